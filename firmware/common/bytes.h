@@ -1,0 +1,48 @@
+/* Explicit little-endian access to byte buffers, for any alignment and any host byte order. */
+#ifndef COMMON_BYTES_H
+#define COMMON_BYTES_H
+
+#include <stdint.h>
+#include <string.h>
+
+static inline void bytes_put_u16(uint8_t *to, uint16_t value) {
+  to[0] = (uint8_t)value;
+  to[1] = (uint8_t)(value >> 8);
+}
+
+static inline void bytes_put_u32(uint8_t *to, uint32_t value) {
+  bytes_put_u16(to, (uint16_t)value);
+  bytes_put_u16(to + 2, (uint16_t)(value >> 16));
+}
+
+static inline void bytes_put_u64(uint8_t *to, uint64_t value) {
+  bytes_put_u32(to, (uint32_t)value);
+  bytes_put_u32(to + 4, (uint32_t)(value >> 32));
+}
+
+static inline uint16_t bytes_get_u16(const uint8_t *from) {
+  return (uint16_t)(from[0] | (uint16_t)from[1] << 8);
+}
+
+static inline uint32_t bytes_get_u32(const uint8_t *from) {
+  return bytes_get_u16(from) | (uint32_t)bytes_get_u16(from + 2) << 16;
+}
+
+static inline uint64_t bytes_get_u64(const uint8_t *from) {
+  return bytes_get_u32(from) | (uint64_t)bytes_get_u32(from + 4) << 32;
+}
+
+/* IEEE 754 binary32 by its bits. */
+static inline uint32_t bytes_from_f32(float value) {
+  uint32_t bits;
+  memcpy(&bits, &value, sizeof bits);
+  return bits;
+}
+
+static inline float bytes_to_f32(uint32_t bits) {
+  float value;
+  memcpy(&value, &bits, sizeof value);
+  return value;
+}
+
+#endif

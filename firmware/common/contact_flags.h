@@ -1,0 +1,30 @@
+/* What a contact result says about itself. The bits travel unchanged in the contact packet.
+ *
+ * A quantity may be used only under its VALID flag; where the flag is off its field is zero.
+ * The warnings leave the numbers in place and say why they deserve less trust.
+ */
+#ifndef COMMON_CONTACT_FLAGS_H
+#define COMMON_CONTACT_FLAGS_H
+
+enum contact_flag {
+  /* State */
+  CONTACT_FLAG_CONTACT = 1 << 0,           /* some sensor is pressed: the gate is open */
+  CONTACT_FLAG_FIT_VALID = 1 << 1,         /* x, y, p0, sigma, force and residual hold a fit */
+  CONTACT_FLAG_UNCERTAINTY_VALID = 1 << 2, /* the standard deviations hold values */
+  CONTACT_FLAG_SLIP_VALID = 1 << 3,        /* the slip distance spans its whole window */
+  CONTACT_FLAG_SLIP = 1 << 4,              /* slip distance above the threshold */
+  CONTACT_FLAG_TARED = 1 << 5,             /* readings are relative to a measured zero */
+
+  /* Warnings */
+  CONTACT_FLAG_LOW_SIGNAL = 1 << 8, /* peak below 20 noise standard deviations */
+  CONTACT_FLAG_FLAT = 1 << 9,       /* pressure without a peak: no location */
+  CONTACT_FLAG_UNCERTAIN = 1 << 10, /* predicted location sd above 0.25 mm, or no convergence */
+  CONTACT_FLAG_MODEL = 1 << 11,     /* residual too large for one Gaussian */
+  CONTACT_FLAG_SATURATED = 1 << 12, /* a sensor is beyond its range; it was left out */
+  CONTACT_FLAG_FORCE_LOWER_BOUND = 1
+                                   << 13, /* too few unsaturated sensors: force is at least this */
+  CONTACT_FLAG_SENSOR_MASKED = 1 << 14,   /* a sensor is missing or was left out */
+  CONTACT_FLAG_AT_BOUND = 1 << 15,        /* the fit stopped at a limit of its box */
+};
+
+#endif

@@ -1,0 +1,232 @@
+/* The packets of the wire protocol, and their only encoder and decoder.
+ *
+ * PROTOCOL.md is the specification. Firmware and host use this same code. A frame on the line is
+ *   COBS(header 12 bytes, body, CRC-32/ISO-HDLC of header and body) 0x00
+ * and nothing here depends on the byte order, the alignment or the structure padding of the
+ * machine. Floats are IEEE 754 binary32 and always finite: the encoder refuses others and the
+ * decoder rejects them.
+ */
+#ifndef WIRE_PACKET_H
+#define WIRE_PACKET_H
+
+#include "common/limits.h"
+#include "common/status.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+#define WIRE_VERSION 1
+
+enum {
+  WIRE_HEADER_BYTES = 12,
+  WIRE_CRC_BYTES = 4,
+  WIRE_MAX_BODY_BYTES = 400,
+  WIRE_MAX_PACKET_BYTES = WIRE_HEADER_BYTES + WIRE_MAX_BODY_BYTES + WIRE_CRC_BYTES,
+  /* COBS adds one byte, and one more for each full 254 bytes; then the delimiter. */
+  WIRE_MAX_FRAME_BYTES = WIRE_MAX_PACKET_BYTES + WIRE_MAX_PACKET_BYTES / 254 + 2,
+};
+
+enum wire_type {
+  /* device to host */
+  WIRE_CONTACT = 0x01,
+  WIRE_RAW = 0x02,
+  WIRE_INFO = 0x03,
+  WIRE_HEALTH = 0x04,
+  WIRE_ACK = 0x05,
+  /* host to device */
+  WIRE_CMD_STREAM = 0x80,
+  WIRE_CMD_TARE = 0x81,
+  WIRE_CMD_RATE = 0x82,
+  WIRE_CMD_OSR = 0x83,
+  WIRE_CMD_SLIP = 0x84,
+  WIRE_CMD_INFO = 0x85,
+  WIRE_CMD_HEALTH = 0x86,
+  WIRE_CMD_LOADER = 0x87,
+};
+
+/* Bits of the stream mask. */
+enum wire_stream {
+  WIRE_STREAM_CONTACT = 1 << 0,
+  WIRE_STREAM_RAW = 1 << 1,
+  WIRE_STREAM_HEALTH = 1 << 2, /* once a second */
+  WIRE_STREAM_ALL = WIRE_STREAM_CONTACT | WIRE_STREAM_RAW | WIRE_STREAM_HEALTH,
+};
+
+/* The result code of an ACK. */
+enum wire_result {
+  WIRE_RESULT_DONE = 0,
+  WIRE_RESULT_UNKNOWN_COMMAND = 1,
+  WIRE_RESULT_OUT_OF_RANGE = 2,
+  WIRE_RESULT_NOT_NOW = 3, /* e.g. tare while no sensor answers */
+};
+
+/* Ranges of the settings that commands carry; the device answers OUT_OF_RANGE beyond them. */
+#define WIRE_RATE_MAX_mHz 2000000u /* 0 means as fast as the sensors allow */
+#define WIRE_RATE_MIN_mHz 100u
+#define WIRE_SLIP_THRESHOLD_MIN_mm 0.01f
+#define WIRE_SLIP_THRESHOLD_MAX_mm 50.0f
+#define WIRE_SLIP_WINDOW_MIN_ms 5u
+#define WIRE_SLIP_WINDOW_MAX_ms 1000u
+#define WIRE_LOADER_MAGIC 0x746F6F42u /* "Boot": a stray byte never reboots a fingertip */
+
+/* Where the time of one frame went, us. The stages follow one another without a gap:
+ * their sum is total_us, from the first bus activity of the frame to the hand-over of its packet.
+ * Values above 65535 saturate.
+ */
+struct wire_stages {
+  uint16_t convert_us;   /* broadcast of the conversion command and the sensors' conversion */
+  uint16_t read_us;      /* reading every sensor */
+  uint16_t queue_us;     /* complete frame waiting for the processor */
+  uint16_t condition_us; /* compensation, tare, gate */
+  uint16_t fit_us;
+  uint16_t contact_us; /* force, slip, packing */
+  uint16_t total_us;
+};
+
+/* One fitted frame. header.t_us is the middle of the sensors' conversion. */
+struct wire_contact {
+  uint32_t frame;        /* counts every frame since start, fitted or not */
+  uint32_t flags;        /* enum contact_flag */
+  uint32_t sensors_used; /* bitmap of the sensors that entered the fit */
+  float x_mm, y_mm;      /* contact location, origin in the centre of the pad */
+  float p0_Pa;           /* peak of the fitted Gaussian */
+  float sigma_mm;        /* its standard deviation */
+  float force_N;         /* 2 pi p0 sigma^2, paper eq. (4) */
+  float slip_mm;         /* slip distance, paper eq. (7) */
+  float residual_rms_Pa; /* root mean square of the fit residuals */
+  float location_sd_mm;  /* predicted radial standard deviation of the location */
+  float force_sd_N;      /* predicted standard deviation of the force */
+  struct wire_stages stages;
+};
+
+/* The readings of one frame. header.t_us as in the contact packet of the same frame number. */
+struct wire_raw {
+  uint32_t frame;
+  uint32_t valid;         /* bitmap: the reading is a measurement */
+  uint32_t saturated;     /* bitmap: the reading is beyond the specified 1200 mbar */
+  int16_t temperature_cC; /* mean of the sensors, 0.01 degC; 0 until first measured */
+  uint8_t sensor_count;   /* 1..FT_MAX_SENSORS */
+  int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* absolute, 1/1024 Pa */
+  int32_t baseline_Pa_q10[FT_MAX_SENSORS]; /* the tare that is subtracted before the fit */
+};
+
+enum { WIRE_TEXT_BYTES = 16 };
+
+struct wire_info {
+  uint8_t firmware_version[3];    /* major, minor, patch */
+  uint8_t sensor_count;           /* 1..FT_MAX_SENSORS */
+  char git_hash[WIRE_TEXT_BYTES]; /* printable ASCII, zero-padded; '+' at its end: uncommitted
+                                     changes */
+  char board[WIRE_TEXT_BYTES];    /* same form */
+  char scene[WIRE_TEXT_BYTES];    /* same form */
+  char serial[WIRE_TEXT_BYTES];   /* sixteen hexadecimal digits: the flash chip's unique id */
+  uint32_t rate_mHz;              /* requested frame rate, 0 = as fast as the sensors allow */
+  uint32_t measured_rate_mHz;     /* over the last second; 0 before */
+  uint16_t osr;                   /* 256..8192 */
+  uint16_t temperature_interval;  /* frames between temperature conversions */
+  uint16_t slip_window_ms;
+  uint8_t fit_iterations;
+  uint8_t streams; /* enum wire_stream */
+  float slip_threshold_mm;
+  float pitch_mm;                                   /* of a rectangular layout; 0 for a free one */
+  float x_mm[FT_MAX_SENSORS], y_mm[FT_MAX_SENSORS]; /* sensor positions */
+};
+
+/* Counters since start, modulo 2^32, and present state. */
+struct wire_health {
+  uint32_t uptime_s;
+  uint32_t frames;            /* read from the array */
+  uint32_t frames_incomplete; /* of these, with at least one sensor missing */
+  uint32_t packets_sent;      /* handed to the USB queue */
+  uint32_t packets_dropped;   /* queue full: whole packets, each leaving a gap in the sequence */
+  uint32_t commands_done;
+  uint32_t commands_rejected; /* unknown, out of range, damaged */
+  uint32_t bus_nacks;         /* reads that a sensor did not acknowledge */
+  uint32_t bus_timeouts;      /* operations that did not end in time */
+  uint32_t bus_recoveries;    /* nine clocks and multiplexer resets */
+  uint32_t zero_readings;     /* a conversion result of 0, and the one after it */
+  uint32_t fit_failures;      /* frames in contact whose fit could not be solved */
+  uint32_t sensors_present;   /* bitmap: answered at the last attempt */
+  uint32_t sensors_prom_bad;  /* bitmap: calibration CRC differs; still streaming */
+  uint32_t watchdog_resets;   /* the last start was by the watchdog: 1 */
+  uint16_t cpu_busy_permille; /* over the last second */
+  uint16_t stack_free_bytes;  /* never touched since start */
+};
+
+struct wire_ack {
+  uint8_t command;       /* enum wire_type of the command */
+  uint8_t result;        /* enum wire_result */
+  uint16_t sequence;     /* the command's own */
+  uint64_t host_time_us; /* the command's header.t_us, so that the host can relate the clocks */
+};
+
+struct wire_cmd_stream {
+  uint8_t streams; /* enum wire_stream; 0 stops */
+};
+struct wire_cmd_rate {
+  uint32_t rate_mHz; /* 0, or WIRE_RATE_MIN_mHz..WIRE_RATE_MAX_mHz */
+};
+struct wire_cmd_osr {
+  uint16_t osr; /* 256, 512, 1024, 2048, 4096, 8192 */
+};
+struct wire_cmd_slip {
+  float threshold_mm;
+  uint16_t window_ms;
+};
+struct wire_cmd_loader {
+  uint32_t magic; /* WIRE_LOADER_MAGIC */
+};
+
+struct wire_packet {
+  uint8_t type;      /* enum wire_type */
+  uint16_t sequence; /* counts the packets of one sender, also those it had to drop */
+  uint64_t t_us;     /* device time since start; in commands the host's own clock */
+  union {
+    struct wire_contact contact;
+    struct wire_raw raw;
+    struct wire_info info;
+    struct wire_health health;
+    struct wire_ack ack;
+    struct wire_cmd_stream cmd_stream;
+    struct wire_cmd_rate cmd_rate;
+    struct wire_cmd_osr cmd_osr;
+    struct wire_cmd_slip cmd_slip;
+    struct wire_cmd_loader cmd_loader;
+  } body;
+};
+
+/* Encodes one packet into a complete frame, delimiter included.
+ * FT_OK: *length bytes are in frame. FT_ERR_SPACE: capacity is too small (WIRE_MAX_FRAME_BYTES
+ * always suffices). FT_ERR_ARGUMENT: unknown type, sensor_count of 0 or too large, or a float
+ * that is not finite. Cost: about 45 Cortex-M0+ cycles a byte.
+ */
+enum ft_status wire_encode(const struct wire_packet *packet, uint8_t *frame, size_t capacity,
+                           size_t *length);
+
+/* Decodes the bytes of one frame without its delimiter. The frame buffer is overwritten.
+ * FT_ERR_FORMAT: bad COBS, wrong length for the type, or a value that the encoder would refuse.
+ * FT_ERR_CRC. FT_ERR_VERSION: another protocol version, the CRC being right. FT_ERR_TYPE: of an
+ * unknown type but undamaged; type, sequence and t_us are set, so that the sender can be answered
+ * and its sequence followed.
+ */
+enum ft_status wire_decode(uint8_t *frame, size_t length, struct wire_packet *packet);
+
+/* Collects bytes from a line into packets. Resynchronisation: whatever happened, the next
+ * frame begins after the next 0x00.
+ */
+struct wire_receiver {
+  uint8_t frame[WIRE_MAX_FRAME_BYTES];
+  size_t length;
+  uint32_t overlong; /* 1 while skipping a frame that is longer than any valid one */
+};
+
+void wire_receiver_init(struct wire_receiver *receiver);
+
+/* Takes one byte. FT_PENDING: no frame is complete. FT_OK: *packet is a new packet.
+ * Else a damaged frame ended here and was discarded, for the reason given by wire_decode, or
+ * FT_ERR_SPACE for an overlong one. Empty frames (two delimiters in a row) are legal fill.
+ */
+enum ft_status wire_receive(struct wire_receiver *receiver, uint8_t byte,
+                            struct wire_packet *packet);
+
+#endif
