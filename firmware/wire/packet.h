@@ -103,7 +103,7 @@ struct wire_contact {
 struct wire_raw {
   uint32_t frame;
   uint32_t valid;         /* bitmap: the reading is a measurement */
-  uint32_t saturated;     /* bitmap: the reading is beyond the specified 1200 mbar */
+  uint32_t saturated;     /* bitmap: beyond 2000 mbar, where the sensor reads low */
   int16_t temperature_cC; /* mean of the sensors, 0.01 degC; 0 until first measured */
   uint8_t sensor_count;   /* 1..FT_MAX_SENSORS */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* absolute, 1/1024 Pa */

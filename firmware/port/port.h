@@ -1,0 +1,42 @@
+/* What exists exactly once per image and that the board provides at link time: time, the event
+ * interrupt, sleep, watchdog, identity, and the way out to the boot loader.
+ */
+#ifndef PORT_PORT_H
+#define PORT_PORT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* Microseconds since start; never goes back. Any context. */
+uint64_t port_now_us(void);
+
+/* The event handler runs in interrupt context, never nested with itself: when the alarm is due and
+ * whenever the array bus has made progress. */
+void port_set_event_handler(void (*handler)(void *context), void *context);
+
+/* Arms the one alarm. A time that has passed fires at once. Replaces an earlier setting. */
+void port_alarm_at_us(uint64_t t_us);
+
+/* Sleeps until an interrupt has run since the last return of this function, so that a condition
+ * checked just before it cannot be missed. Main context only. */
+void port_sleep(void);
+
+/* Must be called at least once each PORT_WATCHDOG_PERIOD_us from the main loop. */
+#define PORT_WATCHDOG_PERIOD_us 500000u
+void port_watchdog_feed(void);
+bool port_started_by_watchdog(void);
+
+/* Sixteen upper-case hexadecimal digits and a terminating zero: the unique id of the flash chip. */
+void port_serial_number(char text[17]);
+
+/* Bytes of the main stack that were never touched since start. Cost grows with the result. */
+size_t port_stack_free_bytes(void);
+
+/* Leaves for the boot ROM's USB loader. Does not return. */
+_Noreturn void port_reboot_to_loader(void);
+
+/* A failed assertion or an unexpected exception: resets the chip. Does not return. */
+_Noreturn void port_panic(void);
+
+#endif

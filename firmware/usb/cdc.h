@@ -1,0 +1,47 @@
+/* A USB CDC ACM device: the byte stream between the fingertip and its host.
+ *
+ * Sources: Universal Serial Bus Specification 2.0 chapter 9; USB Class Definitions for
+ * Communications Devices 1.2 and its PSTN subclass 1.2 (ACM). The controller is the board's, behind
+ * port/usb_controller.h. Exactly one exists per image.
+ *
+ * Interrupt context serves the controller; the functions below are for the main context. Between
+ * the two stand single-producer single-consumer rings, so nothing here locks or waits.
+ */
+#ifndef USB_CDC_H
+#define USB_CDC_H
+
+#include "common/status.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+struct cdc_identity {
+  uint16_t vendor_id;
+  uint16_t product_id;
+  uint16_t device_version_bcd;
+  const char *manufacturer; /* ASCII; the strings must outlive the device */
+  const char *product;
+  const char *serial;
+};
+
+/* Prepares the device and attaches it to the bus. */
+void cdc_start(const struct cdc_identity *identity);
+
+/* The device is configured and the host has raised DTR. */
+bool cdc_is_open(void);
+
+/* Counts the times the port was closed (DTR dropped, bus reset, unplugged): streams end then. */
+uint32_t cdc_close_count(void);
+
+/* Queues all of the bytes or none. FT_ERR_SPACE: the queue is too full. FT_ERR_ARGUMENT: longer
+ * than the queue will ever hold. Bytes queued while the port is closed are discarded at once. */
+enum ft_status cdc_write(const uint8_t *bytes, size_t length);
+
+/* Takes what has arrived, at most capacity bytes; returns how many. */
+size_t cdc_read(uint8_t *bytes, size_t capacity);
+
+/* The host has set 1200 baud and closed the port, or opened it at 1200: it asks for the loader. */
+bool cdc_loader_requested(void);
+
+#endif
