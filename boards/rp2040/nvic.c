@@ -1,0 +1,11 @@
+#include "rp2040/nvic.h"
+
+#include "rp2040/reg.h"
+
+#define NVIC_ISER 0xe000e100u
+#define NVIC_ICPR 0xe000e280u
+
+void rp2040_irq_enable(unsigned irq) {
+  REG32(NVIC_ICPR) = UINT32_C(1) << irq;
+  REG32(NVIC_ISER) = UINT32_C(1) << irq;
+}

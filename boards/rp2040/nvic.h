@@ -1,0 +1,16 @@
+/* Interrupt numbers (RP2040 datasheet 2.3.2) and the interrupt controller of the core (2.4.8). */
+#ifndef RP2040_NVIC_H
+#define RP2040_NVIC_H
+
+enum rp2040_irq {
+  RP2040_IRQ_TIMER_0 = 0,
+  RP2040_IRQ_USBCTRL = 5,
+  RP2040_IRQ_PIO0_0 = 7,
+  RP2040_IRQ_DMA_0 = 11,
+  RP2040_IRQ_I2C0 = 23,
+};
+
+/* Forgets what is pending on the line and lets it interrupt. */
+void rp2040_irq_enable(unsigned irq);
+
+#endif
