@@ -1,0 +1,49 @@
+/* rp2040/i2c.h and the reset pins of rp2040/gpio.h without a chip: three TCA9548A and fifteen
+ * sensors in place of the controller, at the speed of a 400 kHz bus, with faults on request.
+ *
+ * A sensor answers a read with fake_byte(). If several answer at once the bytes are wired-AND, as
+ * on the bus, and counted in `collisions`.
+ */
+#ifndef FAKE_I2C_H
+#define FAKE_I2C_H
+
+#include "pico_mux/board.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct fake_i2c {
+  /* Set by the test */
+  uint64_t now_us;
+  bool mux_missing[BOARD_MUX_COUNT];
+  bool sensor_missing[BOARD_SENSOR_COUNT];
+  unsigned hang_at;             /* the transaction with this number, from 1, never ends */
+  unsigned arbitration_lost_at; /* likewise, loses arbitration */
+  unsigned nack_select_at;      /* likewise, the addressed multiplexer misses its address */
+  unsigned busy_polls;          /* polls of each transaction that find the controller not yet idle */
+  bool sda_held, scl_held;
+  unsigned sda_free_after_clocks; /* 0: no number of clocks frees it */
+  bool sda_free_by_mux_reset;
+
+  /* Seen */
+  unsigned transactions, selects, commands, reads;
+  unsigned collisions;
+  unsigned misuses;          /* calls that the real controller forbids in its state */
+  uint32_t command_reached;  /* bitmap: sensors that heard the last command */
+  uint8_t last_command;
+  unsigned clocks, stops; /* on the lines as plain pins */
+  unsigned opened;
+  bool open;
+};
+
+extern struct fake_i2c fake;
+
+/* Powers everything up anew: no faults, time 0, all channels closed. */
+void fake_i2c_power_up(void);
+
+uint8_t fake_byte(unsigned sensor, uint8_t command, unsigned index);
+
+/* When the transaction under way ends; UINT64_MAX if none does. */
+uint64_t fake_i2c_next_event_us(void);
+
+#endif

@@ -1,0 +1,360 @@
+#include "fake_i2c.h"
+#include "pico_mux/mux_bus.h"
+
+#include <string.h>
+#include <unity.h>
+
+#define ALL_SENSORS 0x7FFFu
+#define STRIP(mux) (0x1Fu << 5 * (mux))
+#define CONVERSION_us 600u
+#define CONVERT 0x40
+#define READ_ADC 0x00
+
+enum { COMMAND_TRANSACTIONS = 4, BETWEEN_TRANSACTIONS = 3, READ_TRANSACTIONS = 31 };
+enum { FRAME_TRANSACTIONS = COMMAND_TRANSACTIONS + BETWEEN_TRANSACTIONS + READ_TRANSACTIONS };
+
+static struct mux_bus mux_bus;
+static struct array_bus bus;
+static struct array_bus_result result;
+
+void setUp(void) {
+  fake_i2c_power_up();
+  memset(&result, 0xA5, sizeof result);
+  TEST_ASSERT_EQUAL_INT(FT_OK, mux_bus_init(&mux_bus, &bus));
+}
+
+void tearDown(void) {
+  TEST_ASSERT_EQUAL_UINT(0, fake.misuses);
+  TEST_ASSERT_EQUAL_UINT(0, fake.collisions);
+}
+
+/* For the cases of one test: checks the last one and powers up for the next. */
+static void next_case(void) {
+  tearDown();
+  setUp();
+}
+
+static uint64_t earlier(uint64_t a, uint64_t b) { return a < b ? a : b; }
+
+/* Polls as the event handler does: at every event and alarm. No operation takes 20 ms. */
+static enum ft_status finish(void) {
+  const uint64_t give_up_us = fake.now_us + 20000;
+  for (;;) {
+    uint64_t wake_us = 0;
+    const enum ft_status status = bus.poll(bus.context, fake.now_us, &result, &wake_us);
+    if (status != FT_PENDING)
+      return status;
+    const uint64_t next_us = earlier(wake_us, fake_i2c_next_event_us());
+    TEST_ASSERT_TRUE_MESSAGE(next_us > fake.now_us, "asks to be woken in the past");
+    fake.now_us = next_us;
+    TEST_ASSERT_TRUE_MESSAGE(fake.now_us < give_up_us, "the operation does not end");
+  }
+}
+
+static enum ft_status command(uint8_t byte) {
+  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_command(bus.context, byte, fake.now_us));
+  return finish();
+}
+
+static enum ft_status read_back(uint8_t byte, uint8_t count) {
+  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_read(bus.context, byte, count, fake.now_us));
+  return finish();
+}
+
+static enum ft_status recover(void) {
+  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_recovery(bus.context, fake.now_us));
+  return finish();
+}
+
+static void wait_for_conversion(void) {
+  const uint64_t until_us = fake.now_us + CONVERSION_us;
+  while (fake_i2c_next_event_us() <= until_us) {
+    fake.now_us = fake_i2c_next_event_us();
+    mux_bus_service(&mux_bus, fake.now_us);
+  }
+  fake.now_us = until_us;
+}
+
+static enum ft_status frame(void) {
+  const enum ft_status status = command(CONVERT);
+  if (status != FT_OK)
+    return status;
+  wait_for_conversion();
+  return read_back(READ_ADC, 3);
+}
+
+static void expect_readings(uint32_t sensors) {
+  TEST_ASSERT_EQUAL_HEX32(sensors, result.acknowledged);
+  for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
+    for (unsigned i = 0; (sensors >> k & 1) != 0 && i < 3; i++)
+      TEST_ASSERT_EQUAL_HEX8(fake_byte(k, READ_ADC, i), result.bytes[k][i]);
+  }
+}
+
+static void expect_good_frame(void) {
+  TEST_ASSERT_EQUAL_INT(FT_OK, frame());
+  expect_readings(ALL_SENSORS);
+}
+
+static void test_a_command_reaches_all_sensors_in_one_write(void) {
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  TEST_ASSERT_EQUAL_HEX32(ALL_SENSORS, result.acknowledged);
+  TEST_ASSERT_EQUAL_UINT(0, result.nacks);
+  TEST_ASSERT_EQUAL_HEX32(ALL_SENSORS, fake.command_reached);
+  TEST_ASSERT_EQUAL_HEX8(CONVERT, fake.last_command);
+  TEST_ASSERT_EQUAL_UINT(3, fake.selects);
+  TEST_ASSERT_EQUAL_UINT(1, fake.commands);
+}
+
+static void test_a_command_ends_with_its_own_stop(void) {
+  const uint64_t start_us = fake.now_us;
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  TEST_ASSERT_EQUAL_UINT64(start_us + COMMAND_TRANSACTIONS * I2C_WRITE_us, fake.now_us);
+}
+
+static void test_transactions_and_bus_time_of_a_frame(void) {
+  for (int n = 0; n < 3; n++) {
+    const unsigned before = fake.transactions;
+    TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+    wait_for_conversion();
+    TEST_ASSERT_EQUAL_UINT(COMMAND_TRANSACTIONS + BETWEEN_TRANSACTIONS, fake.transactions - before);
+    const uint64_t read_us = fake.now_us;
+    TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+    expect_readings(ALL_SENSORS);
+    TEST_ASSERT_EQUAL_UINT(0, result.nacks);
+    TEST_ASSERT_EQUAL_UINT(FRAME_TRANSACTIONS, fake.transactions - before);
+    TEST_ASSERT_EQUAL_UINT64(read_us + 16 * I2C_WRITE_us + 15 * I2C_WRITE_READ_us(3), fake.now_us);
+  }
+}
+
+static void test_without_service_the_read_does_the_switching(void) {
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  fake.now_us += CONVERSION_us;
+  TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+  expect_readings(ALL_SENSORS);
+  TEST_ASSERT_EQUAL_UINT(FRAME_TRANSACTIONS, fake.transactions);
+}
+
+static void test_a_read_may_follow_a_command_at_once(void) {
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+  expect_readings(ALL_SENSORS);
+}
+
+static void test_commands_in_a_row_reach_everybody(void) {
+  for (uint8_t byte = 1; byte < 5; byte++) {
+    TEST_ASSERT_EQUAL_INT(FT_OK, command(byte));
+    TEST_ASSERT_EQUAL_HEX8(byte, fake.last_command);
+    TEST_ASSERT_EQUAL_HEX32(ALL_SENSORS, fake.command_reached);
+  }
+}
+
+static void test_reads_of_every_length_without_a_command(void) {
+  for (uint8_t count = 1; count <= ARRAY_BUS_MAX_READ_BYTES; count++) {
+    TEST_ASSERT_EQUAL_INT(FT_OK, read_back(0xA2, count));
+    TEST_ASSERT_EQUAL_HEX32(ALL_SENSORS, result.acknowledged);
+    for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++)
+      TEST_ASSERT_EQUAL_HEX8(fake_byte(k, 0xA2, count - 1u), result.bytes[k][count - 1]);
+  }
+}
+
+static void test_a_controller_that_is_slow_to_become_idle_is_asked_again(void) {
+  fake.busy_polls = 3;
+  expect_good_frame();
+}
+
+static void test_arguments_and_order_of_calls(void) {
+  uint64_t wake_us;
+  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.poll(bus.context, 0, &result, &wake_us));
+  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.start_read(bus.context, 0, 0, 0));
+  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.start_read(bus.context, 0, 4, 0));
+  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_command(bus.context, CONVERT, 0));
+  TEST_ASSERT_EQUAL_INT(FT_ERR_BUSY, bus.start_command(bus.context, CONVERT, 0));
+  TEST_ASSERT_EQUAL_INT(FT_ERR_BUSY, bus.start_read(bus.context, READ_ADC, 3, 0));
+  TEST_ASSERT_EQUAL_INT(FT_OK, finish());
+  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.poll(bus.context, fake.now_us, &result, &wake_us));
+}
+
+static void test_a_missing_multiplexer_costs_its_own_sensors_only(void) {
+  for (unsigned mux = 0; mux < BOARD_MUX_COUNT; mux++) {
+    next_case();
+    fake.mux_missing[mux] = true;
+    for (int n = 0; n < 3; n++) {
+      TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+      TEST_ASSERT_EQUAL_HEX32(ALL_SENSORS & ~STRIP(mux), result.acknowledged);
+      TEST_ASSERT_EQUAL_HEX32(ALL_SENSORS & ~STRIP(mux), fake.command_reached);
+      uint32_t nacks = result.nacks;
+      wait_for_conversion();
+      TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+      expect_readings(ALL_SENSORS & ~STRIP(mux));
+      nacks += result.nacks;
+      /* Asked once for the command and once for the read. */
+      TEST_ASSERT_EQUAL_UINT32(2, nacks);
+    }
+    fake.mux_missing[mux] = false;
+    expect_good_frame();
+    TEST_ASSERT_EQUAL_UINT32(0, result.nacks);
+  }
+}
+
+static void test_without_any_multiplexer_nobody_acknowledges(void) {
+  memset(fake.mux_missing, true, sizeof fake.mux_missing);
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  TEST_ASSERT_EQUAL_HEX32(0, result.acknowledged);
+  TEST_ASSERT_EQUAL_UINT32(3, result.nacks);
+  TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+  TEST_ASSERT_EQUAL_HEX32(0, result.acknowledged);
+  TEST_ASSERT_EQUAL_UINT32(3, result.nacks);
+}
+
+static void test_a_missing_sensor_shows_when_it_is_read(void) {
+  for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
+    next_case();
+    fake.sensor_missing[k] = true;
+    TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+    TEST_ASSERT_EQUAL_HEX32(ALL_SENSORS, result.acknowledged);
+    wait_for_conversion();
+    TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+    expect_readings(ALL_SENSORS & ~(1u << k));
+    TEST_ASSERT_EQUAL_UINT32(1, result.nacks);
+  }
+}
+
+static void test_without_any_sensor_the_command_is_refused(void) {
+  memset(fake.sensor_missing, true, sizeof fake.sensor_missing);
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  TEST_ASSERT_EQUAL_HEX32(0, result.acknowledged);
+  TEST_ASSERT_EQUAL_UINT32(1, result.nacks);
+}
+
+/* tearDown checks the point: its open channels never answer for another strip. */
+static void test_a_multiplexer_that_misses_one_selection_is_shut(void) {
+  for (unsigned at = 1; at <= FRAME_TRANSACTIONS; at++) {
+    next_case();
+    expect_good_frame();
+    fake.nack_select_at = fake.transactions + at;
+    const unsigned selects = fake.selects;
+    TEST_ASSERT_EQUAL_INT(FT_OK, frame());
+    expect_readings(result.acknowledged);
+    TEST_ASSERT_NOT_EQUAL(selects, fake.selects);
+    TEST_ASSERT_EQUAL_UINT(0, fake.collisions);
+    expect_good_frame();
+    TEST_ASSERT_EQUAL_UINT(0, fake.collisions);
+  }
+}
+
+static void test_a_transaction_that_never_ends_at_every_place(void) {
+  for (unsigned at = 1; at <= FRAME_TRANSACTIONS; at++) {
+    next_case();
+    expect_good_frame();
+    fake.hang_at = fake.transactions + at;
+    const uint64_t start_us = fake.now_us;
+    TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, frame());
+    TEST_ASSERT_LESS_THAN_UINT64(start_us + 5000, fake.now_us);
+    TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+    expect_good_frame();
+  }
+}
+
+static void test_lost_arbitration_at_every_place(void) {
+  for (unsigned at = 1; at <= FRAME_TRANSACTIONS; at++) {
+    next_case();
+    expect_good_frame();
+    fake.arbitration_lost_at = fake.transactions + at;
+    TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, frame());
+    TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+    expect_good_frame();
+  }
+}
+
+static void test_a_failed_bus_is_left_alone_until_recovery(void) {
+  fake.hang_at = 2;
+  TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, command(CONVERT));
+  const unsigned before = fake.transactions;
+  TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, command(CONVERT));
+  TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, read_back(READ_ADC, 3));
+  TEST_ASSERT_EQUAL_UINT(before, fake.transactions);
+}
+
+static void test_recovery_clocks_until_sda_is_released(void) {
+  for (unsigned clocks = 1; clocks <= 9; clocks++) {
+    next_case();
+    fake.sda_held = true;
+    fake.sda_free_after_clocks = clocks;
+    TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+    TEST_ASSERT_EQUAL_UINT(clocks, fake.clocks);
+    TEST_ASSERT_EQUAL_UINT(1, fake.stops);
+    expect_good_frame();
+  }
+}
+
+static void test_recovery_of_a_free_bus_sends_a_stop_only(void) {
+  TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+  TEST_ASSERT_EQUAL_UINT(0, fake.clocks);
+  TEST_ASSERT_EQUAL_UINT(1, fake.stops);
+}
+
+static void test_recovery_by_the_multiplexer_reset(void) {
+  fake.sda_held = true;
+  fake.sda_free_by_mux_reset = true;
+  TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+  TEST_ASSERT_EQUAL_UINT(9, fake.clocks);
+  expect_good_frame();
+}
+
+static void test_a_line_held_for_good_is_reported_and_asked_again(void) {
+  for (int line = 0; line < 2; line++) {
+    next_case();
+    *(line == 0 ? &fake.sda_held : &fake.scl_held) = true;
+    for (int n = 0; n < 3; n++) {
+      TEST_ASSERT_EQUAL_INT(FT_ERR_STUCK, recover());
+      TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, command(CONVERT));
+    }
+    fake.sda_held = fake.scl_held = false;
+    TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+    expect_good_frame();
+  }
+}
+
+static void test_recovery_abandons_whatever_is_under_way(void) {
+  for (uint64_t after_us = 0; after_us < 3000; after_us += 77) {
+    next_case();
+    TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_read(bus.context, READ_ADC, 3, fake.now_us));
+    const uint64_t until_us = fake.now_us + after_us;
+    uint64_t wake_us = 0;
+    while (fake_i2c_next_event_us() <= until_us) {
+      fake.now_us = fake_i2c_next_event_us();
+      TEST_ASSERT_EQUAL_INT(FT_PENDING, bus.poll(bus.context, fake.now_us, &result, &wake_us));
+    }
+    fake.now_us = until_us;
+    TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+    expect_good_frame();
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_a_command_reaches_all_sensors_in_one_write);
+  RUN_TEST(test_a_command_ends_with_its_own_stop);
+  RUN_TEST(test_transactions_and_bus_time_of_a_frame);
+  RUN_TEST(test_without_service_the_read_does_the_switching);
+  RUN_TEST(test_a_read_may_follow_a_command_at_once);
+  RUN_TEST(test_commands_in_a_row_reach_everybody);
+  RUN_TEST(test_reads_of_every_length_without_a_command);
+  RUN_TEST(test_a_controller_that_is_slow_to_become_idle_is_asked_again);
+  RUN_TEST(test_arguments_and_order_of_calls);
+  RUN_TEST(test_a_missing_multiplexer_costs_its_own_sensors_only);
+  RUN_TEST(test_without_any_multiplexer_nobody_acknowledges);
+  RUN_TEST(test_a_missing_sensor_shows_when_it_is_read);
+  RUN_TEST(test_without_any_sensor_the_command_is_refused);
+  RUN_TEST(test_a_multiplexer_that_misses_one_selection_is_shut);
+  RUN_TEST(test_a_transaction_that_never_ends_at_every_place);
+  RUN_TEST(test_lost_arbitration_at_every_place);
+  RUN_TEST(test_a_failed_bus_is_left_alone_until_recovery);
+  RUN_TEST(test_recovery_clocks_until_sda_is_released);
+  RUN_TEST(test_recovery_of_a_free_bus_sends_a_stop_only);
+  RUN_TEST(test_recovery_by_the_multiplexer_reset);
+  RUN_TEST(test_a_line_held_for_good_is_reported_and_asked_again);
+  RUN_TEST(test_recovery_abandons_whatever_is_under_way);
+  return UNITY_END();
+}
