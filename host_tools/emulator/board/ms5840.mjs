@@ -1,0 +1,199 @@
+/**
+ * TE MS5840-02BA pressure sensor, written from its family's datasheets and independent of the firmware.
+ *
+ * Commands: reset 1Eh (no acknowledge for 2.8 ms), PROM A0h..ACh, convert 40h/50h | osr, ADC read 00h. The
+ * early-read trap is modelled: an ADC read during a conversion returns 0 and spoils that conversion, so does a
+ * convert command; without a finished conversion, or a second time, an ADC read returns 0.
+ *
+ * The 24-bit codes are found by inverting the datasheet's compensation, second order included, for the absolute
+ * pressure and temperature in the middle of the conversion, plus Gaussian noise of the datasheet's rms.
+ */
+import { I2cTarget } from './i2c_bus.mjs';
+
+export const ADDRESS = 0x76;
+const RESET_NS = 2.8e6;
+/** Typical conversion time as a fraction of the datasheet's maximum, before the oscillator's own tolerance. */
+const CONVERSION_FRACTION = 0.96;
+const OSCILLATOR_TOLERANCE = 0.04;
+const CODE_MAX = 0xffffff;
+
+/** By osr field / 2: maximum conversion time, pressure noise rms, temperature noise rms. */
+export const OSR = [
+  { name: 256, max_ns: 0.56e6, noise_Pa: 11, noise_degC: 0.012 },
+  { name: 512, max_ns: 1.1e6, noise_Pa: 6.2, noise_degC: 0.009 },
+  { name: 1024, max_ns: 2.17e6, noise_Pa: 3.9, noise_degC: 0.006 },
+  { name: 2048, max_ns: 4.32e6, noise_Pa: 2.8, noise_degC: 0.004 },
+  { name: 4096, max_ns: 8.61e6, noise_Pa: 2.1, noise_degC: 0.003 },
+  { name: 8192, max_ns: 17.2e6, noise_Pa: 1.6, noise_degC: 0.002 },
+];
+
+/** A public dump of a part (C1..C6), around which the simulated parts spread. */
+const TYPICAL = [41335, 41466, 26840, 27317, 31225, 28780];
+const SPREAD = 0.03;
+/** Product type and factory bits of the same dump. */
+const WORD0 = 0x8a1;
+
+/** CRC-4 over seven PROM words, the first one's top nibble and the eighth word taken as 0. */
+export function crc4(words) {
+  let remainder = 0;
+  const all = [words[0] & 0x0fff, ...words.slice(1, 7), 0];
+  for (const word of all) {
+    for (const byte of [word >> 8, word & 0xff]) {
+      remainder ^= byte;
+      for (let i = 0; i < 8; i++) remainder = remainder & 0x8000 ? ((remainder << 1) ^ 0x3000) & 0xffff : (remainder << 1) & 0xffff;
+    }
+  }
+  return remainder >> 12;
+}
+
+export function makeProm(prng) {
+  const words = [WORD0, ...TYPICAL.map((c) => Math.min(65535, Math.round(c * prng.range(1 - SPREAD, 1 + SPREAD))))];
+  words[0] |= crc4(words) << 12;
+  return words;
+}
+
+/** First-order temperature and the second-order terms for it, in the datasheet's units, not rounded. */
+function secondOrder(dT, temperature) {
+  const below = temperature - 2000;
+  if (temperature >= 2000) return { t: 0, off: 0, sens: 0 };
+  if (temperature >= 1000) return { t: (12 * dT * dT) / 2 ** 35, off: (30 * below * below) / 2 ** 8, sens: 0 };
+  return { t: (14 * dT * dT) / 2 ** 35, off: (35 * below * below) / 2 ** 3, sens: (63 * below * below) / 2 ** 5 };
+}
+
+/** Pressure (Pa) and temperature (0.01 degC) of a pair of codes: the datasheet's formula in real numbers. */
+export function compensate(words, d1, d2) {
+  const dT = d2 - words[5] * 2 ** 8;
+  const first = 2000 + (dT * words[6]) / 2 ** 23;
+  const second = secondOrder(dT, first);
+  const off = words[2] * 2 ** 17 + (words[4] * dT) / 2 ** 6 - second.off;
+  const sens = words[1] * 2 ** 16 + (words[3] * dT) / 2 ** 7 - second.sens;
+  return { pressure_Pa: ((d1 * sens) / 2 ** 21 - off) / 2 ** 15, temperature_cdegC: first - second.t };
+}
+
+/** Codes (real numbers) that a part with this PROM gives for a pressure and temperature. */
+export function codesFor(words, pressure_Pa, temperature_degC) {
+  const wanted = temperature_degC * 100;
+  let low = -(2 ** 24);
+  let high = 2 ** 24;
+  const temperatureOf = (dT) => {
+    const first = 2000 + (dT * words[6]) / 2 ** 23;
+    return first - secondOrder(dT, first).t;
+  };
+  for (let i = 0; i < 60; i++) {
+    const middle = (low + high) / 2;
+    if (temperatureOf(middle) < wanted) low = middle;
+    else high = middle;
+  }
+  const dT = (low + high) / 2;
+  const second = secondOrder(dT, 2000 + (dT * words[6]) / 2 ** 23);
+  const off = words[2] * 2 ** 17 + (words[4] * dT) / 2 ** 6 - second.off;
+  const sens = words[1] * 2 ** 16 + (words[3] * dT) / 2 ** 7 - second.sens;
+  return { d1: ((pressure_Pa * 2 ** 15 + off) * 2 ** 21) / sens, d2: dT + words[5] * 2 ** 8 };
+}
+
+export class Ms5840 extends I2cTarget {
+  /**
+   * @param options index; prng: this sensor's own; now_ns: () => time; report: Report;
+   *   stimulus: (index, t_ns) => { pressure_Pa, temperature_degC }, absolute;
+   *   faults: (index) => { dead, promCorrupt, adcZero, holdSda } of this moment
+   */
+  constructor({ index, prng, now_ns, report, stimulus, faults = () => ({}) }) {
+    super(ADDRESS);
+    this.index = index;
+    this.prng = prng;
+    this.now_ns = now_ns;
+    this.report = report;
+    this.stimulus = stimulus;
+    this.faults = faults;
+    this.prom = makeProm(prng);
+    this.timeFactor = CONVERSION_FRACTION * (1 + prng.range(-OSCILLATOR_TOLERANCE, OSCILLATOR_TOLERANCE));
+    this.busyUntil_ns = 0;
+    this.wasReset = false;
+    this.conversion = null;
+    this.output = [];
+    this.heldClocks = 0;
+    this.holding = false;
+  }
+
+  get holdsSda() {
+    return this.holding;
+  }
+
+  hold() {
+    this.holding = true;
+    this.heldClocks = 0;
+  }
+
+  release() {
+    this.holding = false;
+  }
+
+  clock() {
+    if (this.holding && ++this.heldClocks >= 9) this.holding = false;
+  }
+
+  acknowledgesAddress() {
+    return this.now_ns() >= this.busyUntil_ns && !this.faults(this.index).dead && !this.holding;
+  }
+
+  receive(command) {
+    const now = this.now_ns();
+    if (command === 0x1e) {
+      this.busyUntil_ns = now + RESET_NS;
+      this.wasReset = true;
+      this.conversion = null;
+      this.output = [];
+      return true;
+    }
+    if (command === 0x00) {
+      this.output = this.#adcRead(now);
+      return true;
+    }
+    const osr = command & 0x0f;
+    if ((command & 0xf0) === 0x40 || (command & 0xf0) === 0x50) {
+      if (osr & 1 || osr > 10) return false;
+      this.#convert(now, (command & 0xf0) === 0x40, OSR[osr >> 1]);
+      return true;
+    }
+    if (command >= 0xa0 && command <= 0xac && !(command & 1)) {
+      let word = this.prom[(command - 0xa0) >> 1];
+      if (this.faults(this.index).promCorrupt) word ^= 0x0140 << ((command >> 1) & 3);
+      this.output = [(word >> 8) & 0xff, word & 0xff];
+      return true;
+    }
+    return false;
+  }
+
+  transmit() {
+    return this.output.length ? this.output.shift() : 0xff;
+  }
+
+  #convert(now, isPressure, osr) {
+    if (!this.wasReset) this.report.warn('ms5840', `sensor ${this.index}: conversion before the reset command that loads its PROM`);
+    const interrupted = this.conversion !== null && now < this.conversion.end_ns;
+    const duration_ns = osr.max_ns * this.timeFactor;
+    this.conversion = { isPressure, osr, start_ns: now, end_ns: now + duration_ns, spoiled: interrupted };
+  }
+
+  #adcRead(now) {
+    const conversion = this.conversion;
+    if (!conversion || this.faults(this.index).adcZero) return [0, 0, 0];
+    if (now < conversion.end_ns) {
+      conversion.spoiled = true;
+      return [0, 0, 0];
+    }
+    this.conversion = null;
+    const code = this.#code(conversion);
+    return [code >> 16, (code >> 8) & 0xff, code & 0xff];
+  }
+
+  #code({ isPressure, osr, start_ns, end_ns, spoiled }) {
+    const { pressure_Pa, temperature_degC } = this.stimulus(this.index, (start_ns + end_ns) / 2);
+    const noise = this.prng.normal();
+    const codes = isPressure
+      ? codesFor(this.prom, pressure_Pa + noise * osr.noise_Pa, temperature_degC).d1
+      : codesFor(this.prom, pressure_Pa, temperature_degC + noise * osr.noise_degC).d2;
+    const spoil = spoiled ? this.prng.range(-0.5, 0.5) * 2 ** 22 : 0;
+    return Math.max(0, Math.min(CODE_MAX, Math.round(codes + spoil)));
+  }
+}

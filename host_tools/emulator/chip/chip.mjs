@@ -1,0 +1,357 @@
+/**
+ * The RP2040 as the firmware meets it at power-on, built on rp2040js with everything replaced that a board
+ * would punish and rp2040js lets pass.
+ *
+ *     const chip = new Chip(time, report, { serial, seed });
+ *     chip.load(image);            // raw flash image, offset 0
+ *     chip.boot();                 // what the boot ROM does, then the second stage
+ *     chip.runUntil(at_ns);        // throws Stopped when the run is over before
+ *
+ * Boot: the boot ROM's part is played here. The CRC-32 of the 256-byte second stage is checked as the boot ROM
+ * checks it, the second stage is copied to 0x20041f00 and entered there with lr = 0, clk_sys on the ring
+ * oscillator, and only IO_QSPI, PADS_QSPI and TIMER out of reset. SRAM starts filled with seeded noise.
+ *
+ * `chip.onCall(address, callback)` runs `callback(chip)` each time the instruction at `address` is about to
+ * execute; `chip.core.cycles` is the processor cycle count at that moment (sleep does not count).
+ */
+import { RP2040 } from 'rp2040js';
+import { Prng } from '../prng.mjs';
+import { Clocks, makeRosc, Pll, RESET_NAMES, Resets, ROSC_HZ, Xosc } from './clocks.mjs';
+import { RAM_BASE, RAM_BYTES, StrictCore } from './core.mjs';
+import { I2cBlock } from './i2c_block.mjs';
+import { RegisterFile } from './registers.mjs';
+import { StrictSio } from './sio.mjs';
+import { Ssi } from './ssi.mjs';
+import { Timer, Watchdog } from './timer_watchdog.mjs';
+import { UsbBlock } from './usb_block.mjs';
+
+export const FLASH_BYTES = 2 * 1024 * 1024;
+const XIP_BASE = 0x10000000;
+const BOOT2_BYTES = 256;
+const BOOT2_RAM = 0x20041f00;
+const DPRAM_BASE = 0x50100000;
+/** Asleep for so long without one wake-up means the firmware hung. */
+const HUNG_AFTER_NS = 2e9;
+
+/** Page (address >> 14) to bit in RESETS. */
+const RESET_BIT_OF_PAGE = new Map(
+  Object.entries({
+    0x40004000: 18, 0x40000000: 19, 0x40014000: 5, 0x40018000: 6, 0x4001c000: 8, 0x40020000: 9, 0x40028000: 12,
+    0x4002c000: 13, 0x40030000: 1, 0x40034000: 22, 0x40038000: 23, 0x4003c000: 16, 0x40040000: 17, 0x40044000: 3,
+    0x40048000: 4, 0x4004c000: 0, 0x40050000: 14, 0x40054000: 21, 0x4005c000: 15, 0x4006c000: 20, 0x50000000: 2,
+    0x50100000: 24, 0x50110000: 24, 0x50200000: 10, 0x50300000: 11,
+  }).map(([address, bit]) => [Number(address) >>> 14, bit]),
+);
+
+/** Ends the run; `reason` is what the report calls it. */
+export class Stopped extends Error {
+  constructor(reason, detail = {}) {
+    super(reason);
+    this.reason = reason;
+    this.detail = detail;
+  }
+}
+
+class StrictLogger {
+  constructor(chip) {
+    this.chip = chip;
+  }
+  debug() {}
+  info() {}
+  warn(source, message) {
+    this.chip.fail(source, message);
+  }
+  error(source, message) {
+    this.chip.fail(source, message);
+  }
+}
+
+/** CRC-32 with polynomial 0x04c11db7, start 0xffffffff, no reflection, no final xor. */
+export function boot2Crc(bytes) {
+  let crc = 0xffffffff;
+  for (const byte of bytes) {
+    crc ^= byte << 24;
+    for (let i = 0; i < 8; i++) crc = crc & 0x80000000 ? (crc << 1) ^ 0x04c11db7 : crc << 1;
+  }
+  return crc >>> 0;
+}
+
+export class Chip extends RP2040 {
+  /**
+   * @param time SimulatedTime
+   * @param report Report
+   * @param options serial: 8-byte flash unique id; seed: of the power-on noise in SRAM;
+   *   kept: { sram, watchdog } of the life before a watchdog reboot
+   */
+  constructor(time, report, { serial, seed = 1, kept = null }) {
+    super(time.scope());
+    this.time = time;
+    this.report = report;
+    this.options = { serial, seed };
+    this.logger = new StrictLogger(this);
+    this.core = new StrictCore(this);
+    this.sio = new StrictSio(this);
+    this.clkSys = ROSC_HZ;
+    this.clkUsbHz = 0;
+    this.hooks = new Map();
+    this.slept_since_ns = -1;
+    this.sleepCycles = 0;
+    this.onWatchdog = null;
+    this.onUsbBoot = null;
+    this.gpioChange_ns = 0;
+
+    this.resets = new Resets(this);
+    this.xosc = new Xosc(this);
+    this.pllSys = new Pll(this, 'PLL_SYS');
+    this.pllUsb = new Pll(this, 'PLL_USB');
+    this.clocks = new Clocks(this);
+    this.timer = new Timer(this);
+    this.watchdog = new Watchdog(this, kept?.watchdog);
+    this.ssi = new Ssi(this, serial);
+    this.i2c = [new I2cBlock(this, 0), new I2cBlock(this, 1)];
+    this.usbCtrl = new UsbBlock(this);
+    const ioQspi = new RegisterFile(this, 'IO_QSPI', Object.fromEntries([0, 1, 2, 3, 4, 5].flatMap((i) => [[8 * i, [0, 0]], [8 * i + 4, [0x1f, 0x3003331f]]])));
+    const writeIoQspi = ioQspi.writeUint32.bind(ioQspi);
+    ioQspi.writeUint32 = (offset, value) => {
+      writeIoQspi(offset, value);
+      if (offset === 0x0c) this.ssi.forceSelect(((value >>> 8) & 3) === 2);
+    };
+    Object.assign(this.peripherals, {
+      0x14000: new RegisterFile(this, 'XIP_CTRL', { 0: [3, 0xb], 4: [0, 0], 8: [2, 0], 12: [0, 0], 16: [0, 0] }),
+      0x18000: this.ssi,
+      0x40008: this.clocks,
+      0x4000c: this.resets,
+      0x40018: ioQspi,
+      0x40024: this.xosc,
+      0x40028: this.pllSys,
+      0x4002c: this.pllUsb,
+      0x40044: this.i2c[0],
+      0x40048: this.i2c[1],
+      0x40054: this.timer,
+      0x40058: this.watchdog,
+      0x40060: makeRosc(this),
+      0x40064: new RegisterFile(this, 'VREG_AND_CHIP_RESET', { 0: [0xb1, 0xf3], 4: [9, 0x1f], 8: [1 << 8, 1 << 24] }),
+      0x50110: this.usbCtrl,
+    });
+    for (const pin of this.gpio) pin.padValue = 0x56;
+    for (const pin of this.qspi) pin.padValue = 0x56;
+    if (kept) this.sram.set(kept.sram);
+    else {
+      const noise = new Prng(seed ^ 0x5eed);
+      const words = new Uint32Array(this.sram.buffer);
+      for (let i = 0; i < words.length; i++) words[i] = noise.uint32();
+    }
+    this.#makeBootRom();
+    this.onBreak = (code) => {
+      if (code === 0x42) {
+        const [r0, r1] = this.core.registers;
+        throw new Stopped('entered the USB boot loader', { r0, r1 });
+      }
+      this.fail('core', `breakpoint or undefined instruction ${code} at 0x${(this.core.PC - 2).toString(16)}`);
+    };
+  }
+
+  /** Record a failure and end the run. */
+  fail(source, message) {
+    const pc = this.core?.registers?.[15] >>> 0;
+    this.report.fail(source, `${message} (pc 0x${pc.toString(16)})`);
+    throw new Stopped('failure');
+  }
+
+  #makeBootRom() {
+    const rom = new DataView(this.bootrom.buffer);
+    const [table, lookup, usbBoot] = [0x40, 0x60, 0x80];
+    const code = (at, ...ops) => ops.forEach((op, i) => rom.setUint16(at + 2 * i, op, true));
+    rom.setUint32(0x00, BOOT2_RAM, true);
+    rom.setUint32(0x04, usbBoot | 1, true);
+    rom.setUint32(0x10, 0x0301754d, true);
+    rom.setUint16(0x14, table, true);
+    rom.setUint16(0x16, table + 4, true);
+    rom.setUint16(0x18, lookup | 1, true);
+    code(table, 0x4255, usbBoot | 1, 0, 0);
+    // ldrh r2,[r0]; cmp r2,#0; beq none; cmp r2,r1; beq found; adds r0,#4; b .; found: ldrh r0,[r0,#2]; bx lr; none: movs r0,#0; bx lr
+    code(lookup, 0x8802, 0x2a00, 0xd005, 0x428a, 0xd001, 0x3004, 0xe7f8, 0x8840, 0x4770, 0x2000, 0x4770);
+    code(usbBoot, 0xbe42, 0xe7fe);
+  }
+
+  load(image) {
+    if (image.length < BOOT2_BYTES + 8 || image.length > FLASH_BYTES) {
+      throw new Error(`image of ${image.length} bytes; expected 264 bytes to 2 MiB of raw flash content`);
+    }
+    this.flash.fill(0xff);
+    this.flash.set(image);
+    this.image = image;
+  }
+
+  boot() {
+    const stored = this.flashView.getUint32(BOOT2_BYTES - 4, true);
+    const computed = boot2Crc(this.flash.subarray(0, BOOT2_BYTES - 4));
+    const { core } = this;
+    core.VTOR = 0;
+    core.registers.fill(0);
+    core.registers[13] = BOOT2_RAM;
+    core.registers[15] = BOOT2_RAM;
+    this.time.setCycleSource(core, 1e9 / this.clkSys);
+    if (stored !== computed) {
+      this.fail('boot ROM', `second stage CRC is 0x${stored.toString(16)}, computed 0x${computed.toString(16)}: the chip would not start this image`);
+    }
+    const magic = this.watchdog.scratch[4];
+    if (this.watchdog.reason && magic === 0xb007c0d3) {
+      this.fail('boot ROM', 'watchdog reboot to a vector (scratch 4 magic) is not modelled');
+    }
+    this.sram.set(this.flash.subarray(0, BOOT2_BYTES), BOOT2_RAM - RAM_BASE);
+  }
+
+  /** Stop existing: no alarm of this chip fires any more. */
+  dispose() {
+    this.clock.dispose();
+  }
+
+  updateClocks() {
+    const hz = this.clocks.sysHz;
+    if (hz > 133e6) this.fail('CLOCKS', `clk_sys at ${hz / 1e6} MHz; the rated maximum is 133 MHz`);
+    if (hz && hz !== this.clkSys) {
+      this.clkSys = hz;
+      this.time.setCycleSource(this.core, 1e9 / hz);
+      this.ppb.systickTimer.frequency = hz;
+    } else if (!hz) this.fail('CLOCKS', 'clk_sys stopped');
+    this.clkUsbHz = this.clocks.usbHz;
+    this.clkPeri = this.clocks.periHz || this.clkPeri;
+  }
+
+  resetBlock(bit) {
+    if (bit === 3 || bit === 4) this.i2c[bit - 3].reset();
+    else if (bit === 12 || bit === 13) {
+      (bit === 12 ? this.pllSys : this.pllUsb).reset();
+      this.updateClocks();
+    } else if (bit === 21) this.timer.reset();
+    else if (bit === 24) this.usbCtrl.reset();
+    else if (bit === 8) for (const pin of this.gpio) this.#setPad(pin, 0x56);
+    else if (bit === 5) {
+      for (const pin of this.gpio) {
+        pin.ctrl = 0x1f;
+        pin.checkForUpdates();
+      }
+    }
+  }
+
+  #setPad(pin, value) {
+    pin.padValue = value;
+    pin.checkForUpdates();
+  }
+
+  gpioWillChange() {
+    this.gpioChange_ns = this.time.nanos;
+  }
+
+  watchdogFired(reason) {
+    const wdsel = this.peripherals[0x40010].wdsel;
+    if ((wdsel & 0x1fffc) !== 0x1fffc) {
+      this.fail('WATCHDOG', `fired with PSM_WDSEL 0x${wdsel.toString(16)}; select everything but the oscillators (0x1fffc), or the reboot is partial`);
+    }
+    this.watchdog.reason = reason;
+    this.onWatchdog?.(reason);
+    throw new Stopped('watchdog reboot', { reason });
+  }
+
+  #checkPage(address, what) {
+    const bit = RESET_BIT_OF_PAGE.get(address >>> 14) ?? (address >>> 16 === 0x5010 ? 24 : undefined);
+    if (bit !== undefined && this.resets.isHeld(bit)) {
+      this.fail('RESETS', `${what} 0x${address.toString(16)} while ${RESET_NAMES[bit]} is held in reset`);
+    }
+  }
+
+  /** A load that did not hit SRAM. */
+  busRead(address, bytes) {
+    if (address & (bytes - 1)) this.fail('core', `unaligned ${8 * bytes}-bit read of 0x${address.toString(16)}`);
+    const word = address & ~3;
+    let value;
+    if (address < 0x4000) value = this.bootrom[address >>> 2];
+    else if (address >= XIP_BASE && address < 0x14000000) {
+      const problem = this.ssi.xipProblem;
+      if (problem) this.fail('XIP', `read of flash at 0x${address.toString(16)} while ${problem}`);
+      const offset = word & 0xffffff;
+      if (offset >= FLASH_BYTES) this.fail('XIP', `read of 0x${address.toString(16)}, beyond the 2 MiB flash`);
+      value = this.flashView.getUint32(offset, true);
+    } else if (address >>> 28 === 0xd) {
+      value = this.sio.readUint32(word - 0xd0000000);
+    } else if (address >>> 12 === 0xe000e) {
+      value = this.ppb.readUint32(word & 0xfff);
+    } else if (address >>> 12 === DPRAM_BASE >>> 12) {
+      this.#checkPage(address, 'read of');
+      value = this.usbDPRAMView.getUint32(word - DPRAM_BASE, true);
+    } else {
+      const peripheral = this.findPeripheral(address);
+      if (!peripheral) this.fail('core', `read of 0x${address.toString(16)}, where nothing is`);
+      this.#checkPage(address, 'read of');
+      value = peripheral.readUint32(word & 0xfff);
+    }
+    if (bytes === 4) return value >>> 0;
+    return bytes === 2 ? (value >>> (8 * (address & 2))) & 0xffff : (value >>> (8 * (address & 3))) & 0xff;
+  }
+
+  /** A store that did not hit SRAM. Narrow stores to peripherals replicate the value, as the bus does. */
+  busWrite(address, value, bytes) {
+    if (address & (bytes - 1)) this.fail('core', `unaligned ${8 * bytes}-bit write of 0x${address.toString(16)}`);
+    if (address < 0x4000) this.fail('core', `write to 0x${address.toString(16)} in the boot ROM (null pointer?)`);
+    if (address >>> 26 === XIP_BASE >>> 26) this.fail('core', `write to 0x${address.toString(16)} in flash`);
+    if (address >>> 12 === DPRAM_BASE >>> 12) {
+      this.#checkPage(address, 'write of');
+      this.usbCtrl.writeDpram(address - DPRAM_BASE, value, bytes);
+      return;
+    }
+    const wide = bytes === 4 ? value : bytes === 2 ? (value | (value << 16)) >>> 0 : Math.imul(value, 0x01010101) >>> 0;
+    if (address >>> 28 === 0xd) {
+      if (bytes !== 4) this.fail('SIO', `${8 * bytes}-bit write of 0x${address.toString(16)}`);
+      this.sio.writeUint32(address - 0xd0000000, value);
+    } else if (address >>> 12 === 0xe000e) {
+      if (bytes !== 4) this.fail('core', `${8 * bytes}-bit write of system register 0x${address.toString(16)}`);
+      this.ppb.writeUint32(address & 0xfff, value);
+    } else {
+      const peripheral = this.findPeripheral(address);
+      if (!peripheral) this.fail('core', `write to 0x${address.toString(16)}, where nothing is`);
+      this.#checkPage(address, 'write of');
+      if (address >>> 14 === 0x40014000 >>> 14) this.gpioWillChange();
+      peripheral.writeUint32Atomic(address & 0xffc, wide, (address >>> 12) & 3);
+    }
+  }
+
+  onCall(address, callback) {
+    this.hooks.set(address & ~1, callback);
+  }
+
+  /** Run until emulated time `end_ns`, firing alarms on the way. */
+  runUntil(end_ns) {
+    const { time, core } = this;
+    for (;;) {
+      time.fireDue();
+      if (core.waiting) core.checkForInterrupts();
+      const now = time.nanos;
+      if (now >= end_ns) return;
+      const next = Math.min(time.next_ns, end_ns);
+      if (core.waiting) {
+        if (this.slept_since_ns < 0) this.slept_since_ns = now;
+        if (!core.wakeable) this.fail('core', 'firmware hung: WFI with no interrupt enabled');
+        if (now - this.slept_since_ns > HUNG_AFTER_NS) {
+          this.fail('core', `firmware hung: asleep for ${HUNG_AFTER_NS / 1e9} s without an interrupt`);
+        }
+        time.advanceTo(next);
+        continue;
+      }
+      this.slept_since_ns = -1;
+      const stop = core.cycles + Math.max(1, Math.ceil((next - now) / time.ns_per_cycle - 1e-9));
+      time.earliestChanged = false;
+      if (this.hooks.size) {
+        do {
+          this.hooks.get(core.registers[15] & ~1)?.(this);
+          core.executeInstruction();
+        } while (core.cycles < stop && !core.waiting && !time.earliestChanged);
+      } else {
+        do core.executeInstruction();
+        while (core.cycles < stop && !core.waiting && !time.earliestChanged);
+      }
+    }
+  }
+}
+
+export { RAM_BASE, RAM_BYTES };

@@ -1,0 +1,252 @@
+/**
+ * The XIP serial interface (DW_apb_ssi, RP2040 datasheet 4.10) with a W25Q16-like flash behind it.
+ *
+ * Modelled: eight-bit full-duplex transfers through 16-deep FIFOs with bus time, chip select (automatic while
+ * the transmit FIFO holds data, or forced through IO_QSPI), the commands read status, write enable, write
+ * status and read unique id (4Bh), the dummy read that enters continuous-read mode and its exit by FFh, and
+ * whether execute-in-place works with the present settings. Any other flash command fails the run.
+ */
+import { BasePeripheral } from 'rp2040js';
+
+const FIFO_DEPTH = 16;
+const TMOD_TX_AND_RX = 0;
+const TMOD_EEPROM_READ = 3;
+
+export class Flash {
+  constructor(fail, serial) {
+    this.fail = fail;
+    this.serial = serial;
+    this.status2 = 0x02;
+    this.writeEnabled = false;
+    this.continuousRead = false;
+    this.command = [];
+  }
+
+  select() {
+    this.command = [];
+  }
+
+  deselect() {
+    const [op] = this.command;
+    if (op === undefined) return;
+    if (this.continuousRead) {
+      if (this.command.every((b) => b === 0xff || b === 0)) this.continuousRead = false;
+      else this.fail('flash', `command 0x${op.toString(16)} while in continuous-read mode; leave it with FFh bytes first`);
+    } else if (op === 0x06) this.writeEnabled = true;
+    else if (op === 0x01) {
+      if (!this.writeEnabled) this.fail('flash', 'status written without write enable');
+      this.status2 = this.command[2] ?? this.status2;
+      this.writeEnabled = false;
+    } else if (op === 0x4b && this.command.length < 13) {
+      this.fail('flash', `chip select rose after ${this.command.length} of the 13 bytes of a unique-id read; keep the FIFO fed or force chip select`);
+    }
+  }
+
+  exchange(byte) {
+    this.command.push(byte);
+    if (this.continuousRead) return 0xff;
+    const index = this.command.length - 1;
+    switch (this.command[0]) {
+      case 0x05:
+        return index ? (this.writeEnabled ? 2 : 0) : 0xff;
+      case 0x35:
+        return index ? this.status2 : 0xff;
+      case 0x4b:
+        return index >= 5 && index < 13 ? this.serial[index - 5] : 0xff;
+      case 0x06:
+      case 0x01:
+      case 0xff:
+        return 0xff;
+      case 0x9f:
+        return [0xff, 0xef, 0x40, 0x15][index] ?? 0xff;
+    }
+    if (index === 0) this.fail('flash', `command 0x${byte.toString(16)} is not modelled`);
+    return 0xff;
+  }
+}
+
+export class Ssi extends BasePeripheral {
+  constructor(chip, serial) {
+    super(chip, 'SSI');
+    this.flash = new Flash((s, m) => chip.fail(s, m), serial);
+    this.tx = [];
+    this.rx = [];
+    this.shifting = null;
+    this.forcedSelect = false;
+    this.selected = false;
+    this.alarm = chip.clock.createAlarm(() => this.#shifted());
+    // As the boot ROM leaves it: single-bit 03h reads.
+    this.ctrlr0 = (31 << 16) | (TMOD_EEPROM_READ << 8);
+    this.ctrlr1 = 0;
+    this.enabled = 1;
+    this.ser = 1;
+    this.baudr = 4;
+    this.spiCtrlr0 = (0x03 << 24) | (2 << 8) | (6 << 2);
+    this.sampleDelay = 0;
+    this.driveEdge = 0;
+    this.entering = [];
+  }
+
+  /** Why execute-in-place does not work now, or null. */
+  get xipProblem() {
+    if (!this.enabled) return 'the SSI is disabled';
+    if (((this.ctrlr0 >>> 8) & 3) !== TMOD_EEPROM_READ || ((this.ctrlr0 >>> 16) & 31) !== 31) {
+      return 'the SSI is not in 32-bit EEPROM-read mode';
+    }
+    if (this.baudr < 2 || this.baudr & 1) return `the SSI divider BAUDR is ${this.baudr}`;
+    if (this.forcedSelect) return 'chip select is forced';
+    const hasInstruction = (this.spiCtrlr0 >>> 8) & 3;
+    if (hasInstruction && this.flash.continuousRead) return 'the flash is in continuous-read mode but the SSI sends a command';
+    if (!hasInstruction && !this.flash.continuousRead) return 'the SSI sends no command but the flash is not in continuous-read mode';
+    const command = this.spiCtrlr0 >>> 24;
+    if (hasInstruction && ![0x03, 0x0b, 0x3b, 0x6b, 0xbb, 0xeb].includes(command)) {
+      return `0x${command.toString(16)} is not a read command`;
+    }
+    return null;
+  }
+
+  forceSelect(low) {
+    if (low === this.forcedSelect) return;
+    this.forcedSelect = low;
+    this.#updateSelect();
+  }
+
+  #updateSelect() {
+    const selected = this.forcedSelect || this.shifting !== null;
+    if (selected === this.selected) return;
+    this.selected = selected;
+    if (selected) this.flash.select();
+    else this.flash.deselect();
+  }
+
+  get #serialMode() {
+    return ((this.ctrlr0 >>> 8) & 3) === TMOD_TX_AND_RX && ((this.ctrlr0 >>> 16) & 31) === 7 && ((this.ctrlr0 >>> 21) & 3) === 0;
+  }
+
+  #start() {
+    if (this.shifting !== null || !this.tx.length || !this.enabled || !this.ser) return;
+    this.shifting = this.tx.shift();
+    this.#updateSelect();
+    this.alarm.schedule((8 * this.baudr * 1e9) / this.rp2040.clkSys);
+  }
+
+  #shifted() {
+    const answer = this.flash.exchange(this.shifting & 0xff);
+    if (this.rx.length >= FIFO_DEPTH) this.rp2040.fail('SSI', 'receive FIFO overflow');
+    this.rx.push(answer);
+    if (this.tx.length) {
+      this.shifting = this.tx.shift();
+      this.alarm.schedule((8 * this.baudr * 1e9) / this.rp2040.clkSys);
+    } else {
+      this.shifting = null;
+      this.#updateSelect();
+    }
+  }
+
+  readUint32(offset) {
+    switch (offset) {
+      case 0x00:
+        return this.ctrlr0;
+      case 0x04:
+        return this.ctrlr1;
+      case 0x08:
+        return this.enabled;
+      case 0x10:
+        return this.ser;
+      case 0x14:
+        return this.baudr;
+      case 0x20:
+        return this.tx.length;
+      case 0x24:
+        return this.rx.length;
+      case 0x28: {
+        const busy = this.shifting !== null;
+        return (busy ? 1 : 0) | (this.tx.length < FIFO_DEPTH ? 2 : 0) | (this.tx.length === 0 ? 4 : 0) | (this.rx.length ? 8 : 0) | (this.rx.length >= FIFO_DEPTH ? 16 : 0);
+      }
+      case 0x48:
+        return 0;
+      case 0x58:
+        return 0x51535049;
+      case 0x5c:
+        return 0x3430312a;
+      case 0x60:
+        if (!this.rx.length) this.rp2040.fail('SSI', 'data register read while the receive FIFO is empty');
+        return this.rx.shift();
+      case 0xf0:
+        return this.sampleDelay;
+      case 0xf4:
+        return this.spiCtrlr0;
+      case 0xf8:
+        return this.driveEdge;
+    }
+    return super.readUint32(offset);
+  }
+
+  writeUint32(offset, value) {
+    const configuration = offset === 0x00 || offset === 0x04 || offset === 0x14 || offset === 0xf0 || offset === 0xf4 || offset === 0xf8;
+    if (configuration && this.enabled) {
+      this.rp2040.fail('SSI', `configuration register 0x${offset.toString(16)} written while enabled`);
+    }
+    switch (offset) {
+      case 0x00:
+        this.ctrlr0 = value >>> 0;
+        return;
+      case 0x04:
+        this.ctrlr1 = value & 0xffff;
+        return;
+      case 0x08:
+        if (!(value & 1)) {
+          if (this.shifting !== null) this.rp2040.fail('SSI', 'disabled in mid-transfer');
+          this.tx = [];
+          this.rx = [];
+          this.entering = [];
+        }
+        this.enabled = value & 1;
+        return;
+      case 0x10:
+        this.ser = value & 1;
+        this.#start();
+        return;
+      case 0x14:
+        this.baudr = value & 0xfffe;
+        return;
+      case 0x18:
+      case 0x1c:
+      case 0x2c:
+      case 0x4c:
+        return;
+      case 0x60:
+        this.#push(value);
+        return;
+      case 0xf0:
+        this.sampleDelay = value & 0xff;
+        return;
+      case 0xf4:
+        this.spiCtrlr0 = value >>> 0;
+        return;
+      case 0xf8:
+        this.driveEdge = value & 0xff;
+        return;
+    }
+    super.writeUint32(offset, value);
+  }
+
+  #push(value) {
+    if (!this.enabled) this.rp2040.fail('SSI', 'data register written while disabled');
+    if (((this.ctrlr0 >>> 8) & 3) === TMOD_EEPROM_READ) {
+      // Command and address of one read; only the dummy read that enters continuous-read mode is of interest.
+      this.entering.push(value >>> 0);
+      if (this.entering.length === 2) {
+        const modeBits = this.entering[1] & 0xff;
+        if (![0xeb, 0xbb].includes(this.entering[0])) this.rp2040.fail('SSI', `dummy read with command 0x${this.entering[0].toString(16)} is not modelled`);
+        this.flash.continuousRead = (modeBits & 0xf0) === 0xa0;
+        this.rx.push(0);
+      }
+      return;
+    }
+    if (!this.#serialMode) this.rp2040.fail('SSI', 'only 8-bit single-lane transmit-and-receive transfers are modelled');
+    if (this.tx.length >= FIFO_DEPTH) this.rp2040.fail('SSI', 'transmit FIFO overflow');
+    this.tx.push(value & 0xff);
+    this.#start();
+  }
+}

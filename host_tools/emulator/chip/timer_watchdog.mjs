@@ -1,0 +1,227 @@
+/**
+ * TIMER and WATCHDOG with the tick generator between them (RP2040 datasheet 4.6 and 4.7).
+ *
+ * The timer counts ticks of clk_ref / WATCHDOG_TICK.CYCLES, which must be 1 MHz. The counter reaches a
+ * value exactly when the tick does, and an alarm fires at that tick, never earlier. The watchdog counts
+ * down twice per tick (erratum RP2040-E1) and reboots what PSM_WDSEL selects.
+ */
+import { BasePeripheral } from 'rp2040js';
+
+const WATCHDOG_MAX = 0xffffff;
+
+export class Timer extends BasePeripheral {
+  constructor(chip) {
+    super(chip, 'TIMER');
+    this.alarms = [0, 1, 2, 3].map((i) => ({ armed: false, target: 0, alarm: chip.clock.createAlarm(() => this.#fire(i)) }));
+    /** Emulated time at which the counter was 0, or null while no tick runs. */
+    this.zero_ns = null;
+    this.stopped_us = 0;
+    this.reset();
+  }
+
+  reset() {
+    for (const a of this.alarms) {
+      a.armed = false;
+      a.alarm.cancel();
+    }
+    if (this.zero_ns !== null) this.zero_ns = this.rp2040.clock.nanos;
+    this.stopped_us = 0;
+    this.latchedHigh = 0;
+    this.raw = 0;
+    this.enable = 0;
+    this.force = 0;
+    this.writeLow = 0;
+    this.#interrupts();
+  }
+
+  tickStarted() {
+    if (this.zero_ns === null) this.zero_ns = this.rp2040.clock.nanos - this.stopped_us * 1000;
+    for (const a of this.alarms) if (a.armed) this.#schedule(a);
+  }
+
+  tickStopped() {
+    if (this.zero_ns === null) return;
+    this.stopped_us = this.count_us;
+    this.zero_ns = null;
+    for (const a of this.alarms) a.alarm.cancel();
+  }
+
+  get count_us() {
+    return this.zero_ns === null ? this.stopped_us : Math.floor((this.rp2040.clock.nanos - this.zero_ns) / 1000 + 1e-6);
+  }
+
+  #count() {
+    if (this.zero_ns === null) {
+      this.rp2040.fail('TIMER', 'counter read while no tick runs; set WATCHDOG_TICK (ENABLE, CYCLES) first');
+    }
+    return this.count_us;
+  }
+
+  readUint32(offset) {
+    switch (offset) {
+      case 0x08:
+        return this.latchedHigh;
+      case 0x0c: {
+        const count = this.#count();
+        this.latchedHigh = Math.floor(count / 2 ** 32);
+        return count >>> 0;
+      }
+      case 0x10:
+      case 0x14:
+      case 0x18:
+      case 0x1c:
+        return this.alarms[(offset - 0x10) >> 2].target;
+      case 0x20:
+        return this.alarms.reduce((bits, a, i) => bits | (a.armed ? 1 << i : 0), 0);
+      case 0x24:
+        return Math.floor(this.#count() / 2 ** 32);
+      case 0x28:
+        return this.#count() >>> 0;
+      case 0x2c:
+        return 3;
+      case 0x30:
+        return 0;
+      case 0x34:
+        return this.raw;
+      case 0x38:
+        return this.enable;
+      case 0x3c:
+        return this.force;
+      case 0x40:
+        return (this.raw & this.enable) | this.force;
+    }
+    return super.readUint32(offset);
+  }
+
+  writeUint32(offset, value) {
+    switch (offset) {
+      case 0x10:
+      case 0x14:
+      case 0x18:
+      case 0x1c: {
+        const a = this.alarms[(offset - 0x10) >> 2];
+        a.target = value >>> 0;
+        a.armed = true;
+        if (this.zero_ns !== null) this.#schedule(a);
+        return;
+      }
+      case 0x20:
+        this.alarms.forEach((a, i) => {
+          if ((this.rawWriteValue >>> i) & 1) {
+            a.armed = false;
+            a.alarm.cancel();
+          }
+        });
+        return;
+      case 0x2c:
+        return;
+      case 0x34:
+        this.raw &= ~this.rawWriteValue;
+        break;
+      case 0x38:
+        this.enable = value & 0xf;
+        break;
+      case 0x3c:
+        this.force = value & 0xf;
+        break;
+      default:
+        super.writeUint32(offset, value);
+    }
+    this.#interrupts();
+  }
+
+  /** The alarm matches when the low word becomes equal to the target: a target equal to now waits a whole turn. */
+  #schedule(a) {
+    const now_us = this.count_us;
+    const delta_us = ((a.target - (now_us >>> 0)) >>> 0) || 2 ** 32;
+    a.alarm.scheduleAt(this.zero_ns + (now_us + delta_us) * 1000);
+  }
+
+  #fire(index) {
+    this.alarms[index].armed = false;
+    this.raw |= 1 << index;
+    this.#interrupts();
+  }
+
+  #interrupts() {
+    const status = (this.raw & this.enable) | this.force;
+    for (let i = 0; i < 4; i++) this.rp2040.setInterrupt(i, ((status >>> i) & 1) === 1);
+  }
+}
+
+export class Watchdog extends BasePeripheral {
+  /** @param kept what a previous life of the chip left: { reason, scratch } */
+  constructor(chip, kept) {
+    super(chip, 'WATCHDOG');
+    this.reason = kept?.reason ?? 0;
+    this.scratch = kept?.scratch ?? new Uint32Array(8);
+    this.ctrl = 0x07000000;
+    this.tick = 0x200;
+    this.load = 0;
+    this.expires_ns = Infinity;
+    this.remaining = 0;
+    this.alarm = chip.clock.createAlarm(() => this.#expired(1));
+  }
+
+  get enabled() {
+    return (this.ctrl >>> 30) & 1;
+  }
+
+  get ticking() {
+    return (this.tick & 0x200) !== 0 && (this.tick & 0x1ff) !== 0;
+  }
+
+  #left() {
+    if (this.expires_ns === Infinity) return this.remaining;
+    return Math.max(0, Math.ceil(((this.expires_ns - this.rp2040.clock.nanos) / 1000) * 2));
+  }
+
+  #rearm() {
+    this.alarm.cancel();
+    this.expires_ns = Infinity;
+    if (!this.enabled || !this.ticking) return;
+    this.expires_ns = this.rp2040.clock.nanos + (this.remaining / 2) * 1000;
+    this.alarm.scheduleAt(this.expires_ns);
+  }
+
+  readUint32(offset) {
+    if (offset === 0x00) return ((this.ctrl & 0x47000000) | this.#left()) >>> 0;
+    if (offset === 0x08) return this.reason;
+    if (offset >= 0x0c && offset <= 0x28) return this.scratch[(offset - 0x0c) >> 2];
+    if (offset === 0x2c) return this.tick | (this.ticking ? 0x400 : 0);
+    return super.readUint32(offset);
+  }
+
+  writeUint32(offset, value) {
+    if (offset === 0x00) {
+      const left = this.#left();
+      this.ctrl = value & 0x47000000;
+      this.remaining = left;
+      this.#rearm();
+      if (value & 0x80000000) this.#expired(2);
+    } else if (offset === 0x04) {
+      this.remaining = value & WATCHDOG_MAX;
+      this.#rearm();
+    } else if (offset >= 0x0c && offset <= 0x28) {
+      this.scratch[(offset - 0x0c) >> 2] = value;
+    } else if (offset === 0x2c) {
+      const left = this.#left();
+      this.tick = value & 0x3ff;
+      this.remaining = left;
+      if (this.ticking) {
+        const hz = this.rp2040.clocks.refHz / (this.tick & 0x1ff);
+        if (Math.abs(hz - 1e6) > 1) {
+          this.rp2040.fail('WATCHDOG', `tick of ${(hz / 1e6).toFixed(4)} MHz; clk_ref / CYCLES must be 1 MHz`);
+        }
+        this.rp2040.timer.tickStarted();
+      } else this.rp2040.timer.tickStopped();
+      this.#rearm();
+    } else super.writeUint32(offset, value);
+  }
+
+  #expired(reason) {
+    this.expires_ns = Infinity;
+    this.remaining = 0;
+    this.rp2040.watchdogFired(reason);
+  }
+}

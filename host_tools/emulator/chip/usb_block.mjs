@@ -1,0 +1,386 @@
+/**
+ * USB controller of the RP2040 in device mode (datasheet 4.1), seen from both sides: registers and DPRAM for the
+ * firmware, tokens for a host (`busReset`, `sof`, `setup`, `inToken`, `outData`).
+ *
+ * Fails the run on what hardware would punish: AVAILABLE set in the same write as other fields of a buffer
+ * control register or less than one 48 MHz cycle later, a buffer touched while the controller owns it (unless
+ * aborted), buffers not 64-byte aligned, wrong data PID, pull-up without VBUS, PHY, clock or controller.
+ */
+import { BasePeripheral } from 'rp2040js';
+
+const IRQ = 5;
+const CLK_USB_HZ = 48e6;
+
+const BC_AVAILABLE = 1 << 10;
+const BC_STALL = 1 << 11;
+const BC_RESET_SELECT = 1 << 12;
+const BC_PID = 1 << 13;
+const BC_FULL = 1 << 15;
+const BC_LENGTH = 0x3ff;
+
+const EP_ENABLE = 0x80000000;
+const EP_DOUBLE = 1 << 30;
+const EP_INT_PER_BUFFER = 1 << 29;
+const EP_INT_PER_TWO = 1 << 28;
+
+const SIE_PULLUP_EN = 1 << 16;
+const SIE_EP0_INT_1BUF = 1 << 29;
+
+const ST_ACK_REC = 1 << 30;
+const ST_STALL_REC = 1 << 29;
+const ST_BUS_RESET = 1 << 19;
+const ST_TRANS_COMPLETE = 1 << 18;
+const ST_SETUP_REC = 1 << 17;
+const ST_CONNECTED = 1 << 16;
+const ST_RESUME = 1 << 11;
+const ST_SUSPENDED = 1 << 4;
+const ST_WRITE_CLEAR = 0xff0f0800 | ST_SUSPENDED;
+
+const DPRAM_BYTES = 4096;
+
+export class UsbBlock extends BasePeripheral {
+  constructor(chip) {
+    super(chip, 'USB');
+    this.onPortChange = () => {};
+    /** (endpoint, isIn): the firmware gave the controller a buffer, or set a stall. */
+    this.onArmed = () => {};
+    this.reset();
+  }
+
+  reset() {
+    this.address = 0;
+    this.mainCtrl = 0;
+    this.sieCtrl = 0;
+    this.sieStatus = 0;
+    this.buffStatus = 0;
+    this.epAbort = 0;
+    this.epAbortDone = 0;
+    this.stallArm = 0;
+    this.stallNak = 0;
+    this.muxing = 0;
+    this.pwr = 0;
+    this.nakPoll = 0x00100010;
+    this.inte = 0;
+    this.intf = 0;
+    this.frame = 0;
+    this.sofPending = false;
+    this.phy = new Map();
+    this.select = new Uint8Array(32);
+    this.fieldsWritten_ns = new Float64Array(64).fill(-1e9);
+    this.quiet = true;
+    this.resetDone = false;
+    this.#update();
+    this.onPortChange();
+  }
+
+  get vbusDetected() {
+    return (this.pwr & 0xc) === 0xc;
+  }
+
+  /** The pull-up is visible to the host. */
+  get attached() {
+    return (this.sieCtrl & SIE_PULLUP_EN) !== 0 && this.attachProblem === null && !this.rp2040.resets.isHeld(24);
+  }
+
+  /** Why the pull-up would not make a working device, or null. */
+  get attachProblem() {
+    if (!(this.mainCtrl & 1)) return 'MAIN_CTRL.CONTROLLER_EN is not set';
+    if (!(this.muxing & 1)) return 'USB_MUXING.TO_PHY is not set';
+    if (!(this.muxing & 8)) return 'USB_MUXING.SOFTCON is not set';
+    if (!this.vbusDetected) return 'USB_PWR does not say that VBUS is present';
+    if (Math.abs(this.rp2040.clkUsbHz - CLK_USB_HZ) > 1) return `clk_usb is ${this.rp2040.clkUsbHz / 1e6} MHz instead of 48 MHz`;
+    return null;
+  }
+
+  get raw() {
+    const s = this.sieStatus;
+    return (
+      (this.stallNak ? 1 << 19 : 0) | (this.epAbortDone ? 1 << 18 : 0) | (this.sofPending ? 1 << 17 : 0) |
+      (s & ST_SETUP_REC ? 1 << 16 : 0) | (s & ST_RESUME ? 1 << 15 : 0) | (s & ST_SUSPENDED ? 1 << 14 : 0) |
+      (s & ST_CONNECTED ? 1 << 13 : 0) | (s & ST_BUS_RESET ? 1 << 12 : 0) | (this.vbusDetected ? 1 << 11 : 0) |
+      (s & ST_STALL_REC ? 1 << 10 : 0) | (this.buffStatus ? 1 << 4 : 0) | (s & ST_TRANS_COMPLETE ? 1 << 3 : 0)
+    );
+  }
+
+  #update() {
+    this.rp2040.setInterrupt(IRQ, ((this.raw & this.inte) | this.intf) !== 0);
+  }
+
+  readUint32(offset) {
+    switch (offset) {
+      case 0x00:
+        return this.address;
+      case 0x40:
+        return this.mainCtrl;
+      case 0x48:
+        this.sofPending = false;
+        this.#update();
+        return this.frame;
+      case 0x4c:
+        return this.sieCtrl >>> 0;
+      case 0x50:
+        return (this.sieStatus | (this.vbusDetected ? 1 : 0)) >>> 0;
+      case 0x58:
+        return this.buffStatus >>> 0;
+      case 0x5c:
+        return 0;
+      case 0x60:
+        return this.epAbort >>> 0;
+      case 0x64:
+        return this.epAbortDone >>> 0;
+      case 0x68:
+        return this.stallArm;
+      case 0x6c:
+        return this.nakPoll;
+      case 0x70:
+        return this.stallNak >>> 0;
+      case 0x74:
+        return this.muxing;
+      case 0x78:
+        return this.pwr;
+      case 0x7c:
+      case 0x80:
+      case 0x84:
+        return this.phy.get(offset) ?? 0;
+      case 0x8c:
+        return this.raw;
+      case 0x90:
+        return this.inte;
+      case 0x94:
+        return this.intf;
+      case 0x98:
+        return (this.raw & this.inte) | this.intf;
+    }
+    return super.readUint32(offset);
+  }
+
+  writeUint32(offset, value) {
+    switch (offset) {
+      case 0x00:
+        this.address = value & 0x7f;
+        return;
+      case 0x40:
+        if (value & 2) this.rp2040.fail('USB', 'host mode is not modelled');
+        this.mainCtrl = value & 0x80000003;
+        break;
+      case 0x4c:
+        this.sieCtrl = value >>> 0;
+        break;
+      case 0x50:
+        this.sieStatus &= ~(this.rawWriteValue & ST_WRITE_CLEAR);
+        break;
+      case 0x58:
+        this.buffStatus &= ~this.rawWriteValue;
+        break;
+      case 0x60:
+        this.epAbort = value >>> 0;
+        this.epAbortDone |= this.epAbort;
+        break;
+      case 0x64:
+        this.epAbortDone &= ~this.rawWriteValue;
+        break;
+      case 0x68:
+        this.stallArm = value & 3;
+        this.#update();
+        if (value & 1) this.onArmed(0, true);
+        if (value & 2) this.onArmed(0, false);
+        return;
+      case 0x6c:
+        this.nakPoll = value;
+        return;
+      case 0x70:
+        this.stallNak &= ~this.rawWriteValue;
+        break;
+      case 0x74:
+        this.muxing = value & 0xf;
+        break;
+      case 0x78:
+        this.pwr = value & 0x3f;
+        break;
+      case 0x7c:
+      case 0x80:
+      case 0x84:
+        this.phy.set(offset, value >>> 0);
+        return;
+      case 0x90:
+        this.inte = value & 0xfffff;
+        break;
+      case 0x94:
+        this.intf = value & 0xfffff;
+        break;
+      default:
+        super.writeUint32(offset, value);
+    }
+    this.#update();
+    this.onPortChange();
+  }
+
+  writeDpram(offset, value, bytes) {
+    const view = this.rp2040.usbDPRAMView;
+    if (offset < 0x08 || offset >= 0x100) {
+      if (bytes === 4) view.setUint32(offset, value, true);
+      else if (bytes === 2) view.setUint16(offset, value, true);
+      else view.setUint8(offset, value);
+      return;
+    }
+    const word = offset & ~3;
+    const old = view.getUint32(word, true);
+    const shift = 8 * (offset & 3);
+    const mask = bytes === 4 ? 0xffffffff : bytes === 2 ? 0xffff << shift : 0xff << shift;
+    const next = ((old & ~mask) | ((value << shift) & mask)) >>> 0;
+    if (word < 0x80) this.#checkEndpointControl(word, next);
+    else this.#checkBufferControl(word, old, next);
+    view.setUint32(word, next, true);
+    if (word >= 0x80 && (next & ~old) & (BC_AVAILABLE | BC_STALL | (BC_AVAILABLE << 16))) {
+      this.onArmed((word - 0x80) >> 3, (word & 4) === 0);
+    }
+  }
+
+  #checkEndpointControl(word, value) {
+    if (!(value & EP_ENABLE)) return;
+    const name = `EP${word >> 3} ${word & 4 ? 'OUT' : 'IN'}`;
+    if (value & 0x3f) this.rp2040.fail('USB', `${name}: buffer address 0x${(value & 0xffff).toString(16)} is not 64-byte aligned`);
+    const base = value & 0xffc0;
+    if (base < 0x180 || base > DPRAM_BYTES - 64) this.rp2040.fail('USB', `${name}: buffer at 0x${base.toString(16)}, outside 0x180..0xfc0`);
+  }
+
+  #checkBufferControl(word, old, next) {
+    const chip = this.rp2040;
+    const now = chip.clock.nanos;
+    const endpoint = (word - 0x80) >> 3;
+    const isOut = (word & 4) !== 0;
+    const name = `EP${endpoint} ${isOut ? 'OUT' : 'IN'} buffer control`;
+    const bit = 2 * endpoint + (isOut ? 1 : 0);
+    const ownerMayTake = endpoint === 0 || this.quiet || ((this.epAbort >>> bit) & 1) !== 0;
+    for (const half of [0, 1]) {
+      const was = (old >>> (16 * half)) & 0xffff;
+      const is = (next >>> (16 * half)) & 0xffff;
+      const fieldsChanged = ((was ^ is) & ~(BC_AVAILABLE | BC_STALL | (half ? BC_RESET_SELECT : 0))) !== 0;
+      const time = 2 * bit + half;
+      if (was & BC_AVAILABLE && (fieldsChanged || !(is & BC_AVAILABLE)) && !ownerMayTake) {
+        chip.fail('USB', `${name}: written while the controller owns the buffer; abort the endpoint (EP_ABORT) first`);
+      }
+      if (is & BC_AVAILABLE && !(was & BC_AVAILABLE)) {
+        if (fieldsChanged) chip.fail('USB', `${name}: AVAILABLE set in the same write as the other fields; write those first`);
+        const gap_ns = now - this.fieldsWritten_ns[time];
+        if (gap_ns < 1e9 / CLK_USB_HZ) {
+          chip.fail('USB', `${name}: AVAILABLE set ${gap_ns.toFixed(0)} ns after the other fields; wait at least one cycle of clk_usb (21 ns)`);
+        }
+        if ((is & BC_LENGTH) > 64) chip.fail('USB', `${name}: length ${is & BC_LENGTH} exceeds the 64-byte packet`);
+        if (!isOut && !(is & BC_FULL)) chip.fail('USB', `${name}: an IN buffer was made available without FULL`);
+        if (isOut && is & BC_FULL) chip.fail('USB', `${name}: an OUT buffer was made available with FULL set`);
+      }
+      if (fieldsChanged) this.fieldsWritten_ns[time] = now;
+    }
+  }
+
+  #control(endpoint, isIn) {
+    return this.rp2040.usbDPRAMView.getUint32(8 * endpoint + (isIn ? 0 : 4), true);
+  }
+
+  /** The buffer that answers a token, or null if the endpoint is deaf. */
+  #buffer(endpoint, isIn) {
+    const word = 0x80 + 8 * endpoint + (isIn ? 0 : 4);
+    const bit = 2 * endpoint + (isIn ? 0 : 1);
+    let control = EP_ENABLE | EP_INT_PER_BUFFER;
+    let base = 0x100;
+    if (endpoint !== 0) {
+      control = this.#control(endpoint, isIn);
+      if (!(control & EP_ENABLE)) return null;
+      base = control & 0xffc0;
+    }
+    const view = this.rp2040.usbDPRAMView;
+    const value = view.getUint32(word, true);
+    const double = endpoint !== 0 && (control & EP_DOUBLE) !== 0;
+    if (value & BC_RESET_SELECT) this.select[bit] = 0;
+    const half = double ? this.select[bit] : 0;
+    return { word, bit, control, double, half, address: base + 64 * half, value: (value >>> (16 * half)) & 0xffff };
+  }
+
+  #complete(buffer, endpoint, status) {
+    const view = this.rp2040.usbDPRAMView;
+    const old = view.getUint32(buffer.word, true);
+    const next = (old & ~(0xffff << (16 * buffer.half))) | (status << (16 * buffer.half));
+    view.setUint32(buffer.word, (next & ~BC_RESET_SELECT) >>> 0, true);
+    if (buffer.double) this.select[buffer.bit] ^= 1;
+    const everyBuffer = endpoint === 0 ? this.sieCtrl & SIE_EP0_INT_1BUF : buffer.control & EP_INT_PER_BUFFER;
+    const everySecond = endpoint !== 0 && buffer.double && buffer.control & EP_INT_PER_TWO && buffer.half === 1;
+    if (everyBuffer || everySecond) this.buffStatus |= 1 << buffer.bit;
+    this.sieStatus |= ST_TRANS_COMPLETE | ST_ACK_REC;
+    this.#update();
+  }
+
+  #stalls(buffer, endpoint, isIn) {
+    if (!(buffer.value & BC_STALL)) return false;
+    if (endpoint === 0 && !((this.stallArm >>> (isIn ? 0 : 1)) & 1)) return false;
+    this.stallNak |= 1 << buffer.bit;
+    this.sieStatus |= ST_STALL_REC;
+    this.#update();
+    return true;
+  }
+
+  #hears(address) {
+    this.quiet = false;
+    return this.attached && address === this.address;
+  }
+
+  busReset() {
+    this.quiet = true;
+    this.resetDone = true;
+    this.sieStatus = (this.sieStatus | ST_BUS_RESET | ST_CONNECTED) & ~ST_SUSPENDED;
+    this.#update();
+  }
+
+  suspend() {
+    this.sieStatus |= ST_SUSPENDED;
+    this.#update();
+  }
+
+  sof(frame) {
+    this.frame = frame & 0x7ff;
+    this.sofPending = true;
+    if (this.inte & (1 << 17)) this.#update();
+  }
+
+  /** @returns true if acknowledged */
+  setup(address, packet) {
+    if (!this.#hears(address)) return false;
+    this.rp2040.usbDPRAM.set(packet, 0);
+    this.stallArm = 0;
+    this.sieStatus |= ST_SETUP_REC;
+    this.#update();
+    return true;
+  }
+
+  /** @returns { answer: 'none' | 'nak' | 'stall' } or { answer: 'data', pid, data, acknowledged() } */
+  inToken(address, endpoint) {
+    if (!this.#hears(address)) return { answer: 'none' };
+    const buffer = this.#buffer(endpoint, true);
+    if (!buffer) return { answer: 'none' };
+    if (this.#stalls(buffer, endpoint, true)) return { answer: 'stall' };
+    if (!(buffer.value & BC_AVAILABLE) || (this.epAbort >>> buffer.bit) & 1) return { answer: 'nak' };
+    const data = this.rp2040.usbDPRAM.slice(buffer.address, buffer.address + (buffer.value & BC_LENGTH));
+    return {
+      answer: 'data',
+      pid: buffer.value & BC_PID ? 1 : 0,
+      data,
+      acknowledged: () => this.#complete(buffer, endpoint, buffer.value & ~(BC_AVAILABLE | BC_FULL)),
+    };
+  }
+
+  /** @returns 'none' | 'nak' | 'stall' | 'ack' */
+  outData(address, endpoint, pid, data) {
+    if (!this.#hears(address)) return 'none';
+    const buffer = this.#buffer(endpoint, false);
+    if (!buffer) return 'none';
+    if (this.#stalls(buffer, endpoint, false)) return 'stall';
+    if (!(buffer.value & BC_AVAILABLE) || (this.epAbort >>> buffer.bit) & 1) return 'nak';
+    const expected = buffer.value & BC_PID ? 1 : 0;
+    if (expected !== pid) this.rp2040.fail('USB', `EP${endpoint} OUT: host sent DATA${pid}, the firmware expects DATA${expected}`);
+    const room = buffer.value & BC_LENGTH;
+    if (data.length > room) this.rp2040.fail('USB', `EP${endpoint} OUT: packet of ${data.length} bytes into a buffer of ${room}`);
+    this.rp2040.usbDPRAM.set(data, buffer.address);
+    this.#complete(buffer, endpoint, (buffer.value & ~(BC_AVAILABLE | BC_LENGTH)) | BC_FULL | data.length);
+    return 'ack';
+  }
+}

@@ -1,0 +1,87 @@
+/**
+ * Faults of the world around the chip, from a JSON file: a list of
+ *
+ *     { "type": TYPE, "sensor": 0..14 | "mux": 0..2, "from_s": seconds, "to_s": seconds }
+ *
+ *     sensor_dead (sensor)          acknowledges nothing
+ *     sensor_prom_corrupt (sensor)  PROM words read back with flipped bits
+ *     sensor_adc_zero (sensor)      every ADC read gives 0
+ *     sda_stuck_low (sensor)        pulls SDA from from_s until nine clocks reached it or its multiplexer was reset
+ *     mux_stuck (mux)               acknowledges nothing until its RESET line was pulsed
+ *     host_stall                    the USB host stops reading the CDC port
+ *     usb_unplug                    the cable is out; it comes back at to_s
+ *
+ * `to_s` may be left out: the fault then stays. Times are seconds since power-on.
+ */
+import { readFileSync } from 'node:fs';
+import { InputError } from './errors.mjs';
+
+const TARGET = {
+  sensor_dead: 'sensor',
+  sensor_prom_corrupt: 'sensor',
+  sensor_adc_zero: 'sensor',
+  sda_stuck_low: 'sensor',
+  mux_stuck: 'mux',
+  host_stall: null,
+  usb_unplug: null,
+};
+
+export function parseFaults(text, file, { sensors, muxes }) {
+  const fail = (message) => {
+    throw new InputError(`${file}: ${message}`);
+  };
+  let list;
+  try {
+    list = JSON.parse(text);
+  } catch (error) {
+    fail(`not JSON (${error.message})`);
+  }
+  if (!Array.isArray(list)) fail('must be a list of faults, e.g. [{"type":"sensor_dead","sensor":3,"from_s":1}]');
+  return list.map((fault, i) => {
+    const at = `fault ${i + 1}`;
+    if (!fault || typeof fault !== 'object' || !(fault.type in TARGET)) fail(`${at}: unknown type "${fault?.type}"; known: ${Object.keys(TARGET).join(', ')}`);
+    const target = TARGET[fault.type];
+    const extra = Object.keys(fault).find((key) => !['type', 'from_s', 'to_s', target].includes(key));
+    if (extra) fail(`${at}: key "${extra}" does not belong to ${fault.type}`);
+    if (target) {
+      const count = target === 'sensor' ? sensors : muxes;
+      if (!Number.isInteger(fault[target]) || fault[target] < 0 || fault[target] >= count) fail(`${at}: "${target}" must be 0..${count - 1}`);
+    }
+    const { from_s, to_s = Infinity } = fault;
+    if (typeof from_s !== 'number' || !(from_s >= 0)) fail(`${at}: "from_s" must be a time >= 0`);
+    if (typeof to_s !== 'number' || !(to_s > from_s)) fail(`${at}: "to_s" must be later than "from_s"`);
+    return { type: fault.type, target: target ? fault[target] : null, from_ns: from_s * 1e9, to_ns: to_s * 1e9 };
+  });
+}
+
+export function readFaults(file, limits) {
+  let text;
+  try {
+    text = readFileSync(file, 'utf8');
+  } catch (error) {
+    throw new InputError(`${file}: cannot read the faults (${error.code}); check the path`);
+  }
+  return parseFaults(text, file, limits);
+}
+
+const NONE = Object.freeze({});
+
+/** The faults in force. `on[type](target, active)` is called when one that acts by itself begins or ends. */
+export class Faults {
+  constructor(list, scope, on = {}) {
+    this.sensors = new Map();
+    const key = { sensor_dead: 'dead', sensor_prom_corrupt: 'promCorrupt', sensor_adc_zero: 'adcZero' };
+    for (const fault of list) {
+      const change = (active) => {
+        if (key[fault.type]) this.sensors.set(fault.target, { ...this.sensors.get(fault.target), [key[fault.type]]: active });
+        else on[fault.type]?.(fault.target, active);
+      };
+      scope.createAlarm(() => change(true)).scheduleAt(fault.from_ns);
+      if (fault.to_ns !== Infinity) scope.createAlarm(() => change(false)).scheduleAt(fault.to_ns);
+    }
+  }
+
+  sensor(index) {
+    return this.sensors.get(index) ?? NONE;
+  }
+}

@@ -1,0 +1,131 @@
+/**
+ * A whole bench in emulated time: chip, board with sensors, USB host with CDC client, faults.
+ *
+ *     const machine = new Machine({ image, Board, scenario, ... });
+ *     machine.run(end_ns);            // may be called again with a later time; false when the run is over
+ *     machine.result                  // what run.json holds
+ */
+import { createHash } from 'node:crypto';
+import { Chip, Stopped } from './chip/chip.mjs';
+import { SimulatedTime } from './clock.mjs';
+import { Faults } from './faults.mjs';
+import { Report } from './report.mjs';
+import { CdcClient } from './usb/cdc_client.mjs';
+import { UsbHost } from './usb/host.mjs';
+
+export const DEFAULT_SERIAL = 'e660583883265a2c';
+/** By then the firmware must run at the board's frequency. */
+const CLOCK_CHECK_NS = 200e6;
+
+export class Machine {
+  /**
+   * @param options image: Uint8Array; Board; scenario; seed; faults: parsed list; serial: 16 hex digits;
+   *   fastEnumeration; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes)
+   */
+  constructor({
+    image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, fastEnumeration = false, allowWatchdog = false,
+    onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {},
+  }) {
+    this.image = image;
+    this.Board = Board;
+    this.seed = seed;
+    this.allowWatchdog = allowWatchdog;
+    this.serial = Uint8Array.from(serial.match(/../g).map((h) => parseInt(h, 16)));
+    this.time = new SimulatedTime();
+    this.scope = this.time.scope();
+    this.report = new Report(() => this.time.nanos);
+    this.endReason = null;
+    this.endDetail = {};
+    this.reboots = 0;
+    this.cyclesBefore = 0;
+
+    this.board = new Board({
+      scope: this.scope, report: this.report, seed, onTransfer: onBusTransfer,
+      stimulus: (index, t_ns) => scenario.at_ns(index, t_ns), faults: () => this.faults,
+    });
+    this.host = new UsbHost({ scope: this.scope, report: this.report, fast: fastEnumeration, onPacket: onUsbPacket });
+    this.cdc = new CdcClient({ host: this.host, report: this.report, onData });
+    this.faults = new Faults(faults, this.scope, {
+      ...this.board.faultActions,
+      host_stall: (_, active) => this.cdc.setStalled(active),
+      usb_unplug: (_, active) => (active ? this.host.unplug() : this.host.plug()),
+    });
+    this.scope.createAlarm(() => this.#checkClock()).scheduleAt(CLOCK_CHECK_NS);
+    this.#guard(() => this.#powerUp(null));
+  }
+
+  #checkClock() {
+    const { clkSys } = this.chip;
+    if (clkSys !== this.Board.clkSys_Hz) this.report.warn('clocks', `clk_sys is ${clkSys / 1e6} MHz; this board runs at ${this.Board.clkSys_Hz / 1e6} MHz`);
+  }
+
+  #powerUp(kept) {
+    this.chip = new Chip(this.time, this.report, { serial: this.serial, seed: this.seed, kept });
+    this.chip.load(this.image);
+    this.board.attachChip(this.chip);
+    this.host.connect(this.chip.usbCtrl);
+    this.chip.boot();
+    this.onPowerUp?.(this.chip);
+  }
+
+  #guard(action) {
+    try {
+      action();
+      return true;
+    } catch (error) {
+      if (!(error instanceof Stopped)) throw error;
+      if (error.reason === 'watchdog reboot') {
+        this.#reboot(error.detail.reason);
+        return true;
+      }
+      this.endReason = error.reason;
+      this.endDetail = error.detail;
+      return false;
+    }
+  }
+
+  #reboot(reason) {
+    const why = reason === 1 ? 'was not fed in time' : 'was triggered by the firmware';
+    if (!this.allowWatchdog) this.report.warn('watchdog', `${why}; the chip rebooted`);
+    this.reboots += 1;
+    const old = this.chip;
+    this.cyclesBefore += old.core.cycles;
+    const kept = { sram: old.sram, watchdog: { reason, scratch: old.watchdog.scratch } };
+    old.dispose();
+    this.#guard(() => this.#powerUp(kept));
+  }
+
+  /** Run to `end_ns`; false when the run ended before (see `endReason`). */
+  run(end_ns) {
+    while (!this.endReason && this.time.nanos < end_ns) {
+      if (!this.#guard(() => this.chip.runUntil(end_ns))) break;
+    }
+    return this.endReason === null;
+  }
+
+  get busyNs() {
+    return ((this.cyclesBefore + this.chip.core.cycles) * 1e9) / this.Board.clkSys_Hz;
+  }
+
+  get result() {
+    const { time, host, board, report, chip } = this;
+    const cycles = this.cyclesBefore + chip.core.cycles;
+    return {
+      emulated_s: time.nanos / 1e9,
+      cycles,
+      busy_fraction: time.nanos ? this.busyNs / time.nanos : 0,
+      device_time_zero_s: chip.timer.zero_ns === null ? null : chip.timer.zero_ns / 1e9,
+      reboots: this.reboots,
+      usb: {
+        ...host.statistics, configured: host.configured,
+        ...(host.device ? { strings: host.device.strings, vendor: host.device.vendor, product: host.device.product } : {}),
+      },
+      i2c: { ...board.bus.statistics },
+      warnings: report.list.map((e) => Report.line(e)),
+      end_reason: this.endReason ?? 'end of time',
+      end_detail: this.endDetail,
+      image_sha256: createHash('sha256').update(this.image).digest('hex'),
+      seed: this.seed,
+    };
+  }
+}

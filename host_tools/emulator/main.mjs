@@ -1,0 +1,233 @@
+#!/usr/bin/env node
+/** Command line of the emulator: see USAGE. */
+import { closeSync, openSync, readFileSync, writeFileSync, writeSync } from 'node:fs';
+import { parseArgs } from 'node:util';
+import { findBoard } from './board/boards.mjs';
+import { InputError } from './errors.mjs';
+import { readFaults } from './faults.mjs';
+import { readHostScript, scheduleHostScript } from './port/host_script.mjs';
+import { PtyPort } from './port/pty_port.mjs';
+import { DEFAULT_SERIAL, Machine } from './machine.mjs';
+import { readScenario } from './scenario.mjs';
+
+const USAGE = `usage: main.mjs --image FILE.bin --board NAME --scenario FILE.csv [options]
+
+Runs an unmodified firmware image on an emulated board with simulated sensors and a USB host.
+
+  --image FILE         raw flash image (.bin), loaded at flash offset 0
+  --board NAME         pico_mux
+  --scenario FILE      what the sensors feel (format: scenario.mjs)
+  --seconds N          emulated seconds to run; default: the scenario's last row
+  --seed N             noise, sensor tolerances, SRAM content at power-on; default 1
+  --serial HEX16       unique id of the flash chip; default ${DEFAULT_SERIAL}
+  --faults FILE.json   faults of sensors, multiplexers, USB (format: faults.mjs)
+  --fast-enumeration   shorten the host's debounce and reset waits
+  --allow-watchdog     a watchdog reboot is no warning
+
+  --pty LINK           serve the CDC port as a pseudo-terminal, LINK is a symbolic link to it
+  --wait-open          power on only when the pseudo-terminal was opened
+  --pace real|fast     real: never faster than the clock on the wall (default with --pty); fast: as fast as possible
+  --host-script FILE   without --pty: lines "TIME_S HEXBYTES", "TIME_S dtr 0|1", "TIME_S baud N", comments "#"
+  --capture FILE       every byte received on bulk IN
+
+  --bus-log FILE.csv   I2C transfers: start_ns,end_ns,muxes,address,rw,bytes,ack
+  --usb-log FILE.csv   USB packets: t_ns,endpoint,dir,length,bytes
+  --report FILE.json   what happened, in numbers
+  --progress           a line on stderr each second
+
+Runs without --pty are the same bit for bit each time. SIGINT ends a run cleanly.
+Exit: 0 clean; 1 a warning or failure of firmware or emulation, each printed as a line; 2 wrong usage or input.`;
+
+const OPTIONS = {
+  image: { type: 'string' }, board: { type: 'string' }, scenario: { type: 'string' }, seconds: { type: 'string' },
+  seed: { type: 'string', default: '1' }, serial: { type: 'string', default: DEFAULT_SERIAL }, faults: { type: 'string' },
+  'fast-enumeration': { type: 'boolean', default: false }, 'allow-watchdog': { type: 'boolean', default: false },
+  pty: { type: 'string' }, 'wait-open': { type: 'boolean', default: false }, pace: { type: 'string' },
+  'host-script': { type: 'string' }, capture: { type: 'string' }, 'bus-log': { type: 'string' }, 'usb-log': { type: 'string' },
+  report: { type: 'string' }, progress: { type: 'boolean', default: false }, help: { type: 'boolean', short: 'h', default: false },
+};
+
+/** Emulated time run between looks at the wall clock and the pseudo-terminal. */
+const SLICE_NS = 1e6;
+const SLICE_BATCH_NS = 50e6;
+
+class OutputFile {
+  constructor(path, header = null) {
+    this.path = path;
+    this.pending = [];
+    this.size = 0;
+    if (!path) return;
+    try {
+      this.fd = openSync(path, 'w');
+    } catch (error) {
+      throw new InputError(`${path}: cannot write (${error.code}); check the folder`);
+    }
+    if (header) this.write(Buffer.from(`${header}\n`));
+  }
+
+  write(bytes) {
+    if (!this.path) return;
+    this.pending.push(Buffer.from(bytes));
+    this.size += bytes.length;
+    if (this.size > 65536) this.flush();
+  }
+
+  flush() {
+    if (!this.path || !this.size) return;
+    const all = Buffer.concat(this.pending);
+    for (let at = 0; at < all.length; ) at += writeSync(this.fd, all, at);
+    this.pending = [];
+    this.size = 0;
+  }
+
+  close() {
+    this.flush();
+    if (this.path) closeSync(this.fd);
+  }
+}
+
+function parseOptions(argv) {
+  let values;
+  try {
+    ({ values } = parseArgs({ args: argv, options: OPTIONS, strict: true }));
+  } catch (error) {
+    throw new InputError(`${error.message.split('\n')[0]}; see --help`);
+  }
+  if (values.help) return values;
+  for (const name of ['image', 'board', 'scenario']) if (!values[name]) throw new InputError(`--${name} is missing; see --help`);
+  const number = (name, check, what) => {
+    const value = Number(values[name]);
+    if (values[name].trim() === '' || !check(value)) throw new InputError(`--${name} "${values[name]}" is not ${what}`);
+    return value;
+  };
+  values.seed = number('seed', (v) => Number.isInteger(v) && v >= 0 && v < 2 ** 32, 'a whole number from 0 to 4294967295');
+  if (values.seconds !== undefined) values.seconds = number('seconds', (v) => Number.isFinite(v) && v > 0, 'a positive number of seconds');
+  if (!/^[0-9a-fA-F]{16}$/.test(values.serial)) throw new InputError(`--serial "${values.serial}" is not 16 hexadecimal digits`);
+  values.pace ??= values.pty ? 'real' : 'fast';
+  if (!['real', 'fast'].includes(values.pace)) throw new InputError(`--pace "${values.pace}" is neither real nor fast`);
+  if (values.pty && values['host-script']) throw new InputError('--pty and --host-script exclude each other');
+  if (values['wait-open'] && !values.pty) throw new InputError('--wait-open needs --pty');
+  return values;
+}
+
+function readImage(path) {
+  let image;
+  try {
+    image = readFileSync(path);
+  } catch (error) {
+    throw new InputError(`${path}: cannot read the image (${error.code}); build it first`);
+  }
+  if (image.length < 512 || image.length > 2 * 1024 * 1024) throw new InputError(`${path}: ${image.length} bytes; a raw flash image has 512 bytes to 2 MiB`);
+  if (image.readUInt32LE(0) === 0x0a324655 || image.readUInt32LE(0) === 0x464c457f) throw new InputError(`${path}: this is a UF2 or ELF file; give the raw .bin image`);
+  return image;
+}
+
+const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+const breathe = () => new Promise((resolve) => setImmediate(resolve));
+
+async function run(options) {
+  const Board = findBoard(options.board);
+  const image = readImage(options.image);
+  const scenario = readScenario(options.scenario);
+  if (scenario.sensors !== Board.sensors) throw new InputError(`${options.scenario}: ${scenario.sensors} sensors, but board ${options.board} has ${Board.sensors}`);
+  const faults = options.faults ? readFaults(options.faults, Board) : [];
+  const script = options['host-script'] ? readHostScript(options['host-script']) : [];
+  const seconds = options.seconds ?? scenario.end_s;
+  if (!(seconds > 0)) throw new InputError(`${options.scenario}: ends at 0 s; give --seconds`);
+
+  const capture = new OutputFile(options.capture);
+  const busLog = new OutputFile(options['bus-log'], 'start_ns,end_ns,muxes,address,rw,bytes,ack');
+  const usbLog = new OutputFile(options['usb-log'], 't_ns,endpoint,dir,length,bytes');
+  const hex = (bytes) => Buffer.from(bytes).toString('hex');
+
+  let interrupted = false;
+  const onInterrupt = () => {
+    interrupted = true;
+  };
+  process.on('SIGINT', onInterrupt);
+  process.on('SIGTERM', onInterrupt);
+
+  const pty = options.pty ? await PtyPort.start(options.pty) : null;
+  try {
+    while (options['wait-open'] && !pty.isOpen && !interrupted && !pty.failure) await sleep(5);
+
+    const machine = new Machine({
+      image, Board, scenario, faults, seed: options.seed, serial: options.serial,
+      fastEnumeration: options['fast-enumeration'], allowWatchdog: options['allow-watchdog'],
+      onBusTransfer: options['bus-log']
+        ? (t) => busLog.write(Buffer.from(`${t.start_ns.toFixed(0)},${t.end_ns.toFixed(0)},${t.muxes},0x${t.address.toString(16)},${t.read ? 'r' : 'w'},${hex(t.bytes)},${t.acknowledged ? 1 : 0}\n`))
+        : undefined,
+      onUsbPacket: (p) => {
+        if (options['usb-log']) usbLog.write(Buffer.from(`${p.t_ns.toFixed(0)},${p.endpoint},${p.setup ? 'setup' : p.isIn ? 'in' : 'out'},${p.data.length},${hex(p.data)}\n`));
+        if (p.isIn && p.endpoint !== 0 && p.endpoint === (machine.cdc.bound?.bulkIn.address & 15)) capture.write(p.data);
+      },
+      onData: (bytes) => pty?.send(bytes),
+    });
+    if (pty) pty.connect(machine.cdc);
+    else scheduleHostScript(script, machine.scope, machine.cdc);
+
+    const end_ns = seconds * 1e9;
+    const started_ms = performance.now();
+    let paced_ms = started_ms;
+    let paced_ns = 0;
+    let shown_ms = started_ms;
+    const slice_ns = pty || options.pace === 'real' ? SLICE_NS : SLICE_BATCH_NS;
+    for (;;) {
+      const target = Math.min(end_ns, machine.time.nanos + slice_ns);
+      if (!machine.run(target) || target >= end_ns) break;
+      const now_ms = performance.now();
+      if (interrupted) {
+        machine.endReason = 'interrupted';
+        break;
+      }
+      if (pty?.failure) {
+        machine.report.warn('pty', pty.failure);
+        machine.endReason = 'pseudo-terminal lost';
+        break;
+      }
+      if (options.progress && now_ms - shown_ms >= 1000) {
+        shown_ms = now_ms;
+        const emulated_s = machine.time.nanos / 1e9;
+        const line = `${emulated_s.toFixed(2)} / ${seconds} s, ${(emulated_s / ((now_ms - started_ms) / 1000)).toFixed(2)} x real time`;
+        process.stderr.write(process.stderr.isTTY ? `\r${line}   ` : `${line}\n`);
+      }
+      if (options.pace === 'real') {
+        // A lag is dropped, not caught up: a client that waited must not see a burst.
+        const ahead_ms = (machine.time.nanos - paced_ns) / 1e6 - (now_ms - paced_ms);
+        if (ahead_ms < -50) {
+          paced_ms = now_ms;
+          paced_ns = machine.time.nanos;
+        }
+        if (ahead_ms > 1) await sleep(ahead_ms);
+        else await breathe();
+      } else await breathe();
+    }
+    if (options.progress && process.stderr.isTTY) process.stderr.write('\n');
+    if (pty) await pty.drain();
+    const wall_s = (performance.now() - started_ms) / 1000;
+    const { result } = machine;
+    if (options.report) {
+      const file = new OutputFile(options.report);
+      file.write(Buffer.from(`${JSON.stringify({ ...result, wall_s }, null, 2)}\n`));
+      file.close();
+    }
+    for (const line of result.warnings) process.stderr.write(`${line}\n`);
+    if (result.end_reason !== 'end of time') process.stderr.write(`ended after ${result.emulated_s.toFixed(6)} s: ${result.end_reason}\n`);
+    return result.warnings.length ? 1 : 0;
+  } finally {
+    for (const file of [capture, busLog, usbLog]) file.close();
+    await pty?.stop();
+    process.off('SIGINT', onInterrupt);
+    process.off('SIGTERM', onInterrupt);
+  }
+}
+
+try {
+  const options = parseOptions(process.argv.slice(2));
+  if (options.help) process.stdout.write(`${USAGE}\n`);
+  else process.exitCode = await run(options);
+} catch (error) {
+  if (!(error instanceof InputError)) throw error;
+  process.stderr.write(`error: ${error.message}\n`);
+  process.exitCode = 2;
+}

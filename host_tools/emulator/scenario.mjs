@@ -1,0 +1,118 @@
+/**
+ * What the sensors feel over time, from a CSV file.
+ *
+ *     # fingertip-scenario 1
+ *     # key: value                     name, ambient_Pa (101325), temperature_degC (25), sensors (15), ...
+ *     t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip,s0_Pa,...,s14_Pa[,temperature_degC]
+ *     0,0,0,0,0,0,0,0,0,...
+ *
+ * Rows have strictly increasing t_s >= 0; s<k>_Pa is the pressure on sensor k above ambient. Between rows
+ * everything is linear, before the first and after the last it holds. contact .. slip are the truth for whoever
+ * judges the answer and are not used here. Time 0 is power-on.
+ */
+import { readFileSync } from 'node:fs';
+import { InputError } from './errors.mjs';
+
+const TRUTH = ['contact', 'x_mm', 'y_mm', 'force_N', 'p0_Pa', 'sigma_mm', 'slip'];
+
+export class Scenario {
+  constructor(metadata, times_s, pressures_Pa, temperatures_degC) {
+    this.metadata = metadata;
+    this.times_s = times_s;
+    this.pressures_Pa = pressures_Pa;
+    this.temperatures_degC = temperatures_degC;
+    this.sensors = pressures_Pa[0].length;
+    this.ambient_Pa = Number(metadata.ambient_Pa ?? 101325);
+    this.at = 0;
+  }
+
+  get end_s() {
+    return this.times_s.at(-1);
+  }
+
+  /** Absolute pressure and temperature at one sensor. */
+  at_ns(sensor, t_ns) {
+    const t = t_ns / 1e9;
+    const times = this.times_s;
+    let i = this.at;
+    if (times[i] > t) i = 0;
+    while (i + 1 < times.length && times[i + 1] <= t) i += 1;
+    this.at = i;
+    const last = i + 1 >= times.length || t <= times[i];
+    const f = last ? 0 : (t - times[i]) / (times[i + 1] - times[i]);
+    const j = last ? i : i + 1;
+    const mix = (a, b) => a + (b - a) * f;
+    return {
+      pressure_Pa: this.ambient_Pa + mix(this.pressures_Pa[i][sensor], this.pressures_Pa[j][sensor]),
+      temperature_degC: mix(this.temperatures_degC[i], this.temperatures_degC[j]),
+    };
+  }
+}
+
+export function parseScenario(text, file) {
+  const fail = (line, message) => {
+    throw new InputError(`${file}:${line}: ${message}`);
+  };
+  const lines = text.split(/\r?\n/);
+  const version = /^#\s*fingertip-scenario\s+(\S+)\s*$/.exec(lines[0] ?? '');
+  if (!version) fail(1, 'not a scenario; the first line must be "# fingertip-scenario 1"');
+  if (version[1] !== '1') fail(1, `scenario version ${version[1]} is unknown; this emulator reads version 1`);
+
+  const metadata = {};
+  let header = null;
+  const times_s = [];
+  const pressures_Pa = [];
+  const temperatures_degC = [];
+  let sensors = 0;
+  let hasTemperature = false;
+  lines.forEach((line, index) => {
+    const number = index + 1;
+    if (index === 0 || line.trim() === '') return;
+    if (line.startsWith('#')) {
+      const pair = /^#\s*([A-Za-z0-9_]+)\s*:\s*(.*?)\s*$/.exec(line);
+      if (pair && !header) metadata[pair[1]] = pair[2];
+      return;
+    }
+    const cells = line.split(',').map((c) => c.trim());
+    if (!header) {
+      header = cells;
+      sensors = Number(metadata.sensors ?? 15);
+      if (!Number.isInteger(sensors) || sensors < 1 || sensors > 32) fail(number, `metadata "sensors" is "${metadata.sensors}"; give a whole number from 1 to 32`);
+      for (const key of ['ambient_Pa', 'temperature_degC']) {
+        if (metadata[key] !== undefined && !Number.isFinite(Number(metadata[key] || NaN))) fail(number, `metadata "${key}" is "${metadata[key]}"; give a number`);
+      }
+      const expected = ['t_s', ...TRUTH, ...Array.from({ length: sensors }, (_, k) => `s${k}_Pa`)];
+      hasTemperature = cells.length === expected.length + 1 && cells.at(-1) === 'temperature_degC';
+      const named = hasTemperature ? cells.slice(0, -1) : cells;
+      const wrong = expected.findIndex((name, i) => named[i] !== name);
+      if (wrong >= 0) fail(number, `column ${wrong + 1} is "${named[wrong] ?? ''}"; expected "${expected[wrong]}"`);
+      if (named.length !== expected.length) fail(number, `${named.length} columns; expected ${expected.length} (or one more, temperature_degC)`);
+      return;
+    }
+    if (cells.length !== header.length) fail(number, `${cells.length} columns; the header has ${header.length}`);
+    const values = cells.map((cell, i) => {
+      const value = cell === '' ? NaN : Number(cell);
+      if (!Number.isFinite(value)) fail(number, `column "${header[i]}" is "${cell}"; give a finite number`);
+      return value;
+    });
+    const [t] = values;
+    if (t < 0) fail(number, `t_s is ${t}; time starts at 0`);
+    if (times_s.length && t <= times_s.at(-1)) fail(number, `t_s ${t} does not increase (previous row: ${times_s.at(-1)})`);
+    times_s.push(t);
+    pressures_Pa.push(Float64Array.from(values.slice(1 + TRUTH.length, 1 + TRUTH.length + sensors)));
+    temperatures_degC.push(hasTemperature ? values.at(-1) : Number(metadata.temperature_degC ?? 25));
+  });
+  if (!header) fail(lines.length, 'no header line; add "t_s,contact,x_mm,..."');
+  if (!times_s.length) fail(lines.length, 'no rows; add at least one');
+  return new Scenario(metadata, times_s, pressures_Pa, temperatures_degC);
+}
+
+export function readScenario(file) {
+  let text;
+  try {
+    text = readFileSync(file, 'utf8');
+  } catch (error) {
+    throw new InputError(`${file}: cannot read the scenario (${error.code}); check the path`);
+  }
+  return parseScenario(text, file);
+}
