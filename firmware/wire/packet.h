@@ -69,9 +69,9 @@ enum wire_result {
 #define WIRE_SLIP_WINDOW_MAX_ms 1000u
 #define WIRE_LOADER_MAGIC 0x746F6F42u /* "Boot": a stray byte never reboots a fingertip */
 
-/* Where the time of one frame went, us. The stages follow one another without a gap:
- * their sum is total_us, from the first bus activity of the frame to the hand-over of its packet.
- * Values above 65535 saturate.
+/* Where the time of one frame went, us. The stages follow one another without a gap: their sum is
+ * total_us, from the first bus activity of the frame to the encoding of its packet. Values above
+ * 65535 saturate.
  */
 struct wire_stages {
   uint16_t convert_us;   /* broadcast of the conversion command and the sensors' conversion */
@@ -79,7 +79,7 @@ struct wire_stages {
   uint16_t queue_us;     /* complete frame waiting for the processor */
   uint16_t condition_us; /* compensation, tare, gate */
   uint16_t fit_us;
-  uint16_t contact_us; /* force, slip, packing */
+  uint16_t contact_us; /* slip and the judgement of the result */
   uint16_t total_us;
 };
 

@@ -1,0 +1,26 @@
+# Writes OUTPUT, a C file with the identity of the build, only when it changes.
+find_package(Git QUIET)
+set(hash unknown)
+if(GIT_FOUND)
+  execute_process(COMMAND ${GIT_EXECUTABLE} -C ${SOURCE_DIR} rev-parse --short=12 HEAD
+    OUTPUT_VARIABLE head OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET RESULT_VARIABLE failed)
+  if(NOT failed)
+    execute_process(COMMAND ${GIT_EXECUTABLE} -C ${SOURCE_DIR} status --porcelain
+      OUTPUT_VARIABLE changes ERROR_QUIET)
+    set(hash ${head})
+    if(changes)
+      string(APPEND hash "+")
+    endif()
+  endif()
+endif()
+string(REPLACE "." ", " version_bytes ${VERSION})
+file(CONFIGURE OUTPUT ${OUTPUT} CONTENT [[
+#include "config/build_info.h"
+
+const struct build_info build_info = {
+    .version = {@version_bytes@},
+    .git_hash = "@hash@",
+    .board = "@BOARD@",
+    .scene = "@SCENE@",
+};
+]] @ONLY)

@@ -1,0 +1,361 @@
+#include "app/app.h"
+
+#include "common/contact_flags.h"
+#include "config/build_info.h"
+#include "config/defaults.h"
+#include "config/geometry.h"
+#include "port/port.h"
+#include "usb/cdc.h"
+
+#include <string.h>
+
+/* The event context must come round often enough for the main loop to feed the watchdog. */
+#define EVENT_INTERVAL_MAX_us (PORT_WATCHDOG_PERIOD_us / 5u)
+/* Lets the acknowledgement out before the device leaves. */
+#define LOADER_DELAY_us 50000u
+
+static void on_event(void *context) {
+  struct app *app = context;
+  uint64_t now_us = port_now_us();
+  uint64_t wake_us = scan_step(&app->scan, now_us);
+  uint64_t latest_us = now_us + EVENT_INTERVAL_MAX_us;
+  port_alarm_at_us(wake_us < latest_us ? wake_us : latest_us);
+}
+
+void app_start(struct app *app, const struct array_bus *bus) {
+  memset(app, 0, sizeof *app);
+  const struct scan_settings scan_settings = {
+      .sensor_count = geometry.sensor_count,
+      .osr = DEFAULT_OSR,
+      .temperature_interval = DEFAULT_TEMPERATURE_INTERVAL,
+      .rate_mHz = DEFAULT_RATE_mHz,
+  };
+  if (scan_init(&app->scan, bus, &scan_settings) != FT_OK ||
+      fit_array_init(&app->fit_array, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
+                     geometry.pitch_mm) != FT_OK) {
+    port_panic();
+  }
+  app->osr = DEFAULT_OSR;
+  app->rate_mHz = DEFAULT_RATE_mHz;
+  app->fit_settings.iterations = DEFAULT_FIT_ITERATIONS;
+  app->contact_settings.slip_threshold_mm = DEFAULT_SLIP_THRESHOLD_mm;
+  app->contact_settings.slip_window_us = DEFAULT_SLIP_WINDOW_ms * 1000u;
+  condition_tare(&app->condition);
+  wire_receiver_init(&app->receiver);
+
+  static char serial[17];
+  port_serial_number(serial);
+  static const struct cdc_identity identity_template = {
+      .vendor_id = FINGERTIP_USB_VID,
+      .product_id = FINGERTIP_USB_PID,
+      .manufacturer = "Fingertip",
+      .product = "Fingertip tactile sensor",
+  };
+  static struct cdc_identity identity;
+  identity = identity_template;
+  identity.device_version_bcd =
+      (uint16_t)(build_info.version[0] << 8 | build_info.version[1] << 4 | build_info.version[2]);
+  identity.serial = serial;
+  cdc_start(&identity);
+
+  port_set_event_handler(on_event, app);
+  port_alarm_at_us(port_now_us());
+}
+
+/* Sends app->packet. A sequence number is spent even when the queue is full: the gap tells. */
+static void send_packet(struct app *app, uint8_t type, uint64_t t_us) {
+  size_t length;
+  app->packet.type = type;
+  app->packet.sequence = app->sequence++;
+  app->packet.t_us = t_us;
+  if (wire_encode(&app->packet, app->out, sizeof app->out, &length) == FT_OK &&
+      cdc_write(app->out, length) == FT_OK) {
+    app->packets_sent++;
+  } else {
+    app->packets_dropped++;
+  }
+}
+
+static uint16_t saturate_u16(uint64_t value) {
+  return value < UINT16_MAX ? (uint16_t)value : UINT16_MAX;
+}
+
+static void copy_text(char to[WIRE_TEXT_BYTES], const char *from) {
+  memset(to, 0, WIRE_TEXT_BYTES);
+  for (int i = 0; i < WIRE_TEXT_BYTES && from[i]; i++) {
+    to[i] = from[i];
+  }
+}
+
+static void send_info(struct app *app, uint64_t now_us) {
+  struct wire_info *info = &app->packet.body.info;
+  memset(info, 0, sizeof *info);
+  memcpy(info->firmware_version, build_info.version, sizeof info->firmware_version);
+  info->sensor_count = geometry.sensor_count;
+  copy_text(info->git_hash, build_info.git_hash);
+  copy_text(info->board, build_info.board);
+  copy_text(info->scene, build_info.scene);
+  char serial[17];
+  port_serial_number(serial);
+  copy_text(info->serial, serial);
+  info->rate_mHz = app->rate_mHz;
+  info->measured_rate_mHz = app->measured_rate_mHz;
+  info->osr = app->osr;
+  info->temperature_interval = app->scan.temperature_interval;
+  info->slip_window_ms = (uint16_t)(app->contact_settings.slip_window_us / 1000u);
+  info->fit_iterations = app->fit_settings.iterations;
+  info->streams = app->streams;
+  info->slip_threshold_mm = app->contact_settings.slip_threshold_mm;
+  info->pitch_mm = geometry.pitch_mm;
+  memcpy(info->x_mm, geometry.x_mm, sizeof info->x_mm);
+  memcpy(info->y_mm, geometry.y_mm, sizeof info->y_mm);
+  send_packet(app, WIRE_INFO, now_us);
+}
+
+static uint32_t read_counter(const _Atomic uint32_t *counter) {
+  return atomic_load_explicit(counter, memory_order_relaxed);
+}
+
+static void send_health(struct app *app, uint64_t now_us) {
+  const struct scan *scan = &app->scan;
+  size_t stack_free = port_stack_free_bytes();
+  app->packet.body.health = (struct wire_health){
+      .uptime_s = (uint32_t)(now_us / 1000000u),
+      .frames = read_counter(&scan->counters.frames),
+      .frames_incomplete = read_counter(&scan->counters.frames_incomplete),
+      .packets_sent = app->packets_sent,
+      .packets_dropped = app->packets_dropped,
+      .commands_done = app->commands_done,
+      .commands_rejected = app->commands_rejected,
+      .bus_nacks = read_counter(&scan->counters.bus_nacks),
+      .bus_timeouts = read_counter(&scan->counters.bus_timeouts),
+      .bus_recoveries = read_counter(&scan->counters.bus_recoveries),
+      .zero_readings = read_counter(&scan->counters.zero_readings),
+      .fit_failures = app->fit_failures,
+      .sensors_present = read_counter(&scan->present),
+      .sensors_prom_bad = read_counter(&scan->prom_bad),
+      .watchdog_resets = port_started_by_watchdog() ? 1 : 0,
+      .cpu_busy_permille = app->cpu_busy_permille,
+      .stack_free_bytes = saturate_u16(stack_free),
+  };
+  send_packet(app, WIRE_HEALTH, now_us);
+}
+
+static void send_raw(struct app *app) {
+  struct wire_raw *raw = &app->packet.body.raw;
+  const struct frame *frame = &app->frame;
+  raw->frame = frame->number;
+  raw->valid = frame->valid;
+  raw->saturated = frame->saturated;
+  raw->temperature_cC = frame->temperature_cC;
+  raw->sensor_count = frame->sensor_count;
+  memcpy(raw->pressure_Pa_q10, frame->pressure_Pa_q10, sizeof raw->pressure_Pa_q10);
+  memcpy(raw->baseline_Pa_q10, app->condition.zero_Pa_q10, sizeof raw->baseline_Pa_q10);
+  send_packet(app, WIRE_RAW, frame->t_us);
+}
+
+static void send_contact(struct app *app, const struct wire_stages *stages) {
+  app->packet.body.contact = (struct wire_contact){
+      .frame = app->frame.number,
+      .flags = app->contact.flags,
+      .sensors_used = app->fit.used,
+      .x_mm = app->fit.x_mm,
+      .y_mm = app->fit.y_mm,
+      .p0_Pa = app->fit.p0_Pa,
+      .sigma_mm = app->fit.sigma_mm,
+      .force_N = app->fit.force_N,
+      .slip_mm = app->contact.slip_mm,
+      .residual_rms_Pa = app->fit.residual_rms_Pa,
+      .location_sd_mm = app->fit.location_sd_mm,
+      .force_sd_N = app->fit.force_sd_N,
+      .stages = *stages,
+  };
+  send_packet(app, WIRE_CONTACT, app->frame.t_us);
+}
+
+static void process_frame(struct app *app, uint64_t taken_us) {
+  const struct frame *frame = &app->frame;
+  condition_frame(&app->condition, frame, &app->conditioned);
+  uint64_t conditioned_us = port_now_us();
+
+  memset(&app->fit, 0, sizeof app->fit);
+  if (app->conditioned.contact) {
+    app->fit_settings.noise_Pa_q10 = frame->noise_Pa_q10;
+    fit_gaussian(&app->fit_array, app->conditioned.pressure_Pa_q10, app->conditioned.usable,
+                 &app->fit_settings, &app->fit);
+    if (!(app->fit.flags & CONTACT_FLAG_FIT_VALID)) {
+      app->fit_failures++;
+    }
+  }
+  uint64_t fitted_us = port_now_us();
+
+  const struct contact_input input = {
+      .t_us = frame->t_us,
+      .contact = app->conditioned.contact,
+      .tared = app->conditioned.tared,
+      .saturated = frame->saturated,
+      .fit = app->conditioned.contact ? &app->fit : NULL,
+  };
+  contact_update(&app->slip_history, &app->contact_settings, &input, &app->contact);
+  uint64_t judged_us = port_now_us();
+
+  const struct wire_stages stages = {
+      .convert_us = saturate_u16(frame->t_converted_us - frame->t_begin_us),
+      .read_us = saturate_u16(frame->t_read_us - frame->t_converted_us),
+      .queue_us = saturate_u16(taken_us - frame->t_read_us),
+      .condition_us = saturate_u16(conditioned_us - taken_us),
+      .fit_us = saturate_u16(fitted_us - conditioned_us),
+      .contact_us = saturate_u16(judged_us - fitted_us),
+      .total_us = saturate_u16(judged_us - frame->t_begin_us),
+  };
+  if (app->streams & WIRE_STREAM_CONTACT) {
+    send_contact(app, &stages);
+  }
+  if (app->streams & WIRE_STREAM_RAW) {
+    send_raw(app);
+  }
+}
+
+static enum wire_result obey(struct app *app, const struct wire_packet *command, uint64_t now_us) {
+  switch (command->type) {
+  case WIRE_CMD_STREAM:
+    if (command->body.cmd_stream.streams & ~WIRE_STREAM_ALL) {
+      return WIRE_RESULT_OUT_OF_RANGE;
+    }
+    app->streams = command->body.cmd_stream.streams;
+    return WIRE_RESULT_DONE;
+  case WIRE_CMD_TARE:
+    if (read_counter(&app->scan.admitted) == 0) {
+      return WIRE_RESULT_NOT_NOW;
+    }
+    condition_tare(&app->condition);
+    return WIRE_RESULT_DONE;
+  case WIRE_CMD_RATE: {
+    uint32_t rate_mHz = command->body.cmd_rate.rate_mHz;
+    if (rate_mHz != 0 && (rate_mHz < WIRE_RATE_MIN_mHz || rate_mHz > WIRE_RATE_MAX_mHz)) {
+      return WIRE_RESULT_OUT_OF_RANGE;
+    }
+    app->rate_mHz = rate_mHz;
+    scan_set_rate_mHz(&app->scan, rate_mHz);
+    return WIRE_RESULT_DONE;
+  }
+  case WIRE_CMD_OSR:
+    if (scan_set_osr(&app->scan, command->body.cmd_osr.osr) != FT_OK) {
+      return WIRE_RESULT_OUT_OF_RANGE;
+    }
+    app->osr = command->body.cmd_osr.osr;
+    return WIRE_RESULT_DONE;
+  case WIRE_CMD_SLIP: {
+    const struct wire_cmd_slip *slip = &command->body.cmd_slip;
+    if (slip->threshold_mm < WIRE_SLIP_THRESHOLD_MIN_mm ||
+        slip->threshold_mm > WIRE_SLIP_THRESHOLD_MAX_mm ||
+        slip->window_ms < WIRE_SLIP_WINDOW_MIN_ms || slip->window_ms > WIRE_SLIP_WINDOW_MAX_ms) {
+      return WIRE_RESULT_OUT_OF_RANGE;
+    }
+    app->contact_settings.slip_threshold_mm = slip->threshold_mm;
+    app->contact_settings.slip_window_us = slip->window_ms * 1000u;
+    slip_reset(&app->slip_history);
+    return WIRE_RESULT_DONE;
+  }
+  case WIRE_CMD_INFO:
+  case WIRE_CMD_HEALTH:
+    return WIRE_RESULT_DONE;
+  case WIRE_CMD_LOADER:
+    if (command->body.cmd_loader.magic != WIRE_LOADER_MAGIC) {
+      return WIRE_RESULT_OUT_OF_RANGE;
+    }
+    app->loader_at_us = now_us + LOADER_DELAY_us;
+    return WIRE_RESULT_DONE;
+  default:
+    return WIRE_RESULT_UNKNOWN_COMMAND;
+  }
+}
+
+/* app->packet holds the command and is used up. */
+static void answer_command(struct app *app, uint64_t now_us) {
+  uint8_t command = app->packet.type;
+  enum wire_result result = obey(app, &app->packet, now_us);
+  app->packet.body.ack = (struct wire_ack){
+      .command = command,
+      .result = (uint8_t)result,
+      .sequence = app->packet.sequence,
+      .host_time_us = app->packet.t_us,
+  };
+  send_packet(app, WIRE_ACK, now_us);
+  if (result != WIRE_RESULT_DONE) {
+    app->commands_rejected++;
+    return;
+  }
+  app->commands_done++;
+  if (command == WIRE_CMD_INFO) {
+    send_info(app, now_us);
+  } else if (command == WIRE_CMD_HEALTH) {
+    send_health(app, now_us);
+  }
+}
+
+/* At most one USB packet's worth a round, so that a flood of commands cannot starve the frames.
+ * Returns whether anything had arrived. */
+static bool receive_commands(struct app *app) {
+  uint8_t bytes[64];
+  size_t count = cdc_read(bytes, sizeof bytes);
+  for (size_t i = 0; i < count; i++) {
+    enum ft_status status = wire_receive(&app->receiver, bytes[i], &app->packet);
+    if (status == FT_OK || status == FT_ERR_TYPE) {
+      answer_command(app, port_now_us());
+    } else if (status != FT_PENDING) {
+      app->commands_rejected++;
+    }
+  }
+  return count > 0;
+}
+
+static void follow_port(struct app *app) {
+  uint32_t close_count = cdc_close_count();
+  if (close_count != app->close_count) {
+    app->close_count = close_count;
+    app->streams = 0;
+    wire_receiver_init(&app->receiver);
+  }
+  if (cdc_loader_requested() && app->loader_at_us == 0) {
+    app->loader_at_us = port_now_us() + LOADER_DELAY_us;
+  }
+}
+
+static void each_second(struct app *app, uint64_t now_us) {
+  uint32_t elapsed_us = (uint32_t)(now_us - app->second_began_us);
+  if (elapsed_us < 1000000u) {
+    return;
+  }
+  uint32_t frames = read_counter(&app->scan.counters.frames);
+  uint32_t elapsed_ms = elapsed_us / 1000u;
+  app->measured_rate_mHz = (frames - app->frames_at_second) * 1000000u / elapsed_ms;
+  uint32_t asleep_ms = (uint32_t)app->asleep_us / 1000u;
+  uint32_t asleep_permille = asleep_ms < elapsed_ms ? asleep_ms * 1000u / elapsed_ms : 1000u;
+  app->cpu_busy_permille = (uint16_t)(1000u - asleep_permille);
+  app->second_began_us = now_us;
+  app->frames_at_second = frames;
+  app->asleep_us = 0;
+  if (app->streams & WIRE_STREAM_HEALTH) {
+    send_health(app, now_us);
+  }
+}
+
+void app_run(struct app *app) {
+  port_watchdog_feed();
+  follow_port(app);
+  bool active = receive_commands(app);
+  if (scan_take(&app->scan, &app->frame)) {
+    process_frame(app, port_now_us());
+    active = true;
+  }
+  uint64_t now_us = port_now_us();
+  each_second(app, now_us);
+  if (app->loader_at_us != 0 && now_us >= app->loader_at_us) {
+    port_reboot_to_loader();
+  }
+  if (!active) {
+    port_sleep();
+    app->asleep_us += port_now_us() - now_us;
+  }
+}

@@ -1,0 +1,62 @@
+/* The fingertip: frames in, packets out, commands obeyed. Everything below it is wired here and
+ * only here.
+ *
+ * One instance per image, static. The board's main calls app_start once and then app_run for ever.
+ */
+#ifndef APP_APP_H
+#define APP_APP_H
+
+#include "array_bus/array_bus.h"
+#include "condition/condition.h"
+#include "contact/contact.h"
+#include "fit/fit.h"
+#include "scan/scan.h"
+#include "wire/packet.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct app {
+  struct scan scan; /* shared with the event context under scan's own rules; the rest is main's */
+  struct condition condition;
+  struct fit_array fit_array;
+  struct fit_settings fit_settings;
+  struct contact_settings contact_settings;
+  struct slip_history slip_history;
+  struct wire_receiver receiver;
+
+  /* The frame under way. */
+  struct frame frame;
+  struct conditioned conditioned;
+  struct fit_result fit;
+  struct contact_result contact;
+  struct wire_packet packet; /* in or out, one at a time */
+  uint8_t out[WIRE_MAX_FRAME_BYTES];
+
+  uint8_t streams; /* enum wire_stream */
+  uint16_t sequence;
+  uint32_t close_count; /* of the port, when last looked at */
+  uint16_t osr;
+  uint32_t rate_mHz;
+
+  uint32_t packets_sent, packets_dropped;
+  uint32_t commands_done, commands_rejected;
+  uint32_t fit_failures;
+
+  /* Over the second under way, and the one before. */
+  uint64_t second_began_us;
+  uint64_t asleep_us;
+  uint32_t frames_at_second;
+  uint32_t measured_rate_mHz;
+  uint16_t cpu_busy_permille;
+
+  uint64_t loader_at_us; /* 0: no reboot is planned */
+};
+
+/* Starts the pipeline on this bus, which must outlive it. Attaches to USB. */
+void app_start(struct app *app, const struct array_bus *bus);
+
+/* One round of the main loop: does what is due, or sleeps until something happens. */
+void app_run(struct app *app);
+
+#endif

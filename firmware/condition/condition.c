@@ -1,0 +1,72 @@
+#include "condition/condition.h"
+
+#include <string.h>
+
+void condition_tare(struct condition *condition) {
+  memset(condition, 0, sizeof *condition);
+  memset(condition->tare_left, CONDITION_TARE_FRAMES, sizeof condition->tare_left);
+}
+
+static void tare_step(struct condition *condition, uint8_t k, int32_t pressure_Pa_q10) {
+  condition->zero_sum[k] += pressure_Pa_q10;
+  condition->tare_left[k]--;
+  if (condition->tare_left[k] == 0) {
+    condition->zero_Pa_q10[k] = (int32_t)(condition->zero_sum[k] / CONDITION_TARE_FRAMES);
+    condition->zero_rest[k] = 0;
+  }
+}
+
+static void track_step(struct condition *condition, uint8_t k, int32_t above_Pa_q10) {
+  const int32_t limit = 1 << 30; /* the sum must not overflow */
+  if (above_Pa_q10 < -limit) {
+    above_Pa_q10 = -limit;
+  }
+  int32_t rest = condition->zero_rest[k] + above_Pa_q10;
+  int32_t whole = rest / CONDITION_TRACK_FRAMES;
+  condition->zero_Pa_q10[k] += whole;
+  condition->zero_rest[k] = rest - whole * CONDITION_TRACK_FRAMES;
+}
+
+static int32_t clamped_difference(int32_t a, int32_t b) {
+  int64_t difference = (int64_t)a - b;
+  if (difference > INT32_MAX) {
+    return INT32_MAX;
+  }
+  return difference < INT32_MIN ? INT32_MIN : (int32_t)difference;
+}
+
+void condition_frame(struct condition *condition, const struct frame *frame,
+                     struct conditioned *conditioned) {
+  memset(conditioned, 0, sizeof *conditioned);
+  conditioned->tared = true;
+  uint32_t readable = frame->valid & ~frame->saturated;
+  for (uint8_t k = 0; k < frame->sensor_count; k++) {
+    uint32_t bit = UINT32_C(1) << k;
+    if (!(readable & bit)) {
+      continue;
+    }
+    if (condition->tare_left[k] > 0) {
+      conditioned->tared = false;
+      tare_step(condition, k, frame->pressure_Pa_q10[k]);
+      continue;
+    }
+    int32_t above = clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k]);
+    conditioned->pressure_Pa_q10[k] = above;
+    conditioned->usable |= bit;
+    if (above > conditioned->peak_Pa_q10) {
+      conditioned->peak_Pa_q10 = above;
+    }
+  }
+  int32_t sigmas = condition->contact ? CONDITION_CLOSE_SIGMA : CONDITION_OPEN_SIGMA;
+  condition->contact =
+      frame->saturated != 0 || conditioned->peak_Pa_q10 > sigmas * frame->noise_Pa_q10;
+  conditioned->contact = condition->contact;
+  if (condition->contact) {
+    return;
+  }
+  for (uint8_t k = 0; k < frame->sensor_count; k++) {
+    if (conditioned->usable & (UINT32_C(1) << k)) {
+      track_step(condition, k, conditioned->pressure_Pa_q10[k]);
+    }
+  }
+}

@@ -1,0 +1,49 @@
+/* From absolute readings to pressure on the pad: tare, and the gate that says whether anything
+ * touches it at all.
+ *
+ * The zero of each sensor is the mean of its first CONDITION_TARE_FRAMES readings after start or
+ * after a tare, and then follows the readings slowly while nothing touches the pad (time constant
+ * CONDITION_TRACK_FRAMES frames): barometers drift by some 150 Pa in a quarter of an hour, and the
+ * paper sets its readings to zero between contacts (section IV.A).
+ *
+ * The gate opens when the strongest reading exceeds CONDITION_OPEN_SIGMA standard deviations of the
+ * sensor noise and closes below CONDITION_CLOSE_SIGMA. Below it a fit would only describe noise.
+ */
+#ifndef CONDITION_CONDITION_H
+#define CONDITION_CONDITION_H
+
+#include "frame/frame.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define CONDITION_TARE_FRAMES 16
+#define CONDITION_TRACK_FRAMES 256
+#define CONDITION_OPEN_SIGMA 20
+#define CONDITION_CLOSE_SIGMA 12
+
+struct condition {
+  int64_t zero_sum[FT_MAX_SENSORS];    /* while taring: sum of the readings, 1/1024 Pa */
+  int32_t zero_Pa_q10[FT_MAX_SENSORS]; /* [sensor] the tare */
+  int32_t
+      zero_rest[FT_MAX_SENSORS]; /* part of the tare below 1/1024 Pa, 1/CONDITION_TRACK_FRAMES */
+  uint8_t tare_left[FT_MAX_SENSORS]; /* readings still to be averaged */
+  bool contact;
+};
+
+struct conditioned {
+  uint32_t usable;                         /* bitmap: tared, valid and not saturated */
+  bool tared;                              /* every valid sensor is */
+  bool contact;                            /* the gate */
+  int32_t peak_Pa_q10;                     /* strongest usable reading; 0 when none */
+  int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* [sensor] above the tare, 1/1024 Pa; 0 if not usable */
+};
+
+/* Asks for a tare of all sensors over the next frames. */
+void condition_tare(struct condition *condition);
+
+/* Processes one frame. Cost: about 60 Cortex-M0+ cycles a sensor. */
+void condition_frame(struct condition *condition, const struct frame *frame,
+                     struct conditioned *conditioned);
+
+#endif

@@ -1,0 +1,23 @@
+/* The settings a fingertip starts with. Commands change those that PROTOCOL.md lists. */
+#ifndef CONFIG_DEFAULTS_H
+#define CONFIG_DEFAULTS_H
+
+#if FINGERTIP_SCENE_PAPER
+#define DEFAULT_RATE_mHz 20000u /* the paper reads at 20 Hz */
+#else
+#define DEFAULT_RATE_mHz 0u /* as fast as the sensors allow */
+#endif
+
+#define DEFAULT_OSR 1024u
+
+/* Frames between two temperature conversions. A conversion costs a frame; the temperature of a
+ * pad in the hand moves by less than 0.1 degC/s. */
+#define DEFAULT_TEMPERATURE_INTERVAL 64u
+
+/* Paper, section IV.D: n = 2 steps at 20 Hz is 0.1 s, threshold 0.75 mm. */
+#define DEFAULT_SLIP_WINDOW_ms 100u
+#define DEFAULT_SLIP_THRESHOLD_mm 0.75f
+
+#define DEFAULT_FIT_ITERATIONS FINGERTIP_FIT_ITERATIONS
+
+#endif

@@ -1,0 +1,36 @@
+#include "contact/contact.h"
+
+#include "common/contact_flags.h"
+
+static bool fewer_bits_than(uint32_t bitmap, int limit) {
+  int bits = 0;
+  for (; bitmap && bits < limit; bitmap &= bitmap - 1) {
+    bits++;
+  }
+  return bits < limit;
+}
+
+void contact_update(struct slip_history *history, const struct contact_settings *settings,
+                    const struct contact_input *input, struct contact_result *result) {
+  uint32_t flags = input->fit ? input->fit->flags : 0;
+  flags |= input->contact ? (uint32_t)CONTACT_FLAG_CONTACT : 0;
+  flags |= input->tared ? (uint32_t)CONTACT_FLAG_TARED : 0;
+  if (input->saturated) {
+    flags |= CONTACT_FLAG_SATURATED;
+    if (!input->fit || fewer_bits_than(input->fit->used, CONTACT_MIN_UNSATURATED)) {
+      flags |= CONTACT_FLAG_FORCE_LOWER_BOUND;
+    }
+  }
+  result->slip_mm = 0.0f;
+  const uint32_t spoiled = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND;
+  if (!input->fit || !(flags & CONTACT_FLAG_FIT_VALID) || (flags & spoiled)) {
+    slip_reset(history);
+  } else if (slip_update(history, input->t_us, input->fit->x_mm, input->fit->y_mm,
+                         settings->slip_window_us, &result->slip_mm)) {
+    flags |= CONTACT_FLAG_SLIP_VALID;
+    if (result->slip_mm > settings->slip_threshold_mm) {
+      flags |= CONTACT_FLAG_SLIP;
+    }
+  }
+  result->flags = flags;
+}

@@ -1,0 +1,40 @@
+/* What the fingertip says about one frame: the fit, the slip, and every flag that applies.
+ */
+#ifndef CONTACT_CONTACT_H
+#define CONTACT_CONTACT_H
+
+#include "contact/slip.h"
+#include "fit/fit.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct contact_settings {
+  float slip_threshold_mm;
+  uint32_t slip_window_us;
+};
+
+/* What the fit does not know of its readings. */
+struct contact_input {
+  uint64_t t_us; /* of the frame */
+  bool contact;  /* the gate is open */
+  bool tared;
+  uint32_t saturated;           /* bitmap: left out of the fit for being beyond their range */
+  const struct fit_result *fit; /* NULL where nothing was fitted */
+};
+
+struct contact_result {
+  uint32_t flags; /* enum contact_flag */
+  float slip_mm;  /* 0 unless SLIP_VALID */
+};
+
+/* With fewer unsaturated sensors than this the peak is extrapolated, and the force a lower bound.
+ */
+#define CONTACT_MIN_UNSATURATED 5
+
+/* Locations flagged UNCERTAIN, FLAT or AT_BOUND do not enter the slip history: it starts anew
+ * after them, as after a loss of contact. */
+void contact_update(struct slip_history *history, const struct contact_settings *settings,
+                    const struct contact_input *input, struct contact_result *result);
+
+#endif

@@ -1,0 +1,57 @@
+#include "contact/slip.h"
+
+#include <math.h>
+
+#define SIXTEENTHS_PER_mm 16000.0f
+
+void slip_reset(struct slip_history *history) {
+  history->oldest = 0;
+  history->count = 0;
+  history->x_sum = 0;
+  history->y_sum = 0;
+}
+
+static void drop_oldest(struct slip_history *history) {
+  history->x_sum -= history->x_16th_um[history->oldest];
+  history->y_sum -= history->y_16th_um[history->oldest];
+  history->oldest = (uint16_t)((history->oldest + 1u) % SLIP_CAPACITY);
+  history->count--;
+}
+
+static void append(struct slip_history *history, uint64_t t_us, int32_t x, int32_t y) {
+  uint16_t at = (uint16_t)((history->oldest + history->count) % SLIP_CAPACITY);
+  history->t_us[at] = t_us;
+  history->x_16th_um[at] = x;
+  history->y_16th_um[at] = y;
+  history->x_sum += x;
+  history->y_sum += y;
+  history->count++;
+}
+
+bool slip_update(struct slip_history *history, uint64_t t_us, float x_mm, float y_mm,
+                 uint32_t window_us, float *distance_mm) {
+  int32_t x = (int32_t)(x_mm * SIXTEENTHS_PER_mm);
+  int32_t y = (int32_t)(y_mm * SIXTEENTHS_PER_mm);
+  bool full = false;
+  if (history->count > 0) {
+    uint16_t newest = (uint16_t)((history->oldest + history->count - 1u) % SLIP_CAPACITY);
+    uint64_t interval_us = t_us - history->t_us[newest];
+    uint64_t reach_us = window_us + interval_us / 2;
+    while (history->count > 1 && t_us - history->t_us[history->oldest] > reach_us) {
+      drop_oldest(history);
+    }
+    full = history->count == SLIP_CAPACITY ||
+           t_us - history->t_us[history->oldest] + interval_us > reach_us;
+  }
+  if (full) {
+    float n = (float)history->count;
+    float dx = (float)x - (float)history->x_sum / n;
+    float dy = (float)y - (float)history->y_sum / n;
+    *distance_mm = sqrtf(dx * dx + dy * dy) * (1.0f / SIXTEENTHS_PER_mm);
+  }
+  if (history->count == SLIP_CAPACITY) {
+    drop_oldest(history);
+  }
+  append(history, t_us, x, y);
+  return full;
+}

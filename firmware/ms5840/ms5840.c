@@ -1,0 +1,127 @@
+#include "ms5840/ms5840.h"
+
+#include <stddef.h>
+
+/* Conversion times and noise: MS5840-02BA datasheet; 1 mbar = 100 Pa. */
+#define ROW(ratio, bits, max_us, noise_Pa)                                                         \
+  {                                                                                                \
+    .osr = ratio, .convert_pressure = 0x40 | bits, .convert_temperature = 0x50 | bits,             \
+    .conversion_us = (max_us)*105 / 100, .noise_Pa_q10 = (int32_t)((noise_Pa)*1024.0f)             \
+  }
+static const struct ms5840_osr osr_table[] = {
+    ROW(256, 0x0, 560, 11.0f),  ROW(512, 0x2, 1100, 6.2f),  ROW(1024, 0x4, 2170, 3.9f),
+    ROW(2048, 0x6, 4320, 2.8f), ROW(4096, 0x8, 8610, 2.1f), ROW(8192, 0xA, 17200, 1.6f),
+};
+
+const struct ms5840_osr *ms5840_find_osr(uint16_t osr) {
+  for (size_t i = 0; i < sizeof osr_table / sizeof osr_table[0]; i++) {
+    if (osr_table[i].osr == osr) {
+      return &osr_table[i];
+    }
+  }
+  return NULL;
+}
+
+uint8_t ms5840_crc4_bytes(const uint8_t bytes[16]) {
+  uint16_t remainder = 0;
+  for (int i = 0; i < 16; i++) {
+    remainder ^= bytes[i];
+    for (int bit = 0; bit < 8; bit++) {
+      remainder = (uint16_t)((remainder & 0x8000u) ? (uint16_t)(remainder << 1) ^ 0x3000u
+                                                   : (uint16_t)(remainder << 1));
+    }
+  }
+  return (uint8_t)(remainder >> 12);
+}
+
+uint8_t ms5840_prom_crc4(const struct ms5840_prom *prom) {
+  uint8_t bytes[16] = {0};
+  for (int i = 0; i < MS5840_PROM_WORDS; i++) {
+    bytes[2 * i] = (uint8_t)(prom->word[i] >> 8);
+    bytes[2 * i + 1] = (uint8_t)prom->word[i];
+  }
+  bytes[0] &= 0x0F;
+  return ms5840_crc4_bytes(bytes);
+}
+
+enum ms5840_prom_state ms5840_check_prom(const struct ms5840_prom *prom) {
+  bool all_zero = true;
+  bool all_ones = true;
+  for (int i = 0; i < MS5840_PROM_WORDS; i++) {
+    all_zero = all_zero && prom->word[i] == 0;
+    all_ones = all_ones && prom->word[i] == 0xFFFF;
+  }
+  if (all_zero || all_ones) {
+    return MS5840_PROM_BLANK;
+  }
+  return ms5840_prom_crc4(prom) == prom->word[0] >> 12 ? MS5840_PROM_GOOD : MS5840_PROM_CRC_DIFFERS;
+}
+
+enum ms5840_branch ms5840_branch_of(enum ms5840_branch previous, int32_t temperature_cC) {
+  int32_t warm_edge_cC = 2000;
+  int32_t very_cold_edge_cC = 1000;
+  switch (previous) {
+  case MS5840_BRANCH_WARM:
+    warm_edge_cC -= MS5840_BRANCH_HYSTERESIS_cC;
+    break;
+  case MS5840_BRANCH_COLD:
+    warm_edge_cC += MS5840_BRANCH_HYSTERESIS_cC;
+    very_cold_edge_cC -= MS5840_BRANCH_HYSTERESIS_cC;
+    break;
+  case MS5840_BRANCH_VERY_COLD:
+    very_cold_edge_cC += MS5840_BRANCH_HYSTERESIS_cC;
+    break;
+  case MS5840_BRANCH_UNKNOWN:
+    break;
+  }
+  if (temperature_cC >= warm_edge_cC) {
+    return MS5840_BRANCH_WARM;
+  }
+  return temperature_cC >= very_cold_edge_cC ? MS5840_BRANCH_COLD : MS5840_BRANCH_VERY_COLD;
+}
+
+void ms5840_compensate_temperature(const struct ms5840_prom *prom, uint32_t d2,
+                                   enum ms5840_branch previous, struct ms5840_thermal *thermal) {
+  const uint16_t *c = prom->word;
+  int32_t dT = (int32_t)d2 - ((int32_t)c[5] << 8);
+  int32_t temperature_cC = 2000 + (int32_t)(((int64_t)dT * c[6]) >> 23);
+  int64_t offset = ((int64_t)c[2] << 17) + (((int64_t)c[4] * dT) >> 6);
+  int64_t sensitivity = ((int64_t)c[1] << 16) + (((int64_t)c[3] * dT) >> 7);
+
+  thermal->branch = ms5840_branch_of(previous, temperature_cC);
+  thermal->dT = dT;
+  thermal->first_order_cC = temperature_cC;
+
+  int64_t dT_squared = (int64_t)dT * dT;
+  int64_t below = temperature_cC - 2000;
+  int64_t below_squared = below * below;
+  switch (thermal->branch) {
+  case MS5840_BRANCH_COLD:
+    temperature_cC -= (int32_t)((12 * dT_squared) >> 35);
+    offset -= (30 * below_squared) >> 8;
+    break;
+  case MS5840_BRANCH_VERY_COLD:
+    temperature_cC -= (int32_t)((14 * dT_squared) >> 35);
+    offset -= (35 * below_squared) >> 3;
+    sensitivity -= (63 * below_squared) >> 5;
+    break;
+  case MS5840_BRANCH_WARM:
+  case MS5840_BRANCH_UNKNOWN:
+    break;
+  }
+  thermal->temperature_cC = temperature_cC;
+  thermal->offset = offset;
+  thermal->sensitivity = sensitivity;
+}
+
+int32_t ms5840_compensate_pressure(const struct ms5840_thermal *thermal, uint32_t d1) {
+  int64_t pressure_Pa_q15 = (((int64_t)d1 * thermal->sensitivity) >> 21) - thermal->offset;
+  int64_t pressure_Pa_q10 = pressure_Pa_q15 >> 5;
+  if (pressure_Pa_q10 > INT32_MAX) {
+    return INT32_MAX;
+  }
+  if (pressure_Pa_q10 < INT32_MIN) {
+    return INT32_MIN;
+  }
+  return (int32_t)pressure_Pa_q10;
+}

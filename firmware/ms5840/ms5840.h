@@ -1,0 +1,93 @@
+/* TE Connectivity MS5840-02BA: commands, calibration PROM and compensation. Pure functions: no bus,
+ * no time, no state but what the caller owns.
+ *
+ * Sources: MS5840-02BA datasheet (commands, conversion times, compensation), its command set and
+ * first-order arithmetic cross-checked with the MS5837-02BA datasheet; Application Note AN520 for
+ * the CRC-4.
+ */
+#ifndef MS5840_MS5840_H
+#define MS5840_MS5840_H
+
+#include "common/status.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define MS5840_ADDRESS 0x76
+
+enum {
+  MS5840_CMD_RESET = 0x1E,
+  MS5840_CMD_READ_ADC = 0x00,  /* 3 bytes, MSB first; 0 = no finished conversion */
+  MS5840_CMD_READ_PROM = 0xA0, /* + 2 * word, 2 bytes, MSB first */
+  MS5840_PROM_WORDS = 7,       /* an eighth is refused by some parts */
+};
+
+/* PROM reload after reset: 2.8 ms (recalled from the sensor family; public drivers wait 3 ms). */
+#define MS5840_RESET_us 4000u
+
+/* One row per oversampling ratio: the commands and the time they take cannot disagree. */
+struct ms5840_osr {
+  uint16_t osr;
+  uint8_t convert_pressure;    /* D1 */
+  uint8_t convert_temperature; /* D2 */
+  uint16_t conversion_us;      /* datasheet maximum plus 5 % for the sensor's own oscillator. An
+                                  earlier read returns 0 and spoils the conversion */
+  int32_t noise_Pa_q10;        /* rms of one reading, 1/1024 Pa */
+};
+
+/* NULL for anything but 256, 512, 1024, 2048, 4096, 8192. */
+const struct ms5840_osr *ms5840_find_osr(uint16_t osr);
+
+/* W0: CRC-4, type, factory bits. W1..W6: C1..C6. */
+struct ms5840_prom {
+  uint16_t word[MS5840_PROM_WORDS];
+};
+
+/* CRC-4 of the seven words with the CRC nibble itself taken as 0. All sixteen values occur. */
+uint8_t ms5840_prom_crc4(const struct ms5840_prom *prom);
+
+/* The core of the check: 16 bytes, MSB first; for the test vector of AN520. */
+uint8_t ms5840_crc4_bytes(const uint8_t bytes[16]);
+
+enum ms5840_prom_state {
+  MS5840_PROM_GOOD,
+  MS5840_PROM_CRC_DIFFERS, /* usable: one genuine part is known with a wrong nibble */
+  MS5840_PROM_BLANK,       /* all 0 or all ones: not a calibration */
+};
+enum ms5840_prom_state ms5840_check_prom(const struct ms5840_prom *prom);
+
+/* The second-order corrections come in three branches of the first-order temperature. Where they
+ * meet at 10 degC the pressure steps by some 60 Pa at 1 bar, so a branch is left only when the
+ * temperature is MS5840_BRANCH_HYSTERESIS_cC beyond its edge. */
+enum ms5840_branch {
+  MS5840_BRANCH_UNKNOWN = 0,
+  MS5840_BRANCH_WARM,      /* >= 20 degC: none */
+  MS5840_BRANCH_COLD,      /* 10..20 degC */
+  MS5840_BRANCH_VERY_COLD, /* < 10 degC */
+};
+#define MS5840_BRANCH_HYSTERESIS_cC 30
+enum ms5840_branch ms5840_branch_of(enum ms5840_branch previous, int32_t temperature_cC);
+
+/* What a temperature conversion yields: the coefficients of the following pressures. */
+struct ms5840_thermal {
+  enum ms5840_branch branch;
+  int32_t dT;             /* D2 - C5 * 2^8 */
+  int32_t first_order_cC; /* TEMP before the second-order term, 0.01 degC */
+  int32_t temperature_cC; /* TEMP */
+  int64_t offset;         /* OFF, 41 bit */
+  int64_t sensitivity;    /* SENS, 41 bit */
+};
+
+/* d2: 24-bit code of a temperature conversion. previous: branch of the last call for this sensor,
+ * or MS5840_BRANCH_UNKNOWN. About 700 Cortex-M0+ cycles. */
+void ms5840_compensate_temperature(const struct ms5840_prom *prom, uint32_t d2,
+                                   enum ms5840_branch previous, struct ms5840_thermal *thermal);
+
+/* d1: 24-bit code of a pressure conversion. Absolute pressure in 1/1024 Pa, saturated to int32;
+ * shifted right by 10 it is the datasheet's P in Pa. About 130 Cortex-M0+ cycles. */
+int32_t ms5840_compensate_pressure(const struct ms5840_thermal *thermal, uint32_t d1);
+
+/* Beyond the extended range the reading is biased low. */
+#define MS5840_MAX_PRESSURE_Pa 200000
+
+#endif
