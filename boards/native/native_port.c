@@ -1,0 +1,127 @@
+#include "native/native_port.h"
+
+#include "port/port.h"
+
+#include <setjmp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* More events than this at one moment are a program that never lets time pass. */
+enum { MAX_EVENTS_AT_ONCE = 10000 };
+
+static struct {
+  uint64_t now_us;
+  uint64_t alarm_us; /* UINT64_MAX = off */
+  void (*handler)(void *);
+  void *handler_context;
+  uint64_t (*source_next_us)(const void *);
+  const void *source_context;
+  uint64_t fed_us;
+  uint64_t events;
+  unsigned events_at_once;
+  bool watchdog_expired;
+  bool started_by_watchdog;
+  bool running;
+  jmp_buf out;
+} native = {.alarm_us = UINT64_MAX};
+
+static _Noreturn void stop(const char *why) {
+  fprintf(stderr, "native_port: %s at %llu us\n", why, (unsigned long long)native.now_us);
+  abort();
+}
+
+void native_start(bool by_watchdog) {
+  memset(&native, 0, sizeof native);
+  native.alarm_us = UINT64_MAX;
+  native.started_by_watchdog = by_watchdog;
+}
+
+void native_set_event_source(uint64_t (*next_us)(const void *context), const void *context) {
+  native.source_next_us = next_us;
+  native.source_context = context;
+}
+
+static uint64_t next_event_us(void) {
+  uint64_t next_us = native.alarm_us;
+  if (native.source_next_us) {
+    const uint64_t source_us = native.source_next_us(native.source_context);
+    next_us = source_us < next_us ? source_us : next_us;
+  }
+  return next_us < native.now_us ? native.now_us : next_us;
+}
+
+static void pass_time_to(uint64_t t_us) {
+  if (t_us > native.now_us)
+    native.events_at_once = 0;
+  native.now_us = t_us;
+  if (t_us - native.fed_us > PORT_WATCHDOG_PERIOD_us)
+    native.watchdog_expired = true;
+}
+
+static void take_event(uint64_t t_us) {
+  pass_time_to(t_us);
+  native.events++;
+  if (++native.events_at_once > MAX_EVENTS_AT_ONCE)
+    stop("events without end: an alarm or the bus asks for the same moment again and again");
+  if (native.alarm_us <= native.now_us)
+    native.alarm_us = UINT64_MAX;
+  if (native.handler)
+    native.handler(native.handler_context);
+}
+
+enum native_end native_run_until(uint64_t t_us, void (*main_pass)(void *context), void *context) {
+  const int left = setjmp(native.out);
+  native.running = left == 0;
+  if (left != 0)
+    return (enum native_end)left;
+  if (main_pass)
+    main_pass(context);
+  for (uint64_t next_us; (next_us = next_event_us()) <= t_us;) {
+    take_event(next_us);
+    if (main_pass)
+      main_pass(context);
+  }
+  pass_time_to(t_us);
+  native.running = false;
+  return NATIVE_TIME_UP;
+}
+
+bool native_watchdog_expired(void) { return native.watchdog_expired; }
+
+uint64_t native_event_count(void) { return native.events; }
+
+uint64_t port_now_us(void) { return native.now_us; }
+
+void port_set_event_handler(void (*handler)(void *context), void *context) {
+  native.handler = handler;
+  native.handler_context = context;
+}
+
+void port_alarm_at_us(uint64_t t_us) { native.alarm_us = t_us; }
+
+void port_sleep(void) {
+  const uint64_t next_us = next_event_us();
+  if (next_us == UINT64_MAX)
+    stop("the main loop sleeps and nothing will wake it");
+  take_event(next_us);
+}
+
+void port_watchdog_feed(void) { native.fed_us = native.now_us; }
+
+bool port_started_by_watchdog(void) { return native.started_by_watchdog; }
+
+void port_serial_number(char text[17]) { memcpy(text, "0000000000000001", 17); }
+
+/* The host's stack is not watched. */
+size_t port_stack_free_bytes(void) { return 0; }
+
+static _Noreturn void leave(enum native_end how, const char *why) {
+  if (!native.running)
+    stop(why);
+  longjmp(native.out, how);
+}
+
+void port_reboot_to_loader(void) { leave(NATIVE_LOADER, "left for the boot loader"); }
+
+void port_panic(void) { leave(NATIVE_PANIC, "panic"); }

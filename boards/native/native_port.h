@@ -1,0 +1,36 @@
+/* port/port.h on the host, in virtual time: time passes only in native_run_until() and
+ * port_sleep(), from one event to the next, so a run is exact, repeatable and as fast as the host.
+ *
+ * Events are the alarm and those of one source, such as the simulated bus. At each, the event
+ * handler runs; computing takes no time. What the target cannot survive stops the test program with
+ * a message: a main loop that sleeps with no event to come, and events that do not let time pass.
+ */
+#ifndef NATIVE_NATIVE_PORT_H
+#define NATIVE_NATIVE_PORT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Start-up: time 0, no alarm, no handler, no source. */
+void native_start(bool by_watchdog);
+
+/* next_us tells when the source has its next event, UINT64_MAX for never. */
+void native_set_event_source(uint64_t (*next_us)(const void *context), const void *context);
+
+enum native_end {
+  NATIVE_TIME_UP,
+  NATIVE_LOADER, /* the program left by port_reboot_to_loader() */
+  NATIVE_PANIC,  /* by port_panic() */
+};
+
+/* Runs until t_us: events, and main_pass (one pass of the main loop; may be NULL) once at the
+ * beginning and after every event, as if it slept in between. */
+enum native_end native_run_until(uint64_t t_us, void (*main_pass)(void *context), void *context);
+
+/* The watchdog would have struck: it was not fed for PORT_WATCHDOG_PERIOD_us. */
+bool native_watchdog_expired(void);
+
+/* Events since start. */
+uint64_t native_event_count(void);
+
+#endif
