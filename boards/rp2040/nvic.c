@@ -3,9 +3,15 @@
 #include "rp2040/reg.h"
 
 #define NVIC_ISER 0xe000e100u
+#define NVIC_ICER 0xe000e180u
+#define NVIC_ISPR 0xe000e200u
 #define NVIC_ICPR 0xe000e280u
 
 void rp2040_irq_enable(unsigned irq) {
   REG32(NVIC_ICPR) = UINT32_C(1) << irq;
   REG32(NVIC_ISER) = UINT32_C(1) << irq;
 }
+
+void rp2040_irq_disable(unsigned irq) { REG32(NVIC_ICER) = UINT32_C(1) << irq; }
+
+void rp2040_irq_pend(unsigned irq) { REG32(NVIC_ISPR) = UINT32_C(1) << irq; }

@@ -8,9 +8,15 @@ enum rp2040_irq {
   RP2040_IRQ_PIO0_0 = 7,
   RP2040_IRQ_DMA_0 = 11,
   RP2040_IRQ_I2C0 = 23,
+  RP2040_IRQ_USB_SERVICE = 26, /* wired to no block: for software */
 };
 
 /* Forgets what is pending on the line and lets it interrupt. */
 void rp2040_irq_enable(unsigned irq);
+
+void rp2040_irq_disable(unsigned irq);
+
+/* Lets the line interrupt now, as if its block had asked for it. */
+void rp2040_irq_pend(unsigned irq);
 
 #endif

@@ -1,0 +1,67 @@
+#include "rp2040/clocks.h"
+
+#include "rp2040/clocks_regs.h"
+#include "rp2040/resets.h"
+#include "rp2040/watchdog_regs.h"
+
+
+/* A poll takes about ten cycles and the ring oscillator gives at most 12 MHz: at least 80 ms. The
+ * crystal needs 1 ms, a PLL 50 us. */
+enum { POLLS = 100000 };
+
+_Noreturn void clocks_reset_chip(void) {
+  PSM_WDSEL = PSM_WDSEL_ALL_BUT_OSCILLATORS;
+  REG32_SET(WATCHDOG_CTRL) = WATCHDOG_CTRL_TRIGGER;
+  for (;;) {
+  }
+}
+
+static void wait_for(uint32_t address, uint32_t bits) {
+  for (int polls = 0; polls < POLLS; polls++) {
+    if (REG32(address) & bits)
+      return;
+  }
+  clocks_reset_chip();
+}
+
+static void start_pll(uint32_t base, uint32_t feedback_divider, uint32_t post_dividers) {
+  REG32(base + PLL_CS) = 1; /* reference divider */
+  REG32(base + PLL_FBDIV_INT) = feedback_divider;
+  REG32_CLEAR(base + PLL_PWR) = PLL_PWR_PD | PLL_PWR_VCOPD;
+  wait_for(base + PLL_CS, PLL_CS_LOCK);
+  REG32(base + PLL_PRIM) = post_dividers;
+  REG32_CLEAR(base + PLL_PWR) = PLL_PWR_POSTDIVPD;
+}
+
+void clocks_start(void) {
+  /* A debugger may come here with everything running. */
+  REG32(CLK_SYS_RESUS_CTRL) = 0;
+  REG32_CLEAR(CLK_SYS_CTRL) = CLK_SYS_SRC_AUX;
+  wait_for(CLK_SYS_SELECTED, 1u << CLK_SYS_SRC_REF);
+  REG32(CLK_REF_CTRL) = CLK_REF_SRC_ROSC;
+  wait_for(CLK_REF_SELECTED, 1u << CLK_REF_SRC_ROSC);
+  REG32(CLK_PERI_CTRL) = 0;
+  REG32(CLK_USB_CTRL) = 0;
+  resets_assert(RESETS_ALL & ~(RESETS_IO_QSPI | RESETS_PADS_QSPI));
+
+  if ((REG32(XOSC_STATUS) & XOSC_STATUS_STABLE) == 0) {
+    REG32(XOSC_CTRL) = XOSC_CTRL_1_TO_15_MHZ;
+    XOSC_STARTUP = 12000 / 256 + 1; /* 1 ms */
+    REG32_SET(XOSC_CTRL) = XOSC_CTRL_ENABLE;
+    wait_for(XOSC_STATUS, XOSC_STATUS_STABLE);
+  }
+
+  if (resets_release(RESETS_PLL_SYS | RESETS_PLL_USB) != FT_OK)
+    clocks_reset_chip();
+  start_pll(PLL_SYS_BASE, 125, PLL_PRIM_POSTDIV1(6) | PLL_PRIM_POSTDIV2(2)); /* 1500 / 12 MHz */
+  start_pll(PLL_USB_BASE, 100, PLL_PRIM_POSTDIV1(5) | PLL_PRIM_POSTDIV2(5)); /* 1200 / 25 MHz */
+
+  REG32(CLK_REF_CTRL) = CLK_REF_SRC_XOSC;
+  wait_for(CLK_REF_SELECTED, 1u << CLK_REF_SRC_XOSC);
+  REG32_SET(CLK_SYS_CTRL) = CLK_SYS_SRC_AUX;
+  wait_for(CLK_SYS_SELECTED, 1u << CLK_SYS_SRC_AUX);
+  REG32(CLK_PERI_CTRL) = CLK_CTRL_ENABLE;
+  REG32(CLK_USB_CTRL) = CLK_CTRL_ENABLE;
+
+  WATCHDOG_TICK = WATCHDOG_TICK_ENABLE | 12u;
+}

@@ -1,0 +1,43 @@
+/* Oscillators, PLLs and clock generators: the registers and bits used here (RP2040 datasheet 2.15
+ * clocks, 2.16 XOSC, 2.17 ROSC, 2.18 PLL). */
+#ifndef RP2040_CLOCKS_REGS_H
+#define RP2040_CLOCKS_REGS_H
+
+#include "rp2040/reg.h"
+
+#define CLOCKS_BASE 0x40008000u
+#define CLK_REF_CTRL (CLOCKS_BASE + 0x30u)
+#define CLK_REF_SELECTED (CLOCKS_BASE + 0x38u) /* bit n: source n drives the clock */
+#define CLK_REF_SRC_ROSC 0u
+#define CLK_REF_SRC_XOSC 2u
+#define CLK_SYS_CTRL (CLOCKS_BASE + 0x3cu)
+#define CLK_SYS_SELECTED (CLOCKS_BASE + 0x44u)
+#define CLK_SYS_SRC_REF 0u
+#define CLK_SYS_SRC_AUX 1u /* AUXSRC 0: PLL_SYS */
+#define CLK_PERI_CTRL (CLOCKS_BASE + 0x48u) /* AUXSRC 0: clk_sys */
+#define CLK_USB_CTRL (CLOCKS_BASE + 0x54u)  /* AUXSRC 0: PLL_USB */
+#define CLK_CTRL_ENABLE (1u << 11)
+#define CLK_SYS_RESUS_CTRL (CLOCKS_BASE + 0x78u)
+
+#define XOSC_BASE 0x40024000u
+#define XOSC_CTRL (XOSC_BASE + 0x00u)
+#define XOSC_CTRL_1_TO_15_MHZ 0xaa0u
+#define XOSC_CTRL_ENABLE (0xfabu << 12)
+#define XOSC_STATUS (XOSC_BASE + 0x04u)
+#define XOSC_STATUS_STABLE (1u << 31)
+#define XOSC_STARTUP REG32(XOSC_BASE + 0x0cu) /* in units of 256 cycles of the crystal */
+
+#define PLL_SYS_BASE 0x40028000u
+#define PLL_USB_BASE 0x4002c000u
+#define PLL_CS 0x00u
+#define PLL_CS_LOCK (1u << 31)
+#define PLL_PWR 0x04u
+#define PLL_PWR_PD (1u << 0)
+#define PLL_PWR_POSTDIVPD (1u << 3)
+#define PLL_PWR_VCOPD (1u << 5)
+#define PLL_FBDIV_INT 0x08u
+#define PLL_PRIM 0x0cu
+#define PLL_PRIM_POSTDIV1(n) ((uint32_t)(n) << 16)
+#define PLL_PRIM_POSTDIV2(n) ((uint32_t)(n) << 12)
+
+#endif

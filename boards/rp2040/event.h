@@ -1,0 +1,14 @@
+/* The event interrupt of port.h: all interrupts have one priority, so handlers never nest. */
+#ifndef RP2040_EVENT_H
+#define RP2040_EVENT_H
+
+/* Calls the handler that port_set_event_handler() installed. From an interrupt handler. */
+void rp2040_event(void);
+
+/* Interrupt vector of TIMER alarm 0. */
+void timer0_irq_handler(void);
+
+/* Prepares what port.h offers; the watchdog runs from then on. Called once, before main. */
+void port_start(void);
+
+#endif

@@ -1,0 +1,166 @@
+#include "port/port.h"
+
+#include "rp2040/event.h"
+#include "rp2040/flash_id.h"
+#include "rp2040/nvic.h"
+#include "rp2040/resets.h"
+#include "rp2040/timer_regs.h"
+#include "rp2040/watchdog_regs.h"
+
+/* In scratch 0 from the first start on: a watchdog reset after that was ours, and not the boot
+ * ROM's, which leaves its USB loader in the same way. */
+#define STARTED_MAGIC UINT32_C(0x46546970)
+
+/* ALARM0 compares 32 bits, so nearer than one turn of the low word. */
+#define ALARM_HORIZON_us UINT32_C(0x7fffffff)
+
+static struct {
+  void (*handler)(void *context);
+  void *context;
+} event;
+
+static struct {
+  uint64_t due_us;
+  bool set;
+} alarm;
+
+static bool started_by_watchdog;
+static char serial_number[2 * FLASH_ID_BYTES + 1];
+
+static uint32_t disable_interrupts(void) {
+  uint32_t primask;
+  __asm volatile("mrs %0, primask\n cpsid i" : "=r"(primask)::"memory");
+  return primask;
+}
+
+static void restore_interrupts(uint32_t primask) {
+  __asm volatile("msr primask, %0" ::"r"(primask) : "memory");
+}
+
+uint64_t port_now_us(void) {
+  uint32_t high = TIMER_TIMERAWH;
+  uint32_t low = TIMER_TIMERAWL;
+  uint32_t high_again = TIMER_TIMERAWH;
+  if (high != high_again) /* the low word has turned over just now, so a second read is safe */
+    low = TIMER_TIMERAWL;
+  return (uint64_t)high_again << 32 | low;
+}
+
+void port_set_event_handler(void (*handler)(void *context), void *context) {
+  uint32_t primask = disable_interrupts();
+  event.handler = handler;
+  event.context = context;
+  restore_interrupts(primask);
+}
+
+void rp2040_event(void) {
+  if (event.handler)
+    event.handler(event.context);
+}
+
+/* With interrupts disabled, or in an interrupt. */
+static void arm_alarm(void) {
+  uint64_t now_us = port_now_us();
+  uint64_t target_us = alarm.due_us;
+  if (target_us > now_us + ALARM_HORIZON_us)
+    target_us = now_us + ALARM_HORIZON_us;
+  TIMER_ALARM0 = (uint32_t)target_us;
+  if (port_now_us() >= target_us) { /* too late for the comparison, perhaps */
+    TIMER_ARMED = TIMER_ALARM0_BIT;
+    rp2040_irq_pend(RP2040_IRQ_TIMER_0);
+  }
+}
+
+void port_alarm_at_us(uint64_t t_us) {
+  uint32_t primask = disable_interrupts();
+  alarm.due_us = t_us;
+  alarm.set = true;
+  arm_alarm();
+  restore_interrupts(primask);
+}
+
+void timer0_irq_handler(void) {
+  TIMER_INTR = TIMER_ALARM0_BIT;
+  if (!alarm.set)
+    return;
+  if (port_now_us() < alarm.due_us) {
+    arm_alarm();
+    return;
+  }
+  alarm.set = false;
+  rp2040_event();
+}
+
+/* Leaving an exception sets the event register (ARMv6-M B1.5.18), so an interrupt between the
+ * caller's check and WFE makes WFE return at once. */
+void port_sleep(void) { __asm volatile("wfe" ::: "memory"); }
+
+void port_watchdog_feed(void) { WATCHDOG_LOAD = 2 * PORT_WATCHDOG_PERIOD_us; }
+
+bool port_started_by_watchdog(void) { return started_by_watchdog; }
+
+void port_serial_number(char text[17]) {
+  for (unsigned i = 0; i < sizeof serial_number; i++)
+    text[i] = serial_number[i];
+}
+
+size_t port_stack_free_bytes(void) {
+  extern const uint32_t __stack_limit[], __stack_top[];
+  const uint32_t paint = UINT32_C(0x5aa5c33c); /* start.S */
+  const uint32_t *word = __stack_limit;
+  while (word < __stack_top && *word == paint)
+    word++;
+  return (size_t)(word - __stack_limit) * sizeof *word;
+}
+
+/* RP2040 datasheet 2.8.3: half-word pointers to the function table and to its look-up function, and
+ * the code of reset_to_usb_boot(activity pins, disabled interfaces). */
+_Noreturn void port_reboot_to_loader(void) {
+  typedef void *lookup_fn(const uint16_t *table, uint32_t code);
+  typedef void reset_to_usb_boot_fn(uint32_t activity_pins, uint32_t disabled_interfaces);
+  const uint32_t code = 'U' | 'B' << 8;
+
+  disable_interrupts();
+  WATCHDOG_SCRATCH0 = 0;
+  extern const uint16_t __rom_function_table, __rom_function_lookup;
+  const uint16_t *table = (const uint16_t *)(uintptr_t)__rom_function_table;
+  lookup_fn *lookup = (lookup_fn *)(uintptr_t)__rom_function_lookup;
+  reset_to_usb_boot_fn *reset_to_usb_boot;
+  *(void **)&reset_to_usb_boot = lookup(table, code);
+  reset_to_usb_boot(0, 0);
+  port_panic();
+}
+
+_Noreturn void port_panic(void) {
+  disable_interrupts();
+  PSM_WDSEL = PSM_WDSEL_ALL_BUT_OSCILLATORS;
+  REG32_SET(WATCHDOG_CTRL) = WATCHDOG_CTRL_TRIGGER;
+  for (;;) {
+  }
+}
+
+static void read_serial_number(void) {
+  uint8_t id[FLASH_ID_BYTES] = {0};
+  if (flash_read_id(id) != FT_OK)
+    port_panic();
+  for (unsigned i = 0; i < 2 * FLASH_ID_BYTES; i++) {
+    unsigned digit = (unsigned)id[i / 2] >> (i % 2 ? 0 : 4) & 15u;
+    serial_number[i] = (char)(digit < 10 ? '0' + digit : 'A' + digit - 10);
+  }
+}
+
+void port_start(void) {
+  started_by_watchdog = WATCHDOG_REASON != 0 && WATCHDOG_SCRATCH0 == STARTED_MAGIC;
+  WATCHDOG_SCRATCH0 = STARTED_MAGIC;
+
+  PSM_WDSEL = PSM_WDSEL_ALL_BUT_OSCILLATORS;
+  port_watchdog_feed();
+  REG32_SET(WATCHDOG_CTRL) = WATCHDOG_CTRL_ENABLE;
+
+  if (resets_release(RESETS_TIMER) != FT_OK)
+    port_panic();
+  TIMER_INTE = TIMER_ALARM0_BIT;
+  rp2040_irq_enable(RP2040_IRQ_TIMER_0);
+
+  read_serial_number();
+}

@@ -1,0 +1,16 @@
+/* The 64-bit microsecond counter and its alarms (RP2040 datasheet 4.6). */
+#ifndef RP2040_TIMER_REGS_H
+#define RP2040_TIMER_REGS_H
+
+#include "rp2040/reg.h"
+
+#define TIMER_BASE 0x40054000u
+#define TIMER_ALARM0 REG32(TIMER_BASE + 0x10u) /* fires when the low word becomes equal to it */
+#define TIMER_ARMED REG32(TIMER_BASE + 0x20u)  /* writing a 1 disarms */
+#define TIMER_TIMERAWH REG32(TIMER_BASE + 0x24u)
+#define TIMER_TIMERAWL REG32(TIMER_BASE + 0x28u)
+#define TIMER_INTR REG32(TIMER_BASE + 0x34u) /* writing a 1 clears */
+#define TIMER_INTE REG32(TIMER_BASE + 0x38u)
+#define TIMER_ALARM0_BIT (1u << 0)
+
+#endif

@@ -1,0 +1,280 @@
+/* The controller keeps no toggles and no state of its own worth speaking of: each packet's PID is in
+ * its buffer control word, and software tells from BUFF_STATUS what has happened (RP2040 datasheet
+ * 4.1.2). Every endpoint is single-buffered.
+ *
+ * Errata: E2 (an abort blocks the controller for good) and E5 (a busy bus hides the end of a bus
+ * reset) are fixed in revision B2 of the chip. On B0 and B1 aborts are left out, and E5, whose
+ * work-around takes two pins, is not worked around: there the device may not enumerate behind a hub
+ * with traffic. E15 (some bus errors in an IN transfer hang the device) stands in all revisions: no
+ * bulk IN packet is offered in the last 200 us of a frame, where such errors come from.
+ */
+#include "rp2040/usb_controller.h"
+
+#include "port/port.h"
+#include "port/usb_controller.h"
+#include "rp2040/nvic.h"
+#include "rp2040/resets.h"
+#include "rp2040/timer_regs.h"
+#include "rp2040/usb_regs.h"
+
+enum { ENDPOINT_NUMBERS = 3 };
+
+#define SYSINFO_CHIP_ID REG32(0x40000000u)
+#define SYSINFO_CHIP_ID_REVISION(id) ((id) >> 28)
+#define REVISION_B2 2u
+
+/* Frame time, counted from its start, in which nothing is offered: erratum E15 */
+#define FRAME_TAIL_BEGIN_us 800u
+#define FRAME_TAIL_END_us 998u
+
+/* A full packet and its handshake take 50 us on the bus. */
+#define ABORT_LIMIT_us 200u
+
+/* One bit for each endpoint, as in BUFF_STATUS */
+static uint32_t data1;    /* the next packet is DATA1 */
+static uint32_t held;     /* it offers a packet, or accepts one */
+static uint32_t deferred; /* held, but not before the next frame */
+static uint32_t bulk;
+
+static uint32_t frame_start_us;
+static bool suspended;
+static bool can_abort;
+
+/* The controller reads the control word in its own clock domain, so AVAILABLE is written once the
+ * other fields are certain to have arrived there: datasheet 4.1.2.5.1. */
+static void hand_over(uint8_t endpoint, uint32_t fields) {
+  USB_BUFFER_CONTROL(endpoint) = fields;
+  __asm volatile("nop\n nop\n nop\n nop\n nop\n nop\n"
+                 "nop\n nop\n nop\n nop\n nop\n nop" ::
+                     : "memory");
+  USB_BUFFER_CONTROL(endpoint) = fields | USB_BUFFER_AVAILABLE;
+}
+
+static uint32_t pid(uint8_t endpoint) {
+  return data1 & USB_BIT(endpoint) ? USB_BUFFER_DATA1 : 0;
+}
+
+static bool in_frame_tail(void) {
+  uint32_t frame_us = TIMER_TIMERAWL - frame_start_us;
+  return frame_us >= FRAME_TAIL_BEGIN_us && frame_us < FRAME_TAIL_END_us;
+}
+
+static void start_frame(void) {
+  frame_start_us = TIMER_TIMERAWL;
+  for (uint8_t number = 1; deferred && number < ENDPOINT_NUMBERS; number++) {
+    uint8_t endpoint = USB_ENDPOINT_IN | number;
+    if (deferred & USB_BIT(endpoint))
+      hand_over(endpoint, USB_BUFFER_CONTROL(endpoint));
+  }
+  deferred = 0;
+}
+
+/* Stops the controller from touching the buffer. */
+static void begin_abort(uint32_t bit) {
+  if (!can_abort)
+    return;
+  REG32_SET(USB_EP_ABORT) = bit;
+  uint32_t start_us = TIMER_TIMERAWL;
+  while ((REG32(USB_EP_ABORT_DONE) & bit) == 0 && TIMER_TIMERAWL - start_us < ABORT_LIMIT_us) {
+  }
+}
+
+static void end_abort(uint32_t bit) {
+  if (!can_abort)
+    return;
+  REG32_CLEAR(USB_EP_ABORT_DONE) = bit;
+  REG32_CLEAR(USB_EP_ABORT) = bit;
+}
+
+bool usb_controller_withdraw(uint8_t endpoint) {
+  uint32_t bit = USB_BIT(endpoint);
+  if ((held & bit) == 0)
+    return false;
+  held &= ~bit;
+  if (deferred & bit) {
+    deferred &= ~bit;
+    return true;
+  }
+  begin_abort(bit);
+  bool done = REG32(USB_BUFF_STATUS) & bit; /* just before, and not yet seen here */
+  REG32_CLEAR(USB_BUFF_STATUS) = bit;
+  USB_BUFFER_CONTROL(endpoint) = 0;
+  end_abort(bit);
+  if (done)
+    data1 ^= bit;
+  return !done;
+}
+
+void usb_controller_set_address(uint8_t address) { USB_ADDR_ENDP = address; }
+
+void usb_controller_open(uint8_t endpoint, enum usb_endpoint_type type) {
+  usb_controller_withdraw(endpoint);
+  data1 &= ~USB_BIT(endpoint);
+  if (type == USB_ENDPOINT_BULK)
+    bulk |= USB_BIT(endpoint);
+  USB_BUFFER_CONTROL(endpoint) = 0;
+  USB_ENDPOINT_CONTROL(endpoint) = USB_ENDPOINT_CONTROL_ENABLE | USB_ENDPOINT_CONTROL_INTERRUPT |
+                                   USB_ENDPOINT_CONTROL_TYPE(type) | USB_BUFFER_OFFSET(endpoint);
+}
+
+static void close(uint8_t endpoint) {
+  usb_controller_withdraw(endpoint);
+  USB_ENDPOINT_CONTROL(endpoint) = 0;
+  USB_BUFFER_CONTROL(endpoint) = 0;
+}
+
+void usb_controller_close_all(void) {
+  for (uint8_t number = 1; number < ENDPOINT_NUMBERS; number++) {
+    close(number);
+    close(USB_ENDPOINT_IN | number);
+  }
+}
+
+void usb_controller_send(uint8_t endpoint, const uint8_t *bytes, size_t length) {
+  volatile uint8_t *buffer =
+      (volatile uint8_t *)(uintptr_t)(USB_DPRAM_BASE + USB_BUFFER_OFFSET(endpoint));
+  for (size_t i = 0; i < length; i++)
+    buffer[i] = bytes[i];
+  uint32_t bit = USB_BIT(endpoint);
+  uint32_t fields = USB_BUFFER_FULL | pid(endpoint) | (uint32_t)length;
+  held |= bit;
+  if ((bulk & bit) && in_frame_tail()) {
+    USB_BUFFER_CONTROL(endpoint) = fields;
+    deferred |= bit;
+  } else {
+    hand_over(endpoint, fields);
+  }
+}
+
+void usb_controller_receive(uint8_t endpoint) {
+  if (held & USB_BIT(endpoint))
+    return;
+  held |= USB_BIT(endpoint);
+  hand_over(endpoint, pid(endpoint) | USB_MAX_PACKET_BYTES);
+}
+
+void usb_controller_stall(uint8_t endpoint) {
+  if (endpoint == 0) {
+    usb_controller_withdraw(USB_ENDPOINT_IN);
+    usb_controller_withdraw(0);
+    USB_EP_STALL_ARM = USB_EP_STALL_ARM_BOTH;
+    USB_BUFFER_CONTROL(USB_ENDPOINT_IN) = USB_BUFFER_STALL;
+    USB_BUFFER_CONTROL(0) = USB_BUFFER_STALL;
+  } else {
+    usb_controller_withdraw(endpoint);
+    USB_BUFFER_CONTROL(endpoint) = USB_BUFFER_STALL;
+  }
+}
+
+void usb_controller_unstall(uint8_t endpoint) {
+  usb_controller_withdraw(endpoint);
+  USB_BUFFER_CONTROL(endpoint) = 0;
+  data1 &= ~USB_BIT(endpoint);
+}
+
+static void on_bus_reset(void) {
+  REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_BUS_RESET;
+  USB_ADDR_ENDP = 0;
+  usb_controller_close_all();
+  usb_controller_withdraw(USB_ENDPOINT_IN);
+  usb_controller_withdraw(0);
+  suspended = false;
+  usb_device_on_bus_reset();
+}
+
+static void on_setup(void) {
+  REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_SETUP_REC;
+  uint8_t packet[USB_SETUP_BYTES];
+  for (unsigned i = 0; i < sizeof packet; i++)
+    packet[i] = *(volatile uint8_t *)(uintptr_t)(USB_SETUP_PACKET + i);
+
+  usb_controller_withdraw(USB_ENDPOINT_IN);
+  usb_controller_withdraw(0);
+  USB_BUFFER_CONTROL(USB_ENDPOINT_IN) = 0; /* a stall ends here */
+  USB_BUFFER_CONTROL(0) = 0;
+  data1 |= USB_BIT(USB_ENDPOINT_IN) | USB_BIT(0);
+  usb_device_on_setup(packet);
+}
+
+static void on_buffer(uint8_t endpoint) {
+  uint32_t bit = USB_BIT(endpoint);
+  REG32_CLEAR(USB_BUFF_STATUS) = bit;
+  if ((held & bit) == 0)
+    return;
+  held &= ~bit;
+  data1 ^= bit;
+  if (endpoint & USB_ENDPOINT_IN) {
+    usb_device_on_sent(endpoint);
+    return;
+  }
+  uint8_t packet[USB_MAX_PACKET_BYTES];
+  size_t length = USB_BUFFER_CONTROL(endpoint) & USB_BUFFER_LENGTH;
+  const volatile uint8_t *buffer =
+      (const volatile uint8_t *)(uintptr_t)(USB_DPRAM_BASE + USB_BUFFER_OFFSET(endpoint));
+  for (size_t i = 0; i < length && i < sizeof packet; i++)
+    packet[i] = buffer[i];
+  usb_device_on_received(endpoint, packet, length);
+}
+
+static void set_suspended(bool now) {
+  if (suspended == now)
+    return;
+  suspended = now;
+  if (now)
+    usb_device_on_suspend();
+  else
+    usb_device_on_resume();
+}
+
+/* What was finished before a SETUP is handled before it, so that an address set counts. */
+void usbctrl_irq_handler(void) {
+  uint32_t interrupts = USB_INTS;
+  if (interrupts & USB_INT_BUS_RESET)
+    on_bus_reset();
+  if (interrupts & USB_INT_DEV_SUSPEND) {
+    REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_SUSPENDED;
+    set_suspended(true);
+  }
+  if (interrupts & USB_INT_DEV_RESUME)
+    REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_RESUME;
+  if (interrupts & (USB_INT_DEV_RESUME | USB_INT_DEV_SOF | USB_INT_SETUP_REQ | USB_INT_BUFF_STATUS))
+    set_suspended(false);
+  if (interrupts & USB_INT_DEV_SOF) {
+    (void)USB_SOF_RD;
+    start_frame();
+  }
+  if (interrupts & USB_INT_BUFF_STATUS) {
+    uint32_t finished = REG32(USB_BUFF_STATUS);
+    for (uint8_t number = 0; number < ENDPOINT_NUMBERS; number++) {
+      if (finished & USB_BIT(USB_ENDPOINT_IN | number))
+        on_buffer(USB_ENDPOINT_IN | number);
+      if (finished & USB_BIT(number))
+        on_buffer(number);
+    }
+  }
+  if (interrupts & USB_INT_SETUP_REQ)
+    on_setup();
+}
+
+void usb_service_irq_handler(void) { usb_device_on_service(); }
+
+void usb_controller_request_service(void) { rp2040_irq_pend(RP2040_IRQ_USB_SERVICE); }
+
+void usb_controller_start(void) {
+  resets_assert(RESETS_USBCTRL);
+  if (resets_release(RESETS_USBCTRL | RESETS_SYSINFO) != FT_OK)
+    port_panic();
+  can_abort = SYSINFO_CHIP_ID_REVISION(SYSINFO_CHIP_ID) >= REVISION_B2;
+  for (uint32_t offset = 0; offset < USB_DPRAM_BYTES; offset += 4)
+    REG32(USB_DPRAM_BASE + offset) = 0;
+
+  USB_MUXING = USB_MUXING_TO_PHY | USB_MUXING_SOFTCON;
+  USB_PWR = USB_PWR_VBUS_DETECT | USB_PWR_VBUS_DETECT_OVERRIDE_EN; /* powered by the bus */
+  USB_MAIN_CTRL = USB_MAIN_CTRL_CONTROLLER_EN;
+  REG32(USB_SIE_CTRL) = USB_SIE_CTRL_EP0_INT_1BUF;
+  USB_INTE = USB_INT_BUS_RESET | USB_INT_SETUP_REQ | USB_INT_BUFF_STATUS | USB_INT_DEV_SUSPEND |
+             USB_INT_DEV_RESUME | USB_INT_DEV_SOF;
+  rp2040_irq_enable(RP2040_IRQ_USBCTRL);
+  rp2040_irq_enable(RP2040_IRQ_USB_SERVICE);
+  REG32_SET(USB_SIE_CTRL) = USB_SIE_CTRL_PULLUP_EN;
+}

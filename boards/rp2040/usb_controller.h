@@ -1,0 +1,10 @@
+/* Interrupt vectors of the USB controller behind port/usb_controller.h. */
+#ifndef RP2040_USB_CONTROLLER_H
+#define RP2040_USB_CONTROLLER_H
+
+void usbctrl_irq_handler(void);
+
+/* A line without a block, for usb_controller_request_service(). */
+void usb_service_irq_handler(void);
+
+#endif
