@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* More events than this at one moment are a program that never lets time pass. */
-enum { MAX_EVENTS_AT_ONCE = 10000 };
+/* More events, or rounds of the main loop, at one moment are a program that never lets time pass. */
+enum { MAX_AT_ONCE = 10000 };
 
 static struct {
   uint64_t now_us;
@@ -19,7 +19,8 @@ static struct {
   const void *source_context;
   uint64_t fed_us;
   uint64_t events;
-  unsigned events_at_once;
+  unsigned at_once;
+  uint64_t limit_us; /* of the run; sleep ends there */
   bool watchdog_expired;
   bool started_by_watchdog;
   bool running;
@@ -53,36 +54,43 @@ static uint64_t next_event_us(void) {
 
 static void pass_time_to(uint64_t t_us) {
   if (t_us > native.now_us)
-    native.events_at_once = 0;
+    native.at_once = 0;
   native.now_us = t_us;
   if (t_us - native.fed_us > PORT_WATCHDOG_PERIOD_us)
     native.watchdog_expired = true;
 }
 
+static void count_at_once(void) {
+  if (++native.at_once > MAX_AT_ONCE)
+    stop("no time passes: the alarm, the bus or the main loop goes round without end");
+}
+
 static void take_event(uint64_t t_us) {
   pass_time_to(t_us);
   native.events++;
-  if (++native.events_at_once > MAX_EVENTS_AT_ONCE)
-    stop("events without end: an alarm or the bus asks for the same moment again and again");
+  count_at_once();
   if (native.alarm_us <= native.now_us)
     native.alarm_us = UINT64_MAX;
   if (native.handler)
     native.handler(native.handler_context);
 }
 
-enum native_end native_run_until(uint64_t t_us, void (*main_pass)(void *context), void *context) {
+enum native_end native_run_until(uint64_t t_us, void (*main_round)(void *context), void *context) {
   const int left = setjmp(native.out);
   native.running = left == 0;
   if (left != 0)
     return (enum native_end)left;
-  if (main_pass)
-    main_pass(context);
-  for (uint64_t next_us; (next_us = next_event_us()) <= t_us;) {
-    take_event(next_us);
-    if (main_pass)
-      main_pass(context);
+  native.limit_us = t_us;
+  if (main_round) {
+    while (native.now_us < t_us) {
+      count_at_once();
+      main_round(context);
+    }
+  } else {
+    for (uint64_t next_us; (next_us = next_event_us()) <= t_us;)
+      take_event(next_us);
+    pass_time_to(t_us);
   }
-  pass_time_to(t_us);
   native.running = false;
   return NATIVE_TIME_UP;
 }
@@ -104,7 +112,10 @@ void port_sleep(void) {
   const uint64_t next_us = next_event_us();
   if (next_us == UINT64_MAX)
     stop("the main loop sleeps and nothing will wake it");
-  take_event(next_us);
+  if (native.running && next_us > native.limit_us)
+    pass_time_to(native.limit_us);
+  else
+    take_event(next_us);
 }
 
 void port_watchdog_feed(void) { native.fed_us = native.now_us; }

@@ -3,7 +3,7 @@
  *
  * Events are the alarm and those of one source, such as the simulated bus. At each, the event
  * handler runs; computing takes no time. What the target cannot survive stops the test program with
- * a message: a main loop that sleeps with no event to come, and events that do not let time pass.
+ * a message: a main loop that sleeps with no event to come, and a program that never lets time pass.
  */
 #ifndef NATIVE_NATIVE_PORT_H
 #define NATIVE_NATIVE_PORT_H
@@ -23,9 +23,9 @@ enum native_end {
   NATIVE_PANIC,  /* by port_panic() */
 };
 
-/* Runs until t_us: events, and main_pass (one pass of the main loop; may be NULL) once at the
- * beginning and after every event, as if it slept in between. */
-enum native_end native_run_until(uint64_t t_us, void (*main_pass)(void *context), void *context);
+/* Runs until t_us: main_round again and again, one round of a main loop that sleeps when it has
+ * nothing to do. NULL: only events. */
+enum native_end native_run_until(uint64_t t_us, void (*main_round)(void *context), void *context);
 
 /* The watchdog would have struck: it was not fed for PORT_WATCHDOG_PERIOD_us. */
 bool native_watchdog_expired(void);

@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unity.h>
 
-static unsigned handled, passes;
+static unsigned handled, rounds;
 static uint64_t handled_at_us[8];
 static uint64_t source_us;
 
@@ -18,9 +18,10 @@ static void handler(void *context) {
     source_us = UINT64_MAX;
 }
 
-static void pass(void *context) {
+static void round_of_main(void *context) {
   (void)context;
-  passes++;
+  rounds++;
+  port_sleep();
 }
 
 static uint64_t next_us(const void *context) { return *(const uint64_t *)context; }
@@ -28,7 +29,7 @@ static uint64_t next_us(const void *context) { return *(const uint64_t *)context
 void setUp(void) {
   native_start(false);
   native_cdc_reset();
-  handled = passes = 0;
+  handled = rounds = 0;
   source_us = UINT64_MAX;
   port_set_event_handler(handler, &handled);
   native_set_event_source(next_us, &source_us);
@@ -39,12 +40,15 @@ void tearDown(void) { native_cdc_reset(); }
 static void test_time_passes_from_event_to_event(void) {
   port_alarm_at_us(700);
   source_us = 300;
-  TEST_ASSERT_EQUAL_INT(NATIVE_TIME_UP, native_run_until(1000, pass, NULL));
-  TEST_ASSERT_EQUAL_UINT64(1000, port_now_us());
+  TEST_ASSERT_EQUAL_INT(NATIVE_TIME_UP, native_run_until(600, round_of_main, NULL));
+  TEST_ASSERT_EQUAL_UINT64(600, port_now_us());
+  TEST_ASSERT_EQUAL_UINT(2, rounds);
+  TEST_ASSERT_EQUAL_INT(NATIVE_TIME_UP, native_run_until(700, round_of_main, NULL));
+  TEST_ASSERT_EQUAL_UINT64(700, port_now_us());
   TEST_ASSERT_EQUAL_UINT(2, handled);
   TEST_ASSERT_EQUAL_UINT64(300, handled_at_us[0]);
   TEST_ASSERT_EQUAL_UINT64(700, handled_at_us[1]);
-  TEST_ASSERT_EQUAL_UINT(3, passes);
+  TEST_ASSERT_EQUAL_UINT(3, rounds);
 }
 
 static void test_an_alarm_strikes_once_and_a_new_one_replaces_it(void) {
@@ -57,8 +61,9 @@ static void test_an_alarm_strikes_once_and_a_new_one_replaces_it(void) {
 
 static void test_an_alarm_in_the_past_strikes_at_once(void) {
   native_run_until(1000, NULL, NULL);
+  TEST_ASSERT_EQUAL_UINT(0, handled);
   port_alarm_at_us(10);
-  native_run_until(1000, NULL, NULL);
+  native_run_until(1001, NULL, NULL);
   TEST_ASSERT_EQUAL_UINT(1, handled);
   TEST_ASSERT_EQUAL_UINT64(1000, handled_at_us[0]);
 }
@@ -70,16 +75,17 @@ static void test_sleep_lasts_until_the_next_event(void) {
   TEST_ASSERT_EQUAL_UINT(1, handled);
 }
 
-static void feed(void *context) {
+static void fed_round(void *context) {
   (void)context;
   port_watchdog_feed();
+  port_alarm_at_us(port_now_us() + PORT_WATCHDOG_PERIOD_us / 2);
+  port_sleep();
 }
 
 static void test_the_watchdog_strikes_if_it_is_not_fed(void) {
-  native_run_until(PORT_WATCHDOG_PERIOD_us, feed, NULL);
-  native_run_until(2 * PORT_WATCHDOG_PERIOD_us, feed, NULL);
+  native_run_until(5 * PORT_WATCHDOG_PERIOD_us, fed_round, NULL);
   TEST_ASSERT_FALSE(native_watchdog_expired());
-  native_run_until(3 * PORT_WATCHDOG_PERIOD_us + 1, NULL, NULL);
+  native_run_until(7 * PORT_WATCHDOG_PERIOD_us, NULL, NULL);
   TEST_ASSERT_TRUE(native_watchdog_expired());
 }
 
