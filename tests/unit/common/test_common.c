@@ -1,0 +1,134 @@
+#include "common/bytes.h"
+#include "common/crc32.h"
+#include "support/random.h"
+
+#include <string.h>
+#include <unity.h>
+
+void setUp(void) {}
+void tearDown(void) {}
+
+/* The definition: one bit at a time, no table. */
+static uint32_t crc32_bitwise(const uint8_t *bytes, size_t length) {
+  uint32_t crc = UINT32_MAX;
+  for (size_t i = 0; i < length; i++) {
+    crc ^= bytes[i];
+    for (int bit = 0; bit < 8; bit++) {
+      crc = crc & 1u ? crc >> 1 ^ 0xEDB88320u : crc >> 1;
+    }
+  }
+  return ~crc;
+}
+
+static void test_crc_check_value(void) {
+  TEST_ASSERT_EQUAL_HEX32(0xCBF43926, crc32_iso_hdlc((const uint8_t *)"123456789", 9));
+  TEST_ASSERT_EQUAL_HEX32(0, crc32_iso_hdlc((const uint8_t *)"", 0));
+}
+
+static void test_crc_equals_bitwise_at_every_length_and_alignment(void) {
+  struct random random = {1};
+  uint8_t bytes[520];
+  for (size_t i = 0; i < sizeof bytes; i++) {
+    bytes[i] = (uint8_t)random_u32(&random);
+  }
+  for (size_t length = 0; length <= 512; length++) {
+    for (size_t at = 0; at < 8; at++) {
+      TEST_ASSERT_EQUAL_HEX32(crc32_bitwise(bytes + at, length),
+                              crc32_iso_hdlc(bytes + at, length));
+    }
+  }
+  for (int value = 0; value < 256; value++) {
+    uint8_t byte = (uint8_t)value;
+    TEST_ASSERT_EQUAL_HEX32(crc32_bitwise(&byte, 1), crc32_iso_hdlc(&byte, 1));
+  }
+}
+
+/* A message followed by its CRC, low byte first, always leaves the same remainder: sender and
+ * receiver agree on the byte order, wherever the message is cut into body and CRC. */
+static void test_crc_of_message_with_crc_is_constant(void) {
+  struct random random = {2};
+  uint8_t bytes[104];
+  for (size_t length = 0; length <= 100; length++) {
+    for (size_t i = 0; i < length; i++) {
+      bytes[i] = (uint8_t)random_u32(&random);
+    }
+    bytes_put_u32(bytes + length, crc32_iso_hdlc(bytes, length));
+    TEST_ASSERT_EQUAL_HEX32(0x2144DF1C, crc32_iso_hdlc(bytes, length + 4));
+  }
+}
+
+static void test_crc_sees_every_flip_of_one_or_two_bits(void) {
+  uint8_t bytes[40] = "a message of forty bytes, zero at its en";
+  const uint32_t right = crc32_iso_hdlc(bytes, sizeof bytes);
+  for (unsigned first = 0; first < 8 * sizeof bytes; first++) {
+    for (unsigned second = first; second < 8 * sizeof bytes; second++) {
+      bytes[first / 8] ^= (uint8_t)(1u << first % 8);
+      if (second != first) {
+        bytes[second / 8] ^= (uint8_t)(1u << second % 8);
+      }
+      TEST_ASSERT_NOT_EQUAL_UINT32(right, crc32_iso_hdlc(bytes, sizeof bytes));
+      bytes[first / 8] ^= (uint8_t)(1u << first % 8);
+      if (second != first) {
+        bytes[second / 8] ^= (uint8_t)(1u << second % 8);
+      }
+    }
+  }
+}
+
+static void test_bytes_are_little_endian(void) {
+  const uint8_t expected[8] = {0x88, 0x77, 0x66, 0x55, 0x44, 0x33, 0x22, 0x11};
+  uint8_t bytes[8];
+  bytes_put_u64(bytes, UINT64_C(0x1122334455667788));
+  TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, bytes, 8);
+  memset(bytes, 0, sizeof bytes);
+  bytes_put_u32(bytes, 0x55667788);
+  TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, bytes, 4);
+  TEST_ASSERT_EQUAL_HEX8(0, bytes[4]);
+  memset(bytes, 0, sizeof bytes);
+  bytes_put_u16(bytes, 0x7788);
+  TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, bytes, 2);
+  TEST_ASSERT_EQUAL_HEX8(0, bytes[2]);
+}
+
+static void test_bytes_round_trip_at_every_alignment(void) {
+  static const uint64_t values[] = {0,          1,          0x7F,       0x80,      0xFF,
+                                    0x100,      0x7FFF,     0x8000,     0xFFFF,    0x10000,
+                                    0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, INT64_MAX, UINT64_MAX};
+  uint8_t bytes[16];
+  for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
+    for (size_t at = 0; at < 8; at++) {
+      bytes_put_u64(bytes + at, values[i]);
+      TEST_ASSERT_EQUAL_HEX64(values[i], bytes_get_u64(bytes + at));
+      bytes_put_u32(bytes + at, (uint32_t)values[i]);
+      TEST_ASSERT_EQUAL_HEX32((uint32_t)values[i], bytes_get_u32(bytes + at));
+      bytes_put_u16(bytes + at, (uint16_t)values[i]);
+      TEST_ASSERT_EQUAL_HEX16((uint16_t)values[i], bytes_get_u16(bytes + at));
+    }
+  }
+}
+
+static void test_floats_travel_by_their_bits(void) {
+  TEST_ASSERT_EQUAL_HEX32(0x3F800000, bytes_from_f32(1.0f));
+  TEST_ASSERT_EQUAL_HEX32(0x80000000, bytes_from_f32(-0.0f));
+  TEST_ASSERT_EQUAL_HEX32(0x40490FDB, bytes_from_f32(3.14159265f));
+  TEST_ASSERT_TRUE(bytes_to_f32(0x00000001) > 0.0f);
+  struct random random = {3};
+  for (int i = 0; i < 100000; i++) {
+    uint32_t bits = random_u32(&random);
+    if ((bits & 0x7F800000u) != 0x7F800000u) {
+      TEST_ASSERT_EQUAL_HEX32(bits, bytes_from_f32(bytes_to_f32(bits)));
+    }
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_crc_check_value);
+  RUN_TEST(test_crc_equals_bitwise_at_every_length_and_alignment);
+  RUN_TEST(test_crc_of_message_with_crc_is_constant);
+  RUN_TEST(test_crc_sees_every_flip_of_one_or_two_bits);
+  RUN_TEST(test_bytes_are_little_endian);
+  RUN_TEST(test_bytes_round_trip_at_every_alignment);
+  RUN_TEST(test_floats_travel_by_their_bits);
+  return UNITY_END();
+}
