@@ -18,24 +18,27 @@ static const struct i2c_pins PINS = {.sda = BOARD_PIN_SDA, .scl = BOARD_PIN_SCL}
 
 static void drive_resets(uint8_t muxes, bool released) {
   for (unsigned mux = 0; mux < BOARD_MUX_COUNT; mux++) {
-    if ((muxes >> mux & 1) != 0)
+    if ((muxes >> mux & 1) != 0) {
       gpio_write(BOARD_PIN_MUX_RESET_0 + mux, released);
+    }
   }
 }
 
 static void reset_muxes(struct mux_bus *bus, uint8_t muxes) {
   drive_resets(muxes, false);
   for (unsigned mux = 0; mux < BOARD_MUX_COUNT; mux++) {
-    if ((muxes >> mux & 1) != 0)
+    if ((muxes >> mux & 1) != 0) {
       bus->open[mux] = 0;
+    }
   }
 }
 
 static uint32_t sensors_of(uint8_t muxes) {
   uint32_t sensors = 0;
   for (unsigned mux = 0; mux < BOARD_MUX_COUNT; mux++) {
-    if ((muxes >> mux & 1) != 0)
+    if ((muxes >> mux & 1) != 0) {
       sensors |= (uint32_t)ALL_CHANNELS << mux * BOARD_CHANNELS_PER_MUX;
+    }
   }
   return sensors;
 }
@@ -45,13 +48,15 @@ static void expect_end(struct mux_bus *bus, enum ft_status status, uint64_t now_
 }
 
 /* Starts the next selection towards wanted, channels of each multiplexer; false if none is left. */
-static bool select_one(struct mux_bus *bus, const uint8_t wanted[BOARD_MUX_COUNT], uint64_t now_us) {
+static bool select_one(struct mux_bus *bus, const uint8_t wanted[BOARD_MUX_COUNT],
+                       uint64_t now_us) {
   /* Off before on: at no moment may two sensors answer a read. */
   for (int turn_off = 1; turn_off >= 0; turn_off--) {
     for (unsigned mux = 0; mux < BOARD_MUX_COUNT; mux++) {
       if (bus->open[mux] == wanted[mux] || (bus->absent >> mux & 1) != 0 ||
-          (wanted[mux] == 0) != (turn_off != 0))
+          (wanted[mux] == 0) != (turn_off != 0)) {
         continue;
+      }
       bus->under_way = MUX_BUS_SELECT;
       bus->select_mux = (uint8_t)mux;
       bus->select_channels = wanted[mux];
@@ -79,8 +84,9 @@ static bool start_next(struct mux_bus *bus, uint64_t now_us) {
   switch (bus->operation) {
   case MUX_BUS_COMMAND:
     if (!select_all(bus, now_us)) {
-      if (bus->absent == ALL_MUXES)
+      if (bus->absent == ALL_MUXES) {
         return false;
+      }
       bus->under_way = MUX_BUS_WRITE;
       bus->deadline_us = now_us + MARGIN_us(I2C_WRITE_us);
       expect_end(bus, i2c_start_write(BOARD_SENSOR_ADDRESS, bus->command), now_us);
@@ -88,10 +94,12 @@ static bool start_next(struct mux_bus *bus, uint64_t now_us) {
     return true;
   case MUX_BUS_READ:
     for (; bus->sensor < BOARD_SENSOR_COUNT; bus->sensor++) {
-      if (select_sensor(bus, bus->sensor, now_us))
+      if (select_sensor(bus, bus->sensor, now_us)) {
         return true;
-      if ((bus->absent >> bus->sensor / BOARD_CHANNELS_PER_MUX & 1) != 0)
+      }
+      if ((bus->absent >> bus->sensor / BOARD_CHANNELS_PER_MUX & 1) != 0) {
         continue;
+      }
       bus->under_way = MUX_BUS_FETCH;
       bus->deadline_us = now_us + MARGIN_us(I2C_WRITE_READ_us(bus->read_count));
       expect_end(bus, i2c_start_write_read(BOARD_SENSOR_ADDRESS, bus->command, bus->read_count),
@@ -107,8 +115,9 @@ static bool start_next(struct mux_bus *bus, uint64_t now_us) {
 
 /* Takes note of how a transaction ended. */
 static void account(struct mux_bus *bus, bool acknowledged, const uint8_t *bytes) {
-  if (!acknowledged)
+  if (!acknowledged) {
     bus->result.nacks++;
+  }
   switch (bus->under_way) {
   case MUX_BUS_SELECT:
     if (acknowledged) {
@@ -119,8 +128,9 @@ static void account(struct mux_bus *bus, bool acknowledged, const uint8_t *bytes
     }
     break;
   case MUX_BUS_WRITE:
-    if (acknowledged)
+    if (acknowledged) {
       bus->result.acknowledged = sensors_of(ALL_MUXES & (uint8_t)~bus->absent);
+    }
     break;
   case MUX_BUS_FETCH:
     if (acknowledged) {
@@ -140,22 +150,26 @@ static enum ft_status advance(struct mux_bus *bus, uint64_t now_us, uint64_t *wa
     uint8_t bytes[I2C_MAX_READ_BYTES];
     const enum ft_status status = i2c_poll(bytes);
     if (status == FT_PENDING || status == FT_ERR_BUSY) {
-      if (now_us >= bus->deadline_us)
+      if (now_us >= bus->deadline_us) {
         return FT_ERR_TIMEOUT;
+      }
       expect_end(bus, status, now_us);
       *wake_us = bus->wake_us;
       return FT_PENDING;
     }
-    if (status != FT_OK && status != FT_ERR_NACK)
+    if (status != FT_OK && status != FT_ERR_NACK) {
       return FT_ERR_TIMEOUT;
+    }
     const bool command_sent = bus->under_way == MUX_BUS_WRITE;
     account(bus, status == FT_OK, bytes);
     bus->under_way = MUX_BUS_NOTHING;
-    if (command_sent)
+    if (command_sent) {
       return FT_OK;
+    }
   }
-  if (!start_next(bus, now_us))
+  if (!start_next(bus, now_us)) {
     return FT_OK;
+  }
   *wake_us = bus->wake_us;
   return FT_PENDING;
 }
@@ -197,8 +211,9 @@ static enum ft_status recover_step(struct mux_bus *bus, uint64_t now_us, uint64_
     bus->recovery_step = MUX_BUS_REOPEN;
     break;
   case MUX_BUS_REOPEN:
-    if (!i2c_line_is_high(&PINS, I2C_LINE_SDA) || !i2c_line_is_high(&PINS, I2C_LINE_SCL))
+    if (!i2c_line_is_high(&PINS, I2C_LINE_SDA) || !i2c_line_is_high(&PINS, I2C_LINE_SCL)) {
       return FT_ERR_STUCK;
+    }
     return i2c_open(&PINS) == FT_OK ? FT_OK : FT_ERR_STUCK;
   }
   bus->recovery_due_us = now_us + RECOVERY_HALF_PERIOD_us;
@@ -206,10 +221,11 @@ static enum ft_status recover_step(struct mux_bus *bus, uint64_t now_us, uint64_
   return FT_PENDING;
 }
 
-static enum ft_status start(struct mux_bus *bus, enum mux_bus_operation operation,
-                            uint8_t command, uint8_t byte_count, uint64_t now_us) {
-  if (bus->operation != MUX_BUS_IDLE)
+static enum ft_status start(struct mux_bus *bus, enum mux_bus_operation operation, uint8_t command,
+                            uint8_t byte_count, uint64_t now_us) {
+  if (bus->operation != MUX_BUS_IDLE) {
     return FT_ERR_BUSY;
+  }
   bus->operation = operation;
   bus->command = command;
   bus->read_count = byte_count;
@@ -217,12 +233,14 @@ static enum ft_status start(struct mux_bus *bus, enum mux_bus_operation operatio
   drive_resets(bus->absent, true);
   bus->absent = 0;
   bus->result.acknowledged = 0;
-  if (bus->failed)
+  if (bus->failed) {
     return FT_OK;
-  if (bus->under_way == MUX_BUS_NOTHING)
+  }
+  if (bus->under_way == MUX_BUS_NOTHING) {
     start_next(bus, now_us);
-  else /* left over from the last command, and perhaps nobody has watched it */
+  } else { /* left over from the last command, and perhaps nobody has watched it */
     bus->deadline_us = now_us + MARGIN_us(I2C_WRITE_us);
+  }
   return FT_OK;
 }
 
@@ -232,8 +250,9 @@ static enum ft_status start_command(void *context, uint8_t command, uint64_t now
 
 static enum ft_status start_read(void *context, uint8_t command, uint8_t byte_count,
                                  uint64_t now_us) {
-  if (byte_count < 1 || byte_count > ARRAY_BUS_MAX_READ_BYTES)
+  if (byte_count < 1 || byte_count > ARRAY_BUS_MAX_READ_BYTES) {
     return FT_ERR_ARGUMENT;
+  }
   return start(context, MUX_BUS_READ, command, byte_count, now_us);
 }
 
@@ -255,16 +274,19 @@ static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_resu
                            uint64_t *wake_us) {
   struct mux_bus *bus = context;
   enum ft_status status;
-  if (bus->operation == MUX_BUS_IDLE)
+  if (bus->operation == MUX_BUS_IDLE) {
     return FT_ERR_ARGUMENT;
-  if (bus->operation == MUX_BUS_RECOVERY)
+  }
+  if (bus->operation == MUX_BUS_RECOVERY) {
     status = recover_step(bus, now_us, wake_us);
-  else if (bus->failed)
+  } else if (bus->failed) {
     status = FT_ERR_TIMEOUT;
-  else
+  } else {
     status = advance(bus, now_us, wake_us);
-  if (status == FT_PENDING)
+  }
+  if (status == FT_PENDING) {
     return FT_PENDING;
+  }
 
   bus->failed = status != FT_OK;
   const bool conversion_may_run = bus->operation == MUX_BUS_COMMAND && !bus->failed;
@@ -273,22 +295,25 @@ static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_resu
     *result = bus->result;
     bus->result.nacks = 0;
   }
-  if (conversion_may_run)
+  if (conversion_may_run) {
     start_next(bus, now_us);
+  }
   return status;
 }
 
 void mux_bus_service(struct mux_bus *bus, uint64_t now_us) {
   uint64_t wake_us;
-  if (bus->operation == MUX_BUS_IDLE && bus->under_way != MUX_BUS_NOTHING && !bus->failed)
+  if (bus->operation == MUX_BUS_IDLE && bus->under_way != MUX_BUS_NOTHING && !bus->failed) {
     bus->failed = advance(bus, now_us, &wake_us) == FT_ERR_TIMEOUT;
+  }
 }
 
 enum ft_status mux_bus_init(struct mux_bus *bus, struct array_bus *array_bus) {
   memset(bus, 0, sizeof *bus);
   const enum ft_status status = i2c_open(&PINS);
-  if (status != FT_OK)
+  if (status != FT_OK) {
     return status;
+  }
   for (unsigned mux = 0; mux < BOARD_MUX_COUNT; mux++) {
     const unsigned pin = BOARD_PIN_MUX_RESET_0 + mux;
     gpio_set_pad(pin, GPIO_PULL_NONE);

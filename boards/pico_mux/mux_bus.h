@@ -36,7 +36,7 @@ struct mux_bus {
   uint8_t sensor; /* during a read: the one whose turn it is; after it, BOARD_SENSOR_COUNT */
 
   uint8_t open[BOARD_MUX_COUNT]; /* [mux] channels that are on, by what it acknowledged last */
-  uint8_t absent;  /* bitmap of multiplexers: did not acknowledge in this operation */
+  uint8_t absent;                /* bitmap of multiplexers: did not acknowledge in this operation */
 
   enum { MUX_BUS_NOTHING, MUX_BUS_SELECT, MUX_BUS_WRITE, MUX_BUS_FETCH } under_way;
   uint8_t select_mux;

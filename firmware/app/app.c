@@ -14,8 +14,7 @@
 /* Lets the acknowledgement out before the device leaves. */
 #define LOADER_DELAY_us 50000u
 
-static void on_event(void *context) {
-  struct app *app = context;
+void app_on_event(struct app *app) {
   uint64_t now_us = port_now_us();
   uint64_t wake_us = scan_step(&app->scan, now_us);
   uint64_t latest_us = now_us + EVENT_INTERVAL_MAX_us;
@@ -58,7 +57,6 @@ void app_start(struct app *app, const struct array_bus *bus) {
   identity.serial = serial;
   cdc_start(&identity);
 
-  port_set_event_handler(on_event, app);
   port_alarm_at_us(port_now_us());
 }
 

@@ -1,7 +1,8 @@
 /* The fingertip: frames in, packets out, commands obeyed. Everything below it is wired here and
  * only here.
  *
- * One instance per image, static. The board's main calls app_start once and then app_run for ever.
+ * One instance per image, static. The board's main installs an event handler (port.h) that calls
+ * app_on_event, calls app_start once and then app_run for ever.
  */
 #ifndef APP_APP_H
 #define APP_APP_H
@@ -55,6 +56,9 @@ struct app {
 
 /* Starts the pipeline on this bus, which must outlive it. Attaches to USB. */
 void app_start(struct app *app, const struct array_bus *bus);
+
+/* Event context: moves the scan on and arms the next alarm. */
+void app_on_event(struct app *app);
 
 /* One round of the main loop: does what is due, or sleeps until something happens. */
 void app_run(struct app *app);

@@ -2,7 +2,7 @@
 #ifndef CONFIG_DEFAULTS_H
 #define CONFIG_DEFAULTS_H
 
-#if FINGERTIP_SCENE_PAPER
+#ifdef FINGERTIP_SCENE_PAPER
 #define DEFAULT_RATE_mHz 20000u /* the paper reads at 20 Hz */
 #else
 #define DEFAULT_RATE_mHz 0u /* as fast as the sensors allow */

@@ -386,6 +386,9 @@ uint64_t scan_step(struct scan *scan, uint64_t now_us) {
     } else {
       fail_operation(scan, status, now_us);
     }
+    /* Judging the PROMs takes longer than a transfer: the next operation's deadlines must count
+     * from a fresh time. */
+    break;
   }
   return now_us;
 }

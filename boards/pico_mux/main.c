@@ -1,0 +1,24 @@
+#include "app/app.h"
+#include "pico_mux/mux_bus.h"
+#include "port/port.h"
+
+static struct mux_bus mux_bus;
+static struct array_bus array_bus;
+static struct app app;
+
+static void on_event(void *context) {
+  (void)context;
+  mux_bus_service(&mux_bus, port_now_us());
+  app_on_event(&app);
+}
+
+int main(void) {
+  if (mux_bus_init(&mux_bus, &array_bus) != FT_OK) {
+    port_panic();
+  }
+  port_set_event_handler(on_event, 0);
+  app_start(&app, &array_bus);
+  for (;;) {
+    app_run(&app);
+  }
+}

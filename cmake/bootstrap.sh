@@ -1,0 +1,83 @@
+#!/bin/sh
+# Sets up a Debian 12 or Ubuntu machine and does one of the project's main jobs.
+# usage: sh cmake/bootstrap.sh demo|test
+set -eu
+root=$(cd "$(dirname "$0")/.." && pwd)
+cd "$root"
+
+usage() {
+  echo "usage: sh cmake/bootstrap.sh demo|test" >&2
+  echo "  demo  build everything, play presses and slips to the emulated fingertip, draw what it felt" >&2
+  echo "  test  build everything and run the whole test suite" >&2
+  exit 2
+}
+[ $# -eq 1 ] || usage
+case $1 in demo | test) ;; *) usage ;; esac
+
+say() { printf '%s\n' "== $*"; }
+
+# command or file that shows a package is there, then the package
+needed() {
+  cat << 'LIST'
+cmake cmake
+ninja ninja-build
+gcc gcc
+g++ g++
+git git
+node nodejs
+npm npm
+python3 python3
+xz xz-utils
+arm-none-eabi-gcc gcc-arm-none-eabi
+/usr/lib/arm-none-eabi/newlib/nano.specs libnewlib-arm-none-eabi
+/usr/include/ceres/ceres.h libceres-dev
+/usr/include/gtest/gtest.h libgtest-dev
+/usr/include/CLI/CLI.hpp libcli11-dev
+/usr/lib/python3/dist-packages/numpy/__init__.py python3-numpy
+/usr/lib/python3/dist-packages/matplotlib/__init__.py python3-matplotlib
+LIST
+}
+
+is_there() {
+  case $1 in
+    /*) [ -e "$1" ] ;;
+    *) command -v "$1" > /dev/null 2>&1 ;;
+  esac
+}
+
+missing=$(needed | while read -r probe package; do is_there "$probe" || echo "$package"; done)
+if [ -n "$missing" ]; then
+  say "missing packages:" $missing
+  command -v apt-get > /dev/null 2>&1 || {
+    echo "bootstrap: apt-get is not here; install the packages above with your system's tools" >&2
+    exit 1
+  }
+  as_root=
+  if [ "$(id -u)" -ne 0 ]; then
+    command -v sudo > /dev/null 2>&1 || {
+      echo "bootstrap: run as root: apt-get install" $missing >&2
+      exit 1
+    }
+    as_root=sudo
+  fi
+  say "installing them"
+  $as_root apt-get -qq update
+  $as_root env DEBIAN_FRONTEND=noninteractive apt-get -qq -y install --no-install-recommends $missing
+fi
+
+emulator=host_tools/emulator
+if ! cmp -s $emulator/package-lock.json $emulator/node_modules/.installed-lock; then
+  say "fetching the emulator's one dependency with npm"
+  (cd $emulator && npm ci --no-audit --no-fund --loglevel=error)
+  cp $emulator/package-lock.json $emulator/node_modules/.installed-lock
+fi
+
+say "building firmware and host tools into build/"
+mkdir -p build
+cmake --preset host > build/configure.log 2>&1 || { cat build/configure.log >&2; exit 1; }
+cmake --build --preset host
+
+case $1 in
+  demo) exec sh host_tools/demo/demo.sh ;;
+  test) exec ctest --preset host -j 2 ;;
+esac
