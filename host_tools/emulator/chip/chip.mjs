@@ -17,7 +17,7 @@
 import { RP2040 } from 'rp2040js';
 import { Prng } from '../prng.mjs';
 import { Clocks, makeRosc, Pll, RESET_NAMES, Resets, ROSC_HZ, Xosc } from './clocks.mjs';
-import { RAM_BASE, RAM_BYTES, StrictCore } from './core.mjs';
+import { FLASH_BASE, FLASH_BYTES, RAM_BASE, StrictCore } from './core.mjs';
 import { I2cBlock } from './i2c_block.mjs';
 import { RegisterFile } from './registers.mjs';
 import { StrictSio } from './sio.mjs';
@@ -25,8 +25,6 @@ import { Ssi } from './ssi.mjs';
 import { Timer, Watchdog } from './timer_watchdog.mjs';
 import { UsbBlock } from './usb_block.mjs';
 
-export const FLASH_BYTES = 2 * 1024 * 1024;
-const XIP_BASE = 0x10000000;
 const BOOT2_BYTES = 256;
 const BOOT2_RAM = 0x20041f00;
 const DPRAM_BASE = 0x50100000;
@@ -117,6 +115,7 @@ export class Chip extends RP2040 {
       if (offset === 0x0c) this.ssi.forceSelect(((value >>> 8) & 3) === 2);
     };
     Object.assign(this.peripherals, {
+      0x40000: new RegisterFile(this, 'SYSINFO', { 0: [0x20002927, 0], 4: [2, 0] }), // revision B2
       0x14000: new RegisterFile(this, 'XIP_CTRL', { 0: [3, 0xb], 4: [0, 0], 8: [2, 0], 12: [0, 0], 16: [0, 0] }),
       0x18000: this.ssi,
       0x40008: this.clocks,
@@ -264,10 +263,10 @@ export class Chip extends RP2040 {
   /** A load that did not hit SRAM. */
   busRead(address, bytes) {
     if (address & (bytes - 1)) this.fail('core', `unaligned ${8 * bytes}-bit read of 0x${address.toString(16)}`);
-    const word = address & ~3;
+    const word = (address & ~3) >>> 0;
     let value;
     if (address < 0x4000) value = this.bootrom[address >>> 2];
-    else if (address >= XIP_BASE && address < 0x14000000) {
+    else if (address >= FLASH_BASE && address < 0x14000000) {
       const problem = this.ssi.xipProblem;
       if (problem) this.fail('XIP', `read of flash at 0x${address.toString(16)} while ${problem}`);
       const offset = word & 0xffffff;
@@ -294,7 +293,7 @@ export class Chip extends RP2040 {
   busWrite(address, value, bytes) {
     if (address & (bytes - 1)) this.fail('core', `unaligned ${8 * bytes}-bit write of 0x${address.toString(16)}`);
     if (address < 0x4000) this.fail('core', `write to 0x${address.toString(16)} in the boot ROM (null pointer?)`);
-    if (address >>> 26 === XIP_BASE >>> 26) this.fail('core', `write to 0x${address.toString(16)} in flash`);
+    if (address >>> 26 === FLASH_BASE >>> 26) this.fail('core', `write to 0x${address.toString(16)} in flash`);
     if (address >>> 12 === DPRAM_BASE >>> 12) {
       this.#checkPage(address, 'write of');
       this.usbCtrl.writeDpram(address - DPRAM_BASE, value, bytes);
@@ -332,10 +331,10 @@ export class Chip extends RP2040 {
       if (core.waiting) {
         if (this.slept_since_ns < 0) this.slept_since_ns = now;
         if (!core.wakeable) this.fail('core', 'firmware hung: WFI with no interrupt enabled');
-        if (now - this.slept_since_ns > HUNG_AFTER_NS) {
+        if (now - this.slept_since_ns >= HUNG_AFTER_NS) {
           this.fail('core', `firmware hung: asleep for ${HUNG_AFTER_NS / 1e9} s without an interrupt`);
         }
-        time.advanceTo(next);
+        time.advanceTo(Math.min(next, this.slept_since_ns + HUNG_AFTER_NS));
         continue;
       }
       this.slept_since_ns = -1;
@@ -346,12 +345,7 @@ export class Chip extends RP2040 {
           this.hooks.get(core.registers[15] & ~1)?.(this);
           core.executeInstruction();
         } while (core.cycles < stop && !core.waiting && !time.earliestChanged);
-      } else {
-        do core.executeInstruction();
-        while (core.cycles < stop && !core.waiting && !time.earliestChanged);
-      }
+      } else core.execute(stop, time);
     }
   }
 }
-
-export { RAM_BASE, RAM_BYTES };

@@ -49,7 +49,13 @@ export class I2cBlock extends BasePeripheral {
     super(chip, `I2C${index}`);
     this.irq = 23 + index;
     this.bus = null;
-    this.alarm = chip.clock.createAlarm(() => this.continuation());
+    /** Bus time of the step in progress: an alarm fires at the end of an instruction, the bus does not wait for it. */
+    this.step_ns = null;
+    this.alarm = chip.clock.createAlarm(() => {
+      this.step_ns = this.alarm.at_ns;
+      this.continuation();
+      this.step_ns = null;
+    });
     this.continuation = null;
     this.reset();
   }
@@ -315,7 +321,7 @@ export class I2cBlock extends BasePeripheral {
 
   #after(delay_ns, then) {
     this.continuation = then;
-    this.alarm.schedule(delay_ns);
+    this.alarm.scheduleAt((this.step_ns ?? this.rp2040.clock.nanos) + delay_ns);
   }
 
   #kick() {
@@ -420,6 +426,7 @@ export class I2cBlock extends BasePeripheral {
   }
 
   #receive() {
+    if (this.#arbitrationLost()) return;
     if (this.rx.length >= FIFO_DEPTH) {
       if (this.con & CON_RX_FULL_HOLD) {
         this.state = 'rx-full';

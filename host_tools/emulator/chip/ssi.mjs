@@ -85,6 +85,11 @@ export class Ssi extends BasePeripheral {
     this.sampleDelay = 0;
     this.driveEdge = 0;
     this.entering = [];
+    this.#settingsChanged();
+  }
+
+  #settingsChanged() {
+    this.rp2040.xipReady = this.xipProblem === null;
   }
 
   /** Why execute-in-place does not work now, or null. */
@@ -109,6 +114,7 @@ export class Ssi extends BasePeripheral {
     if (low === this.forcedSelect) return;
     this.forcedSelect = low;
     this.#updateSelect();
+    this.#settingsChanged();
   }
 
   #updateSelect() {
@@ -140,6 +146,7 @@ export class Ssi extends BasePeripheral {
     } else {
       this.shifting = null;
       this.#updateSelect();
+      this.#settingsChanged();
     }
   }
 
@@ -183,6 +190,11 @@ export class Ssi extends BasePeripheral {
   }
 
   writeUint32(offset, value) {
+    this.#write(offset, value);
+    this.#settingsChanged();
+  }
+
+  #write(offset, value) {
     const configuration = offset === 0x00 || offset === 0x04 || offset === 0x14 || offset === 0xf0 || offset === 0xf4 || offset === 0xf8;
     if (configuration && this.enabled) {
       this.rp2040.fail('SSI', `configuration register 0x${offset.toString(16)} written while enabled`);

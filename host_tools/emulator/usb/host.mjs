@@ -271,16 +271,19 @@ export class UsbHost {
   #sof() {
     this.frame += 1;
     this.block.sof(this.frame);
-    this.sofAlarm.schedule(FRAME_NS);
-    this.frameEnd_ns = this.scope.nanos + FRAME_NS;
-    this.bus_free_ns = this.scope.nanos + SOF_NS;
+    const start_ns = this.sofAlarm.at_ns;
+    this.sofAlarm.scheduleAt(start_ns + FRAME_NS);
+    this.frameEnd_ns = start_ns + FRAME_NS;
+    this.bus_free_ns = start_ns + SOF_NS;
     this.#schedule();
   }
 
   #armed(endpoint, isIn) {
     const now = this.scope.nanos;
     for (const pipe of endpoint === 0 ? [this.controlPipe] : [this.pipes.get(isIn ? endpoint | 0x80 : endpoint)]) {
-      if (!pipe || pipe.parked_ns === null) continue;
+      if (!pipe) continue;
+      if (this.running?.pipe === pipe) this.running.armedMeanwhile = true;
+      if (pipe.parked_ns === null) continue;
       const retries = Math.max(1, Math.ceil((now - pipe.parked_ns) / RETRY_NS));
       this.statistics.naks += retries - 1;
       pipe.retry_ns = pipe.parked_ns + retries * RETRY_NS;
@@ -378,24 +381,26 @@ export class UsbHost {
     transfer.stage = transfer.length ? 'data' : 'status';
   }
 
-  #refused(pipe, transfer, answer) {
+  #refused({ pipe, transfer, armedMeanwhile }, answer) {
     if (answer === 'none') this.#fail(`no answer from ${pipe.name} at address ${this.address}; is the endpoint enabled?`);
     if (answer === 'nak') {
       this.statistics.naks += 1;
-      pipe.parked_ns = this.scope.nanos;
+      if (armedMeanwhile) pipe.retry_ns = this.scope.nanos + RETRY_NS;
+      else pipe.parked_ns = this.scope.nanos;
       return;
     }
     this.statistics.stalls += 1;
     this.#finish(pipe, transfer, 'stall');
   }
 
-  #inDone({ pipe, transfer, interrupt, answer }) {
+  #inDone(t) {
+    const { pipe, transfer, interrupt, answer } = t;
     if (interrupt) {
       if (answer.answer === 'nak') this.statistics.naks += 1;
       else if (answer.answer === 'none') this.#fail(`no answer from interrupt ${pipe.name}; is the endpoint enabled?`);
       if (answer.answer !== 'data') return;
     } else if (answer.answer !== 'data') {
-      this.#refused(pipe, transfer, answer.answer);
+      this.#refused(t, answer.answer);
       return;
     }
     const status = transfer?.stage === 'status';
@@ -406,7 +411,7 @@ export class UsbHost {
     answer.acknowledged();
     pipe.toggle ^= 1;
     this.statistics.in_packets += 1;
-    this.statistics.in_bytes += data.length;
+    if (pipe.endpoint) this.statistics.in_bytes += data.length;
     this.onPacket({ t_ns: this.scope.nanos, endpoint: pipe.endpoint, isIn: true, setup: false, data });
     if (interrupt) {
       interrupt.onData(data);
@@ -426,16 +431,17 @@ export class UsbHost {
     }
   }
 
-  #outDone({ pipe, transfer, data }) {
+  #outDone(t) {
+    const { pipe, transfer, data } = t;
     const status = transfer.stage === 'status';
     const answer = this.block.outData(this.address, pipe.endpoint, status ? 1 : pipe.toggle, data);
     if (answer !== 'ack') {
-      this.#refused(pipe, transfer, answer);
+      this.#refused(t, answer);
       return;
     }
     pipe.toggle ^= 1;
     this.statistics.out_packets += 1;
-    this.statistics.out_bytes += data.length;
+    if (pipe.endpoint) this.statistics.out_bytes += data.length;
     this.onPacket({ t_ns: this.scope.nanos, endpoint: pipe.endpoint, isIn: false, setup: false, data });
     if (status) {
       this.#finish(pipe, transfer, 'ok');

@@ -18,11 +18,11 @@ export function build(source) {
   const folder = mkdtempSync(join(tmpdir(), 'rig-'));
   try {
     const path = (name) => join(folder, name);
-    writeFileSync(path('main.c'), `#include "rig.h"\n${source}\n`);
+    writeFileSync(path('main.c'), `${/\bvoid isr\(/.test(source) ? '#define HAS_ISR\n' : ''}#include "rig.h"\n${source}\n`);
     const gcc = (...args) => execFileSync('arm-none-eabi-gcc', [...CPU, ...args], { stdio: 'pipe' });
     const binary = (elf, bin) => execFileSync('arm-none-eabi-objcopy', ['-O', 'binary', path(elf), path(bin)]);
     gcc('-c', join(RIG, 'boot2.S'), '-o', path('boot2.o'));
-    gcc('-O2', '-ffreestanding', '-nostdlib', '-fno-tree-loop-distribute-patterns', '-Wall', '-Werror', `-I${RIG}`, `-T${join(RIG, 'rig.ld')}`, path('main.c'), '-lgcc', '-o', path('main.elf'));
+    gcc('-O2', '-ffreestanding', '-nostdlib', '-fno-tree-loop-distribute-patterns', '-Wall', '-Werror', '--param=min-pagesize=0', '-fno-delete-null-pointer-checks', `-I${RIG}`, `-T${join(RIG, 'rig.ld')}`, path('main.c'), '-lgcc', '-o', path('main.elf'));
     binary('boot2.o', 'boot2.bin');
     binary('main.elf', 'main.bin');
     const main = readFileSync(path('main.bin'));

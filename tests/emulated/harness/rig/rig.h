@@ -9,6 +9,12 @@
 
 void main(void);
 
+void *memset(void *to, int value, unsigned n);
+void *memset(void *to, int value, unsigned n) {
+  for (unsigned i = 0; i < n; i++) ((volatile uint8_t *)to)[i] = (uint8_t)value;
+  return to;
+}
+
 static inline void unreset(uint32_t bits) {
   CLR(0x4000c000) = bits;
   while ((REG(0x4000c008) & bits) != bits) {
@@ -109,8 +115,11 @@ void reset_entry(void) {
   for (;;) {
   }
 }
-void isr(void) __attribute__((weak));
+/* An image with interrupts defines HAS_ISR and isr(). */
+void isr(void);
+#ifndef HAS_ISR
 void isr(void) { __asm volatile("bkpt 1"); }
+#endif
 __attribute__((section(".vectors"), used)) const void *const vectors[48] = {
     (void *)0x20010000, (void *)reset_entry, (void *)isr, (void *)isr, 0, 0, 0, 0, 0, 0, 0, (void *)isr, 0, 0,
     (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr, (void *)isr,

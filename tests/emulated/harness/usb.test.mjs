@@ -1,0 +1,92 @@
+/** The USB host against a small CDC device, and the device mistakes it must catch. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { scheduleHostScript } from '../../../host_tools/emulator/port/host_script.mjs';
+import { makeMachine } from './bench.mjs';
+
+const device = (defines = '', body = '') => `${defines}\n#include "cdc.h"\nvoid main(void) { start_clocks(); usb_start(); ${body} for (;;) usb_poll(); }`;
+
+function session(source, steps, seconds, options = {}) {
+  const bytes = [];
+  const packets = [];
+  const machine = makeMachine(source, { onData: (b) => bytes.push(...b), onUsbPacket: (p) => packets.push(p), ...options });
+  scheduleHostScript(steps, machine.scope, machine.cdc);
+  machine.run(seconds * 1e9);
+  return { machine, bytes, packets, result: machine.result };
+}
+
+test('enumeration as Linux does it, then echo', () => {
+  const { bytes, packets, result } = session(device(), [{ t_s: 0.2, dtr: true }, { t_s: 0.3, bytes: Uint8Array.of(1, 2, 3) }], 0.4);
+  assert.deepEqual(result.warnings, []);
+  assert.deepEqual(bytes, [1, 2, 3]);
+  assert.equal(result.usb.resets, 2);
+  assert.deepEqual(result.usb.strings, { product: 'Pr', manufacturer: 'Mf', serial: 'S1' });
+  const setups = packets.filter((p) => p.setup).map((p) => Buffer.from(p.data).toString('hex'));
+  assert.deepEqual(setups, [
+    '8006000100004000', '0005050000000000', '8006000100001200', '8006000600000a00', '8006000200000900', '8006000200004300',
+    '800600030000ff00', '800602030904ff00', '800601030904ff00', '800603030904ff00', '0009010000000000', '2120000000000700', '2122030000000000',
+  ]);
+});
+
+test('realistic waits: the first request comes 160 ms after the pull-up', () => {
+  const { packets } = session(device(), [], 0.3, { fastEnumeration: false });
+  assert.ok(packets[0].t_ns > 159e6 && packets[0].t_ns < 165e6, `${packets[0].t_ns}`);
+});
+
+test('baud rate and DTR reach the device; a closed port is not read', () => {
+  const { machine, bytes } = session(device('#define STREAM'), [{ t_s: 0.2, dtr: true }, { t_s: 0.3, dtr: false }, { t_s: 0.31, baud: 1200 }], 0.5);
+  const n = bytes.length;
+  assert.ok(n > 1000);
+  assert.ok(bytes.every((b, i) => b === (i & 255)), 'no byte lost or repeated');
+  assert.equal(machine.cdc.baud, 1200);
+  machine.run(0.6e9);
+  assert.equal(bytes.length, n);
+});
+
+test('full speed carries at most 19 packets of 64 bytes in a frame', () => {
+  const { packets } = session(device('#define STREAM'), [{ t_s: 0.1, dtr: true }], 0.3);
+  const perFrame = new Map();
+  for (const p of packets) if (p.endpoint === 2 && p.isIn) perFrame.set(Math.floor(p.t_ns / 1e6), (perFrame.get(Math.floor(p.t_ns / 1e6)) ?? 0) + 1);
+  assert.ok(Math.max(...perFrame.values()) <= 20, `${Math.max(...perFrame.values())}`);
+  const total = [...perFrame.values()].reduce((a, n) => a + n, 0);
+  assert.ok(total / perFrame.size <= 19 && total / perFrame.size > 5);
+});
+
+test('unplug and replug enumerate again; a stalled host stops the stream without losing a byte', () => {
+  const { result, bytes } = session(device('#define STREAM'), [{ t_s: 0.1, dtr: true }], 0.6, { faults: [{ type: 'host_stall', from_s: 0.15, to_s: 0.2 }, { type: 'usb_unplug', from_s: 0.3, to_s: 0.4 }] });
+  assert.deepEqual(result.warnings, []);
+  assert.equal(result.usb.enumerations, 2);
+  assert.ok(bytes.length > 10000);
+});
+
+test('two runs are equal to the byte and the cycle', () => {
+  const once = () => {
+    const { bytes, result } = session(device('#define STREAM'), [{ t_s: 0.1, dtr: true }], 0.15);
+    return JSON.stringify([bytes, result]);
+  };
+  assert.equal(once(), once());
+});
+
+for (const [name, defines, pattern, body] of [
+  ['controller without PHY', '#define MUXING 0', /TO_PHY is not set/],
+  ['controller without VBUS', '#define POWER 0', /USB_PWR does not say that VBUS/],
+  ['EP0 interrupt per buffer off: requests time out or lack an address', '#define PULLUP_BITS (1u << 16)', /no answer|not finished/],
+  ['AVAILABLE in the same write', '#define ARM(c, v) (c) = (v) | 1 << 10', /same write as the other fields/],
+  ['AVAILABLE too soon', '#define ARM(c, v) do { volatile uint32_t *q = &(c); uint32_t w = (v), a = w | 1 << 10; __asm volatile("str %1, [%0]\\n str %2, [%0]" :: "l"(q), "l"(w), "l"(a) : "memory"); } while (0)', /ns after the other fields/],
+  ['address never set', '#define NO_ADDRESS', /no answer to SETUP .* at address 5/],
+  ['endpoints not enabled', '#define NO_ENABLE', /is the endpoint enabled/],
+  ['wrong data PID', '', /sent DATA1, expected DATA0/, 'for (;;) { usb_poll(); if (dtr) { pid_in2 = 1; const uint8_t x = 0; bulk_in(&x, 1); for (;;) usb_poll(); } }'],
+  ['buffer not aligned', '', /not 64-byte aligned/, 'REG(0x50100010) = 1u << 31 | 2 << 26 | 0x1e8;'],
+  ['buffer taken back from the controller', '', /owns the buffer/, 'for (;;) { usb_poll(); if (dtr) { OUT_CTL(2) = 0; } }'],
+]) {
+  test(`fails: ${name}`, () => {
+    const { result } = session(device(defines, body), [{ t_s: 0.1, dtr: true }], 6);
+    assert.equal(result.end_reason, 'failure', JSON.stringify(result.warnings));
+    assert.match(result.warnings.join('\n'), pattern);
+  });
+}
+
+test('fails: no pull-up leaves the device unseen', () => {
+  const { result } = session(device('#define PULLUP_BITS 0'), [], 0.3);
+  assert.equal(result.usb.configured, false);
+});
