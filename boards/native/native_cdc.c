@@ -33,8 +33,9 @@ static void append(struct bytes *to, const uint8_t *data, size_t length) {
 
 static size_t take(struct bytes *from, uint8_t *data, size_t capacity) {
   const size_t length = from->length < capacity ? from->length : capacity;
-  if (length == 0)
+  if (length == 0) {
     return 0;
+  }
   memcpy(data, from->data, length);
   from->length -= length;
   memmove(from->data, from->data + length, from->length);
@@ -48,20 +49,26 @@ void native_cdc_reset(void) {
   memset(&cdc, 0, sizeof cdc);
 }
 
-const struct cdc_identity *native_cdc_identity(void) { return cdc.identity; }
+const struct cdc_identity *native_cdc_identity(void) {
+  return cdc.identity;
+}
 
 static void deliver(void) {
-  if (cdc.stalled || cdc.queued.length == 0)
+  if (cdc.stalled || cdc.queued.length == 0) {
     return;
+  }
   append(&cdc.received, cdc.queued.data, cdc.queued.length);
   cdc.queued.length = 0;
 }
 
-void native_cdc_open(void) { cdc.open = cdc.identity != NULL; }
+void native_cdc_open(void) {
+  cdc.open = cdc.identity != NULL;
+}
 
 void native_cdc_close(void) {
-  if (cdc.open)
+  if (cdc.open) {
     cdc.close_count++;
+  }
   cdc.open = false;
   cdc.queued.length = 0;
   cdc.sent.length = 0;
@@ -73,36 +80,52 @@ void native_cdc_stall(bool stalled) {
 }
 
 enum ft_status native_cdc_send(const uint8_t *bytes, size_t length) {
-  if (cdc.sent.length + length > NATIVE_CDC_RECEIVE_BYTES)
+  if (cdc.sent.length + length > NATIVE_CDC_RECEIVE_BYTES) {
     return FT_ERR_SPACE;
+  }
   append(&cdc.sent, bytes, length);
   return FT_OK;
 }
 
-void native_cdc_request_loader(void) { cdc.loader_requested = true; }
+void native_cdc_request_loader(void) {
+  cdc.loader_requested = true;
+}
 
 size_t native_cdc_receive(uint8_t *bytes, size_t capacity) {
   return take(&cdc.received, bytes, capacity);
 }
 
-void cdc_start(const struct cdc_identity *identity) { cdc.identity = identity; }
+void cdc_start(const struct cdc_identity *identity) {
+  cdc.identity = identity;
+}
 
-bool cdc_is_open(void) { return cdc.open; }
+bool cdc_is_open(void) {
+  return cdc.open;
+}
 
-uint32_t cdc_close_count(void) { return cdc.close_count; }
+uint32_t cdc_close_count(void) {
+  return cdc.close_count;
+}
 
 enum ft_status cdc_write(const uint8_t *bytes, size_t length) {
-  if (length > NATIVE_CDC_TRANSMIT_BYTES)
+  if (length > NATIVE_CDC_TRANSMIT_BYTES) {
     return FT_ERR_ARGUMENT;
-  if (!cdc.open)
+  }
+  if (!cdc.open) {
     return FT_OK;
-  if (cdc.queued.length + length > NATIVE_CDC_TRANSMIT_BYTES)
+  }
+  if (cdc.queued.length + length > NATIVE_CDC_TRANSMIT_BYTES) {
     return FT_ERR_SPACE;
+  }
   append(&cdc.queued, bytes, length);
   deliver();
   return FT_OK;
 }
 
-size_t cdc_read(uint8_t *bytes, size_t capacity) { return take(&cdc.sent, bytes, capacity); }
+size_t cdc_read(uint8_t *bytes, size_t capacity) {
+  return take(&cdc.sent, bytes, capacity);
+}
 
-bool cdc_loader_requested(void) { return cdc.loader_requested; }
+bool cdc_loader_requested(void) {
+  return cdc.loader_requested;
+}

@@ -7,7 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* More events, or rounds of the main loop, at one moment are a program that never lets time pass. */
+/* More events, or rounds of the main loop, at one moment are a program that never lets time pass.
+ */
 enum { MAX_AT_ONCE = 10000 };
 
 static struct {
@@ -53,33 +54,39 @@ static uint64_t next_event_us(void) {
 }
 
 static void pass_time_to(uint64_t t_us) {
-  if (t_us > native.now_us)
+  if (t_us > native.now_us) {
     native.at_once = 0;
+  }
   native.now_us = t_us;
-  if (t_us - native.fed_us > PORT_WATCHDOG_PERIOD_us)
+  if (t_us - native.fed_us > PORT_WATCHDOG_PERIOD_us) {
     native.watchdog_expired = true;
+  }
 }
 
 static void count_at_once(void) {
-  if (++native.at_once > MAX_AT_ONCE)
+  if (++native.at_once > MAX_AT_ONCE) {
     stop("no time passes: the alarm, the bus or the main loop goes round without end");
+  }
 }
 
 static void take_event(uint64_t t_us) {
   pass_time_to(t_us);
   native.events++;
   count_at_once();
-  if (native.alarm_us <= native.now_us)
+  if (native.alarm_us <= native.now_us) {
     native.alarm_us = UINT64_MAX;
-  if (native.handler)
+  }
+  if (native.handler) {
     native.handler(native.handler_context);
+  }
 }
 
 enum native_end native_run_until(uint64_t t_us, void (*main_round)(void *context), void *context) {
   const int left = setjmp(native.out);
   native.running = left == 0;
-  if (left != 0)
+  if (left != 0) {
     return (enum native_end)left;
+  }
   native.limit_us = t_us;
   if (main_round) {
     while (native.now_us < t_us) {
@@ -87,52 +94,76 @@ enum native_end native_run_until(uint64_t t_us, void (*main_round)(void *context
       main_round(context);
     }
   } else {
-    for (uint64_t next_us; (next_us = next_event_us()) <= t_us;)
+    for (uint64_t next_us; (next_us = next_event_us()) <= t_us;) {
       take_event(next_us);
+    }
     pass_time_to(t_us);
   }
   native.running = false;
   return NATIVE_TIME_UP;
 }
 
-bool native_watchdog_expired(void) { return native.watchdog_expired; }
+bool native_watchdog_expired(void) {
+  return native.watchdog_expired;
+}
 
-uint64_t native_event_count(void) { return native.events; }
+uint64_t native_event_count(void) {
+  return native.events;
+}
 
-uint64_t port_now_us(void) { return native.now_us; }
+uint64_t port_now_us(void) {
+  return native.now_us;
+}
 
 void port_set_event_handler(void (*handler)(void *context), void *context) {
   native.handler = handler;
   native.handler_context = context;
 }
 
-void port_alarm_at_us(uint64_t t_us) { native.alarm_us = t_us; }
+void port_alarm_at_us(uint64_t t_us) {
+  native.alarm_us = t_us;
+}
 
 void port_sleep(void) {
   const uint64_t next_us = next_event_us();
-  if (next_us == UINT64_MAX)
+  if (next_us == UINT64_MAX) {
     stop("the main loop sleeps and nothing will wake it");
-  if (native.running && next_us > native.limit_us)
+  }
+  if (native.running && next_us > native.limit_us) {
     pass_time_to(native.limit_us);
-  else
+  } else {
     take_event(next_us);
+  }
 }
 
-void port_watchdog_feed(void) { native.fed_us = native.now_us; }
+void port_watchdog_feed(void) {
+  native.fed_us = native.now_us;
+}
 
-bool port_started_by_watchdog(void) { return native.started_by_watchdog; }
+bool port_started_by_watchdog(void) {
+  return native.started_by_watchdog;
+}
 
-void port_serial_number(char text[17]) { memcpy(text, "0000000000000001", 17); }
+void port_serial_number(char text[17]) {
+  memcpy(text, "0000000000000001", 17);
+}
 
 /* The host's stack is not watched. */
-size_t port_stack_free_bytes(void) { return 0; }
+size_t port_stack_free_bytes(void) {
+  return 0;
+}
 
 static _Noreturn void leave(enum native_end how, const char *why) {
-  if (!native.running)
+  if (!native.running) {
     stop(why);
+  }
   longjmp(native.out, how);
 }
 
-void port_reboot_to_loader(void) { leave(NATIVE_LOADER, "left for the boot loader"); }
+void port_reboot_to_loader(void) {
+  leave(NATIVE_LOADER, "left for the boot loader");
+}
 
-void port_panic(void) { leave(NATIVE_PANIC, "panic"); }
+void port_panic(void) {
+  leave(NATIVE_PANIC, "panic");
+}

@@ -3,7 +3,8 @@
  *
  * Events are the alarm and those of one source, such as the simulated bus. At each, the event
  * handler runs; computing takes no time. What the target cannot survive stops the test program with
- * a message: a main loop that sleeps with no event to come, and a program that never lets time pass.
+ * a message: a main loop that sleeps with no event to come, and a program that never lets time
+ * pass.
  */
 #ifndef NATIVE_NATIVE_PORT_H
 #define NATIVE_NATIVE_PORT_H

@@ -27,10 +27,10 @@ static double temperature_at(const struct sim_array *array, unsigned k, uint64_t
              : ROOM_TEMPERATURE_degC;
 }
 
-static uint32_t d2_at(const struct sim_array *array, unsigned k, uint64_t t_us,
-                      double error_degC) {
-  if (array->d2[k] != 0)
+static uint32_t d2_at(const struct sim_array *array, unsigned k, uint64_t t_us, double error_degC) {
+  if (array->d2[k] != 0) {
     return array->d2[k];
+  }
   return sim_ms5840_d2(array->sensor[k].prom, temperature_at(array, k, t_us) + error_degC);
 }
 
@@ -42,13 +42,15 @@ static uint32_t measure(void *context, int type, unsigned osr, uint64_t t_us) {
         array->noise > 0 ? array->noise * sim_ms5840_noise_degC(osr) * gaussian(array) : 0;
     return d2_at(array, k, t_us, error_degC);
   }
-  if (array->d1[k] != 0)
+  if (array->d1[k] != 0) {
     return array->d1[k];
+  }
   double pressure_Pa = array->world.pressure_Pa
                            ? array->world.pressure_Pa(array->world.context, k, t_us)
                            : STANDARD_PRESSURE_Pa;
-  if (array->noise > 0)
+  if (array->noise > 0) {
     pressure_Pa += array->noise * sim_ms5840_noise_Pa(osr) * gaussian(array);
+  }
   return sim_ms5840_d1(array->sensor[k].prom, pressure_Pa, d2_at(array, k, t_us, 0));
 }
 
@@ -72,10 +74,12 @@ static bool strikes(const struct sim_array *array, enum sim_fault_kind kind) {
 /* Faults of one sensor in the transfer under way; false: it neither hears nor answers. */
 static bool is_alive(struct sim_array *array, unsigned k) {
   const bool meant = array->operation == SIM_ARRAY_READ || array->fault.sensor == k;
-  if (meant && strikes(array, SIM_FAULT_DEAD))
+  if (meant && strikes(array, SIM_FAULT_DEAD)) {
     array->dead_transfers[k] = array->fault.count;
-  if (meant && strikes(array, SIM_FAULT_POWER_CYCLE))
+  }
+  if (meant && strikes(array, SIM_FAULT_POWER_CYCLE)) {
     sim_ms5840_power_cycle(&array->sensor[k]);
+  }
   if (array->dead_transfers[k] > 0) {
     array->dead_transfers[k]--;
     return false;
@@ -87,34 +91,41 @@ static void note_early(struct sim_array *array, unsigned k, uint64_t t_us) {
   const struct sim_ms5840 *sensor = &array->sensor[k];
   const bool disturbs =
       array->command == 0x00 || array->command >> 4 == 4 || array->command >> 4 == 5;
-  if (disturbs && sensor->converting && t_us < sensor->busy_until_us)
+  if (disturbs && sensor->converting && t_us < sensor->busy_until_us) {
     array->early_reads++;
+  }
 }
 
 static void broadcast(struct sim_array *array, uint64_t t_us) {
   bool anybody = false;
   for (unsigned k = 0; k < array->sensor_count; k++) {
-    if (!is_alive(array, k))
+    if (!is_alive(array, k)) {
       continue;
+    }
     array->measured_sensor = (uint8_t)k;
     note_early(array, k, t_us);
-    if (sim_ms5840_command(&array->sensor[k], array->command, t_us, measure, array))
+    if (sim_ms5840_command(&array->sensor[k], array->command, t_us, measure, array)) {
       anybody = true;
+    }
   }
-  if (anybody)
+  if (anybody) {
     array->result.acknowledged = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
-  else
+  } else {
     array->result.nacks++;
+  }
 }
 
 static void spoil_bytes(const struct sim_array *array, uint8_t *bytes) {
   for (unsigned i = 0; i < array->byte_count; i++) {
-    if (strikes(array, SIM_FAULT_FLIP))
+    if (strikes(array, SIM_FAULT_FLIP)) {
       bytes[i] ^= (uint8_t)(array->fault.mask >> (16 - 8 * i));
-    if (strikes(array, SIM_FAULT_ZERO))
+    }
+    if (strikes(array, SIM_FAULT_ZERO)) {
       bytes[i] = 0;
-    if (strikes(array, SIM_FAULT_ONES))
+    }
+    if (strikes(array, SIM_FAULT_ONES)) {
       bytes[i] = 0xFF;
+    }
   }
 }
 
@@ -135,24 +146,27 @@ static void read_one(struct sim_array *array, unsigned k, uint64_t t_us) {
 
 static void begin_transfer(struct sim_array *array, uint64_t t_us) {
   array->transfers++;
-  array->transfer_end_us = t_us + (array->operation == SIM_ARRAY_COMMAND ? SIM_ARRAY_BROADCAST_us
-                                                                         : SIM_ARRAY_READ_us);
+  array->transfer_end_us =
+      t_us + (array->operation == SIM_ARRAY_COMMAND ? SIM_ARRAY_BROADCAST_us : SIM_ARRAY_READ_us);
   array->hangs = strikes(array, SIM_FAULT_TIMEOUT) || strikes(array, SIM_FAULT_STUCK);
-  if (array->hangs && strikes(array, SIM_FAULT_STUCK))
+  if (array->hangs && strikes(array, SIM_FAULT_STUCK)) {
     array->failing_recoveries = array->fault.count;
+  }
 }
 
 static enum ft_status start(struct sim_array *array, enum sim_array_operation operation,
                             uint8_t command, uint8_t byte_count, uint64_t now_us) {
-  if (array->operation != SIM_ARRAY_IDLE)
+  if (array->operation != SIM_ARRAY_IDLE) {
     return FT_ERR_BUSY;
+  }
   array->operation = operation;
   array->command = command;
   array->byte_count = byte_count;
   array->next_sensor = 0;
   memset(&array->result, 0, sizeof array->result);
-  if (!array->needs_recovery)
+  if (!array->needs_recovery) {
     begin_transfer(array, now_us);
+  }
   return FT_OK;
 }
 
@@ -162,8 +176,9 @@ static enum ft_status start_command(void *context, uint8_t command, uint64_t now
 
 static enum ft_status start_read(void *context, uint8_t command, uint8_t byte_count,
                                  uint64_t now_us) {
-  if (byte_count < 1 || byte_count > ARRAY_BUS_MAX_READ_BYTES)
+  if (byte_count < 1 || byte_count > ARRAY_BUS_MAX_READ_BYTES) {
     return FT_ERR_ARGUMENT;
+  }
   return start(context, SIM_ARRAY_READ, command, byte_count, now_us);
 }
 
@@ -188,10 +203,12 @@ static enum ft_status end_recovery(struct sim_array *array) {
 
 /* Everything that has ended on the bus by now_us. */
 static enum ft_status advance(struct sim_array *array, uint64_t now_us) {
-  if (array->operation == SIM_ARRAY_RECOVERY)
+  if (array->operation == SIM_ARRAY_RECOVERY) {
     return now_us < array->transfer_end_us ? FT_PENDING : end_recovery(array);
-  if (array->needs_recovery)
+  }
+  if (array->needs_recovery) {
     return FT_ERR_TIMEOUT;
+  }
   while (!array->hangs && now_us >= array->transfer_end_us) {
     const uint64_t t_us = array->transfer_end_us;
     if (array->operation == SIM_ARRAY_COMMAND) {
@@ -199,8 +216,9 @@ static enum ft_status advance(struct sim_array *array, uint64_t now_us) {
       return FT_OK;
     }
     read_one(array, array->next_sensor, t_us);
-    if (++array->next_sensor == array->sensor_count)
+    if (++array->next_sensor == array->sensor_count) {
       return FT_OK;
+    }
     begin_transfer(array, t_us);
   }
   return now_us >= array->transfer_end_us + SIM_ARRAY_TIMEOUT_us ? FT_ERR_TIMEOUT : FT_PENDING;
@@ -209,8 +227,9 @@ static enum ft_status advance(struct sim_array *array, uint64_t now_us) {
 static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_result *result,
                            uint64_t *wake_us) {
   struct sim_array *array = context;
-  if (array->operation == SIM_ARRAY_IDLE)
+  if (array->operation == SIM_ARRAY_IDLE) {
     return FT_ERR_ARGUMENT;
+  }
   const enum ft_status status = advance(array, now_us);
   if (status == FT_PENDING) {
     *wake_us = array->transfer_end_us +
@@ -219,8 +238,9 @@ static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_resu
   }
   array->operation = SIM_ARRAY_IDLE;
   array->needs_recovery = status != FT_OK;
-  if (status == FT_OK)
+  if (status == FT_OK) {
     *result = array->result;
+  }
   return status;
 }
 

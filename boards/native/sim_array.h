@@ -45,7 +45,7 @@ struct sim_fault {
 /* What the sensors feel. */
 struct sim_world {
   void *context;
-  double (*pressure_Pa)(void *context, unsigned sensor, uint64_t t_us);    /* absolute */
+  double (*pressure_Pa)(void *context, unsigned sensor, uint64_t t_us);      /* absolute */
   double (*temperature_degC)(void *context, unsigned sensor, uint64_t t_us); /* NULL: 25 degC */
 };
 
@@ -53,10 +53,10 @@ struct sim_array {
   /* The test's, at any time */
   struct sim_fault fault;
   struct sim_world world;
-  double noise;                   /* times the datasheet's; 0 = none */
-  uint32_t d1[FT_MAX_SENSORS];    /* [sensor] code instead of the world's pressure; 0 = none */
-  uint32_t d2[FT_MAX_SENSORS];    /* [sensor] code instead of the world's temperature; 0 = none */
-  bool absent[FT_MAX_SENSORS];    /* [sensor] not fitted */
+  double noise;                /* times the datasheet's; 0 = none */
+  uint32_t d1[FT_MAX_SENSORS]; /* [sensor] code instead of the world's pressure; 0 = none */
+  uint32_t d2[FT_MAX_SENSORS]; /* [sensor] code instead of the world's temperature; 0 = none */
+  bool absent[FT_MAX_SENSORS]; /* [sensor] not fitted */
   struct sim_ms5840 sensor[FT_MAX_SENSORS];
 
   /* To look at */

@@ -19,25 +19,34 @@ enum { ROWS = sizeof rows / sizeof rows[0] };
 
 static unsigned row_of(unsigned osr) {
   unsigned row = 0;
-  while (row < ROWS - 1 && rows[row].osr != osr)
+  while (row < ROWS - 1 && rows[row].osr != osr) {
     row++;
+  }
   return row;
 }
 
-uint32_t sim_ms5840_conversion_us(unsigned osr) { return rows[row_of(osr)].conversion_us; }
-double sim_ms5840_noise_Pa(unsigned osr) { return rows[row_of(osr)].noise_Pa; }
-double sim_ms5840_noise_degC(unsigned osr) { return rows[row_of(osr)].noise_degC; }
+uint32_t sim_ms5840_conversion_us(unsigned osr) {
+  return rows[row_of(osr)].conversion_us;
+}
+double sim_ms5840_noise_Pa(unsigned osr) {
+  return rows[row_of(osr)].noise_Pa;
+}
+double sim_ms5840_noise_degC(unsigned osr) {
+  return rows[row_of(osr)].noise_degC;
+}
 
 uint8_t sim_ms5840_crc4(const uint16_t prom[SIM_MS5840_PROM_WORDS]) {
   /* The words without the CRC nibble, and twelve bits 0 of an eighth word, modulo x^4 + x + 1. */
   unsigned remainder = 0;
   for (unsigned bit = 4; bit < 16 * SIM_MS5840_PROM_WORDS + 12; bit++) {
     unsigned next = 0;
-    if (bit < 16 * SIM_MS5840_PROM_WORDS)
+    if (bit < 16 * SIM_MS5840_PROM_WORDS) {
       next = (unsigned)prom[bit / 16] >> (15 - bit % 16) & 1u;
+    }
     remainder = remainder << 1 | next;
-    if ((remainder & 0x10) != 0)
+    if ((remainder & 0x10) != 0) {
       remainder ^= 0x13;
+    }
   }
   return (uint8_t)remainder;
 }
@@ -57,8 +66,9 @@ void sim_ms5840_power_cycle(struct sim_ms5840 *sensor) {
 }
 
 static void settle(struct sim_ms5840 *sensor, uint64_t t_us) {
-  if (!sensor->converting || t_us < sensor->busy_until_us)
+  if (!sensor->converting || t_us < sensor->busy_until_us) {
     return;
+  }
   sensor->converting = false;
   sensor->result = sensor->spoiled ? sensor->converted - sensor->converted / 8 : sensor->converted;
   sensor->spoiled = false;
@@ -76,8 +86,9 @@ static bool is_resetting(const struct sim_ms5840 *sensor, uint64_t t_us) {
 bool sim_ms5840_command(struct sim_ms5840 *sensor, uint8_t command, uint64_t t_us,
                         sim_ms5840_measure *measure, void *context) {
   settle(sensor, t_us);
-  if (is_resetting(sensor, t_us))
+  if (is_resetting(sensor, t_us)) {
     return false;
+  }
   if (command == RESET) {
     sim_ms5840_power_cycle(sensor);
     sensor->loaded = true;
@@ -87,8 +98,9 @@ bool sim_ms5840_command(struct sim_ms5840 *sensor, uint8_t command, uint64_t t_u
   const int type = command >> 4 == 4 ? 1 : command >> 4 == 5 ? 2 : 0;
   const unsigned row = (command & 0xFu) / 2;
   if (type != 0 && command % 2 == 0 && row < ROWS) {
-    if (!sensor->loaded)
+    if (!sensor->loaded) {
       return true;
+    }
     if (sensor->converting) {
       sensor->spoiled = true;
       return true;
@@ -106,8 +118,9 @@ bool sim_ms5840_command(struct sim_ms5840 *sensor, uint8_t command, uint64_t t_u
 bool sim_ms5840_read(struct sim_ms5840 *sensor, uint8_t command, uint8_t *bytes, unsigned count,
                      uint64_t t_us) {
   settle(sensor, t_us);
-  if (is_resetting(sensor, t_us) || !is_read_command(command))
+  if (is_resetting(sensor, t_us) || !is_read_command(command)) {
     return false;
+  }
   uint32_t value = 0; /* left-aligned in 24 bits */
   if (command == READ_ADC) {
     if (sensor->converting) {
@@ -119,8 +132,9 @@ bool sim_ms5840_read(struct sim_ms5840 *sensor, uint8_t command, uint8_t *bytes,
   } else if (sensor->loaded) {
     value = (uint32_t)sensor->prom[(command - READ_PROM) / 2] << 8;
   }
-  for (unsigned i = 0; i < count; i++)
+  for (unsigned i = 0; i < count; i++) {
     bytes[i] = (uint8_t)(value >> (16 - 8 * i));
+  }
   return true;
 }
 
@@ -165,10 +179,11 @@ uint32_t sim_ms5840_d2(const uint16_t *prom, double temperature_degC) {
   uint32_t low = 1, high = CODE_MAX; /* the temperature rises with the code */
   while (low < high) {
     const uint32_t middle = low + (high - low) / 2;
-    if (sim_ms5840_temperature_degC(prom, middle) < temperature_degC)
+    if (sim_ms5840_temperature_degC(prom, middle) < temperature_degC) {
       low = middle + 1;
-    else
+    } else {
       high = middle;
+    }
   }
   return low;
 }

@@ -17,8 +17,8 @@
 #define SIO_GPIO_OE_CLR 0xd0000028u
 
 void gpio_set_pad(unsigned pin, enum gpio_pull pull) {
-  REG32(PADS_BANK0_GPIO(pin)) = PAD_INPUT_ENABLE | PAD_DRIVE_4_MA | PAD_SCHMITT |
-                                (pull == GPIO_PULL_UP ? PAD_PULL_UP : 0);
+  REG32(PADS_BANK0_GPIO(pin)) =
+      PAD_INPUT_ENABLE | PAD_DRIVE_4_MA | PAD_SCHMITT | (pull == GPIO_PULL_UP ? PAD_PULL_UP : 0);
 }
 
 void gpio_set_function(unsigned pin, enum gpio_function function) {
@@ -33,4 +33,6 @@ void gpio_drive(unsigned pin, bool enabled) {
   REG32(enabled ? SIO_GPIO_OE_SET : SIO_GPIO_OE_CLR) = UINT32_C(1) << pin;
 }
 
-bool gpio_read(unsigned pin) { return (REG32(SIO_GPIO_IN) >> pin & 1u) != 0; }
+bool gpio_read(unsigned pin) {
+  return (REG32(SIO_GPIO_IN) >> pin & 1u) != 0;
+}

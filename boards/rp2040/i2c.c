@@ -37,8 +37,9 @@ static struct {
 enum ft_status i2c_open(const struct i2c_pins *pins) {
   resets_assert(RESETS_I2C0);
   enum ft_status status = resets_release(RESETS_IO_BANK0 | RESETS_PADS_BANK0 | RESETS_I2C0);
-  if (status != FT_OK)
+  if (status != FT_OK) {
     return status;
+  }
 
   IC_CON = IC_CON_MASTER_MODE | IC_CON_SPEED_FAST | IC_CON_RESTART_EN | IC_CON_SLAVE_DISABLE;
   IC_FS_SCL_HCNT = HCNT;
@@ -75,16 +76,18 @@ enum { IDLE_POLLS = 50 };
 
 static enum ft_status load_when_idle(void) {
   for (int polls = 0; (IC_ENABLE_STATUS & IC_ENABLE_STATUS_IC_EN) != 0; polls++) {
-    if (polls == IDLE_POLLS)
+    if (polls == IDLE_POLLS) {
       return FT_ERR_BUSY;
+    }
   }
   IC_TAR = transaction.address;
   (void)IC_CLR_INTR;
   IC_ENABLE = 1;
   IC_DATA_CMD = transaction.byte | (transaction.read_count == 0 ? IC_DATA_CMD_STOP : 0);
-  for (unsigned i = 1; i <= transaction.read_count; i++)
+  for (unsigned i = 1; i <= transaction.read_count; i++) {
     IC_DATA_CMD = IC_DATA_CMD_READ | (i == 1 ? IC_DATA_CMD_RESTART : 0) |
                   (i == transaction.read_count ? IC_DATA_CMD_STOP : 0);
+  }
   IC_INTR_MASK = IC_INTR_STOP_DET | IC_INTR_TX_ABRT;
   transaction.loaded = true;
   return FT_PENDING;
@@ -110,16 +113,19 @@ static enum ft_status end(enum ft_status status) {
 }
 
 enum ft_status i2c_poll(uint8_t bytes[I2C_MAX_READ_BYTES]) {
-  if (!transaction.loaded)
+  if (!transaction.loaded) {
     return load_when_idle();
+  }
 
   const uint32_t events = IC_RAW_INTR_STAT;
   if ((events & IC_INTR_TX_ABRT) != 0) {
     const uint32_t nack = IC_TX_ABRT_7B_ADDR_NOACK | IC_TX_ABRT_TXDATA_NOACK;
-    if ((IC_TX_ABRT_SOURCE & nack) == 0)
+    if ((IC_TX_ABRT_SOURCE & nack) == 0) {
       return end(FT_ERR_TIMEOUT);
-    if ((events & IC_INTR_STOP_DET) != 0)
+    }
+    if ((events & IC_INTR_STOP_DET) != 0) {
       return end(FT_ERR_NACK);
+    }
     IC_INTR_MASK = IC_INTR_STOP_DET; /* the controller sends its STOP by itself */
     return FT_PENDING;
   }
@@ -127,10 +133,12 @@ enum ft_status i2c_poll(uint8_t bytes[I2C_MAX_READ_BYTES]) {
     IC_INTR_MASK = IC_INTR_STOP_DET | IC_INTR_TX_ABRT;
     return FT_PENDING;
   }
-  if (IC_RXFLR != transaction.read_count)
+  if (IC_RXFLR != transaction.read_count) {
     return end(FT_ERR_TIMEOUT);
-  for (unsigned i = 0; i < transaction.read_count; i++)
+  }
+  for (unsigned i = 0; i < transaction.read_count; i++) {
     bytes[i] = (uint8_t)IC_DATA_CMD;
+  }
   return end(FT_OK);
 }
 

@@ -49,7 +49,7 @@ enum ft_status i2c_poll(uint8_t bytes[I2C_MAX_READ_BYTES]);
 /* Time on the bus of the two kinds of transaction at 400 kHz: 9 clocks a byte, 1 for each START,
  * repeated START and STOP. */
 #define I2C_WRITE_us 50u
-#define I2C_WRITE_READ_us(byte_count) (75u + (9u * (byte_count) * 5u + 1u) / 2u)
+#define I2C_WRITE_READ_us(byte_count) (75u + (9u * (byte_count)*5u + 1u) / 2u)
 
 /* After i2c_close_to_lines(). */
 enum i2c_line { I2C_LINE_SDA, I2C_LINE_SCL };

@@ -27,8 +27,9 @@
 #define IC_INTR_TX_ABRT (1u << 6)
 #define IC_INTR_STOP_DET (1u << 9)
 
-#define IC_CLR_INTR REG32(I2C0_BASE + 0x40u) /* reading clears every interrupt, the abort source
-                                                and the flushed state of the FIFOs */
+#define IC_CLR_INTR                                                                                \
+  REG32(I2C0_BASE + 0x40u) /* reading clears every interrupt, the abort source                     \
+                              and the flushed state of the FIFOs */
 
 #define IC_ENABLE REG32(I2C0_BASE + 0x6cu) /* bit 0; 0 flushes both FIFOs */
 #define IC_RXFLR REG32(I2C0_BASE + 0x78u)

@@ -40,8 +40,9 @@ uint64_t fake_i2c_next_event_us(void) {
 }
 
 enum ft_status i2c_open(const struct i2c_pins *pins) {
-  if (pins->sda != BOARD_PIN_SDA || pins->scl != BOARD_PIN_SCL)
+  if (pins->sda != BOARD_PIN_SDA || pins->scl != BOARD_PIN_SCL) {
     fake.misuses++;
+  }
   fake.open = true;
   fake.opened++;
   transaction.active = false;
@@ -60,8 +61,9 @@ enum ft_status i2c_start_write(uint8_t address, uint8_t byte) {
 }
 
 enum ft_status i2c_start_write_read(uint8_t address, uint8_t byte, uint8_t byte_count) {
-  if (!fake.open || transaction.active)
+  if (!fake.open || transaction.active) {
     fake.misuses++;
+  }
   transaction.active = true;
   transaction.address = address;
   transaction.byte = byte;
@@ -78,8 +80,9 @@ static uint32_t reachable(void) {
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
     const unsigned m = k / BOARD_CHANNELS_PER_MUX;
     if ((mux.open[m] >> k % BOARD_CHANNELS_PER_MUX & 1) != 0 && !fake.mux_missing[m] &&
-        !fake.sensor_missing[k])
+        !fake.sensor_missing[k]) {
       sensors |= UINT32_C(1) << k;
+    }
   }
   return sensors;
 }
@@ -87,8 +90,9 @@ static uint32_t reachable(void) {
 static enum ft_status write_mux(unsigned m) {
   fake.selects++;
   if (m >= BOARD_MUX_COUNT || fake.mux_missing[m] || mux.in_reset[m] ||
-      transaction.number == fake.nack_select_at)
+      transaction.number == fake.nack_select_at) {
     return FT_ERR_NACK;
+  }
   mux.open[m] = transaction.byte;
   return FT_OK;
 }
@@ -103,32 +107,40 @@ static enum ft_status write_sensors(void) {
 static enum ft_status read_sensors(uint8_t *bytes) {
   const uint32_t sensors = reachable();
   fake.reads++;
-  if (sensors == 0)
+  if (sensors == 0) {
     return FT_ERR_NACK;
-  if ((sensors & (sensors - 1)) != 0)
+  }
+  if ((sensors & (sensors - 1)) != 0) {
     fake.collisions++;
+  }
   for (unsigned i = 0; i < transaction.read_count; i++) {
     bytes[i] = 0xFF;
     for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
-      if ((sensors >> k & 1) != 0)
+      if ((sensors >> k & 1) != 0) {
         bytes[i] &= fake_byte(k, transaction.byte, i);
+      }
     }
   }
   return FT_OK;
 }
 
 enum ft_status i2c_poll(uint8_t bytes[I2C_MAX_READ_BYTES]) {
-  if (!fake.open || !transaction.active)
+  if (!fake.open || !transaction.active) {
     fake.misuses++;
-  if (transaction.busy_polls > 0 && --transaction.busy_polls > 0)
+  }
+  if (transaction.busy_polls > 0 && --transaction.busy_polls > 0) {
     return FT_ERR_BUSY;
-  if (transaction.number == fake.hang_at || fake.now_us < transaction.end_us)
+  }
+  if (transaction.number == fake.hang_at || fake.now_us < transaction.end_us) {
     return FT_PENDING;
+  }
   transaction.active = false;
-  if (transaction.number == fake.arbitration_lost_at)
+  if (transaction.number == fake.arbitration_lost_at) {
     return FT_ERR_TIMEOUT;
-  if (transaction.address != BOARD_SENSOR_ADDRESS)
+  }
+  if (transaction.address != BOARD_SENSOR_ADDRESS) {
     return write_mux((unsigned)transaction.address - BOARD_MUX_ADDRESS_0);
+  }
   return transaction.read_count == 0 ? write_sensors() : read_sensors(bytes);
 }
 
@@ -139,25 +151,30 @@ bool i2c_line_is_high(const struct i2c_pins *pins, enum i2c_line line) {
 
 void i2c_line_pull_low(const struct i2c_pins *pins, enum i2c_line line) {
   (void)pins;
-  if (fake.open)
+  if (fake.open) {
     fake.misuses++;
+  }
   low[line] = true;
 }
 
 void i2c_line_release(const struct i2c_pins *pins, enum i2c_line line) {
   const bool was_low = low[line];
   low[line] = false;
-  if (fake.open)
+  if (fake.open) {
     fake.misuses++;
-  if (!was_low)
+  }
+  if (!was_low) {
     return;
+  }
   if (line == I2C_LINE_SDA) {
-    if (i2c_line_is_high(pins, I2C_LINE_SDA) && i2c_line_is_high(pins, I2C_LINE_SCL))
+    if (i2c_line_is_high(pins, I2C_LINE_SDA) && i2c_line_is_high(pins, I2C_LINE_SCL)) {
       fake.stops++;
+    }
   } else if (!low[I2C_LINE_SDA] && !fake.scl_held) {
     fake.clocks++;
-    if (fake.clocks == fake.sda_free_after_clocks)
+    if (fake.clocks == fake.sda_free_after_clocks) {
       fake.sda_held = false;
+    }
   }
 }
 
@@ -168,24 +185,29 @@ void gpio_write(unsigned pin, bool high) {
     return;
   }
   mux.in_reset[m] = !high;
-  if (high)
+  if (high) {
     return;
+  }
   mux.open[m] = 0;
-  if (fake.sda_free_by_mux_reset)
+  if (fake.sda_free_by_mux_reset) {
     fake.sda_held = false;
+  }
 }
 
 void gpio_drive(unsigned pin, bool enabled) {
-  if (pin - BOARD_PIN_MUX_RESET_0 >= BOARD_MUX_COUNT || !enabled)
+  if (pin - BOARD_PIN_MUX_RESET_0 >= BOARD_MUX_COUNT || !enabled) {
     fake.misuses++;
+  }
 }
 
 void gpio_set_pad(unsigned pin, enum gpio_pull pull) {
-  if (pin - BOARD_PIN_MUX_RESET_0 >= BOARD_MUX_COUNT || pull != GPIO_PULL_NONE)
+  if (pin - BOARD_PIN_MUX_RESET_0 >= BOARD_MUX_COUNT || pull != GPIO_PULL_NONE) {
     fake.misuses++;
+  }
 }
 
 void gpio_set_function(unsigned pin, enum gpio_function function) {
-  if (pin - BOARD_PIN_MUX_RESET_0 >= BOARD_MUX_COUNT || function != GPIO_FUNCTION_SIO)
+  if (pin - BOARD_PIN_MUX_RESET_0 >= BOARD_MUX_COUNT || function != GPIO_FUNCTION_SIO) {
     fake.misuses++;
+  }
 }

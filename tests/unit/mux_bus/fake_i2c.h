@@ -20,7 +20,7 @@ struct fake_i2c {
   unsigned hang_at;             /* the transaction with this number, from 1, never ends */
   unsigned arbitration_lost_at; /* likewise, loses arbitration */
   unsigned nack_select_at;      /* likewise, the addressed multiplexer misses its address */
-  unsigned busy_polls;          /* polls of each transaction that find the controller not yet idle */
+  unsigned busy_polls; /* polls of each transaction that find the controller not yet idle */
   bool sda_held, scl_held;
   unsigned sda_free_after_clocks; /* 0: no number of clocks frees it */
   bool sda_free_by_mux_reset;
@@ -28,8 +28,8 @@ struct fake_i2c {
   /* Seen */
   unsigned transactions, selects, commands, reads;
   unsigned collisions;
-  unsigned misuses;          /* calls that the real controller forbids in its state */
-  uint32_t command_reached;  /* bitmap: sensors that heard the last command */
+  unsigned misuses;         /* calls that the real controller forbids in its state */
+  uint32_t command_reached; /* bitmap: sensors that heard the last command */
   uint8_t last_command;
   unsigned clocks, stops; /* on the lines as plain pins */
   unsigned opened;

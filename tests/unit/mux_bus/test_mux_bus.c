@@ -34,7 +34,9 @@ static void next_case(void) {
   setUp();
 }
 
-static uint64_t earlier(uint64_t a, uint64_t b) { return a < b ? a : b; }
+static uint64_t earlier(uint64_t a, uint64_t b) {
+  return a < b ? a : b;
+}
 
 /* Polls as the event handler does: at every event and alarm. No operation takes 20 ms. */
 static enum ft_status finish(void) {
@@ -42,8 +44,9 @@ static enum ft_status finish(void) {
   for (;;) {
     uint64_t wake_us = 0;
     const enum ft_status status = bus.poll(bus.context, fake.now_us, &result, &wake_us);
-    if (status != FT_PENDING)
+    if (status != FT_PENDING) {
       return status;
+    }
     const uint64_t next_us = earlier(wake_us, fake_i2c_next_event_us());
     TEST_ASSERT_TRUE_MESSAGE(next_us > fake.now_us, "asks to be woken in the past");
     fake.now_us = next_us;
@@ -77,8 +80,9 @@ static void wait_for_conversion(void) {
 
 static enum ft_status frame(void) {
   const enum ft_status status = command(CONVERT);
-  if (status != FT_OK)
+  if (status != FT_OK) {
     return status;
+  }
   wait_for_conversion();
   return read_back(READ_ADC, 3);
 }
@@ -86,8 +90,9 @@ static enum ft_status frame(void) {
 static void expect_readings(uint32_t sensors) {
   TEST_ASSERT_EQUAL_HEX32(sensors, result.acknowledged);
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
-    for (unsigned i = 0; (sensors >> k & 1) != 0 && i < 3; i++)
+    for (unsigned i = 0; (sensors >> k & 1) != 0 && i < 3; i++) {
       TEST_ASSERT_EQUAL_HEX8(fake_byte(k, READ_ADC, i), result.bytes[k][i]);
+    }
   }
 }
 
@@ -153,8 +158,9 @@ static void test_reads_of_every_length_without_a_command(void) {
   for (uint8_t count = 1; count <= ARRAY_BUS_MAX_READ_BYTES; count++) {
     TEST_ASSERT_EQUAL_INT(FT_OK, read_back(0xA2, count));
     TEST_ASSERT_EQUAL_HEX32(ALL_SENSORS, result.acknowledged);
-    for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++)
+    for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
       TEST_ASSERT_EQUAL_HEX8(fake_byte(k, 0xA2, count - 1u), result.bytes[k][count - 1]);
+    }
   }
 }
 

@@ -11,11 +11,13 @@ static uint64_t source_us;
 
 static void handler(void *context) {
   TEST_ASSERT_EQUAL_PTR(&handled, context);
-  if (handled < 8)
+  if (handled < 8) {
     handled_at_us[handled] = port_now_us();
+  }
   handled++;
-  if (source_us <= port_now_us())
+  if (source_us <= port_now_us()) {
     source_us = UINT64_MAX;
+  }
 }
 
 static void round_of_main(void *context) {
@@ -24,7 +26,9 @@ static void round_of_main(void *context) {
   port_sleep();
 }
 
-static uint64_t next_us(const void *context) { return *(const uint64_t *)context; }
+static uint64_t next_us(const void *context) {
+  return *(const uint64_t *)context;
+}
 
 void setUp(void) {
   native_start(false);
@@ -35,7 +39,9 @@ void setUp(void) {
   native_set_event_source(next_us, &source_us);
 }
 
-void tearDown(void) { native_cdc_reset(); }
+void tearDown(void) {
+  native_cdc_reset();
+}
 
 static void test_time_passes_from_event_to_event(void) {
   port_alarm_at_us(700);
@@ -126,8 +132,9 @@ static void test_a_stalled_host_fills_the_queue(void) {
   cdc_start(&IDENTITY);
   native_cdc_open();
   native_cdc_stall(true);
-  for (int n = 0; n < 4; n++)
+  for (int n = 0; n < 4; n++) {
     TEST_ASSERT_EQUAL_INT(FT_OK, cdc_write(block, sizeof block));
+  }
   TEST_ASSERT_EQUAL_INT(FT_ERR_SPACE, cdc_write(block, sizeof block));
   uint8_t received[NATIVE_CDC_TRANSMIT_BYTES];
   TEST_ASSERT_EQUAL_size_t(0, native_cdc_receive(received, sizeof received));

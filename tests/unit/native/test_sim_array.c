@@ -16,8 +16,9 @@ static enum ft_status finish(void) {
   for (;;) {
     uint64_t wake_us = 0;
     const enum ft_status status = bus->poll(bus->context, now_us, &result, &wake_us);
-    if (status != FT_PENDING)
+    if (status != FT_PENDING) {
       return status;
+    }
     const uint64_t event_us = sim_array_next_event_us(&array);
     const uint64_t next_us = event_us < wake_us ? event_us : wake_us;
     TEST_ASSERT_TRUE(next_us > now_us);
@@ -47,8 +48,9 @@ static uint32_t code(unsigned k) {
 
 static enum ft_status frame(void) {
   enum ft_status status = command(CONVERT);
-  if (status != FT_OK)
+  if (status != FT_OK) {
     return status;
+  }
   now_us += CONVERT_us;
   status = read_back(READ_ADC, 3);
   return status;
@@ -57,16 +59,18 @@ static enum ft_status frame(void) {
 static void expect_good_frame(void) {
   TEST_ASSERT_EQUAL_INT(FT_OK, frame());
   TEST_ASSERT_EQUAL_HEX32(ALL, result.acknowledged);
-  for (unsigned k = 0; k < SENSORS; k++)
+  for (unsigned k = 0; k < SENSORS; k++) {
     TEST_ASSERT_EQUAL_UINT32(1000000 + k, code(k));
+  }
 }
 
 void setUp(void) {
   sim_array_init(&array, SENSORS, 1);
   bus = sim_array_bus(&array);
   now_us = 0;
-  for (unsigned k = 0; k < SENSORS; k++)
+  for (unsigned k = 0; k < SENSORS; k++) {
     array.d1[k] = 1000000 + k;
+  }
   TEST_ASSERT_EQUAL_INT(FT_OK, command(RESET));
   TEST_ASSERT_EQUAL_HEX32(ALL, result.acknowledged);
   now_us += SIM_MS5840_RESET_us;
@@ -93,8 +97,9 @@ static void test_a_frame_and_its_bus_time(void) {
 
 static void test_proms_differ_and_are_read(void) {
   TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_C1, 2));
-  for (unsigned k = 0; k < SENSORS; k++)
+  for (unsigned k = 0; k < SENSORS; k++) {
     TEST_ASSERT_EQUAL_UINT16(array.sensor[k].prom[1], result.bytes[k][0] << 8 | result.bytes[k][1]);
+  }
   TEST_ASSERT_NOT_EQUAL_UINT16(array.sensor[0].prom[1], array.sensor[1].prom[1]);
 }
 
@@ -179,8 +184,9 @@ static void test_nack_of_a_command_and_of_a_read(void) {
   strike(SIM_FAULT_NACK, 3, 0, 0);
   TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
   TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << 2), result.acknowledged);
-  for (unsigned k = 0; k < SENSORS; k++)
+  for (unsigned k = 0; k < SENSORS; k++) {
     TEST_ASSERT_TRUE(k == 2 || code(k) == 0);
+  }
   expect_good_frame();
 }
 
@@ -198,14 +204,14 @@ static void test_spoilt_bytes(void) {
   const struct {
     enum sim_fault_kind kind;
     uint32_t code;
-  } cases[] = {{SIM_FAULT_FLIP, 1000006 ^ 0x800001},
-               {SIM_FAULT_ZERO, 0},
-               {SIM_FAULT_ONES, 0xFFFFFF}};
+  } cases[] = {
+      {SIM_FAULT_FLIP, 1000006 ^ 0x800001}, {SIM_FAULT_ZERO, 0}, {SIM_FAULT_ONES, 0xFFFFFF}};
   for (unsigned i = 0; i < 3; i++) {
     strike(cases[i].kind, 1 + 7, 0, 0);
     TEST_ASSERT_EQUAL_INT(FT_OK, frame());
-    for (unsigned k = 0; k < SENSORS; k++)
+    for (unsigned k = 0; k < SENSORS; k++) {
       TEST_ASSERT_EQUAL_UINT32(k == 6 ? cases[i].code : 1000000 + k, code(k));
+    }
   }
 }
 
@@ -237,8 +243,9 @@ static void test_a_timeout_needs_a_recovery(void) {
 static void test_a_stuck_bus_needs_several_recoveries(void) {
   strike(SIM_FAULT_STUCK, 5, 3, 0);
   TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, frame());
-  for (int n = 0; n < 3; n++)
+  for (int n = 0; n < 3; n++) {
     TEST_ASSERT_EQUAL_INT(FT_ERR_STUCK, recover());
+  }
   TEST_ASSERT_EQUAL_INT(FT_OK, recover());
   expect_good_frame();
 }

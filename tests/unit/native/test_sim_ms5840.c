@@ -37,8 +37,7 @@ void tearDown(void) {}
 
 static void test_worked_example(void) {
   TEST_ASSERT_EQUAL_DOUBLE(20.00, sim_ms5840_temperature_degC(sensor.prom, EXAMPLE_D2));
-  TEST_ASSERT_EQUAL_DOUBLE(EXAMPLE_Pa,
-                           sim_ms5840_pressure_Pa(sensor.prom, EXAMPLE_D1, EXAMPLE_D2));
+  TEST_ASSERT_EQUAL_DOUBLE(EXAMPLE_Pa, sim_ms5840_pressure_Pa(sensor.prom, EXAMPLE_D1, EXAMPLE_D2));
 }
 
 /* A genuine MS5840 (public dump): 22.75 degC, 1002.41 mbar. */
@@ -92,8 +91,9 @@ static void test_seven_prom_words_and_no_eighth(void) {
 
 static void test_undefined_commands_are_refused(void) {
   const uint8_t undefined[] = {0x01, 0x1F, 0x41, 0x4C, 0x5E, 0x60, 0xFF};
-  for (unsigned i = 0; i < sizeof undefined; i++)
+  for (unsigned i = 0; i < sizeof undefined; i++) {
     TEST_ASSERT_FALSE(command(undefined[i], 5000));
+  }
 }
 
 static void test_each_ratio_takes_the_datasheets_time(void) {
