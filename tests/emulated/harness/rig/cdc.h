@@ -136,7 +136,7 @@ static inline void usb_poll(void) {
   }
   if (done_buffers & 2) USB(0x58) = 2;
   if (done_buffers & 1 << 4) USB(0x58) = 1 << 4;
-  if (done_buffers & 1 << 5) {
+  if (done_buffers & 1 << 5 && !(IN_CTL(2) & 1 << 10)) {
     USB(0x58) = 1 << 5;
     const int n = OUT_CTL(2) & 0x3ff;
     uint8_t bytes[64];
