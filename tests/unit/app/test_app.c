@@ -1,0 +1,452 @@
+/* The whole firmware on the host: simulated sensors below, a USB host above. */
+#include "app/app.h"
+#include "common/bytes.h"
+#include "common/contact_flags.h"
+#include "common/crc32.h"
+#include "config/geometry.h"
+#include "native/native_cdc.h"
+#include "native/native_port.h"
+#include "native/sim_array.h"
+#include "port/port.h"
+
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+#define AMBIENT_Pa 101325.0
+#define PI 3.14159265358979
+
+static struct sim_array array;
+static struct app app;
+static struct wire_receiver receiver;
+static uint16_t host_sequence;
+
+/* The press that the world applies. */
+static struct {
+  double force_N, x_mm, y_mm, speed_y_mm_s;
+  uint64_t from_us;
+} press;
+
+static double world_pressure_Pa(void *context, unsigned sensor, uint64_t t_us) {
+  (void)context;
+  if (press.force_N == 0.0 || t_us < press.from_us) {
+    return AMBIENT_Pa;
+  }
+  const double sigma_mm = 5.7;
+  double p0_Pa = press.force_N / (2.0 * PI * sigma_mm * sigma_mm * 1e-6);
+  double y_mm = press.y_mm + press.speed_y_mm_s * (double)(t_us - press.from_us) * 1e-6;
+  double dx = (double)geometry.x_mm[sensor] - press.x_mm;
+  double dy = (double)geometry.y_mm[sensor] - y_mm;
+  return AMBIENT_Pa + p0_Pa * exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm));
+}
+
+static uint64_t next_event_us(const void *context) {
+  return sim_array_next_event_us(context);
+}
+
+static void on_event(void *context) {
+  app_on_event(context);
+}
+
+static void main_round(void *context) {
+  app_run(context);
+}
+
+void setUp(void) {
+  memset(&press, 0, sizeof press);
+  native_start(false);
+  native_cdc_reset();
+  sim_array_init(&array, geometry.sensor_count, 1);
+  array.world = (struct sim_world){.pressure_Pa = world_pressure_Pa};
+  array.noise = 1.0;
+  native_set_event_source(next_event_us, &array);
+  port_set_event_handler(on_event, &app);
+  app_start(&app, sim_array_bus(&array));
+  wire_receiver_init(&receiver);
+  host_sequence = 0;
+}
+
+void tearDown(void) {
+  TEST_ASSERT_FALSE_MESSAGE(native_watchdog_expired(), "the watchdog would have struck");
+}
+
+static enum native_end run_for(uint32_t ms) {
+  return native_run_until(port_now_us() + 1000u * ms, main_round, &app);
+}
+
+static void send_packet(struct wire_packet *packet) {
+  uint8_t frame[WIRE_MAX_FRAME_BYTES];
+  size_t length;
+  packet->sequence = host_sequence++;
+  packet->t_us = 123456789;
+  TEST_ASSERT_EQUAL(FT_OK, wire_encode(packet, frame, sizeof frame, &length));
+  TEST_ASSERT_EQUAL(FT_OK, native_cdc_send(frame, length));
+}
+
+/* The next packet that the host has received; false when there is none. */
+static bool next_packet(struct wire_packet *packet) {
+  uint8_t byte;
+  while (native_cdc_receive(&byte, 1) == 1) {
+    enum ft_status status = wire_receive(&receiver, byte, packet);
+    if (status == FT_OK) {
+      return true;
+    }
+    TEST_ASSERT_EQUAL_MESSAGE(FT_PENDING, status, "the device sent a damaged frame");
+  }
+  return false;
+}
+
+static bool next_of_type(uint8_t type, struct wire_packet *packet) {
+  while (next_packet(packet)) {
+    if (packet->type == type) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/* Sends a command and returns the result of its acknowledgement. */
+static uint8_t ask(struct wire_packet command) {
+  struct wire_packet packet;
+  send_packet(&command);
+  run_for(30);
+  TEST_ASSERT_TRUE_MESSAGE(next_of_type(WIRE_ACK, &packet), "no acknowledgement");
+  TEST_ASSERT_EQUAL_HEX8(command.type, packet.body.ack.command);
+  TEST_ASSERT_EQUAL_UINT16(host_sequence - 1, packet.body.ack.sequence);
+  TEST_ASSERT_EQUAL_UINT64(123456789, packet.body.ack.host_time_us);
+  return packet.body.ack.result;
+}
+
+static void start_streams(uint8_t streams) {
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_STREAM,
+                                                               .body.cmd_stream = {streams}}));
+}
+
+static struct wire_info get_info(void) {
+  struct wire_packet packet;
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_INFO}));
+  TEST_ASSERT_TRUE(next_of_type(WIRE_INFO, &packet));
+  return packet.body.info;
+}
+
+static struct wire_health get_health(void) {
+  struct wire_packet packet;
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_HEALTH}));
+  TEST_ASSERT_TRUE(next_of_type(WIRE_HEALTH, &packet));
+  return packet.body.health;
+}
+
+static void nothing_streams_before_a_command(void) {
+  uint8_t byte;
+  native_cdc_open();
+  run_for(500);
+  TEST_ASSERT_EQUAL(0, native_cdc_receive(&byte, 1));
+}
+
+static void a_press_is_located_and_weighed(void) {
+  press.force_N = 5.0;
+  press.x_mm = 2.5;
+  press.y_mm = -7.0;
+  press.from_us = 700000;
+  native_cdc_open();
+  run_for(600);
+  start_streams(WIRE_STREAM_CONTACT | WIRE_STREAM_RAW);
+  run_for(500);
+
+  struct wire_packet packet;
+  struct wire_contact contact = {0};
+  int in_contact = 0;
+  while (next_packet(&packet)) {
+    if (packet.type == WIRE_RAW) {
+      TEST_ASSERT_EQUAL_HEX32(0x7FFF, packet.body.raw.valid);
+      TEST_ASSERT_EQUAL_UINT32_MESSAGE(contact.frame, packet.body.raw.frame, "raw follows contact");
+      continue;
+    }
+    TEST_ASSERT_EQUAL(WIRE_CONTACT, packet.type);
+    contact = packet.body.contact;
+    const struct wire_stages *stages = &contact.stages;
+    TEST_ASSERT_EQUAL_UINT16(stages->total_us, stages->convert_us + stages->read_us +
+                                                   stages->queue_us + stages->condition_us +
+                                                   stages->fit_us + stages->contact_us);
+    if (!(contact.flags & CONTACT_FLAG_CONTACT)) {
+      TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.force_N);
+      TEST_ASSERT_TRUE(packet.t_us < press.from_us + 3000);
+      continue;
+    }
+    if (packet.t_us < press.from_us + 3000) {
+      continue; /* this conversion saw the press begin */
+    }
+    in_contact++;
+    TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID |
+                                CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TARED,
+                            contact.flags & ~(uint32_t)CONTACT_FLAG_SLIP_VALID);
+    TEST_ASSERT_EQUAL_HEX32(0x7FFF, contact.sensors_used);
+    /* Six predicted standard deviations, and 2 um and 2 mN for the compensation's own rounding. */
+    TEST_ASSERT_FLOAT_WITHIN(6 * contact.location_sd_mm + 0.002f, 2.5f, contact.x_mm);
+    TEST_ASSERT_FLOAT_WITHIN(6 * contact.location_sd_mm + 0.002f, -7.0f, contact.y_mm);
+    TEST_ASSERT_FLOAT_WITHIN(6 * contact.force_sd_N + 0.002f, 5.0f, contact.force_N);
+    TEST_ASSERT_TRUE(contact.location_sd_mm < 0.01f);
+  }
+  TEST_ASSERT_GREATER_THAN(50, in_contact);
+  TEST_ASSERT_TRUE(contact.flags & CONTACT_FLAG_SLIP_VALID);
+  TEST_ASSERT_FALSE(contact.flags & CONTACT_FLAG_SLIP);
+}
+
+static void a_moving_contact_slips(void) {
+  press.force_N = 5.0;
+  press.y_mm = -10.0;
+  press.speed_y_mm_s = 40.0;
+  press.from_us = 700000;
+  native_cdc_open();
+  run_for(600);
+  start_streams(WIRE_STREAM_CONTACT);
+  run_for(400);
+  struct wire_packet packet;
+  int slipping = 0;
+  float last_mm = 0.0f;
+  while (next_of_type(WIRE_CONTACT, &packet)) {
+    if (packet.body.contact.flags & CONTACT_FLAG_SLIP) {
+      slipping++;
+      last_mm = packet.body.contact.slip_mm;
+      TEST_ASSERT_TRUE(packet.t_us > press.from_us + 90000);
+    }
+  }
+  TEST_ASSERT_GREATER_THAN(20, slipping);
+  /* v (window + interval) / 2 with an interval of 5 to 6 ms */
+  TEST_ASSERT_FLOAT_WITHIN(0.05f, 40.0f * 0.1055f / 2.0f, last_mm);
+}
+
+static void info_tells_what_this_is(void) {
+  native_cdc_open();
+  run_for(1500);
+  struct wire_info info = get_info();
+  TEST_ASSERT_EQUAL_UINT8(15, info.sensor_count);
+  TEST_ASSERT_EQUAL_STRING("native", info.board);
+  TEST_ASSERT_EQUAL_STRING("slip", info.scene);
+  TEST_ASSERT_EQUAL_FLOAT(9.0f, info.pitch_mm);
+  TEST_ASSERT_EQUAL_FLOAT(-18.0f, info.y_mm[0]);
+  TEST_ASSERT_EQUAL_UINT16(1024, info.osr);
+  TEST_ASSERT_UINT32_WITHIN(20000, 185000, info.measured_rate_mHz);
+  TEST_ASSERT_EQUAL_UINT16(100, info.slip_window_ms);
+  TEST_ASSERT_EQUAL_FLOAT(0.75f, info.slip_threshold_mm);
+}
+
+static void settings_are_checked_and_kept(void) {
+  native_cdc_open();
+  run_for(300);
+  static const struct {
+    uint32_t rate_mHz;
+    uint8_t result;
+  } rates[] = {{0, 0},       {100, 0},  {2000000, 0}, {99, WIRE_RESULT_OUT_OF_RANGE},
+               {2000001, 2}, {20000, 0}};
+  for (size_t i = 0; i < sizeof rates / sizeof rates[0]; i++) {
+    TEST_ASSERT_EQUAL_UINT8(
+        rates[i].result,
+        ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {rates[i].rate_mHz}}));
+  }
+  TEST_ASSERT_EQUAL_UINT32(20000, get_info().rate_mHz);
+
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE,
+                    ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {1000}}));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
+                    ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {256}}));
+  TEST_ASSERT_EQUAL_UINT16(256, get_info().osr);
+
+  static const struct {
+    float threshold_mm;
+    uint16_t window_ms;
+    uint8_t result;
+  } slips[] = {{0.009f, 100, 2}, {51.0f, 100, 2}, {1.0f, 4, 2},
+               {1.0f, 1001, 2},  {-1.0f, 100, 2}, {0.5f, 200, 0}};
+  for (size_t i = 0; i < sizeof slips / sizeof slips[0]; i++) {
+    TEST_ASSERT_EQUAL_UINT8(
+        slips[i].result,
+        ask((struct wire_packet){.type = WIRE_CMD_SLIP,
+                                 .body.cmd_slip = {slips[i].threshold_mm, slips[i].window_ms}}));
+  }
+  TEST_ASSERT_EQUAL_UINT16(200, get_info().slip_window_ms);
+  TEST_ASSERT_EQUAL_FLOAT(0.5f, get_info().slip_threshold_mm);
+
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE,
+                    ask((struct wire_packet){.type = WIRE_CMD_STREAM, .body.cmd_stream = {8}}));
+}
+
+static void at_20_Hz_frames_are_50_ms_apart(void) {
+  native_cdc_open();
+  run_for(300);
+  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {20000}});
+  start_streams(WIRE_STREAM_CONTACT);
+  run_for(200);
+  struct wire_packet packet;
+  while (next_of_type(WIRE_CONTACT, &packet)) {
+  }
+  uint64_t before_us = 0;
+  int frames = 0;
+  run_for(5000);
+  while (next_of_type(WIRE_CONTACT, &packet)) {
+    if (before_us) {
+      TEST_ASSERT_UINT64_WITHIN(1000, 50000, packet.t_us - before_us);
+    }
+    before_us = packet.t_us;
+    frames++;
+  }
+  TEST_ASSERT_INT_WITHIN(1, 100, frames);
+}
+
+static void a_tare_takes_the_present_as_zero(void) {
+  press.force_N = 2.0;
+  native_cdc_open();
+  run_for(1000); /* the start-up tare took the press for the zero */
+  press.force_N = 0.0;
+  run_for(20);
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_TARE}));
+  run_for(300);
+  press.force_N = 4.0;
+  start_streams(WIRE_STREAM_CONTACT);
+  run_for(100);
+  struct wire_packet packet;
+  struct wire_contact last = {0};
+  while (next_of_type(WIRE_CONTACT, &packet)) {
+    last = packet.body.contact;
+  }
+  TEST_ASSERT_TRUE(last.flags & CONTACT_FLAG_TARED);
+  TEST_ASSERT_FLOAT_WITHIN(0.02f, 4.0f, last.force_N);
+}
+
+static void a_tare_without_sensors_is_refused(void) {
+  for (unsigned k = 0; k < geometry.sensor_count; k++) {
+    array.absent[k] = true;
+  }
+  native_cdc_open();
+  run_for(1000);
+  TEST_ASSERT_EQUAL(WIRE_RESULT_NOT_NOW, ask((struct wire_packet){.type = WIRE_CMD_TARE}));
+}
+
+static void damage_is_counted_and_unknown_commands_are_answered(void) {
+  native_cdc_open();
+  run_for(300);
+  static const uint8_t echo[] = {5, 'h', 'e', 'l', 'l', 0, 'x', 0, 0, 0};
+  TEST_ASSERT_EQUAL(FT_OK, native_cdc_send(echo, sizeof echo));
+  run_for(50);
+
+  /* A command of a later version, type 0xF0 without a body; COBS by hand. */
+  uint8_t raw[16] = {WIRE_VERSION, 0xF0};
+  bytes_put_u32(raw + 12, crc32_iso_hdlc(raw, 12));
+  uint8_t coded[20];
+  size_t out = 1, code_at = 0;
+  for (int i = 0; i < 16; i++) {
+    if (raw[i]) {
+      coded[out++] = raw[i];
+    } else {
+      coded[code_at] = (uint8_t)(out - code_at);
+      code_at = out++;
+    }
+  }
+  coded[code_at] = (uint8_t)(out - code_at);
+  coded[out++] = 0;
+  TEST_ASSERT_EQUAL(FT_OK, native_cdc_send(coded, out));
+  run_for(50);
+  struct wire_packet packet;
+  TEST_ASSERT_TRUE(next_of_type(WIRE_ACK, &packet));
+  TEST_ASSERT_EQUAL_HEX8(0xF0, packet.body.ack.command);
+  TEST_ASSERT_EQUAL_UINT8(WIRE_RESULT_UNKNOWN_COMMAND, packet.body.ack.result);
+  TEST_ASSERT_EQUAL_UINT32(3, get_health().commands_rejected);
+}
+
+static void closing_the_port_ends_the_streams(void) {
+  native_cdc_open();
+  run_for(300);
+  start_streams(WIRE_STREAM_CONTACT);
+  native_cdc_close();
+  run_for(100);
+  struct wire_packet packet;
+  while (next_packet(&packet)) {
+  }
+  wire_receiver_init(&receiver);
+  native_cdc_open();
+  run_for(200);
+  TEST_ASSERT_FALSE(next_packet(&packet));
+}
+
+static void a_host_that_does_not_read_loses_whole_packets_and_sees_the_gap(void) {
+  native_cdc_open();
+  run_for(300);
+  start_streams(WIRE_STREAM_CONTACT | WIRE_STREAM_RAW);
+  native_cdc_stall(true);
+  run_for(5000);
+  native_cdc_stall(false);
+  run_for(100);
+  struct wire_packet packet;
+  bool first = true;
+  uint16_t expected = 0;
+  uint32_t missing = 0;
+  while (next_packet(&packet)) { /* asserts that no frame is damaged */
+    if (!first) {
+      missing += (uint16_t)(packet.sequence - expected);
+    }
+    first = false;
+    expected = (uint16_t)(packet.sequence + 1);
+  }
+  struct wire_health health = get_health();
+  TEST_ASSERT_GREATER_THAN_UINT32(1000, health.packets_dropped);
+  TEST_ASSERT_EQUAL_UINT32(health.packets_dropped, missing);
+}
+
+static void health_comes_each_second(void) {
+  native_cdc_open();
+  run_for(300);
+  start_streams(WIRE_STREAM_HEALTH);
+  run_for(5000);
+  struct wire_packet packet;
+  int count = 0;
+  while (next_of_type(WIRE_HEALTH, &packet)) {
+    count++;
+    TEST_ASSERT_EQUAL_HEX32(0x7FFF, packet.body.health.sensors_present);
+    TEST_ASSERT_EQUAL_UINT32(0, packet.body.health.frames_incomplete);
+  }
+  TEST_ASSERT_INT_WITHIN(1, 5, count);
+}
+
+static void the_loader_is_reached_by_command_and_by_touch(void) {
+  native_cdc_open();
+  run_for(300);
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE,
+                    ask((struct wire_packet){.type = WIRE_CMD_LOADER, .body.cmd_loader = {0}}));
+  TEST_ASSERT_EQUAL(NATIVE_TIME_UP, run_for(200));
+  TEST_ASSERT_EQUAL(
+      WIRE_RESULT_DONE,
+      ask((struct wire_packet){.type = WIRE_CMD_LOADER, .body.cmd_loader = {WIRE_LOADER_MAGIC}}));
+  TEST_ASSERT_EQUAL(NATIVE_LOADER, run_for(200));
+
+  setUp();
+  native_cdc_open();
+  run_for(300);
+  native_cdc_request_loader();
+  TEST_ASSERT_EQUAL(NATIVE_LOADER, run_for(200));
+}
+
+static void at_the_slowest_rate_the_watchdog_is_fed(void) {
+  native_cdc_open();
+  run_for(300);
+  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {WIRE_RATE_MIN_mHz}});
+  run_for(25000);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(nothing_streams_before_a_command);
+  RUN_TEST(a_press_is_located_and_weighed);
+  RUN_TEST(a_moving_contact_slips);
+  RUN_TEST(info_tells_what_this_is);
+  RUN_TEST(settings_are_checked_and_kept);
+  RUN_TEST(at_20_Hz_frames_are_50_ms_apart);
+  RUN_TEST(a_tare_takes_the_present_as_zero);
+  RUN_TEST(a_tare_without_sensors_is_refused);
+  RUN_TEST(damage_is_counted_and_unknown_commands_are_answered);
+  RUN_TEST(closing_the_port_ends_the_streams);
+  RUN_TEST(a_host_that_does_not_read_loses_whole_packets_and_sees_the_gap);
+  RUN_TEST(health_comes_each_second);
+  RUN_TEST(the_loader_is_reached_by_command_and_by_touch);
+  RUN_TEST(at_the_slowest_rate_the_watchdog_is_fed);
+  return UNITY_END();
+}
