@@ -149,7 +149,13 @@ static void end_prom_pass(struct scan *scan) {
 static void take_prom_word(struct scan *scan) {
   for (uint8_t k = 0; k < scan->sensor_count; k++) {
     const uint8_t *bytes = scan->result.bytes[k];
-    scan->prom_read[k].word[scan->prom_word] = (uint16_t)(bytes[0] << 8 | bytes[1]);
+    uint16_t word = (uint16_t)(bytes[0] << 8 | bytes[1]);
+    scan->prom_read[k].word[scan->prom_word] = word;
+    /* No coefficient, but what a silent bus or an unloaded sensor gives; the CRC lets one such word
+     * in sixteen pass. */
+    if (scan->prom_word > 0 && (word == 0 || word == 0xFFFF)) {
+      scan->prom_answered &= ~(UINT32_C(1) << k);
+    }
   }
   scan->prom_answered &= scan->result.acknowledged;
   scan->prom_word++;
@@ -168,14 +174,15 @@ static void take_codes(struct scan *scan, uint64_t now_us) {
   for (uint8_t k = 0; k < scan->sensor_count; k++) {
     const uint8_t *bytes = scan->result.bytes[k];
     slot->code[k] = (uint32_t)bytes[0] << 16 | (uint32_t)bytes[1] << 8 | bytes[2];
-    if (slot->code[k] == 0) {
+    if (slot->code[k] == 0 || (slot->is_temperature && slot->code[k] == 0xFFFFFF)) {
       zero |= UINT32_C(1) << k;
     }
   }
   uint32_t unusable = admitted & (zero | scan->void_next);
   count(&scan->counters.zero_readings, count_bits(unusable));
-  scan->void_next = admitted & zero;
   slot->good = admitted & ~unusable;
+  admitted &= ~(zero & scan->void_next); /* twice in a row: it has lost its reset */
+  scan->void_next = admitted & zero;
   slot->t_read_us = now_us;
   set(&scan->present, acknowledged);
   set(&scan->admitted, admitted);

@@ -10,7 +10,9 @@
  * A sensor is admitted when it has acknowledged its whole calibration PROM. One that stops
  * answering loses its admission; when sensors answer again, all are reset and their PROMs read
  * anew, at most once a second. Only admitted sensors yield valid readings. A reading of 0 means
- * that no conversion had finished, and the reading after it is void too: both are invalid.
+ * that no conversion had finished, and the reading after it is void too: both are invalid, and two
+ * in a row are a sensor that needs a reset, which loses its admission. A temperature of all ones is
+ * no reading either: it would falsify the pressures of many frames.
  */
 #ifndef SCAN_SCAN_H
 #define SCAN_SCAN_H
