@@ -1,0 +1,16 @@
+/* Bringing the device up as Linux does, for tests that need one. */
+#ifndef TESTS_USB_ENUMERATE_H
+#define TESTS_USB_ENUMERATE_H
+
+#include <stdint.h>
+
+/* A device that has just been plugged in; from its start if it is the first of the program. */
+void plug_in(void);
+
+/* Bus reset, address, configuration 1. */
+void enumerate(void);
+
+void set_dtr(int on);
+void set_baud(uint32_t baud);
+
+#endif

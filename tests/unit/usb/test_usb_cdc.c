@@ -1,0 +1,279 @@
+/* The serial port: line state, and the two byte streams. */
+#include "enumerate.h"
+#include "fake_controller.h"
+#include "usb/cdc.h"
+
+#include "unity.h"
+#include <string.h>
+
+enum { QUEUE_BYTES = 4096 };
+
+static uint8_t packet[64];
+static uint8_t bytes[QUEUE_BYTES + 256];
+static uint8_t got[QUEUE_BYTES + 256];
+
+void setUp(void) {
+  for (size_t i = 0; i < sizeof bytes; i++)
+    bytes[i] = (uint8_t)(i * 7 + i / 256);
+  plug_in();
+  enumerate();
+}
+
+void tearDown(void) {}
+
+/* Reads as cdc_acm does: a transfer of 128 bytes ends when full or with a short packet. Returns its
+ * bytes, or -1 if it does not end, with what has come so far in *so_far. */
+static int read_transfer(uint8_t *to, int *so_far) {
+  int total = 0;
+  while (total < 128) {
+    int n = host_in(0x82, packet);
+    if (n == HOST_NAK) {
+      *so_far = total;
+      return -1;
+    }
+    TEST_ASSERT_LESS_OR_EQUAL(64, n);
+    TEST_ASSERT_GREATER_OR_EQUAL(0, n);
+    memcpy(to + total, packet, (size_t)n);
+    total += n;
+    if (n < 64)
+      break;
+  }
+  return total;
+}
+
+/* Whatever is written arrives at once, whole, whatever its length. */
+static void test_every_length_arrives_without_waiting_for_more(void) {
+  set_dtr(1);
+  for (size_t length = 1; length <= 300; length++) {
+    TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes + length, length));
+    size_t total = 0;
+    int so_far = 0;
+    for (int n = read_transfer(got, &so_far); n >= 0; n = read_transfer(got + total, &so_far))
+      total += (size_t)n;
+    TEST_ASSERT_EQUAL_MESSAGE(0, so_far, "bytes wait in an unfinished transfer of the host");
+    TEST_ASSERT_EQUAL(length, total);
+    TEST_ASSERT_EQUAL_MEMORY(bytes + length, got, length);
+  }
+}
+
+static void test_packets_of_a_write(void) {
+  set_dtr(1);
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 80));
+  TEST_ASSERT_EQUAL(64, host_in(0x82, packet));
+  TEST_ASSERT_EQUAL(16, host_in(0x82, packet));
+  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
+
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 128));
+  TEST_ASSERT_EQUAL(64, host_in(0x82, packet));
+  TEST_ASSERT_EQUAL(64, host_in(0x82, packet));
+  TEST_ASSERT_EQUAL(0, host_in(0x82, packet));
+  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
+
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 0));
+  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
+}
+
+static void test_write_takes_all_or_nothing(void) {
+  set_dtr(1);
+  TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, cdc_write(bytes, QUEUE_BYTES + 1));
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, QUEUE_BYTES - 100));
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes + QUEUE_BYTES - 100, 164)); /* 64 are on their way */
+  TEST_ASSERT_EQUAL(FT_ERR_SPACE, cdc_write(bytes, 1));
+  TEST_ASSERT_EQUAL(64, host_in(0x82, got));
+  TEST_ASSERT_EQUAL(FT_ERR_SPACE, cdc_write(bytes, 65));
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"!", 1));
+  size_t total = 64;
+  for (int n; (n = host_in(0x82, packet)) >= 0; total += (size_t)n) {
+    TEST_ASSERT_LESS_OR_EQUAL(sizeof got, total + (size_t)n);
+    memcpy(got + total, packet, (size_t)n);
+  }
+  TEST_ASSERT_EQUAL(QUEUE_BYTES + 64 + 1, total);
+  TEST_ASSERT_EQUAL_MEMORY(bytes, got, QUEUE_BYTES + 64);
+  TEST_ASSERT_EQUAL('!', got[QUEUE_BYTES + 64]);
+}
+
+/* Random writes and reads: the stream that comes out is the stream that went in. */
+static void test_stream_keeps_order_and_loses_nothing(void) {
+  set_dtr(1);
+  uint32_t random = 1;
+  uint32_t written = 0;
+  uint32_t read = 0;
+  for (int step = 0; step < 20000; step++) {
+    random = random * 1664525u + 1013904223u;
+    size_t length = random >> 20 & 255;
+    uint8_t block[255];
+    for (size_t i = 0; i < length; i++)
+      block[i] = (uint8_t)((written + i) * 2654435761u >> 24);
+    if (cdc_write(block, length) == FT_OK)
+      written += (uint32_t)length;
+    for (uint32_t packets = random >> 29; packets > 0; packets--) {
+      int n = host_in(0x82, packet);
+      for (int i = 0; i < n; i++)
+        TEST_ASSERT_EQUAL_HEX8((uint8_t)((read + (uint32_t)i) * 2654435761u >> 24), packet[i]);
+      read += n > 0 ? (uint32_t)n : 0;
+    }
+  }
+  TEST_ASSERT_GREATER_THAN(100 * QUEUE_BYTES, read);
+  for (int n; (n = host_in(0x82, packet)) >= 0;)
+    read += (uint32_t)n;
+  TEST_ASSERT_EQUAL(written, read);
+}
+
+static void test_closed_port_swallows_writes(void) {
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 100));
+  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
+  set_dtr(1);
+  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
+}
+
+static void test_close_discards_what_waits(void) {
+  set_dtr(1);
+  uint32_t closes = cdc_close_count();
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 64));
+  set_dtr(0);
+  TEST_ASSERT_EQUAL(closes + 1, cdc_close_count());
+  set_dtr(0);
+  TEST_ASSERT_EQUAL(closes + 1, cdc_close_count());
+  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
+  set_dtr(1);
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"new", 3));
+  TEST_ASSERT_EQUAL(3, host_in(0x82, packet));
+  TEST_ASSERT_EQUAL_MEMORY("new", packet, 3);
+  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
+}
+
+/* The port closes between the look at it and the queueing: the bytes must not greet the next one. */
+static void test_write_overtaken_by_close(void) {
+  set_dtr(1);
+  fake_hold_interrupts();
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 30));
+  set_dtr(0);
+  fake_run_interrupts();
+  set_dtr(1);
+  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
+}
+
+static void test_suspended_port_is_closed(void) {
+  set_dtr(1);
+  uint32_t closes = cdc_close_count();
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 100));
+  host_suspend();
+  TEST_ASSERT_FALSE(cdc_is_open());
+  TEST_ASSERT_EQUAL(closes + 1, cdc_close_count());
+  host_resume();
+  TEST_ASSERT_TRUE(cdc_is_open());
+  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
+  host_suspend();
+  host_bus_reset();
+  TEST_ASSERT_FALSE(cdc_is_open());
+  TEST_ASSERT_EQUAL(closes + 2, cdc_close_count());
+  enumerate();
+  set_dtr(1);
+  TEST_ASSERT_TRUE(cdc_is_open());
+}
+
+static void test_halt_keeps_the_packet_that_the_host_has_not_got(void) {
+  set_dtr(1);
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 80));
+  TEST_ASSERT_EQUAL(0, host_control_out(0x02, 3, 0, 0x82, NULL, 0));
+  TEST_ASSERT_EQUAL(HOST_STALL, host_in(0x82, packet));
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes + 80, 10));
+  TEST_ASSERT_EQUAL(HOST_STALL, host_in(0x82, packet));
+  TEST_ASSERT_EQUAL(0, host_control_out(0x02, 1, 0, 0x82, NULL, 0));
+  host_reset_toggle(0x82);
+  TEST_ASSERT_EQUAL(64, host_in(0x82, got));
+  TEST_ASSERT_EQUAL(26, host_in(0x82, got + 64));
+  TEST_ASSERT_EQUAL_MEMORY(bytes, got, 90);
+}
+
+static void test_halt_does_not_repeat_a_packet_that_the_host_has_got(void) {
+  set_dtr(1);
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 80));
+  fake_take_at_next_withdrawal();
+  TEST_ASSERT_EQUAL(0, host_control_out(0x02, 1, 0, 0x82, NULL, 0));
+  host_reset_toggle(0x82);
+  TEST_ASSERT_EQUAL(16, host_in(0x82, packet));
+  TEST_ASSERT_EQUAL_MEMORY(bytes + 64, packet, 16);
+}
+
+static void test_host_waits_while_nobody_reads(void) {
+  for (int i = 0; i < 4; i++)
+    TEST_ASSERT_EQUAL(0, host_out(0x02, bytes + 64 * i, 64));
+  TEST_ASSERT_EQUAL(HOST_NAK, host_out(0x02, "x", 1));
+  TEST_ASSERT_EQUAL(63, cdc_read(got, 63));
+  TEST_ASSERT_EQUAL(HOST_NAK, host_out(0x02, "x", 1));
+  TEST_ASSERT_EQUAL(1, cdc_read(got + 63, 1));
+  TEST_ASSERT_EQUAL(0, host_out(0x02, bytes + 256, 64));
+  TEST_ASSERT_EQUAL(256, cdc_read(got + 64, 1000));
+  TEST_ASSERT_EQUAL(0, cdc_read(got, sizeof got));
+  TEST_ASSERT_EQUAL_MEMORY(bytes, got, 320);
+}
+
+/* A terminal in cooked mode echoes the stream byte for byte, before anybody has opened and after. */
+static void test_echoing_terminal(void) {
+  for (int round = 0; round < 2; round++) {
+    for (int i = 0; i < 1000; i++) {
+      uint8_t byte = (uint8_t)i;
+      TEST_ASSERT_EQUAL(0, host_out(0x02, &byte, 1));
+      TEST_ASSERT_EQUAL(1, cdc_read(got, sizeof got));
+      TEST_ASSERT_EQUAL_HEX8(byte, got[0]);
+      TEST_ASSERT_EQUAL(0, host_out(0x02, NULL, 0));
+    }
+    set_dtr(1);
+  }
+}
+
+static void test_line_coding_is_kept(void) {
+  static const uint8_t initial[7] = {0x00, 0xc2, 0x01, 0, 0, 0, 8};
+  static const uint8_t coding[7] = {0x80, 0x25, 0, 0, 2, 1, 7};
+  TEST_ASSERT_EQUAL(7, host_control_in(0xa1, 0x21, 0, 0, 7, got));
+  TEST_ASSERT_EQUAL_HEX8_ARRAY(initial, got, 7);
+  TEST_ASSERT_EQUAL(0, host_control_out(0x21, 0x20, 0, 0, coding, 7));
+  TEST_ASSERT_EQUAL(7, host_control_in(0xa1, 0x21, 0, 0, 64, got));
+  TEST_ASSERT_EQUAL_HEX8_ARRAY(coding, got, 7);
+  TEST_ASSERT_EQUAL(0, host_control_out(0x21, 0x23, 0xffff, 0, NULL, 0));
+}
+
+static void test_line_coding_in_a_short_packet_stalls(void) {
+  host_setup(0x21, 0x20, 0, 0, 7);
+  TEST_ASSERT_EQUAL(0, host_out(0, "\x80\x25", 2));
+  TEST_ASSERT_EQUAL(HOST_STALL, host_in(0x80, packet));
+}
+
+/* Last, as the request cannot be taken back. */
+static void test_1200_baud_asks_for_the_loader(void) {
+  set_baud(9600);
+  set_dtr(1);
+  set_dtr(0);
+  set_dtr(1);
+  set_baud(1200);
+  TEST_ASSERT_FALSE(cdc_loader_requested());
+  set_baud(115200);
+  set_dtr(0);
+  TEST_ASSERT_FALSE(cdc_loader_requested());
+  set_baud(1200);
+  set_dtr(0);
+  TEST_ASSERT_FALSE(cdc_loader_requested());
+  set_dtr(1);
+  TEST_ASSERT_TRUE(cdc_loader_requested());
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_every_length_arrives_without_waiting_for_more);
+  RUN_TEST(test_packets_of_a_write);
+  RUN_TEST(test_write_takes_all_or_nothing);
+  RUN_TEST(test_stream_keeps_order_and_loses_nothing);
+  RUN_TEST(test_closed_port_swallows_writes);
+  RUN_TEST(test_close_discards_what_waits);
+  RUN_TEST(test_write_overtaken_by_close);
+  RUN_TEST(test_suspended_port_is_closed);
+  RUN_TEST(test_halt_keeps_the_packet_that_the_host_has_not_got);
+  RUN_TEST(test_halt_does_not_repeat_a_packet_that_the_host_has_got);
+  RUN_TEST(test_host_waits_while_nobody_reads);
+  RUN_TEST(test_echoing_terminal);
+  RUN_TEST(test_line_coding_is_kept);
+  RUN_TEST(test_line_coding_in_a_short_packet_stalls);
+  RUN_TEST(test_1200_baud_asks_for_the_loader);
+  return UNITY_END();
+}
