@@ -1,0 +1,210 @@
+/* The byte images of tests/vectors/wire, assembled by hand from PROTOCOL.md, against the codec. */
+#include "common/contact_flags.h"
+#include "wire/packet.h"
+
+#include <ctype.h>
+#include <stdio.h>
+#include <string.h>
+#include <unity.h>
+
+struct vector {
+  uint8_t packet[WIRE_MAX_PACKET_BYTES], frame[WIRE_MAX_FRAME_BYTES];
+  size_t packet_length, frame_length;
+};
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static struct vector read_vector(const char *name) {
+  struct vector vector = {.packet_length = 0};
+  char path[512];
+  snprintf(path, sizeof path, "%s%s", VECTORS, name);
+  FILE *file = fopen(path, "r");
+  TEST_ASSERT_NOT_NULL_MESSAGE(file, path);
+  uint8_t *to = NULL;
+  size_t *length = NULL;
+  size_t capacity = 0;
+  char line[256];
+  while (fgets(line, sizeof line, file)) {
+    line[strcspn(line, "#\n")] = '\0';
+    for (char *word = strtok(line, " "); word; word = strtok(NULL, " ")) {
+      if (strcmp(word, "packet") == 0) {
+        to = vector.packet;
+        length = &vector.packet_length;
+        capacity = sizeof vector.packet;
+      } else if (strcmp(word, "frame") == 0) {
+        to = vector.frame;
+        length = &vector.frame_length;
+        capacity = sizeof vector.frame;
+      } else {
+        TEST_ASSERT_TRUE_MESSAGE(strlen(word) == 2 && isxdigit((unsigned char)word[0]) &&
+                                     isxdigit((unsigned char)word[1]) && length,
+                                 path);
+        TEST_ASSERT_LESS_THAN_size_t(capacity, *length);
+        unsigned value;
+        TEST_ASSERT_EQUAL_INT(1, sscanf(word, "%x", &value));
+        to[(*length)++] = (uint8_t)value;
+      }
+    }
+  }
+  fclose(file);
+  TEST_ASSERT_GREATER_THAN_size_t(0, vector.frame_length);
+  return vector;
+}
+
+/* The frame is the packet under COBS and a delimiter, and both say what expected says. */
+static void check(const char *name, const struct wire_packet *expected) {
+  struct vector vector = read_vector(name);
+  uint8_t frame[WIRE_MAX_FRAME_BYTES];
+  size_t length = 0;
+  TEST_ASSERT_EQUAL_INT_MESSAGE(FT_OK, wire_encode(expected, frame, sizeof frame, &length), name);
+  TEST_ASSERT_EQUAL_size_t_MESSAGE(vector.frame_length, length, name);
+  TEST_ASSERT_EQUAL_HEX8_ARRAY_MESSAGE(vector.frame, frame, length, name);
+
+  struct wire_packet decoded;
+  TEST_ASSERT_EQUAL_INT_MESSAGE(FT_OK, wire_decode(frame, length - 1, &decoded), name);
+  TEST_ASSERT_EQUAL_MEMORY_MESSAGE(expected, &decoded, sizeof decoded, name);
+  /* wire_decode has left the packet itself in the buffer. */
+  TEST_ASSERT_EQUAL_HEX8_ARRAY_MESSAGE(vector.packet, frame, vector.packet_length, name);
+}
+
+static struct wire_packet blank(uint8_t type, uint16_t sequence, uint64_t t_us) {
+  struct wire_packet packet;
+  memset(&packet, 0, sizeof packet);
+  packet.type = type;
+  packet.sequence = sequence;
+  packet.t_us = t_us;
+  return packet;
+}
+
+static void test_contact(void) {
+  struct wire_packet packet = blank(0x01, 0xA1B2, UINT64_C(123456789012));
+  packet.body.contact = (struct wire_contact){
+      .frame = 70000,
+      .flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
+               CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED | CONTACT_FLAG_LOW_SIGNAL |
+               CONTACT_FLAG_SENSOR_MASKED,
+      .sensors_used = 0x7FEF,
+      .x_mm = -4.5f,
+      .y_mm = 12.25f,
+      .p0_Pa = 7500.0f,
+      .sigma_mm = 5.625f,
+      .force_N = 1.5f,
+      .slip_mm = 0.375f,
+      .residual_rms_Pa = 17.5f,
+      .location_sd_mm = 0.015625f,
+      .force_sd_N = 0.00390625f,
+      .stages = {2300, 3001, 12, 34, 2760, 56, 8163},
+  };
+  check("contact.txt", &packet);
+}
+
+static void test_raw(void) {
+  struct wire_packet packet = blank(0x02, UINT16_MAX, UINT64_C(0x100000000));
+  struct wire_raw *raw = &packet.body.raw;
+  raw->frame = 256;
+  raw->valid = 5;
+  raw->saturated = 4;
+  raw->temperature_cC = -125;
+  raw->sensor_count = 3;
+  raw->pressure_Pa_q10[0] = 100000 * 1024;
+  raw->baseline_Pa_q10[0] = 102300001;
+  raw->baseline_Pa_q10[1] = -1;
+  raw->pressure_Pa_q10[2] = INT32_MAX;
+  raw->baseline_Pa_q10[2] = INT32_MIN;
+  check("raw.txt", &packet);
+}
+
+static void test_info(void) {
+  struct wire_packet packet = blank(0x03, 7, 1000000);
+  struct wire_info *info = &packet.body.info;
+  memcpy(info->firmware_version, "\1\2\3", 3);
+  info->sensor_count = 2;
+  memcpy(info->git_hash, "0123456789ab+", 13);
+  memcpy(info->board, "pico_mux", 8);
+  memcpy(info->scene, "slip", 4);
+  memcpy(info->serial, "E66058388347A12C", 16);
+  info->rate_mHz = 20000;
+  info->measured_rate_mHz = 19998;
+  info->osr = 1024;
+  info->temperature_interval = 64;
+  info->slip_window_ms = 100;
+  info->fit_iterations = 7;
+  info->streams = WIRE_STREAM_CONTACT | WIRE_STREAM_RAW;
+  info->slip_threshold_mm = 0.75f;
+  info->pitch_mm = 9.0f;
+  info->x_mm[0] = -4.5f;
+  info->y_mm[0] = -18.0f;
+  info->x_mm[1] = 4.5f;
+  info->y_mm[1] = 18.0f;
+  check("info.txt", &packet);
+}
+
+static void test_health(void) {
+  struct wire_packet packet = blank(0x04, 8, 2000000);
+  packet.body.health = (struct wire_health){
+      .uptime_s = 0x01010100,
+      .frames = 0x02020201,
+      .frames_incomplete = 0x03030302,
+      .packets_sent = 0x04040403,
+      .packets_dropped = 0x05050504,
+      .commands_done = 0x06060605,
+      .commands_rejected = 0x07070706,
+      .bus_nacks = 0x08080807,
+      .bus_timeouts = 0x09090908,
+      .bus_recoveries = 0x0A0A0A09,
+      .zero_readings = 0x0B0B0B0A,
+      .fit_failures = 0x0C0C0C0B,
+      .sensors_present = 0x0D0D0D0C,
+      .sensors_prom_bad = 0x0E0E0E0D,
+      .watchdog_resets = 0x0F0F0F0E,
+      .cpu_busy_permille = 425,
+      .stack_free_bytes = 1536,
+  };
+  check("health.txt", &packet);
+}
+
+static void test_acknowledgement(void) {
+  struct wire_packet packet = blank(0x05, 9, 3000000);
+  packet.body.ack.command = 0x84;
+  packet.body.ack.result = WIRE_RESULT_OUT_OF_RANGE;
+  packet.body.ack.sequence = 0x0102;
+  packet.body.ack.host_time_us = UINT64_C(0x1122334455667788);
+  check("acknowledgement.txt", &packet);
+}
+
+static void test_commands(void) {
+  struct wire_packet packet = blank(0x84, 0x0102, UINT64_C(0x1122334455667788));
+  packet.body.cmd_slip.threshold_mm = 0.75f;
+  packet.body.cmd_slip.window_ms = 100;
+  check("command_slip.txt", &packet);
+  packet = blank(0x80, 1, 10);
+  packet.body.cmd_stream.streams = WIRE_STREAM_ALL;
+  check("command_stream.txt", &packet);
+  packet = blank(0x81, 0, 0);
+  check("command_tare.txt", &packet);
+  packet = blank(0x82, 2, 20);
+  packet.body.cmd_rate.rate_mHz = WIRE_RATE_MAX_mHz;
+  check("command_rate.txt", &packet);
+  packet = blank(0x83, 3, 30);
+  packet.body.cmd_osr.osr = 8192;
+  check("command_osr.txt", &packet);
+  packet = blank(0x85, 4, 40);
+  check("command_info.txt", &packet);
+  packet = blank(0x86, 5, 50);
+  check("command_health.txt", &packet);
+  packet = blank(0x87, 6, 60);
+  packet.body.cmd_loader.magic = WIRE_LOADER_MAGIC;
+  check("command_loader.txt", &packet);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_contact);
+  RUN_TEST(test_raw);
+  RUN_TEST(test_info);
+  RUN_TEST(test_health);
+  RUN_TEST(test_acknowledgement);
+  RUN_TEST(test_commands);
+  return UNITY_END();
+}

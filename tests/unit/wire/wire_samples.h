@@ -1,0 +1,260 @@
+/* Packets of every type for the tests, and a second COBS encoder, written from the paper. */
+#ifndef WIRE_SAMPLES_H
+#define WIRE_SAMPLES_H
+
+#include "common/bytes.h"
+#include "common/crc32.h"
+#include "support/random.h"
+#include "wire/packet.h"
+
+#include <float.h>
+#include <string.h>
+
+static const uint8_t wire_types[] = {
+    WIRE_CONTACT,    WIRE_RAW,        WIRE_INFO,      WIRE_HEALTH,  WIRE_ACK,
+    WIRE_CMD_STREAM, WIRE_CMD_TARE,   WIRE_CMD_RATE,  WIRE_CMD_OSR, WIRE_CMD_SLIP,
+    WIRE_CMD_INFO,   WIRE_CMD_HEALTH, WIRE_CMD_LOADER};
+enum { WIRE_TYPES = sizeof wire_types };
+
+enum sample_kind { SAMPLE_ZERO, SAMPLE_GREATEST, SAMPLE_LEAST, SAMPLE_RANDOM, SAMPLE_KINDS };
+
+struct sampler {
+  enum sample_kind kind;
+  struct random random;
+};
+
+static inline uint32_t sample_u32(struct sampler *sampler) {
+  switch (sampler->kind) {
+  case SAMPLE_GREATEST:
+    return UINT32_MAX;
+  case SAMPLE_RANDOM:
+    return random_u32(&sampler->random) >> random_below(&sampler->random, 32);
+  default:
+    return 0;
+  }
+}
+
+static inline uint64_t sample_u64(struct sampler *sampler) {
+  uint64_t high = sample_u32(sampler);
+  return high << 32 | sample_u32(sampler);
+}
+
+static inline int32_t sample_i32(struct sampler *sampler) {
+  switch (sampler->kind) {
+  case SAMPLE_GREATEST:
+    return INT32_MAX;
+  case SAMPLE_LEAST:
+    return INT32_MIN;
+  default:
+    return (int32_t)sample_u32(sampler);
+  }
+}
+
+/* Finite: the extremes, the smallest denormal, -0 and random bits. */
+static inline float sample_f32(struct sampler *sampler) {
+  switch (sampler->kind) {
+  case SAMPLE_GREATEST:
+    return FLT_MAX;
+  case SAMPLE_LEAST:
+    return -FLT_MAX;
+  case SAMPLE_RANDOM:
+    switch (random_below(&sampler->random, 8)) {
+    case 0:
+      return -0.0f;
+    case 1:
+      return bytes_to_f32(1);
+    default: {
+      uint32_t bits = random_u32(&sampler->random);
+      return bytes_to_f32((bits & 0x7F800000u) == 0x7F800000u ? bits ^ 0x40000000u : bits);
+    }
+    }
+  default:
+    return 0.0f;
+  }
+}
+
+static inline void sample_text(struct sampler *sampler, char text[WIRE_TEXT_BYTES]) {
+  uint32_t length = sampler->kind == SAMPLE_RANDOM     ? random_below(&sampler->random, 17)
+                    : sampler->kind == SAMPLE_GREATEST ? WIRE_TEXT_BYTES
+                                                       : 0;
+  for (uint32_t i = 0; i < length; i++) {
+    text[i] = sampler->kind == SAMPLE_GREATEST
+                  ? '~'
+                  : (char)(' ' + (int)random_below(&sampler->random, '~' - ' ' + 1));
+  }
+}
+
+static inline uint8_t sample_sensor_count(struct sampler *sampler) {
+  return sampler->kind == SAMPLE_RANDOM     ? (uint8_t)(1 + random_below(&sampler->random, 32))
+         : sampler->kind == SAMPLE_GREATEST ? FT_MAX_SENSORS
+                                            : 1;
+}
+
+static inline void sample_contact(struct sampler *sampler, struct wire_contact *contact) {
+  contact->frame = sample_u32(sampler);
+  contact->flags = sample_u32(sampler);
+  contact->sensors_used = sample_u32(sampler);
+  contact->x_mm = sample_f32(sampler);
+  contact->y_mm = sample_f32(sampler);
+  contact->p0_Pa = sample_f32(sampler);
+  contact->sigma_mm = sample_f32(sampler);
+  contact->force_N = sample_f32(sampler);
+  contact->slip_mm = sample_f32(sampler);
+  contact->residual_rms_Pa = sample_f32(sampler);
+  contact->location_sd_mm = sample_f32(sampler);
+  contact->force_sd_N = sample_f32(sampler);
+  contact->stages.convert_us = (uint16_t)sample_u32(sampler);
+  contact->stages.read_us = (uint16_t)sample_u32(sampler);
+  contact->stages.queue_us = (uint16_t)sample_u32(sampler);
+  contact->stages.condition_us = (uint16_t)sample_u32(sampler);
+  contact->stages.fit_us = (uint16_t)sample_u32(sampler);
+  contact->stages.contact_us = (uint16_t)sample_u32(sampler);
+  contact->stages.total_us = (uint16_t)sample_u32(sampler);
+}
+
+static inline void sample_raw(struct sampler *sampler, struct wire_raw *raw) {
+  raw->frame = sample_u32(sampler);
+  raw->valid = sample_u32(sampler);
+  raw->saturated = sample_u32(sampler);
+  raw->temperature_cC = (int16_t)(sample_i32(sampler) >> 16);
+  raw->sensor_count = sample_sensor_count(sampler);
+  for (int k = 0; k < raw->sensor_count; k++) {
+    raw->pressure_Pa_q10[k] = sample_i32(sampler);
+    raw->baseline_Pa_q10[k] = sample_i32(sampler);
+  }
+}
+
+static inline void sample_info(struct sampler *sampler, struct wire_info *info) {
+  for (int i = 0; i < 3; i++) {
+    info->firmware_version[i] = (uint8_t)sample_u32(sampler);
+  }
+  info->sensor_count = sample_sensor_count(sampler);
+  sample_text(sampler, info->git_hash);
+  sample_text(sampler, info->board);
+  sample_text(sampler, info->scene);
+  sample_text(sampler, info->serial);
+  info->rate_mHz = sample_u32(sampler);
+  info->measured_rate_mHz = sample_u32(sampler);
+  info->osr = (uint16_t)sample_u32(sampler);
+  info->temperature_interval = (uint16_t)sample_u32(sampler);
+  info->slip_window_ms = (uint16_t)sample_u32(sampler);
+  info->fit_iterations = (uint8_t)sample_u32(sampler);
+  info->streams = (uint8_t)sample_u32(sampler);
+  info->slip_threshold_mm = sample_f32(sampler);
+  info->pitch_mm = sample_f32(sampler);
+  for (int k = 0; k < info->sensor_count; k++) {
+    info->x_mm[k] = sample_f32(sampler);
+    info->y_mm[k] = sample_f32(sampler);
+  }
+}
+
+static inline void sample_health(struct sampler *sampler, struct wire_health *health) {
+  uint32_t *counters[] = {
+      &health->uptime_s,          &health->frames,           &health->frames_incomplete,
+      &health->packets_sent,      &health->packets_dropped,  &health->commands_done,
+      &health->commands_rejected, &health->bus_nacks,        &health->bus_timeouts,
+      &health->bus_recoveries,    &health->zero_readings,    &health->fit_failures,
+      &health->sensors_present,   &health->sensors_prom_bad, &health->watchdog_resets};
+  for (size_t i = 0; i < sizeof counters / sizeof counters[0]; i++) {
+    *counters[i] = sample_u32(sampler);
+  }
+  health->cpu_busy_permille = (uint16_t)sample_u32(sampler);
+  health->stack_free_bytes = (uint16_t)sample_u32(sampler);
+}
+
+/* Every byte of the packet is defined, so that two of them may be compared as memory. */
+static inline void sample_packet(struct sampler *sampler, uint8_t type,
+                                 struct wire_packet *packet) {
+  memset(packet, 0, sizeof *packet);
+  packet->type = type;
+  packet->sequence = (uint16_t)sample_u32(sampler);
+  packet->t_us = sample_u64(sampler);
+  switch (type) {
+  case WIRE_CONTACT:
+    sample_contact(sampler, &packet->body.contact);
+    break;
+  case WIRE_RAW:
+    sample_raw(sampler, &packet->body.raw);
+    break;
+  case WIRE_INFO:
+    sample_info(sampler, &packet->body.info);
+    break;
+  case WIRE_HEALTH:
+    sample_health(sampler, &packet->body.health);
+    break;
+  case WIRE_ACK:
+    packet->body.ack.command = (uint8_t)sample_u32(sampler);
+    packet->body.ack.result = (uint8_t)sample_u32(sampler);
+    packet->body.ack.sequence = (uint16_t)sample_u32(sampler);
+    packet->body.ack.host_time_us = sample_u64(sampler);
+    break;
+  case WIRE_CMD_STREAM:
+    packet->body.cmd_stream.streams = (uint8_t)sample_u32(sampler);
+    break;
+  case WIRE_CMD_RATE:
+    packet->body.cmd_rate.rate_mHz = sample_u32(sampler);
+    break;
+  case WIRE_CMD_OSR:
+    packet->body.cmd_osr.osr = (uint16_t)sample_u32(sampler);
+    break;
+  case WIRE_CMD_SLIP:
+    packet->body.cmd_slip.threshold_mm = sample_f32(sampler);
+    packet->body.cmd_slip.window_ms = (uint16_t)sample_u32(sampler);
+    break;
+  case WIRE_CMD_LOADER:
+    packet->body.cmd_loader.magic = sample_u32(sampler);
+    break;
+  default:
+    break;
+  }
+}
+
+/* COBS by its definition: the zeros end blocks; a block of 254 bytes stands for itself. */
+static inline size_t reference_cobs(const uint8_t *from, size_t length, uint8_t *to) {
+  size_t in = 0;
+  size_t out = 0;
+  for (;;) {
+    size_t run = 0;
+    while (in + run < length && from[in + run] != 0 && run < 254) {
+      run++;
+    }
+    to[out++] = (uint8_t)(run + 1);
+    memcpy(to + out, from + in, run);
+    out += run;
+    in += run;
+    if (in == length) {
+      return out;
+    }
+    if (run < 254) {
+      in++; /* the zero */
+      if (in == length) {
+        to[out++] = 1;
+        return out;
+      }
+    }
+  }
+}
+
+/* Appends the CRC to length bytes and codes them; returns the length without a delimiter. */
+static inline size_t seal(uint8_t *bytes, size_t length, uint8_t *frame) {
+  bytes_put_u32(bytes + length, crc32_iso_hdlc(bytes, length));
+  return reference_cobs(bytes, length + WIRE_CRC_BYTES, frame);
+}
+
+/* The opposite of the coding above, for frames known to be right. */
+static inline size_t unseal(const uint8_t *frame, size_t length, uint8_t *bytes) {
+  size_t in = 0;
+  size_t out = 0;
+  while (in < length) {
+    uint8_t code = frame[in++];
+    memcpy(bytes + out, frame + in, code - 1u);
+    out += code - 1u;
+    in += code - 1u;
+    if (code != 0xFF && in < length) {
+      bytes[out++] = 0;
+    }
+  }
+  return out - WIRE_CRC_BYTES;
+}
+
+#endif
