@@ -1,0 +1,70 @@
+#!/usr/bin/env python3
+"""Checks the rules of the source tree that no compiler checks.
+
+usage: check_sources.py [ROOT]
+
+Prints one line for each violation and exits with 1 if there is any.
+"""
+import pathlib
+import re
+import sys
+
+SOURCE = {".c", ".h", ".cpp", ".hpp", ".S"}
+
+
+def strip_comments(text):
+    """Blanks comments and string literals, keeping line numbers; include lines stay."""
+
+    def blank(match):
+        return re.sub(r"[^\n]", " ", match.group(0))
+
+    lines = []
+    for line in re.sub(r"/\*.*?\*/|//[^\n]*", blank, text, flags=re.S).split("\n"):
+        if not line.lstrip().startswith("#include"):
+            line = re.sub(r'"(?:\\.|[^"\\])*"', '""', line)
+        lines.append(line)
+    return lines
+
+
+def rules_for(path):
+    """(pattern, what is wrong) that apply to this path, relative to the root."""
+    top = path.parts[0]
+    rules = [(r'#include\s+"\.\./', 'includes through "../": name the folder in CMake and in the include')]
+    if top == "firmware":
+        rules += [
+            (r"\bvolatile\b", "volatile belongs under boards/"),
+            (r"\bdouble\b", "double has no place in the firmware"),
+            (r"\b(malloc|calloc|realloc|free)\s*\(", "the firmware does not allocate"),
+            (r"#include\s+<(stdio|stdlib)\.h>", "the firmware uses no stdio and no stdlib"),
+            (r"\b0x(400|501|d00)[0-9A-Fa-f]{5}\b", "register addresses belong under boards/"),
+            (r'#include\s+"(native|rp2040|pico_mux|reference|libfingertip)/', "the firmware does not reach into boards or host tools"),
+        ]
+    return [(re.compile(pattern), message) for pattern, message in rules]
+
+
+def violations(root):
+    for folder in ("firmware", "boards", "host_tools", "tests"):
+        for path in sorted((root / folder).rglob("*")):
+            if path.suffix not in SOURCE or "node_modules" in path.parts:
+                continue
+            relative = path.relative_to(root)
+            lines = strip_comments(path.read_text(encoding="utf-8"))
+            for pattern, message in rules_for(relative):
+                for number, line in enumerate(lines, 1):
+                    if pattern.search(line):
+                        yield f"{relative}:{number}: {message}"
+            if relative.name == "main.c" and relative.parts[0] == "boards" and len(lines) >= 100:
+                yield f"{relative}: main.c only wires and stays under 100 lines; it has {len(lines)}"
+
+
+def main():
+    root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".").resolve()
+    if not (root / "firmware").is_dir():
+        sys.exit(f"check_sources: {root} has no firmware folder; give the project's root")
+    found = list(violations(root))
+    print("\n".join(found) if found else "the source tree keeps its rules")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,48 @@
+"""The source rules catch what they are for."""
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+CHECK = pathlib.Path(__file__).with_name("check_sources.py")
+
+
+class CheckSources(unittest.TestCase):
+    def check(self, path, text):
+        with tempfile.TemporaryDirectory() as root:
+            (pathlib.Path(root) / "firmware").mkdir()
+            file = pathlib.Path(root) / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text)
+            done = subprocess.run([sys.executable, CHECK, root], capture_output=True, text=True)
+            return done.returncode, done.stdout
+
+    def assert_caught(self, path, text, word):
+        code, output = self.check(path, text)
+        self.assertEqual(code, 1, output)
+        self.assertIn(f"{path}:1: ", output)
+        self.assertIn(word, output)
+
+    def test_each_rule_fires(self):
+        self.assert_caught("firmware/a/a.c", '#include "../b/b.h"\n', "../")
+        self.assert_caught("boards/a/a.c", '#include "../b/b.h"\n', "../")
+        self.assert_caught("firmware/a/a.c", "static volatile int x;\n", "volatile")
+        self.assert_caught("firmware/a/a.h", "double x;\n", "double")
+        self.assert_caught("firmware/a/a.c", "void *p = malloc (4);\n", "allocate")
+        self.assert_caught("firmware/a/a.c", "#include <stdio.h>\n", "stdio")
+        self.assert_caught("firmware/a/a.c", "int *p = (int *)0x40044000;\n", "register")
+        self.assert_caught("firmware/a/a.c", '#include "rp2040/i2c.h"\n', "boards")
+
+    def test_comments_and_strings_are_free(self):
+        code, output = self.check("firmware/a/a.c", '/* double\n volatile */ // malloc(1)\nchar s[] = "double";\n')
+        self.assertEqual(code, 0, output)
+
+    def test_a_long_main_is_caught(self):
+        code, output = self.check("boards/x/main.c", "\n" * 120)
+        self.assertEqual(code, 1)
+        self.assertIn("under 100 lines", output)
+
+
+if __name__ == "__main__":
+    unittest.main()
