@@ -1,0 +1,265 @@
+"""The files of the Fingertip tools: scenarios, recordings, run reports. One reader for each.
+
+Scenario (CSV, UTF-8): what the sensors feel.
+    # fingertip-scenario 1
+    # key: value              name, description, ambient_Pa, temperature_degC, sensors
+    t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip,s0_Pa,...,s14_Pa
+One row each millisecond, t_s strictly increasing from 0 = power-on; linear between rows. s<k>_Pa is the pressure
+above ambient on sensor k. contact .. slip are the truth.
+
+Recording (CSV, UTF-8): what a fingertip said, written by `fingertip record`; one row per frame.
+    # fingertip-recording 1
+    # key: value              serial, board, scene, firmware, git, rate_mHz, osr, slip_window_ms, x_mm, ...
+    t_us,frame,...            device time; see RECORDING_COLUMNS, then s<k>_Pa (absolute) and tare<k>_Pa
+    # health: ... | # ack: ... | # info: ... | # event: ...     between the rows
+    # end: key=value ...      counts of the whole recording; absent if the recorder was killed
+Cells of a packet that did not come are empty, and NaN here.
+
+Run report (JSON): what the emulator measured; used are device_time_zero_s and warnings.
+
+Every error is an InputError whose text is one line that names file and line and says what to do.
+"""
+import json
+import math
+import sys
+
+import numpy as np
+
+PITCH_mm = 9.0
+# Sensor k = 5 * strip + position along the strip; origin in the centre of the pad.
+SENSOR_X_mm = np.repeat(np.arange(-1, 2), 5) * PITCH_mm
+SENSOR_Y_mm = np.tile(np.arange(-2, 3), 3) * PITCH_mm
+SLIP_SPEED_mm_s = 10.0
+
+TRUTH_COLUMNS = ("contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip")
+STAGES = ("convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us")
+CONTACT_COLUMNS = (
+    "sequence", "flags", "sensors_used", "x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N", "slip_mm", "residual_rms_Pa",
+    "location_sd_mm", "force_sd_N", *STAGES, "total_us")
+RAW_COLUMNS = ("raw_sequence", "valid", "saturated", "temperature_degC")
+RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *RAW_COLUMNS)
+
+# Flag bits of the contact packet, firmware/wire/PROTOCOL.md.
+CONTACT, FIT_VALID, SLIP = 1 << 0, 1 << 1, 1 << 4
+
+
+class InputError(Exception):
+    """Something the user can mend; one line."""
+
+
+def run_tool(name, main):
+    """Exit status of a command line tool: 0, or 1 after one line on stderr."""
+    try:
+        return main(sys.argv[1:])
+    except InputError as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return 1
+
+
+def read_lines(path):
+    try:
+        with open(path, encoding="utf-8") as file:
+            return file.read().split("\n")
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}; check the path") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: no text file; give a CSV file") from None
+
+
+def write_text(path, text):
+    try:
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}; choose another place") from None
+
+
+def _number(path, line, column, cell, empty_allowed):
+    if cell == "" and empty_allowed:
+        return math.nan
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f'{path}:{line}: column {column} is "{cell}"; a finite number is needed')
+    return value
+
+
+def _check_kind(path, lines, kind):
+    first = lines[0].strip().split()
+    if first[:2] != ["#", f"fingertip-{kind}"] or len(first) != 3:
+        raise InputError(f'{path}:1: no {kind}; its first line must be "# fingertip-{kind} 1"')
+    if first[2] != "1":
+        raise InputError(f"{path}:1: {kind} format {first[2]} is unknown; this tool reads format 1")
+
+
+def _metadata(line):
+    key, separator, value = line[1:].partition(":")
+    return (key.strip(), value.strip()) if separator else (None, None)
+
+
+class Scenario:
+    """t_s[n], the TRUTH_COLUMNS as arrays[n], sensors_Pa[n][sensor], metadata."""
+
+    def __init__(self, metadata, table, sensors):
+        self.metadata = metadata
+        self.t_s = table[:, 0]
+        self.truth = {name: table[:, 1 + i] for i, name in enumerate(TRUTH_COLUMNS)}
+        self.sensors_Pa = table[:, 1 + len(TRUTH_COLUMNS):1 + len(TRUTH_COLUMNS) + sensors]
+
+    def at(self, name, t_s):
+        """The truth at these times, linear between rows."""
+        return np.interp(t_s, self.t_s, self.truth[name])
+
+    def is_on(self, name, t_s):
+        """True where contact or slip is on at both rows around each time."""
+        return self.at(name, t_s) > 1 - 1e-9
+
+    def is_off(self, name, t_s):
+        return self.at(name, t_s) < 1e-9
+
+    def intervals(self, name):
+        """(start_s, end_s) of every run of rows in which contact or slip is on."""
+        on = np.concatenate(([0], (self.truth[name] > 0.5).astype(int), [0]))
+        starts, ends = np.flatnonzero(np.diff(on) == 1), np.flatnonzero(np.diff(on) == -1) - 1
+        return [(float(self.t_s[a]), float(self.t_s[b])) for a, b in zip(starts, ends)]
+
+
+def read_scenario(path):
+    lines = read_lines(path)
+    _check_kind(path, lines, "scenario")
+    metadata, header, rows, sensors = {}, None, [], 0
+    for number, line in enumerate(lines[1:], 2):
+        line = line.strip()
+        if not line:
+            continue
+        if line.startswith("#"):
+            key, value = _metadata(line)
+            if key:
+                metadata[key] = value
+            continue
+        cells = [cell.strip() for cell in line.split(",")]
+        if header is None:
+            header = cells
+            sensors = sum(name.startswith("s") and name[1:].removesuffix("_Pa").isdigit() for name in cells)
+            expected = ["t_s", *TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(sensors))]
+            if cells[:len(expected)] != expected or not sensors or cells[len(expected):] not in ([], ["temperature_degC"]):
+                raise InputError(f"{path}:{number}: wrong header; it must be {','.join(['t_s', *TRUTH_COLUMNS])},s0_Pa,...")
+            continue
+        if len(cells) != len(header):
+            raise InputError(f"{path}:{number}: {len(cells)} columns where the header has {len(header)}; write the scenario anew")
+        row = [_number(path, number, name, cell, False) for name, cell in zip(header, cells)]
+        if row[0] < 0:
+            raise InputError(f"{path}:{number}: t_s is {cells[0]}; time starts at 0")
+        if rows and row[0] <= rows[-1][0]:
+            raise InputError(f"{path}:{number}: t_s {cells[0]} does not increase; sort the rows by time")
+        rows.append(row)
+    if not rows:
+        raise InputError(f"{path}: no rows; write the scenario anew")
+    return Scenario(metadata, np.array(rows), sensors)
+
+
+def write_scenario(path, metadata, columns):
+    """columns: t_s, the TRUTH_COLUMNS, and sensors_Pa[n][sensor]."""
+    sensors = columns["sensors_Pa"].shape[1]
+    header = ["t_s", *TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(sensors))]
+    formats = ["%.3f", "%d", "%.4f", "%.4f", "%.5f", "%.3f", "%.3f", "%d"] + ["%.3f"] * sensors
+    table = np.column_stack([columns["t_s"], *(columns[name] for name in TRUTH_COLUMNS), columns["sensors_Pa"]])
+    row_format = ",".join(formats)
+    text = ["# fingertip-scenario 1", *(f"# {key}: {value}" for key, value in metadata.items()), ",".join(header)]
+    text += [(row_format % tuple(row)).replace("-0.0000", "0.0000") for row in table.tolist()]
+    write_text(path, "\n".join(text) + "\n")
+
+
+class Recording:
+    """metadata, columns (name -> array[n], NaN where empty), sensors_Pa and tare_Pa [n][sensor], events, end."""
+
+    def __init__(self, metadata, names, table, sensors, events, end, skipped_lines):
+        self.metadata = metadata
+        self.columns = {name: table[:, i] for i, name in enumerate(names[:len(RECORDING_COLUMNS)])}
+        first = len(RECORDING_COLUMNS)
+        self.sensors_Pa = table[:, first:first + sensors]
+        self.tare_Pa = table[:, first + sensors:first + 2 * sensors]
+        self.events = events
+        self.end = end
+        self.skipped_lines = skipped_lines
+
+    def __getitem__(self, name):
+        return self.columns[name]
+
+    @property
+    def has_contact(self):
+        return ~np.isnan(self["flags"])
+
+    def flag(self, bit):
+        return (np.nan_to_num(self["flags"]).astype(np.int64) & bit) != 0
+
+
+def _end_counts(path, number, text):
+    counts = {}
+    for pair in text.split():
+        key, separator, value = pair.partition("=")
+        if not separator:
+            raise InputError(f'{path}:{number}: "{pair}" is not key=value; use --salvage to skip the line')
+        counts[key] = value
+    return counts
+
+
+def read_recording(path, salvage=False):
+    lines = read_lines(path)
+    _check_kind(path, lines, "recording")
+    complete = lines[-1] == ""
+    metadata, header, rows, events, end, skipped, sensors = {}, None, [], [], {}, 0, 0
+    advice = "use --salvage to skip damaged lines"
+    for number, line in enumerate(lines[1:], 2):
+        if not line.strip():
+            continue
+        try:
+            if number == len(lines) and not complete:
+                raise InputError(f"{path}:{number}: the last line is torn; {advice}")
+            if line.startswith("#"):
+                key, value = _metadata(line)
+                if key == "end":
+                    end = _end_counts(path, number, value)
+                elif key == "event":
+                    events.append(value)
+                elif key and header is None:
+                    metadata[key] = value
+                continue
+            cells = line.split(",")
+            if header is None:
+                sensors = (len(cells) - len(RECORDING_COLUMNS)) // 2
+                expected = [*RECORDING_COLUMNS, *(f"s{k}_Pa" for k in range(sensors)), *(f"tare{k}_Pa" for k in range(sensors))]
+                if cells != expected:
+                    raise InputError(f"{path}:{number}: wrong header; record anew with this version of fingertip")
+                header = cells
+                continue
+            if len(cells) != len(header):
+                raise InputError(f"{path}:{number}: {len(cells)} columns where the header has {len(header)}; {advice}")
+            row = [_number(path, number, name, cell, i >= 2) for i, (name, cell) in enumerate(zip(header, cells))]
+            if row[0] < 0:
+                raise InputError(f"{path}:{number}: t_us is {cells[0]}; device time starts at 0; {advice}")
+            rows.append(row)
+        except InputError:
+            if not salvage or header is None:
+                raise
+            skipped += 1
+    if header is None:
+        raise InputError(f"{path}: no header line; record anew")
+    if not rows:
+        raise InputError(f"{path}: no frames; record again while the fingertip streams")
+    return Recording(metadata, header, np.array(rows), sensors, events, end, skipped)
+
+
+def read_run(path):
+    """The emulator's report; without a file an empty one."""
+    if path is None:
+        return {}
+    try:
+        run = json.loads("\n".join(read_lines(path)))
+    except json.JSONDecodeError as error:
+        raise InputError(f"{path}:{error.lineno}: no JSON ({error.msg}); run the emulator anew") from None
+    if not isinstance(run, dict):
+        raise InputError(f"{path}: no run report; give the emulator's --report file")
+    return run

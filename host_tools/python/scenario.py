@@ -1,0 +1,154 @@
+#!/usr/bin/python3
+"""Writes a scenario: what the fifteen sensors feel over time, and the truth behind it.
+
+    scenario.py NAME -o FILE.csv [--seconds S] [--seed N]
+
+ideal   ideal Gaussian presses (sigma 5.7 mm) of 0.5 to 20 N at random places of the array; no slip
+demo    taps of different force and place, two slips, a figure-eight stroke; 10 s
+slip20  presses that slip at 20 to 200 mm/s, for the slip measure at 20 frames a second
+
+The pressure is the Gaussian of De Clercq et al., RA-L 2022, eq. (2), and the force its integral, eq. (4):
+F = 2 pi p0 sigma^2. slip is 1 while the contact moves faster than 10 mm/s. The same name, length and seed
+give the same bytes. The file format is described in fingertip_files.py.
+"""
+import argparse
+import sys
+
+import numpy as np
+
+from fingertip_files import SENSOR_X_mm, SENSOR_Y_mm, SLIP_SPEED_mm_s, InputError, run_tool, write_scenario
+
+STEP_s = 1e-3
+SIGMA_mm = 5.7
+QUIET_s = 0.5  # without contact, for the tare
+
+DESCRIPTIONS = {
+    "ideal": "ideal Gaussian presses at random places, forces log-uniform from 0.5 to 20 N",
+    "demo": "three taps, slips at 40 and 80 mm/s, a figure-eight stroke",
+    "slip20": "presses that slip along y at 20, 50, 100, 150 and 200 mm/s",
+}
+SECONDS = {"ideal": 20.0, "demo": 10.0, "slip20": 12.0}
+
+
+def smooth_step(t, start, length):
+    """0 before start, 1 after start + length, a raised cosine between."""
+    u = np.clip((t - start) / length, 0.0, 1.0)
+    return 0.5 - 0.5 * np.cos(np.pi * u)
+
+
+class Motion:
+    """Force and place over time, put together from presses and moves."""
+
+    def __init__(self, seconds):
+        self.t_s = np.arange(int(round(seconds / STEP_s)) + 1) * STEP_s
+        self.force_N = np.zeros_like(self.t_s)
+        self.x_mm = np.zeros_like(self.t_s)
+        self.y_mm = np.zeros_like(self.t_s)
+
+    def press(self, start_s, end_s, force_N, x_mm, y_mm, ramp_s):
+        """One contact from start to end, the ramps included; x_mm and y_mm are its place at its start."""
+        t = self.t_s
+        self.force_N += force_N * smooth_step(t, start_s, ramp_s) * (1 - smooth_step(t, end_s - ramp_s, ramp_s))
+        inside = (t >= start_s) & (t <= end_s)
+        self.x_mm[inside] = x_mm
+        self.y_mm[inside] = y_mm
+
+    def slide(self, start_s, press_end_s, direction, speed_mm_s, length_mm):
+        """Moves at constant speed, between accelerations of 10 ms, and stays at the end until the press ends."""
+        t = self.t_s
+        accelerate_s = 0.01
+        cruise_s = length_mm / speed_mm_s - accelerate_s
+        if cruise_s <= 0:
+            raise ValueError("the slide is shorter than its accelerations")
+        times = [start_s, start_s + accelerate_s, start_s + accelerate_s + cruise_s, start_s + 2 * accelerate_s + cruise_s]
+        speed = np.interp(t, times, [0, speed_mm_s, speed_mm_s, 0])
+        way = np.concatenate(([0], np.cumsum((speed[1:] + speed[:-1]) / 2 * STEP_s)))
+        inside = (t >= start_s) & (t <= press_end_s)
+        unit = np.asarray(direction, float) / np.hypot(*direction)
+        self.x_mm[inside] += unit[0] * way[inside]
+        self.y_mm[inside] += unit[1] * way[inside]
+        return times[-1]
+
+    def columns(self, sigma_mm=SIGMA_mm):
+        """The columns of the scenario file."""
+        contact = self.force_N > 0
+        force = np.where(contact, self.force_N, 0)
+        x = np.where(contact, self.x_mm, 0)
+        y = np.where(contact, self.y_mm, 0)
+        p0 = force / (2 * np.pi * (sigma_mm * 1e-3) ** 2)
+        speed = np.hypot(np.gradient(self.x_mm, STEP_s), np.gradient(self.y_mm, STEP_s))
+        steady = contact & np.roll(contact, 1) & np.roll(contact, -1)
+        slip = steady & (speed > SLIP_SPEED_mm_s)
+        distance2 = (SENSOR_X_mm[None, :] - x[:, None]) ** 2 + (SENSOR_Y_mm[None, :] - y[:, None]) ** 2
+        sensors = p0[:, None] * np.exp(-0.5 * distance2 / sigma_mm**2)
+        return {
+            "t_s": self.t_s, "contact": contact, "x_mm": x, "y_mm": y, "force_N": force, "p0_Pa": p0,
+            "sigma_mm": np.where(contact, sigma_mm, 0), "slip": slip, "sensors_Pa": sensors,
+        }
+
+
+def ideal(seconds, random):
+    motion = Motion(seconds)
+    start, ramp, hold = QUIET_s, 0.15, 0.1
+    while start + 2 * ramp + hold <= seconds:
+        force = 0.5 * (20 / 0.5) ** random.random()
+        x, y = random.uniform(-9, 9), random.uniform(-18, 18)
+        motion.press(start, start + 2 * ramp + hold, force, x, y, ramp)
+        start += 2 * ramp + hold + random.uniform(0.1, 0.2)
+    return motion
+
+
+def demo(seconds, random):
+    del random
+    motion = Motion(seconds)
+    for start, force, x, y in [(0.7, 1.0, -6, 12), (1.2, 4.0, 7, -9), (1.7, 14.0, 1, 3)]:
+        motion.press(start, start + 0.4, force, x, y, 0.12)
+    motion.press(2.4, 5.2, 8.0, -4, -9, 0.2)
+    motion.slide(3.2, 5.2, (0, 1), 40, 12)
+    motion.slide(4.2, 5.2, (3, -4), 80, 16)
+    motion.press(5.7, 9.4, 6.0, 0, 0, 0.2)
+    inside = (motion.t_s >= 5.7) & (motion.t_s <= 9.4)
+    phase = 2 * np.pi * smooth_step(motion.t_s[inside], 6.0, 3.1)
+    motion.x_mm[inside] = 7 * np.sin(2 * phase)
+    motion.y_mm[inside] = 15 * np.sin(phase)
+    return motion
+
+
+def slip20(seconds, random):
+    del random
+    motion = Motion(seconds)
+    start = QUIET_s
+    for speed in (20, 50, 100, 150, 200):
+        length = 28.0
+        end = start + 0.3 + 0.4 + length / speed + 0.01 + 0.4 + 0.3
+        motion.press(start, end, 6.0, 0, -14, 0.3)
+        motion.slide(start + 0.7, end, (0, 1), speed, length)
+        start = end + 0.3
+    return motion
+
+
+def main(argv):
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("name", choices=sorted(DESCRIPTIONS), metavar="NAME", help="ideal, demo or slip20")
+    parser.add_argument("-o", "--output", required=True, metavar="FILE.csv")
+    parser.add_argument("--seconds", type=float, metavar="S", help="length; default: that of the scenario")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the random places and forces; default 1")
+    options = parser.parse_args(argv)
+    seconds = SECONDS[options.name] if options.seconds is None else options.seconds
+    if not 1 <= seconds <= 3600:
+        raise InputError(f"--seconds {seconds:g} is out of range; give 1 to 3600")
+    if options.seed < 0:
+        raise InputError(f"--seed {options.seed} is out of range; give 0 or more")
+    make = {"ideal": ideal, "demo": demo, "slip20": slip20}[options.name]
+    motion = make(seconds, np.random.default_rng(options.seed))
+    metadata = {
+        "name": options.name, "description": DESCRIPTIONS[options.name], "seed": options.seed,
+        "ambient_Pa": 101325, "temperature_degC": 25, "sensors": len(SENSOR_X_mm),
+    }
+    write_scenario(options.output, metadata, motion.columns())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run_tool("scenario.py", main))
