@@ -10,7 +10,7 @@ set(CMAKE_C_COMPILER ${FINGERTIP_ARM_GCC})
 set(CMAKE_ASM_COMPILER ${FINGERTIP_ARM_GCC})
 set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
 
-set(CMAKE_C_FLAGS_INIT "-mcpu=cortex-m0plus -mthumb -ffunction-sections -fdata-sections -fno-common")
+set(CMAKE_C_FLAGS_INIT "-mcpu=cortex-m0plus -mthumb -ffunction-sections -fdata-sections -fno-common -fstack-usage")
 set(CMAKE_ASM_FLAGS_INIT "-mcpu=cortex-m0plus -mthumb")
 set(CMAKE_C_FLAGS_RELEASE_INIT "-O2 -g")
 set(CMAKE_C_FLAGS_RELEASE "-O2 -g" CACHE STRING "")
