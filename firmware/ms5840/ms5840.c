@@ -45,14 +45,10 @@ uint8_t ms5840_prom_crc4(const struct ms5840_prom *prom) {
 }
 
 enum ms5840_prom_state ms5840_check_prom(const struct ms5840_prom *prom) {
-  bool all_zero = true;
-  bool all_ones = true;
-  for (int i = 0; i < MS5840_PROM_WORDS; i++) {
-    all_zero = all_zero && prom->word[i] == 0;
-    all_ones = all_ones && prom->word[i] == 0xFFFF;
-  }
-  if (all_zero || all_ones) {
-    return MS5840_PROM_BLANK;
+  for (int i = 1; i < MS5840_PROM_WORDS; i++) {
+    if (prom->word[i] == 0 || prom->word[i] == 0xFFFF) {
+      return MS5840_PROM_BLANK;
+    }
   }
   return ms5840_prom_crc4(prom) == prom->word[0] >> 12 ? MS5840_PROM_GOOD : MS5840_PROM_CRC_DIFFERS;
 }

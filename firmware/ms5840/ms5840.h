@@ -52,7 +52,8 @@ uint8_t ms5840_crc4_bytes(const uint8_t bytes[16]);
 enum ms5840_prom_state {
   MS5840_PROM_GOOD,
   MS5840_PROM_CRC_DIFFERS, /* usable: one genuine part is known with a wrong nibble */
-  MS5840_PROM_BLANK,       /* all 0 or all ones: not a calibration */
+  MS5840_PROM_BLANK,       /* a coefficient of 0 or all ones: what an unloaded sensor or a silent
+                              line gives, and the CRC lets one such PROM in sixteen pass */
 };
 enum ms5840_prom_state ms5840_check_prom(const struct ms5840_prom *prom);
 

@@ -13,6 +13,8 @@
 #define RETRY_TEMPERATURE_FRAMES 8u
 /* How soon a full slot is looked at again. */
 #define SLOT_POLL_us 50u
+/* How soon a new rate is noticed while waiting for the next frame of the old one. */
+#define RATE_POLL_us 10000u
 #define RECOVERY_DELAY_MIN_us 10000u
 #define RECOVERY_DELAY_MAX_us 1000000u
 /* Transitions in one call: enough for the longest run of states that take no time. */
@@ -136,6 +138,7 @@ static void end_prom_pass(struct scan *scan) {
   }
   uint32_t admitted = scan->prom_good | differs;
   if (admitted == all_sensors(scan)) {
+    scan->next_admission_us -= scan->admission_interval_us - ADMISSION_INTERVAL_MIN_us;
     scan->admission_interval_us = ADMISSION_INTERVAL_MIN_us;
   } else if (scan->admission_interval_us < ADMISSION_INTERVAL_MAX_us) {
     scan->admission_interval_us *= 2;
@@ -149,13 +152,7 @@ static void end_prom_pass(struct scan *scan) {
 static void take_prom_word(struct scan *scan) {
   for (uint8_t k = 0; k < scan->sensor_count; k++) {
     const uint8_t *bytes = scan->result.bytes[k];
-    uint16_t word = (uint16_t)(bytes[0] << 8 | bytes[1]);
-    scan->prom_read[k].word[scan->prom_word] = word;
-    /* No coefficient, but what a silent bus or an unloaded sensor gives; the CRC lets one such word
-     * in sixteen pass. */
-    if (scan->prom_word > 0 && (word == 0 || word == 0xFFFF)) {
-      scan->prom_answered &= ~(UINT32_C(1) << k);
-    }
+    scan->prom_read[k].word[scan->prom_word] = (uint16_t)(bytes[0] << 8 | bytes[1]);
   }
   scan->prom_answered &= scan->result.acknowledged;
   scan->prom_word++;
@@ -221,7 +218,8 @@ static void leave_idle(struct scan *scan, uint64_t now_us) {
       scan->next_frame_us = now_us; /* the rate was raised */
     }
     if (now_us < scan->next_frame_us) {
-      scan->wait_until_us = scan->next_frame_us;
+      uint64_t look_us = now_us + RATE_POLL_us;
+      scan->wait_until_us = scan->next_frame_us < look_us ? scan->next_frame_us : look_us;
       return;
     }
     bool late = now_us - scan->next_frame_us > period_us;

@@ -108,7 +108,7 @@ struct scan {
   /* Written by the event context, readable from any. */
   _Atomic uint32_t present;  /* bitmap: acknowledged at the last attempt */
   _Atomic uint32_t admitted; /* bitmap */
-  _Atomic uint32_t prom_bad; /* bitmap: CRC differs after all attempts */
+  _Atomic uint32_t prom_bad; /* bitmap: after all attempts its CRC differs, or it is blank */
   struct scan_counters counters;
 
   /* Main context only. */
@@ -128,7 +128,8 @@ uint64_t scan_step(struct scan *scan, uint64_t now_us);
  * been used up). */
 bool scan_take(struct scan *scan, struct frame *frame);
 
-/* Main context. Effective from the next frame. FT_ERR_ARGUMENT. */
+/* Main context. Effective from the next frame, for which the old rate's pause is cut short.
+ * FT_ERR_ARGUMENT. */
 enum ft_status scan_set_osr(struct scan *scan, uint16_t osr);
 void scan_set_rate_mHz(struct scan *scan, uint32_t rate_mHz);
 

@@ -169,12 +169,18 @@ static void test_blank_proms(void) {
   struct ms5840_prom prom = {{0}};
   TEST_ASSERT_EQUAL_HEX8(0, ms5840_prom_crc4(&prom)); /* the CRC alone would accept it */
   TEST_ASSERT_EQUAL_INT(MS5840_PROM_BLANK, ms5840_check_prom(&prom));
-  prom.word[6] = 1;
-  TEST_ASSERT_NOT_EQUAL_INT(MS5840_PROM_BLANK, ms5840_check_prom(&prom));
   memset(&prom, 0xFF, sizeof prom);
   TEST_ASSERT_EQUAL_INT(MS5840_PROM_BLANK, ms5840_check_prom(&prom));
-  prom.word[0] = 0xFFFE;
-  TEST_ASSERT_NOT_EQUAL_INT(MS5840_PROM_BLANK, ms5840_check_prom(&prom));
+  for (int word = 0; word < MS5840_PROM_WORDS; word++) {
+    static const uint16_t values[] = {0, 1, 0xFFFE, 0xFFFF};
+    for (int i = 0; i < 4; i++) {
+      prom = example;
+      prom.word[word] = values[i];
+      bool blank = word > 0 && (i == 0 || i == 3);
+      prom.word[0] = (uint16_t)((prom.word[0] & 0x0FFF) | ms5840_prom_crc4(&prom) << 12);
+      TEST_ASSERT_EQUAL_INT(blank ? MS5840_PROM_BLANK : MS5840_PROM_GOOD, ms5840_check_prom(&prom));
+    }
+  }
 }
 
 static void test_worked_example(void) {
