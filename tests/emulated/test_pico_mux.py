@@ -1,0 +1,165 @@
+"""The release image of pico_mux in the emulator: accuracy, repeatability, timing, faults.
+
+usage: test_pico_mux.py --image F.bin --fingertip TOOL --node NODE
+"""
+import argparse
+import csv
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "host_tools" / "python"))
+import fingertip_files  # noqa: E402
+
+TOOLS = argparse.Namespace()
+FLAG_CONTACT = 1 << 0
+FLAG_FIT_VALID = 1 << 1
+FLAG_SENSOR_MASKED = 1 << 14
+
+
+def encoded(*command):
+    done = subprocess.run([TOOLS.fingertip, "encode", *command], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+class Run:
+    """One run of the image: starts at once, waits on demand."""
+
+    def __init__(self, folder, name, scenario, seconds=None, commands=(), faults=None, logs=False):
+        self.base = pathlib.Path(folder) / name
+        script = [(0.45, "dtr 1"), (0.46, encoded("stream", "contact,raw,health")), *commands]
+        self.path("script").write_text("".join(f"{t} {what}\n" for t, what in script))
+        call = [TOOLS.node, str(ROOT / "host_tools/emulator/main.mjs"), "--board", "pico_mux", "--image", TOOLS.image,
+                "--scenario", str(scenario), "--host-script", str(self.path("script")), "--capture", str(self.path("ftr")),
+                "--report", str(self.path("run.json"))]
+        if seconds:
+            call += ["--seconds", str(seconds)]
+        if faults is not None:
+            self.path("faults.json").write_text(json.dumps(faults))
+            call += ["--faults", str(self.path("faults.json"))]
+        if logs:
+            call += ["--bus-log", str(self.path("bus.csv")), "--usb-log", str(self.path("usb.csv"))]
+        self.process = subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+    def path(self, suffix):
+        return self.base.with_suffix("." + suffix)
+
+    def finish(self):
+        output, _ = self.process.communicate()
+        if self.process.returncode != 0:
+            raise AssertionError(f"the emulator found something wrong:\n{output}")
+        self.report = json.loads(self.path("run.json").read_text())
+        subprocess.run([TOOLS.fingertip, "replay", str(self.path("ftr")), "--to-csv", str(self.path("csv"))],
+                       check=True, capture_output=True)
+        self.recording = fingertip_files.read_recording(self.path("csv"))
+        return self
+
+
+def make_scenario(folder, name, seconds):
+    path = pathlib.Path(folder) / f"{name}.csv"
+    subprocess.run([sys.executable, str(ROOT / "host_tools/python/scenario.py"), name, "-o", str(path), "--seconds",
+                    str(seconds)], check=True)
+    return path
+
+
+class PicoMux(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.scenario = make_scenario(cls.folder.name, "ideal", 12)
+        runs = [Run(cls.folder.name, "first", cls.scenario, logs=True), Run(cls.folder.name, "second", cls.scenario)]
+        cls.first, cls.second = [run.finish() for run in runs]
+
+    def test_ideal_presses_are_located_and_weighed(self):
+        out = self.first.path("summary.json")
+        subprocess.run([sys.executable, str(ROOT / "host_tools/python/evaluate.py"), str(self.first.path("csv")),
+                        str(self.scenario), "--run", str(self.first.path("run.json")), "-o", str(out)], check=True)
+        summary = json.loads(out.read_text())
+        self.assertLessEqual(summary["localisation_median_mm"], 0.05)
+        self.assertLessEqual(summary["force_mape_percent"], 1.0)
+        self.assertGreaterEqual(summary["frames_per_s"], 100)
+        self.assertGreater(summary["fitted_frames"], 500)
+        for nothing in ("dropped_packets", "crc_errors", "emulator_warnings"):
+            self.assertEqual(summary[nothing], 0, nothing)
+
+    def test_two_runs_are_the_same_to_the_byte(self):
+        self.assertEqual(self.first.path("ftr").read_bytes(), self.second.path("ftr").read_bytes())
+        self.assertEqual(self.first.report["cycles"], self.second.report["cycles"])
+
+    def test_stage_timings_are_those_of_the_bus(self):
+        """convert and read against the bus itself, and the six stages against their total."""
+        zero_us = self.first.report["device_time_zero_s"] * 1e6
+        with open(self.first.path("bus.csv"), newline="") as file:
+            transfers = list(csv.DictReader(file))
+        start_us = [float(row["start_ns"]) / 1e3 - zero_us for row in transfers]
+        end_us = [float(row["end_ns"]) / 1e3 - zero_us for row in transfers]
+        conversions = [i for i, row in enumerate(transfers)
+                       if row["address"] == "0x76" and row["rw"] == "w" and row["bytes"] == "44"]
+        recording = self.first.recording
+        checked = 0
+        for row in range(len(recording["t_us"])):
+            stages = [recording[name][row] for name in fingertip_files.STAGES]
+            if not all(stage == stage for stage in stages):
+                continue  # no contact packet for this frame
+            self.assertEqual(sum(stages), recording["total_us"][row])
+            t_us = recording["t_us"][row]
+            command = max((i for i in conversions if end_us[i] <= t_us), default=None)
+            self.assertIsNotNone(command)
+            # The middle of the conversion, as the datasheet's maximum and its margin have it.
+            self.assertLess(abs(t_us - end_us[command] - 1.05 * 2170 / 2), 20)
+            convert_us, read_us = stages[0], stages[1]
+            begin_us = start_us[command - 3]  # three selections lead up to the broadcast
+            reads = [i for i in range(command, min(command + 60, len(transfers)))
+                     if transfers[i]["rw"] == "r" and start_us[i] < begin_us + convert_us + read_us + 100]
+            self.assertEqual(len(reads), 15)
+            self.assertLess(abs(end_us[reads[-1]] - begin_us - convert_us - read_us), 40)
+            checked += 1
+        self.assertGreater(checked, 1000)
+
+    def test_a_sensor_that_dies_is_masked_and_comes_back(self):
+        faults = [{"type": "sensor_dead", "sensor": 7, "from_s": 1.0, "to_s": 1.5}]
+        recording = Run(self.folder.name, "dead", self.scenario, 4, faults=faults).finish().recording
+        t_s = recording["t_us"] * 1e-6
+        valid = recording["valid"].astype("uint32")
+        dead = (t_s > 1.05) & (t_s < 1.45)
+        self.assertTrue((valid[dead] == 0x7FFF & ~(1 << 7)).all())
+        self.assertTrue((valid[t_s > 3.0] == 0x7FFF).all())
+        flags = recording["flags"].astype("uint32")
+        in_contact = dead & (flags & FLAG_CONTACT != 0)
+        self.assertGreater(in_contact.sum(), 0)
+        self.assertTrue((flags[in_contact] & FLAG_SENSOR_MASKED != 0).all())
+
+    def test_a_stuck_bus_recovers(self):
+        faults = [{"type": "sda_stuck_low", "sensor": 3, "from_s": 1.0, "to_s": 3.0},
+                  {"type": "mux_stuck", "mux": 1, "from_s": 2.0, "to_s": 3.0}]
+        recording = Run(self.folder.name, "stuck", self.scenario, 4, faults=faults).finish().recording
+        t_s = recording["t_us"] * 1e-6
+        self.assertGreater(((t_s > 1.2) & (t_s < 1.9)).sum(), 50)
+        self.assertTrue((recording["valid"].astype("uint32")[t_s > 3.5] == 0x7FFF).all())
+        self.assertGreater(((t_s > 3.5) & (t_s < 4.0)).sum(), 40)
+
+    def test_the_rate_of_the_paper(self):
+        commands = [(0.5, encoded("rate", "20"))]
+        recording = Run(self.folder.name, "slow", self.scenario, 3, commands=commands).finish().recording
+        t_us = recording["t_us"]
+        steps = (t_us[1:] - t_us[:-1])[t_us[:-1] > 600000]
+        self.assertGreater(len(steps), 40)
+        self.assertLess(abs(steps - 50000).max(), 20)
+
+    def test_the_loader_is_entered_on_command(self):
+        run = Run(self.folder.name, "loader", self.scenario, 3, commands=[(0.8, encoded("loader"))]).finish()
+        self.assertIn("loader", run.report["end_reason"])
+        self.assertLess(run.report["emulated_s"], 1.0)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    for name in ("image", "fingertip", "node"):
+        parser.add_argument(f"--{name}", required=True)
+    _, rest = parser.parse_known_args(namespace=TOOLS)
+    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
