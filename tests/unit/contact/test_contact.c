@@ -1,0 +1,153 @@
+#include "common/contact_flags.h"
+#include "contact/contact.h"
+
+#include <string.h>
+#include <unity.h>
+
+#define GOOD_FIT (CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID)
+
+static const struct contact_settings settings = {.slip_threshold_mm = 0.75f,
+                                                 .slip_window_us = 100000};
+static struct slip_history history;
+static struct fit_result fit;
+static struct contact_input input;
+static struct contact_result result;
+
+void setUp(void) {
+  slip_reset(&history);
+  memset(&fit, 0, sizeof fit);
+  fit.flags = GOOD_FIT;
+  fit.used = 0x7FFF;
+  input = (struct contact_input){.contact = true, .tared = true, .fit = &fit};
+}
+
+void tearDown(void) {}
+
+static uint32_t update(void) {
+  memset(&result, 0xA5, sizeof result);
+  input.t_us += 50000;
+  contact_update(&history, &settings, &input, &result);
+  return result.flags;
+}
+
+static void fill_history(void) {
+  update();
+  update();
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SLIP_VALID, update());
+}
+
+static void test_nothing_fitted(void) {
+  input = (struct contact_input){.fit = NULL};
+  TEST_ASSERT_EQUAL_HEX32(0, update());
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, result.slip_mm);
+  input.contact = true;
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_CONTACT, update());
+  input.contact = false;
+  input.tared = true;
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TARED, update());
+}
+
+static void test_flags_of_the_fit_pass(void) {
+  static const uint32_t flags[] = {CONTACT_FLAG_LOW_SIGNAL,    CONTACT_FLAG_FLAT,
+                                   CONTACT_FLAG_UNCERTAIN,     CONTACT_FLAG_MODEL,
+                                   CONTACT_FLAG_SENSOR_MASKED, CONTACT_FLAG_AT_BOUND};
+  for (size_t i = 0; i < sizeof flags / sizeof flags[0]; i++) {
+    setUp();
+    fit.flags = GOOD_FIT | flags[i];
+    TEST_ASSERT_EQUAL_HEX32(GOOD_FIT | flags[i] | CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED,
+                            update());
+  }
+}
+
+static void test_slip_flag_and_threshold(void) {
+  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID, update());
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, result.slip_mm);
+  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID, update());
+  uint32_t flags = update();
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SLIP_VALID, flags);
+  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP, flags);
+  fit.x_mm = 0.749f;
+  flags = update();
+  TEST_ASSERT_FLOAT_WITHIN(1e-3f, 0.749f, result.slip_mm);
+  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP, flags);
+  fit.x_mm = 0.3745f + 0.751f;
+  flags = update();
+  TEST_ASSERT_FLOAT_WITHIN(1e-3f, 0.751f, result.slip_mm);
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SLIP, flags);
+  setUp();
+  fill_history();
+  fit.x_mm = 0.75f;
+  update();
+  fit.x_mm = 2.0f;
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SLIP | CONTACT_FLAG_SLIP_VALID, update());
+  TEST_ASSERT_FLOAT_WITHIN(1e-3f, 2.0f - 0.375f, result.slip_mm);
+}
+
+static void assert_history_begins_anew(void) {
+  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_SLIP, update());
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, result.slip_mm);
+  setUp();
+}
+
+static void test_doubtful_locations_end_the_history(void) {
+  static const uint32_t spoilers[] = {CONTACT_FLAG_UNCERTAIN, CONTACT_FLAG_FLAT,
+                                      CONTACT_FLAG_AT_BOUND};
+  for (size_t i = 0; i < 3; i++) {
+    fill_history();
+    fit.flags = GOOD_FIT | spoilers[i];
+    TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_SLIP, update());
+    TEST_ASSERT_EQUAL_UINT16(0, history.count);
+    fit.flags = GOOD_FIT;
+    update();
+    assert_history_begins_anew();
+  }
+  fill_history();
+  fit.flags = 0;
+  update();
+  TEST_ASSERT_EQUAL_UINT16(0, history.count);
+  setUp();
+  fill_history();
+  input.fit = NULL;
+  update();
+  TEST_ASSERT_EQUAL_UINT16(0, history.count);
+}
+
+static void test_other_warnings_keep_the_history(void) {
+  static const uint32_t warnings[] = {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_MODEL,
+                                      CONTACT_FLAG_SENSOR_MASKED};
+  for (size_t i = 0; i < 3; i++) {
+    setUp();
+    fill_history();
+    fit.flags = GOOD_FIT | warnings[i];
+    TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SLIP_VALID, update());
+  }
+}
+
+static void test_saturation_and_lower_bound(void) {
+  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND, update());
+  input.saturated = 0x80;
+  fit.used = 0x7F7F;
+  uint32_t flags = update();
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SATURATED, flags);
+  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_FORCE_LOWER_BOUND, flags);
+  for (uint32_t sensors = 1; sensors <= 15; sensors++) {
+    fit.used = 0x7FFFu >> (15 - sensors);
+    flags = update();
+    TEST_ASSERT_EQUAL(sensors < 5, (flags & CONTACT_FLAG_FORCE_LOWER_BOUND) != 0);
+  }
+  input.fit = NULL;
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND, update());
+  input.saturated = 0;
+  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND, update());
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_nothing_fitted);
+  RUN_TEST(test_flags_of_the_fit_pass);
+  RUN_TEST(test_slip_flag_and_threshold);
+  RUN_TEST(test_doubtful_locations_end_the_history);
+  RUN_TEST(test_other_warnings_keep_the_history);
+  RUN_TEST(test_saturation_and_lower_bound);
+  return UNITY_END();
+}
