@@ -4,7 +4,7 @@
 usage: bin2uf2.py INPUT.bin OUTPUT.uf2
 
 Format: https://github.com/microsoft/uf2. Family RP2040; 256 bytes a block, the flash page. The last
-page is padded with zeros.
+page is padded with zeros. The image has no holes, which the loader gets wrong (erratum RP2040-E14).
 """
 import struct
 import sys

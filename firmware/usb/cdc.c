@@ -47,11 +47,8 @@ static const uint8_t default_line_coding[LINE_CODING_BYTES] = {0x00, 0xc2, 0x01,
 /* The host gets what there is at once: it reads in transfers of several packets, which a packet
  * below the maximum ends, so when the ring runs dry after a full one an empty one follows. */
 static void transmit(void) {
-  if (!atomic_load_explicit(&is_open, memory_order_relaxed)) {
-    ring_clear(&transmit_ring);
-    return;
-  }
-  if (port.packet_state == PACKET_OFFERED || device_endpoint_is_halted(CDC_ENDPOINT_IN))
+  if (!atomic_load_explicit(&is_open, memory_order_relaxed) ||
+      port.packet_state == PACKET_OFFERED || device_endpoint_is_halted(CDC_ENDPOINT_IN))
     return;
   if (port.packet_state == PACKET_NONE) {
     size_t length = ring_take(&transmit_ring, port.packet, USB_MAX_PACKET_BYTES);

@@ -236,10 +236,6 @@ void usb_device_on_setup(const uint8_t packet[USB_SETUP_BYTES]) {
     start_status_in();
     break;
   case CONTROL_SEND:
-    if (setup->length == 0) {
-      start_status_in();
-      break;
-    }
     device.length = length < setup->length ? length : setup->length;
     device.stage = STAGE_DATA_IN;
     send_next_packet();

@@ -120,7 +120,10 @@ static void test_stream_keeps_order_and_loses_nothing(void) {
 }
 
 static void test_closed_port_swallows_writes(void) {
-  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 100));
+  fake_hold_interrupts();
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, QUEUE_BYTES));
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, QUEUE_BYTES));
+  fake_run_interrupts();
   TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
   set_dtr(1);
   TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
@@ -136,6 +139,8 @@ static void test_close_discards_what_waits(void) {
   TEST_ASSERT_EQUAL(closes + 1, cdc_close_count());
   TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
   set_dtr(1);
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 0));
+  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
   TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"new", 3));
   TEST_ASSERT_EQUAL(3, host_in(0x82, packet));
   TEST_ASSERT_EQUAL_MEMORY("new", packet, 3);
@@ -170,6 +175,10 @@ static void test_suspended_port_is_closed(void) {
   enumerate();
   set_dtr(1);
   TEST_ASSERT_TRUE(cdc_is_open());
+  enumerate();
+  host_suspend();
+  host_resume();
+  TEST_ASSERT_FALSE(cdc_is_open());
 }
 
 static void test_halt_keeps_the_packet_that_the_host_has_not_got(void) {
@@ -234,10 +243,13 @@ static void test_line_coding_is_kept(void) {
   TEST_ASSERT_EQUAL(0, host_control_out(0x21, 0x23, 0xffff, 0, NULL, 0));
 }
 
-static void test_line_coding_in_a_short_packet_stalls(void) {
-  host_setup(0x21, 0x20, 0, 0, 7);
-  TEST_ASSERT_EQUAL(0, host_out(0, "\x80\x25", 2));
-  TEST_ASSERT_EQUAL(HOST_STALL, host_in(0x80, packet));
+static void test_line_coding_of_another_length_than_announced_stalls(void) {
+  static const size_t lengths[] = {0, 2, 6, 8, 64};
+  for (size_t i = 0; i < sizeof lengths / sizeof lengths[0]; i++) {
+    host_setup(0x21, 0x20, 0, 0, 7);
+    TEST_ASSERT_EQUAL(0, host_out(0, bytes, lengths[i]));
+    TEST_ASSERT_EQUAL(HOST_STALL, host_in(0x80, packet));
+  }
 }
 
 /* Last, as the request cannot be taken back. */
@@ -273,7 +285,7 @@ int main(void) {
   RUN_TEST(test_host_waits_while_nobody_reads);
   RUN_TEST(test_echoing_terminal);
   RUN_TEST(test_line_coding_is_kept);
-  RUN_TEST(test_line_coding_in_a_short_packet_stalls);
+  RUN_TEST(test_line_coding_of_another_length_than_announced_stalls);
   RUN_TEST(test_1200_baud_asks_for_the_loader);
   return UNITY_END();
 }

@@ -112,7 +112,7 @@ static void test_answer_is_cut_to_what_was_asked_for(void) {
     TEST_ASSERT_EQUAL(length, get_descriptor(CONFIGURATION, length));
 }
 
-static void test_question_for_no_bytes_has_only_a_status_stage(void) {
+static void test_question_for_no_bytes_gets_none(void) {
   host_setup(0x80, GET_DESCRIPTOR, DEVICE, 0, 0);
   TEST_ASSERT_EQUAL(0, host_in(0x80, answer));
 }
@@ -268,6 +268,18 @@ static void test_halted_endpoint_stalls_until_cleared_and_starts_at_data0(void) 
   TEST_ASSERT_EQUAL_MEMORY("ac", answer, 2);
 }
 
+static void test_configuration_ends_halts(void) {
+  enumerate();
+  TEST_ASSERT_EQUAL(0, host_control_out(0x02, SET_FEATURE, 0, 0x82, NULL, 0));
+  TEST_ASSERT_EQUAL(0, host_control_out(0x00, SET_CONFIGURATION, 1, 0, NULL, 0));
+  host_reset_toggles();
+  TEST_ASSERT_EQUAL(2, host_control_in(0x82, GET_STATUS, 0, 0x82, 2, answer));
+  TEST_ASSERT_EQUAL_HEX8_ARRAY("\0\0", answer, 2);
+  set_dtr(1);
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"x", 1));
+  TEST_ASSERT_EQUAL(1, host_in(0x82, answer));
+}
+
 static void test_configuration_may_be_set_again_and_again(void) {
   enumerate();
   for (int i = 0; i < 3; i++) {
@@ -324,7 +336,7 @@ int main(void) {
   RUN_TEST(test_configuration_descriptor_is_well_formed);
   RUN_TEST(test_answer_of_whole_packets_ends_with_an_empty_one_when_shorter_than_asked);
   RUN_TEST(test_answer_is_cut_to_what_was_asked_for);
-  RUN_TEST(test_question_for_no_bytes_has_only_a_status_stage);
+  RUN_TEST(test_question_for_no_bytes_gets_none);
   RUN_TEST(test_host_may_end_the_data_stage_early);
   RUN_TEST(test_new_setup_replaces_a_transfer_at_any_point);
   RUN_TEST(test_status_stage_with_data_stalls);
@@ -332,6 +344,7 @@ int main(void) {
   RUN_TEST(test_refused_before_configuration);
   RUN_TEST(test_status_and_interface_questions);
   RUN_TEST(test_halted_endpoint_stalls_until_cleared_and_starts_at_data0);
+  RUN_TEST(test_configuration_ends_halts);
   RUN_TEST(test_configuration_may_be_set_again_and_again);
   RUN_TEST(test_interface_set_empties_the_data_endpoints);
   RUN_TEST(test_bus_reset_in_mid_transfer);
