@@ -6,7 +6,7 @@
 
 #include <stdint.h>
 
-/* a * b / 2^30 for |a|, |b| <= 2^30, error below 3 units: four 16-bit products, as the
+/* a * b / 2^30 for |a|, |b| <= 2^30, error below 5 units: four 16-bit products, as the
  * Cortex-M0+ has no 32 x 32 to 64 bit multiplication. */
 static inline int32_t fit_mul_q30(int32_t a, int32_t b) {
   int32_t a_high = a >> 16;
