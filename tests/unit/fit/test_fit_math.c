@@ -1,0 +1,98 @@
+#include "fit/fit_math.h"
+#include "support/random.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <unity.h>
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static void say(const char *what, double value) {
+  char text[80];
+  snprintf(text, sizeof text, "%s %.3g", what, value);
+  TEST_MESSAGE(text);
+}
+
+static void test_mul_q30(void) {
+  static const int32_t corners[] = {0,          1,          -1,          65535,
+                                    65536,      -65535,     -65536,      1 << 30,
+                                    -(1 << 30), 1073741823, -1073741823, 1073676289};
+  double worst = 0.0;
+  struct random random = {61};
+  for (int i = 0; i < 2000000; i++) {
+    int32_t a = i < 144 ? corners[i / 12] : (int32_t)random_below(&random, 1u << 31) - (1 << 30);
+    int32_t b = i < 144 ? corners[i % 12] : (int32_t)random_below(&random, 1u << 31) - (1 << 30);
+    double error = fabs((double)fit_mul_q30(a, b) - (double)a * (double)b / 1073741824.0);
+    worst = error > worst ? error : worst;
+  }
+  say("largest error of fit_mul_q30, units:", worst);
+  TEST_ASSERT_TRUE(worst < 5.0);
+}
+
+/* Against the library, once for the z that the fixed point can hold and once for z itself. */
+static void test_exp2(void) {
+  double worst = 0.0;
+  double worst_all = 0.0;
+  for (uint32_t i = 0; i < 4000000; i++) {
+    float z = i < 2000000 ? (float)i * (100.0f / 2000000.0f) : (float)(i - 2000000) * 5e-7f;
+    double held = floor((double)z * 16777216.0) / 16777216.0;
+    double value = (double)fit_exp2_negative(z);
+    double error = fabs(value / exp2(-held) - 1.0);
+    double error_all = fabs(value / exp2(-(double)z) - 1.0);
+    worst = error > worst ? error : worst;
+    worst_all = error_all > worst_all ? error_all : worst_all;
+  }
+  say("largest relative error of fit_exp2_negative, 2^-23:", worst * 0x1p23);
+  say("with the rounding of z, 2^-23:", worst_all * 0x1p23);
+  TEST_ASSERT_TRUE(worst < 0x1p-23);
+  TEST_ASSERT_TRUE(worst_all < 0x1p-23 + 0.6932 * 0x1p-24);
+}
+
+static void test_exp2_at_its_ends(void) {
+  TEST_ASSERT_EQUAL_FLOAT(1.0f, fit_exp2_negative(0.0f));
+  TEST_ASSERT_EQUAL_FLOAT(1.0f, fit_exp2_negative(-0.0f));
+  TEST_ASSERT_EQUAL_FLOAT(1.0f, fit_exp2_negative(-5.0f));
+  TEST_ASSERT_EQUAL_FLOAT(1.0f, fit_exp2_negative(-INFINITY));
+  TEST_ASSERT_EQUAL_FLOAT(1.0f, fit_exp2_negative(NAN));
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, fit_exp2_negative(100.0f));
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, fit_exp2_negative(INFINITY));
+  for (int whole = 1; whole < 100; whole++) {
+    TEST_ASSERT_EQUAL_FLOAT(ldexpf(1.0f, -whole), fit_exp2_negative((float)whole));
+    TEST_ASSERT_TRUE(fit_exp2_negative(nextafterf((float)whole, 0.0f)) >=
+                     fit_exp2_negative((float)whole));
+  }
+}
+
+static void log2_error(uint32_t value, double *worst) {
+  double error = fabs((double)fit_log2_q24(value) / 16777216.0 - log2((double)value));
+  *worst = error > *worst ? error : *worst;
+}
+
+static void test_log2(void) {
+  double worst = 0.0;
+  for (uint32_t value = 1; value < 3000000; value++) {
+    log2_error(value, &worst);
+  }
+  struct random random = {62};
+  for (int i = 0; i < 1000000; i++) {
+    log2_error(random_u32(&random) | 1u, &worst);
+  }
+  log2_error(UINT32_MAX, &worst);
+  log2_error(UINT32_C(0x80000000), &worst);
+  log2_error(INT32_MAX, &worst);
+  say("largest error of fit_log2_q24:", worst);
+  TEST_ASSERT_TRUE(worst < 2e-4);
+  for (uint32_t bit = 0; bit < 32; bit++) {
+    TEST_ASSERT_EQUAL_INT32((int32_t)(bit << 24), fit_log2_q24(UINT32_C(1) << bit));
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_mul_q30);
+  RUN_TEST(test_exp2);
+  RUN_TEST(test_exp2_at_its_ends);
+  RUN_TEST(test_log2);
+  return UNITY_END();
+}
