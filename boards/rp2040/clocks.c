@@ -4,7 +4,6 @@
 #include "rp2040/resets.h"
 #include "rp2040/watchdog_regs.h"
 
-
 /* A poll takes about ten cycles and the ring oscillator gives at most 12 MHz: at least 80 ms. The
  * crystal needs 1 ms, a PLL 50 us. */
 enum { POLLS = 100000 };

@@ -13,7 +13,7 @@
 #define CLK_SYS_CTRL (CLOCKS_BASE + 0x3cu)
 #define CLK_SYS_SELECTED (CLOCKS_BASE + 0x44u)
 #define CLK_SYS_SRC_REF 0u
-#define CLK_SYS_SRC_AUX 1u /* AUXSRC 0: PLL_SYS */
+#define CLK_SYS_SRC_AUX 1u                  /* AUXSRC 0: PLL_SYS */
 #define CLK_PERI_CTRL (CLOCKS_BASE + 0x48u) /* AUXSRC 0: clk_sys */
 #define CLK_USB_CTRL (CLOCKS_BASE + 0x54u)  /* AUXSRC 0: PLL_USB */
 #define CLK_CTRL_ENABLE (1u << 11)

@@ -93,11 +93,17 @@ void timer0_irq_handler(void) {
 
 /* Leaving an exception sets the event register (ARMv6-M B1.5.18), so an interrupt between the
  * caller's check and WFE makes WFE return at once. */
-void port_sleep(void) { __asm volatile("wfe" ::: "memory"); }
+void port_sleep(void) {
+  __asm volatile("wfe" ::: "memory");
+}
 
-void port_watchdog_feed(void) { WATCHDOG_LOAD = 2 * PORT_WATCHDOG_PERIOD_us; }
+void port_watchdog_feed(void) {
+  WATCHDOG_LOAD = 2 * PORT_WATCHDOG_PERIOD_us;
+}
 
-bool port_started_by_watchdog(void) { return started_by_watchdog; }
+bool port_started_by_watchdog(void) {
+  return started_by_watchdog;
+}
 
 void port_serial_number(char text[17]) {
   for (unsigned i = 0; i < sizeof serial_number; i++)

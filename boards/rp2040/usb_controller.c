@@ -1,6 +1,6 @@
-/* The controller keeps no toggles and no state of its own worth speaking of: each packet's PID is in
- * its buffer control word, and software tells from BUFF_STATUS what has happened (RP2040 datasheet
- * 4.1.2). Every endpoint is single-buffered.
+/* The controller keeps no toggles and no state of its own worth speaking of: each packet's PID is
+ * in its buffer control word, and software tells from BUFF_STATUS what has happened (RP2040
+ * datasheet 4.1.2). Every endpoint is single-buffered.
  *
  * Errata: E2 (an abort blocks the controller for good) and E5 (a busy bus hides the end of a bus
  * reset) are fixed in revision B2 of the chip. On B0 and B1 aborts are left out, and E5, whose
@@ -105,7 +105,9 @@ bool usb_controller_withdraw(uint8_t endpoint) {
   return !done;
 }
 
-void usb_controller_set_address(uint8_t address) { USB_ADDR_ENDP = address; }
+void usb_controller_set_address(uint8_t address) {
+  USB_ADDR_ENDP = address;
+}
 
 void usb_controller_open(uint8_t endpoint, enum usb_endpoint_type type) {
   usb_controller_withdraw(endpoint);
@@ -256,9 +258,13 @@ void usbctrl_irq_handler(void) {
     on_setup();
 }
 
-void usb_service_irq_handler(void) { usb_device_on_service(); }
+void usb_service_irq_handler(void) {
+  usb_device_on_service();
+}
 
-void usb_controller_request_service(void) { rp2040_irq_pend(RP2040_IRQ_USB_SERVICE); }
+void usb_controller_request_service(void) {
+  rp2040_irq_pend(RP2040_IRQ_USB_SERVICE);
+}
 
 void usb_controller_start(void) {
   resets_assert(RESETS_USBCTRL);

@@ -5,8 +5,8 @@
 
 #include "rp2040/reg.h"
 
-#define USB_NUMBER(endpoint) ((uint32_t)(endpoint) & 15u)
-#define USB_OUT(endpoint) ((endpoint) & 0x80u ? 0u : 1u)
+#define USB_NUMBER(endpoint) (15u & (uint32_t)(endpoint))
+#define USB_OUT(endpoint) (0x80u & (endpoint) ? 0u : 1u)
 
 /* Bit of the endpoint in BUFF_STATUS, EP_ABORT and EP_ABORT_DONE */
 #define USB_BIT(endpoint) (1u << (2u * USB_NUMBER(endpoint) + USB_OUT(endpoint)))

@@ -177,9 +177,13 @@ void cdc_start(const struct cdc_identity *identity) {
   device_start(identity);
 }
 
-bool cdc_is_open(void) { return atomic_load_explicit(&is_open, memory_order_acquire); }
+bool cdc_is_open(void) {
+  return atomic_load_explicit(&is_open, memory_order_acquire);
+}
 
-uint32_t cdc_close_count(void) { return atomic_load_explicit(&close_count, memory_order_acquire); }
+uint32_t cdc_close_count(void) {
+  return atomic_load_explicit(&close_count, memory_order_acquire);
+}
 
 enum ft_status cdc_write(const uint8_t *bytes, size_t length) {
   if (length > TRANSMIT_BYTES)
@@ -194,8 +198,8 @@ enum ft_status cdc_write(const uint8_t *bytes, size_t length) {
 }
 
 size_t cdc_read(uint8_t *bytes, size_t capacity) {
-  uint32_t length =
-      ring_take(&receive_ring, bytes, capacity < RECEIVE_BYTES ? (uint32_t)capacity : RECEIVE_BYTES);
+  uint32_t length = ring_take(&receive_ring, bytes,
+                              capacity < RECEIVE_BYTES ? (uint32_t)capacity : RECEIVE_BYTES);
   if (length)
     usb_controller_request_service();
   return length;

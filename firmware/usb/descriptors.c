@@ -11,7 +11,7 @@ enum descriptor_type {
 
 enum string_index { STRING_LANGUAGES, STRING_MANUFACTURER, STRING_PRODUCT, STRING_SERIAL };
 
-#define U16(value) (uint8_t)((value) & 0xff), (uint8_t)((value) >> 8)
+#define U16(value) (uint8_t)((value)&0xff), (uint8_t)((value) >> 8)
 
 static const uint8_t device_descriptor[] = {
     18,

@@ -2,9 +2,8 @@
 
 #include "common/bytes.h"
 #include "fake_controller.h"
-#include "usb/cdc.h"
-
 #include "unity.h"
+#include "usb/cdc.h"
 
 static const struct cdc_identity IDENTITY = {
     .vendor_id = 0x1209,

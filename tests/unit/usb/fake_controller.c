@@ -1,8 +1,8 @@
 #include "fake_controller.h"
 
 #include "port/usb_controller.h"
-
 #include "unity.h"
+
 #include <string.h>
 
 enum { NUMBERS = 3 };
@@ -38,15 +38,20 @@ static void enter_interrupt(void) {
   fake.in_interrupt = true;
 }
 
-static void leave_interrupt(void) { fake.in_interrupt = false; }
+static void leave_interrupt(void) {
+  fake.in_interrupt = false;
+}
 
 static void assert_device_context(void) {
   TEST_ASSERT_TRUE_MESSAGE(fake.in_interrupt, "called outside the interrupt context");
 }
 
-/* usb_controller.h ------------------------------------------------------------------------------ */
+/* usb_controller.h ------------------------------------------------------------------------------
+ */
 
-void usb_controller_start(void) { fake.attached = true; }
+void usb_controller_start(void) {
+  fake.attached = true;
+}
 
 void usb_controller_request_service(void) {
   TEST_ASSERT_FALSE(fake.in_interrupt);
@@ -131,7 +136,8 @@ void usb_controller_unstall(uint8_t endpoint) {
   e->data1 = false;
 }
 
-/* Test side -------------------------------------------------------------------------------------- */
+/* Test side --------------------------------------------------------------------------------------
+ */
 
 void fake_power_on(void) {
   memset(&fake, 0, sizeof fake);
@@ -139,9 +145,13 @@ void fake_power_on(void) {
   find(USB_ENDPOINT_IN)->open = true;
 }
 
-bool fake_is_attached(void) { return fake.attached; }
+bool fake_is_attached(void) {
+  return fake.attached;
+}
 
-void fake_hold_interrupts(void) { fake.interrupts_held = true; }
+void fake_hold_interrupts(void) {
+  fake.interrupts_held = true;
+}
 
 void fake_run_interrupts(void) {
   fake.interrupts_held = false;
@@ -153,9 +163,13 @@ void fake_run_interrupts(void) {
   }
 }
 
-void fake_take_at_next_withdrawal(void) { fake.take_at_next_withdrawal = true; }
+void fake_take_at_next_withdrawal(void) {
+  fake.take_at_next_withdrawal = true;
+}
 
-bool fake_accepts(uint8_t endpoint) { return find(endpoint)->held; }
+bool fake_accepts(uint8_t endpoint) {
+  return find(endpoint)->held;
+}
 
 void host_bus_reset(void) {
   enter_interrupt();
@@ -220,9 +234,14 @@ int host_out(uint8_t endpoint, const void *bytes, size_t length) {
 }
 
 void host_setup(uint8_t type, uint8_t request, uint16_t value, uint16_t index, uint16_t length) {
-  const uint8_t packet[USB_SETUP_BYTES] = {
-      type,           request, (uint8_t)value,  (uint8_t)(value >> 8), (uint8_t)index,
-      (uint8_t)(index >> 8), (uint8_t)length, (uint8_t)(length >> 8)};
+  const uint8_t packet[USB_SETUP_BYTES] = {type,
+                                           request,
+                                           (uint8_t)value,
+                                           (uint8_t)(value >> 8),
+                                           (uint8_t)index,
+                                           (uint8_t)(index >> 8),
+                                           (uint8_t)length,
+                                           (uint8_t)(length >> 8)};
   for (int in = 0; in < 2; in++) {
     struct endpoint *e = &fake.endpoints[0][in];
     e->stalled = e->held = false;
@@ -270,11 +289,15 @@ int host_control_out(uint8_t type, uint8_t request, uint16_t value, uint16_t ind
   return n;
 }
 
-void host_address(uint8_t address) { fake.host_address = address; }
+void host_address(uint8_t address) {
+  fake.host_address = address;
+}
 
 void host_reset_toggles(void) {
   for (int number = 1; number < NUMBERS; number++)
     fake.endpoints[number][0].host_data1 = fake.endpoints[number][1].host_data1 = false;
 }
 
-void host_reset_toggle(uint8_t endpoint) { find(endpoint)->host_data1 = false; }
+void host_reset_toggle(uint8_t endpoint) {
+  find(endpoint)->host_data1 = false;
+}

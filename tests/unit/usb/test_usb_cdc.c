@@ -1,9 +1,9 @@
 /* The serial port: line state, and the two byte streams. */
 #include "enumerate.h"
 #include "fake_controller.h"
+#include "unity.h"
 #include "usb/cdc.h"
 
-#include "unity.h"
 #include <string.h>
 
 enum { QUEUE_BYTES = 4096 };
@@ -147,7 +147,8 @@ static void test_close_discards_what_waits(void) {
   TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
 }
 
-/* The port closes between the look at it and the queueing: the bytes must not greet the next one. */
+/* The port closes between the look at it and the queueing: the bytes must not greet the next one.
+ */
 static void test_write_overtaken_by_close(void) {
   set_dtr(1);
   fake_hold_interrupts();
@@ -218,7 +219,8 @@ static void test_host_waits_while_nobody_reads(void) {
   TEST_ASSERT_EQUAL_MEMORY(bytes, got, 320);
 }
 
-/* A terminal in cooked mode echoes the stream byte for byte, before anybody has opened and after. */
+/* A terminal in cooked mode echoes the stream byte for byte, before anybody has opened and after.
+ */
 static void test_echoing_terminal(void) {
   for (int round = 0; round < 2; round++) {
     for (int i = 0; i < 1000; i++) {

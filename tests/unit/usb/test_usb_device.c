@@ -1,9 +1,9 @@
 /* What every USB device owes: USB 2.0 chapter 9. */
 #include "enumerate.h"
 #include "fake_controller.h"
+#include "unity.h"
 #include "usb/cdc.h"
 
-#include "unity.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -166,22 +166,22 @@ static void assert_refused(const struct refused *r, size_t count) {
 static void test_refused_in_any_state(void) {
   static const struct refused always[] = {
       {0x80, GET_DESCRIPTOR, QUALIFIER, 0, 10},
-      {0x80, GET_DESCRIPTOR, 0x700, 0, 9},     /* other speed */
-      {0x80, GET_DESCRIPTOR, 0x0f00, 0, 5},    /* BOS */
-      {0x80, GET_DESCRIPTOR, 0x201, 0, 9},     /* second configuration */
+      {0x80, GET_DESCRIPTOR, 0x700, 0, 9},  /* other speed */
+      {0x80, GET_DESCRIPTOR, 0x0f00, 0, 5}, /* BOS */
+      {0x80, GET_DESCRIPTOR, 0x201, 0, 9},  /* second configuration */
       {0x80, GET_DESCRIPTOR, STRING | 4, 0x0409, 255},
       {0x80, GET_DESCRIPTOR, STRING | 0xee, 0, 255},
-      {0x81, GET_DESCRIPTOR, 0x2200, 0, 64},   /* HID report */
-      {0x00, GET_DESCRIPTOR, DEVICE, 0, 18},   /* wrong direction */
+      {0x81, GET_DESCRIPTOR, 0x2200, 0, 64}, /* HID report */
+      {0x00, GET_DESCRIPTOR, DEVICE, 0, 18}, /* wrong direction */
       {0x80, SET_ADDRESS, 5, 0, 0},
       {0x00, SET_ADDRESS, 128, 0, 0},
       {0x00, SET_ADDRESS, 5, 0, 8},
       {0x00, SET_DESCRIPTOR, DEVICE, 0, 18},
       {0x00, SET_CONFIGURATION, 2, 0, 0},
-      {0x00, SET_FEATURE, 1, 0, 0},            /* remote wake-up */
-      {0x00, SET_FEATURE, 2, 0x0100, 0},       /* test mode */
+      {0x00, SET_FEATURE, 1, 0, 0},      /* remote wake-up */
+      {0x00, SET_FEATURE, 2, 0x0100, 0}, /* test mode */
       {0x00, CLEAR_FEATURE, 1, 0, 0},
-      {0x02, SET_FEATURE, 0, 0x00, 0},         /* halt of endpoint 0 */
+      {0x02, SET_FEATURE, 0, 0x00, 0}, /* halt of endpoint 0 */
       {0x02, SET_FEATURE, 0, 0x83, 0},
       {0x02, SET_FEATURE, 1, 0x82, 0},
       {0x82, SYNCH_FRAME, 0, 0x82, 2},
@@ -193,8 +193,8 @@ static void test_refused_in_any_state(void) {
       {0x80, 2, 0, 0, 2},
       {0x80, 0xff, 0, 0, 2},
       {0x83, GET_STATUS, 0, 0, 2},
-      {0xc0, 0x01, 0, 0, 8},                   /* vendor */
-      {0xa1, 0x21, 0, 1, 7},                   /* class request to the data interface */
+      {0xc0, 0x01, 0, 0, 8}, /* vendor */
+      {0xa1, 0x21, 0, 1, 7}, /* class request to the data interface */
       {0x21, 0x21, 0, 0, 0},
       {0xa1, 0x20, 0, 0, 7},
       {0x21, 0x20, 0, 0, 6},
@@ -210,10 +210,10 @@ static void test_refused_in_any_state(void) {
 
 static void test_refused_before_configuration(void) {
   static const struct refused early[] = {
-      {0x81, GET_STATUS, 0, 0, 2},      {0x82, GET_STATUS, 0, 0x82, 2},
-      {0x81, GET_INTERFACE, 0, 0, 1},   {0x01, SET_INTERFACE, 0, 0, 0},
-      {0x02, SET_FEATURE, 0, 0x82, 0},  {0x02, CLEAR_FEATURE, 0, 0x82, 0},
-      {0x21, 0x22, 1, 0, 0},            {0xa1, 0x21, 0, 0, 7},
+      {0x81, GET_STATUS, 0, 0, 2},     {0x82, GET_STATUS, 0, 0x82, 2},
+      {0x81, GET_INTERFACE, 0, 0, 1},  {0x01, SET_INTERFACE, 0, 0, 0},
+      {0x02, SET_FEATURE, 0, 0x82, 0}, {0x02, CLEAR_FEATURE, 0, 0x82, 0},
+      {0x21, 0x22, 1, 0, 0},           {0xa1, 0x21, 0, 0, 7},
   };
   static const struct refused unaddressed[] = {{0x00, SET_CONFIGURATION, 1, 0, 0}};
   assert_refused(early, sizeof early / sizeof early[0]);
@@ -229,8 +229,9 @@ static void test_refused_before_configuration(void) {
 static void test_status_and_interface_questions(void) {
   enumerate();
   static const struct refused questions[] = {
-      {0x80, GET_STATUS, 0, 0, 2},    {0x81, GET_STATUS, 0, 0, 2},    {0x81, GET_STATUS, 0, 1, 2},
-      {0x82, GET_STATUS, 0, 0, 2},    {0x82, GET_STATUS, 0, 0x80, 2}, {0x82, GET_STATUS, 0, 0x81, 2},
+      {0x80, GET_STATUS, 0, 0, 2},    {0x81, GET_STATUS, 0, 0, 2},
+      {0x81, GET_STATUS, 0, 1, 2},    {0x82, GET_STATUS, 0, 0, 2},
+      {0x82, GET_STATUS, 0, 0x80, 2}, {0x82, GET_STATUS, 0, 0x81, 2},
       {0x82, GET_STATUS, 0, 0x02, 2}, {0x82, GET_STATUS, 0, 0x82, 2},
   };
   for (size_t i = 0; i < sizeof questions / sizeof questions[0]; i++) {
