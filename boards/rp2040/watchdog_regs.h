@@ -9,9 +9,8 @@
 #define WATCHDOG_CTRL (WATCHDOG_BASE + 0x00u)
 #define WATCHDOG_CTRL_ENABLE (1u << 30)
 #define WATCHDOG_CTRL_TRIGGER (1u << 31)
-#define WATCHDOG_LOAD                                                                              \
-  REG32(WATCHDOG_BASE + 0x04u) /* counts down twice a tick: erratum RP2040-E1                      \
-                                */
+/* Counts down twice a tick: erratum RP2040-E1 */
+#define WATCHDOG_LOAD REG32(WATCHDOG_BASE + 0x04u)
 #define WATCHDOG_REASON REG32(WATCHDOG_BASE + 0x08u)   /* 0: this start was no watchdog's */
 #define WATCHDOG_SCRATCH0 REG32(WATCHDOG_BASE + 0x0cu) /* survives everything but power-off */
 #define WATCHDOG_TICK REG32(WATCHDOG_BASE + 0x2cu)
