@@ -20,8 +20,7 @@ struct cdc_identity {
   uint16_t vendor_id;
   uint16_t product_id;
   uint16_t device_version_bcd;
-  const char
-      *manufacturer; /* ASCII, the first 63 characters; the strings must outlive the device */
+  const char *manufacturer; /* ASCII, 63 characters at most; must outlive the device */
   const char *product;
   const char *serial;
 };
