@@ -341,8 +341,9 @@ static void each_second(struct app *app, uint64_t now_us) {
 
 void app_run(struct app *app) {
   port_watchdog_feed();
-  follow_port(app);
   bool active = receive_commands(app);
+  /* After the commands: one sent just before the port closed must not outlive it. */
+  follow_port(app);
   if (scan_take(&app->scan, &app->frame)) {
     process_frame(app, port_now_us());
     active = true;
