@@ -372,6 +372,35 @@ static void test_two_contacts_are_not_the_model(void) {
   TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_MODEL, result.flags);
 }
 
+/* A last step above 20 um says that the fit was still on its way. */
+static void test_unsettled_fits_are_uncertain(void) {
+  struct random random = {76};
+  int unsettled = 0;
+  int settled = 0;
+  for (int i = 0; i < 2000; i++) {
+    struct press press = random_press(&random, 3.0);
+    press.p0_Pa = 50000.0;
+    read_press(&press, 0.0, NULL);
+    struct fit_settings settings = {.iterations = 1, .noise_Pa_q10 = 1};
+    fit_gaussian(&array, readings, ALL, &settings, &result);
+    for (settings.iterations = 2; settings.iterations <= 5; settings.iterations++) {
+      struct fit_result before = result;
+      fit_gaussian(&array, readings, ALL, &settings, &result);
+      double moved_mm =
+          hypot((double)(result.x_mm - before.x_mm), (double)(result.y_mm - before.y_mm));
+      if (moved_mm > 0.021) {
+        TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_UNCERTAIN, result.flags);
+        unsettled += result.location_sd_mm < 0.2f;
+      } else if (moved_mm < 0.019 && result.location_sd_mm < 0.2f) {
+        TEST_ASSERT_BITS_LOW(CONTACT_FLAG_UNCERTAIN, result.flags);
+        settled++;
+      }
+    }
+  }
+  TEST_ASSERT_GREATER_THAN_INT(50, unsettled); /* that nothing but the step told */
+  TEST_ASSERT_GREATER_THAN_INT(1000, settled);
+}
+
 /* Share of presses farther off than 1 mm that carry no warning, and of those with a warning. */
 static void shares(double sigma_low_mm, double sigma_high_mm, double outside_mm, bool corner,
                    uint64_t seed, double *unflagged, double *warned) {
@@ -563,6 +592,7 @@ int main(void) {
   RUN_TEST(test_one_hot);
   RUN_TEST(test_low_signal_below_twenty_sigma);
   RUN_TEST(test_two_contacts_are_not_the_model);
+  RUN_TEST(test_unsettled_fits_are_uncertain);
   RUN_TEST(test_stiff_cases_are_flagged);
   RUN_TEST(test_predicted_scatter);
   RUN_TEST(test_random_bits);

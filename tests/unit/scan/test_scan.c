@@ -17,11 +17,15 @@ static uint64_t now_us;
 static struct frame frame;
 static bool taking; /* the main context keeps up */
 static int frames;
+static uint32_t lateness_us; /* at most, of every wake-up */
+static struct random lateness;
 
 static void power_up(uint8_t sensor_count, const struct scan_settings *settings) {
   now_us = 0;
   taking = true;
   frames = 0;
+  lateness_us = 0;
+  lateness.state = 30;
   fake_bus_init(&fake, &bus, sensor_count);
   TEST_ASSERT_EQUAL_INT(FT_OK, scan_init(&scan, &bus, settings));
 }
@@ -52,7 +56,7 @@ static bool step(void) {
   }
   bool taken = taking && scan_take(&scan, &frame);
   frames += taken;
-  now_us = wake_us;
+  now_us = wake_us + random_below(&lateness, lateness_us + 1);
   return taken;
 }
 
@@ -413,6 +417,27 @@ static void test_sensor_stops_and_comes_back(void) {
   TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
 }
 
+/* A part that took another's place has no temperature yet when its first one reads 0: until the
+ * next one its pressures are invalid, not computed with what belonged to the other. */
+static void test_replaced_sensor_waits_for_its_own_temperature(void) {
+  run_until(3000000);
+  fake.answering = ALL & ~DISTURBED_BIT;
+  skip_frames(2);
+  fake.prom[DISTURBED] = fake.prom[SENSORS - 1];
+  fake.d2[DISTURBED] += 500000;
+  fake.answering = ALL;
+  while (count_entries(0x1E, FAKE_COMMAND) < 2 || scan.state != SCAN_WAIT_TEMPERATURE) {
+    step();
+  }
+  fake.zero_next = DISTURBED_BIT;
+  for (int i = 0; i < 8; i++) {
+    next_frame();
+    assert_good_frame(ALL & ~DISTURBED_BIT);
+  }
+  next_frame();
+  assert_good_frame(ALL);
+}
+
 /* A sensor with a loose contact must not cost the others more than one admission a second. */
 static void test_flickering_sensor_costs_one_admission_a_second(void) {
   struct random random = {31};
@@ -515,6 +540,20 @@ static void test_twenty_hertz_without_drift(void) {
     next_frame();
     TEST_ASSERT_EQUAL_UINT64(first_us + 50000 * i, frame.t_begin_us);
     TEST_ASSERT_EQUAL_UINT32(1 + i, frame.number);
+  }
+}
+
+/* Wake-ups that come late delay their own frame and no other. */
+static void test_late_wake_ups_do_not_add_up(void) {
+  struct scan_settings settings = usual;
+  settings.rate_mHz = 20000;
+  next_case(&settings);
+  lateness_us = 300;
+  for (uint64_t i = 1; i < 2000; i++) {
+    next_frame();
+    if (i > 1) {
+      TEST_ASSERT_UINT64_WITHIN(150, 50000 * (i - 1) + 150, frame.t_begin_us);
+    }
   }
 }
 
@@ -706,6 +745,7 @@ int main(void) {
   RUN_TEST(test_zero_temperature_keeps_the_last_and_is_repeated_soon);
   RUN_TEST(test_temperature_interval);
   RUN_TEST(test_sensor_stops_and_comes_back);
+  RUN_TEST(test_replaced_sensor_waits_for_its_own_temperature);
   RUN_TEST(test_flickering_sensor_costs_one_admission_a_second);
   RUN_TEST(test_timeout_leads_to_recovery_and_admission);
   RUN_TEST(test_failure_at_any_operation_is_survived);
@@ -713,6 +753,7 @@ int main(void) {
   RUN_TEST(test_failing_recoveries_are_bounded);
   RUN_TEST(test_refused_starts_are_survived);
   RUN_TEST(test_twenty_hertz_without_drift);
+  RUN_TEST(test_late_wake_ups_do_not_add_up);
   RUN_TEST(test_rate_beyond_the_sensors);
   RUN_TEST(test_rate_changes);
   RUN_TEST(test_raised_rate_does_not_wait_for_the_old_period);
