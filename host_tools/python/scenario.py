@@ -88,13 +88,16 @@ class Motion:
 
 
 def ideal(seconds, random):
+    """A Latin hypercube over place and log force: however few the presses, they reach every edge."""
     motion = Motion(seconds)
-    start, ramp, hold = QUIET_s, 0.15, 0.1
-    while start + 2 * ramp + hold <= seconds:
-        force = 0.5 * (20 / 0.5) ** random.random()
-        x, y = random.uniform(-9, 9), random.uniform(-18, 18)
-        motion.press(start, start + 2 * ramp + hold, force, x, y, ramp)
-        start += 2 * ramp + hold + random.uniform(0.1, 0.2)
+    ramp, hold, gap_min, gap_max = 0.15, 0.1, 0.1, 0.2
+    length = 2 * ramp + hold
+    count = int((seconds - QUIET_s) / (length + gap_max))
+    strata = [(random.permutation(count) + random.random(count)) / count for _ in range(3)]
+    start = QUIET_s
+    for u_force, u_x, u_y in zip(*strata):
+        motion.press(start, start + length, 0.5 * (20 / 0.5) ** u_force, 18 * u_x - 9, 36 * u_y - 18, ramp)
+        start += length + random.uniform(gap_min, gap_max)
     return motion
 
 

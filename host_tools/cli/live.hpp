@@ -1,0 +1,27 @@
+/* A fingertip on its port, shown and recorded until something ends it. */
+#pragma once
+
+#include "cli/terminal.hpp"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace fingertip {
+
+struct LiveOptions {
+  std::string port;
+  std::uint8_t streams = 0;
+  std::optional<double> seconds; /* of device time, counted from the first frame */
+  std::string recording;         /* empty: none */
+  std::string raw_bytes;         /* empty: none */
+  bool overwrite = false;
+  bool until_gone = false; /* end when the port vanishes, instead of waiting for it */
+  bool monitor = true;     /* else a line of progress */
+  ColourMode colour = ColourMode::automatic;
+};
+
+/* Exit status. Throws Error. */
+int run_live(const LiveOptions &options);
+
+} // namespace fingertip

@@ -1,0 +1,361 @@
+/* fingertip: the command line tool. Exit status: 0 done; 1 something went wrong, said in one line;
+ * 2 wrong usage. */
+#include "cli/live.hpp"
+#include "cli/replay.hpp"
+#include "libfingertip/command.hpp"
+#include "libfingertip/discovery.hpp"
+#include "libfingertip/names.hpp"
+#include "libfingertip/recording.hpp"
+#include "libfingertip/serial_transport.hpp"
+#include "libfingertip/session.hpp"
+#include "libfingertip/text.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <map>
+
+namespace {
+
+using namespace fingertip;
+
+constexpr std::uint8_t SHOWN_STREAMS = WIRE_STREAM_ALL;
+
+struct Options {
+  std::string port;
+  LiveOptions live;
+  ReplayOptions replay;
+  double seconds = 0;
+  std::string speed = "1";
+  std::vector<std::string> settings;
+  std::vector<std::string> encode;
+  unsigned sequence = 0;
+  std::uint64_t time_us = 0;
+};
+
+/* A port with a session on it. */
+struct Device {
+  SerialTransport transport;
+  Session session;
+  explicit Device(const std::string &port)
+      : transport(choose_port(port)), session(transport, stop_requested) {}
+};
+
+void print_pairs(const Metadata &pairs) {
+  for (const auto &[key, value] : pairs) {
+    std::printf("%-22s%s\n", key.c_str(), value.c_str());
+  }
+}
+
+int list() {
+  std::vector<Port> ports = find_ports();
+  if (ports.empty()) {
+    throw Error("no fingertip found; plug one in, or name its port in FINGERTIP_PORT");
+  }
+  for (const Port &port : ports) {
+    std::printf("%s\t%s\t%s\n", port.path.c_str(), port.serial.empty() ? "-" : port.serial.c_str(),
+                port.product.empty() ? "-" : port.product.c_str());
+  }
+  return 0;
+}
+
+int info(const Options &options) {
+  Device device(options.port);
+  wire_info info = device.session.info().body.info;
+  wire_health health = device.session.health().body.health;
+  Metadata pairs = info_metadata(info);
+  pairs.insert(pairs.begin(), {"port", device.transport.description()});
+  for (auto &[key, value] : pairs) {
+    if (key == "streams") {
+      value = streams_text(info.streams);
+    }
+  }
+  print_pairs(pairs);
+  std::printf("\n");
+  for (const auto &[key, value] : health_fields(health)) {
+    std::printf("%-22s%lu\n", key.c_str(), static_cast<unsigned long>(value));
+  }
+  return 0;
+}
+
+int tare(const Options &options) {
+  Device device(options.port);
+  device.session.command(command_stream(WIRE_STREAM_CONTACT));
+  bool tared = false;
+  bool acknowledged = false;
+  std::int64_t last_frame_us = steady_now_us();
+  device.session.on_packet([&](const wire_packet &packet) {
+    if (packet.type == WIRE_ACK && packet.body.ack.command == WIRE_CMD_TARE) {
+      acknowledged = true;
+    } else if (packet.type == WIRE_CONTACT) {
+      last_frame_us = steady_now_us();
+      tared = acknowledged && (packet.body.contact.flags & CONTACT_FLAG_TARED);
+    }
+  });
+  device.session.command(command_tare());
+  constexpr std::int64_t patience_us = 12000000; /* the slowest frame rate is one in 10 s */
+  while (!tared) {
+    if (stop_requested()) {
+      throw Interrupted();
+    }
+    if (device.session.poll(std::chrono::milliseconds(50)) == Transport::Result::gone) {
+      throw Error(device.transport.description() +
+                  ": vanished while taring; plug it in and try again");
+    }
+    if (steady_now_us() - last_frame_us > patience_us) {
+      throw Error("no frames while taring; see that its sensors answer (fingertip info)");
+    }
+  }
+  device.session.command(command_stream(0));
+  std::printf("tared\n");
+  return 0;
+}
+
+/* Commands for "rate=20" and the like; slip settings share one command. */
+struct Settings {
+  std::optional<std::uint32_t> rate_mHz, osr, slip_window_ms;
+  std::optional<float> slip_threshold_mm;
+};
+
+Settings parse_settings(const std::vector<std::string> &texts) {
+  Settings settings;
+  for (const std::string &text : texts) {
+    std::size_t equals = text.find('=');
+    std::string key = text.substr(0, equals);
+    std::string value = equals == std::string::npos ? "" : text.substr(equals + 1);
+    if (key == "rate") {
+      settings.rate_mHz = rate_mHz_from_text(value);
+    } else if (key == "osr") {
+      settings.osr = osr_from_text(value);
+    } else if (key == "slip_threshold") {
+      settings.slip_threshold_mm = slip_threshold_mm_from_text(value);
+    } else if (key == "slip_window") {
+      settings.slip_window_ms = slip_window_ms_from_text(value);
+    } else {
+      throw Error("setting \"" + text +
+                  "\" is unknown; give rate=HZ|max, osr=N, slip_threshold=MM or slip_window=MS");
+    }
+  }
+  return settings;
+}
+
+int set(const Options &options) {
+  Settings settings = parse_settings(options.settings);
+  Device device(options.port);
+  Session &session = device.session;
+  if (settings.rate_mHz) {
+    session.command(command_rate_mHz(*settings.rate_mHz));
+  }
+  if (settings.osr) {
+    session.command(command_osr(*settings.osr));
+  }
+  if (settings.slip_threshold_mm || settings.slip_window_ms) {
+    wire_info now = session.info().body.info;
+    session.command(command_slip(settings.slip_threshold_mm.value_or(now.slip_threshold_mm),
+                                 settings.slip_window_ms.value_or(now.slip_window_ms)));
+  }
+  wire_info info = session.info().body.info;
+  std::printf("rate=%s osr=%u slip_threshold=%s slip_window=%u\n",
+              info.rate_mHz ? fixed(info.rate_mHz / 1000.0, 3).c_str() : "max", info.osr,
+              shortest(info.slip_threshold_mm).c_str(), info.slip_window_ms);
+  return 0;
+}
+
+int loader(const Options &options) {
+  Device device(options.port);
+  device.session.command(command_loader());
+  std::printf("restarting into the USB loader: the drive RPI-RP2 takes a .uf2 file\n");
+  return 0;
+}
+
+wire_packet packet_from_words(const std::vector<std::string> &words) {
+  struct Form {
+    std::size_t arguments;
+    std::string usage;
+    std::function<wire_packet()> make;
+  };
+  auto word = [&](std::size_t i) { return words[i]; };
+  const std::map<std::string, Form> forms = {
+      {"stream",
+       {1, "stream none|contact,raw,health",
+        [&] { return command_stream(streams_from_text(word(1))); }}},
+      {"tare", {0, "tare", command_tare}},
+      {"rate", {1, "rate HZ|max", [&] { return command_rate_mHz(rate_mHz_from_text(word(1))); }}},
+      {"osr", {1, "osr N", [&] { return command_osr(osr_from_text(word(1))); }}},
+      {"slip",
+       {2, "slip THRESHOLD_MM WINDOW_MS",
+        [&] {
+          return command_slip(slip_threshold_mm_from_text(word(1)),
+                              slip_window_ms_from_text(word(2)));
+        }}},
+      {"info", {0, "info", command_info}},
+      {"health", {0, "health", command_health}},
+      {"loader", {0, "loader", command_loader}},
+  };
+  auto form = forms.find(words[0]);
+  if (form == forms.end()) {
+    throw Error("command \"" + words[0] +
+                "\" is unknown; give stream, tare, rate, osr, slip, info, health or loader");
+  }
+  if (words.size() != 1 + form->second.arguments) {
+    throw Error("wrong arguments; give: fingertip encode " + form->second.usage);
+  }
+  return form->second.make();
+}
+
+int encode(const Options &options) {
+  wire_packet packet = packet_from_words(options.encode);
+  packet.sequence = static_cast<std::uint16_t>(options.sequence);
+  packet.t_us = options.time_us;
+  std::printf("%s\n", hex(frame_bytes(packet)).c_str());
+  return 0;
+}
+
+double speed_from_text(const std::string &text) {
+  if (text == "max") {
+    return 0;
+  }
+  auto speed = to_double(text);
+  if (!speed || *speed < 0.01 || *speed > 1000) {
+    throw Error("speed \"" + text + "\" is out of range; give 0.01 to 1000, or max");
+  }
+  return *speed;
+}
+
+int run(int argc, char **argv) {
+  Options options;
+  std::function<int()> action;
+  CLI::App app("Talks to Fingertip tactile sensors: shows, records and replays what they feel.",
+               "fingertip");
+  app.set_version_flag("--version", "fingertip " FINGERTIP_VERSION);
+  app.require_subcommand(1);
+  app.failure_message([](const CLI::App *failed, const CLI::Error &error) {
+    return "fingertip: " + std::string(error.what()) + "; see " +
+           (failed->get_parent() ? "fingertip " + failed->get_name() : "fingertip") + " --help\n";
+  });
+
+  auto add = [&](const char *name, const char *text, std::function<int()> run_it) {
+    CLI::App *command = app.add_subcommand(name, text);
+    command->callback([&action, run_it] { action = run_it; });
+    return command;
+  };
+  auto with_port = [&](CLI::App *command) {
+    command
+        ->add_option("--port", options.port,
+                     "Serial port or pseudo-terminal; default: $FINGERTIP_PORT, or the only "
+                     "fingertip plugged in")
+        ->type_name("PATH");
+    return command;
+  };
+  const std::map<std::string, ColourMode> colours = {{"auto", ColourMode::automatic},
+                                                     {"truecolour", ColourMode::truecolour},
+                                                     {"256", ColourMode::palette_256},
+                                                     {"plain", ColourMode::plain}};
+  auto with_colour = [&](CLI::App *command, ColourMode &mode) {
+    command->add_option("--colour", mode, "auto, truecolour, 256, or plain: a line a second")
+        ->transform(CLI::CheckedTransformer(colours))
+        ->type_name("MODE");
+  };
+  auto with_recording = [&](CLI::App *command) {
+    command->add_option("--seconds", options.seconds, "End after this much device time")
+        ->type_name("S")
+        ->check(CLI::PositiveNumber);
+    command
+        ->add_option("--raw-bytes", options.live.raw_bytes,
+                     "Also keep the bytes of the line as they came")
+        ->type_name("FILE.ftr");
+    command->add_flag("--overwrite", options.live.overwrite, "Replace files that exist");
+    command->add_flag("--until-gone", options.live.until_gone,
+                      "End when the port vanishes, instead of waiting for it");
+  };
+  auto live = [&](bool monitor) {
+    options.live.port = options.port;
+    options.live.monitor = monitor;
+    options.live.streams = SHOWN_STREAMS;
+    if (options.seconds > 0) {
+      options.live.seconds = options.seconds;
+    }
+    return run_live(options.live);
+  };
+
+  add("list",
+      "List the fingertips plugged in, and the paths in $FINGERTIP_PORT: path, serial number, "
+      "product",
+      list);
+  with_port(add("info", "Show identity, settings and health", [&] { return info(options); }));
+
+  CLI::App *monitor =
+      with_port(add("monitor", "Show live what the fingertip feels", [&] { return live(true); }));
+  with_recording(monitor);
+  monitor->add_option("--record", options.live.recording, "Record at the same time")
+      ->type_name("FILE.csv");
+  with_colour(monitor, options.live.colour);
+
+  CLI::App *record = with_port(
+      add("record", "Record every frame to a CSV file, until Ctrl-C", [&] { return live(false); }));
+  record->add_option("file", options.live.recording, "The recording to write")
+      ->required()
+      ->type_name("FILE.csv");
+  with_recording(record);
+
+  CLI::App *replay = add("replay", "Show a recording or a capture of bytes", [&] {
+    options.replay.speed = speed_from_text(options.speed);
+    return run_replay(options.replay);
+  });
+  replay->add_option("file", options.replay.file, "Recording (.csv) or bytes of the line (.ftr)")
+      ->required()
+      ->type_name("FILE");
+  replay->add_option("--speed", options.speed, "Times the recorded speed, or max; default 1")
+      ->type_name("X|max");
+  replay->add_flag("--salvage", options.replay.salvage, "Skip damaged lines and count them");
+  replay->add_option("--to-csv", options.replay.to_csv, "Write a recording instead of showing it")
+      ->type_name("OUT.csv");
+  replay->add_flag("--overwrite", options.replay.overwrite, "Replace OUT.csv if it exists");
+  with_colour(replay, options.replay.colour);
+
+  with_port(add("tare", "Measure the zero of every sensor anew; nothing may touch the pad",
+                [&] { return tare(options); }));
+  with_port(add("set", "Change settings until the next power-on", [&] { return set(options); }))
+      ->add_option("settings", options.settings,
+                   "rate=HZ|max (0.1 to 2000), osr=256|512|1024|2048|4096|8192, slip_threshold=MM "
+                   "(0.01 to 50), "
+                   "slip_window=MS (5 to 1000)")
+      ->required()
+      ->type_name("KEY=VALUE");
+  with_port(add("loader", "Restart into the USB loader, to install firmware",
+                [&] { return loader(options); }));
+
+  CLI::App *encode_command = add("encode", "Print the frame of a command as hexadecimal digits",
+                                 [&] { return encode(options); });
+  encode_command
+      ->add_option("command", options.encode,
+                   "stream none|contact,raw,health; tare; rate HZ|max; osr N; slip THRESHOLD_MM "
+                   "WINDOW_MS; info; health; loader")
+      ->required()
+      ->type_name("COMMAND [ARGS]");
+  encode_command->add_option("--sequence", options.sequence, "Sequence number; default 0")
+      ->check(CLI::Range(0, 65535))
+      ->type_name("N");
+  encode_command->add_option("--time", options.time_us, "Time of the header; default 0")
+      ->type_name("US");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError &error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  catch_signals();
+  return action();
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+  try {
+    return run(argc, argv);
+  } catch (const fingertip::Error &error) {
+    std::fprintf(stderr, "fingertip: %s\n", error.what());
+  } catch (const fingertip::Interrupted &) {
+    std::fprintf(stderr, "fingertip: interrupted\n");
+  }
+  return 1;
+}

@@ -1,0 +1,80 @@
+/* What is known of a fingertip at this moment, gathered from its packets, for views to show. */
+#pragma once
+
+#include "libfingertip/decoder.hpp"
+
+#include <chrono>
+#include <deque>
+#include <optional>
+#include <string>
+
+namespace fingertip {
+
+class Model {
+public:
+  enum class State { connecting, live, gone, replay };
+
+  struct Location {
+    std::uint64_t t_us;
+    float x_mm, y_mm;
+  };
+  struct Force {
+    float peak_N; /* highest of the interval */
+    bool slip;
+  };
+  static constexpr std::uint64_t FORCE_INTERVAL_us = 50000;
+  static constexpr std::size_t FORCE_INTERVALS = 400;
+
+  void take(const wire_packet &packet);
+  void set_statistics(const LineStatistics &statistics) { statistics_ = statistics; }
+  void set_state(State state) { state_ = state; }
+  void set_source(const std::string &source) { source_ = source; }
+
+  State state() const { return state_; }
+  const std::string &source() const { return source_; }
+  const LineStatistics &statistics() const { return statistics_; }
+  const std::optional<wire_info> &info() const { return info_; }
+  const std::optional<wire_contact> &contact() const { return contact_; }
+  const std::optional<wire_raw> &raw() const { return raw_; }
+  const std::optional<wire_health> &health() const { return health_; }
+
+  /* Frames since the first, and their device time. */
+  std::uint64_t frames() const { return frames_; }
+  double seconds() const;
+  /* Over the last second of device time. */
+  double frames_per_s() const;
+  /* Over everything. */
+  double mean_frames_per_s() const;
+  /* A slip flag within the last 0.15 s of device time: long enough to be seen. */
+  bool slipped_lately() const;
+  /* Since the last frame, by the host's clock; nothing before the first. */
+  std::optional<double> seconds_since_frame() const;
+  /* Of the last second, oldest first; emptied where contact ends. */
+  const std::deque<Location> &trail() const { return trail_; }
+  const std::deque<Force> &forces() const { return forces_; }
+
+private:
+  void take_frame(std::uint64_t t_us);
+  void take_contact(const wire_contact &contact, std::uint64_t t_us);
+
+  State state_ = State::connecting;
+  std::string source_;
+  LineStatistics statistics_;
+  std::optional<wire_info> info_;
+  std::optional<wire_contact> contact_;
+  std::optional<wire_raw> raw_;
+  std::optional<wire_health> health_;
+
+  std::uint64_t frames_ = 0;
+  std::uint64_t before_restart_us_ = 0; /* device time of earlier runs of the device */
+  std::optional<std::uint64_t> first_us_;
+  std::uint64_t last_us_ = 0;
+  std::optional<std::uint64_t> last_slip_us_;
+  std::optional<std::chrono::steady_clock::time_point> last_arrival_;
+  std::deque<std::uint64_t> recent_us_;
+  std::deque<Location> trail_;
+  std::deque<Force> forces_;
+  std::uint64_t force_interval_ = 0;
+};
+
+} // namespace fingertip

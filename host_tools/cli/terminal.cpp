@@ -1,0 +1,138 @@
+#include "cli/terminal.hpp"
+
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+namespace fingertip {
+
+namespace {
+
+volatile std::sig_atomic_t stop_signal = 0;
+volatile std::sig_atomic_t suspend_signal = 0;
+
+void on_stop(int signal) {
+  stop_signal = signal;
+}
+void on_suspend(int signal) {
+  suspend_signal = signal;
+}
+
+void handle(int signal, void (*handler)(int)) {
+  struct sigaction action = {};
+  action.sa_handler = handler;
+  sigaction(signal, &action, nullptr);
+}
+
+void write_all(const std::string &text) {
+  std::size_t at = 0;
+  while (at < text.size()) {
+    ssize_t count = write(STDOUT_FILENO, text.data() + at, text.size() - at);
+    if (count < 0 && errno == EAGAIN) {
+      pollfd waiting = {STDOUT_FILENO, POLLOUT, 0};
+      poll(&waiting, 1, 100);
+    } else if (count < 0 && errno != EINTR) {
+      return;
+    } else if (count > 0) {
+      at += static_cast<std::size_t>(count);
+    }
+  }
+}
+
+winsize window() {
+  winsize size = {};
+  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0 || size.ws_row == 0) {
+    size.ws_col = 80;
+    size.ws_row = 24;
+  }
+  return size;
+}
+
+} // namespace
+
+void catch_signals() {
+  handle(SIGINT, on_stop);
+  handle(SIGTERM, on_stop);
+  handle(SIGHUP, on_stop);
+  handle(SIGPIPE, SIG_IGN);
+}
+
+bool stop_requested() {
+  return stop_signal != 0;
+}
+
+std::optional<ColourDepth> screen_depth(ColourMode mode) {
+  const char *term = std::getenv("TERM");
+  if (mode == ColourMode::plain || !isatty(STDOUT_FILENO) || !term || !std::strcmp(term, "dumb")) {
+    return std::nullopt;
+  }
+  if (mode == ColourMode::truecolour) {
+    return ColourDepth::truecolour;
+  }
+  const char *colours = std::getenv("COLORTERM");
+  bool truecolour =
+      colours && (!std::strcmp(colours, "truecolor") || !std::strcmp(colours, "24bit"));
+  return mode == ColourMode::automatic && truecolour ? ColourDepth::truecolour
+                                                     : ColourDepth::palette_256;
+}
+
+Screen::Screen() : has_input_(tcgetattr(STDIN_FILENO, &before_) == 0) {
+  handle(SIGTSTP, on_suspend);
+  enter();
+}
+
+Screen::~Screen() {
+  leave();
+  handle(SIGTSTP, SIG_DFL);
+}
+
+void Screen::enter() {
+  if (has_input_) {
+    termios settings = before_;
+    settings.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
+    settings.c_cc[VMIN] = 0;
+    settings.c_cc[VTIME] = 0;
+    tcsetattr(STDIN_FILENO, TCSANOW, &settings);
+  }
+  /* alternate screen, cursor and line wrap off */
+  write_all("\x1b[?1049h\x1b[?25l\x1b[?7l\x1b[2J");
+}
+
+void Screen::leave() {
+  write_all("\x1b[0m\x1b[?7h\x1b[?25h\x1b[?1049l");
+  if (has_input_) {
+    tcsetattr(STDIN_FILENO, TCSANOW, &before_);
+  }
+}
+
+int Screen::columns() const {
+  return window().ws_col;
+}
+int Screen::rows() const {
+  return window().ws_row;
+}
+
+void Screen::draw(const std::string &ansi) {
+  if (suspend_signal) {
+    suspend_signal = 0;
+    leave();
+    raise(SIGSTOP);
+    enter();
+  }
+  /* begin and end of a synchronised update: no tearing where the terminal knows it */
+  write_all("\x1b[?2026h" + ansi + "\x1b[?2026l");
+}
+
+std::optional<char> Screen::key() {
+  char pressed = 0;
+  if (has_input_ && read(STDIN_FILENO, &pressed, 1) == 1) {
+    return pressed;
+  }
+  return std::nullopt;
+}
+
+} // namespace fingertip

@@ -1,0 +1,43 @@
+/* The user's terminal and signals. */
+#pragma once
+
+#include "cli/canvas.hpp"
+
+#include <optional>
+#include <string>
+#include <termios.h>
+
+namespace fingertip {
+
+/* SIGINT, SIGTERM and SIGHUP from now on only ask to stop, SIGPIPE is ignored. */
+void catch_signals();
+bool stop_requested();
+
+enum class ColourMode { automatic, truecolour, palette_256, plain };
+
+/* What standard output can show: nothing if it is no terminal, a dumb one, or plain is wanted. */
+std::optional<ColourDepth> screen_depth(ColourMode mode);
+
+/* The full screen, given back as it was when this ends; also over a suspend (Ctrl-Z). */
+class Screen {
+public:
+  Screen();
+  ~Screen();
+  Screen(const Screen &) = delete;
+  Screen &operator=(const Screen &) = delete;
+
+  int columns() const;
+  int rows() const;
+  void draw(const std::string &ansi);
+  /* A key that was pressed, or nothing. */
+  std::optional<char> key();
+
+private:
+  void enter();
+  void leave();
+
+  bool has_input_;
+  termios before_;
+};
+
+} // namespace fingertip

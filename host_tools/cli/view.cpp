@@ -1,0 +1,143 @@
+#include "cli/view.hpp"
+
+#include "cli/monitor.hpp"
+#include "libfingertip/names.hpp"
+#include "libfingertip/text.hpp"
+
+#include <chrono>
+#include <cstdio>
+#include <unistd.h>
+
+namespace fingertip {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+class Interval {
+public:
+  explicit Interval(std::chrono::milliseconds length) : length_(length) {}
+  bool is_due() {
+    auto now = Clock::now();
+    if (now < next_) {
+      return false;
+    }
+    next_ = now + length_;
+    return true;
+  }
+
+private:
+  std::chrono::milliseconds length_;
+  Clock::time_point next_{};
+};
+
+std::string state_text(const Model &model) {
+  auto silence_s = model.seconds_since_frame();
+  switch (model.state()) {
+  case Model::State::connecting:
+    return "waiting for an answer";
+  case Model::State::gone:
+    return "gone, waiting for it to come back";
+  case Model::State::live:
+    return !silence_s || *silence_s > STALLED_s ? "STALLED" : "";
+  case Model::State::replay:
+    break;
+  }
+  return "";
+}
+
+std::string status_line(const Model &model) {
+  const LineStatistics &line = model.statistics();
+  std::string text = fixed(model.seconds(), 1) + " s  " + std::to_string(model.frames()) +
+                     " frames  " + fixed(model.frames_per_s(), 1) + "/s  dropped " +
+                     std::to_string(line.dropped_packets) + "  CRC errors " +
+                     std::to_string(line.crc_errors);
+  std::string state = state_text(model);
+  return state.empty() ? text : text + "  " + state;
+}
+
+class ScreenView : public View {
+public:
+  explicit ScreenView(ColourDepth depth) : depth_(depth) {}
+  void update(const Model &model, const std::string &note) override {
+    if (interval_.is_due()) {
+      screen_.draw(draw_monitor(model, note, screen_.columns(), screen_.rows()).ansi(depth_));
+    }
+  }
+  std::optional<char> key() override { return screen_.key(); }
+
+private:
+  ColourDepth depth_;
+  Screen screen_;
+  Interval interval_{std::chrono::milliseconds(40)};
+};
+
+class LineView : public View {
+public:
+  void update(const Model &model, const std::string &note) override {
+    if (!interval_.is_due()) {
+      return;
+    }
+    std::string text = status_line(model);
+    if (model.contact()) {
+      const wire_contact &contact = *model.contact();
+      if (contact.flags & CONTACT_FLAG_FIT_VALID) {
+        text += "  x " + fixed(static_cast<double>(contact.x_mm), 2) + " mm  y " +
+                fixed(static_cast<double>(contact.y_mm), 2) + " mm  force " +
+                fixed(static_cast<double>(contact.force_N), 2) + " N";
+      }
+      text += "  " + flags_text(contact.flags);
+    }
+    std::printf("%s%s%s\n", text.c_str(), note.empty() ? "" : "  ", note.c_str());
+    std::fflush(stdout);
+  }
+
+private:
+  Interval interval_{std::chrono::milliseconds(1000)};
+};
+
+class ProgressView : public View {
+public:
+  ~ProgressView() override {
+    if (in_place_ && shown_) {
+      std::fputs("\r\x1b[K", stderr);
+    }
+  }
+  void update(const Model &model, const std::string &note) override {
+    if (!interval_.is_due()) {
+      return;
+    }
+    shown_ = true;
+    std::string text = status_line(model) + (note.empty() ? "" : "  " + note);
+    std::fprintf(stderr, in_place_ ? "\r\x1b[K%s" : "%s\n", text.c_str());
+    std::fflush(stderr);
+  }
+
+private:
+  bool in_place_ = isatty(STDERR_FILENO);
+  bool shown_ = false;
+  Interval interval_{std::chrono::milliseconds(in_place_ ? 200 : 1000)};
+};
+
+} // namespace
+
+std::unique_ptr<View> make_monitor_view(ColourMode mode) {
+  if (auto depth = screen_depth(mode)) {
+    return std::make_unique<ScreenView>(*depth);
+  }
+  return std::make_unique<LineView>();
+}
+
+std::unique_ptr<View> make_progress_view() {
+  return std::make_unique<ProgressView>();
+}
+
+std::string summary_text(const Model &model) {
+  const LineStatistics &line = model.statistics();
+  return std::to_string(model.frames()) + " frames in " + fixed(model.seconds(), 2) + " s (" +
+         fixed(model.mean_frames_per_s(), 1) + "/s), " + std::to_string(line.dropped_packets) +
+         " packets dropped, " + std::to_string(line.crc_errors) + " CRC errors, " +
+         std::to_string(line.format_errors) + " format errors";
+}
+
+} // namespace fingertip

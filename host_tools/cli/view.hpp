@@ -1,0 +1,28 @@
+/* Ways to show a model while it changes. */
+#pragma once
+
+#include "cli/model.hpp"
+#include "cli/terminal.hpp"
+
+#include <memory>
+#include <optional>
+
+namespace fingertip {
+
+class View {
+public:
+  virtual ~View() = default;
+  /* Called often; draws as often as it sees fit. */
+  virtual void update(const Model &model, const std::string &note) = 0;
+  virtual std::optional<char> key() { return std::nullopt; }
+};
+
+/* The monitor on a terminal, or one line a second elsewhere. */
+std::unique_ptr<View> make_monitor_view(ColourMode mode);
+/* One line on standard error, renewed in place if that is a terminal. */
+std::unique_ptr<View> make_progress_view();
+
+/* "5068 frames in 12.3 s (412.1/s), 0 packets dropped, 0 CRC errors, 0 format errors" */
+std::string summary_text(const Model &model);
+
+} // namespace fingertip

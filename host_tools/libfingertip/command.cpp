@@ -1,0 +1,167 @@
+#include "libfingertip/command.hpp"
+
+#include "libfingertip/error.hpp"
+#include "libfingertip/text.hpp"
+
+#include <cmath>
+#include <cstring>
+
+namespace fingertip {
+
+namespace {
+
+wire_packet packet_of(wire_type type) {
+  wire_packet packet;
+  std::memset(&packet, 0, sizeof packet);
+  packet.type = static_cast<std::uint8_t>(type);
+  return packet;
+}
+
+[[noreturn]] void out_of_range(const char *what, const std::string &value,
+                               const std::string &range) {
+  throw Error(std::string(what) + " " + value + " is out of range; give " + range);
+}
+
+std::string rate_range() {
+  return fixed(WIRE_RATE_MIN_mHz / 1000.0, 1) + " to " + fixed(WIRE_RATE_MAX_mHz / 1000.0, 0) +
+         " Hz, or max";
+}
+
+std::string osr_range() {
+  return "256, 512, 1024, 2048, 4096 or 8192";
+}
+
+std::string threshold_range() {
+  return shortest(WIRE_SLIP_THRESHOLD_MIN_mm) + " to " + shortest(WIRE_SLIP_THRESHOLD_MAX_mm) +
+         " mm";
+}
+
+std::string window_range() {
+  return std::to_string(WIRE_SLIP_WINDOW_MIN_ms) + " to " +
+         std::to_string(WIRE_SLIP_WINDOW_MAX_ms) + " ms";
+}
+
+void check_rate(std::uint32_t rate_mHz, const std::string &text) {
+  if (rate_mHz != 0 && (rate_mHz < WIRE_RATE_MIN_mHz || rate_mHz > WIRE_RATE_MAX_mHz)) {
+    out_of_range("rate", text, rate_range());
+  }
+}
+
+void check_osr(std::uint64_t osr) {
+  if (osr < 256 || osr > 8192 || (osr & (osr - 1)) != 0) {
+    out_of_range("osr", std::to_string(osr), osr_range());
+  }
+}
+
+void check_threshold(float threshold_mm) {
+  if (!(threshold_mm >= WIRE_SLIP_THRESHOLD_MIN_mm && threshold_mm <= WIRE_SLIP_THRESHOLD_MAX_mm)) {
+    out_of_range("slip threshold", shortest(threshold_mm), threshold_range());
+  }
+}
+
+void check_window(std::uint64_t window_ms) {
+  if (window_ms < WIRE_SLIP_WINDOW_MIN_ms || window_ms > WIRE_SLIP_WINDOW_MAX_ms) {
+    out_of_range("slip window", std::to_string(window_ms), window_range());
+  }
+}
+
+} // namespace
+
+wire_packet command_stream(std::uint8_t streams) {
+  wire_packet packet = packet_of(WIRE_CMD_STREAM);
+  packet.body.cmd_stream.streams = streams;
+  return packet;
+}
+
+wire_packet command_tare() {
+  return packet_of(WIRE_CMD_TARE);
+}
+
+wire_packet command_rate_mHz(std::uint32_t rate_mHz) {
+  check_rate(rate_mHz, fixed(rate_mHz / 1000.0, 3));
+  wire_packet packet = packet_of(WIRE_CMD_RATE);
+  packet.body.cmd_rate.rate_mHz = rate_mHz;
+  return packet;
+}
+
+wire_packet command_osr(std::uint32_t osr) {
+  check_osr(osr);
+  wire_packet packet = packet_of(WIRE_CMD_OSR);
+  packet.body.cmd_osr.osr = static_cast<std::uint16_t>(osr);
+  return packet;
+}
+
+wire_packet command_slip(float threshold_mm, std::uint32_t window_ms) {
+  check_threshold(threshold_mm);
+  check_window(window_ms);
+  wire_packet packet = packet_of(WIRE_CMD_SLIP);
+  packet.body.cmd_slip.threshold_mm = threshold_mm;
+  packet.body.cmd_slip.window_ms = static_cast<std::uint16_t>(window_ms);
+  return packet;
+}
+
+wire_packet command_info() {
+  return packet_of(WIRE_CMD_INFO);
+}
+wire_packet command_health() {
+  return packet_of(WIRE_CMD_HEALTH);
+}
+
+wire_packet command_loader() {
+  wire_packet packet = packet_of(WIRE_CMD_LOADER);
+  packet.body.cmd_loader.magic = WIRE_LOADER_MAGIC;
+  return packet;
+}
+
+std::uint32_t rate_mHz_from_text(const std::string &text) {
+  if (text == "max") {
+    return 0;
+  }
+  auto rate_Hz = to_double(text);
+  if (!rate_Hz) {
+    throw Error("rate \"" + text + "\" is no number; give " + rate_range());
+  }
+  if (*rate_Hz * 1000 < WIRE_RATE_MIN_mHz || *rate_Hz * 1000 > WIRE_RATE_MAX_mHz) {
+    out_of_range("rate", text, rate_range());
+  }
+  return static_cast<std::uint32_t>(std::lround(*rate_Hz * 1000));
+}
+
+std::uint32_t osr_from_text(const std::string &text) {
+  auto osr = to_u64(text);
+  if (!osr) {
+    throw Error("osr \"" + text + "\" is no whole number; give " + osr_range());
+  }
+  check_osr(*osr);
+  return static_cast<std::uint32_t>(*osr);
+}
+
+float slip_threshold_mm_from_text(const std::string &text) {
+  auto threshold_mm = to_float(text);
+  if (!threshold_mm) {
+    throw Error("slip threshold \"" + text + "\" is no number; give " + threshold_range());
+  }
+  check_threshold(*threshold_mm);
+  return *threshold_mm;
+}
+
+std::uint32_t slip_window_ms_from_text(const std::string &text) {
+  auto window_ms = to_u64(text);
+  if (!window_ms) {
+    throw Error("slip window \"" + text + "\" is no whole number; give " + window_range());
+  }
+  check_window(*window_ms);
+  return static_cast<std::uint32_t>(*window_ms);
+}
+
+std::vector<std::uint8_t> frame_bytes(const wire_packet &packet) {
+  std::vector<std::uint8_t> bytes(WIRE_MAX_FRAME_BYTES);
+  std::size_t length = 0;
+  if (wire_encode(&packet, bytes.data(), bytes.size(), &length) != FT_OK) {
+    throw std::logic_error("a packet that the codec refuses");
+  }
+  bytes.resize(length);
+  return bytes;
+}
+
+} // namespace fingertip

@@ -1,0 +1,32 @@
+/* Commands for a fingertip, their values checked against the ranges of packet.h before anything is
+ * sent. Each function throws Error with the allowed range. */
+#pragma once
+
+#include "libfingertip/wire.hpp"
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace fingertip {
+
+/* Sequence and time are filled in by whoever sends. */
+wire_packet command_stream(std::uint8_t streams);
+wire_packet command_tare();
+wire_packet command_rate_mHz(std::uint32_t rate_mHz);
+wire_packet command_osr(std::uint32_t osr);
+wire_packet command_slip(float threshold_mm, std::uint32_t window_ms);
+wire_packet command_info();
+wire_packet command_health();
+wire_packet command_loader();
+
+/* Values as people type them. Each throws Error if the text is no number or out of range. */
+std::uint32_t rate_mHz_from_text(const std::string &text); /* Hz, or "max" */
+std::uint32_t osr_from_text(const std::string &text);
+float slip_threshold_mm_from_text(const std::string &text);
+std::uint32_t slip_window_ms_from_text(const std::string &text);
+
+/* The bytes of a packet on the line, delimiter included. */
+std::vector<std::uint8_t> frame_bytes(const wire_packet &packet);
+
+} // namespace fingertip

@@ -1,0 +1,71 @@
+#include "libfingertip/decoder.hpp"
+
+namespace fingertip {
+
+std::string LineStatistics::text() const {
+  auto pair = [](const char *key, std::uint64_t value) {
+    return std::string(key) + "=" + std::to_string(value);
+  };
+  return pair("packets", packets) + " " + pair("dropped_packets", dropped_packets) + " " +
+         pair("out_of_order", out_of_order) + " " + pair("crc_errors", crc_errors) + " " +
+         pair("format_errors", format_errors) + " " + pair("version_errors", version_errors) + " " +
+         pair("unknown_types", unknown_types);
+}
+
+Decoder::Decoder() {
+  wire_receiver_init(&receiver_);
+}
+
+void Decoder::restart() {
+  wire_receiver_init(&receiver_);
+  joining_ = true;
+  expected_sequence_.reset();
+}
+
+void Decoder::follow_sequence(std::uint16_t sequence) {
+  if (expected_sequence_) {
+    auto ahead = static_cast<std::uint16_t>(sequence - *expected_sequence_);
+    if (ahead < 0x8000) {
+      statistics_.dropped_packets += ahead;
+    } else {
+      statistics_.out_of_order++;
+    }
+  }
+  expected_sequence_ = static_cast<std::uint16_t>(sequence + 1);
+}
+
+void Decoder::feed(const std::uint8_t *bytes, std::size_t length, const Handler &handler) {
+  statistics_.bytes += length;
+  for (std::size_t i = 0; i < length; i++) {
+    wire_packet packet;
+    ft_status status = wire_receive(&receiver_, bytes[i], &packet);
+    bool torn_by_joining = joining_;
+    if (bytes[i] == 0) {
+      joining_ = false;
+    }
+    switch (status) {
+    case FT_PENDING:
+      break;
+    case FT_OK:
+      statistics_.packets++;
+      follow_sequence(packet.sequence);
+      handler(packet);
+      break;
+    case FT_ERR_TYPE:
+      statistics_.unknown_types++;
+      follow_sequence(packet.sequence);
+      break;
+    case FT_ERR_VERSION:
+      statistics_.version_errors++;
+      break;
+    case FT_ERR_CRC:
+      statistics_.crc_errors += torn_by_joining ? 0 : 1;
+      break;
+    default:
+      statistics_.format_errors += torn_by_joining ? 0 : 1;
+      break;
+    }
+  }
+}
+
+} // namespace fingertip

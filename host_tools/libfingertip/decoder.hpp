@@ -1,0 +1,55 @@
+/* Bytes of the line to packets, with an account of everything that went wrong on the way.
+ *
+ * After any damage decoding goes on after the next 0x00 (PROTOCOL.md, resynchronisation). The frame
+ * that is under way when a receiver joins is torn by nature: its failure counts as nothing.
+ */
+#pragma once
+
+#include "libfingertip/wire.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+namespace fingertip {
+
+struct LineStatistics {
+  std::uint64_t bytes = 0;
+  std::uint64_t packets = 0;         /* undamaged and of a known type */
+  std::uint64_t dropped_packets = 0; /* missing from the sequence */
+  std::uint64_t out_of_order = 0;    /* repeated, or older than one before */
+  std::uint64_t crc_errors = 0;
+  std::uint64_t format_errors = 0; /* right or no CRC, but no frame of this protocol */
+  std::uint64_t version_errors = 0;
+  std::uint64_t unknown_types = 0; /* undamaged, from a newer firmware */
+
+  /* "dropped_packets=0 crc_errors=0 ...", as recordings end with. */
+  std::string text() const;
+};
+
+class Decoder {
+public:
+  using Handler = std::function<void(const wire_packet &)>;
+
+  Decoder();
+
+  /* Calls the handler for each packet that these bytes complete. */
+  void feed(const std::uint8_t *bytes, std::size_t length, const Handler &handler);
+
+  /* The line was interrupted: join anew, and expect no particular sequence number. */
+  void restart();
+
+  const LineStatistics &statistics() const { return statistics_; }
+
+private:
+  void follow_sequence(std::uint16_t sequence);
+
+  wire_receiver receiver_;
+  bool joining_ = true;
+  std::optional<std::uint16_t> expected_sequence_;
+  LineStatistics statistics_;
+};
+
+} // namespace fingertip

@@ -1,0 +1,126 @@
+#include "libfingertip/names.hpp"
+
+#include "libfingertip/error.hpp"
+#include "libfingertip/text.hpp"
+#include "libfingertip/wire.hpp"
+
+namespace fingertip {
+
+const std::vector<FlagName> &flag_names() {
+  static const std::vector<FlagName> names = {
+      {CONTACT_FLAG_CONTACT, "CONTACT", false},
+      {CONTACT_FLAG_FIT_VALID, "FIT_VALID", false},
+      {CONTACT_FLAG_UNCERTAINTY_VALID, "UNCERTAINTY_VALID", false},
+      {CONTACT_FLAG_SLIP_VALID, "SLIP_VALID", false},
+      {CONTACT_FLAG_SLIP, "SLIP", false},
+      {CONTACT_FLAG_TARED, "TARED", false},
+      {CONTACT_FLAG_LOW_SIGNAL, "LOW_SIGNAL", true},
+      {CONTACT_FLAG_FLAT, "FLAT", true},
+      {CONTACT_FLAG_UNCERTAIN, "UNCERTAIN", true},
+      {CONTACT_FLAG_MODEL, "MODEL", true},
+      {CONTACT_FLAG_SATURATED, "SATURATED", true},
+      {CONTACT_FLAG_FORCE_LOWER_BOUND, "FORCE_LOWER_BOUND", true},
+      {CONTACT_FLAG_SENSOR_MASKED, "SENSOR_MASKED", true},
+      {CONTACT_FLAG_AT_BOUND, "AT_BOUND", true},
+  };
+  return names;
+}
+
+std::string flags_text(std::uint32_t flags) {
+  std::string text;
+  auto add = [&](const std::string &name) { text += (text.empty() ? "" : " ") + name; };
+  for (const FlagName &flag : flag_names()) {
+    if (flags & flag.bit) {
+      add(flag.name);
+      flags &= ~flag.bit;
+    }
+  }
+  for (int bit = 0; bit < 32; bit++) {
+    if (flags >> bit & 1u) {
+      add("bit" + std::to_string(bit));
+    }
+  }
+  return text;
+}
+
+std::string command_name(std::uint8_t type) {
+  switch (type) {
+  case WIRE_CMD_STREAM:
+    return "stream";
+  case WIRE_CMD_TARE:
+    return "tare";
+  case WIRE_CMD_RATE:
+    return "rate";
+  case WIRE_CMD_OSR:
+    return "osr";
+  case WIRE_CMD_SLIP:
+    return "slip";
+  case WIRE_CMD_INFO:
+    return "info";
+  case WIRE_CMD_HEALTH:
+    return "health";
+  case WIRE_CMD_LOADER:
+    return "loader";
+  default:
+    return "0x" + hex({type});
+  }
+}
+
+std::string result_text(std::uint8_t result) {
+  switch (result) {
+  case WIRE_RESULT_DONE:
+    return "done";
+  case WIRE_RESULT_UNKNOWN_COMMAND:
+    return "its firmware does not know this command; update the firmware";
+  case WIRE_RESULT_OUT_OF_RANGE:
+    return "the value is out of range for this firmware";
+  case WIRE_RESULT_NOT_NOW:
+    return "not possible now; see that its sensors answer (fingertip info)";
+  default:
+    return "result " + std::to_string(result) + "; update these tools";
+  }
+}
+
+namespace {
+
+struct StreamName {
+  std::uint8_t bit;
+  const char *name;
+};
+constexpr StreamName stream_names[] = {
+    {WIRE_STREAM_CONTACT, "contact"}, {WIRE_STREAM_RAW, "raw"}, {WIRE_STREAM_HEALTH, "health"}};
+
+} // namespace
+
+std::string streams_text(std::uint8_t streams) {
+  std::string text;
+  for (const StreamName &stream : stream_names) {
+    if (streams & stream.bit) {
+      text += (text.empty() ? "" : ",") + std::string(stream.name);
+    }
+  }
+  return text.empty() ? "none" : text;
+}
+
+std::uint8_t streams_from_text(const std::string &text) {
+  std::uint8_t streams = 0;
+  if (text == "none") {
+    return streams;
+  }
+  for (std::string_view part : split(text, ',')) {
+    bool known = false;
+    for (const StreamName &stream : stream_names) {
+      if (part == stream.name) {
+        streams = static_cast<std::uint8_t>(streams | stream.bit);
+        known = true;
+      }
+    }
+    if (!known) {
+      throw Error("stream \"" + std::string(part) +
+                  "\" is unknown; give none, or some of contact,raw,health");
+    }
+  }
+  return streams;
+}
+
+} // namespace fingertip

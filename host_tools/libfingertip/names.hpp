@@ -1,0 +1,32 @@
+/* Names of what the wire protocol numbers, as people read and type them. */
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace fingertip {
+
+struct FlagName {
+  std::uint32_t bit;
+  const char *name;
+  bool warning; /* the numbers deserve less trust */
+};
+
+/* Every flag of the contact packet, lowest bit first. */
+const std::vector<FlagName> &flag_names();
+
+/* "CONTACT FIT_VALID", an unknown bit as "bit9". */
+std::string flags_text(std::uint32_t flags);
+
+/* "stream", "tare", ...: a command's type; "0x9a" if unknown. */
+std::string command_name(std::uint8_t type);
+
+/* What an acknowledgement's result means, for the end of a sentence. */
+std::string result_text(std::uint8_t result);
+
+/* "contact,raw" and back; "none" is 0. Throws Error on an unknown name. */
+std::string streams_text(std::uint8_t streams);
+std::uint8_t streams_from_text(const std::string &text);
+
+} // namespace fingertip

@@ -1,0 +1,634 @@
+#include "libfingertip/recording.hpp"
+
+#include "libfingertip/error.hpp"
+#include "libfingertip/names.hpp"
+#include "libfingertip/text.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fcntl.h>
+#include <limits>
+#include <map>
+#include <type_traits>
+#include <unistd.h>
+
+namespace fingertip {
+
+namespace {
+
+constexpr const char *FIRST_LINE = "# fingertip-recording 1";
+constexpr double Q10 = 1024.0;
+
+/* A value of the packet that the file shows in another unit: shown = raw / scale. */
+template <typename Integer> struct Scaled {
+  Integer &raw;
+  double scale;
+  int digits;
+};
+
+/* One walk over the fields of each packet serves the header, the rows and the reader; the order
+ * here is the order of the columns. */
+template <typename Visitor> void visit_contact(Visitor &visit, wire_packet &packet) {
+  wire_contact &contact = packet.body.contact;
+  visit("sequence", packet.sequence);
+  visit("flags", contact.flags);
+  visit("sensors_used", contact.sensors_used);
+  visit("x_mm", contact.x_mm);
+  visit("y_mm", contact.y_mm);
+  visit("p0_Pa", contact.p0_Pa);
+  visit("sigma_mm", contact.sigma_mm);
+  visit("force_N", contact.force_N);
+  visit("slip_mm", contact.slip_mm);
+  visit("residual_rms_Pa", contact.residual_rms_Pa);
+  visit("location_sd_mm", contact.location_sd_mm);
+  visit("force_sd_N", contact.force_sd_N);
+  visit("convert_us", contact.stages.convert_us);
+  visit("read_us", contact.stages.read_us);
+  visit("queue_us", contact.stages.queue_us);
+  visit("condition_us", contact.stages.condition_us);
+  visit("fit_us", contact.stages.fit_us);
+  visit("contact_us", contact.stages.contact_us);
+  visit("total_us", contact.stages.total_us);
+}
+
+template <typename Visitor>
+void visit_raw(Visitor &visit, wire_packet &packet, std::uint8_t sensor_count) {
+  wire_raw &raw = packet.body.raw;
+  visit("raw_sequence", packet.sequence);
+  visit("valid", raw.valid);
+  visit("saturated", raw.saturated);
+  visit("temperature_degC", Scaled<std::int16_t>{raw.temperature_cC, 100.0, 2});
+  for (int k = 0; k < sensor_count; k++) {
+    visit("s" + std::to_string(k) + "_Pa", Scaled<std::int32_t>{raw.pressure_Pa_q10[k], Q10, 4});
+  }
+  for (int k = 0; k < sensor_count; k++) {
+    visit("tare" + std::to_string(k) + "_Pa", Scaled<std::int32_t>{raw.baseline_Pa_q10[k], Q10, 4});
+  }
+}
+
+template <typename Visitor> void visit_health(Visitor &visit, wire_health &health) {
+  visit("uptime_s", health.uptime_s);
+  visit("frames", health.frames);
+  visit("frames_incomplete", health.frames_incomplete);
+  visit("packets_sent", health.packets_sent);
+  visit("packets_dropped", health.packets_dropped);
+  visit("commands_done", health.commands_done);
+  visit("commands_rejected", health.commands_rejected);
+  visit("bus_nacks", health.bus_nacks);
+  visit("bus_timeouts", health.bus_timeouts);
+  visit("bus_recoveries", health.bus_recoveries);
+  visit("zero_readings", health.zero_readings);
+  visit("fit_failures", health.fit_failures);
+  visit("sensors_present", health.sensors_present);
+  visit("sensors_prom_bad", health.sensors_prom_bad);
+  visit("watchdog_resets", health.watchdog_resets);
+  visit("cpu_busy_permille", health.cpu_busy_permille);
+  visit("stack_free_bytes", health.stack_free_bytes);
+}
+
+template <typename Visitor> void visit_ack(Visitor &visit, wire_ack &ack) {
+  visit("command", ack.command);
+  visit("result", ack.result);
+  visit("command_sequence", ack.sequence);
+  visit("host_time_us", ack.host_time_us);
+}
+
+template <typename Visitor> void visit_info(Visitor &visit, wire_info &info) {
+  visit("sensors", info.sensor_count);
+  visit("rate_mHz", info.rate_mHz);
+  visit("measured_rate_mHz", info.measured_rate_mHz);
+  visit("osr", info.osr);
+  visit("temperature_interval", info.temperature_interval);
+  visit("slip_threshold_mm", info.slip_threshold_mm);
+  visit("slip_window_ms", info.slip_window_ms);
+  visit("fit_iterations", info.fit_iterations);
+  visit("streams", info.streams);
+  visit("pitch_mm", info.pitch_mm);
+}
+
+struct Namer {
+  std::string text;
+  template <typename Value> void operator()(const std::string &name, const Value &) {
+    text += "," + name;
+  }
+};
+
+template <typename Value> std::string cell_text(const Value &value) {
+  if constexpr (std::is_same_v<Value, float>) {
+    return shortest(value);
+  } else if constexpr (std::is_integral_v<Value>) {
+    return std::to_string(value);
+  } else {
+    return fixed(value.raw / value.scale, value.digits);
+  }
+}
+
+struct RowWriter {
+  std::string text;
+  template <typename Value> void operator()(const std::string &, const Value &value) {
+    text += "," + cell_text(value);
+  }
+};
+
+struct PairWriter {
+  Metadata pairs;
+  template <typename Value> void operator()(const std::string &name, const Value &value) {
+    pairs.emplace_back(name, cell_text(value));
+  }
+  std::string text() const {
+    std::string joined;
+    for (const auto &[key, value] : pairs) {
+      joined += " " + key + "=" + value;
+    }
+    return joined;
+  }
+};
+
+/* What is wrong with a line, without its place. */
+struct Damage {
+  std::string what;
+};
+
+template <typename Integer> Integer checked(std::int64_t value, const std::string &name) {
+  if (value < static_cast<std::int64_t>(std::numeric_limits<Integer>::min()) ||
+      value > static_cast<std::int64_t>(std::numeric_limits<Integer>::max())) {
+    throw Damage{name + " is out of range"};
+  }
+  return static_cast<Integer>(value);
+}
+
+template <typename Value>
+void parse_cell(const std::string &name, std::string_view cell, Value &&value) {
+  using Plain = std::decay_t<Value>;
+  std::string wrong = name + " is \"" + std::string(cell) + "\"";
+  if constexpr (std::is_same_v<Plain, float>) {
+    auto number = to_float(cell);
+    if (!number) {
+      throw Damage{wrong};
+    }
+    value = *number;
+  } else if constexpr (std::is_same_v<Plain, std::uint64_t>) {
+    auto number = to_u64(cell);
+    if (!number) {
+      throw Damage{wrong};
+    }
+    value = *number;
+  } else if constexpr (std::is_integral_v<Plain>) {
+    auto number = to_i64(cell);
+    if (!number) {
+      throw Damage{wrong};
+    }
+    value = checked<Plain>(*number, name);
+  } else {
+    auto number = to_double(cell);
+    if (!number || std::fabs(*number) > 1e12) {
+      throw Damage{wrong};
+    }
+    value.raw =
+        checked<std::decay_t<decltype(value.raw)>>(std::llround(*number * value.scale), name);
+  }
+}
+
+struct RowReader {
+  const std::vector<std::string_view> &cells;
+  std::size_t at;
+  template <typename Value> void operator()(const std::string &name, Value &&value) {
+    parse_cell(name, cells[at++], std::forward<Value>(value));
+  }
+};
+
+struct PairReader {
+  const std::map<std::string, std::string, std::less<>> &pairs;
+  template <typename Value> void operator()(const std::string &name, Value &&value) {
+    auto pair = pairs.find(name);
+    if (pair == pairs.end()) {
+      throw Damage{name + " is missing"};
+    }
+    parse_cell(name, pair->second, std::forward<Value>(value));
+  }
+};
+
+std::string header_text(std::uint8_t sensor_count) {
+  wire_packet packet;
+  std::memset(&packet, 0, sizeof packet);
+  Namer namer;
+  visit_contact(namer, packet);
+  visit_raw(namer, packet, sensor_count);
+  return "t_us,frame" + namer.text;
+}
+
+std::size_t contact_columns() {
+  wire_packet packet;
+  std::memset(&packet, 0, sizeof packet);
+  Namer namer;
+  visit_contact(namer, packet);
+  return static_cast<std::size_t>(std::count(namer.text.begin(), namer.text.end(), ','));
+}
+
+std::string text_field(const char *field) {
+  return std::string(field, strnlen(field, WIRE_TEXT_BYTES));
+}
+
+std::string positions_text(const float *positions, std::uint8_t count) {
+  std::string text;
+  for (int k = 0; k < count; k++) {
+    text += (k ? " " : "") + shortest(positions[k]);
+  }
+  return text;
+}
+
+constexpr const char *PACKET_HEALTH = "health";
+constexpr const char *PACKET_INFO = "info";
+constexpr const char *PACKET_ACK = "ack";
+
+} // namespace
+
+Metadata info_metadata(const wire_info &info) {
+  const std::uint8_t *version = info.firmware_version;
+  Metadata pairs = {
+      {"serial", text_field(info.serial)},
+      {"board", text_field(info.board)},
+      {"scene", text_field(info.scene)},
+      {"firmware", std::to_string(version[0]) + "." + std::to_string(version[1]) + "." +
+                       std::to_string(version[2])},
+      {"git", text_field(info.git_hash)},
+  };
+  wire_info copy = info;
+  PairWriter writer;
+  visit_info(writer, copy);
+  pairs.insert(pairs.end(), writer.pairs.begin(), writer.pairs.end());
+  pairs.emplace_back("x_mm", positions_text(info.x_mm, info.sensor_count));
+  pairs.emplace_back("y_mm", positions_text(info.y_mm, info.sensor_count));
+  return pairs;
+}
+
+std::vector<std::pair<std::string, std::uint32_t>> health_fields(const wire_health &health) {
+  std::vector<std::pair<std::string, std::uint32_t>> fields;
+  auto visit = [&](const std::string &name, std::uint32_t value) {
+    fields.emplace_back(name, value);
+  };
+  wire_health copy = health;
+  visit_health(visit, copy);
+  return fields;
+}
+
+OutputFile::OutputFile(const std::string &path, bool replace) : path_(path) {
+  fd_ = open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | (replace ? O_TRUNC : O_EXCL), 0666);
+  if (fd_ < 0) {
+    int error = errno;
+    throw Error(path + ": " +
+                (error == EEXIST
+                     ? std::string("exists already; choose another name, or --overwrite")
+                     : std::string(std::strerror(error)) + "; choose another place"));
+  }
+}
+
+OutputFile::~OutputFile() {
+  close(fd_);
+}
+
+void OutputFile::append(const void *bytes, std::size_t length) {
+  auto next = static_cast<const char *>(bytes);
+  std::size_t left = length;
+  while (left > 0) {
+    ssize_t count = write(fd_, next, left);
+    if (count < 0 && errno == EINTR) {
+      continue;
+    }
+    if (count <= 0) {
+      int error = count == 0 ? ENOSPC : errno;
+      if (ftruncate(fd_, length_) != 0) {
+        throw Error(path_ + ": " + std::strerror(error) +
+                    "; its last line is torn, read it with --salvage");
+      }
+      throw Error(path_ + ": " + std::strerror(error) +
+                  "; what was written until now stays readable, make room and start a new file");
+    }
+    next += count;
+    left -= static_cast<std::size_t>(count);
+  }
+  length_ += static_cast<std::int64_t>(length);
+}
+
+RecordingWriter::RecordingWriter(const std::string &path, bool replace, const wire_info *info,
+                                 std::uint8_t sensor_count, const Metadata &extra,
+                                 bool raw_expected)
+    : file_(path, replace), sensor_count_(sensor_count), raw_expected_(raw_expected) {
+  line(FIRST_LINE);
+  for (const auto &[key, value] : extra) {
+    line("# " + key + ": " + value);
+  }
+  if (info) {
+    write_info(*info);
+  }
+  line(header_text(sensor_count_));
+}
+
+void RecordingWriter::write_info(const wire_info &info) {
+  Metadata all = info_metadata(info);
+  for (const auto &pair : all) {
+    if (std::find(info_.begin(), info_.end(), pair) == info_.end()) {
+      line("# " + pair.first + ": " + pair.second);
+    }
+  }
+  info_ = all;
+}
+
+void RecordingWriter::line(const std::string &text) {
+  std::string whole = text + "\n";
+  file_.append(whole.data(), whole.size());
+}
+
+void RecordingWriter::row(const wire_packet *contact, const wire_packet *raw) {
+  const wire_packet &any = contact ? *contact : *raw;
+  std::uint32_t frame = contact ? contact->body.contact.frame : raw->body.raw.frame;
+  RowWriter writer;
+  writer.text = std::to_string(any.t_us) + "," + std::to_string(frame);
+  if (contact) {
+    wire_packet copy = *contact;
+    visit_contact(writer, copy);
+  } else {
+    writer.text += std::string(contact_columns(), ',');
+  }
+  if (raw) {
+    wire_packet copy = *raw;
+    visit_raw(writer, copy, sensor_count_);
+  } else {
+    writer.text += std::string(4u + 2u * sensor_count_, ',');
+  }
+  line(writer.text);
+  frames_++;
+  first_us_ = first_us_.value_or(any.t_us);
+  last_us_ = any.t_us;
+}
+
+void RecordingWriter::write_pending() {
+  if (pending_contact_) {
+    wire_packet contact = *pending_contact_;
+    pending_contact_.reset();
+    row(&contact, nullptr);
+  }
+}
+
+void RecordingWriter::packet(const wire_packet &packet) {
+  wire_packet copy = packet;
+  PairWriter writer;
+  writer("sequence", packet.sequence);
+  writer("t_us", packet.t_us);
+  switch (packet.type) {
+  case WIRE_CONTACT:
+    write_pending();
+    if (raw_expected_) {
+      pending_contact_ = packet;
+    } else {
+      row(&packet, nullptr);
+    }
+    return;
+  case WIRE_RAW:
+    if (packet.body.raw.sensor_count != sensor_count_) {
+      throw Error(path() + ": the fingertip now has " +
+                  std::to_string(packet.body.raw.sensor_count) + " sensors instead of " +
+                  std::to_string(sensor_count_) + "; start a new recording");
+    }
+    if (pending_contact_ && pending_contact_->body.contact.frame == packet.body.raw.frame &&
+        pending_contact_->t_us == packet.t_us) {
+      wire_packet contact = *pending_contact_;
+      pending_contact_.reset();
+      row(&contact, &packet);
+    } else {
+      write_pending();
+      row(nullptr, &packet);
+    }
+    return;
+  case WIRE_HEALTH:
+    write_pending();
+    visit_health(writer, copy.body.health);
+    line(std::string("# packet: ") + PACKET_HEALTH + writer.text());
+    return;
+  case WIRE_ACK:
+    write_pending();
+    visit_ack(writer, copy.body.ack);
+    line(std::string("# packet: ") + PACKET_ACK + writer.text());
+    return;
+  case WIRE_INFO:
+    write_pending();
+    write_info(packet.body.info);
+    line(std::string("# packet: ") + PACKET_INFO + writer.text());
+    return;
+  default:
+    return;
+  }
+}
+
+void RecordingWriter::event(const std::string &text) {
+  write_pending();
+  line("# event: " + text);
+}
+
+void RecordingWriter::finish(const LineStatistics &statistics, const std::string &reason) {
+  write_pending();
+  double seconds = first_us_ ? static_cast<double>(last_us_ - *first_us_) / 1e6 : 0.0;
+  line("# end: reason=" + reason + " frames=" + std::to_string(frames_) +
+       " seconds=" + fixed(seconds, 6) + " " + statistics.text());
+}
+
+RecordingReader::RecordingReader(const std::string &path, bool salvage)
+    : path_(path), salvage_(salvage), file_(path, std::ios::binary) {
+  if (!file_) {
+    throw Error(path + ": " + std::strerror(errno) + "; check the path");
+  }
+  std::memset(&info_, 0, sizeof info_);
+  std::string first;
+  std::getline(file_, first);
+  line_number_ = 1;
+  if (trim(first) != FIRST_LINE) {
+    throw Error(path + ":1: no recording of this version; its first line must be \"" + FIRST_LINE +
+                "\"");
+  }
+}
+
+void RecordingReader::damaged(const std::string &what) const {
+  throw Error(path_ + ":" + std::to_string(line_number_) + ": " + what +
+              "; use --salvage to skip damaged lines");
+}
+
+std::optional<RecordingReader::Item> RecordingReader::next() {
+  std::string text;
+  while (items_.empty() && std::getline(file_, text)) {
+    line_number_++;
+    try {
+      if (file_.eof() && !text.empty()) {
+        throw Damage{"the last line is torn"};
+      }
+      read_line(text);
+    } catch (const Damage &damage) {
+      if (!salvage_ || !header_seen_) {
+        damaged(damage.what);
+      }
+      skipped_lines_++;
+    }
+  }
+  if (items_.empty()) {
+    if (!header_seen_) {
+      throw Error(path_ + ": no header line; record anew");
+    }
+    return std::nullopt;
+  }
+  Item item = items_.front();
+  items_.pop_front();
+  return item;
+}
+
+void RecordingReader::read_line(const std::string &text) {
+  if (trim(text).empty()) {
+    return;
+  }
+  if (text[0] == '#') {
+    read_comment(text);
+  } else if (header_seen_) {
+    read_row(text);
+  } else {
+    auto columns = static_cast<std::size_t>(std::count(text.begin(), text.end(), ',')) + 1;
+    std::size_t fixed_columns = 2 + contact_columns() + 4;
+    std::size_t sensors = columns > fixed_columns ? (columns - fixed_columns) / 2 : 0;
+    if (sensors > FT_MAX_SENSORS || text != header_text(static_cast<std::uint8_t>(sensors))) {
+      throw Damage{"unknown header"};
+    }
+    sensor_count_ = static_cast<std::uint8_t>(sensors);
+    header_seen_ = true;
+  }
+}
+
+void RecordingReader::read_comment(const std::string &text) {
+  std::size_t colon = text.find(": ");
+  if (colon == std::string::npos) {
+    throw Damage{"neither a comment \"# key: value\" nor a row"};
+  }
+  std::string key(trim(std::string_view(text).substr(1, colon - 1)));
+  std::string value(text.substr(colon + 2));
+  Item item{};
+  std::map<std::string, std::string, std::less<>> pairs;
+  auto copy_text = [&](char *field) {
+    std::memset(field, 0, WIRE_TEXT_BYTES);
+    std::memcpy(field, value.data(), std::min<std::size_t>(value.size(), WIRE_TEXT_BYTES));
+  };
+  auto read_positions = [&](float *positions) {
+    auto numbers = split(value, ' ');
+    if (numbers.size() > FT_MAX_SENSORS) {
+      throw Damage{"too many sensor positions"};
+    }
+    for (std::size_t k = 0; k < numbers.size() && !value.empty(); k++) {
+      parse_cell(key, numbers[k], positions[k]);
+    }
+  };
+  if (key == "packet") {
+    auto words = split(value, ' ');
+    for (std::size_t i = 1; i < words.size(); i++) {
+      std::size_t equals = words[i].find('=');
+      if (equals == std::string_view::npos) {
+        throw Damage{"\"" + std::string(words[i]) + "\" is not key=value"};
+      }
+      pairs.emplace(words[i].substr(0, equals), words[i].substr(equals + 1));
+    }
+    PairReader reader{pairs};
+    item.kind = Item::Kind::packet;
+    reader("sequence", item.packet.sequence);
+    reader("t_us", item.packet.t_us);
+    if (words[0] == PACKET_HEALTH) {
+      item.packet.type = WIRE_HEALTH;
+      visit_health(reader, item.packet.body.health);
+    } else if (words[0] == PACKET_ACK) {
+      item.packet.type = WIRE_ACK;
+      visit_ack(reader, item.packet.body.ack);
+    } else if (words[0] == PACKET_INFO) {
+      if (info_.sensor_count < 1 || info_.sensor_count > FT_MAX_SENSORS) {
+        throw Damage{"an info packet without \"# sensors:\" before it"};
+      }
+      item.packet.type = WIRE_INFO;
+      item.packet.body.info = info_;
+    } else {
+      throw Damage{"packet \"" + std::string(words[0]) + "\" is unknown"};
+    }
+    items_.push_back(item);
+  } else if (key == "event") {
+    item.kind = Item::Kind::event;
+    item.event = value;
+    items_.push_back(item);
+  } else if (key == "serial") {
+    copy_text(info_.serial);
+  } else if (key == "board") {
+    copy_text(info_.board);
+  } else if (key == "scene") {
+    copy_text(info_.scene);
+  } else if (key == "git") {
+    copy_text(info_.git_hash);
+  } else if (key == "firmware") {
+    auto parts = split(value, '.');
+    if (parts.size() != 3) {
+      throw Damage{"firmware is \"" + value + "\""};
+    }
+    for (std::size_t i = 0; i < 3; i++) {
+      parse_cell(key, parts[i], info_.firmware_version[i]);
+    }
+  } else if (key == "x_mm") {
+    read_positions(info_.x_mm);
+  } else if (key == "y_mm") {
+    read_positions(info_.y_mm);
+  } else {
+    auto visit = [&](const std::string &name, auto &field) {
+      if (name == key) {
+        parse_cell(name, value, field);
+      }
+    };
+    visit_info(visit, info_);
+  }
+}
+
+void RecordingReader::read_row(const std::string &text) {
+  auto cells = split(text, ',');
+  std::size_t contact_count = contact_columns();
+  std::size_t raw_count = 4 + 2 * std::size_t{sensor_count_};
+  if (cells.size() != 2 + contact_count + raw_count) {
+    throw Damage{std::to_string(cells.size()) + " columns where the header has " +
+                 std::to_string(2 + contact_count + raw_count)};
+  }
+  auto is_empty = [&](std::size_t from, std::size_t count) {
+    return std::all_of(cells.begin() + static_cast<std::ptrdiff_t>(from),
+                       cells.begin() + static_cast<std::ptrdiff_t>(from + count),
+                       [](std::string_view cell) { return cell.empty(); });
+  };
+  std::uint64_t t_us = 0;
+  std::uint32_t frame = 0;
+  parse_cell("t_us", cells[0], t_us);
+  parse_cell("frame", cells[1], frame);
+  std::vector<Item> items;
+  if (!is_empty(2, contact_count)) {
+    Item item{};
+    item.kind = Item::Kind::packet;
+    item.packet.type = WIRE_CONTACT;
+    item.packet.t_us = t_us;
+    RowReader reader{cells, 2};
+    visit_contact(reader, item.packet);
+    item.packet.body.contact.frame = frame;
+    items.push_back(item);
+  }
+  if (!is_empty(2 + contact_count, raw_count)) {
+    Item item{};
+    item.kind = Item::Kind::packet;
+    item.packet.type = WIRE_RAW;
+    item.packet.t_us = t_us;
+    RowReader reader{cells, 2 + contact_count};
+    visit_raw(reader, item.packet, sensor_count_);
+    item.packet.body.raw.frame = frame;
+    item.packet.body.raw.sensor_count = sensor_count_;
+    items.push_back(item);
+  }
+  if (items.empty()) {
+    throw Damage{"a row without a packet"};
+  }
+  items_.insert(items_.end(), items.begin(), items.end());
+}
+
+} // namespace fingertip

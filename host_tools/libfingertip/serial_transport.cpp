@@ -1,0 +1,151 @@
+#include "libfingertip/serial_transport.hpp"
+
+#include "libfingertip/error.hpp"
+
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/file.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
+#include <termios.h>
+#include <unistd.h>
+
+namespace fingertip {
+
+namespace {
+
+constexpr int WRITE_TIMEOUT_ms = 1000;
+
+std::string open_error(const std::string &path, int error) {
+  switch (error) {
+  case ENOENT:
+  case ENODEV:
+  case ENXIO:
+    return path + ": no such port; plug the fingertip in, then see `fingertip list`";
+  case EBUSY:
+  case EWOULDBLOCK:
+    return path + ": in use by another program; end that one first (who: fuser -v " + path + ")";
+  case EACCES:
+  case EPERM:
+    return path + ": permission denied; add yourself to the group that owns it (sudo usermod -aG "
+                  "dialout $USER) and log in anew";
+  default:
+    return path + ": cannot open (" + std::strerror(error) + "); check the path";
+  }
+}
+
+/* Major numbers of Unix98 pseudo-terminals, Documentation/admin-guide/devices.txt of Linux. */
+bool is_pseudo_terminal(int fd) {
+  struct stat status;
+  return fstat(fd, &status) == 0 && major(status.st_rdev) >= 136 && major(status.st_rdev) <= 143;
+}
+
+int open_port(const std::string &path, int *error) {
+  int fd = open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (fd < 0) {
+    *error = errno;
+    return -1;
+  }
+  termios settings;
+  bool fine = tcgetattr(fd, &settings) == 0;
+  if (fine) {
+    cfmakeraw(&settings);
+    settings.c_cflag |= CLOCAL | CREAD | HUPCL;
+    cfsetspeed(&settings, B115200);
+  }
+  /* The lock keeps out programs that ask for it, as root too; TIOCEXCL keeps out all others. On a
+   * pseudo-terminal TIOCEXCL would outlive a killed program. */
+  fine = fine && flock(fd, LOCK_EX | LOCK_NB) == 0 && tcsetattr(fd, TCSANOW, &settings) == 0 &&
+         (is_pseudo_terminal(fd) || ioctl(fd, TIOCEXCL) == 0);
+  if (!fine) {
+    *error = errno;
+    ::close(fd);
+    return -1;
+  }
+  return fd;
+}
+
+} // namespace
+
+SerialTransport::SerialTransport(const std::string &path) : path_(path) {
+  int error = 0;
+  fd_ = open_port(path_, &error);
+  if (fd_ < 0) {
+    if (error == ENOTTY) {
+      throw Error(path_ + ": no serial port; a recording is shown with `fingertip replay`");
+    }
+    throw Error(open_error(path_, error));
+  }
+}
+
+SerialTransport::~SerialTransport() {
+  close();
+}
+
+void SerialTransport::close() {
+  if (fd_ >= 0) {
+    ::close(fd_);
+    fd_ = -1;
+  }
+}
+
+Transport::Result SerialTransport::read(std::uint8_t *bytes, std::size_t capacity,
+                                        std::size_t *length, std::chrono::milliseconds timeout) {
+  *length = 0;
+  if (fd_ < 0) {
+    return Result::gone;
+  }
+  pollfd waiting = {fd_, POLLIN, 0};
+  int ready = poll(&waiting, 1, static_cast<int>(timeout.count()));
+  if (ready <= 0) {
+    return Result::timeout;
+  }
+  if (waiting.revents & POLLIN) {
+    ssize_t count = ::read(fd_, bytes, capacity);
+    if (count > 0) {
+      *length = static_cast<std::size_t>(count);
+      return Result::data;
+    }
+    if (count < 0 && (errno == EAGAIN || errno == EINTR)) {
+      return Result::timeout;
+    }
+  }
+  close();
+  return Result::gone;
+}
+
+bool SerialTransport::write(const std::uint8_t *bytes, std::size_t length) {
+  while (length > 0) {
+    if (fd_ < 0) {
+      return false;
+    }
+    ssize_t count = ::write(fd_, bytes, length);
+    if (count >= 0) {
+      bytes += count;
+      length -= static_cast<std::size_t>(count);
+    } else if (errno == EAGAIN) {
+      pollfd waiting = {fd_, POLLOUT, 0};
+      if (poll(&waiting, 1, WRITE_TIMEOUT_ms) <= 0) {
+        return false;
+      }
+    } else if (errno != EINTR) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool SerialTransport::reopen() {
+  close();
+  int error = 0;
+  fd_ = open_port(path_, &error);
+  if (fd_ < 0 && (error == EBUSY || error == EWOULDBLOCK)) {
+    throw Error(open_error(path_, error));
+  }
+  return fd_ >= 0;
+}
+
+} // namespace fingertip

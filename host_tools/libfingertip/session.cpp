@@ -1,0 +1,128 @@
+#include "libfingertip/session.hpp"
+
+#include "libfingertip/command.hpp"
+#include "libfingertip/names.hpp"
+
+#include <algorithm>
+
+namespace fingertip {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr std::chrono::milliseconds POLL_INTERVAL{50};
+
+} // namespace
+
+std::int64_t steady_now_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now().time_since_epoch())
+      .count();
+}
+
+Session::Session(Transport &transport, std::function<bool()> stop)
+    : transport_(transport), stop_(std::move(stop)) {}
+
+Transport::Result Session::poll(std::chrono::milliseconds timeout) {
+  std::uint8_t bytes[4096];
+  std::size_t length = 0;
+  Transport::Result result = transport_.read(bytes, sizeof bytes, &length, timeout);
+  if (result == Transport::Result::data) {
+    if (tap_) {
+      tap_(bytes, length);
+    }
+    decoder_.feed(bytes, length, [this](const wire_packet &packet) { take(packet); });
+  }
+  return result;
+}
+
+void Session::take(const wire_packet &packet) {
+  if (packet.type == WIRE_ACK) {
+    const wire_ack &ack = packet.body.ack;
+    std::int64_t now_us = steady_now_us();
+    auto sent_us = static_cast<std::int64_t>(ack.host_time_us);
+    if (sent_us > 0 && sent_us <= now_us) {
+      ClockRelation relation = {static_cast<std::int64_t>(packet.t_us) - (sent_us + now_us) / 2,
+                                (now_us - sent_us + 1) / 2};
+      if (!clock_ || relation.uncertainty_us < clock_->uncertainty_us) {
+        clock_ = relation;
+      }
+    }
+    /* The sequence numbers of this exchange's attempts are consecutive. */
+    auto attempt = static_cast<std::uint16_t>(ack.sequence - awaited_first_sequence_);
+    auto attempts = static_cast<std::uint16_t>(sequence_ - awaited_first_sequence_);
+    if (awaited_command_ && ack.command == awaited_command_ && attempt < attempts) {
+      ack_ = ack;
+    }
+  } else if (awaited_answer_ && packet.type == awaited_answer_ && ack_) {
+    answer_ = packet;
+  }
+  if (handler_) {
+    handler_(packet);
+  }
+}
+
+bool Session::send(wire_packet command) {
+  command.sequence = sequence_++;
+  command.t_us = static_cast<std::uint64_t>(steady_now_us());
+  auto bytes = frame_bytes(command);
+  return transport_.write(bytes.data(), bytes.size());
+}
+
+wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_type, Policy policy) {
+  std::string name = command_name(command.type);
+  awaited_command_ = command.type;
+  awaited_answer_ = answer_type;
+  awaited_first_sequence_ = sequence_;
+  ack_.reset();
+  answer_.reset();
+  for (int attempt = 0; attempt < policy.attempts; attempt++) {
+    send(command);
+    auto deadline = Clock::now() + policy.answer_timeout;
+    for (auto now = Clock::now(); now < deadline; now = Clock::now()) {
+      if (stop_()) {
+        throw Interrupted();
+      }
+      auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - now) +
+                  std::chrono::milliseconds(1);
+      if (poll(std::min(left, POLL_INTERVAL)) == Transport::Result::gone) {
+        throw Gone(transport_.description() + ": vanished before it answered \"" + name +
+                   "\"; plug it in and try again");
+      }
+      if (ack_ && ack_->result != WIRE_RESULT_DONE) {
+        throw Error("the fingertip refused \"" + name + "\": " + result_text(ack_->result));
+      }
+      if (ack_ && (answer_ || answer_type == 0)) {
+        awaited_command_ = 0;
+        awaited_answer_ = 0;
+        return answer_.value_or(command);
+      }
+    }
+  }
+  std::string hint = statistics().version_errors > 0
+                         ? "it speaks another protocol version; use the tools of its firmware"
+                         : "is it a fingertip? unplug it and plug it in again";
+  throw Error(transport_.description() + ": no answer to \"" + name + "\"; " + hint);
+}
+
+void Session::command(const wire_packet &command, Policy policy) {
+  exchange(command, 0, policy);
+}
+
+wire_packet Session::info() {
+  return exchange(command_info(), WIRE_INFO, Policy());
+}
+
+wire_packet Session::health() {
+  return exchange(command_health(), WIRE_HEALTH, Policy());
+}
+
+bool Session::reopen() {
+  if (!transport_.reopen()) {
+    return false;
+  }
+  decoder_.restart();
+  clock_.reset();
+  return true;
+}
+
+} // namespace fingertip

@@ -1,0 +1,96 @@
+/* A conversation with one fingertip: commands and their acknowledgements, while packets stream.
+ *
+ * Commands are repeated if no acknowledgement comes in time; each may arrive twice without harm.
+ * No packet is lost to waiting: the handler sees every one, in order.
+ */
+#pragma once
+
+#include "libfingertip/decoder.hpp"
+#include "libfingertip/error.hpp"
+#include "libfingertip/transport.hpp"
+
+#include <chrono>
+#include <functional>
+#include <optional>
+
+namespace fingertip {
+
+/* The port vanished in the middle of a command. */
+class Gone : public Error {
+public:
+  using Error::Error;
+};
+
+/* The stop function of the session said so, in the middle of a command. */
+class Interrupted : public std::exception {};
+
+/* device time = host time + offset, good to the uncertainty (half the best round trip). Host time
+ * is std::chrono::steady_clock in us. */
+struct ClockRelation {
+  std::int64_t device_minus_host_us;
+  std::int64_t uncertainty_us;
+};
+
+std::int64_t steady_now_us();
+
+class Session {
+public:
+  using Handler = std::function<void(const wire_packet &)>;
+  using Tap = std::function<void(const std::uint8_t *bytes, std::size_t length)>;
+
+  struct Policy {
+    std::chrono::milliseconds answer_timeout{1000};
+    int attempts = 10;
+  };
+
+  /* The transport must outlive the session. stop: asked while waiting; true throws Interrupted. */
+  explicit Session(
+      Transport &transport, std::function<bool()> stop = [] { return false; });
+
+  void on_packet(Handler handler) { handler_ = std::move(handler); }
+  void on_bytes(Tap tap) { tap_ = std::move(tap); }
+
+  /* Takes what comes, waiting at most this long for it to begin. */
+  Transport::Result poll(std::chrono::milliseconds timeout);
+
+  /* Returns once the fingertip has done it. Throws Error if it refuses or does not answer, Gone,
+   * Interrupted. */
+  void command(const wire_packet &command, Policy policy);
+  void command(const wire_packet &command) { this->command(command, Policy()); }
+
+  /* Sends without waiting for the answer. False: the port is gone or takes nothing. */
+  bool send(wire_packet command);
+
+  /* The whole packets, since recordings keep their header. */
+  wire_packet info();
+  wire_packet health();
+
+  /* After gone; the line begins anew. */
+  bool reopen();
+
+  const LineStatistics &statistics() const { return decoder_.statistics(); }
+  /* From the acknowledgements since the port was opened. */
+  std::optional<ClockRelation> clock() const { return clock_; }
+
+private:
+  void take(const wire_packet &packet);
+  /* Sends until the acknowledgement and, unless 0, a packet of the answer's type came. */
+  wire_packet exchange(const wire_packet &command, std::uint8_t answer_type, Policy policy);
+
+  Transport &transport_;
+  std::function<bool()> stop_;
+  Decoder decoder_;
+  Handler handler_;
+  Tap tap_;
+  std::uint16_t sequence_ = 0;
+  std::optional<ClockRelation> clock_;
+
+  /* The exchange under way. */
+  std::uint8_t awaited_command_ = 0;
+  std::uint8_t awaited_answer_ = 0;
+  std::uint16_t awaited_first_sequence_ = 0;
+  std::optional<wire_ack> ack_;
+  std::optional<wire_packet> answer_;
+};
+
+} // namespace fingertip

@@ -1,0 +1,38 @@
+/* Where the bytes of a fingertip come from: a serial port or pseudo-terminal
+ * (serial_transport.hpp), or a file (recording_transport.hpp).
+ */
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+namespace fingertip {
+
+class Transport {
+public:
+  enum class Result {
+    data,    /* at least one byte */
+    timeout, /* none came in time */
+    gone,    /* the other end vanished, or the file is at its end */
+  };
+
+  virtual ~Transport() = default;
+
+  /* Waits at most this long for the first byte. Throws Error only where waiting for the other end
+   * to come back could not help. */
+  virtual Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
+                      std::chrono::milliseconds timeout) = 0;
+
+  /* All of the bytes, or false: the other end is gone or takes nothing. */
+  virtual bool write(const std::uint8_t *bytes, std::size_t length) = 0;
+
+  /* After gone: true if it is there again. Never blocks; ask again later. */
+  virtual bool reopen() = 0;
+
+  /* For people: what this is. */
+  virtual std::string description() const = 0;
+};
+
+} // namespace fingertip
