@@ -1,0 +1,136 @@
+#!/usr/bin/python3
+"""Compares a recording with the truth of its scenario.
+
+    evaluate.py RECORDING.csv SCENARIO.csv [--run run.json] -o summary.json
+
+Scenario time = device time + device_time_zero_s of the run report (0 without one). The truth is taken at each
+frame's own time, linear between the scenario's rows. Frames whose time falls between a row with and a row
+without contact belong to neither.
+
+    frames, frames_per_s       contact packets in the recording, and their rate in device time
+    fitted_frames              frames with truth in contact and FIT_VALID: the ones compared
+    localisation_median_mm, localisation_p95_mm      distance of the location from the truth
+    force_rmse_N               root mean square error of the force
+    force_mape_percent         median absolute percentage error, as in De Clercq et al., RA-L 2022, section IV.C
+    force_mape_frames          only frames with a true force above 0.2 N count for it
+    contact_missed, contact_false     frames above 0.2 N without CONTACT; frames without contact but with CONTACT
+    slip_found, slip_missed    true slips of at least 50 ms with, without a SLIP frame between start and end + 0.1 s
+    slip_false                 SLIP frames outside of all true slips; a slip's end is widened by the slip window,
+                               over which the measure looks back
+    total_us_median            from the first bus activity of a frame to its packet
+    stages_sum_wrong           frames whose stages do not add up to their total
+    dropped_packets, crc_errors, format_errors       as the recorder counted; null if it was killed
+    emulator_warnings          of the run report
+"""
+import argparse
+import json
+import sys
+
+import numpy as np
+
+from fingertip_files import (
+    CONTACT, FIT_VALID, SLIP, STAGES, InputError, read_recording, read_run, read_scenario, run_tool, write_text)
+
+FORCE_MIN_N = 0.2
+SLIP_MIN_s = 0.05
+SLIP_LATE_s = 0.1
+DEFAULT_SLIP_WINDOW_ms = 100
+SATURATED_us = 65535
+
+
+class Comparison:
+    """Arrays over the frames that hold a contact packet, and the summary."""
+
+    def __init__(self, recording, scenario, run):
+        rows = recording.has_contact
+        if not rows.any():
+            raise InputError("the recording holds no contact packet; record with the contact stream on")
+        zero_s = run.get("device_time_zero_s", 0.0)
+        if not isinstance(zero_s, (int, float)):
+            raise InputError("device_time_zero_s of the run report is no number; the image never started its timer")
+        self.t_s = recording["t_us"][rows] / 1e6 + zero_s
+        if (np.diff(self.t_s) <= 0).any():
+            raise InputError("device time does not increase; the fingertip restarted, record again")
+        flag = {bit: recording.flag(bit)[rows] for bit in (CONTACT, FIT_VALID, SLIP)}
+        self.true_force_N = scenario.at("force_N", self.t_s)
+        in_contact = scenario.is_on("contact", self.t_s)
+        self.compared = in_contact & flag[FIT_VALID]
+        if not self.compared.any():
+            raise InputError("no fitted frame falls into a true contact; give the scenario and run report of this recording")
+        x, y, force = (recording[name][rows] for name in ("x_mm", "y_mm", "force_N"))
+        self.x_mm, self.y_mm, self.force_N = x, y, force
+        self.fitted, self.slip = flag[FIT_VALID], flag[SLIP]
+        self.location_error_mm = np.hypot(x - scenario.at("x_mm", self.t_s), y - scenario.at("y_mm", self.t_s))
+        self.force_error_N = force - self.true_force_N
+        self.strong = self.compared & (self.true_force_N > FORCE_MIN_N)
+
+        recorded = (self.t_s[0], self.t_s[-1])
+        self.slips = [s for s in scenario.intervals("slip") if recorded[0] <= s[0] and s[1] <= recorded[1]]
+        found = missed = 0
+        window_s = float(recording.metadata.get("slip_window_ms", DEFAULT_SLIP_WINDOW_ms)) / 1000
+        outside = self.slip.copy()
+        for start, end in scenario.intervals("slip"):
+            outside &= ~((self.t_s >= start) & (self.t_s <= end + window_s))
+        for start, end in self.slips:
+            if end - start < SLIP_MIN_s:
+                continue
+            if (self.slip & (self.t_s >= start) & (self.t_s <= end + SLIP_LATE_s)).any():
+                found += 1
+            else:
+                missed += 1
+
+        total = recording["total_us"][rows]
+        stages = np.column_stack([recording[name][rows] for name in STAGES])
+        unsaturated = (total < SATURATED_us) & (stages < SATURATED_us).all(axis=1)
+        error_mm, error_N = self.location_error_mm[self.compared], self.force_error_N[self.compared]
+        percent = 100 * np.abs(self.force_error_N[self.strong]) / self.true_force_N[self.strong]
+        self.summary = {
+            "frames": len(self.t_s),
+            "frames_per_s": float((len(self.t_s) - 1) / (recorded[1] - recorded[0])) if len(self.t_s) > 1 else 0.0,
+            "fitted_frames": int(self.compared.sum()),
+            "localisation_median_mm": float(np.median(error_mm)),
+            "localisation_p95_mm": float(np.percentile(error_mm, 95)),
+            "force_rmse_N": float(np.sqrt(np.mean(error_N**2))),
+            "force_mape_percent": float(np.median(percent)) if len(percent) else None,
+            "force_mape_frames": int(self.strong.sum()),
+            "contact_missed": int((in_contact & (self.true_force_N > FORCE_MIN_N) & ~flag[CONTACT]).sum()),
+            "contact_false": int((scenario.is_off("contact", self.t_s) & flag[CONTACT]).sum()),
+            "slip_found": found,
+            "slip_missed": missed,
+            "slip_false": int(outside.sum()),
+            "total_us_median": float(np.median(total)),
+            "stages_sum_wrong": int((unsaturated & (stages.sum(axis=1) != total)).sum()),
+            **{key: int(recording.end[key]) if key in recording.end else None
+               for key in ("dropped_packets", "crc_errors", "format_errors")},
+            "emulator_warnings": len(run.get("warnings", [])),
+        }
+
+
+def add_salvage_option(parser):
+    parser.add_argument("--salvage", action="store_true", help="skip damaged lines of the recording and say how many")
+
+
+def load_recording(options):
+    recording = read_recording(options.recording, options.salvage)
+    if recording.skipped_lines:
+        print(f"{options.recording}: {recording.skipped_lines} damaged lines skipped", file=sys.stderr)
+    if not recording.end and not options.salvage:
+        raise InputError(f"{options.recording}: no end line, the recorder was killed; use --salvage to take what there is")
+    return recording
+
+
+def main(argv):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("recording", metavar="RECORDING.csv")
+    parser.add_argument("scenario", metavar="SCENARIO.csv")
+    parser.add_argument("--run", metavar="run.json", help="the emulator's report")
+    parser.add_argument("-o", "--output", required=True, metavar="summary.json")
+    add_salvage_option(parser)
+    options = parser.parse_args(argv)
+    comparison = Comparison(load_recording(options), read_scenario(options.scenario), read_run(options.run))
+    write_text(options.output, json.dumps(comparison.summary, indent=2) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run_tool("evaluate.py", main))

@@ -1,0 +1,167 @@
+#!/usr/bin/python3
+"""Draws a recording, with the truth behind it if there is one.
+
+    plot.py RECORDING.csv [--truth SCENARIO.csv] [--run run.json] -o FILE.png
+"""
+import argparse
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.patches import FancyBboxPatch
+
+from evaluate import Comparison, add_salvage_option, load_recording
+from fingertip_files import FIT_VALID, SLIP, InputError, read_run, read_scenario, run_tool
+
+INK, FAINT, TRUTH, MEASURED, SLIPPING = "#22252e", "#8a8f9c", "#b4bac6", "#1f6fd6", "#d93a3a"
+RIM_mm = 6.0
+
+
+def positions(recording):
+    try:
+        x, y = (np.array([float(v) for v in recording.metadata[key].split()]) for key in ("x_mm", "y_mm"))
+    except (KeyError, ValueError):
+        return np.empty(0), np.empty(0)
+    return x, y
+
+
+def gaps_as_nan(t_s, values, fitted):
+    """Values with NaN where nothing is fitted or frames are missing, so that lines break there."""
+    values = np.where(fitted, values, np.nan)
+    if len(t_s) > 2:
+        values[1:][np.diff(t_s) > 5 * np.median(np.diff(t_s))] = np.nan
+    return values
+
+
+def draw_pad(axes, recording, t_s, x, y, fitted, truth):
+    sensor_x, sensor_y = positions(recording)
+    if len(sensor_x):
+        corner = (sensor_x.min() - RIM_mm, sensor_y.min() - RIM_mm)
+        size = (np.ptp(sensor_x) + 2 * RIM_mm, np.ptp(sensor_y) + 2 * RIM_mm)
+        axes.add_patch(FancyBboxPatch(corner, *size, boxstyle="round,pad=0,rounding_size=2.5", fc="#f3f4f7", ec=TRUTH, zorder=0))
+        axes.scatter(sensor_x, sensor_y, s=120, marker="s", fc="white", ec=TRUTH, zorder=1)
+        for k, (sx, sy) in enumerate(zip(sensor_x, sensor_y)):
+            axes.text(sx, sy, str(k), color=FAINT, size=6.5, ha="center", va="center", zorder=1)
+        axes.set_xlim(corner[0] - 1, corner[0] + size[0] + 1)
+        axes.set_ylim(corner[1] - 1, corner[1] + size[1] + 1)
+    if truth is not None:
+        on = truth.truth["contact"] > 0.5
+        axes.plot(np.where(on, truth.truth["x_mm"], np.nan), np.where(on, truth.truth["y_mm"], np.nan),
+                  color=TRUTH, lw=5, solid_capstyle="round", zorder=2)
+    points = axes.scatter(x[fitted], y[fitted], c=t_s[fitted], s=9, cmap="plasma", lw=0, zorder=3)
+    bar = plt.colorbar(points, ax=axes, orientation="horizontal", pad=0.07, fraction=0.03, aspect=40)
+    bar.set_label("time, s", size=8)
+    bar.outline.set_visible(False)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x, mm")
+    axes.set_ylabel("y, mm")
+    axes.set_title("contact on the pad", loc="left", size=10)
+
+
+def runs(t_s, on):
+    """(start, end) of consecutive frames that are on."""
+    edges = np.diff(np.concatenate(([0], on.astype(int), [0])))
+    return list(zip(t_s[np.flatnonzero(edges == 1)], t_s[np.flatnonzero(edges == -1) - 1]))
+
+
+def draw_over_time(axes, t_s, series, fitted, slip, truth):
+    for panel, (label, name, values) in zip(axes, series):
+        if truth is not None:
+            on = truth.truth["contact"] > 0.5
+            panel.plot(truth.t_s, np.where(on, truth.truth[name], np.nan), color=TRUTH, lw=4, label="truth", zorder=1)
+            for start, end in truth.intervals("slip"):
+                panel.axvspan(start, end, color=SLIPPING, alpha=0.10, lw=0, zorder=0)
+        panel.plot(t_s, gaps_as_nan(t_s, values, fitted), color=MEASURED, lw=1.1, label="measured", zorder=2)
+        panel.set_ylabel(label)
+        panel.grid(color="#e6e8ee", lw=0.6)
+    low, high = axes[-1].get_ylim()
+    mark = low - 0.06 * (high - low)
+    for i, (start, end) in enumerate(runs(t_s, slip)):
+        axes[-1].plot([start, max(end, start + 1e-3)], [mark, mark], color=SLIPPING, lw=4, solid_capstyle="butt",
+                      label="slip found" if i == 0 else None)
+    axes[-1].set_ylim(mark - 0.04 * (high - low), high)
+    axes[-1].legend(loc="upper right", ncol=3, fontsize=8, frameon=False)
+    axes[-1].set_xlabel("time, s")
+    axes[0].set_title("over time" + (" (shaded: true slip)" if truth is not None else ""), loc="left", size=10)
+
+
+def draw_errors(axes, comparison):
+    location, force = axes
+    error_mm = comparison.location_error_mm[comparison.compared]
+    location.hist(error_mm, bins=40, range=(0, max(np.percentile(error_mm, 99), 1e-3)), color=MEASURED)
+    location.axvline(np.median(error_mm), color=INK, lw=1)
+    location.set_xlabel("location error, mm (line: median)")
+    percent = 100 * comparison.force_error_N[comparison.strong] / comparison.true_force_N[comparison.strong]
+    if len(percent):
+        reach = max(np.percentile(np.abs(percent), 99), 1e-3)
+        force.hist(percent, bins=41, range=(-reach, reach), color=MEASURED)
+        force.axvline(0, color=INK, lw=1)
+    force.set_xlabel("force error, %")
+    for panel in axes:
+        panel.set_ylabel("frames")
+
+
+def header(recording, comparison, t_s, simulated):
+    identity = "  ·  ".join(recording.metadata[key] for key in ("serial", "board", "scene", "git") if recording.metadata.get(key))
+    lines = [identity]
+    if comparison:
+        s = comparison.summary
+        lines.append(
+            f"{s['frames']} frames at {s['frames_per_s']:.1f}/s  ·  location: median {s['localisation_median_mm']:.3f} mm, "
+            f"95 % {s['localisation_p95_mm']:.3f} mm  ·  force: "
+            + (f"median {s['force_mape_percent']:.2f} %, " if s["force_mape_percent"] is not None else "")
+            + f"RMSE {s['force_rmse_N']:.3f} N  ·  slips: {s['slip_found']} found, {s['slip_missed']} missed, "
+            f"{s['slip_false']} false frames  ·  dropped packets: {'?' if s['dropped_packets'] is None else s['dropped_packets']}")
+    else:
+        lines.append(f"{len(t_s)} frames in {t_s[-1] - t_s[0]:.1f} s")
+    return ("Fingertip, simulated sensors" if simulated else "Fingertip"), lines
+
+
+def main(argv):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("recording", metavar="RECORDING.csv")
+    parser.add_argument("--truth", metavar="SCENARIO.csv", help="the scenario that was played")
+    parser.add_argument("--run", metavar="run.json", help="the emulator's report: the recording is of simulated sensors")
+    parser.add_argument("-o", "--output", required=True, metavar="FILE.png")
+    add_salvage_option(parser)
+    options = parser.parse_args(argv)
+    recording = load_recording(options)
+    run = read_run(options.run)
+    truth = read_scenario(options.truth) if options.truth else None
+    comparison = Comparison(recording, truth, run) if truth else None
+    rows = recording.has_contact
+    if not rows.any():
+        raise InputError(f"{options.recording}: no contact packet in it; record with the contact stream on")
+    t_s = comparison.t_s if comparison else recording["t_us"][rows] / 1e6
+    x, y, force = (recording[name][rows] for name in ("x_mm", "y_mm", "force_N"))
+    fitted, slip = recording.flag(FIT_VALID)[rows], recording.flag(SLIP)[rows]
+
+    plt.rcParams.update({
+        "font.size": 9, "axes.edgecolor": TRUTH, "axes.labelcolor": INK, "xtick.color": FAINT, "ytick.color": FAINT,
+        "text.color": INK, "axes.spines.top": False, "axes.spines.right": False, "axes.titlecolor": FAINT})
+    figure = plt.figure(figsize=(14, 9.2))
+    grid = figure.add_gridspec(4 if comparison else 3, 3, width_ratios=[1.25, 1, 1], hspace=0.38, wspace=0.27,
+                               left=0.055, right=0.985, top=0.87, bottom=0.06)
+    draw_pad(figure.add_subplot(grid[:, 0]), recording, t_s, x, y, fitted, truth)
+    first = figure.add_subplot(grid[0, 1:])
+    panels = [first, figure.add_subplot(grid[1, 1:], sharex=first), figure.add_subplot(grid[2, 1:], sharex=first)]
+    series = [("x, mm", "x_mm", x), ("y, mm", "y_mm", y), ("force, N", "force_N", force)]
+    draw_over_time(panels, t_s, series, fitted, slip, truth)
+    if comparison:
+        draw_errors([figure.add_subplot(grid[3, 1]), figure.add_subplot(grid[3, 2])], comparison)
+    title, lines = header(recording, comparison, t_s, options.run is not None)
+    figure.text(0.055, 0.955, title, size=17, weight="bold")
+    for i, line in enumerate(lines):
+        figure.text(0.055, 0.93 - 0.022 * i, line, size=9, color=INK if i else FAINT)
+    try:
+        figure.savefig(options.output, dpi=110)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{options.output}: {error}; give a name that ends in .png, in a folder that exists") from None
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run_tool("plot.py", main))
