@@ -44,7 +44,8 @@ struct array_bus {
   /* Advances the operation. FT_PENDING: call again at *wake_us at the latest, or as soon as the
    * board signals an event. FT_OK: finished, *result is filled (a sensor that did not acknowledge
    * is no error of the bus). FT_ERR_TIMEOUT: the hardware did not finish in time; recover.
-   * FT_ERR_STUCK: recovery did not free the bus; recover again later. An operation ends with its
+   * FT_ERR_STUCK: recovery did not free the bus; recover again later; a recovery fails in no other
+   * way. An operation ends with its
    * first answer other than FT_PENDING; without one, poll answers FT_ERR_ARGUMENT. */
   enum ft_status (*poll)(void *context, uint64_t now_us, struct array_bus_result *result,
                          uint64_t *wake_us);

@@ -25,6 +25,7 @@
 
 #define SETTLED_mm 0.02f /* a larger last step has not settled */
 #define UNCERTAIN_SD_mm 0.25f
+#define POSITION_MAX_mm 10000.0f
 #define SD_MAX 1e9f          /* stands for: nothing is known */
 #define MODEL_RESIDUAL 0.15f /* of the root of the sum of squared readings */
 #define FLAT_SIGMA (0.98f * FIT_SIGMA_MAX)
@@ -49,13 +50,13 @@ struct parameters {
 
 enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
                               const float *y_mm, float pitch_mm) {
-  if (sensor_count < 1 || sensor_count > FT_MAX_SENSORS || !(pitch_mm > 0.0f) ||
-      !isfinite(pitch_mm)) {
+  if (sensor_count < 1 || sensor_count > FT_MAX_SENSORS ||
+      !(pitch_mm >= 0.01f && pitch_mm <= POSITION_MAX_mm)) {
     return FT_ERR_ARGUMENT;
   }
   struct fit_array made = {.sensor_count = sensor_count, .pitch_mm = pitch_mm};
   for (uint8_t k = 0; k < sensor_count; k++) {
-    if (!isfinite(x_mm[k]) || !isfinite(y_mm[k])) {
+    if (!(fabsf(x_mm[k]) <= POSITION_MAX_mm && fabsf(y_mm[k]) <= POSITION_MAX_mm)) {
       return FT_ERR_ARGUMENT;
     }
     float x = x_mm[k] / pitch_mm;

@@ -50,8 +50,8 @@ struct fit_result {
                      UNCERTAIN, MODEL, AT_BOUND, SENSOR_MASKED */
 };
 
-/* FT_ERR_ARGUMENT: sensor_count outside 1..FT_MAX_SENSORS, pitch not positive and finite, or a
- * position that is not finite. */
+/* FT_ERR_ARGUMENT: sensor_count outside 1..FT_MAX_SENSORS, pitch outside 0.01..10000 mm, or a
+ * position outside +-10000 mm. */
 enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
                               const float *y_mm, float pitch_mm);
 

@@ -95,12 +95,15 @@ static void field_f32(struct cursor *cursor, float *value) {
 }
 
 static void field_text(struct cursor *cursor, char text[WIRE_TEXT_BYTES]) {
+  bool padding = false;
   for (int i = 0; i < WIRE_TEXT_BYTES; i++) {
     uint8_t byte = (uint8_t)text[i];
     field_u8(cursor, &byte);
-    if (byte != 0 && (byte < 0x20 || byte > 0x7E)) {
+    bool printable = byte >= 0x20 && byte <= 0x7E;
+    if (padding ? byte != 0 : byte != 0 && !printable) {
       cursor->failed = true;
     }
+    padding = byte == 0;
     text[i] = (char)byte;
   }
 }

@@ -20,7 +20,7 @@
 enum {
   WIRE_HEADER_BYTES = 12,
   WIRE_CRC_BYTES = 4,
-  WIRE_MAX_BODY_BYTES = 400,
+  WIRE_MAX_BODY_BYTES = 92 + 8 * FT_MAX_SENSORS, /* info */
   WIRE_MAX_PACKET_BYTES = WIRE_HEADER_BYTES + WIRE_MAX_BODY_BYTES + WIRE_CRC_BYTES,
   /* COBS adds one byte, and one more for each full 254 bytes; then the delimiter. */
   WIRE_MAX_FRAME_BYTES = WIRE_MAX_PACKET_BYTES + WIRE_MAX_PACKET_BYTES / 254 + 2,
@@ -147,7 +147,8 @@ struct wire_health {
   uint32_t zero_readings;     /* a conversion result of 0, and the one after it */
   uint32_t fit_failures;      /* frames in contact whose fit could not be solved */
   uint32_t sensors_present;   /* bitmap: answered at the last attempt */
-  uint32_t sensors_prom_bad;  /* bitmap: calibration CRC differs; still streaming */
+  uint32_t sensors_prom_bad;  /* bitmap: calibration CRC differs, streaming all the same; or blank,
+                                 and not */
   uint32_t watchdog_resets;   /* the last start was by the watchdog: 1 */
   uint16_t cpu_busy_permille; /* over the last second */
   uint16_t stack_free_bytes;  /* never touched since start */
