@@ -1,0 +1,210 @@
+#include "reference/double_kernel.hpp"
+
+#include "common/contact_flags.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace fingertip::reference {
+namespace {
+
+using Vector4 = Eigen::Vector4d;
+using Matrix4 = Eigen::Matrix4d;
+
+struct Sample {
+  double x, y, p; // pitches, units of the largest reading
+};
+
+struct State {
+  double p0, x, y, sigma;
+};
+
+struct Normal {
+  Matrix4 matrix = Matrix4::Zero();
+  Vector4 rhs = Vector4::Zero();
+
+  void add(const Vector4 &row, double value) {
+    matrix += row * row.transpose();
+    rhs += row * value;
+  }
+};
+
+constexpr double GUESS_SHARE = 0.1;
+constexpr double GUESS_WEIGHT = 1e-3;
+constexpr double GUESS_SIGMA = 0.6;
+constexpr double STEP_LIMIT = 0.5;
+constexpr double P0_MIN = 0.05;
+constexpr double P0_MAX = 1e6;
+constexpr double SIGMA_MIN = 0.158;
+constexpr double SIGMA_MAX = 5.0;
+constexpr double PIVOT_FLOOR = 1e-15; // double tells no less
+
+double limited(double value, double low, double high) {
+  return value > low ? std::min(value, high) : low;
+}
+
+// L D L^T with pivots raised to their floor.
+struct Factors {
+  Matrix4 lower = Matrix4::Identity();
+  Vector4 pivots;
+  bool deficient = false;
+
+  explicit Factors(const Matrix4 &a) {
+    for (int i = 0; i < 4; i++) {
+      double pivot = a(i, i);
+      for (int j = 0; j < i; j++) {
+        double product = a(i, j);
+        for (int k = 0; k < j; k++) {
+          product -= lower(i, k) * pivots[k] * lower(j, k);
+        }
+        lower(i, j) = product / pivots[j];
+        pivot -= product * lower(i, j);
+      }
+      const double floor = a(i, i) * PIVOT_FLOOR + 1e-300;
+      deficient |= !(pivot > floor);
+      pivots[i] = pivot > floor ? pivot : floor;
+    }
+  }
+
+  Vector4 solve(const Vector4 &right) const {
+    Vector4 v = lower.triangularView<Eigen::UnitLower>().solve(right);
+    v = v.cwiseQuotient(pivots).eval();
+    return lower.transpose().triangularView<Eigen::UnitUpper>().solve(v);
+  }
+
+  double inverse_form(const Vector4 &v) const { return v.dot(solve(v)); }
+};
+
+State guess(const std::vector<Sample> &samples, const Sample &peak) {
+  Normal normal;
+  normal.matrix.diagonal().setConstant(GUESS_WEIGHT);
+  normal.rhs[3] = -GUESS_WEIGHT * 0.5 / (GUESS_SIGMA * GUESS_SIGMA);
+  for (const Sample &s : samples) {
+    if (s.p >= GUESS_SHARE) {
+      const double x = s.x - peak.x, y = s.y - peak.y;
+      normal.add(s.p * Vector4(1.0, x, y, x * x + y * y), s.p * std::log(s.p / peak.p));
+    }
+  }
+  const Vector4 c = Factors(normal.matrix).solve(normal.rhs);
+  const double curvature =
+      limited(-c[3], 0.5 / (SIGMA_MAX * SIGMA_MAX), 0.5 / (0.25 * 0.25));
+  const double half_inverse = 0.5 / curvature;
+  return {1.0, peak.x + limited(c[1] * half_inverse, -1.0, 1.0),
+          peak.y + limited(c[2] * half_inverse, -1.0, 1.0), std::sqrt(half_inverse)};
+}
+
+} // namespace
+
+KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10,
+                           std::uint32_t usable, const KernelSettings &settings) {
+  KernelResult result{};
+  std::int32_t largest = 0;
+  for (unsigned k = 0; k < array.sensor_count; k++) {
+    if (usable >> k & 1u) {
+      largest = std::max(largest, pressure_Pa_q10[k]);
+    }
+  }
+  if (largest <= 0) {
+    result.flags = CONTACT_FLAG_LOW_SIGNAL;
+    return result;
+  }
+  std::vector<Sample> samples;
+  Sample peak{};
+  double sum_squares = 0.0;
+  for (unsigned k = 0; k < array.sensor_count; k++) {
+    if (usable >> k & 1u) {
+      const double p = std::max(static_cast<double>(pressure_Pa_q10[k]) / largest, -1.0);
+      samples.push_back({static_cast<double>(array.x[k]), static_cast<double>(array.y[k]), p});
+      if (pressure_Pa_q10[k] == largest) {
+        peak = samples.back();
+      }
+      sum_squares += p * p;
+    }
+  }
+  if (samples.size() < 4) {
+    return result;
+  }
+
+  State theta = guess(samples, peak);
+  double numerator = 0.0, denominator = 1e-30;
+  for (const Sample &s : samples) {
+    const double x = s.x - theta.x, y = s.y - theta.y;
+    const double e = std::exp(-0.5 * (x * x + y * y) / (theta.sigma * theta.sigma));
+    numerator += e * s.p;
+    denominator += e * e;
+  }
+  theta.p0 = limited(numerator / denominator, P0_MIN, P0_MAX);
+
+  const double x_min = static_cast<double>(array.x_min), x_max = static_cast<double>(array.x_max);
+  const double y_min = static_cast<double>(array.y_min), y_max = static_cast<double>(array.y_max);
+  Normal normal;
+  double squares = 0.0, moved = 0.0;
+  State before = theta;
+  const auto linearise = [&] {
+    normal = Normal();
+    squares = 0.0;
+    for (const Sample &s : samples) {
+      const double x = s.x - theta.x, y = s.y - theta.y;
+      const double r2 = x * x + y * y;
+      const double e = std::exp(-0.5 * r2 / (theta.sigma * theta.sigma));
+      const double residual = s.p - theta.p0 * e;
+      squares += residual * residual;
+      normal.add(e * Vector4(1.0, x, y, r2), residual);
+    }
+  };
+  linearise();
+  for (int i = 0; i < settings.iterations; i++) {
+    if (i > 0) {
+      linearise();
+    }
+    before = theta;
+    const Vector4 b = Factors(normal.matrix).solve(normal.rhs);
+    const double gain = theta.sigma * theta.sigma / theta.p0;
+    const double dx = limited(gain * b[1], -STEP_LIMIT, STEP_LIMIT);
+    const double dy = limited(gain * b[2], -STEP_LIMIT, STEP_LIMIT);
+    const double ds = theta.sigma * limited(gain * b[3], -STEP_LIMIT, STEP_LIMIT);
+    theta = {limited(theta.p0 + b[0], P0_MIN, P0_MAX), limited(theta.x + dx, x_min, x_max),
+             limited(theta.y + dy, y_min, y_max), limited(theta.sigma + ds, SIGMA_MIN, SIGMA_MAX)};
+    moved = std::hypot(dx, dy);
+  }
+
+  const double pitch_mm = static_cast<double>(array.pitch_mm);
+  const double unit_Pa = largest / 1024.0;
+  result.x_mm = theta.x * pitch_mm;
+  result.y_mm = theta.y * pitch_mm;
+  result.p0_Pa = theta.p0 * unit_Pa;
+  result.sigma_mm = theta.sigma * pitch_mm;
+  result.force_N = 2.0 * M_PI * result.p0_Pa * result.sigma_mm * result.sigma_mm * 1e-6;
+
+  const Factors factors(normal.matrix);
+  const double freedom = samples.size() > 4 ? static_cast<double>(samples.size()) - 4.0 : 1.0;
+  const double noise = settings.noise_Pa / unit_Pa;
+  const double variance = std::max(squares / freedom, noise * noise);
+  const double gain = before.sigma * before.sigma / before.p0;
+  const double sd_mm = pitch_mm * gain *
+                       std::sqrt(variance * (factors.inverse_form(Vector4::UnitY()) +
+                                             factors.inverse_form(Vector4::UnitZ())));
+  result.flags = CONTACT_FLAG_FIT_VALID;
+  if (largest < 20.0 * 1024.0 * settings.noise_Pa) {
+    result.flags |= CONTACT_FLAG_LOW_SIGNAL;
+  }
+  if (theta.sigma >= 0.98 * SIGMA_MAX) {
+    result.flags |= CONTACT_FLAG_FLAT;
+  }
+  if (factors.deficient || moved * pitch_mm > 0.02 || !(sd_mm <= 0.25)) {
+    result.flags |= CONTACT_FLAG_UNCERTAIN;
+  }
+  if (squares > 0.15 * 0.15 * sum_squares) {
+    result.flags |= CONTACT_FLAG_MODEL;
+  }
+  if (theta.x <= x_min || theta.x >= x_max || theta.y <= y_min || theta.y >= y_max ||
+      theta.sigma <= SIGMA_MIN || theta.sigma >= SIGMA_MAX || theta.p0 <= P0_MIN ||
+      theta.p0 >= P0_MAX) {
+    result.flags |= CONTACT_FLAG_AT_BOUND;
+  }
+  return result;
+}
+
+} // namespace fingertip::reference

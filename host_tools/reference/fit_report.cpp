@@ -1,0 +1,313 @@
+// fit_report: how far the on-chip fit lies from the reference optimum, and how well its flags tell.
+//
+// Usage: fit_report [--kernel NAME] [--variant TEXT] [--set A|B|C|D] [--limit N] [--seed S]
+//                   [--out DIR] [--cache DIR]
+//
+// --kernel, --variant (part of a variant's name) and --set choose rows; --limit takes N presses in
+// all (120 000 by default: A, B a third each, C, D a sixth each). Writes fit_error.csv and .json
+// to --out and prints the same. One row per kernel, variant, set and observability:
+//   presses       of the set that are (not) observable (reference/dataset.hpp)
+//   p50_um ..     distance of the location from the reference optimum of the presses as received at
+//                 1/1024 Pa with every sensor in use
+//   above_10um    presses farther than that from the reference
+//   truth_p50_mm  distance from where the contact truly is
+//   bad_unflagged share more than 1 mm wrong without a warning (UNCERTAIN, MODEL, FLAT, AT_BOUND,
+//                 LOW_SIGNAL, or no fit): against the reference in A and B, the truth in C and D
+//   good_flagged  share within 1 mm with a warning
+#include "common/contact_flags.h"
+#include "reference/dataset.hpp"
+#include "reference/kernels.hpp"
+#include "reference/parallel.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <stdexcept>
+#include <string>
+
+namespace {
+
+namespace reference = fingertip::reference;
+using reference::Case;
+using reference::Mask;
+using reference::PressSet;
+
+constexpr int USUAL_ITERATIONS = 7;
+constexpr double BAD_mm = 1.0;
+constexpr std::uint32_t WARNINGS = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_FLAT |
+                                   CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL;
+
+struct Variant {
+  std::string name;
+  int iterations = USUAL_ITERATIONS;
+  int n_largest = 0;
+  double lsb_Pa = 1.0 / 1024.0;
+  Mask mask = Mask::none;
+};
+
+std::vector<Variant> all_variants() {
+  std::vector<Variant> variants;
+  const auto add = [&](const std::string &name) -> Variant & {
+    variants.emplace_back();
+    variants.back().name = name;
+    return variants.back();
+  };
+  for (int k = 0; k <= 10; k++) {
+    add("iterations=" + std::to_string(k)).iterations = k;
+  }
+  for (int n = 4; n <= 15; n++) {
+    add("n_largest=" + std::to_string(n)).n_largest = n;
+  }
+  for (int denominator : {1, 16, 100, 1024}) {
+    add("lsb_Pa=1/" + std::to_string(denominator)).lsb_Pa = 1.0 / denominator;
+  }
+  for (Mask mask : {Mask::random, Mask::peak}) {
+    add(std::string("mask=") + reference::name_of(mask)).mask = mask;
+  }
+  return variants;
+}
+
+struct Options {
+  std::string kernel, variant, set, out = FINGERTIP_REPORT_DIR, cache = FINGERTIP_CACHE_DIR;
+  std::size_t limit = 120000;
+  std::uint64_t seed = 20221015;
+};
+
+Options parse(int argc, char **argv) {
+  Options options;
+  for (int i = 1; i < argc; i += 2) {
+    const std::string name = argv[i];
+    if (i + 1 == argc) {
+      throw std::runtime_error(name + " needs a value");
+    }
+    const std::string value = argv[i + 1];
+    const auto number = [&] {
+      std::size_t used = 0;
+      const unsigned long long n = value.find('-') == 0 ? 0 : std::stoull(value, &used);
+      if (used != value.size()) {
+        throw std::runtime_error(name + " needs a number, not '" + value + "'");
+      }
+      return n;
+    };
+    if (name == "--kernel") {
+      options.kernel = value;
+    } else if (name == "--variant") {
+      options.variant = value;
+    } else if (name == "--set") {
+      options.set = value;
+    } else if (name == "--limit") {
+      options.limit = number();
+    } else if (name == "--seed") {
+      options.seed = number();
+    } else if (name == "--out") {
+      options.out = value;
+    } else if (name == "--cache") {
+      options.cache = value;
+    } else {
+      throw std::runtime_error("unknown option " + name +
+                               "; known are --kernel --variant --set --limit --seed --out --cache");
+    }
+  }
+  return options;
+}
+
+struct Outcome {
+  double from_reference_um, from_truth_mm;
+  std::uint32_t flags;
+};
+
+struct Row {
+  std::string kernel, variant;
+  char set;
+  bool observable;
+  std::size_t presses = 0, without_fit = 0, above_10um = 0, above_100um = 0;
+  double p50_um = 0, p99_um = 0, p999_um = 0, worst_um = 0;
+  double truth_p50_mm = 0, truth_p99_mm = 0;
+  double bad_unflagged = 0, good_flagged = 0;
+};
+
+double quantile(const std::vector<double> &sorted, double share) {
+  if (sorted.empty()) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
+}
+
+Row summarise(const std::vector<Case> &cases, const std::vector<Outcome> &outcomes, PressSet set,
+              bool observable) {
+  Row row;
+  row.set = reference::name_of(set);
+  row.observable = observable;
+  const bool gaussian = set == PressSet::A || set == PressSet::B;
+  std::vector<double> um, truth_mm;
+  std::size_t bad_unflagged = 0, good_flagged = 0;
+  for (std::size_t i = 0; i < cases.size(); i++) {
+    if (cases[i].observable != observable) {
+      continue;
+    }
+    const Outcome &outcome = outcomes[i];
+    row.presses++;
+    if (!(outcome.flags & CONTACT_FLAG_FIT_VALID)) {
+      row.without_fit++;
+      continue;
+    }
+    um.push_back(outcome.from_reference_um);
+    truth_mm.push_back(outcome.from_truth_mm);
+    row.above_10um += outcome.from_reference_um > 10.0;
+    row.above_100um += outcome.from_reference_um > 100.0;
+    const double wrong_mm = gaussian ? outcome.from_reference_um * 1e-3 : outcome.from_truth_mm;
+    const bool warned = (outcome.flags & WARNINGS) != 0;
+    bad_unflagged += wrong_mm > BAD_mm && !warned;
+    good_flagged += wrong_mm <= BAD_mm && warned;
+  }
+  std::sort(um.begin(), um.end());
+  std::sort(truth_mm.begin(), truth_mm.end());
+  row.p50_um = quantile(um, 0.5);
+  row.p99_um = quantile(um, 0.99);
+  row.p999_um = quantile(um, 0.999);
+  row.worst_um = quantile(um, 1.0);
+  row.truth_p50_mm = quantile(truth_mm, 0.5);
+  row.truth_p99_mm = quantile(truth_mm, 0.99);
+  const auto presses = static_cast<double>(row.presses);
+  row.bad_unflagged = static_cast<double>(bad_unflagged) / presses;
+  row.good_flagged = static_cast<double>(good_flagged) / presses;
+  return row;
+}
+
+std::vector<Outcome> run(const reference::Kernel &kernel, const fit_array &array,
+                         const Variant &variant, const std::vector<Case> &cases) {
+  std::vector<Outcome> outcomes(cases.size());
+  reference::in_parallel(cases.size(), [&](std::size_t i) {
+    const Case &c = cases[i];
+    const auto readings = reference::quantise(c.press.pressure_Pa, variant.lsb_Pa);
+    const auto result =
+        kernel.fit(array, readings.data(), c.usable,
+                   {variant.iterations, c.press.noise_Pa, variant.n_largest});
+    outcomes[i] = {1e3 * std::hypot(result.x_mm - c.best.theta.x_mm,
+                                    result.y_mm - c.best.theta.y_mm),
+                   std::hypot(result.x_mm - c.press.x_mm, result.y_mm - c.press.y_mm),
+                   result.flags};
+  });
+  return outcomes;
+}
+
+void print_header() {
+  std::printf("%-8s %-16s set obs %7s %9s %9s %9s %9s %6s %6s %8s %8s %8s %8s\n", "kernel",
+              "variant", "presses", "p50_um", "p99_um", "p99.9_um", "worst_um", ">10um", ">100um",
+              "tru50_mm", "tru99_mm", "bad!flag", "good&fl");
+}
+
+void print(const Row &row) {
+  std::printf("%-8s %-16s  %c  %s %7zu %9.4g %9.4g %9.4g %9.4g %6zu %6zu %8.3g %8.3g %7.3f%% "
+              "%7.3f%%\n",
+              row.kernel.c_str(), row.variant.c_str(), row.set, row.observable ? "yes" : " no",
+              row.presses, row.p50_um, row.p99_um, row.p999_um, row.worst_um, row.above_10um,
+              row.above_100um, row.truth_p50_mm, row.truth_p99_mm, 100.0 * row.bad_unflagged,
+              100.0 * row.good_flagged);
+  std::fflush(stdout);
+}
+
+void write_csv(const std::string &path, const std::vector<Row> &rows) {
+  std::ofstream file(path);
+  file << "kernel,variant,set,observable,presses,without_fit,p50_um,p99_um,p999_um,worst_um,"
+          "above_10um,above_100um,truth_p50_mm,truth_p99_mm,bad_unflagged,good_flagged\n";
+  for (const Row &r : rows) {
+    file << r.kernel << ',' << r.variant << ',' << r.set << ',' << r.observable << ',' << r.presses
+         << ',' << r.without_fit << ',' << r.p50_um << ',' << r.p99_um << ',' << r.p999_um << ','
+         << r.worst_um << ',' << r.above_10um << ',' << r.above_100um << ',' << r.truth_p50_mm
+         << ',' << r.truth_p99_mm << ',' << r.bad_unflagged << ',' << r.good_flagged << '\n';
+  }
+  file.close();
+  if (!file) {
+    throw std::runtime_error("cannot write " + path);
+  }
+}
+
+void write_json(const std::string &path, const std::vector<Row> &rows, const Options &options) {
+  std::ofstream file(path);
+  file << "{\"seed\": " << options.seed << ", \"presses\": " << options.limit << ", \"rows\": [";
+  const char *separator = "\n";
+  for (const Row &r : rows) {
+    file << separator << "{\"kernel\": \"" << r.kernel << "\", \"variant\": \"" << r.variant
+         << "\", \"set\": \"" << r.set << "\", \"observable\": " << (r.observable ? "true" : "false")
+         << ", \"presses\": " << r.presses << ", \"without_fit\": " << r.without_fit
+         << ", \"p50_um\": " << r.p50_um << ", \"p99_um\": " << r.p99_um
+         << ", \"p999_um\": " << r.p999_um << ", \"worst_um\": " << r.worst_um
+         << ", \"above_10um\": " << r.above_10um << ", \"above_100um\": " << r.above_100um
+         << ", \"truth_p50_mm\": " << r.truth_p50_mm << ", \"truth_p99_mm\": " << r.truth_p99_mm
+         << ", \"bad_unflagged\": " << r.bad_unflagged << ", \"good_flagged\": " << r.good_flagged
+         << "}";
+    separator = ",\n";
+  }
+  file << "\n]}\n";
+  file.close();
+  if (!file) {
+    throw std::runtime_error("cannot write " + path);
+  }
+}
+
+int report(const Options &options) {
+  std::filesystem::create_directories(options.out);
+  const fit_array array = reference::firmware_fit_array();
+  std::map<std::pair<PressSet, Mask>, std::vector<Case>> loaded;
+  const auto cases_of = [&](PressSet set, Mask mask) -> const std::vector<Case> & {
+    auto &cases = loaded[{set, mask}];
+    if (cases.empty()) {
+      const bool gaussian = set == PressSet::A || set == PressSet::B;
+      cases = reference::load_cases(set, mask, options.seed, options.limit / (gaussian ? 3 : 6),
+                                    options.cache);
+    }
+    return cases;
+  };
+  std::vector<Row> rows;
+  print_header();
+  for (const reference::Kernel &kernel : reference::all_kernels()) {
+    if (!options.kernel.empty() && options.kernel != kernel.name) {
+      continue;
+    }
+    for (const Variant &variant : all_variants()) {
+      if (variant.name.find(options.variant) == std::string::npos ||
+          variant.iterations < kernel.fewest_iterations) {
+        continue;
+      }
+      for (PressSet set : reference::ALL_PRESS_SETS) {
+        if (!options.set.empty() && options.set != std::string(1, reference::name_of(set))) {
+          continue;
+        }
+        const std::vector<Case> &cases = cases_of(set, variant.mask);
+        const std::vector<Outcome> outcomes = run(kernel, array, variant, cases);
+        for (bool observable : {true, false}) {
+          Row row = summarise(cases, outcomes, set, observable);
+          if (row.presses == 0) {
+            continue;
+          }
+          row.kernel = kernel.name;
+          row.variant = variant.name;
+          print(row);
+          rows.push_back(row);
+        }
+      }
+    }
+  }
+  if (rows.empty()) {
+    throw std::runtime_error("no kernel, variant and set match");
+  }
+  write_csv(options.out + "/fit_error.csv", rows);
+  write_json(options.out + "/fit_error.json", rows, options);
+  return 0;
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+  try {
+    return report(parse(argc, argv));
+  } catch (const std::exception &error) {
+    std::fprintf(stderr, "fit_report: %s\n", error.what());
+    return 1;
+  }
+}
