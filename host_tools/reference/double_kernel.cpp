@@ -5,21 +5,12 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 namespace fingertip::reference {
 namespace {
 
 using Vector4 = Eigen::Vector4d;
 using Matrix4 = Eigen::Matrix4d;
-
-struct Sample {
-  double x, y, p; // pitches, units of the largest reading
-};
-
-struct State {
-  double p0, x, y, sigma;
-};
 
 struct Normal {
   Matrix4 matrix = Matrix4::Zero();
@@ -77,29 +68,11 @@ struct Factors {
   double inverse_form(const Vector4 &v) const { return v.dot(solve(v)); }
 };
 
-State guess(const std::vector<Sample> &samples, const Sample &peak) {
-  Normal normal;
-  normal.matrix.diagonal().setConstant(GUESS_WEIGHT);
-  normal.rhs[3] = -GUESS_WEIGHT * 0.5 / (GUESS_SIGMA * GUESS_SIGMA);
-  for (const Sample &s : samples) {
-    if (s.p >= GUESS_SHARE) {
-      const double x = s.x - peak.x, y = s.y - peak.y;
-      normal.add(s.p * Vector4(1.0, x, y, x * x + y * y), s.p * std::log(s.p / peak.p));
-    }
-  }
-  const Vector4 c = Factors(normal.matrix).solve(normal.rhs);
-  const double curvature =
-      limited(-c[3], 0.5 / (SIGMA_MAX * SIGMA_MAX), 0.5 / (0.25 * 0.25));
-  const double half_inverse = 0.5 / curvature;
-  return {1.0, peak.x + limited(c[1] * half_inverse, -1.0, 1.0),
-          peak.y + limited(c[2] * half_inverse, -1.0, 1.0), std::sqrt(half_inverse)};
-}
-
 } // namespace
 
-KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                           std::uint32_t usable, const KernelSettings &settings) {
-  KernelResult result{};
+Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10,
+                  std::uint32_t usable) {
+  Samples samples;
   std::int32_t largest = 0;
   for (unsigned k = 0; k < array.sensor_count; k++) {
     if (usable >> k & 1u) {
@@ -107,49 +80,74 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
     }
   }
   if (largest <= 0) {
-    result.flags = CONTACT_FLAG_LOW_SIGNAL;
-    return result;
+    return samples;
   }
-  std::vector<Sample> samples;
-  Sample peak{};
-  double sum_squares = 0.0;
+  samples.unit_Pa = largest / 1024.0;
   for (unsigned k = 0; k < array.sensor_count; k++) {
     if (usable >> k & 1u) {
       const double p = std::max(static_cast<double>(pressure_Pa_q10[k]) / largest, -1.0);
-      samples.push_back({static_cast<double>(array.x[k]), static_cast<double>(array.y[k]), p});
-      if (pressure_Pa_q10[k] == largest) {
-        peak = samples.back();
-      }
-      sum_squares += p * p;
+      samples.x[samples.count] = static_cast<double>(array.x[k]);
+      samples.y[samples.count] = static_cast<double>(array.y[k]);
+      samples.p[samples.count++] = p;
+      samples.sum_squares += p * p;
     }
   }
-  if (samples.size() < 4) {
-    return result;
-  }
+  return samples;
+}
 
-  State theta = guess(samples, peak);
+Gaussian first_guess(const Samples &samples) {
+  const auto first = samples.p.begin();
+  const auto peak = static_cast<std::size_t>(
+      std::max_element(first, first + static_cast<std::ptrdiff_t>(samples.count)) - first);
+  Normal normal;
+  normal.matrix.diagonal().setConstant(GUESS_WEIGHT);
+  normal.rhs[3] = -GUESS_WEIGHT * 0.5 / (GUESS_SIGMA * GUESS_SIGMA);
+  for (std::size_t k = 0; k < samples.count; k++) {
+    const double p = samples.p[k];
+    if (p >= GUESS_SHARE) {
+      const double x = samples.x[k] - samples.x[peak], y = samples.y[k] - samples.y[peak];
+      normal.add(p * Vector4(1.0, x, y, x * x + y * y), p * std::log(p / samples.p[peak]));
+    }
+  }
+  const Vector4 c = Factors(normal.matrix).solve(normal.rhs);
+  const double curvature = limited(-c[3], 0.5 / (SIGMA_MAX * SIGMA_MAX), 0.5 / (0.25 * 0.25));
+  const double half_inverse = 0.5 / curvature;
+  Gaussian theta{1.0, samples.x[peak] + limited(c[1] * half_inverse, -1.0, 1.0),
+                 samples.y[peak] + limited(c[2] * half_inverse, -1.0, 1.0),
+                 std::sqrt(half_inverse)};
   double numerator = 0.0, denominator = 1e-30;
-  for (const Sample &s : samples) {
-    const double x = s.x - theta.x, y = s.y - theta.y;
+  for (std::size_t k = 0; k < samples.count; k++) {
+    const double x = samples.x[k] - theta.x, y = samples.y[k] - theta.y;
     const double e = std::exp(-0.5 * (x * x + y * y) / (theta.sigma * theta.sigma));
-    numerator += e * s.p;
+    numerator += e * samples.p[k];
     denominator += e * e;
   }
   theta.p0 = limited(numerator / denominator, P0_MIN, P0_MAX);
+  return theta;
+}
 
+KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10,
+                           std::uint32_t usable, const KernelSettings &settings) {
+  KernelResult result{};
+  const Samples samples = normalise(array, pressure_Pa_q10, usable);
+  if (samples.count < 4) {
+    result.flags = samples.count == 0 ? CONTACT_FLAG_LOW_SIGNAL : 0;
+    return result;
+  }
+  Gaussian theta = first_guess(samples);
   const double x_min = static_cast<double>(array.x_min), x_max = static_cast<double>(array.x_max);
   const double y_min = static_cast<double>(array.y_min), y_max = static_cast<double>(array.y_max);
   Normal normal;
   double squares = 0.0, moved = 0.0;
-  State before = theta;
+  Gaussian before = theta;
   const auto linearise = [&] {
     normal = Normal();
     squares = 0.0;
-    for (const Sample &s : samples) {
-      const double x = s.x - theta.x, y = s.y - theta.y;
+    for (std::size_t k = 0; k < samples.count; k++) {
+      const double x = samples.x[k] - theta.x, y = samples.y[k] - theta.y;
       const double r2 = x * x + y * y;
       const double e = std::exp(-0.5 * r2 / (theta.sigma * theta.sigma));
-      const double residual = s.p - theta.p0 * e;
+      const double residual = samples.p[k] - theta.p0 * e;
       squares += residual * residual;
       normal.add(e * Vector4(1.0, x, y, r2), residual);
     }
@@ -171,23 +169,22 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
   }
 
   const double pitch_mm = static_cast<double>(array.pitch_mm);
-  const double unit_Pa = largest / 1024.0;
   result.x_mm = theta.x * pitch_mm;
   result.y_mm = theta.y * pitch_mm;
-  result.p0_Pa = theta.p0 * unit_Pa;
+  result.p0_Pa = theta.p0 * samples.unit_Pa;
   result.sigma_mm = theta.sigma * pitch_mm;
   result.force_N = 2.0 * M_PI * result.p0_Pa * result.sigma_mm * result.sigma_mm * 1e-6;
 
   const Factors factors(normal.matrix);
-  const double freedom = samples.size() > 4 ? static_cast<double>(samples.size()) - 4.0 : 1.0;
-  const double noise = settings.noise_Pa / unit_Pa;
+  const double freedom = samples.count > 4 ? static_cast<double>(samples.count) - 4.0 : 1.0;
+  const double noise = settings.noise_Pa / samples.unit_Pa;
   const double variance = std::max(squares / freedom, noise * noise);
   const double gain = before.sigma * before.sigma / before.p0;
   const double sd_mm = pitch_mm * gain *
                        std::sqrt(variance * (factors.inverse_form(Vector4::UnitY()) +
                                              factors.inverse_form(Vector4::UnitZ())));
   result.flags = CONTACT_FLAG_FIT_VALID;
-  if (largest < 20.0 * 1024.0 * settings.noise_Pa) {
+  if (samples.unit_Pa < 20.0 * settings.noise_Pa) {
     result.flags |= CONTACT_FLAG_LOW_SIGNAL;
   }
   if (theta.sigma >= 0.98 * SIGMA_MAX) {
@@ -196,7 +193,7 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
   if (factors.deficient || moved * pitch_mm > 0.02 || !(sd_mm <= 0.25)) {
     result.flags |= CONTACT_FLAG_UNCERTAIN;
   }
-  if (squares > 0.15 * 0.15 * sum_squares) {
+  if (squares > 0.15 * 0.15 * samples.sum_squares) {
     result.flags |= CONTACT_FLAG_MODEL;
   }
   if (theta.x <= x_min || theta.x >= x_max || theta.y <= y_min || theta.y >= y_max ||

@@ -3,7 +3,29 @@
 
 #include "reference/kernels.hpp"
 
+#include <array>
+
 namespace fingertip::reference {
+
+// The readings that enter, in pitches and units of the largest.
+struct Samples {
+  std::size_t count = 0;
+  std::array<double, FT_MAX_SENSORS> x, y, p;
+  double unit_Pa = 0.0;     // of p
+  double sum_squares = 0.0; // of p
+};
+
+// In pitches and units of the largest reading.
+struct Gaussian {
+  double p0, x, y, sigma;
+};
+
+Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10,
+                  std::uint32_t usable);
+
+// The firmware's first guess: log-linear fit to the large readings, then the best amplitude.
+// Needs four samples, one of them positive.
+Gaussian first_guess(const Samples &samples);
 
 KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10,
                            std::uint32_t usable, const KernelSettings &settings);

@@ -17,11 +17,11 @@
 #include "common/contact_flags.h"
 #include "reference/dataset.hpp"
 #include "reference/kernels.hpp"
+#include "reference/options.hpp"
 #include "reference/parallel.hpp"
 
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -73,46 +73,21 @@ std::vector<Variant> all_variants() {
 
 struct Options {
   std::string kernel, variant, set, out = FINGERTIP_REPORT_DIR, cache = FINGERTIP_CACHE_DIR;
-  std::size_t limit = 120000;
+  std::uint64_t limit = 120000;
   std::uint64_t seed = 20221015;
 };
 
 Options parse(int argc, char **argv) {
-  Options options;
-  for (int i = 1; i < argc; i += 2) {
-    const std::string name = argv[i];
-    if (i + 1 == argc) {
-      throw std::runtime_error(name + " needs a value");
-    }
-    const std::string value = argv[i + 1];
-    const auto number = [&] {
-      std::size_t used = 0;
-      const unsigned long long n = value.find('-') == 0 ? 0 : std::stoull(value, &used);
-      if (used != value.size()) {
-        throw std::runtime_error(name + " needs a number, not '" + value + "'");
-      }
-      return n;
-    };
-    if (name == "--kernel") {
-      options.kernel = value;
-    } else if (name == "--variant") {
-      options.variant = value;
-    } else if (name == "--set") {
-      options.set = value;
-    } else if (name == "--limit") {
-      options.limit = number();
-    } else if (name == "--seed") {
-      options.seed = number();
-    } else if (name == "--out") {
-      options.out = value;
-    } else if (name == "--cache") {
-      options.cache = value;
-    } else {
-      throw std::runtime_error("unknown option " + name +
-                               "; known are --kernel --variant --set --limit --seed --out --cache");
-    }
-  }
-  return options;
+  Options o;
+  reference::parse_options(argc, argv,
+                           {{"--kernel", &o.kernel},
+                            {"--variant", &o.variant},
+                            {"--set", &o.set},
+                            {"--out", &o.out},
+                            {"--cache", &o.cache},
+                            {"--limit", nullptr, &o.limit},
+                            {"--seed", nullptr, &o.seed}});
+  return o;
 }
 
 struct Outcome {

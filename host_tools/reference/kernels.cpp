@@ -1,6 +1,5 @@
 #include "reference/kernels.hpp"
 
-#include "common/contact_flags.h"
 #include "reference/double_kernel.hpp"
 
 extern "C" {
