@@ -114,8 +114,12 @@ private:
   /* Returns once streams run. Gone if the port vanishes. */
   void connect() {
     model_.set_state(Model::State::connecting);
+    session_.info();
+    /* The first answer may have waited for the device to start; this one tells its clock. */
     wire_packet info = session_.info();
-    if (!options_.recording.empty() && !recording_) {
+    if (recording_) {
+      event("back");
+    } else if (!options_.recording.empty()) {
       start_recording(info);
     }
     session_.command(command_stream(options_.streams));
@@ -157,7 +161,6 @@ private:
       }
       try {
         connect();
-        event("back");
         return;
       } catch (const Gone &) {
         model_.set_state(Model::State::gone);

@@ -229,8 +229,11 @@ int run(int argc, char **argv) {
   app.set_version_flag("--version", "fingertip " FINGERTIP_VERSION);
   app.require_subcommand(1);
   app.failure_message([](const CLI::App *failed, const CLI::Error &error) {
-    return "fingertip: " + std::string(error.what()) + "; see " +
-           (failed->get_parent() ? "fingertip " + failed->get_name() : "fingertip") + " --help\n";
+    std::string command = "fingertip";
+    for (const CLI::App *chosen : failed->get_subcommands()) {
+      command += " " + chosen->get_name();
+    }
+    return "fingertip: " + std::string(error.what()) + "; see " + command + " --help\n";
   });
 
   auto add = [&](const char *name, const char *text, std::function<int()> run_it) {

@@ -133,10 +133,9 @@ void paint_contact(PadPicture &picture, const Model &model) {
   }
   int column = picture.column_of(contact.x_mm);
   int row = picture.pixel_row_of(contact.y_mm);
-  Colour cross = model.slipped_lately() ? BAD : WHITE;
   for (int arm = -3; arm <= 3; arm++) {
-    picture.paint(column + arm, row, cross, 1);
-    picture.paint(column, row + arm, cross, 1);
+    picture.paint(column + arm, row, WHITE, 1);
+    picture.paint(column, row + arm, WHITE, 1);
   }
 }
 
@@ -206,8 +205,8 @@ void draw_picture(Canvas &canvas, PadPicture &picture, int left, int top) {
   }
 }
 
-void draw_frame(Canvas &canvas, int left, int top, int width, int height) {
-  Style style = text_style(RULE);
+void draw_frame(Canvas &canvas, int left, int top, int width, int height, Colour colour) {
+  Style style = text_style(colour);
   for (int i = 1; i <= width; i++) {
     canvas.text(left + i, top, "─", style);
     canvas.text(left + i, top + height + 1, "─", style);
@@ -488,7 +487,8 @@ Canvas draw_monitor(const Model &model, const std::string &note, int columns, in
   if (model.info() && model.info()->sensor_count > 0) {
     PadPicture picture(*model.info(), columns - panel_columns - 4, rows - 6);
     paint_contact(picture, model);
-    draw_frame(canvas, 0, 1, picture.columns(), picture.rows());
+    draw_frame(canvas, 0, 1, picture.columns(), picture.rows(),
+               model.slipped_lately() ? BAD : RULE);
     draw_picture(canvas, picture, 1, 2);
     draw_readings(canvas, picture, model, 1, 2);
     draw_scale(canvas, 1, picture.rows() + 3, picture.columns());

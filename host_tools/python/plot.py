@@ -77,6 +77,7 @@ def draw_over_time(axes, t_s, series, fitted, slip, truth):
         panel.plot(t_s, gaps_as_nan(t_s, values, fitted), color=MEASURED, lw=1.1, label="measured", zorder=2)
         panel.set_ylabel(label)
         panel.grid(color="#e6e8ee", lw=0.6)
+        panel.tick_params(labelbottom=panel is axes[-1])
     low, high = axes[-1].get_ylim()
     mark = low - 0.06 * (high - low)
     for i, (start, end) in enumerate(runs(t_s, slip)):

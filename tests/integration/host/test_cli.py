@@ -1,0 +1,377 @@
+"""The fingertip command against a fake device: usage test_cli.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
+import contextlib
+import os
+import pty
+import re
+import resource
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+import termios
+import time
+import unittest
+
+FINGERTIP, FAKE_DEVICE = (os.path.abspath(path) for path in sys.argv[1:3])
+PATIENCE_s = 30
+
+
+class CliTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        self.port = os.path.join(self.folder, "tty")
+        self.csv = os.path.join(self.folder, "r.csv")
+        self.ftr = os.path.join(self.folder, "r.ftr")
+        self.environment = {k: v for k, v in os.environ.items() if k != "FINGERTIP_PORT"}
+
+    @contextlib.contextmanager
+    def device(self, *options):
+        process = subprocess.Popen([FAKE_DEVICE, self.port, *options])
+        try:
+            self.wait_for(lambda: os.path.lexists(self.port))
+            yield process
+        finally:
+            process.terminate()
+            process.wait(PATIENCE_s)
+
+    def wait_for(self, condition):
+        end = time.monotonic() + PATIENCE_s
+        while not condition():
+            self.assertLess(time.monotonic(), end, "waited too long")
+            time.sleep(0.01)
+
+    def start(self, *arguments, **options):
+        return subprocess.Popen([FINGERTIP, *arguments], env=self.environment, text=True, stdin=subprocess.DEVNULL,
+                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options)
+
+    def run_cli(self, *arguments, status=0, **options):
+        process = self.start(*arguments, **options)
+        out, err = process.communicate(timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, status, (arguments, out, err))
+        return out, err
+
+    def error(self, *arguments, status=1):
+        """The one line that a failing command prints."""
+        out, err = self.run_cli(*arguments, status=status)
+        self.assertEqual(out, "")
+        self.assertEqual(err.count("\n"), 1, err)
+        self.assertTrue(err.startswith("fingertip: "), err)
+        return err
+
+    def rows(self, path=None):
+        """Data rows as dictionaries, and the comment lines."""
+        with open(path or self.csv, encoding="utf-8") as file:
+            lines = file.read().splitlines()
+        data = [line.split(",") for line in lines if not line.startswith("#")]
+        return [dict(zip(data[0], row)) for row in data[1:]], [line for line in lines if line.startswith("#")]
+
+
+class Usage(CliTest):
+    def test_help_and_version(self):
+        self.assertRegex(self.run_cli("--version")[0], r"^fingertip \d+\.\d+\.\d+\n$")
+        commands = re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
+        self.assertEqual(sorted(commands), sorted(
+            ["list", "info", "monitor", "record", "replay", "tare", "set", "loader", "encode"]))
+        for command in commands:
+            self.assertIn(f"Usage: fingertip {command}", self.run_cli(command, "--help")[0])
+
+    def test_wrong_usage(self):
+        self.assertIn("see fingertip --help", self.error(status=2))
+        self.assertIn("see fingertip record --help", self.error("record", status=2))
+        self.error("monitor", "--bogus", status=2)
+        self.error("record", self.csv, "--seconds", "-1", status=2)
+        self.error("replay", self.csv, "--colour", "pink", status=2)
+
+    def test_ports(self):
+        self.assertIn("no such port", self.error("info", "--port", self.port))
+        self.assertIn("no serial port", self.error("info", "--port", "/dev/null"))
+        self.environment["FINGERTIP_PORT"] = "/tmp/a:/tmp/b"
+        self.assertIn("several fingertips found", self.error("info"))
+        self.assertIn("/tmp/b", self.run_cli("list")[0])
+
+    def test_ranges_are_found_before_a_port_is_opened(self):
+        for setting, allowed in [("rate=0", "0.1 to 2000 Hz, or max"), ("rate=x", "0.1 to 2000 Hz, or max"),
+                                 ("osr=1000", "256, 512, 1024, 2048, 4096 or 8192"),
+                                 ("slip_threshold=0", "0.01 to 50 mm"), ("slip_window=1001", "5 to 1000 ms"),
+                                 ("colour=red", "rate=HZ|max"), ("rate", "0.1 to 2000 Hz")]:
+            self.assertIn(allowed, self.error("set", "--port", self.port, setting))
+
+    def test_encode(self):
+        # COBS of version, type, sequence, time, body and CRC, worked out by zlib.crc32 and hand
+        self.assertEqual(self.run_cli("encode", "tare")[0], "030181010101010101010101055f601f5600\n")
+        timed = self.run_cli("encode", "--sequence", "258", "--time", "1", "osr", "8192")[0].strip()
+        self.assertTrue(timed.startswith("0601830201"), timed)
+        self.assertIn("slip THRESHOLD_MM WINDOW_MS", self.error("encode", "slip", "0.75"))
+        self.assertIn("0.1 to 2000", self.error("encode", "rate", "3000"))
+        self.assertIn("unknown", self.error("encode", "bogus"))
+
+
+class Commands(CliTest):
+    def test_info_and_settings(self):
+        with self.device():
+            out = self.run_cli("info", "--port", self.port)[0]
+            self.assertRegex(out, r"(?m)^serial +E660583883265A2C$")
+            self.assertRegex(out, r"(?m)^sensors_present +32767$")
+            self.environment["FINGERTIP_PORT"] = self.port
+            out = self.run_cli("set", "rate=max", "osr=256", "slip_threshold=0.5")[0]
+            self.assertEqual(out, "rate=max osr=256 slip_threshold=0.5 slip_window=100\n")
+            out = self.run_cli("set", "slip_window=250", "rate=20.5")[0]
+            self.assertEqual(out, "rate=20.500 osr=256 slip_threshold=0.5 slip_window=250\n")
+            self.assertEqual(self.run_cli("tare")[0], "tared\n")
+            self.assertIn("RPI-RP2", self.run_cli("loader")[0])
+
+    def test_refusal(self):
+        with self.device("refuse=1"):
+            self.assertIn('refused "tare": not possible now', self.error("tare", "--port", self.port))
+
+    def test_no_answer_can_be_interrupted(self):
+        with self.device("mute=1"):
+            process = self.start("info", "--port", self.port)
+            time.sleep(0.5)
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=5)
+            self.assertEqual((process.returncode, out, err), (1, "", "fingertip: interrupted\n"))
+
+    def test_a_port_in_use_is_busy(self):
+        with self.device():
+            process = self.start("record", self.csv, "--port", self.port)
+            self.wait_for(lambda: os.path.exists(self.csv))
+            self.assertIn("in use by another program", self.error("info", "--port", self.port))
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=PATIENCE_s)
+
+
+class Recording(CliTest):
+    def test_seconds(self):
+        with self.device():
+            self.run_cli("record", self.csv, "--port", self.port, "--seconds", "1", "--raw-bytes", self.ftr)
+        rows, comments = self.rows()
+        self.assertAlmostEqual((int(rows[-1]["t_us"]) - int(rows[0]["t_us"])) / 1e6, 1, delta=0.1)
+        self.assertIn("# serial: E660583883265A2C", comments)
+        self.assertRegex(comments[-1], r"^# end: reason=seconds frames=\d+ .* dropped_packets=0 .*crc_errors=0")
+        self.assertEqual([int(row["frame"]) for row in rows], list(range(1, len(rows) + 1)))
+        self.assertTrue(all(row["x_mm"] and row["s14_Pa"] and row["tare0_Pa"] for row in rows[:-1]))
+        # the captured bytes hold the same frames
+        converted = os.path.join(self.folder, "c.csv")
+        self.run_cli("replay", self.ftr, "--to-csv", converted)
+        again, _ = self.rows(converted)
+        self.assertEqual(again[:len(rows) - 1], rows[:-1])
+
+    def test_interrupt_ends_cleanly(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            with self.device():
+                process = self.start("record", self.csv, "--port", self.port)
+                self.wait_for(lambda: os.path.exists(self.csv) and len(self.rows()[0]) > 20)
+                process.send_signal(number)
+                _, err = process.communicate(timeout=PATIENCE_s)
+            self.assertEqual(process.returncode, 0)
+            self.assertRegex(err, r"r\.csv: \d+ frames in .* 0 packets dropped")
+            _, comments = self.rows()
+            os.unlink(self.csv)
+            self.assertIn("reason=interrupted", comments[-1])
+            # the stop was acknowledged: command 128 is stream
+            self.assertTrue(any(c.startswith("# packet: ack") and "command=128" in c for c in comments[-2:]), comments[-2:])
+
+    def test_kill_loses_nothing_written(self):
+        with self.device():
+            process = self.start("record", self.csv, "--port", self.port)
+            self.wait_for(lambda: os.path.exists(self.csv) and len(self.rows()[0]) > 50)
+            process.kill()
+            process.communicate(timeout=PATIENCE_s)
+        self.assertRegex(self.run_cli("replay", self.csv, "--speed", "max")[0], r"\d\d frames in")
+
+    def test_losses_and_damage_are_counted(self):
+        with self.device("drop=20", "flip=25", "frames=100"):
+            self.run_cli("record", self.csv, "--port", self.port, "--until-gone")
+        rows, comments = self.rows()
+        # Frames 20, 40, 60 and 80 lose two packets each, and 25, 50 and 75 a damaged one; 100 has no successor to tell.
+        self.assertRegex(comments[-1], "reason=gone frames=95 .*dropped_packets=11 .*crc_errors=3 format_errors=0")
+        self.assertEqual(sum(row["x_mm"] == "" for row in rows), 3)
+
+    def test_a_vanished_device_is_waited_for(self):
+        with self.device("vanish=100,700", "frames=150"):
+            self.wait_for(lambda: os.path.lexists(self.port))
+            process = self.start("record", self.csv, "--port", self.port)
+            self.wait_for(lambda: os.path.exists(self.csv) and any("back" in c for c in self.rows()[1]))
+            self.wait_for(lambda: len(self.rows()[0]) >= 220)
+            process.send_signal(signal.SIGINT)
+            _, err = process.communicate(timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, 0, err)
+        rows, comments = self.rows()
+        self.assertTrue(any(c.startswith("# event: gone") for c in comments))
+        self.assertIn("dropped_packets=0", comments[-1])
+        frames = [int(row["frame"]) for row in rows]
+        restart = frames.index(1, 1)
+        self.assertGreaterEqual(frames[restart - 1], 95)
+        self.assertEqual(frames[restart:], list(range(1, len(frames) - restart + 1)))
+        self.assertRegex(self.run_cli("replay", self.csv, "--speed", "max")[0], " 0 packets dropped")
+
+    def test_until_gone(self):
+        with self.device("frames=60"):
+            out, _ = self.run_cli("monitor", "--port", self.port, "--until-gone", "--record", self.csv)
+        self.assertRegex(out, r"r\.csv: 60 frames in")
+
+    def test_existing_files_are_kept(self):
+        with open(self.csv, "w", encoding="utf-8") as file:
+            file.write("precious")
+        with self.device():
+            self.assertIn("exists already", self.run_cli("record", self.csv, "--port", self.port, status=1)[1])
+        with open(self.csv, encoding="utf-8") as file:
+            self.assertEqual(file.read(), "precious")
+
+    def test_a_full_disk_is_an_error_and_leaves_a_readable_file(self):
+        def limit():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+
+        with self.device():
+            _, err = self.run_cli("record", self.csv, "--port", self.port, status=1, preexec_fn=limit)
+        self.assertIn("what was written until now stays readable", err)
+        self.assertRegex(self.run_cli("replay", self.csv, "--speed", "max")[0], r"\d\d frames in")
+
+    def test_an_absent_folder_is_an_error(self):
+        with self.device():
+            _, err = self.run_cli("record", self.folder + "/no/r.csv", "--port", self.port, status=1)
+        self.assertIn("No such file or directory; choose another place", err)
+
+
+class Replay(CliTest):
+    def record(self):
+        with self.device("frames=100"):
+            self.run_cli("record", self.csv, "--port", self.port, "--until-gone", "--raw-bytes", self.ftr)
+
+    def test_recorded_speed(self):
+        self.record()
+        begin = time.monotonic()
+        self.run_cli("replay", self.csv)
+        normal = time.monotonic() - begin
+        self.assertGreater(normal, 0.4)
+        begin = time.monotonic()
+        self.run_cli("replay", self.ftr, "--speed", "max")
+        self.assertLess(time.monotonic() - begin, normal / 2)
+        self.assertIn("0.01 to 1000, or max", self.error("replay", self.csv, "--speed", "0"))
+
+    def test_torn_lines(self):
+        self.record()
+        with open(self.csv, encoding="utf-8") as file:
+            text = file.read()
+        rows = [i for i, line in enumerate(text.split("\n")) if line and not line.startswith("#")]
+        lines = text.split("\n")
+        lines[rows[10]] = lines[rows[10]][:40]
+        with open(self.csv, "w", encoding="utf-8") as file:
+            file.write("\n".join(lines))
+        out, err = self.run_cli("replay", self.csv, "--speed", "max", status=1)
+        self.assertIn(f"{self.csv}:{rows[10] + 1}: ", err)
+        self.assertIn("use --salvage", err)
+        out, err = self.run_cli("replay", self.csv, "--speed", "max", "--salvage")
+        self.assertIn("1 damaged lines skipped", err)
+        self.assertIn("99 frames in", out)
+
+    def test_other_files(self):
+        noise = os.path.join(self.folder, "noise.ftr")
+        with open(noise, "wb") as file:
+            file.write(bytes(range(256)) * 20)
+        self.assertIn("no frames in it", self.run_cli("replay", noise, "--speed", "max", status=1)[1])
+        self.assertIn("no frames in it", self.error("replay", noise, "--to-csv", self.csv))
+        self.assertFalse(os.path.exists(self.csv))
+        self.assertIn("No such file", self.run_cli("replay", self.folder + "/absent.csv", status=1)[1])
+
+
+class Monitor(CliTest):
+    """On a terminal of 80 x 24 that this test reads."""
+
+    def on_terminal(self, *arguments, until, then, environment=(("COLORTERM", "truecolor"), ("TERM", "xterm"))):
+        """Output up to the end; once `until` was seen, `then` (a signal, or keys) is sent."""
+        pid, terminal = pty.fork()
+        if pid == 0:
+            os.execve(FINGERTIP, [FINGERTIP, *arguments], {**self.environment, **dict(environment)})
+        before = termios.tcgetattr(terminal)
+        output, sent, end = b"", False, time.monotonic() + PATIENCE_s
+        while True:
+            self.assertLess(time.monotonic(), end, output[-2000:])
+            if not select.select([terminal], [], [], 0.1)[0]:
+                continue
+            try:
+                chunk = os.read(terminal, 65536)
+            except OSError:
+                break
+            if not chunk:
+                break
+            output += chunk
+            if not sent and re.search(until.encode(), output, re.S):
+                sent = True
+                if isinstance(then, bytes):
+                    os.write(terminal, then)
+                else:
+                    os.kill(pid, then)
+        _, status = os.waitpid(pid, 0)
+        after = None
+        with contextlib.suppress(termios.error):
+            after = termios.tcgetattr(terminal)
+        os.close(terminal)
+        return output.decode(), os.waitstatus_to_exitcode(status), before, after
+
+    def assert_restored(self, output):
+        last_enter, last_leave = output.rfind("\x1b[?1049h"), output.rfind("\x1b[?1049l")
+        self.assertGreater(last_enter, -1)
+        self.assertGreater(last_leave, last_enter)
+        self.assertGreater(output.rfind("\x1b[?25h"), output.rfind("\x1b[?25l"))
+        self.assertNotIn("\x1b", output[last_leave + 8:])
+        self.assertRegex(output[last_leave:], r"\d+ frames in")
+
+    def test_every_way_out_restores_the_terminal(self):
+        for way in (signal.SIGINT, signal.SIGTERM, b"q"):
+            with self.device():
+                output, status, before, after = self.on_terminal("monitor", "--port", self.port, until="live.*live", then=way)
+            self.assertEqual(status, 0)
+            self.assert_restored(output)
+            if after:
+                self.assertEqual(before, after)
+
+    def test_shows_what_matters(self):
+        with self.device():
+            output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until="(live.*){5}", then=b"q")
+        text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", output)
+        for word in ("FINGERTIP", "E660583883265A2C", "pico_mux", "force", "5.00", "CONTACT", "SLIP", "frames/s",
+                     "dropped", "CRC errors", "FIT_VALID", "convert", "2501", "▀"):
+            self.assertIn(word, text)
+        self.assertIn("\x1b[0;38;2;", output)
+
+    def test_256_colours(self):
+        with self.device():
+            output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until="live", then=b"q",
+                                               environment=(("TERM", "xterm-256color"), ("COLORTERM", "")))
+        self.assertIn("38;5;", output)
+        self.assertNotIn("38;2;", output)
+
+    def test_a_dumb_terminal_gets_lines(self):
+        with self.device():
+            output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until="FIT_VALID", then=signal.SIGINT,
+                                               environment=(("TERM", "dumb"),))
+        self.assertNotIn("\x1b", output)
+
+    def test_a_stall_shows_within_a_second(self):
+        with self.device("stall=50"):
+            output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until=r"STALLED for 0\.[789]", then=b"q")
+        self.assert_restored(output)
+
+    def test_an_error_restores_the_terminal(self):
+        with self.device("refuse=1", "frames=30"):
+            output, status, _, _ = self.on_terminal("monitor", "--port", self.port, "--record", self.folder + "/no/r.csv",
+                                                    until="never", then=b"q")
+        self.assertEqual(status, 1)
+        self.assertGreater(output.rfind("\x1b[?1049l"), output.rfind("\x1b[?1049h"))
+        self.assertIn("choose another place", output[output.rfind("\x1b[?1049l"):])
+
+    def test_lines_where_there_is_no_terminal(self):
+        with self.device("frames=300"):
+            out, _ = self.run_cli("monitor", "--port", self.port, "--until-gone")
+        self.assertNotIn("\x1b", out)
+        self.assertRegex(out, r"(?m)^\d\.\d s  \d+ frames .* force 5\.00 N  CONTACT FIT_VALID TARED$")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])

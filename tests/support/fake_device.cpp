@@ -1,0 +1,231 @@
+/* A fingertip without firmware, for tests of the host tools: serves a pseudo-terminal with the
+ * wire protocol's own codec.
+ *
+ *   fake_device LINK [key=value]...
+ *     rate=HZ          frames a second, default 200
+ *     frames=N         leave after this many frames
+ *     vanish=AT,BACK   the port goes after AT frames and is back BACK ms later, restarted
+ *     drop=N           every Nth frame loses its packets
+ *     flip=N           every Nth frame has a flipped bit
+ *     stall=N          says nothing more after N frames
+ *     mute=1           never says anything
+ *     refuse=1         answers every command but stream, info and health with "not now"
+ *
+ * Ends by SIGTERM, or after a minute. */
+#include "libfingertip/command.hpp"
+#include "libfingertip/text.hpp"
+#include "support/host_packets.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <fcntl.h>
+#include <map>
+#include <poll.h>
+#include <termios.h>
+#include <thread>
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+volatile std::sig_atomic_t ended = 0;
+
+class FakeDevice {
+public:
+  FakeDevice(std::string link, std::map<std::string, std::string> options)
+      : link_(std::move(link)), options_(std::move(options)) {
+    power_on();
+  }
+  ~FakeDevice() { power_off(); }
+
+  void run() {
+    auto end = Clock::now() + std::chrono::minutes(1);
+    auto next_frame = Clock::now();
+    auto interval = std::chrono::microseconds(1000000 / number("rate", 200));
+    while (!ended && Clock::now() < end) {
+      if (serve(std::max(milliseconds(0),
+                         std::chrono::duration_cast<milliseconds>(next_frame - Clock::now())))) {
+        next_frame = Clock::now();
+      }
+      if (streams_ == 0) {
+        next_frame = Clock::now() + milliseconds(5);
+        continue;
+      }
+      for (; next_frame <= Clock::now() && streams_ != 0; next_frame += interval) {
+        send_frame();
+        long vanish = number("vanish", 0);
+        if (vanish && frame_ == vanish && !vanished_) {
+          vanished_ = true;
+          std::string text = options_["vanish"];
+          power_off();
+          std::this_thread::sleep_for(milliseconds(std::atol(text.c_str() + text.find(',') + 1)));
+          power_on();
+        }
+        if (frame_ == number("frames", -1)) {
+          /* what was written is read before the terminal goes */
+          std::this_thread::sleep_for(milliseconds(200));
+          return;
+        }
+      }
+    }
+  }
+
+private:
+  long number(const char *key, long otherwise) const {
+    auto option = options_.find(key);
+    return option == options_.end() ? otherwise : std::atol(option->second.c_str());
+  }
+
+  void power_on() {
+    master_ = posix_openpt(O_RDWR | O_NOCTTY);
+    if (master_ < 0 || grantpt(master_) != 0 || unlockpt(master_) != 0) {
+      perror("posix_openpt");
+      std::exit(1);
+    }
+    termios settings;
+    tcgetattr(master_, &settings);
+    cfmakeraw(&settings);
+    tcsetattr(master_, TCSANOW, &settings);
+    unlink(link_.c_str());
+    if (symlink(ptsname(master_), link_.c_str()) != 0) {
+      perror(link_.c_str());
+      std::exit(1);
+    }
+    wire_receiver_init(&receiver_);
+    started_ = Clock::now();
+    streams_ = 0;
+    sequence_ = 0;
+    frame_ = 0;
+  }
+
+  void power_off() {
+    unlink(link_.c_str());
+    close(master_);
+  }
+
+  std::uint64_t now_us() const {
+    return static_cast<std::uint64_t>(
+        std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - started_).count());
+  }
+
+  void send(wire_packet packet, bool flip = false) {
+    packet.sequence = sequence_++;
+    auto bytes = fingertip::frame_bytes(packet);
+    if (flip) {
+      bytes[bytes.size() / 2] = static_cast<std::uint8_t>(bytes[bytes.size() / 2] ^ 0x80);
+    }
+    if (number("mute", 0) || write(master_, bytes.data(), bytes.size()) < 0) {
+      return;
+    }
+  }
+
+  void send_frame() {
+    frame_++;
+    long stall = number("stall", 0), drop = number("drop", 0), flip = number("flip", 0);
+    if (stall && frame_ > stall) {
+      return;
+    }
+    std::uint64_t t_us = now_us();
+    auto frame = static_cast<std::uint32_t>(frame_);
+    wire_packet contact = test::make_contact(0, t_us, frame);
+    float angle = static_cast<float>(frame % 400) * 0.0157f;
+    contact.body.contact.x_mm = 8 * std::cos(angle);
+    contact.body.contact.y_mm = 16 * std::sin(angle);
+    contact.body.contact.force_N = 5;
+    if (drop && frame_ % drop == 0) {
+      sequence_ = static_cast<std::uint16_t>(sequence_ + 2);
+      return;
+    }
+    send(contact, flip && frame_ % flip == 0);
+    send(test::make_raw(0, t_us, frame));
+  }
+
+  /* True if the streams changed. */
+  bool serve(milliseconds timeout) {
+    pollfd waiting = {master_, POLLIN, 0};
+    if (poll(&waiting, 1, static_cast<int>(timeout.count())) <= 0) {
+      return false;
+    }
+    std::uint8_t bytes[256];
+    ssize_t count = waiting.revents & POLLIN ? read(master_, bytes, sizeof bytes) : -1;
+    if (count <= 0) {
+      streams_ = 0; /* nobody has it open */
+      std::this_thread::sleep_for(milliseconds(2));
+      return false;
+    }
+    bool changed = false;
+    for (ssize_t i = 0; i < count; i++) {
+      wire_packet command;
+      if (wire_receive(&receiver_, bytes[i], &command) == FT_OK) {
+        changed = obey(command) || changed;
+      }
+    }
+    return changed;
+  }
+
+  bool obey(const wire_packet &command) {
+    bool known = command.type == WIRE_CMD_STREAM || command.type == WIRE_CMD_INFO ||
+                 command.type == WIRE_CMD_HEALTH;
+    std::uint8_t result = number("refuse", 0) && !known ? WIRE_RESULT_NOT_NOW : WIRE_RESULT_DONE;
+    send(test::make_ack(0, now_us(), command.type, result, command.sequence, command.t_us));
+    if (result != WIRE_RESULT_DONE) {
+      return false;
+    }
+    switch (command.type) {
+    case WIRE_CMD_STREAM:
+      streams_ = command.body.cmd_stream.streams;
+      return true;
+    case WIRE_CMD_RATE:
+      info_.body.info.rate_mHz = command.body.cmd_rate.rate_mHz;
+      return false;
+    case WIRE_CMD_OSR:
+      info_.body.info.osr = command.body.cmd_osr.osr;
+      return false;
+    case WIRE_CMD_SLIP:
+      info_.body.info.slip_threshold_mm = command.body.cmd_slip.threshold_mm;
+      info_.body.info.slip_window_ms = command.body.cmd_slip.window_ms;
+      return false;
+    case WIRE_CMD_INFO:
+      info_.t_us = now_us();
+      send(info_);
+      return false;
+    case WIRE_CMD_HEALTH:
+      send(test::make_health(0, now_us()));
+      return false;
+    default:
+      return false;
+    }
+  }
+
+  std::string link_;
+  std::map<std::string, std::string> options_;
+  int master_ = -1;
+  wire_receiver receiver_;
+  wire_packet info_ = test::make_info(0, 0);
+  Clock::time_point started_;
+  std::uint8_t streams_ = 0;
+  std::uint16_t sequence_ = 0;
+  long frame_ = 0;
+  bool vanished_ = false;
+};
+
+} // namespace
+
+int main(int argc, char **argv) {
+  if (argc < 2) {
+    std::fprintf(stderr, "usage: fake_device LINK [key=value]...\n");
+    return 2;
+  }
+  std::map<std::string, std::string> options;
+  for (int i = 2; i < argc; i++) {
+    std::string text = argv[i];
+    options[text.substr(0, text.find('='))] = text.substr(text.find('=') + 1);
+  }
+  std::signal(SIGTERM, [](int) { ended = 1; });
+  FakeDevice(argv[1], options).run();
+  return 0;
+}

@@ -1,0 +1,118 @@
+/* Packets with every field set, each field different, for tests of the host tools. */
+#pragma once
+
+#include "libfingertip/wire.hpp"
+
+#include <cstring>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+namespace test {
+
+inline wire_packet make_packet(wire_type type, std::uint16_t sequence, std::uint64_t t_us) {
+  wire_packet packet;
+  std::memset(&packet, 0, sizeof packet);
+  packet.type = static_cast<std::uint8_t>(type);
+  packet.sequence = sequence;
+  packet.t_us = t_us;
+  return packet;
+}
+
+inline wire_packet make_contact(std::uint16_t sequence, std::uint64_t t_us, std::uint32_t frame) {
+  wire_packet packet = make_packet(WIRE_CONTACT, sequence, t_us);
+  wire_contact &contact = packet.body.contact;
+  contact.frame = frame;
+  contact.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_TARED;
+  contact.sensors_used = 0x7FFF;
+  contact.x_mm = 0.1f + static_cast<float>(frame % 10);
+  contact.y_mm = -3.3333333f;
+  contact.p0_Pa = 41234.567f;
+  contact.sigma_mm = 5.7000003f;
+  contact.force_N = 1.0e-7f;
+  contact.slip_mm = 0.75f;
+  contact.residual_rms_Pa = 12.5f;
+  contact.location_sd_mm = 0.0123456f;
+  contact.force_sd_N = 3.0e-5f;
+  contact.stages = {2501, 3206, 1449, 23, 6918, 30, 14127};
+  return packet;
+}
+
+inline wire_packet make_raw(std::uint16_t sequence, std::uint64_t t_us, std::uint32_t frame,
+                            std::uint8_t sensor_count = 15) {
+  wire_packet packet = make_packet(WIRE_RAW, sequence, t_us);
+  wire_raw &raw = packet.body.raw;
+  raw.frame = frame;
+  raw.valid = 0x7FFE;
+  raw.saturated = 0x4000;
+  raw.temperature_cC = -1234;
+  raw.sensor_count = sensor_count;
+  for (int k = 0; k < sensor_count; k++) {
+    raw.pressure_Pa_q10[k] = 101325 * 1024 + 7 * k + 1;
+    raw.baseline_Pa_q10[k] = k % 2 ? -k : 101325 * 1024 - k;
+  }
+  return packet;
+}
+
+inline wire_packet make_info(std::uint16_t sequence, std::uint64_t t_us) {
+  wire_packet packet = make_packet(WIRE_INFO, sequence, t_us);
+  wire_info &info = packet.body.info;
+  info.firmware_version[0] = 1;
+  info.firmware_version[1] = 20;
+  info.firmware_version[2] = 3;
+  info.sensor_count = 15;
+  std::memcpy(info.git_hash, "0123456789ab+", 13);
+  std::memcpy(info.board, "pico_mux", 8);
+  std::memcpy(info.scene, "slip", 4);
+  std::memcpy(info.serial, "E660583883265A2C", 16);
+  info.rate_mHz = 20000;
+  info.measured_rate_mHz = 19998;
+  info.osr = 1024;
+  info.temperature_interval = 64;
+  info.slip_window_ms = 100;
+  info.fit_iterations = 7;
+  info.streams = 3;
+  info.slip_threshold_mm = 0.75f;
+  info.pitch_mm = 9;
+  for (int k = 0; k < 15; k++) {
+    info.x_mm[k] = 9.0f * static_cast<float>(k / 5 - 1);
+    info.y_mm[k] = 9.0f * static_cast<float>(k % 5 - 2);
+  }
+  return packet;
+}
+
+inline wire_packet make_health(std::uint16_t sequence, std::uint64_t t_us) {
+  wire_packet packet = make_packet(WIRE_HEALTH, sequence, t_us);
+  packet.body.health = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0x7FFF, 14, 0xFFFFFFFFu, 16, 17};
+  return packet;
+}
+
+inline wire_packet make_ack(std::uint16_t sequence, std::uint64_t t_us, std::uint8_t command,
+                            std::uint8_t result, std::uint16_t command_sequence,
+                            std::uint64_t host_time_us) {
+  wire_packet packet = make_packet(WIRE_ACK, sequence, t_us);
+  packet.body.ack = {command, result, command_sequence, host_time_us};
+  return packet;
+}
+
+/* A folder that goes when the test ends. */
+class TemporaryFolder {
+public:
+  TemporaryFolder() {
+    char name[] = "/tmp/fingertip-test-XXXXXX";
+    path_ = mkdtemp(name);
+  }
+  ~TemporaryFolder() {
+    std::string command = "rm -rf '" + path_ + "'";
+    if (system(command.c_str()) != 0) {
+      perror("rm");
+    }
+  }
+  std::string operator/(const std::string &name) const { return path_ + "/" + name; }
+  const std::string &path() const { return path_; }
+
+private:
+  std::string path_;
+};
+
+} // namespace test

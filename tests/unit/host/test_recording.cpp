@@ -1,0 +1,259 @@
+#include "libfingertip/command.hpp"
+#include "libfingertip/error.hpp"
+#include "libfingertip/recording.hpp"
+#include "libfingertip/recording_transport.hpp"
+#include "support/host_packets.hpp"
+
+#include <csignal>
+#include <fstream>
+#include <gtest/gtest.h>
+#include <sstream>
+#include <sys/resource.h>
+
+using namespace fingertip;
+
+namespace {
+
+std::string contents(const std::string &path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+void write(const std::string &path, const std::string &text) {
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+/* Two packets are the same if their frames are. */
+std::vector<std::vector<std::uint8_t>> frames_of(const std::vector<wire_packet> &packets) {
+  std::vector<std::vector<std::uint8_t>> frames;
+  for (const wire_packet &packet : packets) {
+    frames.push_back(frame_bytes(packet));
+  }
+  return frames;
+}
+
+std::vector<wire_packet> all_kinds() {
+  return {test::make_info(0, 10),
+          test::make_ack(1, 20, WIRE_CMD_STREAM, WIRE_RESULT_OUT_OF_RANGE, 65535, ~0ull),
+          test::make_contact(2, 1000, 1),
+          test::make_raw(3, 1000, 1),
+          test::make_contact(4, 2000, 2), /* its raw packet was lost */
+          test::make_contact(6, 3000, 3),
+          test::make_raw(7, 3000, 3),
+          test::make_health(8, 3500),
+          test::make_raw(10, 4000, 4)}; /* its contact packet was lost */
+}
+
+void record(const std::string &path, const std::vector<wire_packet> &packets, bool finish = true) {
+  wire_info info = test::make_info(0, 0).body.info;
+  RecordingWriter writer(path, false, &info, 15, {{"note", "a: b"}}, true);
+  for (const wire_packet &packet : packets) {
+    writer.packet(packet);
+  }
+  if (finish) {
+    writer.finish(LineStatistics(), "test");
+  }
+}
+
+std::vector<wire_packet> read_all(const std::string &path, bool salvage = false,
+                                  std::uint64_t *skipped = nullptr) {
+  RecordingReader reader(path, salvage);
+  std::vector<wire_packet> packets;
+  while (auto item = reader.next()) {
+    if (item->kind == RecordingReader::Item::Kind::packet) {
+      packets.push_back(item->packet);
+    }
+  }
+  if (skipped) {
+    *skipped = reader.skipped_lines();
+  }
+  return packets;
+}
+
+std::string error_of(const std::string &path) {
+  try {
+    read_all(path);
+  } catch (const Error &error) {
+    return error.what();
+  }
+  return "";
+}
+
+} // namespace
+
+TEST(Recording, GivesBackEveryFieldOfEveryPacket) {
+  test::TemporaryFolder folder;
+  record(folder / "r.csv", all_kinds());
+  EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(all_kinds()));
+}
+
+TEST(Recording, OneRowPerFrame) {
+  test::TemporaryFolder folder;
+  record(folder / "r.csv", all_kinds());
+  std::istringstream text(contents(folder / "r.csv"));
+  int rows = -1; /* the header */
+  for (std::string line; std::getline(text, line);) {
+    rows += line[0] != '#';
+  }
+  EXPECT_EQ(rows, 4);
+}
+
+TEST(Recording, TransportGivesTheSameBytesAgainAndTheGapsCount) {
+  test::TemporaryFolder folder;
+  record(folder / "r.csv", all_kinds());
+  RecordingTransport transport(folder / "r.csv", false);
+  Decoder decoder;
+  std::vector<wire_packet> packets;
+  std::uint8_t bytes[7];
+  std::size_t length;
+  while (transport.read(bytes, sizeof bytes, &length, std::chrono::milliseconds(0)) ==
+         Transport::Result::data) {
+    decoder.feed(bytes, length, [&](const wire_packet &packet) { packets.push_back(packet); });
+  }
+  EXPECT_EQ(frames_of(packets), frames_of(all_kinds()));
+  EXPECT_EQ(decoder.statistics().dropped_packets, 2u);
+  EXPECT_EQ(decoder.statistics().out_of_order, 0u);
+  EXPECT_FALSE(transport.reopen());
+}
+
+TEST(Recording, AGonePortIsGoneAgainInReplay) {
+  test::TemporaryFolder folder;
+  {
+    RecordingWriter writer(folder / "r.csv", false, nullptr, 0, {}, false);
+    writer.packet(test::make_contact(1000, 1, 1));
+    writer.event(std::string(EVENT_GONE) + " 12:00");
+    writer.event("back 12:01");
+    writer.packet(test::make_contact(3, 1, 1));
+  }
+  RecordingTransport transport(folder / "r.csv", false);
+  std::uint8_t bytes[WIRE_MAX_FRAME_BYTES];
+  std::size_t length;
+  auto read = [&] {
+    return transport.read(bytes, sizeof bytes, &length, std::chrono::milliseconds(0));
+  };
+  EXPECT_EQ(read(), Transport::Result::data);
+  EXPECT_EQ(read(), Transport::Result::gone);
+  EXPECT_TRUE(transport.reopen());
+  EXPECT_EQ(read(), Transport::Result::data);
+  EXPECT_EQ(read(), Transport::Result::gone);
+  EXPECT_FALSE(transport.reopen());
+}
+
+TEST(Recording, ChangedInfoAfterAReturnIsKept) {
+  test::TemporaryFolder folder;
+  wire_packet later = test::make_info(0, 5);
+  later.body.info.osr = 256;
+  later.body.info.x_mm[3] = 1.25f;
+  std::vector<wire_packet> packets = {test::make_info(1, 2), test::make_contact(2, 3, 1), later,
+                                      test::make_contact(1, 9, 1)};
+  record(folder / "r.csv", packets);
+  EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(packets));
+}
+
+TEST(Recording, AKilledRecorderLosesAtMostTheLastFrame) {
+  test::TemporaryFolder folder;
+  record(folder / "r.csv", all_kinds(), false);
+  EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(all_kinds()));
+}
+
+TEST(Recording, EveryTornTailIsReportedWithItsLineOrSalvaged) {
+  test::TemporaryFolder folder;
+  record(folder / "r.csv",
+         {test::make_contact(1, 1000, 1), test::make_raw(2, 1000, 1),
+          test::make_contact(3, 2000, 2), test::make_raw(4, 2000, 2)},
+         false);
+  std::string whole = contents(folder / "r.csv");
+  std::size_t last_line = whole.rfind('\n', whole.size() - 2) + 1;
+  std::size_t line_number = static_cast<std::size_t>(std::count(whole.begin(), whole.end(), '\n'));
+  for (std::size_t length = last_line + 1; length < whole.size(); length++) {
+    write(folder / "torn.csv", whole.substr(0, length));
+    std::string error = error_of(folder / "torn.csv");
+    EXPECT_EQ(error.rfind(folder / "torn.csv" + ":" + std::to_string(line_number) + ": ", 0), 0u)
+        << error;
+    EXPECT_NE(error.find("--salvage"), std::string::npos);
+    std::uint64_t skipped = 0;
+    EXPECT_EQ(read_all(folder / "torn.csv", true, &skipped).size(), 2u);
+    EXPECT_EQ(skipped, 1u);
+  }
+}
+
+TEST(Recording, DamagedCellsAreNamed) {
+  test::TemporaryFolder folder;
+  record(folder / "r.csv", {test::make_contact(1, 1000, 1), test::make_contact(2, 2000, 2)});
+  std::string whole = contents(folder / "r.csv");
+  std::size_t row = whole.find("\n1000,1,") + 1;
+  struct {
+    const char *from, *to, *named;
+  } cases[] = {{"1000,", "-1000,", "t_us"},      {"1000,", "nan,", "t_us"},
+               {"5.7000003", "nan", "sigma_mm"}, {"5.7000003", "inf", "sigma_mm"},
+               {"5.7000003", "", "sigma_mm"},    {"2501", "70000", "convert_us"},
+               {"2501", "2501x", "convert_us"},  {"2501", "2501,1", "columns"},
+               {"2501,", "", "columns"}};
+  for (const auto &damage : cases) {
+    std::string text = whole;
+    std::size_t at = text.find(damage.from, row);
+    ASSERT_NE(at, std::string::npos) << damage.from;
+    text.replace(at, std::string(damage.from).size(), damage.to);
+    write(folder / "bad.csv", text);
+    std::string error = error_of(folder / "bad.csv");
+    EXPECT_NE(error.find(damage.named), std::string::npos) << damage.from << " " << error;
+    std::uint64_t skipped = 0;
+    EXPECT_EQ(read_all(folder / "bad.csv", true, &skipped).size(), 1u);
+    EXPECT_EQ(skipped, 1u);
+  }
+}
+
+TEST(Recording, OtherFilesAreRefused) {
+  test::TemporaryFolder folder;
+  write(folder / "x.csv", "t_us,frame\n1,2\n");
+  EXPECT_NE(error_of(folder / "x.csv").find(":1: no recording"), std::string::npos);
+  EXPECT_NE(error_of(folder / "absent.csv").find("No such file"), std::string::npos);
+  write(folder / "h.csv", "# fingertip-recording 1\nt_us,frame,colour\n");
+  EXPECT_NE(error_of(folder / "h.csv").find(":2: unknown header"), std::string::npos);
+  write(folder / "e.csv", "# fingertip-recording 1\n");
+  EXPECT_NE(error_of(folder / "e.csv").find("no header line"), std::string::npos);
+}
+
+TEST(Recording, ExistingFilesAreKeptUnlessReplaced) {
+  test::TemporaryFolder folder;
+  write(folder / "r.csv", "precious");
+  EXPECT_THROW(RecordingWriter(folder / "r.csv", false, nullptr, 0, {}, false), Error);
+  EXPECT_EQ(contents(folder / "r.csv"), "precious");
+  RecordingWriter(folder / "r.csv", true, nullptr, 0, {}, false);
+  EXPECT_EQ(contents(folder / "r.csv").rfind("# fingertip-recording 1\n", 0), 0u);
+}
+
+TEST(Recording, AnotherNumberOfSensorsEndsIt) {
+  test::TemporaryFolder folder;
+  RecordingWriter writer(folder / "r.csv", false, nullptr, 15, {}, true);
+  EXPECT_THROW(writer.packet(test::make_raw(1, 1, 1, 12)), Error);
+}
+
+/* A limit on the file's size stands in for a full disk: write stops in mid-line. */
+TEST(Recording, AFullDiskIsAnErrorAndLeavesWholeLines) {
+  test::TemporaryFolder folder;
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  rlimit small = {5000, before.rlim_max};
+  std::string error;
+  std::uint64_t frames = 0;
+  {
+    RecordingWriter writer(folder / "r.csv", false, nullptr, 15, {}, false);
+    setrlimit(RLIMIT_FSIZE, &small);
+    try {
+      for (std::uint16_t i = 0; i < 1000; i++) {
+        writer.packet(test::make_contact(i, 1000u * i, i));
+      }
+    } catch (const Error &thrown) {
+      error = thrown.what();
+    }
+    setrlimit(RLIMIT_FSIZE, &before);
+    frames = writer.frames();
+  }
+  EXPECT_NE(error.find("stays readable"), std::string::npos) << error;
+  EXPECT_GT(frames, 10u);
+  EXPECT_EQ(read_all(folder / "r.csv").size(), frames);
+}

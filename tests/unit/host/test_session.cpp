@@ -1,0 +1,179 @@
+#include "libfingertip/command.hpp"
+#include "libfingertip/session.hpp"
+#include "support/host_packets.hpp"
+
+#include <deque>
+#include <gtest/gtest.h>
+
+using namespace fingertip;
+using std::chrono::milliseconds;
+
+namespace {
+
+/* A line in memory: what the host writes is answered by a function. */
+class FakeTransport : public Transport {
+public:
+  std::function<void(const wire_packet &)> on_command = [](const wire_packet &) {};
+  std::vector<wire_packet> commands;
+  bool gone = false;
+
+  void say(const wire_packet &packet) {
+    for (std::uint8_t byte : frame_bytes(packet)) {
+      waiting_.push_back(byte);
+    }
+  }
+  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
+              milliseconds) override {
+    *length = 0;
+    while (*length < capacity && !waiting_.empty()) {
+      bytes[(*length)++] = waiting_.front();
+      waiting_.pop_front();
+    }
+    return *length ? Result::data : gone ? Result::gone : Result::timeout;
+  }
+  bool write(const std::uint8_t *bytes, std::size_t length) override {
+    for (std::size_t i = 0; i < length; i++) {
+      wire_packet packet;
+      if (wire_receive(&receiver_, bytes[i], &packet) == FT_OK) {
+        commands.push_back(packet);
+        on_command(packet);
+      }
+    }
+    return true;
+  }
+  bool reopen() override { return !gone; }
+  std::string description() const override { return "fake"; }
+  FakeTransport() { wire_receiver_init(&receiver_); }
+
+private:
+  std::deque<std::uint8_t> waiting_;
+  wire_receiver receiver_;
+};
+
+const Session::Policy QUICK = {milliseconds(20), 3};
+
+std::string error_of(const std::function<void()> &action) {
+  try {
+    action();
+  } catch (const Error &error) {
+    return error.what();
+  }
+  return "";
+}
+
+} // namespace
+
+TEST(Session, RepeatsACommandUntilItIsAcknowledged) {
+  FakeTransport line;
+  int deaf = 2;
+  line.on_command = [&](const wire_packet &command) {
+    if (deaf-- <= 0) {
+      line.say(
+          test::make_ack(1, 5000, command.type, WIRE_RESULT_DONE, command.sequence, command.t_us));
+    }
+  };
+  Session session(line);
+  session.command(command_tare(), QUICK);
+  ASSERT_EQ(line.commands.size(), 3u);
+  EXPECT_NE(line.commands[0].sequence, line.commands[2].sequence);
+}
+
+TEST(Session, TakesALateAnswerToAnEarlierAttempt) {
+  FakeTransport line;
+  line.on_command = [&](const wire_packet &) {
+    if (line.commands.size() == 2) {
+      const wire_packet &first = line.commands[0];
+      line.say(test::make_ack(1, 5000, first.type, WIRE_RESULT_DONE, first.sequence, first.t_us));
+    }
+  };
+  Session session(line);
+  session.command(command_tare(), QUICK);
+  EXPECT_EQ(line.commands.size(), 2u);
+}
+
+TEST(Session, AnswersToOthersDoNotCount) {
+  FakeTransport line;
+  line.on_command = [&](const wire_packet &command) {
+    auto stale = static_cast<std::uint16_t>(command.sequence - 1000);
+    line.say(test::make_ack(1, 1, command.type, WIRE_RESULT_DONE, stale, 1));
+    line.say(test::make_ack(2, 2, WIRE_CMD_OSR, WIRE_RESULT_DONE, command.sequence, 1));
+  };
+  Session session(line);
+  EXPECT_NE(error_of([&] { session.command(command_tare(), QUICK); }).find("no answer to \"tare\""),
+            std::string::npos);
+  EXPECT_EQ(line.commands.size(), 3u);
+}
+
+TEST(Session, ARefusalIsAnErrorAtOnce) {
+  FakeTransport line;
+  line.on_command = [&](const wire_packet &command) {
+    line.say(
+        test::make_ack(1, 1, command.type, WIRE_RESULT_NOT_NOW, command.sequence, command.t_us));
+  };
+  Session session(line);
+  EXPECT_NE(error_of([&] {
+              session.command(command_tare(), QUICK);
+            }).find("refused \"tare\": not possible now"),
+            std::string::npos);
+  EXPECT_EQ(line.commands.size(), 1u);
+}
+
+TEST(Session, NoPacketIsLostToWaiting) {
+  FakeTransport line;
+  std::uint16_t sequence = 0;
+  line.on_command = [&](const wire_packet &command) {
+    line.say(test::make_contact(sequence++, 1, 1));
+    line.say(test::make_ack(sequence++, 2, command.type, WIRE_RESULT_DONE, command.sequence,
+                            command.t_us));
+    line.say(test::make_contact(sequence++, 3, 2));
+    line.say(test::make_info(sequence++, 4));
+    line.say(test::make_contact(sequence++, 5, 3));
+  };
+  Session session(line);
+  std::vector<int> types;
+  session.on_packet([&](const wire_packet &packet) { types.push_back(packet.type); });
+  wire_packet info = session.info();
+  EXPECT_EQ(info.sequence, 3);
+  EXPECT_EQ(info.body.info.osr, 1024);
+  EXPECT_EQ(types,
+            (std::vector<int>{WIRE_CONTACT, WIRE_ACK, WIRE_CONTACT, WIRE_INFO, WIRE_CONTACT}));
+  EXPECT_EQ(session.statistics().dropped_packets, 0u);
+}
+
+TEST(Session, RelatesTheClocks) {
+  FakeTransport line;
+  line.on_command = [&](const wire_packet &command) {
+    auto device_us = static_cast<std::uint64_t>(steady_now_us()) - 1000000u;
+    line.say(test::make_ack(1, device_us, command.type, WIRE_RESULT_DONE, command.sequence,
+                            command.t_us));
+  };
+  Session session(line);
+  EXPECT_FALSE(session.clock());
+  session.command(command_tare(), QUICK);
+  ASSERT_TRUE(session.clock());
+  EXPECT_LE(std::abs(session.clock()->device_minus_host_us + 1000000),
+            session.clock()->uncertainty_us + 1);
+}
+
+TEST(Session, AVanishedPortAndAStopEndTheWait) {
+  FakeTransport line;
+  line.gone = true;
+  Session session(line);
+  EXPECT_THROW(session.info(), Gone);
+  FakeTransport silent;
+  Session stopped(silent, [] { return true; });
+  EXPECT_THROW(stopped.info(), Interrupted);
+}
+
+TEST(Session, BytesAreTappedAsTheyCome) {
+  FakeTransport line;
+  wire_packet contact = test::make_contact(1, 2, 3);
+  line.say(contact);
+  Session session(line);
+  std::vector<std::uint8_t> tapped;
+  session.on_bytes([&](const std::uint8_t *bytes, std::size_t length) {
+    tapped.insert(tapped.end(), bytes, bytes + length);
+  });
+  session.poll(milliseconds(0));
+  EXPECT_EQ(tapped, frame_bytes(contact));
+}
