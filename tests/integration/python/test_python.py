@@ -1,0 +1,316 @@
+"""Scenarios, evaluation and plots on data whose answer is known."""
+import json
+import math
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools" / "python"
+sys.path.insert(0, str(TOOLS))
+
+import fingertip_files as files  # noqa: E402
+
+CONTACT, FIT_VALID, SLIP, TARED = 1, 2, 16, 32
+
+
+class ToolTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def tool(self, name, *arguments, status=0):
+        done = subprocess.run([sys.executable, TOOLS / name, *map(str, arguments)], capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, status, done.stderr)
+        return done
+
+    def error(self, name, *arguments):
+        done = self.tool(name, *arguments, status=1)
+        self.assertEqual((done.stdout, done.stderr.count("\n")), ("", 1), done.stderr)
+        return done.stderr
+
+    def scenario(self, name="demo", *arguments):
+        path = self.folder / f"{name}.csv"
+        self.tool("scenario.py", name, "-o", path, *arguments)
+        return path
+
+    def recording(self, scenario, rate_Hz=200, zero_s=0.25, change=lambda row: row, until_s=None, end=True):
+        """What a perfect fingertip would record of a scenario, after change(row)."""
+        truth = files.read_scenario(scenario)
+        window_us, threshold_mm = 100000, 0.75
+        path = self.folder / "recording.csv"
+        names = [*files.RECORDING_COLUMNS, *(f"s{k}_Pa" for k in range(15)), *(f"tare{k}_Pa" for k in range(15))]
+        lines = ["# fingertip-recording 1", "# serial: 0123456789ABCDEF", "# slip_window_ms: 100",
+                 "# x_mm: " + " ".join(f"{v:g}" for v in files.SENSOR_X_mm),
+                 "# y_mm: " + " ".join(f"{v:g}" for v in files.SENSOR_Y_mm), ",".join(names)]
+        past = []
+        t_us = np.round(np.arange(0.1, (until_s or truth.t_s[-1]) - zero_s, 1 / rate_Hz) * 1e6).astype(int)
+        keys = ("x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N")
+        values = np.column_stack([truth.at(key, t_us / 1e6 + zero_s) for key in keys])
+        pressed = truth.is_on("contact", t_us / 1e6 + zero_s) & (values[:, 4] > 0.05)
+        for frame in range(len(t_us)):
+            row = dict.fromkeys(names, 0)
+            row.update(t_us=t_us[frame], frame=frame, sequence=frame % 65536, flags=TARED)
+            if pressed[frame]:
+                row.update(zip(keys, values[frame]))
+                row["flags"] |= CONTACT | FIT_VALID
+                past = [p for p in past if p[0] >= t_us[frame] - window_us]
+                count = max(len(past), 1)
+                mean_x, mean_y = sum(p[1] for p in past) / count, sum(p[2] for p in past) / count
+                if past and math.hypot(row["x_mm"] - mean_x, row["y_mm"] - mean_y) > threshold_mm:
+                    row["flags"] |= SLIP
+                past.append((t_us[frame], row["x_mm"], row["y_mm"]))
+            else:
+                past = []
+            row.update(convert_us=2500, read_us=3200, queue_us=100, condition_us=20, fit_us=7000, contact_us=30, total_us=12850)
+            row = change(row)
+            if row is not None:
+                lines.append(",".join(str(row[name]) for name in names))
+        if end:
+            lines.append("# end: reason=seconds frames=1 dropped_packets=3 crc_errors=2 format_errors=1")
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return path
+
+    def run_report(self, zero_s=0.25, **more):
+        path = self.folder / "run.json"
+        path.write_text(json.dumps({"device_time_zero_s": zero_s, "warnings": ["a", "b"], **more}), encoding="utf-8")
+        return path
+
+    def summary(self, recording, scenario, *arguments):
+        output = self.folder / "summary.json"
+        self.tool("evaluate.py", recording, scenario, "-o", output, *arguments)
+        return json.loads(output.read_text(encoding="utf-8"))
+
+
+class Scenarios(ToolTest):
+    def test_the_same_seed_gives_the_same_bytes(self):
+        first = self.scenario("ideal", "--seed", "5").read_bytes()
+        self.assertEqual(self.scenario("ideal", "--seed", "5").read_bytes(), first)
+        self.assertNotEqual(self.scenario("ideal", "--seed", "6").read_bytes(), first)
+
+    def test_every_scenario_is_whole(self):
+        for name, seconds in (("ideal", 20), ("demo", 10), ("slip20", 12)):
+            truth = files.read_scenario(self.scenario(name))
+            self.assertEqual(truth.metadata["name"], name)
+            self.assertEqual(truth.sensors_Pa.shape[1], 15)
+            np.testing.assert_allclose(np.diff(truth.t_s), 1e-3, atol=1e-9)
+            self.assertAlmostEqual(truth.t_s[-1], seconds)
+            self.assertFalse(truth.truth["contact"][truth.t_s < 0.5].any(), "quiet at first, for the tare")
+            on = truth.truth["contact"] > 0.5
+            self.assertTrue((np.abs(truth.truth["x_mm"]) <= 9).all() and (np.abs(truth.truth["y_mm"]) <= 18).all())
+            # eq. (4), and no step between rows that a sensor could not follow
+            p0, sigma, force = (truth.truth[key][on] for key in ("p0_Pa", "sigma_mm", "force_N"))
+            np.testing.assert_allclose(force, 2 * np.pi * p0 * (sigma * 1e-3) ** 2, atol=1e-4)
+            self.assertLess(np.abs(np.diff(truth.truth["force_N"])).max(), 0.3)
+
+    def test_the_sensors_feel_the_gaussian(self):
+        truth = files.read_scenario(self.scenario("ideal"))
+        row = int(np.argmax(truth.truth["force_N"]))
+        x, y, p0, sigma = (truth.truth[key][row] for key in ("x_mm", "y_mm", "p0_Pa", "sigma_mm"))
+        for k in range(15):
+            distance = math.hypot((k // 5 - 1) * 9 - x, (k % 5 - 2) * 9 - y)
+            self.assertAlmostEqual(truth.sensors_Pa[row, k], p0 * math.exp(-distance**2 / (2 * sigma**2)), delta=0.002 * p0 + 0.01)
+
+    def test_ideal_covers_place_and_force_and_does_not_slip(self):
+        truth = files.read_scenario(self.scenario("ideal"))
+        middles = [np.searchsorted(truth.t_s, (a + b) / 2) for a, b in truth.intervals("contact")]
+        self.assertGreater(len(middles), 25)
+        for key, low, high in (("x_mm", -7, 7), ("y_mm", -15, 15), ("force_N", 0.6, 17)):
+            self.assertLess(truth.truth[key][middles].min(), low)
+            self.assertGreater(truth.truth[key][middles].max(), high)
+        self.assertEqual(truth.intervals("slip"), [])
+
+    def test_slips_have_their_speed(self):
+        truth = files.read_scenario(self.scenario("slip20"))
+        speeds = []
+        for start, end in truth.intervals("slip"):
+            middle = truth.at("y_mm", (start + end) / 2 + np.array([-0.01, 0.01]))
+            speeds.append((middle[1] - middle[0]) / 0.02)
+        np.testing.assert_allclose(speeds, [20, 50, 100, 150, 200], rtol=1e-3)
+        demo = files.read_scenario(self.scenario("demo")).intervals("slip")
+        self.assertEqual(len(demo), 3)
+
+    def test_ranges(self):
+        self.assertIn("1 to 3600", self.error("scenario.py", "demo", "-o", self.folder / "x", "--seconds", "nan"))
+        self.assertIn("0 or more", self.error("scenario.py", "demo", "-o", self.folder / "x", "--seed", "-1"))
+        self.assertIn("choose another place", self.error("scenario.py", "demo", "-o", self.folder / "no" / "x"))
+
+
+class Evaluation(ToolTest):
+    def test_a_perfect_recording(self):
+        scenario = self.scenario()
+        summary = self.summary(self.recording(scenario), scenario, "--run", self.run_report())
+        # the file has four decimals of mm, five of N
+        self.assertLess(summary["localisation_p95_mm"], 2e-4)
+        self.assertLess(summary["force_mape_percent"], 1e-2)
+        self.assertLess(summary["force_rmse_N"], 1e-4)
+        self.assertAlmostEqual(summary["frames_per_s"], 200, delta=0.1)
+        for key, value in {"contact_missed": 0, "contact_false": 0, "slip_found": 3, "slip_missed": 0, "slip_false": 0,
+                           "stages_sum_wrong": 0, "dropped_packets": 3, "crc_errors": 2, "format_errors": 1,
+                           "emulator_warnings": 2, "total_us_median": 12850}.items():
+            self.assertEqual(summary[key], value, key)
+
+    def test_known_errors_come_out(self):
+        def change(row):
+            if row["flags"] & FIT_VALID:
+                row["x_mm"] += 0.3
+                row["y_mm"] -= 0.4
+                row["force_N"] *= 1.05
+            return row
+
+        scenario = self.scenario("ideal")
+        summary = self.summary(self.recording(scenario, change=change), scenario, "--run", self.run_report())
+        self.assertAlmostEqual(summary["localisation_median_mm"], 0.5, delta=1e-3)
+        self.assertAlmostEqual(summary["force_mape_percent"], 5, delta=0.01)
+
+    def test_device_time_zero_counts(self):
+        scenario = self.scenario()
+        recording = self.recording(scenario)
+        wrong = self.summary(recording, scenario, "--run", self.run_report(zero_s=0.2))
+        self.assertGreater(wrong["force_rmse_N"], 0.1)
+        without = self.summary(recording, scenario)
+        self.assertGreater(without["force_rmse_N"], wrong["force_rmse_N"])
+
+    def test_missed_and_false_contacts(self):
+        scenario = self.scenario()
+        truth = files.read_scenario(scenario)
+        recorded = truth.t_s >= 0.35
+        missed = self.summary(self.recording(scenario, change=lambda row: {**row, "flags": TARED if row["frame"] % 2 else row["flags"]}),
+                              scenario, "--run", self.run_report())
+        strong = (truth.truth["force_N"][recorded] > 0.2).mean()
+        self.assertAlmostEqual(missed["contact_missed"] / missed["frames"], strong / 2, delta=0.01)
+        false = self.summary(self.recording(scenario, change=lambda row: {**row, "flags": row["flags"] | CONTACT}),
+                             scenario, "--run", self.run_report())
+        self.assertAlmostEqual(false["contact_false"] / false["frames"], 1 - truth.truth["contact"][recorded].mean(), delta=0.01)
+        self.assertEqual(false["contact_missed"], 0)
+
+    def test_slips_missed_and_false(self):
+        scenario = self.scenario()
+        none = self.summary(self.recording(scenario, change=lambda row: {**row, "flags": row["flags"] & ~SLIP}),
+                            scenario, "--run", self.run_report())
+        self.assertEqual((none["slip_found"], none["slip_missed"], none["slip_false"]), (0, 3, 0))
+        # one frame of slip well before the first true one
+        one = self.summary(self.recording(scenario, change=lambda row: {**row, "flags": row["flags"] | (SLIP if row["frame"] == 500 else 0)}),
+                           scenario, "--run", self.run_report())
+        self.assertEqual((one["slip_found"], one["slip_false"]), (3, 1))
+        # a slip after the end of the recording is neither found nor missed
+        short = self.summary(self.recording(scenario, until_s=4), scenario, "--run", self.run_report())
+        self.assertEqual((short["slip_found"], short["slip_missed"]), (1, 0))
+
+    def test_stages_that_do_not_add_up(self):
+        scenario = self.scenario()
+        summary = self.summary(self.recording(scenario, change=lambda row: {**row, "fit_us": 7000 + (row["frame"] < 7)}),
+                               scenario, "--run", self.run_report())
+        self.assertEqual(summary["stages_sum_wrong"], 7)
+
+    def test_rows_without_contact_packet_are_left_out(self):
+        def change(row):
+            if row["frame"] % 10 == 0:
+                row.update(dict.fromkeys(files.CONTACT_COLUMNS, ""))
+            return row
+
+        scenario = self.scenario()
+        summary = self.summary(self.recording(scenario, change=change), scenario, "--run", self.run_report())
+        self.assertLess(summary["localisation_p95_mm"], 2e-4)
+
+    def test_a_killed_recorder(self):
+        scenario = self.scenario()
+        recording = self.recording(scenario, end=False)
+        arguments = (recording, scenario, "-o", self.folder / "s.json", "--run", self.run_report())
+        self.assertIn("use --salvage", self.error("evaluate.py", *arguments))
+        summary = self.summary(recording, scenario, "--run", self.run_report(), "--salvage")
+        self.assertIsNone(summary["dropped_packets"])
+
+    def test_unrelated_files(self):
+        scenario = self.scenario()
+        recording = self.recording(scenario, change=lambda row: {**row, "flags": TARED})
+        output = self.folder / "s.json"
+        self.assertIn("no fitted frame", self.error("evaluate.py", recording, scenario, "-o", output))
+        self.assertIn("no recording", self.error("evaluate.py", scenario, scenario, "-o", output))
+        self.assertIn("no scenario", self.error("evaluate.py", recording, recording, "-o", output))
+        self.assertIn("device_time_zero_s", self.error("evaluate.py", recording, scenario, "--run", self.run_report(None), "-o", output))
+        self.assertFalse(output.exists())
+
+    def test_time_that_runs_backwards(self):
+        scenario = self.scenario()
+        recording = self.recording(scenario, change=lambda row: {**row, "t_us": row["t_us"] if row["frame"] < 600 else row["t_us"] - 3000000})
+        self.assertIn("restarted", self.error("evaluate.py", recording, scenario, "--run", self.run_report(), "-o", self.folder / "s"))
+
+
+class MalformedFiles(ToolTest):
+    def assert_damage(self, read, path, line_number, change, expected):
+        lines = path.read_text(encoding="utf-8").split("\n")
+        lines[line_number - 1] = change(lines[line_number - 1])
+        bad = self.folder / "bad.csv"
+        bad.write_text("\n".join(lines), encoding="utf-8")
+        with self.assertRaises(files.InputError) as caught:
+            read(bad)
+        message = str(caught.exception)
+        self.assertTrue(message.startswith(f"{bad}:{line_number}: "), message)
+        self.assertIn(expected, message)
+        return bad
+
+    def test_scenarios(self):
+        path = self.scenario("demo", "--seconds", "1")
+        for change, expected in [(lambda s: "nan," + s.split(",", 1)[1], "t_s"), (lambda s: "-0.001," + s.split(",", 1)[1], "time starts at 0"),
+                                 (lambda s: s + ",1", "columns"), (lambda s: s[:30], "columns"), (lambda s: s.rsplit(",", 1)[0] + ",inf", "s14_Pa"),
+                                 (lambda s: s.rsplit(",", 1)[0] + ",", "s14_Pa"), (lambda s: "0.001," + s.split(",", 1)[1], "does not increase")]:
+            self.assert_damage(files.read_scenario, path, 100, change, expected)
+        self.assert_damage(files.read_scenario, path, 8, lambda s: s.replace("force_N", "force"), "wrong header")
+        self.assert_damage(files.read_scenario, path, 1, lambda s: "# fingertip-scenario 2", "format 2 is unknown")
+        with self.assertRaisesRegex(files.InputError, "check the path"):
+            files.read_scenario(self.folder / "absent.csv")
+
+    def test_recordings(self):
+        path = self.recording(self.scenario("demo", "--seconds", "2"))
+        for change, expected in [(lambda s: "nan," + s.split(",", 1)[1], "t_us"), (lambda s: "-5," + s.split(",", 1)[1], "device time starts at 0"),
+                                 (lambda s: s[:30], "columns"), (lambda s: s.rsplit(",", 1)[0] + ",x", "tare14_Pa"),
+                                 (lambda s: s.rsplit(",", 1)[0] + ",inf", "tare14_Pa"), (lambda s: "," + s.split(",", 1)[1], "t_us")]:
+            bad = self.assert_damage(files.read_recording, path, 50, change, expected)
+            salvaged = files.read_recording(bad, salvage=True)
+            self.assertEqual(salvaged.skipped_lines, 1)
+            self.assertEqual(len(salvaged["t_us"]), len(files.read_recording(path)["t_us"]) - 1)
+        self.assert_damage(files.read_recording, path, 6, lambda s: s.replace("flags", "flag"), "wrong header")
+
+    def test_a_torn_last_line(self):
+        path = self.recording(self.scenario("demo", "--seconds", "2"), end=False)
+        path.write_text(path.read_text(encoding="utf-8")[:-20], encoding="utf-8")
+        with self.assertRaisesRegex(files.InputError, "torn; use --salvage"):
+            files.read_recording(path)
+        self.assertEqual(files.read_recording(path, salvage=True).skipped_lines, 1)
+
+    def test_run_reports(self):
+        path = self.folder / "run.json"
+        for text in ("{", "[]"):
+            path.write_text(text, encoding="utf-8")
+            with self.assertRaises(files.InputError):
+                files.read_run(path)
+
+
+class Plots(ToolTest):
+    def assert_png(self, path):
+        self.assertEqual(path.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertGreater(path.stat().st_size, 20000)
+
+    def test_with_and_without_truth(self):
+        scenario = self.scenario()
+        recording = self.recording(scenario)
+        picture = self.folder / "p.png"
+        self.tool("plot.py", recording, "--truth", scenario, "--run", self.run_report(), "-o", picture)
+        self.assert_png(picture)
+        picture.unlink()
+        self.tool("plot.py", recording, "-o", picture)
+        self.assert_png(picture)
+
+    def test_where_nothing_can_be_written(self):
+        recording = self.recording(self.scenario())
+        self.assertIn("in a folder that exists", self.error("plot.py", recording, "-o", self.folder / "no" / "p.png"))
+        self.assertIn("ends in .png", self.error("plot.py", recording, "-o", self.folder / "p.xyz"))
+
+
+if __name__ == "__main__":
+    unittest.main()
