@@ -31,6 +31,8 @@ xz xz-utils
 arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/lib/arm-none-eabi/newlib/nano.specs libnewlib-arm-none-eabi
 /usr/include/ceres/ceres.h libceres-dev
+/usr/include/gsl/gsl_multifit_nlinear.h libgsl-dev
+/usr/include/cminpack-1/cminpack.h libcminpack-dev
 /usr/include/gtest/gtest.h libgtest-dev
 /usr/include/CLI/CLI.hpp libcli11-dev
 /usr/lib/python3/dist-packages/numpy/__init__.py python3-numpy
