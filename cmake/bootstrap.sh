@@ -24,6 +24,7 @@ ninja ninja-build
 gcc gcc
 g++ g++
 git git
+pkg-config pkg-config
 node nodejs
 npm npm
 python3 python3
