@@ -144,7 +144,6 @@ std::vector<Case> load_cases(PressSet set, Mask mask, std::uint64_t seed, std::s
                              const std::string &cache_dir) {
   constexpr std::uint64_t MASK_STREAM = 1000;
   const Array array = firmware_array();
-  make_press(set, array, seed, 0); // builds the layer's table before the threads share it
   std::vector<Case> cases(count);
   in_parallel(count, [&](std::size_t i) {
     Case &c = cases[i];

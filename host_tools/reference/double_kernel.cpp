@@ -137,6 +137,9 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
   Gaussian theta = first_guess(samples);
   const double x_min = static_cast<double>(array.x_min), x_max = static_cast<double>(array.x_max);
   const double y_min = static_cast<double>(array.y_min), y_max = static_cast<double>(array.y_max);
+  const double pitch_mm = static_cast<double>(array.pitch_mm);
+  const double prior_weight =
+      static_cast<double>(FIT_PRIOR_WEIGHT) * pitch_mm / settings.prior_width_mm;
   Normal normal;
   double squares = 0.0, moved = 0.0;
   Gaussian before = theta;
@@ -150,6 +153,11 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
       const double residual = samples.p[k] - theta.p0 * e;
       squares += residual * residual;
       normal.add(e * Vector4(1.0, x, y, r2), residual);
+    }
+    if (settings.prior_width_mm > 0.0) {
+      const double gain = theta.sigma * theta.sigma / theta.p0;
+      normal.add(Vector4(0.0, 0.0, 0.0, prior_weight * gain * theta.sigma),
+                 prior_weight * (settings.prior_sigma_mm / pitch_mm - theta.sigma));
     }
   };
   linearise();
@@ -168,7 +176,6 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
     moved = std::hypot(dx, dy);
   }
 
-  const double pitch_mm = static_cast<double>(array.pitch_mm);
   result.x_mm = theta.x * pitch_mm;
   result.y_mm = theta.y * pitch_mm;
   result.p0_Pa = theta.p0 * samples.unit_Pa;

@@ -92,7 +92,7 @@ std::vector<Measured> measure(const std::vector<Kernel> &kernels, const std::vec
         for (std::size_t n = 0; n < BLOCK; n++) {
           const Case &c = cases[start + n];
           results[n] = kernels[k].fit(array, c.pressure_Pa_q10.data(), c.usable,
-                                      {ITERATIONS, c.press.noise_Pa, 0});
+                                      {ITERATIONS, c.press.noise_Pa});
         }
         all[k].block_us.push_back((processor_time_us() - before_us) / BLOCK);
         for (std::size_t n = 0; n < BLOCK; n++) {

@@ -12,9 +12,6 @@ extern "C" {
 namespace fingertip::reference {
 namespace {
 
-using FirmwareFit = void (*)(const fit_array *, const std::int32_t *, std::uint32_t,
-                             const fit_settings *, fit_result *);
-
 std::uint32_t largest_readings(const fit_array &array, const std::int32_t *pressure_Pa_q10,
                                std::uint32_t usable, int n) {
   std::vector<int> sensors;
@@ -35,18 +32,36 @@ std::uint32_t largest_readings(const fit_array &array, const std::int32_t *press
   return chosen;
 }
 
-template <FirmwareFit FIT>
-KernelResult firmware(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                      std::uint32_t usable, const KernelSettings &settings) {
+fit_settings chip_settings(const KernelSettings &settings) {
   fit_settings chip{};
   chip.iterations = static_cast<std::uint8_t>(settings.iterations);
   chip.noise_Pa_q10 = static_cast<std::int32_t>(settings.noise_Pa * 1024.0);
-  fit_result result;
-  FIT(&array, pressure_Pa_q10,
-      largest_readings(array, pressure_Pa_q10, usable, settings.n_largest), &chip, &result);
-  return {static_cast<double>(result.x_mm),     static_cast<double>(result.y_mm),
-          static_cast<double>(result.p0_Pa),    static_cast<double>(result.sigma_mm),
+  chip.prior_sigma_mm = static_cast<float>(settings.prior_sigma_mm);
+  chip.prior_width_mm = static_cast<float>(settings.prior_width_mm);
+  return chip;
+}
+
+KernelResult widened(const fit_result &result) {
+  return {static_cast<double>(result.x_mm),    static_cast<double>(result.y_mm),
+          static_cast<double>(result.p0_Pa),   static_cast<double>(result.sigma_mm),
           static_cast<double>(result.force_N), result.flags};
+}
+
+KernelResult grid(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t,
+                  const KernelSettings &settings) {
+  const fit_settings chip = chip_settings(settings);
+  fit_result result;
+  fit_grid(&array, pressure_Pa_q10, &chip, &result);
+  return widened(result);
+}
+
+KernelResult general(const fit_array &array, const std::int32_t *pressure_Pa_q10,
+                     std::uint32_t usable, const KernelSettings &settings) {
+  const fit_settings chip = chip_settings(settings);
+  fit_result result;
+  fit_general(&array, pressure_Pa_q10,
+              largest_readings(array, pressure_Pa_q10, usable, settings.n_largest), &chip, &result);
+  return widened(result);
 }
 
 KernelResult in_double(const fit_array &array, const std::int32_t *pressure_Pa_q10,
@@ -60,8 +75,9 @@ KernelResult in_double(const fit_array &array, const std::int32_t *pressure_Pa_q
 
 const std::vector<Kernel> &all_kernels() {
   static const std::vector<Kernel> kernels{
-      {"general", 1, firmware<fit_gaussian>},
-      {"double", 0, in_double},
+      {"grid", false, grid},
+      {"general", true, general},
+      {"double", true, in_double},
   };
   return kernels;
 }

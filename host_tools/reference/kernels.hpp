@@ -15,7 +15,8 @@ namespace fingertip::reference {
 struct KernelSettings {
   int iterations;
   double noise_Pa;
-  int n_largest; // largest readings to use; 0 for all
+  int n_largest = 0; // largest readings to use; 0 for all
+  double prior_sigma_mm = 0.0, prior_width_mm = 0.0; // as fit_settings; width 0 for none
 };
 
 // As fit_result, with the location in double so that a double kernel is not rounded.
@@ -26,14 +27,15 @@ struct KernelResult {
 
 struct Kernel {
   const char *name;
-  int fewest_iterations;
+  bool any_subset; // whether it fits without every sensor
   KernelResult (*fit)(const fit_array &array, const std::int32_t *pressure_Pa_q10,
                       std::uint32_t usable, const KernelSettings &settings);
 };
 
-// general  the firmware's kernel for any layout, float32
-// double   its iteration in double precision, same guess, limits and flags: what is left between
-//          it and the reference is the optimiser's doing, the rest is rounding
+// grid     the firmware's kernel for a full rectangle, fixed point
+// general  its kernel for any layout, float32
+// double   the general kernel's iteration in double precision, same guess, limits and flags: what
+//          is left between it and the reference is the optimiser's doing, the rest is rounding
 const std::vector<Kernel> &all_kernels();
 
 // The firmware's array. Throws std::runtime_error if its geometry is refused.

@@ -10,7 +10,7 @@ constexpr double POISSON = 0.49;
 // Young's modulus of silicone rubber of Shore hardness 15 A by Gent's relation.
 constexpr double YOUNG_Pa = 0.56e6;
 constexpr double GATE_SIGMAS = 20.0;
-constexpr double TABLE_REACH = 16.0; // thicknesses
+constexpr double TABLE_REACH = 24.0; // thicknesses
 constexpr int STEPS_PER_THICKNESS = 128;
 
 struct Node {
@@ -42,10 +42,31 @@ std::vector<Node> gauss_legendre(int n) {
   return nodes;
 }
 
-const Layer &layer_of(PressSet set) {
-  static const Layer thick(12.0);
-  static const Layer thin(6.0);
-  return set == PressSet::C ? thick : thin;
+// Pressure under a point load on a layer of thickness 1, [r * STEPS_PER_THICKNESS]: the Hankel
+// transform (1 / 2 pi) int u T(u) J0(u r) du. T falls as u exp(-u), and a panel of 1/4 holds one
+// period of J0 at the reach.
+std::vector<double> tabulate_point_load() {
+  struct Wave {
+    double u, weight;
+  };
+  std::vector<Wave> waves;
+  const std::vector<Node> rule = gauss_legendre(8);
+  for (double start = 0.0; start < 48.0; start += 0.25) {
+    for (const Node &node : rule) {
+      const double u = start + 0.25 * node.at;
+      waves.push_back({u, 0.25 * node.weight * u * layer_transfer(u) / (2.0 * M_PI)});
+    }
+  }
+  std::vector<double> table;
+  const int count = static_cast<int>(TABLE_REACH * STEPS_PER_THICKNESS) + 3;
+  for (int i = 0; i < count; i++) {
+    double sum = 0.0;
+    for (const Wave &wave : waves) {
+      sum += wave.weight * j0(wave.u * i / STEPS_PER_THICKNESS);
+    }
+    table.push_back(sum);
+  }
+  return table;
 }
 
 double half_extent(const std::vector<double> &coordinates) {
@@ -99,32 +120,8 @@ double layer_transfer(double H) {
          ((3.0 - 4.0 * POISSON) * cosh * cosh + H * H + b * b);
 }
 
-Layer::Layer(double thickness_mm) : thickness_mm_(thickness_mm) {
-  // Hankel transform (1 / 2 pi) int k T(k h) J0(k r) dk in u = k h; T falls as u exp(-u), and panels
-  // of 1/4 hold less than a period of J0 at the reach.
-  struct Wave {
-    double u, weight;
-  };
-  std::vector<Wave> waves;
-  const std::vector<Node> rule = gauss_legendre(8);
-  for (double start = 0.0; start < 48.0; start += 0.25) {
-    for (const Node &node : rule) {
-      const double u = start + 0.25 * node.at;
-      waves.push_back({u, 0.25 * node.weight * u * layer_transfer(u)});
-    }
-  }
-  const double unit_Pa = 1e6 / (2.0 * M_PI * thickness_mm * thickness_mm);
-  const int count = static_cast<int>(TABLE_REACH * STEPS_PER_THICKNESS) + 3;
-  for (int i = 0; i < count; i++) {
-    double sum = 0.0;
-    for (const Wave &wave : waves) {
-      sum += wave.weight * std::cyl_bessel_j(0.0, wave.u * i / STEPS_PER_THICKNESS);
-    }
-    table_Pa_.push_back(unit_Pa * sum);
-  }
-}
-
 double Layer::point_load_Pa(double r_mm) const {
+  static const std::vector<double> table = tabulate_point_load();
   const double position = r_mm / thickness_mm_ * STEPS_PER_THICKNESS;
   if (!(position < TABLE_REACH * STEPS_PER_THICKNESS)) {
     return 0.0;
@@ -132,11 +129,13 @@ double Layer::point_load_Pa(double r_mm) const {
   // Cubic through the four neighbours; the response is even in r.
   const auto i = static_cast<std::size_t>(position);
   const double t = position - static_cast<double>(i);
-  const double before = table_Pa_[i == 0 ? 1 : i - 1];
-  const double *at = &table_Pa_[i];
-  return -t * (t - 1.0) * (t - 2.0) / 6.0 * before +
-         (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0 * at[0] -
-         (t + 1.0) * t * (t - 2.0) / 2.0 * at[1] + (t + 1.0) * t * (t - 1.0) / 6.0 * at[2];
+  const double before = table[i == 0 ? 1 : i - 1];
+  const double *at = &table[i];
+  const double value = -t * (t - 1.0) * (t - 2.0) / 6.0 * before +
+                       (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0 * at[0] -
+                       (t + 1.0) * t * (t - 2.0) / 2.0 * at[1] +
+                       (t + 1.0) * t * (t - 1.0) / 6.0 * at[2];
+  return 1e6 / (thickness_mm_ * thickness_mm_) * value;
 }
 
 std::vector<PointLoad> contact_pressure(Indenter indenter, double force_N,
@@ -205,7 +204,7 @@ Press make_press(PressSet set, const Array &array, std::uint64_t seed, std::size
                                     std::exp(-0.5 * (dx * dx + dy * dy) / (sigma_mm * sigma_mm)));
       }
     } else {
-      const Layer &layer = layer_of(set);
+      const Layer layer(set == PressSet::C ? 12.0 : 6.0);
       press.force_N = random.log_uniform(1.0, 25.0);
       const Indenter indenter = ALL_INDENTERS[random.next() % ALL_INDENTERS.size()];
       const auto loads = contact_pressure(indenter, press.force_N, layer.thickness_mm());

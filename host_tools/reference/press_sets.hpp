@@ -64,15 +64,14 @@ double layer_transfer(double H);
 // Pressure on the base of a bonded elastic layer (Poisson's ratio 0.49).
 class Layer {
 public:
-  explicit Layer(double thickness_mm);
+  explicit Layer(double thickness_mm) : thickness_mm_(thickness_mm) {}
   double thickness_mm() const { return thickness_mm_; }
   // Under a point load of 1 N, at distance r_mm from it, Pa. Relative error to the peak below 1e-7;
-  // 0 beyond 16 thicknesses.
+  // 0 beyond 24 thicknesses.
   double point_load_Pa(double r_mm) const;
 
 private:
   double thickness_mm_;
-  std::vector<double> table_Pa_; // [r / step]
 };
 
 enum class Indenter { sphere_6mm, sphere_15mm, cylinder_6mm, cube_6mm };

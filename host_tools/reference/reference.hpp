@@ -13,7 +13,7 @@
 //   bound of the location's sd is above 2 mm: there the optimum has no use.
 // The record is Ceres' lowest cost, brought to rounding by Newton steps with the full Hessian; a
 // step that would leave the valley (cost up by more than rounding) is not taken. The test
-// accuracy.reference_starts compares this with Ceres from every start.
+// accuracy.reference compares this with Ceres from every start.
 #pragma once
 
 #include <cstdint>
