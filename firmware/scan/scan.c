@@ -9,8 +9,12 @@
 #define ADMISSION_INTERVAL_MIN_us 1000000u
 #define ADMISSION_INTERVAL_MAX_us 8000000u
 #define PROM_PASSES 3
-/* After a temperature reading that a sensor missed. */
+/* After a temperature reading that a sensor missed, or one in doubt. */
 #define RETRY_TEMPERATURE_FRAMES 8u
+/* At slow rates: the pressures of a pad that warms by 0.1 degC/s stay within some 12 Pa. */
+#define TEMPERATURE_RATE_MIN_mHz 2000u
+/* A larger step in half a second is no change of temperature. 1 degC is worth some 240 Pa. */
+#define TEMPERATURE_STEP_MAX_cC 100
 /* How soon a full slot is looked at again. */
 #define SLOT_POLL_us 50u
 /* How soon a new rate is noticed while waiting for the next frame of the old one. */
@@ -195,6 +199,20 @@ static bool slot_is_empty(const struct scan *scan) {
   return !atomic_load_explicit(&scan->slot_full, memory_order_acquire);
 }
 
+/* The frames that may still pass before the next temperature. */
+static void limit_frames_to_temperature(struct scan *scan) {
+  uint32_t limit = scan->frames_to_temperature;
+  uint32_t rate_mHz = get(&scan->rate_mHz);
+  if (rate_mHz != 0 && limit > 1u + rate_mHz / TEMPERATURE_RATE_MIN_mHz) {
+    limit = 1u + rate_mHz / TEMPERATURE_RATE_MIN_mHz;
+  }
+  if (get(&scan->temperature_doubted) != 0 && limit > RETRY_TEMPERATURE_FRAMES) {
+    limit = RETRY_TEMPERATURE_FRAMES;
+  }
+  set(&scan->temperature_doubted, 0);
+  scan->frames_to_temperature = limit;
+}
+
 /* Decides what comes next once the last reading has been taken. */
 static void leave_idle(struct scan *scan, uint64_t now_us) {
   if (!slot_is_empty(scan)) {
@@ -207,6 +225,7 @@ static void leave_idle(struct scan *scan, uint64_t now_us) {
     begin_admission(scan, now_us);
     return;
   }
+  limit_frames_to_temperature(scan);
   if (scan->frames_to_temperature == 0) {
     enter(scan, SCAN_CONVERT_TEMPERATURE);
     return;
@@ -405,9 +424,20 @@ static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
     if (!(slot->good & bit)) {
       continue;
     }
-    enum ms5840_branch previous =
-        scan->has_thermal & bit ? scan->thermal[k].branch : MS5840_BRANCH_UNKNOWN;
-    ms5840_compensate_temperature(&scan->prom[k], slot->code[k], previous, &scan->thermal[k]);
+    const struct ms5840_thermal *last = &scan->thermal[k];
+    bool has_last = scan->has_thermal & bit;
+    struct ms5840_thermal thermal;
+    ms5840_compensate_temperature(&scan->prom[k], slot->code[k],
+                                  has_last ? last->branch : MS5840_BRANCH_UNKNOWN, &thermal);
+    int32_t step_cC = thermal.first_order_cC - last->first_order_cC;
+    bool jumped = step_cC > TEMPERATURE_STEP_MAX_cC || step_cC < -TEMPERATURE_STEP_MAX_cC;
+    if (has_last && jumped && !(scan->doubted & bit)) {
+      scan->doubted |= bit;
+      set(&scan->temperature_doubted, 1);
+      continue;
+    }
+    scan->doubted &= ~bit;
+    scan->thermal[k] = thermal;
     scan->has_thermal |= bit;
   }
 }

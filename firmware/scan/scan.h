@@ -11,8 +11,11 @@
  * answering loses its admission; when sensors answer again, all are reset and their PROMs read
  * anew, at most once a second. Only admitted sensors yield valid readings. A reading of 0 means
  * that no conversion had finished, and the reading after it is void too: both are invalid, and two
- * in a row are a sensor that needs a reset, which loses its admission. A temperature of all ones is
- * no reading either: it would falsify the pressures of many frames.
+ * in a row are a sensor that needs a reset, which loses its admission.
+ *
+ * A wrong temperature would falsify the pressures of many frames: all ones are no reading, and one
+ * that jumps is used only when the next, taken soon after, jumps too. Temperatures are taken every
+ * temperature_interval frames, at slow rates more often: about twice a second, or every frame.
  */
 #ifndef SCAN_SCAN_H
 #define SCAN_SCAN_H
@@ -28,7 +31,7 @@
 struct scan_settings {
   uint8_t sensor_count;          /* 1..FT_MAX_SENSORS */
   uint16_t osr;                  /* see ms5840_find_osr */
-  uint16_t temperature_interval; /* frames between temperature conversions, at least 1 */
+  uint16_t temperature_interval; /* most frames between temperature conversions, at least 1 */
   uint32_t rate_mHz;             /* 0 = as fast as the sensors allow */
 };
 
@@ -77,6 +80,8 @@ struct scan {
   /* Requests of the main context. */
   _Atomic uint32_t osr;
   _Atomic uint32_t rate_mHz;
+  _Atomic uint32_t temperature_doubted; /* 1: take the next soon; set while the slot is full, cleared
+                                           while it is empty */
 
   /* Event context only. */
   enum scan_state state;
@@ -114,6 +119,7 @@ struct scan {
   /* Main context only. */
   struct ms5840_thermal thermal[FT_MAX_SENSORS];
   uint32_t has_thermal; /* bitmap */
+  uint32_t doubted;     /* bitmap: the last temperature jumped and was not used */
 };
 
 /* FT_ERR_ARGUMENT: a setting outside its range. The bus must outlive the scan. */

@@ -362,7 +362,7 @@ static void test_zero_temperature_keeps_the_last_and_is_repeated_soon(void) {
   skip_frames(16);
   uint32_t d2 = fake.d2[DISTURBED];
   fake.zero_next = DISTURBED_BIT;
-  fake.d2[DISTURBED] += 200000; /* must not show before a good reading of it */
+  fake.d2[DISTURBED] += 20000; /* must not show before a good reading of it */
   skip_frames(1);
   TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, frame.valid);
   skip_frames(1);
@@ -376,6 +376,51 @@ static void test_zero_temperature_keeps_the_last_and_is_repeated_soon(void) {
   int second = find_entry(find_entry(0, 0x54, FAKE_COMMAND) + 1, 0x54, FAKE_COMMAND);
   int third = find_entry(second + 1, 0x54, FAKE_COMMAND);
   TEST_ASSERT_EQUAL_INT(2 * 8 + 2, third - second); /* eight frames between them */
+}
+
+/* A flipped bit: the pressures keep the temperature before it. A jump that stays is believed. */
+static void test_jump_of_the_temperature_must_be_confirmed(void) {
+  skip_frames(64);
+  uint32_t d2 = fake.d2[DISTURBED];
+  fake.d2[DISTURBED] = d2 ^ 0x80000;
+  uint32_t flipped_d2 = fake.d2[DISTURBED];
+  skip_frames(2);
+  TEST_ASSERT_EQUAL_INT(2, count_entries(0x54, FAKE_COMMAND));
+  fake.d2[DISTURBED] = d2;
+  assert_good_frame(ALL);
+  skip_frames(8);
+  TEST_ASSERT_EQUAL_INT(3, count_entries(0x54, FAKE_COMMAND)); /* asked again soon */
+  assert_good_frame(ALL);
+  skip_frames(64);
+  TEST_ASSERT_EQUAL_INT(4, count_entries(0x54, FAKE_COMMAND)); /* and then as ever */
+  assert_good_frame(ALL);
+
+  fake.d2[DISTURBED] = flipped_d2;
+  skip_frames(64 + 8);
+  assert_good_frame(ALL);
+}
+
+/* What is an instant at 180 Hz would be minutes at slow rates. */
+static void test_slow_rates_take_the_temperature_more_often(void) {
+  static const struct {
+    uint32_t rate_mHz;
+    int frames;
+  } cases[] = {{0, 64}, {100000, 51}, {20000, 11}, {100, 1}};
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    struct scan_settings settings = usual;
+    settings.rate_mHz = cases[i].rate_mHz;
+    next_case(&settings);
+    skip_frames(2 * cases[i].frames + 1);
+    int first = find_entry(0, 0x54, FAKE_COMMAND);
+    int second = find_entry(first + 1, 0x54, FAKE_COMMAND);
+    TEST_ASSERT_EQUAL_INT(2 + 2 * cases[i].frames, second - first);
+  }
+  /* Also when the rate falls while many frames are still to come. */
+  next_case(&usual);
+  skip_frames(3);
+  scan_set_rate_mHz(&scan, 1000);
+  skip_frames(2);
+  TEST_ASSERT_EQUAL_INT(2, count_entries(0x54, FAKE_COMMAND));
 }
 
 static void test_temperature_interval(void) {
@@ -743,6 +788,8 @@ int main(void) {
   RUN_TEST(test_two_zeros_in_a_row_lead_to_a_reset);
   RUN_TEST(test_temperature_of_all_ones_is_no_reading);
   RUN_TEST(test_zero_temperature_keeps_the_last_and_is_repeated_soon);
+  RUN_TEST(test_jump_of_the_temperature_must_be_confirmed);
+  RUN_TEST(test_slow_rates_take_the_temperature_more_often);
   RUN_TEST(test_temperature_interval);
   RUN_TEST(test_sensor_stops_and_comes_back);
   RUN_TEST(test_replaced_sensor_waits_for_its_own_temperature);
