@@ -2,25 +2,38 @@
 
 #include <string.h>
 
+static void begin_tare(struct condition *condition, uint8_t k) {
+  condition->zero_sum[k] = 0;
+  condition->zero_min[k] = INT32_MAX;
+  condition->zero_max[k] = INT32_MIN;
+  condition->tare_left[k] = CONDITION_TARE_FRAMES;
+  condition->below[k] = 0;
+}
+
 void condition_tare(struct condition *condition) {
   memset(condition, 0, sizeof *condition);
-  memset(condition->tare_left, CONDITION_TARE_FRAMES, sizeof condition->tare_left);
+  for (uint8_t k = 0; k < FT_MAX_SENSORS; k++) {
+    begin_tare(condition, k);
+  }
 }
 
 static void tare_step(struct condition *condition, uint8_t k, int32_t pressure_Pa_q10) {
   condition->zero_sum[k] += pressure_Pa_q10;
+  if (pressure_Pa_q10 < condition->zero_min[k]) {
+    condition->zero_min[k] = pressure_Pa_q10;
+  }
+  if (pressure_Pa_q10 > condition->zero_max[k]) {
+    condition->zero_max[k] = pressure_Pa_q10;
+  }
   condition->tare_left[k]--;
   if (condition->tare_left[k] == 0) {
-    condition->zero_Pa_q10[k] = (int32_t)(condition->zero_sum[k] / CONDITION_TARE_FRAMES);
+    int64_t sum = condition->zero_sum[k] - condition->zero_min[k] - condition->zero_max[k];
+    condition->zero_Pa_q10[k] = (int32_t)(sum / (CONDITION_TARE_FRAMES - 2));
     condition->zero_rest[k] = 0;
   }
 }
 
 static void track_step(struct condition *condition, uint8_t k, int32_t above_Pa_q10) {
-  const int32_t limit = 1 << 30; /* the sum must not overflow */
-  if (above_Pa_q10 < -limit) {
-    above_Pa_q10 = -limit;
-  }
   int32_t rest = condition->zero_rest[k] + above_Pa_q10;
   int32_t whole = rest / CONDITION_TRACK_FRAMES;
   condition->zero_Pa_q10[k] += whole;
@@ -65,8 +78,18 @@ void condition_frame(struct condition *condition, const struct frame *frame,
     return;
   }
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
-    if (conditioned->usable & (UINT32_C(1) << k)) {
+    if (!(conditioned->usable & (UINT32_C(1) << k))) {
+      continue;
+    }
+    if (conditioned->pressure_Pa_q10[k] >= -CONDITION_OPEN_SIGMA * frame->noise_Pa_q10) {
+      condition->below[k] = 0;
       track_step(condition, k, conditioned->pressure_Pa_q10[k]);
+      continue;
+    }
+    conditioned->tared = false;
+    condition->below[k]++;
+    if (condition->below[k] == CONDITION_BELOW_FRAMES) {
+      begin_tare(condition, k);
     }
   }
 }

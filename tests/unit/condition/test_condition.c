@@ -36,13 +36,15 @@ void setUp(void) {
 
 void tearDown(void) {}
 
-static void test_tare_is_the_mean_of_sixteen_readings(void) {
+static void test_tare_is_the_mean_without_the_extremes(void) {
   struct random random = {41};
   int64_t sum[SENSORS] = {0};
   for (int i = 0; i < CONDITION_TARE_FRAMES; i++) {
     for (int k = 0; k < SENSORS; k++) {
-      frame.pressure_Pa_q10[k] = AMBIENT + 5000 * k + (int32_t)random_below(&random, 20000);
-      sum[k] += frame.pressure_Pa_q10[k];
+      bool extreme = i == k || i == (k + 5) % CONDITION_TARE_FRAMES;
+      int32_t reading = AMBIENT + 5000 * k + (int32_t)random_below(&random, 20000);
+      frame.pressure_Pa_q10[k] = !extreme ? reading : i == k ? INT32_MAX : INT32_MIN;
+      sum[k] += extreme ? 0 : reading;
     }
     run(1);
     TEST_ASSERT_FALSE(conditioned.tared);
@@ -50,8 +52,8 @@ static void test_tare_is_the_mean_of_sixteen_readings(void) {
     TEST_ASSERT_FALSE(conditioned.contact);
   }
   for (int k = 0; k < SENSORS; k++) {
-    TEST_ASSERT_EQUAL_INT32(sum[k] / 16, condition.zero_Pa_q10[k]);
-    frame.pressure_Pa_q10[k] = (int32_t)(sum[k] / 16) + 100 * k;
+    TEST_ASSERT_EQUAL_INT32(sum[k] / 14, condition.zero_Pa_q10[k]);
+    frame.pressure_Pa_q10[k] = (int32_t)(sum[k] / 14) + 100 * k;
   }
   run(1);
   TEST_ASSERT_TRUE(conditioned.tared);
@@ -79,9 +81,27 @@ static void test_gate_opens_above_twenty_sigma_and_closes_at_twelve(void) {
   }
 }
 
+/* A flipped bit must not become a false touch that lasts. */
+static void test_one_disturbed_reading_moves_no_zero(void) {
+  static const int32_t readings[] = {INT32_MIN, 0, AMBIENT - 21 * NOISE, AMBIENT + 21 * NOISE,
+                                     INT32_MAX};
+  run(16);
+  for (size_t i = 0; i < sizeof readings / sizeof readings[0]; i++) {
+    frame.pressure_Pa_q10[7] = readings[i];
+    run(1);
+    TEST_ASSERT_EQUAL(readings[i] > AMBIENT, conditioned.contact);
+    TEST_ASSERT_EQUAL(readings[i] > AMBIENT, conditioned.tared);
+    TEST_ASSERT_EQUAL_INT32(AMBIENT, condition.zero_Pa_q10[7]);
+    fill(AMBIENT);
+    run(1);
+    TEST_ASSERT_FALSE(conditioned.contact);
+    TEST_ASSERT_TRUE(conditioned.tared);
+  }
+}
+
 /* A step of the ambient pressure: after CONDITION_TRACK_FRAMES frames 1/e of it is left. */
 static void test_zero_follows_with_its_time_constant(void) {
-  static const int32_t drifts[] = {10 * NOISE, -10 * NOISE, -500 * 1024};
+  static const int32_t drifts[] = {10 * NOISE, -10 * NOISE, -20 * NOISE};
   for (size_t i = 0; i < 3; i++) {
     setUp();
     run(16);
@@ -163,7 +183,7 @@ static void test_saturated_sensor_means_contact_and_is_left_out(void) {
   TEST_ASSERT_EQUAL_INT32(AMBIENT, condition.zero_Pa_q10[3]);
 }
 
-/* The press becomes the zero; after it the pad reads negative, and recovers by itself. */
+/* The press becomes the zero; after it the pad reads negative, says so, and is tared anew. */
 static void test_tare_during_contact(void) {
   run(16);
   frame.pressure_Pa_q10[7] += 1000 * NOISE;
@@ -181,8 +201,16 @@ static void test_tare_during_contact(void) {
   run(1);
   TEST_ASSERT_EQUAL_INT32(-1000 * NOISE, conditioned.pressure_Pa_q10[7]);
   TEST_ASSERT_FALSE(conditioned.contact);
-  run(10 * CONDITION_TRACK_FRAMES);
-  TEST_ASSERT_INT32_WITHIN(NOISE, 0, conditioned.pressure_Pa_q10[7]);
+  TEST_ASSERT_FALSE(conditioned.tared);
+  run(CONDITION_BELOW_FRAMES - 1);
+  TEST_ASSERT_FALSE(conditioned.tared);
+  TEST_ASSERT_EQUAL_HEX32(ALL, conditioned.usable);
+  run(CONDITION_TARE_FRAMES);
+  TEST_ASSERT_FALSE(conditioned.tared);
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~128u, conditioned.usable);
+  run(1);
+  TEST_ASSERT_TRUE(conditioned.tared);
+  TEST_ASSERT_EQUAL_INT32(AMBIENT, condition.zero_Pa_q10[7]);
 }
 
 static void test_extremes(void) {
@@ -235,7 +263,8 @@ static void test_random_frames(void) {
 
 int main(void) {
   UNITY_BEGIN();
-  RUN_TEST(test_tare_is_the_mean_of_sixteen_readings);
+  RUN_TEST(test_tare_is_the_mean_without_the_extremes);
+  RUN_TEST(test_one_disturbed_reading_moves_no_zero);
   RUN_TEST(test_gate_opens_above_twenty_sigma_and_closes_at_twelve);
   RUN_TEST(test_zero_follows_with_its_time_constant);
   RUN_TEST(test_zero_follows_the_smallest_drift);
