@@ -173,6 +173,9 @@ static void send_contact(struct app *app, const struct wire_stages *stages) {
 
 static void process_frame(struct app *app, uint64_t taken_us) {
   const struct frame *frame = &app->frame;
+  if (taken_us < frame->t_read_us) { /* it came between the look at the clock and the taking */
+    taken_us = frame->t_read_us;
+  }
   condition_frame(&app->condition, frame, &app->conditioned);
   uint64_t conditioned_us = port_now_us();
 
@@ -191,6 +194,7 @@ static void process_frame(struct app *app, uint64_t taken_us) {
       .t_us = frame->t_us,
       .contact = app->conditioned.contact,
       .tared = app->conditioned.tared,
+      .masked = app->conditioned.usable != UINT32_MAX >> (FT_MAX_SENSORS - frame->sensor_count),
       .saturated = frame->saturated,
       .fit = app->conditioned.contact ? &app->fit : NULL,
   };
@@ -344,8 +348,9 @@ void app_run(struct app *app) {
   bool active = receive_commands(app);
   /* After the commands: one sent just before the port closed must not outlive it. */
   follow_port(app);
+  uint64_t taken_us = port_now_us(); /* taking compensates the readings */
   if (scan_take(&app->scan, &app->frame)) {
-    process_frame(app, port_now_us());
+    process_frame(app, taken_us);
     active = true;
   }
   uint64_t now_us = port_now_us();

@@ -15,6 +15,7 @@ void contact_update(struct slip_history *history, const struct contact_settings 
   uint32_t flags = input->fit ? input->fit->flags : 0;
   flags |= input->contact ? (uint32_t)CONTACT_FLAG_CONTACT : 0;
   flags |= input->tared ? (uint32_t)CONTACT_FLAG_TARED : 0;
+  flags |= input->masked ? (uint32_t)CONTACT_FLAG_SENSOR_MASKED : 0;
   if (input->saturated) {
     flags |= CONTACT_FLAG_SATURATED;
     if (!input->fit || fewer_bits_than(input->fit->used, CONTACT_MIN_UNSATURATED)) {

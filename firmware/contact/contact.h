@@ -19,6 +19,7 @@ struct contact_input {
   uint64_t t_us; /* of the frame */
   bool contact;  /* the gate is open */
   bool tared;
+  bool masked;                  /* a sensor is missing or was left out */
   uint32_t saturated;           /* bitmap: left out of the fit for being beyond their range */
   const struct fit_result *fit; /* NULL where nothing was fitted */
 };

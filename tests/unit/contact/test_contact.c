@@ -45,6 +45,8 @@ static void test_nothing_fitted(void) {
   input.contact = false;
   input.tared = true;
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TARED, update());
+  input.masked = true;
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TARED | CONTACT_FLAG_SENSOR_MASKED, update());
 }
 
 static void test_flags_of_the_fit_pass(void) {
