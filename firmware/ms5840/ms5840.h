@@ -10,10 +10,7 @@
 
 #include "common/status.h"
 
-#include <stdbool.h>
 #include <stdint.h>
-
-#define MS5840_ADDRESS 0x76
 
 enum {
   MS5840_CMD_RESET = 0x1E,
