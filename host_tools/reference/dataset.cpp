@@ -105,7 +105,8 @@ void write_records(const std::string &path, const std::vector<Record> &records) 
   file.close();
   if (!file) {
     std::filesystem::remove(fresh);
-    throw std::runtime_error("cannot write " + fresh + ": is the folder writable and the disk free?");
+    throw std::runtime_error("cannot write " + fresh +
+                             ": is the folder writable and the disk free?");
   }
   std::filesystem::rename(fresh, path);
 }

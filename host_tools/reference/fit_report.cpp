@@ -215,16 +215,26 @@ void write_json(const std::string &path, const std::vector<Row> &rows, const Opt
   std::ofstream file(path);
   file << "{\"seed\": " << options.seed << ", \"presses\": " << options.limit << ", \"rows\": [";
   const char *separator = "\n";
+  // JSON has no word for a quantile of nothing but null.
+  const auto number = [&](const char *name, double value) {
+    file << ", \"" << name << "\": ";
+    std::isfinite(value) ? file << value : file << "null";
+  };
   for (const Row &r : rows) {
     file << separator << "{\"kernel\": \"" << r.kernel << "\", \"variant\": \"" << r.variant
-         << "\", \"set\": \"" << r.set << "\", \"observable\": " << (r.observable ? "true" : "false")
+         << "\", \"set\": \"" << r.set
+         << "\", \"observable\": " << (r.observable ? "true" : "false")
          << ", \"presses\": " << r.presses << ", \"without_fit\": " << r.without_fit
-         << ", \"p50_um\": " << r.p50_um << ", \"p99_um\": " << r.p99_um
-         << ", \"p999_um\": " << r.p999_um << ", \"worst_um\": " << r.worst_um
-         << ", \"above_10um\": " << r.above_10um << ", \"above_100um\": " << r.above_100um
-         << ", \"truth_p50_mm\": " << r.truth_p50_mm << ", \"truth_p99_mm\": " << r.truth_p99_mm
-         << ", \"bad_unflagged\": " << r.bad_unflagged << ", \"good_flagged\": " << r.good_flagged
-         << "}";
+         << ", \"above_10um\": " << r.above_10um << ", \"above_100um\": " << r.above_100um;
+    number("p50_um", r.p50_um);
+    number("p99_um", r.p99_um);
+    number("p999_um", r.p999_um);
+    number("worst_um", r.worst_um);
+    number("truth_p50_mm", r.truth_p50_mm);
+    number("truth_p99_mm", r.truth_p99_mm);
+    number("bad_unflagged", r.bad_unflagged);
+    number("good_flagged", r.good_flagged);
+    file << '}';
     separator = ",\n";
   }
   file << "\n]}\n";

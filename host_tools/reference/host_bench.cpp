@@ -7,7 +7,7 @@
 // all of them see the same machine. A fit starts at the readings as the firmware receives them and
 // ends at location, peak, width and force. Our kernels run the usual seven iterations; what the
 // libraries do is in reference/libraries.hpp. Writes fit_bench.csv and .json to --out, prints:
-//   us          processor time of one fit: median over blocks and passes, and the 10 % and 90 % quantiles
+//   us          processor time of one fit: median over blocks and passes, 10 % and 90 % quantiles
 //   ratio       the same block's time by this kernel over that by the first: median, 10 %, 90 %
 //   p50_um ..   distance of the location from the reference optimum; not a number counts as
 //               infinitely far
@@ -146,8 +146,8 @@ int bench(int argc, char **argv) {
   std::ofstream json(out + "/fit_bench.json");
   csv << "kernel,us,us_p10,us_p90,ratio,ratio_p10,ratio_p90,p50_um,p999_um,above_100um\n";
   json << "{\"processor\": \"" << processor() << "\", \"compiler\": \"" << __VERSION__
-       << "\", \"presses\": " << cases.size() << ", \"passes\": " << passes << ", \"seed\": " << seed
-       << ", \"rows\": [";
+       << "\", \"presses\": " << cases.size() << ", \"passes\": " << passes
+       << ", \"seed\": " << seed << ", \"rows\": [";
   std::printf("%zu observable presses, %s\n", cases.size(), processor().c_str());
   std::printf("%-13s %8s %17s %8s %17s %10s %10s %7s\n", "kernel", "us", "10 %..90 %", "ratio",
               "10 %..90 %", "p50_um", "p99.9_um", ">100um");

@@ -13,8 +13,8 @@
 //   bound of the location's sd is above 2 mm: there the optimum has no use.
 // The record is Ceres' lowest cost, brought to rounding by Newton steps with the full Hessian; a
 // step that would leave the valley (cost up by more than rounding) is not taken. Against Ceres from
-// every start (the test accuracy.reference repeats it on fewer): on 10 810 observable presses of all
-// sets and masks never a higher cost, once a lower one.
+// every start, on 10 810 observable presses of all sets and masks, the cost was never higher and
+// once lower; the test accuracy.reference repeats that on fewer.
 #pragma once
 
 #include <cstdint>
