@@ -1,6 +1,7 @@
 #include "ms5840/ms5840.h"
 #include "support/random.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
 #include <unity.h>
