@@ -2,12 +2,13 @@
  * touches it at all.
  *
  * The zero of each sensor is the mean of its first CONDITION_TARE_FRAMES readings after start or
- * after a tare, the smallest and the largest left out, and then follows the readings slowly while nothing touches the pad (time constant
- * CONDITION_TRACK_FRAMES frames): barometers drift by some 150 Pa in a quarter of an hour, and the
- * paper sets its readings to zero between contacts (section IV.A).
+ * after a tare, the smallest and the largest left out. Then it follows the readings slowly while
+ * nothing touches the pad (time constant CONDITION_TRACK_FRAMES frames): barometers drift by some
+ * 150 Pa in a quarter of an hour, and the paper sets its readings to zero between contacts
+ * (section IV.A).
  *
  * A reading more than CONDITION_OPEN_SIGMA below zero while nothing touches the pad is no drift: a
- * disturbed reading, or a zero taken under a press. It does not move the zero, and ends .tared while
+ * disturbed reading, or a zero taken under a press. It does not move the zero and ends .tared while
  * it lasts; after CONDITION_BELOW_FRAMES in a row the sensor is tared anew.
  *
  * The gate opens when the strongest reading exceeds CONDITION_OPEN_SIGMA standard deviations of the

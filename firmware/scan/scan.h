@@ -80,8 +80,8 @@ struct scan {
   /* Requests of the main context. */
   _Atomic uint32_t osr;
   _Atomic uint32_t rate_mHz;
-  _Atomic uint32_t temperature_doubted; /* 1: take the next soon; set while the slot is full, cleared
-                                           while it is empty */
+  _Atomic uint32_t temperature_doubted; /* 1: take the next soon. Set while the slot is full and
+                                           cleared while it is empty */
 
   /* Event context only. */
   enum scan_state state;
