@@ -1,52 +1,72 @@
 #include "fit/fit.h"
 
-#include "common/contact_flags.h"
-#include "fit/fit_math.h"
+#include "common/bytes.h"
+#include "fit/fit_limits.h"
 
 #include <math.h>
 #include <stdbool.h>
-#include <string.h>
 
-#define PARAMETERS 4
-#define LOG2_E 1.44269504f
-#define TWO_PI 6.28318531f
-
-/* Readings below this share of the largest carry more noise than shape into the logarithm. */
-#define GUESS_SHARE 0.1f
-/* Prior of the guess alone: sigma of 0.6 pitch, where the array localises best. It decides where
- * too few readings are large, and weighs nothing elsewhere. */
-#define GUESS_PRIOR_WEIGHT 1e-3f
-#define GUESS_PRIOR_SIGMA 0.6f
-
-#define STEP_LIMIT 0.5f   /* pitches in x and y, and share of sigma, in one iteration */
-#define P0_MIN 0.05f      /* of the largest reading */
-#define P0_MAX 1e6f       /* reached 30 mm outside the array */
-#define PIVOT_FLOOR 2e-7f /* of the diagonal entry: float32 tells no less */
-
-#define SETTLED_mm 0.02f /* a larger last step has not settled */
-#define UNCERTAIN_SD_mm 0.25f
 #define POSITION_MAX_mm 10000.0f
-#define SD_MAX 1e9f          /* stands for: nothing is known */
-#define MODEL_RESIDUAL 0.15f /* of the root of the sum of squared readings */
-#define FLAT_SIGMA (0.98f * FIT_SIGMA_MAX)
-#define LOW_SIGNAL_SIGMA 20
+#define MARGIN 1.5f   /* pitches around the array in which a contact may lie */
+#define ON_NODE 1e-4f /* pitches */
 
-/* Symmetric 4 x 4 and right-hand side. matrix[i][j] for j <= i. */
-struct normal_equations {
-  float matrix[PARAMETERS][PARAMETERS];
-  float rhs[PARAMETERS];
-};
+/* value > 0 as mantissa * 2^exponent with a mantissa of 2^29 .. 2^30. */
+static int32_t split(float value, int32_t *exponent) {
+  uint32_t bits = bytes_from_f32(value);
+  *exponent = (int32_t)(bits >> 23) - 127 - 29;
+  return (int32_t)((bits & 0x7FFFFFu) | 0x800000u) << 6;
+}
 
-/* The readings that enter, in units of the largest. */
-struct samples {
-  int count;
-  float x[FT_MAX_SENSORS], y[FT_MAX_SENSORS], p[FT_MAX_SENSORS];
-  int32_t log2_q24[FT_MAX_SENSORS]; /* of the reading; 0 below GUESS_SHARE */
-};
+/* Number of the node at this coordinate, or -1 off the grid. */
+static int node_at(float position, float first) {
+  float steps = position - first;
+  float nearest = floorf(steps + 0.5f);
+  bool on_node = fabsf(steps - nearest) <= ON_NODE && nearest < (float)FIT_GRID_MAX_NODES;
+  return on_node ? (int)nearest : -1;
+}
 
-struct parameters {
-  float p0, x, y, sigma;
-};
+/* Fills made->grid if the sensors occupy every node of a rectangle. */
+static void find_grid(struct fit_array *made, const float *x_mm, const float *y_mm) {
+  struct fit_grid_shape *grid = &made->grid;
+  float x_first = made->x_min + MARGIN, y_first = made->y_min + MARGIN;
+  int columns = node_at(made->x_max - MARGIN, x_first) + 1;
+  int rows = node_at(made->y_max - MARGIN, y_first) + 1;
+  if (columns < 2 || rows < 2 || columns * rows != made->sensor_count) {
+    return;
+  }
+  uint32_t seen = 0;
+  for (uint8_t k = 0; k < made->sensor_count; k++) {
+    int column = node_at(made->x[k], x_first);
+    int row = node_at(made->y[k], y_first);
+    if (column < 0 || row < 0) {
+      return;
+    }
+    grid->sensor[column * rows + row] = k;
+    seen |= UINT32_C(1) << (column * rows + row);
+  }
+  if (seen != UINT32_MAX >> (FT_MAX_SENSORS - made->sensor_count)) {
+    return;
+  }
+  const int32_t half_q26 = 1 << 25;
+  grid->x_min = -(2 * (columns / 2) + 3) * half_q26;
+  grid->x_max = (2 * (columns - 1 - columns / 2) + 3) * half_q26;
+  grid->y_min = -(2 * (rows / 2) + 3) * half_q26;
+  grid->y_max = (2 * (rows - 1 - rows / 2) + 3) * half_q26;
+  int32_t exponent;
+  grid->pitch = split(made->pitch_mm, &exponent);
+  grid->pitch_exponent = exponent + 6;
+  uint8_t origin = grid->sensor[(columns / 2) * rows + rows / 2];
+  float unit = ldexpf(1.0f, -grid->pitch_exponent);
+  grid->x_origin = (int32_t)(x_mm[origin] * unit);
+  grid->y_origin = (int32_t)(y_mm[origin] * unit);
+  grid->force_scale =
+      split(6.28318531e-6f * made->pitch_mm * made->pitch_mm, &grid->force_exponent);
+  float settled = FIT_SETTLED_mm / made->pitch_mm * 4194304.0f;
+  settled = settled * settled * 0.5f;
+  grid->settled_square = settled < 5e8f ? (int32_t)settled : 500000000;
+  grid->columns = (uint8_t)columns;
+  grid->rows = (uint8_t)rows;
+}
 
 enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
                               const float *y_mm, float pitch_mm) {
@@ -63,299 +83,23 @@ enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, con
     float y = y_mm[k] / pitch_mm;
     made.x[k] = x;
     made.y[k] = y;
-    made.x_min = k == 0 || x - 1.5f < made.x_min ? x - 1.5f : made.x_min;
-    made.x_max = k == 0 || x + 1.5f > made.x_max ? x + 1.5f : made.x_max;
-    made.y_min = k == 0 || y - 1.5f < made.y_min ? y - 1.5f : made.y_min;
-    made.y_max = k == 0 || y + 1.5f > made.y_max ? y + 1.5f : made.y_max;
+    made.x_min = k == 0 || x - MARGIN < made.x_min ? x - MARGIN : made.x_min;
+    made.x_max = k == 0 || x + MARGIN > made.x_max ? x + MARGIN : made.x_max;
+    made.y_min = k == 0 || y - MARGIN < made.y_min ? y - MARGIN : made.y_min;
+    made.y_max = k == 0 || y + MARGIN > made.y_max ? y + MARGIN : made.y_max;
   }
+  find_grid(&made, x_mm, y_mm);
   *array = made;
   return FT_OK;
 }
 
-/* NaN counts as low. */
-static float clamp(float value, float low, float high) {
-  if (!(value > low)) {
-    return low;
-  }
-  return value > high ? high : value;
-}
-
-/* NaN and infinity count as high. */
-static float at_most(float value, float high) {
-  return value < high ? value : high;
-}
-
-/* In place, matrix = L D L^T: L below the diagonal, D on it. A pivot below its floor is raised to
- * it, which shortens the step in a direction that the readings do not determine. Returns whether
- * that happened. */
-static bool factorise(struct normal_equations *normal) {
-  bool deficient = false;
-  for (int i = 0; i < PARAMETERS; i++) {
-    float *row = normal->matrix[i];
-    float diagonal = row[i];
-    float pivot = diagonal;
-    for (int j = 0; j < i; j++) {
-      float *other = normal->matrix[j];
-      float product = row[j]; /* L[i][j] * D[j] */
-      for (int k = 0; k < j; k++) {
-        product -= row[k] * other[k];
-      }
-      row[j] = product;
-    }
-    for (int j = 0; j < i; j++) {
-      float scaled = row[j] / normal->matrix[j][j];
-      pivot -= row[j] * scaled;
-      row[j] = scaled;
-    }
-    float floor = diagonal * PIVOT_FLOOR + 1e-30f;
-    if (!(pivot > floor)) {
-      pivot = floor;
-      deficient = true;
-    }
-    row[i] = pivot;
-  }
-  return deficient;
-}
-
-/* L z = vector, in place. */
-static void forward(const struct normal_equations *normal, float vector[PARAMETERS]) {
-  for (int i = 1; i < PARAMETERS; i++) {
-    for (int j = 0; j < i; j++) {
-      vector[i] -= normal->matrix[i][j] * vector[j];
-    }
-  }
-}
-
-static void solve(const struct normal_equations *normal, float vector[PARAMETERS]) {
-  forward(normal, vector);
-  for (int i = PARAMETERS - 1; i >= 0; i--) {
-    vector[i] /= normal->matrix[i][i];
-    for (int j = i + 1; j < PARAMETERS; j++) {
-      vector[i] -= normal->matrix[j][i] * vector[j];
-    }
-  }
-}
-
-/* vector^T matrix^-1 vector, from the factors. */
-static float inverse_form(const struct normal_equations *normal, float vector[PARAMETERS]) {
-  forward(normal, vector);
-  float sum = 0.0f;
-  for (int i = 0; i < PARAMETERS; i++) {
-    sum += vector[i] * vector[i] / normal->matrix[i][i];
-  }
-  return sum;
-}
-
-/* Adds row^T row to the matrix and row * value to the right-hand side. */
-static void add_row(struct normal_equations *normal, const float row[PARAMETERS], float value) {
-  for (int i = 0; i < PARAMETERS; i++) {
-    for (int j = 0; j <= i; j++) {
-      normal->matrix[i][j] += row[i] * row[j];
-    }
-    normal->rhs[i] += row[i] * value;
-  }
-}
-
-/* log p is a paraboloid: weighted linear least squares about the largest reading. */
-static struct parameters guess(const struct samples *samples, int peak) {
-  struct normal_equations normal;
-  memset(&normal, 0, sizeof normal);
-  const float prior_curvature = 0.5f / (GUESS_PRIOR_SIGMA * GUESS_PRIOR_SIGMA);
-  for (int i = 0; i < PARAMETERS; i++) {
-    normal.matrix[i][i] = GUESS_PRIOR_WEIGHT;
-  }
-  normal.rhs[3] = -GUESS_PRIOR_WEIGHT * prior_curvature;
-  for (int k = 0; k < samples->count; k++) {
-    float weight = samples->p[k];
-    if (weight < GUESS_SHARE) {
-      continue;
-    }
-    float x = samples->x[k] - samples->x[peak];
-    float y = samples->y[k] - samples->y[peak];
-    int32_t log2_q24 = samples->log2_q24[k] - samples->log2_q24[peak];
-    float log_p = (float)log2_q24 * (1.0f / (16777216.0f * LOG2_E));
-    float row[PARAMETERS] = {weight, weight * x, weight * y, weight * (x * x + y * y)};
-    add_row(&normal, row, weight * log_p);
-  }
-  factorise(&normal);
-  solve(&normal, normal.rhs);
-  float curvature = -normal.rhs[3]; /* 1 / (2 sigma^2) */
-  const float flattest = 0.5f / (FIT_SIGMA_MAX * FIT_SIGMA_MAX);
-  const float sharpest = 0.5f / (0.25f * 0.25f);
-  curvature = clamp(curvature, flattest, sharpest);
-  struct parameters theta;
-  float half_inverse = 0.5f / curvature;
-  theta.x = clamp(normal.rhs[1] * half_inverse, -1.0f, 1.0f) + samples->x[peak];
-  theta.y = clamp(normal.rhs[2] * half_inverse, -1.0f, 1.0f) + samples->y[peak];
-  theta.sigma = sqrtf(half_inverse);
-  theta.p0 = 1.0f;
-  return theta;
-}
-
-/* Normal equations of the model linearised at theta, in the basis e (1, X, Y, X^2 + Y^2) with
- * e = exp(-(X^2 + Y^2) / (2 sigma^2)) and X, Y about the centre. Returns the sum of squared
- * residuals. */
-static float linearise(const struct samples *samples, const struct parameters *theta,
-                       struct normal_equations *normal) {
-  memset(normal, 0, sizeof *normal);
-  float sum = 0.0f;
-  float log2_scale = 0.5f * LOG2_E / (theta->sigma * theta->sigma);
-  for (int k = 0; k < samples->count; k++) {
-    float x = samples->x[k] - theta->x;
-    float y = samples->y[k] - theta->y;
-    float r2 = x * x + y * y;
-    float e = fit_exp2_negative(r2 * log2_scale);
-    float residual = samples->p[k] - theta->p0 * e;
-    sum += residual * residual;
-    float row[PARAMETERS] = {e, e * x, e * y, e * r2};
-    add_row(normal, row, residual);
-  }
-  return sum;
-}
-
-/* The best amplitude for the shape of theta: p0 enters linearly. */
-static float best_amplitude(const struct samples *samples, const struct parameters *theta) {
-  float numerator = 0.0f;
-  float denominator = 1e-30f;
-  float log2_scale = 0.5f * LOG2_E / (theta->sigma * theta->sigma);
-  for (int k = 0; k < samples->count; k++) {
-    float x = samples->x[k] - theta->x;
-    float y = samples->y[k] - theta->y;
-    float e = fit_exp2_negative((x * x + y * y) * log2_scale);
-    numerator += e * samples->p[k];
-    denominator += e * e;
-  }
-  return clamp(numerator / denominator, P0_MIN, P0_MAX);
-}
-
-/* One Gauss-Newton step; returns the length of its move in pitches. */
-static float step(const struct fit_array *array, struct normal_equations *normal,
-                  struct parameters *theta) {
-  solve(normal, normal->rhs);
-  float sigma2 = theta->sigma * theta->sigma;
-  float gain = sigma2 / theta->p0;
-  float dx = clamp(gain * normal->rhs[1], -STEP_LIMIT, STEP_LIMIT);
-  float dy = clamp(gain * normal->rhs[2], -STEP_LIMIT, STEP_LIMIT);
-  float limit = STEP_LIMIT * theta->sigma;
-  float dsigma = clamp(gain * theta->sigma * normal->rhs[3], -limit, limit);
-  theta->p0 = clamp(theta->p0 + normal->rhs[0], P0_MIN, P0_MAX);
-  theta->x = clamp(theta->x + dx, array->x_min, array->x_max);
-  theta->y = clamp(theta->y + dy, array->y_min, array->y_max);
-  theta->sigma = clamp(theta->sigma + dsigma, FIT_SIGMA_MIN, FIT_SIGMA_MAX);
-  return sqrtf(dx * dx + dy * dy);
-}
-
-static bool at_bound(const struct fit_array *array, const struct parameters *theta) {
-  return theta->x <= array->x_min || theta->x >= array->x_max || theta->y <= array->y_min ||
-         theta->y >= array->y_max || theta->sigma <= FIT_SIGMA_MIN ||
-         theta->sigma >= FIT_SIGMA_MAX || theta->p0 <= P0_MIN || theta->p0 >= P0_MAX;
-}
-
-static int32_t largest_reading(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                               uint32_t usable) {
-  int32_t largest = 0;
-  for (uint8_t k = 0; k < array->sensor_count; k++) {
-    if ((usable & UINT32_C(1) << k) && pressure_Pa_q10[k] > largest) {
-      largest = pressure_Pa_q10[k];
-    }
-  }
-  return largest;
-}
-
 void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                   const struct fit_settings *settings, struct fit_result *result) {
-  memset(result, 0, sizeof *result);
   uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
-  usable &= all;
-  if (usable != all) {
-    result->flags |= CONTACT_FLAG_SENSOR_MASKED;
+  if (array->grid.columns == FIT_GRID_COLUMNS && array->grid.rows == FIT_GRID_ROWS &&
+      (usable & all) == all) {
+    fit_grid(array, pressure_Pa_q10, settings, result);
+  } else {
+    fit_general(array, pressure_Pa_q10, usable, settings, result);
   }
-  int32_t largest = largest_reading(array, pressure_Pa_q10, usable);
-  if (largest <= 0) {
-    result->flags |= CONTACT_FLAG_LOW_SIGNAL;
-    return;
-  }
-  float scale = 1.0f / (float)largest;
-  struct samples samples;
-  samples.count = 0;
-  int peak = 0;
-  float sum_squares = 0.0f;
-  for (uint8_t k = 0; k < array->sensor_count; k++) {
-    if (!(usable & UINT32_C(1) << k)) {
-      continue;
-    }
-    int n = samples.count++;
-    int32_t reading = pressure_Pa_q10[k];
-    if (reading == largest) {
-      peak = n;
-    }
-    samples.x[n] = array->x[k];
-    samples.y[n] = array->y[k];
-    samples.p[n] = clamp((float)reading * scale, -1.0f, 1.0f);
-    samples.log2_q24[n] = samples.p[n] >= GUESS_SHARE ? fit_log2_q24((uint32_t)reading) : 0;
-    sum_squares += samples.p[n] * samples.p[n];
-  }
-  if (samples.count < PARAMETERS) {
-    return;
-  }
-
-  struct parameters theta = guess(&samples, peak);
-  theta.p0 = best_amplitude(&samples, &theta);
-  struct normal_equations normal;
-  float squares = 0.0f;
-  float moved = 0.0f;
-  bool deficient = false;
-  struct parameters before = theta;
-  for (uint8_t i = 0; i < settings->iterations; i++) {
-    before = theta;
-    squares = linearise(&samples, &theta, &normal);
-    deficient = factorise(&normal);
-    moved = step(array, &normal, &theta);
-  }
-
-  float pitch = array->pitch_mm;
-  float unit_Pa = (float)largest * (1.0f / 1024.0f);
-  float sigma_mm = theta.sigma * pitch;
-  result->used = usable;
-  result->x_mm = theta.x * pitch;
-  result->y_mm = theta.y * pitch;
-  result->p0_Pa = theta.p0 * unit_Pa;
-  result->sigma_mm = sigma_mm;
-  result->force_N = TWO_PI * result->p0_Pa * sigma_mm * sigma_mm * 1e-6f;
-  result->residual_rms_Pa = unit_Pa * sqrtf(squares / (float)samples.count);
-
-  /* Covariance at the last linearisation: sd of a reading from the residuals, at least the noise.
-   */
-  int freedom = samples.count > PARAMETERS ? samples.count - PARAMETERS : 1;
-  float noise = (float)settings->noise_Pa_q10 * scale;
-  float variance = squares / (float)freedom;
-  if (variance < noise * noise) {
-    variance = noise * noise;
-  }
-  float gain = before.sigma * before.sigma / before.p0;
-  float along_x[PARAMETERS] = {0.0f, 1.0f, 0.0f, 0.0f};
-  float along_y[PARAMETERS] = {0.0f, 0.0f, 1.0f, 0.0f};
-  float along_force[PARAMETERS] = {1.0f, 0.0f, 0.0f, 2.0f * before.sigma * before.sigma};
-  float location_form = inverse_form(&normal, along_x) + inverse_form(&normal, along_y);
-  result->location_sd_mm = at_most(pitch * gain * sqrtf(variance * location_form), SD_MAX);
-  float relative_sd = sqrtf(variance * inverse_form(&normal, along_force)) / before.p0;
-  result->force_sd_N = at_most(result->force_N * relative_sd, SD_MAX);
-
-  uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
-  if (largest < LOW_SIGNAL_SIGMA * settings->noise_Pa_q10) {
-    flags |= CONTACT_FLAG_LOW_SIGNAL;
-  }
-  if (theta.sigma >= FLAT_SIGMA) {
-    flags |= CONTACT_FLAG_FLAT;
-  }
-  if (deficient || moved * pitch > SETTLED_mm || result->location_sd_mm > UNCERTAIN_SD_mm) {
-    flags |= CONTACT_FLAG_UNCERTAIN;
-  }
-  if (squares > MODEL_RESIDUAL * MODEL_RESIDUAL * sum_squares) {
-    flags |= CONTACT_FLAG_MODEL;
-  }
-  if (at_bound(array, &theta)) {
-    flags |= CONTACT_FLAG_AT_BOUND;
-  }
-  result->flags |= flags;
 }

@@ -3,16 +3,18 @@
  *
  * De Clercq et al., RA-L 2022, eq. (2) to (4). Gauss-Newton with a fixed number of iterations from
  * a first guess made anew for every frame: no state between frames, no early exit, so the cost
- * depends on the number of sensors alone. Any positions, any subset of sensors.
+ * depends on the array alone. Any positions, any subset of sensors.
  *
- * Works in pitches and in units of the largest reading, in float32 with integer exponential and
- * logarithm, so that a Cortex-M0+, a Cortex-M4F and a PC compute the same bits.
+ * Two kernels do it: fixed point for a full rectangular grid, float32 for everything else. Both use
+ * integer exponentials and logarithms, so that a Cortex-M0+, a Cortex-M4F and a PC compute the same
+ * bits. Main context only: they divide with port/divide.h.
  */
 #ifndef FIT_FIT_H
 #define FIT_FIT_H
 
 #include "common/limits.h"
 #include "common/status.h"
+#include "fit/fit_grid.h"
 
 #include <stdint.h>
 
@@ -22,13 +24,18 @@ struct fit_array {
   float pitch_mm;
   float x[FT_MAX_SENSORS], y[FT_MAX_SENSORS]; /* [sensor], pitches */
   float x_min, x_max, y_min, y_max; /* box of the location: the array and 1.5 pitches around it */
+  struct fit_grid_shape grid;
 };
 
 struct fit_settings {
-  uint8_t iterations;   /* 1..FIT_MAX_ITERATIONS; 7 brings 99.9 % of observable presses within 1 um
-                           of the optimum */
+  uint8_t iterations;   /* 0 (the guess)..FIT_MAX_ITERATIONS; 7 brings 99.9 % of observable presses
+                           within 1 um of the optimum */
   int32_t noise_Pa_q10; /* rms noise of a reading, 1/1024 Pa, at least 1 */
+  /* Weak prior on sigma, for rubber so stiff that the array can hardly tell it: one more row
+   * FIT_PRIOR_WEIGHT largest (sigma - prior_sigma) / prior_width. Width 0: none. */
+  float prior_sigma_mm, prior_width_mm;
 };
+#define FIT_PRIOR_WEIGHT 0.01f
 #define FIT_MAX_ITERATIONS 20
 
 /* Widths that the fit can tell, in pitches: narrower ones fall between the sensors, wider ones
@@ -59,5 +66,15 @@ enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, con
  * to use. With fewer than four, or no positive reading, FIT_VALID stays off. */
 void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                   const struct fit_settings *settings, struct fit_result *result);
+
+/* The two kernels behind fit_gaussian, to compare them.
+ *
+ * fit_grid: fixed point, for a full rectangle of FIT_GRID_COLUMNS x FIT_GRID_ROWS nodes (of the
+ * build, 2 to 6 each way) with every sensor usable; sigma from 0.216 pitch.
+ * fit_general: float32, any positions, any sensors missing. */
+void fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+              const struct fit_settings *settings, struct fit_result *result);
+void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                 const struct fit_settings *settings, struct fit_result *result);
 
 #endif

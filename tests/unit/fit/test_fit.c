@@ -382,10 +382,10 @@ static void test_unsettled_fits_are_uncertain(void) {
     press.p0_Pa = 50000.0;
     read_press(&press, 0.0, NULL);
     struct fit_settings settings = {.iterations = 1, .noise_Pa_q10 = 1};
-    fit_gaussian(&array, readings, ALL, &settings, &result);
+    fit_general(&array, readings, ALL, &settings, &result);
     for (settings.iterations = 2; settings.iterations <= 5; settings.iterations++) {
       struct fit_result before = result;
-      fit_gaussian(&array, readings, ALL, &settings, &result);
+      fit_general(&array, readings, ALL, &settings, &result);
       double moved_mm =
           hypot((double)(result.x_mm - before.x_mm), (double)(result.y_mm - before.y_mm));
       if (moved_mm > 0.021) {

@@ -1,0 +1,181 @@
+/* Fixed-point arithmetic for the fit on a core with a 32 x 32 -> 32 bit multiplier and a 32/32 bit
+ * divider. Qn means: the integer is the value times 2^n. Every function is exact to the bit on
+ * every machine: it uses nothing but two's complement integers and arithmetic right shifts.
+ */
+#ifndef FIT_FIT_FIXED_H
+#define FIT_FIT_FIXED_H
+
+#include "port/divide.h"
+
+#include <stdint.h>
+
+#define FIXED_INLINE static inline __attribute__((always_inline))
+
+/* a * b / 2^32 for |a|, |b| <= 2^30, error below 2 units: three 16-bit products. */
+FIXED_INLINE int32_t fixed_mul_q32(int32_t a, int32_t b) {
+  int32_t a_high = a >> 16, a_low = a & 0xFFFF;
+  int32_t b_high = b >> 16, b_low = b & 0xFFFF;
+  return a_high * b_high + ((a_high * b_low + a_low * b_high) >> 16);
+}
+
+/* a * b / 2^30, likewise, error below 3 units. |result| < 2^31. */
+FIXED_INLINE int32_t fixed_mul_q30(int32_t a, int32_t b) {
+  int32_t a_high = a >> 16, a_low = a & 0xFFFF;
+  int32_t b_high = b >> 16, b_low = b & 0xFFFF;
+  return a_high * b_high * 4 + ((a_high * b_low + a_low * b_high) >> 14);
+}
+
+/* a * b / 2^28 and / 2^26 with all four products, error below 2 units. |result| < 2^31. */
+FIXED_INLINE int32_t fixed_mul_q28(int32_t a, int32_t b) {
+  int32_t a_high = a >> 16, a_low = a & 0xFFFF;
+  int32_t b_high = b >> 16, b_low = b & 0xFFFF;
+  uint32_t low = (uint32_t)a_low * (uint32_t)b_low;
+  return a_high * b_high * 16 + ((a_high * b_low + a_low * b_high) >> 12) + (int32_t)(low >> 28);
+}
+FIXED_INLINE int32_t fixed_mul_q26(int32_t a, int32_t b) {
+  int32_t a_high = a >> 16, a_low = a & 0xFFFF;
+  int32_t b_high = b >> 16, b_low = b & 0xFFFF;
+  uint32_t low = (uint32_t)a_low * (uint32_t)b_low;
+  return a_high * b_high * 64 + ((a_high * b_low + a_low * b_high) >> 10) + (int32_t)(low >> 26);
+}
+
+/* a * b / 2^16 for any a and |b| < 2^15. */
+FIXED_INLINE int32_t fixed_mul_16(int32_t a, int32_t b) {
+  return (a >> 16) * b + (((a & 0xFFFF) * b) >> 16);
+}
+
+/* Position of the highest set bit plus one; 0 for 0. */
+FIXED_INLINE int32_t fixed_bits(uint32_t value) {
+  int32_t count = 0;
+  if (value >> 16) {
+    count = 16;
+    value >>= 16;
+  }
+  if (value >> 8) {
+    count += 8;
+    value >>= 8;
+  }
+  if (value >> 4) {
+    count += 4;
+    value >>= 4;
+  }
+  if (value >> 2) {
+    count += 2;
+    value >>= 2;
+  }
+  if (value >> 1) {
+    count += 1;
+    value >>= 1;
+  }
+  return count + (int32_t)value;
+}
+
+/* |value| without its last unit for negative ones: good for judging sizes. */
+FIXED_INLINE uint32_t fixed_size(int32_t value) {
+  return (uint32_t)(value ^ (value >> 31));
+}
+
+FIXED_INLINE int32_t fixed_clamp(int32_t value, int32_t low, int32_t high) {
+  return value < low ? low : value > high ? high : value;
+}
+
+/* numerator / denominator in Q26 from two divisions, for denominator >= 2^13 and a quotient of at
+ * most 16. The remainder is exact modulo 2^32, and it is small. */
+FIXED_INLINE int32_t fixed_div_q26(int32_t numerator, int32_t denominator) {
+  int32_t coarse = denominator >> 13;
+  int32_t quotient = port_divide(numerator, coarse);
+  int32_t rest =
+      (int32_t)(((uint32_t)numerator << 13) - (uint32_t)quotient * (uint32_t)denominator);
+  return (int32_t)((uint32_t)quotient << 13) + port_divide(rest, coarse);
+}
+
+/* mantissa * 2^exponent with |mantissa| <= 2^15: relative precision 2^-14, for what scales a step
+ * or a standard deviation and never decides where the fit ends. */
+struct scaled {
+  int32_t mantissa;
+  int32_t exponent;
+};
+
+FIXED_INLINE struct scaled scaled_from(int32_t value, int32_t exponent) {
+  int32_t shift = fixed_bits(fixed_size(value) | 1) - 15;
+  struct scaled result = {shift >= 0 ? value >> shift : value * (1 << -shift), exponent + shift};
+  return result;
+}
+
+/* The product of two normalised mantissas keeps 14 of its 15 bits at least. */
+FIXED_INLINE struct scaled scaled_mul(struct scaled a, struct scaled b) {
+  struct scaled result = {(a.mantissa * b.mantissa) >> 15, a.exponent + b.exponent + 15};
+  return result;
+}
+
+FIXED_INLINE struct scaled scaled_add(struct scaled a, struct scaled b) {
+  if (a.mantissa == 0) {
+    return b;
+  }
+  if (b.mantissa == 0) {
+    return a;
+  }
+  int32_t shift = a.exponent - b.exponent;
+  struct scaled result;
+  if (shift >= 0) {
+    result.mantissa = (a.mantissa + (b.mantissa >> (shift < 31 ? shift : 31))) >> 1;
+    result.exponent = a.exponent + 1;
+  } else {
+    result.mantissa = (b.mantissa + (a.mantissa >> (shift > -31 ? -shift : 31))) >> 1;
+    result.exponent = b.exponent + 1;
+  }
+  return result;
+}
+
+FIXED_INLINE struct scaled scaled_sub(struct scaled a, struct scaled b) {
+  b.mantissa = -b.mantissa;
+  return scaled_add(a, b);
+}
+
+/* A zero divisor counts as the smallest mantissa. */
+FIXED_INLINE struct scaled scaled_div(struct scaled a, struct scaled b) {
+  int32_t divisor = b.mantissa != 0 ? b.mantissa : 1;
+  return scaled_from(port_divide(a.mantissa * (1 << 15), divisor), a.exponent - b.exponent - 15);
+}
+
+/* In Qq, saturated to +-2^30. */
+FIXED_INLINE int32_t scaled_to_fixed(struct scaled a, int32_t q) {
+  int32_t shift = a.exponent + q;
+  if (shift > 15) {
+    return a.mantissa == 0 ? 0 : a.mantissa < 0 ? -(1 << 30) : 1 << 30;
+  }
+  if (shift >= 0) {
+    return fixed_clamp(a.mantissa, -(1 << 15), 1 << 15) * (1 << shift);
+  }
+  return a.mantissa >> (shift < -31 ? 31 : -shift);
+}
+
+FIXED_INLINE int32_t scaled_ratio(struct scaled a, struct scaled b, int32_t q) {
+  int32_t divisor = b.mantissa != 0 ? b.mantissa : 1;
+  int32_t quotient = port_divide(a.mantissa * (1 << 15), divisor);
+  int32_t shift = a.exponent - b.exponent - 15 + q;
+  if (shift >= 0) {
+    int32_t limit = (1 << 30) >> (shift < 30 ? shift : 30);
+    return fixed_clamp(quotient, -limit, limit) * (1 << (shift < 30 ? shift : 30));
+  }
+  return quotient >> (shift < -31 ? 31 : -shift);
+}
+
+/* Square root of a non-negative value: three Newton steps from the middle of the mantissa's range.
+ */
+FIXED_INLINE struct scaled scaled_sqrt(struct scaled a) {
+  a = scaled_from(a.mantissa, a.exponent);
+  if (a.mantissa <= 0) {
+    struct scaled zero = {0, 0};
+    return zero;
+  }
+  int32_t odd = a.exponent & 1;
+  int32_t square = a.mantissa * (1 << (14 + odd)); /* 2^28 .. 2^30 */
+  int32_t root = 23170;
+  for (int i = 0; i < 3; i++) {
+    root = (root + port_divide(square, root)) >> 1;
+  }
+  return scaled_from(root, (a.exponent - odd - 14) / 2);
+}
+
+#endif

@@ -1,0 +1,349 @@
+#include "common/contact_flags.h"
+#include "fit/fit.h"
+#include "fit/fit_limits.h"
+#include "fit/fit_math.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#define PARAMETERS 4
+#define LOG2_E 1.44269504f
+#define TWO_PI 6.28318531f
+
+/* Readings below this share of the largest carry more noise than shape into the logarithm. */
+#define GUESS_SHARE 0.1f
+/* Prior of the guess alone: sigma of 0.6 pitch, where the array localises best. It decides where
+ * too few readings are large, and weighs nothing elsewhere. */
+#define GUESS_PRIOR_WEIGHT 1e-3f
+#define GUESS_PRIOR_SIGMA 0.6f
+
+#define STEP_LIMIT 0.5f   /* pitches in x and y, and share of sigma, in one iteration */
+#define P0_MIN 0.05f      /* of the largest reading */
+#define P0_MAX 1e6f       /* reached 30 mm outside the array */
+#define PIVOT_FLOOR 2e-7f /* of the diagonal entry: float32 tells no less */
+
+/* Symmetric 4 x 4 and right-hand side. matrix[i][j] for j <= i. */
+struct normal_equations {
+  float matrix[PARAMETERS][PARAMETERS];
+  float rhs[PARAMETERS];
+};
+
+/* The readings that enter, in units of the largest. */
+struct samples {
+  int count;
+  float x[FT_MAX_SENSORS], y[FT_MAX_SENSORS], p[FT_MAX_SENSORS];
+  int32_t log2_q24[FT_MAX_SENSORS]; /* of the reading; 0 below GUESS_SHARE */
+};
+
+struct parameters {
+  float p0, x, y, sigma;
+};
+
+/* One more row weight (sigma - prior) of the least squares, pitches; weight 0: none. */
+struct prior {
+  float sigma, weight;
+};
+
+/* NaN counts as low. */
+static float clamp(float value, float low, float high) {
+  if (!(value > low)) {
+    return low;
+  }
+  return value > high ? high : value;
+}
+
+/* NaN and infinity count as high. */
+static float at_most(float value, float high) {
+  return value < high ? value : high;
+}
+
+/* In place, matrix = L D L^T: L below the diagonal, D on it. A pivot below its floor is raised to
+ * it, which shortens the step in a direction that the readings do not determine. Returns whether
+ * that happened. */
+static bool factorise(struct normal_equations *normal) {
+  bool deficient = false;
+  for (int i = 0; i < PARAMETERS; i++) {
+    float *row = normal->matrix[i];
+    float diagonal = row[i];
+    float pivot = diagonal;
+    for (int j = 0; j < i; j++) {
+      float *other = normal->matrix[j];
+      float product = row[j]; /* L[i][j] * D[j] */
+      for (int k = 0; k < j; k++) {
+        product -= row[k] * other[k];
+      }
+      row[j] = product;
+    }
+    for (int j = 0; j < i; j++) {
+      float scaled = row[j] / normal->matrix[j][j];
+      pivot -= row[j] * scaled;
+      row[j] = scaled;
+    }
+    float floor = diagonal * PIVOT_FLOOR + 1e-30f;
+    if (!(pivot > floor)) {
+      pivot = floor;
+      deficient = true;
+    }
+    row[i] = pivot;
+  }
+  return deficient;
+}
+
+/* L z = vector, in place. */
+static void forward(const struct normal_equations *normal, float vector[PARAMETERS]) {
+  for (int i = 1; i < PARAMETERS; i++) {
+    for (int j = 0; j < i; j++) {
+      vector[i] -= normal->matrix[i][j] * vector[j];
+    }
+  }
+}
+
+static void solve(const struct normal_equations *normal, float vector[PARAMETERS]) {
+  forward(normal, vector);
+  for (int i = PARAMETERS - 1; i >= 0; i--) {
+    vector[i] /= normal->matrix[i][i];
+    for (int j = i + 1; j < PARAMETERS; j++) {
+      vector[i] -= normal->matrix[j][i] * vector[j];
+    }
+  }
+}
+
+/* vector^T matrix^-1 vector, from the factors. */
+static float inverse_form(const struct normal_equations *normal, float vector[PARAMETERS]) {
+  forward(normal, vector);
+  float sum = 0.0f;
+  for (int i = 0; i < PARAMETERS; i++) {
+    sum += vector[i] * vector[i] / normal->matrix[i][i];
+  }
+  return sum;
+}
+
+/* Adds row^T row to the matrix and row * value to the right-hand side. */
+static void add_row(struct normal_equations *normal, const float row[PARAMETERS], float value) {
+  for (int i = 0; i < PARAMETERS; i++) {
+    for (int j = 0; j <= i; j++) {
+      normal->matrix[i][j] += row[i] * row[j];
+    }
+    normal->rhs[i] += row[i] * value;
+  }
+}
+
+/* log p is a paraboloid: weighted linear least squares about the largest reading. */
+static struct parameters guess(const struct samples *samples, int peak) {
+  struct normal_equations normal;
+  memset(&normal, 0, sizeof normal);
+  const float prior_curvature = 0.5f / (GUESS_PRIOR_SIGMA * GUESS_PRIOR_SIGMA);
+  for (int i = 0; i < PARAMETERS; i++) {
+    normal.matrix[i][i] = GUESS_PRIOR_WEIGHT;
+  }
+  normal.rhs[3] = -GUESS_PRIOR_WEIGHT * prior_curvature;
+  for (int k = 0; k < samples->count; k++) {
+    float weight = samples->p[k];
+    if (weight < GUESS_SHARE) {
+      continue;
+    }
+    float x = samples->x[k] - samples->x[peak];
+    float y = samples->y[k] - samples->y[peak];
+    int32_t log2_q24 = samples->log2_q24[k] - samples->log2_q24[peak];
+    float log_p = (float)log2_q24 * (1.0f / (16777216.0f * LOG2_E));
+    float row[PARAMETERS] = {weight, weight * x, weight * y, weight * (x * x + y * y)};
+    add_row(&normal, row, weight * log_p);
+  }
+  factorise(&normal);
+  solve(&normal, normal.rhs);
+  float curvature = -normal.rhs[3]; /* 1 / (2 sigma^2) */
+  const float flattest = 0.5f / (FIT_SIGMA_MAX * FIT_SIGMA_MAX);
+  const float sharpest = 0.5f / (0.25f * 0.25f);
+  curvature = clamp(curvature, flattest, sharpest);
+  struct parameters theta;
+  float half_inverse = 0.5f / curvature;
+  theta.x = clamp(normal.rhs[1] * half_inverse, -1.0f, 1.0f) + samples->x[peak];
+  theta.y = clamp(normal.rhs[2] * half_inverse, -1.0f, 1.0f) + samples->y[peak];
+  theta.sigma = sqrtf(half_inverse);
+  theta.p0 = 1.0f;
+  return theta;
+}
+
+/* Normal equations of the model linearised at theta, in the basis e (1, X, Y, X^2 + Y^2) with
+ * e = exp(-(X^2 + Y^2) / (2 sigma^2)) and X, Y about the centre. Returns the sum of squared
+ * residuals. */
+static float linearise(const struct samples *samples, const struct parameters *theta,
+                       struct prior prior, struct normal_equations *normal) {
+  memset(normal, 0, sizeof *normal);
+  float sum = 0.0f;
+  float log2_scale = 0.5f * LOG2_E / (theta->sigma * theta->sigma);
+  for (int k = 0; k < samples->count; k++) {
+    float x = samples->x[k] - theta->x;
+    float y = samples->y[k] - theta->y;
+    float r2 = x * x + y * y;
+    float e = fit_exp2_negative(r2 * log2_scale);
+    float residual = samples->p[k] - theta->p0 * e;
+    sum += residual * residual;
+    float row[PARAMETERS] = {e, e * x, e * y, e * r2};
+    add_row(normal, row, residual);
+  }
+  if (prior.weight > 0.0f) {
+    /* The fourth unknown alone changes sigma, by sigma^3 / p0. */
+    float sensitivity = theta->sigma * theta->sigma * theta->sigma / theta->p0;
+    float row[PARAMETERS] = {0.0f, 0.0f, 0.0f, prior.weight * sensitivity};
+    add_row(normal, row, prior.weight * (prior.sigma - theta->sigma));
+  }
+  return sum;
+}
+
+/* The best amplitude for the shape of theta: p0 enters linearly. */
+static float best_amplitude(const struct samples *samples, const struct parameters *theta) {
+  float numerator = 0.0f;
+  float denominator = 1e-30f;
+  float log2_scale = 0.5f * LOG2_E / (theta->sigma * theta->sigma);
+  for (int k = 0; k < samples->count; k++) {
+    float x = samples->x[k] - theta->x;
+    float y = samples->y[k] - theta->y;
+    float e = fit_exp2_negative((x * x + y * y) * log2_scale);
+    numerator += e * samples->p[k];
+    denominator += e * e;
+  }
+  return clamp(numerator / denominator, P0_MIN, P0_MAX);
+}
+
+/* One Gauss-Newton step; returns the length of its move in pitches. */
+static float step(const struct fit_array *array, struct normal_equations *normal,
+                  struct parameters *theta) {
+  solve(normal, normal->rhs);
+  float sigma2 = theta->sigma * theta->sigma;
+  float gain = sigma2 / theta->p0;
+  float dx = clamp(gain * normal->rhs[1], -STEP_LIMIT, STEP_LIMIT);
+  float dy = clamp(gain * normal->rhs[2], -STEP_LIMIT, STEP_LIMIT);
+  float limit = STEP_LIMIT * theta->sigma;
+  float dsigma = clamp(gain * theta->sigma * normal->rhs[3], -limit, limit);
+  theta->p0 = clamp(theta->p0 + normal->rhs[0], P0_MIN, P0_MAX);
+  theta->x = clamp(theta->x + dx, array->x_min, array->x_max);
+  theta->y = clamp(theta->y + dy, array->y_min, array->y_max);
+  theta->sigma = clamp(theta->sigma + dsigma, FIT_SIGMA_MIN, FIT_SIGMA_MAX);
+  return sqrtf(dx * dx + dy * dy);
+}
+
+static bool at_bound(const struct fit_array *array, const struct parameters *theta) {
+  return theta->x <= array->x_min || theta->x >= array->x_max || theta->y <= array->y_min ||
+         theta->y >= array->y_max || theta->sigma <= FIT_SIGMA_MIN ||
+         theta->sigma >= FIT_SIGMA_MAX || theta->p0 <= P0_MIN || theta->p0 >= P0_MAX;
+}
+
+static int32_t largest_reading(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                               uint32_t usable) {
+  int32_t largest = 0;
+  for (uint8_t k = 0; k < array->sensor_count; k++) {
+    if ((usable & UINT32_C(1) << k) && pressure_Pa_q10[k] > largest) {
+      largest = pressure_Pa_q10[k];
+    }
+  }
+  return largest;
+}
+
+void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                 const struct fit_settings *settings, struct fit_result *result) {
+  memset(result, 0, sizeof *result);
+  uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
+  usable &= all;
+  if (usable != all) {
+    result->flags |= CONTACT_FLAG_SENSOR_MASKED;
+  }
+  int32_t largest = largest_reading(array, pressure_Pa_q10, usable);
+  if (largest <= 0) {
+    result->flags |= CONTACT_FLAG_LOW_SIGNAL;
+    return;
+  }
+  float scale = 1.0f / (float)largest;
+  struct samples samples;
+  samples.count = 0;
+  int peak = 0;
+  float sum_squares = 0.0f;
+  for (uint8_t k = 0; k < array->sensor_count; k++) {
+    if (!(usable & UINT32_C(1) << k)) {
+      continue;
+    }
+    int n = samples.count++;
+    int32_t reading = pressure_Pa_q10[k];
+    if (reading == largest) {
+      peak = n;
+    }
+    samples.x[n] = array->x[k];
+    samples.y[n] = array->y[k];
+    samples.p[n] = clamp((float)reading * scale, -1.0f, 1.0f);
+    samples.log2_q24[n] = samples.p[n] >= GUESS_SHARE ? fit_log2_q24((uint32_t)reading) : 0;
+    sum_squares += samples.p[n] * samples.p[n];
+  }
+  if (samples.count < PARAMETERS) {
+    return;
+  }
+
+  struct parameters theta = guess(&samples, peak);
+  theta.p0 = best_amplitude(&samples, &theta);
+  struct prior prior = {0.0f, 0.0f};
+  if (settings->prior_width_mm > 0.0f) {
+    prior.sigma = settings->prior_sigma_mm / array->pitch_mm;
+    prior.weight = FIT_PRIOR_WEIGHT * array->pitch_mm / settings->prior_width_mm;
+  }
+  struct normal_equations normal;
+  struct parameters before;
+  float squares;
+  float moved = 0.0f;
+  bool deficient;
+  int left = settings->iterations;
+  do {
+    before = theta;
+    squares = linearise(&samples, &theta, prior, &normal);
+    deficient = factorise(&normal);
+    if (left > 0) {
+      moved = step(array, &normal, &theta);
+    }
+    left--;
+  } while (left > 0);
+
+  float pitch = array->pitch_mm;
+  float unit_Pa = (float)largest * (1.0f / 1024.0f);
+  float sigma_mm = theta.sigma * pitch;
+  result->used = usable;
+  result->x_mm = theta.x * pitch;
+  result->y_mm = theta.y * pitch;
+  result->p0_Pa = theta.p0 * unit_Pa;
+  result->sigma_mm = sigma_mm;
+  result->force_N = TWO_PI * result->p0_Pa * sigma_mm * sigma_mm * 1e-6f;
+  result->residual_rms_Pa = unit_Pa * sqrtf(squares / (float)samples.count);
+
+  /* Covariance at the last linearisation: sd of a reading from the residuals, at least the noise.
+   */
+  int freedom = samples.count > PARAMETERS ? samples.count - PARAMETERS : 1;
+  float noise = (float)settings->noise_Pa_q10 * scale;
+  float variance = squares / (float)freedom;
+  if (variance < noise * noise) {
+    variance = noise * noise;
+  }
+  float gain = before.sigma * before.sigma / before.p0;
+  float along_x[PARAMETERS] = {0.0f, 1.0f, 0.0f, 0.0f};
+  float along_y[PARAMETERS] = {0.0f, 0.0f, 1.0f, 0.0f};
+  float along_force[PARAMETERS] = {1.0f, 0.0f, 0.0f, 2.0f * before.sigma * before.sigma};
+  float location_form = inverse_form(&normal, along_x) + inverse_form(&normal, along_y);
+  result->location_sd_mm = at_most(pitch * gain * sqrtf(variance * location_form), FIT_HUGE);
+  float relative_sd = sqrtf(variance * inverse_form(&normal, along_force)) / before.p0;
+  result->force_sd_N = at_most(result->force_N * relative_sd, FIT_HUGE);
+
+  uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
+  if (largest < FIT_LOW_SIGNAL_SIGMA * settings->noise_Pa_q10) {
+    flags |= CONTACT_FLAG_LOW_SIGNAL;
+  }
+  if (theta.sigma >= FIT_FLAT_SIGMA) {
+    flags |= CONTACT_FLAG_FLAT;
+  }
+  if (deficient || moved * pitch > FIT_SETTLED_mm || result->location_sd_mm > FIT_UNCERTAIN_SD_mm) {
+    flags |= CONTACT_FLAG_UNCERTAIN;
+  }
+  if (squares > FIT_MODEL_RESIDUAL * FIT_MODEL_RESIDUAL * sum_squares) {
+    flags |= CONTACT_FLAG_MODEL;
+  }
+  if (at_bound(array, &theta)) {
+    flags |= CONTACT_FLAG_AT_BOUND;
+  }
+  result->flags |= flags;
+}

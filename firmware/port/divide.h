@@ -1,0 +1,18 @@
+/* Integer division with whatever the core has for it. For the main context only: a divider that is
+ * a peripheral, as the RP2040's, is not saved by interrupts.
+ */
+#ifndef PORT_DIVIDE_H
+#define PORT_DIVIDE_H
+
+#ifdef PORT_DIVIDE_HEADER
+#include PORT_DIVIDE_HEADER
+#else
+#include <stdint.h>
+
+/* numerator / denominator, towards zero. denominator is not 0, and not -1 with INT32_MIN. */
+static inline int32_t port_divide(int32_t numerator, int32_t denominator) {
+  return numerator / denominator;
+}
+#endif
+
+#endif

@@ -1,0 +1,269 @@
+/* The fixed-point kernel against the float32 one, which other tests hold to the reference. Built
+ * once for the 3 x 5 grid of the firmware and once for another size. */
+#include "common/contact_flags.h"
+#include "fit/fit.h"
+#include "fit/fit_tables.h"
+#include "support/random.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+#include <unity.h>
+
+enum { COLUMNS = FIT_GRID_COLUMNS, ROWS = FIT_GRID_ROWS, SENSORS = COLUMNS * ROWS };
+#define PITCH_mm 9.0f
+#define ALL (UINT32_MAX >> (32 - SENSORS))
+
+static float x_mm[SENSORS], y_mm[SENSORS];
+static struct fit_array array;
+static int32_t readings[SENSORS];
+static const struct fit_settings usual = {.iterations = 7, .noise_Pa_q10 = 5120};
+
+void setUp(void) {
+  for (int k = 0; k < SENSORS; k++) { /* rows run from top to bottom, columns are interleaved */
+    x_mm[k] = PITCH_mm * ((float)(k % COLUMNS) - 0.5f * (COLUMNS - 1)) + 1.5f;
+    y_mm[k] = PITCH_mm * (0.5f * (ROWS - 1) - (float)(k / COLUMNS)) - 0.25f;
+  }
+  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, SENSORS, x_mm, y_mm, PITCH_mm));
+}
+
+void tearDown(void) {}
+
+static void press(double x, double y, double p0_Pa, double sigma_mm, double noise_Pa,
+                  struct random *random) {
+  for (int k = 0; k < SENSORS; k++) {
+    double dx = (double)x_mm[k] - x;
+    double dy = (double)y_mm[k] - y;
+    double p = p0_Pa * exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm));
+    readings[k] = (int32_t)nearbyint(1024.0 * (p + noise_Pa * random_normal(random)));
+  }
+}
+
+static void random_press(struct random *random, double sigma_low_mm, double sigma_high_mm) {
+  double half_x = 4.5 * (COLUMNS - 1), half_y = 4.5 * (ROWS - 1);
+  press(1.5 + random_between(random, -half_x, half_x),
+        -0.25 + random_between(random, -half_y, half_y), random_between(random, 2e3, 1e5),
+        random_between(random, sigma_low_mm, sigma_high_mm), 5.0, random);
+}
+
+static void a_rectangle_is_recognised_in_any_order(void) {
+  TEST_ASSERT_EQUAL_UINT8(COLUMNS, array.grid.columns);
+  TEST_ASSERT_EQUAL_UINT8(ROWS, array.grid.rows);
+}
+
+static void what_is_no_rectangle_is_not(void) {
+  float moved = x_mm[0];
+  x_mm[0] += 0.1f;
+  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, SENSORS, x_mm, y_mm, PITCH_mm));
+  TEST_ASSERT_EQUAL_UINT8(0, array.grid.columns);
+  x_mm[0] = moved;
+  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, SENSORS - 1, x_mm, y_mm, PITCH_mm));
+  TEST_ASSERT_EQUAL_UINT8(0, array.grid.columns);
+  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, SENSORS, x_mm, y_mm, PITCH_mm / 2));
+  TEST_ASSERT_EQUAL_UINT8(0, array.grid.columns);
+  x_mm[0] = x_mm[1]; /* two sensors on one node, another node empty */
+  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, SENSORS, x_mm, y_mm, PITCH_mm));
+  TEST_ASSERT_EQUAL_UINT8(0, array.grid.columns);
+}
+
+static void the_tables_are_those_of_the_library(void) {
+  for (int k = 0; k < 256; k++) {
+    TEST_ASSERT_EQUAL_INT32(lround(ldexp(exp2(-k / 256.0), 30)), fit_exp2_table[k]);
+  }
+  for (int k = 0; k <= 64; k++) {
+    TEST_ASSERT_EQUAL_INT32(lround(32768.0 * log2(1.0 + k / 64.0)), fit_log2_table[k]);
+  }
+}
+
+static void both_kernels_agree(void) {
+  struct random random = {11};
+  float worst_um = 0.0f, worst_force = 0.0f, worst_sd = 0.0f, worst_force_sd = 0.0f;
+  for (int i = 0; i < 20000; i++) {
+    random_press(&random, 4.0, 15.0);
+    struct fit_result grid, general;
+    fit_grid(&array, readings, &usual, &grid);
+    fit_general(&array, readings, ALL, &usual, &general);
+    TEST_ASSERT_EQUAL_HEX32(ALL, grid.used);
+    if ((general.flags | grid.flags) & (CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_LOW_SIGNAL)) {
+      continue; /* near a limit of the warnings the two may differ */
+    }
+    TEST_ASSERT_EQUAL_HEX32(general.flags, grid.flags);
+    float um = 1e3f * hypotf(grid.x_mm - general.x_mm, grid.y_mm - general.y_mm);
+    worst_um = fmaxf(worst_um, um);
+    worst_force = fmaxf(worst_force, fabsf(grid.force_N / general.force_N - 1.0f));
+    worst_sd = fmaxf(worst_sd, fabsf(grid.location_sd_mm / general.location_sd_mm - 1.0f));
+    worst_force_sd = fmaxf(worst_force_sd, fabsf(grid.force_sd_N / general.force_sd_N - 1.0f));
+    TEST_ASSERT_FLOAT_WITHIN(1e-4f * general.p0_Pa, general.p0_Pa, grid.p0_Pa);
+    TEST_ASSERT_FLOAT_WITHIN(1e-4f * general.sigma_mm, general.sigma_mm, grid.sigma_mm);
+    TEST_ASSERT_FLOAT_WITHIN(0.02f * general.residual_rms_Pa, general.residual_rms_Pa,
+                             grid.residual_rms_Pa);
+  }
+  char text[120];
+  snprintf(text, sizeof text, "worst: %.3f um, force %.1e, sd %.1e, force sd %.1e",
+           (double)worst_um, (double)worst_force, (double)worst_sd, (double)worst_force_sd);
+  TEST_MESSAGE(text);
+  TEST_ASSERT_TRUE(worst_um < 1.0f);
+  TEST_ASSERT_TRUE(worst_force < 1e-4f);
+  TEST_ASSERT_TRUE(worst_sd < 0.01f);
+  TEST_ASSERT_TRUE(worst_force_sd < 0.01f);
+}
+
+static void scaling_the_readings_scales_the_pressures_alone(void) {
+  struct random random = {5};
+  random_press(&random, 5.0, 6.0);
+  const struct fit_settings quiet = {.iterations = 7, .noise_Pa_q10 = 1};
+  struct fit_result once, twice;
+  fit_grid(&array, readings, &quiet, &once);
+  for (int k = 0; k < SENSORS; k++) {
+    readings[k] *= 2;
+  }
+  fit_grid(&array, readings, &quiet, &twice);
+  TEST_ASSERT_EQUAL_MEMORY(&once.x_mm, &twice.x_mm, sizeof once.x_mm);
+  TEST_ASSERT_EQUAL_MEMORY(&once.y_mm, &twice.y_mm, sizeof once.y_mm);
+  TEST_ASSERT_EQUAL_MEMORY(&once.sigma_mm, &twice.sigma_mm, sizeof once.sigma_mm);
+  TEST_ASSERT_EQUAL_MEMORY(&once.location_sd_mm, &twice.location_sd_mm, sizeof once.location_sd_mm);
+  TEST_ASSERT_TRUE(twice.p0_Pa == 2.0f * once.p0_Pa && twice.force_N == 2.0f * once.force_N);
+}
+
+static void more_iterations_come_nearer(void) {
+  struct random random = {7};
+  float mean_um[9] = {0};
+  for (int i = 0; i < 500; i++) {
+    random_press(&random, 4.5, 7.0);
+    struct fit_result best, result;
+    fit_general(&array, readings, ALL, &usual, &best);
+    for (uint8_t n = 0; n < 9; n++) {
+      const struct fit_settings settings = {.iterations = n, .noise_Pa_q10 = 5120};
+      fit_grid(&array, readings, &settings, &result);
+      mean_um[n] += 2.0f * hypotf(result.x_mm - best.x_mm, result.y_mm - best.y_mm);
+    }
+  }
+  TEST_ASSERT_TRUE(mean_um[0] > 20.0f && mean_um[0] < 2000.0f);
+  for (int n = 1; n < 5; n++) {
+    TEST_ASSERT_TRUE(mean_um[n] < 0.7f * mean_um[n - 1] || mean_um[n] < 0.05f);
+  }
+  TEST_ASSERT_TRUE(mean_um[7] < 0.05f && mean_um[8] < 0.05f);
+}
+
+/* Up to three iterations are all of one kind, so that one more is one more step. */
+static void a_fit_that_still_moves_says_so(void) {
+  struct random random = {13};
+  int moving = 0;
+  for (int i = 0; i < 1000; i++) {
+    random_press(&random, 3.5, 7.0);
+    struct fit_settings settings = {.iterations = 1, .noise_Pa_q10 = 1};
+    struct fit_result before, result;
+    fit_grid(&array, readings, &settings, &before);
+    for (settings.iterations = 2; settings.iterations <= 3; settings.iterations++) {
+      fit_grid(&array, readings, &settings, &result);
+      float moved_mm = hypotf(result.x_mm - before.x_mm, result.y_mm - before.y_mm);
+      bool uncertain = result.flags & CONTACT_FLAG_UNCERTAIN;
+      TEST_ASSERT_TRUE(uncertain || moved_mm < 0.021f);
+      TEST_ASSERT_TRUE(!uncertain || moved_mm > 0.019f || result.location_sd_mm > 0.2f);
+      moving += moved_mm > 0.021f && result.location_sd_mm < 0.2f;
+      before = result;
+    }
+  }
+  TEST_ASSERT_GREATER_THAN_INT(20, moving);
+}
+
+static void a_prior_pulls_sigma_alike_in_both(void) {
+  struct random random = {9};
+  for (int i = 0; i < 200; i++) {
+    random_press(&random, 3.2, 3.6);
+    struct fit_settings settings = usual;
+    settings.prior_sigma_mm = 4.0f;
+    settings.prior_width_mm = 0.5f;
+    struct fit_result grid, general, free;
+    fit_grid(&array, readings, &settings, &grid);
+    fit_general(&array, readings, ALL, &settings, &general);
+    fit_general(&array, readings, ALL, &usual, &free);
+    if ((general.flags | grid.flags | free.flags) & CONTACT_FLAG_UNCERTAIN) {
+      continue;
+    }
+    /* the grid kernel takes sigma to 15 bits into the prior */
+    TEST_ASSERT_FLOAT_WITHIN(1e-2f, general.sigma_mm, grid.sigma_mm);
+    TEST_ASSERT_FLOAT_WITHIN(1e-2f, general.x_mm, grid.x_mm);
+    TEST_ASSERT_TRUE(general.sigma_mm > free.sigma_mm - 1e-4f);
+  }
+}
+
+static void warnings_are_given(void) {
+  struct fit_result result;
+  for (int k = 0; k < SENSORS; k++) {
+    readings[k] = 5000 * 1024;
+  }
+  fit_grid(&array, readings, &usual, &result);
+  TEST_ASSERT_TRUE(result.flags & CONTACT_FLAG_FLAT);
+  TEST_ASSERT_TRUE(result.flags & CONTACT_FLAG_AT_BOUND);
+
+  struct random random = {3};
+  press(1.5, -0.25, 60.0, 6.0, 0.0, &random);
+  fit_grid(&array, readings, &usual, &result);
+  TEST_ASSERT_TRUE(result.flags & CONTACT_FLAG_LOW_SIGNAL);
+
+  press(1.5, -0.25, 20e3, 6.0, 0.0, &random);
+  for (int k = 0; k < SENSORS; k += 2) {
+    readings[k] -= 8000 * 1024; /* no Gaussian */
+  }
+  fit_grid(&array, readings, &usual, &result);
+  TEST_ASSERT_TRUE(result.flags & CONTACT_FLAG_MODEL);
+
+  press(1.5, -0.25, 20e3, 1.0, 0.0, &random); /* far narrower than the grid */
+  fit_grid(&array, readings, &usual, &result);
+  TEST_ASSERT_TRUE(result.flags &
+                   (CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL));
+
+  memset(readings, 0, sizeof readings);
+  fit_grid(&array, readings, &usual, &result);
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_LOW_SIGNAL, result.flags);
+  for (int k = 0; k < SENSORS; k++) {
+    readings[k] = INT32_MIN;
+  }
+  fit_grid(&array, readings, &usual, &result);
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_LOW_SIGNAL, result.flags);
+}
+
+static void any_bits_give_finite_results(void) {
+  struct random random = {21};
+  for (int i = 0; i < 200000; i++) {
+    uint32_t kind = random_below(&random, 4);
+    for (int k = 0; k < SENSORS; k++) {
+      uint32_t bits = random_u32(&random);
+      readings[k] = (int32_t)(kind == 0   ? bits
+                              : kind == 1 ? bits >> (bits & 31)
+                              : kind == 2 ? (bits & 7 ? 0 : bits)
+                                          : (bits & 1 ? 0x7FFFFFFFu : 0x80000000u));
+    }
+    struct fit_settings settings = {.iterations = (uint8_t)random_below(&random, 11),
+                                    .noise_Pa_q10 = (int32_t)(random_u32(&random) >> 1) | 1};
+    if (random_below(&random, 2)) {
+      settings.prior_sigma_mm = 5.0f;
+      settings.prior_width_mm = 0.01f + (float)random_below(&random, 100);
+    }
+    struct fit_result result;
+    fit_grid(&array, readings, &settings, &result);
+    TEST_ASSERT_TRUE(isfinite(result.x_mm) && isfinite(result.y_mm) && isfinite(result.p0_Pa) &&
+                     isfinite(result.sigma_mm) && isfinite(result.force_N) &&
+                     isfinite(result.residual_rms_Pa) && isfinite(result.location_sd_mm) &&
+                     isfinite(result.force_sd_N));
+    bool valid = result.flags & CONTACT_FLAG_FIT_VALID;
+    TEST_ASSERT_TRUE(valid || result.flags == CONTACT_FLAG_LOW_SIGNAL);
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(a_rectangle_is_recognised_in_any_order);
+  RUN_TEST(what_is_no_rectangle_is_not);
+  RUN_TEST(the_tables_are_those_of_the_library);
+  RUN_TEST(both_kernels_agree);
+  RUN_TEST(scaling_the_readings_scales_the_pressures_alone);
+  RUN_TEST(more_iterations_come_nearer);
+  RUN_TEST(a_fit_that_still_moves_says_so);
+  RUN_TEST(a_prior_pulls_sigma_alike_in_both);
+  RUN_TEST(warnings_are_given);
+  RUN_TEST(any_bits_give_finite_results);
+  return UNITY_END();
+}
