@@ -7,6 +7,7 @@
 void slip_reset(struct slip_history *history) {
   history->oldest = 0;
   history->count = 0;
+  history->spans = false;
   history->x_sum = 0;
   history->y_sum = 0;
 }
@@ -40,8 +41,10 @@ bool slip_update(struct slip_history *history, uint64_t t_us, float x_mm, float 
     while (history->count > 1 && t_us - history->t_us[history->oldest] > reach_us) {
       drop_oldest(history);
     }
-    full = history->count == SLIP_CAPACITY ||
-           t_us - history->t_us[history->oldest] + interval_us > reach_us;
+    /* Once filled, only a pause empties the window: a single longer interval does not. */
+    history->spans = (history->spans && history->count > 1) || history->count == SLIP_CAPACITY ||
+                     t_us - history->t_us[history->oldest] + interval_us > reach_us;
+    full = history->spans;
   }
   if (full) {
     float n = (float)history->count;

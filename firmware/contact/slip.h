@@ -25,6 +25,7 @@ struct slip_history {
   uint64_t t_us[SLIP_CAPACITY];
   int32_t x_16th_um[SLIP_CAPACITY], y_16th_um[SLIP_CAPACITY];
   uint16_t oldest, count; /* ring */
+  bool spans;             /* the window has been filled since the last reset or pause */
   int32_t x_sum, y_sum;   /* over the ring */
 };
 

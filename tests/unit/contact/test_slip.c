@@ -178,6 +178,23 @@ static void test_farthest_positions(void) {
   TEST_ASSERT_FLOAT_WITHIN(1e-2f, 2262.742f, distance_mm);
 }
 
+/* A temperature conversion takes the place of a frame every 64: the interval doubles once. */
+static void test_a_missing_frame_does_not_void_the_window(void) {
+  uint64_t t_us = 0;
+  int full_frames = 0;
+  for (int i = 0; i < 400; i++) {
+    t_us += i % 64 == 63 ? 11600 : 5800;
+    float distance_mm = 0.0f;
+    bool full = slip_update(&history, t_us, 40e-6f * (float)t_us, 0.0f, WINDOW_us, &distance_mm);
+    TEST_ASSERT_TRUE(full || i < 17);
+    if (full && full_frames++ > 20) {
+      /* v (window + interval) / 2, with either interval */
+      TEST_ASSERT_FLOAT_WITHIN(0.25f, 40e-3f * (100.0f + 8.7f) / 2.0f, distance_mm);
+    }
+  }
+  TEST_ASSERT_GREATER_THAN_INT(380, full_frames);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_twenty_hertz_is_the_papers_metric);
@@ -189,5 +206,6 @@ int main(void) {
   RUN_TEST(test_pause);
   RUN_TEST(test_sums_stay_exact);
   RUN_TEST(test_farthest_positions);
+  RUN_TEST(test_a_missing_frame_does_not_void_the_window);
   return UNITY_END();
 }
