@@ -55,6 +55,9 @@ void condition_frame(struct condition *condition, const struct frame *frame,
   uint32_t readable = frame->valid & ~frame->saturated;
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
     uint32_t bit = UINT32_C(1) << k;
+    if (frame->renewed & bit) {
+      begin_tare(condition, k);
+    }
     if (!(readable & bit)) {
       continue;
     }

@@ -1,11 +1,11 @@
 /* From absolute readings to pressure on the pad: tare, and the gate that says whether anything
  * touches it at all.
  *
- * The zero of each sensor is the mean of its first CONDITION_TARE_FRAMES readings after start or
- * after a tare, the smallest and the largest left out. Then it follows the readings slowly while
- * nothing touches the pad (time constant CONDITION_TRACK_FRAMES frames): barometers drift by some
- * 150 Pa in a quarter of an hour, and the paper sets its readings to zero between contacts
- * (section IV.A).
+ * The zero of each sensor is the mean of its first CONDITION_TARE_FRAMES readings after start,
+ * after a tare, or after another sensor took its place, the smallest and the largest left out. Then
+ * it follows the readings slowly while nothing touches the pad (time constant
+ * CONDITION_TRACK_FRAMES frames): barometers drift by some 150 Pa in a quarter of an hour, and the
+ * paper sets its readings to zero between contacts (section IV.A).
  *
  * A reading more than CONDITION_OPEN_SIGMA below zero while nothing touches the pad is no drift: a
  * disturbed reading, or a zero taken under a press. It does not move the zero and ends .tared while
@@ -29,8 +29,8 @@
 #define CONDITION_CLOSE_SIGMA 12
 
 struct condition {
-  int64_t zero_sum[FT_MAX_SENSORS];    /* while taring: sum of the readings, 1/1024 Pa */
-  int32_t zero_min[FT_MAX_SENSORS];    /* while taring: the smallest and the largest */
+  int64_t zero_sum[FT_MAX_SENSORS]; /* while taring: sum of the readings, 1/1024 Pa */
+  int32_t zero_min[FT_MAX_SENSORS]; /* while taring: the smallest and the largest */
   int32_t zero_max[FT_MAX_SENSORS];
   int32_t zero_Pa_q10[FT_MAX_SENSORS]; /* [sensor] the tare */
   int32_t

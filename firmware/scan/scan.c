@@ -100,9 +100,12 @@ static void begin_admission(struct scan *scan, uint64_t now_us) {
   enter(scan, SCAN_RESET);
 }
 
+/* Another PROM is another sensor: nothing that was known of this one holds. */
 static void store_prom(struct scan *scan, uint8_t k) {
-  scan->prom[k] = scan->prom_read[k];
-  scan->prom_changed |= UINT32_C(1) << k;
+  if (memcmp(&scan->prom[k], &scan->prom_read[k], sizeof scan->prom[k]) != 0) {
+    scan->prom[k] = scan->prom_read[k];
+    scan->prom_changed |= UINT32_C(1) << k;
+  }
 }
 
 /* Judges one complete reading of all PROMs. What is good is kept; what is not is read again, and
@@ -419,6 +422,7 @@ uint64_t scan_step(struct scan *scan, uint64_t now_us) {
 
 static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
   scan->has_thermal &= ~slot->prom_changed;
+  scan->renewed |= slot->prom_changed;
   for (uint8_t k = 0; k < scan->sensor_count; k++) {
     uint32_t bit = UINT32_C(1) << k;
     if (!(slot->good & bit)) {
@@ -451,6 +455,8 @@ static void fill_frame(struct scan *scan, const struct scan_slot *slot, struct f
   frame->t_read_us = slot->t_read_us;
   frame->sensor_count = scan->sensor_count;
   frame->noise_Pa_q10 = slot->noise_Pa_q10;
+  frame->renewed = scan->renewed;
+  scan->renewed = 0;
   int32_t temperature_sum_cC = 0;
   int32_t temperatures = 0;
   for (uint8_t k = 0; k < scan->sensor_count; k++) {

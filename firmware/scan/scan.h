@@ -68,7 +68,7 @@ struct scan_slot {
   uint32_t number;
   uint64_t t_us, t_begin_us, t_converted_us, t_read_us;
   uint32_t good;                 /* bitmap: the code is a measurement */
-  uint32_t prom_changed;         /* bitmap: what was known of the sensor no longer holds */
+  uint32_t prom_changed;         /* bitmap: another sensor than before */
   uint32_t code[FT_MAX_SENSORS]; /* [sensor] 24-bit */
 };
 
@@ -98,7 +98,7 @@ struct scan {
   uint32_t void_next;     /* bitmap: the next reading does not count */
   uint32_t prom_answered; /* bitmap: every word of this pass */
   uint32_t prom_good;     /* bitmap: in some pass of this admission */
-  uint32_t prom_changed;  /* bitmap: stored anew in this admission */
+  uint32_t prom_changed;  /* bitmap: another PROM than before this admission */
   uint8_t prom_word, prom_pass;
   struct array_bus_result result;
   struct ms5840_prom prom_read[FT_MAX_SENSORS];
@@ -119,6 +119,7 @@ struct scan {
   /* Main context only. */
   struct ms5840_thermal thermal[FT_MAX_SENSORS];
   uint32_t has_thermal; /* bitmap */
+  uint32_t renewed;     /* bitmap: another sensor since the last frame */
   uint32_t doubted;     /* bitmap: the last temperature jumped and was not used */
 };
 

@@ -261,6 +261,23 @@ static void test_random_frames(void) {
   }
 }
 
+/* A sensor that took another's place has another zero; the others keep theirs. */
+static void test_another_sensor_is_tared_anew(void) {
+  run(CONDITION_TARE_FRAMES + 1);
+  TEST_ASSERT_TRUE(conditioned.tared);
+  frame.pressure_Pa_q10[4] += 300 * 1024;
+  frame.renewed = 1u << 4;
+  run(1);
+  frame.renewed = 0;
+  TEST_ASSERT_FALSE(conditioned.tared);
+  TEST_ASSERT_FALSE(conditioned.contact);
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << 4), conditioned.usable);
+  run(CONDITION_TARE_FRAMES);
+  TEST_ASSERT_TRUE(conditioned.tared);
+  TEST_ASSERT_FALSE(conditioned.contact);
+  TEST_ASSERT_EQUAL_INT32(0, conditioned.pressure_Pa_q10[4]);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_tare_is_the_mean_without_the_extremes);
@@ -274,5 +291,6 @@ int main(void) {
   RUN_TEST(test_tare_during_contact);
   RUN_TEST(test_extremes);
   RUN_TEST(test_random_frames);
+  RUN_TEST(test_another_sensor_is_tared_anew);
   return UNITY_END();
 }

@@ -478,6 +478,7 @@ static void test_replaced_sensor_waits_for_its_own_temperature(void) {
   for (int i = 0; i < 8; i++) {
     next_frame();
     assert_good_frame(ALL & ~DISTURBED_BIT);
+    TEST_ASSERT_EQUAL_HEX32(i == 0 ? DISTURBED_BIT : 0, frame.renewed);
   }
   next_frame();
   assert_good_frame(ALL);
