@@ -51,8 +51,8 @@ static int32_t clamped_difference(int32_t a, int32_t b) {
 void condition_frame(struct condition *condition, const struct frame *frame,
                      struct conditioned *conditioned) {
   memset(conditioned, 0, sizeof *conditioned);
-  conditioned->tared = true;
   uint32_t readable = frame->valid & ~frame->saturated;
+  conditioned->tared = readable != 0;
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
     uint32_t bit = UINT32_C(1) << k;
     if (frame->renewed & bit) {

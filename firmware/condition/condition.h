@@ -41,10 +41,10 @@ struct condition {
 };
 
 struct conditioned {
-  uint32_t usable;                         /* bitmap: tared, valid and not saturated */
-  bool tared;                              /* every valid sensor is, and none is far below */
-  bool contact;                            /* the gate */
-  int32_t peak_Pa_q10;                     /* strongest usable reading; 0 when none */
+  uint32_t usable;     /* bitmap: tared, valid and not saturated */
+  bool tared;          /* every valid sensor is, there is one, and none is far below */
+  bool contact;        /* the gate */
+  int32_t peak_Pa_q10; /* strongest usable reading; 0 when none */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* [sensor] above the tare, 1/1024 Pa; 0 if not usable */
 };
 
