@@ -7,6 +7,7 @@ usage: check_image.py IMAGE.elf [--bin IMAGE.bin] [--json FILE]
 Prints the sizes; --json writes them. Exit 1 and one line for the first thing that is wrong.
 """
 import argparse
+import binascii
 import json
 import re
 import struct
@@ -40,12 +41,9 @@ FORBIDDEN = {
 
 
 def crc32_mpeg2(data):
-    crc = 0xFFFFFFFF
-    for byte in data:
-        crc ^= byte << 24
-        for _ in range(8):
-            crc = (crc << 1 ^ (0x04C11DB7 if crc & 0x80000000 else 0)) & 0xFFFFFFFF
-    return crc
+    """The reflected CRC-32 of binascii over mirrored bytes, mirrored back: shares no code with boot2_checksum.py."""
+    mirrored = bytes(int(f"{byte:08b}"[::-1], 2) for byte in data)
+    return int(f"{binascii.crc32(mirrored) ^ 0xFFFFFFFF:032b}"[::-1], 2)
 
 
 def check_boot2(elf):
