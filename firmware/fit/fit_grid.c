@@ -1,26 +1,12 @@
-#include "common/bytes.h"
 #include "common/contact_flags.h"
 #include "fit/fit.h"
 #include "fit/fit_fixed.h"
+#include "fit/fit_grid_parts.h"
 #include "fit/fit_limits.h"
-#include "fit/fit_tables.h"
 
 #include <stdbool.h>
 #include <string.h>
 
-#define COLUMNS FIT_GRID_COLUMNS
-#define ROWS FIT_GRID_ROWS
-#define NODES (COLUMNS * ROWS)
-#define MAX_NODES (COLUMNS > ROWS ? COLUMNS : ROWS)
-#define ONE_Q26 (1 << 26)
-#define NOINLINE __attribute__((noinline))
-
-/* Exponent of the Gaussian: g = 2^(-height (k - centre)^2), height = log2(e) / (2 sigma^2). */
-#define HEIGHT_MIN_Q26 1936353                      /* sigma 5 pitches */
-#define HEIGHT_MAX_Q26 (16 * ONE_Q26 - ONE_Q26 / 2) /* sigma 0.2157 pitch */
-#define LOG2E_HALF_Q26 48408813
-
-#define LOG2E_HALF ((struct scaled){23637, -15})
 #define TWO_OVER_LOG2E ((struct scaled){22713, -14})
 
 #define AMPLITUDE_MIN_Q28 13421773        /* 0.05 */
@@ -45,32 +31,6 @@
 #define FLAT_HEIGHT_Q26 2016200                           /* sigma 4.9 pitches */
 #define PEAK_RISE_MAX_Q22 (20 << 22)                      /* a factor of a million */
 
-/* The pressures of one frame in grid order [column][row], the largest from 0.5 to 1. */
-struct readings {
-  int32_t q28[NODES], q14[NODES];
-  int32_t shift;                           /* Q28 = 1/1024 Pa times 2^shift */
-  int32_t largest;                         /* 1/1024 Pa */
-  struct scaled prior_sigma, prior_weight; /* pitches, per pitch; weight 0: none */
-};
-
-struct state {
-  int32_t x, y;   /* Q26, pitches from the grid's origin node */
-  int32_t height; /* Q26 */
-};
-
-/* One axis of the separable Gaussian and the polynomials that are orthogonal under its square. */
-struct axis {
-  int32_t g[MAX_NODES];      /* Q30, 1 at the nearest node */
-  int32_t linear[MAX_NODES]; /* g (k - mean), |.| < 2^15, value = integer * 2^-linear_q */
-  int32_t square[MAX_NODES]; /* g (k^2 - k slope + constant), likewise */
-  int32_t linear_q, square_q;
-  /* Sums of squares of the three: the nearest node's 1 and the block normalisation keep them within
-   * a few bits of 2^28. */
-  int32_t mass_q26, linear_norm, square_norm; /* the latter two * 2^(2 - 2 q) */
-  int32_t mean, slope, constant;              /* Q26 */
-  int32_t offset;                             /* Q26, of the centre from the nearest node */
-};
-
 /* What one evaluation of the model leaves: the normal equations in the orthogonal basis
  *   e, e p1(x), e q1(y), e (p2(x) + q2(y))
  * which spans what the derivatives of the model span. Their matrix is diagonal. */
@@ -83,55 +43,6 @@ struct moments {
   struct scaled stiffness;      /* amplitude / sigma^2 */
   int32_t move_x_q22, move_y_q22, ratio_q28; /* the step taken */
 };
-
-/* 2^-z, z in Q22, result Q30; relative error below 2^-26. */
-FIXED_INLINE int32_t exp2_negative(int32_t z_q22) {
-  int32_t whole = z_q22 >> 22;
-  if (whole > 29) {
-    return 0;
-  }
-  int32_t head = fit_exp2_table[(z_q22 >> 14) & 255];
-  int32_t rest = z_q22 & 0x3FFF;
-  int32_t minus = rest * (45426 - ((rest * 15743) >> 22)); /* 1 - 2^-rest, Q38 */
-  return (head - (fixed_mul_q32(head, minus) >> 6)) >> whole;
-}
-
-FIXED_INLINE void gaussian(struct axis *axis, int nodes, int origin, int32_t centre,
-                           int32_t height) {
-  int32_t nearest = fixed_clamp((centre + (ONE_Q26 >> 1)) >> 26, -origin, nodes - 1 - origin);
-  axis->offset = centre - nearest * ONE_Q26;
-  int32_t slope_q22 = fixed_mul_q32(height, axis->offset * 8);
-  int32_t curvature_q22 = height >> 4;
-  for (int i = 0; i < nodes; i++) {
-    int32_t k = i - origin - nearest;
-    /* An exact quadratic in k: rounding of its two coefficients only moves centre and width. */
-    int32_t rise = curvature_q22 * k - slope_q22;
-    if (nodes > 5) { /* five nodes stay within 32 bits by themselves */
-      rise = fixed_clamp(rise, -INT32_MAX / 5, INT32_MAX / 5);
-    }
-    int32_t z = k * rise;
-    axis->g[i] = exp2_negative(z < 0 ? 0 : z);
-  }
-}
-
-/* Brings the vector to |.| < 2^15, as near below as a common power of two allows; returns it. */
-FIXED_INLINE int32_t block_normalise(const int32_t *from, int32_t *to, int count) {
-  uint32_t size = 1;
-  for (int i = 0; i < count; i++) {
-    size |= fixed_size(from[i]);
-  }
-  int32_t shift = fixed_bits(size) - 15;
-  if (shift >= 0) {
-    for (int i = 0; i < count; i++) {
-      to[i] = from[i] >> shift;
-    }
-  } else {
-    for (int i = 0; i < count; i++) {
-      to[i] = from[i] * (1 << -shift);
-    }
-  }
-  return -shift;
-}
 
 /* Monic polynomials of degree 1 and 2 in the node number, orthogonal under g^2 to each other and to
  * 1. Their values come from additions, so they stay accurate where they nearly vanish. */
@@ -350,15 +261,6 @@ FIXED_INLINE void evaluate(const struct state *state, const struct readings *rea
   }
 }
 
-/* log2(v / 2^14) in Q15, v = 1 .. 2^14; error below 2^-11. */
-FIXED_INLINE int32_t log2_q15(int32_t value) {
-  int32_t whole = fixed_bits((uint32_t)value) - 1;
-  int32_t position = value * (1 << (22 - whole)); /* 2^22 .. 2^23 */
-  int32_t index = (position >> 16) & 63;
-  int32_t low = fit_log2_table[index], high = fit_log2_table[index + 1];
-  return (whole - 14) * (1 << 15) + low + (((high - low) * (position & 0xFFFF)) >> 16);
-}
-
 /* First guess, every sensor there: the marginals weighted by the row and the column of the largest
  * reading are the two factors of the Gaussian, and the logarithm of each a parabola. */
 FIXED_INLINE void guess_axis(struct axis *axis, const int32_t *marginal, int nodes, int origin,
@@ -438,50 +340,6 @@ static void guess(const struct fit_grid_shape *grid, const struct readings *read
   set_guess(grid, m, c1, c2, height, state);
 }
 
-/* mantissa * 2^exponent, rounded to nearest, as a float; what is too large becomes FIT_HUGE. */
-static float compose(int32_t mantissa, int32_t exponent) {
-  if (mantissa == 0) {
-    return 0.0f;
-  }
-  uint32_t sign = mantissa < 0 ? UINT32_C(1) << 31 : 0;
-  uint32_t size = mantissa < 0 ? 0u - (uint32_t)mantissa : (uint32_t)mantissa;
-  int32_t bits = fixed_bits(size);
-  if (bits > 24) {
-    int32_t shift = bits - 24;
-    size = (size + (UINT32_C(1) << (shift - 1))) >> shift;
-  } else {
-    size <<= 24 - bits;
-  }
-  int32_t biased = exponent + bits - 1 + 127;
-  if (biased <= 0) {
-    return 0.0f;
-  }
-  if (biased >= 156) { /* 2^29: more than any result can mean */
-    return sign ? -FIT_HUGE : FIT_HUGE;
-  }
-  uint32_t word = sign | (((uint32_t)biased << 23) + size - (UINT32_C(1) << 23));
-  float value;
-  memcpy(&value, &word, sizeof value);
-  return value;
-}
-
-/* value >= 0 and finite. */
-static struct scaled scaled_from_float(float value) {
-  uint32_t bits = bytes_from_f32(value);
-  if (bits >> 23 == 0) {
-    return (struct scaled){0, 0};
-  }
-  return scaled_from((int32_t)((bits & 0x7FFFFFu) | 0x800000u), (int32_t)(bits >> 23) - 150);
-}
-
-/* sigma in Q26 pitches: one Newton step of sigma = (log2(e) / 2) / (height sigma) from 15 bits. */
-FIXED_INLINE int32_t sigma_of(int32_t height) {
-  struct scaled rough = scaled_sqrt(scaled_div(LOG2E_HALF, scaled_from(height, -26)));
-  int32_t sigma = scaled_to_fixed(rough, 26);
-  int32_t other = fixed_div_q26(LOG2E_HALF_Q26, fixed_mul_q26(height, sigma));
-  return (sigma + other) >> 1;
-}
-
 /* p2(x) + q2(y) at the centre, Q25: how a change along the third basis function lifts the peak. */
 FIXED_INLINE int32_t bend_q25(const struct state *before, const struct moments *m) {
   int32_t x = fixed_mul_q26(before->x, before->x - m->x.slope) + m->x.constant;
@@ -538,17 +396,17 @@ static NOINLINE void conclude(const struct fit_grid_shape *grid, const struct re
                               struct fit_result *result) {
   int32_t peak_exponent;
   int32_t peak = peak_of(readings, before, m, &peak_exponent);
-  int32_t sigma = sigma_of(state->height);
+  int32_t sigma = fit_grid_sigma(state->height);
   int32_t up = 30 - fixed_bits((uint32_t)sigma);
   int32_t sigma_square = fixed_mul_q30(sigma * (1 << up), sigma * (1 << up));
   int32_t force = fixed_mul_q30(fixed_mul_q30(peak, sigma_square), grid->force_scale);
   result->x_mm =
-      compose(fixed_mul_q32(state->x, grid->pitch) + grid->x_origin, grid->pitch_exponent);
+      fit_grid_compose(fixed_mul_q32(state->x, grid->pitch) + grid->x_origin, grid->pitch_exponent);
   result->y_mm =
-      compose(fixed_mul_q32(state->y, grid->pitch) + grid->y_origin, grid->pitch_exponent);
-  result->sigma_mm = compose(fixed_mul_q32(sigma, grid->pitch), grid->pitch_exponent);
-  result->p0_Pa = compose(peak, peak_exponent);
-  result->force_N = compose(force, peak_exponent + 38 - 2 * up + grid->force_exponent);
+      fit_grid_compose(fixed_mul_q32(state->y, grid->pitch) + grid->y_origin, grid->pitch_exponent);
+  result->sigma_mm = fit_grid_compose(fixed_mul_q32(sigma, grid->pitch), grid->pitch_exponent);
+  result->p0_Pa = fit_grid_compose(peak, peak_exponent);
+  result->force_N = fit_grid_compose(force, peak_exponent + 38 - 2 * up + grid->force_exponent);
 
   /* Standard deviation of one reading: the residuals', at least the noise. In units of Q28. */
   struct scaled square_sum = scaled_from(m->residual_squares, -23 - 2 * m->residual_shift);
@@ -562,7 +420,7 @@ static NOINLINE void conclude(const struct fit_grid_shape *grid, const struct re
     variance = noise_variance;
   }
   struct scaled rms = scaled_sqrt(scaled_div(square_sum, scaled_from(NODES, 0)));
-  result->residual_rms_Pa = compose(rms.mantissa, rms.exponent + 18 - readings->shift);
+  result->residual_rms_Pa = fit_grid_compose(rms.mantissa, rms.exponent + 18 - readings->shift);
 
   const struct scaled zero = {0, 0}, one = {1 << 14, -14};
   struct scaled slope_x = scaled_from(2 * before->x - m->x.slope, -26);
@@ -571,7 +429,7 @@ static NOINLINE void conclude(const struct fit_grid_shape *grid, const struct re
       scaled_add(inverse_form(m, one, zero, slope_x), inverse_form(m, zero, one, slope_y));
   struct scaled location_sd = scaled_div(scaled_sqrt(scaled_mul(variance, location)), m->stiffness);
   location_sd = scaled_mul(location_sd, scaled_from(grid->pitch, grid->pitch_exponent - 6));
-  result->location_sd_mm = compose(location_sd.mantissa, location_sd.exponent);
+  result->location_sd_mm = fit_grid_compose(location_sd.mantissa, location_sd.exponent);
 
   /* dF / F = dp0 / p0 + 2 dsigma / sigma, each by its part in the basis; the mean of the model adds
    * one over its mass. */
@@ -585,7 +443,7 @@ static NOINLINE void conclude(const struct fit_grid_shape *grid, const struct re
   struct scaled force_rough =
       scaled_from(force, peak_exponent + 38 - 2 * up + grid->force_exponent);
   force_sd = scaled_mul(force_sd, force_rough);
-  result->force_sd_N = compose(force_sd.mantissa, force_sd.exponent);
+  result->force_sd_N = fit_grid_compose(force_sd.mantissa, force_sd.exponent);
 
   uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
   if (settings->noise_Pa_q10 > readings->largest / FIT_LOW_SIGNAL_SIGMA) {
@@ -625,48 +483,13 @@ static NOINLINE void evaluate_fine(const struct state *state, const struct readi
   evaluate(state, readings, m, true);
 }
 
-/* Readings in grid order, scaled by a power of two. False: nothing positive. */
-static bool take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                          const struct fit_settings *settings, struct readings *readings) {
-  const uint8_t *sensor = array->grid.sensor;
-  int32_t largest = 0;
-  for (int k = 0; k < NODES; k++) {
-    int32_t value = pressure_Pa_q10[sensor[k]];
-    largest = value > largest ? value : largest;
-  }
-  if (largest <= 0) {
-    return false;
-  }
-  int32_t shift = 28 - fixed_bits((uint32_t)largest);
-  int32_t up = shift >= 0 ? 1 << shift : 1;
-  int32_t down = shift >= 0 ? 0 : -shift;
-  readings->largest = largest;
-  readings->shift = shift;
-  for (int k = 0; k < NODES; k++) {
-    int32_t value = pressure_Pa_q10[sensor[k]];
-    value = value < -largest ? -largest : value;
-    value = (value >> down) * up;
-    readings->q28[k] = value;
-    readings->q14[k] = value >> 14;
-  }
-  readings->prior_sigma = readings->prior_weight = (struct scaled){0, 0};
-  if (settings->prior_width_mm > 0.0f) {
-    float width = settings->prior_width_mm / array->pitch_mm;
-    int32_t largest_q28 = (largest >> down) * up;
-    readings->prior_sigma = scaled_from_float(settings->prior_sigma_mm / array->pitch_mm);
-    readings->prior_weight =
-        scaled_mul(scaled_from_float(FIT_PRIOR_WEIGHT / width), scaled_from(largest_q28, -28));
-  }
-  return true;
-}
-
 void fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
               const struct fit_settings *settings, struct fit_result *result) {
   struct readings readings;
   struct moments m;
   struct state state, before;
   memset(result, 0, sizeof *result);
-  if (!take_readings(array, pressure_Pa_q10, settings, &readings)) {
+  if (!fit_grid_take_readings(array, pressure_Pa_q10, settings, &readings)) {
     result->flags = CONTACT_FLAG_LOW_SIGNAL;
     return;
   }

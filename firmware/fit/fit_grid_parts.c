@@ -1,0 +1,83 @@
+#include "fit/fit_grid_parts.h"
+
+#include "common/bytes.h"
+#include "fit/fit_limits.h"
+
+#include <string.h>
+
+float fit_grid_compose(int32_t mantissa, int32_t exponent) {
+  if (mantissa == 0) {
+    return 0.0f;
+  }
+  uint32_t sign = mantissa < 0 ? UINT32_C(1) << 31 : 0;
+  uint32_t size = mantissa < 0 ? 0u - (uint32_t)mantissa : (uint32_t)mantissa;
+  int32_t bits = fixed_bits(size);
+  if (bits > 24) {
+    int32_t shift = bits - 24;
+    size = (size + (UINT32_C(1) << (shift - 1))) >> shift;
+  } else {
+    size <<= 24 - bits;
+  }
+  int32_t biased = exponent + bits - 1 + 127;
+  if (biased <= 0) {
+    return 0.0f;
+  }
+  if (biased >= 156) { /* 2^29: more than any result can mean */
+    return sign ? -FIT_HUGE : FIT_HUGE;
+  }
+  uint32_t word = sign | (((uint32_t)biased << 23) + size - (UINT32_C(1) << 23));
+  float value;
+  memcpy(&value, &word, sizeof value);
+  return value;
+}
+
+/* value >= 0 and finite. */
+static struct scaled scaled_from_float(float value) {
+  uint32_t bits = bytes_from_f32(value);
+  if (bits >> 23 == 0) {
+    return (struct scaled){0, 0};
+  }
+  return scaled_from((int32_t)((bits & 0x7FFFFFu) | 0x800000u), (int32_t)(bits >> 23) - 150);
+}
+
+/* One Newton step of sigma = (log2(e) / 2) / (height sigma) from 15 bits. */
+int32_t fit_grid_sigma(int32_t height) {
+  struct scaled rough = scaled_sqrt(scaled_div(LOG2E_HALF, scaled_from(height, -26)));
+  int32_t sigma = scaled_to_fixed(rough, 26);
+  int32_t other = fixed_div_q26(LOG2E_HALF_Q26, fixed_mul_q26(height, sigma));
+  return (sigma + other) >> 1;
+}
+
+bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                            const struct fit_settings *settings, struct readings *readings) {
+  const uint8_t *sensor = array->grid.sensor;
+  int32_t largest = 0;
+  for (int k = 0; k < NODES; k++) {
+    int32_t value = pressure_Pa_q10[sensor[k]];
+    largest = value > largest ? value : largest;
+  }
+  if (largest <= 0) {
+    return false;
+  }
+  int32_t shift = 28 - fixed_bits((uint32_t)largest);
+  int32_t up = shift >= 0 ? 1 << shift : 1;
+  int32_t down = shift >= 0 ? 0 : -shift;
+  readings->largest = largest;
+  readings->shift = shift;
+  for (int k = 0; k < NODES; k++) {
+    int32_t value = pressure_Pa_q10[sensor[k]];
+    value = value < -largest ? -largest : value;
+    value = (value >> down) * up;
+    readings->q28[k] = value;
+    readings->q14[k] = value >> 14;
+  }
+  readings->prior_sigma = readings->prior_weight = (struct scaled){0, 0};
+  if (settings->prior_width_mm > 0.0f) {
+    float width = settings->prior_width_mm / array->pitch_mm;
+    int32_t largest_q28 = (largest >> down) * up;
+    readings->prior_sigma = scaled_from_float(settings->prior_sigma_mm / array->pitch_mm);
+    readings->prior_weight =
+        scaled_mul(scaled_from_float(FIT_PRIOR_WEIGHT / width), scaled_from(largest_q28, -28));
+  }
+  return true;
+}

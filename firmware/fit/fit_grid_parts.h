@@ -1,0 +1,122 @@
+/* Inside the fixed-point kernels alone: what they share. Pitches are the unit of length, readings
+ * have the grid's order [column][row], node numbers count from node (COLUMNS / 2, ROWS / 2).
+ */
+#ifndef FIT_FIT_GRID_PARTS_H
+#define FIT_FIT_GRID_PARTS_H
+
+#include "fit/fit.h"
+#include "fit/fit_fixed.h"
+#include "fit/fit_tables.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define COLUMNS FIT_GRID_COLUMNS
+#define ROWS FIT_GRID_ROWS
+#define NODES (COLUMNS * ROWS)
+#define MAX_NODES (COLUMNS > ROWS ? COLUMNS : ROWS)
+#define ONE_Q26 (1 << 26)
+#define NOINLINE __attribute__((noinline))
+
+/* Exponent of the Gaussian: g = 2^(-height (k - centre)^2), height = log2(e) / (2 sigma^2). */
+#define HEIGHT_MIN_Q26 1936353                      /* sigma 5 pitches */
+#define HEIGHT_MAX_Q26 (16 * ONE_Q26 - ONE_Q26 / 2) /* sigma 0.2157 pitch */
+#define LOG2E_HALF_Q26 48408813
+
+#define LOG2E_HALF ((struct scaled){23637, -15})
+
+/* The pressures of one frame in grid order [column][row], the largest from 0.5 to 1. */
+struct readings {
+  int32_t q28[NODES], q14[NODES];
+  int32_t shift;                           /* Q28 = 1/1024 Pa times 2^shift */
+  int32_t largest;                         /* 1/1024 Pa */
+  struct scaled prior_sigma, prior_weight; /* pitches, per pitch; weight 0: none */
+};
+
+struct state {
+  int32_t x, y;   /* Q26, pitches from the grid's origin node */
+  int32_t height; /* Q26 */
+};
+
+/* One axis of the separable Gaussian and the polynomials that are orthogonal under its square. */
+struct axis {
+  int32_t g[MAX_NODES];      /* Q30, 1 at the nearest node */
+  int32_t linear[MAX_NODES]; /* g (k - mean), |.| < 2^15, value = integer * 2^-linear_q */
+  int32_t square[MAX_NODES]; /* g (k^2 - k slope + constant), likewise */
+  int32_t linear_q, square_q;
+  /* Sums of squares of the three: the nearest node's 1 and the block normalisation keep them within
+   * a few bits of 2^28. */
+  int32_t mass_q26, linear_norm, square_norm; /* the latter two * 2^(2 - 2 q) */
+  int32_t mean, slope, constant;              /* Q26 */
+  int32_t offset;                             /* Q26, of the centre from the nearest node */
+};
+
+/* 2^-z, z in Q22, result Q30; relative error below 2^-26. */
+FIXED_INLINE int32_t exp2_negative(int32_t z_q22) {
+  int32_t whole = z_q22 >> 22;
+  if (whole > 29) {
+    return 0;
+  }
+  int32_t head = fit_exp2_table[(z_q22 >> 14) & 255];
+  int32_t rest = z_q22 & 0x3FFF;
+  int32_t minus = rest * (45426 - ((rest * 15743) >> 22)); /* 1 - 2^-rest, Q38 */
+  return (head - (fixed_mul_q32(head, minus) >> 6)) >> whole;
+}
+
+FIXED_INLINE void gaussian(struct axis *axis, int nodes, int origin, int32_t centre,
+                           int32_t height) {
+  int32_t nearest = fixed_clamp((centre + (ONE_Q26 >> 1)) >> 26, -origin, nodes - 1 - origin);
+  axis->offset = centre - nearest * ONE_Q26;
+  int32_t slope_q22 = fixed_mul_q32(height, axis->offset * 8);
+  int32_t curvature_q22 = height >> 4;
+  for (int i = 0; i < nodes; i++) {
+    int32_t k = i - origin - nearest;
+    /* An exact quadratic in k: rounding of its two coefficients only moves centre and width. */
+    int32_t rise = curvature_q22 * k - slope_q22;
+    if (nodes > 5) { /* five nodes stay within 32 bits by themselves */
+      rise = fixed_clamp(rise, -INT32_MAX / 5, INT32_MAX / 5);
+    }
+    int32_t z = k * rise;
+    axis->g[i] = exp2_negative(z < 0 ? 0 : z);
+  }
+}
+
+/* Brings the vector to |.| < 2^15, as near below as a common power of two allows; returns it. */
+FIXED_INLINE int32_t block_normalise(const int32_t *from, int32_t *to, int count) {
+  uint32_t size = 1;
+  for (int i = 0; i < count; i++) {
+    size |= fixed_size(from[i]);
+  }
+  int32_t shift = fixed_bits(size) - 15;
+  if (shift >= 0) {
+    for (int i = 0; i < count; i++) {
+      to[i] = from[i] >> shift;
+    }
+  } else {
+    for (int i = 0; i < count; i++) {
+      to[i] = from[i] * (1 << -shift);
+    }
+  }
+  return -shift;
+}
+
+/* log2(v / 2^14) in Q15, v = 1 .. 2^14; error below 2^-11. */
+FIXED_INLINE int32_t log2_q15(int32_t value) {
+  int32_t whole = fixed_bits((uint32_t)value) - 1;
+  int32_t position = value * (1 << (22 - whole)); /* 2^22 .. 2^23 */
+  int32_t index = (position >> 16) & 63;
+  int32_t low = fit_log2_table[index], high = fit_log2_table[index + 1];
+  return (whole - 14) * (1 << 15) + low + (((high - low) * (position & 0xFFFF)) >> 16);
+}
+
+/* False: nothing positive. */
+bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                            const struct fit_settings *settings, struct readings *readings);
+
+/* mantissa * 2^exponent, rounded to nearest, as a float; what is too large becomes FIT_HUGE. */
+float fit_grid_compose(int32_t mantissa, int32_t exponent);
+
+/* sigma in Q26 pitches. */
+int32_t fit_grid_sigma(int32_t height);
+
+#endif
