@@ -19,5 +19,6 @@
 #define DEFAULT_SLIP_THRESHOLD_mm 0.75f
 
 #define DEFAULT_FIT_ITERATIONS FINGERTIP_FIT_ITERATIONS
+#define DEFAULT_FIT_N_LARGEST 0u /* all: the others only add accuracy */
 
 #endif

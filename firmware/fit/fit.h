@@ -31,6 +31,9 @@ struct fit_settings {
   uint8_t iterations;   /* 0 (the guess)..FIT_MAX_ITERATIONS; 7 brings 99.9 % of observable presses
                            within 1 um of the optimum */
   int32_t noise_Pa_q10; /* rms noise of a reading, 1/1024 Pa, at least 1 */
+  uint8_t n_largest;    /* fit the n largest readings only, of equal ones those of lower number, as
+                           the paper does; 0: all, which is more accurate. Fewer than four give no
+                           fit. Takes the general kernel. */
   /* Weak prior on sigma, for rubber so stiff that the array can hardly tell it: one more row
    * FIT_PRIOR_WEIGHT largest (sigma - prior_sigma) / prior_width. Width 0: none. */
   float prior_sigma_mm, prior_width_mm;

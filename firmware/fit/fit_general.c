@@ -241,6 +241,26 @@ static int32_t largest_reading(const struct fit_array *array, const int32_t *pre
   return largest;
 }
 
+/* Bitmap of the n largest readings in use; of equal ones, those of lower number. */
+static uint32_t n_largest_of(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                             uint32_t usable, uint8_t n) {
+  uint32_t chosen = 0;
+  for (uint8_t i = 0; i < n && usable; i++) {
+    uint32_t best = 0;
+    int32_t largest = INT32_MIN;
+    for (uint8_t k = 0; k < array->sensor_count; k++) {
+      uint32_t bit = UINT32_C(1) << k;
+      if ((usable & bit) && (best == 0 || pressure_Pa_q10[k] > largest)) {
+        largest = pressure_Pa_q10[k];
+        best = bit;
+      }
+    }
+    chosen |= best;
+    usable &= ~best;
+  }
+  return chosen;
+}
+
 void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                  const struct fit_settings *settings, struct fit_result *result) {
   memset(result, 0, sizeof *result);
@@ -253,6 +273,9 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   if (largest <= 0) {
     result->flags |= CONTACT_FLAG_LOW_SIGNAL;
     return;
+  }
+  if (settings->n_largest > 0) {
+    usable = n_largest_of(array, pressure_Pa_q10, usable, settings->n_largest);
   }
   float scale = 1.0f / (float)largest;
   struct samples samples;

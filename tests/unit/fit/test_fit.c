@@ -502,6 +502,51 @@ static void test_predicted_scatter(void) {
   }
 }
 
+/* The same fit as if the others did not read, but those are no masked sensors. */
+static void test_n_largest(void) {
+  struct random random = {94};
+  for (int i = 0; i < 5000; i++) {
+    struct press press = random_press(&random, 6.0);
+    read_press(&press, 5.0, &random);
+    for (int k = 0; k < SENSORS && i % 2; k++) {
+      readings[k] = (readings[k] >> 20) - 1; /* many equal ones */
+    }
+    uint32_t usable = i % 3 ? ALL : random_u32(&random) & ALL;
+    struct fit_settings settings = usual;
+    settings.n_largest = (uint8_t)(1 + random_below(&random, 20));
+    uint32_t expected = 0;
+    int32_t largest = 0;
+    for (int k = 0; k < SENSORS; k++) {
+      int before = 0;
+      for (int j = 0; j < SENSORS; j++) {
+        bool ahead = readings[j] > readings[k] || (readings[j] == readings[k] && j < k);
+        before += (usable >> j & 1u) && ahead;
+      }
+      bool in_use = usable >> k & 1u;
+      expected |= in_use && before < settings.n_largest ? UINT32_C(1) << k : 0;
+      largest = in_use && readings[k] > largest ? readings[k] : largest;
+    }
+    struct fit_result masked;
+    fit_general(&array, readings, expected, &usual, &masked);
+    fit_general(&array, readings, usable, &settings, &result);
+    assert_finite_and_defined();
+    bool enough = largest > 0 && __builtin_popcount(expected) >= 4;
+    TEST_ASSERT_EQUAL_HEX32(enough ? expected : 0, result.used);
+    TEST_ASSERT_EQUAL(usable != ALL, (result.flags & CONTACT_FLAG_SENSOR_MASKED) != 0);
+    masked.flags = result.flags =
+        (masked.flags ^ result.flags) & ~(uint32_t)CONTACT_FLAG_SENSOR_MASKED;
+    TEST_ASSERT_EQUAL_MEMORY(&masked, &result, sizeof masked);
+    TEST_ASSERT_EQUAL_HEX32(0, result.flags);
+
+    fit_general(&array, readings, ALL, &settings, &masked);
+    fit_gaussian(&array, readings, ALL, &settings, &result);
+    if (settings.n_largest >= SENSORS) {
+      fit_gaussian(&array, readings, ALL, &usual, &masked);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&masked, &result, sizeof masked);
+  }
+}
+
 static void test_random_bits(void) {
   struct random random = {91};
   for (int i = 0; i < 100000; i++) {
@@ -512,7 +557,8 @@ static void test_random_bits(void) {
     }
     uint32_t used = i % 3 ? random_u32(&random) : ALL;
     struct fit_settings settings = {.iterations = (uint8_t)(1 + random_below(&random, 20)),
-                                    .noise_Pa_q10 = 1 + (int32_t)random_below(&random, 100000)};
+                                    .noise_Pa_q10 = 1 + (int32_t)random_below(&random, 100000),
+                                    .n_largest = (uint8_t)(i % 5 ? 0 : random_below(&random, 17))};
     fit_gaussian(&array, readings, used, &settings, &result);
     assert_finite_and_defined();
   }
@@ -595,6 +641,7 @@ int main(void) {
   RUN_TEST(test_unsettled_fits_are_uncertain);
   RUN_TEST(test_stiff_cases_are_flagged);
   RUN_TEST(test_predicted_scatter);
+  RUN_TEST(test_n_largest);
   RUN_TEST(test_random_bits);
   RUN_TEST(test_any_layout);
   RUN_TEST(test_duplicate_and_collinear_positions);
