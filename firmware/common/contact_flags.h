@@ -18,7 +18,8 @@ enum contact_flag {
   /* Warnings */
   CONTACT_FLAG_LOW_SIGNAL = 1 << 8, /* peak below 20 noise standard deviations */
   CONTACT_FLAG_FLAT = 1 << 9,       /* pressure without a peak: no location */
-  CONTACT_FLAG_UNCERTAIN = 1 << 10, /* predicted location sd above 0.25 mm, or no convergence */
+  CONTACT_FLAG_UNCERTAIN = 1 << 10, /* location sd above what passes (0.12 to 0.5 mm), or no
+                                       convergence */
   CONTACT_FLAG_MODEL = 1 << 11,     /* residual too large for one Gaussian */
   CONTACT_FLAG_SATURATED = 1 << 12, /* a sensor is beyond its range; it was left out */
   CONTACT_FLAG_FORCE_LOWER_BOUND = 1

@@ -311,15 +311,16 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   struct normal_equations normal;
   struct parameters before;
   float squares;
-  float moved = 0.0f;
+  float moved;
   bool deficient;
   int left = settings->iterations;
   do {
     before = theta;
     squares = linearise(&samples, &theta, prior, &normal);
     deficient = factorise(&normal);
-    if (left > 0) {
-      moved = step(array, &normal, &theta);
+    moved = step(array, &normal, &theta);
+    if (left == 0) { /* the guess is asked for: the step only tells how good it is */
+      theta = before;
     }
     left--;
   } while (left > 0);
@@ -335,22 +336,33 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   result->force_N = TWO_PI * result->p0_Pa * sigma_mm * sigma_mm * 1e-6f;
   result->residual_rms_Pa = unit_Pa * sqrtf(squares / (float)samples.count);
 
-  /* Covariance at the last linearisation: sd of a reading from the residuals, at least the noise.
-   */
+  /* Covariance at the last linearisation: sd of a reading from the residuals, at least the noise;
+   * that of the prior is its own. */
   int freedom = samples.count > PARAMETERS ? samples.count - PARAMETERS : 1;
   float noise = (float)settings->noise_Pa_q10 * scale;
   float variance = squares / (float)freedom;
   if (variance < noise * noise) {
     variance = noise * noise;
   }
+  bool misfit = variance > (float)(FIT_MISFIT * FIT_MISFIT) * noise * noise;
   float gain = before.sigma * before.sigma / before.p0;
   float along_x[PARAMETERS] = {0.0f, 1.0f, 0.0f, 0.0f};
   float along_y[PARAMETERS] = {0.0f, 0.0f, 1.0f, 0.0f};
   float along_force[PARAMETERS] = {1.0f, 0.0f, 0.0f, 2.0f * before.sigma * before.sigma};
-  float location_form = inverse_form(&normal, along_x) + inverse_form(&normal, along_y);
-  result->location_sd_mm = at_most(pitch * gain * sqrtf(variance * location_form), FIT_HUGE);
-  float relative_sd = sqrtf(variance * inverse_form(&normal, along_force)) / before.p0;
-  result->force_sd_N = at_most(result->force_N * relative_sd, FIT_HUGE);
+  float force_along_sigma = along_force[3];
+  float location_variance =
+      variance * (inverse_form(&normal, along_x) + inverse_form(&normal, along_y));
+  float force_variance = variance * inverse_form(&normal, along_force);
+  float prior_excess = FIT_PRIOR_WEIGHT * FIT_PRIOR_WEIGHT - variance;
+  if (prior.weight > 0.0f && prior_excess > 0.0f) {
+    float answer[PARAMETERS] = {0.0f, 0.0f, 0.0f, prior.weight * before.sigma * gain};
+    solve(&normal, answer);
+    float force = answer[0] + force_along_sigma * answer[3];
+    location_variance += prior_excess * (answer[1] * answer[1] + answer[2] * answer[2]);
+    force_variance += prior_excess * force * force;
+  }
+  result->location_sd_mm = at_most(pitch * gain * sqrtf(location_variance), FIT_HUGE);
+  result->force_sd_N = at_most(result->force_N * sqrtf(force_variance) / before.p0, FIT_HUGE);
 
   uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
   if (largest < FIT_LOW_SIGNAL_SIGMA * settings->noise_Pa_q10) {
@@ -359,7 +371,9 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   if (theta.sigma >= FIT_FLAT_SIGMA) {
     flags |= CONTACT_FLAG_FLAT;
   }
-  if (deficient || moved * pitch > FIT_SETTLED_mm || result->location_sd_mm > FIT_UNCERTAIN_SD_mm) {
+  bool rough = squares > FIT_ROUGH_RESIDUAL * FIT_ROUGH_RESIDUAL * sum_squares;
+  if (deficient || moved * pitch > FIT_SETTLED_mm ||
+      result->location_sd_mm > fit_sd_limit_mm(misfit, theta.sigma < FIT_NARROW_SIGMA, rough)) {
     flags |= CONTACT_FLAG_UNCERTAIN;
   }
   if (squares > FIT_MODEL_RESIDUAL * FIT_MODEL_RESIDUAL * sum_squares) {
