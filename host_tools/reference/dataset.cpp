@@ -8,6 +8,7 @@ extern "C" {
 
 #include <algorithm>
 #include <atomic>
+#include <bitset>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -118,17 +119,22 @@ std::uint32_t usable_of(const Press &press, const std::vector<std::int32_t> &q10
   if (mask == Mask::none) {
     return all;
   }
-  const auto sensor =
-      mask == Mask::random
-          ? static_cast<std::ptrdiff_t>(random.next() % count)
-          : std::max_element(q10.begin(), q10.end()) - q10.begin();
-  return all & ~(std::uint32_t{1} << sensor);
+  if (mask == Mask::peak) {
+    return all & ~(std::uint32_t{1} << (std::max_element(q10.begin(), q10.end()) - q10.begin()));
+  }
+  const std::size_t left = count - (mask == Mask::random ? 1 : mask == Mask::random2 ? 2 : 3);
+  std::uint32_t usable = all;
+  while (std::bitset<32>(usable).count() > left) {
+    usable &= ~(std::uint32_t{1} << random.next() % count);
+  }
+  return usable;
 }
 
 } // namespace
 
 const char *name_of(Mask mask) {
-  return mask == Mask::none ? "none" : mask == Mask::random ? "random" : "peak";
+  static const char *const names[] = {"none", "random", "peak", "random2", "random3"};
+  return names[static_cast<int>(mask)];
 }
 
 Array firmware_array() {

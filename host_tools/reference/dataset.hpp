@@ -7,6 +7,7 @@
 
 #include "reference/press_sets.hpp"
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -15,9 +16,13 @@ namespace fingertip::reference {
 
 enum class Mask {
   none,
-  random, // one sensor of the press, drawn from the seed
-  peak,   // the sensor with the largest reading
+  random,  // one sensor of the press, drawn from the seed
+  peak,    // the sensor with the largest reading
+  random2, // two sensors, drawn from the seed
+  random3,
 };
+constexpr std::array<Mask, 5> ALL_MASKS{Mask::none, Mask::random, Mask::peak, Mask::random2,
+                                        Mask::random3};
 const char *name_of(Mask mask);
 
 struct Case {

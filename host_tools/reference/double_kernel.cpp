@@ -25,6 +25,7 @@ struct Normal {
 constexpr double GUESS_SHARE = 0.1;
 constexpr double GUESS_WEIGHT = 1e-3;
 constexpr double GUESS_SIGMA = 0.6;
+constexpr double PLAIN_GUESS_SIGMA = 0.65;
 constexpr double STEP_LIMIT = 0.5;
 constexpr double P0_MIN = 0.05;
 constexpr double P0_MAX = 1e6;
@@ -68,6 +69,51 @@ struct Factors {
   double inverse_form(const Vector4 &v) const { return v.dot(solve(v)); }
 };
 
+// About the peak.
+Gaussian log_linear(const Samples &samples, const Gaussian &peak) {
+  Normal normal;
+  normal.matrix.diagonal().setConstant(GUESS_WEIGHT);
+  normal.rhs[3] = -GUESS_WEIGHT * 0.5 / (GUESS_SIGMA * GUESS_SIGMA);
+  for (std::size_t k = 0; k < samples.count; k++) {
+    const double p = samples.p[k];
+    if (p >= GUESS_SHARE) {
+      const double x = samples.x[k] - peak.x, y = samples.y[k] - peak.y;
+      normal.add(p * Vector4(1.0, x, y, x * x + y * y), p * std::log(p));
+    }
+  }
+  const Vector4 c = Factors(normal.matrix).solve(normal.rhs);
+  const double curvature = limited(-c[3], 0.5 / (SIGMA_MAX * SIGMA_MAX), 0.5 / (0.25 * 0.25));
+  const double half_inverse = 0.5 / curvature;
+  return {1.0, peak.x + limited(c[1] * half_inverse, -1.0, 1.0),
+          peak.y + limited(c[2] * half_inverse, -1.0, 1.0), std::sqrt(half_inverse)};
+}
+
+double best_amplitude(const Samples &samples, const Gaussian &theta) {
+  double numerator = 0.0, denominator = 1e-30;
+  for (std::size_t k = 0; k < samples.count; k++) {
+    const double x = samples.x[k] - theta.x, y = samples.y[k] - theta.y;
+    const double e = std::exp(-0.5 * (x * x + y * y) / (theta.sigma * theta.sigma));
+    numerator += e * samples.p[k];
+    denominator += e * e;
+  }
+  return limited(numerator / denominator, P0_MIN, P0_MAX);
+}
+
+// What the firmware's fit of these readings starts from.
+Gaussian firmware_guess(const fit_array &array, const std::int32_t *pressure_Pa_q10,
+                        std::uint32_t usable, const Samples &samples) {
+  fit_settings none{};
+  none.noise_Pa_q10 = 1;
+  fit_result result;
+  fit_gaussian(&array, pressure_Pa_q10, usable, &none, &result);
+  const double pitch_mm = static_cast<double>(array.pitch_mm);
+  Gaussian theta{1.0, static_cast<double>(result.x_mm) / pitch_mm,
+                 static_cast<double>(result.y_mm) / pitch_mm,
+                 std::max(static_cast<double>(result.sigma_mm) / pitch_mm, SIGMA_MIN)};
+  theta.p0 = best_amplitude(samples, theta);
+  return theta;
+}
+
 } // namespace
 
 Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10,
@@ -95,34 +141,25 @@ Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10,
   return samples;
 }
 
-Gaussian first_guess(const Samples &samples) {
+Gaussian first_guess(const Samples &samples, Guess guess) {
   const auto first = samples.p.begin();
   const auto peak = static_cast<std::size_t>(
       std::max_element(first, first + static_cast<std::ptrdiff_t>(samples.count)) - first);
-  Normal normal;
-  normal.matrix.diagonal().setConstant(GUESS_WEIGHT);
-  normal.rhs[3] = -GUESS_WEIGHT * 0.5 / (GUESS_SIGMA * GUESS_SIGMA);
-  for (std::size_t k = 0; k < samples.count; k++) {
-    const double p = samples.p[k];
-    if (p >= GUESS_SHARE) {
-      const double x = samples.x[k] - samples.x[peak], y = samples.y[k] - samples.y[peak];
-      normal.add(p * Vector4(1.0, x, y, x * x + y * y), p * std::log(p / samples.p[peak]));
+  Gaussian theta{1.0, samples.x[peak], samples.y[peak], PLAIN_GUESS_SIGMA};
+  if (guess == Guess::log_linear) {
+    theta = log_linear(samples, theta);
+  } else if (guess == Guess::centroid) {
+    double sum = 0.0, sum_x = 0.0, sum_y = 0.0;
+    for (std::size_t k = 0; k < samples.count; k++) {
+      const double p = std::max(samples.p[k], 0.0);
+      sum += p;
+      sum_x += p * samples.x[k];
+      sum_y += p * samples.y[k];
     }
+    theta.x = sum_x / sum;
+    theta.y = sum_y / sum;
   }
-  const Vector4 c = Factors(normal.matrix).solve(normal.rhs);
-  const double curvature = limited(-c[3], 0.5 / (SIGMA_MAX * SIGMA_MAX), 0.5 / (0.25 * 0.25));
-  const double half_inverse = 0.5 / curvature;
-  Gaussian theta{1.0, samples.x[peak] + limited(c[1] * half_inverse, -1.0, 1.0),
-                 samples.y[peak] + limited(c[2] * half_inverse, -1.0, 1.0),
-                 std::sqrt(half_inverse)};
-  double numerator = 0.0, denominator = 1e-30;
-  for (std::size_t k = 0; k < samples.count; k++) {
-    const double x = samples.x[k] - theta.x, y = samples.y[k] - theta.y;
-    const double e = std::exp(-0.5 * (x * x + y * y) / (theta.sigma * theta.sigma));
-    numerator += e * samples.p[k];
-    denominator += e * e;
-  }
-  theta.p0 = limited(numerator / denominator, P0_MIN, P0_MAX);
+  theta.p0 = best_amplitude(samples, theta);
   return theta;
 }
 
@@ -134,7 +171,9 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
     result.flags = samples.count == 0 ? CONTACT_FLAG_LOW_SIGNAL : 0;
     return result;
   }
-  Gaussian theta = first_guess(samples);
+  Gaussian theta = settings.guess == Guess::firmware
+                       ? firmware_guess(array, pressure_Pa_q10, usable, samples)
+                       : first_guess(samples, settings.guess);
   const double x_min = static_cast<double>(array.x_min), x_max = static_cast<double>(array.x_max);
   const double y_min = static_cast<double>(array.y_min), y_max = static_cast<double>(array.y_max);
   const double pitch_mm = static_cast<double>(array.pitch_mm);
@@ -190,6 +229,7 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
   const double sd_mm = pitch_mm * gain *
                        std::sqrt(variance * (factors.inverse_form(Vector4::UnitY()) +
                                              factors.inverse_form(Vector4::UnitZ())));
+  result.used = usable;
   result.flags = CONTACT_FLAG_FIT_VALID;
   if (samples.unit_Pa < 20.0 * settings.noise_Pa) {
     result.flags |= CONTACT_FLAG_LOW_SIGNAL;

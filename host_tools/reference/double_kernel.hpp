@@ -23,9 +23,9 @@ struct Gaussian {
 Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10,
                   std::uint32_t usable);
 
-// The firmware's first guess: log-linear fit to the large readings, then the best amplitude.
-// Needs four samples, one of them positive.
-Gaussian first_guess(const Samples &samples);
+// Any guess but the firmware's, with the best amplitude for its shape. Needs four samples, one of
+// them positive.
+Gaussian first_guess(const Samples &samples, Guess guess = Guess::log_linear);
 
 KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10,
                            std::uint32_t usable, const KernelSettings &settings);

@@ -1,26 +1,11 @@
 // fit_report: how far the on-chip fit lies from the reference optimum, and how well its flags tell.
-//
-// Usage: fit_report [--kernel NAME] [--variant TEXT] [--set A|B|C|D] [--limit N] [--seed S]
-//                   [--out DIR] [--cache DIR]
-//
-// --kernel, --variant (part of a variant's name) and --set choose rows; --limit takes N presses in
-// all (120 000 by default: A, B a third each, C, D a sixth each). Writes fit_error.csv and .json
-// to --out and prints the same. One row per kernel, variant, set and observability:
-// Variants without every sensor are left out for kernels that need all of them.
-//   presses       of the set that are (not) observable (reference/dataset.hpp)
-//   p50_um ..     distance of the location from the reference optimum of the presses as received at
-//                 1/1024 Pa with every sensor in use
-//   above_10um    presses farther than that from the reference
-//   truth_p50_mm  distance from where the contact truly is
-//   bad_unflagged share more than 1 mm wrong without a warning (UNCERTAIN, MODEL, FLAT, AT_BOUND,
-//                 LOW_SIGNAL, or no fit): against the reference in A and B, the truth in C and D
-//   good_flagged  share within 1 mm with a warning
 #include "common/contact_flags.h"
 #include "reference/dataset.hpp"
 #include "reference/kernels.hpp"
 #include "reference/options.hpp"
 #include "reference/parallel.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -34,8 +19,35 @@ namespace {
 
 namespace reference = fingertip::reference;
 using reference::Case;
+using reference::Guess;
 using reference::Mask;
 using reference::PressSet;
+
+const char USAGE[] =
+    R"(fit_report: how far fits lie from the reference optimum, and how well their flags tell.
+
+usage: fit_report [--kernel NAME] [--variant TEXT] [--set A|B|C|D] [--limit N] [--seed S]
+                  [--out DIR] [--cache DIR] [--jobs FILE.json]
+
+--kernel (reference/kernels.hpp), --variant (part of a variant's name) and --set choose rows;
+--limit takes N presses in all (120 000 by default: A, B a third each, C, D a sixth each), for two
+and three masked sensors a tenth of that. Writes fit_error.csv and .json to --out and prints the
+same. One row per kernel, variant, set and observability; variants that a kernel does not have are
+left out:
+  presses       of the set that are (not) observable (reference/dataset.hpp)
+  p50_um ..     distance of the location from the reference optimum of the presses as received at
+                1/1024 Pa, with the sensors usable that the variant leaves; where there is no fit it
+                is infinite
+  above_10um    presses farther than that from the reference
+  without_fit   presses that gave no fit
+  outlier       presses of which the fit left out a sensor by itself
+  truth_p50_mm  distance from where the contact truly is, of those with a fit
+  bad_unflagged share more than 1 mm wrong without a warning (UNCERTAIN, MODEL, FLAT, AT_BOUND,
+                LOW_SIGNAL, or no fit): against the reference in A and B, the truth in C and D
+  good_flagged  share within 1 mm with a warning
+
+--jobs writes the variants and some of the presses for on_chip/bench.mjs, and does nothing else.
+)";
 
 constexpr int USUAL_ITERATIONS = 7;
 constexpr double BAD_mm = 1.0;
@@ -49,6 +61,9 @@ struct Variant {
   double lsb_Pa = 1.0 / 1024.0;
   Mask mask = Mask::none;
   double prior_sigma_mm = 0.0, prior_width_mm = 0.0;
+  Guess guess = Guess::log_linear;
+  unsigned needs = 0; // of enum Capability
+  bool on_chip = true; // worth counting its cycles
 };
 
 std::vector<Variant> all_variants() {
@@ -61,26 +76,61 @@ std::vector<Variant> all_variants() {
   for (int k = 0; k <= 10; k++) {
     add("iterations=" + std::to_string(k)).iterations = k;
   }
-  for (int n = 4; n < 15; n++) {
-    add("n_largest=" + std::to_string(n)).n_largest = n;
+  for (int k : {20, 50}) {
+    Variant &variant = add("iterations=" + std::to_string(k));
+    variant.iterations = k;
+    variant.needs = reference::ENDS_EARLY;
+  }
+  for (int n = 4; n <= 15; n++) {
+    Variant &variant = add("n_largest=" + std::to_string(n));
+    variant.n_largest = n;
+    variant.needs = reference::N_LARGEST;
   }
   for (int denominator : {1, 16, 100, 1024}) {
-    add("lsb_Pa=1/" + std::to_string(denominator)).lsb_Pa = 1.0 / denominator;
+    Variant &variant = add("lsb_Pa=1/" + std::to_string(denominator));
+    variant.lsb_Pa = 1.0 / denominator;
+    variant.on_chip = false;
   }
   // The width that set D's layer gives a contact, one that is 20 % off, and set C's.
   for (double prior_sigma_mm : {3.2, 3.8, 5.7}) {
     Variant &variant = add("prior_mm=" + std::to_string(prior_sigma_mm).substr(0, 3));
     variant.prior_sigma_mm = prior_sigma_mm;
     variant.prior_width_mm = 0.5;
+    variant.needs = reference::PRIOR;
+  }
+  for (Guess guess : {Guess::maximum, Guess::centroid, Guess::firmware}) {
+    Variant &variant = add(std::string("guess=") + reference::name_of(guess));
+    variant.guess = guess;
+    variant.needs = guess == Guess::firmware ? reference::FIRMWARE_GUESS : reference::GUESSES;
+  }
+  for (Mask mask : reference::ALL_MASKS) {
+    if (mask != Mask::none) {
+      Variant &variant = add(std::string("mask=") + reference::name_of(mask));
+      variant.mask = mask;
+      variant.needs = reference::ANY_SUBSET;
+    }
   }
   for (Mask mask : {Mask::random, Mask::peak}) {
-    add(std::string("mask=") + reference::name_of(mask)).mask = mask;
+    Variant &variant = add(std::string("mask=") + reference::name_of(mask) + " guess=firmware");
+    variant.mask = mask;
+    variant.guess = Guess::firmware;
+    variant.needs = reference::ANY_SUBSET | reference::FIRMWARE_GUESS;
   }
   return variants;
 }
 
+bool has(const reference::Kernel &kernel, const Variant &variant) {
+  return (variant.needs & ~kernel.capabilities) == 0;
+}
+
+std::size_t presses_of(PressSet set, Mask mask, std::uint64_t limit) {
+  const bool gaussian = set == PressSet::A || set == PressSet::B;
+  const bool few = mask == Mask::random2 || mask == Mask::random3;
+  return limit / (gaussian ? 3 : 6) / (few ? 10 : 1);
+}
+
 struct Options {
-  std::string kernel, variant, set, out = FINGERTIP_REPORT_DIR, cache = FINGERTIP_CACHE_DIR;
+  std::string kernel, variant, set, jobs, out = FINGERTIP_REPORT_DIR, cache = FINGERTIP_CACHE_DIR;
   std::uint64_t limit = 120000;
   std::uint64_t seed = 20221015;
 };
@@ -91,23 +141,26 @@ Options parse(int argc, char **argv) {
                            {{"--kernel", &o.kernel},
                             {"--variant", &o.variant},
                             {"--set", &o.set},
+                            {"--jobs", &o.jobs},
                             {"--out", &o.out},
                             {"--cache", &o.cache},
                             {"--limit", nullptr, &o.limit},
-                            {"--seed", nullptr, &o.seed}});
+                            {"--seed", nullptr, &o.seed}},
+                           USAGE);
   return o;
 }
 
 struct Outcome {
   double from_reference_um, from_truth_mm;
   std::uint32_t flags;
+  bool outlier;
 };
 
 struct Row {
   std::string kernel, variant;
   char set;
   bool observable;
-  std::size_t presses = 0, without_fit = 0, above_10um = 0, above_100um = 0;
+  std::size_t presses = 0, without_fit = 0, outlier = 0, above_10um = 0, above_100um = 0;
   double p50_um = 0, p99_um = 0, p999_um = 0, worst_um = 0;
   double truth_p50_mm = 0, truth_p99_mm = 0;
   double bad_unflagged = 0, good_flagged = 0;
@@ -134,14 +187,15 @@ Row summarise(const std::vector<Case> &cases, const std::vector<Outcome> &outcom
     }
     const Outcome &outcome = outcomes[i];
     row.presses++;
+    um.push_back(outcome.from_reference_um);
+    row.above_10um += outcome.from_reference_um > 10.0;
+    row.above_100um += outcome.from_reference_um > 100.0;
     if (!(outcome.flags & CONTACT_FLAG_FIT_VALID)) {
       row.without_fit++;
       continue;
     }
-    um.push_back(outcome.from_reference_um);
+    row.outlier += outcome.outlier;
     truth_mm.push_back(outcome.from_truth_mm);
-    row.above_10um += outcome.from_reference_um > 10.0;
-    row.above_100um += outcome.from_reference_um > 100.0;
     const double wrong_mm = gaussian ? outcome.from_reference_um * 1e-3 : outcome.from_truth_mm;
     const bool warned = (outcome.flags & WARNINGS) != 0;
     bad_unflagged += wrong_mm > BAD_mm && !warned;
@@ -170,23 +224,25 @@ std::vector<Outcome> run(const reference::Kernel &kernel, const fit_array &array
     const auto result =
         kernel.fit(array, readings.data(), c.usable,
                    {variant.iterations, c.press.noise_Pa, variant.n_largest,
-                    variant.prior_sigma_mm, variant.prior_width_mm});
-    outcomes[i] = {1e3 * std::hypot(result.x_mm - c.best.theta.x_mm,
-                                    result.y_mm - c.best.theta.y_mm),
-                   std::hypot(result.x_mm - c.press.x_mm, result.y_mm - c.press.y_mm),
-                   result.flags};
+                    variant.prior_sigma_mm, variant.prior_width_mm, variant.guess});
+    const double um =
+        1e3 * std::hypot(result.x_mm - c.best.theta.x_mm, result.y_mm - c.best.theta.y_mm);
+    const bool fitted = (result.flags & CONTACT_FLAG_FIT_VALID) && std::isfinite(um);
+    outcomes[i] = {fitted ? um : std::numeric_limits<double>::infinity(),
+                   std::hypot(result.x_mm - c.press.x_mm, result.y_mm - c.press.y_mm), result.flags,
+                   variant.n_largest == 0 && result.used != c.usable};
   });
   return outcomes;
 }
 
 void print_header() {
-  std::printf("%-8s %-16s set obs %7s %9s %9s %9s %9s %6s %6s %8s %8s %8s %8s\n", "kernel",
+  std::printf("%-12s %-18s set obs %7s %9s %9s %9s %9s %6s %6s %8s %8s %8s %8s\n", "kernel",
               "variant", "presses", "p50_um", "p99_um", "p99.9_um", "worst_um", ">10um", ">100um",
               "tru50_mm", "tru99_mm", "bad!flag", "good&fl");
 }
 
 void print(const Row &row) {
-  std::printf("%-8s %-16s  %c  %s %7zu %9.4g %9.4g %9.4g %9.4g %6zu %6zu %8.3g %8.3g %7.3f%% "
+  std::printf("%-12s %-18s  %c  %s %7zu %9.4g %9.4g %9.4g %9.4g %6zu %6zu %8.3g %8.3g %7.3f%% "
               "%7.3f%%\n",
               row.kernel.c_str(), row.variant.c_str(), row.set, row.observable ? "yes" : " no",
               row.presses, row.p50_um, row.p99_um, row.p999_um, row.worst_um, row.above_10um,
@@ -197,13 +253,13 @@ void print(const Row &row) {
 
 void write_csv(const std::string &path, const std::vector<Row> &rows) {
   std::ofstream file(path);
-  file << "kernel,variant,set,observable,presses,without_fit,p50_um,p99_um,p999_um,worst_um,"
-          "above_10um,above_100um,truth_p50_mm,truth_p99_mm,bad_unflagged,good_flagged\n";
+  file << "kernel,variant,set,observable,presses,without_fit,outlier,p50_um,p99_um,p999_um,"
+          "worst_um,above_10um,above_100um,truth_p50_mm,truth_p99_mm,bad_unflagged,good_flagged\n";
   for (const Row &r : rows) {
     file << r.kernel << ',' << r.variant << ',' << r.set << ',' << r.observable << ',' << r.presses
-         << ',' << r.without_fit << ',' << r.p50_um << ',' << r.p99_um << ',' << r.p999_um << ','
-         << r.worst_um << ',' << r.above_10um << ',' << r.above_100um << ',' << r.truth_p50_mm
-         << ',' << r.truth_p99_mm << ',' << r.bad_unflagged << ',' << r.good_flagged << '\n';
+         << ',' << r.without_fit << ',' << r.outlier << ',' << r.p50_um << ',' << r.p99_um << ','
+         << r.p999_um << ',' << r.worst_um << ',' << r.above_10um << ',' << r.above_100um
+         << ',' << r.truth_p50_mm << ',' << r.truth_p99_mm << ',' << r.bad_unflagged << ',' << r.good_flagged << '\n';
   }
   file.close();
   if (!file) {
@@ -225,6 +281,7 @@ void write_json(const std::string &path, const std::vector<Row> &rows, const Opt
          << "\", \"set\": \"" << r.set
          << "\", \"observable\": " << (r.observable ? "true" : "false")
          << ", \"presses\": " << r.presses << ", \"without_fit\": " << r.without_fit
+         << ", \"outlier\": " << r.outlier
          << ", \"above_10um\": " << r.above_10um << ", \"above_100um\": " << r.above_100um;
     number("p50_um", r.p50_um);
     number("p99_um", r.p99_um);
@@ -244,16 +301,71 @@ void write_json(const std::string &path, const std::vector<Row> &rows, const Opt
   }
 }
 
+// {"variants": [{"kernel": .., "variant": .., settings}], "presses": {mask: [press]}}
+void write_jobs(const Options &options) {
+  constexpr std::size_t SHARE = 1000; // of the presses
+  std::ofstream file(options.jobs);
+  file.precision(17);
+  file << "{\"variants\": [";
+  const char *separator = "\n";
+  for (const reference::Kernel &kernel : reference::all_kernels()) {
+    for (const Variant &v : all_variants()) {
+      if (has(kernel, v) && v.on_chip) {
+        file << separator << "{\"kernel\": \"" << kernel.name << "\", \"variant\": \"" << v.name
+             << "\", \"iterations\": " << v.iterations << ", \"n_largest\": " << v.n_largest
+             << ", \"guess\": \"" << reference::name_of(v.guess) << "\", \"mask\": \""
+             << reference::name_of(v.mask) << "\", \"prior_sigma_mm\": " << v.prior_sigma_mm
+             << ", \"prior_width_mm\": " << v.prior_width_mm << '}';
+        separator = ",\n";
+      }
+    }
+  }
+  file << "\n], \"presses\": {";
+  separator = "\n";
+  for (Mask mask : reference::ALL_MASKS) {
+    file << separator << '"' << reference::name_of(mask) << "\": [";
+    separator = "\n";
+    for (PressSet set : reference::ALL_PRESS_SETS) {
+      const std::size_t count =
+          std::max<std::size_t>(1, presses_of(set, Mask::none, options.limit) / SHARE);
+      for (const Case &c :
+           reference::load_cases(set, mask, options.seed, count, options.cache)) {
+        file << separator << "{\"set\": \"" << reference::name_of(set)
+             << "\", \"observable\": " << (c.observable ? "true" : "false")
+             << ", \"usable\": " << c.usable << ", \"noise_Pa_q10\": "
+             << static_cast<std::int32_t>(c.press.noise_Pa * 1024.0)
+             << ", \"best_x_mm\": " << c.best.theta.x_mm
+             << ", \"best_y_mm\": " << c.best.theta.y_mm << ", \"readings\": [";
+        for (std::size_t k = 0; k < c.pressure_Pa_q10.size(); k++) {
+          file << (k ? ", " : "") << c.pressure_Pa_q10[k];
+        }
+        file << "]}";
+        separator = ",\n";
+      }
+    }
+    file << "\n]";
+    separator = ",\n";
+  }
+  file << "\n}}\n";
+  file.close();
+  if (!file) {
+    throw std::runtime_error("cannot write " + options.jobs);
+  }
+}
+
 int report(const Options &options) {
+  if (!options.jobs.empty()) {
+    write_jobs(options);
+    return 0;
+  }
   std::filesystem::create_directories(options.out);
   const fit_array array = reference::firmware_fit_array();
   std::map<std::pair<PressSet, Mask>, std::vector<Case>> loaded;
   const auto cases_of = [&](PressSet set, Mask mask) -> const std::vector<Case> & {
     auto &cases = loaded[{set, mask}];
     if (cases.empty()) {
-      const bool gaussian = set == PressSet::A || set == PressSet::B;
-      cases = reference::load_cases(set, mask, options.seed, options.limit / (gaussian ? 3 : 6),
-                                    options.cache);
+      cases = reference::load_cases(set, mask, options.seed,
+                                    presses_of(set, mask, options.limit), options.cache);
     }
     return cases;
   };
@@ -264,9 +376,7 @@ int report(const Options &options) {
       continue;
     }
     for (const Variant &variant : all_variants()) {
-      const bool subset = variant.mask != Mask::none || variant.n_largest != 0;
-      if (variant.name.find(options.variant) == std::string::npos ||
-          (subset && !kernel.any_subset)) {
+      if (variant.name.find(options.variant) == std::string::npos || !has(kernel, variant)) {
         continue;
       }
       for (PressSet set : reference::ALL_PRESS_SETS) {

@@ -1,17 +1,4 @@
 // fit_bench: time and error of one fit, our kernels and host libraries on the same presses.
-//
-// Usage: fit_bench [--limit N] [--passes N] [--seed S] [--out DIR] [--cache DIR]
-//
-// Takes the observable ones of the first N presses (12 000 by default, the sets A to D mixed), cuts
-// them into blocks and lets every kernel fit block after block, in an order that rotates, so that
-// all of them see the same machine. A fit starts at the readings as the firmware receives them and
-// ends at location, peak, width and force. Our kernels run the usual seven iterations; what the
-// libraries do is in reference/libraries.hpp. Writes fit_bench.csv and .json to --out, prints:
-//   us          processor time of one fit: median over blocks and passes, 10 % and 90 % quantiles
-//   ratio       the same block's time by this kernel over that by the first: median, 10 %, 90 %
-//   p50_um ..   distance of the location from the reference optimum; not a number counts as
-//               infinitely far
-// Times depend on the machine and its load; the ratios are what is comparable.
 #include "reference/dataset.hpp"
 #include "reference/kernels.hpp"
 #include "reference/libraries.hpp"
@@ -33,6 +20,23 @@ namespace {
 namespace reference = fingertip::reference;
 using reference::Case;
 using reference::Kernel;
+
+const char USAGE[] =
+    R"(fit_bench: time and error of one fit, our kernels and host libraries on the same presses.
+
+usage: fit_bench [--limit N] [--passes N] [--seed S] [--out DIR] [--cache DIR]
+
+Takes the observable ones of the first N presses (12 000 by default, the sets A to D mixed), cuts
+them into blocks and lets every kernel fit block after block, in an order that rotates, so that all
+of them see the same machine. A fit starts at the readings as the firmware receives them and ends at
+location, peak, width and force. Kernels that run a number of iterations run seven; what the
+libraries do is in reference/libraries.hpp. Writes fit_bench.csv and .json to --out, prints:
+  us          processor time of one fit: median over blocks and passes, 10 % and 90 % quantiles
+  ratio       the same block's time by this kernel over that by the first: median, 10 %, 90 %
+  p50_um ..   distance of the location from the reference optimum; not a number counts as
+              infinitely far
+Times depend on the machine and its load; the ratios are what is comparable.
+)";
 
 constexpr std::size_t BLOCK = 400;
 constexpr int ITERATIONS = 7;
@@ -129,7 +133,8 @@ int bench(int argc, char **argv) {
                             {"--cache", &cache},
                             {"--limit", nullptr, &limit},
                             {"--passes", nullptr, &passes},
-                            {"--seed", nullptr, &seed}});
+                            {"--seed", nullptr, &seed}},
+                           USAGE);
   std::filesystem::create_directories(out);
   std::vector<Case> cases = mixed_cases(limit, seed, cache);
   cases.resize(cases.size() / BLOCK * BLOCK);

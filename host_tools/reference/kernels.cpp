@@ -3,10 +3,13 @@
 #include "reference/double_kernel.hpp"
 
 extern "C" {
+#include "alternatives/alternatives.h"
 #include "config/geometry.h"
 }
+#include "common/contact_flags.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 namespace fingertip::reference {
@@ -35,6 +38,7 @@ std::uint32_t largest_readings(const fit_array &array, const std::int32_t *press
 fit_settings chip_settings(const KernelSettings &settings) {
   fit_settings chip{};
   chip.iterations = static_cast<std::uint8_t>(settings.iterations);
+  chip.n_largest = static_cast<std::uint8_t>(settings.n_largest);
   chip.noise_Pa_q10 = static_cast<std::int32_t>(settings.noise_Pa * 1024.0);
   chip.prior_sigma_mm = static_cast<float>(settings.prior_sigma_mm);
   chip.prior_width_mm = static_cast<float>(settings.prior_width_mm);
@@ -44,7 +48,16 @@ fit_settings chip_settings(const KernelSettings &settings) {
 KernelResult widened(const fit_result &result) {
   return {static_cast<double>(result.x_mm),    static_cast<double>(result.y_mm),
           static_cast<double>(result.p0_Pa),   static_cast<double>(result.sigma_mm),
-          static_cast<double>(result.force_N), result.flags};
+          static_cast<double>(result.force_N), result.used,
+          result.flags};
+}
+
+KernelResult fit(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                 const KernelSettings &settings) {
+  const fit_settings chip = chip_settings(settings);
+  fit_result result;
+  fit_gaussian(&array, pressure_Pa_q10, usable, &chip, &result);
+  return widened(result);
 }
 
 KernelResult grid(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t,
@@ -59,8 +72,7 @@ KernelResult general(const fit_array &array, const std::int32_t *pressure_Pa_q10
                      std::uint32_t usable, const KernelSettings &settings) {
   const fit_settings chip = chip_settings(settings);
   fit_result result;
-  fit_general(&array, pressure_Pa_q10,
-              largest_readings(array, pressure_Pa_q10, usable, settings.n_largest), &chip, &result);
+  fit_general(&array, pressure_Pa_q10, usable, &chip, &result);
   return widened(result);
 }
 
@@ -71,13 +83,42 @@ KernelResult in_double(const fit_array &array, const std::int32_t *pressure_Pa_q
                        settings);
 }
 
+// Neither judges itself, so the only flag is whether it came to anything.
+template <auto SOLVE>
+KernelResult alternative(const fit_array &array, const std::int32_t *pressure_Pa_q10,
+                         std::uint32_t usable, const KernelSettings &settings) {
+  const alternative_settings chosen{settings.iterations,
+                                    static_cast<alternative_guess>(settings.guess)};
+  const auto found = SOLVE(&array, pressure_Pa_q10, usable, &chosen);
+  KernelResult result{};
+  result.x_mm = static_cast<double>(found.x_mm);
+  result.y_mm = static_cast<double>(found.y_mm);
+  result.p0_Pa = static_cast<double>(found.p0_Pa);
+  result.sigma_mm = static_cast<double>(found.sigma_mm);
+  result.force_N = static_cast<double>(found.force_N);
+  const bool finite = std::isfinite(result.x_mm) && std::isfinite(result.y_mm);
+  result.flags = finite && result.sigma_mm != 0.0 ? std::uint32_t{CONTACT_FLAG_FIT_VALID} : 0;
+  result.used = usable;
+  return result;
+}
+
 } // namespace
+
+const char *name_of(Guess guess) {
+  static const char *const names[] = {"log_linear", "maximum", "centroid", "firmware"};
+  return names[static_cast<int>(guess)];
+}
 
 const std::vector<Kernel> &all_kernels() {
   static const std::vector<Kernel> kernels{
-      {"grid", false, grid},
-      {"general", true, general},
-      {"double", true, in_double},
+      {"fit", ANY_SUBSET | PRIOR, fit},
+      {"grid", PRIOR, grid},
+      {"general", ANY_SUBSET | N_LARGEST | PRIOR, general},
+      {"double", ANY_SUBSET | N_LARGEST | PRIOR | GUESSES | FIRMWARE_GUESS, in_double},
+      {"naive_float", ANY_SUBSET | GUESSES, alternative<alternative_naive_float>},
+      {"naive_double", ANY_SUBSET | GUESSES, alternative<alternative_naive_double>},
+      {"lm_float", ANY_SUBSET | GUESSES | ENDS_EARLY, alternative<alternative_lm_float>},
+      {"lm_double", ANY_SUBSET | GUESSES | ENDS_EARLY, alternative<alternative_lm_double>},
   };
   return kernels;
 }

@@ -20,22 +20,21 @@ constexpr int SENSORS = 15;
 constexpr int MAX_ITERATIONS = 50;
 
 // residual[k] = model - reading; row k of the Jacobian goes to jacobian[k * row + j * column].
-template <typename Scalar>
-void evaluate(const Samples &samples, const Scalar *theta, Scalar *residual, Scalar *jacobian,
+void evaluate(const Samples &samples, const double *theta, double *residual, double *jacobian,
               int row, int column) {
-  const Scalar inverse_variance = Scalar(1) / (theta[3] * theta[3]);
+  const double inverse_variance = 1.0 / (theta[3] * theta[3]);
   for (int k = 0; k < SENSORS; k++) {
     const auto s = static_cast<std::size_t>(k);
-    const Scalar dx = static_cast<Scalar>(samples.x[s]) - theta[1];
-    const Scalar dy = static_cast<Scalar>(samples.y[s]) - theta[2];
-    const Scalar r2 = dx * dx + dy * dy;
-    const Scalar e = std::exp(Scalar(-0.5) * r2 * inverse_variance);
+    const double dx = samples.x[s] - theta[1];
+    const double dy = samples.y[s] - theta[2];
+    const double r2 = dx * dx + dy * dy;
+    const double e = std::exp(-0.5 * r2 * inverse_variance);
     if (residual) {
-      residual[k] = theta[0] * e - static_cast<Scalar>(samples.p[s]);
+      residual[k] = theta[0] * e - samples.p[s];
     }
     if (jacobian) {
-      const Scalar slope = theta[0] * e * inverse_variance;
-      Scalar *at = jacobian + k * row;
+      const double slope = theta[0] * e * inverse_variance;
+      double *at = jacobian + k * row;
       at[0] = e;
       at[column] = slope * dx;
       at[2 * column] = slope * dy;
@@ -44,11 +43,11 @@ void evaluate(const Samples &samples, const Scalar *theta, Scalar *residual, Sca
   }
 }
 
-using Solve = void (*)(const Samples &samples, double theta[4], int iterations);
+using Solve = void (*)(const Samples &samples, double theta[4]);
 
 template <Solve SOLVE>
 KernelResult with(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                  std::uint32_t usable, const KernelSettings &settings) {
+                  std::uint32_t usable, const KernelSettings &) {
   const Samples samples = normalise(array, pressure_Pa_q10, usable);
   KernelResult result{};
   if (samples.count != SENSORS) {
@@ -56,13 +55,14 @@ KernelResult with(const fit_array &array, const std::int32_t *pressure_Pa_q10,
   }
   const Gaussian guess = first_guess(samples);
   double theta[4] = {guess.p0, guess.x, guess.y, guess.sigma};
-  SOLVE(samples, theta, settings.iterations);
+  SOLVE(samples, theta);
   const double pitch_mm = static_cast<double>(array.pitch_mm);
   result.x_mm = theta[1] * pitch_mm;
   result.y_mm = theta[2] * pitch_mm;
   result.p0_Pa = theta[0] * samples.unit_Pa;
   result.sigma_mm = theta[3] * pitch_mm;
   result.force_N = 2.0 * M_PI * result.p0_Pa * result.sigma_mm * result.sigma_mm * 1e-6;
+  result.used = usable;
   result.flags = CONTACT_FLAG_FIT_VALID;
   return result;
 }
@@ -88,7 +88,7 @@ ceres::Solver::Options ceres_options() {
   return options;
 }
 
-void ceres_new(const Samples &samples, double theta[4], int) {
+void ceres_new(const Samples &samples, double theta[4]) {
   ceres::Problem problem;
   problem.AddResidualBlock(new CeresResiduals(&samples), nullptr, theta);
   ceres::Solver::Summary summary;
@@ -115,12 +115,12 @@ private:
   ceres::Problem problem_;
 };
 
-void ceres_reused(const Samples &samples, double theta[4], int) {
+void ceres_reused(const Samples &samples, double theta[4]) {
   static ReusedCeres solver(ceres_options());
   solver.solve(samples, theta);
 }
 
-void ceres_tight(const Samples &samples, double theta[4], int) {
+void ceres_tight(const Samples &samples, double theta[4]) {
   static ReusedCeres solver([] {
     ceres::Solver::Options options = ceres_options();
     options.function_tolerance = 1e-14;
@@ -149,12 +149,12 @@ void solve_tiny(Tiny *solver, const Samples &samples, double theta[4]) {
   std::copy(x.data(), x.data() + 4, theta);
 }
 
-void tiny_solver(const Samples &samples, double theta[4], int) {
+void tiny_solver(const Samples &samples, double theta[4]) {
   Tiny solver;
   solve_tiny(&solver, samples, theta);
 }
 
-void tiny_tight(const Samples &samples, double theta[4], int) {
+void tiny_tight(const Samples &samples, double theta[4]) {
   Tiny solver;
   solver.options.function_tolerance = 1e-20;
   solver.options.gradient_tolerance = 1e-14;
@@ -167,14 +167,14 @@ int cminpack_function(void *context, int, int, const double *theta, double *resi
                       double *jacobian, int stride, int what) {
   const auto &samples = *static_cast<const Samples *>(context);
   if (what == 1) {
-    evaluate<double>(samples, theta, residuals, nullptr, 0, 0);
+    evaluate(samples, theta, residuals, nullptr, 0, 0);
   } else {
-    evaluate<double>(samples, theta, nullptr, jacobian, 1, stride);
+    evaluate(samples, theta, nullptr, jacobian, 1, stride);
   }
   return 0;
 }
 
-void cminpack(const Samples &samples, double theta[4], int) {
+void cminpack(const Samples &samples, double theta[4]) {
   double residuals[SENSORS], jacobian[SENSORS * 4], work[5 * 4 + SENSORS];
   int pivots[4];
   Samples context = samples;
@@ -184,18 +184,17 @@ void cminpack(const Samples &samples, double theta[4], int) {
 }
 
 int gsl_residuals(const gsl_vector *theta, void *context, gsl_vector *residuals) {
-  evaluate<double>(*static_cast<const Samples *>(context), theta->data, residuals->data, nullptr,
-                   0, 0);
+  evaluate(*static_cast<const Samples *>(context), theta->data, residuals->data, nullptr, 0, 0);
   return GSL_SUCCESS;
 }
 
 int gsl_jacobian(const gsl_vector *theta, void *context, gsl_matrix *jacobian) {
-  evaluate<double>(*static_cast<const Samples *>(context), theta->data, nullptr, jacobian->data,
-                   static_cast<int>(jacobian->tda), 1);
+  evaluate(*static_cast<const Samples *>(context), theta->data, nullptr, jacobian->data,
+           static_cast<int>(jacobian->tda), 1);
   return GSL_SUCCESS;
 }
 
-void gsl(const Samples &samples, double theta[4], int) {
+void gsl(const Samples &samples, double theta[4]) {
   struct Free {
     void operator()(gsl_multifit_nlinear_workspace *w) const { gsl_multifit_nlinear_free(w); }
   };
@@ -221,30 +220,14 @@ void gsl(const Samples &samples, double theta[4], int) {
   }
 }
 
-template <typename Scalar> void naive(const Samples &samples, double theta[4], int iterations) {
-  Eigen::Matrix<Scalar, 4, 1> x;
-  x << static_cast<Scalar>(theta[0]), static_cast<Scalar>(theta[1]), static_cast<Scalar>(theta[2]),
-      static_cast<Scalar>(theta[3]);
-  Eigen::Matrix<Scalar, SENSORS, 1> residuals;
-  Eigen::Matrix<Scalar, SENSORS, 4, Eigen::RowMajor> jacobian;
-  for (int i = 0; i < iterations; i++) {
-    evaluate<Scalar>(samples, x.data(), residuals.data(), jacobian.data(), 4, 1);
-    x -= (jacobian.transpose() * jacobian).llt().solve(jacobian.transpose() * residuals);
-  }
-  for (int i = 0; i < 4; i++) {
-    theta[i] = static_cast<double>(x[i]);
-  }
-}
-
 } // namespace
 
 const std::vector<Kernel> &library_kernels() {
   static const std::vector<Kernel> kernels{
-      {"naive_float", false, with<naive<float>>}, {"naive_double", false, with<naive<double>>},
-      {"tiny_solver", false, with<tiny_solver>},  {"tiny_tight", false, with<tiny_tight>},
-      {"cminpack", false, with<cminpack>},        {"gsl", false, with<gsl>},
-      {"ceres_reused", false, with<ceres_reused>}, {"ceres_new", false, with<ceres_new>},
-      {"ceres_tight", false, with<ceres_tight>},
+      {"tiny_solver", 0, with<tiny_solver>},   {"tiny_tight", 0, with<tiny_tight>},
+      {"cminpack", 0, with<cminpack>},         {"gsl", 0, with<gsl>},
+      {"ceres_reused", 0, with<ceres_reused>}, {"ceres_new", 0, with<ceres_new>},
+      {"ceres_tight", 0, with<ceres_tight>},
   };
   return kernels;
 }

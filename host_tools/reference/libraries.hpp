@@ -1,8 +1,8 @@
 // Solvers that a host program might use instead, behind the same call as our kernels.
 //
 // All of them get the readings that the firmware gets, scale them the same way and start from the
-// firmware's first guess, with the analytic Jacobian. The iteration limit of the settings counts
-// for naive_double and naive_float alone; the libraries stop by their own rules:
+// general kernel's first guess, with the analytic Jacobian. They stop by their own rules, whatever
+// the iterations of the settings:
 //   ceres_new      Ceres, new problem per fit, dense QR, default tolerances
 //   ceres_reused   the same problem object for every fit
 //   ceres_tight    reused, function 1e-14, gradient 1e-14, parameter 1e-10
@@ -10,8 +10,6 @@
 //   tiny_tight     function 1e-20 (an absolute change of cost), gradient 1e-14, parameter 1e-10
 //   cminpack       lmder with the tolerances of lmder1 at the square root of epsilon
 //   gsl            gsl_multifit_nlinear, trust region LM, xtol = gtol = 1e-8, ftol = 0
-//   naive_double   Gauss-Newton as one writes it first: no step limit, no box, Cholesky
-//   naive_float    the same in float32
 // The fits use every sensor of a fully usable array and report no flags but FIT_VALID.
 #pragma once
 

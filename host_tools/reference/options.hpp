@@ -1,7 +1,9 @@
-// Command line of the form --name value.
+// Command line of the form --name value, and --help.
 #pragma once
 
 #include <cstdint>
+#include <cstdio>
+#include <cstdlib>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -14,10 +16,16 @@ struct Option {
   std::uint64_t *number = nullptr;
 };
 
-// Throws std::runtime_error with a message for the user.
-inline void parse_options(int argc, char **argv, const std::vector<Option> &options) {
+// Throws std::runtime_error with a message for the user. On --help, prints the usage, if there is
+// one, and ends.
+inline void parse_options(int argc, char **argv, const std::vector<Option> &options,
+                          const char *usage = nullptr) {
   for (int i = 1; i < argc; i += 2) {
     const std::string name = argv[i];
+    if (usage && name == "--help") {
+      std::fputs(usage, stdout);
+      std::exit(0);
+    }
     const Option *found = nullptr;
     std::string known;
     for (const Option &option : options) {
