@@ -35,7 +35,8 @@ struct fit_settings {
                            the paper does; 0: all, which is more accurate. Fewer than four give no
                            fit. Takes the general kernel. */
   /* Weak prior on sigma, for rubber so stiff that the array can hardly tell it: one more row
-   * FIT_PRIOR_WEIGHT largest (sigma - prior_sigma) / prior_width. Width 0: none. */
+   * FIT_PRIOR_WEIGHT largest (sigma - prior_sigma) / prior_width. None unless the width is
+   * 0.001..10000 mm and sigma 0..10000 mm. */
   float prior_sigma_mm, prior_width_mm;
 };
 #define FIT_PRIOR_WEIGHT 0.01f

@@ -304,7 +304,7 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   struct parameters theta = guess(&samples, peak);
   theta.p0 = best_amplitude(&samples, &theta);
   struct prior prior = {0.0f, 0.0f};
-  if (settings->prior_width_mm > 0.0f) {
+  if (fit_has_prior(settings)) {
     prior.sigma = settings->prior_sigma_mm / array->pitch_mm;
     prior.weight = FIT_PRIOR_WEIGHT * array->pitch_mm / settings->prior_width_mm;
   }
@@ -365,7 +365,7 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   result->force_sd_N = at_most(result->force_N * sqrtf(force_variance) / before.p0, FIT_HUGE);
 
   uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
-  if (largest < FIT_LOW_SIGNAL_SIGMA * settings->noise_Pa_q10) {
+  if (settings->noise_Pa_q10 > largest / FIT_LOW_SIGNAL_SIGMA) {
     flags |= CONTACT_FLAG_LOW_SIGNAL;
   }
   if (theta.sigma >= FIT_FLAT_SIGMA) {

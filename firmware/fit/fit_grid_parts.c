@@ -72,7 +72,7 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
     readings->q14[k] = value >> 14;
   }
   readings->prior_sigma = readings->prior_weight = (struct scaled){0, 0};
-  if (settings->prior_width_mm > 0.0f) {
+  if (fit_has_prior(settings)) {
     float width = settings->prior_width_mm / array->pitch_mm;
     int32_t largest_q28 = (largest >> down) * up;
     readings->prior_sigma = scaled_from_float(settings->prior_sigma_mm / array->pitch_mm);

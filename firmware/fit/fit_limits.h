@@ -2,6 +2,8 @@
 #ifndef FIT_FIT_LIMITS_H
 #define FIT_FIT_LIMITS_H
 
+#include "fit/fit.h"
+
 #include <stdbool.h>
 
 #define FIT_SETTLED_mm 0.02f      /* a larger last step has not settled */
@@ -27,6 +29,16 @@ static inline float fit_sd_limit_mm(bool misfit, bool narrow, bool rough) {
     return 0.2f;
   }
   return narrow ? 0.5f : rough ? 0.12f : 0.2f;
+}
+
+#define FIT_PRIOR_WIDTH_MIN_mm 0.001f
+#define FIT_PRIOR_MAX_mm 10000.0f
+
+/* No comparison with a NaN holds. */
+static inline bool fit_has_prior(const struct fit_settings *settings) {
+  return settings->prior_width_mm >= FIT_PRIOR_WIDTH_MIN_mm &&
+         settings->prior_width_mm <= FIT_PRIOR_MAX_mm && settings->prior_sigma_mm >= 0.0f &&
+         settings->prior_sigma_mm <= FIT_PRIOR_MAX_mm;
 }
 
 #endif
