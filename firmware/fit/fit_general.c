@@ -18,7 +18,13 @@
 #define GUESS_PRIOR_WEIGHT 1e-3f
 #define GUESS_PRIOR_SIGMA 0.6f
 
-#define STEP_LIMIT 0.5f   /* pitches in x and y, and share of sigma, in one iteration */
+/* Longest step: in x and y in pitches, of sigma as a share of it. A longer one is shortened as a
+ * whole. Where a stiff layer is pressed between the sensors of a corner, the cost is a bent valley
+ * that leads far out of the array; a step limited along each parameter by itself leaves it. */
+#define MOVE_LIMIT 0.65f
+#define WIDEN_LIMIT 0.5f
+/* Pitches by which an iterate may leave the box that the result is held to, for the same reason. */
+#define OVERSHOOT 0.25f
 #define P0_MIN 0.05f      /* of the largest reading */
 #define P0_MAX 1e6f       /* reached 30 mm outside the array */
 #define PIVOT_FLOOR 2e-7f /* of the diagonal entry: float32 tells no less */
@@ -165,22 +171,32 @@ static struct parameters guess(const struct samples *samples, int peak) {
   return theta;
 }
 
-/* Normal equations of the model linearised at theta, in the basis e (1, X, Y, X^2 + Y^2) with
+/* Gives theta the best amplitude for its shape, p0 entering linearly, and sets up the normal
+ * equations of the model linearised there, in the basis e (1, X, Y, X^2 + Y^2) with
  * e = exp(-(X^2 + Y^2) / (2 sigma^2)) and X, Y about the centre. Returns the sum of squared
  * residuals. */
-static float linearise(const struct samples *samples, const struct parameters *theta,
-                       struct prior prior, struct normal_equations *normal) {
+static float linearise(const struct samples *samples, struct parameters *theta, struct prior prior,
+                       struct normal_equations *normal) {
   memset(normal, 0, sizeof *normal);
-  float sum = 0.0f;
+  float e[FT_MAX_SENSORS];
+  float numerator = 0.0f;
+  float denominator = 1e-30f;
   float log2_scale = 0.5f * LOG2_E / (theta->sigma * theta->sigma);
   for (int k = 0; k < samples->count; k++) {
     float x = samples->x[k] - theta->x;
     float y = samples->y[k] - theta->y;
-    float r2 = x * x + y * y;
-    float e = fit_exp2_negative(r2 * log2_scale);
-    float residual = samples->p[k] - theta->p0 * e;
+    e[k] = fit_exp2_negative((x * x + y * y) * log2_scale);
+    numerator += e[k] * samples->p[k];
+    denominator += e[k] * e[k];
+  }
+  theta->p0 = clamp(numerator / denominator, P0_MIN, P0_MAX);
+  float sum = 0.0f;
+  for (int k = 0; k < samples->count; k++) {
+    float x = samples->x[k] - theta->x;
+    float y = samples->y[k] - theta->y;
+    float residual = samples->p[k] - theta->p0 * e[k];
     sum += residual * residual;
-    float row[PARAMETERS] = {e, e * x, e * y, e * r2};
+    float row[PARAMETERS] = {e[k], e[k] * x, e[k] * y, e[k] * (x * x + y * y)};
     add_row(normal, row, residual);
   }
   if (prior.weight > 0.0f) {
@@ -192,35 +208,25 @@ static float linearise(const struct samples *samples, const struct parameters *t
   return sum;
 }
 
-/* The best amplitude for the shape of theta: p0 enters linearly. */
-static float best_amplitude(const struct samples *samples, const struct parameters *theta) {
-  float numerator = 0.0f;
-  float denominator = 1e-30f;
-  float log2_scale = 0.5f * LOG2_E / (theta->sigma * theta->sigma);
-  for (int k = 0; k < samples->count; k++) {
-    float x = samples->x[k] - theta->x;
-    float y = samples->y[k] - theta->y;
-    float e = fit_exp2_negative((x * x + y * y) * log2_scale);
-    numerator += e * samples->p[k];
-    denominator += e * e;
-  }
-  return clamp(numerator / denominator, P0_MIN, P0_MAX);
-}
-
 /* One Gauss-Newton step; returns the length of its move in pitches. */
 static float step(const struct fit_array *array, struct normal_equations *normal,
                   struct parameters *theta) {
   solve(normal, normal->rhs);
   float sigma2 = theta->sigma * theta->sigma;
   float gain = sigma2 / theta->p0;
-  float dx = clamp(gain * normal->rhs[1], -STEP_LIMIT, STEP_LIMIT);
-  float dy = clamp(gain * normal->rhs[2], -STEP_LIMIT, STEP_LIMIT);
-  float limit = STEP_LIMIT * theta->sigma;
-  float dsigma = clamp(gain * theta->sigma * normal->rhs[3], -limit, limit);
-  theta->p0 = clamp(theta->p0 + normal->rhs[0], P0_MIN, P0_MAX);
-  theta->x = clamp(theta->x + dx, array->x_min, array->x_max);
-  theta->y = clamp(theta->y + dy, array->y_min, array->y_max);
-  theta->sigma = clamp(theta->sigma + dsigma, FIT_SIGMA_MIN, FIT_SIGMA_MAX);
+  float dx = gain * normal->rhs[1];
+  float dy = gain * normal->rhs[2];
+  float ratio = gain * normal->rhs[3]; /* of the change of sigma to sigma */
+  float excess = fabsf(ratio) * (1.0f / WIDEN_LIMIT);
+  excess = fabsf(dx) * (1.0f / MOVE_LIMIT) > excess ? fabsf(dx) * (1.0f / MOVE_LIMIT) : excess;
+  excess = fabsf(dy) * (1.0f / MOVE_LIMIT) > excess ? fabsf(dy) * (1.0f / MOVE_LIMIT) : excess;
+  float share = excess > 1.0f ? 1.0f / excess : 1.0f;
+  dx *= share;
+  dy *= share;
+  theta->p0 = clamp(theta->p0 + share * normal->rhs[0], P0_MIN, P0_MAX);
+  theta->x = clamp(theta->x + dx, array->x_min - OVERSHOOT, array->x_max + OVERSHOOT);
+  theta->y = clamp(theta->y + dy, array->y_min - OVERSHOOT, array->y_max + OVERSHOOT);
+  theta->sigma = clamp(theta->sigma * (1.0f + share * ratio), FIT_SIGMA_MIN, FIT_SIGMA_MAX);
   return sqrtf(dx * dx + dy * dy);
 }
 
@@ -302,7 +308,6 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   }
 
   struct parameters theta = guess(&samples, peak);
-  theta.p0 = best_amplitude(&samples, &theta);
   struct prior prior = {0.0f, 0.0f};
   if (fit_has_prior(settings)) {
     prior.sigma = settings->prior_sigma_mm / array->pitch_mm;
@@ -315,8 +320,8 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   bool deficient;
   int left = settings->iterations;
   do {
-    before = theta;
     squares = linearise(&samples, &theta, prior, &normal);
+    before = theta;
     deficient = factorise(&normal);
     moved = step(array, &normal, &theta);
     if (left == 0) { /* the guess is asked for: the step only tells how good it is */
@@ -324,6 +329,8 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
     }
     left--;
   } while (left > 0);
+  theta.x = clamp(theta.x, array->x_min, array->x_max);
+  theta.y = clamp(theta.y, array->y_min, array->y_max);
 
   float pitch = array->pitch_mm;
   float unit_Pa = (float)largest * (1.0f / 1024.0f);

@@ -26,7 +26,9 @@ constexpr double GUESS_SHARE = 0.1;
 constexpr double GUESS_WEIGHT = 1e-3;
 constexpr double GUESS_SIGMA = 0.6;
 constexpr double PLAIN_GUESS_SIGMA = 0.65;
-constexpr double STEP_LIMIT = 0.5;
+constexpr double MOVE_LIMIT = 0.65;
+constexpr double WIDEN_LIMIT = 0.5;
+constexpr double OVERSHOOT = 0.25;
 constexpr double P0_MIN = 0.05;
 constexpr double P0_MAX = 1e6;
 constexpr double SIGMA_MIN = 0.158;
@@ -41,7 +43,6 @@ double limited(double value, double low, double high) {
 struct Factors {
   Matrix4 lower = Matrix4::Identity();
   Vector4 pivots;
-  bool deficient = false;
 
   explicit Factors(const Matrix4 &a) {
     for (int i = 0; i < 4; i++) {
@@ -55,7 +56,6 @@ struct Factors {
         pivot -= product * lower(i, j);
       }
       const double floor = a(i, i) * PIVOT_FLOOR + 1e-300;
-      deficient |= !(pivot > floor);
       pivots[i] = pivot > floor ? pivot : floor;
     }
   }
@@ -65,8 +65,6 @@ struct Factors {
     v = v.cwiseQuotient(pivots).eval();
     return lower.transpose().triangularView<Eigen::UnitUpper>().solve(v);
   }
-
-  double inverse_form(const Vector4 &v) const { return v.dot(solve(v)); }
 };
 
 // About the peak.
@@ -179,75 +177,40 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
   const double pitch_mm = static_cast<double>(array.pitch_mm);
   const double prior_weight =
       static_cast<double>(FIT_PRIOR_WEIGHT) * pitch_mm / settings.prior_width_mm;
-  Normal normal;
-  double squares = 0.0, moved = 0.0;
-  Gaussian before = theta;
-  const auto linearise = [&] {
-    normal = Normal();
-    squares = 0.0;
+  for (int i = 0; i < settings.iterations; i++) {
+    theta.p0 = best_amplitude(samples, theta);
+    Normal normal;
     for (std::size_t k = 0; k < samples.count; k++) {
       const double x = samples.x[k] - theta.x, y = samples.y[k] - theta.y;
       const double r2 = x * x + y * y;
       const double e = std::exp(-0.5 * r2 / (theta.sigma * theta.sigma));
-      const double residual = samples.p[k] - theta.p0 * e;
-      squares += residual * residual;
-      normal.add(e * Vector4(1.0, x, y, r2), residual);
+      normal.add(e * Vector4(1.0, x, y, r2), samples.p[k] - theta.p0 * e);
     }
+    const double gain = theta.sigma * theta.sigma / theta.p0;
     if (settings.prior_width_mm > 0.0) {
-      const double gain = theta.sigma * theta.sigma / theta.p0;
       normal.add(Vector4(0.0, 0.0, 0.0, prior_weight * gain * theta.sigma),
                  prior_weight * (settings.prior_sigma_mm / pitch_mm - theta.sigma));
     }
-  };
-  linearise();
-  for (int i = 0; i < settings.iterations; i++) {
-    if (i > 0) {
-      linearise();
-    }
-    before = theta;
     const Vector4 b = Factors(normal.matrix).solve(normal.rhs);
-    const double gain = theta.sigma * theta.sigma / theta.p0;
-    const double dx = limited(gain * b[1], -STEP_LIMIT, STEP_LIMIT);
-    const double dy = limited(gain * b[2], -STEP_LIMIT, STEP_LIMIT);
-    const double ds = theta.sigma * limited(gain * b[3], -STEP_LIMIT, STEP_LIMIT);
-    theta = {limited(theta.p0 + b[0], P0_MIN, P0_MAX), limited(theta.x + dx, x_min, x_max),
-             limited(theta.y + dy, y_min, y_max), limited(theta.sigma + ds, SIGMA_MIN, SIGMA_MAX)};
-    moved = std::hypot(dx, dy);
+    const double excess =
+        gain * std::max({std::abs(b[1]) / MOVE_LIMIT, std::abs(b[2]) / MOVE_LIMIT,
+                         std::abs(b[3]) / WIDEN_LIMIT});
+    const double share = excess > 1.0 ? 1.0 / excess : 1.0;
+    theta.p0 = limited(theta.p0 + share * b[0], P0_MIN, P0_MAX);
+    theta.x = limited(theta.x + share * gain * b[1], x_min - OVERSHOOT, x_max + OVERSHOOT);
+    theta.y = limited(theta.y + share * gain * b[2], y_min - OVERSHOOT, y_max + OVERSHOOT);
+    theta.sigma = limited(theta.sigma * (1.0 + share * gain * b[3]), SIGMA_MIN, SIGMA_MAX);
   }
+  theta.x = limited(theta.x, x_min, x_max);
+  theta.y = limited(theta.y, y_min, y_max);
 
   result.x_mm = theta.x * pitch_mm;
   result.y_mm = theta.y * pitch_mm;
   result.p0_Pa = theta.p0 * samples.unit_Pa;
   result.sigma_mm = theta.sigma * pitch_mm;
   result.force_N = 2.0 * M_PI * result.p0_Pa * result.sigma_mm * result.sigma_mm * 1e-6;
-
-  const Factors factors(normal.matrix);
-  const double freedom = samples.count > 4 ? static_cast<double>(samples.count) - 4.0 : 1.0;
-  const double noise = settings.noise_Pa / samples.unit_Pa;
-  const double variance = std::max(squares / freedom, noise * noise);
-  const double gain = before.sigma * before.sigma / before.p0;
-  const double sd_mm = pitch_mm * gain *
-                       std::sqrt(variance * (factors.inverse_form(Vector4::UnitY()) +
-                                             factors.inverse_form(Vector4::UnitZ())));
   result.used = usable;
   result.flags = CONTACT_FLAG_FIT_VALID;
-  if (samples.unit_Pa < 20.0 * settings.noise_Pa) {
-    result.flags |= CONTACT_FLAG_LOW_SIGNAL;
-  }
-  if (theta.sigma >= 0.98 * SIGMA_MAX) {
-    result.flags |= CONTACT_FLAG_FLAT;
-  }
-  if (factors.deficient || moved * pitch_mm > 0.02 || !(sd_mm <= 0.25)) {
-    result.flags |= CONTACT_FLAG_UNCERTAIN;
-  }
-  if (squares > 0.15 * 0.15 * samples.sum_squares) {
-    result.flags |= CONTACT_FLAG_MODEL;
-  }
-  if (theta.x <= x_min || theta.x >= x_max || theta.y <= y_min || theta.y >= y_max ||
-      theta.sigma <= SIGMA_MIN || theta.sigma >= SIGMA_MAX || theta.p0 <= P0_MIN ||
-      theta.p0 >= P0_MAX) {
-    result.flags |= CONTACT_FLAG_AT_BOUND;
-  }
   return result;
 }
 

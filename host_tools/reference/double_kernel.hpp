@@ -1,4 +1,5 @@
-// The firmware's general kernel in double precision: the same guess, step limits and box.
+// The firmware's general kernel in double precision: the same guess, step limits and box. It does
+// not judge itself: no flag but FIT_VALID.
 #pragma once
 
 #include "reference/kernels.hpp"

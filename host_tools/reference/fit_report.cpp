@@ -32,8 +32,8 @@ usage: fit_report [--kernel NAME] [--variant TEXT] [--set A|B|C|D] [--limit N] [
 --kernel (reference/kernels.hpp), --variant (part of a variant's name) and --set choose rows;
 --limit takes N presses in all (120 000 by default: A, B a third each, C, D a sixth each), for two
 and three masked sensors a tenth of that. Writes fit_error.csv and .json to --out and prints the
-same. One row per kernel, variant, set and observability; variants that a kernel does not have are
-left out:
+same. One row per kernel, variant, set (ABCD: all together) and observability; variants that a
+kernel does not have are left out:
   presses       of the set that are (not) observable (reference/dataset.hpp)
   p50_um ..     distance of the location from the reference optimum of the presses as received at
                 1/1024 Pa, with the sensors usable that the variant leaves; where there is no fit it
@@ -157,9 +157,8 @@ struct Outcome {
 };
 
 struct Row {
-  std::string kernel, variant;
-  char set;
-  bool observable;
+  std::string kernel, variant, set;
+  bool observable = false;
   std::size_t presses = 0, without_fit = 0, outlier = 0, above_10um = 0, above_100um = 0;
   double p50_um = 0, p99_um = 0, p999_um = 0, worst_um = 0;
   double truth_p50_mm = 0, truth_p99_mm = 0;
@@ -173,47 +172,60 @@ double quantile(const std::vector<double> &sorted, double share) {
   return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
 
-Row summarise(const std::vector<Case> &cases, const std::vector<Outcome> &outcomes, PressSet set,
-              bool observable) {
-  Row row;
-  row.set = reference::name_of(set);
-  row.observable = observable;
-  const bool gaussian = set == PressSet::A || set == PressSet::B;
-  std::vector<double> um, truth_mm;
-  std::size_t bad_unflagged = 0, good_flagged = 0;
-  for (std::size_t i = 0; i < cases.size(); i++) {
-    if (cases[i].observable != observable) {
-      continue;
+// What a row is made from; sets may be added together.
+class Tally {
+public:
+  void add(const std::vector<Case> &cases, const std::vector<Outcome> &outcomes, PressSet set,
+           bool observable) {
+    const bool gaussian = set == PressSet::A || set == PressSet::B;
+    for (std::size_t i = 0; i < cases.size(); i++) {
+      if (cases[i].observable != observable) {
+        continue;
+      }
+      const Outcome &outcome = outcomes[i];
+      counts_.presses++;
+      um_.push_back(outcome.from_reference_um);
+      counts_.above_10um += outcome.from_reference_um > 10.0;
+      counts_.above_100um += outcome.from_reference_um > 100.0;
+      if (!(outcome.flags & CONTACT_FLAG_FIT_VALID)) {
+        counts_.without_fit++;
+        continue;
+      }
+      counts_.outlier += outcome.outlier;
+      truth_mm_.push_back(outcome.from_truth_mm);
+      const double wrong_mm = gaussian ? outcome.from_reference_um * 1e-3 : outcome.from_truth_mm;
+      const bool warned = (outcome.flags & WARNINGS) != 0;
+      bad_unflagged_ += wrong_mm > BAD_mm && !warned;
+      good_flagged_ += wrong_mm <= BAD_mm && warned;
     }
-    const Outcome &outcome = outcomes[i];
-    row.presses++;
-    um.push_back(outcome.from_reference_um);
-    row.above_10um += outcome.from_reference_um > 10.0;
-    row.above_100um += outcome.from_reference_um > 100.0;
-    if (!(outcome.flags & CONTACT_FLAG_FIT_VALID)) {
-      row.without_fit++;
-      continue;
-    }
-    row.outlier += outcome.outlier;
-    truth_mm.push_back(outcome.from_truth_mm);
-    const double wrong_mm = gaussian ? outcome.from_reference_um * 1e-3 : outcome.from_truth_mm;
-    const bool warned = (outcome.flags & WARNINGS) != 0;
-    bad_unflagged += wrong_mm > BAD_mm && !warned;
-    good_flagged += wrong_mm <= BAD_mm && warned;
   }
-  std::sort(um.begin(), um.end());
-  std::sort(truth_mm.begin(), truth_mm.end());
-  row.p50_um = quantile(um, 0.5);
-  row.p99_um = quantile(um, 0.99);
-  row.p999_um = quantile(um, 0.999);
-  row.worst_um = quantile(um, 1.0);
-  row.truth_p50_mm = quantile(truth_mm, 0.5);
-  row.truth_p99_mm = quantile(truth_mm, 0.99);
-  const auto presses = static_cast<double>(row.presses);
-  row.bad_unflagged = static_cast<double>(bad_unflagged) / presses;
-  row.good_flagged = static_cast<double>(good_flagged) / presses;
-  return row;
-}
+
+  Row row(const char *kernel, const std::string &variant, const std::string &set,
+          bool observable) {
+    Row row = counts_;
+    row.kernel = kernel;
+    row.variant = variant;
+    row.set = set;
+    row.observable = observable;
+    std::sort(um_.begin(), um_.end());
+    std::sort(truth_mm_.begin(), truth_mm_.end());
+    row.p50_um = quantile(um_, 0.5);
+    row.p99_um = quantile(um_, 0.99);
+    row.p999_um = quantile(um_, 0.999);
+    row.worst_um = quantile(um_, 1.0);
+    row.truth_p50_mm = quantile(truth_mm_, 0.5);
+    row.truth_p99_mm = quantile(truth_mm_, 0.99);
+    const auto presses = static_cast<double>(row.presses);
+    row.bad_unflagged = static_cast<double>(bad_unflagged_) / presses;
+    row.good_flagged = static_cast<double>(good_flagged_) / presses;
+    return row;
+  }
+
+private:
+  Row counts_;
+  std::size_t bad_unflagged_ = 0, good_flagged_ = 0;
+  std::vector<double> um_, truth_mm_;
+};
 
 std::vector<Outcome> run(const reference::Kernel &kernel, const fit_array &array,
                          const Variant &variant, const std::vector<Case> &cases) {
@@ -236,15 +248,15 @@ std::vector<Outcome> run(const reference::Kernel &kernel, const fit_array &array
 }
 
 void print_header() {
-  std::printf("%-12s %-18s set obs %7s %9s %9s %9s %9s %6s %6s %8s %8s %8s %8s\n", "kernel",
+  std::printf("%-12s %-18s set  obs %7s %9s %9s %9s %9s %6s %6s %8s %8s %8s %8s\n", "kernel",
               "variant", "presses", "p50_um", "p99_um", "p99.9_um", "worst_um", ">10um", ">100um",
               "tru50_mm", "tru99_mm", "bad!flag", "good&fl");
 }
 
 void print(const Row &row) {
-  std::printf("%-12s %-18s  %c  %s %7zu %9.4g %9.4g %9.4g %9.4g %6zu %6zu %8.3g %8.3g %7.3f%% "
+  std::printf("%-12s %-18s %-4s %s %7zu %9.4g %9.4g %9.4g %9.4g %6zu %6zu %8.3g %8.3g %7.3f%% "
               "%7.3f%%\n",
-              row.kernel.c_str(), row.variant.c_str(), row.set, row.observable ? "yes" : " no",
+              row.kernel.c_str(), row.variant.c_str(), row.set.c_str(), row.observable ? "yes" : " no",
               row.presses, row.p50_um, row.p99_um, row.p999_um, row.worst_um, row.above_10um,
               row.above_100um, row.truth_p50_mm, row.truth_p99_mm, 100.0 * row.bad_unflagged,
               100.0 * row.good_flagged);
@@ -379,21 +391,30 @@ int report(const Options &options) {
       if (variant.name.find(options.variant) == std::string::npos || !has(kernel, variant)) {
         continue;
       }
+      Tally together[2];
+      const auto keep = [&](const Row &row) {
+        if (row.presses > 0) {
+          print(row);
+          rows.push_back(row);
+        }
+      };
       for (PressSet set : reference::ALL_PRESS_SETS) {
-        if (!options.set.empty() && options.set != std::string(1, reference::name_of(set))) {
+        const std::string name(1, reference::name_of(set));
+        if (!options.set.empty() && options.set != name) {
           continue;
         }
         const std::vector<Case> &cases = cases_of(set, variant.mask);
         const std::vector<Outcome> outcomes = run(kernel, array, variant, cases);
         for (bool observable : {true, false}) {
-          Row row = summarise(cases, outcomes, set, observable);
-          if (row.presses == 0) {
-            continue;
-          }
-          row.kernel = kernel.name;
-          row.variant = variant.name;
-          print(row);
-          rows.push_back(row);
+          Tally tally;
+          tally.add(cases, outcomes, set, observable);
+          together[observable].add(cases, outcomes, set, observable);
+          keep(tally.row(kernel.name, variant.name, name, observable));
+        }
+      }
+      if (options.set.empty()) {
+        for (bool observable : {true, false}) {
+          keep(together[observable].row(kernel.name, variant.name, "ABCD", observable));
         }
       }
     }

@@ -56,8 +56,8 @@ struct Kernel {
 // fit      fit_gaussian, as the firmware calls it: it picks the kernel and masks outliers
 // grid     the firmware's kernel for a full rectangle, fixed point
 // general  its kernel for any layout, float32
-// double   the general kernel's iteration in double precision, same guess, limits and flags: what
-//          is left between it and the reference is the optimiser's doing, the rest is rounding
+// double   the general kernel's iteration in double precision, same guess and limits: what is left
+//          between it and the reference is the optimiser's doing, the rest is rounding
 // naive_float, naive_double, lm_float, lm_double
 //          what one would write instead: alternatives/alternatives.h
 const std::vector<Kernel> &all_kernels();

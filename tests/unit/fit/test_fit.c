@@ -391,7 +391,7 @@ static void test_unsettled_fits_are_uncertain(void) {
       if (moved_mm > 0.021) {
         TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_UNCERTAIN, result.flags);
         unsettled += result.location_sd_mm < 0.2f;
-      } else if (moved_mm < 0.019 && result.location_sd_mm < 0.2f) {
+      } else if (moved_mm < 0.019 && result.location_sd_mm < 0.12f) {
         TEST_ASSERT_BITS_LOW(CONTACT_FLAG_UNCERTAIN, result.flags);
         settled++;
       }
