@@ -1,18 +1,19 @@
 #!/bin/sh
 # Sets up a Debian 12 or Ubuntu machine and does one of the project's main jobs.
-# usage: sh cmake/bootstrap.sh demo|test
+# usage: sh cmake/bootstrap.sh demo|test|report
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
 
 usage() {
-  echo "usage: sh cmake/bootstrap.sh demo|test" >&2
-  echo "  demo  build everything, play presses and slips to the emulated fingertip, draw what it felt" >&2
-  echo "  test  build everything and run the whole test suite" >&2
+  echo "usage: sh cmake/bootstrap.sh demo|test|report" >&2
+  echo "  demo    build everything, play presses and slips to the emulated fingertip, draw what it felt" >&2
+  echo "  test    build everything and run the whole test suite" >&2
+  echo "  report  build everything, measure the fit's error and run time, write build/report" >&2
   exit 2
 }
 [ $# -eq 1 ] || usage
-case $1 in demo | test) ;; *) usage ;; esac
+case $1 in demo | test | report) ;; *) usage ;; esac
 
 say() { printf '%s\n' "== $*"; }
 
@@ -83,4 +84,6 @@ cmake --build --preset host
 case $1 in
   demo) exec sh host_tools/demo/demo.sh ;;
   test) exec ctest --preset host -j 2 ;;
+  report) exec /usr/bin/python3 host_tools/reference/report.py --build build/host \
+    --image build/pico_mux/fit_cycles.bin -o build/report --plot host_tools/reference/fit_report.png ;;
 esac

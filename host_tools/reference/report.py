@@ -1,0 +1,384 @@
+#!/usr/bin/python3
+"""Error of the fit against its run time, beside every alternative: build/report.
+
+    report.py --build build/host --image build/pico_mux/fit_cycles.bin -o build/report
+
+Runs fit_report (error against the reference), on_chip/bench.mjs (cycles on the emulated chip), fit_bench (time on this
+host, paired), fit_stiff and fit_recordings, and merges what they find:
+
+    fit.json        the figures by which the fit is judged, with their goals
+    fit_table.csv   every kernel and variant: cycles, milliseconds at 125 MHz, error; fit_table.md says the same
+    fit_report.png  the Pareto front
+
+Errors are distances of the location from the reference optimum over the observable presses of the sets A to D.
+"""
+import argparse
+import csv
+import json
+import math
+import pathlib
+import shutil
+import subprocess
+import sys
+import time
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "python"))
+from fingertip_files import InputError, run_tool, write_text  # noqa: E402
+
+CLOCK_Hz = 125e6
+SETS = ("A", "B", "C", "D")
+ALL_SETS = "".join(SETS)
+USUAL = "iterations=7"
+MASKS = ("mask=random", "mask=peak", "mask=random2", "mask=random3")
+
+
+class Steps:
+    """Runs the tools one after the other and says so."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.start_s = time.monotonic()
+
+    def run(self, what, *command):
+        """Output goes to a log beside the results; progress of the reference to the terminal."""
+        print(f"{time.monotonic() - self.start_s:5.0f} s  {what}", flush=True)
+        log = self.folder / f"{pathlib.Path(command[0] if command[0] != 'node' else command[1]).stem}.log"
+        with open(log, "w", encoding="utf-8") as file:
+            done = subprocess.run([str(part) for part in command], stdout=file)
+        if done.returncode != 0:
+            raise InputError(f"{what} failed, exit status {done.returncode}; see above and {log}")
+
+
+def measure(options, out):
+    steps = Steps(out)
+    tools = pathlib.Path(options.build) / "host_tools/reference"
+    for tool in ("fit_report", "fit_bench"):
+        if not (tools / tool).exists():
+            raise InputError(f"{tools / tool} is not there; build it: cmake --build --preset host")
+    if not pathlib.Path(options.image).exists():
+        raise InputError(f"{options.image} is not there; build it: cmake --preset pico_mux && cmake --build --preset pico_mux")
+    common = ("--limit", options.limit, "--seed", options.seed, "--out", out, "--cache", out / "cache")
+    steps.run("error against the reference (the first run solves the reference, about eight minutes)", tools / "fit_report", *common)
+    jobs = out / "fit_jobs.json"
+    steps.run("presses for the chip", tools / "fit_report", *common, "--jobs", jobs)
+    steps.run("cycles on the emulated chip", "node", HERE / "on_chip/bench.mjs", "--image", options.image, "--jobs", jobs,
+              "--out", out / "fit_cycles.csv", "--budget", options.budget)
+    steps.run("time on this host", tools / "fit_bench", "--limit", max(1200, options.limit // 10), "--passes", options.passes,
+              "--seed", options.seed, "--out", out, "--cache", out / "cache")
+    for tool, name in (("fit_stiff", "stiff.json"), ("fit_recordings", "recordings.json")):
+        (out / name).unlink(missing_ok=True)
+        if (tools / tool).exists():
+            steps.run(tool, tools / tool, "--out", out)
+    print(f"{time.monotonic() - steps.start_s:5.0f} s  table and plot", flush=True)
+
+
+def read_json(path):
+    if not path.exists():
+        return None
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+class Results:
+    def __init__(self, out):
+        self.rows = {}
+        report = read_json(out / "fit_error.json")
+        self.seed = report["seed"]
+        for row in report["rows"]:
+            self.rows[row["kernel"], row["variant"], row["set"], row["observable"]] = row
+        with open(out / "fit_cycles.csv", newline="", encoding="utf-8") as file:
+            self.cycles = {(row["kernel"], row["variant"]): row for row in csv.DictReader(file)}
+        self.bench = read_json(out / "fit_bench.json")
+        self.host = {row["kernel"]: row for row in self.bench["rows"]}
+        self.stiff = read_json(out / "stiff.json")
+        self.recordings = read_json(out / "recordings.json")
+
+    def error(self, kernel, variant, set_, key):
+        """null stands for infinite: too many presses without a fit."""
+        row = self.rows.get((kernel, variant, set_, True))
+        if row is None:
+            return None
+        return math.inf if row[key] is None else row[key]
+
+    def worst(self, kernel, variant, key, sets=SETS):
+        return max(self.error(kernel, variant, set_, key) for set_ in sets)
+
+    def per_set(self, kernel, variant, key):
+        return {set_: self.error(kernel, variant, set_, key) for set_ in SETS}
+
+    def percent_of_all(self, kernel, variant, set_, key):
+        """Of the observable presses of a set and the others together."""
+        rows = [self.rows[k] for k in ((kernel, variant, set_, True), (kernel, variant, set_, False)) if k in self.rows]
+        return 100 * sum(row[key] * row["presses"] for row in rows) / sum(row["presses"] for row in rows)
+
+    def cycles_max(self, kernel, variants):
+        return max(int(self.cycles[kernel, variant]["cycles_max"]) for variant in variants)
+
+    def variants(self):
+        seen = {}
+        for kernel, variant, _, _ in self.rows:
+            seen[kernel, variant] = None
+        return list(seen)
+
+
+# Of fit.json: what to stay below or above, as the fit is meant to be.
+GOALS = (
+    ("observable_presses", ">=", 100000), ("p99_9_um", "<=", 0.5), ("above_100um", "<=", 1), ("masked_p99_9_um", "<=", 1),
+    ("masked_p99_um_d", "<=", 10), ("masked_peak_p99_um", "<=", 1), ("masked_peak_above_100um_d", "<=", "masked_peak_above_100um_d_double"),
+    ("bad_unflagged_percent_worst", "<=", 0.5), ("good_flagged_percent_c", "<=", 5), ("good_flagged_percent_d", "<=", 25),
+    ("cold_cycles", "<=", 30000), ("masked_cycles", "<=", 60000), ("speed_vs_ceres", ">=", 20), ("speed_vs_tinysolver", ">=", 2),
+    ("speed_vs_cminpack", ">=", 6), ("recordings_median_mm", "<=", 0.12))
+
+
+def figures(results):
+    """fit.json. Masked: one random sensor, or the peak sensor, is unusable for the reference too."""
+    r = results
+    ours = r.bench["rows"][0]["kernel"]  # what fit_bench compares the others with
+    speed = {name: r.host[name]["ratio"] for name in ("ceres_reused", "tiny_solver", "cminpack")}
+    found = {
+        "observable_presses": sum(r.error("fit", USUAL, s, "presses") for s in SETS),
+        "p99_9_um": r.worst("fit", USUAL, "p999_um"),
+        "p99_9_um_per_set": r.per_set("fit", USUAL, "p999_um"),
+        "above_100um": sum(r.error("fit", USUAL, s, "above_100um") for s in SETS),
+        "above_100um_per_set": r.per_set("fit", USUAL, "above_100um"),
+        "masked_p99_9_um": r.worst("fit", "mask=random", "p999_um", SETS[:3]),
+        "masked_p99_9_um_per_set": r.per_set("fit", "mask=random", "p999_um"),
+        "masked_p99_um_d": r.error("fit", "mask=random", "D", "p99_um"),
+        "masked_peak_p99_um": r.worst("fit", "mask=peak", "p99_um", SETS[:3]),
+        "masked_peak_p99_um_per_set": r.per_set("fit", "mask=peak", "p99_um"),
+        "masked_peak_above_100um_d": r.error("fit", "mask=peak", "D", "above_100um"),
+        "masked_peak_above_100um_d_double": r.error("double", "mask=peak guess=firmware", "D", "above_100um"),
+        "masked_observable_presses": {mask[5:]: sum(r.error("fit", mask, s, "presses") for s in SETS) for mask in MASKS},
+        "bad_unflagged_percent_worst": None if r.stiff is None else 100 * r.stiff["bad_unflagged_worst"],
+        "bad_unflagged_percent_per_set": {s: r.percent_of_all("fit", USUAL, s, "bad_unflagged") for s in SETS},
+        "good_flagged_percent_c": r.percent_of_all("fit", USUAL, "C", "good_flagged"),
+        "good_flagged_percent_d": r.percent_of_all("fit", USUAL, "D", "good_flagged"),
+        "cold_cycles": r.cycles_max("fit", [USUAL]),
+        "masked_cycles": r.cycles_max("fit", MASKS),
+        "general_cycles": r.cycles_max("general", [USUAL]),
+        "speed_vs_ceres": speed["ceres_reused"],
+        "speed_vs_tinysolver": speed["tiny_solver"],
+        "speed_vs_cminpack": speed["cminpack"],
+        "speed_of": ours,
+        "host_p99_9_um": {name: r.host[name]["p999_um"] for name in (ours, *speed)},
+        "recordings_median_mm": None if r.recordings is None else r.recordings["median_mm"],
+        "seed": r.seed,
+        "processor": r.bench["processor"],
+    }
+    goals = {}
+    for name, sign, limit in GOALS:
+        bound = found[limit] if isinstance(limit, str) else limit
+        value = found[name]
+        met = None if value is None else value <= bound if sign == "<=" else value >= bound
+        goals[name] = {"goal": f"{sign} {bound:g}", "met": met}
+    return {**found, "goals": goals}
+
+
+def finite(value):
+    """For JSON, which has no infinity."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def table(results):
+    """One dict for each kernel and variant."""
+    rows = []
+    for kernel, variant in results.variants():
+        cycles = results.cycles.get((kernel, variant), {})
+        median = cycles.get("cycles_median")
+        row = {"kernel": kernel, "variant": variant, **{f"cycles_{k}": cycles.get(f"cycles_{k}", "") for k in ("min", "median", "max")},
+               "ms": "" if median is None else int(median) / CLOCK_Hz * 1e3,
+               "host_us": results.host[kernel]["us"] if variant == USUAL and kernel in results.host else "",
+               "presses": results.error(kernel, variant, ALL_SETS, "presses"),
+               "above_100um": results.error(kernel, variant, ALL_SETS, "above_100um")}
+        for key in ("p50_um", "p99_um", "p999_um", "worst_um"):
+            row[key] = results.error(kernel, variant, ALL_SETS, key)
+            for set_ in SETS:
+                row[f"{key}_{set_}"] = results.error(kernel, variant, set_, key)
+        for set_ in SETS:
+            row[f"truth_p99_mm_{set_}"] = results.error(kernel, variant, set_, "truth_p99_mm")
+        rows.append(row)
+    for kernel, host in results.host.items():
+        if (kernel, USUAL) not in results.variants():
+            rows.append({"kernel": kernel, "variant": "host library", "host_us": host["us"], "presses": results.bench["presses"],
+                         "above_100um": host["above_100um"], "p50_um": host["p50_um"],
+                         "p999_um": math.inf if host["p999_um"] is None else host["p999_um"]})
+    return rows
+
+
+def write_table_csv(path, rows):
+    names = list(rows[0])
+    lines = [",".join(names)]
+    lines += [",".join("" if row.get(n) is None else f"{row[n]:.6g}" if isinstance(row.get(n), float) else str(row.get(n, "")) for n in names)
+              for row in rows]
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def number(value, digits=2):
+    if value is None or value == "":
+        return ""
+    if not math.isfinite(value):
+        return "none"
+    if value >= 1e6:
+        return f"{value:.0e}"
+    return f"{value:.{digits}g}" if value < 100 else f"{value:.0f}"
+
+
+def write_table_md(path, rows, found):
+    lines = ["# Error of the fit against run time", "",
+             "Written by `sh cmake/bootstrap.sh report`. Cycles: emulated Cortex-M0+, median; ms at 125 MHz. um: distance of the location from",
+             f"the reference optimum over the observable presses of sets A to D, seed {found['seed']}. host us: {found['processor']}.", "",
+             "| figure | found | goal | met |", "|---|---|---|---|"]
+    for name, goal in found["goals"].items():
+        met = {None: "not measured", True: "yes", False: "NO"}[goal["met"]]
+        value = "" if found[name] is None else f"{found[name]:.4g}" if isinstance(found[name], float) else found[name]
+        lines.append(f"| {name} | {value} | {goal['goal']} | {met} |")
+    lines += ["", "| kernel | variant | cycles | ms | host us | p50 | p99 | p99.9 | A p99.9 | B | C | D | above 100 um | C, D: p99 mm to the truth |",
+              "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"]
+    for row in rows:
+        cells = [row["kernel"], row["variant"], row.get("cycles_median", ""), number(row.get("ms"), 3), number(row["host_us"], 3),
+                 *(number(row.get(key)) for key in ("p50_um", "p99_um", "p999_um", *(f"p999_um_{s}" for s in SETS))),
+                 f"{row['above_100um']} of {row['presses']}",
+                 ", ".join(number(row[f"truth_p99_mm_{s}"]) for s in "CD" if f"truth_p99_mm_{s}" in row)]
+        lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def pareto(points):
+    """Those of (x, y) that no other beats in both."""
+    front = []
+    for x, y in sorted(points):
+        if not front or y < front[-1][1]:
+            front.append((x, y))
+    return front
+
+
+def plot(path, results, found):
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    ink, faint, grid = "#22252e", "#8a8f9c", "#e6e8ee"
+    colours = {"fit": "#1f6fd6", "general": "#0e9aa7", "naive_float": "#e08a1e", "naive_double": "#b5651d", "lm_float": "#a05cc5",
+               "lm_double": "#6f3d94", "double": "#8a8f9c"}
+    labels = {"fit": "firmware, fixed point", "general": "firmware, float32, any layout", "naive_float": "Gauss-Newton, expf",
+              "naive_double": "Gauss-Newton, exp", "lm_float": "Levenberg-Marquardt, float", "lm_double": "Levenberg-Marquardt, double"}
+    low_um, high_um = 1e-3, 1e5
+
+    def shown(um):
+        return min(max(um, low_um), high_um)
+
+    plt.rcParams.update({
+        "font.size": 9, "axes.edgecolor": "#b4bac6", "axes.labelcolor": ink, "xtick.color": faint, "ytick.color": faint,
+        "text.color": ink, "axes.spines.top": False, "axes.spines.right": False, "axes.titlecolor": faint})
+    figure, (chip, host) = plt.subplots(1, 2, figsize=(13, 6.6), width_ratios=[1.5, 1], sharey=True)
+    figure.subplots_adjust(left=0.06, right=0.985, top=0.8, bottom=0.09, wspace=0.06)
+
+    every = []
+    for kernel, label in labels.items():
+        line = []
+        for k in range(51):
+            cycles, error = results.cycles.get((kernel, f"iterations={k}")), results.error(kernel, f"iterations={k}", ALL_SETS, "p999_um")
+            if cycles is not None and error is not None:
+                line.append((int(cycles["cycles_median"]), shown(error), k))
+        every += [point[:2] for point in line]
+        chip.plot([p[0] for p in line], [p[1] for p in line], "o-", color=colours[kernel], ms=4, lw=1.2, label=label, zorder=3)
+        for x, y, k in line:
+            if k in (0, 4, 7, 10, 50):
+                chip.annotate(str(k), (x, y), (0, 5), textcoords="offset points", size=7, ha="center", color=colours[kernel])
+        for n in range(4, 15):
+            cycles, error = results.cycles.get((kernel, f"n_largest={n}")), results.error(kernel, f"n_largest={n}", ALL_SETS, "p999_um")
+            if cycles is not None and error is not None:
+                chip.plot(int(cycles["cycles_median"]), shown(error), "x", color=colours[kernel], ms=5, zorder=3,
+                          label="n largest, 4 to 14" if n == 4 else None)
+    for variant, marker, label in (("mask=random", "s", "one random sensor masked"), ("mask=peak", "D", "peak sensor masked")):
+        if ("fit", variant) in results.cycles:
+            chip.plot(int(results.cycles["fit", variant]["cycles_median"]), shown(results.error("fit", variant, ALL_SETS, "p999_um")),
+                      marker, mfc="white", mec=colours["fit"], ms=6, label=label, zorder=4)
+    front = pareto(every)
+    chip.step([p[0] for p in front], [p[1] for p in front], where="post", color="#b4bac6", lw=5, alpha=0.6, solid_capstyle="round",
+              label="Pareto front", zorder=1)
+    chip.set_xlabel("cycles of one cold fit on the emulated Cortex-M0+, median (numbers: iterations)")
+    chip.set_ylabel("p99.9 distance to the least-squares optimum, um")
+    chip.set_title("on the chip", loc="left", size=10)
+    chip.legend(loc="lower left", fontsize=7.5, frameon=False)
+    top = chip.secondary_xaxis("top", functions=(lambda c: c / CLOCK_Hz * 1e3, lambda ms: ms * CLOCK_Hz / 1e3))
+    top.set_xlabel("ms at 125 MHz", size=8, color=faint, loc="right")
+    top.spines["top"].set_visible(False)
+
+    for kernel, row in results.host.items():
+        if kernel in ("grid", "ceres_new"):
+            continue  # as fit, and as ceres_reused
+        error = math.inf if row["p999_um"] is None else row["p999_um"]
+        colour = colours.get(kernel, ink)
+        host.errorbar(row["us"], shown(error), xerr=[[row["us"] - row["us_p10"]], [row["us_p90"] - row["us"]]], fmt="o", ms=5,
+                      color=colour, elinewidth=0.8, zorder=3)
+        above = kernel not in ("naive_float", "lm_float", "ceres_reused")
+        host.annotate(kernel, (row["us"], shown(error)), (0, 5 if above else -11), textcoords="offset points", size=7.5,
+                      ha="center", color=colour)
+    host.set_xlabel("us of one fit on the host, median and 10..90 %, paired")
+    host.set_title("on this host", loc="left", size=10)
+    for axes in (chip, host):
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_ylim(low_um * 0.7, high_um * 1.5)
+        axes.grid(color=grid, lw=0.6)
+        axes.set_axisbelow(True)
+    figure.text(0.06, 0.945, "The fit: error against run time", size=15, weight="bold")
+    figure.text(0.06, 0.905, f"{found['observable_presses']} observable presses of sets A to D (simulated), seed {found['seed']}; errors outside the "
+                f"axis are drawn on its edge; host: {found['processor']}", size=8.5)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def whole(text):
+    value = int(text)
+    if value <= 0:
+        raise ValueError
+    return value
+
+
+def main(argv):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", required=True, metavar="DIR", help="build folder of the host tools")
+    parser.add_argument("--image", required=True, metavar="fit_cycles.bin", help="built with the board's firmware")
+    parser.add_argument("-o", "--output", required=True, metavar="DIR")
+    parser.add_argument("--limit", type=whole, default=130000, help="presses, in all (default: %(default)s)")
+    parser.add_argument("--seed", type=whole, default=20221015)
+    parser.add_argument("--budget", type=float, default=15.0, help="million emulated cycles for each variant (default: %(default)s)")
+    parser.add_argument("--passes", type=whole, default=3, help="of the timing on the host (default: %(default)s)")
+    parser.add_argument("--plot", metavar="FILE.png", help="a second copy of the plot")
+    parser.add_argument("--only-merge", action="store_true", help="measure nothing, take what is in the folder")
+    parser.add_argument("--check", action="store_true", help="exit status 1 if a goal is not met")
+    options = parser.parse_args(argv)
+    out = pathlib.Path(options.output)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{out}: {error.strerror}; choose another place") from None
+    if not options.only_merge:
+        measure(options, out)
+    try:
+        results = Results(out)
+        found = figures(results)
+    except (KeyError, OSError, TypeError) as error:
+        raise InputError(f"{out}: the results there are incomplete ({error!r}); run without --only-merge") from None
+    rows = table(results)
+    write_text(out / "fit.json", json.dumps(finite(found), indent=2) + "\n")
+    write_table_csv(out / "fit_table.csv", rows)
+    write_table_md(out / "fit_table.md", rows, found)
+    plot(out / "fit_report.png", results, found)
+    if options.plot:
+        shutil.copyfile(out / "fit_report.png", options.plot)
+    missed = [name for name, goal in found["goals"].items() if goal["met"] is False]
+    for name, goal in found["goals"].items():
+        value = "not measured" if found[name] is None else f"{found[name]:.6g}"
+        print(f"{'MISSED' if goal['met'] is False else 'ok' if goal['met'] else '-':7s} {name:28s} {value:>12s}   goal {goal['goal']}")
+    print(f"report: {out / 'fit.json'}, {out / 'fit_table.md'}, {out / 'fit_report.png'}")
+    return 1 if options.check and missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(run_tool("report.py", main))
