@@ -5,6 +5,7 @@
 #ifndef FIT_FIT_FIXED_H
 #define FIT_FIT_FIXED_H
 
+#include "fit/fit_tables.h"
 #include "port/divide.h"
 
 #include <stdint.h>
@@ -13,35 +14,35 @@
 
 /* a * b / 2^32 for |a|, |b| <= 2^30, error below 2 units: three 16-bit products. */
 FIXED_INLINE int32_t fixed_mul_q32(int32_t a, int32_t b) {
-  int32_t a_high = a >> 16, a_low = a & 0xFFFF;
-  int32_t b_high = b >> 16, b_low = b & 0xFFFF;
+  int32_t a_high = a >> 16, a_low = (uint16_t)a;
+  int32_t b_high = b >> 16, b_low = (uint16_t)b;
   return a_high * b_high + ((a_high * b_low + a_low * b_high) >> 16);
 }
 
 /* a * b / 2^30, likewise, error below 3 units. |result| < 2^31. */
 FIXED_INLINE int32_t fixed_mul_q30(int32_t a, int32_t b) {
-  int32_t a_high = a >> 16, a_low = a & 0xFFFF;
-  int32_t b_high = b >> 16, b_low = b & 0xFFFF;
+  int32_t a_high = a >> 16, a_low = (uint16_t)a;
+  int32_t b_high = b >> 16, b_low = (uint16_t)b;
   return a_high * b_high * 4 + ((a_high * b_low + a_low * b_high) >> 14);
 }
 
 /* a * b / 2^28 and / 2^26 with all four products, error below 2 units. |result| < 2^31. */
 FIXED_INLINE int32_t fixed_mul_q28(int32_t a, int32_t b) {
-  int32_t a_high = a >> 16, a_low = a & 0xFFFF;
-  int32_t b_high = b >> 16, b_low = b & 0xFFFF;
+  int32_t a_high = a >> 16, a_low = (uint16_t)a;
+  int32_t b_high = b >> 16, b_low = (uint16_t)b;
   uint32_t low = (uint32_t)a_low * (uint32_t)b_low;
   return a_high * b_high * 16 + ((a_high * b_low + a_low * b_high) >> 12) + (int32_t)(low >> 28);
 }
 FIXED_INLINE int32_t fixed_mul_q26(int32_t a, int32_t b) {
-  int32_t a_high = a >> 16, a_low = a & 0xFFFF;
-  int32_t b_high = b >> 16, b_low = b & 0xFFFF;
+  int32_t a_high = a >> 16, a_low = (uint16_t)a;
+  int32_t b_high = b >> 16, b_low = (uint16_t)b;
   uint32_t low = (uint32_t)a_low * (uint32_t)b_low;
   return a_high * b_high * 64 + ((a_high * b_low + a_low * b_high) >> 10) + (int32_t)(low >> 26);
 }
 
 /* a * b / 2^16 for any a and |b| < 2^15. */
 FIXED_INLINE int32_t fixed_mul_16(int32_t a, int32_t b) {
-  return (a >> 16) * b + (((a & 0xFFFF) * b) >> 16);
+  return (a >> 16) * b + (((int32_t)(uint16_t)a * b) >> 16);
 }
 
 /* Position of the highest set bit plus one; 0 for 0. */
@@ -55,19 +56,7 @@ FIXED_INLINE int32_t fixed_bits(uint32_t value) {
     count += 8;
     value >>= 8;
   }
-  if (value >> 4) {
-    count += 4;
-    value >>= 4;
-  }
-  if (value >> 2) {
-    count += 2;
-    value >>= 2;
-  }
-  if (value >> 1) {
-    count += 1;
-    value >>= 1;
-  }
-  return count + (int32_t)value;
+  return count + fit_bits_table[value];
 }
 
 /* |value| without its last unit for negative ones: good for judging sizes. */
@@ -104,7 +93,8 @@ FIXED_INLINE struct scaled scaled_from(int32_t value, int32_t exponent) {
 
 /* The product of two normalised mantissas keeps 14 of its 15 bits at least. */
 FIXED_INLINE struct scaled scaled_mul(struct scaled a, struct scaled b) {
-  struct scaled result = {(a.mantissa * b.mantissa) >> 15, a.exponent + b.exponent + 15};
+  struct scaled result = {(a.mantissa * b.mantissa + (1 << 14)) >> 15,
+                          a.exponent + b.exponent + 15};
   return result;
 }
 
@@ -161,8 +151,8 @@ FIXED_INLINE int32_t scaled_ratio(struct scaled a, struct scaled b, int32_t q) {
   return quotient >> (shift < -31 ? 31 : -shift);
 }
 
-/* Square root of a non-negative value: three Newton steps from the middle of the mantissa's range.
- */
+/* Square root of a non-negative value: two Newton steps from a straight line that is within 3.2 %
+ * of it. */
 FIXED_INLINE struct scaled scaled_sqrt(struct scaled a) {
   a = scaled_from(a.mantissa, a.exponent);
   if (a.mantissa <= 0) {
@@ -171,11 +161,11 @@ FIXED_INLINE struct scaled scaled_sqrt(struct scaled a) {
   }
   int32_t odd = a.exponent & 1;
   int32_t square = a.mantissa * (1 << (14 + odd)); /* 2^28 .. 2^30 */
-  int32_t root = 23170;
-  for (int i = 0; i < 3; i++) {
-    root = (root + port_divide(square, root)) >> 1;
-  }
-  return scaled_from(root, (a.exponent - odd - 14) / 2);
+  int32_t root = (((square >> 14) * 5584) >> 14) + 11249;
+  root = (root + port_divide(square, root)) >> 1;
+  root = (root + port_divide(square, root)) >> 1;
+  struct scaled result = {root, (a.exponent - odd - 14) / 2};
+  return result;
 }
 
 #endif

@@ -54,27 +54,28 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
   int32_t largest = 0;
   for (int k = 0; k < NODES; k++) {
     int32_t value = pressure_Pa_q10[sensor[k]];
+    readings->q28[k] = value;
     largest = value > largest ? value : largest;
   }
   if (largest <= 0) {
     return false;
   }
   int32_t shift = 28 - fixed_bits((uint32_t)largest);
-  int32_t up = shift >= 0 ? 1 << shift : 1;
-  int32_t down = shift >= 0 ? 0 : -shift;
+  int32_t up = shift >= 0 ? shift : 0;
+  int32_t down = up - shift;
   readings->largest = largest;
   readings->shift = shift;
   for (int k = 0; k < NODES; k++) {
-    int32_t value = pressure_Pa_q10[sensor[k]];
+    int32_t value = readings->q28[k];
     value = value < -largest ? -largest : value;
-    value = (value >> down) * up;
+    value = (value >> down) * (1 << up);
     readings->q28[k] = value;
-    readings->q14[k] = value >> 14;
+    readings->q14[k] = (value + (1 << 13)) >> 14;
   }
   readings->prior_sigma = readings->prior_weight = (struct scaled){0, 0};
   if (fit_has_prior(settings)) {
     float width = settings->prior_width_mm / array->pitch_mm;
-    int32_t largest_q28 = (largest >> down) * up;
+    int32_t largest_q28 = (largest >> down) * (1 << up);
     readings->prior_sigma = scaled_from_float(settings->prior_sigma_mm / array->pitch_mm);
     readings->prior_weight =
         scaled_mul(scaled_from_float(FIT_PRIOR_WEIGHT / width), scaled_from(largest_q28, -28));

@@ -28,6 +28,7 @@
 /* The pressures of one frame in grid order [column][row], the largest from 0.5 to 1. */
 struct readings {
   int32_t q28[NODES], q14[NODES];
+  int32_t residual[NODES];                 /* room for the kernels */
   int32_t shift;                           /* Q28 = 1/1024 Pa times 2^shift */
   int32_t largest;                         /* 1/1024 Pa */
   struct scaled prior_sigma, prior_weight; /* pitches, per pitch; weight 0: none */
@@ -51,16 +52,18 @@ struct axis {
   int32_t offset;                             /* Q26, of the centre from the nearest node */
 };
 
-/* 2^-z, z in Q22, result Q30; relative error below 2^-26. */
-FIXED_INLINE int32_t exp2_negative(int32_t z_q22) {
-  int32_t whole = z_q22 >> 22;
+/* 2^-z, z in Q22, result Q30; relative error below 2^-25. */
+FIXED_INLINE int32_t exp2_negative(uint32_t z_q22) {
+  uint32_t whole = z_q22 >> 22;
   if (whole > 29) {
     return 0;
   }
-  int32_t head = fit_exp2_table[(z_q22 >> 14) & 255];
-  int32_t rest = z_q22 & 0x3FFF;
-  int32_t minus = rest * (45426 - ((rest * 15743) >> 22)); /* 1 - 2^-rest, Q38 */
-  return (head - (fixed_mul_q32(head, minus) >> 6)) >> whole;
+  uint32_t head = (uint32_t)fit_exp2_table[(z_q22 >> 14) & 255];
+  uint32_t rest = z_q22 & 0x3FFF;
+  uint32_t minus = rest * (45426 - ((rest * 15743) >> 22)); /* 1 - 2^-rest, Q38 */
+  minus = (minus + (1 << 13)) >> 14;                        /* Q24 */
+  uint32_t loss = (head >> 16) * minus + (((uint16_t)head * minus) >> 16);
+  return (int32_t)((head - (loss >> 8)) >> whole);
 }
 
 FIXED_INLINE void gaussian(struct axis *axis, int nodes, int origin, int32_t centre,
@@ -77,7 +80,7 @@ FIXED_INLINE void gaussian(struct axis *axis, int nodes, int origin, int32_t cen
       rise = fixed_clamp(rise, -INT32_MAX / 5, INT32_MAX / 5);
     }
     int32_t z = k * rise;
-    axis->g[i] = exp2_negative(z < 0 ? 0 : z);
+    axis->g[i] = exp2_negative(z < 0 ? 0 : (uint32_t)z);
   }
 }
 

@@ -9,11 +9,15 @@
 
 static inline __attribute__((always_inline)) int32_t port_divide(int32_t numerator,
                                                                  int32_t denominator) {
-  volatile int32_t *const divider = (volatile int32_t *)0xd0000068; /* DIV_SDIVIDEND */
-  divider[0] = numerator;
-  divider[1] = denominator;                                           /* DIV_SDIVISOR starts it */
-  __asm volatile("b 1f\n1: b 1f\n1: b 1f\n1: b 1f\n1:" ::: "memory"); /* 4 x 2 cycles */
-  return divider[2];                                                  /* DIV_QUOTIENT */
+  const uint32_t sio = 0xd0000060;
+  int32_t quotient;
+  __asm("str %1, [%3, #8]\n\t"                     /* DIV_SDIVIDEND */
+        "str %2, [%3, #12]\n\t"                    /* DIV_SDIVISOR starts it */
+        "b 1f\n1:\tb 1f\n1:\tb 1f\n1:\tb 1f\n1:\t" /* 4 x 2 cycles */
+        "ldr %0, [%3, #16]"                        /* DIV_QUOTIENT */
+        : "=l"(quotient)
+        : "l"(numerator), "l"(denominator), "l"(sio));
+  return quotient;
 }
 
 #endif

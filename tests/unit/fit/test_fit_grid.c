@@ -70,6 +70,7 @@ static void what_is_no_rectangle_is_not(void) {
 static void the_tables_are_those_of_the_library(void) {
   for (int k = 0; k < 256; k++) {
     TEST_ASSERT_EQUAL_INT32(lround(ldexp(exp2(-k / 256.0), 30)), fit_exp2_table[k]);
+    TEST_ASSERT_EQUAL_INT(k > 0 ? ilogb(k) + 1 : 0, fit_bits_table[k]);
   }
   for (int k = 0; k <= 64; k++) {
     TEST_ASSERT_EQUAL_INT32(lround(32768.0 * log2(1.0 + k / 64.0)), fit_log2_table[k]);
