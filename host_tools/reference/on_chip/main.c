@@ -1,12 +1,12 @@
-/* An image that fits what it is told to, for counting cycles in the emulator: bench.mjs beside this
- * file is its other half and plays the debugger that the breakpoints call.
+/* An image that fits what it is told to, for counting cycles in the emulator: fit_on_chip.mjs beside
+ * this file is its other half and plays the debugger that the breakpoints call.
  */
 #include "alternatives/alternatives.h"
 #include "config/geometry.h"
 #include "fit/fit.h"
 #include "port/port.h"
 
-/* Words of 32 bits, in this order, as bench.mjs writes and reads them. */
+/* Words of 32 bits, in this order, as fit_on_chip.mjs writes and reads them. */
 static struct {
   uint32_t kernel; /* index into kernels */
   uint32_t iterations, n_largest, guess;
@@ -63,7 +63,7 @@ ALTERNATIVE(naive_double, naive, double)
 ALTERNATIVE(lm_float, lm, float)
 ALTERNATIVE(lm_double, lm, double)
 
-/* The order is that of KERNELS in bench.mjs. */
+/* The order is that of KERNELS in fit_on_chip.mjs. */
 static void (*const kernels[])(void) = {nothing,     fit,          grid,     general,
                                         naive_float, naive_double, lm_float, lm_double};
 

@@ -1,0 +1,65 @@
+/** Runs fits on the emulated chip one at a time and counts their cycles: the other half of main.c. */
+import { Chip, Stopped } from '../../emulator/chip/chip.mjs';
+import { SimulatedTime } from '../../emulator/clock.mjs';
+import { Report } from '../../emulator/report.mjs';
+
+/** In the order of `kernels` in main.c. */
+export const KERNELS = ['nothing', 'fit', 'grid', 'general', 'naive_float', 'naive_double', 'lm_float', 'lm_double'];
+const [NEXT_JOB, START, STOP] = [1, 2, 3];
+/** Words of `job` in main.c. */
+const FIELDS = { kernel: 0, iterations: 1, n_largest: 2, guess: 3, noise_Pa_q10: 4, prior_sigma_mm: 5, prior_width_mm: 6, usable: 7, readings: 8, x_mm: 40, y_mm: 41 };
+const GUESSES = ['log_linear', 'maximum', 'centroid'];
+
+/** One chip that runs fit_cycles.bin. */
+export class Bench {
+  constructor(image) {
+    this.time = new SimulatedTime();
+    this.report = new Report(() => this.time.nanos);
+    this.chip = new Chip(this.time, this.report, { serial: new Uint8Array(8) });
+    this.chip.load(image);
+    this.chip.boot();
+    const { chip } = this;
+    const breakpoint = chip.onBreak;
+    this.started = null;
+    this.cycles = null;
+    this.next = null;
+    chip.onBreak = (code) => {
+      if (code === START) this.started = chip.core.cycles;
+      else if (code === STOP) this.cycles = chip.core.cycles - this.started;
+      else if (code === NEXT_JOB) throw new Stopped('next job');
+      else breakpoint(code);
+    };
+    this.#untilNextJob();
+    this.overhead = this.run({ kernel: 'nothing' }).cycles;
+  }
+
+  #untilNextJob() {
+    try {
+      this.chip.runUntil(this.time.nanos + 60e9);
+    } catch (error) {
+      if (!(error instanceof Stopped)) throw error;
+      if (error.reason !== 'next job') throw new Error(`the image stopped: ${error.reason}; ${this.report.list.map((e) => Report.line(e)).join('; ')}`);
+      return;
+    }
+    throw new Error('a fit takes longer than a minute');
+  }
+
+  /** @returns {{cycles, x_mm, y_mm}} of one fit */
+  run({ kernel, iterations = 0, n_largest = 0, guess = 'log_linear', noise_Pa_q10 = 1, prior_sigma_mm = 0, prior_width_mm = 0, usable = 0, readings = [] }) {
+    const { chip } = this;
+    const at = chip.core.registers[0] - 0x20000000;
+    const view = new DataView(chip.sram.buffer, chip.sram.byteOffset + at);
+    const put = (field, value) => view.setInt32(4 * field, value, true);
+    put(FIELDS.kernel, KERNELS.indexOf(kernel));
+    put(FIELDS.iterations, iterations);
+    put(FIELDS.n_largest, n_largest);
+    put(FIELDS.guess, GUESSES.indexOf(guess));
+    put(FIELDS.noise_Pa_q10, noise_Pa_q10);
+    view.setFloat32(4 * FIELDS.prior_sigma_mm, prior_sigma_mm, true);
+    view.setFloat32(4 * FIELDS.prior_width_mm, prior_width_mm, true);
+    put(FIELDS.usable, usable);
+    readings.forEach((value, k) => put(FIELDS.readings + k, value));
+    this.#untilNextJob();
+    return { cycles: this.cycles - (this.overhead ?? 0), x_mm: view.getFloat32(4 * FIELDS.x_mm, true), y_mm: view.getFloat32(4 * FIELDS.y_mm, true) };
+  }
+}

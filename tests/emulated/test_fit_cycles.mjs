@@ -1,0 +1,76 @@
+#!/usr/bin/env node
+/**
+ * The fit's run time on the chip: usage test_fit_cycles.mjs fit_cycles.bin
+ *
+ * The grid kernel has a fixed number of iterations and no early exit, so its cycles depend on the readings only through
+ * short branches: normalising shifts, limits, signs. The limits below are what the firmware counts on.
+ */
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { test } from 'node:test';
+import { Prng } from '../../host_tools/emulator/prng.mjs';
+import { Bench } from '../../host_tools/reference/on_chip/fit_on_chip.mjs';
+
+/** Seven iterations from cold, with everything: readings, guess, amplitude, force, covariance, flags. */
+const COLD_CYCLES_MAX = 30000;
+/** Between the cheapest and the dearest press, share of the dearest. */
+const SPREAD_MAX = 0.05;
+
+const PITCH_mm = 9;
+const SENSORS = 15;
+const bench = new Bench(readFileSync(process.argv[2]));
+const random = new Prng(20221015);
+const between = (low, high) => random.range(low, high);
+const anyInt32 = () => random.uint32() | 0;
+
+/** Sensor k sits in column k / 5 and row k % 5. */
+function press(x_mm, y_mm, p0_Pa, sigma_mm, noise_Pa) {
+  return Array.from({ length: SENSORS }, (_, k) => {
+    const dx = PITCH_mm * (Math.floor(k / 5) - 1) - x_mm;
+    const dy = PITCH_mm * ((k % 5) - 2) - y_mm;
+    const p_Pa = p0_Pa * Math.exp(-(dx * dx + dy * dy) / (2 * sigma_mm * sigma_mm)) + noise_Pa * between(-1, 1);
+    return Math.round(1024 * p_Pa);
+  });
+}
+
+const presses = Array.from({ length: 200 }, () => press(between(-15, 15), between(-24, 24), 10 ** between(2, 6), 10 ** between(0.2, 1.4), 10 ** between(-1, 2)));
+const garbage = [
+  ...Array.from({ length: 60 }, () => Array.from({ length: SENSORS }, anyInt32)),
+  ...Array.from({ length: 40 }, () => Array.from({ length: SENSORS }, () => anyInt32() >> Math.floor(between(0, 31)))),
+  ...Array.from({ length: SENSORS }, (_, k) => Array.from({ length: SENSORS }, (_, j) => (j === k ? 2 ** 31 - 1 : 0))),
+  ...Array.from({ length: SENSORS }, (_, k) => Array.from({ length: SENSORS }, (_, j) => (j === k ? 1 : -(2 ** 31)))),
+  ...[1, 1000, 2 ** 31 - 1].map((value) => new Array(SENSORS).fill(value)),
+];
+
+const cyclesOf = (readings, iterations = 7) => bench.run({ kernel: 'grid', iterations, noise_Pa_q10: 4096, readings }).cycles;
+
+test(`no press and no garbage takes more than ${COLD_CYCLES_MAX} cycles, nor much less`, (t) => {
+  for (const [name, list] of Object.entries({ presses, garbage })) {
+    const cycles = list.map((readings) => cyclesOf(readings)).sort((a, b) => a - b);
+    const [min, median, max] = [cycles[0], cycles[cycles.length >> 1], cycles[cycles.length - 1]];
+    t.diagnostic(`${name}: ${min} ${median} ${max} cycles (min, median, max)`);
+    assert.ok(max <= COLD_CYCLES_MAX, `${name}: ${max}`);
+    assert.ok(max - min <= SPREAD_MAX * max, `${name}: ${min} to ${max}`);
+  }
+});
+
+test('the same press takes the same cycles, whatever came before', () => {
+  const before = cyclesOf(presses[0]);
+  for (const readings of garbage.slice(0, 5)) cyclesOf(readings);
+  assert.equal(cyclesOf(presses[0]), before);
+});
+
+test('each further iteration costs the same', () => {
+  const cycles = [7, 8, 9, 10].map((iterations) => cyclesOf(presses[1], iterations));
+  const steps = cycles.slice(1).map((value, i) => value - cycles[i]);
+  assert.ok(Math.max(...steps) - Math.min(...steps) <= SPREAD_MAX * Math.max(...steps), steps.join(' '));
+  assert.ok(Math.min(...steps) > 1000, steps.join(' '));
+});
+
+test('the cycles are spent on fits', () => {
+  for (let i = 0; i < 20; i++) {
+    const [x_mm, y_mm] = [between(-8, 8), between(-17, 17)];
+    const answer = bench.run({ kernel: 'grid', iterations: 7, noise_Pa_q10: 1024, readings: press(x_mm, y_mm, 5e4, 6, 1) });
+    assert.ok(Math.hypot(answer.x_mm - x_mm, answer.y_mm - y_mm) < 0.01, `${x_mm} ${y_mm}: ${answer.x_mm} ${answer.y_mm}`);
+  }
+});
