@@ -271,7 +271,8 @@ void write_csv(const std::string &path, const std::vector<Row> &rows) {
     file << r.kernel << ',' << r.variant << ',' << r.set << ',' << r.observable << ',' << r.presses
          << ',' << r.without_fit << ',' << r.outlier << ',' << r.p50_um << ',' << r.p99_um << ','
          << r.p999_um << ',' << r.worst_um << ',' << r.above_10um << ',' << r.above_100um
-         << ',' << r.truth_p50_mm << ',' << r.truth_p99_mm << ',' << r.bad_unflagged << ',' << r.good_flagged << '\n';
+         << ',' << r.truth_p50_mm << ',' << r.truth_p99_mm << ',' << r.bad_unflagged
+         << ',' << r.good_flagged << '\n';
   }
   file.close();
   if (!file) {

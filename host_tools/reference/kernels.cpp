@@ -1,6 +1,7 @@
 #include "reference/kernels.hpp"
 
 #include "reference/double_kernel.hpp"
+#include "reference/separable.hpp"
 
 extern "C" {
 #include "alternatives/alternatives.h"
@@ -115,6 +116,7 @@ const std::vector<Kernel> &all_kernels() {
       {"grid", PRIOR, grid},
       {"general", ANY_SUBSET | N_LARGEST | PRIOR, general},
       {"double", ANY_SUBSET | N_LARGEST | PRIOR | GUESSES | FIRMWARE_GUESS, in_double},
+      {"separable", 0, separable},
       {"naive_float", ANY_SUBSET | GUESSES, alternative<alternative_naive_float>},
       {"naive_double", ANY_SUBSET | GUESSES, alternative<alternative_naive_double>},
       {"lm_float", ANY_SUBSET | GUESSES | ENDS_EARLY, alternative<alternative_lm_float>},

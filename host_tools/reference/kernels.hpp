@@ -58,6 +58,8 @@ struct Kernel {
 // general  its kernel for any layout, float32
 // double   the general kernel's iteration in double precision, same guess and limits: what is left
 //          between it and the reference is the optimiser's doing, the rest is rounding
+// separable
+//          the grid kernel's iteration in double precision, for the host: reference/separable.hpp
 // naive_float, naive_double, lm_float, lm_double
 //          what one would write instead: alternatives/alternatives.h
 const std::vector<Kernel> &all_kernels();

@@ -262,7 +262,7 @@ def plot(path, results, found):
 
     ink, faint, grid = "#22252e", "#8a8f9c", "#e6e8ee"
     colours = {"fit": "#1f6fd6", "general": "#0e9aa7", "naive_float": "#e08a1e", "naive_double": "#b5651d", "lm_float": "#a05cc5",
-               "lm_double": "#6f3d94", "double": "#8a8f9c"}
+               "lm_double": "#6f3d94", "double": "#8a8f9c", "separable": "#2a9d4a"}
     labels = {"fit": "firmware, fixed point", "general": "firmware, float32, any layout", "naive_float": "Gauss-Newton, expf",
               "naive_double": "Gauss-Newton, exp", "lm_float": "Levenberg-Marquardt, float", "lm_double": "Levenberg-Marquardt, double"}
     low_um, high_um = 1e-3, 1e5
