@@ -32,6 +32,7 @@ python3 python3
 xz xz-utils
 arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/lib/arm-none-eabi/newlib/nano.specs libnewlib-arm-none-eabi
+qemu-system-arm qemu-system-arm
 /usr/include/ceres/ceres.h libceres-dev
 /usr/include/gsl/gsl_multifit_nlinear.h libgsl-dev
 /usr/include/cminpack-1/cminpack.h libcminpack-dev

@@ -1,0 +1,142 @@
+#include "fit_bits.h"
+
+#include "common/crc32.h"
+#include "config/geometry.h"
+#include "fit/fit.h"
+
+#include <stdbool.h>
+#include <string.h>
+
+#define LAYOUTS 4
+#define ONE_Q16 65536
+
+static struct fit_array layouts[LAYOUTS];
+
+/* xorshift64* (Vigna, 2016) */
+static uint64_t state;
+
+static uint32_t draw(void) {
+  state ^= state >> 12;
+  state ^= state << 25;
+  state ^= state >> 27;
+  return (uint32_t)((state * UINT64_C(2685821657736338717)) >> 32);
+}
+
+/* low..high, both included. */
+static int32_t draw_between(int32_t low, int32_t high) {
+  uint64_t span = (uint64_t)((int64_t)high - low) + 1;
+  return (int32_t)(low + (int64_t)(span * draw() >> 32));
+}
+
+static void stop_unless(enum ft_status status) {
+  while (status != FT_OK) {
+  }
+}
+
+void fit_bits_init(void) {
+  float x_mm[FT_MAX_SENSORS], y_mm[FT_MAX_SENSORS];
+  stop_unless(fit_array_init(&layouts[0], geometry.sensor_count, geometry.x_mm, geometry.y_mm,
+                             geometry.pitch_mm));
+  for (int k = 0; k < 4; k++) { /* a line */
+    x_mm[k] = 6.0f * (float)k;
+    y_mm[k] = 3.0f;
+  }
+  stop_unless(fit_array_init(&layouts[1], 4, x_mm, y_mm, 6.0f));
+  for (int k = 0; k < 19; k++) { /* rows that are shifted against each other */
+    x_mm[k] = 7.0f * (float)(k % 5) + 3.5f * (float)(k / 5 % 2) - 14.0f;
+    y_mm[k] = 6.0625f * (float)(k / 5) - 9.0f;
+  }
+  stop_unless(fit_array_init(&layouts[2], 19, x_mm, y_mm, 7.0f));
+  state = 1;
+  for (int k = 0; k < FT_MAX_SENSORS; k++) { /* anywhere, some of them twice */
+    x_mm[k] = k % 8 == 7 ? x_mm[k - 1] : (float)draw_between(-320, 320) / 16.0f;
+    y_mm[k] = k % 8 == 7 ? y_mm[k - 1] : (float)draw_between(-320, 320) / 16.0f;
+  }
+  stop_unless(fit_array_init(&layouts[3], FT_MAX_SENSORS, x_mm, y_mm, 8.0f));
+}
+
+/* 2^-z, z in Q16, in Q30: a parabola between the powers, 0.3 % off. */
+static int64_t exp2_negative_q30(int64_t z_q16) {
+  int64_t whole = z_q16 >> 16, f = z_q16 & 0xFFFF;
+  if (whole > 40) {
+    return 0;
+  }
+  int64_t value_q32 = (INT64_C(1) << 32) - f * 43035 + ((f * f) >> 16) * 10267;
+  return value_q32 >> (2 + whole);
+}
+
+static int32_t to_int32(int64_t value) {
+  return value > INT32_MAX ? INT32_MAX : value < INT32_MIN ? INT32_MIN : (int32_t)value;
+}
+
+/* A press near the array, of every width and height, and its noise. */
+static void draw_press(const struct fit_array *array, int32_t noise, int32_t *pressure_Pa_q10) {
+  uint8_t last = (uint8_t)(array->sensor_count - 1);
+  int32_t x = draw_between((int32_t)(array->x[0] * 65536.0f) - ONE_Q16,
+                           (int32_t)(array->x[last] * 65536.0f) + ONE_Q16);
+  int32_t y = draw_between((int32_t)(array->y[0] * 65536.0f) - ONE_Q16,
+                           (int32_t)(array->y[last] * 65536.0f) + ONE_Q16);
+  /* 1 / (2 sigma^2) in powers of 2 over pitches squared: sigma 0.2 to 3.4 pitches */
+  int64_t height_q16 = (int64_t)draw_between(ONE_Q16, 2 * ONE_Q16) << draw_between(0, 7) >> 4;
+  int64_t peak = (int64_t)draw_between(ONE_Q16, 2 * ONE_Q16) << draw_between(0, 14);
+  for (uint8_t k = 0; k <= last; k++) {
+    int64_t dx = (int64_t)(array->x[k] * 65536.0f) - x;
+    int64_t dy = (int64_t)(array->y[k] * 65536.0f) - y;
+    int64_t z_q16 = (((dx * dx + dy * dy) >> 16) * height_q16) >> 16;
+    int64_t value = (peak * exp2_negative_q30(z_q16)) >> 30;
+    int32_t four = 0;
+    for (int i = 0; i < 4; i++) {
+      four += draw_between(-noise, noise);
+    }
+    pressure_Pa_q10[k] = to_int32(value + four);
+  }
+}
+
+uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
+  state = UINT64_C(0x9E3779B97F4A7C15) * (press + 1) ^ (uint64_t)kernel;
+  draw();
+  bool other = kernel == FIT_BITS_GENERAL && press % 2;
+  const struct fit_array *array = &layouts[other ? draw_between(1, LAYOUTS - 1) : 0];
+
+  struct fit_settings settings;
+  memset(&settings, 0, sizeof settings);
+  settings.iterations = (uint8_t)(press % 4 ? 7 : draw_between(0, 12));
+  settings.noise_Pa_q10 = draw_between(1, 32 * 1024);
+  if (kernel == FIT_BITS_GENERAL && press % 5 == 0) {
+    settings.n_largest = (uint8_t)draw_between(1, array->sensor_count);
+  }
+  if (press % 3 == 0) {
+    settings.prior_sigma_mm = (float)draw_between(1, 256) / 16.0f;
+    settings.prior_width_mm = (float)draw_between(1, 64) / 32.0f;
+  }
+
+  int32_t pressure_Pa_q10[FT_MAX_SENSORS] = {0};
+  if (press % 16 == 15) { /* nothing that a press could give */
+    int shift = draw_between(0, 30);
+    for (uint8_t k = 0; k < array->sensor_count; k++) {
+      pressure_Pa_q10[k] = draw_between(INT32_MIN, INT32_MAX) >> shift;
+    }
+  } else {
+    draw_press(array, settings.noise_Pa_q10, pressure_Pa_q10);
+  }
+
+  uint32_t usable = UINT32_MAX;
+  if (kernel == FIT_BITS_MASKED) {
+    for (int left_out = draw_between(1, 11) / draw_between(1, 11); left_out >= 0; left_out--) {
+      usable &= ~(UINT32_C(1) << draw_between(0, array->sensor_count - 1));
+    }
+  } else if (kernel == FIT_BITS_GENERAL && press % 4 < 2) {
+    usable = draw() | draw();
+  }
+
+  struct fit_result result;
+  memset(&result, 0, sizeof result);
+  if (kernel == FIT_BITS_GRID) {
+    fit_grid(array, pressure_Pa_q10, &settings, &result);
+  } else if (kernel == FIT_BITS_MASKED) {
+    fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
+  } else {
+    fit_general(array, pressure_Pa_q10, usable, &settings, &result);
+  }
+  return crc32_iso_hdlc((const uint8_t *)&result, sizeof result);
+}

@@ -1,0 +1,42 @@
+/* An image for a machine of QEMU: prints the CRC of each press through semihosting (ARM, "Semihosting
+ * for AArch32 and AArch64"), for the kernels that the command line names by their numbers. */
+#include "fit_bits.h"
+
+#include <stdint.h>
+
+enum { SYS_WRITE0 = 0x04, SYS_GET_CMDLINE = 0x15, SYS_EXIT = 0x18 };
+#define APPLICATION_EXIT 0x20026u
+
+static uint32_t call_host(uint32_t operation, const void *argument) {
+  register uint32_t r0 __asm("r0") = operation;
+  register const void *r1 __asm("r1") = argument;
+  __asm volatile("bkpt 0xab" : "+r"(r0) : "r"(r1) : "memory");
+  return r0;
+}
+
+static void print_hex(uint32_t value) {
+  char text[10];
+  for (int i = 0; i < 8; i++) {
+    text[i] = "0123456789abcdef"[value >> (28 - 4 * i) & 15];
+  }
+  text[8] = '\n';
+  text[9] = 0;
+  call_host(SYS_WRITE0, text);
+}
+
+int main(void) {
+  static char line[80];
+  struct {
+    char *text;
+    uint32_t size;
+  } command = {line, sizeof line};
+  call_host(SYS_GET_CMDLINE, &command);
+  fit_bits_init();
+  for (const char *c = line; *c; c++) {
+    for (uint32_t press = 0; *c >= '0' && *c <= '9' && press < FIT_BITS_PRESSES; press++) {
+      print_hex(fit_bits_of((enum fit_bits_kernel)(*c - '0'), press));
+    }
+  }
+  call_host(SYS_EXIT, (const void *)APPLICATION_EXIT);
+  return 0;
+}

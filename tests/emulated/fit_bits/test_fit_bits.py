@@ -1,0 +1,72 @@
+"""The fit computes the same bits on every machine: every byte of the result of 10 000 presses a kernel.
+
+usage: test_fit_bits.py --host TOOL --m4f ELF --m0 ELF --rp2040 BIN --qemu QEMU --node NODE
+
+Compared with the host build:
+- the Cortex-M4F build, hardware floating point, in QEMU (mps2-an386): all presses, all kernels;
+- the Cortex-M0+ objects of the firmware in the RP2040's emulator: all presses of the fixed-point kernel;
+- those of float32 take a million cycles a fit there. The emulator does the first 200, and QEMU's Cortex-M0 (microbit),
+  which has not the RP2040's divider but needs none for this kernel, does all with the same objects.
+"""
+import argparse
+import pathlib
+import subprocess
+import sys
+import unittest
+
+KERNELS = ["grid", "masked", "general"]  # the order of enum fit_bits_kernel
+PRESSES = 10000
+PRESSES_IN_EMULATOR = {"grid": PRESSES, "masked": 200, "general": 200}
+FOLDER = pathlib.Path(__file__).resolve().parent
+TOOLS = argparse.Namespace()
+
+
+def output_of(*command):
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, timeout=900, check=False)
+    if done.returncode != 0:
+        raise AssertionError(f"{command[0]} failed with {done.returncode}: {done.stderr.strip()[-500:]}")
+    return done.stdout.split()
+
+
+def on_host(kernel, count=PRESSES):
+    return output_of(TOOLS.host, KERNELS.index(kernel), count)
+
+
+def in_qemu(machine, image, kernel):
+    return output_of(TOOLS.qemu, "-M", machine, "-nographic", "-monitor", "none", "-serial", "none", "-kernel", image,
+                     "-chardev", "stdio,id=host", "-semihosting-config",
+                     f"enable=on,target=native,chardev=host,arg=fit,arg={KERNELS.index(kernel)}")
+
+
+class SameBits(unittest.TestCase):
+    def compare(self, kernel, crcs, count):
+        expected = on_host(kernel, count)
+        self.assertEqual(len(crcs), count, f"{kernel}: {len(crcs)} results")
+        differing = [press for press in range(count) if crcs[press] != expected[press]]
+        self.assertFalse(differing, f"{kernel}: {len(differing)} of {count} differ, the first is press {differing[:1]}")
+
+    def test_results_differ_from_press_to_press(self):
+        for kernel in KERNELS:
+            self.assertGreater(len(set(on_host(kernel))), 0.85 * PRESSES)
+
+    def test_cortex_m4f(self):
+        for kernel in KERNELS:
+            with self.subTest(kernel):
+                self.compare(kernel, in_qemu("mps2-an386", TOOLS.m4f, kernel), PRESSES)
+
+    def test_cortex_m0(self):
+        self.compare("general", in_qemu("microbit", TOOLS.m0, "general"), PRESSES)
+
+    def test_rp2040(self):
+        for kernel, count in PRESSES_IN_EMULATOR.items():
+            with self.subTest(kernel):
+                crcs = output_of(TOOLS.node, FOLDER / "run_on_chip.mjs", TOOLS.rp2040, KERNELS.index(kernel), count)
+                self.compare(kernel, crcs, count)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name in ("host", "m4f", "m0", "rp2040", "qemu", "node"):
+        parser.add_argument(f"--{name}", required=True)
+    _, rest = parser.parse_known_args(namespace=TOOLS)
+    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
