@@ -379,8 +379,9 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
     flags |= CONTACT_FLAG_FLAT;
   }
   bool rough = squares > FIT_ROUGH_RESIDUAL * FIT_ROUGH_RESIDUAL * sum_squares;
+  int32_t limit_mm_q16 = fit_sd_limit_mm_q16(misfit, theta.sigma < FIT_NARROW_SIGMA, rough);
   if (deficient || moved * pitch > FIT_SETTLED_mm ||
-      result->location_sd_mm > fit_sd_limit_mm(misfit, theta.sigma < FIT_NARROW_SIGMA, rough)) {
+      result->location_sd_mm * 65536.0f > (float)limit_mm_q16) {
     flags |= CONTACT_FLAG_UNCERTAIN;
   }
   if (squares > FIT_MODEL_RESIDUAL * FIT_MODEL_RESIDUAL * sum_squares) {

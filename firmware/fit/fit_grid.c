@@ -33,8 +33,10 @@
 #define GUESS_HEIGHT_MAX_Q26 484088133 /* sigma 0.316 pitch */
 
 #define MODEL_INVERSE_SQUARE ((struct scaled){22756, -9}) /* 1 / 0.15^2 */
-#define FLAT_HEIGHT_Q26 2016200                           /* sigma 4.9 pitches */
-#define UNCERTAIN_SD_mm_Q16 ((int32_t)(FIT_UNCERTAIN_SD_mm * 65536.0f))
+#define ROUGH_INVERSE_SQUARE ((struct scaled){20000, -3}) /* 1 / 0.02^2 */
+#define MISFIT_SQUARE ((struct scaled){FIT_MISFIT * FIT_MISFIT << 11, -11})
+#define FLAT_HEIGHT_Q26 2016200     /* sigma 4.9 pitches */
+#define NARROW_HEIGHT_Q26 302550256 /* sigma 0.4 pitch */
 #define PEAK_RISE_MAX_Q22 (20 << 22) /* a factor of a million */
 
 /* 1 / n of a constant. */
@@ -71,6 +73,7 @@ struct moments {
   struct scaled b1, b2, b3; /* right-hand side */
   struct scaled d1, d2, d3; /* the matrix */
   struct scaled stiffness;  /* amplitude / sigma^2 */
+  struct scaled prior_row;      /* what the prior adds to the matrix is its square */
   int32_t c1_q26, c2_q26;   /* the step along the basis, before any limit */
   int32_t c3_q28;
   int32_t move_x_q22, move_y_q22; /* the step taken */
@@ -269,6 +272,7 @@ static NOINLINE void add_prior(const struct readings *readings, const struct sta
   struct scaled sigma = scaled_sqrt(scaled_div(LOG2E_HALF, scaled_from(state->height, -26)));
   struct scaled pull = scaled_mul(scaled_sub(readings->prior_sigma, sigma), readings->prior_weight);
   struct scaled row = scaled_div(scaled_mul(sigma, readings->prior_weight), m->stiffness);
+  m->prior_row = row;
   struct scaled d3 = scaled_add(scaled_from(m->d3.mantissa, m->d3.exponent), scaled_mul(row, row));
   struct scaled b3 = scaled_add(scaled_from(m->b3.mantissa, m->b3.exponent), scaled_mul(row, pull));
   m->d3 = (struct scaled){d3.mantissa * (1 << 14), d3.exponent - 14};
@@ -493,6 +497,18 @@ FIXED_INLINE struct scaled scaled_square(struct scaled a) {
   return scaled_mul(a, a);
 }
 
+/* Raises the inverse of d3 to that by which the variance of a reading gives that of c3: the prior's
+ * row varies by a width of its own, not as the readings do. */
+static NOINLINE void widen_for_prior(const struct readings *readings, const struct moments *m,
+                                     const struct scaled *variance, struct scaled *inverse3) {
+  struct scaled excess = scaled_sub(scaled_square(readings->prior_sd), *variance);
+  if (excess.mantissa > 0) {
+    struct scaled share = scaled_mul(m->prior_row, *inverse3);
+    struct scaled more = scaled_div(scaled_mul(excess, scaled_square(share)), *variance);
+    *inverse3 = scaled_add(*inverse3, more);
+  }
+}
+
 static NOINLINE void conclude(const struct fit_grid_shape *grid, const struct readings *readings,
                               const struct fit_settings *settings, const struct state *before,
                               const struct state *state, const struct moments *m,
@@ -529,6 +545,7 @@ static NOINLINE void conclude(const struct fit_grid_shape *grid, const struct re
   struct scaled noise = scaled_from(settings->noise_Pa_q10, readings->shift - 28);
   struct scaled variance = scaled_mul(square_sum, RECIPROCAL(freedom));
   struct scaled noise_variance = scaled_square(noise);
+  bool misfit = scaled_sub(variance, scaled_mul(noise_variance, MISFIT_SQUARE)).mantissa > 0;
   if (scaled_sub(variance, noise_variance).mantissa < 0) {
     variance = noise_variance;
   }
@@ -537,6 +554,9 @@ static NOINLINE void conclude(const struct fit_grid_shape *grid, const struct re
 
   struct scaled inverse1 = reciprocal(m->d1), inverse2 = reciprocal(m->d2);
   struct scaled inverse3 = reciprocal(m->d3);
+  if (readings->prior_weight.mantissa != 0) {
+    widen_for_prior(readings, m, &variance, &inverse3);
+  }
   struct scaled slope_x = scaled_from(2 * before->x - m->x.slope, -26);
   struct scaled slope_y = scaled_from(2 * before->y - m->y.slope, -26);
   struct scaled slopes = scaled_add(scaled_square(slope_x), scaled_square(slope_y));
@@ -566,15 +586,16 @@ static NOINLINE void conclude(const struct fit_grid_shape *grid, const struct re
   if (state->height <= FLAT_HEIGHT_Q26) {
     flags |= CONTACT_FLAG_FLAT;
   }
+  struct scaled total = scaled_add(scaled_mul(scaled_square(amplitude), mass), square_sum);
+  bool rough = scaled_sub(scaled_mul(square_sum, ROUGH_INVERSE_SQUARE), total).mantissa > 0;
+  bool narrow = state->height > NARROW_HEIGHT_Q26;
   int32_t move_x = fixed_clamp(m->move_x_q22, -(1 << 15), 1 << 15);
   int32_t move_y = fixed_clamp(m->move_y_q22, -(1 << 15), 1 << 15);
   if (((move_x * move_x) >> 1) + ((move_y * move_y) >> 1) > grid->settled_square ||
-      scaled_to_fixed(location_sd, 16) > UNCERTAIN_SD_mm_Q16) {
+      scaled_to_fixed(location_sd, 16) > fit_sd_limit_mm_q16(misfit, narrow, rough)) {
     flags |= CONTACT_FLAG_UNCERTAIN;
   }
-  struct scaled explained = scaled_mul(scaled_square(amplitude), mass);
-  struct scaled unexplained = scaled_mul(square_sum, MODEL_INVERSE_SQUARE);
-  if (scaled_sub(unexplained, scaled_add(explained, square_sum)).mantissa > 0) {
+  if (scaled_sub(scaled_mul(square_sum, MODEL_INVERSE_SQUARE), total).mantissa > 0) {
     flags |= CONTACT_FLAG_MODEL;
   }
   if (state->x <= grid->x_min || state->x >= grid->x_max || state->y <= grid->y_min ||
@@ -597,18 +618,19 @@ void fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
     return;
   }
   guess(&array->grid, &readings, &m, &state);
-  m.c1_q26 = m.c2_q26 = m.c3_q28 = m.move_x_q22 = m.move_y_q22 = 0;
   int iterations = settings->iterations;
   int coarse = iterations > COARSE_ITERATIONS ? COARSE_ITERATIONS : 0;
   int i = 0;
   do {
     before = state;
     evaluate(&state, &readings, &m, i < coarse);
-    if (i < iterations) {
-      take_step(&array->grid, &state, &m);
-    }
+    take_step(&array->grid, &state, &m);
     i++;
   } while (i < iterations);
+  if (iterations == 0) { /* the guess is asked for: the step only tells how good it is */
+    state = before;
+    m.c1_q26 = m.c2_q26 = m.c3_q28 = 0;
+  }
   result->used = UINT32_MAX >> (FT_MAX_SENSORS - NODES);
   conclude(&array->grid, &readings, settings, &before, &state, &m, result);
 }

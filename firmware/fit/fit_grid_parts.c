@@ -72,13 +72,14 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
     readings->q28[k] = value;
     readings->q14[k] = (value + (1 << 13)) >> 14;
   }
-  readings->prior_sigma = readings->prior_weight = (struct scaled){0, 0};
+  readings->prior_sigma = readings->prior_weight = readings->prior_sd = (struct scaled){0, 0};
   if (fit_has_prior(settings)) {
-    float width = settings->prior_width_mm / array->pitch_mm;
+    struct scaled width = scaled_from_float(settings->prior_width_mm / array->pitch_mm);
     int32_t largest_q28 = (largest >> down) * (1 << up);
+    readings->prior_sd =
+        scaled_mul(scaled_from_float(FIT_PRIOR_WEIGHT), scaled_from(largest_q28, -28));
     readings->prior_sigma = scaled_from_float(settings->prior_sigma_mm / array->pitch_mm);
-    readings->prior_weight =
-        scaled_mul(scaled_from_float(FIT_PRIOR_WEIGHT / width), scaled_from(largest_q28, -28));
+    readings->prior_weight = scaled_div(readings->prior_sd, width);
   }
   return true;
 }

@@ -32,6 +32,7 @@ struct readings {
   int32_t shift;                           /* Q28 = 1/1024 Pa times 2^shift */
   int32_t largest;                         /* 1/1024 Pa */
   struct scaled prior_sigma, prior_weight; /* pitches, per pitch; weight 0: none */
+  struct scaled prior_sd;                  /* of its row, in units of q28 */
 };
 
 struct state {

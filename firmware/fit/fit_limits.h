@@ -5,18 +5,18 @@
 #include "fit/fit.h"
 
 #include <stdbool.h>
+#include <stdint.h>
 
-#define FIT_SETTLED_mm 0.02f      /* a larger last step has not settled */
-#define FIT_UNCERTAIN_SD_mm 0.25f /* predicted radial standard deviation, fixed point */
-#define FIT_MODEL_RESIDUAL 0.15f  /* of the root of the sum of squared readings */
+#define FIT_SETTLED_mm 0.02f     /* a larger last step has not settled */
+#define FIT_MODEL_RESIDUAL 0.15f /* of the root of the sum of squared readings */
 #define FIT_ROUGH_RESIDUAL 0.02f
-#define FIT_NARROW_SIGMA 0.4f     /* pitches */
-#define FIT_MISFIT 3              /* standard deviation of the residuals, in those of the noise */
-#define FIT_FLAT_SIGMA 4.9f       /* pitches */
-#define FIT_LOW_SIGNAL_SIGMA 20   /* noise standard deviations in the largest reading */
-#define FIT_HUGE 1e9f             /* stands for: nothing is known */
+#define FIT_NARROW_SIGMA 0.4f   /* pitches */
+#define FIT_MISFIT 3            /* standard deviation of the residuals, in those of the noise */
+#define FIT_FLAT_SIGMA 4.9f     /* pitches */
+#define FIT_LOW_SIGNAL_SIGMA 20 /* noise standard deviations in the largest reading */
+#define FIT_HUGE 1e9f           /* stands for: nothing is known */
 
-/* Largest predicted standard deviation of the location that passes without a warning.
+/* Largest predicted standard deviation of the location that passes without a warning, mm in Q16.
  *
  * misfit: the residuals exceed the noise by FIT_MISFIT, so that they are the model's error. Of a
  * narrow pressure that is the shape of a stiff layer, even about its centre: it moves the location
@@ -24,11 +24,9 @@
  * FIT_ROUGH_RESIDUAL of the readings, it has no symmetry to rely on: unequal sensors, or two
  * contacts. The limits are chosen on the sets and stiff cases of the fit report: in none of them
  * are more than 0.5 % of the presses off by more than 1 mm without a warning. */
-static inline float fit_sd_limit_mm(bool misfit, bool narrow, bool rough) {
-  if (!misfit) {
-    return 0.2f;
-  }
-  return narrow ? 0.5f : rough ? 0.12f : 0.2f;
+static inline int32_t fit_sd_limit_mm_q16(bool misfit, bool narrow, bool rough) {
+  const int32_t usual = 13107 /* 0.2 */, of_narrow = 32768 /* 0.5 */, of_rough = 7864 /* 0.12 */;
+  return !misfit ? usual : narrow ? of_narrow : rough ? of_rough : usual;
 }
 
 #define FIT_PRIOR_WIDTH_MIN_mm 0.001f

@@ -41,7 +41,7 @@ using reference::Random;
 
 constexpr char HELP[] =
     "usage: fit_stiff [--limit N] [--seed S] [--case TEXT] [--out DIR] [--check]\n"
-    "  --limit N    presses of each case, 4000 by default\n"
+    "  --limit N    presses of each case, 8000 by default\n"
     "  --seed S     of the presses\n"
     "  --case TEXT  only cases whose name holds it\n"
     "  --out DIR    where stiff.csv and stiff.json go, build/.../report by default\n"
@@ -607,7 +607,7 @@ void write_json(const std::string &path, const std::vector<Row> &rows, std::uint
 
 struct Options {
   std::string name, out = FINGERTIP_REPORT_DIR;
-  std::uint64_t limit = 4000, seed = 20221015;
+  std::uint64_t limit = 8000, seed = 20221015;
   bool check = false;
 };
 
