@@ -11,12 +11,14 @@
 #define LOG2_E 1.44269504f
 #define TWO_PI 6.28318531f
 
-/* Readings below this share of the largest carry more noise than shape into the logarithm. */
-#define GUESS_SHARE 0.1f
-/* Prior of the guess alone: sigma of 0.6 pitch, where the array localises best. It decides where
- * too few readings are large, and weighs nothing elsewhere. */
-#define GUESS_PRIOR_WEIGHT 1e-3f
-#define GUESS_PRIOR_SIGMA 0.6f
+/* Readings below this share of the largest, or this many standard deviations of the noise, carry
+ * more noise than shape into the logarithm. */
+#define GUESS_SHARE 0.01f
+#define GUESS_NOISES 5.0f
+/* Prior of the guess alone: a sigma that is narrow for the array. It decides where too few readings
+ * are large, and weighs nothing elsewhere. */
+#define GUESS_PRIOR_WEIGHT 3e-3f
+#define GUESS_PRIOR_SIGMA 0.42f
 
 /* Longest step: in x and y in pitches, of sigma as a share of it. A longer one is shortened as a
  * whole. Where a stiff layer is pressed between the sensors of a corner, the cost is a bent valley
@@ -39,7 +41,7 @@ struct normal_equations {
 struct samples {
   int count;
   float x[FT_MAX_SENSORS], y[FT_MAX_SENSORS], p[FT_MAX_SENSORS];
-  int32_t log2_q24[FT_MAX_SENSORS]; /* of the reading; 0 below GUESS_SHARE */
+  int32_t log2_q24[FT_MAX_SENSORS]; /* of a reading that enters the guess, else INT32_MIN */
 };
 
 struct parameters {
@@ -146,7 +148,7 @@ static struct parameters guess(const struct samples *samples, int peak) {
   normal.rhs[3] = -GUESS_PRIOR_WEIGHT * prior_curvature;
   for (int k = 0; k < samples->count; k++) {
     float weight = samples->p[k];
-    if (weight < GUESS_SHARE) {
+    if (samples->log2_q24[k] == INT32_MIN) {
       continue;
     }
     float x = samples->x[k] - samples->x[peak];
@@ -284,6 +286,8 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
     usable = n_largest_of(array, pressure_Pa_q10, usable, settings->n_largest);
   }
   float scale = 1.0f / (float)largest;
+  float guess_share = GUESS_NOISES * (float)settings->noise_Pa_q10 * scale;
+  guess_share = clamp(guess_share, GUESS_SHARE, 0.99f); /* the largest reading enters */
   struct samples samples;
   samples.count = 0;
   int peak = 0;
@@ -300,7 +304,7 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
     samples.x[n] = array->x[k];
     samples.y[n] = array->y[k];
     samples.p[n] = clamp((float)reading * scale, -1.0f, 1.0f);
-    samples.log2_q24[n] = samples.p[n] >= GUESS_SHARE ? fit_log2_q24((uint32_t)reading) : 0;
+    samples.log2_q24[n] = samples.p[n] >= guess_share ? fit_log2_q24((uint32_t)reading) : INT32_MIN;
     sum_squares += samples.p[n] * samples.p[n];
   }
   if (samples.count < PARAMETERS) {

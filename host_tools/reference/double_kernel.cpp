@@ -22,9 +22,10 @@ struct Normal {
   }
 };
 
-constexpr double GUESS_SHARE = 0.1;
-constexpr double GUESS_WEIGHT = 1e-3;
-constexpr double GUESS_SIGMA = 0.6;
+constexpr double GUESS_SHARE = 0.01;
+constexpr double GUESS_NOISES = 5.0;
+constexpr double GUESS_WEIGHT = 3e-3;
+constexpr double GUESS_SIGMA = 0.42;
 constexpr double PLAIN_GUESS_SIGMA = 0.65;
 constexpr double MOVE_LIMIT = 0.65;
 constexpr double WIDEN_LIMIT = 0.5;
@@ -68,13 +69,14 @@ struct Factors {
 };
 
 // About the peak.
-Gaussian log_linear(const Samples &samples, const Gaussian &peak) {
+Gaussian log_linear(const Samples &samples, double noise_Pa, const Gaussian &peak) {
+  const double least = std::clamp(GUESS_NOISES * noise_Pa / samples.unit_Pa, GUESS_SHARE, 0.99);
   Normal normal;
   normal.matrix.diagonal().setConstant(GUESS_WEIGHT);
   normal.rhs[3] = -GUESS_WEIGHT * 0.5 / (GUESS_SIGMA * GUESS_SIGMA);
   for (std::size_t k = 0; k < samples.count; k++) {
     const double p = samples.p[k];
-    if (p >= GUESS_SHARE) {
+    if (p >= least) {
       const double x = samples.x[k] - peak.x, y = samples.y[k] - peak.y;
       normal.add(p * Vector4(1.0, x, y, x * x + y * y), p * std::log(p));
     }
@@ -139,13 +141,13 @@ Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10,
   return samples;
 }
 
-Gaussian first_guess(const Samples &samples, Guess guess) {
+Gaussian first_guess(const Samples &samples, double noise_Pa, Guess guess) {
   const auto first = samples.p.begin();
   const auto peak = static_cast<std::size_t>(
       std::max_element(first, first + static_cast<std::ptrdiff_t>(samples.count)) - first);
   Gaussian theta{1.0, samples.x[peak], samples.y[peak], PLAIN_GUESS_SIGMA};
   if (guess == Guess::log_linear) {
-    theta = log_linear(samples, theta);
+    theta = log_linear(samples, noise_Pa, theta);
   } else if (guess == Guess::centroid) {
     double sum = 0.0, sum_x = 0.0, sum_y = 0.0;
     for (std::size_t k = 0; k < samples.count; k++) {
@@ -171,7 +173,7 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
   }
   Gaussian theta = settings.guess == Guess::firmware
                        ? firmware_guess(array, pressure_Pa_q10, usable, samples)
-                       : first_guess(samples, settings.guess);
+                       : first_guess(samples, settings.noise_Pa, settings.guess);
   const double x_min = static_cast<double>(array.x_min), x_max = static_cast<double>(array.x_max);
   const double y_min = static_cast<double>(array.y_min), y_max = static_cast<double>(array.y_max);
   const double pitch_mm = static_cast<double>(array.pitch_mm);

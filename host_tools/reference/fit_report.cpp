@@ -257,9 +257,9 @@ void print(const Row &row) {
   std::printf("%-12s %-18s %-4s %s %7zu %9.4g %9.4g %9.4g %9.4g %6zu %6zu %8.3g %8.3g %7.3f%% "
               "%7.3f%%\n",
               row.kernel.c_str(), row.variant.c_str(), row.set.c_str(),
-              row.observable ? "yes" : " no", row.presses, row.p50_um, row.p99_um, row.p999_um, row.worst_um, row.above_10um,
-              row.above_100um, row.truth_p50_mm, row.truth_p99_mm, 100.0 * row.bad_unflagged,
-              100.0 * row.good_flagged);
+              row.observable ? "yes" : " no", row.presses, row.p50_um, row.p99_um, row.p999_um,
+              row.worst_um, row.above_10um, row.above_100um, row.truth_p50_mm, row.truth_p99_mm,
+              100.0 * row.bad_unflagged, 100.0 * row.good_flagged);
   std::fflush(stdout);
 }
 

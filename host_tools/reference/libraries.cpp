@@ -47,13 +47,13 @@ using Solve = void (*)(const Samples &samples, double theta[4]);
 
 template <Solve SOLVE>
 KernelResult with(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                  std::uint32_t usable, const KernelSettings &) {
+                  std::uint32_t usable, const KernelSettings &settings) {
   const Samples samples = normalise(array, pressure_Pa_q10, usable);
   KernelResult result{};
   if (samples.count != SENSORS) {
     return result;
   }
-  const Gaussian guess = first_guess(samples);
+  const Gaussian guess = first_guess(samples, settings.noise_Pa);
   double theta[4] = {guess.p0, guess.x, guess.y, guess.sigma};
   SOLVE(samples, theta);
   const double pitch_mm = static_cast<double>(array.pitch_mm);

@@ -23,9 +23,9 @@ constexpr double HEIGHT_MAX = std::max(COLUMNS, ROWS) < 6 ? 0.5 / (0.158 * 0.158
 constexpr double LEAST_MODEL = 0.05;
 
 // The guess: marginals below this share of their largest do not enter, and a weak prior on sigma.
-constexpr double GUESS_SHARE = 0.05;
-constexpr double GUESS_WEIGHT = 0.01;
-constexpr double GUESS_HEIGHT = 1.62;
+constexpr double GUESS_SHARE = 0.08;
+constexpr double GUESS_WEIGHT = 0.003;
+constexpr double GUESS_HEIGHT = 2.47; // sigma 0.45 pitch
 constexpr double GUESS_HEIGHT_MIN = 0.07, GUESS_HEIGHT_MAX = 3.8;
 
 using Readings = double[COLUMNS][ROWS]; // in units of the largest

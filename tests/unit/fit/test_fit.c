@@ -378,7 +378,7 @@ static void test_unsettled_fits_are_uncertain(void) {
   int unsettled = 0;
   int settled = 0;
   for (int i = 0; i < 2000; i++) {
-    struct press press = random_press(&random, 3.0);
+    struct press press = random_press(&random, 2.0);
     press.p0_Pa = 50000.0;
     read_press(&press, 0.0, NULL);
     struct fit_settings settings = {.iterations = 1, .noise_Pa_q10 = 1};
