@@ -8,7 +8,7 @@
 
 #define POSITION_MAX_mm 10000.0f
 #define MARGIN 1.5f   /* pitches around the array in which a contact may lie */
-#define ON_NODE 1e-4f /* pitches */
+#define ON_NODE 1e-4f /* pitches; and off a line, likewise */
 
 /* value > 0 as mantissa * 2^exponent with a mantissa of 2^29 .. 2^30. */
 static int32_t split(float value, int32_t *exponent) {
@@ -68,6 +68,32 @@ static void find_grid(struct fit_array *made, const float *x_mm, const float *y_
   grid->rows = (uint8_t)rows;
 }
 
+/* Fills the line that the sensors lie on, if they do and not all in one place. */
+static void find_line(struct fit_array *made) {
+  float along_x = 0.0f, along_y = 0.0f, longest = 0.0f;
+  for (uint8_t k = 1; k < made->sensor_count; k++) {
+    float x = made->x[k] - made->x[0], y = made->y[k] - made->y[0];
+    float length = sqrtf(x * x + y * y);
+    if (length > longest) {
+      longest = length;
+      along_x = x;
+      along_y = y;
+    }
+  }
+  if (longest <= ON_NODE) {
+    return;
+  }
+  made->line_x = -along_y / longest;
+  made->line_y = along_x / longest;
+  made->line_offset = made->x[0] * made->line_x + made->y[0] * made->line_y;
+  made->is_line = true;
+  for (uint8_t k = 1; k < made->sensor_count; k++) {
+    float x = made->x[k] - made->x[0], y = made->y[k] - made->y[0];
+    float across = x * made->line_x + y * made->line_y;
+    made->is_line = made->is_line && fabsf(across) <= ON_NODE;
+  }
+}
+
 enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
                               const float *y_mm, float pitch_mm) {
   if (sensor_count < 1 || sensor_count > FT_MAX_SENSORS ||
@@ -89,6 +115,7 @@ enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, con
     made.y_max = k == 0 || y + MARGIN > made.y_max ? y + MARGIN : made.y_max;
   }
   find_grid(&made, x_mm, y_mm);
+  find_line(&made);
   *array = made;
   return FT_OK;
 }

@@ -8,6 +8,9 @@
  * Two kernels do it: fixed point for a full rectangular grid, float32 for everything else. Both use
  * integer exponentials and logarithms, so that a Cortex-M0+, a Cortex-M4F and a PC compute the same
  * bits. Main context only: they divide with port/divide.h.
+ *
+ * Sensors on a line do not tell where a contact lies across it: the location is held to the line,
+ * and p0 and force are those of a contact whose centre is there.
  */
 #ifndef FIT_FIT_H
 #define FIT_FIT_H
@@ -16,6 +19,7 @@
 #include "common/status.h"
 #include "fit/fit_grid.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 /* The array as the fit sees it. Fill with fit_array_init; read-only afterwards. */
@@ -24,6 +28,8 @@ struct fit_array {
   float pitch_mm;
   float x[FT_MAX_SENSORS], y[FT_MAX_SENSORS]; /* [sensor], pitches */
   float x_min, x_max, y_min, y_max; /* box of the location: the array and 1.5 pitches around it */
+  bool is_line;                     /* the sensors lie on x line_x + y line_y = line_offset, and */
+  float line_x, line_y, line_offset; /* (line_x, line_y) is of unit length */
   struct fit_grid_shape grid;
 };
 
@@ -32,8 +38,8 @@ struct fit_settings {
                            within 1 um of the optimum */
   int32_t noise_Pa_q10; /* rms noise of a reading, 1/1024 Pa, at least 1 */
   uint8_t n_largest;    /* fit the n largest readings only, of equal ones those of lower number, as
-                           the paper does; 0: all, which is more accurate. Fewer than four give no
-                           fit. Takes the general kernel. */
+                           the paper does; 0: all, which is more accurate. Fewer than a fit
+                           needs give none. Takes the general kernel. */
   /* Weak prior on sigma, for rubber so stiff that the array can hardly tell it: one more row
    * FIT_PRIOR_WEIGHT largest (sigma - prior_sigma) / prior_width. None unless the width is
    * 0.001..10000 mm and sigma 0..10000 mm. */
@@ -67,7 +73,8 @@ enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, con
                               const float *y_mm, float pitch_mm);
 
 /* pressure_Pa_q10[sensor]: pressure on the pad, 1/1024 Pa, any bits. usable: bitmap of the sensors
- * to use. With fewer than four, or no positive reading, FIT_VALID stays off. */
+ * to use. With fewer than four (of an array on a line, three), or no positive reading, FIT_VALID
+ * stays off. */
 void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                   const struct fit_settings *settings, struct fit_result *result);
 

@@ -177,7 +177,8 @@ static struct parameters guess(const struct samples *samples, int peak) {
  * equations of the model linearised there, in the basis e (1, X, Y, X^2 + Y^2) with
  * e = exp(-(X^2 + Y^2) / (2 sigma^2)) and X, Y about the centre. Returns the sum of squared
  * residuals. */
-static float linearise(const struct samples *samples, struct parameters *theta, struct prior prior,
+static float linearise(const struct fit_array *array, const struct samples *samples,
+                       struct prior prior, struct parameters *theta,
                        struct normal_equations *normal) {
   memset(normal, 0, sizeof *normal);
   float e[FT_MAX_SENSORS];
@@ -206,6 +207,13 @@ static float linearise(const struct samples *samples, struct parameters *theta, 
     float sensitivity = theta->sigma * theta->sigma * theta->sigma / theta->p0;
     float row[PARAMETERS] = {0.0f, 0.0f, 0.0f, prior.weight * sensitivity};
     add_row(normal, row, prior.weight * (prior.sigma - theta->sigma));
+  }
+  if (array->is_line) {
+    /* Nothing else tells the coordinate across the line: this row alone brings it there. */
+    float across = theta->x * array->line_x + theta->y * array->line_y;
+    float row[PARAMETERS] = {0.0f, array->line_x, array->line_y, 0.0f};
+    float gain = theta->sigma * theta->sigma / theta->p0;
+    add_row(normal, row, (array->line_offset - across) / gain);
   }
   return sum;
 }
@@ -307,7 +315,8 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
     samples.log2_q24[n] = samples.p[n] >= guess_share ? fit_log2_q24((uint32_t)reading) : INT32_MIN;
     sum_squares += samples.p[n] * samples.p[n];
   }
-  if (samples.count < PARAMETERS) {
+  const int unknowns = array->is_line ? PARAMETERS - 1 : PARAMETERS;
+  if (samples.count < unknowns) {
     return;
   }
 
@@ -324,7 +333,7 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   bool deficient;
   int left = settings->iterations;
   do {
-    squares = linearise(&samples, &theta, prior, &normal);
+    squares = linearise(array, &samples, prior, &theta, &normal);
     before = theta;
     deficient = factorise(&normal);
     moved = step(array, &normal, &theta);
@@ -349,7 +358,7 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
 
   /* Covariance at the last linearisation: sd of a reading from the residuals, at least the noise;
    * that of the prior is its own. */
-  int freedom = samples.count > PARAMETERS ? samples.count - PARAMETERS : 1;
+  int freedom = samples.count > unknowns ? samples.count - unknowns : 1;
   float noise = (float)settings->noise_Pa_q10 * scale;
   float variance = squares / (float)freedom;
   if (variance < noise * noise) {
@@ -361,8 +370,11 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   float along_y[PARAMETERS] = {0.0f, 0.0f, 1.0f, 0.0f};
   float along_force[PARAMETERS] = {1.0f, 0.0f, 0.0f, 2.0f * before.sigma * before.sigma};
   float force_along_sigma = along_force[3];
-  float location_variance =
-      variance * (inverse_form(&normal, along_x) + inverse_form(&normal, along_y));
+  float along_line[PARAMETERS] = {0.0f, -array->line_y, array->line_x, 0.0f};
+  float location_form = array->is_line
+                            ? inverse_form(&normal, along_line)
+                            : inverse_form(&normal, along_x) + inverse_form(&normal, along_y);
+  float location_variance = variance * location_form;
   float force_variance = variance * inverse_form(&normal, along_force);
   float prior_excess = FIT_PRIOR_WEIGHT * FIT_PRIOR_WEIGHT - variance;
   if (prior.weight > 0.0f && prior_excess > 0.0f) {

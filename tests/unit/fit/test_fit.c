@@ -583,22 +583,18 @@ static void test_any_layout(void) {
   }
 }
 
-/* Positions that say nothing about one direction, or nothing at all. */
-static void test_duplicate_and_collinear_positions(void) {
+static void test_duplicate_positions(void) {
   struct press press = {1.0, 2.0, 5000.0, 6.0};
   float x[SENSORS], y[SENSORS];
-  for (int layout = 0; layout < 2; layout++) {
-    for (int k = 0; k < SENSORS; k++) {
-      x[k] = 0.0f;
-      y[k] = layout == 0 ? 0.0f : (float)(3 * k - 21);
-      readings[k] = to_q10(gaussian(&press, (double)x[k], (double)y[k]));
-    }
-    struct fit_array poor;
-    TEST_ASSERT_EQUAL_INT(FT_OK, fit_array_init(&poor, SENSORS, x, y, PITCH_mm));
-    fit_gaussian(&poor, readings, ALL, &usual, &result);
-    assert_finite_and_defined();
-    TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAIN, result.flags);
+  for (int k = 0; k < SENSORS; k++) {
+    x[k] = y[k] = 0.0f;
+    readings[k] = to_q10(gaussian(&press, 0.0, 0.0));
   }
+  struct fit_array point;
+  TEST_ASSERT_EQUAL_INT(FT_OK, fit_array_init(&point, SENSORS, x, y, PITCH_mm));
+  fit_gaussian(&point, readings, ALL, &usual, &result);
+  assert_finite_and_defined();
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAIN, result.flags);
   /* A doubled sensor among good ones only weighs twice. */
   for (int k = 0; k < SENSORS; k++) {
     x[k] = x_mm[k == 14 ? 7 : k];
@@ -610,6 +606,54 @@ static void test_duplicate_and_collinear_positions(void) {
   fit_gaussian(&doubled, readings, ALL, &patient, &result);
   TEST_ASSERT_TRUE(location_error_mm(&press) < 1e-3);
   TEST_ASSERT_BITS_LOW(CONTACT_FLAG_UNCERTAIN, result.flags);
+}
+
+/* Six sensors, 6 mm apart, on a line at any angle: the location is found along it, and its scatter
+ * is the predicted one. */
+static void test_sensors_on_a_line(void) {
+  enum { COUNT = 6, FITS = 2000 };
+  struct random random = {94};
+  const double angles[] = {0.0, 1.5707963267948966, 0.5, 2.4};
+  for (size_t a = 0; a < sizeof angles / sizeof *angles; a++) {
+    const double along_x = cos(angles[a]), along_y = sin(angles[a]);
+    const double origin_x = 3.0, origin_y = -7.0;
+    float x[COUNT], y[COUNT];
+    for (int k = 0; k < COUNT; k++) {
+      x[k] = (float)(origin_x + 6.0 * k * along_x);
+      y[k] = (float)(origin_y + 6.0 * k * along_y);
+    }
+    struct fit_array line;
+    TEST_ASSERT_EQUAL_INT(FT_OK, fit_array_init(&line, COUNT, x, y, 6.0f));
+    double squares = 0.0, predicted = 0.0;
+    for (int i = 0; i < FITS; i++) {
+      const double noise_Pa = i == 0 ? 0.0 : 5.0;
+      const double at = random_between(&random, 6.0, 24.0);
+      const struct press press = {origin_x + at * along_x, origin_y + at * along_y, 5000.0,
+                                  random_between(&random, 3.0, 6.0)};
+      for (int k = 0; k < COUNT; k++) {
+        readings[k] = to_q10(gaussian(&press, (double)x[k], (double)y[k]) +
+                             noise_Pa * random_normal(&random));
+      }
+      const struct fit_settings settings = {.iterations = 12, .noise_Pa_q10 = NOISE_5_Pa};
+      fit_gaussian(&line, readings, UINT32_MAX, &settings, &result);
+      TEST_ASSERT_EQUAL_HEX32(GOOD_FIT, result.flags);
+      const double dx = (double)result.x_mm - press.x_mm, dy = (double)result.y_mm - press.y_mm;
+      const double along = dx * along_x + dy * along_y;
+      TEST_ASSERT_TRUE(fabs(dy * along_x - dx * along_y) < 1e-4);
+      if (i == 0) {
+        TEST_ASSERT_TRUE(fabs(along) < 1e-3);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1.0, (double)result.force_N / force_of(&press));
+      }
+      squares += along * along;
+      predicted += (double)result.location_sd_mm * (double)result.location_sd_mm;
+    }
+    /* The prediction takes the larger of noise and residual, hence the wide upper limit. */
+    TEST_ASSERT_TRUE(predicted > 0.9 * squares && predicted < 2.0 * squares);
+    fit_gaussian(&line, readings, 0x7, &usual, &result);
+    TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_FIT_VALID, result.flags);
+    fit_gaussian(&line, readings, 0x3, &usual, &result);
+    TEST_ASSERT_BITS_LOW(CONTACT_FLAG_FIT_VALID, result.flags);
+  }
 }
 
 static void test_repeated_fits_give_the_same_bits(void) {
@@ -644,7 +688,8 @@ int main(void) {
   RUN_TEST(test_n_largest);
   RUN_TEST(test_random_bits);
   RUN_TEST(test_any_layout);
-  RUN_TEST(test_duplicate_and_collinear_positions);
+  RUN_TEST(test_duplicate_positions);
+  RUN_TEST(test_sensors_on_a_line);
   RUN_TEST(test_repeated_fits_give_the_same_bits);
   return UNITY_END();
 }

@@ -240,8 +240,8 @@ static const char *complaint(const struct input *input, const struct fit_result 
   if (!saturated && !within(result->force_N, 0.999f * force, 1.001f * force)) {
     return "the force is not 2 pi p0 sigma^2";
   }
-  if (!within(result->residual_rms_Pa, 0.0f, 1e13f) || !within(result->location_sd_mm, 0.0f, huge) ||
-      !within(result->force_sd_N, 0.0f, huge)) {
+  if (!within(result->residual_rms_Pa, 0.0f, 1e13f) ||
+      !within(result->location_sd_mm, 0.0f, huge) || !within(result->force_sd_N, 0.0f, huge)) {
     return "residual or standard deviation";
   }
   return NULL;
