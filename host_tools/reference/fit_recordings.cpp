@@ -264,10 +264,6 @@ int main(int argc, char **argv) {
     }
     std::vector<char *> named{argv[0]};
     for (int i = 1; i < argc; i++) {
-      if (std::strcmp(argv[i], "--help") == 0) {
-        std::fputs(HELP, stdout);
-        return 0;
-      }
       if (std::strcmp(argv[i], "--check") == 0) {
         options.check = true;
       } else {
@@ -275,7 +271,7 @@ int main(int argc, char **argv) {
       }
     }
     reference::parse_options(static_cast<int>(named.size()), named.data(),
-                             {{"--recordings", &options.recordings}, {"--out", &options.out}});
+                             {{"--recordings", &options.recordings}, {"--out", &options.out}}, HELP);
     return run(options);
   } catch (const std::exception &error) {
     std::fprintf(stderr, "fit_recordings: %s\n", error.what());

@@ -663,24 +663,20 @@ int run(const Options &options) {
 int main(int argc, char **argv) {
   try {
     Options options;
-    std::vector<char *> named;
+    std::vector<char *> named{argv[0]};
     for (int i = 1; i < argc; i++) {
-      if (std::strcmp(argv[i], "--help") == 0) {
-        std::fputs(HELP, stdout);
-        return 0;
-      }
       if (std::strcmp(argv[i], "--check") == 0) {
         options.check = true;
       } else {
         named.push_back(argv[i]);
       }
     }
-    named.insert(named.begin(), argv[0]);
     reference::parse_options(static_cast<int>(named.size()), named.data(),
                              {{"--case", &options.name},
                               {"--out", &options.out},
                               {"--limit", nullptr, &options.limit},
-                              {"--seed", nullptr, &options.seed}});
+                              {"--seed", nullptr, &options.seed}},
+                             HELP);
     return run(options);
   } catch (const std::exception &error) {
     std::fprintf(stderr, "fit_stiff: %s\n", error.what());
