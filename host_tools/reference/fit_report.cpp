@@ -30,9 +30,9 @@ usage: fit_report [--kernel NAME] [--variant TEXT] [--set A|B|C|D] [--limit N] [
                   [--out DIR] [--cache DIR] [--jobs FILE.json]
 
 --kernel (reference/kernels.hpp), --variant (part of a variant's name) and --set choose rows;
---limit takes N presses in all (120 000 by default: A, B a third each, C, D a sixth each), for two
-and three masked sensors a tenth of that. Writes fit_error.csv and .json to --out and prints the
-same. One row per kernel, variant, set (ABCD: all together) and observability; variants that a
+--limit takes N presses in all (120 000 by default: A, B a third each, C, D a sixth each), with one
+sensor masked half of them, with two and three a tenth. Writes fit_error.csv and .json to --out and
+prints the same. One row per kernel, variant, set (ABCD: all together) and observability; variants that a
 kernel does not have are left out:
   presses       of the set that are (not) observable (reference/dataset.hpp)
   p50_um ..     distance of the location from the reference optimum of the presses as received at
@@ -125,8 +125,9 @@ bool has(const reference::Kernel &kernel, const Variant &variant) {
 
 std::size_t presses_of(PressSet set, Mask mask, std::uint64_t limit) {
   const bool gaussian = set == PressSet::A || set == PressSet::B;
-  const bool few = mask == Mask::random2 || mask == Mask::random3;
-  return limit / (gaussian ? 3 : 6) / (few ? 10 : 1);
+  const bool one = mask == Mask::random || mask == Mask::peak;
+  const unsigned share = mask == Mask::none ? 1 : one ? 2 : 10;
+  return limit / (gaussian ? 3 : 6) / share;
 }
 
 struct Options {

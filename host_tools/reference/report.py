@@ -27,6 +27,7 @@ sys.path.insert(0, str(HERE.parent / "python"))
 from fingertip_files import InputError, run_tool, write_text  # noqa: E402
 
 CLOCK_Hz = 125e6
+SKIPPED = 77  # exit status of a tool that has nothing to measure here
 SETS = ("A", "B", "C", "D")
 ALL_SETS = "".join(SETS)
 USUAL = "iterations=7"
@@ -40,13 +41,13 @@ class Steps:
         self.folder = folder
         self.start_s = time.monotonic()
 
-    def run(self, what, *command):
+    def run(self, what, *command, may_skip=False):
         """Output goes to a log beside the results; progress of the reference to the terminal."""
         print(f"{time.monotonic() - self.start_s:5.0f} s  {what}", flush=True)
         log = self.folder / f"{pathlib.Path(command[0] if command[0] != 'node' else command[1]).stem}.log"
         with open(log, "w", encoding="utf-8") as file:
             done = subprocess.run([str(part) for part in command], stdout=file)
-        if done.returncode != 0:
+        if done.returncode != 0 and not (may_skip and done.returncode == SKIPPED):
             raise InputError(f"{what} failed, exit status {done.returncode}; see above and {log}")
 
 
@@ -59,7 +60,7 @@ def measure(options, out):
     if not pathlib.Path(options.image).exists():
         raise InputError(f"{options.image} is not there; build it: cmake --preset pico_mux && cmake --build --preset pico_mux")
     common = ("--limit", options.limit, "--seed", options.seed, "--out", out, "--cache", out / "cache")
-    steps.run("error against the reference (the first run solves the reference, about eight minutes)", tools / "fit_report", *common)
+    steps.run("error against the reference (the first run solves the reference, about eight minutes on two cores)", tools / "fit_report", *common)
     jobs = out / "fit_jobs.json"
     steps.run("presses for the chip", tools / "fit_report", *common, "--jobs", jobs)
     steps.run("cycles on the emulated chip", "node", HERE / "on_chip/bench.mjs", "--image", options.image, "--jobs", jobs,
@@ -69,7 +70,7 @@ def measure(options, out):
     for tool, name in (("fit_stiff", "stiff.json"), ("fit_recordings", "recordings.json")):
         (out / name).unlink(missing_ok=True)
         if (tools / tool).exists():
-            steps.run(tool, tools / tool, "--out", out)
+            steps.run(tool, tools / tool, "--out", out, may_skip=True)
     print(f"{time.monotonic() - steps.start_s:5.0f} s  table and plot", flush=True)
 
 
@@ -303,7 +304,7 @@ def plot(path, results, found):
     chip.set_xlabel("cycles of one cold fit on the emulated Cortex-M0+, median (numbers: iterations)")
     chip.set_ylabel("p99.9 distance to the least-squares optimum, um")
     chip.set_title("on the chip", loc="left", size=10)
-    chip.legend(loc="lower left", fontsize=7.5, frameon=False)
+    chip.legend(loc="lower left", bbox_to_anchor=(0.2, 0), ncol=2, fontsize=7.5, frameon=False)
     top = chip.secondary_xaxis("top", functions=(lambda c: c / CLOCK_Hz * 1e3, lambda ms: ms * CLOCK_Hz / 1e3))
     top.set_xlabel("ms at 125 MHz", size=8, color=faint, loc="right")
     top.spines["top"].set_visible(False)
@@ -345,7 +346,7 @@ def main(argv):
     parser.add_argument("--build", required=True, metavar="DIR", help="build folder of the host tools")
     parser.add_argument("--image", required=True, metavar="fit_cycles.bin", help="built with the board's firmware")
     parser.add_argument("-o", "--output", required=True, metavar="DIR")
-    parser.add_argument("--limit", type=whole, default=130000, help="presses, in all (default: %(default)s)")
+    parser.add_argument("--limit", type=whole, default=120000, help="presses, in all (default: %(default)s)")
     parser.add_argument("--seed", type=whole, default=20221015)
     parser.add_argument("--budget", type=float, default=15.0, help="million emulated cycles for each variant (default: %(default)s)")
     parser.add_argument("--passes", type=whole, default=3, help="of the timing on the host (default: %(default)s)")
