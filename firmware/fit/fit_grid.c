@@ -1,3 +1,17 @@
+/* Gauss-Newton without a matrix to solve. On a full rectangle the model is a product e = gx gy, and
+ * its derivatives span
+ *   e, e p1(x), e q1(y), e (p2(x) + q2(y))
+ * with p and q the polynomials of degree 1 and 2 that are orthogonal over the nodes under gx^2 and
+ * gy^2. These four are orthogonal to each other: the normal matrix is diagonal, and where the data
+ * hardly tell a direction apart, a small diagonal element says so with its full relative precision
+ * instead of as a difference of large ones. That is what lets 16-bit factors do.
+ *
+ * The amplitude is no unknown: each evaluation takes the best one for the shape (variable
+ * projection). Whatever is rounded in the matrix, the step or the amplitude only turns or stretches
+ * a step; where the fit ends is decided by the right-hand side, sums of the residual against the
+ * basis. So the residual is computed to 2^-26 of the largest reading and then rounded relative to
+ * its own size.
+ */
 #include "common/contact_flags.h"
 #include "fit/fit.h"
 #include "fit/fit_fixed.h"
@@ -7,16 +21,17 @@
 #include <stdbool.h>
 #include <string.h>
 
-#define UNROLL _Pragma("GCC unroll 6") /* loops over the nodes of an axis, of constant length */
+#define UNROLL _Pragma("GCC unroll 6") /* for loops over the nodes of an axis */
 
-/* Sums over all nodes of 15-bit values stay within 32 bits. */
-#define RESIDUAL_BITS (NODES <= 15 ? 15 : 14)
+/* A sum against the basis adds NODES products value * g * p, |value| <= 2^RESIDUAL_BITS, g <= 2^14,
+ * |p| <= 2^15, of which 16 bits are dropped: below 2^31. */
+#define RESIDUAL_BITS (NODES <= 15 ? 14 : 13)
 
 #define STIFFNESS_PER_HEIGHT_Q14 22713 /* 2 / log2(e) = 1 / (sigma^2 height) */
 
 #define AMPLITUDE_MIN_Q28 13421773        /* 0.05 */
 #define AMPLITUDE_MAX_Q28 ((1 << 30) - 1) /* 4 */
-#define STEP_LIMIT_Q22 (1 << 21)          /* half a pitch */
+#define STEP_LIMIT_Q22 (1 << 22)          /* a pitch */
 #define RATIO_LIMIT_Q28 (1 << 27)         /* sigma changes by half at most */
 
 /* The first iterations only have to come near: they project the readings themselves, since the
@@ -26,17 +41,17 @@
 
 /* Guess alone: readings below a share of the largest carry more noise than shape into a logarithm;
  * a ridge towards sigma 0.556 pitch decides where too few are large. */
-#define GUESS_SHARE_Q30 53687091                         /* 5 % of the largest marginal */
-#define GUESS_RIDGE ((struct scaled){20972, -21})        /* 0.01 */
-#define GUESS_RIDGE_HEIGHT ((struct scaled){24507, -20}) /* 0.01 * 2.337 */
+#define GUESS_SHARE_Q30 85899346                         /* 8 % of the largest marginal */
+#define GUESS_RIDGE ((struct scaled){31458, -21})        /* 0.015 */
+#define GUESS_RIDGE_HEIGHT ((struct scaled){18380, -19}) /* 0.015 * 2.337 */
 #define GUESS_HEIGHT_MIN_Q26 1936353
 #define GUESS_HEIGHT_MAX_Q26 484088133 /* sigma 0.316 pitch */
 
 #define MODEL_INVERSE_SQUARE ((struct scaled){22756, -9}) /* 1 / 0.15^2 */
 #define ROUGH_INVERSE_SQUARE ((struct scaled){20000, -3}) /* 1 / 0.02^2 */
 #define MISFIT_SQUARE ((struct scaled){FIT_MISFIT * FIT_MISFIT << 11, -11})
-#define FLAT_HEIGHT_Q26 2016200     /* sigma 4.9 pitches */
-#define NARROW_HEIGHT_Q26 302550256 /* sigma 0.4 pitch */
+#define FLAT_HEIGHT_Q26 2016200      /* sigma 4.9 pitches */
+#define NARROW_HEIGHT_Q26 302550256  /* sigma 0.4 pitch */
 #define PEAK_RISE_MAX_Q22 (20 << 22) /* a factor of a million */
 
 /* 1 / n of a constant. */
@@ -47,33 +62,30 @@
  * p1 = k - mean and p2 = k^2 - k slope + constant, k the node number. */
 struct factor {
   int32_t g[MAX_NODES];      /* Q30, 1 at the nearest node */
-  int32_t g_q13[MAX_NODES];  /* the same */
+  int32_t g_q14[MAX_NODES];  /* the same */
   int32_t linear[MAX_NODES]; /* g p1, |.| <= 2^15, value = integer * 2^-linear_q */
   int32_t square[MAX_NODES]; /* g p2, |.| <= 2^15, value = integer * 2^-square_q */
   int32_t linear_q;
   int32_t mass_q26;    /* sum of g^2 */
   int32_t linear_norm; /* sum of linear^2 / 8 */
   int32_t square_norm; /* sum of square^2 / 8 */
-  int32_t mean;        /* Q26, as the next two */
-  int32_t mean_square; /* of k */
+  int32_t mean;        /* Q26, as the next three */
   int32_t slope, constant;
-  int32_t offset; /* Q26, of the centre from the nearest node */
+  int32_t offset; /* of the centre from the nearest node */
 };
 
-/* What one evaluation of the model leaves: the normal equations in the orthogonal basis
- *   e, e p1(x), e q1(y), e (p2(x) + q2(y))
- * which spans what the derivatives of the model span. Their matrix is diagonal. Of the struct
- * scaled here the mantissas have up to 31 bits. */
+/* What one evaluation of the model leaves: the normal equations in the orthogonal basis. Of the
+ * struct scaled here the mantissas have up to 31 bits. */
 struct moments {
   struct factor x, y;
   int32_t square_q; /* common to both, so that the parts of p2(x) + q2(y) add up */
   int32_t amplitude_q28;
   int32_t residual_shift;   /* the sums take the residual in Q(28 - shift) */
-  int32_t b0;               /* what the amplitude's rounding left, Q(38 - shift) */
+  int32_t b0;               /* what the amplitude's rounding left, Q(40 - shift) */
   struct scaled b1, b2, b3; /* right-hand side */
   struct scaled d1, d2, d3; /* the matrix */
   struct scaled stiffness;  /* amplitude / sigma^2 */
-  struct scaled prior_row;      /* what the prior adds to the matrix is its square */
+  struct scaled prior_row;  /* what the prior adds to the matrix is its square */
   int32_t c1_q26, c2_q26;   /* the step along the basis, before any limit */
   int32_t c3_q28;
   int32_t move_x_q22, move_y_q22; /* the step taken */
@@ -130,14 +142,14 @@ FIXED_INLINE void set_polynomials(struct factor *f, int nodes, int origin) {
     int32_t k = i - origin;
     int32_t g = f->g[i] >> 15;
     int32_t weight = (g * g) >> 4; /* Q26 */
-    f->g_q13[i] = (g + 2) >> 2;
+    f->g_q14[i] = (g + 1) >> 1;
     mass += weight;
     first += k * weight;
     second += k * k * weight;
   }
   f->mass_q26 = mass;
   f->mean = fixed_div_q26(first, mass);
-  f->mean_square = fixed_div_q26(second, mass);
+  int32_t mean_square = fixed_div_q26(second, mass);
 
   int32_t values[MAX_NODES];
   UNROLL for (int i = 0; i < nodes; i++) {
@@ -154,10 +166,11 @@ FIXED_INLINE void set_polynomials(struct factor *f, int nodes, int origin) {
     moment += (i - origin) * square;
   }
   f->linear_norm = norm;
+  /* The mean under linear^2. Where that is too small to tell, any value serves. */
   int32_t skew = norm < 1 << 13 ? f->mean : fixed_div_q26(moment, norm);
 
   f->slope = skew + f->mean;
-  f->constant = fixed_mul_q26(f->slope, f->mean) - f->mean_square;
+  f->constant = fixed_mul_q26(f->slope, f->mean) - mean_square;
   UNROLL for (int i = 0; i < nodes; i++) {
     int32_t k = i - origin;
     f->square[i] = fixed_mul_q28(f->g[i], k * k * ONE_Q26 - k * f->slope + f->constant);
@@ -185,14 +198,14 @@ static NOINLINE void orthogonalise(struct moments *m) {
 
 /* <e, readings>, Q26. */
 static NOINLINE int32_t project_on_model(const struct moments *m, const int32_t *p_q14) {
-  const int32_t *x = m->x.g_q13, *y = m->y.g_q13;
+  const int32_t *x = m->x.g_q14, *y = m->y.g_q14;
   int32_t product = 0;
   UNROLL for (int i = 0; i < COLUMNS; i++) {
     int32_t sum = 0;
     UNROLL for (int j = 0; j < ROWS; j++) {
       sum += p_q14[i * ROWS + j] * y[j];
     }
-    product += fixed_mul_16(sum, x[i] * 4);
+    product += fixed_mul_16(sum, x[i]);
   }
   return product;
 }
@@ -214,24 +227,25 @@ FIXED_INLINE int32_t best_amplitude(const struct moments *m, int32_t product_q26
 /* What the model leaves of the readings, rounded to RESIDUAL_BITS; returns the shift. */
 static NOINLINE int32_t set_residual(struct moments *m, struct readings *readings) {
   const struct factor *y = &m->y;
-  int32_t *p = readings->q28;
+  const int32_t *p = readings->q28;
+  int32_t *residual = readings->residual;
   uint32_t size = 1;
   for (int i = 0; i < COLUMNS; i++) {
     int32_t column = fixed_mul_q30(m->amplitude_q28, m->x.g[i]);
     UNROLL for (int j = 0; j < ROWS; j++) {
-      int32_t r = *p - fixed_mul_q30(y->g[j], column);
-      p[2 * NODES] = r;
+      int32_t r = p[j] - fixed_mul_q30(y->g[j], column);
+      residual[j] = r;
       size |= fixed_size(r);
-      p++;
-    }
-  }
-  int32_t shift = shift_to(RESIDUAL_BITS, size), half = (1 << shift) >> 1;
-  p = readings->residual;
-  for (int i = 0; i < COLUMNS; i++) {
-    UNROLL for (int j = 0; j < ROWS; j++) {
-      p[j] = (p[j] + half) >> shift;
     }
     p += ROWS;
+    residual += ROWS;
+  }
+  int32_t shift = shift_to(RESIDUAL_BITS, size), half = (1 << shift) >> 1;
+  for (int i = 0; i < COLUMNS; i++) {
+    residual -= ROWS;
+    UNROLL for (int j = 0; j < ROWS; j++) {
+      residual[j] = (residual[j] + half) >> shift;
+    }
   }
   return shift;
 }
@@ -243,33 +257,33 @@ static NOINLINE void project(struct moments *m, const int32_t *values, int32_t s
   int32_t over_y[COLUMNS] = {0};
   int32_t b2 = 0, b3_y = 0;
   for (int j = 0; j < ROWS; j++) {
-    int32_t over_x = 0, g = y->g_q13[j];
+    int32_t over_x = 0, g = y->g_q14[j];
     UNROLL for (int i = 0; i < COLUMNS; i++) {
       int32_t value = values[i * ROWS + j];
       over_y[i] += value * g;
-      over_x += value * x->g_q13[i];
+      over_x += value * x->g_q14[i];
     }
     b2 += fixed_mul_16(over_x, y->linear[j]);
     b3_y += fixed_mul_16(over_x, y->square[j]);
   }
   int32_t b0 = 0, b1 = 0, b3_x = 0;
   UNROLL for (int i = 0; i < COLUMNS; i++) {
-    b0 += fixed_mul_16(over_y[i], x->g_q13[i]);
+    b0 += fixed_mul_16(over_y[i], x->g_q14[i]);
     b1 += fixed_mul_16(over_y[i], x->linear[i]);
     b3_x += fixed_mul_16(over_y[i], x->square[i]);
   }
-  int32_t q = shift - 25; /* values Q(28 - shift), g Q13, 16 bits dropped */
+  int32_t q = shift - 26; /* values Q(28 - shift), g Q14, 16 bits dropped */
   m->b0 = b0;
   m->b1 = (struct scaled){b1, q - x->linear_q};
   m->b2 = (struct scaled){b2, q - y->linear_q};
-  m->b3 = (struct scaled){(b3_x >> 1) + (b3_y >> 1), q + 1 - m->square_q};
+  m->b3 = (struct scaled){(b3_x >> 1) + (b3_y >> 1), q + 1 - m->square_q}; /* one bit more */
 }
 
 /* The prior (sigma - prior) / width is one more row of the least squares; c3 is the only unknown
  * that changes sigma, by sigma * gain. */
 static NOINLINE void add_prior(const struct readings *readings, const struct state *state,
                                struct moments *m) {
-  struct scaled sigma = scaled_sqrt(scaled_div(LOG2E_HALF, scaled_from(state->height, -26)));
+  struct scaled sigma = scaled_from(fit_grid_sigma(state->height), -26);
   struct scaled pull = scaled_mul(scaled_sub(readings->prior_sigma, sigma), readings->prior_weight);
   struct scaled row = scaled_div(scaled_mul(sigma, readings->prior_weight), m->stiffness);
   m->prior_row = row;
@@ -286,7 +300,7 @@ static NOINLINE void evaluate(const struct state *state, struct readings *readin
   orthogonalise(m);
   if (coarse) {
     project(m, readings->q14, 14);
-    m->amplitude_q28 = best_amplitude(m, m->b0 * 4);
+    m->amplitude_q28 = best_amplitude(m, m->b0);
   } else {
     m->amplitude_q28 = best_amplitude(m, project_on_model(m, readings->q14));
     m->residual_shift = set_residual(m, readings);
@@ -316,7 +330,7 @@ FIXED_INLINE int32_t shifted(int32_t value, int32_t shift) {
   return value >> (shift < -31 ? 31 : -shift);
 }
 
-/* b / (d stiffness) in Qq. */
+/* b / (d stiffness) in Qq. Near the end b is small, and its last bits decide. */
 FIXED_INLINE int32_t step_along(struct scaled b, struct scaled d, struct scaled stiffness,
                                 int32_t q) {
   int32_t divisor = ((d.mantissa >> 14) * stiffness.mantissa) >> 13; /* below 2^18 */
@@ -363,8 +377,8 @@ static NOINLINE void take_step(const struct fit_grid_shape *grid, struct state *
 /* First guess, every sensor there: the marginals weighted by the row and the column of the largest
  * reading are the two factors of the Gaussian, and the logarithm of each a parabola. Leaves the
  * marginal in g and its logarithm, weighted by it, in `weighted` (Q14). */
-FIXED_INLINE void set_marginal(struct factor *f, const int32_t *marginal, int32_t *weighted,
-                               int nodes) {
+static NOINLINE void set_marginal(struct factor *f, const int32_t *marginal, int32_t *weighted,
+                                  int nodes) {
   int32_t largest = 1;
   for (int i = 0; i < nodes; i++) {
     largest = marginal[i] > largest ? marginal[i] : largest;
@@ -477,7 +491,7 @@ FIXED_INLINE int32_t peak_of(const struct readings *readings, const struct state
   growth_q24 = fixed_mul_16(growth_q24, STIFFNESS_PER_HEIGHT_Q14) * 4;
   /* The amplitude's rounding. */
   int32_t scale_q12 = fixed_mul_q32(mass_q20 * 16, m->amplitude_q28) >> 8;
-  growth_q24 += shifted(port_divide(m->b0, scale_q12 + 1), m->residual_shift - 2);
+  growth_q24 += shifted(port_divide(m->b0, scale_q12 + 1), m->residual_shift - 4);
   int32_t growth = fixed_clamp(growth_q24, -(1 << 23), 1 << 23) * 16;
   peak = fixed_mul_q28(peak, (1 << 28) + growth);
   if (peak >= 1 << 30) {
@@ -491,6 +505,11 @@ FIXED_INLINE int32_t peak_of(const struct readings *readings, const struct state
 static NOINLINE struct scaled reciprocal(struct scaled value) {
   struct scaled a = scaled_from(value.mantissa < 1 ? 1 : value.mantissa, value.exponent);
   return (struct scaled){port_divide(1 << 29, a.mantissa), -29 - a.exponent};
+}
+
+/* A value of 29 or 30 bits. */
+FIXED_INLINE struct scaled scaled_top(int32_t value, int32_t exponent) {
+  return (struct scaled){value >> 15, exponent + 15};
 }
 
 FIXED_INLINE struct scaled scaled_square(struct scaled a) {
@@ -536,8 +555,8 @@ static NOINLINE void conclude(const struct fit_grid_shape *grid, const struct re
     int32_t r = readings->residual[k];
     squares += (r * r) >> 4;
   }
-  struct scaled mass = scaled_from(mass_q20, -20), inverse_mass = reciprocal(mass);
-  struct scaled left = scaled_from(m->b0, m->residual_shift - 38);
+  struct scaled mass = {mass_q20 >> 10, -10}, inverse_mass = reciprocal(mass);
+  struct scaled left = scaled_from(m->b0, m->residual_shift - 40);
   struct scaled square_sum = scaled_sub(scaled_from(squares, 2 * m->residual_shift - 52),
                                         scaled_mul(scaled_square(left), inverse_mass));
   square_sum.mantissa = square_sum.mantissa < 0 ? 0 : square_sum.mantissa;
@@ -557,12 +576,12 @@ static NOINLINE void conclude(const struct fit_grid_shape *grid, const struct re
   if (readings->prior_weight.mantissa != 0) {
     widen_for_prior(readings, m, &variance, &inverse3);
   }
-  struct scaled slope_x = scaled_from(2 * before->x - m->x.slope, -26);
-  struct scaled slope_y = scaled_from(2 * before->y - m->y.slope, -26);
-  struct scaled slopes = scaled_add(scaled_square(slope_x), scaled_square(slope_y));
+  int32_t slope_x = (2 * before->x - m->x.slope) >> 15; /* Q11 */
+  int32_t slope_y = (2 * before->y - m->y.slope) >> 15;
+  struct scaled slopes = scaled_from(slope_x * slope_x + slope_y * slope_y, -22);
   struct scaled location = scaled_add(scaled_add(inverse1, inverse2), scaled_mul(slopes, inverse3));
   struct scaled location_sd = scaled_div(scaled_sqrt(scaled_mul(variance, location)), m->stiffness);
-  location_sd = scaled_mul(location_sd, scaled_from(grid->pitch, grid->pitch_exponent - 6));
+  location_sd = scaled_mul(location_sd, scaled_top(grid->pitch, grid->pitch_exponent - 6));
   result->location_sd_mm = fit_grid_compose(location_sd.mantissa, location_sd.exponent);
 
   /* dF / F = dp0 / p0 + 2 dsigma / sigma, each by its part in the basis; the mean of the model adds
@@ -576,7 +595,7 @@ static NOINLINE void conclude(const struct fit_grid_shape *grid, const struct re
                  scaled_add(scaled_mul(scaled_square(lift), inverse3), inverse_mass));
   struct scaled amplitude = scaled_from(m->amplitude_q28, -28);
   struct scaled force_sd = scaled_div(scaled_sqrt(scaled_mul(variance, form)), amplitude);
-  force_sd = scaled_mul(force_sd, scaled_from(force, force_exponent));
+  force_sd = scaled_mul(force_sd, scaled_top(force, force_exponent));
   result->force_sd_N = fit_grid_compose(force_sd.mantissa, force_sd.exponent);
 
   uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;

@@ -28,7 +28,7 @@
 /* The pressures of one frame in grid order [column][row], the largest from 0.5 to 1. */
 struct readings {
   int32_t q28[NODES], q14[NODES];
-  int32_t residual[NODES];                 /* room for the kernels */
+  int32_t residual[NODES];                 /* room for the kernel */
   int32_t shift;                           /* Q28 = 1/1024 Pa times 2^shift */
   int32_t largest;                         /* 1/1024 Pa */
   struct scaled prior_sigma, prior_weight; /* pitches, per pitch; weight 0: none */
@@ -38,19 +38,6 @@ struct readings {
 struct state {
   int32_t x, y;   /* Q26, pitches from the grid's origin node */
   int32_t height; /* Q26 */
-};
-
-/* One axis of the separable Gaussian and the polynomials that are orthogonal under its square. */
-struct axis {
-  int32_t g[MAX_NODES];      /* Q30, 1 at the nearest node */
-  int32_t linear[MAX_NODES]; /* g (k - mean), |.| < 2^15, value = integer * 2^-linear_q */
-  int32_t square[MAX_NODES]; /* g (k^2 - k slope + constant), likewise */
-  int32_t linear_q, square_q;
-  /* Sums of squares of the three: the nearest node's 1 and the block normalisation keep them within
-   * a few bits of 2^28. */
-  int32_t mass_q26, linear_norm, square_norm; /* the latter two * 2^(2 - 2 q) */
-  int32_t mean, slope, constant;              /* Q26 */
-  int32_t offset;                             /* Q26, of the centre from the nearest node */
 };
 
 /* 2^-z, z in Q22, result Q30; relative error below 2^-25. */
@@ -65,43 +52,6 @@ FIXED_INLINE int32_t exp2_negative(uint32_t z_q22) {
   minus = (minus + (1 << 13)) >> 14;                        /* Q24 */
   uint32_t loss = (head >> 16) * minus + (((uint16_t)head * minus) >> 16);
   return (int32_t)((head - (loss >> 8)) >> whole);
-}
-
-FIXED_INLINE void gaussian(struct axis *axis, int nodes, int origin, int32_t centre,
-                           int32_t height) {
-  int32_t nearest = fixed_clamp((centre + (ONE_Q26 >> 1)) >> 26, -origin, nodes - 1 - origin);
-  axis->offset = centre - nearest * ONE_Q26;
-  int32_t slope_q22 = fixed_mul_q32(height, axis->offset * 8);
-  int32_t curvature_q22 = height >> 4;
-  for (int i = 0; i < nodes; i++) {
-    int32_t k = i - origin - nearest;
-    /* An exact quadratic in k: rounding of its two coefficients only moves centre and width. */
-    int32_t rise = curvature_q22 * k - slope_q22;
-    if (nodes > 5) { /* five nodes stay within 32 bits by themselves */
-      rise = fixed_clamp(rise, -INT32_MAX / 5, INT32_MAX / 5);
-    }
-    int32_t z = k * rise;
-    axis->g[i] = exp2_negative(z < 0 ? 0 : (uint32_t)z);
-  }
-}
-
-/* Brings the vector to |.| < 2^15, as near below as a common power of two allows; returns it. */
-FIXED_INLINE int32_t block_normalise(const int32_t *from, int32_t *to, int count) {
-  uint32_t size = 1;
-  for (int i = 0; i < count; i++) {
-    size |= fixed_size(from[i]);
-  }
-  int32_t shift = fixed_bits(size) - 15;
-  if (shift >= 0) {
-    for (int i = 0; i < count; i++) {
-      to[i] = from[i] >> shift;
-    }
-  } else {
-    for (int i = 0; i < count; i++) {
-      to[i] = from[i] * (1 << -shift);
-    }
-  }
-  return -shift;
 }
 
 /* log2(v / 2^14) in Q15, v = 1 .. 2^14; error below 2^-11. */
