@@ -32,8 +32,8 @@ usage: fit_report [--kernel NAME] [--variant TEXT] [--set A|B|C|D] [--limit N] [
 --kernel (reference/kernels.hpp), --variant (part of a variant's name) and --set choose rows;
 --limit takes N presses in all (120 000 by default: A, B a third each, C, D a sixth each), with one
 sensor masked half of them, with two and three a tenth. Writes fit_error.csv and .json to --out and
-prints the same. One row per kernel, variant, set (ABCD: all together) and observability; variants that a
-kernel does not have are left out:
+prints the same. One row per kernel, variant, set (ABCD: all together) and observability; variants
+that a kernel does not have are left out:
   presses       of the set that are (not) observable (reference/dataset.hpp)
   p50_um ..     distance of the location from the reference optimum of the presses as received at
                 1/1024 Pa, with the sensors usable that the variant leaves; where there is no fit it

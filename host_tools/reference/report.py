@@ -67,10 +67,10 @@ def measure(options, out):
               "--out", out / "fit_cycles.csv", "--budget", options.budget)
     steps.run("time on this host", tools / "fit_bench", "--limit", max(1200, options.limit // 10), "--passes", options.passes,
               "--seed", options.seed, "--out", out, "--cache", out / "cache")
-    for tool, name in (("fit_stiff", "stiff.json"), ("fit_recordings", "recordings.json")):
+    for tool, name, *more in (("fit_stiff", "stiff.json", "--limit", max(200, options.limit // 30)), ("fit_recordings", "recordings.json")):
         (out / name).unlink(missing_ok=True)
         if (tools / tool).exists():
-            steps.run(tool, tools / tool, "--out", out, may_skip=True)
+            steps.run(tool, tools / tool, "--out", out, *more, may_skip=True)
     print(f"{time.monotonic() - steps.start_s:5.0f} s  table and plot", flush=True)
 
 
@@ -304,7 +304,7 @@ def plot(path, results, found):
     chip.set_xlabel("cycles of one cold fit on the emulated Cortex-M0+, median (numbers: iterations)")
     chip.set_ylabel("p99.9 distance to the least-squares optimum, um")
     chip.set_title("on the chip", loc="left", size=10)
-    chip.legend(loc="lower left", bbox_to_anchor=(0.2, 0), ncol=2, fontsize=7.5, frameon=False)
+    chip.legend(loc="lower left", bbox_to_anchor=(0.1, 0), ncol=2, fontsize=7.5, frameon=False)
     top = chip.secondary_xaxis("top", functions=(lambda c: c / CLOCK_Hz * 1e3, lambda ms: ms * CLOCK_Hz / 1e3))
     top.set_xlabel("ms at 125 MHz", size=8, color=faint, loc="right")
     top.spines["top"].set_visible(False)
