@@ -15,6 +15,7 @@ without contact belong to neither.
     force_mape_frames          only frames with a true force above 0.2 N count for it
     contact_missed, contact_false     frames above 0.2 N without CONTACT; frames without contact but with CONTACT
     slip_found, slip_missed    true slips of at least 50 ms with, without a SLIP frame between start and end + 0.1 s
+    slip_valid_lost            of these true slips, those with a frame without SLIP_VALID between start and end
     slip_false                 SLIP frames outside of all true slips; a slip's end is widened by the slip window,
                                over which the measure looks back
     total_us_median            from the first bus activity of a frame to its packet
@@ -29,7 +30,8 @@ import sys
 import numpy as np
 
 from fingertip_files import (
-    CONTACT, FIT_VALID, SLIP, STAGES, InputError, read_recording, read_run, read_scenario, run_tool, write_text)
+    CONTACT, FIT_VALID, SLIP, SLIP_VALID, STAGES, InputError, check_output, printable, read_recording, read_run,
+    read_scenario, run_tool, write_text)
 
 FORCE_MIN_N = 0.2
 SLIP_MIN_s = 0.05
@@ -49,9 +51,7 @@ class Comparison:
         if not isinstance(zero_s, (int, float)):
             raise InputError("device_time_zero_s of the run report is no number; the image never started its timer")
         self.t_s = recording["t_us"][rows] / 1e6 + zero_s
-        if (np.diff(self.t_s) <= 0).any():
-            raise InputError("device time does not increase; the fingertip restarted, record again")
-        flag = {bit: recording.flag(bit)[rows] for bit in (CONTACT, FIT_VALID, SLIP)}
+        flag = {bit: recording.flag(bit)[rows] for bit in (CONTACT, FIT_VALID, SLIP_VALID, SLIP)}
         self.true_force_N = scenario.at("force_N", self.t_s)
         in_contact = scenario.is_on("contact", self.t_s)
         self.compared = in_contact & flag[FIT_VALID]
@@ -66,7 +66,7 @@ class Comparison:
 
         recorded = (self.t_s[0], self.t_s[-1])
         self.slips = [s for s in scenario.intervals("slip") if recorded[0] <= s[0] and s[1] <= recorded[1]]
-        found = missed = 0
+        found = missed = valid_lost = 0
         window_s = float(recording.metadata.get("slip_window_ms", DEFAULT_SLIP_WINDOW_ms)) / 1000
         outside = self.slip.copy()
         for start, end in scenario.intervals("slip"):
@@ -78,6 +78,8 @@ class Comparison:
                 found += 1
             else:
                 missed += 1
+            during = (self.t_s >= start) & (self.t_s <= end)
+            valid_lost += bool((during & ~flag[SLIP_VALID]).any())
 
         total = recording["total_us"][rows]
         stages = np.column_stack([recording[name][rows] for name in STAGES])
@@ -97,6 +99,7 @@ class Comparison:
             "contact_false": int((scenario.is_off("contact", self.t_s) & flag[CONTACT]).sum()),
             "slip_found": found,
             "slip_missed": missed,
+            "slip_valid_lost": valid_lost,
             "slip_false": int(outside.sum()),
             "total_us_median": float(np.median(total)),
             "stages_sum_wrong": int((unsaturated & (stages.sum(axis=1) != total)).sum()),
@@ -113,10 +116,24 @@ def add_salvage_option(parser):
 def load_recording(options):
     recording = read_recording(options.recording, options.salvage)
     if recording.skipped_lines:
-        print(f"{options.recording}: {recording.skipped_lines} damaged lines skipped", file=sys.stderr)
+        print(f"{printable(options.recording)}: {recording.skipped_lines} damaged lines skipped", file=sys.stderr)
     if not recording.end and not options.salvage:
         raise InputError(f"{options.recording}: no end line, the recorder was killed; use --salvage to take what there is")
+    check_time(recording)
     return recording
+
+
+def check_time(recording):
+    """One run of the device is one axis of time: a recording that crosses a restart has none."""
+    t_us, frame = recording["t_us"], recording["frame"]
+    restarts = np.flatnonzero((np.diff(t_us) < 0) | (np.diff(frame) < 0))
+    contact = np.flatnonzero(recording.has_contact)
+    repeated = contact[1:][np.diff(t_us[contact]) == 0]
+    for rows, what in ((restarts + 1, "the fingertip restarted here; record anew, or cut the file before this line "
+                                      "and use --salvage"),
+                       (repeated, "a second frame of the same time; remove the line")):
+        if len(rows):
+            raise InputError(f"{recording.path}:{recording.line_numbers[rows[0]]}: {what}")
 
 
 def main(argv):
@@ -127,6 +144,7 @@ def main(argv):
     parser.add_argument("-o", "--output", required=True, metavar="summary.json")
     add_salvage_option(parser)
     options = parser.parse_args(argv)
+    check_output(options.output, options.recording, options.scenario, options.run)
     comparison = Comparison(load_recording(options), read_scenario(options.scenario), read_run(options.run))
     write_text(options.output, json.dumps(comparison.summary, indent=2) + "\n")
     return 0

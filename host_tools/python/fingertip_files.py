@@ -11,7 +11,7 @@ Recording (CSV, UTF-8): what a fingertip said, written by `fingertip record`; on
     # fingertip-recording 1
     # key: value              serial, board, scene, firmware, git, rate_mHz, osr, slip_window_ms, x_mm, ...
     t_us,frame,...            device time; see RECORDING_COLUMNS, then s<k>_Pa (absolute) and tare<k>_Pa
-    # health: ... | # ack: ... | # info: ... | # event: ...     between the rows
+    # packet: ... | # event: ...     between the rows
     # end: key=value ...      counts of the whole recording; absent if the recorder was killed
 Cells of a packet that did not come are empty, and NaN here.
 
@@ -21,6 +21,7 @@ Every error is an InputError whose text is one line that names file and line and
 """
 import json
 import math
+import os
 import sys
 
 import numpy as np
@@ -40,7 +41,7 @@ RAW_COLUMNS = ("raw_sequence", "valid", "saturated", "temperature_degC")
 RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *RAW_COLUMNS)
 
 # Flag bits of the contact packet, firmware/wire/PROTOCOL.md.
-CONTACT, FIT_VALID, SLIP = 1 << 0, 1 << 1, 1 << 4
+CONTACT, FIT_VALID, SLIP_VALID, SLIP = 1 << 0, 1 << 1, 1 << 3, 1 << 4
 
 
 class InputError(Exception):
@@ -52,8 +53,27 @@ def run_tool(name, main):
     try:
         return main(sys.argv[1:])
     except InputError as error:
-        print(f"{name}: {error}", file=sys.stderr)
+        print(f"{name}: {printable(str(error))}", file=sys.stderr)
         return 1
+
+
+def printable(text):
+    """In one line and harmless to a terminal: control characters and stray bytes as \\x1b."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
+def check_output(path, *inputs):
+    """Fails before any work where write_text or write_bytes would fail, or would replace an input."""
+    if os.path.isdir(path):
+        raise InputError(f"{path}: is a folder; give the name of a file in it")
+    folder = os.path.dirname(path) or "."
+    if not os.path.isdir(folder):
+        raise InputError(f"{path}: there is no folder {folder}; choose another place")
+    if not os.access(path if os.path.exists(path) else folder, os.W_OK):
+        raise InputError(f"{path}: it may not be written; choose another place")
+    for other in inputs:
+        if other is not None and os.path.exists(other) and os.path.exists(path) and os.path.samefile(path, other):
+            raise InputError(f"{path}: is a file to read; give -o another name")
 
 
 def read_lines(path):
@@ -67,9 +87,13 @@ def read_lines(path):
 
 
 def write_text(path, text):
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path, content):
     try:
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(text)
+        with open(path, "wb") as file:
+            file.write(content)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}; choose another place") from None
 
@@ -173,9 +197,12 @@ def write_scenario(path, metadata, columns):
 
 
 class Recording:
-    """metadata, columns (name -> array[n], NaN where empty), sensors_Pa and tare_Pa [n][sensor], events, end."""
+    """metadata, columns (name -> array[n], NaN where empty), sensors_Pa and tare_Pa [n][sensor], events, end;
+    line_numbers[n] of the rows in the file."""
 
-    def __init__(self, metadata, names, table, sensors, events, end, skipped_lines):
+    def __init__(self, path, metadata, names, table, line_numbers, sensors, events, end, skipped_lines):
+        self.path = path
+        self.line_numbers = np.array(line_numbers)
         self.metadata = metadata
         self.columns = {name: table[:, i] for i, name in enumerate(names[:len(RECORDING_COLUMNS)])}
         first = len(RECORDING_COLUMNS)
@@ -210,7 +237,7 @@ def read_recording(path, salvage=False):
     lines = read_lines(path)
     _check_kind(path, lines, "recording")
     complete = lines[-1] == ""
-    metadata, header, rows, events, end, skipped, sensors = {}, None, [], [], {}, 0, 0
+    metadata, header, rows, line_numbers, events, end, skipped, sensors = {}, None, [], [], [], {}, 0, 0
     advice = "use --salvage to skip damaged lines"
     for number, line in enumerate(lines[1:], 2):
         if not line.strip():
@@ -241,6 +268,7 @@ def read_recording(path, salvage=False):
             if row[0] < 0:
                 raise InputError(f"{path}:{number}: t_us is {cells[0]}; device time starts at 0; {advice}")
             rows.append(row)
+            line_numbers.append(number)
         except InputError:
             if not salvage or header is None:
                 raise
@@ -249,7 +277,7 @@ def read_recording(path, salvage=False):
         raise InputError(f"{path}: no header line; record anew")
     if not rows:
         raise InputError(f"{path}: no frames; record again while the fingertip streams")
-    return Recording(metadata, header, np.array(rows), sensors, events, end, skipped)
+    return Recording(path, metadata, header, np.array(rows), line_numbers, sensors, events, end, skipped)
 
 
 def read_run(path):

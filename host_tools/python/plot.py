@@ -4,6 +4,7 @@
     plot.py RECORDING.csv [--truth SCENARIO.csv] [--run run.json] -o FILE.png
 """
 import argparse
+import io
 import sys
 
 import matplotlib
@@ -14,7 +15,7 @@ import numpy as np
 from matplotlib.patches import FancyBboxPatch
 
 from evaluate import Comparison, add_salvage_option, load_recording
-from fingertip_files import FIT_VALID, SLIP, InputError, read_run, read_scenario, run_tool
+from fingertip_files import FIT_VALID, SLIP, InputError, check_output, read_run, read_scenario, run_tool, write_bytes
 
 INK, FAINT, TRUTH, MEASURED, SLIPPING = "#22252e", "#8a8f9c", "#b4bac6", "#1f6fd6", "#d93a3a"
 RIM_mm = 6.0
@@ -129,6 +130,9 @@ def main(argv):
     parser.add_argument("-o", "--output", required=True, metavar="FILE.png")
     add_salvage_option(parser)
     options = parser.parse_args(argv)
+    if not options.output.lower().endswith(".png"):
+        raise InputError(f"{options.output}: no name of a picture; give one that ends in .png")
+    check_output(options.output, options.recording, options.truth, options.run)
     recording = load_recording(options)
     run = read_run(options.run)
     truth = read_scenario(options.truth) if options.truth else None
@@ -157,10 +161,9 @@ def main(argv):
     figure.text(0.055, 0.955, title, size=17, weight="bold")
     for i, line in enumerate(lines):
         figure.text(0.055, 0.93 - 0.022 * i, line, size=9, color=INK if i else FAINT)
-    try:
-        figure.savefig(options.output, dpi=110)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{options.output}: {error}; give a name that ends in .png, in a folder that exists") from None
+    picture = io.BytesIO()
+    figure.savefig(picture, dpi=110, format="png")
+    write_bytes(options.output, picture.getvalue())
     return 0
 
 

@@ -16,7 +16,7 @@ import sys
 
 import numpy as np
 
-from fingertip_files import SENSOR_X_mm, SENSOR_Y_mm, SLIP_SPEED_mm_s, InputError, run_tool, write_scenario
+from fingertip_files import SENSOR_X_mm, SENSOR_Y_mm, SLIP_SPEED_mm_s, InputError, check_output, run_tool, write_scenario
 
 STEP_s = 1e-3
 SIGMA_mm = 5.7
@@ -143,6 +143,7 @@ def main(argv):
         raise InputError(f"--seconds {seconds:g} is out of range; give 1 to 3600")
     if options.seed < 0:
         raise InputError(f"--seed {options.seed} is out of range; give 0 or more")
+    check_output(options.output)
     make = {"ideal": ideal, "demo": demo, "slip20": slip20}[options.name]
     motion = make(seconds, np.random.default_rng(options.seed))
     metadata = {

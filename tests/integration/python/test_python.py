@@ -14,7 +14,7 @@ sys.path.insert(0, str(TOOLS))
 
 import fingertip_files as files  # noqa: E402
 
-CONTACT, FIT_VALID, SLIP, TARED = 1, 2, 16, 32
+CONTACT, FIT_VALID, SLIP_VALID, SLIP, TARED = 1, 2, 8, 16, 32
 
 
 class ToolTest(unittest.TestCase):
@@ -58,6 +58,9 @@ class ToolTest(unittest.TestCase):
             if pressed[frame]:
                 row.update(zip(keys, values[frame]))
                 row["flags"] |= CONTACT | FIT_VALID
+                began = began if past else t_us[frame]
+                if t_us[frame] - began >= window_us:
+                    row["flags"] |= SLIP_VALID
                 past = [p for p in past if p[0] >= t_us[frame] - window_us]
                 count = max(len(past), 1)
                 mean_x, mean_y = sum(p[1] for p in past) / count, sum(p[2] for p in past) / count
@@ -149,7 +152,7 @@ class Evaluation(ToolTest):
         self.assertLess(summary["force_mape_percent"], 1e-2)
         self.assertLess(summary["force_rmse_N"], 1e-4)
         self.assertAlmostEqual(summary["frames_per_s"], 200, delta=0.1)
-        for key, value in {"contact_missed": 0, "contact_false": 0, "slip_found": 3, "slip_missed": 0, "slip_false": 0,
+        for key, value in {"contact_missed": 0, "contact_false": 0, "slip_found": 3, "slip_missed": 0, "slip_valid_lost": 0, "slip_false": 0,
                            "stages_sum_wrong": 0, "dropped_packets": 3, "crc_errors": 2, "format_errors": 1,
                            "emulator_warnings": 2, "total_us_median": 12850}.items():
             self.assertEqual(summary[key], value, key)
@@ -201,6 +204,32 @@ class Evaluation(ToolTest):
         short = self.summary(self.recording(scenario, until_s=4), scenario, "--run", self.run_report())
         self.assertEqual((short["slip_found"], short["slip_missed"]), (1, 0))
 
+    def test_slips_whose_validity_was_lost(self):
+        scenario = self.scenario()
+        slips = files.read_scenario(scenario).intervals("slip")
+        middle = sum(slips[1]) / 2
+
+        def change(row):
+            t_s = row["t_us"] / 1e6 + 0.25
+            # one frame within the second slip, and a time far from any
+            if abs(t_s - middle) < 0.003 or t_s < slips[0][0] - 0.1:
+                return {**row, "flags": row["flags"] & ~SLIP_VALID}
+            return row
+
+        lost = self.summary(self.recording(scenario, change=change), scenario, "--run", self.run_report())
+        self.assertEqual((lost["slip_found"], lost["slip_valid_lost"]), (3, 1))
+
+    def test_an_output_is_never_an_input(self):
+        scenario = self.scenario()
+        recording = self.recording(scenario)
+        before = recording.read_bytes()
+        linked = self.folder / "linked.png"
+        linked.hardlink_to(recording)
+        self.assertIn("give -o another name", self.error("evaluate.py", recording, scenario, "-o", linked))
+        self.assertIn("give -o another name", self.error("plot.py", recording, "-o", linked))
+        self.assertIn("is a folder", self.error("evaluate.py", recording, scenario, "-o", self.folder))
+        self.assertEqual(recording.read_bytes(), before)
+
     def test_stages_that_do_not_add_up(self):
         scenario = self.scenario()
         summary = self.summary(self.recording(scenario, change=lambda row: {**row, "fit_us": 7000 + (row["frame"] < 7)}),
@@ -238,7 +267,32 @@ class Evaluation(ToolTest):
     def test_time_that_runs_backwards(self):
         scenario = self.scenario()
         recording = self.recording(scenario, change=lambda row: {**row, "t_us": row["t_us"] if row["frame"] < 600 else row["t_us"] - 3000000})
-        self.assertIn("restarted", self.error("evaluate.py", recording, scenario, "--run", self.run_report(), "-o", self.folder / "s"))
+        self.assert_restart(recording, scenario, 600)
+
+    def test_a_restart_that_only_the_frame_numbers_tell(self):
+        scenario = self.scenario()
+        self.assert_restart(self.recording(scenario, change=lambda row: {**row, "frame": row["frame"] % 700}), scenario, 700)
+
+    def assert_restart(self, recording, scenario, frame):
+        line = recording.read_text(encoding="utf-8").split("\n").index(",".join(files.RECORDING_COLUMNS + tuple(
+            [f"s{k}_Pa" for k in range(15)] + [f"tare{k}_Pa" for k in range(15)]))) + 2 + frame
+        for arguments in (("evaluate.py", recording, scenario), ("plot.py", recording), ("plot.py", recording, "--truth", scenario)):
+            err = self.error(*arguments, "--run", self.run_report(), "-o", self.folder / "p.png")
+            self.assertIn(f"{recording}:{line}: the fingertip restarted here; ", err)
+        self.assertFalse((self.folder / "p.png").exists())
+        # what it advises to do works
+        lines = recording.read_text(encoding="utf-8").split("\n")
+        recording.write_text("\n".join(lines[:line - 1]) + "\n", encoding="utf-8")
+        self.tool("plot.py", recording, "--salvage", "-o", self.folder / "p.png")
+
+    def test_a_time_that_repeats(self):
+        scenario = self.scenario()
+        recording = self.recording(scenario, change=lambda row: {**row, "t_us": row["t_us"] - 5000 * (row["frame"] == 600)})
+        self.assertRegex(self.error("evaluate.py", recording, scenario, "-o", self.folder / "s"), r"\.csv:\d+: a second frame of the same time")
+
+    def test_names_cannot_speak_to_the_terminal(self):
+        err = self.error("evaluate.py", self.folder / "\x1b[31m\n", "x", "-o", self.folder / "s")
+        self.assertIn("\\x1b[31m\\n: No such file", err)
 
 
 class MalformedFiles(ToolTest):
@@ -308,8 +362,14 @@ class Plots(ToolTest):
 
     def test_where_nothing_can_be_written(self):
         recording = self.recording(self.scenario())
-        self.assertIn("in a folder that exists", self.error("plot.py", recording, "-o", self.folder / "no" / "p.png"))
-        self.assertIn("ends in .png", self.error("plot.py", recording, "-o", self.folder / "p.xyz"))
+        (self.folder / "d.png").mkdir()
+        for name, expected in (("no/p.png", "there is no folder"), ("p.xyz", "ends in .png"), ("p", "ends in .png"),
+                               ("d.png", "is a folder"), ("/proc/p.png", "choose another place")):
+            self.assertIn(expected, self.error("plot.py", recording, "-o", self.folder / name))
+        full = self.folder / "full.png"
+        full.symlink_to("/dev/full")
+        self.assertIn("No space left on device; choose another place", self.error("plot.py", recording, "-o", full))
+        self.assertEqual({path.name for path in self.folder.iterdir()}, {"demo.csv", "recording.csv", "d.png", "full.png"})
 
 
 if __name__ == "__main__":
