@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
+#include <map>
 
 namespace fingertip {
 
@@ -54,6 +55,18 @@ std::size_t character_length(unsigned char first) {
   return first < 0x80 ? 1 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
 }
 
+constexpr const char *UPPER_HALF = "▀";
+
+char ascii_of(const std::string &character) {
+  static const std::map<std::string, char> nearest = {
+      {"─", '-'}, {"│", '|'}, {"╭", '+'}, {"╮", '+'}, {"╰", '+'}, {"╯", '+'}, {"●", '*'},
+      {"○", 'o'}, {"·", '.'}, {"×", 'x'}, {"σ", 's'}, {"µ", 'u'}, {"▏", ' '}, {"▎", ' '},
+      {"▍", ' '}, {"▌", '#'}, {"▋", '#'}, {"▊", '#'}, {"▉", '#'}, {"█", '#'}, {"▁", '_'},
+      {"▂", '_'}, {"▃", '_'}, {"▄", '_'}, {"▅", '#'}, {"▆", '#'}, {"▇", '#'}};
+  auto found = nearest.find(character);
+  return found != nearest.end() ? found->second : '?';
+}
+
 } // namespace
 
 Colour mix(Colour a, Colour b, float part) {
@@ -97,18 +110,31 @@ int Canvas::text(int column, int row, std::string_view text, const Style &style)
 
 void Canvas::halves(int column, int row, Colour top, Colour bottom) {
   if (Cell *cell = at(column, row)) {
-    cell->character = "▀";
+    cell->character = UPPER_HALF;
     cell->style = {top, bottom, false};
   }
 }
 
-std::string Canvas::ansi(ColourDepth depth) const {
+Canvas::Cell Canvas::in_ascii(const Cell &cell) {
+  if (cell.character.size() == 1) {
+    return cell;
+  }
+  if (cell.character != UPPER_HALF) {
+    return {std::string(1, ascii_of(cell.character)), cell.style};
+  }
+  const Style &style = cell.style;
+  return {" ", {style.front, style.back ? mix(*style.front, *style.back, 0.5f) : style.front, false}};
+}
+
+std::string Canvas::ansi(ColourDepth depth, Characters characters) const {
   std::string out = "\x1b[H";
   for (int row = 0; row < rows_; row++) {
     std::optional<Style> current;
     for (int column = 0; column < columns_; column++) {
-      const Cell &cell = cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-                                static_cast<std::size_t>(column)];
+      const Cell &drawn =
+          cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+                 static_cast<std::size_t>(column)];
+      Cell cell = characters == Characters::ascii ? in_ascii(drawn) : drawn;
       if (!current || !(*current == cell.style)) {
         out += style_code(cell.style, depth);
         current = cell.style;

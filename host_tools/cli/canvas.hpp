@@ -27,6 +27,7 @@ struct Style {
 };
 
 enum class ColourDepth { truecolour, palette_256 };
+enum class Characters { utf_8, ascii };
 
 class Canvas {
 public:
@@ -42,8 +43,9 @@ public:
   /* A cell of two square halves. */
   void halves(int column, int row, Colour top, Colour bottom);
 
-  /* Draws it all, starting at the terminal's upper left corner. */
-  std::string ansi(ColourDepth depth) const;
+  /* Draws it all, starting at the terminal's upper left corner. In ASCII halves become whole cells
+   * of their mean colour, other shapes the nearest character, foreign letters '?'. */
+  std::string ansi(ColourDepth depth, Characters characters) const;
 
 private:
   struct Cell {
@@ -51,6 +53,7 @@ private:
     Style style;
   };
   Cell *at(int column, int row);
+  static Cell in_ascii(const Cell &cell);
 
   int columns_, rows_;
   std::vector<Cell> cells_;

@@ -360,30 +360,33 @@ void draw_stages(Panel &panel, const wire_stages &stages) {
     from = std::max(from, to);
   }
   panel.next();
-  int column = panel.left();
+  constexpr int place = 14; /* "convert 65535 " */
+  int at = panel.left();
   for (const Stage &stage : all) {
-    if (column + 13 > panel.left() + width) {
+    if (at + place - 1 > panel.left() + width) {
       panel.next();
-      column = panel.left();
+      at = panel.left();
     }
-    column = panel.put(column, std::string(stage.name) + " ", text_style(stage.colour));
-    column = panel.put(column, std::to_string(stage.us), text_style(INK)) + 1;
+    int column = panel.put(at, std::string(stage.name) + " ", text_style(stage.colour));
+    panel.put(column, std::to_string(stage.us), text_style(INK));
+    at += place;
   }
   panel.next();
 }
 
+/* Every flag has a place of its own, empty while it is off, so that nothing moves. */
 void draw_flags(Panel &panel, std::uint32_t flags) {
   int column = panel.left();
   for (const FlagName &flag : flag_names()) {
-    if (!(flags & flag.bit)) {
-      continue;
-    }
-    if (column + static_cast<int>(std::strlen(flag.name)) > panel.left() + panel.width()) {
+    auto length = static_cast<int>(std::strlen(flag.name));
+    if (column > panel.left() && column + length > panel.left() + panel.width()) {
       panel.next();
       column = panel.left();
     }
-    column =
-        panel.put(column, flag.name, text_style(flag.warning ? WARNING : FAINT, flag.warning)) + 1;
+    if (flags & flag.bit) {
+      panel.put(column, flag.name, text_style(flag.warning ? WARNING : FAINT, flag.warning));
+    }
+    column += length + 1;
   }
   panel.next();
 }

@@ -1,9 +1,13 @@
 #include "cli/terminal.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <langinfo.h>
+#include <locale.h>
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
@@ -78,6 +82,28 @@ std::optional<ColourDepth> screen_depth(ColourMode mode) {
       colours && (!std::strcmp(colours, "truecolor") || !std::strcmp(colours, "24bit"));
   return mode == ColourMode::automatic && truecolour ? ColourDepth::truecolour
                                                      : ColourDepth::palette_256;
+}
+
+Characters screen_characters() {
+  std::string charset;
+  if (locale_t locale = newlocale(LC_CTYPE_MASK, "", locale_t{})) {
+    charset = nl_langinfo_l(CODESET, locale);
+    freelocale(locale);
+  } else {
+    /* Named but not installed here, as when logged in from elsewhere: the name has to do. */
+    for (const char *variable : {"LC_ALL", "LC_CTYPE", "LANG"}) {
+      const char *name = std::getenv(variable);
+      if (name && *name) {
+        charset = name;
+        break;
+      }
+    }
+  }
+  std::transform(charset.begin(), charset.end(), charset.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  bool utf_8 = charset.find("utf-8") != std::string::npos ||
+               charset.find("utf8") != std::string::npos;
+  return utf_8 ? Characters::utf_8 : Characters::ascii;
 }
 
 Screen::Screen() : has_input_(tcgetattr(STDIN_FILENO, &before_) == 0) {

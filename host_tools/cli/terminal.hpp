@@ -18,6 +18,9 @@ enum class ColourMode { automatic, truecolour, palette_256, plain };
 /* What standard output can show: nothing if it is no terminal, a dumb one, or plain is wanted. */
 std::optional<ColourDepth> screen_depth(ColourMode mode);
 
+/* What the locale says that the terminal can show: UTF-8 or, in any other, ASCII. */
+Characters screen_characters();
+
 /* The full screen, given back as it was when this ends; also over a suspend (Ctrl-Z). */
 class Screen {
 public:

@@ -61,13 +61,14 @@ public:
   explicit ScreenView(ColourDepth depth) : depth_(depth) {}
   void update(const Model &model, const std::string &note) override {
     if (interval_.is_due()) {
-      screen_.draw(draw_monitor(model, note, screen_.columns(), screen_.rows()).ansi(depth_));
+      screen_.draw(draw_monitor(model, note, screen_.columns(), screen_.rows()).ansi(depth_, characters_));
     }
   }
   std::optional<char> key() override { return screen_.key(); }
 
 private:
   ColourDepth depth_;
+  Characters characters_ = screen_characters();
   Screen screen_;
   Interval interval_{std::chrono::milliseconds(40)};
 };
