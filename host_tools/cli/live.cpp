@@ -3,6 +3,7 @@
 #include "cli/view.hpp"
 #include "libfingertip/command.hpp"
 #include "libfingertip/discovery.hpp"
+#include "libfingertip/output_file.hpp"
 #include "libfingertip/recording.hpp"
 #include "libfingertip/recording_transport.hpp"
 #include "libfingertip/serial_transport.hpp"
@@ -41,14 +42,30 @@ std::string utc_now() {
   return whole;
 }
 
+/* Before the port is opened, so that a wrong path costs nothing. */
+void check_outputs(const LiveOptions &options) {
+  for (const std::string &path : {options.recording, options.raw_bytes}) {
+    if (!path.empty()) {
+      check_output(path, options.overwrite);
+    }
+  }
+  if (!options.recording.empty() && !options.raw_bytes.empty() &&
+      is_same_file(options.recording, options.raw_bytes)) {
+    throw Error(options.raw_bytes + ": is the recording too; give --raw-bytes another name");
+  }
+}
+
 class Live {
 public:
   explicit Live(const LiveOptions &options)
       : options_(options), transport_(choose_port(options.port)),
         session_(transport_, [this] { return is_stop_wanted(); }) {
     if (!options.raw_bytes.empty()) {
-      raw_bytes_ = std::make_unique<OutputFile>(options.raw_bytes, options.overwrite);
       session_.on_bytes([this](const std::uint8_t *bytes, std::size_t length) {
+        if (!raw_bytes_) {
+          raw_bytes_ = std::make_unique<OutputFile>(options_.raw_bytes, options_.overwrite,
+                                                    OutputFile::Appears::at_once);
+        }
         raw_bytes_->append(bytes, length);
       });
     }
@@ -60,7 +77,7 @@ public:
     });
     model_.set_source(transport_.description());
     if (!options.recording.empty()) {
-      note_ = "recording to " + options.recording;
+      note_ = "recording to " + printable(options.recording);
     }
     view_ = options.monitor ? make_monitor_view(options.colour) : make_progress_view();
   }
@@ -81,7 +98,7 @@ public:
     std::string summary = summary_text(model_);
     if (recording_) {
       recording_->finish(session_.statistics(), reason);
-      summary = recording_->path() + ": " + summary;
+      summary = printable(recording_->path()) + ": " + summary;
     }
     std::fprintf(options_.monitor ? stdout : stderr, "%s\n", summary.c_str());
     if (model_.frames() == 0 && reason == "gone") {
@@ -138,7 +155,8 @@ private:
     }
     recording_ = std::make_unique<RecordingWriter>(options_.recording, options_.overwrite,
                                                    &info.body.info, info.body.info.sensor_count,
-                                                   extra, options_.streams & WIRE_STREAM_RAW);
+                                                   extra, options_.streams & WIRE_STREAM_RAW,
+                                                   OutputFile::Appears::at_once);
     recording_->packet(info);
   }
 
@@ -234,6 +252,7 @@ private:
 } // namespace
 
 int run_live(const LiveOptions &options) {
+  check_outputs(options);
   return Live(options).run();
 }
 

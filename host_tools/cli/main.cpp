@@ -11,6 +11,7 @@
 #include "libfingertip/text.hpp"
 
 #include <CLI/CLI.hpp>
+#include <bitset>
 #include <cstdio>
 #include <map>
 
@@ -24,8 +25,6 @@ struct Options {
   std::string port;
   LiveOptions live;
   ReplayOptions replay;
-  double seconds = 0;
-  std::string speed = "1";
   std::vector<std::string> settings;
   std::vector<std::string> encode;
   unsigned sequence = 0;
@@ -52,10 +51,33 @@ int list() {
     throw Error("no fingertip found; plug one in, or name its port in FINGERTIP_PORT");
   }
   for (const Port &port : ports) {
-    std::printf("%s\t%s\t%s\n", port.path.c_str(), port.serial.empty() ? "-" : port.serial.c_str(),
-                port.product.empty() ? "-" : port.product.c_str());
+    auto shown = [](const std::string &text) { return text.empty() ? "-" : printable(text); };
+    std::printf("%s\t%s\t%s\n", shown(port.path).c_str(), shown(port.serial).c_str(),
+                shown(port.product).c_str());
   }
   return 0;
+}
+
+/* "3 7": the sensors of these bits; "" for none. */
+std::string sensors_text(std::uint32_t sensors) {
+  std::string text;
+  for (int k = 0; k < FT_MAX_SENSORS; k++) {
+    if (sensors >> k & 1u) {
+      text += (text.empty() ? "" : " ") + std::to_string(k);
+    }
+  }
+  return text;
+}
+
+std::string present_text(std::uint32_t present, std::uint8_t sensor_count) {
+  std::uint32_t all = (1u << sensor_count) - 1u;
+  std::string missing = sensors_text(all & ~present);
+  return std::to_string(std::bitset<32>(present & all).count()) + " of " +
+         std::to_string(sensor_count) + (missing.empty() ? "" : ", missing: " + missing);
+}
+
+std::string rate_text(std::uint32_t rate_mHz) {
+  return rate_mHz ? fixed(rate_mHz / 1000.0, 3) : "max";
 }
 
 int info(const Options &options) {
@@ -63,17 +85,24 @@ int info(const Options &options) {
   wire_info info = device.session.info().body.info;
   wire_health health = device.session.health().body.health;
   Metadata pairs = info_metadata(info);
-  pairs.insert(pairs.begin(), {"port", device.transport.description()});
+  pairs.insert(pairs.begin(), {"port", printable(device.transport.description())});
   for (auto &[key, value] : pairs) {
     if (key == "streams") {
       value = streams_text(info.streams);
+    } else if (key == "rate_mHz" && info.rate_mHz == 0) {
+      value = rate_text(info.rate_mHz);
     }
   }
   print_pairs(pairs);
   std::printf("\n");
+  Metadata counters;
   for (const auto &[key, value] : health_fields(health)) {
-    std::printf("%-22s%lu\n", key.c_str(), static_cast<unsigned long>(value));
+    std::string bad = sensors_text(health.sensors_prom_bad);
+    counters.emplace_back(key, key == "sensors_present" ? present_text(value, info.sensor_count)
+                               : key == "sensors_prom_bad" ? (bad.empty() ? "none" : bad)
+                                                           : std::to_string(value));
   }
+  print_pairs(counters);
   return 0;
 }
 
@@ -155,8 +184,7 @@ int set(const Options &options) {
   }
   wire_info info = session.info().body.info;
   std::printf("rate=%s osr=%u slip_threshold=%s slip_window=%u\n",
-              info.rate_mHz ? fixed(info.rate_mHz / 1000.0, 3).c_str() : "max", info.osr,
-              shortest(info.slip_threshold_mm).c_str(), info.slip_window_ms);
+              rate_text(info.rate_mHz).c_str(), info.osr, shortest(info.slip_threshold_mm).c_str(), info.slip_window_ms);
   return 0;
 }
 
@@ -210,15 +238,40 @@ int encode(const Options &options) {
   return 0;
 }
 
+[[noreturn]] void wrong_value(const std::string &option, const std::string &text,
+                              const std::string &allowed) {
+  throw CLI::ValidationError(option + " \"" + text + "\" is not possible; give " + allowed);
+}
+
 double speed_from_text(const std::string &text) {
   if (text == "max") {
     return 0;
   }
   auto speed = to_double(text);
   if (!speed || *speed < 0.01 || *speed > 1000) {
-    throw Error("speed \"" + text + "\" is out of range; give 0.01 to 1000, or max");
+    wrong_value("--speed", text, "0.01 to 1000, or max");
   }
   return *speed;
+}
+
+double seconds_from_text(const std::string &text) {
+  auto seconds = to_double(text);
+  if (!seconds || *seconds < 0.001 || *seconds > 1e9) {
+    wrong_value("--seconds", text, "a number from 0.001 to 1e9");
+  }
+  return *seconds;
+}
+
+ColourMode colour_from_text(const std::string &text) {
+  static const std::map<std::string, ColourMode> colours = {{"auto", ColourMode::automatic},
+                                                            {"truecolour", ColourMode::truecolour},
+                                                            {"256", ColourMode::palette_256},
+                                                            {"plain", ColourMode::plain}};
+  auto mode = colours.find(text);
+  if (mode == colours.end()) {
+    wrong_value("--colour", text, "auto, truecolour, 256 or plain");
+  }
+  return mode->second;
 }
 
 int run(int argc, char **argv) {
@@ -233,7 +286,8 @@ int run(int argc, char **argv) {
     for (const CLI::App *chosen : failed->get_subcommands()) {
       command += " " + chosen->get_name();
     }
-    return "fingertip: " + std::string(error.what()) + "; see " + command + " --help\n";
+    return printable("fingertip: " + std::string(error.what()) + "; see " + command + " --help") +
+           "\n";
   });
 
   auto add = [&](const char *name, const char *text, std::function<int()> run_it) {
@@ -249,19 +303,20 @@ int run(int argc, char **argv) {
         ->type_name("PATH");
     return command;
   };
-  const std::map<std::string, ColourMode> colours = {{"auto", ColourMode::automatic},
-                                                     {"truecolour", ColourMode::truecolour},
-                                                     {"256", ColourMode::palette_256},
-                                                     {"plain", ColourMode::plain}};
-  auto with_colour = [&](CLI::App *command, ColourMode &mode) {
-    command->add_option("--colour", mode, "auto, truecolour, 256, or plain: a line a second")
-        ->transform(CLI::CheckedTransformer(colours))
+  auto with_colour = [](CLI::App *command, ColourMode &mode) {
+    command
+        ->add_option_function<std::string>(
+            "--colour", [&mode](const std::string &text) { mode = colour_from_text(text); },
+            "auto, truecolour, 256, or plain: a line a second")
         ->type_name("MODE");
   };
   auto with_recording = [&](CLI::App *command) {
-    command->add_option("--seconds", options.seconds, "End after this much device time")
-        ->type_name("S")
-        ->check(CLI::PositiveNumber);
+    command
+        ->add_option_function<std::string>(
+            "--seconds",
+            [&](const std::string &text) { options.live.seconds = seconds_from_text(text); },
+            "End after this much device time")
+        ->type_name("S");
     command
         ->add_option("--raw-bytes", options.live.raw_bytes,
                      "Also keep the bytes of the line as they came")
@@ -274,9 +329,6 @@ int run(int argc, char **argv) {
     options.live.port = options.port;
     options.live.monitor = monitor;
     options.live.streams = SHOWN_STREAMS;
-    if (options.seconds > 0) {
-      options.live.seconds = options.seconds;
-    }
     return run_live(options.live);
   };
 
@@ -300,14 +352,16 @@ int run(int argc, char **argv) {
       ->type_name("FILE.csv");
   with_recording(record);
 
-  CLI::App *replay = add("replay", "Show a recording or a capture of bytes", [&] {
-    options.replay.speed = speed_from_text(options.speed);
-    return run_replay(options.replay);
-  });
+  CLI::App *replay = add("replay", "Show a recording or a capture of bytes",
+                         [&] { return run_replay(options.replay); });
   replay->add_option("file", options.replay.file, "Recording (.csv) or bytes of the line (.ftr)")
       ->required()
       ->type_name("FILE");
-  replay->add_option("--speed", options.speed, "Times the recorded speed, or max; default 1")
+  replay
+      ->add_option_function<std::string>(
+          "--speed",
+          [&](const std::string &text) { options.replay.speed = speed_from_text(text); },
+          "Times the recorded speed, or max; default 1")
       ->type_name("X|max");
   replay->add_flag("--salvage", options.replay.salvage, "Skip damaged lines and count them");
   replay->add_option("--to-csv", options.replay.to_csv, "Write a recording instead of showing it")
@@ -356,7 +410,7 @@ int main(int argc, char **argv) {
   try {
     return run(argc, argv);
   } catch (const fingertip::Error &error) {
-    std::fprintf(stderr, "fingertip: %s\n", error.what());
+    std::fprintf(stderr, "fingertip: %s\n", printable(error.what()).c_str());
   } catch (const fingertip::Interrupted &) {
     std::fprintf(stderr, "fingertip: interrupted\n");
   }

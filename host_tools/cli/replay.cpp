@@ -3,7 +3,9 @@
 #include "cli/view.hpp"
 #include "libfingertip/decoder.hpp"
 #include "libfingertip/error.hpp"
+#include "libfingertip/output_file.hpp"
 #include "libfingertip/recording_transport.hpp"
+#include "libfingertip/text.hpp"
 
 #include <algorithm>
 #include <cstdio>
@@ -18,13 +20,13 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-/* Every packet of the file, until it ends or the handler throws. Returns the statistics and the
- * number of lines skipped. */
 struct Playback {
   LineStatistics statistics;
   std::uint64_t skipped_lines = 0;
+  bool cut_short = false;
 };
 
+/* Every packet of the file, until it ends or the handler throws. */
 Playback play(const std::string &file, bool salvage,
               const std::function<void(const wire_packet &, const LineStatistics &)> &handler) {
   RecordingTransport transport(file, salvage);
@@ -38,7 +40,7 @@ Playback play(const std::string &file, bool salvage,
     } else if (transport.reopen()) {
       decoder.restart();
     } else {
-      return {decoder.statistics(), transport.skipped_lines()};
+      return {decoder.statistics(), transport.skipped_lines(), transport.is_cut_short()};
     }
   }
 }
@@ -47,14 +49,24 @@ bool is_frame(const wire_packet &packet) {
   return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW;
 }
 
-void report_skipped(const std::string &file, const Playback &playback) {
+void report_losses(const std::string &file, const Playback &playback) {
   if (playback.skipped_lines > 0) {
-    std::fprintf(stderr, "%s: %llu damaged lines skipped\n", file.c_str(),
+    std::fprintf(stderr, "%s: %llu damaged lines skipped\n", printable(file).c_str(),
                  static_cast<unsigned long long>(playback.skipped_lines));
+  }
+  if (playback.cut_short) {
+    std::fprintf(stderr,
+                 "%s: no end line: the recording was cut short, its recorder killed or its disk "
+                 "full\n",
+                 printable(file).c_str());
   }
 }
 
 int convert(const ReplayOptions &options) {
+  if (is_same_file(options.file, options.to_csv)) {
+    throw Error(options.to_csv + ": is the file to read; give --to-csv another name");
+  }
+  check_output(options.to_csv, options.overwrite);
   std::optional<wire_info> info;
   std::optional<std::uint8_t> sensor_count;
   std::uint64_t frames = 0;
@@ -73,13 +85,14 @@ int convert(const ReplayOptions &options) {
   RecordingWriter writer(
       options.to_csv, options.overwrite, info ? &*info : nullptr,
       sensor_count.value_or(info ? info->sensor_count : std::uint8_t{0}),
-      {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"source", options.file}}, has_raw);
+      {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"source", options.file}}, has_raw,
+      OutputFile::Appears::when_finished);
   Playback playback =
       play(options.file, options.salvage,
            [&](const wire_packet &packet, const LineStatistics &) { writer.packet(packet); });
   writer.finish(playback.statistics, "converted");
-  report_skipped(options.file, playback);
-  std::printf("%s: %llu frames, %s\n", options.to_csv.c_str(),
+  report_losses(options.file, playback);
+  std::printf("%s: %llu frames, %s\n", printable(options.to_csv).c_str(),
               static_cast<unsigned long long>(writer.frames()), playback.statistics.text().c_str());
   return 0;
 }
@@ -116,8 +129,9 @@ int show(const ReplayOptions &options) {
   std::unique_ptr<View> view = make_monitor_view(options.colour);
   Pace pace(options.speed);
   Playback playback;
+  std::string note = printable(options.file);
   auto update = [&] {
-    view->update(model, options.file);
+    view->update(model, note);
     auto key = view->key();
     if (stop_requested() || (key && *key == 'q')) {
       throw Ended();
@@ -146,8 +160,8 @@ int show(const ReplayOptions &options) {
     throw Error(options.file +
                 ": no frames in it; give a recording or capture of a streaming fingertip");
   }
-  report_skipped(options.file, playback);
-  std::printf("%s: %s\n", options.file.c_str(), summary_text(model).c_str());
+  report_losses(options.file, playback);
+  std::printf("%s: %s\n", printable(options.file).c_str(), summary_text(model).c_str());
   return 0;
 }
 

@@ -65,7 +65,10 @@ std::vector<Port> environment_ports() {
   const char *paths = std::getenv("FINGERTIP_PORT");
   for (std::string_view path : split(paths ? paths : "", ':')) {
     if (!path.empty()) {
-      ports.push_back({std::string(path), "", "from FINGERTIP_PORT"});
+      std::error_code none;
+      ports.push_back({std::string(path), "",
+                       fs::exists(path, none) ? "from FINGERTIP_PORT"
+                                              : "from FINGERTIP_PORT, no such port"});
     }
   }
   return ports;

@@ -9,7 +9,7 @@ namespace fingertip {
 struct Port {
   std::string path;   /* the stable name under /dev/serial/by-id where there is one */
   std::string serial; /* as USB reports it; empty for a path from the environment */
-  std::string product;
+  std::string product; /* of a path from the environment: that, and whether it exists */
 };
 
 /* Ports with our USB ids, then the paths in the environment variable FINGERTIP_PORT (separated by

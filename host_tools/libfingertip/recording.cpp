@@ -8,11 +8,9 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <fcntl.h>
 #include <limits>
 #include <map>
 #include <type_traits>
-#include <unistd.h>
 
 namespace fingertip {
 
@@ -274,51 +272,13 @@ std::vector<std::pair<std::string, std::uint32_t>> health_fields(const wire_heal
   return fields;
 }
 
-OutputFile::OutputFile(const std::string &path, bool replace) : path_(path) {
-  fd_ = open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | (replace ? O_TRUNC : O_EXCL), 0666);
-  if (fd_ < 0) {
-    int error = errno;
-    throw Error(path + ": " +
-                (error == EEXIST
-                     ? std::string("exists already; choose another name, or --overwrite")
-                     : std::string(std::strerror(error)) + "; choose another place"));
-  }
-}
-
-OutputFile::~OutputFile() {
-  close(fd_);
-}
-
-void OutputFile::append(const void *bytes, std::size_t length) {
-  auto next = static_cast<const char *>(bytes);
-  std::size_t left = length;
-  while (left > 0) {
-    ssize_t count = write(fd_, next, left);
-    if (count < 0 && errno == EINTR) {
-      continue;
-    }
-    if (count <= 0) {
-      int error = count == 0 ? ENOSPC : errno;
-      if (ftruncate(fd_, length_) != 0) {
-        throw Error(path_ + ": " + std::strerror(error) +
-                    "; its last line is torn, read it with --salvage");
-      }
-      throw Error(path_ + ": " + std::strerror(error) +
-                  "; what was written until now stays readable, make room and start a new file");
-    }
-    next += count;
-    left -= static_cast<std::size_t>(count);
-  }
-  length_ += static_cast<std::int64_t>(length);
-}
-
 RecordingWriter::RecordingWriter(const std::string &path, bool replace, const wire_info *info,
                                  std::uint8_t sensor_count, const Metadata &extra,
-                                 bool raw_expected)
-    : file_(path, replace), sensor_count_(sensor_count), raw_expected_(raw_expected) {
+                                 bool raw_expected, OutputFile::Appears appears)
+    : file_(path, replace, appears), sensor_count_(sensor_count), raw_expected_(raw_expected) {
   line(FIRST_LINE);
   for (const auto &[key, value] : extra) {
-    line("# " + key + ": " + value);
+    line("# " + key + ": " + printable(value));
   }
   if (info) {
     write_info(*info);
@@ -360,6 +320,10 @@ void RecordingWriter::row(const wire_packet *contact, const wire_packet *raw) {
   }
   line(writer.text);
   frames_++;
+  if (first_us_ && any.t_us < last_us_) {
+    before_restart_us_ += last_us_ - *first_us_;
+    first_us_.reset();
+  }
   first_us_ = first_us_.value_or(any.t_us);
   last_us_ = any.t_us;
 }
@@ -429,9 +393,10 @@ void RecordingWriter::event(const std::string &text) {
 
 void RecordingWriter::finish(const LineStatistics &statistics, const std::string &reason) {
   write_pending();
-  double seconds = first_us_ ? static_cast<double>(last_us_ - *first_us_) / 1e6 : 0.0;
+  std::uint64_t recorded_us = before_restart_us_ + (first_us_ ? last_us_ - *first_us_ : 0);
   line("# end: reason=" + reason + " frames=" + std::to_string(frames_) +
-       " seconds=" + fixed(seconds, 6) + " " + statistics.text());
+       " seconds=" + fixed(static_cast<double>(recorded_us) / 1e6, 6) + " " + statistics.text());
+  file_.finish();
 }
 
 RecordingReader::RecordingReader(const std::string &path, bool salvage)
@@ -511,6 +476,9 @@ void RecordingReader::read_comment(const std::string &text) {
   Item item{};
   std::map<std::string, std::string, std::less<>> pairs;
   auto copy_text = [&](char *field) {
+    if (!std::all_of(value.begin(), value.end(), [](char c) { return c >= 0x20 && c <= 0x7E; })) {
+      throw Damage{key + " is no printable ASCII"};
+    }
     std::memset(field, 0, WIRE_TEXT_BYTES);
     std::memcpy(field, value.data(), std::min<std::size_t>(value.size(), WIRE_TEXT_BYTES));
   };
@@ -556,6 +524,8 @@ void RecordingReader::read_comment(const std::string &text) {
     item.kind = Item::Kind::event;
     item.event = value;
     items_.push_back(item);
+  } else if (key == "end") {
+    has_end_ = true;
   } else if (key == "serial") {
     copy_text(info_.serial);
   } else if (key == "board") {

@@ -1,13 +1,16 @@
 /* Recordings: what a fingertip said, as a CSV file that people, pandas and numpy read as it is.
  *
  *   # fingertip-recording 1
- *   # key: value               from the info packet: serial, board, scene, firmware, git, sensors,
- *                              rate_mHz, osr, ..., x_mm and y_mm of the sensors; and of the
- * recorder t_us,frame,sequence,flags,...,total_us,raw_sequence,...,s0_Pa,...,tare0_Pa,... one row
- * per frame          a contact and a raw packet; cells of one that did not come are empty # packet:
- * NAME key=value   every other packet, where it came; before an info packet stand those of its
- * fields that are new, as "# key: value" # event: text              "gone" and "back" of the port
- * among others # end: key=value ...       totals; absent if the recorder was killed
+ *   # key: value              of the info packet: serial, board, scene, firmware, git, sensors,
+ *                             rate_mHz, osr, ..., x_mm and y_mm of the sensors; of the recorder
+ *   t_us,frame,sequence,flags,...,total_us,raw_sequence,...,s0_Pa,...,tare0_Pa,...
+ *                             one row per frame: a contact and a raw packet; cells of one that
+ *                             did not come are empty
+ *   # packet: NAME key=value  every other packet, where it came; before an info packet stand those
+ *                             of its fields that are new, as "# key: value"
+ *   # event: text             "gone" and "back" of the port among others
+ *   # end: key=value ...      totals, over all runs of a device that restarted; absent if the
+ *                             recorder was killed or the disk was full
  *
  * Times are device time in us, pressures Pa with four decimals (exact: the wire carries 1/1024 Pa),
  * floats the shortest text that reads back the same. So nothing of the packets is lost.
@@ -18,6 +21,7 @@
 #pragma once
 
 #include "libfingertip/decoder.hpp"
+#include "libfingertip/output_file.hpp"
 #include "libfingertip/wire.hpp"
 
 #include <cstdint>
@@ -29,26 +33,6 @@
 #include <vector>
 
 namespace fingertip {
-
-/* A file that holds nothing but complete appends, even when the disk is full. Errors are thrown as
- * Error. */
-class OutputFile {
-public:
-  /* An existing file is an error unless it may be replaced. */
-  OutputFile(const std::string &path, bool replace);
-  ~OutputFile();
-  OutputFile(const OutputFile &) = delete;
-  OutputFile &operator=(const OutputFile &) = delete;
-
-  /* On an error the file is cut back to what it held before. */
-  void append(const void *bytes, std::size_t length);
-  const std::string &path() const { return path_; }
-
-private:
-  std::string path_;
-  int fd_;
-  std::int64_t length_ = 0;
-};
 
 using Metadata = std::vector<std::pair<std::string, std::string>>;
 
@@ -64,11 +48,13 @@ public:
   /* sensor_count: columns for raw packets, 0 to FT_MAX_SENSORS; extra: the recorder's own metadata.
    * raw_expected: a contact packet waits for the raw packet of its frame, to share its row. */
   RecordingWriter(const std::string &path, bool replace, const wire_info *info,
-                  std::uint8_t sensor_count, const Metadata &extra, bool raw_expected);
+                  std::uint8_t sensor_count, const Metadata &extra, bool raw_expected,
+                  OutputFile::Appears appears);
 
   /* Throws Error if the disk is full, or a raw packet has another number of sensors. */
   void packet(const wire_packet &packet);
   void event(const std::string &text);
+  /* Last of all. */
   void finish(const LineStatistics &statistics, const std::string &reason);
 
   std::uint64_t frames() const { return frames_; }
@@ -85,6 +71,7 @@ private:
   bool raw_expected_;
   std::optional<wire_packet> pending_contact_;
   Metadata info_; /* as last written */
+  std::uint64_t before_restart_us_ = 0; /* device time of earlier runs of the device */
   std::optional<std::uint64_t> first_us_;
   std::uint64_t last_us_ = 0;
   std::uint64_t frames_ = 0;
@@ -105,6 +92,8 @@ public:
   std::optional<Item> next();
 
   std::uint64_t skipped_lines() const { return skipped_lines_; }
+  /* Whether the end line was seen: without one the recording was cut short. */
+  bool has_end() const { return has_end_; }
 
 private:
   void read_line(const std::string &text);
@@ -118,6 +107,7 @@ private:
   std::uint64_t line_number_ = 0;
   std::uint64_t skipped_lines_ = 0;
   bool header_seen_ = false;
+  bool has_end_ = false;
   std::uint8_t sensor_count_ = 0;
   wire_info info_;
   std::deque<Item> items_;

@@ -27,6 +27,8 @@ public:
   bool reopen() override;
   std::string description() const override { return path_; }
 
+  /* At the end of the file: a recording without its end line. */
+  bool is_cut_short() const { return ended_ && reader_ && !reader_->has_end(); }
   std::uint64_t skipped_lines() const { return reader_ ? reader_->skipped_lines() : 0; }
 
 private:

@@ -8,6 +8,8 @@
  *     drop=N           every Nth frame loses its packets
  *     flip=N           every Nth frame has a flipped bit
  *     stall=N          says nothing more after N frames
+ *     flags=BITS       of every contact packet
+ *     absent=K         sensor K is not there
  *     mute=1           never says anything
  *     refuse=1         answers every command but stream, info and health with "not now"
  *
@@ -80,6 +82,14 @@ private:
     return option == options_.end() ? otherwise : std::atol(option->second.c_str());
   }
 
+  void send_health() {
+    wire_packet packet = test::make_health(0, now_us());
+    if (long absent = number("absent", -1); absent >= 0) {
+      packet.body.health.sensors_present &= ~(1u << absent);
+    }
+    send(packet);
+  }
+
   void power_on() {
     master_ = posix_openpt(O_RDWR | O_NOCTTY);
     if (master_ < 0 || grantpt(master_) != 0 || unlockpt(master_) != 0) {
@@ -136,12 +146,17 @@ private:
     contact.body.contact.x_mm = 8 * std::cos(angle);
     contact.body.contact.y_mm = 16 * std::sin(angle);
     contact.body.contact.force_N = 5;
+    contact.body.contact.flags =
+        static_cast<std::uint32_t>(number("flags", contact.body.contact.flags));
     if (drop && frame_ % drop == 0) {
       sequence_ = static_cast<std::uint16_t>(sequence_ + 2);
       return;
     }
     send(contact, flip && frame_ % flip == 0);
     send(test::make_raw(0, t_us, frame));
+    if (frame_ == 1) {
+      send_health();
+    }
   }
 
   /* True if the streams changed. */
@@ -194,7 +209,7 @@ private:
       send(info_);
       return false;
     case WIRE_CMD_HEALTH:
-      send(test::make_health(0, now_us()));
+      send_health();
       return false;
     default:
       return false;

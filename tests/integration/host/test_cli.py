@@ -25,7 +25,8 @@ class CliTest(unittest.TestCase):
         self.port = os.path.join(self.folder, "tty")
         self.csv = os.path.join(self.folder, "r.csv")
         self.ftr = os.path.join(self.folder, "r.ftr")
-        self.environment = {k: v for k, v in os.environ.items() if k != "FINGERTIP_PORT"}
+        self.environment = {k: v for k, v in os.environ.items() if k != "FINGERTIP_PORT" and not k.startswith("LC_")}
+        self.environment["LC_ALL"] = "C.UTF-8"
 
     @contextlib.contextmanager
     def device(self, *options):
@@ -82,15 +83,32 @@ class Usage(CliTest):
         self.assertIn("see fingertip --help", self.error(status=2))
         self.assertIn("see fingertip record --help", self.error("record", status=2))
         self.error("monitor", "--bogus", status=2)
-        self.error("record", self.csv, "--seconds", "-1", status=2)
-        self.error("replay", self.csv, "--colour", "pink", status=2)
+
+    def test_wrong_values_say_what_is_right(self):
+        for value in ("nan", "-1", "0", "inf", "1x"):
+            self.assertIn("give a number from 0.001", self.error("record", self.csv, f"--seconds={value}", status=2))
+        for value in ("pink", "0"):
+            err = self.error("monitor", "--colour", value, status=2)
+            self.assertEqual(err, f'fingertip: --colour "{value}" is not possible; give auto, truecolour, 256 or plain; '
+                                  "see fingertip monitor --help\n")
+        for value in ("abc", "0", "nan", "-1", "1001"):
+            self.assertIn("give 0.01 to 1000, or max", self.error("replay", self.csv, "--speed", value, status=2))
+
+    def test_names_cannot_speak_to_the_terminal(self):
+        name = self.folder + "/\x1b[31m\n.csv"
+        err = self.error("replay", name)
+        self.assertIn("\\x1b[31m\\x0a.csv: No such file", err)
+        self.assertNotIn("\x1b", self.error("record", name, "--port", "/no/\x1b[31m"))
+        self.assertNotIn("\x1b", self.error("replay", "--\x1b[31m", status=2))
 
     def test_ports(self):
         self.assertIn("no such port", self.error("info", "--port", self.port))
         self.assertIn("no serial port", self.error("info", "--port", "/dev/null"))
         self.environment["FINGERTIP_PORT"] = "/tmp/a:/tmp/b"
         self.assertIn("several fingertips found", self.error("info"))
-        self.assertIn("/tmp/b", self.run_cli("list")[0])
+        self.environment["FINGERTIP_PORT"] = self.port + ":" + self.folder
+        self.assertEqual(self.run_cli("list")[0], f"{self.port}\t-\tfrom FINGERTIP_PORT, no such port\n"
+                                                  f"{self.folder}\t-\tfrom FINGERTIP_PORT\n")
 
     def test_ranges_are_found_before_a_port_is_opened(self):
         for setting, allowed in [("rate=0", "0.1 to 2000 Hz, or max"), ("rate=x", "0.1 to 2000 Hz, or max"),
@@ -114,14 +132,21 @@ class Commands(CliTest):
         with self.device():
             out = self.run_cli("info", "--port", self.port)[0]
             self.assertRegex(out, r"(?m)^serial +E660583883265A2C$")
-            self.assertRegex(out, r"(?m)^sensors_present +32767$")
+            self.assertRegex(out, r"(?m)^sensors_present +15 of 15$")
+            self.assertRegex(out, r"(?m)^sensors_prom_bad +1 2 3$")
+            self.assertRegex(out, r"(?m)^rate_mHz +20000$")
             self.environment["FINGERTIP_PORT"] = self.port
             out = self.run_cli("set", "rate=max", "osr=256", "slip_threshold=0.5")[0]
             self.assertEqual(out, "rate=max osr=256 slip_threshold=0.5 slip_window=100\n")
+            self.assertRegex(self.run_cli("info")[0], r"(?m)^rate_mHz +max$")
             out = self.run_cli("set", "slip_window=250", "rate=20.5")[0]
             self.assertEqual(out, "rate=20.500 osr=256 slip_threshold=0.5 slip_window=250\n")
             self.assertEqual(self.run_cli("tare")[0], "tared\n")
             self.assertIn("RPI-RP2", self.run_cli("loader")[0])
+
+    def test_info_names_missing_sensors(self):
+        with self.device("absent=7"):
+            self.assertRegex(self.run_cli("info", "--port", self.port)[0], r"(?m)^sensors_present +14 of 15, missing: 7$")
 
     def test_refusal(self):
         with self.device("refuse=1"):
@@ -207,6 +232,9 @@ class Recording(CliTest):
         restart = frames.index(1, 1)
         self.assertGreaterEqual(frames[restart - 1], 95)
         self.assertEqual(frames[restart:], list(range(1, len(frames) - restart + 1)))
+        t_us = [int(row["t_us"]) for row in rows]
+        seconds = (t_us[restart - 1] - t_us[0] + t_us[-1] - t_us[restart]) / 1e6
+        self.assertIn(f" seconds={seconds:.6f} ", comments[-1])
         self.assertRegex(self.run_cli("replay", self.csv, "--speed", "max")[0], " 0 packets dropped")
 
     def test_until_gone(self):
@@ -217,10 +245,24 @@ class Recording(CliTest):
     def test_existing_files_are_kept(self):
         with open(self.csv, "w", encoding="utf-8") as file:
             file.write("precious")
-        with self.device():
-            self.assertIn("exists already", self.run_cli("record", self.csv, "--port", self.port, status=1)[1])
+        self.assertIn("exists already", self.error("record", self.csv))
+        self.assertIn("exists already", self.error("monitor", "--record", self.csv))
+        self.assertIn("exists already", self.error("record", self.ftr, "--raw-bytes", self.csv))
+        # nor does --overwrite touch them while nothing answers
+        self.assertIn("no such port", self.error("record", self.csv, "--port", self.port, "--overwrite"))
+        with self.device("mute=1"):
+            process = self.start("record", self.ftr, "--raw-bytes", self.csv, "--port", self.port, "--overwrite")
+            time.sleep(0.5)
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=PATIENCE_s)
         with open(self.csv, encoding="utf-8") as file:
             self.assertEqual(file.read(), "precious")
+
+    def test_one_file_cannot_be_two(self):
+        for other in (self.csv, self.folder + "/./r.csv"):
+            for overwrite in ([], ["--overwrite"]):
+                self.assertIn("give --raw-bytes another name", self.error("record", self.csv, "--raw-bytes", other, *overwrite))
+        self.assertFalse(os.path.exists(self.csv))
 
     def test_a_full_disk_is_an_error_and_leaves_a_readable_file(self):
         def limit():
@@ -232,10 +274,11 @@ class Recording(CliTest):
         self.assertIn("what was written until now stays readable", err)
         self.assertRegex(self.run_cli("replay", self.csv, "--speed", "max")[0], r"\d\d frames in")
 
-    def test_an_absent_folder_is_an_error(self):
-        with self.device():
-            _, err = self.run_cli("record", self.folder + "/no/r.csv", "--port", self.port, status=1)
-        self.assertIn("No such file or directory; choose another place", err)
+    def test_a_wrong_place_is_found_before_a_port_is_opened(self):
+        for option in ([], ["--overwrite"]):
+            self.assertIn("No such file or directory; choose another place", self.error("record", self.folder + "/no/r.csv", *option))
+            self.assertIn("is a folder; give the name of a file in it", self.error("record", self.folder, *option))
+            self.assertIn("is a folder", self.error("record", self.csv, "--raw-bytes", self.folder + "/", *option))
 
 
 class Replay(CliTest):
@@ -252,7 +295,6 @@ class Replay(CliTest):
         begin = time.monotonic()
         self.run_cli("replay", self.ftr, "--speed", "max")
         self.assertLess(time.monotonic() - begin, normal / 2)
-        self.assertIn("0.01 to 1000, or max", self.error("replay", self.csv, "--speed", "0"))
 
     def test_torn_lines(self):
         self.record()
@@ -269,6 +311,43 @@ class Replay(CliTest):
         out, err = self.run_cli("replay", self.csv, "--speed", "max", "--salvage")
         self.assertIn("1 damaged lines skipped", err)
         self.assertIn("99 frames in", out)
+
+    def test_a_recording_that_was_cut_short(self):
+        self.record()
+        self.assertNotIn("cut short", self.run_cli("replay", self.csv, "--speed", "max")[1])
+        self.assertNotIn("cut short", self.run_cli("replay", self.ftr, "--speed", "max")[1])
+        with open(self.csv, encoding="utf-8") as file:
+            lines = file.readlines()
+        self.assertTrue(lines[-1].startswith("# end: "))
+        with open(self.csv, "w", encoding="utf-8") as file:
+            file.writelines(lines[:-1])
+        self.assertIn(f"{self.csv}: no end line: the recording was cut short", self.run_cli("replay", self.csv, "--speed", "max")[1])
+        self.assertIn("cut short", self.run_cli("replay", self.csv, "--to-csv", self.folder + "/c.csv")[1])
+
+    def test_a_conversion_never_harms_a_file(self):
+        self.record()
+        with open(self.csv, "rb") as file:
+            before = file.read()
+        os.link(self.csv, self.folder + "/hard.csv")
+        os.symlink("r.csv", self.folder + "/soft.csv")
+        for name in ("r.csv", "./r.csv", "hard.csv", "soft.csv"):
+            err = self.error("replay", self.csv, "--to-csv", os.path.join(self.folder, name), "--overwrite")
+            self.assertIn("give --to-csv another name", err)
+        self.assertIn("is a folder", self.error("replay", self.ftr, "--to-csv", self.folder, "--overwrite"))
+        self.assertIn("exists already", self.error("replay", self.ftr, "--to-csv", self.csv))
+
+        # a disk that is full in the middle
+        def limit():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (10000, 10000))
+
+        _, err = self.run_cli("replay", self.ftr, "--to-csv", self.csv, "--overwrite", status=1, preexec_fn=limit)
+        self.assertIn("nothing was changed", err)
+        with open(self.csv, "rb") as file:
+            self.assertEqual(file.read(), before)
+        self.assertEqual(sorted(os.listdir(self.folder)), ["hard.csv", "r.csv", "r.ftr", "soft.csv"])
+        self.run_cli("replay", self.ftr, "--to-csv", self.csv, "--overwrite")
+        self.assertIn("reason=converted", self.rows()[1][-1])
 
     def test_other_files(self):
         noise = os.path.join(self.folder, "noise.ftr")
@@ -347,6 +426,36 @@ class Monitor(CliTest):
         self.assertIn("38;5;", output)
         self.assertNotIn("38;2;", output)
 
+    def test_a_terminal_without_utf_8_gets_ascii(self):
+        for language in ("C", "POSIX"):
+            with self.device():
+                output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until="live", then=b"q",
+                                                   environment=(("TERM", "xterm"), ("LC_ALL", language)))
+            self.assertTrue(output.isascii(), re.sub("[ -~]", "", output)[:200])
+            self.assertIn("FIT_VALID", output)
+            self.assertIn("us", output)
+        # a locale that this system does not have is known by its name
+        with self.device():
+            output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until="live", then=b"q",
+                                               environment=(("TERM", "xterm"), ("LC_ALL", "xx_XX.utf8")))
+        self.assertIn("▀", output)
+
+    def test_flags_move_nothing(self):
+        def places(*options):
+            with self.device(*options):
+                output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until="(live.*){4}", then=b"q")
+            last = output[:output.rfind("\x1b[?2026l")].rsplit("\x1b[?2026h", 1)[1]
+            lines = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", last).split("\r\n")
+            return lines, [next(i for i, line in enumerate(lines) if word in line) for word in ("frames/s", "dropped", "one frame", "CPU", "q quit")]
+
+        few, few_places = places("flags=0")
+        many, many_places = places("flags=65535")
+        self.assertEqual(few_places, many_places)
+        self.assertFalse(any("AT_BOUND" in line for line in few))
+        for name in ("UNCERTAINTY_VALID", "FORCE_LOWER_BOUND", "AT_BOUND"):
+            self.assertTrue(any(name in line for line in many), (name, many))
+        self.assertEqual(len(many), 24)
+
     def test_a_dumb_terminal_gets_lines(self):
         with self.device():
             output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until="FIT_VALID", then=signal.SIGINT,
@@ -359,12 +468,13 @@ class Monitor(CliTest):
         self.assert_restored(output)
 
     def test_an_error_restores_the_terminal(self):
-        with self.device("refuse=1", "frames=30"):
-            output, status, _, _ = self.on_terminal("monitor", "--port", self.port, "--record", self.folder + "/no/r.csv",
+        with self.device("frames=30"):
+            output, status, _, _ = self.on_terminal("monitor", "--port", self.port, "--record", "/dev/full", "--overwrite",
                                                     until="never", then=b"q")
         self.assertEqual(status, 1)
+        self.assertIn("\x1b[?1049h", output)
         self.assertGreater(output.rfind("\x1b[?1049l"), output.rfind("\x1b[?1049h"))
-        self.assertIn("choose another place", output[output.rfind("\x1b[?1049l"):])
+        self.assertIn("No space left on device", output[output.rfind("\x1b[?1049l"):])
 
     def test_lines_where_there_is_no_terminal(self):
         with self.device("frames=300"):

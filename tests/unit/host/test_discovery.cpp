@@ -81,6 +81,9 @@ TEST_F(FakeSystem, TheEnvironmentGoesBeforeUsbAndTheArgumentBeforeBoth) {
   EXPECT_EQ(choose_port("", root()), "/tmp/pty");
   EXPECT_EQ(choose_port("/tmp/other", root()), "/tmp/other");
   EXPECT_EQ(find_ports(root()).size(), 2u);
+  EXPECT_EQ(find_ports(root())[1].product, "from FINGERTIP_PORT, no such port");
+  setenv("FINGERTIP_PORT", root().c_str(), 1);
+  EXPECT_EQ(find_ports(root())[1].product, "from FINGERTIP_PORT");
   setenv("FINGERTIP_PORT", "/tmp/a:/tmp/b", 1);
   EXPECT_THROW(choose_port("", root()), Error);
   unsetenv("FINGERTIP_PORT");

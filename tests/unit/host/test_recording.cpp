@@ -46,9 +46,11 @@ std::vector<wire_packet> all_kinds() {
           test::make_raw(10, 4000, 4)}; /* its contact packet was lost */
 }
 
+constexpr auto AT_ONCE = OutputFile::Appears::at_once;
+
 void record(const std::string &path, const std::vector<wire_packet> &packets, bool finish = true) {
   wire_info info = test::make_info(0, 0).body.info;
-  RecordingWriter writer(path, false, &info, 15, {{"note", "a: b"}}, true);
+  RecordingWriter writer(path, false, &info, 15, {{"note", "a: b"}}, true, AT_ONCE);
   for (const wire_packet &packet : packets) {
     writer.packet(packet);
   }
@@ -121,7 +123,7 @@ TEST(Recording, TransportGivesTheSameBytesAgainAndTheGapsCount) {
 TEST(Recording, AGonePortIsGoneAgainInReplay) {
   test::TemporaryFolder folder;
   {
-    RecordingWriter writer(folder / "r.csv", false, nullptr, 0, {}, false);
+    RecordingWriter writer(folder / "r.csv", false, nullptr, 0, {}, false, AT_ONCE);
     writer.packet(test::make_contact(1000, 1, 1));
     writer.event(std::string(EVENT_GONE) + " 12:00");
     writer.event("back 12:01");
@@ -139,6 +141,47 @@ TEST(Recording, AGonePortIsGoneAgainInReplay) {
   EXPECT_EQ(read(), Transport::Result::data);
   EXPECT_EQ(read(), Transport::Result::gone);
   EXPECT_FALSE(transport.reopen());
+}
+
+TEST(Recording, TheEndCountsTheTimeOfEveryRunOfTheDevice) {
+  test::TemporaryFolder folder;
+  record(folder / "r.csv", {test::make_contact(1, 5000000, 1), test::make_contact(2, 7500000, 2),
+                            test::make_contact(1, 1000, 1), test::make_contact(2, 251000, 2)});
+  EXPECT_NE(contents(folder / "r.csv").find(" frames=4 seconds=2.750000 "), std::string::npos);
+}
+
+TEST(Recording, TheReaderTellsWhetherTheEndIsThere) {
+  test::TemporaryFolder folder;
+  for (bool finished : {true, false}) {
+    std::string path = folder / (finished ? "whole.csv" : "cut.csv");
+    record(path, all_kinds(), finished);
+    RecordingTransport transport(path, false);
+    std::uint8_t bytes[4096];
+    std::size_t length;
+    EXPECT_FALSE(transport.is_cut_short()) << "not at its end yet";
+    while (transport.read(bytes, sizeof bytes, &length, std::chrono::milliseconds(0)) ==
+           Transport::Result::data) {
+    }
+    EXPECT_EQ(transport.is_cut_short(), !finished);
+  }
+}
+
+TEST(Recording, NamesThatOthersChoseCannotBreakALine) {
+  test::TemporaryFolder folder;
+  RecordingWriter(folder / "r.csv", false, nullptr, 0, {{"source", "a\nb\x1b\xff"}}, true, AT_ONCE);
+  EXPECT_NE(contents(folder / "r.csv").find("# source: a\\x0ab\\x1b\\xff\n"), std::string::npos);
+}
+
+TEST(Recording, TextThatNoPacketCanHoldIsDamage) {
+  test::TemporaryFolder folder;
+  record(folder / "r.csv", all_kinds());
+  std::string whole = contents(folder / "r.csv");
+  for (std::string bad : {"\x1b", "\xc3\xa4", "\x7f"}) {
+    std::string text = whole;
+    text.insert(text.find("# scene: ") + 9, bad);
+    write(folder / "bad.csv", text);
+    EXPECT_NE(error_of(folder / "bad.csv").find("scene is no printable ASCII"), std::string::npos);
+  }
 }
 
 TEST(Recording, ChangedInfoAfterAReturnIsKept) {
@@ -219,15 +262,15 @@ TEST(Recording, OtherFilesAreRefused) {
 TEST(Recording, ExistingFilesAreKeptUnlessReplaced) {
   test::TemporaryFolder folder;
   write(folder / "r.csv", "precious");
-  EXPECT_THROW(RecordingWriter(folder / "r.csv", false, nullptr, 0, {}, false), Error);
+  EXPECT_THROW(RecordingWriter(folder / "r.csv", false, nullptr, 0, {}, false, AT_ONCE), Error);
   EXPECT_EQ(contents(folder / "r.csv"), "precious");
-  RecordingWriter(folder / "r.csv", true, nullptr, 0, {}, false);
+  RecordingWriter(folder / "r.csv", true, nullptr, 0, {}, false, AT_ONCE);
   EXPECT_EQ(contents(folder / "r.csv").rfind("# fingertip-recording 1\n", 0), 0u);
 }
 
 TEST(Recording, AnotherNumberOfSensorsEndsIt) {
   test::TemporaryFolder folder;
-  RecordingWriter writer(folder / "r.csv", false, nullptr, 15, {}, true);
+  RecordingWriter writer(folder / "r.csv", false, nullptr, 15, {}, true, AT_ONCE);
   EXPECT_THROW(writer.packet(test::make_raw(1, 1, 1, 12)), Error);
 }
 
@@ -241,7 +284,7 @@ TEST(Recording, AFullDiskIsAnErrorAndLeavesWholeLines) {
   std::string error;
   std::uint64_t frames = 0;
   {
-    RecordingWriter writer(folder / "r.csv", false, nullptr, 15, {}, false);
+    RecordingWriter writer(folder / "r.csv", false, nullptr, 15, {}, false, AT_ONCE);
     setrlimit(RLIMIT_FSIZE, &small);
     try {
       for (std::uint16_t i = 0; i < 1000; i++) {

@@ -1,0 +1,131 @@
+#include "libfingertip/output_file.hpp"
+
+#include "libfingertip/error.hpp"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fcntl.h>
+#include <filesystem>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace fingertip {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void fail(const std::string &path, int error) {
+  switch (error) {
+  case EEXIST:
+    throw Error(path + ": exists already; choose another name, or --overwrite");
+  case EISDIR:
+    throw Error(path + ": is a folder; give the name of a file in it");
+  default:
+    throw Error(path + ": " + std::strerror(error) + "; choose another place");
+  }
+}
+
+fs::path without_links(const std::string &path) {
+  std::error_code error;
+  fs::path plain = fs::weakly_canonical(fs::absolute(path, error), error);
+  return error ? fs::path(path) : plain;
+}
+
+} // namespace
+
+void check_output(const std::string &path, bool replace) {
+  std::string folder = fs::path(path).parent_path().string();
+  struct stat status;
+  bool exists = stat(path.c_str(), &status) == 0;
+  if ((exists && S_ISDIR(status.st_mode)) || path.empty() || path.back() == '/') {
+    fail(path, EISDIR);
+  }
+  if (exists && !replace) {
+    fail(path, EEXIST);
+  }
+  if (exists ? access(path.c_str(), W_OK) != 0
+             : access(folder.empty() ? "." : folder.c_str(), W_OK | X_OK) != 0) {
+    fail(path, errno);
+  }
+}
+
+bool is_same_file(const std::string &a, const std::string &b) {
+  std::error_code absent;
+  return fs::equivalent(a, b, absent) || without_links(a) == without_links(b);
+}
+
+OutputFile::OutputFile(const std::string &path, bool replace, Appears appears)
+    : path_(path), replace_(replace) {
+  check_output(path, replace);
+  target_ = without_links(path).string();
+  struct stat old;
+  bool exists = stat(path.c_str(), &old) == 0;
+  if (appears == Appears::when_finished && (!exists || S_ISREG(old.st_mode))) {
+    temporary_ = target_ + ".XXXXXX";
+    fd_ = mkostemp(temporary_.data(), O_CLOEXEC);
+    if (fd_ >= 0) {
+      mode_t mask = umask(0);
+      umask(mask);
+      fchmod(fd_, exists ? old.st_mode & 07777 : 0666 & ~mask);
+    }
+  } else {
+    fd_ = open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | (replace ? O_TRUNC : O_EXCL), 0666);
+  }
+  if (fd_ < 0) {
+    fail(path, errno);
+  }
+}
+
+OutputFile::~OutputFile() {
+  close(fd_);
+  if (!temporary_.empty()) {
+    unlink(temporary_.c_str());
+  }
+}
+
+void OutputFile::append(const void *bytes, std::size_t length) {
+  auto next = static_cast<const char *>(bytes);
+  std::size_t left = length;
+  while (left > 0) {
+    ssize_t count = write(fd_, next, left);
+    if (count < 0 && errno == EINTR) {
+      continue;
+    }
+    if (count <= 0) {
+      int error = count == 0 ? ENOSPC : errno;
+      std::string what = path_ + ": " + std::strerror(error);
+      if (!temporary_.empty()) {
+        throw Error(what + "; nothing was changed, make room and try again");
+      }
+      if (ftruncate(fd_, length_) != 0) {
+        throw Error(what + "; its last line is torn, read it with --salvage");
+      }
+      throw Error(what +
+                  "; what was written until now stays readable, make room and start a new file");
+    }
+    next += count;
+    left -= static_cast<std::size_t>(count);
+  }
+  length_ += static_cast<std::int64_t>(length);
+}
+
+void OutputFile::finish() {
+  if (temporary_.empty()) {
+    return;
+  }
+  if (fsync(fd_) != 0) {
+    fail(path_, errno);
+  }
+  /* Some file systems cannot refuse to replace: EINVAL. */
+  if (renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target_.c_str(),
+                replace_ ? 0 : RENAME_NOREPLACE) != 0 &&
+      (errno != EINVAL || rename(temporary_.c_str(), target_.c_str()) != 0)) {
+    fail(path_, errno);
+  }
+  temporary_.clear();
+}
+
+} // namespace fingertip

@@ -1,0 +1,46 @@
+/* Files that the tools write: never one that is there already, unless it may be replaced, and never
+ * over what is being read. Errors are thrown as Error.
+ */
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+namespace fingertip {
+
+/* Throws unless an OutputFile can be made of these; touches nothing. */
+void check_output(const std::string &path, bool replace);
+
+/* Whether both paths lead, or would lead once written, to one file. */
+bool is_same_file(const std::string &a, const std::string &b);
+
+/* A file that holds nothing but complete appends, even when the disk is full. */
+class OutputFile {
+public:
+  enum class Appears {
+    at_once,      /* and grows: what was appended outlives a killed program */
+    when_finished /* whole, in one step; until then, and without finish, an older file stays */
+  };
+
+  /* replace: whether an existing file may go. Devices and pipes are written to at once. */
+  OutputFile(const std::string &path, bool replace, Appears appears);
+  ~OutputFile();
+  OutputFile(const OutputFile &) = delete;
+  OutputFile &operator=(const OutputFile &) = delete;
+
+  /* On an error the file is cut back to what it held before. */
+  void append(const void *bytes, std::size_t length);
+  void finish();
+  const std::string &path() const { return path_; }
+
+private:
+  std::string path_;
+  bool replace_;
+  std::string target_;    /* path_ without symbolic links */
+  std::string temporary_; /* beside the target, until finished; empty if written at once */
+  int fd_;
+  std::int64_t length_ = 0;
+};
+
+} // namespace fingertip

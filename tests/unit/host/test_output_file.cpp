@@ -1,0 +1,111 @@
+#include "libfingertip/error.hpp"
+#include "libfingertip/output_file.hpp"
+#include "support/host_packets.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <gtest/gtest.h>
+#include <sstream>
+#include <sys/stat.h>
+
+using namespace fingertip;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr auto WHEN_FINISHED = OutputFile::Appears::when_finished;
+
+std::string contents(const std::string &path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+void write(const std::string &path, const std::string &text) {
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+std::string refusal(const std::string &path, bool replace) {
+  try {
+    check_output(path, replace);
+  } catch (const Error &error) {
+    return error.what();
+  }
+  return "";
+}
+
+long files_in(const std::string &folder) {
+  return std::distance(fs::directory_iterator(folder), fs::directory_iterator());
+}
+
+} // namespace
+
+TEST(OutputFile, AnUnfinishedOneLeavesTheOldFile) {
+  test::TemporaryFolder folder;
+  write(folder / "a", "old");
+  {
+    OutputFile file(folder / "a", true, WHEN_FINISHED);
+    file.append("new", 3);
+    EXPECT_EQ(contents(folder / "a"), "old");
+  }
+  EXPECT_EQ(contents(folder / "a"), "old");
+  EXPECT_EQ(files_in(folder.path()), 1);
+}
+
+TEST(OutputFile, AFinishedOneTakesThePlaceAndThePermissionsOfTheOld) {
+  test::TemporaryFolder folder;
+  write(folder / "a", "old");
+  chmod((folder / "a").c_str(), 0640);
+  fs::create_symlink("a", folder / "link");
+  {
+    OutputFile file(folder / "link", true, WHEN_FINISHED);
+    file.append("new", 3);
+    file.finish();
+  }
+  EXPECT_TRUE(fs::is_symlink(folder / "link"));
+  EXPECT_EQ(contents(folder / "a"), "new");
+  EXPECT_EQ(fs::status(folder / "a").permissions(), fs::perms(0640));
+  EXPECT_EQ(files_in(folder.path()), 2);
+}
+
+TEST(OutputFile, AFileThatCameMeanwhileIsKept) {
+  test::TemporaryFolder folder;
+  OutputFile file(folder / "a", false, WHEN_FINISHED);
+  file.append("new", 3);
+  write(folder / "a", "other");
+  EXPECT_THROW(file.finish(), Error);
+  EXPECT_EQ(contents(folder / "a"), "other");
+}
+
+TEST(OutputFile, WhatCannotBeWrittenIsRefusedAndTouchesNothing) {
+  test::TemporaryFolder folder;
+  write(folder / "a", "old");
+  EXPECT_NE(refusal(folder / "a", false).find("exists already; choose another name"),
+            std::string::npos);
+  EXPECT_EQ(refusal(folder / "a", true), "");
+  EXPECT_EQ(refusal(folder / "b", false), "");
+  EXPECT_NE(refusal(folder / "no/a", false).find("choose another place"), std::string::npos);
+  for (bool replace : {false, true}) {
+    std::string error = refusal(folder.path(), replace);
+    EXPECT_NE(error.find("is a folder"), std::string::npos) << error;
+    EXPECT_EQ(error.find("--overwrite"), std::string::npos) << error;
+  }
+  EXPECT_EQ(contents(folder / "a"), "old");
+  EXPECT_EQ(files_in(folder.path()), 1);
+}
+
+TEST(OutputFile, OneFileByTwoNames) {
+  test::TemporaryFolder folder;
+  write(folder / "a", "");
+  fs::create_hard_link(folder / "a", folder / "hard");
+  fs::create_symlink("a", folder / "soft");
+  fs::create_directory_symlink(".", folder / "here");
+  EXPECT_TRUE(is_same_file(folder / "a", folder / "hard"));
+  EXPECT_TRUE(is_same_file(folder / "a", folder / "soft"));
+  EXPECT_TRUE(is_same_file(folder / "a", folder / "here/a"));
+  EXPECT_TRUE(is_same_file(folder / "new", folder / "./here/new"));
+  EXPECT_TRUE(is_same_file("new", "./new"));
+  EXPECT_FALSE(is_same_file(folder / "a", folder / "b"));
+  EXPECT_FALSE(is_same_file(folder / "b", folder / "c"));
+}
