@@ -122,8 +122,8 @@ Canvas::Cell Canvas::in_ascii(const Cell &cell) {
   if (cell.character != UPPER_HALF) {
     return {std::string(1, ascii_of(cell.character)), cell.style};
   }
-  const Style &style = cell.style;
-  return {" ", {style.front, style.back ? mix(*style.front, *style.back, 0.5f) : style.front, false}};
+  const auto &[front, back, bold] = cell.style;
+  return {" ", {front, back ? mix(*front, *back, 0.5f) : front, bold}};
 }
 
 std::string Canvas::ansi(ColourDepth depth, Characters characters) const {

@@ -184,7 +184,8 @@ int set(const Options &options) {
   }
   wire_info info = session.info().body.info;
   std::printf("rate=%s osr=%u slip_threshold=%s slip_window=%u\n",
-              rate_text(info.rate_mHz).c_str(), info.osr, shortest(info.slip_threshold_mm).c_str(), info.slip_window_ms);
+              rate_text(info.rate_mHz).c_str(), info.osr, shortest(info.slip_threshold_mm).c_str(),
+              info.slip_window_ms);
   return 0;
 }
 

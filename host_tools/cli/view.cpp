@@ -61,7 +61,8 @@ public:
   explicit ScreenView(ColourDepth depth) : depth_(depth) {}
   void update(const Model &model, const std::string &note) override {
     if (interval_.is_due()) {
-      screen_.draw(draw_monitor(model, note, screen_.columns(), screen_.rows()).ansi(depth_, characters_));
+      Canvas canvas = draw_monitor(model, note, screen_.columns(), screen_.rows());
+      screen_.draw(canvas.ansi(depth_, characters_));
     }
   }
   std::optional<char> key() override { return screen_.key(); }

@@ -23,7 +23,8 @@ std::optional<std::int64_t> to_i64(std::string_view text);
 /* Empty parts are kept: "a,,b" has three. */
 std::vector<std::string_view> split(std::string_view text, char separator);
 std::string_view trim(std::string_view text);
-/* For names that others chose, in one line and harmless to a terminal: control characters, and what is no UTF-8, as \\x1b. */
+/* For names that others chose, in one line and harmless to a terminal: control characters, and
+ * what is no UTF-8, as \x1b. */
 std::string printable(std::string_view text);
 std::string hex(const std::vector<std::uint8_t> &bytes);
 
