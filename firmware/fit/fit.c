@@ -123,11 +123,13 @@ enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, con
 void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                   const struct fit_settings *settings, struct fit_result *result) {
   uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
+  bool grid = array->grid.columns == FIT_GRID_COLUMNS && array->grid.rows == FIT_GRID_ROWS;
   bool some = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
-  if (array->grid.columns == FIT_GRID_COLUMNS && array->grid.rows == FIT_GRID_ROWS &&
-      (usable & all) == all && !some) {
+  if (!grid || some) {
+    fit_general(array, pressure_Pa_q10, usable, settings, result);
+  } else if ((usable & all) == all) {
     fit_grid(array, pressure_Pa_q10, settings, result);
   } else {
-    fit_general(array, pressure_Pa_q10, usable, settings, result);
+    fit_grid_masked(array, pressure_Pa_q10, usable, settings, result);
   }
 }

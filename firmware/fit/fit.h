@@ -5,9 +5,9 @@
  * a first guess made anew for every frame: no state between frames, no early exit, so the cost
  * depends on the array alone. Any positions, any subset of sensors.
  *
- * Two kernels do it: fixed point for a full rectangular grid, float32 for everything else. Both use
- * integer exponentials and logarithms, so that a Cortex-M0+, a Cortex-M4F and a PC compute the same
- * bits. Main context only: they divide with port/divide.h.
+ * Fixed point does it for a rectangular grid, with every sensor or without some, float32 for
+ * everything else. Both use integer exponentials and logarithms, so that a Cortex-M0+, a Cortex-M4F
+ * and a PC compute the same bits. Main context only: they divide with port/divide.h.
  *
  * Sensors on a line do not tell where a contact lies across it: the location is held to the line,
  * and p0 and force are those of a contact whose centre is there.
@@ -78,13 +78,16 @@ enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, con
 void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                   const struct fit_settings *settings, struct fit_result *result);
 
-/* The two kernels behind fit_gaussian, to compare them.
+/* The kernels behind fit_gaussian, to compare them.
  *
  * fit_grid: fixed point, for a full rectangle of FIT_GRID_COLUMNS x FIT_GRID_ROWS nodes (of the
  * build, 2 to 6 each way) with every sensor usable; sigma from 0.216 pitch.
+ * fit_grid_masked: the same with any sensors missing, at twice the cost.
  * fit_general: float32, any positions, any sensors missing. */
 void fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
               const struct fit_settings *settings, struct fit_result *result);
+void fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                     const struct fit_settings *settings, struct fit_result *result);
 void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                  const struct fit_settings *settings, struct fit_result *result);
 

@@ -140,17 +140,6 @@ FIXED_INLINE int32_t scaled_to_fixed(struct scaled a, int32_t q) {
   return a.mantissa >> (shift < -31 ? 31 : -shift);
 }
 
-FIXED_INLINE int32_t scaled_ratio(struct scaled a, struct scaled b, int32_t q) {
-  int32_t divisor = b.mantissa != 0 ? b.mantissa : 1;
-  int32_t quotient = port_divide(a.mantissa * (1 << 15), divisor);
-  int32_t shift = a.exponent - b.exponent - 15 + q;
-  if (shift >= 0) {
-    int32_t limit = (1 << 30) >> (shift < 30 ? shift : 30);
-    return fixed_clamp(quotient, -limit, limit) * (1 << (shift < 30 ? shift : 30));
-  }
-  return quotient >> (shift < -31 ? 31 : -shift);
-}
-
 /* Square root of a non-negative value: two Newton steps from a straight line that is within 3.2 %
  * of it. */
 FIXED_INLINE struct scaled scaled_sqrt(struct scaled a) {
@@ -166,6 +155,20 @@ FIXED_INLINE struct scaled scaled_sqrt(struct scaled a) {
   root = (root + port_divide(square, root)) >> 1;
   struct scaled result = {root, (a.exponent - odd - 14) / 2};
   return result;
+}
+
+/* 15-bit mantissa from one of up to 31 bits. */
+FIXED_INLINE struct scaled short_of(struct scaled a) {
+  return scaled_from(a.mantissa, a.exponent);
+}
+
+/* value * 2^shift, saturated to +-2^30. */
+FIXED_INLINE int32_t shifted(int32_t value, int32_t shift) {
+  if (shift >= 0) {
+    int32_t limit = (1 << 30) >> (shift < 30 ? shift : 30);
+    return fixed_clamp(value, -limit, limit) * (1 << (shift < 30 ? shift : 30));
+  }
+  return value >> (shift < -31 ? 31 : -shift);
 }
 
 #endif

@@ -49,11 +49,12 @@ int32_t fit_grid_sigma(int32_t height) {
 }
 
 bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                            const struct fit_settings *settings, struct readings *readings) {
+                            uint32_t usable, const struct fit_settings *settings,
+                            struct readings *readings) {
   const uint8_t *sensor = array->grid.sensor;
   int32_t largest = 0;
   for (int k = 0; k < NODES; k++) {
-    int32_t value = pressure_Pa_q10[sensor[k]];
+    int32_t value = usable >> sensor[k] & 1 ? pressure_Pa_q10[sensor[k]] : 0;
     readings->q28[k] = value;
     largest = value > largest ? value : largest;
   }

@@ -63,9 +63,10 @@ FIXED_INLINE int32_t log2_q15(int32_t value) {
   return (whole - 14) * (1 << 15) + low + (((high - low) * (position & 0xFFFF)) >> 16);
 }
 
-/* False: nothing positive. */
+/* usable: bitmap of the sensors, of which those left out read 0. False: nothing positive. */
 bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                            const struct fit_settings *settings, struct readings *readings);
+                            uint32_t usable, const struct fit_settings *settings,
+                            struct readings *readings);
 
 /* mantissa * 2^exponent, rounded to nearest, as a float; what is too large becomes FIT_HUGE. */
 float fit_grid_compose(int32_t mantissa, int32_t exponent);

@@ -16,7 +16,7 @@ import unittest
 
 KERNELS = ["grid", "masked", "general"]  # the order of enum fit_bits_kernel
 PRESSES = 10000
-PRESSES_IN_EMULATOR = {"grid": PRESSES, "masked": 200, "general": 200}
+PRESSES_IN_EMULATOR = {"grid": PRESSES, "masked": PRESSES, "general": 200}
 FOLDER = pathlib.Path(__file__).resolve().parent
 TOOLS = argparse.Namespace()
 

@@ -1,4 +1,4 @@
-/* The fixed-point kernel against the float32 one, which other tests hold to the reference. Built
+/* The fixed-point kernels against the float32 one, which other tests hold to the reference. Built
  * once for the 3 x 5 grid of the firmware and once for another size. */
 #include "common/contact_flags.h"
 #include "fit/fit.h"
@@ -77,37 +77,103 @@ static void the_tables_are_those_of_the_library(void) {
   }
 }
 
-static void both_kernels_agree(void) {
-  struct random random = {11};
+/* The kernels agree on presses that neither warns of, once both have settled: without the sensor at
+ * the peak that takes some longer. */
+static void hold_to_the_general_kernel(uint32_t seed, int presses, int masked) {
+  const struct fit_settings settled = {.iterations = masked > 0 ? 14 : 7, .noise_Pa_q10 = 5120};
+  struct random random = {seed};
+  int compared = 0;
   float worst_um = 0.0f, worst_force = 0.0f, worst_sd = 0.0f, worst_force_sd = 0.0f;
-  for (int i = 0; i < 20000; i++) {
+  for (int i = 0; i < presses; i++) {
     random_press(&random, 4.0, 15.0);
+    uint32_t usable = ALL;
+    for (int k = 0; k < masked; k++) {
+      usable &= ~(UINT32_C(1) << random_below(&random, SENSORS));
+    }
+    for (int k = 0; k < SENSORS; k++) {
+      readings[k] = usable >> k & 1 ? readings[k] : (int32_t)random_u32(&random);
+    }
     struct fit_result grid, general;
-    fit_grid(&array, readings, &usual, &grid);
-    fit_general(&array, readings, ALL, &usual, &general);
-    TEST_ASSERT_EQUAL_HEX32(ALL, grid.used);
+    if (masked == 0) {
+      fit_grid(&array, readings, &settled, &grid);
+    } else {
+      fit_grid_masked(&array, readings, usable, &settled, &grid);
+    }
+    fit_general(&array, readings, usable, &settled, &general);
+    TEST_ASSERT_EQUAL_HEX32(usable, grid.used);
     if ((general.flags | grid.flags) & (CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_LOW_SIGNAL)) {
       continue; /* near a limit of the warnings the two may differ */
     }
+    compared++;
     TEST_ASSERT_EQUAL_HEX32(general.flags, grid.flags);
     float um = 1e3f * hypotf(grid.x_mm - general.x_mm, grid.y_mm - general.y_mm);
     worst_um = fmaxf(worst_um, um);
     worst_force = fmaxf(worst_force, fabsf(grid.force_N / general.force_N - 1.0f));
     worst_sd = fmaxf(worst_sd, fabsf(grid.location_sd_mm / general.location_sd_mm - 1.0f));
     worst_force_sd = fmaxf(worst_force_sd, fabsf(grid.force_sd_N / general.force_sd_N - 1.0f));
-    TEST_ASSERT_FLOAT_WITHIN(1e-4f * general.p0_Pa, general.p0_Pa, grid.p0_Pa);
-    TEST_ASSERT_FLOAT_WITHIN(1e-4f * general.sigma_mm, general.sigma_mm, grid.sigma_mm);
+    TEST_ASSERT_FLOAT_WITHIN(3e-4f * general.p0_Pa, general.p0_Pa, grid.p0_Pa);
+    TEST_ASSERT_FLOAT_WITHIN(3e-4f * general.sigma_mm, general.sigma_mm, grid.sigma_mm);
     TEST_ASSERT_FLOAT_WITHIN(0.02f * general.residual_rms_Pa, general.residual_rms_Pa,
                              grid.residual_rms_Pa);
   }
   char text[120];
-  snprintf(text, sizeof text, "worst: %.3f um, force %.1e, sd %.1e, force sd %.1e",
-           (double)worst_um, (double)worst_force, (double)worst_sd, (double)worst_force_sd);
+  snprintf(text, sizeof text, "%d compared, worst: %.3f um, force %.1e, sd %.1e, force sd %.1e",
+           compared, (double)worst_um, (double)worst_force, (double)worst_sd,
+           (double)worst_force_sd);
   TEST_MESSAGE(text);
-  TEST_ASSERT_TRUE(worst_um < 1.0f);
-  TEST_ASSERT_TRUE(worst_force < 1e-4f);
+  TEST_ASSERT_GREATER_THAN_INT(presses / 3, compared);
+  TEST_ASSERT_TRUE(worst_um < (masked > 0 ? 3.0f : 1.0f));
+  TEST_ASSERT_TRUE(worst_force < (masked > 0 ? 5e-4f : 1e-4f));
   TEST_ASSERT_TRUE(worst_sd < 0.02f);
   TEST_ASSERT_TRUE(worst_force_sd < 0.02f);
+}
+
+static void the_kernels_agree(void) {
+  hold_to_the_general_kernel(11, 20000, 0);
+}
+
+static void the_kernels_agree_without_some_sensors(void) {
+  for (int masked = 1; masked <= 4; masked++) {
+    hold_to_the_general_kernel(40 + (uint32_t)masked, 5000, masked);
+  }
+}
+
+static void without_a_mask_both_grid_kernels_agree(void) {
+  struct random random = {17};
+  for (int i = 0; i < 2000; i++) {
+    random_press(&random, 3.5, 15.0);
+    struct fit_result plain, masked;
+    fit_grid(&array, readings, &usual, &plain);
+    fit_grid_masked(&array, readings, ALL, &usual, &masked);
+    TEST_ASSERT_EQUAL_HEX32(0, masked.flags & CONTACT_FLAG_SENSOR_MASKED);
+    if (!((plain.flags | masked.flags) & CONTACT_FLAG_UNCERTAIN)) {
+      TEST_ASSERT_TRUE(hypotf(plain.x_mm - masked.x_mm, plain.y_mm - masked.y_mm) < 1e-3f);
+    }
+  }
+}
+
+static void what_a_masked_sensor_reads_changes_nothing(void) {
+  struct random random = {19};
+  for (int i = 0; i < 500; i++) {
+    random_press(&random, 3.0, 15.0);
+    uint32_t gone = random_below(&random, SENSORS);
+    struct fit_result one, other;
+    fit_grid_masked(&array, readings, ALL & ~(UINT32_C(1) << gone), &usual, &one);
+    readings[gone] = (int32_t)random_u32(&random);
+    fit_grid_masked(&array, readings, ALL & ~(UINT32_C(1) << gone), &usual, &other);
+    TEST_ASSERT_EQUAL_MEMORY(&one, &other, sizeof one);
+  }
+}
+
+static void too_few_sensors_give_no_fit(void) {
+  struct random random = {23};
+  random_press(&random, 4.0, 8.0);
+  for (int count = 0; count < 4; count++) {
+    struct fit_result result;
+    fit_grid_masked(&array, readings, (UINT32_C(1) << count) - 1, &usual, &result);
+    TEST_ASSERT_EQUAL_HEX32(0, result.flags & CONTACT_FLAG_FIT_VALID);
+    TEST_ASSERT_TRUE(result.flags & CONTACT_FLAG_SENSOR_MASKED);
+  }
 }
 
 static void scaling_the_readings_scales_the_pressures_alone(void) {
@@ -161,8 +227,8 @@ static void a_fit_that_still_moves_says_so(void) {
       float moved_mm = hypotf(result.x_mm - before.x_mm, result.y_mm - before.y_mm);
       bool uncertain = result.flags & CONTACT_FLAG_UNCERTAIN;
       TEST_ASSERT_TRUE(uncertain || moved_mm < 0.021f);
-      TEST_ASSERT_TRUE(!uncertain || moved_mm > 0.019f || result.location_sd_mm > 0.2f);
-      moving += moved_mm > 0.021f && result.location_sd_mm < 0.2f;
+      TEST_ASSERT_TRUE(!uncertain || moved_mm > 0.019f || result.location_sd_mm > 0.12f);
+      moving += moved_mm > 0.021f && result.location_sd_mm < 0.12f;
       before = result;
     }
   }
@@ -244,13 +310,18 @@ static void any_bits_give_finite_results(void) {
       settings.prior_width_mm = 0.01f + (float)random_below(&random, 100);
     }
     struct fit_result result;
-    fit_grid(&array, readings, &settings, &result);
+    bool masked = random_below(&random, 2);
+    if (masked) {
+      fit_grid_masked(&array, readings, random_u32(&random), &settings, &result);
+    } else {
+      fit_grid(&array, readings, &settings, &result);
+    }
     TEST_ASSERT_TRUE(isfinite(result.x_mm) && isfinite(result.y_mm) && isfinite(result.p0_Pa) &&
                      isfinite(result.sigma_mm) && isfinite(result.force_N) &&
                      isfinite(result.residual_rms_Pa) && isfinite(result.location_sd_mm) &&
                      isfinite(result.force_sd_N));
     bool valid = result.flags & CONTACT_FLAG_FIT_VALID;
-    TEST_ASSERT_TRUE(valid || result.flags == CONTACT_FLAG_LOW_SIGNAL);
+    TEST_ASSERT_TRUE(valid || masked || result.flags == CONTACT_FLAG_LOW_SIGNAL);
   }
 }
 
@@ -259,7 +330,11 @@ int main(void) {
   RUN_TEST(a_rectangle_is_recognised_in_any_order);
   RUN_TEST(what_is_no_rectangle_is_not);
   RUN_TEST(the_tables_are_those_of_the_library);
-  RUN_TEST(both_kernels_agree);
+  RUN_TEST(the_kernels_agree);
+  RUN_TEST(the_kernels_agree_without_some_sensors);
+  RUN_TEST(without_a_mask_both_grid_kernels_agree);
+  RUN_TEST(what_a_masked_sensor_reads_changes_nothing);
+  RUN_TEST(too_few_sensors_give_no_fit);
   RUN_TEST(scaling_the_readings_scales_the_pressures_alone);
   RUN_TEST(more_iterations_come_nearer);
   RUN_TEST(a_fit_that_still_moves_says_so);

@@ -1,0 +1,499 @@
+#include "common/contact_flags.h"
+#include "fit/fit_grid_solve.h"
+
+#include <string.h>
+
+#define ORIGIN_X (COLUMNS / 2)
+#define ORIGIN_Y (ROWS / 2)
+
+#define PRAGMA(text) _Pragma(#text)
+#define UNROLL_BY(n) PRAGMA(GCC unroll n)
+#define UNROLL UNROLL_BY(5)
+
+/* Polynomials over the nodes are sums of a part along x and one along y. Those of degree one are in
+ * LINEAR_Q, |.| < 2^30, that of degree two in SQUARE_Q, |.| < 2^31. Their coefficients are held to
+ * what a press can ask for, and used with 12 bits after the point: what that leaves to be
+ * orthogonal is dealt with as the rest is. */
+#define LINEAR_Q (MAX_NODES > 5 ? 24 : 25)
+#define LINEAR_ONE (1 << LINEAR_Q)
+#define LINEAR_TO_Q26 (1 << (26 - LINEAR_Q))
+#define SQUARE_Q (LINEAR_Q - 1)
+#define SQUARE_ONE (1 << SQUARE_Q)
+#define CROSS_LIMIT (4 << LINEAR_Q)
+#define SKEW_LIMIT (4 << LINEAR_Q)
+#define COEFFICIENT_SHIFT (LINEAR_Q - 12)
+
+/* Sums over all nodes stay within 32 bits. */
+#define NORM_SHIFT (NODES > 15 ? 5 : 4)
+#define MASS_SHIFT (NODES > 15 ? 6 : 4)
+#define SUM_BITS (NODES > 15 ? 25 : 26)
+#define COARSE_SHIFT (NODES > 15 ? 4 : 2)
+
+/* A node below 2^-25 of the strongest carries nothing; one that is not used is as far as that, and
+ * its reading counts as 0. */
+#define FAR 25
+#define UNUSED (1 << 24)
+
+/* The first iterations only have to come near: they project the readings themselves. */
+#define COARSE_ITERATIONS 3
+#define FINE_ITERATIONS 3
+
+/* One sensor: the model there and the columns of the normal equations. Side by side, so that one
+ * pointer reaches them all. */
+struct node {
+  int32_t e;               /* Q30; then the residual, Q28 */
+  int32_t mantissa, shift; /* e again, to 15 bits of its own: mantissa * 2^-(15 + shift) */
+  int32_t p1, p2, p3;      /* e times the polynomials of struct fit_system; |.| < 2^15 */
+};
+
+/* The columns and the polynomials behind them. The polynomials are those that were orthogonal
+ * under the previous iterate, about the present mean; what is missing to be orthogonal under the
+ * present one is small, and the factors below take it out of the right-hand side. */
+struct columns {
+  struct node node[NODES];
+  int32_t q1, q2, q3;     /* value = integer * 2^-q */
+  int32_t mean_x, mean_y; /* LINEAR_Q, as the next */
+  int32_t cross;          /* p2 = dy - cross dx */
+  int32_t skew_x, skew_y; /* p3 = dx^2 + dy^2 - variance - skew_x dx - skew_y dy */
+  int32_t variance;
+  int32_t mass;                /* sum of e^2, Q(30 - MASS_SHIFT) */
+  int32_t product_q26;         /* sum of e times the reading */
+  int32_t norm1, norm2, norm3; /* value = integer * 2^(NORM_SHIFT - 2 q) */
+  int32_t f21, f31, f32;       /* L of L D L^T, Q12 in the units of the columns */
+};
+
+/* Added to the norms: what it is in units of a column of the finest scale that is allowed. */
+struct ridge {
+  int32_t finest_q, norm;
+};
+/* Of the guess: 0.003. Of the iterations: 2^-31, below which columns are rounding. */
+static const struct ridge guess_ridge = {20, 206158430}; /* 0.003 * 2^36 */
+static const struct ridge rounding_ridge = {24, 1 << 13};
+#define GUESS_RIDGE_HEIGHT ((struct scaled){25733, -21}) /* 0.003 * log2(e) / (2 * 0.42^2) */
+#define GUESS_HEIGHT_MIN_Q26 1936353
+#define GUESS_HEIGHT_MAX_Q26 484088133 /* sigma 0.316 pitch */
+#define GUESS_NOISES 5                 /* readings below that many noise standard deviations, or */
+                                       /* 1 % of the largest, do not enter */
+
+enum { STEP = sizeof(struct node) / sizeof(int32_t) };
+
+/* Brings a column in Qraw_q to 15 bits; returns its norm with the ridge. What is smaller stays as
+ * it is, since there is nothing below its last bit. */
+FIXED_INLINE int32_t normalise(int32_t *column, uint32_t size, int32_t raw_q,
+                               const struct ridge *ridge, int32_t *q) {
+  int32_t shift = fixed_bits(size) - 15;
+  int32_t least = raw_q - ridge->finest_q;
+  shift = shift < least ? least : shift;
+  shift = shift < 0 ? 0 : shift;
+  *q = raw_q - shift;
+  int32_t finer = 2 * (ridge->finest_q - *q);
+  int32_t norm = (ridge->norm >> (finer > 31 ? 31 : finer)) + (1 << 13);
+  UNROLL_BY(NODES)
+  for (int k = 0; k < NODES; k++) {
+    int32_t value = *column >> shift;
+    *column = value;
+    norm += (value * value) >> NORM_SHIFT;
+    column += STEP;
+  }
+  return norm;
+}
+
+/* Column of the model times (along_x[i] + along_y[j]). */
+static NOINLINE int32_t fill(int32_t *column, const struct node *node, const int32_t *along_x,
+                             const int32_t *along_y, int32_t q, const struct ridge *ridge,
+                             int32_t *column_q) {
+  uint32_t size = 1;
+  int32_t *to = column;
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t x = along_x[i];
+    UNROLL
+    for (int j = 0; j < ROWS; j++) {
+      int32_t value = fixed_mul_16(x + along_y[j], node->mantissa) >> node->shift;
+      *to = value;
+      size |= fixed_size(value);
+      to += STEP;
+      node++;
+    }
+  }
+  return normalise(column, size, q - 1, ridge, column_q);
+}
+
+/* Column of the model times along_x[i]. */
+static NOINLINE int32_t fill_along_x(struct node *node, const int32_t *along_x,
+                                     const struct ridge *ridge, int32_t *column_q) {
+  uint32_t size = 1;
+  int32_t *column = &node->p1;
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t x = along_x[i];
+    UNROLL
+    for (int j = 0; j < ROWS; j++) {
+      int32_t value = fixed_mul_16(x, node->mantissa) >> node->shift;
+      node->p1 = value;
+      size |= fixed_size(value);
+      node++;
+    }
+  }
+  return normalise(column, size, LINEAR_Q - 1, ridge, column_q);
+}
+
+/* value * coefficient / 2^12, |coefficient| < 2^15. */
+FIXED_INLINE int32_t times_q12(int32_t value, int32_t coefficient) {
+  return (value >> 16) * coefficient * 16 + (((value & 0xFFFF) * coefficient) >> 12);
+}
+
+/* product / norm in Q12. */
+FIXED_INLINE int32_t factor(int32_t product, int32_t norm) {
+  return fixed_clamp(port_divide(product, norm >> 12), -INT16_MAX, INT16_MAX);
+}
+
+FIXED_INLINE int32_t times_factor(int32_t value, int32_t factor_q12) {
+  return times_q12(value, factor_q12);
+}
+
+/* From Q12 in units of columns to LINEAR_Q. */
+FIXED_INLINE int32_t to_poly(int32_t factor_q12, int32_t finer, int32_t limit) {
+  int32_t shift = finer + LINEAR_Q - 12;
+  shift = shift > 14 ? 14 : shift;
+  int32_t value = shift < 0 ? factor_q12 >> (shift < -31 ? 31 : -shift) : factor_q12 * (1 << shift);
+  return fixed_clamp(value, -limit, limit);
+}
+
+/* What elimination leaves of a norm; never so little that rounding decides. */
+FIXED_INLINE int32_t remaining(int32_t norm, int32_t taken) {
+  int32_t least = norm >> 8;
+  return norm - taken < least ? least : norm - taken;
+}
+
+/* Mean and variance of the positions under the squared model, and the readings times the model. */
+static NOINLINE void set_mean(const struct readings *readings, struct columns *c) {
+  const int32_t *p_q14 = readings->q14;
+  int32_t product_q26 = 0;
+  int32_t mass = 0, first_x = 0, first_y = 0, second = 0;
+  const struct node *node = c->node;
+  for (int i = 0; i < COLUMNS; i++) {
+    const int32_t x = i - ORIGIN_X;
+    int32_t sum = 0;
+    UNROLL_BY(FIT_GRID_MAX_NODES)
+    for (int j = 0; j < ROWS; j++) {
+      const int32_t y = j - ORIGIN_Y;
+      int32_t weight =
+          ((node->mantissa * node->mantissa) >> (node->shift + MASS_SHIFT)) >> node->shift;
+      sum += weight;
+      first_y += y * weight;
+      second += y * y * (weight >> 2);
+      product_q26 += (*p_q14++ * node->mantissa) >> (node->shift + 3);
+      node++;
+    }
+    mass += sum;
+    first_x += x * sum;
+    second += x * x * (sum >> 2);
+  }
+  int32_t mean_x = fixed_div_q26(first_x, mass), mean_y = fixed_div_q26(first_y, mass);
+  int32_t squares = fixed_mul_q26(mean_x, mean_x) + fixed_mul_q26(mean_y, mean_y);
+  c->mass = mass;
+  c->product_q26 = product_q26;
+  c->mean_x = mean_x >> (26 - LINEAR_Q);
+  c->mean_y = mean_y >> (26 - LINEAR_Q);
+  c->variance = (fixed_div_q26(second, mass >> 2) - squares) >> (26 - LINEAR_Q);
+}
+
+/* Columns, norms and factors from the model at the nodes. */
+static NOINLINE void orthogonalise(const struct readings *readings, const struct ridge *ridge,
+                                   struct columns *c) {
+  set_mean(readings, c);
+  int32_t dx[COLUMNS], dy[ROWS], square_x[COLUMNS], square_y[ROWS];
+  int32_t mean_x = c->mean_x, mean_y = c->mean_y;
+  int32_t cross = c->cross >> COEFFICIENT_SHIFT;
+  int32_t skew_x = c->skew_x >> COEFFICIENT_SHIFT, skew_y = c->skew_y >> COEFFICIENT_SHIFT;
+  int32_t constant = (fixed_mul_q26(mean_x, mean_x * LINEAR_TO_Q26) - c->variance) >> 1;
+  for (int i = 0; i < COLUMNS; i++) {
+    const int32_t k = i - ORIGIN_X;
+    dx[i] = k * LINEAR_ONE - mean_x;
+    square_x[i] = k * k * SQUARE_ONE - k * mean_x + constant - (times_q12(dx[i], skew_x) >> 1);
+  }
+  constant = fixed_mul_q26(mean_y, mean_y * LINEAR_TO_Q26) >> 1;
+  for (int j = 0; j < ROWS; j++) {
+    const int32_t k = j - ORIGIN_Y;
+    dy[j] = k * LINEAR_ONE - mean_y;
+    square_y[j] = k * k * SQUARE_ONE - k * mean_y + constant - (times_q12(dy[j], skew_y) >> 1);
+  }
+  c->norm1 = fill_along_x(c->node, dx, ridge, &c->q1);
+  c->norm3 = fill(&c->node[0].p3, c->node, square_x, square_y, SQUARE_Q, ridge, &c->q3);
+  for (int i = 0; i < COLUMNS; i++) {
+    dx[i] = -times_q12(dx[i], cross);
+  }
+  c->norm2 = fill(&c->node[0].p2, c->node, dx, dy, LINEAR_Q, ridge, &c->q2);
+
+  int32_t g21 = 0, g31 = 0, g32 = 0;
+  const struct node *node = c->node;
+  UNROLL_BY(NODES)
+  for (int k = 0; k < NODES; k++) {
+    int32_t p1 = node->p1, p2 = node->p2, p3 = node->p3;
+    g21 += (p1 * p2) >> NORM_SHIFT;
+    g31 += (p1 * p3) >> NORM_SHIFT;
+    g32 += (p2 * p3) >> NORM_SHIFT;
+    node++;
+  }
+  c->f21 = factor(g21, c->norm1);
+  c->f31 = factor(g31, c->norm1);
+  c->norm2 = remaining(c->norm2, times_factor(g21, c->f21));
+  g32 -= times_factor(g31, c->f21);
+  c->f32 = factor(g32, c->norm2);
+  c->norm3 = remaining(c->norm3, times_factor(g31, c->f31) + times_factor(g32, c->f32));
+
+  cross = cross * (1 << COEFFICIENT_SHIFT) + to_poly(c->f21, c->q1 - c->q2, CROSS_LIMIT);
+  int32_t tilt_x = to_poly(c->f31, c->q1 - c->q3, SKEW_LIMIT);
+  int32_t tilt_y = to_poly(c->f32, c->q2 - c->q3, SKEW_LIMIT);
+  c->cross = fixed_clamp(cross, -CROSS_LIMIT, CROSS_LIMIT);
+  tilt_x += skew_x * (1 << COEFFICIENT_SHIFT) - fixed_mul_q26(tilt_y, c->cross * LINEAR_TO_Q26);
+  tilt_y += skew_y * (1 << COEFFICIENT_SHIFT);
+  c->skew_x = fixed_clamp(tilt_x, -SKEW_LIMIT, SKEW_LIMIT);
+  c->skew_y = fixed_clamp(tilt_y, -SKEW_LIMIT, SKEW_LIMIT);
+}
+
+/* norm as a mantissa of 30 bits. */
+FIXED_INLINE struct scaled long_norm(int32_t norm, int32_t q) {
+  int32_t up = 30 - fixed_bits((uint32_t)norm);
+  return (struct scaled){norm * (1 << up), NORM_SHIFT - 2 * q - up};
+}
+
+/* The system from sums over the columns in Q q. */
+static NOINLINE void eliminate(const struct columns *c, int32_t sum1, int32_t sum2, int32_t sum3,
+                               int32_t q, struct fit_system *system) {
+  sum2 -= times_factor(sum1, c->f21);
+  sum3 -= times_factor(sum1, c->f31) + times_factor(sum2, c->f32);
+  system->b1 = (struct scaled){sum1, -q - c->q1};
+  system->b2 = (struct scaled){sum2, -q - c->q2};
+  system->b3 = (struct scaled){sum3, -q - c->q3};
+  system->d1 = long_norm(c->norm1, c->q1);
+  system->d2 = long_norm(c->norm2, c->q2);
+  system->d3 = long_norm(c->norm3, c->q3);
+  system->mean_x = c->mean_x * LINEAR_TO_Q26;
+  system->mean_y = c->mean_y * LINEAR_TO_Q26;
+  system->cross = c->cross * LINEAR_TO_Q26;
+  system->slope_x = (2 * c->mean_x + c->skew_x) * LINEAR_TO_Q26;
+  system->slope_y = (2 * c->mean_y + c->skew_y) * LINEAR_TO_Q26;
+}
+
+/* First guess: the logarithm of the readings is a paraboloid, fitted with the readings themselves
+ * as the weights. The ridge decides where too few of them are large. */
+static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readings *readings,
+                           const struct fit_settings *settings, struct columns *c,
+                           struct fit_system *system, struct state *state) {
+  int32_t up = readings->shift > 0 ? readings->shift : 0, down = up - readings->shift;
+  int32_t largest = (readings->largest >> down) * (1 << up);
+  int32_t noise = settings->noise_Pa_q10 >> down;
+  noise = noise < largest >> up ? noise * (1 << up) : largest;
+  int32_t least = (largest >> 7) + (largest >> 9);
+  least = noise * GUESS_NOISES > least ? noise * GUESS_NOISES : least;
+  least = least < largest ? least : largest;
+  int32_t weighted[NODES];
+  for (int k = 0; k < NODES; k++) {
+    int32_t p = readings->q28[k];
+    bool enters = p >= least;
+    c->node[k].shift = 0;
+    c->node[k].mantissa = enters ? p >> 13 : 0;
+    weighted[k] = enters ? ((p >> 13) * (log2_q15(p >> 14) >> 3)) >> 13 : 0; /* Q14 */
+  }
+  c->cross = c->skew_x = c->skew_y = 0;
+  orthogonalise(readings, &guess_ridge, c);
+  int32_t sum1 = 0, sum2 = 0, sum3 = 0;
+  const struct node *node = c->node;
+  for (int k = 0; k < NODES; k++) {
+    sum1 += (node->p1 * weighted[k]) >> NORM_SHIFT;
+    sum2 += (node->p2 * weighted[k]) >> NORM_SHIFT;
+    sum3 += (node->p3 * weighted[k]) >> NORM_SHIFT;
+    node++;
+  }
+  eliminate(c, sum1, sum2, sum3, 14 - NORM_SHIFT, system);
+  struct scaled c1 = scaled_div(short_of(system->b1), short_of(system->d1));
+  struct scaled c2 = scaled_div(short_of(system->b2), short_of(system->d2));
+  struct scaled height =
+      scaled_div(scaled_sub(GUESS_RIDGE_HEIGHT, short_of(system->b3)), short_of(system->d3));
+  state->height =
+      fixed_clamp(scaled_to_fixed(height, 26), GUESS_HEIGHT_MIN_Q26, GUESS_HEIGHT_MAX_Q26);
+  struct scaled half = scaled_div((struct scaled){1 << 14, -15}, scaled_from(state->height, -26));
+  c1 = scaled_sub(c1, scaled_mul(c2, scaled_from(system->cross, -26)));
+  int32_t x = scaled_to_fixed(scaled_mul(c1, half), 26);
+  int32_t y = scaled_to_fixed(scaled_mul(c2, half), 26);
+  x = fixed_clamp(x, -(1 << 28), 1 << 28) + (system->slope_x >> 1);
+  y = fixed_clamp(y, -(1 << 28), 1 << 28) + (system->slope_y >> 1);
+  state->x = fixed_clamp(x, grid->x_min, grid->x_max);
+  state->y = fixed_clamp(y, grid->y_min, grid->y_max);
+}
+
+/* One factor of the separable Gaussian as mantissa (Q30, above 0.5) * 2^-shift, relative to the
+ * nearest node. Returns the offset of the centre from that node, Q26. */
+static NOINLINE int32_t set_factor(int32_t *mantissa, int32_t *shift, int nodes, int origin,
+                                   int32_t centre, int32_t height) {
+  int32_t nearest = fixed_clamp((centre + (ONE_Q26 >> 1)) >> 26, -origin, nodes - 1 - origin);
+  int32_t offset = centre - nearest * ONE_Q26;
+  /* The exponent, k (curvature k - slope) with k counted from the nearest node, is a parabola by
+   * its differences: the rounding of its coefficients moves centre and width and cannot show in the
+   * residual. The 2 more than makes up for it where the exponent is 0. */
+  int32_t slope = fixed_mul_q32(height, offset * 8); /* Q22 */
+  int32_t curvature = (height >> 4) + 2;
+  int32_t k = -origin - nearest;
+  uint32_t exponent = (uint32_t)k * (uint32_t)(curvature * k - slope);
+  uint32_t difference = (uint32_t)(curvature * (2 * k + 1) - slope);
+  for (int i = 0; i < nodes; i++) {
+    shift[i] = (int32_t)(exponent >> 22);
+    mantissa[i] = exp2_negative(exponent & 0x3FFFFF);
+    exponent += difference;
+    difference += 2 * (uint32_t)curvature;
+  }
+  return offset;
+}
+
+/* The model at the sensors in use, relative to the power of two of the strongest. Returns log2 of
+ * the model at the centre in that unit, Q22. */
+static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused,
+                                  struct columns *c) {
+  int32_t factor_x[COLUMNS], factor_y[ROWS], shift_x[COLUMNS], shift_y[ROWS];
+  int32_t offset_x = set_factor(factor_x, shift_x, COLUMNS, ORIGIN_X, at->x, at->height);
+  int32_t offset_y = set_factor(factor_y, shift_y, ROWS, ORIGIN_Y, at->y, at->height);
+  int32_t strongest = INT32_MAX;
+  struct node *node = c->node;
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t along = shift_x[i];
+    UNROLL
+    for (int j = 0; j < ROWS; j++) {
+      int32_t shift = along + shift_y[j] + unused[j];
+      node->shift = shift;
+      strongest = shift < strongest ? shift : strongest;
+      node++;
+    }
+    unused += ROWS;
+  }
+  node = c->node;
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t along = factor_x[i];
+    UNROLL
+    for (int j = 0; j < ROWS; j++) {
+      int32_t shift = node->shift - strongest;
+      shift = shift < FAR ? shift : FAR;
+      int32_t product = fixed_mul_q30(along, factor_y[j]);
+      node->e = product >> shift;
+      node->mantissa = (product - (product >> 15)) >> 15;
+      node->shift = shift;
+      node++;
+    }
+  }
+  int32_t power = strongest < 100 ? strongest : 100;
+  return (power << 22) + fit_grid_rise(at->height, offset_x, offset_y);
+}
+
+/* What the result needs besides the system. */
+static NOINLINE void finish(const struct columns *c, int32_t finer, struct fit_system *system) {
+  int32_t b0 = 0, squares = 0;
+  for (int k = 0; k < NODES; k++) {
+    int32_t r = shifted(c->node[k].e, finer);
+    b0 += fixed_mul_16(r, c->node[k].mantissa) >> c->node[k].shift;
+    r >>= SUM_BITS - 15;
+    squares += (r * r) >> NORM_SHIFT;
+  }
+  system->b0 = b0;
+  system->residual_shift = 11 - finer;
+  system->square_sum = (struct scaled){squares, NORM_SHIFT - 2 * (28 + finer - (SUM_BITS - 15))};
+  system->mass_q20 = c->mass >> (10 - MASS_SHIFT);
+  int32_t off_x = system->at.x - system->mean_x, off_y = system->at.y - system->mean_y;
+  int32_t bend = fixed_mul_q28(off_x, off_x) + fixed_mul_q28(off_y, off_y);
+  bend -= fixed_mul_q28(off_x, c->skew_x * LINEAR_TO_Q26) +
+          fixed_mul_q28(off_y, c->skew_y * LINEAR_TO_Q26);
+  system->bend_q24 = fixed_clamp(bend - (c->variance >> (LINEAR_Q - 24)), -(1 << 29), 1 << 29);
+}
+
+enum accuracy { COARSE, FINE, LAST };
+
+static NOINLINE void evaluate(const struct readings *readings, const int32_t *unused,
+                              enum accuracy accuracy, struct columns *c,
+                              struct fit_system *system) {
+  system->rise_q22 = set_model(&system->at, unused, c);
+  orthogonalise(readings, &rounding_ridge, c);
+  system->amplitude_q28 =
+      fit_grid_amplitude(c->product_q26, c->mass >> (16 - MASS_SHIFT), accuracy != COARSE);
+  int32_t sum1 = 0, sum2 = 0, sum3 = 0;
+  struct node *node = c->node;
+  if (accuracy == COARSE) {
+    /* The columns are orthogonal to the model, so the readings do as well as the residual. */
+    UNROLL
+    for (int k = 0; k < NODES; k++) {
+      int32_t p = readings->q14[k];
+      sum1 += (p * node->p1) >> COARSE_SHIFT;
+      sum2 += (p * node->p2) >> COARSE_SHIFT;
+      sum3 += (p * node->p3) >> COARSE_SHIFT;
+      node++;
+    }
+    eliminate(c, sum1, sum2, sum3, 14 - COARSE_SHIFT, system);
+  } else {
+    uint32_t size = 1;
+    UNROLL
+    for (int k = 0; k < NODES; k++) {
+      int32_t r = readings->q28[k] - fixed_mul_q30(system->amplitude_q28, node->e);
+      node->e = r;
+      size |= fixed_size(r);
+      node++;
+    }
+    /* As large as the sums allow: truncation hurts small residuals. */
+    int32_t finer = SUM_BITS - fixed_bits(size);
+    int32_t up = finer > 0 ? finer : 0, down = up - finer;
+    node = c->node;
+    UNROLL
+    for (int k = 0; k < NODES; k++) {
+      int32_t r = (node->e * (1 << up)) >> down;
+      sum1 += fixed_mul_16(r, node->p1);
+      sum2 += fixed_mul_16(r, node->p2);
+      sum3 += fixed_mul_16(r, node->p3);
+      node++;
+    }
+    eliminate(c, sum1, sum2, sum3, 12 + finer, system);
+    if (accuracy == LAST) {
+      finish(c, finer, system);
+    }
+  }
+  fit_grid_complete(readings, system);
+}
+
+void fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                     const struct fit_settings *settings, struct fit_result *result) {
+  const struct fit_grid_shape *grid = &array->grid;
+  struct readings readings;
+  int32_t unused[NODES];
+  int count = 0;
+  memset(result, 0, sizeof *result);
+  for (int k = 0; k < NODES; k++) {
+    bool used = usable >> grid->sensor[k] & 1;
+    unused[k] = used ? 0 : UNUSED;
+    count += used;
+  }
+  usable &= UINT32_MAX >> (FT_MAX_SENSORS - NODES);
+  if (count < NODES) {
+    result->flags = CONTACT_FLAG_SENSOR_MASKED;
+  }
+  if (!fit_grid_take_readings(array, pressure_Pa_q10, usable, settings, &readings)) {
+    result->flags |= CONTACT_FLAG_LOW_SIGNAL;
+    return;
+  }
+  if (count < 4) {
+    return;
+  }
+  struct columns columns;
+  struct fit_system system;
+  struct state state;
+  guess(grid, &readings, settings, &columns, &system, &state);
+  int left = settings->iterations;
+  do {
+    bool coarse = left > FINE_ITERATIONS && settings->iterations - left < COARSE_ITERATIONS;
+    system.at.x = state.x;
+    system.at.y = state.y;
+    system.at.height = state.height;
+    evaluate(&readings, unused, left <= 1 ? LAST : coarse ? COARSE : FINE, &columns, &system);
+    fit_grid_step(grid, &system, &state);
+    if (left == 0) { /* the guess is asked for: the step only tells how good it is */
+      state = system.at;
+    }
+    left--;
+  } while (left > 0);
+  result->used = usable;
+  fit_grid_conclude(grid, &readings, settings, &system, &state, count, result);
+}

@@ -1,0 +1,257 @@
+#include "fit/fit_grid_solve.h"
+
+#include "common/contact_flags.h"
+#include "fit/fit_limits.h"
+
+/* Longest step: 0.6 pitch in x and y, 0.4 of sigma. A longer one is shortened as a whole: along the
+ * bent valleys of a stiff press its direction is what brings it on, and limiting each parameter by
+ * itself loses it. */
+#define MOVE_INVERSE_Q6 107 /* 1 / 0.6 */
+#define RATIO_INVERSE_Q1 5  /* 1 / 0.4 */
+/* By how much an iterate may leave the box that the result is held to, for the same reason. */
+#define OVERSHOOT_Q26 (ONE_Q26 / 4)
+
+#define PEAK_RISE_MAX_Q22 (20 << 22)                      /* a factor of a million */
+#define MODEL_INVERSE_SQUARE ((struct scaled){22756, -9}) /* 1 / FIT_MODEL_RESIDUAL^2 */
+#define ROUGH_INVERSE_SQUARE ((struct scaled){20000, -3}) /* 1 / FIT_ROUGH_RESIDUAL^2 */
+#define MISFIT_SQUARE ((struct scaled){FIT_MISFIT * FIT_MISFIT << 11, -11})
+#define FLAT_HEIGHT_Q26 2016200     /* FIT_FLAT_SIGMA */
+#define NARROW_HEIGHT_Q26 302550256 /* FIT_NARROW_SIGMA */
+
+FIXED_INLINE struct scaled scaled_square(struct scaled a) {
+  return scaled_mul(a, a);
+}
+
+FIXED_INLINE struct scaled long_of(struct scaled a) {
+  return (struct scaled){a.mantissa * (1 << 14), a.exponent - 14};
+}
+
+void fit_grid_add_prior(const struct readings *readings, struct fit_system *system) {
+  struct scaled sigma = scaled_from(fit_grid_sigma(system->at.height), -26);
+  struct scaled pull = scaled_mul(scaled_sub(readings->prior_sigma, sigma), readings->prior_weight);
+  struct scaled row = scaled_div(scaled_mul(sigma, readings->prior_weight), system->stiffness);
+  system->prior_row = row;
+  system->d3 = long_of(scaled_add(short_of(system->d3), scaled_mul(row, row)));
+  system->b3 = long_of(scaled_add(short_of(system->b3), scaled_mul(row, pull)));
+}
+
+/* b / (d stiffness) in Qq, at most 2^30. Near the end b is small, and its last bits decide. */
+FIXED_INLINE int32_t step_along(const struct scaled *b, const struct scaled *d,
+                                const struct scaled *stiffness, int32_t q) {
+  int32_t divisor = ((d->mantissa >> 14) * stiffness->mantissa) >> 13; /* below 2^18 */
+  int32_t up = 31 - fixed_bits(fixed_size(b->mantissa) | 1);
+  int32_t quotient = port_divide(b->mantissa * (1 << up), divisor < 2 ? 2 : divisor);
+  int32_t shift = b->exponent - up - d->exponent - stiffness->exponent - 27 + q;
+  if (shift > 0) {
+    shift = shift < 30 ? shift : 30;
+    int32_t limit = (1 << 30) >> shift;
+    return fixed_clamp(quotient, -limit, limit) * (1 << shift);
+  }
+  return quotient >> (shift < -31 ? 31 : -shift);
+}
+
+/* With c = b / d / stiffness:
+ *   dsigma / sigma = c3,  dx = c1 - cross c2 + (2 x - slope_x) c3,  dy = c2 + (2 y - slope_y) c3.
+ */
+void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system,
+                   struct state *state) {
+  int32_t c1 = step_along(&system->b1, &system->d1, &system->stiffness, 26);
+  int32_t c2 = step_along(&system->b2, &system->d2, &system->stiffness, 26);
+  int32_t ratio = step_along(&system->b3, &system->d3, &system->stiffness, 28);
+  system->c1_q26 = c1;
+  system->c2_q26 = c2;
+  system->c3_q28 = ratio;
+  int32_t dx = (c1 >> 4) + fixed_mul_q32(2 * system->at.x - system->slope_x, ratio);
+  if (system->cross != 0) {
+    dx -= fixed_mul_q28(c2 >> 2, system->cross);
+  }
+  int32_t dy = (c2 >> 4) + fixed_mul_q32(2 * system->at.y - system->slope_y, ratio);
+
+  /* The largest component in units of its limit, Q14. */
+  uint32_t most = (fixed_size(dx) >> 9) * MOVE_INVERSE_Q6 >> 5;
+  uint32_t other = (fixed_size(dy) >> 9) * MOVE_INVERSE_Q6 >> 5;
+  most = other > most ? other : most;
+  other = (fixed_size(ratio) >> 14) * RATIO_INVERSE_Q1 >> 1;
+  most = other > most ? other : most;
+  if (most > 1 << 14) {
+    int32_t share_q15 = port_divide(1 << 29, (int32_t)most);
+    dx = fixed_mul_16(dx, share_q15) * 2;
+    dy = fixed_mul_16(dy, share_q15) * 2;
+    ratio = fixed_mul_16(ratio, share_q15) * 2;
+  }
+  system->move_x_q22 = dx;
+  system->move_y_q22 = dy;
+  state->x =
+      fixed_clamp(system->at.x + dx * 16, grid->x_min - OVERSHOOT_Q26, grid->x_max + OVERSHOOT_Q26);
+  state->y =
+      fixed_clamp(system->at.y + dy * 16, grid->y_min - OVERSHOOT_Q26, grid->y_max + OVERSHOOT_Q26);
+
+  /* height /= (1 + ratio)^2 as height -= height f (2 - f), f = ratio / (1 + ratio): relative
+   * precision is enough for f, and it goes to zero smoothly. */
+  int32_t inverse_q15 = port_divide(1 << 30, ((1 << 28) + ratio) >> 13);
+  int32_t f = fixed_mul_16(ratio, inverse_q15 >> 1) * 4;
+  int32_t height = system->at.height;
+  int32_t loss = 2 * f - (f >> 14) * (f >> 14); /* Q28, -3 .. 0.56 */
+  if (height < 1 << 28) {
+    height -= fixed_mul_q28(height, loss);
+  } else {
+    height = (height >> 2) - fixed_mul_q28(height >> 2, loss);
+    height = height > HEIGHT_MAX_Q26 >> 2 ? HEIGHT_MAX_Q26 : height * 4;
+  }
+  state->height = fixed_clamp(height, HEIGHT_MIN_Q26, HEIGHT_MAX_Q26);
+}
+
+/* Peak at the centre after the step: 30-bit mantissa and exponent, Pa. */
+static int32_t peak_of(const struct readings *readings, const struct fit_system *system,
+                       int32_t *exponent) {
+  int32_t rise_q22 = fixed_clamp(system->rise_q22, 0, PEAK_RISE_MAX_Q22);
+  int32_t up = 30 - fixed_bits((uint32_t)system->amplitude_q28);
+  int32_t peak = fixed_mul_q30(system->amplitude_q28 * (1 << up),
+                               exp2_negative((1u << 22) - ((uint32_t)rise_q22 & 0x3FFFFF)));
+  *exponent = (rise_q22 >> 22) + 1 - up - 10 - readings->shift;
+
+  /* The last step's own part, relative: c1 and c2 tilt the model about its mean, c3 bends it. */
+  const struct state *at = &system->at;
+  int32_t c1 = fixed_clamp(system->c1_q26, -ONE_Q26, ONE_Q26) * 16;
+  int32_t c2 = fixed_clamp(system->c2_q26, -ONE_Q26, ONE_Q26) * 16;
+  int32_t c3 = fixed_clamp(system->c3_q28, -(1 << 28), 1 << 28) * 4;
+  int32_t off_x = at->x - system->mean_x;
+  int32_t off_y = at->y - system->mean_y - fixed_mul_q26(system->cross, off_x);
+  int32_t tilt_q24 = fixed_mul_q32(c1, off_x) + fixed_mul_q32(c2, off_y);
+  int32_t lift_q22 =
+      fixed_clamp(fixed_mul_q32(c3, system->bend_q24) + (tilt_q24 >> 2), -(1 << 21), 1 << 21);
+  int32_t growth_q24 = fixed_mul_q32(at->height, lift_q22 * (1 << 8));
+  growth_q24 = fixed_mul_16(growth_q24, STIFFNESS_PER_HEIGHT_Q14) * 4;
+  /* The amplitude's rounding. */
+  int32_t scale_q12 = fixed_mul_q32(system->mass_q20 * 16, system->amplitude_q28) >> 8;
+  growth_q24 += shifted(port_divide(system->b0, scale_q12 + 1), system->residual_shift - 2);
+  int32_t growth = fixed_clamp(growth_q24, -(1 << 23), 1 << 23) * 16;
+  peak = fixed_mul_q28(peak, (1 << 28) + growth);
+  if (peak >= 1 << 30) {
+    peak >>= 1;
+    *exponent += 1;
+  }
+  return peak;
+}
+
+/* 1 / value; what is not positive counts as the last place. */
+static NOINLINE struct scaled reciprocal(struct scaled value) {
+  struct scaled a = scaled_from(value.mantissa < 1 ? 1 : value.mantissa, value.exponent);
+  return (struct scaled){port_divide(1 << 29, a.mantissa), -29 - a.exponent};
+}
+
+/* A value of 29 or 30 bits. */
+FIXED_INLINE struct scaled scaled_top(int32_t value, int32_t exponent) {
+  return (struct scaled){value >> 15, exponent + 15};
+}
+
+/* square_sum / count */
+FIXED_INLINE struct scaled scaled_mean(struct scaled sum, int count) {
+  return scaled_mul(sum, scaled_from(port_divide(1 << 20, count), -20));
+}
+
+/* Raises the inverse of d3 to that by which the variance of a reading gives that of c3: the prior's
+ * row varies by a width of its own, not as the readings do. */
+static NOINLINE void widen_for_prior(const struct readings *readings,
+                                     const struct fit_system *system, const struct scaled *variance,
+                                     struct scaled *inverse3) {
+  struct scaled excess = scaled_sub(scaled_square(readings->prior_sd), *variance);
+  if (excess.mantissa > 0) {
+    struct scaled share = scaled_mul(system->prior_row, *inverse3);
+    struct scaled more = scaled_div(scaled_mul(excess, scaled_square(share)), *variance);
+    *inverse3 = scaled_add(*inverse3, more);
+  }
+}
+
+void fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
+                       const struct fit_settings *settings, const struct fit_system *system,
+                       const struct state *state, int count, struct fit_result *result) {
+  const struct state *at = &system->at;
+  int32_t x = fixed_clamp(state->x, grid->x_min, grid->x_max);
+  int32_t y = fixed_clamp(state->y, grid->y_min, grid->y_max);
+  int32_t peak_exponent;
+  int32_t peak = peak_of(readings, system, &peak_exponent);
+  int32_t sigma = fit_grid_sigma(state->height);
+  int32_t up = 30 - fixed_bits((uint32_t)sigma);
+  int32_t sigma_square = fixed_mul_q30(sigma * (1 << up), sigma * (1 << up));
+  int32_t force = fixed_mul_q30(fixed_mul_q30(peak, sigma_square), grid->force_scale);
+  int32_t force_exponent = peak_exponent + 38 - 2 * up + grid->force_exponent;
+  int32_t pitch_exponent = grid->pitch_exponent;
+  result->x_mm = fit_grid_compose(fixed_mul_q32(x, grid->pitch) + grid->x_origin, pitch_exponent);
+  result->y_mm = fit_grid_compose(fixed_mul_q32(y, grid->pitch) + grid->y_origin, pitch_exponent);
+  result->sigma_mm = fit_grid_compose(fixed_mul_q32(sigma, grid->pitch), pitch_exponent);
+  result->p0_Pa = fit_grid_compose(peak, peak_exponent);
+  result->force_N = fit_grid_compose(force, force_exponent);
+
+  /* Variance of one reading: the residuals', at least the noise's. In units of Q28. */
+  struct scaled mass = scaled_from(system->mass_q20, -20), inverse_mass = reciprocal(mass);
+  struct scaled left = scaled_from(system->b0, system->residual_shift - 38);
+  struct scaled square_sum =
+      scaled_sub(short_of(system->square_sum), scaled_mul(scaled_square(left), inverse_mass));
+  square_sum.mantissa = square_sum.mantissa < 0 ? 0 : square_sum.mantissa;
+  struct scaled variance = scaled_mean(square_sum, count > 4 ? count - 4 : 1);
+  struct scaled noise_variance =
+      scaled_square(scaled_from(settings->noise_Pa_q10, readings->shift - 28));
+  bool misfit = scaled_sub(variance, scaled_mul(noise_variance, MISFIT_SQUARE)).mantissa > 0;
+  if (scaled_sub(variance, noise_variance).mantissa < 0) {
+    variance = noise_variance;
+  }
+  struct scaled rms = scaled_sqrt(scaled_mean(square_sum, count));
+  result->residual_rms_Pa = fit_grid_compose(rms.mantissa, rms.exponent + 18 - readings->shift);
+
+  struct scaled inverse1 = reciprocal(system->d1), inverse2 = reciprocal(system->d2);
+  struct scaled inverse3 = reciprocal(system->d3);
+  if (readings->prior_weight.mantissa != 0) {
+    widen_for_prior(readings, system, &variance, &inverse3);
+  }
+  int32_t along_x = (2 * at->x - system->slope_x) >> 16; /* Q10 */
+  int32_t along_y = (2 * at->y - system->slope_y) >> 16;
+  struct scaled slopes = scaled_from(along_x * along_x + along_y * along_y, -20);
+  struct scaled form = scaled_add(scaled_add(inverse1, inverse2), scaled_mul(slopes, inverse3));
+  if (system->cross != 0) {
+    form = scaled_add(form, scaled_mul(scaled_square(scaled_from(system->cross, -26)), inverse2));
+  }
+  struct scaled location_sd =
+      scaled_div(scaled_sqrt(scaled_mul(variance, form)), system->stiffness);
+  location_sd = scaled_mul(location_sd, scaled_top(grid->pitch, pitch_exponent - 6));
+  result->location_sd_mm = fit_grid_compose(location_sd.mantissa, location_sd.exponent);
+
+  /* dF / F = dp0 / p0 + 2 dsigma / sigma, each by its part in the basis; the mean of the model adds
+   * one over its mass. */
+  int32_t off_x = at->x - system->mean_x;
+  int32_t off_y = at->y - system->mean_y - fixed_mul_q26(system->cross, off_x);
+  struct scaled lift = scaled_from(system->bend_q24 + (fixed_mul_q26(sigma, sigma) >> 1), -24);
+  form = scaled_add(inverse_mass, scaled_mul(scaled_square(scaled_from(off_x, -26)), inverse1));
+  form = scaled_add(form, scaled_mul(scaled_square(scaled_from(off_y, -26)), inverse2));
+  form = scaled_add(form, scaled_mul(scaled_square(lift), inverse3));
+  struct scaled amplitude = scaled_from(system->amplitude_q28, -28);
+  struct scaled force_sd = scaled_div(scaled_sqrt(scaled_mul(variance, form)), amplitude);
+  force_sd = scaled_mul(force_sd, scaled_from(force, force_exponent));
+  result->force_sd_N = fit_grid_compose(force_sd.mantissa, force_sd.exponent);
+
+  uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
+  if (settings->noise_Pa_q10 > port_divide(readings->largest, FIT_LOW_SIGNAL_SIGMA)) {
+    flags |= CONTACT_FLAG_LOW_SIGNAL;
+  }
+  if (state->height <= FLAT_HEIGHT_Q26) {
+    flags |= CONTACT_FLAG_FLAT;
+  }
+  struct scaled total = scaled_add(scaled_mul(scaled_square(amplitude), mass), square_sum);
+  bool rough = scaled_sub(scaled_mul(square_sum, ROUGH_INVERSE_SQUARE), total).mantissa > 0;
+  bool narrow = state->height > NARROW_HEIGHT_Q26;
+  int32_t move_x = fixed_clamp(system->move_x_q22, -(1 << 15), 1 << 15);
+  int32_t move_y = fixed_clamp(system->move_y_q22, -(1 << 15), 1 << 15);
+  if (((move_x * move_x) >> 1) + ((move_y * move_y) >> 1) > grid->settled_square ||
+      scaled_to_fixed(location_sd, 16) > fit_sd_limit_mm_q16(misfit, narrow, rough)) {
+    flags |= CONTACT_FLAG_UNCERTAIN;
+  }
+  if (scaled_sub(scaled_mul(square_sum, MODEL_INVERSE_SQUARE), total).mantissa > 0) {
+    flags |= CONTACT_FLAG_MODEL;
+  }
+  if (x == grid->x_min || x == grid->x_max || y == grid->y_min || y == grid->y_max ||
+      state->height <= HEIGHT_MIN_Q26 || state->height >= HEIGHT_MAX_Q26 ||
+      system->amplitude_q28 <= AMPLITUDE_MIN_Q28 || system->amplitude_q28 >= AMPLITUDE_MAX_Q28) {
+    flags |= CONTACT_FLAG_AT_BOUND;
+  }
+  result->flags |= flags;
+}
