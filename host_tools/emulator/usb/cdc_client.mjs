@@ -38,6 +38,7 @@ export class CdcClient {
       this.host.block.rp2040.fail('usb host', 'the device is no CDC ACM device: an interface or endpoint is missing');
     }
     this.bound = { interface: communication.number, bulkIn, bulkOut, notification };
+    this.host.pause(bulkIn.address, this.stalled);
     this.#sendLineCoding();
     if (this.dtr) this.#open();
   }
@@ -79,11 +80,10 @@ export class CdcClient {
     this.#write();
   }
 
-  /** Fault: the host stops polling IN. */
+  /** Fault: the host stops polling IN; a packet on the bus still arrives. */
   setStalled(on) {
     this.stalled = on;
-    if (on) for (const read of [...this.reads]) this.host.cancel(read);
-    else this.#read();
+    if (this.bound) this.host.pause(this.bound.bulkIn.address, on);
   }
 
   /** The consumer of `onData` is full: stop reading until it says otherwise. */
@@ -93,7 +93,7 @@ export class CdcClient {
   }
 
   #read() {
-    if (!this.bound || !this.dtr || this.stalled || this.blocked) return;
+    if (!this.bound || !this.dtr || this.blocked) return;
     const { bulkIn } = this.bound;
     while (this.reads.size < READS) {
       const read = this.host.bulkIn(bulkIn.address, PACKETS_PER_READ * bulkIn.maxPacket, (status, data) => {

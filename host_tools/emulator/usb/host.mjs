@@ -9,6 +9,7 @@
  *     host.bulkIn(endpoint, length, (status, data) => ...)      done on a short packet or when full
  *     host.bulkOut(endpoint, data, (status) => ...)
  *     host.pollInterrupt(endpoint, interval_ms, (data) => ...)  /  host.stopInterrupt(endpoint)
+ *     host.pause(endpoint, on)                                  send it no token for a while; its transfers wait
  *     host.cancel(transfer)      host.unplug()      host.plug()
  *
  * Status is 'ok', 'stall', 'cancelled' or 'gone'. One transaction is on the bus at a time and takes its time:
@@ -38,6 +39,7 @@ class Pipe {
     this.toggle = 0;
     this.queue = [];
     this.parked_ns = null;
+    this.paused = false;
     this.retry_ns = 0;
   }
 
@@ -241,6 +243,11 @@ export class UsbHost {
     this.interrupts.delete(address);
   }
 
+  pause(address, on) {
+    this.#pipe(address).paused = on;
+    this.#schedule();
+  }
+
   cancel(transfer) {
     const { queue } = transfer.pipe;
     const index = queue.indexOf(transfer);
@@ -294,7 +301,7 @@ export class UsbHost {
 
   #candidates() {
     const pipes = [this.controlPipe, ...this.pipes.values()];
-    return [...pipes.slice(this.turn % pipes.length), ...pipes.slice(0, this.turn % pipes.length)].filter((p) => p.queue.length && p.parked_ns === null);
+    return [...pipes.slice(this.turn % pipes.length), ...pipes.slice(0, this.turn % pipes.length)].filter((p) => p.queue.length && p.parked_ns === null && !p.paused);
   }
 
   #schedule() {

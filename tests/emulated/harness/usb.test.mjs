@@ -6,10 +6,14 @@ import { makeMachine } from './bench.mjs';
 
 const device = (defines = '', body = '') => `${defines}\n#include "cdc.h"\nvoid main(void) { start_clocks(); usb_start(); ${body} for (;;) usb_poll(); }`;
 
-function session(source, steps, seconds, options = {}) {
+function session(source, steps, seconds, { onArrival = () => {}, ...options } = {}) {
   const bytes = [];
   const packets = [];
-  const machine = makeMachine(source, { onData: (b) => bytes.push(...b), onUsbPacket: (p) => packets.push(p), ...options });
+  const onData = (b) => {
+    bytes.push(...b);
+    onArrival(machine.time.nanos, bytes.length);
+  };
+  const machine = makeMachine(source, { onData, onUsbPacket: (p) => packets.push(p), ...options });
   scheduleHostScript(steps, machine.scope, machine.cdc);
   machine.run(seconds * 1e9);
   return { machine, bytes, packets, result: machine.result };
@@ -52,11 +56,42 @@ test('full speed carries at most 19 packets of 64 bytes in a frame', () => {
   assert.ok(total / perFrame.size <= 19 && total / perFrame.size > 5);
 });
 
-test('unplug and replug enumerate again; a stalled host stops the stream without losing a byte', () => {
-  const { result, bytes } = session(device('#define STREAM'), [{ t_s: 0.1, dtr: true }], 0.6, { faults: [{ type: 'host_stall', from_s: 0.15, to_s: 0.2 }, { type: 'usb_unplug', from_s: 0.3, to_s: 0.4 }] });
+/** Fails unless `bytes` count up modulo 256 from `first`. */
+function assertCounts(bytes, first = 0) {
+  const wrong = bytes.findIndex((b, i) => b !== ((first + i) & 255));
+  assert.equal(wrong, -1, `byte ${wrong} is ${bytes[wrong]}`);
+}
+
+/** What `seconds` of the stream device give; `pauseAt` is the number of bytes before the longest time without any. */
+function streamThrough(faults, seconds) {
+  const arrivals = [];
+  const { bytes, packets, result } = session(device('#define STREAM'), [{ t_s: 0.1, dtr: true }], seconds, { faults, onArrival: (t_ns, total) => arrivals.push({ t_ns, total }) });
+  let longest = 1;
+  const wait_ns = (i) => arrivals[i].t_ns - arrivals[i - 1].t_ns;
+  for (let i = 2; i < arrivals.length; i++) if (wait_ns(i) > wait_ns(longest)) longest = i;
+  return { bytes, packets, result, pauseAt: arrivals[longest - 1].total };
+}
+
+for (const [name, from_s, to_s] of [['in mid-stream', 0.2, 0.3], ['from before the port opens', 0.05, 0.2]]) {
+  test(`a host that stalls ${name} stops the stream without losing or repeating a byte`, () => {
+    const { bytes, packets, result } = streamThrough([{ type: 'host_stall', from_s, to_s }], 0.4);
+    assert.deepEqual(result.warnings, []);
+    assertCounts(bytes);
+    const taken = (begin_s, end_s) => packets.filter((p) => p.endpoint === 2 && p.isIn && p.t_ns > begin_s * 1e9 && p.t_ns < end_s * 1e9).length;
+    assert.equal(taken(from_s + 1e-4, to_s), 0, 'no packet was taken in between');
+    assert.ok(taken(to_s, 0.4) > 100, 'the stream went on');
+    assert.ok(result.usb.in_bytes - bytes.length <= 64, 'all but a read under way was delivered');
+  });
+}
+
+test('unplug and replug enumerate again; the stream goes on, short of the read that was under way', () => {
+  const { bytes, result, pauseAt } = streamThrough([{ type: 'usb_unplug', from_s: 0.2, to_s: 0.3 }], 0.5);
   assert.deepEqual(result.warnings, []);
   assert.equal(result.usb.enumerations, 2);
-  assert.ok(bytes.length > 10000);
+  assert.ok(pauseAt > 10000 && bytes.length - pauseAt > 10000, `${pauseAt} and ${bytes.length - pauseAt} bytes`);
+  assertCounts(bytes.slice(0, pauseAt));
+  assertCounts(bytes.slice(pauseAt), bytes[pauseAt]);
+  assert.ok(result.usb.in_bytes - bytes.length <= 2 * 64, 'the cable cost one packet, the end of the run another');
 });
 
 test('two runs are equal to the byte and the cycle', () => {
