@@ -28,6 +28,9 @@ def make_link(link, target):
     if os.path.lexists(link):
         if not os.path.islink(link):
             sys.exit(f"{link} exists and is no symbolic link; choose another --pty")
+        used = os.readlink(link)
+        if used != target and os.path.exists(link):
+            sys.exit(f"{link} is in use: it leads to {used}; end the other emulator, delete the link, or choose another --pty")
         os.unlink(link)
     try:
         os.symlink(target, link)
@@ -78,7 +81,8 @@ def main():
                 (length,) = struct.unpack_from("<I", incoming, 1)
                 if len(incoming) < 5 + length:
                     break
-                outgoing += incoming[5:5 + length]
+                if is_open:  # a client that comes later must not get what an earlier one left
+                    outgoing += incoming[5:5 + length]
                 incoming = incoming[5 + length:]
             if is_open:
                 speed = BAUD.get(termios.tcgetattr(master)[5], 0)
