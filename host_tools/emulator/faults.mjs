@@ -14,7 +14,7 @@
  * `to_s` may be left out: the fault then stays. Times are seconds since power-on.
  */
 import { readFileSync } from 'node:fs';
-import { InputError } from './errors.mjs';
+import { InputError, inWords } from './errors.mjs';
 
 const TARGET = {
   sensor_dead: 'sensor',
@@ -39,7 +39,10 @@ export function parseFaults(text, file, { sensors, muxes }) {
   if (!Array.isArray(list)) fail('must be a list of faults, e.g. [{"type":"sensor_dead","sensor":3,"from_s":1}]');
   return list.map((fault, i) => {
     const at = `fault ${i + 1}`;
-    if (!fault || typeof fault !== 'object' || !(fault.type in TARGET)) fail(`${at}: unknown type "${fault?.type}"; known: ${Object.keys(TARGET).join(', ')}`);
+    const known = `known: ${Object.keys(TARGET).join(', ')}`;
+    if (!fault || typeof fault !== 'object' || Array.isArray(fault)) fail(`${at}: must be an object, e.g. {"type":"sensor_dead","sensor":3,"from_s":1}`);
+    if (fault.type === undefined) fail(`${at}: "type" is missing; ${known}`);
+    if (!Object.hasOwn(TARGET, fault.type)) fail(`${at}: unknown type "${fault.type}"; ${known}`);
     const target = TARGET[fault.type];
     const extra = Object.keys(fault).find((key) => !['type', 'from_s', 'to_s', target].includes(key));
     if (extra) fail(`${at}: key "${extra}" does not belong to ${fault.type}`);
@@ -59,7 +62,7 @@ export function readFaults(file, limits) {
   try {
     text = readFileSync(file, 'utf8');
   } catch (error) {
-    throw new InputError(`${file}: cannot read the faults (${error.code}); check the path`);
+    throw new InputError(`${file}: cannot read the faults (${inWords(error)}); check the path`);
   }
   return parseFaults(text, file, limits);
 }

@@ -6,13 +6,16 @@
  *     t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip,s0_Pa,...,s14_Pa[,temperature_degC]
  *     0,0,0,0,0,0,0,0,0,...
  *
- * Rows have strictly increasing t_s >= 0; s<k>_Pa is the pressure on sensor k above ambient. Between rows
+ * Rows have strictly increasing t_s >= 0; s<k>_Pa is the pressure on sensor k above ambient, at most 1e7 Pa to
+ * either side. The last line ends with a newline: a file without it was cut off and is refused. Between rows
  * everything is linear, before the first and after the last it holds. contact .. slip are the truth for whoever
  * judges the answer and are not used here. Time 0 is power-on.
  */
 import { readFileSync } from 'node:fs';
-import { InputError } from './errors.mjs';
+import { InputError, inWords } from './errors.mjs';
 
+/** Far above what a sensor takes, far below what its arithmetic cannot hold. */
+const PRESSURE_LIMIT_Pa = 1e7;
 const TRUTH = ['contact', 'x_mm', 'y_mm', 'force_N', 'p0_Pa', 'sigma_mm', 'slip'];
 
 export class Scenario {
@@ -58,6 +61,8 @@ export function parseScenario(text, file) {
   if (!version) fail(1, 'not a scenario; the first line must be "# fingertip-scenario 1"');
   if (version[1] !== '1') fail(1, `scenario version ${version[1]} is unknown; this emulator reads version 1`);
 
+  if (!text.endsWith('\n')) fail(lines.length, 'the file ends within a line, so its end is missing; write it again');
+
   const metadata = {};
   let header = null;
   const times_s = [];
@@ -81,6 +86,7 @@ export function parseScenario(text, file) {
       for (const key of ['ambient_Pa', 'temperature_degC']) {
         if (metadata[key] !== undefined && !Number.isFinite(Number(metadata[key] || NaN))) fail(number, `metadata "${key}" is "${metadata[key]}"; give a number`);
       }
+      if (Math.abs(metadata.ambient_Pa ?? 0) > PRESSURE_LIMIT_Pa) fail(number, `metadata "ambient_Pa" is "${metadata.ambient_Pa}"; give at most 1e7 Pa`);
       const expected = ['t_s', ...TRUTH, ...Array.from({ length: sensors }, (_, k) => `s${k}_Pa`)];
       hasTemperature = cells.length === expected.length + 1 && cells.at(-1) === 'temperature_degC';
       const named = hasTemperature ? cells.slice(0, -1) : cells;
@@ -98,6 +104,9 @@ export function parseScenario(text, file) {
     const [t] = values;
     if (t < 0) fail(number, `t_s is ${t}; time starts at 0`);
     if (times_s.length && t <= times_s.at(-1)) fail(number, `t_s ${t} does not increase (previous row: ${times_s.at(-1)})`);
+    values.slice(1 + TRUTH.length, 1 + TRUTH.length + sensors).forEach((value, k) => {
+      if (Math.abs(value) > PRESSURE_LIMIT_Pa) fail(number, `column "s${k}_Pa" is ${value}; give at most 1e7 Pa`);
+    });
     times_s.push(t);
     pressures_Pa.push(Float64Array.from(values.slice(1 + TRUTH.length, 1 + TRUTH.length + sensors)));
     temperatures_degC.push(hasTemperature ? values.at(-1) : Number(metadata.temperature_degC ?? 25));
@@ -112,7 +121,7 @@ export function readScenario(file) {
   try {
     text = readFileSync(file, 'utf8');
   } catch (error) {
-    throw new InputError(`${file}: cannot read the scenario (${error.code}); check the path`);
+    throw new InputError(`${file}: cannot read the scenario (${inWords(error)}); check the path`);
   }
   return parseScenario(text, file);
 }

@@ -7,7 +7,7 @@
  *     2.5 baud 1200
  */
 import { readFileSync } from 'node:fs';
-import { InputError } from '../errors.mjs';
+import { InputError, inWords } from '../errors.mjs';
 
 export function parseHostScript(text, file) {
   const steps = [];
@@ -33,7 +33,7 @@ export function readHostScript(file) {
   try {
     text = readFileSync(file, 'utf8');
   } catch (error) {
-    throw new InputError(`${file}: cannot read the host script (${error.code}); check the path`);
+    throw new InputError(`${file}: cannot read the host script (${inWords(error)}); check the path`);
   }
   return parseHostScript(text, file);
 }

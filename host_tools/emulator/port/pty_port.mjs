@@ -10,7 +10,7 @@
  */
 import { spawn } from 'node:child_process';
 import { fileURLToPath } from 'node:url';
-import { InputError } from '../errors.mjs';
+import { InputError, inWords } from '../errors.mjs';
 
 const PYTHON = '/usr/bin/python3';
 const WINDOW = 16384;
@@ -34,7 +34,7 @@ export class PtyPort {
     this.baud = null;
     this.errors = '';
     this.child = spawn(PYTHON, [fileURLToPath(new URL('./pty_port.py', import.meta.url)), link], { stdio: ['pipe', 'pipe', 'pipe'], detached: true });
-    this.child.on('error', (error) => this.#lost(`cannot start ${PYTHON} (${error.code})`));
+    this.child.on('error', (error) => this.#lost(`cannot start ${PYTHON} (${inWords(error)})`));
     this.child.stderr.on('data', (text) => {
       this.errors += text;
     });

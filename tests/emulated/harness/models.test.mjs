@@ -233,7 +233,7 @@ test('bus: a sensor that holds SDA lets go after nine clocks, not eight', () => 
 });
 
 const row = (t, p = 0) => `${t},0,0,0,0,0,0,0,${new Array(15).fill(p).join(',')}`;
-const scenario = (...lines) => parseScenario(lines.join('\n'), 's.csv');
+const scenario = (...lines) => parseScenario(`${lines.join('\n')}\n`, 's.csv');
 
 test('scenario: interpolates, holds, adds ambient pressure', () => {
   const s = scenario('# fingertip-scenario 1', '# ambient_Pa: 90000', HEADER, row(1, 0), row(2, 1000), row(4, 0));
@@ -259,17 +259,27 @@ for (const [name, lines, expected] of [
   ['wrong header', ['# fingertip-scenario 1', HEADER.replace('sigma_mm', 'sigma'), row(0)], /^s\.csv:2: column 7 is "sigma"/],
   ['no rows', ['# fingertip-scenario 1', HEADER], /no rows/],
   ['no header', ['# fingertip-scenario 1'], /no header/],
+  ['pressure no sensor takes', ['# fingertip-scenario 1', HEADER, row(0), row(1, -1.1e7)], /^s\.csv:4: column "s0_Pa" is -11000000; give at most 1e7 Pa/],
+  ['ambient pressure', ['# fingertip-scenario 1', '# ambient_Pa: 2e7', HEADER, row(0)], /^s\.csv:3: metadata "ambient_Pa" is "2e7"; give at most 1e7 Pa/],
 ]) {
   test(`scenario: ${name} is refused with its place`, () => {
     assert.throws(() => scenario(...lines), (e) => e instanceof InputError && expected.test(e.message) && !e.message.includes('\n'));
   });
 }
 
+test('scenario: pressures up to the limit are taken, a file cut off in its last line is not', () => {
+  assert.equal(scenario('# fingertip-scenario 1', '# ambient_Pa: 0', HEADER, row(0, 1e7)).at_ns(0, 0).pressure_Pa, 1e7);
+  const text = `# fingertip-scenario 1\n${HEADER}\n${row(0)}\n${row(1, 1000)}`;
+  assert.throws(() => parseScenario(text, 's.csv'), (e) => e instanceof InputError && /^s\.csv:4: the file ends within a line/.test(e.message));
+});
+
 test('faults and host script: what is wrong is named', () => {
   const limits = { sensors: 15, muxes: 3 };
   assert.equal(parseFaults('[{"type":"sensor_dead","sensor":14,"from_s":0.5,"to_s":1}]', 'f', limits)[0].to_ns, 1e9);
   for (const [text, message] of [
     ['{', /not JSON/], ['{}', /must be a list/], ['[{"type":"x"}]', /unknown type "x"/],
+    ['[{"sensor":3,"from_s":1}]', /fault 1: "type" is missing; known: sensor_dead,/], ['[[]]', /fault 1: must be an object/],
+    ['[{"type":"constructor","from_s":1}]', /unknown type "constructor"/],
     ['[{"type":"sensor_dead","sensor":15,"from_s":0}]', /"sensor" must be 0..14/],
     ['[{"type":"mux_stuck","mux":0}]', /"from_s"/], ['[{"type":"host_stall","from_s":2,"to_s":1}]', /"to_s"/],
     ['[{"type":"host_stall","from_s":2,"mux":1}]', /key "mux"/],
