@@ -1,13 +1,14 @@
 #!/usr/bin/env node
 /** Command line of the emulator: see USAGE. */
-import { closeSync, openSync, readFileSync, writeFileSync, writeSync } from 'node:fs';
+import { readFileSync } from 'node:fs';
 import { parseArgs } from 'node:util';
 import { findBoard } from './board/boards.mjs';
-import { InputError } from './errors.mjs';
+import { InputError, inWords } from './errors.mjs';
 import { readFaults } from './faults.mjs';
 import { readHostScript, scheduleHostScript } from './port/host_script.mjs';
 import { PtyPort } from './port/pty_port.mjs';
 import { DEFAULT_SERIAL, Machine } from './machine.mjs';
+import { OutputFile } from './output_file.mjs';
 import { readScenario } from './scenario.mjs';
 
 const USAGE = `usage: main.mjs --image FILE.bin --board NAME --scenario FILE.csv [options]
@@ -36,7 +37,8 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --progress           a line on stderr each second
 
 Runs without --pty are the same bit for bit each time. SIGINT ends a run cleanly.
-Exit: 0 clean; 1 a warning or failure of firmware or emulation, each printed as a line; 2 wrong usage or input.`;
+Exit: 0 clean; 1 a warning or failure of firmware or emulation, or an output that could not be written whole,
+each printed as a line; 2 wrong usage or input.`;
 
 const OPTIONS = {
   image: { type: 'string' }, board: { type: 'string' }, scenario: { type: 'string' }, seconds: { type: 'string' },
@@ -51,45 +53,21 @@ const OPTIONS = {
 const SLICE_NS = 1e6;
 const SLICE_BATCH_NS = 50e6;
 
-class OutputFile {
-  constructor(path, header = null) {
-    this.path = path;
-    this.pending = [];
-    this.size = 0;
-    if (!path) return;
-    try {
-      this.fd = openSync(path, 'w');
-    } catch (error) {
-      throw new InputError(`${path}: cannot write (${error.code}); check the folder`);
-    }
-    if (header) this.write(Buffer.from(`${header}\n`));
+/** parseArgs takes "-1" behind "--name" for an option: join the two, so that the value is judged. */
+function joinNegativeNumbers(argv) {
+  const joined = [];
+  for (const argument of argv) {
+    const name = joined.at(-1) ?? '';
+    if (/^-[.0-9]/.test(argument) && name.startsWith('--') && OPTIONS[name.slice(2)]?.type === 'string') joined[joined.length - 1] = `${name}=${argument}`;
+    else joined.push(argument);
   }
-
-  write(bytes) {
-    if (!this.path) return;
-    this.pending.push(Buffer.from(bytes));
-    this.size += bytes.length;
-    if (this.size > 65536) this.flush();
-  }
-
-  flush() {
-    if (!this.path || !this.size) return;
-    const all = Buffer.concat(this.pending);
-    for (let at = 0; at < all.length; ) at += writeSync(this.fd, all, at);
-    this.pending = [];
-    this.size = 0;
-  }
-
-  close() {
-    this.flush();
-    if (this.path) closeSync(this.fd);
-  }
+  return joined;
 }
 
 function parseOptions(argv) {
   let values;
   try {
-    ({ values } = parseArgs({ args: argv, options: OPTIONS, strict: true }));
+    ({ values } = parseArgs({ args: joinNegativeNumbers(argv), options: OPTIONS, strict: true }));
   } catch (error) {
     throw new InputError(`${error.message.split('\n')[0]}; see --help`);
   }
@@ -115,7 +93,7 @@ function readImage(path) {
   try {
     image = readFileSync(path);
   } catch (error) {
-    throw new InputError(`${path}: cannot read the image (${error.code}); build it first`);
+    throw new InputError(`${path}: cannot read the image (${inWords(error)}); build it first`);
   }
   if (image.length < 512 || image.length > 2 * 1024 * 1024) throw new InputError(`${path}: ${image.length} bytes; a raw flash image has 512 bytes to 2 MiB`);
   if (image.readUInt32LE(0) === 0x0a324655 || image.readUInt32LE(0) === 0x464c457f) throw new InputError(`${path}: this is a UF2 or ELF file; give the raw .bin image`);
@@ -135,9 +113,12 @@ async function run(options) {
   const seconds = options.seconds ?? scenario.end_s;
   if (!(seconds > 0)) throw new InputError(`${options.scenario}: ends at 0 s; give --seconds`);
 
-  const capture = new OutputFile(options.capture);
-  const busLog = new OutputFile(options['bus-log'], 'start_ns,end_ns,muxes,address,rw,bytes,ack');
-  const usbLog = new OutputFile(options['usb-log'], 't_ns,endpoint,dir,length,bytes');
+  const outputs = [];
+  const output = (path, header) => {
+    const file = new OutputFile(path, { header, onFailure: (line) => process.stderr.write(`error: ${line}\n`) });
+    outputs.push(file);
+    return file;
+  };
   const hex = (bytes) => Buffer.from(bytes).toString('hex');
 
   let interrupted = false;
@@ -147,8 +128,15 @@ async function run(options) {
   process.on('SIGINT', onInterrupt);
   process.on('SIGTERM', onInterrupt);
 
+  // Before the outputs: a link that another emulator serves must not cost that one its files.
   const pty = options.pty ? await PtyPort.start(options.pty) : null;
+  let clean;
   try {
+    const reportFile = output(options.report);
+    const capture = output(options.capture);
+    const busLog = output(options['bus-log'], 'start_ns,end_ns,muxes,address,rw,bytes,ack');
+    const usbLog = output(options['usb-log'], 't_ns,endpoint,dir,length,bytes');
+
     while (options['wait-open'] && !pty.isOpen && !interrupted && !pty.failure) await sleep(5);
 
     const machine = new Machine({
@@ -206,20 +194,17 @@ async function run(options) {
     if (pty) await pty.drain();
     const wall_s = (performance.now() - started_ms) / 1000;
     const { result } = machine;
-    if (options.report) {
-      const file = new OutputFile(options.report);
-      file.write(Buffer.from(`${JSON.stringify({ ...result, wall_s }, null, 2)}\n`));
-      file.close();
-    }
+    reportFile.write(Buffer.from(`${JSON.stringify({ ...result, wall_s }, null, 2)}\n`));
     for (const line of result.warnings) process.stderr.write(`${line}\n`);
     if (result.end_reason !== 'end of time') process.stderr.write(`ended after ${result.emulated_s.toFixed(6)} s: ${result.end_reason}\n`);
-    return result.warnings.length ? 1 : 0;
+    clean = result.warnings.length === 0;
   } finally {
-    for (const file of [capture, busLog, usbLog]) file.close();
+    for (const file of outputs) file.close();
     await pty?.stop();
     process.off('SIGINT', onInterrupt);
     process.off('SIGTERM', onInterrupt);
   }
+  return clean && outputs.every((file) => !file.failure) ? 0 : 1;
 }
 
 try {

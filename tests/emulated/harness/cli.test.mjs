@@ -1,15 +1,16 @@
 /** The command line as a process: exit codes, one-line errors, files, pseudo-terminal, clean end by signal. */
 import assert from 'node:assert/strict';
 import { spawn, spawnSync } from 'node:child_process';
-import { existsSync, lstatSync, mkdtempSync, readFileSync, writeFileSync } from 'node:fs';
+import { existsSync, lstatSync, mkdtempSync, readFileSync, readlinkSync, rmSync, symlinkSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, test } from 'node:test';
-import { rmSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
+import { OutputFile } from '../../../host_tools/emulator/output_file.mjs';
 import { build, HEADER } from './bench.mjs';
 
 const MAIN = fileURLToPath(new URL('../../../host_tools/emulator/main.mjs', import.meta.url));
+const HELPER = fileURLToPath(new URL('../../../host_tools/emulator/port/pty_port.py', import.meta.url));
 const folder = mkdtempSync(join(tmpdir(), 'emulator-cli-'));
 after(() => rmSync(folder, { recursive: true }));
 const file = (name, content) => {
@@ -17,6 +18,7 @@ const file = (name, content) => {
   return join(folder, name);
 };
 const image = file('echo.bin', build('#include "cdc.h"\nvoid main(void) { start_clocks(); usb_start(); for (;;) usb_poll(); }'));
+const stream = file('stream.bin', build('#define STREAM\n#include "cdc.h"\nvoid main(void) { start_clocks(); usb_start(); for (;;) usb_poll(); }'));
 const broken = file('null.bin', build('void main(void) { start_clocks(); REG(0) = 1; done(); }'));
 const scenario = file('s.csv', `# fingertip-scenario 1\n${HEADER}\n0${',0'.repeat(22)}\n0.2${',0'.repeat(22)}\n`);
 const base = ['--board', 'pico_mux', '--scenario', scenario, '--fast-enumeration'];
@@ -36,6 +38,30 @@ test('a host script drives the port; capture, logs and report are written; exit 
   assert.match(readFileSync(out('b.csv'), 'utf8'), /^start_ns,end_ns,muxes,address,rw,bytes,ack\n$/);
 });
 
+test('a full disk costs the file on it, in one line at once and exit 1; the others are whole', () => {
+  const script = file('open', '0.1 dtr 1\n0.12 0102ff\n');
+  const out = (name) => join(folder, name);
+  const others = ['--capture', out('c2.bin'), '--report', out('r2.json')];
+  const { status, stderr } = run('--image', image, ...base, '--host-script', script, '--usb-log', '/dev/full', ...others);
+  assert.equal(status, 1);
+  assert.equal(stderr, 'error: /dev/full: cannot write (no space left on device); the file is not complete\n');
+  assert.deepEqual([...readFileSync(out('c2.bin'))], [1, 2, 255]);
+  assert.equal(JSON.parse(readFileSync(out('r2.json'))).end_reason, 'end of time');
+  const lost = run('--image', image, ...base, '--report', '/dev/full');
+  assert.equal(lost.status, 1);
+  assert.match(lost.stderr, /^error: \/dev\/full: .*\n$/);
+});
+
+test('what an output file could not take is reported once and needs no memory', () => {
+  const lines = [];
+  const output = new OutputFile('/dev/full', { onFailure: (line) => lines.push(line) });
+  for (let i = 0; i < 100; i++) output.write(new Uint8Array(65537));
+  assert.equal(output.pending.length, 0);
+  output.close();
+  assert.equal(lines.length, 1);
+  assert.equal(output.failure, lines[0]);
+});
+
 test('a failing image ends with 1 and one line', () => {
   const { status, stderr } = run('--image', broken, ...base);
   assert.equal(status, 1);
@@ -44,10 +70,14 @@ test('a failing image ends with 1 and one line', () => {
 
 for (const [name, args, message] of [
   ['unknown board', ['--image', image, '--board', 'x', '--scenario', scenario], /^error: unknown board "x"; known: pico_mux\n$/],
-  ['missing image', ['--image', '/nowhere', ...base], /^error: \/nowhere: cannot read the image \(ENOENT\); build it first\n$/],
+  ['missing image', ['--image', '/nowhere', ...base], /^error: \/nowhere: cannot read the image \(no such file or directory\); build it first\n$/],
+  ['folder for an image', ['--image', folder, ...base], /^error: .*: cannot read the image \(illegal operation on a directory\)/],
   ['missing option', ['--image', image], /^error: --board is missing/],
   ['unknown option', ['--frobnicate'], /^error: Unknown option '--frobnicate'/],
-  ['bad seed', ['--image', image, ...base, '--seed', '-1'], /^error: .*seed/i],
+  ['bad seed', ['--image', image, ...base, '--seed', '-1'], /^error: --seed "-1" is not a whole number from 0 to 4294967295\n$/],
+  ['negative time', ['--image', image, ...base, '--seconds', '-1'], /^error: --seconds "-1" is not a positive number of seconds\n$/],
+  ['option without its value', ['--image', image, ...base, '--seconds', '--progress'], /^error: .*--seconds/],
+  ['report nowhere', ['--image', image, ...base, '--seconds', '1e6', '--report', '/nowhere/r'], /^error: \/nowhere\/r: cannot write \(no such file or directory\); check the folder\n$/],
   ['bad scenario', ['--image', image, '--board', 'pico_mux', '--scenario', image], /^error: .*:1: not a scenario/],
 ]) {
   test(`exit 2: ${name}`, () => {
@@ -75,17 +105,112 @@ while len(got) < len(data) and time.time() < end:
 sys.exit(0 if got == data else 1)
 `;
 
-test('pseudo-terminal: bytes go both ways, SIGINT ends cleanly and removes the link', async () => {
-  const link = join(folder, 'tty');
-  const emulator = spawn(process.execPath, [MAIN, '--image', image, ...base, '--seconds', '60', '--pty', link, '--wait-open'], { stdio: ['ignore', 'ignore', 'pipe'] });
+/** An emulator that serves `link`: waits for the link; `end()` interrupts it and gives its exit code. */
+async function serve(link, ...args) {
+  const emulator = spawn(process.execPath, [MAIN, ...base, '--seconds', '60', '--pty', link, '--wait-open', ...args], { stdio: ['ignore', 'ignore', 'pipe'] });
   let stderr = '';
   emulator.stderr.on('data', (d) => (stderr += d));
   const ended = new Promise((resolve) => emulator.on('close', resolve));
-  for (let i = 0; i < 200 && !existsSync(link); i++) await new Promise((r) => setTimeout(r, 25));
-  const client = spawn('/usr/bin/python3', ['-c', CLIENT, link], { stdio: 'inherit' });
+  for (let i = 0; i < 400 && !existsSync(link) && emulator.exitCode === null; i++) await new Promise((r) => setTimeout(r, 25));
+  assert.ok(existsSync(link), stderr);
+  const end = async () => {
+    emulator.kill('SIGINT');
+    return { code: await ended, stderr };
+  };
+  /** With --progress: wait for that much emulated time. */
+  const reach = async (wanted_s) => {
+    const reached_s = () => Number(stderr.trim().split('\n').at(-1).split(' ')[0]);
+    while (!(reached_s() >= wanted_s) && emulator.exitCode === null) await new Promise((r) => setTimeout(r, 50));
+  };
+  return { end, reach };
+}
+
+async function runClient(program, link, go = Promise.resolve()) {
+  const client = spawn('/usr/bin/python3', ['-c', program, link], { stdio: ['pipe', 'pipe', 'inherit'] });
+  go.then(() => client.stdin.end('\n'));
+  let stdout = '';
+  client.stdout.on('data', (d) => (stdout += d));
   const code = await new Promise((resolve) => client.on('close', resolve));
-  emulator.kill('SIGINT');
-  assert.equal(await ended, 0, stderr);
-  assert.equal(code, 0, stderr);
+  return { code, stdout };
+}
+
+test('pseudo-terminal: bytes go both ways, SIGINT ends cleanly and removes the link', async () => {
+  const link = join(folder, 'tty');
+  const emulator = await serve(link, '--image', image);
+  const { code } = await runClient(CLIENT, link);
+  const ended = await emulator.end();
+  assert.equal(ended.code, 0, ended.stderr);
+  assert.equal(code, 0, ended.stderr);
   assert.throws(() => lstatSync(link));
+});
+
+test('pseudo-terminal: a link in use is refused and its emulator keeps its files; a stale link is replaced', async () => {
+  const link = join(folder, 'shared');
+  symlinkSync(join(folder, 'gone'), link);
+  const capture = file('kept.bin', '');
+  const emulator = await serve(link, '--image', image, '--capture', capture);
+  const target = readlinkSync(link);
+  writeFileSync(capture, 'mine');
+  const second = run('--image', image, ...base, '--seconds', '1', '--pty', link, '--capture', capture);
+  assert.equal(second.status, 2);
+  assert.match(second.stderr, /^error: .*shared is in use: it leads to \/dev\/pts\/[0-9]+; end the other emulator, [^\n]*\n$/);
+  assert.equal(readlinkSync(link), target);
+  assert.equal(readFileSync(capture, 'utf8'), 'mine');
+  const ended = await emulator.end();
+  assert.equal(ended.code, 0, ended.stderr);
+});
+
+/** Opens, does not read before it is told to on stdin, then takes 100 000 bytes and tells the first that breaks the count. */
+const LATE_READER = `
+import os, select, sys, termios, time, tty
+fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
+tty.setraw(fd, termios.TCSANOW)
+sys.stdin.readline()
+got = 0
+end = time.time() + 60
+while got < 100000 and time.time() < end:
+    if not select.select([fd], [], [], 1)[0]:
+        continue
+    for byte in os.read(fd, 4096):
+        if byte != got & 255:
+            sys.exit(f"byte {got} is {byte}")
+        got += 1
+print(got)
+`;
+
+test('pseudo-terminal: a client that does not read stops the stream, loses nothing, and is not buffered for', async () => {
+  const link = join(folder, 'late');
+  const log = join(folder, 'late.csv');
+  const emulator = await serve(link, '--image', stream, '--usb-log', log, '--progress');
+  const { code, stdout } = await runClient(LATE_READER, link, emulator.reach(0.3));
+  const ended = await emulator.end();
+  assert.equal(ended.code, 0, ended.stderr);
+  assert.equal(code, 0);
+  assert.ok(Number(stdout) >= 100000, stdout);
+  const packets = readFileSync(log, 'utf8').split('\n').filter((line) => /^\d+,2,in,[1-9]/.test(line)).map((line) => line.split(',').map(Number));
+  let paused = 1;
+  for (let i = 2; i < packets.length; i++) if (packets[i][0] - packets[i - 1][0] > packets[paused][0] - packets[paused - 1][0]) paused = i;
+  const pause_s = (packets[paused][0] - packets[paused - 1][0]) / 1e9;
+  assert.ok(pause_s > 0.05, `the device was read on: longest pause ${pause_s} s`);
+  const before = packets.slice(0, paused).reduce((sum, packet) => sum + packet[3], 0);
+  // The window of 16 KiB, sixteen reads under way, and what the kernel holds of a terminal's bytes.
+  assert.ok(before >= 16384 && before <= 16384 + 16 * 128 + 65536, `${before} bytes were taken for a client that did not read`);
+});
+
+/** Gives the helper bytes while nobody has the terminal open; a client then must find nothing. */
+test('pseudo-terminal: bytes for a client that left do not reach the next one', async () => {
+  const link = join(folder, 'helper');
+  const helper = spawn('/usr/bin/python3', [HELPER, link], { stdio: ['pipe', 'pipe', 'inherit'] });
+  const ended = new Promise((resolve) => helper.on('close', resolve));
+  await new Promise((resolve) => helper.stdout.once('data', resolve));
+  helper.stdin.write(Buffer.from([0x44, 3, 0, 0, 0, 1, 2, 3]));
+  await new Promise((r) => setTimeout(r, 200));
+  const { stdout } = await runClient(`
+import os, select, sys, tty
+fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
+tty.setraw(fd)
+print(len(os.read(fd, 100)) if select.select([fd], [], [], 0.5)[0] else 0)`, link);
+  helper.stdin.end();
+  assert.equal(await ended, 0);
+  assert.equal(stdout.trim(), '0');
 });
