@@ -8,6 +8,13 @@
 # unity.sha256 pins what is accepted.
 set -eu
 [ $# -eq 1 ] || { echo "usage: fetch_unity.sh DIRECTORY" >&2; exit 2; }
+need() {
+  for tool; do
+    command -v "$tool" > /dev/null 2>&1 || { echo "fetch_unity: $tool is missing; install it and run again" >&2; exit 1; }
+  done
+}
+
+need sha256sum
 mkdir -p "$1"
 dest=$(cd "$1" && pwd)
 sums=$(cd "$(dirname "$0")" && pwd)/unity.sha256
@@ -15,6 +22,7 @@ sums=$(cd "$(dirname "$0")" && pwd)/unity.sha256
 pinned() { (cd "$dest" && sha256sum --check --status "$sums" 2> /dev/null); }
 pinned && exit 0
 
+need apt-get awk sort tar xz
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir -p "$work/lists/partial"

@@ -9,6 +9,12 @@ python=/usr/bin/python3
 rm -rf $out
 mkdir -p $out
 
+fail() {
+  tail -n 20 $out/emulator.log >&2
+  echo "demo: $1; the emulator's whole log is $out/emulator.log" >&2
+  exit 1
+}
+
 $python host_tools/python/scenario.py demo -o $out/scenario.csv
 
 node host_tools/emulator/main.mjs --board pico_mux --image build/pico_mux/fingertip-pico_mux.bin \
@@ -16,17 +22,14 @@ node host_tools/emulator/main.mjs --board pico_mux --image build/pico_mux/finger
   > $out/emulator.log 2>&1 &
 emulator=$!
 trap 'kill $emulator 2> /dev/null || true' EXIT
-for _ in 1 2 3 4 5 6 7 8 9 10; do
-  [ -e $out/fingertip.tty ] && break
-  sleep 0.5
+while [ ! -e $out/fingertip.tty ]; do
+  kill -0 $emulator 2> /dev/null || fail "the emulator did not start"
+  sleep 0.1
 done
 
-build/host/host_tools/cli/fingertip monitor --port $out/fingertip.tty --until-gone --record $out/recording.csv
-if ! wait $emulator; then
-  cat $out/emulator.log >&2
-  echo "demo: the emulator found something wrong; see above" >&2
-  exit 1
-fi
+build/host/host_tools/cli/fingertip monitor --port $out/fingertip.tty --until-gone --record $out/recording.csv ||
+  fail "the monitor ended with an error"
+wait $emulator || fail "the emulator found something wrong"
 trap - EXIT
 
 $python host_tools/python/evaluate.py $out/recording.csv $out/scenario.csv --run $out/run.json -o $out/summary.json

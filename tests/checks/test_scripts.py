@@ -1,0 +1,166 @@
+#!/usr/bin/env python3
+"""The build's and the demo's scripts: what they compute, and the one line they end with when something is missing."""
+import os
+import pathlib
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import textwrap
+import types
+import unittest
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path.insert(0, str(HERE))
+import check_image  # noqa: E402
+
+CHECKSUM = ROOT / "cmake" / "boot2_checksum.py"
+
+
+class Folder(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+
+class Boot2Checksum(Folder):
+    def stage(self, code):
+        """The 256 bytes that boot2_checksum.py makes of `code`, or its failed run."""
+        source, result = self.folder / "in.bin", self.folder / "out.bin"
+        source.write_bytes(code)
+        done = subprocess.run([sys.executable, CHECKSUM, source, result], capture_output=True, text=True)
+        return done if done.returncode else result.read_bytes()
+
+    def check(self, stage):
+        section = types.SimpleNamespace(address=check_image.FLASH[0])
+        check_image.check_boot2(types.SimpleNamespace(bytes_of=lambda name: stage, section=lambda name: section))
+
+    def test_agrees_with_the_image_check(self):
+        prng = random.Random(1)
+        for length in (1, 2, 100, 251, 252):
+            code = prng.randbytes(length)
+            stage = self.stage(code)
+            self.assertEqual(stage[:252], code.ljust(252, b"\0"))
+            self.assertEqual(stage[252:], check_image.crc32_mpeg2(stage[:252]).to_bytes(4, "little"))
+            self.check(stage)
+
+    def test_the_image_check_has_the_catalogued_crc(self):
+        # CRC-32/MPEG-2, check value over "123456789".
+        self.assertEqual(check_image.crc32_mpeg2(b"123456789"), 0x0376E6E7)
+
+    def test_every_flipped_byte_is_found(self):
+        stage = self.stage(random.Random(2).randbytes(252))
+        for at in range(256):
+            for mask in (0x01, 0x80, 0xFF):
+                spoilt = bytearray(stage)
+                spoilt[at] ^= mask
+                with self.assertRaises(SystemExit, msg=f"byte {at}, mask {mask:#x}"):
+                    self.check(bytes(spoilt))
+
+    def test_code_that_does_not_fit_is_refused(self):
+        for length in (0, 253):
+            done = self.stage(b"\1" * length)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn(f"has {length} bytes; 1 to 252 fit", done.stderr)
+
+
+class FetchUnity(Folder):
+    def path_without(self, *missing):
+        """A PATH that leads to every program of this machine but those."""
+        tools = self.folder / "bin"
+        tools.mkdir()
+        for folder in os.environ["PATH"].split(":") + ["/usr/bin", "/bin"]:
+            for program in pathlib.Path(folder).glob("*"):
+                link = tools / program.name
+                if program.name not in missing and not os.path.lexists(link):
+                    link.symlink_to(program)
+        return str(tools)
+
+    def test_a_missing_tool_is_named(self):
+        shell = shutil.which("sh")
+        for tool in ("sha256sum", "apt-get", "awk", "sort", "tar", "xz"):
+            with self.subTest(tool):
+                environment = {"PATH": self.path_without(tool)}
+                done = subprocess.run([shell, ROOT / "cmake/fetch_unity.sh", self.folder / "unity"], capture_output=True,
+                                      text=True, env=environment)
+                shutil.rmtree(environment["PATH"])
+                self.assertEqual(done.returncode, 1)
+                self.assertEqual(done.stderr, f"fetch_unity: {tool} is missing; install it and run again\n")
+
+    def test_configuring_shows_the_line_and_points_at_it(self):
+        environment = {**os.environ, "PATH": self.path_without("apt-get")}
+        done = subprocess.run(["cmake", "-G", "Ninja", "-S", ROOT, "-B", self.folder / "build", "-DFINGERTIP_IMAGES=",
+                               f"-DFINGERTIP_UNITY_DIR={self.folder}/unity"], capture_output=True, text=True, env=environment)
+        self.assertEqual(done.returncode, 1)
+        told = done.stderr.find("fetch_unity: apt-get is missing")
+        self.assertGreaterEqual(told, 0, done.stderr)
+        self.assertGreater(" ".join(done.stderr.split()).find("see the line above"), 0, done.stderr)
+        self.assertLess(told, done.stderr.find("CMake Error"))
+
+
+class Demo(Folder):
+    """demo.sh alone, with a stand-in for each program that it calls."""
+
+    def setUp(self):
+        super().setUp()
+        shutil.copytree(ROOT / "host_tools/demo", self.folder / "host_tools/demo")
+        for name in ("scenario", "evaluate", "plot"):
+            self.write(f"host_tools/python/{name}.py", """
+                import sys
+                open(sys.argv[sys.argv.index("-o") + 1], "w").write("{}")
+                """)
+        self.monitor('test -e "$3"')
+
+    def write(self, path, text):
+        file = self.folder / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(textwrap.dedent(text))
+        return file
+
+    def emulator(self, body):
+        self.write("host_tools/emulator/main.mjs", f"""
+            import {{ writeFileSync }} from 'node:fs';
+            const link = process.argv[process.argv.indexOf('--pty') + 1];
+            const later = (ms, action) => setTimeout(action, ms);
+            {body}
+            """)
+
+    def monitor(self, body):
+        self.write("build/host/host_tools/cli/fingertip", f"#!/bin/sh\n{body}\n").chmod(0o755)
+
+    def play(self):
+        return subprocess.run(["sh", self.folder / "host_tools/demo/demo.sh"], capture_output=True, text=True, timeout=60)
+
+    def assert_fails(self, message, log):
+        done = self.play()
+        self.assertEqual(done.returncode, 1, done.stderr)
+        lines = done.stderr.splitlines()
+        self.assertEqual(lines[-1], f"demo: {message}; the emulator's whole log is build/demo/emulator.log")
+        self.assertEqual(lines[-2], log)
+        self.assertLessEqual(len(lines), 21)
+
+    def test_a_slow_start_is_waited_for(self):
+        self.emulator("later(6000, () => { writeFileSync(link, ''); later(500, () => {}); });")
+        done = self.play()
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("picture: build/demo/demo.png", done.stdout)
+
+    def test_an_emulator_that_does_not_start(self):
+        self.emulator("for (let i = 0; i < 100; i++) console.error(`line ${i}`); process.exitCode = 2;")
+        self.assert_fails("the emulator did not start", "line 99")
+
+    def test_an_emulator_that_finds_something_wrong(self):
+        self.emulator("writeFileSync(link, ''); later(1000, () => { console.error('warning'); process.exitCode = 1; });")
+        self.assert_fails("the emulator found something wrong", "warning")
+
+    def test_a_monitor_that_fails(self):
+        self.emulator("console.error('ready'); writeFileSync(link, ''); later(20000, () => {});")
+        self.monitor("exit 3")
+        self.assert_fails("the monitor ended with an error", "ready")
+
+
+if __name__ == "__main__":
+    unittest.main()
