@@ -1,6 +1,7 @@
 #include "fit/fit.h"
 
 #include "common/bytes.h"
+#include "fit/fit_grid_solve.h"
 #include "fit/fit_limits.h"
 
 #include <math.h>
@@ -120,6 +121,22 @@ enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, con
   return FT_OK;
 }
 
+/* Fits once more without the outlier, if there is one. */
+static void leave_outlier_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                              uint32_t usable, const struct fit_settings *settings,
+                              struct fit_result *result) {
+  int outlier = fit_grid_outlier(array, pressure_Pa_q10, usable, settings, result);
+  if (outlier < 0) {
+    return;
+  }
+  struct fit_result without;
+  usable &= ~(UINT32_C(1) << outlier);
+  bool rough = fit_grid_masked(array, pressure_Pa_q10, usable, settings, &without);
+  if (fit_outlier_gone(result, &without, rough, array->pitch_mm)) {
+    *result = without;
+  }
+}
+
 void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                   const struct fit_settings *settings, struct fit_result *result) {
   uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
@@ -127,9 +144,12 @@ void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   bool some = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
   if (!grid || some) {
     fit_general(array, pressure_Pa_q10, usable, settings, result);
-  } else if ((usable & all) == all) {
-    fit_grid(array, pressure_Pa_q10, settings, result);
-  } else {
-    fit_grid_masked(array, pressure_Pa_q10, usable, settings, result);
+    return;
+  }
+  usable &= all;
+  bool rough = usable == all ? fit_grid(array, pressure_Pa_q10, settings, result)
+                             : fit_grid_masked(array, pressure_Pa_q10, usable, settings, result);
+  if (rough) {
+    leave_outlier_out(array, pressure_Pa_q10, usable, settings, result);
   }
 }

@@ -27,8 +27,8 @@ struct fit_array {
   uint8_t sensor_count;
   float pitch_mm;
   float x[FT_MAX_SENSORS], y[FT_MAX_SENSORS]; /* [sensor], pitches */
-  float x_min, x_max, y_min, y_max; /* box of the location: the array and 1.5 pitches around it */
-  bool is_line;                     /* the sensors lie on x line_x + y line_y = line_offset, and */
+  float x_min, x_max, y_min, y_max;  /* box of the location: the array and 1.5 pitches around it */
+  bool is_line;                      /* the sensors lie on x line_x + y line_y = line_offset, and */
   float line_x, line_y, line_offset; /* (line_x, line_y) is of unit length */
   struct fit_grid_shape grid;
 };
@@ -72,7 +72,10 @@ struct fit_result {
 enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
                               const float *y_mm, float pitch_mm);
 
-/* pressure_Pa_q10[sensor]: pressure on the pad, 1/1024 Pa, any bits. usable: bitmap of the sensors
+/* A sensor whose reading does not belong to the others' (fit_limits.h) is left out of a second fit;
+ * SENSOR_MASKED and `used` tell. Only residuals that are rough and no noise make it look for one.
+ *
+ * pressure_Pa_q10[sensor]: pressure on the pad, 1/1024 Pa, any bits. usable: bitmap of the sensors
  * to use. With fewer than four (of an array on a line, three), or no positive reading, FIT_VALID
  * stays off. */
 void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
@@ -83,10 +86,12 @@ void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10,
  * fit_grid: fixed point, for a full rectangle of FIT_GRID_COLUMNS x FIT_GRID_ROWS nodes (of the
  * build, 2 to 6 each way) with every sensor usable; sigma from 0.216 pitch.
  * fit_grid_masked: the same with any sensors missing, at twice the cost.
- * fit_general: float32, any positions, any sensors missing. */
-void fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+ * fit_general: float32, any positions, any sensors missing; leaves an outlier out by itself.
+ * The former two return whether they have settled with residuals that are rough and no noise, as
+ * with an outlier. */
+bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
               const struct fit_settings *settings, struct fit_result *result);
-void fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                      const struct fit_settings *settings, struct fit_result *result);
 void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                  const struct fit_settings *settings, struct fit_result *result);

@@ -27,9 +27,10 @@
 #define WIDEN_LIMIT 0.5f
 /* Pitches by which an iterate may leave the box that the result is held to, for the same reason. */
 #define OVERSHOOT 0.25f
-#define P0_MIN 0.05f      /* of the largest reading */
-#define P0_MAX 1e6f       /* reached 30 mm outside the array */
-#define PIVOT_FLOOR 2e-7f /* of the diagonal entry: float32 tells no less */
+#define P0_MIN 0.05f         /* of the largest reading */
+#define P0_MAX 1e6f          /* reached 30 mm outside the array */
+#define LEAST_FREE 0.015625f /* 1 - leverage, in a studentised residual */
+#define PIVOT_FLOOR 2e-7f    /* of the diagonal entry: float32 tells no less */
 
 /* Symmetric 4 x 4 and right-hand side. matrix[i][j] for j <= i. */
 struct normal_equations {
@@ -40,6 +41,7 @@ struct normal_equations {
 /* The readings that enter, in units of the largest. */
 struct samples {
   int count;
+  uint8_t sensor[FT_MAX_SENSORS];
   float x[FT_MAX_SENSORS], y[FT_MAX_SENSORS], p[FT_MAX_SENSORS];
   int32_t log2_q24[FT_MAX_SENSORS]; /* of a reading that enters the guess, else INT32_MIN */
 };
@@ -277,9 +279,42 @@ static uint32_t n_largest_of(const struct fit_array *array, const int32_t *press
   return chosen;
 }
 
-void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                 const struct fit_settings *settings, struct fit_result *result) {
+/* The sensor whose reading does not belong to the others', or -1. theta and the factors are those
+ * of the last linearisation, squares its sum of squared residuals. */
+static int outlier_of(const struct samples *samples, const struct parameters *theta,
+                      const struct normal_equations *normal, float squares, int unknowns) {
+  float log2_scale = 0.5f * LOG2_E / (theta->sigma * theta->sigma);
+  float worst = 0.0f, second = 0.0f;
+  int outlier = -1;
+  for (int k = 0; k < samples->count; k++) {
+    float x = samples->x[k] - theta->x;
+    float y = samples->y[k] - theta->y;
+    float r2 = x * x + y * y;
+    float e = fit_exp2_negative(r2 * log2_scale);
+    float residual = samples->p[k] - theta->p0 * e;
+    float row[PARAMETERS] = {e, e * x, e * y, e * r2};
+    float free = 1.0f - inverse_form(normal, row); /* of the leverage */
+    float without = residual * residual / (free > LEAST_FREE ? free : LEAST_FREE);
+    if (without > worst) {
+      second = worst;
+      worst = without;
+      outlier = samples->sensor[k];
+    } else if (without > second) {
+      second = without;
+    }
+  }
+  float others = squares > worst ? squares - worst : 0.0f;
+  bool alone = second < 0.5f * worst;
+  float freedom = (float)(samples->count - unknowns - 1);
+  return alone && others * (float)(FIT_OUTLIER * FIT_OUTLIER) < worst * freedom ? outlier : -1;
+}
+
+/* Whether the fit has settled with residuals that are rough and no noise; then outlier is the
+ * sensor that does not belong to the others, or -1. */
+static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                     const struct fit_settings *settings, struct fit_result *result, int *outlier) {
   memset(result, 0, sizeof *result);
+  *outlier = -1;
   uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
   usable &= all;
   if (usable != all) {
@@ -288,7 +323,7 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   int32_t largest = largest_reading(array, pressure_Pa_q10, usable);
   if (largest <= 0) {
     result->flags |= CONTACT_FLAG_LOW_SIGNAL;
-    return;
+    return false;
   }
   if (settings->n_largest > 0) {
     usable = n_largest_of(array, pressure_Pa_q10, usable, settings->n_largest);
@@ -309,6 +344,7 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
     if (reading == largest) {
       peak = n;
     }
+    samples.sensor[n] = k;
     samples.x[n] = array->x[k];
     samples.y[n] = array->y[k];
     samples.p[n] = clamp((float)reading * scale, -1.0f, 1.0f);
@@ -317,7 +353,7 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   }
   const int unknowns = array->is_line ? PARAMETERS - 1 : PARAMETERS;
   if (samples.count < unknowns) {
-    return;
+    return false;
   }
 
   struct parameters theta = guess(&samples, peak);
@@ -407,4 +443,28 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
     flags |= CONTACT_FLAG_AT_BOUND;
   }
   result->flags |= flags;
+  bool settled = moved * pitch <= FIT_SETTLED_mm;
+  if (!misfit || !rough || !settled) {
+    return false;
+  }
+  bool selected = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
+  if (samples.count > unknowns + 1 && !selected) {
+    *outlier = outlier_of(&samples, &before, &normal, squares, unknowns);
+  }
+  return true;
+}
+
+void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                 const struct fit_settings *settings, struct fit_result *result) {
+  int outlier;
+  fit_once(array, pressure_Pa_q10, usable, settings, result, &outlier);
+  if (outlier < 0) {
+    return;
+  }
+  struct fit_result without;
+  usable &= ~(UINT32_C(1) << outlier);
+  bool rough = fit_once(array, pressure_Pa_q10, usable, settings, &without, &outlier);
+  if (fit_outlier_gone(result, &without, rough, array->pitch_mm)) {
+    *result = without;
+  }
 }

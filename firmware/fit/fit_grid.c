@@ -373,7 +373,7 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
   state->y = fixed_clamp(y, grid->y_min + ONE_Q26 / 2, grid->y_max - ONE_Q26 / 2);
 }
 
-void fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
               const struct fit_settings *settings, struct fit_result *result) {
   const struct fit_grid_shape *grid = &array->grid;
   struct readings readings;
@@ -383,7 +383,7 @@ void fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   if (!fit_grid_take_readings(array, pressure_Pa_q10, UINT32_MAX, settings, &readings)) {
     memset(result, 0, sizeof *result);
     result->flags = CONTACT_FLAG_LOW_SIGNAL;
-    return;
+    return false;
   }
   guess(grid, &readings, &m, &state);
   system.cross = 0;
@@ -401,5 +401,5 @@ void fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   result->flags = 0;
   result->used = UINT32_MAX >> (FT_MAX_SENSORS - NODES);
   finish(&readings, &m, &system);
-  fit_grid_conclude(grid, &readings, settings, &system, &state, NODES, result);
+  return fit_grid_conclude(grid, &readings, settings, &system, &state, NODES, result);
 }

@@ -1,5 +1,6 @@
 #include "common/contact_flags.h"
 #include "fit/fit_grid_solve.h"
+#include "fit/fit_limits.h"
 
 #include <string.h>
 
@@ -454,28 +455,37 @@ static NOINLINE void evaluate(const struct readings *readings, const int32_t *un
   fit_grid_complete(readings, system);
 }
 
-void fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+/* Readings in use, which sensors are not, and how many are. False: nothing to fit. */
+static bool gather(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                   const struct fit_settings *settings, struct readings *readings, int32_t *unused,
+                   int *count) {
+  *count = 0;
+  for (int k = 0; k < NODES; k++) {
+    bool used = usable >> array->grid.sensor[k] & 1;
+    unused[k] = used ? 0 : UNUSED;
+    *count += used;
+  }
+  return fit_grid_take_readings(array, pressure_Pa_q10, usable, settings, readings);
+}
+
+bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                      const struct fit_settings *settings, struct fit_result *result) {
   const struct fit_grid_shape *grid = &array->grid;
   struct readings readings;
   int32_t unused[NODES];
-  int count = 0;
+  int count;
   memset(result, 0, sizeof *result);
-  for (int k = 0; k < NODES; k++) {
-    bool used = usable >> grid->sensor[k] & 1;
-    unused[k] = used ? 0 : UNUSED;
-    count += used;
-  }
   usable &= UINT32_MAX >> (FT_MAX_SENSORS - NODES);
+  bool positive = gather(array, pressure_Pa_q10, usable, settings, &readings, unused, &count);
   if (count < NODES) {
     result->flags = CONTACT_FLAG_SENSOR_MASKED;
   }
-  if (!fit_grid_take_readings(array, pressure_Pa_q10, usable, settings, &readings)) {
+  if (!positive) {
     result->flags |= CONTACT_FLAG_LOW_SIGNAL;
-    return;
+    return false;
   }
   if (count < 4) {
-    return;
+    return false;
   }
   struct columns columns;
   struct fit_system system;
@@ -495,5 +505,70 @@ void fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
     left--;
   } while (left > 0);
   result->used = usable;
-  fit_grid_conclude(grid, &readings, settings, &system, &state, count, result);
+  return fit_grid_conclude(grid, &readings, settings, &system, &state, count, result);
+}
+
+/* Q26, towards zero; within what fits. */
+static int32_t q26_of(float value) {
+  return value >= 16.0f    ? INT32_C(1) << 30
+         : value <= -16.0f ? -(INT32_C(1) << 30)
+                           : (int32_t)(value * 67108864.0f);
+}
+
+/* value^2 of the sum of squares, Q15. */
+static int32_t share_of(int32_t value, int32_t sum, int32_t sum_shift) {
+  value = fixed_clamp(value, -46340, 46340);
+  return port_divide((value * value) >> sum_shift, (sum >> 15) + 1);
+}
+
+int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                     const struct fit_settings *settings, const struct fit_result *result) {
+  const struct fit_grid_shape *grid = &array->grid;
+  struct readings readings;
+  int32_t unused[NODES];
+  int count;
+  if (!gather(array, pressure_Pa_q10, usable, settings, &readings, unused, &count) || count < 6) {
+    return -1;
+  }
+  float per_pitch = 1.0f / array->pitch_mm, sigma = result->sigma_mm * per_pitch;
+  uint8_t origin = grid->sensor[ORIGIN_X * ROWS + ORIGIN_Y];
+  struct fit_system system;
+  system.at.x = q26_of(result->x_mm * per_pitch - array->x[origin]);
+  system.at.y = q26_of(result->y_mm * per_pitch - array->y[origin]);
+  system.at.height =
+      fixed_clamp(q26_of(0.72134752f / (sigma * sigma)), HEIGHT_MIN_Q26, HEIGHT_MAX_Q26);
+  struct columns c;
+  c.cross = c.skew_x = c.skew_y = 0;
+  evaluate(&readings, unused, FINE, &c, &system);
+
+  uint32_t size = 1;
+  for (int k = 0; k < NODES; k++) {
+    size |= fixed_size(c.node[k].e);
+  }
+  int32_t finer = 15 - fixed_bits(size);
+  int32_t total = 0, worst = 0, second = 0;
+  int outlier = -1;
+  for (int k = 0; k < NODES; k++) {
+    const struct node *node = &c.node[k];
+    int32_t r = shifted(node->e, finer);
+    /* The columns as they are after the elimination, and with them the leverage. */
+    int32_t p2 = node->p2 - times_q12(node->p1, c.f21);
+    int32_t p3 = node->p3 - times_q12(node->p1, c.f31) - times_q12(p2, c.f32);
+    int32_t e = node->mantissa >> node->shift;
+    int32_t leverage = share_of(e, c.mass, MASS_SHIFT) + share_of(node->p1, c.norm1, NORM_SHIFT) +
+                       share_of(p2, c.norm2, NORM_SHIFT) + share_of(p3, c.norm3, NORM_SHIFT);
+    int32_t free = 32768 - leverage;
+    int32_t without = port_divide(r * r, free < 512 ? 512 : free);
+    total += (r * r) >> 15;
+    if (without > worst && unused[k] == 0) {
+      second = worst;
+      worst = without;
+      outlier = grid->sensor[k];
+    } else if (without > second) {
+      second = without;
+    }
+  }
+  int32_t others = total > worst ? total - worst : 0;
+  bool alone = second < worst >> 1;
+  return alone && others * (FIT_OUTLIER * FIT_OUTLIER) < worst * (count - 5) ? outlier : -1;
 }

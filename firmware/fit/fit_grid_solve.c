@@ -163,7 +163,7 @@ static NOINLINE void widen_for_prior(const struct readings *readings,
   }
 }
 
-void fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
+bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
                        const struct fit_settings *settings, const struct fit_system *system,
                        const struct state *state, int count, struct fit_result *result) {
   const struct state *at = &system->at;
@@ -241,8 +241,8 @@ void fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   bool narrow = state->height > NARROW_HEIGHT_Q26;
   int32_t move_x = fixed_clamp(system->move_x_q22, -(1 << 15), 1 << 15);
   int32_t move_y = fixed_clamp(system->move_y_q22, -(1 << 15), 1 << 15);
-  if (((move_x * move_x) >> 1) + ((move_y * move_y) >> 1) > grid->settled_square ||
-      scaled_to_fixed(location_sd, 16) > fit_sd_limit_mm_q16(misfit, narrow, rough)) {
+  bool settled = ((move_x * move_x) >> 1) + ((move_y * move_y) >> 1) <= grid->settled_square;
+  if (!settled || scaled_to_fixed(location_sd, 16) > fit_sd_limit_mm_q16(misfit, narrow, rough)) {
     flags |= CONTACT_FLAG_UNCERTAIN;
   }
   if (scaled_sub(scaled_mul(square_sum, MODEL_INVERSE_SQUARE), total).mantissa > 0) {
@@ -254,4 +254,5 @@ void fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
     flags |= CONTACT_FLAG_AT_BOUND;
   }
   result->flags |= flags;
+  return misfit && rough && settled;
 }

@@ -82,9 +82,15 @@ FIXED_INLINE void fit_grid_complete(const struct readings *readings, struct fit_
 void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system,
                    struct state *state);
 
-/* From the last system and the state after its step; used: bitmap of the sensors. */
-void fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
+/* The result from the last system and the state after its step; count: of the sensors in use.
+ * Returns
+ * whether it has settled with residuals that are rough and no noise. */
+bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
                        const struct fit_settings *settings, const struct fit_system *system,
                        const struct state *state, int count, struct fit_result *result);
+
+/* The sensor whose reading does not belong to the others', or -1; result: the fit to them all. */
+int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                     const struct fit_settings *settings, const struct fit_result *result);
 
 #endif

@@ -2,6 +2,7 @@
 #ifndef FIT_FIT_LIMITS_H
 #define FIT_FIT_LIMITS_H
 
+#include "common/contact_flags.h"
 #include "fit/fit.h"
 
 #include <stdbool.h>
@@ -15,6 +16,13 @@
 #define FIT_FLAT_SIGMA 4.9f     /* pitches */
 #define FIT_LOW_SIGNAL_SIGMA 20 /* noise standard deviations in the largest reading */
 #define FIT_HUGE 1e9f           /* stands for: nothing is known */
+
+/* A sensor is an outlier if its studentised residual, in standard deviations that the others'
+ * suggest, exceeds FIT_OUTLIER and leaving it out brings the residuals below the share
+ * FIT_OUTLIER_GAIN. It is looked for where the fit has settled with
+ * residuals that are rough and no noise. */
+#define FIT_OUTLIER 15
+#define FIT_OUTLIER_GAIN 0.5f
 
 /* Largest predicted standard deviation of the location that passes without a warning, mm in Q16.
  *
@@ -37,6 +45,21 @@ static inline bool fit_has_prior(const struct fit_settings *settings) {
   return settings->prior_width_mm >= FIT_PRIOR_WIDTH_MIN_mm &&
          settings->prior_width_mm <= FIT_PRIOR_MAX_mm && settings->prior_sigma_mm >= 0.0f &&
          settings->prior_sigma_mm <= FIT_PRIOR_MAX_mm;
+}
+
+/* Whether the fit without an outlier is the better one; rough: its residuals still are. An outlier
+ * above the others takes the place of a narrow press and makes others outliers: that is uncertain.
+ */
+static inline bool fit_outlier_gone(const struct fit_result *with, struct fit_result *without,
+                                    bool rough, float pitch_mm) {
+  if (!(without->flags & CONTACT_FLAG_FIT_VALID) ||
+      !(without->residual_rms_Pa < FIT_OUTLIER_GAIN * with->residual_rms_Pa)) {
+    return false;
+  }
+  if (rough || without->sigma_mm < FIT_NARROW_SIGMA * pitch_mm) {
+    without->flags |= CONTACT_FLAG_UNCERTAIN;
+  }
+  return true;
 }
 
 #endif

@@ -69,6 +69,14 @@ KernelResult grid(const fit_array &array, const std::int32_t *pressure_Pa_q10, s
   return widened(result);
 }
 
+KernelResult masked(const fit_array &array, const std::int32_t *pressure_Pa_q10,
+                    std::uint32_t usable, const KernelSettings &settings) {
+  const fit_settings chip = chip_settings(settings);
+  fit_result result;
+  fit_grid_masked(&array, pressure_Pa_q10, usable, &chip, &result);
+  return widened(result);
+}
+
 KernelResult general(const fit_array &array, const std::int32_t *pressure_Pa_q10,
                      std::uint32_t usable, const KernelSettings &settings) {
   const fit_settings chip = chip_settings(settings);
@@ -114,6 +122,7 @@ const std::vector<Kernel> &all_kernels() {
   static const std::vector<Kernel> kernels{
       {"fit", ANY_SUBSET | PRIOR, fit},
       {"grid", PRIOR, grid},
+      {"masked", ANY_SUBSET | PRIOR, masked},
       {"general", ANY_SUBSET | N_LARGEST | PRIOR, general},
       {"double", ANY_SUBSET | N_LARGEST | PRIOR | GUESSES | FIRMWARE_GUESS, in_double},
       {"separable", 0, separable},

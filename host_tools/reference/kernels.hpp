@@ -55,6 +55,7 @@ struct Kernel {
 
 // fit      fit_gaussian, as the firmware calls it: it picks the kernel and masks outliers
 // grid     the firmware's kernel for a full rectangle, fixed point
+// masked   the one for such a rectangle with sensors missing, fixed point
 // general  its kernel for any layout, float32
 // double   the general kernel's iteration in double precision, same guess and limits: what is left
 //          between it and the reference is the optimiser's doing, the rest is rounding

@@ -15,6 +15,8 @@ import { Bench } from '../../host_tools/reference/on_chip/fit_on_chip.mjs';
 const COLD_CYCLES_MAX = 31000;
 /** The same without some of the sensors. */
 const MASKED_CYCLES_MAX = 60000;
+/** A fit that finds an outlier: the fit, the search, and the fit without it. */
+const OUTLIER_CYCLES_MAX = 110000;
 /** Between the cheapest and the dearest press, share of the dearest. */
 const SPREAD_MAX = 0.05;
 
@@ -45,8 +47,8 @@ const garbage = [
 ];
 
 const ALL = 2 ** SENSORS - 1;
-const cyclesOf = (readings, iterations = 7, usable = ALL) =>
-  bench.run({ kernel: 'fit', iterations, noise_Pa_q10: 4096, usable, readings }).cycles;
+const cyclesOf = (readings, iterations = 7, usable = ALL, kernel = 'grid') =>
+  bench.run({ kernel, iterations, noise_Pa_q10: 4096, usable, readings }).cycles;
 /** One to three sensors missing, the one with the largest reading among them every other time. */
 function maskFor(readings, i) {
   let usable = ALL;
@@ -57,11 +59,14 @@ function maskFor(readings, i) {
 /** Without a positive reading there is nothing to fit. */
 const anyPositive = (readings, usable) => readings.some((value, k) => value > 0 && (usable >> k) & 1);
 
-for (const [what, limit, usable] of [['every sensor', COLD_CYCLES_MAX, () => ALL], ['sensors missing', MASKED_CYCLES_MAX, maskFor]]) {
+for (const [what, kernel, limit, usable] of [
+  ['every sensor', 'grid', COLD_CYCLES_MAX, () => ALL],
+  ['sensors missing', 'masked', MASKED_CYCLES_MAX, maskFor],
+]) {
   test(`${what}: no press and no garbage takes more than ${limit} cycles, nor much less`, (t) => {
     for (const [name, list] of Object.entries({ presses, garbage })) {
       const inputs = list.map((readings, i) => [readings, usable(readings, i)]).filter((input) => anyPositive(...input));
-      const cycles = inputs.map(([readings, mask]) => cyclesOf(readings, 7, mask)).sort((a, b) => a - b);
+      const cycles = inputs.map(([readings, mask]) => cyclesOf(readings, 7, mask, kernel)).sort((a, b) => a - b);
       const [min, median, max] = [cycles[0], cycles[cycles.length >> 1], cycles[cycles.length - 1]];
       t.diagnostic(`${name}: ${min} ${median} ${max} cycles (min, median, max)`);
       assert.ok(max <= limit, `${name}: ${max}`);
@@ -69,6 +74,15 @@ for (const [what, limit, usable] of [['every sensor', COLD_CYCLES_MAX, () => ALL
     }
   });
 }
+
+test(`a fit with an outlier takes at most ${OUTLIER_CYCLES_MAX} cycles`, (t) => {
+  const wrong = presses.map((readings, i) => readings.map((value, k) => value + (k === i % SENSORS ? 10000 * 1024 : 0)));
+  const cycles = wrong.map((readings) => cyclesOf(readings, 7, ALL, 'fit')).sort((a, b) => a - b);
+  const max = cycles[cycles.length - 1];
+  t.diagnostic(`${cycles[0]} ${cycles[cycles.length >> 1]} ${max} cycles (min, median, max)`);
+  assert.ok(max <= OUTLIER_CYCLES_MAX, `${max}`);
+  assert.ok(max > MASKED_CYCLES_MAX, 'none of the outliers was found');
+});
 
 test('the same press takes the same cycles, whatever came before', () => {
   const before = cyclesOf(presses[0]);

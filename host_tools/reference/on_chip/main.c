@@ -1,5 +1,5 @@
-/* An image that fits what it is told to, for counting cycles in the emulator: fit_on_chip.mjs beside
- * this file is its other half and plays the debugger that the breakpoints call.
+/* An image that fits what it is told to, for counting cycles in the emulator: fit_on_chip.mjs
+ * beside this file is its other half and plays the debugger that the breakpoints call.
  */
 #include "alternatives/alternatives.h"
 #include "config/geometry.h"
@@ -43,6 +43,12 @@ static void grid(void) {
   job.y_mm = result.y_mm;
 }
 
+static void masked(void) {
+  fit_grid_masked(&array, job.pressure_Pa_q10, job.usable, &settings, &result);
+  job.x_mm = result.x_mm;
+  job.y_mm = result.y_mm;
+}
+
 static void general(void) {
   fit_general(&array, job.pressure_Pa_q10, job.usable, &settings, &result);
   job.x_mm = result.x_mm;
@@ -53,8 +59,8 @@ static void general(void) {
   static void name(void) {                                                                         \
     const struct alternative_settings chosen = {(int)job.iterations,                               \
                                                 (enum alternative_guess)job.guess};                \
-    struct alternative_fit_##real found = alternative_##solver##_##real(                           \
-        &array, job.pressure_Pa_q10, job.usable, &chosen);                                         \
+    struct alternative_fit_##real found =                                                          \
+        alternative_##solver##_##real(&array, job.pressure_Pa_q10, job.usable, &chosen);           \
     job.x_mm = (float)found.x_mm;                                                                  \
     job.y_mm = (float)found.y_mm;                                                                  \
   }
@@ -64,7 +70,7 @@ ALTERNATIVE(lm_float, lm, float)
 ALTERNATIVE(lm_double, lm, double)
 
 /* The order is that of KERNELS in fit_on_chip.mjs. */
-static void (*const kernels[])(void) = {nothing,     fit,          grid,     general,
+static void (*const kernels[])(void) = {nothing,     fit,          grid,     masked,   general,
                                         naive_float, naive_double, lm_float, lm_double};
 
 int main(void) {

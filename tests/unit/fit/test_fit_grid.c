@@ -176,6 +176,58 @@ static void too_few_sensors_give_no_fit(void) {
   }
 }
 
+/* One sensor of a clean press reads 10 kPa too much or too little. */
+static void an_outlier_is_left_out(bool by_the_general_kernel) {
+  struct random random = {29};
+  int found = 0, others = 0, unwarned = 0;
+  const int presses = 2000;
+  for (int i = 0; i < presses; i++) {
+    random_press(&random, 4.5, 12.0);
+    struct fit_result clean, result;
+    fit_gaussian(&array, readings, ALL, &usual, &clean);
+    uint32_t wrong = random_below(&random, SENSORS);
+    readings[wrong] += (i % 2 ? 1 : -1) * 10000 * 1024;
+    if (by_the_general_kernel) {
+      fit_general(&array, readings, ALL, &usual, &result);
+    } else {
+      fit_gaussian(&array, readings, ALL, &usual, &result);
+    }
+    float moved_mm = hypotf(result.x_mm - clean.x_mm, result.y_mm - clean.y_mm);
+    bool masked = result.flags & CONTACT_FLAG_SENSOR_MASKED;
+    TEST_ASSERT_EQUAL(masked, result.used != ALL);
+    found += result.used == (ALL & ~(UINT32_C(1) << wrong)) && moved_mm < 0.2f;
+    others += masked && result.used != (ALL & ~(UINT32_C(1) << wrong));
+    const uint32_t warnings = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND |
+                              CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL;
+    unwarned += moved_mm > 1.0f && !(result.flags & warnings);
+  }
+  char text[100];
+  snprintf(text, sizeof text, "of %d outliers %d found, %d others left out, %d unwarned", presses,
+           found, others, unwarned);
+  TEST_MESSAGE(text);
+  TEST_ASSERT_GREATER_THAN_INT(presses * 3 / 5, found);
+  TEST_ASSERT_LESS_THAN_INT(presses / 20, others);
+  TEST_ASSERT_LESS_THAN_INT(presses / 100, unwarned);
+}
+
+static void the_grid_kernels_leave_an_outlier_out(void) {
+  an_outlier_is_left_out(false);
+}
+
+static void the_general_kernel_leaves_an_outlier_out(void) {
+  an_outlier_is_left_out(true);
+}
+
+static void no_sensor_of_a_clean_press_is_left_out(void) {
+  struct random random = {31};
+  for (int i = 0; i < 5000; i++) {
+    random_press(&random, 4.0, 15.0);
+    struct fit_result result;
+    fit_gaussian(&array, readings, ALL, &usual, &result);
+    TEST_ASSERT_EQUAL_HEX32(ALL, result.used);
+  }
+}
+
 static void scaling_the_readings_scales_the_pressures_alone(void) {
   struct random random = {5};
   random_press(&random, 5.0, 6.0);
@@ -335,6 +387,9 @@ int main(void) {
   RUN_TEST(without_a_mask_both_grid_kernels_agree);
   RUN_TEST(what_a_masked_sensor_reads_changes_nothing);
   RUN_TEST(too_few_sensors_give_no_fit);
+  RUN_TEST(the_grid_kernels_leave_an_outlier_out);
+  RUN_TEST(the_general_kernel_leaves_an_outlier_out);
+  RUN_TEST(no_sensor_of_a_clean_press_is_left_out);
   RUN_TEST(scaling_the_readings_scales_the_pressures_alone);
   RUN_TEST(more_iterations_come_nearer);
   RUN_TEST(a_fit_that_still_moves_says_so);

@@ -34,8 +34,8 @@ void setUp(void) {}
 
 void tearDown(void) {}
 
-static void make_array(struct fit_array *array, uint8_t count, const float *x_mm,
-                       const float *y_mm, float pitch_mm) {
+static void make_array(struct fit_array *array, uint8_t count, const float *x_mm, const float *y_mm,
+                       float pitch_mm) {
   TEST_ASSERT_EQUAL(FT_OK, fit_array_init(array, count, x_mm, y_mm, pitch_mm));
 }
 
@@ -89,8 +89,8 @@ static int32_t to_int32(double value) {
 }
 
 static int32_t extreme(struct random *random) {
-  static const int32_t values[] = {INT32_MIN, INT32_MIN + 1, -1, 0, 1, 2, INT32_MAX - 1, INT32_MAX,
-                                   1 << 27,   1 << 28,       1 << 30};
+  static const int32_t values[] = {INT32_MIN,     INT32_MIN + 1, -1,      0,       1,      2,
+                                   INT32_MAX - 1, INT32_MAX,     1 << 27, 1 << 28, 1 << 30};
   return values[random_below(random, sizeof values / sizeof *values)];
 }
 
@@ -210,7 +210,12 @@ static const char *complaint(const struct input *input, const struct fit_result 
   if (result->flags & ~(always | warnings)) {
     return "an undefined flag";
   }
-  if (!(result->flags & CONTACT_FLAG_SENSOR_MASKED) != ((input->usable & all) == all)) {
+  const uint8_t n = input->settings.n_largest;
+  const bool selected = n > 0 && n < array->sensor_count;
+  const bool outlier = (result->flags & CONTACT_FLAG_FIT_VALID) && !selected &&
+                       result->used != (input->usable & all);
+  const bool masked = outlier || (input->usable & all) != all;
+  if (!(result->flags & CONTACT_FLAG_SENSOR_MASKED) == masked) {
     return "SENSOR_MASKED";
   }
   if (!(result->flags & CONTACT_FLAG_FIT_VALID)) {
