@@ -25,6 +25,16 @@ if(NOT FINGERTIP_FIT_ITERATIONS MATCHES "^([1-9]|1[0-9]|20)$")
   message(FATAL_ERROR "FINGERTIP_FIT_ITERATIONS=${FINGERTIP_FIT_ITERATIONS} must be a whole number from 1 to 20")
 endif()
 
+# Prior on the width of the contact, for rubber so stiff that the array can hardly tell it: the sigma
+# that the pad gives (about 0.45 of the rubber's thickness) and how sure that is. 0: none.
+set(FINGERTIP_PRIOR_SIGMA_UM 0 CACHE STRING "Prior on sigma, micrometres; 0 for none")
+set(FINGERTIP_PRIOR_WIDTH_UM 500 CACHE STRING "Standard deviation of that prior, micrometres")
+foreach(option FINGERTIP_PRIOR_SIGMA_UM FINGERTIP_PRIOR_WIDTH_UM)
+  if(NOT ${option} MATCHES "^[0-9]+$" OR ${option} GREATER 1000000)
+    message(FATAL_ERROR "${option}=${${option}} must be a whole number of micrometres, at most 1000000")
+  endif()
+endforeach()
+
 # 1209:0001 is the pid.codes id for tests: a product needs its own.
 set(FINGERTIP_USB_VID 0x1209 CACHE STRING "USB vendor id")
 set(FINGERTIP_USB_PID 0x0001 CACHE STRING "USB product id")

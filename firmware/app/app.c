@@ -38,6 +38,8 @@ void app_start(struct app *app, const struct array_bus *bus) {
   app->rate_mHz = DEFAULT_RATE_mHz;
   app->fit_settings.iterations = DEFAULT_FIT_ITERATIONS;
   app->fit_settings.n_largest = DEFAULT_FIT_N_LARGEST;
+  app->fit_settings.prior_sigma_mm = DEFAULT_PRIOR_SIGMA_mm;
+  app->fit_settings.prior_width_mm = DEFAULT_PRIOR_WIDTH_mm;
   app->contact_settings.slip_threshold_mm = DEFAULT_SLIP_THRESHOLD_mm;
   app->contact_settings.slip_window_us = DEFAULT_SLIP_WINDOW_ms * 1000u;
   condition_tare(&app->condition);

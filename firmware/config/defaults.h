@@ -21,4 +21,9 @@
 #define DEFAULT_FIT_ITERATIONS FINGERTIP_FIT_ITERATIONS
 #define DEFAULT_FIT_N_LARGEST 0u /* all: the others only add accuracy */
 
+/* Width 0 is no prior. */
+#define DEFAULT_PRIOR_SIGMA_mm (0.001f * FINGERTIP_PRIOR_SIGMA_UM)
+#define DEFAULT_PRIOR_WIDTH_mm                                                                     \
+  (FINGERTIP_PRIOR_SIGMA_UM > 0 ? 0.001f * FINGERTIP_PRIOR_WIDTH_UM : 0.0f)
+
 #endif
