@@ -281,7 +281,7 @@ static NOINLINE void finish(const struct readings *readings, const struct moment
   system->mass_q20 = fixed_mul_q32(m->x.mass_q26, m->y.mass_q26);
   system->rise_q22 = fit_grid_rise(at->height, m->x.offset, m->y.offset);
   int32_t squares = 0;
-  for (int k = 0; k < NODES; k++) {
+  UNROLL for (int k = 0; k < NODES; k++) {
     int32_t r = readings->residual[k] >> 2;
     squares += r * r;
   }

@@ -54,7 +54,10 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
   const uint8_t *sensor = array->grid.sensor;
   int32_t largest = 0;
   for (int k = 0; k < NODES; k++) {
-    int32_t value = usable >> sensor[k] & 1 ? pressure_Pa_q10[sensor[k]] : 0;
+    int32_t value = pressure_Pa_q10[sensor[k]];
+    if (usable != UINT32_MAX && !(usable >> sensor[k] & 1)) {
+      value = 0;
+    }
     readings->q28[k] = value;
     largest = value > largest ? value : largest;
   }

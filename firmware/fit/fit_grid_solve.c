@@ -147,7 +147,8 @@ FIXED_INLINE struct scaled scaled_top(int32_t value, int32_t exponent) {
 
 /* square_sum / count */
 FIXED_INLINE struct scaled scaled_mean(struct scaled sum, int count) {
-  return scaled_mul(sum, scaled_from(port_divide(1 << 20, count), -20));
+  int32_t up = count >= 8 ? 18 : 15; /* 13 bits at least */
+  return scaled_mul(sum, (struct scaled){port_divide((1 << up) - 1, count), -up});
 }
 
 /* Raises the inverse of d3 to that by which the variance of a reading gives that of c3: the prior's
