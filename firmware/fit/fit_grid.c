@@ -147,7 +147,7 @@ FIXED_INLINE void set_polynomials(struct factor *f, int nodes, int origin) {
   f->constant = fixed_mul_q26(f->slope, f->mean) - mean_square;
   UNROLL for (int i = 0; i < nodes; i++) {
     int32_t k = i - origin;
-    f->square[i] = fixed_mul_q28(f->g[i], k * k * ONE_Q26 - k * f->slope + f->constant);
+    f->square[i] = fixed_mul_near_q28(f->g[i], k * k * ONE_Q26 - k * f->slope + f->constant);
   }
 }
 
@@ -243,7 +243,7 @@ static NOINLINE void project(const struct moments *m, const int32_t *values, int
   system->b3 = (struct scaled){(b3_x >> 1) + (b3_y >> 1), q + 1 - m->square_q}; /* one bit more */
 }
 
-static NOINLINE void evaluate(struct readings *readings, bool coarse, struct moments *m,
+FIXED_INLINE void evaluate(struct readings *readings, bool coarse, struct moments *m,
                               struct fit_system *system) {
   const struct state *at = &system->at;
   set_gaussian(&m->x, COLUMNS, COLUMNS / 2, at->x, at->height);

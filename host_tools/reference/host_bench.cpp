@@ -30,8 +30,8 @@ usage: fit_bench [--limit N] [--passes N] [--seed S] [--out DIR] [--cache DIR]
 Takes the observable ones of the first N presses (12 000 by default, the sets A to D mixed), cuts
 them into blocks and lets every kernel fit block after block, in an order that rotates, so that all
 of them see the same machine. A fit starts at the readings as the firmware receives them and ends at
-location, peak, width and force. Kernels that run a number of iterations run seven, separable eight,
-which leaves it no more error than any library, separable_6 six; what those do is in reference/libraries.hpp. Writes
+location, peak, width and force. Kernels that run a number of iterations run seven; separable goes on until it has settled, twelve at
+the most, which leaves it no more error than any library; what those do is in reference/libraries.hpp. Writes
 fit_bench.csv and .json to --out, prints:
   us          processor time of one fit: median over blocks and passes, 10 % and 90 % quantiles
   ratio       the same block's time by this kernel over that by separable: median, 10 %, 90 %
@@ -42,19 +42,12 @@ Times depend on the machine and its load; the ratios are what is comparable.
 
 constexpr std::size_t BLOCK = 400;
 constexpr int ITERATIONS = 7;
-// The kernel made for the host, which the others are compared with, and the iterations that leave
-// it no more error than any library.
+// The kernel made for the host, which the others are compared with, and its most iterations.
 constexpr char HOST_KERNEL[] = "separable";
-constexpr int HOST_ITERATIONS = 8;
-// The same with fewer, still no more error than the libraries that stop early.
-constexpr char HOST_KERNEL_SHORT[] = "separable_6";
-constexpr int HOST_ITERATIONS_SHORT = 6;
+constexpr int HOST_ITERATIONS = 12;
 
 int iterations_of(const char *kernel) {
-  if (std::strcmp(kernel, HOST_KERNEL) == 0) {
-    return HOST_ITERATIONS;
-  }
-  return std::strcmp(kernel, HOST_KERNEL_SHORT) == 0 ? HOST_ITERATIONS_SHORT : ITERATIONS;
+  return std::strcmp(kernel, HOST_KERNEL) == 0 ? HOST_ITERATIONS : ITERATIONS;
 }
 
 struct Measured {
@@ -162,9 +155,6 @@ int bench(int argc, char **argv) {
   std::stable_partition(kernels.begin(), kernels.end(), [](const Kernel &kernel) {
     return std::strcmp(kernel.name, HOST_KERNEL) == 0;
   });
-  Kernel shorter = kernels.front();
-  shorter.name = HOST_KERNEL_SHORT;
-  kernels.insert(kernels.begin() + 1, shorter);
   for (const Kernel &kernel : reference::library_kernels()) {
     kernels.push_back(kernel);
   }

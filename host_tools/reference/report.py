@@ -131,21 +131,12 @@ GOALS = (
     ("speed_vs_cminpack", ">=", 6), ("recordings_median_mm", "<=", 0.12))
 
 
-def no_more_error(host, kernels, library):
-    """The first of the kernels whose error on the host is no larger than the library's, or the last."""
-    for name in kernels:
-        if all(host[name][error] <= host[library][error] for error in ("p999_um", "above_100um")):
-            return name
-    return kernels[-1]
-
-
 def figures(results):
     """fit.json. Masked: one random sensor, or the peak sensor, is unusable for the reference too."""
     r = results
     ours = r.bench["rows"][0]["kernel"]  # what fit_bench compares the others with
     libraries = ("ceres_reused", "tiny_solver", "cminpack")
-    speed_of = {name: no_more_error(r.host, (f"{ours}_6", ours), name) for name in libraries}
-    speed = {name: r.host[name]["ratio"] / r.host[speed_of[name]]["ratio"] for name in libraries}
+    speed = {name: r.host[name]["ratio"] for name in libraries}
     found = {
         "observable_presses": sum(r.error("fit", USUAL, s, "presses") for s in SETS),
         "p99_9_um": r.worst("fit", USUAL, "p999_um"),
@@ -171,8 +162,7 @@ def figures(results):
         "speed_vs_ceres": speed["ceres_reused"],
         "speed_vs_tinysolver": speed["tiny_solver"],
         "speed_vs_cminpack": speed["cminpack"],
-        "speed_of": speed_of,
-        "host_p99_9_um": {name: r.host[name]["p999_um"] for name in (ours, f"{ours}_6", *speed)},
+        "host_p99_9_um": {name: r.host[name]["p999_um"] for name in (ours, *speed)},
         "recordings_median_mm": None if r.recordings is None else r.recordings["median_mm"],
         "seed": r.seed,
         "processor": r.bench["processor"],

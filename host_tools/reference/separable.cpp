@@ -28,6 +28,9 @@ constexpr double GUESS_WEIGHT = 0.003;
 constexpr double GUESS_HEIGHT = 2.47; // sigma 0.45 pitch
 constexpr double GUESS_HEIGHT_MIN = 0.07, GUESS_HEIGHT_MAX = 3.8;
 
+// A step this short, in pitches and in shares of sigma, is the last: what is left is shorter still.
+constexpr double SETTLED = 3e-8;
+
 using Readings = double[COLUMNS][ROWS]; // in units of the largest
 
 // To 1e-11: an error of an exponential here moves location and width as little as itself, and leaves
@@ -48,6 +51,21 @@ inline double quick_exp(double x) {
   double power;
   std::memcpy(&power, &bits, sizeof power);
   return value * power;
+}
+
+// To 2e-5, for 0.08 < x <= 1. The exponent is taken such that the mantissa lies in 2/3 .. 4/3; the
+// polynomial is least squares over Chebyshev nodes of that interval.
+inline float rough_log(float x) {
+  std::int32_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  const std::int32_t exponent = (bits - 0x3f2aaaab) >> 23;
+  bits -= static_cast<std::int32_t>(static_cast<std::uint32_t>(exponent) << 23);
+  float mantissa;
+  std::memcpy(&mantissa, &bits, sizeof mantissa);
+  const float f = mantissa - 1.0F;
+  const float series =
+      1.0000072F + f * (-0.49927367F + f * (0.33219161F + f * (-0.2753717F + f * 0.22646900F)));
+  return static_cast<float>(exponent) * 0.6931472F + f * series;
 }
 
 // Orthogonal polynomials on the nodes first, first + 1, .. under the weights g^2, times g.
@@ -124,7 +142,7 @@ template <int N> struct Parabola {
       const double ratio = marginal[i] * scale;
       axis.g[i] = ratio >= GUESS_SHARE ? ratio : 0.0;
       const auto counting = static_cast<float>(std::max(ratio, GUESS_SHARE));
-      weighted[i] = axis.g[i] * static_cast<double>(std::log(counting));
+      weighted[i] = axis.g[i] * static_cast<double>(rough_log(counting));
     }
     axis.orthogonalise(first);
     double sum = 0.0;
@@ -161,7 +179,8 @@ State guess(const Readings &p, int peak_column, int peak_row) {
           within(y.axis.kappa * 0.5 + y.linear * half, FIRST_ROW, ROWS, 1.0), height, 1.0};
 }
 
-void step(const Readings &p, bool last, State *state) {
+// Returns whether it was the last.
+bool step(const Readings &p, bool last, State *state) {
   Axis<COLUMNS> x;
   Axis<ROWS> y;
   const double decay = quick_exp(-state->height);
@@ -197,6 +216,7 @@ void step(const Readings &p, bool last, State *state) {
   const double excess = std::max(std::max(std::abs(dx), std::abs(dy)) * (1.0 / MOVE_LIMIT),
                                  std::abs(ratio) * (1.0 / WIDEN_LIMIT));
   const double share = excess > 1.0 ? 1.0 / excess : 1.0;
+  last = last || excess < SETTLED;
   if (last) {
     const double at_x = state->x - x.mean, at_y = state->y - y.mean;
     const double change = c1 * at_x + c2 * at_y +
@@ -209,6 +229,7 @@ void step(const Readings &p, bool last, State *state) {
   state->y = within(state->y + share * dy, FIRST_ROW, ROWS, MARGIN + OVERSHOOT);
   const double growth = 1.0 + share * ratio;
   state->height = std::clamp(state->height / (growth * growth), HEIGHT_MIN, HEIGHT_MAX);
+  return last;
 }
 
 } // namespace
@@ -237,8 +258,9 @@ KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q
     p[n / ROWS][n % ROWS] = std::max(pressure_Pa_q10[grid.sensor[n]] * scale, -1.0);
   }
   State state = guess(p, peak / ROWS, peak % ROWS);
-  for (int i = 0; i < settings.iterations; i++) {
-    step(p, i + 1 == settings.iterations, &state);
+  int left = settings.iterations;
+  while (left > 0 && !step(p, left == 1, &state)) {
+    left--;
   }
   state.x = within(state.x, FIRST_COLUMN, COLUMNS, MARGIN);
   state.y = within(state.y, FIRST_ROW, ROWS, MARGIN);

@@ -5,7 +5,7 @@
 // 1, q1, q2 that are orthogonal under gx^2 and gy^2, the Gauss-Newton basis 1, x, y, x^2 + y^2
 // becomes 1, p1, q1, p2 + q2: orthogonal, so that there is no matrix to solve. Three exponentials
 // give all eight g, and the amplitude is always the best for the shape. Steps are limited as in the
-// general kernel.
+// general kernel. It stops when it has settled: settings.iterations is the most it takes.
 #pragma once
 
 #include "reference/kernels.hpp"

@@ -12,7 +12,7 @@ import { Prng } from '../../host_tools/emulator/prng.mjs';
 import { Bench } from '../../host_tools/reference/on_chip/fit_on_chip.mjs';
 
 /** Seven iterations from cold, with everything: readings, guess, amplitude, force, covariance, flags. */
-const COLD_CYCLES_MAX = 31000;
+const COLD_CYCLES_MAX = 30000;
 /** The same without some of the sensors. */
 const MASKED_CYCLES_MAX = 60000;
 /** A fit that finds an outlier: the fit, the search, and the fit without it. */
