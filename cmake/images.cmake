@@ -2,7 +2,7 @@
 # compiler into build/BOARD, exactly as `cmake --preset BOARD` does.
 include(ExternalProject)
 
-set(FINGERTIP_IMAGES pico_mux CACHE STRING "Boards whose image the tests run in the emulator; empty for none")
+set(FINGERTIP_IMAGES pico_mux pico_parallel CACHE STRING "Boards whose image the tests run in the emulator; empty for none")
 
 foreach(board IN LISTS FINGERTIP_IMAGES)
   set(image_dir ${CMAKE_SOURCE_DIR}/build/${board})

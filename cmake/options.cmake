@@ -1,6 +1,6 @@
 # What is built: a board, a scene, and the identity that the image carries.
 
-set(FINGERTIP_BOARDS native pico_mux)
+set(FINGERTIP_BOARDS native pico_mux pico_parallel)
 set(FINGERTIP_BOARD native CACHE STRING "Board: one of ${FINGERTIP_BOARDS}")
 set_property(CACHE FINGERTIP_BOARD PROPERTY STRINGS ${FINGERTIP_BOARDS})
 if(NOT FINGERTIP_BOARD IN_LIST FINGERTIP_BOARDS)

@@ -28,4 +28,7 @@ void gpio_drive(unsigned pin, bool enabled);
 /* The level on the pad, whatever its function. */
 bool gpio_read(unsigned pin);
 
+/* Of all pins at one moment: bitmap of those that are high. */
+uint32_t gpio_read_all(void);
+
 #endif

@@ -37,7 +37,7 @@ def rules_for(path):
             (r"\b(malloc|calloc|realloc|free)\s*\(", "the firmware does not allocate"),
             (r"#include\s+<(stdio|stdlib)\.h>", "the firmware uses no stdio and no stdlib"),
             (r"\b0x(400|501|d00)[0-9A-Fa-f]{5}\b", "register addresses belong under boards/"),
-            (r'#include\s+"(native|rp2040|pico_mux|reference|libfingertip)/', "the firmware does not reach into boards or host tools"),
+            (r'#include\s+"(native|rp2040|pico_mux|pico_parallel|reference|libfingertip)/', "the firmware does not reach into boards or host tools"),
         ]
     return [(re.compile(pattern), message) for pattern, message in rules]
 

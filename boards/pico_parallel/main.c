@@ -1,0 +1,23 @@
+#include "app/app.h"
+#include "pico_parallel/parallel_bus.h"
+#include "port/port.h"
+
+static struct parallel_bus parallel_bus;
+static struct array_bus array_bus;
+static struct app app;
+
+static void on_event(void *context) {
+  (void)context;
+  app_on_event(&app);
+}
+
+int main(void) {
+  if (parallel_bus_init(&parallel_bus, &array_bus) != FT_OK) {
+    port_panic();
+  }
+  port_set_event_handler(on_event, 0);
+  app_start(&app, &array_bus);
+  for (;;) {
+    app_run(&app);
+  }
+}

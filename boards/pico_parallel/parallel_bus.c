@@ -1,0 +1,178 @@
+#include "pico_parallel/parallel_bus.h"
+
+#include "rp2040/wave_player.h"
+
+#include <string.h>
+
+/* For the way from the interrupt to the event handler */
+#define MARGIN_us 100u
+#define FREE_INTERVAL_MAX 1024u
+
+static unsigned count_bits(unsigned bitmap) {
+  unsigned bits = 0;
+  for (; bitmap != 0; bitmap &= bitmap - 1) {
+    bits++;
+  }
+  return bits;
+}
+
+static void play(struct parallel_bus *bus, const uint16_t steps[][WAVE_STEPS_PER_CELL],
+                 unsigned cell_count, uint64_t now_us) {
+  bus->deadline_us = now_us + cell_count * WAVE_CELL_ns / 1000u + MARGIN_us;
+  wave_player_start(steps[0], bus->samples, cell_count);
+}
+
+static void play_operation(struct parallel_bus *bus, uint64_t now_us) {
+  if (bus->operation == PARALLEL_BUS_COMMAND) {
+    play(bus, bus->command_steps, I2C_WAVE_COMMAND_CELLS, now_us);
+  } else {
+    play(bus, bus->read_steps, bus->read_cells, now_us);
+  }
+}
+
+static void play_recovery(struct parallel_bus *bus, uint16_t lines, uint64_t now_us) {
+  i2c_wave_recovery(bus->recovery_steps, lines);
+  play(bus, bus->recovery_steps, I2C_WAVE_RECOVERY_CELLS, now_us);
+}
+
+/* Whether this command is one before which the stuck lines get their clocks. */
+static bool must_free(struct parallel_bus *bus) {
+  if (bus->stuck == 0) {
+    bus->free_interval = 1;
+    bus->free_wait = 0;
+    return false;
+  }
+  if (bus->free_wait > 0) {
+    bus->free_wait--;
+    return false;
+  }
+  bus->free_wait = bus->free_interval;
+  if (bus->free_interval < FREE_INTERVAL_MAX) {
+    bus->free_interval = (uint16_t)(2 * bus->free_interval);
+  }
+  return true;
+}
+
+static enum ft_status start_command(void *context, uint8_t command, uint64_t now_us) {
+  struct parallel_bus *bus = context;
+  if (bus->operation != PARALLEL_BUS_IDLE) {
+    return FT_ERR_BUSY;
+  }
+  bus->operation = PARALLEL_BUS_COMMAND;
+  if (bus->failed) {
+    return FT_OK;
+  }
+  if (command != bus->command) {
+    bus->command = command;
+    i2c_wave_set_command(bus->command_steps, command);
+  }
+  bus->freeing = must_free(bus);
+  if (bus->freeing) {
+    play_recovery(bus, bus->stuck, now_us);
+  } else {
+    play_operation(bus, now_us);
+  }
+  return FT_OK;
+}
+
+static enum ft_status start_read(void *context, uint8_t command, uint8_t byte_count,
+                                 uint64_t now_us) {
+  struct parallel_bus *bus = context;
+  if (byte_count < 1 || byte_count > ARRAY_BUS_MAX_READ_BYTES) {
+    return FT_ERR_ARGUMENT;
+  }
+  if (bus->operation != PARALLEL_BUS_IDLE) {
+    return FT_ERR_BUSY;
+  }
+  bus->operation = PARALLEL_BUS_READ;
+  if (bus->failed) {
+    return FT_OK;
+  }
+  if (byte_count != bus->read_count) {
+    bus->read_count = byte_count;
+    bus->read_cells = (uint8_t)i2c_wave_read(bus->read_steps, command, byte_count);
+  } else if (command != bus->read_command) {
+    i2c_wave_set_command(bus->read_steps, command);
+  }
+  bus->read_command = command;
+  play_operation(bus, now_us);
+  return FT_OK;
+}
+
+static enum ft_status start_recovery(void *context, uint64_t now_us) {
+  struct parallel_bus *bus = context;
+  bus->operation = PARALLEL_BUS_RECOVERY;
+  bus->freeing = false;
+  bus->failed = wave_player_open() != FT_OK;
+  if (!bus->failed) {
+    play_recovery(bus, BOARD_SDA_LINES, now_us);
+  }
+  return FT_OK;
+}
+
+/* The nine clocks are over: takes note of the lines that are still held. False if SCL is. */
+static bool look_at_idle_lines(struct parallel_bus *bus) {
+  const unsigned levels = bus->samples[I2C_WAVE_RECOVERY_CELLS - 1];
+  bus->stuck = (uint16_t)(~levels & BOARD_SDA_LINES);
+  return (levels & BOARD_SCL_LINE) != 0;
+}
+
+static enum ft_status judge(struct parallel_bus *bus, struct array_bus_result *result) {
+  if (bus->operation == PARALLEL_BUS_RECOVERY) {
+    return look_at_idle_lines(bus) ? FT_OK : FT_ERR_STUCK;
+  }
+  const struct i2c_reply reply = i2c_wave_reply(
+      bus->samples, bus->operation == PARALLEL_BUS_READ ? bus->read_count : 0, result->bytes);
+  if (!reply.scl_follows) {
+    return FT_ERR_TIMEOUT;
+  }
+  bus->stuck = reply.held;
+  result->acknowledged = reply.acknowledged;
+  result->nacks = BOARD_SENSOR_COUNT - count_bits(reply.acknowledged);
+  return FT_OK;
+}
+
+static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_result *result,
+                           uint64_t *wake_us) {
+  struct parallel_bus *bus = context;
+  enum ft_status status;
+  if (bus->operation == PARALLEL_BUS_IDLE) {
+    return FT_ERR_ARGUMENT;
+  }
+  if (bus->failed) {
+    status = bus->operation == PARALLEL_BUS_RECOVERY ? FT_ERR_STUCK : FT_ERR_TIMEOUT;
+  } else if (!wave_player_has_ended()) {
+    if (now_us < bus->deadline_us) {
+      *wake_us = bus->deadline_us;
+      return FT_PENDING;
+    }
+    status = bus->operation == PARALLEL_BUS_RECOVERY ? FT_ERR_STUCK : FT_ERR_TIMEOUT;
+  } else if (bus->freeing && look_at_idle_lines(bus)) {
+    bus->freeing = false;
+    play_operation(bus, now_us);
+    *wake_us = bus->deadline_us;
+    return FT_PENDING;
+  } else {
+    status = bus->freeing ? FT_ERR_TIMEOUT : judge(bus, result);
+  }
+  bus->failed = status != FT_OK;
+  bus->operation = PARALLEL_BUS_IDLE;
+  return status;
+}
+
+enum ft_status parallel_bus_init(struct parallel_bus *bus, struct array_bus *array_bus) {
+  memset(bus, 0, sizeof *bus);
+  const enum ft_status status = wave_player_open();
+  if (status != FT_OK) {
+    return status;
+  }
+  i2c_wave_command(bus->command_steps, bus->command);
+  *array_bus = (struct array_bus){
+      .context = bus,
+      .start_command = start_command,
+      .start_read = start_read,
+      .start_recovery = start_recovery,
+      .poll = poll,
+  };
+  return FT_OK;
+}

@@ -1,0 +1,341 @@
+#include "fake_lines.h"
+#include "pico_parallel/parallel_bus.h"
+
+#include <string.h>
+#include <unity.h>
+
+#define ALL ((1u << 15) - 1u)
+#define CONVERT 0x44
+#define READ_ADC 0x00
+
+static struct parallel_bus parallel_bus;
+static struct array_bus bus;
+static struct array_bus_result result;
+
+void setUp(void) {
+  fake_lines_power_up();
+  memset(&result, 0xA5, sizeof result);
+  TEST_ASSERT_EQUAL_INT(FT_OK, parallel_bus_init(&parallel_bus, &bus));
+}
+
+void tearDown(void) {
+  TEST_ASSERT_EQUAL_UINT_MESSAGE(0, fake.misuses, fake.misuse ? fake.misuse : "");
+}
+
+static void next_case(void) {
+  tearDown();
+  setUp();
+}
+
+/* Polls as the event handler does: at every event and alarm. No operation takes 1 ms. */
+static enum ft_status finish(void) {
+  const uint64_t give_up_us = fake.now_us + 1000;
+  for (;;) {
+    uint64_t wake_us = 0;
+    const enum ft_status status = bus.poll(bus.context, fake.now_us, &result, &wake_us);
+    if (status != FT_PENDING) {
+      return status;
+    }
+    const uint64_t event_us = fake_lines_next_event_us();
+    const uint64_t next_us = event_us < wake_us ? event_us : wake_us;
+    TEST_ASSERT_TRUE_MESSAGE(next_us > fake.now_us, "asks to be woken in the past");
+    fake.now_us = next_us;
+    TEST_ASSERT_TRUE_MESSAGE(fake.now_us < give_up_us, "the operation does not end");
+  }
+}
+
+static enum ft_status command(uint8_t byte) {
+  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_command(bus.context, byte, fake.now_us));
+  return finish();
+}
+
+static enum ft_status read_back(uint8_t byte, uint8_t count) {
+  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_read(bus.context, byte, count, fake.now_us));
+  return finish();
+}
+
+static enum ft_status recover(void) {
+  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_recovery(bus.context, fake.now_us));
+  return finish();
+}
+
+static void expect_bytes_of(uint32_t sensors, uint8_t byte, uint8_t count) {
+  TEST_ASSERT_EQUAL_HEX32(sensors, sensors & result.acknowledged);
+  for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
+    for (unsigned i = 0; (sensors >> k & 1) != 0 && i < count; i++) {
+      TEST_ASSERT_EQUAL_HEX8(fake_byte(k, byte, i), result.bytes[k][i]);
+    }
+  }
+}
+
+static void expect_bytes(uint32_t acknowledged, uint8_t byte, uint8_t count) {
+  TEST_ASSERT_EQUAL_HEX32(acknowledged, result.acknowledged);
+  expect_bytes_of(acknowledged, byte, count);
+}
+
+static void expect_good_frame(void) {
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  TEST_ASSERT_EQUAL_HEX32(ALL, result.acknowledged);
+  TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+  expect_bytes(ALL, READ_ADC, 3);
+}
+
+static void test_every_command_reaches_every_sensor(void) {
+  for (unsigned byte = 0; byte < 256; byte++) {
+    TEST_ASSERT_EQUAL_INT(FT_OK, command((uint8_t)byte));
+    TEST_ASSERT_EQUAL_HEX32(ALL, result.acknowledged);
+    TEST_ASSERT_EQUAL_UINT32(0, result.nacks);
+    TEST_ASSERT_EQUAL_HEX16(ALL, fake.starts);
+    TEST_ASSERT_EQUAL_HEX16(ALL, fake.stops);
+    TEST_ASSERT_EQUAL_UINT(19, fake.clocks); /* the last one is the rise before the STOP */
+    for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
+      TEST_ASSERT_EQUAL_HEX8(byte, fake.commands[k]);
+      TEST_ASSERT_EQUAL_UINT(byte + 1, fake.received[k]);
+    }
+  }
+}
+
+static void test_reads_of_every_length_and_command(void) {
+  for (unsigned byte = 0; byte < 256; byte++) {
+    for (uint8_t count = 1; count <= ARRAY_BUS_MAX_READ_BYTES; count++) {
+      TEST_ASSERT_EQUAL_INT(FT_OK, read_back((uint8_t)byte, count));
+      expect_bytes(ALL, (uint8_t)byte, count);
+      TEST_ASSERT_EQUAL_UINT32(0, result.nacks);
+      for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
+        for (unsigned i = count; i < ARRAY_BUS_MAX_READ_BYTES; i++) {
+          TEST_ASSERT_EQUAL_HEX8(0xA5, result.bytes[k][i]);
+        }
+      }
+      memset(&result, 0xA5, sizeof result);
+    }
+  }
+}
+
+static void test_time_on_the_bus(void) {
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  TEST_ASSERT_EQUAL_UINT64(50, fake.now_us);
+  TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+  TEST_ASSERT_EQUAL_UINT64(50 + 146, fake.now_us);
+}
+
+static void test_arguments_and_order_of_calls(void) {
+  uint64_t wake_us;
+  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.poll(bus.context, 0, &result, &wake_us));
+  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.start_read(bus.context, 0, 0, 0));
+  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.start_read(bus.context, 0, 4, 0));
+  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_command(bus.context, CONVERT, 0));
+  TEST_ASSERT_EQUAL_INT(FT_ERR_BUSY, bus.start_command(bus.context, CONVERT, 0));
+  TEST_ASSERT_EQUAL_INT(FT_ERR_BUSY, bus.start_read(bus.context, READ_ADC, 3, 0));
+  TEST_ASSERT_EQUAL_INT(FT_OK, finish());
+  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus.poll(bus.context, fake.now_us, &result, &wake_us));
+}
+
+static void test_a_chip_that_does_not_start(void) {
+  fake.opens = false;
+  TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, parallel_bus_init(&parallel_bus, &bus));
+  fake.opens = true;
+  TEST_ASSERT_EQUAL_INT(FT_OK, parallel_bus_init(&parallel_bus, &bus));
+  fake.opens = false;
+  TEST_ASSERT_EQUAL_INT(FT_ERR_STUCK, recover());
+  fake.opens = true;
+  TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+  expect_good_frame();
+}
+
+static void test_missing_sensors_in_every_place(void) {
+  for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
+    next_case();
+    fake.missing = (uint16_t)(1u << k | 1u << (4 * k + 1) % BOARD_SENSOR_COUNT);
+    const uint32_t there = ALL & ~(uint32_t)fake.missing;
+    const uint32_t absent = k == (4 * k + 1) % BOARD_SENSOR_COUNT ? 1 : 2;
+    TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+    TEST_ASSERT_EQUAL_HEX32(there, result.acknowledged);
+    TEST_ASSERT_EQUAL_UINT32(absent, result.nacks);
+    TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+    expect_bytes(there, READ_ADC, 3);
+    TEST_ASSERT_EQUAL_UINT32(absent, result.nacks);
+    fake.missing = 0;
+    expect_good_frame();
+  }
+}
+
+static void test_nobody_answers(void) {
+  fake.missing = ALL;
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  TEST_ASSERT_EQUAL_HEX32(0, result.acknowledged);
+  TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+  TEST_ASSERT_EQUAL_HEX32(0, result.acknowledged);
+  TEST_ASSERT_EQUAL_UINT32(BOARD_SENSOR_COUNT, result.nacks);
+}
+
+static void test_a_refused_command_is_not_acknowledged(void) {
+  fake.deaf = 1u << 6;
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << 6), result.acknowledged);
+  TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+  expect_bytes(ALL & ~(1u << 6), READ_ADC, 3);
+}
+
+static void test_a_line_held_low_costs_its_own_sensor_only(void) {
+  for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
+    next_case();
+    fake.held_low = (uint16_t)(1u << k);
+    for (int n = 0; n < 5; n++) {
+      TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+      TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << k), result.acknowledged);
+      TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+      expect_bytes(ALL & ~(1u << k), READ_ADC, 3);
+      TEST_ASSERT_EQUAL_UINT32(1, result.nacks);
+    }
+    fake.held_low = 0;
+    expect_good_frame();
+  }
+}
+
+static void test_a_line_held_high_costs_its_own_sensor_only(void) {
+  fake.held_high = 1u << 14;
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << 14), result.acknowledged);
+  TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+  expect_bytes(ALL & ~(1u << 14), READ_ADC, 3);
+}
+
+static void test_a_sensor_that_lost_its_place_is_clocked_free_alone(void) {
+  for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
+    next_case();
+    expect_good_frame();
+    fake_lose_its_place(k);
+    TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+    expect_bytes(ALL & ~(1u << k), READ_ADC, 3);
+    /* Still held at the last address: the nine clocks go before the next command. */
+    fake_lose_its_place(k);
+    TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_command(bus.context, CONVERT, fake.now_us));
+    TEST_ASSERT_EQUAL_UINT(10, fake.clocks);
+    TEST_ASSERT_EQUAL_HEX16(0, fake.starts);
+    TEST_ASSERT_EQUAL_HEX16(1u << k, fake.stops);
+    TEST_ASSERT_EQUAL_INT(FT_OK, finish());
+    TEST_ASSERT_EQUAL_HEX32(ALL, result.acknowledged);
+    expect_good_frame();
+  }
+}
+
+static void test_a_line_held_for_good_is_clocked_ever_more_rarely(void) {
+  fake.held_low = 1u << 3;
+  unsigned attempts = 0;
+  for (int n = 0; n < 5000; n++) {
+    const unsigned before = fake.waves;
+    TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+    attempts += fake.waves - before - 1;
+  }
+  /* After 1, 2, 4 .. 1024, and then each 1024 commands */
+  TEST_ASSERT_GREATER_OR_EQUAL_UINT(11, attempts);
+  TEST_ASSERT_LESS_OR_EQUAL_UINT(15, attempts);
+  fake.held_low = 0;
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  fake.held_low = 1u << 9; /* another one is answered at once */
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  const unsigned before = fake.waves;
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  TEST_ASSERT_LESS_OR_EQUAL_UINT(2, fake.waves - before);
+}
+
+/* A sensor that misses a clock, or sees one too many, at every place of a read: it is left out, or
+ * wrong in the last byte only, or it has seen no acknowledgement and the last byte is all ones. It
+ * is back two commands later. */
+static void test_a_disturbed_clock_at_every_place(void) {
+  for (int doubles = 0; doubles < 2; doubles++) {
+    for (unsigned at = 1; at <= 57; at++) {
+      next_case();
+      expect_good_frame();
+      fake.slips = 1u << 5;
+      fake.slip_clock = at;
+      fake.slip_doubles = doubles;
+      TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+      expect_bytes_of(ALL & ~(1u << 5), READ_ADC, 3);
+      const bool acknowledged = (result.acknowledged >> 5 & 1) != 0;
+      const uint8_t *bytes = result.bytes[5];
+      const bool high_bytes_right =
+          bytes[0] == fake_byte(5, READ_ADC, 0) && bytes[1] == fake_byte(5, READ_ADC, 1);
+      TEST_ASSERT_TRUE(!acknowledged || high_bytes_right || bytes[2] == 0xFF);
+      TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+      TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+      expect_good_frame();
+    }
+  }
+}
+
+static void test_scl_held_is_a_failure_of_the_bus(void) {
+  for (int high = 0; high < 2; high++) {
+    next_case();
+    expect_good_frame();
+    *(high ? &fake.held_high : &fake.held_low) = BOARD_SCL_LINE;
+    TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, command(CONVERT));
+    if (!high) {
+      TEST_ASSERT_EQUAL_INT(FT_ERR_STUCK, recover());
+      TEST_ASSERT_EQUAL_INT(FT_ERR_STUCK, recover());
+    }
+    const unsigned before = fake.waves;
+    TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, command(CONVERT));
+    TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, read_back(READ_ADC, 3));
+    TEST_ASSERT_EQUAL_UINT(before, fake.waves);
+    fake.held_low = fake.held_high = 0;
+    TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+    expect_good_frame();
+    fake.misuses = 0; /* the fake holds the line against us */
+  }
+}
+
+static void test_a_wave_that_never_ends(void) {
+  expect_good_frame();
+  fake.hangs = true;
+  const uint64_t start_us = fake.now_us;
+  TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, read_back(READ_ADC, 3));
+  TEST_ASSERT_LESS_THAN_UINT64(start_us + 300, fake.now_us);
+  TEST_ASSERT_EQUAL_INT(FT_ERR_STUCK, recover());
+  fake.hangs = false;
+  TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+  expect_good_frame();
+}
+
+static void test_recovery_gives_nine_clocks_and_a_stop_to_all(void) {
+  fake_lose_its_place(2);
+  fake_lose_its_place(11);
+  TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+  TEST_ASSERT_EQUAL_UINT(10, fake.clocks);
+  TEST_ASSERT_EQUAL_HEX16(0, fake.starts);
+  TEST_ASSERT_EQUAL_HEX16(ALL, fake.stops);
+  expect_good_frame();
+}
+
+static void test_recovery_abandons_whatever_is_under_way(void) {
+  for (uint64_t after_us = 0; after_us < 150; after_us += 7) {
+    next_case();
+    TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_read(bus.context, READ_ADC, 3, fake.now_us));
+    fake.now_us += after_us;
+    TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+    expect_good_frame();
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_every_command_reaches_every_sensor);
+  RUN_TEST(test_reads_of_every_length_and_command);
+  RUN_TEST(test_time_on_the_bus);
+  RUN_TEST(test_arguments_and_order_of_calls);
+  RUN_TEST(test_a_chip_that_does_not_start);
+  RUN_TEST(test_missing_sensors_in_every_place);
+  RUN_TEST(test_nobody_answers);
+  RUN_TEST(test_a_refused_command_is_not_acknowledged);
+  RUN_TEST(test_a_line_held_low_costs_its_own_sensor_only);
+  RUN_TEST(test_a_line_held_high_costs_its_own_sensor_only);
+  RUN_TEST(test_a_sensor_that_lost_its_place_is_clocked_free_alone);
+  RUN_TEST(test_a_line_held_for_good_is_clocked_ever_more_rarely);
+  RUN_TEST(test_a_disturbed_clock_at_every_place);
+  RUN_TEST(test_scl_held_is_a_failure_of_the_bus);
+  RUN_TEST(test_a_wave_that_never_ends);
+  RUN_TEST(test_recovery_gives_nine_clocks_and_a_stop_to_all);
+  RUN_TEST(test_recovery_abandons_whatever_is_under_way);
+  return UNITY_END();
+}
