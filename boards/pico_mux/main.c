@@ -8,7 +8,6 @@ static struct app app;
 
 static void on_event(void *context) {
   (void)context;
-  mux_bus_service(&mux_bus, port_now_us());
   app_on_event(&app);
 }
 

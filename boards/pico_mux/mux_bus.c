@@ -1,5 +1,6 @@
 #include "pico_mux/mux_bus.h"
 
+#include "rp2040/event.h"
 #include "rp2040/gpio.h"
 
 #include <string.h>
@@ -11,8 +12,9 @@ enum {
 };
 #define RECOVERY_HALF_PERIOD_us 5u /* 100 kHz, for whatever is on the bus */
 
-/* Twice the time on the bus, for slow edges, and the way from interrupt to event handler. */
-#define MARGIN_us(bus_us) (2u * (bus_us) + 50u)
+/* Interrupts lead from one transaction to the next; whoever polls only looks whether they move on.
+ * A transaction takes 110 us. */
+#define STANDSTILL_us 1000u
 
 static const struct i2c_pins PINS = {.sda = BOARD_PIN_SDA, .scl = BOARD_PIN_SCL};
 
@@ -43,74 +45,71 @@ static uint32_t sensors_of(uint8_t muxes) {
   return sensors;
 }
 
-static void expect_end(struct mux_bus *bus, enum ft_status status, uint64_t now_us) {
-  bus->wake_us = status == FT_ERR_BUSY ? now_us + I2C_IDLE_us : bus->deadline_us;
+/* Switches off by RESET, which takes no transaction. Its shortest pulse, 6 ns, is less than the
+ * time between two writes to the pins. */
+static void shut_all_but(struct mux_bus *bus, unsigned kept) {
+  for (unsigned mux = 0; mux < BOARD_MUX_COUNT; mux++) {
+    if (mux != kept && bus->open[mux] != 0) {
+      reset_muxes(bus, (uint8_t)(1u << mux));
+      drive_resets((uint8_t)(1u << mux), true);
+    }
+  }
 }
 
-/* Starts the next selection towards wanted, channels of each multiplexer; false if none is left. */
-static bool select_one(struct mux_bus *bus, const uint8_t wanted[BOARD_MUX_COUNT],
-                       uint64_t now_us) {
-  /* Off before on: at no moment may two sensors answer a read. */
-  for (int turn_off = 1; turn_off >= 0; turn_off--) {
-    for (unsigned mux = 0; mux < BOARD_MUX_COUNT; mux++) {
-      if (bus->open[mux] == wanted[mux] || (bus->absent >> mux & 1) != 0 ||
-          (wanted[mux] == 0) != (turn_off != 0)) {
-        continue;
-      }
-      bus->under_way = MUX_BUS_SELECT;
-      bus->select_mux = (uint8_t)mux;
-      bus->select_channels = wanted[mux];
-      bus->deadline_us = now_us + MARGIN_us(I2C_WRITE_us);
-      expect_end(bus, i2c_start_write((uint8_t)(BOARD_MUX_ADDRESS_0 + mux), wanted[mux]), now_us);
+static void begin(struct mux_bus *bus, enum mux_bus_transaction what, enum ft_status status) {
+  bus->under_way = what;
+  bus->controller_busy = status == FT_ERR_BUSY;
+}
+
+/* Starts the selection of these channels unless they are on already or the multiplexer is absent.
+ */
+static bool select(struct mux_bus *bus, unsigned mux, uint8_t channels) {
+  if (bus->open[mux] == channels || (bus->absent >> mux & 1) != 0) {
+    return false;
+  }
+  bus->select_mux = (uint8_t)mux;
+  bus->select_channels = channels;
+  begin(bus, MUX_BUS_SELECT, i2c_start_write((uint8_t)(BOARD_MUX_ADDRESS_0 + mux), channels));
+  return true;
+}
+
+static bool select_all(struct mux_bus *bus) {
+  for (unsigned mux = 0; mux < BOARD_MUX_COUNT; mux++) {
+    if (select(bus, mux, ALL_CHANNELS)) {
       return true;
     }
   }
   return false;
 }
 
-static bool select_all(struct mux_bus *bus, uint64_t now_us) {
-  const uint8_t wanted[BOARD_MUX_COUNT] = {ALL_CHANNELS, ALL_CHANNELS, ALL_CHANNELS};
-  return select_one(bus, wanted, now_us);
-}
-
-static bool select_sensor(struct mux_bus *bus, unsigned sensor, uint64_t now_us) {
-  uint8_t wanted[BOARD_MUX_COUNT] = {0};
-  wanted[sensor / BOARD_CHANNELS_PER_MUX] = (uint8_t)(1u << sensor % BOARD_CHANNELS_PER_MUX);
-  return select_one(bus, wanted, now_us);
-}
-
 /* Starts the next transaction of the operation; false if there is none left. */
-static bool start_next(struct mux_bus *bus, uint64_t now_us) {
-  switch (bus->operation) {
-  case MUX_BUS_COMMAND:
-    if (!select_all(bus, now_us)) {
-      if (bus->absent == ALL_MUXES) {
-        return false;
-      }
-      bus->under_way = MUX_BUS_WRITE;
-      bus->deadline_us = now_us + MARGIN_us(I2C_WRITE_us);
-      expect_end(bus, i2c_start_write(BOARD_SENSOR_ADDRESS, bus->command), now_us);
-    }
-    return true;
-  case MUX_BUS_READ:
-    for (; bus->sensor < BOARD_SENSOR_COUNT; bus->sensor++) {
-      if (select_sensor(bus, bus->sensor, now_us)) {
-        return true;
-      }
-      if ((bus->absent >> bus->sensor / BOARD_CHANNELS_PER_MUX & 1) != 0) {
-        continue;
-      }
-      bus->under_way = MUX_BUS_FETCH;
-      bus->deadline_us = now_us + MARGIN_us(I2C_WRITE_READ_us(bus->read_count));
-      expect_end(bus, i2c_start_write_read(BOARD_SENSOR_ADDRESS, bus->command, bus->read_count),
-                 now_us);
+static bool start_next(struct mux_bus *bus) {
+  if (!bus->command_sent) {
+    if (select_all(bus)) {
       return true;
     }
-    return false;
-  default:
-    /* Between a command and the read that usually follows. */
-    return select_sensor(bus, 0, now_us);
+    if (bus->absent == ALL_MUXES) {
+      return false;
+    }
+    begin(bus, MUX_BUS_WRITE, i2c_start_write(BOARD_SENSOR_ADDRESS, bus->command));
+    return true;
   }
+  if (bus->operation != MUX_BUS_READ) {
+    return false;
+  }
+  while (bus->sensor < BOARD_SENSOR_COUNT) {
+    const unsigned mux = bus->sensor / BOARD_CHANNELS_PER_MUX;
+    shut_all_but(bus, mux);
+    if (select(bus, mux, (uint8_t)(1u << bus->sensor % BOARD_CHANNELS_PER_MUX))) {
+      return true;
+    }
+    if ((bus->absent >> mux & 1) == 0) {
+      begin(bus, MUX_BUS_FETCH, i2c_start_read(BOARD_SENSOR_ADDRESS, bus->read_count));
+      return true;
+    }
+    bus->sensor++;
+  }
+  return false;
 }
 
 /* Takes note of how a transaction ended. */
@@ -128,7 +127,10 @@ static void account(struct mux_bus *bus, bool acknowledged, const uint8_t *bytes
     }
     break;
   case MUX_BUS_WRITE:
-    if (acknowledged) {
+    bus->command_sent = true;
+    if (!acknowledged) {
+      bus->sensor = BOARD_SENSOR_COUNT; /* there is none */
+    } else if (bus->operation == MUX_BUS_COMMAND) {
       bus->result.acknowledged = sensors_of(ALL_MUXES & (uint8_t)~bus->absent);
     }
     break;
@@ -144,33 +146,57 @@ static void account(struct mux_bus *bus, bool acknowledged, const uint8_t *bytes
   }
 }
 
-/* Advances by at most one transaction that has ended. FT_OK: the operation has no more to do. */
-static enum ft_status advance(struct mux_bus *bus, uint64_t now_us, uint64_t *wake_us) {
-  if (bus->under_way != MUX_BUS_NOTHING) {
-    uint8_t bytes[I2C_MAX_READ_BYTES];
-    const enum ft_status status = i2c_poll(bytes);
-    if (status == FT_PENDING || status == FT_ERR_BUSY) {
-      if (now_us >= bus->deadline_us) {
-        return FT_ERR_TIMEOUT;
-      }
-      expect_end(bus, status, now_us);
-      *wake_us = bus->wake_us;
-      return FT_PENDING;
-    }
-    if (status != FT_OK && status != FT_ERR_NACK) {
-      return FT_ERR_TIMEOUT;
-    }
-    const bool command_sent = bus->under_way == MUX_BUS_WRITE;
-    account(bus, status == FT_OK, bytes);
-    bus->under_way = MUX_BUS_NOTHING;
-    if (command_sent) {
-      return FT_OK;
+/* Moves from a transaction that has ended to the next one. */
+static void advance(struct mux_bus *bus) {
+  uint8_t bytes[I2C_MAX_READ_BYTES];
+  const enum ft_status status = i2c_poll(bytes);
+  bus->controller_busy = status == FT_ERR_BUSY;
+  if (status == FT_PENDING || status == FT_ERR_BUSY) {
+    return;
+  }
+  bus->moves++;
+  if (status != FT_OK && status != FT_ERR_NACK) {
+    bus->failed = true;
+    return;
+  }
+  account(bus, status == FT_OK, bytes);
+  bus->under_way = MUX_BUS_NOTHING;
+  bus->ended = !start_next(bus);
+}
+
+static bool is_moving(const struct mux_bus *bus) {
+  return (bus->operation == MUX_BUS_COMMAND || bus->operation == MUX_BUS_READ) && !bus->failed &&
+         !bus->ended;
+}
+
+static void on_i2c_event(void *context) {
+  struct mux_bus *bus = context;
+  if (is_moving(bus)) {
+    advance(bus);
+    if (!is_moving(bus) || bus->controller_busy) {
+      rp2040_event();
     }
   }
-  if (!start_next(bus, now_us)) {
-    return FT_OK;
+}
+
+static enum ft_status open_controller(struct mux_bus *bus) {
+  return i2c_open(&PINS, (struct i2c_owner){.on_event = on_i2c_event, .context = bus});
+}
+
+static enum ft_status look(struct mux_bus *bus, uint64_t now_us, uint64_t *wake_us) {
+  if (is_moving(bus)) {
+    advance(bus);
   }
-  *wake_us = bus->wake_us;
+  if (!is_moving(bus)) {
+    return bus->failed ? FT_ERR_TIMEOUT : FT_OK;
+  }
+  if (bus->moves != bus->moves_seen) {
+    bus->moves_seen = bus->moves;
+    bus->deadline_us = now_us + STANDSTILL_us;
+  } else if (now_us >= bus->deadline_us) {
+    return FT_ERR_TIMEOUT;
+  }
+  *wake_us = bus->controller_busy ? now_us + I2C_IDLE_us : bus->deadline_us;
   return FT_PENDING;
 }
 
@@ -214,7 +240,7 @@ static enum ft_status recover_step(struct mux_bus *bus, uint64_t now_us, uint64_
     if (!i2c_line_is_high(&PINS, I2C_LINE_SDA) || !i2c_line_is_high(&PINS, I2C_LINE_SCL)) {
       return FT_ERR_STUCK;
     }
-    return i2c_open(&PINS) == FT_OK ? FT_OK : FT_ERR_STUCK;
+    return open_controller(bus) == FT_OK ? FT_OK : FT_ERR_STUCK;
   }
   bus->recovery_due_us = now_us + RECOVERY_HALF_PERIOD_us;
   *wake_us = bus->recovery_due_us;
@@ -228,18 +254,16 @@ static enum ft_status start(struct mux_bus *bus, enum mux_bus_operation operatio
   }
   bus->operation = operation;
   bus->command = command;
+  bus->command_sent = false;
   bus->read_count = byte_count;
   bus->sensor = 0;
   drive_resets(bus->absent, true);
   bus->absent = 0;
   bus->result.acknowledged = 0;
-  if (bus->failed) {
-    return FT_OK;
-  }
-  if (bus->under_way == MUX_BUS_NOTHING) {
-    start_next(bus, now_us);
-  } else { /* left over from the last command, and perhaps nobody has watched it */
-    bus->deadline_us = now_us + MARGIN_us(I2C_WRITE_us);
+  bus->moves_seen = bus->moves;
+  bus->deadline_us = now_us + STANDSTILL_us;
+  if (!bus->failed) {
+    bus->ended = !start_next(bus);
   }
   return FT_OK;
 }
@@ -277,40 +301,23 @@ static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_resu
   if (bus->operation == MUX_BUS_IDLE) {
     return FT_ERR_ARGUMENT;
   }
-  if (bus->operation == MUX_BUS_RECOVERY) {
-    status = recover_step(bus, now_us, wake_us);
-  } else if (bus->failed) {
-    status = FT_ERR_TIMEOUT;
-  } else {
-    status = advance(bus, now_us, wake_us);
-  }
+  status = bus->operation == MUX_BUS_RECOVERY ? recover_step(bus, now_us, wake_us)
+                                              : look(bus, now_us, wake_us);
   if (status == FT_PENDING) {
     return FT_PENDING;
   }
-
   bus->failed = status != FT_OK;
-  const bool conversion_may_run = bus->operation == MUX_BUS_COMMAND && !bus->failed;
   bus->operation = MUX_BUS_IDLE;
   if (status == FT_OK) {
     *result = bus->result;
     bus->result.nacks = 0;
   }
-  if (conversion_may_run) {
-    start_next(bus, now_us);
-  }
   return status;
-}
-
-void mux_bus_service(struct mux_bus *bus, uint64_t now_us) {
-  uint64_t wake_us;
-  if (bus->operation == MUX_BUS_IDLE && bus->under_way != MUX_BUS_NOTHING && !bus->failed) {
-    bus->failed = advance(bus, now_us, &wake_us) == FT_ERR_TIMEOUT;
-  }
 }
 
 enum ft_status mux_bus_init(struct mux_bus *bus, struct array_bus *array_bus) {
   memset(bus, 0, sizeof *bus);
-  const enum ft_status status = i2c_open(&PINS);
+  const enum ft_status status = open_controller(bus);
   if (status != FT_OK) {
     return status;
   }

@@ -1,13 +1,14 @@
 /* array_bus over TCA9548A multiplexers on I2C0.
  *
- * A command goes to all sensors at once: every used channel of every multiplexer is switched on and
- * one write reaches them all. A read goes from sensor to sensor, with one channel open at a time.
- * A channel opens at the STOP of its selection, so selections are transactions of their own; one is
- * sent only where a multiplexer is not in the needed state already. In steady state a frame takes
- *   command  3 selections, 1 write                             200 us
- *   between  2 off, 1 selection, during the conversion         150 us
- *   read     14 selections, 2 off, 15 reads of 3 bytes        2940 us
- * on the bus at 400 kHz (sources: TCA9548A datasheet SCPS207; array_bus.h).
+ * What can go to all sensors at once does: with every used channel of every multiplexer switched
+ * on, one write reaches them all, a conversion command and the command that makes ready what is
+ * read alike. Only the bytes are fetched from sensor to sensor, with one channel open at a time. A
+ * channel opens at the STOP of its selection, so selections are transactions of their own; a
+ * multiplexer is shut by its RESET line, which takes none. In steady state a frame takes command  3
+ * selections, 1 write                     200 us read     1 write, 15 selections, 15 fetches 2250
+ * us on the bus at 400 kHz (sources: TCA9548A datasheet SCPS207; MS5840-02BA datasheet, whose
+ * command and answer are transactions of their own; array_bus.h), and 3 us between two
+ * transactions. All sensors sample together; the reading skews nothing.
  *
  * A multiplexer that does not acknowledge is held in reset, which closes its channels whatever
  * state it is in, until the next operation asks it again; its sensors do not acknowledge and the
@@ -33,17 +34,26 @@ struct mux_bus {
   } operation;
   uint8_t command;
   uint8_t read_count;
+  bool command_sent;
   uint8_t sensor; /* during a read: the one whose turn it is; after it, BOARD_SENSOR_COUNT */
 
   uint8_t open[BOARD_MUX_COUNT]; /* [mux] channels that are on, by what it acknowledged last */
   uint8_t absent;                /* bitmap of multiplexers: did not acknowledge in this operation */
 
-  enum { MUX_BUS_NOTHING, MUX_BUS_SELECT, MUX_BUS_WRITE, MUX_BUS_FETCH } under_way;
+  enum mux_bus_transaction {
+    MUX_BUS_NOTHING,
+    MUX_BUS_SELECT,
+    MUX_BUS_WRITE,
+    MUX_BUS_FETCH,
+  } under_way;
   uint8_t select_mux;
   uint8_t select_channels;
+  bool controller_busy; /* the transaction under way could not be loaded yet */
+  bool ended;           /* the operation has no more to do */
+  bool failed;          /* until a recovery succeeds, every operation ends with FT_ERR_TIMEOUT */
+  uint32_t moves;       /* transactions ended since start */
+  uint32_t moves_seen;  /* when last polled; more must have ended by deadline_us */
   uint64_t deadline_us;
-  uint64_t wake_us;
-  bool failed; /* until a recovery succeeds, every operation ends with FT_ERR_TIMEOUT */
 
   enum {
     MUX_BUS_CLOCK_LOW,
@@ -63,9 +73,5 @@ struct mux_bus {
 /* Resets the multiplexers and opens the controller. FT_ERR_TIMEOUT: a block of the chip does not
  * start. Fills *array_bus, which refers to *bus. */
 enum ft_status mux_bus_init(struct mux_bus *bus, struct array_bus *array_bus);
-
-/* Goes on with the switching that a finished command leaves for the time of the conversion. Call at
- * every event, before what uses the array bus; without it, the next operation does it. */
-void mux_bus_service(struct mux_bus *bus, uint64_t now_us);
 
 #endif

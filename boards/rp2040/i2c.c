@@ -1,6 +1,5 @@
 #include "rp2040/i2c.h"
 
-#include "rp2040/event.h"
 #include "rp2040/gpio.h"
 #include "rp2040/i2c_regs.h"
 #include "rp2040/nvic.h"
@@ -27,6 +26,8 @@ _Static_assert(HCNT + 3 >= CYCLES(600), "START hold time too short");
 _Static_assert(LCNT > SPIKE_CYCLES + 7 && HCNT > SPIKE_CYCLES + 5, "limits of the controller");
 _Static_assert(SDA_HOLD_CYCLES <= LOW_CYCLES - 2, "limit of the controller");
 
+static struct i2c_owner owner;
+
 static struct {
   uint8_t address;
   uint8_t byte;
@@ -34,7 +35,8 @@ static struct {
   bool loaded;
 } transaction;
 
-enum ft_status i2c_open(const struct i2c_pins *pins) {
+enum ft_status i2c_open(const struct i2c_pins *pins, struct i2c_owner new_owner) {
+  owner = new_owner;
   resets_assert(RESETS_I2C0);
   enum ft_status status = resets_release(RESETS_IO_BANK0 | RESETS_PADS_BANK0 | RESETS_I2C0);
   if (status != FT_OK) {
@@ -83,27 +85,32 @@ static enum ft_status load_when_idle(void) {
   IC_TAR = transaction.address;
   (void)IC_CLR_INTR;
   IC_ENABLE = 1;
-  IC_DATA_CMD = transaction.byte | (transaction.read_count == 0 ? IC_DATA_CMD_STOP : 0);
+  if (transaction.read_count == 0) {
+    IC_DATA_CMD = transaction.byte | IC_DATA_CMD_STOP;
+  }
   for (unsigned i = 1; i <= transaction.read_count; i++) {
-    IC_DATA_CMD = IC_DATA_CMD_READ | (i == 1 ? IC_DATA_CMD_RESTART : 0) |
-                  (i == transaction.read_count ? IC_DATA_CMD_STOP : 0);
+    IC_DATA_CMD = IC_DATA_CMD_READ | (i == transaction.read_count ? IC_DATA_CMD_STOP : 0);
   }
   IC_INTR_MASK = IC_INTR_STOP_DET | IC_INTR_TX_ABRT;
   transaction.loaded = true;
   return FT_PENDING;
 }
 
-enum ft_status i2c_start_write(uint8_t address, uint8_t byte) {
-  return i2c_start_write_read(address, byte, 0);
-}
-
-enum ft_status i2c_start_write_read(uint8_t address, uint8_t byte, uint8_t byte_count) {
+static enum ft_status start(uint8_t address, uint8_t byte, uint8_t read_count) {
   transaction.address = address;
   transaction.byte = byte;
-  transaction.read_count = byte_count;
+  transaction.read_count = read_count;
   transaction.loaded = false;
   IC_ENABLE = 0;
   return load_when_idle();
+}
+
+enum ft_status i2c_start_write(uint8_t address, uint8_t byte) {
+  return start(address, byte, 0);
+}
+
+enum ft_status i2c_start_read(uint8_t address, uint8_t byte_count) {
+  return start(address, 0, byte_count);
 }
 
 static enum ft_status end(enum ft_status status) {
@@ -161,5 +168,5 @@ bool i2c_line_is_high(const struct i2c_pins *pins, enum i2c_line line) {
 /* The interrupts are levels, cleared by the next transaction: masked until i2c_poll has looked. */
 void i2c0_irq_handler(void) {
   IC_INTR_MASK = 0;
-  rp2040_event();
+  owner.on_event(owner.context);
 }

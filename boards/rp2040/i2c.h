@@ -2,9 +2,9 @@
  * for the recovery of a stuck bus.
  *
  * A transaction fits into the FIFO whole, so it is loaded at once and needs nobody until its STOP,
- * whose interrupt calls rp2040_event(). Nothing here waits, but for a block to leave reset (a few
- * cycles) and for the bus-free time after a STOP (2 us), both bounded. One context: the event
- * handler.
+ * whose interrupt calls the owner, who may start the next one from there. Nothing here waits, but
+ * for a block to leave reset (a few cycles) and for the bus-free time after a STOP (2 us), both
+ * bounded. One context: the event handler's.
  *
  * Source: RP2040 datasheet 4.3; I2C-bus specification UM10204, fast mode.
  */
@@ -23,9 +23,15 @@ struct i2c_pins {
   uint8_t scl;
 };
 
+/* Whom to call, in interrupt context, when a transaction may have ended. */
+struct i2c_owner {
+  void (*on_event)(void *context);
+  void *context;
+};
+
 /* Connects controller and pins, ready for a transaction. FT_ERR_TIMEOUT: a block does not leave
  * reset. */
-enum ft_status i2c_open(const struct i2c_pins *pins);
+enum ft_status i2c_open(const struct i2c_pins *pins, struct i2c_owner owner);
 
 /* Puts the controller into reset, in the middle of a transaction too, which lets go of both lines,
  * and turns them into open-drain pins, not pulled low. */
@@ -35,21 +41,20 @@ void i2c_close_to_lines(const struct i2c_pins *pins);
  * FT_PENDING or FT_ERR_BUSY. */
 enum ft_status i2c_start_write(uint8_t address, uint8_t byte);
 
-/* START, address, one byte, repeated START, address, byte_count (1..I2C_MAX_READ_BYTES) bytes read,
- * STOP. */
-enum ft_status i2c_start_write_read(uint8_t address, uint8_t byte, uint8_t byte_count);
+/* START, address, byte_count (1..I2C_MAX_READ_BYTES) bytes read, STOP. */
+enum ft_status i2c_start_read(uint8_t address, uint8_t byte_count);
 
-/* FT_PENDING: under way, an event will tell the end. FT_ERR_BUSY: the controller is still leaving
- * the transaction before; no event will come, ask again after I2C_IDLE_us. FT_OK: ended, the bytes
- * read are in bytes. FT_ERR_NACK: ended, an address or the byte was not acknowledged.
- * FT_ERR_TIMEOUT: ended without its STOP, as when arbitration is lost. */
+/* FT_PENDING: under way, the owner will be called. FT_ERR_BUSY: the controller is still leaving the
+ * transaction before; no call will come, ask again after I2C_IDLE_us. FT_OK: ended, the bytes read
+ * are in bytes. FT_ERR_NACK: ended, the address or the byte was not acknowledged. FT_ERR_TIMEOUT:
+ * ended without its STOP, as when arbitration is lost. */
 enum ft_status i2c_poll(uint8_t bytes[I2C_MAX_READ_BYTES]);
 #define I2C_IDLE_us 5u
 
-/* Time on the bus of the two kinds of transaction at 400 kHz: 9 clocks a byte, 1 for each START,
- * repeated START and STOP. */
+/* Time on the bus of the two kinds of transaction at 400 kHz: 9 clocks a byte, 1 for START and for
+ * STOP. */
 #define I2C_WRITE_us 50u
-#define I2C_WRITE_READ_us(byte_count) (75u + (9u * (byte_count)*5u + 1u) / 2u)
+#define I2C_READ_us(byte_count) ((11u * 5u + 9u * 5u * (byte_count) + 1u) / 2u)
 
 /* After i2c_close_to_lines(). */
 enum i2c_line { I2C_LINE_SDA, I2C_LINE_SCL };

@@ -26,7 +26,6 @@ void app_start(struct app *app, const struct array_bus *bus) {
   const struct scan_settings scan_settings = {
       .sensor_count = geometry.sensor_count,
       .osr = DEFAULT_OSR,
-      .temperature_interval = DEFAULT_TEMPERATURE_INTERVAL,
       .rate_mHz = DEFAULT_RATE_mHz,
   };
   if (scan_init(&app->scan, bus, &scan_settings) != FT_OK ||
@@ -102,7 +101,7 @@ static void send_info(struct app *app, uint64_t now_us) {
   info->rate_mHz = app->rate_mHz;
   info->measured_rate_mHz = app->measured_rate_mHz;
   info->osr = app->osr;
-  info->temperature_interval = app->scan.temperature_interval;
+  info->temperature_interval_ms = SCAN_TEMPERATURE_INTERVAL_ms;
   info->slip_window_ms = (uint16_t)(app->contact_settings.slip_window_us / 1000u);
   info->fit_iterations = app->fit_settings.iterations;
   info->streams = app->streams;
@@ -124,6 +123,7 @@ static void send_health(struct app *app, uint64_t now_us) {
       .uptime_s = (uint32_t)(now_us / 1000000u),
       .frames = read_counter(&scan->counters.frames),
       .frames_incomplete = read_counter(&scan->counters.frames_incomplete),
+      .frames_skipped = read_counter(&scan->counters.frames_skipped),
       .packets_sent = app->packets_sent,
       .packets_dropped = app->packets_dropped,
       .commands_done = app->commands_done,
@@ -146,7 +146,7 @@ static void send_raw(struct app *app) {
   struct wire_raw *raw = &app->packet.body.raw;
   const struct frame *frame = &app->frame;
   raw->frame = frame->number;
-  raw->valid = frame->valid;
+  raw->valid = frame->held ? 0 : frame->valid;
   raw->saturated = frame->saturated;
   raw->temperature_cC = frame->temperature_cC;
   raw->sensor_count = frame->sensor_count;
@@ -156,43 +156,38 @@ static void send_raw(struct app *app) {
 }
 
 static void send_contact(struct app *app, const struct wire_stages *stages) {
-  app->packet.body.contact = (struct wire_contact){
-      .frame = app->frame.number,
-      .flags = app->contact.flags,
-      .sensors_used = app->fit.used,
-      .x_mm = app->fit.x_mm,
-      .y_mm = app->fit.y_mm,
-      .p0_Pa = app->fit.p0_Pa,
-      .sigma_mm = app->fit.sigma_mm,
-      .force_N = app->fit.force_N,
-      .slip_mm = app->contact.slip_mm,
-      .residual_rms_Pa = app->fit.residual_rms_Pa,
-      .location_sd_mm = app->fit.location_sd_mm,
-      .force_sd_N = app->fit.force_sd_N,
-      .stages = *stages,
-  };
+  struct wire_contact *contact = &app->packet.body.contact;
+  contact->frame = app->frame.number;
+  contact->flags = app->contact.flags;
+  contact->sensors_used = app->fit.used;
+  contact->x_mm = app->fit.x_mm;
+  contact->y_mm = app->fit.y_mm;
+  contact->p0_Pa = app->fit.p0_Pa;
+  contact->sigma_mm = app->fit.sigma_mm;
+  contact->force_N = app->fit.force_N;
+  contact->slip_mm = app->contact.slip_mm;
+  contact->residual_rms_Pa = app->fit.residual_rms_Pa;
+  contact->location_sd_mm = app->fit.location_sd_mm;
+  contact->force_sd_N = app->fit.force_sd_N;
+  contact->stages = *stages;
   send_packet(app, WIRE_CONTACT, app->frame.t_us);
 }
 
-static void process_frame(struct app *app, uint64_t taken_us) {
-  const struct frame *frame = &app->frame;
-  if (taken_us < frame->t_read_us) { /* it came between the look at the clock and the taking */
-    taken_us = frame->t_read_us;
-  }
-  condition_frame(&app->condition, frame, &app->conditioned);
-  uint64_t conditioned_us = port_now_us();
-
+static void fit_frame(struct app *app) {
   memset(&app->fit, 0, sizeof app->fit);
-  if (app->conditioned.contact) {
-    app->fit_settings.noise_Pa_q10 = frame->noise_Pa_q10;
-    fit_gaussian(&app->fit_array, app->conditioned.pressure_Pa_q10, app->conditioned.usable,
-                 &app->fit_settings, &app->fit);
-    if (!(app->fit.flags & CONTACT_FLAG_FIT_VALID)) {
-      app->fit_failures++;
-    }
+  if (!app->conditioned.contact) {
+    return;
   }
-  uint64_t fitted_us = port_now_us();
+  app->fit_settings.noise_Pa_q10 = app->frame.noise_Pa_q10;
+  fit_gaussian(&app->fit_array, app->conditioned.pressure_Pa_q10, app->conditioned.usable,
+               &app->fit_settings, &app->fit);
+  if (!(app->fit.flags & CONTACT_FLAG_FIT_VALID)) {
+    app->fit_failures++;
+  }
+}
 
+static void judge_frame(struct app *app) {
+  const struct frame *frame = &app->frame;
   const struct contact_input input = {
       .t_us = frame->t_us,
       .contact = app->conditioned.contact,
@@ -202,6 +197,27 @@ static void process_frame(struct app *app, uint64_t taken_us) {
       .fit = app->conditioned.contact ? &app->fit : NULL,
   };
   contact_update(&app->slip_history, &app->contact_settings, &input, &app->contact);
+}
+
+/* A held frame brings nothing to interpret: what was found in the frame before goes out again. */
+static void process_frame(struct app *app, uint64_t taken_us) {
+  const struct frame *frame = &app->frame;
+  if (taken_us < frame->t_read_us) { /* it came between the look at the clock and the taking */
+    taken_us = frame->t_read_us;
+  }
+  if (!frame->held) {
+    condition_frame(&app->condition, frame, &app->conditioned);
+  }
+  uint64_t conditioned_us = port_now_us();
+  if (!frame->held) {
+    fit_frame(app);
+  }
+  uint64_t fitted_us = port_now_us();
+  if (frame->held) {
+    app->contact.flags |= CONTACT_FLAG_HELD;
+  } else {
+    judge_frame(app);
+  }
   uint64_t judged_us = port_now_us();
 
   const struct wire_stages stages = {

@@ -14,6 +14,7 @@ enum contact_flag {
   CONTACT_FLAG_SLIP_VALID = 1 << 3,        /* the slip distance spans its whole window */
   CONTACT_FLAG_SLIP = 1 << 4,              /* slip distance above the threshold */
   CONTACT_FLAG_TARED = 1 << 5,             /* readings are relative to a measured zero */
+  CONTACT_FLAG_HELD = 1 << 6, /* all of the frame before: the sensors measured temperature */
 
   /* Warnings */
   CONTACT_FLAG_LOW_SIGNAL = 1 << 8, /* peak below 20 noise standard deviations */

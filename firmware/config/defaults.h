@@ -10,10 +10,6 @@
 
 #define DEFAULT_OSR 1024u
 
-/* Frames between two temperature conversions, fewer at slow rates (scan.h). A conversion costs a
- * frame; the temperature of a pad in the hand moves by less than 0.1 degC/s. */
-#define DEFAULT_TEMPERATURE_INTERVAL 64u
-
 /* Paper, section IV.D: n = 2 steps at 20 Hz is 0.1 s, threshold 0.75 mm. */
 #define DEFAULT_SLIP_WINDOW_ms 100u
 #define DEFAULT_SLIP_THRESHOLD_mm 0.75f

@@ -4,6 +4,7 @@
 
 #include "common/limits.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 /* Readings of the whole array at one moment. Pressures are absolute, in 1/1024 Pa: an int32
@@ -14,6 +15,8 @@ struct frame {
   uint64_t t_begin_us;     /* first bus activity */
   uint64_t t_converted_us; /* conversion over, reading begins */
   uint64_t t_read_us;      /* last sensor read */
+  bool held;               /* pressures, renewed, valid and saturated are those of the frame before:
+                              the sensors converted their temperature meanwhile */
   uint8_t sensor_count;    /* 1..FT_MAX_SENSORS */
   int32_t noise_Pa_q10;    /* rms noise of a reading at this conversion's OSR, 1/1024 Pa */
   int16_t temperature_cC;  /* mean of the sensors, 0.01 degC; 0 until first measured */

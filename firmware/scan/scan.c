@@ -9,20 +9,26 @@
 #define ADMISSION_INTERVAL_MIN_us 1000000u
 #define ADMISSION_INTERVAL_MAX_us 8000000u
 #define PROM_PASSES 3
+#define TEMPERATURE_INTERVAL_us (SCAN_TEMPERATURE_INTERVAL_ms * 1000u)
 /* After a temperature reading that a sensor missed, or one in doubt. */
-#define RETRY_TEMPERATURE_FRAMES 8u
-/* At slow rates: the pressures of a pad that warms by 0.1 degC/s stay within some 12 Pa. */
-#define TEMPERATURE_RATE_MIN_mHz 2000u
+#define TEMPERATURE_RETRY_us 100000u
 /* A larger step in half a second is no change of temperature. 1 degC is worth some 240 Pa. */
 #define TEMPERATURE_STEP_MAX_cC 100
-/* How soon a full slot is looked at again. */
-#define SLOT_POLL_us 50u
+/* How soon a temperature that nobody has taken is looked at again. */
+#define SLOT_POLL_us 1000u
 /* How soon a new rate is noticed while waiting for the next frame of the old one. */
 #define RATE_POLL_us 10000u
 #define RECOVERY_DELAY_MIN_us 10000u
 #define RECOVERY_DELAY_MAX_us 1000000u
 /* Transitions in one call: enough for the longest run of states that take no time. */
 #define MAX_TRANSITIONS 8
+/* A sensor that loses count of the clocks finds its byte not acknowledged and sends no more: what
+ * follows reads as ones. One code in 65536 ends in sixteen of them by chance, and one frame of
+ * fifteen sensors in three million has four that end in eight. */
+#define TORN_MASK 0xFFFFu
+#define TORN_BYTE_MASK 0xFFu
+#define TORN_BYTE_SENSORS 4u
+#define CODE_MAX 0xFFFFFFu
 
 static void count(_Atomic uint32_t *counter, uint32_t amount) {
   uint32_t value = atomic_load_explicit(counter, memory_order_relaxed);
@@ -52,16 +58,15 @@ static uint32_t count_bits(uint32_t bitmap) {
 enum ft_status scan_init(struct scan *scan, const struct array_bus *bus,
                          const struct scan_settings *settings) {
   if (settings->sensor_count < 1 || settings->sensor_count > FT_MAX_SENSORS ||
-      settings->temperature_interval < 1 || !ms5840_find_osr(settings->osr)) {
+      !ms5840_find_osr(settings->osr)) {
     return FT_ERR_ARGUMENT;
   }
   memset(scan, 0, sizeof *scan);
   scan->bus = bus;
   scan->sensor_count = settings->sensor_count;
-  scan->temperature_interval = settings->temperature_interval;
-  scan->conversion = ms5840_find_osr(settings->osr);
+  scan->conversion.osr = ms5840_find_osr(settings->osr);
   set(&scan->osr, settings->osr);
-  set(&scan->rate_mHz, settings->rate_mHz);
+  scan_set_rate_mHz(scan, settings->rate_mHz);
   scan->state = SCAN_WAIT_POWER;
   scan->wait_until_us = POWER_UP_us;
   scan->recovery_delay_us = RECOVERY_DELAY_MIN_us;
@@ -78,7 +83,7 @@ enum ft_status scan_set_osr(struct scan *scan, uint16_t osr) {
 }
 
 void scan_set_rate_mHz(struct scan *scan, uint32_t rate_mHz) {
-  set(&scan->rate_mHz, rate_mHz);
+  set(&scan->period_us, rate_mHz == 0 ? 0 : 1000000000u / rate_mHz);
 }
 
 static void wait_in(struct scan *scan, enum scan_state state, uint64_t until_us) {
@@ -89,6 +94,12 @@ static void wait_in(struct scan *scan, enum scan_state state, uint64_t until_us)
 static void enter(struct scan *scan, enum scan_state state) {
   scan->state = state;
   scan->operation_running = false;
+}
+
+static void convert(struct scan *scan, bool is_temperature, bool is_frame) {
+  scan->conversion.is_temperature = is_temperature;
+  scan->conversion.is_frame = is_frame;
+  enter(scan, SCAN_CONVERT);
 }
 
 static void begin_admission(struct scan *scan, uint64_t now_us) {
@@ -153,7 +164,7 @@ static void end_prom_pass(struct scan *scan) {
   set(&scan->admitted, admitted);
   set(&scan->prom_bad, differs | blank);
   scan->void_next = 0;
-  enter(scan, SCAN_CONVERT_TEMPERATURE);
+  convert(scan, true, false);
 }
 
 static void take_prom_word(struct scan *scan) {
@@ -170,154 +181,167 @@ static void take_prom_word(struct scan *scan) {
   }
 }
 
-static void take_codes(struct scan *scan, uint64_t now_us) {
-  struct scan_slot *slot = &scan->filling;
+/* Where the codes of this conversion go; NULL while the main context reads the last ones. */
+static struct scan_slot *slot_for(struct scan *scan, const struct scan_conversion *conversion) {
+  if (conversion->is_temperature) {
+    return get(&scan->temperature_state) == SCAN_SLOT_EMPTY ? &scan->temperature_slot : NULL;
+  }
+  return get(&scan->slot_state) == SCAN_SLOT_CLAIMED ? NULL : &scan->slot;
+}
+
+/* Judges the codes in scan->result. Returns the bitmap of those that are measurements. */
+static uint32_t take_codes(struct scan *scan, bool is_temperature, uint32_t codes[]) {
   uint32_t acknowledged = scan->result.acknowledged & all_sensors(scan);
-  uint32_t admitted = get(&scan->admitted) & acknowledged;
   uint32_t zero = 0;
+  uint32_t torn = 0;
+  uint32_t ends_in_ones = 0;
   for (uint8_t k = 0; k < scan->sensor_count; k++) {
     const uint8_t *bytes = scan->result.bytes[k];
-    slot->code[k] = (uint32_t)bytes[0] << 16 | (uint32_t)bytes[1] << 8 | bytes[2];
-    if (slot->code[k] == 0 || (slot->is_temperature && slot->code[k] == 0xFFFFFF)) {
-      zero |= UINT32_C(1) << k;
+    uint32_t code = (uint32_t)bytes[0] << 16 | (uint32_t)bytes[1] << 8 | bytes[2];
+    uint32_t bit = UINT32_C(1) << k;
+    if (code == 0 || (code == CODE_MAX && is_temperature)) {
+      zero |= bit;
+    } else if ((code & TORN_BYTE_MASK) == TORN_BYTE_MASK && code != CODE_MAX) {
+      ends_in_ones |= bit;
+      torn |= (code & TORN_MASK) == TORN_MASK ? bit : 0;
+    }
+    if (codes) {
+      codes[k] = code;
     }
   }
+  ends_in_ones &= acknowledged;
+  torn &= acknowledged;
+  if (ends_in_ones != 0 && count_bits(ends_in_ones) >= TORN_BYTE_SENSORS) {
+    torn = ends_in_ones;
+  }
+  uint32_t admitted = get(&scan->admitted) & acknowledged;
   uint32_t unusable = admitted & (zero | scan->void_next);
-  count(&scan->counters.zero_readings, count_bits(unusable));
-  slot->good = admitted & ~unusable;
+  uint32_t good = admitted & ~unusable & ~torn;
   admitted &= ~(zero & scan->void_next); /* twice in a row: it has lost its reset */
   scan->void_next = admitted & zero;
-  slot->t_read_us = now_us;
+  count(&scan->counters.zero_readings, count_bits(unusable));
+  count(&scan->counters.bus_nacks, count_bits(torn));
   set(&scan->present, acknowledged);
   set(&scan->admitted, admitted);
+  return good;
 }
 
-/* The slot is empty when this is called. */
-static void deliver(struct scan *scan) {
-  scan->slot = scan->filling;
-  atomic_store_explicit(&scan->slot_full, 1, memory_order_release);
-}
-
-static bool slot_is_empty(const struct scan *scan) {
-  return !atomic_load_explicit(&scan->slot_full, memory_order_acquire);
-}
-
-/* The frames that may still pass before the next temperature. */
-static void limit_frames_to_temperature(struct scan *scan) {
-  uint32_t limit = scan->frames_to_temperature;
-  uint32_t rate_mHz = get(&scan->rate_mHz);
-  if (rate_mHz != 0 && limit > 1u + rate_mHz / TEMPERATURE_RATE_MIN_mHz) {
-    limit = 1u + rate_mHz / TEMPERATURE_RATE_MIN_mHz;
+static void take_reading(struct scan *scan, const struct scan_conversion *conversion) {
+  struct scan_slot *slot = slot_for(scan, conversion);
+  uint32_t good = take_codes(scan, conversion->is_temperature, slot ? slot->code : NULL);
+  if (conversion->is_frame) {
+    count(&scan->counters.frames, 1);
+    if (good != all_sensors(scan)) {
+      count(&scan->counters.frames_incomplete, 1);
+    }
+    if (!slot || (!conversion->is_temperature && get(&scan->slot_state) == SCAN_SLOT_FULL)) {
+      count(&scan->counters.frames_skipped, 1);
+    }
   }
-  if (get(&scan->temperature_doubted) != 0 && limit > RETRY_TEMPERATURE_FRAMES) {
-    limit = RETRY_TEMPERATURE_FRAMES;
+  if (conversion->is_temperature) {
+    if (!slot || good != get(&scan->admitted)) {
+      scan->next_temperature_us = conversion->t_begin_us + TEMPERATURE_RETRY_us;
+    }
   }
-  set(&scan->temperature_doubted, 0);
-  scan->frames_to_temperature = limit;
-}
-
-/* Decides what comes next once the last reading has been taken. */
-static void leave_idle(struct scan *scan, uint64_t now_us) {
-  if (!slot_is_empty(scan)) {
-    scan->wait_until_us = now_us + SLOT_POLL_us;
+  if (!slot) {
     return;
   }
+  slot->conversion = *conversion;
+  slot->good = good;
+  if (conversion->is_temperature) {
+    slot->prom_changed = scan->prom_changed;
+    scan->prom_changed = 0;
+  }
+  atomic_store_explicit(conversion->is_temperature ? &scan->temperature_state : &scan->slot_state,
+                        SCAN_SLOT_FULL, memory_order_release);
+}
+
+static bool temperature_waits(const struct scan *scan) {
+  return atomic_load_explicit(&scan->temperature_state, memory_order_acquire) != SCAN_SLOT_EMPTY;
+}
+
+static void heed_doubt(struct scan *scan, uint64_t now_us) {
+  if (temperature_waits(scan) || get(&scan->temperature_doubted) == 0) {
+    return;
+  }
+  set(&scan->temperature_doubted, 0);
+  if (scan->next_temperature_us > now_us + TEMPERATURE_RETRY_us) {
+    scan->next_temperature_us = now_us + TEMPERATURE_RETRY_us;
+  }
+}
+
+/* When to convert the temperature in the pause before the next frame; UINT64_MAX: not in this one,
+ * because it is not due or the pause is too short. */
+static uint64_t temperature_in_pause_us(const struct scan *scan, uint64_t now_us) {
+  const struct ms5840_osr *osr = ms5840_find_osr((uint16_t)get(&scan->osr));
+  uint32_t slot_us = scan->overhead_us + osr->conversion_us;
+  if (scan->next_temperature_us > scan->next_frame_us ||
+      scan->next_frame_us - now_us < slot_us + slot_us / 16) {
+    return UINT64_MAX;
+  }
+  return scan->next_frame_us - slot_us - slot_us / 8;
+}
+
+static uint64_t earlier(uint64_t a, uint64_t b) {
+  return a < b ? a : b;
+}
+
+/* Decides what comes next once the last reading is here. */
+static void leave_idle(struct scan *scan, uint64_t now_us) {
   uint32_t waiting = get(&scan->present) & ~get(&scan->admitted);
   bool nobody = get(&scan->present) == 0;
-  if ((waiting || nobody) && now_us >= scan->next_admission_us) {
+  /* A temperature that was read just now still has to go into its slot. */
+  bool prom_is_free = !temperature_waits(scan) && !scan->conversion.is_temperature;
+  if ((waiting || nobody) && now_us >= scan->next_admission_us && prom_is_free) {
     begin_admission(scan, now_us);
     return;
   }
-  limit_frames_to_temperature(scan);
-  if (scan->frames_to_temperature == 0) {
-    enter(scan, SCAN_CONVERT_TEMPERATURE);
-    return;
-  }
-  uint32_t rate_mHz = get(&scan->rate_mHz);
-  if (rate_mHz != 0) {
-    uint32_t period_us = 1000000000u / rate_mHz;
+  heed_doubt(scan, now_us);
+  uint32_t period_us = get(&scan->period_us);
+  if (period_us != 0) {
     if (scan->next_frame_us > now_us + period_us) {
       scan->next_frame_us = now_us; /* the rate was raised */
     }
     if (now_us < scan->next_frame_us) {
-      uint64_t look_us = now_us + RATE_POLL_us;
-      scan->wait_until_us = scan->next_frame_us < look_us ? scan->next_frame_us : look_us;
+      uint64_t temperature_us = temperature_in_pause_us(scan, now_us);
+      if (temperature_us <= now_us) {
+        convert(scan, true, false);
+      } else {
+        scan->wait_until_us =
+            earlier(earlier(scan->next_frame_us, temperature_us), now_us + RATE_POLL_us);
+      }
       return;
     }
     bool late = now_us - scan->next_frame_us > period_us;
     scan->next_frame_us = (late ? now_us : scan->next_frame_us) + period_us;
   }
-  enter(scan, SCAN_CONVERT_PRESSURE);
+  convert(scan, now_us >= scan->next_temperature_us, true);
 }
 
 static enum ft_status start_operation(struct scan *scan, uint64_t now_us) {
   const struct array_bus *bus = scan->bus;
+  struct scan_conversion *conversion = &scan->conversion;
   switch (scan->state) {
   case SCAN_RESET:
     return bus->start_command(bus->context, MS5840_CMD_RESET, now_us);
   case SCAN_READ_PROM:
     return bus->start_read(bus->context, (uint8_t)(MS5840_CMD_READ_PROM + 2 * scan->prom_word), 2,
                            now_us);
-  case SCAN_CONVERT_TEMPERATURE:
-    scan->conversion = ms5840_find_osr((uint16_t)get(&scan->osr));
-    scan->filling.is_temperature = true;
-    return bus->start_command(bus->context, scan->conversion->convert_temperature, now_us);
-  case SCAN_CONVERT_PRESSURE:
-    scan->conversion = ms5840_find_osr((uint16_t)get(&scan->osr));
-    scan->filling.is_temperature = false;
-    scan->filling.noise_Pa_q10 = scan->conversion->noise_Pa_q10;
-    scan->filling.t_begin_us = now_us;
-    return bus->start_command(bus->context, scan->conversion->convert_pressure, now_us);
-  case SCAN_READ_TEMPERATURE:
-  case SCAN_READ_PRESSURE:
-    scan->filling.t_converted_us = now_us;
+  case SCAN_CONVERT:
+    conversion->osr = ms5840_find_osr((uint16_t)get(&scan->osr));
+    conversion->t_begin_us = now_us;
+    if (conversion->is_temperature) {
+      scan->next_temperature_us = now_us + TEMPERATURE_INTERVAL_us;
+    }
+    return bus->start_command(bus->context,
+                              conversion->is_temperature ? conversion->osr->convert_temperature
+                                                         : conversion->osr->convert_pressure,
+                              now_us);
+  case SCAN_READ_ADC:
+    conversion->t_converted_us = now_us;
     return bus->start_read(bus->context, MS5840_CMD_READ_ADC, 3, now_us);
   default:
     return bus->start_recovery(bus->context, now_us);
-  }
-}
-
-static void end_operation(struct scan *scan, uint64_t now_us) {
-  switch (scan->state) {
-  case SCAN_RESET:
-    wait_in(scan, SCAN_WAIT_RESET, now_us + MS5840_RESET_us);
-    break;
-  case SCAN_READ_PROM:
-    take_prom_word(scan);
-    break;
-  case SCAN_CONVERT_TEMPERATURE:
-    wait_in(scan, SCAN_WAIT_TEMPERATURE, now_us + scan->conversion->conversion_us);
-    break;
-  case SCAN_CONVERT_PRESSURE:
-    scan->filling.t_us = now_us + scan->conversion->conversion_us / 2u;
-    wait_in(scan, SCAN_WAIT_PRESSURE, now_us + scan->conversion->conversion_us);
-    break;
-  case SCAN_READ_TEMPERATURE:
-    take_codes(scan, now_us);
-    scan->frames_to_temperature = scan->filling.good == get(&scan->admitted)
-                                      ? scan->temperature_interval
-                                      : RETRY_TEMPERATURE_FRAMES;
-    scan->filling.prom_changed = scan->prom_changed;
-    scan->prom_changed = 0;
-    deliver(scan);
-    wait_in(scan, SCAN_IDLE, now_us);
-    break;
-  case SCAN_READ_PRESSURE:
-    take_codes(scan, now_us);
-    scan->filling.number = scan->frame_number++;
-    scan->frames_to_temperature--;
-    count(&scan->counters.frames, 1);
-    if (scan->filling.good != all_sensors(scan)) {
-      count(&scan->counters.frames_incomplete, 1);
-    }
-    deliver(scan);
-    wait_in(scan, SCAN_IDLE, now_us);
-    break;
-  default: /* SCAN_RECOVER: a conversion may still be running, and a command would spoil it */
-    scan->bus_stuck = false;
-    scan->recovery_delay_us = RECOVERY_DELAY_MIN_us;
-    wait_in(scan, SCAN_WAIT_RECOVERY, now_us + scan->conversion->conversion_us);
-    break;
   }
 }
 
@@ -340,14 +364,64 @@ static bool state_has_operation(enum scan_state state) {
   switch (state) {
   case SCAN_RESET:
   case SCAN_READ_PROM:
-  case SCAN_CONVERT_TEMPERATURE:
-  case SCAN_READ_TEMPERATURE:
-  case SCAN_CONVERT_PRESSURE:
-  case SCAN_READ_PRESSURE:
+  case SCAN_CONVERT:
+  case SCAN_READ_ADC:
   case SCAN_RECOVER:
     return true;
   default:
     return false;
+  }
+}
+
+/* Starts what the state asks for, if it asks for anything. */
+static void begin_operation(struct scan *scan, uint64_t now_us) {
+  if (!state_has_operation(scan->state)) {
+    return;
+  }
+  if (scan->state == SCAN_RECOVER) {
+    count(&scan->counters.bus_recoveries, 1);
+  }
+  if (start_operation(scan, now_us) == FT_OK) {
+    scan->operation_running = true;
+  } else {
+    fail_operation(scan, FT_ERR_TIMEOUT, now_us);
+  }
+}
+
+/* The codes are in scan->result, and stay there while the next operation runs. */
+static void end_reading(struct scan *scan, uint64_t now_us) {
+  struct scan_conversion *read = &scan->read;
+  *read = scan->conversion;
+  read->t_read_us = now_us;
+  read->number = scan->frame_number;
+  scan->frame_number += read->is_frame;
+  scan->overhead_us = (uint32_t)(now_us - read->t_begin_us) - read->osr->conversion_us;
+  wait_in(scan, SCAN_IDLE, now_us);
+  leave_idle(scan, now_us);
+  begin_operation(scan, now_us);
+  take_reading(scan, read);
+}
+
+static void end_operation(struct scan *scan, uint64_t now_us) {
+  switch (scan->state) {
+  case SCAN_RESET:
+    wait_in(scan, SCAN_WAIT_RESET, now_us + MS5840_RESET_us);
+    break;
+  case SCAN_READ_PROM:
+    take_prom_word(scan);
+    break;
+  case SCAN_CONVERT:
+    scan->conversion.t_us = now_us + scan->conversion.osr->conversion_us / 2u;
+    wait_in(scan, SCAN_WAIT_CONVERSION, now_us + scan->conversion.osr->conversion_us);
+    break;
+  case SCAN_READ_ADC:
+    end_reading(scan, now_us);
+    break;
+  default: /* SCAN_RECOVER: a conversion may still be running, and a command would spoil it */
+    scan->bus_stuck = false;
+    scan->recovery_delay_us = RECOVERY_DELAY_MIN_us;
+    wait_in(scan, SCAN_WAIT_RECOVERY, now_us + scan->conversion.osr->conversion_us);
+    break;
   }
 }
 
@@ -359,19 +433,16 @@ static void end_wait(struct scan *scan, uint64_t now_us) {
   case SCAN_WAIT_RESET:
     enter(scan, SCAN_READ_PROM);
     break;
-  case SCAN_WAIT_TEMPERATURE:
-    enter(scan, SCAN_READ_TEMPERATURE);
-    break;
-  case SCAN_WAIT_PRESSURE:
-    enter(scan, SCAN_READ_PRESSURE);
+  case SCAN_WAIT_CONVERSION:
+    enter(scan, SCAN_READ_ADC);
     break;
   case SCAN_WAIT_RECOVERY:
     if (scan->bus_stuck) {
       enter(scan, SCAN_RECOVER);
-    } else if (slot_is_empty(scan)) {
-      begin_admission(scan, now_us);
-    } else {
+    } else if (temperature_waits(scan)) {
       scan->wait_until_us = now_us + SLOT_POLL_us;
+    } else {
+      begin_admission(scan, now_us);
     }
     break;
   default:
@@ -389,33 +460,28 @@ uint64_t scan_step(struct scan *scan, uint64_t now_us) {
       end_wait(scan, now_us);
       continue;
     }
-    enum ft_status status;
     if (!scan->operation_running) {
-      if (scan->state == SCAN_RECOVER) {
-        count(&scan->counters.bus_recoveries, 1);
-      }
-      status = start_operation(scan, now_us);
-      if (status != FT_OK) {
-        fail_operation(scan, FT_ERR_TIMEOUT, now_us);
-        continue;
-      }
-      scan->operation_running = true;
+      begin_operation(scan, now_us);
+      continue;
     }
     uint64_t wake_us = now_us + SLOT_POLL_us;
-    status = scan->bus->poll(scan->bus->context, now_us, &scan->result, &wake_us);
+    enum ft_status status = scan->bus->poll(scan->bus->context, now_us, &scan->result, &wake_us);
     if (status == FT_PENDING) {
       return wake_us;
     }
     scan->operation_running = false;
-    if (status == FT_OK) {
-      count(&scan->counters.bus_nacks, scan->result.nacks);
-      end_operation(scan, now_us);
-    } else {
+    if (status != FT_OK) {
       fail_operation(scan, status, now_us);
+      continue;
     }
-    /* Judging the PROMs takes longer than a transfer: the next operation's deadlines must count
-     * from a fresh time. */
-    break;
+    count(&scan->counters.bus_nacks, scan->result.nacks);
+    bool was_prom = scan->state == SCAN_READ_PROM;
+    end_operation(scan, now_us);
+    if (was_prom && scan->state != SCAN_READ_PROM) {
+      /* Judging the PROMs takes longer than a transfer: the next operation's deadlines must count
+       * from a fresh time. */
+      break;
+    }
   }
   return now_us;
 }
@@ -444,51 +510,89 @@ static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
     scan->thermal[k] = thermal;
     scan->has_thermal |= bit;
   }
+  int32_t sum_cC = 0;
+  int32_t sensors = 0;
+  for (uint8_t k = 0; k < scan->sensor_count; k++) {
+    if (scan->has_thermal & (UINT32_C(1) << k)) {
+      sum_cC += scan->thermal[k].temperature_cC;
+      sensors++;
+    }
+  }
+  scan->temperature_cC = sensors > 0 ? (int16_t)(sum_cC / sensors) : 0;
 }
 
-static void fill_frame(struct scan *scan, const struct scan_slot *slot, struct frame *frame) {
-  memset(frame, 0, sizeof *frame);
-  frame->number = slot->number;
-  frame->t_us = slot->t_us;
-  frame->t_begin_us = slot->t_begin_us;
-  frame->t_converted_us = slot->t_converted_us;
-  frame->t_read_us = slot->t_read_us;
+static void fill_head(struct scan *scan, const struct scan_conversion *conversion,
+                      struct frame *frame) {
+  frame->held = conversion->is_temperature;
+  frame->number = conversion->number;
+  frame->t_us = conversion->t_us;
+  frame->t_begin_us = conversion->t_begin_us;
+  frame->t_converted_us = conversion->t_converted_us;
+  frame->t_read_us = conversion->t_read_us;
   frame->sensor_count = scan->sensor_count;
-  frame->noise_Pa_q10 = slot->noise_Pa_q10;
+  frame->noise_Pa_q10 = conversion->osr->noise_Pa_q10;
+  frame->temperature_cC = scan->temperature_cC;
+}
+
+static void fill_pressures(struct scan *scan, const struct scan_slot *slot, struct frame *frame) {
+  uint32_t valid = slot->good & scan->has_thermal;
+  uint32_t saturated = 0;
+  uint32_t bit = 1;
+  for (uint8_t k = 0; k < scan->sensor_count; k++, bit <<= 1) {
+    int32_t pressure_Pa_q10 = 0;
+    if (valid & bit) {
+      pressure_Pa_q10 = ms5840_compensate_pressure(&scan->thermal[k], slot->code[k]);
+      if (pressure_Pa_q10 > MS5840_MAX_PRESSURE_Pa * 1024) {
+        saturated |= bit;
+      }
+    }
+    frame->pressure_Pa_q10[k] = pressure_Pa_q10;
+  }
+  frame->valid = valid;
+  frame->saturated = saturated;
   frame->renewed = scan->renewed;
   scan->renewed = 0;
-  int32_t temperature_sum_cC = 0;
-  int32_t temperatures = 0;
-  for (uint8_t k = 0; k < scan->sensor_count; k++) {
-    uint32_t bit = UINT32_C(1) << k;
-    if (scan->has_thermal & bit) {
-      temperature_sum_cC += scan->thermal[k].temperature_cC;
-      temperatures++;
-    }
-    if (!(slot->good & scan->has_thermal & bit)) {
-      continue;
-    }
-    frame->pressure_Pa_q10[k] = ms5840_compensate_pressure(&scan->thermal[k], slot->code[k]);
-    frame->valid |= bit;
-    if (frame->pressure_Pa_q10[k] > MS5840_MAX_PRESSURE_Pa * 1024) {
-      frame->saturated |= bit;
-    }
+}
+
+/* A temperature applies to the frames after it. */
+static bool temperature_is_next(const struct scan *scan) {
+  if (get(&scan->slot_state) == SCAN_SLOT_EMPTY) {
+    return true;
   }
-  if (temperatures > 0) {
-    frame->temperature_cC = (int16_t)(temperature_sum_cC / temperatures);
+  uint32_t number = scan->temperature_slot.conversion.number;
+  return (int32_t)(scan->slot.conversion.number - number) >= 0;
+}
+
+static bool claim(_Atomic uint32_t *state) {
+  if (atomic_load_explicit(state, memory_order_acquire) != SCAN_SLOT_FULL) {
+    return false;
   }
+  atomic_store_explicit(state, SCAN_SLOT_CLAIMED, memory_order_relaxed);
+  atomic_signal_fence(memory_order_seq_cst);
+  return true;
+}
+
+static void release(_Atomic uint32_t *state) {
+  atomic_store_explicit(state, SCAN_SLOT_EMPTY, memory_order_release);
 }
 
 bool scan_take(struct scan *scan, struct frame *frame) {
-  if (!atomic_load_explicit(&scan->slot_full, memory_order_acquire)) {
+  if (temperature_waits(scan) && temperature_is_next(scan) && claim(&scan->temperature_state)) {
+    const bool is_frame = scan->temperature_slot.conversion.is_frame;
+    use_temperature(scan, &scan->temperature_slot);
+    if (is_frame) {
+      fill_head(scan, &scan->temperature_slot.conversion, frame);
+    }
+    release(&scan->temperature_state);
+    if (is_frame) {
+      return true;
+    }
+  }
+  if (!claim(&scan->slot_state)) {
     return false;
   }
-  bool is_frame = !scan->slot.is_temperature;
-  if (is_frame) {
-    fill_frame(scan, &scan->slot, frame);
-  } else {
-    use_temperature(scan, &scan->slot);
-  }
-  atomic_store_explicit(&scan->slot_full, 0, memory_order_release);
-  return is_frame;
+  fill_head(scan, &scan->slot.conversion, frame);
+  fill_pressures(scan, &scan->slot, frame);
+  release(&scan->slot_state);
+  return true;
 }

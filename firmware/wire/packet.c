@@ -161,7 +161,7 @@ static void info_fields(struct cursor *cursor, struct wire_info *info) {
   field_u32(cursor, &info->rate_mHz);
   field_u32(cursor, &info->measured_rate_mHz);
   field_u16(cursor, &info->osr);
-  field_u16(cursor, &info->temperature_interval);
+  field_u16(cursor, &info->temperature_interval_ms);
   field_u16(cursor, &info->slip_window_ms);
   field_u8(cursor, &info->fit_iterations);
   field_u8(cursor, &info->streams);
@@ -177,6 +177,7 @@ static void health_fields(struct cursor *cursor, struct wire_health *health) {
   field_u32(cursor, &health->uptime_s);
   field_u32(cursor, &health->frames);
   field_u32(cursor, &health->frames_incomplete);
+  field_u32(cursor, &health->frames_skipped);
   field_u32(cursor, &health->packets_sent);
   field_u32(cursor, &health->packets_dropped);
   field_u32(cursor, &health->commands_done);

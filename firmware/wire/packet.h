@@ -15,7 +15,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define WIRE_VERSION 1
+#define WIRE_VERSION 2
 
 enum {
   WIRE_HEADER_BYTES = 12,
@@ -102,7 +102,8 @@ struct wire_contact {
 /* The readings of one frame. header.t_us as in the contact packet of the same frame number. */
 struct wire_raw {
   uint32_t frame;
-  uint32_t valid;         /* bitmap: the reading is a measurement */
+  uint32_t valid;         /* bitmap: the reading is a measurement; 0 in a held frame, whose readings
+                             are those of the frame before */
   uint32_t saturated;     /* bitmap: beyond 2000 mbar, where the sensor reads low */
   int16_t temperature_cC; /* mean of the sensors, 0.01 degC; 0 until first measured */
   uint8_t sensor_count;   /* 1..FT_MAX_SENSORS */
@@ -123,7 +124,7 @@ struct wire_info {
   uint32_t rate_mHz;              /* requested frame rate, 0 = as fast as the sensors allow */
   uint32_t measured_rate_mHz;     /* over the last second; 0 before */
   uint16_t osr;                   /* 256..8192 */
-  uint16_t temperature_interval;  /* frames between temperature conversions */
+  uint16_t temperature_interval_ms;
   uint16_t slip_window_ms;
   uint8_t fit_iterations;
   uint8_t streams; /* enum wire_stream */
@@ -137,11 +138,12 @@ struct wire_health {
   uint32_t uptime_s;
   uint32_t frames;            /* read from the array */
   uint32_t frames_incomplete; /* of these, with at least one sensor missing */
+  uint32_t frames_skipped;    /* of these, never fitted: the processor was behind */
   uint32_t packets_sent;      /* handed to the USB queue */
   uint32_t packets_dropped;   /* queue full: whole packets, each leaving a gap in the sequence */
   uint32_t commands_done;
   uint32_t commands_rejected; /* unknown, out of range, damaged */
-  uint32_t bus_nacks;         /* reads that a sensor did not acknowledge */
+  uint32_t bus_nacks;         /* reads that a sensor did not acknowledge, or that broke off */
   uint32_t bus_timeouts;      /* operations that did not end in time */
   uint32_t bus_recoveries;    /* nine clocks and multiplexer resets */
   uint32_t zero_readings;     /* a conversion result of 0, and the one after it */

@@ -41,7 +41,7 @@ struct Device {
 
 void print_pairs(const Metadata &pairs) {
   for (const auto &[key, value] : pairs) {
-    std::printf("%-22s%s\n", key.c_str(), value.c_str());
+    std::printf("%-24s%s\n", key.c_str(), value.c_str());
   }
 }
 

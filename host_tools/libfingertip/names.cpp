@@ -14,6 +14,7 @@ const std::vector<FlagName> &flag_names() {
       {CONTACT_FLAG_SLIP_VALID, "SLIP_VALID", false},
       {CONTACT_FLAG_SLIP, "SLIP", false},
       {CONTACT_FLAG_TARED, "TARED", false},
+      {CONTACT_FLAG_HELD, "HELD", false},
       {CONTACT_FLAG_LOW_SIGNAL, "LOW_SIGNAL", true},
       {CONTACT_FLAG_FLAT, "FLAT", true},
       {CONTACT_FLAG_UNCERTAIN, "UNCERTAIN", true},

@@ -70,6 +70,7 @@ template <typename Visitor> void visit_health(Visitor &visit, wire_health &healt
   visit("uptime_s", health.uptime_s);
   visit("frames", health.frames);
   visit("frames_incomplete", health.frames_incomplete);
+  visit("frames_skipped", health.frames_skipped);
   visit("packets_sent", health.packets_sent);
   visit("packets_dropped", health.packets_dropped);
   visit("commands_done", health.commands_done);
@@ -98,7 +99,7 @@ template <typename Visitor> void visit_info(Visitor &visit, wire_info &info) {
   visit("rate_mHz", info.rate_mHz);
   visit("measured_rate_mHz", info.measured_rate_mHz);
   visit("osr", info.osr);
-  visit("temperature_interval", info.temperature_interval);
+  visit("temperature_interval_ms", info.temperature_interval_ms);
   visit("slip_threshold_mm", info.slip_threshold_mm);
   visit("slip_window_ms", info.slip_window_ms);
   visit("fit_iterations", info.fit_iterations);

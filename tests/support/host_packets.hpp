@@ -68,7 +68,7 @@ inline wire_packet make_info(std::uint16_t sequence, std::uint64_t t_us) {
   info.rate_mHz = 20000;
   info.measured_rate_mHz = 19998;
   info.osr = 1024;
-  info.temperature_interval = 64;
+  info.temperature_interval_ms = 500;
   info.slip_window_ms = 100;
   info.fit_iterations = 7;
   info.streams = 3;
@@ -83,7 +83,7 @@ inline wire_packet make_info(std::uint16_t sequence, std::uint64_t t_us) {
 
 inline wire_packet make_health(std::uint16_t sequence, std::uint64_t t_us) {
   wire_packet packet = make_packet(WIRE_HEALTH, sequence, t_us);
-  packet.body.health = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0x7FFF, 14, 0xFFFFFFFFu, 16, 17};
+  packet.body.health = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 0x7FFF, 15, 0xFFFFFFFFu, 17, 18};
   return packet;
 }
 

@@ -119,9 +119,9 @@ class Usage(CliTest):
 
     def test_encode(self):
         # COBS of version, type, sequence, time, body and CRC, worked out by zlib.crc32 and hand
-        self.assertEqual(self.run_cli("encode", "tare")[0], "030181010101010101010101055f601f5600\n")
+        self.assertEqual(self.run_cli("encode", "tare")[0], "03028101010101010101010105afb2812100\n")
         timed = self.run_cli("encode", "--sequence", "258", "--time", "1", "osr", "8192")[0].strip()
-        self.assertTrue(timed.startswith("0601830201"), timed)
+        self.assertTrue(timed.startswith("0602830201"), timed)
         self.assertIn("slip THRESHOLD_MM WINDOW_MS", self.error("encode", "slip", "0.75"))
         self.assertIn("0.1 to 2000", self.error("encode", "rate", "3000"))
         self.assertIn("unknown", self.error("encode", "bogus"))
@@ -133,7 +133,7 @@ class Commands(CliTest):
             out = self.run_cli("info", "--port", self.port)[0]
             self.assertRegex(out, r"(?m)^serial +E660583883265A2C$")
             self.assertRegex(out, r"(?m)^sensors_present +15 of 15$")
-            self.assertRegex(out, r"(?m)^sensors_prom_bad +1 2 3$")
+            self.assertRegex(out, r"(?m)^sensors_prom_bad +0 1 2 3$")
             self.assertRegex(out, r"(?m)^rate_mHz +20000$")
             self.environment["FINGERTIP_PORT"] = self.port
             out = self.run_cli("set", "rate=max", "osr=256", "slip_threshold=0.5")[0]

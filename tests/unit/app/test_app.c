@@ -156,15 +156,25 @@ static void a_press_is_located_and_weighed(void) {
   struct wire_packet packet;
   struct wire_contact contact = {0};
   int in_contact = 0;
+  int held = 0;
   while (next_packet(&packet)) {
     if (packet.type == WIRE_RAW) {
-      TEST_ASSERT_EQUAL_HEX32(0x7FFF, packet.body.raw.valid);
+      TEST_ASSERT_EQUAL_HEX32(contact.flags & CONTACT_FLAG_HELD ? 0 : 0x7FFF,
+                              packet.body.raw.valid);
       TEST_ASSERT_EQUAL_UINT32_MESSAGE(contact.frame, packet.body.raw.frame, "raw follows contact");
       continue;
     }
     TEST_ASSERT_EQUAL(WIRE_CONTACT, packet.type);
+    const struct wire_contact last = contact;
     contact = packet.body.contact;
+    TEST_ASSERT_TRUE(last.frame == 0 || contact.frame == last.frame + 1);
     const struct wire_stages *stages = &contact.stages;
+    if (contact.flags & CONTACT_FLAG_HELD) {
+      held++;
+      TEST_ASSERT_EQUAL_HEX32(last.flags | CONTACT_FLAG_HELD, contact.flags);
+      TEST_ASSERT_EQUAL_FLOAT(last.x_mm, contact.x_mm);
+      TEST_ASSERT_EQUAL_FLOAT(last.force_N, contact.force_N);
+    }
     TEST_ASSERT_EQUAL_UINT16(stages->total_us, stages->convert_us + stages->read_us +
                                                    stages->queue_us + stages->condition_us +
                                                    stages->fit_us + stages->contact_us);
@@ -179,7 +189,8 @@ static void a_press_is_located_and_weighed(void) {
     in_contact++;
     TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID |
                                 CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TARED,
-                            contact.flags & ~(uint32_t)CONTACT_FLAG_SLIP_VALID);
+                            contact.flags &
+                                ~(uint32_t)(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_HELD));
     TEST_ASSERT_EQUAL_HEX32(0x7FFF, contact.sensors_used);
     /* Six predicted standard deviations, and 2 um and 2 mN for the compensation's own rounding. */
     TEST_ASSERT_FLOAT_WITHIN(6 * contact.location_sd_mm + 0.002f, 2.5f, contact.x_mm);
@@ -188,6 +199,7 @@ static void a_press_is_located_and_weighed(void) {
     TEST_ASSERT_TRUE(contact.location_sd_mm < 0.01f);
   }
   TEST_ASSERT_GREATER_THAN(50, in_contact);
+  TEST_ASSERT_EQUAL(1, held);
   TEST_ASSERT_TRUE(contact.flags & CONTACT_FLAG_SLIP_VALID);
   TEST_ASSERT_FALSE(contact.flags & CONTACT_FLAG_SLIP);
 }

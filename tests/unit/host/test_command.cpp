@@ -75,7 +75,7 @@ TEST(Names, StreamsBothWays) {
 TEST(Names, EveryFlagBitHasAName) {
   EXPECT_EQ(flags_text(0), "");
   EXPECT_EQ(flags_text(CONTACT_FLAG_CONTACT | CONTACT_FLAG_SLIP), "CONTACT SLIP");
-  EXPECT_EQ(flags_text(1u << 6 | 1u << 31), "bit6 bit31");
+  EXPECT_EQ(flags_text(1u << 7 | 1u << 31), "bit7 bit31");
 }
 
 TEST(Text, NumbersReadBackTheSame) {

@@ -1,5 +1,6 @@
 #include "fake_i2c.h"
 
+#include "rp2040/event.h"
 #include "rp2040/gpio.h"
 #include "rp2040/i2c.h"
 
@@ -20,6 +21,9 @@ static struct {
   uint64_t end_us;
 } transaction;
 
+static struct i2c_owner owner;
+static uint8_t heard[BOARD_SENSOR_COUNT];
+
 static bool low[2]; /* [enum i2c_line] pulled by us */
 
 void fake_i2c_power_up(void) {
@@ -27,6 +31,15 @@ void fake_i2c_power_up(void) {
   memset(&mux, 0, sizeof mux);
   memset(&transaction, 0, sizeof transaction);
   memset(low, 0, sizeof low);
+  memset(heard, 0, sizeof heard);
+}
+
+void rp2040_event(void) {
+  fake.events++;
+}
+
+void fake_i2c_interrupt(void) {
+  owner.on_event(owner.context);
 }
 
 uint8_t fake_byte(unsigned sensor, uint8_t command, unsigned index) {
@@ -39,7 +52,8 @@ uint64_t fake_i2c_next_event_us(void) {
   return will_end ? transaction.end_us : UINT64_MAX;
 }
 
-enum ft_status i2c_open(const struct i2c_pins *pins) {
+enum ft_status i2c_open(const struct i2c_pins *pins, struct i2c_owner new_owner) {
+  owner = new_owner;
   if (pins->sda != BOARD_PIN_SDA || pins->scl != BOARD_PIN_SCL) {
     fake.misuses++;
   }
@@ -56,11 +70,7 @@ void i2c_close_to_lines(const struct i2c_pins *pins) {
   low[I2C_LINE_SDA] = low[I2C_LINE_SCL] = false;
 }
 
-enum ft_status i2c_start_write(uint8_t address, uint8_t byte) {
-  return i2c_start_write_read(address, byte, 0);
-}
-
-enum ft_status i2c_start_write_read(uint8_t address, uint8_t byte, uint8_t byte_count) {
+static enum ft_status start(uint8_t address, uint8_t byte, uint8_t byte_count) {
   if (!fake.open || transaction.active) {
     fake.misuses++;
   }
@@ -70,9 +80,16 @@ enum ft_status i2c_start_write_read(uint8_t address, uint8_t byte, uint8_t byte_
   transaction.read_count = byte_count;
   transaction.number = ++fake.transactions;
   transaction.busy_polls = fake.busy_polls;
-  transaction.end_us =
-      fake.now_us + (byte_count == 0 ? I2C_WRITE_us : I2C_WRITE_READ_us(byte_count));
+  transaction.end_us = fake.now_us + (byte_count == 0 ? I2C_WRITE_us : I2C_READ_us(byte_count));
   return transaction.busy_polls > 0 ? FT_ERR_BUSY : FT_PENDING;
+}
+
+enum ft_status i2c_start_write(uint8_t address, uint8_t byte) {
+  return start(address, byte, 0);
+}
+
+enum ft_status i2c_start_read(uint8_t address, uint8_t byte_count) {
+  return start(address, 0, byte_count);
 }
 
 static uint32_t reachable(void) {
@@ -101,6 +118,9 @@ static enum ft_status write_sensors(void) {
   fake.commands++;
   fake.command_reached = reachable();
   fake.last_command = transaction.byte;
+  for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
+    heard[k] = (fake.command_reached >> k & 1) != 0 ? transaction.byte : heard[k];
+  }
   return fake.command_reached != 0 ? FT_OK : FT_ERR_NACK;
 }
 
@@ -117,7 +137,7 @@ static enum ft_status read_sensors(uint8_t *bytes) {
     bytes[i] = 0xFF;
     for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
       if ((sensors >> k & 1) != 0) {
-        bytes[i] &= fake_byte(k, transaction.byte, i);
+        bytes[i] &= fake_byte(k, heard[k], i);
       }
     }
   }

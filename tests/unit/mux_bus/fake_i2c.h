@@ -1,8 +1,9 @@
-/* rp2040/i2c.h and the reset pins of rp2040/gpio.h without a chip: three TCA9548A and fifteen
- * sensors in place of the controller, at the speed of a 400 kHz bus, with faults on request.
+/* rp2040/i2c.h, rp2040/event.h and the reset pins of rp2040/gpio.h without a chip: three TCA9548A
+ * and fifteen sensors in place of the controller, at the speed of a 400 kHz bus, with faults on
+ * request.
  *
- * A sensor answers a read with fake_byte(). If several answer at once the bytes are wired-AND, as
- * on the bus, and counted in `collisions`.
+ * A sensor answers a read with fake_byte() of the command it got last. If several answer at once
+ * the bytes are wired-AND, as on the bus, and counted in `collisions`.
  */
 #ifndef FAKE_I2C_H
 #define FAKE_I2C_H
@@ -34,6 +35,7 @@ struct fake_i2c {
   unsigned clocks, stops; /* on the lines as plain pins */
   unsigned opened;
   bool open;
+  unsigned events; /* calls of rp2040_event() */
 };
 
 extern struct fake_i2c fake;
@@ -45,5 +47,8 @@ uint8_t fake_byte(unsigned sensor, uint8_t command, unsigned index);
 
 /* When the transaction under way ends; UINT64_MAX if none does. */
 uint64_t fake_i2c_next_event_us(void);
+
+/* The interrupt of that end. */
+void fake_i2c_interrupt(void);
 
 #endif

@@ -30,8 +30,7 @@ static void power_up(uint8_t sensor_count, const struct scan_settings *settings)
   TEST_ASSERT_EQUAL_INT(FT_OK, scan_init(&scan, &bus, settings));
 }
 
-static const struct scan_settings usual = {
-    .sensor_count = SENSORS, .osr = 1024, .temperature_interval = 64, .rate_mHz = 0};
+static const struct scan_settings usual = {.sensor_count = SENSORS, .osr = 1024, .rate_mHz = 0};
 
 void setUp(void) {
   power_up(SENSORS, &usual);
@@ -139,9 +138,15 @@ static void test_settings_outside_their_range(void) {
   settings = usual;
   settings.osr = 1000;
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, scan_init(&scan, &bus, &settings));
-  settings = usual;
-  settings.temperature_interval = 0;
-  TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, scan_init(&scan, &bus, &settings));
+}
+
+/* To the middle of the next conversion of the temperature. */
+static void skip_to_temperature(void) {
+  for (int steps = 0; scan.state != SCAN_WAIT_CONVERSION || !scan.conversion.is_temperature;
+       steps++) {
+    TEST_ASSERT_LESS_THAN_INT_MESSAGE(20000, steps, "no temperature comes");
+    step();
+  }
 }
 
 static void test_start_up_sequence(void) {
@@ -185,6 +190,7 @@ static void test_frame_contents(void) {
     TEST_ASSERT_EQUAL_UINT32(number, frame.number);
     assert_good_frame(ALL);
   }
+  TEST_ASSERT_EQUAL_UINT32(0, value_of(&scan.counters.frames_skipped));
   TEST_ASSERT_EQUAL_UINT32(200, value_of(&scan.counters.frames));
   TEST_ASSERT_EQUAL_UINT32(0, value_of(&scan.counters.frames_incomplete));
   TEST_ASSERT_EQUAL_UINT32(0, value_of(&scan.counters.bus_nacks));
@@ -214,9 +220,9 @@ static void test_waits_at_every_osr(void) {
   for (size_t i = 0; i < 6; i++) {
     struct scan_settings settings = usual;
     settings.osr = osrs[i];
-    settings.temperature_interval = 3;
     next_case(&settings);
-    skip_frames(20);
+    run_until(1200000);
+    TEST_ASSERT_EQUAL_INT(3, count_entries((uint8_t)(0x50 + 2 * i), FAKE_COMMAND));
     for (int at = 0; at + 1 < fake.logged; at++) {
       const struct fake_entry *entry = &fake.log[at];
       uint64_t wait_us = fake.log[at + 1].start_us - entry->end_us;
@@ -337,16 +343,16 @@ static void test_two_zeros_in_a_row_lead_to_a_reset(void) {
   }
   TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, value_of(&scan.admitted));
   TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.present));
+  next_frame(); /* its conversion has already begun */
+  assert_good_frame(ALL & ~DISTURBED_BIT);
   next_frame();
   TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
   assert_good_frame(ALL);
 }
 
 static void test_temperature_of_all_ones_is_no_reading(void) {
-  struct scan_settings settings = usual;
-  settings.temperature_interval = 16;
-  next_case(&settings);
-  skip_frames(16);
+  next_frame();
+  skip_to_temperature();
   uint32_t d2 = fake.d2[DISTURBED];
   fake.d2[DISTURBED] = 0xFFFFFF;
   skip_frames(3);
@@ -356,84 +362,129 @@ static void test_temperature_of_all_ones_is_no_reading(void) {
 }
 
 static void test_zero_temperature_keeps_the_last_and_is_repeated_soon(void) {
-  struct scan_settings settings = usual;
-  settings.temperature_interval = 16;
-  next_case(&settings);
-  skip_frames(16);
+  next_frame();
+  skip_to_temperature();
   uint32_t d2 = fake.d2[DISTURBED];
   fake.zero_next = DISTURBED_BIT;
   fake.d2[DISTURBED] += 20000; /* must not show before a good reading of it */
-  skip_frames(1);
-  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, frame.valid);
-  skip_frames(1);
+  next_frame();
+  TEST_ASSERT_TRUE(frame.held);
   TEST_ASSERT_EQUAL_HEX32(ALL, frame.valid);
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, frame.valid);
+  next_frame();
   uint32_t next_d2 = fake.d2[DISTURBED];
   fake.d2[DISTURBED] = d2;
   assert_good_frame(ALL);
   fake.d2[DISTURBED] = next_d2;
-  skip_frames(8);
+  uint64_t asked_us = now_us;
+  skip_to_temperature();
+  TEST_ASSERT_LESS_THAN_UINT64(asked_us + 110000, now_us);
+  skip_frames(2);
   assert_good_frame(ALL);
-  int second = find_entry(find_entry(0, 0x54, FAKE_COMMAND) + 1, 0x54, FAKE_COMMAND);
-  int third = find_entry(second + 1, 0x54, FAKE_COMMAND);
-  TEST_ASSERT_EQUAL_INT(2 * 8 + 2, third - second); /* eight frames between them */
 }
 
 /* A flipped bit: the pressures keep the temperature before it. A jump that stays is believed. */
 static void test_jump_of_the_temperature_must_be_confirmed(void) {
-  skip_frames(64);
+  next_frame();
+  skip_to_temperature();
   uint32_t d2 = fake.d2[DISTURBED];
   fake.d2[DISTURBED] = d2 ^ 0x80000;
   uint32_t flipped_d2 = fake.d2[DISTURBED];
   skip_frames(2);
-  TEST_ASSERT_EQUAL_INT(2, count_entries(0x54, FAKE_COMMAND));
   fake.d2[DISTURBED] = d2;
   assert_good_frame(ALL);
-  skip_frames(8);
-  TEST_ASSERT_EQUAL_INT(3, count_entries(0x54, FAKE_COMMAND)); /* asked again soon */
-  assert_good_frame(ALL);
-  skip_frames(64);
-  TEST_ASSERT_EQUAL_INT(4, count_entries(0x54, FAKE_COMMAND)); /* and then as ever */
-  assert_good_frame(ALL);
-
-  fake.d2[DISTURBED] = flipped_d2;
-  skip_frames(64 + 8);
-  assert_good_frame(ALL);
-}
-
-/* What is an instant at 180 Hz would be minutes at slow rates. */
-static void test_slow_rates_take_the_temperature_more_often(void) {
-  static const struct {
-    uint32_t rate_mHz;
-    int frames;
-  } cases[] = {{0, 64}, {100000, 51}, {20000, 11}, {100, 1}};
-  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-    struct scan_settings settings = usual;
-    settings.rate_mHz = cases[i].rate_mHz;
-    next_case(&settings);
-    skip_frames(2 * cases[i].frames + 1);
-    int first = find_entry(0, 0x54, FAKE_COMMAND);
-    int second = find_entry(first + 1, 0x54, FAKE_COMMAND);
-    TEST_ASSERT_EQUAL_INT(2 + 2 * cases[i].frames, second - first);
-  }
-  /* Also when the rate falls while many frames are still to come. */
-  next_case(&usual);
-  skip_frames(3);
-  scan_set_rate_mHz(&scan, 1000);
+  uint64_t asked_us = now_us;
+  skip_to_temperature(); /* asked again soon */
+  TEST_ASSERT_LESS_THAN_UINT64(asked_us + 110000, now_us);
   skip_frames(2);
-  TEST_ASSERT_EQUAL_INT(2, count_entries(0x54, FAKE_COMMAND));
+  assert_good_frame(ALL);
+  asked_us = now_us;
+  skip_to_temperature(); /* and then as ever */
+  TEST_ASSERT_UINT64_WITHIN(15000, asked_us + 490000, now_us);
+  skip_frames(2);
+  assert_good_frame(ALL);
+
+  skip_to_temperature();
+  fake.d2[DISTURBED] = flipped_d2;
+  next_frame();
+  skip_to_temperature();
+  skip_frames(2);
+  assert_good_frame(ALL);
 }
 
-static void test_temperature_interval(void) {
-  static const uint16_t intervals[] = {1, 2, 64, 1000};
-  for (size_t i = 0; i < 4; i++) {
+/* Twice a second, at most one frame in twenty: that frame comes in its turn, at its time, with the
+ * pressures of the one before. */
+static void test_temperature_takes_the_place_of_a_frame(void) {
+  static const uint16_t osrs[] = {256, 512, 1024, 2048, 4096, 8192};
+  for (size_t i = 0; i < 6; i++) {
     struct scan_settings settings = usual;
-    settings.temperature_interval = intervals[i];
+    settings.osr = osrs[i];
     next_case(&settings);
-    skip_frames(2 * intervals[i] + 1);
-    int first = find_entry(0, 0x54, FAKE_COMMAND);
-    int second = find_entry(first + 1, 0x54, FAKE_COMMAND);
-    TEST_ASSERT_EQUAL_INT(2 + 2 * intervals[i], second - first);
-    TEST_ASSERT_EQUAL_INT(second + second - first, find_entry(second + 1, 0x54, FAKE_COMMAND));
+    skip_frames(2);
+    struct frame last = frame;
+    uint64_t begun_us = now_us;
+    int held = 0;
+    int all = 0;
+    uint64_t period_us = 0;
+    for (; now_us < begun_us + 5000000; all++) {
+      fake.d1[DISTURBED] += 10;
+      next_frame();
+      TEST_ASSERT_EQUAL_UINT32(last.number + 1, frame.number);
+      if (period_us == 0) {
+        period_us = frame.t_us - last.t_us;
+      }
+      TEST_ASSERT_EQUAL_UINT64(period_us, frame.t_us - last.t_us);
+      TEST_ASSERT_EQUAL_UINT64(period_us, frame.t_begin_us - last.t_begin_us);
+      TEST_ASSERT_EQUAL_INT32(ms5840_find_osr(osrs[i])->noise_Pa_q10, frame.noise_Pa_q10);
+      if (frame.held) {
+        held++;
+        TEST_ASSERT_EQUAL_HEX32(last.valid, frame.valid);
+        TEST_ASSERT_EQUAL_INT32_ARRAY(last.pressure_Pa_q10, frame.pressure_Pa_q10, FT_MAX_SENSORS);
+      } else {
+        TEST_ASSERT_EQUAL_HEX32(ALL, frame.valid);
+        TEST_ASSERT_NOT_EQUAL(last.pressure_Pa_q10[DISTURBED], frame.pressure_Pa_q10[DISTURBED]);
+      }
+      last = frame;
+    }
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(9, held);
+    TEST_ASSERT_LESS_OR_EQUAL_INT(10, held);
+    TEST_ASSERT_LESS_OR_EQUAL_INT(all, 20 * held);
+    TEST_ASSERT_EQUAL_UINT32(0, value_of(&scan.counters.frames_skipped));
+  }
+}
+
+/* A requested rate leaves pauses: there no frame is held, and the temperature is fresh. */
+static void test_temperature_fits_into_the_pauses(void) {
+  static const uint32_t rates_mHz[] = {75000, 20000, 1000, 100};
+  for (size_t i = 0; i < sizeof rates_mHz / sizeof rates_mHz[0]; i++) {
+    struct scan_settings settings = usual;
+    settings.rate_mHz = rates_mHz[i];
+    next_case(&settings);
+    const uint64_t period_us = 1000000000u / rates_mHz[i];
+    skip_frames(2);
+    uint64_t last_us = frame.t_begin_us;
+    while (now_us < 31000000) {
+      next_frame();
+      TEST_ASSERT_FALSE(frame.held);
+      TEST_ASSERT_EQUAL_UINT64(period_us, frame.t_begin_us - last_us);
+      last_us = frame.t_begin_us;
+    }
+    int at = 0;
+    int temperatures = count_entries(0x54, FAKE_COMMAND);
+    for (int n = 0; n < temperatures; n++) {
+      int next = find_entry(at, 0x54, FAKE_COMMAND);
+      TEST_ASSERT_LESS_THAN_UINT64(7000, fake.log[next + 2].start_us - fake.log[next].start_us);
+      if (n > 1) {
+        uint64_t interval_us = fake.log[next].start_us - fake.log[at - 1].start_us;
+        TEST_ASSERT_UINT64_WITHIN(
+            10000,
+            period_us > 500000 ? period_us : (500000 + period_us - 1) / period_us * period_us,
+            interval_us);
+      }
+      at = next + 1;
+    }
+    TEST_ASSERT_GREATER_THAN_INT(3, temperatures);
   }
 }
 
@@ -471,16 +522,20 @@ static void test_replaced_sensor_waits_for_its_own_temperature(void) {
   fake.prom[DISTURBED] = fake.prom[SENSORS - 1];
   fake.d2[DISTURBED] += 500000;
   fake.answering = ALL;
-  while (count_entries(0x1E, FAKE_COMMAND) < 2 || scan.state != SCAN_WAIT_TEMPERATURE) {
+  while (count_entries(0x1E, FAKE_COMMAND) < 2 || !scan.conversion.is_temperature ||
+         scan.state != SCAN_WAIT_CONVERSION) {
     step();
   }
   fake.zero_next = DISTURBED_BIT;
-  for (int i = 0; i < 8; i++) {
+  uint64_t asked_us = now_us;
+  for (int i = 0; value_of(&scan.counters.zero_readings) < 3 && now_us < asked_us + 90000; i++) {
     next_frame();
     assert_good_frame(ALL & ~DISTURBED_BIT);
     TEST_ASSERT_EQUAL_HEX32(i == 0 ? DISTURBED_BIT : 0, frame.renewed);
   }
-  next_frame();
+  skip_to_temperature();
+  TEST_ASSERT_LESS_THAN_UINT64(asked_us + 120000, now_us);
+  skip_frames(2);
   assert_good_frame(ALL);
 }
 
@@ -517,9 +572,7 @@ static void test_failure_at_any_operation_is_survived(void) {
   static const enum ft_status failures[] = {FT_ERR_TIMEOUT, FT_ERR_STUCK, FT_ERR_ARGUMENT};
   for (int which = 0; which < 3; which++) {
     for (int at = 0; at < 60; at++) {
-      struct scan_settings settings = usual;
-      settings.temperature_interval = 5;
-      next_case(&settings);
+      next_case(&usual);
       fake.fail_at = at;
       fake.fail_with = failures[which];
       run_until(400000);
@@ -661,7 +714,7 @@ static void test_raised_rate_does_not_wait_for_the_old_period(void) {
 static void test_osr_changes_between_frames(void) {
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, scan_set_osr(&scan, 1023));
   skip_frames(3);
-  while (scan.state != SCAN_WAIT_PRESSURE) {
+  while (scan.state != SCAN_WAIT_CONVERSION || scan.conversion.is_temperature) {
     step();
   }
   /* During a conversion: it ends as it began, and the frame says so. */
@@ -676,20 +729,84 @@ static void test_osr_changes_between_frames(void) {
   assert_good_frame(ALL);
 }
 
-static void test_full_slot_stops_the_conversions(void) {
+/* A processor that falls behind gets the newest frame, each one it missed is counted, and the
+ * conversions keep their time. */
+static void test_frames_that_nobody_takes_are_counted(void) {
   skip_frames(3);
+  uint64_t first_us = frame.t_us;
+  uint32_t first = frame.number;
+  next_frame();
+  uint64_t period_us = frame.t_us - first_us;
   taking = false;
-  run_until(now_us + 100000);
-  int logged = fake.logged;
-  run_until(now_us + 1000000);
-  TEST_ASSERT_EQUAL_INT(logged, fake.logged);
-  uint64_t asked_us = now_us;
+  run_until(now_us + 300000);
   taking = true;
-  uint32_t number = frame.number;
-  skip_frames(2);
-  TEST_ASSERT_EQUAL_UINT32(number + 2, frame.number); /* none lost, none twice */
-  TEST_ASSERT_LESS_OR_EQUAL_UINT64(asked_us + 100, frame.t_begin_us);
+  next_frame();
+  TEST_ASSERT_GREATER_THAN_UINT32(first + 50, frame.number);
+  TEST_ASSERT_EQUAL_UINT64(first_us + (frame.number - first) * period_us, frame.t_us);
+  TEST_ASSERT_EQUAL_UINT32(frame.number - first - 2, value_of(&scan.counters.frames_skipped));
+  TEST_ASSERT_LESS_THAN_UINT64(2 * period_us, now_us - frame.t_us);
   TEST_ASSERT_FALSE(scan_take(&scan, &frame));
+  uint32_t skipped = value_of(&scan.counters.frames_skipped);
+  skip_frames(20);
+  TEST_ASSERT_EQUAL_UINT32(skipped, value_of(&scan.counters.frames_skipped));
+}
+
+/* Frames and temperatures that wait are taken in the order in which they were measured, and no PROM
+ * changes under a temperature that waits. */
+static void test_a_temperature_waits_for_the_processor(void) {
+  skip_frames(3);
+  uint32_t frames_before = frame.number + 1;
+  taking = false;
+  skip_to_temperature();
+  fake.d2[DISTURBED] += 20000;
+  run_until(now_us + 3000);
+  fake.d2[DISTURBED] -= 20000;
+  run_until(now_us + 600000); /* the next temperature finds its slot full */
+  fake.answering = ALL & ~DISTURBED_BIT;
+  run_until(now_us + 20000);
+  fake.answering = ALL;
+  run_until(now_us + 3000000);
+  TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND));
+  taking = true;
+  next_frame();
+  TEST_ASSERT_TRUE(frame.held);
+  uint32_t number = frame.number;
+  next_frame();
+  TEST_ASSERT_FALSE(frame.held);
+  TEST_ASSERT_GREATER_THAN_UINT32(number, frame.number);
+  TEST_ASSERT_EQUAL_UINT32(frame.number + 1 - frames_before - 2,
+                           value_of(&scan.counters.frames_skipped));
+  run_until(now_us + 2000000);
+  TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
+  assert_good_frame(ALL);
+}
+
+/* What a sensor that lost count of the clocks sends ends in ones. A pressure of all ones is beyond
+ * what the sensor can say, which is a measurement. */
+static void test_readings_that_break_off_are_invalid(void) {
+  skip_frames(3);
+  uint32_t d1[SENSORS];
+  memcpy(d1, fake.d1, sizeof d1);
+  fake.d1[DISTURBED] = (d1[DISTURBED] & 0xFF0000) | 0xFFFF;
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, frame.valid);
+  TEST_ASSERT_EQUAL_UINT32(1, value_of(&scan.counters.bus_nacks));
+  fake.d1[DISTURBED] = d1[DISTURBED];
+  for (int k = 0; k < 3; k++) {
+    fake.d1[k] |= 0xFF; /* by chance */
+  }
+  next_frame();
+  assert_good_frame(ALL);
+  fake.d1[10] |= 0xFF;
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~0x407u, frame.valid);
+  TEST_ASSERT_EQUAL_UINT32(5, value_of(&scan.counters.bus_nacks));
+  for (int k = 0; k < SENSORS; k++) {
+    fake.d1[k] = 0xFFFFFF;
+  }
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(ALL, frame.valid);
+  TEST_ASSERT_EQUAL_HEX32(ALL, frame.saturated);
 }
 
 /* Events that come early or for nothing change nothing. */
@@ -790,8 +907,8 @@ int main(void) {
   RUN_TEST(test_temperature_of_all_ones_is_no_reading);
   RUN_TEST(test_zero_temperature_keeps_the_last_and_is_repeated_soon);
   RUN_TEST(test_jump_of_the_temperature_must_be_confirmed);
-  RUN_TEST(test_slow_rates_take_the_temperature_more_often);
-  RUN_TEST(test_temperature_interval);
+  RUN_TEST(test_temperature_takes_the_place_of_a_frame);
+  RUN_TEST(test_temperature_fits_into_the_pauses);
   RUN_TEST(test_sensor_stops_and_comes_back);
   RUN_TEST(test_replaced_sensor_waits_for_its_own_temperature);
   RUN_TEST(test_flickering_sensor_costs_one_admission_a_second);
@@ -806,7 +923,9 @@ int main(void) {
   RUN_TEST(test_rate_changes);
   RUN_TEST(test_raised_rate_does_not_wait_for_the_old_period);
   RUN_TEST(test_osr_changes_between_frames);
-  RUN_TEST(test_full_slot_stops_the_conversions);
+  RUN_TEST(test_frames_that_nobody_takes_are_counted);
+  RUN_TEST(test_a_temperature_waits_for_the_processor);
+  RUN_TEST(test_readings_that_break_off_are_invalid);
   RUN_TEST(test_spurious_calls_change_nothing);
   RUN_TEST(test_random_faults_are_survived);
   RUN_TEST(test_one_and_thirty_two_sensors);

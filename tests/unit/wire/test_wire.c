@@ -16,7 +16,7 @@ static size_t body_length(uint8_t type, uint8_t n) {
   case WIRE_INFO:
     return 92 + 8u * n;
   case WIRE_HEALTH:
-    return 64;
+    return 68;
   case WIRE_ACK:
     return 12;
   case WIRE_CMD_STREAM:

@@ -127,7 +127,7 @@ static void test_info(void) {
   info->rate_mHz = 20000;
   info->measured_rate_mHz = 19998;
   info->osr = 1024;
-  info->temperature_interval = 64;
+  info->temperature_interval_ms = 500;
   info->slip_window_ms = 100;
   info->fit_iterations = 7;
   info->streams = WIRE_STREAM_CONTACT | WIRE_STREAM_RAW;
@@ -146,6 +146,7 @@ static void test_health(void) {
       .uptime_s = 0x01010100,
       .frames = 0x02020201,
       .frames_incomplete = 0x03030302,
+      .frames_skipped = 0x66554433,
       .packets_sent = 0x04040403,
       .packets_dropped = 0x05050504,
       .commands_done = 0x06060605,
