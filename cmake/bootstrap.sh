@@ -34,6 +34,7 @@ arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/lib/arm-none-eabi/newlib/nano.specs libnewlib-arm-none-eabi
 qemu-system-arm qemu-system-arm
 /usr/include/ceres/ceres.h libceres-dev
+/usr/include/fftw3.h libfftw3-dev
 /usr/include/gsl/gsl_multifit_nlinear.h libgsl-dev
 /usr/include/cminpack-1/cminpack.h libcminpack-dev
 /usr/include/gtest/gtest.h libgtest-dev

@@ -1,5 +1,7 @@
 #include "reference/press_sets.hpp"
 
+#include "twin/layer.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -54,7 +56,7 @@ std::vector<double> tabulate_point_load() {
   for (double start = 0.0; start < 48.0; start += 0.25) {
     for (const Node &node : rule) {
       const double u = start + 0.25 * node.at;
-      waves.push_back({u, 0.25 * node.weight * u * layer_transfer(u) / (2.0 * M_PI)});
+      waves.push_back({u, 0.25 * node.weight * u * twin::base_transfer(u, POISSON) / (2.0 * M_PI)});
     }
   }
   std::vector<double> table;
@@ -109,17 +111,6 @@ double Random::normal() {
   return radius * std::cos(uniform(0.0, 2.0 * M_PI));
 }
 
-double layer_transfer(double H) {
-  if (H > 300.0) {
-    return 0.0;
-  }
-  const double a = 2.0 * (1.0 - POISSON);
-  const double b = 1.0 - 2.0 * POISSON;
-  const double cosh = std::cosh(H);
-  return 2.0 * (1.0 - POISSON) * (a * cosh + H * std::sinh(H)) /
-         ((3.0 - 4.0 * POISSON) * cosh * cosh + H * H + b * b);
-}
-
 double Layer::point_load_Pa(double r_mm) const {
   static const std::vector<double> table = tabulate_point_load();
   const double position = r_mm / thickness_mm_ * STEPS_PER_THICKNESS;
@@ -131,10 +122,9 @@ double Layer::point_load_Pa(double r_mm) const {
   const double t = position - static_cast<double>(i);
   const double before = table[i == 0 ? 1 : i - 1];
   const double *at = &table[i];
-  const double value = -t * (t - 1.0) * (t - 2.0) / 6.0 * before +
-                       (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0 * at[0] -
-                       (t + 1.0) * t * (t - 2.0) / 2.0 * at[1] +
-                       (t + 1.0) * t * (t - 1.0) / 6.0 * at[2];
+  const double value =
+      -t * (t - 1.0) * (t - 2.0) / 6.0 * before + (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0 * at[0] -
+      (t + 1.0) * t * (t - 2.0) / 2.0 * at[1] + (t + 1.0) * t * (t - 1.0) / 6.0 * at[2];
   return 1e6 / (thickness_mm_ * thickness_mm_) * value;
 }
 

@@ -32,9 +32,9 @@ constexpr std::array<PressSet, 4> ALL_PRESS_SETS{PressSet::A, PressSet::B, Press
 char name_of(PressSet set);
 
 struct Press {
-  double x_mm, y_mm;  // where the contact truly is
-  double force_N;     // true; for a Gaussian 2 pi p0 sigma^2
-  double noise_Pa;    // rms
+  double x_mm, y_mm;               // where the contact truly is
+  double force_N;                  // true; for a Gaussian 2 pi p0 sigma^2
+  double noise_Pa;                 // rms
   std::vector<double> pressure_Pa; // [sensor], exact value plus noise
 };
 
@@ -58,10 +58,7 @@ private:
   std::uint64_t state_;
 };
 
-// Base stress per surface pressure of a bonded layer at H = |wave number| * thickness.
-double layer_transfer(double H);
-
-// Pressure on the base of a bonded elastic layer (Poisson's ratio 0.49).
+// Pressure on the base of a bonded elastic layer of Poisson's ratio 0.49 (twin/layer.hpp).
 class Layer {
 public:
   explicit Layer(double thickness_mm) : thickness_mm_(thickness_mm) {}

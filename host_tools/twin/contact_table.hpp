@@ -1,0 +1,48 @@
+// The pressure on the base under one indenter on one layer, for any force and place: computed once
+// (contact.hpp), kept in a file, interpolated.
+//
+// Forces 0..50 N; below 0.02 N the contact is as if at 0.02 N. Places up to 45 mm away; beyond, the
+// pressure is taken to be none. The interpolation is cubic in x, y and the logarithm of the force;
+// the tests hold it to 0.2 % of the peak of a solution of its own; a flat indenter, whose edge
+// takes hold node by node, needs that much. Some 0.2 us per pressure.
+#pragma once
+
+#include "twin/contact.hpp"
+
+#include <filesystem>
+#include <functional>
+#include <vector>
+
+namespace fingertip::twin {
+
+class ContactTable {
+public:
+  static constexpr double FORCE_MAX_N = 50.0;
+  static constexpr double REACH_mm = 45.0;
+
+  // From the cache if it holds this very table, else solved (half a minute at most) and kept there;
+  // a damaged file is solved anew. on_progress gets the share done, 0..1. Throws
+  // std::filesystem::filesystem_error or std::runtime_error if the cache cannot be written.
+  static ContactTable load_or_build(const Indenter &indenter, const Layer &layer,
+                                    const std::filesystem::path &cache_directory,
+                                    const std::function<void(double)> &on_progress = {});
+
+  // On the base, by dx, dy from the middle of the contact, along the indenter's own axes.
+  double base_pressure_Pa(double force_N, double dx_mm, double dy_mm) const;
+  double indentation_mm(double force_N) const;
+  double contact_radius_mm(double force_N) const; // of a disc of the contact's area
+
+private:
+  struct Between; // four neighbouring forces and their weights
+  Between between(double force_N) const;
+  double interpolated(const std::vector<float> &values, double force_N) const;
+
+  std::vector<float> per_force_;                  // [force][x][y], Pa / N
+  std::vector<float> indentation_mm_, radius_mm_; // [force]
+};
+
+// Where the tables of a user are kept, if not said otherwise: fingertip/contact-tables in
+// XDG_CACHE_HOME or ~/.cache.
+std::filesystem::path default_cache_directory();
+
+} // namespace fingertip::twin
