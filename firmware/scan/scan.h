@@ -150,6 +150,12 @@ enum ft_status scan_init(struct scan *scan, const struct array_bus *bus,
  * latest; an earlier one, when the bus has made progress, is welcome. */
 uint64_t scan_step(struct scan *scan, uint64_t now_us);
 
+/* Whether scan_take has something to do. Any context. */
+static inline bool scan_has_news(const struct scan *scan) {
+  return atomic_load_explicit(&scan->slot_state, memory_order_relaxed) == SCAN_SLOT_FULL ||
+         atomic_load_explicit(&scan->temperature_state, memory_order_relaxed) == SCAN_SLOT_FULL;
+}
+
 /* Main context. True: *frame, which must still hold the frame before, holds a new one. False:
  * nothing new (a temperature may have been used up). */
 bool scan_take(struct scan *scan, struct frame *frame);
