@@ -1,0 +1,38 @@
+/* The whole firmware in this process, on simulated sensors and in simulated time: firmware/app on
+ * boards/native. One at a time, since the board is one.
+ *
+ * The host's end of the line is native_cdc.h. Nothing takes time but the bus and the conversions.
+ */
+#ifndef PLAYER_NATIVE_FINGERTIP_H
+#define PLAYER_NATIVE_FINGERTIP_H
+
+#include "native/sim_array.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct native_fingertip_settings {
+  uint64_t seed;        /* of noise and calibration */
+  double noise;         /* times the datasheet's */
+  double prom_spread;   /* every calibration word of every sensor is off the typical part's by up to
+                           this share; the firmware reads it and calculates with it */
+  float prior_sigma_mm; /* prior on the width; prior_width_mm 0: the build's own */
+  float prior_width_mm;
+  struct sim_world world;
+};
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Powers up at time 0. */
+void native_fingertip_start(const struct native_fingertip_settings *settings);
+
+/* Runs to t_us. False: the firmware left for the loader or panicked. */
+bool native_fingertip_run_until(uint64_t t_us);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
