@@ -85,32 +85,6 @@ char name_of(PressSet set) {
   return static_cast<char>('A' + static_cast<int>(set));
 }
 
-Random::Random(std::uint64_t seed, std::uint64_t stream, std::uint64_t index) : state_(seed) {
-  state_ = next() ^ stream;
-  state_ = next() ^ index;
-}
-
-std::uint64_t Random::next() {
-  state_ += 0x9E3779B97F4A7C15u;
-  std::uint64_t z = state_;
-  z = (z ^ z >> 30) * 0xBF58476D1CE4E5B9u;
-  z = (z ^ z >> 27) * 0x94D049BB133111EBu;
-  return z ^ z >> 31;
-}
-
-double Random::uniform(double low, double high) {
-  return low + (high - low) * static_cast<double>(next() >> 11) * 0x1p-53;
-}
-
-double Random::log_uniform(double low, double high) {
-  return std::exp(uniform(std::log(low), std::log(high)));
-}
-
-double Random::normal() {
-  const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform(0.0, 1.0)));
-  return radius * std::cos(uniform(0.0, 2.0 * M_PI));
-}
-
 double Layer::point_load_Pa(double r_mm) const {
   static const std::vector<double> table = tabulate_point_load();
   const double position = r_mm / thickness_mm_ * STEPS_PER_THICKNESS;

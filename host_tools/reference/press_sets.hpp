@@ -17,6 +17,7 @@
 // not a contact solver and says nothing about hyperelastic rubber.
 #pragma once
 
+#include "libfingertip/random.hpp"
 #include "reference/reference.hpp"
 
 #include <array>
@@ -25,6 +26,8 @@
 #include <vector>
 
 namespace fingertip::reference {
+
+using fingertip::Random;
 
 enum class PressSet { A, B, C, D };
 constexpr std::array<PressSet, 4> ALL_PRESS_SETS{PressSet::A, PressSet::B, PressSet::C,
@@ -44,19 +47,6 @@ Press make_press(PressSet set, const Array &array, std::uint64_t seed, std::size
 // As the firmware receives it, 1/1024 Pa, after rounding to multiples of lsb_Pa.
 std::vector<std::int32_t> quantise(const std::vector<double> &pressure_Pa,
                                    double lsb_Pa = 1.0 / 1024.0);
-
-// Random 64-bit words by splitmix64: the same on every machine and library.
-class Random {
-public:
-  Random(std::uint64_t seed, std::uint64_t stream, std::uint64_t index);
-  std::uint64_t next();
-  double uniform(double low, double high);
-  double log_uniform(double low, double high);
-  double normal(); // mean 0, sd 1
-
-private:
-  std::uint64_t state_;
-};
 
 // Pressure on the base of a bonded elastic layer of Poisson's ratio 0.49 (twin/layer.hpp).
 class Layer {

@@ -1,0 +1,92 @@
+// What rubber and sensors do to the pressure on the base before a sensor reports it. Each effect is
+// switched on by its name and has one value; effects() is the list of them, with sources.
+//
+// In the order in which they act on the pressure p of one sensor:
+//   hysteresis   rate-independent. Loading to a new maximum m, p stays; unloading from m it is lower
+//                by 3 V p (1 - p / m), which makes the loop V of the area below the loading curve.
+//                Loading again leads straight back to m. Nothing remains at p = 0.
+//   relaxation   linear viscoelastic, a Prony series of two times: p less the sum of g_i z_i, where
+//                z_i follows p with the time constant TIMES_s[i]. g are scaled so that a hold of 8 s
+//                after a press of 1.3 s loses V of its peak, V drawn for each sensor. No reading
+//                leaves the range from 0 to p: rubber does not pull.
+//   gain         p times 1 + V normal, drawn for each sensor, at most three standard deviations
+//   drift        p plus a ramp in time, drawn for each sensor: slope and sign
+//   bias         reads low above 1.2 bar absolute: by V at 2 bar, growing with the square
+//   clip         never above V absolute
+//   temperature  not in the pressure: the sensors, whose PROM corrects for it, warm up by V with the
+//                slowest time constant 4 h^2 / (pi^2 a) of a layer h warmed from above
+//
+// Relaxation and hysteresis act on the reported pressure while the scene's force is what it is: as
+// if the press were force-controlled and the sensor's share of the load went down. Where a robot
+// holds its position the force goes down as well, and less of the effect is an error.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace fingertip::twin {
+
+struct Effect {
+  std::string name;
+  std::string unit;
+  double usual, lowest, highest; // values
+  std::string description;
+  std::string source;
+};
+
+const std::vector<Effect> &effects();
+
+// Name to value, of those that are switched on.
+using EffectValues = std::map<std::string, double>;
+
+// "drift,relaxation=20": a list of names, each with a value or its usual one. "" and "none" are no
+// effects, "all" is all of them, "all,clip=5" with that value. Throws Error.
+EffectValues parse_effects(const std::string &text);
+
+// One pad: the same seed draws the same pad, and the same draws at any value of an effect.
+class Pad {
+public:
+  static constexpr std::array<double, 2> TIMES_s{1.0, 10.0};
+
+  Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, double ambient_Pa,
+      std::uint64_t seed);
+
+  // The pressure that each sensor reports above ambient at this time, given the pressure on the
+  // base. Times must increase; between them the pressure on the base is linear. The first time is
+  // the beginning: the pad is at rest until then.
+  void report(double t_s, const std::vector<double> &base_Pa, std::vector<double> &reported_Pa);
+  double temperature_rise_K(double t_s) const;
+
+  // Drawn, [sensor]; empty where the effect is off.
+  const std::vector<double> &gain_errors() const { return gain_errors_; }
+  const std::vector<double> &drifts_Pa_s() const { return drifts_Pa_s_; }
+  const std::vector<double> &relaxations() const { return relaxations_; } // share lost in the hold
+
+private:
+  struct Rubber { // of one sensor
+    std::array<double, TIMES_s.size()> strength{}, follows_Pa{};
+    double elastic_Pa = 0.0; // after the hysteresis, at the last time
+    // Hysteresis: the last pressure and what it lacks, whether it falls, where it turned last, and
+    // the largest since the pressure was none.
+    double pressure_Pa = 0.0, lacks_Pa = 0.0;
+    bool falls = false;
+    double turn_Pa = 0.0, turn_lacks_Pa = 0.0, largest_Pa = 0.0;
+  };
+  double with_hysteresis(Rubber &rubber, double pressure_Pa) const;
+  double relaxed(Rubber &rubber, double pressure_Pa);
+
+  double ambient_Pa_;
+  double hysteresis_ = 0.0; // share of the loop
+  double bias_ = 0.0, clip_Pa_ = 0.0, warming_K_ = 0.0, warming_s_ = 0.0;
+  bool relaxes_ = false;
+  std::vector<double> gain_errors_, drifts_Pa_s_, relaxations_;
+  std::vector<Rubber> rubber_;
+  double t_s_ = 0.0, step_s_ = 0.0, begin_s_ = 0.0;
+  bool begun_ = false;
+  std::array<double, TIMES_s.size()> decay_{};
+};
+
+} // namespace fingertip::twin

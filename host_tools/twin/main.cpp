@@ -1,0 +1,296 @@
+// twin: writes scenes that emulator and native pipeline play. Exit status: 0 done; 1 something went
+// wrong, said in one line; 2 wrong usage.
+#include "libfingertip/error.hpp"
+#include "libfingertip/output_file.hpp"
+#include "libfingertip/text.hpp"
+#include "twin/scene_file.hpp"
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <cstdio>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <unistd.h>
+
+namespace {
+
+using namespace fingertip;
+using namespace fingertip::twin;
+
+constexpr double LAYER_MIN_mm = 3.0, LAYER_MAX_mm = 20.0;
+
+struct Options {
+  SceneOptions scene;
+  std::string effects;
+  std::string gain;
+  std::string output;
+  bool overwrite = false;
+  std::string cache;
+  std::vector<std::string> indenters;
+  std::vector<double> layers_mm;
+};
+
+std::string number(double value) {
+  return shortest(static_cast<float>(value));
+}
+
+// One line on a terminal, rewritten; nothing where the output is kept.
+class ProgressBar {
+public:
+  explicit ProgressBar(std::string what) : what_(std::move(what)), shown_(isatty(STDERR_FILENO)) {}
+  ~ProgressBar() {
+    if (drawn_) {
+      std::fprintf(stderr, "\r\x1b[K");
+    }
+  }
+  void show(double share) {
+    const int percent = static_cast<int>(100.0 * share);
+    if (!shown_ || (drawn_ && percent == percent_)) {
+      return;
+    }
+    constexpr int WIDTH = 40;
+    const int full = static_cast<int>(WIDTH * share);
+    std::fprintf(stderr, "\r%s [%s%s] %3d %%", what_.c_str(), std::string(full, '#').c_str(),
+                 std::string(WIDTH - full, '.').c_str(), percent);
+    std::fflush(stderr);
+    percent_ = percent;
+    drawn_ = true;
+  }
+
+private:
+  std::string what_;
+  bool shown_;
+  bool drawn_ = false;
+  int percent_ = 0;
+};
+
+Layer layer_of(double thickness_mm) {
+  if (!(thickness_mm >= LAYER_MIN_mm && thickness_mm <= LAYER_MAX_mm)) {
+    throw Error("--layer " + number(thickness_mm) + " is out of range; give " +
+                number(LAYER_MIN_mm) + " to " + number(LAYER_MAX_mm) + " mm");
+  }
+  return silicone(thickness_mm);
+}
+
+std::filesystem::path cache_of(const Options &options) {
+  return options.cache.empty() ? default_cache_directory() : std::filesystem::path(options.cache);
+}
+
+int list() {
+  std::printf("Scenes (twin scene KIND), usual length and force:\n");
+  for (const SceneKind &kind : scene_kinds()) {
+    std::printf("  %-14s%s; %s s, %s N\n", kind.name.c_str(), kind.description.c_str(),
+                number(kind.usual_seconds).c_str(), kind.usual_forces.c_str());
+  }
+  std::printf("\nIndenters (--indenter):\n");
+  for (const Indenter &one : indenters()) {
+    std::printf("  %-14s%s\n", one.name.c_str(), one.description.c_str());
+  }
+  std::printf("\nLayers (--layer):\n"
+              "  %-14sof silicone rubber, Shore 15 A; %s to %s mm, the report uses 12 and 6\n",
+              "MM", number(LAYER_MIN_mm).c_str(), number(LAYER_MAX_mm).c_str());
+  std::printf("\nEffects (--effects NAME[=VALUE],...; none and all), usual value:\n");
+  for (const Effect &effect : effects()) {
+    std::printf("  %-14s%s; %s %s. %s\n", effect.name.c_str(), effect.description.c_str(),
+                number(effect.usual).c_str(), effect.unit.c_str(), effect.source.c_str());
+  }
+  return 0;
+}
+
+// All pairs, on as many threads as there are processors.
+int tables(const Options &options) {
+  struct Job {
+    const Indenter *indenter;
+    Layer layer;
+    double share = 0.0;
+  };
+  std::vector<Job> jobs;
+  for (double thickness_mm : options.layers_mm) {
+    const Layer layer = layer_of(thickness_mm);
+    if (options.indenters.empty()) {
+      for (const Indenter &one : indenters()) {
+        jobs.push_back({&one, layer});
+      }
+    }
+    for (const std::string &name : options.indenters) {
+      jobs.push_back({&indenter(name), layer});
+    }
+  }
+  const std::filesystem::path cache = cache_of(options);
+  ProgressBar bar("contact tables");
+  std::mutex telling;
+  std::exception_ptr failure;
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t i; (i = next++) < jobs.size();) {
+      const auto tell = [&](double share) {
+        const std::lock_guard<std::mutex> lock(telling);
+        jobs[i].share = share;
+        double sum = 0.0;
+        for (const Job &job : jobs) {
+          sum += job.share;
+        }
+        bar.show(sum / static_cast<double>(jobs.size()));
+      };
+      try {
+        ContactTable::load_or_build(*jobs[i].indenter, jobs[i].layer, cache, tell);
+        tell(1.0);
+      } catch (...) {
+        const std::lock_guard<std::mutex> lock(telling);
+        failure = std::current_exception();
+        next = jobs.size();
+      }
+    }
+  };
+  std::vector<std::thread> threads(std::max(1u, std::thread::hardware_concurrency()));
+  for (std::thread &thread : threads) {
+    thread = std::thread(work);
+  }
+  for (std::thread &thread : threads) {
+    thread.join();
+  }
+  if (failure) {
+    std::rethrow_exception(failure);
+  }
+  std::printf("%zu contact tables in %s\n", jobs.size(), cache.string().c_str());
+  return 0;
+}
+
+ContactTable table_of(const std::string &name, const Layer &layer, const Options &options) {
+  ProgressBar bar("contact table of " + name + ", once");
+  return ContactTable::load_or_build(indenter(name), layer, cache_of(options),
+                                     [&](double share) { bar.show(share); });
+}
+
+int scene(Options &options) {
+  SceneOptions &chosen = options.scene;
+  chosen.effects = parse_effects(options.effects);
+  if (!options.gain.empty()) {
+    const double percent = parse_effects("gain=" + options.gain).at("gain");
+    if (percent > 0.0) {
+      chosen.effects["gain"] = percent;
+    } else {
+      chosen.effects.erase("gain");
+    }
+  }
+  const Layer layer = layer_of(chosen.layer_mm);
+  check_output(options.output, options.overwrite);
+  check_output(truth_path(options.output), options.overwrite);
+  const ContactTable table = table_of(chosen.indenter, layer, options);
+  const bool other = !chosen.second_indenter.empty() && chosen.second_indenter != chosen.indenter;
+  const ContactTable second = other ? table_of(chosen.second_indenter, layer, options) : table;
+  const Scene made = make_scene(chosen, table);
+  Written written;
+  {
+    ProgressBar bar(made.name);
+    written = write_scene(made, layer, table, second, options.output, options.overwrite,
+                          [&](double share) { bar.show(share); });
+  }
+  std::printf("%s: %s, %zu contacts in %s s, %zu rows, %s MB, at most %s kPa\n",
+              printable(options.output).c_str(), made.name.c_str(), made.acts.size(),
+              number(*made.options.seconds).c_str(), written.rows,
+              fixed(1e-6 * static_cast<double>(written.bytes), 1).c_str(),
+              fixed(1e-3 * written.peak_Pa, 1).c_str());
+  return 0;
+}
+
+int run(int argc, char **argv) {
+  Options options;
+  std::function<int()> action;
+  CLI::App app("Writes what the sensors of a simulated pad feel, for emulator and native pipeline.",
+               "twin");
+  app.set_version_flag("--version", "twin " FINGERTIP_VERSION);
+  app.require_subcommand(1);
+  app.failure_message([](const CLI::App *failed, const CLI::Error &error) {
+    std::string command = "twin";
+    for (const CLI::App *chosen : failed->get_subcommands()) {
+      command += " " + chosen->get_name();
+    }
+    return printable("twin: " + std::string(error.what()) + "; see " + command + " --help") + "\n";
+  });
+  const auto with_cache = [&](CLI::App *command) {
+    command
+        ->add_option("--cache", options.cache,
+                     "Folder of the contact tables; default: " + default_cache_directory().string())
+        ->type_name("DIR");
+  };
+
+  app.add_subcommand("list", "Explain scenes, indenters, layers and effects")->callback([&] {
+    action = list;
+  });
+
+  CLI::App *build = app.add_subcommand("tables", "Compute the contact tables that are not cached");
+  build->add_option("--indenter", options.indenters, "Only of these; default: all")
+      ->delimiter(',')
+      ->type_name("NAME,...");
+  build->add_option("--layer", options.layers_mm, "On layers of these thicknesses; default: 12,6")
+      ->delimiter(',')
+      ->default_val(std::vector<double>{12.0, 6.0})
+      ->default_str("")
+      ->type_name("MM,...");
+  with_cache(build);
+  build->callback([&] { action = [&] { return tables(options); }; });
+
+  CLI::App *write =
+      app.add_subcommand("scene", "Write a scenario, and its events beside it: FILE.truth.csv");
+  SceneOptions &s = options.scene;
+  write->add_option("kind", s.kind, "What happens: see twin list")->required()->type_name("KIND");
+  write->add_option("-o,--output", options.output, "The scenario to write")
+      ->required()
+      ->type_name("FILE.csv");
+  write->add_option("--indenter", s.indenter, "What presses; default sphere6")->type_name("NAME");
+  write->add_option("--second", s.second_indenter, "What presses too, in scenes of two contacts; "
+                                                   "default: the same")
+      ->type_name("NAME");
+  write->add_option("--layer", s.layer_mm, "Thickness of the rubber; default 12")->type_name("MM");
+  write->add_option("--gain", options.gain, "Short for the effect gain; 0: none")
+      ->type_name("PERCENT");
+  write->add_option("--effects", options.effects,
+                    "Errors of the pad, as in \"drift,relaxation=20\"; none (default), all")
+      ->type_name("NAME[=VALUE],...");
+  write->add_option("--seed", s.seed, "Of places, forces and times; default 1")->type_name("N");
+  write->add_option("--pad", s.pad_seed, "Seed of the pad's errors; default: --seed")
+      ->type_name("N");
+  write->add_option("--seconds", s.seconds, "Length; default: see twin list")->type_name("S");
+  write->add_option("--force", s.forces, "\"5\", in turn \"1,2,5\", any of \"1..15\"; default: see "
+                                         "twin list")
+      ->type_name("N");
+  write->add_option("--speed", s.speeds_mm_s, "In turn, of slip and rolloff")
+      ->delimiter(',')
+      ->type_name("MM_PER_S,...");
+  write->add_option("--dead-travel", s.dead_travel_mm,
+                    "The pusher's way before the object slips; default 1")
+      ->type_name("MM");
+  write->add_option("--creep", s.creep_share,
+                    "Share of the dead travel by which the contact moves along; default 0.5")
+      ->type_name("SHARE");
+  write->add_option("--stick-slip", s.stick_slip_mm, "Slip in jumps of this size; default 0: steady")
+      ->type_name("MM");
+  write->add_option("--margin", s.margin_mm,
+                    "Random places reach so far beyond the paper's grid; default 2.25")
+      ->type_name("MM");
+  write->add_option("--quiet", s.quiet_s, "Time between contacts; default 1.2")->type_name("S");
+  write->add_flag("--overwrite", options.overwrite, "Replace files that exist");
+  with_cache(write);
+  write->callback([&] { action = [&] { return scene(options); }; });
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError &error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  return action();
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception &error) {
+    std::fprintf(stderr, "twin: %s\n", printable(error.what()).c_str());
+    return 1;
+  }
+}

@@ -1,0 +1,496 @@
+#include "twin/scene_file.hpp"
+
+#include "libfingertip/output_file.hpp"
+#include "libfingertip/text.hpp"
+
+extern "C" {
+#include "config/geometry.h"
+}
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <optional>
+
+namespace fingertip::twin {
+namespace {
+
+constexpr double STEP_s = 1e-3;
+constexpr double QUIET_STEP_s = 0.1;
+constexpr double GAUSSIAN_REACH = 3.0; // thicknesses
+constexpr int GAUSSIAN_STEPS = 24;     // from the middle to there
+constexpr int GAUSSIAN_FORCES = 33;
+constexpr double FORCE_MIN_N = 0.02;
+
+class Text {
+public:
+  Text &operator<<(std::string_view text) {
+    bytes_ += text;
+    return *this;
+  }
+  void number(double value, int digits) {
+    char buffer[64];
+    char *end =
+        std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::fixed, digits).ptr;
+    // No "-0.00".
+    const bool zero = std::all_of(buffer, end, [](char c) { return c == '-' || c == '0' || c == '.'; });
+    const std::string_view text(buffer, static_cast<std::size_t>(end - buffer));
+    bytes_ += zero && text[0] == '-' ? text.substr(1) : text;
+  }
+  void cell(double value, int digits) {
+    bytes_ += ',';
+    number(value, digits);
+  }
+  const std::string &bytes() const { return bytes_; }
+  void clear() { bytes_.clear(); }
+
+private:
+  std::string bytes_;
+};
+
+struct Row {
+  double t_s = 0.0;
+  bool contact = false, slip = false;
+  double x_mm = 0.0, y_mm = 0.0, force_N = 0.0, p0_Pa = 0.0, sigma_mm = 0.0;
+  double temperature_degC = ROOM_degC;
+  std::vector<double> sensors_Pa;
+};
+
+// Leaves out rows that the line through their neighbours tells.
+class RowWriter {
+public:
+  RowWriter(OutputFile &file, bool temperature) : file_(file), temperature_(temperature) {}
+
+  void add(const Row &row) {
+    if (!anchor_) {
+      write(row);
+      return;
+    }
+    if (row.contact != last_.contact || row.slip != last_.slip) {
+      if (pending_) {
+        write(last_);
+      }
+      write(row);
+      return;
+    }
+    if (pending_ && !on_the_line(row)) {
+      write(last_);
+    }
+    narrow(row);
+    last_ = row;
+    pending_ = true;
+  }
+
+  void finish() {
+    if (pending_) {
+      write(last_);
+    }
+    flush();
+  }
+
+  std::size_t rows() const { return rows_; }
+  std::size_t bytes() const { return bytes_; }
+
+private:
+  struct Channel {
+    double value, tolerance;
+    double lowest, highest; // slope from the anchor that keeps all rows since within tolerance
+  };
+
+  std::vector<std::pair<double, double>> values_of(const Row &row) const {
+    double peak_Pa = 0.0;
+    for (double sensor_Pa : row.sensors_Pa) {
+      peak_Pa = std::max(peak_Pa, std::abs(sensor_Pa));
+    }
+    std::vector<std::pair<double, double>> values{
+        {row.x_mm, 2e-3},
+        {row.y_mm, 2e-3},
+        {row.force_N, 1e-4 + 5e-5 * row.force_N},
+        {row.p0_Pa, 0.2 + 5e-5 * row.p0_Pa},
+        {row.sigma_mm, 1e-3},
+        {row.temperature_degC, 2e-3},
+    };
+    for (double sensor_Pa : row.sensors_Pa) {
+      values.emplace_back(sensor_Pa, 0.2 + 5e-5 * peak_Pa);
+    }
+    return values;
+  }
+
+  bool on_the_line(const Row &row) const {
+    const auto values = values_of(row);
+    const double step_s = row.t_s - anchor_s_;
+    for (std::size_t i = 0; i < values.size(); i++) {
+      const double slope = (values[i].first - channels_[i].value) / step_s;
+      if (slope < channels_[i].lowest || slope > channels_[i].highest) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  void narrow(const Row &row) {
+    const auto values = values_of(row);
+    const double step_s = row.t_s - anchor_s_;
+    for (std::size_t i = 0; i < values.size(); i++) {
+      Channel &channel = channels_[i];
+      const double change = values[i].first - channel.value;
+      channel.lowest = std::max(channel.lowest, (change - values[i].second) / step_s);
+      channel.highest = std::min(channel.highest, (change + values[i].second) / step_s);
+    }
+  }
+
+  void write(const Row &row) {
+    text_.number(row.t_s, 3);
+    text_ << (row.contact ? ",1" : ",0");
+    text_.cell(row.x_mm, 4);
+    text_.cell(row.y_mm, 4);
+    text_.cell(row.force_N, 5);
+    text_.cell(row.p0_Pa, 1);
+    text_.cell(row.sigma_mm, 3);
+    text_ << (row.slip ? ",1" : ",0");
+    for (double sensor_Pa : row.sensors_Pa) {
+      text_.cell(sensor_Pa, 2);
+    }
+    if (temperature_) {
+      text_.cell(row.temperature_degC, 3);
+    }
+    text_ << "\n";
+    rows_++;
+    if (text_.bytes().size() > 1 << 20) {
+      flush();
+    }
+    channels_.clear();
+    for (const auto &[value, tolerance] : values_of(row)) {
+      channels_.push_back({value, tolerance, -std::numeric_limits<double>::infinity(),
+                           std::numeric_limits<double>::infinity()});
+    }
+    anchor_ = true;
+    anchor_s_ = row.t_s;
+    pending_ = false;
+    last_ = row;
+  }
+
+  void flush() {
+    file_.append(text_.bytes().data(), text_.bytes().size());
+    bytes_ += text_.bytes().size();
+    text_.clear();
+  }
+
+  OutputFile &file_;
+  bool temperature_;
+  Text text_;
+  std::vector<Channel> channels_;
+  bool anchor_ = false, pending_ = false;
+  double anchor_s_ = 0.0;
+  Row last_;
+  std::size_t rows_ = 0, bytes_ = 0;
+};
+
+void metadata(Text &text, const std::string &key, const std::string &value) {
+  text << "# " << key << ": " << value << "\n";
+}
+
+std::string number(double value) {
+  return shortest(static_cast<float>(value));
+}
+
+std::string list(const std::vector<double> &values, double factor, int digits) {
+  std::string text;
+  for (double value : values) {
+    text += (text.empty() ? "" : " ") + fixed(factor * value, digits);
+  }
+  return text;
+}
+
+std::string file_name(const std::string &path) {
+  return std::filesystem::path(path).filename().string();
+}
+
+const SceneKind &kind_of(const Scene &scene) {
+  return *std::find_if(scene_kinds().begin(), scene_kinds().end(), [&](const SceneKind &kind) {
+    return kind.name == scene.options.kind;
+  });
+}
+
+void describe(Text &text, const Scene &scene, const Layer &layer, const Pad &pad,
+              const std::string &path) {
+  const SceneOptions &options = scene.options;
+  metadata(text, "name", scene.name);
+  metadata(text, "description", kind_of(scene).description + "; simulated by twin");
+  metadata(text, "kind", options.kind);
+  metadata(text, "seed", std::to_string(options.seed));
+  metadata(text, "pad_seed", std::to_string(*options.pad_seed));
+  metadata(text, "ambient_Pa", number(AMBIENT_Pa));
+  metadata(text, "temperature_degC", number(ROOM_degC));
+  metadata(text, "sensors", std::to_string(geometry.sensor_count));
+  metadata(text, "indenter", options.indenter + ", " + indenter(options.indenter).description);
+  if (options.kind == "two") {
+    const std::string &second =
+        options.second_indenter.empty() ? options.indenter : options.second_indenter;
+    metadata(text, "second_indenter", second + ", " + indenter(second).description);
+  }
+  metadata(text, "layer_mm", number(layer.thickness_mm));
+  metadata(text, "layer_youngs_modulus_MPa", fixed(1e-6 * layer.youngs_modulus_Pa, 4));
+  metadata(text, "layer_poisson", number(layer.poisson));
+  metadata(text, "force_N", options.forces);
+  metadata(text, "margin_mm", number(options.margin_mm));
+  metadata(text, "quiet_s", number(options.quiet_s));
+  if (options.kind == "slip") {
+    metadata(text, "dead_travel_mm", number(options.dead_travel_mm));
+    metadata(text, "creep_share", number(options.creep_share));
+    metadata(text, "stick_slip_mm", number(options.stick_slip_mm));
+  }
+  for (const Effect &effect : effects()) {
+    const auto chosen = options.effects.find(effect.name);
+    if (chosen != options.effects.end()) {
+      metadata(text, "effect_" + effect.name,
+               number(chosen->second) + " " + effect.unit + "; " + effect.source);
+    }
+  }
+  if (!pad.gain_errors().empty()) {
+    metadata(text, "gain_errors_percent", list(pad.gain_errors(), 100.0, 3));
+  }
+  if (!pad.drifts_Pa_s().empty()) {
+    metadata(text, "drifts_Pa_s", list(pad.drifts_Pa_s(), 1.0, 5));
+  }
+  if (!pad.relaxations().empty()) {
+    metadata(text, "relaxations_percent", list(pad.relaxations(), 100.0, 2));
+  }
+  metadata(text, "gaussian",
+           scene.options.kind == "two" ? "none: p0_Pa and sigma_mm are 0"
+                                       : "p0_Pa and sigma_mm: closest to the pressure on the base");
+  metadata(text, "truth", file_name(truth_path(path)));
+}
+
+// A path within a folder that is absent, and the like, are told before any work.
+std::string truth_of(const Scene &scene, const std::string &path) {
+  Text text;
+  text << "# fingertip-truth 1\n";
+  metadata(text, "scene", scene.name);
+  metadata(text, "scenario", file_name(path));
+  metadata(text, "indenter", scene.options.indenter);
+  text << "act,press,phase,t_begin_s,t_end_s,x_mm,y_mm,force_N,angle_deg,x_end_mm,y_end_mm,"
+          "force_end_N,angle_end_deg,x2_mm,y2_mm,force2_N,force2_end_N,sensors_near,speed_mm_s,"
+          "dead_travel_mm,stick_slip_mm\n";
+  for (std::size_t n = 0; n < scene.acts.size(); n++) {
+    const Act &act = scene.acts[n];
+    const bool pushed = scene.options.kind == "slip";
+    for (const Phase &phase : act.phases) {
+      const double begin_s = phase.begin_s - act.begin_s, end_s = phase.end_s - act.begin_s;
+      text << std::to_string(n + 1) << "," << act.press << "," << phase.name;
+      text.cell(phase.begin_s, 3);
+      text.cell(phase.end_s, 3);
+      for (double t_s : {begin_s, end_s}) {
+        const Touch contact = act.tracks[0].at(t_s);
+        text.cell(contact.x_mm, 4);
+        text.cell(contact.y_mm, 4);
+        text.cell(contact.force_N, 5);
+        text.cell(contact.angle_rad * 180.0 / M_PI, 3);
+      }
+      if (act.tracks.size() > 1) {
+        const Touch contact = act.tracks[1].at(begin_s);
+        text.cell(contact.x_mm, 4);
+        text.cell(contact.y_mm, 4);
+        text.cell(contact.force_N, 5);
+        text.cell(act.tracks[1].at(end_s).force_N, 5);
+      } else {
+        text << ",,,,";
+      }
+      text << "," << std::to_string(act.sensors_near);
+      text.cell(act.speed_mm_s, 1);
+      text.cell(pushed ? scene.options.dead_travel_mm : 0.0, 3);
+      text.cell(pushed ? scene.options.stick_slip_mm : 0.0, 3);
+      text << "\n";
+    }
+  }
+  return text.bytes();
+}
+
+} // namespace
+
+BestGaussian::BestGaussian(const ContactTable &table, double layer_mm) {
+  const double step_mm = GAUSSIAN_REACH * layer_mm / GAUSSIAN_STEPS;
+  constexpr int SIDE = 2 * GAUSSIAN_STEPS + 1;
+  std::vector<double> pressure(SIDE * SIDE);
+  for (int f = 0; f < GAUSSIAN_FORCES; f++) {
+    const double force_N =
+        FORCE_MIN_N * std::pow(ContactTable::FORCE_MAX_N / FORCE_MIN_N, f / (GAUSSIAN_FORCES - 1.0));
+    double squares = 0.0;
+    for (int i = 0; i < SIDE; i++) {
+      for (int j = 0; j < SIDE; j++) {
+        const double p = table.base_pressure_Pa(force_N, (i - GAUSSIAN_STEPS) * step_mm,
+                                                (j - GAUSSIAN_STEPS) * step_mm) /
+                         force_N;
+        pressure[static_cast<std::size_t>(i * SIDE + j)] = p;
+        squares += p * p;
+      }
+    }
+    // With the best peak for a width, what is left of the squares; and that peak.
+    double p0 = 0.0;
+    const auto left = [&](double sigma_mm) {
+      std::vector<double> line(SIDE);
+      for (int i = 0; i < SIDE; i++) {
+        const double u = (i - GAUSSIAN_STEPS) * step_mm / sigma_mm;
+        line[static_cast<std::size_t>(i)] = std::exp(-0.5 * u * u);
+      }
+      double pg = 0.0, gg = 0.0;
+      for (std::size_t i = 0; i < SIDE; i++) {
+        for (std::size_t j = 0; j < SIDE; j++) {
+          const double g = line[i] * line[j];
+          pg += pressure[i * SIDE + j] * g;
+          gg += g * g;
+        }
+      }
+      p0 = pg / gg;
+      return squares - pg * p0;
+    };
+    // Golden section.
+    const double golden = 0.5 * (std::sqrt(5.0) - 1.0);
+    double low = 0.1 * layer_mm, high = 3.0 * layer_mm;
+    double a = high - golden * (high - low), b = low + golden * (high - low);
+    double at_a = left(a), at_b = left(b);
+    while (high - low > 1e-5 * layer_mm) {
+      if (at_a < at_b) {
+        high = b;
+        b = a;
+        at_b = at_a;
+        a = high - golden * (high - low);
+        at_a = left(a);
+      } else {
+        low = a;
+        a = b;
+        at_a = at_b;
+        b = low + golden * (high - low);
+        at_b = left(b);
+      }
+    }
+    const double sigma_mm = 0.5 * (low + high);
+    left(sigma_mm);
+    p0_per_N_.push_back(p0);
+    sigma_mm_.push_back(sigma_mm);
+  }
+}
+
+BestGaussian::Fit BestGaussian::at(double force_N) const {
+  const double at = std::log(std::clamp(force_N, FORCE_MIN_N, ContactTable::FORCE_MAX_N) / FORCE_MIN_N) *
+                    (GAUSSIAN_FORCES - 1) / std::log(ContactTable::FORCE_MAX_N / FORCE_MIN_N);
+  const std::size_t i = std::min(static_cast<std::size_t>(at), std::size_t(GAUSSIAN_FORCES - 2));
+  const double t = at - static_cast<double>(i);
+  return {force_N * (p0_per_N_[i] + t * (p0_per_N_[i + 1] - p0_per_N_[i])),
+          sigma_mm_[i] + t * (sigma_mm_[i + 1] - sigma_mm_[i])};
+}
+
+std::string truth_path(const std::string &scenario_path) {
+  std::filesystem::path path(scenario_path);
+  if (path.extension() == ".csv") {
+    path.replace_extension();
+  }
+  return path.string() + ".truth.csv";
+}
+
+Written write_scene(const Scene &scene, const Layer &layer, const ContactTable &table,
+                    const ContactTable &second, const std::string &path, bool replace,
+                    const std::function<void(double share)> &on_progress) {
+  const SceneOptions &options = scene.options;
+  OutputFile truth(truth_path(path), replace, OutputFile::Appears::when_finished);
+  OutputFile file(path, replace, OutputFile::Appears::when_finished);
+  const bool temperature = options.effects.count("temperature") > 0;
+  const std::size_t sensors = geometry.sensor_count;
+  Pad pad(options.effects, sensors, layer.thickness_mm, AMBIENT_Pa, *options.pad_seed);
+  const BestGaussian gaussian(table, layer.thickness_mm);
+  Written written;
+
+  Text head;
+  head << "# fingertip-scenario 1\n";
+  describe(head, scene, layer, pad, path);
+  head << "t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip";
+  for (std::size_t k = 0; k < sensors; k++) {
+    head << ",s" << std::to_string(k) << "_Pa";
+  }
+  head << (temperature ? ",temperature_degC\n" : "\n");
+  file.append(head.bytes().data(), head.bytes().size());
+
+  RowWriter writer(file, temperature);
+  const std::vector<double> none_Pa(sensors, 0.0);
+  Row row;
+  row.sensors_Pa.resize(sensors);
+  const auto add = [&](double t_s, const std::vector<double> &base_Pa) {
+    row.t_s = t_s;
+    pad.report(t_s, base_Pa, row.sensors_Pa);
+    row.temperature_degC = ROOM_degC + pad.temperature_rise_K(t_s);
+    written.peak_Pa = std::max(
+        written.peak_Pa, *std::max_element(row.sensors_Pa.begin(), row.sensors_Pa.end()));
+    writer.add(row);
+  };
+  double t_s = 0.0;
+  const auto quiet_until = [&](double end_s) {
+    row.contact = row.slip = false;
+    row.x_mm = row.y_mm = row.force_N = row.p0_Pa = row.sigma_mm = 0.0;
+    while (t_s < end_s - 1e-9) {
+      add(t_s, none_Pa);
+      t_s = std::min(t_s + QUIET_STEP_s, end_s);
+    }
+  };
+
+  std::vector<Touch> contacts, before;
+  std::vector<double> base_Pa(sensors);
+  for (const Act &act : scene.acts) {
+    quiet_until(act.begin_s);
+    const long long steps = std::llround((act.end_s - act.begin_s) / STEP_s);
+    before.clear();
+    for (long long i = 0; i < steps; i++) {
+      t_s = act.begin_s + static_cast<double>(i) * STEP_s;
+      contacts.clear();
+      for (const Track &track : act.tracks) {
+        contacts.push_back(track.at(t_s - act.begin_s));
+      }
+      if (contacts != before) {
+        std::fill(base_Pa.begin(), base_Pa.end(), 0.0);
+        row.x_mm = row.y_mm = row.force_N = 0.0;
+        for (std::size_t c = 0; c < contacts.size(); c++) {
+          const Touch &contact = contacts[c];
+          const double cosine = std::cos(contact.angle_rad), sine = std::sin(contact.angle_rad);
+          for (std::size_t k = 0; k < sensors; k++) {
+            const double dx = static_cast<double>(geometry.x_mm[k]) - contact.x_mm;
+            const double dy = static_cast<double>(geometry.y_mm[k]) - contact.y_mm;
+            base_Pa[k] += (c == 0 ? table : second)
+                              .base_pressure_Pa(contact.force_N, cosine * dx + sine * dy,
+                                                cosine * dy - sine * dx);
+          }
+          row.force_N += contact.force_N;
+          row.x_mm += contact.force_N * contact.x_mm;
+          row.y_mm += contact.force_N * contact.y_mm;
+        }
+        row.contact = row.force_N > 0.0;
+        row.x_mm = row.contact ? row.x_mm / row.force_N : 0.0;
+        row.y_mm = row.contact ? row.y_mm / row.force_N : 0.0;
+        const bool one = row.contact && contacts.size() == 1;
+        const BestGaussian::Fit fit = gaussian.at(row.force_N);
+        row.p0_Pa = one ? fit.p0_Pa : 0.0;
+        row.sigma_mm = one ? fit.sigma_mm : 0.0;
+        before = contacts;
+      }
+      row.slip = row.contact && act.slips(t_s);
+      add(t_s, base_Pa);
+    }
+    t_s = act.end_s;
+    if (on_progress) {
+      on_progress(t_s / *options.seconds);
+    }
+  }
+  quiet_until(*options.seconds);
+  add(*options.seconds, none_Pa);
+  writer.finish();
+
+  const std::string events = truth_of(scene, path);
+  truth.append(events.data(), events.size());
+  truth.finish();
+  file.finish();
+  written.rows = writer.rows();
+  written.bytes = head.bytes().size() + writer.bytes();
+  return written;
+}
+
+} // namespace fingertip::twin

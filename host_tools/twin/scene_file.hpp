@@ -1,0 +1,65 @@
+// Scenes as files: the scenario that emulator and native pipeline play, and the events in it.
+//
+// FILE.csv is a scenario ("# fingertip-scenario 1", host_tools/emulator/scenario.mjs): truth, then
+// what each sensor reports above ambient with all effects in it. It is linear between rows. Computed
+// each millisecond of a contact, written where the line through the rows would leave
+// 0.2 Pa + 5e-5 of the largest reading in any sensor (likewise 0.1 mN + 5e-5 of the force, 2 um,
+// 2 mK), and wherever contact or slip change.
+//   contact    1 while the force is not 0
+//   x_mm y_mm  middle of the contact; of two, their centre of force
+//   force_N    on the pad, of all contacts
+//   p0_Pa sigma_mm  the Gaussian that is closest to the pressure on the base without errors, in the
+//              least squares over three thicknesses to every side; 0 with two contacts
+//   slip       see scenes.hpp
+//   temperature_degC  only with the effect "temperature"
+//
+// FILE.truth.csv has one row for each phase of each contact:
+//   # fingertip-truth 1
+//   # scene: name                  # scenario: FILE.csv without its folder
+//   act         number of the contact, from 1
+//   press       what the contact is: tap press hold poke cycle grip roll two
+//   phase       touch hold release; poke; load unload; dead_travel slip after; twist; roll
+//   t_begin_s t_end_s              on the scenario's clock
+//   x_mm y_mm force_N angle_deg    at its beginning, of the first contact
+//   x_end_mm y_end_mm force_end_N angle_end_deg   at its end
+//   x2_mm y2_mm force2_N force2_end_N   of the second contact; empty if there is none
+//   sensors_near                   grid: 1 above a sensor, 2 between two, 4 between four; else 0
+//   speed_mm_s dead_travel_mm stick_slip_mm       of the pusher; 0 where there is none
+// The indenter is in the metadata of both.
+#pragma once
+
+#include "twin/scenes.hpp"
+
+#include <functional>
+#include <string>
+
+namespace fingertip::twin {
+
+// The Gaussian closest to the pressure on the base, in the least squares over the square of three
+// thicknesses to every side.
+class BestGaussian {
+public:
+  BestGaussian(const ContactTable &table, double layer_mm);
+  struct Fit {
+    double p0_Pa, sigma_mm;
+  };
+  Fit at(double force_N) const;
+
+private:
+  std::vector<double> p0_per_N_, sigma_mm_; // [force], in equal steps of its logarithm
+};
+
+std::string truth_path(const std::string &scenario_path);
+
+struct Written {
+  std::size_t rows = 0, bytes = 0;
+  double peak_Pa = 0.0; // largest reading above ambient
+};
+
+// Both files, whole or not at all. `second` is the table of the second indenter, for two contacts.
+// Throws Error.
+Written write_scene(const Scene &scene, const Layer &layer, const ContactTable &table,
+                    const ContactTable &second, const std::string &path, bool replace,
+                    const std::function<void(double share)> &on_progress = {});
+
+} // namespace fingertip::twin

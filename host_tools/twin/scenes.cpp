@@ -1,0 +1,511 @@
+#include "twin/scenes.hpp"
+
+#include "libfingertip/error.hpp"
+#include "libfingertip/random.hpp"
+#include "libfingertip/text.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+
+namespace fingertip::twin {
+namespace {
+
+constexpr double GRID_STEP_mm = 4.5;
+constexpr double GRID_HALF_X_mm = 4.5, GRID_HALF_Y_mm = 13.5;
+constexpr int GRID_PLACES_X = 3, GRID_PLACES_Y = 7;
+constexpr double FORCE_MIN_N = 0.02;
+constexpr double SLIP_WAY_mm = 24.0, SLIP_SPAN_mm = 28.0;
+constexpr double SPEED_UP_s = 0.01;
+constexpr double DEGREE = M_PI / 180.0;
+
+constexpr std::array<double, 5> SLIP_SPEEDS_mm_s{20, 50, 100, 150, 200}; // the paper: 5 of them
+constexpr std::array<double, 3> ROLL_SPEEDS_mm_s{10, 25, 50};
+constexpr std::array<double, 4> TWIST_RATES_deg_s{30, 60, 120, 180};
+constexpr std::array<double, 7> DISTANCES_mm{6, 9, 12, 15, 18, 24, 30};
+
+// One for each kind, so that kinds with the same seed have nothing in common.
+enum Stream : std::uint64_t {
+  GRID_ORDER = 1,
+  GRID,
+  TAPS,
+  POKES,
+  CYCLE,
+  SLIP,
+  TWIST,
+  ROLLOFF,
+  TWO
+};
+
+std::string number(double value) {
+  return shortest(static_cast<float>(value));
+}
+
+double milliseconds(double seconds) {
+  return 1e-3 * std::round(1e3 * seconds);
+}
+
+struct Place {
+  double x_mm, y_mm;
+};
+
+// Puts acts one after the other.
+class Stage {
+public:
+  Stage(const SceneOptions &scene_options, const ContactTable &contact_table,
+        const Forces &pressing)
+      : options(scene_options), table(contact_table), forces(pressing), t_s_(START_QUIET_s) {}
+
+  // The act's times count from its beginning; false, and the scene is full, if it does not fit.
+  bool play(Act act) {
+    const double length_s = act.phases.back().end_s;
+    if (t_s_ + length_s + options.quiet_s > *options.seconds + 1e-9) {
+      return false;
+    }
+    act.begin_s = t_s_;
+    act.end_s = t_s_ + length_s;
+    for (Phase &phase : act.phases) {
+      phase.begin_s += t_s_;
+      phase.end_s += t_s_;
+    }
+    t_s_ = milliseconds(act.end_s + options.quiet_s);
+    acts.push_back(std::move(act));
+    return true;
+  }
+
+  Place random_place(Random &random) const {
+    const double x = GRID_HALF_X_mm + options.margin_mm, y = GRID_HALF_Y_mm + options.margin_mm;
+    const double at_x = random.uniform(-x, x);
+    return {at_x, random.uniform(-y, y)};
+  }
+
+  const SceneOptions &options;
+  const ContactTable &table;
+  const Forces &forces;
+  std::vector<Act> acts;
+
+private:
+  double t_s_;
+};
+
+// Phases of an act that end where its profiles' pieces do.
+void phase(Act &act, const std::string &name, double end_s, bool slip = false) {
+  const double begin_s = act.phases.empty() ? 0.0 : act.phases.back().end_s;
+  act.phases.push_back({name, begin_s, milliseconds(end_s), slip});
+}
+
+Track track_at(Place place) {
+  Track track;
+  track.x_mm = place.x_mm;
+  track.y_mm = place.y_mm;
+  return track;
+}
+
+// Press, hold and let go at one place.
+Act press(const std::string &name, Place place, double force_N, double ramp_s, double hold_s) {
+  Act act;
+  act.press = name;
+  Track track = track_at(place);
+  track.force_N.ease(ramp_s, force_N);
+  phase(act, "touch", track.force_N.end_s());
+  track.force_N.hold(hold_s);
+  phase(act, "hold", track.force_N.end_s());
+  track.force_N.ease(ramp_s, 0.0);
+  phase(act, "release", track.force_N.end_s());
+  act.tracks.push_back(track);
+  return act;
+}
+
+void grid(Stage &stage) {
+  struct Way {
+    const char *name;
+    double ramp_s, hold_s;
+  };
+  constexpr std::array<Way, 3> ways{{{"tap", 0.1, 0.1}, {"press", 0.8, 0.3}, {"hold", 0.25, 3.0}}};
+  for (std::size_t pass = 0;; pass++) {
+    std::array<int, GRID_PLACES_X * GRID_PLACES_Y> order{};
+    for (std::size_t i = 0; i < order.size(); i++) {
+      order[i] = static_cast<int>(i);
+    }
+    Random random(stage.options.seed, GRID_ORDER, pass);
+    for (std::size_t i = order.size() - 1; i > 0; i--) {
+      std::swap(order[i], order[random.next() % (i + 1)]);
+    }
+    for (std::size_t i = 0; i < order.size(); i++) {
+      const int row = order[i] / GRID_PLACES_X - GRID_PLACES_Y / 2;
+      const int column = order[i] % GRID_PLACES_X - GRID_PLACES_X / 2;
+      const Place place{GRID_STEP_mm * column, GRID_STEP_mm * row};
+      for (std::size_t w = 0; w < ways.size(); w++) {
+        Random strength(stage.options.seed, GRID, (pass * order.size() + i) * ways.size() + w);
+        // Forces in turn: after some passes every place has had all of them in every way.
+        const std::size_t turn = static_cast<std::size_t>(order[i]) + pass + 2 * w;
+        Act act = press(ways[w].name, place,
+                        stage.forces.pick(turn, strength.uniform(0.0, 1.0)), ways[w].ramp_s,
+                        ways[w].hold_s);
+        act.sensors_near = (column % 2 != 0 ? 2 : 1) * (row % 2 != 0 ? 2 : 1);
+        if (!stage.play(act)) {
+          return;
+        }
+      }
+    }
+  }
+}
+
+void random_presses(Stage &stage, const std::string &name, double ramp_s, double hold_s) {
+  for (std::size_t n = 0;; n++) {
+    Random random(stage.options.seed, TAPS, n);
+    const Place place = stage.random_place(random);
+    const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+    const double ramps_s = milliseconds(ramp_s * random.uniform(0.7, 1.3));
+    if (!stage.play(press(name, place, force_N, ramps_s, hold_s))) {
+      return;
+    }
+  }
+}
+
+void taps(Stage &stage) {
+  random_presses(stage, "tap", 0.12, 0.3);
+}
+
+void high(Stage &stage) {
+  random_presses(stage, "hold", 0.5, 0.6);
+}
+
+// By hand: never at rest, and not quite at one place.
+void pokes(Stage &stage) {
+  constexpr double WANDER_mm = 1.5;
+  for (std::size_t n = 0;; n++) {
+    Random random(stage.options.seed, POKES, n);
+    Act act;
+    act.press = "poke";
+    Track track = track_at(stage.random_place(random));
+    const double direction = random.uniform(0.0, 2.0 * M_PI);
+    track.along_x = std::cos(direction);
+    track.along_y = std::sin(direction);
+    const int changes = 3 + static_cast<int>(random.next() % 5);
+    for (int i = 0; i < changes; i++) {
+      const double seconds = random.uniform(0.15, 0.6);
+      track.force_N.ease(seconds, stage.forces.pick(n, random.uniform(0.0, 1.0)));
+      track.pusher_mm.ease(seconds, random.uniform(0.0, WANDER_mm));
+      if (i == 0) {
+        phase(act, "touch", track.force_N.end_s());
+      }
+    }
+    phase(act, "poke", track.force_N.end_s());
+    track.force_N.ease(random.uniform(0.15, 0.4), 0.0);
+    phase(act, "release", track.force_N.end_s());
+    act.tracks.push_back(track);
+    if (!stage.play(act)) {
+      return;
+    }
+  }
+}
+
+// Slow enough that only what does not depend on the rate makes a loop, save relaxation.
+void cycle(Stage &stage) {
+  constexpr double RAMP_s = 15.0;
+  for (std::size_t n = 0;; n++) {
+    Random random(stage.options.seed, CYCLE, n);
+    const Place place = n == 0 ? Place{0.0, 0.0} : stage.random_place(random);
+    Act act;
+    act.press = "cycle";
+    Track track = track_at(place);
+    track.force_N.line(RAMP_s, stage.forces.pick(n, random.uniform(0.0, 1.0)));
+    phase(act, "load", track.force_N.end_s());
+    track.force_N.line(RAMP_s, 0.0);
+    phase(act, "unload", track.force_N.end_s());
+    act.tracks.push_back(track);
+    if (!stage.play(act)) {
+      return;
+    }
+  }
+}
+
+// When the pusher's way, which never falls, first is this long; whole milliseconds.
+double time_of(const Profile &way, double length_mm, double begin_s, double end_s) {
+  double low = begin_s, high = end_s;
+  while (high - low > 1e-4) {
+    const double middle = 0.5 * (low + high);
+    (way.at(middle) < length_mm ? low : high) = middle;
+  }
+  return milliseconds(high);
+}
+
+void slip(Stage &stage) {
+  const std::vector<double> usual(SLIP_SPEEDS_mm_s.begin(), SLIP_SPEEDS_mm_s.end());
+  const std::vector<double> &speeds =
+      stage.options.speeds_mm_s.empty() ? usual : stage.options.speeds_mm_s;
+  for (std::size_t n = 0;; n++) {
+    Random random(stage.options.seed, SLIP, n);
+    const bool upward = random.uniform(0.0, 1.0) < 0.5;
+    const double slack_mm = 0.5 * (SLIP_SPAN_mm - SLIP_WAY_mm);
+    const double x_mm = random.uniform(-GRID_HALF_X_mm, GRID_HALF_X_mm);
+    const double y_mm = -0.5 * SLIP_WAY_mm + random.uniform(-slack_mm, slack_mm);
+    Act act;
+    act.press = "grip";
+    act.speed_mm_s = speeds[n % speeds.size()];
+    Track track = track_at({x_mm, upward ? y_mm : -y_mm});
+    track.along_y = upward ? 1.0 : -1.0;
+    track.grip = {stage.options.dead_travel_mm, stage.options.creep_share,
+                  stage.options.stick_slip_mm};
+    track.angle_rad = Profile(random.uniform(-15.0, 15.0) * DEGREE);
+    const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+
+    track.force_N.ease(0.3, force_N);
+    phase(act, "touch", track.force_N.end_s());
+    track.force_N.hold(random.uniform(0.8, 1.2));
+    const double push_s = track.force_N.end_s();
+    phase(act, "hold", push_s);
+    track.pusher_mm.hold(push_s);
+    track.pusher_mm.travel(track.grip.pusher_mm(SLIP_WAY_mm), act.speed_mm_s, SPEED_UP_s);
+    const double stop_s = track.pusher_mm.end_s();
+    if (track.grip.dead_travel_mm > 0.0) {
+      phase(act, "dead_travel",
+            time_of(track.pusher_mm, track.grip.dead_travel_mm, push_s, stop_s), true);
+    }
+    phase(act, "slip", stop_s, true);
+    track.force_N.hold(stop_s - push_s + 0.5);
+    phase(act, "after", track.force_N.end_s());
+    track.force_N.ease(0.3, 0.0);
+    phase(act, "release", track.force_N.end_s());
+    act.tracks.push_back(track);
+    if (!stage.play(act)) {
+      return;
+    }
+  }
+}
+
+void twist(Stage &stage) {
+  constexpr double TURN_deg = 90.0;
+  for (std::size_t n = 0;; n++) {
+    Random random(stage.options.seed, TWIST, n);
+    Act act;
+    act.press = "grip";
+    Track track = track_at(stage.random_place(random));
+    const double from = random.uniform(-45.0, 45.0) * DEGREE;
+    track.angle_rad = Profile(from);
+    track.force_N.ease(0.3, stage.forces.pick(n, random.uniform(0.0, 1.0)));
+    phase(act, "touch", track.force_N.end_s());
+    track.force_N.hold(random.uniform(0.5, 0.7));
+    const double begin_s = track.force_N.end_s();
+    phase(act, "hold", begin_s);
+    track.angle_rad.hold(begin_s);
+    const double rate = TWIST_RATES_deg_s[n % TWIST_RATES_deg_s.size()] * DEGREE;
+    track.angle_rad.travel(TURN_deg * DEGREE, rate, SPEED_UP_s);
+    const double end_s = track.angle_rad.end_s();
+    phase(act, "twist", end_s);
+    track.force_N.hold(end_s - begin_s + 0.5);
+    phase(act, "after", track.force_N.end_s());
+    track.force_N.ease(0.3, 0.0);
+    phase(act, "release", track.force_N.end_s());
+    act.tracks.push_back(track);
+    if (!stage.play(act)) {
+      return;
+    }
+  }
+}
+
+// The contact rolls across the pad's long edge, until nothing of it is left on the pad.
+void rolloff(Stage &stage) {
+  const std::vector<double> usual(ROLL_SPEEDS_mm_s.begin(), ROLL_SPEEDS_mm_s.end());
+  const std::vector<double> &speeds =
+      stage.options.speeds_mm_s.empty() ? usual : stage.options.speeds_mm_s;
+  for (std::size_t n = 0;; n++) {
+    Random random(stage.options.seed, ROLLOFF, n);
+    Act act;
+    act.press = "roll";
+    act.speed_mm_s = speeds[n % speeds.size()];
+    Track track = track_at({random.uniform(-2.0, 2.0),
+                            random.uniform(-GRID_HALF_Y_mm, GRID_HALF_Y_mm)});
+    track.along_x = 1.0;
+    track.along_y = 0.0;
+    const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+    track.edge_x_mm = PAD_HALF_WIDTH_mm;
+    track.radius_mm = stage.table.contact_radius_mm(force_N);
+    track.force_N.ease(0.3, force_N);
+    phase(act, "touch", track.force_N.end_s());
+    track.force_N.hold(random.uniform(0.4, 0.6));
+    phase(act, "hold", track.force_N.end_s());
+    track.pusher_mm.hold(track.force_N.end_s());
+    track.pusher_mm.travel(PAD_HALF_WIDTH_mm + track.radius_mm - track.x_mm, act.speed_mm_s,
+                           SPEED_UP_s);
+    track.force_N.hold(track.pusher_mm.end_s() - track.force_N.end_s());
+    phase(act, "roll", track.force_N.end_s());
+    act.tracks.push_back(track);
+    if (!stage.play(act)) {
+      return;
+    }
+  }
+}
+
+void two(Stage &stage) {
+  for (std::size_t n = 0;; n++) {
+    Random random(stage.options.seed, TWO, n);
+    const double distance = DISTANCES_mm[n % DISTANCES_mm.size()];
+    // The far ones lie along the pad, which is too narrow for them.
+    const double direction = distance > 2.0 * GRID_HALF_X_mm ? random.uniform(60.0, 120.0)
+                                                             : random.uniform(0.0, 180.0);
+    const double half_x = 0.5 * distance * std::cos(direction * DEGREE);
+    const double half_y = 0.5 * distance * std::sin(direction * DEGREE);
+    const double x_mm = random.uniform(-2.0, 2.0), y_mm = random.uniform(-2.0, 2.0);
+    const double one_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+    const double other_N = stage.forces.pick(n + 1, random.uniform(0.0, 1.0));
+    Act act = press("two", {x_mm - half_x, y_mm - half_y}, one_N, 0.25, 0.5);
+    act.tracks.push_back(
+        press("two", {x_mm + half_x, y_mm + half_y}, other_N, 0.25, 0.5).tracks.front());
+    if (!stage.play(act)) {
+      return;
+    }
+  }
+}
+
+struct Kind {
+  SceneKind kind;
+  std::function<void(Stage &)> play;
+};
+
+const std::vector<Kind> &all_kinds() {
+  static const std::vector<Kind> all{
+      {{"grid", 200, "1,2.5,5,10,15",
+        "tap, press and 3 s hold on each of the paper's 21 places, 4.5 mm apart"},
+       grid},
+      {{"taps", 120, "1..15", "short taps at random places"}, taps},
+      {{"high", 120, "25..50", "strong presses at random places"}, high},
+      {{"pokes", 120, "0.5..25", "as if by hand: changing force, wandering place"}, pokes},
+      {{"cycle", 120, "20", "slow loading and unloading, 15 s each; the first above a sensor"},
+       cycle},
+      {{"slip", 120, "6",
+        "a gripped object is pushed 24 mm along y at 20, 50, 100, 150, 200 mm/s"},
+       slip},
+      {{"twist", 60, "6", "a gripped object turns by 90 degrees about its contact"}, twist},
+      {{"rolloff", 60, "6", "an object rolls over the pad's edge at 10, 25, 50 mm/s"}, rolloff},
+      {{"two", 60, "4..10", "two contacts at once, 6 to 30 mm apart"}, two},
+  };
+  return all;
+}
+
+void check(const char *option, double value, double lowest, double highest) {
+  if (!(value >= lowest && value <= highest)) {
+    throw Error(std::string(option) + " " + number(value) + " is out of range; give " +
+                number(lowest) + " to " + number(highest));
+  }
+}
+
+// What shows all that differs but the seeds, the length and the kind's own settings.
+std::string name_of(const SceneOptions &options) {
+  std::string name = options.kind + "-" + options.indenter;
+  if (!options.second_indenter.empty()) {
+    name += "+" + options.second_indenter;
+  }
+  name += "-h" + number(options.layer_mm);
+  const auto gain = options.effects.find("gain");
+  name += "-gain" + number(gain == options.effects.end() ? 0.0 : gain->second);
+  for (const Effect &effect : effects()) {
+    const auto chosen = options.effects.find(effect.name);
+    if (chosen != options.effects.end() && effect.name != "gain") {
+      name += "-" + effect.name + (chosen->second == effect.usual ? "" : number(chosen->second));
+    }
+  }
+  return name;
+}
+
+} // namespace
+
+const std::vector<SceneKind> &scene_kinds() {
+  static const std::vector<SceneKind> kinds = [] {
+    std::vector<SceneKind> list;
+    for (const Kind &one : all_kinds()) {
+      list.push_back(one.kind);
+    }
+    return list;
+  }();
+  return kinds;
+}
+
+Forces::Forces(const std::string &text) {
+  const std::size_t dots = text.find("..");
+  std::vector<std::string_view> parts;
+  if (dots != std::string::npos) {
+    range_ = true;
+    parts = {std::string_view(text).substr(0, dots), std::string_view(text).substr(dots + 2)};
+  } else {
+    parts = split(text, ',');
+  }
+  bool good = true;
+  for (std::string_view part : parts) {
+    const auto force_N = to_double(trim(part));
+    good = good && force_N && *force_N >= FORCE_MIN_N && *force_N <= ContactTable::FORCE_MAX_N;
+    values_.push_back(force_N.value_or(0.0));
+  }
+  if (!good || (range_ && values_[1] < values_[0])) {
+    throw Error("--force \"" + printable(text) + "\" is not possible; give newtons from " +
+                number(FORCE_MIN_N) + " to " + number(ContactTable::FORCE_MAX_N) +
+                ": 5, or in turn 1,2,5, or any of 1..15");
+  }
+}
+
+double Forces::pick(std::size_t turn, double random_share) const {
+  return range_ ? values_[0] + random_share * (values_[1] - values_[0])
+                : values_[turn % values_.size()];
+}
+
+double Forces::largest() const {
+  return *std::max_element(values_.begin(), values_.end());
+}
+
+bool Act::slips(double t_s) const {
+  constexpr double ROUNDING_s = 1e-7;
+  return std::any_of(phases.begin(), phases.end(), [&](const Phase &one) {
+    return one.slip && t_s > one.begin_s + ROUNDING_s && t_s < one.end_s - ROUNDING_s;
+  });
+}
+
+Scene make_scene(const SceneOptions &options, const ContactTable &table) {
+  const auto kind = std::find_if(all_kinds().begin(), all_kinds().end(), [&](const Kind &one) {
+    return one.kind.name == options.kind;
+  });
+  if (kind == all_kinds().end()) {
+    std::string names;
+    for (const Kind &one : all_kinds()) {
+      names += (names.empty() ? "" : ", ") + one.kind.name;
+    }
+    throw Error("there is no kind of scene \"" + printable(options.kind) + "\"; give one of: " +
+                names);
+  }
+  Scene scene;
+  scene.options = options;
+  SceneOptions &chosen = scene.options;
+  chosen.seconds = milliseconds(options.seconds.value_or(kind->kind.usual_seconds));
+  chosen.pad_seed = options.pad_seed.value_or(options.seed);
+  chosen.forces = options.forces.empty() ? kind->kind.usual_forces : options.forces;
+  check("--seconds", *chosen.seconds, 1.0, 7200.0);
+  check("--margin", chosen.margin_mm, 0.0, 10.0);
+  check("--quiet", chosen.quiet_s, 0.1, 60.0);
+  check("--dead-travel", chosen.dead_travel_mm, 0.0, 10.0);
+  check("--creep", chosen.creep_share, 0.0, 1.0);
+  check("--stick-slip", chosen.stick_slip_mm, 0.0, 5.0);
+  for (double speed_mm_s : chosen.speeds_mm_s) {
+    check("--speed", speed_mm_s, 1.0, 1000.0);
+  }
+  if (!chosen.speeds_mm_s.empty() && chosen.kind != "slip" && chosen.kind != "rolloff") {
+    throw Error("--speed says nothing in a scene of \"" + chosen.kind +
+                "\"; leave it out, or choose slip or rolloff");
+  }
+  if (!chosen.second_indenter.empty() && chosen.kind != "two") {
+    throw Error("--second says nothing in a scene of \"" + chosen.kind +
+                "\"; leave it out, or choose two");
+  }
+  const Forces forces(chosen.forces);
+  Stage stage(chosen, table, forces);
+  kind->play(stage);
+  if (stage.acts.empty()) {
+    throw Error("--seconds " + number(*chosen.seconds) + " is too short for one contact of \"" +
+                chosen.kind + "\"; leave it out for " + number(kind->kind.usual_seconds));
+  }
+  scene.acts = std::move(stage.acts);
+  scene.name = name_of(chosen);
+  return scene;
+}
+
+} // namespace fingertip::twin

@@ -1,0 +1,103 @@
+// Scenes: what happens to a pad over time, each composed from a kind, an indenter, a layer and the
+// errors of a pad. kinds() lists the kinds; De Clercq et al., RA-L 2022 ("the paper"), section IV,
+// is what they follow. scene_file.hpp writes them down.
+//
+// Nothing touches the pad for the first START_QUIET_s, nor for quiet_s after each contact: time for
+// the 16 frames of the firmware's tare at 20 frames a second; the paper, too, sets its readings to
+// zero between contacts.
+//
+// Where things are: random places are uniform over the paper's grid, |x| <= 4.5 mm and |y| <=
+// 13.5 mm, and margin_mm around it, by default half a step of the grid. Slips go along y through
+// the middle of the pad, with x anywhere on the grid.
+//
+// What the truth calls slip is what the paper calls it (section IV.D): the pusher is in contact and
+// moves. So the dead travel, in which nothing slides yet, counts as slip; the events tell it apart.
+// A twist and a contact that rolls are no slip.
+//
+// Left out: edges of the rubber, tangential load (which moves the middle of the pressure on the
+// base by up to friction times thickness), influence of two contacts on each other's shape.
+#pragma once
+
+#include "twin/contact_table.hpp"
+#include "twin/effects.hpp"
+#include "twin/trajectory.hpp"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace fingertip::twin {
+
+constexpr double START_QUIET_s = 1.5;
+constexpr double AMBIENT_Pa = 101325.0;
+constexpr double ROOM_degC = 25.0;
+constexpr double PAD_HALF_WIDTH_mm = 15.0; // in x; the paper's box is 30 mm by 50 mm
+
+struct SceneKind {
+  std::string name;
+  double usual_seconds;
+  std::string usual_forces;
+  std::string description;
+};
+const std::vector<SceneKind> &scene_kinds();
+
+// "5": always that; "1,2,5": one after the other; "1..15": anywhere between, uniform. In N.
+class Forces {
+public:
+  // Throws Error unless all are from 0.02 N to the tables' end.
+  explicit Forces(const std::string &text);
+  double pick(std::size_t turn, double random_share) const;
+  double largest() const;
+
+private:
+  std::vector<double> values_;
+  bool range_ = false;
+};
+
+struct SceneOptions {
+  std::string kind = "taps";
+  std::string indenter = "sphere6";
+  std::string second_indenter; // kind "two"; empty: as the first
+  double layer_mm = 12.0;
+  EffectValues effects;
+  std::uint64_t seed = 1;
+  std::optional<std::uint64_t> pad_seed; // of the pad's errors; else seed
+  std::optional<double> seconds;         // else usual_seconds
+  std::string forces;                    // empty: usual_forces
+  std::vector<double> speeds_mm_s;       // kinds "slip" and "rolloff"; empty: usual ones
+  double dead_travel_mm = 1.0, creep_share = 0.5, stick_slip_mm = 0.0; // Grip, kind "slip"
+  double margin_mm = 2.25;
+  double quiet_s = 1.2;
+};
+
+// A stretch of one act in which one thing goes on.
+struct Phase {
+  std::string name;
+  double begin_s, end_s; // in the scene
+  bool slip = false;
+};
+
+// From touch to loss.
+struct Act {
+  std::string press;
+  double begin_s = 0.0, end_s = 0.0;
+  std::vector<Track> tracks; // one or two; their time 0 is begin_s
+  std::vector<Phase> phases;
+  int sensors_near = 0; // grid: as many sensors are nearest to the place, 1, 2 or 4; else 0
+  double speed_mm_s = 0.0;
+
+  bool slips(double t_s) const;
+};
+
+struct Scene {
+  SceneOptions options; // seconds, forces and pad_seed filled in
+  std::string name;
+  std::vector<Act> acts; // in order of time, none overlap
+};
+
+// The tables are those of the indenters on the layer: creep and rolling need the contact's size.
+// Throws Error for options that are out of range.
+Scene make_scene(const SceneOptions &options, const ContactTable &table);
+
+} // namespace fingertip::twin

@@ -1,0 +1,97 @@
+// How contacts move over the pad and how hard they press: smooth functions of time.
+//
+// All of it is kinematic: what slips when is set here, not found from friction. Of the elastic dead
+// travel and of stick-slip only the motions are modelled (Grip).
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace fingertip::twin {
+
+// A value over time, put together from cubic pieces; continuous. Times are whole milliseconds, so
+// that rows fall on the joints.
+class Profile {
+public:
+  explicit Profile(double value = 0.0) : value_(value) {}
+
+  Profile &hold(double seconds);
+  // From rest to rest.
+  Profile &ease(double seconds, double to);
+  // At constant rate.
+  Profile &line(double seconds, double to);
+  // By `distance`, at this speed but for a constant acceleration at either end. Throws
+  // std::invalid_argument if the accelerations alone would take the distance.
+  Profile &travel(double distance, double speed, double accelerate_s);
+
+  double at(double t_s) const; // before its beginning and after its end it stays
+  double end_s() const { return 1e-3 * static_cast<double>(end_ms_); }
+  double end_value() const { return value_; }
+
+private:
+  struct Piece {
+    double begin_s, end_s;
+    double from, to, rate_from, rate_to; // Hermite
+  };
+  void add(double seconds, double to, double rate_from, double rate_to);
+  std::vector<Piece> pieces_;
+  long long end_ms_ = 0;
+  double value_;
+};
+
+// What a held object does on the pad while something pushes it: the way of the contact, given that
+// of the pusher. Both in mm, 0 at rest; the way never falls.
+//
+// At first the object is held. The pusher's way goes into the rubber and all else that gives: the
+// dead travel. Of it, what the base feels creeps along with the tangential load, which Cattaneo and
+// Mindlin's contact lets rise as 1 - (1 - s / dead travel)^(3/2) until the last ring slips (Mindlin,
+// "Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949). Its amount for a sphere on
+// a half-space, 3 (2-nu) mu F / (16 G a), is 0.8 to 1.8 mm for 2 to 6 N at mu = 0.5 on rubber of
+// Shore 15 A; the slip of human fingertips begins likewise after millimetres (Delhaye, Lefevre,
+// Thonnard, "Dynamics of fingertip contact during the onset of tangential slip", J. R. Soc.
+// Interface 11, 2014). The share that creeps is an assumption, and so is how stick-slip goes: the
+// object rests for 4/5 of each period of the pusher's way and catches up in the last fifth.
+struct Grip {
+  double dead_travel_mm = 0.0;
+  double creep_share = 0.5;   // of the dead travel
+  double stick_slip_mm = 0.0; // way of one jump; 0: steady
+
+  double way_mm(double pusher_mm) const;
+  // The pusher's way that moves the contact by this much, at the latest.
+  double pusher_mm(double way_mm) const;
+};
+
+struct Touch {
+  double force_N = 0.0;
+  double x_mm = 0.0, y_mm = 0.0, angle_rad = 0.0; // the object is turned by the angle
+  bool operator==(const Touch &other) const {
+    return force_N == other.force_N && x_mm == other.x_mm && y_mm == other.y_mm &&
+           angle_rad == other.angle_rad;
+  }
+};
+
+// One contact from touch to loss, or one of two that touch together. Time 0 is the beginning.
+struct Track {
+  Profile force_N;
+  double x_mm = 0.0, y_mm = 0.0;     // where it touches
+  double along_x = 0.0, along_y = 1.0; // unit vector of its way
+  Profile pusher_mm;
+  Grip grip;
+  Profile angle_rad;
+  // Where the pad ends in x, and the radius of the contact then: what is beyond carries nothing.
+  // The disc's part on the pad acts at that part's centre, with its share of the force.
+  double edge_x_mm = std::numeric_limits<double>::infinity();
+  double radius_mm = 0.0;
+
+  Touch at(double t_s) const;
+};
+
+// Share of a disc's area that lies before a straight edge, and how far the centre of that part lies
+// before the disc's, both for an edge `ahead` radii ahead of the centre (-1..1).
+struct DiscPart {
+  double share, back; // back in radii
+};
+DiscPart disc_before_edge(double ahead);
+
+} // namespace fingertip::twin
