@@ -6,7 +6,9 @@
  * scope (`nanos`, `micros`, `createAlarm`) is the one rp2040js expects of its clock.
  *
  * While the processor executes, time advances instruction by instruction: `cycleSource` supplies the
- * cycles executed since the last synchronisation. Alarms fire between instructions only.
+ * cycles executed since the last synchronisation. Alarms fire between instructions only, in the order of their
+ * times; while one fires, `nanos` is the time it was set for, so what it does does not depend on the length of the
+ * instruction before.
  */
 class Alarm {
   constructor(time, callback) {
@@ -71,9 +73,12 @@ export class SimulatedTime {
     this.ns_per_cycle = 0;
     /** Bumped whenever the earliest alarm may have changed; lets the run loop cut its batch short. */
     this.earliestChanged = false;
+    /** While an alarm fires: its time. */
+    this.firing_ns = -1;
   }
 
   get nanos() {
+    if (this.firing_ns >= 0) return this.firing_ns;
     return this.base_ns + (this.cycleSource.cycles - this.base_cycles) * this.ns_per_cycle;
   }
 
@@ -102,12 +107,18 @@ export class SimulatedTime {
 
   /** Fire everything that is due. */
   fireDue() {
-    while (this.first && this.first.at_ns <= this.nanos) {
-      const alarm = this.first;
-      this.first = alarm.next;
-      alarm.next = null;
-      alarm.scheduled = false;
-      alarm.callback();
+    const now_ns = this.nanos;
+    try {
+      while (this.first && this.first.at_ns <= now_ns) {
+        const alarm = this.first;
+        this.first = alarm.next;
+        alarm.next = null;
+        alarm.scheduled = false;
+        this.firing_ns = alarm.at_ns;
+        alarm.callback();
+      }
+    } finally {
+      this.firing_ns = -1;
     }
   }
 

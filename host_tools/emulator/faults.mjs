@@ -8,9 +8,14 @@
  *     sensor_adc_zero (sensor)      every ADC read gives 0
  *     sda_stuck_low (sensor)        pulls SDA from from_s until nine clocks reached it or its multiplexer was reset
  *     mux_stuck (mux)               acknowledges nothing until its RESET line was pulsed
+ *     sensor_missing (sensor)       is not there; when it comes back it has just been powered
+ *     line_stuck_low, line_stuck_high (sensor)  its SDA is tied to ground, to VDD
+ *     scl_stuck_low, scl_stuck_high SCL is tied to ground, to VDD
+ *     clock_glitch (sensor)         sees one clock too many, once, in the first transfer from from_s on
  *     host_stall                    the USB host stops reading the CDC port
  *     usb_unplug                    the cable is out; it comes back at to_s
  *
+ * Those from sensor_missing to clock_glitch need a board with a data line for each sensor.
  * `to_s` may be left out: the fault then stays. Times are seconds since power-on.
  */
 import { readFileSync } from 'node:fs';
@@ -22,11 +27,19 @@ const TARGET = {
   sensor_adc_zero: 'sensor',
   sda_stuck_low: 'sensor',
   mux_stuck: 'mux',
+  sensor_missing: 'sensor',
+  line_stuck_low: 'sensor',
+  line_stuck_high: 'sensor',
+  scl_stuck_low: null,
+  scl_stuck_high: null,
+  clock_glitch: 'sensor',
   host_stall: null,
   usb_unplug: null,
 };
 
-export function parseFaults(text, file, { sensors, muxes }) {
+const OF_LINES = ['sensor_missing', 'line_stuck_low', 'line_stuck_high', 'scl_stuck_low', 'scl_stuck_high', 'clock_glitch'];
+
+export function parseFaults(text, file, { sensors, muxes, lines }) {
   const fail = (message) => {
     throw new InputError(`${file}: ${message}`);
   };
@@ -44,6 +57,8 @@ export function parseFaults(text, file, { sensors, muxes }) {
     if (fault.type === undefined) fail(`${at}: "type" is missing; ${known}`);
     if (!Object.hasOwn(TARGET, fault.type)) fail(`${at}: unknown type "${fault.type}"; ${known}`);
     const target = TARGET[fault.type];
+    if (OF_LINES.includes(fault.type) && !lines) fail(`${at}: ${fault.type} needs a board with a data line for each sensor`);
+    if (target === 'mux' && !muxes) fail(`${at}: ${fault.type} needs a board with multiplexers`);
     const extra = Object.keys(fault).find((key) => !['type', 'from_s', 'to_s', target].includes(key));
     if (extra) fail(`${at}: key "${extra}" does not belong to ${fault.type}`);
     if (target) {

@@ -120,7 +120,7 @@ export class Machine {
         ...host.statistics, configured: host.configured,
         ...(host.device ? { strings: host.device.strings, vendor: host.device.vendor, product: host.device.product } : {}),
       },
-      i2c: { ...board.bus.statistics },
+      i2c: { ...board.statistics },
       warnings: report.list.map((e) => Report.line(e)),
       end_reason: this.endReason ?? 'end of time',
       end_detail: this.endDetail,

@@ -16,7 +16,7 @@ const USAGE = `usage: main.mjs --image FILE.bin --board NAME --scenario FILE.csv
 Runs an unmodified firmware image on an emulated board with simulated sensors and a USB host.
 
   --image FILE         raw flash image (.bin), loaded at flash offset 0
-  --board NAME         pico_mux
+  --board NAME         pico_mux or pico_parallel
   --scenario FILE      what the sensors feel (format: scenario.mjs)
   --seconds N          emulated seconds to run; default: the scenario's last row
   --seed N             noise, sensor tolerances, SRAM content at power-on; default 1

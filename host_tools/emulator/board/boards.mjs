@@ -1,8 +1,9 @@
-/** The boards by name. A board class has static sensors, muxes, clkSys_Hz; see pico_mux.mjs for its instances. */
+/** The boards by name. A board class has static sensors, muxes, lines, clkSys_Hz; see pico_mux.mjs for its instances. */
 import { InputError } from '../errors.mjs';
 import { PicoMux } from './pico_mux.mjs';
+import { PicoParallel } from './pico_parallel.mjs';
 
-const BOARDS = { pico_mux: PicoMux };
+const BOARDS = { pico_mux: PicoMux, pico_parallel: PicoParallel };
 
 export function findBoard(name) {
   if (!Object.hasOwn(BOARDS, name)) throw new InputError(`unknown board "${name}"; known: ${Object.keys(BOARDS).join(', ')}`);

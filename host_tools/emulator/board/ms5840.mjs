@@ -107,12 +107,17 @@ export class Ms5840 extends I2cTarget {
     this.faults = faults;
     this.prom = makeProm(prng);
     this.timeFactor = CONVERSION_FRACTION * (1 + prng.range(-OSCILLATOR_TOLERANCE, OSCILLATOR_TOLERANCE));
+    this.heldClocks = 0;
+    this.holding = false;
+    this.powerUp();
+  }
+
+  powerUp() {
     this.busyUntil_ns = 0;
     this.wasReset = false;
     this.conversion = null;
     this.output = [];
-    this.heldClocks = 0;
-    this.holding = false;
+    this.phase = 'idle';
   }
 
   get holdsSda() {

@@ -21,6 +21,7 @@ const RISE_NS = 100;
 export class PicoMux {
   static sensors = 15;
   static muxes = 3;
+  static lines = false;
   static clkSys_Hz = 125e6;
 
   /** @param options scope, report, seed, stimulus(index, t_ns), faults() -> Faults, onTransfer */
@@ -47,6 +48,10 @@ export class PicoMux {
     });
     this.bus.targets = this.muxes;
     this.bus.muxState = () => this.muxes.map((m) => m.control.toString(16).padStart(2, '0')).join(':');
+  }
+
+  get statistics() {
+    return this.bus.statistics;
   }
 
   /** Actions for `Faults`. */

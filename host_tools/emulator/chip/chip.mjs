@@ -18,10 +18,14 @@ import { RP2040 } from 'rp2040js';
 import { Prng } from '../prng.mjs';
 import { Clocks, makeRosc, Pll, RESET_NAMES, Resets, ROSC_HZ, Xosc } from './clocks.mjs';
 import { FLASH_BASE, FLASH_BYTES, RAM_BASE, StrictCore } from './core.mjs';
+import { Dma } from './dma.mjs';
 import { I2cBlock } from './i2c_block.mjs';
+import { Pins } from './pins.mjs';
+import { Pio } from './pio.mjs';
 import { RegisterFile } from './registers.mjs';
 import { StrictSio } from './sio.mjs';
 import { Ssi } from './ssi.mjs';
+import { SysClock } from './sys_clock.mjs';
 import { Timer, Watchdog } from './timer_watchdog.mjs';
 import { UsbBlock } from './usb_block.mjs';
 
@@ -96,7 +100,8 @@ export class Chip extends RP2040 {
     this.sleepCycles = 0;
     this.onWatchdog = null;
     this.onUsbBoot = null;
-    this.gpioChange_ns = 0;
+    this.sysClock = new SysClock(time, ROSC_HZ);
+    this.pio = [];
 
     this.resets = new Resets(this);
     this.xosc = new Xosc(this);
@@ -108,6 +113,9 @@ export class Chip extends RP2040 {
     this.ssi = new Ssi(this, serial);
     this.i2c = [new I2cBlock(this, 0), new I2cBlock(this, 1)];
     this.usbCtrl = new UsbBlock(this);
+    this.dma = new Dma(this);
+    this.pio = [new Pio(this, 0), new Pio(this, 1)];
+    this.pins = new Pins(this);
     const ioQspi = new RegisterFile(this, 'IO_QSPI', Object.fromEntries([0, 1, 2, 3, 4, 5].flatMap((i) => [[8 * i, [0, 0]], [8 * i + 4, [0x1f, 0x3003331f]]])));
     const writeIoQspi = ioQspi.writeUint32.bind(ioQspi);
     ioQspi.writeUint32 = (offset, value) => {
@@ -130,9 +138,11 @@ export class Chip extends RP2040 {
       0x40058: this.watchdog,
       0x40060: makeRosc(this),
       0x40064: new RegisterFile(this, 'VREG_AND_CHIP_RESET', { 0: [0xb1, 0xf3], 4: [9, 0x1f], 8: [1 << 8, 1 << 24] }),
+      0x50000: this.dma,
       0x50110: this.usbCtrl,
+      0x50200: this.pio[0],
+      0x50300: this.pio[1],
     });
-    for (const pin of this.gpio) pin.padValue = 0x56;
     for (const pin of this.qspi) pin.padValue = 0x56;
     if (kept) this.sram.set(kept.sram);
     else {
@@ -212,6 +222,8 @@ export class Chip extends RP2040 {
     if (hz && hz !== this.clkSys) {
       this.clkSys = hz;
       this.time.setCycleSource(this.core, 1e9 / hz);
+      this.sysClock.retune(hz);
+      for (const block of [this.dma, ...this.pio]) block.clockChanged();
       this.ppb.systickTimer.frequency = hz;
     } else if (!hz) this.fail('CLOCKS', 'clk_sys stopped');
     this.clkUsbHz = this.clocks.usbHz;
@@ -225,22 +237,21 @@ export class Chip extends RP2040 {
       this.updateClocks();
     } else if (bit === 21) this.timer.reset();
     else if (bit === 24) this.usbCtrl.reset();
-    else if (bit === 8) for (const pin of this.gpio) this.#setPad(pin, 0x56);
-    else if (bit === 5) {
+    else if (bit === 2) this.dma.reset();
+    else if (bit === 10 || bit === 11) {
+      this.pio[bit - 10].reset();
+      this.pins.drive();
+    } else if (bit === 5 || bit === 8) {
       for (const pin of this.gpio) {
-        pin.ctrl = 0x1f;
-        pin.checkForUpdates();
+        if (bit === 5) pin.ctrl = 0x1f;
+        else pin.padValue = 0x56;
       }
+      this.pins.reconfigure();
     }
   }
 
-  #setPad(pin, value) {
-    pin.padValue = value;
-    pin.checkForUpdates();
-  }
-
-  gpioWillChange() {
-    this.gpioChange_ns = this.time.nanos;
+  get gpioValues() {
+    return this.pins.inputs;
   }
 
   watchdogFired(reason) {
@@ -310,8 +321,8 @@ export class Chip extends RP2040 {
       const peripheral = this.findPeripheral(address);
       if (!peripheral) this.fail('core', `write to 0x${address.toString(16)}, where nothing is`);
       this.#checkPage(address, 'write of');
-      if (address >>> 14 === 0x40014000 >>> 14) this.gpioWillChange();
       peripheral.writeUint32Atomic(address & 0xffc, wide, (address >>> 12) & 3);
+      if (peripheral === this.peripherals[0x40014] || peripheral === this.peripherals[0x4001c]) this.pins.reconfigure();
     }
   }
 

@@ -81,8 +81,8 @@ export class StrictSio extends RPSIO {
     if (offset === 0x78 || (offset >= 0x50 && offset < 0x5c)) {
       return this.rp2040.fail('SIO', `write of 0x${offset.toString(16)}`);
     }
-    if (offset >= 0x10 && offset < 0x30) this.rp2040.gpioWillChange();
     super.writeUint32(offset, value);
+    if (offset >= 0x10 && offset < 0x30) this.rp2040.pins.drive();
     return undefined;
   }
 }

@@ -69,7 +69,7 @@ test('a failing image ends with 1 and one line', () => {
 });
 
 for (const [name, args, message] of [
-  ['unknown board', ['--image', image, '--board', 'x', '--scenario', scenario], /^error: unknown board "x"; known: pico_mux\n$/],
+  ['unknown board', ['--image', image, '--board', 'x', '--scenario', scenario], /^error: unknown board "x"; known: pico_mux, pico_parallel\n$/],
   ['missing image', ['--image', '/nowhere', ...base], /^error: \/nowhere: cannot read the image \(no such file or directory\); build it first\n$/],
   ['folder for an image', ['--image', folder, ...base], /^error: .*: cannot read the image \(illegal operation on a directory\)/],
   ['missing option', ['--image', image], /^error: --board is missing/],

@@ -1,0 +1,218 @@
+/**
+ * Board pico_parallel: fifteen MS5840, sensor k with its SDA on GPIO k, all with their SCL on GPIO15; a pull-up on
+ * every line. Lines are wired-AND; in bitmaps bit k is SDA k and bit 15 is SCL.
+ *
+ * A line falls at once, and is high when it has risen to 0.7 VDD, which takes 1.42 times its rise time from 0.3 to
+ * 0.7 VDD. A sensor changes SDA a while after the fall of SCL. Every line is checked against the times of UM10204's
+ * fast mode. Of changes at one moment, SCL comes first where it falls and last where it rises.
+ */
+import { Prng } from '../prng.mjs';
+import { I2cTarget } from './i2c_bus.mjs';
+import { I2cLine, TimingCheck } from './i2c_line.mjs';
+import { Ms5840 } from './ms5840.mjs';
+
+const SENSORS = 15;
+const SCL = 1 << SENSORS;
+const SDA = SCL - 1;
+const LINES = SCL | SDA;
+
+/** With the board's pull-ups: 3.3 kOhm and 75 pF, 1 kOhm and 300 pF. */
+const RISE_NS = { sda: 210, scl: 254 };
+/** Time from release to 0.7 VDD over the time from 0.3 to 0.7 VDD, of a line that charges through a resistor. */
+const RELEASE_TO_HIGH = Math.log(0.3) / Math.log(0.3 / 0.7);
+/** From the fall of SCL to a sensor's change of SDA: assumed; UM10204 asks for 300 ns internal hold, 900 ns to valid. */
+const SENSOR_SDA_NS = 350;
+/** Where in a clock's high time a glitch falls. */
+const GLITCH_AT_NS = 200;
+
+export class PicoParallel {
+  static sensors = SENSORS;
+  static muxes = 0;
+  /** A data line for each sensor: there are faults of single lines. */
+  static lines = true;
+  static clkSys_Hz = 125e6;
+
+  /** @param options scope, report, seed, stimulus(index, t_ns), faults() -> Faults, onTransfer, rise_ns: { sda, scl } */
+  constructor({ scope, report, seed, stimulus, faults, onTransfer, rise_ns = RISE_NS }) {
+    this.scope = scope;
+    this.statistics = { transactions: 0, nacks: 0 };
+    this.sclCheck = new TimingCheck(report, 'SCL');
+    this.sensors = Array.from({ length: SENSORS }, (_, index) => new Ms5840({
+      index, prng: new Prng(Math.imul(seed, 1000003) + index), now_ns: () => scope.nanos, report, stimulus,
+      faults: (i) => faults().sensor(i),
+    }));
+    this.lines = this.sensors.map((target, k) => new I2cLine({ name: `SDA${k}`, target, rise_ns, report, statistics: this.statistics, onTransfer }));
+    this.nobody = new I2cTarget(-1);
+    this.rise_ns = rise_ns;
+    /** Who pulls down; what a fault ties to VDD wins. */
+    this.low = { chip: 0, sensors: 0, fault: 0 };
+    this.tied = 0;
+    this.levels = LINES;
+    /** Released lines that are not high yet, and since when. */
+    this.rising = 0;
+    this.released_ns = new Float64Array(SENSORS + 1);
+    this.riseAlarms = [[SDA, rise_ns.sda], [SCL, rise_ns.scl]].map(([mask, rise]) => this.#riser(mask, rise * RELEASE_TO_HIGH));
+    this.sensorsAlarm = scope.createAlarm(() => this.#sensorsPull());
+    this.glitches = 0;
+    this.glitchAlarm = scope.createAlarm(() => this.#glitch());
+    this.sclFell_ns = -Infinity;
+    this.sclRose_ns = -Infinity;
+    /** (levels, t_ns): a line changed. */
+    this.onLevels = () => {};
+  }
+
+  /** What a logic analyser would be connected to: names, and the bit of each in `levels`. */
+  static get probes() {
+    return [...Array.from({ length: SENSORS }, (_, k) => [`SDA${k}`, 1 << k]), ['SCL', SCL]];
+  }
+
+  /** Actions for `Faults`. */
+  get faultActions() {
+    const onLine = (action) => (k, active) => {
+      this.lines[k].fault(active);
+      action(1 << k, active, k);
+      this.#resolve();
+    };
+    const onScl = (action) => (_, active) => {
+      this.sclCheck.excused = active;
+      for (const line of this.lines) line.fault(active);
+      action(SCL, active);
+      this.#resolve();
+    };
+    const tieLow = (mask, active) => {
+      this.low.fault = active ? this.low.fault | mask : this.low.fault & ~mask;
+    };
+    const tieHigh = (mask, active) => {
+      this.tied = active ? this.tied | mask : this.tied & ~mask;
+    };
+    return {
+      sda_stuck_low: onLine((_, active, k) => {
+        if (active) this.sensors[k].hold();
+        else this.sensors[k].release();
+        this.#sensorsPull();
+      }),
+      line_stuck_low: onLine(tieLow),
+      line_stuck_high: onLine(tieHigh),
+      scl_stuck_low: onScl(tieLow),
+      scl_stuck_high: onScl(tieHigh),
+      sensor_missing: onLine((_, active, k) => {
+        if (!active) this.sensors[k].powerUp();
+        this.lines[k].connect(active ? this.nobody : this.sensors[k]);
+        this.#sensorsPull();
+      }),
+      clock_glitch: (k, active) => {
+        this.glitches = active ? this.glitches | (1 << k) : this.glitches & ~(1 << k);
+      },
+    };
+  }
+
+  attachChip(chip) {
+    const drive = (low, high) => {
+      const pins = high & LINES;
+      if (pins) chip.fail('i2c', `GPIO${31 - Math.clz32(pins & -pins)} drives a bus line high; a bus line may only be pulled low or released`);
+      this.low.chip = low & LINES;
+      this.#resolve();
+    };
+    this.chip = chip;
+    chip.pins.onDriven = drive;
+    chip.pins.setLevels(LINES, this.levels);
+    drive(chip.pins.low, chip.pins.high);
+  }
+
+  #riser(mask, delay_ns) {
+    const alarm = this.scope.createAlarm(() => {
+      const now = this.scope.nanos;
+      let risen = 0;
+      let next = Infinity;
+      for (let rest = this.rising & mask; rest; rest &= rest - 1) {
+        const bit = rest & -rest;
+        const due = this.released_ns[31 - Math.clz32(bit)] + delay_ns;
+        if (due <= now) risen |= bit;
+        else if (due < next) next = due;
+      }
+      if (next !== Infinity) alarm.scheduleAt(next);
+      this.rising &= ~risen;
+      if (risen) this.#become(this.levels | risen);
+    });
+    return { mask, delay_ns, alarm };
+  }
+
+  /** Somebody pulls, or lets go. */
+  #resolve() {
+    const low = (this.low.chip | this.low.sensors | this.low.fault) & ~this.tied;
+    const released = ~low & ~this.levels & ~this.rising & LINES;
+    this.rising = (this.rising & ~low) | released;
+    if (released) {
+      const now = this.scope.nanos;
+      for (let rest = released; rest; rest &= rest - 1) this.released_ns[31 - Math.clz32(rest & -rest)] = now;
+      for (const { mask, delay_ns, alarm } of this.riseAlarms) if (released & mask && !alarm.scheduled) alarm.scheduleAt(now + delay_ns);
+    }
+    if (this.levels & low) this.#become(this.levels & ~low);
+  }
+
+  #become(levels) {
+    const now = this.scope.nanos;
+    const was = this.levels;
+    this.levels = levels;
+    this.chip?.pins.setLevels(LINES, levels);
+    this.onLevels(levels, now);
+    const sclFalls = (was & ~levels & SCL) !== 0;
+    const sclRises = (~was & levels & SCL) !== 0;
+    if (sclFalls) this.#sclFell(now);
+    for (let rest = (was ^ levels) & SDA; rest; rest &= rest - 1) {
+      const bit = rest & -rest;
+      const line = this.lines[31 - Math.clz32(bit)];
+      if (levels & bit) line.sdaRose(now);
+      else line.sdaFell(now, (this.low.chip & bit) !== 0);
+    }
+    if (sclRises) this.#sclRose(now);
+    else if (levels & SCL && (was ^ levels) & SDA) this.#sensorsWill(now);
+  }
+
+  #sclFell(now) {
+    this.sclCheck.atLeast('tHIGH', now - this.sclRose_ns);
+    this.sclCheck.atLeast('period', now - this.sclFell_ns);
+    this.sclFell_ns = now;
+    for (const line of this.lines) line.sclFell(now);
+    this.#sensorsWill(now);
+  }
+
+  #sclRose(now) {
+    this.sclCheck.atLeast('tLOW', now - this.rise_ns.scl - this.sclFell_ns);
+    this.sclRose_ns = now;
+    const { chip } = this.low;
+    for (let k = 0; k < SENSORS; k++) this.lines[k].sclRose(now, ((chip >>> k) & 1) === 1);
+    if (this.glitches) this.glitchAlarm.scheduleAt(now + GLITCH_AT_NS);
+  }
+
+  get #wanted() {
+    let pulled = 0;
+    for (let k = 0; k < SENSORS; k++) if (this.lines[k].pulls || this.lines[k].target.holdsSda) pulled |= 1 << k;
+    return pulled;
+  }
+
+  #sensorsWill(now) {
+    if (this.#wanted !== this.low.sensors) this.sensorsAlarm.scheduleAt(now + SENSOR_SDA_NS);
+  }
+
+  #sensorsPull() {
+    this.low.sensors = this.#wanted;
+    this.#resolve();
+  }
+
+  /** Sensors that are being talked to see one clock more than there is. */
+  #glitch() {
+    if (!(this.levels & SCL)) return;
+    const now = this.scope.nanos;
+    for (let k = 0; k < SENSORS; k++) {
+      const line = this.lines[k];
+      if (!((this.glitches >>> k) & 1) || line.phase === 'idle') continue;
+      this.glitches &= ~(1 << k);
+      line.fault(true);
+      line.sclFell(now);
+      line.sclRose(now, ((this.low.chip >>> k) & 1) === 1);
+      line.fault(false);
+    }
+    this.#sensorsWill(now);
+  }
+}
