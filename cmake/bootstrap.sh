@@ -33,6 +33,7 @@ xz xz-utils
 arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/lib/arm-none-eabi/newlib/nano.specs libnewlib-arm-none-eabi
 qemu-system-arm qemu-system-arm
+sigrok-cli sigrok-cli
 /usr/include/ceres/ceres.h libceres-dev
 /usr/include/fftw3.h libfftw3-dev
 /usr/include/gsl/gsl_multifit_nlinear.h libgsl-dev

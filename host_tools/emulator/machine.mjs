@@ -20,11 +20,12 @@ const CLOCK_CHECK_NS = 200e6;
 export class Machine {
   /**
    * @param options image: Uint8Array; Board; scenario; seed; faults: parsed list; serial: 16 hex digits;
-   *   fastEnumeration; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes)
+   *   fastEnumeration; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes);
+   *   rise_ns, onLevels: see the boards
    */
   constructor({
     image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, fastEnumeration = false, allowWatchdog = false,
-    onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {},
+    rise_ns, onLevels, onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {},
   }) {
     this.image = image;
     this.Board = Board;
@@ -40,7 +41,7 @@ export class Machine {
     this.cyclesBefore = 0;
 
     this.board = new Board({
-      scope: this.scope, report: this.report, seed, onTransfer: onBusTransfer,
+      scope: this.scope, report: this.report, seed, rise_ns, onLevels, onTransfer: onBusTransfer,
       stimulus: (index, t_ns) => scenario.at_ns(index, t_ns), faults: () => this.faults,
     });
     this.host = new UsbHost({ scope: this.scope, report: this.report, fast: fastEnumeration, onPacket: onUsbPacket });
@@ -120,7 +121,7 @@ export class Machine {
         ...host.statistics, configured: host.configured,
         ...(host.device ? { strings: host.device.strings, vendor: host.device.vendor, product: host.device.product } : {}),
       },
-      i2c: { ...board.statistics },
+      i2c: { ...board.statistics, ...(board.times_ns ? { times_ns: board.times_ns } : {}) },
       warnings: report.list.map((e) => Report.line(e)),
       end_reason: this.endReason ?? 'end of time',
       end_detail: this.endDetail,

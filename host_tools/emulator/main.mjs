@@ -10,6 +10,7 @@ import { PtyPort } from './port/pty_port.mjs';
 import { DEFAULT_SERIAL, Machine } from './machine.mjs';
 import { OutputFile } from './output_file.mjs';
 import { readScenario } from './scenario.mjs';
+import { VcdDump } from './vcd.mjs';
 
 const USAGE = `usage: main.mjs --image FILE.bin --board NAME --scenario FILE.csv [options]
 
@@ -31,7 +32,12 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --host-script FILE   without --pty: lines "TIME_S HEXBYTES", "TIME_S dtr 0|1", "TIME_S baud N", comments "#"
   --capture FILE       every byte received on bulk IN
 
-  --bus-log FILE.csv   I2C transfers: start_ns,end_ns,muxes,address,rw,bytes,ack
+  --bus-log FILE.csv   I2C transfers: start_ns,end_ns,muxes,address,rw,bytes,ack (muxes: their control bytes, or
+                       the data line)
+  --vcd FILE           SDA and SCL as a logic analyser sees them, for a waveform viewer
+  --vcd-from S         dump from this time on, seconds; default 0
+  --vcd-to S           dump up to this time
+  --rise-ns N          rise time of the bus lines, 0 to 1000 ns; default: what the board's pull-ups make it
   --usb-log FILE.csv   USB packets: t_ns,endpoint,dir,length,bytes
   --report FILE.json   what happened, in numbers
   --progress           a line on stderr each second
@@ -46,6 +52,7 @@ const OPTIONS = {
   'fast-enumeration': { type: 'boolean', default: false }, 'allow-watchdog': { type: 'boolean', default: false },
   pty: { type: 'string' }, 'wait-open': { type: 'boolean', default: false }, pace: { type: 'string' },
   'host-script': { type: 'string' }, capture: { type: 'string' }, 'bus-log': { type: 'string' }, 'usb-log': { type: 'string' },
+  vcd: { type: 'string' }, 'vcd-from': { type: 'string', default: '0' }, 'vcd-to': { type: 'string' }, 'rise-ns': { type: 'string' },
   report: { type: 'string' }, progress: { type: 'boolean', default: false }, help: { type: 'boolean', short: 'h', default: false },
 };
 
@@ -80,6 +87,11 @@ function parseOptions(argv) {
   };
   values.seed = number('seed', (v) => Number.isInteger(v) && v >= 0 && v < 2 ** 32, 'a whole number from 0 to 4294967295');
   if (values.seconds !== undefined) values.seconds = number('seconds', (v) => Number.isFinite(v) && v > 0, 'a positive number of seconds');
+  for (const name of ['vcd-from', 'vcd-to']) {
+    values[name] = values[name] === undefined ? Infinity : number(name, (v) => Number.isFinite(v) && v >= 0, 'a time in seconds, 0 or later');
+  }
+  if (values['vcd-to'] < values['vcd-from']) throw new InputError('--vcd-to is before --vcd-from');
+  if (values['rise-ns'] !== undefined) values['rise-ns'] = number('rise-ns', (v) => v >= 0 && v <= 1000, 'a rise time from 0 to 1000 ns');
   if (!/^[0-9a-fA-F]{16}$/.test(values.serial)) throw new InputError(`--serial "${values.serial}" is not 16 hexadecimal digits`);
   values.pace ??= values.pty ? 'real' : 'fast';
   if (!['real', 'fast'].includes(values.pace)) throw new InputError(`--pace "${values.pace}" is neither real nor fast`);
@@ -135,6 +147,10 @@ async function run(options) {
     const reportFile = output(options.report);
     const capture = output(options.capture);
     const busLog = output(options['bus-log'], 'start_ns,end_ns,muxes,address,rw,bytes,ack');
+    const vcd = options.vcd && new VcdDump({
+      file: output(options.vcd), probes: Board.probes, comment: `board ${options.board}; a level is high from 0.7 VDD on`,
+      from_ns: options['vcd-from'] * 1e9, to_ns: options['vcd-to'] * 1e9,
+    });
     const usbLog = output(options['usb-log'], 't_ns,endpoint,dir,length,bytes');
 
     while (options['wait-open'] && !pty.isOpen && !interrupted && !pty.failure) await sleep(5);
@@ -142,6 +158,7 @@ async function run(options) {
     const machine = new Machine({
       image, Board, scenario, faults, seed: options.seed, serial: options.serial,
       fastEnumeration: options['fast-enumeration'], allowWatchdog: options['allow-watchdog'],
+      rise_ns: options['rise-ns'], onLevels: vcd ? (levels, t_ns) => vcd.change(levels, t_ns) : undefined,
       onBusTransfer: options['bus-log']
         ? (t) => busLog.write(Buffer.from(`${t.start_ns.toFixed(0)},${t.end_ns.toFixed(0)},${t.muxes},0x${t.address.toString(16)},${t.read ? 'r' : 'w'},${hex(t.bytes)},${t.acknowledged ? 1 : 0}\n`))
         : undefined,
@@ -192,6 +209,7 @@ async function run(options) {
     }
     if (options.progress && process.stderr.isTTY) process.stderr.write('\n');
     if (pty) await pty.drain();
+    vcd?.close(machine.time.nanos);
     const wall_s = (performance.now() - started_ms) / 1000;
     const { result } = machine;
     reportFile.write(Buffer.from(`${JSON.stringify({ ...result, wall_s }, null, 2)}\n`));

@@ -1,4 +1,4 @@
-/** The boards by name. A board class has static sensors, muxes, lines, clkSys_Hz; see pico_mux.mjs for its instances. */
+/** The boards by name. A board class has static sensors, muxes, lines, probes, clkSys_Hz; see pico_mux.mjs for its instances. */
 import { InputError } from '../errors.mjs';
 import { PicoMux } from './pico_mux.mjs';
 import { PicoParallel } from './pico_parallel.mjs';

@@ -62,6 +62,9 @@ export class I2cBus {
     this.onTransfer = onTransfer;
     this.targets = [];
     this.onReleased = null;
+    /** An I2cWaveform, and the bit times of the block that drives the bus. */
+    this.waveform = null;
+    this.timing = null;
     this.onLines = () => {};
     this.problem = () => null;
     this.muxState = () => '';
@@ -81,6 +84,7 @@ export class I2cBus {
   /** A target let go of (or grabbed) SDA: tell the pins and a waiting controller. */
   linesChanged() {
     this.onLines();
+    this.waveform?.lines(!this.sdaLow, !this.sclLow, this.now_ns());
     if (!this.sdaLow && !this.sclLow && this.onReleased) {
       const released = this.onReleased;
       this.onReleased = null;
@@ -90,6 +94,7 @@ export class I2cBus {
 
   start() {
     this.#finish();
+    this.waveform?.start(this.timing, this.now_ns());
     this.current = { start_ns: this.now_ns(), address: -1, read: false, bytes: [], acknowledged: true, muxes: this.muxState() };
     for (const t of this.targets) t.start();
   }
@@ -97,6 +102,7 @@ export class I2cBus {
   writeByte(byte) {
     let acknowledged = false;
     for (const t of this.targets) acknowledged = t.write(byte) || acknowledged;
+    this.waveform?.byte((byte << 1) | (acknowledged ? 0 : 1), this.timing, this.now_ns());
     const transfer = this.current;
     if (transfer.address < 0) {
       transfer.address = byte >> 1;
@@ -120,12 +126,14 @@ export class I2cBus {
     }
     if (drivers > 1) this.report.warn('i2c', `${drivers} sensors answered one read of 0x${this.current.address.toString(16)} at once; their data was ANDed`);
     for (const t of this.targets) t.readAcknowledged(acknowledge);
+    this.waveform?.byte((byte << 1) | (acknowledge ? 0 : 1), this.timing, this.now_ns());
     this.current.bytes.push(byte);
     return byte;
   }
 
   stop() {
     this.#finish();
+    this.waveform?.stop(this.timing, this.now_ns());
     for (const t of this.targets) t.stop();
     this.linesChanged();
   }
@@ -134,6 +142,7 @@ export class I2cBus {
   abandon() {
     if (this.current) this.current.acknowledged = false;
     this.#finish();
+    this.waveform?.abandon();
   }
 
   #finish() {

@@ -6,7 +6,7 @@
  * target wants SDA low, and changes only in `sclFell` and where the target loses its place (START, STOP).
  */
 
-/** UM10204 table 10, fast mode, ns. */
+/** UM10204 table 10, fast mode, ns. tVD;DAT may be longer by what SCL stays low beyond tLOW. */
 export const FAST_MODE = {
   tHD_STA: 600, tLOW: 1300, tHIGH: 600, tSU_STA: 600, tSU_DAT: 100, tSU_STO: 600, tBUF: 1300, tVD_DAT: 900, period: 2500, tr: 300,
 };
@@ -143,7 +143,10 @@ export class I2cLine {
     this.sclRose_ns = t_ns;
     if (this.phase === 'idle') return;
     this.check.atLeast('tSU_DAT', t_ns - this.rise_ns.scl - this.sdaChanged_ns);
-    if (this.sdaChanged_ns > this.sclFell_ns) this.check.atMost('tVD_DAT', this.sdaChanged_ns - this.sclFell_ns);
+    if (this.sdaChanged_ns > this.sclFell_ns) {
+      const stretched_ns = Math.max(0, t_ns - this.rise_ns.scl - this.sclFell_ns - FAST_MODE.tLOW);
+      this.check.atMost('tVD_DAT', this.sdaChanged_ns - this.sclFell_ns - stretched_ns);
+    }
     this.byte = (this.byte << 1) | (this.sdaHigh ? 1 : 0);
     this.bits += 1;
     const targets = this.phase === 'acknowledge' || (this.phase === 'transmit' && this.answer !== null);

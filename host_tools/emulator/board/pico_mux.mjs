@@ -6,6 +6,7 @@
 import { GPIOPinState } from 'rp2040js';
 import { Prng } from '../prng.mjs';
 import { I2cBus } from './i2c_bus.mjs';
+import { I2cWaveform, WAVEFORM_SCL, WAVEFORM_SDA } from './i2c_waveform.mjs';
 import { Ms5840 } from './ms5840.mjs';
 import { Tca9548a } from './tca9548a.mjs';
 
@@ -24,11 +25,17 @@ export class PicoMux {
   static lines = false;
   static clkSys_Hz = 125e6;
 
-  /** @param options scope, report, seed, stimulus(index, t_ns), faults() -> Faults, onTransfer */
-  constructor({ scope, report, seed, stimulus, faults, onTransfer }) {
+  static probes = [['SDA', WAVEFORM_SDA], ['SCL', WAVEFORM_SCL]];
+
+  /**
+   * @param options scope, report, seed, stimulus(index, t_ns), faults() -> Faults, onTransfer; rise_ns: of SCL;
+   *   onLevels(levels, t_ns): the lines changed, bits as in `probes`
+   */
+  constructor({ scope, report, seed, stimulus, faults, onTransfer, onLevels, rise_ns = RISE_NS }) {
     const now_ns = () => scope.nanos;
     this.report = report;
-    this.bus = new I2cBus({ now_ns, rise_ns: RISE_NS, report, onTransfer });
+    this.bus = new I2cBus({ now_ns, rise_ns, report, onTransfer });
+    if (onLevels) this.bus.waveform = new I2cWaveform(onLevels);
     this.sensors = [];
     this.muxes = RESETS.map((_, m) => {
       const mux = new Tca9548a(FIRST_ADDRESS + m, m);

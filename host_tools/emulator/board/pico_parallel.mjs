@@ -32,9 +32,16 @@ export class PicoParallel {
   static lines = true;
   static clkSys_Hz = 125e6;
 
-  /** @param options scope, report, seed, stimulus(index, t_ns), faults() -> Faults, onTransfer, rise_ns: { sda, scl } */
-  constructor({ scope, report, seed, stimulus, faults, onTransfer, rise_ns = RISE_NS }) {
+  static probes = [...Array.from({ length: SENSORS }, (_, k) => [`SDA${k}`, 1 << k]), ['SCL', SCL]];
+
+  /**
+   * @param options scope, report, seed, stimulus(index, t_ns), faults() -> Faults, onTransfer; rise_ns: of every line;
+   *   onLevels(levels, t_ns): lines changed, bits as in `probes`
+   */
+  constructor({ scope, report, seed, stimulus, faults, onTransfer, onLevels = () => {}, rise_ns: rise }) {
+    const rise_ns = rise === undefined ? RISE_NS : { sda: rise, scl: rise };
     this.scope = scope;
+    this.onLevels = onLevels;
     this.statistics = { transactions: 0, nacks: 0 };
     this.sclCheck = new TimingCheck(report, 'SCL');
     this.sensors = Array.from({ length: SENSORS }, (_, index) => new Ms5840({
@@ -57,13 +64,18 @@ export class PicoParallel {
     this.glitchAlarm = scope.createAlarm(() => this.#glitch());
     this.sclFell_ns = -Infinity;
     this.sclRose_ns = -Infinity;
-    /** (levels, t_ns): a line changed. */
-    this.onLevels = () => {};
   }
 
-  /** What a logic analyser would be connected to: names, and the bit of each in `levels`. */
-  static get probes() {
-    return [...Array.from({ length: SENSORS }, (_, k) => [`SDA${k}`, 1 << k]), ['SCL', SCL]];
+  /** By name, as in FAST_MODE: the shortest (tVD_DAT: longest) of all lines. */
+  get times_ns() {
+    const times = { ...this.sclCheck.extremes };
+    for (const { check } of this.lines) {
+      for (const [name, value] of Object.entries(check.extremes)) {
+        const other = times[name] ?? value;
+        times[name] = name === 'tVD_DAT' ? Math.max(other, value) : Math.min(other, value);
+      }
+    }
+    return times;
   }
 
   /** Actions for `Faults`. */

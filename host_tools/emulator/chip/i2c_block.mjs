@@ -49,13 +49,7 @@ export class I2cBlock extends BasePeripheral {
     super(chip, `I2C${index}`);
     this.irq = 23 + index;
     this.bus = null;
-    /** Bus time of the step in progress: an alarm fires at the end of an instruction, the bus does not wait for it. */
-    this.step_ns = null;
-    this.alarm = chip.clock.createAlarm(() => {
-      this.step_ns = this.alarm.at_ns;
-      this.continuation();
-      this.step_ns = null;
-    });
+    this.alarm = chip.clock.createAlarm(() => this.continuation());
     this.continuation = null;
     this.reset();
   }
@@ -321,7 +315,7 @@ export class I2cBlock extends BasePeripheral {
 
   #after(delay_ns, then) {
     this.continuation = then;
-    this.alarm.scheduleAt((this.step_ns ?? this.rp2040.clock.nanos) + delay_ns);
+    this.alarm.schedule(delay_ns);
   }
 
   #kick() {
@@ -343,6 +337,7 @@ export class I2cBlock extends BasePeripheral {
 
   #startCondition() {
     this.state = 'start';
+    this.bus.timing = { low_ns: this.low_ns, high_ns: this.high_ns, hold_ns: ((this.sdaHold & 0xffff) * 1e9) / this.rp2040.clkSys };
     this.bus.start();
     this.latched |= START_DET;
     this.reading = (this.tx[0] & CMD_READ) !== 0;
