@@ -3,7 +3,9 @@
  * its own line: a sample holds one bit of each.
  *
  * Cells, steps and samples are those of rp2040/wave_player.h. A bit, a START and a STOP take a cell
- * each, a repeated START takes two. Pure functions. Sources: UM10204; MS5840-02BA datasheet.
+ * each, a repeated START takes two. The last step of a cell prepares the bit of the next one; after
+ * a STOP it leaves the bus free for 1.4 us. Pure functions. Sources: UM10204; MS5840-02BA
+ * datasheet.
  */
 #ifndef PICO_PARALLEL_I2C_WAVE_H
 #define PICO_PARALLEL_I2C_WAVE_H
@@ -21,34 +23,44 @@ enum {
   I2C_WAVE_RECOVERY_CELLS = 12, /* SCL down, nine clocks, STOP, idle */
 };
 
+enum {
+  I2C_WAVE_COMMAND_STEPS = I2C_WAVE_COMMAND_CELLS * WAVE_STEPS_PER_CELL,
+  I2C_WAVE_READ_STEPS = I2C_WAVE_READ_CELLS * WAVE_STEPS_PER_CELL,
+  I2C_WAVE_RECOVERY_STEPS = I2C_WAVE_RECOVERY_CELLS * WAVE_STEPS_PER_CELL,
+};
+
 /* START, sensor address, command, STOP. */
-void i2c_wave_command(uint16_t steps[I2C_WAVE_COMMAND_CELLS][WAVE_STEPS_PER_CELL], uint8_t command);
+void i2c_wave_command(uint16_t steps[I2C_WAVE_COMMAND_STEPS], uint8_t command);
 
 /* START, sensor address, command, repeated START, sensor address, byte_count
  * (1..ARRAY_BUS_MAX_READ_BYTES) bytes read, STOP. Returns the number of cells. */
-unsigned i2c_wave_read(uint16_t steps[I2C_WAVE_READ_CELLS][WAVE_STEPS_PER_CELL], uint8_t command,
-                       uint8_t byte_count);
+unsigned i2c_wave_read(uint16_t steps[I2C_WAVE_READ_STEPS], uint8_t command, uint8_t byte_count);
 
 /* Another command in a wave of either kind. */
-void i2c_wave_set_command(uint16_t steps[][WAVE_STEPS_PER_CELL], uint8_t command);
+void i2c_wave_set_command(uint16_t steps[], uint8_t command);
 
 /* UM10204 3.1.16: nine clocks, in which a sensor that was left in the middle of a byte lets go, and
  * a STOP on these lines (bitmap). The other lines stay released: sensors take no notice of clocks
  * without a START. The last cell is idle, so its sample tells which lines are held low. */
-void i2c_wave_recovery(uint16_t steps[I2C_WAVE_RECOVERY_CELLS][WAVE_STEPS_PER_CELL],
-                       uint16_t stop_lines);
+void i2c_wave_recovery(uint16_t steps[I2C_WAVE_RECOVERY_STEPS], uint16_t stop_lines);
+
+/* Cells after which the samples of this byte of a read (0 is the first) are complete. */
+#define I2C_WAVE_CELLS_WITH_BYTE(index) (38u + I2C_WAVE_BYTE_CELLS * (index))
+
+/* Gives each sensor its byte with this index. Returns the lines that were high in all of its bits;
+ * of those only SCL has to be. About 180 Cortex-M0+ cycles. */
+uint16_t i2c_wave_byte(const uint16_t *samples, unsigned index,
+                       uint8_t bytes[][ARRAY_BUS_MAX_READ_BYTES]);
 
 struct i2c_reply {
   uint16_t
       acknowledged; /* bitmap: acknowledged every byte, and let go of the line where it should */
   uint16_t held;    /* bitmap of lines that were low while nobody had a reason to pull them */
-  bool scl_follows; /* SCL went low at the START and high at every sample that was looked at */
+  bool scl_follows; /* SCL was high in every sample that was looked at */
 };
 
-/* What the samples of a wave say; byte_count 0 is a command's. The bytes of a read go to
- * bytes[sensor][0..byte_count - 1]; they count for those that acknowledged. About 700 Cortex-M0+
- * cycles for three bytes. */
-struct i2c_reply i2c_wave_reply(const uint16_t *samples, uint8_t byte_count,
-                                uint8_t bytes[][ARRAY_BUS_MAX_READ_BYTES]);
+/* What all the other samples say, with the AND of what i2c_wave_byte() returned for byte_count
+ * bytes; 0 and UINT16_MAX for a command. The bytes count for those that acknowledged. */
+struct i2c_reply i2c_wave_reply(const uint16_t *samples, uint8_t byte_count, uint16_t in_bytes);
 
 #endif

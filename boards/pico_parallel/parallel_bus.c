@@ -4,8 +4,10 @@
 
 #include <string.h>
 
-/* For the way from the interrupt to the event handler */
-#define MARGIN_us 100u
+/* The longest wave, and time for the way from the interrupt to the event handler. */
+#define LONGEST_us (I2C_WAVE_READ_CELLS * WAVE_CELL_ns / 1000u + 100u)
+/* From the start of a read to the samples of this byte, which come in pairs, and a little later */
+#define LOOK_us(index) (uint8_t)((I2C_WAVE_CELLS_WITH_BYTE(index) + 2u) * WAVE_CELL_ns / 1000u)
 #define FREE_INTERVAL_MAX 1024u
 
 static unsigned count_bits(unsigned bitmap) {
@@ -16,10 +18,10 @@ static unsigned count_bits(unsigned bitmap) {
   return bits;
 }
 
-static void play(struct parallel_bus *bus, const uint16_t steps[][WAVE_STEPS_PER_CELL],
-                 unsigned cell_count, uint64_t now_us) {
-  bus->deadline_us = now_us + cell_count * WAVE_CELL_ns / 1000u + MARGIN_us;
-  wave_player_start(steps[0], bus->samples, cell_count);
+static void play(struct parallel_bus *bus, const uint16_t *steps, unsigned cell_count,
+                 uint64_t now_us) {
+  bus->deadline_us = now_us + LONGEST_us;
+  wave_player_start(steps, bus->samples, cell_count);
 }
 
 static void play_operation(struct parallel_bus *bus, uint64_t now_us) {
@@ -59,6 +61,8 @@ static enum ft_status start_command(void *context, uint8_t command, uint64_t now
     return FT_ERR_BUSY;
   }
   bus->operation = PARALLEL_BUS_COMMAND;
+  bus->in_bytes = UINT16_MAX;
+  bus->look_us = now_us;
   if (bus->failed) {
     return FT_OK;
   }
@@ -85,16 +89,20 @@ static enum ft_status start_read(void *context, uint8_t command, uint8_t byte_co
     return FT_ERR_BUSY;
   }
   bus->operation = PARALLEL_BUS_READ;
+  bus->in_bytes = UINT16_MAX;
   if (bus->failed) {
     return FT_OK;
   }
   if (byte_count != bus->read_count) {
     bus->read_count = byte_count;
     bus->read_cells = (uint8_t)i2c_wave_read(bus->read_steps, command, byte_count);
+    bus->read_look_us = byte_count > 1 ? LOOK_us(byte_count - 2u) : 0;
   } else if (command != bus->read_command) {
     i2c_wave_set_command(bus->read_steps, command);
   }
   bus->read_command = command;
+  bus->bytes_taken = 0;
+  bus->look_us = now_us + bus->read_look_us;
   play_operation(bus, now_us);
   return FT_OK;
 }
@@ -102,12 +110,24 @@ static enum ft_status start_read(void *context, uint8_t command, uint8_t byte_co
 static enum ft_status start_recovery(void *context, uint64_t now_us) {
   struct parallel_bus *bus = context;
   bus->operation = PARALLEL_BUS_RECOVERY;
+  bus->look_us = now_us;
   bus->freeing = false;
   bus->failed = wave_player_open() != FT_OK;
   if (!bus->failed) {
     play_recovery(bus, BOARD_SDA_LINES, now_us);
   }
   return FT_OK;
+}
+
+/* Takes the bytes that are complete; most of them while the last one is still on its way, so that
+ * little is left to do at the end. */
+static void take_bytes(struct parallel_bus *bus, struct array_bus_result *result) {
+  const unsigned cells = wave_player_sampled();
+  while (bus->bytes_taken < bus->read_count &&
+         cells >= I2C_WAVE_CELLS_WITH_BYTE(bus->bytes_taken)) {
+    bus->in_bytes &= i2c_wave_byte(bus->samples, bus->bytes_taken, result->bytes);
+    bus->bytes_taken++;
+  }
 }
 
 /* The nine clocks are over: takes note of the lines that are still held. False if SCL is. */
@@ -121,14 +141,18 @@ static enum ft_status judge(struct parallel_bus *bus, struct array_bus_result *r
   if (bus->operation == PARALLEL_BUS_RECOVERY) {
     return look_at_idle_lines(bus) ? FT_OK : FT_ERR_STUCK;
   }
-  const struct i2c_reply reply = i2c_wave_reply(
-      bus->samples, bus->operation == PARALLEL_BUS_READ ? bus->read_count : 0, result->bytes);
+  const bool is_read = bus->operation == PARALLEL_BUS_READ;
+  if (is_read) {
+    take_bytes(bus, result);
+  }
+  const struct i2c_reply reply =
+      i2c_wave_reply(bus->samples, is_read ? bus->read_count : 0, bus->in_bytes);
   if (!reply.scl_follows) {
     return FT_ERR_TIMEOUT;
   }
   bus->stuck = reply.held;
   result->acknowledged = reply.acknowledged;
-  result->nacks = BOARD_SENSOR_COUNT - count_bits(reply.acknowledged);
+  result->nacks = count_bits(BOARD_SDA_LINES & ~reply.acknowledged);
   return FT_OK;
 }
 
@@ -144,6 +168,11 @@ static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_resu
   } else if (!wave_player_has_ended()) {
     if (now_us < bus->deadline_us) {
       *wake_us = bus->deadline_us;
+      if (now_us < bus->look_us) {
+        *wake_us = bus->look_us;
+      } else if (bus->operation == PARALLEL_BUS_READ) {
+        take_bytes(bus, result);
+      }
       return FT_PENDING;
     }
     status = bus->operation == PARALLEL_BUS_RECOVERY ? FT_ERR_STUCK : FT_ERR_TIMEOUT;

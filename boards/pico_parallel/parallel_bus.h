@@ -1,6 +1,6 @@
 /* array_bus over one SCL and a data line for each sensor, by PIO and DMA.
  *
- * A command takes 50 us and a read of three bytes 146 us on the bus at 397 kHz, for all sensors at
+ * A command takes 49 us and a read of three bytes 146 us on the bus at 397 kHz, for all sensors at
  * once: they sample at the same moment, and the skew between them is that of their own oscillators.
  *
  * A line that is low while nobody should pull it is taken for stuck: its sensor does not
@@ -30,6 +30,9 @@ struct parallel_bus {
   bool freeing; /* the wave under way is the one for the stuck lines, before the command's own */
   bool failed;  /* until a recovery succeeds, every operation ends with FT_ERR_TIMEOUT */
   uint64_t deadline_us;
+  uint64_t look_us;    /* what a read has so far is looked at then */
+  uint8_t bytes_taken; /* of a read */
+  uint16_t in_bytes;   /* AND of what i2c_wave_byte() returned */
 
   uint16_t stuck;         /* bitmap of lines, by the last wave */
   uint16_t free_interval; /* commands between two attempts to free them */
@@ -38,9 +41,10 @@ struct parallel_bus {
   /* What the tables hold */
   uint8_t command;
   uint8_t read_command, read_count, read_cells;
-  _Alignas(uint32_t) uint16_t command_steps[I2C_WAVE_COMMAND_CELLS][WAVE_STEPS_PER_CELL];
-  _Alignas(uint32_t) uint16_t read_steps[I2C_WAVE_READ_CELLS][WAVE_STEPS_PER_CELL];
-  _Alignas(uint32_t) uint16_t recovery_steps[I2C_WAVE_RECOVERY_CELLS][WAVE_STEPS_PER_CELL];
+  uint8_t read_look_us; /* from its start until all bytes but the last are there */
+  _Alignas(uint32_t) uint16_t command_steps[I2C_WAVE_COMMAND_STEPS];
+  _Alignas(uint32_t) uint16_t read_steps[I2C_WAVE_READ_STEPS];
+  _Alignas(uint32_t) uint16_t recovery_steps[I2C_WAVE_RECOVERY_STEPS];
   _Alignas(uint32_t) uint16_t samples[I2C_WAVE_READ_CELLS];
 };
 

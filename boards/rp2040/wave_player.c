@@ -6,7 +6,6 @@
 #include "rp2040/nvic.h"
 #include "rp2040/pio_regs.h"
 #include "rp2040/resets.h"
-#include "rp2040/timer_regs.h"
 
 enum {
   LINES = 16,
@@ -19,26 +18,19 @@ enum {
 #define DELAY(ns) ((ns) / CYCLE_ns - 1)
 
 static const uint16_t program[] = {
-    PIO_OUT_PINDIRS(LINES, DELAY(WAVE_STEP0_ns)),
-    PIO_OUT_PINDIRS(LINES, DELAY(WAVE_STEP1_ns - CYCLE_ns)),
+    PIO_OUT_PINDIRS(LINES, DELAY(WAVE_STEP0_ns - CYCLE_ns)),
     PIO_IN_PINS(LINES, 0),
+    PIO_OUT_PINDIRS(LINES, DELAY(WAVE_STEP1_ns)),
     PIO_OUT_PINDIRS(LINES, DELAY(WAVE_STEP2_ns)),
     PIO_OUT_PINDIRS(LINES, DELAY(WAVE_STEP3_ns)),
 };
 enum { PROGRAM_LENGTH = sizeof program / sizeof program[0] };
-_Static_assert(DELAY(WAVE_STEP0_ns) <= 31, "a delay has five bits");
+_Static_assert(DELAY(WAVE_STEP3_ns) <= 31, "a delay has five bits");
 _Static_assert(WAVE_STEP0_ns % CYCLE_ns == 0 && WAVE_STEP1_ns % CYCLE_ns == 0 &&
                    WAVE_STEP2_ns % CYCLE_ns == 0 && WAVE_STEP3_ns % CYCLE_ns == 0,
                "steps are whole cycles");
 
-/* From the last sample of a wave: its last steps (0.6 us), the rise of SDA (0.3 us at most) and the
- * bus-free time (1.3 us). The timer may tick at once, so one more. */
-#define BUS_FREE_us 4u
-/* Five cycles or more each: far beyond BUS_FREE_us */
-#define BUS_FREE_POLLS 200
-
-static uint32_t ended_us;
-static bool under_way;
+static unsigned cells; /* of the wave under way */
 
 enum ft_status wave_player_open(void) {
   rp2040_irq_disable(RP2040_IRQ_DMA_0);
@@ -66,17 +58,13 @@ enum ft_status wave_player_open(void) {
 
   DMA_INTE0 = 1u << CHANNEL_SAMPLES;
   rp2040_irq_enable(RP2040_IRQ_DMA_0);
-  under_way = false;
-  ended_us = TIMER_TIMERAWL;
   return FT_OK;
 }
 
 /* A word holds two steps or two samples, the first in its low half, which leaves the shift register
  * first and enters it first. */
 void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_count) {
-  for (int polls = 0; TIMER_TIMERAWL - ended_us < BUS_FREE_us && polls < BUS_FREE_POLLS; polls++) {
-  }
-  under_way = true;
+  cells = cell_count;
   DMA_READ_ADDR(CHANNEL_SAMPLES) = PIO0_RXF0_ADDRESS;
   DMA_WRITE_ADDR(CHANNEL_SAMPLES) = (uint32_t)(uintptr_t)samples;
   DMA_TRANS_COUNT(CHANNEL_SAMPLES) = cell_count / 2;
@@ -91,12 +79,12 @@ void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_c
                                  DMA_CTRL_TREQ(DMA_DREQ_PIO0_TX0) | DMA_CTRL_IRQ_QUIET;
 }
 
+unsigned wave_player_sampled(void) {
+  return cells - 2 * DMA_TRANS_COUNT(CHANNEL_SAMPLES);
+}
+
 bool wave_player_has_ended(void) {
-  if (under_way && (DMA_CTRL_TRIG(CHANNEL_SAMPLES) & DMA_CTRL_BUSY) == 0) {
-    under_way = false;
-    ended_us = TIMER_TIMERAWL;
-  }
-  return !under_way;
+  return (DMA_CTRL_TRIG(CHANNEL_SAMPLES) & DMA_CTRL_BUSY) == 0;
 }
 
 uint16_t wave_player_levels(void) {

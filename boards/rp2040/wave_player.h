@@ -2,16 +2,18 @@
  * PIO0 and two DMA channels. The processor is free until the end, which calls rp2040_event().
  *
  * A step is a bitmap of the lines pulled low; the others are released. Four steps make a cell. In
- * each cell all lines are sampled once, at the end of its second step. When a wave is over, the
+ * each cell all lines are sampled once, at the end of its first step. When a wave is over, the
  * lines stay as its last step has them.
  *
- * The lengths of the four steps are those of a bit of fast-mode I2C, SCL being low in the first and
- * the last, UM10204 table 10: with rise and fall times of up to 300 ns, tLOW >= 1.3 us,
- * tHIGH, tSU;STA, tSU;STO >= 0.6 us, tHD;STA >= 0.6 us, and SDA held 320 ns beyond the fall of SCL.
- * 2520 ns a bit: 396.8 kHz whatever the rise time, as nothing waits for an edge.
+ * The lengths of the steps are those that a bit of fast-mode I2C needs: SCL is high in the first
+ * two and low in the others, and SDA may change between those. They keep the times of UM10204
+ * table 10 where a line is back above 0.7 VDD within 430 ns, which is a rise time of 300 ns from
+ * 0.3 VDD on, and below 0.3 VDD within 180 ns: tLOW >= 1.3 us, tHIGH, tSU;STA, tSU;STO, tHD;STA >=
+ * 0.6 us, SDA held 300 ns beyond the fall of SCL. 2520 ns a bit: 396.8 kHz whatever the rise time,
+ * as nothing waits for an edge.
  *
  * One context: the event handler, or main before there is one. Nothing here waits, but for blocks
- * to leave reset and for the bus to have been free for 2 us between two waves, both bounded.
+ * to leave reset, which is bounded.
  */
 #ifndef RP2040_WAVE_PLAYER_H
 #define RP2040_WAVE_PLAYER_H
@@ -23,10 +25,10 @@
 
 enum {
   WAVE_STEPS_PER_CELL = 4,
-  WAVE_STEP0_ns = 1280,
-  WAVE_STEP1_ns = 640,
-  WAVE_STEP2_ns = 280,
-  WAVE_STEP3_ns = 320,
+  WAVE_STEP0_ns = 760,
+  WAVE_STEP1_ns = 280,
+  WAVE_STEP2_ns = 320,
+  WAVE_STEP3_ns = 1160,
   WAVE_CELL_ns = WAVE_STEP0_ns + WAVE_STEP1_ns + WAVE_STEP2_ns + WAVE_STEP3_ns,
 };
 
@@ -36,12 +38,15 @@ enum {
 enum ft_status wave_player_open(void);
 
 /* Starts a wave of cell_count cells (even, not 0). The one before must have ended. Both tables are
- * aligned to words and in use until the end: steps[cell][WAVE_STEPS_PER_CELL]; samples[cell],
- * bitmap of the lines that were high. */
+ * aligned to words and in use until the end: steps[cell * WAVE_STEPS_PER_CELL + step];
+ * samples[cell], bitmap of the lines that were high. */
 void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_count);
 
-/* All samples are there. The last two steps of the wave are still to come, within 0.6 us. */
+/* All samples are there. The last three steps are still to come, before those of the next wave. */
 bool wave_player_has_ended(void);
+
+/* How many of this wave's cells have their samples in memory. */
+unsigned wave_player_sampled(void);
 
 /* The levels now: bitmap of the lines that are high. */
 uint16_t wave_player_levels(void);

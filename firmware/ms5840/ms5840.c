@@ -3,10 +3,15 @@
 #include <stddef.h>
 
 /* Conversion times and noise: MS5840-02BA datasheet; 1 mbar = 100 Pa. */
+#define LONGEST_us(max_us) ((max_us)*105u / 100u)
 #define ROW(ratio, bits, max_us, noise_Pa)                                                         \
   {                                                                                                \
     .osr = ratio, .convert_pressure = 0x40 | bits, .convert_temperature = 0x50 | bits,             \
-    .conversion_us = (max_us)*105 / 100, .noise_Pa_q10 = (int32_t)((noise_Pa)*1024.0f)             \
+    .conversion_us = LONGEST_us(max_us),                                                           \
+    .read_after_us = LONGEST_us(max_us) - MS5840_READ_LEAD_us > (max_us)                           \
+                         ? LONGEST_us(max_us) - MS5840_READ_LEAD_us                                \
+                         : (max_us),                                                               \
+    .noise_Pa_q10 = (int32_t)((noise_Pa)*1024.0f)                                                  \
   }
 static const struct ms5840_osr osr_table[] = {
     ROW(256, 0x0, 560, 11.0f),  ROW(512, 0x2, 1100, 6.2f),  ROW(1024, 0x4, 2170, 3.9f),

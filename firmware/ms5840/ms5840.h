@@ -22,6 +22,10 @@ enum {
 /* PROM reload after reset: 2.8 ms (recalled from the sensor family; public drivers wait 3 ms). */
 #define MS5840_RESET_us 4000u
 
+/* A read is too early when its command arrives before the conversion is over, not when its START
+ * does: address and command take 17 clocks of 2.5 us at least (UM10204, fast mode). */
+#define MS5840_READ_LEAD_us 42u
+
 /* One row per oversampling ratio: the commands and the time they take cannot disagree. */
 struct ms5840_osr {
   uint16_t osr;
@@ -29,6 +33,8 @@ struct ms5840_osr {
   uint8_t convert_temperature; /* D2 */
   uint16_t conversion_us;      /* datasheet maximum plus 5 % for the sensor's own oscillator. An
                                   earlier read returns 0 and spoils the conversion */
+  uint16_t read_after_us;      /* from the end of the command to the START of the read: the maximum
+                                  itself at least */
   int32_t noise_Pa_q10;        /* rms of one reading, 1/1024 Pa */
 };
 

@@ -64,7 +64,8 @@ enum ft_status scan_init(struct scan *scan, const struct array_bus *bus,
   memset(scan, 0, sizeof *scan);
   scan->bus = bus;
   scan->sensor_count = settings->sensor_count;
-  scan->conversion.osr = ms5840_find_osr(settings->osr);
+  scan->conversion = &scan->conversions[0];
+  scan->conversion->osr = ms5840_find_osr(settings->osr);
   set(&scan->osr, settings->osr);
   scan_set_rate_mHz(scan, settings->rate_mHz);
   scan->state = SCAN_WAIT_POWER;
@@ -97,8 +98,8 @@ static void enter(struct scan *scan, enum scan_state state) {
 }
 
 static void convert(struct scan *scan, bool is_temperature, bool is_frame) {
-  scan->conversion.is_temperature = is_temperature;
-  scan->conversion.is_frame = is_frame;
+  scan->conversion->is_temperature = is_temperature;
+  scan->conversion->is_frame = is_frame;
   enter(scan, SCAN_CONVERT);
 }
 
@@ -291,7 +292,7 @@ static void leave_idle(struct scan *scan, uint64_t now_us) {
   uint32_t waiting = get(&scan->present) & ~get(&scan->admitted);
   bool nobody = get(&scan->present) == 0;
   /* A temperature that was read just now still has to go into its slot. */
-  bool prom_is_free = !temperature_waits(scan) && !scan->conversion.is_temperature;
+  bool prom_is_free = !temperature_waits(scan) && !scan->last_was_temperature;
   if ((waiting || nobody) && now_us >= scan->next_admission_us && prom_is_free) {
     begin_admission(scan, now_us);
     return;
@@ -320,7 +321,7 @@ static void leave_idle(struct scan *scan, uint64_t now_us) {
 
 static enum ft_status start_operation(struct scan *scan, uint64_t now_us) {
   const struct array_bus *bus = scan->bus;
-  struct scan_conversion *conversion = &scan->conversion;
+  struct scan_conversion *conversion = scan->conversion;
   switch (scan->state) {
   case SCAN_RESET:
     return bus->start_command(bus->context, MS5840_CMD_RESET, now_us);
@@ -390,12 +391,14 @@ static void begin_operation(struct scan *scan, uint64_t now_us) {
 
 /* The codes are in scan->result, and stay there while the next operation runs. */
 static void end_reading(struct scan *scan, uint64_t now_us) {
-  struct scan_conversion *read = &scan->read;
-  *read = scan->conversion;
+  struct scan_conversion *read = scan->conversion;
   read->t_read_us = now_us;
   read->number = scan->frame_number;
   scan->frame_number += read->is_frame;
   scan->overhead_us = (uint32_t)(now_us - read->t_begin_us) - read->osr->conversion_us;
+  scan->last_was_temperature = read->is_temperature;
+  scan->conversion = &scan->conversions[read == &scan->conversions[0]];
+  scan->conversion->osr = read->osr;
   wait_in(scan, SCAN_IDLE, now_us);
   leave_idle(scan, now_us);
   begin_operation(scan, now_us);
@@ -411,8 +414,8 @@ static void end_operation(struct scan *scan, uint64_t now_us) {
     take_prom_word(scan);
     break;
   case SCAN_CONVERT:
-    scan->conversion.t_us = now_us + scan->conversion.osr->conversion_us / 2u;
-    wait_in(scan, SCAN_WAIT_CONVERSION, now_us + scan->conversion.osr->conversion_us);
+    scan->conversion->t_us = now_us + scan->conversion->osr->conversion_us / 2u;
+    wait_in(scan, SCAN_WAIT_CONVERSION, now_us + scan->conversion->osr->read_after_us);
     break;
   case SCAN_READ_ADC:
     end_reading(scan, now_us);
@@ -420,7 +423,7 @@ static void end_operation(struct scan *scan, uint64_t now_us) {
   default: /* SCAN_RECOVER: a conversion may still be running, and a command would spoil it */
     scan->bus_stuck = false;
     scan->recovery_delay_us = RECOVERY_DELAY_MIN_us;
-    wait_in(scan, SCAN_WAIT_RECOVERY, now_us + scan->conversion.osr->conversion_us);
+    wait_in(scan, SCAN_WAIT_RECOVERY, now_us + scan->conversion->osr->conversion_us);
     break;
   }
 }

@@ -101,10 +101,12 @@ struct scan {
   /* Event context only. */
   enum scan_state state;
   bool operation_running;
-  bool bus_stuck;                    /* the last recovery did not free the bus */
-  struct scan_conversion conversion; /* under way */
-  struct scan_conversion read;       /* the one before: its codes are in result */
-  uint32_t overhead_us;              /* of a conversion: command and reading */
+  bool bus_stuck; /* the last recovery did not free the bus */
+  struct scan_conversion
+      conversions[2];                 /* under way, and the one before, whose codes are in result */
+  struct scan_conversion *conversion; /* under way */
+  bool last_was_temperature;
+  uint32_t overhead_us; /* of a conversion: command and reading */
   uint64_t wait_until_us;
   uint64_t next_frame_us;
   uint64_t next_temperature_us;

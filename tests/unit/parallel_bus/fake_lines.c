@@ -6,7 +6,7 @@
 
 struct fake_lines fake;
 
-enum { MAX_CELLS = 64, RISE_ns = 300, FALL_ns = 300 };
+enum { MAX_CELLS = 64, RISE_ns = 426, FALL_ns = 180, HOLD_ns = 300 };
 static const int STEP_ns[WAVE_STEPS_PER_CELL] = {WAVE_STEP0_ns, WAVE_STEP1_ns, WAVE_STEP2_ns,
                                                  WAVE_STEP3_ns};
 
@@ -143,7 +143,7 @@ static void check_scl_edge(bool rises) {
 static void check_sda_edge(unsigned k, bool rises, bool scl) {
   sda_changed_ns[k] = time_ns;
   if (!scl) {
-    if (time_ns - scl_fell_ns < FALL_ns) {
+    if (time_ns - scl_fell_ns < HOLD_ns) {
       misused("tHD;DAT");
     }
     return;
@@ -228,7 +228,7 @@ void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_c
     for (unsigned i = 0; i < WAVE_STEPS_PER_CELL; i++) {
       take_step(steps[cell * WAVE_STEPS_PER_CELL + i]);
       time_ns += STEP_ns[i];
-      if (i == 1) {
+      if (i == 0) {
         wave.sampled[cell] = levels();
       }
     }
@@ -241,6 +241,18 @@ void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_c
   wave.samples = samples;
   wave.cells = cell_count;
   wave.end_us = fake.now_us + cell_count * WAVE_CELL_ns / 1000u;
+}
+
+/* Nothing is known before it is in memory. */
+unsigned wave_player_sampled(void) {
+  if (!wave.active) {
+    return wave.cells;
+  }
+  const uint64_t began_us = wave.end_us - wave.cells * WAVE_CELL_ns / 1000u;
+  const unsigned pairs = (unsigned)((fake.now_us - began_us) * 1000u / (2 * WAVE_CELL_ns));
+  const unsigned cells = 2 * pairs < wave.cells && !fake.hangs ? 2 * pairs : 0;
+  memcpy(wave.samples, wave.sampled, cells * sizeof wave.sampled[0]);
+  return cells;
 }
 
 bool wave_player_has_ended(void) {
