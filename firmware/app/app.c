@@ -193,6 +193,7 @@ static void judge_frame(struct app *app) {
       .contact = app->conditioned.contact,
       .tared = app->conditioned.tared,
       .masked = app->conditioned.usable != UINT32_MAX >> (FT_MAX_SENSORS - frame->sensor_count),
+      .noise_Pa = (float)frame->noise_Pa_q10 * (1.0f / 1024.0f),
       .saturated = frame->saturated,
       .fit = app->conditioned.contact ? &app->fit : NULL,
   };

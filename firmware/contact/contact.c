@@ -10,6 +10,21 @@ static bool fewer_bits_than(uint32_t bitmap, int limit) {
   return bits < limit;
 }
 
+/* An uncertain location still tells motion if it is the model that does not fit: such an error
+ * moves with the contact. What the noise adds to it is the predicted standard deviation times the
+ * share of the noise in the residuals. */
+static bool tells_motion(const struct contact_input *input, uint32_t flags) {
+  if (!(flags & CONTACT_FLAG_FIT_VALID) || (flags & (CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND))) {
+    return false;
+  }
+  if (!(flags & CONTACT_FLAG_UNCERTAIN)) {
+    return true;
+  }
+  const struct fit_result *fit = input->fit;
+  return (flags & CONTACT_FLAG_UNCERTAINTY_VALID) &&
+         fit->location_sd_mm * input->noise_Pa <= CONTACT_JITTER_MAX_mm * fit->residual_rms_Pa;
+}
+
 void contact_update(struct slip_history *history, const struct contact_settings *settings,
                     const struct contact_input *input, struct contact_result *result) {
   uint32_t flags = input->fit ? input->fit->flags : 0;
@@ -23,8 +38,7 @@ void contact_update(struct slip_history *history, const struct contact_settings 
     }
   }
   result->slip_mm = 0.0f;
-  const uint32_t spoiled = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND;
-  if (!input->fit || !(flags & CONTACT_FLAG_FIT_VALID) || (flags & spoiled)) {
+  if (!input->fit || !tells_motion(input, flags)) {
     slip_reset(history);
   } else if (slip_update(history, input->t_us, input->fit->x_mm, input->fit->y_mm,
                          settings->slip_window_us, &result->slip_mm)) {

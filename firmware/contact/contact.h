@@ -20,6 +20,7 @@ struct contact_input {
   bool contact;  /* the gate is open */
   bool tared;
   bool masked;                  /* a sensor is missing or was left out */
+  float noise_Pa;               /* rms noise of a reading */
   uint32_t saturated;           /* bitmap: left out of the fit for being beyond their range */
   const struct fit_result *fit; /* NULL where nothing was fitted */
 };
@@ -33,8 +34,11 @@ struct contact_result {
  */
 #define CONTACT_MIN_UNSATURATED 5
 
-/* Locations flagged UNCERTAIN, FLAT or AT_BOUND do not enter the slip history: it starts anew
- * after them, as after a loss of contact. */
+/* Locations flagged FLAT or AT_BOUND do not enter the slip history, nor do those flagged UNCERTAIN
+ * whose noise alone has a standard deviation above CONTACT_JITTER_MAX_mm: it starts anew after
+ * them, as after a loss of contact. */
+#define CONTACT_JITTER_MAX_mm 0.1f
+
 void contact_update(struct slip_history *history, const struct contact_settings *settings,
                     const struct contact_input *input, struct contact_result *result);
 

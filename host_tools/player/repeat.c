@@ -73,6 +73,7 @@ void repeat_frame(const struct wire_packet *packet, bool held, struct wire_conta
         .contact = repeat.conditioned.contact,
         .tared = repeat.conditioned.tared,
         .masked = repeat.conditioned.usable != UINT32_MAX >> (FT_MAX_SENSORS - frame.sensor_count),
+        .noise_Pa = (float)frame.noise_Pa_q10 * (1.0f / 1024.0f),
         .saturated = frame.saturated,
         .fit = repeat.conditioned.contact ? &repeat.fit : NULL,
     };

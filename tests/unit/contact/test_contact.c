@@ -18,7 +18,9 @@ void setUp(void) {
   memset(&fit, 0, sizeof fit);
   fit.flags = GOOD_FIT;
   fit.used = 0x7FFF;
-  input = (struct contact_input){.contact = true, .tared = true, .fit = &fit};
+  fit.location_sd_mm = 0.5f; /* of which the noise has 4 / 18 */
+  fit.residual_rms_Pa = 18.0f;
+  input = (struct contact_input){.contact = true, .tared = true, .noise_Pa = 4.0f, .fit = &fit};
 }
 
 void tearDown(void) {}
@@ -114,6 +116,20 @@ static void test_doubtful_locations_end_the_history(void) {
   TEST_ASSERT_EQUAL_UINT16(0, history.count);
 }
 
+static void test_an_uncertain_location_that_noise_hardly_moves_keeps_the_history(void) {
+  fill_history();
+  fit.flags = GOOD_FIT | CONTACT_FLAG_UNCERTAIN;
+  fit.residual_rms_Pa = 0.5f * 4.0f / CONTACT_JITTER_MAX_mm * 1.01f;
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SLIP_VALID, update());
+  fit.residual_rms_Pa *= 0.98f;
+  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID, update());
+  setUp();
+  fill_history();
+  fit.flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAIN; /* and nobody knows how far */
+  fit.residual_rms_Pa = 1e6f;
+  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID, update());
+}
+
 static void test_other_warnings_keep_the_history(void) {
   static const uint32_t warnings[] = {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_MODEL,
                                       CONTACT_FLAG_SENSOR_MASKED};
@@ -149,6 +165,7 @@ int main(void) {
   RUN_TEST(test_flags_of_the_fit_pass);
   RUN_TEST(test_slip_flag_and_threshold);
   RUN_TEST(test_doubtful_locations_end_the_history);
+  RUN_TEST(test_an_uncertain_location_that_noise_hardly_moves_keeps_the_history);
   RUN_TEST(test_other_warnings_keep_the_history);
   RUN_TEST(test_saturation_and_lower_bound);
   return UNITY_END();
