@@ -8,7 +8,7 @@
  * flags and pins of before it; of two that write one pin the higher-numbered wins.
  *
  * The first cycle of a divider is the one after its restart; with a fraction the cycles are floor(k * divisor).
- * Autopull refills in cycles of an enabled machine only. An instruction written to INSTR takes the next cycle of
+ * A stalled instruction does its side-set in its first cycle. Autopull refills in cycles of an enabled machine only. An instruction written to INSTR takes the next cycle of
  * clk_sys.
  *
  * Fails the run: encodings and field values that the datasheet reserves, OUT_STICKY and INLINE_OUT_EN (not modelled).
@@ -98,7 +98,9 @@ class StateMachine {
     this.raised = false;
     /** Instruction from OUT or MOV EXEC, and one written to INSTR; -1: none. */
     this.executee = -1;
+    this.begun = false;
     this.forced = -1;
+    this.forcedBegun = false;
     this.forcedEdge = Infinity;
     this.forcedStall = 0;
     this.stall = 0;
@@ -283,6 +285,7 @@ class StateMachine {
   force(instruction) {
     this.forced = instruction;
     this.forcedStall = 0;
+    this.forcedBegun = false;
     this.raised = false;
     this.forcedEdge = this.pio.clock.edge + 1;
   }
@@ -300,7 +303,8 @@ class StateMachine {
   }
 
   #actForced(edge) {
-    const ended = this.#execute(this.forced, edge);
+    const ended = this.#execute(this.forced, edge, this.forcedBegun);
+    this.forcedBegun = ended !== DONE;
     if (ended >= 0) {
       this.forcedStall = ended;
       this.nextEdge = Infinity;
@@ -315,6 +319,7 @@ class StateMachine {
       if (this.enabled && (this.nextEdge <= edge || this.nextEdge === Infinity)) {
         this.stall = 0;
         this.raised = false;
+        this.begun = false;
         this.nextEdge = this.cycleAfter(edge);
       }
     }
@@ -324,7 +329,8 @@ class StateMachine {
   #actNext(edge) {
     const instruction = this.executee >= 0 ? this.executee : this.pio.memory[this.pc];
     const stalledBefore = this.stall;
-    const ended = this.#execute(instruction, edge);
+    const ended = this.#execute(instruction, edge, this.begun);
+    this.begun = ended !== DONE;
     if (ended >= 0) {
       this.stall = ended;
       this.nextEdge = Infinity;
@@ -355,7 +361,7 @@ class StateMachine {
   }
 
   /** Returns DONE, AGAIN (next cycle) or what to wait for; sets `jumped` (address or -1) and `newExecutee`. */
-  #execute(instruction, edge) {
+  #execute(instruction, edge, begun) {
     this.jumped = -1;
     this.newExecutee = -1;
     const argument = instruction & 31;
@@ -388,7 +394,7 @@ class StateMachine {
       default:
         this.#set(which, argument, instruction);
     }
-    if (this.sideBits) this.#sideSetPins(instruction);
+    if (this.sideBits && !begun) this.#sideSetPins(instruction);
     return ended;
   }
 

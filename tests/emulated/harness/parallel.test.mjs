@@ -1,0 +1,306 @@
+/** Board pico_parallel: fifteen lines bit by bit, driven by hand through SIO; wired-AND, faults, times. */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { PicoParallel } from '../../../host_tools/emulator/board/pico_parallel.mjs';
+import { parseFaults } from '../../../host_tools/emulator/faults.mjs';
+import { findBoard } from '../../../host_tools/emulator/board/boards.mjs';
+import { VcdDump } from '../../../host_tools/emulator/vcd.mjs';
+import { ChipBench } from './chip_bench.mjs';
+
+const SCL = 1 << 15;
+const ALL = SCL - 1;
+const [GPIO_IN, OUT_SET, OE] = [0xd0000004, 0xd0000014, 0xd0000020];
+
+/** A controller made by hand, with the times of fast mode and `slack_ns` on each. */
+class Controller extends ChipBench {
+  constructor({ slack_ns = 500, rise_ns, onLevels } = {}) {
+    super();
+    this.slack_ns = slack_ns;
+    this.transfers = [];
+    this.faulty = new Map();
+    this.board = new PicoParallel({
+      scope: this.time.scope(), report: this.report, seed: 5, rise_ns, onLevels,
+      stimulus: () => ({ pressure_Pa: 101325, temperature_degC: 25 }),
+      faults: () => ({ sensor: (i) => this.faulty.get(i) ?? {} }),
+      onTransfer: (t) => this.transfers.push(t),
+    });
+    this.board.attachChip(this.chip);
+    this.pinFunction([...Array(16).keys()], 5);
+    this.low = 0;
+    this.wait_ns(5000);
+  }
+
+  wait_ns(ns) {
+    this.runTo(this.time.nanos + ns);
+  }
+
+  drive(low, ns) {
+    this.low = low;
+    this.write(OE, low);
+    this.wait_ns(ns + this.slack_ns);
+  }
+
+  get levels() {
+    return this.read(GPIO_IN) & 0xffff;
+  }
+
+  start() {
+    if (this.low & SCL) {
+      this.drive(SCL, 700);
+      this.drive(0, 700);
+    }
+    this.drive(ALL, 600);
+    this.drive(SCL | ALL, 700);
+  }
+
+  stop(lines = ALL) {
+    this.drive(SCL | lines, 700);
+    this.drive(lines, 700);
+    this.drive(0, 1400);
+  }
+
+  /** Sends `low` (SDA lines pulled) as one bit, returns the levels of the SDA lines while SCL is high. */
+  bit(low) {
+    this.drive(SCL | low, 900);
+    this.drive(low, 700);
+    const seen = this.levels & ALL;
+    this.drive(SCL | low, 350);
+    return seen;
+  }
+
+  /** Returns the bitmap of those that acknowledge. */
+  byte(value) {
+    for (let i = 7; i >= 0; i--) this.bit((value >> i) & 1 ? 0 : ALL);
+    return ~this.bit(0) & ALL;
+  }
+
+  /** Bytes of each sensor. */
+  receive(last) {
+    const bytes = new Array(15).fill(0);
+    for (let i = 0; i < 8; i++) {
+      const seen = this.bit(0);
+      bytes.forEach((b, k) => (bytes[k] = (b << 1) | ((seen >> k) & 1)));
+    }
+    this.bit(last ? 0 : ALL);
+    return bytes;
+  }
+
+  command(value) {
+    this.start();
+    const acknowledged = this.byte(0xec) & this.byte(value);
+    this.stop();
+    return acknowledged;
+  }
+
+  read16(command) {
+    this.start();
+    let acknowledged = this.byte(0xec) & this.byte(command);
+    this.start();
+    acknowledged &= this.byte(0xed);
+    const [high, low] = [this.receive(false), this.receive(true)];
+    this.stop();
+    return { acknowledged, words: high.map((h, k) => (h << 8) | low[k]) };
+  }
+
+  fault(type, k, active = true) {
+    this.board.faultActions[type](k, active);
+  }
+}
+
+/** A controller whose sensors have been reset. */
+function ready(options) {
+  const c = new Controller(options);
+  assert.equal(c.command(0x1e), ALL);
+  c.wait_ns(3e6);
+  return c;
+}
+
+const proms = (c, i = 1) => c.board.sensors.map((s) => s.prom[i]);
+
+test('every sensor hears the same command and answers on its own line, without a warning', () => {
+  const c = ready();
+  const { acknowledged, words } = c.read16(0xa2);
+  assert.equal(acknowledged, ALL);
+  assert.deepEqual(words, proms(c));
+  assert.equal(new Set(words).size > 10, true);
+  assert.deepEqual(c.warnings, []);
+  assert.equal(c.transfers.length, 45);
+  const of3 = c.transfers.filter((t) => t.muxes === 'SDA3').map((t) => [t.address, t.read, t.bytes, t.acknowledged]);
+  assert.deepEqual(of3, [[0x76, false, [0x1e], true], [0x76, false, [0xa2], true], [0x76, true, [words[3] >> 8, words[3] & 255], true]]);
+  assert.deepEqual(c.board.statistics, { transactions: 45, nacks: 0 });
+});
+
+test('an address that is not theirs is acknowledged by none', () => {
+  const c = ready();
+  c.start();
+  assert.equal(c.byte(0x70 << 1), 0);
+  c.stop();
+  assert.equal(c.board.statistics.nacks, 15);
+});
+
+test('during its reset a sensor does not answer', () => {
+  const c = new Controller();
+  c.command(0x1e);
+  assert.equal(c.command(0xa2), 0);
+});
+
+test('a line is the AND of all who pull it, and rises late', () => {
+  const c = new Controller({ rise_ns: 200 });
+  const low = () => ~c.levels & 0xffff;
+  c.write(OE, 0b101);
+  assert.equal(low(), 0b101);
+  c.board.low.sensors = 0b100;
+  c.write(OE, 0);
+  c.wait_ns(280);
+  assert.equal(low(), 0b101, 'not before 1.42 times 200 ns');
+  c.wait_ns(8);
+  assert.equal(low(), 0b100);
+  c.fault('line_stuck_high', 2);
+  c.wait_ns(300);
+  assert.equal(low(), 0);
+});
+
+test('faults of single lines cost those sensors only', () => {
+  const c = ready();
+  c.fault('line_stuck_low', 0);
+  c.fault('line_stuck_high', 5);
+  c.fault('sensor_missing', 7);
+  c.faulty.set(9, { dead: true });
+  const { acknowledged, words } = c.read16(0xa2);
+  const expected = proms(c);
+  const lost = { 0: [true, 0], 5: [false, 0xffff], 7: [false, 0xffff], 9: [false, 0xffff] };
+  words.forEach((word, k) => {
+    assert.equal(((acknowledged >> k) & 1) === 1, lost[k]?.[0] ?? true, `sensor ${k}`);
+    assert.equal(word, lost[k]?.[1] ?? expected[k], `sensor ${k}`);
+  });
+  c.fault('line_stuck_low', 0, false);
+  c.fault('line_stuck_high', 5, false);
+  c.fault('sensor_missing', 7, false);
+  c.faulty.clear();
+  c.stop();
+  const after = c.read16(0xa2);
+  assert.equal(after.acknowledged, ALL);
+  assert.deepEqual(after.words, expected);
+  assert.deepEqual(c.warnings, []);
+});
+
+test('a sensor that comes back has lost what it knew: converting without a reset is noticed', () => {
+  const c = ready();
+  c.fault('sensor_missing', 4);
+  c.wait_ns(1e5);
+  c.fault('sensor_missing', 4, false);
+  assert.equal(c.command(0x44), ALL);
+  assert.deepEqual(c.warnings, ['sensor 4: conversion before the reset command that loads its PROM']);
+});
+
+test('SCL stuck: nothing moves, and the sensors are well when it is free again', () => {
+  for (const type of ['scl_stuck_low', 'scl_stuck_high']) {
+    const c = ready();
+    c.fault(type, null);
+    c.read16(0xa2);
+    c.fault(type, null, false);
+    c.wait_ns(1e5);
+    for (let i = 0; i < 9; i++) c.bit(0);
+    c.stop();
+    assert.deepEqual(c.read16(0xa2).words, proms(c));
+    assert.deepEqual(c.warnings, []);
+  }
+});
+
+test('a sensor that holds SDA lets go after nine clocks', () => {
+  const c = ready();
+  c.fault('sda_stuck_low', 6);
+  c.wait_ns(1000);
+  assert.equal(~c.levels & ALL, 1 << 6);
+  c.drive(SCL, 700);
+  for (let i = 0; i < 7; i++) c.bit(0);
+  assert.equal(~c.levels & ALL, 1 << 6, 'eight falls of SCL');
+  c.bit(0);
+  c.drive(SCL, 700);
+  assert.equal(~c.levels & ALL, 0);
+  c.stop();
+  c.fault('sda_stuck_low', 6, false);
+  assert.deepEqual(c.read16(0xa2).words, proms(c));
+  assert.deepEqual(c.warnings, []);
+});
+
+test('a clock too many puts one sensor a bit ahead, for this transfer only', () => {
+  const c = ready();
+  c.start();
+  assert.equal(c.byte(0xec) & c.byte(0xa2), ALL);
+  c.start();
+  c.byte(0xed);
+  c.fault('clock_glitch', 8);
+  const [high, low] = [c.receive(false), c.receive(true)];
+  c.stop();
+  const words = high.map((h, k) => (h << 8) | low[k]);
+  const wrong = words.flatMap((word, k) => (word === proms(c)[k] ? [] : [k]));
+  assert.deepEqual(wrong, [8]);
+  for (let i = 0; i < 9; i++) c.bit(0);
+  c.stop();
+  assert.deepEqual(c.read16(0xa2).words, proms(c));
+  assert.deepEqual(c.warnings, []);
+});
+
+test('a controller that keeps no time is told what is too short', () => {
+  const c = ready({ rise_ns: 300 });
+  c.slack_ns = -200;
+  c.read16(0xa2);
+  const about = (what) => c.warnings.some((w) => w.includes(`${what} is `));
+  for (const what of ['tHIGH', 'tSU_STA', 'tHD_STA', 'tLOW', 'period']) assert.ok(about(what), `${what}: ${c.warnings.join('\n')}`);
+});
+
+test('SDA and SCL at one moment: no set-up time', () => {
+  const c = ready({ rise_ns: 0 });
+  c.start();
+  c.drive(SCL, 900);
+  c.drive(0, 700);
+  c.drive(SCL, 900);
+  c.drive(1, 700);
+  assert.deepEqual(c.warnings, ['SDA0: tSU_DAT is 0 ns; fast mode allows at least 100 ns', 'SDA0: tVD_DAT is 1300 ns; fast mode allows at most 900 ns']);
+});
+
+test('a STOP within a byte, a bit of the sensor that the controller pulls: warned of', () => {
+  const c = ready();
+  c.start();
+  for (let i = 0; i < 3; i++) c.bit(0);
+  c.stop();
+  assert.match(c.warnings[0], /^SDA0: STOP in the middle of a byte/);
+  const d = ready();
+  d.start();
+  d.byte(0xed);
+  for (let i = 0; i < 8; i++) d.bit(1 << 2);
+  assert.deepEqual(d.warnings, ['SDA2: the controller pulls SDA in a bit that is the sensor\'s']);
+});
+
+test('fails: a line driven high', () => {
+  const c = new Controller();
+  c.write(OUT_SET, 2);
+  assert.throws(() => c.write(OE, 2), /failure/);
+  assert.match(c.warnings[0], /GPIO1 drives a bus line high/);
+});
+
+test('faults: those of lines need a board that has them', () => {
+  const one = (type, extra = {}) => JSON.stringify([{ type, from_s: 1, ...extra }]);
+  for (const type of ['line_stuck_low', 'line_stuck_high', 'sensor_missing', 'clock_glitch']) {
+    assert.equal(parseFaults(one(type, { sensor: 14 }), 'f', findBoard('pico_parallel')).length, 1);
+    assert.throws(() => parseFaults(one(type, { sensor: 1 }), 'f', findBoard('pico_mux')), /needs a board with a data line for each sensor/);
+  }
+  assert.equal(parseFaults(one('scl_stuck_low'), 'f', findBoard('pico_parallel')).length, 1);
+  assert.throws(() => parseFaults(one('mux_stuck', { mux: 0 }), 'f', findBoard('pico_parallel')), /needs a board with multiplexers/);
+});
+
+test('a dump holds the window asked for, the levels at its beginning, and its end', () => {
+  let text = '';
+  const file = { write: (bytes) => (text += bytes) };
+  const dump = new VcdDump({ file, probes: [['SDA', 1], ['SCL', 2]], comment: 'c', from_ns: 100, to_ns: 200 });
+  dump.change(3, 10);
+  dump.change(1, 50.2);
+  dump.change(0, 120.4);
+  dump.change(2, 120.6);
+  dump.change(3, 120.7);
+  dump.change(1, 300);
+  dump.close(400);
+  assert.equal(text, '$comment c $end\n$timescale 1 ns $end\n$var wire 1 ! SDA $end\n$var wire 1 " SCL $end\n$enddefinitions $end\n'
+    + '#100\n$dumpvars\n1!\n0"\n$end\n#120\n0!\n#121\n1"\n1!\n#200\n');
+});
