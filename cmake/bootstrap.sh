@@ -9,7 +9,7 @@ usage() {
   echo "usage: sh cmake/bootstrap.sh demo|test|report" >&2
   echo "  demo    build everything, play presses and slips to the emulated fingertip, draw what it felt" >&2
   echo "  test    build everything and run the whole test suite" >&2
-  echo "  report  build everything, measure the fit's error and run time, write build/report" >&2
+  echo "  report  build everything, measure the fit, repeat the published experiments in simulation, write build/report" >&2
   exit 2
 }
 [ $# -eq 1 ] || usage
@@ -87,6 +87,12 @@ cmake --build --preset host
 case $1 in
   demo) exec sh host_tools/demo/demo.sh ;;
   test) exec ctest --preset host -j 2 ;;
-  report) exec /usr/bin/python3 host_tools/reference/report.py --build build/host \
-    --image build/pico_mux/fit_cycles.bin -o build/report --plot host_tools/reference/fit_report.png ;;
+  report)
+    say "the fit: error against run time"
+    /usr/bin/python3 host_tools/reference/report.py --build build/host \
+      --image build/pico_mux/fit_cycles.bin -o build/report --plot host_tools/reference/fit_report.png
+    say "the published experiments on the simulated fingertip"
+    /usr/bin/python3 host_tools/twin/validation.py --build build/host \
+      --image build/pico_mux/fingertip-pico_mux.bin -o build/report
+    ;;
 esac

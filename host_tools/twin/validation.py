@@ -39,6 +39,8 @@ WARNINGS = sum(1 << bit for bit in (8, 9, 10, 11, 12, 13, 14, 15))
 # A saturated or missing sensor is left out of the fit: that alone does not make a location worse.
 LOCATION_WARNINGS = WARNINGS & ~(1 << 12 | 1 << 13 | 1 << 14)
 
+FORCE_WARNINGS = 1 << 8 | 1 << 9 | 1 << 15  # LOW_SIGNAL, FLAT, AT_BOUND
+
 PAPER_RATE_Hz = 20
 FORCE_MIN_N = 1.0
 SIGMA_PER_LAYER = 0.465  # of the best Gaussian on the base, layer of 6 mm (accuracy.twin_physics prints it)
@@ -361,8 +363,10 @@ def write_report(shop, found, out):
            "Columns headed *paper* are measured on hardware (De Clercq et al., RA-L 2022). Columns headed *simulated* come from the twin: an "
            "elastic layer under the paper's indenters, the firmware's own code on simulated sensors. The two do not compare as better and worse: "
            "a simulated pad is as straight, as bonded and as quiet as it is told to be.",
-           f"{found['samples']} samples (frames in contact with a fit) out of {found['frames']} frames, at {PAPER_RATE_Hz} Hz, OSR 1024, in "
-           f"{found['seconds']:.0f} s. Layers: rubber of Shore 15 A, 12 mm unless said otherwise.")
+           f"{found['samples']} samples (frames in contact with a fit) out of {found['frames']} frames, at {PAPER_RATE_Hz} Hz where nothing else is "
+           f"said, OSR 1024, in {found['seconds']:.0f} s. The image on the emulated chip played {found['emulated_frames']} frames of such taps: "
+           f"{found['emulated_frames'] - found['emulated_frames_different']} of its contact packets are what the same code gives here, byte for "
+           "byte. Layers: rubber of Shore 15 A, 12 mm unless said otherwise.")
     r.text("## Figures and goals")
     r.table(("figure", "value", "goal", ""), [
         (f"`{name}`", "-" if found[name] is None else f"{found[name]:.4g}", goal["goal"], {True: "met", False: "**missed**", None: "not measured"}[goal["met"]])
@@ -377,6 +381,14 @@ def write_report(shop, found, out):
             if paper and any(cells):
                 rows.append((label, NAMES[indenter], f"{paper[0]} / {paper[1]}", *("-" if c is None else median_std(c) for c in cells)))
     r.table(("", "", "paper", "simulated, equal sensors", "simulated, gain spread 10 %", "simulated, every effect"), rows)
+    shares = []
+    for level in GAINS:
+        taps = by_level(shop, "taps", level)
+        warned = (taps[3] & LOCATION_WARNINGS) != 0
+        bad = (taps[0] > 1) & ~warned
+        shares.append(f"gain spread {level} %: {100 * warned.mean():.1f} % carry a warning, {100 * bad.mean():.2f} % are off by more than 1 mm without one")
+    r.text("Of the taps, " + "; ".join(shares) + ". UNCERTAIN begins at a predicted standard deviation of 0.12 mm where the residuals are rough, "
+           "as unequal sensors make them.")
     near = {}
     for p in (p for key, p in shop.played.items() if key[0] == "grid" and key[-1] == 10):
         for phase in p.phases:
@@ -408,9 +420,12 @@ def write_report(shop, found, out):
             cells += [f"{raw[0]:.2f} / {raw[1]:.1f} / {raw[2]:.4f}", f"{scaled[0]:.2f} / {scaled[1]:.2f}"]
         rows.append((label, "{} / {}".format(*PAPER_FORCE[kind]), *cells))
     r.table(("", "paper", "simulated, equal sensors", "the same, scaled", "simulated, gain spread 10 %", "the same, scaled"), rows)
-    everything = [(p.force_N[p.sample], p.said["force_N"][p.sample]) for key, p in shop.played.items() if key[0] in ("grid", "taps", "pokes", "high")]
-    force, said = (np.concatenate(parts) for parts in zip(*everything))
-    r.text(f"Over all samples r = {np.corrcoef(force, said)[0, 1]:.4f} (paper: {PAPER_R}).",
+    everything = [(p.force_N[p.sample], p.said["force_N"][p.sample], p.flags[p.sample])
+                  for key, p in shop.played.items() if key[0] in ("grid", "taps", "pokes", "high")]
+    force, said, flags = (np.concatenate(parts) for parts in zip(*everything))
+    sound = (flags & FORCE_WARNINGS) == 0
+    r.text(f"Over all samples r = {np.corrcoef(force[sound], said[sound])[0, 1]:.4f} (paper: {PAPER_R}), without the "
+           f"{100 * (1 - sound.mean()):.2f} % that say themselves that they are at a bound of the fit, flat or weak: the first frames of a touch.",
            "![Force: taps, an object, all samples, a quasi-static loop](validation_force.png)")
 
     stiff = by_level(shop, "stiff", 10)

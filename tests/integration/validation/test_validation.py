@@ -1,0 +1,83 @@
+"""The published experiments in short: the chain runs, and what it finds is what physics and the method give.
+
+usage: test_validation.py --build BUILD --image fingertip-pico_mux.bin
+"""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+OPTIONS = argparse.Namespace()
+
+
+def validate(folder, *more):
+    return subprocess.run(
+        [sys.executable, str(ROOT / "host_tools/twin/validation.py"), "--build", OPTIONS.build, "--image", OPTIONS.image, "-o", str(folder),
+         "--tables", str(pathlib.Path(OPTIONS.build) / "tests/contact_tables"), "--indenters", "sphere6,cube6,sphere12", "--scale", "0.05",
+         "--emulated-seconds", "4", *more], capture_output=True, text=True)
+
+
+class Validation(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.temporary.cleanup)
+        cls.folder = pathlib.Path(cls.temporary.name)
+        done = validate(cls.folder)
+        if done.returncode != 0:
+            raise AssertionError(done.stdout + done.stderr)
+        cls.found = json.loads((cls.folder / "validation.json").read_text())
+
+    def test_samples_are_there(self):
+        self.assertGreater(self.found["samples"], 8000)
+        self.assertLess(self.found["samples"], self.found["frames"])
+
+    def test_the_model_is_off_by_what_a_layer_is(self):
+        self.assertGreater(self.found["h12_gain0_median_mm"], 0.02)
+        self.assertLess(self.found["h12_gain0_median_mm"], 0.12)
+        self.assertGreater(self.found["h12_gain10_median_mm"], 2 * self.found["h12_gain0_median_mm"])
+        self.assertLess(self.found["h12_gain10_median_mm"], 0.6)
+
+    def test_force_is_low_by_one_factor(self):
+        self.assertAlmostEqual(self.found["force_mape_raw_percent"], 9.3, delta=1.5)
+        self.assertLess(self.found["force_mape_scaled_gain0_percent"], 0.5)
+
+    def test_stiff_and_saturated(self):
+        self.assertLess(self.found["h6_prior_p99_mm"], 1.5)
+        self.assertLessEqual(self.found["h6_bad_unflagged_percent"], 0.5)
+        self.assertGreater(self.found["saturated_samples"], 100)
+        self.assertLess(self.found["saturated_median_mm"], 0.1)
+
+    def test_slips_are_found(self):
+        self.assertGreater(self.found["slip_steps"], 100)
+        self.assertGreater(self.found["slip_success_percent"], 85)
+
+    def test_the_chip_agrees(self):
+        self.assertGreater(self.found["emulated_frames"], 300)
+        self.assertEqual(self.found["emulated_frames_different"], 0)
+
+    def test_pictures_and_text(self):
+        text = (self.folder / "validation.md").read_text()
+        for picture in ("validation_force.png", "validation_signals.png", "validation_slip.png"):
+            self.assertIn(picture, text)
+        self.assertGreater((self.folder / "validation_force.png").stat().st_size, 10000)
+        self.assertNotIn("nan", text)
+        self.assertFalse((self.folder / "validation_work").exists())
+
+    def test_a_missing_build_is_said(self):
+        done = subprocess.run([sys.executable, str(ROOT / "host_tools/twin/validation.py"), "--build", str(self.folder), "--image", "no.bin", "-o",
+                               str(self.folder / "none")], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("cmake --build", done.stderr)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--build", required=True)
+    parser.add_argument("--image", required=True)
+    OPTIONS, rest = parser.parse_known_args()
+    unittest.main(argv=[sys.argv[0], *rest])
