@@ -39,6 +39,7 @@ sigrok-cli sigrok-cli
 /usr/include/gsl/gsl_multifit_nlinear.h libgsl-dev
 /usr/include/cminpack-1/cminpack.h libcminpack-dev
 /usr/include/gtest/gtest.h libgtest-dev
+/usr/include/libusb-1.0/libusb.h libusb-1.0-0-dev
 /usr/include/CLI/CLI.hpp libcli11-dev
 /usr/lib/python3/dist-packages/numpy/__init__.py python3-numpy
 /usr/lib/python3/dist-packages/matplotlib/__init__.py python3-matplotlib

@@ -2,11 +2,9 @@
 
 #include "cli/view.hpp"
 #include "libfingertip/command.hpp"
-#include "libfingertip/discovery.hpp"
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/recording.hpp"
 #include "libfingertip/recording_transport.hpp"
-#include "libfingertip/serial_transport.hpp"
 #include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
 
@@ -58,8 +56,8 @@ void check_outputs(const LiveOptions &options) {
 class Live {
 public:
   explicit Live(const LiveOptions &options)
-      : options_(options), transport_(choose_port(options.port)),
-        session_(transport_, [this] { return is_stop_wanted(); }) {
+      : options_(options), transport_(open_way(choose_way(options.choice))),
+        session_(*transport_, [this] { return is_stop_wanted(); }) {
     if (!options.raw_bytes.empty()) {
       session_.on_bytes([this](const std::uint8_t *bytes, std::size_t length) {
         if (!raw_bytes_) {
@@ -75,7 +73,7 @@ public:
         recording_->packet(packet);
       }
     });
-    model_.set_source(transport_.description());
+    model_.set_source(transport_->description());
     if (!options.recording.empty()) {
       note_ = "recording to " + printable(options.recording);
     }
@@ -102,7 +100,7 @@ public:
     }
     std::fprintf(options_.monitor ? stdout : stderr, "%s\n", summary.c_str());
     if (model_.frames() == 0 && reason == "gone") {
-      throw Error(transport_.description() + ": vanished before the first frame");
+      throw Error(transport_->description() + ": vanished before the first frame");
     }
     return 0;
   }
@@ -147,7 +145,7 @@ private:
   void start_recording(const wire_packet &info) {
     Metadata extra = {{"recorded_by", "fingertip " FINGERTIP_VERSION},
                       {"started_utc", utc_now()},
-                      {"port", transport_.description()}};
+                      {"port", transport_->description()}};
     if (auto clock = session_.clock()) {
       auto device_us = steady_now_us() + clock->device_minus_host_us;
       extra.emplace_back("started_device_us", std::to_string(device_us));
@@ -237,7 +235,7 @@ private:
   }
 
   const LiveOptions &options_;
-  SerialTransport transport_;
+  std::unique_ptr<Transport> transport_;
   Session session_;
   std::unique_ptr<OutputFile> raw_bytes_;
   std::unique_ptr<RecordingWriter> recording_;

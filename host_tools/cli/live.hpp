@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/terminal.hpp"
+#include "libfingertip/connection.hpp"
 
 #include <cstdint>
 #include <optional>
@@ -10,7 +11,7 @@
 namespace fingertip {
 
 struct LiveOptions {
-  std::string port;
+  Choice choice;
   std::uint8_t streams = 0;
   std::optional<double> seconds; /* of device time, counted from the first frame */
   std::string recording;         /* empty: none */

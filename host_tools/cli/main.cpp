@@ -3,14 +3,14 @@
 #include "cli/live.hpp"
 #include "cli/replay.hpp"
 #include "libfingertip/command.hpp"
-#include "libfingertip/discovery.hpp"
+#include "libfingertip/connection.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/recording.hpp"
-#include "libfingertip/serial_transport.hpp"
 #include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <bitset>
 #include <cstdio>
 #include <map>
@@ -22,7 +22,7 @@ using namespace fingertip;
 constexpr std::uint8_t SHOWN_STREAMS = WIRE_STREAM_ALL;
 
 struct Options {
-  std::string port;
+  Choice choice;
   LiveOptions live;
   ReplayOptions replay;
   std::vector<std::string> settings;
@@ -31,12 +31,12 @@ struct Options {
   std::uint64_t time_us = 0;
 };
 
-/* A port with a session on it. */
+/* A fingertip with a session on it. */
 struct Device {
-  SerialTransport transport;
+  std::unique_ptr<Transport> transport;
   Session session;
-  explicit Device(const std::string &port)
-      : transport(choose_port(port)), session(transport, stop_requested) {}
+  explicit Device(const Choice &choice)
+      : transport(open_way(choose_way(choice))), session(*transport, stop_requested) {}
 };
 
 void print_pairs(const Metadata &pairs) {
@@ -45,15 +45,41 @@ void print_pairs(const Metadata &pairs) {
   }
 }
 
-int list() {
-  std::vector<Port> ports = find_ports();
-  if (ports.empty()) {
+/* "serial /dev/ttyACM0, usb 001/005" */
+std::string reached_text(const Found &found) {
+  std::string text = found.port.empty() ? "" : (found.usb ? "serial " : "port ") + found.port;
+  if (found.usb) {
+    char place[32];
+    std::snprintf(place, sizeof place, "usb %03u/%03u", found.usb->bus, found.usb->address);
+    text += (text.empty() ? "" : ", ") + std::string(place);
+  }
+  return text;
+}
+
+int list(const Options &options) {
+  std::vector<Found> all = find_usb();
+  for (const Found &found : find_in_environment()) {
+    all.push_back(found);
+  }
+  if (all.empty()) {
     throw Error("no fingertip found; plug one in, or name its port in FINGERTIP_PORT");
   }
-  for (const Port &port : ports) {
-    auto shown = [](const std::string &text) { return text.empty() ? "-" : printable(text); };
-    std::printf("%s\t%s\t%s\n", shown(port.path).c_str(), shown(port.serial).c_str(),
-                shown(port.product).c_str());
+  for (const Found &found : all) {
+    Metadata info = {{"serial", found.serial}, {"board", ""}, {"scene", ""}, {"firmware", ""}};
+    std::string reached = reached_text(found);
+    try {
+      auto way = way_to(found, options.choice.reach);
+      if (way) {
+        info = info_metadata(ask(*way, stop_requested));
+      }
+    } catch (const Error &error) {
+      reached += " (" + std::string(error.what()) + ")";
+    }
+    for (const char *key : {"serial", "board", "firmware"}) {
+      auto pair = std::find_if(info.begin(), info.end(), [&](auto &p) { return p.first == key; });
+      std::printf("%s\t", pair->second.empty() ? "-" : printable(pair->second).c_str());
+    }
+    std::printf("%s\n", printable(reached).c_str());
   }
   return 0;
 }
@@ -81,11 +107,11 @@ std::string rate_text(std::uint32_t rate_mHz) {
 }
 
 int info(const Options &options) {
-  Device device(options.port);
+  Device device(options.choice);
   wire_info info = device.session.info().body.info;
   wire_health health = device.session.health().body.health;
   Metadata pairs = info_metadata(info);
-  pairs.insert(pairs.begin(), {"port", printable(device.transport.description())});
+  pairs.insert(pairs.begin(), {"port", printable(device.transport->description())});
   for (auto &[key, value] : pairs) {
     if (key == "streams") {
       value = streams_text(info.streams);
@@ -107,7 +133,7 @@ int info(const Options &options) {
 }
 
 int tare(const Options &options) {
-  Device device(options.port);
+  Device device(options.choice);
   device.session.command(command_stream(WIRE_STREAM_CONTACT));
   bool tared = false;
   bool acknowledged = false;
@@ -127,7 +153,7 @@ int tare(const Options &options) {
       throw Interrupted();
     }
     if (device.session.poll(std::chrono::milliseconds(50)) == Transport::Result::gone) {
-      throw Error(device.transport.description() +
+      throw Error(device.transport->description() +
                   ": vanished while taring; plug it in and try again");
     }
     if (steady_now_us() - last_frame_us > patience_us) {
@@ -169,7 +195,7 @@ Settings parse_settings(const std::vector<std::string> &texts) {
 
 int set(const Options &options) {
   Settings settings = parse_settings(options.settings);
-  Device device(options.port);
+  Device device(options.choice);
   Session &session = device.session;
   if (settings.rate_mHz) {
     session.command(command_rate_mHz(*settings.rate_mHz));
@@ -190,7 +216,7 @@ int set(const Options &options) {
 }
 
 int loader(const Options &options) {
-  Device device(options.port);
+  Device device(options.choice);
   device.session.command(command_loader());
   std::printf("restarting into the USB loader: the drive RPI-RP2 takes a .uf2 file\n");
   return 0;
@@ -263,6 +289,16 @@ double seconds_from_text(const std::string &text) {
   return *seconds;
 }
 
+Reach reach_from_text(const std::string &text) {
+  static const std::map<std::string, Reach> kinds = {
+      {"auto", Reach::automatic}, {"serial", Reach::serial}, {"usb", Reach::usb}};
+  auto kind = kinds.find(text);
+  if (kind == kinds.end()) {
+    wrong_value("--transport", text, "auto, serial or usb");
+  }
+  return kind->second;
+}
+
 ColourMode colour_from_text(const std::string &text) {
   static const std::map<std::string, ColourMode> colours = {{"auto", ColourMode::automatic},
                                                             {"truecolour", ColourMode::truecolour},
@@ -296,13 +332,26 @@ int run(int argc, char **argv) {
     command->callback([&action, run_it] { action = run_it; });
     return command;
   };
+  auto with_transport = [&](CLI::App *command) {
+    command
+        ->add_option_function<std::string>(
+            "--transport",
+            [&](const std::string &text) { options.choice.reach = reach_from_text(text); },
+            "serial, usb (libusb, past the system's driver), or auto: serial where there is a port")
+        ->type_name("KIND");
+    return command;
+  };
   auto with_port = [&](CLI::App *command) {
     command
-        ->add_option("--port", options.port,
-                     "Serial port or pseudo-terminal; default: $FINGERTIP_PORT, or the only "
-                     "fingertip plugged in")
+        ->add_option("--device", options.choice.device,
+                     "Serial number of the fingertip; default: the only one there is")
+        ->type_name("SERIAL");
+    command
+        ->add_option("--port", options.choice.port,
+                     "Serial port or pseudo-terminal; default: $FINGERTIP_PORT, or a fingertip "
+                     "plugged in")
         ->type_name("PATH");
-    return command;
+    return with_transport(command);
   };
   auto with_colour = [](CLI::App *command, ColourMode &mode) {
     command
@@ -327,16 +376,16 @@ int run(int argc, char **argv) {
                       "End when the port vanishes, instead of waiting for it");
   };
   auto live = [&](bool monitor) {
-    options.live.port = options.port;
+    options.live.choice = options.choice;
     options.live.monitor = monitor;
     options.live.streams = SHOWN_STREAMS;
     return run_live(options.live);
   };
 
-  add("list",
-      "List the fingertips plugged in, and the paths in $FINGERTIP_PORT: path, serial number, "
-      "product",
-      list);
+  with_transport(add("list",
+                     "List the fingertips plugged in, and the paths in $FINGERTIP_PORT: serial "
+                     "number, board, firmware, how it is reached",
+                     [&] { return list(options); }));
   with_port(add("info", "Show identity, settings and health", [&] { return info(options); }));
 
   CLI::App *monitor =

@@ -17,9 +17,10 @@ using Clock = std::chrono::steady_clock;
 class Interval {
 public:
   explicit Interval(std::chrono::milliseconds length) : length_(length) {}
-  bool is_due() {
+  /* at_once: something changed that cannot wait. */
+  bool is_due(bool at_once = false) {
     auto now = Clock::now();
-    if (now < next_) {
+    if (now < next_ && !at_once) {
       return false;
     }
     next_ = now + length_;
@@ -29,6 +30,19 @@ public:
 private:
   std::chrono::milliseconds length_;
   Clock::time_point next_{};
+};
+
+/* Tells when a text is another than before. */
+class Change {
+public:
+  bool is_new(const std::string &text) {
+    bool changed = text != last_;
+    last_ = text;
+    return changed;
+  }
+
+private:
+  std::string last_;
 };
 
 std::string state_text(const Model &model) {
@@ -77,7 +91,7 @@ private:
 class LineView : public View {
 public:
   void update(const Model &model, const std::string &note) override {
-    if (!interval_.is_due()) {
+    if (!interval_.is_due(change_.is_new(state_text(model)))) {
       return;
     }
     std::string text = status_line(model);
@@ -95,6 +109,7 @@ public:
   }
 
 private:
+  Change change_;
   Interval interval_{std::chrono::milliseconds(1000)};
 };
 
@@ -106,7 +121,7 @@ public:
     }
   }
   void update(const Model &model, const std::string &note) override {
-    if (!interval_.is_due()) {
+    if (!interval_.is_due(change_.is_new(state_text(model)))) {
       return;
     }
     shown_ = true;
@@ -118,6 +133,7 @@ public:
 private:
   bool in_place_ = isatty(STDERR_FILENO);
   bool shown_ = false;
+  Change change_;
   Interval interval_{std::chrono::milliseconds(in_place_ ? 200 : 1000)};
 };
 

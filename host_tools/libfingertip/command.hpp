@@ -29,4 +29,8 @@ std::uint32_t slip_window_ms_from_text(const std::string &text);
 /* The bytes of a packet on the line, delimiter included. */
 std::vector<std::uint8_t> frame_bytes(const wire_packet &packet);
 
+/* The info command as another version of the protocol has it, delimiter included: who speaks that
+ * version answers. */
+std::vector<std::uint8_t> info_frame_of_version(std::uint8_t version);
+
 } // namespace fingertip

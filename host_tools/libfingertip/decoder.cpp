@@ -57,6 +57,7 @@ void Decoder::feed(const std::uint8_t *bytes, std::size_t length, const Handler 
       break;
     case FT_ERR_VERSION:
       statistics_.version_errors++;
+      other_version_ = receiver_.frame[0]; /* the packet was decoded in place */
       break;
     case FT_ERR_CRC:
       statistics_.crc_errors += torn_by_joining ? 0 : 1;

@@ -42,6 +42,8 @@ public:
   void restart();
 
   const LineStatistics &statistics() const { return statistics_; }
+  /* Of the last packet that counted as a version error. */
+  std::uint8_t other_version() const { return other_version_; }
 
 private:
   void follow_sequence(std::uint16_t sequence);
@@ -50,6 +52,7 @@ private:
   bool joining_ = true;
   std::optional<std::uint16_t> expected_sequence_;
   LineStatistics statistics_;
+  std::uint8_t other_version_ = 0;
 };
 
 } // namespace fingertip

@@ -1,6 +1,5 @@
 #include "libfingertip/discovery.hpp"
 
-#include "libfingertip/error.hpp"
 #include "libfingertip/text.hpp"
 
 #include <algorithm>
@@ -8,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <strings.h>
 
 namespace fingertip {
 
@@ -39,73 +39,64 @@ std::string stable_path(const fs::path &device, const fs::path &root) {
   return device.string();
 }
 
-std::vector<Port> usb_ports(const fs::path &root) {
-  std::vector<Port> ports;
+/* The terminal that serves one of the interfaces of this USB device. */
+std::string port_of(const fs::path &usb, const fs::path &root) {
   std::error_code none;
-  for (const auto &tty : fs::directory_iterator(root / "sys/class/tty", none)) {
-    fs::path interface = fs::canonical(tty.path() / "device", none);
-    if (none) {
-      none.clear();
-      continue;
-    }
-    fs::path usb = interface.parent_path();
-    if (is_hex(file_text(usb / "idVendor"), FINGERTIP_USB_VID) &&
-        is_hex(file_text(usb / "idProduct"), FINGERTIP_USB_PID)) {
-      ports.push_back({stable_path(root / "dev" / tty.path().filename(), root),
-                       file_text(usb / "serial"), file_text(usb / "product")});
+  for (const auto &interface : fs::directory_iterator(usb, none)) {
+    for (const auto &tty : fs::directory_iterator(interface.path() / "tty", none)) {
+      return stable_path(root / "dev" / tty.path().filename(), root);
     }
   }
-  std::sort(ports.begin(), ports.end(),
-            [](const Port &a, const Port &b) { return a.path < b.path; });
-  return ports;
-}
-
-std::vector<Port> environment_ports() {
-  std::vector<Port> ports;
-  const char *paths = std::getenv("FINGERTIP_PORT");
-  for (std::string_view path : split(paths ? paths : "", ':')) {
-    if (!path.empty()) {
-      std::error_code none;
-      ports.push_back({std::string(path), "",
-                       fs::exists(path, none) ? "from FINGERTIP_PORT"
-                                              : "from FINGERTIP_PORT, no such port"});
-    }
-  }
-  return ports;
+  return "";
 }
 
 } // namespace
 
-std::vector<Port> find_ports(const std::string &root) {
-  std::vector<Port> ports = usb_ports(root);
-  for (Port &port : environment_ports()) {
-    ports.push_back(port);
+std::vector<Found> find_usb(const std::string &root) {
+  std::vector<Found> found;
+  std::error_code none;
+  for (const auto &entry : fs::directory_iterator(fs::path(root) / "sys/bus/usb/devices", none)) {
+    const fs::path &usb = entry.path();
+    if (!is_hex(file_text(usb / "idVendor"), FINGERTIP_USB_VID) ||
+        !is_hex(file_text(usb / "idProduct"), FINGERTIP_USB_PID)) {
+      continue;
+    }
+    auto number = [&](const char *name) {
+      return static_cast<unsigned>(to_u64(file_text(usb / name)).value_or(0));
+    };
+    found.push_back({file_text(usb / "serial"), file_text(usb / "product"), port_of(usb, root),
+                     UsbPlace{number("busnum"), number("devnum")}});
   }
-  return ports;
+  std::sort(found.begin(), found.end(),
+            [](const Found &a, const Found &b) { return a.serial < b.serial; });
+  return found;
 }
 
-std::string choose_port(const std::string &wanted, const std::string &root) {
-  if (!wanted.empty()) {
-    std::error_code none;
-    return fs::exists(wanted, none) && fs::path(wanted).parent_path() == "/dev"
-               ? stable_path(wanted, root)
-               : wanted;
-  }
-  std::vector<Port> ports = environment_ports();
-  if (ports.empty()) {
-    ports = usb_ports(root);
-  }
-  if (ports.empty()) {
-    throw Error("no fingertip found; plug one in, or name its port with --port PATH");
-  }
-  if (ports.size() > 1) {
-    std::string names;
-    for (const Port &port : ports) {
-      names += " " + port.path;
+std::vector<Found> find_in_environment() {
+  std::vector<Found> found;
+  const char *paths = std::getenv("FINGERTIP_PORT");
+  for (std::string_view path : split(paths ? paths : "", ':')) {
+    if (!path.empty()) {
+      std::error_code none;
+      found.push_back({"",
+                       fs::exists(path, none) ? "from FINGERTIP_PORT"
+                                              : "from FINGERTIP_PORT, no such port",
+                       std::string(path),
+                       {}});
     }
-    throw Error("several fingertips found; choose one with --port:" + names);
   }
-  return ports[0].path;
+  return found;
+}
+
+std::string stable_port(const std::string &path, const std::string &root) {
+  std::error_code none;
+  return fs::exists(path, none) && fs::path(path).parent_path() == fs::path(root) / "dev"
+             ? stable_path(path, root)
+             : path;
+}
+
+bool is_same_serial(const std::string &a, const std::string &b) {
+  return strcasecmp(a.c_str(), b.c_str()) == 0;
 }
 
 } // namespace fingertip

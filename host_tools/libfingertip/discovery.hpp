@@ -1,23 +1,36 @@
-/* Finds fingertips among the serial ports of a Linux system. */
+/* Finds fingertips in what Linux shows of its USB devices, and in the environment. Nothing is
+ * opened. */
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace fingertip {
 
-struct Port {
-  std::string path;   /* the stable name under /dev/serial/by-id where there is one */
-  std::string serial; /* as USB reports it; empty for a path from the environment */
-  std::string product; /* of a path from the environment: that, and whether it exists */
+struct UsbPlace {
+  unsigned bus, address;
 };
 
-/* Ports with our USB ids, then the paths in the environment variable FINGERTIP_PORT (separated by
- * colons). root: where to look for sys/ and dev/, "/" but in tests. */
-std::vector<Port> find_ports(const std::string &root = "/");
+struct Found {
+  std::string serial;  /* as USB reports it; empty for a path from the environment */
+  std::string product; /* of a path from the environment: that, and whether it exists */
+  std::string port;    /* the stable name under /dev/serial/by-id where there is one, else under
+                          /dev; empty: no driver serves it as a serial port */
+  std::optional<UsbPlace> usb;
+};
 
-/* The wanted path, or the only one there is: FINGERTIP_PORT first, then USB. Throws Error if there
- * is none, or a choice. */
-std::string choose_port(const std::string &wanted, const std::string &root = "/");
+/* Devices with our USB ids, sorted by serial number. root: where to look for sys/ and dev/, "/" but
+ * in tests. */
+std::vector<Found> find_usb(const std::string &root = "/");
+
+/* The paths in the environment variable FINGERTIP_PORT, separated by colons. */
+std::vector<Found> find_in_environment();
+
+/* The stable name of a device below /dev, or the path itself. */
+std::string stable_port(const std::string &path, const std::string &root = "/");
+
+/* Serial numbers are hexadecimal digits; people type either case. */
+bool is_same_serial(const std::string &a, const std::string &b);
 
 } // namespace fingertip

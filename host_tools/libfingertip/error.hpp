@@ -12,4 +12,9 @@ public:
   using std::runtime_error::runtime_error;
 };
 
+/* For the end of a sentence about a device that may not be opened. */
+inline constexpr const char *PERMISSION_ADVICE =
+    "permission denied; install the udev rule: fingertip rule | sudo tee "
+    "/etc/udev/rules.d/60-fingertip.rules, then sudo udevadm control --reload, and plug it in again";
+
 } // namespace fingertip

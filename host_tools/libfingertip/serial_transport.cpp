@@ -30,8 +30,7 @@ std::string open_error(const std::string &path, int error) {
     return path + ": in use by another program; end that one first (who: fuser -v " + path + ")";
   case EACCES:
   case EPERM:
-    return path + ": permission denied; add yourself to the group that owns it (sudo usermod -aG "
-                  "dialout $USER) and log in anew";
+    return path + ": " + PERMISSION_ADVICE;
   default:
     return path + ": cannot open (" + std::strerror(error) + "); check the path";
   }
@@ -70,7 +69,8 @@ int open_port(const std::string &path, int *error) {
 
 } // namespace
 
-SerialTransport::SerialTransport(const std::string &path) : path_(path) {
+SerialTransport::SerialTransport(const std::string &path, std::function<std::string()> find_again)
+    : path_(path), find_again_(std::move(find_again)) {
   int error = 0;
   fd_ = open_port(path_, &error);
   if (fd_ < 0) {
@@ -140,12 +140,39 @@ bool SerialTransport::write(const std::uint8_t *bytes, std::size_t length) {
 
 bool SerialTransport::reopen() {
   close();
+  if (find_again_) {
+    std::string path = find_again_();
+    if (path.empty()) {
+      return false;
+    }
+    path_ = path;
+  }
   int error = 0;
   fd_ = open_port(path_, &error);
   if (fd_ < 0 && (error == EBUSY || error == EWOULDBLOCK)) {
     throw Error(open_error(path_, error));
   }
   return fd_ >= 0;
+}
+
+bool SerialTransport::ask_loader() {
+  termios settings;
+  if (fd_ < 0 || tcgetattr(fd_, &settings) != 0 || cfsetspeed(&settings, B1200) != 0 ||
+      tcsetattr(fd_, TCSANOW, &settings) != 0) {
+    return false;
+  }
+  close();
+  return true;
+}
+
+void SerialTransport::check_unused(const std::string &path) {
+  int error = 0;
+  int fd = open_port(path, &error);
+  if (fd >= 0) {
+    ::close(fd);
+  } else if (error == EBUSY || error == EWOULDBLOCK) {
+    throw Error(open_error(path, error));
+  }
 }
 
 } // namespace fingertip

@@ -11,6 +11,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds POLL_INTERVAL{50};
+/* A fingertip does not answer a version that it does not speak: it is asked in these too. */
+constexpr int NEWER_VERSIONS = 2;
 
 } // namespace
 
@@ -68,6 +70,15 @@ bool Session::send(wire_packet command) {
   return transport_.write(bytes.data(), bytes.size());
 }
 
+void Session::look_for_other_versions() {
+  for (int version = 1; version <= WIRE_VERSION + NEWER_VERSIONS; version++) {
+    if (version != WIRE_VERSION) {
+      auto bytes = info_frame_of_version(static_cast<std::uint8_t>(version));
+      transport_.write(bytes.data(), bytes.size());
+    }
+  }
+}
+
 wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_type, Policy policy) {
   std::string name = command_name(command.type);
   awaited_command_ = command.type;
@@ -75,8 +86,12 @@ wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_ty
   awaited_first_sequence_ = sequence_;
   ack_.reset();
   answer_.reset();
+  std::uint64_t version_errors = statistics().version_errors;
   for (int attempt = 0; attempt < policy.attempts; attempt++) {
     send(command);
+    if (attempt > 0) {
+      look_for_other_versions();
+    }
     auto deadline = Clock::now() + policy.answer_timeout;
     for (auto now = Clock::now(); now < deadline; now = Clock::now()) {
       if (stop_()) {
@@ -97,19 +112,23 @@ wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_ty
         return answer_.value_or(command);
       }
     }
+    if (statistics().version_errors > version_errors) {
+      throw Error(transport_.description() + ": speaks protocol version " +
+                  std::to_string(decoder_.other_version()) + ", this tool version " +
+                  std::to_string(WIRE_VERSION) +
+                  "; install this tool's firmware with `fingertip flash`, or use the other's tool");
+    }
   }
-  std::string hint = statistics().version_errors > 0
-                         ? "it speaks another protocol version; use the tools of its firmware"
-                         : "is it a fingertip? unplug it and plug it in again";
-  throw Error(transport_.description() + ": no answer to \"" + name + "\"; " + hint);
+  throw Error(transport_.description() + ": no answer to \"" + name +
+              "\"; is it a fingertip? unplug it and plug it in again");
 }
 
 void Session::command(const wire_packet &command, Policy policy) {
   exchange(command, 0, policy);
 }
 
-wire_packet Session::info() {
-  return exchange(command_info(), WIRE_INFO, Policy());
+wire_packet Session::info(Policy policy) {
+  return exchange(command_info(), WIRE_INFO, policy);
 }
 
 wire_packet Session::health() {

@@ -62,7 +62,8 @@ public:
   bool send(wire_packet command);
 
   /* The whole packets, since recordings keep their header. */
-  wire_packet info();
+  wire_packet info(Policy policy);
+  wire_packet info() { return info(Policy()); }
   wire_packet health();
 
   /* After gone; the line begins anew. */
@@ -74,6 +75,7 @@ public:
 
 private:
   void take(const wire_packet &packet);
+  void look_for_other_versions();
   /* Sends until the acknowledgement and, unless 0, a packet of the answer's type came. */
   wire_packet exchange(const wire_packet &command, std::uint8_t answer_type, Policy policy);
 

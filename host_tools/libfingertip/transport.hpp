@@ -1,5 +1,5 @@
 /* Where the bytes of a fingertip come from: a serial port or pseudo-terminal
- * (serial_transport.hpp), or a file (recording_transport.hpp).
+ * (serial_transport.hpp), libusb (usb_transport.hpp), or a file (recording_transport.hpp).
  */
 #pragma once
 
@@ -30,6 +30,10 @@ public:
 
   /* After gone: true if it is there again. Never blocks; ask again later. */
   virtual bool reopen() = 0;
+
+  /* Asks for the USB loader without a packet, as any firmware of ours understands it, of whatever
+   * protocol version: 1200 baud, then DTR down. False: not possible here. */
+  virtual bool ask_loader() { return false; }
 
   /* For people: what this is. */
   virtual std::string description() const = 0;

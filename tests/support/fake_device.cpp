@@ -12,12 +12,17 @@
  *     absent=K         sensor K is not there
  *     mute=1           never says anything
  *     refuse=1         answers every command but stream, info and health with "not now"
+ *     serial=HEX       its serial number
+ *     version=V        speaks this protocol version, answers nothing else
+ *     clock_ppm=P      its clock is fast by so much, over the whole of its life
+ *     started=S        its clock was started S seconds before
  *
  * Ends by SIGTERM, or after a minute. */
 #include "libfingertip/command.hpp"
 #include "libfingertip/text.hpp"
 #include "support/host_packets.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -40,6 +45,12 @@ class FakeDevice {
 public:
   FakeDevice(std::string link, std::map<std::string, std::string> options)
       : link_(std::move(link)), options_(std::move(options)) {
+    std::string serial = options_["serial"];
+    if (!serial.empty()) {
+      std::memset(info_.body.info.serial, 0, WIRE_TEXT_BYTES);
+      std::memcpy(info_.body.info.serial, serial.data(),
+                  std::min<std::size_t>(serial.size(), WIRE_TEXT_BYTES));
+    }
     power_on();
   }
   ~FakeDevice() { power_off(); }
@@ -118,8 +129,9 @@ private:
   }
 
   std::uint64_t now_us() const {
-    return static_cast<std::uint64_t>(
-        std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - started_).count());
+    double us = std::chrono::duration<double, std::micro>(Clock::now() - started_).count();
+    return static_cast<std::uint64_t>(us * (1 + static_cast<double>(number("clock_ppm", 0)) / 1e6) +
+                                      static_cast<double>(number("started", 0)) * 1e6);
   }
 
   void send(wire_packet packet, bool flip = false) {
@@ -173,6 +185,14 @@ private:
       return false;
     }
     bool changed = false;
+    if (long version = number("version", 0)) {
+      auto known = fingertip::info_frame_of_version(static_cast<std::uint8_t>(version));
+      if (std::search(bytes, bytes + count, known.begin(), known.end()) != bytes + count) {
+        /* an empty packet will do: the version is judged first */
+        count = write(master_, known.data(), known.size());
+      }
+      return false;
+    }
     for (ssize_t i = 0; i < count; i++) {
       wire_packet command;
       if (wire_receive(&receiver_, bytes[i], &command) == FT_OK) {

@@ -29,10 +29,11 @@ class CliTest(unittest.TestCase):
         self.environment["LC_ALL"] = "C.UTF-8"
 
     @contextlib.contextmanager
-    def device(self, *options):
-        process = subprocess.Popen([FAKE_DEVICE, self.port, *options])
+    def device(self, *options, port=None):
+        port = port or self.port
+        process = subprocess.Popen([FAKE_DEVICE, port, *options])
         try:
-            self.wait_for(lambda: os.path.lexists(self.port))
+            self.wait_for(lambda: os.path.lexists(port))
             yield process
         finally:
             process.terminate()
@@ -107,8 +108,11 @@ class Usage(CliTest):
         self.environment["FINGERTIP_PORT"] = "/tmp/a:/tmp/b"
         self.assertIn("several fingertips found", self.error("info"))
         self.environment["FINGERTIP_PORT"] = self.port + ":" + self.folder
-        self.assertEqual(self.run_cli("list")[0], f"{self.port}\t-\tfrom FINGERTIP_PORT, no such port\n"
-                                                  f"{self.folder}\t-\tfrom FINGERTIP_PORT\n")
+        self.assertRegex(self.run_cli("list")[0],
+                         f"-\t-\t-\tport {self.port} \\(.*no such port; plug .*\\)\n-\t-\t-\tport {self.folder} \\(.*\\)\n")
+        self.assertIn("no fingertip 1234 here", self.error("info", "--device", "1234"))
+        self.assertIn("takes no --port", self.error("info", "--port", self.port, "--transport", "usb"))
+        self.assertIn("give auto, serial or usb", self.error("info", "--transport", "bluetooth", status=2))
 
     def test_ranges_are_found_before_a_port_is_opened(self):
         for setting, allowed in [("rate=0", "0.1 to 2000 Hz, or max"), ("rate=x", "0.1 to 2000 Hz, or max"),
@@ -127,7 +131,44 @@ class Usage(CliTest):
         self.assertIn("unknown", self.error("encode", "bogus"))
 
 
+class Several(CliTest):
+    """Two fingertips, told apart by their serial numbers."""
+
+    def setUp(self):
+        super().setUp()
+        self.other = self.port + "2"
+        self.environment["FINGERTIP_PORT"] = self.port + ":" + self.other
+
+    def test_list_shows_each_and_what_is_in_use(self):
+        with self.device("serial=AAAA"), self.device("serial=BBBB", port=self.other):
+            self.assertEqual(self.run_cli("list")[0], f"AAAA\tpico_mux\t1.20.3\tport {self.port}\n"
+                                                      f"BBBB\tpico_mux\t1.20.3\tport {self.other}\n")
+            process = self.start("record", self.csv, "--device", "AAAA")
+            self.wait_for(lambda: os.path.exists(self.csv))
+            first, second = self.run_cli("list")[0].splitlines()
+            self.assertRegex(first, r"^-\t-\t-\t.*in use by another program")
+            self.assertTrue(second.startswith("BBBB"))
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=PATIENCE_s)
+
+    def test_the_serial_number_chooses(self):
+        with self.device("serial=AAAA"), self.device("serial=BBBB", port=self.other):
+            for serial, port in (("aaaa", self.port), ("BBBB", self.other)):
+                out = self.run_cli("info", "--device", serial)[0]
+                self.assertRegex(out, f"(?m)^port +{port}$")
+                self.assertRegex(out, f"(?m)^serial +{serial.upper()}$")
+            self.assertEqual(self.error("info", "--device", "CCCC"), "fingertip: no fingertip CCCC here; there are: AAAA BBBB\n")
+            self.assertIn("several fingertips found; choose one with --port", self.error("info"))
+            self.assertIn("is fingertip AAAA, not BBBB", self.error("info", "--port", self.port, "--device", "BBBB"))
+
+
 class Commands(CliTest):
+    def test_another_protocol_version_is_named(self):
+        for version in (1, 3):
+            with self.device(f"version={version}"):
+                self.assertIn(f"speaks protocol version {version}, this tool version 2; install this tool's firmware",
+                              self.error("info", "--port", self.port))
+
     def test_info_and_settings(self):
         with self.device():
             out = self.run_cli("info", "--port", self.port)[0]
@@ -466,6 +507,18 @@ class Monitor(CliTest):
         with self.device("stall=50"):
             output, _, _, _ = self.on_terminal("monitor", "--port", self.port, until=r"STALLED for 0\.[789]", then=b"q")
         self.assert_restored(output)
+
+    def test_a_stall_shows_within_a_second_without_a_terminal(self):
+        with self.device("stall=50"):
+            process = self.start("monitor", "--port", self.port)
+            seen = [(time.monotonic(), process.stdout.readline())]
+            while "STALLED" not in seen[-1][1]:
+                seen.append((time.monotonic(), process.stdout.readline()))
+            stalled_s = time.monotonic() - seen[0][0]
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=PATIENCE_s)
+        # fifty frames take a quarter of a second
+        self.assertLess(stalled_s, 0.25 + 1.0 + 0.2)
 
     def test_an_error_restores_the_terminal(self):
         with self.device("frames=30"):

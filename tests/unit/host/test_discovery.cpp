@@ -1,3 +1,4 @@
+#include "libfingertip/connection.hpp"
 #include "libfingertip/discovery.hpp"
 #include "libfingertip/error.hpp"
 #include "support/host_packets.hpp"
@@ -17,26 +18,41 @@ class FakeSystem : public ::testing::Test {
 protected:
   FakeSystem() {
     unsetenv("FINGERTIP_PORT");
-    fs::create_directories(root() + "/sys/class/tty/tty0");
+    fs::create_directories(root() + "/sys/bus/usb/devices/usb1");
     fs::create_directories(root() + "/dev/serial/by-id");
   }
   std::string root() const { return folder_.path(); }
 
-  void plug_in(const std::string &tty, const std::string &vendor, const std::string &product_id,
-               const std::string &serial, bool by_id) {
-    fs::path usb = root() + "/sys/devices/usb1/" + tty;
-    fs::create_directories(usb / "1.0/tty" / tty);
+  /* tty: empty where no driver serves it */
+  void plug_in(const std::string &place, const std::string &tty, const std::string &vendor,
+               const std::string &product_id, const std::string &serial, bool by_id) {
+    fs::path usb = root() + "/sys/devices/usb1/" + place;
+    fs::create_directories(usb / (place + ":1.0"));
     std::ofstream(usb / "idVendor") << vendor << "\n";
     std::ofstream(usb / "idProduct") << product_id << "\n";
     std::ofstream(usb / "serial") << serial << "\n";
     std::ofstream(usb / "product") << "Fingertip tactile sensor\n";
-    fs::create_directory_symlink(usb / "1.0", usb / "1.0/tty" / tty / "device");
-    fs::create_directory_symlink(usb / "1.0/tty" / tty, root() + "/sys/class/tty/" + tty);
-    std::ofstream(root() + "/dev/" + tty) << "";
+    std::ofstream(usb / "busnum") << "1\n";
+    std::ofstream(usb / "devnum") << place.back() << "\n";
+    fs::create_directory_symlink(usb, root() + "/sys/bus/usb/devices/" + place);
+    if (!tty.empty()) {
+      fs::create_directories(usb / (place + ":1.0") / "tty" / tty);
+      std::ofstream(root() + "/dev/" + tty) << "";
+    }
     if (by_id) {
       fs::create_symlink("../../" + tty,
                          root() + "/dev/serial/by-id/usb-Fingertip_" + serial + "-if00");
     }
+  }
+
+  std::string port(const Choice &choice) const { return choose_way(choice, root()).port; }
+  std::string error(const Choice &choice) const {
+    try {
+      choose_way(choice, root());
+    } catch (const Error &error) {
+      return error.what();
+    }
+    return "";
   }
 
 private:
@@ -46,45 +62,71 @@ private:
 } // namespace
 
 TEST_F(FakeSystem, FindsOursAndNoOther) {
-  plug_in("ttyACM0", "2341", "0043", "arduino", true);
-  plug_in("ttyACM1", "1209", "0001", "E660583883265A2C", true);
-  plug_in("ttyACM2", "1209", "0002", "other", false);
-  auto ports = find_ports(root());
-  ASSERT_EQ(ports.size(), 1u);
-  EXPECT_EQ(ports[0].path, root() + "/dev/serial/by-id/usb-Fingertip_E660583883265A2C-if00");
-  EXPECT_EQ(ports[0].serial, "E660583883265A2C");
-  EXPECT_EQ(ports[0].product, "Fingertip tactile sensor");
-  EXPECT_EQ(choose_port("", root()), ports[0].path);
+  plug_in("1-1", "ttyACM0", "2341", "0043", "arduino", true);
+  plug_in("1-2", "ttyACM1", "1209", "0001", "E660583883265A2C", true);
+  plug_in("1-3", "ttyACM2", "1209", "0002", "other", false);
+  auto found = find_usb(root());
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].port, root() + "/dev/serial/by-id/usb-Fingertip_E660583883265A2C-if00");
+  EXPECT_EQ(found[0].serial, "E660583883265A2C");
+  EXPECT_EQ(found[0].product, "Fingertip tactile sensor");
+  ASSERT_TRUE(found[0].usb);
+  EXPECT_EQ(found[0].usb->bus, 1u);
+  EXPECT_EQ(found[0].usb->address, 2u);
+  Way way = choose_way({}, root());
+  EXPECT_EQ(way.port, found[0].port);
+  EXPECT_EQ(way.serial, "E660583883265A2C");
+  EXPECT_TRUE(way.found_by_usb);
 }
 
 TEST_F(FakeSystem, WithoutAStableNameTheDeviceItself) {
-  plug_in("ttyACM4", "1209", "0001", "A", false);
-  EXPECT_EQ(choose_port("", root()), root() + "/dev/ttyACM4");
+  plug_in("1-1", "ttyACM4", "1209", "0001", "A", false);
+  EXPECT_EQ(port({}), root() + "/dev/ttyACM4");
+}
+
+TEST_F(FakeSystem, WithoutADriverLibusb) {
+  plug_in("1-1", "", "1209", "0001", "A", false);
+  EXPECT_EQ(port({}), "");
+  EXPECT_EQ(choose_way({}, root()).serial, "A");
+  EXPECT_NE(error({"", "", Reach::serial}).find("A: has no serial port"), std::string::npos);
+  EXPECT_NE(error({"", "a", Reach::serial}).find("A: has no serial port"), std::string::npos);
+}
+
+TEST_F(FakeSystem, TheWishedTransport) {
+  plug_in("1-1", "ttyACM0", "1209", "0001", "A", false);
+  EXPECT_EQ(port({"", "", Reach::serial}), root() + "/dev/ttyACM0");
+  EXPECT_EQ(port({"", "", Reach::usb}), "");
+  setenv("FINGERTIP_PORT", "/tmp/pty", 1);
+  EXPECT_EQ(port({"", "", Reach::usb}), "");
+  EXPECT_NE(error({"/dev/ttyACM0", "", Reach::usb}).find("takes no --port"), std::string::npos);
+  unsetenv("FINGERTIP_PORT");
 }
 
 TEST_F(FakeSystem, NoneAndSeveralAreErrors) {
-  EXPECT_THROW(choose_port("", root()), Error);
-  plug_in("ttyACM0", "1209", "0001", "A", false);
-  plug_in("ttyACM1", "1209", "0001", "B", false);
-  try {
-    choose_port("", root());
-    FAIL();
-  } catch (const Error &error) {
-    EXPECT_NE(std::string(error.what()).find("/dev/ttyACM0 "), std::string::npos);
-    EXPECT_NE(std::string(error.what()).find("/dev/ttyACM1"), std::string::npos);
-  }
+  EXPECT_NE(error({}).find("no fingertip found; plug one in"), std::string::npos);
+  plug_in("1-2", "ttyACM0", "1209", "0001", "BBBB", false);
+  plug_in("1-1", "ttyACM1", "1209", "0001", "AAAA", false);
+  EXPECT_EQ(error({}), "several fingertips found; choose one with --device: AAAA BBBB");
+  EXPECT_EQ(port({"", "bbbb", Reach::automatic}), root() + "/dev/ttyACM0");
+  EXPECT_EQ(error({"", "CCCC", Reach::automatic}),
+            "no fingertip CCCC here; there are: AAAA BBBB");
+  auto ways = all_ways(Reach::automatic, root());
+  ASSERT_EQ(ways.size(), 2u);
+  EXPECT_EQ(ways[0].serial, "AAAA");
+  EXPECT_EQ(ways[1].serial, "BBBB");
 }
 
 TEST_F(FakeSystem, TheEnvironmentGoesBeforeUsbAndTheArgumentBeforeBoth) {
-  plug_in("ttyACM0", "1209", "0001", "A", false);
+  plug_in("1-1", "ttyACM0", "1209", "0001", "A", false);
   setenv("FINGERTIP_PORT", "/tmp/pty", 1);
-  EXPECT_EQ(choose_port("", root()), "/tmp/pty");
-  EXPECT_EQ(choose_port("/tmp/other", root()), "/tmp/other");
-  EXPECT_EQ(find_ports(root()).size(), 2u);
-  EXPECT_EQ(find_ports(root())[1].product, "from FINGERTIP_PORT, no such port");
+  EXPECT_EQ(port({}), "/tmp/pty");
+  EXPECT_EQ(port({"/tmp/other", "", Reach::automatic}), "/tmp/other");
+  EXPECT_EQ(port({"", "A", Reach::automatic}), root() + "/dev/ttyACM0");
+  ASSERT_EQ(find_in_environment().size(), 1u);
+  EXPECT_EQ(find_in_environment()[0].product, "from FINGERTIP_PORT, no such port");
   setenv("FINGERTIP_PORT", root().c_str(), 1);
-  EXPECT_EQ(find_ports(root())[1].product, "from FINGERTIP_PORT");
+  EXPECT_EQ(find_in_environment()[0].product, "from FINGERTIP_PORT");
   setenv("FINGERTIP_PORT", "/tmp/a:/tmp/b", 1);
-  EXPECT_THROW(choose_port("", root()), Error);
+  EXPECT_EQ(error({}), "several fingertips found; choose one with --port: /tmp/a /tmp/b");
   unsetenv("FINGERTIP_PORT");
 }

@@ -1,0 +1,171 @@
+#include "libfingertip/connection.hpp"
+
+#include "libfingertip/error.hpp"
+#include "libfingertip/serial_transport.hpp"
+#include "libfingertip/usb_transport.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace fingertip {
+
+namespace {
+
+constexpr Session::Policy QUICK = {std::chrono::milliseconds(400), 3};
+
+const Found *with_serial(const std::vector<Found> &found, const std::string &serial) {
+  auto at = std::find_if(found.begin(), found.end(),
+                         [&](const Found &each) { return is_same_serial(each.serial, serial); });
+  return at == found.end() ? nullptr : &*at;
+}
+
+std::string serial_of(const wire_info &info) {
+  return std::string(info.serial, strnlen(info.serial, WIRE_TEXT_BYTES));
+}
+
+bool never() {
+  return false;
+}
+
+[[noreturn]] void no_way(const Found &found) {
+  throw Error(found.serial + ": has no serial port; its driver cdc_acm is not loaded, or another "
+                             "program uses it by libusb: try --transport usb");
+}
+
+/* Throws Error with the reason to choose another. */
+Way only_one(const std::vector<Found> &found, Reach reach, const char *none) {
+  if (found.empty()) {
+    throw Error(none);
+  }
+  if (found.size() > 1) {
+    std::string names;
+    for (const Found &each : found) {
+      names += " " + (each.serial.empty() ? each.port : each.serial);
+    }
+    throw Error("several fingertips found; choose one with " +
+                std::string(found[0].serial.empty() ? "--port:" : "--device:") + names);
+  }
+  auto way = way_to(found[0], reach);
+  if (!way) {
+    no_way(found[0]);
+  }
+  return *way;
+}
+
+Way with_wanted_serial(const Choice &choice, const std::string &root) {
+  auto usb = find_usb(root);
+  if (const Found *found = with_serial(usb, choice.device)) {
+    auto way = way_to(*found, choice.reach);
+    if (!way) {
+      no_way(*found);
+    }
+    return *way;
+  }
+  std::string others;
+  std::string unasked;
+  for (const Found &found : usb) {
+    others += " " + found.serial;
+  }
+  for (const Found &found : find_in_environment()) {
+    auto way = way_to(found, choice.reach);
+    if (!way) {
+      continue;
+    }
+    try {
+      way->serial = serial_of(ask(*way, never, root));
+    } catch (const Error &error) {
+      unasked = std::string(error.what());
+      continue;
+    }
+    if (is_same_serial(way->serial, choice.device)) {
+      return *way;
+    }
+    others += " " + way->serial;
+  }
+  throw Error("no fingertip " + choice.device + " here; " +
+              (!others.empty()    ? "there are:" + others
+               : !unasked.empty() ? unasked
+                                  : "plug it in, then see `fingertip list`"));
+}
+
+} // namespace
+
+std::optional<Way> way_to(const Found &found, Reach reach) {
+  if (found.usb && (reach == Reach::usb || (reach == Reach::automatic && found.port.empty()))) {
+    return Way{found.serial, "", true};
+  }
+  if (found.port.empty() || reach == Reach::usb) {
+    return std::nullopt;
+  }
+  return Way{found.serial, found.port, found.usb.has_value()};
+}
+
+wire_info ask(const Way &way, const std::function<bool()> &stop, const std::string &root) {
+  auto transport = open_way(way, root);
+  Session session(*transport, stop);
+  return session.info(QUICK).body.info;
+}
+
+Way choose_way(const Choice &choice, const std::string &root) {
+  if (!choice.port.empty()) {
+    if (choice.reach == Reach::usb) {
+      throw Error("--transport usb takes no --port; choose the fingertip with --device");
+    }
+    Way way = {"", stable_port(choice.port, root), false};
+    if (!choice.device.empty()) {
+      way.serial = serial_of(ask(way, never, root));
+      if (!is_same_serial(way.serial, choice.device)) {
+        throw Error(choice.port + ": is fingertip " + way.serial + ", not " + choice.device +
+                    "; leave out --port, or see `fingertip list`");
+      }
+    }
+    return way;
+  }
+  if (!choice.device.empty()) {
+    return with_wanted_serial(choice, root);
+  }
+  auto in_environment = find_in_environment();
+  if (!in_environment.empty() && choice.reach != Reach::usb) {
+    return only_one(in_environment, choice.reach, "");
+  }
+  return only_one(find_usb(root), choice.reach,
+                  "no fingertip found; plug one in, or name its port with --port PATH");
+}
+
+std::vector<Way> all_ways(Reach reach, const std::string &root) {
+  std::vector<Way> ways;
+  for (const Found &found : find_usb(root)) {
+    auto way = way_to(found, reach);
+    if (!way) {
+      no_way(found);
+    }
+    ways.push_back(*way);
+  }
+  for (const Found &found : find_in_environment()) {
+    if (auto way = way_to(found, reach)) {
+      way->serial = serial_of(ask(*way, never, root));
+      ways.push_back(*way);
+    }
+  }
+  return ways;
+}
+
+std::unique_ptr<Transport> open_way(const Way &way, const std::string &root) {
+  auto find_again = [serial = way.serial, root] {
+    auto found = find_usb(root);
+    const Found *again = with_serial(found, serial);
+    return again ? again->port : std::string();
+  };
+  if (!way.port.empty()) {
+    return std::make_unique<SerialTransport>(
+        way.port, way.found_by_usb ? find_again : std::function<std::string()>());
+  }
+  /* libusb would take the port away from whoever has it open. */
+  std::string port = find_again();
+  if (!port.empty()) {
+    SerialTransport::check_unused(port);
+  }
+  return std::make_unique<UsbTransport>(way.serial);
+}
+
+} // namespace fingertip

@@ -1,0 +1,38 @@
+/* A fingertip reached by libusb, past the system's serial driver.
+ *
+ * Found by our vendor and product id and its serial number, at whatever bus and address. The
+ * driver cdc_acm is detached while this is open and given back at the end. Bulk transfers of one
+ * USB packet each wait in the system's queue, so that nothing is lost between two reads and no
+ * short packet waits for a longer one; they are served by the thread that calls read and write.
+ */
+#pragma once
+
+#include "libfingertip/transport.hpp"
+
+#include <memory>
+
+namespace fingertip {
+
+class UsbTransport : public Transport {
+public:
+  /* serial: empty for any fingertip. Throws Error if it is absent, in use, or not allowed. */
+  explicit UsbTransport(const std::string &serial);
+  ~UsbTransport() override;
+  UsbTransport(const UsbTransport &) = delete;
+  UsbTransport &operator=(const UsbTransport &) = delete;
+
+  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
+              std::chrono::milliseconds timeout) override;
+  bool write(const std::uint8_t *bytes, std::size_t length) override;
+  /* Throws Error if it is there but was taken by somebody else. */
+  bool reopen() override;
+  bool ask_loader() override;
+  std::string description() const override;
+
+private:
+  class Link;
+  std::string serial_;
+  std::unique_ptr<Link> link_;
+};
+
+} // namespace fingertip

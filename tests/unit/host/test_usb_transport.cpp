@@ -1,0 +1,182 @@
+#include "libfingertip/error.hpp"
+#include "libfingertip/usb_transport.hpp"
+#include "support/fake_libusb.hpp"
+
+#include <functional>
+#include <gtest/gtest.h>
+#include <numeric>
+
+using namespace fingertip;
+using std::chrono::milliseconds;
+using Result = Transport::Result;
+
+namespace {
+
+class Usb : public ::testing::Test {
+protected:
+  Usb() { fake_libusb::reset(); }
+  ~Usb() override {
+    EXPECT_EQ(fake_libusb::misuse(), "");
+    EXPECT_EQ(fake_libusb::leaks(), 0);
+  }
+  fake_libusb::Device &plug_in(const std::string &serial, std::uint8_t address = 1) {
+    auto device = std::make_shared<fake_libusb::Device>();
+    device->serial = serial;
+    device->address = address;
+    fake_libusb::bus().push_back(device);
+    return *device;
+  }
+  static std::string error_of(const std::string &serial) {
+    try {
+      UsbTransport transport(serial);
+    } catch (const Error &error) {
+      return error.what();
+    }
+    return "";
+  }
+  static std::vector<std::uint8_t> read_all(UsbTransport &transport, Result last) {
+    std::vector<std::uint8_t> all;
+    std::uint8_t bytes[100];
+    std::size_t length = 0;
+    Result result;
+    while ((result = transport.read(bytes, sizeof bytes, &length, milliseconds(1))) ==
+           Result::data) {
+      all.insert(all.end(), bytes, bytes + length);
+    }
+    EXPECT_EQ(static_cast<int>(result), static_cast<int>(last));
+    return all;
+  }
+};
+
+std::vector<std::uint8_t> counting(std::size_t length) {
+  std::vector<std::uint8_t> bytes(length);
+  std::iota(bytes.begin(), bytes.end(), std::uint8_t{0});
+  return bytes;
+}
+
+} // namespace
+
+TEST_F(Usb, OpensLikeAPortAndGivesTheDriverBack) {
+  auto &device = plug_in("A");
+  {
+    UsbTransport transport("A");
+    EXPECT_EQ(device.lines, 3);
+    EXPECT_EQ(device.baud, 115200u);
+    EXPECT_FALSE(device.driver[0] || device.driver[1]);
+    EXPECT_TRUE(device.claimed[0] && device.claimed[1]);
+    EXPECT_EQ(transport.description(), "usb 001/001 A");
+  }
+  EXPECT_EQ(device.lines, 0);
+  EXPECT_TRUE(device.driver[0] && device.driver[1]);
+}
+
+TEST_F(Usb, WhatAKilledProgramLeftIsMended) {
+  auto &device = plug_in("A");
+  device.driver[0] = device.driver[1] = false;
+  UsbTransport("A");
+  EXPECT_TRUE(device.driver[0]);
+}
+
+TEST_F(Usb, EveryByteComesInOrderWhateverThePackets) {
+  auto &device = plug_in("A");
+  auto sent = counting(64 * 500);
+  for (std::size_t at = 0, length = 0; at < sent.size(); at += length) {
+    length = std::min<std::size_t>(at % 65, sent.size() - at); /* from empty to full */
+    length = length == 0 && device.in.size() % 2 ? 64 : length;
+    auto from = sent.begin() + static_cast<std::ptrdiff_t>(at);
+    length = std::min(length, sent.size() - at);
+    device.in.emplace_back(from, from + static_cast<std::ptrdiff_t>(length));
+  }
+  UsbTransport transport("A");
+  EXPECT_EQ(read_all(transport, Result::timeout), sent);
+  EXPECT_EQ(device.most_waiting, 64);
+}
+
+TEST_F(Usb, WritesAllOrSaysNo) {
+  auto &device = plug_in("A");
+  UsbTransport transport("A");
+  auto bytes = counting(200);
+  EXPECT_TRUE(transport.write(bytes.data(), bytes.size()));
+  EXPECT_EQ(device.out, bytes);
+  device.takes_bytes = false;
+  EXPECT_FALSE(transport.write(bytes.data(), 1));
+  device.is_plugged_in = false;
+  EXPECT_FALSE(transport.write(bytes.data(), 1));
+}
+
+TEST_F(Usb, TheSerialNumberChoosesInEitherCase) {
+  plug_in("AB", 1);
+  plug_in("CD", 2);
+  auto &other = plug_in("EF", 3);
+  other.product = 0x4321;
+  EXPECT_EQ(UsbTransport("cd").description(), "usb 001/002 CD");
+  EXPECT_NE(error_of("EF").find("no such fingertip; plug it in"), std::string::npos);
+}
+
+TEST_F(Usb, GoneAndBackAtAnotherAddress) {
+  auto &device = plug_in("A");
+  UsbTransport transport("A");
+  for (int cycle = 0; cycle < 20; cycle++) {
+    device.in.push_back(counting(64));
+    EXPECT_EQ(read_all(transport, Result::timeout).size(), 64u);
+    device.in.push_back(counting(64)); /* never fetched: the cable was faster */
+    device.is_plugged_in = false;
+    EXPECT_EQ(read_all(transport, Result::gone).size(), 0u);
+    EXPECT_EQ(read_all(transport, Result::gone).size(), 0u);
+    EXPECT_FALSE(transport.reopen());
+    device.claimed[0] = device.claimed[1] = false;
+    device.driver[0] = device.driver[1] = true;
+    device.in.clear();
+    device.address++;
+    device.is_plugged_in = true;
+    ASSERT_TRUE(transport.reopen());
+    EXPECT_EQ(device.lines, 3);
+  }
+  EXPECT_EQ(transport.description(), "usb 001/021 A");
+}
+
+TEST_F(Usb, AHaltedEndpointIsFreed) {
+  auto &device = plug_in("A");
+  UsbTransport transport("A");
+  device.halted = true;
+  EXPECT_TRUE(read_all(transport, Result::timeout).empty());
+  while (device.halted) {
+    read_all(transport, Result::timeout);
+  }
+  device.in.push_back(counting(10));
+  EXPECT_EQ(read_all(transport, Result::timeout), counting(10));
+}
+
+TEST_F(Usb, ErrorsSayWhatToDo) {
+  EXPECT_NE(error_of("A").find("usb A: no such fingertip; plug it in, then see `fingertip list`"),
+            std::string::npos);
+  auto &device = plug_in("A");
+  device.is_denied = true;
+  EXPECT_NE(error_of("A").find("install the udev rule: fingertip rule"), std::string::npos);
+  device.is_denied = false;
+  device.driver[0] = device.driver[1] = false;
+  device.is_claimed = true;
+  EXPECT_NE(error_of("A").find("in use by another program"), std::string::npos);
+  device.is_claimed = false;
+  device.has_cdc_interfaces = false;
+  EXPECT_NE(error_of("A").find("flash its firmware"), std::string::npos);
+}
+
+TEST_F(Usb, TakenByAnotherWhileItWasGoneIsAnError) {
+  auto &device = plug_in("A");
+  UsbTransport transport("A");
+  device.is_plugged_in = false;
+  read_all(transport, Result::gone);
+  device.is_plugged_in = true;
+  device.claimed[0] = device.claimed[1] = false;
+  device.is_claimed = true;
+  EXPECT_THROW(transport.reopen(), Error);
+}
+
+TEST_F(Usb, TheLoaderIsAskedForByTheBaudRate) {
+  auto &device = plug_in("A");
+  UsbTransport transport("A");
+  EXPECT_TRUE(transport.ask_loader());
+  EXPECT_EQ(device.baud, 1200u);
+  EXPECT_EQ(device.lines, 0);
+}
