@@ -22,6 +22,7 @@ static struct {
 static struct {
   uint64_t due_us;
   bool set;
+  bool is_far; /* due beyond the horizon: what fires is to arm it anew */
 } alarm;
 
 static bool started_by_watchdog;
@@ -46,6 +47,11 @@ uint64_t port_now_us(void) {
   return (uint64_t)high_again << 32 | low;
 }
 
+/* Of times within the horizon */
+static bool is_past(uint32_t t_us) {
+  return (int32_t)(t_us - TIMER_TIMERAWL) <= 0;
+}
+
 void port_set_event_handler(void (*handler)(void *context), void *context) {
   uint32_t primask = disable_interrupts();
   event.handler = handler;
@@ -61,11 +67,10 @@ void rp2040_event(void) {
 /* With interrupts disabled, or in an interrupt. */
 static void arm_alarm(void) {
   uint64_t now_us = port_now_us();
-  uint64_t target_us = alarm.due_us;
-  if (target_us > now_us + ALARM_HORIZON_us)
-    target_us = now_us + ALARM_HORIZON_us;
-  TIMER_ALARM0 = (uint32_t)target_us;
-  if (port_now_us() >= target_us) { /* too late for the comparison, perhaps */
+  alarm.is_far = alarm.due_us > now_us + ALARM_HORIZON_us;
+  uint32_t target_us = alarm.is_far ? (uint32_t)now_us + ALARM_HORIZON_us : (uint32_t)alarm.due_us;
+  TIMER_ALARM0 = target_us;
+  if (alarm.due_us <= now_us || is_past(target_us)) { /* too late for the comparison, perhaps */
     TIMER_ARMED = TIMER_ALARM0_BIT;
     rp2040_irq_pend(RP2040_IRQ_TIMER_0);
   }
@@ -83,7 +88,7 @@ void timer0_irq_handler(void) {
   TIMER_INTR = TIMER_ALARM0_BIT;
   if (!alarm.set)
     return;
-  if (port_now_us() < alarm.due_us) {
+  if (alarm.is_far || !is_past((uint32_t)alarm.due_us)) {
     arm_alarm();
     return;
   }

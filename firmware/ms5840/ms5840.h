@@ -22,9 +22,10 @@ enum {
 /* PROM reload after reset: 2.8 ms (recalled from the sensor family; public drivers wait 3 ms). */
 #define MS5840_RESET_us 4000u
 
-/* A read is too early when its command arrives before the conversion is over, not when its START
- * does: address and command take 17 clocks of 2.5 us at least (UM10204, fast mode). */
-#define MS5840_READ_LEAD_us 42u
+/* A read is too early when the sensor acknowledges its command before the conversion is over, not
+ * when its START comes before: hold time of the START, address and command with eighteen clocks of
+ * 2.5 us take that long at least (UM10204, fast mode). */
+#define MS5840_READ_LEAD_us 44u
 
 /* One row per oversampling ratio: the commands and the time they take cannot disagree. */
 struct ms5840_osr {

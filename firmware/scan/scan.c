@@ -43,6 +43,16 @@ static void set(_Atomic uint32_t *to, uint32_t value) {
   atomic_store_explicit(to, value, memory_order_relaxed);
 }
 
+/* An interrupt and what it interrupts share one core: the compiler alone must keep the order. */
+static void hand_over(_Atomic uint32_t *state, enum scan_slot_state to) {
+  atomic_signal_fence(memory_order_seq_cst);
+  set(state, to);
+}
+
+static const struct ms5840_osr *get_osr(const struct scan *scan) {
+  return atomic_load_explicit(&scan->osr, memory_order_relaxed);
+}
+
 static uint32_t all_sensors(const struct scan *scan) {
   return UINT32_MAX >> (FT_MAX_SENSORS - scan->sensor_count);
 }
@@ -65,8 +75,8 @@ enum ft_status scan_init(struct scan *scan, const struct array_bus *bus,
   scan->bus = bus;
   scan->sensor_count = settings->sensor_count;
   scan->conversion = &scan->conversions[0];
-  scan->conversion->osr = ms5840_find_osr(settings->osr);
-  set(&scan->osr, settings->osr);
+  scan_set_osr(scan, settings->osr);
+  scan->conversion->osr = get_osr(scan);
   scan_set_rate_mHz(scan, settings->rate_mHz);
   scan->state = SCAN_WAIT_POWER;
   scan->wait_until_us = POWER_UP_us;
@@ -76,10 +86,11 @@ enum ft_status scan_init(struct scan *scan, const struct array_bus *bus,
 }
 
 enum ft_status scan_set_osr(struct scan *scan, uint16_t osr) {
-  if (!ms5840_find_osr(osr)) {
+  const struct ms5840_osr *found = ms5840_find_osr(osr);
+  if (!found) {
     return FT_ERR_ARGUMENT;
   }
-  set(&scan->osr, osr);
+  atomic_store_explicit(&scan->osr, found, memory_order_relaxed);
   return FT_OK;
 }
 
@@ -253,12 +264,12 @@ static void take_reading(struct scan *scan, const struct scan_conversion *conver
     slot->prom_changed = scan->prom_changed;
     scan->prom_changed = 0;
   }
-  atomic_store_explicit(conversion->is_temperature ? &scan->temperature_state : &scan->slot_state,
-                        SCAN_SLOT_FULL, memory_order_release);
+  hand_over(conversion->is_temperature ? &scan->temperature_state : &scan->slot_state,
+            SCAN_SLOT_FULL);
 }
 
 static bool temperature_waits(const struct scan *scan) {
-  return atomic_load_explicit(&scan->temperature_state, memory_order_acquire) != SCAN_SLOT_EMPTY;
+  return get(&scan->temperature_state) != SCAN_SLOT_EMPTY;
 }
 
 static void heed_doubt(struct scan *scan, uint64_t now_us) {
@@ -274,8 +285,7 @@ static void heed_doubt(struct scan *scan, uint64_t now_us) {
 /* When to convert the temperature in the pause before the next frame; UINT64_MAX: not in this one,
  * because it is not due or the pause is too short. */
 static uint64_t temperature_in_pause_us(const struct scan *scan, uint64_t now_us) {
-  const struct ms5840_osr *osr = ms5840_find_osr((uint16_t)get(&scan->osr));
-  uint32_t slot_us = scan->overhead_us + osr->conversion_us;
+  uint32_t slot_us = scan->overhead_us + get_osr(scan)->conversion_us;
   if (scan->next_temperature_us > scan->next_frame_us ||
       scan->next_frame_us - now_us < slot_us + slot_us / 16) {
     return UINT64_MAX;
@@ -329,7 +339,7 @@ static enum ft_status start_operation(struct scan *scan, uint64_t now_us) {
     return bus->start_read(bus->context, (uint8_t)(MS5840_CMD_READ_PROM + 2 * scan->prom_word), 2,
                            now_us);
   case SCAN_CONVERT:
-    conversion->osr = ms5840_find_osr((uint16_t)get(&scan->osr));
+    conversion->osr = get_osr(scan);
     conversion->t_begin_us = now_us;
     if (conversion->is_temperature) {
       scan->next_temperature_us = now_us + TEMPERATURE_INTERVAL_us;
@@ -389,19 +399,21 @@ static void begin_operation(struct scan *scan, uint64_t now_us) {
   }
 }
 
-/* The codes are in scan->result, and stay there while the next operation runs. */
+/* The codes are in scan->result, and stay there while the next operation runs: nothing is done
+ * before that but what it needs. */
 static void end_reading(struct scan *scan, uint64_t now_us) {
   struct scan_conversion *read = scan->conversion;
-  read->t_read_us = now_us;
-  read->number = scan->frame_number;
-  scan->frame_number += read->is_frame;
-  scan->overhead_us = (uint32_t)(now_us - read->t_begin_us) - read->osr->conversion_us;
   scan->last_was_temperature = read->is_temperature;
   scan->conversion = &scan->conversions[read == &scan->conversions[0]];
   scan->conversion->osr = read->osr;
   wait_in(scan, SCAN_IDLE, now_us);
   leave_idle(scan, now_us);
   begin_operation(scan, now_us);
+
+  read->t_read_us = now_us;
+  read->number = scan->frame_number;
+  scan->frame_number += read->is_frame;
+  scan->overhead_us = (uint32_t)(now_us - read->t_begin_us) - read->osr->conversion_us;
   take_reading(scan, read);
 }
 
@@ -477,9 +489,9 @@ uint64_t scan_step(struct scan *scan, uint64_t now_us) {
       fail_operation(scan, status, now_us);
       continue;
     }
-    count(&scan->counters.bus_nacks, scan->result.nacks);
     bool was_prom = scan->state == SCAN_READ_PROM;
     end_operation(scan, now_us);
+    count(&scan->counters.bus_nacks, scan->result.nacks);
     if (was_prom && scan->state != SCAN_READ_PROM) {
       /* Judging the PROMs takes longer than a transfer: the next operation's deadlines must count
        * from a fresh time. */
@@ -567,16 +579,12 @@ static bool temperature_is_next(const struct scan *scan) {
 }
 
 static bool claim(_Atomic uint32_t *state) {
-  if (atomic_load_explicit(state, memory_order_acquire) != SCAN_SLOT_FULL) {
+  if (get(state) != SCAN_SLOT_FULL) {
     return false;
   }
-  atomic_store_explicit(state, SCAN_SLOT_CLAIMED, memory_order_relaxed);
+  set(state, SCAN_SLOT_CLAIMED);
   atomic_signal_fence(memory_order_seq_cst);
   return true;
-}
-
-static void release(_Atomic uint32_t *state) {
-  atomic_store_explicit(state, SCAN_SLOT_EMPTY, memory_order_release);
 }
 
 bool scan_take(struct scan *scan, struct frame *frame) {
@@ -586,7 +594,7 @@ bool scan_take(struct scan *scan, struct frame *frame) {
     if (is_frame) {
       fill_head(scan, &scan->temperature_slot.conversion, frame);
     }
-    release(&scan->temperature_state);
+    hand_over(&scan->temperature_state, SCAN_SLOT_EMPTY);
     if (is_frame) {
       return true;
     }
@@ -596,6 +604,6 @@ bool scan_take(struct scan *scan, struct frame *frame) {
   }
   fill_head(scan, &scan->slot.conversion, frame);
   fill_pressures(scan, &scan->slot, frame);
-  release(&scan->slot_state);
+  hand_over(&scan->slot_state, SCAN_SLOT_EMPTY);
   return true;
 }

@@ -93,7 +93,7 @@ struct scan {
   uint8_t sensor_count;
 
   /* Requests of the main context. */
-  _Atomic uint32_t osr;
+  const struct ms5840_osr *_Atomic osr;
   _Atomic uint32_t period_us;           /* of frames; 0: as fast as the sensors allow */
   _Atomic uint32_t temperature_doubted; /* 1: take the next soon. Set while the temperature's slot
                                            is not empty and cleared while it is */

@@ -230,8 +230,8 @@ static void test_waits_at_every_osr(void) {
         uint32_t longest_us = fake_conversion_us(entry->command);
         TEST_ASSERT_EQUAL_HEX8(2 * i, entry->command & 0x0F);
         TEST_ASSERT_GREATER_OR_EQUAL_UINT64(longest_us, wait_us);
-        /* Address and command of the read take 42 us. */
-        TEST_ASSERT_GREATER_OR_EQUAL_UINT64(longest_us + longest_us / 20 - 42, wait_us);
+        /* Address and command of the read take 44 us. */
+        TEST_ASSERT_GREATER_OR_EQUAL_UINT64(longest_us + longest_us / 20 - 44, wait_us);
         TEST_ASSERT_LESS_OR_EQUAL_UINT64(longest_us + longest_us / 10, wait_us);
       } else if (entry->command == 0x1E) {
         TEST_ASSERT_GREATER_OR_EQUAL_UINT64(2800, wait_us);
