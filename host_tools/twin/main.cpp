@@ -196,6 +196,16 @@ int scene(Options &options) {
   return 0;
 }
 
+// CLI11 would take -1 for a large seed.
+std::uint64_t seed_from_text(const std::string &option, const std::string &text) {
+  const auto seed = to_u64(text);
+  if (!seed) {
+    throw CLI::ValidationError(option + " \"" + text +
+                               "\" is not possible; give a whole number from 0");
+  }
+  return *seed;
+}
+
 int run(int argc, char **argv) {
   Options options;
   std::function<int()> action;
@@ -250,8 +260,15 @@ int run(int argc, char **argv) {
   write->add_option("--effects", options.effects,
                     "Errors of the pad, as in \"drift,relaxation=20\"; none (default), all")
       ->type_name("NAME[=VALUE],...");
-  write->add_option("--seed", s.seed, "Of places, forces and times; default 1")->type_name("N");
-  write->add_option("--pad", s.pad_seed, "Seed of the pad's errors; default: --seed")
+  write
+      ->add_option_function<std::string>(
+          "--seed", [&](const std::string &text) { s.seed = seed_from_text("--seed", text); },
+          "Of places, forces and times; default 1")
+      ->type_name("N");
+  write
+      ->add_option_function<std::string>(
+          "--pad", [&](const std::string &text) { s.pad_seed = seed_from_text("--pad", text); },
+          "Seed of the pad's errors; default: --seed")
       ->type_name("N");
   write->add_option("--seconds", s.seconds, "Length; default: see twin list")->type_name("S");
   write->add_option("--force", s.forces, "\"5\", in turn \"1,2,5\", any of \"1..15\"; default: see "

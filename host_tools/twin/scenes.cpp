@@ -456,9 +456,13 @@ double Forces::largest() const {
 
 bool Act::slips(double t_s) const {
   constexpr double ROUNDING_s = 1e-7;
-  return std::any_of(phases.begin(), phases.end(), [&](const Phase &one) {
-    return one.slip && t_s > one.begin_s + ROUNDING_s && t_s < one.end_s - ROUNDING_s;
-  });
+  bool slips = false;
+  for (std::size_t i = 0; i < phases.size(); i++) {
+    const bool goes_on = i + 1 < phases.size() && phases[i + 1].slip;
+    slips = slips || (phases[i].slip && t_s > phases[i].begin_s + ROUNDING_s &&
+                      t_s < phases[i].end_s + (goes_on ? ROUNDING_s : -ROUNDING_s));
+  }
+  return slips;
 }
 
 Scene make_scene(const SceneOptions &options, const ContactTable &table) {

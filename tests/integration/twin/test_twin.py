@@ -1,0 +1,188 @@
+"""The twin command, and its files in the hands of their readers: usage test_twin.py TWIN TABLES [unittest arguments]."""
+import csv
+import json
+import os
+import pathlib
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+
+TWIN, TABLES = (os.path.abspath(path) for path in sys.argv[1:3])
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+PATIENCE_s = 60
+sys.path.insert(0, str(ROOT / "host_tools/python"))
+import fingertip_files  # noqa: E402
+
+READ_AS_THE_EMULATOR_DOES = """
+import { readScenario } from '%s';
+const s = readScenario(process.argv[1]);
+const at = (t) => Array.from({ length: s.sensors }, (_, k) => s.at_ns(k, t * 1e9));
+console.log(JSON.stringify({ metadata: s.metadata, rows: s.times_s.length, end_s: s.end_s, at: process.argv.slice(2).map(Number).map(at) }));
+""" % (ROOT / "host_tools/emulator/scenario.mjs").as_uri()
+
+
+class TwinTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="twin-test-")
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.csv = str(self.folder / "scene.csv")
+
+    def run_twin(self, *arguments, status=0, **options):
+        done = subprocess.run([TWIN, *arguments], capture_output=True, text=True, timeout=PATIENCE_s, **options)
+        self.assertEqual(done.returncode, status, (arguments, done.stdout, done.stderr))
+        return done.stdout, done.stderr
+
+    def scene(self, *arguments, path=None, **options):
+        return self.run_twin("scene", *arguments, "-o", path or self.csv, "--cache", TABLES, **options)
+
+    def error(self, *arguments, status=1, **options):
+        out, err = self.run_twin(*arguments, status=status, **options)
+        self.assertEqual(out, "")
+        self.assertEqual(err.count("\n"), 1, err)
+        self.assertTrue(err.startswith("twin: "), err)
+        return err
+
+    def scene_error(self, *arguments, **options):
+        return self.error("scene", *arguments, "-o", self.csv, "--cache", TABLES, **options)
+
+    def events(self):
+        lines = (self.folder / "scene.truth.csv").read_text().splitlines()
+        self.assertEqual(lines[0], "# fingertip-truth 1")
+        return list(csv.DictReader(line for line in lines if not line.startswith("#")))
+
+
+class Files(TwinTest):
+    def test_every_kind_is_read_by_python_and_emulator_alike(self):
+        names = [line.split()[0] for line in self.run_twin("list")[0].split("\n\n")[0].splitlines()[1:]]
+        self.assertEqual(sorted(names), sorted(["grid", "taps", "high", "pokes", "cycle", "slip", "twist", "rolloff", "two"]))
+        for kind in names:
+            with self.subTest(kind):
+                seconds = 34 if kind == "cycle" else 12
+                self.scene(kind, "--seconds", str(seconds), "--effects", "all", "--overwrite")
+                scene = fingertip_files.read_scenario(self.csv)
+                times = [0, 1.8, 7.3, seconds]
+                done = subprocess.run(["node", "--input-type=module", "-e", READ_AS_THE_EMULATOR_DOES, self.csv, *map(str, times)],
+                                      capture_output=True, text=True, check=True, timeout=PATIENCE_s)
+                emulator = json.loads(done.stdout)
+                self.assertEqual(emulator["end_s"], seconds)
+                self.assertEqual(emulator["rows"], len(scene.t_s))
+                self.assertEqual(emulator["metadata"], scene.metadata)
+                self.assertEqual(scene.metadata["name"],
+                                 f"{kind}-sphere6-h12-gain10-drift-relaxation-hysteresis-temperature-bias-clip")
+                for t_s, sensors in zip(times, emulator["at"]):
+                    for k, sensor in enumerate(sensors):
+                        self.assertAlmostEqual(
+                            sensor["pressure_Pa"] - 101325, fingertip_files.np.interp(t_s, scene.t_s, scene.sensors_Pa[:, k]), places=6)
+                        self.assertTrue(25 <= sensor["temperature_degC"] < 31)
+                events = self.events()
+                held = [row for row in events if float(row["force_N"]) > 0 or float(row["force_end_N"]) > 0]
+                self.assertGreater(len(held), 1)
+                # Where the events say that something presses, so does the scenario.
+                for row in events:
+                    middle = (float(row["t_begin_s"]) + float(row["t_end_s"])) / 2
+                    self.assertTrue(scene.is_on("contact", middle), row)
+                    slips = row["phase"] in ("dead_travel", "slip")
+                    self.assertEqual(bool(scene.is_on("slip", middle)), slips, row)
+                    force = float(row["force_end_N"]) + float(row["force2_end_N"] or 0)
+                    self.assertAlmostEqual(scene.at("force_N", float(row["t_end_s"])), force, delta=0.02, msg=row)
+                acts = {row["act"]: row for row in events}
+                self.assertEqual(len(scene.intervals("contact")), len(acts))
+
+    def test_same_options_same_bytes_and_other_seeds_others(self):
+        options = ("taps", "--seconds", "20", "--gain", "10", "--effects", "relaxation,hysteresis")
+        files = {}
+        for name, more in {"a": (), "b": (), "seed": ("--seed", "2"), "pad": ("--pad", "2")}.items():
+            path = self.folder / name / "scene.csv"
+            path.parent.mkdir()
+            self.scene(*options, *more, path=str(path))
+            files[name] = (path.read_bytes(), (path.parent / "scene.truth.csv").read_bytes())
+        self.assertEqual(files["a"], files["b"])
+        self.assertNotEqual(files["a"][1], files["seed"][1])
+        self.assertEqual(files["a"][1], files["pad"][1])
+        self.assertNotEqual(files["a"][0], files["pad"][0])
+
+    def test_readings_return_to_zero_between_contacts(self):
+        self.scene("high", "--seconds", "20", "--effects", "relaxation,hysteresis,gain,clip,bias")
+        scene = fingertip_files.read_scenario(self.csv)
+        intervals = scene.intervals("contact")
+        for (_, end), (begin, _) in zip(intervals, intervals[1:]):
+            self.assertGreaterEqual(begin - end, 1.2)
+            quiet = (scene.t_s > end + 0.002) & (scene.t_s < begin - 0.002)
+            self.assertFalse(scene.sensors_Pa[quiet].any())
+
+    def test_long_scenes_stay_small(self):
+        self.scene("slip", "--seconds", "400", "--effects", "all", "--stick-slip", "1")
+        self.assertLess(os.path.getsize(self.csv), 60e6 * 400 / 2000)
+
+    def test_nothing_but_the_two_files_is_left(self):
+        self.scene("taps", "--seconds", "5")
+        self.assertEqual(sorted(os.listdir(self.folder)), ["scene.csv", "scene.truth.csv"])
+
+    def test_a_full_disk_leaves_older_files_as_they_were(self):
+        self.scene("taps", "--seconds", "5")
+        before = [(self.folder / name).read_bytes() for name in ("scene.csv", "scene.truth.csv")]
+
+        def small_disk():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (100000, 100000))
+
+        err = self.scene_error("taps", "--seconds", "60", "--overwrite", preexec_fn=small_disk)
+        self.assertIn("scene.csv", err)
+        self.assertEqual(before, [(self.folder / name).read_bytes() for name in ("scene.csv", "scene.truth.csv")])
+        self.assertEqual(sorted(os.listdir(self.folder)), ["scene.csv", "scene.truth.csv"])
+
+
+class Usage(TwinTest):
+    def test_list_explains_everything(self):
+        out = self.run_twin("list")[0]
+        for word in ("sphere6", "cube24", "rubber_duck", "relaxation", "hysteresis", "clip", "rolloff", "Shore"):
+            self.assertIn(word, out)
+
+    def test_tables_are_built_once(self):
+        out, err = self.run_twin("tables", "--indenter", "sphere6", "--layer", "12", "--cache", TABLES)
+        self.assertEqual(out, f"1 contact tables in {TABLES}\n")
+        self.assertEqual(err, "")
+
+    def test_existing_files_stay_unless_told(self):
+        self.scene("taps", "--seconds", "5")
+        self.assertIn("exists already; choose another name, or --overwrite", self.scene_error("taps", "--seconds", "5"))
+        os.remove(self.csv)
+        self.assertIn("scene.truth.csv: exists already", self.scene_error("taps", "--seconds", "5"))
+        self.scene("taps", "--seconds", "5", "--overwrite")
+
+    def test_wrong_words_are_told_in_one_line(self):
+        for arguments, what in {
+            ("slide",): 'there is no kind of scene "slide"; give one of: grid, taps',
+            ("taps", "--indenter", "finger"): 'there is no indenter "finger"',
+            ("two", "--second", "finger"): 'there is no indenter "finger"',
+            ("taps", "--layer", "1"): "--layer 1 is out of range; give 3 to 20 mm",
+            ("taps", "--layer", "nan"): "--layer nan is out of range",
+            ("taps", "--effects", "noise"): 'there is no effect "noise"; give some of: gain, drift',
+            ("taps", "--gain", "ten"): 'effect gain is "ten"; give 0 to 30 (%)',
+            ("taps", "--seconds", "0"): "--seconds 0 is out of range; give 1 to 7200",
+            ("cycle", "--seconds", "20"): '--seconds 20 is too short for one contact of "cycle"',
+            ("taps", "--force", "much"): '--force "much" is not possible',
+            ("taps", "--speed", "20"): "--speed says nothing",
+        }.items():
+            self.assertIn(what, self.scene_error(*arguments))
+            self.assertEqual(os.listdir(self.folder), [])
+        self.assertIn("/no/such/place.csv: No such file or directory", self.error("scene", "taps", "-o", "/no/such/place.csv"))
+        for arguments in (("scene",), ("scene", "taps"), ("draw",), ("scene", "taps", "-o", self.csv, "--seed", "-1"),
+                          ("scene", "taps", "-o", self.csv, "--pad", "1.5"),
+                          ("scene", "taps", "-o", self.csv, "--seconds", "x"), ()):
+            self.error(*arguments, status=2)
+
+    def test_a_cache_that_cannot_be_is_told(self):
+        blocked = self.folder / "file"
+        blocked.write_text("")
+        err = self.error("scene", "taps", "-o", self.csv, "--cache", str(blocked / "cache"), "--indenter", "sphere6", "--layer", "12")
+        self.assertIn("file", err)
+
+
+if __name__ == "__main__":
+    del sys.argv[1:3]
+    unittest.main(verbosity=2)

@@ -1,0 +1,251 @@
+#include "libfingertip/error.hpp"
+#include "twin/effects.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <gtest/gtest.h>
+
+namespace {
+
+using namespace fingertip;
+using namespace fingertip::twin;
+
+constexpr double AMBIENT_Pa = 101325.0;
+constexpr std::size_t SENSORS = 15;
+constexpr double LAYER_mm = 12.0;
+
+Pad pad_with(const std::string &effects, std::uint64_t seed = 1) {
+  return Pad(parse_effects(effects), SENSORS, LAYER_mm, AMBIENT_Pa, seed);
+}
+
+std::vector<double> reported(Pad &pad, double t_s, double base_Pa) {
+  std::vector<double> out(SENSORS);
+  pad.report(t_s, std::vector<double>(SENSORS, base_Pa), out);
+  return out;
+}
+
+// Readings of sensor 0 along a path of pressures that is linear between its corners.
+struct Corner {
+  double t_s, base_Pa;
+};
+std::vector<double> along(Pad &pad, const std::vector<Corner> &corners, double step_s) {
+  std::vector<double> readings{reported(pad, corners[0].t_s, corners[0].base_Pa)[0]};
+  for (std::size_t i = 1; i < corners.size(); i++) {
+    const Corner &a = corners[i - 1], &b = corners[i];
+    const long steps = std::lround((b.t_s - a.t_s) / step_s);
+    for (long n = 1; n <= steps; n++) {
+      const double u = static_cast<double>(n) / static_cast<double>(steps);
+      readings.push_back(
+          reported(pad, a.t_s + u * (b.t_s - a.t_s), a.base_Pa + u * (b.base_Pa - a.base_Pa))[0]);
+    }
+  }
+  return readings;
+}
+
+TEST(Effects, NoneChangesNothing) {
+  Pad pad = pad_with("none");
+  for (double base_Pa : {0.0, 12345.6, -321.0, 350000.0, 0.0}) {
+    static double t_s = 0.0;
+    EXPECT_EQ(reported(pad, t_s, base_Pa), std::vector<double>(SENSORS, base_Pa));
+    t_s += 1.0;
+  }
+  EXPECT_EQ(pad.temperature_rise_K(1000.0), 0.0);
+}
+
+TEST(Effects, RelaxationLosesItsShareInTheHoldItIsDefinedBy) {
+  for (std::uint64_t seed = 1; seed <= 5; seed++) {
+    Pad pad = pad_with("relaxation", seed);
+    std::vector<double> peak, held;
+    for (int ms = 0; ms <= 9300; ms++) {
+      const double readings_of = 20000.0 * std::min(1.0, ms / 1300.0);
+      held = reported(pad, 1e-3 * ms, readings_of);
+      if (ms == 1300) {
+        peak = held;
+      }
+    }
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      const double lost = 1.0 - held[k] / peak[k];
+      EXPECT_NEAR(lost, pad.relaxations()[k], 1e-9);
+      EXPECT_GT(lost, 0.09 - 1e-9);
+      EXPECT_LT(lost, 0.26 + 1e-9);
+    }
+  }
+}
+
+TEST(Effects, RelaxationDependsNeitherOnTheStepNorOnTheScale) {
+  const std::vector<Corner> path{{0, 0}, {0.4, 9000}, {3, 9000}, {3.2, 1000}, {5, 4000}, {9, 4000}};
+  Pad fine = pad_with("relaxation"), coarse = pad_with("relaxation"), twice = pad_with("relaxation");
+  const std::vector<double> a = along(fine, path, 0.001), b = along(coarse, path, 0.1);
+  std::vector<Corner> doubled = path;
+  for (Corner &corner : doubled) {
+    corner.base_Pa *= 2.0;
+  }
+  const std::vector<double> c = along(twice, doubled, 0.001);
+  for (std::size_t i = 0; i < b.size(); i++) {
+    EXPECT_NEAR(a[100 * i], b[i], 1e-6);
+  }
+  for (std::size_t i = 0; i < a.size(); i++) {
+    EXPECT_NEAR(2.0 * a[i], c[i], 1e-6);
+  }
+}
+
+TEST(Effects, RubberNeitherPullsNorGivesMore) {
+  Pad pad = pad_with("relaxation,hysteresis");
+  const std::vector<Corner> path{{0, 0}, {0.1, 50000}, {20, 50000}, {20.1, 0}, {21, 0}, {22, -200}};
+  const std::vector<double> readings = along(pad, path, 0.01);
+  for (double reading : readings) {
+    EXPECT_LE(reading, 50000.0);
+    EXPECT_GE(reading, -200.0);
+  }
+  const auto at = [&](double t_s) { return readings[static_cast<std::size_t>(std::lround(t_s / 0.01))]; };
+  EXPECT_GT(at(20.0), 0.5 * 50000.0);
+  EXPECT_LT(at(20.0), 0.95 * 50000.0);
+  EXPECT_EQ(at(20.5), 0.0);
+  EXPECT_LE(at(22.0), 0.0);
+}
+
+TEST(Effects, HysteresisLoopHasItsShareOfTheWorkAtAnySpeedAndSize) {
+  for (double speed : {1.0, 10.0}) {
+    for (double peak_Pa : {2000.0, 80000.0}) {
+      Pad pad = pad_with("hysteresis=4");
+      const double t_s = 10.0 / speed;
+      const std::vector<double> readings =
+          along(pad, {{0, 0}, {t_s, peak_Pa}, {2 * t_s, 0}}, t_s / 5000);
+      const std::size_t half = readings.size() / 2;
+      double loop = 0.0, work = 0.0;
+      for (std::size_t i = 0; i <= half; i++) {
+        loop += readings[i] - readings[readings.size() - 1 - i];
+        work += readings[i];
+        EXPECT_NEAR(readings[i], peak_Pa * double(i) / double(half), 1e-6);
+      }
+      EXPECT_NEAR(loop / work, 0.04, 1e-5);
+      EXPECT_EQ(readings.back(), 0.0);
+    }
+  }
+}
+
+TEST(Effects, HysteresisRemembersItsLargestPressureAndClosesInnerLoops) {
+  Pad pad = pad_with("hysteresis=10");
+  const std::vector<double> readings = along(
+      pad, {{0, 0}, {1, 10000}, {2, 5000}, {3, 8000}, {4, 5000}, {5, 10000}, {6, 12000}}, 0.01);
+  EXPECT_NEAR(readings[200], 5000.0 - 0.3 * 5000.0 * 0.5, 1e-6);
+  EXPECT_LT(readings[300], 8000.0);
+  EXPECT_GT(readings[300], 8000.0 - 0.3 * 2500.0);
+  EXPECT_LT(readings[350], 6500.0);
+  EXPECT_NEAR(readings[500], 10000.0, 1e-6);
+  EXPECT_NEAR(readings[600], 12000.0, 1e-6);
+  for (std::size_t i = 1; i < readings.size(); i++) {
+    EXPECT_LT(std::abs(readings[i] - readings[i - 1]), 120.0) << i; // no jump at a turn
+  }
+}
+
+TEST(Effects, GainsAreNormalAndTheSamePadAtAnySpread) {
+  double sum = 0.0, squares = 0.0, largest = 0.0;
+  int beyond_sd = 0;
+  constexpr int PADS = 4000;
+  for (int seed = 0; seed < PADS; seed++) {
+    const Pad ten = pad_with("gain=10", static_cast<std::uint64_t>(seed));
+    const Pad five = pad_with("gain=5", static_cast<std::uint64_t>(seed));
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      const double error = ten.gain_errors()[k];
+      EXPECT_NEAR(five.gain_errors()[k], 0.5 * error, 1e-12);
+      sum += error;
+      squares += error * error;
+      largest = std::max(largest, std::abs(error));
+      beyond_sd += std::abs(error) > 0.1;
+    }
+  }
+  constexpr double COUNT = PADS * SENSORS;
+  // Cut at three sd, a normal has 0.9866 of its sd.
+  EXPECT_NEAR(std::sqrt(squares / COUNT), 0.09866, 0.001);
+  EXPECT_NEAR(sum / COUNT, 0.0, 0.0015);
+  EXPECT_LE(largest, 0.3);
+  EXPECT_NEAR(beyond_sd / COUNT, 0.3155, 0.008);
+  Pad pad = pad_with("gain=10");
+  const std::vector<double> readings = reported(pad, 0.0, 1000.0);
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    EXPECT_NEAR(readings[k], 1000.0 * (1.0 + pad.gain_errors()[k]), 1e-9);
+  }
+}
+
+TEST(Effects, DriftIsARampOfTheMeasuredSizeEitherWay) {
+  int up = 0, down = 0;
+  for (std::uint64_t seed = 0; seed < 20; seed++) {
+    Pad pad = pad_with("drift", seed);
+    const std::vector<double> first = reported(pad, 0.0, 0.0), half = reported(pad, 480.0, 0.0),
+                              last = reported(pad, 960.0, 0.0);
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      EXPECT_EQ(first[k], 0.0);
+      EXPECT_NEAR(2.0 * half[k], last[k], 1e-9);
+      EXPECT_GE(std::abs(last[k]), 130.0 - 1e-9);
+      EXPECT_LE(std::abs(last[k]), 210.0 + 1e-9);
+      (last[k] > 0 ? up : down)++;
+    }
+  }
+  EXPECT_GT(up, 110);
+  EXPECT_GT(down, 110);
+}
+
+TEST(Effects, BiasReadsLowAboveTheSpecifiedRangeOnly) {
+  Pad pad = pad_with("bias=2");
+  double before_Pa = -1.0;
+  for (double absolute_Pa = AMBIENT_Pa; absolute_Pa < 600000.0; absolute_Pa += 1000.0) {
+    const double reading_Pa = reported(pad, absolute_Pa, absolute_Pa - AMBIENT_Pa)[0];
+    if (absolute_Pa <= 120000.0) {
+      EXPECT_NEAR(reading_Pa, absolute_Pa - AMBIENT_Pa, 1e-9);
+    } else {
+      EXPECT_LT(reading_Pa, absolute_Pa - AMBIENT_Pa);
+    }
+    EXPECT_GT(reading_Pa, before_Pa);
+    before_Pa = reading_Pa;
+  }
+  EXPECT_NEAR(reported(pad, 1e6, 200000.0 - AMBIENT_Pa)[0], 196000.0 - AMBIENT_Pa, 1e-6);
+}
+
+TEST(Effects, ClipEndsReadings) {
+  Pad two = pad_with("clip"), five = pad_with("clip=5");
+  EXPECT_NEAR(reported(two, 0, 90000)[0], 90000, 1e-9);
+  EXPECT_NEAR(reported(two, 1, 300000)[0], 202000 - AMBIENT_Pa, 1e-9);
+  EXPECT_NEAR(reported(five, 0, 300000)[0], 300000, 1e-9);
+  EXPECT_NEAR(reported(five, 1, 500000)[0], 500000 - AMBIENT_Pa, 1e-9);
+}
+
+TEST(Effects, TemperatureRisesThroughTheLayerAndLeavesPressuresAlone) {
+  Pad thick = pad_with("temperature");
+  const Pad thin(parse_effects("temperature"), SENSORS, 6.0, AMBIENT_Pa, 1);
+  EXPECT_EQ(thick.temperature_rise_K(0), 0.0);
+  EXPECT_NEAR(thick.temperature_rise_K(486.3), 6.0 * (1 - std::exp(-1.0)), 0.01);
+  EXPECT_NEAR(thin.temperature_rise_K(486.3 / 4), 6.0 * (1 - std::exp(-1.0)), 0.01);
+  EXPECT_NEAR(thick.temperature_rise_K(1e5), 6.0, 1e-9);
+  EXPECT_EQ(reported(thick, 0, 1234.0)[3], 1234.0);
+}
+
+TEST(Effects, AreParsed) {
+  EXPECT_TRUE(parse_effects("").empty());
+  EXPECT_TRUE(parse_effects("none").empty());
+  EXPECT_EQ(parse_effects("all").size(), effects().size());
+  EXPECT_EQ(parse_effects("all,clip=5").at("clip"), 5.0);
+  EXPECT_EQ(parse_effects("clip=5, all").at("clip"), 5.0);
+  EXPECT_EQ(parse_effects("gain").at("gain"), 10.0);
+  for (const char *wrong : {"noise", "gain=", "gain=x", "gain=31", "gain=-1", "drift,,gain", "all=1"}) {
+    EXPECT_THROW(parse_effects(wrong), Error) << wrong;
+  }
+  try {
+    parse_effects("clip=9999");
+    FAIL();
+  } catch (const Error &error) {
+    EXPECT_STREQ(error.what(), "effect clip is \"9999\"; give 1.2 to 10 (bar)");
+  }
+}
+
+TEST(Effects, AreAllDescribed) {
+  for (const Effect &effect : effects()) {
+    EXPECT_FALSE(effect.description.empty());
+    EXPECT_FALSE(effect.source.empty());
+    EXPECT_GE(effect.usual, effect.lowest);
+    EXPECT_LE(effect.usual, effect.highest);
+    EXPECT_EQ(effect.source.find('\n'), std::string::npos);
+  }
+}
+
+} // namespace

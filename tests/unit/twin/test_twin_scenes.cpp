@@ -1,0 +1,425 @@
+#include "libfingertip/error.hpp"
+#include "libfingertip/random.hpp"
+#include "libfingertip/text.hpp"
+#include "twin/scene_file.hpp"
+
+extern "C" {
+#include "config/geometry.h"
+}
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <gtest/gtest.h>
+#include <map>
+#include <set>
+#include <sstream>
+
+namespace {
+
+using namespace fingertip;
+using namespace fingertip::twin;
+
+constexpr double LAYER_mm = 12.0;
+
+const ContactTable &table_of(const std::string &name) {
+  static std::map<std::string, ContactTable> tables;
+  const auto found = tables.find(name);
+  if (found != tables.end()) {
+    return found->second;
+  }
+  return tables
+      .emplace(name, ContactTable::load_or_build(indenter(name), silicone(LAYER_mm),
+                                                 FINGERTIP_TEST_TABLES))
+      .first->second;
+}
+
+Scene scene_of(const std::string &kind, const std::function<void(SceneOptions &)> &change = {}) {
+  SceneOptions options;
+  options.kind = kind;
+  if (change) {
+    change(options);
+  }
+  return make_scene(options, table_of("sphere6"));
+}
+
+struct File {
+  std::map<std::string, std::string> metadata;
+  std::map<std::string, std::size_t> column;
+  std::vector<std::vector<double>> rows;
+  std::string bytes;
+
+  double at(const std::string &name, double t_s) const {
+    const auto after = std::lower_bound(
+        rows.begin(), rows.end(), t_s,
+        [](const std::vector<double> &row, double t) { return row[0] < t; });
+    const std::size_t c = column.at(name);
+    if (after == rows.begin() || after == rows.end()) {
+      return (after == rows.begin() ? rows.front() : rows.back())[c];
+    }
+    const std::vector<double> &a = *(after - 1), &b = *after;
+    return a[c] + (b[c] - a[c]) * (t_s - a[0]) / (b[0] - a[0]);
+  }
+};
+
+File written(const Scene &scene) {
+  const std::string path = testing::TempDir() + "twin_scene.csv";
+  const std::string &first = scene.options.indenter, &second = scene.options.second_indenter;
+  write_scene(scene, silicone(LAYER_mm), table_of(first), table_of(second.empty() ? first : second),
+              path, true);
+  std::stringstream text;
+  text << std::ifstream(path).rdbuf();
+  File file;
+  file.bytes = text.str();
+  for (std::string line; std::getline(text, line);) {
+    if (line[0] == '#') {
+      const std::size_t colon = line.find(": ");
+      if (colon != std::string::npos) {
+        file.metadata[line.substr(2, colon - 2)] = line.substr(colon + 2);
+      }
+    } else if (file.column.empty()) {
+      for (std::string_view name : split(line, ',')) {
+        file.column.emplace(name, file.column.size());
+      }
+    } else {
+      std::vector<double> row;
+      for (std::string_view cell : split(line, ',')) {
+        row.push_back(to_double(cell).value());
+      }
+      file.rows.push_back(row);
+    }
+  }
+  std::filesystem::remove(path);
+  std::filesystem::remove(truth_path(path));
+  return file;
+}
+
+TEST(Scenes, HaveQuietTimeAndNoJumps) {
+  for (const SceneKind &kind : scene_kinds()) {
+    const Scene scene = scene_of(kind.name);
+    ASSERT_GE(scene.acts.size(), 3u) << kind.name;
+    double free_s = START_QUIET_s;
+    for (const Act &act : scene.acts) {
+      EXPECT_GE(act.begin_s, free_s - 1e-9) << kind.name;
+      free_s = act.end_s + scene.options.quiet_s;
+      EXPECT_LE(free_s, *scene.options.seconds + 1e-9);
+      EXPECT_EQ(act.phases.front().begin_s, act.begin_s);
+      EXPECT_NEAR(act.phases.back().end_s, act.end_s, 1e-9);
+      for (std::size_t i = 1; i < act.phases.size(); i++) {
+        EXPECT_EQ(act.phases[i].begin_s, act.phases[i - 1].end_s);
+        EXPECT_GT(act.phases[i].end_s, act.phases[i].begin_s) << act.phases[i].name;
+      }
+      for (const Track &track : act.tracks) {
+        const double length_s = act.end_s - act.begin_s;
+        EXPECT_EQ(track.at(0.0).force_N, 0.0);
+        EXPECT_NEAR(track.at(length_s).force_N, 0.0, 1e-9) << kind.name;
+        Touch before = track.at(0.0);
+        for (double t_s = 1e-3; t_s < length_s + 1e-9; t_s += 1e-3) {
+          const Touch now = track.at(t_s);
+          EXPECT_LE(now.force_N, ContactTable::FORCE_MAX_N);
+          EXPECT_GE(now.force_N, 0.0);
+          // At most 15 N in 0.1 s, 200 mm/s and 180 degrees a second.
+          EXPECT_LT(std::abs(now.force_N - before.force_N), 0.3) << kind.name << t_s;
+          EXPECT_LT(std::hypot(now.x_mm - before.x_mm, now.y_mm - before.y_mm), 0.202)
+              << kind.name << t_s;
+          EXPECT_LT(std::abs(now.angle_rad - before.angle_rad), 3.2e-3) << kind.name << t_s;
+          before = now;
+        }
+      }
+    }
+  }
+}
+
+TEST(Scenes, SlipIsTruthWhereThePusherMovesAndNowhereElse) {
+  for (const SceneKind &kind : scene_kinds()) {
+    const Scene scene = scene_of(kind.name);
+    for (const Act &act : scene.acts) {
+      const Track &track = act.tracks[0];
+      int slipping = 0;
+      for (long ms = 0; ms < std::lround(1e3 * (act.end_s - act.begin_s)); ms++) {
+        const double local_s = 1e-3 * static_cast<double>(ms);
+        // Half a millisecond to either side tells at the very beginning and end.
+        const bool moved = track.pusher_mm.at(local_s) > track.pusher_mm.at(local_s - 5e-4);
+        const bool moves = track.pusher_mm.at(local_s + 5e-4) > track.pusher_mm.at(local_s);
+        const bool slips = act.slips(act.begin_s + local_s);
+        EXPECT_EQ(slips, kind.name == "slip" && moved && moves) << kind.name << local_s;
+        EXPECT_TRUE(!slips || track.at(local_s).force_N > 0.0);
+        slipping += slips;
+      }
+      EXPECT_EQ(slipping > 100, kind.name == "slip");
+    }
+  }
+}
+
+TEST(Scenes, SlipHasDeadTravelThenSpeed) {
+  const Scene scene = scene_of("slip", [](SceneOptions &o) { o.dead_travel_mm = 2.0; });
+  std::set<double> speeds;
+  for (const Act &act : scene.acts) {
+    speeds.insert(act.speed_mm_s);
+    const auto phase = [&](const std::string &name) {
+      return *std::find_if(act.phases.begin(), act.phases.end(),
+                           [&](const Phase &one) { return one.name == name; });
+    };
+    const Phase dead = phase("dead_travel"), slip = phase("slip");
+    const auto y = [&](double t_s) { return act.tracks[0].at(t_s - act.begin_s).y_mm; };
+    EXPECT_NEAR(std::abs(y(dead.end_s) - y(dead.begin_s)), 1.0, 0.21);
+    EXPECT_NEAR(std::abs(y(slip.end_s) - y(dead.begin_s)), 24.0, 1e-6);
+    EXPECT_NEAR(dead.end_s - dead.begin_s, 2.0 / act.speed_mm_s + 0.005, 1.2e-3);
+    const double middle_s = 0.5 * (slip.begin_s + slip.end_s);
+    EXPECT_NEAR(std::abs(y(middle_s + 0.01) - y(middle_s - 0.01)) / 0.02, act.speed_mm_s,
+                0.006 * act.speed_mm_s);
+  }
+  EXPECT_EQ(speeds, (std::set<double>{20, 50, 100, 150, 200}));
+}
+
+TEST(Scenes, GridIsThePapers) {
+  const Scene scene = scene_of("grid", [](SceneOptions &o) { o.seconds = 1100; });
+  std::map<std::pair<double, double>, std::set<double>> forces;
+  std::map<std::pair<double, double>, int> near;
+  for (const Act &act : scene.acts) {
+    const Touch held = act.tracks[0].at(act.phases[1].end_s - act.begin_s);
+    forces[{held.x_mm, held.y_mm}].insert(held.force_N);
+    near[{held.x_mm, held.y_mm}] = act.sensors_near;
+  }
+  EXPECT_EQ(forces.size(), 21u);
+  int count[5] = {};
+  for (const auto &[place, n] : near) {
+    EXPECT_LE(std::abs(place.first), 4.5);
+    EXPECT_LE(std::abs(place.second), 13.5);
+    // As many sensors are at the least distance.
+    std::multiset<double> distances;
+    for (int k = 0; k < geometry.sensor_count; k++) {
+      distances.insert(std::hypot(double(geometry.x_mm[k]) - place.first,
+                                  double(geometry.y_mm[k]) - place.second));
+    }
+    EXPECT_EQ(static_cast<std::size_t>(n), distances.count(*distances.begin()));
+    count[n]++;
+    EXPECT_EQ(forces[place], (std::set<double>{1, 2.5, 5, 10, 15}));
+  }
+  EXPECT_EQ(count[1], 3);
+  EXPECT_EQ(count[2], 10);
+  EXPECT_EQ(count[4], 8);
+}
+
+TEST(Scenes, RandomPlacesFillTheAreaAndForcesTheRange) {
+  const Scene scene = scene_of("taps", [](SceneOptions &o) { o.seconds = 2000; });
+  double x_max = 0, y_max = 0, force_min = 99, force_max = 0;
+  for (const Act &act : scene.acts) {
+    const Touch held = act.tracks[0].at(act.phases[1].begin_s - act.begin_s);
+    x_max = std::max(x_max, std::abs(held.x_mm));
+    y_max = std::max(y_max, std::abs(held.y_mm));
+    force_min = std::min(force_min, held.force_N);
+    force_max = std::max(force_max, held.force_N);
+  }
+  EXPECT_LE(x_max, 6.75);
+  EXPECT_GT(x_max, 6.6);
+  EXPECT_LE(y_max, 15.75);
+  EXPECT_GT(y_max, 15.5);
+  EXPECT_LT(force_min, 1.1);
+  EXPECT_GE(force_min, 1.0);
+  EXPECT_GT(force_max, 14.9);
+  EXPECT_LE(force_max, 15.0);
+}
+
+TEST(Scenes, TwoContactsAreApartAsTold) {
+  std::set<long> distances;
+  for (const Act &act : scene_of("two").acts) {
+    ASSERT_EQ(act.tracks.size(), 2u);
+    const Touch a = act.tracks[0].at(0.4), b = act.tracks[1].at(0.4);
+    distances.insert(std::lround(std::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) * 1e6));
+    EXPECT_LE(std::abs(a.y_mm), 18.0);
+    EXPECT_LE(std::abs(b.x_mm), 10.0);
+  }
+  EXPECT_EQ(distances, (std::set<long>{6000000, 9000000, 12000000, 15000000, 18000000, 24000000,
+                                       30000000}));
+}
+
+TEST(Scenes, LongerOnesBeginAlikeAndEffectsDoNotMoveContacts) {
+  const Scene brief = scene_of("taps"), longer = scene_of("taps", [](SceneOptions &o) {
+                                         o.seconds = 300;
+                                         o.effects = parse_effects("all");
+                                         o.pad_seed = 77;
+                                       });
+  ASSERT_GT(longer.acts.size(), brief.acts.size());
+  for (std::size_t i = 0; i < brief.acts.size(); i++) {
+    EXPECT_EQ(brief.acts[i].begin_s, longer.acts[i].begin_s);
+    EXPECT_EQ(brief.acts[i].tracks[0].at(0.2), longer.acts[i].tracks[0].at(0.2));
+  }
+  const Scene other = scene_of("taps", [](SceneOptions &o) { o.seed = 2; });
+  EXPECT_FALSE(brief.acts[0].tracks[0].at(0.2) == other.acts[0].tracks[0].at(0.2));
+}
+
+TEST(Scenes, WrongOptionsAreToldInOneLine) {
+  const auto message = [](const std::string &kind, const std::function<void(SceneOptions &)> &change) {
+    try {
+      scene_of(kind, change);
+    } catch (const Error &error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  for (const std::string &text :
+       {message("slide", {}), message("taps", [](SceneOptions &o) { o.seconds = 2; }),
+        message("taps", [](SceneOptions &o) { o.seconds = 1e9; }),
+        message("taps", [](SceneOptions &o) { o.seconds = NAN; }),
+        message("taps", [](SceneOptions &o) { o.forces = "0"; }),
+        message("taps", [](SceneOptions &o) { o.forces = "1..51"; }),
+        message("taps", [](SceneOptions &o) { o.forces = "9..2"; }),
+        message("taps", [](SceneOptions &o) { o.forces = "5,"; }),
+        message("taps", [](SceneOptions &o) { o.margin_mm = -1; }),
+        message("taps", [](SceneOptions &o) { o.speeds_mm_s = {20}; }),
+        message("slip", [](SceneOptions &o) { o.speeds_mm_s = {0}; }),
+        message("slip", [](SceneOptions &o) { o.second_indenter = "cube6"; }),
+        message("slip", [](SceneOptions &o) { o.dead_travel_mm = 11; })}) {
+    EXPECT_NE(text.find("; "), std::string::npos) << text;
+    EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+  }
+}
+
+TEST(SceneFile, IsThePressureOnTheBaseWithinItsTolerance) {
+  for (const char *kind : {"taps", "slip", "rolloff"}) {
+    const Scene scene = scene_of(kind, [](SceneOptions &o) { o.seconds = 30; });
+    const File file = written(scene);
+    Random random(7, 7, 7);
+    for (int i = 0; i < 3000; i++) {
+      const double t_s = 1e-3 * std::round(random.uniform(0.0, 30000.0)); // where it was computed
+      const auto act = std::find_if(scene.acts.begin(), scene.acts.end(), [&](const Act &one) {
+        return t_s >= one.begin_s && t_s < one.end_s;
+      });
+      const bool touched = act != scene.acts.end();
+      const Touch touch = touched ? act->tracks[0].at(t_s - act->begin_s) : Touch{};
+      double peak_Pa = 0.0, expected[15];
+      for (int k = 0; k < 15; k++) {
+        expected[k] = table_of("sphere6").base_pressure_Pa(
+            touch.force_N, double(geometry.x_mm[k]) - touch.x_mm,
+            double(geometry.y_mm[k]) - touch.y_mm);
+        peak_Pa = std::max(peak_Pa, std::abs(expected[k]));
+      }
+      for (int k = 0; k < 15; k++) {
+        EXPECT_NEAR(file.at("s" + std::to_string(k) + "_Pa", t_s), expected[k],
+                    0.25 + 6e-5 * peak_Pa)
+            << kind << " " << t_s;
+      }
+      EXPECT_NEAR(file.at("force_N", t_s), touch.force_N, 2e-4 + 6e-5 * touch.force_N);
+      EXPECT_NEAR(file.at("contact", t_s), touch.force_N > 0.0, 1e-9);
+      EXPECT_NEAR(file.at("slip", t_s), touched && act->slips(t_s), 1e-9) << t_s;
+      if (touch.force_N > 0.0) {
+        EXPECT_NEAR(file.at("x_mm", t_s), touch.x_mm, 3e-3);
+        EXPECT_NEAR(file.at("y_mm", t_s), touch.y_mm, 3e-3);
+      }
+    }
+  }
+}
+
+TEST(SceneFile, IsSparseWhereNothingHappens) {
+  const File file = written(scene_of("grid"));
+  EXPECT_EQ(file.rows.front()[0], 0.0);
+  EXPECT_EQ(file.rows.back()[0], 200.0);
+  EXPECT_LT(file.bytes.size(), 60e6 * 200 / 2000);
+  for (std::size_t i = 1; i < file.rows.size(); i++) {
+    EXPECT_GT(file.rows[i][0], file.rows[i - 1][0]);
+  }
+}
+
+TEST(SceneFile, HasTheClosestGaussian) {
+  const File file = written(scene_of("taps", [](SceneOptions &o) {
+    o.seconds = 5;
+    o.forces = "10";
+  }));
+  const double p0_Pa = file.at("p0_Pa", 1.8), sigma_mm = file.at("sigma_mm", 1.8);
+  // Any other width or height leaves more of the squares.
+  const auto squares = [&](double p0, double sigma) {
+    double sum = 0.0;
+    for (double x = -36.0; x <= 36.0; x += 1.5) {
+      for (double y = -36.0; y <= 36.0; y += 1.5) {
+        const double rest = table_of("sphere6").base_pressure_Pa(10.0, x, y) -
+                            p0 * std::exp(-(x * x + y * y) / (2 * sigma * sigma));
+        sum += rest * rest;
+      }
+    }
+    return sum;
+  };
+  const double best = squares(p0_Pa, sigma_mm);
+  for (double by : {0.997, 1.003}) {
+    EXPECT_GT(squares(by * p0_Pa, sigma_mm), best);
+    EXPECT_GT(squares(p0_Pa, by * sigma_mm), best);
+  }
+  // It holds less than the force: a layer's pressure has wider tails than a Gaussian.
+  const double held = 2 * M_PI * p0_Pa * sigma_mm * sigma_mm * 1e-6 / 10.0;
+  EXPECT_GT(held, 0.85);
+  EXPECT_LT(held, 0.95);
+}
+
+TEST(SceneFile, AddsTwoContactsAndTurnsObjects) {
+  const Scene two = scene_of("two", [](SceneOptions &o) {
+    o.seconds = 5;
+    o.second_indenter = "cube6";
+  });
+  const File file = written(two);
+  const Act &act = two.acts[0];
+  const double t_s = act.begin_s + 0.4;
+  const Touch a = act.tracks[0].at(0.4), b = act.tracks[1].at(0.4);
+  for (int k = 0; k < 15; k++) {
+    const double x = double(geometry.x_mm[k]), y = double(geometry.y_mm[k]);
+    EXPECT_NEAR(file.at("s" + std::to_string(k) + "_Pa", t_s),
+                table_of("sphere6").base_pressure_Pa(a.force_N, x - a.x_mm, y - a.y_mm) +
+                    table_of("cube6").base_pressure_Pa(b.force_N, x - b.x_mm, y - b.y_mm),
+                3.0);
+  }
+  EXPECT_NEAR(file.at("force_N", t_s), a.force_N + b.force_N, 1e-3);
+  EXPECT_NEAR(file.at("x_mm", t_s),
+              (a.force_N * a.x_mm + b.force_N * b.x_mm) / (a.force_N + b.force_N), 3e-3);
+  EXPECT_EQ(file.at("p0_Pa", t_s), 0.0);
+  EXPECT_EQ(file.metadata.at("second_indenter").substr(0, 5), "cube6");
+}
+
+TEST(SceneFile, TurnsObjects) {
+  SceneOptions options;
+  options.kind = "twist";
+  options.indenter = "cube6";
+  options.seconds = 10;
+  const Scene scene = make_scene(options, table_of("cube6"));
+  const File file = written(scene);
+  // The pressure is the same after a quarter turn, another after an eighth.
+  const Act &act = scene.acts[0];
+  const Phase &twist = act.phases[2];
+  EXPECT_EQ(twist.name, "twist");
+  const auto angle = [&](double t_s) { return act.tracks[0].at(t_s - act.begin_s).angle_rad; };
+  EXPECT_NEAR(angle(twist.end_s) - angle(twist.begin_s), M_PI / 2, 1e-9);
+  const double middle_s = 0.5 * (twist.begin_s + twist.end_s);
+  double difference_Pa = 0.0, peak_Pa = 0.0;
+  for (int k = 0; k < 15; k++) {
+    const std::string name = "s" + std::to_string(k) + "_Pa";
+    EXPECT_NEAR(file.at(name, twist.begin_s), file.at(name, twist.end_s), 3.0) << k;
+    difference_Pa = std::max(difference_Pa,
+                             std::abs(file.at(name, twist.begin_s) - file.at(name, middle_s)));
+    peak_Pa = std::max(peak_Pa, file.at(name, middle_s));
+  }
+  EXPECT_GT(difference_Pa, 1e-3 * peak_Pa);
+}
+
+TEST(SceneFile, HasItsEffectsInIt) {
+  const File file = written(scene_of("taps", [](SceneOptions &o) {
+    o.seconds = 40;
+    o.effects = parse_effects("gain=5,drift=200,temperature=8");
+  }));
+  const File plain = written(scene_of("taps", [](SceneOptions &o) { o.seconds = 40; }));
+  EXPECT_EQ(file.metadata.at("effect_gain").substr(0, 4), "5 %;");
+  const auto gains = split(file.metadata.at("gain_errors_percent"), ' ');
+  const auto drifts = split(file.metadata.at("drifts_Pa_s"), ' ');
+  ASSERT_EQ(gains.size(), 15u);
+  ASSERT_EQ(drifts.size(), 15u);
+  for (double t_s : {0.0, 1.7, 15.2, 22.22, 39.9}) {
+    for (std::size_t k = 0; k < 15; k++) {
+      const std::string name = "s" + std::to_string(k) + "_Pa";
+      const double expected = plain.at(name, t_s) * (1 + 0.01 * to_double(gains[k]).value()) +
+                              to_double(drifts[k]).value() * t_s;
+      EXPECT_NEAR(file.at(name, t_s), expected, 0.5 + 2e-4 * std::abs(expected)) << t_s;
+    }
+  }
+  EXPECT_NEAR(file.at("temperature_degC", 39.9), 25 + 8 * (1 - std::exp(-39.9 / 486.3)), 0.01);
+  EXPECT_EQ(plain.column.count("temperature_degC"), 0u);
+}
+
+} // namespace
