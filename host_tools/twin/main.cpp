@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 #include <atomic>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <functional>
@@ -32,6 +33,17 @@ struct Options {
   std::vector<double> layers_mm;
 };
 
+std::atomic<bool> interrupted{false};
+
+void catch_signals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { interrupted = true; };
+  action.sa_flags = static_cast<int>(SA_RESETHAND); // a second one ends it at once
+  for (int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    sigaction(signal, &action, nullptr);
+  }
+}
+
 std::string number(double value) {
   return shortest(static_cast<float>(value));
 }
@@ -45,7 +57,11 @@ public:
       std::fprintf(stderr, "\r\x1b[K");
     }
   }
+  // Throws Error once a signal asked for the end.
   void show(double share) {
+    if (interrupted) {
+      throw Error("interrupted; what was not finished was not written");
+    }
     const int percent = static_cast<int>(100.0 * share);
     if (!shown_ || (drawn_ && percent == percent_)) {
       return;
@@ -298,6 +314,7 @@ int run(int argc, char **argv) {
   } catch (const CLI::ParseError &error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
+  catch_signals();
   return action();
 }
 

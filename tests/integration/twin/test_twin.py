@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 TWIN, TABLES = (os.path.abspath(path) for path in sys.argv[1:3])
@@ -121,6 +122,18 @@ class Files(TwinTest):
     def test_nothing_but_the_two_files_is_left(self):
         self.scene("taps", "--seconds", "5")
         self.assertEqual(sorted(os.listdir(self.folder)), ["scene.csv", "scene.truth.csv"])
+
+    def test_an_interrupt_leaves_nothing(self):
+        twin = subprocess.Popen([TWIN, "scene", "slip", "--seconds", "7200", "--effects", "all", "-o", self.csv, "--cache", TABLES],
+                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        end = time.monotonic() + PATIENCE_s
+        while not any(path.stat().st_size for path in self.folder.iterdir()):
+            self.assertLess(time.monotonic(), end)
+            time.sleep(0.01)
+        twin.send_signal(signal.SIGINT)
+        out, err = twin.communicate(timeout=PATIENCE_s)
+        self.assertEqual((twin.returncode, out, err), (1, "", "twin: interrupted; what was not finished was not written\n"))
+        self.assertEqual(os.listdir(self.folder), [])
 
     def test_a_full_disk_leaves_older_files_as_they_were(self):
         self.scene("taps", "--seconds", "5")
