@@ -90,8 +90,16 @@ Layer layer_of(double thickness_mm) {
   return silicone(thickness_mm);
 }
 
+// There and open to new tables, which take long to solve.
 std::filesystem::path cache_of(const Options &options) {
-  return options.cache.empty() ? default_cache_directory() : std::filesystem::path(options.cache);
+  const std::filesystem::path cache =
+      options.cache.empty() ? default_cache_directory() : std::filesystem::path(options.cache);
+  std::error_code error;
+  std::filesystem::create_directories(cache, error);
+  if (error || !std::filesystem::is_directory(cache) || access(cache.c_str(), W_OK | X_OK) != 0) {
+    throw Error(cache.string() + ": cannot keep contact tables here; give another --cache");
+  }
+  return cache;
 }
 
 int list() {

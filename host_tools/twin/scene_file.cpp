@@ -107,13 +107,13 @@ private:
     std::vector<std::pair<double, double>> values{
         {row.x_mm, 2e-3},
         {row.y_mm, 2e-3},
-        {row.force_N, 1e-4 + 5e-5 * row.force_N},
-        {row.p0_Pa, 0.2 + 5e-5 * row.p0_Pa},
+        {row.force_N, 1e-4 + 1e-4 * row.force_N},
+        {row.p0_Pa, 0.2 + 1e-4 * row.p0_Pa},
         {row.sigma_mm, 1e-3},
         {row.temperature_degC, 2e-3},
     };
     for (double sensor_Pa : row.sensors_Pa) {
-      values.emplace_back(sensor_Pa, 0.2 + 5e-5 * peak_Pa);
+      values.emplace_back(sensor_Pa, 0.2 + 1e-4 * peak_Pa);
     }
     return values;
   }
@@ -264,7 +264,6 @@ void describe(Text &text, const Scene &scene, const Layer &layer, const Pad &pad
   metadata(text, "truth", file_name(truth_path(path)));
 }
 
-// A path within a folder that is absent, and the like, are told before any work.
 std::string truth_of(const Scene &scene, const std::string &path) {
   Text text;
   text << "# fingertip-truth 1\n";

@@ -193,7 +193,7 @@ class Usage(TwinTest):
         blocked = self.folder / "file"
         blocked.write_text("")
         err = self.error("scene", "taps", "-o", self.csv, "--cache", str(blocked / "cache"), "--indenter", "sphere6", "--layer", "12")
-        self.assertIn("file", err)
+        self.assertIn("file/cache: cannot keep contact tables here; give another --cache", err)
 
 
 if __name__ == "__main__":

@@ -298,10 +298,10 @@ TEST(SceneFile, IsThePressureOnTheBaseWithinItsTolerance) {
       }
       for (int k = 0; k < 15; k++) {
         EXPECT_NEAR(file.at("s" + std::to_string(k) + "_Pa", t_s), expected[k],
-                    0.25 + 6e-5 * peak_Pa)
+                    0.25 + 1.1e-4 * peak_Pa)
             << kind << " " << t_s;
       }
-      EXPECT_NEAR(file.at("force_N", t_s), touch.force_N, 2e-4 + 6e-5 * touch.force_N);
+      EXPECT_NEAR(file.at("force_N", t_s), touch.force_N, 2e-4 + 1.1e-4 * touch.force_N);
       EXPECT_NEAR(file.at("contact", t_s), touch.force_N > 0.0, 1e-9);
       EXPECT_NEAR(file.at("slip", t_s), touched && act->slips(t_s), 1e-9) << t_s;
       if (touch.force_N > 0.0) {
@@ -391,7 +391,7 @@ TEST(SceneFile, TurnsObjects) {
   double difference_Pa = 0.0, peak_Pa = 0.0;
   for (int k = 0; k < 15; k++) {
     const std::string name = "s" + std::to_string(k) + "_Pa";
-    EXPECT_NEAR(file.at(name, twist.begin_s), file.at(name, twist.end_s), 3.0) << k;
+    EXPECT_NEAR(file.at(name, twist.begin_s), file.at(name, twist.end_s), 6.0) << k;
     difference_Pa = std::max(difference_Pa,
                              std::abs(file.at(name, twist.begin_s) - file.at(name, middle_s)));
     peak_Pa = std::max(peak_Pa, file.at(name, middle_s));
