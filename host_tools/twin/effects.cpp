@@ -227,7 +227,8 @@ void Pad::report(double t_s, const std::vector<double> &base_Pa, std::vector<dou
     if (!drifts_Pa_s_.empty()) {
       pressure_Pa += drifts_Pa_s_[k] * (t_s - begin_s_);
     }
-    const double excess = (ambient_Pa_ + pressure_Pa - SPECIFIED_Pa) / (RANGE_END_Pa - SPECIFIED_Pa);
+    const double excess =
+        (ambient_Pa_ + pressure_Pa - SPECIFIED_Pa) / (RANGE_END_Pa - SPECIFIED_Pa);
     if (excess > 0.0) {
       pressure_Pa -= bias_ * RANGE_END_Pa * excess * excess;
     }

@@ -2,19 +2,19 @@
 // switched on by its name and has one value; effects() is the list of them, with sources.
 //
 // In the order in which they act on the pressure p of one sensor:
-//   hysteresis   rate-independent. Loading to a new maximum m, p stays; unloading from m it is lower
-//                by 3 V p (1 - p / m), which makes the loop V of the area below the loading curve.
+//   hysteresis   rate-independent. Loading to a new maximum m, p stays; unloading from m it is
+//                lower by 3 V p (1 - p / m): the loop is V of the area below the loading curve.
 //                Loading again leads straight back to m. Nothing remains at p = 0.
-//   relaxation   linear viscoelastic, a Prony series of two times: p less the sum of g_i z_i, where
-//                z_i follows p with the time constant TIMES_s[i]. g are scaled so that a hold of 8 s
-//                after a press of 1.3 s loses V of its peak, V drawn for each sensor. No reading
+//   relaxation   linear viscoelastic, a Prony series of two times: p less the sum of g_i z_i;
+//                z_i follows p with the time constant TIMES_s[i]. g are scaled so that a hold of
+//                8 s after a press of 1.3 s loses V of its peak, V drawn for each sensor. No reading
 //                leaves the range from 0 to p: rubber does not pull.
 //   gain         p times 1 + V normal, drawn for each sensor, at most three standard deviations
 //   drift        p plus a ramp in time, drawn for each sensor: slope and sign
 //   bias         reads low above 1.2 bar absolute: by V at 2 bar, growing with the square
 //   clip         never above V absolute
-//   temperature  not in the pressure: the sensors, whose PROM corrects for it, warm up by V with the
-//                slowest time constant 4 h^2 / (pi^2 a) of a layer h warmed from above
+//   temperature  not in the pressure: the sensors, whose PROM corrects for it, warm up by V with
+//                the slowest time constant 4 h^2 / (pi^2 a) of a layer h warmed from above
 //
 // Relaxation and hysteresis act on the reported pressure while the scene's force is what it is: as
 // if the press were force-controlled and the sensor's share of the load went down. Where a robot

@@ -307,7 +307,9 @@ int run(int argc, char **argv) {
   write->add_option("--creep", s.creep_share,
                     "Share of the dead travel by which the contact moves along; default 0.5")
       ->type_name("SHARE");
-  write->add_option("--stick-slip", s.stick_slip_mm, "Slip in jumps of this size; default 0: steady")
+  write
+      ->add_option("--stick-slip", s.stick_slip_mm,
+                   "Slip in jumps of this size; default 0: steady")
       ->type_name("MM");
   write->add_option("--margin", s.margin_mm,
                     "Random places reach so far beyond the paper's grid; default 2.25")

@@ -35,7 +35,8 @@ public:
     char *end =
         std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::fixed, digits).ptr;
     // No "-0.00".
-    const bool zero = std::all_of(buffer, end, [](char c) { return c == '-' || c == '0' || c == '.'; });
+    const bool zero =
+        std::all_of(buffer, end, [](char c) { return c == '-' || c == '0' || c == '.'; });
     const std::string_view text(buffer, static_cast<std::size_t>(end - buffer));
     bytes_ += zero && text[0] == '-' ? text.substr(1) : text;
   }
@@ -315,7 +316,8 @@ BestGaussian::BestGaussian(const ContactTable &table, double layer_mm) {
   std::vector<double> pressure(SIDE * SIDE);
   for (int f = 0; f < GAUSSIAN_FORCES; f++) {
     const double force_N =
-        FORCE_MIN_N * std::pow(ContactTable::FORCE_MAX_N / FORCE_MIN_N, f / (GAUSSIAN_FORCES - 1.0));
+        FORCE_MIN_N *
+        std::pow(ContactTable::FORCE_MAX_N / FORCE_MIN_N, f / (GAUSSIAN_FORCES - 1.0));
     double squares = 0.0;
     for (int i = 0; i < SIDE; i++) {
       for (int j = 0; j < SIDE; j++) {
@@ -373,8 +375,9 @@ BestGaussian::BestGaussian(const ContactTable &table, double layer_mm) {
 }
 
 BestGaussian::Fit BestGaussian::at(double force_N) const {
-  const double at = std::log(std::clamp(force_N, FORCE_MIN_N, ContactTable::FORCE_MAX_N) / FORCE_MIN_N) *
-                    (GAUSSIAN_FORCES - 1) / std::log(ContactTable::FORCE_MAX_N / FORCE_MIN_N);
+  const double range = std::log(ContactTable::FORCE_MAX_N / FORCE_MIN_N);
+  const double within_N = std::clamp(force_N, FORCE_MIN_N, ContactTable::FORCE_MAX_N);
+  const double at = std::log(within_N / FORCE_MIN_N) * (GAUSSIAN_FORCES - 1) / range;
   const std::size_t i = std::min(static_cast<std::size_t>(at), std::size_t(GAUSSIAN_FORCES - 2));
   const double t = at - static_cast<double>(i);
   return {force_N * (p0_per_N_[i] + t * (p0_per_N_[i + 1] - p0_per_N_[i])),

@@ -44,8 +44,8 @@ std::vector<double> along(Pad &pad, const std::vector<Corner> &corners, double s
 
 TEST(Effects, NoneChangesNothing) {
   Pad pad = pad_with("none");
+  double t_s = 0.0;
   for (double base_Pa : {0.0, 12345.6, -321.0, 350000.0, 0.0}) {
-    static double t_s = 0.0;
     EXPECT_EQ(reported(pad, t_s, base_Pa), std::vector<double>(SENSORS, base_Pa));
     t_s += 1.0;
   }
@@ -74,7 +74,8 @@ TEST(Effects, RelaxationLosesItsShareInTheHoldItIsDefinedBy) {
 
 TEST(Effects, RelaxationDependsNeitherOnTheStepNorOnTheScale) {
   const std::vector<Corner> path{{0, 0}, {0.4, 9000}, {3, 9000}, {3.2, 1000}, {5, 4000}, {9, 4000}};
-  Pad fine = pad_with("relaxation"), coarse = pad_with("relaxation"), twice = pad_with("relaxation");
+  Pad fine = pad_with("relaxation"), coarse = pad_with("relaxation");
+  Pad twice = pad_with("relaxation");
   const std::vector<double> a = along(fine, path, 0.001), b = along(coarse, path, 0.1);
   std::vector<Corner> doubled = path;
   for (Corner &corner : doubled) {
@@ -97,7 +98,9 @@ TEST(Effects, RubberNeitherPullsNorGivesMore) {
     EXPECT_LE(reading, 50000.0);
     EXPECT_GE(reading, -200.0);
   }
-  const auto at = [&](double t_s) { return readings[static_cast<std::size_t>(std::lround(t_s / 0.01))]; };
+  const auto at = [&](double t_s) {
+    return readings[static_cast<std::size_t>(std::lround(t_s / 0.01))];
+  };
   EXPECT_GT(at(20.0), 0.5 * 50000.0);
   EXPECT_LT(at(20.0), 0.95 * 50000.0);
   EXPECT_EQ(at(20.5), 0.0);
@@ -227,7 +230,8 @@ TEST(Effects, AreParsed) {
   EXPECT_EQ(parse_effects("all,clip=5").at("clip"), 5.0);
   EXPECT_EQ(parse_effects("clip=5, all").at("clip"), 5.0);
   EXPECT_EQ(parse_effects("gain").at("gain"), 10.0);
-  for (const char *wrong : {"noise", "gain=", "gain=x", "gain=31", "gain=-1", "drift,,gain", "all=1"}) {
+  for (const char *wrong : {"noise", "gain=", "gain=x", "gain=31", "gain=-1", "drift,,gain",
+                            "all=1"}) {
     EXPECT_THROW(parse_effects(wrong), Error) << wrong;
   }
   try {

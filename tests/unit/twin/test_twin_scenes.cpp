@@ -251,7 +251,8 @@ TEST(Scenes, LongerOnesBeginAlikeAndEffectsDoNotMoveContacts) {
 }
 
 TEST(Scenes, WrongOptionsAreToldInOneLine) {
-  const auto message = [](const std::string &kind, const std::function<void(SceneOptions &)> &change) {
+  const auto message = [](const std::string &kind,
+                          const std::function<void(SceneOptions &)> &change) {
     try {
       scene_of(kind, change);
     } catch (const Error &error) {
