@@ -27,19 +27,6 @@ constexpr milliseconds REOPEN_INTERVAL{200};
  * without the port noticing. */
 constexpr milliseconds REVIVE_AFTER{3000};
 
-std::string utc_now() {
-  auto now = std::chrono::system_clock::now();
-  std::time_t seconds = std::chrono::system_clock::to_time_t(now);
-  auto ms = std::chrono::duration_cast<milliseconds>(now.time_since_epoch()).count() % 1000;
-  std::tm parts{};
-  gmtime_r(&seconds, &parts);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &parts);
-  char whole[48];
-  std::snprintf(whole, sizeof whole, "%s.%03dZ", text, static_cast<int>(ms));
-  return whole;
-}
-
 /* Before the port is opened, so that a wrong path costs nothing. */
 void check_outputs(const LiveOptions &options) {
   for (const std::string &path : {options.recording, options.raw_bytes}) {
@@ -248,6 +235,19 @@ private:
 };
 
 } // namespace
+
+std::string utc_now() {
+  auto now = std::chrono::system_clock::now();
+  std::time_t seconds = std::chrono::system_clock::to_time_t(now);
+  auto ms = std::chrono::duration_cast<milliseconds>(now.time_since_epoch()).count() % 1000;
+  std::tm parts{};
+  gmtime_r(&seconds, &parts);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &parts);
+  char whole[48];
+  std::snprintf(whole, sizeof whole, "%s.%03dZ", text, static_cast<int>(ms));
+  return whole;
+}
 
 int run_live(const LiveOptions &options) {
   check_outputs(options);

@@ -22,6 +22,9 @@ struct LiveOptions {
   ColourMode colour = ColourMode::automatic;
 };
 
+/* Now, as recordings write it. */
+std::string utc_now();
+
 /* Exit status. Throws Error. */
 int run_live(const LiveOptions &options);
 

@@ -1,5 +1,6 @@
 /* fingertip: the command line tool. Exit status: 0 done; 1 something went wrong, said in one line;
  * 2 wrong usage. */
+#include "cli/joint.hpp"
 #include "cli/live.hpp"
 #include "cli/replay.hpp"
 #include "libfingertip/command.hpp"
@@ -23,6 +24,8 @@ constexpr std::uint8_t SHOWN_STREAMS = WIRE_STREAM_ALL;
 
 struct Options {
   Choice choice;
+  std::vector<std::string> devices; /* to record together */
+  bool all = false;
   LiveOptions live;
   ReplayOptions replay;
   std::vector<std::string> settings;
@@ -341,11 +344,20 @@ int run(int argc, char **argv) {
         ->type_name("KIND");
     return command;
   };
-  auto with_port = [&](CLI::App *command) {
-    command
-        ->add_option("--device", options.choice.device,
-                     "Serial number of the fingertip; default: the only one there is")
-        ->type_name("SERIAL");
+  auto with_port = [&](CLI::App *command, bool several = false) {
+    if (several) {
+      command
+          ->add_option("--device", options.devices,
+                       "Serial number of the fingertip; several record on one clock")
+          ->take_all()
+          ->expected(1)
+          ->type_name("SERIAL");
+    } else {
+      command
+          ->add_option("--device", options.choice.device,
+                       "Serial number of the fingertip; default: the only one there is")
+          ->type_name("SERIAL");
+    }
     command
         ->add_option("--port", options.choice.port,
                      "Serial port or pseudo-terminal; default: $FINGERTIP_PORT, or a fingertip "
@@ -382,6 +394,23 @@ int run(int argc, char **argv) {
     return run_live(options.live);
   };
 
+  auto record_them = [&] {
+    std::vector<Way> ways;
+    if (options.all) {
+      ways = all_ways(options.choice.reach);
+    } else if (options.devices.size() > 1) {
+      for (const std::string &device : options.devices) {
+        ways.push_back(choose_way({options.choice.port, device, options.choice.reach}));
+      }
+    }
+    if (ways.empty()) {
+      options.choice.device = options.devices.empty() ? "" : options.devices[0];
+      return live(false);
+    }
+    options.live.streams = SHOWN_STREAMS;
+    return run_joint(options.live, ways);
+  };
+
   with_transport(add("list",
                      "List the fingertips plugged in, and the paths in $FINGERTIP_PORT: serial "
                      "number, board, firmware, how it is reached",
@@ -396,7 +425,9 @@ int run(int argc, char **argv) {
   with_colour(monitor, options.live.colour);
 
   CLI::App *record = with_port(
-      add("record", "Record every frame to a CSV file, until Ctrl-C", [&] { return live(false); }));
+      add("record", "Record every frame to a CSV file, until Ctrl-C", [&] { return record_them(); }),
+      true);
+  record->add_flag("--all", options.all, "Every fingertip there is, on one clock");
   record->add_option("file", options.live.recording, "The recording to write")
       ->required()
       ->type_name("FILE.csv");
@@ -413,6 +444,10 @@ int run(int argc, char **argv) {
           [&](const std::string &text) { options.replay.speed = speed_from_text(text); },
           "Times the recorded speed, or max; default 1")
       ->type_name("X|max");
+  replay
+      ->add_option("--device", options.replay.device,
+                   "Serial number of one of several fingertips in the recording")
+      ->type_name("SERIAL");
   replay->add_flag("--salvage", options.replay.salvage, "Skip damaged lines and count them");
   replay->add_option("--to-csv", options.replay.to_csv, "Write a recording instead of showing it")
       ->type_name("OUT.csv");

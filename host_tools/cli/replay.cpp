@@ -27,9 +27,9 @@ struct Playback {
 };
 
 /* Every packet of the file, until it ends or the handler throws. */
-Playback play(const std::string &file, bool salvage,
+Playback play(const ReplayOptions &options,
               const std::function<void(const wire_packet &, const LineStatistics &)> &handler) {
-  RecordingTransport transport(file, salvage);
+  RecordingTransport transport(options.file, options.salvage, options.device);
   Decoder decoder;
   std::uint8_t bytes[4096];
   std::size_t length = 0;
@@ -70,7 +70,7 @@ int convert(const ReplayOptions &options) {
   std::optional<wire_info> info;
   std::optional<std::uint8_t> sensor_count;
   std::uint64_t frames = 0;
-  play(options.file, options.salvage, [&](const wire_packet &packet, const LineStatistics &) {
+  play(options, [&](const wire_packet &packet, const LineStatistics &) {
     frames += is_frame(packet);
     if (packet.type == WIRE_INFO && !info) {
       info = packet.body.info;
@@ -88,7 +88,7 @@ int convert(const ReplayOptions &options) {
       {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"source", options.file}}, has_raw,
       OutputFile::Appears::when_finished);
   Playback playback =
-      play(options.file, options.salvage,
+      play(options,
            [&](const wire_packet &packet, const LineStatistics &) { writer.packet(packet); });
   writer.finish(playback.statistics, "converted");
   report_losses(options.file, playback);
@@ -139,7 +139,7 @@ int show(const ReplayOptions &options) {
   };
   try {
     playback =
-        play(options.file, options.salvage,
+        play(options,
              [&](const wire_packet &packet, const LineStatistics &statistics) {
                if (is_frame(packet) && options.speed > 0) {
                  auto due = pace.due(packet.t_us);

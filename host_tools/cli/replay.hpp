@@ -11,6 +11,7 @@ struct ReplayOptions {
   std::string file;
   double speed = 1; /* 0: as fast as possible */
   bool salvage = false;
+  std::string device; /* of several in the file */
   std::string to_csv; /* empty: show it */
   bool overwrite = false;
   ColourMode colour = ColourMode::automatic;

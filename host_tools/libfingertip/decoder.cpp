@@ -12,6 +12,18 @@ std::string LineStatistics::text() const {
          pair("unknown_types", unknown_types);
 }
 
+LineStatistics &LineStatistics::operator+=(const LineStatistics &other) {
+  bytes += other.bytes;
+  packets += other.packets;
+  dropped_packets += other.dropped_packets;
+  out_of_order += other.out_of_order;
+  crc_errors += other.crc_errors;
+  format_errors += other.format_errors;
+  version_errors += other.version_errors;
+  unknown_types += other.unknown_types;
+  return *this;
+}
+
 Decoder::Decoder() {
   wire_receiver_init(&receiver_);
 }

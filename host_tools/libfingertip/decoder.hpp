@@ -27,6 +27,8 @@ struct LineStatistics {
 
   /* "dropped_packets=0 crc_errors=0 ...", as recordings end with. */
   std::string text() const;
+
+  LineStatistics &operator+=(const LineStatistics &other);
 };
 
 class Decoder {

@@ -1,5 +1,6 @@
 #include "libfingertip/recording.hpp"
 
+#include "libfingertip/discovery.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/text.hpp"
@@ -17,6 +18,8 @@ namespace fingertip {
 namespace {
 
 constexpr const char *FIRST_LINE = "# fingertip-recording 1";
+constexpr const char *FIRST_LINE_JOINT = "# fingertip-recording 2";
+constexpr const char *JOINT_COLUMNS = "device,time_us,";
 constexpr double Q10 = 1024.0;
 
 /* A value of the packet that the file shows in another unit: shown = raw / scale. */
@@ -273,36 +276,26 @@ std::vector<std::pair<std::string, std::uint32_t>> health_fields(const wire_heal
   return fields;
 }
 
-RecordingWriter::RecordingWriter(const std::string &path, bool replace, const wire_info *info,
-                                 std::uint8_t sensor_count, const Metadata &extra,
-                                 bool raw_expected, OutputFile::Appears appears)
-    : file_(path, replace, appears), sensor_count_(sensor_count), raw_expected_(raw_expected) {
-  line(FIRST_LINE);
-  for (const auto &[key, value] : extra) {
-    line("# " + key + ": " + printable(value));
-  }
-  if (info) {
-    write_info(*info);
-  }
-  line(header_text(sensor_count_));
-}
+PacketLines::PacketLines(std::string path, std::uint8_t sensor_count, bool raw_expected,
+                         CommentHandler comment, RowHandler row)
+    : path_(std::move(path)), sensor_count_(sensor_count), raw_expected_(raw_expected),
+      comment_(std::move(comment)), row_(std::move(row)) {}
 
-void RecordingWriter::write_info(const wire_info &info) {
+void PacketLines::info(const wire_info &info) {
   Metadata all = info_metadata(info);
   for (const auto &pair : all) {
     if (std::find(info_.begin(), info_.end(), pair) == info_.end()) {
-      line("# " + pair.first + ": " + pair.second);
+      comment_(pair.first, pair.second);
     }
   }
   info_ = all;
 }
 
-void RecordingWriter::line(const std::string &text) {
-  std::string whole = text + "\n";
-  file_.append(whole.data(), whole.size());
+double PacketLines::seconds() const {
+  return static_cast<double>(before_restart_us_ + (first_us_ ? last_us_ - *first_us_ : 0)) / 1e6;
 }
 
-void RecordingWriter::row(const wire_packet *contact, const wire_packet *raw) {
+void PacketLines::row(const wire_packet *contact, const wire_packet *raw) {
   const wire_packet &any = contact ? *contact : *raw;
   std::uint32_t frame = contact ? contact->body.contact.frame : raw->body.raw.frame;
   RowWriter writer;
@@ -319,7 +312,7 @@ void RecordingWriter::row(const wire_packet *contact, const wire_packet *raw) {
   } else {
     writer.text += std::string(4u + 2u * sensor_count_, ',');
   }
-  line(writer.text);
+  row_(any.t_us, writer.text);
   frames_++;
   if (first_us_ && any.t_us < last_us_) {
     before_restart_us_ += last_us_ - *first_us_;
@@ -329,7 +322,7 @@ void RecordingWriter::row(const wire_packet *contact, const wire_packet *raw) {
   last_us_ = any.t_us;
 }
 
-void RecordingWriter::write_pending() {
+void PacketLines::write_pending() {
   if (pending_contact_) {
     wire_packet contact = *pending_contact_;
     pending_contact_.reset();
@@ -337,7 +330,7 @@ void RecordingWriter::write_pending() {
   }
 }
 
-void RecordingWriter::packet(const wire_packet &packet) {
+void PacketLines::packet(const wire_packet &packet) {
   wire_packet copy = packet;
   PairWriter writer;
   writer("sequence", packet.sequence);
@@ -353,7 +346,7 @@ void RecordingWriter::packet(const wire_packet &packet) {
     return;
   case WIRE_RAW:
     if (packet.body.raw.sensor_count != sensor_count_) {
-      throw Error(path() + ": the fingertip now has " +
+      throw Error(path_ + ": the fingertip now has " +
                   std::to_string(packet.body.raw.sensor_count) + " sensors instead of " +
                   std::to_string(sensor_count_) + "; start a new recording");
     }
@@ -370,38 +363,187 @@ void RecordingWriter::packet(const wire_packet &packet) {
   case WIRE_HEALTH:
     write_pending();
     visit_health(writer, copy.body.health);
-    line(std::string("# packet: ") + PACKET_HEALTH + writer.text());
+    comment_("packet", PACKET_HEALTH + writer.text());
     return;
   case WIRE_ACK:
     write_pending();
     visit_ack(writer, copy.body.ack);
-    line(std::string("# packet: ") + PACKET_ACK + writer.text());
+    comment_("packet", PACKET_ACK + writer.text());
     return;
   case WIRE_INFO:
     write_pending();
-    write_info(packet.body.info);
-    line(std::string("# packet: ") + PACKET_INFO + writer.text());
+    info(packet.body.info);
+    comment_("packet", PACKET_INFO + writer.text());
     return;
   default:
     return;
   }
 }
 
+RecordingWriter::RecordingWriter(const std::string &path, bool replace, const wire_info *info,
+                                 std::uint8_t sensor_count, const Metadata &extra,
+                                 bool raw_expected, OutputFile::Appears appears)
+    : file_(path, replace, appears),
+      lines_(
+          path, sensor_count, raw_expected,
+          [this](const std::string &key, const std::string &value) {
+            line("# " + key + ": " + value);
+          },
+          [this](std::uint64_t, const std::string &cells) { line(cells); }) {
+  line(FIRST_LINE);
+  for (const auto &[key, value] : extra) {
+    line("# " + key + ": " + printable(value));
+  }
+  if (info) {
+    lines_.info(*info);
+  }
+  line(header_text(sensor_count));
+}
+
+void RecordingWriter::line(const std::string &text) {
+  std::string whole = text + "\n";
+  file_.append(whole.data(), whole.size());
+}
+
+void RecordingWriter::packet(const wire_packet &packet) {
+  lines_.packet(packet);
+}
+
 void RecordingWriter::event(const std::string &text) {
-  write_pending();
+  lines_.write_pending();
   line("# event: " + text);
 }
 
 void RecordingWriter::finish(const LineStatistics &statistics, const std::string &reason) {
-  write_pending();
-  std::uint64_t recorded_us = before_restart_us_ + (first_us_ ? last_us_ - *first_us_ : 0);
-  line("# end: reason=" + reason + " frames=" + std::to_string(frames_) +
-       " seconds=" + fixed(static_cast<double>(recorded_us) / 1e6, 6) + " " + statistics.text());
+  lines_.write_pending();
+  line("# end: reason=" + reason + " frames=" + std::to_string(lines_.frames()) +
+       " seconds=" + fixed(lines_.seconds(), 6) + " " + statistics.text());
   file_.finish();
 }
 
-RecordingReader::RecordingReader(const std::string &path, bool salvage)
-    : path_(path), salvage_(salvage), file_(path, std::ios::binary) {
+JointRecordingWriter::JointRecordingWriter(const std::string &path, bool replace,
+                                           const std::vector<wire_info> &infos,
+                                           const Metadata &extra, std::int64_t host_zero_us,
+                                           bool raw_expected, OutputFile::Appears appears)
+    : file_(path, replace, appears), host_zero_us_(host_zero_us) {
+  std::string serials;
+  for (std::size_t i = 0; i < infos.size(); i++) {
+    if (infos[i].sensor_count != infos[0].sensor_count) {
+      throw Error("fingertips with " + std::to_string(infos[0].sensor_count) + " and " +
+                  std::to_string(infos[i].sensor_count) +
+                  " sensors do not fit into one file; record them apart");
+    }
+    serials += " " + text_field(infos[i].serial);
+    auto number = std::to_string(i);
+    devices_.emplace_back(PacketLines(
+        path, infos[i].sensor_count, raw_expected,
+        [this, number](const std::string &key, const std::string &value) {
+          line("# " + number + "/" + key + ": " + value);
+        },
+        [this, number, i](std::uint64_t t_us, const std::string &cells) {
+          const Device &device = devices_[i];
+          double host_us = device.packet_host_us +
+                           static_cast<double>(static_cast<std::int64_t>(t_us - device.packet_t_us));
+          waiting_.emplace(host_us, number + "," + time_text(host_us) + "," + cells);
+          last_us_ = std::max(last_us_, host_us);
+        }));
+  }
+  line(FIRST_LINE_JOINT);
+  line("# devices:" + serials);
+  line("# host_zero_us: " + std::to_string(host_zero_us));
+  for (const auto &[key, value] : extra) {
+    line("# " + key + ": " + printable(value));
+  }
+  for (std::size_t i = 0; i < infos.size(); i++) {
+    devices_[i].lines.info(infos[i]);
+  }
+  line(JOINT_COLUMNS + header_text(infos[0].sensor_count));
+}
+
+void JointRecordingWriter::line(const std::string &text) {
+  std::string whole = text + "\n";
+  file_.append(whole.data(), whole.size());
+}
+
+std::string JointRecordingWriter::time_text(double host_us) const {
+  return fixed(host_us - static_cast<double>(host_zero_us_), 1);
+}
+
+void JointRecordingWriter::packet(std::size_t device, const wire_packet &packet, double host_us) {
+  if (packet.type == WIRE_ACK) {
+    return;
+  }
+  devices_[device].packet_t_us = packet.t_us;
+  devices_[device].packet_host_us = host_us;
+  devices_[device].lines.packet(packet);
+}
+
+void JointRecordingWriter::event(std::size_t device, const std::string &text) {
+  devices_[device].lines.write_pending();
+  settle(std::numeric_limits<double>::infinity());
+  line("# " + std::to_string(device) + "/event: " + text);
+}
+
+void JointRecordingWriter::clock(std::size_t device, const ClockEstimate &estimate,
+                                 unsigned jumps) {
+  constexpr double interval_us = 1e6;
+  Device &state = devices_[device];
+  state.clock = estimate;
+  state.jumps = jumps;
+  std::vector<double> bounds;
+  for (const Device &each : devices_) {
+    bounds.push_back(each.clock ? each.clock->uncertainty_us : 0);
+  }
+  std::sort(bounds.rbegin(), bounds.rend());
+  alignment_us_ = std::max(alignment_us_, bounds[0] + (bounds.size() > 1 ? bounds[1] : 0));
+  if (estimate.host_us - state.clock_written_us >= interval_us) {
+    state.clock_written_us = estimate.host_us;
+    line("# " + std::to_string(device) + "/clock: t_us=" + std::to_string(estimate.device_us) +
+         " time_us=" + time_text(estimate.host_us) + " drift_ppm=" + fixed(estimate.drift_ppm, 3) +
+         " uncertainty_us=" + fixed(estimate.uncertainty_us, 1));
+  }
+}
+
+void JointRecordingWriter::settle(double host_us) {
+  while (!waiting_.empty() && waiting_.begin()->first <= host_us) {
+    line(waiting_.begin()->second);
+    waiting_.erase(waiting_.begin());
+  }
+}
+
+std::uint64_t JointRecordingWriter::frames() const {
+  std::uint64_t sum = 0;
+  for (const Device &device : devices_) {
+    sum += device.lines.frames();
+  }
+  return sum;
+}
+
+void JointRecordingWriter::finish(const std::vector<LineStatistics> &statistics,
+                                  const std::string &reason) {
+  for (Device &device : devices_) {
+    device.lines.write_pending();
+  }
+  settle(std::numeric_limits<double>::infinity());
+  LineStatistics sum;
+  for (std::size_t i = 0; i < devices_.size(); i++) {
+    const Device &device = devices_[i];
+    std::string clock = device.clock
+                            ? " drift_ppm=" + fixed(device.clock->drift_ppm, 3) +
+                                  " uncertainty_us=" + fixed(device.clock->uncertainty_us, 1)
+                            : "";
+    line("# " + std::to_string(i) + "/end: frames=" + std::to_string(device.lines.frames()) +
+         " jumps=" + std::to_string(device.jumps) + clock + " " + statistics[i].text());
+    sum += statistics[i];
+  }
+  double seconds = frames() > 0 ? (last_us_ - static_cast<double>(host_zero_us_)) / 1e6 : 0;
+  line("# end: reason=" + reason + " frames=" + std::to_string(frames()) + " seconds=" +
+       fixed(seconds, 6) + " alignment_us=" + fixed(alignment_us_, 1) + " " + sum.text());
+  file_.finish();
+}
+
+RecordingReader::RecordingReader(const std::string &path, bool salvage, const std::string &device)
+    : path_(path), salvage_(salvage), file_(path, std::ios::binary), wanted_(device) {
   if (!file_) {
     throw Error(path + ": " + std::strerror(errno) + "; check the path");
   }
@@ -409,9 +551,10 @@ RecordingReader::RecordingReader(const std::string &path, bool salvage)
   std::string first;
   std::getline(file_, first);
   line_number_ = 1;
-  if (trim(first) != FIRST_LINE) {
+  joint_ = trim(first) == FIRST_LINE_JOINT;
+  if (!joint_ && trim(first) != FIRST_LINE) {
     throw Error(path + ":1: no recording of this version; its first line must be \"" + FIRST_LINE +
-                "\"");
+                "\", or 2 for several fingertips");
   }
 }
 
@@ -453,13 +596,30 @@ void RecordingReader::read_line(const std::string &text) {
   }
   if (text[0] == '#') {
     read_comment(text);
+  } else if (header_seen_ && joint_) {
+    auto mine = number_ + ",";
+    std::size_t time = text.find(',');
+    std::size_t rest = time == std::string::npos ? time : text.find(',', time + 1);
+    if (rest == std::string::npos) {
+      throw Damage{"neither a comment nor a row"};
+    }
+    if (text.compare(0, mine.size(), mine) == 0) {
+      read_row(std::string_view(text).substr(rest + 1));
+    }
   } else if (header_seen_) {
     read_row(text);
   } else {
-    auto columns = static_cast<std::size_t>(std::count(text.begin(), text.end(), ',')) + 1;
+    std::string text_of_one = text;
+    if (joint_) {
+      if (text.rfind(JOINT_COLUMNS, 0) != 0 || number_.empty()) {
+        throw Damage{"unknown header"};
+      }
+      text_of_one = text.substr(std::string(JOINT_COLUMNS).size());
+    }
+    auto columns = static_cast<std::size_t>(std::count(text_of_one.begin(), text_of_one.end(), ',')) + 1;
     std::size_t fixed_columns = 2 + contact_columns() + 4;
     std::size_t sensors = columns > fixed_columns ? (columns - fixed_columns) / 2 : 0;
-    if (sensors > FT_MAX_SENSORS || text != header_text(static_cast<std::uint8_t>(sensors))) {
+    if (sensors > FT_MAX_SENSORS || text_of_one != header_text(static_cast<std::uint8_t>(sensors))) {
       throw Damage{"unknown header"};
     }
     sensor_count_ = static_cast<std::uint8_t>(sensors);
@@ -473,6 +633,15 @@ void RecordingReader::read_comment(const std::string &text) {
     throw Damage{"neither a comment \"# key: value\" nor a row"};
   }
   std::string key(trim(std::string_view(text).substr(1, colon - 1)));
+  if (std::size_t slash = key.find('/'); joint_ && slash != std::string::npos) {
+    if (key.compare(0, slash, number_) != 0 || key.compare(slash + 1, key.npos, "end") == 0) {
+      return;
+    }
+    key = key.substr(slash + 1);
+  } else if (joint_ && key == "devices") {
+    choose_device(text.substr(colon + 2));
+    return;
+  }
   std::string value(text.substr(colon + 2));
   Item item{};
   std::map<std::string, std::string, std::less<>> pairs;
@@ -557,7 +726,21 @@ void RecordingReader::read_comment(const std::string &text) {
   }
 }
 
-void RecordingReader::read_row(const std::string &text) {
+void RecordingReader::choose_device(const std::string &serials) {
+  auto all = split(serials, ' ');
+  for (std::size_t i = 0; i < all.size(); i++) {
+    std::string serial(trim(all[i]));
+    if (wanted_.empty() ? all.size() == 1 : is_same_serial(serial, wanted_)) {
+      number_ = std::to_string(i);
+      return;
+    }
+  }
+  throw Error(path_ + (wanted_.empty() ? ": holds several fingertips"
+                                       : ": no fingertip " + wanted_ + " in it") +
+              "; choose one with --device: " + std::string(trim(serials)));
+}
+
+void RecordingReader::read_row(std::string_view text) {
   auto cells = split(text, ',');
   std::size_t contact_count = contact_columns();
   std::size_t raw_count = 4 + 2 * std::size_t{sensor_count_};

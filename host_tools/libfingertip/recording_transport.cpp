@@ -9,7 +9,9 @@
 
 namespace fingertip {
 
-RecordingTransport::RecordingTransport(const std::string &path, bool salvage) : path_(path) {
+RecordingTransport::RecordingTransport(const std::string &path, bool salvage,
+                                       const std::string &device)
+    : path_(path) {
   bytes_.open(path, std::ios::binary);
   char start[12] = {};
   if (!bytes_ || (!bytes_.read(start, sizeof start) && !bytes_.eof())) {
@@ -19,7 +21,7 @@ RecordingTransport::RecordingTransport(const std::string &path, bool salvage) : 
   bytes_.seekg(0);
   if (std::string(start, sizeof start) == "# fingertip-") {
     bytes_.close();
-    reader_ = std::make_unique<RecordingReader>(path, salvage);
+    reader_ = std::make_unique<RecordingReader>(path, salvage, device);
   }
 }
 

@@ -18,8 +18,9 @@ inline constexpr const char *EVENT_GONE = "gone";
 
 class RecordingTransport : public Transport {
 public:
-  /* Throws Error if the file cannot be read; so does read for a damaged line, unless salvaging. */
-  RecordingTransport(const std::string &path, bool salvage);
+  /* Throws Error if the file cannot be read; so does read for a damaged line, unless salvaging.
+   * device: the serial number of one of several fingertips in the file. */
+  RecordingTransport(const std::string &path, bool salvage, const std::string &device = "");
 
   Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
               std::chrono::milliseconds timeout) override;

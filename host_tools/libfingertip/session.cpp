@@ -48,6 +48,9 @@ void Session::take(const wire_packet &packet) {
       if (!clock_ || relation.uncertainty_us < clock_->uncertainty_us) {
         clock_ = relation;
       }
+      if (exchange_handler_) {
+        exchange_handler_({sent_us, now_us, packet.t_us});
+      }
     }
     /* The sequence numbers of this exchange's attempts are consecutive. */
     auto attempt = static_cast<std::uint16_t>(ack.sequence - awaited_first_sequence_);

@@ -5,6 +5,7 @@
  */
 #pragma once
 
+#include "libfingertip/clock_fit.hpp"
 #include "libfingertip/decoder.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/transport.hpp"
@@ -36,6 +37,7 @@ std::int64_t steady_now_us();
 class Session {
 public:
   using Handler = std::function<void(const wire_packet &)>;
+  using ExchangeHandler = std::function<void(const ClockExchange &)>;
   using Tap = std::function<void(const std::uint8_t *bytes, std::size_t length)>;
 
   struct Policy {
@@ -49,6 +51,8 @@ public:
 
   void on_packet(Handler handler) { handler_ = std::move(handler); }
   void on_bytes(Tap tap) { tap_ = std::move(tap); }
+  /* Each acknowledgement as a relation of the two clocks. */
+  void on_exchange(ExchangeHandler handler) { exchange_handler_ = std::move(handler); }
 
   /* Takes what comes, waiting at most this long for it to begin. */
   Transport::Result poll(std::chrono::milliseconds timeout);
@@ -84,6 +88,7 @@ private:
   Decoder decoder_;
   Handler handler_;
   Tap tap_;
+  ExchangeHandler exchange_handler_;
   std::uint16_t sequence_ = 0;
   std::optional<ClockRelation> clock_;
 

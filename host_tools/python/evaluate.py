@@ -109,12 +109,13 @@ class Comparison:
         }
 
 
-def add_salvage_option(parser):
+def add_recording_options(parser):
     parser.add_argument("--salvage", action="store_true", help="skip damaged lines of the recording and say how many")
+    parser.add_argument("--device", metavar="SERIAL", help="one of several fingertips in the recording")
 
 
 def load_recording(options):
-    recording = read_recording(options.recording, options.salvage)
+    recording = read_recording(options.recording, options.salvage, options.device)
     if recording.skipped_lines:
         print(f"{printable(options.recording)}: {recording.skipped_lines} damaged lines skipped", file=sys.stderr)
     if not recording.end and not options.salvage:
@@ -142,7 +143,7 @@ def main(argv):
     parser.add_argument("scenario", metavar="SCENARIO.csv")
     parser.add_argument("--run", metavar="run.json", help="the emulator's report")
     parser.add_argument("-o", "--output", required=True, metavar="summary.json")
-    add_salvage_option(parser)
+    add_recording_options(parser)
     options = parser.parse_args(argv)
     check_output(options.output, options.recording, options.scenario, options.run)
     comparison = Comparison(load_recording(options), read_scenario(options.scenario), read_run(options.run))

@@ -15,6 +15,9 @@ Recording (CSV, UTF-8): what a fingertip said, written by `fingertip record`; on
     # end: key=value ...      counts of the whole recording; absent if the recorder was killed
 Cells of a packet that did not come are empty, and NaN here.
 
+Of several fingertips on one clock, format 2, written by `fingertip record --device A --device B`: see
+host_tools/libfingertip/recording.hpp. Read as the recording of one of them, with time_us, the recorder's clock.
+
 Run report (JSON): what the emulator measured; used are device_time_zero_s and warnings.
 
 Every error is an InputError whose text is one line that names file and line and says what to do.
@@ -110,12 +113,14 @@ def _number(path, line, column, cell, empty_allowed):
     return value
 
 
-def _check_kind(path, lines, kind):
+def _check_kind(path, lines, kind, formats=("1",)):
+    """The format's number."""
     first = lines[0].strip().split()
     if first[:2] != ["#", f"fingertip-{kind}"] or len(first) != 3:
         raise InputError(f'{path}:1: no {kind}; its first line must be "# fingertip-{kind} 1"')
-    if first[2] != "1":
-        raise InputError(f"{path}:1: {kind} format {first[2]} is unknown; this tool reads format 1")
+    if first[2] not in formats:
+        raise InputError(f"{path}:1: {kind} format {first[2]} is unknown; this tool reads format {' and '.join(formats)}")
+    return first[2]
 
 
 def _metadata(line):
@@ -198,10 +203,11 @@ def write_scenario(path, metadata, columns):
 
 class Recording:
     """metadata, columns (name -> array[n], NaN where empty), sensors_Pa and tare_Pa [n][sensor], events, end;
-    line_numbers[n] of the rows in the file."""
+    line_numbers[n] of the rows in the file; time_us[n] on the recorder's clock, None in a recording of one."""
 
-    def __init__(self, path, metadata, names, table, line_numbers, sensors, events, end, skipped_lines):
+    def __init__(self, path, metadata, names, table, line_numbers, sensors, events, end, skipped_lines, time_us=None):
         self.path = path
+        self.time_us = time_us
         self.line_numbers = np.array(line_numbers)
         self.metadata = metadata
         self.columns = {name: table[:, i] for i, name in enumerate(names[:len(RECORDING_COLUMNS)])}
@@ -233,9 +239,51 @@ def _end_counts(path, number, text):
     return counts
 
 
-def read_recording(path, salvage=False):
+def recorded_devices(path):
+    """Serial numbers of the fingertips in a recording of several; of one, an empty list."""
     lines = read_lines(path)
-    _check_kind(path, lines, "recording")
+    if _check_kind(path, lines, "recording", ("1", "2")) == "1":
+        return []
+    for line in lines:
+        if line.startswith("# devices:"):
+            return line.split(":", 1)[1].split()
+    raise InputError(f'{path}: no line "# devices: ..."; record anew')
+
+
+def _choose_device(path, devices, wanted):
+    """The number of the wanted fingertip."""
+    for number, serial in enumerate(devices):
+        if serial.lower() == wanted.lower() if wanted else len(devices) == 1:
+            return number
+    problem = f"no fingertip {wanted} in it" if wanted else "holds several fingertips"
+    raise InputError(f"{path}: {problem}; choose one with --device: {' '.join(devices)}")
+
+
+def _of_one_device(line, number, advice):
+    """A line of format 2 as format 1 has it, and its time; nothing for another fingertip's line."""
+    if line.startswith("#"):
+        key, separator, rest = line[1:].partition("/")
+        if separator and key.strip().isdigit():
+            mine = int(key) == number and not rest.startswith("end:")
+            return ("# " + rest if mine else None), None
+        return line, None
+    cells = line.split(",", 2)
+    if cells[:2] == ["device", "time_us"]:
+        return cells[2], None
+    if len(cells) < 3:
+        raise InputError(f"is no row; {advice}")
+    if cells[0] != str(number):
+        return None, None
+    return cells[2], _number("", 0, "time_us", cells[1], False)
+
+
+def read_recording(path, salvage=False, device=None):
+    """device: the serial number of one of several fingertips."""
+    lines = read_lines(path)
+    _check_kind(path, lines, "recording", ("1", "2"))
+    devices = recorded_devices(path)
+    number_in_file = _choose_device(path, devices, device) if devices else None
+    times_us = []
     complete = lines[-1] == ""
     metadata, header, rows, line_numbers, events, end, skipped, sensors = {}, None, [], [], [], {}, 0, 0
     advice = "use --salvage to skip damaged lines"
@@ -245,6 +293,14 @@ def read_recording(path, salvage=False):
         try:
             if number == len(lines) and not complete:
                 raise InputError(f"{path}:{number}: the last line is torn; {advice}")
+            time_us = None
+            if devices:
+                try:
+                    line, time_us = _of_one_device(line, number_in_file, advice)
+                except InputError:
+                    raise InputError(f"{path}:{number}: is no row of this recording; {advice}") from None
+                if line is None:
+                    continue
             if line.startswith("#"):
                 key, value = _metadata(line)
                 if key == "end":
@@ -269,6 +325,7 @@ def read_recording(path, salvage=False):
                 raise InputError(f"{path}:{number}: t_us is {cells[0]}; device time starts at 0; {advice}")
             rows.append(row)
             line_numbers.append(number)
+            times_us.append(time_us)
         except InputError:
             if not salvage or header is None:
                 raise
@@ -277,7 +334,8 @@ def read_recording(path, salvage=False):
         raise InputError(f"{path}: no header line; record anew")
     if not rows:
         raise InputError(f"{path}: no frames; record again while the fingertip streams")
-    return Recording(path, metadata, header, np.array(rows), line_numbers, sensors, events, end, skipped)
+    return Recording(path, metadata, header, np.array(rows), line_numbers, sensors, events, end, skipped,
+                     np.array(times_us) if devices else None)
 
 
 def read_run(path):

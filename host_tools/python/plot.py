@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import FancyBboxPatch
 
-from evaluate import Comparison, add_salvage_option, load_recording
+from evaluate import Comparison, add_recording_options, load_recording
 from fingertip_files import FIT_VALID, SLIP, InputError, check_output, read_run, read_scenario, run_tool, write_bytes
 
 INK, FAINT, TRUTH, MEASURED, SLIPPING = "#22252e", "#8a8f9c", "#b4bac6", "#1f6fd6", "#d93a3a"
@@ -128,7 +128,7 @@ def main(argv):
     parser.add_argument("--truth", metavar="SCENARIO.csv", help="the scenario that was played")
     parser.add_argument("--run", metavar="run.json", help="the emulator's report: the recording is of simulated sensors")
     parser.add_argument("-o", "--output", required=True, metavar="FILE.png")
-    add_salvage_option(parser)
+    add_recording_options(parser)
     options = parser.parse_args(argv)
     if not options.output.lower().endswith(".png"):
         raise InputError(f"{options.output}: no name of a picture; give one that ends in .png")

@@ -15,6 +15,7 @@
  *     serial=HEX       its serial number
  *     version=V        speaks this protocol version, answers nothing else
  *     clock_ppm=P      its clock is fast by so much, over the whole of its life
+ *     zero_log=FILE    writes there when its clock was zero, us of CLOCK_MONOTONIC
  *     started=S        its clock was started S seconds before
  *
  * Ends by SIGTERM, or after a minute. */
@@ -118,6 +119,14 @@ private:
     }
     wire_receiver_init(&receiver_);
     started_ = Clock::now();
+    if (!options_["zero_log"].empty()) {
+      double ago_us = static_cast<double>(number("started", 0)) * 1e6 / clock_rate();
+      std::FILE *log = std::fopen(options_["zero_log"].c_str(), "w");
+      double now_us =
+          std::chrono::duration<double, std::micro>(started_.time_since_epoch()).count();
+      std::fprintf(log, "%.3f\n", now_us - ago_us);
+      std::fclose(log);
+    }
     streams_ = 0;
     sequence_ = 0;
     frame_ = 0;
@@ -128,9 +137,11 @@ private:
     close(master_);
   }
 
+  double clock_rate() const { return 1 + static_cast<double>(number("clock_ppm", 0)) / 1e6; }
+
   std::uint64_t now_us() const {
     double us = std::chrono::duration<double, std::micro>(Clock::now() - started_).count();
-    return static_cast<std::uint64_t>(us * (1 + static_cast<double>(number("clock_ppm", 0)) / 1e6) +
+    return static_cast<std::uint64_t>(us * clock_rate() +
                                       static_cast<double>(number("started", 0)) * 1e6);
   }
 

@@ -1,6 +1,8 @@
 """The fingertip command against a fake device: usage test_cli.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
 import contextlib
+import json
 import os
+import pathlib
 import pty
 import re
 import resource
@@ -13,8 +15,20 @@ import termios
 import time
 import unittest
 
+import numpy as np
+
 FINGERTIP, FAKE_DEVICE = (os.path.abspath(path) for path in sys.argv[1:3])
 PATIENCE_s = 30
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools" / "python"))
+import fingertip_files as files  # noqa: E402
+
+
+def report(**numbers):
+    """Adds to the JSON file that FINGERTIP_REPORT names."""
+    path = os.environ.get("FINGERTIP_REPORT")
+    if path:
+        old = json.loads(pathlib.Path(path).read_text(encoding="utf-8")) if os.path.exists(path) else {}
+        pathlib.Path(path).write_text(json.dumps({**old, **numbers}, indent=2) + "\n", encoding="utf-8")
 
 
 class CliTest(unittest.TestCase):
@@ -160,6 +174,78 @@ class Several(CliTest):
             self.assertEqual(self.error("info", "--device", "CCCC"), "fingertip: no fingertip CCCC here; there are: AAAA BBBB\n")
             self.assertIn("several fingertips found; choose one with --port", self.error("info"))
             self.assertIn("is fingertip AAAA, not BBBB", self.error("info", "--port", self.port, "--device", "BBBB"))
+
+
+    ALIGNMENT_SECONDS = int(os.environ.get("FINGERTIP_ALIGNMENT_SECONDS", "3"))
+
+    def test_two_on_one_clock(self):
+        zeros = [os.path.join(self.folder, name) for name in ("zero_a", "zero_b")]
+        rates = (1 + 25e-6, 1 - 25e-6)
+        with self.device("serial=AAAA", "clock_ppm=25", "started=1000", f"zero_log={zeros[0]}"), \
+                self.device("serial=BBBB", "clock_ppm=-25", "started=7", f"zero_log={zeros[1]}", port=self.other):
+            self.run_cli("record", self.csv, "--all", "--seconds", str(self.ALIGNMENT_SECONDS))
+        one, two = (files.read_recording(self.csv, device=serial) for serial in ("AAAA", "bbbb"))
+        host_zero_us = float(one.metadata["host_zero_us"])
+        errors = []
+        for recording, zero, rate in zip((one, two), zeros, rates):
+            with open(zero, encoding="utf-8") as file:
+                zero_us = float(file.read())
+            truth_us = zero_us + recording["t_us"] / rate - host_zero_us
+            error_us = recording.time_us - truth_us
+            self.assertEqual(list(recording["frame"]), list(range(1, len(error_us) + 1)))
+            self.assertEqual(len(recording.events), 0)
+            errors.append(error_us)
+        # at each row of the one, against the other's latest error
+        both = np.concatenate([np.column_stack([r.time_us, e, np.full(len(e), i)]) for i, (r, e) in enumerate(zip((one, two), errors))])
+        both = both[np.argsort(both[:, 0], kind="stable")]
+        latest, alignment_us = [None, None], 0.0
+        for _, error, number in both:
+            latest[int(number)] = error
+            if None not in latest:
+                alignment_us = max(alignment_us, abs(latest[0] - latest[1]))
+        self.assertLess(alignment_us, 1000)
+        self.assertLessEqual(alignment_us, float(one.end["alignment_us"]) + 2)
+        self.assertEqual(one.end["dropped_packets"], "0")
+        self.assertGreater(len(errors[0]), 100 * self.ALIGNMENT_SECONDS)
+        report(alignment_us=round(alignment_us, 1), alignment_bound_us=float(one.end["alignment_us"]),
+               alignment_seconds=self.ALIGNMENT_SECONDS)
+        # rows are in order of the common clock
+        with open(self.csv, encoding="utf-8") as file:
+            times = [float(line.split(",")[1]) for line in file if line[0].isdigit()]
+        self.assertEqual(times, sorted(times))
+        # replay and conversion take one of them
+        self.assertIn("holds several fingertips; choose one with --device: AAAA BBBB", self.run_cli("replay", self.csv, status=1)[1])
+        self.assertIn("no fingertip CCCC in it", self.run_cli("replay", self.csv, "--device", "CCCC", status=1)[1])
+        self.assertIn(f" {len(errors[1])} frames in", self.run_cli("replay", self.csv, "--device", "BBBB", "--speed", "max")[0])
+        converted = os.path.join(self.folder, "c.csv")
+        self.run_cli("replay", self.csv, "--device", "BBBB", "--to-csv", converted)
+        self.assertTrue(np.array_equal(files.read_recording(converted)["t_us"], two["t_us"]))
+        self.assertEqual(files.read_recording(converted).metadata["serial"], "BBBB")
+
+    def test_one_of_two_goes_and_comes_back(self):
+        with self.device("serial=AAAA"), self.device("serial=BBBB", "vanish=100,500", port=self.other):
+            process = self.start("record", self.csv, "--all")
+            self.wait_for(lambda: os.path.exists(self.csv) and any("1/event: back" in c for c in self.rows()[1]))
+            self.wait_for(lambda: sum(row["device"] == "1" for row in self.rows()[0]) > 130)
+            process.send_signal(signal.SIGINT)
+            _, err = process.communicate(timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, 0, err)
+        self.assertIn(" of 2 fingertips, aligned to ", err)
+        one, two = (files.read_recording(self.csv, device=serial) for serial in ("AAAA", "BBBB"))
+        self.assertEqual((len(one.events), len(two.events)), (0, 2))
+        self.assertTrue((np.diff(two.time_us) > 0).all())
+        self.assertTrue((np.diff(one["frame"]) == 1).all())
+
+    def test_errors_of_several(self):
+        with self.device("serial=AAAA"), self.device("serial=AAAA", port=self.other):
+            self.assertIn("is the same fingertip as another", self.error("record", self.csv, "--all"))
+            self.assertFalse(os.path.exists(self.csv))
+            self.assertIn("--raw-bytes keeps one fingertip's line", self.error("record", self.csv, "--all", "--raw-bytes", self.ftr))
+        with self.device("serial=AAAA"), self.device("serial=BBBB", "mute=1", port=self.other):
+            self.assertIn("no answer", self.error("record", self.csv, "--all"))
+        with self.device("serial=AAAA"), self.device("serial=BBBB", port=self.other):
+            _, err = self.run_cli("record", "/dev/full", "--overwrite", "--all", status=1)
+            self.assertIn("No space left on device", err)
 
 
 class Commands(CliTest):
