@@ -112,7 +112,9 @@ export class Ms5840 extends I2cTarget {
     this.powerUp();
   }
 
+  /** The supply comes, or comes back: then the PROM reads as 0 until a reset command (assumed; drivers all reset first). */
   powerUp() {
+    this.returned = this.wasReset !== undefined;
     this.busyUntil_ns = 0;
     this.wasReset = false;
     this.conversion = null;
@@ -162,6 +164,7 @@ export class Ms5840 extends I2cTarget {
     }
     if (command >= 0xa0 && command <= 0xac && !(command & 1)) {
       let word = this.prom[(command - 0xa0) >> 1];
+      if (this.returned && !this.wasReset) word = 0;
       if (this.faults(this.index).promCorrupt) word ^= 0x0140 << ((command >> 1) & 3);
       this.output = [(word >> 8) & 0xff, word & 0xff];
       return true;
@@ -174,7 +177,8 @@ export class Ms5840 extends I2cTarget {
   }
 
   #convert(now, isPressure, osr) {
-    if (!this.wasReset) this.report.warn('ms5840', `sensor ${this.index}: conversion before the reset command that loads its PROM`);
+    // A sensor that came back hears what is meant for the others.
+    if (!this.wasReset && !this.returned) this.report.warn('ms5840', `sensor ${this.index}: conversion before the reset command that loads its PROM`);
     const interrupted = this.conversion !== null && now < this.conversion.end_ns;
     const duration_ns = osr.max_ns * this.timeFactor;
     this.conversion = { isPressure, osr, start_ns: now, end_ns: now + duration_ns, spoiled: interrupted };

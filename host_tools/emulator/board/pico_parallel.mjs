@@ -22,6 +22,8 @@ const RISE_NS = { sda: 210, scl: 254 };
 const RELEASE_TO_HIGH = Math.log(0.3) / Math.log(0.3 / 0.7);
 /** From the fall of SCL to a sensor's change of SDA: assumed; UM10204 asks for 300 ns internal hold, 900 ns to valid. */
 const SENSOR_SDA_NS = 350;
+/** A clock that was high for so long begins anew after a fault of SCL. */
+const QUIET_NS = 3000;
 /** Where in a clock's high time a glitch falls. */
 const GLITCH_AT_NS = 200;
 
@@ -62,6 +64,7 @@ export class PicoParallel {
     this.sensorsAlarm = scope.createAlarm(() => this.#sensorsPull());
     this.glitches = 0;
     this.glitchAlarm = scope.createAlarm(() => this.#glitch());
+    this.sclFaults = 0;
     this.sclFell_ns = -Infinity;
     this.sclRose_ns = -Infinity;
   }
@@ -86,7 +89,8 @@ export class PicoParallel {
       this.#resolve();
     };
     const onScl = (action) => (_, active) => {
-      this.sclCheck.excused = active;
+      this.sclFaults += active ? 1 : -1;
+      if (active) this.sclCheck.excused = true;
       for (const line of this.lines) line.fault(active);
       action(SCL, active);
       this.#resolve();
@@ -182,6 +186,7 @@ export class PicoParallel {
   }
 
   #sclFell(now) {
+    if (!this.sclFaults && now - this.sclRose_ns > QUIET_NS) this.sclCheck.excused = false;
     this.sclCheck.atLeast('tHIGH', now - this.sclRose_ns);
     this.sclCheck.atLeast('period', now - this.sclFell_ns);
     this.sclFell_ns = now;

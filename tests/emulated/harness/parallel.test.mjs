@@ -178,19 +178,31 @@ test('faults of single lines cost those sensors only', () => {
   c.fault('sensor_missing', 7, false);
   c.faulty.clear();
   c.stop();
+  c.command(0x1e);
+  c.wait_ns(3e6);
   const after = c.read16(0xa2);
   assert.equal(after.acknowledged, ALL);
   assert.deepEqual(after.words, expected);
   assert.deepEqual(c.warnings, []);
 });
 
-test('a sensor that comes back has lost what it knew: converting without a reset is noticed', () => {
+test('a sensor that comes back has no PROM before its reset', () => {
   const c = ready();
   c.fault('sensor_missing', 4);
   c.wait_ns(1e5);
   c.fault('sensor_missing', 4, false);
   assert.equal(c.command(0x44), ALL);
-  assert.deepEqual(c.warnings, ['sensor 4: conversion before the reset command that loads its PROM']);
+  assert.deepEqual(c.read16(0xa2).words, proms(c).map((word, k) => (k === 4 ? 0 : word)));
+  c.command(0x1e);
+  c.wait_ns(3e6);
+  assert.deepEqual(c.read16(0xa2).words, proms(c));
+  assert.deepEqual(c.warnings, []);
+});
+
+test('sensors that convert before their first reset are warned of', () => {
+  const c = new Controller();
+  assert.equal(c.command(0x44), ALL);
+  assert.match(c.warnings[0], /sensor 0: conversion before the reset command/);
 });
 
 test('SCL stuck: nothing moves, and the sensors are well when it is free again', () => {

@@ -1,0 +1,142 @@
+"""The release image of pico_parallel in the emulator: rate, accuracy, faults of lines, sensors, clock and host.
+
+usage: test_pico_parallel.py --image F.bin --fingertip TOOL --node NODE
+"""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "host_tools" / "python"))
+import fingertip_files  # noqa: E402
+
+TOOLS = argparse.Namespace()
+ALL = 0x7FFF
+# Noise of a conversion, rms (MS5840 datasheet), and how far a reading may be off in all: noise, and what the pressure does
+# within a millisecond.
+NOISE_Pa = {256: 11.0, 1024: 3.9}
+
+
+def encoded(*command):
+    done = subprocess.run([TOOLS.fingertip, "encode", *command], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+class Run:
+    def __init__(self, folder, name, scenario, seconds, osr, faults=()):
+        base = pathlib.Path(folder) / name
+
+        def path(suffix):
+            return base.with_suffix("." + suffix)
+
+        script = [(0.45, "dtr 1"), (0.46, encoded("stream", "contact,raw,health")), (0.47, encoded("osr", str(osr)))]
+        path("script").write_text("".join(f"{t} {what}\n" for t, what in script))
+        path("faults.json").write_text(json.dumps(list(faults)))
+        done = subprocess.run(
+            [TOOLS.node, str(ROOT / "host_tools/emulator/main.mjs"), "--board", "pico_parallel", "--image", TOOLS.image, "--scenario",
+             str(scenario), "--host-script", str(path("script")), "--capture", str(path("ftr")), "--report", str(path("run.json")),
+             "--seconds", str(seconds), "--faults", str(path("faults.json"))], capture_output=True, text=True)
+        if done.returncode != 0:
+            raise AssertionError(f"the emulator found something wrong:\n{done.stderr}")
+        self.report = json.loads(path("run.json").read_text())
+        subprocess.run([TOOLS.fingertip, "replay", str(path("ftr")), "--to-csv", str(path("csv"))], check=True, capture_output=True)
+        self.recording = fingertip_files.read_recording(path("csv"))
+        # Times since power-on.
+        self.t_s = self.recording["t_us"] * 1e-6 + self.report["device_time_zero_s"]
+        self.valid = np.nan_to_num(self.recording["valid"]).astype(int)
+
+    def between(self, from_s, to_s):
+        return (self.t_s > from_s) & (self.t_s < to_s)
+
+    def worst_error_Pa(self, scenario, ambient_Pa):
+        """Of the readings that are said to be valid, the largest deviation from the truth."""
+        truth_Pa = np.column_stack([np.interp(self.t_s, scenario.t_s, scenario.sensors_Pa[:, k]) for k in range(15)])
+        is_valid = ((self.valid[:, None] >> np.arange(15)) & 1) == 1
+        error_Pa = np.abs(self.recording.sensors_Pa - ambient_Pa - truth_Pa)
+        # Where the pressure moves, the moment of the conversion counts.
+        slope = np.abs(np.gradient(truth_Pa, self.t_s, axis=0)) * 1e-3
+        return float(np.nanmax(np.where(is_valid, error_Pa - slope, 0)))
+
+
+class PicoParallel(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.path = pathlib.Path(cls.folder.name) / "ideal.csv"
+        subprocess.run([sys.executable, str(ROOT / "host_tools/python/scenario.py"), "ideal", "-o", str(cls.path), "--seconds", "12"],
+                       check=True)
+        cls.scenario = fingertip_files.read_scenario(cls.path)
+        cls.ambient_Pa = float(cls.scenario.metadata["ambient_Pa"])
+
+    def check_rate(self, osr, at_least):
+        run = Run(self.folder.name, f"rate{osr}", self.path, 2.0, osr)
+        steady = run.between(0.6, 1.95)
+        self.assertGreaterEqual(steady.sum() / 1.35, at_least)
+        # A frame whose time a temperature conversion took holds no reading, and says so.
+        self.assertLess((run.valid[steady] != ALL).mean(), 0.05)
+        self.assertTrue(np.isin(run.valid[steady], (0, ALL)).all())
+        self.assertEqual(run.recording.end["dropped_packets"], "0")
+        self.assertEqual(run.recording.end["crc_errors"], "0")
+        self.assertEqual(run.report["i2c"]["nacks"], 0)
+        self.assertLess(run.worst_error_Pa(self.scenario, self.ambient_Pa), 7 * NOISE_Pa[osr])
+        # The frame clock is steady: of the sampling, not of the sending.
+        steps_us = np.diff(run.recording["t_us"][steady])
+        self.assertLess(np.median(np.abs(steps_us - np.median(steps_us))), 5)
+
+    def test_rate_and_readings_at_osr_256(self):
+        self.check_rate(256, 1250)
+
+    def test_rate_and_readings_at_osr_1024(self):
+        self.check_rate(1024, 410)
+
+    def test_what_befalls_one_line_costs_its_sensor_only(self):
+        first = {"line_stuck_low": 0, "sensor_missing": 5, "clock_glitch": 14}
+        second = {"line_stuck_high": 3, "sensor_dead": 8, "sda_stuck_low": 11}
+        plan = [{"type": kind, "sensor": sensor, "from_s": from_s, "to_s": from_s + 0.1}
+                for from_s, kinds in ((0.8, first), (0.9, second)) for kind, sensor in kinds.items()]
+        run = Run(self.folder.name, "lines", self.path, 2.6, 256, plan)
+        self.assertTrue((run.valid[run.between(0.7, 0.795)] == ALL).all())
+        for from_s, silent, touched in ((0.8, (0, 5), (0, 5, 14)), (0.9, (3, 8), (0, 5, 14, 3, 8, 11))):
+            during = run.between(from_s + 0.003, from_s + 0.098)
+            self.assertGreater(during.sum(), 110)
+            others = ALL & ~sum(1 << k for k in touched)
+            self.assertTrue((run.valid[during] & others == others).all())
+            self.assertTrue((run.valid[during] & sum(1 << k for k in silent) == 0).all())
+        # Sensors that were lost are asked for again every second at first.
+        after = run.valid[run.between(2.2, 2.6)]
+        self.assertGreater(len(after), 480)
+        self.assertGreater((after == ALL).mean(), 0.95)
+        self.assertLess(np.diff(run.t_s[run.t_s > 0.6]).max(), 0.012)
+        self.assertLess(run.worst_error_Pa(self.scenario, self.ambient_Pa), 7 * NOISE_Pa[256])
+
+    def test_the_stream_comes_back_after_a_stuck_clock(self):
+        plan = [{"type": "scl_stuck_low", "from_s": 0.7, "to_s": 0.75}, {"type": "scl_stuck_high", "from_s": 1.0, "to_s": 1.05}]
+        run = Run(self.folder.name, "clock", self.path, 2.5, 256, plan)
+        for fault, back_s in zip(plan, (0.15, 1.1)):
+            self.assertTrue((run.valid[run.between(fault["from_s"] + 0.003, fault["to_s"])] == 0).all())
+            after = run.valid[run.between(fault["to_s"] + back_s, fault["to_s"] + back_s + 0.1)]
+            self.assertGreater(len(after), 110, fault["type"])
+            self.assertGreater((after == ALL).mean(), 0.95, fault["type"])
+        self.assertLess(run.worst_error_Pa(self.scenario, self.ambient_Pa), 7 * NOISE_Pa[256])
+
+    def test_a_host_that_stalls_costs_frames_and_no_more(self):
+        plan = [{"type": "host_stall", "from_s": 0.8, "to_s": 1.3}]
+        run = Run(self.folder.name, "host", self.path, 1.8, 256, plan)
+        self.assertGreater(run.between(1.35, 1.75).sum(), 480)
+        self.assertGreater(int(run.recording.end["dropped_packets"]), 300)
+        self.assertLess(run.worst_error_Pa(self.scenario, self.ambient_Pa), 7 * NOISE_Pa[256])
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    for argument in ("image", "fingertip", "node"):
+        parser.add_argument(f"--{argument}", required=True)
+    _, rest = parser.parse_known_args(namespace=TOOLS)
+    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
