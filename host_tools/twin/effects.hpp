@@ -7,8 +7,8 @@
 //                Loading again leads straight back to m. Nothing remains at p = 0.
 //   relaxation   linear viscoelastic, a Prony series of two times: p less the sum of g_i z_i;
 //                z_i follows p with the time constant TIMES_s[i]. g are scaled so that a hold of
-//                8 s after a press of 1.3 s loses V of its peak, V drawn for each sensor. No reading
-//                leaves the range from 0 to p: rubber does not pull.
+//                8 s after a press of 1.3 s loses V of its peak, V drawn for each sensor. No
+//                reading leaves the range from 0 to p: rubber does not pull.
 //   gain         p times 1 + V normal, drawn for each sensor, at most three standard deviations
 //   drift        p plus a ramp in time, drawn for each sensor: slope and sign
 //   bias         reads low above 1.2 bar absolute: by V at 2 bar, growing with the square
