@@ -29,13 +29,13 @@ def encoded(*command):
 
 
 class Run:
-    def __init__(self, folder, name, scenario, seconds, osr, faults=()):
+    def __init__(self, folder, name, scenario, seconds, osr, faults=(), commands=()):
         base = pathlib.Path(folder) / name
 
         def path(suffix):
             return base.with_suffix("." + suffix)
 
-        script = [(0.45, "dtr 1"), (0.46, encoded("stream", "contact,raw,health")), (0.47, encoded("osr", str(osr)))]
+        script = [(0.45, "dtr 1"), (0.46, encoded("stream", "contact,raw,health")), (0.47, encoded("osr", str(osr))), *commands]
         path("script").write_text("".join(f"{t} {what}\n" for t, what in script))
         path("faults.json").write_text(json.dumps(list(faults)))
         done = subprocess.run(
@@ -126,12 +126,18 @@ class PicoParallel(unittest.TestCase):
             self.assertGreater((after == ALL).mean(), 0.95, fault["type"])
         self.assertLess(run.worst_error_Pa(self.scenario, self.ambient_Pa), 7 * NOISE_Pa[256])
 
-    def test_a_host_that_stalls_costs_frames_and_no_more(self):
-        plan = [{"type": "host_stall", "from_s": 0.8, "to_s": 1.3}]
-        run = Run(self.folder.name, "host", self.path, 1.8, 256, plan)
-        self.assertGreater(run.between(1.35, 1.75).sum(), 480)
-        self.assertGreater(int(run.recording.end["dropped_packets"]), 300)
-        self.assertLess(run.worst_error_Pa(self.scenario, self.ambient_Pa), 7 * NOISE_Pa[256])
+    def test_a_host_that_stalls_and_a_cable_that_is_pulled_cost_frames_and_no_more(self):
+        plan = [{"type": "host_stall", "from_s": 0.8, "to_s": 5.8}, {"type": "usb_unplug", "from_s": 6.2, "to_s": 6.4}]
+        again = [(7.0, "dtr 1"), (7.01, encoded("stream", "contact,raw,health"))]
+        run = Run(self.folder.name, "host", self.path, 7.5, 1024, plan, again)
+        for from_s, to_s in ((5.85, 6.15), (7.1, 7.5)):
+            valid = run.valid[run.between(from_s, to_s)]
+            self.assertGreater(len(valid), 400 * (to_s - from_s))
+            self.assertGreater((valid == ALL).mean(), 0.95)
+        self.assertGreater(int(run.recording.end["dropped_packets"]), 4.5 * 400)
+        self.assertEqual(run.report["reboots"], 0)
+        self.assertEqual(run.report["usb"]["enumerations"], 2)
+        self.assertLess(run.worst_error_Pa(self.scenario, self.ambient_Pa), 7 * NOISE_Pa[1024])
 
 
 if __name__ == "__main__":
