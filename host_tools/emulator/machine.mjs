@@ -21,11 +21,12 @@ export class Machine {
   /**
    * @param options image: Uint8Array; Board; scenario; seed; faults: parsed list; serial: 16 hex digits;
    *   fastEnumeration; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes);
-   *   rise_ns, onLevels: see the boards
+   *   rise_ns, onLevels: see the boards; makeClient({ host, report, onData }): what uses the USB device, CdcClient by
+   *   default
    */
   constructor({
     image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, fastEnumeration = false, allowWatchdog = false,
-    rise_ns, onLevels, onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {},
+    rise_ns, onLevels, onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {}, makeClient = (parts) => new CdcClient(parts),
   }) {
     this.image = image;
     this.Board = Board;
@@ -45,10 +46,10 @@ export class Machine {
       stimulus: (index, t_ns) => scenario.at_ns(index, t_ns), faults: () => this.faults,
     });
     this.host = new UsbHost({ scope: this.scope, report: this.report, fast: fastEnumeration, onPacket: onUsbPacket });
-    this.cdc = new CdcClient({ host: this.host, report: this.report, onData });
+    this.client = makeClient({ host: this.host, report: this.report, onData });
     this.faults = new Faults(faults, this.scope, {
       ...this.board.faultActions,
-      host_stall: (_, active) => this.cdc.setStalled(active),
+      host_stall: (_, active) => this.client.setStalled(active),
       usb_unplug: (_, active) => (active ? this.host.unplug() : this.host.plug()),
     });
     this.scope.createAlarm(() => this.#checkClock()).scheduleAt(CLOCK_CHECK_NS);

@@ -1,6 +1,7 @@
 #!/usr/bin/env node
 /** Command line of the emulator: see USAGE. */
 import { readFileSync } from 'node:fs';
+import { createInterface } from 'node:readline';
 import { parseArgs } from 'node:util';
 import { findBoard } from './board/boards.mjs';
 import { InputError, inWords } from './errors.mjs';
@@ -10,6 +11,7 @@ import { PtyPort } from './port/pty_port.mjs';
 import { DEFAULT_SERIAL, Machine } from './machine.mjs';
 import { OutputFile } from './output_file.mjs';
 import { readScenario } from './scenario.mjs';
+import { UsbRedirServer } from './usb/usbredir.mjs';
 import { VcdDump } from './vcd.mjs';
 
 const USAGE = `usage: main.mjs --image FILE.bin --board NAME --scenario FILE.csv [options]
@@ -28,8 +30,12 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
 
   --pty LINK           serve the CDC port as a pseudo-terminal, LINK is a symbolic link to it
   --wait-open          power on only when the pseudo-terminal was opened
-  --pace real|fast     real: never faster than the clock on the wall (default with --pty); fast: as fast as possible
-  --host-script FILE   without --pty: lines "TIME_S HEXBYTES", "TIME_S dtr 0|1", "TIME_S baud N", comments "#"
+  --pace real|fast     real: never faster than the clock on the wall (default with --pty and
+                       --usbredir); fast: as fast as possible
+  --usbredir WHERE     give the USB device to a virtual machine instead of the built-in host; WHERE is the path of a
+                       Unix socket or a TCP port on the loopback. QEMU: -chardev socket,id=r,path=WHERE,reconnect=1
+                       -device qemu-xhci -device usb-redir,chardev=r. Lines on stdin: "unplug", "plug"
+  --host-script FILE   with the built-in host: lines "TIME_S HEXBYTES", "TIME_S dtr 0|1", "TIME_S baud N", comments "#"
   --capture FILE       every byte received on bulk IN
 
   --bus-log FILE.csv   I2C transfers: start_ns,end_ns,muxes,address,rw,bytes,ack (muxes: their control bytes, or
@@ -42,7 +48,7 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --report FILE.json   what happened, in numbers
   --progress           a line on stderr each second
 
-Runs without --pty are the same bit for bit each time. SIGINT ends a run cleanly.
+Runs without --pty and --usbredir are the same bit for bit each time. SIGINT ends a run cleanly.
 Exit: 0 clean; 1 a warning or failure of firmware or emulation, or an output that could not be written whole,
 each printed as a line; 2 wrong usage or input.`;
 
@@ -50,7 +56,7 @@ const OPTIONS = {
   image: { type: 'string' }, board: { type: 'string' }, scenario: { type: 'string' }, seconds: { type: 'string' },
   seed: { type: 'string', default: '1' }, serial: { type: 'string', default: DEFAULT_SERIAL }, faults: { type: 'string' },
   'fast-enumeration': { type: 'boolean', default: false }, 'allow-watchdog': { type: 'boolean', default: false },
-  pty: { type: 'string' }, 'wait-open': { type: 'boolean', default: false }, pace: { type: 'string' },
+  pty: { type: 'string' }, usbredir: { type: 'string' }, 'wait-open': { type: 'boolean', default: false }, pace: { type: 'string' },
   'host-script': { type: 'string' }, capture: { type: 'string' }, 'bus-log': { type: 'string' }, 'usb-log': { type: 'string' },
   vcd: { type: 'string' }, 'vcd-from': { type: 'string', default: '0' }, 'vcd-to': { type: 'string' }, 'rise-ns': { type: 'string' },
   report: { type: 'string' }, progress: { type: 'boolean', default: false }, help: { type: 'boolean', short: 'h', default: false },
@@ -58,6 +64,8 @@ const OPTIONS = {
 
 /** Emulated time run between looks at the wall clock and the pseudo-terminal. */
 const SLICE_NS = 1e6;
+/** A virtual machine waits for each control request. */
+const USBREDIR_SLICE_NS = 200e3;
 const SLICE_BATCH_NS = 50e6;
 
 /** parseArgs takes "-1" behind "--name" for an option: join the two, so that the value is judged. */
@@ -93,9 +101,10 @@ function parseOptions(argv) {
   if (values['vcd-to'] < values['vcd-from']) throw new InputError('--vcd-to is before --vcd-from');
   if (values['rise-ns'] !== undefined) values['rise-ns'] = number('rise-ns', (v) => v >= 0 && v <= 1000, 'a rise time from 0 to 1000 ns');
   if (!/^[0-9a-fA-F]{16}$/.test(values.serial)) throw new InputError(`--serial "${values.serial}" is not 16 hexadecimal digits`);
-  values.pace ??= values.pty ? 'real' : 'fast';
+  values.pace ??= values.pty || values.usbredir ? 'real' : 'fast';
   if (!['real', 'fast'].includes(values.pace)) throw new InputError(`--pace "${values.pace}" is neither real nor fast`);
-  if (values.pty && values['host-script']) throw new InputError('--pty and --host-script exclude each other');
+  const drivers = ['pty', 'usbredir', 'host-script'].filter((name) => values[name] !== undefined);
+  if (drivers.length > 1) throw new InputError(`--${drivers[0]} and --${drivers[1]} exclude each other`);
   if (values['wait-open'] && !values.pty) throw new InputError('--wait-open needs --pty');
   return values;
 }
@@ -142,6 +151,8 @@ async function run(options) {
 
   // Before the outputs: a link that another emulator serves must not cost that one its files.
   const pty = options.pty ? await PtyPort.start(options.pty) : null;
+  const usbredir = options.usbredir ? await UsbRedirServer.start(options.usbredir) : null;
+  const cable = usbredir && createInterface({ input: process.stdin });
   let clean;
   try {
     const reportFile = output(options.report);
@@ -164,19 +175,24 @@ async function run(options) {
         : undefined,
       onUsbPacket: (p) => {
         if (options['usb-log']) usbLog.write(Buffer.from(`${p.t_ns.toFixed(0)},${p.endpoint},${p.setup ? 'setup' : p.isIn ? 'in' : 'out'},${p.data.length},${hex(p.data)}\n`));
-        if (p.isIn && p.endpoint !== 0 && p.endpoint === (machine.cdc.bound?.bulkIn.address & 15)) capture.write(p.data);
+        if (p.isIn && machine.host.isBulkIn(p.endpoint)) capture.write(p.data);
       },
       onData: (bytes) => pty?.send(bytes),
+      ...(usbredir ? { makeClient: (parts) => usbredir.attachTo(parts) } : {}),
     });
-    if (pty) pty.connect(machine.cdc);
-    else scheduleHostScript(script, machine.scope, machine.cdc);
+    cable?.on('line', (line) => {
+      if (line === 'plug' || line === 'unplug') usbredir.setPlugged(line === 'plug');
+      else process.stderr.write(`error: "${line}" on stdin is neither plug nor unplug\n`);
+    });
+    if (pty) pty.connect(machine.client);
+    else if (!usbredir) scheduleHostScript(script, machine.scope, machine.client);
 
     const end_ns = seconds * 1e9;
     const started_ms = performance.now();
     let paced_ms = started_ms;
     let paced_ns = 0;
     let shown_ms = started_ms;
-    const slice_ns = pty || options.pace === 'real' ? SLICE_NS : SLICE_BATCH_NS;
+    const slice_ns = usbredir ? USBREDIR_SLICE_NS : pty || options.pace === 'real' ? SLICE_NS : SLICE_BATCH_NS;
     for (;;) {
       const target = Math.min(end_ns, machine.time.nanos + slice_ns);
       if (!machine.run(target) || target >= end_ns) break;
@@ -219,6 +235,8 @@ async function run(options) {
   } finally {
     for (const file of outputs) file.close();
     await pty?.stop();
+    cable?.close();
+    await usbredir?.stop();
     process.off('SIGINT', onInterrupt);
     process.off('SIGTERM', onInterrupt);
   }

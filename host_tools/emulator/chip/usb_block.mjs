@@ -336,6 +336,11 @@ export class UsbBlock extends BasePeripheral {
     this.#update();
   }
 
+  resume() {
+    this.sieStatus = (this.sieStatus | ST_RESUME) & ~ST_SUSPENDED;
+    this.#update();
+  }
+
   sof(frame) {
     this.frame = frame & 0x7ff;
     this.sofPending = true;

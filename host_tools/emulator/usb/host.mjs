@@ -11,6 +11,9 @@
  *     host.pollInterrupt(endpoint, interval_ms, (data) => ...)  /  host.stopInterrupt(endpoint)
  *     host.pause(endpoint, on)                                  send it no token for a while; its transfers wait
  *     host.cancel(transfer)      host.unplug()      host.plug()
+ *     host.suspend()  /  host.resume()                          the bus idles; transfers wait
+ *     host.resetDevice(() => ...)                               transfers are cancelled; the device has an address again
+ *     host.restartToggles(addresses)                            after SET_CONFIGURATION, SET_INTERFACE, CLEAR_FEATURE(HALT)
  *
  * Status is 'ok', 'stall', 'cancelled' or 'gone'. One transaction is on the bus at a time and takes its time:
  * (payload + 13 bytes) at 12 Mbit/s, so at most 19 packets of 64 bytes in a frame. A NAKed bulk or control
@@ -24,6 +27,11 @@ const RETRY_NS = 10e3;
 const FRAME_NS = 1e6;
 const SOF_NS = 3e3;
 const CONTROL_TIMEOUT_NS = 5e9;
+const IDLE_SUSPENDS_NS = 3e6;
+/** USB 2.0, 7.1.7.7: resume signalling lasts 20 ms, and the device has 10 ms to recover. */
+const RESUME_NS = 20e6;
+const RESUME_RECOVERY_NS = 10e6;
+const ADDRESS = 5;
 
 const REALISTIC = { debounce_ns: 100e6, reset_ns: 50e6, recovery_ns: 10e6, address_ns: 10e6 };
 const FAST = { debounce_ns: 1e6, reset_ns: 10e6, recovery_ns: 1e6, address_ns: 2e6 };
@@ -85,7 +93,7 @@ export class UsbHost {
 
   unplug() {
     this.plugged = false;
-    this.suspendAlarm.schedule(3e6);
+    this.suspendAlarm.schedule(IDLE_SUSPENDS_NS);
     this.#portChange();
   }
 
@@ -93,6 +101,60 @@ export class UsbHost {
     this.plugged = true;
     this.suspendAlarm.cancel();
     this.#portChange();
+  }
+
+  /** No frame begins any more; after 3 ms of silence the device must see that it is suspended. */
+  suspend() {
+    if (this.state !== 'active' || !this.device) throw new Error('only a configured device is suspended');
+    this.state = 'suspended';
+    this.sofAlarm.cancel();
+    this.suspendAlarm.schedule(IDLE_SUSPENDS_NS);
+  }
+
+  resume() {
+    if (this.state !== 'suspended') throw new Error('the bus is not suspended');
+    this.suspendAlarm.cancel();
+    this.block.resume();
+    this.#enumeration = this.#awake();
+    this.portStep();
+  }
+
+  *#awake() {
+    this.state = 'resuming';
+    yield RESUME_NS;
+    this.sofAlarm.schedule(0);
+    yield RESUME_RECOVERY_NS;
+    this.state = 'active';
+    this.#schedule();
+  }
+
+  resetDevice(done) {
+    for (const a of [this.portAlarm, this.sofAlarm, this.busAlarm, this.retryAlarm, this.controlAlarm, this.suspendAlarm]) a.cancel();
+    const transfers = [this.controlPipe, ...this.pipes.values()].flatMap((p) => p.queue.splice(0));
+    this.running = null;
+    this.interrupts.clear();
+    for (const pipe of [this.controlPipe, ...this.pipes.values()]) {
+      pipe.toggle = 0;
+      pipe.parked_ns = null;
+      pipe.retry_ns = 0;
+    }
+    for (const t of transfers) t.done('cancelled', concat(t.got ?? []));
+    this.#enumeration = this.#readdress(done);
+    this.portStep();
+  }
+
+  *#readdress(done) {
+    yield* this.#resetBus();
+    yield* this.#setAddress();
+    done();
+  }
+
+  restartToggles(addresses = [...this.pipes.keys()]) {
+    for (const address of addresses) this.#pipe(address).toggle = 0;
+  }
+
+  isBulkIn(endpoint) {
+    return this.device?.endpoints.some((e) => e.type === 2 && e.address === (endpoint | 0x80)) ?? false;
   }
 
   get configured() {
@@ -116,6 +178,7 @@ export class UsbHost {
     for (const a of [this.portAlarm, this.sofAlarm, this.busAlarm, this.retryAlarm, this.controlAlarm]) a.cancel();
     const transfers = [...this.controlPipe.queue, ...[...this.pipes.values()].flatMap((p) => p.queue)];
     const had = this.device !== null;
+    this.#enumeration = null;
     this.#detach();
     for (const t of transfers) t.done('gone', new Uint8Array(0));
     if (had) this.onDisconnected();
@@ -139,7 +202,7 @@ export class UsbHost {
   #enumeration = null;
 
   portStep(result) {
-    const step = this.#enumeration.next(result);
+    const step = this.#enumeration?.next(result) ?? { done: true };
     if (!step.done && typeof step.value === 'number') this.portAlarm.schedule(step.value);
   }
 
@@ -167,6 +230,12 @@ export class UsbHost {
     return answer;
   }
 
+  *#setAddress() {
+    yield* this.#request('SET_ADDRESS', setupPacket(0, 5, ADDRESS, 0, 0));
+    yield this.wait.address_ns;
+    this.address = ADDRESS;
+  }
+
   *#enumerate() {
     const get = (type, index, length, language = 0) => setupPacket(0x80, 6, (type << 8) | index, language, length);
     yield* this.#resetBus();
@@ -174,9 +243,7 @@ export class UsbHost {
     if (first.length < 8 || first[1] !== 1) this.#fail(`DEVICE(64) answered ${first.length} bytes that are no device descriptor`);
     if (first[7] !== 64) this.#fail(`bMaxPacketSize0 is ${first[7]}; only 64 is modelled`);
     yield* this.#resetBus();
-    yield* this.#request('SET_ADDRESS', setupPacket(0, 5, 5, 0, 0));
-    yield this.wait.address_ns;
-    this.address = 5;
+    yield* this.#setAddress();
     const device = yield* this.#request('DEVICE(18)', get(1, 0, 18));
     if (device.length !== 18 || device[0] !== 18) this.#fail(`DEVICE(18) answered ${device.length} bytes`);
     yield* this.#request('DEVICE_QUALIFIER', get(6, 0, 10), { expectStall: true });
@@ -253,6 +320,7 @@ export class UsbHost {
     const index = queue.indexOf(transfer);
     if (index < 0) return;
     queue.splice(index, 1);
+    if (transfer.pipe === this.controlPipe && index === 0) this.controlAlarm.cancel();
     transfer.done('cancelled', concat(transfer.got ?? []));
   }
 

@@ -14,7 +14,7 @@ function session(source, steps, seconds, { onArrival = () => {}, ...options } = 
     onArrival(machine.time.nanos, bytes.length);
   };
   const machine = makeMachine(source, { onData, onUsbPacket: (p) => packets.push(p), ...options });
-  scheduleHostScript(steps, machine.scope, machine.cdc);
+  scheduleHostScript(steps, machine.scope, machine.client);
   machine.run(seconds * 1e9);
   return { machine, bytes, packets, result: machine.result };
 }
@@ -42,7 +42,7 @@ test('baud rate and DTR reach the device; a closed port is not read', () => {
   const n = bytes.length;
   assert.ok(n > 1000);
   assert.ok(bytes.every((b, i) => b === (i & 255)), 'no byte lost or repeated');
-  assert.equal(machine.cdc.baud, 1200);
+  assert.equal(machine.client.baud, 1200);
   machine.run(0.6e9);
   assert.equal(bytes.length, n);
 });

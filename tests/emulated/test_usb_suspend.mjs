@@ -1,0 +1,113 @@
+/**
+ * The release image on a bus that sleeps: suspend, resume, and a reset instead of a resume.
+ *
+ * usage: test_usb_suspend.mjs IMAGE.bin FINGERTIP
+ */
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { findBoard } from '../../host_tools/emulator/board/boards.mjs';
+import { Machine } from '../../host_tools/emulator/machine.mjs';
+import { setupPacket } from '../../host_tools/emulator/usb/host.mjs';
+import { steady } from './harness/bench.mjs';
+
+const [image, fingertip] = process.argv.slice(2);
+const streams = Buffer.from(execFileSync(fingertip, ['encode', 'stream', 'contact,raw'], { encoding: 'utf8' }).trim(), 'hex');
+const LINE_CODING_115200 = '00c20100000008';
+
+const received = [];
+const arrivals_ns = [];
+const machine = new Machine({
+  image: readFileSync(image), Board: findBoard('pico_mux'), scenario: steady(), fastEnumeration: true,
+  onData: (bytes) => received.push(Buffer.from(bytes)),
+  onUsbPacket: (p) => arrivals_ns.push(p.t_ns),
+});
+const { host, client } = machine;
+const run = (seconds) => assert.ok(machine.run(machine.time.nanos + seconds * 1e9), `${machine.endReason} ${machine.result.warnings}`);
+const count = () => received.reduce((n, bytes) => n + bytes.length, 0);
+const control = (packet) => {
+  let answer = null;
+  host.control(packet, null, (status, data) => {
+    answer = { status, data: Buffer.from(data).toString('hex') };
+  });
+  run(0.02);
+  return answer;
+};
+
+const streamFor = (seconds) => {
+  const before = count();
+  client.write(streams);
+  run(seconds);
+  assert.ok(count() > before + seconds * 20000, `${count() - before} bytes in ${seconds} s`);
+};
+
+run(0.4);
+assert.ok(host.configured);
+client.setDtr(true);
+streamFor(0.5);
+
+// Asleep and awake in mid-stream: silence, then the same configuration, and the stream when it is asked for again.
+host.suspend();
+const asleep_ns = machine.time.nanos;
+run(0.5);
+assert.ok(arrivals_ns.every((t_ns) => t_ns < asleep_ns + 1e6), 'a packet on a suspended bus');
+host.resume();
+const before = count();
+run(0.1);
+assert.equal(count(), before, 'streams end with a suspend');
+assert.deepEqual(control(setupPacket(0x80, 8, 0, 0, 1)), { status: 'ok', data: '01' });
+streamFor(0.5);
+
+// Three times in a row, the last too short for the device to notice.
+for (const seconds of [0.01, 0.3, 0.002]) {
+  host.suspend();
+  run(seconds);
+  host.resume();
+  run(0.05);
+}
+streamFor(0.3);
+
+// A host that lost its power over the night resets the device instead.
+host.suspend();
+run(0.2);
+let addressed = false;
+host.resetDevice(() => {
+  addressed = true;
+});
+run(0.1);
+assert.ok(addressed);
+assert.deepEqual(control(setupPacket(0x00, 9, 1, 0, 0)), { status: 'ok', data: '' });
+host.restartToggles();
+assert.deepEqual(control(setupPacket(0xa1, 0x21, 0, 0, 7)), { status: 'ok', data: LINE_CODING_115200 });
+client.setDtr(false);
+run(0.02);
+client.setDtr(true);
+streamFor(0.3);
+
+// Pulled while it sleeps.
+host.suspend();
+run(0.1);
+host.unplug();
+run(0.1);
+host.plug();
+run(0.2);
+assert.ok(host.configured);
+streamFor(0.3);
+
+assert.deepEqual(machine.result.warnings, []);
+assert.equal(machine.result.reboots, 0);
+const folder = mkdtempSync(join(tmpdir(), 'suspend-'));
+try {
+  const [stream, table] = [join(folder, 'stream.ftr'), join(folder, 'stream.csv')];
+  writeFileSync(stream, Buffer.concat(received));
+  execFileSync(fingertip, ['replay', stream, '--to-csv', table], { stdio: 'pipe' });
+  const end = readFileSync(table, 'utf8').trim().split('\n').at(-1);
+  process.stdout.write(`${end}\n`);
+  const [, crc, format] = /crc_errors=(\d+) format_errors=(\d+)/.exec(end);
+  // A packet under way may be cut where the bus falls asleep or the port closes, nowhere else.
+  assert.ok(Number(crc) + Number(format) <= 6, end);
+} finally {
+  rmSync(folder, { recursive: true });
+}
