@@ -7,7 +7,7 @@
 /* The longest wave, and ample time for what the caller did between now_us and the start, such as
  * checking fifteen PROMs, and for the way to the event handler. No wave waits for anything, so one
  * that is not over by then will never be. */
-#define LONGEST_us (I2C_WAVE_READ_CELLS * WAVE_CELL_ns / 1000u + 2000u)
+#define LONGEST_us (I2C_WAVE_READ_CELLS * WAVE_CELL_ns / 1000u + 700u)
 /* From the start of a read to the samples of this byte, which come in pairs, and a little later */
 #define LOOK_us(index) (uint8_t)((I2C_WAVE_CELLS_WITH_BYTE(index) + 2u) * WAVE_CELL_ns / 1000u)
 #define FREE_INTERVAL_MAX 1024u
