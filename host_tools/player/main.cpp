@@ -24,13 +24,12 @@ namespace {
 
 // Small enough that the queue of the line, 4096 bytes, does not fill up at any rate.
 constexpr std::uint64_t SLICE_us = 5000;
-constexpr double PROM_SPREAD = 0.03;
 constexpr double SECONDS_MAX = 24 * 3600;
 
 struct PlayOptions {
   std::string scenario, recording;
   std::string osr = "1024", rate = "max", slip_threshold, slip_window;
-  double noise = 1.0, seconds = 0.0;
+  double noise = 1.0, prom_spread = 3.0, seconds = 0.0;
   std::uint64_t seed = 1;
   float prior_sigma_mm = 0.0F, prior_width_mm = 0.0F;
   bool raw = false, replace = false, quiet = false;
@@ -102,7 +101,7 @@ int play(const PlayOptions &options) {
   native_fingertip_settings settings{};
   settings.seed = options.seed;
   settings.noise = options.noise;
-  settings.prom_spread = PROM_SPREAD;
+  settings.prom_spread = 0.01 * options.prom_spread;
   settings.prior_sigma_mm = options.prior_sigma_mm;
   settings.prior_width_mm = options.prior_width_mm;
   settings.world = {&scenario, pressure_Pa, temperature_degC};
@@ -316,6 +315,11 @@ int run(int argc, char **argv) {
   player->add_option("--noise", play_options.noise, "Times the datasheet's; default 1")
       ->check(CLI::Range(0.0, 1000.0))
       ->type_name("FACTOR");
+  player
+      ->add_option("--prom-spread", play_options.prom_spread,
+                   "Calibration words differ from part to part by up to this; default 3")
+      ->check(CLI::Range(0.0, 10.0))
+      ->type_name("PERCENT");
   player->add_option("--seed", play_options.seed, "Of noise and calibration; default 1")
       ->type_name("N");
   player->add_option("--seconds", play_options.seconds, "Default: to the scenario's end")
