@@ -94,6 +94,7 @@ case $1 in
       --image build/pico_mux/fit_cycles.bin -o build/report --plot host_tools/reference/fit_report.png
     say "the published experiments on the simulated fingertip"
     /usr/bin/python3 host_tools/twin/validation.py --build build/host \
-      --image build/pico_mux/fingertip-pico_mux.bin -o build/report
+      --image build/pico_mux/fingertip-pico_mux.bin -o build/report \
+      --picture host_tools/twin/validation_force.png
     ;;
 esac

@@ -19,6 +19,7 @@ import concurrent.futures
 import csv
 import json
 import pathlib
+import shutil
 import subprocess
 import sys
 import time
@@ -592,6 +593,7 @@ def main(argv):
     parser.add_argument("--build", required=True, metavar="DIR", help="of the host tools")
     parser.add_argument("--image", required=True, metavar="FILE.bin", help="firmware for pico_mux")
     parser.add_argument("-o", "--output", required=True, metavar="DIR")
+    parser.add_argument("--picture", metavar="FILE.png", help="where the picture of the force goes too")
     parser.add_argument("--tables", metavar="DIR", help="cache of the contact tables; default: contact_tables in the output")
     parser.add_argument("--seed", type=int, default=1, metavar="N")
     parser.add_argument("--scale", type=float, default=1, metavar="FACTOR", help="of the scenes' lengths; default 1")
@@ -614,6 +616,8 @@ def main(argv):
     found = figures(shop, seconds, emulated)
     write_text(out / "validation.json", json.dumps(found, indent=1) + "\n")
     draw(shop, out)
+    if options.picture:
+        shutil.copy(out / "validation_force.png", options.picture)
     write_report(shop, found, out)
     for name, goal in found["goals"].items():
         value = "-" if found[name] is None else f"{found[name]:.6g}"
