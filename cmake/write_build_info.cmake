@@ -17,10 +17,17 @@ string(REPLACE "." ", " version_bytes ${VERSION})
 file(CONFIGURE OUTPUT ${OUTPUT} CONTENT [[
 #include "config/build_info.h"
 
+/* With marks that tell an image file's identity to whoever installs it. */
+#define MARKED(name, mark, text) \
+  static const char name[] = mark text; \
+  enum { name##_at = sizeof mark - 1 }
+MARKED(git_hash, "fingertip-version=@VERSION@ fingertip-git=", "@hash@");
+MARKED(board, "fingertip-board=", "@BOARD@");
+
 const struct build_info build_info = {
     .version = {@version_bytes@},
-    .git_hash = "@hash@",
-    .board = "@BOARD@",
+    .git_hash = git_hash + git_hash_at,
+    .board = board + board_at,
     .scene = "@SCENE@",
 };
 ]] @ONLY)

@@ -1,8 +1,10 @@
 /* fingertip: the command line tool. Exit status: 0 done; 1 something went wrong, said in one line;
  * 2 wrong usage. */
+#include "cli/flash.hpp"
 #include "cli/joint.hpp"
 #include "cli/live.hpp"
 #include "cli/replay.hpp"
+#include "cli/rule.hpp"
 #include "libfingertip/command.hpp"
 #include "libfingertip/connection.hpp"
 #include "libfingertip/names.hpp"
@@ -28,6 +30,7 @@ struct Options {
   bool all = false;
   LiveOptions live;
   ReplayOptions replay;
+  FlashOptions flash;
   std::vector<std::string> settings;
   std::vector<std::string> encode;
   unsigned sequence = 0;
@@ -465,6 +468,22 @@ int run(int argc, char **argv) {
       ->type_name("KEY=VALUE");
   with_port(add("loader", "Restart into the USB loader, to install firmware",
                 [&] { return loader(options); }));
+
+  CLI::App *flash = with_port(add("flash", "Install firmware and see it come back", [&] {
+    options.flash.choice = options.choice;
+    return run_flash(options.flash);
+  }));
+  flash->add_option("image", options.flash.file, "The firmware, build/BOARD/fingertip-BOARD.uf2")
+      ->required()
+      ->type_name("IMAGE.uf2");
+  flash
+      ->add_option("--volume", options.flash.volume,
+                   "Where the loader's drive RPI-RP2 is mounted; default: found, or mounted")
+      ->type_name("FOLDER");
+  add("rule", "Print the udev rule that lets users without privileges open fingertips", [] {
+    std::fputs(UDEV_RULE, stdout);
+    return 0;
+  });
 
   CLI::App *encode_command = add("encode", "Print the frame of a command as hexadecimal digits",
                                  [&] { return encode(options); });

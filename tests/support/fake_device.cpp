@@ -12,7 +12,8 @@
  *     absent=K         sensor K is not there
  *     mute=1           never says anything
  *     refuse=1         answers every command but stream, info and health with "not now"
- *     serial=HEX       its serial number
+ *     serial=HEX       its serial number; board=NAME, git=HASH, firmware=A.B.C likewise
+ *     loader=1         ends when it is asked into the loader, by the command or by 1200 baud
  *     version=V        speaks this protocol version, answers nothing else
  *     clock_ppm=P      its clock is fast by so much, over the whole of its life
  *     zero_log=FILE    writes there when its clock was zero, us of CLOCK_MONOTONIC
@@ -46,11 +47,17 @@ class FakeDevice {
 public:
   FakeDevice(std::string link, std::map<std::string, std::string> options)
       : link_(std::move(link)), options_(std::move(options)) {
-    std::string serial = options_["serial"];
-    if (!serial.empty()) {
-      std::memset(info_.body.info.serial, 0, WIRE_TEXT_BYTES);
-      std::memcpy(info_.body.info.serial, serial.data(),
-                  std::min<std::size_t>(serial.size(), WIRE_TEXT_BYTES));
+    wire_info &info = info_.body.info;
+    set_text("serial", info.serial);
+    set_text("board", info.board);
+    set_text("git", info.git_hash);
+    std::string firmware = options_["firmware"];
+    if (!firmware.empty()) {
+      auto parts = fingertip::split(firmware, '.');
+      for (std::size_t i = 0; i < 3; i++) {
+        info.firmware_version[i] =
+            static_cast<std::uint8_t>(fingertip::to_u64(parts.at(i)).value_or(0));
+      }
     }
     power_on();
   }
@@ -92,6 +99,14 @@ private:
   long number(const char *key, long otherwise) const {
     auto option = options_.find(key);
     return option == options_.end() ? otherwise : std::atol(option->second.c_str());
+  }
+
+  void set_text(const char *key, char *field) {
+    std::string text = options_[key];
+    if (!text.empty()) {
+      std::memset(field, 0, WIRE_TEXT_BYTES);
+      std::memcpy(field, text.data(), std::min<std::size_t>(text.size(), WIRE_TEXT_BYTES));
+    }
   }
 
   void send_health() {
@@ -184,6 +199,11 @@ private:
 
   /* True if the streams changed. */
   bool serve(milliseconds timeout) {
+    termios settings;
+    if (number("loader", 0) && tcgetattr(master_, &settings) == 0 &&
+        cfgetospeed(&settings) == B1200) {
+      ended = 1;
+    }
     pollfd waiting = {master_, POLLIN, 0};
     if (poll(&waiting, 1, static_cast<int>(timeout.count())) <= 0) {
       return false;
@@ -238,6 +258,10 @@ private:
     case WIRE_CMD_INFO:
       info_.t_us = now_us();
       send(info_);
+      return false;
+    case WIRE_CMD_LOADER:
+      ended = number("loader", 0) != 0;
+      std::this_thread::sleep_for(milliseconds(50)); /* the answer is read before the port goes */
       return false;
     case WIRE_CMD_HEALTH:
       send_health();

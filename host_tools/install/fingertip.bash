@@ -1,0 +1,18 @@
+# Completion of the fingertip command for bash, from its own help.
+_fingertip() {
+  local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} words
+  if [ "$COMP_CWORD" -eq 1 ]; then
+    words=$(fingertip --help | sed -n '/^Subcommands:/,$s/^  \([a-z]*\) .*/\1/p')
+  else
+    case $before in
+      --device) words=$(fingertip list 2> /dev/null | cut -f 1) ;;
+      --transport) words='auto serial usb' ;;
+      --colour) words='auto truecolour 256 plain' ;;
+    esac
+    if [ -z "$words" ] && [ "${current#-}" != "$current" ]; then
+      words=$(fingertip "${COMP_WORDS[1]}" --help 2> /dev/null | grep -o -- '--[a-z][a-z-]*')
+    fi
+  fi
+  COMPREPLY=($(compgen -W "$words" -- "$current"))
+}
+complete -o default -F _fingertip fingertip

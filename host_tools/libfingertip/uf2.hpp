@@ -1,0 +1,22 @@
+/* Firmware images as cmake/bin2uf2.py writes them: UF2 (https://github.com/microsoft/uf2) for the
+ * boot ROM of the RP2040 (its datasheet, 2.8.4), which takes any well-formed block without a look at
+ * what it holds. */
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace fingertip {
+
+struct FirmwareImage {
+  std::vector<std::uint8_t> file; /* as it goes to the loader's drive */
+  std::string board;
+  std::string version; /* "0.1.0" */
+  std::string git_hash;
+};
+
+/* Throws Error unless the file is a whole, undamaged firmware of ours for the RP2040. */
+FirmwareImage read_firmware(const std::string &path);
+
+} // namespace fingertip
