@@ -19,7 +19,9 @@
  *     zero_log=FILE    writes there when its clock was zero, us of CLOCK_MONOTONIC
  *     started=S        its clock was started S seconds before
  *
- * Ends by SIGTERM, or after a minute. */
+ *     life=S           ends after this time, default 60
+ *
+ * Ends by SIGTERM too. */
 #include "libfingertip/command.hpp"
 #include "libfingertip/text.hpp"
 #include "support/host_packets.hpp"
@@ -64,7 +66,7 @@ public:
   ~FakeDevice() { power_off(); }
 
   void run() {
-    auto end = Clock::now() + std::chrono::minutes(1);
+    auto end = Clock::now() + std::chrono::seconds(number("life", 60));
     auto next_frame = Clock::now();
     auto interval = std::chrono::microseconds(1000000 / number("rate", 200));
     while (!ended && Clock::now() < end) {

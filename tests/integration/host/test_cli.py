@@ -27,6 +27,7 @@ def report(**numbers):
     """Adds to the JSON file that FINGERTIP_REPORT names."""
     path = os.environ.get("FINGERTIP_REPORT")
     if path:
+        os.makedirs(os.path.dirname(path), exist_ok=True)
         old = json.loads(pathlib.Path(path).read_text(encoding="utf-8")) if os.path.exists(path) else {}
         pathlib.Path(path).write_text(json.dumps({**old, **numbers}, indent=2) + "\n", encoding="utf-8")
 
@@ -63,9 +64,9 @@ class CliTest(unittest.TestCase):
         return subprocess.Popen([FINGERTIP, *arguments], env=self.environment, text=True, stdin=subprocess.DEVNULL,
                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options)
 
-    def run_cli(self, *arguments, status=0, **options):
+    def run_cli(self, *arguments, status=0, patience_s=PATIENCE_s, **options):
         process = self.start(*arguments, **options)
-        out, err = process.communicate(timeout=PATIENCE_s)
+        out, err = process.communicate(timeout=patience_s)
         self.assertEqual(process.returncode, status, (arguments, out, err))
         return out, err
 
@@ -181,9 +182,11 @@ class Several(CliTest):
     def test_two_on_one_clock(self):
         zeros = [os.path.join(self.folder, name) for name in ("zero_a", "zero_b")]
         rates = (1 + 25e-6, 1 - 25e-6)
-        with self.device("serial=AAAA", "clock_ppm=25", "started=1000", f"zero_log={zeros[0]}"), \
-                self.device("serial=BBBB", "clock_ppm=-25", "started=7", f"zero_log={zeros[1]}", port=self.other):
-            self.run_cli("record", self.csv, "--all", "--seconds", str(self.ALIGNMENT_SECONDS))
+        life = f"life={self.ALIGNMENT_SECONDS + PATIENCE_s}"
+        with self.device("serial=AAAA", "clock_ppm=25", "started=1000", f"zero_log={zeros[0]}", life), \
+                self.device("serial=BBBB", "clock_ppm=-25", "started=7", f"zero_log={zeros[1]}", life, port=self.other):
+            self.run_cli("record", self.csv, "--all", "--seconds", str(self.ALIGNMENT_SECONDS),
+                         patience_s=self.ALIGNMENT_SECONDS + PATIENCE_s)
         one, two = (files.read_recording(self.csv, device=serial) for serial in ("AAAA", "bbbb"))
         host_zero_us = float(one.metadata["host_zero_us"])
         errors = []
