@@ -364,6 +364,16 @@ class Install(CliTest):
     def commands(self):
         return re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
 
+    def test_the_build_installs_all_of_it(self):
+        build = pathlib.Path(FINGERTIP).parents[2]
+        subprocess.run(["cmake", "--install", build, "--prefix", self.folder], check=True, capture_output=True)
+        for path in ("bin/fingertip", "lib/udev/rules.d/60-fingertip.rules", "share/man/man1/fingertip.1",
+                     "share/bash-completion/completions/fingertip", "share/zsh/site-functions/_fingertip",
+                     "share/fish/vendor_completions.d/fingertip.fish"):
+            self.assertTrue(os.path.isfile(os.path.join(self.folder, path)), path)
+        with open(os.path.join(self.folder, "lib/udev/rules.d/60-fingertip.rules"), encoding="utf-8") as file:
+            self.assertEqual(file.read(), self.run_cli("rule")[0])
+
     def test_the_rule_is_for_our_ids(self):
         rule = self.run_cli("rule")[0]
         self.assertIn('ATTR{idVendor}=="1209", ATTR{idProduct}=="0001"', rule)
