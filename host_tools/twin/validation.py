@@ -152,6 +152,7 @@ class Workshop:
         self.work = out / "validation_work"
         self.work.mkdir(parents=True, exist_ok=True)
         self.indenters = set(options.indenters.split(",")) if options.indenters else None
+        self.pads = options.pads
         self.jobs, self.played = {}, {}
 
     def add(self, key, kind, indenter, layer_mm=12, seconds=120, effects="", noise=1, rate=PAPER_RATE_Hz, play=(), scene=(), raw=False):
@@ -209,22 +210,30 @@ class Workshop:
     def get(self, *key):
         return self.played.get(key)
 
+    def scenes(self, kind, indenter, level):
+        """Of every pad."""
+        return [played for key, played in self.played.items() if (key[0], *key[1:2], key[-1]) == (kind, indenter, level)]
+
 
 def plan(shop):
+    """Unequal sensors are drawn anew for each pad: one pad's luck is not what the spread costs."""
     for gain in GAINS:
         effects = f"gain={gain}" if gain else ""
-        for indenter in INDENTERS[:2]:
-            shop.add(("grid", indenter, gain), "grid", indenter, seconds=360, effects=effects)
+        pads = shop.pads if gain else 1
+        for pad in range(1, pads + 1):
+            for indenter in INDENTERS[:2]:
+                shop.add(("grid", indenter, pad, gain), "grid", indenter, seconds=360 / pads, effects=effects, scene=("--pad", pad))
+            for indenter in INDENTERS:
+                shop.add(("taps", indenter, pad, gain), "taps", indenter, seconds=600 / pads, effects=effects, scene=("--margin", 0, "--pad", pad))
+                shop.add(("stiff", indenter, pad, gain), "taps", indenter, layer_mm=6, seconds=300 / pads, effects=effects,
+                         scene=("--margin", 0, "--pad", pad), play=("--prior-sigma", SIGMA_PER_LAYER * 6, "--prior-width", PRIOR_WIDTH_mm))
         for indenter in INDENTERS:
-            shop.add(("taps", indenter, gain), "taps", indenter, seconds=600, effects=effects, scene=("--margin", 0))
-            sigma_mm = SIGMA_PER_LAYER * 6
-            shop.add(("stiff", indenter, gain), "taps", indenter, layer_mm=6, seconds=300, effects=effects, scene=("--margin", 0),
-                     play=("--prior-sigma", sigma_mm, "--prior-width", PRIOR_WIDTH_mm))
             shop.add(("high", indenter, gain), "high", indenter, seconds=150, effects=",".join(filter(None, (effects, "clip"))))
         for indenter in OBJECTS:
             shop.add(("pokes", indenter, gain), "pokes", indenter, seconds=150, effects=effects)
     for indenter in INDENTERS:
-        shop.add(("taps", indenter, "all"), "taps", indenter, seconds=300, effects="all", scene=("--margin", 0))
+        for pad in range(1, shop.pads + 1):
+            shop.add(("taps", indenter, pad, "all"), "taps", indenter, seconds=300 / shop.pads, effects="all", scene=("--margin", 0, "--pad", pad))
         shop.add(("stiff without prior", indenter, 0), "taps", indenter, layer_mm=6, seconds=300, scene=("--margin", 0))
         shop.add(("high biased", indenter, 0), "high", indenter, seconds=150, effects="clip,bias")
     shop.add(("cycle", "sphere6"), "cycle", "sphere6", seconds=120, effects="relaxation,hysteresis")
@@ -242,9 +251,9 @@ def plan(shop):
         shop.add(("other", kind), kind, "cube12" if kind == "twist" else "sphere15", seconds=60)
 
 
-def by_level(shop, first, level):
-    """error_mm, force_N, said force_N, flags of the located samples of the scenes (first, any indenter, level)."""
-    keys = [key for key in shop.played if key[0] == first and key[-1] == level]
+def by_level(shop, first, level, pad=None):
+    """error_mm, force_N, said force_N, flags of the located samples of the scenes of this kind and level, of one pad or of all."""
+    keys = [key for key in shop.played if key[0] == first and key[-1] == level and (pad is None or key[2] == pad)]
     parts = [shop.played[key] for key in keys]
     if not parts:
         return None
@@ -322,9 +331,13 @@ def figures(shop, seconds, emulated):
     for gain in GAINS:
         taps = by_level(shop, "taps", gain)
         found[f"h12_gain{gain}_median_mm"] = float(np.median(taps[0]))
-        scale = scale_of(taps[1], taps[2])
-        found[f"force_scale_gain{gain}"] = scale
-        found[f"force_mape_scaled_gain{gain}_percent"] = force_errors(taps[1], scale * taps[2])[1]
+        pads = sorted({key[2] for key in shop.played if key[0] == "taps" and key[-1] == gain})
+        per_pad = [by_level(shop, "taps", gain, pad) for pad in pads]
+        found[f"h12_gain{gain}_median_mm_per_pad"] = [float(np.median(data[0])) for data in per_pad]
+        scales = [scale_of(data[1], data[2]) for data in per_pad]  # each pad has a factor of its own
+        found[f"force_scale_gain{gain}"] = float(np.median(scales))
+        relative = np.concatenate([np.abs(scale * data[2] / data[1] - 1) for scale, data in zip(scales, per_pad)])
+        found[f"force_mape_scaled_gain{gain}_percent"] = float(100 * np.median(relative))
         if gain == 0:
             found["force_mape_raw_percent"] = force_errors(taps[1], taps[2])[1]
     stiff = by_level(shop, "stiff", 0)
@@ -366,8 +379,8 @@ class Report:
         write_text(path, "\n".join(self.lines))
 
 
-def median_std(played):
-    errors = played.error_mm[played.located()]
+def median_std(scenes):
+    errors = np.concatenate([played.error_mm[played.located()] for played in scenes])
     return f"{np.median(errors):.3f} / {np.std(errors):.3f}"
 
 
@@ -386,14 +399,16 @@ def write_report(shop, found, out):
         (f"`{name}`", "-" if found[name] is None else f"{found[name]:.4g}", goal["goal"], {True: "met", False: "**missed**", None: "not measured"}[goal["met"]])
         for name, goal in found["goals"].items()])
 
-    r.text("## Where: localisation", "Median / standard deviation of the error in mm, samples of at least 1 N (paper: table II).")
+    r.text("## Where: localisation", "Median / standard deviation of the error in mm, samples of at least 1 N (paper: table II). Unequal sensors: "
+           f"{shop.pads} pads, medians of their taps {min(found['h12_gain10_median_mm_per_pad']):.2f} to "
+           f"{max(found['h12_gain10_median_mm_per_pad']):.2f} mm.")
     rows = []
     for kind, label in (("grid", "Sampling grid"), ("taps", "Random taps, 1 to 15 N")):
         for indenter in INDENTERS:
             paper = PAPER_LOCATION_mm.get((kind, indenter))
-            cells = [shop.get(kind, indenter, level) for level in (*GAINS, "all")]
+            cells = [shop.scenes(kind, indenter, level) for level in (*GAINS, "all")]
             if paper and any(cells):
-                rows.append((label, NAMES[indenter], f"{paper[0]} / {paper[1]}", *("-" if c is None else median_std(c) for c in cells)))
+                rows.append((label, NAMES[indenter], f"{paper[0]} / {paper[1]}", *(median_std(c) if c else "-" for c in cells)))
     r.table(("", "", "paper", "simulated, equal sensors", "simulated, gain spread 10 %", "simulated, every effect"), rows)
     shares = []
     for level in GAINS:
@@ -527,10 +542,11 @@ def draw(shop, out):
     grey, blue, orange = "#8a8f9c", "#2463a8", "#e07b39"
     figure, axes = plt.subplots(2, 2, figsize=(11, 7.5), layout="constrained")
     for axis, key, title in ((axes[0, 0], ("taps", "sphere6", 10), "(a) taps, small sphere"), (axes[0, 1], ("pokes", "ping_pong", 10), "(b) ping-pong ball")):
-        played = shop.get(*key)
-        if played is None:
+        scenes = shop.scenes(*key)
+        if not scenes:
             axis.set_axis_off()
             continue
+        played = scenes[0]
         shown = (played.time_s > 20) & (played.time_s < 40)
         axis.plot(played.time_s[shown], played.force_N[shown], color=orange, label="true")
         axis.plot(played.time_s[shown], played.said["force_N"][shown], ".-", color=blue, ms=3, lw=0.8, label="estimated")
@@ -597,9 +613,12 @@ def main(argv):
     parser.add_argument("--tables", metavar="DIR", help="cache of the contact tables; default: contact_tables in the output")
     parser.add_argument("--seed", type=int, default=1, metavar="N")
     parser.add_argument("--scale", type=float, default=1, metavar="FACTOR", help="of the scenes' lengths; default 1")
+    parser.add_argument("--pads", type=int, default=8, metavar="N", help="with unequal sensors; default 8")
     parser.add_argument("--indenters", metavar="NAME,...", help="only scenes with these; sphere6 must be among them")
     parser.add_argument("--emulated-seconds", type=float, default=12, metavar="S", help="of the image on the emulated chip; default 12")
     options = parser.parse_args(argv)
+    if not 1 <= options.pads <= 100:
+        raise InputError(f"--pads {options.pads} is out of range; give 1 to 100")
     if not 0.01 <= options.scale <= 100:
         raise InputError(f"--scale {options.scale:g} is out of range; give 0.01 to 100")
     out = pathlib.Path(options.output)

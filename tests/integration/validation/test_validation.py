@@ -17,7 +17,7 @@ OPTIONS = argparse.Namespace()
 def validate(folder, *more):
     return subprocess.run(
         [sys.executable, str(ROOT / "host_tools/twin/validation.py"), "--build", OPTIONS.build, "--image", OPTIONS.image, "-o", str(folder),
-         "--tables", str(pathlib.Path(OPTIONS.build) / "tests/contact_tables"), "--indenters", "sphere6,cube6,sphere12", "--scale", "0.05",
+         "--tables", str(pathlib.Path(OPTIONS.build) / "tests/contact_tables"), "--indenters", "sphere6,cube6,sphere12", "--scale", "0.05", "--pads", "2",
          "--emulated-seconds", "4", *more], capture_output=True, text=True)
 
 
@@ -41,6 +41,7 @@ class Validation(unittest.TestCase):
         self.assertLess(self.found["h12_gain0_median_mm"], 0.12)
         self.assertGreater(self.found["h12_gain10_median_mm"], 2 * self.found["h12_gain0_median_mm"])
         self.assertLess(self.found["h12_gain10_median_mm"], 0.6)
+        self.assertEqual(len(self.found["h12_gain10_median_mm_per_pad"]), 2)
 
     def test_force_is_low_by_one_factor(self):
         self.assertAlmostEqual(self.found["force_mape_raw_percent"], 9.3, delta=1.5)
