@@ -92,7 +92,8 @@ void ms5840_compensate_temperature(const struct ms5840_prom *prom, uint32_t d2,
  * shifted right by 10 it is the datasheet's P in Pa. About 130 Cortex-M0+ cycles. */
 int32_t ms5840_compensate_pressure(const struct ms5840_thermal *thermal, uint32_t d1);
 
-/* Beyond the extended range the reading is biased low. */
-#define MS5840_MAX_PRESSURE_Pa 200000
+/* The extended range ends at 2 bar, beyond which a reading is biased low. Readings count as beyond
+ * it from 1 % before: a part whose readings end right there must not pass by its noise. */
+#define MS5840_MAX_PRESSURE_Pa 198000
 
 #endif

@@ -104,7 +104,7 @@ struct wire_raw {
   uint32_t frame;
   uint32_t valid;         /* bitmap: the reading is a measurement; 0 in a held frame, whose readings
                              are those of the frame before */
-  uint32_t saturated;     /* bitmap: beyond 2000 mbar, where the sensor reads low */
+  uint32_t saturated;     /* bitmap: above 1980 mbar, where the sensor's range ends */
   int16_t temperature_cC; /* mean of the sensors, 0.01 degC; 0 until first measured */
   uint8_t sensor_count;   /* 1..FT_MAX_SENSORS */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* absolute, 1/1024 Pa */

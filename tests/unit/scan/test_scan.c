@@ -196,13 +196,13 @@ static void test_frame_contents(void) {
   TEST_ASSERT_EQUAL_UINT32(0, value_of(&scan.counters.bus_nacks));
 }
 
-static void test_saturation_is_reported_beyond_two_bar(void) {
+static void test_saturation_is_reported_at_the_end_of_the_range(void) {
   next_frame();
   uint32_t low = 0;
   uint32_t high = 0xFFFFFF;
-  while (high - low > 1) { /* the greatest code up to 200 kPa */
+  while (high - low > 1) { /* the greatest code that passes */
     fake.d1[DISTURBED] = (low + high) / 2;
-    *(expected_Pa_q10(DISTURBED) > 200000 * 1024 ? &high : &low) = fake.d1[DISTURBED];
+    *(expected_Pa_q10(DISTURBED) > MS5840_MAX_PRESSURE_Pa * 1024 ? &high : &low) = fake.d1[DISTURBED];
   }
   fake.d1[DISTURBED] = low;
   skip_frames(2);
@@ -897,7 +897,7 @@ int main(void) {
   RUN_TEST(test_settings_outside_their_range);
   RUN_TEST(test_start_up_sequence);
   RUN_TEST(test_frame_contents);
-  RUN_TEST(test_saturation_is_reported_beyond_two_bar);
+  RUN_TEST(test_saturation_is_reported_at_the_end_of_the_range);
   RUN_TEST(test_waits_at_every_osr);
   RUN_TEST(test_prom_misread_once_is_read_again);
   RUN_TEST(test_prom_with_differing_crc_is_used_and_reported);
