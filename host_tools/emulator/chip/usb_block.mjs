@@ -55,6 +55,8 @@ export class UsbBlock extends BasePeripheral {
     this.buffStatus = 0;
     this.epAbort = 0;
     this.epAbortDone = 0;
+    /** The endpoint whose IN packet is on the bus: an abort of it is done when the packet is through. */
+    this.inFlight = 0;
     this.stallArm = 0;
     this.stallNak = 0;
     this.muxing = 0;
@@ -174,7 +176,7 @@ export class UsbBlock extends BasePeripheral {
         break;
       case 0x60:
         this.epAbort = value >>> 0;
-        this.epAbortDone |= this.epAbort;
+        this.epAbortDone |= this.epAbort & ~this.inFlight;
         break;
       case 0x64:
         this.epAbortDone &= ~this.rawWriteValue;
@@ -251,7 +253,7 @@ export class UsbBlock extends BasePeripheral {
     const isOut = (word & 4) !== 0;
     const name = `EP${endpoint} ${isOut ? 'OUT' : 'IN'} buffer control`;
     const bit = 2 * endpoint + (isOut ? 1 : 0);
-    const ownerMayTake = endpoint === 0 || this.quiet || ((this.epAbort >>> bit) & 1) !== 0;
+    const ownerMayTake = endpoint === 0 || this.quiet || ((this.epAbortDone >>> bit) & 1) !== 0;
     for (const half of [0, 1]) {
       const was = (old >>> (16 * half)) & 0xffff;
       const is = (next >>> (16 * half)) & 0xffff;
@@ -324,7 +326,15 @@ export class UsbBlock extends BasePeripheral {
     return this.attached && address === this.address;
   }
 
+  /** The packet on the bus is through, or the line went dead under it. */
+  endTransaction() {
+    this.epAbortDone |= this.epAbort & this.inFlight;
+    this.inFlight = 0;
+    this.#update();
+  }
+
   busReset() {
+    this.endTransaction();
     this.quiet = true;
     this.resetDone = true;
     this.sieStatus = (this.sieStatus | ST_BUS_RESET | ST_CONNECTED) & ~ST_SUSPENDED;
@@ -364,12 +374,16 @@ export class UsbBlock extends BasePeripheral {
     if (!buffer) return { answer: 'none' };
     if (this.#stalls(buffer, endpoint, true)) return { answer: 'stall' };
     if (!(buffer.value & BC_AVAILABLE) || (this.epAbort >>> buffer.bit) & 1) return { answer: 'nak' };
+    this.inFlight = 1 << buffer.bit;
     const data = this.rp2040.usbDPRAM.slice(buffer.address, buffer.address + (buffer.value & BC_LENGTH));
     return {
       answer: 'data',
       pid: buffer.value & BC_PID ? 1 : 0,
       data,
-      acknowledged: () => this.#complete(buffer, endpoint, buffer.value & ~(BC_AVAILABLE | BC_FULL)),
+      acknowledged: () => {
+        this.#complete(buffer, endpoint, buffer.value & ~(BC_AVAILABLE | BC_FULL));
+        this.endTransaction();
+      },
     };
   }
 

@@ -179,6 +179,7 @@ export class UsbHost {
     const transfers = [...this.controlPipe.queue, ...[...this.pipes.values()].flatMap((p) => p.queue)];
     const had = this.device !== null;
     this.#enumeration = null;
+    if (this.running) this.block.endTransaction();
     this.#detach();
     for (const t of transfers) t.done('gone', new Uint8Array(0));
     if (had) this.onDisconnected();
