@@ -33,6 +33,9 @@ xz xz-utils
 arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/lib/arm-none-eabi/newlib/nano.specs libnewlib-arm-none-eabi
 qemu-system-arm qemu-system-arm
+qemu-system-x86_64 qemu-system-x86
+/bin/busybox busybox-static
+lsusb usbutils
 sigrok-cli sigrok-cli
 /usr/include/ceres/ceres.h libceres-dev
 /usr/include/fftw3.h libfftw3-dev

@@ -1,0 +1,392 @@
+"""The emulated device judged by a stock Debian kernel, and the host tool run on that kernel.
+
+usage: test_linux.py --image F.bin --fingertip TOOL --node NODE --cache FOLDER --report usb.json
+
+The tests are one story and run in order: a first boot of the device streams over the serial port and ends with the
+boot loader request, a second one over libusb and ends with a 1200-baud touch. Exit: 77 if this machine cannot run it.
+"""
+import argparse
+import csv
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import zlib
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path.insert(0, str(HERE))
+import guest as virtual  # noqa: E402
+
+TOOLS = argparse.Namespace()
+REPORT = {}
+SERIAL = "E660583883265A2C"
+VENDOR_PRODUCT = "1209:0001"
+SKIPPED = 77
+PACKETS = 10000
+STREAM_s = 25  # 2 packets for each of 207 frames a second
+SERIAL_CYCLES = 12
+LIBUSB_CYCLES = 8
+# Seconds on the wall, for a machine that emulates at a tenth of real time
+PATIENCE_s = 60
+STREAM_LIMIT_s = 10 * STREAM_s
+KERNEL_WARNING = 4
+CONTACT, RAW = 0x01, 0x02
+
+
+def cobs_decode(coded):
+    plain = bytearray()
+    at = 0
+    while at < len(coded):
+        code = coded[at]
+        plain += coded[at + 1:at + code]
+        at += code
+        if code < 0xFF and at < len(coded):
+            plain.append(0)
+    return bytes(plain)
+
+
+def packets_of(stream):
+    """(type, sequence, body) of each good packet, and how many frames were damaged. The first frame may be cut."""
+    packets, damaged = [], 0
+    for number, coded in enumerate(stream.split(b"\0")[:-1]):
+        packet = cobs_decode(coded)
+        if len(packet) >= 16 and zlib.crc32(packet[:-4]) == int.from_bytes(packet[-4:], "little"):
+            packets.append((packet[1], int.from_bytes(packet[2:4], "little"), packet[12:-4]))
+        elif number and coded:
+            damaged += 1
+    return packets, damaged
+
+
+def gaps(packets):
+    """How many packets are missing between the first and the last."""
+    return sum((b[1] - a[1] - 1) % 65536 for a, b in zip(packets, packets[1:]))
+
+
+class Emulator:
+    """A powered device on the cable."""
+
+    def __init__(self, folder, name, scenario, socket):
+        self.base = folder / name
+        self.errors = open(self.path("err"), "w+")
+        self.process = subprocess.Popen(
+            [TOOLS.node, ROOT / "host_tools/emulator/main.mjs", "--image", TOOLS.image, "--board", "pico_mux",
+             "--scenario", scenario, "--seconds", "3600", "--usbredir", socket, "--fast-enumeration",
+             "--usb-log", self.path("usb"), "--capture", self.path("ftr"), "--report", self.path("json")],
+            stdin=subprocess.PIPE, stderr=self.errors, text=True)
+
+    def path(self, suffix):
+        return self.base.with_suffix("." + suffix)
+
+    def cable(self, action):
+        self.process.stdin.write(f"{action}\n")
+        self.process.stdin.flush()
+
+    def finish(self, limit_s):
+        """Its report, once the device has left by itself."""
+        self.process.wait(limit_s)
+        return json.loads(self.path("json").read_text())
+
+    def complaints(self):
+        self.errors.seek(0)
+        return [line for line in self.errors.read().splitlines() if "entered the USB boot loader" not in line]
+
+    def requests(self):
+        """Control requests: (setup in hexadecimal, the data stage's packets of either direction)."""
+        found = []
+        with open(self.path("usb"), newline="") as file:
+            for row in csv.DictReader(file):
+                if row["dir"] == "setup":
+                    found.append((row["bytes"], []))
+                elif row["endpoint"] == "0" and row["length"] != "0":
+                    found[-1][1].append(row["bytes"])
+        return found
+
+    def stop(self):
+        if self.process.poll() is None:
+            self.process.terminate()
+            self.process.wait(30)
+        self.process.stdin.close()
+        self.errors.close()
+
+
+class Linux(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        holder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(holder.cleanup)
+        cls.folder = pathlib.Path(holder.name)
+        cls.scenario = cls.folder / "scenario.csv"
+        subprocess.run([sys.executable, ROOT / "host_tools/python/scenario.py", "ideal", "-o", cls.scenario, "--seconds",
+                        "120"], check=True)
+        cls.socket = cls.folder / "usb.sock"
+        programs = [TOOLS.fingertip, "/usr/bin/lsusb", "/usr/bin/usbreset"]
+        cls.guest = virtual.Guest(cls.folder, TOOLS.kernel, programs, cls.socket)
+        cls.addClassCleanup(cls.guest.stop)
+        cls.quiet_until = len(cls.kernel_log())
+        cls.streams = {}
+        cls.power_up("first")
+
+    @classmethod
+    def power_up(cls, name):
+        cls.device = Emulator(cls.folder, name, cls.scenario, cls.socket)
+        cls.addClassCleanup(cls.device.stop)
+
+    @classmethod
+    def kernel_log(cls):
+        """(level, text) of each line."""
+        lines = re.findall(r"^<(\d+)>\[ *[\d.]+\] (.*)$", cls.guest.run("dmesg -r")[1], re.M)
+        return [(int(level) & 7, text) for level, text in lines]
+
+    def sh(self, script, limit_s=PATIENCE_s):
+        status, output = self.guest.run(script, limit_s)
+        self.assertEqual(status, 0, f"{script}\n{output}")
+        return output
+
+    def wait_for(self, condition, limit_s=PATIENCE_s):
+        self.sh(f"n=0; until {condition}; do n=$((n+1)); [ $n -lt {limit_s * 10} ] || exit 1; usleep 100000; done", limit_s + 30)
+
+    def wait_for_port(self):
+        self.wait_for("[ -c /dev/ttyACM0 ]")
+
+    def tool(self, arguments, limit_s=PATIENCE_s):
+        return self.sh(f"fingertip {arguments}", limit_s)
+
+    def pairs(self, text):
+        return dict(re.findall(r"^(\w+) +(.*)$", text, re.M))
+
+    def stream(self, transport):
+        """Records what PACKETS needs; checks that the tool got every byte that the device sent meanwhile."""
+        self.tool(f"record /tmp/{transport}.csv --raw-bytes /tmp/{transport}.ftr --transport {transport} "
+                  f"--seconds {STREAM_s}", STREAM_LIMIT_s)
+        end = self.sh(f"tail -n 1 /tmp/{transport}.csv")
+        self.assertIn("dropped_packets=0 out_of_order=0 crc_errors=0 format_errors=0", end)
+        received = self.guest.read_file(f"/tmp/{transport}.ftr")
+        self.sh(f"rm /tmp/{transport}.csv /tmp/{transport}.ftr")
+        packets, damaged = packets_of(received)
+        self.assertEqual(damaged, 0)
+        self.assertEqual(gaps(packets), 0)
+        self.assertGreaterEqual(len(packets), PACKETS)
+        self.streams[transport] = received
+
+    def leave(self, reason):
+        """The device goes to its boot loader; what it and the emulator had to say is checked."""
+        result = self.device.finish(PATIENCE_s)
+        self.assertEqual(result["end_reason"], reason)
+        self.assertEqual(result["warnings"], [])
+        self.assertEqual(self.device.complaints(), [])
+        self.wait_for("[ ! -e /dev/ttyACM0 ]")
+
+    def check_bytes(self, transport):
+        sent = self.device.path("ftr").read_bytes()
+        self.assertIn(self.streams[transport], sent, "the tool received other bytes than the device sent")
+
+    # The first boot
+
+    def test_01_enumeration(self):
+        self.wait_for_port()
+        texts = [text for _, text in self.kernel_log()]
+        for wanted in ("new full-speed USB device", "Product: Fingertip tactile sensor", "Manufacturer: Fingertip",
+                       f"SerialNumber: {SERIAL}", "ttyACM0: USB ACM device"):
+            self.assertTrue(any(wanted in text for text in texts), f"{wanted}: not in\n" + "\n".join(texts))
+
+    def test_02_ten_thousand_packets_over_the_serial_port(self):
+        self.stream("serial")
+
+    def test_03_descriptors(self):
+        text = self.sh(f"lsusb -v -d {VENDOR_PRODUCT} 2>&1")
+        for wanted in (r"bcdUSB +2\.00", r"bMaxPacketSize0 +64", r"iManufacturer +1 Fingertip", r"bNumConfigurations +1",
+                       r"iProduct +2 Fingertip tactile sensor", rf"iSerial +3 {SERIAL}", r"bNumInterfaces +2",
+                       r"bFunctionClass +2", r"bInterfaceClass +2", r"bInterfaceSubClass +2", r"bInterfaceClass +10",
+                       r"CDC Header:", r"CDC Call Management:", r"CDC ACM:\s+bmCapabilities +0x06",
+                       r"bMasterInterface +0\s+bSlaveInterface +1", r"EP 1 IN\s+bmAttributes +3", r"EP 2 OUT\s+bmAttributes +2",
+                       r"EP 2 IN\s+bmAttributes +2", r"Device Status: +0x0000"):
+            self.assertRegex(text, wanted)
+        for complaint in ("Warning", "INVALID", "UNRECOGNIZED", "Bad", "cannot read"):
+            self.assertNotIn(complaint, text)
+
+    def test_04_tool_over_both_transports(self):
+        self.assertRegex(self.tool("list"), rf"^{SERIAL}\tpico_mux\t\d+\.\d+\.\d+\tserial /dev/ttyACM0, usb \d+/\d+\n$")
+        answers = [self.pairs(self.tool(f"info --transport {transport}")) for transport in ("serial", "usb")]
+        for name in ("serial", "board", "firmware", "git", "sensors", "osr", "x_mm", "y_mm", "sensors_present"):
+            self.assertEqual(answers[0][name], answers[1][name], name)
+        self.assertEqual(answers[0]["serial"], SERIAL)
+        self.assertEqual(answers[0]["commands_rejected"], "0")
+        for transport in ("serial", "usb"):
+            self.assertIn("frames", self.tool(f"monitor --colour plain --seconds 0.5 --device {SERIAL} --transport {transport}"))
+            self.wait_for_port()
+
+    def test_05_line_coding(self):
+        self.sh("stty -F /dev/ttyACM0 raw -echo 230400 cs7 parenb -parodd cstopb")
+        self.assertIn("speed 230400 baud", self.sh("stty -F /dev/ttyACM0"))
+
+    def test_06_boot_loader_request(self):
+        self.tool("loader")
+        self.leave("entered the USB boot loader")
+        self.check_bytes("serial")
+
+    def test_07_requests_of_the_kernel(self):
+        requests = self.device.requests()
+        setups = [setup for setup, _ in requests]
+        self.assertIn("8006000600000a00", setups, "DEVICE_QUALIFIER was not asked for")
+        self.assertEqual([data for setup, data in requests if setup.startswith("80060006")][0], [],
+                         "a full-speed device has no DEVICE_QUALIFIER")
+        for string in (0, 1, 2, 3):
+            asked = [data for setup, data in requests if re.match(f"8006{string:02}03(0000|0904)", setup)]
+            self.assertTrue(asked and all(asked), f"string {string}")
+        self.assertIn(("2120000000000700", ["80250000000008"]), requests)
+        self.assertIn(("2120000000000700", ["00840300020207"]), requests)
+        self.assertIn("2122030000000000", setups, "DTR was not raised")
+        self.assertIn("2122000000000000", setups, "DTR was not dropped")
+
+    # The second boot
+
+    def test_10_ten_thousand_packets_over_libusb(self):
+        self.power_up("second")
+        self.wait_for_port()
+        self.stream("usb")
+        self.wait_for_port()
+
+    def test_11_equal_sequences_and_none_lost(self):
+        received = {transport: packets_of(stream)[0] for transport, stream in self.streams.items()}
+        REPORT.update(packets_serial=len(received["serial"]), packets_libusb=len(received["usb"]),
+                      lost=sum(gaps(packets) for packets in received.values()))
+        for packets in received.values():
+            frames = [(kind, int.from_bytes(body[:4], "little")) for kind, _, body in packets if kind in (CONTACT, RAW)]
+            first = frames[0][1]
+            wanted = [(kind, first + i) for i in range(PACKETS // 2) for kind in (CONTACT, RAW)]
+            self.assertEqual(frames[:PACKETS] == wanted, True, "not a contact and a raw packet for each frame in turn")
+
+    def start_recording(self, name, transport):
+        self.sh(f"fingertip record /tmp/{name}.csv --raw-bytes /tmp/{name}.ftr --transport {transport} "
+                f"> /tmp/{name}.log 2>&1 & echo $! > /tmp/{name}.pid")
+        self.wait_for_growth(name)
+
+    def wait_for_growth(self, name):
+        """Two kilobytes more than there are."""
+        size = int(self.sh(f"stat -c %s /tmp/{name}.ftr 2>/dev/null || echo 0"))
+        self.wait_for(f"[ $(stat -c %s /tmp/{name}.ftr 2>/dev/null || echo 0) -gt {size + 2000} ]")
+
+    def end_recording(self, name):
+        """Its events, and the packets of its bytes."""
+        self.sh(f"kill -0 $(cat /tmp/{name}.pid)")
+        self.sh(f"kill -INT $(cat /tmp/{name}.pid); n=0; while kill -0 $(cat /tmp/{name}.pid) 2>/dev/null; do n=$((n+1)); "
+                "[ $n -lt 300 ] || exit 1; usleep 100000; done", 90)
+        recording = self.guest.read_file(f"/tmp/{name}.csv").decode()
+        stream = self.guest.read_file(f"/tmp/{name}.ftr")
+        self.sh(f"rm /tmp/{name}.*")
+        self.assertIn("crc_errors=", recording.splitlines()[-1])
+        return re.findall(r"^# event: (\w+)", recording, re.M), packets_of(stream)[0]
+
+    def test_12_bus_reset_in_mid_stream(self):
+        self.start_recording("reset", "serial")
+        self.sh(f"usbreset {VENDOR_PRODUCT}")
+        self.wait_for_growth("reset")
+        events, packets = self.end_recording("reset")
+        self.assertEqual(events.count("gone"), events.count("back"))
+        self.assertGreater(len(packets), 20)
+        self.assertTrue(any("reset full-speed USB device" in text for _, text in self.kernel_log()))
+
+    def cycles(self, transport, count):
+        name = f"cycles_{transport}"
+        self.start_recording(name, transport)
+        for _ in range(count):
+            self.device.cable("unplug")
+            self.wait_for("[ ! -e /dev/ttyACM0 ] && ! grep -qs Fingertip /sys/bus/usb/devices/*/manufacturer")
+            self.device.cable("plug")
+            self.wait_for_growth(name)
+        events, _ = self.end_recording(name)
+        self.assertEqual((events.count("gone"), events.count("back")), (count, count), events)
+        REPORT["detach_cycles"] = REPORT.get("detach_cycles", 0) + count
+
+    def test_13_detached_in_mid_stream_serial(self):
+        self.cycles("serial", SERIAL_CYCLES)
+
+    def test_14_detached_in_mid_stream_libusb(self):
+        self.cycles("usb", LIBUSB_CYCLES)
+        self.wait_for_port()
+
+    def encoded(self, *command):
+        done = subprocess.run([TOOLS.fingertip, "encode", *command], capture_output=True, text=True, check=True)
+        return re.sub("(..)", r"\\x\1", done.stdout.strip())
+
+    def test_15_echo_of_a_terminal_not_yet_raw(self):
+        before = self.pairs(self.tool("info"))
+        command = self.encoded("stream", "contact,raw")
+        self.sh(f"exec 3<>/dev/ttyACM0; stty -F /dev/ttyACM0 sane echo; printf '{command}' >&3; sleep 4")
+        after = self.pairs(self.tool("info"))
+        self.assertGreater(int(after["frames"]), int(before["frames"]))
+        self.assertEqual(after["watchdog_resets"], "0")
+
+    def test_16_host_that_opens_and_does_not_read(self):
+        before = self.pairs(self.tool("info"))
+        command = self.encoded("stream", "contact,raw")
+        # Kernel and device hold 70 KiB for the reader, less than 2 s of the stream.
+        self.sh("exec 3<>/dev/ttyACM0; stty -F /dev/ttyACM0 raw -echo; "
+                f"printf '{command}' >&3; sleep 12; cat <&3 > /tmp/late.ftr & sleep 4; kill $!", PATIENCE_s)
+        packets, damaged = packets_of(self.guest.read_file("/tmp/late.ftr"))
+        self.assertEqual(damaged, 0, "whole packets are dropped, never parts of them")
+        after = self.pairs(self.tool("info"))
+        dropped = int(after["packets_dropped"]) - int(before["packets_dropped"])
+        self.assertGreater(dropped, 0)
+        self.assertLessEqual(gaps(packets), dropped)
+        self.assertGreater(len(packets), 100)
+
+    def test_17_touch_at_1200_baud(self):
+        self.sh("stty -F /dev/ttyACM0 1200")
+        self.leave("entered the USB boot loader")
+        self.check_bytes("usb")
+        with open(self.device.path("usb"), newline="") as file:
+            echoed = sum(row["endpoint"] == "2" and row["dir"] == "out" and row["length"] == "1" for row in csv.DictReader(file))
+        self.assertGreater(echoed, 100, "the terminal that was not yet raw echoed nothing")
+
+    def test_20_no_complaint(self):
+        complaints = [text for level, text in self.kernel_log()[self.quiet_until:] if level <= KERNEL_WARNING]
+        REPORT["kernel_warnings"] = len(complaints)
+        self.assertEqual(complaints, [])
+        reconnecting = "Unable to connect character device usb"
+        self.assertEqual([line for line in self.guest.stop() if reconnecting not in line], [])
+
+
+class Report(unittest.TextTestRunner):
+    def run(self, test):
+        began_s = time.monotonic()
+        result = super().run(test)
+        REPORT["linux_test_s"] = round(time.monotonic() - began_s, 1)
+        return result
+
+
+def write_report(path):
+    """Into a file that other tests write to too."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    whole = json.loads(path.read_text()) if path.exists() else {}
+    path.write_text(json.dumps({**whole, **REPORT}, indent=2, sort_keys=True) + "\n")
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    for name in ("image", "fingertip", "node", "cache", "report"):
+        parser.add_argument(f"--{name}", required=True)
+    parser.parse_known_args(namespace=TOOLS)
+    try:
+        virtual.check_programs()
+        for program in ("/usr/bin/lsusb", "/usr/bin/usbreset"):
+            if not pathlib.Path(program).exists():
+                raise virtual.Unavailable(f"{program} is not here: install usbutils")
+        TOOLS.kernel = virtual.fetch_kernel(TOOLS.cache)
+    except virtual.Unavailable as error:
+        print(f"skipped: {error}")
+        return SKIPPED
+    options = parser.parse_known_args()[1]
+    program = unittest.main(argv=[sys.argv[0], *options], testRunner=Report(verbosity=2), exit=False)
+    if program.result.wasSuccessful() and "kernel_warnings" in REPORT:
+        write_report(pathlib.Path(TOOLS.report))
+    return 0 if program.result.wasSuccessful() else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
