@@ -67,6 +67,20 @@ void sim_array_init(struct sim_array *array, uint8_t sensor_count, uint64_t seed
   }
 }
 
+void sim_array_vary_parts(struct sim_array *array, double share) {
+  /* C1..C6 of a public dump of an MS5840. */
+  static const uint16_t TYPICAL[6] = {41335, 41466, 26840, 27317, 31225, 28780};
+  for (unsigned k = 0; k < array->sensor_count; k++) {
+    uint16_t c[6];
+    for (int i = 0; i < 6; i++) {
+      const double drawn = (double)(random_u64(array) >> 11) / 9007199254740992.0;
+      const double word = TYPICAL[i] * (1.0 + share * (2.0 * drawn - 1.0));
+      c[i] = word < 65535.0 ? (uint16_t)word : 65535;
+    }
+    sim_ms5840_init(&array->sensor[k], c);
+  }
+}
+
 static bool strikes(const struct sim_array *array, enum sim_fault_kind kind) {
   return array->fault.kind == kind && array->fault.transfer == array->transfers;
 }

@@ -88,6 +88,10 @@ struct sim_array {
  * seed: of the noise. */
 void sim_array_init(struct sim_array *array, uint8_t sensor_count, uint64_t seed);
 
+/* Draws every sensor's calibration anew, each word up to `share` (below 1) off the typical part's.
+ * The sensors are as after power-up. */
+void sim_array_vary_parts(struct sim_array *array, double share);
+
 /* The array as the firmware sees it; valid as long as *array stays where it is. */
 const struct array_bus *sim_array_bus(struct sim_array *array);
 

@@ -200,8 +200,7 @@ static void judge_frame(struct app *app) {
   contact_update(&app->slip_history, &app->contact_settings, &input, &app->contact);
 }
 
-/* A held frame brings nothing to interpret: what was found in the frame before goes out again. */
-static void process_frame(struct app *app, uint64_t taken_us) {
+void app_process_frame(struct app *app, uint64_t taken_us) {
   const struct frame *frame = &app->frame;
   if (taken_us < frame->t_read_us) { /* it came between the look at the clock and the taking */
     taken_us = frame->t_read_us;
@@ -317,8 +316,8 @@ static void answer_command(struct app *app, uint64_t now_us) {
 }
 
 /* At most one USB packet's worth a round, so that a flood of commands cannot starve the frames.
- * Returns whether anything had arrived. */
-static bool receive_commands(struct app *app) {
+ * Returns whether anything had arrived. Its bytes must not lie on the stack below a fit. */
+static __attribute__((noinline)) bool receive_commands(struct app *app) {
   uint8_t bytes[64];
   size_t count = cdc_read(bytes, sizeof bytes);
   for (size_t i = 0; i < count; i++) {
@@ -370,7 +369,7 @@ void app_run(struct app *app) {
   follow_port(app);
   uint64_t taken_us = port_now_us(); /* taking compensates the readings */
   if (scan_take(&app->scan, &app->frame)) {
-    process_frame(app, taken_us);
+    app_process_frame(app, taken_us);
     active = true;
   }
   uint64_t now_us = port_now_us();

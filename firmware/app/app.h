@@ -60,6 +60,12 @@ void app_start(struct app *app, const struct array_bus *bus);
 /* Event context: moves the scan on and arms the next alarm. */
 void app_on_event(struct app *app);
 
+/* Interprets app->frame and sends what the open streams ask for; app->fit and app->contact keep it,
+ * and app->packet the last packet. A held frame brings nothing to interpret: what was found in the
+ * frame before goes out again. app_run calls it with the time at which it took the frame; so may a
+ * host that has frames of its own. */
+void app_process_frame(struct app *app, uint64_t taken_us);
+
 /* One round of the main loop: does what is due, or sleeps until something happens. */
 void app_run(struct app *app);
 

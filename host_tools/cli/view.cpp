@@ -53,7 +53,7 @@ std::string state_text(const Model &model) {
   case Model::State::gone:
     return "gone, waiting for it to come back";
   case Model::State::live:
-    return !silence_s || *silence_s > STALLED_s ? "STALLED" : "";
+    return !silence_s ? "no frames yet" : *silence_s > STALLED_s ? "STALLED" : "";
   case Model::State::replay:
     break;
   }

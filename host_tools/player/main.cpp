@@ -2,6 +2,7 @@
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/output_file.hpp"
+#include "libfingertip/progress_bar.hpp"
 #include "libfingertip/recording.hpp"
 #include "libfingertip/text.hpp"
 #include "player/native_fingertip.h"
@@ -17,8 +18,6 @@ extern "C" {
 #include <cstring>
 #include <fstream>
 #include <optional>
-#include <unistd.h>
-
 namespace fingertip {
 namespace {
 
@@ -33,33 +32,6 @@ struct PlayOptions {
   std::uint64_t seed = 1;
   float prior_sigma_mm = 0.0F, prior_width_mm = 0.0F;
   bool raw = false, replace = false, quiet = false;
-};
-
-class Progress {
-public:
-  Progress(const std::string &what, bool quiet)
-      : what_(what), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
-  void show(double share) {
-    const int percent = static_cast<int>(100.0 * share);
-    // Tenths where lines stay.
-    if (quiet_ || percent < shown_ + (terminal_ ? 1 : 10)) {
-      return;
-    }
-    shown_ = percent;
-    std::fprintf(stderr, terminal_ ? "\r%s %3d %%" : "%s %3d %%\n", what_.c_str(), percent);
-  }
-  ~Progress() {
-    if (terminal_ && shown_ >= 0) {
-      std::fputc('\n', stderr);
-    }
-  }
-  Progress(const Progress &) = delete;
-  Progress &operator=(const Progress &) = delete;
-
-private:
-  std::string what_;
-  bool quiet_, terminal_;
-  int shown_ = -1;
 };
 
 double pressure_Pa(void *context, unsigned sensor, std::uint64_t t_us) {
@@ -141,7 +113,10 @@ int play(const PlayOptions &options) {
       writer->packet(packet);
     }
   };
-  Progress progress("playing " + scenario.name(), options.quiet);
+  std::optional<ProgressBar> progress;
+  if (!options.quiet) {
+    progress.emplace("playing " + scenario.name(), ProgressBar::Lines::tenths);
+  }
   const auto end_us = static_cast<std::uint64_t>(1e6 * seconds);
   for (std::uint64_t t_us = SLICE_us;; t_us += SLICE_us) {
     if (!native_fingertip_run_until(t_us < end_us ? t_us : end_us)) {
@@ -154,7 +129,9 @@ int play(const PlayOptions &options) {
     if (!refused.empty()) {
       throw Error(refused);
     }
-    progress.show(static_cast<double>(t_us) / static_cast<double>(end_us));
+    if (progress) {
+      progress->show(static_cast<double>(t_us) / static_cast<double>(end_us));
+    }
     if (t_us >= end_us) {
       break;
     }

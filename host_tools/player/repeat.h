@@ -15,9 +15,8 @@ extern "C" {
  * False: it cannot be; the packet is not to be trusted. */
 bool repeat_begin(const struct wire_info *info);
 
-/* A tare command was obeyed, or the settings of slip changed. */
+/* A tare command was obeyed. */
 void repeat_tare(void);
-void repeat_slip_settings(float threshold_mm, uint16_t window_ms);
 
 /* Fills in the contact packet to this raw packet; stages are left as they are. held: no new
  * pressures came. */

@@ -2,6 +2,7 @@
 // wrong, said in one line; 2 wrong usage.
 #include "libfingertip/error.hpp"
 #include "libfingertip/output_file.hpp"
+#include "libfingertip/progress_bar.hpp"
 #include "libfingertip/text.hpp"
 #include "twin/scene_file.hpp"
 
@@ -13,7 +14,6 @@
 #include <functional>
 #include <mutex>
 #include <thread>
-#include <unistd.h>
 
 namespace {
 
@@ -48,39 +48,13 @@ std::string number(double value) {
   return shortest(static_cast<float>(value));
 }
 
-// One line on a terminal, rewritten; nothing where the output is kept.
-class ProgressBar {
-public:
-  explicit ProgressBar(std::string what) : what_(std::move(what)), shown_(isatty(STDERR_FILENO)) {}
-  ~ProgressBar() {
-    if (drawn_) {
-      std::fprintf(stderr, "\r\x1b[K");
-    }
+// Throws Error once a signal asked for the end.
+void show(ProgressBar &bar, double share) {
+  if (interrupted) {
+    throw Error("interrupted; what was not finished was not written");
   }
-  // Throws Error once a signal asked for the end.
-  void show(double share) {
-    if (interrupted) {
-      throw Error("interrupted; what was not finished was not written");
-    }
-    const int percent = static_cast<int>(100.0 * share);
-    if (!shown_ || (drawn_ && percent == percent_)) {
-      return;
-    }
-    constexpr int WIDTH = 40;
-    const int full = static_cast<int>(WIDTH * share);
-    std::fprintf(stderr, "\r%s [%s%s] %3d %%", what_.c_str(), std::string(full, '#').c_str(),
-                 std::string(WIDTH - full, '.').c_str(), percent);
-    std::fflush(stderr);
-    percent_ = percent;
-    drawn_ = true;
-  }
-
-private:
-  std::string what_;
-  bool shown_;
-  bool drawn_ = false;
-  int percent_ = 0;
-};
+  bar.show(share);
+}
 
 Layer layer_of(double thickness_mm) {
   if (!(thickness_mm >= LAYER_MIN_mm && thickness_mm <= LAYER_MAX_mm)) {
@@ -143,7 +117,7 @@ int tables(const Options &options) {
     }
   }
   const std::filesystem::path cache = cache_of(options);
-  ProgressBar bar("contact tables");
+  ProgressBar bar("contact tables", ProgressBar::Lines::tenths);
   std::mutex telling;
   std::exception_ptr failure;
   std::atomic<std::size_t> next{0};
@@ -156,7 +130,7 @@ int tables(const Options &options) {
         for (const Job &job : jobs) {
           sum += job.share;
         }
-        bar.show(sum / static_cast<double>(jobs.size()));
+        show(bar, sum / static_cast<double>(jobs.size()));
       };
       try {
         ContactTable::load_or_build(*jobs[i].indenter, jobs[i].layer, cache, tell);
@@ -183,9 +157,9 @@ int tables(const Options &options) {
 }
 
 ContactTable table_of(const std::string &name, const Layer &layer, const Options &options) {
-  ProgressBar bar("contact table of " + name + ", once");
+  ProgressBar bar("contact table of " + name + ", once", ProgressBar::Lines::none);
   return ContactTable::load_or_build(indenter(name), layer, cache_of(options),
-                                     [&](double share) { bar.show(share); });
+                                     [&](double share) { show(bar, share); });
 }
 
 int scene(Options &options) {
@@ -208,9 +182,9 @@ int scene(Options &options) {
   const Scene made = make_scene(chosen, table);
   Written written;
   {
-    ProgressBar bar(made.name);
+    ProgressBar bar(made.name, ProgressBar::Lines::none);
     written = write_scene(made, layer, table, second, options.output, options.overwrite,
-                          [&](double share) { bar.show(share); });
+                          [&](double share) { show(bar, share); });
   }
   std::printf("%s: %s, %zu contacts in %s s, %zu rows, %s MB, at most %s kPa\n",
               printable(options.output).c_str(), made.name.c_str(), made.acts.size(),
@@ -275,14 +249,17 @@ int run(int argc, char **argv) {
       ->required()
       ->type_name("FILE.csv");
   write->add_option("--indenter", s.indenter, "What presses; default sphere6")->type_name("NAME");
-  write->add_option("--second", s.second_indenter, "What presses too, in scenes of two contacts; "
-                                                   "default: the same")
+  write
+      ->add_option("--second", s.second_indenter,
+                   "What presses too, in scenes of two contacts; "
+                   "default: the same")
       ->type_name("NAME");
   write->add_option("--layer", s.layer_mm, "Thickness of the rubber; default 12")->type_name("MM");
   write->add_option("--gain", options.gain, "Short for the effect gain; 0: none")
       ->type_name("PERCENT");
-  write->add_option("--effects", options.effects,
-                    "Errors of the pad, as in \"drift,relaxation=20\"; none (default), all")
+  write
+      ->add_option("--effects", options.effects,
+                   "Errors of the pad, as in \"drift,relaxation=20\"; none (default), all")
       ->type_name("NAME[=VALUE],...");
   write
       ->add_option_function<std::string>(
@@ -295,24 +272,28 @@ int run(int argc, char **argv) {
           "Seed of the pad's errors; default: --seed")
       ->type_name("N");
   write->add_option("--seconds", s.seconds, "Length; default: see twin list")->type_name("S");
-  write->add_option("--force", s.forces, "\"5\", in turn \"1,2,5\", any of \"1..15\"; default: see "
-                                         "twin list")
+  write
+      ->add_option("--force", s.forces,
+                   "\"5\", in turn \"1,2,5\", any of \"1..15\"; default: see "
+                   "twin list")
       ->type_name("N");
   write->add_option("--speed", s.speeds_mm_s, "In turn, of slip and rolloff")
       ->delimiter(',')
       ->type_name("MM_PER_S,...");
-  write->add_option("--dead-travel", s.dead_travel_mm,
-                    "The pusher's way before the object slips; default 1")
+  write
+      ->add_option("--dead-travel", s.dead_travel_mm,
+                   "The pusher's way before the object slips; default 1")
       ->type_name("MM");
-  write->add_option("--creep", s.creep_share,
-                    "Share of the dead travel by which the contact moves along; default 0.5")
+  write
+      ->add_option("--creep", s.creep_share,
+                   "Share of the dead travel by which the contact moves along; default 0.5")
       ->type_name("SHARE");
   write
-      ->add_option("--stick-slip", s.stick_slip_mm,
-                   "Slip in jumps of this size; default 0: steady")
+      ->add_option("--stick-slip", s.stick_slip_mm, "Slip in jumps of this size; default 0: steady")
       ->type_name("MM");
-  write->add_option("--margin", s.margin_mm,
-                    "Random places reach so far beyond the paper's grid; default 2.25")
+  write
+      ->add_option("--margin", s.margin_mm,
+                   "Random places reach so far beyond the paper's grid; default 2.25")
       ->type_name("MM");
   write->add_option("--quiet", s.quiet_s, "Time between contacts; default 1.2")->type_name("S");
   write->add_flag("--overwrite", options.overwrite, "Replace files that exist");
