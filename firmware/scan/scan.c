@@ -26,7 +26,7 @@
  * follows reads as ones. One code in 65536 ends in sixteen of them by chance, and one frame of
  * fifteen sensors in three million has four that end in eight. */
 #define TORN_MASK 0xFFFFu
-#define TORN_BYTE_MASK 0xFFu
+#define TORN_BYTE 0xFFu
 #define TORN_BYTE_SENSORS 4u
 #define CODE_MAX 0xFFFFFFu
 
@@ -207,18 +207,23 @@ static uint32_t take_codes(struct scan *scan, bool is_temperature, uint32_t code
   uint32_t zero = 0;
   uint32_t torn = 0;
   uint32_t ends_in_ones = 0;
-  for (uint8_t k = 0; k < scan->sensor_count; k++) {
-    const uint8_t *bytes = scan->result.bytes[k];
-    uint32_t code = (uint32_t)bytes[0] << 16 | (uint32_t)bytes[1] << 8 | bytes[2];
-    uint32_t bit = UINT32_C(1) << k;
-    if (code == 0 || (code == CODE_MAX && is_temperature)) {
-      zero |= bit;
-    } else if ((code & TORN_BYTE_MASK) == TORN_BYTE_MASK && code != CODE_MAX) {
-      ends_in_ones |= bit;
-      torn |= (code & TORN_MASK) == TORN_MASK ? bit : 0;
-    }
+  uint32_t bit = 1;
+  const uint8_t(*bytes)[ARRAY_BUS_MAX_READ_BYTES] = scan->result.bytes;
+  for (int left = scan->sensor_count; left > 0; left--, bit <<= 1, bytes++) {
+    uint32_t low = (*bytes)[2];
+    uint32_t code = (uint32_t)(*bytes)[0] << 16 | (uint32_t)(*bytes)[1] << 8 | low;
     if (codes) {
-      codes[k] = code;
+      *codes++ = code;
+    }
+    if (code == 0) {
+      zero |= bit;
+    } else if (low == TORN_BYTE) {
+      if (code != CODE_MAX) {
+        ends_in_ones |= bit;
+        torn |= (code & TORN_MASK) == TORN_MASK ? bit : 0;
+      } else if (is_temperature) {
+        zero |= bit;
+      }
     }
   }
   ends_in_ones &= acknowledged;

@@ -44,7 +44,7 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --vcd-from S         dump from this time on, seconds; default 0
   --vcd-to S           dump up to this time
   --rise-ns N          rise time of the bus lines, 0 to 1000 ns; default: what the board's pull-ups make it
-  --usb-log FILE.csv   USB packets: t_ns,endpoint,dir,length,bytes
+  --usb-log FILE.csv   USB packets: t_ns,endpoint,dir,length,bytes,offered_ns (when the firmware gave an IN packet to the controller)
   --report FILE.json   what happened, in numbers
   --progress           a line on stderr each second
 
@@ -162,7 +162,7 @@ async function run(options) {
       file: output(options.vcd), probes: Board.probes, comment: `board ${options.board}; a level is high from 0.7 VDD on`,
       from_ns: options['vcd-from'] * 1e9, to_ns: options['vcd-to'] * 1e9,
     });
-    const usbLog = output(options['usb-log'], 't_ns,endpoint,dir,length,bytes');
+    const usbLog = output(options['usb-log'], 't_ns,endpoint,dir,length,bytes,offered_ns');
 
     while (options['wait-open'] && !pty.isOpen && !interrupted && !pty.failure) await sleep(5);
 
@@ -174,7 +174,7 @@ async function run(options) {
         ? (t) => busLog.write(Buffer.from(`${t.start_ns.toFixed(0)},${t.end_ns.toFixed(0)},${t.muxes},0x${t.address.toString(16)},${t.read ? 'r' : 'w'},${hex(t.bytes)},${t.acknowledged ? 1 : 0}\n`))
         : undefined,
       onUsbPacket: (p) => {
-        if (options['usb-log']) usbLog.write(Buffer.from(`${p.t_ns.toFixed(0)},${p.endpoint},${p.setup ? 'setup' : p.isIn ? 'in' : 'out'},${p.data.length},${hex(p.data)}\n`));
+        if (options['usb-log']) usbLog.write(Buffer.from(`${p.t_ns.toFixed(0)},${p.endpoint},${p.setup ? 'setup' : p.isIn ? 'in' : 'out'},${p.data.length},${hex(p.data)},${p.offered_ns?.toFixed(0) ?? ''}\n`));
         if (p.isIn && machine.host.isBulkIn(p.endpoint)) capture.write(p.data);
       },
       onData: (bytes) => pty?.send(bytes),

@@ -6,6 +6,7 @@
 ideal   ideal Gaussian presses (sigma 5.7 mm) of 0.5 to 20 N at random places of the array; no slip
 demo    taps of different force and place, two slips, a figure-eight stroke; 10 s
 slip20  presses that slip at 20 to 200 mm/s, for the slip measure at 20 frames a second
+wander  one contact of 5 N from 0.6 s to the end that never rests: every frame has something to fit
 
 The pressure is the Gaussian of De Clercq et al., RA-L 2022, eq. (2), and the force its integral, eq. (4):
 F = 2 pi p0 sigma^2. slip is 1 while the contact moves faster than 10 mm/s. The same name, length and seed
@@ -26,8 +27,9 @@ DESCRIPTIONS = {
     "ideal": "ideal Gaussian presses at random places, forces log-uniform from 0.5 to 20 N",
     "demo": "three taps, slips at 40 and 80 mm/s, a figure-eight stroke",
     "slip20": "presses that slip along y at 20, 50, 100, 150 and 200 mm/s",
+    "wander": "one contact of 5 N that moves around the centre at 5 mm/s",
 }
-SECONDS = {"ideal": 20.0, "demo": 10.0, "slip20": 12.0}
+SECONDS = {"ideal": 20.0, "demo": 10.0, "slip20": 12.0, "wander": 10.0}
 
 
 def smooth_step(t, start, length):
@@ -130,10 +132,21 @@ def slip20(seconds, random):
     return motion
 
 
+def wander(seconds, random):
+    del random
+    motion = Motion(seconds)
+    start, ramp = QUIET_s + 0.1, 0.05
+    motion.press(start, seconds + 2 * ramp, 5.0, 0, 0, ramp)
+    angle = 5.0 / 6.0 * np.maximum(motion.t_s - start, 0)
+    motion.x_mm[:] = 6 * np.cos(angle)
+    motion.y_mm[:] = 6 * np.sin(angle)
+    return motion
+
+
 def main(argv):
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("name", choices=sorted(DESCRIPTIONS), metavar="NAME", help="ideal, demo or slip20")
+    parser.add_argument("name", choices=sorted(DESCRIPTIONS), metavar="NAME", help=", ".join(sorted(DESCRIPTIONS)))
     parser.add_argument("-o", "--output", required=True, metavar="FILE.csv")
     parser.add_argument("--seconds", type=float, metavar="S", help="length; default: that of the scenario")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the random places and forces; default 1")
@@ -144,7 +157,7 @@ def main(argv):
     if options.seed < 0:
         raise InputError(f"--seed {options.seed} is out of range; give 0 or more")
     check_output(options.output)
-    make = {"ideal": ideal, "demo": demo, "slip20": slip20}[options.name]
+    make = {"ideal": ideal, "demo": demo, "slip20": slip20, "wander": wander}[options.name]
     motion = make(seconds, np.random.default_rng(options.seed))
     metadata = {
         "name": options.name, "description": DESCRIPTIONS[options.name], "seed": options.seed,

@@ -59,13 +59,15 @@ class Pipe {
 export class UsbHost {
   /**
    * @param options scope: of SimulatedTime; report: Report; fast: shorten the waits of enumeration;
-   *   onPacket({ t_ns, endpoint, isIn, setup, data }): every acknowledged packet
+   *   onPacket({ t_ns, endpoint, isIn, setup, data, offered_ns }): every acknowledged packet, and when the firmware gave
+   *   it to the controller if it is an IN
    */
   constructor({ scope, report, fast = false, onPacket = () => {} }) {
     this.scope = scope;
     this.report = report;
     this.wait = fast ? FAST : REALISTIC;
     this.onPacket = onPacket;
+    this.offered_ns = new Map();
     this.onConfigured = () => {};
     this.onDisconnected = () => {};
     this.statistics = { in_bytes: 0, out_bytes: 0, in_packets: 0, out_packets: 0, naks: 0, stalls: 0, resets: 0, enumerations: 0 };
@@ -355,6 +357,7 @@ export class UsbHost {
   }
 
   #armed(endpoint, isIn) {
+    if (isIn) this.offered_ns.set(endpoint, this.scope.nanos);
     const now = this.scope.nanos;
     for (const pipe of endpoint === 0 ? [this.controlPipe] : [this.pipes.get(isIn ? endpoint | 0x80 : endpoint)]) {
       if (!pipe) continue;
@@ -488,7 +491,7 @@ export class UsbHost {
     pipe.toggle ^= 1;
     this.statistics.in_packets += 1;
     if (pipe.endpoint) this.statistics.in_bytes += data.length;
-    this.onPacket({ t_ns: this.scope.nanos, endpoint: pipe.endpoint, isIn: true, setup: false, data });
+    this.onPacket({ t_ns: this.scope.nanos, endpoint: pipe.endpoint, isIn: true, setup: false, data, offered_ns: this.offered_ns.get(pipe.endpoint) });
     if (interrupt) {
       interrupt.onData(data);
       return;

@@ -34,7 +34,7 @@ test('a host script drives the port; capture, logs and report are written; exit 
   assert.equal(report.end_reason, 'end of time');
   assert.ok(Math.abs(report.emulated_s - 0.2) < 1e-6);
   assert.deepEqual([report.usb.in_bytes, report.usb.out_bytes], [3, 3]);
-  assert.match(readFileSync(out('u.csv'), 'utf8'), /^t_ns,endpoint,dir,length,bytes\n.*,2,out,3,0102ff\n/s);
+  assert.match(readFileSync(out('u.csv'), 'utf8'), /^t_ns,endpoint,dir,length,bytes,offered_ns\n.*,2,out,3,0102ff,\n/s);
   assert.match(readFileSync(out('b.csv'), 'utf8'), /^start_ns,end_ns,muxes,address,rw,bytes,ack\n$/);
 });
 

@@ -96,7 +96,7 @@ class Scenarios(ToolTest):
         self.assertNotEqual(self.scenario("ideal", "--seed", "6").read_bytes(), first)
 
     def test_every_scenario_is_whole(self):
-        for name, seconds in (("ideal", 20), ("demo", 10), ("slip20", 12)):
+        for name, seconds in (("ideal", 20), ("demo", 10), ("slip20", 12), ("wander", 10)):
             truth = files.read_scenario(self.scenario(name))
             self.assertEqual(truth.metadata["name"], name)
             self.assertEqual(truth.sensors_Pa.shape[1], 15)
