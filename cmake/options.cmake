@@ -10,15 +10,57 @@ if(NOT FINGERTIP_BOARD STREQUAL "native" AND NOT CMAKE_CROSSCOMPILING)
   message(FATAL_ERROR "Board ${FINGERTIP_BOARD} needs the cross compiler: use cmake --preset ${FINGERTIP_BOARD}")
 endif()
 
-# A scene is a named set of defaults for one use of the fingertip.
-#   slip   every frame the sensors can give; location, force and slip
-#   paper  the published setting: 20 Hz, slip by eq. (7) with n = 2
-set(FINGERTIP_SCENES slip paper)
+# A scene is a named set of capabilities and defaults for one use of the fingertip.
+#   raw    every frame the sensors can give; pressures and tare only
+#   press  every frame; location and force, no slip and no raw packets
+#   slip   every frame; all there is
+#   paper  all there is, in the published setting: 20 Hz, slip by eq. (7) with n = 2
+set(FINGERTIP_SCENES raw press slip paper)
 set(FINGERTIP_SCENE slip CACHE STRING "Scene: one of ${FINGERTIP_SCENES}")
 set_property(CACHE FINGERTIP_SCENE PROPERTY STRINGS ${FINGERTIP_SCENES})
 if(NOT FINGERTIP_SCENE IN_LIST FINGERTIP_SCENES)
   message(FATAL_ERROR "FINGERTIP_SCENE=${FINGERTIP_SCENE} is unknown; choose one of: ${FINGERTIP_SCENES}")
 endif()
+
+# Capabilities: what is off is not compiled (firmware/config/capabilities.h).
+set(FINGERTIP_CAPABILITIES FIT SLIP RAW_STREAM)
+set(capabilities_of_raw RAW_STREAM)
+set(capabilities_of_press FIT)
+set(capabilities_of_slip FIT SLIP RAW_STREAM)
+set(capabilities_of_paper FIT SLIP RAW_STREAM)
+foreach(capability IN LISTS FINGERTIP_CAPABILITIES)
+  set(option FINGERTIP_${capability})
+  set(${option} SCENE CACHE STRING "ON, OFF, or SCENE: as the scene has it")
+  set_property(CACHE ${option} PROPERTY STRINGS ON OFF SCENE)
+  if(${option} STREQUAL "SCENE")
+    set(wanted FALSE)
+    if(capability IN_LIST capabilities_of_${FINGERTIP_SCENE})
+      set(wanted TRUE)
+    endif()
+  elseif(${option} MATCHES "^(ON|OFF)$")
+    set(wanted ${${option}})
+  else()
+    message(FATAL_ERROR "${option}=${${option}} must be ON, OFF or SCENE")
+  endif()
+  set(FT_WITH_${capability} $<BOOL:${wanted}>) # 0 or 1
+  set(has_${capability} ${wanted})
+endforeach()
+if(has_SLIP AND NOT has_FIT)
+  message(FATAL_ERROR "FINGERTIP_SLIP needs FINGERTIP_FIT: slip is found from fits")
+endif()
+if(NOT has_FIT AND NOT has_RAW_STREAM)
+  message(FATAL_ERROR "with FINGERTIP_FIT and FINGERTIP_RAW_STREAM off nothing would be streamed; switch one on")
+endif()
+
+# The general kernel fits what the fixed-point ones cannot take: layouts other than the full rectangle
+# that they are compiled for, and selections of the n largest readings. The host's tools compare with
+# it; an image of a full rectangle never calls it.
+if(FINGERTIP_BOARD STREQUAL "native")
+  set(general_by_default ON)
+else()
+  set(general_by_default OFF)
+endif()
+option(FINGERTIP_FIT_GENERAL "Fit any layout, with the float kernel" ${general_by_default})
 
 set(FINGERTIP_FIT_ITERATIONS 7 CACHE STRING "Gauss-Newton iterations of every fit, 1 to 20")
 if(NOT FINGERTIP_FIT_ITERATIONS MATCHES "^([1-9]|1[0-9]|20)$")

@@ -12,7 +12,7 @@ struct bytes {
 static struct {
   const struct cdc_identity *identity;
   bool open, stalled, loader_requested;
-  uint32_t close_count;
+  uint32_t close_count, news;
   struct bytes queued;   /* device to host, not read by the host */
   struct bytes received; /* by the host */
   struct bytes sent;     /* host to device, not read by the device */
@@ -68,6 +68,7 @@ void native_cdc_open(void) {
 void native_cdc_close(void) {
   if (cdc.open) {
     cdc.close_count++;
+    cdc.news++;
   }
   cdc.open = false;
   cdc.queued.length = 0;
@@ -84,11 +85,13 @@ enum ft_status native_cdc_send(const uint8_t *bytes, size_t length) {
     return FT_ERR_SPACE;
   }
   append(&cdc.sent, bytes, length);
+  cdc.news++;
   return FT_OK;
 }
 
 void native_cdc_request_loader(void) {
   cdc.loader_requested = true;
+  cdc.news++;
 }
 
 size_t native_cdc_receive(uint8_t *bytes, size_t capacity) {
@@ -101,6 +104,10 @@ void cdc_start(const struct cdc_identity *identity) {
 
 bool cdc_is_open(void) {
   return cdc.open;
+}
+
+uint32_t cdc_news(void) {
+  return cdc.news;
 }
 
 uint32_t cdc_close_count(void) {

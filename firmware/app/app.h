@@ -1,5 +1,5 @@
 /* The fingertip: frames in, packets out, commands obeyed. Everything below it is wired here and
- * only here.
+ * only here, as far as this build has it (config/capabilities.h).
  *
  * One instance per image, static. The board's main installs an event handler (port.h) that calls
  * app_on_event, calls app_start once and then app_run for ever.
@@ -9,6 +9,7 @@
 
 #include "array_bus/array_bus.h"
 #include "condition/condition.h"
+#include "config/capabilities.h"
 #include "contact/contact.h"
 #include "fit/fit.h"
 #include "scan/scan.h"
@@ -20,32 +21,46 @@
 struct app {
   struct scan scan; /* shared with the event context under scan's own rules; the rest is main's */
   struct condition condition;
+#if FT_WITH_FIT
   struct fit_array fit_array;
   struct fit_settings fit_settings;
+  uint32_t fit_failures;
+#endif
+#if FT_WITH_SLIP
   struct contact_settings contact_settings;
   struct slip_history slip_history;
+#endif
   struct wire_receiver receiver;
 
   /* The frame under way. */
   struct frame frame;
   struct conditioned conditioned;
+#if FT_WITH_FIT
   struct fit_result fit;
+#endif
   struct contact_result contact;
   struct wire_packet packet; /* in or out, one at a time */
   uint8_t out[WIRE_MAX_FRAME_BYTES];
 
   uint8_t streams; /* enum wire_stream */
   uint16_t sequence;
-  uint32_t close_count; /* of the port, when last looked at */
+  uint32_t news;        /* of the port, when last looked at */
+  uint32_t close_count; /* likewise */
+  bool active;          /* the last round had something to do, so there may be more */
   uint16_t osr;
   uint32_t rate_mHz;
 
   uint32_t packets_sent, packets_dropped;
   uint32_t commands_done, commands_rejected;
-  uint32_t fit_failures;
+
+  /* Set by the event context from time to time, so that the main loop looks at the clock. */
+  _Atomic uint32_t tick;
+  uint64_t next_tick_us; /* event context only */
 
   /* Over the second under way, and the one before. */
+  uint32_t uptime_s, uptime_rest_us;
   uint64_t second_began_us;
+  uint64_t idle_since_us; /* unless .active */
   uint64_t asleep_us;
   uint32_t frames_at_second;
   uint32_t measured_rate_mHz;

@@ -21,12 +21,12 @@ static bool tells_motion(const struct contact_input *input, uint32_t flags) {
     return true;
   }
   const struct fit_result *fit = input->fit;
+  float noise_Pa = (float)input->noise_Pa_q10 * (1.0f / 1024.0f);
   return (flags & CONTACT_FLAG_UNCERTAINTY_VALID) &&
-         fit->location_sd_mm * input->noise_Pa <= CONTACT_JITTER_MAX_mm * fit->residual_rms_Pa;
+         fit->location_sd_mm * noise_Pa <= CONTACT_JITTER_MAX_mm * fit->residual_rms_Pa;
 }
 
-void contact_update(struct slip_history *history, const struct contact_settings *settings,
-                    const struct contact_input *input, struct contact_result *result) {
+void contact_judge(const struct contact_input *input, struct contact_result *result) {
   uint32_t flags = input->fit ? input->fit->flags : 0;
   flags |= input->contact ? (uint32_t)CONTACT_FLAG_CONTACT : 0;
   flags |= input->tared ? (uint32_t)CONTACT_FLAG_TARED : 0;
@@ -38,6 +38,13 @@ void contact_update(struct slip_history *history, const struct contact_settings 
     }
   }
   result->slip_mm = 0.0f;
+  result->flags = flags;
+}
+
+void contact_update(struct slip_history *history, const struct contact_settings *settings,
+                    const struct contact_input *input, struct contact_result *result) {
+  contact_judge(input, result);
+  uint32_t flags = result->flags;
   if (!input->fit || !tells_motion(input, flags)) {
     slip_reset(history);
   } else if (slip_update(history, input->t_us, input->fit->x_mm, input->fit->y_mm,

@@ -1,4 +1,5 @@
-/* What the fingertip says about one frame: the fit, the slip, and every flag that applies.
+/* What the fingertip says about one frame: the flags of the fit and every other that applies, and
+ * the slip.
  */
 #ifndef CONTACT_CONTACT_H
 #define CONTACT_CONTACT_H
@@ -20,7 +21,7 @@ struct contact_input {
   bool contact;  /* the gate is open */
   bool tared;
   bool masked;                  /* a sensor is missing or was left out */
-  float noise_Pa;               /* rms noise of a reading */
+  int32_t noise_Pa_q10;         /* rms noise of a reading, 1/1024 Pa */
   uint32_t saturated;           /* bitmap: left out of the fit for being beyond their range */
   const struct fit_result *fit; /* NULL where nothing was fitted */
 };
@@ -34,9 +35,12 @@ struct contact_result {
  */
 #define CONTACT_MIN_UNSATURATED 5
 
-/* Locations flagged FLAT or AT_BOUND do not enter the slip history, nor do those flagged UNCERTAIN
- * whose noise alone has a standard deviation above CONTACT_JITTER_MAX_mm: it starts anew after
- * them, as after a loss of contact. */
+/* Without slip. */
+void contact_judge(const struct contact_input *input, struct contact_result *result);
+
+/* With slip. Locations flagged FLAT or AT_BOUND do not enter the slip history, nor do those flagged
+ * UNCERTAIN whose noise alone has a standard deviation above CONTACT_JITTER_MAX_mm: it starts anew
+ * after them, as after a loss of contact. */
 #define CONTACT_JITTER_MAX_mm 0.1f
 
 void contact_update(struct slip_history *history, const struct contact_settings *settings,

@@ -95,8 +95,9 @@ static void find_line(struct fit_array *made) {
   }
 }
 
-enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
-                              const float *y_mm, float pitch_mm) {
+/* Everything but the line. */
+static enum ft_status make_array(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
+                                 const float *y_mm, float pitch_mm) {
   if (sensor_count < 1 || sensor_count > FT_MAX_SENSORS ||
       !(pitch_mm >= 0.01f && pitch_mm <= POSITION_MAX_mm)) {
     return FT_ERR_ARGUMENT;
@@ -116,9 +117,27 @@ enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, con
     made.y_max = k == 0 || y + MARGIN > made.y_max ? y + MARGIN : made.y_max;
   }
   find_grid(&made, x_mm, y_mm);
-  find_line(&made);
   *array = made;
   return FT_OK;
+}
+
+static bool is_grid(const struct fit_array *array) {
+  return array->grid.columns == FIT_GRID_COLUMNS && array->grid.rows == FIT_GRID_ROWS;
+}
+
+enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
+                              const float *y_mm, float pitch_mm) {
+  enum ft_status status = make_array(array, sensor_count, x_mm, y_mm, pitch_mm);
+  if (status == FT_OK) {
+    find_line(array);
+  }
+  return status;
+}
+
+enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
+                                   const float *y_mm, float pitch_mm) {
+  enum ft_status status = make_array(array, sensor_count, x_mm, y_mm, pitch_mm);
+  return status == FT_OK && !is_grid(array) ? FT_ERR_ARGUMENT : status;
 }
 
 /* Fits once more without the outlier, if there is one. */
@@ -137,19 +156,24 @@ static void leave_outlier_out(const struct fit_array *array, const int32_t *pres
   }
 }
 
-void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                  const struct fit_settings *settings, struct fit_result *result) {
+void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                       uint32_t usable, const struct fit_settings *settings,
+                       struct fit_result *result) {
   uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
-  bool grid = array->grid.columns == FIT_GRID_COLUMNS && array->grid.rows == FIT_GRID_ROWS;
-  bool some = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
-  if (!grid || some) {
-    fit_general(array, pressure_Pa_q10, usable, settings, result);
-    return;
-  }
   usable &= all;
   bool rough = usable == all ? fit_grid(array, pressure_Pa_q10, settings, result)
                              : fit_grid_masked(array, pressure_Pa_q10, usable, settings, result);
   if (rough) {
     leave_outlier_out(array, pressure_Pa_q10, usable, settings, result);
+  }
+}
+
+void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+                  const struct fit_settings *settings, struct fit_result *result) {
+  bool some = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
+  if (is_grid(array) && !some) {
+    fit_gaussian_grid(array, pressure_Pa_q10, usable, settings, result);
+  } else {
+    fit_general(array, pressure_Pa_q10, usable, settings, result);
   }
 }

@@ -72,6 +72,12 @@ struct fit_result {
 enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
                               const float *y_mm, float pitch_mm);
 
+/* The same for an image that knows its layout: only the rectangle of FIT_GRID_COLUMNS x
+ * FIT_GRID_ROWS nodes that the fixed-point kernels are compiled for is taken, another is
+ * FT_ERR_ARGUMENT too; goes with fit_gaussian_grid. */
+enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
+                                   const float *y_mm, float pitch_mm);
+
 /* A sensor whose reading does not belong to the others' (fit_limits.h) is left out of a second fit;
  * SENSOR_MASKED and `used` tell. Only residuals that are rough and no noise make it look for one.
  *
@@ -80,6 +86,11 @@ enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, con
  * stays off. */
 void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                   const struct fit_settings *settings, struct fit_result *result);
+
+/* The same without the general kernel, which it keeps out of an image: n_largest must be 0. */
+void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                       uint32_t usable, const struct fit_settings *settings,
+                       struct fit_result *result);
 
 /* The kernels behind fit_gaussian, to compare them.
  *

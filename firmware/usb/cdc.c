@@ -25,6 +25,7 @@ static struct ring receive_ring = {.bytes = receive_bytes, .size = RECEIVE_BYTES
 static _Atomic uint32_t is_open;
 static _Atomic uint32_t close_count;
 static _Atomic uint32_t loader_requested;
+static _Atomic uint32_t news;
 
 enum packet_state { PACKET_NONE, PACKET_HELD, PACKET_OFFERED };
 
@@ -43,6 +44,11 @@ static struct {
 } port;
 
 static const uint8_t default_line_coding[LINE_CODING_BYTES] = {0x00, 0xc2, 0x01, 0x00, 0, 0, 8};
+
+static void add_news(void) {
+  uint32_t count = atomic_load_explicit(&news, memory_order_relaxed);
+  atomic_store_explicit(&news, count + 1, memory_order_release);
+}
 
 /* The host gets what there is at once: it reads in transfers of several packets, which a packet
  * below the maximum ends, so when the ring runs dry after a full one an empty one follows. */
@@ -81,6 +87,7 @@ static void update_open(void) {
     atomic_store_explicit(&is_open, 0, memory_order_relaxed);
     uint32_t count = atomic_load_explicit(&close_count, memory_order_relaxed);
     atomic_store_explicit(&close_count, count + 1, memory_order_release);
+    add_news();
     usb_controller_withdraw(CDC_ENDPOINT_IN);
     drop_stream();
   } else if (!was_open && now_open) {
@@ -91,8 +98,10 @@ static void update_open(void) {
 
 static void set_control_lines(uint16_t lines) {
   bool dtr = lines & CONTROL_LINE_DTR;
-  if (dtr != port.dtr && bytes_get_u32(port.line_coding) == LOADER_BAUD)
+  if (dtr != port.dtr && bytes_get_u32(port.line_coding) == LOADER_BAUD) {
     atomic_store_explicit(&loader_requested, 1, memory_order_relaxed);
+    add_news();
+  }
   port.dtr = dtr;
   update_open();
 }
@@ -163,6 +172,7 @@ void cdc_on_sent(uint8_t endpoint) {
 void cdc_on_received(uint8_t endpoint, const uint8_t *bytes, size_t length) {
   if (endpoint == CDC_ENDPOINT_OUT) {
     ring_put(&receive_ring, bytes, (uint32_t)length);
+    add_news();
     accept_packet();
   }
 }
@@ -179,6 +189,10 @@ void cdc_start(const struct cdc_identity *identity) {
 
 bool cdc_is_open(void) {
   return atomic_load_explicit(&is_open, memory_order_acquire);
+}
+
+uint32_t cdc_news(void) {
+  return atomic_load_explicit(&news, memory_order_acquire);
 }
 
 uint32_t cdc_close_count(void) {

@@ -31,6 +31,10 @@ void cdc_start(const struct cdc_identity *identity);
 /* The device is configured and the host has raised DTR. */
 bool cdc_is_open(void);
 
+/* Changes when there is something to read, the port was closed, or the loader was asked for: a main
+ * loop that has seen to all that need not look before. */
+uint32_t cdc_news(void);
+
 /* Counts the times the port was closed (DTR dropped, bus reset, unplugged): streams end then. */
 uint32_t cdc_close_count(void);
 

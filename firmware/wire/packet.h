@@ -2,9 +2,12 @@
  *
  * PROTOCOL.md is the specification. Firmware and host use this same code. A frame on the line is
  *   COBS(header 12 bytes, body, CRC-32/ISO-HDLC of header and body) 0x00
- * and nothing here depends on the byte order, the alignment or the structure padding of the
+ * and nothing on the line depends on the byte order, the alignment or the structure padding of the
  * machine. Floats are IEEE 754 binary32 and always finite: the encoder refuses others and the
  * decoder rejects them.
+ *
+ * Each body is described by one constant, its layout, for both directions. Whoever encodes or
+ * decodes names the layouts, so an image holds those of its own packets and commands only.
  */
 #ifndef WIRE_PACKET_H
 #define WIRE_PACKET_H
@@ -20,7 +23,7 @@
 enum {
   WIRE_HEADER_BYTES = 12,
   WIRE_CRC_BYTES = 4,
-  WIRE_MAX_BODY_BYTES = 92 + 8 * FT_MAX_SENSORS, /* info */
+  WIRE_MAX_BODY_BYTES = 96 + 8 * FT_MAX_SENSORS, /* info */
   WIRE_MAX_PACKET_BYTES = WIRE_HEADER_BYTES + WIRE_MAX_BODY_BYTES + WIRE_CRC_BYTES,
   /* COBS adds one byte, and one more for each full 254 bytes; then the delimiter. */
   WIRE_MAX_FRAME_BYTES = WIRE_MAX_PACKET_BYTES + WIRE_MAX_PACKET_BYTES / 254 + 2,
@@ -50,6 +53,13 @@ enum wire_stream {
   WIRE_STREAM_RAW = 1 << 1,
   WIRE_STREAM_HEALTH = 1 << 2, /* once a second */
   WIRE_STREAM_ALL = WIRE_STREAM_CONTACT | WIRE_STREAM_RAW | WIRE_STREAM_HEALTH,
+};
+
+/* What a build can do: cmake/options.cmake. */
+enum wire_capability {
+  WIRE_CAPABILITY_FIT = 1 << 0,        /* contact packets: location and force */
+  WIRE_CAPABILITY_SLIP = 1 << 1,       /* and slip, and the command that sets it */
+  WIRE_CAPABILITY_RAW_STREAM = 1 << 2, /* raw packets */
 };
 
 /* The result code of an ACK. */
@@ -83,25 +93,30 @@ struct wire_stages {
   uint16_t total_us;
 };
 
-/* One fitted frame. header.t_us is the middle of the sensors' conversion. */
+/* One judged frame. header.t_us is the middle of the sensors' conversion. A quantity travels only
+ * under its VALID flag; without it the encoder leaves it out and the decoder gives 0. */
 struct wire_contact {
-  uint32_t frame;        /* counts every frame since start, fitted or not */
-  uint32_t flags;        /* enum contact_flag */
+  uint32_t frame; /* counts every frame since start, fitted or not */
+  uint32_t flags; /* enum contact_flag */
+  struct wire_stages stages;
+  /* FIT_VALID */
   uint32_t sensors_used; /* bitmap of the sensors that entered the fit */
   float x_mm, y_mm;      /* contact location, origin in the centre of the pad */
   float p0_Pa;           /* peak of the fitted Gaussian */
   float sigma_mm;        /* its standard deviation */
   float force_N;         /* 2 pi p0 sigma^2, paper eq. (4) */
-  float slip_mm;         /* slip distance, paper eq. (7) */
   float residual_rms_Pa; /* root mean square of the fit residuals */
-  float location_sd_mm;  /* predicted radial standard deviation of the location */
-  float force_sd_N;      /* predicted standard deviation of the force */
-  struct wire_stages stages;
+  /* UNCERTAINTY_VALID */
+  float location_sd_mm; /* predicted radial standard deviation of the location */
+  float force_sd_N;     /* predicted standard deviation of the force */
+  /* SLIP_VALID */
+  float slip_mm; /* slip distance, paper eq. (7) */
 };
 
 /* The readings of one frame. header.t_us as in the contact packet of the same frame number. */
 struct wire_raw {
   uint32_t frame;
+  uint32_t flags;         /* enum contact_flag; those of a fit or a slip only with the fit */
   uint32_t valid;         /* bitmap: the reading is a measurement; 0 in a held frame, whose readings
                              are those of the frame before */
   uint32_t saturated;     /* bitmap: above 1980 mbar, where the sensor's range ends */
@@ -116,6 +131,7 @@ enum { WIRE_TEXT_BYTES = 16 };
 struct wire_info {
   uint8_t firmware_version[3];    /* major, minor, patch */
   uint8_t sensor_count;           /* 1..FT_MAX_SENSORS */
+  uint32_t capabilities;          /* enum wire_capability */
   char git_hash[WIRE_TEXT_BYTES]; /* printable ASCII, zero-padded; '+' at its end: uncommitted
                                      changes */
   char board[WIRE_TEXT_BYTES];    /* same form */
@@ -125,16 +141,17 @@ struct wire_info {
   uint32_t measured_rate_mHz;     /* over the last second; 0 before */
   uint16_t osr;                   /* 256..8192 */
   uint16_t temperature_interval_ms;
-  uint16_t slip_window_ms;
-  uint8_t fit_iterations;
-  uint8_t streams; /* enum wire_stream */
-  float slip_threshold_mm;
+  uint8_t streams;                                  /* enum wire_stream */
+  uint8_t fit_iterations;                           /* with WIRE_CAPABILITY_FIT, else 0 */
+  uint16_t slip_window_ms;                          /* with WIRE_CAPABILITY_SLIP, else 0 */
+  float slip_threshold_mm;                          /* likewise */
   float pitch_mm;                                   /* of a rectangular layout; 0 for a free one */
   float x_mm[FT_MAX_SENSORS], y_mm[FT_MAX_SENSORS]; /* sensor positions */
 };
 
 /* Counters since start, modulo 2^32, and present state. */
 struct wire_health {
+  uint32_t capabilities; /* enum wire_capability */
   uint32_t uptime_s;
   uint32_t frames;            /* read from the array */
   uint32_t frames_incomplete; /* of these, with at least one sensor missing */
@@ -147,13 +164,14 @@ struct wire_health {
   uint32_t bus_timeouts;      /* operations that did not end in time */
   uint32_t bus_recoveries;    /* nine clocks and multiplexer resets */
   uint32_t zero_readings;     /* a conversion result of 0, and the one after it */
-  uint32_t fit_failures;      /* frames in contact whose fit could not be solved */
   uint32_t sensors_present;   /* bitmap: answered at the last attempt */
   uint32_t sensors_prom_bad;  /* bitmap: calibration CRC differs, streaming all the same; or blank,
                                  and not */
   uint32_t watchdog_resets;   /* the last start was by the watchdog: 1 */
   uint16_t cpu_busy_permille; /* over the last second */
   uint16_t stack_free_bytes;  /* never touched since start */
+  uint32_t fit_failures;      /* frames in contact whose fit could not be solved; with
+                                 WIRE_CAPABILITY_FIT, else 0 */
 };
 
 struct wire_ack {
@@ -198,32 +216,48 @@ struct wire_packet {
   } body;
 };
 
-/* Encodes one packet into a complete frame, delimiter included.
- * FT_OK: *length bytes are in frame. FT_ERR_SPACE: capacity is too small (WIRE_MAX_FRAME_BYTES
- * always suffices). FT_ERR_ARGUMENT: unknown type, sensor_count of 0 or too large, or a float
- * that is not finite. Cost: about 45 Cortex-M0+ cycles a byte.
+/* The layout of one body. */
+struct wire_layout;
+extern const struct wire_layout wire_contact_layout, wire_raw_layout, wire_info_layout,
+    wire_health_layout, wire_ack_layout;
+
+/* Sets of layouts, ended by NULL: those of the commands, with and without that for slip, and all
+ * there are. */
+extern const struct wire_layout *const wire_commands[];
+extern const struct wire_layout *const wire_commands_without_slip[];
+extern const struct wire_layout *const wire_all_layouts[];
+
+/* NULL: the set has no such type. */
+const struct wire_layout *wire_find_layout(const struct wire_layout *const *set, uint8_t type);
+
+/* Encodes one packet as its layout says, of which its type is too, into a complete frame, delimiter
+ * included: *length bytes. FT_ERR_ARGUMENT: layout is NULL, sensor_count is 0 or too large, a text
+ * is not printable, or a float is not finite; frame is scratch then. Cost: about 40 Cortex-M0+
+ * cycles a byte.
  */
-enum ft_status wire_encode(const struct wire_packet *packet, uint8_t *frame, size_t capacity,
-                           size_t *length);
+enum ft_status wire_encode(const struct wire_layout *layout, const struct wire_packet *packet,
+                           uint8_t frame[WIRE_MAX_FRAME_BYTES], size_t *length);
 
 /* Decodes the bytes of one frame without its delimiter. The frame buffer is overwritten.
  * FT_ERR_FORMAT: bad COBS, wrong length for the type, or a value that the encoder would refuse.
- * FT_ERR_CRC. FT_ERR_VERSION: another protocol version, the CRC being right. FT_ERR_TYPE: of an
- * unknown type but undamaged; type, sequence and t_us are set, so that the sender can be answered
- * and its sequence followed.
+ * FT_ERR_CRC. FT_ERR_VERSION: another protocol version, the CRC being right. FT_ERR_TYPE: of a
+ * type that the set lacks but undamaged; type, sequence and t_us are set, so that the sender can be
+ * answered and its sequence followed.
  */
-enum ft_status wire_decode(uint8_t *frame, size_t length, struct wire_packet *packet);
+enum ft_status wire_decode(const struct wire_layout *const *set, uint8_t *frame, size_t length,
+                           struct wire_packet *packet);
 
 /* Collects bytes from a line into packets. Resynchronisation: whatever happened, the next
  * frame begins after the next 0x00.
  */
 struct wire_receiver {
+  const struct wire_layout *const *set;
   uint8_t frame[WIRE_MAX_FRAME_BYTES];
   size_t length;
   uint32_t overlong; /* 1 while skipping a frame that is longer than any valid one */
 };
 
-void wire_receiver_init(struct wire_receiver *receiver);
+void wire_receiver_init(struct wire_receiver *receiver, const struct wire_layout *const *set);
 
 /* Takes one byte. FT_PENDING: no frame is complete. FT_OK: *packet is a new packet.
  * Else a damaged frame ended here and was discarded, for the reason given by wire_decode, or

@@ -119,12 +119,13 @@ private:
     session_.info();
     /* The first answer may have waited for the device to start; this one tells its clock. */
     wire_packet info = session_.info();
+    streams_ = possible_streams(info.body.info, options_.streams);
     if (recording_) {
       event("back");
     } else if (!options_.recording.empty()) {
       start_recording(info);
     }
-    session_.command(command_stream(options_.streams));
+    session_.command(command_stream(streams_));
     revived_ = Clock::now();
     model_.set_state(Model::State::live);
   }
@@ -140,9 +141,14 @@ private:
     }
     recording_ = std::make_unique<RecordingWriter>(options_.recording, options_.overwrite,
                                                    &info.body.info, info.body.info.sensor_count,
-                                                   extra, options_.streams & WIRE_STREAM_RAW,
+                                                   extra, raw_expected(),
                                                    OutputFile::Appears::at_once);
     recording_->packet(info);
+  }
+
+  /* A raw packet follows each contact packet. */
+  bool raw_expected() const {
+    return (streams_ & WIRE_STREAM_RAW) != 0 && (streams_ & WIRE_STREAM_CONTACT) != 0;
   }
 
   void event(const std::string &text) {
@@ -177,7 +183,7 @@ private:
     if (now - revived_ > REVIVE_AFTER &&
         (!silence_s || *silence_s > std::chrono::duration<double>(REVIVE_AFTER).count())) {
       revived_ = now;
-      session_.send(command_stream(options_.streams));
+      session_.send(command_stream(streams_));
     }
   }
 
@@ -229,6 +235,7 @@ private:
   Model model_;
   std::unique_ptr<View> view_;
   std::string note_;
+  std::uint8_t streams_ = 0; /* of those wanted, what the firmware has */
   bool stopping_ = false;
   bool quit_ = false;
   Clock::time_point revived_{};

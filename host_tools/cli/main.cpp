@@ -112,6 +112,17 @@ std::string rate_text(std::uint32_t rate_mHz) {
   return rate_mHz ? fixed(rate_mHz / 1000.0, 3) : "max";
 }
 
+/* What belongs to a capability that the firmware lacks. */
+void leave_out_missing(Metadata &pairs, std::uint32_t capabilities) {
+  auto is_missing = [&](const std::pair<std::string, std::string> &pair) {
+    bool of_slip = pair.first.rfind("slip_", 0) == 0;
+    bool of_fit = pair.first.rfind("fit_", 0) == 0;
+    return (of_slip && !(capabilities & WIRE_CAPABILITY_SLIP)) ||
+           (of_fit && !(capabilities & WIRE_CAPABILITY_FIT));
+  };
+  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), is_missing), pairs.end());
+}
+
 int info(const Options &options) {
   Device device(options.choice);
   wire_info info = device.session.info().body.info;
@@ -119,37 +130,48 @@ int info(const Options &options) {
   Metadata pairs = info_metadata(info);
   pairs.insert(pairs.begin(), {"port", printable(device.transport->description())});
   for (auto &[key, value] : pairs) {
-    if (key == "streams") {
+    if (key == "capabilities") {
+      value = capabilities_text(info.capabilities);
+    } else if (key == "streams") {
       value = streams_text(info.streams);
     } else if (key == "rate_mHz" && info.rate_mHz == 0) {
       value = rate_text(info.rate_mHz);
     }
   }
+  leave_out_missing(pairs, info.capabilities);
   print_pairs(pairs);
   std::printf("\n");
   Metadata counters;
   for (const auto &[key, value] : health_fields(health)) {
+    if (key == "capabilities") {
+      continue; // said above
+    }
     std::string bad = sensors_text(health.sensors_prom_bad);
     counters.emplace_back(key, key == "sensors_present" ? present_text(value, info.sensor_count)
                                : key == "sensors_prom_bad" ? (bad.empty() ? "none" : bad)
                                                            : std::to_string(value));
   }
+  leave_out_missing(counters, info.capabilities);
   print_pairs(counters);
   return 0;
 }
 
 int tare(const Options &options) {
   Device device(options.choice);
-  device.session.command(command_stream(WIRE_STREAM_CONTACT));
+  wire_info info = device.session.info().body.info;
+  device.session.command(
+      command_stream(possible_streams(info, WIRE_STREAM_CONTACT | WIRE_STREAM_RAW)));
   bool tared = false;
   bool acknowledged = false;
   std::int64_t last_frame_us = steady_now_us();
   device.session.on_packet([&](const wire_packet &packet) {
     if (packet.type == WIRE_ACK && packet.body.ack.command == WIRE_CMD_TARE) {
       acknowledged = true;
-    } else if (packet.type == WIRE_CONTACT) {
+    } else if (packet.type == WIRE_CONTACT || packet.type == WIRE_RAW) {
+      std::uint32_t flags =
+          packet.type == WIRE_RAW ? packet.body.raw.flags : packet.body.contact.flags;
       last_frame_us = steady_now_us();
-      tared = acknowledged && (packet.body.contact.flags & CONTACT_FLAG_TARED);
+      tared = acknowledged && (flags & CONTACT_FLAG_TARED);
     }
   });
   device.session.command(command_tare());
@@ -215,9 +237,12 @@ int set(const Options &options) {
                                  settings.slip_window_ms.value_or(now.slip_window_ms)));
   }
   wire_info info = session.info().body.info;
-  std::printf("rate=%s osr=%u slip_threshold=%s slip_window=%u\n",
-              rate_text(info.rate_mHz).c_str(), info.osr, shortest(info.slip_threshold_mm).c_str(),
-              info.slip_window_ms);
+  std::printf("rate=%s osr=%u", rate_text(info.rate_mHz).c_str(), info.osr);
+  if (info.capabilities & WIRE_CAPABILITY_SLIP) {
+    std::printf(" slip_threshold=%s slip_window=%u", shortest(info.slip_threshold_mm).c_str(),
+                info.slip_window_ms);
+  }
+  std::printf("\n");
   return 0;
 }
 

@@ -20,7 +20,9 @@ void Model::take(const wire_packet &packet) {
     break;
   case WIRE_RAW:
     take_frame(packet.t_us);
-    take_raw(packet.body.raw);
+    if (!raw_ || !(packet.body.raw.flags & CONTACT_FLAG_HELD)) {
+      raw_ = packet.body.raw;
+    }
     break;
   case WIRE_INFO:
     info_ = packet.body.info;
@@ -52,16 +54,6 @@ void Model::take_frame(std::uint64_t t_us) {
   while (t_us - recent_us_.front() > RATE_SPAN_us) {
     recent_us_.pop_front();
   }
-}
-
-/* A frame without a valid reading is the one in which the sensors measure their temperature, unless
- * another follows it. */
-void Model::take_raw(const wire_raw &raw) {
-  bool nothing_valid = raw.valid == 0;
-  if (!raw_ || !nothing_valid || nothing_valid_) {
-    raw_ = raw;
-  }
-  nothing_valid_ = nothing_valid;
 }
 
 void Model::take_contact(const wire_contact &contact, std::uint64_t t_us) {

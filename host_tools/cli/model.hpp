@@ -55,7 +55,6 @@ public:
 
 private:
   void take_frame(std::uint64_t t_us);
-  void take_raw(const wire_raw &raw);
   void take_contact(const wire_contact &contact, std::uint64_t t_us);
 
   State state_ = State::connecting;
@@ -64,7 +63,6 @@ private:
   std::optional<wire_info> info_;
   std::optional<wire_contact> contact_;
   std::optional<wire_raw> raw_;
-  bool nothing_valid_ = false; /* in the last raw packet */
   std::optional<wire_health> health_;
 
   std::uint64_t frames_ = 0;

@@ -72,6 +72,12 @@ void check_window(std::uint64_t window_ms) {
 
 } // namespace
 
+std::uint8_t possible_streams(const wire_info &info, std::uint8_t streams) {
+  int missing = (info.capabilities & WIRE_CAPABILITY_FIT ? 0 : WIRE_STREAM_CONTACT) |
+                (info.capabilities & WIRE_CAPABILITY_RAW_STREAM ? 0 : WIRE_STREAM_RAW);
+  return static_cast<std::uint8_t>(streams & ~missing);
+}
+
 wire_packet command_stream(std::uint8_t streams) {
   wire_packet packet = packet_of(WIRE_CMD_STREAM);
   packet.body.cmd_stream.streams = streams;
@@ -162,7 +168,8 @@ std::uint32_t slip_window_ms_from_text(const std::string &text) {
 std::vector<std::uint8_t> frame_bytes(const wire_packet &packet) {
   std::vector<std::uint8_t> bytes(WIRE_MAX_FRAME_BYTES);
   std::size_t length = 0;
-  if (wire_encode(&packet, bytes.data(), bytes.size(), &length) != FT_OK) {
+  const wire_layout *layout = wire_find_layout(wire_all_layouts, packet.type);
+  if (wire_encode(layout, &packet, bytes.data(), &length) != FT_OK) {
     throw std::logic_error("a packet that the codec refuses");
   }
   bytes.resize(length);

@@ -10,6 +10,9 @@
 
 namespace fingertip {
 
+/* Those of the streams that this firmware has. */
+std::uint8_t possible_streams(const wire_info &info, std::uint8_t streams);
+
 /* Sequence and time are filled in by whoever sends. */
 wire_packet command_stream(std::uint8_t streams);
 wire_packet command_tare();

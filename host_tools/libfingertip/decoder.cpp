@@ -25,11 +25,11 @@ LineStatistics &LineStatistics::operator+=(const LineStatistics &other) {
 }
 
 Decoder::Decoder() {
-  wire_receiver_init(&receiver_);
+  wire_receiver_init(&receiver_, wire_all_layouts);
 }
 
 void Decoder::restart() {
-  wire_receiver_init(&receiver_);
+  wire_receiver_init(&receiver_, wire_all_layouts);
   joining_ = true;
   expected_sequence_.reset();
 }

@@ -72,7 +72,7 @@ std::string result_text(std::uint8_t result) {
   case WIRE_RESULT_DONE:
     return "done";
   case WIRE_RESULT_UNKNOWN_COMMAND:
-    return "its firmware does not know this command; update the firmware";
+    return "its firmware does not know this command; see what it can do (fingertip info) or update it";
   case WIRE_RESULT_OUT_OF_RANGE:
     return "the value is out of range for this firmware";
   case WIRE_RESULT_NOT_NOW:
@@ -84,23 +84,36 @@ std::string result_text(std::uint8_t result) {
 
 namespace {
 
-struct StreamName {
+struct BitName {
   std::uint8_t bit;
   const char *name;
 };
-constexpr StreamName stream_names[] = {
+constexpr BitName stream_names[] = {
     {WIRE_STREAM_CONTACT, "contact"}, {WIRE_STREAM_RAW, "raw"}, {WIRE_STREAM_HEALTH, "health"}};
 
-} // namespace
+constexpr BitName capability_names[] = {{WIRE_CAPABILITY_FIT, "fit"},
+                                        {WIRE_CAPABILITY_SLIP, "slip"},
+                                        {WIRE_CAPABILITY_RAW_STREAM, "raw"}};
 
-std::string streams_text(std::uint8_t streams) {
+template <std::size_t count>
+std::string bits_text(const BitName (&names)[count], std::uint32_t bits) {
   std::string text;
-  for (const StreamName &stream : stream_names) {
-    if (streams & stream.bit) {
-      text += (text.empty() ? "" : ",") + std::string(stream.name);
+  for (const BitName &name : names) {
+    if (bits & name.bit) {
+      text += (text.empty() ? "" : ",") + std::string(name.name);
     }
   }
   return text.empty() ? "none" : text;
+}
+
+} // namespace
+
+std::string capabilities_text(std::uint32_t capabilities) {
+  return bits_text(capability_names, capabilities);
+}
+
+std::string streams_text(std::uint8_t streams) {
+  return bits_text(stream_names, streams);
 }
 
 std::uint8_t streams_from_text(const std::string &text) {
@@ -110,7 +123,7 @@ std::uint8_t streams_from_text(const std::string &text) {
   }
   for (std::string_view part : split(text, ',')) {
     bool known = false;
-    for (const StreamName &stream : stream_names) {
+    for (const BitName &stream : stream_names) {
       if (part == stream.name) {
         streams = static_cast<std::uint8_t>(streams | stream.bit);
         known = true;

@@ -25,6 +25,9 @@ std::string command_name(std::uint8_t type);
 /* What an acknowledgement's result means, for the end of a sentence. */
 std::string result_text(std::uint8_t result);
 
+/* "fit,slip,raw": what a firmware can do; "none". */
+std::string capabilities_text(std::uint32_t capabilities);
+
 /* "contact,raw" and back; "none" is 0. Throws Error on an unknown name. */
 std::string streams_text(std::uint8_t streams);
 std::uint8_t streams_from_text(const std::string &text);

@@ -21,6 +21,7 @@ constexpr const char *FIRST_LINE = "# fingertip-recording 1";
 constexpr const char *FIRST_LINE_JOINT = "# fingertip-recording 2";
 constexpr const char *JOINT_COLUMNS = "device,time_us,";
 constexpr double Q10 = 1024.0;
+constexpr std::size_t RAW_COLUMNS = 5; /* without those of the sensors */
 
 /* A value of the packet that the file shows in another unit: shown = raw / scale. */
 template <typename Integer> struct Scaled {
@@ -58,6 +59,7 @@ template <typename Visitor>
 void visit_raw(Visitor &visit, wire_packet &packet, std::uint8_t sensor_count) {
   wire_raw &raw = packet.body.raw;
   visit("raw_sequence", packet.sequence);
+  visit("raw_flags", raw.flags);
   visit("valid", raw.valid);
   visit("saturated", raw.saturated);
   visit("temperature_degC", Scaled<std::int16_t>{raw.temperature_cC, 100.0, 2});
@@ -70,6 +72,7 @@ void visit_raw(Visitor &visit, wire_packet &packet, std::uint8_t sensor_count) {
 }
 
 template <typename Visitor> void visit_health(Visitor &visit, wire_health &health) {
+  visit("capabilities", health.capabilities);
   visit("uptime_s", health.uptime_s);
   visit("frames", health.frames);
   visit("frames_incomplete", health.frames_incomplete);
@@ -99,6 +102,7 @@ template <typename Visitor> void visit_ack(Visitor &visit, wire_ack &ack) {
 
 template <typename Visitor> void visit_info(Visitor &visit, wire_info &info) {
   visit("sensors", info.sensor_count);
+  visit("capabilities", info.capabilities);
   visit("rate_mHz", info.rate_mHz);
   visit("measured_rate_mHz", info.measured_rate_mHz);
   visit("osr", info.osr);
@@ -310,7 +314,7 @@ void PacketLines::row(const wire_packet *contact, const wire_packet *raw) {
     wire_packet copy = *raw;
     visit_raw(writer, copy, sensor_count_);
   } else {
-    writer.text += std::string(4u + 2u * sensor_count_, ',');
+    writer.text += std::string(RAW_COLUMNS + 2u * sensor_count_, ',');
   }
   row_(any.t_us, writer.text);
   frames_++;
@@ -617,7 +621,7 @@ void RecordingReader::read_line(const std::string &text) {
       text_of_one = text.substr(std::string(JOINT_COLUMNS).size());
     }
     auto columns = static_cast<std::size_t>(std::count(text_of_one.begin(), text_of_one.end(), ',')) + 1;
-    std::size_t fixed_columns = 2 + contact_columns() + 4;
+    std::size_t fixed_columns = 2 + contact_columns() + RAW_COLUMNS;
     std::size_t sensors = columns > fixed_columns ? (columns - fixed_columns) / 2 : 0;
     if (sensors > FT_MAX_SENSORS || text_of_one != header_text(static_cast<std::uint8_t>(sensors))) {
       throw Damage{"unknown header"};
@@ -743,7 +747,7 @@ void RecordingReader::choose_device(const std::string &serials) {
 void RecordingReader::read_row(std::string_view text) {
   auto cells = split(text, ',');
   std::size_t contact_count = contact_columns();
-  std::size_t raw_count = 4 + 2 * std::size_t{sensor_count_};
+  std::size_t raw_count = RAW_COLUMNS + 2 * std::size_t{sensor_count_};
   if (cells.size() != 2 + contact_count + raw_count) {
     throw Damage{std::to_string(cells.size()) + " columns where the header has " +
                  std::to_string(2 + contact_count + raw_count)};

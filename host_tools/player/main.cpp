@@ -189,6 +189,8 @@ public:
   }
   const Repeated &result() const { return result_; }
   bool tared() const { return tared_; }
+  // The first frame that has a raw packet only.
+  std::optional<std::uint32_t> lonely_frame() const { return lonely_frame_; }
 
 private:
   void frame(const wire_packet &raw) {
@@ -196,8 +198,8 @@ private:
       return; // what came before decides about the zero, and is not known
     }
     if (!contact_ || contact_->body.contact.frame != raw.body.raw.frame) {
-      throw Error("frame " + std::to_string(raw.body.raw.frame) +
-                  " has no contact packet; stream both contact and raw");
+      lonely_frame_ = lonely_frame_.value_or(raw.body.raw.frame);
+      return;
     }
     const bool held = contact_->body.contact.flags & CONTACT_FLAG_HELD;
     wire_packet ours = *contact_;
@@ -224,6 +226,7 @@ private:
   }
 
   bool begun_ = false, tared_ = false;
+  std::optional<std::uint32_t> lonely_frame_;
   std::optional<wire_packet> contact_;
   Repeated result_;
 };
@@ -245,6 +248,10 @@ int repeat_capture(const RepeatOptions &options) {
   if (decoder.statistics().dropped_packets > 0 || decoder.statistics().crc_errors > 0) {
     throw Error(options.capture + ": packets are missing (" + decoder.statistics().text() +
                 "); what follows them cannot be repeated");
+  }
+  if (repeater.lonely_frame()) {
+    throw Error("frame " + std::to_string(*repeater.lonely_frame()) +
+                " has no contact packet; stream both contact and raw");
   }
   if (r.frames == 0) {
     throw Error(options.capture + (repeater.tared() ? ": no frame after the tare"

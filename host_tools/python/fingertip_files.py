@@ -40,7 +40,7 @@ STAGES = ("convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contac
 CONTACT_COLUMNS = (
     "sequence", "flags", "sensors_used", "x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N", "slip_mm", "residual_rms_Pa",
     "location_sd_mm", "force_sd_N", *STAGES, "total_us")
-RAW_COLUMNS = ("raw_sequence", "valid", "saturated", "temperature_degC")
+RAW_COLUMNS = ("raw_sequence", "raw_flags", "valid", "saturated", "temperature_degC")
 RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *RAW_COLUMNS)
 
 # Flag bits of the contact packet, firmware/wire/PROTOCOL.md.

@@ -134,7 +134,7 @@ private:
       perror(link_.c_str());
       std::exit(1);
     }
-    wire_receiver_init(&receiver_);
+    wire_receiver_init(&receiver_, wire_commands);
     started_ = Clock::now();
     if (!options_["zero_log"].empty()) {
       double ago_us = static_cast<double>(number("started", 0)) * 1e6 / clock_rate();

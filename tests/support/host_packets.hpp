@@ -23,7 +23,8 @@ inline wire_packet make_contact(std::uint16_t sequence, std::uint64_t t_us, std:
   wire_packet packet = make_packet(WIRE_CONTACT, sequence, t_us);
   wire_contact &contact = packet.body.contact;
   contact.frame = frame;
-  contact.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_TARED;
+  contact.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
+                  CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED;
   contact.sensors_used = 0x7FFF;
   contact.x_mm = 0.1f + static_cast<float>(frame % 10);
   contact.y_mm = -3.3333333f;
@@ -43,6 +44,7 @@ inline wire_packet make_raw(std::uint16_t sequence, std::uint64_t t_us, std::uin
   wire_packet packet = make_packet(WIRE_RAW, sequence, t_us);
   wire_raw &raw = packet.body.raw;
   raw.frame = frame;
+  raw.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED;
   raw.valid = 0x7FFE;
   raw.saturated = 0x4000;
   raw.temperature_cC = -1234;
@@ -61,6 +63,7 @@ inline wire_packet make_info(std::uint16_t sequence, std::uint64_t t_us) {
   info.firmware_version[1] = 20;
   info.firmware_version[2] = 3;
   info.sensor_count = 15;
+  info.capabilities = WIRE_CAPABILITY_FIT | WIRE_CAPABILITY_SLIP | WIRE_CAPABILITY_RAW_STREAM;
   std::memcpy(info.git_hash, "0123456789ab+", 13);
   std::memcpy(info.board, "pico_mux", 8);
   std::memcpy(info.scene, "slip", 4);
@@ -83,7 +86,8 @@ inline wire_packet make_info(std::uint16_t sequence, std::uint64_t t_us) {
 
 inline wire_packet make_health(std::uint16_t sequence, std::uint64_t t_us) {
   wire_packet packet = make_packet(WIRE_HEALTH, sequence, t_us);
-  packet.body.health = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 0x7FFF, 15, 0xFFFFFFFFu, 17, 18};
+  packet.body.health = {7,  1,      2,  3,           4,  5,  6, 7, 8, 9, 10, 11, 12,
+                        0x7FFF, 15, 0xFFFFFFFFu, 17, 18, 13};
   return packet;
 }
 

@@ -94,7 +94,8 @@ static void look_at(const struct wire_packet *packet) {
 static void send(struct wire_packet *packet) {
   uint8_t frame[WIRE_MAX_FRAME_BYTES];
   size_t length;
-  TEST_ASSERT_EQUAL_INT(FT_OK, wire_encode(packet, frame, sizeof frame, &length));
+  TEST_ASSERT_EQUAL_INT(
+      FT_OK, wire_encode(wire_find_layout(wire_commands, packet->type), packet, frame, &length));
   TEST_ASSERT_EQUAL_INT(FT_OK, native_cdc_send(frame, length));
 }
 
@@ -114,7 +115,7 @@ static void run_until(uint64_t t_us) {
 static void power_up(void) {
   native_start(false);
   native_cdc_reset();
-  wire_receiver_init(&receiver);
+  wire_receiver_init(&receiver, wire_all_layouts);
   memset(&seen, 0, sizeof seen);
   seen.expected = ALL;
   sim_array_init(&array, SENSORS, 1);

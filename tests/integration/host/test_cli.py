@@ -775,7 +775,7 @@ class Monitor(CliTest):
         with self.device("frames=300"):
             out, _ = self.run_cli("monitor", "--port", self.port, "--until-gone")
         self.assertNotIn("\x1b", out)
-        self.assertRegex(out, r"(?m)^\d\.\d s  \d+ frames .* force 5\.00 N  CONTACT FIT_VALID TARED$")
+        self.assertRegex(out, r"(?m)^\d\.\d s  \d+ frames .* force 5\.00 N  CONTACT FIT_VALID UNCERTAINTY_VALID SLIP_VALID TARED$")
 
 
 if __name__ == "__main__":

@@ -1,139 +1,15 @@
-/* The whole firmware on the host: simulated sensors below, a USB host above. */
-#include "app/app.h"
+/* The app of scene slip, all there is. */
+#include "app_rig.h"
 #include "common/bytes.h"
 #include "common/contact_flags.h"
 #include "common/crc32.h"
-#include "config/geometry.h"
-#include "native/native_cdc.h"
-#include "native/native_port.h"
-#include "native/sim_array.h"
-#include "port/port.h"
-
-#include <math.h>
-#include <string.h>
-#include <unity.h>
-
-#define AMBIENT_Pa 101325.0
-#define PI 3.14159265358979
-
-static struct sim_array array;
-static struct app app;
-static struct wire_receiver receiver;
-static uint16_t host_sequence;
-
-/* The press that the world applies. */
-static struct {
-  double force_N, x_mm, y_mm, speed_y_mm_s;
-  uint64_t from_us;
-} press;
-
-static double world_pressure_Pa(void *context, unsigned sensor, uint64_t t_us) {
-  (void)context;
-  if (press.force_N == 0.0 || t_us < press.from_us) {
-    return AMBIENT_Pa;
-  }
-  const double sigma_mm = 5.7;
-  double p0_Pa = press.force_N / (2.0 * PI * sigma_mm * sigma_mm * 1e-6);
-  double y_mm = press.y_mm + press.speed_y_mm_s * (double)(t_us - press.from_us) * 1e-6;
-  double dx = (double)geometry.x_mm[sensor] - press.x_mm;
-  double dy = (double)geometry.y_mm[sensor] - y_mm;
-  return AMBIENT_Pa + p0_Pa * exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm));
-}
-
-static uint64_t next_event_us(const void *context) {
-  return sim_array_next_event_us(context);
-}
-
-static void on_event(void *context) {
-  app_on_event(context);
-}
-
-static void main_round(void *context) {
-  app_run(context);
-}
 
 void setUp(void) {
-  memset(&press, 0, sizeof press);
-  native_start(false);
-  native_cdc_reset();
-  sim_array_init(&array, geometry.sensor_count, 1);
-  array.world = (struct sim_world){.pressure_Pa = world_pressure_Pa};
-  array.noise = 1.0;
-  native_set_event_source(next_event_us, &array);
-  port_set_event_handler(on_event, &app);
-  app_start(&app, sim_array_bus(&array));
-  wire_receiver_init(&receiver);
-  host_sequence = 0;
+  rig_start();
 }
 
 void tearDown(void) {
-  TEST_ASSERT_FALSE_MESSAGE(native_watchdog_expired(), "the watchdog would have struck");
-}
-
-static enum native_end run_for(uint32_t ms) {
-  return native_run_until(port_now_us() + 1000u * ms, main_round, &app);
-}
-
-static void send_packet(struct wire_packet *packet) {
-  uint8_t frame[WIRE_MAX_FRAME_BYTES];
-  size_t length;
-  packet->sequence = host_sequence++;
-  packet->t_us = 123456789;
-  TEST_ASSERT_EQUAL(FT_OK, wire_encode(packet, frame, sizeof frame, &length));
-  TEST_ASSERT_EQUAL(FT_OK, native_cdc_send(frame, length));
-}
-
-/* The next packet that the host has received; false when there is none. */
-static bool next_packet(struct wire_packet *packet) {
-  uint8_t byte;
-  while (native_cdc_receive(&byte, 1) == 1) {
-    enum ft_status status = wire_receive(&receiver, byte, packet);
-    if (status == FT_OK) {
-      return true;
-    }
-    TEST_ASSERT_EQUAL_MESSAGE(FT_PENDING, status, "the device sent a damaged frame");
-  }
-  return false;
-}
-
-static bool next_of_type(uint8_t type, struct wire_packet *packet) {
-  while (next_packet(packet)) {
-    if (packet->type == type) {
-      return true;
-    }
-  }
-  return false;
-}
-
-/* Sends a command and returns the result of its acknowledgement. */
-static uint8_t ask(struct wire_packet command) {
-  struct wire_packet packet;
-  send_packet(&command);
-  run_for(30);
-  TEST_ASSERT_TRUE_MESSAGE(next_of_type(WIRE_ACK, &packet), "no acknowledgement");
-  TEST_ASSERT_EQUAL_HEX8(command.type, packet.body.ack.command);
-  TEST_ASSERT_EQUAL_UINT16(host_sequence - 1, packet.body.ack.sequence);
-  TEST_ASSERT_EQUAL_UINT64(123456789, packet.body.ack.host_time_us);
-  return packet.body.ack.result;
-}
-
-static void start_streams(uint8_t streams) {
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_STREAM,
-                                                               .body.cmd_stream = {streams}}));
-}
-
-static struct wire_info get_info(void) {
-  struct wire_packet packet;
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_INFO}));
-  TEST_ASSERT_TRUE(next_of_type(WIRE_INFO, &packet));
-  return packet.body.info;
-}
-
-static struct wire_health get_health(void) {
-  struct wire_packet packet;
-  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_HEALTH}));
-  TEST_ASSERT_TRUE(next_of_type(WIRE_HEALTH, &packet));
-  return packet.body.health;
+  rig_end();
 }
 
 static void nothing_streams_before_a_command(void) {
@@ -374,7 +250,7 @@ static void closing_the_port_ends_the_streams(void) {
   struct wire_packet packet;
   while (next_packet(&packet)) {
   }
-  wire_receiver_init(&receiver);
+  wire_receiver_init(&receiver, wire_all_layouts);
   native_cdc_open();
   run_for(200);
   TEST_ASSERT_FALSE(next_packet(&packet));

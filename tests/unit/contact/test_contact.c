@@ -20,7 +20,7 @@ void setUp(void) {
   fit.used = 0x7FFF;
   fit.location_sd_mm = 0.5f; /* of which the noise has 4 / 18 */
   fit.residual_rms_Pa = 18.0f;
-  input = (struct contact_input){.contact = true, .tared = true, .noise_Pa = 4.0f, .fit = &fit};
+  input = (struct contact_input){.contact = true, .tared = true, .noise_Pa_q10 = 4096, .fit = &fit};
 }
 
 void tearDown(void) {}

@@ -12,7 +12,7 @@ namespace {
 wire_packet decoded(const wire_packet &command) {
   auto bytes = frame_bytes(command);
   wire_packet packet{};
-  EXPECT_EQ(wire_decode(bytes.data(), bytes.size() - 1, &packet), FT_OK);
+  EXPECT_EQ(wire_decode(wire_commands, bytes.data(), bytes.size() - 1, &packet), FT_OK);
   return packet;
 }
 

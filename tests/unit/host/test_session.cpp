@@ -43,7 +43,7 @@ public:
   }
   bool reopen() override { return !gone; }
   std::string description() const override { return "fake"; }
-  FakeTransport() { wire_receiver_init(&receiver_); }
+  FakeTransport() { wire_receiver_init(&receiver_, wire_commands); }
 
 private:
   std::deque<std::uint8_t> waiting_;

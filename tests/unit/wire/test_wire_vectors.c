@@ -57,12 +57,16 @@ static void check(const char *name, const struct wire_packet *expected) {
   struct vector vector = read_vector(name);
   uint8_t frame[WIRE_MAX_FRAME_BYTES];
   size_t length = 0;
-  TEST_ASSERT_EQUAL_INT_MESSAGE(FT_OK, wire_encode(expected, frame, sizeof frame, &length), name);
+  TEST_ASSERT_EQUAL_INT_MESSAGE(
+      FT_OK,
+      wire_encode(wire_find_layout(wire_all_layouts, expected->type), expected, frame, &length),
+      name);
   TEST_ASSERT_EQUAL_size_t_MESSAGE(vector.frame_length, length, name);
   TEST_ASSERT_EQUAL_HEX8_ARRAY_MESSAGE(vector.frame, frame, length, name);
 
   struct wire_packet decoded;
-  TEST_ASSERT_EQUAL_INT_MESSAGE(FT_OK, wire_decode(frame, length - 1, &decoded), name);
+  TEST_ASSERT_EQUAL_INT_MESSAGE(FT_OK, wire_decode(wire_all_layouts, frame, length - 1, &decoded),
+                                name);
   TEST_ASSERT_EQUAL_MEMORY_MESSAGE(expected, &decoded, sizeof decoded, name);
   /* wire_decode has left the packet itself in the buffer. */
   TEST_ASSERT_EQUAL_HEX8_ARRAY_MESSAGE(vector.packet, frame, vector.packet_length, name);
@@ -97,12 +101,23 @@ static void test_contact(void) {
       .stages = {2300, 3001, 12, 34, 2760, 56, 8163},
   };
   check("contact.txt", &packet);
+
+  struct wire_contact *contact = &packet.body.contact;
+  contact->flags &= ~(uint32_t)CONTACT_FLAG_SLIP_VALID;
+  contact->slip_mm = 0.0f;
+  check("contact_press.txt", &packet);
+
+  *contact = (struct wire_contact){
+      .frame = contact->frame, .flags = CONTACT_FLAG_TARED, .stages = contact->stages};
+  check("contact_none.txt", &packet);
 }
 
 static void test_raw(void) {
   struct wire_packet packet = blank(0x02, UINT16_MAX, UINT64_C(0x100000000));
   struct wire_raw *raw = &packet.body.raw;
   raw->frame = 256;
+  raw->flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED | CONTACT_FLAG_SATURATED |
+               CONTACT_FLAG_SENSOR_MASKED;
   raw->valid = 5;
   raw->saturated = 4;
   raw->temperature_cC = -125;
@@ -120,6 +135,7 @@ static void test_info(void) {
   struct wire_info *info = &packet.body.info;
   memcpy(info->firmware_version, "\1\2\3", 3);
   info->sensor_count = 2;
+  info->capabilities = WIRE_CAPABILITY_FIT | WIRE_CAPABILITY_SLIP | WIRE_CAPABILITY_RAW_STREAM;
   memcpy(info->git_hash, "0123456789ab+", 13);
   memcpy(info->board, "pico_mux", 8);
   memcpy(info->scene, "slip", 4);
@@ -138,11 +154,25 @@ static void test_info(void) {
   info->x_mm[1] = 4.5f;
   info->y_mm[1] = 18.0f;
   check("info.txt", &packet);
+
+  memcpy(info->scene, "press", 5);
+  info->capabilities = WIRE_CAPABILITY_FIT;
+  info->streams = WIRE_STREAM_CONTACT;
+  info->slip_window_ms = 0;
+  info->slip_threshold_mm = 0.0f;
+  check("info_press.txt", &packet);
+
+  memcpy(info->scene, "raw\0", 5);
+  info->capabilities = WIRE_CAPABILITY_RAW_STREAM;
+  info->streams = WIRE_STREAM_RAW;
+  info->fit_iterations = 0;
+  check("info_raw.txt", &packet);
 }
 
 static void test_health(void) {
   struct wire_packet packet = blank(0x04, 8, 2000000);
   packet.body.health = (struct wire_health){
+      .capabilities = WIRE_CAPABILITY_FIT | WIRE_CAPABILITY_SLIP | WIRE_CAPABILITY_RAW_STREAM,
       .uptime_s = 0x01010100,
       .frames = 0x02020201,
       .frames_incomplete = 0x03030302,
@@ -163,6 +193,10 @@ static void test_health(void) {
       .stack_free_bytes = 1536,
   };
   check("health.txt", &packet);
+
+  packet.body.health.capabilities = WIRE_CAPABILITY_RAW_STREAM;
+  packet.body.health.fit_failures = 0;
+  check("health_raw.txt", &packet);
 }
 
 static void test_acknowledgement(void) {

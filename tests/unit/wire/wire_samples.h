@@ -3,6 +3,7 @@
 #define WIRE_SAMPLES_H
 
 #include "common/bytes.h"
+#include "common/contact_flags.h"
 #include "common/crc32.h"
 #include "support/random.h"
 #include "wire/packet.h"
@@ -90,19 +91,10 @@ static inline uint8_t sample_sensor_count(struct sampler *sampler) {
                                             : 1;
 }
 
+/* A quantity that is not valid is 0. */
 static inline void sample_contact(struct sampler *sampler, struct wire_contact *contact) {
   contact->frame = sample_u32(sampler);
   contact->flags = sample_u32(sampler);
-  contact->sensors_used = sample_u32(sampler);
-  contact->x_mm = sample_f32(sampler);
-  contact->y_mm = sample_f32(sampler);
-  contact->p0_Pa = sample_f32(sampler);
-  contact->sigma_mm = sample_f32(sampler);
-  contact->force_N = sample_f32(sampler);
-  contact->slip_mm = sample_f32(sampler);
-  contact->residual_rms_Pa = sample_f32(sampler);
-  contact->location_sd_mm = sample_f32(sampler);
-  contact->force_sd_N = sample_f32(sampler);
   contact->stages.convert_us = (uint16_t)sample_u32(sampler);
   contact->stages.read_us = (uint16_t)sample_u32(sampler);
   contact->stages.queue_us = (uint16_t)sample_u32(sampler);
@@ -110,10 +102,27 @@ static inline void sample_contact(struct sampler *sampler, struct wire_contact *
   contact->stages.fit_us = (uint16_t)sample_u32(sampler);
   contact->stages.contact_us = (uint16_t)sample_u32(sampler);
   contact->stages.total_us = (uint16_t)sample_u32(sampler);
+  if (contact->flags & CONTACT_FLAG_FIT_VALID) {
+    contact->sensors_used = sample_u32(sampler);
+    contact->x_mm = sample_f32(sampler);
+    contact->y_mm = sample_f32(sampler);
+    contact->p0_Pa = sample_f32(sampler);
+    contact->sigma_mm = sample_f32(sampler);
+    contact->force_N = sample_f32(sampler);
+    contact->residual_rms_Pa = sample_f32(sampler);
+  }
+  if (contact->flags & CONTACT_FLAG_UNCERTAINTY_VALID) {
+    contact->location_sd_mm = sample_f32(sampler);
+    contact->force_sd_N = sample_f32(sampler);
+  }
+  if (contact->flags & CONTACT_FLAG_SLIP_VALID) {
+    contact->slip_mm = sample_f32(sampler);
+  }
 }
 
 static inline void sample_raw(struct sampler *sampler, struct wire_raw *raw) {
   raw->frame = sample_u32(sampler);
+  raw->flags = sample_u32(sampler);
   raw->valid = sample_u32(sampler);
   raw->saturated = sample_u32(sampler);
   raw->temperature_cC = (int16_t)(sample_i32(sampler) >> 16);
@@ -137,10 +146,15 @@ static inline void sample_info(struct sampler *sampler, struct wire_info *info) 
   info->measured_rate_mHz = sample_u32(sampler);
   info->osr = (uint16_t)sample_u32(sampler);
   info->temperature_interval_ms = (uint16_t)sample_u32(sampler);
-  info->slip_window_ms = (uint16_t)sample_u32(sampler);
-  info->fit_iterations = (uint8_t)sample_u32(sampler);
   info->streams = (uint8_t)sample_u32(sampler);
-  info->slip_threshold_mm = sample_f32(sampler);
+  info->capabilities = sample_u32(sampler);
+  if (info->capabilities & WIRE_CAPABILITY_FIT) {
+    info->fit_iterations = (uint8_t)sample_u32(sampler);
+  }
+  if (info->capabilities & WIRE_CAPABILITY_SLIP) {
+    info->slip_window_ms = (uint16_t)sample_u32(sampler);
+    info->slip_threshold_mm = sample_f32(sampler);
+  }
   info->pitch_mm = sample_f32(sampler);
   for (int k = 0; k < info->sensor_count; k++) {
     info->x_mm[k] = sample_f32(sampler);
@@ -155,13 +169,16 @@ static inline void sample_health(struct sampler *sampler, struct wire_health *he
                           &health->commands_done,     &health->commands_rejected,
                           &health->bus_nacks,         &health->bus_timeouts,
                           &health->bus_recoveries,    &health->zero_readings,
-                          &health->fit_failures,      &health->sensors_present,
+                          &health->capabilities,      &health->sensors_present,
                           &health->sensors_prom_bad,  &health->watchdog_resets};
   for (size_t i = 0; i < sizeof counters / sizeof counters[0]; i++) {
     *counters[i] = sample_u32(sampler);
   }
   health->cpu_busy_permille = (uint16_t)sample_u32(sampler);
   health->stack_free_bytes = (uint16_t)sample_u32(sampler);
+  if (health->capabilities & WIRE_CAPABILITY_FIT) {
+    health->fit_failures = sample_u32(sampler);
+  }
 }
 
 /* Every byte of the packet is defined, so that two of them may be compared as memory. */
@@ -209,6 +226,11 @@ static inline void sample_packet(struct sampler *sampler, uint8_t type,
   default:
     break;
   }
+}
+
+static inline enum ft_status encode(const struct wire_packet *packet, uint8_t *frame,
+                                    size_t *length) {
+  return wire_encode(wire_find_layout(wire_all_layouts, packet->type), packet, frame, length);
 }
 
 /* COBS by its definition: the zeros end blocks; a block of 254 bytes stands for itself. */

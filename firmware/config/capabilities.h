@@ -1,0 +1,34 @@
+/* What this build can do, 0 or 1 each: cmake/options.cmake sets them, by scene or one by one. What
+ * is off is not compiled: it leaves no symbol, no variable and no field of a packet.
+ */
+#ifndef CONFIG_CAPABILITIES_H
+#define CONFIG_CAPABILITIES_H
+
+/* Location, force and the contact packets. */
+#ifndef FT_WITH_FIT
+#define FT_WITH_FIT FINGERTIP_FIT
+#endif
+
+/* Fits of any layout; without it only of the rectangle that the fixed-point kernels take (fit.h). */
+#ifndef FT_WITH_FIT_GENERAL
+#define FT_WITH_FIT_GENERAL FINGERTIP_FIT_GENERAL
+#endif
+
+/* Slip, and the command that sets it. */
+#ifndef FT_WITH_SLIP
+#define FT_WITH_SLIP FINGERTIP_SLIP
+#endif
+
+/* The raw packets. */
+#ifndef FT_WITH_RAW_STREAM
+#define FT_WITH_RAW_STREAM FINGERTIP_RAW_STREAM
+#endif
+
+#if FT_WITH_SLIP && !FT_WITH_FIT
+#error "slip is found from fits: switch FINGERTIP_FIT on too"
+#endif
+#if !FT_WITH_FIT && !FT_WITH_RAW_STREAM
+#error "nothing would be streamed: switch FINGERTIP_FIT or FINGERTIP_RAW_STREAM on"
+#endif
+
+#endif
