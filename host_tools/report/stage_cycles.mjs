@@ -173,7 +173,7 @@ function main(argv) {
   const machine = new Machine({
     image: readImage(`${options.image}.bin`), Board: findBoard(options.board), scenario: readScenario(options.scenario), fastEnumeration: true,
   });
-  scheduleHostScript(readHostScript(options['host-script']), machine.scope, machine.cdc);
+  scheduleHostScript(readHostScript(options['host-script']), machine.scope, machine.client);
   const run = (to_s) => {
     if (!machine.run(to_s * 1e9)) throw new Error(`the image stopped at ${machine.time.nanos / 1e9} s: ${machine.result.warnings.join('; ') || machine.endReason}`);
   };
