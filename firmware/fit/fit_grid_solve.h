@@ -83,8 +83,7 @@ void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system,
                    struct state *state);
 
 /* The result from the last system and the state after its step; count: of the sensors in use.
- * Returns
- * whether it has settled with residuals that are rough and no noise. */
+ * Returns whether it has settled with residuals that are rough and no noise. */
 bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
                        const struct fit_settings *settings, const struct fit_system *system,
                        const struct state *state, int count, struct fit_result *result);

@@ -19,8 +19,8 @@
 
 /* A sensor is an outlier if its studentised residual, in standard deviations that the others'
  * suggest, exceeds FIT_OUTLIER and leaving it out brings the residuals below the share
- * FIT_OUTLIER_GAIN. It is looked for where the fit has settled with
- * residuals that are rough and no noise. */
+ * FIT_OUTLIER_GAIN. It is looked for where the fit has settled with residuals that are rough and
+ * no noise. */
 #define FIT_OUTLIER 15
 #define FIT_OUTLIER_GAIN 0.5f
 

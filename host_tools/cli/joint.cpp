@@ -1,5 +1,6 @@
 #include "cli/joint.hpp"
 
+#include "cli/monitor.hpp"
 #include "libfingertip/clock_fit.hpp"
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
@@ -35,7 +36,6 @@ constexpr milliseconds EXCHANGE_INTERVAL{100};
 /* How long a row may wait for earlier ones of the others. */
 constexpr double SETTLE_us = 250e3;
 constexpr milliseconds SHOW_INTERVAL{1000};
-constexpr std::int64_t STALLED_us = 700000;
 
 struct Item {
   enum class Kind { packet, event, clock } kind;
@@ -87,7 +87,9 @@ public:
   bool is_ready() const { return ready_; }
   bool is_gone() const { return gone_; }
   bool has_ended() const { return ended_; }
-  bool is_stalled() const { return steady_now_us() - last_frame_us_ > STALLED_us; }
+  bool is_stalled() const {
+    return 1e-6 * static_cast<double>(steady_now_us() - last_frame_us_) > STALLED_s;
+  }
   std::string name() const { return transport_->description(); }
   /* Once it is ready. */
   const wire_packet &info_packet() const { return info_; }
