@@ -14,7 +14,6 @@
 namespace fingertip::twin {
 namespace {
 
-constexpr double FORCE_MIN_N = 0.02;
 constexpr int FORCES = 20;
 constexpr double STEP_mm = 0.5;
 // One node more than the reach on the far side, for the cubic.
@@ -25,7 +24,8 @@ constexpr std::size_t VALUES = FORCES * PLANE;
 constexpr int VERSION = 1;
 
 double force_at(int n) {
-  return FORCE_MIN_N * std::pow(ContactTable::FORCE_MAX_N / FORCE_MIN_N, double(n) / (FORCES - 1));
+  constexpr double LOWEST_N = ContactTable::FORCE_MIN_N;
+  return LOWEST_N * std::pow(ContactTable::FORCE_MAX_N / LOWEST_N, double(n) / (FORCES - 1));
 }
 
 std::uint64_t fnv1a(const void *data, std::size_t length) {
@@ -45,7 +45,8 @@ std::string key_of(const Indenter &indenter, const Layer &layer, const Grid &gri
                 VERSION, static_cast<int>(indenter.shape), indenter.size_x_mm, indenter.size_y_mm,
                 indenter.size_z_mm, indenter.edge_mm, indenter.youngs_modulus_Pa,
                 layer.thickness_mm, layer.youngs_modulus_Pa, layer.poisson, grid.nodes,
-                grid.step_mm, FORCES, FORCE_MIN_N, ContactTable::FORCE_MAX_N, STEP_mm, NODES);
+                grid.step_mm, FORCES, ContactTable::FORCE_MIN_N, ContactTable::FORCE_MAX_N, STEP_mm,
+                NODES);
   return text;
 }
 

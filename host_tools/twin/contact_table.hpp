@@ -17,7 +17,7 @@ namespace fingertip::twin {
 
 class ContactTable {
 public:
-  static constexpr double FORCE_MAX_N = 50.0;
+  static constexpr double FORCE_MIN_N = 0.02, FORCE_MAX_N = 50.0;
   static constexpr double REACH_mm = 45.0;
 
   // From the cache if it holds this very table, else solved (half a minute at most) and kept there;

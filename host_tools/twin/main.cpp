@@ -4,10 +4,12 @@
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/text.hpp"
+#include "twin/best_gaussian.hpp"
 #include "twin/scene_file.hpp"
 
 #include <CLI/CLI.hpp>
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <exception>
@@ -21,6 +23,7 @@ using namespace fingertip;
 using namespace fingertip::twin;
 
 constexpr double LAYER_MIN_mm = 3.0, LAYER_MAX_mm = 20.0;
+constexpr double WIDTH_FORCE_N = 2.0;
 
 struct Options {
   SceneOptions scene;
@@ -134,7 +137,8 @@ int tables(const Options &options) {
       };
       try {
         ContactTable::load_or_build(*jobs[i].indenter, jobs[i].layer, cache, tell);
-        tell(1.0);
+        const std::lock_guard<std::mutex> lock(telling);
+        jobs[i].share = 1.0; // without a word: it may have been there
       } catch (...) {
         const std::lock_guard<std::mutex> lock(telling);
         failure = std::current_exception();
@@ -160,6 +164,17 @@ ContactTable table_of(const std::string &name, const Layer &layer, const Options
   ProgressBar bar("contact table of " + name + ", once", ProgressBar::Lines::none);
   return ContactTable::load_or_build(indenter(name), layer, cache_of(options),
                                      [&](double share) { show(bar, share); });
+}
+
+int width(const Options &options) {
+  const Layer layer = layer_of(options.scene.layer_mm);
+  const BestGaussian gaussian(table_of(options.scene.indenter, layer, options),
+                              layer.thickness_mm);
+  const BestGaussian::Fit fit = gaussian.at(WIDTH_FORCE_N);
+  const double force_N = 2e-6 * M_PI * fit.p0_Pa * fit.sigma_mm * fit.sigma_mm;
+  std::printf("sigma_mm=%s force_share=%s\n", fixed(fit.sigma_mm, 3).c_str(),
+              fixed(force_N / WIDTH_FORCE_N, 3).c_str());
+  return 0;
 }
 
 int scene(Options &options) {
@@ -241,6 +256,21 @@ int run(int argc, char **argv) {
   with_cache(build);
   build->callback([&] { action = [&] { return tables(options); }; });
 
+  const auto with_contact = [&](CLI::App *command) {
+    command
+        ->add_option("--indenter", options.scene.indenter, "What presses; default sphere6")
+        ->type_name("NAME");
+    command
+        ->add_option("--layer", options.scene.layer_mm, "Thickness of the rubber; default 12")
+        ->type_name("MM");
+  };
+
+  CLI::App *fit = app.add_subcommand(
+      "width", "Width of the Gaussian that fits the pressure under 2 N best, and its share of them");
+  with_contact(fit);
+  with_cache(fit);
+  fit->callback([&] { action = [&] { return width(options); }; });
+
   CLI::App *write =
       app.add_subcommand("scene", "Write a scenario, and its events beside it: FILE.truth.csv");
   SceneOptions &s = options.scene;
@@ -248,13 +278,12 @@ int run(int argc, char **argv) {
   write->add_option("-o,--output", options.output, "The scenario to write")
       ->required()
       ->type_name("FILE.csv");
-  write->add_option("--indenter", s.indenter, "What presses; default sphere6")->type_name("NAME");
+  with_contact(write);
   write
       ->add_option("--second", s.second_indenter,
                    "What presses too, in scenes of two contacts; "
                    "default: the same")
       ->type_name("NAME");
-  write->add_option("--layer", s.layer_mm, "Thickness of the rubber; default 12")->type_name("MM");
   write->add_option("--gain", options.gain, "Short for the effect gain; 0: none")
       ->type_name("PERCENT");
   write

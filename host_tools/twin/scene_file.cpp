@@ -2,6 +2,7 @@
 
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/text.hpp"
+#include "twin/best_gaussian.hpp"
 
 extern "C" {
 #include "config/geometry.h"
@@ -19,10 +20,6 @@ namespace {
 
 constexpr double STEP_s = 1e-3;
 constexpr double QUIET_STEP_s = 0.1;
-constexpr double GAUSSIAN_REACH = 3.0; // thicknesses
-constexpr int GAUSSIAN_STEPS = 24;     // from the middle to there
-constexpr int GAUSSIAN_FORCES = 33;
-constexpr double FORCE_MIN_N = 0.02;
 
 class Text {
 public:
@@ -309,80 +306,6 @@ std::string truth_of(const Scene &scene, const std::string &path) {
 }
 
 } // namespace
-
-BestGaussian::BestGaussian(const ContactTable &table, double layer_mm) {
-  const double step_mm = GAUSSIAN_REACH * layer_mm / GAUSSIAN_STEPS;
-  constexpr int SIDE = 2 * GAUSSIAN_STEPS + 1;
-  std::vector<double> pressure(SIDE * SIDE);
-  for (int f = 0; f < GAUSSIAN_FORCES; f++) {
-    const double force_N =
-        FORCE_MIN_N *
-        std::pow(ContactTable::FORCE_MAX_N / FORCE_MIN_N, f / (GAUSSIAN_FORCES - 1.0));
-    double squares = 0.0;
-    for (int i = 0; i < SIDE; i++) {
-      for (int j = 0; j < SIDE; j++) {
-        const double p = table.base_pressure_Pa(force_N, (i - GAUSSIAN_STEPS) * step_mm,
-                                                (j - GAUSSIAN_STEPS) * step_mm) /
-                         force_N;
-        pressure[static_cast<std::size_t>(i * SIDE + j)] = p;
-        squares += p * p;
-      }
-    }
-    // With the best peak for a width, what is left of the squares; and that peak.
-    double p0 = 0.0;
-    const auto left = [&](double sigma_mm) {
-      std::vector<double> line(SIDE);
-      for (int i = 0; i < SIDE; i++) {
-        const double u = (i - GAUSSIAN_STEPS) * step_mm / sigma_mm;
-        line[static_cast<std::size_t>(i)] = std::exp(-0.5 * u * u);
-      }
-      double pg = 0.0, gg = 0.0;
-      for (std::size_t i = 0; i < SIDE; i++) {
-        for (std::size_t j = 0; j < SIDE; j++) {
-          const double g = line[i] * line[j];
-          pg += pressure[i * SIDE + j] * g;
-          gg += g * g;
-        }
-      }
-      p0 = pg / gg;
-      return squares - pg * p0;
-    };
-    // Golden section.
-    const double golden = 0.5 * (std::sqrt(5.0) - 1.0);
-    double low = 0.1 * layer_mm, high = 3.0 * layer_mm;
-    double a = high - golden * (high - low), b = low + golden * (high - low);
-    double at_a = left(a), at_b = left(b);
-    while (high - low > 1e-5 * layer_mm) {
-      if (at_a < at_b) {
-        high = b;
-        b = a;
-        at_b = at_a;
-        a = high - golden * (high - low);
-        at_a = left(a);
-      } else {
-        low = a;
-        a = b;
-        at_a = at_b;
-        b = low + golden * (high - low);
-        at_b = left(b);
-      }
-    }
-    const double sigma_mm = 0.5 * (low + high);
-    left(sigma_mm);
-    p0_per_N_.push_back(p0);
-    sigma_mm_.push_back(sigma_mm);
-  }
-}
-
-BestGaussian::Fit BestGaussian::at(double force_N) const {
-  const double range = std::log(ContactTable::FORCE_MAX_N / FORCE_MIN_N);
-  const double within_N = std::clamp(force_N, FORCE_MIN_N, ContactTable::FORCE_MAX_N);
-  const double at = std::log(within_N / FORCE_MIN_N) * (GAUSSIAN_FORCES - 1) / range;
-  const std::size_t i = std::min(static_cast<std::size_t>(at), std::size_t(GAUSSIAN_FORCES - 2));
-  const double t = at - static_cast<double>(i);
-  return {force_N * (p0_per_N_[i] + t * (p0_per_N_[i + 1] - p0_per_N_[i])),
-          sigma_mm_[i] + t * (sigma_mm_[i + 1] - sigma_mm_[i])};
-}
 
 std::string truth_path(const std::string &scenario_path) {
   std::filesystem::path path(scenario_path);

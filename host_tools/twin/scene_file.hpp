@@ -8,8 +8,8 @@
 //   contact    1 while the force is not 0
 //   x_mm y_mm  middle of the contact; of two, their centre of force
 //   force_N    on the pad, of all contacts
-//   p0_Pa sigma_mm  the Gaussian that is closest to the pressure on the base without errors, in the
-//              least squares over three thicknesses to every side; 0 with two contacts
+//   p0_Pa sigma_mm  the Gaussian that is closest to the pressure on the base without errors
+//              (best_gaussian.hpp); 0 with two contacts
 //   slip       see scenes.hpp
 //   temperature_degC  only with the effect "temperature"
 //
@@ -34,20 +34,6 @@
 #include <string>
 
 namespace fingertip::twin {
-
-// The Gaussian closest to the pressure on the base, in the least squares over the square of three
-// thicknesses to every side.
-class BestGaussian {
-public:
-  BestGaussian(const ContactTable &table, double layer_mm);
-  struct Fit {
-    double p0_Pa, sigma_mm;
-  };
-  Fit at(double force_N) const;
-
-private:
-  std::vector<double> p0_per_N_, sigma_mm_; // [force], in equal steps of its logarithm
-};
 
 std::string truth_path(const std::string &scenario_path);
 

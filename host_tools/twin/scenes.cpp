@@ -15,7 +15,6 @@ namespace {
 constexpr double GRID_STEP_mm = 4.5;
 constexpr double GRID_HALF_X_mm = 4.5, GRID_HALF_Y_mm = 13.5;
 constexpr int GRID_PLACES_X = 3, GRID_PLACES_Y = 7;
-constexpr double FORCE_MIN_N = 0.02;
 constexpr double SLIP_WAY_mm = 24.0, SLIP_SPAN_mm = 28.0;
 constexpr double SPEED_UP_s = 0.01;
 constexpr double DEGREE = M_PI / 180.0;
@@ -435,12 +434,13 @@ Forces::Forces(const std::string &text) {
   bool good = true;
   for (std::string_view part : parts) {
     const auto force_N = to_double(trim(part));
-    good = good && force_N && *force_N >= FORCE_MIN_N && *force_N <= ContactTable::FORCE_MAX_N;
+    good = good && force_N && *force_N >= ContactTable::FORCE_MIN_N &&
+           *force_N <= ContactTable::FORCE_MAX_N;
     values_.push_back(force_N.value_or(0.0));
   }
   if (!good || (range_ && values_[1] < values_[0])) {
     throw Error("--force \"" + printable(text) + "\" is not possible; give newtons from " +
-                number(FORCE_MIN_N) + " to " + number(ContactTable::FORCE_MAX_N) +
+                number(ContactTable::FORCE_MIN_N) + " to " + number(ContactTable::FORCE_MAX_N) +
                 ": 5, or in turn 1,2,5, or any of 1..15");
   }
 }

@@ -161,6 +161,13 @@ class Usage(TwinTest):
         self.assertEqual(out, f"1 contact tables in {TABLES}\n")
         self.assertEqual(err, "")
 
+    def test_width_is_that_of_the_layer(self):
+        out, _ = self.run_twin("width", "--indenter", "sphere6", "--layer", "12", "--cache", TABLES)
+        found = dict(word.split("=") for word in out.split())
+        self.assertEqual(list(found), ["sigma_mm", "force_share"])
+        self.assertAlmostEqual(float(found["sigma_mm"]), 0.45 * 12, delta=0.36)
+        self.assertAlmostEqual(float(found["force_share"]), 0.9, delta=0.02)
+
     def test_existing_files_stay_unless_told(self):
         self.scene("taps", "--seconds", "5")
         self.assertIn("exists already; choose another name, or --overwrite", self.scene_error("taps", "--seconds", "5"))
