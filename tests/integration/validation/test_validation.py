@@ -53,6 +53,19 @@ class Validation(unittest.TestCase):
         self.assertGreater(self.found["saturated_samples"], 100)
         self.assertLess(self.found["saturated_median_mm"], 0.1)
 
+    def test_a_stiff_pad_needs_its_width_where_few_sensors_feel(self):
+        stiff = {(row["margin_mm"], row["prior"]): row for row in self.found["stiff"] if row["gain"] == 0}
+        self.assertLess(stiff[0, False]["bad_percent"], 2)
+        self.assertGreater(stiff[4.5, False]["bad_percent"], 5)
+        self.assertLess(stiff[4.5, True]["bad_percent"], 0.5 * stiff[4.5, False]["bad_percent"])
+        self.assertLess(stiff[4.5, True]["bad_unflagged_percent"], 0.5)
+
+    def test_unequal_sensors_cost_most(self):
+        budget = {row["effect"]: row["median_mm"] for row in self.found["budget"]}
+        spreads = [budget[f"gain spread {gain} %"] for gain in (5, 10, 15)]
+        self.assertEqual(spreads, sorted(spreads))
+        self.assertGreater(spreads[1], 1.5 * budget["hysteresis 3 %"])
+
     def test_slips_are_found(self):
         self.assertGreater(self.found["slip_steps"], 100)
         self.assertGreater(self.found["slip_success_percent"], 85)
