@@ -19,18 +19,19 @@ const CLOCK_CHECK_NS = 200e6;
 
 export class Machine {
   /**
-   * @param options image: Uint8Array; Board; scenario; seed; faults: parsed list; serial: 16 hex digits;
-   *   fastEnumeration; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes);
+   * @param options image: Uint8Array; Board; scenario; seed; faults: parsed list; serial: 16 hex digits; clock_ppm: by how
+   *   much the chip's clocks are fast; fastEnumeration; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes);
    *   rise_ns, onLevels: see the boards; makeClient({ host, report, onData }): what uses the USB device, CdcClient by
    *   default
    */
   constructor({
-    image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, fastEnumeration = false, allowWatchdog = false,
+    image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, clock_ppm = 0, fastEnumeration = false, allowWatchdog = false,
     rise_ns, onLevels, onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {}, makeClient = (parts) => new CdcClient(parts),
   }) {
     this.image = image;
     this.Board = Board;
     this.seed = seed;
+    this.clock_ppm = clock_ppm;
     this.allowWatchdog = allowWatchdog;
     this.serial = Uint8Array.from(serial.match(/../g).map((h) => parseInt(h, 16)));
     this.time = new SimulatedTime();
@@ -62,7 +63,7 @@ export class Machine {
   }
 
   #powerUp(kept) {
-    this.chip = new Chip(this.time, this.report, { serial: this.serial, seed: this.seed, kept });
+    this.chip = new Chip(this.time, this.report, { serial: this.serial, seed: this.seed, clock_ppm: this.clock_ppm, kept });
     this.chip.load(this.image);
     this.board.attachChip(this.chip);
     this.host.connect(this.chip.usbCtrl);
@@ -106,7 +107,7 @@ export class Machine {
   }
 
   get busyNs() {
-    return ((this.cyclesBefore + this.chip.core.cycles) * 1e9) / this.Board.clkSys_Hz;
+    return ((this.cyclesBefore + this.chip.core.cycles) * 1e9) / this.chip.trueHz(this.Board.clkSys_Hz);
   }
 
   get result() {
@@ -117,6 +118,7 @@ export class Machine {
       cycles,
       busy_fraction: time.nanos ? this.busyNs / time.nanos : 0,
       device_time_zero_s: chip.timer.zero_ns === null ? null : chip.timer.zero_ns / 1e9,
+      clock_ppm: this.clock_ppm,
       reboots: this.reboots,
       usb: {
         ...host.statistics, configured: host.configured,

@@ -24,14 +24,18 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --seconds N          emulated seconds to run; default: the scenario's last row
   --seed N             noise, sensor tolerances, SRAM content at power-on; default 1
   --serial HEX16       unique id of the flash chip; default ${DEFAULT_SERIAL}
+  --clock-ppm P        the chip's clocks are fast by P parts per million of emulated time, -1000 to 1000; default 0
   --faults FILE.json   faults of sensors, multiplexers, USB (format: faults.mjs)
   --fast-enumeration   shorten the host's debounce and reset waits
   --allow-watchdog     a watchdog reboot is no warning
 
   --pty LINK           serve the CDC port as a pseudo-terminal, LINK is a symbolic link to it
   --wait-open          power on only when the pseudo-terminal was opened
-  --pace real|fast     real: never faster than the clock on the wall (default with --pty and
-                       --usbredir); fast: as fast as possible
+  --pace real|wall|fast
+                       real: never faster than the clock on the wall, a lag is dropped (default with --pty and
+                       --usbredir); wall: emulated time is the time on the wall, for measuring clocks: with --pty, what
+                       a client writes arrives at the time of its writing, answers never come early, a lag is caught
+                       up and delays them; fast: as fast as possible
   --usbredir WHERE     give the USB device to a virtual machine instead of the built-in host; WHERE is the path of a
                        Unix socket or a TCP port on the loopback. QEMU: -chardev socket,id=r,path=WHERE,reconnect=1
                        -device qemu-xhci -device usb-redir,chardev=r. Lines on stdin: "unplug", "plug"
@@ -54,7 +58,7 @@ each printed as a line; 2 wrong usage or input.`;
 
 const OPTIONS = {
   image: { type: 'string' }, board: { type: 'string' }, scenario: { type: 'string' }, seconds: { type: 'string' },
-  seed: { type: 'string', default: '1' }, serial: { type: 'string', default: DEFAULT_SERIAL }, faults: { type: 'string' },
+  seed: { type: 'string', default: '1' }, 'clock-ppm': { type: 'string', default: '0' }, serial: { type: 'string', default: DEFAULT_SERIAL }, faults: { type: 'string' },
   'fast-enumeration': { type: 'boolean', default: false }, 'allow-watchdog': { type: 'boolean', default: false },
   pty: { type: 'string' }, usbredir: { type: 'string' }, 'wait-open': { type: 'boolean', default: false }, pace: { type: 'string' },
   'host-script': { type: 'string' }, capture: { type: 'string' }, 'bus-log': { type: 'string' }, 'usb-log': { type: 'string' },
@@ -66,6 +70,9 @@ const OPTIONS = {
 const SLICE_NS = 1e6;
 /** A virtual machine waits for each control request. */
 const USBREDIR_SLICE_NS = 200e3;
+/** An answer is late by this much at most. */
+const WALL_SLICE_NS = 250e3;
+const WALL_CATCH_UP_NS = 10e6;
 const SLICE_BATCH_NS = 50e6;
 
 /** parseArgs takes "-1" behind "--name" for an option: join the two, so that the value is judged. */
@@ -94,6 +101,7 @@ function parseOptions(argv) {
     return value;
   };
   values.seed = number('seed', (v) => Number.isInteger(v) && v >= 0 && v < 2 ** 32, 'a whole number from 0 to 4294967295');
+  values['clock-ppm'] = number('clock-ppm', (v) => Math.abs(v) <= 1000, 'a number from -1000 to 1000');
   if (values.seconds !== undefined) values.seconds = number('seconds', (v) => Number.isFinite(v) && v > 0, 'a positive number of seconds');
   for (const name of ['vcd-from', 'vcd-to']) {
     values[name] = values[name] === undefined ? Infinity : number(name, (v) => Number.isFinite(v) && v >= 0, 'a time in seconds, 0 or later');
@@ -102,9 +110,10 @@ function parseOptions(argv) {
   if (values['rise-ns'] !== undefined) values['rise-ns'] = number('rise-ns', (v) => v >= 0 && v <= 1000, 'a rise time from 0 to 1000 ns');
   if (!/^[0-9a-fA-F]{16}$/.test(values.serial)) throw new InputError(`--serial "${values.serial}" is not 16 hexadecimal digits`);
   values.pace ??= values.pty || values.usbredir ? 'real' : 'fast';
-  if (!['real', 'fast'].includes(values.pace)) throw new InputError(`--pace "${values.pace}" is neither real nor fast`);
+  if (!['real', 'wall', 'fast'].includes(values.pace)) throw new InputError(`--pace "${values.pace}" is neither real, wall nor fast`);
   const drivers = ['pty', 'usbredir', 'host-script'].filter((name) => values[name] !== undefined);
   if (drivers.length > 1) throw new InputError(`--${drivers[0]} and --${drivers[1]} exclude each other`);
+  if (values.pace === 'wall' && values.usbredir) throw new InputError('--pace wall and --usbredir exclude each other');
   if (values['wait-open'] && !values.pty) throw new InputError('--wait-open needs --pty');
   return values;
 }
@@ -122,7 +131,22 @@ function readImage(path) {
 }
 
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+/** Finer than timers are, which count whole milliseconds. */
+const nap = (ms) => Atomics.wait(new Int32Array(new SharedArrayBuffer(4)), 0, 0, ms);
 const breathe = () => new Promise((resolve) => setImmediate(resolve));
+
+/** Runs actions at the emulated time that it is on the wall; emulated time is never later. */
+function inOrder(scope, wall_ns) {
+  const waiting = [];
+  const alarm = scope.createAlarm(() => {
+    waiting.shift().action();
+    if (waiting.length) alarm.scheduleAt(waiting[0].at_ns);
+  });
+  return (action) => {
+    waiting.push({ at_ns: wall_ns(), action });
+    if (waiting.length === 1) alarm.scheduleAt(waiting[0].at_ns);
+  };
+}
 
 async function run(options) {
   const Board = findBoard(options.board);
@@ -167,7 +191,7 @@ async function run(options) {
     while (options['wait-open'] && !pty.isOpen && !interrupted && !pty.failure) await sleep(5);
 
     const machine = new Machine({
-      image, Board, scenario, faults, seed: options.seed, serial: options.serial,
+      image, Board, scenario, faults, seed: options.seed, serial: options.serial, clock_ppm: options['clock-ppm'],
       fastEnumeration: options['fast-enumeration'], allowWatchdog: options['allow-watchdog'],
       rise_ns: options['rise-ns'], onLevels: vcd ? (levels, t_ns) => vcd.change(levels, t_ns) : undefined,
       onBusTransfer: options['bus-log']
@@ -184,17 +208,26 @@ async function run(options) {
       if (line === 'plug' || line === 'unplug') usbredir.setPlugged(line === 'plug');
       else process.stderr.write(`error: "${line}" on stdin is neither plug nor unplug\n`);
     });
-    if (pty) pty.connect(machine.client);
-    else if (!usbredir) scheduleHostScript(script, machine.scope, machine.client);
-
     const end_ns = seconds * 1e9;
     const started_ms = performance.now();
+    const wall_zero_ns = process.hrtime.bigint();
+    const wall_ns = () => Number(process.hrtime.bigint() - wall_zero_ns);
+    if (pty) pty.connect(machine.client, options.pace === 'wall' ? inOrder(machine.scope, wall_ns) : undefined);
+    else if (!usbredir) scheduleHostScript(script, machine.scope, machine.client);
+
     let paced_ms = started_ms;
     let paced_ns = 0;
     let shown_ms = started_ms;
-    const slice_ns = usbredir ? USBREDIR_SLICE_NS : pty || options.pace === 'real' ? SLICE_NS : SLICE_BATCH_NS;
+    const slice_ns = usbredir ? USBREDIR_SLICE_NS : options.pace === 'wall' ? WALL_SLICE_NS : pty || options.pace === 'real' ? SLICE_NS : SLICE_BATCH_NS;
     for (;;) {
-      const target = Math.min(end_ns, machine.time.nanos + slice_ns);
+      let target = Math.min(end_ns, machine.time.nanos + slice_ns);
+      if (options.pace === 'wall') {
+        target = Math.min(end_ns, Math.max(target, Math.min(wall_ns(), machine.time.nanos + WALL_CATCH_UP_NS)));
+        while (wall_ns() < target) {
+          nap((target - wall_ns()) / 1e6);
+          await breathe();
+        }
+      }
       if (!machine.run(target) || target >= end_ns) break;
       const now_ms = performance.now();
       if (interrupted) {
@@ -228,7 +261,7 @@ async function run(options) {
     vcd?.close(machine.time.nanos);
     const wall_s = (performance.now() - started_ms) / 1000;
     const { result } = machine;
-    reportFile.write(Buffer.from(`${JSON.stringify({ ...result, wall_s }, null, 2)}\n`));
+    reportFile.write(Buffer.from(`${JSON.stringify({ ...result, wall_s, ...(options.pace === 'wall' ? { wall_zero_us: Number(wall_zero_ns) / 1e3 } : {}) }, null, 2)}\n`));
     for (const line of result.warnings) process.stderr.write(`${line}\n`);
     if (result.end_reason !== 'end of time') process.stderr.write(`ended after ${result.emulated_s.toFixed(6)} s: ${result.end_reason}\n`);
     clean = result.warnings.length === 0;

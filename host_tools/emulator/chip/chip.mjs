@@ -82,10 +82,10 @@ export class Chip extends RP2040 {
   /**
    * @param time SimulatedTime
    * @param report Report
-   * @param options serial: 8-byte flash unique id; seed: of the power-on noise in SRAM;
-   *   kept: { sram, watchdog } of the life before a watchdog reboot
+   * @param options serial: 8-byte flash unique id; seed: of the power-on noise in SRAM; clock_ppm: by how much all of
+   *   the chip's clocks are fast, in this time; kept: { sram, watchdog } of the life before a watchdog reboot
    */
-  constructor(time, report, { serial, seed = 1, kept = null }) {
+  constructor(time, report, { serial, seed = 1, clock_ppm = 0, kept = null }) {
     super(time.scope());
     this.time = time;
     this.report = report;
@@ -93,6 +93,8 @@ export class Chip extends RP2040 {
     this.logger = new StrictLogger(this);
     this.core = new StrictCore(this);
     this.sio = new StrictSio(this);
+    /** Frequencies are nominal here, as the firmware believes them; what passes in time is this many times as fast. */
+    this.clockRate = 1 + clock_ppm * 1e-6;
     this.clkSys = ROSC_HZ;
     this.clkUsbHz = 0;
     this.hooks = new Map();
@@ -100,7 +102,7 @@ export class Chip extends RP2040 {
     this.sleepCycles = 0;
     this.onWatchdog = null;
     this.onUsbBoot = null;
-    this.sysClock = new SysClock(time, ROSC_HZ);
+    this.sysClock = new SysClock(time, this.trueHz(ROSC_HZ));
     this.pio = [];
 
     this.resets = new Resets(this);
@@ -160,6 +162,10 @@ export class Chip extends RP2040 {
     };
   }
 
+  trueHz(nominalHz) {
+    return nominalHz * this.clockRate;
+  }
+
   /** Record a failure and end the run. */
   fail(source, message) {
     const pc = this.core?.registers?.[15] >>> 0;
@@ -200,7 +206,7 @@ export class Chip extends RP2040 {
     core.registers.fill(0);
     core.registers[13] = BOOT2_RAM;
     core.registers[15] = BOOT2_RAM;
-    this.time.setCycleSource(core, 1e9 / this.clkSys);
+    this.time.setCycleSource(core, 1e9 / this.trueHz(this.clkSys));
     if (stored !== computed) {
       this.fail('boot ROM', `second stage CRC is 0x${stored.toString(16)}, computed 0x${computed.toString(16)}: the chip would not start this image`);
     }
@@ -221,10 +227,10 @@ export class Chip extends RP2040 {
     if (hz > 133e6) this.fail('CLOCKS', `clk_sys at ${hz / 1e6} MHz; the rated maximum is 133 MHz`);
     if (hz && hz !== this.clkSys) {
       this.clkSys = hz;
-      this.time.setCycleSource(this.core, 1e9 / hz);
-      this.sysClock.retune(hz);
+      this.time.setCycleSource(this.core, 1e9 / this.trueHz(hz));
+      this.sysClock.retune(this.trueHz(hz));
       for (const block of [this.dma, ...this.pio]) block.clockChanged();
-      this.ppb.systickTimer.frequency = hz;
+      this.ppb.systickTimer.frequency = this.trueHz(hz);
     } else if (!hz) this.fail('CLOCKS', 'clk_sys stopped');
     this.clkUsbHz = this.clocks.usbHz;
     this.clkPeri = this.clocks.periHz || this.clkPeri;

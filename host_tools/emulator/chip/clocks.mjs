@@ -91,7 +91,7 @@ export class Xosc extends BasePeripheral {
       this.ctrl = value & 0xffffff;
       if (this.enabled && !wasEnabled) {
         const cycles = (this.startup & 0x3fff) * 256 * (this.startup & 0x100000 ? 4 : 1);
-        this.alarm.schedule((cycles / XOSC_HZ) * 1e9);
+        this.alarm.schedule((cycles / this.rp2040.trueHz(XOSC_HZ)) * 1e9);
       } else if (!this.enabled) {
         this.stable = false;
         this.alarm.cancel();

@@ -83,11 +83,11 @@ export class I2cBlock extends BasePeripheral {
   }
 
   get low_ns() {
-    return ((this.lcnt[this.speed] + 1) * 1e9) / this.rp2040.clkSys + this.bus.rise_ns;
+    return ((this.lcnt[this.speed] + 1) * 1e9) / this.rp2040.trueHz(this.rp2040.clkSys) + this.bus.rise_ns;
   }
 
   get high_ns() {
-    return ((this.hcnt[this.speed] + this.spklen + 7) * 1e9) / this.rp2040.clkSys;
+    return ((this.hcnt[this.speed] + this.spklen + 7) * 1e9) / this.rp2040.trueHz(this.rp2040.clkSys);
   }
 
   get enabled() {
@@ -337,7 +337,7 @@ export class I2cBlock extends BasePeripheral {
 
   #startCondition() {
     this.state = 'start';
-    this.bus.timing = { low_ns: this.low_ns, high_ns: this.high_ns, hold_ns: ((this.sdaHold & 0xffff) * 1e9) / this.rp2040.clkSys };
+    this.bus.timing = { low_ns: this.low_ns, high_ns: this.high_ns, hold_ns: ((this.sdaHold & 0xffff) * 1e9) / this.rp2040.trueHz(this.rp2040.clkSys) };
     this.bus.start();
     this.latched |= START_DET;
     this.reading = (this.tx[0] & CMD_READ) !== 0;

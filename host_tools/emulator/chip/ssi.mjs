@@ -133,7 +133,7 @@ export class Ssi extends BasePeripheral {
     if (this.shifting !== null || !this.tx.length || !this.enabled || !this.ser) return;
     this.shifting = this.tx.shift();
     this.#updateSelect();
-    this.alarm.schedule((8 * this.baudr * 1e9) / this.rp2040.clkSys);
+    this.alarm.schedule((8 * this.baudr * 1e9) / this.rp2040.trueHz(this.rp2040.clkSys));
   }
 
   #shifted() {
@@ -142,7 +142,7 @@ export class Ssi extends BasePeripheral {
     this.rx.push(answer);
     if (this.tx.length) {
       this.shifting = this.tx.shift();
-      this.alarm.schedule((8 * this.baudr * 1e9) / this.rp2040.clkSys);
+      this.alarm.schedule((8 * this.baudr * 1e9) / this.rp2040.trueHz(this.rp2040.clkSys));
     } else {
       this.shifting = null;
       this.#updateSelect();

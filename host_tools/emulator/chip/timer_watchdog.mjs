@@ -12,6 +12,7 @@ const WATCHDOG_MAX = 0xffffff;
 export class Timer extends BasePeripheral {
   constructor(chip) {
     super(chip, 'TIMER');
+    this.tick_ns = 1e9 / chip.trueHz(1e6);
     this.alarms = [0, 1, 2, 3].map((i) => ({ armed: false, target: 0, alarm: chip.clock.createAlarm(() => this.#fire(i)) }));
     /** Emulated time at which the counter was 0, or null while no tick runs. */
     this.zero_ns = null;
@@ -35,7 +36,7 @@ export class Timer extends BasePeripheral {
   }
 
   tickStarted() {
-    if (this.zero_ns === null) this.zero_ns = this.rp2040.clock.nanos - this.stopped_us * 1000;
+    if (this.zero_ns === null) this.zero_ns = this.rp2040.clock.nanos - this.stopped_us * this.tick_ns;
     for (const a of this.alarms) if (a.armed) this.#schedule(a);
   }
 
@@ -47,7 +48,7 @@ export class Timer extends BasePeripheral {
   }
 
   get count_us() {
-    return this.zero_ns === null ? this.stopped_us : Math.floor((this.rp2040.clock.nanos - this.zero_ns) / 1000 + 1e-6);
+    return this.zero_ns === null ? this.stopped_us : Math.floor((this.rp2040.clock.nanos - this.zero_ns) / this.tick_ns + 1e-6);
   }
 
   #count() {
@@ -134,7 +135,7 @@ export class Timer extends BasePeripheral {
   #schedule(a) {
     const now_us = this.count_us;
     const delta_us = ((a.target - (now_us >>> 0)) >>> 0) || 2 ** 32;
-    a.alarm.scheduleAt(this.zero_ns + (now_us + delta_us) * 1000);
+    a.alarm.scheduleAt(this.zero_ns + (now_us + delta_us) * this.tick_ns);
   }
 
   #fire(index) {
@@ -173,14 +174,14 @@ export class Watchdog extends BasePeripheral {
 
   #left() {
     if (this.expires_ns === Infinity) return this.remaining;
-    return Math.max(0, Math.ceil(((this.expires_ns - this.rp2040.clock.nanos) / 1000) * 2));
+    return Math.max(0, Math.ceil(((this.expires_ns - this.rp2040.clock.nanos) / this.rp2040.timer.tick_ns) * 2));
   }
 
   #rearm() {
     this.alarm.cancel();
     this.expires_ns = Infinity;
     if (!this.enabled || !this.ticking) return;
-    this.expires_ns = this.rp2040.clock.nanos + (this.remaining / 2) * 1000;
+    this.expires_ns = this.rp2040.clock.nanos + (this.remaining / 2) * this.rp2040.timer.tick_ns;
     this.alarm.scheduleAt(this.expires_ns);
   }
 

@@ -265,7 +265,7 @@ export class UsbBlock extends BasePeripheral {
       if (is & BC_AVAILABLE && !(was & BC_AVAILABLE)) {
         if (fieldsChanged) chip.fail('USB', `${name}: AVAILABLE set in the same write as the other fields; write those first`);
         const gap_ns = now - this.fieldsWritten_ns[time];
-        if (gap_ns < 1e9 / CLK_USB_HZ) {
+        if (gap_ns < 1e9 / this.rp2040.trueHz(CLK_USB_HZ)) {
           chip.fail('USB', `${name}: AVAILABLE set ${gap_ns.toFixed(0)} ns after the other fields; wait at least one cycle of clk_usb (21 ns)`);
         }
         if ((is & BC_LENGTH) > 64) chip.fail('USB', `${name}: length ${is & BC_LENGTH} exceeds the 64-byte packet`);

@@ -63,7 +63,7 @@ export class PtyPort {
       this.received = this.received.subarray(5 + length);
       if (type === 'R') this.onReady?.();
       else if (type === 'A') this.#taken(payload.readUInt32LE(0));
-      else if (this.cdc) this.#deliver(type, payload);
+      else if (this.cdc) this.at(() => this.#deliver(type, payload));
       else {
         if (type === 'O' || type === 'C') this.isOpen = type === 'O';
         this.early.push([type, Buffer.from(payload)]);
@@ -71,10 +71,11 @@ export class PtyPort {
     }
   }
 
-  /** From now on the client's doings reach this CDC client. */
-  connect(cdc) {
+  /** From now on the client's doings reach this CDC client, when `at` calls what it is given. */
+  connect(cdc, at = (action) => action()) {
     this.cdc = cdc;
-    for (const [type, payload] of this.early) this.#deliver(type, payload);
+    this.at = at;
+    for (const [type, payload] of this.early) at(() => this.#deliver(type, payload));
     this.early = [];
   }
 

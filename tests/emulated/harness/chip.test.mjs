@@ -79,6 +79,21 @@ test('cycles: push/pop, exception entry and exit are charged as the hardware doe
   assert.equal(back[1] - back[0], 3 + 5);
 });
 
+test('a chip whose clocks are fast does everything sooner, by as much, and does not know', () => {
+  const loops = `void main(void) { start_clocks(); for (unsigned i = 0; i < 2000000; i++) __asm volatile(""); done(); }`;
+  const [exact, fast] = [0, 500].map((clock_ppm) => makeMachine(loops, { clock_ppm }));
+  for (const machine of [exact, fast]) machine.run(1e9);
+  assert.ok(Math.abs(fast.result.cycles - exact.result.cycles) < 100);
+  assert.deepEqual([exact.result.clock_ppm, fast.result.clock_ppm], [0, 500]);
+  const lives_ns = [exact, fast].map((machine) => machine.time.nanos);
+  assert.ok(Math.abs(lives_ns[0] / lives_ns[1] - 1 - 500e-6) < 50e-6, `${lives_ns}`);
+  const passed_us = [exact, fast].map(({ chip }) => {
+    const { timer, clock } = chip;
+    return timer.count_us / ((clock.nanos - timer.zero_ns) / 1000);
+  });
+  assert.ok(Math.abs(passed_us[1] / passed_us[0] - 1 - 500e-6) < 50e-6, `${passed_us}`);
+});
+
 const CODE = 0x20001000;
 const STACK = 0x20004000;
 const EDGES = [0, 1, 2, 31, 32, 33, 0x7fffffff, 0x80000000, 0x80000001, 0xfffffffe, 0xffffffff];

@@ -19,6 +19,11 @@ const file = (name, content) => {
 };
 const image = file('echo.bin', build('#include "cdc.h"\nvoid main(void) { start_clocks(); usb_start(); for (;;) usb_poll(); }'));
 const stream = file('stream.bin', build('#define STREAM\n#include "cdc.h"\nvoid main(void) { start_clocks(); usb_start(); for (;;) usb_poll(); }'));
+/** Asleep most of the time, so that its emulation keeps up with the wall. */
+const sleeper = file('sleeper.bin', build(`#include "cdc.h"
+  void isr(void) { usb_poll(); }
+  void main(void) { start_clocks(); usb_start(); REG(0x50110090) = 1 << 4 | 1 << 12 | 1 << 16; REG(0xe000e100) = 1 << 5;
+    for (;;) __asm volatile("wfi"); }`));
 const broken = file('null.bin', build('void main(void) { start_clocks(); REG(0) = 1; done(); }'));
 const scenario = file('s.csv', `# fingertip-scenario 1\n${HEADER}\n0${',0'.repeat(22)}\n0.2${',0'.repeat(22)}\n`);
 const base = ['--board', 'pico_mux', '--scenario', scenario, '--fast-enumeration'];
@@ -77,6 +82,8 @@ for (const [name, args, message] of [
   ['bad seed', ['--image', image, ...base, '--seed', '-1'], /^error: --seed "-1" is not a whole number from 0 to 4294967295\n$/],
   ['negative time', ['--image', image, ...base, '--seconds', '-1'], /^error: --seconds "-1" is not a positive number of seconds\n$/],
   ['option without its value', ['--image', image, ...base, '--seconds', '--progress'], /^error: .*--seconds/],
+  ['bad clock', ['--image', image, ...base, '--clock-ppm', '1001'], /^error: --clock-ppm "1001" is not a number from -1000 to 1000\n$/],
+  ['bad pace', ['--image', image, ...base, '--pace', 'slow'], /^error: --pace "slow" is neither real, wall nor fast\n$/],
   ['report nowhere', ['--image', image, ...base, '--seconds', '1e6', '--report', '/nowhere/r'], /^error: \/nowhere\/r: cannot write \(no such file or directory\); check the folder\n$/],
   ['bad scenario', ['--image', image, '--board', 'pico_mux', '--scenario', image], /^error: .*:1: not a scenario/],
 ]) {
@@ -142,6 +149,40 @@ test('pseudo-terminal: bytes go both ways, SIGINT ends cleanly and removes the l
   assert.equal(ended.code, 0, ended.stderr);
   assert.equal(code, 0, ended.stderr);
   assert.throws(() => lstatSync(link));
+});
+
+/** Each answer must come after the moment of its question on the emulator's own time line, which is the wall's. */
+const ASKING = `
+import os, select, sys, termios, time, tty
+fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
+tty.setraw(fd, termios.TCSANOW)
+time.sleep(1)
+for i in range(50):
+    asked = time.monotonic_ns()
+    os.write(fd, bytes([i]))
+    select.select([fd], [], [], 5)
+    assert os.read(fd, 1) == bytes([i])
+    print(asked, time.monotonic_ns())
+    time.sleep(0.01)
+`;
+
+test('pseudo-terminal at the pace of the wall: no question is heard before it was asked, no answer early', async () => {
+  const link = join(folder, 'wall');
+  const out = (name) => join(folder, name);
+  const emulator = await serve(link, '--image', sleeper, '--pace', 'wall', '--usb-log', out('wall.csv'), '--report', out('wall.json'));
+  const { code, stdout } = await runClient(ASKING, link);
+  const ended = await emulator.end();
+  assert.equal(ended.code, 0, ended.stderr);
+  assert.equal(code, 0);
+  const zero_ns = JSON.parse(readFileSync(out('wall.json'))).wall_zero_us * 1e3;
+  const rows = readFileSync(out('wall.csv'), 'utf8').split('\n').map((line) => line.split(',')).filter(([, endpoint, , length]) => endpoint === '2' && length === '1');
+  const heard = (dir) => rows.filter((row) => row[2] === dir).map((row) => zero_ns + Number(row[0]));
+  const [questions, answers] = [heard('out'), heard('in')];
+  const seen = stdout.trim().split('\n').map((line) => line.split(' ').map(Number));
+  assert.equal(seen.length, 50);
+  seen.forEach(([asked_ns, answered_ns], i) => {
+    assert.ok(asked_ns <= questions[i] && questions[i] <= answers[i] && answers[i] <= answered_ns, `${[asked_ns, questions[i], answers[i], answered_ns]}`);
+  });
 });
 
 test('pseudo-terminal: a link in use is refused and its emulator keeps its files; a stale link is replaced', async () => {

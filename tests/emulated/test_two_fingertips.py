@@ -1,0 +1,203 @@
+"""Two emulated fingertips, their clocks 50 ppm apart, recorded into one file by the host tool.
+
+usage: test_two_fingertips.py --image F.bin --fingertip TOOL --node NODE --report usb.json
+
+Emulated time is the wall's (--pace wall), so that the tool's own clock runs beside it as it would beside real devices;
+each emulator says when, on CLOCK_MONOTONIC, it was powered on, and so when every frame truly was. The sensors of both
+feel triangles of pressure: their tops, found in the recording, show the same without any device's clock.
+"""
+import argparse
+import contextlib
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "host_tools" / "python"))
+import fingertip_files as files  # noqa: E402
+
+TOOLS = argparse.Namespace()
+CLOCKS_ppm = {"E660583883265A01": 25, "E660583883265A02": -25}
+RECORDED_s = 60
+RATE_Hz = 50
+LIMIT_us = 1000
+PATIENCE_s = 60
+PROMPT_s = 0.1
+TRIANGLE_s = 2.0
+TOP_Pa = 20000
+
+
+def write_scenario(path):
+    names = ["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(15))]
+    rows = [f"{t_s:g},{','.join('0' * len(files.TRUTH_COLUMNS))},{','.join([str(p_Pa)] * 15)}"
+            for t_s, p_Pa in zip(np.arange(0, RECORDED_s + 3 * PATIENCE_s, TRIANGLE_s / 2), [0, TOP_Pa] * 1000)]
+    path.write_text("\n".join(["# fingertip-scenario 1", ",".join(names), *rows]) + "\n")
+
+
+class Emulator:
+    def __init__(self, folder, serial, scenario):
+        self.port = folder / f"tty-{serial}"
+        self.report_path = folder / f"{serial}.json"
+        self.process = subprocess.Popen(
+            [TOOLS.node, ROOT / "host_tools/emulator/main.mjs", "--image", TOOLS.image, "--board", "pico_mux", "--scenario",
+             scenario, "--seconds", "3600", "--seed", str(int(serial[-2:])), "--serial", serial,
+             "--clock-ppm", str(CLOCKS_ppm[serial]), "--pty", self.port, "--wait-open", "--pace", "wall",
+             "--fast-enumeration", "--report", self.report_path],
+            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+    def wait(self):
+        end_s = time.monotonic() + PATIENCE_s
+        while not os.path.lexists(self.port):
+            if self.process.poll() is not None or time.monotonic() > end_s:
+                raise AssertionError("the emulator did not start")
+            time.sleep(0.02)
+
+    def catch_up(self):
+        """At its first rate it is slower than the wall."""
+        end_s = time.monotonic() + PATIENCE_s
+        while True:
+            began_s = time.monotonic()
+            done = subprocess.run([TOOLS.fingertip, "info", "--port", self.port], capture_output=True, timeout=PATIENCE_s)
+            if done.returncode == 0 and time.monotonic() - began_s < PROMPT_s:
+                return
+            if began_s > end_s:
+                raise AssertionError("the emulator is slower than the clock on the wall: nothing can be measured here")
+
+    def stop(self):
+        self.process.terminate()
+        self.errors = self.process.communicate(timeout=PATIENCE_s)[1]
+
+    @property
+    def report(self):
+        return json.loads(self.report_path.read_text())
+
+    def true_us(self, device_us):
+        """On CLOCK_MONOTONIC."""
+        report = self.report
+        return report["wall_zero_us"] + report["device_time_zero_s"] * 1e6 + device_us / (1 + report["clock_ppm"] * 1e-6)
+
+
+def tool(*arguments, limit_s=PATIENCE_s, **environment):
+    done = subprocess.run([TOOLS.fingertip, *arguments], capture_output=True, text=True, timeout=limit_s,
+                          env={**os.environ, **environment})
+    if done.returncode:
+        raise AssertionError(f"fingertip {arguments[0]}: {done.stderr}")
+    return done.stdout
+
+
+def tops_us(time_us, pressure_Pa, expected_us):
+    """When each triangle was at its top: half-way between its two crossings of the middle."""
+    low_Pa, high_Pa = pressure_Pa.min(), pressure_Pa.max()
+    height = (pressure_Pa - low_Pa) / (high_Pa - low_Pa)
+    found = []
+    for top_us in expected_us:
+        crossings = []
+        for sign in (-1, 1):
+            flank = (sign * (time_us - top_us) > 0) & (abs(time_us - top_us) < TRIANGLE_s / 2 * 1e6)
+            flank &= (height > 0.1) & (height < 0.9)
+            slope, offset = np.polyfit(height[flank] - 0.5, time_us[flank] - top_us, 1)
+            crossings.append(offset)
+        found.append(top_us + np.mean(crossings))
+    return np.array(found)
+
+
+class TwoFingertips(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        holder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(holder.cleanup)
+        folder = pathlib.Path(holder.name)
+        write_scenario(folder / "scenario.csv")
+        cls.file = folder / "both.csv"
+        with contextlib.ExitStack() as stack:
+            cls.emulators = [Emulator(folder, serial, folder / "scenario.csv") for serial in CLOCKS_ppm]
+            for each in cls.emulators:
+                stack.callback(each.stop)
+            for each in cls.emulators:
+                each.wait()
+                tool("set", "--port", each.port, f"rate={RATE_Hz}")
+            for each in cls.emulators:
+                each.catch_up()
+            ports = ":".join(str(each.port) for each in cls.emulators)
+            tool("record", cls.file, "--all", "--seconds", str(RECORDED_s), limit_s=RECORDED_s + PATIENCE_s,
+                 FINGERTIP_PORT=ports)
+        cls.recordings = [files.read_recording(cls.file, device=serial) for serial in CLOCKS_ppm]
+        cls.host_zero_us = float(cls.recordings[0].metadata["host_zero_us"])
+
+    def test_nothing_was_amiss(self):
+        for each, recording in zip(self.emulators, self.recordings):
+            self.assertEqual(each.report["warnings"], [], each.errors)
+            self.assertEqual(recording.events, [])
+            self.assertTrue((np.diff(recording["frame"]) == 1).all())
+            self.assertGreater(len(recording["frame"]), 0.95 * RATE_Hz * RECORDED_s)
+        self.assertEqual(self.recordings[0].end["dropped_packets"], "0")
+
+    def test_the_clocks_drift_as_they_were_told(self):
+        for serial, recording in zip(CLOCKS_ppm, self.recordings):
+            with open(self.file, encoding="utf-8") as file:
+                number = list(CLOCKS_ppm).index(serial)
+                end = next(line for line in file if line.startswith(f"# {number}/end:"))
+            drift_ppm = float(dict(pair.split("=") for pair in end.split()[2:])["drift_ppm"])
+            self.assertLess(abs(drift_ppm - CLOCKS_ppm[serial]), 10)
+            # the rows themselves: device time against the common clock, over the second half
+            late = slice(len(recording.time_us) // 2, None)
+            slope = np.polyfit(recording.time_us[late], recording["t_us"][late] - recording.time_us[late], 1)[0]
+            self.assertLess(abs(slope * 1e6 - CLOCKS_ppm[serial]), 20)
+
+    def test_rows_are_where_they_truly_were(self):
+        rows = []
+        for number, (each, recording) in enumerate(zip(self.emulators, self.recordings)):
+            error_us = recording.time_us - (each.true_us(recording["t_us"]) - self.host_zero_us)
+            self.assertGreater(recording.time_us[-1] - recording.time_us[0], 0.98e6 * RECORDED_s)
+            rows += [(time_us, number, error) for time_us, error in zip(recording.time_us, error_us)]
+        # at each row of the one, against the other's latest error
+        latest, worst_us = {}, 0.0
+        for _, number, error_us in sorted(rows):
+            latest[number] = error_us
+            worst_us = max(worst_us, abs(latest[number] - latest.get(1 - number, error_us)))
+        bound_us = float(self.recordings[0].end["alignment_us"])
+        print(f"worst {worst_us:.1f} us, stated bound {bound_us:.1f} us")
+        self.assertLess(worst_us, LIMIT_us)
+        self.assertLessEqual(worst_us, bound_us)
+        report(alignment_us=round(worst_us, 1), alignment_bound_us=bound_us, alignment_seconds=RECORDED_s,
+               alignment_of="two emulated fingertips, clocks 50 ppm apart, emulated at the pace of the wall clock, "
+                            "recorded by the host tool through pseudo-terminals")
+
+    def test_what_both_felt_tells_the_same(self):
+        errors = []
+        for each, recording in zip(self.emulators, self.recordings):
+            zero_us = each.report["wall_zero_us"] - self.host_zero_us
+            tops = zero_us + np.arange(TRIANGLE_s / 2, RECORDED_s + 2 * PATIENCE_s, TRIANGLE_s) * 1e6
+            inside = (tops > recording.time_us[0] + TRIANGLE_s * 0.5e6) & (tops < recording.time_us[-1] - TRIANGLE_s * 0.5e6)
+            pressure_Pa = recording.sensors_Pa.mean(axis=1)
+            told = ~np.isnan(pressure_Pa)
+            errors.append(tops_us(recording.time_us[told], pressure_Pa[told], tops[inside]) - tops[inside])
+        count = min(len(each) for each in errors)
+        self.assertGreater(count, RECORDED_s / TRIANGLE_s - 3)
+        apart_us = abs(errors[0][:count] - errors[1][:count]).max()
+        print(f"tops {apart_us:.1f} us apart, late by {np.mean(errors):.1f} us")
+        self.assertLess(apart_us, LIMIT_us)
+        report(alignment_felt_us=round(apart_us, 1))
+
+
+def report(**numbers):
+    """Adds to a file that other tests write to too."""
+    path = pathlib.Path(TOOLS.report)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    old = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    path.write_text(json.dumps({**old, **numbers}, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    for name in ("image", "fingertip", "node", "report"):
+        parser.add_argument(f"--{name}", required=True)
+    _, rest = parser.parse_known_args(namespace=TOOLS)
+    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
