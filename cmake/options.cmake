@@ -68,7 +68,7 @@ if(NOT FINGERTIP_FIT_ITERATIONS MATCHES "^([1-9]|1[0-9]|20)$")
 endif()
 
 # Prior on the width of the contact, for rubber so stiff that the array can hardly tell it: the sigma
-# that the pad gives (about 0.45 of the rubber's thickness) and how sure that is. 0: none.
+# that the pad gives (`twin width` computes it) and how sure that is. 0: none.
 set(FINGERTIP_PRIOR_SIGMA_UM 0 CACHE STRING "Prior on sigma, micrometres; 0 for none")
 set(FINGERTIP_PRIOR_WIDTH_UM 500 CACHE STRING "Standard deviation of that prior, micrometres")
 foreach(option FINGERTIP_PRIOR_SIGMA_UM FINGERTIP_PRIOR_WIDTH_UM)
