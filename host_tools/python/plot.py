@@ -102,6 +102,7 @@ def draw_errors(axes, comparison):
         force.hist(percent, bins=41, range=(-reach, reach), color=MEASURED)
         force.axvline(0, color=INK, lw=1)
     force.set_xlabel("force error, %")
+    force.locator_params(axis="x", nbins=5)
     for panel in axes:
         panel.set_ylabel("frames")
 

@@ -31,8 +31,8 @@ usage: fit_report [--kernel NAME] [--variant TEXT] [--set A|B|C|D] [--limit N] [
 
 --kernel (reference/kernels.hpp), --variant (part of a variant's name) and --set choose rows;
 --limit takes N presses in all (120 000 by default: A, B a third each, C, D a sixth each), with one
-sensor masked half of them, with two and three a tenth. Writes fit_error.csv and .json to --out and
-prints the same. One row per kernel, variant, set (ABCD: all together) and observability; variants
+sensor masked half of them, with two and three a tenth. Writes fit_error.json to --out and prints
+the same. One row per kernel, variant, set (ABCD: all together) and observability; variants
 that a kernel does not have are left out:
   presses       of the set that are (not) observable (reference/dataset.hpp)
   p50_um ..     distance of the location from the reference optimum of the presses as received at
@@ -264,23 +264,6 @@ void print(const Row &row) {
   std::fflush(stdout);
 }
 
-void write_csv(const std::string &path, const std::vector<Row> &rows) {
-  std::ofstream file(path);
-  file << "kernel,variant,set,observable,presses,without_fit,outlier,p50_um,p99_um,p999_um,"
-          "worst_um,above_10um,above_100um,truth_p50_mm,truth_p99_mm,bad_unflagged,good_flagged\n";
-  for (const Row &r : rows) {
-    file << r.kernel << ',' << r.variant << ',' << r.set << ',' << r.observable << ',' << r.presses
-         << ',' << r.without_fit << ',' << r.outlier << ',' << r.p50_um << ',' << r.p99_um << ','
-         << r.p999_um << ',' << r.worst_um << ',' << r.above_10um << ',' << r.above_100um
-         << ',' << r.truth_p50_mm << ',' << r.truth_p99_mm << ',' << r.bad_unflagged
-         << ',' << r.good_flagged << '\n';
-  }
-  file.close();
-  if (!file) {
-    throw std::runtime_error("cannot write " + path);
-  }
-}
-
 void write_json(const std::string &path, const std::vector<Row> &rows, const Options &options) {
   std::ofstream file(path);
   file << "{\"seed\": " << options.seed << ", \"presses\": " << options.limit << ", \"rows\": [";
@@ -424,7 +407,6 @@ int report(const Options &options) {
   if (rows.empty()) {
     throw std::runtime_error("no kernel, variant and set match");
   }
-  write_csv(options.out + "/fit_error.csv", rows);
   write_json(options.out + "/fit_error.json", rows, options);
   return 0;
 }

@@ -44,7 +44,7 @@ constexpr char HELP[] =
     "  --limit N    presses of each case, 8000 by default\n"
     "  --seed S     of the presses\n"
     "  --case TEXT  only cases whose name holds it\n"
-    "  --out DIR    where stiff.csv and stiff.json go, build/.../report by default\n"
+    "  --out DIR    where stiff.json goes, build/.../report by default\n"
     "  --check      exit status 1 if a result is not finite, or if more than 0.5 % of a case are\n"
     "               bad and carry no warning\n";
 
@@ -541,37 +541,6 @@ void print_header() {
   std::printf("  %7s %7s\n", "bad!fl%", "good&f%");
 }
 
-void write_csv(const std::string &path, const std::vector<Row> &rows) {
-  std::ofstream file(path);
-  file << "case,presses,fits,not_finite,p50_mm,p95_mm,worst_mm";
-  for (const Flag &flag : FLAGS) {
-    file << ',' << flag.name;
-  }
-  file << ",bad_unflagged,good_flagged\n";
-  const auto number = [&](double value) {
-    file << ',';
-    if (std::isfinite(value)) {
-      file << value;
-    }
-  };
-  for (const Row &r : rows) {
-    file << '"' << r.name << '"' << ',' << r.presses << ',' << r.fits << ',' << r.not_finite;
-    number(r.p50_mm);
-    number(r.p95_mm);
-    number(r.worst_mm);
-    for (double share : r.share) {
-      number(share);
-    }
-    number(r.bad_unflagged);
-    number(r.good_flagged);
-    file << '\n';
-  }
-  file.close();
-  if (!file) {
-    throw std::runtime_error("cannot write " + path);
-  }
-}
-
 void write_json(const std::string &path, const std::vector<Row> &rows, std::uint64_t seed) {
   std::ofstream file(path);
   const auto number = [&](const char *name, double value) {
@@ -641,7 +610,6 @@ int run(const Options &options) {
     throw std::runtime_error("no case is named '" + options.name + "'");
   }
   std::filesystem::create_directories(options.out);
-  write_csv(options.out + "/stiff.csv", rows);
   write_json(options.out + "/stiff.json", rows, options.seed);
   int failed = 0;
   for (const Row &row : rows) {

@@ -30,9 +30,9 @@ usage: fit_bench [--limit N] [--passes N] [--seed S] [--out DIR] [--cache DIR]
 Takes the observable ones of the first N presses (12 000 by default, the sets A to D mixed), cuts
 them into blocks and lets every kernel fit block after block, in an order that rotates, so that all
 of them see the same machine. A fit starts at the readings as the firmware receives them and ends at
-location, peak, width and force. Kernels that run a number of iterations run seven; separable goes on until it has settled, twelve at
-the most, which leaves it no more error than any library; what those do is in reference/libraries.hpp. Writes
-fit_bench.csv and .json to --out, prints:
+location, peak, width and force. Kernels that run a number of iterations run seven; separable goes
+on until it has settled, twelve at the most, which leaves it no more error than any library; what
+those do is in reference/libraries.hpp. Writes fit_bench.json to --out, prints:
   us          processor time of one fit: median over blocks and passes, 10 % and 90 % quantiles
   ratio       the same block's time by this kernel over that by separable: median, 10 %, 90 %
   p50_um ..   distance of the location from the reference optimum; not a number counts as
@@ -160,9 +160,8 @@ int bench(int argc, char **argv) {
   }
   const std::vector<Measured> all = measure(kernels, cases, passes);
 
-  std::ofstream csv(out + "/fit_bench.csv");
-  std::ofstream json(out + "/fit_bench.json");
-  csv << "kernel,us,us_p10,us_p90,ratio,ratio_p10,ratio_p90,p50_um,p999_um,above_100um\n";
+  const std::string path = out + "/fit_bench.json";
+  std::ofstream json(path);
   json << "{\"processor\": \"" << processor() << "\", \"compiler\": \"" << __VERSION__
        << "\", \"presses\": " << cases.size() << ", \"passes\": " << passes
        << ", \"seed\": " << seed << ", \"rows\": [";
@@ -184,11 +183,6 @@ int bench(int argc, char **argv) {
     std::printf("%-13s %8.3f %8.3f..%7.3f %8.3f %8.3f..%7.3f %10.4g %10.4g %7td\n", m.name,
                 values[0], values[1], values[2], values[3], values[4], values[5], values[6],
                 values[7], above);
-    csv << m.name;
-    for (double value : values) {
-      csv << ',' << value;
-    }
-    csv << ',' << above << '\n';
     const char *names[] = {"us",        "us_p10",    "us_p90", "ratio",
                            "ratio_p10", "ratio_p90", "p50_um", "p999_um"};
     json << separator << "{\"kernel\": \"" << m.name << "\"";
@@ -200,10 +194,9 @@ int bench(int argc, char **argv) {
     separator = ",\n";
   }
   json << "\n]}\n";
-  csv.close();
   json.close();
-  if (!csv || !json) {
-    throw std::runtime_error("cannot write fit_bench.csv and .json to " + out);
+  if (!json) {
+    throw std::runtime_error("cannot write " + path);
   }
   return 0;
 }

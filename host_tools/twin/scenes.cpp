@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
+#include <numeric>
 
 namespace fingertip::twin {
 namespace {
@@ -116,109 +116,98 @@ Act press(const std::string &name, Place place, double force_N, double ramp_s, d
   return act;
 }
 
-void grid(Stage &stage) {
+// The functions below make the nth act of a kind.
+
+Act grid(const Stage &stage, std::size_t n) {
   struct Way {
     const char *name;
     double ramp_s, hold_s;
   };
   constexpr std::array<Way, 3> ways{{{"tap", 0.1, 0.1}, {"press", 0.8, 0.3}, {"hold", 0.25, 3.0}}};
-  for (std::size_t pass = 0;; pass++) {
-    std::array<int, GRID_PLACES_X * GRID_PLACES_Y> order{};
-    for (std::size_t i = 0; i < order.size(); i++) {
-      order[i] = static_cast<int>(i);
-    }
-    Random random(stage.options.seed, GRID_ORDER, pass);
-    for (std::size_t i = order.size() - 1; i > 0; i--) {
-      std::swap(order[i], order[random.next() % (i + 1)]);
-    }
-    for (std::size_t i = 0; i < order.size(); i++) {
-      const int row = order[i] / GRID_PLACES_X - GRID_PLACES_Y / 2;
-      const int column = order[i] % GRID_PLACES_X - GRID_PLACES_X / 2;
-      const Place place{GRID_STEP_mm * column, GRID_STEP_mm * row};
-      for (std::size_t w = 0; w < ways.size(); w++) {
-        Random strength(stage.options.seed, GRID, (pass * order.size() + i) * ways.size() + w);
-        // Forces in turn: after some passes every place has had all of them in every way.
-        const std::size_t turn = static_cast<std::size_t>(order[i]) + pass + 2 * w;
-        Act act = press(ways[w].name, place,
-                        stage.forces.pick(turn, strength.uniform(0.0, 1.0)), ways[w].ramp_s,
-                        ways[w].hold_s);
-        act.sensors_near = (column % 2 != 0 ? 2 : 1) * (row % 2 != 0 ? 2 : 1);
-        if (!stage.play(act)) {
-          return;
-        }
-      }
-    }
+  std::array<int, GRID_PLACES_X * GRID_PLACES_Y> order{};
+  std::iota(order.begin(), order.end(), 0);
+  const std::size_t way = n % ways.size(), nth_place = n / ways.size() % order.size();
+  const std::size_t pass = n / (ways.size() * order.size());
+  Random random(stage.options.seed, GRID_ORDER, pass);
+  for (std::size_t i = order.size() - 1; i > 0; i--) {
+    std::swap(order[i], order[random.next() % (i + 1)]);
   }
+  const int at = order[nth_place];
+  const int row = at / GRID_PLACES_X - GRID_PLACES_Y / 2;
+  const int column = at % GRID_PLACES_X - GRID_PLACES_X / 2;
+  Random strength(stage.options.seed, GRID, n);
+  // Forces in turn: after some passes every place has had all of them in every way.
+  const std::size_t turn = static_cast<std::size_t>(at) + pass + 2 * way;
+  Act act = press(ways[way].name, {GRID_STEP_mm * column, GRID_STEP_mm * row},
+                  stage.forces.pick(turn, strength.uniform(0.0, 1.0)), ways[way].ramp_s,
+                  ways[way].hold_s);
+  act.sensors_near = (column % 2 != 0 ? 2 : 1) * (row % 2 != 0 ? 2 : 1);
+  return act;
 }
 
-void random_presses(Stage &stage, const std::string &name, double ramp_s, double hold_s) {
-  for (std::size_t n = 0;; n++) {
-    Random random(stage.options.seed, TAPS, n);
-    const Place place = stage.random_place(random);
-    const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
-    const double ramps_s = milliseconds(ramp_s * random.uniform(0.7, 1.3));
-    if (!stage.play(press(name, place, force_N, ramps_s, hold_s))) {
-      return;
-    }
-  }
+Act random_press(const Stage &stage, std::size_t n, const std::string &name, double ramp_s,
+                 double hold_s) {
+  Random random(stage.options.seed, TAPS, n);
+  const Place place = stage.random_place(random);
+  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+  const double ramps_s = milliseconds(ramp_s * random.uniform(0.7, 1.3));
+  return press(name, place, force_N, ramps_s, hold_s);
 }
 
-void taps(Stage &stage) {
-  random_presses(stage, "tap", 0.12, 0.3);
+Act tap(const Stage &stage, std::size_t n) {
+  return random_press(stage, n, "tap", 0.12, 0.3);
 }
 
-void high(Stage &stage) {
-  random_presses(stage, "hold", 0.5, 0.6);
+Act high(const Stage &stage, std::size_t n) {
+  return random_press(stage, n, "hold", 0.5, 0.6);
 }
 
 // By hand: never at rest, and not quite at one place.
-void pokes(Stage &stage) {
+Act poke(const Stage &stage, std::size_t n) {
   constexpr double WANDER_mm = 1.5;
-  for (std::size_t n = 0;; n++) {
-    Random random(stage.options.seed, POKES, n);
-    Act act;
-    act.press = "poke";
-    Track track = track_at(stage.random_place(random));
-    const double direction = random.uniform(0.0, 2.0 * M_PI);
-    track.along_x = std::cos(direction);
-    track.along_y = std::sin(direction);
-    const int changes = 3 + static_cast<int>(random.next() % 5);
-    for (int i = 0; i < changes; i++) {
-      const double seconds = random.uniform(0.15, 0.6);
-      track.force_N.ease(seconds, stage.forces.pick(n, random.uniform(0.0, 1.0)));
-      track.pusher_mm.ease(seconds, random.uniform(0.0, WANDER_mm));
-      if (i == 0) {
-        phase(act, "touch", track.force_N.end_s());
-      }
-    }
-    phase(act, "poke", track.force_N.end_s());
-    track.force_N.ease(random.uniform(0.15, 0.4), 0.0);
-    phase(act, "release", track.force_N.end_s());
-    act.tracks.push_back(track);
-    if (!stage.play(act)) {
-      return;
+  Random random(stage.options.seed, POKES, n);
+  Act act;
+  act.press = "poke";
+  Track track = track_at(stage.random_place(random));
+  const double direction = random.uniform(0.0, 2.0 * M_PI);
+  track.along_x = std::cos(direction);
+  track.along_y = std::sin(direction);
+  const int changes = 3 + static_cast<int>(random.next() % 5);
+  for (int i = 0; i < changes; i++) {
+    const double seconds = random.uniform(0.15, 0.6);
+    track.force_N.ease(seconds, stage.forces.pick(n, random.uniform(0.0, 1.0)));
+    track.pusher_mm.ease(seconds, random.uniform(0.0, WANDER_mm));
+    if (i == 0) {
+      phase(act, "touch", track.force_N.end_s());
     }
   }
+  phase(act, "poke", track.force_N.end_s());
+  track.force_N.ease(random.uniform(0.15, 0.4), 0.0);
+  phase(act, "release", track.force_N.end_s());
+  act.tracks.push_back(track);
+  return act;
 }
 
 // Slow enough that only what does not depend on the rate makes a loop, save relaxation.
-void cycle(Stage &stage) {
+Act cycle(const Stage &stage, std::size_t n) {
   constexpr double RAMP_s = 15.0;
-  for (std::size_t n = 0;; n++) {
-    Random random(stage.options.seed, CYCLE, n);
-    const Place place = n == 0 ? Place{0.0, 0.0} : stage.random_place(random);
-    Act act;
-    act.press = "cycle";
-    Track track = track_at(place);
-    track.force_N.line(RAMP_s, stage.forces.pick(n, random.uniform(0.0, 1.0)));
-    phase(act, "load", track.force_N.end_s());
-    track.force_N.line(RAMP_s, 0.0);
-    phase(act, "unload", track.force_N.end_s());
-    act.tracks.push_back(track);
-    if (!stage.play(act)) {
-      return;
-    }
-  }
+  Random random(stage.options.seed, CYCLE, n);
+  const Place place = n == 0 ? Place{0.0, 0.0} : stage.random_place(random);
+  Act act;
+  act.press = "cycle";
+  Track track = track_at(place);
+  track.force_N.line(RAMP_s, stage.forces.pick(n, random.uniform(0.0, 1.0)));
+  phase(act, "load", track.force_N.end_s());
+  track.force_N.line(RAMP_s, 0.0);
+  phase(act, "unload", track.force_N.end_s());
+  act.tracks.push_back(track);
+  return act;
+}
+
+template <std::size_t N>
+double speed_mm_s(const Stage &stage, std::size_t n, const std::array<double, N> &usual_mm_s) {
+  const std::vector<double> &given_mm_s = stage.options.speeds_mm_s;
+  return given_mm_s.empty() ? usual_mm_s[n % N] : given_mm_s[n % given_mm_s.size()];
 }
 
 // When the pusher's way, which never falls, first is this long; whole milliseconds.
@@ -231,137 +220,115 @@ double time_of(const Profile &way, double length_mm, double begin_s, double end_
   return milliseconds(high);
 }
 
-void slip(Stage &stage) {
-  const std::vector<double> usual(SLIP_SPEEDS_mm_s.begin(), SLIP_SPEEDS_mm_s.end());
-  const std::vector<double> &speeds =
-      stage.options.speeds_mm_s.empty() ? usual : stage.options.speeds_mm_s;
-  for (std::size_t n = 0;; n++) {
-    Random random(stage.options.seed, SLIP, n);
-    const bool upward = random.uniform(0.0, 1.0) < 0.5;
-    const double slack_mm = 0.5 * (SLIP_SPAN_mm - SLIP_WAY_mm);
-    const double x_mm = random.uniform(-GRID_HALF_X_mm, GRID_HALF_X_mm);
-    const double y_mm = -0.5 * SLIP_WAY_mm + random.uniform(-slack_mm, slack_mm);
-    Act act;
-    act.press = "grip";
-    act.speed_mm_s = speeds[n % speeds.size()];
-    Track track = track_at({x_mm, upward ? y_mm : -y_mm});
-    track.along_y = upward ? 1.0 : -1.0;
-    track.grip = {stage.options.dead_travel_mm, stage.options.creep_share,
-                  stage.options.stick_slip_mm};
-    track.angle_rad = Profile(random.uniform(-15.0, 15.0) * DEGREE);
-    const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+Act slip(const Stage &stage, std::size_t n) {
+  Random random(stage.options.seed, SLIP, n);
+  const bool upward = random.uniform(0.0, 1.0) < 0.5;
+  const double slack_mm = 0.5 * (SLIP_SPAN_mm - SLIP_WAY_mm);
+  const double x_mm = random.uniform(-GRID_HALF_X_mm, GRID_HALF_X_mm);
+  const double y_mm = -0.5 * SLIP_WAY_mm + random.uniform(-slack_mm, slack_mm);
+  Act act;
+  act.press = "grip";
+  act.speed_mm_s = speed_mm_s(stage, n, SLIP_SPEEDS_mm_s);
+  Track track = track_at({x_mm, upward ? y_mm : -y_mm});
+  track.along_y = upward ? 1.0 : -1.0;
+  track.grip = {stage.options.dead_travel_mm, stage.options.creep_share,
+                stage.options.stick_slip_mm};
+  track.angle_rad = Profile(random.uniform(-15.0, 15.0) * DEGREE);
+  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
 
-    track.force_N.ease(0.3, force_N);
-    phase(act, "touch", track.force_N.end_s());
-    track.force_N.hold(random.uniform(0.8, 1.2));
-    const double push_s = track.force_N.end_s();
-    phase(act, "hold", push_s);
-    track.pusher_mm.hold(push_s);
-    track.pusher_mm.travel(track.grip.pusher_mm(SLIP_WAY_mm), act.speed_mm_s, SPEED_UP_s);
-    const double stop_s = track.pusher_mm.end_s();
-    if (track.grip.dead_travel_mm > 0.0) {
-      phase(act, "dead_travel",
-            time_of(track.pusher_mm, track.grip.dead_travel_mm, push_s, stop_s), true);
-    }
-    phase(act, "slip", stop_s, true);
-    track.force_N.hold(stop_s - push_s + 0.5);
-    phase(act, "after", track.force_N.end_s());
-    track.force_N.ease(0.3, 0.0);
-    phase(act, "release", track.force_N.end_s());
-    act.tracks.push_back(track);
-    if (!stage.play(act)) {
-      return;
-    }
+  track.force_N.ease(0.3, force_N);
+  phase(act, "touch", track.force_N.end_s());
+  track.force_N.hold(random.uniform(0.8, 1.2));
+  const double push_s = track.force_N.end_s();
+  phase(act, "hold", push_s);
+  track.pusher_mm.hold(push_s);
+  track.pusher_mm.travel(track.grip.pusher_mm(SLIP_WAY_mm), act.speed_mm_s, SPEED_UP_s);
+  const double stop_s = track.pusher_mm.end_s();
+  if (track.grip.dead_travel_mm > 0.0) {
+    phase(act, "dead_travel", time_of(track.pusher_mm, track.grip.dead_travel_mm, push_s, stop_s),
+          true);
   }
+  phase(act, "slip", stop_s, true);
+  track.force_N.hold(stop_s - push_s + 0.5);
+  phase(act, "after", track.force_N.end_s());
+  track.force_N.ease(0.3, 0.0);
+  phase(act, "release", track.force_N.end_s());
+  act.tracks.push_back(track);
+  return act;
 }
 
-void twist(Stage &stage) {
+Act twist(const Stage &stage, std::size_t n) {
   constexpr double TURN_deg = 90.0;
-  for (std::size_t n = 0;; n++) {
-    Random random(stage.options.seed, TWIST, n);
-    Act act;
-    act.press = "grip";
-    Track track = track_at(stage.random_place(random));
-    const double from = random.uniform(-45.0, 45.0) * DEGREE;
-    track.angle_rad = Profile(from);
-    track.force_N.ease(0.3, stage.forces.pick(n, random.uniform(0.0, 1.0)));
-    phase(act, "touch", track.force_N.end_s());
-    track.force_N.hold(random.uniform(0.5, 0.7));
-    const double begin_s = track.force_N.end_s();
-    phase(act, "hold", begin_s);
-    track.angle_rad.hold(begin_s);
-    const double rate = TWIST_RATES_deg_s[n % TWIST_RATES_deg_s.size()] * DEGREE;
-    track.angle_rad.travel(TURN_deg * DEGREE, rate, SPEED_UP_s);
-    const double end_s = track.angle_rad.end_s();
-    phase(act, "twist", end_s);
-    track.force_N.hold(end_s - begin_s + 0.5);
-    phase(act, "after", track.force_N.end_s());
-    track.force_N.ease(0.3, 0.0);
-    phase(act, "release", track.force_N.end_s());
-    act.tracks.push_back(track);
-    if (!stage.play(act)) {
-      return;
-    }
-  }
+  Random random(stage.options.seed, TWIST, n);
+  Act act;
+  act.press = "grip";
+  Track track = track_at(stage.random_place(random));
+  const double from = random.uniform(-45.0, 45.0) * DEGREE;
+  track.angle_rad = Profile(from);
+  track.force_N.ease(0.3, stage.forces.pick(n, random.uniform(0.0, 1.0)));
+  phase(act, "touch", track.force_N.end_s());
+  track.force_N.hold(random.uniform(0.5, 0.7));
+  const double begin_s = track.force_N.end_s();
+  phase(act, "hold", begin_s);
+  track.angle_rad.hold(begin_s);
+  const double rate = TWIST_RATES_deg_s[n % TWIST_RATES_deg_s.size()] * DEGREE;
+  track.angle_rad.travel(TURN_deg * DEGREE, rate, SPEED_UP_s);
+  const double end_s = track.angle_rad.end_s();
+  phase(act, "twist", end_s);
+  track.force_N.hold(end_s - begin_s + 0.5);
+  phase(act, "after", track.force_N.end_s());
+  track.force_N.ease(0.3, 0.0);
+  phase(act, "release", track.force_N.end_s());
+  act.tracks.push_back(track);
+  return act;
 }
 
 // The contact rolls across the pad's long edge, until nothing of it is left on the pad.
-void rolloff(Stage &stage) {
-  const std::vector<double> usual(ROLL_SPEEDS_mm_s.begin(), ROLL_SPEEDS_mm_s.end());
-  const std::vector<double> &speeds =
-      stage.options.speeds_mm_s.empty() ? usual : stage.options.speeds_mm_s;
-  for (std::size_t n = 0;; n++) {
-    Random random(stage.options.seed, ROLLOFF, n);
-    Act act;
-    act.press = "roll";
-    act.speed_mm_s = speeds[n % speeds.size()];
-    Track track = track_at({random.uniform(-2.0, 2.0),
-                            random.uniform(-GRID_HALF_Y_mm, GRID_HALF_Y_mm)});
-    track.along_x = 1.0;
-    track.along_y = 0.0;
-    const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
-    track.edge_x_mm = PAD_HALF_WIDTH_mm;
-    track.radius_mm = stage.table.contact_radius_mm(force_N);
-    track.force_N.ease(0.3, force_N);
-    phase(act, "touch", track.force_N.end_s());
-    track.force_N.hold(random.uniform(0.4, 0.6));
-    phase(act, "hold", track.force_N.end_s());
-    track.pusher_mm.hold(track.force_N.end_s());
-    track.pusher_mm.travel(PAD_HALF_WIDTH_mm + track.radius_mm - track.x_mm, act.speed_mm_s,
-                           SPEED_UP_s);
-    track.force_N.hold(track.pusher_mm.end_s() - track.force_N.end_s());
-    phase(act, "roll", track.force_N.end_s());
-    act.tracks.push_back(track);
-    if (!stage.play(act)) {
-      return;
-    }
-  }
+Act rolloff(const Stage &stage, std::size_t n) {
+  Random random(stage.options.seed, ROLLOFF, n);
+  Act act;
+  act.press = "roll";
+  act.speed_mm_s = speed_mm_s(stage, n, ROLL_SPEEDS_mm_s);
+  Track track =
+      track_at({random.uniform(-2.0, 2.0), random.uniform(-GRID_HALF_Y_mm, GRID_HALF_Y_mm)});
+  track.along_x = 1.0;
+  track.along_y = 0.0;
+  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+  track.edge_x_mm = PAD_HALF_WIDTH_mm;
+  track.radius_mm = stage.table.contact_radius_mm(force_N);
+  track.force_N.ease(0.3, force_N);
+  phase(act, "touch", track.force_N.end_s());
+  track.force_N.hold(random.uniform(0.4, 0.6));
+  phase(act, "hold", track.force_N.end_s());
+  track.pusher_mm.hold(track.force_N.end_s());
+  track.pusher_mm.travel(PAD_HALF_WIDTH_mm + track.radius_mm - track.x_mm, act.speed_mm_s,
+                         SPEED_UP_s);
+  track.force_N.hold(track.pusher_mm.end_s() - track.force_N.end_s());
+  phase(act, "roll", track.force_N.end_s());
+  act.tracks.push_back(track);
+  return act;
 }
 
-void two(Stage &stage) {
-  for (std::size_t n = 0;; n++) {
-    Random random(stage.options.seed, TWO, n);
-    const double distance = DISTANCES_mm[n % DISTANCES_mm.size()];
-    // The far ones lie along the pad, which is too narrow for them.
-    const double direction = distance > 2.0 * GRID_HALF_X_mm ? random.uniform(60.0, 120.0)
-                                                             : random.uniform(0.0, 180.0);
-    const double half_x = 0.5 * distance * std::cos(direction * DEGREE);
-    const double half_y = 0.5 * distance * std::sin(direction * DEGREE);
-    const double x_mm = random.uniform(-2.0, 2.0), y_mm = random.uniform(-2.0, 2.0);
-    const double one_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
-    const double other_N = stage.forces.pick(n + 1, random.uniform(0.0, 1.0));
-    Act act = press("two", {x_mm - half_x, y_mm - half_y}, one_N, 0.25, 0.5);
-    act.tracks.push_back(
-        press("two", {x_mm + half_x, y_mm + half_y}, other_N, 0.25, 0.5).tracks.front());
-    if (!stage.play(act)) {
-      return;
-    }
-  }
+Act two(const Stage &stage, std::size_t n) {
+  Random random(stage.options.seed, TWO, n);
+  const double distance = DISTANCES_mm[n % DISTANCES_mm.size()];
+  // The far ones lie along the pad, which is too narrow for them.
+  const double direction = distance > 2.0 * GRID_HALF_X_mm ? random.uniform(60.0, 120.0)
+                                                           : random.uniform(0.0, 180.0);
+  const double half_x = 0.5 * distance * std::cos(direction * DEGREE);
+  const double half_y = 0.5 * distance * std::sin(direction * DEGREE);
+  const double x_mm = random.uniform(-2.0, 2.0), y_mm = random.uniform(-2.0, 2.0);
+  const double one_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+  const double other_N = stage.forces.pick(n + 1, random.uniform(0.0, 1.0));
+  Act act = press("two", {x_mm - half_x, y_mm - half_y}, one_N, 0.25, 0.5);
+  act.tracks.push_back(
+      press("two", {x_mm + half_x, y_mm + half_y}, other_N, 0.25, 0.5).tracks.front());
+  return act;
 }
 
 struct Kind {
   SceneKind kind;
-  std::function<void(Stage &)> play;
+  Act (*act)(const Stage &stage, std::size_t n);
 };
 
 const std::vector<Kind> &all_kinds() {
@@ -369,9 +336,9 @@ const std::vector<Kind> &all_kinds() {
       {{"grid", 200, "1,2.5,5,10,15",
         "tap, press and 3 s hold on each of the paper's 21 places, 4.5 mm apart"},
        grid},
-      {{"taps", 120, "1..15", "short taps at random places"}, taps},
+      {{"taps", 120, "1..15", "short taps at random places"}, tap},
       {{"high", 120, "25..50", "strong presses at random places"}, high},
-      {{"pokes", 120, "0.5..25", "as if by hand: changing force, wandering place"}, pokes},
+      {{"pokes", 120, "0.5..25", "as if by hand: changing force, wandering place"}, poke},
       {{"cycle", 120, "20", "slow loading and unloading, 15 s each; the first above a sensor"},
        cycle},
       {{"slip", 120, "6",
@@ -502,7 +469,8 @@ Scene make_scene(const SceneOptions &options, const ContactTable &table) {
   }
   const Forces forces(chosen.forces);
   Stage stage(chosen, table, forces);
-  kind->play(stage);
+  for (std::size_t n = 0; stage.play(kind->act(stage, n)); n++) {
+  }
   if (stage.acts.empty()) {
     throw Error("--seconds " + number(*chosen.seconds) + " is too short for one contact of \"" +
                 chosen.kind + "\"; leave it out for " + number(kind->kind.usual_seconds));

@@ -194,8 +194,8 @@ void host_resume(void) {
   leave_interrupt();
 }
 
-int host_in(uint8_t endpoint, uint8_t packet[64]) {
-  struct endpoint *e = find(endpoint);
+/* What it answers instead of a packet, or 0: then the buffer is the device's again. */
+static int exchange(struct endpoint *e) {
   if (fake.host_address != fake.address || !e->open)
     return HOST_NO_ANSWER;
   if (e->stalled)
@@ -203,12 +203,20 @@ int host_in(uint8_t endpoint, uint8_t packet[64]) {
   if (!e->held)
     return HOST_NAK;
   TEST_ASSERT_EQUAL_MESSAGE(e->host_data1, e->data1, "wrong data PID");
-  size_t length = e->length;
-  if (length)
-    memcpy(packet, e->packet, length);
   e->held = false;
   e->data1 = !e->data1;
   e->host_data1 = !e->host_data1;
+  return 0;
+}
+
+int host_in(uint8_t endpoint, uint8_t packet[64]) {
+  struct endpoint *e = find(endpoint);
+  int refused = exchange(e);
+  if (refused)
+    return refused;
+  size_t length = e->length;
+  if (length)
+    memcpy(packet, e->packet, length);
   enter_interrupt();
   usb_device_on_sent(endpoint);
   leave_interrupt();
@@ -216,17 +224,9 @@ int host_in(uint8_t endpoint, uint8_t packet[64]) {
 }
 
 int host_out(uint8_t endpoint, const void *bytes, size_t length) {
-  struct endpoint *e = find(endpoint);
-  if (fake.host_address != fake.address || !e->open)
-    return HOST_NO_ANSWER;
-  if (e->stalled)
-    return HOST_STALL;
-  if (!e->held)
-    return HOST_NAK;
-  TEST_ASSERT_EQUAL_MESSAGE(e->host_data1, e->data1, "wrong data PID");
-  e->held = false;
-  e->data1 = !e->data1;
-  e->host_data1 = !e->host_data1;
+  int refused = exchange(find(endpoint));
+  if (refused)
+    return refused;
   enter_interrupt();
   usb_device_on_received(endpoint, bytes, length);
   leave_interrupt();
