@@ -1,15 +1,19 @@
 """The emulated device judged by a stock Debian kernel, and the host tool run on that kernel.
 
-usage: test_linux.py --image F.bin --fingertip TOOL --node NODE --cache FOLDER --report usb.json
+usage: test_linux.py --image F.bin --parallel F.bin --fingertip TOOL --node NODE --cache FOLDER --report usb.json
 
 The tests are one story and run in order: a first boot of the device streams over the serial port and ends with the
-boot loader request, a second one over libusb and ends with a 1200-baud touch. Exit: 77 if this machine cannot run it.
+boot loader request, a second one over libusb and ends with a 1200-baud touch, the third is of the other board. In the
+first two the sensors feel the same steady press: what frame N holds is the same in both, so that the two transports
+can be compared frame by frame. Exit: 77 if this machine cannot run it.
 """
 import argparse
 import csv
 import json
+import math
 import pathlib
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -20,16 +24,20 @@ import zlib
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path.insert(0, str(HERE))
+sys.path.insert(0, str(ROOT / "host_tools" / "python"))
+import fingertip_files as files  # noqa: E402
 import guest as virtual  # noqa: E402
 
 TOOLS = argparse.Namespace()
 REPORT = {}
-REPORTED = ("packets_serial", "packets_libusb", "lost", "kernel_warnings", "detach_cycles", "linux_test_s")
+REPORTED = ("packets_serial", "packets_libusb", "packets_compared", "different", "packets_pico_parallel", "lost",
+            "stalled_shown_s", "kernel_warnings", "detach_cycles", "linux_test_s")
 SERIAL = "E660583883265A2C"
 VENDOR_PRODUCT = "1209:0001"
 SKIPPED = 77
 PACKETS = 10000
-STREAM_s = 25  # 2 packets for each of 207 frames a second
+STREAM_s = 30  # 2 packets for each of 207 frames a second, and what the two streams do not share
+PARALLEL_STREAM_s = 2
 SERIAL_CYCLES = 12
 LIBUSB_CYCLES = 8
 # Seconds on the wall, for a machine that emulates at a tenth of real time
@@ -37,6 +45,8 @@ PATIENCE_s = 60
 STREAM_LIMIT_s = 10 * STREAM_s
 KERNEL_WARNING = 4
 CONTACT, RAW = 0x01, 0x02
+# Of a contact packet's body: the stages' times, measured in a chip that also does as its host wants.
+STAGE_TIMES = slice(8, 22)
 
 
 def cobs_decode(coded):
@@ -71,11 +81,11 @@ def gaps(packets):
 class Emulator:
     """A powered device on the cable."""
 
-    def __init__(self, folder, name, scenario, socket):
+    def __init__(self, folder, name, image, board, scenario, socket):
         self.base = folder / name
         self.errors = open(self.path("err"), "w+")
         self.process = subprocess.Popen(
-            [TOOLS.node, ROOT / "host_tools/emulator/main.mjs", "--image", TOOLS.image, "--board", "pico_mux",
+            [TOOLS.node, ROOT / "host_tools/emulator/main.mjs", "--image", image, "--board", board,
              "--scenario", scenario, "--seconds", "3600", "--usbredir", socket, "--fast-enumeration",
              "--usb-log", self.path("usb"), "--capture", self.path("ftr"), "--report", self.path("json")],
             stdin=subprocess.PIPE, stderr=self.errors, text=True)
@@ -115,6 +125,16 @@ class Emulator:
         self.errors.close()
 
 
+def write_press(path):
+    """The same press from 1.2 s on."""
+    press = [20000 * math.exp(-((x_mm - 2) ** 2 + (y_mm - 3) ** 2) / (2 * 5.7 ** 2))
+             for x_mm, y_mm in zip(files.SENSOR_X_mm, files.SENSOR_Y_mm)]
+    names = ["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(len(press)))]
+    truth = ",".join("0" * len(files.TRUTH_COLUMNS))
+    rows = [f"{t_s},{truth},{','.join(f'{scale * p_Pa:.3f}' for p_Pa in press)}" for t_s, scale in ((0, 0), (1, 0), (1.2, 1))]
+    path.write_text("\n".join(["# fingertip-scenario 1", ",".join(names), *rows]) + "\n")
+
+
 class Linux(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -122,8 +142,7 @@ class Linux(unittest.TestCase):
         cls.addClassCleanup(holder.cleanup)
         cls.folder = pathlib.Path(holder.name)
         cls.scenario = cls.folder / "scenario.csv"
-        subprocess.run([sys.executable, ROOT / "host_tools/python/scenario.py", "ideal", "-o", cls.scenario, "--seconds",
-                        "120"], check=True)
+        write_press(cls.scenario)
         cls.socket = cls.folder / "usb.sock"
         programs = [TOOLS.fingertip, "/usr/bin/lsusb", "/usr/bin/usbreset"]
         cls.guest = virtual.Guest(cls.folder, TOOLS.kernel, programs, cls.socket)
@@ -133,8 +152,8 @@ class Linux(unittest.TestCase):
         cls.power_up("first")
 
     @classmethod
-    def power_up(cls, name):
-        cls.device = Emulator(cls.folder, name, cls.scenario, cls.socket)
+    def power_up(cls, name, image=None, board="pico_mux"):
+        cls.device = Emulator(cls.folder, name, image or TOOLS.image, board, cls.scenario, cls.socket)
         cls.addClassCleanup(cls.device.stop)
 
     @classmethod
@@ -160,10 +179,10 @@ class Linux(unittest.TestCase):
     def pairs(self, text):
         return dict(re.findall(r"^(\w+) +(.*)$", text, re.M))
 
-    def stream(self, transport):
-        """Records what PACKETS needs; checks that the tool got every byte that the device sent meanwhile."""
+    def stream(self, transport, seconds=STREAM_s, wanted=PACKETS):
+        """Records so many packets; check_bytes then sees that the tool got every byte that the device sent meanwhile."""
         self.tool(f"record /tmp/{transport}.csv --raw-bytes /tmp/{transport}.ftr --transport {transport} "
-                  f"--seconds {STREAM_s}", STREAM_LIMIT_s)
+                  f"--seconds {seconds}", STREAM_LIMIT_s)
         end = self.sh(f"tail -n 1 /tmp/{transport}.csv")
         self.assertIn("dropped_packets=0 out_of_order=0 crc_errors=0 format_errors=0", end)
         received = self.guest.read_file(f"/tmp/{transport}.ftr")
@@ -171,8 +190,9 @@ class Linux(unittest.TestCase):
         packets, damaged = packets_of(received)
         self.assertEqual(damaged, 0)
         self.assertEqual(gaps(packets), 0)
-        self.assertGreaterEqual(len(packets), PACKETS)
+        self.assertGreaterEqual(len(packets), wanted)
         self.streams[transport] = received
+        return packets
 
     def leave(self, reason):
         """The device goes to its boot loader; what it and the emulator had to say is checked."""
@@ -262,6 +282,49 @@ class Linux(unittest.TestCase):
             wanted = [(kind, first + i) for i in range(PACKETS // 2) for kind in (CONTACT, RAW)]
             self.assertEqual(frames[:PACKETS] == wanted, True, "not a contact and a raw packet for each frame in turn")
 
+    def test_11_the_same_frames_over_both(self):
+        bodies = []
+        for stream in self.streams.values():
+            of_frame = {}
+            for kind, _, body in packets_of(stream)[0]:
+                if kind == CONTACT:
+                    body = body[:STAGE_TIMES.start] + body[STAGE_TIMES.stop:]
+                if kind in (CONTACT, RAW):
+                    of_frame[kind, int.from_bytes(body[:4], "little")] = body
+            bodies.append(of_frame)
+        shared = set(bodies[0]) & set(bodies[1])
+        different = [key for key in sorted(shared) if bodies[0][key] != bodies[1][key]]
+        REPORT.update(packets_compared=len(shared), different=len(different))
+        self.assertEqual(different, [])
+        self.assertGreaterEqual(len(shared), PACKETS)
+        self.assertGreater(len({body[4:] for body in bodies[0].values()}), 0.95 * len(shared), "readings that never change")
+
+    def stall(self, transport):
+        """Seconds in the machine from a silent device to the monitor's word; the device is silent while it is stopped."""
+        def uptime_s():
+            return float(self.sh("cut -d' ' -f1 /proc/uptime"))
+        self.sh(f"(fingertip monitor --colour plain --transport {transport} | while read -r line; do "
+                "echo \"$(cut -d' ' -f1 /proc/uptime) $line\"; done) > /tmp/monitor.log 2>&1 & "
+                "n=0; until pidof fingertip > /tmp/monitor.pid; do n=$((n+1)); [ $n -lt 100 ] || exit 1; usleep 50000; done")
+        self.wait_for("grep -q 'CONTACT FIT_VALID' /tmp/monitor.log")
+        self.device.process.send_signal(signal.SIGSTOP)
+        silent_s = uptime_s()
+        time.sleep(3)
+        self.device.process.send_signal(signal.SIGCONT)
+        self.wait_for("sed '1,/STALLED/d' /tmp/monitor.log | grep -q 'CONTACT FIT_VALID'")
+        self.sh("kill -INT $(cat /tmp/monitor.pid); n=0; while pidof fingertip; do n=$((n+1)); [ $n -lt 100 ] || exit 1; "
+                "usleep 50000; done")
+        lines = self.sh("cat /tmp/monitor.log; rm /tmp/monitor.*").splitlines()
+        stalled_s = next(float(line.split()[0]) for line in lines if "STALLED" in line)
+        return stalled_s - silent_s
+
+    def test_11_standing_still_shows_within_a_second(self):
+        shown_s = [self.stall(transport) for transport in ("serial", "usb")]
+        self.wait_for_port()
+        REPORT["stalled_shown_s"] = round(max(shown_s), 2)
+        self.assertGreater(min(shown_s), 0)
+        self.assertLess(max(shown_s), 1.0)
+
     def start_recording(self, name, transport):
         self.sh(f"fingertip record /tmp/{name}.csv --raw-bytes /tmp/{name}.ftr --transport {transport} "
                 f"> /tmp/{name}.log 2>&1 & echo $! > /tmp/{name}.pid")
@@ -345,6 +408,22 @@ class Linux(unittest.TestCase):
             echoed = sum(row["endpoint"] == "2" and row["dir"] == "out" and row["length"] == "1" for row in csv.DictReader(file))
         self.assertGreater(echoed, 100, "the terminal that was not yet raw echoed nothing")
 
+    # The other board
+
+    def test_18_the_parallel_board(self):
+        self.power_up("third", TOOLS.parallel, "pico_parallel")
+        self.wait_for_port()
+        self.assertRegex(self.tool("list"), rf"^{SERIAL}\tpico_parallel\t\d+\.\d+\.\d+\tserial /dev/ttyACM0, usb \d+/\d+\n$")
+        count = 0
+        for transport in ("serial", "usb"):
+            count += len(self.stream(transport, PARALLEL_STREAM_s, 2 * 400 * PARALLEL_STREAM_s))
+            self.wait_for_port()
+        REPORT["packets_pico_parallel"] = count
+        self.tool("loader")
+        self.leave("entered the USB boot loader")
+        for transport in ("serial", "usb"):
+            self.check_bytes(transport)
+
     def test_20_no_complaint(self):
         complaints = [text for level, text in self.kernel_log()[self.quiet_until:] if level <= KERNEL_WARNING]
         REPORT["kernel_warnings"] = len(complaints)
@@ -371,7 +450,7 @@ def write_report(path):
 
 def main():
     parser = argparse.ArgumentParser()
-    for name in ("image", "fingertip", "node", "cache", "report"):
+    for name in ("image", "parallel", "fingertip", "node", "cache", "report"):
         parser.add_argument(f"--{name}", required=True)
     parser.parse_known_args(namespace=TOOLS)
     try:
