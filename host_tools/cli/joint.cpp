@@ -371,7 +371,7 @@ private:
       const Fingertip &each = *fingertips_[i];
       text += "  " + std::string(each.info().serial, strnlen(each.info().serial, WIRE_TEXT_BYTES)) +
               " " + std::to_string(recording_->frames(i)) + " frames" +
-              (each.is_gone() ? " GONE" : each.is_stalled() ? " STALLED" : "");
+              (each.is_gone() ? std::string(" ") + GONE_ADVICE : each.is_stalled() ? " STALLED" : "");
     }
     text += "  aligned to " + fixed(recording_->alignment_us(), 0) + " us";
     std::fprintf(stderr, isatty(STDERR_FILENO) ? "\r\x1b[K%s" : "%s\n", printable(text).c_str());

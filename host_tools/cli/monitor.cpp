@@ -1,5 +1,6 @@
 #include "cli/monitor.hpp"
 
+#include "libfingertip/error.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/text.hpp"
 
@@ -243,7 +244,7 @@ void draw_title(Canvas &canvas, const Model &model, const std::string &note) {
     colour = WARNING;
     break;
   case Model::State::gone:
-    state = "gone, waiting for it to come back";
+    state = GONE_ADVICE;
     break;
   case Model::State::replay:
     state = "replay";

@@ -1,6 +1,7 @@
 #include "cli/view.hpp"
 
 #include "cli/monitor.hpp"
+#include "libfingertip/error.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/text.hpp"
 
@@ -51,7 +52,7 @@ std::string state_text(const Model &model) {
   case Model::State::connecting:
     return "waiting for an answer";
   case Model::State::gone:
-    return "gone, waiting for it to come back";
+    return GONE_ADVICE;
   case Model::State::live:
     return !silence_s ? "no frames yet" : *silence_s > STALLED_s ? "STALLED" : "";
   case Model::State::replay:

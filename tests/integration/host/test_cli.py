@@ -7,6 +7,7 @@ import pty
 import re
 import resource
 import select
+import shutil
 import signal
 import subprocess
 import sys
@@ -250,6 +251,97 @@ class Several(CliTest):
             self.assertIn("No space left on device", err)
 
 
+class ErrorsPeopleMeet(CliTest):
+    """Each one line that says what to do, and exit status 1. Those of several fingertips on USB: tests/unit/host."""
+
+    RULE = "permission denied; install the udev rule: fingertip rule | sudo tee /etc/udev/rules.d/60-fingertip.rules, " \
+           "then sudo udevadm control --reload, and plug it in again"
+
+    def test_no_permission(self):
+        with self.device():
+            os.chmod(os.path.realpath(self.port), 0)
+            if os.geteuid() != 0:
+                self.assertEqual(self.error("info", "--port", self.port), f"fingertip: {self.port}: {self.RULE}\n")
+                return
+            tool = os.path.join(self.folder, "fingertip")  # where everybody may run it
+            shutil.copy(FINGERTIP, tool)
+            os.chmod(self.folder, 0o755)
+            done = subprocess.run([tool, "info", "--port", self.port], capture_output=True, text=True, user=65534, group=65534,
+                                  extra_groups=[], env=self.environment)
+            self.assertEqual((done.returncode, done.stdout, done.stderr), (1, "", f"fingertip: {self.port}: {self.RULE}\n"))
+
+    def test_port_busy(self):
+        with self.device():
+            process = self.start("record", self.csv, "--port", self.port)
+            self.wait_for(lambda: os.path.exists(self.csv))
+            for command in (["info"], ["monitor"], ["record", self.ftr]):
+                self.assertEqual(self.error(*command, "--port", self.port),
+                                 f"fingertip: {self.port}: in use by another program; end that one first "
+                                 f"(who: fuser -v {self.port})\n")
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=PATIENCE_s)
+
+    def test_no_device(self):
+        if subprocess.run([FINGERTIP, "list"], env=self.environment, capture_output=True).returncode == 0:
+            self.skipTest("a fingertip is plugged in")
+        for command in (["list"], ["info"], ["monitor"], ["record", self.csv], ["tare"], ["set", "rate=max"], ["loader"]):
+            self.assertRegex(self.error(*command), "^fingertip: no fingertip found; plug one in")
+        self.assertFalse(os.path.exists(self.csv))
+
+    def test_two_and_none_chosen(self):
+        other = self.port + "2"
+        with self.device("serial=AAAA"), self.device("serial=BBBB", port=other):
+            self.environment["FINGERTIP_PORT"] = self.port + ":" + other
+            for command in (["info"], ["monitor"], ["record", self.csv], ["tare"]):
+                self.assertEqual(self.error(*command), "fingertip: several fingertips found; choose one with --port: "
+                                                       f"{self.port} {other}\n")
+
+    def test_wrong_device(self):
+        with self.device("mute=1"):
+            self.assertEqual(self.error("info", "--port", self.port),
+                             f'fingertip: {self.port}: no answer to "info"; is it a fingertip? unplug it and plug it in again\n')
+        with self.device("serial=AAAA"):
+            self.assertEqual(self.error("info", "--port", self.port, "--device", "BBBB"),
+                             f"fingertip: {self.port}: is fingertip AAAA, not BBBB; leave out --port, or see `fingertip list`\n")
+
+    def test_older_or_newer_protocol_version(self):
+        for version in (1, 3):
+            with self.device(f"version={version}"):
+                for command in (["info"], ["set", "rate=max"]):
+                    self.assertEqual(self.error(*command, "--port", self.port),
+                                     f"fingertip: {self.port}: speaks protocol version {version}, this tool version 2; install "
+                                     "this tool's firmware with `fingertip flash`, or use the other's tool\n")
+
+    def test_cable_pulled(self):
+        with self.device("mute=1") as device:
+            process = self.start("info", "--port", self.port)
+            time.sleep(0.3)
+            device.terminate()
+            self.assertEqual(process.communicate(timeout=PATIENCE_s),
+                             ("", f'fingertip: {self.port}: vanished before it answered "info"; plug it in and try again\n'))
+            self.assertEqual(process.returncode, 1)
+        for command, told in (["record", self.csv], "stderr"), (["monitor"], "stdout"), (["record", self.ftr, "--all"], "stderr"):
+            self.environment["FINGERTIP_PORT"] = self.port
+            with self.device() as device:
+                process = self.start(*command)
+                stream = getattr(process, told)
+                self.assertIn("frames", stream.readline())
+                device.terminate()
+                while "gone, plug it in again" not in (line := stream.readline()):
+                    self.assertIn("frames", line)
+                process.send_signal(signal.SIGINT)
+                process.communicate(timeout=PATIENCE_s)
+            self.assertEqual(process.returncode, 0)
+
+    def test_disk_full(self):
+        with self.device():
+            for command in (["record", "/dev/full", "--overwrite"], ["record", self.csv, "--raw-bytes", "/dev/full", "--overwrite"],
+                            ["monitor", "--record", "/dev/full", "--overwrite"]):
+                err = self.run_cli(*command, "--port", self.port, status=1)[1]
+                self.assertRegex(err.splitlines()[-1], "^fingertip: /dev/full: No space left on device; .*make room and start a new file$|"
+                                                       "^fingertip: /dev/full: No space left on device; .*--salvage$")
+
+
 class Flash(CliTest):
     """Images as the build makes them, a fake loader's drive, and a fake device that comes back."""
 
@@ -366,10 +458,14 @@ class Install(CliTest):
     def test_the_build_installs_all_of_it(self):
         build = pathlib.Path(FINGERTIP).parents[2]
         subprocess.run(["cmake", "--install", build, "--prefix", self.folder], check=True, capture_output=True)
-        for path in ("bin/fingertip", "lib/udev/rules.d/60-fingertip.rules", "share/man/man1/fingertip.1",
-                     "share/bash-completion/completions/fingertip", "share/zsh/site-functions/_fingertip",
-                     "share/fish/vendor_completions.d/fingertip.fish"):
-            self.assertTrue(os.path.isfile(os.path.join(self.folder, path)), path)
+        installed = {os.path.relpath(os.path.join(folder, name), self.folder)
+                     for folder, _, names in os.walk(self.folder) for name in names}
+        self.assertEqual(installed, {
+            "bin/fingertip", "lib/udev/rules.d/60-fingertip.rules", "share/man/man1/fingertip.1",
+            "share/bash-completion/completions/fingertip", "share/zsh/site-functions/_fingertip",
+            "share/fish/vendor_completions.d/fingertip.fish"})
+        self.assertEqual(subprocess.run([os.path.join(self.folder, "bin/fingertip"), "--version"], capture_output=True, text=True,
+                                        check=True).stdout, self.run_cli("--version")[0])
         with open(os.path.join(self.folder, "lib/udev/rules.d/60-fingertip.rules"), encoding="utf-8") as file:
             self.assertEqual(file.read(), self.run_cli("rule")[0])
 
@@ -385,6 +481,12 @@ class Install(CliTest):
             self.assertRegex(manual, rf"(?m)^\.BI? {command}\b")
             for option in re.findall(r"--[a-z][a-z-]*", self.run_cli(command, "--help")[0]):
                 self.assertIn(option, manual)
+
+    @unittest.skipUnless(shutil.which("groff"), "groff is not here")
+    def test_the_manual_is_well_formed(self):
+        done = subprocess.run(["groff", "-man", "-ww", "-Tutf8", self.INSTALL / "fingertip.1"], capture_output=True, text=True, check=True)
+        self.assertEqual(done.stderr, "")
+        self.assertIn("FINGERTIP_PORT", re.sub(".\b", "", done.stdout))
 
     def test_bash_completes(self):
         def complete(*words):
@@ -404,12 +506,6 @@ class Install(CliTest):
 
 
 class Commands(CliTest):
-    def test_another_protocol_version_is_named(self):
-        for version in (1, 3):
-            with self.device(f"version={version}"):
-                self.assertIn(f"speaks protocol version {version}, this tool version 2; install this tool's firmware",
-                              self.error("info", "--port", self.port))
-
     def test_info_and_settings(self):
         with self.device():
             out = self.run_cli("info", "--port", self.port)[0]
