@@ -1,7 +1,7 @@
 """A virtual machine that runs a stock Debian kernel, with busybox and the programs it is given.
 
     kernel = fetch_kernel(cache)                  # Unavailable if that cannot be had
-    guest = Guest(folder, kernel, [fingertip, "/usr/bin/lsusb"], usbredir="/tmp/usb.sock")
+    guest = Guest(folder, kernel, [fingertip, "/usr/bin/lsusb"], usbredir=["/tmp/usb.sock"])
     status, output = guest.run("lsusb -v")
     guest.stop()
 
@@ -167,8 +167,10 @@ class Guest:
              "-nic", "none", "-kernel", kernel / "vmlinux", "-initrd", initramfs,
              "-append", "console=ttyS0 quiet panic=-1 mitigations=off nokaslr",
              "-serial", f"file:{self.folder / 'console.log'}", "-serial", f"unix:{port},server=on,wait=off",
-             "-device", "qemu-xhci", "-chardev", f"socket,id=usb,path={usbredir},reconnect=1",
-             "-device", "usb-redir,chardev=usb"],
+             "-device", "qemu-xhci",
+             *(option for number, path in enumerate(usbredir)
+               for option in ("-chardev", f"socket,id=usb{number},path={path},reconnect=1",
+                              "-device", f"usb-redir,chardev=usb{number}"))],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=self.errors)
         self.requests = 0
         self.received = b""

@@ -3,9 +3,10 @@
 usage: test_linux.py --image F.bin --parallel F.bin --fingertip TOOL --node NODE --cache FOLDER --report usb.json
 
 The tests are one story and run in order: a first boot of the device streams over the serial port and ends with the
-boot loader request, a second one over libusb and ends with a 1200-baud touch, the third is of the other board. In the
-first two the sensors feel the same steady press: what frame N holds is the same in both, so that the two transports
-can be compared frame by frame. Exit: 77 if this machine cannot run it.
+boot loader request, a second one over libusb and ends with a 1200-baud touch, the third is of the other board, and
+another fingertip is plugged in beside it. The sensors feel the same steady press each time: what frame N holds is the
+same in the first two boots, so that the two transports can be compared frame by frame. Exit: 77 if this machine cannot
+run it.
 """
 import argparse
 import csv
@@ -33,11 +34,13 @@ REPORT = {}
 REPORTED = ("packets_serial", "packets_libusb", "packets_compared", "different", "packets_pico_parallel", "lost",
             "stalled_shown_s", "kernel_warnings", "detach_cycles", "linux_test_s")
 SERIAL = "E660583883265A2C"
+OTHER_SERIAL = "E660583883265A2D"
 VENDOR_PRODUCT = "1209:0001"
 SKIPPED = 77
 PACKETS = 10000
 STREAM_s = 30  # 2 packets for each of 207 frames a second, and what the two streams do not share
 PARALLEL_STREAM_s = 2
+PAIR_s, PAIR_RATE_Hz = 4, 50
 SERIAL_CYCLES = 12
 LIBUSB_CYCLES = 8
 # Seconds on the wall, for a machine that emulates at a tenth of real time
@@ -47,6 +50,9 @@ KERNEL_WARNING = 4
 CONTACT, RAW = 0x01, 0x02
 # Of a contact packet's body: the stages' times, measured in a chip that also does as its host wants.
 STAGE_TIMES = slice(8, 22)
+# While the press comes on, a reading depends on its microsecond.
+PRESSED_s = 1.2
+STEADY_FROM_FRAME = 300
 
 
 def cobs_decode(coded):
@@ -81,12 +87,12 @@ def gaps(packets):
 class Emulator:
     """A powered device on the cable."""
 
-    def __init__(self, folder, name, image, board, scenario, socket):
+    def __init__(self, folder, name, image, board, scenario, socket, serial=SERIAL):
         self.base = folder / name
         self.errors = open(self.path("err"), "w+")
         self.process = subprocess.Popen(
             [TOOLS.node, ROOT / "host_tools/emulator/main.mjs", "--image", image, "--board", board,
-             "--scenario", scenario, "--seconds", "3600", "--usbredir", socket, "--fast-enumeration",
+             "--scenario", scenario, "--seconds", "3600", "--serial", serial, "--usbredir", socket, "--fast-enumeration",
              "--usb-log", self.path("usb"), "--capture", self.path("ftr"), "--report", self.path("json")],
             stdin=subprocess.PIPE, stderr=self.errors, text=True)
 
@@ -126,12 +132,12 @@ class Emulator:
 
 
 def write_press(path):
-    """The same press from 1.2 s on."""
+    """The same press from PRESSED_s on."""
     press = [20000 * math.exp(-((x_mm - 2) ** 2 + (y_mm - 3) ** 2) / (2 * 5.7 ** 2))
              for x_mm, y_mm in zip(files.SENSOR_X_mm, files.SENSOR_Y_mm)]
     names = ["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(len(press)))]
     truth = ",".join("0" * len(files.TRUTH_COLUMNS))
-    rows = [f"{t_s},{truth},{','.join(f'{scale * p_Pa:.3f}' for p_Pa in press)}" for t_s, scale in ((0, 0), (1, 0), (1.2, 1))]
+    rows = [f"{t_s},{truth},{','.join(f'{scale * p_Pa:.3f}' for p_Pa in press)}" for t_s, scale in ((0, 0), (PRESSED_s - 0.2, 0), (PRESSED_s, 1))]
     path.write_text("\n".join(["# fingertip-scenario 1", ",".join(names), *rows]) + "\n")
 
 
@@ -143,9 +149,9 @@ class Linux(unittest.TestCase):
         cls.folder = pathlib.Path(holder.name)
         cls.scenario = cls.folder / "scenario.csv"
         write_press(cls.scenario)
-        cls.socket = cls.folder / "usb.sock"
+        cls.sockets = [cls.folder / f"usb{number}.sock" for number in range(2)]
         programs = [TOOLS.fingertip, "/usr/bin/lsusb", "/usr/bin/usbreset"]
-        cls.guest = virtual.Guest(cls.folder, TOOLS.kernel, programs, cls.socket)
+        cls.guest = virtual.Guest(cls.folder, TOOLS.kernel, programs, cls.sockets)
         cls.addClassCleanup(cls.guest.stop)
         cls.quiet_until = len(cls.kernel_log())
         cls.streams = {}
@@ -153,7 +159,7 @@ class Linux(unittest.TestCase):
 
     @classmethod
     def power_up(cls, name, image=None, board="pico_mux"):
-        cls.device = Emulator(cls.folder, name, image or TOOLS.image, board, cls.scenario, cls.socket)
+        cls.device = Emulator(cls.folder, name, image or TOOLS.image, board, cls.scenario, cls.sockets[0])
         cls.addClassCleanup(cls.device.stop)
 
     @classmethod
@@ -289,8 +295,9 @@ class Linux(unittest.TestCase):
             for kind, _, body in packets_of(stream)[0]:
                 if kind == CONTACT:
                     body = body[:STAGE_TIMES.start] + body[STAGE_TIMES.stop:]
-                if kind in (CONTACT, RAW):
-                    of_frame[kind, int.from_bytes(body[:4], "little")] = body
+                frame = int.from_bytes(body[:4], "little")
+                if kind in (CONTACT, RAW) and frame >= STEADY_FROM_FRAME:
+                    of_frame[kind, frame] = body
             bodies.append(of_frame)
         shared = set(bodies[0]) & set(bodies[1])
         different = [key for key in sorted(shared) if bodies[0][key] != bodies[1][key]]
@@ -408,7 +415,7 @@ class Linux(unittest.TestCase):
             echoed = sum(row["endpoint"] == "2" and row["dir"] == "out" and row["length"] == "1" for row in csv.DictReader(file))
         self.assertGreater(echoed, 100, "the terminal that was not yet raw echoed nothing")
 
-    # The other board
+    # The third boot
 
     def test_18_the_parallel_board(self):
         self.power_up("third", TOOLS.parallel, "pico_parallel")
@@ -419,6 +426,36 @@ class Linux(unittest.TestCase):
             count += len(self.stream(transport, PARALLEL_STREAM_s, 2 * 400 * PARALLEL_STREAM_s))
             self.wait_for_port()
         REPORT["packets_pico_parallel"] = count
+
+    def test_19_two_told_apart(self):
+        other = Emulator(self.folder, "other", TOOLS.image, "pico_mux", self.scenario, self.sockets[1], OTHER_SERIAL)
+        self.addCleanup(other.stop)
+        self.wait_for("[ -c /dev/ttyACM1 ]")
+        boards = {SERIAL: "pico_parallel", OTHER_SERIAL: "pico_mux"}
+        for serial in boards:
+            self.tool(f"set rate={PAIR_RATE_Hz} --device {serial}")
+        listed = [line.split("\t") for line in self.tool("list").splitlines()]
+        self.assertEqual({serial: board for serial, board, *_ in listed}, boards)
+        self.assertEqual({re.search("ttyACM[01]", reached)[0] for *_, reached in listed}, {"ttyACM0", "ttyACM1"})
+        self.assertEqual(self.guest.run("fingertip info"), (1, f"fingertip: several fingertips found; choose one with --device: "
+                                                               f"{SERIAL} {OTHER_SERIAL}\n"))
+        self.assertEqual(self.guest.run("fingertip info --device 1234"),
+                         (1, f"fingertip: no fingertip 1234 here; there are: {SERIAL} {OTHER_SERIAL}\n"))
+        for serial, board in boards.items():
+            for transport in ("serial", "usb"):
+                told = self.pairs(self.tool(f"info --device {serial} --transport {transport}"))
+                self.assertEqual((told["serial"], told["board"]), (serial, board))
+                self.wait_for("[ -c /dev/ttyACM0 ] && [ -c /dev/ttyACM1 ]")
+        for transport in ("serial", "usb"):
+            self.tool(f"record /tmp/both.csv --overwrite --all --seconds {PAIR_s} --transport {transport}", STREAM_LIMIT_s)
+            ends = self.sh("grep '/end:' /tmp/both.csv").splitlines()
+            self.assertEqual(len(ends), 2)
+            for end in ends:
+                self.assertGreater(int(re.search(r"frames=(\d+)", end)[1]), PAIR_s * PAIR_RATE_Hz / 2)
+                self.assertIn("dropped_packets=0 out_of_order=0 crc_errors=0 format_errors=0", end)
+            self.wait_for("[ -c /dev/ttyACM0 ] && [ -c /dev/ttyACM1 ]")
+        self.tool(f"loader --device {OTHER_SERIAL}")
+        self.assertEqual(other.finish(PATIENCE_s)["warnings"], [])
         self.tool("loader")
         self.leave("entered the USB boot loader")
         for transport in ("serial", "usb"):
