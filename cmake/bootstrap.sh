@@ -9,7 +9,7 @@ usage() {
   echo "usage: sh cmake/bootstrap.sh demo|test|report" >&2
   echo "  demo    build everything, play presses and slips to the emulated fingertip, draw what it felt" >&2
   echo "  test    build everything and run the whole test suite" >&2
-  echo "  report  build everything, measure the fit, repeat the published experiments in simulation, write build/report" >&2
+  echo "  report  build everything, measure fit, rate and cost, repeat the published experiments in simulation, write build/report" >&2
   exit 2
 }
 [ $# -eq 1 ] || usage
@@ -95,6 +95,9 @@ case $1 in
     say "the fit: error against run time"
     /usr/bin/python3 host_tools/reference/report.py --build build/host \
       --image build/pico_mux/fit_cycles.bin -o build/report --plot host_tools/reference/fit_report.png
+    say "rate, latency and cost, in emulated time"
+    /usr/bin/python3 host_tools/report/rate.py --build build/host --boards build -o build/report \
+      --plot host_tools/report/rate.png
     say "the published experiments on the simulated fingertip"
     /usr/bin/python3 host_tools/twin/validation.py --build build/host \
       --image build/pico_mux/fingertip-pico_mux.bin -o build/report \

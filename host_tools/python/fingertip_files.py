@@ -202,10 +202,10 @@ def write_scenario(path, metadata, columns):
 
 
 class Recording:
-    """metadata, columns (name -> array[n], NaN where empty), sensors_Pa and tare_Pa [n][sensor], events, end;
-    line_numbers[n] of the rows in the file; time_us[n] on the recorder's clock, None in a recording of one."""
+    """metadata, columns (name -> array[n], NaN where empty), sensors_Pa and tare_Pa [n][sensor], events, end; packets, those
+    that are no frame: (type, {field: text}); line_numbers[n] of the rows in the file; time_us[n] on the recorder's clock, None in a recording of one."""
 
-    def __init__(self, path, metadata, names, table, line_numbers, sensors, events, end, skipped_lines, time_us=None):
+    def __init__(self, path, metadata, names, table, line_numbers, sensors, events, packets, end, skipped_lines, time_us=None):
         self.path = path
         self.time_us = time_us
         self.line_numbers = np.array(line_numbers)
@@ -215,6 +215,7 @@ class Recording:
         self.sensors_Pa = table[:, first:first + sensors]
         self.tare_Pa = table[:, first + sensors:first + 2 * sensors]
         self.events = events
+        self.packets = packets
         self.end = end
         self.skipped_lines = skipped_lines
 
@@ -224,6 +225,10 @@ class Recording:
     @property
     def has_contact(self):
         return ~np.isnan(self["flags"])
+
+    def health(self):
+        """Counters and state as of each health packet: {field: number}."""
+        return [{name: int(text) for name, text in fields.items()} for kind, fields in self.packets if kind == "health"]
 
     def flag(self, bit):
         return (np.nan_to_num(self["flags"]).astype(np.int64) & bit) != 0
@@ -237,6 +242,11 @@ def _end_counts(path, number, text):
             raise InputError(f'{path}:{number}: "{pair}" is not key=value; use --salvage to skip the line')
         counts[key] = value
     return counts
+
+
+def _packet(text):
+    words = text.split() or [""]
+    return words[0], dict(field.split("=", 1) for field in words[1:] if "=" in field)
 
 
 def recorded_devices(path):
@@ -285,7 +295,7 @@ def read_recording(path, salvage=False, device=None):
     number_in_file = _choose_device(path, devices, device) if devices else None
     times_us = []
     complete = lines[-1] == ""
-    metadata, header, rows, line_numbers, events, end, skipped, sensors = {}, None, [], [], [], {}, 0, 0
+    metadata, header, rows, line_numbers, events, packets, end, skipped, sensors = {}, None, [], [], [], [], {}, 0, 0
     advice = "use --salvage to skip damaged lines"
     for number, line in enumerate(lines[1:], 2):
         if not line.strip():
@@ -307,6 +317,8 @@ def read_recording(path, salvage=False, device=None):
                     end = _end_counts(path, number, value)
                 elif key == "event":
                     events.append(value)
+                elif key == "packet":
+                    packets.append(_packet(value))
                 elif key and header is None:
                     metadata[key] = value
                 continue
@@ -334,7 +346,7 @@ def read_recording(path, salvage=False, device=None):
         raise InputError(f"{path}: no header line; record anew")
     if not rows:
         raise InputError(f"{path}: no frames; record again while the fingertip streams")
-    return Recording(path, metadata, header, np.array(rows), line_numbers, sensors, events, end, skipped,
+    return Recording(path, metadata, header, np.array(rows), line_numbers, sensors, events, packets, end, skipped,
                      np.array(times_us) if devices else None)
 
 

@@ -25,6 +25,7 @@ import time
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "python"))
 from fingertip_files import InputError, run_tool, write_text  # noqa: E402
+from goals import goal_table_md, judge, missed, print_goals  # noqa: E402
 
 CLOCK_Hz = 125e6
 SKIPPED = 77  # exit status of a tool that has nothing to measure here
@@ -167,13 +168,7 @@ def figures(results):
         "seed": r.seed,
         "processor": r.bench["processor"],
     }
-    goals = {}
-    for name, sign, limit in GOALS:
-        bound = found[limit] if isinstance(limit, str) else limit
-        value = found[name]
-        met = None if value is None else value <= bound if sign == "<=" else value >= bound
-        goals[name] = {"goal": f"{sign} {bound:g}", "met": met}
-    return {**found, "goals": goals}
+    return judge(found, GOALS)
 
 
 def finite(value):
@@ -231,11 +226,7 @@ def write_table_md(path, rows, found):
     lines = ["# Error of the fit against run time", "",
              "Written by `sh cmake/bootstrap.sh report`. Cycles: emulated Cortex-M0+, median; ms at 125 MHz. um: distance of the location from",
              f"the reference optimum over the observable presses of sets A to D, seed {found['seed']}. host us: {found['processor']}.", "",
-             "| figure | found | goal | met |", "|---|---|---|---|"]
-    for name, goal in found["goals"].items():
-        met = {None: "not measured", True: "yes", False: "NO"}[goal["met"]]
-        value = "" if found[name] is None else f"{found[name]:.4g}" if isinstance(found[name], float) else found[name]
-        lines.append(f"| {name} | {value} | {goal['goal']} | {met} |")
+             *goal_table_md(found)]
     lines += ["", "| kernel | variant | cycles | ms | host us | p50 | p99 | p99.9 | A p99.9 | B | C | D | above 100 um | C, D: p99 mm to the truth |",
               "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"]
     for row in rows:
@@ -374,12 +365,9 @@ def main(argv):
     plot(out / "fit_report.png", results, found)
     if options.plot:
         shutil.copyfile(out / "fit_report.png", options.plot)
-    missed = [name for name, goal in found["goals"].items() if goal["met"] is False]
-    for name, goal in found["goals"].items():
-        value = "not measured" if found[name] is None else f"{found[name]:.6g}"
-        print(f"{'MISSED' if goal['met'] is False else 'ok' if goal['met'] else '-':7s} {name:28s} {value:>12s}   goal {goal['goal']}")
+    print_goals(found)
     print(f"report: {out / 'fit.json'}, {out / 'fit_table.md'}, {out / 'fit_report.png'}")
-    return 1 if options.check and missed else 0
+    return 1 if options.check and missed(found) else 0
 
 
 if __name__ == "__main__":

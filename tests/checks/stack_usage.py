@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 """Worst-case use of the main stack of a linked RP2040 image.
 
-usage: stack_usage.py IMAGE.elf --su-dir BUILD [--indirect FILE] [--limit BYTES] [--json FILE]
+usage: stack_usage.py IMAGE.elf --su-dir FOLDER... [--indirect FILE] [--limit BYTES] [--json FILE]
 
-Frames come from the compiler (GCC's -fstack-usage files below BUILD); of functions that it did not
-compile, from the disassembly, as the sum of all that they push. Calls are read from the linked code,
-because only there library functions and tail calls can be seen; a tail call counts as a call. Calls
-through pointers are resolved by a table (indirect_calls.txt tells its form). A call that the table
-does not resolve, recursion, and a frame of unknown size fail.
+Frames come from the compiler (GCC's -fstack-usage files below the folders, which hold nothing but
+what the image may be linked from); of functions that it did not compile, from the disassembly, as
+the sum of all that they push. Calls are read from the linked code, because only there library
+functions and tail calls can be seen; a tail call counts as a call. Calls through pointers are
+resolved by a table (indirect_calls.txt tells its form). A call that the table does not resolve,
+recursion, and a frame of unknown size fail.
 
 All interrupts of an image have one priority, so at most one handler runs on top of the main program:
 worst case = start-up and main + exception frame + deepest handler. A fault can come on top, but it
@@ -100,10 +101,10 @@ def count_registers(operands):
     return count
 
 
-def read_compiler_frames(folder):
+def read_compiler_frames(folders):
     """Function name to the largest frame of that name; a clone is listed under its own name."""
     frames = {}
-    for path in pathlib.Path(folder).rglob("*.su"):
+    for path in (path for folder in folders for path in pathlib.Path(folder).rglob("*.su")):
         for line in path.read_text().splitlines():
             place, size, kind = line.split("\t")
             if kind == "dynamic":
@@ -111,7 +112,7 @@ def read_compiler_frames(folder):
             name = place.rsplit(":", 1)[1]
             frames[name] = max(frames.get(name, 0), int(size))
     if not frames:
-        fail(f"{folder}: no .su files; compile with -fstack-usage")
+        fail(f"{' '.join(folders)}: no .su files; compile with -fstack-usage")
     return frames
 
 
@@ -172,7 +173,7 @@ def chain_text(chain):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("elf")
-    parser.add_argument("--su-dir", required=True, help="build folder with the .su files")
+    parser.add_argument("--su-dir", required=True, nargs="+", help="build folders with the .su files")
     parser.add_argument("--indirect", default=str(pathlib.Path(__file__).with_name("indirect_calls.txt")))
     parser.add_argument("--limit", type=int, help="fail above this many bytes")
     parser.add_argument("--json", help="write the result to this file")

@@ -14,7 +14,7 @@ sys.path.insert(0, str(HERE))
 from elf import Elf  # noqa: E402
 
 IMAGE = sys.argv[1]
-BUILD = sys.argv[2]
+SU_FOLDERS = [str(pathlib.Path(sys.argv[2]) / part) for part in ("firmware", "boards")]
 
 
 class Checks(unittest.TestCase):
@@ -50,7 +50,7 @@ class Checks(unittest.TestCase):
     def test_good_image_passes(self):
         done = self.run_check("check_image.py")
         self.assertEqual((done.returncode, done.stderr), (0, ""))
-        done = self.run_check("stack_usage.py", "--su-dir", BUILD)
+        done = self.run_check("stack_usage.py", "--su-dir", *SU_FOLDERS)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
 
     def test_boot2_crc(self):
@@ -100,7 +100,7 @@ class Checks(unittest.TestCase):
         self.assert_fails("not a 32-bit", "check_image.py")
 
     def test_stack_limit(self):
-        self.assert_fails("more than the 100 allowed", "stack_usage.py", "--su-dir", BUILD, "--limit", "100")
+        self.assert_fails("more than the 100 allowed", "stack_usage.py", "--su-dir", *SU_FOLDERS, "--limit", "100")
 
     def test_frames_without_compiler_files(self):
         self.assert_fails("-fstack-usage", "stack_usage.py", "--su-dir", self.folder.name)
@@ -112,13 +112,13 @@ class Checks(unittest.TestCase):
     def test_call_through_a_pointer_that_the_table_lacks(self):
         table = pathlib.Path(self.folder.name) / "table"
         table.write_text("# empty\n")
-        self.assert_fails("calls through a pointer", "stack_usage.py", "--su-dir", BUILD, "--indirect", str(table))
+        self.assert_fails("calls through a pointer", "stack_usage.py", "--su-dir", *SU_FOLDERS, "--indirect", str(table))
 
     def test_recursion(self):
         table = pathlib.Path(self.folder.name) / "table"
         good = (HERE / "indirect_calls.txt").read_text()
         table.write_text(good.replace("boot_reset: ", "boot_reset: boot_reset "))
-        self.assert_fails("recursion: boot_reset -> boot_reset", "stack_usage.py", "--su-dir", BUILD, "--indirect", str(table))
+        self.assert_fails("recursion: boot_reset -> boot_reset", "stack_usage.py", "--su-dir", *SU_FOLDERS, "--indirect", str(table))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,190 @@
+"""Measurements of the release images in the emulator: rates, latencies, sleep. The same bit for bit each time."""
+import concurrent.futures
+import csv
+import json
+import pathlib
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "host_tools" / "python"))
+from fingertip_files import CONTACT, FIT_VALID, InputError, read_recording  # noqa: E402
+
+HELD = 1 << 6
+WIRE_CONTACT = 0x01
+CLOCK_Hz = 125e6
+BOARDS = ("pico_parallel", "pico_mux")
+# Longest conversion by OSR, us: MS5840-02BA datasheet.
+CONVERSION_us = {256: 560, 512: 1100, 1024: 2170, 2048: 4320, 4096: 8610, 8192: 17200}
+# By then the contact stands, the tare is over, and the settings have been obeyed.
+FROM_s = 1.0
+# The firmware waits for a conversion by this much longer than the datasheet's maximum.
+MARGIN = 1.05
+
+
+class Steps:
+    """Runs what is to be done, some at a time, and says what is done and when."""
+
+    def __init__(self):
+        self.start_s = time.monotonic()
+        self.lock = threading.Lock()
+
+    def say(self, what):
+        with self.lock:
+            print(f"{time.monotonic() - self.start_s:5.0f} s  {what}", flush=True)
+
+    def run_all(self, jobs, workers=2):
+        """jobs: key -> (what, function). key -> result."""
+        def one(what, function):
+            result = function()
+            self.say(what)
+            return result
+
+        with concurrent.futures.ThreadPoolExecutor(workers) as pool:
+            futures = {key: pool.submit(one, *job) for key, job in jobs.items()}
+            try:
+                return {key: future.result() for key, future in futures.items()}
+            except BaseException:
+                pool.shutdown(cancel_futures=True)
+                raise
+
+
+def run(*call):
+    """What it printed."""
+    done = subprocess.run([str(part) for part in call], capture_output=True, text=True)
+    if done.returncode != 0:
+        shown = " ".join(str(part) for part in call[:3])
+        raise InputError(f"{shown} ... failed: {(done.stderr or done.stdout).strip()[-500:]}")
+    return done.stdout
+
+
+class Tools:
+    def __init__(self, build, boards):
+        self.fingertip = pathlib.Path(build) / "host_tools/cli/fingertip"
+        self.boards = pathlib.Path(boards)
+        for path in (self.fingertip, *(self.image(board) for board in BOARDS)):
+            if not path.is_file():
+                raise InputError(f"{path}: is not there; build it: cmake --preset host && cmake --build --preset host")
+
+    def image(self, board, suffix="bin"):
+        return self.boards / board / f"fingertip-{board}.{suffix}"
+
+    def encoded(self, *command):
+        return run(self.fingertip, "encode", *command).strip()
+
+
+def scenario(folder, name, seconds, stem=None):
+    """"wander" touches from 0.65 s on; "rest" never."""
+    path = pathlib.Path(folder) / f"{stem or name}.csv"
+    if name != "rest":
+        run(sys.executable, ROOT / "host_tools/python/scenario.py", name, "-o", path, "--seconds", f"{seconds:g}")
+        return path
+    names = ["t_s", "contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip", *(f"s{k}_Pa" for k in range(15))]
+    zeros = ",0" * (len(names) - 1)
+    path.write_text(f"# fingertip-scenario 1\n# name: rest\n{','.join(names)}\n0{zeros}\n{seconds:g}{zeros}\n")
+    return path
+
+
+def cobs_header(frame):
+    """The first twelve bytes of the packet in a frame."""
+    packet, at = bytearray(), 0
+    while at < len(frame) and len(packet) < 12:
+        code = frame[at]
+        packet += frame[at + 1:at + code]
+        at += code
+        if code != 0xFF:
+            packet.append(0)
+    return bytes(packet[:12])
+
+
+def contact_times_us(usb_log, zero_us):
+    """For each contact packet: device time of its frame, when its first part was offered, when its last byte was delivered."""
+    times, frame, offered_us = [], bytearray(), 0.0
+    with open(usb_log, newline="") as file:
+        for row in csv.DictReader(file):
+            if row["dir"] != "in" or row["endpoint"] != "2":
+                continue
+            for byte in bytes.fromhex(row["bytes"]):
+                if not frame:
+                    offered_us = float(row["offered_ns"]) / 1e3 - zero_us
+                if byte:
+                    frame.append(byte)
+                    continue
+                header = cobs_header(frame)
+                if len(header) == 12 and header[1] == WIRE_CONTACT:
+                    times.append((int.from_bytes(header[4:12], "little"), offered_us, float(row["t_ns"]) / 1e3 - zero_us))
+                frame = bytearray()
+    return np.array(times)
+
+
+def distribution(values):
+    return {"median": float(np.median(values)), "p99": float(np.percentile(values, 99)), "max": float(values.max())}
+
+
+class Measurement:
+    """One board at one OSR for some seconds, contact and health packets streamed to a host that reads.
+
+    Fitted frames hold a fit of this moment's pressures; held ones repeat the fit before while the sensors measure their
+    temperature.
+    """
+
+    def __init__(self, tools, folder, board, osr, path, seconds):
+        base = pathlib.Path(folder) / f"{board}-{osr}-{path.stem}"
+        script = base.with_suffix(".script")
+        script.write_text(f"0.45 dtr 1\n0.452 {tools.encoded('info')}\n0.455 {tools.encoded('osr', osr)}\n"
+                          f"0.46 {tools.encoded('stream', 'contact,health')}\n")
+
+        def emulate(name, until_s):
+            to = f"{base}.{name}"
+            run("node", ROOT / "host_tools/emulator/main.mjs", "--board", board, "--image", tools.image(board), "--scenario", path,
+                "--seconds", until_s, "--host-script", script, "--capture", f"{to}.ftr", "--report", f"{to}.json", "--usb-log", f"{to}.usb")
+            return to, json.loads(pathlib.Path(f"{to}.json").read_text())
+
+        _, before = emulate("before", FROM_s)
+        # A health packet comes with each whole second.
+        name, emulated = emulate("run", FROM_s + seconds + 0.02)
+        self.cycles = emulated["cycles"] - before["cycles"]
+        self.sleep_percent = 100 * (1 - self.cycles / ((emulated["emulated_s"] - before["emulated_s"]) * CLOCK_Hz))
+        run(tools.fingertip, "replay", f"{name}.ftr", "--to-csv", f"{name}.csv")
+        recording = read_recording(f"{name}.csv")
+        self.scene, self.iterations = recording.metadata["scene"], int(recording.metadata["fit_iterations"])
+        zero_us = emulated["device_time_zero_s"] * 1e6
+        self._rates(recording, recording.has_contact & (recording["t_us"] >= FROM_s * 1e6 - zero_us))
+        self._losses(recording)
+        times = contact_times_us(f"{name}.usb", zero_us)
+        times = times[times[:, 0] >= FROM_s * 1e6 - zero_us]
+        # The time of a frame is the middle of its conversion, waiting included.
+        converted_us = times[:, 0] - CONVERSION_us[osr] * MARGIN / 2 + CONVERSION_us[osr]
+        self.offered_us, self.delivered_us = times[:, 1] - converted_us, times[:, 2] - converted_us
+
+    def _rates(self, recording, rows):
+        t_us, flags = recording["t_us"][rows], recording["flags"][rows].astype(np.int64)
+        held = (flags & HELD) != 0
+        fresh = ((flags & (CONTACT | FIT_VALID)) == CONTACT | FIT_VALID) & ~held
+        self.seconds = float(t_us[-1] - t_us[0]) * 1e-6
+        self.frames_per_s = (len(t_us) - 1) / self.seconds
+        self.fitted_per_s = float(fresh[1:].sum()) / self.seconds
+        self.held_per_s = float(held[1:].sum()) / self.seconds
+        self.unfitted = int((~fresh & ~held).sum())
+        steps_us = np.diff(t_us)
+        # A temperature conversion takes longer than one of pressure at OSR 256 to 4096, so its step is another.
+        self.clock_jitter_us = float(np.ptp(steps_us[~held[1:] & ~held[:-1]]))
+        self.stages_us = {name: float(recording[name][rows][~held].mean()) for name in ("convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us")}
+
+    def _losses(self, recording):
+        """From the first frame on: what did not come, as the host and as the device counts it."""
+        rows = recording.has_contact
+        health = recording.health()[-1]
+        self.sequence_gaps = int(recording.end["dropped_packets"])
+        self.packets_dropped = health["packets_dropped"]
+        self.frames_skipped = health["frames_skipped"]
+        self.frames_missing = int((np.diff(recording["frame"][rows]) - 1).sum())
+        self.damaged = sum(int(recording.end[name]) for name in ("crc_errors", "format_errors", "out_of_order"))
+
+    @property
+    def dropped(self):
+        return max(self.sequence_gaps, self.packets_dropped) + max(self.frames_skipped, self.frames_missing) + self.damaged

@@ -1,0 +1,125 @@
+"""rate.json as text and as a picture."""
+import scenes
+from emulated import BOARDS, CONVERSION_us
+from fingertip_files import InputError
+from goals import goal_table_md
+
+COLOURS = {"pico_parallel": "#1f6fd6", "pico_mux": "#d98a1f"}
+INK, FAINT, GRID, GOAL = "#22252e", "#8a8f9c", "#e6e8ee", "#2a9d4a"
+
+
+def number(value):
+    if value is None:
+        return ""
+    return f"{value:.1f}" if isinstance(value, float) else str(value)
+
+
+def table(rows, columns):
+    """columns: heading -> function of a row."""
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    return lines + ["| " + " | ".join(number(cell(row)) for cell in columns.values()) + " |" for row in rows]
+
+
+def text(found, how):
+    field = lambda *names: lambda row: row[names[0]] if len(names) == 1 else row[names[0]][names[1]]
+    lines = ["# Rate, latency and cost", "", "Written by `sh cmake/bootstrap.sh report`. ![Rates, latency, cycles](rate.png)", "",
+             *goal_table_md(found), "", how.strip(), "",
+             f"On pico_parallel at OSR 256, over {found['seconds']:.0f} s at {found['contact_frames_per_s']:.0f} frames/s:", "",
+             *table([{"what": what, **{name: found[f"{key}_parallel_{name}_us"] for name in ("median", "p99", "max")}}
+                     for what, key in (("offered", "latency"), ("delivered", "delivery"))],
+                    {"us after the conversion": field("what"), "median": field("median"), "p99": field("p99"), "max": field("max")}), "",
+             f"- Lost: {found['sequence_gaps']} gaps in the sequence, {found['packets_dropped']} packets dropped and {found['frames_skipped']} frames",
+             f"  skipped by the device's own count, {found['frames_missing']} frame numbers that never came, {found['unfitted']} frames without a fit.",
+             f"- Steps of the frame clock differ by {found['clock_jitter_us']:.0f} us at most.",
+             "- Skew between taxels: 0 on pico_parallel, one command on all lines at once. On pico_mux too one command reaches all",
+             "  sensors, through all multiplexers; only the reading takes its turn. Their own oscillators remain.", "", "## By OSR", ""]
+    lines += table(found["by_osr"], {
+        "board": field("board"), "OSR": field("osr"), "frames/s": field("frames_per_s"), "fitted/s": field("fitted_per_s"),
+        "held/s": field("held_per_s"), "asleep, %": field("sleep_percent"), "convert, us": field("convert_us"), "read": field("read_us"),
+        "queue": field("queue_us"), "condition": field("condition_us"), "fit": field("fit_us"), "contact": field("contact_us"),
+        "offered, median": field("latency_us", "median"), "p99": field("latency_us", "p99"), "max": field("latency_us", "max"),
+        "delivered, median": field("delivery_us", "median"), "p99 ": field("delivery_us", "p99"), "max ": field("delivery_us", "max")})
+    lines += ["", "## By number of sensors", "",
+              "Cycles are counted on the emulated chip, which takes presses on that many sensors through compensation, conditioning and fit.",
+              "Rates and latencies at OSR 256 follow from them and from the measured ones of fifteen: the bus or the processor, whichever is",
+              "slower; more than 15 lines take a second state machine. Rectangles have a fixed-point kernel compiled for them; float serves any",
+              "layout.", ""]
+    lines += table(found["by_sensors"], {
+        "kernel": field("kernel"), "sensors": field("sensors"), "layout": field("layout"), "compensate, cycles": field("take"),
+        "condition": field("condition"), "fit": field("fit"), "worst location, um": lambda row: f"{row['error_um']:.3f}",
+        "pico_parallel frames/s": field("parallel_fps"), "latency, us": field("parallel_latency_us"), "pico_mux frames/s": field("mux_fps"),
+        "latency, us ": field("mux_latency_us")})
+    return "\n".join([*lines, "", "## By scene", "", *scenes.table_md(found["scenes"])]) + "\n"
+
+
+def draw(path, found, parallel):
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    plt.rcParams.update({
+        "font.size": 9, "axes.edgecolor": "#b4bac6", "axes.labelcolor": INK, "xtick.color": FAINT, "ytick.color": FAINT, "text.color": INK,
+        "axes.spines.top": False, "axes.spines.right": False})
+    figure, ((rate, latency), (stages, sensors)) = plt.subplots(2, 2, figsize=(12, 8))
+    draw_rates(rate, found)
+    draw_latency(latency, found, parallel)
+    draw_stages(stages, found)
+    draw_sensors(sensors, found)
+    for axes in (rate, latency, stages, sensors):
+        axes.grid(color=GRID, lw=0.6)
+        axes.set_axisbelow(True)
+        axes.legend(frameon=False, fontsize=8)
+    figure.tight_layout()
+    try:
+        figure.savefig(path, dpi=120, metadata={"Software": None})
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}; choose another place") from None
+    plt.close(figure)
+
+
+def draw_rates(axes, found):
+    osrs = sorted({row["osr"] for row in found["by_osr"]})
+    axes.plot(osrs, [1e6 / CONVERSION_us[osr] for osr in osrs], "--", color=FAINT, lw=1, label="conversion alone")
+    for board in BOARDS:
+        rows = [row for row in found["by_osr"] if row["board"] == board]
+        axes.plot([row["osr"] for row in rows], [row["fitted_per_s"] for row in rows], "o-", color=COLOURS[board], label=board)
+        for row in rows:
+            axes.annotate(f"{row['fitted_per_s']:.0f}", (row["osr"], row["fitted_per_s"]), textcoords="offset points",
+                          xytext=(4, 5 if board == BOARDS[0] else -12), fontsize=8)
+    for name, sign, osr in (("parallel", 1250, 256), ("parallel", 410, 1024), ("mux", 260, 256), ("mux", 185, 1024)):
+        axes.plot(osr, sign, "_", color=GOAL, ms=16, mew=2, label="goal" if (name, osr) == ("parallel", 256) else None)
+    axes.set(xscale="log", yscale="log", xlabel="OSR", ylabel="fitted frames a second", title="Rate in contact")
+    axes.set_xticks(osrs, [str(osr) for osr in osrs])
+    axes.minorticks_off()
+
+
+def draw_latency(axes, found, parallel):
+    for name, values, colour in (("offered to the USB controller", parallel.offered_us, "#1f6fd6"), ("last byte on the wire", parallel.delivered_us, "#8a8f9c")):
+        axes.hist(values, bins=120, histtype="stepfilled", alpha=0.6, color=colour, label=name, log=True)
+    goal_us = float(found["goals"]["latency_parallel_us"]["goal"].split()[1])
+    axes.axvline(goal_us, color=GOAL, lw=2, label=f"goal of the first: {goal_us:.0f} us")
+    axes.set(xlabel="us after the end of conversion", ylabel="packets", title="Latency on pico_parallel, OSR 256")
+
+
+def draw_stages(axes, found):
+    import matplotlib
+
+    rows = found["scenes"][::-1]
+    labels = [f"{row['scene']}\n{row['board']}" for row in rows]
+    left = [0] * len(rows)
+    for i, stage in enumerate(rows[0]["cycles_by_stage"]):
+        width = [row["cycles_by_stage"][stage] / 1e3 for row in rows]
+        axes.barh(labels, width, left=left, color=matplotlib.colormaps["tab20"](i), label=stage)
+        left = [a + b for a, b in zip(left, width)]
+    axes.set(xlabel="thousand cycles of a frame, OSR 256, in contact", title="Where the cycles go")
+    axes.tick_params(axis="y", labelsize=7)
+
+
+def draw_sensors(axes, found):
+    for kernel, style in (("fixed point", "o-"), ("float", "s--")):
+        rows = [row for row in found["by_sensors"] if row["kernel"] == kernel]
+        for board in BOARDS:
+            axes.plot([row["sensors"] for row in rows], [row[f"{board.removeprefix('pico_')}_fps"] for row in rows], style, color=COLOURS[board],
+                      label=f"{board}, {kernel}")
+    axes.set(xlabel="sensors", ylabel="frames a second, OSR 256", yscale="log", title="More or fewer sensors")

@@ -1,0 +1,124 @@
+#!/usr/bin/python3
+"""What each scene costs on each board: flash, RAM, stack, cycles of a frame by stage, frames a second by OSR.
+
+    scenes.py --build build/host --scenes build/scenes -o build/report
+
+    scenes.json, scenes.md    the table
+
+Builds the images of all scenes in folders below --scenes and runs them in the emulator.
+"""
+import argparse
+import json
+import pathlib
+import sys
+import tempfile
+
+from emulated import BOARDS, CONVERSION_us, ROOT, Steps, run, scenario
+from fingertip_files import InputError, run_tool, write_text
+
+SCENES = ("raw", "press", "slip", "paper")
+STREAM = {"raw": "raw", "press": "contact", "slip": "contact", "paper": "contact"}
+# The contact of the scenario "wander" stands from 0.65 s on; windows of whole temperature intervals.
+REST_s = (0.5, 0.58)
+CONTACT_FROM_s, WINDOW_s, SETTLE_s = 1.0, 1.0, 0.1
+
+
+def build(scene, board, folder):
+    """Folder of the images of a scene on a board."""
+    place = pathlib.Path(folder).absolute() / scene / board
+    run("cmake", "-G", "Ninja", "-S", ROOT, "-B", place, f"-DCMAKE_TOOLCHAIN_FILE={ROOT}/cmake/toolchain-arm-none-eabi.cmake",
+        "-DCMAKE_BUILD_TYPE=Release", f"-DFINGERTIP_BOARD={board}", f"-DFINGERTIP_SCENE={scene}")
+    run("cmake", "--build", place, "--target", f"fingertip-{board}", "-j", "1")
+    return place
+
+
+def sizes(place, board):
+    """Bytes, by the checks of the tests. RAM is what is not code: constants, variables and the whole stack."""
+    elf = place / f"fingertip-{board}.elf"
+    with tempfile.TemporaryDirectory() as folder:
+        image, stack = pathlib.Path(folder) / "image.json", pathlib.Path(folder) / "stack.json"
+        run(sys.executable, ROOT / "tests/checks/check_image.py", elf, "--json", image)
+        run(sys.executable, ROOT / "tests/checks/stack_usage.py", elf, "--su-dir", place / "firmware", place / "boards", "--json", stack)
+        image, stack = json.loads(image.read_text()), json.loads(stack.read_text())
+    return {
+        "flash_bytes": image["flash_bytes"],
+        "ram_bytes": image["constants_in_sram_bytes"] + image["variables_bytes"] + image["stack_reserved_bytes"],
+        "code_in_sram_bytes": image["code_in_sram_bytes"], "stack_bytes": stack["worst_bytes"],
+    }
+
+
+def cycles(fingertip, place, scene, board, osrs, folder):
+    """Cycles of a frame by stage without and in contact, at the first OSR, and frames a second at each."""
+    def encoded(*command):
+        return run(fingertip, "encode", *command).strip()
+
+    script, windows, t_s = [(0.45, "dtr 1"), (0.46, encoded("stream", STREAM[scene]))], [("rest", *REST_s)], CONTACT_FROM_s
+    for osr in osrs:
+        first = osr == osrs[0]
+        script.append((0.455 if first else t_s, encoded("osr", osr)))
+        begin_s = t_s if first else t_s + SETTLE_s
+        windows.append((str(osr), begin_s, begin_s + WINDOW_s))
+        t_s = begin_s + WINDOW_s
+    files = [pathlib.Path(folder) / f"{scene}-{board}.{suffix}" for suffix in ("script", "json")]
+    files[0].write_text("".join(f"{at_s:.3f} {what}\n" for at_s, what in sorted(script)))
+    run("node", ROOT / "host_tools/report/stage_cycles.mjs", "--image", place / f"fingertip-{board}", "--board", board, "--scenario",
+        scenario(folder, "wander", t_s + 1, f"{scene}-{board}"), "--host-script", files[0], "--json", files[1],
+        *(word for name, from_s, to_s in windows for word in ("--window", f"{name}:{from_s:.3f}:{to_s:.3f}")))
+    found = json.loads(files[1].read_text())
+    contact = found[str(osrs[0])]
+    return {
+        "cycles_of_frame_at_rest": found["rest"]["total_cycles_per_frame"], "cycles_of_frame": contact["total_cycles_per_frame"],
+        "cycles_by_stage": contact["cycles_per_frame"], "frames_per_s": {str(osr): found[str(osr)]["frames_per_s"] for osr in osrs},
+    }
+
+
+def measure(fingertip, scenes_folder, steps, scenes=SCENES, boards=BOARDS, osrs=tuple(CONVERSION_us)):
+    """Rows of the table."""
+    def one(scene, board, folder):
+        place = build(scene, board, scenes_folder)
+        return {"scene": scene, "board": board, **sizes(place, board), **cycles(fingertip, place, scene, board, osrs, folder)}
+
+    with tempfile.TemporaryDirectory() as folder:
+        jobs = {(scene, board): (f"scene {scene} on {board}", lambda s=scene, b=board: one(s, b, folder)) for board in boards for scene in scenes}
+        return list(steps.run_all(jobs).values())
+
+
+def table_md(rows):
+    """Lines of Markdown."""
+    osrs = list(rows[0]["frames_per_s"])
+    lines = [
+        "RAM is constants, variables and the whole stack; code runs from SRAM and is counted apart. Stack: the worst case by the call",
+        f"graph. Cycles of a frame are counted at OSR {osrs[0]}, in contact and at rest; frames are those that hold new pressures.", ""]
+    names = ["board", "scene", "flash", "RAM", "code in SRAM", "stack", "cycles in contact", "at rest", *(f"frames/s, OSR {osr}" for osr in osrs)]
+    lines += ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
+    for row in rows:
+        cells = [row["board"], row["scene"], *(row[f"{name}_bytes"] for name in ("flash", "ram", "code_in_sram", "stack")),
+                 row["cycles_of_frame"], row["cycles_of_frame_at_rest"], *(f"{rate:.0f}" for rate in row["frames_per_s"].values())]
+        lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
+    stages = list(rows[0]["cycles_by_stage"])
+    lines += ["", "Cycles of a frame in contact by stage; what an interrupt takes is its own stage, wherever it strikes.", ""]
+    lines += ["| " + " | ".join(["board", "scene", *stages]) + " |", "|" + "---|" * (2 + len(stages))]
+    for row in rows:
+        lines.append("| " + " | ".join(str(cell) for cell in (row["board"], row["scene"], *(row["cycles_by_stage"][stage] for stage in stages))) + " |")
+    return lines
+
+
+def main(argv):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", required=True, metavar="DIR", help="build folder of the host tools")
+    parser.add_argument("--scenes", required=True, metavar="DIR", help="where to build the scenes")
+    parser.add_argument("-o", "--output", required=True, metavar="DIR")
+    options = parser.parse_args(argv)
+    fingertip, out = pathlib.Path(options.build) / "host_tools/cli/fingertip", pathlib.Path(options.output)
+    if not fingertip.is_file():
+        raise InputError(f"{fingertip}: is not there; build it: cmake --preset host && cmake --build --preset host")
+    out.mkdir(parents=True, exist_ok=True)
+    rows = measure(fingertip, options.scenes, Steps())
+    write_text(out / "scenes.json", json.dumps(rows, indent=2) + "\n")
+    write_text(out / "scenes.md", "\n".join(["# Scenes", "", *table_md(rows)]) + "\n")
+    print(f"report: {out / 'scenes.json'}, {out / 'scenes.md'}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run_tool("scenes.py", main))
