@@ -14,12 +14,17 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
 import fingertip_files  # noqa: E402
+from truth import Truth  # noqa: E402
 
 TOOLS = argparse.Namespace()
 FLAG_CONTACT = 1 << 0
 FLAG_FIT_VALID = 1 << 1
 FLAG_HELD = 1 << 6
 FLAG_SENSOR_MASKED = 1 << 14
+# Noise of a conversion at OSR 1024, rms: MS5840 datasheet.
+NOISE_Pa = 3.9
+# A location without a warning is never off by more, whatever befalls the array.
+UNWARNED_mm = 0.5
 
 
 def encoded(*command):
@@ -75,6 +80,14 @@ class PicoMux(unittest.TestCase):
         cls.scenario = make_scenario(cls.folder.name, "ideal", 12)
         runs = [Run(cls.folder.name, "first", cls.scenario, logs=True), Run(cls.folder.name, "second", cls.scenario)]
         cls.first, cls.second = [run.finish() for run in runs]
+        cls.truth = Truth(cls.scenario)
+
+    def assert_nothing_is_wrong_and_unflagged(self, run):
+        t_s = self.truth.times_s(run.recording, run.report)
+        self.assertLess(self.truth.worst_reading_Pa(run.recording, t_s), 7 * NOISE_Pa)
+        errors_mm = self.truth.unwarned_errors_mm(run.recording, t_s)
+        self.assertGreater(len(errors_mm), 100)
+        self.assertLess(errors_mm.max(), UNWARNED_mm)
 
     def test_ideal_presses_are_located_and_weighed(self):
         out = self.first.path("summary.json")
@@ -134,7 +147,8 @@ class PicoMux(unittest.TestCase):
 
     def test_a_sensor_that_dies_is_masked_and_comes_back(self):
         faults = [{"type": "sensor_dead", "sensor": 7, "from_s": 1.0, "to_s": 1.5}]
-        recording = Run(self.folder.name, "dead", self.scenario, 4, faults=faults).finish().recording
+        run = Run(self.folder.name, "dead", self.scenario, 4.1, [(1.3, encoded("health"))], faults).finish()
+        recording = run.recording
         t_s = recording["t_us"] * 1e-6
         valid = recording["valid"].astype("uint32")
         measured = ~recording.flag(FLAG_HELD)
@@ -145,16 +159,42 @@ class PicoMux(unittest.TestCase):
         in_contact = dead & (flags & FLAG_CONTACT != 0)
         self.assertGreater(in_contact.sum(), 0)
         self.assertTrue((flags[in_contact] & FLAG_SENSOR_MASKED != 0).all())
+        during, end = recording.health()[1], recording.health()[-1]
+        self.assertEqual((during["sensors_present"], end["sensors_present"]), (0x7FFF & ~(1 << 7), 0x7FFF))
+        self.assertGreater(end["bus_nacks"], 50)
+        self.assertGreater(end["frames_incomplete"], 50)
+        self.assert_nothing_is_wrong_and_unflagged(run)
 
     def test_a_stuck_bus_recovers(self):
         faults = [{"type": "sda_stuck_low", "sensor": 3, "from_s": 1.0, "to_s": 3.0},
                   {"type": "mux_stuck", "mux": 1, "from_s": 2.0, "to_s": 3.0}]
-        recording = Run(self.folder.name, "stuck", self.scenario, 4, faults=faults).finish().recording
+        run = Run(self.folder.name, "stuck", self.scenario, 4.1, faults=faults).finish()
+        recording = run.recording
         t_s = recording["t_us"] * 1e-6
         self.assertGreater(((t_s > 1.2) & (t_s < 1.9)).sum(), 50)
         back = (t_s > 3.5) & ~recording.flag(FLAG_HELD)
         self.assertTrue((recording["valid"].astype("uint32")[back] == 0x7FFF).all())
         self.assertGreater(((t_s > 3.5) & (t_s < 4.0)).sum(), 40)
+        self.assertGreater(recording.health()[-1]["bus_recoveries"], 0)
+        self.assert_nothing_is_wrong_and_unflagged(run)
+
+    def test_a_host_that_stalls_and_a_cable_that_is_pulled_cost_frames_and_no_more(self):
+        faults = [{"type": "host_stall", "from_s": 0.8, "to_s": 5.8}, {"type": "usb_unplug", "from_s": 6.2, "to_s": 6.4}]
+        again = [(7.0, "dtr 1"), (7.01, encoded("stream", "contact,raw,health")), (7.3, encoded("health"))]
+        run = Run(self.folder.name, "host", self.scenario, 7.5, again, faults).finish()
+        t_s = self.truth.times_s(run.recording, run.report)
+        for from_s, to_s in ((5.85, 6.15), (7.1, 7.5)):
+            rows = (t_s > from_s) & (t_s < to_s)
+            self.assertGreater(rows.sum(), 190 * (to_s - from_s))
+            self.assertTrue((run.recording["valid"][rows & ~run.recording.flag(FLAG_HELD)] == 0x7FFF).all())
+        # What the host misses is what the device says that it dropped, and the few that were under way in the cable.
+        missed, dropped = int(run.recording.end["dropped_packets"]), run.recording.health()[-1]["packets_dropped"]
+        self.assertGreater(missed, 4.5 * 190)
+        self.assertLessEqual(dropped, missed)
+        self.assertLess(missed - dropped, 10)
+        self.assertEqual(run.report["reboots"], 0)
+        self.assertEqual(run.report["usb"]["enumerations"], 2)
+        self.assert_nothing_is_wrong_and_unflagged(run)
 
     def test_the_rate_of_the_paper(self):
         commands = [(0.5, encoded("rate", "20"))]

@@ -1,0 +1,120 @@
+"""The report on rate and cost in its short form: every figure is there, agrees with the others, and comes out the same again.
+
+usage: test_rate.py --build BUILD --boards BOARDS
+"""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "host_tools" / "report"))
+import emulated  # noqa: E402
+import rate  # noqa: E402
+
+OPTIONS = argparse.Namespace()
+FIGURES = (
+    "parallel_fps_osr256", "parallel_fps_osr1024", "mux_fps_osr256", "mux_fps_osr1024", "latency_parallel_us",
+    "latency_parallel_median_us", "latency_parallel_p99_us", "latency_parallel_max_us", "idle_sleep_percent",
+    "contact_sleep_percent", "flash_bytes", "ram_bytes", "code_in_sram_bytes", "stack_bytes", "raw_flash_bytes", "dropped")
+
+
+def report(*options):
+    return subprocess.run([sys.executable, str(ROOT / "host_tools/report/rate.py"), *options], capture_output=True, text=True)
+
+
+class Rate(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.temporary.cleanup)
+        cls.folder = pathlib.Path(cls.temporary.name)
+        done = report("--build", OPTIONS.build, "--boards", OPTIONS.boards, "-o", str(cls.folder), "--quick", "--seconds", "1")
+        if done.returncode != 0:
+            raise AssertionError(done.stdout + done.stderr)
+        cls.printed = done.stdout
+        cls.found = json.loads((cls.folder / "rate.json").read_text())
+
+    def test_every_figure_is_there_and_judged(self):
+        for name in FIGURES:
+            self.assertIsNotNone(self.found[name], name)
+        for name, *_ in rate.GOALS:
+            self.assertIsNotNone(self.found["goals"][name]["met"], name)
+            self.assertRegex(self.printed, rf"(?m)^(met|MISSED) +{name} ")
+
+    def test_every_frame_is_fitted_from_a_cold_start_and_arrives(self):
+        for name in ("dropped", "sequence_gaps", "packets_dropped", "frames_skipped", "frames_missing", "unfitted"):
+            self.assertEqual(self.found[name], 0, name)
+        self.assertEqual(self.found["fit_iterations"], 7)
+        for row in self.found["by_osr"]:
+            self.assertEqual(row["dropped"], 0)
+            self.assertLess(row["fitted_per_s"] + row["held_per_s"], 1e6 / emulated.CONVERSION_us[row["osr"]])
+            self.assertAlmostEqual(row["held_per_s"], 2, delta=0.1 * row["held_per_s"] + 1)
+            for times in (row["latency_us"], row["delivery_us"]):
+                self.assertLessEqual(times["median"], times["p99"])
+                self.assertLessEqual(times["p99"], times["max"])
+            self.assertLess(row["latency_us"]["max"], row["delivery_us"]["max"])
+            self.assertGreater(row["latency_us"]["median"], row["read_us"] + row["condition_us"] + row["fit_us"])
+
+    def test_two_ways_of_counting_agree(self):
+        """Cycles of the whole chip, frames of the stream; cycles and frames of the stage meter."""
+        slip = next(row for row in self.found["scenes"] if row["scene"] == "slip")
+        self.assertEqual(sum(slip["cycles_by_stage"].values()), slip["cycles_of_frame"])
+        self.assertLess(abs(slip["frames_per_s"]["256"] - self.found["parallel_fps_osr256"]), 3)
+        by_chip = (1 - self.found["contact_sleep_percent"] / 100) * emulated.CLOCK_Hz / self.found["parallel_fps_osr256"]
+        self.assertLess(abs(by_chip / slip["cycles_of_frame"] - 1), 0.02)
+        fit = next(row["fit"] for row in self.found["by_sensors"] if row["sensors"] == 15 and row["kernel"] == "fixed point")
+        self.assertLess(abs(slip["cycles_by_stage"]["fit"] / fit - 1), 0.05)
+
+    def test_more_costs_more(self):
+        raw, slip = (next(row for row in self.found["scenes"] if row["scene"] == scene) for scene in ("raw", "slip"))
+        for name in ("flash_bytes", "ram_bytes", "code_in_sram_bytes", "stack_bytes", "cycles_of_frame"):
+            self.assertLess(raw[name], slip[name], name)
+        self.assertEqual(raw["cycles_by_stage"]["fit"], 0)
+        self.assertGreater(slip["cycles_by_stage"]["fit"], 15000)
+        for kernel in ("fixed point", "float"):
+            rows = [row for row in self.found["by_sensors"] if row["kernel"] == kernel]
+            self.assertEqual(rows, sorted(rows, key=lambda row: row["sensors"]))
+            fits = [row["fit"] for row in rows]
+            self.assertEqual(fits, sorted(fits))
+            self.assertLess(max(row["error_um"] for row in rows), 1)
+        self.assertEqual({row["sensors"] for row in self.found["by_sensors"]} & {5, 15, 32}, {5, 15, 32})
+
+    def test_the_same_again(self):
+        """Emulated cycles and times, to the last one."""
+        tools = emulated.Tools(OPTIONS.build, OPTIONS.boards)
+        path = emulated.scenario(self.folder, "wander", 4)
+        first, second = (emulated.Measurement(tools, self.folder, "pico_mux", 1024, path, 1) for _ in range(2))
+        self.assertEqual(first.cycles, second.cycles)
+        self.assertTrue((first.offered_us == second.offered_us).all() and (first.delivered_us == second.delivered_us).all())
+        row = next(row for row in self.found["by_osr"] if (row["board"], row["osr"]) == ("pico_mux", 1024))
+        self.assertEqual(row["sleep_percent"], first.sleep_percent)
+        self.assertEqual(row["latency_us"], emulated.distribution(first.offered_us))
+
+    def test_text_and_picture(self):
+        self.assertEqual((self.folder / "rate.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        text = (self.folder / "rate.md").read_text()
+        for name, *_ in rate.GOALS:
+            self.assertRegex(text, rf"\| {name} \| [0-9.]+ \| [<>]= [0-9]+ \| (met|MISSED) \|")
+        tables = text.split("\n\n")
+        for table in (part for part in tables if part.startswith("|")):
+            self.assertEqual(len({line.count("|") for line in table.strip().split("\n")}), 1, table)
+
+    def test_a_missing_build_and_a_wrong_number_are_one_line(self):
+        for options, message in ((("--build", str(self.folder / "none"), "--boards", OPTIONS.boards), "is not there; build it"),
+                                 (("--build", OPTIONS.build, "--boards", OPTIONS.boards, "--seconds", "0"), "give 1 to 600")):
+            done = report(*options, "-o", str(self.folder / "other"))
+            self.assertEqual(done.returncode, 1)
+            self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+            self.assertIn(message, done.stderr)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    for option in ("build", "boards"):
+        parser.add_argument(f"--{option}", required=True)
+    _, rest = parser.parse_known_args(namespace=OPTIONS)
+    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
