@@ -87,7 +87,13 @@ class Rate(unittest.TestCase):
         """Emulated cycles and times, to the last one."""
         tools = emulated.Tools(OPTIONS.build, OPTIONS.boards)
         path = emulated.scenario(self.folder, "wander", 4)
-        first, second = (emulated.Measurement(tools, self.folder, "pico_mux", 1024, path, 1) for _ in range(2))
+
+        def measured(name):
+            folder = self.folder / name
+            folder.mkdir()
+            return emulated.Measurement(tools, folder, "pico_mux", 1024, path, 1)
+
+        first, second = measured("first"), measured("second")
         self.assertEqual(first.cycles, second.cycles)
         self.assertTrue((first.offered_us == second.offered_us).all() and (first.delivered_us == second.delivered_us).all())
         row = next(row for row in self.found["by_osr"] if (row["board"], row["osr"]) == ("pico_mux", 1024))
