@@ -15,7 +15,9 @@ sys.path.insert(0, str(ROOT / "host_tools" / "python"))
 from fingertip_files import CONTACT, FIT_VALID, InputError, read_recording  # noqa: E402
 
 HELD = 1 << 6
+# Of a packet, firmware/wire/PROTOCOL.md.
 WIRE_CONTACT = 0x01
+HEADER_BYTES, CRC_BYTES = 12, 4
 CLOCK_Hz = 125e6
 BOARDS = ("pico_parallel", "pico_mux")
 # Longest conversion by OSR, us: MS5840-02BA datasheet.
@@ -89,16 +91,16 @@ def scenario(folder, name, seconds, stem=None):
     return path
 
 
-def cobs_header(frame):
-    """The first twelve bytes of the packet in a frame."""
+def unstuffed(frame):
+    """The packet in a COBS frame without its delimiter."""
     packet, at = bytearray(), 0
-    while at < len(frame) and len(packet) < 12:
+    while at < len(frame):
         code = frame[at]
         packet += frame[at + 1:at + code]
         at += code
-        if code != 0xFF:
+        if code != 0xFF and at < len(frame):
             packet.append(0)
-    return bytes(packet[:12])
+    return bytes(packet)
 
 
 def contact_times_us(usb_log, zero_us):
@@ -114,9 +116,9 @@ def contact_times_us(usb_log, zero_us):
                 if byte:
                     frame.append(byte)
                     continue
-                header = cobs_header(frame)
-                if len(header) == 12 and header[1] == WIRE_CONTACT:
-                    times.append((int.from_bytes(header[4:12], "little"), offered_us, float(row["t_ns"]) / 1e3 - zero_us))
+                packet = unstuffed(frame)
+                if len(packet) > HEADER_BYTES and packet[1] == WIRE_CONTACT:
+                    times.append((int.from_bytes(packet[4:HEADER_BYTES], "little"), offered_us, float(row["t_ns"]) / 1e3 - zero_us))
                 frame = bytearray()
     return np.array(times)
 

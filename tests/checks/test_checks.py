@@ -14,7 +14,8 @@ sys.path.insert(0, str(HERE))
 from elf import Elf  # noqa: E402
 
 IMAGE = sys.argv[1]
-SU_FOLDERS = [str(pathlib.Path(sys.argv[2]) / part) for part in ("firmware", "boards")]
+BUILD = sys.argv[2]
+SU_FOLDERS = [str(pathlib.Path(BUILD) / part) for part in ("firmware", "boards")]
 
 
 class Checks(unittest.TestCase):
@@ -52,6 +53,16 @@ class Checks(unittest.TestCase):
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         done = self.run_check("stack_usage.py", "--su-dir", *SU_FOLDERS)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
+
+    def test_what_a_scene_switches_off(self):
+        scene = ("check_scene.py", "--build", BUILD, "--capabilities")
+        self.assertEqual(self.run_check(*scene, "FIT", "SLIP", "RAW_STREAM").returncode, 0)
+        self.assert_fails("SLIP is off, but the image has cmd_slip_", *scene, "FIT", "RAW_STREAM")
+        self.assert_fails("FIT is off, but the image has ", *scene, "SLIP", "RAW_STREAM")
+        self.rename("wire_raw_layout", "layout")
+        self.rename("wire_raw_runs", "runs")
+        self.assert_fails("RAW_STREAM is on, but the image has no symbol of it", *scene, "FIT", "SLIP", "RAW_STREAM")
+        self.assert_fails("no objects", "check_scene.py", "--build", self.folder.name, "--capabilities", "FIT")
 
     def test_boot2_crc(self):
         self.poke(".boot2", 20, b"\xff")

@@ -1,0 +1,54 @@
+#!/usr/bin/env python3
+"""Checks that an image has what its scene switches on, and no symbol of what it switches off.
+
+usage: check_scene.py IMAGE.elf --build FOLDER --capabilities NAME...
+
+A capability owns the symbols that its sources define, as the objects in the build folder have them, and those of its packets
+and commands. Exit 1 and one line for the first thing that is wrong.
+"""
+import argparse
+import pathlib
+import re
+import subprocess
+
+from elf import Elf, fail
+
+# Objects below firmware/CMakeFiles, and names of other symbols.
+OWNED = {
+    "FIT": ("ft_fit.dir/fit/*.obj", r"wire_contact_\w+"),
+    "SLIP": ("ft_contact.dir/contact/slip.c.obj", r"contact_update|cmd_slip_\w+"),
+    "RAW_STREAM": (None, r"wire_raw_\w+"),
+}
+
+
+def defined_in(build, pattern):
+    objects = sorted((pathlib.Path(build) / "firmware/CMakeFiles").glob(pattern))
+    if not objects:
+        fail(f"{build}: no objects {pattern}; build the image there first")
+    try:
+        lines = subprocess.run(["arm-none-eabi-nm", "--defined-only", *objects], check=True, capture_output=True, text=True).stdout
+    except (OSError, subprocess.CalledProcessError) as error:
+        fail(f"arm-none-eabi-nm: {error}")
+    return {name for name in re.findall(r"(?m)^[0-9a-f]+ \w (\S+)$", lines) if not name.startswith(("$", "."))}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("elf")
+    parser.add_argument("--build", required=True, help="build folder of the image")
+    parser.add_argument("--capabilities", required=True, nargs="+", choices=OWNED, help="those that are on")
+    args = parser.parse_args()
+
+    names = {symbol.name for symbol in Elf(args.elf).symbols if not symbol.is_file}
+    for capability, (objects, pattern) in OWNED.items():
+        owned = defined_in(args.build, objects) if objects else set()
+        there = sorted(name for name in names if name in owned or re.fullmatch(pattern, name))
+        if capability in args.capabilities and not there:
+            fail(f"{args.elf}: {capability} is on, but the image has no symbol of it")
+        if capability not in args.capabilities and there:
+            fail(f"{args.elf}: {capability} is off, but the image has {there[0]}; find who calls it in the map file")
+        print(f"{capability:12} {'on ' if capability in args.capabilities else 'off'} {len(there):4} symbols")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,97 @@
+"""The images of the scenes raw and press in the emulator: a packet has no field of what is off, and no command brings it back.
+
+usage: test_scenes.py --scenes FOLDER --fingertip TOOL --node NODE
+"""
+import argparse
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "host_tools" / "report"))
+import emulated  # noqa: E402
+import fingertip_files  # noqa: E402
+
+TOOLS = argparse.Namespace()
+BOARD = "pico_parallel"
+# Of a packet, firmware/wire/PROTOCOL.md: types, and bytes of the body without what belongs to a capability.
+CONTACT, RAW, INFO, HEALTH, ACK = 0x01, 0x02, 0x03, 0x04, 0x05
+INFO_BYTES, HEALTH_BYTES = 89 + 8 * 15, 68
+OF_FIT = {INFO: 1, HEALTH: 4}
+UNKNOWN_COMMAND, OUT_OF_RANGE = "1", "2"
+
+
+def encoded(*command):
+    return subprocess.run([TOOLS.fingertip, "encode", *command], capture_output=True, text=True, check=True).stdout.strip()
+
+
+class Run:
+    """A second in contact. acks: sequence number of the command -> result; body_bytes: packet type -> lengths of bodies."""
+
+    def __init__(self, folder, scene, stream):
+        base = pathlib.Path(folder) / scene
+        path = lambda suffix: str(base.with_suffix("." + suffix))
+        subprocess.run([sys.executable, str(ROOT / "host_tools/python/scenario.py"), "wander", "-o", path("scenario"), "--seconds", "3"],
+                       check=True)
+        script = [(0.45, "dtr 1"), (0.46, encoded("--sequence", "1", "info")), (0.47, encoded("--sequence", "2", "stream", "contact,raw,health")),
+                  (0.48, encoded("--sequence", "3", "slip", "1", "100")), (0.49, encoded("--sequence", "4", "stream", f"{stream},health")),
+                  (1.7, encoded("--sequence", "5", "health"))]
+        pathlib.Path(path("script")).write_text("".join(f"{t_s} {what}\n" for t_s, what in script))
+        image = pathlib.Path(TOOLS.scenes) / scene / f"fingertip-{BOARD}.bin"
+        done = subprocess.run(
+            [TOOLS.node, str(ROOT / "host_tools/emulator/main.mjs"), "--board", BOARD, "--image", str(image), "--scenario", path("scenario"),
+             "--host-script", path("script"), "--capture", path("ftr"), "--seconds", "1.8"], capture_output=True, text=True)
+        if done.returncode != 0:
+            raise AssertionError(f"the emulator found something wrong:\n{done.stderr}")
+        subprocess.run([TOOLS.fingertip, "replay", path("ftr"), "--to-csv", path("csv")], check=True, capture_output=True)
+        self.recording = fingertip_files.read_recording(path("csv"))
+        self.acks = {fields["command_sequence"]: fields["result"] for kind, fields in self.recording.packets if kind == "ack"}
+        self.body_bytes = {}
+        for frame in pathlib.Path(path("ftr")).read_bytes().split(b"\0"):
+            packet = emulated.unstuffed(frame)
+            if packet:
+                self.body_bytes.setdefault(packet[1], set()).add(len(packet) - emulated.HEADER_BYTES - emulated.CRC_BYTES)
+        self.has_contact = self.recording.has_contact
+        self.has_raw = self.recording["valid"] == self.recording["valid"]
+
+
+class Scenes(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.raw, cls.press = Run(cls.folder.name, "raw", "raw"), Run(cls.folder.name, "press", "contact")
+
+    def test_raw_streams_readings_and_nothing_of_a_fit(self):
+        self.assertEqual(self.raw.recording.metadata["scene"], "raw")
+        self.assertTrue(self.raw.has_raw.all())
+        self.assertFalse(self.raw.has_contact.any())
+        self.assertGreater(len(self.raw.has_raw), 400 * 1.3)
+        self.assertEqual(set(self.raw.body_bytes), {RAW, INFO, HEALTH, ACK})
+        self.assertEqual(self.raw.body_bytes[INFO], {INFO_BYTES})
+        self.assertEqual(self.raw.body_bytes[HEALTH], {HEALTH_BYTES})
+
+    def test_press_streams_contacts_and_nothing_of_slip_and_raw(self):
+        self.assertEqual(self.press.recording.metadata["scene"], "press")
+        self.assertTrue(self.press.has_contact.all())
+        self.assertFalse(self.press.has_raw.any())
+        self.assertTrue(self.press.recording.flag(fingertip_files.FIT_VALID)[-400:].all())
+        self.assertFalse(self.press.recording.flag(fingertip_files.SLIP | fingertip_files.SLIP_VALID).any())
+        self.assertEqual(set(self.press.body_bytes), {CONTACT, INFO, HEALTH, ACK})
+        self.assertEqual(self.press.body_bytes[INFO], {INFO_BYTES + OF_FIT[INFO]})
+        self.assertEqual(self.press.body_bytes[HEALTH], {HEALTH_BYTES + OF_FIT[HEALTH]})
+
+    def test_commands_for_what_is_off_are_refused(self):
+        for run in (self.raw, self.press):
+            self.assertEqual(run.acks, {"1": "0", "2": OUT_OF_RANGE, "3": UNKNOWN_COMMAND, "4": "0", "5": "0"})
+            self.assertEqual(run.recording.health()[-1]["commands_rejected"], 2)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    for argument in ("scenes", "fingertip", "node"):
+        parser.add_argument(f"--{argument}", required=True)
+    _, rest = parser.parse_known_args(namespace=TOOLS)
+    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
