@@ -37,6 +37,8 @@ constexpr milliseconds VOLUME_TIMEOUT{10000};
 /* A desktop mounts the drive itself within this time, or nobody does. */
 constexpr milliseconds MOUNTED_BY_OTHERS{3000};
 constexpr milliseconds RETURN_TIMEOUT{15000};
+/* udev gives a new port its owner within this time, or has no rule for it. */
+constexpr milliseconds PERMITTED_WITHIN{3000};
 constexpr Session::Policy QUICK = {milliseconds(400), 3};
 constexpr const char *INFO_FILE = "INFO_UF2.TXT";
 constexpr const char *BY_LABEL = "/dev/disk/by-label/RPI-RP2";
@@ -226,12 +228,19 @@ std::unique_ptr<Volume> wait_for_volume(const std::string &given) {
 /* The fingertip as it came back. */
 wire_info wait_for_return(const Choice &choice) {
   std::string last = "nothing answered";
-  for (auto begin = Clock::now(); Clock::now() - begin < RETURN_TIMEOUT;) {
+  auto begin = Clock::now();
+  auto not_refused = begin;
+  while (Clock::now() - begin < RETURN_TIMEOUT) {
     sleep_or_stop();
     try {
       return ask(choose_way(choice), stop_requested);
     } catch (const Error &error) {
       last = error.what();
+    }
+    if (last.find(PERMISSION_ADVICE) == std::string::npos) {
+      not_refused = Clock::now();
+    } else if (Clock::now() - not_refused > PERMITTED_WITHIN) {
+      throw Error("written, but it cannot be asked for its version: " + last);
     }
   }
   throw Error("written, but it did not come back (" + last + "); " + PRESS);

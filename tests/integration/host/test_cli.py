@@ -79,6 +79,21 @@ class CliTest(unittest.TestCase):
         self.assertTrue(err.startswith("fingertip: "), err)
         return err
 
+    RULE = "permission denied; install the udev rule: fingertip rule | sudo tee /etc/udev/rules.d/60-fingertip.rules, " \
+           "then sudo udevadm control --reload, and plug it in again"
+
+    def without_permission(self, *arguments):
+        """What a user says who may not open the port, on failing."""
+        os.chmod(os.path.realpath(self.port), 0)
+        os.chmod(self.folder, 0o777)
+        tool, user = FINGERTIP, {}
+        if os.geteuid() == 0:
+            tool, user = os.path.join(self.folder, "fingertip"), {"user": 65534, "group": 65534, "extra_groups": []}
+            shutil.copy(FINGERTIP, tool)  # where everybody may run it
+        done = subprocess.run([tool, *arguments], capture_output=True, text=True, env=self.environment, timeout=PATIENCE_s, **user)
+        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        return done.stderr
+
     def rows(self, path=None):
         """Data rows as dictionaries, and the comment lines."""
         with open(path or self.csv, encoding="utf-8") as file:
@@ -254,21 +269,10 @@ class Several(CliTest):
 class ErrorsPeopleMeet(CliTest):
     """Each one line that says what to do, and exit status 1. Those of several fingertips on USB: tests/unit/host."""
 
-    RULE = "permission denied; install the udev rule: fingertip rule | sudo tee /etc/udev/rules.d/60-fingertip.rules, " \
-           "then sudo udevadm control --reload, and plug it in again"
-
     def test_no_permission(self):
         with self.device():
-            os.chmod(os.path.realpath(self.port), 0)
-            if os.geteuid() != 0:
-                self.assertEqual(self.error("info", "--port", self.port), f"fingertip: {self.port}: {self.RULE}\n")
-                return
-            tool = os.path.join(self.folder, "fingertip")  # where everybody may run it
-            shutil.copy(FINGERTIP, tool)
-            os.chmod(self.folder, 0o755)
-            done = subprocess.run([tool, "info", "--port", self.port], capture_output=True, text=True, user=65534, group=65534,
-                                  extra_groups=[], env=self.environment)
-            self.assertEqual((done.returncode, done.stdout, done.stderr), (1, "", f"fingertip: {self.port}: {self.RULE}\n"))
+            for command in (["info"], ["monitor"], ["record", self.csv]):
+                self.assertEqual(self.without_permission(*command, "--port", self.port), f"fingertip: {self.port}: {self.RULE}\n")
 
     def test_port_busy(self):
         with self.device():
@@ -400,6 +404,14 @@ class Flash(CliTest):
         self.make_volume()
         with self.device("board=pico_mux", "git=abcdef012345", "firmware=9.8.7"):
             self.assertIn("firmware 9.8.7", self.run_cli("flash", self.image, "--volume", self.volume)[0])
+
+    def test_back_before_the_rule_is_installed(self):
+        self.make_volume()
+        os.chmod(self.volume, 0o777)
+        with self.device():
+            err = self.without_permission("flash", self.image, "--volume", self.volume)
+        self.assertEqual(err, "writing 9.8.7 abcdef012345 for pico_mux\n"
+                              f"fingertip: written, but it cannot be asked for its version: {self.port}: {self.RULE}\n")
 
     def test_another_version_came_back(self):
         self.assertIn("came back with firmware 1.20.3 0123456789ab+ instead of 9.8.7 abcdef012345; unplug the Pico, hold its BOOTSEL",
