@@ -32,6 +32,9 @@ PATIENCE_s = 60
 PROMPT_s = 0.1
 TRIANGLE_s = 2.0
 TOP_Pa = 20000
+ALL_SENSORS = 0x7FFF
+REPORTED = ("alignment_us", "alignment_bound_us", "alignment_felt_us", "alignment_seconds", "alignment_of")
+MEASURED = {}
 
 
 def write_scenario(path):
@@ -111,6 +114,7 @@ def tops_us(time_us, pressure_Pa, expected_us):
 class TwoFingertips(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
+        report()
         holder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(holder.cleanup)
         folder = pathlib.Path(holder.name)
@@ -177,22 +181,23 @@ class TwoFingertips(unittest.TestCase):
             tops = zero_us + np.arange(TRIANGLE_s / 2, RECORDED_s + 2 * PATIENCE_s, TRIANGLE_s) * 1e6
             inside = (tops > recording.time_us[0] + TRIANGLE_s * 0.5e6) & (tops < recording.time_us[-1] - TRIANGLE_s * 0.5e6)
             pressure_Pa = recording.sensors_Pa.mean(axis=1)
-            told = ~np.isnan(pressure_Pa)
+            told = recording["valid"] == ALL_SENSORS  # in one of 65536 readings the firmware does not trust the sensor
             errors.append(tops_us(recording.time_us[told], pressure_Pa[told], tops[inside]) - tops[inside])
-        count = min(len(each) for each in errors)
-        self.assertGreater(count, RECORDED_s / TRIANGLE_s - 3)
-        apart_us = abs(errors[0][:count] - errors[1][:count]).max()
-        print(f"tops {apart_us:.1f} us apart, late by {np.mean(errors):.1f} us")
+            self.assertGreater(len(errors[-1]), RECORDED_s / TRIANGLE_s - 3)
+        apart_us = max(errors[0].max() - errors[1].min(), errors[1].max() - errors[0].min())
+        print(f"tops {apart_us:.1f} us apart, late by {np.concatenate(errors).mean():.1f} us")
         self.assertLess(apart_us, LIMIT_us)
         report(alignment_felt_us=round(apart_us, 1))
 
 
 def report(**numbers):
-    """Adds to a file that other tests write to too."""
+    """Into a file that other tests write to too; what this run did not measure is in it no more."""
     path = pathlib.Path(TOOLS.report)
     path.parent.mkdir(parents=True, exist_ok=True)
-    old = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-    path.write_text(json.dumps({**old, **numbers}, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+    whole = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    others = {name: value for name, value in whole.items() if name not in REPORTED}
+    MEASURED.update(numbers)
+    path.write_text(json.dumps({**others, **MEASURED}, indent=2, sort_keys=True) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
