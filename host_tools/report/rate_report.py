@@ -25,9 +25,9 @@ def text(found, how):
     lines = ["# Rate, latency and cost", "", "Written by `sh cmake/bootstrap.sh report`. ![Rates, latency, cycles](rate.png)", "",
              *goal_table_md(found), "", how.strip(), "",
              f"On pico_parallel at OSR 256, over {found['seconds']:.0f} s at {found['contact_frames_per_s']:.0f} frames/s:", "",
-             *table([{"what": what, **{name: found[f"{key}_parallel_{name}_us"] for name in ("median", "p99", "max")}}
+             *table([{"what": what, **{name: found[f"{key}_parallel_{name}_us"] for name in ("median", "p99", "p99_9", "max")}}
                      for what, key in (("offered", "latency"), ("delivered", "delivery"))],
-                    {"us after the conversion": field("what"), "median": field("median"), "p99": field("p99"), "max": field("max")}), "",
+                    {"us after the conversion": field("what"), "median": field("median"), "p99": field("p99"), "p99.9": field("p99_9"), "max": field("max")}), "",
              f"- Lost: {found['sequence_gaps']} gaps in the sequence, {found['packets_dropped']} packets dropped and {found['frames_skipped']} frames",
              f"  skipped by the device's own count, {found['frames_missing']} frame numbers that never came, {found['unfitted']} frames without a fit.",
              f"- Steps of the frame clock differ by {found['clock_jitter_us']:.0f} us at most.",

@@ -30,6 +30,7 @@ import numpy as np
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "python"))
 from fingertip_files import FIT_VALID, SLIP, InputError, read_recording, run_tool, write_text  # noqa: E402
+from goals import judge, print_goals  # noqa: E402
 from validation_report import draw, write_report  # noqa: E402
 
 SATURATED = 1 << 12
@@ -433,12 +434,7 @@ def measure(shop, seconds, emulated):
     found |= measure_location(shop) | measure_force(shop, found["force_scale_gain0"]) | measure_stiff(shop) | measure_slip(shop)
     found |= measure_budget(shop)
     found["emulated_frames"], found["emulated_frames_different"] = emulated["frames"], emulated["frames"] - emulated["equal"]
-    found["goals"] = {}
-    for name, sign, bound in GOALS:
-        value = found[name]
-        met = None if value is None else value <= bound if sign == "<=" else value >= bound
-        found["goals"][name] = {"goal": f"{sign} {bound:g}", "met": met}
-    return found
+    return judge(found, GOALS)
 
 
 def curves(shop):
@@ -504,9 +500,7 @@ def main(argv):
     if options.picture:
         shutil.copy(out / "validation_force.png", options.picture)
     write_report(found, out / "validation.md")
-    for name, goal in found["goals"].items():
-        value = "-" if found[name] is None else f"{found[name]:.6g}"
-        print(f"{ {True: 'ok', False: 'MISSED', None: '-'}[goal['met']]:<7} {name:<34} {value:>10}   goal {goal['goal']}")
+    print_goals(found)
     print(f"validation: {out / 'validation.json'}, {out / 'validation.md'}")
     return 0
 

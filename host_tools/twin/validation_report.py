@@ -8,6 +8,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 from fingertip_files import SENSOR_X_mm, SENSOR_Y_mm, write_text  # noqa: E402
+from goals import goal_table_md  # noqa: E402
 
 NAMES = {
     "sphere6": "Small spherical indenter", "sphere15": "Large spherical indenter", "cylinder6": "Cylindrical indenter",
@@ -68,9 +69,7 @@ def write_report(found, path):
            f"{found['emulated_frames'] - found['emulated_frames_different']} of its contact packets are what the same code gives here, byte for "
            f"byte. Layers: rubber of Shore 15 A, 12 mm unless said otherwise. Unequal sensors are drawn for {found['pads']} pads.")
     r.text("## Figures and goals")
-    r.table(("figure", "value", "goal", ""), [
-        (f"`{name}`", "-" if found[name] is None else f"{found[name]:.4g}", goal["goal"], {True: "met", False: "**missed**", None: "not measured"}[goal["met"]])
-        for name, goal in found["goals"].items()])
+    r.text(*goal_table_md(found))
     write_location(found, r)
     write_force(found, r)
     write_stiff(found, r)
