@@ -91,6 +91,7 @@ export class PicoParallel {
     const onScl = (action) => (_, active) => {
       this.sclFaults += active ? 1 : -1;
       if (active) this.sclCheck.excused = true;
+      else this.sclRose_ns = this.scope.nanos; // it may end within a clock: only a pause from here on is one
       for (const line of this.lines) line.fault(active);
       action(SCL, active);
       this.#resolve();
