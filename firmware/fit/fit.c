@@ -20,10 +20,10 @@ static int32_t split(float value, int32_t *exponent) {
 
 /* Number of the node at this coordinate, or -1 off the grid. */
 static int node_at(float position, float first) {
-  float steps = position - first;
-  float nearest = floorf(steps + 0.5f);
-  bool on_node = fabsf(steps - nearest) <= ON_NODE && nearest < (float)FIT_GRID_MAX_NODES;
-  return on_node ? (int)nearest : -1;
+  float steps = position - first; /* not negative but for rounding */
+  int nearest = (int)(steps + 0.5f);
+  bool on_node = fabsf(steps - (float)nearest) <= ON_NODE && nearest < FIT_GRID_MAX_NODES;
+  return on_node ? nearest : -1;
 }
 
 /* Fills made->grid if the sensors occupy every node of a rectangle. */
@@ -57,7 +57,7 @@ static void find_grid(struct fit_array *made, const float *x_mm, const float *y_
   grid->pitch = split(made->pitch_mm, &exponent);
   grid->pitch_exponent = exponent + 6;
   uint8_t origin = grid->sensor[(columns / 2) * rows + rows / 2];
-  float unit = ldexpf(1.0f, -grid->pitch_exponent);
+  float unit = bytes_to_f32((uint32_t)(127 - grid->pitch_exponent) << 23); /* a power of 2 */
   grid->x_origin = (int32_t)(x_mm[origin] * unit);
   grid->y_origin = (int32_t)(y_mm[origin] * unit);
   grid->force_scale =
