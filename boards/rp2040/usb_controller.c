@@ -133,10 +133,11 @@ void usb_controller_close_all(void) {
 }
 
 void usb_controller_send(uint8_t endpoint, const uint8_t *bytes, size_t length) {
-  volatile uint8_t *buffer =
-      (volatile uint8_t *)(uintptr_t)(USB_DPRAM_BASE + USB_BUFFER_OFFSET(endpoint));
-  for (size_t i = 0; i < length; i++)
-    buffer[i] = bytes[i];
+  volatile uint32_t *buffer =
+      (volatile uint32_t *)(uintptr_t)(USB_DPRAM_BASE + USB_BUFFER_OFFSET(endpoint));
+  const uint32_t *words = __builtin_assume_aligned(bytes, 4);
+  for (size_t i = 0; i < (length + 3) / 4; i++)
+    buffer[i] = words[i];
   uint32_t bit = USB_BIT(endpoint);
   uint32_t fields = USB_BUFFER_FULL | pid(endpoint) | (uint32_t)length;
   held |= bit;

@@ -39,8 +39,8 @@ struct app {
   struct fit_result fit;
 #endif
   struct contact_result contact;
-  struct wire_packet packet; /* in or out, one at a time */
-  uint8_t out[WIRE_MAX_FRAME_BYTES];
+  struct wire_packet packet;                         /* in or out, one at a time */
+  _Alignas(4) uint8_t out[WIRE_MAX_FRAME_BYTES + 3]; /* filled up to whole words */
 
   uint8_t streams; /* enum wire_stream */
   uint16_t sequence;

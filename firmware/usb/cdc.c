@@ -16,7 +16,7 @@ enum class_request {
 enum { LINE_CODING_BYTES = 7, CONTROL_LINE_DTR = 1, LOADER_BAUD = 1200 };
 
 enum { TRANSMIT_BYTES = 4096, RECEIVE_BYTES = 256 };
-static uint8_t transmit_bytes[TRANSMIT_BYTES];
+static _Alignas(4) uint8_t transmit_bytes[TRANSMIT_BYTES];
 static uint8_t receive_bytes[RECEIVE_BYTES];
 static struct ring transmit_ring = {.bytes = transmit_bytes, .size = TRANSMIT_BYTES};
 static struct ring receive_ring = {.bytes = receive_bytes, .size = RECEIVE_BYTES};
@@ -37,7 +37,7 @@ static struct {
   bool suspended;
 
   /* The packet at the head of the stream: taken from the ring, not yet acknowledged */
-  uint8_t packet[USB_MAX_PACKET_BYTES];
+  _Alignas(4) uint8_t packet[USB_MAX_PACKET_BYTES];
   size_t packet_bytes;
   enum packet_state packet_state;
   bool transfer_is_open; /* the last packet was full, so the host waits for more */

@@ -38,8 +38,9 @@ uint32_t cdc_news(void);
 /* Counts the times the port was closed (DTR dropped, bus reset, unplugged): streams end then. */
 uint32_t cdc_close_count(void);
 
-/* Queues all of the bytes or none. FT_ERR_SPACE: the queue is too full. FT_ERR_ARGUMENT: longer
- * than the queue will ever hold. Bytes queued while the port is closed are discarded at once. */
+/* Queues all of the bytes or none; those of whole words cost less. FT_ERR_SPACE: the queue is too
+ * full. FT_ERR_ARGUMENT: longer than the queue will ever hold. Bytes queued while the port is
+ * closed are discarded at once. */
 enum ft_status cdc_write(const uint8_t *bytes, size_t length);
 
 /* Takes what has arrived, at most capacity bytes; returns how many. */

@@ -51,7 +51,7 @@ static struct {
   /* The control transfer under way */
   enum stage stage;
   struct usb_setup setup;
-  uint8_t data[DESCRIPTOR_MAX_BYTES];
+  _Alignas(4) uint8_t data[DESCRIPTOR_MAX_BYTES];
   size_t length; /* of the data stage */
   size_t done;
 } device;

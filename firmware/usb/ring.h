@@ -1,5 +1,6 @@
 /* A byte queue between one producer and one consumer in different contexts, without locks. Each
  * side stores its own index and only reads the other's, so plain atomic loads and stores suffice.
+ * Lengths and buffers that are multiples of 4 bytes are copied by words.
  */
 #ifndef USB_RING_H
 #define USB_RING_H
@@ -7,6 +8,7 @@
 #include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 struct ring {
   uint8_t *bytes;
@@ -24,8 +26,11 @@ static inline uint32_t ring_space(const struct ring *ring) {
 /* Producer; length is at most ring_space(). */
 static inline void ring_put(struct ring *ring, const uint8_t *bytes, uint32_t length) {
   uint32_t put = atomic_load_explicit(&ring->put, memory_order_relaxed);
-  for (uint32_t i = 0; i < length; i++)
-    ring->bytes[(put + i) & (ring->size - 1)] = bytes[i];
+  uint32_t at = put & (ring->size - 1);
+  uint32_t to_end = ring->size - at;
+  uint32_t first = length < to_end ? length : to_end;
+  memcpy(ring->bytes + at, bytes, first);
+  memcpy(ring->bytes, bytes + first, length - first);
   atomic_store_explicit(&ring->put, put + length, memory_order_release);
 }
 
@@ -35,8 +40,11 @@ static inline uint32_t ring_take(struct ring *ring, uint8_t *bytes, uint32_t cap
   uint32_t length = atomic_load_explicit(&ring->put, memory_order_acquire) - taken;
   if (length > capacity)
     length = capacity;
-  for (uint32_t i = 0; i < length; i++)
-    bytes[i] = ring->bytes[(taken + i) & (ring->size - 1)];
+  uint32_t at = taken & (ring->size - 1);
+  uint32_t to_end = ring->size - at;
+  uint32_t first = length < to_end ? length : to_end;
+  memcpy(bytes, ring->bytes + at, first);
+  memcpy(bytes + first, ring->bytes, length - first);
   atomic_store_explicit(&ring->taken, taken + length, memory_order_release);
   return length;
 }

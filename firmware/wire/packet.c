@@ -127,105 +127,192 @@ const struct wire_layout *wire_find_layout(const struct wire_layout *const *set,
   return *set;
 }
 
-/* Walks over a body in one direction or the other, so that each layout is written down once. */
-struct cursor {
-  uint8_t *at;
-  const uint8_t *end;
-  bool writing;
-};
-
-static bool move_bytes(struct cursor *cursor, uint8_t *field, unsigned count) {
-  memcpy(cursor->writing ? cursor->at : field, cursor->writing ? field : cursor->at, count);
-  return true;
+static bool is_printable(uint8_t byte) {
+  return byte >= 0x20 && byte <= 0x7E;
 }
 
-static bool move_texts(struct cursor *cursor, uint8_t *field, unsigned count) {
-  move_bytes(cursor, field, count * WIRE_TEXT_BYTES);
+/* Whether these fields, in the machine's form, hold what the protocol allows. */
+static bool is_text(const uint8_t *field, unsigned count) {
   bool padding = false;
-  for (unsigned i = 0; i < count * WIRE_TEXT_BYTES; i++) {
-    uint8_t byte = field[i];
+  for (unsigned i = 0; i < count; i++) {
     padding = padding && i % WIRE_TEXT_BYTES != 0;
-    bool printable = byte >= 0x20 && byte <= 0x7E;
-    if (byte != 0 && (padding || !printable)) {
+    if (field[i] != 0 && (padding || !is_printable(field[i]))) {
       return false;
     }
-    padding = byte == 0;
+    padding = field[i] == 0;
   }
   return true;
 }
 
-static bool move_u16(struct cursor *cursor, uint8_t *field, unsigned count) {
-  for (uint8_t *at = cursor->at; count > 0; count--, at += 2, field += 2) {
-    uint16_t value;
-    if (cursor->writing) {
-      memcpy(&value, __builtin_assume_aligned(field, 2), sizeof value);
-      bytes_put_u16(at, value);
-    } else {
-      value = bytes_get_u16(at);
-      memcpy(__builtin_assume_aligned(field, 2), &value, sizeof value);
-    }
-  }
-  return true;
+#define EXPONENT 0x7F800000u
+#define IS_FINITE(bits) (((bits)&EXPONENT) != EXPONENT)
+
+/* From one 32-bit value of a run to the next: of a pair the two take turns. */
+struct stride {
+  int next, after;
+};
+
+static inline struct stride stride_of(bool pairs) {
+  const int across = 4 * FT_MAX_SENSORS;
+  return pairs ? (struct stride){across, 4 - across} : (struct stride){4, 4};
 }
 
-static bool move_u64(struct cursor *cursor, uint8_t *field) {
-  uint64_t value;
-  if (cursor->writing) {
-    memcpy(&value, field, sizeof value);
-    bytes_put_u64(cursor->at, value);
-  } else {
-    value = bytes_get_u64(cursor->at);
-    memcpy(field, &value, sizeof value);
-  }
-  return true;
-}
+struct writer {
+  uint8_t *at;
+  uint32_t crc;
+};
 
-/* stride: of the values on the line. False: a float that is not finite. */
-static bool move_u32(struct cursor *cursor, uint8_t *field, unsigned count, size_t first,
-                     size_t stride, bool is_float) {
-  const uint32_t exponent = 0x7F800000u;
+/* Returns whether all would be finite as floats. Most of a packet goes through here. */
+static bool put_u32(struct writer *writer, const uint8_t *field, unsigned count, bool pairs) {
+  struct stride stride = stride_of(pairs);
+  uint8_t *at = writer->at;
+  uint32_t crc = writer->crc;
   bool finite = true;
-  for (uint8_t *at = cursor->at + first; count > 0; count--, at += stride, field += 4) {
+  for (; count > 0; count--) {
     uint32_t value;
-    if (cursor->writing) {
-      memcpy(&value, __builtin_assume_aligned(field, 4), sizeof value);
-      bytes_put_u32(at, value);
-    } else {
-      value = bytes_get_u32(at);
-      memcpy(__builtin_assume_aligned(field, 4), &value, sizeof value);
-    }
-    if ((value & exponent) == exponent) {
+    memcpy(&value, __builtin_assume_aligned(field, 4), sizeof value);
+    bytes_put_u32(at, value);
+    crc = crc32_add_u32(crc, value);
+    if (!IS_FINITE(value)) {
       finite = false;
     }
+    at += 4;
+    field += stride.next;
+    stride = (struct stride){stride.after, stride.next};
   }
-  return finite || !is_float;
+  writer->at = at;
+  writer->crc = crc;
+  return finite;
 }
 
-static bool move_pairs(struct cursor *cursor, uint8_t *field, unsigned count, bool is_float) {
-  bool first = move_u32(cursor, field, count, 0, 8, is_float);
-  bool second = move_u32(cursor, field + 4 * FT_MAX_SENSORS, count, 4, 8, is_float);
-  return first && second;
+static void put_u16(struct writer *writer, const uint8_t *field, unsigned count) {
+  for (; count > 0; count--, field += 2, writer->at += 2) {
+    uint16_t value;
+    memcpy(&value, __builtin_assume_aligned(field, 2), sizeof value);
+    bytes_put_u16(writer->at, value);
+    writer->crc = crc32_add_u16(writer->crc, value);
+  }
 }
 
-static bool move_run(struct cursor *cursor, const struct run *run, uint8_t *field, unsigned count) {
-  switch (run->kind) {
+static void put_bytes(struct writer *writer, const uint8_t *field, unsigned count) {
+  for (; count > 0; count--) {
+    writer->crc = crc32_add_u8(writer->crc, *field);
+    *writer->at++ = *field++;
+  }
+}
+
+static void put_u64(struct writer *writer, uint64_t value) {
+  const uint32_t words[2] = {(uint32_t)value, (uint32_t)(value >> 32)};
+  put_u32(writer, (const uint8_t *)words, 2, false);
+}
+
+static bool put_run(struct writer *writer, uint8_t kind, const uint8_t *field, unsigned count) {
+  uint64_t wide;
+  switch (kind) {
   case TEXTS:
-    return move_texts(cursor, field, count);
+    put_bytes(writer, field, count * WIRE_TEXT_BYTES);
+    return is_text(field, count * WIRE_TEXT_BYTES);
   case U16:
-    return move_u16(cursor, field, count);
-  case U32:
-    return move_u32(cursor, field, count, 0, 4, false);
+    put_u16(writer, field, count);
+    return true;
   case U64:
-    return move_u64(cursor, field);
-  case F32:
-    return move_u32(cursor, field, count, 0, 4, true);
+    memcpy(&wide, field, sizeof wide);
+    put_u64(writer, wide);
+    return true;
+  case U32:
+    put_u32(writer, field, count, false);
+    return true;
   case PAIRS:
-    return move_pairs(cursor, field, count, false);
+    put_u32(writer, field, 2 * count, true);
+    return true;
+  case F32:
+    return put_u32(writer, field, count, false);
   case F32_PAIRS:
-    return move_pairs(cursor, field, count, true);
+    return put_u32(writer, field, 2 * count, true);
   default:
-    return move_bytes(cursor, field, count);
+    put_bytes(writer, field, count);
+    return true;
   }
+}
+
+static bool get_u32(const uint8_t *at, uint8_t *field, unsigned count, bool pairs) {
+  struct stride stride = stride_of(pairs);
+  bool finite = true;
+  for (; count > 0; count--, at += 4) {
+    uint32_t value = bytes_get_u32(at);
+    memcpy(__builtin_assume_aligned(field, 4), &value, sizeof value);
+    finite = finite && IS_FINITE(value);
+    field += stride.next;
+    stride = (struct stride){stride.after, stride.next};
+  }
+  return finite;
+}
+
+static bool get_run(const uint8_t *at, uint8_t kind, uint8_t *field, unsigned count) {
+  uint64_t wide;
+  uint16_t half;
+  switch (kind) {
+  case TEXTS:
+    memcpy(field, at, count * WIRE_TEXT_BYTES);
+    return is_text(field, count * WIRE_TEXT_BYTES);
+  case U16:
+    for (; count > 0; count--, at += 2, field += 2) {
+      half = bytes_get_u16(at);
+      memcpy(__builtin_assume_aligned(field, 2), &half, sizeof half);
+    }
+    return true;
+  case U64:
+    wide = bytes_get_u64(at);
+    memcpy(field, &wide, sizeof wide);
+    return true;
+  case U32:
+    get_u32(at, field, count, false);
+    return true;
+  case PAIRS:
+    get_u32(at, field, 2 * count, true);
+    return true;
+  case F32:
+    return get_u32(at, field, count, false);
+  case F32_PAIRS:
+    return get_u32(at, field, 2 * count, true);
+  default:
+    memcpy(field, at, count);
+    return true;
+  }
+}
+
+static bool is_left_out(const struct run *when, const uint8_t *field) {
+  uint32_t flags;
+  memcpy(&flags, __builtin_assume_aligned(field, 4), sizeof flags);
+  return (flags >> when->count & 1u) == 0;
+}
+
+static bool is_sensor_count(uint8_t count) {
+  return count >= 1 && count <= FT_MAX_SENSORS;
+}
+
+/* False: a value is refused. */
+static bool put_body(const struct wire_layout *layout, const uint8_t *packet,
+                     struct writer *writer) {
+  uint8_t sensor_count = 0;
+  const struct run *end = layout->runs + layout->run_count;
+  for (const struct run *run = layout->runs; run < end; run++) {
+    const uint8_t *field = packet + run->offset;
+    if (run->kind == WHEN) {
+      run += is_left_out(run, field);
+      continue;
+    }
+    if (run->kind == SENSOR_COUNT) {
+      sensor_count = *field;
+      if (!is_sensor_count(sensor_count)) {
+        return false;
+      }
+    }
+    if (!put_run(writer, run->kind, field, run->kind >= PAIRS ? sensor_count : run->count)) {
+      return false;
+    }
+  }
+  return true;
 }
 
 static const uint8_t bytes_of_kind[] = {[BYTES] = 1,        [TEXTS] = WIRE_TEXT_BYTES,
@@ -234,53 +321,60 @@ static const uint8_t bytes_of_kind[] = {[BYTES] = 1,        [TEXTS] = WIRE_TEXT_
                                         [F32] = 4,          [PAIRS] = 8,
                                         [F32_PAIRS] = 8};
 
-/* False: the body is too short, or a value is refused. */
-static bool move_body(const struct wire_layout *layout, struct cursor *cursor,
-                      struct wire_packet *packet) {
-  unsigned sensor_count = 0;
+/* False: a value is refused, or the body has another length. */
+static bool get_body(const struct wire_layout *layout, const uint8_t *at, size_t length,
+                     uint8_t *packet) {
+  uint8_t sensor_count = 0;
   const struct run *end = layout->runs + layout->run_count;
   for (const struct run *run = layout->runs; run < end; run++) {
-    uint8_t *field = (uint8_t *)packet + run->offset;
+    uint8_t *field = packet + run->offset;
     if (run->kind == WHEN) {
-      uint32_t flags;
-      memcpy(&flags, __builtin_assume_aligned(field, 4), sizeof flags);
-      run += ~flags >> run->count & 1u;
+      run += is_left_out(run, field);
       continue;
     }
     unsigned count = run->kind >= PAIRS ? sensor_count : run->count;
-    size_t length = count * bytes_of_kind[run->kind];
-    if ((size_t)(cursor->end - cursor->at) < length || !move_run(cursor, run, field, count)) {
+    size_t bytes = count * bytes_of_kind[run->kind];
+    if (length < bytes || !get_run(at, run->kind, field, count)) {
       return false;
     }
-    cursor->at += length;
+    at += bytes;
+    length -= bytes;
     if (run->kind == SENSOR_COUNT) {
       sensor_count = *field;
-      if (sensor_count < 1 || sensor_count > FT_MAX_SENSORS) {
+      if (!is_sensor_count(sensor_count)) {
         return false;
       }
     }
   }
-  return true;
+  return length == 0;
 }
+
+/* Bytes without a zero that one code covers, and the code itself */
+enum { COBS_RUN = 255 };
 
 /* In place: the first byte of frame is free, length bytes follow, and room for what COBS adds.
  * Returns the length of the whole. */
 static size_t cobs_encode(uint8_t *frame, size_t length) {
-  size_t code_at = 0;
-  for (size_t i = 1; i <= length; i++) {
-    if (frame[i] == 0) {
-      frame[code_at] = (uint8_t)(i - code_at);
-      code_at = i;
-    } else if (i - code_at == 254 && i < length) {
-      frame[code_at] = 0xFF;
-      code_at = i + 1;
-      memmove(frame + code_at + 1, frame + code_at, length - i);
-      length++;
-      i++;
+  uint8_t *code_at = frame;
+  const uint8_t *end = frame + 1 + length;
+  uint8_t *at = frame + 1;
+  for (;;) {
+    const uint8_t *stop = end - code_at > COBS_RUN ? code_at + COBS_RUN : end;
+    while (at < stop && *at != 0) {
+      at++;
     }
+    if (at == end) {
+      break;
+    }
+    *code_at = (uint8_t)(at - code_at);
+    if (at == stop) { /* no zero stands there to give its place for the next code */
+      memmove(at + 1, at, (size_t)(end - at));
+      end++;
+    }
+    code_at = at++;
   }
-  frame[code_at] = (uint8_t)(length + 1 - code_at);
-  return length + 1;
+  *code_at = (uint8_t)(at - code_at);
+  return (size_t)(end - frame);
 }
 
 /* In place. Returns 0 for bytes that no COBS encoder produces. */
@@ -310,21 +404,16 @@ enum ft_status wire_encode(const struct wire_layout *layout, const struct wire_p
   if (!layout) {
     return FT_ERR_ARGUMENT;
   }
-  uint8_t *bytes = frame + 1;
-  bytes[0] = WIRE_VERSION;
-  bytes[1] = layout->type;
-  bytes_put_u16(bytes + 2, packet->sequence);
-  bytes_put_u64(bytes + 4, packet->t_us);
-  struct cursor cursor = {.at = bytes + WIRE_HEADER_BYTES,
-                          .end = bytes + WIRE_HEADER_BYTES + WIRE_MAX_BODY_BYTES,
-                          .writing = true};
-  /* Writing only reads the packet. */
-  if (!move_body(layout, &cursor, (struct wire_packet *)(uintptr_t)packet)) {
+  struct writer writer = {.at = frame + 1, .crc = CRC32_BEGIN};
+  const uint8_t head[2] = {WIRE_VERSION, layout->type};
+  put_bytes(&writer, head, sizeof head);
+  put_u16(&writer, (const uint8_t *)&packet->sequence, 1);
+  put_u64(&writer, packet->t_us);
+  if (!put_body(layout, (const uint8_t *)packet, &writer)) {
     return FT_ERR_ARGUMENT;
   }
-  size_t used = (size_t)(cursor.at - bytes);
-  bytes_put_u32(cursor.at, crc32_iso_hdlc(bytes, used));
-  size_t out = cobs_encode(frame, used + WIRE_CRC_BYTES);
+  bytes_put_u32(writer.at, ~writer.crc);
+  size_t out = cobs_encode(frame, (size_t)(writer.at + WIRE_CRC_BYTES - (frame + 1)));
   frame[out++] = 0;
   *length = out;
   return FT_OK;
@@ -353,8 +442,7 @@ enum ft_status wire_decode(const struct wire_layout *const *set, uint8_t *frame,
     *packet = decoded;
     return FT_ERR_TYPE;
   }
-  struct cursor cursor = {.at = frame + WIRE_HEADER_BYTES, .end = frame + used, .writing = false};
-  if (!move_body(layout, &cursor, &decoded) || cursor.at != cursor.end) {
+  if (!get_body(layout, frame + WIRE_HEADER_BYTES, used - WIRE_HEADER_BYTES, (uint8_t *)&decoded)) {
     return FT_ERR_FORMAT;
   }
   *packet = decoded;
