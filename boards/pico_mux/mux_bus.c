@@ -10,6 +10,9 @@ enum {
   ALL_MUXES = (1 << BOARD_MUX_COUNT) - 1,
   RECOVERY_CLOCKS = 9, /* UM10204 3.1.16: a device that holds SDA lets go within nine */
 };
+/* From a START to the acknowledge of address and command, at the least: hold time and eighteen
+ * clocks of 2.5 us up to the rise of the last (UM10204, fast mode). */
+#define COMMAND_us 44u
 #define RECOVERY_HALF_PERIOD_us 5u /* 100 kHz, for whatever is on the bus */
 
 /* Interrupts lead from one transaction to the next; whoever polls only looks whether they move on.
@@ -332,6 +335,7 @@ enum ft_status mux_bus_init(struct mux_bus *bus, struct array_bus *array_bus) {
 
   *array_bus = (struct array_bus){
       .context = bus,
+      .read_lead_us = COMMAND_us,
       .start_command = start_command,
       .start_read = start_read,
       .start_recovery = start_recovery,

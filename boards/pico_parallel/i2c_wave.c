@@ -128,8 +128,8 @@ static unsigned levels_in_address(const uint16_t *samples) {
   } while (0)
 
 /* Of two rows of each matrix, the bytes of four sensors: those at first, first + 1 and eight on. */
-static inline void put_four(uint32_t rows, uint8_t bytes[][ARRAY_BUS_MAX_READ_BYTES],
-                            unsigned first) {
+static inline __attribute__((always_inline)) void
+put_four(uint32_t rows, uint8_t bytes[][ARRAY_BUS_MAX_READ_BYTES], unsigned first) {
   const uint32_t differ = (rows >> 1 ^ rows >> 16) & 0x5555u;
   rows ^= differ << 1 ^ differ << 16;
   bytes[first][0] = (uint8_t)rows;

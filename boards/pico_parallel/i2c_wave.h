@@ -29,6 +29,9 @@ enum {
   I2C_WAVE_RECOVERY_STEPS = I2C_WAVE_RECOVERY_CELLS * WAVE_STEPS_PER_CELL,
 };
 
+/* From the first step to the sample of the acknowledged command, in waves of either kind */
+#define I2C_WAVE_COMMAND_ns ((1u + 2u * I2C_WAVE_BYTE_CELLS - 1u) * WAVE_CELL_ns + WAVE_STEP0_ns)
+
 /* START, sensor address, command, STOP. */
 void i2c_wave_command(uint16_t steps[I2C_WAVE_COMMAND_STEPS], uint8_t command);
 

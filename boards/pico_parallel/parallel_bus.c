@@ -10,6 +10,8 @@
 #define LONGEST_us (I2C_WAVE_READ_CELLS * WAVE_CELL_ns / 1000u + 700u)
 /* From the start of a read to the samples of this byte, which come in pairs, and a little later */
 #define LOOK_us(index) (uint8_t)((I2C_WAVE_CELLS_WITH_BYTE(index) + 2u) * WAVE_CELL_ns / 1000u)
+/* From the look at the clock that a read is started with to its first step, at the least */
+#define START_ns 1000u
 #define FREE_INTERVAL_MAX 1024u
 
 static unsigned count_bits(unsigned bitmap) {
@@ -200,6 +202,7 @@ enum ft_status parallel_bus_init(struct parallel_bus *bus, struct array_bus *arr
   i2c_wave_command(bus->command_steps, bus->command);
   *array_bus = (struct array_bus){
       .context = bus,
+      .read_lead_us = (I2C_WAVE_COMMAND_ns + START_ns) / 1000u,
       .start_command = start_command,
       .start_read = start_read,
       .start_recovery = start_recovery,

@@ -29,6 +29,10 @@ struct array_bus_result {
 struct array_bus {
   void *context;
 
+  /* Between start_read and the moment at which the first sensor has its command, at the least: a
+   * read may start that much before what it asks for is ready. */
+  uint8_t read_lead_us;
+
   /* Sends a one-byte command to every sensor.
    * FT_ERR_BUSY: an operation is under way. */
   enum ft_status (*start_command)(void *context, uint8_t command, uint64_t now_us);

@@ -3,14 +3,10 @@
 #include <stddef.h>
 
 /* Conversion times and noise: MS5840-02BA datasheet; 1 mbar = 100 Pa. */
-#define LONGEST_us(max_us) ((max_us)*105u / 100u)
 #define ROW(ratio, bits, max_us, noise_Pa)                                                         \
   {                                                                                                \
     .osr = ratio, .convert_pressure = 0x40 | bits, .convert_temperature = 0x50 | bits,             \
-    .conversion_us = LONGEST_us(max_us),                                                           \
-    .read_after_us = LONGEST_us(max_us) - MS5840_READ_LEAD_us > (max_us)                           \
-                         ? LONGEST_us(max_us) - MS5840_READ_LEAD_us                                \
-                         : (max_us),                                                               \
+    .conversion_us = (max_us)*105u / 100u, .maximum_us = (max_us),                                 \
     .noise_Pa_q10 = (int32_t)((noise_Pa)*1024.0f)                                                  \
   }
 static const struct ms5840_osr osr_table[] = {

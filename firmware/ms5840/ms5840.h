@@ -22,20 +22,14 @@ enum {
 /* PROM reload after reset: 2.8 ms (recalled from the sensor family; public drivers wait 3 ms). */
 #define MS5840_RESET_us 4000u
 
-/* A read is too early when the sensor acknowledges its command before the conversion is over, not
- * when its START comes before: hold time of the START, address and command with eighteen clocks of
- * 2.5 us take that long at least (UM10204, fast mode). */
-#define MS5840_READ_LEAD_us 44u
-
 /* One row per oversampling ratio: the commands and the time they take cannot disagree. */
 struct ms5840_osr {
   uint16_t osr;
   uint8_t convert_pressure;    /* D1 */
   uint8_t convert_temperature; /* D2 */
-  uint16_t conversion_us;      /* datasheet maximum plus 5 % for the sensor's own oscillator. An
-                                  earlier read returns 0 and spoils the conversion */
-  uint16_t read_after_us;      /* from the end of the command to the START of the read: the maximum
-                                  itself at least */
+  uint16_t conversion_us;      /* the maximum plus 5 % for the sensor's own oscillator. An earlier
+                                  read returns 0 and spoils the conversion */
+  uint16_t maximum_us;         /* of the conversion, from the datasheet */
   int32_t noise_Pa_q10;        /* rms of one reading, 1/1024 Pa */
 };
 

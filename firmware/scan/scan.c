@@ -1,5 +1,7 @@
 #include "scan/scan.h"
 
+#include "port/divide.h"
+
 #include <string.h>
 
 /* Supply and sensors settle: power-on reset of the family takes under 10 ms (recalled). */
@@ -10,6 +12,9 @@
 #define ADMISSION_INTERVAL_MAX_us 8000000u
 #define PROM_PASSES 3
 #define TEMPERATURE_INTERVAL_us (SCAN_TEMPERATURE_INTERVAL_ms * 1000u)
+#define TEMPERATURE_INTERVAL_MAX_us (SCAN_TEMPERATURE_INTERVAL_MAX_ms * 1000u)
+/* No change between two readings: 15 Pa, and 3.5 standard deviations of the noise at OSR 256. */
+#define TEMPERATURE_STILL_cC 6
 /* After a temperature reading that a sensor missed, or one in doubt. */
 #define TEMPERATURE_RETRY_us 100000u
 /* A larger step in half a second is no change of temperature. 1 degC is worth some 240 Pa. */
@@ -82,6 +87,7 @@ enum ft_status scan_init(struct scan *scan, const struct array_bus *bus,
   scan->wait_until_us = POWER_UP_us;
   scan->recovery_delay_us = RECOVERY_DELAY_MIN_us;
   scan->admission_interval_us = ADMISSION_INTERVAL_MIN_us;
+  set(&scan->temperature_interval_us, TEMPERATURE_INTERVAL_us);
   return FT_OK;
 }
 
@@ -277,13 +283,14 @@ static bool temperature_waits(const struct scan *scan) {
   return get(&scan->temperature_state) != SCAN_SLOT_EMPTY;
 }
 
-static void heed_doubt(struct scan *scan, uint64_t now_us) {
-  if (temperature_waits(scan) || get(&scan->temperature_doubted) == 0) {
+static void heed_wish(struct scan *scan, uint64_t now_us) {
+  uint32_t within_us = get(&scan->temperature_within_us);
+  if (temperature_waits(scan) || within_us == 0) {
     return;
   }
-  set(&scan->temperature_doubted, 0);
-  if (scan->next_temperature_us > now_us + TEMPERATURE_RETRY_us) {
-    scan->next_temperature_us = now_us + TEMPERATURE_RETRY_us;
+  set(&scan->temperature_within_us, 0);
+  if (scan->next_temperature_us > now_us + within_us) {
+    scan->next_temperature_us = now_us + within_us;
   }
 }
 
@@ -312,7 +319,7 @@ static void leave_idle(struct scan *scan, uint64_t now_us) {
     begin_admission(scan, now_us);
     return;
   }
-  heed_doubt(scan, now_us);
+  heed_wish(scan, now_us);
   uint32_t period_us = get(&scan->period_us);
   if (period_us != 0) {
     if (scan->next_frame_us > now_us + period_us) {
@@ -347,7 +354,7 @@ static enum ft_status start_operation(struct scan *scan, uint64_t now_us) {
     conversion->osr = get_osr(scan);
     conversion->t_begin_us = now_us;
     if (conversion->is_temperature) {
-      scan->next_temperature_us = now_us + TEMPERATURE_INTERVAL_us;
+      scan->next_temperature_us = now_us + get(&scan->temperature_interval_us);
     }
     return bus->start_command(bus->context,
                               conversion->is_temperature ? conversion->osr->convert_temperature
@@ -422,6 +429,14 @@ static void end_reading(struct scan *scan, uint64_t now_us) {
   take_reading(scan, read);
 }
 
+/* From the end of the command to the start of the read. The conversion has its longest time until
+ * the sensors see the read's command, and its maximum until the START. */
+static uint32_t read_after_us(const struct scan *scan) {
+  const struct ms5840_osr *osr = scan->conversion->osr;
+  uint32_t after_us = osr->conversion_us - scan->bus->read_lead_us;
+  return after_us > osr->maximum_us ? after_us : osr->maximum_us;
+}
+
 static void end_operation(struct scan *scan, uint64_t now_us) {
   switch (scan->state) {
   case SCAN_RESET:
@@ -432,7 +447,7 @@ static void end_operation(struct scan *scan, uint64_t now_us) {
     break;
   case SCAN_CONVERT:
     scan->conversion->t_us = now_us + scan->conversion->osr->conversion_us / 2u;
-    wait_in(scan, SCAN_WAIT_CONVERSION, now_us + scan->conversion->osr->read_after_us);
+    wait_in(scan, SCAN_WAIT_CONVERSION, now_us + read_after_us(scan));
     break;
   case SCAN_READ_ADC:
     end_reading(scan, now_us);
@@ -506,9 +521,22 @@ uint64_t scan_step(struct scan *scan, uint64_t now_us) {
   return now_us;
 }
 
+/* Says when the next reading is wanted, if not as planned. */
+static void adapt_interval(struct scan *scan, bool moves, bool doubted) {
+  uint32_t interval_us = get(&scan->temperature_interval_us);
+  if (moves || doubted) {
+    set(&scan->temperature_interval_us, TEMPERATURE_INTERVAL_us);
+    set(&scan->temperature_within_us, doubted ? TEMPERATURE_RETRY_us : TEMPERATURE_INTERVAL_us);
+  } else if (interval_us < TEMPERATURE_INTERVAL_MAX_us) {
+    set(&scan->temperature_interval_us, 2 * interval_us);
+  }
+}
+
 static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
   scan->has_thermal &= ~slot->prom_changed;
   scan->renewed |= slot->prom_changed;
+  bool moves = false;
+  bool doubted = false;
   for (uint8_t k = 0; k < scan->sensor_count; k++) {
     uint32_t bit = UINT32_C(1) << k;
     if (!(slot->good & bit)) {
@@ -523,13 +551,16 @@ static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
     bool jumped = step_cC > TEMPERATURE_STEP_MAX_cC || step_cC < -TEMPERATURE_STEP_MAX_cC;
     if (has_last && jumped && !(scan->doubted & bit)) {
       scan->doubted |= bit;
-      set(&scan->temperature_doubted, 1);
+      doubted = true;
+
       continue;
     }
+    moves = moves || step_cC > TEMPERATURE_STILL_cC || step_cC < -TEMPERATURE_STILL_cC;
     scan->doubted &= ~bit;
     scan->thermal[k] = thermal;
     scan->has_thermal |= bit;
   }
+  adapt_interval(scan, moves, doubted);
   int32_t sum_cC = 0;
   int32_t sensors = 0;
   for (uint8_t k = 0; k < scan->sensor_count; k++) {
@@ -538,7 +569,7 @@ static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
       sensors++;
     }
   }
-  scan->temperature_cC = sensors > 0 ? (int16_t)(sum_cC / sensors) : 0;
+  scan->temperature_cC = sensors > 0 ? (int16_t)port_divide(sum_cC, sensors) : 0;
 }
 
 static void fill_head(struct scan *scan, const struct scan_conversion *conversion,

@@ -15,11 +15,12 @@
  * in a row are a sensor that needs a reset, which loses its admission. A reading that ends in ones
  * comes from a sensor that lost count of the clocks and stopped sending: see scan.c.
  *
- * Temperatures are converted twice a second. Where the requested rate leaves a pause, that is done
- * in the pause before a frame; else it takes the place of a frame, one in 600 at OSR 256 and one in
- * 25 at OSR 8192. That frame goes out at its time too, with the pressures of the one before and
- * marked as held. A wrong temperature would falsify the pressures of many frames: all ones are no
- * reading, and one that jumps is used only when the next, taken soon after, jumps too.
+ * Temperatures are converted twice a second, less often while they stand still. Where the
+ * requested rate leaves a pause, that is done in the pause before a frame; else it takes the place
+ * of a frame, at most one in 600 at OSR 256 and one in 25 at OSR 8192. That frame goes out at its
+ * time too, with the pressures of the one before and marked as held. A wrong temperature would
+ * falsify the pressures of many frames: all ones are no reading, and one that jumps is used only
+ * when the next, taken soon after, jumps too.
  */
 #ifndef SCAN_SCAN_H
 #define SCAN_SCAN_H
@@ -38,8 +39,11 @@ struct scan_settings {
   uint32_t rate_mHz;    /* 0 = as fast as the sensors allow */
 };
 
-/* At 0.1 degC/s, as in a hand, the pressures stay within some 12 Pa. */
+/* While the temperature changes; while it stands still the interval doubles up to the maximum. At
+ * 0.1 degC/s, as in a hand, the pressures stay within some 24 Pa, and within 48 Pa until such a
+ * change is noticed; it is much the same for all sensors. */
 #define SCAN_TEMPERATURE_INTERVAL_ms 500u
+#define SCAN_TEMPERATURE_INTERVAL_MAX_ms 2000u
 
 /* Since start, modulo 2^32. Written by scan_step, readable from any context. */
 struct scan_counters {
@@ -94,9 +98,10 @@ struct scan {
 
   /* Requests of the main context. */
   const struct ms5840_osr *_Atomic osr;
-  _Atomic uint32_t period_us;           /* of frames; 0: as fast as the sensors allow */
-  _Atomic uint32_t temperature_doubted; /* 1: take the next soon. Set while the temperature's slot
-                                           is not empty and cleared while it is */
+  _Atomic uint32_t period_us;               /* of frames; 0: as fast as the sensors allow */
+  _Atomic uint32_t temperature_interval_us; /* set by the main context */
+  _Atomic uint32_t temperature_within_us;   /* if not 0, the next so soon. Set while the slot of
+                                               the temperature is claimed, reset while it is empty */
 
   /* Event context only. */
   enum scan_state state;

@@ -157,5 +157,10 @@ void fake_bus_init(struct fake_bus *fake, struct array_bus *bus, uint8_t sensor_
     fake->d1[k] = 6465444u + 1000u * k;
     fake->d2[k] = 8077636u + 150000u;
   }
-  *bus = (struct array_bus){fake, start_command, start_read, start_recovery, poll};
+  *bus = (struct array_bus){.context = fake,
+                            .read_lead_us = FAKE_READ_LEAD_us,
+                            .start_command = start_command,
+                            .start_read = start_read,
+                            .start_recovery = start_recovery,
+                            .poll = poll};
 }

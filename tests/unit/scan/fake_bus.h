@@ -43,6 +43,9 @@ struct fake_bus {
   const char *misuse;
 };
 
+/* Of a read, until the sensors have its command */
+#define FAKE_READ_LEAD_us 44u
+
 /* A healthy array: sensors with different PROMs at about 1 bar and 25 degC. */
 void fake_bus_init(struct fake_bus *fake, struct array_bus *bus, uint8_t sensor_count);
 
