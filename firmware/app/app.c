@@ -11,6 +11,8 @@
 
 /* How often the main loop looks at the clock if nothing else wakes it: for the watchdog. */
 #define TICK_us (PORT_WATCHDOG_PERIOD_us / 5u)
+/* So long the end of a second waits for a frame to follow, rather than keep one waiting. */
+#define FRAME_WAIT_us 100000u
 /* Lets the acknowledgement out before the device leaves. */
 #define LOADER_DELAY_us 50000u
 
@@ -60,8 +62,14 @@ static void send_packet(struct app *app, const struct wire_layout *layout, uint6
   size_t length;
   app->packet.sequence = app->sequence++;
   app->packet.t_us = t_us;
-  if (wire_encode(layout, &app->packet, app->out, &length) == FT_OK &&
-      cdc_write(app->out, length) == FT_OK) {
+  bool sent = false;
+  if (wire_encode(layout, &app->packet, app->out, &length) == FT_OK) {
+    while (length % 4 != 0) { /* whole words are queued faster; more delimiters are legal */
+      app->out[length++] = 0;
+    }
+    sent = cdc_write(app->out, length) == FT_OK;
+  }
+  if (sent) {
     app->packets_sent++;
   } else {
     app->packets_dropped++;
@@ -231,14 +239,14 @@ static void fit_frame(struct app *app) {
 static void judge_frame(struct app *app) {
   const struct frame *frame = &app->frame;
   const struct contact_input input = {
-      .t_us = frame->t_us,
-      .contact = app->conditioned.contact,
-      .tared = app->conditioned.tared,
-      .masked = app->conditioned.usable != UINT32_MAX >> (FT_MAX_SENSORS - frame->sensor_count),
-      .noise_Pa_q10 = frame->noise_Pa_q10,
-      .saturated = frame->saturated,
+    .t_us = frame->t_us,
+    .contact = app->conditioned.contact,
+    .tared = app->conditioned.tared,
+    .masked = app->conditioned.usable != UINT32_MAX >> (FT_MAX_SENSORS - frame->sensor_count),
+    .noise_Pa_q10 = frame->noise_Pa_q10,
+    .saturated = frame->saturated,
 #if FT_WITH_FIT
-      .fit = app->conditioned.contact ? &app->fit : NULL,
+    .fit = app->conditioned.contact ? &app->fit : NULL,
 #endif
   };
 #if FT_WITH_SLIP
@@ -402,9 +410,10 @@ static void follow_port(struct app *app) {
   }
 }
 
-static void each_second(struct app *app, uint64_t now_us) {
+/* after_frame: the next one is some time off. */
+static void each_second(struct app *app, uint64_t now_us, bool after_frame) {
   uint32_t elapsed_us = (uint32_t)(now_us - app->second_began_us);
-  if (elapsed_us < 1000000u) {
+  if (elapsed_us < (after_frame ? 1000000u : 1000000u + FRAME_WAIT_us)) {
     return;
   }
   app->uptime_rest_us += elapsed_us;
@@ -443,12 +452,13 @@ void app_run(struct app *app) {
   /* After the commands: one sent just before the port closed must not outlive it. */
   follow_port(app);
   uint64_t taken_us = port_now_us(); /* taking compensates the readings */
-  if (scan_take(&app->scan, &app->frame)) {
+  bool has_frame = scan_take(&app->scan, &app->frame);
+  if (has_frame) {
     app_process_frame(app, taken_us);
     app->active = true;
   }
   uint64_t now_us = port_now_us();
-  each_second(app, now_us);
+  each_second(app, now_us, has_frame);
   if (app->loader_at_us != 0 && now_us >= app->loader_at_us) {
     port_reboot_to_loader();
   }
