@@ -12,8 +12,8 @@ set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
 
 set(CMAKE_C_FLAGS_INIT "-mcpu=cortex-m0plus -mthumb -ffunction-sections -fdata-sections -fno-common -fstack-usage")
 set(CMAKE_ASM_FLAGS_INIT "-mcpu=cortex-m0plus -mthumb")
-set(CMAKE_C_FLAGS_RELEASE_INIT "-O2 -g")
-set(CMAKE_C_FLAGS_RELEASE "-O2 -g" CACHE STRING "")
+set(CMAKE_C_FLAGS_RELEASE_INIT "-Os -g")
+set(CMAKE_C_FLAGS_RELEASE "-Os -g" CACHE STRING "")
 set(CMAKE_EXE_LINKER_FLAGS_INIT "-nostartfiles --specs=nano.specs")
 
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)

@@ -1,5 +1,7 @@
 #include "condition/condition.h"
 
+#include "port/divide.h"
+
 #include <string.h>
 
 static void begin_tare(struct condition *condition, uint8_t k) {
@@ -17,6 +19,14 @@ void condition_tare(struct condition *condition) {
   }
 }
 
+/* By halves of 32 bits: |sum| < 2^47, and a remainder is less than the count. */
+static int32_t mean_of(int64_t sum, int32_t count) {
+  int32_t high = (int32_t)(sum >> 16);
+  int32_t quotient = port_divide(high, count);
+  int32_t rest = (high - quotient * count) * (1 << 16) + (int32_t)(sum & 0xFFFF);
+  return quotient * (1 << 16) + port_divide(rest, count);
+}
+
 static void tare_step(struct condition *condition, uint8_t k, int32_t pressure_Pa_q10) {
   condition->zero_sum[k] += pressure_Pa_q10;
   if (pressure_Pa_q10 < condition->zero_min[k]) {
@@ -28,7 +38,7 @@ static void tare_step(struct condition *condition, uint8_t k, int32_t pressure_P
   condition->tare_left[k]--;
   if (condition->tare_left[k] == 0) {
     int64_t sum = condition->zero_sum[k] - condition->zero_min[k] - condition->zero_max[k];
-    condition->zero_Pa_q10[k] = (int32_t)(sum / (CONDITION_TARE_FRAMES - 2));
+    condition->zero_Pa_q10[k] = mean_of(sum, CONDITION_TARE_FRAMES - 2);
     condition->zero_rest[k] = 0;
   }
 }
@@ -41,11 +51,12 @@ static void track_step(struct condition *condition, uint8_t k, int32_t above_Pa_
 }
 
 static int32_t clamped_difference(int32_t a, int32_t b) {
-  int64_t difference = (int64_t)a - b;
-  if (difference > INT32_MAX) {
-    return INT32_MAX;
+  int32_t difference = (int32_t)((uint32_t)a - (uint32_t)b);
+  bool overflows = ((a ^ b) & (a ^ difference)) < 0;
+  if (!overflows) {
+    return difference;
   }
-  return difference < INT32_MIN ? INT32_MIN : (int32_t)difference;
+  return a < 0 ? INT32_MIN : INT32_MAX;
 }
 
 void condition_frame(struct condition *condition, const struct frame *frame,

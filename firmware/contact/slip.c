@@ -1,5 +1,7 @@
 #include "contact/slip.h"
 
+#include "port/divide.h"
+
 #include <math.h>
 
 #define SIXTEENTHS_PER_mm 16000.0f
@@ -12,15 +14,21 @@ void slip_reset(struct slip_history *history) {
   history->y_sum = 0;
 }
 
+/* Place in the ring of what entered this many locations after the oldest. */
+static uint32_t place_of(const struct slip_history *history, uint32_t age) {
+  uint32_t at = history->oldest + age;
+  return at < SLIP_CAPACITY ? at : at - SLIP_CAPACITY;
+}
+
 static void drop_oldest(struct slip_history *history) {
   history->x_sum -= history->x_16th_um[history->oldest];
   history->y_sum -= history->y_16th_um[history->oldest];
-  history->oldest = (uint16_t)((history->oldest + 1u) % SLIP_CAPACITY);
+  history->oldest = (uint16_t)place_of(history, 1);
   history->count--;
 }
 
 static void append(struct slip_history *history, uint64_t t_us, int32_t x, int32_t y) {
-  uint16_t at = (uint16_t)((history->oldest + history->count) % SLIP_CAPACITY);
+  uint32_t at = place_of(history, history->count);
   history->t_us[at] = t_us;
   history->x_16th_um[at] = x;
   history->y_16th_um[at] = y;
@@ -35,8 +43,7 @@ bool slip_update(struct slip_history *history, uint64_t t_us, float x_mm, float 
   int32_t y = (int32_t)(y_mm * SIXTEENTHS_PER_mm);
   bool full = false;
   if (history->count > 0) {
-    uint16_t newest = (uint16_t)((history->oldest + history->count - 1u) % SLIP_CAPACITY);
-    uint64_t interval_us = t_us - history->t_us[newest];
+    uint64_t interval_us = t_us - history->t_us[place_of(history, history->count - 1u)];
     uint64_t reach_us = window_us + interval_us / 2;
     while (history->count > 1 && t_us - history->t_us[history->oldest] > reach_us) {
       drop_oldest(history);
@@ -47,9 +54,8 @@ bool slip_update(struct slip_history *history, uint64_t t_us, float x_mm, float 
     full = history->spans;
   }
   if (full) {
-    float n = (float)history->count;
-    float dx = (float)x - (float)history->x_sum / n;
-    float dy = (float)y - (float)history->y_sum / n;
+    float dx = (float)(x - port_divide(history->x_sum, history->count));
+    float dy = (float)(y - port_divide(history->y_sum, history->count));
     *distance_mm = sqrtf(dx * dx + dy * dy) * (1.0f / SIXTEENTHS_PER_mm);
   }
   if (history->count == SLIP_CAPACITY) {

@@ -79,7 +79,10 @@ class PicoParallel(unittest.TestCase):
         self.assertGreaterEqual(steady.sum() / 1.35, at_least)
         # A frame whose time a temperature conversion took holds no reading, and says so.
         self.assertLess((run.valid[steady] != ALL).mean(), 0.05)
-        self.assertTrue(np.isin(run.valid[steady], (0, ALL)).all())
+        # One code in 65536 looks as if it had been torn: its sensor alone is left out.
+        left_out = [ALL & ~int(valid) for valid in run.valid[steady] if valid not in (0, ALL)]
+        self.assertLessEqual(len(left_out), 3)
+        self.assertTrue(all(bits.bit_count() == 1 for bits in left_out))
         self.assertEqual(run.recording.end["dropped_packets"], "0")
         self.assertEqual(run.recording.end["crc_errors"], "0")
         self.assertEqual(run.report["i2c"]["nacks"], 0)
