@@ -202,6 +202,9 @@ private:
       return;
     }
     const bool held = contact_->body.contact.flags & CONTACT_FLAG_HELD;
+    if (held && result_.frames == 0) {
+      return; // it shows what was found before the tare
+    }
     wire_packet ours = *contact_;
     repeat_frame(&raw, held, &ours.body.contact);
     result_.frames++;

@@ -63,7 +63,8 @@ class Rate(unittest.TestCase):
     def test_two_ways_of_counting_agree(self):
         """Cycles of the whole chip, frames of the stream; cycles and frames of the stage meter."""
         slip = next(row for row in self.found["scenes"] if row["scene"] == "slip")
-        self.assertEqual(sum(slip["cycles_by_stage"].values()), slip["cycles_of_frame"])
+        stages = slip["cycles_by_stage"].values()  # each rounded
+        self.assertLessEqual(abs(sum(stages) - slip["cycles_of_frame"]), len(stages))
         self.assertLess(abs(slip["frames_per_s"]["256"] - self.found["parallel_fps_osr256"]), 3)
         by_chip = (1 - self.found["contact_sleep_percent"] / 100) * emulated.CLOCK_Hz / self.found["parallel_fps_osr256"]
         self.assertLess(abs(by_chip / slip["cycles_of_frame"] - 1), 0.02)
