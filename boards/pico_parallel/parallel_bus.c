@@ -10,8 +10,9 @@
 #define LONGEST_us (I2C_WAVE_READ_CELLS * WAVE_CELL_ns / 1000u + 700u)
 /* From the start of a read to the samples of this byte, which come in pairs, and a little later */
 #define LOOK_us(index) (uint8_t)((I2C_WAVE_CELLS_WITH_BYTE(index) + 2u) * WAVE_CELL_ns / 1000u)
-/* From the look at the clock that a read is started with to its first step, at the least */
-#define START_ns 1000u
+/* From the look at the clock that a read is started with to its first step, which takes more than
+ * 300 cycles of clk_sys at 125 MHz */
+#define START_ns 2000u
 #define FREE_INTERVAL_MAX 1024u
 
 static unsigned count_bits(unsigned bitmap) {

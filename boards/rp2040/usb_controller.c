@@ -17,6 +17,8 @@
 #include "rp2040/timer_regs.h"
 #include "rp2040/usb_regs.h"
 
+#include <string.h>
+
 enum { ENDPOINT_NUMBERS = 3 };
 
 #define SYSINFO_CHIP_ID REG32(0x40000000u)
@@ -135,9 +137,11 @@ void usb_controller_close_all(void) {
 void usb_controller_send(uint8_t endpoint, const uint8_t *bytes, size_t length) {
   volatile uint32_t *buffer =
       (volatile uint32_t *)(uintptr_t)(USB_DPRAM_BASE + USB_BUFFER_OFFSET(endpoint));
-  const uint32_t *words = __builtin_assume_aligned(bytes, 4);
-  for (size_t i = 0; i < (length + 3) / 4; i++)
-    buffer[i] = words[i];
+  for (size_t i = 0; i < length; i += 4) {
+    uint32_t word;
+    memcpy(&word, __builtin_assume_aligned(bytes + i, 4), sizeof word);
+    *buffer++ = word;
+  }
   uint32_t bit = USB_BIT(endpoint);
   uint32_t fields = USB_BUFFER_FULL | pid(endpoint) | (uint32_t)length;
   held |= bit;

@@ -38,8 +38,8 @@ void usb_controller_open(uint8_t endpoint, enum usb_endpoint_type type);
 /* Closes all endpoints but the control endpoint. */
 void usb_controller_close_all(void);
 
-/* Offers a packet to the host; the bytes, which are aligned to words, are copied. The endpoint must
- * hold none. */
+/* Offers a packet to the host; the bytes are copied, in whole words: they are aligned to them and
+ * readable up to the end of the last. The endpoint must hold none. */
 void usb_controller_send(uint8_t endpoint, const uint8_t *bytes, size_t length);
 
 /* Accepts one packet from the host. No effect if the endpoint does so already. */
