@@ -66,8 +66,6 @@ static enum ft_status start_command(void *context, uint8_t command, uint64_t now
     return FT_ERR_BUSY;
   }
   bus->operation = PARALLEL_BUS_COMMAND;
-  bus->in_bytes = UINT16_MAX;
-  bus->look_us = now_us;
   if (bus->failed) {
     return FT_OK;
   }
@@ -150,8 +148,9 @@ static enum ft_status judge(struct parallel_bus *bus, struct array_bus_result *r
   if (is_read) {
     take_bytes(bus, result);
   }
-  const struct i2c_reply reply =
-      i2c_wave_reply(bus->samples, is_read ? bus->read_count : 0, bus->in_bytes);
+  const struct i2c_reply reply = is_read
+                                     ? i2c_wave_reply(bus->samples, bus->read_count, bus->in_bytes)
+                                     : i2c_wave_reply(bus->samples, 0, UINT16_MAX);
   if (!reply.scl_follows) {
     return FT_ERR_TIMEOUT;
   }
