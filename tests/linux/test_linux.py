@@ -32,13 +32,13 @@ import guest as virtual  # noqa: E402
 TOOLS = argparse.Namespace()
 REPORT = {}
 REPORTED = ("packets_serial", "packets_libusb", "packets_compared", "different", "packets_pico_parallel", "lost",
-            "stalled_shown_s", "kernel_warnings", "detach_cycles", "linux_test_s")
+            "stalled_shown_s", "kernel_warnings", "controller_warnings", "detach_cycles", "linux_test_s")
 SERIAL = "E660583883265A2C"
 OTHER_SERIAL = "E660583883265A2D"
 VENDOR_PRODUCT = "1209:0001"
 SKIPPED = 77
 PACKETS = 10000
-STREAM_s = 30  # 2 packets for each of 207 frames a second, and what the two streams do not share
+STREAM_s = 28  # 2 packets for each of 207 frames a second, and what the two streams do not share
 PARALLEL_STREAM_s = 2
 PAIR_s, PAIR_RATE_Hz = 4, 50
 SERIAL_CYCLES = 12
@@ -47,6 +47,9 @@ LIBUSB_CYCLES = 8
 PATIENCE_s = 60
 STREAM_LIMIT_s = 10 * STREAM_s
 KERNEL_WARNING = 4
+# What the driver says of QEMU's controller when that, having taken transfers back amid data, reports one that is not
+# next on its ring. No device has a part in it; it happens now and then on a loaded machine, and is counted apart.
+CONTROLLER_WARNING = re.compile(r"xhci_hcd [\w:.]+: (ERROR Transfer event TRB DMA ptr not part of current TD|Looking for event-dma) ")
 CONTACT, RAW = 0x01, 0x02
 # Of a contact packet's body: the stages' times, measured in a chip that also does as its host wants.
 STAGE_TIMES = slice(8, 22)
@@ -153,9 +156,16 @@ class Linux(unittest.TestCase):
         programs = [TOOLS.fingertip, "/usr/bin/lsusb", "/usr/bin/usbreset"]
         cls.guest = virtual.Guest(cls.folder, TOOLS.kernel, programs, cls.sockets)
         cls.addClassCleanup(cls.guest.stop)
-        cls.quiet_until = len(cls.kernel_log())
+        cls.heard = len(cls.kernel_log())
+        cls.complaints = []
         cls.streams = {}
         cls.power_up("first")
+
+    def setUp(self):
+        """What the kernel complained of until now, and before which test."""
+        log = self.kernel_log()
+        self.complaints += [(self._testMethodName, text) for level, text in log[self.heard:] if level <= KERNEL_WARNING]
+        type(self).heard = len(log)
 
     @classmethod
     def power_up(cls, name, image=None, board="pico_mux"):
@@ -462,8 +472,11 @@ class Linux(unittest.TestCase):
             self.check_bytes(transport)
 
     def test_20_no_complaint(self):
-        complaints = [text for level, text in self.kernel_log()[self.quiet_until:] if level <= KERNEL_WARNING]
-        REPORT["kernel_warnings"] = len(complaints)
+        controller = [each for each in self.complaints if CONTROLLER_WARNING.match(each[1])]
+        complaints = [each for each in self.complaints if each not in controller]
+        REPORT.update(kernel_warnings=len(complaints), controller_warnings=len(controller))
+        for before, text in controller:
+            print(f"before {before}: {text}")
         self.assertEqual(complaints, [])
         reconnecting = "Unable to connect character device usb"
         self.assertEqual([line for line in self.guest.stop() if reconnecting not in line], [])
