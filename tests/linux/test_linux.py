@@ -47,8 +47,8 @@ LIBUSB_CYCLES = 8
 PATIENCE_s = 60
 STREAM_LIMIT_s = 10 * STREAM_s
 KERNEL_WARNING = 4
-# What the driver says of QEMU's controller when that, having taken transfers back amid data, reports one that is not
-# next on its ring. No device has a part in it; it happens now and then on a loaded machine, and is counted apart.
+# What the driver says when QEMU's controller, having taken transfers back amid data, reports one that is not next on its
+# ring: seen once, on a machine under eightfold load. The order of a ring is between those two, so it is counted apart.
 CONTROLLER_WARNING = re.compile(r"xhci_hcd [\w:.]+: (ERROR Transfer event TRB DMA ptr not part of current TD|Looking for event-dma) ")
 CONTACT, RAW = 0x01, 0x02
 # Of a contact packet's body: the stages' times, measured in a chip that also does as its host wants.

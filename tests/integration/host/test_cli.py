@@ -154,9 +154,9 @@ class Usage(CliTest):
 
     def test_encode(self):
         # COBS of version, type, sequence, time, body and CRC, worked out by zlib.crc32 and hand
-        self.assertEqual(self.run_cli("encode", "tare")[0], "03028101010101010101010105afb2812100\n")
+        self.assertEqual(self.run_cli("encode", "tare")[0], "03038101010101010101010105c0fe24ba00\n")
         timed = self.run_cli("encode", "--sequence", "258", "--time", "1", "osr", "8192")[0].strip()
-        self.assertTrue(timed.startswith("0602830201"), timed)
+        self.assertTrue(timed.startswith("0603830201"), timed)
         self.assertIn("slip THRESHOLD_MM WINDOW_MS", self.error("encode", "slip", "0.75"))
         self.assertIn("0.1 to 2000", self.error("encode", "rate", "3000"))
         self.assertIn("unknown", self.error("encode", "bogus"))
@@ -309,11 +309,11 @@ class ErrorsPeopleMeet(CliTest):
                              f"fingertip: {self.port}: is fingertip AAAA, not BBBB; leave out --port, or see `fingertip list`\n")
 
     def test_older_or_newer_protocol_version(self):
-        for version in (1, 3):
+        for version in (1, 2, 4):
             with self.device(f"version={version}"):
                 for command in (["info"], ["set", "rate=max"]):
                     self.assertEqual(self.error(*command, "--port", self.port),
-                                     f"fingertip: {self.port}: speaks protocol version {version}, this tool version 2; install "
+                                     f"fingertip: {self.port}: speaks protocol version {version}, this tool version 3; install "
                                      "this tool's firmware with `fingertip flash`, or use the other's tool\n")
 
     def test_cable_pulled(self):
