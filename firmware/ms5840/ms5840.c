@@ -111,8 +111,22 @@ void ms5840_compensate_temperature(const struct ms5840_prom *prom, uint32_t d2,
   thermal->sensitivity = sensitivity;
 }
 
+/* The product of a 24-bit code. Sensitivities of 35 bits, all that make sense, take four 32-bit
+ * products and half the time. */
+static int64_t multiply(uint32_t code, int64_t sensitivity) {
+  int32_t top = (int32_t)(sensitivity >> 32);
+  if (top < -4 || top > 3) {
+    return (int64_t)code * sensitivity;
+  }
+  int32_t high = (int32_t)(sensitivity >> 16);
+  uint32_t low = (uint16_t)sensitivity;
+  uint32_t code_high = code >> 12, code_low = code & 0xFFFu;
+  int64_t upper = (int64_t)((int32_t)code_high * high) * (1 << 12) + (int32_t)code_low * high;
+  return upper * (1 << 16) + ((int64_t)(code_high * low) << 12) + code_low * low;
+}
+
 int32_t ms5840_compensate_pressure(const struct ms5840_thermal *thermal, uint32_t d1) {
-  int64_t pressure_Pa_q15 = (((int64_t)d1 * thermal->sensitivity) >> 21) - thermal->offset;
+  int64_t pressure_Pa_q15 = (multiply(d1, thermal->sensitivity) >> 21) - thermal->offset;
   int64_t pressure_Pa_q10 = pressure_Pa_q15 >> 5;
   if (pressure_Pa_q10 > INT32_MAX) {
     return INT32_MAX;

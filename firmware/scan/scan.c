@@ -28,9 +28,11 @@
 /* Transitions in one call: enough for the longest run of states that take no time. */
 #define MAX_TRANSITIONS 8
 /* A sensor that loses count of the clocks finds its byte not acknowledged and sends no more: what
- * follows reads as ones. One code in 65536 ends in sixteen of them by chance, and one frame of
- * fifteen sensors in three million has four that end in eight. */
+ * follows reads as ones. One code in 65536 ends in sixteen of them by chance, and counts if it is
+ * near the sensor's last one, as a torn one hardly is; and one frame of fifteen sensors in three
+ * million has four that end in eight. */
 #define TORN_MASK 0xFFFFu
+#define TORN_TOLERANCE 1024u /* some 45 Pa: four standard deviations of the noise at OSR 256 */
 #define TORN_BYTE 0xFFu
 #define TORN_BYTE_SENSORS 4u
 #define CODE_MAX 0xFFFFFFu
@@ -207,6 +209,10 @@ static struct scan_slot *slot_for(struct scan *scan, const struct scan_conversio
   return get(&scan->slot_state) == SCAN_SLOT_CLAIMED ? NULL : &scan->slot;
 }
 
+static bool is_near(uint32_t code, uint32_t last) {
+  return code - last + TORN_TOLERANCE <= 2 * TORN_TOLERANCE;
+}
+
 /* Judges the codes in scan->result. Returns the bitmap of those that are measurements. */
 static uint32_t take_codes(struct scan *scan, bool is_temperature, uint32_t codes[]) {
   uint32_t acknowledged = scan->result.acknowledged & all_sensors(scan);
@@ -218,18 +224,21 @@ static uint32_t take_codes(struct scan *scan, bool is_temperature, uint32_t code
   for (int left = scan->sensor_count; left > 0; left--, bit <<= 1, bytes++) {
     uint32_t low = (*bytes)[2];
     uint32_t code = (uint32_t)(*bytes)[0] << 16 | (uint32_t)(*bytes)[1] << 8 | low;
-    if (codes) {
-      *codes++ = code;
-    }
     if (code == 0) {
       zero |= bit;
     } else if (low == TORN_BYTE) {
       if (code != CODE_MAX) {
         ends_in_ones |= bit;
-        torn |= (code & TORN_MASK) == TORN_MASK ? bit : 0;
+        if ((code & TORN_MASK) == TORN_MASK && !(codes && is_near(code, *codes))) {
+          torn |= bit;
+          code = codes ? *codes : 0; /* the next is held against the last that was whole */
+        }
       } else if (is_temperature) {
         zero |= bit;
       }
+    }
+    if (codes) {
+      *codes++ = code;
     }
   }
   ends_in_ones &= acknowledged;
