@@ -12,7 +12,11 @@ import { build, HEADER } from './bench.mjs';
 const MAIN = fileURLToPath(new URL('../../../host_tools/emulator/main.mjs', import.meta.url));
 const HELPER = fileURLToPath(new URL('../../../host_tools/emulator/port/pty_port.py', import.meta.url));
 const folder = mkdtempSync(join(tmpdir(), 'emulator-cli-'));
-after(() => rmSync(folder, { recursive: true }));
+const serving = new Set();
+after(() => {
+  for (const emulator of serving) emulator.kill('SIGKILL');
+  rmSync(folder, { recursive: true });
+});
 const file = (name, content) => {
   writeFileSync(join(folder, name), content);
   return join(folder, name);
@@ -115,9 +119,10 @@ sys.exit(0 if got == data else 1)
 /** An emulator that serves `link`: waits for the link; `end()` interrupts it and gives its exit code. */
 async function serve(link, ...args) {
   const emulator = spawn(process.execPath, [MAIN, ...base, '--seconds', '60', '--pty', link, '--wait-open', ...args], { stdio: ['ignore', 'ignore', 'pipe'] });
+  serving.add(emulator);
   let stderr = '';
   emulator.stderr.on('data', (d) => (stderr += d));
-  const ended = new Promise((resolve) => emulator.on('close', resolve));
+  const ended = new Promise((resolve) => emulator.on('close', resolve)).finally(() => serving.delete(emulator));
   for (let i = 0; i < 400 && !existsSync(link) && emulator.exitCode === null; i++) await new Promise((r) => setTimeout(r, 25));
   assert.ok(existsSync(link), stderr);
   const end = async () => {
@@ -185,13 +190,12 @@ test('pseudo-terminal at the pace of the wall: no question is heard before it wa
   });
 });
 
-test('pseudo-terminal: a link in use is refused and its emulator keeps its files; a stale link is replaced', async () => {
+test('pseudo-terminal: a link in use is refused before any file is opened; a stale link is replaced', async () => {
   const link = join(folder, 'shared');
   symlinkSync(join(folder, 'gone'), link);
-  const capture = file('kept.bin', '');
-  const emulator = await serve(link, '--image', image, '--capture', capture);
+  const emulator = await serve(link, '--image', image);
   const target = readlinkSync(link);
-  writeFileSync(capture, 'mine');
+  const capture = file('kept.bin', 'mine');
   const second = run('--image', image, ...base, '--seconds', '1', '--pty', link, '--capture', capture);
   assert.equal(second.status, 2);
   assert.match(second.stderr, /^error: .*shared is in use: it leads to \/dev\/pts\/[0-9]+; end the other emulator, [^\n]*\n$/);
