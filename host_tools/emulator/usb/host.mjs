@@ -159,6 +159,11 @@ export class UsbHost {
     return this.device?.endpoints.some((e) => e.type === 2 && e.address === (endpoint | 0x80)) ?? false;
   }
 
+  /** A bulk IN packet lies ready and no transfer asks for it. */
+  get hasUnasked() {
+    return this.state === 'active' && [...this.pipes.values()].some((p) => p.isIn && !p.queue.length && this.isBulkIn(p.endpoint) && this.block.offers(p.endpoint));
+  }
+
   get configured() {
     return this.device !== null;
   }

@@ -36,6 +36,7 @@ const SPEED_FULL = 1;
 const UNUSED_ENDPOINT = 255;
 const ENDPOINTS = 32;
 const VERSION_BYTES = 64;
+const READER_GRACE_MS = 2000;
 const LARGEST_MESSAGE = 1 << 20;
 const STANDARD = { get_configuration: 8, get_interface: 10, set_interface: 11, clear_feature: 1 };
 
@@ -141,6 +142,7 @@ export class UsbRedirServer {
     this.report = null;
     this.stalled = false;
     this.arrived = [];
+    this.unasked_ms = null;
     this.#forget();
   }
 
@@ -199,6 +201,20 @@ export class UsbRedirServer {
   setStalled(on) {
     this.stalled = on;
     this.#pauseBulkIn();
+  }
+
+  /**
+   * A packet lies ready that the virtual machine does not ask for. On a busy computer that is for want of processor
+   * time, which a real host has: emulated time then waits, two seconds on the wall. After that the host is taken for one
+   * that does not read.
+   */
+  waitsForReader(now_ms) {
+    if (!this.connected || !this.host.hasUnasked) {
+      this.unasked_ms = null;
+      return false;
+    }
+    this.unasked_ms ??= now_ms;
+    return !this.arrived.length && !this.transfers.size && now_ms - this.unasked_ms < READER_GRACE_MS;
   }
 
   #pauseBulkIn() {

@@ -174,3 +174,25 @@ test('a path that something else holds is refused in words', async () => {
   other.close();
   await assert.rejects(UsbRedirServer.start(join(folder, 'nowhere', 'a.sock')), /cannot listen \(/);
 });
+
+test('emulated time waits two seconds for a reader that is late, never for what it has asked for', () => session(async (vm) => {
+  const { server } = vm;
+  vm.setup(2n, '2122030000000000');
+  await vm.expect(100, 2n);
+  assert.equal(server.waitsForReader(0), false, 'nothing lies ready');
+  vm.bulk(3n, 0x02, 3, Buffer.from('abc'));
+  await vm.expect(101, 3n);
+  await vm.quiet();
+  assert.deepEqual([10, 2009, 2010, 9000].map((now_ms) => server.waitsForReader(now_ms)), [true, true, false, false]);
+  vm.bulk(4n, 0x82, 128);
+  assert.equal((await vm.expect(101, 4n)).subarray(10).toString(), 'abc');
+  assert.equal(server.waitsForReader(9001), false, 'it was read');
+  vm.bulk(5n, 0x02, 1, Buffer.from('d'));
+  await vm.expect(101, 5n);
+  await vm.quiet();
+  assert.equal(server.waitsForReader(9002), true, 'a reader again, so it gets its time again');
+  vm.setup(6n, '8006000100001200');
+  while (!server.arrived.length) await new Promise((resolve) => setImmediate(resolve));
+  assert.equal(server.waitsForReader(9003), false, 'what the machine asked for comes first');
+  await vm.expect(100, 6n);
+}));
