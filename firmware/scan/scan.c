@@ -32,7 +32,7 @@
  * near the sensor's last one, as a torn one hardly is; and one frame of fifteen sensors in three
  * million has four that end in eight. */
 #define TORN_MASK 0xFFFFu
-#define TORN_TOLERANCE 1024u /* some 45 Pa: four standard deviations of the noise at OSR 256 */
+#define TORN_TOLERANCE 1024u /* some 45 Pa: three standard deviations of a difference at OSR 256 */
 #define TORN_BYTE 0xFFu
 #define TORN_BYTE_SENSORS 4u
 #define CODE_MAX 0xFFFFFFu
@@ -181,6 +181,7 @@ static void end_prom_pass(struct scan *scan) {
   } else if (scan->admission_interval_us < ADMISSION_INTERVAL_MAX_us) {
     scan->admission_interval_us *= 2;
   }
+  scan->returned |= admitted & ~get(&scan->admitted);
   set(&scan->admitted, admitted);
   set(&scan->prom_bad, differs | blank);
   scan->void_next = 0;
@@ -282,7 +283,9 @@ static void take_reading(struct scan *scan, const struct scan_conversion *conver
   slot->good = good;
   if (conversion->is_temperature) {
     slot->prom_changed = scan->prom_changed;
+    slot->returned = scan->returned;
     scan->prom_changed = 0;
+    scan->returned = 0;
   }
   hand_over(conversion->is_temperature ? &scan->temperature_state : &scan->slot_state,
             SCAN_SLOT_FULL);
@@ -378,8 +381,9 @@ static enum ft_status start_operation(struct scan *scan, uint64_t now_us) {
 }
 
 static void fail_operation(struct scan *scan, enum ft_status why, uint64_t now_us) {
+  set(&scan->present, 0);
   if (why == FT_ERR_STUCK) {
-    set(&scan->present, 0);
+    set(&scan->admitted, 0);
     scan->bus_stuck = true;
     wait_in(scan, SCAN_WAIT_RECOVERY, now_us + scan->recovery_delay_us);
     scan->recovery_delay_us *= 2;
@@ -542,7 +546,7 @@ static void adapt_interval(struct scan *scan, bool moves, bool doubted) {
 }
 
 static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
-  scan->has_thermal &= ~slot->prom_changed;
+  scan->has_thermal &= ~(slot->prom_changed | slot->returned);
   scan->renewed |= slot->prom_changed;
   bool moves = false;
   bool doubted = false;
@@ -561,7 +565,6 @@ static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
     if (has_last && jumped && !(scan->doubted & bit)) {
       scan->doubted |= bit;
       doubted = true;
-
       continue;
     }
     moves = moves || step_cC > TEMPERATURE_STILL_cC || step_cC < -TEMPERATURE_STILL_cC;
@@ -573,12 +576,14 @@ static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
   int32_t sum_cC = 0;
   int32_t sensors = 0;
   for (uint8_t k = 0; k < scan->sensor_count; k++) {
-    if (scan->has_thermal & (UINT32_C(1) << k)) {
+    if (scan->has_thermal & get(&scan->admitted) & (UINT32_C(1) << k)) {
       sum_cC += scan->thermal[k].temperature_cC;
       sensors++;
     }
   }
-  scan->temperature_cC = sensors > 0 ? (int16_t)port_divide(sum_cC, sensors) : 0;
+  if (sensors > 0) {
+    scan->temperature_cC = (int16_t)port_divide(sum_cC, sensors);
+  }
 }
 
 static void fill_head(struct scan *scan, const struct scan_conversion *conversion,

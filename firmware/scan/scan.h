@@ -12,15 +12,17 @@
  * answering loses its admission; when sensors answer again, all are reset and their PROMs read
  * anew, at most once a second. Only admitted sensors yield valid readings. A reading of 0 means
  * that no conversion had finished, and the reading after it is void too: both are invalid, and two
- * in a row are a sensor that needs a reset, which loses its admission. A reading that ends in ones
- * comes from a sensor that lost count of the clocks and stopped sending: see scan.c.
+ * in a row are a sensor that needs a reset, which loses its admission. A reading whose last sixteen
+ * bits are ones, far from the sensor's last one, comes from a sensor that lost count of the clocks
+ * and stopped sending: see scan.c.
  *
  * Temperatures are converted twice a second, less often while they stand still. Where the
  * requested rate leaves a pause, that is done in the pause before a frame; else it takes the place
  * of a frame, at most one in 600 at OSR 256 and one in 25 at OSR 8192. That frame goes out at its
  * time too, with the pressures of the one before and marked as held. A wrong temperature would
  * falsify the pressures of many frames: all ones are no reading, and one that jumps is used only
- * when the next, taken soon after, jumps too.
+ * when the next, taken soon after, jumps too. What a sensor told before it was away is forgotten
+ * when it is admitted again; its next temperature is the next conversion.
  */
 #ifndef SCAN_SCAN_H
 #define SCAN_SCAN_H
@@ -83,6 +85,7 @@ struct scan_slot {
   struct scan_conversion conversion;
   uint32_t good;                 /* bitmap: the code is a measurement */
   uint32_t prom_changed;         /* bitmap: another sensor than before. Of a temperature */
+  uint32_t returned;             /* bitmap: was away, perhaps for long. Of a temperature */
   uint32_t code[FT_MAX_SENSORS]; /* [sensor] 24-bit */
 };
 
@@ -123,6 +126,7 @@ struct scan {
   uint32_t prom_answered; /* bitmap: every word of this pass */
   uint32_t prom_good;     /* bitmap: in some pass of this admission */
   uint32_t prom_changed;  /* bitmap: another PROM than before this admission */
+  uint32_t returned;      /* bitmap: admitted, and was not before */
   uint8_t prom_word, prom_pass;
   struct array_bus_result result;
   struct ms5840_prom prom_read[FT_MAX_SENSORS];
@@ -146,7 +150,7 @@ struct scan {
   uint32_t has_thermal;   /* bitmap */
   uint32_t renewed;       /* bitmap: another sensor since the last frame */
   uint32_t doubted;       /* bitmap: the last temperature jumped and was not used */
-  int16_t temperature_cC; /* mean */
+  int16_t temperature_cC; /* mean of the sensors admitted, the last one if there is none */
 };
 
 /* FT_ERR_ARGUMENT: a setting outside its range. The bus must outlive the scan. */

@@ -576,6 +576,41 @@ static void test_replaced_sensor_waits_for_its_own_temperature(void) {
   assert_good_frame(ALL);
 }
 
+/* Minutes may have passed, and the pad be warmer: no frame is computed with what was before. */
+static void test_sensor_that_was_away_gets_a_new_temperature(void) {
+  run_until(3000000);
+  skip_to_temperature();
+  skip_frames(2);
+  int16_t mean_cC = frame.temperature_cC;
+  fake.answering = ALL & ~DISTURBED_BIT;
+  skip_frames(2);
+  fake.d2[DISTURBED] += 200000; /* some 7 degC */
+  skip_to_temperature();
+  skip_frames(2);
+  TEST_ASSERT_INT16_WITHIN(1, mean_cC, frame.temperature_cC); /* of those that are here */
+  fake.answering = ALL;
+  do {
+    next_frame();
+    assert_good_frame(frame.valid);
+  } while (frame.valid != ALL);
+  TEST_ASSERT_GREATER_THAN_INT16(mean_cC + 30, frame.temperature_cC);
+  TEST_ASSERT_EQUAL_INT(0, (int)value_of(&scan.counters.bus_recoveries));
+
+  fake.recovery_is = FT_ERR_STUCK;
+  fake.fail_at = 0;
+  run_until(now_us + 1000000);
+  for (uint8_t k = 0; k < SENSORS; k++) {
+    fake.d2[k] -= 200000;
+  }
+  int before = frames;
+  fake.recovery_is = FT_OK;
+  while (frames < before + 50) {
+    next_frame();
+    assert_good_frame(frame.valid);
+  }
+  TEST_ASSERT_EQUAL_HEX32(ALL, frame.valid);
+}
+
 /* A sensor with a loose contact must not cost the others more than one admission a second. */
 static void test_flickering_sensor_costs_one_admission_a_second(void) {
   struct random random = {31};
@@ -958,6 +993,7 @@ int main(void) {
   RUN_TEST(test_temperature_fits_into_the_pauses);
   RUN_TEST(test_sensor_stops_and_comes_back);
   RUN_TEST(test_replaced_sensor_waits_for_its_own_temperature);
+  RUN_TEST(test_sensor_that_was_away_gets_a_new_temperature);
   RUN_TEST(test_flickering_sensor_costs_one_admission_a_second);
   RUN_TEST(test_timeout_leads_to_recovery_and_admission);
   RUN_TEST(test_failure_at_any_operation_is_survived);
