@@ -8,7 +8,10 @@
 enum {
   ALL_CHANNELS = (1 << BOARD_CHANNELS_PER_MUX) - 1,
   ALL_MUXES = (1 << BOARD_MUX_COUNT) - 1,
-  RECOVERY_CLOCKS = 9, /* UM10204 3.1.16: a device that holds SDA lets go within nine */
+  NO_MUX = BOARD_MUX_COUNT,
+  /* UM10204 3.1.16: a device that holds SDA lets go within nine; one of them is the clock of an
+   * acknowledge, and it is not given. */
+  RECOVERY_CLOCKS = 9,
 };
 /* From a START to the acknowledge of address and command, at the least: hold time and eighteen
  * clocks of 2.5 us up to the rise of the last (UM10204, fast mode). */
@@ -18,6 +21,8 @@ enum {
 /* Interrupts lead from one transaction to the next; whoever polls only looks whether they move on.
  * A transaction takes 110 us. */
 #define STANDSTILL_us 1000u
+#define SHUT_MIN_us 1000000u
+#define SHUT_MAX_us 16000000u
 
 static const struct i2c_pins PINS = {.sda = BOARD_PIN_SDA, .scl = BOARD_PIN_SCL};
 
@@ -120,10 +125,12 @@ static void account(struct mux_bus *bus, bool acknowledged, const uint8_t *bytes
   if (!acknowledged) {
     bus->result.nacks++;
   }
+  bus->just_opened = NO_MUX;
   switch (bus->under_way) {
   case MUX_BUS_SELECT:
     if (acknowledged) {
       bus->open[bus->select_mux] = bus->select_channels;
+      bus->just_opened = bus->select_mux;
     } else {
       bus->absent |= (uint8_t)(1u << bus->select_mux);
       reset_muxes(bus, (uint8_t)(1u << bus->select_mux));
@@ -203,6 +210,28 @@ static enum ft_status look(struct mux_bus *bus, uint64_t now_us, uint64_t *wake_
   return FT_PENDING;
 }
 
+/* Twice in a row the bus stood still as soon as this multiplexer had opened: a line behind it is
+ * held, and whoever opens it loses the others too. */
+static void judge_failure(struct mux_bus *bus, uint64_t now_us) {
+  if (bus->just_opened == NO_MUX) {
+    return;
+  }
+  if (bus->just_opened == bus->suspect) {
+    bus->shut |= (uint8_t)(1u << bus->suspect);
+    bus->shut_until_us = now_us + bus->shut_us;
+    bus->shut_us = bus->shut_us < SHUT_MAX_us ? 2 * bus->shut_us : SHUT_MAX_us;
+  }
+  bus->suspect = bus->just_opened;
+  bus->just_opened = NO_MUX;
+}
+
+static void judge_success(struct mux_bus *bus) {
+  if (bus->shut == 0) {
+    bus->suspect = NO_MUX;
+    bus->shut_us = SHUT_MIN_us;
+  }
+}
+
 /* One half period of the recovery; *wake_us is when the next one is due. */
 static enum ft_status recover_step(struct mux_bus *bus, uint64_t now_us, uint64_t *wake_us) {
   if (now_us < bus->recovery_due_us) {
@@ -217,9 +246,7 @@ static enum ft_status recover_step(struct mux_bus *bus, uint64_t now_us, uint64_
     break;
   case MUX_BUS_CLOCK_HIGH:
     bus->recovery_step =
-        i2c_line_is_high(&PINS, I2C_LINE_SDA) || bus->recovery_clocks == RECOVERY_CLOCKS
-            ? MUX_BUS_STOP_LOW
-            : MUX_BUS_CLOCK_LOW;
+        bus->recovery_clocks == RECOVERY_CLOCKS ? MUX_BUS_STOP_LOW : MUX_BUS_CLOCK_LOW;
     i2c_line_pull_low(&PINS, I2C_LINE_SCL);
     break;
   case MUX_BUS_STOP_LOW:
@@ -236,7 +263,7 @@ static enum ft_status recover_step(struct mux_bus *bus, uint64_t now_us, uint64_
     bus->recovery_step = MUX_BUS_MUX_RESET;
     break;
   case MUX_BUS_MUX_RESET:
-    drive_resets(ALL_MUXES, true);
+    drive_resets(ALL_MUXES & (uint8_t)~bus->shut, true);
     bus->recovery_step = MUX_BUS_REOPEN;
     break;
   case MUX_BUS_REOPEN:
@@ -260,8 +287,11 @@ static enum ft_status start(struct mux_bus *bus, enum mux_bus_operation operatio
   bus->command_sent = false;
   bus->read_count = byte_count;
   bus->sensor = 0;
-  drive_resets(bus->absent, true);
-  bus->absent = 0;
+  if (now_us >= bus->shut_until_us) {
+    bus->shut = 0;
+  }
+  drive_resets(bus->absent & (uint8_t)~bus->shut, true);
+  bus->absent = bus->shut;
   bus->result.acknowledged = 0;
   bus->moves_seen = bus->moves;
   bus->deadline_us = now_us + STANDSTILL_us;
@@ -290,8 +320,8 @@ static enum ft_status start_recovery(void *context, uint64_t now_us) {
   bus->operation = MUX_BUS_RECOVERY;
   bus->recovery_step = MUX_BUS_CLOCK_HIGH;
   bus->recovery_clocks = 0;
+  bus->just_opened = NO_MUX;
   bus->recovery_due_us = now_us + RECOVERY_HALF_PERIOD_us;
-  bus->absent = 0;
   bus->result.acknowledged = 0;
   i2c_close_to_lines(&PINS);
   return FT_OK;
@@ -304,12 +334,17 @@ static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_resu
   if (bus->operation == MUX_BUS_IDLE) {
     return FT_ERR_ARGUMENT;
   }
-  status = bus->operation == MUX_BUS_RECOVERY ? recover_step(bus, now_us, wake_us)
-                                              : look(bus, now_us, wake_us);
+  const bool recovers = bus->operation == MUX_BUS_RECOVERY;
+  status = recovers ? recover_step(bus, now_us, wake_us) : look(bus, now_us, wake_us);
   if (status == FT_PENDING) {
     return FT_PENDING;
   }
   bus->failed = status != FT_OK;
+  if (bus->failed) {
+    judge_failure(bus, now_us);
+  } else if (!recovers) {
+    judge_success(bus);
+  }
   bus->operation = MUX_BUS_IDLE;
   if (status == FT_OK) {
     *result = bus->result;
@@ -320,6 +355,9 @@ static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_resu
 
 enum ft_status mux_bus_init(struct mux_bus *bus, struct array_bus *array_bus) {
   memset(bus, 0, sizeof *bus);
+  bus->just_opened = NO_MUX;
+  bus->suspect = NO_MUX;
+  bus->shut_us = SHUT_MIN_us;
   const enum ft_status status = open_controller(bus);
   if (status != FT_OK) {
     return status;

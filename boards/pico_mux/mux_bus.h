@@ -4,15 +4,17 @@
  * on, one write reaches them all, a conversion command and the command that makes ready what is
  * read alike. Only the bytes are fetched from sensor to sensor, with one channel open at a time. A
  * channel opens at the STOP of its selection, so selections are transactions of their own; a
- * multiplexer is shut by its RESET line, which takes none. In steady state a frame takes command  3
- * selections, 1 write                     200 us read     1 write, 15 selections, 15 fetches 2250
- * us on the bus at 400 kHz (sources: TCA9548A datasheet SCPS207; MS5840-02BA datasheet, whose
- * command and answer are transactions of their own; array_bus.h), and 3 us between two
- * transactions. All sensors sample together; the reading skews nothing.
+ * multiplexer is shut by its RESET line, which takes none. In steady state a frame takes 200 us on
+ * the bus at 400 kHz for the command (3 selections, 1 write) and 2250 us for the reading (1 write,
+ * 15 selections, 15 fetches), and 3 us between two transactions. Sources: TCA9548A datasheet
+ * SCPS207; MS5840-02BA datasheet, whose command and answer are transactions of their own;
+ * array_bus.h. All sensors sample together; the reading skews nothing.
  *
  * A multiplexer that does not acknowledge is held in reset, which closes its channels whatever
  * state it is in, until the next operation asks it again; its sensors do not acknowledge and the
- * others are not disturbed.
+ * others are not disturbed. So is one whose opening makes the bus stand still, twice in a row, for
+ * a line behind it is then held; it is opened again after 1 s, and after twice as long each time,
+ * up to 16 s, that it still does.
  */
 #ifndef PICO_MUX_MUX_BUS_H
 #define PICO_MUX_MUX_BUS_H
@@ -38,7 +40,12 @@ struct mux_bus {
   uint8_t sensor; /* during a read: the one whose turn it is; after it, BOARD_SENSOR_COUNT */
 
   uint8_t open[BOARD_MUX_COUNT]; /* [mux] channels that are on, by what it acknowledged last */
-  uint8_t absent;                /* bitmap of multiplexers: did not acknowledge in this operation */
+  uint8_t absent;      /* bitmap of multiplexers: shut, or did not acknowledge in this operation */
+  uint8_t just_opened; /* multiplexer, if the last transaction that ended selected its channels */
+  uint8_t suspect;     /* the one just opened when the bus last stood still, until all goes well */
+  uint8_t shut;        /* bitmap: held in reset until shut_until_us */
+  uint64_t shut_until_us;
+  uint32_t shut_us; /* how long the next one is */
 
   enum mux_bus_transaction {
     MUX_BUS_NOTHING,

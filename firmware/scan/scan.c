@@ -32,7 +32,7 @@
  * near the sensor's last one, as a torn one hardly is; and one frame of fifteen sensors in three
  * million has four that end in eight. */
 #define TORN_MASK 0xFFFFu
-#define TORN_TOLERANCE 1024u /* some 45 Pa: three standard deviations of a difference at OSR 256 */
+#define TORN_TOLERANCE 1024u /* some 45 Pa; two readings at OSR 256 differ by 16 Pa rms */
 #define TORN_BYTE 0xFFu
 #define TORN_BYTE_SENSORS 4u
 #define CODE_MAX 0xFFFFFFu

@@ -9,13 +9,14 @@
  *     sda_stuck_low (sensor)        pulls SDA from from_s until nine clocks reached it or its multiplexer was reset
  *     mux_stuck (mux)               acknowledges nothing until its RESET line was pulsed
  *     sensor_missing (sensor)       is not there; when it comes back it has just been powered
- *     line_stuck_low, line_stuck_high (sensor)  its SDA is tied to ground, to VDD
+ *     line_stuck_low (sensor)       its SDA is tied to ground; behind a multiplexer the bus feels it while it is on
+ *     line_stuck_high (sensor)      its SDA is tied to VDD
  *     scl_stuck_low, scl_stuck_high SCL is tied to ground, to VDD
  *     clock_glitch (sensor)         sees one clock too many, once, in the first transfer from from_s on
  *     host_stall                    the USB host stops reading the CDC port
  *     usb_unplug                    the cable is out; it comes back at to_s
  *
- * Those from sensor_missing to clock_glitch need a board with a data line for each sensor.
+ * sensor_missing, line_stuck_high, scl_stuck_* and clock_glitch need a board with a data line for each sensor.
  * `to_s` may be left out: the fault then stays. Times are seconds since power-on.
  */
 import { readFileSync } from 'node:fs';
@@ -37,7 +38,7 @@ const TARGET = {
   usb_unplug: null,
 };
 
-const OF_LINES = ['sensor_missing', 'line_stuck_low', 'line_stuck_high', 'scl_stuck_low', 'scl_stuck_high', 'clock_glitch'];
+const OF_LINES = ['sensor_missing', 'line_stuck_high', 'scl_stuck_low', 'scl_stuck_high', 'clock_glitch'];
 
 export function parseFaults(text, file, { sensors, muxes, lines }) {
   const fail = (message) => {

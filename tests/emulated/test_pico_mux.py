@@ -178,6 +178,25 @@ class PicoMux(unittest.TestCase):
         self.assertGreater(recording.health()[-1]["bus_recoveries"], 0)
         self.assert_nothing_is_wrong_and_unflagged(run)
 
+    def test_a_line_tied_low_costs_its_multiplexer_only(self):
+        faults = [{"type": "line_stuck_low", "sensor": 7, "from_s": 1.0, "to_s": 1.5}]
+        run = Run(self.folder.name, "tied", self.scenario, 4.1, [(1.3, encoded("health"))], faults).finish()
+        recording = run.recording
+        t_s = recording["t_us"] * 1e-6
+        valid = recording["valid"].astype("uint32")
+        measured = ~recording.flag(FLAG_HELD)
+        others = 0x7FFF & ~(0x1F << 5)
+        tied = (t_s > 1.1) & (t_s < 1.5) & measured
+        self.assertGreater(tied.sum(), 70)
+        self.assertTrue((valid[tied] == others).all())
+        back = (t_s > 2.2) & (t_s < 4.0) & measured
+        self.assertGreater(back.sum(), 150)
+        self.assertTrue((valid[back] == 0x7FFF).all())
+        during, end = recording.health()[1], recording.health()[-1]
+        self.assertEqual((during["sensors_present"], end["sensors_present"]), (others, 0x7FFF))
+        self.assertLess(end["bus_recoveries"], 6)
+        self.assert_nothing_is_wrong_and_unflagged(run)
+
     def test_a_host_that_stalls_and_a_cable_that_is_pulled_cost_frames_and_no_more(self):
         faults = [{"type": "host_stall", "from_s": 0.8, "to_s": 5.8}, {"type": "usb_unplug", "from_s": 6.2, "to_s": 6.4}]
         again = [(7.0, "dtr 1"), (7.01, encoded("stream", "contact,raw,health")), (7.3, encoded("health"))]

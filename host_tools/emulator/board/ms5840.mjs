@@ -109,6 +109,8 @@ export class Ms5840 extends I2cTarget {
     this.timeFactor = CONVERSION_FRACTION * (1 + prng.range(-OSCILLATOR_TOLERANCE, OSCILLATOR_TOLERANCE));
     this.heldClocks = 0;
     this.holding = false;
+    /** Fault: its SDA is tied to ground, which no reset ends. */
+    this.tied = false;
     this.powerUp();
   }
 
@@ -123,7 +125,7 @@ export class Ms5840 extends I2cTarget {
   }
 
   get holdsSda() {
-    return this.holding;
+    return this.holding || this.tied;
   }
 
   hold() {
@@ -140,7 +142,7 @@ export class Ms5840 extends I2cTarget {
   }
 
   acknowledgesAddress() {
-    return this.now_ns() >= this.busyUntil_ns && !this.faults(this.index).dead && !this.holding;
+    return this.now_ns() >= this.busyUntil_ns && !this.faults(this.index).dead && !this.holdsSda;
   }
 
   receive(command) {

@@ -69,6 +69,10 @@ export class PicoMux {
         else this.sensors[sensor].release();
         this.bus.linesChanged();
       },
+      line_stuck_low: (sensor, active) => {
+        this.sensors[sensor].tied = active;
+        this.bus.linesChanged();
+      },
       mux_stuck: (mux, active) => {
         this.muxes[mux].stuck = active;
       },

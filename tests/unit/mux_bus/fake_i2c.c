@@ -46,9 +46,20 @@ uint8_t fake_byte(unsigned sensor, uint8_t command, unsigned index) {
   return (uint8_t)(0x35u + 11u * sensor + 3u * command + 71u * index);
 }
 
+static uint32_t open_channels(void) {
+  uint32_t sensors = 0;
+  for (unsigned m = 0; m < BOARD_MUX_COUNT; m++) {
+    sensors |= (uint32_t)mux.open[m] << m * BOARD_CHANNELS_PER_MUX;
+  }
+  return sensors;
+}
+
+static bool hangs(void) {
+  return transaction.number == fake.hang_at || (open_channels() & fake.tied_low) != 0;
+}
+
 uint64_t fake_i2c_next_event_us(void) {
-  const bool will_end =
-      transaction.active && transaction.busy_polls == 0 && transaction.number != fake.hang_at;
+  const bool will_end = transaction.active && transaction.busy_polls == 0 && !hangs();
   return will_end ? transaction.end_us : UINT64_MAX;
 }
 
@@ -151,7 +162,7 @@ enum ft_status i2c_poll(uint8_t bytes[I2C_MAX_READ_BYTES]) {
   if (transaction.busy_polls > 0 && --transaction.busy_polls > 0) {
     return FT_ERR_BUSY;
   }
-  if (transaction.number == fake.hang_at || fake.now_us < transaction.end_us) {
+  if (hangs() || fake.now_us < transaction.end_us) {
     return FT_PENDING;
   }
   transaction.active = false;
@@ -166,7 +177,8 @@ enum ft_status i2c_poll(uint8_t bytes[I2C_MAX_READ_BYTES]) {
 
 bool i2c_line_is_high(const struct i2c_pins *pins, enum i2c_line line) {
   (void)pins;
-  return !low[line] && !(line == I2C_LINE_SDA ? fake.sda_held : fake.scl_held);
+  const bool tied = (open_channels() & fake.tied_low) != 0;
+  return !low[line] && !(line == I2C_LINE_SDA ? fake.sda_held || tied : fake.scl_held);
 }
 
 void i2c_line_pull_low(const struct i2c_pins *pins, enum i2c_line line) {

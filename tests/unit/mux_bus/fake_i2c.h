@@ -23,6 +23,8 @@ struct fake_i2c {
   unsigned nack_select_at;      /* likewise, the addressed multiplexer misses its address */
   unsigned busy_polls; /* polls of each transaction that find the controller not yet idle */
   bool sda_held, scl_held;
+  uint32_t
+      tied_low; /* bitmap: sensors whose SDA is at ground, which the bus feels while it is on */
   unsigned sda_free_after_clocks; /* 0: no number of clocks frees it */
   bool sda_free_by_mux_reset;
 

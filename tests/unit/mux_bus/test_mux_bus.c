@@ -307,22 +307,93 @@ static void test_a_failed_bus_is_left_alone_until_recovery(void) {
   TEST_ASSERT_EQUAL_UINT(before, fake.transactions);
 }
 
-static void test_recovery_clocks_until_sda_is_released(void) {
+static void test_recovery_frees_sda_within_nine_clocks(void) {
   for (unsigned clocks = 1; clocks <= 9; clocks++) {
     next_case();
     fake.sda_held = true;
     fake.sda_free_after_clocks = clocks;
     TEST_ASSERT_EQUAL_INT(FT_OK, recover());
-    TEST_ASSERT_EQUAL_UINT(clocks, fake.clocks);
+    TEST_ASSERT_EQUAL_UINT(9, fake.clocks);
     TEST_ASSERT_EQUAL_UINT(1, fake.stops);
     expect_good_frame();
   }
 }
 
-static void test_recovery_of_a_free_bus_sends_a_stop_only(void) {
+/* SDA may be high because a sensor is sending a one: it needs its clocks all the same. */
+static void test_recovery_of_a_free_bus_clocks_too(void) {
   TEST_ASSERT_EQUAL_INT(FT_OK, recover());
-  TEST_ASSERT_EQUAL_UINT(0, fake.clocks);
+  TEST_ASSERT_EQUAL_UINT(9, fake.clocks);
   TEST_ASSERT_EQUAL_UINT(1, fake.stops);
+}
+
+/* Frames and recoveries as scan makes them; returns how many of the frames failed. */
+static int run_for(uint64_t duration_us, uint32_t *sensors) {
+  int failed = 0;
+  const uint64_t until_us = fake.now_us + duration_us;
+  while (fake.now_us < until_us) {
+    if (frame() == FT_OK) {
+      *sensors = result.acknowledged;
+      expect_readings(result.acknowledged);
+    } else {
+      failed++;
+      TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+    }
+  }
+  return failed;
+}
+
+static void test_a_line_tied_low_costs_its_multiplexer_only(void) {
+  for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
+    next_case();
+    const uint32_t rest = ALL_SENSORS & ~STRIP(k / BOARD_CHANNELS_PER_MUX);
+    uint32_t sensors = 0;
+    expect_good_frame();
+    fake.tied_low = 1u << k;
+    const uint64_t start_us = fake.now_us;
+    int failed = 0;
+    while (sensors == 0) {
+      failed += run_for(1, &sensors);
+      TEST_ASSERT_LESS_THAN_INT(4, failed);
+    }
+    TEST_ASSERT_EQUAL_HEX32(rest, sensors);
+    TEST_ASSERT_LESS_THAN_UINT64(start_us + 15000, fake.now_us);
+    /* Tried again ever more rarely: after 1, 2, 4, 8 and 16 s, and then every 16 s. */
+    TEST_ASSERT_EQUAL_INT(5, run_for(32000000, &sensors));
+    TEST_ASSERT_EQUAL_INT(3, run_for(48000000, &sensors));
+    TEST_ASSERT_EQUAL_HEX32(rest, sensors);
+    fake.tied_low = 0;
+    TEST_ASSERT_EQUAL_INT(0, run_for(17000000, &sensors));
+    TEST_ASSERT_EQUAL_HEX32(ALL_SENSORS, sensors);
+    /* All went well: the next time it is shut for a second again. */
+    fake.tied_low = 1u << k;
+    TEST_ASSERT_LESS_THAN_INT(4, run_for(100000, &sensors));
+    fake.tied_low = 0;
+    TEST_ASSERT_EQUAL_INT(0, run_for(1100000, &sensors));
+    TEST_ASSERT_EQUAL_HEX32(ALL_SENSORS, sensors);
+  }
+}
+
+static void test_lines_tied_low_behind_all_multiplexers_leave_nobody(void) {
+  uint32_t sensors = ALL_SENSORS;
+  fake.tied_low = 1u << 0 | 1u << 7 | 1u << 14;
+  TEST_ASSERT_LESS_THAN_INT(60, run_for(10000000, &sensors));
+  TEST_ASSERT_EQUAL_HEX32(0, sensors);
+  fake.tied_low = 1u << 7;
+  run_for(40000000, &sensors);
+  TEST_ASSERT_EQUAL_HEX32(ALL_SENSORS & ~STRIP(1), sensors);
+}
+
+/* What stands still once, or at another place each time, is no held line. */
+static void test_single_standstills_shut_nobody(void) {
+  for (unsigned at = 1; at <= FRAME_TRANSACTIONS; at++) {
+    next_case();
+    for (int n = 0; n < 3; n++) {
+      fake.hang_at = fake.transactions + at;
+      TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, frame());
+      TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+      expect_good_frame();
+    }
+  }
 }
 
 static void test_recovery_by_the_multiplexer_reset(void) {
@@ -382,8 +453,11 @@ int main(void) {
   RUN_TEST(test_lost_arbitration_at_every_place);
   RUN_TEST(test_lost_interrupts_only_cost_time);
   RUN_TEST(test_a_failed_bus_is_left_alone_until_recovery);
-  RUN_TEST(test_recovery_clocks_until_sda_is_released);
-  RUN_TEST(test_recovery_of_a_free_bus_sends_a_stop_only);
+  RUN_TEST(test_recovery_frees_sda_within_nine_clocks);
+  RUN_TEST(test_recovery_of_a_free_bus_clocks_too);
+  RUN_TEST(test_a_line_tied_low_costs_its_multiplexer_only);
+  RUN_TEST(test_lines_tied_low_behind_all_multiplexers_leave_nobody);
+  RUN_TEST(test_single_standstills_shut_nobody);
   RUN_TEST(test_recovery_by_the_multiplexer_reset);
   RUN_TEST(test_a_line_held_for_good_is_reported_and_asked_again);
   RUN_TEST(test_recovery_abandons_whatever_is_under_way);
