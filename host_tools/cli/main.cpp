@@ -488,7 +488,7 @@ int run(int argc, char **argv) {
       ->add_option("settings", options.settings,
                    "rate=HZ|max (0.1 to 2000), osr=256|512|1024|2048|4096|8192, slip_threshold=MM "
                    "(0.01 to 50), "
-                   "slip_window=MS (5 to 1000)")
+                   "slip_window=MS (5 to 1000, and 160 frames at most)")
       ->required()
       ->type_name("KEY=VALUE");
   with_port(add("loader", "Restart into the USB loader, to install firmware",
