@@ -45,7 +45,7 @@ SERIAL_CYCLES = 12
 LIBUSB_CYCLES = 8
 # Seconds on the wall, for a machine that emulates at a tenth of real time
 PATIENCE_s = 60
-STREAM_LIMIT_s = 10 * STREAM_s
+STREAM_LIMIT_s = 20 * STREAM_s
 KERNEL_WARNING = 4
 # What the driver says when QEMU's controller, having taken transfers back amid data, reports one that is not next on its
 # ring: seen once, on a machine under eightfold load. The order of a ring is between those two, so it is counted apart.
