@@ -3,8 +3,11 @@
  *
  *   fake_device LINK [key=value]...
  *     rate=HZ          frames a second, default 200
- *     frames=N         leave after this many frames
- *     vanish=AT,BACK   the port goes after AT frames and is back BACK ms later, restarted
+ *     frames=N         leave after this many frames, once they were read
+ *     vanish=AT,BACK   the port goes after AT frames, once they were read, and is back BACK ms
+ *                      later, restarted
+ *     pulled=1         leaves at the first byte that it hears
+ *     heard=FILE       made at the first byte that it hears
  *     drop=N           every Nth frame loses its packets
  *     flip=N           every Nth frame has a flipped bit
  *     stall=N          says nothing more after N frames
@@ -35,6 +38,7 @@
 #include <fcntl.h>
 #include <map>
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 #include <thread>
 
@@ -84,13 +88,13 @@ public:
         if (vanish && frame_ == vanish && !vanished_) {
           vanished_ = true;
           std::string text = options_["vanish"];
+          wait_for_reader();
           power_off();
           std::this_thread::sleep_for(milliseconds(std::atol(text.c_str() + text.find(',') + 1)));
           power_on();
         }
         if (frame_ == number("frames", -1)) {
-          /* what was written is read before the terminal goes */
-          std::this_thread::sleep_for(milliseconds(200));
+          wait_for_reader();
           return;
         }
       }
@@ -147,6 +151,20 @@ private:
     streams_ = 0;
     sequence_ = 0;
     frame_ = 0;
+  }
+
+  /* A terminal that goes takes along what nobody has read yet. */
+  void wait_for_reader() {
+    constexpr milliseconds step{10}, settled{200}, limit{20000};
+    int terminal = open(ptsname(master_), O_RDWR | O_NOCTTY | O_NONBLOCK);
+    milliseconds empty{0};
+    for (milliseconds waited{0}; empty < settled && waited < limit && !ended; waited += step) {
+      int unread = 0;
+      ioctl(terminal, FIONREAD, &unread);
+      empty = unread > 0 ? milliseconds(0) : empty + step;
+      std::this_thread::sleep_for(step);
+    }
+    close(terminal);
   }
 
   void power_off() {
@@ -215,6 +233,13 @@ private:
     if (count <= 0) {
       streams_ = 0; /* nobody has it open */
       std::this_thread::sleep_for(milliseconds(2));
+      return false;
+    }
+    if (!options_["heard"].empty()) {
+      close(open(options_["heard"].c_str(), O_WRONLY | O_CREAT, 0644));
+    }
+    if (number("pulled", 0)) {
+      ended = 1;
       return false;
     }
     bool changed = false;
@@ -297,7 +322,9 @@ int main(int argc, char **argv) {
     std::string text = argv[i];
     options[text.substr(0, text.find('='))] = text.substr(text.find('=') + 1);
   }
-  std::signal(SIGTERM, [](int) { ended = 1; });
+  struct sigaction action = {}; /* without SA_RESTART: a write that nobody takes ends too */
+  action.sa_handler = [](int) { ended = 1; };
+  sigaction(SIGTERM, &action, nullptr);
   FakeDevice(argv[1], options).run();
   return 0;
 }
