@@ -79,6 +79,8 @@ class PicoMux(unittest.TestCase):
         cls.addClassCleanup(cls.folder.cleanup)
         cls.scenario = make_scenario(cls.folder.name, "ideal", 12)
         runs = [Run(cls.folder.name, "first", cls.scenario, logs=True), Run(cls.folder.name, "second", cls.scenario)]
+        for run in runs:
+            cls.addClassCleanup(run.process.kill)
         cls.first, cls.second = [run.finish() for run in runs]
         cls.truth = Truth(cls.scenario)
 

@@ -199,7 +199,9 @@ def report(**numbers):
     whole = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
     others = {name: value for name, value in whole.items() if name not in REPORTED}
     MEASURED.update(numbers)
-    path.write_text(json.dumps({**others, **MEASURED}, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+    fresh = path.with_suffix(".new")
+    fresh.write_text(json.dumps({**others, **MEASURED}, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+    fresh.replace(path)
 
 
 if __name__ == "__main__":
