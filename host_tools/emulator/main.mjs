@@ -35,7 +35,8 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
                        real: never faster than the clock on the wall, a lag is dropped (default with --pty and
                        --usbredir); wall: emulated time is the time on the wall, for measuring clocks: with --pty, what
                        a client writes arrives at the time of its writing, answers never come early, a lag is caught
-                       up and delays them; fast: as fast as possible
+                       up and delays them, and the report has the largest of each second on the wall (wall_lag_s);
+                       fast: as fast as possible
   --usbredir WHERE     give the USB device to a virtual machine instead of the built-in host; WHERE is the path of a
                        Unix socket or a TCP port on the loopback. QEMU: -chardev socket,id=r,path=WHERE,reconnect=1
                        -device qemu-xhci -device usb-redir,chardev=r. Lines on stdin: "unplug", "plug". While a packet
@@ -219,6 +220,7 @@ async function run(options) {
     let paced_ms = started_ms;
     let paced_ns = 0;
     let shown_ms = started_ms;
+    const wall_lag_s = [];
     const slice_ns = usbredir ? USBREDIR_SLICE_NS : options.pace === 'wall' ? WALL_SLICE_NS : pty || options.pace === 'real' ? SLICE_NS : SLICE_BATCH_NS;
     for (;;) {
       while (usbredir?.waitsForReader(performance.now()) && !interrupted) await sleep(1);
@@ -231,6 +233,12 @@ async function run(options) {
         }
       }
       if (!machine.run(target) || target >= end_ns) break;
+      if (options.pace === 'wall') {
+        const now_s = wall_ns() / 1e9;
+        const lag_s = Math.max(0, now_s - machine.time.nanos / 1e9);
+        while (wall_lag_s.length <= now_s) wall_lag_s.push(lag_s);
+        wall_lag_s.push(Math.max(wall_lag_s.pop(), lag_s));
+      }
       const now_ms = performance.now();
       if (interrupted) {
         machine.endReason = 'interrupted';
@@ -263,7 +271,7 @@ async function run(options) {
     vcd?.close(machine.time.nanos);
     const wall_s = (performance.now() - started_ms) / 1000;
     const { result } = machine;
-    reportFile.write(Buffer.from(`${JSON.stringify({ ...result, wall_s, ...(options.pace === 'wall' ? { wall_zero_us: Number(wall_zero_ns) / 1e3 } : {}) }, null, 2)}\n`));
+    reportFile.write(Buffer.from(`${JSON.stringify({ ...result, wall_s, ...(options.pace === 'wall' ? { wall_zero_us: Number(wall_zero_ns) / 1e3, wall_lag_s } : {}) }, null, 2)}\n`));
     for (const line of result.warnings) process.stderr.write(`${line}\n`);
     if (result.end_reason !== 'end of time') process.stderr.write(`ended after ${result.emulated_s.toFixed(6)} s: ${result.end_reason}\n`);
     clean = result.warnings.length === 0;

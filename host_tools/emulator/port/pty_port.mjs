@@ -3,7 +3,7 @@
  * stdout: one byte type, u32 little-endian length, payload.
  *
  *     from the helper: 'R' ready, 'O' opened, 'C' closed, 'B' u32 baud rate changed, 'D' bytes from the client,
- *                      'A' u32 bytes taken by the client
+ *                      'A' u32 bytes taken by the client, or discarded as there is none
  *     to the helper:   'D' bytes for the client
  *
  * At most WINDOW bytes wait for the client; beyond that the emulated host stops reading the device.

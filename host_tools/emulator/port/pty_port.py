@@ -81,8 +81,10 @@ def main():
                 (length,) = struct.unpack_from("<I", incoming, 1)
                 if len(incoming) < 5 + length:
                     break
-                if is_open:  # a client that comes later must not get what an earlier one left
+                if is_open:
                     outgoing += incoming[5:5 + length]
+                else:  # a client that comes later must not get what an earlier one left
+                    frame(b"A", struct.pack("<I", length))
                 incoming = incoming[5 + length:]
             if is_open:
                 speed = BAUD.get(termios.tcgetattr(master)[5], 0)

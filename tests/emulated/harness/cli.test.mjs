@@ -106,9 +106,9 @@ tty.setraw(fd, termios.TCSANOW)
 time.sleep(0.5)
 data = bytes(range(256)) * 8
 got = b""
-end = time.time() + 20
+end = time.monotonic() + 20
 sent = 0
-while len(got) < len(data) and time.time() < end:
+while len(got) < len(data) and time.monotonic() < end:
     if sent < len(data) and sent - len(got) < 64:
         sent += os.write(fd, data[sent:sent + 32])
     if select.select([fd], [], [], 0.02)[0]:
@@ -123,7 +123,7 @@ async function serve(link, ...args) {
   let stderr = '';
   emulator.stderr.on('data', (d) => (stderr += d));
   const ended = new Promise((resolve) => emulator.on('close', resolve)).finally(() => serving.delete(emulator));
-  for (let i = 0; i < 400 && !existsSync(link) && emulator.exitCode === null; i++) await new Promise((r) => setTimeout(r, 25));
+  for (let i = 0; i < 2400 && !existsSync(link) && emulator.exitCode === null; i++) await new Promise((r) => setTimeout(r, 25));
   assert.ok(existsSync(link), stderr);
   const end = async () => {
     emulator.kill('SIGINT');
@@ -134,7 +134,7 @@ async function serve(link, ...args) {
     const reached_s = () => Number(stderr.trim().split('\n').at(-1).split(' ')[0]);
     while (!(reached_s() >= wanted_s) && emulator.exitCode === null) await new Promise((r) => setTimeout(r, 50));
   };
-  return { end, reach };
+  return { end, reach, signal: (name) => emulator.kill(name) };
 }
 
 async function runClient(program, link, go = Promise.resolve()) {
@@ -176,10 +176,15 @@ test('pseudo-terminal at the pace of the wall: no question is heard before it wa
   const out = (name) => join(folder, name);
   const emulator = await serve(link, '--image', sleeper, '--pace', 'wall', '--usb-log', out('wall.csv'), '--report', out('wall.json'));
   const { code, stdout } = await runClient(ASKING, link);
+  emulator.signal('SIGSTOP');
+  await new Promise((r) => setTimeout(r, 1100));
+  emulator.signal('SIGCONT');
   const ended = await emulator.end();
   assert.equal(ended.code, 0, ended.stderr);
   assert.equal(code, 0);
-  const zero_ns = JSON.parse(readFileSync(out('wall.json'))).wall_zero_us * 1e3;
+  const report = JSON.parse(readFileSync(out('wall.json')));
+  assert.ok(report.wall_lag_s.length > 2 && Math.max(...report.wall_lag_s) > 1, `lag ${report.wall_lag_s}`);
+  const zero_ns = report.wall_zero_us * 1e3;
   const rows = readFileSync(out('wall.csv'), 'utf8').split('\n').map((line) => line.split(',')).filter(([, endpoint, , length]) => endpoint === '2' && length === '1');
   const heard = (dir) => rows.filter((row) => row[2] === dir).map((row) => zero_ns + Number(row[0]));
   const [questions, answers] = [heard('out'), heard('in')];
@@ -212,8 +217,8 @@ fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
 tty.setraw(fd, termios.TCSANOW)
 sys.stdin.readline()
 got = 0
-end = time.time() + 60
-while got < 100000 and time.time() < end:
+end = time.monotonic() + 60
+while got < 100000 and time.monotonic() < end:
     if not select.select([fd], [], [], 1)[0]:
         continue
     for byte in os.read(fd, 4096):
@@ -246,10 +251,16 @@ test('pseudo-terminal: a client that does not read stops the stream, loses nothi
 test('pseudo-terminal: bytes for a client that left do not reach the next one', async () => {
   const link = join(folder, 'helper');
   const helper = spawn('/usr/bin/python3', [HELPER, link], { stdio: ['pipe', 'pipe', 'inherit'] });
-  const ended = new Promise((resolve) => helper.on('close', resolve));
-  await new Promise((resolve) => helper.stdout.once('data', resolve));
+  serving.add(helper);
+  const ended = new Promise((resolve) => helper.on('close', resolve)).finally(() => serving.delete(helper));
+  let said = Buffer.alloc(0);
+  const hear = async (length) => {
+    while (said.length < length) said = Buffer.concat([said, await new Promise((resolve) => helper.stdout.once('data', resolve))]);
+  };
+  await hear(5);
   helper.stdin.write(Buffer.from([0x44, 3, 0, 0, 0, 1, 2, 3]));
-  await new Promise((r) => setTimeout(r, 200));
+  await hear(14);
+  assert.deepEqual([...said], [0x52, 0, 0, 0, 0, 0x41, 4, 0, 0, 0, 3, 0, 0, 0]);
   const { stdout } = await runClient(`
 import os, select, sys, tty
 fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
