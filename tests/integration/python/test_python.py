@@ -17,6 +17,11 @@ import fingertip_files as files  # noqa: E402
 CONTACT, FIT_VALID, SLIP_VALID, SLIP, TARED = 1, 2, 8, 16, 32
 
 
+def setUpModule():
+    """matplotlib's first import on a computer speaks of the fonts that it looks for."""
+    subprocess.run([sys.executable, "-c", "import matplotlib.pyplot"], capture_output=True, check=True)
+
+
 class ToolTest(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
