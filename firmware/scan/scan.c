@@ -619,15 +619,6 @@ static void fill_pressures(struct scan *scan, const struct scan_slot *slot, stru
   scan->renewed = 0;
 }
 
-/* A temperature applies to the frames after it. */
-static bool temperature_is_next(const struct scan *scan) {
-  if (get(&scan->slot_state) == SCAN_SLOT_EMPTY) {
-    return true;
-  }
-  uint32_t number = scan->temperature_slot.conversion.number;
-  return (int32_t)(scan->slot.conversion.number - number) >= 0;
-}
-
 static bool claim(_Atomic uint32_t *state) {
   if (get(state) != SCAN_SLOT_FULL) {
     return false;
@@ -637,19 +628,31 @@ static bool claim(_Atomic uint32_t *state) {
   return true;
 }
 
+/* A temperature applies to the frames after it. The frame is claimed while the two are compared:
+ * else a newer one could take its place and overtake the temperature. */
 bool scan_take(struct scan *scan, struct frame *frame) {
-  if (temperature_waits(scan) && temperature_is_next(scan) && claim(&scan->temperature_state)) {
-    const bool is_frame = scan->temperature_slot.conversion.is_frame;
+  const struct scan_conversion *temperature = &scan->temperature_slot.conversion;
+  const bool waits = temperature_waits(scan);
+  bool claimed = claim(&scan->slot_state);
+  const bool frame_is_older =
+      claimed && (int32_t)(scan->slot.conversion.number - temperature->number) < 0;
+  if (waits && !frame_is_older) {
+    if (claimed) {
+      hand_over(&scan->slot_state, SCAN_SLOT_FULL);
+    }
+    claim(&scan->temperature_state);
+    const bool is_frame = temperature->is_frame;
     use_temperature(scan, &scan->temperature_slot);
     if (is_frame) {
-      fill_head(scan, &scan->temperature_slot.conversion, frame);
+      fill_head(scan, temperature, frame);
     }
     hand_over(&scan->temperature_state, SCAN_SLOT_EMPTY);
     if (is_frame) {
       return true;
     }
+    claimed = claim(&scan->slot_state);
   }
-  if (!claim(&scan->slot_state)) {
+  if (!claimed) {
     return false;
   }
   fill_head(scan, &scan->slot.conversion, frame);

@@ -258,6 +258,13 @@ def plot(path, results, found):
                "lm_double": "#6f3d94", "double": "#8a8f9c", "separable": "#2a9d4a"}
     labels = {"fit": "firmware, fixed point", "general": "firmware, float32, any layout", "naive_float": "Gauss-Newton, expf",
               "naive_double": "Gauss-Newton, exp", "lm_float": "Levenberg-Marquardt, float", "lm_double": "Levenberg-Marquardt, double"}
+    # on the host: name, whether it stands left or right of the bar or else above the point, lifted by so many points
+    host_labels = {"fit": ("firmware, fixed point", "left", 0), "general": ("firmware, float32", "left", 0), "masked": ("firmware, a sensor masked", "right", 0),
+                   "double": ("the same steps in double", "right", 0), "separable": ("fixed point's iteration in double", "right", 0),
+                   "naive_float": ("Gauss-Newton, expf", "left", -5), "naive_double": ("Gauss-Newton, exp", "left", 5),
+                   "lm_float": ("Levenberg-Marquardt, float", "left", -4), "lm_double": ("Levenberg-Marquardt, double", "right", -4),
+                   "tiny_solver": ("TinySolver", "right", 4), "tiny_tight": ("TinySolver, tight", "left", -9), "gsl": ("GSL", "left", 0),
+                   "ceres_reused": ("Ceres", "above, left", 9), "ceres_tight": ("Ceres, tight", "above, right", 9), "cminpack": ("cminpack", "right", 0)}
     low_um, high_um = 1e-3, 1e5
 
     def shown(um):
@@ -278,8 +285,11 @@ def plot(path, results, found):
                 line.append((int(cycles["cycles_median"]), shown(error), k))
         every += [point[:2] for point in line]
         chip.plot([p[0] for p in line], [p[1] for p in line], "o-", color=colours[kernel], ms=4, lw=1.2, label=label, zorder=3)
+        labelled = []
         for x, y, k in line:
-            if k in (0, 4, 7, 10, 50):
+            apart = all(abs(math.log10(x / other_x)) > 0.05 or abs(math.log10(y / other_y)) > 0.5 for other_x, other_y in labelled)
+            if k in (0, 4, 7, 10, 50) and apart and not (kernel.startswith("lm_") and k == 4):
+                labelled.append((x, y))
                 chip.annotate(str(k), (x, y), (0, 5), textcoords="offset points", size=7, ha="center", color=colours[kernel])
         for n in range(4, 15):
             cycles, error = results.cycles.get((kernel, f"n_largest={n}")), results.error(kernel, f"n_largest={n}", ALL_SETS, "p999_um")
@@ -308,11 +318,12 @@ def plot(path, results, found):
         colour = colours.get(kernel, ink)
         host.errorbar(row["us"], shown(error), xerr=[[row["us"] - row["us_p10"]], [row["us_p90"] - row["us"]]], fmt="o", ms=5,
                       color=colour, elinewidth=0.8, zorder=3)
-        above = kernel not in ("naive_float", "lm_float", "ceres_reused")
-        host.annotate(kernel, (row["us"], shown(error)), (0, 5 if above else -11), textcoords="offset points", size=7.5,
-                      ha="center", color=colour)
+        name, side, up = host_labels[kernel]
+        at_us, outwards = {"right": (row["us_p90"], 4), "left": (row["us_p10"], -4)}.get(side, (row["us"], 0))
+        host.annotate(name, (at_us, shown(error)), (outwards, up), textcoords="offset points", size=7.5, va="center",
+                      ha="left" if side.endswith("right") else "right", color=colour)
     host.set_xlabel("us of one fit on the host, median and 10..90 %, paired")
-    host.set_title("on this host", loc="left", size=10)
+    host.set_title("on this host, each from one start", loc="left", size=10)
     for axes in (chip, host):
         axes.set_xscale("log")
         axes.set_yscale("log")
