@@ -10,11 +10,13 @@
 #include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <thread>
@@ -35,6 +37,8 @@ constexpr int FIRST_EXCHANGES = 32;
 constexpr milliseconds EXCHANGE_INTERVAL{100};
 /* How long a row may wait for earlier ones of the others. */
 constexpr double SETTLE_us = 250e3;
+/* How far behind a fingertip's thread may be with reading, for the others' rows to wait for it. */
+constexpr std::int64_t LONGEST_BACKLOG_us = 2000000;
 constexpr milliseconds SHOW_INTERVAL{1000};
 
 struct Item {
@@ -90,6 +94,12 @@ public:
   bool is_stalled() const {
     return 1e-6 * static_cast<double>(steady_now_us() - last_frame_us_) > STALLED_s;
   }
+  /* Until when everything that came was read, on the host's clock; no more is expected of one that
+   * is gone. */
+  double read_until_us() const {
+    return is_gone() || has_ended() ? std::numeric_limits<double>::infinity()
+                                    : static_cast<double>(read_until_us_);
+  }
   std::string name() const { return transport_->description(); }
   /* Once it is ready. */
   const wire_packet &info_packet() const { return info_; }
@@ -124,9 +134,15 @@ private:
     }
     send_streams();
     while (!stop_) {
-      if (session_.poll(POLL) == Transport::Result::gone) {
+      std::int64_t begun_us = steady_now_us();
+      Transport::Result result = session_.poll(POLL);
+      if (result == Transport::Result::timeout) {
+        read_until_us_ = begun_us;
+      } else if (result == Transport::Result::gone) {
         come_back();
-      } else if (Clock::now() - asked_ >= EXCHANGE_INTERVAL) {
+        continue;
+      }
+      if (Clock::now() - asked_ >= EXCHANGE_INTERVAL) {
         /* repeating the wish is an exchange, and wakes a device that restarted unnoticed */
         send_streams();
       }
@@ -169,6 +185,7 @@ private:
       }
     }
     put_event("back");
+    read_until_us_ = steady_now_us();
     gone_ = false;
     send_streams();
   }
@@ -193,7 +210,11 @@ private:
     item.device = number_;
     item.packet = packet;
     item.host_us = fit_.estimate()->host_at(packet.t_us);
+    std::int64_t now_us = steady_now_us();
+    auto until_us =
+        std::clamp(static_cast<std::int64_t>(item.host_us), now_us - LONGEST_BACKLOG_us, now_us);
     queue_.put(std::move(item));
+    read_until_us_ = until_us;
   }
 
   void put_clock() {
@@ -229,6 +250,7 @@ private:
   std::atomic<bool> gone_{false};
   std::atomic<bool> ended_{false};
   std::atomic<std::int64_t> last_frame_us_{0};
+  std::atomic<std::int64_t> read_until_us_{0};
   std::exception_ptr failure_;
   std::thread thread_;
 };
@@ -259,16 +281,16 @@ public:
     begin();
     std::string reason;
     while (reason.empty()) {
-      write(queue_.take(POLL));
+      write_news(POLL);
       stop_if_one_failed();
       show();
       reason = reason_to_end();
     }
     stop_ = true;
     while (!is_everyone([](const Fingertip &each) { return each.has_ended(); })) {
-      write(queue_.take(POLL));
+      write_news(POLL);
     }
-    write(queue_.take(milliseconds(0)));
+    write_news(milliseconds(0));
     std::vector<LineStatistics> statistics;
     LineStatistics sum;
     for (const auto &each : fingertips_) {
@@ -328,8 +350,14 @@ private:
     started_ = true;
   }
 
-  void write(const std::vector<Item> &items) {
-    for (const Item &item : items) {
+  void write_news(milliseconds timeout) {
+    /* Asked first: what was read until then is in the queue. A row waits for those of a fingertip
+     * whose thread got no time to read them. */
+    double settled_us = static_cast<double>(steady_now_us());
+    for (const auto &each : fingertips_) {
+      settled_us = std::min(settled_us, each->read_until_us());
+    }
+    for (const Item &item : queue_.take(timeout)) {
       switch (item.kind) {
       case Item::Kind::packet:
         recording_->packet(item.device, item.packet, item.host_us);
@@ -342,7 +370,7 @@ private:
         break;
       }
     }
-    recording_->settle(static_cast<double>(steady_now_us()) - SETTLE_us);
+    recording_->settle(settled_us - SETTLE_us);
   }
 
   std::string reason_to_end() const {

@@ -83,7 +83,7 @@ public:
         continue;
       }
       for (; next_frame <= Clock::now() && streams_ != 0; next_frame += interval) {
-        send_frame();
+        send_frame(next_frame);
         long vanish = number("vanish", 0);
         if (vanish && frame_ == vanish && !vanished_) {
           vanished_ = true;
@@ -174,8 +174,10 @@ private:
 
   double clock_rate() const { return 1 + static_cast<double>(number("clock_ppm", 0)) / 1e6; }
 
-  std::uint64_t now_us() const {
-    double us = std::chrono::duration<double, std::micro>(Clock::now() - started_).count();
+  std::uint64_t now_us() const { return device_us(Clock::now()); }
+
+  std::uint64_t device_us(Clock::time_point at) const {
+    double us = std::chrono::duration<double, std::micro>(at - started_).count();
     return static_cast<std::uint64_t>(us * clock_rate() +
                                       static_cast<double>(number("started", 0)) * 1e6);
   }
@@ -191,13 +193,14 @@ private:
     }
   }
 
-  void send_frame() {
+  /* measured: when, however late it is sent. */
+  void send_frame(Clock::time_point measured) {
     frame_++;
     long stall = number("stall", 0), drop = number("drop", 0), flip = number("flip", 0);
     if (stall && frame_ > stall) {
       return;
     }
-    std::uint64_t t_us = now_us();
+    std::uint64_t t_us = device_us(measured);
     auto frame = static_cast<std::uint32_t>(frame_);
     wire_packet contact = test::make_contact(0, t_us, frame);
     float angle = static_cast<float>(frame % 400) * 0.0157f;

@@ -214,6 +214,27 @@ class Several(CliTest):
 
     ALIGNMENT_SECONDS = int(os.environ.get("FINGERTIP_ALIGNMENT_SECONDS", "3"))
 
+    def assert_in_order(self):
+        """Rows are in order of the common clock."""
+        with open(self.csv, encoding="utf-8") as file:
+            times = [float(line.split(",")[1]) for line in file if line[0].isdigit()]
+        self.assertEqual(times, sorted(times))
+
+    def test_rows_stay_in_order_when_the_tool_was_held_up(self):
+        with self.device("serial=AAAA"), self.device("serial=BBBB", port=self.other):
+            process = self.start("record", self.csv, "--all")
+            self.wait_for(lambda: os.path.exists(self.csv) and len(self.rows()[0]) > 20)
+            for _ in range(4):
+                process.send_signal(signal.SIGSTOP)
+                time.sleep(0.6)
+                process.send_signal(signal.SIGCONT)
+                time.sleep(0.1)
+            process.send_signal(signal.SIGINT)
+            _, err = process.communicate(timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, 0, err)
+        self.assertGreater(len(self.rows()[0]), 500)
+        self.assert_in_order()
+
     def test_two_on_one_clock(self):
         zeros = [os.path.join(self.folder, name) for name in ("zero_a", "zero_b")]
         rates = (1 + 25e-6, 1 - 25e-6)
@@ -248,10 +269,7 @@ class Several(CliTest):
         self.assertGreater(span_us, 1e6)
         self.assertGreater(len(errors[0]), 100e-6 * span_us)
         report(alignment_fake_devices_us=round(alignment_us, 1), alignment_fake_devices_seconds=self.ALIGNMENT_SECONDS)
-        # rows are in order of the common clock
-        with open(self.csv, encoding="utf-8") as file:
-            times = [float(line.split(",")[1]) for line in file if line[0].isdigit()]
-        self.assertEqual(times, sorted(times))
+        self.assert_in_order()
         # replay and conversion take one of them
         self.assertIn("holds several fingertips; choose one with --device: AAAA BBBB", self.run_cli("replay", self.csv, status=1)[1])
         self.assertIn("no fingertip CCCC in it", self.run_cli("replay", self.csv, "--device", "CCCC", status=1)[1])
