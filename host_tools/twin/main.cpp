@@ -189,6 +189,7 @@ int scene(Options &options) {
     }
   }
   const Layer layer = layer_of(chosen.layer_mm);
+  chosen = complete(chosen);
   check_output(options.output, options.overwrite);
   check_output(truth_path(options.output), options.overwrite);
   const ContactTable table = table_of(chosen.indenter, layer, options);
@@ -236,7 +237,7 @@ int run(int argc, char **argv) {
   const auto with_cache = [&](CLI::App *command) {
     command
         ->add_option("--cache", options.cache,
-                     "Folder of the contact tables; default: " + default_cache_directory().string())
+                     "Folder of the contact tables; default: ~/.cache/fingertip/contact-tables")
         ->type_name("DIR");
   };
 

@@ -351,6 +351,18 @@ const std::vector<Kind> &all_kinds() {
   return all;
 }
 
+const Kind &kind_of(const SceneOptions &options) {
+  std::string names;
+  for (const Kind &one : all_kinds()) {
+    if (one.kind.name == options.kind) {
+      return one;
+    }
+    names += (names.empty() ? "" : ", ") + one.kind.name;
+  }
+  throw Error("there is no kind of scene \"" + printable(options.kind) + "\"; give one of: " +
+              names);
+}
+
 void check(const char *option, double value, double lowest, double highest) {
   if (!(value >= lowest && value <= highest)) {
     throw Error(std::string(option) + " " + number(value) + " is out of range; give " +
@@ -432,24 +444,12 @@ bool Act::slips(double t_s) const {
   return slips;
 }
 
-Scene make_scene(const SceneOptions &options, const ContactTable &table) {
-  const auto kind = std::find_if(all_kinds().begin(), all_kinds().end(), [&](const Kind &one) {
-    return one.kind.name == options.kind;
-  });
-  if (kind == all_kinds().end()) {
-    std::string names;
-    for (const Kind &one : all_kinds()) {
-      names += (names.empty() ? "" : ", ") + one.kind.name;
-    }
-    throw Error("there is no kind of scene \"" + printable(options.kind) + "\"; give one of: " +
-                names);
-  }
-  Scene scene;
-  scene.options = options;
-  SceneOptions &chosen = scene.options;
-  chosen.seconds = milliseconds(options.seconds.value_or(kind->kind.usual_seconds));
+SceneOptions complete(const SceneOptions &options) {
+  const SceneKind &kind = kind_of(options).kind;
+  SceneOptions chosen = options;
+  chosen.seconds = milliseconds(options.seconds.value_or(kind.usual_seconds));
   chosen.pad_seed = options.pad_seed.value_or(options.seed);
-  chosen.forces = options.forces.empty() ? kind->kind.usual_forces : options.forces;
+  chosen.forces = options.forces.empty() ? kind.usual_forces : options.forces;
   check("--seconds", *chosen.seconds, 1.0, 7200.0);
   check("--margin", chosen.margin_mm, 0.0, 10.0);
   check("--quiet", chosen.quiet_s, 0.1, 60.0);
@@ -467,13 +467,22 @@ Scene make_scene(const SceneOptions &options, const ContactTable &table) {
     throw Error("--second says nothing in a scene of \"" + chosen.kind +
                 "\"; leave it out, or choose two");
   }
+  static_cast<void>(Forces(chosen.forces));
+  return chosen;
+}
+
+Scene make_scene(const SceneOptions &options, const ContactTable &table) {
+  const Kind &kind = kind_of(options);
+  Scene scene;
+  scene.options = complete(options);
+  const SceneOptions &chosen = scene.options;
   const Forces forces(chosen.forces);
   Stage stage(chosen, table, forces);
-  for (std::size_t n = 0; stage.play(kind->act(stage, n)); n++) {
+  for (std::size_t n = 0; stage.play(kind.act(stage, n)); n++) {
   }
   if (stage.acts.empty()) {
     throw Error("--seconds " + number(*chosen.seconds) + " is too short for one contact of \"" +
-                chosen.kind + "\"; leave it out for " + number(kind->kind.usual_seconds));
+                chosen.kind + "\"; leave it out for " + number(kind.kind.usual_seconds));
   }
   scene.acts = std::move(stage.acts);
   scene.name = name_of(chosen);

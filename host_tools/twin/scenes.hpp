@@ -91,13 +91,17 @@ struct Act {
 };
 
 struct Scene {
-  SceneOptions options; // seconds, forces and pad_seed filled in
+  SceneOptions options; // complete
   std::string name;
   std::vector<Act> acts; // in order of time, none overlap
 };
 
+// With seconds, forces and pad_seed filled in. Throws Error for an unknown kind or what is out of
+// range.
+SceneOptions complete(const SceneOptions &options);
+
 // The tables are those of the indenters on the layer: creep and rolling need the contact's size.
-// Throws Error for options that are out of range.
+// Throws Error as complete does, and if the scene is too short for one contact.
 Scene make_scene(const SceneOptions &options, const ContactTable &table);
 
 } // namespace fingertip::twin

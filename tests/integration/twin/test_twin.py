@@ -175,6 +175,16 @@ class Usage(TwinTest):
         self.assertIn("scene.truth.csv: exists already", self.scene_error("taps", "--seconds", "5"))
         self.scene("taps", "--seconds", "5", "--overwrite")
 
+    def test_wrong_words_are_told_before_a_table_is_solved(self):
+        for arguments in (("slide",), ("taps", "--seconds", "0"), ("taps", "--force", "x")):
+            self.error("scene", *arguments, "-o", self.csv, "--cache", str(self.folder / "cache"))
+            self.assertFalse((self.folder / "cache").exists())
+
+    def test_the_help_is_the_same_for_everybody(self):
+        out, _ = self.run_twin("scene", "--help", env={**os.environ, "XDG_CACHE_HOME": "/somewhere/else"})
+        self.assertIn("~/.cache/fingertip/contact-tables", out)
+        self.assertNotIn("/somewhere/else", out)
+
     def test_wrong_words_are_told_in_one_line(self):
         for arguments, what in {
             ("slide",): 'there is no kind of scene "slide"; give one of: grid, taps',
