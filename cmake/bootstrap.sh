@@ -1,5 +1,5 @@
 #!/bin/sh
-# Sets up a Debian 12 or Ubuntu machine and does one of the project's main jobs.
+# Sets up a Debian 12 or Ubuntu 24.04 machine and does one of the project's main jobs.
 # usage: sh cmake/bootstrap.sh demo|test|report
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -75,6 +75,16 @@ if [ -n "$missing" ]; then
   $as_root apt-get -qq update
   $as_root env DEBIAN_FRONTEND=noninteractive apt-get -qq -y install --no-install-recommends $missing
 fi
+
+# NAME VERSION LEAST: ends if VERSION is older
+at_least() {
+  [ "$(printf '%s\n' "$3" "$2" | sort -V | head -n 1)" = "$3" ] || {
+    echo "bootstrap: $1 is ${2:-of unknown version}, but $3 or newer is needed; use Debian 12, Ubuntu 24.04 or newer" >&2
+    exit 1
+  }
+}
+at_least cmake "$(cmake --version | sed -n 's/^cmake version //p')" 3.25
+at_least node "$(node --version | sed 's/^v//')" 18
 
 emulator=host_tools/emulator
 if ! cmp -s $emulator/package-lock.json $emulator/node_modules/.installed-lock; then

@@ -101,6 +101,34 @@ class FetchUnity(Folder):
         self.assertLess(told, done.stderr.find("CMake Error"))
 
 
+class Bootstrap(Folder):
+    """bootstrap.sh alone, up to its call of npm, with a stand-in for each program that it must not call."""
+
+    def up_to_npm(self, cmake="3.25.1", node="18.20.4"):
+        for folder in ("cmake", "host_tools/emulator", "bin"):
+            (self.folder / folder).mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / "cmake/bootstrap.sh", self.folder / "cmake")
+        for name, body in (("apt-get", "exit 0"), ("sudo", "exit 0"), ("npm", "exit 33"),
+                           ("cmake", f"printf 'cmake version {cmake}\\n\\nmade by somebody\\n'"), ("node", f"echo v{node}")):
+            program = self.folder / "bin" / name
+            program.write_text(f"#!/bin/sh\n{body}\n")
+            program.chmod(0o755)
+        return subprocess.run(["sh", self.folder / "cmake/bootstrap.sh", "demo"], capture_output=True, text=True, timeout=60,
+                              env={**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
+
+    def test_what_is_too_old_is_named(self):
+        for tool, version, least in (("cmake", "3.22.1", "3.25"), ("cmake", "2.99", "3.25"), ("node", "12.22.9", "18"), ("node", "", "18")):
+            with self.subTest(tool, version=version):
+                done = self.up_to_npm(**{tool: version})
+                self.assertEqual(done.returncode, 1)
+                self.assertEqual(done.stderr, f"bootstrap: {tool} is {version or 'of unknown version'}, but {least} or newer is "
+                                              "needed; use Debian 12, Ubuntu 24.04 or newer\n")
+
+    def test_what_is_new_enough_goes_on(self):
+        for versions in ({}, {"cmake": "3.100.0-rc1", "node": "22.1.0"}, {"cmake": "4.0", "node": "18.0.0"}):
+            self.assertEqual(self.up_to_npm(**versions).returncode, 33)
+
+
 class Demo(Folder):
     """demo.sh alone, with a stand-in for each program that it calls."""
 
