@@ -42,6 +42,7 @@ constexpr milliseconds PERMITTED_WITHIN{3000};
 constexpr Session::Policy QUICK = {milliseconds(400), 3};
 constexpr const char *INFO_FILE = "INFO_UF2.TXT";
 constexpr const char *BY_LABEL = "/dev/disk/by-label/RPI-RP2";
+constexpr const char *NO_VOLUME = ": no RP2040 boot volume (no INFO_UF2.TXT); ";
 constexpr const char *PRESS =
     "unplug the Pico, hold its BOOTSEL button while plugging it in, and run this again";
 
@@ -219,14 +220,14 @@ std::unique_ptr<Volume> wait_for_volume(const std::string &given) {
       return volume;
     }
     if (waited > VOLUME_TIMEOUT) {
-      throw Error("no drive RPI-RP2 appeared; " + std::string(PRESS));
+      throw Error((given.empty() ? "no drive RPI-RP2 appeared; " : given + NO_VOLUME) + PRESS);
     }
     sleep_or_stop();
   }
 }
 
-/* The fingertip as it came back. */
-wire_info wait_for_return(const Choice &choice) {
+/* The fingertip as it came back; nothing if it did and may not be opened. */
+std::optional<wire_info> wait_for_return(const Choice &choice) {
   std::string last = "nothing answered";
   auto begin = Clock::now();
   auto not_refused = begin;
@@ -240,7 +241,9 @@ wire_info wait_for_return(const Choice &choice) {
     if (last.find(PERMISSION_ADVICE) == std::string::npos) {
       not_refused = Clock::now();
     } else if (Clock::now() - not_refused > PERMITTED_WITHIN) {
-      throw Error("written, but it cannot be asked for its version: " + last);
+      std::fprintf(stderr, "written, and it came back; its version was not read: %s\n",
+                   printable(last).c_str());
+      return std::nullopt;
     }
   }
   throw Error("written, but it did not come back (" + last + "); " + PRESS);
@@ -252,6 +255,12 @@ int run_flash(const FlashOptions &options) {
   FirmwareImage image = read_firmware(options.file);
   Choice choice = options.choice;
   std::unique_ptr<Volume> volume;
+  /* What has other things in it will not become a mount point. */
+  std::error_code unreadable;
+  if (!options.volume.empty() && fs::exists(options.volume, unreadable) &&
+      !fs::is_empty(options.volume, unreadable) && !loader_board(options.volume)) {
+    throw Error(options.volume + NO_VOLUME + "leave out --volume, or give that of the drive RPI-RP2");
+  }
   if (choice.device.empty() && choice.port.empty()) {
     volume = Volume::find(options.volume, true);
   }
@@ -272,7 +281,11 @@ int run_flash(const FlashOptions &options) {
                image.board.c_str());
   volume->write(image);
   volume.reset();
-  wire_info info = wait_for_return(choice);
+  std::optional<wire_info> back = wait_for_return(choice);
+  if (!back) {
+    return 0;
+  }
+  const wire_info &info = *back;
   Metadata pairs = info_metadata(info);
   std::string version;
   for (const auto &[key, value] : pairs) {

@@ -30,7 +30,7 @@ constexpr milliseconds REVIVE_AFTER{3000};
 /* Before the port is opened, so that a wrong path costs nothing. */
 void check_outputs(const LiveOptions &options) {
   for (const std::string &path : {options.recording, options.raw_bytes}) {
-    if (!path.empty()) {
+    if (!path.empty() && path != STANDARD_OUTPUT) {
       check_output(path, options.overwrite);
     }
   }
@@ -56,15 +56,17 @@ public:
     }
     session_.on_packet([this](const wire_packet &packet) {
       model_.take(packet);
-      if (recording_) {
+      if (recording_ && can_write()) {
         recording_->packet(packet);
       }
     });
     model_.set_source(transport_->description());
-    if (!options.recording.empty()) {
+    if (!options.recording.empty() && !to_standard_output_) {
       note_ = "recording to " + printable(options.recording);
     }
-    view_ = options.monitor ? make_monitor_view(options.colour) : make_progress_view();
+    view_ = options.monitor       ? make_monitor_view(options.colour)
+            : to_standard_output_ ? make_state_view()
+                                  : make_progress_view();
   }
 
   int run() {
@@ -82,8 +84,10 @@ public:
     view_.reset();
     std::string summary = summary_text(model_);
     if (recording_) {
-      recording_->finish(session_.statistics(), reason);
-      summary = printable(recording_->path()) + ": " + summary;
+      if (can_write()) {
+        recording_->finish(session_.statistics(), reason);
+      }
+      summary = (to_standard_output_ ? "" : printable(recording_->path()) + ": ") + summary;
     }
     std::fprintf(options_.monitor ? stdout : stderr, "%s\n", summary.c_str());
     if (model_.frames() == 0 && reason == "gone") {
@@ -98,8 +102,11 @@ private:
       return false;
     }
     show();
-    return stop_requested() || quit_;
+    return stop_requested() || quit_ || (to_standard_output_ && !is_standard_output_read());
   }
+
+  /* A reader of standard output that is slow is waited for, unless the end is wanted. */
+  bool can_write() const { return !to_standard_output_ || wait_for_standard_output(); }
 
   void show() {
     model_.set_statistics(session_.statistics());
@@ -142,7 +149,9 @@ private:
     recording_ = std::make_unique<RecordingWriter>(options_.recording, options_.overwrite,
                                                    &info.body.info, info.body.info.sensor_count,
                                                    extra, raw_expected(),
-                                                   OutputFile::Appears::at_once);
+                                                   to_standard_output_
+                                                       ? OutputFile::Appears::on_standard_output
+                                                       : OutputFile::Appears::at_once);
     recording_->packet(info);
   }
 
@@ -152,7 +161,7 @@ private:
   }
 
   void event(const std::string &text) {
-    if (recording_) {
+    if (recording_ && can_write()) {
       recording_->event(text + " " + utc_now());
     }
   }
@@ -230,6 +239,7 @@ private:
   const LiveOptions &options_;
   std::unique_ptr<Transport> transport_;
   Session session_;
+  const bool to_standard_output_ = options_.recording == STANDARD_OUTPUT;
   std::unique_ptr<OutputFile> raw_bytes_;
   std::unique_ptr<RecordingWriter> recording_;
   Model model_;

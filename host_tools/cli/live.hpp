@@ -10,11 +10,13 @@
 
 namespace fingertip {
 
+inline constexpr const char *STANDARD_OUTPUT = "-";
+
 struct LiveOptions {
   Choice choice;
   std::uint8_t streams = 0;
   std::optional<double> seconds; /* of device time, counted from the first frame */
-  std::string recording;         /* empty: none */
+  std::string recording;         /* empty: none; "-": standard output, if it is no monitor */
   std::string raw_bytes;         /* empty: none */
   bool overwrite = false;
   bool until_gone = false; /* end when the port vanishes, instead of waiting for it */

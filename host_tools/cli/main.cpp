@@ -24,6 +24,21 @@ using namespace fingertip;
 
 constexpr std::uint8_t SHOWN_STREAMS = WIRE_STREAM_ALL;
 
+/* Exit status 2. */
+class WrongUsage : public Error {
+public:
+  using Error::Error;
+};
+
+/* What was typed is wrong, whatever the reason. */
+template <typename Parse> auto typed(Parse parse) {
+  try {
+    return parse();
+  } catch (const Error &error) {
+    throw WrongUsage(error.what());
+  }
+}
+
 struct Options {
   Choice choice;
   std::vector<std::string> devices; /* to record together */
@@ -222,7 +237,7 @@ Settings parse_settings(const std::vector<std::string> &texts) {
 }
 
 int set(const Options &options) {
-  Settings settings = parse_settings(options.settings);
+  Settings settings = typed([&] { return parse_settings(options.settings); });
   Device device(options.choice);
   Session &session = device.session;
   if (settings.rate_mHz) {
@@ -289,7 +304,7 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
 }
 
 int encode(const Options &options) {
-  wire_packet packet = packet_from_words(options.encode);
+  wire_packet packet = typed([&] { return packet_from_words(options.encode); });
   packet.sequence = static_cast<std::uint16_t>(options.sequence);
   packet.t_us = options.time_us;
   std::printf("%s\n", hex(frame_bytes(packet)).c_str());
@@ -416,6 +431,13 @@ int run(int argc, char **argv) {
                       "End when the port vanishes, instead of waiting for it");
   };
   auto live = [&](bool monitor) {
+    if (monitor && options.live.recording == STANDARD_OUTPUT) {
+      throw WrongUsage("monitor shows on standard output; give --record a file, or use "
+                       "`fingertip record -`");
+    }
+    if (options.live.raw_bytes == STANDARD_OUTPUT) {
+      throw WrongUsage("--raw-bytes needs a file; give it a name");
+    }
     options.live.choice = options.choice;
     options.live.monitor = monitor;
     options.live.streams = SHOWN_STREAMS;
@@ -423,6 +445,10 @@ int run(int argc, char **argv) {
   };
 
   auto record_them = [&] {
+    if (options.live.recording == STANDARD_OUTPUT && (options.all || options.devices.size() > 1)) {
+      throw WrongUsage("several fingertips need a file; for - run one `fingertip record - --device "
+                       "SERIAL` for each");
+    }
     std::vector<Way> ways;
     if (options.all) {
       ways = all_ways(options.choice.reach);
@@ -456,9 +482,10 @@ int run(int argc, char **argv) {
       add("record", "Record every frame to a CSV file, until Ctrl-C", [&] { return record_them(); }),
       true);
   record->add_flag("--all", options.all, "Every fingertip there is, on one clock");
-  record->add_option("file", options.live.recording, "The recording to write")
+  record->add_option("file", options.live.recording, 
+                     "The recording to write; -: standard output, each row as it comes")
       ->required()
-      ->type_name("FILE.csv");
+      ->type_name("FILE.csv|-");
   with_recording(record);
 
   CLI::App *replay = add("replay", "Show a recording or a capture of bytes",
@@ -524,6 +551,17 @@ int run(int argc, char **argv) {
   encode_command->add_option("--time", options.time_us, "Time of the header; default 0")
       ->type_name("US");
 
+  std::string commands;
+  bool is_known = false;
+  for (const CLI::App *command : app.get_subcommands([](const CLI::App *) { return true; })) {
+    commands += (commands.empty() ? "" : ", ") + command->get_name();
+    is_known = is_known || (argc > 1 && command->get_name() == argv[1]);
+  }
+  if (argc < 2 || (argv[1][0] != '-' && !is_known)) {
+    throw WrongUsage((argc < 2 ? "a command is missing"
+                               : "\"" + std::string(argv[1]) + "\" is no command") +
+                     "; give one of " + commands + "; see fingertip --help");
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError &error) {
@@ -538,6 +576,9 @@ int run(int argc, char **argv) {
 int main(int argc, char **argv) {
   try {
     return run(argc, argv);
+  } catch (const WrongUsage &error) {
+    std::fprintf(stderr, "fingertip: %s\n", printable(error.what()).c_str());
+    return 2;
   } catch (const fingertip::Error &error) {
     std::fprintf(stderr, "fingertip: %s\n", printable(error.what()).c_str());
   } catch (const fingertip::Interrupted &) {

@@ -65,6 +65,21 @@ void catch_signals() {
   handle(SIGPIPE, SIG_IGN);
 }
 
+bool is_standard_output_read() {
+  pollfd asked = {STDOUT_FILENO, 0, 0};
+  return poll(&asked, 1, 0) <= 0;
+}
+
+bool wait_for_standard_output() {
+  pollfd waiting = {STDOUT_FILENO, POLLOUT, 0};
+  while (poll(&waiting, 1, 100) <= 0) {
+    if (stop_requested()) {
+      return false;
+    }
+  }
+  return true;
+}
+
 bool stop_requested() {
   return stop_signal != 0;
 }

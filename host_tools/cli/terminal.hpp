@@ -13,6 +13,12 @@ namespace fingertip {
 void catch_signals();
 bool stop_requested();
 
+/* Whether a pipe's other end is still there. */
+bool is_standard_output_read();
+/* Waits until standard output takes at least 4 KiB more; false if it does not and a stop is
+ * requested. */
+bool wait_for_standard_output();
+
 enum class ColourMode { automatic, truecolour, palette_256, plain };
 
 /* What standard output can show: nothing if it is no terminal, a dumb one, or plain is wanted. */

@@ -138,6 +138,24 @@ private:
   Interval interval_{std::chrono::milliseconds(in_place_ ? 200 : 1000)};
 };
 
+class StateView : public View {
+public:
+  StateView() { interval_.is_due(); }
+  void update(const Model &model, const std::string &) override {
+    if (!interval_.is_due()) {
+      return;
+    }
+    std::string state = state_text(model);
+    if (change_.is_new(state)) {
+      std::fprintf(stderr, "%s\n", state.empty() ? "streaming" : state.c_str());
+    }
+  }
+
+private:
+  Change change_;
+  Interval interval_{std::chrono::milliseconds(1000)};
+};
+
 } // namespace
 
 std::unique_ptr<View> make_monitor_view(ColourMode mode) {
@@ -149,6 +167,10 @@ std::unique_ptr<View> make_monitor_view(ColourMode mode) {
 
 std::unique_ptr<View> make_progress_view() {
   return std::make_unique<ProgressView>();
+}
+
+std::unique_ptr<View> make_state_view() {
+  return std::make_unique<StateView>();
 }
 
 std::string summary_text(const Model &model) {

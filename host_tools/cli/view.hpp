@@ -21,6 +21,8 @@ public:
 std::unique_ptr<View> make_monitor_view(ColourMode mode);
 /* One line on standard error, renewed in place if that is a terminal. */
 std::unique_ptr<View> make_progress_view();
+/* On standard error only what is wrong for a second or more, and that it has ended. */
+std::unique_ptr<View> make_state_view();
 
 /* "5068 frames in 12.3 s (412.1/s), 0 packets dropped, 0 CRC errors, 0 format errors" */
 std::string summary_text(const Model &model);

@@ -129,7 +129,9 @@ Way choose_way(const Choice &choice, const std::string &root) {
     return only_one(in_environment, choice.reach, "");
   }
   return only_one(find_usb(root), choice.reach,
-                  "no fingertip found; plug one in, or name its port with --port PATH");
+                  choice.reach == Reach::usb
+                      ? "no fingertip found by libusb; plug one in"
+                      : "no fingertip found; plug one in, or name its port with --port PATH");
 }
 
 std::vector<Way> all_ways(Reach reach, const std::string &root) {

@@ -58,7 +58,14 @@ bool is_same_file(const std::string &a, const std::string &b) {
 }
 
 OutputFile::OutputFile(const std::string &path, bool replace, Appears appears)
-    : path_(path), replace_(replace) {
+    : path_(path), replace_(replace), to_standard_output_(appears == Appears::on_standard_output) {
+  if (to_standard_output_) {
+    fd_ = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 0);
+    if (fd_ < 0) {
+      fail(path, errno);
+    }
+    return;
+  }
   check_output(path, replace);
   target_ = without_links(path).string();
   struct stat old;
@@ -94,13 +101,16 @@ void OutputFile::append(const void *bytes, std::size_t length) {
     if (count < 0 && errno == EINTR) {
       continue;
     }
+    if (count < 0 && errno == EPIPE && to_standard_output_) {
+      return;
+    }
     if (count <= 0) {
       int error = count == 0 ? ENOSPC : errno;
       std::string what = path_ + ": " + std::strerror(error);
       if (!temporary_.empty()) {
         throw Error(what + "; nothing was changed, make room and try again");
       }
-      if (ftruncate(fd_, length_) != 0) {
+      if (to_standard_output_ || ftruncate(fd_, length_) != 0) {
         throw Error(what + "; its last line is torn, read it with --salvage");
       }
       throw Error(what +

@@ -20,7 +20,8 @@ class OutputFile {
 public:
   enum class Appears {
     at_once,      /* and grows: what was appended outlives a killed program */
-    when_finished /* whole, in one step; until then, and without finish, an older file stays */
+    when_finished, /* whole, in one step; until then, and without finish, an older file stays */
+    on_standard_output /* no file: the path only names it in messages */
   };
 
   /* replace: whether an existing file may go. Devices and pipes are written to at once. */
@@ -29,7 +30,8 @@ public:
   OutputFile(const OutputFile &) = delete;
   OutputFile &operator=(const OutputFile &) = delete;
 
-  /* On an error the file is cut back to what it held before. */
+  /* On an error a file is cut back to what it held before. What nobody reads any more from standard
+   * output is dropped without a word. */
   void append(const void *bytes, std::size_t length);
   void finish();
   const std::string &path() const { return path_; }
@@ -37,6 +39,7 @@ public:
 private:
   std::string path_;
   bool replace_;
+  bool to_standard_output_;
   std::string target_;    /* path_ without symbolic links */
   std::string temporary_; /* beside the target, until finished; empty if written at once */
   int fd_;

@@ -13,15 +13,19 @@ RecordingTransport::RecordingTransport(const std::string &path, bool salvage,
                                        const std::string &device)
     : path_(path) {
   bytes_.open(path, std::ios::binary);
-  char start[12] = {};
-  if (!bytes_ || (!bytes_.read(start, sizeof start) && !bytes_.eof())) {
+  std::string start(4096, ' '); /* several frames, each of which would end with 0x00 */
+  if (!bytes_ || (!bytes_.read(start.data(), 4096) && !bytes_.eof())) {
     throw Error(path + ": " + std::strerror(errno) + "; check the path");
   }
+  start.resize(static_cast<std::size_t>(bytes_.gcount()));
   bytes_.clear();
   bytes_.seekg(0);
-  if (std::string(start, sizeof start) == "# fingertip-") {
+  if (start.rfind("# fingertip-", 0) == 0) {
     bytes_.close();
     reader_ = std::make_unique<RecordingReader>(path, salvage, device);
+  } else if (!start.empty() && start.find('\0') == std::string::npos) {
+    throw Error(path + ": neither a recording nor bytes of a fingertip's line; give a file that "
+                       "`fingertip record` wrote");
   }
 }
 

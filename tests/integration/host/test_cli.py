@@ -101,8 +101,8 @@ class CliTest(unittest.TestCase):
     RULE = "permission denied; install the udev rule: fingertip rule | sudo tee /etc/udev/rules.d/60-fingertip.rules, " \
            "then sudo udevadm control --reload, and plug it in again"
 
-    def without_permission(self, *arguments):
-        """What a user says who may not open the port, on failing."""
+    def without_permission(self, *arguments, status=1):
+        """What the tool says to a user who may not open the port."""
         os.chmod(os.path.realpath(self.port), 0)
         os.chmod(self.folder, 0o777)
         tool, user = FINGERTIP, {}
@@ -110,7 +110,7 @@ class CliTest(unittest.TestCase):
             tool, user = os.path.join(self.folder, "fingertip"), {"user": 65534, "group": 65534, "extra_groups": []}
             shutil.copy(FINGERTIP, tool)  # where everybody may run it
         done = subprocess.run([tool, *arguments], capture_output=True, text=True, env=self.environment, timeout=PATIENCE_s, **user)
-        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        self.assertEqual((done.returncode, done.stdout), (status, ""))
         return done.stderr
 
     def rows(self, path=None):
@@ -134,6 +134,8 @@ class Usage(CliTest):
         self.assertIn("see fingertip --help", self.error(status=2))
         self.assertIn("see fingertip record --help", self.error("record", status=2))
         self.error("monitor", "--bogus", status=2)
+        for words, problem in (([], "a command is missing"), (["moniter"], '"moniter" is no command'), (["moniter", "--port", "x"], "is no command")):
+            self.assertRegex(self.error(*words, status=2), f"{problem}; give one of list, info, monitor, .*; see fingertip --help")
 
     def test_wrong_values_say_what_is_right(self):
         for value in ("nan", "-1", "0", "inf", "1x"):
@@ -169,16 +171,16 @@ class Usage(CliTest):
                                  ("osr=1000", "256, 512, 1024, 2048, 4096 or 8192"),
                                  ("slip_threshold=0", "0.01 to 50 mm"), ("slip_window=1001", "5 to 1000 ms"),
                                  ("colour=red", "rate=HZ|max"), ("rate", "0.1 to 2000 Hz")]:
-            self.assertIn(allowed, self.error("set", "--port", self.port, setting))
+            self.assertIn(allowed, self.error("set", "--port", self.port, setting, status=2))
 
     def test_encode(self):
         # COBS of version, type, sequence, time, body and CRC, worked out by zlib.crc32 and hand
         self.assertEqual(self.run_cli("encode", "tare")[0], "03038101010101010101010105c0fe24ba00\n")
         timed = self.run_cli("encode", "--sequence", "258", "--time", "1", "osr", "8192")[0].strip()
         self.assertTrue(timed.startswith("0603830201"), timed)
-        self.assertIn("slip THRESHOLD_MM WINDOW_MS", self.error("encode", "slip", "0.75"))
-        self.assertIn("0.1 to 2000", self.error("encode", "rate", "3000"))
-        self.assertIn("unknown", self.error("encode", "bogus"))
+        self.assertIn("slip THRESHOLD_MM WINDOW_MS", self.error("encode", "slip", "0.75", status=2))
+        self.assertIn("0.1 to 2000", self.error("encode", "rate", "3000", status=2))
+        self.assertIn("unknown", self.error("encode", "bogus", status=2))
 
 
 class Several(CliTest):
@@ -329,6 +331,7 @@ class ErrorsPeopleMeet(CliTest):
             self.skipTest("a fingertip is plugged in")
         for command in (["list"], ["info"], ["monitor"], ["record", self.csv], ["tare"], ["set", "rate=max"], ["loader"]):
             self.assertRegex(self.error(*command), "^fingertip: no fingertip found; plug one in")
+        self.assertEqual(self.error("monitor", "--transport", "usb"), "fingertip: no fingertip found by libusb; plug one in\n")
         self.assertFalse(os.path.exists(self.csv))
 
     def test_two_and_none_chosen(self):
@@ -444,9 +447,11 @@ class Flash(CliTest):
         self.make_volume()
         os.chmod(self.volume, 0o777)
         with self.device():
-            err = self.without_permission("flash", self.image, "--volume", self.volume)
+            err = self.without_permission("flash", self.image, "--volume", self.volume, status=0)
         self.assertEqual(err, "writing 9.8.7 abcdef012345 for pico_mux\n"
-                              f"fingertip: written, but it cannot be asked for its version: {self.port}: {self.RULE}\n")
+                              f"written, and it came back; its version was not read: {self.port}: {self.RULE}\n")
+        with open(os.path.join(self.volume, "fingertip.uf2"), "rb") as written, open(self.image, "rb") as image:
+            self.assertEqual(written.read(), image.read())
 
     def test_another_version_came_back(self):
         self.assertIn("came back with firmware 1.20.3 0123456789ab+ instead of 9.8.7 abcdef012345; unplug the Pico, hold its BOOTSEL",
@@ -462,6 +467,14 @@ class Flash(CliTest):
         self.assertIn("unplug the Pico, hold its BOOTSEL button while plugging it in", self.error("flash", self.image))
         self.make_volume(board="RP2350")
         self.assertIn("the loader of another chip (RP2350)", self.error("flash", self.image, "--volume", self.volume))
+
+    def test_a_folder_that_is_no_boot_volume_is_refused_before_anything_happens(self):
+        with self.device("loader=1") as device:
+            self.assertEqual(self.error("flash", self.image, "--volume", self.folder),
+                             f"fingertip: {self.folder}: no RP2040 boot volume (no INFO_UF2.TXT); "
+                             "leave out --volume, or give that of the drive RPI-RP2\n")
+            self.assertIsNone(device.poll())
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "fingertip.uf2")))
 
     def test_damaged_and_foreign_images_are_refused(self):
         with open(self.image, "rb") as file:
@@ -714,6 +727,111 @@ class Recording(CliTest):
             self.assertIn("is a folder", self.error("record", self.csv, "--raw-bytes", self.folder + "/", *option))
 
 
+class LiveData(CliTest):
+    """record -: the recording for another program, as it happens."""
+
+    ROOT = pathlib.Path(__file__).resolve().parents[3]
+
+    def read_row(self, process):
+        while (line := process.stdout.readline()) and not line[0].isdigit():
+            pass
+        return line.split(",")
+
+    def test_the_last_row_does_not_wait_for_the_next(self):
+        with self.device("stall=50"):
+            process = self.start("record", "-", "--port", self.port, cwd=self.folder)
+            for frame in range(1, 51):
+                self.assertEqual(int(self.read_row(process)[1]), frame)
+            process.send_signal(signal.SIGINT)
+            rest, err = process.communicate(timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, 0, err)
+        self.assertIn("# end: reason=interrupted frames=50 ", rest)
+        self.assertRegex(err.splitlines()[-1], r"^50 frames in .* 0 packets dropped")
+        self.assertEqual(os.listdir(self.folder), [])
+
+    def test_what_comes_out_is_a_recording(self):
+        with self.device("frames=60"):
+            out, err = self.run_cli("record", "-", "--port", self.port, "--until-gone", "--raw-bytes", self.ftr)
+        pathlib.Path(self.csv).write_text(out, encoding="utf-8")
+        self.assertEqual(len(files.read_recording(self.csv)["frame"]), 60)
+        self.assertRegex(err, r"^60 frames in .*\n$")
+        self.assertIn(" 60 frames in", self.run_cli("replay", self.csv, "--speed", "max")[0])
+        self.assertIn(" 60 frames in", self.run_cli("replay", self.ftr, "--speed", "max")[0])
+
+    def test_a_reader_that_leaves_ends_it(self):
+        with self.device():
+            process = self.start("record", "-", "--port", self.port)
+            self.read_row(process)
+            process.stdout.close()
+            self.assertEqual(process.wait(PATIENCE_s), 0)
+            self.assertRegex(process.stderr.read(), r"^\d+ frames in")
+            process.stderr.close()
+            self.assertIn("E660583883265A2C", self.run_cli("info", "--port", self.port)[0])
+
+    def test_a_reader_that_does_not_read_keeps_nobody_from_ending_it(self):
+        with self.device("rate=2000") as device:
+            process = self.start("record", "-", "--port", self.port)
+            self.read_row(process)
+            time.sleep(1.5)  # a pipe holds 64 KiB, a hundred rows
+            process.send_signal(signal.SIGTERM)
+            try:
+                self.assertEqual(process.wait(PATIENCE_s), 0)
+            finally:
+                process.kill()
+                process.communicate()
+                device.kill()  # it waits for its own reader
+
+    def test_trouble_is_told_on_standard_error(self):
+        with self.device("vanish=50,2500"), open(self.csv, "wb") as out:
+            process = subprocess.Popen([FINGERTIP, "record", "-", "--port", self.port], env=self.environment, text=True,
+                                       stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.PIPE)
+            self.assertEqual(process.stderr.readline(), "gone, plug it in again\n")
+            while (line := process.stderr.readline()) != "streaming\n":
+                self.assertIn(line, ["waiting for an answer\n", "STALLED\n"])
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=PATIENCE_s)
+        self.assertRegex(pathlib.Path(self.csv).read_text(encoding="utf-8"), "(?m)^# event: gone .*\n(#.*\n)*# event: back ")
+
+    def test_what_cannot_go_there(self):
+        self.assertIn("for - run one `fingertip record - --device SERIAL` for each", self.error("record", "-", "--all", status=2))
+        self.assertIn("for each", self.error("record", "-", "--device", "A", "--device", "B", status=2))
+        self.assertIn("--raw-bytes needs a file", self.error("record", self.csv, "--raw-bytes", "-", status=2))
+        self.assertIn("use `fingertip record -`", self.error("monitor", "--record", "-", status=2))
+        with self.device(), open("/dev/full", "w", encoding="ascii") as full:
+            process = subprocess.run([FINGERTIP, "record", "-", "--port", self.port], env=self.environment, text=True,
+                                     stdin=subprocess.DEVNULL, stdout=full, stderr=subprocess.PIPE, timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, 1)
+        self.assertIn("fingertip: -: No space left on device", process.stderr)
+
+    def test_a_file_it_is_appended_to_keeps_what_it_had(self):
+        def limit():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+
+        pathlib.Path(self.csv).write_text("precious\n", encoding="utf-8")
+        with self.device(), open(self.csv, "a", encoding="utf-8") as file:
+            process = subprocess.run([FINGERTIP, "record", "-", "--port", self.port], env=self.environment, stdin=subprocess.DEVNULL,
+                                     stdout=file, stderr=subprocess.PIPE, preexec_fn=limit, timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, 1)
+        self.assertIn("precious\n# fingertip-recording 1\n", pathlib.Path(self.csv).read_text(encoding="utf-8"))
+
+    def test_the_example_of_the_manual(self):
+        readme = (self.ROOT / "README.md").read_text(encoding="utf-8")
+        example = re.search(r"(?m)^    import csv.*\n(?:    .*\n)+", readme).group()
+        environment = {**self.environment, "PATH": os.path.dirname(FINGERTIP) + ":" + self.environment["PATH"], "FINGERTIP_PORT": self.port}
+        with self.device("frames=60"):
+            process = subprocess.Popen([sys.executable, "-u", "-c", "\n".join(line[4:] for line in example.splitlines())],
+                                       env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+            try:
+                shown = [process.stdout.readline() for _ in range(60)]
+            finally:
+                process.terminate()
+                process.communicate(timeout=PATIENCE_s)
+        self.assertEqual(shown[0], "7.999014 0.25118968 5\n")
+        for line in shown:
+            self.assertRegex(line, r"^-?\d+\.\d+ -?\d+\.\d+ 5\n$")
+
+
 class Replay(CliTest):
     def record(self):
         with self.device("frames=100"):
@@ -802,6 +920,11 @@ class Replay(CliTest):
         self.assertIn("no frames in it", self.run_cli("replay", noise, "--speed", "max", status=1)[1])
         self.assertIn("no frames in it", self.error("replay", noise, "--to-csv", self.csv))
         self.assertFalse(os.path.exists(self.csv))
+        text = os.path.join(self.folder, "text.csv")
+        for content in ("x\n", "a,b,c\n1,2,3\n" * 1000):
+            pathlib.Path(text).write_text(content, encoding="utf-8")
+            for option in ([], ["--to-csv", self.csv]):
+                self.assertIn("neither a recording nor bytes of a fingertip's line", self.error("replay", text, *option))
         self.assertIn("No such file", self.run_cli("replay", self.folder + "/absent.csv", status=1)[1])
 
 
