@@ -45,7 +45,8 @@ struct array_bus {
    * controller re-initialised. Always accepted. */
   enum ft_status (*start_recovery)(void *context, uint64_t now_us);
 
-  /* Advances the operation. FT_PENDING: call again at *wake_us at the latest, or as soon as the
+  /* Advances the operation. Every poll of one operation takes the same *result, which is written to
+   * while FT_PENDING too. FT_PENDING: call again at *wake_us at the latest, or as soon as the
    * board signals an event. FT_OK: finished, *result is filled (a sensor that did not acknowledge
    * is no error of the bus). FT_ERR_TIMEOUT: the hardware did not finish in time; recover.
    * FT_ERR_STUCK: recovery did not free the bus; recover again later; a recovery fails in no other

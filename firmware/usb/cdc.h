@@ -28,14 +28,15 @@ struct cdc_identity {
 /* Prepares the device and attaches it to the bus. */
 void cdc_start(const struct cdc_identity *identity);
 
-/* The device is configured and the host has raised DTR. */
+/* The device is configured and not suspended, and the host has raised DTR. */
 bool cdc_is_open(void);
 
 /* Changes when there is something to read, the port was closed, or the loader was asked for: a main
  * loop that has seen to all that need not look before. */
 uint32_t cdc_news(void);
 
-/* Counts the times the port was closed (DTR dropped, bus reset, unplugged): streams end then. */
+/* Counts the times the port was closed (DTR dropped, suspended, bus reset, unplugged): streams end
+ * then, and a host that comes back must ask for them again. */
 uint32_t cdc_close_count(void);
 
 /* Queues all of the bytes or none; those of whole words cost less. FT_ERR_SPACE: the queue is too
