@@ -244,7 +244,7 @@ static NOINLINE void project(const struct moments *m, const int32_t *values, int
 }
 
 FIXED_INLINE void evaluate(struct readings *readings, bool coarse, struct moments *m,
-                              struct fit_system *system) {
+                           struct fit_system *system) {
   const struct state *at = &system->at;
   set_gaussian(&m->x, COLUMNS, COLUMNS / 2, at->x, at->height);
   set_gaussian(&m->y, ROWS, ROWS / 2, at->y, at->height);

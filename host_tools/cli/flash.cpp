@@ -79,8 +79,8 @@ std::vector<std::string> mounted_volumes() {
     for (std::size_t i = 0; words.size() > 4 && i < words[4].size(); i++) {
       /* blanks and the like are octal */
       if (words[4][i] == '\\' && i + 3 < words[4].size()) {
-        folder += static_cast<char>(std::strtol(std::string(words[4].substr(i + 1, 3)).c_str(),
-                                                nullptr, 8));
+        folder += static_cast<char>(
+            std::strtol(std::string(words[4].substr(i + 1, 3)).c_str(), nullptr, 8));
         i += 3;
       } else {
         folder += words[4][i];
@@ -101,7 +101,8 @@ public:
     if (!given.empty()) {
       auto board = loader_board(given);
       if (board && *board != "RPI-RP2") {
-        throw Error(given + ": the loader of another chip (" + *board + "); give that of an RP2040");
+        throw Error(given + ": the loader of another chip (" + *board +
+                    "); give that of an RP2040");
       }
       return board ? std::unique_ptr<Volume>(new Volume(given, false)) : nullptr;
     }
@@ -259,7 +260,8 @@ int run_flash(const FlashOptions &options) {
   std::error_code unreadable;
   if (!options.volume.empty() && fs::exists(options.volume, unreadable) &&
       !fs::is_empty(options.volume, unreadable) && !loader_board(options.volume)) {
-    throw Error(options.volume + NO_VOLUME + "leave out --volume, or give that of the drive RPI-RP2");
+    throw Error(options.volume + NO_VOLUME +
+                "leave out --volume, or give that of the drive RPI-RP2");
   }
   if (choice.device.empty() && choice.port.empty()) {
     volume = Volume::find(options.volume, true);
@@ -291,7 +293,8 @@ int run_flash(const FlashOptions &options) {
   for (const auto &[key, value] : pairs) {
     version += key == "firmware" ? value : "";
   }
-  if (version != image.version || field(info.git_hash) != image.git_hash.substr(0, WIRE_TEXT_BYTES) ||
+  if (version != image.version ||
+      field(info.git_hash) != image.git_hash.substr(0, WIRE_TEXT_BYTES) ||
       field(info.board) != image.board) {
     throw Error("written, but fingertip " + field(info.serial) + " came back with firmware " +
                 version + " " + field(info.git_hash) + " instead of " + image.version + " " +

@@ -260,8 +260,8 @@ public:
   Joint(const LiveOptions &options, const std::vector<Way> &ways) : options_(options) {
     try {
       for (std::size_t i = 0; i < ways.size(); i++) {
-        fingertips_.push_back(std::make_unique<Fingertip>(i, ways[i], options.streams, queue_,
-                                                          started_, stop_));
+        fingertips_.push_back(
+            std::make_unique<Fingertip>(i, ways[i], options.streams, queue_, started_, stop_));
       }
     } catch (...) {
       stop_ = true;
@@ -399,7 +399,9 @@ private:
       const Fingertip &each = *fingertips_[i];
       text += "  " + std::string(each.info().serial, strnlen(each.info().serial, WIRE_TEXT_BYTES)) +
               " " + std::to_string(recording_->frames(i)) + " frames" +
-              (each.is_gone() ? std::string(" ") + GONE_ADVICE : each.is_stalled() ? " STALLED" : "");
+              (each.is_gone()      ? std::string(" ") + GONE_ADVICE
+               : each.is_stalled() ? " STALLED"
+                                   : "");
     }
     text += "  aligned to " + fixed(recording_->alignment_us(), 0) + " us";
     std::fprintf(stderr, isatty(STDERR_FILENO) ? "\r\x1b[K%s" : "%s\n", printable(text).c_str());

@@ -146,12 +146,11 @@ private:
       extra.emplace_back("started_device_us", std::to_string(device_us));
       extra.emplace_back("started_uncertainty_us", std::to_string(clock->uncertainty_us));
     }
-    recording_ = std::make_unique<RecordingWriter>(options_.recording, options_.overwrite,
-                                                   &info.body.info, info.body.info.sensor_count,
-                                                   extra, raw_expected(),
-                                                   to_standard_output_
-                                                       ? OutputFile::Appears::on_standard_output
-                                                       : OutputFile::Appears::at_once);
+    recording_ = std::make_unique<RecordingWriter>(
+        options_.recording, options_.overwrite, &info.body.info, info.body.info.sensor_count, extra,
+        raw_expected(),
+        to_standard_output_ ? OutputFile::Appears::on_standard_output
+                            : OutputFile::Appears::at_once);
     recording_->packet(info);
   }
 

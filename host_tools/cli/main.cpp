@@ -162,7 +162,7 @@ int info(const Options &options) {
       continue; // said above
     }
     std::string bad = sensors_text(health.sensors_prom_bad);
-    counters.emplace_back(key, key == "sensors_present" ? present_text(value, info.sensor_count)
+    counters.emplace_back(key, key == "sensors_present"    ? present_text(value, info.sensor_count)
                                : key == "sensors_prom_bad" ? (bad.empty() ? "none" : bad)
                                                            : std::to_string(value));
   }
@@ -478,12 +478,13 @@ int run(int argc, char **argv) {
       ->type_name("FILE.csv");
   with_colour(monitor, options.live.colour);
 
-  CLI::App *record = with_port(
-      add("record", "Record every frame to a CSV file, until Ctrl-C", [&] { return record_them(); }),
-      true);
+  CLI::App *record = with_port(add("record", "Record every frame to a CSV file, until Ctrl-C",
+                                   [&] { return record_them(); }),
+                               true);
   record->add_flag("--all", options.all, "Every fingertip there is, on one clock");
-  record->add_option("file", options.live.recording, 
-                     "The recording to write; -: standard output, each row as it comes")
+  record
+      ->add_option("file", options.live.recording,
+                   "The recording to write; -: standard output, each row as it comes")
       ->required()
       ->type_name("FILE.csv|-");
   with_recording(record);
@@ -495,8 +496,7 @@ int run(int argc, char **argv) {
       ->type_name("FILE");
   replay
       ->add_option_function<std::string>(
-          "--speed",
-          [&](const std::string &text) { options.replay.speed = speed_from_text(text); },
+          "--speed", [&](const std::string &text) { options.replay.speed = speed_from_text(text); },
           "Times the recorded speed, or max; default 1")
       ->type_name("X|max");
   replay
@@ -558,9 +558,9 @@ int run(int argc, char **argv) {
     is_known = is_known || (argc > 1 && command->get_name() == argv[1]);
   }
   if (argc < 2 || (argv[1][0] != '-' && !is_known)) {
-    throw WrongUsage((argc < 2 ? "a command is missing"
-                               : "\"" + std::string(argv[1]) + "\" is no command") +
-                     "; give one of " + commands + "; see fingertip --help");
+    throw WrongUsage(
+        (argc < 2 ? "a command is missing" : "\"" + std::string(argv[1]) + "\" is no command") +
+        "; give one of " + commands + "; see fingertip --help");
   }
   try {
     app.parse(argc, argv);

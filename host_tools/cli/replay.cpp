@@ -87,9 +87,8 @@ int convert(const ReplayOptions &options) {
       sensor_count.value_or(info ? info->sensor_count : std::uint8_t{0}),
       {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"source", options.file}}, has_raw,
       OutputFile::Appears::when_finished);
-  Playback playback =
-      play(options,
-           [&](const wire_packet &packet, const LineStatistics &) { writer.packet(packet); });
+  Playback playback = play(
+      options, [&](const wire_packet &packet, const LineStatistics &) { writer.packet(packet); });
   writer.finish(playback.statistics, "converted");
   report_losses(options.file, playback);
   std::printf("%s: %llu frames, %s\n", printable(options.to_csv).c_str(),
@@ -138,20 +137,18 @@ int show(const ReplayOptions &options) {
     }
   };
   try {
-    playback =
-        play(options,
-             [&](const wire_packet &packet, const LineStatistics &statistics) {
-               if (is_frame(packet) && options.speed > 0) {
-                 auto due = pace.due(packet.t_us);
-                 while (Clock::now() < due) {
-                   update();
-                   std::this_thread::sleep_until(std::min(due, Clock::now() + milliseconds(20)));
-                 }
-               }
-               model.set_statistics(statistics);
-               model.take(packet);
-               update();
-             });
+    playback = play(options, [&](const wire_packet &packet, const LineStatistics &statistics) {
+      if (is_frame(packet) && options.speed > 0) {
+        auto due = pace.due(packet.t_us);
+        while (Clock::now() < due) {
+          update();
+          std::this_thread::sleep_until(std::min(due, Clock::now() + milliseconds(20)));
+        }
+      }
+      model.set_statistics(statistics);
+      model.take(packet);
+      update();
+    });
     model.set_statistics(playback.statistics);
   } catch (const Ended &) {
   }

@@ -116,8 +116,8 @@ Characters screen_characters() {
   }
   std::transform(charset.begin(), charset.end(), charset.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  bool utf_8 = charset.find("utf-8") != std::string::npos ||
-               charset.find("utf8") != std::string::npos;
+  bool utf_8 =
+      charset.find("utf-8") != std::string::npos || charset.find("utf8") != std::string::npos;
   return utf_8 ? Characters::utf_8 : Characters::ascii;
 }
 

@@ -54,12 +54,12 @@ std::optional<ClockEstimate> ClockFit::fit() const {
   const ClockExchange &last = exchanges_.back();
   /* Limits at the time of the last exchange of a line of this slope, relative to its sending. */
   auto limit = [&](double slope, bool upper) {
-    double tightest = upper ? std::numeric_limits<double>::infinity()
-                            : -std::numeric_limits<double>::infinity();
+    double tightest =
+        upper ? std::numeric_limits<double>::infinity() : -std::numeric_limits<double>::infinity();
     for (const ClockExchange &exchange : exchanges_) {
       auto ago_us = static_cast<double>(last.device_us - exchange.device_us);
-      auto host_us = static_cast<double>((upper ? exchange.received_us : exchange.sent_us) -
-                                         last.sent_us);
+      auto host_us =
+          static_cast<double>((upper ? exchange.received_us : exchange.sent_us) - last.sent_us);
       double here = host_us + ago_us * (1 + slope);
       tightest = upper ? std::min(tightest, here) : std::max(tightest, here);
     }
@@ -77,8 +77,7 @@ std::optional<ClockEstimate> ClockFit::fit() const {
     return gap(candidate) - DRIFT_COST_us * std::abs(candidate);
   });
   double middle = (limit(slope, true) + limit(slope, false)) / 2;
-  double latest =
-      limit(highest(slowest, fastest, [&](double s) { return limit(s, true); }), true);
+  double latest = limit(highest(slowest, fastest, [&](double s) { return limit(s, true); }), true);
   double earliest =
       limit(highest(slowest, fastest, [&](double s) { return -limit(s, false); }), false);
   ClockEstimate estimate;

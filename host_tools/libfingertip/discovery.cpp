@@ -78,11 +78,11 @@ std::vector<Found> find_in_environment() {
   for (std::string_view path : split(paths ? paths : "", ':')) {
     if (!path.empty()) {
       std::error_code none;
-      found.push_back({"",
-                       fs::exists(path, none) ? "from FINGERTIP_PORT"
-                                              : "from FINGERTIP_PORT, no such port",
-                       std::string(path),
-                       {}});
+      found.push_back(
+          {"",
+           fs::exists(path, none) ? "from FINGERTIP_PORT" : "from FINGERTIP_PORT, no such port",
+           std::string(path),
+           {}});
     }
   }
   return found;

@@ -15,7 +15,8 @@ public:
 /* For the end of a sentence about a device that may not be opened. */
 inline constexpr const char *PERMISSION_ADVICE =
     "permission denied; install the udev rule: fingertip rule | sudo tee "
-    "/etc/udev/rules.d/60-fingertip.rules, then sudo udevadm control --reload, and plug it in again";
+    "/etc/udev/rules.d/60-fingertip.rules, then sudo udevadm control --reload, and plug it in "
+    "again";
 
 /* While something streams: it is waited for. */
 inline constexpr const char *GONE_ADVICE = "gone, plug it in again";

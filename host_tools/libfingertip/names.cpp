@@ -72,7 +72,8 @@ std::string result_text(std::uint8_t result) {
   case WIRE_RESULT_DONE:
     return "done";
   case WIRE_RESULT_UNKNOWN_COMMAND:
-    return "its firmware does not know this command; see what it can do (fingertip info) or update it";
+    return "its firmware does not know this command; see what it can do (fingertip info) or update "
+           "it";
   case WIRE_RESULT_OUT_OF_RANGE:
     return "the value is out of range for this firmware";
   case WIRE_RESULT_NOT_NOW:

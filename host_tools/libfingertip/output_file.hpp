@@ -19,8 +19,8 @@ bool is_same_file(const std::string &a, const std::string &b);
 class OutputFile {
 public:
   enum class Appears {
-    at_once,      /* and grows: what was appended outlives a killed program */
-    when_finished, /* whole, in one step; until then, and without finish, an older file stays */
+    at_once,           /* and grows: what was appended outlives a killed program */
+    when_finished,     /* whole, in one step; until then, and without finish, an older file stays */
     on_standard_output /* no file: the path only names it in messages */
   };
 

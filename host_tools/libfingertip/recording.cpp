@@ -446,8 +446,9 @@ JointRecordingWriter::JointRecordingWriter(const std::string &path, bool replace
         },
         [this, number, i](std::uint64_t t_us, const std::string &cells) {
           const Device &device = devices_[i];
-          double host_us = device.packet_host_us +
-                           static_cast<double>(static_cast<std::int64_t>(t_us - device.packet_t_us));
+          double host_us =
+              device.packet_host_us +
+              static_cast<double>(static_cast<std::int64_t>(t_us - device.packet_t_us));
           waiting_.emplace(host_us, number + "," + time_text(host_us) + "," + cells);
           last_us_ = std::max(last_us_, host_us);
         }));
@@ -620,10 +621,12 @@ void RecordingReader::read_line(const std::string &text) {
       }
       text_of_one = text.substr(std::string(JOINT_COLUMNS).size());
     }
-    auto columns = static_cast<std::size_t>(std::count(text_of_one.begin(), text_of_one.end(), ',')) + 1;
+    auto columns =
+        static_cast<std::size_t>(std::count(text_of_one.begin(), text_of_one.end(), ',')) + 1;
     std::size_t fixed_columns = 2 + contact_columns() + RAW_COLUMNS;
     std::size_t sensors = columns > fixed_columns ? (columns - fixed_columns) / 2 : 0;
-    if (sensors > FT_MAX_SENSORS || text_of_one != header_text(static_cast<std::uint8_t>(sensors))) {
+    if (sensors > FT_MAX_SENSORS ||
+        text_of_one != header_text(static_cast<std::uint8_t>(sensors))) {
       throw Damage{"unknown header"};
     }
     sensor_count_ = static_cast<std::uint8_t>(sensors);
@@ -739,9 +742,10 @@ void RecordingReader::choose_device(const std::string &serials) {
       return;
     }
   }
-  throw Error(path_ + (wanted_.empty() ? ": holds several fingertips"
-                                       : ": no fingertip " + wanted_ + " in it") +
-              "; choose one with --device: " + std::string(trim(serials)));
+  throw Error(
+      path_ +
+      (wanted_.empty() ? ": holds several fingertips" : ": no fingertip " + wanted_ + " in it") +
+      "; choose one with --device: " + std::string(trim(serials)));
 }
 
 void RecordingReader::read_row(std::string_view text) {

@@ -95,7 +95,7 @@ private:
   CommentHandler comment_;
   RowHandler row_;
   std::optional<wire_packet> pending_contact_;
-  Metadata info_; /* as last written */
+  Metadata info_;                       /* as last written */
   std::uint64_t before_restart_us_ = 0; /* device time of earlier runs of the device */
   std::optional<std::uint64_t> first_us_;
   std::uint64_t last_us_ = 0;
@@ -204,9 +204,9 @@ private:
   bool header_seen_ = false;
   bool has_end_ = false;
   std::uint8_t sensor_count_ = 0;
-  bool joint_ = false;  /* of several fingertips */
-  std::string wanted_;  /* serial number */
-  std::string number_;  /* of the wanted one in a joint recording */
+  bool joint_ = false; /* of several fingertips */
+  std::string wanted_; /* serial number */
+  std::string number_; /* of the wanted one in a joint recording */
   wire_info info_;
   std::deque<Item> items_;
 };

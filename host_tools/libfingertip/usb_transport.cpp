@@ -183,7 +183,8 @@ private:
       unsigned char text[128] = {};
       int length = libusb_get_string_descriptor_ascii(handle, descriptor.iSerialNumber, text,
                                                       sizeof text - 1);
-      std::string here(reinterpret_cast<char *>(text), length > 0 ? static_cast<size_t>(length) : 0);
+      std::string here(reinterpret_cast<char *>(text),
+                       length > 0 ? static_cast<size_t>(length) : 0);
       if (!serial.empty() && !is_same_serial(here, serial)) {
         libusb_close(handle);
         continue;
@@ -204,7 +205,8 @@ private:
   /* False: it vanished meanwhile. */
   bool claim() {
     if (!layout_.is_complete()) {
-      throw Error(description_ + ": its interfaces are not those of a fingertip; flash its firmware");
+      throw Error(description_ +
+                  ": its interfaces are not those of a fingertip; flash its firmware");
     }
     for (int interface : {layout_.control_interface, layout_.data_interface}) {
       int result = 0;
@@ -372,15 +374,16 @@ UsbTransport::UsbTransport(const std::string &serial) : serial_(serial) {
   bool denied = false;
   link_ = Link::open(serial, &denied);
   if (!link_) {
-    throw Error(failure(serial, denied ? PERMISSION_ADVICE
-                                       : "no such fingertip; plug it in, then see `fingertip list`"));
+    throw Error(failure(serial, denied
+                                    ? PERMISSION_ADVICE
+                                    : "no such fingertip; plug it in, then see `fingertip list`"));
   }
 }
 
 UsbTransport::~UsbTransport() = default;
 
-Transport::Result UsbTransport::read(std::uint8_t *bytes, std::size_t capacity,
-                                     std::size_t *length, milliseconds timeout) {
+Transport::Result UsbTransport::read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
+                                     milliseconds timeout) {
   *length = 0;
   auto deadline = Clock::now() + timeout;
   while (link_) {

@@ -73,9 +73,9 @@ Record solve(const Array &array, const Case &c) {
   }
   const Fit best = fit(array, pressure_Pa, c.usable, c.press.noise_Pa,
                        {{peak_Pa, c.press.x_mm, c.press.y_mm, sigma_mm}});
-  return {key_of(c),       best.theta.p0_Pa,    best.theta.x_mm,       best.theta.y_mm,
-          best.theta.sigma_mm, best.cost,       best.force_N,          best.location_sd_mm,
-          best.condition_number, best.at_bound};
+  return {
+      key_of(c), best.theta.p0_Pa, best.theta.x_mm,     best.theta.y_mm,       best.theta.sigma_mm,
+      best.cost, best.force_N,     best.location_sd_mm, best.condition_number, best.at_bound};
 }
 
 std::vector<Record> read_records(const std::string &path) {
@@ -186,8 +186,12 @@ std::vector<Case> load_cases(PressSet set, Mask mask, std::uint64_t seed, std::s
   for (std::size_t i = 0; i < count; i++) {
     Case &c = cases[i];
     const Record &r = records[i];
-    c.best = {{r.p0_Pa, r.x_mm, r.y_mm, r.sigma_mm}, r.cost,       r.force_N,
-              r.location_sd_mm,                      r.condition_number, r.at_bound != 0};
+    c.best = {{r.p0_Pa, r.x_mm, r.y_mm, r.sigma_mm},
+              r.cost,
+              r.force_N,
+              r.location_sd_mm,
+              r.condition_number,
+              r.at_bound != 0};
     c.observable = observable(c.best) && !c.best.at_bound &&
                    largest_usable(c) >= GATE_SIGMAS * 1024.0 * c.press.noise_Pa;
   }

@@ -194,9 +194,8 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
                  prior_weight * (settings.prior_sigma_mm / pitch_mm - theta.sigma));
     }
     const Vector4 b = Factors(normal.matrix).solve(normal.rhs);
-    const double excess =
-        gain * std::max({std::abs(b[1]) / MOVE_LIMIT, std::abs(b[2]) / MOVE_LIMIT,
-                         std::abs(b[3]) / WIDEN_LIMIT});
+    const double excess = gain * std::max({std::abs(b[1]) / MOVE_LIMIT, std::abs(b[2]) / MOVE_LIMIT,
+                                           std::abs(b[3]) / WIDEN_LIMIT});
     const double share = excess > 1.0 ? 1.0 / excess : 1.0;
     theta.p0 = limited(theta.p0 + share * b[0], P0_MIN, P0_MAX);
     theta.x = limited(theta.x + share * gain * b[1], x_min - OVERSHOOT, x_max + OVERSHOOT);

@@ -271,7 +271,8 @@ int main(int argc, char **argv) {
       }
     }
     reference::parse_options(static_cast<int>(named.size()), named.data(),
-                             {{"--recordings", &options.recordings}, {"--out", &options.out}}, HELP);
+                             {{"--recordings", &options.recordings}, {"--out", &options.out}},
+                             HELP);
     return run(options);
   } catch (const std::exception &error) {
     std::fprintf(stderr, "fit_recordings: %s\n", error.what());

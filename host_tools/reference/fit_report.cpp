@@ -62,7 +62,7 @@ struct Variant {
   Mask mask = Mask::none;
   double prior_sigma_mm = 0.0, prior_width_mm = 0.0;
   Guess guess = Guess::log_linear;
-  unsigned needs = 0; // of enum Capability
+  unsigned needs = 0;  // of enum Capability
   bool on_chip = true; // worth counting its cycles
 };
 
@@ -201,8 +201,7 @@ public:
     }
   }
 
-  Row row(const char *kernel, const std::string &variant, const std::string &set,
-          bool observable) {
+  Row row(const char *kernel, const std::string &variant, const std::string &set, bool observable) {
     Row row = counts_;
     row.kernel = kernel;
     row.variant = variant;
@@ -234,10 +233,9 @@ std::vector<Outcome> run(const reference::Kernel &kernel, const fit_array &array
   reference::in_parallel(cases.size(), [&](std::size_t i) {
     const Case &c = cases[i];
     const auto readings = reference::quantise(c.press.pressure_Pa, variant.lsb_Pa);
-    const auto result =
-        kernel.fit(array, readings.data(), c.usable,
-                   {variant.iterations, c.press.noise_Pa, variant.n_largest,
-                    variant.prior_sigma_mm, variant.prior_width_mm, variant.guess});
+    const auto result = kernel.fit(array, readings.data(), c.usable,
+                                   {variant.iterations, c.press.noise_Pa, variant.n_largest,
+                                    variant.prior_sigma_mm, variant.prior_width_mm, variant.guess});
     const double um =
         1e3 * std::hypot(result.x_mm - c.best.theta.x_mm, result.y_mm - c.best.theta.y_mm);
     const bool fitted = (result.flags & CONTACT_FLAG_FIT_VALID) && std::isfinite(um);
@@ -278,8 +276,8 @@ void write_json(const std::string &path, const std::vector<Row> &rows, const Opt
          << "\", \"set\": \"" << r.set
          << "\", \"observable\": " << (r.observable ? "true" : "false")
          << ", \"presses\": " << r.presses << ", \"without_fit\": " << r.without_fit
-         << ", \"outlier\": " << r.outlier
-         << ", \"above_10um\": " << r.above_10um << ", \"above_100um\": " << r.above_100um;
+         << ", \"outlier\": " << r.outlier << ", \"above_10um\": " << r.above_10um
+         << ", \"above_100um\": " << r.above_100um;
     number("p50_um", r.p50_um);
     number("p99_um", r.p99_um);
     number("p999_um", r.p999_um);
@@ -325,14 +323,13 @@ void write_jobs(const Options &options) {
     for (PressSet set : reference::ALL_PRESS_SETS) {
       const std::size_t count =
           std::max<std::size_t>(1, presses_of(set, Mask::none, options.limit) / SHARE);
-      for (const Case &c :
-           reference::load_cases(set, mask, options.seed, count, options.cache)) {
+      for (const Case &c : reference::load_cases(set, mask, options.seed, count, options.cache)) {
         file << separator << "{\"set\": \"" << reference::name_of(set)
              << "\", \"observable\": " << (c.observable ? "true" : "false")
-             << ", \"usable\": " << c.usable << ", \"noise_Pa_q10\": "
-             << static_cast<std::int32_t>(c.press.noise_Pa * 1024.0)
-             << ", \"best_x_mm\": " << c.best.theta.x_mm
-             << ", \"best_y_mm\": " << c.best.theta.y_mm << ", \"readings\": [";
+             << ", \"usable\": " << c.usable
+             << ", \"noise_Pa_q10\": " << static_cast<std::int32_t>(c.press.noise_Pa * 1024.0)
+             << ", \"best_x_mm\": " << c.best.theta.x_mm << ", \"best_y_mm\": " << c.best.theta.y_mm
+             << ", \"readings\": [";
         for (std::size_t k = 0; k < c.pressure_Pa_q10.size(); k++) {
           file << (k ? ", " : "") << c.pressure_Pa_q10[k];
         }
@@ -361,8 +358,8 @@ int report(const Options &options) {
   const auto cases_of = [&](PressSet set, Mask mask) -> const std::vector<Case> & {
     auto &cases = loaded[{set, mask}];
     if (cases.empty()) {
-      cases = reference::load_cases(set, mask, options.seed,
-                                    presses_of(set, mask, options.limit), options.cache);
+      cases = reference::load_cases(set, mask, options.seed, presses_of(set, mask, options.limit),
+                                    options.cache);
     }
     return cases;
   };

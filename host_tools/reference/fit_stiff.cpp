@@ -490,9 +490,9 @@ reference::Array doubled(const reference::Array &array) {
 }
 
 double quantile(const std::vector<double> &sorted, double share) {
-  return sorted.empty() ? NOT_A_NUMBER
-                        : sorted[static_cast<std::size_t>(
-                              share * static_cast<double>(sorted.size() - 1))];
+  return sorted.empty()
+             ? NOT_A_NUMBER
+             : sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
 
 Row summarise(const std::string &name, const std::vector<Result> &results) {

@@ -47,9 +47,12 @@ fit_settings chip_settings(const KernelSettings &settings) {
 }
 
 KernelResult widened(const fit_result &result) {
-  return {static_cast<double>(result.x_mm),    static_cast<double>(result.y_mm),
-          static_cast<double>(result.p0_Pa),   static_cast<double>(result.sigma_mm),
-          static_cast<double>(result.force_N), result.used,
+  return {static_cast<double>(result.x_mm),
+          static_cast<double>(result.y_mm),
+          static_cast<double>(result.p0_Pa),
+          static_cast<double>(result.sigma_mm),
+          static_cast<double>(result.force_N),
+          result.used,
           result.flags};
 }
 

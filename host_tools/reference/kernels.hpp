@@ -24,7 +24,7 @@ const char *name_of(Guess guess);
 struct KernelSettings {
   int iterations;
   double noise_Pa;
-  int n_largest = 0; // largest readings to use; 0 for all
+  int n_largest = 0;                                 // largest readings to use; 0 for all
   double prior_sigma_mm = 0.0, prior_width_mm = 0.0; // as fit_settings; width 0 for none
   Guess guess = Guess::log_linear;
 };

@@ -3,13 +3,12 @@
 #include "common/contact_flags.h"
 #include "reference/double_kernel.hpp"
 
+#include <Eigen/Dense>
 #include <ceres/ceres.h>
 #include <ceres/tiny_solver.h>
+#include <cmath>
 #include <cminpack.h>
 #include <gsl/gsl_multifit_nlinear.h>
-
-#include <Eigen/Dense>
-#include <cmath>
 #include <limits>
 #include <memory>
 
@@ -46,8 +45,8 @@ void evaluate(const Samples &samples, const double *theta, double *residual, dou
 using Solve = void (*)(const Samples &samples, double theta[4]);
 
 template <Solve SOLVE>
-KernelResult with(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                  std::uint32_t usable, const KernelSettings &settings) {
+KernelResult with(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+                  const KernelSettings &settings) {
   const Samples samples = normalise(array, pressure_Pa_q10, usable);
   KernelResult result{};
   if (samples.count != SENSORS) {

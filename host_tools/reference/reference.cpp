@@ -1,10 +1,9 @@
 #include "reference/reference.hpp"
 
-#include <ceres/ceres.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
+#include <ceres/ceres.h>
 #include <cmath>
 #include <limits>
 
@@ -92,9 +91,9 @@ Quadratic expand(const std::vector<Sample> &samples, const Vector4 &theta) {
     q.gradient += r * row;
     q.gauss_newton += row * row.transpose();
     Matrix4 second;
-    second << 0.0, e * gx, e * gy, e * gs,                                              //
-        e * gx, m * (gx * gx - iv), m * gx * gy, m * gx * (gs - 2.0 * is),              //
-        e * gy, m * gx * gy, m * (gy * gy - iv), m * gy * (gs - 2.0 * is),              //
+    second << 0.0, e * gx, e * gy, e * gs,                                 //
+        e * gx, m * (gx * gx - iv), m * gx * gy, m * gx * (gs - 2.0 * is), //
+        e * gy, m * gx * gy, m * (gy * gy - iv), m * gy * (gs - 2.0 * is), //
         e * gs, m * gx * (gs - 2.0 * is), m * gy * (gs - 2.0 * is), m * gs * (gs - 3.0 * is);
     q.hessian += r * second;
   }

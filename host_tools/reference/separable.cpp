@@ -42,8 +42,7 @@ inline double quick_exp(double x) {
   const double r = x - n * 0.6931471805599453;
   const double r2 = r * r, r4 = r2 * r2;
   const double value = (1.0 + r) + r2 * (1.0 / 2 + r * (1.0 / 6)) +
-                       r4 * ((1.0 / 24 + r * (1.0 / 120)) +
-                             r2 * (1.0 / 720 + r * (1.0 / 5040)) +
+                       r4 * ((1.0 / 24 + r * (1.0 / 120)) + r2 * (1.0 / 720 + r * (1.0 / 5040)) +
                              r4 * (1.0 / 40320 + r * (1.0 / 362880)));
   std::int64_t bits;
   std::memcpy(&bits, &shifted, sizeof bits);
@@ -170,10 +169,9 @@ State guess(const Readings &p, int peak_column, int peak_row) {
   }
   const Parabola<COLUMNS> x(along_x, FIRST_COLUMN);
   const Parabola<ROWS> y(along_y, FIRST_ROW);
-  const double height =
-      std::clamp((GUESS_WEIGHT * GUESS_HEIGHT - x.curvature - y.curvature) /
-                     (x.axis.n2 + y.axis.n2 + GUESS_WEIGHT),
-                 GUESS_HEIGHT_MIN, GUESS_HEIGHT_MAX);
+  const double height = std::clamp((GUESS_WEIGHT * GUESS_HEIGHT - x.curvature - y.curvature) /
+                                       (x.axis.n2 + y.axis.n2 + GUESS_WEIGHT),
+                                   GUESS_HEIGHT_MIN, GUESS_HEIGHT_MAX);
   const double half = 0.5 / height;
   return {within(x.axis.kappa * 0.5 + x.linear * half, FIRST_COLUMN, COLUMNS, 1.0),
           within(y.axis.kappa * 0.5 + y.linear * half, FIRST_ROW, ROWS, 1.0), height, 1.0};

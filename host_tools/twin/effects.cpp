@@ -118,8 +118,7 @@ EffectValues parse_effects(const std::string &text) {
 
 Pad::Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, double ambient_Pa,
          std::uint64_t seed)
-    : ambient_Pa_(ambient_Pa), clip_Pa_(std::numeric_limits<double>::infinity()),
-      rubber_(sensors) {
+    : ambient_Pa_(ambient_Pa), clip_Pa_(std::numeric_limits<double>::infinity()), rubber_(sensors) {
   for (const auto &[name, value] : effects) {
     if (name == "gain") {
       for (std::size_t k = 0; k < sensors; k++) {
@@ -167,8 +166,7 @@ double Pad::with_hysteresis(Rubber &r, double pressure_Pa) const {
     r.falls = false;
     return pressure_Pa;
   }
-  const bool falls =
-      pressure_Pa < r.pressure_Pa || (pressure_Pa == r.pressure_Pa && r.falls);
+  const bool falls = pressure_Pa < r.pressure_Pa || (pressure_Pa == r.pressure_Pa && r.falls);
   if (falls != r.falls) {
     r.falls = falls;
     r.turn_Pa = r.pressure_Pa;

@@ -168,8 +168,7 @@ ContactTable table_of(const std::string &name, const Layer &layer, const Options
 
 int width(const Options &options) {
   const Layer layer = layer_of(options.scene.layer_mm);
-  const BestGaussian gaussian(table_of(options.scene.indenter, layer, options),
-                              layer.thickness_mm);
+  const BestGaussian gaussian(table_of(options.scene.indenter, layer, options), layer.thickness_mm);
   const BestGaussian::Fit fit = gaussian.at(WIDTH_FORCE_N);
   const double force_N = 2e-6 * M_PI * fit.p0_Pa * fit.sigma_mm * fit.sigma_mm;
   std::printf("sigma_mm=%s force_share=%s\n", fixed(fit.sigma_mm, 3).c_str(),
@@ -258,16 +257,15 @@ int run(int argc, char **argv) {
   build->callback([&] { action = [&] { return tables(options); }; });
 
   const auto with_contact = [&](CLI::App *command) {
-    command
-        ->add_option("--indenter", options.scene.indenter, "What presses; default sphere6")
+    command->add_option("--indenter", options.scene.indenter, "What presses; default sphere6")
         ->type_name("NAME");
-    command
-        ->add_option("--layer", options.scene.layer_mm, "Thickness of the rubber; default 12")
+    command->add_option("--layer", options.scene.layer_mm, "Thickness of the rubber; default 12")
         ->type_name("MM");
   };
 
   CLI::App *fit = app.add_subcommand(
-      "width", "Width of the Gaussian that fits the pressure under 2 N best, and its share of them");
+      "width",
+      "Width of the Gaussian that fits the pressure under 2 N best, and its share of them");
   with_contact(fit);
   with_cache(fit);
   fit->callback([&] { action = [&] { return width(options); }; });

@@ -207,9 +207,8 @@ std::string file_name(const std::string &path) {
 }
 
 const SceneKind &kind_of(const Scene &scene) {
-  return *std::find_if(scene_kinds().begin(), scene_kinds().end(), [&](const SceneKind &kind) {
-    return kind.name == scene.options.kind;
-  });
+  return *std::find_if(scene_kinds().begin(), scene_kinds().end(),
+                       [&](const SceneKind &kind) { return kind.name == scene.options.kind; });
 }
 
 void describe(Text &text, const Scene &scene, const Layer &layer, const Pad &pad,
@@ -345,8 +344,8 @@ Written write_scene(const Scene &scene, const Layer &layer, const ContactTable &
     row.t_s = t_s;
     pad.report(t_s, base_Pa, row.sensors_Pa);
     row.temperature_degC = ROOM_degC + pad.temperature_rise_K(t_s);
-    written.peak_Pa = std::max(
-        written.peak_Pa, *std::max_element(row.sensors_Pa.begin(), row.sensors_Pa.end()));
+    written.peak_Pa =
+        std::max(written.peak_Pa, *std::max_element(row.sensors_Pa.begin(), row.sensors_Pa.end()));
     writer.add(row);
   };
   double t_s = 0.0;

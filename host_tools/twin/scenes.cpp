@@ -25,17 +25,7 @@ constexpr std::array<double, 4> TWIST_RATES_deg_s{30, 60, 120, 180};
 constexpr std::array<double, 7> DISTANCES_mm{6, 9, 12, 15, 18, 24, 30};
 
 // One for each kind, so that kinds with the same seed have nothing in common.
-enum Stream : std::uint64_t {
-  GRID_ORDER = 1,
-  GRID,
-  TAPS,
-  POKES,
-  CYCLE,
-  SLIP,
-  TWIST,
-  ROLLOFF,
-  TWO
-};
+enum Stream : std::uint64_t { GRID_ORDER = 1, GRID, TAPS, POKES, CYCLE, SLIP, TWIST, ROLLOFF, TWO };
 
 std::string number(double value) {
   return shortest(static_cast<float>(value));
@@ -313,8 +303,8 @@ Act two(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, TWO, n);
   const double distance = DISTANCES_mm[n % DISTANCES_mm.size()];
   // The far ones lie along the pad, which is too narrow for them.
-  const double direction = distance > 2.0 * GRID_HALF_X_mm ? random.uniform(60.0, 120.0)
-                                                           : random.uniform(0.0, 180.0);
+  const double direction =
+      distance > 2.0 * GRID_HALF_X_mm ? random.uniform(60.0, 120.0) : random.uniform(0.0, 180.0);
   const double half_x = 0.5 * distance * std::cos(direction * DEGREE);
   const double half_y = 0.5 * distance * std::sin(direction * DEGREE);
   const double x_mm = random.uniform(-2.0, 2.0), y_mm = random.uniform(-2.0, 2.0);
@@ -341,8 +331,7 @@ const std::vector<Kind> &all_kinds() {
       {{"pokes", 120, "0.5..25", "as if by hand: changing force, wandering place"}, poke},
       {{"cycle", 120, "20", "slow loading and unloading, 15 s each; the first above a sensor"},
        cycle},
-      {{"slip", 120, "6",
-        "a gripped object is pushed 24 mm along y at 20, 50, 100, 150, 200 mm/s"},
+      {{"slip", 120, "6", "a gripped object is pushed 24 mm along y at 20, 50, 100, 150, 200 mm/s"},
        slip},
       {{"twist", 60, "6", "a gripped object turns by 90 degrees about its contact"}, twist},
       {{"rolloff", 60, "6", "an object rolls over the pad's edge at 10, 25, 50 mm/s"}, rolloff},
@@ -359,8 +348,8 @@ const Kind &kind_of(const SceneOptions &options) {
     }
     names += (names.empty() ? "" : ", ") + one.kind.name;
   }
-  throw Error("there is no kind of scene \"" + printable(options.kind) + "\"; give one of: " +
-              names);
+  throw Error("there is no kind of scene \"" + printable(options.kind) +
+              "\"; give one of: " + names);
 }
 
 void check(const char *option, double value, double lowest, double highest) {

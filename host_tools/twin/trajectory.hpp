@@ -75,7 +75,7 @@ struct Touch {
 // One contact from touch to loss, or one of two that touch together. Time 0 is the beginning.
 struct Track {
   Profile force_N;
-  double x_mm = 0.0, y_mm = 0.0;     // where it touches
+  double x_mm = 0.0, y_mm = 0.0;       // where it touches
   double along_x = 0.0, along_y = 1.0; // unit vector of its way
   Profile pusher_mm;
   Grip grip;

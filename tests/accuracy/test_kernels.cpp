@@ -3,10 +3,9 @@
 #include "reference/dataset.hpp"
 #include "reference/kernels.hpp"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <cstring>
+#include <gtest/gtest.h>
 
 namespace fingertip::reference {
 namespace {

@@ -55,7 +55,7 @@ TEST_F(Cache, RationedStartsMissNoMinimum) {
         const Fit full = fit(array, pressure_Pa, c.usable, c.press.noise_Pa, {}, Starts::all);
         EXPECT_TRUE(c.best.cost <= full.cost * (1.0 + 1e-9));
         EXPECT_TRUE(std::hypot(c.best.theta.x_mm - full.theta.x_mm,
-                                    c.best.theta.y_mm - full.theta.y_mm) < 1e-6);
+                               c.best.theta.y_mm - full.theta.y_mm) < 1e-6);
         observable_presses++;
       }
     }
@@ -82,8 +82,12 @@ TEST_F(Cache, NoNeighbourOfTheRecordIsBetter) {
     if (c.observable) {
       EXPECT_NEAR(c.best.cost, cost(0.0, 0.0), 1e-9 * c.best.cost);
       for (int i = 0; i < 4; i++) {
-        EXPECT_TRUE(cost(i == 0 ? 1e-3 : i == 1 ? -1e-3 : 0.0,
-                              i == 2 ? 1e-3 : i == 3 ? -1e-3 : 0.0) > cost(0.0, 0.0));
+        EXPECT_TRUE(cost(i == 0   ? 1e-3
+                         : i == 1 ? -1e-3
+                                  : 0.0,
+                         i == 2   ? 1e-3
+                         : i == 3 ? -1e-3
+                                  : 0.0) > cost(0.0, 0.0));
       }
     }
   }

@@ -290,8 +290,7 @@ int LIBUSB_CALL libusb_cancel_transfer(libusb_transfer *transfer) {
 /* At most one packet's or one round's worth of completions, as the real one returns early. */
 int LIBUSB_CALL libusb_handle_events_timeout_completed(libusb_context *context, timeval *, int *) {
   auto take = [&](libusb_transfer *transfer) {
-    context->waiting.erase(
-        std::find(context->waiting.begin(), context->waiting.end(), transfer));
+    context->waiting.erase(std::find(context->waiting.begin(), context->waiting.end(), transfer));
   };
   auto cancelled = std::move(context->cancelled);
   context->cancelled.clear();

@@ -16,8 +16,8 @@ struct Device {
   std::uint8_t bus = 1, address = 1;
   std::uint16_t vendor = FINGERTIP_USB_VID, product = FINGERTIP_USB_PID;
   bool is_plugged_in = true;
-  bool is_denied = false;       /* to this user */
-  bool is_claimed = false;      /* by another program */
+  bool is_denied = false;  /* to this user */
+  bool is_claimed = false; /* by another program */
   bool has_cdc_interfaces = true;
   bool driver[2] = {true, true}; /* the kernel's, of each interface */
   bool claimed[2] = {false, false};

@@ -10,7 +10,7 @@ typedef ALTERNATIVE_REAL real;
 #define JOIN(a, b) JOIN2(a, b)
 #define NAMED(name) JOIN(name, ALTERNATIVE_REAL)
 #define R(constant) ((real)(constant))
-#define OF_REAL(name) _Generic((real)0, float: name##f, double: name)
+#define OF_REAL(name) _Generic((real)0, float : name##f, double : name)
 #define EXP OF_REAL(exp)
 #define LOG OF_REAL(log)
 #define SQRT OF_REAL(sqrt)
@@ -31,8 +31,12 @@ struct samples {
 
 enum { P0, X, Y, SIGMA, PARAMETERS };
 
-static real larger(real a, real b) { return a > b ? a : b; }
-static real smaller(real a, real b) { return a < b ? a : b; }
+static real larger(real a, real b) {
+  return a > b ? a : b;
+}
+static real smaller(real a, real b) {
+  return a < b ? a : b;
+}
 
 struct normal {
   real matrix[PARAMETERS][PARAMETERS]; /* lower triangle */

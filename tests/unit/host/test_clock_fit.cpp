@@ -10,15 +10,14 @@ namespace {
 
 /* A fingertip whose clock is off, and the delays of USB and of a busy main loop between. */
 struct Device {
-  double zero_us;      /* host time at which its clock was zero */
+  double zero_us; /* host time at which its clock was zero */
   double drift_ppm;
   double wander_ppm = 0; /* in a minute, as a crystal that warms up */
 
   std::uint64_t at(double host_us) const {
     double s = (host_us - zero_us) / 60e6;
     double passed_us = host_us - zero_us;
-    return static_cast<std::uint64_t>(
-        passed_us * (1 + 1e-6 * (drift_ppm + wander_ppm * s / 2)));
+    return static_cast<std::uint64_t>(passed_us * (1 + 1e-6 * (drift_ppm + wander_ppm * s / 2)));
   }
 };
 
@@ -44,7 +43,8 @@ double worst_error_us(const Device &device, double seconds, std::uint64_t seed,
     double error_us = now.host_at(device.at(sent_us + there_us)) - (sent_us + there_us);
     EXPECT_LE(std::abs(error_us), now.uncertainty_us + 2) << i;
     double step_us = i < 32 ? 6000 : 100000;
-    for (double later_us = received_us; i >= 32 && later_us < received_us + step_us; later_us += 2500) {
+    for (double later_us = received_us; i >= 32 && later_us < received_us + step_us;
+         later_us += 2500) {
       worst = std::max(worst, std::abs(now.host_at(device.at(later_us)) - later_us));
     }
     sent_us = received_us + step_us;

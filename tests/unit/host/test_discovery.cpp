@@ -108,8 +108,7 @@ TEST_F(FakeSystem, NoneAndSeveralAreErrors) {
   plug_in("1-1", "ttyACM1", "1209", "0001", "AAAA", false);
   EXPECT_EQ(error({}), "several fingertips found; choose one with --device: AAAA BBBB");
   EXPECT_EQ(port({"", "bbbb", Reach::automatic}), root() + "/dev/ttyACM0");
-  EXPECT_EQ(error({"", "CCCC", Reach::automatic}),
-            "no fingertip CCCC here; there are: AAAA BBBB");
+  EXPECT_EQ(error({"", "CCCC", Reach::automatic}), "no fingertip CCCC here; there are: AAAA BBBB");
   auto ways = all_ways(Reach::automatic, root());
   ASSERT_EQ(ways.size(), 2u);
   EXPECT_EQ(ways[0].serial, "AAAA");

@@ -230,8 +230,8 @@ TEST(Effects, AreParsed) {
   EXPECT_EQ(parse_effects("all,clip=5").at("clip"), 5.0);
   EXPECT_EQ(parse_effects("clip=5, all").at("clip"), 5.0);
   EXPECT_EQ(parse_effects("gain").at("gain"), 10.0);
-  for (const char *wrong : {"noise", "gain=", "gain=x", "gain=31", "gain=-1", "drift,,gain",
-                            "all=1"}) {
+  for (const char *wrong :
+       {"noise", "gain=", "gain=x", "gain=31", "gain=-1", "drift,,gain", "all=1"}) {
     EXPECT_THROW(parse_effects(wrong), Error) << wrong;
   }
   try {

@@ -51,9 +51,9 @@ struct File {
   std::string bytes;
 
   double at(const std::string &name, double t_s) const {
-    const auto after = std::lower_bound(
-        rows.begin(), rows.end(), t_s,
-        [](const std::vector<double> &row, double t) { return row[0] < t; });
+    const auto after =
+        std::lower_bound(rows.begin(), rows.end(), t_s,
+                         [](const std::vector<double> &row, double t) { return row[0] < t; });
     const std::size_t c = column.at(name);
     if (after == rows.begin() || after == rows.end()) {
       return (after == rows.begin() ? rows.front() : rows.back())[c];
@@ -231,16 +231,16 @@ TEST(Scenes, TwoContactsAreApartAsTold) {
     EXPECT_LE(std::abs(a.y_mm), 18.0);
     EXPECT_LE(std::abs(b.x_mm), 10.0);
   }
-  EXPECT_EQ(distances, (std::set<long>{6000000, 9000000, 12000000, 15000000, 18000000, 24000000,
-                                       30000000}));
+  EXPECT_EQ(distances,
+            (std::set<long>{6000000, 9000000, 12000000, 15000000, 18000000, 24000000, 30000000}));
 }
 
 TEST(Scenes, LongerOnesBeginAlikeAndEffectsDoNotMoveContacts) {
   const Scene brief = scene_of("taps"), longer = scene_of("taps", [](SceneOptions &o) {
-                                         o.seconds = 300;
-                                         o.effects = parse_effects("all");
-                                         o.pad_seed = 77;
-                                       });
+                                          o.seconds = 300;
+                                          o.effects = parse_effects("all");
+                                          o.pad_seed = 77;
+                                        });
   ASSERT_GT(longer.acts.size(), brief.acts.size());
   for (std::size_t i = 0; i < brief.acts.size(); i++) {
     EXPECT_EQ(brief.acts[i].begin_s, longer.acts[i].begin_s);
@@ -292,9 +292,9 @@ TEST(SceneFile, IsThePressureOnTheBaseWithinItsTolerance) {
       const Touch touch = touched ? act->tracks[0].at(t_s - act->begin_s) : Touch{};
       double peak_Pa = 0.0, expected[15];
       for (int k = 0; k < 15; k++) {
-        expected[k] = table_of("sphere6").base_pressure_Pa(
-            touch.force_N, double(geometry.x_mm[k]) - touch.x_mm,
-            double(geometry.y_mm[k]) - touch.y_mm);
+        expected[k] = table_of("sphere6").base_pressure_Pa(touch.force_N,
+                                                           double(geometry.x_mm[k]) - touch.x_mm,
+                                                           double(geometry.y_mm[k]) - touch.y_mm);
         peak_Pa = std::max(peak_Pa, std::abs(expected[k]));
       }
       for (int k = 0; k < 15; k++) {
@@ -393,8 +393,8 @@ TEST(SceneFile, TurnsObjects) {
   for (int k = 0; k < 15; k++) {
     const std::string name = "s" + std::to_string(k) + "_Pa";
     EXPECT_NEAR(file.at(name, twist.begin_s), file.at(name, twist.end_s), 6.0) << k;
-    difference_Pa = std::max(difference_Pa,
-                             std::abs(file.at(name, twist.begin_s) - file.at(name, middle_s)));
+    difference_Pa =
+        std::max(difference_Pa, std::abs(file.at(name, twist.begin_s) - file.at(name, middle_s)));
     peak_Pa = std::max(peak_Pa, file.at(name, middle_s));
   }
   EXPECT_GT(difference_Pa, 1e-3 * peak_Pa);

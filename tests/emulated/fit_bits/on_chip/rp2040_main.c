@@ -4,9 +4,7 @@
 #include "port/port.h"
 
 /* In this order, as run_on_chip.mjs reads and writes them. */
-static struct {
-  uint32_t kernel, press, crc;
-} job;
+static struct { uint32_t kernel, press, crc; } job;
 
 int main(void) {
   fit_bits_init();
