@@ -262,7 +262,7 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
     taken_us = frame->t_read_us;
   }
   if (!frame->held) {
-    condition_frame(&app->condition, frame, &app->conditioned);
+    condition_frame(&app->condition, frame, NULL, &app->conditioned);
   }
 #if FT_WITH_FIT
   uint64_t conditioned_us = port_now_us();

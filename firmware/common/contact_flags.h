@@ -15,18 +15,25 @@ enum contact_flag {
   CONTACT_FLAG_SLIP = 1 << 4,              /* slip distance above the threshold */
   CONTACT_FLAG_TARED = 1 << 5,             /* readings are relative to a measured zero */
   CONTACT_FLAG_HELD = 1 << 6, /* all of the frame before: the sensors measured temperature */
+  CONTACT_FLAG_WIDTHS_VALID = 1 << 7, /* the widths along the axes and their correlation */
 
   /* Warnings */
   CONTACT_FLAG_LOW_SIGNAL = 1 << 8, /* peak below 20 noise standard deviations */
   CONTACT_FLAG_FLAT = 1 << 9,       /* pressure without a peak: no location */
-  CONTACT_FLAG_UNCERTAIN = 1 << 10, /* location sd above what passes (0.12 to 0.5 mm), or no
-                                       convergence */
+  CONTACT_FLAG_UNCERTAIN = 1 << 10, /* location_sd_mm exceeds the limit that is set */
   CONTACT_FLAG_MODEL = 1 << 11,     /* residual too large for one Gaussian */
   CONTACT_FLAG_SATURATED = 1 << 12, /* a sensor is beyond its range; it was left out */
   CONTACT_FLAG_FORCE_LOWER_BOUND = 1
                                    << 13, /* too few unsaturated sensors: force is at least this */
   CONTACT_FLAG_SENSOR_MASKED = 1 << 14,   /* a sensor is missing or was left out */
   CONTACT_FLAG_AT_BOUND = 1 << 15,        /* the fit stopped at a limit of its box */
+  CONTACT_FLAG_ELONGATED = 1 << 16,       /* the contact is not round: longer along one direction */
+  CONTACT_FLAG_ZERO_DOUBTFUL = 1 << 17,   /* what is pressed, or is not, cannot be told from a zero
+                                             that has moved */
+  CONTACT_FLAG_SENSOR_DOUBTFUL = 1 << 18, /* a sensor in use gives reason to doubt it */
+
+  /* State, continued */
+  CONTACT_FLAG_CALIBRATED = 1 << 19, /* gains and force scale of a calibration act */
 };
 
 #endif

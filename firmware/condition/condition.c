@@ -59,8 +59,20 @@ static int32_t clamped_difference(int32_t a, int32_t b) {
   return a < 0 ? INT32_MIN : INT32_MAX;
 }
 
+/* value * factor / 2^16, saturated; by halves of 16 bits. */
+static int32_t scaled_by(int32_t value, uint32_t factor_q16) {
+  uint32_t size = value < 0 ? 0u - (uint32_t)value : (uint32_t)value;
+  uint32_t whole = (size >> 16) * factor_q16;
+  uint32_t rest_high = (size & 0xFFFF) * (factor_q16 >> 16);
+  uint32_t rest_low = ((size & 0xFFFF) * (factor_q16 & 0xFFFF)) >> 16;
+  uint32_t sum = whole + rest_high + rest_low;
+  bool overflows = (size >> 16) > (INT32_MAX >> 1) / factor_q16 || sum > INT32_MAX;
+  int32_t result = overflows ? INT32_MAX : (int32_t)sum;
+  return value < 0 ? -result : result;
+}
+
 void condition_frame(struct condition *condition, const struct frame *frame,
-                     struct conditioned *conditioned) {
+                     const struct condition_gains *gains, struct conditioned *conditioned) {
   memset(conditioned, 0, sizeof *conditioned);
   uint32_t readable = frame->valid & ~frame->saturated;
   conditioned->tared = readable != 0;
@@ -78,6 +90,9 @@ void condition_frame(struct condition *condition, const struct frame *frame,
       continue;
     }
     int32_t above = clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k]);
+    if (gains) {
+      above = scaled_by(above, gains->inverse_q16[k]);
+    }
     conditioned->pressure_Pa_q10[k] = above;
     conditioned->usable |= bit;
     if (above > conditioned->peak_Pa_q10) {

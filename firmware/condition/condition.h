@@ -40,10 +40,16 @@ struct condition {
   bool contact;
 };
 
+/* What a calibration says of the sensors. */
+struct condition_gains {
+  uint32_t inverse_q16[FT_MAX_SENSORS]; /* [sensor] 1 / gain, 65536: 1; 0.25..4 */
+};
+
 struct conditioned {
   uint32_t usable;     /* bitmap: tared, valid and not saturated */
   bool tared;          /* every valid sensor is, there is one, and none is far below */
   bool contact;        /* the gate */
+  bool zero_doubtful;  /* a force and a zero that has moved cannot be told apart */
   int32_t peak_Pa_q10; /* strongest usable reading; 0 when none */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* [sensor] above the tare, 1/1024 Pa; 0 if not usable */
 };
@@ -51,8 +57,9 @@ struct conditioned {
 /* Asks for a tare of all sensors over the next frames. */
 void condition_tare(struct condition *condition);
 
-/* Processes one frame. Cost: about 60 Cortex-M0+ cycles a sensor. */
+/* Processes one frame. gains: NULL for sensors that are all alike. Cost: about 60 Cortex-M0+ cycles
+ * a sensor. */
 void condition_frame(struct condition *condition, const struct frame *frame,
-                     struct conditioned *conditioned);
+                     const struct condition_gains *gains, struct conditioned *conditioned);
 
 #endif

@@ -13,6 +13,8 @@
 struct contact_settings {
   float slip_threshold_mm;
   uint32_t slip_window_us;
+  float force_scale;    /* force is this times 2 pi p0 sigma^2 */
+  float force_scale_sd; /* relative to 1 */
 };
 
 /* What the fit does not know of its readings. */
@@ -21,6 +23,9 @@ struct contact_input {
   bool contact;  /* the gate is open */
   bool tared;
   bool masked;                  /* a sensor is missing or was left out */
+  bool zero_doubtful;           /* see condition.h */
+  bool sensor_doubtful;         /* a sensor in use is doubtful, see frame.h */
+  bool calibrated;              /* gains and force scale of a calibration act */
   int32_t noise_Pa_q10;         /* rms noise of a reading, 1/1024 Pa */
   uint32_t saturated;           /* bitmap: left out of the fit for being beyond their range */
   const struct fit_result *fit; /* NULL where nothing was fitted */

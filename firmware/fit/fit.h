@@ -44,7 +44,12 @@ struct fit_settings {
    * FIT_PRIOR_WEIGHT largest (sigma - prior_sigma) / prior_width. None unless the width is
    * 0.001..10000 mm and sigma 0..10000 mm. */
   float prior_sigma_mm, prior_width_mm;
+  /* What an honest standard deviation needs besides the noise. */
+  uint16_t gain_sd_q16[FT_MAX_SENSORS]; /* [sensor] relative sd of its gain; 0: exact */
+  uint16_t model_sd_q16; /* sd of the model's own error, as a share of the peak; 0: none */
+  float location_sd_limit_mm; /* UNCERTAIN above it; 0: FIT_LOCATION_SD_LIMIT_mm */
 };
+#define FIT_LOCATION_SD_LIMIT_mm 0.6f
 #define FIT_PRIOR_WEIGHT 0.01f
 #define FIT_MAX_ITERATIONS 20
 
@@ -62,9 +67,11 @@ struct fit_result {
   float residual_rms_Pa; /* over the sensors used */
   float location_sd_mm;  /* radial, from the covariance at the solution */
   float force_sd_N;
+  float sigma_x_mm, sigma_y_mm; /* WIDTHS_VALID: of an elliptic Gaussian, along the axes */
+  float width_correlation;      /* and its correlation, -1..1: 0 unless it lies aslant */
   uint32_t used;  /* bitmap of the sensors that entered */
   uint32_t flags; /* of enum contact_flag: FIT_VALID, UNCERTAINTY_VALID, LOW_SIGNAL, FLAT,
-                     UNCERTAIN, MODEL, AT_BOUND, SENSOR_MASKED */
+                     UNCERTAIN, MODEL, AT_BOUND, SENSOR_MASKED, WIDTHS_VALID, ELONGATED */
 };
 
 /* FT_ERR_ARGUMENT: sensor_count outside 1..FT_MAX_SENSORS, pitch outside 0.01..10000 mm, or a

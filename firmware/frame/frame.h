@@ -22,6 +22,7 @@ struct frame {
   int16_t temperature_cC;  /* mean of the sensors, 0.01 degC; 0 until first measured */
   uint32_t renewed;        /* bitmap: another sensor than in the frame before, with another zero */
   uint32_t valid;          /* bitmap: pressure is a measurement */
+  uint32_t doubtful;       /* bitmap: valid, but there is reason to doubt the reading */
   uint32_t saturated;      /* bitmap: beyond the range in which the sensor reads true */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* [sensor]; 0 where not valid */
 };

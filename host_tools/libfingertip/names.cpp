@@ -15,6 +15,8 @@ const std::vector<FlagName> &flag_names() {
       {CONTACT_FLAG_SLIP, "SLIP", false},
       {CONTACT_FLAG_TARED, "TARED", false},
       {CONTACT_FLAG_HELD, "HELD", false},
+      {CONTACT_FLAG_WIDTHS_VALID, "WIDTHS_VALID", false},
+      {CONTACT_FLAG_CALIBRATED, "CALIBRATED", false},
       {CONTACT_FLAG_LOW_SIGNAL, "LOW_SIGNAL", true},
       {CONTACT_FLAG_FLAT, "FLAT", true},
       {CONTACT_FLAG_UNCERTAIN, "UNCERTAIN", true},
@@ -23,6 +25,9 @@ const std::vector<FlagName> &flag_names() {
       {CONTACT_FLAG_FORCE_LOWER_BOUND, "FORCE_LOWER_BOUND", true},
       {CONTACT_FLAG_SENSOR_MASKED, "SENSOR_MASKED", true},
       {CONTACT_FLAG_AT_BOUND, "AT_BOUND", true},
+      {CONTACT_FLAG_ELONGATED, "ELONGATED", true},
+      {CONTACT_FLAG_ZERO_DOUBTFUL, "ZERO_DOUBTFUL", true},
+      {CONTACT_FLAG_SENSOR_DOUBTFUL, "SENSOR_DOUBTFUL", true},
   };
   return names;
 }

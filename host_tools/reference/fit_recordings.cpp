@@ -134,7 +134,7 @@ std::vector<double> errors_mm(const Recording &recording, const fit_array &array
   condition_tare(&state);
   for (std::size_t i = 0; i < recording.frames.size(); i++) {
     conditioned readings;
-    condition_frame(&state, &recording.frames[i], &readings);
+    condition_frame(&state, &recording.frames[i], nullptr, &readings);
     if (recording.x_mm[i] > LAST_mm || !readings.contact ||
         readings.peak_Pa_q10 < 1024 * LEAST_Pa) {
       continue;

@@ -416,7 +416,7 @@ struct Chain {
     frame quiet = frame_of({std::vector<double>(x_mm.size(), 0.0)});
     conditioned ignored;
     for (int i = 0; i < CONDITION_TARE_FRAMES; i++) {
-      condition_frame(&tared, &quiet, &ignored);
+      condition_frame(&tared, &quiet, nullptr, &ignored);
     }
   }
 
@@ -443,7 +443,7 @@ struct Chain {
     condition state = tared;
     const frame taken = frame_of(press);
     conditioned readings;
-    condition_frame(&state, &taken, &readings);
+    condition_frame(&state, &taken, nullptr, &readings);
     fit_settings settings{};
     settings.iterations = DEFAULT_FIT_ITERATIONS;
     settings.noise_Pa_q10 = taken.noise_Pa_q10;

@@ -41,7 +41,7 @@ static void take(void) {
 }
 
 static void condition_one(void) {
-  condition_frame(&condition, &frame, &conditioned);
+  condition_frame(&condition, &frame, NULL, &conditioned);
 }
 
 static void fit(void) {

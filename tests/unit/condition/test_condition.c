@@ -25,7 +25,7 @@ static void fill(int32_t pressure_Pa_q10) {
 
 static void run(int count) {
   for (int i = 0; i < count; i++) {
-    condition_frame(&condition, &frame, &conditioned);
+    condition_frame(&condition, &frame, NULL, &conditioned);
   }
 }
 
