@@ -460,7 +460,7 @@ struct Chain {
     input.saturated = taken.saturated;
     input.fit = readings.contact ? &fit : nullptr;
     slip_history history{};
-    const contact_settings slip{DEFAULT_SLIP_THRESHOLD_mm, DEFAULT_SLIP_WINDOW_ms * 1000u};
+    const contact_settings slip{DEFAULT_SLIP_THRESHOLD_mm, DEFAULT_SLIP_WINDOW_ms * 1000u, 1.0f, 0.0f};
     contact_result said;
     contact_update(&history, &slip, &input, &said);
 
