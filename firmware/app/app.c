@@ -35,8 +35,10 @@ _Static_assert(DEFAULT_FIT_N_LARGEST == 0, "n_largest needs FINGERTIP_FIT_GENERA
 
 #if FT_WITH_SLIP
 #define COMMANDS wire_commands
-#else
+#elif FT_WITH_FIT
 #define COMMANDS wire_commands_without_slip
+#else
+#define COMMANDS wire_commands_without_fit
 #endif
 
 void app_on_event(struct app *app) {
@@ -76,6 +78,26 @@ static void send_packet(struct app *app, const struct wire_layout *layout, uint6
   }
 }
 
+#if FT_WITH_FIT
+void app_use_calibration(struct app *app, const struct calibration *calibration) {
+  app->calibrated = calibration != NULL;
+  if (app->calibrated) {
+    app->calibration = *calibration;
+  }
+  for (unsigned k = 0; k < geometry.sensor_count; k++) {
+    const struct sensor_calibration *sensor = &app->calibration.sensors[k];
+    float gain_sd = app->calibrated ? sensor->gain_sd : DEFAULT_GAIN_SD;
+    app->gains.inverse_q16[k] =
+        app->calibrated ? (uint32_t)(65536.0f / sensor->gain + 0.5f) : 65536;
+    app->fit_settings.gain_sd_q16[k] = (uint16_t)(gain_sd * 65536.0f + 0.5f);
+  }
+  app->contact_settings.force_scale =
+      app->calibrated ? app->calibration.force_scale : DEFAULT_FORCE_SCALE;
+  app->contact_settings.force_scale_sd =
+      app->calibrated ? app->calibration.force_scale_sd : DEFAULT_FORCE_SCALE_SD;
+}
+#endif
+
 void app_start(struct app *app, const struct array_bus *bus) {
   memset(app, 0, sizeof *app);
   const struct scan_settings scan_settings = {
@@ -97,6 +119,8 @@ void app_start(struct app *app, const struct array_bus *bus) {
   app->fit_settings.n_largest = DEFAULT_FIT_N_LARGEST;
   app->fit_settings.prior_sigma_mm = DEFAULT_PRIOR_SIGMA_mm;
   app->fit_settings.prior_width_mm = DEFAULT_PRIOR_WIDTH_mm;
+  app->fit_settings.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
+  app_use_calibration(app, NULL);
 #endif
 #if FT_WITH_SLIP
   app->contact_settings.slip_threshold_mm = DEFAULT_SLIP_THRESHOLD_mm;
@@ -158,6 +182,15 @@ static void send_info(struct app *app, uint64_t now_us) {
   info->pitch_mm = geometry.pitch_mm;
   memcpy(info->x_mm, geometry.x_mm, sizeof info->x_mm);
   memcpy(info->y_mm, geometry.y_mm, sizeof info->y_mm);
+#if FT_WITH_FIT
+  info->prior_sigma_mm = app->fit_settings.prior_sigma_mm;
+  info->prior_width_mm = app->fit_settings.prior_width_mm;
+  info->location_limit_mm = app->fit_settings.location_sd_limit_mm;
+  if (app->calibrated) {
+    info->stored |= WIRE_STORED_CALIBRATION;
+    info->calibration = app->calibration;
+  }
+#endif
   send_packet(app, &wire_info_layout, now_us);
 }
 
@@ -194,6 +227,7 @@ static void send_raw(struct app *app) {
   raw->flags = app->contact.flags;
   raw->valid = frame->held ? 0 : frame->valid;
   raw->saturated = frame->saturated;
+  raw->doubtful = frame->held ? 0 : frame->doubtful;
   raw->temperature_cC = frame->temperature_cC;
   raw->sensor_count = frame->sensor_count;
   size_t length = frame->sensor_count * sizeof raw->pressure_Pa_q10[0];
@@ -214,11 +248,14 @@ static void send_contact(struct app *app, const struct wire_stages *stages) {
   contact->y_mm = app->fit.y_mm;
   contact->p0_Pa = app->fit.p0_Pa;
   contact->sigma_mm = app->fit.sigma_mm;
-  contact->force_N = app->fit.force_N;
+  contact->force_N = app->force.force_N;
   contact->residual_rms_Pa = app->fit.residual_rms_Pa;
   contact->location_sd_mm = app->fit.location_sd_mm;
-  contact->force_sd_N = app->fit.force_sd_N;
+  contact->force_sd_N = app->force.force_sd_N;
   contact->slip_mm = app->contact.slip_mm;
+  contact->sigma_x_mm = app->fit.sigma_x_mm;
+  contact->sigma_y_mm = app->fit.sigma_y_mm;
+  contact->width_correlation = app->fit.width_correlation;
   send_packet(app, &wire_contact_layout, app->frame.t_us);
 }
 
@@ -247,8 +284,12 @@ static void judge_frame(struct app *app) {
     .saturated = frame->saturated,
 #if FT_WITH_FIT
     .fit = app->conditioned.contact ? &app->fit : NULL,
+    .calibrated = app->calibrated,
 #endif
   };
+#if FT_WITH_FIT
+  app->force = contact_weigh(&app->contact_settings, &app->fit);
+#endif
 #if FT_WITH_SLIP
   contact_update(&app->slip_history, &app->contact_settings, &input, &app->contact);
 #else
@@ -262,7 +303,12 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
     taken_us = frame->t_read_us;
   }
   if (!frame->held) {
-    condition_frame(&app->condition, frame, NULL, &app->conditioned);
+#if FT_WITH_FIT
+    const struct condition_gains *gains = app->calibrated ? &app->gains : NULL;
+#else
+    const struct condition_gains *gains = NULL; /* nothing here tells how hard or where */
+#endif
+    condition_frame(&app->condition, frame, gains, &app->conditioned);
   }
 #if FT_WITH_FIT
   uint64_t conditioned_us = port_now_us();
@@ -312,6 +358,37 @@ static enum wire_result set_slip(struct app *app, const struct wire_cmd_slip *sl
 }
 #endif
 
+#if FT_WITH_FIT
+static enum wire_result calibrate(struct app *app, const struct wire_cmd_calibrate *command) {
+  if (command->sensor_count != geometry.sensor_count ||
+      !calibration_is_valid(&command->calibration, geometry.sensor_count)) {
+    return WIRE_RESULT_OUT_OF_RANGE;
+  }
+  app_use_calibration(app, &command->calibration);
+  return WIRE_RESULT_DONE;
+}
+
+static enum wire_result set_prior(struct app *app, const struct wire_cmd_prior *prior) {
+  bool none = prior->sigma_mm == 0.0f && prior->width_mm == 0.0f;
+  if (!none &&
+      (prior->sigma_mm < WIRE_PRIOR_SIGMA_MIN_mm || prior->sigma_mm > WIRE_PRIOR_SIGMA_MAX_mm ||
+       prior->width_mm < WIRE_PRIOR_WIDTH_MIN_mm || prior->width_mm > WIRE_PRIOR_WIDTH_MAX_mm)) {
+    return WIRE_RESULT_OUT_OF_RANGE;
+  }
+  app->fit_settings.prior_sigma_mm = prior->sigma_mm;
+  app->fit_settings.prior_width_mm = prior->width_mm;
+  return WIRE_RESULT_DONE;
+}
+
+static enum wire_result set_location_limit(struct app *app, float limit_mm) {
+  if (limit_mm < WIRE_LOCATION_LIMIT_MIN_mm || limit_mm > WIRE_LOCATION_LIMIT_MAX_mm) {
+    return WIRE_RESULT_OUT_OF_RANGE;
+  }
+  app->fit_settings.location_sd_limit_mm = limit_mm;
+  return WIRE_RESULT_DONE;
+}
+#endif
+
 static enum wire_result obey(struct app *app, const struct wire_packet *command, uint64_t now_us) {
   switch (command->type) {
   case WIRE_CMD_STREAM:
@@ -345,6 +422,19 @@ static enum wire_result obey(struct app *app, const struct wire_packet *command,
   case WIRE_CMD_SLIP:
     return set_slip(app, &command->body.cmd_slip);
 #endif
+#if FT_WITH_FIT
+  case WIRE_CMD_CALIBRATE:
+    return calibrate(app, &command->body.cmd_calibrate);
+  case WIRE_CMD_ERASE_CALIBRATION:
+    app_use_calibration(app, NULL);
+    return WIRE_RESULT_DONE;
+  case WIRE_CMD_PRIOR:
+    return set_prior(app, &command->body.cmd_prior);
+  case WIRE_CMD_LOCATION_LIMIT:
+    return set_location_limit(app, command->body.cmd_location_limit.limit_mm);
+#endif
+  case WIRE_CMD_KEEP: /* nothing keeps them yet */
+    return WIRE_RESULT_NOT_NOW;
   case WIRE_CMD_INFO:
   case WIRE_CMD_HEALTH:
     return WIRE_RESULT_DONE;

@@ -25,9 +25,12 @@ struct app {
   struct fit_array fit_array;
   struct fit_settings fit_settings;
   uint32_t fit_failures;
+  bool calibrated;
+  struct calibration calibration; /* that acts; of no meaning unless .calibrated */
+  struct condition_gains gains;   /* likewise */
+  struct contact_settings contact_settings;
 #endif
 #if FT_WITH_SLIP
-  struct contact_settings contact_settings;
   struct slip_history slip_history;
 #endif
   struct wire_receiver receiver;
@@ -37,6 +40,7 @@ struct app {
   struct conditioned conditioned;
 #if FT_WITH_FIT
   struct fit_result fit;
+  struct contact_force force;
 #endif
   struct contact_result contact;
   struct wire_packet packet;                         /* in or out, one at a time */
@@ -80,6 +84,11 @@ void app_on_event(struct app *app);
  * frame before goes out again. app_run calls it with the time at which it took the frame; so may a
  * host that has frames of its own. */
 void app_process_frame(struct app *app, uint64_t taken_us);
+
+#if FT_WITH_FIT
+/* Has this calibration, which is valid, act from the next frame on; NULL: none. */
+void app_use_calibration(struct app *app, const struct calibration *calibration);
+#endif
 
 /* One round of the main loop: does what is due, or sleeps until something happens. */
 void app_run(struct app *app);

@@ -17,6 +17,19 @@
 #define DEFAULT_FIT_ITERATIONS FINGERTIP_FIT_ITERATIONS
 #define DEFAULT_FIT_N_LARGEST 0u /* all: the others only add accuracy */
 
+/* Of a pad never calibrated: relative standard deviation of a sensor's gain. Pads as people cast
+ * them spread by 5 to 10 %. */
+#define DEFAULT_GAIN_SD 0.10f
+
+/* Force over 2 pi p0 sigma^2 of a pad never calibrated. Contacts' tails are no Gaussian's, and the
+ * force that the product misses depends on the layer: 0.90 to 0.97 is held on 6 to 12 mm of rubber
+ * (the twin's validation), to which the pad's mean gain adds as much as rubbers differ. */
+#define DEFAULT_FORCE_SCALE 1.0f
+#define DEFAULT_FORCE_SCALE_SD 0.10f
+
+/* UNCERTAIN where the location's standard deviation is above it: FIT_LOCATION_SD_LIMIT_mm. */
+#define DEFAULT_LOCATION_LIMIT_mm 0.6f
+
 /* Width 0 is no prior. */
 #define DEFAULT_PRIOR_SIGMA_mm (0.001f * FINGERTIP_PRIOR_SIGMA_UM)
 #define DEFAULT_PRIOR_WIDTH_mm                                                                     \

@@ -2,6 +2,8 @@
 
 #include "common/contact_flags.h"
 
+#include <math.h>
+
 static bool fewer_bits_than(uint32_t bitmap, int limit) {
   int bits = 0;
   for (; bitmap && bits < limit; bitmap &= bitmap - 1) {
@@ -26,10 +28,22 @@ static bool tells_motion(const struct contact_input *input, uint32_t flags) {
          fit->location_sd_mm * noise_Pa <= CONTACT_JITTER_MAX_mm * fit->residual_rms_Pa;
 }
 
+struct contact_force contact_weigh(const struct contact_settings *settings,
+                                   const struct fit_result *fit) {
+  float of_fit_N = settings->force_scale * fit->force_sd_N;
+  float of_scale_N = settings->force_scale_sd * fit->force_N;
+  struct contact_force weighed = {settings->force_scale * fit->force_N, 0.0f};
+  if (fit->flags & CONTACT_FLAG_UNCERTAINTY_VALID) {
+    weighed.force_sd_N = sqrtf(of_fit_N * of_fit_N + of_scale_N * of_scale_N);
+  }
+  return weighed;
+}
+
 void contact_judge(const struct contact_input *input, struct contact_result *result) {
   uint32_t flags = input->fit ? input->fit->flags : 0;
   flags |= input->contact ? (uint32_t)CONTACT_FLAG_CONTACT : 0;
   flags |= input->tared ? (uint32_t)CONTACT_FLAG_TARED : 0;
+  flags |= input->calibrated ? (uint32_t)CONTACT_FLAG_CALIBRATED : 0;
   flags |= input->masked ? (uint32_t)CONTACT_FLAG_SENSOR_MASKED : 0;
   if (input->saturated) {
     flags |= CONTACT_FLAG_SATURATED;

@@ -14,7 +14,7 @@ struct contact_settings {
   float slip_threshold_mm;
   uint32_t slip_window_us;
   float force_scale;    /* force is this times 2 pi p0 sigma^2 */
-  float force_scale_sd; /* relative to 1 */
+  float force_scale_sd; /* standard deviation of force_scale */
 };
 
 /* What the fit does not know of its readings. */
@@ -36,9 +36,17 @@ struct contact_result {
   float slip_mm;  /* 0 unless SLIP_VALID */
 };
 
+struct contact_force {
+  float force_N, force_sd_N; /* 0 unless FIT_VALID, and UNCERTAINTY_VALID */
+};
+
 /* With fewer unsaturated sensors than this the peak is extrapolated, and the force a lower bound.
  */
 #define CONTACT_MIN_UNSATURATED 5
+
+/* The force of a fit, scaled; its standard deviation holds that of the scale. */
+struct contact_force contact_weigh(const struct contact_settings *settings,
+                                   const struct fit_result *fit);
 
 /* Without slip. */
 void contact_judge(const struct contact_input *input, struct contact_result *result);

@@ -16,9 +16,10 @@ enum kind {
   U32,
   U64,
   F32,
-  PAIRS,     /* of 32 bits: for each sensor an element of each of two arrays behind one another */
-  F32_PAIRS, /* likewise */
-  WHEN,      /* no field: the next run is there if bit `count` of this word is set */
+  PAIRS,       /* of 32 bits: for each sensor an element of each of two arrays behind one another */
+  F32_PAIRS,   /* likewise */
+  F32_TRIPLES, /* for each sensor three behind one another */
+  WHEN,        /* no field: the next run is there if bit `count` of this word is set */
 };
 struct run {
   uint8_t kind;
@@ -38,6 +39,7 @@ struct wire_layout {
   const struct wire_layout name##_layout = {type, sizeof name##_runs / sizeof name##_runs[0],      \
                                             name##_runs}
 #define EMPTY_LAYOUT(name, type) static const struct wire_layout name##_layout = {type, 0, NULL}
+_Static_assert(sizeof(struct sensor_calibration) == 3 * sizeof(float), "F32_TRIPLES");
 _Static_assert(offsetof(struct wire_packet, body.raw.baseline_Pa_q10) ==
                        offsetof(struct wire_packet, body.raw.pressure_Pa_q10) +
                            4 * FT_MAX_SENSORS &&
@@ -51,14 +53,15 @@ static const struct run wire_contact_runs[] = {
     RUN(WHEN, 1, contact.flags), RUN(F32, 6, contact.x_mm),
     RUN(WHEN, 2, contact.flags), RUN(F32, 2, contact.location_sd_mm),
     RUN(WHEN, 3, contact.flags), RUN(F32, 1, contact.slip_mm),
+    RUN(WHEN, 7, contact.flags), RUN(F32, 3, contact.sigma_x_mm),
 };
 _Static_assert(CONTACT_FLAG_FIT_VALID == 1 << 1 && CONTACT_FLAG_UNCERTAINTY_VALID == 1 << 2 &&
-                   CONTACT_FLAG_SLIP_VALID == 1 << 3,
+                   CONTACT_FLAG_SLIP_VALID == 1 << 3 && CONTACT_FLAG_WIDTHS_VALID == 1 << 7,
                "bits in wire_contact_runs");
 LAYOUT(wire_contact, WIRE_CONTACT);
 
 static const struct run wire_raw_runs[] = {
-    RUN(U32, 4, raw.frame),
+    RUN(U32, 5, raw.frame),
     RUN(U16, 1, raw.temperature_cC),
     RUN(SENSOR_COUNT, 1, raw.sensor_count),
     RUN(PAIRS, 1, raw.pressure_Pa_q10),
@@ -66,16 +69,35 @@ static const struct run wire_raw_runs[] = {
 LAYOUT(wire_raw, WIRE_RAW);
 
 static const struct run wire_info_runs[] = {
-    RUN(BYTES, 3, info.firmware_version), RUN(SENSOR_COUNT, 1, info.sensor_count),
-    RUN(U32, 1, info.capabilities),       RUN(TEXTS, 4, info.git_hash),
-    RUN(U32, 2, info.rate_mHz),           RUN(U16, 2, info.osr),
-    RUN(BYTES, 1, info.streams),          RUN(WHEN, 0, info.capabilities),
-    RUN(BYTES, 1, info.fit_iterations),   RUN(WHEN, 1, info.capabilities),
-    RUN(U16, 1, info.slip_window_ms),     RUN(WHEN, 1, info.capabilities),
-    RUN(F32, 1, info.slip_threshold_mm),  RUN(F32, 1, info.pitch_mm),
+    RUN(BYTES, 3, info.firmware_version),
+    RUN(SENSOR_COUNT, 1, info.sensor_count),
+    RUN(U32, 1, info.capabilities),
+    RUN(TEXTS, 4, info.git_hash),
+    RUN(U32, 2, info.rate_mHz),
+    RUN(U16, 2, info.osr),
+    RUN(BYTES, 1, info.streams),
+    RUN(WHEN, 0, info.capabilities),
+    RUN(BYTES, 1, info.fit_iterations),
+    RUN(WHEN, 1, info.capabilities),
+    RUN(U16, 1, info.slip_window_ms),
+    RUN(WHEN, 1, info.capabilities),
+    RUN(F32, 1, info.slip_threshold_mm),
+    RUN(F32, 1, info.pitch_mm),
     RUN(F32_PAIRS, 1, info.x_mm),
+    RUN(WHEN, 0, info.capabilities),
+    RUN(F32, 3, info.prior_sigma_mm),
+    RUN(U32, 1, info.stored),
+    RUN(WHEN, 0, info.stored),
+    RUN(U32, 1, info.calibration.date_s),
+    RUN(WHEN, 0, info.stored),
+    RUN(U16, 1, info.calibration.placements),
+    RUN(WHEN, 0, info.stored),
+    RUN(F32, 2, info.calibration.force_scale),
+    RUN(WHEN, 0, info.stored),
+    RUN(F32_TRIPLES, 1, info.calibration.sensors),
 };
-_Static_assert(WIRE_CAPABILITY_FIT == 1 << 0 && WIRE_CAPABILITY_SLIP == 1 << 1,
+_Static_assert(WIRE_CAPABILITY_FIT == 1 << 0 && WIRE_CAPABILITY_SLIP == 1 << 1 &&
+                   WIRE_STORED_CALIBRATION == 1 << 0,
                "bits in wire_info_runs and wire_health_runs");
 LAYOUT(wire_info, WIRE_INFO);
 
@@ -111,9 +133,29 @@ EMPTY_LAYOUT(cmd_health, WIRE_CMD_HEALTH);
 static const struct run cmd_loader_runs[] = {RUN(U32, 1, cmd_loader.magic)};
 static LAYOUT(cmd_loader, WIRE_CMD_LOADER);
 
-#define COMMANDS_WITHOUT_SLIP                                                                      \
+static const struct run cmd_calibrate_runs[] = {
+    RUN(SENSOR_COUNT, 1, cmd_calibrate.sensor_count),
+    RUN(U32, 1, cmd_calibrate.calibration.date_s),
+    RUN(U16, 1, cmd_calibrate.calibration.placements),
+    RUN(F32, 2, cmd_calibrate.calibration.force_scale),
+    RUN(F32_TRIPLES, 1, cmd_calibrate.calibration.sensors),
+};
+static LAYOUT(cmd_calibrate, WIRE_CMD_CALIBRATE);
+EMPTY_LAYOUT(cmd_erase_calibration, WIRE_CMD_ERASE_CALIBRATION);
+static const struct run cmd_keep_runs[] = {RUN(BYTES, 1, cmd_keep.keep)};
+static LAYOUT(cmd_keep, WIRE_CMD_KEEP);
+static const struct run cmd_prior_runs[] = {RUN(F32, 2, cmd_prior.sigma_mm)};
+static LAYOUT(cmd_prior, WIRE_CMD_PRIOR);
+static const struct run cmd_location_limit_runs[] = {RUN(F32, 1, cmd_location_limit.limit_mm)};
+static LAYOUT(cmd_location_limit, WIRE_CMD_LOCATION_LIMIT);
+
+#define COMMANDS_WITHOUT_FIT                                                                       \
   &cmd_stream_layout, &cmd_tare_layout, &cmd_rate_layout, &cmd_osr_layout, &cmd_info_layout,       \
-      &cmd_health_layout, &cmd_loader_layout
+      &cmd_health_layout, &cmd_loader_layout, &cmd_keep_layout
+#define COMMANDS_WITHOUT_SLIP                                                                      \
+  COMMANDS_WITHOUT_FIT, &cmd_calibrate_layout, &cmd_erase_calibration_layout, &cmd_prior_layout,   \
+      &cmd_location_limit_layout
+const struct wire_layout *const wire_commands_without_fit[] = {COMMANDS_WITHOUT_FIT, NULL};
 const struct wire_layout *const wire_commands_without_slip[] = {COMMANDS_WITHOUT_SLIP, NULL};
 const struct wire_layout *const wire_commands[] = {COMMANDS_WITHOUT_SLIP, &cmd_slip_layout, NULL};
 const struct wire_layout *const wire_all_layouts[] = {
@@ -229,6 +271,8 @@ static bool put_run(struct writer *writer, uint8_t kind, const uint8_t *field, u
     return put_u32(writer, field, count, false);
   case F32_PAIRS:
     return put_u32(writer, field, 2 * count, true);
+  case F32_TRIPLES:
+    return put_u32(writer, field, 3 * count, false);
   default:
     put_bytes(writer, field, count);
     return true;
@@ -275,6 +319,8 @@ static bool get_run(const uint8_t *at, uint8_t kind, uint8_t *field, unsigned co
     return get_u32(at, field, count, false);
   case F32_PAIRS:
     return get_u32(at, field, 2 * count, true);
+  case F32_TRIPLES:
+    return get_u32(at, field, 3 * count, false);
   default:
     memcpy(field, at, count);
     return true;
@@ -319,7 +365,7 @@ static const uint8_t bytes_of_kind[] = {[BYTES] = 1,        [TEXTS] = WIRE_TEXT_
                                         [SENSOR_COUNT] = 1, [U16] = 2,
                                         [U32] = 4,          [U64] = 8,
                                         [F32] = 4,          [PAIRS] = 8,
-                                        [F32_PAIRS] = 8};
+                                        [F32_PAIRS] = 8,    [F32_TRIPLES] = 12};
 
 /* False: a value is refused, or the body has another length. */
 static bool get_body(const struct wire_layout *layout, const uint8_t *at, size_t length,

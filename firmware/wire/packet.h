@@ -12,18 +12,19 @@
 #ifndef WIRE_PACKET_H
 #define WIRE_PACKET_H
 
+#include "common/calibration.h"
 #include "common/limits.h"
 #include "common/status.h"
 
 #include <stddef.h>
 #include <stdint.h>
 
-#define WIRE_VERSION 3
+#define WIRE_VERSION 4
 
 enum {
   WIRE_HEADER_BYTES = 12,
   WIRE_CRC_BYTES = 4,
-  WIRE_MAX_BODY_BYTES = 96 + 8 * FT_MAX_SENSORS, /* info */
+  WIRE_MAX_BODY_BYTES = 126 + 20 * FT_MAX_SENSORS, /* info of a calibrated fingertip */
   WIRE_MAX_PACKET_BYTES = WIRE_HEADER_BYTES + WIRE_MAX_BODY_BYTES + WIRE_CRC_BYTES,
   /* COBS adds one byte, and one more for each full 254 bytes; then the delimiter. */
   WIRE_MAX_FRAME_BYTES = WIRE_MAX_PACKET_BYTES + WIRE_MAX_PACKET_BYTES / 254 + 2,
@@ -45,6 +46,11 @@ enum wire_type {
   WIRE_CMD_INFO = 0x85,
   WIRE_CMD_HEALTH = 0x86,
   WIRE_CMD_LOADER = 0x87,
+  WIRE_CMD_CALIBRATE = 0x88,
+  WIRE_CMD_ERASE_CALIBRATION = 0x89,
+  WIRE_CMD_KEEP = 0x8A,
+  WIRE_CMD_PRIOR = 0x8B,
+  WIRE_CMD_LOCATION_LIMIT = 0x8C,
 };
 
 /* Bits of the stream mask. */
@@ -57,7 +63,7 @@ enum wire_stream {
 
 /* What a build can do: cmake/options.cmake. */
 enum wire_capability {
-  WIRE_CAPABILITY_FIT = 1 << 0,        /* contact packets: location and force */
+  WIRE_CAPABILITY_FIT = 1 << 0,        /* contact packets: location and force; and calibrations */
   WIRE_CAPABILITY_SLIP = 1 << 1,       /* and slip, and the command that sets it */
   WIRE_CAPABILITY_RAW_STREAM = 1 << 2, /* raw packets */
 };
@@ -67,7 +73,17 @@ enum wire_result {
   WIRE_RESULT_DONE = 0,
   WIRE_RESULT_UNKNOWN_COMMAND = 1,
   WIRE_RESULT_OUT_OF_RANGE = 2,
-  WIRE_RESULT_NOT_NOW = 3, /* e.g. tare while no sensor answers */
+  WIRE_RESULT_NOT_NOW = 3, /* tare while no sensor answers; a change of what is stored while one is
+                              being written, or where the flash fails */
+};
+
+/* Bits of the word that says what the fingertip keeps without power. */
+enum wire_stored {
+  WIRE_STORED_CALIBRATION = 1 << 0, /* it acts */
+  WIRE_STORED_SETTINGS = 1 << 1,    /* it started with those of a keep command */
+  WIRE_STORED_WRITING = 1 << 2,     /* a change is on its way into the flash */
+  WIRE_STORED_DAMAGED = 1 << 3, /* what is there cannot be read, or is of a later firmware: it is
+                                   not used */
 };
 
 /* Ranges of the settings that commands carry; the device answers OUT_OF_RANGE beyond them. */
@@ -77,6 +93,12 @@ enum wire_result {
 #define WIRE_SLIP_THRESHOLD_MAX_mm 50.0f
 #define WIRE_SLIP_WINDOW_MIN_ms 5u
 #define WIRE_SLIP_WINDOW_MAX_ms 1000u
+#define WIRE_PRIOR_SIGMA_MIN_mm 0.5f /* of a prior; with a width of 0 there is none */
+#define WIRE_PRIOR_SIGMA_MAX_mm 100.0f
+#define WIRE_PRIOR_WIDTH_MIN_mm 0.01f
+#define WIRE_PRIOR_WIDTH_MAX_mm 100.0f
+#define WIRE_LOCATION_LIMIT_MIN_mm 0.01f
+#define WIRE_LOCATION_LIMIT_MAX_mm 100.0f
 #define WIRE_LOADER_MAGIC 0x746F6F42u /* "Boot": a stray byte never reboots a fingertip */
 
 /* Where the time of one frame went, us. The stages follow one another without a gap: their sum is
@@ -104,13 +126,16 @@ struct wire_contact {
   float x_mm, y_mm;      /* contact location, origin in the centre of the pad */
   float p0_Pa;           /* peak of the fitted Gaussian */
   float sigma_mm;        /* its standard deviation */
-  float force_N;         /* 2 pi p0 sigma^2, paper eq. (4) */
+  float force_N;         /* force scale times 2 pi p0 sigma^2, paper eq. (4) */
   float residual_rms_Pa; /* root mean square of the fit residuals */
   /* UNCERTAINTY_VALID */
   float location_sd_mm; /* predicted radial standard deviation of the location */
   float force_sd_N;     /* predicted standard deviation of the force */
   /* SLIP_VALID */
   float slip_mm; /* slip distance, paper eq. (7) */
+  /* WIDTHS_VALID: of an elliptic Gaussian */
+  float sigma_x_mm, sigma_y_mm; /* standard deviations along the axes */
+  float width_correlation;      /* -1..1; 0 unless it lies aslant */
 };
 
 /* The readings of one frame. header.t_us as in the contact packet of the same frame number. */
@@ -120,6 +145,7 @@ struct wire_raw {
   uint32_t valid;         /* bitmap: the reading is a measurement; 0 in a held frame, whose readings
                              are those of the frame before */
   uint32_t saturated;     /* bitmap: above 1980 mbar, where the sensor's range ends */
+  uint32_t doubtful;      /* bitmap: a measurement, but there is reason to doubt it */
   int16_t temperature_cC; /* mean of the sensors, 0.01 degC; 0 until first measured */
   uint8_t sensor_count;   /* 1..FT_MAX_SENSORS */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* absolute, 1/1024 Pa */
@@ -147,6 +173,11 @@ struct wire_info {
   float slip_threshold_mm;                          /* likewise */
   float pitch_mm;                                   /* of a rectangular layout; 0 for a free one */
   float x_mm[FT_MAX_SENSORS], y_mm[FT_MAX_SENSORS]; /* sensor positions */
+  /* With WIRE_CAPABILITY_FIT, else 0 */
+  float prior_sigma_mm, prior_width_mm; /* on sigma; width 0: none */
+  float location_limit_mm;              /* UNCERTAIN where location_sd_mm is above it */
+  uint32_t stored;                      /* enum wire_stored */
+  struct calibration calibration;       /* with WIRE_STORED_CALIBRATION, else 0 */
 };
 
 /* Counters since start, modulo 2^32, and present state. */
@@ -197,6 +228,19 @@ struct wire_cmd_slip {
 struct wire_cmd_loader {
   uint32_t magic; /* WIRE_LOADER_MAGIC */
 };
+struct wire_cmd_calibrate {
+  uint8_t sensor_count; /* that of the fingertip */
+  struct calibration calibration;
+};
+struct wire_cmd_keep {
+  uint8_t keep; /* 1: the present settings; 0: none, the build's own from the next start on */
+};
+struct wire_cmd_prior {
+  float sigma_mm, width_mm; /* both 0: none */
+};
+struct wire_cmd_location_limit {
+  float limit_mm;
+};
 
 struct wire_packet {
   uint8_t type;      /* enum wire_type */
@@ -213,6 +257,10 @@ struct wire_packet {
     struct wire_cmd_osr cmd_osr;
     struct wire_cmd_slip cmd_slip;
     struct wire_cmd_loader cmd_loader;
+    struct wire_cmd_calibrate cmd_calibrate;
+    struct wire_cmd_keep cmd_keep;
+    struct wire_cmd_prior cmd_prior;
+    struct wire_cmd_location_limit cmd_location_limit;
   } body;
 };
 
@@ -221,10 +269,11 @@ struct wire_layout;
 extern const struct wire_layout wire_contact_layout, wire_raw_layout, wire_info_layout,
     wire_health_layout, wire_ack_layout;
 
-/* Sets of layouts, ended by NULL: those of the commands, with and without that for slip, and all
- * there are. */
+/* Sets of layouts, ended by NULL: those of the commands, without that for slip, without those that
+ * concern the fit either, and all there are. */
 extern const struct wire_layout *const wire_commands[];
 extern const struct wire_layout *const wire_commands_without_slip[];
+extern const struct wire_layout *const wire_commands_without_fit[];
 extern const struct wire_layout *const wire_all_layouts[];
 
 /* NULL: the set has no such type. */

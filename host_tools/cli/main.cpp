@@ -15,7 +15,9 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <bitset>
+#include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <map>
 
 namespace {
@@ -47,6 +49,7 @@ struct Options {
   ReplayOptions replay;
   FlashOptions flash;
   std::vector<std::string> settings;
+  bool keep = false, forget = false;
   std::vector<std::string> encode;
   unsigned sequence = 0;
   std::uint64_t time_us = 0;
@@ -131,11 +134,40 @@ std::string rate_text(std::uint32_t rate_mHz) {
 void leave_out_missing(Metadata &pairs, std::uint32_t capabilities) {
   auto is_missing = [&](const std::pair<std::string, std::string> &pair) {
     bool of_slip = pair.first.rfind("slip_", 0) == 0;
-    bool of_fit = pair.first.rfind("fit_", 0) == 0;
+    bool of_fit = pair.first.rfind("fit_", 0) == 0 || pair.first.rfind("prior_", 0) == 0 ||
+                  pair.first.rfind("location_", 0) == 0;
     return (of_slip && !(capabilities & WIRE_CAPABILITY_SLIP)) ||
            (of_fit && !(capabilities & WIRE_CAPABILITY_FIT));
   };
   pairs.erase(std::remove_if(pairs.begin(), pairs.end(), is_missing), pairs.end());
+}
+
+std::string date_text(std::uint32_t date_s) {
+  std::time_t time = date_s;
+  std::tm utc{};
+  gmtime_r(&time, &utc);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M UTC", &utc);
+  return text;
+}
+
+/* A row for each sensor, with a bar from the mean to its gain. */
+void print_gains(const calibration &calibration, std::uint8_t sensor_count) {
+  constexpr int HALF = 10;
+  constexpr double PER_MARK = 0.02;
+  std::printf("\nsensor    gain    sd %%  memory %%%*s-20 %%      mean      +20 %%\n", 3, "");
+  for (int k = 0; k < sensor_count; k++) {
+    const sensor_calibration &sensor = calibration.sensors[k];
+    int marks =
+        std::clamp(static_cast<int>(std::lround((static_cast<double>(sensor.gain) - 1) / PER_MARK)),
+                   -HALF, HALF);
+    std::string below(static_cast<std::size_t>(std::max(-marks, 0)), '#');
+    std::string above(static_cast<std::size_t>(std::max(marks, 0)), '#');
+    std::printf("%6d  %6.3f  %6.1f  %8.1f   %*s%s|%s\n", k, static_cast<double>(sensor.gain),
+                100.0 * static_cast<double>(sensor.gain_sd),
+                100.0 * static_cast<double>(sensor.memory),
+                HALF + 2 - static_cast<int>(below.size()), "", below.c_str(), above.c_str());
+  }
 }
 
 int info(const Options &options) {
@@ -143,12 +175,20 @@ int info(const Options &options) {
   wire_info info = device.session.info().body.info;
   wire_health health = device.session.health().body.health;
   Metadata pairs = info_metadata(info);
+  auto is_of_sensors = [](const std::pair<std::string, std::string> &pair) {
+    return pair.first == "gains" || pair.first == "gain_sds" || pair.first == "memories";
+  };
+  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), is_of_sensors), pairs.end());
   pairs.insert(pairs.begin(), {"port", printable(device.transport->description())});
   for (auto &[key, value] : pairs) {
     if (key == "capabilities") {
       value = capabilities_text(info.capabilities);
     } else if (key == "streams") {
       value = streams_text(info.streams);
+    } else if (key == "stored") {
+      value = stored_text(info.stored);
+    } else if (key == "calibration_date_s") {
+      value += " (" + date_text(info.calibration.date_s) + ")";
     } else if (key == "rate_mHz" && info.rate_mHz == 0) {
       value = rate_text(info.rate_mHz);
     }
@@ -168,6 +208,13 @@ int info(const Options &options) {
   }
   leave_out_missing(counters, info.capabilities);
   print_pairs(counters);
+  if (info.stored & WIRE_STORED_CALIBRATION) {
+    print_gains(info.calibration, info.sensor_count);
+  }
+  if (info.stored & WIRE_STORED_DAMAGED) {
+    std::printf(
+        "\nwhat it had stored cannot be read and is not used; calibrate anew, or set --keep\n");
+  }
   return 0;
 }
 
@@ -211,7 +258,8 @@ int tare(const Options &options) {
 /* Commands for "rate=20" and the like; slip settings share one command. */
 struct Settings {
   std::optional<std::uint32_t> rate_mHz, osr, slip_window_ms;
-  std::optional<float> slip_threshold_mm;
+  std::optional<float> slip_threshold_mm, limit_mm;
+  std::optional<Prior> prior;
 };
 
 Settings parse_settings(const std::vector<std::string> &texts) {
@@ -228,9 +276,14 @@ Settings parse_settings(const std::vector<std::string> &texts) {
       settings.slip_threshold_mm = slip_threshold_mm_from_text(value);
     } else if (key == "slip_window") {
       settings.slip_window_ms = slip_window_ms_from_text(value);
+    } else if (key == "prior") {
+      settings.prior = prior_from_text(value);
+    } else if (key == "limit") {
+      settings.limit_mm = location_limit_mm_from_text(value);
     } else {
       throw Error("setting \"" + text +
-                  "\" is unknown; give rate=HZ|max, osr=N, slip_threshold=MM or slip_window=MS");
+                  "\" is unknown; give rate=HZ|max, osr=N, slip_threshold=MM, slip_window=MS, "
+                  "prior=SIGMA[:WIDTH]|none or limit=MM");
     }
   }
   return settings;
@@ -238,6 +291,9 @@ Settings parse_settings(const std::vector<std::string> &texts) {
 
 int set(const Options &options) {
   Settings settings = typed([&] { return parse_settings(options.settings); });
+  if (options.settings.empty() && !options.keep && !options.forget) {
+    throw WrongUsage("nothing to set; give settings, --keep or --forget; see fingertip set --help");
+  }
   Device device(options.choice);
   Session &session = device.session;
   if (settings.rate_mHz) {
@@ -251,13 +307,27 @@ int set(const Options &options) {
     session.command(command_slip(settings.slip_threshold_mm.value_or(now.slip_threshold_mm),
                                  settings.slip_window_ms.value_or(now.slip_window_ms)));
   }
+  if (settings.prior) {
+    session.command(command_prior(settings.prior->sigma_mm, settings.prior->width_mm));
+  }
+  if (settings.limit_mm) {
+    session.command(command_location_limit(*settings.limit_mm));
+  }
+  if (options.keep || options.forget) {
+    session.command(command_keep(options.keep));
+  }
   wire_info info = session.info().body.info;
   std::printf("rate=%s osr=%u", rate_text(info.rate_mHz).c_str(), info.osr);
   if (info.capabilities & WIRE_CAPABILITY_SLIP) {
     std::printf(" slip_threshold=%s slip_window=%u", shortest(info.slip_threshold_mm).c_str(),
                 info.slip_window_ms);
   }
-  std::printf("\n");
+  if (info.capabilities & WIRE_CAPABILITY_FIT) {
+    std::printf(" prior=%s limit=%s",
+                prior_text({info.prior_sigma_mm, info.prior_width_mm}).c_str(),
+                shortest(info.location_limit_mm).c_str());
+  }
+  std::printf("%s\n", info.stored & WIRE_STORED_SETTINGS ? " kept" : "");
   return 0;
 }
 
@@ -291,11 +361,24 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
       {"info", {0, "info", command_info}},
       {"health", {0, "health", command_health}},
       {"loader", {0, "loader", command_loader}},
+      {"prior",
+       {1, "prior SIGMA[:WIDTH]|none",
+        [&] {
+          Prior prior = prior_from_text(word(1));
+          return command_prior(prior.sigma_mm, prior.width_mm);
+        }}},
+      {"limit",
+       {1, "limit MM",
+        [&] { return command_location_limit(location_limit_mm_from_text(word(1))); }}},
+      {"keep", {0, "keep", [] { return command_keep(true); }}},
+      {"forget", {0, "forget", [] { return command_keep(false); }}},
+      {"erase", {0, "erase", command_erase_calibration}},
   };
   auto form = forms.find(words[0]);
   if (form == forms.end()) {
     throw Error("command \"" + words[0] +
-                "\" is unknown; give stream, tare, rate, osr, slip, info, health or loader");
+                "\" is unknown; give stream, tare, rate, osr, slip, prior, limit, keep, forget, "
+                "erase, info, health or loader");
   }
   if (words.size() != 1 + form->second.arguments) {
     throw Error("wrong arguments; give: fingertip encode " + form->second.usage);
@@ -511,13 +594,23 @@ int run(int argc, char **argv) {
 
   with_port(add("tare", "Measure the zero of every sensor anew; nothing may touch the pad",
                 [&] { return tare(options); }));
-  with_port(add("set", "Change settings until the next power-on", [&] { return set(options); }))
+  CLI::App *set_command =
+      with_port(add("set", "Change settings until the next power-on, or for good with --keep",
+                    [&] { return set(options); }));
+  set_command
       ->add_option("settings", options.settings,
                    "rate=HZ|max (0.1 to 2000), osr=256|512|1024|2048|4096|8192, slip_threshold=MM "
-                   "(0.01 to 50), "
-                   "slip_window=MS (5 to 1000, and 160 frames at most)")
-      ->required()
+                   "(0.01 to 50), slip_window=MS (5 to 1000, and 160 frames at most), "
+                   "prior=SIGMA[:WIDTH]|none (mm, 0.5 to 100, 0.01 to 100; width 0.5), limit=MM "
+                   "(of location_sd_mm, 0.01 to 100)")
       ->type_name("KEY=VALUE");
+  CLI::Option *keep = set_command->add_flag(
+      "--keep", options.keep,
+      "Keep all present settings: the fingertip starts with them from now on");
+  set_command
+      ->add_flag("--forget", options.forget,
+                 "Keep none: from its next start on it has the firmware's own")
+      ->excludes(keep);
   with_port(add("loader", "Restart into the USB loader, to install firmware",
                 [&] { return loader(options); }));
 
@@ -542,7 +635,8 @@ int run(int argc, char **argv) {
   encode_command
       ->add_option("command", options.encode,
                    "stream none|contact,raw,health; tare; rate HZ|max; osr N; slip THRESHOLD_MM "
-                   "WINDOW_MS; info; health; loader")
+                   "WINDOW_MS; prior SIGMA[:WIDTH]|none; limit MM; keep; forget; erase (the "
+                   "calibration); info; health; loader")
       ->required()
       ->type_name("COMMAND [ARGS]");
   encode_command->add_option("--sequence", options.sequence, "Sequence number; default 0")

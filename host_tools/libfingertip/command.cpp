@@ -70,6 +70,34 @@ void check_window(std::uint64_t window_ms) {
   }
 }
 
+constexpr float PRIOR_WIDTH_mm = 0.5F; /* where none is typed: the build's own default */
+
+std::string prior_range() {
+  return "SIGMA or SIGMA:WIDTH, " + shortest(WIRE_PRIOR_SIGMA_MIN_mm) + " to " +
+         shortest(WIRE_PRIOR_SIGMA_MAX_mm) + " and " + shortest(WIRE_PRIOR_WIDTH_MIN_mm) + " to " +
+         shortest(WIRE_PRIOR_WIDTH_MAX_mm) + " mm, or none";
+}
+
+std::string limit_range() {
+  return shortest(WIRE_LOCATION_LIMIT_MIN_mm) + " to " + shortest(WIRE_LOCATION_LIMIT_MAX_mm) +
+         " mm";
+}
+
+void check_prior(const Prior &prior) {
+  bool none = prior.sigma_mm == 0 && prior.width_mm == 0;
+  if (!none &&
+      !(prior.sigma_mm >= WIRE_PRIOR_SIGMA_MIN_mm && prior.sigma_mm <= WIRE_PRIOR_SIGMA_MAX_mm &&
+        prior.width_mm >= WIRE_PRIOR_WIDTH_MIN_mm && prior.width_mm <= WIRE_PRIOR_WIDTH_MAX_mm)) {
+    out_of_range("prior", shortest(prior.sigma_mm) + ":" + shortest(prior.width_mm), prior_range());
+  }
+}
+
+void check_limit(float limit_mm) {
+  if (!(limit_mm >= WIRE_LOCATION_LIMIT_MIN_mm && limit_mm <= WIRE_LOCATION_LIMIT_MAX_mm)) {
+    out_of_range("limit", shortest(limit_mm), limit_range());
+  }
+}
+
 } // namespace
 
 std::uint8_t possible_streams(const wire_info &info, std::uint8_t streams) {
@@ -124,6 +152,42 @@ wire_packet command_loader() {
   return packet;
 }
 
+wire_packet command_calibrate(const calibration &calibration, std::uint8_t sensor_count) {
+  if (sensor_count < 1 || sensor_count > FT_MAX_SENSORS ||
+      !calibration_is_valid(&calibration, sensor_count)) {
+    throw Error("the calibration holds a value out of range; calibrate anew");
+  }
+  wire_packet packet = packet_of(WIRE_CMD_CALIBRATE);
+  packet.body.cmd_calibrate.sensor_count = sensor_count;
+  packet.body.cmd_calibrate.calibration = calibration;
+  return packet;
+}
+
+wire_packet command_erase_calibration() {
+  return packet_of(WIRE_CMD_ERASE_CALIBRATION);
+}
+
+wire_packet command_keep(bool keep) {
+  wire_packet packet = packet_of(WIRE_CMD_KEEP);
+  packet.body.cmd_keep.keep = keep ? 1 : 0;
+  return packet;
+}
+
+wire_packet command_prior(float sigma_mm, float width_mm) {
+  check_prior({sigma_mm, width_mm});
+  wire_packet packet = packet_of(WIRE_CMD_PRIOR);
+  packet.body.cmd_prior.sigma_mm = sigma_mm;
+  packet.body.cmd_prior.width_mm = width_mm;
+  return packet;
+}
+
+wire_packet command_location_limit(float limit_mm) {
+  check_limit(limit_mm);
+  wire_packet packet = packet_of(WIRE_CMD_LOCATION_LIMIT);
+  packet.body.cmd_location_limit.limit_mm = limit_mm;
+  return packet;
+}
+
 std::uint32_t rate_mHz_from_text(const std::string &text) {
   if (text == "max") {
     return 0;
@@ -163,6 +227,36 @@ std::uint32_t slip_window_ms_from_text(const std::string &text) {
   }
   check_window(*window_ms);
   return static_cast<std::uint32_t>(*window_ms);
+}
+
+Prior prior_from_text(const std::string &text) {
+  if (text == "none") {
+    return {0, 0};
+  }
+  std::size_t colon = text.find(':');
+  auto sigma_mm = to_float(text.substr(0, colon));
+  auto width_mm = colon == std::string::npos ? PRIOR_WIDTH_mm : to_float(text.substr(colon + 1));
+  if (!sigma_mm || !width_mm) {
+    throw Error("prior \"" + text + "\" is no number; give " + prior_range());
+  }
+  if (*sigma_mm == 0) {
+    out_of_range("prior", text, prior_range());
+  }
+  check_prior({*sigma_mm, *width_mm});
+  return {*sigma_mm, *width_mm};
+}
+
+float location_limit_mm_from_text(const std::string &text) {
+  auto limit_mm = to_float(text);
+  if (!limit_mm) {
+    throw Error("limit \"" + text + "\" is no number; give " + limit_range());
+  }
+  check_limit(*limit_mm);
+  return *limit_mm;
+}
+
+std::string prior_text(const Prior &prior) {
+  return prior.width_mm > 0 ? shortest(prior.sigma_mm) + ":" + shortest(prior.width_mm) : "none";
 }
 
 std::vector<std::uint8_t> frame_bytes(const wire_packet &packet) {

@@ -22,12 +22,25 @@ wire_packet command_slip(float threshold_mm, std::uint32_t window_ms);
 wire_packet command_info();
 wire_packet command_health();
 wire_packet command_loader();
+wire_packet command_calibrate(const calibration &calibration, std::uint8_t sensor_count);
+wire_packet command_erase_calibration();
+wire_packet command_keep(bool keep);                       /* the present settings, or none */
+wire_packet command_prior(float sigma_mm, float width_mm); /* 0 and 0: none */
+wire_packet command_location_limit(float limit_mm);
 
 /* Values as people type them. Each throws Error if the text is no number or out of range. */
 std::uint32_t rate_mHz_from_text(const std::string &text); /* Hz, or "max" */
 std::uint32_t osr_from_text(const std::string &text);
 float slip_threshold_mm_from_text(const std::string &text);
 std::uint32_t slip_window_ms_from_text(const std::string &text);
+struct Prior {
+  float sigma_mm, width_mm;
+};
+Prior prior_from_text(const std::string &text); /* "3.1", "3.1:0.5", or "none" */
+float location_limit_mm_from_text(const std::string &text);
+
+/* "3.1:0.5", or "none". */
+std::string prior_text(const Prior &prior);
 
 /* The bytes of a packet on the line, delimiter included. */
 std::vector<std::uint8_t> frame_bytes(const wire_packet &packet);

@@ -67,6 +67,16 @@ std::string command_name(std::uint8_t type) {
     return "health";
   case WIRE_CMD_LOADER:
     return "loader";
+  case WIRE_CMD_CALIBRATE:
+    return "calibrate";
+  case WIRE_CMD_ERASE_CALIBRATION:
+    return "erase calibration";
+  case WIRE_CMD_KEEP:
+    return "keep";
+  case WIRE_CMD_PRIOR:
+    return "prior";
+  case WIRE_CMD_LOCATION_LIMIT:
+    return "limit";
   default:
     return "0x" + hex({type});
   }
@@ -82,7 +92,8 @@ std::string result_text(std::uint8_t result) {
   case WIRE_RESULT_OUT_OF_RANGE:
     return "the value is out of range for this firmware";
   case WIRE_RESULT_NOT_NOW:
-    return "not possible now; see that its sensors answer (fingertip info)";
+    return "not possible now; see that its sensors answer and nothing is being stored (fingertip "
+           "info)";
   default:
     return "result " + std::to_string(result) + "; update these tools";
   }
@@ -101,21 +112,31 @@ constexpr BitName capability_names[] = {{WIRE_CAPABILITY_FIT, "fit"},
                                         {WIRE_CAPABILITY_SLIP, "slip"},
                                         {WIRE_CAPABILITY_RAW_STREAM, "raw"}};
 
+constexpr BitName stored_names[] = {{WIRE_STORED_CALIBRATION, "calibration"},
+                                    {WIRE_STORED_SETTINGS, "settings"},
+                                    {WIRE_STORED_WRITING, "writing"},
+                                    {WIRE_STORED_DAMAGED, "damaged"}};
+
 template <std::size_t count>
-std::string bits_text(const BitName (&names)[count], std::uint32_t bits) {
+std::string bits_text(const BitName (&names)[count], std::uint32_t bits,
+                      const char *none = "none") {
   std::string text;
   for (const BitName &name : names) {
     if (bits & name.bit) {
       text += (text.empty() ? "" : ",") + std::string(name.name);
     }
   }
-  return text.empty() ? "none" : text;
+  return text.empty() ? none : text;
 }
 
 } // namespace
 
 std::string capabilities_text(std::uint32_t capabilities) {
   return bits_text(capability_names, capabilities);
+}
+
+std::string stored_text(std::uint32_t stored) {
+  return bits_text(stored_names, stored, "nothing");
 }
 
 std::string streams_text(std::uint8_t streams) {

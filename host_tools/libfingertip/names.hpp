@@ -28,6 +28,9 @@ std::string result_text(std::uint8_t result);
 /* "fit,slip,raw": what a firmware can do; "none". */
 std::string capabilities_text(std::uint32_t capabilities);
 
+/* "calibration,settings": what a fingertip keeps without power; "nothing". */
+std::string stored_text(std::uint32_t stored);
+
 /* "contact,raw" and back; "none" is 0. Throws Error on an unknown name. */
 std::string streams_text(std::uint8_t streams);
 std::uint8_t streams_from_text(const std::string &text);

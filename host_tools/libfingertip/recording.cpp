@@ -21,7 +21,7 @@ constexpr const char *FIRST_LINE = "# fingertip-recording 1";
 constexpr const char *FIRST_LINE_JOINT = "# fingertip-recording 2";
 constexpr const char *JOINT_COLUMNS = "device,time_us,";
 constexpr double Q10 = 1024.0;
-constexpr std::size_t RAW_COLUMNS = 5; /* without those of the sensors */
+constexpr std::size_t RAW_COLUMNS = 6; /* without those of the sensors */
 
 /* A value of the packet that the file shows in another unit: shown = raw / scale. */
 template <typename Integer> struct Scaled {
@@ -46,6 +46,9 @@ template <typename Visitor> void visit_contact(Visitor &visit, wire_packet &pack
   visit("residual_rms_Pa", contact.residual_rms_Pa);
   visit("location_sd_mm", contact.location_sd_mm);
   visit("force_sd_N", contact.force_sd_N);
+  visit("sigma_x_mm", contact.sigma_x_mm);
+  visit("sigma_y_mm", contact.sigma_y_mm);
+  visit("width_correlation", contact.width_correlation);
   visit("convert_us", contact.stages.convert_us);
   visit("read_us", contact.stages.read_us);
   visit("queue_us", contact.stages.queue_us);
@@ -62,6 +65,7 @@ void visit_raw(Visitor &visit, wire_packet &packet, std::uint8_t sensor_count) {
   visit("raw_flags", raw.flags);
   visit("valid", raw.valid);
   visit("saturated", raw.saturated);
+  visit("doubtful", raw.doubtful);
   visit("temperature_degC", Scaled<std::int16_t>{raw.temperature_cC, 100.0, 2});
   for (int k = 0; k < sensor_count; k++) {
     visit("s" + std::to_string(k) + "_Pa", Scaled<std::int32_t>{raw.pressure_Pa_q10[k], Q10, 4});
@@ -112,7 +116,27 @@ template <typename Visitor> void visit_info(Visitor &visit, wire_info &info) {
   visit("fit_iterations", info.fit_iterations);
   visit("streams", info.streams);
   visit("pitch_mm", info.pitch_mm);
+  visit("prior_sigma_mm", info.prior_sigma_mm);
+  visit("prior_width_mm", info.prior_width_mm);
+  visit("location_limit_mm", info.location_limit_mm);
+  visit("stored", info.stored);
 }
+
+/* What there is only of a calibrated fingertip: numbers, and lists with one for each sensor. */
+template <typename Visitor> void visit_calibration(Visitor &visit, calibration &calibration) {
+  visit("calibration_date_s", calibration.date_s);
+  visit("calibration_placements", calibration.placements);
+  visit("force_scale", calibration.force_scale);
+  visit("force_scale_sd", calibration.force_scale_sd);
+}
+
+struct SensorList {
+  const char *name;
+  float sensor_calibration::*value;
+};
+constexpr SensorList sensor_lists[] = {{"gains", &sensor_calibration::gain},
+                                       {"gain_sds", &sensor_calibration::gain_sd},
+                                       {"memories", &sensor_calibration::memory}};
 
 struct Namer {
   std::string text;
@@ -237,10 +261,10 @@ std::string text_field(const char *field) {
   return std::string(field, strnlen(field, WIRE_TEXT_BYTES));
 }
 
-std::string positions_text(const float *positions, std::uint8_t count) {
+template <typename ValueOf> std::string list_text(ValueOf value_of, std::uint8_t count) {
   std::string text;
   for (int k = 0; k < count; k++) {
-    text += (k ? " " : "") + shortest(positions[k]);
+    text += (k ? " " : "") + shortest(value_of(k));
   }
   return text;
 }
@@ -265,8 +289,19 @@ Metadata info_metadata(const wire_info &info) {
   PairWriter writer;
   visit_info(writer, copy);
   pairs.insert(pairs.end(), writer.pairs.begin(), writer.pairs.end());
-  pairs.emplace_back("x_mm", positions_text(info.x_mm, info.sensor_count));
-  pairs.emplace_back("y_mm", positions_text(info.y_mm, info.sensor_count));
+  auto list = [&](const char *name, auto value_of) {
+    pairs.emplace_back(name, list_text(value_of, info.sensor_count));
+  };
+  list("x_mm", [&](int k) { return info.x_mm[k]; });
+  list("y_mm", [&](int k) { return info.y_mm[k]; });
+  if (info.stored & WIRE_STORED_CALIBRATION) {
+    PairWriter of_calibration;
+    visit_calibration(of_calibration, copy.calibration);
+    pairs.insert(pairs.end(), of_calibration.pairs.begin(), of_calibration.pairs.end());
+    for (const SensorList &each : sensor_lists) {
+      list(each.name, [&](int k) { return info.calibration.sensors[k].*each.value; });
+    }
+  }
   return pairs;
 }
 
@@ -659,13 +694,13 @@ void RecordingReader::read_comment(const std::string &text) {
     std::memset(field, 0, WIRE_TEXT_BYTES);
     std::memcpy(field, value.data(), std::min<std::size_t>(value.size(), WIRE_TEXT_BYTES));
   };
-  auto read_positions = [&](float *positions) {
+  auto read_list = [&](auto value_of) {
     auto numbers = split(value, ' ');
     if (numbers.size() > FT_MAX_SENSORS) {
-      throw Damage{"too many sensor positions"};
+      throw Damage{key + " has too many values"};
     }
     for (std::size_t k = 0; k < numbers.size() && !value.empty(); k++) {
-      parse_cell(key, numbers[k], positions[k]);
+      parse_cell(key, numbers[k], value_of(k));
     }
   };
   if (key == "packet") {
@@ -693,6 +728,9 @@ void RecordingReader::read_comment(const std::string &text) {
       }
       item.packet.type = WIRE_INFO;
       item.packet.body.info = info_;
+      if (!(info_.stored & WIRE_STORED_CALIBRATION)) {
+        item.packet.body.info.calibration = {};
+      }
     } else {
       throw Damage{"packet \"" + std::string(words[0]) + "\" is unknown"};
     }
@@ -720,16 +758,23 @@ void RecordingReader::read_comment(const std::string &text) {
       parse_cell(key, parts[i], info_.firmware_version[i]);
     }
   } else if (key == "x_mm") {
-    read_positions(info_.x_mm);
+    read_list([&](std::size_t k) -> float & { return info_.x_mm[k]; });
   } else if (key == "y_mm") {
-    read_positions(info_.y_mm);
+    read_list([&](std::size_t k) -> float & { return info_.y_mm[k]; });
   } else {
+    for (const SensorList &each : sensor_lists) {
+      if (key == each.name) {
+        read_list(
+            [&](std::size_t k) -> float & { return info_.calibration.sensors[k].*each.value; });
+      }
+    }
     auto visit = [&](const std::string &name, auto &field) {
       if (name == key) {
         parse_cell(name, value, field);
       }
     };
     visit_info(visit, info_);
+    visit_calibration(visit, info_.calibration);
   }
 }
 

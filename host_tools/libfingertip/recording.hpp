@@ -2,33 +2,32 @@
  *
  *   # fingertip-recording 1
  *   # key: value              of the info packet: serial, board, scene, firmware, git, sensors,
- *                             rate_mHz, osr, ..., x_mm and y_mm of the sensors; of the recorder
- *   t_us,frame,sequence,flags,...,total_us,raw_sequence,...,s0_Pa,...,tare0_Pa,...
- *                             one row per frame: a contact and a raw packet; cells of one that
- *                             did not come are empty
- *   # packet: NAME key=value  every other packet, where it came; before an info packet stand those
- *                             of its fields that are new, as "# key: value"
- *   # event: text             "gone" and "back" of the port among others
- *   # end: key=value ...      totals, over all runs of a device that restarted; absent if the
+ *                             rate_mHz, osr, ..., x_mm and y_mm of the sensors; of a calibrated
+ *                             fingertip (stored, bit 0) date, force scale, gains, ...; of the
+ * recorder t_us,frame,sequence,flags,...,total_us,raw_sequence,...,s0_Pa,...,tare0_Pa,... one row
+ * per frame: a contact and a raw packet; cells of one that did not come are empty # packet: NAME
+ * key=value  every other packet, where it came; before an info packet stand those of its fields
+ * that are new, as "# key: value" # event: text             "gone" and "back" of the port among
+ * others # end: key=value ...      totals, over all runs of a device that restarted; absent if the
  *                             recorder was killed or the disk was full
  *
  * Times are device time in us, pressures Pa with four decimals (exact: the wire carries 1/1024 Pa),
- * floats the shortest text that reads back the same. So nothing of the packets is lost.
+ * floats the shortest text that reads back the same. So nothing of the packets is lost. Pressures
+ * are as measured, whatever the calibration: reading - tare, over gain, is what the fit got.
  *
  * Several fingertips on one clock are a recording of format 2:
  *
  *   # fingertip-recording 2
  *   # devices: SERIAL SERIAL...   numbered from 0
  *   # host_zero_us: N             time_us 0 on the recorder's steady clock (CLOCK_MONOTONIC)
- *   # 0/key: value                every comment of format 1 with the number of its fingertip before it
- *   device,time_us,t_us,frame,... the number; the recorder's clock; then the columns of format 1
+ *   # 0/key: value                every comment of format 1 with the number of its fingertip before
+ * it device,time_us,t_us,frame,... the number; the recorder's clock; then the columns of format 1
  *   # 0/clock: t_us=... time_us=... drift_ppm=... uncertainty_us=...
- *                             once a second: the device time t_us is time_us on the recorder's clock,
- *                             surely within the uncertainty; a positive drift is a fast fingertip
- *   # 0/end: frames=... jumps=... drift_ppm=... uncertainty_us=... packets=...
- *   # end: reason=... frames=... seconds=... alignment_us=...
- *                             alignment_us: no two rows of different fingertips were ever further
- *                             from their true distance in time
+ *                             once a second: the device time t_us is time_us on the recorder's
+ * clock, surely within the uncertainty; a positive drift is a fast fingertip # 0/end: frames=...
+ * jumps=... drift_ppm=... uncertainty_us=... packets=... # end: reason=... frames=... seconds=...
+ * alignment_us=... alignment_us: no two rows of different fingertips were ever further from their
+ * true distance in time
  *
  * Rows are in order of time_us unless one came more than a quarter of a second late.
  * Acknowledgements are left out: they are in the clock lines.

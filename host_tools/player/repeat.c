@@ -18,8 +18,11 @@ bool repeat_begin(const struct wire_info *info) {
   app.frame.noise_Pa_q10 = osr->noise_Pa_q10;
   app.fit_settings.iterations = info->fit_iterations;
   app.fit_settings.n_largest = DEFAULT_FIT_N_LARGEST;
-  app.fit_settings.prior_sigma_mm = DEFAULT_PRIOR_SIGMA_mm;
-  app.fit_settings.prior_width_mm = DEFAULT_PRIOR_WIDTH_mm;
+  app.fit_settings.prior_sigma_mm = info->prior_sigma_mm;
+  app.fit_settings.prior_width_mm = info->prior_width_mm;
+  app.fit_settings.location_sd_limit_mm = info->location_limit_mm;
+  const bool calibrated = info->stored & WIRE_STORED_CALIBRATION;
+  app_use_calibration(&app, calibrated ? &info->calibration : NULL);
   app.contact_settings.slip_threshold_mm = info->slip_threshold_mm;
   app.contact_settings.slip_window_us = info->slip_window_ms * 1000u;
   repeat_tare();
@@ -39,6 +42,7 @@ void repeat_frame(const struct wire_packet *packet, bool held, struct wire_conta
   app.frame.temperature_cC = raw->temperature_cC;
   app.frame.valid = raw->valid;
   app.frame.saturated = raw->saturated;
+  app.frame.doubtful = raw->doubtful;
   memcpy(app.frame.pressure_Pa_q10, raw->pressure_Pa_q10, sizeof app.frame.pressure_Pa_q10);
   app_process_frame(&app, 0);
   const struct wire_stages stages = contact->stages;

@@ -11,7 +11,7 @@
 extern "C" {
 #endif
 
-/* From the info packet: layout, OSR, slip settings, iterations. The prior is the build's own.
+/* From the info packet: layout, OSR, slip settings, iterations, prior, limit, calibration.
  * False: it cannot be; the packet is not to be trusted. */
 bool repeat_begin(const struct wire_info *info);
 

@@ -39,8 +39,8 @@ TRUTH_COLUMNS = ("contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "sli
 STAGES = ("convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us")
 CONTACT_COLUMNS = (
     "sequence", "flags", "sensors_used", "x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N", "slip_mm", "residual_rms_Pa",
-    "location_sd_mm", "force_sd_N", *STAGES, "total_us")
-RAW_COLUMNS = ("raw_sequence", "raw_flags", "valid", "saturated", "temperature_degC")
+    "location_sd_mm", "force_sd_N", "sigma_x_mm", "sigma_y_mm", "width_correlation", *STAGES, "total_us")
+RAW_COLUMNS = ("raw_sequence", "raw_flags", "valid", "saturated", "doubtful", "temperature_degC")
 RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *RAW_COLUMNS)
 
 # Flag bits of the contact packet, firmware/wire/PROTOCOL.md.

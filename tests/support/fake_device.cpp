@@ -15,6 +15,7 @@
  *     absent=K         sensor K is not there
  *     mute=1           never says anything
  *     refuse=1         answers every command but stream, info and health with "not now"
+ *     calibrated=1     a calibration is stored
  *     serial=HEX       its serial number; board=NAME, git=HASH, firmware=A.B.C likewise
  *     loader=1         ends when it is asked into the loader, by the command or by 1200 baud
  *     version=V        speaks this protocol version, answers nothing else
@@ -64,6 +65,10 @@ public:
         info.firmware_version[i] =
             static_cast<std::uint8_t>(fingertip::to_u64(parts.at(i)).value_or(0));
       }
+    }
+    if (number("calibrated", 0)) {
+      info.calibration = test::make_calibration();
+      store(WIRE_STORED_CALIBRATION, true);
     }
     power_on();
   }
@@ -285,6 +290,24 @@ private:
       info_.body.info.slip_threshold_mm = command.body.cmd_slip.threshold_mm;
       info_.body.info.slip_window_ms = command.body.cmd_slip.window_ms;
       return false;
+    case WIRE_CMD_PRIOR:
+      info_.body.info.prior_sigma_mm = command.body.cmd_prior.sigma_mm;
+      info_.body.info.prior_width_mm = command.body.cmd_prior.width_mm;
+      return false;
+    case WIRE_CMD_LOCATION_LIMIT:
+      info_.body.info.location_limit_mm = command.body.cmd_location_limit.limit_mm;
+      return false;
+    case WIRE_CMD_KEEP:
+      store(WIRE_STORED_SETTINGS, command.body.cmd_keep.keep != 0);
+      return false;
+    case WIRE_CMD_CALIBRATE:
+      info_.body.info.calibration = command.body.cmd_calibrate.calibration;
+      store(WIRE_STORED_CALIBRATION, true);
+      return false;
+    case WIRE_CMD_ERASE_CALIBRATION:
+      info_.body.info.calibration = {};
+      store(WIRE_STORED_CALIBRATION, false);
+      return false;
     case WIRE_CMD_INFO:
       info_.t_us = now_us();
       send(info_);
@@ -299,6 +322,11 @@ private:
     default:
       return false;
     }
+  }
+
+  void store(std::uint32_t bit, bool there) {
+    std::uint32_t &stored = info_.body.info.stored;
+    stored = there ? stored | bit : stored & ~bit;
   }
 
   std::string link_;

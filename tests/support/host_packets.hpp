@@ -24,7 +24,7 @@ inline wire_packet make_contact(std::uint16_t sequence, std::uint64_t t_us, std:
   wire_contact &contact = packet.body.contact;
   contact.frame = frame;
   contact.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
-                  CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED;
+                  CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED | CONTACT_FLAG_WIDTHS_VALID;
   contact.sensors_used = 0x7FFF;
   contact.x_mm = 0.1f + static_cast<float>(frame % 10);
   contact.y_mm = -3.3333333f;
@@ -35,6 +35,9 @@ inline wire_packet make_contact(std::uint16_t sequence, std::uint64_t t_us, std:
   contact.residual_rms_Pa = 12.5f;
   contact.location_sd_mm = 0.0123456f;
   contact.force_sd_N = 3.0e-5f;
+  contact.sigma_x_mm = 5.9f;
+  contact.sigma_y_mm = 5.4000001f;
+  contact.width_correlation = -0.03f;
   contact.stages = {2501, 3206, 1449, 23, 6918, 30, 14127};
   return packet;
 }
@@ -47,6 +50,7 @@ inline wire_packet make_raw(std::uint16_t sequence, std::uint64_t t_us, std::uin
   raw.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED;
   raw.valid = 0x7FFE;
   raw.saturated = 0x4000;
+  raw.doubtful = 0x0010;
   raw.temperature_cC = -1234;
   raw.sensor_count = sensor_count;
   for (int k = 0; k < sensor_count; k++) {
@@ -54,6 +58,19 @@ inline wire_packet make_raw(std::uint16_t sequence, std::uint64_t t_us, std::uin
     raw.baseline_Pa_q10[k] = k % 2 ? -k : 101325 * 1024 - k;
   }
   return packet;
+}
+
+inline calibration make_calibration() {
+  calibration made{};
+  made.date_s = 1785931200;
+  made.placements = 30;
+  made.force_scale = 1.0625f;
+  made.force_scale_sd = 0.021f;
+  for (int k = 0; k < 15; k++) {
+    made.sensors[k] = {0.86f + 0.02f * static_cast<float>(k),
+                       0.008f + 0.0001f * static_cast<float>(k), k == 3 ? 0.05f : 0.0f};
+  }
+  return made;
 }
 
 inline wire_packet make_info(std::uint16_t sequence, std::uint64_t t_us) {
@@ -81,6 +98,9 @@ inline wire_packet make_info(std::uint16_t sequence, std::uint64_t t_us) {
     info.x_mm[k] = 9.0f * static_cast<float>(k / 5 - 1);
     info.y_mm[k] = 9.0f * static_cast<float>(k % 5 - 2);
   }
+  info.prior_sigma_mm = 3.1f;
+  info.prior_width_mm = 0.5f;
+  info.location_limit_mm = 0.6f;
   return packet;
 }
 

@@ -175,9 +175,9 @@ class Usage(CliTest):
 
     def test_encode(self):
         # COBS of version, type, sequence, time, body and CRC, worked out by zlib.crc32 and hand
-        self.assertEqual(self.run_cli("encode", "tare")[0], "03038101010101010101010105c0fe24ba00\n")
+        self.assertEqual(self.run_cli("encode", "tare")[0], "030481010101010101010101054f17bcce00\n")
         timed = self.run_cli("encode", "--sequence", "258", "--time", "1", "osr", "8192")[0].strip()
-        self.assertTrue(timed.startswith("0603830201"), timed)
+        self.assertTrue(timed.startswith("0604830201"), timed)
         self.assertIn("slip THRESHOLD_MM WINDOW_MS", self.error("encode", "slip", "0.75", status=2))
         self.assertIn("0.1 to 2000", self.error("encode", "rate", "3000", status=2))
         self.assertIn("unknown", self.error("encode", "bogus", status=2))
@@ -351,11 +351,11 @@ class ErrorsPeopleMeet(CliTest):
                              f"fingertip: {self.port}: is fingertip AAAA, not BBBB; leave out --port, or see `fingertip list`\n")
 
     def test_older_or_newer_protocol_version(self):
-        for version in (1, 2, 4):
+        for version in (1, 3, 5):
             with self.device(f"version={version}"):
                 for command in (["info"], ["set", "rate=max"]):
                     self.assertEqual(self.error(*command, "--port", self.port),
-                                     f"fingertip: {self.port}: speaks protocol version {version}, this tool version 3; install "
+                                     f"fingertip: {self.port}: speaks protocol version {version}, this tool version 4; install "
                                      "this tool's firmware with `fingertip flash`, or use the other's tool\n")
 
     def test_cable_pulled(self):
@@ -575,12 +575,36 @@ class Commands(CliTest):
             self.assertRegex(out, r"(?m)^rate_mHz +20000$")
             self.environment["FINGERTIP_PORT"] = self.port
             out = self.run_cli("set", "rate=max", "osr=256", "slip_threshold=0.5")[0]
-            self.assertEqual(out, "rate=max osr=256 slip_threshold=0.5 slip_window=100\n")
+            self.assertEqual(out, "rate=max osr=256 slip_threshold=0.5 slip_window=100 prior=3.1:0.5 limit=0.6\n")
             self.assertRegex(self.run_cli("info")[0], r"(?m)^rate_mHz +max$")
             out = self.run_cli("set", "slip_window=250", "rate=20.5")[0]
-            self.assertEqual(out, "rate=20.500 osr=256 slip_threshold=0.5 slip_window=250\n")
+            self.assertEqual(out, "rate=20.500 osr=256 slip_threshold=0.5 slip_window=250 prior=3.1:0.5 limit=0.6\n")
             self.assertEqual(self.run_cli("tare")[0], "tared\n")
             self.assertIn("RPI-RP2", self.run_cli("loader")[0])
+
+    def test_settings_that_are_kept(self):
+        self.environment["FINGERTIP_PORT"] = self.port
+        with self.device():
+            self.assertRegex(self.run_cli("info")[0], r"(?m)^stored +nothing$")
+            out = self.run_cli("set", "prior=2.5", "limit=0.8", "--keep")[0]
+            self.assertEqual(out, "rate=20.000 osr=1024 slip_threshold=0.75 slip_window=100 prior=2.5:0.5 limit=0.8 kept\n")
+            self.assertRegex(self.run_cli("info")[0], r"(?m)^stored +settings$")
+            self.assertNotIn("kept", self.run_cli("set", "--forget", "prior=none")[0])
+            self.assertIn(" kept\n", self.run_cli("set", "--keep")[0])
+        self.assertIn("excludes", self.error("set", "--keep", "--forget", status=2))
+        for words in ([], ["prior=0"], ["limit=x"], ["prior=3:0"]):
+            self.assertIn("give", self.error("set", *words, status=2))
+
+    def test_info_shows_a_calibration(self):
+        with self.device("calibrated=1"):
+            out = self.run_cli("info", "--port", self.port)[0]
+        self.assertRegex(out, r"(?m)^stored +calibration$")
+        self.assertRegex(out, r"(?m)^calibration_date_s +1785931200 \(2026-08-05 12:00 UTC\)$")
+        self.assertRegex(out, r"(?m)^force_scale +1.0625$")
+        rows = re.findall(r"(?m)^ +(\d+) +(\d\.\d+) +([\d.]+) +([\d.]+) +(#*)\|(#*)$", out)
+        self.assertEqual(len(rows), 15)
+        self.assertEqual(rows[3], ("3", "0.920", "0.8", "5.0", "####", ""))
+        self.assertEqual(rows[12], ("12", "1.100", "0.9", "0.0", "", "#####"))
 
     def test_info_names_missing_sensors(self):
         with self.device("absent=7"):
@@ -1074,7 +1098,7 @@ class Monitor(CliTest):
         with self.device("frames=300"):
             out, _ = self.run_cli("monitor", "--port", self.port, "--until-gone")
         self.assertNotIn("\x1b", out)
-        self.assertRegex(out, r"(?m)^\d\.\d s  \d+ frames .* force 5\.00 N  CONTACT FIT_VALID UNCERTAINTY_VALID SLIP_VALID TARED$")
+        self.assertRegex(out, r"(?m)^\d\.\d s  \d+ frames .* force 5\.00 N  CONTACT FIT_VALID UNCERTAINTY_VALID SLIP_VALID TARED WIDTHS_VALID$")
 
 
 if __name__ == "__main__":

@@ -28,6 +28,9 @@ static struct {
   uint64_t from_us;
 } press;
 
+/* Of a sensor, relative to the mean; NULL: all are alike. */
+static double (*world_gain)(unsigned sensor);
+
 static inline double world_pressure_Pa(void *context, unsigned sensor, uint64_t t_us) {
   (void)context;
   if (press.force_N == 0.0 || t_us < press.from_us) {
@@ -38,7 +41,8 @@ static inline double world_pressure_Pa(void *context, unsigned sensor, uint64_t 
   double y_mm = press.y_mm + press.speed_y_mm_s * (double)(t_us - press.from_us) * 1e-6;
   double dx = (double)geometry.x_mm[sensor] - press.x_mm;
   double dy = (double)geometry.y_mm[sensor] - y_mm;
-  return AMBIENT_Pa + p0_Pa * exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm));
+  return AMBIENT_Pa + (world_gain ? world_gain(sensor) : 1.0) * p0_Pa *
+                          exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm));
 }
 
 static inline uint64_t next_event_us(const void *context) {
@@ -55,6 +59,7 @@ static inline void main_round(void *context) {
 
 static inline void rig_start(void) {
   memset(&press, 0, sizeof press);
+  world_gain = NULL;
   native_start(false);
   native_cdc_reset();
   sim_array_init(&array, geometry.sensor_count, 1);

@@ -25,6 +25,7 @@ static void it_tells_its_capabilities_and_their_settings_only(void) {
   TEST_ASSERT_EQUAL_UINT8(FT_WITH_FIT ? DEFAULT_FIT_ITERATIONS : 0, info.fit_iterations);
   TEST_ASSERT_EQUAL_UINT16(FT_WITH_SLIP ? DEFAULT_SLIP_WINDOW_ms : 0, info.slip_window_ms);
   TEST_ASSERT_EQUAL_FLOAT(FT_WITH_SLIP ? DEFAULT_SLIP_THRESHOLD_mm : 0, info.slip_threshold_mm);
+  TEST_ASSERT_EQUAL_FLOAT(FT_WITH_FIT ? DEFAULT_LOCATION_LIMIT_mm : 0, info.location_limit_mm);
   TEST_ASSERT_EQUAL_HEX32(CAPABILITIES, get_health().capabilities);
 }
 
@@ -41,6 +42,14 @@ static void it_refuses_streams_and_commands_that_it_lacks(void) {
   TEST_ASSERT_EQUAL_UINT8(
       FT_WITH_SLIP ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
       ask((struct wire_packet){.type = WIRE_CMD_SLIP, .body.cmd_slip = {0.5f, 200}}));
+  TEST_ASSERT_EQUAL_UINT8(
+      FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
+      ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {3.1f, 0.5f}}));
+  TEST_ASSERT_EQUAL_UINT8(
+      FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
+      ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {1}}));
+  TEST_ASSERT_EQUAL_UINT8(FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
+                          ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
 }
 
 static void it_streams_what_it_has(void) {

@@ -49,6 +49,20 @@ static void test_nothing_fitted(void) {
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TARED, update());
   input.masked = true;
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TARED | CONTACT_FLAG_SENSOR_MASKED, update());
+  input.calibrated = true;
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TARED | CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_CALIBRATED,
+                          update());
+}
+
+static void test_the_force_is_scaled_and_its_uncertainty_holds_that_of_the_scale(void) {
+  const struct contact_settings scaled = {.force_scale = 1.25f, .force_scale_sd = 0.03f};
+  fit.force_N = 4.0f;
+  fit.force_sd_N = 0.128f; /* times 1.25 0.16; 0.03 of 4 N is 0.12 */
+  struct contact_force force = contact_weigh(&scaled, &fit);
+  TEST_ASSERT_FLOAT_WITHIN(1e-6f, 5.0f, force.force_N);
+  TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.2f, force.force_sd_N);
+  fit.flags &= ~(uint32_t)CONTACT_FLAG_UNCERTAINTY_VALID;
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, contact_weigh(&scaled, &fit).force_sd_N);
 }
 
 static void test_flags_of_the_fit_pass(void) {
@@ -162,6 +176,7 @@ static void test_saturation_and_lower_bound(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_nothing_fitted);
+  RUN_TEST(test_the_force_is_scaled_and_its_uncertainty_holds_that_of_the_scale);
   RUN_TEST(test_flags_of_the_fit_pass);
   RUN_TEST(test_slip_flag_and_threshold);
   RUN_TEST(test_doubtful_locations_end_the_history);

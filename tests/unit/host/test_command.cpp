@@ -2,6 +2,7 @@
 #include "libfingertip/error.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/text.hpp"
+#include "support/host_packets.hpp"
 
 #include <gtest/gtest.h>
 
@@ -26,6 +27,40 @@ TEST(Command, CarriesItsValue) {
   EXPECT_EQ(slip.body.cmd_slip.threshold_mm, 0.5f);
   EXPECT_EQ(slip.body.cmd_slip.window_ms, 250);
   EXPECT_EQ(decoded(command_loader()).body.cmd_loader.magic, WIRE_LOADER_MAGIC);
+  EXPECT_EQ(decoded(command_keep(true)).body.cmd_keep.keep, 1);
+  EXPECT_EQ(decoded(command_keep(false)).body.cmd_keep.keep, 0);
+  wire_packet prior = decoded(command_prior(3.1f, 0.4f));
+  EXPECT_EQ(prior.body.cmd_prior.sigma_mm, 3.1f);
+  EXPECT_EQ(prior.body.cmd_prior.width_mm, 0.4f);
+  EXPECT_EQ(decoded(command_location_limit(0.8f)).body.cmd_location_limit.limit_mm, 0.8f);
+  EXPECT_EQ(decoded(command_erase_calibration()).type, WIRE_CMD_ERASE_CALIBRATION);
+  wire_packet calibrate = decoded(command_calibrate(test::make_calibration(), 15));
+  EXPECT_EQ(calibrate.body.cmd_calibrate.sensor_count, 15);
+  EXPECT_EQ(calibrate.body.cmd_calibrate.calibration.sensors[14].gain,
+            test::make_calibration().sensors[14].gain);
+}
+
+TEST(Command, ACalibrationOutOfRangeIsNotSent) {
+  struct calibration bad = test::make_calibration();
+  bad.sensors[7].gain = 4.1f;
+  EXPECT_THROW(command_calibrate(bad, 15), Error);
+  EXPECT_NO_THROW(command_calibrate(bad, 7)) << "the sensor is not among them";
+  EXPECT_THROW(command_calibrate(test::make_calibration(), 0), Error);
+  EXPECT_THROW(command_calibrate(test::make_calibration(), 33), Error);
+}
+
+TEST(Command, PriorsAndLimitsAsTyped) {
+  EXPECT_EQ(prior_text(prior_from_text("none")), "none");
+  EXPECT_EQ(prior_text(prior_from_text("3.1")), "3.1:0.5");
+  EXPECT_EQ(prior_text(prior_from_text("100:0.01")), "100:0.01");
+  for (const char *text : {"", "x", "3.1:", ":0.5", "0", "0:0", "0.4", "101", "3:0", "3:101",
+                           "3:nan", "inf", "3:0.5:1", "-3"}) {
+    EXPECT_THROW(prior_from_text(text), Error) << text;
+  }
+  EXPECT_EQ(location_limit_mm_from_text("0.6"), 0.6f);
+  for (const char *text : {"", "0", "0.009", "101", "nan", "none"}) {
+    EXPECT_THROW(location_limit_mm_from_text(text), Error) << text;
+  }
 }
 
 TEST(Command, RangesEndWhereThePacketSays) {
@@ -75,7 +110,7 @@ TEST(Names, StreamsBothWays) {
 TEST(Names, EveryFlagBitHasAName) {
   EXPECT_EQ(flags_text(0), "");
   EXPECT_EQ(flags_text(CONTACT_FLAG_CONTACT | CONTACT_FLAG_SLIP), "CONTACT SLIP");
-  EXPECT_EQ(flags_text(1u << 7 | 1u << 31), "bit7 bit31");
+  EXPECT_EQ(flags_text(1u << 20 | 1u << 31), "bit20 bit31");
 }
 
 TEST(Text, NumbersReadBackTheSame) {

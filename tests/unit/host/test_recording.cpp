@@ -195,6 +195,21 @@ TEST(Recording, ChangedInfoAfterAReturnIsKept) {
   EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(packets));
 }
 
+TEST(Recording, TheCalibrationIsKeptWithItsChanges) {
+  test::TemporaryFolder folder;
+  wire_packet calibrated = test::make_info(1, 2);
+  calibrated.body.info.stored = WIRE_STORED_CALIBRATION | WIRE_STORED_SETTINGS;
+  calibrated.body.info.calibration = test::make_calibration();
+  wire_packet anew = calibrated, erased = test::make_info(5, 6);
+  anew.body.info.calibration.sensors[14].memory = 0.125f;
+  anew.body.info.calibration.force_scale = 0.9375f;
+  erased.body.info.stored = WIRE_STORED_SETTINGS;
+  std::vector<wire_packet> packets = {calibrated, test::make_contact(2, 3, 1), anew, erased, anew};
+  record(folder / "r.csv", packets);
+  EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(packets));
+  EXPECT_NE(contents(folder / "r.csv").find("\n# gains: 0.86 0.88 "), std::string::npos);
+}
+
 TEST(Recording, AKilledRecorderLosesAtMostTheLastFrame) {
   test::TemporaryFolder folder;
   record(folder / "r.csv", all_kinds(), false);

@@ -13,24 +13,31 @@ static size_t body_length(const struct wire_packet *packet) {
     uint32_t flags = packet->body.contact.flags;
     return 22u + (flags & CONTACT_FLAG_FIT_VALID ? 28 : 0) +
            (flags & CONTACT_FLAG_UNCERTAINTY_VALID ? 8 : 0) +
-           (flags & CONTACT_FLAG_SLIP_VALID ? 4 : 0);
+           (flags & CONTACT_FLAG_SLIP_VALID ? 4 : 0) + (flags & CONTACT_FLAG_WIDTHS_VALID ? 12 : 0);
   }
   case WIRE_RAW:
-    return 19 + 8u * packet->body.raw.sensor_count;
+    return 23 + 8u * packet->body.raw.sensor_count;
   case WIRE_INFO: {
-    uint32_t capabilities = packet->body.info.capabilities;
-    return 89u + (capabilities & WIRE_CAPABILITY_FIT ? 1 : 0) +
-           (capabilities & WIRE_CAPABILITY_SLIP ? 6 : 0) + 8u * packet->body.info.sensor_count;
+    const struct wire_info *info = &packet->body.info;
+    return 93u + (info->capabilities & WIRE_CAPABILITY_FIT ? 13 : 0) +
+           (info->capabilities & WIRE_CAPABILITY_SLIP ? 6 : 0) + 8u * info->sensor_count +
+           (info->stored & WIRE_STORED_CALIBRATION ? 14 + 12u * info->sensor_count : 0);
   }
   case WIRE_HEALTH:
     return 68u + (packet->body.health.capabilities & WIRE_CAPABILITY_FIT ? 4 : 0);
   case WIRE_ACK:
     return 12;
   case WIRE_CMD_STREAM:
+  case WIRE_CMD_KEEP:
     return 1;
   case WIRE_CMD_RATE:
   case WIRE_CMD_LOADER:
+  case WIRE_CMD_LOCATION_LIMIT:
     return 4;
+  case WIRE_CMD_PRIOR:
+    return 8;
+  case WIRE_CMD_CALIBRATE:
+    return 15 + 12u * packet->body.cmd_calibrate.sensor_count;
   case WIRE_CMD_OSR:
     return 2;
   case WIRE_CMD_SLIP:
@@ -92,14 +99,15 @@ static void test_quantities_travel_under_their_flags(void) {
     size_t length;
   } parts[] = {{CONTACT_FLAG_FIT_VALID, 28},
                {CONTACT_FLAG_UNCERTAINTY_VALID, 8},
-               {CONTACT_FLAG_SLIP_VALID, 4}};
-  for (unsigned present = 0; present < 8; present++) {
+               {CONTACT_FLAG_SLIP_VALID, 4},
+               {CONTACT_FLAG_WIDTHS_VALID, 12}};
+  for (unsigned present = 0; present < 16; present++) {
     struct sampler sampler = {SAMPLE_GREATEST, {12}};
     struct wire_packet packet;
     sample_packet(&sampler, WIRE_CONTACT, &packet);
     packet.body.contact.flags = 0;
     size_t expected = 22;
-    for (unsigned i = 0; i < 3; i++) {
+    for (unsigned i = 0; i < 4; i++) {
       if (present >> i & 1) {
         packet.body.contact.flags |= parts[i].flag;
         expected += parts[i].length;
@@ -119,6 +127,10 @@ static void test_quantities_travel_under_their_flags(void) {
     TEST_ASSERT_EQUAL_FLOAT(sd, contact->location_sd_mm);
     TEST_ASSERT_EQUAL_FLOAT(sd, contact->force_sd_N);
     TEST_ASSERT_EQUAL_FLOAT(present & 4 ? FLT_MAX : 0, contact->slip_mm);
+    float widths = present & 8 ? FLT_MAX : 0;
+    TEST_ASSERT_EQUAL_FLOAT(widths, contact->sigma_x_mm);
+    TEST_ASSERT_EQUAL_FLOAT(widths, contact->sigma_y_mm);
+    TEST_ASSERT_EQUAL_FLOAT(widths, contact->width_correlation);
     TEST_ASSERT_EQUAL_UINT16(UINT16_MAX, contact->stages.total_us);
   }
 }
@@ -128,10 +140,14 @@ static void test_sets_of_commands(void) {
   for (size_t i = 0; i < WIRE_TYPES; i++) {
     bool command = wire_types[i] >= 0x80;
     bool slip = wire_types[i] == WIRE_CMD_SLIP;
+    bool fit = wire_types[i] == WIRE_CMD_CALIBRATE || wire_types[i] == WIRE_CMD_ERASE_CALIBRATION ||
+               wire_types[i] == WIRE_CMD_PRIOR || wire_types[i] == WIRE_CMD_LOCATION_LIMIT;
     TEST_ASSERT_NOT_NULL(wire_find_layout(wire_all_layouts, wire_types[i]));
     TEST_ASSERT_EQUAL(command, wire_find_layout(wire_commands, wire_types[i]) != NULL);
     TEST_ASSERT_EQUAL(command && !slip,
                       wire_find_layout(wire_commands_without_slip, wire_types[i]) != NULL);
+    TEST_ASSERT_EQUAL(command && !slip && !fit,
+                      wire_find_layout(wire_commands_without_fit, wire_types[i]) != NULL);
   }
   struct sampler sampler = {SAMPLE_RANDOM, {12}};
   struct wire_packet packet, decoded;
@@ -166,6 +182,20 @@ static void assert_float_guarded(uint8_t type, size_t body_offset, float *field,
   *field = 0.0f;
 }
 
+/* of FT_MAX_SENSORS */
+static void assert_calibration_guarded(uint8_t type, size_t body_offset,
+                                       struct calibration *calibration,
+                                       struct wire_packet *packet) {
+  assert_float_guarded(type, body_offset + 6, &calibration->force_scale, packet);
+  assert_float_guarded(type, body_offset + 10, &calibration->force_scale_sd, packet);
+  for (size_t k = 0; k < FT_MAX_SENSORS; k++) {
+    struct sensor_calibration *sensor = &calibration->sensors[k];
+    assert_float_guarded(type, body_offset + 14 + 12 * k, &sensor->gain, packet);
+    assert_float_guarded(type, body_offset + 18 + 12 * k, &sensor->gain_sd, packet);
+    assert_float_guarded(type, body_offset + 22 + 12 * k, &sensor->memory, packet);
+  }
+}
+
 static void test_infinity_and_nan_are_refused_both_ways(void) {
   struct sampler sampler = {SAMPLE_GREATEST, {13}};
   struct wire_packet packet;
@@ -173,8 +203,9 @@ static void test_infinity_and_nan_are_refused_both_ways(void) {
   struct wire_contact *contact = &packet.body.contact;
   float *fields[] = {&contact->x_mm,           &contact->y_mm,       &contact->p0_Pa,
                      &contact->sigma_mm,       &contact->force_N,    &contact->residual_rms_Pa,
-                     &contact->location_sd_mm, &contact->force_sd_N, &contact->slip_mm};
-  for (size_t i = 0; i < 9; i++) {
+                     &contact->location_sd_mm, &contact->force_sd_N, &contact->slip_mm,
+                     &contact->sigma_x_mm,     &contact->sigma_y_mm, &contact->width_correlation};
+  for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
     assert_float_guarded(WIRE_CONTACT, 26 + 4 * i, fields[i], &packet);
   }
   sample_packet(&sampler, WIRE_INFO, &packet);
@@ -184,6 +215,21 @@ static void test_infinity_and_nan_are_refused_both_ways(void) {
     assert_float_guarded(WIRE_INFO, 96 + 8 * k, &packet.body.info.x_mm[k], &packet);
     assert_float_guarded(WIRE_INFO, 100 + 8 * k, &packet.body.info.y_mm[k], &packet);
   }
+  struct wire_info *info = &packet.body.info;
+  float *settings[] = {&info->prior_sigma_mm, &info->prior_width_mm, &info->location_limit_mm};
+  for (size_t i = 0; i < 3; i++) {
+    assert_float_guarded(WIRE_INFO, 352 + 4 * i, settings[i], &packet);
+  }
+  assert_calibration_guarded(WIRE_INFO, 368, &info->calibration, &packet);
+  sample_packet(&sampler, WIRE_CMD_CALIBRATE, &packet);
+  assert_calibration_guarded(WIRE_CMD_CALIBRATE, 1, &packet.body.cmd_calibrate.calibration,
+                             &packet);
+  sample_packet(&sampler, WIRE_CMD_PRIOR, &packet);
+  assert_float_guarded(WIRE_CMD_PRIOR, 0, &packet.body.cmd_prior.sigma_mm, &packet);
+  assert_float_guarded(WIRE_CMD_PRIOR, 4, &packet.body.cmd_prior.width_mm, &packet);
+  sample_packet(&sampler, WIRE_CMD_LOCATION_LIMIT, &packet);
+  assert_float_guarded(WIRE_CMD_LOCATION_LIMIT, 0, &packet.body.cmd_location_limit.limit_mm,
+                       &packet);
   sample_packet(&sampler, WIRE_CMD_SLIP, &packet);
   assert_float_guarded(WIRE_CMD_SLIP, 0, &packet.body.cmd_slip.threshold_mm, &packet);
 }
@@ -192,14 +238,16 @@ static void test_sensor_counts_outside_their_range_are_refused_both_ways(void) {
   static const struct {
     uint8_t type;
     size_t offset;
-  } cases[] = {{WIRE_RAW, 18}, {WIRE_INFO, 3}};
-  for (int i = 0; i < 2; i++) {
+  } cases[] = {{WIRE_RAW, 22}, {WIRE_INFO, 3}, {WIRE_CMD_CALIBRATE, 0}};
+  for (int i = 0; i < 3; i++) {
     for (int count = 0; count < 256; count++) {
       struct wire_packet packet;
       memset(&packet, 0, sizeof packet);
       packet.type = cases[i].type;
-      *(packet.type == WIRE_RAW ? &packet.body.raw.sensor_count : &packet.body.info.sensor_count) =
-          (uint8_t)count;
+      uint8_t *sensor_count = packet.type == WIRE_RAW    ? &packet.body.raw.sensor_count
+                              : packet.type == WIRE_INFO ? &packet.body.info.sensor_count
+                                                         : &packet.body.cmd_calibrate.sensor_count;
+      *sensor_count = (uint8_t)count;
       bool legal = count >= 1 && count <= 32;
       uint8_t frame[WIRE_MAX_FRAME_BYTES];
       size_t length;
@@ -208,8 +256,7 @@ static void test_sensor_counts_outside_their_range_are_refused_both_ways(void) {
       bytes[12 + cases[i].offset] = (uint8_t)count;
       struct wire_packet decoded;
       if (count > 40) {
-        *(packet.type == WIRE_RAW ? &packet.body.raw.sensor_count
-                                  : &packet.body.info.sensor_count) = 32;
+        *sensor_count = 32;
       }
       TEST_ASSERT_EQUAL_INT(legal ? FT_OK : FT_ERR_FORMAT,
                             decode_sealed(bytes, 12 + body_length(&packet), &decoded));
@@ -237,7 +284,7 @@ static void test_text_is_printable(void) {
       bytes[12 + offsets[text]] = (uint8_t)value;
       struct wire_packet decoded;
       TEST_ASSERT_EQUAL_INT(legal ? FT_OK : FT_ERR_FORMAT,
-                            decode_sealed(bytes, 12 + 89 + 8, &decoded));
+                            decode_sealed(bytes, 12 + 93 + 8, &decoded));
     }
   }
 }
@@ -324,18 +371,18 @@ static void test_bytes_that_are_not_cobs_are_refused(void) {
   TEST_ASSERT_EQUAL_INT(FT_ERR_FORMAT, wire_decode(wire_all_layouts, inner_zero, 20, &packet));
 }
 
-/* Runs without a zero of 250 to 275 bytes, so around the 254 at which a block is full, ended by a
+/* Runs without a zero of 250 to 279 bytes, so around the 254 at which a block is full, ended by a
  * zero or by the end of the packet, where the CRC's own bytes decide. */
 static void test_cobs_blocks_at_their_limit(void) {
   unsigned full_at_end = 0;
-  for (size_t run = 1; run <= 275; run++) {
+  for (size_t run = 1; run <= 279; run++) {
     for (uint16_t sequence = 0; sequence < 300; sequence++) {
       struct wire_packet packet;
       memset(&packet, 0, sizeof packet);
       packet.type = WIRE_RAW;
       packet.sequence = sequence;
       struct wire_raw *raw = &packet.body.raw;
-      raw->frame = raw->flags = raw->valid = raw->saturated = 0x01010101;
+      raw->frame = raw->flags = raw->valid = raw->saturated = raw->doubtful = 0x01010101;
       raw->temperature_cC = 0x0101;
       raw->sensor_count = 32;
       for (size_t k = 0; k < 32; k++) {
@@ -343,25 +390,25 @@ static void test_cobs_blocks_at_their_limit(void) {
       }
       /* Byte 12 + run of the packet becomes 0: the run begins after the time's last byte. */
       size_t zero_at = run;
-      if (zero_at >= 19 && zero_at < 275) {
-        size_t value = (zero_at - 19) / 4;
+      if (zero_at >= 23 && zero_at < 279) {
+        size_t value = (zero_at - 23) / 4;
         int32_t *at = value % 2 ? raw->baseline_Pa_q10 : raw->pressure_Pa_q10;
-        at[value / 2] &= (int32_t) ~(0xFFu << 8 * ((zero_at - 19) % 4));
+        at[value / 2] &= (int32_t) ~(0xFFu << 8 * ((zero_at - 23) % 4));
       }
       uint8_t frame[WIRE_MAX_FRAME_BYTES];
       size_t length = 0;
       TEST_ASSERT_EQUAL_INT(FT_OK, encode(&packet, frame, &length));
       uint8_t bytes[WIRE_MAX_PACKET_BYTES];
       size_t used = unseal(frame, length - 1, bytes);
-      TEST_ASSERT_EQUAL_size_t(12 + 275, used);
+      TEST_ASSERT_EQUAL_size_t(12 + 279, used);
       uint8_t expected[WIRE_MAX_FRAME_BYTES];
       TEST_ASSERT_EQUAL_size_t(length - 1, seal(bytes, used, expected));
       TEST_ASSERT_EQUAL_MEMORY(expected, frame, length - 1);
-      if (zero_at >= 19 && zero_at < 275) {
+      if (zero_at >= 23 && zero_at < 279) {
         TEST_ASSERT_EQUAL_HEX8(0, bytes[12 + zero_at]);
       }
-      /* 12 + 275 + 4 = 291 bytes: with the zero at 36 the last run of 254 ends the packet. */
-      full_at_end += length >= 256 && frame[length - 256] == 0xFF && zero_at == 24;
+      /* 12 + 279 + 4 = 295 bytes: with the zero at 40 the last run of 254 ends the packet. */
+      full_at_end += length >= 256 && frame[length - 256] == 0xFF && zero_at == 28;
       struct wire_packet decoded;
       TEST_ASSERT_EQUAL_INT(FT_OK, wire_decode(wire_all_layouts, frame, length - 1, &decoded));
       TEST_ASSERT_EQUAL_MEMORY(&packet, &decoded, sizeof packet);

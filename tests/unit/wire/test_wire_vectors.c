@@ -87,7 +87,7 @@ static void test_contact(void) {
       .frame = 70000,
       .flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
                CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED | CONTACT_FLAG_LOW_SIGNAL |
-               CONTACT_FLAG_SENSOR_MASKED,
+               CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_CALIBRATED,
       .sensors_used = 0x7FEF,
       .x_mm = -4.5f,
       .y_mm = 12.25f,
@@ -98,13 +98,18 @@ static void test_contact(void) {
       .residual_rms_Pa = 17.5f,
       .location_sd_mm = 0.015625f,
       .force_sd_N = 0.00390625f,
+      .sigma_x_mm = 5.75f,
+      .sigma_y_mm = 5.5f,
+      .width_correlation = -0.125f,
       .stages = {2300, 3001, 12, 34, 2760, 56, 8163},
   };
   check("contact.txt", &packet);
 
   struct wire_contact *contact = &packet.body.contact;
-  contact->flags &= ~(uint32_t)CONTACT_FLAG_SLIP_VALID;
+  contact->flags &=
+      ~(uint32_t)(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_CALIBRATED);
   contact->slip_mm = 0.0f;
+  contact->sigma_x_mm = contact->sigma_y_mm = contact->width_correlation = 0.0f;
   check("contact_press.txt", &packet);
 
   *contact = (struct wire_contact){
@@ -120,6 +125,7 @@ static void test_raw(void) {
                CONTACT_FLAG_SENSOR_MASKED;
   raw->valid = 5;
   raw->saturated = 4;
+  raw->doubtful = 1;
   raw->temperature_cC = -125;
   raw->sensor_count = 3;
   raw->pressure_Pa_q10[0] = 100000 * 1024;
@@ -128,6 +134,16 @@ static void test_raw(void) {
   raw->pressure_Pa_q10[2] = INT32_MAX;
   raw->baseline_Pa_q10[2] = INT32_MIN;
   check("raw.txt", &packet);
+}
+
+static struct calibration calibration_of_two(void) {
+  return (struct calibration){
+      .date_s = 1785931200,
+      .placements = 30,
+      .force_scale = 1.0625f,
+      .force_scale_sd = 0.03125f,
+      .sensors = {{0.875f, 0.0078125f, 0.0f}, {1.125f, 0.015625f, 0.0625f}},
+  };
 }
 
 static void test_info(void) {
@@ -153,11 +169,18 @@ static void test_info(void) {
   info->y_mm[0] = -18.0f;
   info->x_mm[1] = 4.5f;
   info->y_mm[1] = 18.0f;
+  info->prior_sigma_mm = 3.125f;
+  info->prior_width_mm = 0.5f;
+  info->location_limit_mm = 0.625f;
+  info->stored = WIRE_STORED_CALIBRATION | WIRE_STORED_SETTINGS;
+  info->calibration = calibration_of_two();
   check("info.txt", &packet);
 
   memcpy(info->scene, "press", 5);
   info->capabilities = WIRE_CAPABILITY_FIT;
   info->streams = WIRE_STREAM_CONTACT;
+  info->stored = WIRE_STORED_WRITING | WIRE_STORED_DAMAGED;
+  memset(&info->calibration, 0, sizeof info->calibration);
   info->slip_window_ms = 0;
   info->slip_threshold_mm = 0.0f;
   check("info_press.txt", &packet);
@@ -166,6 +189,8 @@ static void test_info(void) {
   info->capabilities = WIRE_CAPABILITY_RAW_STREAM;
   info->streams = WIRE_STREAM_RAW;
   info->fit_iterations = 0;
+  info->prior_sigma_mm = info->prior_width_mm = info->location_limit_mm = 0.0f;
+  info->stored = 0;
   check("info_raw.txt", &packet);
 }
 
@@ -231,6 +256,22 @@ static void test_commands(void) {
   packet = blank(0x87, 6, 60);
   packet.body.cmd_loader.magic = WIRE_LOADER_MAGIC;
   check("command_loader.txt", &packet);
+  packet = blank(0x88, 7, 70);
+  packet.body.cmd_calibrate.sensor_count = 2;
+  packet.body.cmd_calibrate.calibration = calibration_of_two();
+  check("command_calibrate.txt", &packet);
+  packet = blank(0x89, 8, 80);
+  check("command_erase_calibration.txt", &packet);
+  packet = blank(0x8A, 9, 90);
+  packet.body.cmd_keep.keep = 1;
+  check("command_keep.txt", &packet);
+  packet = blank(0x8B, 10, 100);
+  packet.body.cmd_prior.sigma_mm = 3.125f;
+  packet.body.cmd_prior.width_mm = 0.5f;
+  check("command_prior.txt", &packet);
+  packet = blank(0x8C, 11, 110);
+  packet.body.cmd_location_limit.limit_mm = 0.625f;
+  check("command_location_limit.txt", &packet);
 }
 
 int main(void) {

@@ -12,9 +12,12 @@
 #include <string.h>
 
 static const uint8_t wire_types[] = {
-    WIRE_CONTACT,    WIRE_RAW,        WIRE_INFO,      WIRE_HEALTH,  WIRE_ACK,
-    WIRE_CMD_STREAM, WIRE_CMD_TARE,   WIRE_CMD_RATE,  WIRE_CMD_OSR, WIRE_CMD_SLIP,
-    WIRE_CMD_INFO,   WIRE_CMD_HEALTH, WIRE_CMD_LOADER};
+    WIRE_CONTACT,    WIRE_RAW,           WIRE_INFO,
+    WIRE_HEALTH,     WIRE_ACK,           WIRE_CMD_STREAM,
+    WIRE_CMD_TARE,   WIRE_CMD_RATE,      WIRE_CMD_OSR,
+    WIRE_CMD_SLIP,   WIRE_CMD_INFO,      WIRE_CMD_HEALTH,
+    WIRE_CMD_LOADER, WIRE_CMD_CALIBRATE, WIRE_CMD_ERASE_CALIBRATION,
+    WIRE_CMD_KEEP,   WIRE_CMD_PRIOR,     WIRE_CMD_LOCATION_LIMIT};
 enum { WIRE_TYPES = sizeof wire_types };
 
 enum sample_kind { SAMPLE_ZERO, SAMPLE_GREATEST, SAMPLE_LEAST, SAMPLE_RANDOM, SAMPLE_KINDS };
@@ -118,6 +121,11 @@ static inline void sample_contact(struct sampler *sampler, struct wire_contact *
   if (contact->flags & CONTACT_FLAG_SLIP_VALID) {
     contact->slip_mm = sample_f32(sampler);
   }
+  if (contact->flags & CONTACT_FLAG_WIDTHS_VALID) {
+    contact->sigma_x_mm = sample_f32(sampler);
+    contact->sigma_y_mm = sample_f32(sampler);
+    contact->width_correlation = sample_f32(sampler);
+  }
 }
 
 static inline void sample_raw(struct sampler *sampler, struct wire_raw *raw) {
@@ -125,11 +133,25 @@ static inline void sample_raw(struct sampler *sampler, struct wire_raw *raw) {
   raw->flags = sample_u32(sampler);
   raw->valid = sample_u32(sampler);
   raw->saturated = sample_u32(sampler);
+  raw->doubtful = sample_u32(sampler);
   raw->temperature_cC = (int16_t)(sample_i32(sampler) >> 16);
   raw->sensor_count = sample_sensor_count(sampler);
   for (int k = 0; k < raw->sensor_count; k++) {
     raw->pressure_Pa_q10[k] = sample_i32(sampler);
     raw->baseline_Pa_q10[k] = sample_i32(sampler);
+  }
+}
+
+static inline void sample_calibration(struct sampler *sampler, unsigned sensor_count,
+                                      struct calibration *calibration) {
+  calibration->date_s = sample_u32(sampler);
+  calibration->placements = (uint16_t)sample_u32(sampler);
+  calibration->force_scale = sample_f32(sampler);
+  calibration->force_scale_sd = sample_f32(sampler);
+  for (unsigned k = 0; k < sensor_count; k++) {
+    calibration->sensors[k].gain = sample_f32(sampler);
+    calibration->sensors[k].gain_sd = sample_f32(sampler);
+    calibration->sensors[k].memory = sample_f32(sampler);
   }
 }
 
@@ -159,6 +181,15 @@ static inline void sample_info(struct sampler *sampler, struct wire_info *info) 
   for (int k = 0; k < info->sensor_count; k++) {
     info->x_mm[k] = sample_f32(sampler);
     info->y_mm[k] = sample_f32(sampler);
+  }
+  if (info->capabilities & WIRE_CAPABILITY_FIT) {
+    info->prior_sigma_mm = sample_f32(sampler);
+    info->prior_width_mm = sample_f32(sampler);
+    info->location_limit_mm = sample_f32(sampler);
+  }
+  info->stored = sample_u32(sampler);
+  if (info->stored & WIRE_STORED_CALIBRATION) {
+    sample_calibration(sampler, info->sensor_count, &info->calibration);
   }
 }
 
@@ -222,6 +253,21 @@ static inline void sample_packet(struct sampler *sampler, uint8_t type,
     break;
   case WIRE_CMD_LOADER:
     packet->body.cmd_loader.magic = sample_u32(sampler);
+    break;
+  case WIRE_CMD_CALIBRATE:
+    packet->body.cmd_calibrate.sensor_count = sample_sensor_count(sampler);
+    sample_calibration(sampler, packet->body.cmd_calibrate.sensor_count,
+                       &packet->body.cmd_calibrate.calibration);
+    break;
+  case WIRE_CMD_KEEP:
+    packet->body.cmd_keep.keep = (uint8_t)sample_u32(sampler);
+    break;
+  case WIRE_CMD_PRIOR:
+    packet->body.cmd_prior.sigma_mm = sample_f32(sampler);
+    packet->body.cmd_prior.width_mm = sample_f32(sampler);
+    break;
+  case WIRE_CMD_LOCATION_LIMIT:
+    packet->body.cmd_location_limit.limit_mm = sample_f32(sampler);
     break;
   default:
     break;

@@ -1,0 +1,19 @@
+#include "common/calibration.h"
+
+/* False for NaN too. */
+static bool is_within(float value, float least, float greatest) {
+  return value >= least && value <= greatest;
+}
+
+bool calibration_is_valid(const struct calibration *calibration, unsigned sensor_count) {
+  bool valid = is_within(calibration->force_scale, CALIBRATION_FORCE_SCALE_MIN,
+                         CALIBRATION_FORCE_SCALE_MAX) &&
+               is_within(calibration->force_scale_sd, 0.0f, CALIBRATION_FORCE_SCALE_SD_MAX);
+  for (unsigned k = 0; k < sensor_count; k++) {
+    const struct sensor_calibration *sensor = &calibration->sensors[k];
+    valid = valid && is_within(sensor->gain, CALIBRATION_GAIN_MIN, CALIBRATION_GAIN_MAX) &&
+            is_within(sensor->gain_sd, 0.0f, CALIBRATION_GAIN_SD_MAX) &&
+            is_within(sensor->memory, 0.0f, CALIBRATION_MEMORY_MAX);
+  }
+  return valid;
+}
