@@ -119,6 +119,7 @@ void app_start(struct app *app, const struct array_bus *bus) {
   app->fit_settings.n_largest = DEFAULT_FIT_N_LARGEST;
   app->fit_settings.prior_sigma_mm = DEFAULT_PRIOR_SIGMA_mm;
   app->fit_settings.prior_width_mm = DEFAULT_PRIOR_WIDTH_mm;
+  app->fit_settings.model_sd_q16 = (uint16_t)(DEFAULT_MODEL_SD * 65536.0f);
   app->fit_settings.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
   app_use_calibration(app, NULL);
 #endif

@@ -151,7 +151,7 @@ static void leave_outlier_out(const struct fit_array *array, const int32_t *pres
   struct fit_result without;
   usable &= ~(UINT32_C(1) << outlier);
   bool rough = fit_grid_masked(array, pressure_Pa_q10, usable, settings, &without);
-  if (fit_outlier_gone(result, &without, rough, array->pitch_mm)) {
+  if (fit_outlier_gone(settings, result, &without, rough, array->pitch_mm)) {
     *result = without;
   }
 }

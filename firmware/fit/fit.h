@@ -65,7 +65,8 @@ struct fit_result {
   float sigma_mm;
   float force_N;         /* 2 pi p0 sigma^2 */
   float residual_rms_Pa; /* over the sensors used */
-  float location_sd_mm;  /* radial, from the covariance at the solution */
+  float location_sd_mm;  /* radial: 63 % of errors are smaller, 98 % smaller than twice it */
+  float location_noise_mm; /* what of it is noise: how far a contact at rest jitters */
   float force_sd_N;
   float sigma_x_mm, sigma_y_mm; /* WIDTHS_VALID: of an elliptic Gaussian, along the axes */
   float width_correlation;      /* and its correlation, -1..1: 0 unless it lies aslant */

@@ -309,6 +309,86 @@ static int outlier_of(const struct samples *samples, const struct parameters *th
   return alone && others * (float)(FIT_OUTLIER * FIT_OUTLIER) < worst * freedom ? outlier : -1;
 }
 
+/* Pitches, and shares of the force, by which a unit of the right-hand side moves the result; and what
+ * of these an error of variance 1 of every reading makes. */
+struct influence {
+  float gain; /* sigma^2 / p0 */
+  float x[PARAMETERS], y[PARAMETERS], force[PARAMETERS];
+  float location_form, force_form;
+};
+
+static float product(const float a[PARAMETERS], const float b[PARAMETERS]) {
+  float sum = 0.0f;
+  for (int i = 0; i < PARAMETERS; i++) {
+    sum += a[i] * b[i];
+  }
+  return sum;
+}
+
+/* Leaves matrix^-1 direction, scaled, in `influence`, and returns the quadratic form. */
+static float influence_along(const struct normal_equations *normal, const float *direction,
+                             float scale, float *influence) {
+  for (int i = 0; i < PARAMETERS; i++) {
+    influence[i] = direction[i];
+  }
+  solve(normal, influence);
+  float form = scale * scale * product(influence, direction);
+  for (int i = 0; i < PARAMETERS; i++) {
+    influence[i] *= scale;
+  }
+  return form;
+}
+
+static void set_influence(const struct fit_array *array, const struct parameters *at,
+                          const struct normal_equations *normal, struct influence *influence) {
+  float gain = at->sigma * at->sigma / at->p0;
+  influence->gain = gain;
+  const float along_force[PARAMETERS] = {1.0f, 0.0f, 0.0f, 2.0f * at->sigma * at->sigma};
+  influence->force_form = influence_along(normal, along_force, 1.0f / at->p0, influence->force);
+  float along_x[PARAMETERS] = {0.0f, 1.0f, 0.0f, 0.0f};
+  float along_y[PARAMETERS] = {0.0f, 0.0f, 1.0f, 0.0f};
+  if (array->is_line) { /* x stands for the coordinate along it, nothing for that across */
+    along_x[1] = -array->line_y;
+    along_x[2] = array->line_x;
+    along_y[2] = 0.0f;
+  }
+  influence->location_form = influence_along(normal, along_x, gain, influence->x) +
+                             influence_along(normal, along_y, gain, influence->y);
+}
+
+/* Variances that the sensors' own errors make; fit_limits.h has the errors. */
+struct own_errors {
+  float gains;           /* sum of the squared errors of the readings */
+  float location, force; /* pitches squared, and share squared */
+};
+
+static void add_own_errors(const struct samples *samples, const struct fit_settings *settings,
+                           const struct parameters *at, const struct influence *influence, struct own_errors *own) {
+  float inverse = 1.0f / (at->sigma * at->sigma), log2_scale = 0.5f * LOG2_E * inverse;
+  float shape_x = 0.0f, shape_y = 0.0f;
+  own->gains = own->location = own->force = 0.0f;
+  for (int k = 0; k < samples->count; k++) {
+    float x = samples->x[k] - at->x, y = samples->y[k] - at->y;
+    float r2 = x * x + y * y;
+    float e = fit_exp2_negative(r2 * log2_scale);
+    const float row[PARAMETERS] = {e, e * x, e * y, e * r2};
+    float by_x = product(row, influence->x), by_y = product(row, influence->y);
+    float by_force = product(row, influence->force);
+    float gain_sd = (float)settings->gain_sd_q16[samples->sensor[k]] * (1.0f / 65536.0f);
+    float error = gain_sd * at->p0 * e;
+    own->gains += error * error;
+    own->location += (by_x * by_x + by_y * by_y) * error * error;
+    own->force += by_force * by_force * error * error;
+    float shape = e * (r2 * inverse) * (r2 * inverse);
+    shape_x += by_x * shape;
+    shape_y += by_y * shape;
+  }
+  float usual = FIT_SHAPE_SIGMA * FIT_SHAPE_SIGMA * inverse;
+  float strength = FIT_SHAPE_PER_MODEL * (float)settings->model_sd_q16 * (1.0f / 65536.0f);
+  strength *= usual * at->p0;
+  own->location += (shape_x * shape_x + shape_y * shape_y) * strength * strength;
+}
+
 /* Whether the fit has settled with residuals that are rough and no noise; then outlier is the
  * sensor that does not belong to the others, or -1. */
 static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
@@ -392,37 +472,6 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
   result->force_N = TWO_PI * result->p0_Pa * sigma_mm * sigma_mm * 1e-6f;
   result->residual_rms_Pa = unit_Pa * sqrtf(squares / (float)samples.count);
 
-  /* Covariance at the last linearisation: sd of a reading from the residuals, at least the noise;
-   * that of the prior is its own. */
-  int freedom = samples.count > unknowns ? samples.count - unknowns : 1;
-  float noise = (float)settings->noise_Pa_q10 * scale;
-  float variance = squares / (float)freedom;
-  if (variance < noise * noise) {
-    variance = noise * noise;
-  }
-  bool misfit = variance > (float)(FIT_MISFIT * FIT_MISFIT) * noise * noise;
-  float gain = before.sigma * before.sigma / before.p0;
-  float along_x[PARAMETERS] = {0.0f, 1.0f, 0.0f, 0.0f};
-  float along_y[PARAMETERS] = {0.0f, 0.0f, 1.0f, 0.0f};
-  float along_force[PARAMETERS] = {1.0f, 0.0f, 0.0f, 2.0f * before.sigma * before.sigma};
-  float force_along_sigma = along_force[3];
-  float along_line[PARAMETERS] = {0.0f, -array->line_y, array->line_x, 0.0f};
-  float location_form = array->is_line
-                            ? inverse_form(&normal, along_line)
-                            : inverse_form(&normal, along_x) + inverse_form(&normal, along_y);
-  float location_variance = variance * location_form;
-  float force_variance = variance * inverse_form(&normal, along_force);
-  float prior_excess = FIT_PRIOR_WEIGHT * FIT_PRIOR_WEIGHT - variance;
-  if (prior.weight > 0.0f && prior_excess > 0.0f) {
-    float answer[PARAMETERS] = {0.0f, 0.0f, 0.0f, prior.weight * before.sigma * gain};
-    solve(&normal, answer);
-    float force = answer[0] + force_along_sigma * answer[3];
-    location_variance += prior_excess * (answer[1] * answer[1] + answer[2] * answer[2]);
-    force_variance += prior_excess * force * force;
-  }
-  result->location_sd_mm = at_most(pitch * gain * sqrtf(location_variance), FIT_HUGE);
-  result->force_sd_N = at_most(result->force_N * sqrtf(force_variance) / before.p0, FIT_HUGE);
-
   uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
   if (settings->noise_Pa_q10 > largest / FIT_LOW_SIGNAL_SIGMA) {
     flags |= CONTACT_FLAG_LOW_SIGNAL;
@@ -431,16 +480,46 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
     flags |= CONTACT_FLAG_FLAT;
   }
   bool rough = squares > FIT_ROUGH_RESIDUAL * FIT_ROUGH_RESIDUAL * sum_squares;
-  int32_t limit_mm_q16 = fit_sd_limit_mm_q16(misfit, theta.sigma < FIT_NARROW_SIGMA, rough);
-  if (deficient || moved * pitch > FIT_SETTLED_mm ||
-      result->location_sd_mm * 65536.0f > (float)limit_mm_q16) {
-    flags |= CONTACT_FLAG_UNCERTAIN;
-  }
   if (squares > FIT_MODEL_RESIDUAL * FIT_MODEL_RESIDUAL * sum_squares) {
     flags |= CONTACT_FLAG_MODEL;
   }
   if (at_bound(array, &theta)) {
     flags |= CONTACT_FLAG_AT_BOUND;
+  }
+
+  /* At the last linearisation. A variance of the readings that is the same for all of them, and
+   * what their own errors make of the result; that of the prior is its own. */
+  struct influence influence;
+  set_influence(array, &before, &normal, &influence);
+  struct own_errors own;
+  add_own_errors(&samples, settings, &before, &influence, &own);
+  int freedom = samples.count > unknowns ? samples.count - unknowns : 1;
+  float noise = (float)settings->noise_Pa_q10 * scale;
+  float model = (float)settings->model_sd_q16 * (1.0f / 65536.0f);
+  float variance = noise * noise + model * model;
+  float expected = variance + own.gains / (float)samples.count;
+  float found = squares / (float)freedom;
+  bool misfit = found > (float)(FIT_MISFIT * FIT_MISFIT) * expected;
+  variance += found > expected ? found - expected : 0.0f;
+  float location_variance = variance * influence.location_form + own.location;
+  float force_variance = variance * influence.force_form + own.force;
+  float prior_excess = FIT_PRIOR_WEIGHT * FIT_PRIOR_WEIGHT - variance;
+  if (prior.weight > 0.0f && prior_excess > 0.0f) {
+    float row[PARAMETERS] = {0.0f, 0.0f, 0.0f, prior.weight * before.sigma * influence.gain};
+    float x = product(row, influence.x), y = product(row, influence.y);
+    float force = product(row, influence.force);
+    location_variance += prior_excess * (x * x + y * y);
+    force_variance += prior_excess * force * force;
+  }
+  location_variance += moved * moved;
+  if (deficient || (flags & CONTACT_FLAG_AT_BOUND)) {
+    location_variance += FIT_BOUND_SD * FIT_BOUND_SD;
+  }
+  result->location_noise_mm = at_most(pitch * noise * sqrtf(influence.location_form), FIT_HUGE);
+  result->location_sd_mm = at_most(pitch * sqrtf(location_variance), FIT_HUGE);
+  result->force_sd_N = at_most(result->force_N * sqrtf(force_variance), FIT_HUGE);
+  if (result->location_sd_mm > fit_location_sd_limit_mm(settings)) {
+    flags |= CONTACT_FLAG_UNCERTAIN;
   }
   result->flags |= flags;
   bool settled = moved * pitch <= FIT_SETTLED_mm;
@@ -464,7 +543,7 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   struct fit_result without;
   usable &= ~(UINT32_C(1) << outlier);
   bool rough = fit_once(array, pressure_Pa_q10, usable, settings, &without, &outlier);
-  if (fit_outlier_gone(result, &without, rough, array->pitch_mm)) {
+  if (fit_outlier_gone(settings, result, &without, rough, array->pitch_mm)) {
     *result = without;
   }
 }

@@ -14,6 +14,8 @@
  */
 #include "common/contact_flags.h"
 #include "fit/fit_grid_solve.h"
+#include "fit/fit_grid_spread.h"
+#include "fit/fit_limits.h"
 
 #include <stdbool.h>
 #include <string.h>
@@ -37,6 +39,12 @@
 #define GUESS_RIDGE_HEIGHT ((struct scaled){22410, -21}) /* 0.003 * log2(e) / (2 * 0.45^2) */
 #define GUESS_HEIGHT_MIN_Q26 1936353
 #define GUESS_HEIGHT_MAX_Q26 484088133 /* sigma 0.316 pitch */
+
+/* FIT_STRETCH_LEAST^2, FIT_STRETCH_SURE^2, FIT_STRETCH_SD_MAX^2, and the height of FIT_SHAPE_LEAST. */
+#define ROUND_SQUARE ((struct scaled){20972, -21})
+#define SURE_SQUARE ((struct scaled){25600, -12})
+#define KNOWN_SQUARE ((struct scaled){16384, -18})
+#define SHAPE_HEIGHT_MAX_Q26 239056000
 
 /* 1 / n of a constant. */
 #define RECIPROCAL(n)                                                                              \
@@ -63,6 +71,7 @@ struct factor {
 struct moments {
   struct factor x, y;
   int32_t square_q; /* common to both, so that the parts of p2(x) + q2(y) add up */
+  int32_t b_x, b_y; /* those parts of the right-hand side */
 };
 
 FIXED_INLINE void set_gaussian(struct factor *f, int nodes, int origin, int32_t centre,
@@ -215,7 +224,7 @@ static NOINLINE int32_t set_residual(const struct moments *m, int32_t amplitude_
 
 /* The sums of the values against the basis. Each part of it is g along one of the axes at least, so
  * sums over rows and columns do. */
-static NOINLINE void project(const struct moments *m, const int32_t *values, int32_t shift,
+static NOINLINE void project(struct moments *m, const int32_t *values, int32_t shift,
                              struct fit_system *system) {
   const struct factor *x = &m->x, *y = &m->y;
   int32_t over_y[COLUMNS] = {0};
@@ -241,6 +250,8 @@ static NOINLINE void project(const struct moments *m, const int32_t *values, int
   system->b1 = (struct scaled){b1, q - x->linear_q};
   system->b2 = (struct scaled){b2, q - y->linear_q};
   system->b3 = (struct scaled){(b3_x >> 1) + (b3_y >> 1), q + 1 - m->square_q}; /* one bit more */
+  m->b_x = b3_x;
+  m->b_y = b3_y;
 }
 
 FIXED_INLINE void evaluate(struct readings *readings, bool coarse, struct moments *m,
@@ -286,6 +297,169 @@ static NOINLINE void finish(const struct readings *readings, const struct moment
     squares += r * r;
   }
   system->square_sum = (struct scaled){squares, 4 + 2 * (system->residual_shift - 28)};
+}
+
+/* How far the contact is from round. Widths that differ, e p2(x) and e q2(y) with signs of their
+ * own, and a slant, e p1(x) q1(y), are two more orthogonal columns. Their coefficients are
+ *   stretch = log(sigma_x / sigma_y)  and  slant,
+ * the same for a contact turned by 45 degrees; together they are the logarithm of the longer width
+ * over the shorter. */
+struct shape {
+  struct scaled wider_x, wider_y, stretch, slant; /* wider: log of sigma_x / sigma, sigma_y / sigma */
+  struct scaled noise_form; /* by which the readings' variance gives that of (length of both)^2 / 2 */
+  int32_t x, y, xy, exponent; /* how one unit of each column moves that square, halved */
+  uint32_t by_gains;          /* sum over the sensors, as in struct fit_spread */
+};
+
+/* The sum of the residual against e p1(x) q1(y). */
+static struct scaled project_slant(const struct moments *m, const struct readings *readings,
+                                   int32_t residual_shift) {
+  const int32_t *r = readings->residual;
+  int32_t sum = 0;
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t over_y = 0;
+    UNROLL for (int j = 0; j < ROWS; j++) {
+      over_y += (r[j] >> 1) * m->y.linear[j];
+    }
+    sum += fixed_mul_16(over_y, m->x.linear[i]);
+    r += ROWS;
+  }
+  return scaled_from(sum, 17 + residual_shift - 28 - m->x.linear_q - m->y.linear_q);
+}
+
+static NOINLINE void begin_shape(const struct readings *readings, const struct moments *m,
+                                 const struct fit_system *system, struct shape *shape) {
+  const struct factor *x = &m->x, *y = &m->y;
+  struct scaled mass_x = scaled_from(x->mass_q26, -26), mass_y = scaled_from(y->mass_q26, -26);
+  int32_t norm_q = 3 - 2 * m->square_q;
+  struct scaled inverse_x =
+      fit_grid_reciprocal(scaled_mul(scaled_from(x->square_norm, norm_q), mass_y));
+  struct scaled inverse_y =
+      fit_grid_reciprocal(scaled_mul(scaled_from(y->square_norm, norm_q), mass_x));
+  struct scaled inverse_xy =
+      fit_grid_reciprocal(scaled_mul(scaled_from(x->linear_norm, 3 - 2 * x->linear_q),
+                                     scaled_from(y->linear_norm, 3 - 2 * y->linear_q)));
+  struct scaled softness = fit_grid_reciprocal(system->stiffness);
+  int32_t q = system->residual_shift - 26 - m->square_q;
+  struct scaled along_x = scaled_mul(inverse_x, softness);
+  struct scaled along_y = scaled_mul(inverse_y, softness);
+  struct scaled along_xy = scaled_mul(inverse_xy, softness);
+  shape->wider_x = scaled_mul(scaled_from(m->b_x, q), along_x);
+  shape->wider_y = scaled_mul(scaled_from(m->b_y, q), along_y);
+  shape->stretch = short_of(scaled_sub(shape->wider_x, shape->wider_y));
+  shape->slant = scaled_mul(project_slant(m, readings, system->residual_shift), along_xy);
+
+  struct scaled values[3] = {scaled_mul(shape->stretch, along_x), scaled_mul(shape->stretch, along_y),
+                             scaled_mul(shape->slant, along_xy)};
+  shape->noise_form =
+      short_of(scaled_add(scaled_add(scaled_mul(values[0], shape->stretch),
+                                     scaled_mul(values[1], shape->stretch)),
+                          scaled_mul(values[2], shape->slant)));
+  shape->noise_form = scaled_mul(shape->noise_form, softness);
+  values[0].exponent -= m->square_q;
+  values[1].exponent -= m->square_q;
+  values[2].exponent -= x->linear_q + y->linear_q - 15;
+  int32_t aligned[3];
+  shape->exponent = fit_grid_align(values, 3, aligned) + 15;
+  shape->x = aligned[0];
+  shape->y = -aligned[1];
+  shape->xy = aligned[2];
+  shape->by_gains = 0;
+}
+
+/* cosh(v) and sinh(v) / v from v^2, Q13, for v^2 up to FIT_STRETCH_MAX^2: error below 1 %. */
+FIXED_INLINE int32_t cosh_q13(int32_t square_q13) {
+  return 8192 + (square_q13 >> 1) + ((square_q13 * square_q13) >> 13) / 24;
+}
+FIXED_INLINE int32_t sinh_ratio_q13(int32_t square_q13) {
+  return 8192 + square_q13 / 6 + ((square_q13 * square_q13) >> 13) / 120;
+}
+
+/* Covariance = sigma^2 exp(wider_x + wider_y) exp(S), S the symmetric matrix with stretch and -stretch
+ * on its diagonal and slant beside it. */
+static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *result) {
+  int32_t stretch = scaled_to_fixed(shape->stretch, 13), slant = scaled_to_fixed(shape->slant, 13);
+  int32_t wider = scaled_to_fixed(scaled_add(shape->wider_x, shape->wider_y), 13);
+  const int32_t most = (int32_t)(FIT_STRETCH_MAX * 8192.0f);
+  if (fixed_size(stretch) > (uint32_t)most || fixed_size(slant) > (uint32_t)most ||
+      fixed_size(wider) > 8192) {
+    return false;
+  }
+  int32_t square = (stretch * stretch + slant * slant) >> 13;
+  if (square > (most * most) >> 13) {
+    return false;
+  }
+  int32_t mean = cosh_q13(square), ratio = sinh_ratio_q13(square);
+  int32_t part = (ratio * stretch) >> 13, across = (ratio * slant) >> 13;
+  int32_t growth = 8192 + wider + ((wider * wider) >> 14) + ((wider * wider >> 13) * wider >> 13) / 6;
+  struct scaled scale = scaled_from(growth, -13);
+  struct scaled x = scaled_from(mean + part, -13), y = scaled_from(mean - part, -13);
+  struct scaled root_x = scaled_sqrt(x), root_y = scaled_sqrt(y);
+  struct scaled correlation =
+      scaled_div(scaled_div(scaled_from(across, -13), short_of(root_x)), short_of(root_y));
+  root_x = scaled_sqrt(scaled_mul(x, scale));
+  root_y = scaled_sqrt(scaled_mul(y, scale));
+  result->sigma_x_mm = result->sigma_mm * fit_grid_compose(root_x.mantissa, root_x.exponent);
+  result->sigma_y_mm = result->sigma_mm * fit_grid_compose(root_y.mantissa, root_y.exponent);
+  int32_t limited = fixed_clamp(scaled_to_fixed(correlation, 15), -32767, 32767);
+  result->width_correlation = fit_grid_compose(limited, -15);
+  return true;
+}
+
+static NOINLINE void judge_shape(const struct readings *readings,
+                                 const struct fit_settings *settings,
+                                 const struct fit_system *system, const struct fit_spread *spread,
+                                 const struct shape *shape, struct fit_result *result) {
+  if (system->at.height > SHAPE_HEIGHT_MAX_Q26 ||
+      (result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL))) {
+    return;
+  }
+  struct scaled length_square = short_of(scaled_add(scaled_mul(shape->stretch, shape->stretch),
+                                                    scaled_mul(shape->slant, shape->slant)));
+  struct scaled noise = scaled_from(settings->noise_Pa_q10, readings->shift - 28);
+  struct scaled amplitude = scaled_from(system->amplitude_q28, -28);
+  struct scaled by_gains = scaled_mul(
+      scaled_from((int32_t)shape->by_gains,
+                  SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * shape->exponent),
+      scaled_mul(amplitude, amplitude));
+  struct scaled variance =
+      short_of(scaled_add(scaled_mul(scaled_mul(noise, noise), shape->noise_form), by_gains));
+  struct scaled least = short_of(
+      scaled_add(scaled_mul(length_square, ROUND_SQUARE), scaled_mul(variance, SURE_SQUARE)));
+  if (scaled_sub(scaled_mul(length_square, length_square), least).mantissa > 0) {
+    result->flags |= CONTACT_FLAG_ELONGATED;
+  }
+  struct scaled known = scaled_mul(length_square, KNOWN_SQUARE);
+  if (scaled_sub(variance, known).mantissa <= 0 && set_widths(shape, result)) {
+    result->flags |= CONTACT_FLAG_WIDTHS_VALID;
+  }
+}
+
+/* What errors of single sensors make of the result. */
+static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
+                                   const struct fit_settings *settings, const struct moments *m,
+                                   const struct fit_system *system, struct fit_spread *spread,
+                                   struct shape *shape) {
+  const struct factor *x = &m->x, *y = &m->y;
+  const struct fit_columns_q q = {x->linear_q, y->linear_q, m->square_q - 1};
+  fit_grid_begin_spread(settings, system, &q, spread);
+  const uint8_t *sensor = grid->sensor;
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t g = x->g_q14[i], linear = x->linear[i], square = x->square[i];
+    for (int j = 0; j < ROWS; j++) {
+      int32_t across = y->g_q14[j];
+      int32_t square_x = (square * across) >> 14, square_y = (y->square[j] * g) >> 14;
+      const struct fit_node node = {(g * across) >> 13, (linear * across) >> 14,
+                                    (y->linear[j] * g) >> 14, (square_x + square_y) >> 1};
+      int32_t error =
+          fit_grid_add_to_spread(spread, &node, i, j, settings->gain_sd_q16[*sensor++]);
+      int32_t moved = (shape->x * square_x + shape->y * square_y +
+                       shape->xy * ((linear * y->linear[j]) >> 15)) >>
+                      15;
+      int32_t high = (moved * error) >> 16;
+      shape->by_gains += (uint32_t)(high * high) >> SPREAD_SQUARE_SHIFT;
+    }
+  }
 }
 
 /* First guess, every sensor there: the marginals weighted by the row and the column of the largest
@@ -400,6 +574,14 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   } while (left > 0);
   result->flags = 0;
   result->used = UINT32_MAX >> (FT_MAX_SENSORS - NODES);
+  result->sigma_x_mm = result->sigma_y_mm = result->width_correlation = 0.0f;
   finish(&readings, &m, &system);
-  return fit_grid_conclude(grid, &readings, settings, &system, &state, NODES, result);
+  struct fit_spread spread;
+  struct shape shape;
+  begin_shape(&readings, &m, &system, &shape);
+  spread_errors(grid, settings, &m, &system, &spread, &shape);
+  bool rough =
+      fit_grid_conclude(grid, &readings, settings, &system, &spread, &state, NODES, result);
+  judge_shape(&readings, settings, &system, &spread, &shape, result);
+  return rough;
 }

@@ -9,6 +9,7 @@
  */
 #include "common/contact_flags.h"
 #include "fit/fit_grid_solve.h"
+#include "fit/fit_grid_spread.h"
 #include "fit/fit_limits.h"
 
 #include <string.h>
@@ -393,6 +394,15 @@ static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused,
   return (power << 22) + fit_grid_rise(at->height, offset_x, offset_y);
 }
 
+/* The columns of one sensor as they are after the elimination; none where it is not used. */
+FIXED_INLINE void orthogonal_columns(const struct columns *c, const struct node *node,
+                                     struct fit_node *column) {
+  column->e = node->mantissa >> node->shift;
+  column->p1 = node->p1;
+  column->p2 = node->p2 - times_q12(node->p1, c->f21);
+  column->p3 = node->p3 - times_q12(node->p1, c->f31) - times_q12(column->p2, c->f32);
+}
+
 /* What the result needs besides the system. */
 static NOINLINE void finish(const struct columns *c, int32_t finer, struct fit_system *system) {
   int32_t b0 = 0, squares = 0;
@@ -411,6 +421,27 @@ static NOINLINE void finish(const struct columns *c, int32_t finer, struct fit_s
   bend -= fixed_mul_q28(off_x, c->skew_x * LINEAR_TO_Q26) +
           fixed_mul_q28(off_y, c->skew_y * LINEAR_TO_Q26);
   system->bend_q24 = fixed_clamp(bend - (c->variance >> (LINEAR_Q - 24)), -(1 << 29), 1 << 29);
+}
+
+/* What errors of single sensors make of the result. */
+static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
+                                   const struct fit_settings *settings, const struct columns *c,
+                                   const struct fit_system *system, struct fit_spread *spread) {
+  const struct fit_columns_q q = {c->q1, c->q2, c->q3};
+  fit_grid_begin_spread(settings, system, &q, spread);
+  const struct node *node = c->node;
+  const uint8_t *sensor = grid->sensor;
+  const int32_t most = 3 << 14;
+  for (int i = 0; i < COLUMNS; i++) {
+    for (int j = 0; j < ROWS; j++) {
+      struct fit_node column;
+      orthogonal_columns(c, node, &column);
+      column.p2 = fixed_clamp(column.p2, -most, most);
+      column.p3 = fixed_clamp(column.p3, -most, most);
+      fit_grid_add_to_spread(spread, &column, i, j, settings->gain_sd_q16[*sensor++]);
+      node++;
+    }
+  }
 }
 
 enum accuracy { COARSE, FINE, LAST };
@@ -514,7 +545,9 @@ bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
     left--;
   } while (left > 0);
   result->used = usable;
-  return fit_grid_conclude(grid, &readings, settings, &system, &state, count, result);
+  struct fit_spread spread;
+  spread_errors(grid, settings, &columns, &system, &spread);
+  return fit_grid_conclude(grid, &readings, settings, &system, &spread, &state, count, result);
 }
 
 /* Q26, towards zero; within what fits. */
@@ -560,12 +593,11 @@ int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q
   for (int k = 0; k < NODES; k++) {
     const struct node *node = &c.node[k];
     int32_t r = shifted(node->e, finer);
-    /* The columns as they are after the elimination, and with them the leverage. */
-    int32_t p2 = node->p2 - times_q12(node->p1, c.f21);
-    int32_t p3 = node->p3 - times_q12(node->p1, c.f31) - times_q12(p2, c.f32);
-    int32_t e = node->mantissa >> node->shift;
-    int32_t leverage = share_of(e, c.mass, MASS_SHIFT) + share_of(node->p1, c.norm1, NORM_SHIFT) +
-                       share_of(p2, c.norm2, NORM_SHIFT) + share_of(p3, c.norm3, NORM_SHIFT);
+    struct fit_node column;
+    orthogonal_columns(&c, node, &column);
+    int32_t leverage =
+        share_of(column.e, c.mass, MASS_SHIFT) + share_of(column.p1, c.norm1, NORM_SHIFT) +
+        share_of(column.p2, c.norm2, NORM_SHIFT) + share_of(column.p3, c.norm3, NORM_SHIFT);
     int32_t free = 32768 - leverage;
     int32_t without = port_divide(r * r, free < 512 ? 512 : free);
     total += (r * r) >> 15;

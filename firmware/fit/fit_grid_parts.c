@@ -31,8 +31,7 @@ float fit_grid_compose(int32_t mantissa, int32_t exponent) {
   return value;
 }
 
-/* value >= 0 and finite. */
-static struct scaled scaled_from_float(float value) {
+struct scaled fit_grid_scaled(float value) {
   uint32_t bits = bytes_from_f32(value);
   if (bits >> 23 == 0) {
     return (struct scaled){0, 0};
@@ -78,11 +77,11 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
   }
   readings->prior_sigma = readings->prior_weight = readings->prior_sd = (struct scaled){0, 0};
   if (fit_has_prior(settings)) {
-    struct scaled width = scaled_from_float(settings->prior_width_mm / array->pitch_mm);
+    struct scaled width = fit_grid_scaled(settings->prior_width_mm / array->pitch_mm);
     int32_t largest_q28 = (largest >> down) * (1 << up);
     readings->prior_sd =
-        scaled_mul(scaled_from_float(FIT_PRIOR_WEIGHT), scaled_from(largest_q28, -28));
-    readings->prior_sigma = scaled_from_float(settings->prior_sigma_mm / array->pitch_mm);
+        scaled_mul(fit_grid_scaled(FIT_PRIOR_WEIGHT), scaled_from(largest_q28, -28));
+    readings->prior_sigma = fit_grid_scaled(settings->prior_sigma_mm / array->pitch_mm);
     readings->prior_weight = scaled_div(readings->prior_sd, width);
   }
   return true;

@@ -71,6 +71,9 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
 /* mantissa * 2^exponent, rounded to nearest, as a float; what is too large becomes FIT_HUGE. */
 float fit_grid_compose(int32_t mantissa, int32_t exponent);
 
+/* value >= 0 and finite. */
+struct scaled fit_grid_scaled(float value);
+
 /* sigma in Q26 pitches. */
 int32_t fit_grid_sigma(int32_t height);
 

@@ -1,6 +1,7 @@
 #include "fit/fit_grid_solve.h"
 
 #include "common/contact_flags.h"
+#include "fit/fit_grid_spread.h"
 #include "fit/fit_limits.h"
 
 /* Longest step: 0.6 pitch in x and y, 0.4 of sigma. A longer one is shortened as a whole: along the
@@ -16,7 +17,10 @@
 #define ROUGH_INVERSE_SQUARE ((struct scaled){20000, -3}) /* 1 / FIT_ROUGH_RESIDUAL^2 */
 #define MISFIT_SQUARE ((struct scaled){FIT_MISFIT * FIT_MISFIT << 11, -11})
 #define FLAT_HEIGHT_Q26 2016200     /* FIT_FLAT_SIGMA */
-#define NARROW_HEIGHT_Q26 302550256 /* FIT_NARROW_SIGMA */
+#define MARGIN_SQUARE ((struct scaled){18432, -13}) /* FIT_BOUND_SD^2 */
+/* FIT_SHAPE_PER_MODEL in terms of z^2 and the height: sigma^2 = log2(e) / (2 height) and
+ * r^2 / sigma^2 = 2 z / log2(e). */
+#define SHAPE_PER_MODEL ((struct scaled){24160, -14})
 
 FIXED_INLINE struct scaled scaled_square(struct scaled a) {
   return scaled_mul(a, a);
@@ -134,8 +138,7 @@ static int32_t peak_of(const struct readings *readings, const struct fit_system 
   return peak;
 }
 
-/* 1 / value; what is not positive counts as the last place. */
-static NOINLINE struct scaled reciprocal(struct scaled value) {
+struct scaled fit_grid_reciprocal(struct scaled value) {
   struct scaled a = scaled_from(value.mantissa < 1 ? 1 : value.mantissa, value.exponent);
   return (struct scaled){port_divide(1 << 29, a.mantissa), -29 - a.exponent};
 }
@@ -164,9 +167,28 @@ static NOINLINE void widen_for_prior(const struct readings *readings,
   }
 }
 
+/* Variance of the location from what the sensors' own errors make of it, pitches squared. */
+static NOINLINE struct scaled own_errors(const struct fit_settings *settings,
+                                         const struct fit_system *system,
+                                         const struct fit_spread *spread) {
+  struct scaled amplitude_square = scaled_square(scaled_from(system->amplitude_q28, -28));
+  struct scaled by_gains =
+      scaled_from((int32_t)spread->by_gains,
+                  SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * spread->location_exponent);
+  struct scaled shape_x = scaled_from(spread->shape_x, 0), shape_y = scaled_from(spread->shape_y, 0);
+  struct scaled strength = scaled_mul(scaled_from(settings->model_sd_q16, -16),
+                                      scaled_from(system->at.height, -26));
+  strength = scaled_mul(strength, SHAPE_PER_MODEL);
+  struct scaled shape = scaled_add(scaled_square(shape_x), scaled_square(shape_y));
+  shape = scaled_mul(short_of(shape), scaled_square(strength));
+  shape.exponent += 2 * (spread->location_exponent + 4 - 21 + spread->shape_shift);
+  return scaled_mul(short_of(scaled_add(by_gains, shape)), amplitude_square);
+}
+
 bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
                        const struct fit_settings *settings, const struct fit_system *system,
-                       const struct state *state, int count, struct fit_result *result) {
+                       const struct fit_spread *spread, const struct state *state, int count,
+                       struct fit_result *result) {
   const struct state *at = &system->at;
   int32_t x = fixed_clamp(state->x, grid->x_min, grid->x_max);
   int32_t y = fixed_clamp(state->y, grid->y_min, grid->y_max);
@@ -184,24 +206,48 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   result->p0_Pa = fit_grid_compose(peak, peak_exponent);
   result->force_N = fit_grid_compose(force, force_exponent);
 
-  /* Variance of one reading: the residuals', at least the noise's. In units of Q28. */
-  struct scaled mass = scaled_from(system->mass_q20, -20), inverse_mass = reciprocal(mass);
+  uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
+  if (settings->noise_Pa_q10 > port_divide(readings->largest, FIT_LOW_SIGNAL_SIGMA)) {
+    flags |= CONTACT_FLAG_LOW_SIGNAL;
+  }
+  if (state->height <= FLAT_HEIGHT_Q26) {
+    flags |= CONTACT_FLAG_FLAT;
+  }
+  if (x == grid->x_min || x == grid->x_max || y == grid->y_min || y == grid->y_max ||
+      state->height <= HEIGHT_MIN_Q26 || state->height >= HEIGHT_MAX_Q26 ||
+      system->amplitude_q28 <= AMPLITUDE_MIN_Q28 || system->amplitude_q28 >= AMPLITUDE_MAX_Q28) {
+    flags |= CONTACT_FLAG_AT_BOUND;
+  }
+
+  /* Variance of one reading that is the same for all of them: the noise's, the model's, and what
+   * the residuals are above these and the gains' together. In units of Q28. */
+  struct scaled mass = scaled_from(system->mass_q20, -20), inverse_mass = fit_grid_reciprocal(mass);
   struct scaled left = scaled_from(system->b0, system->residual_shift - 38);
   struct scaled square_sum =
       scaled_sub(short_of(system->square_sum), scaled_mul(scaled_square(left), inverse_mass));
   square_sum.mantissa = square_sum.mantissa < 0 ? 0 : square_sum.mantissa;
-  struct scaled variance = scaled_mean(square_sum, count > 4 ? count - 4 : 1);
+  struct scaled found = scaled_mean(square_sum, count > 4 ? count - 4 : 1);
   struct scaled noise_variance =
       scaled_square(scaled_from(settings->noise_Pa_q10, readings->shift - 28));
-  bool misfit = scaled_sub(variance, scaled_mul(noise_variance, MISFIT_SQUARE)).mantissa > 0;
-  if (scaled_sub(variance, noise_variance).mantissa < 0) {
-    variance = noise_variance;
+  struct scaled model_sd = scaled_mul(scaled_from(settings->model_sd_q16, -16),
+                                      scaled_from(readings->largest, readings->shift - 28));
+  struct scaled variance = scaled_add(noise_variance, scaled_square(model_sd));
+  struct scaled amplitude = scaled_from(system->amplitude_q28, -28);
+  struct scaled gains = scaled_mean(scaled_from((int32_t)spread->gains, SPREAD_SQUARE_SHIFT - 32 -
+                                                                            2 * spread->gain_shift),
+                                    count);
+  struct scaled expected = scaled_add(variance, scaled_mul(gains, scaled_square(amplitude)));
+  bool misfit = scaled_sub(found, scaled_mul(short_of(expected), MISFIT_SQUARE)).mantissa > 0;
+  struct scaled excess = scaled_sub(found, expected);
+  if (excess.mantissa > 0) {
+    variance = scaled_add(variance, excess);
   }
+  variance = short_of(variance);
   struct scaled rms = scaled_sqrt(scaled_mean(square_sum, count));
   result->residual_rms_Pa = fit_grid_compose(rms.mantissa, rms.exponent + 18 - readings->shift);
 
-  struct scaled inverse1 = reciprocal(system->d1), inverse2 = reciprocal(system->d2);
-  struct scaled inverse3 = reciprocal(system->d3);
+  struct scaled inverse1 = fit_grid_reciprocal(system->d1), inverse2 = fit_grid_reciprocal(system->d2);
+  struct scaled inverse3 = fit_grid_reciprocal(system->d3);
   if (readings->prior_weight.mantissa != 0) {
     widen_for_prior(readings, system, &variance, &inverse3);
   }
@@ -212,48 +258,50 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   if (system->cross != 0) {
     form = scaled_add(form, scaled_mul(scaled_square(scaled_from(system->cross, -26)), inverse2));
   }
-  struct scaled location_sd =
-      scaled_div(scaled_sqrt(scaled_mul(variance, form)), system->stiffness);
-  location_sd = scaled_mul(location_sd, scaled_top(grid->pitch, pitch_exponent - 6));
-  result->location_sd_mm = fit_grid_compose(location_sd.mantissa, location_sd.exponent);
+  struct scaled softness = scaled_mul(fit_grid_reciprocal(system->stiffness),
+                                      scaled_top(grid->pitch, pitch_exponent - 6));
+  form = scaled_mul(short_of(form), scaled_square(softness)); /* to mm squared */
+  struct scaled jitter = scaled_sqrt(scaled_mul(noise_variance, form));
+  result->location_noise_mm = fit_grid_compose(jitter.mantissa, jitter.exponent);
 
-  /* dF / F = dp0 / p0 + 2 dsigma / sigma, each by its part in the basis; the mean of the model adds
-   * one over its mass. */
-  int32_t off_x = at->x - system->mean_x;
-  int32_t off_y = at->y - system->mean_y - fixed_mul_q26(system->cross, off_x);
-  struct scaled lift = scaled_from(system->bend_q24 + (fixed_mul_q26(sigma, sigma) >> 1), -24);
-  form = scaled_add(inverse_mass, scaled_mul(scaled_square(scaled_from(off_x, -26)), inverse1));
-  form = scaled_add(form, scaled_mul(scaled_square(scaled_from(off_y, -26)), inverse2));
-  form = scaled_add(form, scaled_mul(scaled_square(lift), inverse3));
-  struct scaled amplitude = scaled_from(system->amplitude_q28, -28);
-  struct scaled force_sd = scaled_div(scaled_sqrt(scaled_mul(variance, form)), amplitude);
+  /* What the last step moved is not settled; beyond a bound the margin may be off. */
+  struct scaled move_x = scaled_from(system->move_x_q22, -22);
+  struct scaled move_y = scaled_from(system->move_y_q22, -22);
+  struct scaled apart = scaled_add(scaled_square(move_x), scaled_square(move_y));
+  apart = scaled_add(apart, own_errors(settings, system, spread));
+  if (flags & CONTACT_FLAG_AT_BOUND) {
+    apart = scaled_add(apart, MARGIN_SQUARE);
+  }
+  apart = scaled_mul(short_of(apart), scaled_square(scaled_top(grid->pitch, pitch_exponent - 6)));
+  struct scaled location_sd = scaled_sqrt(scaled_add(scaled_mul(variance, form), apart));
+  result->location_sd_mm = fit_grid_compose(location_sd.mantissa, location_sd.exponent);
+  if (scaled_sub(location_sd, fit_grid_scaled(fit_location_sd_limit_mm(settings))).mantissa > 0) {
+    flags |= CONTACT_FLAG_UNCERTAIN;
+  }
+
+  /* The mean of the model adds one over its mass to the force's form. */
+  struct scaled off_x = scaled_from(spread->off_x, -26), off_y = scaled_from(spread->off_y, -26);
+  form = scaled_add(inverse_mass, scaled_mul(scaled_square(off_x), inverse1));
+  form = scaled_add(form, scaled_mul(scaled_square(off_y), inverse2));
+  form = scaled_add(form, scaled_mul(scaled_square(scaled_from(spread->lift_q24, -24)), inverse3));
+  struct scaled force_variance =
+      scaled_div(scaled_mul(variance, short_of(form)), scaled_square(amplitude));
+  struct scaled by_gains = scaled_mul(
+      scaled_from((int32_t)spread->force_by_gains,
+                  SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * spread->force_exponent),
+      scaled_square(system->stiffness));
+  struct scaled force_sd = scaled_sqrt(scaled_add(force_variance, by_gains));
   force_sd = scaled_mul(force_sd, scaled_from(force, force_exponent));
   result->force_sd_N = fit_grid_compose(force_sd.mantissa, force_sd.exponent);
 
-  uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
-  if (settings->noise_Pa_q10 > port_divide(readings->largest, FIT_LOW_SIGNAL_SIGMA)) {
-    flags |= CONTACT_FLAG_LOW_SIGNAL;
-  }
-  if (state->height <= FLAT_HEIGHT_Q26) {
-    flags |= CONTACT_FLAG_FLAT;
-  }
   struct scaled total = scaled_add(scaled_mul(scaled_square(amplitude), mass), square_sum);
   bool rough = scaled_sub(scaled_mul(square_sum, ROUGH_INVERSE_SQUARE), total).mantissa > 0;
-  bool narrow = state->height > NARROW_HEIGHT_Q26;
-  int32_t move_x = fixed_clamp(system->move_x_q22, -(1 << 15), 1 << 15);
-  int32_t move_y = fixed_clamp(system->move_y_q22, -(1 << 15), 1 << 15);
-  bool settled = ((move_x * move_x) >> 1) + ((move_y * move_y) >> 1) <= grid->settled_square;
-  if (!settled || scaled_to_fixed(location_sd, 16) > fit_sd_limit_mm_q16(misfit, narrow, rough)) {
-    flags |= CONTACT_FLAG_UNCERTAIN;
-  }
   if (scaled_sub(scaled_mul(square_sum, MODEL_INVERSE_SQUARE), total).mantissa > 0) {
     flags |= CONTACT_FLAG_MODEL;
   }
-  if (x == grid->x_min || x == grid->x_max || y == grid->y_min || y == grid->y_max ||
-      state->height <= HEIGHT_MIN_Q26 || state->height >= HEIGHT_MAX_Q26 ||
-      system->amplitude_q28 <= AMPLITUDE_MIN_Q28 || system->amplitude_q28 >= AMPLITUDE_MAX_Q28) {
-    flags |= CONTACT_FLAG_AT_BOUND;
-  }
+  int32_t x_q22 = fixed_clamp(system->move_x_q22, -(1 << 15), 1 << 15);
+  int32_t y_q22 = fixed_clamp(system->move_y_q22, -(1 << 15), 1 << 15);
+  bool settled = ((x_q22 * x_q22) >> 1) + ((y_q22 * y_q22) >> 1) <= grid->settled_square;
   result->flags |= flags;
   return misfit && rough && settled;
 }

@@ -82,11 +82,18 @@ FIXED_INLINE void fit_grid_complete(const struct readings *readings, struct fit_
 void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system,
                    struct state *state);
 
-/* The result from the last system and the state after its step; count: of the sensors in use.
- * Returns whether it has settled with residuals that are rough and no noise. */
+/* 1 / value; what is not positive counts as the last place. */
+struct scaled fit_grid_reciprocal(struct scaled value);
+
+struct fit_spread;
+
+/* The result from the last system, what it makes of the errors of the readings, and the state after
+ * its step; count: of the sensors in use. Returns whether it has settled with residuals that are
+ * rough and beyond what noise and gains explain. */
 bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
                        const struct fit_settings *settings, const struct fit_system *system,
-                       const struct state *state, int count, struct fit_result *result);
+                       const struct fit_spread *spread, const struct state *state, int count,
+                       struct fit_result *result);
 
 /* The sensor whose reading does not belong to the others', or -1; result: the fit to them all. */
 int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,

@@ -1,18 +1,19 @@
-/* When a result deserves a warning; both kernels judge by the same limits. */
+/* What errors a result is said to have, and when it deserves a warning: the same for all kernels. */
 #ifndef FIT_FIT_LIMITS_H
 #define FIT_FIT_LIMITS_H
 
 #include "common/contact_flags.h"
 #include "fit/fit.h"
 
+#include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 
 #define FIT_SETTLED_mm 0.02f     /* a larger last step has not settled */
 #define FIT_MODEL_RESIDUAL 0.15f /* of the root of the sum of squared readings */
 #define FIT_ROUGH_RESIDUAL 0.02f
-#define FIT_NARROW_SIGMA 0.4f   /* pitches */
-#define FIT_MISFIT 3            /* standard deviation of the residuals, in those of the noise */
+#define FIT_MISFIT 3 /* standard deviation of the residuals, in those that noise, gains and model give */
+#define FIT_NARROW_SIGMA 0.4f   /* pitches: an outlier may look like it */
 #define FIT_FLAT_SIGMA 4.9f     /* pitches */
 #define FIT_LOW_SIGNAL_SIGMA 20 /* noise standard deviations in the largest reading */
 #define FIT_HUGE 1e9f           /* stands for: nothing is known */
@@ -24,17 +25,35 @@
 #define FIT_OUTLIER 15
 #define FIT_OUTLIER_GAIN 0.5f
 
-/* Largest predicted standard deviation of the location that passes without a warning, mm in Q16.
- *
- * misfit: the residuals exceed the noise by FIT_MISFIT, so that they are the model's error. Of a
- * narrow pressure that is the shape of a stiff layer, even about its centre: it moves the location
- * less than the same residuals at random would. Of a rough one, with residuals above
- * FIT_ROUGH_RESIDUAL of the readings, it has no symmetry to rely on: unequal sensors, or two
- * contacts. The limits are chosen on the sets and stiff cases of the fit report: in none of them
- * are more than 0.5 % of the presses off by more than 1 mm without a warning. */
-static inline int32_t fit_sd_limit_mm_q16(bool misfit, bool narrow, bool rough) {
-  const int32_t usual = 13107 /* 0.2 */, of_narrow = 32768 /* 0.5 */, of_rough = 7864 /* 0.12 */;
-  return !misfit ? usual : narrow ? of_narrow : rough ? of_rough : usual;
+/* The errors of a reading that the standard deviations are made of, each independent of the others:
+ *   the noise;
+ *   its gain's: gain_sd times the model there;
+ *   the model's: model_sd times the largest reading, alike for every sensor, and besides
+ *   FIT_SHAPE_PER_MODEL model_sd (FIT_SHAPE_SIGMA / sigma)^2 amplitude e (r / sigma)^4, one amplitude
+ *   for all sensors: a layer's pressure has heavier tails than a Gaussian, and the more so the
+ *   thinner it is. Alone, the former says 0.5 mm where a press on a node of a thin pad is good to
+ *   0.05 mm, and the latter nothing where all sensors are as far from the contact;
+ *   what the residuals are above these.
+ * Not independent readings, but added to the location's: the last step, and FIT_BOUND_SD where the
+ * fit stopped at a limit. Values from truth_fit --seed 1; NUMERICS.md has what they cover on others. */
+#define FIT_SHAPE_PER_MODEL 1.3333f
+#define FIT_SHAPE_SIGMA 0.644f /* pitches: 12 mm of rubber on a pitch of 9 mm */
+#define FIT_BOUND_SD 1.5f      /* pitches: the margin in which it may lie */
+
+/* A contact is elongated if log(longer width / shorter) exceeds FIT_STRETCH_LEAST, which the cubes and
+ * spheres of a layer stay below, and FIT_STRETCH_SURE standard deviations of what noise and gains
+ * make of it, in quadrature. The widths are told up to a standard deviation of FIT_STRETCH_SD_MAX and
+ * a ratio of exp(FIT_STRETCH_MAX); below FIT_SHAPE_LEAST pitches of sigma it is the layer's own
+ * profile that looks elongated between the sensors. */
+#define FIT_STRETCH_LEAST 0.1f
+#define FIT_STRETCH_SURE 2.5f
+#define FIT_STRETCH_SD_MAX 0.25f
+#define FIT_STRETCH_MAX 1.25f
+#define FIT_SHAPE_LEAST 0.45f
+
+static inline float fit_location_sd_limit_mm(const struct fit_settings *settings) {
+  float limit_mm = settings->location_sd_limit_mm;
+  return limit_mm > 0.0f && limit_mm < FIT_HUGE ? limit_mm : FIT_LOCATION_SD_LIMIT_mm;
 }
 
 #define FIT_PRIOR_WIDTH_MIN_mm 0.001f
@@ -48,16 +67,23 @@ static inline bool fit_has_prior(const struct fit_settings *settings) {
 }
 
 /* Whether the fit without an outlier is the better one; rough: its residuals still are. An outlier
- * above the others takes the place of a narrow press and makes others outliers: that is uncertain.
- */
-static inline bool fit_outlier_gone(const struct fit_result *with, struct fit_result *without,
+ * above the others takes the place of a narrow press and makes others outliers: then either fit may
+ * be the right one. */
+static inline bool fit_outlier_gone(const struct fit_settings *settings,
+                                    const struct fit_result *with, struct fit_result *without,
                                     bool rough, float pitch_mm) {
   if (!(without->flags & CONTACT_FLAG_FIT_VALID) ||
       !(without->residual_rms_Pa < FIT_OUTLIER_GAIN * with->residual_rms_Pa)) {
     return false;
   }
   if (rough || without->sigma_mm < FIT_NARROW_SIGMA * pitch_mm) {
-    without->flags |= CONTACT_FLAG_UNCERTAIN;
+    float dx = with->x_mm - without->x_mm, dy = with->y_mm - without->y_mm;
+    float sd = without->location_sd_mm;
+    sd = sqrtf(sd * sd + dx * dx + dy * dy);
+    without->location_sd_mm = sd < FIT_HUGE ? sd : FIT_HUGE;
+    if (sd > fit_location_sd_limit_mm(settings)) {
+      without->flags |= CONTACT_FLAG_UNCERTAIN;
+    }
   }
   return true;
 }

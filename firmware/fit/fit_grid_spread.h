@@ -1,0 +1,53 @@
+/* Inside the fixed-point kernels alone: how an error of each reading moves the result. Errors that
+ * are the same for every sensor, as the noise, need no more than the norms of the columns
+ * (fit_grid_conclude); those of the gains are each sensor's own, and the model's own error has a
+ * shape. So the kernel hands over the sensors one by one. fit_limits.h says which errors there are.
+ */
+#ifndef FIT_FIT_GRID_SPREAD_H
+#define FIT_FIT_GRID_SPREAD_H
+
+#include "fit/fit_grid_solve.h"
+
+/* Of the columns p1, p2, p3: value = integer * 2^-q. */
+struct fit_columns_q {
+  int32_t q1, q2, q3;
+};
+
+/* One sensor: e (Q15), and e times p1, p2, p3 of struct fit_system, at most 1.5 * 2^15. */
+struct fit_node {
+  int32_t e, p1, p2, p3;
+};
+
+struct fit_spread {
+  /* How far one unit of a column moves x and y (pitches, times 2^(location_exponent - 15)) and the force
+   * (its share times sigma^2, times 2^(force_exponent - 15)), if the readings' unit is that of Q28. */
+  int32_t x1, x2, x3, y2, y3, location_exponent;
+  int32_t f0, f1, f2, f3, force_exponent;
+  /* dF / F is that of e, p1, p2 and p3 times 1, off_x, off_y (Q26) and lift_q24. */
+  int32_t off_x, off_y, lift_q24;
+  /* log2 of the model, negative, of each column and row of nodes, Q10 */
+  int32_t down_x[COLUMNS], down_y[ROWS];
+  int32_t gain_shift;  /* gains Q16 are used with so many bits more */
+  int32_t shape_shift; /* the model error's shape in Q(21 - shape_shift) */
+  /* Sums over the sensors. */
+  uint32_t gains;       /* of the squared errors of the readings */
+  uint32_t by_gains;    /* of the squares of what they make of x and y */
+  uint32_t force_by_gains;
+  int32_t shape_x, shape_y; /* what the model error's shape makes of x and y */
+};
+
+/* The square of a number of 15 bits, so that those of all sensors and of two coordinates add up. */
+#define SPREAD_SQUARE_SHIFT (NODES > 15 ? 6 : 5)
+
+void fit_grid_begin_spread(const struct fit_settings *settings, const struct fit_system *system,
+                           const struct fit_columns_q *columns, struct fit_spread *spread);
+
+/* gain_sd_q16 of the sensor at column i, row j. Returns the error that it makes of the reading, in
+ * 15 bits: the share of the amplitude times 2^(31 - gain_shift - 16). */
+int32_t fit_grid_add_to_spread(struct fit_spread *spread, const struct fit_node *node, int i, int j,
+                               uint16_t gain_sd_q16);
+
+/* Up to five values in one unit, the largest of them 13 bits. Returns the exponent of that unit. */
+int32_t fit_grid_align(const struct scaled *values, int count, int32_t *aligned);
+
+#endif

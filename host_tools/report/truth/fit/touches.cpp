@@ -1,0 +1,195 @@
+#include "truth/fit/touches.hpp"
+
+extern "C" {
+#include "config/defaults.h"
+#include "config/geometry.h"
+#include "ms5840/ms5840.h"
+}
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+
+namespace fingertip::truth {
+namespace {
+
+constexpr double FORCE_MIN_N = 1.0, FORCE_MAX_N = 15.0;
+constexpr double GAIN_SIGMAS_MAX = 3.0; // as the twin's pads
+constexpr double SHAPE_SD = 0.012, GAUGE_SD = 0.025;
+constexpr double EDGE_mm = 0.4; // as the twin's cylinders
+
+const twin::Indenter &long_indenter(const std::string &name) {
+  using Shape = twin::Indenter::Shape;
+  static const std::vector<twin::Indenter> all{
+      {"cylinder6x12", "", Shape::roller, 6, 12, 0, EDGE_mm, 0},
+      {"edge20", "", Shape::roller, 2, 20, 0, EDGE_mm, 0},
+  };
+  const auto found =
+      std::find_if(all.begin(), all.end(), [&](const auto &one) { return one.name == name; });
+  return found == all.end() ? twin::indenter(name) : *found;
+}
+
+double normal_within_limit(Random &random) {
+  for (;;) {
+    const double sigmas = random.normal();
+    if (std::abs(sigmas) <= GAIN_SIGMAS_MAX) {
+      return sigmas;
+    }
+  }
+}
+
+// Orthonormal over the sensors: a constant, x, y, x^2 + y^2.
+std::array<Readings, 4> make_gauge() {
+  const fit_array array = firmware_array();
+  std::array<Readings, 4> basis{};
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    const double x = array.x[k], y = array.y[k];
+    basis[0][k] = 1.0;
+    basis[1][k] = x;
+    basis[2][k] = y;
+    basis[3][k] = x * x + y * y;
+  }
+  const auto product = [](const Readings &a, const Readings &b) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      sum += a[k] * b[k];
+    }
+    return sum;
+  };
+  for (std::size_t i = 0; i < basis.size(); i++) {
+    for (std::size_t j = 0; j < i; j++) {
+      const double share = product(basis[i], basis[j]);
+      for (std::size_t k = 0; k < SENSORS; k++) {
+        basis[i][k] -= share * basis[j][k];
+      }
+    }
+    const double length = std::sqrt(product(basis[i], basis[i]));
+    for (double &value : basis[i]) {
+      value /= length;
+    }
+  }
+  return basis;
+}
+
+} // namespace
+
+Contact contact_of(const std::string &name, double layer_mm,
+                   const std::filesystem::path &cache_directory) {
+  const auto table = std::make_shared<twin::ContactTable>(twin::ContactTable::load_or_build(
+      long_indenter(name), twin::silicone(layer_mm), cache_directory));
+  return {name, [table](double force_N, double dx_mm, double dy_mm) {
+            return table->base_pressure_Pa(force_N, dx_mm, dy_mm);
+          }};
+}
+
+Contact gaussian(double sigma_mm, double ratio) {
+  const double along = sigma_mm * std::sqrt(ratio), across = sigma_mm / std::sqrt(ratio);
+  return {"gaussian", [=](double force_N, double dx_mm, double dy_mm) {
+            const double u = dx_mm / along, v = dy_mm / across;
+            return 1e6 * force_N / (2.0 * M_PI * along * across) *
+                   std::exp(-0.5 * (u * u + v * v));
+          }};
+}
+
+Pad perfect_pad() {
+  Pad pad{};
+  pad.gain.fill(1.0);
+  return pad;
+}
+
+Pad raw_pad(double spread, Random &random) {
+  Pad pad{};
+  for (double &gain : pad.gain) {
+    gain = 1.0 + spread * normal_within_limit(random);
+  }
+  pad.gain_sd.fill(spread);
+  return pad;
+}
+
+Pad calibrated_pad(Random &random) {
+  static const std::array<Readings, 4> gauge = make_gauge();
+  Readings error{}, drawn{};
+  std::generate(drawn.begin(), drawn.end(), [&] { return SHAPE_SD * normal_within_limit(random); });
+  error = drawn;
+  // The mean of the gains is 1 by definition; the gauge has a standard deviation of its own, spread
+  // over three directions.
+  const double along_sd = GAUGE_SD * std::sqrt(SENSORS / 3.0);
+  Pad pad{};
+  for (std::size_t i = 0; i < gauge.size(); i++) {
+    double part = 0.0;
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      part += gauge[i][k] * drawn[k];
+    }
+    const double wanted = i == 0 ? 0.0 : along_sd * normal_within_limit(random);
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      error[k] += (wanted - part) * gauge[i][k];
+    }
+  }
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    double shape = 1.0, along = 0.0;
+    for (std::size_t i = 0; i < gauge.size(); i++) {
+      shape -= gauge[i][k] * gauge[i][k];
+      along += i == 0 ? 0.0 : gauge[i][k] * gauge[i][k];
+    }
+    pad.gain[k] = 1.0 + error[k];
+    pad.gain_sd[k] = std::sqrt(SHAPE_SD * SHAPE_SD * shape + along_sd * along_sd * along);
+  }
+  return pad;
+}
+
+Touch draw_touch(const fit_array &array, Random &random) {
+  const auto [left, right] = std::minmax_element(array.x, array.x + SENSORS);
+  const auto [bottom, top] = std::minmax_element(array.y, array.y + SENSORS);
+  const double pitch_mm = static_cast<double>(array.pitch_mm);
+  Touch touch{};
+  touch.x_mm = pitch_mm * random.uniform(*left, *right);
+  touch.y_mm = pitch_mm * random.uniform(*bottom, *top);
+  touch.force_N = random.uniform(FORCE_MIN_N, FORCE_MAX_N);
+  touch.angle_rad = random.uniform(0.0, 2.0 * M_PI);
+  return touch;
+}
+
+double draw_noise_Pa(Random &random) {
+  const auto osr = static_cast<std::uint16_t>(256 << random.next() % 6);
+  return ms5840_find_osr(osr)->noise_Pa_q10 / 1024.0;
+}
+
+std::array<std::int32_t, SENSORS> readings_of(const fit_array &array, const Contact &contact,
+                                              const Touch &touch, const Pad &pad, double noise_Pa,
+                                              Random &random) {
+  std::array<std::int32_t, SENSORS> readings{};
+  const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
+  const double pitch_mm = static_cast<double>(array.pitch_mm);
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    const double dx = pitch_mm * static_cast<double>(array.x[k]) - touch.x_mm;
+    const double dy = pitch_mm * static_cast<double>(array.y[k]) - touch.y_mm;
+    const double base_Pa = contact.base_Pa(touch.force_N, c * dx + s * dy, c * dy - s * dx);
+    const double reading_Pa = pad.gain[k] * base_Pa + noise_Pa * random.normal();
+    readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * reading_Pa));
+  }
+  return readings;
+}
+
+fit_array firmware_array() {
+  fit_array array;
+  if (geometry.sensor_count != SENSORS ||
+      fit_array_init(&array, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
+                     geometry.pitch_mm) != FT_OK) {
+    throw std::runtime_error("the firmware's geometry is not the grid of 15 that is judged here");
+  }
+  return array;
+}
+
+fit_settings settings_for(const Pad &pad, double noise_Pa) {
+  fit_settings settings{};
+  settings.iterations = DEFAULT_FIT_ITERATIONS;
+  settings.model_sd_q16 = static_cast<std::uint16_t>(DEFAULT_MODEL_SD * 65536.0f);
+  settings.noise_Pa_q10 = static_cast<std::int32_t>(std::lround(1024.0 * noise_Pa));
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    settings.gain_sd_q16[k] = static_cast<std::uint16_t>(std::lround(65536.0 * pad.gain_sd[k]));
+  }
+  return settings;
+}
+
+} // namespace fingertip::truth

@@ -1,0 +1,76 @@
+// What the fit is judged on: touches whose true place and force are known, as the sensors of a pad
+// report them.
+//
+// A contact is an object of the twin on a layer of rubber, or an elliptic Gaussian; a pad is a draw
+// of its sensors' gains with what the firmware is told of them.
+#pragma once
+
+#include "libfingertip/random.hpp"
+#include "twin/contact_table.hpp"
+
+extern "C" {
+#include "fit/fit.h"
+}
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace fingertip::truth {
+
+constexpr std::size_t SENSORS = 15;
+using Readings = std::array<double, SENSORS>;
+
+// Pressure on the base by dx, dy from the contact's middle, along its own axes, under this force.
+struct Contact {
+  std::string name;
+  std::function<double(double force_N, double dx_mm, double dy_mm)> base_Pa;
+};
+
+// The twin's object by its name, or one of these: "cylinder6x12", a cylinder of 6 mm lying on a
+// side of 12 mm; "edge20", a straight edge: a cylinder of 2 mm lying on a side of 20 mm. Its table
+// is solved if the cache does not hold it.
+Contact contact_of(const std::string &name, double layer_mm,
+                   const std::filesystem::path &cache_directory);
+// Its widths are sigma sqrt(ratio) along the first axis and sigma / sqrt(ratio) along the other.
+Contact gaussian(double sigma_mm, double ratio);
+
+// Gain of each sensor and its standard deviation as the firmware has it. Gains multiply readings:
+// of a calibrated pad it is what is left after the calibration.
+struct Pad {
+  Readings gain, gain_sd;
+};
+
+Pad perfect_pad();
+// Gains as cast, normal about 1 as the twin draws them, and no calibration.
+Pad raw_pad(double spread, Random &random);
+// What thirty placements of one weight leave: errors with a standard deviation of 1.2 % that change
+// the shape of a touch, and of 2.5 % along the three that do not: log-gains linear in x, in y and in
+// x^2 + y^2 turn one Gaussian into another. The place where the estimates of a solver would come in.
+Pad calibrated_pad(Random &random);
+
+struct Touch {
+  double x_mm, y_mm, force_N;
+  double angle_rad; // of the contact's first axis
+};
+
+// Anywhere on the array, 1..15 N, at any angle.
+Touch draw_touch(const fit_array &array, Random &random);
+
+// The noise of one of the six oversampling ratios, Pa rms.
+double draw_noise_Pa(Random &random);
+
+// What condition hands to the fit: gains act, noise is added; 1/1024 Pa.
+std::array<std::int32_t, SENSORS> readings_of(const fit_array &array, const Contact &contact,
+                                              const Touch &touch, const Pad &pad, double noise_Pa,
+                                              Random &random);
+
+// The firmware's array. Throws std::runtime_error if its geometry is refused.
+fit_array firmware_array();
+// The settings that it fits with: its defaults, told of this pad and noise.
+fit_settings settings_for(const Pad &pad, double noise_Pa);
+
+} // namespace fingertip::truth
