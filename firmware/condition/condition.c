@@ -4,16 +4,95 @@
 
 #include <string.h>
 
+/* Units of 1.024 ms, which a shift makes of microseconds. */
+#define MS(ms) ((int32_t)((ms)*INT64_C(1000) / 1024))
+#define SECONDS(s) MS(INT64_C(1000) * (s))
+#define Pa_q10(Pa) (1024 * (Pa))
+
+#define STEP_MAX_ms 16383 /* a longer gap counts as this */
+#define TRACK_ms 64       /* each sensor is tracked so often; at lower rates with every frame */
+#define AGE_MAX_ms ((uint32_t)SECONDS(86400))
+
+#define TARE_SLOW_ms SECONDS(1)
+#define TARE_FEWEST 3
+
+/* Of real sensors at rest: 130 to 210 Pa in 16 min, 0.22 Pa/s at most (source as in condition.h).
+ * The zero may follow at 0.31; what drifted in a contact is taken to be up to 0.24 Pa/s of it, 900
+ * Pa at most. */
+#define DRIFT_SLEW_q4 5
+#define DRIFT_IN_CONTACT_SHIFT 2
+#define DRIFT_IN_CONTACT_MAX_Pa 900
+#define DRIFT_FASTEST_q12 (DRIFT_SLEW_q4 << 8)
+#define DRIFT_GOES_ON_ms ((uint32_t)SECONDS(3600))
+
+#define IDLE_ms SECONDS(2)     /* time constants of the level, */
+#define FOLLOW_ms MS(700)      /* of the remainder, */
+#define WANDER_ms SECONDS(120) /* and of what it counts as risen lately */
+#define WARM_ms SECONDS(8)
+#define WARM_SHIFT 3 /* share of what may have moved that does in a second */
+#define MEMORY_ms SECONDS(CONDITION_MEMORY_s)
+#define FRESH_ms ((uint32_t)SECONDS(CONDITION_FRESH_s))
+#define WARM_FRESH_ms ((uint32_t)SECONDS(6)) /* sensors rise by 130 Pa in the first 5 s */
+
+#define BAND_SHIFT 3   /* of the memory: the remainder, and what closes the gate, */
+#define DIP_SHIFT 2    /* the remainder below zero, */
+#define REOPEN_SHIFT 4 /* and what a sudden press must exceed later */
+#define CROSS_SHIFT                                                                                \
+  1                    /* share of the strongest sensor's memory that counts for all: far sensors  \
+                          stand off by 2 % of a peak that they hardly felt */
+#define KEEP_SHIFT 8   /* share of the memory that the level takes of the remainder in a second */
+#define CREEP_SHIFT 10 /* and of what the remainder does not follow */
+#define KEEP_DOWN_SHIFT 2 /* less of it downward: what dipped comes back */
+
+#define BELOW_ms SECONDS(CONDITION_BELOW_s) /* dips come back within it */
+#define FAR_BELOW_Pa 1000
+#define FAR_BELOW_ms MS(500)
+#define RETURN_MAX_Pa 600 /* a sensor tared after being below may come back by this, in doubt */
+
+#define SATURATED_Pa 100000
+
+#define CALM_AFTER_TARE_ms ((uint32_t)SECONDS(3))
+#define CALM_AFTER_RELEASE_ms ((uint32_t)SECONDS(20))
+#define CALM_LAG_Pa 2 /* and half a sigma: three sigmas of a mean at the least rate */
+#define SNAPSHOT_ms ((uint32_t)SECONDS(4))
+#define SNAPSHOT_LONGEST_ms ((uint32_t)SECONDS(64))
+#define DRIFT_LEAST_s 8
+#define DRIFT_LONGEST_s 512
+#define DRIFT_CHANGE_MAX_Pa 300
+/* A drift seen for T s weighs T^2 / (T^2 + 16): its sd is 1 Pa / T, that of drifts 0.2 Pa/s. */
+#define DRIFT_HALF_s2 16
+
+#define SUM_RANGE (INT32_C(1) << 23)  /* of a reading in a mean: 8 kPa */
+#define ZERO_MAX (INT32_C(1) << 30)   /* 1 MPa; the part ends near 0.5 */
+#define GAINED_MAX (INT32_C(1) << 29) /* before the gain */
+
+static int32_t clamp(int32_t value, int32_t lowest, int32_t highest) {
+  return value < lowest ? lowest : value > highest ? highest : value;
+}
+
 static void begin_tare(struct condition *condition, uint8_t k) {
-  condition->zero_sum[k] = 0;
-  condition->zero_min[k] = INT32_MAX;
-  condition->zero_max[k] = INT32_MIN;
+  condition->tare_sum[k] = 0;
+  condition->tare_min[k] = INT32_MAX;
+  condition->tare_max[k] = INT32_MIN;
   condition->tare_left[k] = CONDITION_TARE_FRAMES;
-  condition->below[k] = 0;
+  condition->memory_Pa_q10[k] = 0;
+  condition->reached_Pa_q10[k] = 0;
+  condition->margin_Pa_q10[k] = 0;
+  condition->risen_Pa_q10[k] = 0;
+  condition->before_Pa_q10[k] = 0;
+  condition->sum_Pa_q10[k] = 0;
+  condition->drift_q16[k] = 0;
+  condition->below_ms[k] = 0;
+  condition->summed[k] = 0;
+  uint32_t others = ~(UINT32_C(1) << k);
+  condition->restless &= others;
+  condition->stands_off &= others;
+  condition->below &= others;
 }
 
 void condition_tare(struct condition *condition) {
   memset(condition, 0, sizeof *condition);
+  condition->released_ms = AGE_MAX_ms;
   for (uint8_t k = 0; k < FT_MAX_SENSORS; k++) {
     begin_tare(condition, k);
   }
@@ -28,26 +107,30 @@ static int32_t mean_of(int64_t sum, int32_t count) {
 }
 
 static void tare_step(struct condition *condition, uint8_t k, int32_t pressure_Pa_q10) {
-  condition->zero_sum[k] += pressure_Pa_q10;
-  if (pressure_Pa_q10 < condition->zero_min[k]) {
-    condition->zero_min[k] = pressure_Pa_q10;
+  if (condition->tare_left[k] == CONDITION_TARE_FRAMES) {
+    condition->tare_begun_ms[k] = condition->now_ms;
   }
-  if (pressure_Pa_q10 > condition->zero_max[k]) {
-    condition->zero_max[k] = pressure_Pa_q10;
+  condition->tare_sum[k] += pressure_Pa_q10;
+  if (pressure_Pa_q10 < condition->tare_min[k]) {
+    condition->tare_min[k] = pressure_Pa_q10;
+  }
+  if (pressure_Pa_q10 > condition->tare_max[k]) {
+    condition->tare_max[k] = pressure_Pa_q10;
   }
   condition->tare_left[k]--;
-  if (condition->tare_left[k] == 0) {
-    int64_t sum = condition->zero_sum[k] - condition->zero_min[k] - condition->zero_max[k];
-    condition->zero_Pa_q10[k] = mean_of(sum, CONDITION_TARE_FRAMES - 2);
-    condition->zero_rest[k] = 0;
+  int32_t taken = CONDITION_TARE_FRAMES - condition->tare_left[k];
+  bool slow = condition->now_ms - condition->tare_begun_ms[k] >= (uint32_t)TARE_SLOW_ms;
+  if (condition->tare_left[k] > 0 && !(slow && taken >= TARE_FEWEST)) {
+    return;
   }
-}
-
-static void track_step(struct condition *condition, uint8_t k, int32_t above_Pa_q10) {
-  int32_t rest = condition->zero_rest[k] + above_Pa_q10;
-  int32_t whole = rest / CONDITION_TRACK_FRAMES;
-  condition->zero_Pa_q10[k] += whole;
-  condition->zero_rest[k] = rest - whole * CONDITION_TRACK_FRAMES;
+  condition->tare_left[k] = 0;
+  int64_t sum = condition->tare_sum[k] - condition->tare_min[k] - condition->tare_max[k];
+  condition->level_Pa_q10[k] = condition->zero_Pa_q10[k] =
+      clamp(mean_of(sum, taken - 2), -ZERO_MAX, ZERO_MAX);
+  condition->tracked_ms[k] = condition->now_ms;
+  condition->tared_ms = 0;
+  condition->snapshots = 0;
+  condition->warm_Pa_q10 = Pa_q10(CONDITION_WARM_Pa);
 }
 
 static int32_t clamped_difference(int32_t a, int32_t b) {
@@ -59,22 +142,285 @@ static int32_t clamped_difference(int32_t a, int32_t b) {
   return a < 0 ? INT32_MIN : INT32_MAX;
 }
 
-/* value * factor / 2^16, saturated; by halves of 16 bits. */
-static int32_t scaled_by(int32_t value, uint32_t factor_q16) {
-  uint32_t size = value < 0 ? 0u - (uint32_t)value : (uint32_t)value;
-  uint32_t whole = (size >> 16) * factor_q16;
-  uint32_t rest_high = (size & 0xFFFF) * (factor_q16 >> 16);
-  uint32_t rest_low = ((size & 0xFFFF) * (factor_q16 & 0xFFFF)) >> 16;
-  uint32_t sum = whole + rest_high + rest_low;
-  bool overflows = (size >> 16) > (INT32_MAX >> 1) / factor_q16 || sum > INT32_MAX;
-  int32_t result = overflows ? INT32_MAX : (int32_t)sum;
-  return value < 0 ? -result : result;
+/* value times a share below 1, to the nearest. */
+static int32_t part_of(int32_t value, int32_t share_q16) {
+  uint32_t low = ((uint32_t)value & 0xFFFF) * (uint32_t)share_q16;
+  return (value >> 16) * share_q16 + (int32_t)((low + 0x8000) >> 16);
 }
 
-void condition_frame(struct condition *condition, const struct frame *frame,
-                     const struct condition_gains *gains, struct conditioned *conditioned) {
-  memset(conditioned, 0, sizeof *conditioned);
+/* What a low pass takes of a difference in this time. */
+static int32_t share_in(int32_t step_ms, int32_t time_constant_ms) {
+  return port_divide(step_ms << 16, time_constant_ms + step_ms);
+}
+
+static int32_t faded(int32_t value, int32_t step_ms, int32_t time_constant_ms) {
+  return value - part_of(value, share_in(step_ms, time_constant_ms));
+}
+
+/* value / gain, |value| <= 2^29 and 1 / gain <= 4, to 1/1024 Pa below. */
+static int32_t scaled_by(int32_t value, uint32_t inverse_q16) {
+  uint32_t low = (uint32_t)value & 0xFFFF;
+  return (value >> 16) * (int32_t)inverse_q16 + (int32_t)(low * (inverse_q16 >> 16)) +
+         (int32_t)(low * (inverse_q16 & 0xFFFF) >> 16);
+}
+
+/* So much a second makes so much in this time. */
+static int32_t in_step(int32_t each_second, int32_t step_ms) {
+  return (each_second >> 4) * step_ms >> 6;
+}
+
+static uint32_t older(uint32_t age_ms, int32_t step_ms) {
+  return age_ms < AGE_MAX_ms ? age_ms + (uint32_t)step_ms : age_ms;
+}
+
+static void set_bit(uint32_t *bitmap, uint8_t k, bool set) {
+  *bitmap = (*bitmap & ~(UINT32_C(1) << k)) | (uint32_t)set << k;
+}
+
+static int32_t drift_in_contact(const struct condition *condition) {
+  uint32_t drift = condition->pressed_ms >> DRIFT_IN_CONTACT_SHIFT;
+  return drift < Pa_q10(DRIFT_IN_CONTACT_MAX_Pa) ? (int32_t)drift : Pa_q10(DRIFT_IN_CONTACT_MAX_Pa);
+}
+
+/* Of the memory, or of that of the whole pad. */
+static int32_t in_all(int32_t memory, int32_t of_pad) {
+  int32_t crossed = of_pad >> CROSS_SHIFT;
+  return memory > crossed ? memory : crossed;
+}
+
+static void track_pressed(struct condition *condition, uint8_t k, int32_t step_ms, int32_t steady) {
+  int32_t reached = faded(condition->reached_Pa_q10[k], step_ms, MEMORY_ms);
+  reached = steady > reached ? steady : reached;
+  condition->reached_Pa_q10[k] = reached;
+  if (reached > condition->pad_reached_Pa_q10) {
+    condition->pad_reached_Pa_q10 = reached;
+  }
+  condition->margin_Pa_q10[k] = in_all(reached, condition->pad_reached_Pa_q10) >> BAND_SHIFT;
+  condition->risen_Pa_q10[k] = faded(condition->risen_Pa_q10[k], step_ms, WANDER_ms);
+  condition->below_ms[k] = 0;
+  set_bit(&condition->below, k, false);
+  if (condition->pressed_ms < DRIFT_GOES_ON_ms) {
+    int32_t drift_q16 = condition->drift_rest_q16[k] + condition->drift_q16[k] * step_ms;
+    condition->drift_rest_q16[k] = (uint16_t)drift_q16;
+    condition->level_Pa_q10[k] += drift_q16 >> 16;
+    condition->zero_Pa_q10[k] += drift_q16 >> 16;
+  }
+}
+
+static void watch_below(struct condition *condition, uint8_t k, int32_t step_ms,
+                        int32_t above_level, int32_t lowest) {
+  int32_t under = lowest - above_level;
+  bool below = under > 0;
+  set_bit(&condition->below, k, below);
+  if (!below) {
+    condition->below_ms[k] = 0;
+    return;
+  }
+  condition->below_ms[k] = (uint16_t)(condition->below_ms[k] + step_ms);
+  if (condition->below_ms[k] >= (under > Pa_q10(FAR_BELOW_Pa) ? FAR_BELOW_ms : BELOW_ms)) {
+    begin_tare(condition, k);
+    condition->memory_Pa_q10[k] = clamp(-above_level, 0, Pa_q10(RETURN_MAX_Pa)) << BAND_SHIFT;
+  }
+}
+
+/* While nothing touches for certain, or what does cannot be told from a drift (`unsure`). */
+static void track_free(struct condition *condition, uint8_t k, int32_t step_ms, int32_t above_zero,
+                       int32_t open, int32_t calm_lag, bool unsure) {
+  int32_t memory = in_all(condition->memory_Pa_q10[k], condition->pad_memory_Pa_q10);
+  int32_t warm = condition->warm_Pa_q10;
+  bool fresh = condition->released_ms < FRESH_ms || condition->tared_ms < WARM_FRESH_ms;
+  if (condition->summed[k] > 0) {
+    above_zero = port_divide(condition->sum_Pa_q10[k], condition->summed[k]);
+  }
+  condition->sum_Pa_q10[k] = 0;
+  condition->summed[k] = 0;
+  int32_t remainder = condition->zero_Pa_q10[k] - condition->level_Pa_q10[k];
+  int32_t above_level = above_zero + remainder;
+  int32_t deepest = -((memory >> DIP_SHIFT) + warm);
+
+  int32_t slew = (step_ms * DRIFT_SLEW_q4) >> 4;
+  int32_t creep = slew, keep = 0;
+  if (!unsure) {
+    int32_t goal = clamp(above_level, deepest, (memory >> BAND_SHIFT) + warm);
+    int32_t came_down = -condition->risen_Pa_q10[k];
+    int32_t highest = remainder > 0 ? remainder : 0;
+    highest = came_down > highest ? came_down : highest;
+    if (!fresh && goal > highest) {
+      goal = highest;
+    }
+    remainder += part_of(goal - remainder, share_in(step_ms, FOLLOW_ms));
+    int32_t warming = in_step(warm >> WARM_SHIFT, step_ms);
+    creep += in_step(memory >> CREEP_SHIFT, step_ms) + warming;
+    keep = slew + in_step(memory >> KEEP_SHIFT, step_ms) + warming;
+  }
+  int32_t idle_share = share_in(step_ms, IDLE_ms);
+  int32_t crept = clamp(part_of(above_zero, idle_share), -creep, creep);
+  int32_t kept = clamp(part_of(remainder, idle_share), -(keep >> KEEP_DOWN_SHIFT), keep);
+  condition->level_Pa_q10[k] += crept + kept;
+  condition->zero_Pa_q10[k] = condition->level_Pa_q10[k] + remainder - kept;
+  int32_t risen = faded(condition->risen_Pa_q10[k], step_ms, WANDER_ms) + crept + kept;
+  condition->risen_Pa_q10[k] = risen;
+
+  condition->margin_Pa_q10[k] = unsure  ? 0
+                                : fresh ? (memory >> BAND_SHIFT) + warm
+                                        : (memory >> REOPEN_SHIFT) + (warm >> 2);
+  set_bit(&condition->restless, k, above_level > calm_lag || above_level < -calm_lag);
+  set_bit(&condition->stands_off, k,
+          remainder > Pa_q10(CONDITION_OPEN_Pa) || risen > Pa_q10(CONDITION_OPEN_Pa));
+  watch_below(condition, k, step_ms, above_level, deepest - open);
+}
+
+/* The drift of each sensor from the oldest to the latest level, while there is a calm to see it. */
+static void see_drift(struct condition *condition, uint8_t count) {
+  uint8_t latest = (uint8_t)(condition->snapshots - 1);
+  int32_t span_ms = (int32_t)(condition->snapshot_ms[latest] - condition->snapshot_ms[0]);
+  int32_t span_s = span_ms >> 10;
+  if (span_s < DRIFT_LEAST_s) {
+    return;
+  }
+  span_s = span_s < DRIFT_LONGEST_s ? span_s : DRIFT_LONGEST_s;
+  int32_t weight_q12 = port_divide((span_s * span_s) << 12, span_s * span_s + DRIFT_HALF_s2);
+  for (uint8_t k = 0; k < count; k++) {
+    int32_t change =
+        clamped_difference(condition->snapshot_Pa_q10[latest][k], condition->snapshot_Pa_q10[0][k]);
+    change = clamp(change, -Pa_q10(DRIFT_CHANGE_MAX_Pa), Pa_q10(DRIFT_CHANGE_MAX_Pa));
+    int32_t drift_q12 = port_divide(change * (1 << 12), span_ms);
+    bool is_drift = drift_q12 < DRIFT_FASTEST_q12 && drift_q12 > -DRIFT_FASTEST_q12;
+    condition->drift_q16[k] = is_drift ? (drift_q12 * weight_q12) >> 8 : 0;
+  }
+}
+
+/* When the room is full every other one goes, and the next come half as often; at last the oldest
+ * goes. */
+static void take_snapshot(struct condition *condition, uint8_t count) {
+  if (condition->snapshots == CONDITION_SNAPSHOTS) {
+    bool oldest_goes = condition->snapshot_interval_ms >= SNAPSHOT_LONGEST_ms;
+    uint8_t left = oldest_goes ? CONDITION_SNAPSHOTS - 1 : CONDITION_SNAPSHOTS / 2;
+    for (uint8_t i = 0; i < left; i++) {
+      uint8_t from = oldest_goes ? (uint8_t)(i + 1) : (uint8_t)(2 * i);
+      memmove(condition->snapshot_Pa_q10[i], condition->snapshot_Pa_q10[from],
+              count * sizeof condition->level_Pa_q10[0]);
+      condition->snapshot_ms[i] = condition->snapshot_ms[from];
+    }
+    condition->snapshots = left;
+    condition->snapshot_interval_ms *= oldest_goes ? 1u : 2u;
+  }
+  memcpy(condition->snapshot_Pa_q10[condition->snapshots], condition->level_Pa_q10,
+         count * sizeof condition->level_Pa_q10[0]);
+  condition->snapshot_ms[condition->snapshots] = condition->now_ms;
+  condition->snapshots++;
+  see_drift(condition, count);
+}
+
+static void watch_calm(struct condition *condition, const struct conditioned *conditioned,
+                       uint8_t count) {
+  bool calm = !condition->pressed && conditioned->tared &&
+              (condition->restless & conditioned->usable) == 0 &&
+              condition->tared_ms >= CALM_AFTER_TARE_ms &&
+              condition->released_ms >= CALM_AFTER_RELEASE_ms;
+  if (!calm) {
+    return;
+  }
+  if (condition->snapshots == 0) {
+    condition->snapshot_interval_ms = SNAPSHOT_ms;
+  } else if (condition->now_ms - condition->snapshot_ms[condition->snapshots - 1] <
+             condition->snapshot_interval_ms) {
+    return;
+  }
+  take_snapshot(condition, count);
+}
+
+static void press_or_release(struct condition *condition, bool over) {
+  if (over == condition->pressed) {
+    return;
+  }
+  condition->pressed = over;
+  if (over) {
+    condition->pressed_ms = 0;
+    condition->firm = UINT32_MAX;
+    condition->snapshots = 0;
+    condition->pad_reached_Pa_q10 = 0;
+    memset(condition->reached_Pa_q10, 0, sizeof condition->reached_Pa_q10);
+    memset(condition->margin_Pa_q10, 0, sizeof condition->margin_Pa_q10);
+    return;
+  }
+  condition->released_ms = 0;
+  memset(condition->sum_Pa_q10, 0, sizeof condition->sum_Pa_q10);
+  memset(condition->summed, 0, sizeof condition->summed);
+  int32_t drift = drift_in_contact(condition);
+  if (drift > condition->warm_Pa_q10) {
+    condition->warm_Pa_q10 = drift;
+  }
+}
+
+static void track_sensor(struct condition *condition, const struct frame *frame,
+                         const struct conditioned *conditioned, uint8_t k, int32_t open,
+                         bool unsure) {
+  uint32_t bit = UINT32_C(1) << k;
+  uint32_t gap_ms = condition->now_ms - condition->tracked_ms[k];
+  int32_t step_ms = gap_ms < STEP_MAX_ms ? (int32_t)gap_ms : STEP_MAX_ms;
+  condition->tracked_ms[k] = condition->now_ms;
+  if (k == 0) {
+    condition->pad_memory_Pa_q10 = faded(condition->pad_memory_Pa_q10, step_ms, MEMORY_ms);
+    condition->pad_reached_Pa_q10 = faded(condition->pad_reached_Pa_q10, step_ms, MEMORY_ms);
+    if (!condition->pressed) {
+      condition->warm_Pa_q10 = faded(condition->warm_Pa_q10, step_ms, WARM_ms);
+    }
+  }
+  if (frame->saturated & bit) {
+    condition->memory_Pa_q10[k] = condition->reached_Pa_q10[k] = Pa_q10(SATURATED_Pa);
+    condition->margin_Pa_q10[k] = Pa_q10(SATURATED_Pa) >> BAND_SHIFT;
+  }
+  if (!(conditioned->usable & bit) || frame->doubtful & bit) {
+    return;
+  }
+  /* One disturbed reading is no pressure to remember. */
+  int32_t pressure = conditioned->pressure_Pa_q10[k];
+  int32_t steady = condition->before_Pa_q10[k] < pressure ? condition->before_Pa_q10[k] : pressure;
+  steady = steady < Pa_q10(SATURATED_Pa) ? steady : Pa_q10(SATURATED_Pa);
+  condition->before_Pa_q10[k] = pressure;
+  int32_t memory = faded(condition->memory_Pa_q10[k], step_ms, MEMORY_ms);
+  if (condition->pressed && steady > memory) {
+    memory = steady;
+  }
+  condition->memory_Pa_q10[k] = memory;
+  if (memory > condition->pad_memory_Pa_q10) {
+    condition->pad_memory_Pa_q10 = memory;
+  }
+  int32_t risen = condition->risen_Pa_q10[k];
+  set_bit(&condition->firm, k, pressure > open + 3 * (risen < 0 ? -risen : risen) / 2);
+  if (condition->pressed && !unsure) {
+    track_pressed(condition, k, step_ms, steady);
+  } else {
+    int32_t calm_lag = Pa_q10(CALM_LAG_Pa) + frame->noise_Pa_q10 / 2;
+    int32_t above = clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k]);
+    track_free(condition, k, step_ms, clamp(above, -SUM_RANGE, SUM_RANGE), open, calm_lag, unsure);
+  }
+}
+
+/* As many sensors as are due, in turn. */
+static void track(struct condition *condition, const struct frame *frame,
+                  const struct conditioned *conditioned, int32_t step_ms, int32_t open,
+                  bool unsure) {
+  int32_t most = frame->sensor_count * TRACK_ms;
+  int32_t due = condition->due_ms + step_ms * frame->sensor_count;
+  due = due < most ? due : most;
+  for (; due >= TRACK_ms; due -= TRACK_ms) {
+    uint8_t k = condition->next < frame->sensor_count ? condition->next : 0;
+    condition->next = (uint8_t)(k + 1);
+    track_sensor(condition, frame, conditioned, k, open, unsure);
+  }
+  condition->due_ms = due;
+}
+
+/* Fills in pressures, peak and usable; says whether a reading is over the gate and its margin. */
+static bool read_sensors(struct condition *condition, const struct frame *frame,
+                         const struct condition_gains *gains, int32_t limit,
+                         struct conditioned *conditioned) {
   uint32_t readable = frame->valid & ~frame->saturated;
+  bool sums = !condition->pressed;
+  bool over = frame->saturated != 0;
+  int32_t peak = 0;
   conditioned->tared = readable != 0;
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
     uint32_t bit = UINT32_C(1) << k;
@@ -90,35 +436,47 @@ void condition_frame(struct condition *condition, const struct frame *frame,
       continue;
     }
     int32_t above = clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k]);
+    if (sums && above < SUM_RANGE && condition->summed[k] < UINT8_MAX) {
+      condition->sum_Pa_q10[k] += above > -SUM_RANGE ? above : -SUM_RANGE;
+      condition->summed[k]++;
+    }
     if (gains) {
-      above = scaled_by(above, gains->inverse_q16[k]);
+      above = scaled_by(clamp(above, -GAINED_MAX, GAINED_MAX - 1), gains->inverse_q16[k]);
     }
     conditioned->pressure_Pa_q10[k] = above;
     conditioned->usable |= bit;
-    if (above > conditioned->peak_Pa_q10) {
-      conditioned->peak_Pa_q10 = above;
-    }
+    peak = above > peak ? above : peak;
+    over = over || above > limit + condition->margin_Pa_q10[k];
   }
-  int32_t sigmas = condition->contact ? CONDITION_CLOSE_SIGMA : CONDITION_OPEN_SIGMA;
+  conditioned->peak_Pa_q10 = peak;
+  return over;
+}
+
+void condition_frame(struct condition *condition, const struct frame *frame,
+                     const struct condition_gains *gains, struct conditioned *conditioned) {
+  uint32_t now_ms = (uint32_t)(frame->t_us >> 10);
+  uint32_t gap_ms = now_ms - condition->now_ms;
+  int32_t step_ms = gap_ms < STEP_MAX_ms ? (int32_t)gap_ms : STEP_MAX_ms;
+  condition->now_ms = now_ms;
+  condition->pressed_ms = older(condition->pressed_ms, step_ms);
+  condition->released_ms = older(condition->released_ms, step_ms);
+  condition->tared_ms = older(condition->tared_ms, step_ms);
+
+  int32_t open = Pa_q10(CONDITION_OPEN_Pa) + CONDITION_OPEN_SIGMA * frame->noise_Pa_q10;
+  int32_t close = Pa_q10(CONDITION_CLOSE_Pa) + CONDITION_CLOSE_SIGMA * frame->noise_Pa_q10;
+  memset(conditioned, 0, sizeof *conditioned);
+  bool over = read_sensors(condition, frame, gains, condition->pressed ? close : open, conditioned);
+  press_or_release(condition, over);
+  bool unsure = condition->pressed && frame->saturated == 0 &&
+                ((condition->firm & conditioned->usable) == 0 ||
+                 conditioned->peak_Pa_q10 < drift_in_contact(condition));
+  track(condition, frame, conditioned, step_ms, open, unsure);
+
   condition->contact =
-      frame->saturated != 0 || conditioned->peak_Pa_q10 > sigmas * frame->noise_Pa_q10;
+      condition->pressed || conditioned->peak_Pa_q10 > (condition->contact ? close : open);
   conditioned->contact = condition->contact;
-  if (condition->contact) {
-    return;
-  }
-  for (uint8_t k = 0; k < frame->sensor_count; k++) {
-    if (!(conditioned->usable & (UINT32_C(1) << k))) {
-      continue;
-    }
-    if (conditioned->pressure_Pa_q10[k] >= -CONDITION_OPEN_SIGMA * frame->noise_Pa_q10) {
-      condition->below[k] = 0;
-      track_step(condition, k, conditioned->pressure_Pa_q10[k]);
-      continue;
-    }
-    conditioned->tared = false;
-    condition->below[k]++;
-    if (condition->below[k] == CONDITION_BELOW_FRAMES) {
-      begin_tare(condition, k);
-    }
-  }
+  conditioned->tared = conditioned->tared && (condition->below & conditioned->usable) == 0;
+  watch_calm(condition, conditioned, frame->sensor_count);
+  bool stands_off = (condition->stands_off & conditioned->usable) != 0;
+  conditioned->zero_doubtful = condition->pressed ? unsure : condition->contact || stands_off;
 }
