@@ -1,0 +1,447 @@
+#include "store/store.h"
+
+#include "common/bytes.h"
+#include "common/crc32.h"
+
+#include <string.h>
+
+#define MAGIC UINT32_C(0x74665346)
+#define ERASED UINT32_MAX
+#define MARK UINT32_C(0)
+
+enum {
+  VERSION = 1,
+  /* In a slot */
+  BEGUN_AT = 0,
+  MAGIC_AT = 4,
+  VERSION_AT = 8,
+  LENGTH_AT = 10,
+  GENERATION_AT = 12,
+  CRC_AT = 16,
+  PAYLOAD_AT = 20,
+  SEALED_AT = STORE_SLOT_BYTES - 8,
+  FINAL_AT = STORE_SLOT_BYTES - 4,
+  MAX_PAYLOAD = SEALED_AT - PAYLOAD_AT,
+  /* In a payload */
+  HAS_CALIBRATION = 1 << 0,
+  HAS_SETTINGS = 1 << 1,
+  CALIBRATION_AT = 4,
+  SETTINGS_BYTES = 24,
+  /* A slot that does not hold what was written is given up; so often in a row is a flash that
+     fails. */
+  MAX_ATTEMPTS = 3,
+};
+_Static_assert((int)STORE_RECORD_BYTES == (int)SEALED_AT &&
+                   MAX_PAYLOAD >= CALIBRATION_AT + 14 + 12 * FT_MAX_SENSORS + SETTINGS_BYTES,
+               "a record fits into its slot");
+
+/* The longest erase of a sector takes 400 ms (W25Q16JV), and the longest write of a page 3 ms. */
+#define STEP_MAX_us 1000000u
+
+static const uint8_t mark[4] = {0, 0, 0, 0};
+
+static uint32_t slot_address(unsigned sector, unsigned slot) {
+  return sector * PORT_FLASH_SECTOR_BYTES + slot * STORE_SLOT_BYTES;
+}
+
+static uint32_t read_u32(uint32_t at) {
+  uint8_t bytes[4];
+  port_flash_read(at, bytes, sizeof bytes);
+  return bytes_get_u32(bytes);
+}
+
+static unsigned calibration_bytes(unsigned sensor_count) {
+  return 14 + 12 * sensor_count;
+}
+
+/* Record ------------------------------------------------------------------------------------- */
+
+static uint8_t *put_u32(uint8_t *at, uint32_t value) {
+  bytes_put_u32(at, value);
+  return at + 4;
+}
+
+static uint8_t *put_u16(uint8_t *at, uint16_t value) {
+  bytes_put_u16(at, value);
+  return at + 2;
+}
+
+static uint8_t *put_f32(uint8_t *at, float value) {
+  return put_u32(at, bytes_from_f32(value));
+}
+
+static float get_f32(const uint8_t *at) {
+  return bytes_to_f32(bytes_get_u32(at));
+}
+
+static void put_calibration(uint8_t *at, const struct calibration *calibration, unsigned count) {
+  at = put_u32(at, calibration->date_s);
+  at = put_u16(at, calibration->placements);
+  at = put_f32(at, calibration->force_scale);
+  at = put_f32(at, calibration->force_scale_sd);
+  for (unsigned k = 0; k < count; k++) {
+    at = put_f32(at, calibration->sensors[k].gain);
+    at = put_f32(at, calibration->sensors[k].gain_sd);
+    at = put_f32(at, calibration->sensors[k].memory);
+  }
+}
+
+static void get_calibration(const uint8_t *at, struct calibration *calibration, unsigned count) {
+  calibration->date_s = bytes_get_u32(at);
+  calibration->placements = bytes_get_u16(at + 4);
+  calibration->force_scale = get_f32(at + 6);
+  calibration->force_scale_sd = get_f32(at + 10);
+  at += 14;
+  for (unsigned k = 0; k < count; k++, at += 12) {
+    calibration->sensors[k] =
+        (struct sensor_calibration){get_f32(at), get_f32(at + 4), get_f32(at + 8)};
+  }
+}
+
+static void put_settings(uint8_t *at, const struct store_settings *settings) {
+  at = put_u32(at, settings->rate_mHz);
+  at = put_u16(at, settings->osr);
+  at = put_u16(at, settings->slip_window_ms);
+  at = put_f32(at, settings->slip_threshold_mm);
+  at = put_f32(at, settings->prior_sigma_mm);
+  at = put_f32(at, settings->prior_width_mm);
+  put_f32(at, settings->location_limit_mm);
+}
+
+static void get_settings(const uint8_t *at, struct store_settings *settings) {
+  settings->rate_mHz = bytes_get_u32(at);
+  settings->osr = bytes_get_u16(at + 4);
+  settings->slip_window_ms = bytes_get_u16(at + 6);
+  settings->slip_threshold_mm = get_f32(at + 8);
+  settings->prior_sigma_mm = get_f32(at + 12);
+  settings->prior_width_mm = get_f32(at + 16);
+  settings->location_limit_mm = get_f32(at + 20);
+}
+
+/* Its generation and CRC come when its place is known. */
+static void make_record(struct store *store, const struct calibration *calibration,
+                        const struct store_settings *settings) {
+  uint8_t *payload = store->record + PAYLOAD_AT;
+  unsigned length = CALIBRATION_AT + calibration_bytes(store->sensor_count) + SETTINGS_BYTES;
+  memset(payload, 0, length);
+  payload[0] = (uint8_t)((calibration ? HAS_CALIBRATION : 0) | (settings ? HAS_SETTINGS : 0));
+  payload[1] = store->sensor_count;
+  if (calibration) {
+    put_calibration(payload + CALIBRATION_AT, calibration, store->sensor_count);
+  }
+  if (settings) {
+    put_settings(payload + length - SETTINGS_BYTES, settings);
+  }
+  store->record_length = (uint16_t)(PAYLOAD_AT + length);
+}
+
+/* Of the record in the buffer, as its length says. */
+static uint32_t record_crc(const struct store *store) {
+  uint32_t crc = CRC32_BEGIN;
+  for (unsigned i = MAGIC_AT; i < store->record_length; i++) {
+    if (i < CRC_AT || i >= PAYLOAD_AT) {
+      crc = crc32_add_u8(crc, store->record[i]);
+    }
+  }
+  return ~crc;
+}
+
+static void address_record(struct store *store) {
+  uint8_t *record = store->record;
+  bytes_put_u32(record + MAGIC_AT, MAGIC);
+  bytes_put_u16(record + VERSION_AT, VERSION);
+  bytes_put_u16(record + LENGTH_AT, (uint16_t)(store->record_length - PAYLOAD_AT));
+  bytes_put_u32(record + GENERATION_AT, store->to_generation);
+  bytes_put_u32(record + CRC_AT, record_crc(store));
+}
+
+/* False: the record in the buffer is not what this firmware writes for this array. */
+static bool take_record(struct store *store) {
+  struct store_content *content = &store->content;
+  const uint8_t *payload = store->record + PAYLOAD_AT;
+  const unsigned length = store->record_length - PAYLOAD_AT;
+  memset(content, 0, sizeof *content);
+  if (bytes_get_u16(store->record + VERSION_AT) != VERSION ||
+      length != CALIBRATION_AT + calibration_bytes(store->sensor_count) + SETTINGS_BYTES ||
+      payload[1] != store->sensor_count) {
+    return false;
+  }
+  if (payload[0] & HAS_CALIBRATION) {
+    struct calibration *calibration = &content->calibration;
+    get_calibration(payload + CALIBRATION_AT, calibration, store->sensor_count);
+    content->has_calibration = calibration_is_valid(calibration, store->sensor_count);
+    if (!content->has_calibration) {
+      memset(calibration, 0, sizeof *calibration);
+      return false;
+    }
+  }
+  if (payload[0] & HAS_SETTINGS) {
+    get_settings(payload + length - SETTINGS_BYTES, &content->settings);
+    content->has_settings = true;
+  }
+  return true;
+}
+
+/* Start-up ----------------------------------------------------------------------------------- */
+
+/* Reads the record of a slot into the buffer, as it is at this moment. False: it is damaged. */
+static bool load_record(struct store *store, unsigned sector, unsigned slot) {
+  const uint32_t address = slot_address(sector, slot);
+  uint8_t *record = store->record;
+  store->record_length = PAYLOAD_AT;
+  for (unsigned at = MAGIC_AT; at < store->record_length;) {
+    unsigned left = store->record_length - at;
+    unsigned count = left < PORT_FLASH_READ_BYTES ? left : PORT_FLASH_READ_BYTES;
+    port_flash_read(address + at, record + at, count);
+    at += count;
+    if (at == PAYLOAD_AT && left == count) { /* the head: now the length is known */
+      unsigned length = bytes_get_u16(record + LENGTH_AT);
+      if (bytes_get_u32(record + MAGIC_AT) != MAGIC || length > MAX_PAYLOAD ||
+          bytes_get_u32(record + GENERATION_AT) == 0) {
+        return false;
+      }
+      store->record_length = (uint16_t)(PAYLOAD_AT + length);
+    }
+  }
+  return bytes_get_u32(record + CRC_AT) == record_crc(store);
+}
+
+/* What start-up finds in one sector. */
+struct sector {
+  uint32_t generation; /* 0: no good record */
+  uint8_t used;        /* slots, counted to the last one that is */
+  uint8_t sure_slot;   /* the last that is good and sealed; STORE_SLOTS: none */
+  bool is_final;       /* and marked so, and no slot is used behind it */
+  bool lost;           /* behind the newest good record stands one that was sealed */
+  bool first_is_bad;   /* the first slot is used and not good */
+};
+
+static struct sector read_sector(struct store *store, unsigned number) {
+  struct sector sector = {.sure_slot = STORE_SLOTS};
+  for (unsigned i = 0; i < STORE_SLOTS; i++) {
+    const uint32_t address = slot_address(number, i);
+    if (read_u32(address + BEGUN_AT) == ERASED) {
+      continue;
+    }
+    bool sealed = read_u32(address + SEALED_AT) == MARK;
+    bool good = load_record(store, number, i);
+    sector.used = (uint8_t)(i + 1);
+    sector.is_final = good && sealed && read_u32(address + FINAL_AT) == MARK;
+    bool was_record = sealed && bytes_get_u32(store->record + MAGIC_AT) == MAGIC;
+    sector.lost = !good && (sector.lost || was_record);
+    if (good) {
+      sector.generation = bytes_get_u32(store->record + GENERATION_AT);
+      if (sector.generation >= store->generation) { /* now: it need not read the same again */
+        store->generation = sector.generation;
+        store->damaged = !take_record(store);
+      }
+      sector.sure_slot = sealed ? (uint8_t)i : sector.sure_slot;
+    } else if (i == 0) {
+      sector.first_is_bad = true;
+    }
+  }
+  return sector;
+}
+
+void store_init(struct store *store, uint8_t sensor_count) {
+  memset(store, 0, sizeof *store);
+  store->sensor_count = sensor_count;
+  const struct sector sectors[PORT_FLASH_SECTORS] = {read_sector(store, 0), read_sector(store, 1)};
+  store->sector = sectors[1].generation > sectors[0].generation;
+  const struct sector *current = &sectors[store->sector];
+  const struct sector *other = &sectors[!store->sector];
+  store->next_slot = current->used;
+  store->sure_slot = current->sure_slot;
+  store->other_is_quiet = !other->first_is_bad;
+  if (current->generation == 0) {
+    /* A single slot begun, in the first sector: the first record of all was cut short. */
+    store->damaged = current->lost || other->lost;
+    store->must_settle = !store->damaged && current->used == 1 && other->used == 0;
+    return;
+  }
+  if (current->lost) {
+    store->damaged = true;
+    memset(&store->content, 0, sizeof store->content);
+  }
+  store->must_settle = !store->damaged && (!current->is_final || other->first_is_bad);
+}
+
+/* Writing ------------------------------------------------------------------------------------ */
+
+static void begin_step(struct store *store, enum store_step step, uint64_t now_us) {
+  store->step = (uint8_t)step;
+  store->step_ends_us = now_us + STEP_MAX_us;
+}
+
+static uint32_t to_address(const struct store *store) {
+  return slot_address(store->to_sector, store->to_slot);
+}
+
+static void program_mark(const struct store *store, unsigned at) {
+  port_flash_program(to_address(store) + at, mark, sizeof mark);
+}
+
+static void begin_erase(struct store *store, uint64_t now_us) {
+  port_flash_erase(store->to_sector);
+  begin_step(store, STORE_ERASE, now_us);
+}
+
+/* Up to the end of the page. */
+static unsigned write_length(const struct store *store) {
+  unsigned rest = PORT_FLASH_PAGE_BYTES - store->at % PORT_FLASH_PAGE_BYTES;
+  unsigned left = store->record_length - store->at;
+  return left < rest ? left : rest;
+}
+
+static void begin_slot(struct store *store, uint64_t now_us) {
+  program_mark(store, BEGUN_AT);
+  begin_step(store, STORE_BEGIN, now_us);
+}
+
+static void begin_write(struct store *store, uint64_t now_us) {
+  store->to_sector = store->sector;
+  store->to_slot = store->next_slot;
+  store->to_generation = store->generation;
+  bool fits = store->generation != 0 && store->next_slot < STORE_SLOTS && store->other_is_quiet;
+  if (fits) {
+    store->next_slot++;
+    begin_slot(store, now_us);
+  } else if (store->sure_slot < STORE_SLOTS) {
+    /* The seal of what remains may have been cut short itself: made good before the other goes. */
+    port_flash_program(slot_address(store->sector, store->sure_slot) + SEALED_AT, mark,
+                       sizeof mark);
+    begin_step(store, STORE_SECURE, now_us);
+    store->to_sector = !store->sector;
+    store->to_slot = 0;
+    store->to_generation++;
+    store->other_is_quiet = false;
+  } else { /* all of this sector was cut short: what surely stays, if anything, is in the other */
+    store->next_slot = STORE_SLOTS;
+    store->to_slot = 0;
+    store->to_generation = store->generation != 0 ? store->generation : 1;
+    begin_erase(store, now_us);
+  }
+  address_record(store);
+}
+
+static enum ft_status fail(struct store *store, enum ft_status why) {
+  store->step = STORE_IDLE;
+  store->must_settle = false;
+  return why;
+}
+
+static enum ft_status finish_write(struct store *store) {
+  store->sector = store->to_sector;
+  store->next_slot = store->to_slot + 1;
+  store->generation = store->to_generation;
+  store->sure_slot = store->to_slot;
+  store->other_is_quiet = true;
+  store->damaged = false;
+  store->must_settle = false;
+  store->step = STORE_IDLE;
+  take_record(store);
+  return FT_OK;
+}
+
+/* Whether the next bytes are in the flash as they were written. */
+static bool read_back(struct store *store) {
+  uint8_t bytes[PORT_FLASH_READ_BYTES];
+  unsigned left = store->record_length - store->at;
+  unsigned count = left < sizeof bytes ? left : (unsigned)sizeof bytes;
+  port_flash_read(to_address(store) + store->at, bytes, count);
+  bool equal = memcmp(bytes, store->record + store->at, count) == 0;
+  store->at = (uint16_t)(store->at + count);
+  return equal;
+}
+
+static const struct calibration *kept_calibration(const struct store *store) {
+  return store->content.has_calibration ? &store->content.calibration : NULL;
+}
+
+static const struct store_settings *kept_settings(const struct store *store) {
+  return store->content.has_settings ? &store->content.settings : NULL;
+}
+
+/* The deadline has passed: a flash that is still busy with what has failed is not waited for. */
+static void put(struct store *store, const struct calibration *calibration,
+                const struct store_settings *settings) {
+  store->attempts = 0;
+  make_record(store, calibration, settings);
+  store->step = STORE_PUT;
+  store->step_ends_us = 0;
+}
+
+enum ft_status store_poll(struct store *store, uint64_t now_us) {
+  if (store->step == STORE_IDLE) {
+    if (!store->must_settle) {
+      return FT_OK;
+    }
+    put(store, kept_calibration(store), kept_settings(store));
+  }
+  if (port_flash_poll()) {
+    return now_us < store->step_ends_us ? FT_PENDING : fail(store, FT_ERR_TIMEOUT);
+  }
+  switch (store->step) {
+  case STORE_PUT:
+    begin_write(store, now_us);
+    break;
+  case STORE_SECURE:
+    begin_erase(store, now_us);
+    break;
+  case STORE_ERASE:
+    begin_slot(store, now_us);
+    break;
+  case STORE_BEGIN:
+  case STORE_WRITE:
+    store->at = store->step == STORE_BEGIN ? MAGIC_AT : (uint16_t)(store->at + write_length(store));
+    if (store->at < store->record_length) {
+      port_flash_program(to_address(store) + store->at, store->record + store->at,
+                         write_length(store));
+      begin_step(store, STORE_WRITE, now_us);
+    } else {
+      store->at = MAGIC_AT;
+      begin_step(store, STORE_READ_BACK, now_us);
+    }
+    break;
+  case STORE_READ_BACK:
+    if (!read_back(store)) {
+      if (++store->attempts == MAX_ATTEMPTS) {
+        return fail(store, FT_ERR_CRC);
+      }
+      begin_write(store, now_us);
+    } else if (store->at == store->record_length) {
+      program_mark(store, SEALED_AT);
+      begin_step(store, STORE_SEAL, now_us);
+    }
+    break;
+  case STORE_SEAL:
+    program_mark(store, FINAL_AT);
+    begin_step(store, STORE_END, now_us);
+    break;
+  default:
+    return finish_write(store);
+  }
+  return FT_PENDING;
+}
+
+enum ft_status store_put_calibration(struct store *store, const struct calibration *calibration) {
+  if (store_is_writing(store)) {
+    return FT_ERR_BUSY;
+  }
+  if (!calibration && !store->content.has_calibration && !store->damaged) {
+    return FT_OK;
+  }
+  put(store, calibration, kept_settings(store));
+  return FT_PENDING;
+}
+
+enum ft_status store_put_settings(struct store *store, const struct store_settings *settings) {
+  if (store_is_writing(store)) {
+    return FT_ERR_BUSY;
+  }
+  if (!settings && !store->content.has_settings && !store->damaged) {
+    return FT_OK;
+  }
+  put(store, kept_calibration(store), settings);
+  return FT_PENDING;
+}

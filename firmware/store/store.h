@@ -1,0 +1,122 @@
+/* What a fingertip keeps without power: a calibration, and settings to start with. Power lost at
+ * any moment leaves what was there before or what was being written, never a mixture and never
+ * nothing.
+ *
+ * The flash is a log. A sector holds eight slots; a record, which is all that is kept, goes into
+ * the next free one, and into the first of the other sector once that is erased. The newest
+ * undamaged record counts. In a slot, in this order, each by a write of its own:
+ *
+ *     0    u32  begun: 0. From now on the slot is used, whatever it holds
+ *     4    u32  magic 0x74665346
+ *     8    u16  version 1
+ *     10   u16  length of the payload
+ *     12   u32  generation: one more than that of the other sector when this one was erased
+ *     16   u32  CRC-32/ISO-HDLC of bytes 4 to 15 and the payload
+ *     20        payload, below
+ *     504  u32  sealed: 0. The record was read back and is right
+ *     508  u32  final: 0. The seal is whole
+ *
+ * Payload of version 1: u8 parts (bit 0 calibration, bit 1 settings), u8 n sensors, u16 0; the
+ * calibration as in the command that brings it, without its n: 14 + 12 n bytes, zeros where there
+ * is none; the settings: u32 rate mHz, u16 OSR, u16 slip window ms, f32 slip threshold mm, f32 f32
+ * prior mm, f32 location limit mm. Later versions keep the slot as it is and change the payload.
+ *
+ * Bits whose change was cut short may read as they like, differently each time. So a record that is
+ * not final may be there today and gone tomorrow, or the other way round: where start-up meets one,
+ * it writes what it has decided for once more, behind it. A mark is all zeros, so that one cut
+ * short is made good by writing it again; before `begun` is whole no other bit of the slot is
+ * touched, and a slot without it is free. A sector is erased only while the other one holds a
+ * record whose seal is whole, or if all its own records were cut short.
+ *
+ * Main context only. Nothing waits: store_poll() takes a write one short step further.
+ */
+#ifndef STORE_STORE_H
+#define STORE_STORE_H
+
+#include "common/calibration.h"
+#include "common/status.h"
+#include "port/flash.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct store_settings {
+  uint32_t rate_mHz;
+  uint16_t osr;
+  uint16_t slip_window_ms;
+  float slip_threshold_mm;
+  float prior_sigma_mm, prior_width_mm;
+  float location_limit_mm;
+};
+
+/* What is in the flash for good. */
+struct store_content {
+  bool has_calibration, has_settings;
+  struct calibration calibration;
+  struct store_settings settings;
+};
+
+enum {
+  STORE_SLOT_BYTES = 512,
+  STORE_SLOTS = PORT_FLASH_SECTOR_BYTES / STORE_SLOT_BYTES,
+  STORE_RECORD_BYTES = STORE_SLOT_BYTES - 8, /* with the mark before it, without those behind it */
+};
+
+enum store_step {
+  STORE_IDLE,
+  STORE_PUT,    /* to be begun */
+  STORE_SECURE, /* the seal of what remains while the other sector is erased */
+  STORE_ERASE,
+  STORE_BEGIN, /* the mark that the slot is used */
+  STORE_WRITE,
+  STORE_READ_BACK,
+  STORE_SEAL,
+  STORE_END, /* the mark that it is final */
+};
+
+struct store {
+  struct store_content content;
+  /* What the flash holds is damaged, or of a later firmware: .content is empty. */
+  bool damaged;
+
+  uint8_t sensor_count;
+  uint8_t step;     /* enum store_step */
+  uint8_t attempts; /* that have failed */
+
+  /* The log. The current sector holds the newest record, if there is any. */
+  uint8_t sector;
+  uint8_t next_slot;   /* of the current sector; STORE_SLOTS: it is full */
+  uint32_t generation; /* of the current sector; 0: there is no record */
+  uint8_t sure_slot;   /* of the current sector: a sealed record; STORE_SLOTS: none */
+  bool other_is_quiet; /* the other sector holds nothing that may turn into a newer record */
+  bool must_settle;    /* what was decided at start-up has to be written once more */
+
+  /* The write under way. */
+  uint8_t to_sector, to_slot;
+  uint32_t to_generation;
+  uint16_t at; /* byte of the record */
+  uint16_t record_length;
+  uint64_t step_ends_us;
+  uint8_t record[STORE_RECORD_BYTES];
+};
+
+/* Reads the flash; about 1 ms. sensor_count: the fingertip's, 1 to FT_MAX_SENSORS; a calibration of
+ * another array is damage. */
+void store_init(struct store *store, uint8_t sensor_count);
+
+/* Begin to keep this instead of what is there; NULL: keep none. The value may go as soon as they
+ * return. FT_OK: nothing had to be written. FT_PENDING. FT_ERR_BUSY: a write is under way. */
+enum ft_status store_put_calibration(struct store *store, const struct calibration *calibration);
+enum ft_status store_put_settings(struct store *store, const struct store_settings *settings);
+
+/* To be called at least each millisecond or so while a write is under way; a call takes less than
+ * 10 us on the RP2040. FT_PENDING: a write is under way. FT_OK: none is, and .content is what was
+ * put. After FT_PENDING, once: FT_ERR_TIMEOUT, FT_ERR_CRC: the flash has failed; .content is as
+ * before. */
+enum ft_status store_poll(struct store *store, uint64_t now_us);
+
+static inline bool store_is_writing(const struct store *store) {
+  return store->step != STORE_IDLE || store->must_settle;
+}
+
+#endif

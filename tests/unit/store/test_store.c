@@ -1,0 +1,401 @@
+/* The store on a flash that loses its power at every step. */
+#include "common/bytes.h"
+#include "common/crc32.h"
+#include "native/native_flash.h"
+#include "store/store.h"
+#include "support/random.h"
+
+#include <string.h>
+#include <unity.h>
+
+enum { SENSORS = 15, UPDATES = 10000 };
+
+static struct store store;
+static struct random random;
+static uint64_t now_us;
+
+void setUp(void) {
+  random = (struct random){2026};
+  native_flash_reset(7);
+  store_init(&store, SENSORS);
+}
+
+void tearDown(void) {}
+
+static struct calibration some_calibration(void) {
+  struct calibration calibration = {0};
+  calibration.date_s = random_u32(&random);
+  calibration.placements = (uint16_t)random_below(&random, 100);
+  calibration.force_scale = (float)random_between(&random, 0.5, 2.0);
+  calibration.force_scale_sd = (float)random_between(&random, 0.0, 0.2);
+  for (int k = 0; k < SENSORS; k++) {
+    calibration.sensors[k] = (struct sensor_calibration){(float)random_between(&random, 0.7, 1.3),
+                                                         (float)random_between(&random, 0.0, 0.1),
+                                                         (float)random_between(&random, 0.0, 0.1)};
+  }
+  return calibration;
+}
+
+static struct store_settings some_settings(void) {
+  return (struct store_settings){.rate_mHz = random_below(&random, 2000000),
+                                 .osr = (uint16_t)(256u << random_below(&random, 6)),
+                                 .slip_window_ms = (uint16_t)random_below(&random, 1000),
+                                 .slip_threshold_mm = (float)random_between(&random, 0.1, 5.0),
+                                 .prior_sigma_mm = (float)random_between(&random, 1.0, 5.0),
+                                 .prior_width_mm = (float)random_between(&random, 0.1, 1.0),
+                                 .location_limit_mm = (float)random_between(&random, 0.1, 2.0)};
+}
+
+/* A change of what is kept. */
+struct change {
+  enum { CALIBRATE, ERASE_CALIBRATION, KEEP, FORGET } kind;
+  struct calibration calibration;
+  struct store_settings settings;
+};
+
+static struct change some_change(void) {
+  static const int kinds[] = {CALIBRATE, CALIBRATE, CALIBRATE, ERASE_CALIBRATION,
+                              KEEP,      KEEP,      KEEP,      FORGET};
+  struct change change = {.kind = kinds[random_below(&random, 8)]};
+  change.calibration = some_calibration();
+  change.settings = some_settings();
+  return change;
+}
+
+static struct store_content changed(const struct store_content *before,
+                                    const struct change *change) {
+  static const struct calibration no_calibration;
+  static const struct store_settings no_settings;
+  struct store_content after = *before;
+  switch (change->kind) {
+  case CALIBRATE:
+  case ERASE_CALIBRATION:
+    after.has_calibration = change->kind == CALIBRATE;
+    after.calibration = after.has_calibration ? change->calibration : no_calibration;
+    break;
+  default:
+    after.has_settings = change->kind == KEEP;
+    after.settings = after.has_settings ? change->settings : no_settings;
+    break;
+  }
+  return after;
+}
+
+static bool is(const struct store_content *expected) {
+  return store.content.has_calibration == expected->has_calibration &&
+         store.content.has_settings == expected->has_settings &&
+         memcmp(&store.content.calibration, &expected->calibration, sizeof expected->calibration) ==
+             0 &&
+         memcmp(&store.content.settings, &expected->settings, sizeof expected->settings) == 0;
+}
+
+static enum ft_status put(const struct change *change) {
+  switch (change->kind) {
+  case CALIBRATE:
+    return store_put_calibration(&store, &change->calibration);
+  case ERASE_CALIBRATION:
+    return store_put_calibration(&store, NULL);
+  case KEEP:
+    return store_put_settings(&store, &change->settings);
+  default:
+    return store_put_settings(&store, NULL);
+  }
+}
+
+/* Until nothing is under way, or power is lost. */
+static enum ft_status finish(void) {
+  enum ft_status status;
+  unsigned polls = 0;
+  do {
+    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(1000, ++polls, "a write that does not end");
+    now_us += 1000;
+    status = store_poll(&store, now_us);
+  } while (status == FT_PENDING && !native_flash_is_dead());
+  return status;
+}
+
+static void restart(void) {
+  native_flash_power_up();
+  store_init(&store, SENSORS);
+}
+
+static void a_new_fingertip_keeps_nothing(void) {
+  TEST_ASSERT_FALSE(store.content.has_calibration || store.content.has_settings);
+  TEST_ASSERT_FALSE(store.damaged || store_is_writing(&store));
+  TEST_ASSERT_EQUAL(FT_OK, store_put_calibration(&store, NULL));
+  TEST_ASSERT_EQUAL(FT_OK, store_put_settings(&store, NULL));
+  TEST_ASSERT_EQUAL(0, native_flash_steps());
+}
+
+static void what_was_put_is_there_after_a_restart(void) {
+  struct store_content expected = {0};
+  for (int i = 0; i < 200; i++) {
+    struct change change = some_change();
+    enum ft_status begun = put(&change);
+    struct store_content before = expected;
+    expected = changed(&expected, &change);
+    if (begun == FT_PENDING) {
+      TEST_ASSERT_TRUE_MESSAGE(is(&before), "nothing is there before it is there for good");
+      TEST_ASSERT_EQUAL(FT_ERR_BUSY, put(&change));
+      TEST_ASSERT_TRUE(store_is_writing(&store));
+      TEST_ASSERT_EQUAL(FT_OK, finish());
+    } else {
+      TEST_ASSERT_EQUAL(FT_OK, begun);
+    }
+    TEST_ASSERT_TRUE(is(&expected));
+    if (i % 3 == 0) {
+      restart();
+      TEST_ASSERT_TRUE(is(&expected));
+      TEST_ASSERT_FALSE(store.damaged || store_is_writing(&store));
+    }
+  }
+}
+
+/* Power lost at every step of ten thousand changes, and once more while start-up mends what that
+ * has left: what is there is what was or what was to be, and stays so once it has been mended. */
+static void power_may_be_lost_at_any_step(void) {
+  struct store_content before = {0};
+  unsigned long cuts = 0, new_ones = 0;
+  for (int update = 0; update < UPDATES; update++) {
+    const struct native_flash start = native_flash;
+    struct change change = some_change();
+    struct store_content after = changed(&before, &change);
+    for (uint64_t step = 0;; step++) {
+      native_flash = start;
+      restart();
+      finish(); /* the mending, where there is any */
+      native_flash_cut_after(step);
+      if (put(&change) == FT_PENDING) {
+        finish();
+      }
+      if (!native_flash_is_dead()) {
+        break;
+      }
+      cuts++;
+      restart();
+      TEST_ASSERT_TRUE_MESSAGE(is(&before) || is(&after), "lost or mixed");
+      if (random_below(&random, 4) == 0) {
+        native_flash_cut_after(random_below(&random, 24));
+        finish();
+        restart();
+        TEST_ASSERT_TRUE_MESSAGE(is(&before) || is(&after), "lost or mixed in mending");
+      }
+      TEST_ASSERT_EQUAL(FT_OK, finish());
+      bool is_new = is(&after);
+      new_ones += is_new;
+      TEST_ASSERT_TRUE(is_new || is(&before));
+      for (int again = 0; again < 2; again++) {
+        restart();
+        TEST_ASSERT_TRUE_MESSAGE(is(is_new ? &after : &before), "it turned round");
+        TEST_ASSERT_FALSE(store.damaged);
+      }
+    }
+    TEST_ASSERT_TRUE(is(&after));
+    before = after;
+    /* The next update begins where one was cut short, now and then. */
+    if (random_below(&random, 4) == 0) {
+      struct change other = some_change();
+      struct store_content then = changed(&before, &other);
+      native_flash_cut_after(random_below(&random, 24));
+      if (put(&other) == FT_PENDING) {
+        finish();
+      }
+      restart();
+      TEST_ASSERT_TRUE(is(&before) || is(&then));
+      finish();
+      TEST_ASSERT_TRUE(is(&before) || is(&then));
+      before = is(&then) ? then : before;
+    }
+  }
+  TEST_ASSERT_GREATER_THAN_UINT(8ul * UPDATES, cuts);
+  TEST_ASSERT_GREATER_THAN_UINT(UPDATES, new_ones);
+}
+
+/* A supply that comes and goes: each mending is cut short in its turn, many times in a row, so that
+ * whole sectors fill with records that were never sealed. */
+static void power_may_come_and_go(void) {
+  struct store_content before = {0};
+  for (int storm = 0; storm < 2000; storm++) {
+    struct change change = some_change();
+    struct store_content after = changed(&before, &change);
+    if (put(&change) != FT_PENDING) {
+      continue;
+    }
+    for (int cut = 0; cut < 30; cut++) {
+      native_flash_cut_after(4 + random_below(&random, storm % 2 ? 5 : 11));
+      finish();
+      if (!native_flash_is_dead()) { /* it was kept before: there was nothing to mend */
+        TEST_ASSERT_TRUE(is(&before) || is(&after));
+      }
+      restart();
+      TEST_ASSERT_TRUE_MESSAGE(is(&before) || is(&after), "lost or mixed");
+    }
+    TEST_ASSERT_EQUAL(FT_OK, finish());
+    TEST_ASSERT_TRUE(is(&before) || is(&after));
+    before = is(&after) ? after : before;
+    restart();
+    TEST_ASSERT_TRUE_MESSAGE(is(&before), "it turned round");
+    finish();
+  }
+}
+
+static struct store_content keep_something(void) {
+  struct store_content content = {.has_calibration = true, .has_settings = true};
+  content.calibration = some_calibration();
+  content.settings = some_settings();
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &content.calibration));
+  TEST_ASSERT_EQUAL(FT_OK, finish());
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, &content.settings));
+  TEST_ASSERT_EQUAL(FT_OK, finish());
+  return content;
+}
+
+/* The newest record, the second one, is damaged: the one before it is not what the user has stored
+ * last, so it is not used in its place. */
+static void damage_is_told_and_nothing_is_used(void) {
+  static const struct store_content nothing;
+  keep_something();
+  const struct native_flash whole = native_flash;
+  for (uint32_t at = STORE_SLOT_BYTES + 8; at < STORE_SLOT_BYTES + 200; at++) {
+    native_flash = whole;
+    native_flash.bytes[at] ^= (uint8_t)(1u << at % 8);
+    const struct native_flash damaged = native_flash;
+    restart();
+    TEST_ASSERT_TRUE(store.damaged);
+    TEST_ASSERT_TRUE(is(&nothing));
+    TEST_ASSERT_EQUAL(FT_OK, finish());
+    TEST_ASSERT_EQUAL_MEMORY(&damaged, &native_flash, sizeof damaged);
+  }
+  struct store_content anew = {.has_calibration = true, .calibration = some_calibration()};
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &anew.calibration));
+  TEST_ASSERT_EQUAL(FT_OK, finish());
+  TEST_ASSERT_FALSE(store.damaged);
+  restart();
+  TEST_ASSERT_FALSE(store.damaged);
+  TEST_ASSERT_TRUE(is(&anew));
+}
+
+static void forgetting_mends_damage(void) {
+  keep_something();
+  native_flash.bytes[STORE_SLOT_BYTES + 100] ^= 1;
+  restart();
+  TEST_ASSERT_TRUE(store.damaged);
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, NULL));
+  TEST_ASSERT_EQUAL(FT_OK, finish());
+  restart();
+  TEST_ASSERT_FALSE(store.damaged || store.content.has_settings);
+}
+
+/* The first slot's record as another firmware would have written it. */
+static void alter_record(uint32_t at, uint16_t value) {
+  uint8_t *record = native_flash.bytes;
+  bytes_put_u16(record + at, value);
+  uint16_t length = bytes_get_u16(record + 10);
+  uint32_t crc = CRC32_BEGIN;
+  for (int i = 4; i < 20 + length; i++) {
+    crc = i >= 16 && i < 20 ? crc : crc32_add_u8(crc, record[i]);
+  }
+  bytes_put_u32(record + 16, ~crc);
+}
+
+static void what_another_firmware_wrote_is_left_alone(void) {
+  struct calibration calibration = some_calibration();
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &calibration));
+  TEST_ASSERT_EQUAL(FT_OK, finish());
+  const struct native_flash ours = native_flash;
+  alter_record(8, 1); /* as it was: the bytes are where the header says */
+  TEST_ASSERT_EQUAL_MEMORY(&ours, &native_flash, sizeof ours);
+  static const struct {
+    uint32_t at;
+    uint16_t value;
+  } others[] = {{8, 2}, {8, UINT16_MAX}, {20, 14 << 8 | 1}, {10, 60}, {10, 487}, {32, 0x42C8}};
+  for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
+    native_flash = ours;
+    alter_record(others[i].at, others[i].value);
+    const struct native_flash other = native_flash;
+    restart();
+    TEST_ASSERT_TRUE(store.damaged);
+    TEST_ASSERT_FALSE(store.content.has_calibration);
+    TEST_ASSERT_EQUAL(FT_OK, finish());
+    TEST_ASSERT_EQUAL_MEMORY_MESSAGE(&other, &native_flash, sizeof other, "reading wrote");
+  }
+}
+
+/* Sectors that something else has used before. */
+static void rubbish_is_no_damage_and_in_nobodys_way(void) {
+  for (int kind = 0; kind < 3; kind++) {
+    native_flash_reset(3);
+    for (size_t i = 0; i < NATIVE_FLASH_BYTES; i++) {
+      native_flash.bytes[i] = (uint8_t)(kind == 0 ? 0 : kind == 1 ? random_u32(&random) : i);
+    }
+    const struct native_flash rubbish = native_flash;
+    restart();
+    TEST_ASSERT_FALSE(store.damaged || store_is_writing(&store));
+    TEST_ASSERT_EQUAL_MEMORY(&rubbish, &native_flash, sizeof rubbish);
+    struct store_content kept = keep_something();
+    restart();
+    finish();
+    restart();
+    TEST_ASSERT_TRUE(is(&kept));
+    TEST_ASSERT_FALSE_MESSAGE(store_is_writing(&store), "rubbish is cleared away once");
+  }
+}
+
+static void a_flash_that_has_worn_out_is_told_and_what_was_stays(void) {
+  struct store_content kept = keep_something();
+  native_flash_wear_out();
+  struct calibration other = some_calibration();
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &other));
+  TEST_ASSERT_EQUAL(FT_ERR_CRC, finish());
+  TEST_ASSERT_TRUE(is(&kept));
+  TEST_ASSERT_FALSE(store_is_writing(&store));
+  restart();
+  TEST_ASSERT_TRUE(is(&kept));
+}
+
+static void a_flash_that_does_not_answer_is_not_waited_for(void) {
+  native_flash_cut_after(2);
+  struct store_settings settings = some_settings();
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, &settings));
+  enum ft_status status = FT_PENDING;
+  for (int ms = 0; ms < 1100 && status == FT_PENDING; ms++) {
+    now_us += 1000;
+    status = store_poll(&store, now_us);
+  }
+  TEST_ASSERT_EQUAL(FT_ERR_TIMEOUT, status);
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, &settings));
+  TEST_ASSERT_EQUAL(FT_ERR_TIMEOUT, store_poll(&store, now_us));
+}
+
+/* A record of the most sensors takes two pages. */
+static void the_largest_array_fits(void) {
+  store_init(&store, FT_MAX_SENSORS);
+  struct calibration calibration = some_calibration();
+  for (int k = SENSORS; k < FT_MAX_SENSORS; k++) {
+    calibration.sensors[k] = (struct sensor_calibration){1.0f + 0.001f * (float)k, 0.01f, 0.02f};
+  }
+  for (int i = 0; i < 20; i++) {
+    calibration.date_s++;
+    TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &calibration));
+    TEST_ASSERT_EQUAL(FT_OK, finish());
+    native_flash_power_up();
+    store_init(&store, FT_MAX_SENSORS);
+    TEST_ASSERT_EQUAL_MEMORY(&calibration, &store.content.calibration, sizeof calibration);
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(a_new_fingertip_keeps_nothing);
+  RUN_TEST(what_was_put_is_there_after_a_restart);
+  RUN_TEST(damage_is_told_and_nothing_is_used);
+  RUN_TEST(forgetting_mends_damage);
+  RUN_TEST(what_another_firmware_wrote_is_left_alone);
+  RUN_TEST(rubbish_is_no_damage_and_in_nobodys_way);
+  RUN_TEST(a_flash_that_has_worn_out_is_told_and_what_was_stays);
+  RUN_TEST(a_flash_that_does_not_answer_is_not_waited_for);
+  RUN_TEST(the_largest_array_fits);
+  RUN_TEST(power_may_be_lost_at_any_step);
+  RUN_TEST(power_may_come_and_go);
+  return UNITY_END();
+}
