@@ -22,7 +22,8 @@ constexpr double FORCE_MODEL_SD = 0.01;
  * the bound from fewer; until then it only keeps a session from being good. */
 constexpr std::size_t EVIDENCE_SURE = 24, EVIDENCE_MIN = 8;
 constexpr double EVIDENCE_CLEAR = 3.0;
-/* Of the halves' difference at a sensor: how sure it must be, and how many of its sds are chance. */
+/* Of the halves' difference at a sensor: how sure it must be, and how many of its sds are chance.
+ */
 constexpr double HALVES_SD_MAX = 0.025, HALVES_SDS = 2.0;
 /* Halves that disagree are given so many placements to agree. */
 constexpr std::size_t HALVES_SURE = 40;
@@ -56,8 +57,8 @@ std::string list_of(const std::vector<std::size_t> &sensors) {
 }
 
 /* Differences of the gains of odd and even placements beyond what either can not tell. */
-void compare_halves(const Array &array, std::vector<Placement> placements,
-                    const Solution &solution, Judgement &judgement) {
+void compare_halves(const Array &array, std::vector<Placement> placements, const Solution &solution,
+                    Judgement &judgement) {
   remember(placements);
   std::vector<Placement> halves[2];
   Solution from[2] = {solution, solution};
@@ -213,11 +214,12 @@ struct FirmwareFit {
     settings.iterations = ITERATIONS;
     settings.noise_Pa_q10 = NOISE_Pa_Q10;
   }
-  std::optional<fit_result> operator()(const Placement &placement, const std::vector<double> &gain) {
+  std::optional<fit_result> operator()(const Placement &placement,
+                                       const std::vector<double> &gain) {
     std::int32_t pressure[FT_MAX_SENSORS] = {};
     for (std::size_t k = 0; k < placement.reading_Pa.size(); k++) {
-      pressure[k] = static_cast<std::int32_t>(std::lround(
-          std::clamp(placement.reading_Pa[k] / gain[k], -1e6, 1e6) * 1024.0));
+      pressure[k] = static_cast<std::int32_t>(
+          std::lround(std::clamp(placement.reading_Pa[k] / gain[k], -1e6, 1e6) * 1024.0));
     }
     fit_result result{};
     if (usable_array) {
@@ -239,9 +241,9 @@ struct FirmwareFit {
 } // namespace
 
 const char *name_of(Reason reason) {
-  static const char *const names[] = {"none",    "too_few",   "cluster", "one_end", "unsure",
-                                      "weights", "elongated", "offsets", "drift",   "stray",
-                                      "residual", "halves",   "layout"};
+  static const char *const names[] = {"none",     "too_few",   "cluster", "one_end", "unsure",
+                                      "weights",  "elongated", "offsets", "drift",   "stray",
+                                      "residual", "halves",    "layout"};
   return names[static_cast<int>(reason)];
 }
 
@@ -282,9 +284,9 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
   compare_halves(array, placements, s, j);
   const bool agree = j.halves_shape <= HALVES_SHAPE_MAX && j.halves_gauge <= HALVES_GAUGE_MAX;
   j.reason = agree ? Reason::none : Reason::halves;
-  j.state = agree                                           ? Judgement::State::good
+  j.state = agree                                      ? Judgement::State::good
             : last || placements.size() >= HALVES_SURE ? Judgement::State::refused
-                                                            : Judgement::State::more;
+                                                       : Judgement::State::more;
   j.text = text_of(j, placements.size());
   return j;
 }
@@ -294,7 +296,8 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
   FirmwareFit fit(array);
   std::vector<double> forces;
   for (std::size_t i = 0; i < placements.size(); i++) {
-    const auto fitted = solution.placements[i].kept ? fit(placements[i], solution.gain) : std::nullopt;
+    const auto fitted =
+        solution.placements[i].kept ? fit(placements[i], solution.gain) : std::nullopt;
     if (fitted) {
       forces.push_back(static_cast<double>(fitted->force_N));
     }

@@ -26,10 +26,10 @@ constexpr double HALVES_GAUGE_MAX = 0.04;  /* and within */
 constexpr double FORCE_SPREAD_MAX = 0.025; /* rms of e: one weight */
 constexpr double ELLIPSE_MAX = 0.03;       /* rms of q1, q2: a round foot */
 constexpr double OFFSET_MAX = 0.012;       /* rms over the sensors, of the peak: zeros */
-constexpr double DRIFT_MAX = 0.009;        /* likewise, from first to last placement */
+constexpr double DRIFT_MAX = 0.0075;       /* likewise, from first to last placement */
 constexpr double POSITION_MAX_mm = 0.35;   /* rms: sensors where the layout says */
 constexpr std::size_t PLACEMENTS_WANTED = 12; /* at least, so that the halves mean something */
-constexpr std::size_t PLACEMENTS_MAX = 60; /* who is not done by then never will be */
+constexpr std::size_t PLACEMENTS_MAX = 60;    /* who is not done by then never will be */
 
 enum class Reason {
   none,
@@ -57,7 +57,7 @@ struct Judgement {
   Solution solution;
   double halves_shape = 0.0, halves_gauge = 0.0; /* 0 before there are PLACEMENTS_WANTED */
   double kept_share = 0.0;
-  double ellipse = 0.0; /* rms of q1, q2 */
+  double ellipse = 0.0;                         /* rms of q1, q2 */
   double offset_share = 0.0, drift_share = 0.0; /* rms over the sensors beyond what is by chance, of
                                                    the peak */
   std::vector<std::size_t> unsure; /* sensors whose gain is not known well enough yet */

@@ -15,13 +15,13 @@ using Eigen::VectorXd;
 /* Of rubber letting go; see remember. */
 constexpr double SLOW_s = 10.0, FAST_s = 1.0, FAST_SHARE = 20.0;
 
-constexpr int LOCAL = 6; /* x, y, e, w, q1, q2 */
+constexpr int LOCAL = 6;  /* x, y, e, w, q1, q2 */
 constexpr int COMMON = 5; /* log A, log s, m, q1, q2 of all */
 using Local = Eigen::Matrix<double, LOCAL, 1>;
 using LocalSquare = Eigen::Matrix<double, LOCAL, LOCAL>;
 
 constexpr int ITERATIONS_MAX = 60;
-constexpr double COST_SETTLED = 1e-12; /* relative */
+constexpr double COST_SETTLED = 1e-10; /* relative */
 /* A placement whose residuals are beyond these many times what is expected, and as many times the
  * median placement's, was no such placement: another object, a hand, a weight that tipped. */
 constexpr double DROP_MISFIT = 3.0;
@@ -225,7 +225,8 @@ public:
       known += 2.0;
       count += 1.0;
       for (int j = 2; j < LOCAL; j++) {
-        squares[j] += std::min(locals[i][j] * locals[i][j], CAPPED * CAPPED * sd[j] * sd[j]) + own(j, j);
+        squares[j] +=
+            std::min(locals[i][j] * locals[i][j], CAPPED * CAPPED * sd[j] * sd[j]) + own(j, j);
         known += std::max(1.0 - own(j, j) / (sd[j] * sd[j]), 0.0);
       }
       const double t = tau(placements_[i]);
@@ -263,7 +264,8 @@ public:
     const double u = array_.x_mm[std::size_t(k)] + g[layout.dx(k)] - l[0];
     const double v = array_.y_mm[std::size_t(k)] + g[layout.dy(k)] - l[1];
     const double q1 = l[4] + g[layout.ellipse(0)], q2 = l[5] + g[layout.ellipse(1)];
-    const double square = std::max(u * u + v * v - 2.0 * q1 * (u * u - v * v) - 4.0 * q2 * u * v, 0.0);
+    const double square =
+        std::max(u * u + v * v - 2.0 * q1 * (u * u - v * v) - 4.0 * q2 * u * v, 0.0);
     const double width = std::exp(g[layout.log_width()] + l[3]), m = g[layout.mixing()];
     const double per = 0.5 / (width * width), narrow_per = per / (NARROW * NARROW);
     const double wide = std::exp(-per * square), narrow = std::exp(-narrow_per * square);
@@ -274,8 +276,8 @@ public:
     const double by_u = by_square * (2.0 * u - 4.0 * q1 * u - 4.0 * q2 * v);
     const double by_v = by_square * (2.0 * v + 4.0 * q1 * v - 4.0 * q2 * u);
     Reading r;
-    r.model = value + g[layout.offset(k)] + g[layout.drift(k)] * tau -
-              g[layout.memory(k)] * earlier_Pa;
+    r.model =
+        value + g[layout.offset(k)] + g[layout.drift(k)] * tau - g[layout.memory(k)] * earlier_Pa;
     const double by_q1 = -2.0 * by_square * (u * u - v * v), by_q2 = -4.0 * by_square * u * v;
     const int at[TOUCHED] = {k,
                              layout.log_peak(),
@@ -288,9 +290,9 @@ public:
                              layout.memory(k),
                              layout.ellipse(0),
                              layout.ellipse(1)};
-    const double by[TOUCHED] = {value, value, by_log_width, strength * (narrow - wide),
-                                by_u,  by_v,  1.0,          tau,
-                                -earlier_Pa, by_q1,      by_q2};
+    const double by[TOUCHED] = {value,       value, by_log_width, strength * (narrow - wide),
+                                by_u,        by_v,  1.0,          tau,
+                                -earlier_Pa, by_q1, by_q2};
     std::copy(at, at + TOUCHED, r.at);
     std::copy(by, by + TOUCHED, r.by);
     r.by_local << -by_u, -by_v, value, by_log_width - 2.0 * value, by_q1, by_q2;
@@ -304,10 +306,11 @@ public:
   }
   double tau(const Placement &placement) const { return (placement.t_s - middle_s_) / half_s_; }
   double expected_sd(const Placement &placement, double reading_Pa) const {
-    return std::sqrt(placement.noise_Pa * placement.noise_Pa +
-                     excess_ * excess_ *
-                         (assumed_.model_share * peak_Pa_ * assumed_.model_share * peak_Pa_ +
-                          assumed_.reading_share * reading_Pa * assumed_.reading_share * reading_Pa));
+    return std::sqrt(
+        placement.noise_Pa * placement.noise_Pa +
+        excess_ * excess_ *
+            (assumed_.model_share * peak_Pa_ * assumed_.model_share * peak_Pa_ +
+             assumed_.reading_share * reading_Pa * assumed_.reading_share * reading_Pa));
   }
   double expected_sd(const Placement &placement, int k) const {
     return expected_sd(placement, placement.reading_Pa[std::size_t(k)]);
@@ -392,7 +395,8 @@ private:
       widths.push_back(array_.pitch_mm * std::sqrt(-0.5 / bend));
     }
     const auto median = [](std::vector<double> values) {
-      std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2), values.end());
+      std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2),
+                       values.end());
       return values[values.size() / 2];
     };
     global[layout.log_peak()] = std::log(std::clamp(median(peaks), 0.5 * peak_Pa_, 3.0 * peak_Pa_));
@@ -413,7 +417,8 @@ private:
       const double t = tau(placements_[i]);
       for (int k = 0; kept[i] && k < layout.sensors; k++) {
         if (placements_[i].usable >> k & 1u) {
-          const double r = (placements_[i].reading_Pa[std::size_t(k)] - reading(g, l[i], k, t, earlier(i, k)).model) /
+          const double r = (placements_[i].reading_Pa[std::size_t(k)] -
+                            reading(g, l[i], k, t, earlier(i, k)).model) /
                            expected_sd(placements_[i], k);
           sum += huber(r * r);
         }
@@ -522,7 +527,7 @@ private:
 
   const Array &array_;
   const std::vector<Placement> &placements_; /* with earlier_Pa */
-  Assumptions assumed_; /* prior spreads as they are estimated */
+  Assumptions assumed_;                      /* prior spreads as they are estimated */
   const Assumptions given_;
   double excess_ = 1.0; /* of the model's own error over what is assumed */
   double peak_Pa_ = 0.0, middle_s_ = 0.0, half_s_ = 0.0, cost_ = 0.0;
@@ -618,9 +623,11 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
       double left_squares = 0.0, misfit = 0.0, count = 0.0;
       for (int k = 0; k < layout.sensors; k++) {
         if (placements[i].usable >> k & 1u) {
-          const double left =
-              placements[i].reading_Pa[std::size_t(k)] -
-              problem.reading(problem.global, local, k, problem.tau(placements[i]), problem.earlier(i, k)).model;
+          const double left = placements[i].reading_Pa[std::size_t(k)] -
+                              problem
+                                  .reading(problem.global, local, k, problem.tau(placements[i]),
+                                           problem.earlier(i, k))
+                                  .model;
           const double expected = problem.expected_sd(placements[i], k);
           left_squares += left * left;
           misfit += left * left / (expected * expected);
@@ -650,7 +657,8 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
   }
   problem.descend();
   look();
-  for (int round = 0; !keep_all && !from && round < DROP_ROUNDS && misfits.size() > PLACEMENTS_MIN; round++) {
+  for (int round = 0; !keep_all && !from && round < DROP_ROUNDS && misfits.size() > PLACEMENTS_MIN;
+       round++) {
     const auto middle = misfits.begin() + std::ptrdiff_t(misfits.size() / 2);
     std::nth_element(misfits.begin(), middle, misfits.end());
     const double limit = DROP_MISFIT * std::max(*middle, 1.0);
@@ -668,7 +676,8 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
     look();
   }
   MatrixXd covariance = problem.covariance();
-  for (int round = 0; !from && round < LEARN_ROUNDS && problem.learn_spreads(covariance) > LEARNT; round++) {
+  for (int round = 0; !from && round < LEARN_ROUNDS && problem.learn_spreads(covariance) > LEARNT;
+       round++) {
     problem.descend(1);
     covariance = problem.covariance();
   }
@@ -697,10 +706,8 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
     solution.shape_sd.push_back(std::sqrt(std::max(of_shape(k, k), 0.0)));
     solution.offset_Pa.push_back(problem.global[layout.offset(k)]);
     solution.drift_Pa.push_back(2.0 * problem.global[layout.drift(k)]);
-    solution.offset_sd_Pa.push_back(
-        std::sqrt(covariance(layout.offset(k), layout.offset(k))));
-    solution.drift_sd_Pa.push_back(
-        2.0 * std::sqrt(covariance(layout.drift(k), layout.drift(k))));
+    solution.offset_sd_Pa.push_back(std::sqrt(covariance(layout.offset(k), layout.offset(k))));
+    solution.drift_sd_Pa.push_back(2.0 * std::sqrt(covariance(layout.drift(k), layout.drift(k))));
     solution.dx_mm.push_back(problem.global[layout.dx(k)]);
     solution.dy_mm.push_back(problem.global[layout.dy(k)]);
     solution.memory.push_back(problem.global[layout.memory(k)]);
@@ -726,8 +733,8 @@ Solution solve_from(const Array &array, const std::vector<Placement> &placements
   return solve_any(array, placements, assumptions, true, &from);
 }
 
-Wanted next_place(const Array &array, const std::vector<Placement> &given,
-                  const Solution &solution, const Assumptions &assumptions) {
+Wanted next_place(const Array &array, const std::vector<Placement> &given, const Solution &solution,
+                  const Assumptions &assumptions) {
   std::vector<Placement> placements = given;
   remember(placements);
   std::vector<double> x_mm, y_mm;
@@ -750,8 +757,8 @@ Wanted next_place(const Array &array, const std::vector<Placement> &given,
         const auto strongest = static_cast<std::size_t>(
             std::max_element(placement.reading_Pa.begin(), placement.reading_Pa.end()) -
             placement.reading_Pa.begin());
-        nearest = std::min(nearest, std::hypot(x_mm[c] - array.x_mm[strongest],
-                                               y_mm[c] - array.y_mm[strongest]));
+        nearest = std::min(
+            nearest, std::hypot(x_mm[c] - array.x_mm[strongest], y_mm[c] - array.y_mm[strongest]));
       }
       if (nearest > farthest) {
         farthest = nearest;

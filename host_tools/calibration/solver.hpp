@@ -74,8 +74,8 @@ struct Assumptions {
   double width = 0.02;        /* of the width between places: a pad cast a little aslant */
   double ellipse = 0.01;      /* of q1 and q2 from placement to placement; axes differ by 2 q */
   double ellipse_of_all = 0.05; /* of their means: a foot is a foot, but its shape is not known */
-  double memory = 0.03;       /* of r: losing 17.5 % in 8 s makes 0.025 */
-  double model_share = 0.002; /* of the peak: what the profile leaves (above, and 0.13 % rms) */
+  double memory = 0.03;         /* of r: losing 17.5 % in 8 s makes 0.025 */
+  double model_share = 0.002;   /* of the peak: what the profile leaves (above, and 0.13 % rms) */
   double reading_share = 0.003; /* of a reading: what rubber does between 0.5 and 1 s */
   double mixing = 0.2, mixing_sd = 0.1; /* of m: 0.05 to 0.23 on the twin's tables */
 };
@@ -101,14 +101,14 @@ struct Spread {
 };
 
 struct Solution {
-  bool solved = false; /* else too few placements or readings for any of it */
-  std::vector<double> gain;       /* [sensor] relative to their mean */
-  std::vector<double> gain_sd;    /* relative */
-  std::vector<double> shape_sd;   /* the part of gain_sd outside the gauge */
+  bool solved = false;                     /* else too few placements or readings for any of it */
+  std::vector<double> gain;                /* [sensor] relative to their mean */
+  std::vector<double> gain_sd;             /* relative */
+  std::vector<double> shape_sd;            /* the part of gain_sd outside the gauge */
   std::vector<double> offset_Pa, drift_Pa; /* o, and 2 d: from first to last placement */
   std::vector<double> offset_sd_Pa, drift_sd_Pa;
-  std::vector<double> dx_mm, dy_mm;        /* of the sensors from the layout */
-  std::vector<double> memory;              /* r */
+  std::vector<double> dx_mm, dy_mm; /* of the sensors from the layout */
+  std::vector<double> memory;       /* r */
   double ellipse_of_all[2] = {0.0, 0.0};
   double peak_Pa = 0.0; /* A, of a sensor of mean gain */
   double width_mm = 0.0, mixing = 0.0;
@@ -117,7 +117,7 @@ struct Solution {
   double residual_share = 0.0; /* rms over all readings kept, of the peak */
   double excess = 1.0;         /* of the model's own error over what was assumed */
   Spread spread;
-  double cost = 0.0;           /* 1/2 sum of the robust squares and of the priors' */
+  double cost = 0.0; /* 1/2 sum of the robust squares and of the priors' */
 
   /* Most of shape_sd, and the sd of the gains within the gauge, rms over the sensors. */
   double worst_shape_sd() const;
@@ -132,8 +132,8 @@ constexpr std::size_t PLACEMENTS_MIN = 3;
 Solution solve(const Array &array, const std::vector<Placement> &placements,
                const Assumptions &assumptions = {}, bool keep_all = false);
 
-/* Of some of the placements of a session, with the spreads that all of it showed, beginning where all
- * of it ended; from.placements are theirs. A few placements alone may have a second optimum. */
+/* Of some of the placements of a session, with the spreads that all of it showed, beginning where
+ * all of it ended; from.placements are theirs. A few placements alone may have a second optimum. */
 Solution solve_from(const Array &array, const std::vector<Placement> &placements,
                     const Solution &from, const Assumptions &assumptions = {});
 

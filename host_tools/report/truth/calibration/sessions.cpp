@@ -13,7 +13,7 @@ namespace {
 
 constexpr double AMBIENT_Pa = 101325.0;
 constexpr std::uint16_t OSR = 1024;
-constexpr double FRAMES_PER_s = 200.0; // of the slower board at this OSR
+constexpr double FRAMES_PER_s = 200.0;           // of the slower board at this OSR
 constexpr double DOWN_s = 0.3, TAP_DOWN_s = 0.1; // from first touch to the full force
 constexpr double SETTLED_BEGIN_s = 0.5, SETTLED_END_s = 1.0, STANDS_s = 2.0, PAUSE_s = 1.5;
 constexpr int SETTLED_STEPS = 5;
@@ -42,7 +42,8 @@ double noise_of_one_Pa() {
 }
 
 const twin::Indenter &lying_cylinder() {
-  static const twin::Indenter cylinder{"cylinder6x12", "", twin::Indenter::Shape::roller, 6, 12, 0, 0.4, 0};
+  static const twin::Indenter cylinder{
+      "cylinder6x12", "", twin::Indenter::Shape::roller, 6, 12, 0, 0.4, 0};
   return cylinder;
 }
 
@@ -177,7 +178,7 @@ Session::Session(const Feet &feet, SessionKind kind, std::uint64_t seed, std::si
 }
 
 std::optional<calibration::Placement> Session::next(SessionPad &pad,
-                                                   std::optional<calibration::Wanted> wanted) {
+                                                    std::optional<calibration::Wanted> wanted) {
   if (made_ >= planned_) {
     return std::nullopt;
   }
@@ -229,7 +230,8 @@ Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::
       if (judgement.state == calibration::Judgement::State::refused) {
         break;
       }
-      const auto scale = calibration::force_scale(session_array(), placements, judgement.solution, WEIGHT_N);
+      const auto scale =
+          calibration::force_scale(session_array(), placements, judgement.solution, WEIGHT_N);
       if (judgement.state == calibration::Judgement::State::good && scale) {
         const std::vector<double> truth = pad.settled_gains();
         Calibrated left{{}, judgement.solution.gain_sd, scale->scale, scale->sd};

@@ -37,7 +37,8 @@ public:
   std::vector<double> tap(const twin::ContactTable &object, double force_N, double x_mm,
                           double y_mm);
 
-  // What a reading from 0.5 to 1 s after a placement is multiplied by, relative to the sensors' mean.
+  // What a reading from 0.5 to 1 s after a placement is multiplied by, relative to the sensors'
+  // mean.
   std::vector<double> settled_gains() const;
 
 private:
@@ -70,8 +71,8 @@ struct Feet {
   twin::ContactTable round, lying;
 };
 
-// Somebody at work. Places are anywhere on the array; in a good session, where the tool asks for one,
-// within 3 mm (sd) of it.
+// Somebody at work. Places are anywhere on the array; in a good session, where the tool asks for
+// one, within 3 mm (sd) of it.
 //   elongated  lying cylinder, half of the sessions always at one angle
 //   offsets    zeros off by 500 Pa: up in every other session, else up or down by the sensor
 //   one_end    all in the upper third of the array
