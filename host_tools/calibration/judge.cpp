@@ -8,7 +8,7 @@ extern "C" {
 #include <algorithm>
 #include <cmath>
 
-namespace fingertip::calibration {
+namespace fingertip::calibrating {
 namespace {
 
 /* Placements within this of their middle, in pitches (rms), are a cluster. */
@@ -352,4 +352,4 @@ Scatter scatter(const Array &array, const std::vector<Placement> &placements,
   return {std::hypot(sd_x, sd_y), sd_force / mean_force};
 }
 
-} // namespace fingertip::calibration
+} // namespace fingertip::calibrating

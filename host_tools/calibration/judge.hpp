@@ -14,7 +14,7 @@
 #include <optional>
 #include <string>
 
-namespace fingertip::calibration {
+namespace fingertip::calibrating {
 
 constexpr double SHAPE_SD_MAX = 0.015;     /* largest sd of a gain outside the gauge */
 constexpr double GAUGE_SD_MAX = 0.02;      /* rms sd of the gains within it */
@@ -82,4 +82,4 @@ struct Scatter {
 Scatter scatter(const Array &array, const std::vector<Placement> &placements,
                 const Solution &solution, bool with_gains);
 
-} // namespace fingertip::calibration
+} // namespace fingertip::calibrating

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace fingertip::calibration {
+namespace fingertip::calibrating {
 namespace {
 
 constexpr double SLOT_s = 0.05;
@@ -227,4 +227,4 @@ std::optional<Placement> PlacementFinder::settled(double t_s) {
   return placement;
 }
 
-} // namespace fingertip::calibration
+} // namespace fingertip::calibrating

@@ -22,7 +22,7 @@
 #include <optional>
 #include <vector>
 
-namespace fingertip::calibration {
+namespace fingertip::calibrating {
 
 constexpr double TOUCH_Pa =
     400.0; /* above what drift does in a second, and rubber after a release */
@@ -88,4 +88,4 @@ private:
   double touch_s_ = 0.0, moved_s_ = 0.0, rest_from_s_ = 0.0, peak_Pa_ = 0.0;
 };
 
-} // namespace fingertip::calibration
+} // namespace fingertip::calibrating

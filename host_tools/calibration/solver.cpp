@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace fingertip::calibration {
+namespace fingertip::calibrating {
 namespace {
 
 using Eigen::MatrixXd;
@@ -788,4 +788,4 @@ Wanted next_place(const Array &array, const std::vector<Placement> &given, const
   return {x_mm[best], y_mm[best], lowest};
 }
 
-} // namespace fingertip::calibration
+} // namespace fingertip::calibrating

@@ -39,7 +39,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace fingertip::calibration {
+namespace fingertip::calibrating {
 
 struct Array {
   double pitch_mm = 0.0;
@@ -149,4 +149,4 @@ struct Wanted {
 Wanted next_place(const Array &array, const std::vector<Placement> &placements,
                   const Solution &solution, const Assumptions &assumptions = {});
 
-} // namespace fingertip::calibration
+} // namespace fingertip::calibrating

@@ -27,10 +27,10 @@ namespace {
 
 using namespace fingertip;
 using namespace fingertip::truth;
-using calibration::Array;
-using calibration::Judgement;
-using calibration::Placement;
-using calibration::Solution;
+using calibrating::Array;
+using calibrating::Judgement;
+using calibrating::Placement;
+using calibrating::Solution;
 using nlohmann::json;
 
 constexpr std::size_t PLACEMENTS = 30;
@@ -228,20 +228,20 @@ struct Outcome {
 // As the tool leads it: until it is good or refused, or the person has no more.
 Outcome lead(Session &session, SessionPad &pad) {
   Outcome outcome;
-  std::optional<calibration::Wanted> wanted;
+  std::optional<calibrating::Wanted> wanted;
   while (auto placement = session.next(pad, wanted)) {
     outcome.placements.push_back(*placement);
-    if (outcome.placements.size() >= calibration::PLACEMENTS_WANTED &&
+    if (outcome.placements.size() >= calibrating::PLACEMENTS_WANTED &&
         outcome.placements.size() % JUDGED_EVERY == 0) {
-      outcome.judgement = calibration::judge(session_array(), outcome.placements, false);
+      outcome.judgement = calibrating::judge(session_array(), outcome.placements, false);
       if (outcome.judgement.state != Judgement::State::more) {
         return outcome;
       }
       wanted =
-          calibration::next_place(session_array(), outcome.placements, outcome.judgement.solution);
+          calibrating::next_place(session_array(), outcome.placements, outcome.judgement.solution);
     }
   }
-  outcome.judgement = calibration::judge(session_array(), outcome.placements, true);
+  outcome.judgement = calibrating::judge(session_array(), outcome.placements, true);
   return outcome;
 }
 
@@ -254,13 +254,13 @@ PadCase try_pads(const std::string &what, const Options &options, std::size_t pa
   in_parallel(what, pads, [&](std::size_t i) {
     const std::uint64_t seed = options.seed + i;
     SessionPad pad(pad_options, layer_mm, seed);
-    Session session(objects.feet, SessionKind::good, seed, calibration::PLACEMENTS_MAX);
+    Session session(objects.feet, SessionKind::good, seed, calibrating::PLACEMENTS_MAX);
     std::vector<Placement> placements;
     while (placements.size() < PLACEMENTS) {
       placements.push_back(*session.next(pad));
     }
-    const Solution solution = calibration::solve(session_array(), placements);
-    const auto scale = calibration::force_scale(session_array(), placements, solution, WEIGHT_N);
+    const Solution solution = calibrating::solve(session_array(), placements);
+    const auto scale = calibrating::force_scale(session_array(), placements, solution, WEIGHT_N);
     SessionPad fresh(pad_options, layer_mm, seed);
     const std::vector<double> truth = fresh.settled_gains();
     const Taps taps(fresh, objects.all(), seed);
@@ -271,18 +271,18 @@ PadCase try_pads(const std::string &what, const Options &options, std::size_t pa
     std::array<double, COUNTS.size()> at_count{}, sd_at_count{};
     for (std::size_t c = 0; with_counts && c < COUNTS.size(); c++) {
       SessionPad other(pad_options, layer_mm, seed);
-      Session some(objects.feet, SessionKind::good, seed, calibration::PLACEMENTS_MAX);
+      Session some(objects.feet, SessionKind::good, seed, calibrating::PLACEMENTS_MAX);
       std::vector<Placement> first;
       while (first.size() < COUNTS[c]) {
         first.push_back(*some.next(other));
       }
-      const Solution partial = calibration::solve(session_array(), first);
+      const Solution partial = calibrating::solve(session_array(), first);
       at_count[c] = median(taps.felt(partial.gain, partial.gain_sd).location_mm);
       sd_at_count[c] = partial.worst_shape_sd();
     }
 
     SessionPad led_pad(pad_options, layer_mm, seed);
-    Session led(objects.feet, SessionKind::good, seed, calibration::PLACEMENTS_MAX);
+    Session led(objects.feet, SessionKind::good, seed, calibrating::PLACEMENTS_MAX);
     const Outcome outcome = lead(led, led_pad);
     const bool accepted = outcome.judgement.state == Judgement::State::good;
     const bool worse = accepted && median(taps.felt(outcome.judgement.solution.gain,
@@ -312,7 +312,7 @@ PadCase try_pads(const std::string &what, const Options &options, std::size_t pa
     if (accepted) {
       all.placements_needed.push_back(double(outcome.placements.size()));
     } else {
-      const std::string reason = calibration::name_of(outcome.judgement.reason);
+      const std::string reason = calibrating::name_of(outcome.judgement.reason);
       all.refusals[reason] = all.refusals.value(reason, 0) + 1;
     }
     note_evidence(all.evidence, outcome.judgement);
@@ -379,7 +379,7 @@ BadCase try_bad(SessionKind kind, const Options &options, const Objects &objects
     const std::lock_guard<std::mutex> lock(adding);
     all.refused += outcome.judgement.state == Judgement::State::refused;
     all.worse += worse;
-    const std::string reason = calibration::name_of(outcome.judgement.reason);
+    const std::string reason = calibrating::name_of(outcome.judgement.reason);
     all.reasons[reason] = all.reasons.value(reason, 0) + 1;
     note_evidence(all.evidence, outcome.judgement);
   });

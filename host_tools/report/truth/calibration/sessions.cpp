@@ -49,8 +49,8 @@ const twin::Indenter &lying_cylinder() {
 
 } // namespace
 
-calibration::Array session_array() {
-  calibration::Array array;
+calibrating::Array session_array() {
+  calibrating::Array array;
   array.pitch_mm = static_cast<double>(geometry.pitch_mm);
   for (std::size_t k = 0; k < geometry.sensor_count; k++) {
     array.x_mm.push_back(static_cast<double>(geometry.x_mm[k]));
@@ -90,12 +90,12 @@ void SessionPad::aim(const twin::ContactTable &object, double force_N, double x_
   }
 }
 
-calibration::Placement SessionPad::place(const twin::ContactTable &foot, double force_N,
+calibrating::Placement SessionPad::place(const twin::ContactTable &foot, double force_N,
                                          double x_mm, double y_mm, double angle_rad) {
   aim(foot, force_N, x_mm, y_mm, angle_rad);
   report(PAUSE_s, 0.0);
   report(DOWN_s, 1.0);
-  calibration::Placement placement;
+  calibrating::Placement placement;
   placement.t_s = t_s_ + 0.5 * (SETTLED_BEGIN_s + SETTLED_END_s);
   placement.usable = (1u << x_mm_.size()) - 1u;
   placement.noise_Pa =
@@ -163,7 +163,7 @@ Feet::Feet(double layer_thickness_mm, const std::filesystem::path &cache)
 Session::Session(const Feet &feet, SessionKind kind, std::uint64_t seed, std::size_t planned)
     : feet_(feet), kind_(kind), random_(seed, SESSION, static_cast<std::uint64_t>(kind)),
       planned_(kind == SessionKind::too_few ? TOO_FEW : planned), variant_(seed % 2 != 0) {
-  const calibration::Array array = session_array();
+  const calibrating::Array array = session_array();
   middle_x_mm_ = random_.uniform(array.x_mm.front(), array.x_mm.back());
   middle_y_mm_ = random_.uniform(array.y_mm.front(), array.y_mm.back());
   angle_rad_ = random_.uniform(0.0, M_PI);
@@ -177,12 +177,12 @@ Session::Session(const Feet &feet, SessionKind kind, std::uint64_t seed, std::si
   }
 }
 
-std::optional<calibration::Placement> Session::next(SessionPad &pad,
-                                                    std::optional<calibration::Wanted> wanted) {
+std::optional<calibrating::Placement> Session::next(SessionPad &pad,
+                                                    std::optional<calibrating::Wanted> wanted) {
   if (made_ >= planned_) {
     return std::nullopt;
   }
-  const calibration::Array array = session_array();
+  const calibrating::Array array = session_array();
   const double end_x = array.x_mm.back(), end_y = array.y_mm.back();
   double x_mm = random_.uniform(-end_x, end_x);
   double y_mm = random_.uniform(-end_y, end_y);
@@ -203,7 +203,7 @@ std::optional<calibration::Placement> Session::next(SessionPad &pad,
   }
   const bool lying = kind_ == SessionKind::elongated;
   const double angle = variant_ ? angle_rad_ : random_.uniform(0.0, M_PI);
-  calibration::Placement placement =
+  calibrating::Placement placement =
       pad.place(lying ? feet_.lying : feet_.round, force_N, x_mm, y_mm, lying ? angle : 0.0);
   const double share = planned_ > 1 ? double(made_) / double(planned_ - 1) : 0.0;
   for (std::size_t k = 0; k < placement.reading_Pa.size(); k++) {
@@ -218,21 +218,21 @@ Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::
   for (std::uint64_t attempt = 0;; attempt++) {
     const std::uint64_t own = Random(seed, SESSION, attempt).next();
     SessionPad pad(options, feet.layer_mm, own);
-    Session session(feet, SessionKind::good, own, calibration::PLACEMENTS_MAX);
-    std::vector<calibration::Placement> placements;
+    Session session(feet, SessionKind::good, own, calibrating::PLACEMENTS_MAX);
+    std::vector<calibrating::Placement> placements;
     while (auto placement = session.next(pad)) {
       placements.push_back(*placement);
       if (placements.size() < PLACEMENTS) {
         continue;
       }
-      const calibration::Judgement judgement =
-          calibration::judge(session_array(), placements, false);
-      if (judgement.state == calibration::Judgement::State::refused) {
+      const calibrating::Judgement judgement =
+          calibrating::judge(session_array(), placements, false);
+      if (judgement.state == calibrating::Judgement::State::refused) {
         break;
       }
       const auto scale =
-          calibration::force_scale(session_array(), placements, judgement.solution, WEIGHT_N);
-      if (judgement.state == calibration::Judgement::State::good && scale) {
+          calibrating::force_scale(session_array(), placements, judgement.solution, WEIGHT_N);
+      if (judgement.state == calibrating::Judgement::State::good && scale) {
         const std::vector<double> truth = pad.settled_gains();
         Calibrated left{{}, judgement.solution.gain_sd, scale->scale, scale->sd};
         for (std::size_t k = 0; k < truth.size(); k++) {

@@ -16,7 +16,7 @@
 namespace fingertip::truth {
 
 // The firmware's.
-calibration::Array session_array();
+calibrating::Array session_array();
 
 struct PadOptions {
   double gain_percent = 10.0;      // spread of the gains
@@ -31,7 +31,7 @@ public:
 
   // A weight is set down by hand, stands two seconds and is lifted: the means of the readings from
   // 0.5 to 1 s after it was down.
-  calibration::Placement place(const twin::ContactTable &foot, double force_N, double x_mm,
+  calibrating::Placement place(const twin::ContactTable &foot, double force_N, double x_mm,
                                double y_mm, double angle_rad);
   // A tap: the readings of one frame 0.15 s after it was down.
   std::vector<double> tap(const twin::ContactTable &object, double force_N, double x_mm,
@@ -84,8 +84,8 @@ class Session {
 public:
   Session(const Feet &feet, SessionKind kind, std::uint64_t seed, std::size_t planned);
   // The next placement, of as many as the person is willing to make.
-  std::optional<calibration::Placement> next(SessionPad &pad,
-                                             std::optional<calibration::Wanted> wanted = {});
+  std::optional<calibrating::Placement> next(SessionPad &pad,
+                                             std::optional<calibrating::Wanted> wanted = {});
 
 private:
   const Feet &feet_;
