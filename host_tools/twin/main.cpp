@@ -168,7 +168,8 @@ ContactTable table_of(const std::string &name, const Layer &layer, const Options
 
 int width(const Options &options) {
   const Layer layer = layer_of(options.scene.layer_mm);
-  const BestGaussian gaussian(table_of(options.scene.indenter, layer, options), layer.thickness_mm);
+  const std::string name = complete(options.scene).indenter;
+  const BestGaussian gaussian(table_of(name, layer, options), layer.thickness_mm);
   const BestGaussian::Fit fit = gaussian.at(WIDTH_FORCE_N);
   const double force_N = 2e-6 * M_PI * fit.p0_Pa * fit.sigma_mm * fit.sigma_mm;
   std::printf("sigma_mm=%s force_share=%s\n", fixed(fit.sigma_mm, 3).c_str(),
@@ -257,7 +258,9 @@ int run(int argc, char **argv) {
   build->callback([&] { action = [&] { return tables(options); }; });
 
   const auto with_contact = [&](CLI::App *command) {
-    command->add_option("--indenter", options.scene.indenter, "What presses; default sphere6")
+    command
+        ->add_option("--indenter", options.scene.indenter,
+                     "What presses; default sphere6, for placements sphere15")
         ->type_name("NAME");
     command->add_option("--layer", options.scene.layer_mm, "Thickness of the rubber; default 12")
         ->type_name("MM");
@@ -320,8 +323,9 @@ int run(int argc, char **argv) {
       ->add_option("--stick-slip", s.stick_slip_mm, "Slip in jumps of this size; default 0: steady")
       ->type_name("MM");
   write
-      ->add_option("--margin", s.margin_mm,
-                   "Random places reach so far beyond the paper's grid; default 2.25")
+      ->add_option(
+          "--margin", s.margin_mm,
+          "Random places reach so far beyond the paper's grid; default 2.25, for placements 4.5")
       ->type_name("MM");
   write->add_option("--quiet", s.quiet_s, "Time between contacts; default 1.2")->type_name("S");
   write->add_flag("--overwrite", options.overwrite, "Replace files that exist");

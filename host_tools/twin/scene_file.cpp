@@ -232,7 +232,7 @@ void describe(Text &text, const Scene &scene, const Layer &layer, const Pad &pad
   metadata(text, "layer_youngs_modulus_MPa", fixed(1e-6 * layer.youngs_modulus_Pa, 4));
   metadata(text, "layer_poisson", number(layer.poisson));
   metadata(text, "force_N", options.forces);
-  metadata(text, "margin_mm", number(options.margin_mm));
+  metadata(text, "margin_mm", number(*options.margin_mm));
   metadata(text, "quiet_s", number(options.quiet_s));
   if (options.kind == "slip") {
     metadata(text, "dead_travel_mm", number(options.dead_travel_mm));

@@ -17,7 +17,7 @@
 //   # fingertip-truth 1
 //   # scene: name                  # scenario: FILE.csv without its folder
 //   act         number of the contact, from 1
-//   press       what the contact is: tap press hold poke cycle grip roll two
+//   press       what the contact is: tap press hold placement poke cycle grip roll two
 //   phase       touch hold release; poke; load unload; dead_travel slip after; twist; roll
 //   t_begin_s t_end_s              on the scenario's clock
 //   x_mm y_mm force_N angle_deg    at its beginning, of the first contact

@@ -25,7 +25,18 @@ constexpr std::array<double, 4> TWIST_RATES_deg_s{30, 60, 120, 180};
 constexpr std::array<double, 7> DISTANCES_mm{6, 9, 12, 15, 18, 24, 30};
 
 // One for each kind, so that kinds with the same seed have nothing in common.
-enum Stream : std::uint64_t { GRID_ORDER = 1, GRID, TAPS, POKES, CYCLE, SLIP, TWIST, ROLLOFF, TWO };
+enum Stream : std::uint64_t {
+  GRID_ORDER = 1,
+  GRID,
+  TAPS,
+  POKES,
+  CYCLE,
+  SLIP,
+  TWIST,
+  ROLLOFF,
+  TWO,
+  PLACEMENTS
+};
 
 std::string number(double value) {
   return shortest(static_cast<float>(value));
@@ -64,7 +75,7 @@ public:
   }
 
   Place random_place(Random &random) const {
-    const double x = GRID_HALF_X_mm + options.margin_mm, y = GRID_HALF_Y_mm + options.margin_mm;
+    const double x = GRID_HALF_X_mm + *options.margin_mm, y = GRID_HALF_Y_mm + *options.margin_mm;
     const double at_x = random.uniform(-x, x);
     return {at_x, random.uniform(-y, y)};
   }
@@ -150,6 +161,15 @@ Act tap(const Stage &stage, std::size_t n) {
 
 Act high(const Stage &stage, std::size_t n) {
   return random_press(stage, n, "hold", 0.5, 0.6);
+}
+
+// A weight is set down by hand, stands by itself and is lifted.
+Act placement(const Stage &stage, std::size_t n) {
+  constexpr double STANDS_s = 2.0;
+  Random random(stage.options.seed, PLACEMENTS, n);
+  const Place place = stage.random_place(random);
+  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+  return press("placement", place, force_N, milliseconds(random.uniform(0.2, 0.5)), STANDS_s);
 }
 
 // By hand: never at rest, and not quite at one place.
@@ -319,6 +339,8 @@ Act two(const Stage &stage, std::size_t n) {
 struct Kind {
   SceneKind kind;
   Act (*act)(const Stage &stage, std::size_t n);
+  const char *usual_indenter = "sphere6";
+  double usual_margin_mm = 0.5 * GRID_STEP_mm;
 };
 
 const std::vector<Kind> &all_kinds() {
@@ -335,6 +357,11 @@ const std::vector<Kind> &all_kinds() {
        slip},
       {{"twist", 60, "6", "a gripped object turns by 90 degrees about its contact"}, twist},
       {{"rolloff", 60, "6", "an object rolls over the pad's edge at 10, 25, 50 mm/s"}, rolloff},
+      {{"placements", 150, "3",
+        "one weight set down at random places for 2 s each, to calibrate from"},
+       placement,
+       "sphere15",
+       GRID_STEP_mm}, // to the outer sensors
       {{"two", 60, "4..10", "two contacts at once, 6 to 30 mm apart"}, two},
   };
   return all;
@@ -437,10 +464,12 @@ SceneOptions complete(const SceneOptions &options) {
   const SceneKind &kind = kind_of(options).kind;
   SceneOptions chosen = options;
   chosen.seconds = milliseconds(options.seconds.value_or(kind.usual_seconds));
+  chosen.indenter = options.indenter.empty() ? kind_of(options).usual_indenter : options.indenter;
+  chosen.margin_mm = options.margin_mm.value_or(kind_of(options).usual_margin_mm);
   chosen.pad_seed = options.pad_seed.value_or(options.seed);
   chosen.forces = options.forces.empty() ? kind.usual_forces : options.forces;
   check("--seconds", *chosen.seconds, 1.0, 7200.0);
-  check("--margin", chosen.margin_mm, 0.0, 10.0);
+  check("--margin", *chosen.margin_mm, 0.0, 10.0);
   check("--quiet", chosen.quiet_s, 0.1, 60.0);
   check("--dead-travel", chosen.dead_travel_mm, 0.0, 10.0);
   check("--creep", chosen.creep_share, 0.0, 1.0);

@@ -7,8 +7,9 @@
 // zero between contacts.
 //
 // Where things are: random places are uniform over the paper's grid, |x| <= 4.5 mm and |y| <=
-// 13.5 mm, and margin_mm around it, by default half a step of the grid. Slips go along y through
-// the middle of the pad, with x anywhere on the grid.
+// 13.5 mm, and margin_mm around it, by default half a step of the grid, for placements a whole one,
+// to the outer sensors. Slips go along y through the middle of the pad, with x anywhere on the
+// grid.
 //
 // What the truth calls slip is what the paper calls it (section IV.D): the pusher is in contact and
 // moves. So the dead travel, in which nothing slides yet, counts as slip; the events tell it apart.
@@ -57,7 +58,7 @@ private:
 
 struct SceneOptions {
   std::string kind = "taps";
-  std::string indenter = "sphere6";
+  std::string indenter;        // empty: the kind's usual one
   std::string second_indenter; // kind "two"; empty: as the first
   double layer_mm = 12.0;
   EffectValues effects;
@@ -67,7 +68,7 @@ struct SceneOptions {
   std::string forces;                    // empty: usual_forces
   std::vector<double> speeds_mm_s;       // kinds "slip" and "rolloff"; empty: usual ones
   double dead_travel_mm = 1.0, creep_share = 0.5, stick_slip_mm = 0.0; // Grip, kind "slip"
-  double margin_mm = 2.25;
+  std::optional<double> margin_mm;                                     // else the kind's usual one
   double quiet_s = 1.2;
 };
 
@@ -96,7 +97,7 @@ struct Scene {
   std::vector<Act> acts; // in order of time, none overlap
 };
 
-// With seconds, forces and pad_seed filled in. Throws Error for an unknown kind or what is out of
+// With all that was left open filled in. Throws Error for an unknown kind or what is out of
 // range.
 SceneOptions complete(const SceneOptions &options);
 

@@ -1,0 +1,152 @@
+/* Gains of the sensors from placements of one weight.
+ *
+ * The same weight on the same rounded foot is set down at places that nobody measures. Then every
+ * placement presses with the same force and, on a pad of one thickness, with the same profile; what
+ * differs between a reading and that profile at its distance is the sensor's. With placement i at
+ * (x, y), its squared distance R from sensor k and c = NARROW,
+ *
+ *   reading = g_k A exp(e - 2 w) [(1 - m) exp(-R / 2 S^2) + m exp(-R / 2 c^2 S^2)]
+ *             + o_k + d_k tau - r_k M,
+ *   S = s exp(w),   R = u^2 + v^2 - 2 q1 (u^2 - v^2) - 4 q2 u v,
+ *   M = sum over earlier placements of what rubber has not let go of yet (remember)
+ *
+ * One profile for all: peak A, width s and mixing m are fitted along, so nothing need be known of
+ * the pad or the foot. The mixture of two Gaussians is within 0.33 % of the peak of the pressure
+ * under spheres and flat ends on 6, 9 and 12 mm of bonded rubber (the twin's tables, 3 and 10 N),
+ * where one Gaussian is off by up to 3.4 %. Widths per placement (w) keep the force, 2 pi A s^2.
+ *
+ * A tilt and a bowl over the pad are no gains that a touch of unknown strength and width could
+ * tell: they move and widen the Gaussian. That all placements have the same force (e, up to
+ * Assumptions::force_sd) is what tells them, less surely than the rest. They are the gauge: the
+ * subspace of log gains that 1, x, y and x^2 + y^2 span over the sensors.
+ *
+ * All else that a session may hold is in the model with a prior around nothing, so that it neither
+ * passes for a gain nor stays unseen: where the sensors sit (they are soldered by hand), zeros that
+ * were off (o) or move (d), rubber that has not let go of the placements before (r), contacts that
+ * are not round (q, of all and of each). The posterior of each is in the Solution; judge.hpp says
+ * what is too much.
+ *
+ * How large the spreads of e, w, q and of the places are, and the model's own error, is learnt from
+ * the session itself (expectation and maximisation, from the Assumptions as the start): sensors
+ * that sit where they should tell the gains better than others, and the standard deviations say so.
+ *
+ * Robust least squares (Huber) by Levenberg-Marquardt, the placements' own unknowns eliminated; a
+ * placement that does not fit the others is dropped as a whole. The same input gives the same
+ * bits. Thirty placements of fifteen sensors take some 10 ms.
+ */
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace fingertip::calibrating {
+
+struct Array {
+  double pitch_mm = 0.0;
+  std::vector<double> x_mm, y_mm; /* [sensor] */
+  std::size_t sensors() const { return x_mm.size(); }
+};
+
+/* One settled placement. */
+struct Placement {
+  double t_s = 0.0;               /* of the readings, on any clock that goes on */
+  std::vector<double> reading_Pa; /* [sensor] above zero, mean over the frames */
+  std::uint32_t usable = 0;       /* bitmap of the sensors whose reading is a measurement */
+  double noise_Pa = 0.0;          /* sd of a mean */
+  std::vector<double> earlier_Pa; /* [sensor] M; empty: of the placements before it in the list */
+};
+
+/* Fills in earlier_Pa where it is empty: placements in order of time. Of each placement before,
+ * (exp(-age / 10 s) + 20 exp(-age / 1 s)) of its reading: two times and their proportion after two
+ * seconds of standing, as in the holds of a real strip (twin/effects.hpp). It acts in proportion to
+ * how much of the peak the sensor feels now (half at REMEMBERS_FROM of it): a sensor that feels
+ * nothing can not be below that. */
+constexpr double REMEMBERS_FROM = 0.02;
+void remember(std::vector<Placement> &placements);
+
+/* What a session is expected to hold: standard deviations of the priors. */
+struct Assumptions {
+  double gain = 0.15;         /* of the log gains: pads as cast spread by 10 % */
+  double position_mm = 0.1;   /* of a sensor from its place in the layout, each way */
+  double offset_share = 0.02; /* of the peak: zeros that were off, and how far they move from first
+                                 to last placement */
+  double force = 0.01;        /* of the force between placements of one weight */
+  double width = 0.02;        /* of the width between places: a pad cast a little aslant */
+  double ellipse = 0.01;      /* of q1 and q2 from placement to placement; axes differ by 2 q */
+  double ellipse_of_all = 0.05; /* of their means: a foot is a foot, but its shape is not known */
+  double memory = 0.03;         /* of r: losing 17.5 % in 8 s makes 0.025 */
+  double model_share = 0.002;   /* of the peak: what the profile leaves (above, and 0.13 % rms) */
+  double reading_share = 0.003; /* of a reading: what rubber does between 0.5 and 1 s */
+  double mixing = 0.2, mixing_sd = 0.1; /* of m: 0.05 to 0.23 on the twin's tables */
+};
+
+/* Width of the narrow part of the profile over that of the wide one. */
+constexpr double NARROW = 0.64;
+/* In residual standard deviations: where a reading's weight begins to fall. */
+constexpr double HUBER = 2.5;
+
+struct Fitted { /* one placement */
+  bool kept = false;
+  double x_mm = 0.0, y_mm = 0.0;
+  double force = 0.0;             /* e: log of its force over the common one */
+  double width = 0.0;             /* w */
+  double ellipse[2] = {0.0, 0.0}; /* q1, q2, beside those of all */
+  double residual_share = 0.0;    /* rms over its sensors, of the peak */
+  double misfit = 0.0;            /* rms of residuals over their sd; large: does not belong */
+};
+
+/* What the session shows of the Assumptions of the same names; every sd is by these. */
+struct Spread {
+  double position_mm = 0.0, force = 0.0, width = 0.0, ellipse = 0.0, memory = 0.0;
+};
+
+struct Solution {
+  bool solved = false;                     /* else too few placements or readings for any of it */
+  std::vector<double> gain;                /* [sensor] relative to their mean */
+  std::vector<double> gain_sd;             /* relative */
+  std::vector<double> shape_sd;            /* the part of gain_sd outside the gauge */
+  std::vector<double> offset_Pa, drift_Pa; /* o, and 2 d: from first to last placement */
+  std::vector<double> offset_sd_Pa, drift_sd_Pa;
+  std::vector<double> dx_mm, dy_mm; /* of the sensors from the layout */
+  std::vector<double> memory;       /* r */
+  double ellipse_of_all[2] = {0.0, 0.0};
+  double peak_Pa = 0.0; /* A, of a sensor of mean gain */
+  double width_mm = 0.0, mixing = 0.0;
+  std::vector<Fitted> placements; /* as given */
+  std::size_t kept = 0;
+  double residual_share = 0.0; /* rms over all readings kept, of the peak */
+  double excess = 1.0;         /* of the model's own error over what was assumed */
+  Spread spread;
+  double cost = 0.0; /* 1/2 sum of the robust squares and of the priors' */
+
+  /* Most of shape_sd, and the sd of the gains within the gauge, rms over the sensors. */
+  double worst_shape_sd() const;
+  double gauge_sd = 0.0;
+};
+
+/* Fewer can not be solved. */
+constexpr std::size_t PLACEMENTS_MIN = 3;
+
+/* Throws std::invalid_argument if a placement has another number of readings than the array has
+ * sensors. keep_all: drop none, to compare with another solver. */
+Solution solve(const Array &array, const std::vector<Placement> &placements,
+               const Assumptions &assumptions = {}, bool keep_all = false);
+
+/* Of some of the placements of a session, with the spreads that all of it showed, beginning where
+ * all of it ended; from.placements are theirs. A few placements alone may have a second optimum. */
+Solution solve_from(const Array &array, const std::vector<Placement> &placements,
+                    const Solution &from, const Assumptions &assumptions = {});
+
+/* The log gains with their mean, tilt and bowl taken out. */
+std::vector<double> outside_gauge(const Array &array, const std::vector<double> &gain);
+
+/* Where a placement more would lower the largest shape_sd most: a place on the array, in steps of
+ * half a pitch. */
+struct Wanted {
+  double x_mm, y_mm;
+  double worst_shape_sd; /* then */
+};
+Wanted next_place(const Array &array, const std::vector<Placement> &placements,
+                  const Solution &solution, const Assumptions &assumptions = {});
+
+} // namespace fingertip::calibrating

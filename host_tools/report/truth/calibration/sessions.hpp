@@ -1,0 +1,108 @@
+// Calibrations that never were: pads of the twin on which somebody sets down a weight, as it should
+// be done and as it should not.
+#pragma once
+
+#include "calibration/judge.hpp"
+#include "libfingertip/random.hpp"
+#include "twin/contact_table.hpp"
+#include "twin/effects.hpp"
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace fingertip::truth {
+
+// The firmware's.
+calibrating::Array session_array();
+
+struct PadOptions {
+  double gain_percent = 10.0;      // spread of the gains
+  double relaxation_percent = 0.0; // mean of what a sensor loses in a hold; 17.5: 9 to 26 %
+  double misplaced_mm = 0.0;       // sd of a sensor's place, each way
+};
+
+// Fifteen sensors under a layer, over time. What touches it is a table of the twin.
+class SessionPad {
+public:
+  SessionPad(const PadOptions &options, double layer_mm, std::uint64_t seed);
+
+  // A weight is set down by hand, stands two seconds and is lifted: the means of the readings from
+  // 0.5 to 1 s after it was down.
+  calibrating::Placement place(const twin::ContactTable &foot, double force_N, double x_mm,
+                               double y_mm, double angle_rad);
+  // A tap: the readings of one frame 0.15 s after it was down.
+  std::vector<double> tap(const twin::ContactTable &object, double force_N, double x_mm,
+                          double y_mm);
+
+  // What a reading from 0.5 to 1 s after a placement is multiplied by, relative to the sensors'
+  // mean.
+  std::vector<double> settled_gains() const;
+
+private:
+  void report(double after_s, double share);
+  std::vector<double> base_Pa_, reported_Pa_; // [sensor]
+  void aim(const twin::ContactTable &object, double force_N, double x_mm, double y_mm,
+           double angle_rad);
+
+  std::vector<double> x_mm_, y_mm_;
+  PadOptions options_;
+  double layer_mm_;
+  std::uint64_t seed_;
+  twin::Pad pad_;
+  Random noise_;
+  double t_s_ = 0.0;
+};
+
+enum class SessionKind { good, elongated, offsets, one_end, cluster, drift, too_few, weights };
+constexpr std::array<SessionKind, 7> BAD_SESSIONS{
+    SessionKind::elongated, SessionKind::offsets, SessionKind::one_end, SessionKind::cluster,
+    SessionKind::drift,     SessionKind::too_few, SessionKind::weights};
+const char *name_of(SessionKind kind);
+
+constexpr double WEIGHT_N = 3.0;
+
+// Contact tables of one layer: the foot, a sphere of 15 mm, and a lying cylinder of 6 by 12 mm.
+struct Feet {
+  Feet(double layer_mm, const std::filesystem::path &cache);
+  double layer_mm;
+  twin::ContactTable round, lying;
+};
+
+// Somebody at work. Places are anywhere on the array; in a good session, where the tool asks for
+// one, within 3 mm (sd) of it.
+//   elongated  lying cylinder, half of the sessions always at one angle
+//   offsets    zeros off by 500 Pa: up in every other session, else up or down by the sensor
+//   one_end    all in the upper third of the array
+//   cluster    all within 7 mm of one place
+//   drift      zeros move by 200 Pa from first to last, up or down by the sensor
+//   too_few    six placements
+//   weights    in turn 3 and 4 N, or anything from 1.5 to 4.5 N
+class Session {
+public:
+  Session(const Feet &feet, SessionKind kind, std::uint64_t seed, std::size_t planned);
+  // The next placement, of as many as the person is willing to make.
+  std::optional<calibrating::Placement> next(SessionPad &pad,
+                                             std::optional<calibrating::Wanted> wanted = {});
+
+private:
+  const Feet &feet_;
+  SessionKind kind_;
+  Random random_;
+  std::size_t planned_, made_ = 0;
+  bool variant_;
+  double middle_x_mm_, middle_y_mm_, angle_rad_;
+  std::vector<double> zero_Pa_, drift_Pa_;
+};
+
+// What a calibration left: true over estimated gains, and what the solver says of their sds.
+struct Calibrated {
+  std::vector<double> remaining_gain, gain_sd; // [sensor]
+  double force_scale, force_scale_sd;
+};
+// Of a good session of thirty placements on a pad of its own, until one is accepted.
+Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::uint64_t seed);
+
+} // namespace fingertip::truth
