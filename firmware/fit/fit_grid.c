@@ -40,11 +40,13 @@
 #define GUESS_HEIGHT_MIN_Q26 1936353
 #define GUESS_HEIGHT_MAX_Q26 484088133 /* sigma 0.316 pitch */
 
-/* FIT_STRETCH_LEAST^2, FIT_STRETCH_SURE^2, FIT_STRETCH_SD_MAX^2, and the height of FIT_SHAPE_LEAST. */
+/* FIT_STRETCH_LEAST^2, FIT_STRETCH_SURE^2, FIT_STRETCH_SD_MAX^2, FIT_STRETCH_LINEAR^2, and the height
+ * of FIT_SHAPE_LEAST. */
 #define ROUND_SQUARE ((struct scaled){20972, -21})
 #define SURE_SQUARE ((struct scaled){25600, -12})
 #define KNOWN_SQUARE ((struct scaled){16384, -18})
-#define SHAPE_HEIGHT_MAX_Q26 239056000
+#define LINEAR_SQUARE ((struct scaled){16056, -15})
+#define SHAPE_HEIGHT_MAX_Q26 193635251
 
 /* 1 / n of a constant. */
 #define RECIPROCAL(n)                                                                              \
@@ -406,35 +408,6 @@ static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *re
   return true;
 }
 
-static NOINLINE void judge_shape(const struct readings *readings,
-                                 const struct fit_settings *settings,
-                                 const struct fit_system *system, const struct fit_spread *spread,
-                                 const struct shape *shape, struct fit_result *result) {
-  if (system->at.height > SHAPE_HEIGHT_MAX_Q26 ||
-      (result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL))) {
-    return;
-  }
-  struct scaled length_square = short_of(scaled_add(scaled_mul(shape->stretch, shape->stretch),
-                                                    scaled_mul(shape->slant, shape->slant)));
-  struct scaled noise = scaled_from(settings->noise_Pa_q10, readings->shift - 28);
-  struct scaled amplitude = scaled_from(system->amplitude_q28, -28);
-  struct scaled by_gains = scaled_mul(
-      scaled_from((int32_t)shape->by_gains,
-                  SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * shape->exponent),
-      scaled_mul(amplitude, amplitude));
-  struct scaled variance =
-      short_of(scaled_add(scaled_mul(scaled_mul(noise, noise), shape->noise_form), by_gains));
-  struct scaled least = short_of(
-      scaled_add(scaled_mul(length_square, ROUND_SQUARE), scaled_mul(variance, SURE_SQUARE)));
-  if (scaled_sub(scaled_mul(length_square, length_square), least).mantissa > 0) {
-    result->flags |= CONTACT_FLAG_ELONGATED;
-  }
-  struct scaled known = scaled_mul(length_square, KNOWN_SQUARE);
-  if (scaled_sub(variance, known).mantissa <= 0 && set_widths(shape, result)) {
-    result->flags |= CONTACT_FLAG_WIDTHS_VALID;
-  }
-}
-
 /* What errors of single sensors make of the result. */
 static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
                                    const struct fit_settings *settings, const struct moments *m,
@@ -460,6 +433,45 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
       shape->by_gains += (uint32_t)(high * high) >> SPREAD_SQUARE_SHIFT;
     }
   }
+}
+
+/* The flags of the shape that apply. If it is elongated, separate widths would move the location. */
+static NOINLINE uint32_t judge_shape(const struct readings *readings,
+                                     const struct fit_settings *settings,
+                                     const struct fit_system *system, const struct shape *shape,
+                                     struct fit_spread *spread) {
+  const struct state *at = &system->at;
+  if (at->height > SHAPE_HEIGHT_MAX_Q26) {
+    return 0;
+  }
+  struct scaled length_square = short_of(scaled_add(scaled_mul(shape->stretch, shape->stretch),
+                                                    scaled_mul(shape->slant, shape->slant)));
+  struct scaled noise = scaled_from(settings->noise_Pa_q10, readings->shift - 28);
+  struct scaled amplitude = scaled_from(system->amplitude_q28, -28);
+  struct scaled by_gains = scaled_mul(
+      scaled_from((int32_t)shape->by_gains,
+                  SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * shape->exponent),
+      scaled_mul(amplitude, amplitude));
+  struct scaled variance =
+      short_of(scaled_add(scaled_mul(scaled_mul(noise, noise), shape->noise_form), by_gains));
+  struct scaled least = short_of(
+      scaled_add(scaled_mul(length_square, ROUND_SQUARE), scaled_mul(variance, SURE_SQUARE)));
+  uint32_t flags = 0;
+  if (scaled_sub(scaled_mul(length_square, length_square), least).mantissa > 0) {
+    flags |= CONTACT_FLAG_ELONGATED;
+    struct scaled x = scaled_mul(scaled_from(2 * at->x - system->slope_x, -26), shape->wider_x);
+    struct scaled y = scaled_mul(scaled_from(2 * at->y - system->slope_y, -26), shape->wider_y);
+    spread->apart = short_of(scaled_add(scaled_mul(x, x), scaled_mul(y, y)));
+    if (scaled_sub(length_square, LINEAR_SQUARE).mantissa > 0) {
+      struct scaled share = scaled_div(LINEAR_SQUARE, length_square);
+      spread->apart = scaled_mul(spread->apart, scaled_mul(share, share));
+    }
+  }
+  struct scaled known = scaled_mul(length_square, KNOWN_SQUARE);
+  if (scaled_sub(variance, known).mantissa <= 0) {
+    flags |= CONTACT_FLAG_WIDTHS_VALID;
+  }
+  return flags;
 }
 
 /* First guess, every sensor there: the marginals weighted by the row and the column of the largest
@@ -580,8 +592,15 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   struct shape shape;
   begin_shape(&readings, &m, &system, &shape);
   spread_errors(grid, settings, &m, &system, &spread, &shape);
+  uint32_t flags = judge_shape(&readings, settings, &system, &shape, &spread);
   bool rough =
       fit_grid_conclude(grid, &readings, settings, &system, &spread, &state, NODES, result);
-  judge_shape(&readings, settings, &system, &spread, &shape, result);
+  if (!(result->flags &
+        (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL))) {
+    if ((flags & CONTACT_FLAG_WIDTHS_VALID) && !set_widths(&shape, result)) {
+      flags &= ~(uint32_t)CONTACT_FLAG_WIDTHS_VALID;
+    }
+    result->flags |= flags;
+  }
   return rough;
 }

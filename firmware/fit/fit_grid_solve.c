@@ -17,10 +17,11 @@
 #define ROUGH_INVERSE_SQUARE ((struct scaled){20000, -3}) /* 1 / FIT_ROUGH_RESIDUAL^2 */
 #define MISFIT_SQUARE ((struct scaled){FIT_MISFIT * FIT_MISFIT << 11, -11})
 #define FLAT_HEIGHT_Q26 2016200     /* FIT_FLAT_SIGMA */
-#define MARGIN_SQUARE ((struct scaled){18432, -13}) /* FIT_BOUND_SD^2 */
+#define BOUND_SD ((struct scaled){19661, -14}) /* FIT_BOUND_SD */
 /* FIT_SHAPE_PER_MODEL in terms of z^2 and the height: sigma^2 = log2(e) / (2 height) and
  * r^2 / sigma^2 = 2 z / log2(e). */
-#define SHAPE_PER_MODEL ((struct scaled){24160, -14})
+#define SHAPE_PER_MODEL ((struct scaled){20818, -14})
+#define FORCE_SHARE ((struct scaled){20972, -17}) /* FIT_FORCE_SHAPE^2 */
 
 FIXED_INLINE struct scaled scaled_square(struct scaled a) {
   return scaled_mul(a, a);
@@ -167,22 +168,17 @@ static NOINLINE void widen_for_prior(const struct readings *readings,
   }
 }
 
-/* Variance of the location from what the sensors' own errors make of it, pitches squared. */
-static NOINLINE struct scaled own_errors(const struct fit_settings *settings,
-                                         const struct fit_system *system,
-                                         const struct fit_spread *spread) {
-  struct scaled amplitude_square = scaled_square(scaled_from(system->amplitude_q28, -28));
-  struct scaled by_gains =
-      scaled_from((int32_t)spread->by_gains,
-                  SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * spread->location_exponent);
-  struct scaled shape_x = scaled_from(spread->shape_x, 0), shape_y = scaled_from(spread->shape_y, 0);
-  struct scaled strength = scaled_mul(scaled_from(settings->model_sd_q16, -16),
-                                      scaled_from(system->at.height, -26));
-  strength = scaled_mul(strength, SHAPE_PER_MODEL);
-  struct scaled shape = scaled_add(scaled_square(shape_x), scaled_square(shape_y));
-  shape = scaled_mul(short_of(shape), scaled_square(strength));
-  shape.exponent += 2 * (spread->location_exponent + 4 - 21 + spread->shape_shift);
-  return scaled_mul(short_of(scaled_add(by_gains, shape)), amplitude_square);
+/* Variance of a sum of readings from what the sensors' own errors make of it: of the gains by the sum
+ * of squares, of the model's shape by the sum itself; strength of the latter. Coefficients' exponent.
+ * In units of the amplitude. */
+static NOINLINE struct scaled own_errors(const struct fit_spread *spread, uint32_t by_gains,
+                                         struct scaled shape_square, struct scaled strength_square,
+                                         int32_t exponent) {
+  struct scaled gains = scaled_from((int32_t)by_gains, SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift);
+  struct scaled shape = scaled_mul(shape_square, strength_square);
+  shape.exponent += 2 * (4 - 21 + spread->shape_shift);
+  struct scaled sum = scaled_add(gains, shape);
+  return (struct scaled){sum.mantissa, sum.exponent + 2 * exponent};
 }
 
 bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
@@ -258,22 +254,29 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   if (system->cross != 0) {
     form = scaled_add(form, scaled_mul(scaled_square(scaled_from(system->cross, -26)), inverse2));
   }
-  struct scaled softness = scaled_mul(fit_grid_reciprocal(system->stiffness),
-                                      scaled_top(grid->pitch, pitch_exponent - 6));
+  struct scaled pitch = scaled_top(grid->pitch, pitch_exponent - 6);
+  struct scaled softness = scaled_mul(fit_grid_reciprocal(system->stiffness), pitch);
   form = scaled_mul(short_of(form), scaled_square(softness)); /* to mm squared */
   struct scaled jitter = scaled_sqrt(scaled_mul(noise_variance, form));
   result->location_noise_mm = fit_grid_compose(jitter.mantissa, jitter.exponent);
 
-  /* What the last step moved is not settled; beyond a bound the margin may be off. */
+  /* What the last step moved is not settled. */
   struct scaled move_x = scaled_from(system->move_x_q22, -22);
   struct scaled move_y = scaled_from(system->move_y_q22, -22);
   struct scaled apart = scaled_add(scaled_square(move_x), scaled_square(move_y));
-  apart = scaled_add(apart, own_errors(settings, system, spread));
-  if (flags & CONTACT_FLAG_AT_BOUND) {
-    apart = scaled_add(apart, MARGIN_SQUARE);
-  }
-  apart = scaled_mul(short_of(apart), scaled_square(scaled_top(grid->pitch, pitch_exponent - 6)));
-  struct scaled location_sd = scaled_sqrt(scaled_add(scaled_mul(variance, form), apart));
+  apart = scaled_add(apart, spread->apart);
+  struct scaled strength = scaled_mul(scaled_from(settings->model_sd_q16, -16),
+                                      scaled_from(at->height, -26));
+  strength = scaled_square(scaled_mul(strength, SHAPE_PER_MODEL));
+  struct scaled shape = short_of(scaled_add(scaled_square(scaled_from(spread->shape_x, 0)),
+                                            scaled_square(scaled_from(spread->shape_y, 0))));
+  struct scaled own =
+      own_errors(spread, spread->by_gains, shape, strength, spread->location_exponent);
+  apart = scaled_add(apart, scaled_mul(short_of(own), scaled_square(amplitude)));
+  apart = scaled_mul(short_of(apart), scaled_square(pitch));
+  struct scaled location_sd = flags & CONTACT_FLAG_AT_BOUND
+                                  ? scaled_mul(BOUND_SD, pitch)
+                                  : scaled_sqrt(scaled_add(scaled_mul(variance, form), apart));
   result->location_sd_mm = fit_grid_compose(location_sd.mantissa, location_sd.exponent);
   if (scaled_sub(location_sd, fit_grid_scaled(fit_location_sd_limit_mm(settings))).mantissa > 0) {
     flags |= CONTACT_FLAG_UNCERTAIN;
@@ -286,11 +289,10 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   form = scaled_add(form, scaled_mul(scaled_square(scaled_from(spread->lift_q24, -24)), inverse3));
   struct scaled force_variance =
       scaled_div(scaled_mul(variance, short_of(form)), scaled_square(amplitude));
-  struct scaled by_gains = scaled_mul(
-      scaled_from((int32_t)spread->force_by_gains,
-                  SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * spread->force_exponent),
-      scaled_square(system->stiffness));
-  struct scaled force_sd = scaled_sqrt(scaled_add(force_variance, by_gains));
+  shape = scaled_mul(scaled_square(scaled_from(spread->shape_force, 0)), FORCE_SHARE);
+  own = own_errors(spread, spread->force_by_gains, shape, strength, spread->force_exponent);
+  own = scaled_mul(short_of(own), scaled_square(system->stiffness));
+  struct scaled force_sd = scaled_sqrt(scaled_add(force_variance, own));
   force_sd = scaled_mul(force_sd, scaled_from(force, force_exponent));
   result->force_sd_N = fit_grid_compose(force_sd.mantissa, force_sd.exponent);
 

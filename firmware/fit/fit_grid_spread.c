@@ -90,8 +90,9 @@ NOINLINE void fit_grid_begin_spread(const struct fit_settings *settings,
     gains |= settings->gain_sd_q16[k];
   }
   spread->gain_shift = 15 - fixed_bits(gains);
+  spread->apart = (struct scaled){0, 0};
   spread->gains = spread->by_gains = spread->force_by_gains = 0;
-  spread->shape_x = spread->shape_y = 0;
+  spread->shape_x = spread->shape_y = spread->shape_force = 0;
 }
 
 /* The square of what 31 bits hold, for a sum. */
@@ -113,6 +114,7 @@ NOINLINE int32_t fit_grid_add_to_spread(struct fit_spread *spread, const struct 
   shape = shape < INT16_MAX ? shape : INT16_MAX;
   spread->shape_x += (x * shape) >> 4;
   spread->shape_y += (y * shape) >> 4;
+  spread->shape_force += (f * shape) >> 4;
 
   int32_t gain = spread->gain_shift >= 0 ? gain_sd_q16 << spread->gain_shift : gain_sd_q16 >> 1;
   int32_t error = (gain * e) >> 15;

@@ -33,7 +33,8 @@ struct fit_spread {
   uint32_t gains;       /* of the squared errors of the readings */
   uint32_t by_gains;    /* of the squares of what they make of x and y */
   uint32_t force_by_gains;
-  int32_t shape_x, shape_y; /* what the model error's shape makes of x and y */
+  struct scaled apart; /* square of how far another shape of the contact would move it, pitches */
+  int32_t shape_x, shape_y, shape_force; /* what the model error's shape makes of these */
 };
 
 /* The square of a number of 15 bits, so that those of all sensors and of two coordinates add up. */
