@@ -491,11 +491,10 @@ static NOINLINE uint32_t judge_shape(const struct readings *readings,
   struct scaled length_square = fit_scaled_short(scaled_add(
       scaled_mul(shape->stretch, shape->stretch), scaled_mul(shape->slant, shape->slant)));
   struct scaled noise = fit_scaled_from(settings->noise_Pa_q10, readings->shift - 28);
-  struct scaled amplitude = fit_scaled_from(system->amplitude_q28, -28);
   struct scaled by_gains = scaled_mul(
       fit_scaled_from((int32_t)shape->by_gains,
                   SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * shape->exponent),
-      scaled_mul(amplitude, amplitude));
+      scaled_mul(spread->amplitude, spread->amplitude));
   struct scaled variance =
       fit_scaled_short(scaled_add(scaled_mul(scaled_mul(noise, noise), shape->noise_form), by_gains));
   struct scaled least = scaled_add(scaled_mul(length_square, ROUND_SQUARE), scaled_mul(variance, SURE_SQUARE));

@@ -238,76 +238,92 @@ static NOINLINE struct scaled location_form(const struct fit_system *system,
   return form;
 }
 
+/* Variance of one reading that is the same for all of them, in units of Q28, and what the residuals
+ * say besides. */
+struct scatter {
+  struct scaled noise; /* the noise's alone */
+  struct scaled all;   /* and the model's, and what the residuals are above these and the gains' */
+  bool misfit, rough, other_model;
+};
+
+static NOINLINE void set_scatter(const struct readings *readings,
+                                 const struct fit_settings *settings,
+                                 const struct fit_system *system, const struct fit_spread *spread,
+                                 int count, struct scatter *scatter, struct fit_result *result) {
+  struct scaled left = fit_scaled_from(system->b0, system->residual_shift - 38);
+  struct scaled square_sum = scaled_sub(fit_scaled_short(system->square_sum),
+                                        scaled_mul(scaled_square(left), spread->inverse_mass));
+  square_sum.mantissa = square_sum.mantissa < 0 ? 0 : square_sum.mantissa;
+  struct scaled rms = fit_scaled_sqrt(scaled_mean(square_sum, count));
+  result->residual_rms_Pa = fit_grid_compose(rms.mantissa, rms.exponent + 18 - readings->shift);
+
+  scatter->noise = scaled_square(fit_scaled_from(settings->noise_Pa_q10, readings->shift - 28));
+  struct scaled model = scaled_mul(fit_scaled_from(settings->model_sd_q16, -16),
+                                   fit_scaled_from(readings->largest, readings->shift - 28));
+  scatter->all = scaled_add(scatter->noise, scaled_square(model));
+  struct scaled amplitude_square = scaled_square(spread->amplitude);
+  struct scaled gains = fit_scaled_from((int32_t)spread->gains,
+                                        SPREAD_SQUARE_SHIFT - 32 - 2 * spread->gain_shift);
+  gains = scaled_mul(scaled_mean(gains, count), amplitude_square);
+  struct scaled expected = scaled_add(scatter->all, gains);
+  struct scaled found = scaled_mean(square_sum, count > 4 ? count - 4 : 1);
+  struct scaled excess = scaled_sub(found, expected);
+  if (excess.mantissa > 0) {
+    scatter->all = scaled_add(scatter->all, excess);
+  }
+  scatter->misfit = scaled_sub(found, scaled_mul(expected, MISFIT_SQUARE)).mantissa > 0;
+
+  struct scaled mass = fit_scaled_from(system->mass_q20, -20);
+  struct scaled total = scaled_add(scaled_mul(amplitude_square, mass), square_sum);
+  scatter->rough = scaled_sub(scaled_mul(square_sum, ROUGH_INVERSE_SQUARE), total).mantissa > 0;
+  scatter->other_model =
+      scaled_sub(scaled_mul(square_sum, MODEL_INVERSE_SQUARE), total).mantissa > 0;
+}
+
 bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
                        const struct fit_settings *settings, const struct fit_system *system,
                        const struct fit_spread *spread, const struct state *state, int count,
                        struct fit_result *result) {
   struct scaled force = set_values(grid, readings, system, state, result);
   uint32_t flags = flags_of(grid, readings, settings, system, state);
-
-  /* Variance of one reading that is the same for all of them: the noise's, the model's, and what
-   * the residuals are above these and the gains' together. In units of Q28. */
-  struct scaled mass = fit_scaled_from(system->mass_q20, -20);
-  struct scaled left = fit_scaled_from(system->b0, system->residual_shift - 38);
-  struct scaled square_sum = scaled_sub(fit_scaled_short(system->square_sum),
-                                        scaled_mul(scaled_square(left), spread->inverse_mass));
-  square_sum.mantissa = square_sum.mantissa < 0 ? 0 : square_sum.mantissa;
-  struct scaled found = scaled_mean(square_sum, count > 4 ? count - 4 : 1);
-  struct scaled noise_variance =
-      scaled_square(fit_scaled_from(settings->noise_Pa_q10, readings->shift - 28));
-  struct scaled model_sd = scaled_mul(fit_scaled_from(settings->model_sd_q16, -16),
-                                      fit_scaled_from(readings->largest, readings->shift - 28));
-  struct scaled variance = scaled_add(noise_variance, scaled_square(model_sd));
-  struct scaled amplitude_square = scaled_square(fit_scaled_from(system->amplitude_q28, -28));
-  struct scaled gains = fit_scaled_from((int32_t)spread->gains,
-                                        SPREAD_SQUARE_SHIFT - 32 - 2 * spread->gain_shift);
-  struct scaled expected =
-      scaled_add(variance, scaled_mul(scaled_mean(gains, count), amplitude_square));
-  bool misfit = scaled_sub(found, scaled_mul(expected, MISFIT_SQUARE)).mantissa > 0;
-  struct scaled excess = scaled_sub(found, expected);
-  if (excess.mantissa > 0) {
-    variance = scaled_add(variance, excess);
-  }
-  struct scaled rms = fit_scaled_sqrt(scaled_mean(square_sum, count));
-  result->residual_rms_Pa = fit_grid_compose(rms.mantissa, rms.exponent + 18 - readings->shift);
-
+  struct scatter scatter;
+  set_scatter(readings, settings, system, spread, count, &scatter, result);
   struct scaled inverse3 = spread->inverse3;
   if (readings->prior_weight.mantissa != 0) {
-    widen_for_prior(readings, system, &variance, &inverse3);
+    widen_for_prior(readings, system, &scatter.all, &inverse3);
   }
+
   struct scaled pitch = scaled_top(grid->pitch, grid->pitch_exponent - 6);
   struct scaled form = scaled_mul(location_form(system, spread, &inverse3),
                                   scaled_square(scaled_mul(spread->softness, pitch))); /* mm */
-  struct scaled jitter = fit_scaled_sqrt(scaled_mul(noise_variance, form));
-  result->location_noise_mm = fit_grid_compose(jitter.mantissa, jitter.exponent);
+  struct scaled sd = fit_scaled_sqrt(scaled_mul(scatter.noise, form));
+  result->location_noise_mm = fit_grid_compose(sd.mantissa, sd.exponent);
   struct scaled move_x = fit_scaled_from(system->move_x_q22, -22); /* what it moved is not settled */
   struct scaled move_y = fit_scaled_from(system->move_y_q22, -22);
   struct scaled apart = scaled_add(scaled_square(move_x), scaled_square(move_y));
   apart = scaled_add(scaled_add(spread->location_variance, spread->apart), apart);
   apart = scaled_mul(apart, scaled_square(pitch));
-  struct scaled location_sd =
-      flags & CONTACT_FLAG_AT_BOUND
-          ? scaled_mul(BOUND_SD, pitch)
-          : fit_scaled_sqrt(scaled_add(scaled_mul(variance, form), apart));
-  result->location_sd_mm = fit_grid_compose(location_sd.mantissa, location_sd.exponent);
+  sd = flags & CONTACT_FLAG_AT_BOUND
+           ? scaled_mul(BOUND_SD, pitch)
+           : fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), apart));
+  result->location_sd_mm = fit_grid_compose(sd.mantissa, sd.exponent);
   struct scaled limit = fit_grid_scaled(fit_location_sd_limit_mm(settings));
-  if (scaled_sub(location_sd, limit).mantissa > 0) {
+  if (scaled_sub(sd, limit).mantissa > 0) {
     flags |= CONTACT_FLAG_UNCERTAIN;
   }
 
-  form = scaled_mul(force_form(spread, &inverse3), fit_grid_reciprocal(amplitude_square));
-  struct scaled force_sd = fit_scaled_sqrt(scaled_add(scaled_mul(variance, form), spread->force_variance));
-  force_sd = scaled_mul(force_sd, force);
-  result->force_sd_N = fit_grid_compose(force_sd.mantissa, force_sd.exponent);
+  form = scaled_mul(force_form(spread, &inverse3),
+                    fit_grid_reciprocal(scaled_square(spread->amplitude)));
+  sd = fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), spread->force_variance));
+  sd = scaled_mul(sd, force);
+  result->force_sd_N = fit_grid_compose(sd.mantissa, sd.exponent);
 
-  struct scaled total = scaled_add(scaled_mul(amplitude_square, mass), square_sum);
-  bool rough = scaled_sub(scaled_mul(square_sum, ROUGH_INVERSE_SQUARE), total).mantissa > 0;
-  if (scaled_sub(scaled_mul(square_sum, MODEL_INVERSE_SQUARE), total).mantissa > 0) {
+  if (scatter.other_model) {
     flags |= CONTACT_FLAG_MODEL;
   }
   int32_t x_q22 = fixed_clamp(system->move_x_q22, -(1 << 15), 1 << 15);
   int32_t y_q22 = fixed_clamp(system->move_y_q22, -(1 << 15), 1 << 15);
   bool settled = ((x_q22 * x_q22) >> 1) + ((y_q22 * y_q22) >> 1) <= grid->settled_square;
   result->flags |= flags;
-  return misfit && rough && settled;
+  return scatter.misfit && scatter.rough && settled;
 }

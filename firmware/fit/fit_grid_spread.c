@@ -19,16 +19,16 @@
 int32_t fit_grid_align(const struct scaled *values, int count, int32_t *aligned) {
   int32_t exponent = INT16_MIN;
   for (int i = 0; i < count; i++) {
-    int32_t top = fixed_bits(fixed_size(values[i].mantissa)) + values[i].exponent;
-    if (values[i].mantissa != 0 && top > exponent) {
-      exponent = top;
+    uint32_t size = fixed_size(values[i].mantissa);
+    int32_t spare = size >= 1 << 14 ? 0 : size >= 1 << 13 ? 1 : 2; /* products have 13 bits or more */
+    if (size != 0 && values[i].exponent - spare > exponent) {
+      exponent = values[i].exponent - spare;
     }
   }
-  exponent -= COEFFICIENT_BITS;
+  exponent += 15 - COEFFICIENT_BITS;
   for (int i = 0; i < count; i++) {
     int32_t shift = exponent - values[i].exponent;
-    aligned[i] = shift < 0 ? values[i].mantissa * (1 << -shift)
-                           : values[i].mantissa >> (shift < 31 ? shift : 31);
+    aligned[i] = values[i].mantissa >> (shift < 31 ? shift : 31);
   }
   return exponent;
 }
@@ -52,6 +52,7 @@ NOINLINE void fit_grid_begin_spread(const struct fit_settings *settings,
   spread->inverse1 = fit_grid_reciprocal(system->d1);
   spread->inverse2 = fit_grid_reciprocal(system->d2);
   spread->inverse3 = fit_grid_reciprocal(system->d3);
+  spread->amplitude = fit_scaled_from(system->amplitude_q28, -28);
   struct scaled softness = spread->softness = fit_grid_reciprocal(system->stiffness);
   struct scaled unit1 = scaled_mul(softness, spread->inverse1);
   struct scaled unit2 = scaled_mul(softness, spread->inverse2);
@@ -164,8 +165,7 @@ NOINLINE void fit_grid_end_spread(const struct fit_settings *settings,
   struct scaled y = scaled_mul(fit_scaled_from(spread->shape_y, 0), strength);
   struct scaled sum = scaled_add(scaled_mul(x, x), scaled_mul(y, y));
   sum = scaled_add(sum, fit_scaled_from((int32_t)spread->by_gains, gains_exponent));
-  struct scaled amplitude = fit_scaled_from(system->amplitude_q28, -28);
-  sum = scaled_mul(sum, scaled_mul(amplitude, amplitude));
+  sum = scaled_mul(scaled_mul(sum, spread->amplitude), spread->amplitude);
   spread->location_variance = (struct scaled){sum.mantissa, sum.exponent + 2 * spread->location_exponent};
 
   struct scaled force = scaled_mul(fit_scaled_from(spread->shape_force, 0), strength);

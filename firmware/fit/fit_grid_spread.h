@@ -19,7 +19,7 @@ struct fit_spread {
   int32_t x1, x2, x3, y2, y3, location_exponent;
   int32_t f0, f1, f2, f3, force_exponent;
   struct scaled inverse_mass, inverse1, inverse2, inverse3; /* of the norms, of all four columns */
-  struct scaled softness;                                   /* 1 / stiffness */
+  struct scaled amplitude, softness;                        /* the latter 1 / stiffness */
   /* dF / F is that of e, p1, p2 and p3 times 1, off_x, off_y (Q26) and lift_q24. */
   int32_t off_x, off_y, lift_q24;
   int32_t gain_shift;  /* gains Q16 are used with so many bits more */
