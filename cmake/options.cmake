@@ -62,7 +62,7 @@ else()
 endif()
 option(FINGERTIP_FIT_GENERAL "Fit any layout, with the float kernel" ${general_by_default})
 
-set(FINGERTIP_FIT_ITERATIONS 7 CACHE STRING "Gauss-Newton iterations of every fit, 1 to 20")
+set(FINGERTIP_FIT_ITERATIONS 4 CACHE STRING "Gauss-Newton iterations of every fit, 1 to 20")
 if(NOT FINGERTIP_FIT_ITERATIONS MATCHES "^([1-9]|1[0-9]|20)$")
   message(FATAL_ERROR "FINGERTIP_FIT_ITERATIONS=${FINGERTIP_FIT_ITERATIONS} must be a whole number from 1 to 20")
 endif()

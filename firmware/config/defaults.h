@@ -37,6 +37,6 @@
 #define DEFAULT_GAIN_SD 0.10f
 /* Of a layer of rubber against the Gaussian, as a share of the largest reading: with it one standard
  * deviation covers 55 to 75 % of the errors on pads of 6 and 12 mm (truth.json, cover_*). */
-#define DEFAULT_MODEL_SD 0.006f
+#define DEFAULT_MODEL_SD 0.0065f
 
 #endif

@@ -147,8 +147,8 @@ FIXED_INLINE int32_t scaled_to_fixed(struct scaled a, int32_t q) {
   return a.mantissa >> (shift < -31 ? 31 : -shift);
 }
 
-/* Square root of a non-negative value: two Newton steps from a straight line that is within 3.2 %
- * of it. */
+/* Square root of a non-negative value, within 0.06 %: a Newton step from a straight line that is
+ * within 3.2 % of it. */
 FIXED_INLINE struct scaled scaled_sqrt(struct scaled a) {
   a = scaled_from(a.mantissa, a.exponent);
   if (a.mantissa <= 0) {
@@ -158,7 +158,6 @@ FIXED_INLINE struct scaled scaled_sqrt(struct scaled a) {
   int32_t odd = a.exponent & 1;
   int32_t square = a.mantissa * (1 << (14 + odd)); /* 2^28 .. 2^30 */
   int32_t root = (((square >> 14) * 5584) >> 14) + 11249;
-  root = (root + port_divide(square, root)) >> 1;
   root = (root + port_divide(square, root)) >> 1;
   struct scaled result = {root, (a.exponent - odd - 14) / 2};
   return result;

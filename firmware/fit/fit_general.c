@@ -365,7 +365,7 @@ struct own_errors {
 static void add_own_errors(const struct samples *samples, const struct fit_settings *settings,
                            const struct parameters *at, const struct influence *influence, struct own_errors *own) {
   float inverse = 1.0f / (at->sigma * at->sigma), log2_scale = 0.5f * LOG2_E * inverse;
-  float shape_x = 0.0f, shape_y = 0.0f;
+  float shape_x = 0.0f, shape_y = 0.0f, shape_force = 0.0f;
   own->gains = own->location = own->force = 0.0f;
   for (int k = 0; k < samples->count; k++) {
     float x = samples->x[k] - at->x, y = samples->y[k] - at->y;
@@ -382,11 +382,13 @@ static void add_own_errors(const struct samples *samples, const struct fit_setti
     float shape = e * (r2 * inverse) * (r2 * inverse);
     shape_x += by_x * shape;
     shape_y += by_y * shape;
+    shape_force += FIT_FORCE_SHAPE * by_force * shape;
   }
   float usual = FIT_SHAPE_SIGMA * FIT_SHAPE_SIGMA * inverse;
   float strength = FIT_SHAPE_PER_MODEL * (float)settings->model_sd_q16 * (1.0f / 65536.0f);
   strength *= usual * at->p0;
   own->location += (shape_x * shape_x + shape_y * shape_y) * strength * strength;
+  own->force += shape_force * shape_force * strength * strength;
 }
 
 /* Whether the fit has settled with residuals that are rough and no noise; then outlier is the
@@ -513,7 +515,7 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
   }
   location_variance += moved * moved;
   if (deficient || (flags & CONTACT_FLAG_AT_BOUND)) {
-    location_variance += FIT_BOUND_SD * FIT_BOUND_SD;
+    location_variance = FIT_BOUND_SD * FIT_BOUND_SD;
   }
   result->location_noise_mm = at_most(pitch * noise * sqrtf(influence.location_form), FIT_HUGE);
   result->location_sd_mm = at_most(pitch * sqrtf(location_variance), FIT_HUGE);

@@ -30,7 +30,7 @@
  * basis is orthogonal to the model. Their rounding would let them wander along the valleys of badly
  * conditioned presses, so they are few, and the others work on the residual. */
 #define COARSE_ITERATIONS 3
-#define FINE_ITERATIONS 3
+#define FINE_ITERATIONS 2
 
 /* Guess alone: readings below a share of the largest carry more noise than shape into a logarithm;
  * a ridge towards sigma 0.45 pitch decides where too few are large. */
@@ -40,11 +40,13 @@
 #define GUESS_HEIGHT_MIN_Q26 1936353
 #define GUESS_HEIGHT_MAX_Q26 484088133 /* sigma 0.316 pitch */
 
-/* FIT_STRETCH_LEAST^2, FIT_STRETCH_SURE^2, FIT_STRETCH_SD_MAX^2, and the height of FIT_SHAPE_LEAST. */
+/* FIT_STRETCH_LEAST^2, FIT_STRETCH_SURE^2, FIT_STRETCH_SD_MAX^2, FIT_STRETCH_LINEAR^2, and the height
+ * of FIT_SHAPE_LEAST. */
 #define ROUND_SQUARE ((struct scaled){20972, -21})
 #define SURE_SQUARE ((struct scaled){25600, -12})
 #define KNOWN_SQUARE ((struct scaled){16384, -18})
-#define SHAPE_HEIGHT_MAX_Q26 239056000
+#define LINEAR_SQUARE ((struct scaled){16056, -15})
+#define SHAPE_HEIGHT_MAX_Q26 193635251
 
 /* 1 / n of a constant. */
 #define RECIPROCAL(n)                                                                              \
@@ -324,37 +326,38 @@ static struct scaled project_slant(const struct moments *m, const struct reading
     sum += fixed_mul_16(over_y, m->x.linear[i]);
     r += ROWS;
   }
-  return scaled_from(sum, 17 + residual_shift - 28 - m->x.linear_q - m->y.linear_q);
+  return fit_scaled_from(sum, 17 + residual_shift - 28 - m->x.linear_q - m->y.linear_q);
 }
 
 static NOINLINE void begin_shape(const struct readings *readings, const struct moments *m,
-                                 const struct fit_system *system, struct shape *shape) {
+                                 const struct fit_system *system, const struct fit_spread *spread,
+                                 struct shape *shape) {
   const struct factor *x = &m->x, *y = &m->y;
-  struct scaled mass_x = scaled_from(x->mass_q26, -26), mass_y = scaled_from(y->mass_q26, -26);
+  struct scaled mass_x = fit_scaled_from(x->mass_q26, -26), mass_y = fit_scaled_from(y->mass_q26, -26);
   int32_t norm_q = 3 - 2 * m->square_q;
   struct scaled inverse_x =
-      fit_grid_reciprocal(scaled_mul(scaled_from(x->square_norm, norm_q), mass_y));
+      fit_grid_reciprocal(scaled_mul(fit_scaled_from(x->square_norm, norm_q), mass_y));
   struct scaled inverse_y =
-      fit_grid_reciprocal(scaled_mul(scaled_from(y->square_norm, norm_q), mass_x));
+      fit_grid_reciprocal(scaled_mul(fit_scaled_from(y->square_norm, norm_q), mass_x));
   struct scaled inverse_xy =
-      fit_grid_reciprocal(scaled_mul(scaled_from(x->linear_norm, 3 - 2 * x->linear_q),
-                                     scaled_from(y->linear_norm, 3 - 2 * y->linear_q)));
-  struct scaled softness = fit_grid_reciprocal(system->stiffness);
+      fit_grid_reciprocal(scaled_mul(fit_scaled_from(x->linear_norm, 3 - 2 * x->linear_q),
+                                     fit_scaled_from(y->linear_norm, 3 - 2 * y->linear_q)));
+  struct scaled softness = spread->softness;
   int32_t q = system->residual_shift - 26 - m->square_q;
   struct scaled along_x = scaled_mul(inverse_x, softness);
   struct scaled along_y = scaled_mul(inverse_y, softness);
   struct scaled along_xy = scaled_mul(inverse_xy, softness);
-  shape->wider_x = scaled_mul(scaled_from(m->b_x, q), along_x);
-  shape->wider_y = scaled_mul(scaled_from(m->b_y, q), along_y);
-  shape->stretch = short_of(scaled_sub(shape->wider_x, shape->wider_y));
+  shape->wider_x = scaled_mul(fit_scaled_from(m->b_x, q), along_x);
+  shape->wider_y = scaled_mul(fit_scaled_from(m->b_y, q), along_y);
+  shape->stretch = fit_scaled_short(scaled_sub(shape->wider_x, shape->wider_y));
   shape->slant = scaled_mul(project_slant(m, readings, system->residual_shift), along_xy);
 
   struct scaled values[3] = {scaled_mul(shape->stretch, along_x), scaled_mul(shape->stretch, along_y),
                              scaled_mul(shape->slant, along_xy)};
   shape->noise_form =
-      short_of(scaled_add(scaled_add(scaled_mul(values[0], shape->stretch),
-                                     scaled_mul(values[1], shape->stretch)),
-                          scaled_mul(values[2], shape->slant)));
+      scaled_add(scaled_add(scaled_mul(values[0], shape->stretch),
+                                    scaled_mul(values[1], shape->stretch)),
+                     scaled_mul(values[2], shape->slant));
   shape->noise_form = scaled_mul(shape->noise_form, softness);
   values[0].exponent -= m->square_q;
   values[1].exponent -= m->square_q;
@@ -378,8 +381,8 @@ FIXED_INLINE int32_t sinh_ratio_q13(int32_t square_q13) {
 /* Covariance = sigma^2 exp(wider_x + wider_y) exp(S), S the symmetric matrix with stretch and -stretch
  * on its diagonal and slant beside it. */
 static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *result) {
-  int32_t stretch = scaled_to_fixed(shape->stretch, 13), slant = scaled_to_fixed(shape->slant, 13);
-  int32_t wider = scaled_to_fixed(scaled_add(shape->wider_x, shape->wider_y), 13);
+  int32_t stretch = fit_scaled_to_fixed(shape->stretch, 13), slant = fit_scaled_to_fixed(shape->slant, 13);
+  int32_t wider = fit_scaled_to_fixed(scaled_add(shape->wider_x, shape->wider_y), 13);
   const int32_t most = (int32_t)(FIT_STRETCH_MAX * 8192.0f);
   if (fixed_size(stretch) > (uint32_t)most || fixed_size(slant) > (uint32_t)most ||
       fixed_size(wider) > 8192) {
@@ -391,75 +394,126 @@ static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *re
   }
   int32_t mean = cosh_q13(square), ratio = sinh_ratio_q13(square);
   int32_t part = (ratio * stretch) >> 13, across = (ratio * slant) >> 13;
-  int32_t growth = 8192 + wider + ((wider * wider) >> 14) + ((wider * wider >> 13) * wider >> 13) / 6;
-  struct scaled scale = scaled_from(growth, -13);
-  struct scaled x = scaled_from(mean + part, -13), y = scaled_from(mean - part, -13);
-  struct scaled root_x = scaled_sqrt(x), root_y = scaled_sqrt(y);
-  struct scaled correlation =
-      scaled_div(scaled_div(scaled_from(across, -13), short_of(root_x)), short_of(root_y));
-  root_x = scaled_sqrt(scaled_mul(x, scale));
-  root_y = scaled_sqrt(scaled_mul(y, scale));
-  result->sigma_x_mm = result->sigma_mm * fit_grid_compose(root_x.mantissa, root_x.exponent);
-  result->sigma_y_mm = result->sigma_mm * fit_grid_compose(root_y.mantissa, root_y.exponent);
-  int32_t limited = fixed_clamp(scaled_to_fixed(correlation, 15), -32767, 32767);
+  /* exp of half the sum, since it multiplies widths. */
+  int32_t half = wider >> 1, half_square = (half * half) >> 13;
+  int32_t growth = 8192 + half + (half_square >> 1) + ((half_square * half) >> 13) / 6;
+  struct scaled scale = fit_scaled_from(growth, -13);
+  struct scaled x = fit_scaled_sqrt(fit_scaled_from(mean + part, -13));
+  struct scaled y = fit_scaled_sqrt(fit_scaled_from(mean - part, -13));
+  struct scaled correlation = 
+      scaled_mul(fit_scaled_from(across, -13), fit_grid_reciprocal(scaled_mul(x, y)));
+  x = scaled_mul(x, scale);
+  y = scaled_mul(y, scale);
+  result->sigma_x_mm = result->sigma_mm * fit_grid_compose(x.mantissa, x.exponent);
+  result->sigma_y_mm = result->sigma_mm * fit_grid_compose(y.mantissa, y.exponent);
+  int32_t limited = fixed_clamp(fit_scaled_to_fixed(correlation, 15), -32767, 32767);
   result->width_correlation = fit_grid_compose(limited, -15);
   return true;
 }
 
-static NOINLINE void judge_shape(const struct readings *readings,
-                                 const struct fit_settings *settings,
-                                 const struct fit_system *system, const struct fit_spread *spread,
-                                 const struct shape *shape, struct fit_result *result) {
-  if (system->at.height > SHAPE_HEIGHT_MAX_Q26 ||
-      (result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL))) {
-    return;
+/* Each column is g of one axis at least, so that what a sensor moves is a number of its column of
+ * nodes times gy and one of its row times gx. */
+struct moves {
+  int32_t column[COLUMNS], row[ROWS];
+};
+
+static NOINLINE void set_moves(const struct moments *m, const struct moves *moves, int32_t *moved) {
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t column = moves->column[i], g = m->x.g_q14[i];
+    UNROLL for (int j = 0; j < ROWS; j++) {
+      *moved++ = (column * m->y.g_q14[j] + moves->row[j] * g) >> 15;
+    }
   }
-  struct scaled length_square = short_of(scaled_add(scaled_mul(shape->stretch, shape->stretch),
-                                                    scaled_mul(shape->slant, shape->slant)));
-  struct scaled noise = scaled_from(settings->noise_Pa_q10, readings->shift - 28);
-  struct scaled amplitude = scaled_from(system->amplitude_q28, -28);
-  struct scaled by_gains = scaled_mul(
-      scaled_from((int32_t)shape->by_gains,
-                  SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * shape->exponent),
-      scaled_mul(amplitude, amplitude));
-  struct scaled variance =
-      short_of(scaled_add(scaled_mul(scaled_mul(noise, noise), shape->noise_form), by_gains));
-  struct scaled least = short_of(
-      scaled_add(scaled_mul(length_square, ROUND_SQUARE), scaled_mul(variance, SURE_SQUARE)));
-  if (scaled_sub(scaled_mul(length_square, length_square), least).mantissa > 0) {
-    result->flags |= CONTACT_FLAG_ELONGATED;
-  }
-  struct scaled known = scaled_mul(length_square, KNOWN_SQUARE);
-  if (scaled_sub(variance, known).mantissa <= 0 && set_widths(shape, result)) {
-    result->flags |= CONTACT_FLAG_WIDTHS_VALID;
+}
+
+/* A coefficient times the linear and one times the square column of an axis. */
+FIXED_INLINE void set_parts(const struct factor *f, int nodes, int32_t linear, int32_t square,
+                            int32_t *parts) {
+  UNROLL for (int i = 0; i < nodes; i++) {
+    parts[i] = (linear * f->linear[i] + square * (f->square[i] >> 1)) >> 14;
   }
 }
 
 /* What errors of single sensors make of the result. */
 static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
                                    const struct fit_settings *settings, const struct moments *m,
-                                   const struct fit_system *system, struct fit_spread *spread,
-                                   struct shape *shape) {
+                                   const struct fit_system *system, struct readings *room,
+                                   struct fit_spread *spread, struct shape *shape) {
   const struct factor *x = &m->x, *y = &m->y;
-  const struct fit_columns_q q = {x->linear_q, y->linear_q, m->square_q - 1};
-  fit_grid_begin_spread(settings, system, &q, spread);
-  const uint8_t *sensor = grid->sensor;
+  int32_t *moved = room->q28;
   for (int i = 0; i < COLUMNS; i++) {
-    int32_t g = x->g_q14[i], linear = x->linear[i], square = x->square[i];
-    for (int j = 0; j < ROWS; j++) {
-      int32_t across = y->g_q14[j];
-      int32_t square_x = (square * across) >> 14, square_y = (y->square[j] * g) >> 14;
-      const struct fit_node node = {(g * across) >> 13, (linear * across) >> 14,
-                                    (y->linear[j] * g) >> 14, (square_x + square_y) >> 1};
-      int32_t error =
-          fit_grid_add_to_spread(spread, &node, i, j, settings->gain_sd_q16[*sensor++]);
-      int32_t moved = (shape->x * square_x + shape->y * square_y +
-                       shape->xy * ((linear * y->linear[j]) >> 15)) >>
-                      15;
-      int32_t high = (moved * error) >> 16;
-      shape->by_gains += (uint32_t)(high * high) >> SPREAD_SQUARE_SHIFT;
+    int32_t g = x->g_q14[i];
+    UNROLL for (int j = 0; j < ROWS; j++) {
+      *moved++ = (g * y->g_q14[j]) >> 13;
     }
   }
+  moved = room->q28;
+  fit_grid_set_errors(grid, settings, &system->at, room, spread);
+  struct moves moves;
+  set_parts(x, COLUMNS, spread->x1, spread->x3, moves.column);
+  set_parts(y, ROWS, 0, spread->x3, moves.row);
+  set_moves(m, &moves, moved);
+  fit_grid_add_moves(room, &spread->by_gains, &spread->shape_x);
+  set_parts(x, COLUMNS, 0, spread->y3, moves.column);
+  set_parts(y, ROWS, spread->y2, spread->y3, moves.row);
+  set_moves(m, &moves, moved);
+  fit_grid_add_moves(room, &spread->by_gains, &spread->shape_y);
+  set_parts(x, COLUMNS, spread->f1, spread->f3, moves.column);
+  set_parts(y, ROWS, spread->f2, spread->f3, moves.row);
+  UNROLL for (int j = 0; j < ROWS; j++) {
+    moves.row[j] += (spread->f0 * y->g_q14[j]) >> 13;
+  }
+  set_moves(m, &moves, moved);
+  fit_grid_add_moves(room, &spread->force_by_gains, &spread->shape_force);
+  set_parts(x, COLUMNS, 0, shape->x * 2, moves.column);
+  set_parts(y, ROWS, 0, shape->y * 2, moves.row);
+  set_moves(m, &moves, moved);
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t slant = (shape->xy * x->linear[i]) >> 15;
+    UNROLL for (int j = 0; j < ROWS; j++) {
+      *moved++ += (slant * y->linear[j]) >> 15;
+    }
+  }
+  int32_t unused;
+  fit_grid_add_moves(room, &shape->by_gains, &unused);
+  fit_grid_end_spread(settings, system, spread);
+}
+
+/* The flags of the shape that apply. If it is elongated, separate widths would move the location. */
+static NOINLINE uint32_t judge_shape(const struct readings *readings,
+                                     const struct fit_settings *settings,
+                                     const struct fit_system *system, const struct shape *shape,
+                                     struct fit_spread *spread) {
+  const struct state *at = &system->at;
+  if (at->height > SHAPE_HEIGHT_MAX_Q26) {
+    return 0;
+  }
+  struct scaled length_square = fit_scaled_short(scaled_add(
+      scaled_mul(shape->stretch, shape->stretch), scaled_mul(shape->slant, shape->slant)));
+  struct scaled noise = fit_scaled_from(settings->noise_Pa_q10, readings->shift - 28);
+  struct scaled by_gains = scaled_mul(
+      fit_scaled_from((int32_t)shape->by_gains,
+                  SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * shape->exponent),
+      scaled_mul(spread->amplitude, spread->amplitude));
+  struct scaled variance =
+      fit_scaled_short(scaled_add(scaled_mul(scaled_mul(noise, noise), shape->noise_form), by_gains));
+  struct scaled least = scaled_add(scaled_mul(length_square, ROUND_SQUARE), scaled_mul(variance, SURE_SQUARE));
+  uint32_t flags = 0;
+  if (scaled_sub(scaled_mul(length_square, length_square), least).mantissa > 0) {
+    flags |= CONTACT_FLAG_ELONGATED;
+    struct scaled x = scaled_mul(fit_scaled_from(2 * at->x - system->slope_x, -26), shape->wider_x);
+    struct scaled y = scaled_mul(fit_scaled_from(2 * at->y - system->slope_y, -26), shape->wider_y);
+    spread->apart = scaled_add(scaled_mul(x, x), scaled_mul(y, y));
+    if (scaled_sub(length_square, LINEAR_SQUARE).mantissa > 0) {
+      struct scaled share = scaled_mul(LINEAR_SQUARE, fit_grid_reciprocal(length_square));
+      spread->apart = scaled_mul(spread->apart, scaled_mul(share, share));
+    }
+  }
+  struct scaled known = scaled_mul(length_square, KNOWN_SQUARE);
+  if (scaled_sub(variance, known).mantissa <= 0) {
+    flags |= CONTACT_FLAG_WIDTHS_VALID;
+  }
+  return flags;
 }
 
 /* First guess, every sensor there: the marginals weighted by the row and the column of the largest
@@ -578,10 +632,19 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   finish(&readings, &m, &system);
   struct fit_spread spread;
   struct shape shape;
-  begin_shape(&readings, &m, &system, &shape);
-  spread_errors(grid, settings, &m, &system, &spread, &shape);
+  const struct fit_columns_q q = {m.x.linear_q, m.y.linear_q, m.square_q - 1};
+  fit_grid_begin_spread(settings, &system, &q, &spread);
+  begin_shape(&readings, &m, &system, &spread, &shape);
+  spread_errors(grid, settings, &m, &system, &readings, &spread, &shape);
+  uint32_t flags = judge_shape(&readings, settings, &system, &shape, &spread);
   bool rough =
       fit_grid_conclude(grid, &readings, settings, &system, &spread, &state, NODES, result);
-  judge_shape(&readings, settings, &system, &spread, &shape, result);
+  if (!(result->flags &
+        (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL))) {
+    if ((flags & CONTACT_FLAG_WIDTHS_VALID) && !set_widths(&shape, result)) {
+      flags &= ~(uint32_t)CONTACT_FLAG_WIDTHS_VALID;
+    }
+    result->flags |= flags;
+  }
   return rough;
 }

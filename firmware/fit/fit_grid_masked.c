@@ -395,8 +395,11 @@ static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused,
 }
 
 /* The columns of one sensor as they are after the elimination; none where it is not used. */
+struct column {
+  int32_t e, p1, p2, p3;
+};
 FIXED_INLINE void orthogonal_columns(const struct columns *c, const struct node *node,
-                                     struct fit_node *column) {
+                                     struct column *column) {
   column->e = node->mantissa >> node->shift;
   column->p1 = node->p1;
   column->p2 = node->p2 - times_q12(node->p1, c->f21);
@@ -423,33 +426,47 @@ static NOINLINE void finish(const struct columns *c, int32_t finer, struct fit_s
   system->bend_q24 = fixed_clamp(bend - (c->variance >> (LINEAR_Q - 24)), -(1 << 29), 1 << 29);
 }
 
-/* What errors of single sensors make of the result. */
+/* What errors of single sensors make of the result. The columns are made orthogonal for it. */
 static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
-                                   const struct fit_settings *settings, const struct columns *c,
-                                   const struct fit_system *system, struct fit_spread *spread) {
+                                   const struct fit_settings *settings, struct columns *c,
+                                   const struct fit_system *system, struct readings *room,
+                                   struct fit_spread *spread) {
   const struct fit_columns_q q = {c->q1, c->q2, c->q3};
   fit_grid_begin_spread(settings, system, &q, spread);
-  const struct node *node = c->node;
-  const uint8_t *sensor = grid->sensor;
   const int32_t most = 3 << 14;
-  for (int i = 0; i < COLUMNS; i++) {
-    for (int j = 0; j < ROWS; j++) {
-      struct fit_node column;
-      orthogonal_columns(c, node, &column);
-      column.p2 = fixed_clamp(column.p2, -most, most);
-      column.p3 = fixed_clamp(column.p3, -most, most);
-      fit_grid_add_to_spread(spread, &column, i, j, settings->gain_sd_q16[*sensor++]);
-      node++;
-    }
+  for (int k = 0; k < NODES; k++) {
+    struct node *node = &c->node[k];
+    struct column column;
+    orthogonal_columns(c, node, &column);
+    node->e = room->q28[k] = column.e;
+    node->p2 = fixed_clamp(column.p2, -most, most);
+    node->p3 = fixed_clamp(column.p3, -most, most);
   }
+  fit_grid_set_errors(grid, settings, &system->at, room, spread);
+  const struct node *node = c->node;
+  for (int k = 0; k < NODES; k++) {
+    room->q28[k] =
+        (spread->x1 * node[k].p1 + spread->x2 * node[k].p2 + spread->x3 * node[k].p3) >> 15;
+  }
+  fit_grid_add_moves(room, &spread->by_gains, &spread->shape_x);
+  for (int k = 0; k < NODES; k++) {
+    room->q28[k] = (spread->y2 * node[k].p2 + spread->y3 * node[k].p3) >> 15;
+  }
+  fit_grid_add_moves(room, &spread->by_gains, &spread->shape_y);
+  for (int k = 0; k < NODES; k++) {
+    room->q28[k] = (spread->f0 * node[k].e + spread->f1 * node[k].p1 + spread->f2 * node[k].p2 +
+                    spread->f3 * node[k].p3) >>
+                   15;
+  }
+  fit_grid_add_moves(room, &spread->force_by_gains, &spread->shape_force);
+  fit_grid_end_spread(settings, system, spread);
 }
 
 enum accuracy { COARSE, FINE, LAST };
 
-static NOINLINE void evaluate(const struct readings *readings, const int32_t *unused,
-                              enum accuracy accuracy, struct columns *c,
+static NOINLINE void evaluate(const struct readings *readings, enum accuracy accuracy, struct columns *c,
                               struct fit_system *system) {
-  system->rise_q22 = set_model(&system->at, unused, c);
+  system->rise_q22 = set_model(&system->at, readings->residual, c);
   orthogonalise(readings, &rounding_ridge, c);
   system->amplitude_q28 =
       fit_grid_amplitude(c->product_q26, c->mass >> (16 - MASS_SHIFT), accuracy != COARSE);
@@ -495,14 +512,14 @@ static NOINLINE void evaluate(const struct readings *readings, const int32_t *un
   fit_grid_complete(readings, system);
 }
 
-/* Readings in use, which sensors are not, and how many are. False: nothing to fit. */
+/* Readings in use, which sensors are not (in their residual's place), and how many are. False:
+ * nothing to fit. */
 static bool gather(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                   const struct fit_settings *settings, struct readings *readings, int32_t *unused,
-                   int *count) {
+                   const struct fit_settings *settings, struct readings *readings, int *count) {
   *count = 0;
   for (int k = 0; k < NODES; k++) {
     bool used = usable >> array->grid.sensor[k] & 1;
-    unused[k] = used ? 0 : UNUSED;
+    readings->residual[k] = used ? 0 : UNUSED;
     *count += used;
   }
   return fit_grid_take_readings(array, pressure_Pa_q10, usable, settings, readings);
@@ -512,11 +529,10 @@ bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
                      const struct fit_settings *settings, struct fit_result *result) {
   const struct fit_grid_shape *grid = &array->grid;
   struct readings readings;
-  int32_t unused[NODES];
   int count;
   memset(result, 0, sizeof *result);
   usable &= UINT32_MAX >> (FT_MAX_SENSORS - NODES);
-  bool positive = gather(array, pressure_Pa_q10, usable, settings, &readings, unused, &count);
+  bool positive = gather(array, pressure_Pa_q10, usable, settings, &readings, &count);
   if (count < NODES) {
     result->flags = CONTACT_FLAG_SENSOR_MASKED;
   }
@@ -537,7 +553,7 @@ bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
     system.at.x = state.x;
     system.at.y = state.y;
     system.at.height = state.height;
-    evaluate(&readings, unused, left <= 1 ? LAST : coarse ? COARSE : FINE, &columns, &system);
+    evaluate(&readings, left <= 1 ? LAST : coarse ? COARSE : FINE, &columns, &system);
     fit_grid_step(grid, &system, &state);
     if (left == 0) { /* the guess is asked for: the step only tells how good it is */
       state = system.at;
@@ -546,7 +562,7 @@ bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
   } while (left > 0);
   result->used = usable;
   struct fit_spread spread;
-  spread_errors(grid, settings, &columns, &system, &spread);
+  spread_errors(grid, settings, &columns, &system, &readings, &spread);
   return fit_grid_conclude(grid, &readings, settings, &system, &spread, &state, count, result);
 }
 
@@ -567,9 +583,8 @@ int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q
                      const struct fit_settings *settings, const struct fit_result *result) {
   const struct fit_grid_shape *grid = &array->grid;
   struct readings readings;
-  int32_t unused[NODES];
   int count;
-  if (!gather(array, pressure_Pa_q10, usable, settings, &readings, unused, &count) || count < 6) {
+  if (!gather(array, pressure_Pa_q10, usable, settings, &readings, &count) || count < 6) {
     return -1;
   }
   float per_pitch = 1.0f / array->pitch_mm, sigma = result->sigma_mm * per_pitch;
@@ -581,7 +596,7 @@ int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q
       fixed_clamp(q26_of(0.72134752f / (sigma * sigma)), HEIGHT_MIN_Q26, HEIGHT_MAX_Q26);
   struct columns c;
   c.cross = c.skew_x = c.skew_y = 0;
-  evaluate(&readings, unused, FINE, &c, &system);
+  evaluate(&readings, FINE, &c, &system);
 
   uint32_t size = 1;
   for (int k = 0; k < NODES; k++) {
@@ -593,7 +608,7 @@ int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q
   for (int k = 0; k < NODES; k++) {
     const struct node *node = &c.node[k];
     int32_t r = shifted(node->e, finer);
-    struct fit_node column;
+    struct column column;
     orthogonal_columns(&c, node, &column);
     int32_t leverage =
         share_of(column.e, c.mass, MASS_SHIFT) + share_of(column.p1, c.norm1, NORM_SHIFT) +
@@ -601,7 +616,7 @@ int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q
     int32_t free = 32768 - leverage;
     int32_t without = port_divide(r * r, free < 512 ? 512 : free);
     total += (r * r) >> 15;
-    if (without > worst && unused[k] == 0) {
+    if (without > worst && readings.residual[k] == 0) {
       second = worst;
       worst = without;
       outlier = grid->sensor[k];

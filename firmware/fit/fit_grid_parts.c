@@ -31,6 +31,22 @@ float fit_grid_compose(int32_t mantissa, int32_t exponent) {
   return value;
 }
 
+struct scaled fit_scaled_from(int32_t value, int32_t exponent) {
+  return scaled_from(value, exponent);
+}
+
+struct scaled fit_scaled_short(struct scaled a) {
+  return scaled_from(a.mantissa, a.exponent);
+}
+
+struct scaled fit_scaled_sqrt(struct scaled a) {
+  return scaled_sqrt(a);
+}
+
+int32_t fit_scaled_to_fixed(struct scaled a, int32_t q) {
+  return scaled_to_fixed(a, q);
+}
+
 struct scaled fit_grid_scaled(float value) {
   uint32_t bits = bytes_from_f32(value);
   if (bits >> 23 == 0) {
@@ -39,7 +55,7 @@ struct scaled fit_grid_scaled(float value) {
   return scaled_from((int32_t)((bits & 0x7FFFFFu) | 0x800000u), (int32_t)(bits >> 23) - 150);
 }
 
-/* One Newton step of sigma = (log2(e) / 2) / (height sigma) from 15 bits. */
+/* One Newton step of sigma = (log2(e) / 2) / (height sigma) from 11 bits: 22 of them, or 2e-7. */
 int32_t fit_grid_sigma(int32_t height) {
   struct scaled rough = scaled_sqrt(scaled_div(LOG2E_HALF, scaled_from(height, -26)));
   int32_t sigma = scaled_to_fixed(rough, 26);

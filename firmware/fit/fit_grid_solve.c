@@ -17,10 +17,7 @@
 #define ROUGH_INVERSE_SQUARE ((struct scaled){20000, -3}) /* 1 / FIT_ROUGH_RESIDUAL^2 */
 #define MISFIT_SQUARE ((struct scaled){FIT_MISFIT * FIT_MISFIT << 11, -11})
 #define FLAT_HEIGHT_Q26 2016200     /* FIT_FLAT_SIGMA */
-#define MARGIN_SQUARE ((struct scaled){18432, -13}) /* FIT_BOUND_SD^2 */
-/* FIT_SHAPE_PER_MODEL in terms of z^2 and the height: sigma^2 = log2(e) / (2 height) and
- * r^2 / sigma^2 = 2 z / log2(e). */
-#define SHAPE_PER_MODEL ((struct scaled){24160, -14})
+#define BOUND_SD ((struct scaled){19661, -14}) /* FIT_BOUND_SD */
 
 FIXED_INLINE struct scaled scaled_square(struct scaled a) {
   return scaled_mul(a, a);
@@ -162,34 +159,17 @@ static NOINLINE void widen_for_prior(const struct readings *readings,
   struct scaled excess = scaled_sub(scaled_square(readings->prior_sd), *variance);
   if (excess.mantissa > 0) {
     struct scaled share = scaled_mul(system->prior_row, *inverse3);
-    struct scaled more = scaled_div(scaled_mul(excess, scaled_square(share)), *variance);
+    struct scaled more = 
+        scaled_mul(scaled_mul(excess, scaled_square(share)), fit_grid_reciprocal(*variance));
     *inverse3 = scaled_add(*inverse3, more);
   }
 }
 
-/* Variance of the location from what the sensors' own errors make of it, pitches squared. */
-static NOINLINE struct scaled own_errors(const struct fit_settings *settings,
-                                         const struct fit_system *system,
-                                         const struct fit_spread *spread) {
-  struct scaled amplitude_square = scaled_square(scaled_from(system->amplitude_q28, -28));
-  struct scaled by_gains =
-      scaled_from((int32_t)spread->by_gains,
-                  SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * spread->location_exponent);
-  struct scaled shape_x = scaled_from(spread->shape_x, 0), shape_y = scaled_from(spread->shape_y, 0);
-  struct scaled strength = scaled_mul(scaled_from(settings->model_sd_q16, -16),
-                                      scaled_from(system->at.height, -26));
-  strength = scaled_mul(strength, SHAPE_PER_MODEL);
-  struct scaled shape = scaled_add(scaled_square(shape_x), scaled_square(shape_y));
-  shape = scaled_mul(short_of(shape), scaled_square(strength));
-  shape.exponent += 2 * (spread->location_exponent + 4 - 21 + spread->shape_shift);
-  return scaled_mul(short_of(scaled_add(by_gains, shape)), amplitude_square);
-}
-
-bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
-                       const struct fit_settings *settings, const struct fit_system *system,
-                       const struct fit_spread *spread, const struct state *state, int count,
-                       struct fit_result *result) {
-  const struct state *at = &system->at;
+/* Location, width, peak and force; returns the force. */
+static NOINLINE struct scaled set_values(const struct fit_grid_shape *grid,
+                                         const struct readings *readings,
+                                         const struct fit_system *system, const struct state *state,
+                                         struct fit_result *result) {
   int32_t x = fixed_clamp(state->x, grid->x_min, grid->x_max);
   int32_t y = fixed_clamp(state->y, grid->y_min, grid->y_max);
   int32_t peak_exponent;
@@ -205,7 +185,14 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   result->sigma_mm = fit_grid_compose(fixed_mul_q32(sigma, grid->pitch), pitch_exponent);
   result->p0_Pa = fit_grid_compose(peak, peak_exponent);
   result->force_N = fit_grid_compose(force, force_exponent);
+  return fit_scaled_from(force, force_exponent);
+}
 
+/* The flags that need no variance. */
+static NOINLINE uint32_t flags_of(const struct fit_grid_shape *grid,
+                                  const struct readings *readings,
+                                  const struct fit_settings *settings,
+                                  const struct fit_system *system, const struct state *state) {
   uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
   if (settings->noise_Pa_q10 > port_divide(readings->largest, FIT_LOW_SIGNAL_SIGMA)) {
     flags |= CONTACT_FLAG_LOW_SIGNAL;
@@ -213,95 +200,130 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   if (state->height <= FLAT_HEIGHT_Q26) {
     flags |= CONTACT_FLAG_FLAT;
   }
-  if (x == grid->x_min || x == grid->x_max || y == grid->y_min || y == grid->y_max ||
-      state->height <= HEIGHT_MIN_Q26 || state->height >= HEIGHT_MAX_Q26 ||
-      system->amplitude_q28 <= AMPLITUDE_MIN_Q28 || system->amplitude_q28 >= AMPLITUDE_MAX_Q28) {
+  if (state->x <= grid->x_min || state->x >= grid->x_max || state->y <= grid->y_min ||
+      state->y >= grid->y_max || state->height <= HEIGHT_MIN_Q26 ||
+      state->height >= HEIGHT_MAX_Q26 || system->amplitude_q28 <= AMPLITUDE_MIN_Q28 ||
+      system->amplitude_q28 >= AMPLITUDE_MAX_Q28) {
     flags |= CONTACT_FLAG_AT_BOUND;
   }
+  return flags;
+}
 
-  /* Variance of one reading that is the same for all of them: the noise's, the model's, and what
-   * the residuals are above these and the gains' together. In units of Q28. */
-  struct scaled mass = scaled_from(system->mass_q20, -20), inverse_mass = fit_grid_reciprocal(mass);
-  struct scaled left = scaled_from(system->b0, system->residual_shift - 38);
-  struct scaled square_sum =
-      scaled_sub(short_of(system->square_sum), scaled_mul(scaled_square(left), inverse_mass));
-  square_sum.mantissa = square_sum.mantissa < 0 ? 0 : square_sum.mantissa;
-  struct scaled found = scaled_mean(square_sum, count > 4 ? count - 4 : 1);
-  struct scaled noise_variance =
-      scaled_square(scaled_from(settings->noise_Pa_q10, readings->shift - 28));
-  struct scaled model_sd = scaled_mul(scaled_from(settings->model_sd_q16, -16),
-                                      scaled_from(readings->largest, readings->shift - 28));
-  struct scaled variance = scaled_add(noise_variance, scaled_square(model_sd));
-  struct scaled amplitude = scaled_from(system->amplitude_q28, -28);
-  struct scaled gains = scaled_mean(scaled_from((int32_t)spread->gains, SPREAD_SQUARE_SHIFT - 32 -
-                                                                            2 * spread->gain_shift),
-                                    count);
-  struct scaled expected = scaled_add(variance, scaled_mul(gains, scaled_square(amplitude)));
-  bool misfit = scaled_sub(found, scaled_mul(short_of(expected), MISFIT_SQUARE)).mantissa > 0;
-  struct scaled excess = scaled_sub(found, expected);
-  if (excess.mantissa > 0) {
-    variance = scaled_add(variance, excess);
+/* By what the variance of the readings gives that of the force's share, times the amplitude squared:
+ * the mean of the model adds one over its mass. */
+static NOINLINE struct scaled force_form(const struct fit_spread *spread,
+                                        const struct scaled *inverse3) {
+  struct scaled off_x = fit_scaled_from(spread->off_x, -26);
+  struct scaled off_y = fit_scaled_from(spread->off_y, -26);
+  struct scaled lift = fit_scaled_from(spread->lift_q24, -24);
+  struct scaled form =
+      scaled_add(spread->inverse_mass, scaled_mul(scaled_square(off_x), spread->inverse1));
+  form = scaled_add(form, scaled_mul(scaled_square(off_y), spread->inverse2));
+  return scaled_add(form, scaled_mul(scaled_square(lift), *inverse3));
+}
+
+/* The same of the location, times the stiffness squared, pitches. */
+static NOINLINE struct scaled location_form(const struct fit_system *system,
+                                            const struct fit_spread *spread,
+                                            const struct scaled *inverse3) {
+  int32_t along_x = (2 * system->at.x - system->slope_x) >> 16; /* Q10 */
+  int32_t along_y = (2 * system->at.y - system->slope_y) >> 16;
+  struct scaled slopes = fit_scaled_from(along_x * along_x + along_y * along_y, -20);
+  struct scaled form = scaled_add(scaled_add(spread->inverse1, spread->inverse2),
+                                  scaled_mul(slopes, *inverse3));
+  if (system->cross != 0) {
+    struct scaled cross = fit_scaled_from(system->cross, -26);
+    form = scaled_add(form, scaled_mul(scaled_square(cross), spread->inverse2));
   }
-  variance = short_of(variance);
-  struct scaled rms = scaled_sqrt(scaled_mean(square_sum, count));
+  return form;
+}
+
+/* Variance of one reading that is the same for all of them, in units of Q28, and what the residuals
+ * say besides. */
+struct scatter {
+  struct scaled noise; /* the noise's alone */
+  struct scaled all;   /* and the model's, and what the residuals are above these and the gains' */
+  bool misfit, rough, other_model;
+};
+
+static NOINLINE void set_scatter(const struct readings *readings,
+                                 const struct fit_settings *settings,
+                                 const struct fit_system *system, const struct fit_spread *spread,
+                                 int count, struct scatter *scatter, struct fit_result *result) {
+  struct scaled left = fit_scaled_from(system->b0, system->residual_shift - 38);
+  struct scaled square_sum = scaled_sub(fit_scaled_short(system->square_sum),
+                                        scaled_mul(scaled_square(left), spread->inverse_mass));
+  square_sum.mantissa = square_sum.mantissa < 0 ? 0 : square_sum.mantissa;
+  struct scaled rms = fit_scaled_sqrt(scaled_mean(square_sum, count));
   result->residual_rms_Pa = fit_grid_compose(rms.mantissa, rms.exponent + 18 - readings->shift);
 
-  struct scaled inverse1 = fit_grid_reciprocal(system->d1), inverse2 = fit_grid_reciprocal(system->d2);
-  struct scaled inverse3 = fit_grid_reciprocal(system->d3);
-  if (readings->prior_weight.mantissa != 0) {
-    widen_for_prior(readings, system, &variance, &inverse3);
+  scatter->noise = scaled_square(fit_scaled_from(settings->noise_Pa_q10, readings->shift - 28));
+  struct scaled model = scaled_mul(fit_scaled_from(settings->model_sd_q16, -16),
+                                   fit_scaled_from(readings->largest, readings->shift - 28));
+  scatter->all = scaled_add(scatter->noise, scaled_square(model));
+  struct scaled amplitude_square = scaled_square(spread->amplitude);
+  struct scaled gains = fit_scaled_from((int32_t)spread->gains,
+                                        SPREAD_SQUARE_SHIFT - 32 - 2 * spread->gain_shift);
+  gains = scaled_mul(scaled_mean(gains, count), amplitude_square);
+  struct scaled expected = scaled_add(scatter->all, gains);
+  struct scaled found = scaled_mean(square_sum, count > 4 ? count - 4 : 1);
+  struct scaled excess = scaled_sub(found, expected);
+  if (excess.mantissa > 0) {
+    scatter->all = scaled_add(scatter->all, excess);
   }
-  int32_t along_x = (2 * at->x - system->slope_x) >> 16; /* Q10 */
-  int32_t along_y = (2 * at->y - system->slope_y) >> 16;
-  struct scaled slopes = scaled_from(along_x * along_x + along_y * along_y, -20);
-  struct scaled form = scaled_add(scaled_add(inverse1, inverse2), scaled_mul(slopes, inverse3));
-  if (system->cross != 0) {
-    form = scaled_add(form, scaled_mul(scaled_square(scaled_from(system->cross, -26)), inverse2));
-  }
-  struct scaled softness = scaled_mul(fit_grid_reciprocal(system->stiffness),
-                                      scaled_top(grid->pitch, pitch_exponent - 6));
-  form = scaled_mul(short_of(form), scaled_square(softness)); /* to mm squared */
-  struct scaled jitter = scaled_sqrt(scaled_mul(noise_variance, form));
-  result->location_noise_mm = fit_grid_compose(jitter.mantissa, jitter.exponent);
+  scatter->misfit = scaled_sub(found, scaled_mul(expected, MISFIT_SQUARE)).mantissa > 0;
 
-  /* What the last step moved is not settled; beyond a bound the margin may be off. */
-  struct scaled move_x = scaled_from(system->move_x_q22, -22);
-  struct scaled move_y = scaled_from(system->move_y_q22, -22);
-  struct scaled apart = scaled_add(scaled_square(move_x), scaled_square(move_y));
-  apart = scaled_add(apart, own_errors(settings, system, spread));
-  if (flags & CONTACT_FLAG_AT_BOUND) {
-    apart = scaled_add(apart, MARGIN_SQUARE);
+  struct scaled mass = fit_scaled_from(system->mass_q20, -20);
+  struct scaled total = scaled_add(scaled_mul(amplitude_square, mass), square_sum);
+  scatter->rough = scaled_sub(scaled_mul(square_sum, ROUGH_INVERSE_SQUARE), total).mantissa > 0;
+  scatter->other_model =
+      scaled_sub(scaled_mul(square_sum, MODEL_INVERSE_SQUARE), total).mantissa > 0;
+}
+
+bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
+                       const struct fit_settings *settings, const struct fit_system *system,
+                       const struct fit_spread *spread, const struct state *state, int count,
+                       struct fit_result *result) {
+  struct scaled force = set_values(grid, readings, system, state, result);
+  uint32_t flags = flags_of(grid, readings, settings, system, state);
+  struct scatter scatter;
+  set_scatter(readings, settings, system, spread, count, &scatter, result);
+  struct scaled inverse3 = spread->inverse3;
+  if (readings->prior_weight.mantissa != 0) {
+    widen_for_prior(readings, system, &scatter.all, &inverse3);
   }
-  apart = scaled_mul(short_of(apart), scaled_square(scaled_top(grid->pitch, pitch_exponent - 6)));
-  struct scaled location_sd = scaled_sqrt(scaled_add(scaled_mul(variance, form), apart));
-  result->location_sd_mm = fit_grid_compose(location_sd.mantissa, location_sd.exponent);
-  if (scaled_sub(location_sd, fit_grid_scaled(fit_location_sd_limit_mm(settings))).mantissa > 0) {
+
+  struct scaled pitch = scaled_top(grid->pitch, grid->pitch_exponent - 6);
+  struct scaled form = scaled_mul(location_form(system, spread, &inverse3),
+                                  scaled_square(scaled_mul(spread->softness, pitch))); /* mm */
+  struct scaled sd = fit_scaled_sqrt(scaled_mul(scatter.noise, form));
+  result->location_noise_mm = fit_grid_compose(sd.mantissa, sd.exponent);
+  struct scaled move_x = fit_scaled_from(system->move_x_q22, -22); /* what it moved is not settled */
+  struct scaled move_y = fit_scaled_from(system->move_y_q22, -22);
+  struct scaled apart = scaled_add(scaled_square(move_x), scaled_square(move_y));
+  apart = scaled_add(scaled_add(spread->location_variance, spread->apart), apart);
+  apart = scaled_mul(apart, scaled_square(pitch));
+  sd = flags & CONTACT_FLAG_AT_BOUND
+           ? scaled_mul(BOUND_SD, pitch)
+           : fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), apart));
+  result->location_sd_mm = fit_grid_compose(sd.mantissa, sd.exponent);
+  struct scaled limit = fit_grid_scaled(fit_location_sd_limit_mm(settings));
+  if (scaled_sub(sd, limit).mantissa > 0) {
     flags |= CONTACT_FLAG_UNCERTAIN;
   }
 
-  /* The mean of the model adds one over its mass to the force's form. */
-  struct scaled off_x = scaled_from(spread->off_x, -26), off_y = scaled_from(spread->off_y, -26);
-  form = scaled_add(inverse_mass, scaled_mul(scaled_square(off_x), inverse1));
-  form = scaled_add(form, scaled_mul(scaled_square(off_y), inverse2));
-  form = scaled_add(form, scaled_mul(scaled_square(scaled_from(spread->lift_q24, -24)), inverse3));
-  struct scaled force_variance =
-      scaled_div(scaled_mul(variance, short_of(form)), scaled_square(amplitude));
-  struct scaled by_gains = scaled_mul(
-      scaled_from((int32_t)spread->force_by_gains,
-                  SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * spread->force_exponent),
-      scaled_square(system->stiffness));
-  struct scaled force_sd = scaled_sqrt(scaled_add(force_variance, by_gains));
-  force_sd = scaled_mul(force_sd, scaled_from(force, force_exponent));
-  result->force_sd_N = fit_grid_compose(force_sd.mantissa, force_sd.exponent);
+  form = scaled_mul(force_form(spread, &inverse3),
+                    fit_grid_reciprocal(scaled_square(spread->amplitude)));
+  sd = fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), spread->force_variance));
+  sd = scaled_mul(sd, force);
+  result->force_sd_N = fit_grid_compose(sd.mantissa, sd.exponent);
 
-  struct scaled total = scaled_add(scaled_mul(scaled_square(amplitude), mass), square_sum);
-  bool rough = scaled_sub(scaled_mul(square_sum, ROUGH_INVERSE_SQUARE), total).mantissa > 0;
-  if (scaled_sub(scaled_mul(square_sum, MODEL_INVERSE_SQUARE), total).mantissa > 0) {
+  if (scatter.other_model) {
     flags |= CONTACT_FLAG_MODEL;
   }
   int32_t x_q22 = fixed_clamp(system->move_x_q22, -(1 << 15), 1 << 15);
   int32_t y_q22 = fixed_clamp(system->move_y_q22, -(1 << 15), 1 << 15);
   bool settled = ((x_q22 * x_q22) >> 1) + ((y_q22 * y_q22) >> 1) <= grid->settled_square;
   result->flags |= flags;
-  return misfit && rough && settled;
+  return scatter.misfit && scatter.rough && settled;
 }

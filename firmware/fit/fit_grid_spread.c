@@ -1,39 +1,45 @@
 #include "fit/fit_grid_spread.h"
 
+#define UNROLL _Pragma("GCC unroll 6") /* for loops over the nodes of an axis */
+
 /* Columns times these stay within 31 bits with four of them. */
 #define COEFFICIENT_BITS 13
 
-/* z^2 e of a sensor, z in Q10 and below 22.6, in Q21. Where the contact lies among the sensors it is
- * at most 1.2, with room for an e that is up to four times what it is called. */
+/* z^2 e of a sensor in Q21, z = -log2 of the model there, in Q10 and at most 22.6. Where the contact
+ * lies among the sensors it is at most 1.2, with room for an e that is up to four times what it is
+ * called. */
 #define DOWN_MAX_Q10 23170
 #define SHAPE_USUAL_Q21 (10 << 21)
 
+/* FIT_SHAPE_PER_MODEL in terms of z^2 and the height: sigma^2 = log2(e) / (2 height) and
+ * r^2 / sigma^2 = 2 z / log2(e). */
+#define SHAPE_PER_MODEL ((struct scaled){20818, -14})
+#define FORCE_SHARE ((struct scaled){20972, -17}) /* FIT_FORCE_SHAPE^2 */
+
 int32_t fit_grid_align(const struct scaled *values, int count, int32_t *aligned) {
-  int32_t exponent = -1000;
+  int32_t exponent = INT16_MIN;
   for (int i = 0; i < count; i++) {
-    int32_t top = fixed_bits(fixed_size(values[i].mantissa)) + values[i].exponent;
-    if (values[i].mantissa != 0 && top - COEFFICIENT_BITS > exponent) {
-      exponent = top - COEFFICIENT_BITS;
+    uint32_t size = fixed_size(values[i].mantissa);
+    int32_t spare = size >= 1 << 14 ? 0 : size >= 1 << 13 ? 1 : 2; /* products have 13 bits or more */
+    if (size != 0 && values[i].exponent - spare > exponent) {
+      exponent = values[i].exponent - spare;
     }
   }
+  exponent += 15 - COEFFICIENT_BITS;
   for (int i = 0; i < count; i++) {
-    aligned[i] = scaled_to_fixed(values[i], -exponent);
+    int32_t shift = exponent - values[i].exponent;
+    aligned[i] = values[i].mantissa >> (shift < 31 ? shift : 31);
   }
   return exponent;
 }
 
-/* Reciprocal of a norm times 2^-q. */
-static struct scaled per_unit(const struct scaled *norm, int32_t q) {
-  struct scaled result = fit_grid_reciprocal(*norm);
-  result.exponent -= q;
-  return result;
-}
+#define LOG2E_Q30 1549082005
 
-/* log2 of the model along one axis. */
-static void set_down(int32_t *down_q10, int nodes, int origin, int32_t centre, int32_t height) {
+/* How far the model falls from the centre to each node of an axis, log2 in Q10. */
+static void set_down(int32_t *down, int nodes, int origin, int32_t centre, int32_t height) {
   for (int i = 0; i < nodes; i++) {
     int32_t off_q12 = ((i - origin) * ONE_Q26 - centre) >> 14;
-    down_q10[i] = fixed_mul_q32(height, off_q12 * off_q12) >> 8;
+    down[i] = fixed_mul_q32(height, off_q12 * off_q12) >> 8;
   }
 }
 
@@ -42,19 +48,28 @@ NOINLINE void fit_grid_begin_spread(const struct fit_settings *settings,
                                     const struct fit_columns_q *columns,
                                     struct fit_spread *spread) {
   const struct state *at = &system->at;
-  struct scaled unit1 = per_unit(&system->d1, columns->q1);
-  struct scaled unit2 = per_unit(&system->d2, columns->q2);
-  struct scaled unit3 = per_unit(&system->d3, columns->q3);
-  struct scaled values[5], softness = fit_grid_reciprocal(system->stiffness);
+  spread->inverse_mass = fit_grid_reciprocal(fit_scaled_from(system->mass_q20, -20));
+  spread->inverse1 = fit_grid_reciprocal(system->d1);
+  spread->inverse2 = fit_grid_reciprocal(system->d2);
+  spread->inverse3 = fit_grid_reciprocal(system->d3);
+  spread->amplitude = fit_scaled_from(system->amplitude_q28, -28);
+  struct scaled softness = spread->softness = fit_grid_reciprocal(system->stiffness);
+  struct scaled unit1 = scaled_mul(softness, spread->inverse1);
+  struct scaled unit2 = scaled_mul(softness, spread->inverse2);
+  struct scaled unit3 = scaled_mul(softness, spread->inverse3);
+  unit1.exponent -= columns->q1;
+  unit2.exponent -= columns->q2;
+  unit3.exponent -= columns->q3;
+  struct scaled values[5];
   int32_t aligned[5];
-  values[0] = scaled_mul(softness, unit1);
-  values[3] = scaled_mul(softness, unit2);
-  values[1] = scaled_mul(values[3], scaled_from(-system->cross, -26));
-  unit1 = values[0];
-  unit2 = values[3];
-  unit3 = scaled_mul(softness, unit3);
-  values[2] = scaled_mul(unit3, scaled_from(2 * at->x - system->slope_x, -26));
-  values[4] = scaled_mul(unit3, scaled_from(2 * at->y - system->slope_y, -26));
+  values[0] = unit1;
+  values[1] = (struct scaled){0, 0};
+  if (system->cross != 0) {
+    values[1] = scaled_mul(unit2, fit_scaled_from(-system->cross, -26));
+  }
+  values[2] = scaled_mul(unit3, fit_scaled_from(2 * at->x - system->slope_x, -26));
+  values[3] = unit2;
+  values[4] = scaled_mul(unit3, fit_scaled_from(2 * at->y - system->slope_y, -26));
   spread->location_exponent = fit_grid_align(values, 5, aligned) + 15;
   spread->x1 = aligned[0];
   spread->x2 = aligned[1];
@@ -63,23 +78,21 @@ NOINLINE void fit_grid_begin_spread(const struct fit_settings *settings,
   spread->y3 = aligned[4];
 
   /* dF / F = dp0 / p0 + 2 dsigma / sigma, each by its part in the basis. */
-  int32_t sigma = fit_grid_sigma(at->height);
   spread->off_x = at->x - system->mean_x;
   spread->off_y = at->y - system->mean_y - fixed_mul_q26(system->cross, spread->off_x);
-  spread->lift_q24 = system->bend_q24 + (fixed_mul_q26(sigma, sigma) >> 1);
-  values[0] = scaled_mul(fit_grid_reciprocal(scaled_from(system->mass_q20, -20)), softness);
+  /* 2 sigma^2 = log2(e) / height */
+  spread->lift_q24 = system->bend_q24 + port_divide(LOG2E_Q30, at->height >> 14) * (1 << 6);
+  values[0] = scaled_mul(spread->inverse_mass, softness);
   values[0].exponent -= 15;
-  values[1] = scaled_mul(unit1, scaled_from(spread->off_x, -26));
-  values[2] = scaled_mul(unit2, scaled_from(spread->off_y, -26));
-  values[3] = scaled_mul(unit3, scaled_from(spread->lift_q24, -24));
+  values[1] = scaled_mul(unit1, fit_scaled_from(spread->off_x, -26));
+  values[2] = scaled_mul(unit2, fit_scaled_from(spread->off_y, -26));
+  values[3] = scaled_mul(unit3, fit_scaled_from(spread->lift_q24, -24));
   spread->force_exponent = fit_grid_align(values, 4, aligned) + 15;
   spread->f0 = aligned[0];
   spread->f1 = aligned[1];
   spread->f2 = aligned[2];
   spread->f3 = aligned[3];
 
-  set_down(spread->down_x, COLUMNS, COLUMNS / 2, at->x, at->height);
-  set_down(spread->down_y, ROWS, ROWS / 2, at->y, at->height);
   int32_t rise_q10 = fixed_clamp(system->rise_q22 >> 12, 0, DOWN_MAX_Q10);
   int32_t most_q21 = (rise_q10 * rise_q10) * 2;
   most_q21 = most_q21 > SHAPE_USUAL_Q21 ? most_q21 : SHAPE_USUAL_Q21;
@@ -90,34 +103,74 @@ NOINLINE void fit_grid_begin_spread(const struct fit_settings *settings,
     gains |= settings->gain_sd_q16[k];
   }
   spread->gain_shift = 15 - fixed_bits(gains);
-  spread->gains = spread->by_gains = spread->force_by_gains = 0;
-  spread->shape_x = spread->shape_y = 0;
+  spread->apart = (struct scaled){0, 0};
+  spread->by_gains = spread->force_by_gains = 0;
 }
 
-/* The square of what 31 bits hold, for a sum. */
-FIXED_INLINE uint32_t square_of(int32_t value) {
-  int32_t high = value >> 16;
-  return (uint32_t)(high * high) >> SPREAD_SQUARE_SHIFT;
+NOINLINE void fit_grid_set_errors(const struct fit_grid_shape *grid,
+                                  const struct fit_settings *settings, const struct state *at,
+                                  struct readings *room, struct fit_spread *spread) {
+  int32_t down_x[COLUMNS], down_y[ROWS];
+  set_down(down_x, COLUMNS, COLUMNS / 2, at->x, at->height);
+  set_down(down_y, ROWS, ROWS / 2, at->y, at->height);
+  const int32_t *at_node = room->q28;
+  int32_t *shapes = room->residual;
+  int32_t shape_shift = spread->shape_shift;
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t along = down_x[i];
+    UNROLL for (int j = 0; j < ROWS; j++) {
+      int32_t down = along + down_y[j];
+      down = down < DOWN_MAX_Q10 ? down : DOWN_MAX_Q10;
+      int32_t shape = (((down * down) >> 13) * (*at_node++ >> 1)) >> shape_shift;
+      *shapes++ = shape < INT16_MAX ? shape : INT16_MAX;
+    }
+  }
+  const uint8_t *sensor = grid->sensor;
+  int32_t *errors = room->q14;
+  uint32_t gains = 0;
+  int32_t gain_shift = spread->gain_shift + 1;
+  at_node = room->q28;
+  for (int k = 0; k < NODES; k++) {
+    uint32_t gain = (uint32_t)settings->gain_sd_q16[sensor[k]] << gain_shift;
+    uint32_t error = (gain * (uint32_t)at_node[k]) >> 16;
+    errors[k] = (int32_t)error;
+    gains += (error * error) >> SPREAD_SQUARE_SHIFT;
+  }
+  spread->gains = gains;
 }
 
-NOINLINE int32_t fit_grid_add_to_spread(struct fit_spread *spread, const struct fit_node *node,
-                                        int i, int j, uint16_t gain_sd_q16) {
-  int32_t p1 = node->p1, p2 = node->p2, p3 = node->p3, e = node->e;
-  int32_t x = (spread->x1 * p1 + spread->x2 * p2 + spread->x3 * p3) >> 15;
-  int32_t y = (spread->y2 * p2 + spread->y3 * p3) >> 15;
-  int32_t f = (spread->f0 * e + spread->f1 * p1 + spread->f2 * p2 + spread->f3 * p3) >> 15;
+NOINLINE void fit_grid_add_moves(const struct readings *room, uint32_t *by_gains,
+                                 int32_t *by_shape) {
+  const int32_t *moves = room->q28, *errors = room->q14, *shapes = room->residual;
+  uint32_t squares = *by_gains;
+  int32_t sum = 0;
+  _Pragma("GCC unroll 5") for (int k = 0; k < NODES; k++) {
+    int32_t move = moves[k];
+    int32_t high = (move * errors[k]) >> 16;
+    squares += (uint32_t)(high * high) >> SPREAD_SQUARE_SHIFT;
+    sum += (move * shapes[k]) >> 4;
+  }
+  *by_gains = squares;
+  *by_shape = sum;
+}
 
-  int32_t down = spread->down_x[i] + spread->down_y[j];
-  down = down < DOWN_MAX_Q10 ? down : DOWN_MAX_Q10;
-  int32_t shape = (((down * down) >> 13) * (e >> 1)) >> spread->shape_shift;
-  shape = shape < INT16_MAX ? shape : INT16_MAX;
-  spread->shape_x += (x * shape) >> 4;
-  spread->shape_y += (y * shape) >> 4;
+NOINLINE void fit_grid_end_spread(const struct fit_settings *settings,
+                                  const struct fit_system *system, struct fit_spread *spread) {
+  const int32_t gains_exponent = SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift;
+  struct scaled strength = scaled_mul(fit_scaled_from(settings->model_sd_q16, -16),
+                                      fit_scaled_from(system->at.height, -26));
+  strength = scaled_mul(strength, SHAPE_PER_MODEL);
+  strength.exponent += 4 - 21 + spread->shape_shift;
+  struct scaled x = scaled_mul(fit_scaled_from(spread->shape_x, 0), strength);
+  struct scaled y = scaled_mul(fit_scaled_from(spread->shape_y, 0), strength);
+  struct scaled sum = scaled_add(scaled_mul(x, x), scaled_mul(y, y));
+  sum = scaled_add(sum, fit_scaled_from((int32_t)spread->by_gains, gains_exponent));
+  sum = scaled_mul(scaled_mul(sum, spread->amplitude), spread->amplitude);
+  spread->location_variance = (struct scaled){sum.mantissa, sum.exponent + 2 * spread->location_exponent};
 
-  int32_t gain = spread->gain_shift >= 0 ? gain_sd_q16 << spread->gain_shift : gain_sd_q16 >> 1;
-  int32_t error = (gain * e) >> 15;
-  spread->gains += (uint32_t)(error * error) >> SPREAD_SQUARE_SHIFT;
-  spread->by_gains += square_of(x * error) + square_of(y * error);
-  spread->force_by_gains += square_of(f * error);
-  return error;
+  struct scaled force = scaled_mul(fit_scaled_from(spread->shape_force, 0), strength);
+  sum = scaled_mul(scaled_mul(force, force), FORCE_SHARE);
+  sum = scaled_add(sum, fit_scaled_from((int32_t)spread->force_by_gains, gains_exponent));
+  sum = scaled_mul(scaled_mul(sum, system->stiffness), system->stiffness);
+  spread->force_variance = (struct scaled){sum.mantissa, sum.exponent + 2 * spread->force_exponent};
 }

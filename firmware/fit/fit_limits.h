@@ -34,22 +34,28 @@
  *   thinner it is. Alone, the former says 0.5 mm where a press on a node of a thin pad is good to
  *   0.05 mm, and the latter nothing where all sensors are as far from the contact;
  *   what the residuals are above these.
- * Not independent readings, but added to the location's: the last step, and FIT_BOUND_SD where the
- * fit stopped at a limit. Values from truth_fit --seed 1; NUMERICS.md has what they cover on others. */
-#define FIT_SHAPE_PER_MODEL 1.3333f
+ * Of the force the shape's part counts by FIT_FORCE_SHAPE: the rest of it is the same for every touch
+ * of a pad, which the force scale is there for. The last step counts as an error of the location;
+ * where the fit stopped at a limit, FIT_BOUND_SD stands for all: what is linear about such a point
+ * says nothing. Values from truth_fit --seed 1; NUMERICS.md has what they cover on others. */
+#define FIT_SHAPE_PER_MODEL 1.15f
 #define FIT_SHAPE_SIGMA 0.644f /* pitches: 12 mm of rubber on a pitch of 9 mm */
-#define FIT_BOUND_SD 1.5f      /* pitches: the margin in which it may lie */
+#define FIT_FORCE_SHAPE 0.4f
+#define FIT_BOUND_SD 1.2f /* pitches: such presses of a thin pad are off by up to 2.4 */
 
 /* A contact is elongated if log(longer width / shorter) exceeds FIT_STRETCH_LEAST, which the cubes and
  * spheres of a layer stay below, and FIT_STRETCH_SURE standard deviations of what noise and gains
  * make of it, in quadrature. The widths are told up to a standard deviation of FIT_STRETCH_SD_MAX and
  * a ratio of exp(FIT_STRETCH_MAX); below FIT_SHAPE_LEAST pitches of sigma it is the layer's own
- * profile that looks elongated between the sensors. */
+ * profile that looks elongated between the sensors. If elongated, the location's standard deviation
+ * contains by how much separate widths would move it; beyond a stretch of FIT_STRETCH_LINEAR, where
+ * that is many times the error, its share that falls with the square of the stretch. */
 #define FIT_STRETCH_LEAST 0.1f
 #define FIT_STRETCH_SURE 2.5f
 #define FIT_STRETCH_SD_MAX 0.25f
+#define FIT_STRETCH_LINEAR 0.7f
 #define FIT_STRETCH_MAX 1.25f
-#define FIT_SHAPE_LEAST 0.45f
+#define FIT_SHAPE_LEAST 0.5f
 
 static inline float fit_location_sd_limit_mm(const struct fit_settings *settings) {
   float limit_mm = settings->location_sd_limit_mm;

@@ -11,16 +11,18 @@ import { test } from 'node:test';
 import { Prng } from '../../host_tools/emulator/prng.mjs';
 import { Bench } from '../../host_tools/reference/on_chip/fit_on_chip.mjs';
 
-/** Seven iterations from cold, with everything: readings, guess, amplitude, force, covariance, flags. */
-const COLD_CYCLES_MAX = 30000;
+/** The build's iterations from cold, with everything: readings, guess, amplitude, force, errors, shape, flags. */
+const COLD_CYCLES_MAX = 31000;
 /** The same without some of the sensors. */
-const MASKED_CYCLES_MAX = 60000;
+const MASKED_CYCLES_MAX = 48000;
 /** A fit with every sensor that looks for an outlier and finds none. */
-const SEARCH_CYCLES_MAX = 46000;
+const SEARCH_CYCLES_MAX = 47000;
 /** A fit that finds an outlier: the fit, the search, and the fit without it. */
-const OUTLIER_CYCLES_MAX = 110000;
-/** Between the cheapest and the dearest press, share of the dearest. */
-const SPREAD_MAX = 0.05;
+const OUTLIER_CYCLES_MAX = 93000;
+/** Between the cheapest and the dearest press, share of the dearest: a contact at a bound has no widths to tell. */
+const SPREAD_MAX = 0.1;
+/** FINGERTIP_FIT_ITERATIONS. */
+const ITERATIONS = 4;
 
 const PITCH_mm = 9;
 const SENSORS = 15;
@@ -49,7 +51,7 @@ const garbage = [
 ];
 
 const ALL = 2 ** SENSORS - 1;
-const cyclesOf = (readings, iterations = 7, usable = ALL, kernel = 'grid') =>
+const cyclesOf = (readings, iterations = ITERATIONS, usable = ALL, kernel = 'grid') =>
   bench.run({ kernel, iterations, noise_Pa_q10: 4096, usable, readings }).cycles;
 /** One to three sensors missing, the one with the largest reading among them every other time. */
 function maskFor(readings, i) {
@@ -68,7 +70,7 @@ for (const [what, kernel, limit, usable] of [
   test(`${what}: no press and no garbage takes more than ${limit} cycles, nor much less`, (t) => {
     for (const [name, list] of Object.entries({ presses, garbage })) {
       const inputs = list.map((readings, i) => [readings, usable(readings, i)]).filter((input) => anyPositive(...input));
-      const cycles = inputs.map(([readings, mask]) => cyclesOf(readings, 7, mask, kernel)).sort((a, b) => a - b);
+      const cycles = inputs.map(([readings, mask]) => cyclesOf(readings, ITERATIONS, mask, kernel)).sort((a, b) => a - b);
       const [min, median, max] = [cycles[0], cycles[cycles.length >> 1], cycles[cycles.length - 1]];
       t.diagnostic(`${name}: ${min} ${median} ${max} cycles (min, median, max)`);
       assert.ok(max <= limit, `${name}: ${max}`);
@@ -79,7 +81,7 @@ for (const [what, kernel, limit, usable] of [
 
 test(`looking for an outlier: at most ${SEARCH_CYCLES_MAX} cycles in vain, ${OUTLIER_CYCLES_MAX} with the fit without it`, (t) => {
   const wrong = presses.map((readings, i) => readings.map((value, k) => value + (k === i % SENSORS ? 10000 * 1024 : 0)));
-  const cycles = wrong.map((readings) => cyclesOf(readings, 7, ALL, 'fit'));
+  const cycles = wrong.map((readings) => cyclesOf(readings, ITERATIONS, ALL, 'fit'));
   for (const [what, least, most] of [['in vain', COLD_CYCLES_MAX, MASKED_CYCLES_MAX], ['found', MASKED_CYCLES_MAX, Infinity]]) {
     const group = cycles.filter((value) => value > least && value <= most);
     assert.ok(group.length > 10, `${what}: ${group.length}`);
@@ -105,7 +107,7 @@ test('each further iteration costs the same', () => {
 test('the cycles are spent on fits', () => {
   for (let i = 0; i < 20; i++) {
     const [x_mm, y_mm] = [between(-8, 8), between(-17, 17)];
-    const answer = bench.run({ kernel: 'fit', iterations: 7, noise_Pa_q10: 1024, usable: i % 2 ? ALL : ALL & ~(1 << i % SENSORS), readings: press(x_mm, y_mm, 5e4, 6, 1) });
+    const answer = bench.run({ kernel: 'fit', iterations: ITERATIONS, noise_Pa_q10: 1024, usable: i % 2 ? ALL : ALL & ~(1 << i % SENSORS), readings: press(x_mm, y_mm, 5e4, 6, 1) });
     assert.ok(Math.hypot(answer.x_mm - x_mm, answer.y_mm - y_mm) < 0.01, `${x_mm} ${y_mm}: ${answer.x_mm} ${answer.y_mm}`);
   }
 });
