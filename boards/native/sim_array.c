@@ -15,6 +15,10 @@ static uint64_t random_u64(struct sim_array *array) {
   return z ^ z >> 31;
 }
 
+static double uniform(struct sim_array *array) {
+  return (double)(random_u64(array) >> 11) / 9007199254740992.0;
+}
+
 static double gaussian(struct sim_array *array) {
   const double u = (double)((random_u64(array) >> 11) + 1) / 9007199254740992.0;
   const double v = (double)(random_u64(array) >> 11) / 9007199254740992.0;
@@ -40,7 +44,10 @@ static uint32_t measure(void *context, int type, unsigned osr, uint64_t t_us) {
   if (type == 2) {
     const double error_degC =
         array->noise > 0 ? array->noise * sim_ms5840_noise_degC(osr) * gaussian(array) : 0;
-    return d2_at(array, k, t_us, error_degC);
+    const uint32_t d2 = d2_at(array, k, t_us, error_degC);
+    const bool wrong =
+        array->wrong_temperature_share > 0 && uniform(array) < array->wrong_temperature_share;
+    return wrong ? d2 ^ UINT32_C(1) << random_u64(array) % 24 : d2;
   }
   if (array->d1[k] != 0) {
     return array->d1[k];
@@ -73,8 +80,7 @@ void sim_array_vary_parts(struct sim_array *array, double share) {
   for (unsigned k = 0; k < array->sensor_count; k++) {
     uint16_t c[6];
     for (int i = 0; i < 6; i++) {
-      const double drawn = (double)(random_u64(array) >> 11) / 9007199254740992.0;
-      const double word = TYPICAL[i] * (1.0 + share * (2.0 * drawn - 1.0));
+      const double word = TYPICAL[i] * (1.0 + share * (2.0 * uniform(array) - 1.0));
       c[i] = word < 65535.0 ? (uint16_t)word : 65535;
     }
     sim_ms5840_init(&array->sensor[k], c);
@@ -93,6 +99,9 @@ static bool is_alive(struct sim_array *array, unsigned k) {
   }
   if (meant && strikes(array, SIM_FAULT_POWER_CYCLE)) {
     sim_ms5840_power_cycle(&array->sensor[k]);
+  }
+  if (meant && strikes(array, SIM_FAULT_BROWN_OUT)) {
+    sim_ms5840_brown_out(&array->sensor[k]);
   }
   if (array->dead_transfers[k] > 0) {
     array->dead_transfers[k]--;
@@ -145,6 +154,9 @@ static void spoil_bytes(const struct sim_array *array, uint8_t *bytes) {
 
 static void read_one(struct sim_array *array, unsigned k, uint64_t t_us) {
   bool acknowledged = is_alive(array, k);
+  if (acknowledged && array->nack_share > 0 && uniform(array) < array->nack_share) {
+    acknowledged = false;
+  }
   if (acknowledged) {
     note_early(array, k, t_us);
     acknowledged = sim_ms5840_read(&array->sensor[k], array->command, array->result.bytes[k],

@@ -31,6 +31,7 @@ enum sim_fault_kind {
   SIM_FAULT_ZERO,        /* the bytes read are 0 */
   SIM_FAULT_ONES,        /* the bytes read are 0xFF */
   SIM_FAULT_POWER_CYCLE, /* the sensor's supply fails just before the transfer */
+  SIM_FAULT_BROWN_OUT,   /* the sensor's supply dips just before the transfer */
 };
 
 struct sim_fault {
@@ -38,8 +39,8 @@ struct sim_fault {
   uint32_t transfer; /* at which it strikes */
   uint32_t count;
   uint32_t mask;
-  uint8_t sensor; /* DEAD and POWER_CYCLE at a broadcast: which one. Reads name their own. FLIP,
-                     ZERO and ONES concern reads only */
+  uint8_t sensor; /* DEAD, POWER_CYCLE and BROWN_OUT at a broadcast: which one. Reads name their
+                     own. FLIP, ZERO and ONES concern reads only */
 };
 
 /* What the sensors feel. */
@@ -57,6 +58,10 @@ struct sim_array {
   uint32_t d1[FT_MAX_SENSORS]; /* [sensor] code instead of the world's pressure; 0 = none */
   uint32_t d2[FT_MAX_SENSORS]; /* [sensor] code instead of the world's temperature; 0 = none */
   bool absent[FT_MAX_SENSORS]; /* [sensor] not fitted */
+  double nack_share; /* of the reads of one sensor: not acknowledged, at random. The bus does not
+                        ask again */
+  double
+      wrong_temperature_share; /* of the temperatures of one sensor: one bit inverted, at random */
   struct sim_ms5840 sensor[FT_MAX_SENSORS];
 
   /* To look at */

@@ -65,6 +65,13 @@ void sim_ms5840_power_cycle(struct sim_ms5840 *sensor) {
   sensor->result = 0;
 }
 
+void sim_ms5840_brown_out(struct sim_ms5840 *sensor) {
+  const bool loaded = sensor->loaded;
+  sim_ms5840_power_cycle(sensor);
+  sensor->loaded = loaded;
+  sensor->untrimmed = true;
+}
+
 static void settle(struct sim_ms5840 *sensor, uint64_t t_us) {
   if (!sensor->converting || t_us < sensor->busy_until_us) {
     return;
@@ -92,6 +99,7 @@ bool sim_ms5840_command(struct sim_ms5840 *sensor, uint8_t command, uint64_t t_u
   if (command == RESET) {
     sim_ms5840_power_cycle(sensor);
     sensor->loaded = true;
+    sensor->untrimmed = false;
     sensor->busy_until_us = t_us + SIM_MS5840_RESET_us;
     return true;
   }
@@ -110,6 +118,7 @@ bool sim_ms5840_command(struct sim_ms5840 *sensor, uint8_t command, uint64_t t_u
     sensor->result = 0;
     sensor->busy_until_us = t_us + duration_us;
     sensor->converted = measure(context, type, rows[row].osr, t_us + duration_us / 2);
+    sensor->converted -= sensor->untrimmed ? sensor->converted / 16 : 0;
     return true;
   }
   return is_read_command(command);

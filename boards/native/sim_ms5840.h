@@ -22,7 +22,8 @@ struct sim_ms5840 {
   uint16_t prom[SIM_MS5840_PROM_WORDS]; /* W0 with its CRC, C1..C6 */
 
   /* Private */
-  bool loaded; /* has been reset since power-up */
+  bool loaded;    /* has been reset since power-up */
+  bool untrimmed; /* has not been reset since a brown-out */
   bool converting;
   bool spoiled;
   uint64_t busy_until_us; /* end of a reset or a conversion */
@@ -39,6 +40,10 @@ void sim_ms5840_init(struct sim_ms5840 *sensor, const uint16_t c[6]);
 
 /* Supply off and on: the sensor needs a reset, a conversion is lost. */
 void sim_ms5840_power_cycle(struct sim_ms5840 *sensor);
+
+/* Supply down and up, not as far as that: the sensor goes on converting, but until a reset its
+ * codes are 1/16 too small. A conversion is lost. That there are such sensors is assumed. */
+void sim_ms5840_brown_out(struct sim_ms5840 *sensor);
 
 /* A command byte that ends at t_us, alone in its transfer or before a read. False: not
  * acknowledged. */

@@ -120,6 +120,38 @@ static bool start_next(struct mux_bus *bus) {
   return false;
 }
 
+static void account_select(struct mux_bus *bus, bool acknowledged) {
+  const uint8_t bit = (uint8_t)(1u << bus->select_mux);
+  if (acknowledged) {
+    bus->mux_answers |= bit;
+    bus->open[bus->select_mux] = bus->select_channels;
+    bus->just_opened = bus->select_mux;
+    return;
+  }
+  reset_muxes(bus, bit);
+  if ((bus->mux_answers & bit) != 0) {
+    bus->mux_answers &= (uint8_t)~bit;
+    drive_resets(bit, true);
+  } else {
+    bus->absent |= bit;
+  }
+}
+
+/* A sensor that answered last time and now does not is asked once more. */
+static void account_fetch(struct mux_bus *bus, bool acknowledged, const uint8_t *bytes) {
+  const uint32_t bit = UINT32_C(1) << bus->sensor;
+  if (!acknowledged && (bus->answers & bit) != 0) {
+    bus->answers &= ~bit;
+    return;
+  }
+  if (acknowledged) {
+    bus->answers |= bit;
+    bus->result.acknowledged |= bit;
+    memcpy(bus->result.bytes[bus->sensor], bytes, bus->read_count);
+  }
+  bus->sensor++;
+}
+
 /* Takes note of how a transaction ended. */
 static void account(struct mux_bus *bus, bool acknowledged, const uint8_t *bytes) {
   if (!acknowledged) {
@@ -128,13 +160,7 @@ static void account(struct mux_bus *bus, bool acknowledged, const uint8_t *bytes
   bus->just_opened = NO_MUX;
   switch (bus->under_way) {
   case MUX_BUS_SELECT:
-    if (acknowledged) {
-      bus->open[bus->select_mux] = bus->select_channels;
-      bus->just_opened = bus->select_mux;
-    } else {
-      bus->absent |= (uint8_t)(1u << bus->select_mux);
-      reset_muxes(bus, (uint8_t)(1u << bus->select_mux));
-    }
+    account_select(bus, acknowledged);
     break;
   case MUX_BUS_WRITE:
     bus->command_sent = true;
@@ -145,11 +171,7 @@ static void account(struct mux_bus *bus, bool acknowledged, const uint8_t *bytes
     }
     break;
   case MUX_BUS_FETCH:
-    if (acknowledged) {
-      bus->result.acknowledged |= UINT32_C(1) << bus->sensor;
-      memcpy(bus->result.bytes[bus->sensor], bytes, bus->read_count);
-    }
-    bus->sensor++;
+    account_fetch(bus, acknowledged, bytes);
     break;
   case MUX_BUS_NOTHING:
     break;

@@ -8,13 +8,15 @@
  * the bus at 400 kHz for the command (3 selections, 1 write) and 2250 us for the reading (1 write,
  * 15 selections, 15 fetches), and 3 us between two transactions. Sources: TCA9548A datasheet
  * SCPS207; MS5840-02BA datasheet, whose command and answer are transactions of their own;
- * array_bus.h. All sensors sample together; the reading skews nothing.
+ * array_bus.h. All sensors sample together; the reading skews nothing. Who does not
+ * acknowledge, as it did the last time, is asked once more, which repairs a disturbed transaction
+ * for 110 us at most; one that is gone is asked twice once.
  *
- * A multiplexer that does not acknowledge is held in reset, which closes its channels whatever
- * state it is in, until the next operation asks it again; its sensors do not acknowledge and the
- * others are not disturbed. So is one whose opening makes the bus stand still, twice in a row, for
- * a line behind it is then held; it is opened again after 1 s, and after twice as long each time,
- * up to 16 s, that it still does.
+ * A multiplexer that still does not acknowledge is held in reset, which closes its channels
+ * whatever state it is in, until the next operation asks it again; its sensors do not acknowledge
+ * and the others are not disturbed. So is one whose opening makes the bus stand still, twice in a
+ * row, for a line behind it is then held; it is opened again after 1 s, and after twice as long
+ * each time, up to 16 s, that it still does.
  */
 #ifndef PICO_MUX_MUX_BUS_H
 #define PICO_MUX_MUX_BUS_H
@@ -38,6 +40,9 @@ struct mux_bus {
   uint8_t read_count;
   bool command_sent;
   uint8_t sensor; /* during a read: the one whose turn it is; after it, BOARD_SENSOR_COUNT */
+
+  uint32_t answers;    /* bitmap of sensors: acknowledged the last fetch */
+  uint8_t mux_answers; /* bitmap of multiplexers: acknowledged the last selection */
 
   uint8_t open[BOARD_MUX_COUNT]; /* [mux] channels that are on, by what it acknowledged last */
   uint8_t absent;      /* bitmap of multiplexers: shut, or did not acknowledge in this operation */

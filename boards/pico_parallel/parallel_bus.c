@@ -203,6 +203,7 @@ enum ft_status parallel_bus_init(struct parallel_bus *bus, struct array_bus *arr
   *array_bus = (struct array_bus){
       .context = bus,
       .read_lead_us = (I2C_WAVE_COMMAND_ns + START_ns) / 1000u,
+      .answers_are_single = true,
       .start_command = start_command,
       .start_read = start_read,
       .start_recovery = start_recovery,

@@ -13,6 +13,8 @@
 #define TICK_us (PORT_WATCHDOG_PERIOD_us / 5u)
 /* So long the end of a second waits for a frame to follow, rather than keep one waiting. */
 #define FRAME_WAIT_us 100000u
+/* Up to this pitch the neighbours feel what one sensor feels: see READINGS_STILL_NOISES. */
+#define SHARED_PITCH_mm 9.0f
 /* Lets the acknowledgement out before the device leaves. */
 #define LOADER_DELAY_us 50000u
 
@@ -104,6 +106,7 @@ void app_start(struct app *app, const struct array_bus *bus) {
       .sensor_count = geometry.sensor_count,
       .osr = DEFAULT_OSR,
       .rate_mHz = DEFAULT_RATE_mHz,
+      .presses_are_shared = geometry.pitch_mm > 0.0f && geometry.pitch_mm <= SHARED_PITCH_mm,
   };
   if (scan_init(&app->scan, bus, &scan_settings) != FT_OK) {
     port_panic();
@@ -209,6 +212,7 @@ static void send_health(struct app *app, uint64_t now_us) {
     .bus_timeouts = read_counter(&scan->counters.bus_timeouts),
     .bus_recoveries = read_counter(&scan->counters.bus_recoveries),
     .zero_readings = read_counter(&scan->counters.zero_readings),
+    .implausible_readings = read_counter(&scan->counters.implausible_readings),
     .sensors_present = read_counter(&scan->present),
     .sensors_prom_bad = read_counter(&scan->prom_bad),
     .watchdog_resets = port_started_by_watchdog() ? 1 : 0,
@@ -274,12 +278,18 @@ static void fit_frame(struct app *app) {
 }
 #endif
 
+static bool is_sensor_doubtful(const struct app *app) {
+  return (app->frame.doubtful & app->conditioned.usable) != 0;
+}
+
 static void judge_frame(struct app *app) {
   const struct frame *frame = &app->frame;
   const struct contact_input input = {
     .t_us = frame->t_us,
     .contact = app->conditioned.contact,
     .tared = app->conditioned.tared,
+    .zero_doubtful = app->conditioned.zero_doubtful,
+    .sensor_doubtful = is_sensor_doubtful(app),
     .masked = app->conditioned.usable != UINT32_MAX >> (FT_MAX_SENSORS - frame->sensor_count),
     .noise_Pa_q10 = frame->noise_Pa_q10,
     .saturated = frame->saturated,
@@ -320,6 +330,7 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
 #endif
   if (frame->held) {
     app->contact.flags |= CONTACT_FLAG_HELD;
+    app->contact.flags |= is_sensor_doubtful(app) ? (uint32_t)CONTACT_FLAG_SENSOR_DOUBTFUL : 0;
   } else {
     judge_frame(app);
   }

@@ -14,6 +14,7 @@
 #include "common/limits.h"
 #include "common/status.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 enum { ARRAY_BUS_MAX_READ_BYTES = 3 };
@@ -32,6 +33,9 @@ struct array_bus {
   /* Between start_read and the moment at which the first sensor has its command, at the least: a
    * read may start that much before what it asks for is ready. */
   uint8_t read_lead_us;
+
+  /* Each sensor answers a command for itself, so that acknowledged tells who heard it. */
+  bool answers_are_single;
 
   /* Sends a one-byte command to every sensor.
    * FT_ERR_BUSY: an operation is under way. */

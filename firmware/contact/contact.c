@@ -45,6 +45,8 @@ void contact_judge(const struct contact_input *input, struct contact_result *res
   flags |= input->tared ? (uint32_t)CONTACT_FLAG_TARED : 0;
   flags |= input->calibrated ? (uint32_t)CONTACT_FLAG_CALIBRATED : 0;
   flags |= input->masked ? (uint32_t)CONTACT_FLAG_SENSOR_MASKED : 0;
+  flags |= input->zero_doubtful ? (uint32_t)CONTACT_FLAG_ZERO_DOUBTFUL : 0;
+  flags |= input->sensor_doubtful ? (uint32_t)CONTACT_FLAG_SENSOR_DOUBTFUL : 0;
   if (input->saturated) {
     flags |= CONTACT_FLAG_SATURATED;
     if (!input->fit || fewer_bits_than(input->fit->used, CONTACT_MIN_UNSATURATED)) {

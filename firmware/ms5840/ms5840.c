@@ -77,11 +77,23 @@ enum ms5840_branch ms5840_branch_of(enum ms5840_branch previous, int32_t tempera
   return temperature_cC >= very_cold_edge_cC ? MS5840_BRANCH_COLD : MS5840_BRANCH_VERY_COLD;
 }
 
+static int32_t first_order_cC(int32_t dT, uint16_t c6) {
+  return 2000 + (int32_t)(((int64_t)dT * c6) >> 23);
+}
+
+static int32_t difference_from(const struct ms5840_prom *prom, uint32_t d2) {
+  return (int32_t)d2 - ((int32_t)prom->word[5] << 8);
+}
+
+int32_t ms5840_first_order_cC(const struct ms5840_prom *prom, uint32_t d2) {
+  return first_order_cC(difference_from(prom, d2), prom->word[6]);
+}
+
 void ms5840_compensate_temperature(const struct ms5840_prom *prom, uint32_t d2,
                                    enum ms5840_branch previous, struct ms5840_thermal *thermal) {
   const uint16_t *c = prom->word;
-  int32_t dT = (int32_t)d2 - ((int32_t)c[5] << 8);
-  int32_t temperature_cC = 2000 + (int32_t)(((int64_t)dT * c[6]) >> 23);
+  int32_t dT = difference_from(prom, d2);
+  int32_t temperature_cC = first_order_cC(dT, c[6]);
   int64_t offset = ((int64_t)c[2] << 17) + (((int64_t)c[4] * dT) >> 6);
   int64_t sensitivity = ((int64_t)c[1] << 16) + (((int64_t)c[3] * dT) >> 7);
 

@@ -77,6 +77,9 @@ struct ms5840_thermal {
   int64_t sensitivity;    /* SENS, 41 bit */
 };
 
+/* first_order_cC alone. */
+int32_t ms5840_first_order_cC(const struct ms5840_prom *prom, uint32_t d2);
+
 /* d2: 24-bit code of a temperature conversion. previous: branch of the last call for this sensor,
  * or MS5840_BRANCH_UNKNOWN. About 700 Cortex-M0+ cycles. */
 void ms5840_compensate_temperature(const struct ms5840_prom *prom, uint32_t d2,

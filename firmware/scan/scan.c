@@ -1,24 +1,19 @@
 #include "scan/scan.h"
 
-#include "port/divide.h"
-
 #include <string.h>
 
 /* Supply and sensors settle: power-on reset of the family takes under 10 ms (recalled). */
 #define POWER_UP_us 10000u
-/* Between two admissions; doubled while one leaves a sensor out, as each costs some 50 ms of
- * frames. */
+/* After an admission of all sensors the next one waits so many times as long as it took. */
+#define ADMISSION_REST 20u
+/* After one that left a sensor out, or that was for a suspect; then doubled. */
 #define ADMISSION_INTERVAL_MIN_us 1000000u
 #define ADMISSION_INTERVAL_MAX_us 8000000u
 #define PROM_PASSES 3
 #define TEMPERATURE_INTERVAL_us (SCAN_TEMPERATURE_INTERVAL_ms * 1000u)
 #define TEMPERATURE_INTERVAL_MAX_us (SCAN_TEMPERATURE_INTERVAL_MAX_ms * 1000u)
-/* No change between two readings: 15 Pa, and 3.5 standard deviations of the noise at OSR 256. */
-#define TEMPERATURE_STILL_cC 6
 /* After a temperature reading that a sensor missed, or one in doubt. */
 #define TEMPERATURE_RETRY_us 100000u
-/* A larger step in half a second is no change of temperature. 1 degC is worth some 240 Pa. */
-#define TEMPERATURE_STEP_MAX_cC 100
 /* How soon a temperature that nobody has taken is looked at again. */
 #define SLOT_POLL_us 1000u
 /* How soon a new rate is noticed while waiting for the next frame of the old one. */
@@ -28,9 +23,10 @@
 /* Transitions in one call: enough for the longest run of states that take no time. */
 #define MAX_TRANSITIONS 8
 /* A sensor that loses count of the clocks finds its byte not acknowledged and sends no more: what
- * follows reads as ones. One code in 65536 ends in sixteen of them by chance, and counts if it is
- * near the sensor's last one, as a torn one hardly is; and one frame of fifteen sensors in three
- * million has four that end in eight. */
+ * follows reads as ones. All of it does when a sensor missed the command to read, or is far beyond
+ * its range; then it is the same again. One code in 65536 ends in sixteen of them by chance, and
+ * counts if it is near the sensor's last one, as a torn one hardly is; and one frame of fifteen
+ * sensors in three million has four that end in eight. */
 #define TORN_MASK 0xFFFFu
 #define TORN_TOLERANCE 1024u /* some 45 Pa; two readings at OSR 256 differ by 16 Pa rms */
 #define TORN_BYTE 0xFFu
@@ -90,6 +86,7 @@ enum ft_status scan_init(struct scan *scan, const struct array_bus *bus,
   scan->recovery_delay_us = RECOVERY_DELAY_MIN_us;
   scan->admission_interval_us = ADMISSION_INTERVAL_MIN_us;
   set(&scan->temperature_interval_us, TEMPERATURE_INTERVAL_us);
+  scan->readings.presses_are_shared = settings->presses_are_shared;
   return FT_OK;
 }
 
@@ -123,6 +120,11 @@ static void convert(struct scan *scan, bool is_temperature, bool is_frame) {
 }
 
 static void begin_admission(struct scan *scan, uint64_t now_us) {
+  const uint32_t admitted = get(&scan->admitted);
+  const uint32_t suspects = get(&scan->suspects) & admitted;
+  set(&scan->admitted, admitted & ~suspects);
+  scan->admits_suspects = suspects != 0;
+  scan->admission_began_us = now_us;
   scan->next_admission_us = now_us + scan->admission_interval_us;
   scan->prom_pass = 0;
   scan->prom_word = 0;
@@ -141,7 +143,7 @@ static void store_prom(struct scan *scan, uint8_t k) {
 
 /* Judges one complete reading of all PROMs. What is good is kept; what is not is read again, and
  * after the last pass a PROM with a wrong CRC is used and reported. */
-static void end_prom_pass(struct scan *scan) {
+static void end_prom_pass(struct scan *scan, uint64_t now_us) {
   uint32_t differs = 0;
   uint32_t blank = 0;
   for (uint8_t k = 0; k < scan->sensor_count; k++) {
@@ -175,8 +177,8 @@ static void end_prom_pass(struct scan *scan) {
     }
   }
   uint32_t admitted = scan->prom_good | differs;
-  if (admitted == all_sensors(scan)) {
-    scan->next_admission_us -= scan->admission_interval_us - ADMISSION_INTERVAL_MIN_us;
+  if (admitted == all_sensors(scan) && !scan->admits_suspects) {
+    scan->next_admission_us = now_us + ADMISSION_REST * (now_us - scan->admission_began_us);
     scan->admission_interval_us = ADMISSION_INTERVAL_MIN_us;
   } else if (scan->admission_interval_us < ADMISSION_INTERVAL_MAX_us) {
     scan->admission_interval_us *= 2;
@@ -185,10 +187,13 @@ static void end_prom_pass(struct scan *scan) {
   set(&scan->admitted, admitted);
   set(&scan->prom_bad, differs | blank);
   scan->void_next = 0;
+  scan->was_zero = 0;
+  scan->missed_once = 0;
+  scan->missed_twice = 0;
   convert(scan, true, false);
 }
 
-static void take_prom_word(struct scan *scan) {
+static void take_prom_word(struct scan *scan, uint64_t now_us) {
   for (uint8_t k = 0; k < scan->sensor_count; k++) {
     const uint8_t *bytes = scan->result.bytes[k];
     scan->prom_read[k].word[scan->prom_word] = (uint16_t)(bytes[0] << 8 | bytes[1]);
@@ -198,7 +203,7 @@ static void take_prom_word(struct scan *scan) {
   if (scan->prom_word < MS5840_PROM_WORDS) {
     enter(scan, SCAN_READ_PROM);
   } else {
-    end_prom_pass(scan);
+    end_prom_pass(scan, now_us);
   }
 }
 
@@ -214,9 +219,34 @@ static bool is_near(uint32_t code, uint32_t last) {
   return code - last + TORN_TOLERANCE <= 2 * TORN_TOLERANCE;
 }
 
+/* Judges what came of the last conversion of each sensor, for its admission and for the next
+ * reading. Returns the bitmap of those whose reading counts, if its code does. */
+static uint32_t judge_answers(struct scan *scan, uint32_t heard, uint32_t zero) {
+  const bool single = scan->bus->answers_are_single;
+  const uint32_t acknowledged = scan->result.acknowledged & all_sensors(scan);
+  uint32_t admitted = get(&scan->admitted);
+  const uint32_t answered = admitted & acknowledged & heard;
+  const uint32_t missed = admitted & ~answered;
+  const uint32_t unusable = answered & (zero | scan->void_next);
+  zero &= answered;
+  admitted &= ~(missed & scan->missed_twice); /* the third in a row */
+  admitted &= ~(single ? zero : zero & scan->was_zero);
+  scan->missed_twice = missed & scan->missed_once;
+  scan->missed_once = missed;
+  scan->was_zero = zero;
+  /* What was not read is still there to be read, and the sensor may miss the next command. */
+  scan->void_next = single ? 0 : zero | (missed & ~acknowledged);
+  scan->wants_admission =
+      (acknowledged & ~admitted) != 0 || admitted == 0 || (get(&scan->suspects) & admitted) != 0;
+  count(&scan->counters.zero_readings, count_bits(unusable));
+  set(&scan->present, acknowledged);
+  set(&scan->admitted, admitted);
+  return answered & ~unusable;
+}
+
 /* Judges the codes in scan->result. Returns the bitmap of those that are measurements. */
-static uint32_t take_codes(struct scan *scan, bool is_temperature, uint32_t codes[]) {
-  uint32_t acknowledged = scan->result.acknowledged & all_sensors(scan);
+static uint32_t take_codes(struct scan *scan, const struct scan_conversion *conversion,
+                           uint32_t codes[]) {
   uint32_t zero = 0;
   uint32_t torn = 0;
   uint32_t ends_in_ones = 0;
@@ -234,34 +264,30 @@ static uint32_t take_codes(struct scan *scan, bool is_temperature, uint32_t code
           torn |= bit;
           code = codes ? *codes : 0; /* the next is held against the last that was whole */
         }
-      } else if (is_temperature) {
+      } else if (conversion->is_temperature) {
         zero |= bit;
+      } else if (!codes || *codes != CODE_MAX) {
+        torn |= bit;
       }
     }
     if (codes) {
       *codes++ = code;
     }
   }
-  ends_in_ones &= acknowledged;
-  torn &= acknowledged;
+  const uint32_t usable = judge_answers(scan, conversion->heard, zero);
+  ends_in_ones &= usable;
+  torn &= usable;
   if (ends_in_ones != 0 && count_bits(ends_in_ones) >= TORN_BYTE_SENSORS) {
-    torn = ends_in_ones;
+    torn |= ends_in_ones;
   }
-  uint32_t admitted = get(&scan->admitted) & acknowledged;
-  uint32_t unusable = admitted & (zero | scan->void_next);
-  uint32_t good = admitted & ~unusable & ~torn;
-  admitted &= ~(zero & scan->void_next); /* twice in a row: it has lost its reset */
-  scan->void_next = admitted & zero;
-  count(&scan->counters.zero_readings, count_bits(unusable));
+  scan->void_next |= scan->bus->answers_are_single ? 0 : torn;
   count(&scan->counters.bus_nacks, count_bits(torn));
-  set(&scan->present, acknowledged);
-  set(&scan->admitted, admitted);
-  return good;
+  return usable & ~torn;
 }
 
 static void take_reading(struct scan *scan, const struct scan_conversion *conversion) {
   struct scan_slot *slot = slot_for(scan, conversion);
-  uint32_t good = take_codes(scan, conversion->is_temperature, slot ? slot->code : NULL);
+  uint32_t good = take_codes(scan, conversion, slot ? slot->code : NULL);
   if (conversion->is_frame) {
     count(&scan->counters.frames, 1);
     if (good != all_sensors(scan)) {
@@ -323,11 +349,9 @@ static uint64_t earlier(uint64_t a, uint64_t b) {
 
 /* Decides what comes next once the last reading is here. */
 static void leave_idle(struct scan *scan, uint64_t now_us) {
-  uint32_t waiting = get(&scan->present) & ~get(&scan->admitted);
-  bool nobody = get(&scan->present) == 0;
   /* A temperature that was read just now still has to go into its slot. */
   bool prom_is_free = !temperature_waits(scan) && !scan->last_was_temperature;
-  if ((waiting || nobody) && now_us >= scan->next_admission_us && prom_is_free) {
+  if (scan->wants_admission && now_us >= scan->next_admission_us && prom_is_free) {
     begin_admission(scan, now_us);
     return;
   }
@@ -456,9 +480,10 @@ static void end_operation(struct scan *scan, uint64_t now_us) {
     wait_in(scan, SCAN_WAIT_RESET, now_us + MS5840_RESET_us);
     break;
   case SCAN_READ_PROM:
-    take_prom_word(scan);
+    take_prom_word(scan, now_us);
     break;
   case SCAN_CONVERT:
+    scan->conversion->heard = scan->result.acknowledged;
     scan->conversion->t_us = now_us + scan->conversion->osr->conversion_us / 2u;
     wait_in(scan, SCAN_WAIT_CONVERSION, now_us + read_after_us(scan));
     break;
@@ -535,55 +560,28 @@ uint64_t scan_step(struct scan *scan, uint64_t now_us) {
 }
 
 /* Says when the next reading is wanted, if not as planned. */
-static void adapt_interval(struct scan *scan, bool moves, bool doubted) {
+static void adapt_interval(struct scan *scan, uint32_t news) {
   uint32_t interval_us = get(&scan->temperature_interval_us);
-  if (moves || doubted) {
+  if (news != 0) {
     set(&scan->temperature_interval_us, TEMPERATURE_INTERVAL_us);
-    set(&scan->temperature_within_us, doubted ? TEMPERATURE_RETRY_us : TEMPERATURE_INTERVAL_us);
+    set(&scan->temperature_within_us,
+        news & READINGS_ASK_AGAIN ? TEMPERATURE_RETRY_us : TEMPERATURE_INTERVAL_us);
   } else if (interval_us < TEMPERATURE_INTERVAL_MAX_us) {
     set(&scan->temperature_interval_us, 2 * interval_us);
   }
 }
 
 static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
-  scan->has_thermal &= ~(slot->prom_changed | slot->returned);
-  scan->renewed |= slot->prom_changed;
-  bool moves = false;
-  bool doubted = false;
-  for (uint8_t k = 0; k < scan->sensor_count; k++) {
-    uint32_t bit = UINT32_C(1) << k;
-    if (!(slot->good & bit)) {
-      continue;
-    }
-    const struct ms5840_thermal *last = &scan->thermal[k];
-    bool has_last = scan->has_thermal & bit;
-    struct ms5840_thermal thermal;
-    ms5840_compensate_temperature(&scan->prom[k], slot->code[k],
-                                  has_last ? last->branch : MS5840_BRANCH_UNKNOWN, &thermal);
-    int32_t step_cC = thermal.first_order_cC - last->first_order_cC;
-    bool jumped = step_cC > TEMPERATURE_STEP_MAX_cC || step_cC < -TEMPERATURE_STEP_MAX_cC;
-    if (has_last && jumped && !(scan->doubted & bit)) {
-      scan->doubted |= bit;
-      doubted = true;
-      continue;
-    }
-    moves = moves || step_cC > TEMPERATURE_STILL_cC || step_cC < -TEMPERATURE_STILL_cC;
-    scan->doubted &= ~bit;
-    scan->thermal[k] = thermal;
-    scan->has_thermal |= bit;
-  }
-  adapt_interval(scan, moves, doubted);
-  int32_t sum_cC = 0;
-  int32_t sensors = 0;
-  for (uint8_t k = 0; k < scan->sensor_count; k++) {
-    if (scan->has_thermal & get(&scan->admitted) & (UINT32_C(1) << k)) {
-      sum_cC += scan->thermal[k].temperature_cC;
-      sensors++;
-    }
-  }
-  if (sensors > 0) {
-    scan->temperature_cC = (int16_t)port_divide(sum_cC, sensors);
-  }
+  const struct readings_temperature taken = {
+      .prom = scan->prom,
+      .code = slot->code,
+      .good = slot->good,
+      .prom_changed = slot->prom_changed,
+      .returned = slot->returned,
+      .prom_bad = get(&scan->prom_bad),
+      .admitted = get(&scan->admitted),
+  };
+  adapt_interval(scan, readings_take_temperature(&scan->readings, scan->sensor_count, &taken));
 }
 
 static void fill_head(struct scan *scan, const struct scan_conversion *conversion,
@@ -596,27 +594,14 @@ static void fill_head(struct scan *scan, const struct scan_conversion *conversio
   frame->t_read_us = conversion->t_read_us;
   frame->sensor_count = scan->sensor_count;
   frame->noise_Pa_q10 = conversion->osr->noise_Pa_q10;
-  frame->temperature_cC = scan->temperature_cC;
+  frame->temperature_cC = scan->readings.temperature_cC;
 }
 
-static void fill_pressures(struct scan *scan, const struct scan_slot *slot, struct frame *frame) {
-  uint32_t valid = slot->good & scan->has_thermal;
-  uint32_t saturated = 0;
-  uint32_t bit = 1;
-  for (uint8_t k = 0; k < scan->sensor_count; k++, bit <<= 1) {
-    int32_t pressure_Pa_q10 = 0;
-    if (valid & bit) {
-      pressure_Pa_q10 = ms5840_compensate_pressure(&scan->thermal[k], slot->code[k]);
-      if (pressure_Pa_q10 > MS5840_MAX_PRESSURE_Pa * 1024) {
-        saturated |= bit;
-      }
-    }
-    frame->pressure_Pa_q10[k] = pressure_Pa_q10;
-  }
-  frame->valid = valid;
-  frame->saturated = saturated;
-  frame->renewed = scan->renewed;
-  scan->renewed = 0;
+/* What scan_step is to know. Before a slot is given back: no admission begins while a temperature
+ * waits, and none is asked for twice. */
+static void report(struct scan *scan) {
+  set(&scan->suspects, scan->readings.suspects);
+  set(&scan->counters.implausible_readings, scan->readings.left_out);
 }
 
 static bool claim(_Atomic uint32_t *state) {
@@ -645,7 +630,9 @@ bool scan_take(struct scan *scan, struct frame *frame) {
     use_temperature(scan, &scan->temperature_slot);
     if (is_frame) {
       fill_head(scan, temperature, frame);
+      frame->doubtful = frame->valid & scan->readings.doubtful;
     }
+    report(scan);
     hand_over(&scan->temperature_state, SCAN_SLOT_EMPTY);
     if (is_frame) {
       return true;
@@ -656,7 +643,9 @@ bool scan_take(struct scan *scan, struct frame *frame) {
     return false;
   }
   fill_head(scan, &scan->slot.conversion, frame);
-  fill_pressures(scan, &scan->slot, frame);
+  if (readings_take_pressures(&scan->readings, scan->slot.code, scan->slot.good, frame)) {
+    report(scan);
+  }
   hand_over(&scan->slot_state, SCAN_SLOT_EMPTY);
   return true;
 }

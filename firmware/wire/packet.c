@@ -102,7 +102,7 @@ _Static_assert(WIRE_CAPABILITY_FIT == 1 << 0 && WIRE_CAPABILITY_SLIP == 1 << 1 &
 LAYOUT(wire_info, WIRE_INFO);
 
 static const struct run wire_health_runs[] = {
-    RUN(U32, 16, health.capabilities),
+    RUN(U32, 17, health.capabilities),
     RUN(U16, 2, health.cpu_busy_permille),
     RUN(WHEN, 0, health.capabilities),
     RUN(U32, 1, health.fit_failures),

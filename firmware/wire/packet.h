@@ -190,12 +190,13 @@ struct wire_health {
   uint32_t packets_sent;      /* handed to the USB queue */
   uint32_t packets_dropped;   /* queue full: whole packets, each leaving a gap in the sequence */
   uint32_t commands_done;
-  uint32_t commands_rejected; /* unknown, out of range, damaged */
-  uint32_t bus_nacks;         /* reads that a sensor did not acknowledge, or that broke off */
-  uint32_t bus_timeouts;      /* operations that did not end in time */
-  uint32_t bus_recoveries;    /* nine clocks and multiplexer resets */
-  uint32_t zero_readings;     /* a conversion result of 0, and the one after it */
-  uint32_t sensors_present;   /* bitmap: answered at the last attempt */
+  uint32_t commands_rejected;    /* unknown, out of range, damaged */
+  uint32_t bus_nacks;            /* reads that a sensor did not acknowledge, or that broke off */
+  uint32_t bus_timeouts;         /* operations that did not end in time */
+  uint32_t bus_recoveries;       /* nine clocks and multiplexer resets */
+  uint32_t zero_readings;        /* a conversion result of 0, and those void after one or a NACK */
+  uint32_t implausible_readings; /* left out: below zero, or a step that no other sensor shared */
+  uint32_t sensors_present;      /* bitmap: answered at the last attempt */
   uint32_t sensors_prom_bad;  /* bitmap: calibration CRC differs, streaming all the same; or blank,
                                  and not */
   uint32_t watchdog_resets;   /* the last start was by the watchdog: 1 */

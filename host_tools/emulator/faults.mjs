@@ -5,7 +5,11 @@
  *
  *     sensor_dead (sensor)          acknowledges nothing
  *     sensor_prom_corrupt (sensor)  PROM words read back with flipped bits
+ *     sensor_prom_bit (sensor)      bit 10 of C1 reads back inverted: some 7 kPa
  *     sensor_adc_zero (sensor)      every ADC read gives 0
+ *     sensor_nack (sensor)          does not acknowledge its address, once, the first time from from_s on
+ *     sensor_brown_out (sensor)     its supply dips at from_s: a conversion is lost, and until a reset its codes are 1/16 too small
+ *     sensor_d2_corrupt (sensor)    every temperature has one bit inverted
  *     sda_stuck_low (sensor)        pulls SDA from from_s until nine clocks reached it or its multiplexer was reset
  *     mux_stuck (mux)               acknowledges nothing until its RESET line was pulsed
  *     sensor_missing (sensor)       is not there; when it comes back it has just been powered
@@ -25,7 +29,11 @@ import { InputError, inWords } from './errors.mjs';
 const TARGET = {
   sensor_dead: 'sensor',
   sensor_prom_corrupt: 'sensor',
+  sensor_prom_bit: 'sensor',
   sensor_adc_zero: 'sensor',
+  sensor_nack: 'sensor',
+  sensor_brown_out: 'sensor',
+  sensor_d2_corrupt: 'sensor',
   sda_stuck_low: 'sensor',
   mux_stuck: 'mux',
   sensor_missing: 'sensor',
@@ -89,10 +97,17 @@ const NONE = Object.freeze({});
 export class Faults {
   constructor(list, scope, on = {}) {
     this.sensors = new Map();
-    const key = { sensor_dead: 'dead', sensor_prom_corrupt: 'promCorrupt', sensor_adc_zero: 'adcZero' };
+    const key = {
+      sensor_dead: 'dead', sensor_prom_corrupt: 'promCorrupt', sensor_prom_bit: 'promBit', sensor_adc_zero: 'adcZero',
+      sensor_d2_corrupt: 'd2Corrupt',
+    };
+    /** How many have begun. */
+    const times = { sensor_nack: 'nacks', sensor_brown_out: 'brownOuts' };
     for (const fault of list) {
+      const set = (name, value) => this.sensors.set(fault.target, { ...this.sensor(fault.target), [name]: value });
       const change = (active) => {
-        if (key[fault.type]) this.sensors.set(fault.target, { ...this.sensors.get(fault.target), [key[fault.type]]: active });
+        if (key[fault.type]) set(key[fault.type], active);
+        else if (times[fault.type]) set(times[fault.type], (this.sensor(fault.target)[times[fault.type]] ?? 0) + (active ? 1 : 0));
         else on[fault.type]?.(fault.target, active);
       };
       scope.createAlarm(() => change(true)).scheduleAt(fault.from_ns);

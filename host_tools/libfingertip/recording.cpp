@@ -89,6 +89,7 @@ template <typename Visitor> void visit_health(Visitor &visit, wire_health &healt
   visit("bus_timeouts", health.bus_timeouts);
   visit("bus_recoveries", health.bus_recoveries);
   visit("zero_readings", health.zero_readings);
+  visit("implausible_readings", health.implausible_readings);
   visit("fit_failures", health.fit_failures);
   visit("sensors_present", health.sensors_present);
   visit("sensors_prom_bad", health.sensors_prom_bad);

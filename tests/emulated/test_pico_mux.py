@@ -167,6 +167,17 @@ class PicoMux(unittest.TestCase):
         self.assertGreater(end["frames_incomplete"], 50)
         self.assert_nothing_is_wrong_and_unflagged(run)
 
+    def test_scattered_nacks_are_repaired_or_cost_two_frames_each(self):
+        """A sensor that does not hear a command that the others acknowledge has nothing to say, nor anything for sure the next time."""
+        faults = [{"type": "sensor_nack", "sensor": 4 * i % 15, "from_s": 0.7 + 0.0503 * i} for i in range(48)]
+        run = Run(self.folder.name, "nacks", self.scenario, 3.6, [(3.5, encoded("health"))], faults).finish()
+        end = run.recording.health()[-1]
+        repaired = run.report["i2c"]["nacks"]
+        self.assertGreater(repaired, 6)
+        self.assertLessEqual(end["frames_incomplete"], 2 * (48 - repaired))
+        self.assertGreater(end["frames_incomplete"], 0)
+        self.assert_nothing_is_wrong_and_unflagged(run)
+
     def test_a_stuck_bus_recovers(self):
         faults = [{"type": "sda_stuck_low", "sensor": 3, "from_s": 1.0, "to_s": 3.0},
                   {"type": "mux_stuck", "mux": 1, "from_s": 2.0, "to_s": 3.0}]

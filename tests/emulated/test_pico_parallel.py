@@ -23,6 +23,7 @@ ALL = 0x7FFF
 NOISE_Pa = {256: 11.0, 1024: 3.9}
 # A location without a warning is never off by more, whatever befalls the array.
 UNWARNED_mm = 0.5
+SENSOR_DOUBTFUL = 1 << 18
 
 
 def encoded(*command):
@@ -52,6 +53,8 @@ class Run:
         self.t_s = truth.times_s(self.recording, self.report)
         self.truth, self.osr = truth, osr
         self.valid = np.nan_to_num(self.recording["valid"]).astype(int)
+
+        self.doubtful = (np.nan_to_num(self.recording["flags"]).astype(int) & SENSOR_DOUBTFUL) != 0
 
     def between(self, from_s, to_s):
         return (self.t_s > from_s) & (self.t_s < to_s)
@@ -122,6 +125,46 @@ class PicoParallel(unittest.TestCase):
         self.assertGreater(end["frames_incomplete"], 230)
         self.assertGreater(end["bus_nacks"], 10)
         self.assert_nothing_is_wrong_and_unflagged(run)
+
+    def test_scattered_nacks_cost_a_frame_each(self):
+        plan = [{"type": "sensor_nack", "sensor": 4 * i % 15, "from_s": 0.7 + 0.0503 * i} for i in range(24)]
+        run = Run(self.folder.name, "nacks", self.truth, 2.2, 256, plan, [(2.1, encoded("health"))])
+        end = run.recording.health()[-1]
+        self.assertEqual(end["bus_nacks"], 24)
+        self.assertLessEqual(end["frames_incomplete"], 26)  # and up to two by chance, see check_rate
+        self.assertGreaterEqual(end["frames_incomplete"], 24)
+        self.assertFalse(run.doubtful.any())
+        self.assert_nothing_is_wrong_and_unflagged(run)
+
+    def test_a_sensor_whose_supply_dips_is_reset_at_once(self):
+        plan = [{"type": "sensor_brown_out", "sensor": k, "from_s": 0.8 + 0.2003 * i} for i, k in enumerate((0, 7, 14))]
+        run = Run(self.folder.name, "supply", self.truth, 2.2, 256, plan)
+        for k, fault in zip((0, 7, 14), plan):
+            self.assertGreater((run.valid[run.between(fault["from_s"] + 0.02, fault["from_s"] + 0.1)] == ALL).mean(), 0.98)
+            during = run.valid[run.between(fault["from_s"], fault["from_s"] + 0.02)]
+            self.assertTrue(np.isin(during, (0, ALL, ALL & ~(1 << k))).all())
+            self.assertTrue((during == ALL & ~(1 << k)).any())
+        self.assert_nothing_is_wrong_and_unflagged(run)
+
+    def test_temperatures_that_are_wrong_are_not_used(self):
+        plan = [{"type": "sensor_d2_corrupt", "sensor": 3, "from_s": 1.0, "to_s": 5.0}]
+        run = Run(self.folder.name, "temperatures", self.truth, 7.0, 256, plan)
+        self.assertGreater(run.doubtful[run.between(1.6, 5.0)].mean(), 0.05)  # nine bits of 24 make more than 1 degC
+        self.assertFalse(run.doubtful[run.between(0.5, 1.0) | run.between(6.0, 7.0)].any())
+        self.assertGreater((run.valid[run.between(1.0, 7.0)] == ALL).mean(), 0.98)
+        good = ~run.doubtful
+        self.assertLess(run.truth.worst_reading_Pa(run.recording, run.t_s, good), 240 + 7 * NOISE_Pa[256])  # 1 degC may pass
+
+    def test_a_sensor_with_a_wrong_bit_in_its_prom_is_flagged(self):
+        plan = [{"type": "sensor_prom_bit", "sensor": 7, "from_s": 0}]
+        run = Run(self.folder.name, "prom", self.truth, 4.0, 1024, plan)
+        used = (run.valid & 1 << 7) != 0
+        self.assertGreater(used[run.between(3.0, 4.0)].mean(), 0.95)
+        self.assertTrue(run.doubtful[used & run.between(3.0, 4.0)].all())
+        self.assertFalse(run.doubtful[run.between(0.5, 1.0)].any())
+        error_Pa = np.median(run.recording.sensors_Pa[used, 7] - run.recording.sensors_Pa[used, 0])
+        self.assertGreater(abs(error_Pa), 5000)
+        self.assertEqual(run.recording.health()[-1]["sensors_prom_bad"], 1 << 7)
 
     def test_the_stream_comes_back_after_a_stuck_clock(self):
         plan = [{"type": "scl_stuck_low", "from_s": 0.7, "to_s": 0.75}, {"type": "scl_stuck_high", "from_s": 1.0, "to_s": 1.05}]

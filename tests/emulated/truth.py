@@ -24,14 +24,14 @@ class Truth:
         """Since power-on."""
         return recording["t_us"] * 1e-6 + report["device_time_zero_s"]
 
-    def worst_reading_Pa(self, recording, t_s):
-        """Of the readings that are said to be valid, the largest deviation from the truth."""
+    def worst_reading_Pa(self, recording, t_s, rows=slice(None)):
+        """Of the readings that are said to be valid in these rows, the largest deviation from the truth."""
         scenario, sensors = self.scenario, recording.sensors_Pa.shape[1]
         truth_Pa = np.column_stack([np.interp(t_s, scenario.t_s, scenario.sensors_Pa[:, k]) for k in range(sensors)])
         is_valid = ((np.nan_to_num(recording["valid"]).astype(int)[:, None] >> np.arange(sensors)) & 1) == 1
         slope_Pa = np.abs(np.gradient(truth_Pa, t_s, axis=0)) * MOMENT_s
         error_Pa = np.abs(recording.sensors_Pa - self.ambient_Pa - truth_Pa) - slope_Pa
-        return float(np.nanmax(np.where(is_valid, error_Pa, 0)))
+        return float(np.nanmax(np.where(is_valid, error_Pa, 0)[rows]))
 
     def unwarned_errors_mm(self, recording, t_s):
         """Distances from the truth of all locations without a warning, where the scenario presses with at least 0.3 N."""

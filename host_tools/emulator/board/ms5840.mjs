@@ -95,7 +95,7 @@ export class Ms5840 extends I2cTarget {
   /**
    * @param options index; prng: this sensor's own; now_ns: () => time; report: Report;
    *   stimulus: (index, t_ns) => { pressure_Pa, temperature_degC }, absolute;
-   *   faults: (index) => { dead, promCorrupt, adcZero, holdSda } of this moment
+   *   faults: (index) => { dead, promCorrupt, promBit, adcZero, d2Corrupt } of this moment, { nacks, brownOuts } so far
    */
   constructor({ index, prng, now_ns, report, stimulus, faults = () => ({}) }) {
     super(ADDRESS);
@@ -111,6 +111,8 @@ export class Ms5840 extends I2cTarget {
     this.holding = false;
     /** Fault: its SDA is tied to ground, which no reset ends. */
     this.tied = false;
+    this.nacks = 0;
+    this.brownOuts = 0;
     this.powerUp();
   }
 
@@ -119,9 +121,29 @@ export class Ms5840 extends I2cTarget {
     this.returned = this.wasReset !== undefined;
     this.busyUntil_ns = 0;
     this.wasReset = false;
+    this.untrimmed = false;
     this.conversion = null;
     this.output = [];
     this.phase = 'idle';
+  }
+
+  /** The supply dips, not as far as that: the part goes on converting, with another gain until it is reset (assumed). */
+  #brownOut() {
+    this.powerUp();
+    this.untrimmed = true;
+  }
+
+  /** Faults that strike once. */
+  #struck(faults) {
+    const nack = (faults.nacks ?? 0) > this.nacks;
+    if (nack) this.nacks += 1;
+    if ((faults.brownOuts ?? 0) > this.brownOuts) {
+      this.brownOuts += 1;
+      const { phase } = this;
+      this.#brownOut();
+      this.phase = phase;
+    }
+    return nack;
   }
 
   get holdsSda() {
@@ -142,7 +164,9 @@ export class Ms5840 extends I2cTarget {
   }
 
   acknowledgesAddress() {
-    return this.now_ns() >= this.busyUntil_ns && !this.faults(this.index).dead && !this.holdsSda;
+    const faults = this.faults(this.index);
+    if (this.#struck(faults)) return false;
+    return this.now_ns() >= this.busyUntil_ns && !faults.dead && !this.holdsSda;
   }
 
   receive(command) {
@@ -150,6 +174,7 @@ export class Ms5840 extends I2cTarget {
     if (command === 0x1e) {
       this.busyUntil_ns = now + RESET_NS;
       this.wasReset = true;
+      this.untrimmed = false;
       this.conversion = null;
       this.output = [];
       return true;
@@ -167,6 +192,7 @@ export class Ms5840 extends I2cTarget {
     if (command >= 0xa0 && command <= 0xac && !(command & 1)) {
       let word = this.prom[(command - 0xa0) >> 1];
       if (this.returned && !this.wasReset) word = 0;
+      if (this.faults(this.index).promBit && command === 0xa2) word ^= 0x0400;
       if (this.faults(this.index).promCorrupt) word ^= 0x0140 << ((command >> 1) & 3);
       this.output = [(word >> 8) & 0xff, word & 0xff];
       return true;
@@ -183,7 +209,8 @@ export class Ms5840 extends I2cTarget {
     if (!this.wasReset && !this.returned) this.report.warn('ms5840', `sensor ${this.index}: conversion before the reset command that loads its PROM`);
     const interrupted = this.conversion !== null && now < this.conversion.end_ns;
     const duration_ns = osr.max_ns * this.timeFactor;
-    this.conversion = { isPressure, osr, start_ns: now, end_ns: now + duration_ns, spoiled: interrupted };
+    const corrupt = !isPressure && this.faults(this.index).d2Corrupt;
+    this.conversion = { isPressure, osr, start_ns: now, end_ns: now + duration_ns, spoiled: interrupted, wrong: corrupt ? 1 << Math.floor(this.prng.range(0, 24)) : 0 };
   }
 
   #adcRead(now) {
@@ -198,13 +225,14 @@ export class Ms5840 extends I2cTarget {
     return [code >> 16, (code >> 8) & 0xff, code & 0xff];
   }
 
-  #code({ isPressure, osr, start_ns, end_ns, spoiled }) {
+  #code({ isPressure, osr, start_ns, end_ns, spoiled, wrong }) {
     const { pressure_Pa, temperature_degC } = this.stimulus(this.index, (start_ns + end_ns) / 2);
     const noise = this.prng.normal();
     const codes = isPressure
       ? codesFor(this.prom, pressure_Pa + noise * osr.noise_Pa, temperature_degC).d1
       : codesFor(this.prom, pressure_Pa, temperature_degC + noise * osr.noise_degC).d2;
     const spoil = spoiled ? this.prng.range(-0.5, 0.5) * 2 ** 22 : 0;
-    return Math.max(0, Math.min(CODE_MAX, Math.round(codes + spoil)));
+    const gain = this.untrimmed ? 15 / 16 : 1;
+    return Math.max(0, Math.min(CODE_MAX, Math.round(codes * gain + spoil))) ^ wrong;
   }
 }

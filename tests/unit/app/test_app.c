@@ -451,6 +451,48 @@ static void at_the_slowest_rate_the_watchdog_is_fed(void) {
   run_for(25000);
 }
 
+/* In the frame that is held for the temperature already, and until a temperature says otherwise. */
+static void test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful(void) {
+  press.force_N = 5.0;
+  press.from_us = 700000;
+  native_cdc_open();
+  run_for(600);
+  start_streams(WIRE_STREAM_CONTACT | WIRE_STREAM_RAW);
+  run_for(200);
+  struct wire_packet packet;
+  while (array.command >> 4 != 5) {
+    native_run_until(port_now_us() + 50, main_round, &app);
+  }
+  while (next_packet(&packet)) {
+  }
+  array.fault = (struct sim_fault){
+      .kind = SIM_FAULT_FLIP, .transfer = array.transfers + 1 + 7, .mask = 0x80000};
+  run_for(80);
+  int held = 0;
+  int doubtful = 0;
+  while (next_packet(&packet)) {
+    if (packet.type == WIRE_CONTACT) {
+      held += (packet.body.contact.flags & CONTACT_FLAG_HELD) != 0;
+      TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SENSOR_DOUBTFUL | CONTACT_FLAG_FIT_VALID,
+                            packet.body.contact.flags);
+    } else {
+      const bool holds = packet.body.raw.flags & CONTACT_FLAG_HELD;
+      TEST_ASSERT_EQUAL_HEX32(holds ? 0 : 1 << 7, packet.body.raw.doubtful);
+      doubtful += !holds;
+    }
+  }
+  TEST_ASSERT_EQUAL(1, held);
+  TEST_ASSERT_GREATER_THAN(10, doubtful);
+  run_for(60);
+  while (next_packet(&packet)) {
+  }
+  run_for(60);
+  TEST_ASSERT_TRUE(next_of_type(WIRE_CONTACT, &packet));
+  do {
+    TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SENSOR_DOUBTFUL, packet.body.contact.flags);
+  } while (next_of_type(WIRE_CONTACT, &packet));
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(nothing_streams_before_a_command);
@@ -470,5 +512,6 @@ int main(void) {
   RUN_TEST(health_comes_each_second);
   RUN_TEST(the_loader_is_reached_by_command_and_by_touch);
   RUN_TEST(at_the_slowest_rate_the_watchdog_is_fed);
+  RUN_TEST(test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful);
   return UNITY_END();
 }

@@ -52,6 +52,10 @@ static void test_nothing_fitted(void) {
   input.calibrated = true;
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TARED | CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_CALIBRATED,
                           update());
+  input = (struct contact_input){.sensor_doubtful = true};
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_SENSOR_DOUBTFUL, update());
+  input = (struct contact_input){.zero_doubtful = true};
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_ZERO_DOUBTFUL, update());
 }
 
 static void test_the_force_is_scaled_and_its_uncertainty_holds_that_of_the_scale(void) {

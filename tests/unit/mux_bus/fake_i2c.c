@@ -138,7 +138,7 @@ static enum ft_status write_sensors(void) {
 static enum ft_status read_sensors(uint8_t *bytes) {
   const uint32_t sensors = reachable();
   fake.reads++;
-  if (sensors == 0) {
+  if (sensors == 0 || transaction.number == fake.nack_read_at) {
     return FT_ERR_NACK;
   }
   if ((sensors & (sensors - 1)) != 0) {

@@ -245,19 +245,45 @@ static void test_without_any_sensor_the_command_is_refused(void) {
 }
 
 /* tearDown checks the point: its open channels never answer for another strip. */
-static void test_a_multiplexer_that_misses_one_selection_is_shut(void) {
+static void test_a_selection_that_is_missed_once_is_repeated(void) {
   for (unsigned at = 1; at <= FRAME_TRANSACTIONS; at++) {
     next_case();
     expect_good_frame();
     fake.nack_select_at = fake.transactions + at;
     const unsigned selects = fake.selects;
-    TEST_ASSERT_EQUAL_INT(FT_OK, frame());
-    expect_readings(result.acknowledged);
-    TEST_ASSERT_NOT_EQUAL(selects, fake.selects);
+    expect_good_frame();
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(selects + COMMAND_TRANSACTIONS - 1 + READ_TRANSACTIONS,
+                                   fake.selects);
     TEST_ASSERT_EQUAL_UINT(0, fake.collisions);
     expect_good_frame();
     TEST_ASSERT_EQUAL_UINT(0, fake.collisions);
   }
+}
+
+static void test_a_fetch_that_is_missed_once_is_repeated(void) {
+  for (unsigned at = 1; at <= FRAME_TRANSACTIONS; at++) {
+    next_case();
+    expect_good_frame();
+    const unsigned reads = fake.reads;
+    fake.nack_read_at = fake.transactions + at;
+    expect_good_frame();
+    TEST_ASSERT_EQUAL_UINT32(fake.reads - reads - BOARD_SENSOR_COUNT, result.nacks);
+  }
+}
+
+/* Asked twice in the frame in which it fell silent, and once in every other. */
+static void test_a_sensor_that_is_gone_takes_no_time(void) {
+  expect_good_frame();
+  fake.sensor_missing[7] = true;
+  for (uint32_t asked = 2; asked > 0; asked--) {
+    TEST_ASSERT_EQUAL_INT(FT_OK, frame());
+    expect_readings(ALL_SENSORS & ~(1u << 7));
+    TEST_ASSERT_EQUAL_UINT32(asked, result.nacks);
+  }
+  TEST_ASSERT_EQUAL_INT(FT_OK, frame());
+  TEST_ASSERT_EQUAL_UINT32(1, result.nacks);
+  fake.sensor_missing[7] = false;
+  expect_good_frame();
 }
 
 static void test_a_transaction_that_never_ends_at_every_place(void) {
@@ -448,7 +474,9 @@ int main(void) {
   RUN_TEST(test_without_any_multiplexer_nobody_acknowledges);
   RUN_TEST(test_a_missing_sensor_shows_when_it_is_read);
   RUN_TEST(test_without_any_sensor_the_command_is_refused);
-  RUN_TEST(test_a_multiplexer_that_misses_one_selection_is_shut);
+  RUN_TEST(test_a_selection_that_is_missed_once_is_repeated);
+  RUN_TEST(test_a_fetch_that_is_missed_once_is_repeated);
+  RUN_TEST(test_a_sensor_that_is_gone_takes_no_time);
   RUN_TEST(test_a_transaction_that_never_ends_at_every_place);
   RUN_TEST(test_lost_arbitration_at_every_place);
   RUN_TEST(test_lost_interrupts_only_cost_time);

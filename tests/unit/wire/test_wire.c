@@ -24,7 +24,7 @@ static size_t body_length(const struct wire_packet *packet) {
            (info->stored & WIRE_STORED_CALIBRATION ? 14 + 12u * info->sensor_count : 0);
   }
   case WIRE_HEALTH:
-    return 68u + (packet->body.health.capabilities & WIRE_CAPABILITY_FIT ? 4 : 0);
+    return 72u + (packet->body.health.capabilities & WIRE_CAPABILITY_FIT ? 4 : 0);
   case WIRE_ACK:
     return 12;
   case WIRE_CMD_STREAM:

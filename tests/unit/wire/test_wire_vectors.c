@@ -210,6 +210,7 @@ static void test_health(void) {
       .bus_timeouts = 0x09090908,
       .bus_recoveries = 0x0A0A0A09,
       .zero_readings = 0x0B0B0B0A,
+      .implausible_readings = 0x1A1B1C1D,
       .fit_failures = 0x0C0C0C0B,
       .sensors_present = 0x0D0D0D0C,
       .sensors_prom_bad = 0x0E0E0E0D,

@@ -194,14 +194,23 @@ static inline void sample_info(struct sampler *sampler, struct wire_info *info) 
 }
 
 static inline void sample_health(struct sampler *sampler, struct wire_health *health) {
-  uint32_t *counters[] = {&health->uptime_s,          &health->frames,
-                          &health->frames_incomplete, &health->frames_skipped,
-                          &health->packets_sent,      &health->packets_dropped,
-                          &health->commands_done,     &health->commands_rejected,
-                          &health->bus_nacks,         &health->bus_timeouts,
-                          &health->bus_recoveries,    &health->zero_readings,
-                          &health->capabilities,      &health->sensors_present,
-                          &health->sensors_prom_bad,  &health->watchdog_resets};
+  uint32_t *counters[] = {&health->uptime_s,
+                          &health->frames,
+                          &health->frames_incomplete,
+                          &health->frames_skipped,
+                          &health->packets_sent,
+                          &health->packets_dropped,
+                          &health->commands_done,
+                          &health->commands_rejected,
+                          &health->bus_nacks,
+                          &health->bus_timeouts,
+                          &health->bus_recoveries,
+                          &health->zero_readings,
+                          &health->implausible_readings,
+                          &health->capabilities,
+                          &health->sensors_present,
+                          &health->sensors_prom_bad,
+                          &health->watchdog_resets};
   for (size_t i = 0; i < sizeof counters / sizeof counters[0]; i++) {
     *counters[i] = sample_u32(sampler);
   }

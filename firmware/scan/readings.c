@@ -1,0 +1,168 @@
+#include "scan/readings.h"
+
+#define MAX_Pa_q10 (MS5840_MAX_PRESSURE_Pa * 1024)
+
+static uint32_t all_sensors(uint8_t sensor_count) {
+  return UINT32_MAX >> (FT_MAX_SENSORS - sensor_count);
+}
+
+/* Of the lowest bit set; there is one. */
+static uint8_t index_of(uint32_t bitmap) {
+  uint8_t k = 0;
+  while (!(bitmap >> k & 1u)) {
+    k++;
+  }
+  return k;
+}
+
+/* Less one if the value is negative. */
+static uint32_t size_of(int32_t value) {
+  return (uint32_t)(value ^ -(value < 0));
+}
+
+static int32_t difference(int32_t a, int32_t b) {
+  return (int32_t)((uint32_t)a - (uint32_t)b);
+}
+
+/* The sensor whose reading has stepped while all others stood still, as a bitmap. */
+static uint32_t find_alone(const struct readings *readings, const struct frame *frame,
+                           const int32_t last_Pa_q10[]) {
+  uint32_t stepped = 0;
+  uint32_t largest = 0;
+  uint32_t second = 0;
+  for (uint8_t k = 0; k < frame->sensor_count; k++) {
+    uint32_t size = size_of(difference(frame->pressure_Pa_q10[k], last_Pa_q10[k]));
+    if (size > largest) {
+      second = largest;
+      largest = size;
+      stepped = UINT32_C(1) << k;
+    } else if (size > second) {
+      second = size;
+    }
+  }
+  const uint32_t noises = READINGS_STILL_NOISES * (uint32_t)frame->noise_Pa_q10;
+  const bool others_rest = second < noises || second < largest / READINGS_ALONE;
+  return largest > READINGS_STEP_Pa_q10 && others_rest ? stepped & readings->has_last : 0;
+}
+
+/* alone: the sensor whose reading has just stepped alone, or 0. */
+static void judge_alone(struct readings *readings, uint32_t alone, const struct frame *frame,
+                        const int32_t last_Pa_q10[]) {
+  if (alone) {
+    const uint8_t k = index_of(alone);
+    const int32_t to_Pa_q10 = frame->pressure_Pa_q10[k];
+    const int32_t step = difference(to_Pa_q10, last_Pa_q10[k]);
+    const int32_t change = difference(to_Pa_q10, readings->alone_to_Pa_q10);
+    if (alone == readings->alone && size_of(change) <= size_of(step) / 2) {
+      readings->suspects |= alone;
+    }
+    readings->alone_to_Pa_q10 = to_Pa_q10;
+  }
+  readings->alone = alone;
+}
+
+/* Of a sensor without a reading that counts the last one is kept, to hold the next against. */
+static void keep(struct readings *readings, uint32_t usable, uint32_t left_out,
+                 const int32_t last_Pa_q10[], int32_t kept_Pa_q10[]) {
+  uint32_t bit = 1;
+  for (uint8_t k = 0; k < FT_MAX_SENSORS; k++, bit <<= 1) {
+    if (!(usable & ~left_out & bit)) {
+      kept_Pa_q10[k] = last_Pa_q10[k];
+    }
+    readings->left_out += (left_out & bit) != 0;
+  }
+  readings->has_last |= usable & ~left_out;
+}
+
+/* For frames that are not like most. Returns the bitmap of readings that do not count. */
+static __attribute__((noinline, cold)) uint32_t look_closer(struct readings *readings,
+                                                            struct frame *frame, uint32_t usable,
+                                                            const int32_t last_Pa_q10[],
+                                                            int32_t kept_Pa_q10[]) {
+  const bool all = usable == all_sensors(frame->sensor_count);
+  const uint32_t alone =
+      all && readings->presses_are_shared ? find_alone(readings, frame, last_Pa_q10) : 0;
+  judge_alone(readings, alone, frame, last_Pa_q10);
+  uint32_t low = 0;
+  uint32_t bit = 1;
+  for (uint8_t k = 0; k < frame->sensor_count; k++, bit <<= 1) {
+    if (!(usable & bit)) {
+      continue;
+    }
+    if (frame->pressure_Pa_q10[k] < 0) {
+      low |= bit;
+    } else if (frame->pressure_Pa_q10[k] > MAX_Pa_q10) {
+      frame->saturated |= bit;
+    }
+  }
+  readings->suspects |= low & readings->was_low;
+  readings->was_low = low | (readings->was_low & ~usable);
+  const uint32_t left_out = low | alone;
+  keep(readings, usable, left_out, last_Pa_q10, kept_Pa_q10);
+  return left_out;
+}
+
+static void compensate(const struct readings *readings, const uint32_t code[], uint32_t usable,
+                       struct frame *frame) {
+  const struct ms5840_thermal *thermal = readings->thermal;
+  int32_t *pressure_Pa_q10 = frame->pressure_Pa_q10;
+  const int32_t *end = pressure_Pa_q10 + frame->sensor_count;
+  for (; pressure_Pa_q10 != end; usable >>= 1, code++, thermal++) {
+    *pressure_Pa_q10++ = usable & 1u ? ms5840_compensate_pressure(thermal, *code) : 0;
+  }
+}
+
+/* Tells most frames, of which nothing else need be asked, from the others. */
+struct glance {
+  uint32_t sum;
+  uint32_t signs; /* the highest bit: a reading is outside the sensor's range */
+};
+
+/* Keeps the readings on the way. */
+static struct glance glance_at(const struct frame *frame, int32_t kept_Pa_q10[]) {
+  struct glance glance = {0, 0};
+  const int32_t *pressure_Pa_q10 = frame->pressure_Pa_q10;
+  const int32_t *end = pressure_Pa_q10 + frame->sensor_count;
+  while (pressure_Pa_q10 != end) {
+    const uint32_t value = (uint32_t)*pressure_Pa_q10++;
+    *kept_Pa_q10++ = (int32_t)value;
+    glance.sum += value;
+    glance.signs |= value | (MAX_Pa_q10 - value);
+  }
+  return glance;
+}
+
+bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good,
+                             struct frame *frame) {
+  const uint32_t usable = good & readings->has_thermal & ~readings->suspects;
+  compensate(readings, code, usable, frame);
+  const int32_t *last_Pa_q10 = readings->last_Pa_q10[readings->newest];
+  readings->newest ^= 1;
+  int32_t *kept_Pa_q10 = readings->last_Pa_q10[readings->newest];
+  const struct glance glance = glance_at(frame, kept_Pa_q10);
+
+  /* What steps alone steps in the sum. */
+  const uint32_t step = size_of((int32_t)(glance.sum - readings->last_sum));
+  const uint32_t noises = READINGS_STILL_NOISES * (uint32_t)frame->noise_Pa_q10;
+  uint32_t left_out = 0;
+  frame->saturated = 0;
+  if (usable != all_sensors(frame->sensor_count) || usable != readings->counted ||
+      (int32_t)glance.signs < 0 || step >= READINGS_STEP_Pa_q10 - frame->sensor_count * noises) {
+    left_out = look_closer(readings, frame, usable, last_Pa_q10, kept_Pa_q10);
+  }
+  readings->last_sum = glance.sum;
+  readings->counted = usable & ~left_out;
+
+  const uint32_t valid = readings->counted & ~readings->unproven;
+  if (valid != usable) {
+    for (uint8_t k = 0; k < frame->sensor_count; k++) {
+      frame->pressure_Pa_q10[k] = valid >> k & 1u ? frame->pressure_Pa_q10[k] : 0;
+    }
+  }
+  frame->valid = valid;
+  frame->saturated &= valid;
+  frame->doubtful = valid & readings->doubtful;
+  frame->renewed = readings->renewed;
+  readings->renewed = 0;
+  return left_out != 0;
+}

@@ -1,0 +1,104 @@
+/* From codes to readings, and which of them to believe. Main context; no bus, and no time but the
+ * frame's.
+ *
+ * Temperatures. One that differs by more than READINGS_TEMPERATURE_STEP_MAX_cC from the sensor's
+ * last, while the others' have not stepped along, is no change of temperature. It is used when the
+ * next one agrees with it and both are near the other sensors'. Until then the last one stays in
+ * use, and the sensor is doubtful: each degree is worth some 240 Pa. Two that agree with each other
+ * and are near nobody's come from a sensor that has lost its state as its supply failed: it becomes
+ * a suspect. The first temperature of a sensor must be near the others', too; one that says the
+ * same twice before and after a reset is believed, and the sensor stays doubtful.
+ *
+ * Pressures. One below zero is left out, and a second in a row makes the sensor a suspect. A large
+ * step of one sensor alone is left out as well, for rubber lets its neighbours feel any press; when
+ * the next reading is back, that was all, and when it stays, still alone, the sensor is a suspect.
+ * Steps beside which others move count at once, and so does every step while a sensor is missing,
+ * since it may be the one that feels it.
+ *
+ * A suspect is left out until it has been reset and its PROM read again. Then its temperature and
+ * its pressure count as its first; its zero still holds, since it is the same sensor.
+ *
+ * A sensor whose PROM has a wrong CRC is used, for a genuine part is known that has one, and is
+ * doubtful. It must have read like the others at two temperatures in a row before.
+ */
+#ifndef SCAN_READINGS_H
+#define SCAN_READINGS_H
+
+#include "common/limits.h"
+#include "frame/frame.h"
+#include "ms5840/ms5840.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define READINGS_TEMPERATURE_STEP_MAX_cC 100
+/* Sensors of one pad at rest: two parts of +-2 degC, and a warm object at one end. Further off,
+ * a temperature must agree with a second one, no more. */
+#define READINGS_TEMPERATURE_NEAR_cC 500
+/* Of one sensor, from one reading to the next: 8 kPa; a code with bit 18 wrong is 11 kPa off. */
+#define READINGS_STEP_Pa_q10 (8192 * 1024)
+/* All others have moved by less: so many times the noise of a reading (two of them differ by 1.4 of
+ * it rms), or such a part of the step. Of 785 steps beyond 8 kPa that taps of a sphere of 6 mm make
+ * from one frame to the next at 20 and 57 frames/s in a simulated pad of 6 mm with a pitch of 9 mm,
+ * up to 6 mm outside the array, the loneliest moves a neighbour by 64 Pa and 1/160; on 12 mm by
+ * 3.1 kPa and a quarter. At 410 frames/s and more none is so fast. */
+#define READINGS_STILL_NOISES 6
+#define READINGS_ALONE 256
+/* Moulding presses on the sensors: at rest those of four real strips differed by 2 to 12 kPa. A
+ * sensitivity that is off by 1 % moves the reading at 1 bar by 2.9 kPa: what stands apart by less
+ * than this is no worse than the gains of a pad may be. */
+#define READINGS_APART_Pa_q10 (20000 * 1024)
+
+struct readings {
+  bool presses_are_shared; /* see scan_settings */
+  struct ms5840_thermal thermal[FT_MAX_SENSORS];
+  int16_t doubted_cC[FT_MAX_SENSORS];     /* [sensor] the temperature that was not used */
+  int32_t last_Pa_q10[2][FT_MAX_SENSORS]; /* [newest][sensor] the last that counted */
+  uint8_t newest;
+  int16_t temperature_cC; /* mean of the sensors admitted, the last one if there is none */
+  uint8_t doubts_in_a_row;
+  uint32_t has_thermal; /* bitmap */
+  uint32_t renewed;     /* bitmap: another sensor since the last frame */
+  uint32_t doubted;     /* bitmap: the last temperature was not used */
+  uint32_t strange;     /* bitmap: a temperature that is not near the others' is in use */
+  uint32_t unproven;    /* bitmap: the PROM's CRC differs and the sensor has not read like others */
+  uint32_t was_near;    /* bitmap: an unproven one did, at the last temperature */
+  uint32_t doubtful;    /* bitmap: used, and to be flagged */
+  uint32_t has_last;    /* bitmap: last_Pa_q10 holds a reading */
+  uint32_t counted;     /* bitmap: and was in the last frame */
+  uint32_t last_sum;    /* of the pressures of the last frame, modulo 2^32 */
+  uint32_t was_low;     /* bitmap: the last pressure was below zero */
+  uint32_t alone;       /* bitmap of one sensor: its last pressure stepped alone, ... */
+  int32_t alone_to_Pa_q10; /* ... from last_Pa_q10 to here */
+  uint32_t suspects;       /* bitmap: want a reset */
+  uint32_t pardoned;       /* bitmap: had one for that reason */
+  uint32_t left_out;       /* since start: pressures below zero or that stepped alone */
+};
+
+/* What a conversion of the temperature brought. */
+struct readings_temperature {
+  const struct ms5840_prom *prom; /* [sensor] */
+  const uint32_t *code;           /* [sensor] */
+  uint32_t good;                  /* bitmap: the code is a measurement */
+  uint32_t prom_changed;          /* bitmap: another sensor than before */
+  uint32_t returned;              /* bitmap: was reset, perhaps after long */
+  uint32_t prom_bad;              /* bitmap: the CRC differs */
+  uint32_t admitted;              /* bitmap */
+};
+
+enum readings_news {
+  READINGS_MOVED = 1,     /* the temperature changes */
+  READINGS_ASK_AGAIN = 2, /* soon: one is in doubt */
+};
+
+/* Returns a bitmap of readings_news. Cost: some 800 Cortex-M0+ cycles a sensor. */
+uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count,
+                                   const struct readings_temperature *taken);
+
+/* Fills in pressures, valid, doubtful, saturated and renewed. code: [sensor]; good: bitmap. Returns
+ * whether it left any out: left_out and perhaps suspects have changed. Cost: some 140 Cortex-M0+
+ * cycles a sensor. */
+bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good,
+                             struct frame *frame);
+
+#endif

@@ -1,0 +1,212 @@
+#include "port/divide.h"
+#include "scan/readings.h"
+
+/* No change between two readings: 15 Pa, and 3.5 standard deviations of the noise at OSR 256. */
+#define TEMPERATURE_STILL_cC 6
+/* MS5837-02BA datasheet, page 7: the range of the calculation. */
+#define TEMPERATURE_MIN_cC (-4000)
+#define TEMPERATURE_MAX_cC 8500
+/* Fewer cannot outvote one. */
+#define VOTERS_MIN 3
+/* A sensor that is in doubt for ever must not cost a frame in ten. */
+#define HASTY_DOUBTS_MAX 4
+
+static bool within(int32_t value, int32_t limit) {
+  return value >= -limit && value <= limit;
+}
+
+static int16_t clamped_i16(int32_t value) {
+  return (int16_t)(value > INT16_MAX ? INT16_MAX : value < INT16_MIN ? INT16_MIN : value);
+}
+
+/* Of count values, which are put in order. */
+static int32_t median_of(int32_t values[], int count) {
+  for (int i = 1; i < count; i++) {
+    int32_t value = values[i];
+    int at = i;
+    for (; at > 0 && values[at - 1] > value; at--) {
+      values[at] = values[at - 1];
+    }
+    values[at] = value;
+  }
+  return values[count / 2];
+}
+
+/* What the temperatures of the array say about one of them. */
+struct company {
+  int32_t step_cC;   /* that the sensors made together */
+  int32_t middle_cC; /* of them now */
+  bool votes;
+};
+
+static struct company keep_company(const struct readings *readings, uint8_t sensor_count,
+                                   uint32_t good, const int16_t now_cC[]) {
+  struct company company = {.votes = false};
+  int32_t values[FT_MAX_SENSORS];
+  int count = 0;
+  for (uint8_t k = 0; k < sensor_count; k++) {
+    if (good & readings->has_thermal & (UINT32_C(1) << k)) {
+      values[count++] = now_cC[k] - readings->thermal[k].first_order_cC;
+    }
+  }
+  if (count >= VOTERS_MIN) {
+    company.step_cC = median_of(values, count);
+  }
+  count = 0;
+  for (uint8_t k = 0; k < sensor_count; k++) {
+    if (readings->has_thermal & (UINT32_C(1) << k)) {
+      values[count++] = readings->thermal[k].first_order_cC + company.step_cC;
+    } else if (good & (UINT32_C(1) << k)) {
+      values[count++] = now_cC[k];
+    }
+  }
+  if (count >= VOTERS_MIN) {
+    company.votes = true;
+    company.middle_cC = median_of(values, count);
+  }
+  return company;
+}
+
+/* Whether to use a temperature that something speaks against. */
+static bool settle(struct readings *readings, uint8_t k, int16_t now_cC,
+                   const struct company *company) {
+  uint32_t bit = UINT32_C(1) << k;
+  bool possible = now_cC >= TEMPERATURE_MIN_cC && now_cC <= TEMPERATURE_MAX_cC;
+  bool near = possible && (!company->votes ||
+                           within(now_cC - company->middle_cC, READINGS_TEMPERATURE_NEAR_cC));
+  bool agrees = (readings->doubted & bit) &&
+                within(now_cC - readings->doubted_cC[k], READINGS_TEMPERATURE_STEP_MAX_cC);
+  bool use;
+  bool insists; /* says it again, and it cannot be */
+  if (!(readings->has_thermal & bit)) {
+    use = near || (agrees && possible && (readings->pardoned & bit));
+    insists = agrees && !use;
+  } else {
+    use = within(now_cC - readings->thermal[k].first_order_cC - company->step_cC,
+                 READINGS_TEMPERATURE_STEP_MAX_cC) ||
+          (agrees && near);
+    insists = agrees && !near;
+  }
+  if (!use) {
+    readings->suspects |= insists ? bit : 0;
+    readings->doubted |= bit;
+    readings->doubted_cC[k] = now_cC;
+    return false;
+  }
+  readings->strange = near ? readings->strange & ~bit : readings->strange | bit;
+  return true;
+}
+
+static void forget(struct readings *readings, uint32_t sensors) {
+  readings->pardoned = (readings->pardoned & ~sensors) | (readings->suspects & sensors);
+  readings->has_thermal &= ~sensors;
+  readings->doubted &= ~sensors;
+  readings->strange &= ~sensors;
+  readings->was_near &= ~sensors;
+  readings->has_last &= ~sensors;
+  readings->was_low &= ~sensors;
+  readings->alone &= ~sensors;
+  readings->suspects &= ~sensors;
+}
+
+/* Sensors whose PROM has a wrong CRC against the middle of all. */
+static void prove(struct readings *readings, uint8_t sensor_count) {
+  const int32_t *last_Pa_q10 = readings->last_Pa_q10[readings->newest];
+  int32_t values[FT_MAX_SENSORS];
+  int count = 0;
+  for (uint8_t k = 0; k < sensor_count; k++) {
+    if (readings->has_last & (UINT32_C(1) << k)) {
+      values[count++] = last_Pa_q10[k] / 2;
+    }
+  }
+  uint32_t near = 0;
+  const int32_t middle = count > 0 ? median_of(values, count) : 0;
+  for (uint8_t k = 0; k < sensor_count; k++) {
+    const uint32_t bit = readings->unproven & readings->has_last & (UINT32_C(1) << k);
+    if (bit && within(last_Pa_q10[k] / 2 - middle, READINGS_APART_Pa_q10 / 2)) {
+      near |= bit;
+    }
+  }
+  readings->unproven &= ~(near & readings->was_near);
+  readings->was_near = near;
+}
+
+static void average(struct readings *readings, uint8_t sensor_count, uint32_t admitted) {
+  int32_t sum_cC = 0;
+  int32_t sensors = 0;
+  for (uint8_t k = 0; k < sensor_count; k++) {
+    if (readings->has_thermal & admitted & (UINT32_C(1) << k)) {
+      sum_cC += readings->thermal[k].temperature_cC;
+      sensors++;
+    }
+  }
+  if (sensors > 0) {
+    readings->temperature_cC = (int16_t)port_divide(sum_cC, sensors);
+  }
+}
+
+/* Whether any temperature needs more than a look at its own last one. */
+static bool is_unusual(const struct readings *readings, uint8_t sensor_count, uint32_t good,
+                       const int16_t now_cC[]) {
+  if (good & (~readings->has_thermal | readings->doubted | readings->strange)) {
+    return true;
+  }
+  for (uint8_t k = 0; k < sensor_count; k++) {
+    if ((good & (UINT32_C(1) << k)) && !within(now_cC[k] - readings->thermal[k].first_order_cC,
+                                               READINGS_TEMPERATURE_STEP_MAX_cC)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count,
+                                   const struct readings_temperature *taken) {
+  const uint32_t fresh = taken->prom_changed | taken->returned;
+  forget(readings, fresh | ~taken->admitted);
+  readings->renewed |= taken->prom_changed;
+  readings->unproven = (readings->unproven | fresh) & taken->prom_bad;
+  if (readings->unproven) {
+    prove(readings, sensor_count);
+  }
+
+  int16_t now_cC[FT_MAX_SENSORS];
+  for (uint8_t k = 0; k < sensor_count; k++) {
+    now_cC[k] = clamped_i16(ms5840_first_order_cC(&taken->prom[k], taken->code[k]));
+  }
+  const bool unusual = is_unusual(readings, sensor_count, taken->good, now_cC);
+  struct company company;
+  if (unusual) {
+    company = keep_company(readings, sensor_count, taken->good, now_cC);
+  }
+  uint32_t news = 0;
+  for (uint8_t k = 0; k < sensor_count; k++) {
+    const uint32_t bit = UINT32_C(1) << k;
+    if (!(taken->good & bit)) {
+      continue;
+    }
+    if (unusual && !settle(readings, k, now_cC[k], &company)) {
+      news |= READINGS_ASK_AGAIN;
+      continue;
+    }
+    struct ms5840_thermal *thermal = &readings->thermal[k];
+    const bool had = readings->has_thermal & bit;
+    if (!had || !within(now_cC[k] - thermal->first_order_cC, TEMPERATURE_STILL_cC)) {
+      news |= READINGS_MOVED;
+    }
+    ms5840_compensate_temperature(&taken->prom[k], taken->code[k],
+                                  had ? thermal->branch : MS5840_BRANCH_UNKNOWN, thermal);
+    readings->doubted &= ~bit;
+    readings->has_thermal |= bit;
+  }
+  readings->doubtful = taken->prom_bad | readings->doubted | readings->strange;
+  average(readings, sensor_count, taken->admitted);
+  if (!(news & READINGS_ASK_AGAIN)) {
+    readings->doubts_in_a_row = 0;
+  } else if (readings->doubts_in_a_row < HASTY_DOUBTS_MAX) {
+    readings->doubts_in_a_row++;
+  } else {
+    news = READINGS_MOVED;
+  }
+  return news;
+}

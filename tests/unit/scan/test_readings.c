@@ -1,0 +1,453 @@
+#include "scan/readings.h"
+#include "support/random.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <unity.h>
+
+enum { SENSORS = 15, ONE = 7 };
+#define ALL 0x7FFFu
+#define ONE_BIT (1u << ONE)
+
+/* A public dump of a part at 22.75 degC and 1002.41 mbar. */
+static const struct ms5840_prom PROM = {{0, 41335, 41466, 26840, 27317, 31225, 28780}};
+static const uint32_t D1 = 6735203, D2 = 8073757;
+/* Of that part. */
+static const double CODES_PER_Pa = 25.2, CODES_PER_degC = 29150;
+
+static struct ms5840_prom prom[FT_MAX_SENSORS];
+static uint32_t d1[FT_MAX_SENSORS], d2[FT_MAX_SENSORS];
+static struct readings readings;
+static struct readings_temperature temperature;
+static struct frame frame;
+
+void setUp(void) {
+  memset(&readings, 0, sizeof readings);
+  readings.presses_are_shared = true;
+  frame = (struct frame){.sensor_count = SENSORS, .noise_Pa_q10 = 4000};
+  for (int k = 0; k < SENSORS; k++) {
+    prom[k] = PROM;
+    d1[k] = D1 + (uint32_t)(20000 * k); /* moulding: up to 12 kPa apart */
+    d2[k] = D2 + (uint32_t)(700 * k);
+  }
+  temperature = (struct readings_temperature){
+      .prom = prom, .code = d2, .good = ALL, .returned = ALL, .admitted = ALL};
+}
+
+void tearDown(void) {}
+
+static uint32_t take_temperature(void) {
+  uint32_t news = readings_take_temperature(&readings, SENSORS, &temperature);
+  temperature.returned = 0;
+  temperature.prom_changed = 0;
+  return news;
+}
+
+static void take_pressures(uint32_t good) {
+  readings_take_pressures(&readings, d1, good, &frame);
+  for (int k = 0; k < SENSORS; k++) {
+    TEST_ASSERT_TRUE((frame.valid >> k & 1u) || frame.pressure_Pa_q10[k] == 0);
+  }
+  TEST_ASSERT_EQUAL_HEX32(0, (frame.saturated | frame.doubtful) & ~frame.valid);
+}
+
+static void start(void) {
+  TEST_ASSERT_EQUAL_HEX32(READINGS_MOVED, take_temperature());
+  take_pressures(ALL);
+  take_pressures(ALL);
+  TEST_ASSERT_EQUAL_HEX32(ALL, frame.valid);
+  TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful | frame.saturated);
+}
+
+static void next_case(void) {
+  setUp();
+  start();
+}
+
+static void step_by(int k, double Pa) {
+  d1[k] = (uint32_t)(d1[k] + Pa * CODES_PER_Pa);
+}
+
+static void warm_by(int k, double degC) {
+  d2[k] = (uint32_t)(d2[k] + degC * CODES_PER_degC);
+}
+
+static double true_Pa(int k, uint32_t true_d2) {
+  struct ms5840_thermal thermal;
+  ms5840_compensate_temperature(&prom[k], true_d2, MS5840_BRANCH_UNKNOWN, &thermal);
+  return ms5840_compensate_pressure(&thermal, d1[k]) / 1024.0;
+}
+
+static void expect(uint32_t valid, uint32_t left_out) {
+  TEST_ASSERT_EQUAL_HEX32(valid, frame.valid);
+  TEST_ASSERT_EQUAL_UINT32(left_out, readings.left_out);
+}
+
+static void test_the_scales_of_this_test(void) {
+  start();
+  const double before_Pa = frame.pressure_Pa_q10[ONE] / 1024.0;
+  step_by(ONE, 1000);
+  take_pressures(ALL);
+  TEST_ASSERT_DOUBLE_WITHIN(20, before_Pa + 1000, frame.pressure_Pa_q10[ONE] / 1024.0);
+  const int16_t before_cC = (int16_t)readings.thermal[ONE].first_order_cC;
+  warm_by(ONE, 0.5);
+  take_temperature();
+  TEST_ASSERT_INT_WITHIN(1, before_cC + 50, readings.thermal[ONE].first_order_cC);
+}
+
+static void test_a_step_of_one_sensor_alone_is_left_out_of_its_frame(void) {
+  static const double steps_Pa[] = {9e3, -9e3, 60e3, -60e3, 150e3};
+  for (int i = 0; i < 5; i++) {
+    next_case();
+    step_by(ONE, steps_Pa[i]);
+    take_pressures(ALL);
+    expect(ALL & ~ONE_BIT, 1);
+    TEST_ASSERT_EQUAL_HEX32(0, frame.saturated);
+    step_by(ONE, -steps_Pa[i]);
+    take_pressures(ALL);
+    expect(ALL, 1);
+    TEST_ASSERT_EQUAL_HEX32(0, readings.suspects);
+  }
+}
+
+static void test_a_sensor_that_stays_where_it_stepped_is_suspect_until_it_returns(void) {
+  start();
+  step_by(ONE, 12e3);
+  take_pressures(ALL);
+  take_pressures(ALL);
+  expect(ALL & ~ONE_BIT, 2);
+  TEST_ASSERT_EQUAL_HEX32(ONE_BIT, readings.suspects);
+  for (int i = 0; i < 10; i++) {
+    take_pressures(ALL);
+    expect(ALL & ~ONE_BIT, 2);
+  }
+  take_temperature();
+  TEST_ASSERT_EQUAL_HEX32(ONE_BIT, readings.suspects);
+  temperature.returned = ONE_BIT;
+  take_temperature();
+  TEST_ASSERT_EQUAL_HEX32(0, readings.suspects);
+  take_pressures(ALL);
+  expect(ALL, 2);
+}
+
+/* Also after frames in which it had no reading. */
+static void test_a_step_behind_a_gap_is_noticed(void) {
+  start();
+  take_pressures(ALL & ~ONE_BIT);
+  take_pressures(ALL & ~ONE_BIT);
+  step_by(ONE, 12e3);
+  take_pressures(ALL);
+  take_pressures(ALL);
+  TEST_ASSERT_EQUAL_HEX32(ONE_BIT, readings.suspects);
+}
+
+static void test_a_step_that_another_feels_counts_at_once(void) {
+  start();
+  step_by(ONE, 60e3);
+  step_by(ONE + 1, 300);
+  take_pressures(ALL);
+  expect(ALL, 0);
+  step_by(ONE, -60e3);
+  step_by(ONE + 1, -300);
+  take_pressures(ALL);
+  expect(ALL, 0);
+  TEST_ASSERT_EQUAL_HEX32(0, readings.suspects);
+}
+
+static void test_where_presses_are_not_shared_every_step_counts(void) {
+  start();
+  readings.presses_are_shared = false;
+  step_by(ONE, 60e3);
+  take_pressures(ALL);
+  expect(ALL, 0);
+}
+
+/* The neighbour that would feel it may be the one that is missing. */
+static void test_with_a_sensor_missing_every_step_counts(void) {
+  start();
+  step_by(ONE, 60e3);
+  take_pressures(ALL & ~1u);
+  expect(ALL & ~1u, 0);
+}
+
+static void test_a_press_of_one_alone_is_at_most_two_frames_late(void) {
+  start();
+  static const double rise_Pa[] = {20e3, 40e3, 30e3, 10e3};
+  for (int i = 0; i < 4; i++) {
+    step_by(ONE, rise_Pa[i]);
+    take_pressures(ALL);
+    expect(i < 2 ? ALL & ~ONE_BIT : frame.valid, i < 2 ? (uint32_t)i + 1 : readings.left_out);
+  }
+  /* It rose, and stayed: a reset tells. */
+  TEST_ASSERT_EQUAL_HEX32(ONE_BIT, readings.suspects);
+}
+
+/* Always, and never without a step. */
+static void test_steps_alone_amid_the_noise(void) {
+  static const uint16_t osrs[] = {256, 512, 1024, 2048, 4096, 8192};
+  struct random random = {77};
+  for (int i = 0; i < 6; i++) {
+    next_case();
+    frame.noise_Pa_q10 = ms5840_find_osr(osrs[i])->noise_Pa_q10;
+    const double noise_Pa = frame.noise_Pa_q10 / 1024.0;
+    uint32_t rest[FT_MAX_SENSORS];
+    memcpy(rest, d1, sizeof rest);
+    uint32_t noticed = 0;
+    for (int n = 0; n < 1000; n++) {
+      for (int k = 0; k < SENSORS; k++) {
+        d1[k] = rest[k];
+        step_by(k, noise_Pa * random_normal(&random));
+      }
+      const uint32_t before = readings.left_out;
+      if (n % 10 == 9) {
+        step_by(ONE, 15e3);
+        take_pressures(ALL);
+        noticed += readings.left_out - before;
+      } else {
+        take_pressures(ALL);
+        TEST_ASSERT_EQUAL_UINT32(before, readings.left_out);
+      }
+    }
+    TEST_ASSERT_EQUAL_UINT32(100, noticed);
+    TEST_ASSERT_EQUAL_HEX32(0, readings.suspects);
+  }
+}
+
+static void test_pressures_below_zero_are_left_out_and_the_second_makes_a_suspect(void) {
+  start();
+  step_by(ONE, -190e3);
+  step_by(ONE + 1, 1000);
+  take_pressures(ALL);
+  expect(ALL & ~ONE_BIT, 1);
+  step_by(ONE, 190e3);
+  take_pressures(ALL);
+  expect(ALL, 1);
+  step_by(ONE, -190e3);
+  step_by(ONE + 1, 1000);
+  take_pressures(ALL);
+  TEST_ASSERT_EQUAL_HEX32(0, readings.suspects);
+  take_pressures(ALL & ~ONE_BIT);
+  take_pressures(ALL);
+  expect(ALL & ~ONE_BIT, 3);
+  TEST_ASSERT_EQUAL_HEX32(ONE_BIT, readings.suspects);
+}
+
+/* All of them, of every sensor: what the pad is pressed with. */
+static void test_saturation_counts(void) {
+  start();
+  for (int k = 0; k < SENSORS; k++) {
+    step_by(k, 150e3);
+  }
+  take_pressures(ALL);
+  expect(ALL, 0);
+  TEST_ASSERT_EQUAL_HEX32(ALL, frame.saturated);
+}
+
+static void test_a_temperature_step_needs_a_second_and_the_others(void) {
+  static const struct {
+    double first_degC, second_degC;
+    bool used, suspect;
+  } cases[] = {
+      {2, 2.1, true, false},  {-4, -4, true, false},   {2, -3, false, false},
+      {2, 4.5, false, false}, {20, 20.1, false, true}, {-60, -60, false, true},
+      {20, 35, false, false},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    next_case();
+    const uint32_t rest = d2[ONE];
+    const double rest_Pa = true_Pa(ONE, rest);
+    warm_by(ONE, cases[i].first_degC);
+    TEST_ASSERT_EQUAL_HEX32(READINGS_ASK_AGAIN, take_temperature());
+    take_pressures(ALL);
+    expect(ALL, 0);
+    TEST_ASSERT_EQUAL_HEX32(ONE_BIT, frame.doubtful);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, rest_Pa, frame.pressure_Pa_q10[ONE] / 1024.0);
+    d2[ONE] = rest;
+    warm_by(ONE, cases[i].second_degC);
+    take_temperature();
+    take_pressures(ALL);
+    TEST_ASSERT_EQUAL_HEX32(cases[i].suspect ? ONE_BIT : 0, readings.suspects);
+    TEST_ASSERT_EQUAL_HEX32(cases[i].used || cases[i].suspect ? 0 : ONE_BIT, frame.doubtful);
+    if (!cases[i].suspect) {
+      TEST_ASSERT_DOUBLE_WITHIN(0.01, cases[i].used ? true_Pa(ONE, d2[ONE]) : rest_Pa,
+                                frame.pressure_Pa_q10[ONE] / 1024.0);
+    }
+    d2[ONE] = rest;
+  }
+}
+
+static void test_doubt_ends_with_a_temperature_like_the_last(void) {
+  start();
+  const uint32_t rest = d2[ONE];
+  warm_by(ONE, 9);
+  take_temperature();
+  d2[ONE] = rest;
+  TEST_ASSERT_EQUAL_HEX32(0, take_temperature());
+  take_pressures(ALL);
+  TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
+}
+
+/* As when a pad that is read every ten seconds is taken into the hand. */
+static void test_a_step_of_all_temperatures_counts_at_once(void) {
+  start();
+  for (int k = 0; k < SENSORS; k++) {
+    warm_by(k, 3.0 + 0.02 * k);
+  }
+  warm_by(ONE, 30);
+  TEST_ASSERT_EQUAL_HEX32(READINGS_MOVED | READINGS_ASK_AGAIN, take_temperature());
+  take_pressures(ALL);
+  TEST_ASSERT_EQUAL_HEX32(ONE_BIT, frame.doubtful);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, true_Pa(0, d2[0]), frame.pressure_Pa_q10[0] / 1024.0);
+}
+
+/* Doubt for ever is asked about soon a few times, and then as ever. */
+static void test_doubt_for_ever_is_not_asked_about_for_ever(void) {
+  start();
+  const uint32_t rest = d2[ONE];
+  int asked = 0;
+  for (int i = 0; i < 50; i++) {
+    d2[ONE] = rest;
+    warm_by(ONE, 10 + 2 * i);
+    asked += (take_temperature() & READINGS_ASK_AGAIN) != 0;
+    take_pressures(ALL);
+    TEST_ASSERT_EQUAL_HEX32(ONE_BIT, frame.doubtful);
+  }
+  TEST_ASSERT_LESS_THAN_INT(6, asked);
+  d2[ONE] = rest;
+  take_temperature();
+  warm_by(ONE, 10);
+  TEST_ASSERT_EQUAL_HEX32(READINGS_ASK_AGAIN, take_temperature());
+}
+
+static void test_a_first_temperature_far_from_the_others_is_believed_after_a_reset(void) {
+  warm_by(ONE, 12);
+  TEST_ASSERT_EQUAL_HEX32(READINGS_MOVED | READINGS_ASK_AGAIN, take_temperature());
+  take_temperature();
+  TEST_ASSERT_EQUAL_HEX32(ONE_BIT, readings.suspects);
+  temperature.returned = ONE_BIT;
+  take_temperature();
+  TEST_ASSERT_EQUAL_HEX32(0, readings.suspects);
+  take_pressures(ALL);
+  expect(ALL & ~ONE_BIT, 0);
+  take_temperature();
+  TEST_ASSERT_EQUAL_HEX32(0, readings.suspects);
+  take_pressures(ALL);
+  expect(ALL, 0);
+  TEST_ASSERT_EQUAL_HEX32(ONE_BIT, frame.doubtful);
+  warm_by(ONE, -12);
+  temperature.returned = ONE_BIT;
+  take_temperature();
+  take_pressures(ALL);
+  expect(ALL, 0);
+  TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
+}
+
+static void test_a_temperature_at_which_no_sensor_works_is_never_used(void) {
+  warm_by(ONE, 90);
+  for (int i = 0; i < 10; i++) {
+    take_temperature();
+    take_pressures(ALL);
+    expect(ALL & ~ONE_BIT, 0);
+    temperature.returned = readings.suspects;
+  }
+}
+
+static void test_one_and_two_sensors_have_nobody_to_ask(void) {
+  for (uint8_t count = 1; count <= 2; count++) {
+    setUp();
+    frame.sensor_count = count;
+    temperature.good = temperature.admitted = temperature.returned = (1u << count) - 1;
+    readings_take_temperature(&readings, count, &temperature);
+    temperature.returned = 0;
+    warm_by(0, 20);
+    TEST_ASSERT_EQUAL_HEX32(READINGS_ASK_AGAIN,
+                            readings_take_temperature(&readings, count, &temperature));
+    readings_take_temperature(&readings, count, &temperature);
+    readings_take_pressures(&readings, d1, temperature.good, &frame);
+    TEST_ASSERT_EQUAL_HEX32(temperature.good, frame.valid);
+    TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, true_Pa(0, d2[0]), frame.pressure_Pa_q10[0] / 1024.0);
+  }
+}
+
+/* Every third temperature has one bit wrong, of every sensor, all the time. */
+static void test_no_wrong_pressure_goes_out_as_good_while_temperatures_are_corrupted(void) {
+  for (uint64_t seed = 1; seed <= 20; seed++) {
+    next_case();
+    struct random random = {seed};
+    uint32_t rest[FT_MAX_SENSORS];
+    memcpy(rest, d2, sizeof rest);
+    for (int n = 0; n < 2000; n++) {
+      for (int k = 0; k < SENSORS; k++) {
+        d2[k] = rest[k];
+        if (random_below(&random, 10) < 3) {
+          d2[k] ^= 1u << random_below(&random, 24);
+        }
+      }
+      temperature.returned = readings.suspects;
+      take_temperature();
+      take_pressures(ALL);
+      for (int k = 0; k < SENSORS; k++) {
+        const double error_Pa = frame.pressure_Pa_q10[k] / 1024.0 - true_Pa(k, rest[k]);
+        if (frame.valid & ~frame.doubtful & 1u << k) {
+          TEST_ASSERT_DOUBLE_WITHIN(1300, 0, error_Pa); /* 5 degC */
+        } else if (frame.valid & 1u << k) {
+          TEST_ASSERT_DOUBLE_WITHIN(15000, 0, error_Pa);
+        }
+      }
+    }
+  }
+}
+
+static void test_a_sensor_with_a_bad_prom_must_read_like_the_others(void) {
+  static const struct {
+    double apart_Pa;
+    bool used;
+  } cases[] = {{0, true}, {15e3, true}, {-15e3, true}, {30e3, false}, {-30e3, false}};
+  for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    setUp();
+    temperature.prom_bad = ONE_BIT;
+    step_by(ONE, cases[i].apart_Pa);
+    for (int n = 0; n < 2; n++) {
+      take_temperature();
+      take_pressures(ALL);
+      expect(ALL & ~ONE_BIT, 0);
+    }
+    take_temperature();
+    take_pressures(ALL);
+    expect(cases[i].used ? ALL : ALL & ~ONE_BIT, 0);
+    TEST_ASSERT_EQUAL_HEX32(cases[i].used ? ONE_BIT : 0, frame.doubtful);
+    /* Once it did, presses do not matter. */
+    for (int k = 0; k < SENSORS; k++) {
+      step_by(k, k == ONE ? 40e3 : 8e3);
+    }
+    take_temperature();
+    take_pressures(ALL);
+    expect(cases[i].used ? ALL : ALL & ~ONE_BIT, 0);
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_the_scales_of_this_test);
+  RUN_TEST(test_a_step_of_one_sensor_alone_is_left_out_of_its_frame);
+  RUN_TEST(test_a_sensor_that_stays_where_it_stepped_is_suspect_until_it_returns);
+  RUN_TEST(test_a_step_behind_a_gap_is_noticed);
+  RUN_TEST(test_a_step_that_another_feels_counts_at_once);
+  RUN_TEST(test_where_presses_are_not_shared_every_step_counts);
+  RUN_TEST(test_with_a_sensor_missing_every_step_counts);
+  RUN_TEST(test_a_press_of_one_alone_is_at_most_two_frames_late);
+  RUN_TEST(test_steps_alone_amid_the_noise);
+  RUN_TEST(test_pressures_below_zero_are_left_out_and_the_second_makes_a_suspect);
+  RUN_TEST(test_saturation_counts);
+  RUN_TEST(test_a_temperature_step_needs_a_second_and_the_others);
+  RUN_TEST(test_doubt_ends_with_a_temperature_like_the_last);
+  RUN_TEST(test_a_step_of_all_temperatures_counts_at_once);
+  RUN_TEST(test_doubt_for_ever_is_not_asked_about_for_ever);
+  RUN_TEST(test_a_first_temperature_far_from_the_others_is_believed_after_a_reset);
+  RUN_TEST(test_a_temperature_at_which_no_sensor_works_is_never_used);
+  RUN_TEST(test_one_and_two_sensors_have_nobody_to_ask);
+  RUN_TEST(test_no_wrong_pressure_goes_out_as_good_while_temperatures_are_corrupted);
+  RUN_TEST(test_a_sensor_with_a_bad_prom_must_read_like_the_others);
+  return UNITY_END();
+}
