@@ -42,7 +42,6 @@
                           stand off by 2 % of a peak that they hardly felt */
 #define KEEP_SHIFT 8   /* share of the memory that the level takes of the remainder in a second */
 #define CREEP_SHIFT 10 /* and of what the remainder does not follow */
-#define KEEP_DOWN_SHIFT 2 /* less of it downward: what dipped comes back */
 
 #define BELOW_ms SECONDS(CONDITION_BELOW_s) /* dips come back within it */
 #define FAR_BELOW_Pa 1000
@@ -52,7 +51,7 @@
 #define SATURATED_Pa 100000
 
 #define CALM_AFTER_TARE_ms ((uint32_t)SECONDS(3))
-#define CALM_AFTER_RELEASE_ms ((uint32_t)SECONDS(20))
+#define CALM_AFTER_RELEASE_ms ((uint32_t)SECONDS(60)) /* what rubber keeps goes slowly */
 #define CALM_LAG_Pa 2 /* and half a sigma: three sigmas of a mean at the least rate */
 #define SNAPSHOT_ms ((uint32_t)SECONDS(4))
 #define SNAPSHOT_LONGEST_ms ((uint32_t)SECONDS(64))
@@ -242,9 +241,7 @@ static void track_free(struct condition *condition, uint8_t k, int32_t step_ms, 
   int32_t creep = slew, keep = 0;
   if (!unsure) {
     int32_t goal = clamp(above_level, deepest, (memory >> BAND_SHIFT) + warm);
-    int32_t came_down = -condition->risen_Pa_q10[k];
     int32_t highest = remainder > 0 ? remainder : 0;
-    highest = came_down > highest ? came_down : highest;
     if (!fresh && goal > highest) {
       goal = highest;
     }
@@ -255,7 +252,7 @@ static void track_free(struct condition *condition, uint8_t k, int32_t step_ms, 
   }
   int32_t idle_share = share_in(step_ms, IDLE_ms);
   int32_t crept = clamp(part_of(above_zero, idle_share), -creep, creep);
-  int32_t kept = clamp(part_of(remainder, idle_share), -(keep >> KEEP_DOWN_SHIFT), keep);
+  int32_t kept = clamp(part_of(remainder, idle_share), -keep, keep);
   condition->level_Pa_q10[k] += crept + kept;
   condition->zero_Pa_q10[k] = condition->level_Pa_q10[k] + remainder - kept;
   int32_t risen = faded(condition->risen_Pa_q10[k], step_ms, WANDER_ms) + crept + kept;
@@ -265,8 +262,7 @@ static void track_free(struct condition *condition, uint8_t k, int32_t step_ms, 
                                 : fresh ? (memory >> BAND_SHIFT) + warm
                                         : (memory >> REOPEN_SHIFT) + (warm >> 2);
   set_bit(&condition->restless, k, above_level > calm_lag || above_level < -calm_lag);
-  set_bit(&condition->stands_off, k,
-          remainder > Pa_q10(CONDITION_OPEN_Pa) || risen > Pa_q10(CONDITION_OPEN_Pa));
+  set_bit(&condition->stands_off, k, remainder + risen > Pa_q10(CONDITION_OPEN_Pa));
   watch_below(condition, k, step_ms, above_level, deepest - open);
 }
 
@@ -345,8 +341,6 @@ static void press_or_release(struct condition *condition, bool over) {
     return;
   }
   condition->released_ms = 0;
-  memset(condition->sum_Pa_q10, 0, sizeof condition->sum_Pa_q10);
-  memset(condition->summed, 0, sizeof condition->summed);
   int32_t drift = drift_in_contact(condition);
   if (drift > condition->warm_Pa_q10) {
     condition->warm_Pa_q10 = drift;
@@ -472,11 +466,9 @@ void condition_frame(struct condition *condition, const struct frame *frame,
                  conditioned->peak_Pa_q10 < drift_in_contact(condition));
   track(condition, frame, conditioned, step_ms, open, unsure);
 
-  condition->contact =
-      condition->pressed || conditioned->peak_Pa_q10 > (condition->contact ? close : open);
-  conditioned->contact = condition->contact;
+  conditioned->contact = condition->pressed || conditioned->peak_Pa_q10 > open;
   conditioned->tared = conditioned->tared && (condition->below & conditioned->usable) == 0;
   watch_calm(condition, conditioned, frame->sensor_count);
   bool stands_off = (condition->stands_off & conditioned->usable) != 0;
-  conditioned->zero_doubtful = condition->pressed ? unsure : condition->contact || stands_off;
+  conditioned->zero_doubtful = condition->pressed ? unsure : conditioned->contact || stands_off;
 }

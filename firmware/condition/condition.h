@@ -99,7 +99,6 @@ struct condition {
   uint32_t below;      /* bitmap: too far below zero */
   uint8_t next;        /* sensor to track */
   bool pressed;        /* contact that is no remainder */
-  bool contact;
 };
 
 /* What a calibration says of the sensors. */
