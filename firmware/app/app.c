@@ -11,6 +11,8 @@
 
 /* How often the main loop looks at the clock if nothing else wakes it: for the watchdog. */
 #define TICK_us (PORT_WATCHDOG_PERIOD_us / 5u)
+/* The same while something is being stored, which takes some fifty looks and an erase. */
+#define STORE_TICK_us 1000u
 /* So long the end of a second waits for a frame to follow, rather than keep one waiting. */
 #define FRAME_WAIT_us 100000u
 /* Up to this pitch the neighbours feel what one sensor feels: see READINGS_STILL_NOISES. */
@@ -47,7 +49,7 @@ void app_on_event(struct app *app) {
   uint64_t now_us = port_now_us();
   uint64_t wake_us = scan_step(&app->scan, now_us);
   if (now_us >= app->next_tick_us) {
-    app->next_tick_us = now_us + TICK_us;
+    app->next_tick_us = now_us + atomic_load_explicit(&app->tick_interval_us, memory_order_relaxed);
     atomic_store_explicit(&app->tick, 1, memory_order_relaxed);
   }
   port_alarm_at_us(wake_us < app->next_tick_us ? wake_us : app->next_tick_us);
@@ -82,23 +84,99 @@ static void send_packet(struct app *app, const struct wire_layout *layout, uint6
 
 #if FT_WITH_FIT
 void app_use_calibration(struct app *app, const struct calibration *calibration) {
-  app->calibrated = calibration != NULL;
-  if (app->calibrated) {
-    app->calibration = *calibration;
-  }
+  app->calibration = calibration;
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
-    const struct sensor_calibration *sensor = &app->calibration.sensors[k];
-    float gain_sd = app->calibrated ? sensor->gain_sd : DEFAULT_GAIN_SD;
-    app->gains.inverse_q16[k] =
-        app->calibrated ? (uint32_t)(65536.0f / sensor->gain + 0.5f) : 65536;
+    float gain = calibration ? calibration->sensors[k].gain : 1.0f;
+    float gain_sd = calibration ? calibration->sensors[k].gain_sd : DEFAULT_GAIN_SD;
+    app->gains.inverse_q16[k] = (uint32_t)(65536.0f / gain + 0.5f);
     app->fit_settings.gain_sd_q16[k] = (uint16_t)(gain_sd * 65536.0f + 0.5f);
   }
-  app->contact_settings.force_scale =
-      app->calibrated ? app->calibration.force_scale : DEFAULT_FORCE_SCALE;
+  app->contact_settings.force_scale = calibration ? calibration->force_scale : DEFAULT_FORCE_SCALE;
   app->contact_settings.force_scale_sd =
-      app->calibrated ? app->calibration.force_scale_sd : DEFAULT_FORCE_SCALE_SD;
+      calibration ? calibration->force_scale_sd : DEFAULT_FORCE_SCALE_SD;
+}
+
+static enum wire_result set_prior(struct app *app, float sigma_mm, float width_mm) {
+  bool none = sigma_mm == 0.0f && width_mm == 0.0f;
+  bool possible = sigma_mm >= WIRE_PRIOR_SIGMA_MIN_mm && sigma_mm <= WIRE_PRIOR_SIGMA_MAX_mm &&
+                  width_mm >= WIRE_PRIOR_WIDTH_MIN_mm && width_mm <= WIRE_PRIOR_WIDTH_MAX_mm;
+  if (!none && !possible) {
+    return WIRE_RESULT_OUT_OF_RANGE;
+  }
+  app->fit_settings.prior_sigma_mm = sigma_mm;
+  app->fit_settings.prior_width_mm = width_mm;
+  return WIRE_RESULT_DONE;
+}
+
+static enum wire_result set_location_limit(struct app *app, float limit_mm) {
+  if (!(limit_mm >= WIRE_LOCATION_LIMIT_MIN_mm && limit_mm <= WIRE_LOCATION_LIMIT_MAX_mm)) {
+    return WIRE_RESULT_OUT_OF_RANGE;
+  }
+  app->fit_settings.location_sd_limit_mm = limit_mm;
+  return WIRE_RESULT_DONE;
 }
 #endif
+
+#if FT_WITH_SLIP
+static enum wire_result set_slip(struct app *app, float threshold_mm, uint16_t window_ms) {
+  if (!(threshold_mm >= WIRE_SLIP_THRESHOLD_MIN_mm && threshold_mm <= WIRE_SLIP_THRESHOLD_MAX_mm) ||
+      window_ms < WIRE_SLIP_WINDOW_MIN_ms || window_ms > WIRE_SLIP_WINDOW_MAX_ms) {
+    return WIRE_RESULT_OUT_OF_RANGE;
+  }
+  app->contact_settings.slip_threshold_mm = threshold_mm;
+  app->contact_settings.slip_window_us = window_ms * 1000u;
+  slip_reset(&app->slip_history);
+  return WIRE_RESULT_DONE;
+}
+#endif
+
+static enum wire_result set_rate(struct app *app, uint32_t rate_mHz) {
+  if (rate_mHz != 0 && (rate_mHz < WIRE_RATE_MIN_mHz || rate_mHz > WIRE_RATE_MAX_mHz)) {
+    return WIRE_RESULT_OUT_OF_RANGE;
+  }
+  app->rate_mHz = rate_mHz;
+  scan_set_rate_mHz(&app->scan, rate_mHz);
+  return WIRE_RESULT_DONE;
+}
+
+static enum wire_result set_osr(struct app *app, uint16_t osr) {
+  if (scan_set_osr(&app->scan, osr) != FT_OK) {
+    return WIRE_RESULT_OUT_OF_RANGE;
+  }
+  app->osr = osr;
+  return WIRE_RESULT_DONE;
+}
+
+/* While something is being stored the main loop looks after it each millisecond. The alarm that is
+ * armed would come too late for that. */
+static void hurry_store(struct app *app, bool is_writing) {
+  atomic_store_explicit(&app->tick_interval_us, is_writing ? STORE_TICK_us : TICK_us,
+                        memory_order_relaxed);
+  if (is_writing) {
+    port_alarm_at_us(port_now_us());
+  }
+}
+
+/* What the firmware has learnt since to refuse stays as it is. */
+static void use_stored(struct app *app) {
+  const struct store_content *content = &app->store.content;
+  const struct store_settings *settings = &content->settings;
+#if FT_WITH_FIT
+  app_use_calibration(app, content->has_calibration ? &content->calibration : NULL);
+#endif
+  if (!content->has_settings) {
+    return;
+  }
+  set_rate(app, settings->rate_mHz);
+  set_osr(app, settings->osr);
+#if FT_WITH_SLIP
+  set_slip(app, settings->slip_threshold_mm, settings->slip_window_ms);
+#endif
+#if FT_WITH_FIT
+  set_prior(app, settings->prior_sigma_mm, settings->prior_width_mm);
+  set_location_limit(app, settings->location_limit_mm);
+#endif
+}
 
 void app_start(struct app *app, const struct array_bus *bus) {
   memset(app, 0, sizeof *app);
@@ -124,12 +202,13 @@ void app_start(struct app *app, const struct array_bus *bus) {
   app->fit_settings.prior_width_mm = DEFAULT_PRIOR_WIDTH_mm;
   app->fit_settings.model_sd_q16 = (uint16_t)(DEFAULT_MODEL_SD * 65536.0f);
   app->fit_settings.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
-  app_use_calibration(app, NULL);
 #endif
 #if FT_WITH_SLIP
   app->contact_settings.slip_threshold_mm = DEFAULT_SLIP_THRESHOLD_mm;
   app->contact_settings.slip_window_us = DEFAULT_SLIP_WINDOW_ms * 1000u;
 #endif
+  store_init(&app->store, geometry.sensor_count);
+  use_stored(app);
   condition_tare(&app->condition);
   wire_receiver_init(&app->receiver, COMMANDS);
   app->active = true;
@@ -149,6 +228,7 @@ void app_start(struct app *app, const struct array_bus *bus) {
   identity.serial = serial;
   cdc_start(&identity);
 
+  hurry_store(app, store_is_writing(&app->store));
   port_alarm_at_us(port_now_us());
 }
 
@@ -190,11 +270,14 @@ static void send_info(struct app *app, uint64_t now_us) {
   info->prior_sigma_mm = app->fit_settings.prior_sigma_mm;
   info->prior_width_mm = app->fit_settings.prior_width_mm;
   info->location_limit_mm = app->fit_settings.location_sd_limit_mm;
-  if (app->calibrated) {
+  if (app->calibration) {
     info->stored |= WIRE_STORED_CALIBRATION;
-    info->calibration = app->calibration;
+    info->calibration = *app->calibration;
   }
 #endif
+  info->stored |= app->store.content.has_settings ? (uint32_t)WIRE_STORED_SETTINGS : 0;
+  info->stored |= store_is_writing(&app->store) ? (uint32_t)WIRE_STORED_WRITING : 0;
+  info->stored |= app->store.damaged ? (uint32_t)WIRE_STORED_DAMAGED : 0;
   send_packet(app, &wire_info_layout, now_us);
 }
 
@@ -295,7 +378,7 @@ static void judge_frame(struct app *app) {
     .saturated = frame->saturated,
 #if FT_WITH_FIT
     .fit = app->conditioned.contact ? &app->fit : NULL,
-    .calibrated = app->calibrated,
+    .calibrated = app->calibration != NULL,
 #endif
   };
 #if FT_WITH_FIT
@@ -315,7 +398,7 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
   }
   if (!frame->held) {
 #if FT_WITH_FIT
-    const struct condition_gains *gains = app->calibrated ? &app->gains : NULL;
+    const struct condition_gains *gains = app->calibration ? &app->gains : NULL;
 #else
     const struct condition_gains *gains = NULL; /* nothing here tells how hard or where */
 #endif
@@ -356,52 +439,50 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
 #endif
 }
 
-#if FT_WITH_SLIP
-static enum wire_result set_slip(struct app *app, const struct wire_cmd_slip *slip) {
-  if (slip->threshold_mm < WIRE_SLIP_THRESHOLD_MIN_mm ||
-      slip->threshold_mm > WIRE_SLIP_THRESHOLD_MAX_mm ||
-      slip->window_ms < WIRE_SLIP_WINDOW_MIN_ms || slip->window_ms > WIRE_SLIP_WINDOW_MAX_ms) {
-    return WIRE_RESULT_OUT_OF_RANGE;
-  }
-  app->contact_settings.slip_threshold_mm = slip->threshold_mm;
-  app->contact_settings.slip_window_us = slip->window_ms * 1000u;
-  slip_reset(&app->slip_history);
-  return WIRE_RESULT_DONE;
+/* The result of a command whose acknowledgement has to wait. */
+enum { LATER = -1 };
+
+static int result_of_put(struct app *app, enum ft_status status) {
+  hurry_store(app, store_is_writing(&app->store));
+  return status == FT_PENDING ? LATER : status == FT_OK ? WIRE_RESULT_DONE : WIRE_RESULT_NOT_NOW;
 }
-#endif
 
 #if FT_WITH_FIT
-static enum wire_result calibrate(struct app *app, const struct wire_cmd_calibrate *command) {
+static int calibrate(struct app *app, const struct wire_cmd_calibrate *command) {
   if (command->sensor_count != geometry.sensor_count ||
       !calibration_is_valid(&command->calibration, geometry.sensor_count)) {
     return WIRE_RESULT_OUT_OF_RANGE;
   }
-  app_use_calibration(app, &command->calibration);
-  return WIRE_RESULT_DONE;
-}
-
-static enum wire_result set_prior(struct app *app, const struct wire_cmd_prior *prior) {
-  bool none = prior->sigma_mm == 0.0f && prior->width_mm == 0.0f;
-  if (!none &&
-      (prior->sigma_mm < WIRE_PRIOR_SIGMA_MIN_mm || prior->sigma_mm > WIRE_PRIOR_SIGMA_MAX_mm ||
-       prior->width_mm < WIRE_PRIOR_WIDTH_MIN_mm || prior->width_mm > WIRE_PRIOR_WIDTH_MAX_mm)) {
-    return WIRE_RESULT_OUT_OF_RANGE;
-  }
-  app->fit_settings.prior_sigma_mm = prior->sigma_mm;
-  app->fit_settings.prior_width_mm = prior->width_mm;
-  return WIRE_RESULT_DONE;
-}
-
-static enum wire_result set_location_limit(struct app *app, float limit_mm) {
-  if (limit_mm < WIRE_LOCATION_LIMIT_MIN_mm || limit_mm > WIRE_LOCATION_LIMIT_MAX_mm) {
-    return WIRE_RESULT_OUT_OF_RANGE;
-  }
-  app->fit_settings.location_sd_limit_mm = limit_mm;
-  return WIRE_RESULT_DONE;
+  return result_of_put(app, store_put_calibration(&app->store, &command->calibration));
 }
 #endif
 
-static enum wire_result obey(struct app *app, const struct wire_packet *command, uint64_t now_us) {
+static int keep_settings(struct app *app, uint8_t keep) {
+  if (keep > 1) {
+    return WIRE_RESULT_OUT_OF_RANGE;
+  }
+  struct store_settings settings = app->store.content.settings;
+#if !FT_WITH_FIT
+  if (!app->store.content.has_settings) {
+    settings.prior_width_mm = -1.0f; /* no other firmware shall take it for the wish to have none */
+  }
+#endif
+  settings.rate_mHz = app->rate_mHz;
+  settings.osr = app->osr;
+#if FT_WITH_SLIP
+  settings.slip_threshold_mm = app->contact_settings.slip_threshold_mm;
+  settings.slip_window_ms = (uint16_t)(app->contact_settings.slip_window_us / 1000u);
+#endif
+#if FT_WITH_FIT
+  settings.prior_sigma_mm = app->fit_settings.prior_sigma_mm;
+  settings.prior_width_mm = app->fit_settings.prior_width_mm;
+  settings.location_limit_mm = app->fit_settings.location_sd_limit_mm;
+#endif
+  return result_of_put(app, store_put_settings(&app->store, keep ? &settings : NULL));
+}
+
+/* An enum wire_result, or LATER. */
+static int obey(struct app *app, const struct wire_packet *command, uint64_t now_us) {
   switch (command->type) {
   case WIRE_CMD_STREAM:
     if (command->body.cmd_stream.streams & ~STREAMS) {
@@ -415,38 +496,26 @@ static enum wire_result obey(struct app *app, const struct wire_packet *command,
     }
     condition_tare(&app->condition);
     return WIRE_RESULT_DONE;
-  case WIRE_CMD_RATE: {
-    uint32_t rate_mHz = command->body.cmd_rate.rate_mHz;
-    if (rate_mHz != 0 && (rate_mHz < WIRE_RATE_MIN_mHz || rate_mHz > WIRE_RATE_MAX_mHz)) {
-      return WIRE_RESULT_OUT_OF_RANGE;
-    }
-    app->rate_mHz = rate_mHz;
-    scan_set_rate_mHz(&app->scan, rate_mHz);
-    return WIRE_RESULT_DONE;
-  }
+  case WIRE_CMD_RATE:
+    return set_rate(app, command->body.cmd_rate.rate_mHz);
   case WIRE_CMD_OSR:
-    if (scan_set_osr(&app->scan, command->body.cmd_osr.osr) != FT_OK) {
-      return WIRE_RESULT_OUT_OF_RANGE;
-    }
-    app->osr = command->body.cmd_osr.osr;
-    return WIRE_RESULT_DONE;
+    return set_osr(app, command->body.cmd_osr.osr);
 #if FT_WITH_SLIP
   case WIRE_CMD_SLIP:
-    return set_slip(app, &command->body.cmd_slip);
+    return set_slip(app, command->body.cmd_slip.threshold_mm, command->body.cmd_slip.window_ms);
 #endif
 #if FT_WITH_FIT
   case WIRE_CMD_CALIBRATE:
     return calibrate(app, &command->body.cmd_calibrate);
   case WIRE_CMD_ERASE_CALIBRATION:
-    app_use_calibration(app, NULL);
-    return WIRE_RESULT_DONE;
+    return result_of_put(app, store_put_calibration(&app->store, NULL));
   case WIRE_CMD_PRIOR:
-    return set_prior(app, &command->body.cmd_prior);
+    return set_prior(app, command->body.cmd_prior.sigma_mm, command->body.cmd_prior.width_mm);
   case WIRE_CMD_LOCATION_LIMIT:
     return set_location_limit(app, command->body.cmd_location_limit.limit_mm);
 #endif
-  case WIRE_CMD_KEEP: /* nothing keeps them yet */
-    return WIRE_RESULT_NOT_NOW;
+  case WIRE_CMD_KEEP:
+    return keep_settings(app, command->body.cmd_keep.keep);
   case WIRE_CMD_INFO:
   case WIRE_CMD_HEALTH:
     return WIRE_RESULT_DONE;
@@ -461,26 +530,55 @@ static enum wire_result obey(struct app *app, const struct wire_packet *command,
   }
 }
 
+static void acknowledge(struct app *app, const struct wire_ack *ack, uint64_t now_us) {
+  app->packet.body.ack = *ack;
+  send_packet(app, &wire_ack_layout, now_us);
+  if (ack->result == WIRE_RESULT_DONE) {
+    app->commands_done++;
+  } else {
+    app->commands_rejected++;
+  }
+}
+
 /* app->packet holds the command and is used up. */
 static void answer_command(struct app *app, uint64_t now_us) {
-  uint8_t command = app->packet.type;
-  enum wire_result result = obey(app, &app->packet, now_us);
-  app->packet.body.ack = (struct wire_ack){
-      .command = command,
-      .result = (uint8_t)result,
-      .sequence = app->packet.sequence,
-      .host_time_us = app->packet.t_us,
-  };
-  send_packet(app, &wire_ack_layout, now_us);
-  if (result != WIRE_RESULT_DONE) {
-    app->commands_rejected++;
+  struct wire_ack ack = {.command = app->packet.type,
+                         .sequence = app->packet.sequence,
+                         .host_time_us = app->packet.t_us};
+  int result = obey(app, &app->packet, now_us);
+  if (result == LATER) {
+    app->owed = ack;
     return;
   }
-  app->commands_done++;
-  if (command == WIRE_CMD_INFO) {
+  ack.result = (uint8_t)result;
+  acknowledge(app, &ack, now_us);
+  if (result != WIRE_RESULT_DONE) {
+    return;
+  }
+  if (ack.command == WIRE_CMD_INFO) {
     send_info(app, now_us);
-  } else if (command == WIRE_CMD_HEALTH) {
+  } else if (ack.command == WIRE_CMD_HEALTH) {
     send_health(app, now_us);
+  }
+}
+
+static void follow_store(struct app *app, uint64_t now_us) {
+  if (!store_is_writing(&app->store)) {
+    return;
+  }
+  enum ft_status status = store_poll(&app->store, now_us);
+  if (status == FT_PENDING) {
+    return;
+  }
+  hurry_store(app, false);
+#if FT_WITH_FIT
+  const struct store_content *content = &app->store.content;
+  app_use_calibration(app, content->has_calibration ? &content->calibration : NULL);
+#endif
+  if (app->owed.command != 0) {
+    app->owed.result = status == FT_OK ? WIRE_RESULT_DONE : WIRE_RESULT_NOT_NOW;
+    acknowledge(app, &app->owed, now_us);
+    app->owed.command = 0;
   }
 }
 
@@ -505,6 +603,7 @@ static void follow_port(struct app *app) {
   if (close_count != app->close_count) {
     app->close_count = close_count;
     app->streams = 0;
+    app->owed.command = 0;
     wire_receiver_init(&app->receiver, COMMANDS);
   }
   if (cdc_loader_requested() && app->loader_at_us == 0) {
@@ -561,7 +660,8 @@ void app_run(struct app *app) {
   }
   uint64_t now_us = port_now_us();
   each_second(app, now_us, has_frame);
-  if (app->loader_at_us != 0 && now_us >= app->loader_at_us) {
+  follow_store(app, now_us); /* after the frame, which it must not keep waiting */
+  if (app->loader_at_us != 0 && now_us >= app->loader_at_us && !store_is_writing(&app->store)) {
     port_reboot_to_loader();
   }
   app->idle_since_us = now_us;

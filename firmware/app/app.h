@@ -13,6 +13,7 @@
 #include "contact/contact.h"
 #include "fit/fit.h"
 #include "scan/scan.h"
+#include "store/store.h"
 #include "wire/packet.h"
 
 #include <stdbool.h>
@@ -25,15 +26,16 @@ struct app {
   struct fit_array fit_array;
   struct fit_settings fit_settings;
   uint32_t fit_failures;
-  bool calibrated;
-  struct calibration calibration; /* that acts; of no meaning unless .calibrated */
-  struct condition_gains gains;   /* likewise */
+  const struct calibration *calibration; /* that acts; NULL: none */
+  struct condition_gains gains;          /* of it */
   struct contact_settings contact_settings;
 #endif
 #if FT_WITH_SLIP
   struct slip_history slip_history;
 #endif
   struct wire_receiver receiver;
+  struct store store;
+  struct wire_ack owed; /* for what is being stored; .command 0: to nobody */
 
   /* The frame under way. */
   struct frame frame;
@@ -59,6 +61,7 @@ struct app {
 
   /* Set by the event context from time to time, so that the main loop looks at the clock. */
   _Atomic uint32_t tick;
+  _Atomic uint32_t tick_interval_us;
   uint64_t next_tick_us; /* event context only */
 
   /* Over the second under way, and the one before. */
@@ -86,7 +89,9 @@ void app_on_event(struct app *app);
 void app_process_frame(struct app *app, uint64_t taken_us);
 
 #if FT_WITH_FIT
-/* Has this calibration, which is valid, act from the next frame on; NULL: none. */
+/* Has this calibration, which is valid and outlives the app, act from the next frame on; NULL:
+ * none.
+ */
 void app_use_calibration(struct app *app, const struct calibration *calibration);
 #endif
 

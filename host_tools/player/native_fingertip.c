@@ -3,6 +3,7 @@
 #include "app/app.h"
 #include "config/geometry.h"
 #include "native/native_cdc.h"
+#include "native/native_flash.h"
 #include "native/native_port.h"
 #include "port/port.h"
 
@@ -24,6 +25,7 @@ static uint64_t bus_next_us(const void *context) {
 void native_fingertip_start(const struct native_fingertip_settings *settings) {
   native_start(false);
   native_cdc_reset();
+  native_flash_reset(settings->seed);
   sim_array_init(&array, geometry.sensor_count, settings->seed);
   sim_array_vary_parts(&array, settings->prom_spread);
   array.noise = settings->noise;

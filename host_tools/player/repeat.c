@@ -6,6 +6,7 @@
 #include <string.h>
 
 static struct app app;
+static struct calibration calibration;
 
 bool repeat_begin(const struct wire_info *info) {
   memset(&app, 0, sizeof app);
@@ -21,8 +22,9 @@ bool repeat_begin(const struct wire_info *info) {
   app.fit_settings.prior_sigma_mm = info->prior_sigma_mm;
   app.fit_settings.prior_width_mm = info->prior_width_mm;
   app.fit_settings.location_sd_limit_mm = info->location_limit_mm;
-  const bool calibrated = info->stored & WIRE_STORED_CALIBRATION;
-  app_use_calibration(&app, calibrated ? &info->calibration : NULL);
+  app.fit_settings.model_sd_q16 = (uint16_t)(DEFAULT_MODEL_SD * 65536.0f);
+  calibration = info->calibration;
+  app_use_calibration(&app, info->stored & WIRE_STORED_CALIBRATION ? &calibration : NULL);
   app.contact_settings.slip_threshold_mm = info->slip_threshold_mm;
   app.contact_settings.slip_window_us = info->slip_window_ms * 1000u;
   repeat_tare();

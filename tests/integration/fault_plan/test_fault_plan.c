@@ -12,6 +12,7 @@
 #include "app/app.h"
 #include "common/contact_flags.h"
 #include "native/native_cdc.h"
+#include "native/native_flash.h"
 #include "native/native_port.h"
 #include "native/sim_array.h"
 #include "port/port.h"
@@ -123,6 +124,7 @@ static void run_until(uint64_t t_us) {
 
 static void power_up(void) {
   native_start(false);
+  native_flash_reset(1);
   native_cdc_reset();
   wire_receiver_init(&receiver, wire_all_layouts);
   memset(&seen, 0, sizeof seen);

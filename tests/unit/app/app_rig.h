@@ -6,6 +6,7 @@
 #include "app/app.h"
 #include "config/geometry.h"
 #include "native/native_cdc.h"
+#include "native/native_flash.h"
 #include "native/native_port.h"
 #include "native/sim_array.h"
 #include "port/port.h"
@@ -57,9 +58,9 @@ static inline void main_round(void *context) {
   app_run(context);
 }
 
-static inline void rig_start(void) {
-  memset(&press, 0, sizeof press);
-  world_gain = NULL;
+/* Power goes and comes back; what the flash holds stays, and so does the world. */
+static inline void rig_power_up(void) {
+  native_flash_power_up();
   native_start(false);
   native_cdc_reset();
   sim_array_init(&array, geometry.sensor_count, 1);
@@ -70,6 +71,13 @@ static inline void rig_start(void) {
   app_start(&app, sim_array_bus(&array));
   wire_receiver_init(&receiver, wire_all_layouts);
   host_sequence = 0;
+}
+
+static inline void rig_start(void) {
+  memset(&press, 0, sizeof press);
+  world_gain = NULL;
+  native_flash_reset(1);
+  rig_power_up();
 }
 
 static inline void rig_end(void) {
@@ -112,11 +120,13 @@ static inline bool next_of_type(uint8_t type, struct wire_packet *packet) {
   return false;
 }
 
-/* Sends a command and returns the result of its acknowledgement. */
+/* Sends a command and returns the result of its acknowledgement; storing takes longer than others.
+ */
 static inline uint8_t ask(struct wire_packet command) {
   struct wire_packet packet;
+  bool stores = command.type >= WIRE_CMD_CALIBRATE && command.type <= WIRE_CMD_KEEP;
   send_packet(&command);
-  run_for(30);
+  run_for(stores ? 100 : 30);
   TEST_ASSERT_TRUE_MESSAGE(next_of_type(WIRE_ACK, &packet), "no acknowledgement");
   TEST_ASSERT_EQUAL_HEX8(command.type, packet.body.ack.command);
   TEST_ASSERT_EQUAL_UINT16(host_sequence - 1, packet.body.ack.sequence);

@@ -63,17 +63,18 @@ static void a_press_is_located_and_weighed(void) {
       continue; /* this conversion saw the press begin */
     }
     in_contact++;
-    TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID |
-                                CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TARED,
-                            contact.flags &
-                                ~(uint32_t)(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_HELD));
+    TEST_ASSERT_EQUAL_HEX32(
+        CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
+            CONTACT_FLAG_TARED,
+        contact.flags &
+            ~(uint32_t)(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_HELD));
     TEST_ASSERT_EQUAL_HEX32(0x7FFF, contact.sensors_used);
-    /* Six predicted standard deviations, and 2 um for the compensation's own rounding; of the
-     * force's nearly all is that of a scale that nobody has measured. */
-    TEST_ASSERT_FLOAT_WITHIN(6 * contact.location_sd_mm + 0.002f, 2.5f, contact.x_mm);
-    TEST_ASSERT_FLOAT_WITHIN(6 * contact.location_sd_mm + 0.002f, -7.0f, contact.y_mm);
+    /* Noise, and the compensation's own rounding. The standard deviations are far larger: they are
+     * those of a pad that nobody has calibrated, and these sensors happen to be alike. */
+    TEST_ASSERT_FLOAT_WITHIN(0.01f, 2.5f, contact.x_mm);
+    TEST_ASSERT_FLOAT_WITHIN(0.01f, -7.0f, contact.y_mm);
     TEST_ASSERT_FLOAT_WITHIN(0.01f, 5.0f, contact.force_N);
-    TEST_ASSERT_TRUE(contact.location_sd_mm < 0.01f);
+    TEST_ASSERT_TRUE(contact.location_sd_mm > 0.1f && contact.location_sd_mm < 1.0f);
   }
   TEST_ASSERT_GREATER_THAN(50, in_contact);
   TEST_ASSERT_EQUAL(1, held);
@@ -231,6 +232,167 @@ static void a_calibration_acts_on_readings_and_force(void) {
   TEST_ASSERT_FALSE(erased.flags & CONTACT_FLAG_CALIBRATED);
   TEST_ASSERT_FLOAT_WITHIN(0.01f, before.x_mm, erased.x_mm);
   TEST_ASSERT_FALSE(get_info().stored & WIRE_STORED_CALIBRATION);
+}
+
+/* Restarts, opens the port and asks. */
+static struct wire_info info_after_restart(void) {
+  rig_power_up();
+  native_cdc_open();
+  run_for(300);
+  return get_info();
+}
+
+static void a_calibration_outlives_power(void) {
+  native_cdc_open();
+  run_for(300);
+  struct wire_packet command = calibrate_command();
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(command));
+  TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_CALIBRATION, get_info().stored);
+  struct wire_info info = info_after_restart();
+  TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_CALIBRATION, info.stored);
+  TEST_ASSERT_EQUAL_MEMORY(&command.body.cmd_calibrate.calibration, &info.calibration,
+                           sizeof info.calibration);
+  start_streams(WIRE_STREAM_CONTACT);
+  run_for(50);
+  TEST_ASSERT_TRUE(last_contact().flags & CONTACT_FLAG_CALIBRATED);
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
+                    ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
+  TEST_ASSERT_EQUAL_HEX32(0, info_after_restart().stored);
+}
+
+static uint8_t keep(uint8_t what) {
+  return ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {what}});
+}
+
+static void settings_are_kept_when_asked_for_and_forgotten_likewise(void) {
+  native_cdc_open();
+  run_for(300);
+  const struct wire_info built = get_info();
+  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {50000}});
+  ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {512}});
+  ask((struct wire_packet){.type = WIRE_CMD_SLIP, .body.cmd_slip = {0.5f, 200}});
+  ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {3.1f, 0.4f}});
+  ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {0.8f}});
+  TEST_ASSERT_EQUAL_UINT32_MESSAGE(built.rate_mHz, info_after_restart().rate_mHz, "nobody kept it");
+
+  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {50000}});
+  ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {512}});
+  ask((struct wire_packet){.type = WIRE_CMD_SLIP, .body.cmd_slip = {0.5f, 200}});
+  ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {3.1f, 0.4f}});
+  ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {0.8f}});
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, keep(1));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate_command()));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, keep(2));
+  struct wire_info info = info_after_restart();
+  TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_SETTINGS | WIRE_STORED_CALIBRATION, info.stored);
+  TEST_ASSERT_EQUAL_UINT32(50000, info.rate_mHz);
+  TEST_ASSERT_EQUAL_UINT16(512, info.osr);
+  TEST_ASSERT_EQUAL_FLOAT(0.5f, info.slip_threshold_mm);
+  TEST_ASSERT_EQUAL_UINT16(200, info.slip_window_ms);
+  TEST_ASSERT_EQUAL_FLOAT(3.1f, info.prior_sigma_mm);
+  TEST_ASSERT_EQUAL_FLOAT(0.4f, info.prior_width_mm);
+  TEST_ASSERT_EQUAL_FLOAT(0.8f, info.location_limit_mm);
+  TEST_ASSERT_UINT32_WITHIN(1000, 50000, (run_for(2000), get_info().measured_rate_mHz));
+
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, keep(0));
+  TEST_ASSERT_EQUAL_UINT32_MESSAGE(50000, get_info().rate_mHz, "it goes on until it starts anew");
+  info = info_after_restart();
+  TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_CALIBRATION, info.stored);
+  TEST_ASSERT_EQUAL_UINT32(built.rate_mHz, info.rate_mHz);
+  TEST_ASSERT_EQUAL_UINT16(built.osr, info.osr);
+  TEST_ASSERT_EQUAL_FLOAT(built.prior_width_mm, info.prior_width_mm);
+}
+
+/* The answer to a command that stores is late; until then all goes on as before. */
+static void storing_takes_its_time_and_keeps_nobody_waiting(void) {
+  native_cdc_open();
+  run_for(300);
+  start_streams(WIRE_STREAM_CONTACT | WIRE_STREAM_RAW);
+  run_for(100);
+  struct wire_packet packet, command = calibrate_command();
+  while (next_packet(&packet)) {
+  }
+  send_packet(&command);
+  run_for(10);
+  send_packet(&command);
+  uint32_t frame = 0, frames = 0, calibrated_from = 0;
+  int done = 0, refused = 0;
+  for (int ms = 0; ms < 300; ms++) {
+    run_for(1);
+    if (!done) {
+      TEST_ASSERT_NULL(app.calibration);
+    }
+    while (next_packet(&packet)) {
+      if (packet.type == WIRE_ACK) {
+        done += packet.body.ack.result == WIRE_RESULT_DONE;
+        refused += packet.body.ack.result == WIRE_RESULT_NOT_NOW;
+        TEST_ASSERT_EQUAL_UINT16(done ? host_sequence - 2 : host_sequence - 1,
+                                 packet.body.ack.sequence);
+      } else if (packet.type == WIRE_CONTACT) {
+        TEST_ASSERT_TRUE(frame == 0 || packet.body.contact.frame == frame + 1);
+        frame = packet.body.contact.frame;
+        frames++;
+        bool calibrated = packet.body.contact.flags & CONTACT_FLAG_CALIBRATED;
+        TEST_ASSERT_EQUAL(done == 1, calibrated);
+        calibrated_from = calibrated && !calibrated_from ? frames : calibrated_from;
+      }
+    }
+  }
+  TEST_ASSERT_EQUAL(1, done);
+  TEST_ASSERT_EQUAL(1, refused);
+  TEST_ASSERT_GREATER_THAN_UINT32(50, frames);
+  TEST_ASSERT_LESS_THAN_UINT32(frames, calibrated_from);
+  TEST_ASSERT_EQUAL_UINT32(1, get_health().commands_rejected);
+}
+
+/* At the slowest rate nothing else wakes the main loop. */
+static void storing_is_as_quick_at_the_slowest_rate(void) {
+  native_cdc_open();
+  run_for(300);
+  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {WIRE_RATE_MIN_mHz}});
+  run_for(1000);
+  struct wire_packet packet, command = calibrate_command();
+  send_packet(&command);
+  run_for(100); /* until the main loop looks at what the host has sent */
+  run_for(100);
+  TEST_ASSERT_TRUE(next_of_type(WIRE_ACK, &packet));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, packet.body.ack.result);
+}
+
+static void the_loader_waits_for_what_is_being_stored(void) {
+  native_cdc_open();
+  run_for(300);
+  struct wire_packet calibrate = calibrate_command();
+  struct wire_packet loader = {.type = WIRE_CMD_LOADER, .body.cmd_loader = {WIRE_LOADER_MAGIC}};
+  send_packet(&loader);
+  run_for(45); /* it leaves 50 ms after the command */
+  send_packet(&calibrate);
+  TEST_ASSERT_EQUAL(NATIVE_TIME_UP, run_for(20));
+  TEST_ASSERT_EQUAL(NATIVE_LOADER, run_for(200));
+  TEST_ASSERT_TRUE(info_after_restart().stored & WIRE_STORED_CALIBRATION);
+}
+
+static void a_flash_that_fails_is_no_calibration(void) {
+  native_cdc_open();
+  run_for(300);
+  native_flash_wear_out();
+  struct wire_packet packet, command = calibrate_command();
+  send_packet(&command);
+  run_for(1000);
+  TEST_ASSERT_TRUE(next_of_type(WIRE_ACK, &packet));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_NOT_NOW, packet.body.ack.result);
+  TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
+}
+
+static void damage_is_told_and_not_used(void) {
+  native_cdc_open();
+  run_for(300);
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate_command()));
+  native_flash.bytes[100] ^= 4;
+  struct wire_info info = info_after_restart();
+  TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_DAMAGED, info.stored);
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate_command()));
+  TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_CALIBRATION, info_after_restart().stored);
 }
 
 static void a_calibration_out_of_range_is_refused(void) {
@@ -501,6 +663,13 @@ int main(void) {
   RUN_TEST(info_tells_what_this_is);
   RUN_TEST(settings_are_checked_and_kept);
   RUN_TEST(a_calibration_acts_on_readings_and_force);
+  RUN_TEST(a_calibration_outlives_power);
+  RUN_TEST(settings_are_kept_when_asked_for_and_forgotten_likewise);
+  RUN_TEST(storing_takes_its_time_and_keeps_nobody_waiting);
+  RUN_TEST(storing_is_as_quick_at_the_slowest_rate);
+  RUN_TEST(the_loader_waits_for_what_is_being_stored);
+  RUN_TEST(a_flash_that_fails_is_no_calibration);
+  RUN_TEST(damage_is_told_and_not_used);
   RUN_TEST(a_calibration_out_of_range_is_refused);
   RUN_TEST(priors_and_limits_are_checked);
   RUN_TEST(at_20_Hz_frames_are_50_ms_apart);

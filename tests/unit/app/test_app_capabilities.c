@@ -99,6 +99,29 @@ static void it_streams_what_it_has(void) {
   TEST_ASSERT_EQUAL(FT_WITH_SLIP, slips > 20);
 }
 
+/* Settings that it has; what another firmware has stored beside them stays. */
+static void it_keeps_settings(void) {
+  native_cdc_open();
+  run_for(300);
+  struct calibration calibration = {.placements = 20, .force_scale = 1.0f};
+  for (unsigned k = 0; k < geometry.sensor_count; k++) {
+    calibration.sensors[k].gain = 1.0f;
+  }
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&app.store, &calibration));
+  run_for(500);
+  ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {512}});
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
+                    ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}}));
+  rig_power_up();
+  native_cdc_open();
+  run_for(300);
+  struct wire_info info = get_info();
+  TEST_ASSERT_EQUAL_UINT16(512, info.osr);
+  TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_SETTINGS | (FT_WITH_FIT ? WIRE_STORED_CALIBRATION : 0),
+                          info.stored);
+  TEST_ASSERT_EQUAL_UINT16(20, app.store.content.calibration.placements);
+}
+
 static void it_tares(void) {
   native_cdc_open();
   run_for(300);
@@ -118,6 +141,7 @@ int main(void) {
   RUN_TEST(it_tells_its_capabilities_and_their_settings_only);
   RUN_TEST(it_refuses_streams_and_commands_that_it_lacks);
   RUN_TEST(it_streams_what_it_has);
+  RUN_TEST(it_keeps_settings);
   RUN_TEST(it_tares);
   return UNITY_END();
 }
