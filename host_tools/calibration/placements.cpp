@@ -20,6 +20,8 @@ constexpr double SEEN_MIN = 0.8; /* share of the frames in which a sensor must h
 constexpr double SLOTS_MIN = 5.0;
 /* Of a frame, rms: no sensor at any oversampling has more than 11 Pa (ms5840.h). */
 constexpr double NOISE_Pa = 11.0, NOISE_SDS = 4.0;
+/* The largest of fifteen rms of ten readings is hardly ever beyond this many times the noise. */
+constexpr double SWAY_NOISES = 2.5;
 
 } // namespace
 
@@ -169,7 +171,8 @@ std::optional<Placement> PlacementFinder::settled(double t_s) {
     sum += std::max(placement.reading_Pa[k], 0.0);
   }
   /* A line through each sensor's slots: its change over the time, and what the line leaves. */
-  double common = 0.0, left_squares = 0.0, left_count = 0.0, frames = 0.0, slots = 0.0;
+  double common = 0.0, sway = 0.0, left_squares = 0.0, left_count = 0.0;
+  double frames = 0.0, slots = 0.0;
   std::vector<double> changes(sensors_, 0.0);
   for (std::size_t k = 0; k < sensors_; k++) {
     double tt = 0.0, tp = 0.0, pp = 0.0, count = 0.0;
@@ -185,8 +188,10 @@ std::optional<Placement> PlacementFinder::settled(double t_s) {
     if (seen >> k & 1u && count >= SLOTS_MIN) {
       changes[k] = tp / tt * (t_s - begin_s);
       common += changes[k];
-      left_squares += std::max(pp - tp * tp / tt, 0.0);
+      const double left = std::max(pp - tp * tp / tt, 0.0);
+      left_squares += left;
       left_count += count - 2.0;
+      sway = std::max(sway, std::sqrt(left / (count - 2.0)));
     }
   }
   for (const Slot &slot : slots_) {
@@ -198,8 +203,8 @@ std::optional<Placement> PlacementFinder::settled(double t_s) {
   if (slots < SLOTS_MIN) {
     return std::nullopt;
   }
-  const double sway = std::sqrt(left_squares / std::max(left_count, 1.0));
-  placement.noise_Pa = sway * std::sqrt(2.0 / slots); /* with that of the level before */
+  /* With that of the level before. */
+  placement.noise_Pa = std::sqrt(left_squares / std::max(left_count, 1.0) * 2.0 / slots);
   double shift = 0.0;
   for (std::size_t k = 0; k < sensors_; k++) {
     const double share = std::max(placement.reading_Pa[k], 0.0) / std::max(sum, 1.0);
@@ -208,7 +213,7 @@ std::optional<Placement> PlacementFinder::settled(double t_s) {
   const double noise = NOISE_Pa / std::sqrt(frames / slots);
   const bool still = std::abs(common) <= DECAY_MAX * sum + NOISE_SDS * noise &&
                      shift <= SHIFT_MAX * peak + NOISE_SDS * noise &&
-                     sway <= SWAY_MAX * peak + 2.0 * noise;
+                     sway <= SWAY_MAX * peak + SWAY_NOISES * noise;
   if (peak < LIGHT_Pa && still) {
     /* Rubber that comes back after a release is like that, too: the level to rest at now. */
     state_ = State::resting;

@@ -1,6 +1,8 @@
 /* fingertip: the command line tool. Exit status: 0 done; 1 something went wrong, said in one line;
  * 2 wrong usage. */
+#include "cli/calibrate.hpp"
 #include "cli/flash.hpp"
+#include "cli/gains.hpp"
 #include "cli/joint.hpp"
 #include "cli/live.hpp"
 #include "cli/replay.hpp"
@@ -15,9 +17,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <bitset>
-#include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <map>
 
 namespace {
@@ -48,6 +48,7 @@ struct Options {
   LiveOptions live;
   ReplayOptions replay;
   FlashOptions flash;
+  CalibrateOptions calibrate;
   std::vector<std::string> settings;
   bool keep = false, forget = false;
   std::vector<std::string> encode;
@@ -140,34 +141,6 @@ void leave_out_missing(Metadata &pairs, std::uint32_t capabilities) {
            (of_fit && !(capabilities & WIRE_CAPABILITY_FIT));
   };
   pairs.erase(std::remove_if(pairs.begin(), pairs.end(), is_missing), pairs.end());
-}
-
-std::string date_text(std::uint32_t date_s) {
-  std::time_t time = date_s;
-  std::tm utc{};
-  gmtime_r(&time, &utc);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M UTC", &utc);
-  return text;
-}
-
-/* A row for each sensor, with a bar from the mean to its gain. */
-void print_gains(const calibration &calibration, std::uint8_t sensor_count) {
-  constexpr int HALF = 10;
-  constexpr double PER_MARK = 0.02;
-  std::printf("\nsensor    gain    sd %%  memory %%%*s-20 %%      mean      +20 %%\n", 3, "");
-  for (int k = 0; k < sensor_count; k++) {
-    const sensor_calibration &sensor = calibration.sensors[k];
-    int marks =
-        std::clamp(static_cast<int>(std::lround((static_cast<double>(sensor.gain) - 1) / PER_MARK)),
-                   -HALF, HALF);
-    std::string below(static_cast<std::size_t>(std::max(-marks, 0)), '#');
-    std::string above(static_cast<std::size_t>(std::max(marks, 0)), '#');
-    std::printf("%6d  %6.3f  %6.1f  %8.1f   %*s%s|%s\n", k, static_cast<double>(sensor.gain),
-                100.0 * static_cast<double>(sensor.gain_sd),
-                100.0 * static_cast<double>(sensor.memory),
-                HALF + 2 - static_cast<int>(below.size()), "", below.c_str(), above.c_str());
-  }
 }
 
 int info(const Options &options) {
@@ -418,6 +391,18 @@ double seconds_from_text(const std::string &text) {
   return *seconds;
 }
 
+constexpr double GRAVITY_N_PER_g = 9.80665e-3;
+
+double weight_N_from_text(const std::string &option, const std::string &text, double unit_N) {
+  constexpr double LIGHTEST_N = 0.1, HEAVIEST_N = 50;
+  auto weight = to_double(text);
+  if (!weight || *weight * unit_N < LIGHTEST_N || *weight * unit_N > HEAVIEST_N) {
+    wrong_value(option, text,
+                fixed(LIGHTEST_N / unit_N, 1) + " to " + fixed(HEAVIEST_N / unit_N, 0));
+  }
+  return *weight * unit_N;
+}
+
 Reach reach_from_text(const std::string &text) {
   static const std::map<std::string, Reach> kinds = {
       {"auto", Reach::automatic}, {"serial", Reach::serial}, {"usb", Reach::usb}};
@@ -594,6 +579,49 @@ int run(int argc, char **argv) {
 
   with_port(add("tare", "Measure the zero of every sensor anew; nothing may touch the pad",
                 [&] { return tare(options); }));
+  CLI::App *calibrate = with_port(add(
+      "calibrate", "Find the sensors' gains by setting down one weight at some twenty places", [&] {
+        if (options.calibrate.dry_run && options.calibrate.from.empty()) {
+          throw WrongUsage("--dry-run goes with --from; without, it asks before it writes");
+        }
+        options.calibrate.choice = options.choice;
+        return run_calibrate(options.calibrate);
+      }));
+  CLI::Option *weight =
+      calibrate
+          ->add_option_function<std::string>(
+              "--weight",
+              [&](const std::string &text) {
+                options.calibrate.force_N = weight_N_from_text("--weight", text, GRAVITY_N_PER_g);
+              },
+              "The weight's, where it is known: then forces are calibrated too")
+          ->type_name("GRAMS");
+  calibrate
+      ->add_option_function<std::string>(
+          "--force",
+          [&](const std::string &text) {
+            options.calibrate.force_N = weight_N_from_text("--force", text, 1.0);
+          },
+          "The same in newtons")
+      ->excludes(weight)
+      ->type_name("N");
+  CLI::Option *from =
+      calibrate
+          ->add_option("--from", options.calibrate.from,
+                       "From a recording of such placements, with pressures, instead of live")
+          ->type_name("FILE.csv");
+  CLI::Option *dry_run =
+      calibrate->add_flag("--dry-run", options.calibrate.dry_run, "With --from: only show");
+  CLI::Option *yes =
+      calibrate->add_flag("--yes", options.calibrate.yes, "Write, or erase, without asking");
+  CLI::Option *show =
+      calibrate
+          ->add_flag("--show", options.calibrate.show, "Show what the fingertip is calibrated by")
+          ->excludes(weight, from, dry_run, yes);
+  calibrate
+      ->add_flag("--erase", options.calibrate.erase, "Have it forget its calibration; it asks")
+      ->excludes(weight, from, dry_run, show);
+  with_colour(calibrate, options.calibrate.colour);
   CLI::App *set_command =
       with_port(add("set", "Change settings until the next power-on, or for good with --keep",
                     [&] { return set(options); }));

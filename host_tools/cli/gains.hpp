@@ -1,0 +1,17 @@
+/* Calibrations, printed for people. */
+#pragma once
+
+#include "libfingertip/wire.hpp"
+
+#include <cstdint>
+#include <string>
+
+namespace fingertip {
+
+/* "2026-08-05 12:00 UTC" */
+std::string date_text(std::uint32_t date_s);
+
+/* On standard output a row for each sensor, with a bar from the mean to its gain. */
+void print_gains(const calibration &calibration, std::uint8_t sensor_count);
+
+} // namespace fingertip

@@ -1,0 +1,206 @@
+#include "calibration/judge.hpp"
+#include "support/placements.hpp"
+
+#include <functional>
+#include <gtest/gtest.h>
+#include <numeric>
+
+using namespace fingertip::calibrating;
+using fingertip::Random;
+using test::good_session;
+using test::KnownPad;
+using State = Judgement::State;
+
+namespace {
+
+/* Of thirty placements, each made by `press` on pad and placements of this seed. */
+Judgement judged(std::uint64_t seed,
+                 const std::function<KnownPad::Press(Random &random, int i)> &press,
+                 const std::function<void(Placement &placement, int i)> &change = {},
+                 std::size_t count = 30) {
+  const KnownPad pad(seed);
+  Random random(seed, 5, 0);
+  std::vector<Placement> placements;
+  for (int i = 0; i < static_cast<int>(count); i++) {
+    placements.push_back(pad.place(press(random, i), 4.0 * i, random));
+    if (change) {
+      change(placements.back(), i);
+    }
+  }
+  return judge(pad.array, placements, true);
+}
+
+KnownPad::Press anywhere(Random &random, int = 0) {
+  const double x = random.uniform(-9.0, 9.0);
+  return {x, random.uniform(-18.0, 18.0)};
+}
+
+void expect_refused(const Judgement &judgement, Reason reason, const std::string &words) {
+  EXPECT_EQ(judgement.state, State::refused) << judgement.text;
+  EXPECT_STREQ(name_of(judgement.reason), name_of(reason)) << judgement.text;
+  EXPECT_NE(judgement.text.find(words), std::string::npos) << judgement.text;
+}
+
+} // namespace
+
+TEST(Judge, accepts_good_sessions) {
+  for (std::uint64_t seed = 40; seed < 60; seed++) {
+    const Judgement judgement = judged(seed, anywhere, {}, 36);
+    EXPECT_EQ(judgement.state, State::good) << seed << judgement.text;
+    EXPECT_STREQ(name_of(judgement.reason), "none");
+    EXPECT_LE(judgement.solution.worst_shape_sd(), SHAPE_SD_MAX);
+  }
+}
+
+TEST(Judge, asks_for_more_until_it_is_good) {
+  const KnownPad pad(61);
+  const auto placements = good_session(pad, PLACEMENTS_MAX, 61);
+  State state = State::more;
+  std::size_t count = 0;
+  while (state == State::more && count < placements.size()) {
+    count++;
+    const Judgement judgement =
+        judge(pad.array, {placements.begin(), placements.begin() + std::ptrdiff_t(count)}, false);
+    state = judgement.state;
+    EXPECT_EQ(state == State::more, !judgement.unsure.empty() || count < PLACEMENTS_WANTED);
+  }
+  EXPECT_EQ(state, State::good);
+  EXPECT_GE(count, PLACEMENTS_WANTED);
+  EXPECT_LE(count, 40u);
+}
+
+TEST(Judge, refuses_an_elongated_object) {
+  expect_refused(judged(62,
+                        [](Random &random, int) {
+                          KnownPad::Press press = anywhere(random);
+                          press.axes = 1.15;
+                          press.slant = random.uniform(0.0, M_PI);
+                          return press;
+                        }),
+                 Reason::elongated, "round");
+  expect_refused(judged(63,
+                        [](Random &random, int) {
+                          KnownPad::Press press = anywhere(random);
+                          press.axes = 1.15;
+                          return press;
+                        }),
+                 Reason::elongated, "round");
+}
+
+TEST(Judge, refuses_offsets) {
+  expect_refused(judged(64, anywhere,
+                        [](Placement &placement, int) {
+                          for (std::size_t k = 0; k < 15; k++) {
+                            placement.reading_Pa[k] += k % 2 ? 500.0 : -500.0;
+                          }
+                        }),
+                 Reason::offsets, "tare");
+}
+
+TEST(Judge, refuses_drift) {
+  expect_refused(judged(65, anywhere,
+                        [](Placement &placement, int i) {
+                          for (std::size_t k = 0; k < 15; k++) {
+                            placement.reading_Pa[k] += (k % 2 ? 200.0 : -200.0) * i / 29.0;
+                          }
+                        }),
+                 Reason::drift, "warm up");
+}
+
+TEST(Judge, refuses_different_weights) {
+  expect_refused(judged(66,
+                        [](Random &random, int i) {
+                          KnownPad::Press press = anywhere(random);
+                          press.force = i % 2 ? 1.0 : 1.3;
+                          return press;
+                        }),
+                 Reason::weights, "same weight");
+}
+
+TEST(Judge, refuses_one_end_a_cluster_and_too_few) {
+  expect_refused(judged(67,
+                        [](Random &random, int) {
+                          const double x = random.uniform(-9.0, 9.0);
+                          return KnownPad::Press{x, random.uniform(6.0, 18.0)};
+                        }),
+                 Reason::one_end, "sensors 0");
+  expect_refused(judged(68,
+                        [](Random &random, int) {
+                          const double x = random.uniform(-5.0, 5.0);
+                          return KnownPad::Press{x, random.uniform(-5.0, 5.0)};
+                        }),
+                 Reason::cluster, "near one place");
+  expect_refused(judged(69, anywhere, {}, 7), Reason::too_few, "(7)");
+  expect_refused(judge(KnownPad(70).array, {}, true), Reason::too_few, "(0)");
+}
+
+TEST(Judge, refuses_placements_that_do_not_fit_each_other) {
+  expect_refused(judged(71,
+                        [](Random &random, int i) {
+                          KnownPad::Press press = anywhere(random);
+                          if (i % 5 < 2) { /* two of five lean or lie */
+                            press.axes = 1.8;
+                            press.slant = random.uniform(0.0, M_PI);
+                          }
+                          return press;
+                        }),
+                 Reason::stray, "of the placements fit each other");
+}
+
+TEST(Judge, refuses_sensors_in_other_places) {
+  KnownPad pad(72);
+  Random random(72, 5, 0);
+  for (std::size_t k = 0; k < 15; k++) {
+    pad.x_mm[k] += k % 2 ? 0.8 : -0.8;
+    pad.y_mm[k] += k % 3 ? 0.8 : -0.8;
+  }
+  const Judgement judgement = judge(pad.array, good_session(pad, 30, 72), true);
+  EXPECT_EQ(judgement.state, State::refused);
+  EXPECT_STREQ(name_of(judgement.reason), "layout") << judgement.text;
+}
+
+/* Thin rubber: a placement is felt by a sensor or two. */
+TEST(Judge, says_what_thin_rubber_does_not_tell) {
+  const Judgement judgement = judged(73, [](Random &random, int) {
+    KnownPad::Press press = anywhere(random);
+    press.width_mm = 2.4;
+    return press;
+  });
+  expect_refused(judgement, Reason::unsure, "thin rubber");
+  EXPECT_FALSE(judgement.unsure.empty());
+}
+
+TEST(Judge, halves_that_disagree_are_refused) {
+  /* Every other placement finds another gain at one sensor: as a cable that touches now and then. */
+  const Judgement judgement = judged(
+      74, anywhere,
+      [](Placement &placement, int i) { placement.reading_Pa[7] *= i % 2 ? 0.955 : 1.045; }, 44);
+  EXPECT_EQ(judgement.state, State::refused) << judgement.text;
+}
+
+TEST(Force, one_known_weight_gives_the_scale) {
+  const KnownPad pad(75);
+  const auto placements = good_session(pad, 30, 75);
+  const Solution s = solve(pad.array, placements);
+  const auto scale = force_scale(pad.array, placements, s, 3.0);
+  ASSERT_TRUE(scale);
+  const auto twice = force_scale(pad.array, placements, s, 6.0);
+  EXPECT_NEAR(twice->scale, 2.0 * scale->scale, 1e-12);
+  EXPECT_NEAR(twice->sd, 2.0 * scale->sd, 1e-12);
+  /* The force under the bump is 2 pi PEAK s^2 n / (n - 1), of which a Gaussian holds most. */
+  const double under_N = 2e-6 * M_PI * KnownPad::PEAK_Pa * 5.5 * 5.5 * 12.0 / 11.0;
+  const double right = force_scale(pad.array, placements, s, under_N)->scale;
+  EXPECT_GT(right, 1.0);
+  EXPECT_LT(right, 1.15);
+  EXPECT_FALSE(force_scale(pad.array, {}, Solution{}, 3.0));
+}
+
+TEST(Scatter, gains_bring_the_placements_together) {
+  const KnownPad pad(76);
+  const auto placements = good_session(pad, 30, 76);
+  const Solution s = solve(pad.array, placements);
+  const Scatter before = scatter(pad.array, placements, s, false);
+  const Scatter after = scatter(pad.array, placements, s, true);
+  EXPECT_LT(after.location_mm, 0.6 * before.location_mm);
+  EXPECT_LT(after.force, 0.5 * before.force);
+}

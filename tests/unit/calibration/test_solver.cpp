@@ -1,0 +1,218 @@
+#include "calibration/solver.hpp"
+#include "support/placements.hpp"
+
+#include <algorithm>
+#include <gtest/gtest.h>
+#include <numeric>
+
+using namespace fingertip::calibrating;
+using fingertip::Random;
+using test::good_session;
+using test::KnownPad;
+
+namespace {
+
+double rms_error(const std::vector<double> &gain, const std::vector<double> &truth) {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < truth.size(); k++) {
+    sum += std::pow(std::log(gain[k] / truth[k]), 2);
+  }
+  return std::sqrt(sum / static_cast<double>(truth.size()));
+}
+
+} // namespace
+
+TEST(Solver, finds_gains_places_and_the_profile) {
+  const KnownPad pad(3);
+  const auto placements = good_session(pad, 30, 3);
+  const Solution s = solve(pad.array, placements);
+  ASSERT_TRUE(s.solved);
+  EXPECT_LT(rms_error(s.gain, pad.gain), 0.008);
+  EXPECT_NEAR(std::accumulate(s.gain.begin(), s.gain.end(), 0.0), 15.0, 1e-9);
+  EXPECT_NEAR(s.peak_Pa / KnownPad::PEAK_Pa, 1.0, 0.02);
+  EXPECT_EQ(s.kept, 30u);
+  EXPECT_LT(s.residual_share, 0.003);
+  EXPECT_LT(s.spread.force, 0.008);
+  EXPECT_LT(s.spread.position_mm, 0.08);
+  Random random(3, 2, 0);
+  for (const Fitted &fitted : s.placements) {
+    const double x = random.uniform(-9.0, 9.0), y = random.uniform(-18.0, 18.0);
+    EXPECT_NEAR(fitted.x_mm, x, 0.15);
+    EXPECT_NEAR(fitted.y_mm, y, 0.15);
+    for (int k = 0; k < 15; k++) {
+      random.normal();
+    }
+  }
+}
+
+/* A tilt alone is what touches of unknown strength do not tell. */
+TEST(Solver, one_weight_tells_a_tilt_and_a_bowl) {
+  for (int kind = 0; kind < 2; kind++) {
+    KnownPad pad(4, 0.0);
+    for (std::size_t k = 0; k < 15; k++) {
+      const double x = pad.array.x_mm[k], y = pad.array.y_mm[k];
+      pad.gain[k] = kind == 0 ? 1.0 + 0.006 * y : std::exp(0.0008 * (x * x + y * y - 216.0));
+    }
+    const double mean = std::accumulate(pad.gain.begin(), pad.gain.end(), 0.0) / 15.0;
+    for (double &gain : pad.gain) {
+      gain /= mean;
+    }
+    const Solution s = solve(pad.array, good_session(pad, 30, 4));
+    EXPECT_LT(rms_error(s.gain, pad.gain), 0.015) << kind;
+    std::vector<double> shape = outside_gauge(pad.array, pad.gain);
+    EXPECT_LT(std::abs(*std::max_element(shape.begin(), shape.end())), 0.01) << kind;
+  }
+}
+
+TEST(Solver, standard_deviations_are_honest) {
+  for (double misplaced_mm : {0.0, 0.1}) {
+    double within_one = 0.0, within_two = 0.0, all = 0.0;
+    for (std::uint64_t seed = 100; seed < 125; seed++) {
+      const KnownPad pad(seed, 0.1, misplaced_mm);
+      const Solution s = solve(pad.array, good_session(pad, 25, seed));
+      for (std::size_t k = 0; k < 15; k++) {
+        const double off = std::abs(std::log(s.gain[k] / pad.gain[k])) / s.gain_sd[k];
+        within_one += off < 1.0;
+        within_two += off < 2.0;
+        all += 1.0;
+      }
+    }
+    EXPECT_GT(within_one / all, 0.58) << misplaced_mm;
+    EXPECT_GT(within_two / all, 0.92) << misplaced_mm;
+  }
+}
+
+TEST(Solver, more_placements_tell_more) {
+  const KnownPad pad(5);
+  const auto placements = good_session(pad, 40, 5);
+  double before = 1.0;
+  for (std::size_t count : {6u, 10u, 20u, 40u}) {
+    const Solution s = solve(pad.array, {placements.begin(), placements.begin() + count});
+    EXPECT_LT(s.worst_shape_sd(), 0.8 * before) << count;
+    before = s.worst_shape_sd();
+  }
+}
+
+TEST(Solver, drops_what_is_no_such_placement) {
+  const KnownPad pad(6);
+  auto placements = good_session(pad, 25, 6);
+  Random random(6, 3, 0);
+  placements[7] = pad.place({2.0, -5.0, 1.0, 2.5, 0.4}, placements[7].t_s, random);
+  placements[16] = pad.place({-3.0, 8.0, 0.5}, placements[16].t_s, random);
+  const Solution s = solve(pad.array, placements);
+  EXPECT_EQ(s.kept, 23u);
+  EXPECT_FALSE(s.placements[7].kept);
+  EXPECT_FALSE(s.placements[16].kept);
+  EXPECT_LT(rms_error(s.gain, pad.gain), 0.01);
+}
+
+TEST(Solver, sees_what_a_session_holds) {
+  KnownPad pad(7);
+  Random random(7, 3, 0);
+  auto moved = good_session(pad, 30, 7);
+  for (Placement &placement : moved) {
+    placement.reading_Pa[4] += 300.0;
+    placement.reading_Pa[9] += 400.0 * (placement.t_s / moved.back().t_s - 0.5);
+  }
+  const Solution zeros = solve(pad.array, moved);
+  EXPECT_NEAR(zeros.offset_Pa[4], 300.0, 40.0);
+  EXPECT_NEAR(zeros.drift_Pa[9], 400.0, 60.0);
+  EXPECT_NEAR(zeros.offset_Pa[0], 0.0, 60.0);
+
+  pad.x_mm[12] += 0.6;
+  const Solution layout = solve(pad.array, good_session(pad, 30, 7));
+  EXPECT_NEAR(layout.dx_mm[12], 0.5, 0.15); /* the prior draws it towards none */
+
+  std::vector<Placement> oval;
+  for (int i = 0; i < 30; i++) {
+    oval.push_back(pad.place({random.uniform(-9, 9), random.uniform(-18, 18), 1.0, 1.2, 0.0},
+                             4.0 * i, random));
+  }
+  const Solution shape = solve(pad.array, oval);
+  EXPECT_NEAR(2.0 * shape.ellipse_of_all[0], std::log(1.2), 0.03);
+  EXPECT_NEAR(shape.ellipse_of_all[1], 0.0, 0.02);
+}
+
+/* Rubber that has not let go of the placement before. */
+TEST(Solver, tells_memory_from_gain) {
+  const KnownPad pad(8);
+  auto placements = good_session(pad, 30, 8);
+  remember(placements);
+  std::vector<double> memory;
+  for (std::size_t k = 0; k < 15; k++) {
+    memory.push_back(0.01 + 0.004 * static_cast<double>(k % 5));
+  }
+  std::vector<Placement> felt = placements;
+  for (Placement &placement : felt) {
+    for (std::size_t k = 0; k < 15; k++) {
+      const double share =
+          placement.reading_Pa[k] / (placement.reading_Pa[k] + REMEMBERS_FROM * KnownPad::PEAK_Pa);
+      placement.reading_Pa[k] -= memory[k] * placement.earlier_Pa[k] * std::max(share, 0.0);
+    }
+  }
+  const Solution s = solve(pad.array, felt);
+  EXPECT_LT(rms_error(s.gain, pad.gain), 0.012);
+  for (std::size_t k = 0; k < 15; k++) {
+    EXPECT_NEAR(s.memory[k], memory[k], 0.012) << k;
+  }
+}
+
+TEST(Solver, a_sensor_that_is_missing_is_not_known) {
+  const KnownPad pad(9);
+  auto placements = good_session(pad, 20, 9);
+  for (Placement &placement : placements) {
+    placement.usable &= ~(1u << 6);
+    placement.reading_Pa[6] = 1e9;
+  }
+  const Solution s = solve(pad.array, placements);
+  EXPECT_GT(s.gain_sd[6], 0.1);
+  EXPECT_LT(s.gain_sd[7], 0.03);
+  EXPECT_NEAR(s.gain[7] / s.gain[8], pad.gain[7] / pad.gain[8], 0.03);
+}
+
+TEST(Solver, is_deterministic_and_refuses_nonsense) {
+  const KnownPad pad(10);
+  const auto placements = good_session(pad, 15, 10);
+  const Solution a = solve(pad.array, placements), b = solve(pad.array, placements);
+  EXPECT_EQ(a.gain, b.gain);
+  EXPECT_EQ(a.gain_sd, b.gain_sd);
+  EXPECT_EQ(a.cost, b.cost);
+  EXPECT_FALSE(solve(pad.array, {}).solved);
+  EXPECT_FALSE(solve(pad.array, {placements[0], placements[1]}).solved);
+  auto wrong = placements;
+  wrong[3].reading_Pa.pop_back();
+  EXPECT_THROW(solve(pad.array, wrong), std::invalid_argument);
+  auto dead = placements;
+  for (Placement &placement : dead) {
+    placement.reading_Pa.assign(15, 0.0);
+  }
+  for (double gain : solve(pad.array, dead).gain) {
+    EXPECT_TRUE(std::isfinite(gain));
+  }
+}
+
+/* Placements where they are wanted are worth more than placements anywhere. */
+TEST(Solver, wants_the_place_that_tells_most) {
+  const KnownPad pad(11);
+  Random random(11, 3, 0);
+  std::vector<Placement> placements;
+  for (int i = 0; i < 12; i++) { /* none at the upper end */
+    placements.push_back(
+        pad.place({random.uniform(-9, 9), random.uniform(-18, 4)}, 4.0 * i, random));
+  }
+  const Solution s = solve(pad.array, placements);
+  const Wanted wanted = next_place(pad.array, placements, s);
+  EXPECT_GE(wanted.y_mm, 9.0);
+  EXPECT_LT(wanted.worst_shape_sd, s.worst_shape_sd());
+  auto asked = placements, elsewhere = placements;
+  asked.push_back(pad.place({wanted.x_mm, wanted.y_mm}, 60.0, random));
+  elsewhere.push_back(pad.place({0.0, -9.0}, 60.0, random));
+  EXPECT_LT(solve(pad.array, asked).worst_shape_sd(),
+            solve(pad.array, elsewhere).worst_shape_sd());
+  /* The first in the middle, and then away from it. */
+  const Wanted first = next_place(pad.array, {}, Solution{});
+  EXPECT_NEAR(std::hypot(first.x_mm, first.y_mm), 0.0, 1e-9);
+  const Wanted second =
+      next_place(pad.array, {pad.place({0.0, 0.0}, 0.0, random)}, Solution{});
+  EXPECT_GT(std::hypot(second.x_mm, second.y_mm), 15.0);
+}
