@@ -106,8 +106,8 @@ inline wire_packet make_info(std::uint16_t sequence, std::uint64_t t_us) {
 
 inline wire_packet make_health(std::uint16_t sequence, std::uint64_t t_us) {
   wire_packet packet = make_packet(WIRE_HEALTH, sequence, t_us);
-  packet.body.health = {7,  1,  2,  3,      4,  5,           6,  7,  8, 9,
-                        10, 11, 12, 0x7FFF, 15, 0xFFFFFFFFu, 17, 18, 13};
+  packet.body.health = {7,  1,  2,  3,  4,      5,  6,           7,  8,  9,
+                        10, 11, 12, 14, 0x7FFF, 15, 0xFFFFFFFFu, 17, 18, 13};
   return packet;
 }
 
