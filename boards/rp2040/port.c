@@ -1,7 +1,7 @@
 #include "port/port.h"
 
 #include "rp2040/event.h"
-#include "rp2040/flash_id.h"
+#include "rp2040/flash.h"
 #include "rp2040/nvic.h"
 #include "rp2040/resets.h"
 #include "rp2040/timer_regs.h"
@@ -152,7 +152,7 @@ _Noreturn void port_panic(void) {
 
 static void read_serial_number(void) {
   uint8_t id[FLASH_ID_BYTES] = {0};
-  if (flash_read_id(id) != FT_OK)
+  if (flash_start() != FT_OK || flash_read_id(id) != FT_OK)
     port_panic();
   for (unsigned i = 0; i < 2 * FLASH_ID_BYTES; i++) {
     unsigned digit = (unsigned)id[i / 2] >> (i % 2 ? 0 : 4) & 15u;

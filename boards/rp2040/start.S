@@ -61,11 +61,7 @@ boot_reset:
   dsb
   cpsie i
 
-  ldr r0, =port_start
-  blx r0
-  ldr r0, =main
-  blx r0
-  ldr r0, =port_panic
+  ldr r0, =boot_main
   bx r0
 
   /* Before the SRAM copy stands, a fault can only start over. */
@@ -75,3 +71,12 @@ boot_fault:
   bl clocks_reset_chip
 
   .ltorg
+
+  /* In SRAM: port_start ends execution in place. */
+  .section .text.boot_main, "ax"
+  .thumb_func
+  .type boot_main, %function
+boot_main:
+  bl port_start
+  bl main
+  bl port_panic

@@ -122,6 +122,7 @@ static void get_settings(const uint8_t *at, struct store_settings *settings) {
 static void make_record(struct store *store, const struct calibration *calibration,
                         const struct store_settings *settings) {
   uint8_t *payload = store->record + PAYLOAD_AT;
+  bytes_put_u32(store->record + BEGUN_AT, MARK);
   unsigned length = CALIBRATION_AT + calibration_bytes(store->sensor_count) + SETTINGS_BYTES;
   memset(payload, 0, length);
   payload[0] = (uint8_t)((calibration ? HAS_CALIBRATION : 0) | (settings ? HAS_SETTINGS : 0));
@@ -330,6 +331,15 @@ static enum ft_status fail(struct store *store, enum ft_status why) {
   return why;
 }
 
+/* In the next slot. */
+static enum ft_status try_again(struct store *store, uint64_t now_us) {
+  if (++store->attempts == MAX_ATTEMPTS) {
+    return fail(store, FT_ERR_CRC);
+  }
+  begin_write(store, now_us);
+  return FT_PENDING;
+}
+
 static enum ft_status finish_write(struct store *store) {
   store->sector = store->to_sector;
   store->next_slot = store->to_slot + 1;
@@ -399,17 +409,15 @@ enum ft_status store_poll(struct store *store, uint64_t now_us) {
                          write_length(store));
       begin_step(store, STORE_WRITE, now_us);
     } else {
-      store->at = MAGIC_AT;
+      store->at = BEGUN_AT; /* which the buffer holds zeros for, like the mark */
       begin_step(store, STORE_READ_BACK, now_us);
     }
     break;
   case STORE_READ_BACK:
     if (!read_back(store)) {
-      if (++store->attempts == MAX_ATTEMPTS) {
-        return fail(store, FT_ERR_CRC);
-      }
-      begin_write(store, now_us);
-    } else if (store->at == store->record_length) {
+      return try_again(store, now_us);
+    }
+    if (store->at == store->record_length) {
       program_mark(store, SEALED_AT);
       begin_step(store, STORE_SEAL, now_us);
     }
@@ -419,6 +427,10 @@ enum ft_status store_poll(struct store *store, uint64_t now_us) {
     begin_step(store, STORE_END, now_us);
     break;
   default:
+    if (read_u32(to_address(store) + SEALED_AT) != MARK ||
+        read_u32(to_address(store) + FINAL_AT) != MARK) {
+      return try_again(store, now_us);
+    }
     return finish_write(store);
   }
   return FT_PENDING;

@@ -19,6 +19,7 @@
  *     clock_glitch (sensor)         sees one clock too many, once, in the first transfer from from_s on
  *     host_stall                    the USB host stops reading the CDC port
  *     usb_unplug                    the cable is out; it comes back at to_s
+ *     power_cut                     chip, flash and sensors are without power until to_s; what the flash was doing is cut short
  *
  * sensor_missing, line_stuck_high, scl_stuck_* and clock_glitch need a board with a data line for each sensor.
  * `to_s` may be left out: the fault then stays. Times are seconds since power-on.
@@ -44,8 +45,11 @@ const TARGET = {
   clock_glitch: 'sensor',
   host_stall: null,
   usb_unplug: null,
+  power_cut: null,
 };
 
+/** Not of the board. */
+const OF_THE_WORLD = ['host_stall', 'usb_unplug', 'power_cut'];
 const OF_LINES = ['sensor_missing', 'line_stuck_high', 'scl_stuck_low', 'scl_stuck_high', 'clock_glitch'];
 
 export function parseFaults(text, file, { sensors, muxes, lines }) {
@@ -97,6 +101,9 @@ const NONE = Object.freeze({});
 export class Faults {
   constructor(list, scope, on = {}) {
     this.sensors = new Map();
+    this.on = on;
+    /** Those in force that act by themselves. */
+    this.active = new Set();
     const key = {
       sensor_dead: 'dead', sensor_prom_corrupt: 'promCorrupt', sensor_prom_bit: 'promBit', sensor_adc_zero: 'adcZero',
       sensor_d2_corrupt: 'd2Corrupt',
@@ -108,11 +115,20 @@ export class Faults {
       const change = (active) => {
         if (key[fault.type]) set(key[fault.type], active);
         else if (times[fault.type]) set(times[fault.type], (this.sensor(fault.target)[times[fault.type]] ?? 0) + (active ? 1 : 0));
-        else on[fault.type]?.(fault.target, active);
+        else {
+          if (active) this.active.add(fault);
+          else this.active.delete(fault);
+          on[fault.type]?.(fault.target, active);
+        }
       };
       scope.createAlarm(() => change(true)).scheduleAt(fault.from_ns);
       if (fault.to_ns !== Infinity) scope.createAlarm(() => change(false)).scheduleAt(fault.to_ns);
     }
+  }
+
+  /** On a board that has just been powered. */
+  actAnew() {
+    for (const fault of this.active) if (!OF_THE_WORLD.includes(fault.type)) this.on[fault.type]?.(fault.target, true);
   }
 
   sensor(index) {

@@ -7,6 +7,7 @@
  */
 import { createHash } from 'node:crypto';
 import { Chip, Stopped } from './chip/chip.mjs';
+import { FlashMemory } from './chip/flash_memory.mjs';
 import { SimulatedTime } from './clock.mjs';
 import { Faults } from './faults.mjs';
 import { Report } from './report.mjs';
@@ -19,14 +20,15 @@ const CLOCK_CHECK_NS = 200e6;
 
 export class Machine {
   /**
-   * @param options image: Uint8Array; Board; scenario; seed; faults: parsed list; serial: 16 hex digits; clock_ppm: by how
+   * @param options image: Uint8Array; Board; scenario; seed; faults: parsed list; flash: 2 MiB of content, beside the
+   *   image, from an earlier life; flashSpeed: see BUSY_NS; serial: 16 hex digits; clock_ppm: by how
    *   much the chip's clocks are fast; fastEnumeration; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes);
    *   rise_ns, onLevels: see the boards; makeClient({ host, report, onData }): what uses the USB device, CdcClient by
    *   default
    */
   constructor({
     image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, clock_ppm = 0, fastEnumeration = false, allowWatchdog = false,
-    rise_ns, onLevels, onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {}, makeClient = (parts) => new CdcClient(parts),
+    flash = null, flashSpeed, rise_ns, onLevels, onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {}, makeClient = (parts) => new CdcClient(parts),
   }) {
     this.image = image;
     this.Board = Board;
@@ -40,16 +42,24 @@ export class Machine {
     this.endReason = null;
     this.endDetail = {};
     this.reboots = 0;
+    this.hasPower = true;
+    this.powerCuts = 0;
     this.cyclesBefore = 0;
 
-    this.board = new Board({
-      scope: this.scope, report: this.report, seed, rise_ns, onLevels, onTransfer: onBusTransfer,
+    this.memory = new FlashMemory({ time: this.time, serial: this.serial, seed, speed: flashSpeed });
+    if (flash) this.memory.bytes.set(flash);
+    this.makeBoard = () => new Board({
+      scope: this.boardScope, report: this.report, seed, rise_ns, onLevels, onTransfer: onBusTransfer,
       stimulus: (index, t_ns) => scenario.at_ns(index, t_ns), faults: () => this.faults,
     });
+    this.boardScope = this.time.scope();
+    this.board = this.makeBoard();
     this.host = new UsbHost({ scope: this.scope, report: this.report, fast: fastEnumeration, onPacket: onUsbPacket });
     this.client = makeClient({ host: this.host, report: this.report, onData });
+    const onBoard = (type) => [type, (target, active) => this.board.faultActions[type](target, active)];
     this.faults = new Faults(faults, this.scope, {
-      ...this.board.faultActions,
+      ...Object.fromEntries(Object.keys(this.board.faultActions).map(onBoard)),
+      power_cut: (_, active) => (active ? this.#powerDown() : this.#guard(() => this.#powerBack())),
       host_stall: (_, active) => this.client.setStalled(active),
       usb_unplug: (_, active) => (active ? this.host.unplug() : this.host.plug()),
     });
@@ -63,12 +73,31 @@ export class Machine {
   }
 
   #powerUp(kept) {
-    this.chip = new Chip(this.time, this.report, { serial: this.serial, seed: this.seed, clock_ppm: this.clock_ppm, kept });
+    this.chip = new Chip(this.time, this.report, { serial: this.serial, seed: this.seed, clock_ppm: this.clock_ppm, memory: this.memory, kept });
     this.chip.load(this.image);
     this.board.attachChip(this.chip);
     this.host.connect(this.chip.usbCtrl);
     this.chip.boot();
     this.onPowerUp?.(this.chip);
+  }
+
+  /** Everything on the board loses its power; the cable is still there. */
+  #powerDown() {
+    this.hasPower = false;
+    this.cyclesBefore += this.chip.core.cycles;
+    this.chip.dispose();
+    this.memory.cutPower();
+    this.host.disconnect();
+    throw new Stopped('power cut');
+  }
+
+  #powerBack() {
+    this.hasPower = true;
+    this.powerCuts += 1;
+    this.boardScope.dispose();
+    this.board = this.makeBoard();
+    this.#powerUp(null);
+    this.faults.actAnew();
   }
 
   #guard(action) {
@@ -77,6 +106,7 @@ export class Machine {
       return true;
     } catch (error) {
       if (!(error instanceof Stopped)) throw error;
+      if (error.reason === 'power cut') return true;
       if (error.reason === 'watchdog reboot') {
         this.#reboot(error.detail.reason);
         return true;
@@ -95,15 +125,25 @@ export class Machine {
     this.cyclesBefore += old.core.cycles;
     const kept = { sram: old.sram, watchdog: { reason, scratch: old.watchdog.scratch } };
     old.dispose();
+    this.memory.deselect(); // its pads let go; a command that was under way is what came until then
     this.#guard(() => this.#powerUp(kept));
   }
 
   /** Run to `end_ns`; false when the run ended before (see `endReason`). */
   run(end_ns) {
     while (!this.endReason && this.time.nanos < end_ns) {
-      if (!this.#guard(() => this.chip.runUntil(end_ns))) break;
+      if (!this.#guard(() => (this.hasPower ? this.chip.runUntil(end_ns) : this.#passTime(end_ns)))) break;
     }
     return this.endReason === null;
+  }
+
+  /** Until power is back: what is not on the board goes on. */
+  #passTime(end_ns) {
+    const { time } = this;
+    while (!this.hasPower && time.nanos < end_ns) {
+      time.advanceTo(Math.min(time.next_ns, end_ns));
+      time.fireDue();
+    }
   }
 
   get busyNs() {
@@ -120,6 +160,7 @@ export class Machine {
       device_time_zero_s: chip.timer.zero_ns === null ? null : chip.timer.zero_ns / 1e9,
       clock_ppm: this.clock_ppm,
       reboots: this.reboots,
+      flash: { erases: this.memory.erases, programs: this.memory.programs, power_cuts: this.powerCuts },
       usb: {
         ...host.statistics, configured: host.configured,
         ...(host.device ? { strings: host.device.strings, vendor: host.device.vendor, product: host.device.product } : {}),

@@ -4,6 +4,7 @@ import { readFileSync } from 'node:fs';
 import { createInterface } from 'node:readline';
 import { parseArgs } from 'node:util';
 import { findBoard } from './board/boards.mjs';
+import { FLASH_BYTES } from './chip/flash_memory.mjs';
 import { InputError, inWords } from './errors.mjs';
 import { readFaults } from './faults.mjs';
 import { readHostScript, scheduleHostScript } from './port/host_script.mjs';
@@ -25,7 +26,9 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --seed N             noise, sensor tolerances, SRAM content at power-on; default 1
   --serial HEX16       unique id of the flash chip; default ${DEFAULT_SERIAL}
   --clock-ppm P        the chip's clocks are fast by P parts per million of emulated time, -1000 to 1000; default 0
-  --faults FILE.json   faults of sensors, multiplexers, USB (format: faults.mjs)
+  --faults FILE.json   faults of sensors, multiplexers, USB, power (format: faults.mjs)
+  --flash FILE         what the flash holds beside the image, 2 MiB, from an earlier run; written anew at the end of this one
+  --slow-flash         the flash takes the longest times of its datasheet instead of the typical ones
   --fast-enumeration   shorten the host's debounce and reset waits
   --allow-watchdog     a watchdog reboot is no warning
 
@@ -61,6 +64,7 @@ each printed as a line; 2 wrong usage or input.`;
 const OPTIONS = {
   image: { type: 'string' }, board: { type: 'string' }, scenario: { type: 'string' }, seconds: { type: 'string' },
   seed: { type: 'string', default: '1' }, 'clock-ppm': { type: 'string', default: '0' }, serial: { type: 'string', default: DEFAULT_SERIAL }, faults: { type: 'string' },
+  flash: { type: 'string' }, 'slow-flash': { type: 'boolean', default: false },
   'fast-enumeration': { type: 'boolean', default: false }, 'allow-watchdog': { type: 'boolean', default: false },
   pty: { type: 'string' }, usbredir: { type: 'string' }, 'wait-open': { type: 'boolean', default: false }, pace: { type: 'string' },
   'host-script': { type: 'string' }, capture: { type: 'string' }, 'bus-log': { type: 'string' }, 'usb-log': { type: 'string' },
@@ -132,6 +136,19 @@ function readImage(path) {
   return image;
 }
 
+/** Null before there is such a file. */
+function readFlash(path) {
+  let flash;
+  try {
+    flash = readFileSync(path);
+  } catch (error) {
+    if (error.code === 'ENOENT') return null;
+    throw new InputError(`${path}: cannot read the flash (${inWords(error)}); check the path`);
+  }
+  if (flash.length !== FLASH_BYTES) throw new InputError(`${path}: ${flash.length} bytes; the flash has ${FLASH_BYTES}; give the file of an earlier run, or a new name`);
+  return flash;
+}
+
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 /** Finer than timers are, which count whole milliseconds. */
 const nap = (ms) => Atomics.wait(new Int32Array(new SharedArrayBuffer(4)), 0, 0, ms);
@@ -155,6 +172,7 @@ async function run(options) {
   const image = readImage(options.image);
   const scenario = readScenario(options.scenario);
   if (scenario.sensors !== Board.sensors) throw new InputError(`${options.scenario}: ${scenario.sensors} sensors, but board ${options.board} has ${Board.sensors}`);
+  const flash = options.flash ? readFlash(options.flash) : null;
   const faults = options.faults ? readFaults(options.faults, Board) : [];
   const script = options['host-script'] ? readHostScript(options['host-script']) : [];
   const seconds = options.seconds ?? scenario.end_s;
@@ -193,7 +211,7 @@ async function run(options) {
     while (options['wait-open'] && !pty.isOpen && !interrupted && !pty.failure) await sleep(5);
 
     const machine = new Machine({
-      image, Board, scenario, faults, seed: options.seed, serial: options.serial, clock_ppm: options['clock-ppm'],
+      image, Board, scenario, faults, flash, flashSpeed: options['slow-flash'] ? 'slowest' : 'typical', seed: options.seed, serial: options.serial, clock_ppm: options['clock-ppm'],
       fastEnumeration: options['fast-enumeration'], allowWatchdog: options['allow-watchdog'],
       rise_ns: options['rise-ns'], onLevels: vcd ? (levels, t_ns) => vcd.change(levels, t_ns) : undefined,
       onBusTransfer: options['bus-log']
@@ -272,6 +290,8 @@ async function run(options) {
     const wall_s = (performance.now() - started_ms) / 1000;
     const { result } = machine;
     reportFile.write(Buffer.from(`${JSON.stringify({ ...result, wall_s, ...(options.pace === 'wall' ? { wall_zero_us: Number(wall_zero_ns) / 1e3, wall_lag_s } : {}) }, null, 2)}\n`));
+    if (machine.memory.isBusy) machine.memory.cutPower(); // the end of the run is the end of its power
+    if (options.flash) output(options.flash).write(machine.memory.bytes);
     for (const line of result.warnings) process.stderr.write(`${line}\n`);
     if (result.end_reason !== 'end of time') process.stderr.write(`ended after ${result.emulated_s.toFixed(6)} s: ${result.end_reason}\n`);
     clean = result.warnings.length === 0;

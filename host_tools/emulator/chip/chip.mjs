@@ -7,6 +7,8 @@
  *     chip.boot();                 // what the boot ROM does, then the second stage
  *     chip.runUntil(at_ns);        // throws Stopped when the run is over before
  *
+ * An image is loaded as the boot loader does it: the sectors that it reaches are erased, the rest stays.
+ *
  * Boot: the boot ROM's part is played here. The CRC-32 of the 256-byte second stage is checked as the boot ROM
  * checks it, the second stage is copied to 0x20041f00 and entered there with lr = 0, clk_sys on the ring
  * oscillator, and only IO_QSPI, PADS_QSPI and TIMER out of reset. SRAM starts filled with seeded noise.
@@ -19,6 +21,7 @@ import { Prng } from '../prng.mjs';
 import { Clocks, makeRosc, Pll, RESET_NAMES, Resets, ROSC_HZ, Xosc } from './clocks.mjs';
 import { FLASH_BASE, FLASH_BYTES, RAM_BASE, StrictCore } from './core.mjs';
 import { Dma } from './dma.mjs';
+import { FlashMemory } from './flash_memory.mjs';
 import { I2cBlock } from './i2c_block.mjs';
 import { Pins } from './pins.mjs';
 import { Pio } from './pio.mjs';
@@ -30,8 +33,11 @@ import { Timer, Watchdog } from './timer_watchdog.mjs';
 import { UsbBlock } from './usb_block.mjs';
 
 const BOOT2_BYTES = 256;
+const SECTOR_BYTES = 4096;
 const BOOT2_RAM = 0x20041f00;
 const DPRAM_BASE = 0x50100000;
+/** So long the boot ROM tries to load the second stage (datasheet 2.8.1.1); a flash that is still erasing is waited for. */
+const BOOT_TRIES_NS = 0.5e9;
 /** Asleep for so long without one wake-up means the firmware hung. */
 const HUNG_AFTER_NS = 2e9;
 
@@ -83,10 +89,16 @@ export class Chip extends RP2040 {
    * @param time SimulatedTime
    * @param report Report
    * @param options serial: 8-byte flash unique id; seed: of the power-on noise in SRAM; clock_ppm: by how much all of
-   *   the chip's clocks are fast, in this time; kept: { sram, watchdog } of the life before a watchdog reboot
+   *   the chip's clocks are fast, in this time; memory: the FlashMemory, a new one by default; kept: { sram, watchdog }
+   *   of the life before a watchdog reboot
    */
-  constructor(time, report, { serial, seed = 1, clock_ppm = 0, kept = null }) {
+  constructor(time, report, { serial, seed = 1, clock_ppm = 0, memory = new FlashMemory({ time, serial, seed }), kept = null }) {
     super(time.scope());
+    this.memory = memory;
+    memory.fail = (source, message) => this.fail(source, message);
+    this.flash = memory.bytes;
+    this.flash16 = new Uint16Array(this.flash.buffer);
+    this.flashView = new DataView(this.flash.buffer);
     this.time = time;
     this.report = report;
     this.options = { serial, seed };
@@ -112,7 +124,7 @@ export class Chip extends RP2040 {
     this.clocks = new Clocks(this);
     this.timer = new Timer(this);
     this.watchdog = new Watchdog(this, kept?.watchdog);
-    this.ssi = new Ssi(this, serial);
+    this.ssi = new Ssi(this, memory);
     this.i2c = [new I2cBlock(this, 0), new I2cBlock(this, 1)];
     this.usbCtrl = new UsbBlock(this);
     this.dma = new Dma(this);
@@ -193,7 +205,7 @@ export class Chip extends RP2040 {
     if (image.length < BOOT2_BYTES + 8 || image.length > FLASH_BYTES) {
       throw new Error(`image of ${image.length} bytes; expected 264 bytes to 2 MiB of raw flash content`);
     }
-    this.flash.fill(0xff);
+    this.flash.fill(0xff, 0, Math.ceil(image.length / SECTOR_BYTES) * SECTOR_BYTES);
     this.flash.set(image);
     this.image = image;
   }
@@ -215,6 +227,10 @@ export class Chip extends RP2040 {
       this.fail('boot ROM', 'watchdog reboot to a vector (scratch 4 magic) is not modelled');
     }
     this.sram.set(this.flash.subarray(0, BOOT2_BYTES), BOOT2_RAM - RAM_BASE);
+    this.starts_ns = this.memory.isBusy ? this.memory.busyUntil_ns : 0;
+    if (this.starts_ns > this.time.nanos + BOOT_TRIES_NS) {
+      this.fail('boot ROM', 'the flash is busy for longer than 0.5 s: the chip would enter its USB boot loader');
+    }
   }
 
   /** Stop existing: no alarm of this chip fires any more. */
@@ -345,6 +361,10 @@ export class Chip extends RP2040 {
       const now = time.nanos;
       if (now >= end_ns) return;
       const next = Math.min(time.next_ns, end_ns);
+      if (now < this.starts_ns) {
+        time.advanceTo(Math.min(next, this.starts_ns));
+        continue;
+      }
       if (core.waiting) {
         if (this.slept_since_ns < 0) this.slept_since_ns = now;
         if (!core.wakeable) this.fail('core', 'firmware hung: WFI with no interrupt enabled');

@@ -1,10 +1,9 @@
 /**
- * The XIP serial interface (DW_apb_ssi, RP2040 datasheet 4.10) with a W25Q16-like flash behind it.
+ * The XIP serial interface (DW_apb_ssi, RP2040 datasheet 4.10) with the flash of flash_memory.mjs behind it.
  *
  * Modelled: eight-bit full-duplex transfers through 16-deep FIFOs with bus time, chip select (automatic while
- * the transmit FIFO holds data, or forced through IO_QSPI), the commands read status, write enable, write
- * status and read unique id (4Bh), the dummy read that enters continuous-read mode and its exit by FFh, and
- * whether execute-in-place works with the present settings. Any other flash command fails the run.
+ * the transmit FIFO holds data, or forced through IO_QSPI), and whether execute-in-place works with the present
+ * settings and the flash as it is.
  */
 import { BasePeripheral } from 'rp2040js';
 
@@ -12,63 +11,10 @@ const FIFO_DEPTH = 16;
 const TMOD_TX_AND_RX = 0;
 const TMOD_EEPROM_READ = 3;
 
-export class Flash {
-  constructor(fail, serial) {
-    this.fail = fail;
-    this.serial = serial;
-    this.status2 = 0x02;
-    this.writeEnabled = false;
-    this.continuousRead = false;
-    this.command = [];
-  }
-
-  select() {
-    this.command = [];
-  }
-
-  deselect() {
-    const [op] = this.command;
-    if (op === undefined) return;
-    if (this.continuousRead) {
-      if (this.command.every((b) => b === 0xff || b === 0)) this.continuousRead = false;
-      else this.fail('flash', `command 0x${op.toString(16)} while in continuous-read mode; leave it with FFh bytes first`);
-    } else if (op === 0x06) this.writeEnabled = true;
-    else if (op === 0x01) {
-      if (!this.writeEnabled) this.fail('flash', 'status written without write enable');
-      this.status2 = this.command[2] ?? this.status2;
-      this.writeEnabled = false;
-    } else if (op === 0x4b && this.command.length < 13) {
-      this.fail('flash', `chip select rose after ${this.command.length} of the 13 bytes of a unique-id read; keep the FIFO fed or force chip select`);
-    }
-  }
-
-  exchange(byte) {
-    this.command.push(byte);
-    if (this.continuousRead) return 0xff;
-    const index = this.command.length - 1;
-    switch (this.command[0]) {
-      case 0x05:
-        return index ? (this.writeEnabled ? 2 : 0) : 0xff;
-      case 0x35:
-        return index ? this.status2 : 0xff;
-      case 0x4b:
-        return index >= 5 && index < 13 ? this.serial[index - 5] : 0xff;
-      case 0x06:
-      case 0x01:
-      case 0xff:
-        return 0xff;
-      case 0x9f:
-        return [0xff, 0xef, 0x40, 0x15][index] ?? 0xff;
-    }
-    if (index === 0) this.fail('flash', `command 0x${byte.toString(16)} is not modelled`);
-    return 0xff;
-  }
-}
-
 export class Ssi extends BasePeripheral {
-  constructor(chip, serial) {
+  constructor(chip, flash) {
     super(chip, 'SSI');
-    this.flash = new Flash((s, m) => chip.fail(s, m), serial);
+    this.flash = flash;
     this.tx = [];
     this.rx = [];
     this.shifting = null;
@@ -100,6 +46,7 @@ export class Ssi extends BasePeripheral {
     }
     if (this.baudr < 2 || this.baudr & 1) return `the SSI divider BAUDR is ${this.baudr}`;
     if (this.forcedSelect) return 'chip select is forced';
+    if (this.flash.isBusy) return 'the flash is busy';
     const hasInstruction = (this.spiCtrlr0 >>> 8) & 3;
     if (hasInstruction && this.flash.continuousRead) return 'the flash is in continuous-read mode but the SSI sends a command';
     if (!hasInstruction && !this.flash.continuousRead) return 'the SSI sends no command but the flash is not in continuous-read mode';

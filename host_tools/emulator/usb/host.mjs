@@ -93,6 +93,13 @@ export class UsbHost {
     this.#portChange();
   }
 
+  /** The device controller has no power. */
+  disconnect() {
+    this.#gone();
+    this.block.onPortChange = () => {};
+    this.block.onArmed = () => {};
+  }
+
   unplug() {
     this.plugged = false;
     this.suspendAlarm.schedule(IDLE_SUSPENDS_NS);

@@ -1,0 +1,24 @@
+/* The flash chip behind the SSI, by its own commands (W25Q16JV and its kin; RP2040 datasheet 4.10).
+ *
+ * Everything runs from SRAM once it is copied there, so the SSI leaves execution in place for good,
+ * and what port/flash.h asks for needs no interrupt disabled and nobody to wait: commands go out in
+ * slices that fit into the FIFOs, and the chip is busy by itself.
+ */
+#ifndef RP2040_FLASH_H
+#define RP2040_FLASH_H
+
+#include "common/status.h"
+
+#include <stdint.h>
+
+enum { FLASH_ID_BYTES = 8 };
+
+/* To be called once, before any other function here or of port/flash.h: ends execution in place and
+ * waits until the chip is not busy. A reset does not reach the chip, and it may be erasing still,
+ * for 400 ms at most. FT_ERR_TIMEOUT: it does not answer. */
+enum ft_status flash_start(void);
+
+/* The unique id of the chip. Takes 4 us. FT_ERR_TIMEOUT. */
+enum ft_status flash_read_id(uint8_t id[FLASH_ID_BYTES]);
+
+#endif
