@@ -27,6 +27,8 @@
 
 #define IDLE_ms SECONDS(2)     /* time constants of the level, */
 #define FOLLOW_ms MS(700)      /* of the remainder, */
+#define FOLLOW_DOWN_ms MS(100) /* when a force goes at last, */
+#define RISE_SIGMA 3           /* a remainder does not rise by so much noise in TRACK_ms */
 #define WANDER_ms SECONDS(120) /* and of what it counts as risen lately */
 #define WARM_ms SECONDS(8)
 #define WARM_SHIFT 3 /* share of what may have moved that does in a second */
@@ -37,11 +39,12 @@
 #define BAND_SHIFT 3   /* of the memory: the remainder, and what closes the gate, */
 #define DIP_SHIFT 2    /* the remainder below zero, */
 #define REOPEN_SHIFT 4 /* and what a sudden press must exceed later */
-#define CROSS_SHIFT                                                                                \
-  1                    /* share of the strongest sensor's memory that counts for all: far sensors  \
-                          stand off by 2 % of a peak that they hardly felt */
-#define KEEP_SHIFT 8   /* share of the memory that the level takes of the remainder in a second */
-#define CREEP_SHIFT 10 /* and of what the remainder does not follow */
+/* Share of the strongest sensor's memory that counts for all: far sensors stand off by 2 % of a
+ * peak that they hardly felt. */
+#define CROSS_SHIFT 1
+#define KEEP_SHIFT 8 /* share of the memory that the level takes of the remainder in a second */
+#define KEEP_DOWN_SHIFT 2 /* less of it downward: what dipped comes back */
+#define CREEP_SHIFT 10    /* and of what the remainder does not follow */
 
 #define BELOW_ms SECONDS(CONDITION_BELOW_s) /* dips come back within it */
 #define FAR_BELOW_Pa 1000
@@ -78,7 +81,6 @@ static void begin_tare(struct condition *condition, uint8_t k) {
   condition->reached_Pa_q10[k] = 0;
   condition->margin_Pa_q10[k] = 0;
   condition->risen_Pa_q10[k] = 0;
-  condition->before_Pa_q10[k] = 0;
   condition->sum_Pa_q10[k] = 0;
   condition->drift_q16[k] = 0;
   condition->below_ms[k] = 0;
@@ -126,6 +128,7 @@ static void tare_step(struct condition *condition, uint8_t k, int32_t pressure_P
   int64_t sum = condition->tare_sum[k] - condition->tare_min[k] - condition->tare_max[k];
   condition->level_Pa_q10[k] = condition->zero_Pa_q10[k] =
       clamp(mean_of(sum, taken - 2), -ZERO_MAX, ZERO_MAX);
+  condition->before_Pa_q10[k] = condition->zero_Pa_q10[k];
   condition->tracked_ms[k] = condition->now_ms;
   condition->tared_ms = 0;
   condition->snapshots = 0;
@@ -222,12 +225,23 @@ static void watch_below(struct condition *condition, uint8_t k, int32_t step_ms,
   }
 }
 
+/* Of one sensor, when it is tracked. */
+struct look {
+  int32_t step_ms;
+  int32_t above_zero;
+  int32_t open;     /* the gate, */
+  int32_t calm_lag; /* and what the level may lag in a calm */
+  bool rises;       /* by more than noise since it was looked at last: no remainder does */
+};
+
 /* While nothing touches for certain, or what does cannot be told from a drift (`unsure`). */
-static void track_free(struct condition *condition, uint8_t k, int32_t step_ms, int32_t above_zero,
-                       int32_t open, int32_t calm_lag, bool unsure) {
+static void track_free(struct condition *condition, uint8_t k, const struct look *look,
+                       bool unsure) {
   int32_t memory = in_all(condition->memory_Pa_q10[k], condition->pad_memory_Pa_q10);
   int32_t warm = condition->warm_Pa_q10;
   bool fresh = condition->released_ms < FRESH_ms || condition->tared_ms < WARM_FRESH_ms;
+  int32_t step_ms = look->step_ms;
+  int32_t above_zero = look->above_zero;
   if (condition->summed[k] > 0) {
     above_zero = port_divide(condition->sum_Pa_q10[k], condition->summed[k]);
   }
@@ -242,17 +256,18 @@ static void track_free(struct condition *condition, uint8_t k, int32_t step_ms, 
   if (!unsure) {
     int32_t goal = clamp(above_level, deepest, (memory >> BAND_SHIFT) + warm);
     int32_t highest = remainder > 0 ? remainder : 0;
-    if (!fresh && goal > highest) {
+    if ((!fresh || look->rises) && goal > highest) {
       goal = highest;
     }
-    remainder += part_of(goal - remainder, share_in(step_ms, FOLLOW_ms));
+    int32_t follow_ms = goal > remainder || remainder < 0 ? FOLLOW_ms : FOLLOW_DOWN_ms;
+    remainder += part_of(goal - remainder, share_in(step_ms, follow_ms));
     int32_t warming = in_step(warm >> WARM_SHIFT, step_ms);
     creep += in_step(memory >> CREEP_SHIFT, step_ms) + warming;
-    keep = slew + in_step(memory >> KEEP_SHIFT, step_ms) + warming;
+    keep = slew + (fresh ? 0 : in_step(memory >> KEEP_SHIFT, step_ms)) + warming;
   }
   int32_t idle_share = share_in(step_ms, IDLE_ms);
   int32_t crept = clamp(part_of(above_zero, idle_share), -creep, creep);
-  int32_t kept = clamp(part_of(remainder, idle_share), -keep, keep);
+  int32_t kept = clamp(part_of(remainder, idle_share), -(keep >> KEEP_DOWN_SHIFT), keep);
   condition->level_Pa_q10[k] += crept + kept;
   condition->zero_Pa_q10[k] = condition->level_Pa_q10[k] + remainder - kept;
   int32_t risen = faded(condition->risen_Pa_q10[k], step_ms, WANDER_ms) + crept + kept;
@@ -261,9 +276,9 @@ static void track_free(struct condition *condition, uint8_t k, int32_t step_ms, 
   condition->margin_Pa_q10[k] = unsure  ? 0
                                 : fresh ? (memory >> BAND_SHIFT) + warm
                                         : (memory >> REOPEN_SHIFT) + (warm >> 2);
-  set_bit(&condition->restless, k, above_level > calm_lag || above_level < -calm_lag);
+  set_bit(&condition->restless, k, above_level > look->calm_lag || above_level < -look->calm_lag);
   set_bit(&condition->stands_off, k, remainder + risen > Pa_q10(CONDITION_OPEN_Pa));
-  watch_below(condition, k, step_ms, above_level, deepest - open);
+  watch_below(condition, k, step_ms, above_level, deepest - look->open);
 }
 
 /* The drift of each sensor from the oldest to the latest level, while there is a calm to see it. */
@@ -369,10 +384,12 @@ static void track_sensor(struct condition *condition, const struct frame *frame,
     return;
   }
   /* One disturbed reading is no pressure to remember. */
-  int32_t pressure = conditioned->pressure_Pa_q10[k];
-  int32_t steady = condition->before_Pa_q10[k] < pressure ? condition->before_Pa_q10[k] : pressure;
+  int32_t reading = frame->pressure_Pa_q10[k];
+  int32_t before = condition->before_Pa_q10[k];
+  condition->before_Pa_q10[k] = reading;
+  int32_t steady =
+      clamped_difference(reading < before ? reading : before, condition->zero_Pa_q10[k]);
   steady = steady < Pa_q10(SATURATED_Pa) ? steady : Pa_q10(SATURATED_Pa);
-  condition->before_Pa_q10[k] = pressure;
   int32_t memory = faded(condition->memory_Pa_q10[k], step_ms, MEMORY_ms);
   if (condition->pressed && steady > memory) {
     memory = steady;
@@ -382,13 +399,20 @@ static void track_sensor(struct condition *condition, const struct frame *frame,
     condition->pad_memory_Pa_q10 = memory;
   }
   int32_t risen = condition->risen_Pa_q10[k];
-  set_bit(&condition->firm, k, pressure > open + 3 * (risen < 0 ? -risen : risen) / 2);
+  set_bit(&condition->firm, k,
+          conditioned->pressure_Pa_q10[k] > open + 3 * (risen < 0 ? -risen : risen) / 2);
   if (condition->pressed && !unsure) {
     track_pressed(condition, k, step_ms, steady);
   } else {
-    int32_t calm_lag = Pa_q10(CALM_LAG_Pa) + frame->noise_Pa_q10 / 2;
-    int32_t above = clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k]);
-    track_free(condition, k, step_ms, clamp(above, -SUM_RANGE, SUM_RANGE), open, calm_lag, unsure);
+    int32_t above = clamped_difference(reading, condition->zero_Pa_q10[k]);
+    const struct look look = {
+        .step_ms = step_ms,
+        .above_zero = clamp(above, -SUM_RANGE, SUM_RANGE),
+        .open = open,
+        .calm_lag = Pa_q10(CALM_LAG_Pa) + frame->noise_Pa_q10 / 2,
+        .rises = clamped_difference(reading, before) > RISE_SIGMA * frame->noise_Pa_q10,
+    };
+    track_free(condition, k, &look, unsure);
   }
 }
 

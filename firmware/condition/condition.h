@@ -68,7 +68,7 @@ struct condition {
   int32_t reached_Pa_q10[FT_MAX_SENSORS]; /* the same of this contact alone */
   int32_t margin_Pa_q10[FT_MAX_SENSORS];  /* by so much the gate is higher */
   int32_t risen_Pa_q10[FT_MAX_SENSORS];   /* of the level lately, fading */
-  int32_t before_Pa_q10[FT_MAX_SENSORS];  /* above the zero, when last tracked */
+  int32_t before_Pa_q10[FT_MAX_SENSORS];  /* reading when last tracked */
   int32_t sum_Pa_q10[FT_MAX_SENSORS];     /* above the zero, since last tracked */
   int32_t drift_q16[FT_MAX_SENSORS];      /* of the level, 1/1024 Pa in 1.024 ms */
   uint16_t drift_rest_q16[FT_MAX_SENSORS];
