@@ -44,6 +44,7 @@ sigrok-cli sigrok-cli
 /usr/include/gtest/gtest.h libgtest-dev
 /usr/include/libusb-1.0/libusb.h libusb-1.0-0-dev
 /usr/include/CLI/CLI.hpp libcli11-dev
+/usr/include/nlohmann/json.hpp nlohmann-json3-dev
 /usr/lib/python3/dist-packages/numpy/__init__.py python3-numpy
 /usr/lib/python3/dist-packages/matplotlib/__init__.py python3-matplotlib
 LIST

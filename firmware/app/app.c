@@ -97,10 +97,7 @@ void app_start(struct app *app, const struct array_bus *bus) {
   app->fit_settings.n_largest = DEFAULT_FIT_N_LARGEST;
   app->fit_settings.prior_sigma_mm = DEFAULT_PRIOR_SIGMA_mm;
   app->fit_settings.prior_width_mm = DEFAULT_PRIOR_WIDTH_mm;
-  app->fit_settings.model_sd_q16 = (uint16_t)(DEFAULT_MODEL_SD * 65536.0f);
-  for (uint8_t k = 0; k < geometry.sensor_count; k++) {
-    app->fit_settings.gain_sd_q16[k] = (uint16_t)(DEFAULT_GAIN_SD * 65536.0f);
-  }
+  fit_set_errors(&app->fit_settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
 #endif
 #if FT_WITH_SLIP
   app->contact_settings.slip_threshold_mm = DEFAULT_SLIP_THRESHOLD_mm;
@@ -247,7 +244,6 @@ static void judge_frame(struct app *app) {
     .contact = app->conditioned.contact,
     .tared = app->conditioned.tared,
     .masked = app->conditioned.usable != UINT32_MAX >> (FT_MAX_SENSORS - frame->sensor_count),
-    .noise_Pa_q10 = frame->noise_Pa_q10,
     .saturated = frame->saturated,
 #if FT_WITH_FIT
     .fit = app->conditioned.contact ? &app->fit : NULL,

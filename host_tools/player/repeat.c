@@ -20,6 +20,7 @@ bool repeat_begin(const struct wire_info *info) {
   app.fit_settings.n_largest = DEFAULT_FIT_N_LARGEST;
   app.fit_settings.prior_sigma_mm = DEFAULT_PRIOR_SIGMA_mm;
   app.fit_settings.prior_width_mm = DEFAULT_PRIOR_WIDTH_mm;
+  fit_set_errors(&app.fit_settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
   app.contact_settings.slip_threshold_mm = info->slip_threshold_mm;
   app.contact_settings.slip_window_us = info->slip_window_ms * 1000u;
   repeat_tare();
