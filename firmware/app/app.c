@@ -200,7 +200,7 @@ void app_start(struct app *app, const struct array_bus *bus) {
   app->fit_settings.n_largest = DEFAULT_FIT_N_LARGEST;
   app->fit_settings.prior_sigma_mm = DEFAULT_PRIOR_SIGMA_mm;
   app->fit_settings.prior_width_mm = DEFAULT_PRIOR_WIDTH_mm;
-  app->fit_settings.model_sd_q16 = (uint16_t)(DEFAULT_MODEL_SD * 65536.0f);
+  fit_set_errors(&app->fit_settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
   app->fit_settings.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
 #endif
 #if FT_WITH_SLIP
@@ -374,7 +374,6 @@ static void judge_frame(struct app *app) {
     .zero_doubtful = app->conditioned.zero_doubtful,
     .sensor_doubtful = is_sensor_doubtful(app),
     .masked = app->conditioned.usable != UINT32_MAX >> (FT_MAX_SENSORS - frame->sensor_count),
-    .noise_Pa_q10 = frame->noise_Pa_q10,
     .saturated = frame->saturated,
 #if FT_WITH_FIT
     .fit = app->conditioned.contact ? &app->fit : NULL,

@@ -12,20 +12,12 @@ static bool fewer_bits_than(uint32_t bitmap, int limit) {
   return bits < limit;
 }
 
-/* An uncertain location still tells motion if it is the model that does not fit: such an error
- * moves with the contact. What the noise adds to it is the predicted standard deviation times the
- * share of the noise in the residuals. */
+/* An uncertain location tells motion as well as any: what gains and model add to it moves with the
+ * contact. What the noise adds does not. */
 static bool tells_motion(const struct contact_input *input, uint32_t flags) {
-  if (!(flags & CONTACT_FLAG_FIT_VALID) || (flags & (CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND))) {
-    return false;
-  }
-  if (!(flags & CONTACT_FLAG_UNCERTAIN)) {
-    return true;
-  }
-  const struct fit_result *fit = input->fit;
-  float noise_Pa = (float)input->noise_Pa_q10 * (1.0f / 1024.0f);
-  return (flags & CONTACT_FLAG_UNCERTAINTY_VALID) &&
-         fit->location_sd_mm * noise_Pa <= CONTACT_JITTER_MAX_mm * fit->residual_rms_Pa;
+  return (flags & CONTACT_FLAG_FIT_VALID) && (flags & CONTACT_FLAG_UNCERTAINTY_VALID) &&
+         !(flags & (CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND)) &&
+         input->fit->location_noise_mm <= CONTACT_JITTER_MAX_mm;
 }
 
 struct contact_force contact_weigh(const struct contact_settings *settings,

@@ -26,7 +26,6 @@ struct contact_input {
   bool zero_doubtful;           /* see condition.h */
   bool sensor_doubtful;         /* a sensor in use is doubtful, see frame.h */
   bool calibrated;              /* gains and force scale of a calibration act */
-  int32_t noise_Pa_q10;         /* rms noise of a reading, 1/1024 Pa */
   uint32_t saturated;           /* bitmap: left out of the fit for being beyond their range */
   const struct fit_result *fit; /* NULL where nothing was fitted */
 };
@@ -51,10 +50,11 @@ struct contact_force contact_weigh(const struct contact_settings *settings,
 /* Without slip. */
 void contact_judge(const struct contact_input *input, struct contact_result *result);
 
-/* With slip. Locations flagged FLAT or AT_BOUND do not enter the slip history, nor do those flagged
- * UNCERTAIN whose noise alone has a standard deviation above CONTACT_JITTER_MAX_mm: it starts anew
- * after them, as after a loss of contact. */
-#define CONTACT_JITTER_MAX_mm 0.1f
+/* With slip. Locations flagged FLAT or AT_BOUND do not enter the slip history, nor do those whose
+ * noise alone has a standard deviation above CONTACT_JITTER_MAX_mm: it starts anew after them, as
+ * after a loss of contact. At that limit noise alone exceeds the usual threshold of 0.75 mm once in a
+ * million frames. */
+#define CONTACT_JITTER_MAX_mm 0.2f
 
 void contact_update(struct slip_history *history, const struct contact_settings *settings,
                     const struct contact_input *input, struct contact_result *result);

@@ -140,6 +140,13 @@ enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count
   return status == FT_OK && !is_grid(array) ? FT_ERR_ARGUMENT : status;
 }
 
+void fit_set_errors(struct fit_settings *settings, float gain_sd, float model_sd) {
+  for (int k = 0; k < FT_MAX_SENSORS; k++) {
+    settings->gain_sd_q16[k] = (uint16_t)(gain_sd * 65536.0f);
+  }
+  settings->model_sd_q16 = (uint16_t)(model_sd * 65536.0f);
+}
+
 /* Fits once more without the outlier, if there is one. */
 static void leave_outlier_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
                               uint32_t usable, const struct fit_settings *settings,

@@ -34,8 +34,8 @@ struct fit_array {
 };
 
 struct fit_settings {
-  uint8_t iterations;   /* 0 (the guess)..FIT_MAX_ITERATIONS; 7 brings 99.9 % of observable presses
-                           within 1 um of the optimum */
+  uint8_t iterations;   /* 0 (the guess)..FIT_MAX_ITERATIONS; 4 come as near to the truth as more
+                           do, 7 bring 99.9 % of observable presses within 1 um of the optimum */
   int32_t noise_Pa_q10; /* rms noise of a reading, 1/1024 Pa, at least 1 */
   uint8_t n_largest;    /* fit the n largest readings only, of equal ones those of lower number, as
                            the paper does; 0: all, which is more accurate. Fewer than a fit
@@ -46,7 +46,7 @@ struct fit_settings {
   float prior_sigma_mm, prior_width_mm;
   /* What an honest standard deviation needs besides the noise. */
   uint16_t gain_sd_q16[FT_MAX_SENSORS]; /* [sensor] relative sd of its gain; 0: exact */
-  uint16_t model_sd_q16; /* sd of the model's own error, as a share of the peak; 0: none */
+  uint16_t model_sd_q16; /* sd of the model's own error, as a share of the largest reading; 0: none */
   float location_sd_limit_mm; /* UNCERTAIN above it; 0: FIT_LOCATION_SD_LIMIT_mm */
 };
 #define FIT_LOCATION_SD_LIMIT_mm 0.6f
@@ -57,6 +57,9 @@ struct fit_settings {
  * have no location on the array. */
 #define FIT_SIGMA_MIN 0.158f
 #define FIT_SIGMA_MAX 5.0f
+
+/* The same gain_sd for every sensor, and model_sd: shares of 1, below 1. */
+void fit_set_errors(struct fit_settings *settings, float gain_sd, float model_sd);
 
 /* Every member is finite, whatever the input. Where FIT_VALID is off all are zero but the flags. */
 struct fit_result {
@@ -87,7 +90,10 @@ enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count
                                    const float *y_mm, float pitch_mm);
 
 /* A sensor whose reading does not belong to the others' (fit_limits.h) is left out of a second fit;
- * SENSOR_MASKED and `used` tell. Only residuals that are rough and no noise make it look for one.
+ * SENSOR_MASKED and `used` tell. Only residuals that are rough, and more than noise, gains and model
+ * explain, make it look for one.
+ *
+ * Widths and ELONGATED need every sensor of the grid.
  *
  * pressure_Pa_q10[sensor]: pressure on the pad, 1/1024 Pa, any bits. usable: bitmap of the sensors
  * to use. With fewer than four (of an array on a line, three), or no positive reading, FIT_VALID
@@ -106,8 +112,8 @@ void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa
  * build, 2 to 6 each way) with every sensor usable; sigma from 0.216 pitch.
  * fit_grid_masked: the same with any sensors missing, at twice the cost.
  * fit_general: float32, any positions, any sensors missing; leaves an outlier out by itself.
- * The former two return whether they have settled with residuals that are rough and no noise, as
- * with an outlier. */
+ * The former two return whether they have settled with residuals that are rough and more than noise,
+ * gains and model explain, as with an outlier. */
 bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
               const struct fit_settings *settings, struct fit_result *result);
 bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,

@@ -46,7 +46,7 @@
 #define SURE_SQUARE ((struct scaled){25600, -12})
 #define KNOWN_SQUARE ((struct scaled){16384, -18})
 #define LINEAR_SQUARE ((struct scaled){16056, -15})
-#define SHAPE_HEIGHT_MAX_Q26 193635251
+#define SHAPE_HEIGHT_MAX_Q26 160029133
 
 /* 1 / n of a constant. */
 #define RECIPROCAL(n)                                                                              \

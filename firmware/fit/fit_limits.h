@@ -55,7 +55,7 @@
 #define FIT_STRETCH_SD_MAX 0.25f
 #define FIT_STRETCH_LINEAR 0.7f
 #define FIT_STRETCH_MAX 1.25f
-#define FIT_SHAPE_LEAST 0.5f
+#define FIT_SHAPE_LEAST 0.55f
 
 static inline float fit_location_sd_limit_mm(const struct fit_settings *settings) {
   float limit_mm = settings->location_sd_limit_mm;

@@ -22,7 +22,7 @@ bool repeat_begin(const struct wire_info *info) {
   app.fit_settings.prior_sigma_mm = info->prior_sigma_mm;
   app.fit_settings.prior_width_mm = info->prior_width_mm;
   app.fit_settings.location_sd_limit_mm = info->location_limit_mm;
-  app.fit_settings.model_sd_q16 = (uint16_t)(DEFAULT_MODEL_SD * 65536.0f);
+  fit_set_errors(&app.fit_settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
   calibration = info->calibration;
   app_use_calibration(&app, info->stored & WIRE_STORED_CALIBRATION ? &calibration : NULL);
   app.contact_settings.slip_threshold_mm = info->slip_threshold_mm;

@@ -449,6 +449,7 @@ struct Chain {
     settings.noise_Pa_q10 = taken.noise_Pa_q10;
     settings.prior_sigma_mm = static_cast<float>(press.prior_sigma_mm);
     settings.prior_width_mm = press.prior_sigma_mm > 0.0 ? 0.5f : 0.0f;
+    fit_set_errors(&settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
     fit_result fit{};
     if (readings.contact) {
       fit_gaussian(&array, readings.pressure_Pa_q10, readings.usable, &settings, &fit);

@@ -18,9 +18,9 @@ void setUp(void) {
   memset(&fit, 0, sizeof fit);
   fit.flags = GOOD_FIT;
   fit.used = 0x7FFF;
-  fit.location_sd_mm = 0.5f; /* of which the noise has 4 / 18 */
-  fit.residual_rms_Pa = 18.0f;
-  input = (struct contact_input){.contact = true, .tared = true, .noise_Pa_q10 = 4096, .fit = &fit};
+  fit.location_sd_mm = 0.5f;
+  fit.location_noise_mm = 0.01f;
+  input = (struct contact_input){.contact = true, .tared = true, .fit = &fit};
 }
 
 void tearDown(void) {}
@@ -112,9 +112,8 @@ static void assert_history_begins_anew(void) {
 }
 
 static void test_doubtful_locations_end_the_history(void) {
-  static const uint32_t spoilers[] = {CONTACT_FLAG_UNCERTAIN, CONTACT_FLAG_FLAT,
-                                      CONTACT_FLAG_AT_BOUND};
-  for (size_t i = 0; i < 3; i++) {
+  static const uint32_t spoilers[] = {CONTACT_FLAG_FLAT, CONTACT_FLAG_AT_BOUND};
+  for (size_t i = 0; i < 2; i++) {
     fill_history();
     fit.flags = GOOD_FIT | spoilers[i];
     TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_SLIP, update());
@@ -134,24 +133,24 @@ static void test_doubtful_locations_end_the_history(void) {
   TEST_ASSERT_EQUAL_UINT16(0, history.count);
 }
 
-static void test_an_uncertain_location_that_noise_hardly_moves_keeps_the_history(void) {
+static void test_a_location_that_noise_moves_ends_the_history(void) {
   fill_history();
-  fit.flags = GOOD_FIT | CONTACT_FLAG_UNCERTAIN;
-  fit.residual_rms_Pa = 0.5f * 4.0f / CONTACT_JITTER_MAX_mm * 1.01f;
+  fit.location_noise_mm = 0.99f * CONTACT_JITTER_MAX_mm;
   TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SLIP_VALID, update());
-  fit.residual_rms_Pa *= 0.98f;
+  fit.location_noise_mm = 1.01f * CONTACT_JITTER_MAX_mm;
   TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID, update());
+  TEST_ASSERT_EQUAL_UINT16(0, history.count);
   setUp();
   fill_history();
-  fit.flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAIN; /* and nobody knows how far */
-  fit.residual_rms_Pa = 1e6f;
+  fit.flags = CONTACT_FLAG_FIT_VALID; /* and nobody knows how far */
   TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID, update());
 }
 
 static void test_other_warnings_keep_the_history(void) {
   static const uint32_t warnings[] = {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_MODEL,
-                                      CONTACT_FLAG_SENSOR_MASKED};
-  for (size_t i = 0; i < 3; i++) {
+                                      CONTACT_FLAG_SENSOR_MASKED, CONTACT_FLAG_UNCERTAIN,
+                                      CONTACT_FLAG_ELONGATED};
+  for (size_t i = 0; i < sizeof warnings / sizeof warnings[0]; i++) {
     setUp();
     fill_history();
     fit.flags = GOOD_FIT | warnings[i];
@@ -184,7 +183,7 @@ int main(void) {
   RUN_TEST(test_flags_of_the_fit_pass);
   RUN_TEST(test_slip_flag_and_threshold);
   RUN_TEST(test_doubtful_locations_end_the_history);
-  RUN_TEST(test_an_uncertain_location_that_noise_hardly_moves_keeps_the_history);
+  RUN_TEST(test_a_location_that_noise_moves_ends_the_history);
   RUN_TEST(test_other_warnings_keep_the_history);
   RUN_TEST(test_saturation_and_lower_bound);
   return UNITY_END();

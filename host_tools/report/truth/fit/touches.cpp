@@ -83,8 +83,8 @@ Contact contact_of(const std::string &name, double layer_mm,
           }};
 }
 
-Contact gaussian(double sigma_mm, double ratio) {
-  const double along = sigma_mm * std::sqrt(ratio), across = sigma_mm / std::sqrt(ratio);
+Contact gaussian(double shorter_mm, double ratio) {
+  const double along = shorter_mm * ratio, across = shorter_mm;
   return {"gaussian", [=](double force_N, double dx_mm, double dy_mm) {
             const double u = dx_mm / along, v = dy_mm / across;
             return 1e6 * force_N / (2.0 * M_PI * along * across) *
@@ -98,12 +98,12 @@ Pad perfect_pad() {
   return pad;
 }
 
-Pad raw_pad(double spread, Random &random) {
+Pad raw_pad(double spread, double told, Random &random) {
   Pad pad{};
   for (double &gain : pad.gain) {
     gain = 1.0 + spread * normal_within_limit(random);
   }
-  pad.gain_sd.fill(spread);
+  pad.gain_sd.fill(told);
   return pad;
 }
 
@@ -184,7 +184,7 @@ fit_array firmware_array() {
 fit_settings settings_for(const Pad &pad, double noise_Pa) {
   fit_settings settings{};
   settings.iterations = DEFAULT_FIT_ITERATIONS;
-  settings.model_sd_q16 = static_cast<std::uint16_t>(DEFAULT_MODEL_SD * 65536.0f);
+  fit_set_errors(&settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
   settings.noise_Pa_q10 = static_cast<std::int32_t>(std::lround(1024.0 * noise_Pa));
   for (std::size_t k = 0; k < SENSORS; k++) {
     settings.gain_sd_q16[k] = static_cast<std::uint16_t>(std::lround(65536.0 * pad.gain_sd[k]));

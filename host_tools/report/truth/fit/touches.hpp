@@ -35,8 +35,8 @@ struct Contact {
 // is solved if the cache does not hold it.
 Contact contact_of(const std::string &name, double layer_mm,
                    const std::filesystem::path &cache_directory);
-// Its widths are sigma sqrt(ratio) along the first axis and sigma / sqrt(ratio) along the other.
-Contact gaussian(double sigma_mm, double ratio);
+// Its width along the first axis is this times the other.
+Contact gaussian(double shorter_mm, double ratio);
 
 // Gain of each sensor and its standard deviation as the firmware has it. Gains multiply readings:
 // of a calibrated pad it is what is left after the calibration.
@@ -45,8 +45,9 @@ struct Pad {
 };
 
 Pad perfect_pad();
-// Gains as cast, normal about 1 as the twin draws them, and no calibration.
-Pad raw_pad(double spread, Random &random);
+// Gains as cast, normal about 1 as the twin draws them, and no calibration: the firmware is told this
+// standard deviation.
+Pad raw_pad(double spread, double told, Random &random);
 // What thirty placements of one weight leave: errors with a standard deviation of 1.2 % that change
 // the shape of a touch, and of 2.5 % along the three that do not: log-gains linear in x, in y and in
 // x^2 + y^2 turn one Gaussian into another. The place where the estimates of a solver would come in.

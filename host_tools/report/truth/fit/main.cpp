@@ -1,0 +1,371 @@
+// truth_fit: how well the fit's numbers say how far they are from the truth.
+//
+// Touches of the twin's objects on pads (touches.hpp) go through the firmware's fit_gaussian_grid
+// with the settings that the firmware starts with. One JSON object on the standard output: the keys
+// that are judged, and under "cases", "elongated", "iterations" and "few_sensors" the tables behind
+// them. The constants of fit_limits.h and defaults.h were chosen with --seed 1.
+#include "reference/options.hpp"
+#include "reference/parallel.hpp"
+#include "truth/fit/touches.hpp"
+
+extern "C" {
+#include "common/contact_flags.h"
+#include "config/defaults.h"
+}
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace fingertip;
+using namespace fingertip::truth;
+using nlohmann::ordered_json;
+
+constexpr char HELP[] =
+    "usage: truth_fit [--seed S] [--pads N] [--cache DIR]\n"
+    "  --seed S     of pads and touches, 20221015 by default\n"
+    "  --pads N     pads of each case, 1500 by default\n"
+    "  --cache DIR  folder of the contact tables\n";
+
+constexpr int TOUCHES = 50; // of each pad
+constexpr double BAD_mm = 1.0;
+constexpr std::uint32_t WARNINGS = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_FLAT |
+                                   CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL;
+// Rounded feet, a flat cylinder and a cube, and everyday objects; all of them round or nearly so.
+constexpr const char *OBJECTS[] = {"sphere6",   "sphere15",    "cylinder6", "cube6",
+                                   "ping_pong", "rubber_duck", "lime"};
+
+struct Options {
+  std::string cache = FINGERTIP_TABLES_DIR;
+  std::uint64_t seed = 20221015, pads = 1500;
+};
+
+// What a case draws. A contact is drawn for each touch, a pad for TOUCHES of them.
+struct Case {
+  std::string name;
+  std::vector<Contact> contacts;
+  std::function<Pad(Random &)> pad;
+  bool gaussian = false; // the model has no error of its own
+  double angle_rad = NAN;
+  int iterations = DEFAULT_FIT_ITERATIONS;
+  std::size_t sensors = SENSORS; // in use, chosen for each touch
+};
+
+struct Judged {
+  double error_mm, force_N;
+  fit_result fit;
+};
+
+double percent(double part, double whole) {
+  return whole > 0.0 ? 100.0 * part / whole : 0.0;
+}
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) {
+    return 0.0;
+  }
+  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+class Results {
+public:
+  explicit Results(std::vector<Judged> judged) : judged_(std::move(judged)) {}
+
+  template <typename Predicate> double share(const Predicate &predicate) const {
+    return percent(static_cast<double>(std::count_if(judged_.begin(), judged_.end(), predicate)),
+                   static_cast<double>(judged_.size()));
+  }
+  double error_mm(double at) const {
+    std::vector<double> errors;
+    for (const Judged &j : judged_) {
+      errors.push_back(j.error_mm);
+    }
+    return quantile(errors, at);
+  }
+  // Share of the errors within so many predicted standard deviations.
+  double covered(double sds) const {
+    return share([=](const Judged &j) {
+      return j.error_mm <= sds * static_cast<double>(j.fit.location_sd_mm);
+    });
+  }
+  // Of the force, once the scale that all touches have in common is taken out.
+  double force_covered(double sds) const {
+    const double scale = force_scale();
+    return share([=](const Judged &j) {
+      return std::abs(scale * static_cast<double>(j.fit.force_N) - j.force_N) <=
+             sds * scale * static_cast<double>(j.fit.force_sd_N);
+    });
+  }
+  double force_scale() const {
+    std::vector<double> scales;
+    for (const Judged &j : judged_) {
+      scales.push_back(j.force_N / static_cast<double>(j.fit.force_N));
+    }
+    return quantile(scales, 0.5);
+  }
+  double flagged(std::uint32_t flags) const {
+    return share([=](const Judged &j) { return (j.fit.flags & flags) != 0; });
+  }
+  double bad_without(std::uint32_t flags, double bad_mm = BAD_mm) const {
+    return share(
+        [=](const Judged &j) { return j.error_mm > bad_mm && !(j.fit.flags & flags); });
+  }
+  ordered_json row(const std::string &name) const {
+    return {{"case", name},
+            {"touches", judged_.size()},
+            {"error_p50_mm", error_mm(0.5)},
+            {"error_p95_mm", error_mm(0.95)},
+            {"cover_1sd", covered(1.0)},
+            {"cover_2sd", covered(2.0)},
+            {"warned", flagged(WARNINGS)},
+            {"elongated", flagged(CONTACT_FLAG_ELONGATED)},
+            {"bad", share([](const Judged &j) { return j.error_mm > BAD_mm; })},
+            {"bad_unflagged", bad_without(WARNINGS)},
+            {"force_scale", force_scale()},
+            {"force_cover_1sd", force_covered(1.0)},
+            {"force_cover_2sd", force_covered(2.0)}};
+  }
+
+private:
+  std::vector<Judged> judged_;
+};
+
+std::uint64_t stream_of(const std::string &name) {
+  std::uint64_t stream = 0;
+  for (const char letter : name) {
+    stream = stream * 131 + static_cast<unsigned char>(letter);
+  }
+  return stream;
+}
+
+std::uint32_t choose(std::size_t sensors, Random &random) {
+  std::uint32_t usable = (1u << SENSORS) - 1u;
+  for (std::size_t left = SENSORS; left > sensors;) {
+    const std::uint32_t bit = 1u << random.next() % SENSORS;
+    left -= (usable & bit) ? 1 : 0;
+    usable &= ~bit;
+  }
+  return usable;
+}
+
+Results run(const Case &c, const Options &options) {
+  const fit_array array = firmware_array();
+  std::vector<Judged> judged(options.pads * TOUCHES);
+  // Cases that differ in what is done with a touch alone draw the same touches.
+  const std::uint64_t stream = stream_of(c.name.substr(0, c.name.find(',')));
+  reference::in_parallel(options.pads, [&](std::size_t p) {
+    Random random(options.seed, stream, p);
+    const Pad pad = c.pad(random);
+    for (int t = 0; t < TOUCHES;) {
+      Touch touch = draw_touch(array, random);
+      if (!std::isnan(c.angle_rad)) {
+        touch.angle_rad = c.angle_rad;
+      }
+      const Contact &contact = c.contacts[random.next() % c.contacts.size()];
+      const double noise_Pa = draw_noise_Pa(random);
+      const auto readings = readings_of(array, contact, touch, pad, noise_Pa, random);
+      const std::uint32_t usable = choose(c.sensors, random);
+      fit_settings settings = settings_for(pad, noise_Pa);
+      settings.iterations = static_cast<std::uint8_t>(c.iterations);
+      settings.model_sd_q16 = c.gaussian ? 0 : settings.model_sd_q16;
+      fit_result fit;
+      fit_gaussian_grid(&array, readings.data(), usable, &settings, &fit);
+      if (!(fit.flags & CONTACT_FLAG_FIT_VALID)) {
+        continue; // no positive reading among the sensors in use
+      }
+      const double error_mm =
+          std::hypot(static_cast<double>(fit.x_mm) - touch.x_mm,
+                     static_cast<double>(fit.y_mm) - touch.y_mm);
+      judged[p * TOUCHES + static_cast<std::size_t>(t++)] = {error_mm, touch.force_N, fit};
+    }
+  });
+  std::fprintf(stderr, "truth_fit: %s\n", c.name.c_str());
+  return Results(std::move(judged));
+}
+
+std::vector<Contact> objects_on(double layer_mm, const Options &options) {
+  std::vector<Contact> contacts;
+  for (const char *name : OBJECTS) {
+    contacts.push_back(contact_of(name, layer_mm, options.cache));
+  }
+  return contacts;
+}
+
+// The shorter width is one that 12 mm of rubber makes: 5.4 mm of a point, more of larger objects.
+std::vector<Contact> gaussians(double ratio) {
+  std::vector<Contact> contacts;
+  for (double shorter_mm = 5.25; shorter_mm <= 7.0; shorter_mm += 0.25) {
+    contacts.push_back(gaussian(shorter_mm, ratio));
+  }
+  return contacts;
+}
+
+Pad equal(Random &) {
+  return perfect_pad();
+}
+
+auto spread(double sd) {
+  return [sd](Random &random) { return raw_pad(sd, sd, random); };
+}
+
+// What the firmware believes of a pad that was never calibrated.
+Pad never_calibrated(Random &random) {
+  return raw_pad(0.10, static_cast<double>(DEFAULT_GAIN_SD), random);
+}
+
+void judge_coverage(const Options &options, const std::vector<Contact> &thick,
+                    const std::vector<Contact> &thin, ordered_json &out) {
+  const Case cases[] = {
+      {"noise only", gaussians(1.0), equal, true},
+      {"12 mm, equal gains", thick, equal},
+      {"12 mm, gains 5 %", thick, spread(0.05)},
+      {"12 mm, gains 10 %", thick, never_calibrated},
+      {"12 mm, calibrated", thick, calibrated_pad},
+      {"6 mm, equal gains", thin, equal},
+      {"6 mm, gains 10 %", thin, never_calibrated},
+      {"6 mm, calibrated", thin, calibrated_pad},
+  };
+  constexpr std::size_t JUDGED = 6;
+  double least = 100.0, most = 0.0, least_2 = 100.0;
+  for (std::size_t i = 0; i < std::size(cases); i++) {
+    Case c = cases[i];
+    const Results results = run(c, options);
+    out["cases"].push_back(results.row(c.name));
+    if (i < JUDGED) {
+      least = std::min(least, results.covered(1.0));
+      most = std::max(most, results.covered(1.0));
+      least_2 = std::min(least_2, results.covered(2.0));
+    }
+    if (c.name == "12 mm, calibrated") {
+      out["cal_warned_percent"] = results.flagged(WARNINGS);
+      out["cal_bad_unflagged_percent"] = results.bad_without(WARNINGS);
+      out["round_elongated_percent"] = results.share([](const Judged &j) {
+        return j.error_mm <= BAD_mm && (j.fit.flags & CONTACT_FLAG_ELONGATED);
+      });
+    } else if (c.name == "12 mm, gains 10 %") {
+      out["raw_warned_percent"] = results.flagged(WARNINGS);
+      out["raw_bad_unflagged_percent"] = results.bad_without(WARNINGS);
+    }
+  }
+  out["cover_1sd_min"] = least;
+  out["cover_1sd_max"] = most;
+  out["cover_2sd_min"] = least_2;
+}
+
+void judge_elongated(const Options &options, ordered_json &out) {
+  struct Shape {
+    const char *name;
+    std::vector<Contact> contacts;
+  };
+  const Shape shapes[] = {
+      {"sigma ratio 1.2", gaussians(1.2)},
+      {"sigma ratio 1.3", gaussians(1.3)},
+      {"sigma ratio 2", gaussians(2.0)},
+      {"cylinder 6 x 12 mm", {contact_of("cylinder6x12", 12.0, options.cache)}},
+      {"edge of 20 mm", {contact_of("edge20", 12.0, options.cache)}},
+  };
+  struct Angle {
+    const char *name;
+    double angle_rad;
+  };
+  const Angle angles[] = {{"any angle", NAN},
+                          {"0 degrees", 0.0},
+                          {"34 degrees", 34.0 / 180.0 * M_PI},
+                          {"45 degrees", 0.25 * M_PI},
+                          {"90 degrees", 0.5 * M_PI}};
+  double worst = 0.0;
+  for (const Shape &shape : shapes) {
+    for (const Angle &angle : angles) {
+      const Results results =
+          run({std::string(shape.name) + " at " + angle.name, shape.contacts, calibrated_pad,
+               false, angle.angle_rad},
+              options);
+      const double unflagged = results.bad_without(WARNINGS | CONTACT_FLAG_ELONGATED);
+      ordered_json row = results.row(std::string(shape.name) + ", " + angle.name);
+      row["bad_and_neither_warned_nor_elongated"] = unflagged;
+      out["elongated"].push_back(row);
+      worst = std::max(worst, unflagged);
+    }
+  }
+  out["elongated_bad_unflagged_percent"] = worst;
+}
+
+void judge_iterations(const Options &options, const std::vector<Contact> &thick,
+                      const std::vector<Contact> &thin, ordered_json &out) {
+  for (int iterations = 3; iterations <= 8; iterations++) {
+    for (const bool is_thin : {false, true}) {
+      for (const double sd : {0.0, 0.10}) {
+        Case c{is_thin ? "6 mm" : "12 mm", is_thin ? thin : thick, spread(sd)};
+        c.name += sd > 0.0 ? " iterated with gains 10 %" : " iterated";
+        c.name += ", " + std::to_string(iterations);
+        c.iterations = iterations;
+        const Results results = run(c, options);
+        ordered_json row = results.row(c.name);
+        row["iterations"] = iterations;
+        row["layer_mm"] = is_thin ? 6 : 12;
+        row["gain_percent"] = 100.0 * sd;
+        out["iterations"].push_back(row);
+      }
+    }
+  }
+}
+
+void judge_few_sensors(const Options &options, const std::vector<Contact> &thick,
+                       const std::vector<Contact> &thin, ordered_json &out) {
+  for (const bool is_thin : {false, true}) {
+    for (const std::size_t sensors : {4u, 5u, 6u, 8u, 14u}) {
+      Case c{is_thin ? "6 mm" : "12 mm", is_thin ? thin : thick, calibrated_pad};
+      c.name += " with sensors missing, " + std::to_string(sensors);
+      c.sensors = sensors;
+      const Results results = run(c, options);
+      ordered_json row = results.row(c.name);
+      row["sensors"] = sensors;
+      row["off_by_2_mm_unflagged"] = results.bad_without(WARNINGS, 2.0);
+      out["few_sensors"].push_back(row);
+    }
+  }
+}
+
+int judge(const Options &options) {
+  if (options.pads == 0) {
+    throw std::runtime_error("--pads needs at least one pad");
+  }
+  const std::vector<Contact> thick = objects_on(12.0, options), thin = objects_on(6.0, options);
+  ordered_json out;
+  out["seed"] = options.seed;
+  out["pads"] = options.pads;
+  judge_coverage(options, thick, thin, out);
+  judge_elongated(options, out);
+  judge_iterations(options, thick, thin, out);
+  judge_few_sensors(options, thick, thin, out);
+  std::cout << out.dump(1) << '\n';
+  std::cout.flush();
+  return std::cout ? 0 : 1;
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+  try {
+    Options options;
+    reference::parse_options(argc, argv,
+                             {{"--cache", &options.cache},
+                              {"--seed", nullptr, &options.seed},
+                              {"--pads", nullptr, &options.pads}},
+                             HELP);
+    return judge(options);
+  } catch (const std::exception &error) {
+    std::fprintf(stderr, "truth_fit: %s\n", error.what());
+    return 1;
+  }
+}
