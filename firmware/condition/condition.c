@@ -77,6 +77,7 @@ static void begin_tare(struct condition *condition, uint8_t k) {
   condition->tare_min[k] = INT32_MAX;
   condition->tare_max[k] = INT32_MIN;
   condition->tare_left[k] = CONDITION_TARE_FRAMES;
+  condition->taring |= UINT32_C(1) << k;
   condition->memory_Pa_q10[k] = 0;
   condition->reached_Pa_q10[k] = 0;
   condition->margin_Pa_q10[k] = 0;
@@ -124,7 +125,7 @@ static void tare_step(struct condition *condition, uint8_t k, int32_t pressure_P
   if (condition->tare_left[k] > 0 && !(slow && taken >= TARE_FEWEST)) {
     return;
   }
-  condition->tare_left[k] = 0;
+  condition->taring &= ~(UINT32_C(1) << k);
   int64_t sum = condition->tare_sum[k] - condition->tare_min[k] - condition->tare_max[k];
   condition->level_Pa_q10[k] = condition->zero_Pa_q10[k] =
       clamp(mean_of(sum, taken - 2), -ZERO_MAX, ZERO_MAX);
@@ -200,6 +201,8 @@ static void track_pressed(struct condition *condition, uint8_t k, int32_t step_m
   condition->margin_Pa_q10[k] = in_all(reached, condition->pad_reached_Pa_q10) >> BAND_SHIFT;
   condition->risen_Pa_q10[k] = faded(condition->risen_Pa_q10[k], step_ms, WANDER_ms);
   condition->below_ms[k] = 0;
+  condition->sum_Pa_q10[k] = 0;
+  condition->summed[k] = 0;
   set_bit(&condition->below, k, false);
   if (condition->pressed_ms < DRIFT_GOES_ON_ms) {
     int32_t drift_q16 = condition->drift_rest_q16[k] + condition->drift_q16[k] * step_ms;
@@ -431,43 +434,75 @@ static void track(struct condition *condition, const struct frame *frame,
   condition->due_ms = due;
 }
 
-/* Fills in pressures, peak and usable; says whether a reading is over the gate and its margin. */
-static bool read_sensors(struct condition *condition, const struct frame *frame,
-                         const struct condition_gains *gains, int32_t limit,
-                         struct conditioned *conditioned) {
-  uint32_t readable = frame->valid & ~frame->saturated;
-  bool sums = !condition->pressed;
-  bool over = frame->saturated != 0;
-  int32_t peak = 0;
-  conditioned->tared = readable != 0;
+/* Takes the readings of sensors that are tared now, and leaves the bitmap of those that were. */
+static uint32_t tare_sensors(struct condition *condition, const struct frame *frame,
+                             uint32_t readable) {
+  uint32_t ready = readable;
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
     uint32_t bit = UINT32_C(1) << k;
     if (frame->renewed & bit) {
       begin_tare(condition, k);
     }
-    if (!(readable & bit)) {
-      continue;
-    }
-    if (condition->tare_left[k] > 0) {
-      conditioned->tared = false;
+    if (condition->taring & readable & bit) {
+      ready &= ~bit;
       tare_step(condition, k, frame->pressure_Pa_q10[k]);
+    }
+  }
+  return ready;
+}
+
+/* Fills in pressures and peak; the strongest sensor is the answer. */
+static uint8_t read_sensors(const struct condition *condition, const struct frame *frame,
+                            const struct condition_gains *gains, struct conditioned *conditioned) {
+  int32_t peak = 0;
+  uint8_t strongest = 0;
+  uint32_t ready = conditioned->usable;
+  for (uint8_t k = 0; k < frame->sensor_count; k++, ready >>= 1) {
+    if (!(ready & 1u)) {
+      conditioned->pressure_Pa_q10[k] = 0;
       continue;
     }
     int32_t above = clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k]);
-    if (sums && above < SUM_RANGE && condition->summed[k] < UINT8_MAX) {
-      condition->sum_Pa_q10[k] += above > -SUM_RANGE ? above : -SUM_RANGE;
-      condition->summed[k]++;
-    }
     if (gains) {
       above = scaled_by(clamp(above, -GAINED_MAX, GAINED_MAX - 1), gains->inverse_q16[k]);
     }
     conditioned->pressure_Pa_q10[k] = above;
-    conditioned->usable |= bit;
-    peak = above > peak ? above : peak;
-    over = over || above > limit + condition->margin_Pa_q10[k];
+    if (above > peak) {
+      peak = above;
+      strongest = k;
+    }
   }
   conditioned->peak_Pa_q10 = peak;
-  return over;
+  return strongest;
+}
+
+/* Whether a reading is over the gate and its margin: the strongest, mostly. */
+static bool is_over(const struct condition *condition, const struct frame *frame,
+                    const struct conditioned *conditioned, uint8_t strongest, int32_t limit) {
+  if (frame->saturated != 0 ||
+      conditioned->peak_Pa_q10 > limit + condition->margin_Pa_q10[strongest]) {
+    return true;
+  }
+  if (conditioned->peak_Pa_q10 <= limit) {
+    return false;
+  }
+  for (uint8_t k = 0; k < frame->sensor_count; k++) {
+    if (conditioned->pressure_Pa_q10[k] > limit + condition->margin_Pa_q10[k]) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/* For the means that the zeros follow while nothing touches. */
+static void sum_up(struct condition *condition, const struct frame *frame, uint32_t usable) {
+  for (uint8_t k = 0; k < frame->sensor_count; k++) {
+    if (usable >> k & 1u && condition->summed[k] < UINT8_MAX) {
+      int32_t above = clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k]);
+      condition->sum_Pa_q10[k] += clamp(above, -SUM_RANGE, SUM_RANGE);
+      condition->summed[k]++;
+    }
+  }
 }
 
 void condition_frame(struct condition *condition, const struct frame *frame,
@@ -482,16 +517,25 @@ void condition_frame(struct condition *condition, const struct frame *frame,
 
   int32_t open = Pa_q10(CONDITION_OPEN_Pa) + CONDITION_OPEN_SIGMA * frame->noise_Pa_q10;
   int32_t close = Pa_q10(CONDITION_CLOSE_Pa) + CONDITION_CLOSE_SIGMA * frame->noise_Pa_q10;
-  memset(conditioned, 0, sizeof *conditioned);
-  bool over = read_sensors(condition, frame, gains, condition->pressed ? close : open, conditioned);
-  press_or_release(condition, over);
+  uint32_t readable = frame->valid & ~frame->saturated;
+  conditioned->usable = readable;
+  if (condition->taring & readable || frame->renewed) {
+    conditioned->usable = tare_sensors(condition, frame, readable);
+  }
+  uint8_t strongest = read_sensors(condition, frame, gains, conditioned);
+  press_or_release(condition, is_over(condition, frame, conditioned, strongest,
+                                      condition->pressed ? close : open));
+  if (!condition->pressed) {
+    sum_up(condition, frame, conditioned->usable);
+  }
   bool unsure = condition->pressed && frame->saturated == 0 &&
                 ((condition->firm & conditioned->usable) == 0 ||
                  conditioned->peak_Pa_q10 < drift_in_contact(condition));
   track(condition, frame, conditioned, step_ms, open, unsure);
 
   conditioned->contact = condition->pressed || conditioned->peak_Pa_q10 > open;
-  conditioned->tared = conditioned->tared && (condition->below & conditioned->usable) == 0;
+  conditioned->tared = readable != 0 && conditioned->usable == readable &&
+                       (condition->below & conditioned->usable) == 0;
   watch_calm(condition, conditioned, frame->sensor_count);
   bool stands_off = (condition->stands_off & conditioned->usable) != 0;
   conditioned->zero_doubtful = condition->pressed ? unsure : conditioned->contact || stands_off;

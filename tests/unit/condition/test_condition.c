@@ -654,7 +654,7 @@ static void test_random_frames(void) {
     run(1);
     TEST_ASSERT_EQUAL_HEX32(0, conditioned.usable & ~(frame.valid & ~frame.saturated));
     int32_t peak = 0;
-    for (int k = 0; k < FT_MAX_SENSORS; k++) {
+    for (int k = 0; k < frame.sensor_count; k++) {
       bool usable = conditioned.usable >> k & 1u;
       TEST_ASSERT_TRUE(usable || conditioned.pressure_Pa_q10[k] == 0);
       peak = conditioned.pressure_Pa_q10[k] > peak ? conditioned.pressure_Pa_q10[k] : peak;
