@@ -9,7 +9,8 @@ above ambient on sensor k. contact .. slip are the truth.
 
 Recording (CSV, UTF-8): what a fingertip said, written by `fingertip record`; one row per frame.
     # fingertip-recording 1
-    # key: value              serial, board, scene, firmware, git, rate_mHz, osr, slip_window_ms, x_mm, ...
+    # key: value              serial, board, scene, firmware, git, rate_mHz, osr, slip_window_ms, x_mm, ...; of a calibrated
+                              fingertip (stored, bit 0) gains, force_scale, ...: the pressures are as measured all the same
     t_us,frame,...            device time; see RECORDING_COLUMNS, then s<k>_Pa (absolute) and tare<k>_Pa
     # packet: ... | # event: ...     between the rows
     # end: key=value ...      counts of the whole recording; absent if the recorder was killed

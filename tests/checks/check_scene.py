@@ -15,7 +15,7 @@ from elf import Elf, fail
 
 # Objects below firmware/CMakeFiles, and names of other symbols.
 OWNED = {
-    "FIT": ("ft_fit.dir/fit/*.obj", r"wire_contact_\w+"),
+    "FIT": ("ft_fit.dir/fit/*.obj", r"wire_contact_\w+|contact_weigh|app_use_calibration|cmd_(calibrate|prior|location_limit)_\w+"),
     "SLIP": ("ft_contact.dir/contact/slip.c.obj", r"contact_update|cmd_slip_\w+"),
     "RAW_STREAM": (None, r"wire_raw_\w+"),
 }

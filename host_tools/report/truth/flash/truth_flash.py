@@ -1,0 +1,140 @@
+#!/usr/bin/python3
+"""What the fingertip keeps without power, in the emulator with the firmware's own flash driver.
+
+    truth_flash.py --build build/host --boards build
+
+Prints one JSON object, and what it is doing on standard error:
+
+    flash_lost             updates after which neither the old nor the new was there, or it did not stay, of --updates with the
+                           power cut at each step in turn (store_power.mjs); the unit test of the store cuts it at every step
+                           of ten thousand
+    flash_frames_skipped   frames that the release image skipped or did not send while it stored calibrations and settings, at
+                           OSR 256 and full rate, in contact on every frame
+    flash                  the figures behind them: latencies with and without storing among them. A command that brings a calibration
+                           takes the processor 0.1 ms, which a frame may have to wait once; the writing does not
+"""
+import argparse
+import concurrent.futures
+import json
+import pathlib
+import struct
+import sys
+import tempfile
+import zlib
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
+import numpy as np  # noqa: E402
+
+from emulated import CONVERSION_us, MARGIN, ROOT, Tools, contact_times_us, distribution, run, scenario  # noqa: E402
+from fingertip_files import InputError, read_recording, run_tool  # noqa: E402
+
+BOARD, OSR = "pico_parallel", 256
+WIRE_VERSION, CALIBRATE, SENSORS = 4, 0x88, 15
+# From one command to the next: an erase of the slowest flash and all that follows.
+INTERVAL_s = 0.6
+# Gains cost time in each frame, so what is compared has them from here on.
+CALIBRATED_s = 0.5
+FROM_s = 1.1
+
+
+def say(what):
+    print(f"truth_flash: {what}", file=sys.stderr, flush=True)
+
+
+def stuffed(packet):
+    """COBS and the delimiter, firmware/wire/PROTOCOL.md; no run of a command is 254 bytes long."""
+    return b"".join(bytes([len(run) + 1]) + run for run in packet.split(b"\0")) + b"\0"
+
+
+def calibrate_frame(number):
+    body = struct.pack("<BIHff", SENSORS, 1785931200 + number, 30, 1 + 0.001 * number, 0.02)
+    body += b"".join(struct.pack("<fff", 0.9 + 0.01 * ((k + number) % 20), 0.01, 0) for k in range(SENSORS))
+    packet = struct.pack("<BBHQ", WIRE_VERSION, CALIBRATE, number, 0) + body
+    return stuffed(packet + struct.pack("<I", zlib.crc32(packet))).hex()
+
+
+class Run:
+    """The release image, calibrated, in contact, while it obeys so many commands that store."""
+
+    def __init__(self, tools, folder, name, path, commands, options=()):
+        base = pathlib.Path(folder) / name
+        lines = ["0.45 dtr 1", f"0.452 {tools.encoded('info')}", f"0.455 {tools.encoded('osr', OSR)}",
+                 f"0.46 {tools.encoded('stream', 'contact,health')}", f"{CALIBRATED_s} {calibrate_frame(0)}"]
+        stores = [calibrate_frame(1 + i) if i % 3 else tools.encoded("keep") for i in range(commands)]
+        lines += [f"{FROM_s + INTERVAL_s * i:.3f} {frame}" for i, frame in enumerate(stores)]
+        base.with_suffix(".script").write_text("\n".join(lines) + "\n")
+        run("node", ROOT / "host_tools/emulator/main.mjs", "--board", BOARD, "--image", tools.image(BOARD), "--scenario", path,
+            "--host-script", base.with_suffix(".script"), "--capture", f"{base}.ftr", "--usb-log", f"{base}.usb", "--report", f"{base}.json",
+            *options)
+        run(tools.fingertip, "replay", f"{base}.ftr", "--to-csv", f"{base}.csv")
+        emulated = json.loads(pathlib.Path(f"{base}.json").read_text())
+        recording = read_recording(f"{base}.csv")
+        health = recording.health()[-1]
+        zero_us = emulated["device_time_zero_s"] * 1e6
+        rows = recording.has_contact & (recording["t_us"] >= FROM_s * 1e6 - zero_us)
+        self.frames = int(rows.sum())
+        self.skipped = health["frames_skipped"] + int((np.diff(recording["frame"][rows]) - 1).sum())
+        self.stored = [f for kind, f in recording.packets if kind == "ack" and int(f["command"]) >= CALIBRATE][1:]
+        self.refused = sum(f["result"] != "0" for f in self.stored)
+        self.erases, self.programs = emulated["flash"]["erases"], emulated["flash"]["programs"]
+        times = contact_times_us(f"{base}.usb", zero_us)
+        times = times[times[:, 0] >= FROM_s * 1e6 - zero_us]
+        self.latency_us = distribution(times[:, 1] - times[:, 0] + CONVERSION_us[OSR] * (MARGIN / 2 - 1))
+
+
+def stream(tools, commands):
+    with tempfile.TemporaryDirectory() as folder:
+        path = scenario(folder, "wander", FROM_s + INTERVAL_s * commands + 0.1)
+        jobs = {"quiet": (0, ()), "storing": (commands, ()), "storing_slowly": (commands, ("--slow-flash",))}
+        with concurrent.futures.ThreadPoolExecutor(2) as pool:
+            futures = {name: pool.submit(Run, tools, folder, name, path, *job) for name, job in jobs.items()}
+            runs = {name: future.result() for name, future in futures.items()}
+    for name in ("storing", "storing_slowly"):
+        if len(runs[name].stored) != commands or runs[name].refused:
+            raise InputError(f"{name}: {len(runs[name].stored)} of {commands} commands answered, {runs[name].refused} refused")
+    return runs
+
+
+def power(image, updates, seed):
+    """Two processes with half of the updates each."""
+    halves = [updates - updates // 2, updates // 2]
+
+    def half(i):
+        return json.loads(run("node", ROOT / "host_tools/report/truth/flash/store_power.mjs", "--image", image, "--updates", halves[i],
+                              "--seed", 2 * seed + i))
+
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        found = list(pool.map(half, [i for i in range(2) if halves[i]]))
+    return {name: sum(part[name] for part in found) for name in found[0]}
+
+
+def main(argv):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", required=True, metavar="DIR", help="build folder of the host tools")
+    parser.add_argument("--boards", required=True, metavar="DIR", help="folder of the boards' builds")
+    parser.add_argument("--updates", type=int, default=10000, help="with a power cut (default: %(default)s)")
+    parser.add_argument("--commands", type=int, default=20, help="that store, while frames stream (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args(argv)
+    if options.updates < 1 or options.commands < 1 or options.seed < 1:
+        raise InputError("--updates, --commands and --seed count from 1")
+    tools = Tools(options.build, options.boards)
+    image = tools.boards / BOARD / "store_power.bin"
+    say(f"{options.updates} updates with the power cut")
+    cut = power(image, options.updates, options.seed)
+    say(f"{options.commands} commands that store while {BOARD} streams at OSR {OSR}, without them, and with the slowest flash")
+    runs = stream(tools, options.commands)
+    print(json.dumps({
+        "flash_lost": cut["lost"],
+        "flash_frames_skipped": max(runs[name].skipped for name in ("storing", "storing_slowly")),
+        "flash": {
+            "power": cut,
+            **{name: {"frames": found.frames, "skipped": found.skipped, "stored": len(found.stored), "erases": found.erases,
+                      "programs": found.programs, "latency_us": found.latency_us} for name, found in runs.items()},
+        },
+    }, indent=2))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run_tool("truth_flash.py", main))

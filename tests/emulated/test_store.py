@@ -1,0 +1,121 @@
+"""What the release image keeps in its flash: over restarts, new firmware and power cuts; and the report's own measurement of it in short.
+
+usage: test_store.py --build BUILD --boards BOARDS --node NODE
+"""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "host_tools" / "python"))
+import fingertip_files  # noqa: E402
+
+OPTIONS = argparse.Namespace()
+CALIBRATION, SETTINGS, WRITING, DAMAGED = 1, 2, 4, 8
+KEEP = 0x8A
+
+
+def run(*call):
+    done = subprocess.run([str(part) for part in call], capture_output=True, text=True)
+    if done.returncode != 0:
+        raise AssertionError(f"{call}: {done.stdout}{done.stderr}")
+    return done.stdout
+
+
+class Store(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        temporary = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(temporary.cleanup)
+        cls.folder = pathlib.Path(temporary.name)
+        cls.scenario = cls.folder / "rest.csv"
+        names = ["t_s", "contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip", *(f"s{k}_Pa" for k in range(15))]
+        cls.scenario.write_text(f"# fingertip-scenario 1\n{','.join(names)}\n0{',0' * (len(names) - 1)}\n")
+
+    def setUp(self):
+        self.flash = self.folder / "flash.bin"
+        self.flash.unlink(missing_ok=True)
+
+    def life(self, *commands, seconds=1.0, faults=(), options=()):
+        """One run of the image with its flash; its last info packet, and its acknowledgements of keep."""
+        script, capture, table = (self.folder / name for name in ("host.txt", "capture.ftr", "capture.csv"))
+        faulty = self.folder / "faults.json"
+        lines = ["0.45 dtr 1", *(f"{t} {run(self.tool, 'encode', *words.split()).strip()}" for t, words in commands)]
+        script.write_text("\n".join(lines) + "\n")
+        faulty.write_text(json.dumps(list(faults)))
+        run(OPTIONS.node, ROOT / "host_tools/emulator/main.mjs", "--board", "pico_mux", "--image", f"{OPTIONS.boards}/pico_mux/fingertip-pico_mux.bin",
+            "--scenario", self.scenario, "--host-script", script, "--capture", capture, "--faults", faulty, "--seconds", seconds,
+            "--flash", self.flash, "--fast-enumeration", *options)
+        run(self.tool, "replay", capture, "--to-csv", table, "--overwrite")
+        recording = fingertip_files.read_recording(table)
+        results = [int(f["result"]) for kind, f in recording.packets if kind == "ack" and int(f["command"]) == KEEP]
+        metadata = {}
+        for line in table.read_text().splitlines():
+            key, separator, value = line.removeprefix("# ").partition(": ")
+            if line.startswith("# ") and separator:
+                metadata[key] = value
+        return metadata, results
+
+    @property
+    def tool(self):
+        return f"{OPTIONS.build}/host_tools/cli/fingertip"
+
+    LOOK = ((0.9, "info"), (0.91, "stream contact"))
+
+    def test_settings_are_kept_until_they_are_forgotten(self):
+        for slow in ((), ("--slow-flash",)):
+            with self.subTest(slow=slow):
+                self.setUp()
+                info, results = self.life((0.5, "osr 512"), (0.51, "prior 3.1:0.4"), (0.52, "limit 0.8"), (0.53, "keep"), (1.2, "info"),
+                                          (1.21, "stream contact"), seconds=1.3, options=slow)
+                self.assertEqual((results, info["stored"]), ([0], str(SETTINGS)))
+                info, _ = self.life(*self.LOOK)
+                self.assertEqual((info["osr"], info["prior_sigma_mm"], info["prior_width_mm"], info["location_limit_mm"], info["stored"]),
+                                 ("512", "3.1", "0.4", "0.8", str(SETTINGS)))
+                info, results = self.life((0.5, "forget"), *self.LOOK)
+                self.assertEqual((results, info["osr"], info["stored"]), ([0], "512", "0"))
+                self.assertEqual(self.life(*self.LOOK)[0]["osr"], "1024")
+
+    def test_power_lost_while_storing(self):
+        """At many moments of one update; both answers occur."""
+        found = set()
+        for cut_ms in (0.5, 3, 20, 46, 48, 55, 60, 70, 90, 150):
+            self.setUp()
+            self.life((0.5, "osr 512"), (0.53, "keep"), *self.LOOK)
+            at_s = 0.5315 + cut_ms / 1e3
+            self.life((0.5, "osr 256"), (0.53, "keep"), (1.8, "stream contact"), seconds=2.0,
+                      faults=[{"type": "power_cut", "from_s": at_s, "to_s": at_s + 0.01}])
+            info, _ = self.life(*self.LOOK)
+            self.assertIn(info["osr"], ("256", "512"), cut_ms)
+            self.assertEqual(info["stored"], str(SETTINGS))
+            found.add(info["osr"])
+        self.assertEqual(found, {"256", "512"})
+
+    def test_the_power_is_cut_at_each_step(self):
+        """The report's measurement, in short."""
+        found = json.loads(run("/usr/bin/python3", ROOT / "host_tools/report/truth/flash/truth_flash.py", "--build", OPTIONS.build,
+                               "--boards", OPTIONS.boards, "--updates", 160, "--commands", 3))
+        self.assertEqual((found["flash_lost"], found["flash_frames_skipped"]), (0, 0))
+        power = found["flash"]["power"]
+        self.assertEqual(power["updates"], 160)
+        self.assertGreater(power["cuts"], 100)
+        self.assertGreater(power["cuts_in_mending"], 10)
+        self.assertTrue(20 < power["brought"] < power["cuts"] - 20, power)
+        quiet, storing, slowly = (found["flash"][name] for name in ("quiet", "storing", "storing_slowly"))
+        self.assertEqual((quiet["stored"], storing["stored"], slowly["stored"]), (0, 3, 3))
+        self.assertEqual(quiet["frames"], storing["frames"])
+        for run_of in (storing, slowly):
+            self.assertLess(abs(run_of["latency_us"]["median"] - quiet["latency_us"]["median"]), 3)
+            self.assertLess(run_of["latency_us"]["p99"] - quiet["latency_us"]["p99"], 20)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    for name in ("build", "boards", "node"):
+        parser.add_argument(f"--{name}", required=True)
+    OPTIONS, rest = parser.parse_known_args()
+    unittest.main(argv=[sys.argv[0], *rest])
