@@ -36,6 +36,12 @@ double rms(const std::vector<double> &values) {
   return values.empty() ? 0.0 : std::sqrt(sum / double(values.size()));
 }
 
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 /* Beyond what their uncertainty makes. */
 double rms_beyond(const std::vector<double> &values, const std::vector<double> &sds) {
   const double all = rms(values), chance = rms(sds);
@@ -142,6 +148,11 @@ std::string text_of(const Judgement &j, std::size_t placements) {
   case Reason::none:
     return "good: every gain is known to " + percent(s.worst_shape_sd());
   case Reason::too_few:
+    if (placements == 0) {
+      return "no placement was found: set a weight of about 3 N on a round foot down, let it stand "
+             "by "
+             "itself for a second, and lift it";
+    }
     return "too few placements (" + std::to_string(placements) +
            "): place the weight at more places all over the pad";
   case Reason::cluster:
@@ -305,51 +316,40 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
   if (forces.size() < PLACEMENTS_MIN) {
     return std::nullopt;
   }
-  std::sort(forces.begin(), forces.end());
-  const double median = forces[forces.size() / 2];
+  const double middle = median(forces);
   std::vector<double> off;
   for (double force : forces) {
-    off.push_back(std::abs(force / median - 1.0));
+    off.push_back(std::abs(force / middle - 1.0));
   }
-  std::sort(off.begin(), off.end());
   /* Of a median: 1.2533 of a mean's; of a normal spread: 1.4826 of the median deviation. */
-  const double by_chance = 1.2533 * 1.4826 * off[off.size() / 2] / std::sqrt(double(off.size()));
-  return ForceScale{force_N / median, force_N / median * std::hypot(by_chance, FORCE_MODEL_SD)};
+  const double by_chance = 1.2533 * 1.4826 * median(off) / std::sqrt(double(off.size()));
+  return ForceScale{force_N / middle, force_N / middle * std::hypot(by_chance, FORCE_MODEL_SD)};
 }
 
 Scatter scatter(const Array &array, const std::vector<Placement> &placements,
                 const Solution &solution, bool with_gains) {
   FirmwareFit fit(array);
   const std::vector<double> ones(array.sensors(), 1.0);
-  std::vector<double> dx, dy, forces;
+  std::vector<double> distances, forces;
   for (std::size_t i = 0; i < placements.size(); i++) {
     const auto fitted = solution.placements[i].kept
                             ? fit(placements[i], with_gains ? solution.gain : ones)
                             : std::nullopt;
     if (fitted) {
-      dx.push_back(static_cast<double>(fitted->x_mm) - solution.placements[i].x_mm);
-      dy.push_back(static_cast<double>(fitted->y_mm) - solution.placements[i].y_mm);
+      distances.push_back(
+          std::hypot(static_cast<double>(fitted->x_mm) - solution.placements[i].x_mm,
+                     static_cast<double>(fitted->y_mm) - solution.placements[i].y_mm));
       forces.push_back(static_cast<double>(fitted->force_N));
     }
   }
-  const auto about_mean = [](const std::vector<double> &values, double &mean) {
-    mean = 0.0;
-    for (double value : values) {
-      mean += value / double(values.size());
-    }
-    double squares = 0.0;
-    for (double value : values) {
-      squares += (value - mean) * (value - mean) / double(values.size());
-    }
-    return std::sqrt(squares);
-  };
-  if (dx.empty()) {
+  if (forces.empty()) {
     return {};
   }
-  double mean_x, mean_y, mean_force;
-  const double sd_x = about_mean(dx, mean_x), sd_y = about_mean(dy, mean_y);
-  const double sd_force = about_mean(forces, mean_force);
-  return {std::hypot(sd_x, sd_y), sd_force / mean_force};
+  const double force = median(forces);
+  for (double &each : forces) {
+    each = std::abs(each / force - 1.0);
+  }
+  return {median(distances), median(forces)};
 }
 
 } // namespace fingertip::calibrating

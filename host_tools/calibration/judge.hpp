@@ -74,8 +74,8 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
                                       const Solution &solution, double force_N);
 
 /* What a calibration is for: how far the firmware's fit scatters over the placements without and
- * with the gains. Location: rms distance of its locations from those of the solution, the shift
- * common to all left out, mm; force: rms deviation from the mean, relative. */
+ * with the gains. Medians: of the distance of its locations from those of the solution, of the
+ * force's deviation from its median, relative. */
 struct Scatter {
   double location_mm = 0.0, force = 0.0;
 };

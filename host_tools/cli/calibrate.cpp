@@ -34,6 +34,11 @@ constexpr milliseconds POLL{20};
 constexpr std::int64_t PATIENCE_us = 5000000; /* without a frame */
 constexpr double Q10 = 1024.0;
 
+/* Of a field that is padded with zeros, if there is room. */
+std::string text_of(const char *field) {
+  return printable(std::string(field, strnlen(field, WIRE_TEXT_BYTES)));
+}
+
 Array array_of(const wire_info &info) {
   Array array;
   for (int k = 0; k < info.sensor_count; k++) {
@@ -48,8 +53,8 @@ Array array_of(const wire_info &info) {
   array.pitch_mm = std::numeric_limits<double>::infinity();
   for (std::size_t a = 0; a < array.sensors(); a++) {
     for (std::size_t b = 0; b < a; b++) {
-      array.pitch_mm = std::min(array.pitch_mm, std::hypot(array.x_mm[a] - array.x_mm[b],
-                                                           array.y_mm[a] - array.y_mm[b]));
+      array.pitch_mm = std::min(
+          array.pitch_mm, std::hypot(array.x_mm[a] - array.x_mm[b], array.y_mm[a] - array.y_mm[b]));
     }
   }
   return array;
@@ -70,13 +75,15 @@ calibrating::Frame frame_of(const wire_packet &packet) {
 /* What a fingertip must be able to do. Throws Error. */
 void check_firmware(const wire_info &info, const std::string &what) {
   if (!(info.capabilities & WIRE_CAPABILITY_FIT)) {
-    throw Error(what + ": its firmware (scene " + printable(info.scene) +
-                ") computes no locations, so there is nothing to calibrate; flash one of scene slip");
+    throw Error(
+        what + ": its firmware (scene " + text_of(info.scene) +
+        ") computes no locations, so there is nothing to calibrate; flash one of scene slip");
   }
   if (!(info.capabilities & WIRE_CAPABILITY_RAW_STREAM)) {
-    throw Error(what + ": its firmware (scene " + printable(info.scene) +
-                ") sends no pressures; flash one of scene slip, calibrate, and go back if you like: "
-                "the calibration stays");
+    throw Error(
+        what + ": its firmware (scene " + text_of(info.scene) +
+        ") sends no pressures; flash one of scene slip, calibrate, and go back if you like: "
+        "the calibration stays");
   }
   if (info.rate_mHz != 0 && info.rate_mHz < 1000.0 * calibrating::FRAME_RATE_MIN_Hz) {
     throw Error(what + ": " + fixed(info.rate_mHz / 1000.0, 1) +
@@ -173,9 +180,9 @@ void print_result(const Work &work, const calibration &made, std::optional<doubl
               work.placements().size());
   print_gains(made, static_cast<std::uint8_t>(work.array().sensors()));
   std::printf("\nof the placements      before     after\n");
-  std::printf("location off by     %6.2f mm %6.2f mm   rms\n", before.location_mm,
+  std::printf("location off by     %6.2f mm %6.2f mm   median\n", before.location_mm,
               after.location_mm);
-  std::printf("force differs by    %6.1f %%  %6.1f %%    rms\n", 100.0 * before.force,
+  std::printf("force differs by    %6.1f %%  %6.1f %%    median\n", 100.0 * before.force,
               100.0 * after.force);
   if (force_N) {
     std::printf("force scale         %9s %9s    sd %s\n", "1.000",
@@ -306,7 +313,8 @@ void work_live(Device &device, Work &work, ColourMode colour) {
       throw Error(device.name() + ": vanished; nothing was written, plug it in and try again");
     }
     if (steady_now_us() - last_frame_us > PATIENCE_us) {
-      throw Error(device.name() + ": sends no frames; see that its sensors answer (fingertip info)");
+      throw Error(device.name() +
+                  ": sends no frames; see that its sensors answer (fingertip info)");
     }
   }
   device.session().on_packet({});
@@ -353,9 +361,8 @@ int show(const CalibrateOptions &options) {
   Device device(options);
   const wire_info &info = device.info();
   if (!(info.stored & WIRE_STORED_CALIBRATION)) {
-    std::printf("not calibrated%s\n", info.stored & WIRE_STORED_DAMAGED
-                                          ? "; what was stored cannot be read"
-                                          : "");
+    std::printf("not calibrated%s\n",
+                info.stored & WIRE_STORED_DAMAGED ? "; what was stored cannot be read" : "");
     return 0;
   }
   std::printf("calibrated %s from %u placements, force scale %s sd %s\n",
@@ -372,8 +379,7 @@ int erase(const CalibrateOptions &options) {
     std::printf("not calibrated\n");
     return 0;
   }
-  ask(options, "Forget the calibration of " + printable(device.info().serial) + "?",
-      "not erased");
+  ask(options, "Forget the calibration of " + text_of(device.info().serial) + "?", "not erased");
   device.erase();
   std::printf("erased: it is as if never calibrated\n");
   return 0;
@@ -394,8 +400,8 @@ int calibrate(const CalibrateOptions &options) {
     if (!options.dry_run) {
       device.emplace(options);
       if (std::strncmp(info.serial, device->info().serial, WIRE_TEXT_BYTES) != 0) {
-        throw Error(printable(options.from) + ": is of fingertip " + printable(info.serial) +
-                    ", and this is " + printable(device->info().serial) +
+        throw Error(printable(options.from) + ": is of fingertip " + text_of(info.serial) +
+                    ", and this is " + text_of(device->info().serial) +
                     "; calibrate each by its own");
       }
     }
@@ -406,7 +412,7 @@ int calibrate(const CalibrateOptions &options) {
   if (!device) {
     return 0;
   }
-  ask(options, "Write this into " + printable(device->info().serial) + "?", "not written");
+  ask(options, "Write this into " + text_of(device->info().serial) + "?", "not written");
   device->write(made);
   std::printf("calibrated: it acts from now on\n");
   return 0;

@@ -21,8 +21,8 @@ constexpr Colour GOOD = {92, 214, 140}, WARNING = {250, 190, 60}, ACCENT = {96, 
 constexpr Colour WHITE = {255, 255, 255}, FELT = {120, 60, 30};
 constexpr double FULL_Pa = 20000.0;
 
-constexpr double RIM_mm = 6.0;       /* beyond the outer sensors */
-constexpr double CELL_ASPECT = 2.0;  /* height of a character over its width */
+constexpr double RIM_mm = 6.0;      /* beyond the outer sensors */
+constexpr double CELL_ASPECT = 2.0; /* height of a character over its width */
 constexpr int TEXT_COLUMNS = 44;
 constexpr std::chrono::milliseconds REDRAW{40};
 
@@ -39,19 +39,20 @@ public:
     left_mm_ = *left - RIM_mm;
     top_mm_ = *top + RIM_mm;
     const double width_mm = *right + RIM_mm - left_mm_, height_mm = top_mm_ - *bottom + RIM_mm;
-    column_mm_ = std::max(width_mm / std::max(columns, 4),
-                          height_mm / (CELL_ASPECT * std::max(rows, 4)));
+    column_mm_ =
+        std::max(width_mm / std::max(columns, 4), height_mm / (CELL_ASPECT * std::max(rows, 4)));
     columns_ = static_cast<int>(std::lround(width_mm / column_mm_));
     rows_ = static_cast<int>(std::lround(height_mm / (CELL_ASPECT * column_mm_)));
   }
   int columns() const { return columns_; }
   int rows() const { return rows_; }
   int column(double x_mm) const {
-    return std::clamp(static_cast<int>(std::floor((x_mm - left_mm_) / column_mm_)), 0, columns_ - 1);
+    return std::clamp(static_cast<int>(std::floor((x_mm - left_mm_) / column_mm_)), 0,
+                      columns_ - 1);
   }
   int row(double y_mm) const {
-    return std::clamp(static_cast<int>(std::floor((top_mm_ - y_mm) / (CELL_ASPECT * column_mm_))), 0,
-                      rows_ - 1);
+    return std::clamp(static_cast<int>(std::floor((top_mm_ - y_mm) / (CELL_ASPECT * column_mm_))),
+                      0, rows_ - 1);
   }
 
 private:
@@ -93,8 +94,8 @@ Canvas draw(const CalibrateStatus &status, int columns, int rows) {
     }
   }
   for (std::size_t k = 0; k < array.sensors(); k++) {
-    const bool unsure = !judgement || std::count(judgement->unsure.begin(),
-                                                 judgement->unsure.end(), k) > 0;
+    const bool unsure =
+        !judgement || std::count(judgement->unsure.begin(), judgement->unsure.end(), k) > 0;
     const double felt = std::clamp(status.finder->above_Pa()[k] / FULL_Pa, 0.0, 1.0);
     at(array.x_mm[k], array.y_mm[k], std::to_string(k),
        {unsure ? WARNING : GOOD, mix({0, 0, 0}, FELT, static_cast<float>(std::sqrt(felt))), true});
@@ -190,8 +191,8 @@ std::string advice_text(const CalibrateStatus &status) {
 }
 
 std::string progress_text(const CalibrateStatus &status) {
-  std::string text = std::to_string(status.placements) +
-                     (status.placements == 1 ? " placement" : " placements");
+  std::string text =
+      std::to_string(status.placements) + (status.placements == 1 ? " placement" : " placements");
   if (status.judgement && status.judgement->solution.solved) {
     const calibrating::Solution &solution = status.judgement->solution;
     const calibrating::Fitted &last = solution.placements.back();

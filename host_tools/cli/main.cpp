@@ -587,15 +587,15 @@ int run(int argc, char **argv) {
         options.calibrate.choice = options.choice;
         return run_calibrate(options.calibrate);
       }));
-  CLI::Option *weight =
-      calibrate
-          ->add_option_function<std::string>(
-              "--weight",
-              [&](const std::string &text) {
-                options.calibrate.force_N = weight_N_from_text("--weight", text, GRAVITY_N_PER_g);
-              },
-              "The weight's, where it is known: then forces are calibrated too")
-          ->type_name("GRAMS");
+  CLI::Option *weight = calibrate
+                            ->add_option_function<std::string>(
+                                "--weight",
+                                [&](const std::string &text) {
+                                  options.calibrate.force_N =
+                                      weight_N_from_text("--weight", text, GRAVITY_N_PER_g);
+                                },
+                                "The weight's, where it is known: then forces are calibrated too")
+                            ->type_name("GRAMS");
   calibrate
       ->add_option_function<std::string>(
           "--force",
@@ -618,8 +618,7 @@ int run(int argc, char **argv) {
       calibrate
           ->add_flag("--show", options.calibrate.show, "Show what the fingertip is calibrated by")
           ->excludes(weight, from, dry_run, yes);
-  calibrate
-      ->add_flag("--erase", options.calibrate.erase, "Have it forget its calibration; it asks")
+  calibrate->add_flag("--erase", options.calibrate.erase, "Have it forget its calibration; it asks")
       ->excludes(weight, from, dry_run, show);
   with_colour(calibrate, options.calibrate.colour);
   CLI::App *set_command =

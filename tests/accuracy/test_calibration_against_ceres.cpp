@@ -14,8 +14,8 @@ namespace {
 
 constexpr int SENSORS = 15, SENSOR_UNKNOWNS = 6; // log gain, dx, dy, o, d, r
 
-// One reading. Blocks: the sensor's, the profile's (log peak, log width, m, q1, q2), the placement's
-// (x, y, e, w, q1, q2).
+// One reading. Blocks: the sensor's, the profile's (log peak, log width, m, q1, q2), the
+// placement's (x, y, e, w, q1, q2).
 struct ReadingCost {
   double x_mm, y_mm, reading_Pa, sd_Pa, tau, earlier_Pa;
   template <typename T>
@@ -82,7 +82,11 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
   ceres::LossFunction *huber = new ceres::HuberLoss(HUBER);
   for (std::size_t i = 0; i < placements.size(); i++) {
     own[i] = {solution.placements[i].x_mm + 0.5 * start.normal(),
-              solution.placements[i].y_mm + 0.5 * start.normal(), 0.0, 0.0, 0.0, 0.0};
+              solution.placements[i].y_mm + 0.5 * start.normal(),
+              0.0,
+              0.0,
+              0.0,
+              0.0};
     for (std::size_t k = 0; k < SENSORS; k++) {
       const double reading = placements[i].reading_Pa[k];
       const double model = assumed.model_share * peak_Pa, share = assumed.reading_share * reading;
@@ -90,12 +94,11 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
           std::sqrt(placements[i].noise_Pa * placements[i].noise_Pa +
                     solution.excess * solution.excess * (model * model + share * share));
       const double now = std::max(reading, 0.0);
-      const double earlier =
-          placements[i].earlier_Pa[k] * now / (now + REMEMBERS_FROM * peak_Pa);
+      const double earlier = placements[i].earlier_Pa[k] * now / (now + REMEMBERS_FROM * peak_Pa);
       const double tau = 2.0 * (placements[i].t_s - first_s) / (last_s - first_s) - 1.0;
       problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<ReadingCost, 1, SENSOR_UNKNOWNS, 5, 6>(new ReadingCost{
-              array.x_mm[k], array.y_mm[k], reading, sd, tau, earlier}),
+          new ceres::AutoDiffCostFunction<ReadingCost, 1, SENSOR_UNKNOWNS, 5, 6>(
+              new ReadingCost{array.x_mm[k], array.y_mm[k], reading, sd, tau, earlier}),
           huber, sensors[k].data(), profile.data(), own[i].data());
     }
     add_prior<6>(problem, own[i].data(), 2, 0.0, solution.spread.force, huber);
@@ -105,8 +108,9 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
   }
   for (auto &sensor : sensors) {
     const double zero_Pa = assumed.offset_share * peak_Pa;
-    const double sds[] = {assumed.gain, solution.spread.position_mm, solution.spread.position_mm,
-                          zero_Pa,      zero_Pa,                     solution.spread.memory};
+    const double sds[] = {
+        assumed.gain, solution.spread.position_mm, solution.spread.position_mm, zero_Pa,
+        zero_Pa,      solution.spread.memory};
     for (int at = 0; at < SENSOR_UNKNOWNS; at++) {
       add_prior<SENSOR_UNKNOWNS>(problem, sensor.data(), at, 0.0, sds[at]);
     }

@@ -16,17 +16,19 @@
  *     mute=1           never says anything
  *     refuse=1         answers every command but stream, info and health with "not now"
  *     calibrated=1     a calibration is stored
- *     serial=HEX       its serial number; board=NAME, git=HASH, firmware=A.B.C likewise
- *     loader=1         ends when it is asked into the loader, by the command or by 1200 baud
- *     version=V        speaks this protocol version, answers nothing else
- *     clock_ppm=P      its clock is fast by so much, over the whole of its life
- *     zero_log=FILE    writes there when its clock was zero, us of CLOCK_MONOTONIC
- *     started=S        its clock was started S seconds before
+ *     capabilities=BITS  of its firmware
+ *     play=FILE        its raw packets, and its sensors, are those of this recording, as fast as
+ * they are read; then nothing more serial=HEX       its serial number; board=NAME, git=HASH,
+ * firmware=A.B.C likewise loader=1         ends when it is asked into the loader, by the command or
+ * by 1200 baud version=V        speaks this protocol version, answers nothing else clock_ppm=P its
+ * clock is fast by so much, over the whole of its life zero_log=FILE    writes there when its clock
+ * was zero, us of CLOCK_MONOTONIC started=S        its clock was started S seconds before
  *
  *     life=S           ends after this time, default 60
  *
  * Ends by SIGTERM too. */
 #include "libfingertip/command.hpp"
+#include "libfingertip/recording.hpp"
 #include "libfingertip/text.hpp"
 #include "support/host_packets.hpp"
 
@@ -70,6 +72,12 @@ public:
       info.calibration = test::make_calibration();
       store(WIRE_STORED_CALIBRATION, true);
     }
+    if (number("capabilities", -1) >= 0) {
+      info.capabilities = static_cast<std::uint32_t>(number("capabilities", 0));
+    }
+    if (!options_["play"].empty()) {
+      read_recording(options_["play"]);
+    }
     power_on();
   }
   ~FakeDevice() { power_off(); }
@@ -85,6 +93,13 @@ public:
       }
       if (streams_ == 0) {
         next_frame = Clock::now() + milliseconds(5);
+        continue;
+      }
+      if (!options_["play"].empty()) {
+        if (played_ < recorded_.size()) {
+          send(recorded_[played_++]);
+        }
+        next_frame = Clock::now();
         continue;
       }
       for (; next_frame <= Clock::now() && streams_ != 0; next_frame += interval) {
@@ -110,6 +125,25 @@ private:
   long number(const char *key, long otherwise) const {
     auto option = options_.find(key);
     return option == options_.end() ? otherwise : std::atol(option->second.c_str());
+  }
+
+  void read_recording(const std::string &path) {
+    fingertip::RecordingReader reader(path, false);
+    while (auto item = reader.next()) {
+      if (item->kind != fingertip::RecordingReader::Item::Kind::packet) {
+        continue;
+      }
+      if (item->packet.type == WIRE_RAW) {
+        recorded_.push_back(item->packet);
+      } else if (item->packet.type == WIRE_INFO) {
+        wire_info &info = info_.body.info;
+        info.sensor_count = item->packet.body.info.sensor_count;
+        std::copy(std::begin(item->packet.body.info.x_mm), std::end(item->packet.body.info.x_mm),
+                  info.x_mm);
+        std::copy(std::begin(item->packet.body.info.y_mm), std::end(item->packet.body.info.y_mm),
+                  info.y_mm);
+      }
+    }
   }
 
   void set_text(const char *key, char *field) {
@@ -339,6 +373,8 @@ private:
   std::uint16_t sequence_ = 0;
   long frame_ = 0;
   bool vanished_ = false;
+  std::vector<wire_packet> recorded_; /* to play */
+  std::size_t played_ = 0;
 };
 
 } // namespace

@@ -37,8 +37,8 @@ struct KnownPad {
 
   struct Press {
     double x_mm, y_mm;
-    double force = 1.0;               /* times the usual */
-    double axes = 1.0, slant = 0.0;   /* ratio of the axes, and the direction of the long one */
+    double force = 1.0;             /* times the usual */
+    double axes = 1.0, slant = 0.0; /* ratio of the axes, and the direction of the long one */
     double width_mm = 5.5;
   };
   static constexpr double PEAK_Pa = 14000.0;
@@ -53,8 +53,8 @@ struct KnownPad {
            std::pow(1.0 + (a * a + b * b) / (2.0 * n * press.width_mm * press.width_mm), -n);
   }
 
-  fingertip::calibrating::Placement place(const Press &press, double t_s,
-                                          fingertip::Random &random, double noise_Pa = 1.0) const {
+  fingertip::calibrating::Placement place(const Press &press, double t_s, fingertip::Random &random,
+                                          double noise_Pa = 1.0) const {
     fingertip::calibrating::Placement placement;
     placement.t_s = t_s;
     placement.usable = (1u << array.sensors()) - 1u;
@@ -67,9 +67,8 @@ struct KnownPad {
 };
 
 /* Anywhere on the array, one weight, one every four seconds. */
-inline std::vector<fingertip::calibrating::Placement> good_session(const KnownPad &pad,
-                                                                   std::size_t count,
-                                                                   std::uint64_t seed) {
+inline std::vector<fingertip::calibrating::Placement>
+good_session(const KnownPad &pad, std::size_t count, std::uint64_t seed) {
   fingertip::Random random(seed, 2, 0);
   std::vector<fingertip::calibrating::Placement> placements;
   for (std::size_t i = 0; i < count; i++) {

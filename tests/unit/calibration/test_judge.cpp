@@ -131,7 +131,7 @@ TEST(Judge, refuses_one_end_a_cluster_and_too_few) {
                         }),
                  Reason::cluster, "near one place");
   expect_refused(judged(69, anywhere, {}, 7), Reason::too_few, "(7)");
-  expect_refused(judge(KnownPad(70).array, {}, true), Reason::too_few, "(0)");
+  expect_refused(judge(KnownPad(70).array, {}, true), Reason::too_few, "no placement was found");
 }
 
 TEST(Judge, refuses_placements_that_do_not_fit_each_other) {
@@ -171,7 +171,8 @@ TEST(Judge, says_what_thin_rubber_does_not_tell) {
 }
 
 TEST(Judge, halves_that_disagree_are_refused) {
-  /* Every other placement finds another gain at one sensor: as a cable that touches now and then. */
+  /* Every other placement finds another gain at one sensor: as a cable that touches now and then.
+   */
   const Judgement judgement = judged(
       74, anywhere,
       [](Placement &placement, int i) { placement.reading_Pa[7] *= i % 2 ? 0.955 : 1.045; }, 44);

@@ -30,8 +30,8 @@ struct Feed {
       frame.valid = valid;
       for (std::size_t k = 0; k < 15; k++) {
         const double felt_Pa = force(t) * pad.gain[k] * pad.base_Pa({x, y}, k);
-        frame.pressure_Pa.push_back(AMBIENT_Pa + 10.0 * static_cast<double>(k) +
-                                    drift_Pa_s * t_s + felt_Pa + noise_Pa * random.normal());
+        frame.pressure_Pa.push_back(AMBIENT_Pa + 10.0 * static_cast<double>(k) + drift_Pa_s * t_s +
+                                    felt_Pa + noise_Pa * random.normal());
         frame.zero_Pa.push_back(AMBIENT_Pa + 10.0 * static_cast<double>(k) + zero_off_Pa);
       }
       if (auto placement = finder.take(frame)) {
@@ -134,8 +134,11 @@ TEST(Placements, a_hand_is_none) {
   }
   sways.run(
       8.0, [](double) { return 1.0; },
-      [](double t) { return std::pair{2.0 + 0.4 * std::sin(9.0 * t), 3.0 + 0.3 * std::sin(7.0 * t)}; });
-  trembles.run(8.0, [](double t) { return 1.0 + 0.03 * std::sin(20.0 * t) + 0.03 * std::sin(13.0 * t); });
+      [](double t) {
+        return std::pair{2.0 + 0.4 * std::sin(9.0 * t), 3.0 + 0.3 * std::sin(7.0 * t)};
+      });
+  trembles.run(
+      8.0, [](double t) { return 1.0 + 0.03 * std::sin(20.0 * t) + 0.03 * std::sin(13.0 * t); });
   for (Feed *feed : {&sways, &trembles}) {
     EXPECT_TRUE(feed->found.empty());
     EXPECT_EQ(feed->finder.state(), State::refused);

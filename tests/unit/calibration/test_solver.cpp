@@ -207,12 +207,10 @@ TEST(Solver, wants_the_place_that_tells_most) {
   auto asked = placements, elsewhere = placements;
   asked.push_back(pad.place({wanted.x_mm, wanted.y_mm}, 60.0, random));
   elsewhere.push_back(pad.place({0.0, -9.0}, 60.0, random));
-  EXPECT_LT(solve(pad.array, asked).worst_shape_sd(),
-            solve(pad.array, elsewhere).worst_shape_sd());
+  EXPECT_LT(solve(pad.array, asked).worst_shape_sd(), solve(pad.array, elsewhere).worst_shape_sd());
   /* The first in the middle, and then away from it. */
   const Wanted first = next_place(pad.array, {}, Solution{});
   EXPECT_NEAR(std::hypot(first.x_mm, first.y_mm), 0.0, 1e-9);
-  const Wanted second =
-      next_place(pad.array, {pad.place({0.0, 0.0}, 0.0, random)}, Solution{});
+  const Wanted second = next_place(pad.array, {pad.place({0.0, 0.0}, 0.0, random)}, Solution{});
   EXPECT_GT(std::hypot(second.x_mm, second.y_mm), 15.0);
 }
