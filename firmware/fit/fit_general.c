@@ -502,7 +502,10 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
   float expected = variance + own.gains / (float)samples.count;
   float found = squares / (float)freedom;
   bool misfit = found > (float)(FIT_MISFIT * FIT_MISFIT) * expected;
-  variance += found > expected ? found - expected : 0.0f;
+  if (found > expected) {
+    float times = clamp(found / expected * (1.0f / FIT_MISFIT_BEGIN), 1.0f, FIT_MISFIT_MOST);
+    variance += times * (found - expected);
+  }
   float location_variance = variance * influence.location_form + own.location;
   float force_variance = variance * influence.force_form + own.force;
   float prior_excess = FIT_PRIOR_WEIGHT * FIT_PRIOR_WEIGHT - variance;

@@ -15,7 +15,6 @@
 #define PEAK_RISE_MAX_Q22 (20 << 22)                      /* a factor of a million */
 #define MODEL_INVERSE_SQUARE ((struct scaled){22756, -9}) /* 1 / FIT_MODEL_RESIDUAL^2 */
 #define ROUGH_INVERSE_SQUARE ((struct scaled){20000, -3}) /* 1 / FIT_ROUGH_RESIDUAL^2 */
-#define MISFIT_SQUARE ((struct scaled){FIT_MISFIT * FIT_MISFIT << 11, -11})
 #define FLAT_HEIGHT_Q26 2016200     /* FIT_FLAT_SIGMA */
 #define BOUND_SD ((struct scaled){19661, -14}) /* FIT_BOUND_SD */
 
@@ -268,10 +267,15 @@ static NOINLINE void set_scatter(const struct readings *readings,
   struct scaled expected = scaled_add(scatter->all, gains);
   struct scaled found = scaled_mean(square_sum, count > 4 ? count - 4 : 1);
   struct scaled excess = scaled_sub(found, expected);
+  scatter->misfit = false;
   if (excess.mantissa > 0) {
+    int32_t ratio_q10 = fit_scaled_to_fixed(scaled_mul(found, fit_grid_reciprocal(expected)), 10);
+    scatter->misfit = ratio_q10 > (FIT_MISFIT * FIT_MISFIT) << 10;
+    int32_t times_q10 =
+        fixed_clamp(ratio_q10 / FIT_MISFIT_BEGIN, 1 << 10, FIT_MISFIT_MOST << 10);
+    excess = fit_scaled_from(excess.mantissa * times_q10, excess.exponent - 10);
     scatter->all = scaled_add(scatter->all, excess);
   }
-  scatter->misfit = scaled_sub(found, scaled_mul(expected, MISFIT_SQUARE)).mantissa > 0;
 
   struct scaled mass = fit_scaled_from(system->mass_q20, -20);
   struct scaled total = scaled_add(scaled_mul(amplitude_square, mass), square_sum);

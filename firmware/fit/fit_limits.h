@@ -2,6 +2,7 @@
 #ifndef FIT_FIT_LIMITS_H
 #define FIT_FIT_LIMITS_H
 
+#include "common/bytes.h"
 #include "common/contact_flags.h"
 #include "fit/fit.h"
 
@@ -9,7 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define FIT_SETTLED_mm 0.02f     /* a larger last step has not settled */
+#define FIT_SETTLED_mm 0.3f      /* a larger last step leaves outliers undecided */
 #define FIT_MODEL_RESIDUAL 0.15f /* of the root of the sum of squared readings */
 #define FIT_ROUGH_RESIDUAL 0.02f
 #define FIT_MISFIT 3 /* standard deviation of the residuals, in those that noise, gains and model give */
@@ -33,11 +34,14 @@
  *   for all sensors: a layer's pressure has heavier tails than a Gaussian, and the more so the
  *   thinner it is. Alone, the former says 0.5 mm where a press on a node of a thin pad is good to
  *   0.05 mm, and the latter nothing where all sensors are as far from the contact;
- *   what the residuals are above these.
+ *   what the residuals are above these; from FIT_MISFIT_BEGIN times their variance more than that,
+ *   up to FIT_MISFIT_MOST times, as they must come from few readings or another model.
  * Of the force the shape's part counts by FIT_FORCE_SHAPE: the rest of it is the same for every touch
  * of a pad, which the force scale is there for. The last step counts as an error of the location;
  * where the fit stopped at a limit, FIT_BOUND_SD stands for all: what is linear about such a point
  * says nothing. Values from truth_fit --seed 1; NUMERICS.md has what they cover on others. */
+#define FIT_MISFIT_BEGIN 4
+#define FIT_MISFIT_MOST 8
 #define FIT_SHAPE_PER_MODEL 1.15f
 #define FIT_SHAPE_SIGMA 0.644f /* pitches: 12 mm of rubber on a pitch of 9 mm */
 #define FIT_FORCE_SHAPE 0.4f
@@ -57,9 +61,11 @@
 #define FIT_STRETCH_MAX 1.25f
 #define FIT_SHAPE_LEAST 0.55f
 
+/* Of positive floats the bits have the same order, and those of others are none of theirs. */
 static inline float fit_location_sd_limit_mm(const struct fit_settings *settings) {
-  float limit_mm = settings->location_sd_limit_mm;
-  return limit_mm > 0.0f && limit_mm < FIT_HUGE ? limit_mm : FIT_LOCATION_SD_LIMIT_mm;
+  uint32_t bits = bytes_from_f32(settings->location_sd_limit_mm);
+  bool positive = bits - 1u < bytes_from_f32(FIT_HUGE) - 1u;
+  return positive ? settings->location_sd_limit_mm : FIT_LOCATION_SD_LIMIT_mm;
 }
 
 #define FIT_PRIOR_WIDTH_MIN_mm 0.001f

@@ -77,10 +77,12 @@ static void the_tables_are_those_of_the_library(void) {
   }
 }
 
+static const uint32_t of_shape = CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_ELONGATED;
+
 /* The kernels agree on presses that neither warns of, once both have settled: without the sensor at
  * the peak that takes some longer. */
 static void hold_to_the_general_kernel(uint32_t seed, int presses, int masked) {
-  const struct fit_settings settled = {.iterations = masked > 0 ? 14 : 7, .noise_Pa_q10 = 5120};
+  struct fit_settings settled = {.iterations = masked > 0 ? 14 : 7, .noise_Pa_q10 = 5120};
   struct random random = {seed};
   int compared = 0;
   float worst_um = 0.0f, worst_force = 0.0f, worst_sd = 0.0f, worst_force_sd = 0.0f;
@@ -93,6 +95,10 @@ static void hold_to_the_general_kernel(uint32_t seed, int presses, int masked) {
     for (int k = 0; k < SENSORS; k++) {
       readings[k] = usable >> k & 1 ? readings[k] : (int32_t)random_u32(&random);
     }
+    for (int k = 0; k < SENSORS; k++) { /* where gains alone count, weak sensors lose bits */
+      settled.gain_sd_q16[k] = (uint16_t)(i % 3 == 2 ? random_below(&random, 8000) : 0);
+    }
+    settled.model_sd_q16 = i % 3 ? 400 : 0;
     struct fit_result grid, general;
     if (masked == 0) {
       fit_grid(&array, readings, &settled, &grid);
@@ -101,11 +107,13 @@ static void hold_to_the_general_kernel(uint32_t seed, int presses, int masked) {
     }
     fit_general(&array, readings, usable, &settled, &general);
     TEST_ASSERT_EQUAL_HEX32(usable, grid.used);
-    if ((general.flags | grid.flags) & (CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_LOW_SIGNAL)) {
-      continue; /* near a limit of the warnings the two may differ */
+    const uint32_t skipped =
+        CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_ELONGATED;
+    if (((general.flags | grid.flags) & skipped) || general.location_sd_mm > 0.2f) {
+      continue; /* what is hardly determined may differ, and one alone tells shapes */
     }
     compared++;
-    TEST_ASSERT_EQUAL_HEX32(general.flags, grid.flags);
+    TEST_ASSERT_EQUAL_HEX32(general.flags, grid.flags & ~of_shape);
     float um = 1e3f * hypotf(grid.x_mm - general.x_mm, grid.y_mm - general.y_mm);
     worst_um = fmaxf(worst_um, um);
     worst_force = fmaxf(worst_force, fabsf(grid.force_N / general.force_N - 1.0f));
@@ -124,8 +132,8 @@ static void hold_to_the_general_kernel(uint32_t seed, int presses, int masked) {
   TEST_ASSERT_GREATER_THAN_INT(presses / 3, compared);
   TEST_ASSERT_TRUE(worst_um < (masked > 0 ? 3.0f : 1.0f));
   TEST_ASSERT_TRUE(worst_force < (masked > 0 ? 5e-4f : 1e-4f));
-  TEST_ASSERT_TRUE(worst_sd < 0.02f);
-  TEST_ASSERT_TRUE(worst_force_sd < 0.02f);
+  TEST_ASSERT_TRUE(worst_sd < 0.08f);
+  TEST_ASSERT_TRUE(worst_force_sd < 0.04f);
 }
 
 static void the_kernels_agree(void) {
@@ -146,7 +154,7 @@ static void without_a_mask_both_grid_kernels_agree(void) {
     fit_grid(&array, readings, &usual, &plain);
     fit_grid_masked(&array, readings, ALL, &usual, &masked);
     TEST_ASSERT_EQUAL_HEX32(0, masked.flags & CONTACT_FLAG_SENSOR_MASKED);
-    if (!((plain.flags | masked.flags) & CONTACT_FLAG_UNCERTAIN)) {
+    if (plain.location_sd_mm < 0.2f && masked.location_sd_mm < 0.2f) {
       TEST_ASSERT_TRUE(hypotf(plain.x_mm - masked.x_mm, plain.y_mm - masked.y_mm) < 1e-3f);
     }
   }
@@ -265,8 +273,8 @@ static void more_iterations_come_nearer(void) {
   TEST_ASSERT_TRUE(mean_um[7] < 0.05f && mean_um[8] < 0.05f);
 }
 
-/* Up to three iterations are all of one kind, so that one more is one more step. */
-static void a_fit_that_still_moves_says_so(void) {
+/* Up to two iterations are all of one kind, so that one more is one more step. */
+static void a_fit_that_still_moves_says_how_far(void) {
   struct random random = {13};
   int moving = 0;
   for (int i = 0; i < 1000; i++) {
@@ -274,15 +282,11 @@ static void a_fit_that_still_moves_says_so(void) {
     struct fit_settings settings = {.iterations = 1, .noise_Pa_q10 = 1};
     struct fit_result before, result;
     fit_grid(&array, readings, &settings, &before);
-    for (settings.iterations = 2; settings.iterations <= 3; settings.iterations++) {
-      fit_grid(&array, readings, &settings, &result);
-      float moved_mm = hypotf(result.x_mm - before.x_mm, result.y_mm - before.y_mm);
-      bool uncertain = result.flags & CONTACT_FLAG_UNCERTAIN;
-      TEST_ASSERT_TRUE(uncertain || moved_mm < 0.021f);
-      TEST_ASSERT_TRUE(!uncertain || moved_mm > 0.019f || result.location_sd_mm > 0.12f);
-      moving += moved_mm > 0.021f && result.location_sd_mm < 0.12f;
-      before = result;
-    }
+    settings.iterations = 2;
+    fit_grid(&array, readings, &settings, &result);
+    float moved_mm = hypotf(result.x_mm - before.x_mm, result.y_mm - before.y_mm);
+    TEST_ASSERT_TRUE(result.location_sd_mm > 0.99f * moved_mm - 1e-3f);
+    moving += moved_mm > 0.5f * result.location_sd_mm;
   }
   TEST_ASSERT_GREATER_THAN_INT(20, moving);
 }
@@ -392,7 +396,7 @@ int main(void) {
   RUN_TEST(no_sensor_of_a_clean_press_is_left_out);
   RUN_TEST(scaling_the_readings_scales_the_pressures_alone);
   RUN_TEST(more_iterations_come_nearer);
-  RUN_TEST(a_fit_that_still_moves_says_so);
+  RUN_TEST(a_fit_that_still_moves_says_how_far);
   RUN_TEST(a_prior_pulls_sigma_alike_in_both);
   RUN_TEST(warnings_are_given);
   RUN_TEST(any_bits_give_finite_results);

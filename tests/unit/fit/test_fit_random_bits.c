@@ -16,7 +16,8 @@
 #define SEED UINT64_C(0x66696E676572)
 
 static const uint32_t always =
-    CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_SENSOR_MASKED;
+    CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_SENSOR_MASKED |
+    CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_ELONGATED;
 static const uint32_t warnings = CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_FLAT |
                                  CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL |
                                  CONTACT_FLAG_AT_BOUND;
@@ -248,6 +249,16 @@ static const char *complaint(const struct input *input, const struct fit_result 
   if (!within(result->residual_rms_Pa, 0.0f, 1e13f) ||
       !within(result->location_sd_mm, 0.0f, huge) || !within(result->force_sd_N, 0.0f, huge)) {
     return "residual or standard deviation";
+  }
+  if (!within(result->location_noise_mm, 0.0f, huge)) {
+    return "what the noise moves";
+  }
+  bool widths = result->flags & CONTACT_FLAG_WIDTHS_VALID;
+  float least = widths ? 0.2f * result->sigma_mm : 0.0f;
+  float most = widths ? 5.0f * result->sigma_mm : 0.0f;
+  if (!within(result->sigma_x_mm, least, most) || !within(result->sigma_y_mm, least, most) ||
+      !within(result->width_correlation, widths ? -1.0f : 0.0f, widths ? 1.0f : 0.0f)) {
+    return "widths";
   }
   return NULL;
 }
