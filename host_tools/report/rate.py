@@ -7,7 +7,7 @@
     rate.md      the same to read
     rate.png     the same to look at
 
-In contact on every frame, scene slip, seven iterations of the fit from a cold start each time. Fitted frames hold a fit of
+In contact on every frame, scene slip, four iterations of the fit from a cold start each time. Fitted frames hold a fit of
 pressures measured for them; the others are held: they repeat the fit before while the sensors measure their temperature.
 Latencies count from the end of the longest conversion that the datasheet allows. A packet is offered when the firmware gives its
 first part to the USB controller, and delivered with its last byte on the wire. Runs are the same bit for bit each time.

@@ -100,8 +100,8 @@ def write_location(found, r):
     r.table(("", "", "paper", "simulated, equal sensors", "simulated, gain spread 10 %", "simulated, every effect"), rows)
     r.text("Of the taps, " + "; ".join(
         f"gain spread {row['gain']} %: {row['warned_percent']:.1f} % carry a warning, {row['bad_unflagged_percent']:.2f} % are off by more than 1 mm "
-        "without one" for row in found["taps_trust"]) + ". UNCERTAIN begins at a predicted standard deviation of 0.12 mm where the residuals are "
-        "rough, as unequal sensors make them.")
+        "without one" for row in found["taps_trust"]) + ". UNCERTAIN begins at a standard deviation of 0.6 mm, in which the firmware counts the spread "
+        "of gains of a pad that was never calibrated, whatever it is here.")
     near_mm = found["grid_median_mm_by_sensors_near"]
     r.text("By place on the grid, gain spread 10 % (paper: section IV.B), median in mm:")
     r.table(("place", "paper", "simulated"), [

@@ -110,6 +110,13 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     settings.prior_width_mm = (float)draw_between(1, 64) / 32.0f;
   }
 
+  if (press % 2) {
+    for (int k = 0; k < FT_MAX_SENSORS; k++) {
+      settings.gain_sd_q16[k] = (uint16_t)(draw_between(0, 1 << 16) >> draw_between(1, 12));
+    }
+    settings.model_sd_q16 = (uint16_t)(draw_between(0, 1 << 14) >> draw_between(0, 8));
+  }
+
   int32_t pressure_Pa_q10[FT_MAX_SENSORS] = {0};
   if (press % 16 == 15) { /* nothing that a press could give */
     int shift = draw_between(0, 30);

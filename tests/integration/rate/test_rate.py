@@ -48,7 +48,7 @@ class Rate(unittest.TestCase):
     def test_every_frame_is_fitted_from_a_cold_start_and_arrives(self):
         for name in ("dropped", "sequence_gaps", "packets_dropped", "frames_skipped", "frames_missing", "unfitted"):
             self.assertEqual(self.found[name], 0, name)
-        self.assertEqual(self.found["fit_iterations"], 7)
+        self.assertEqual(self.found["fit_iterations"], 4)
         for row in self.found["by_osr"]:
             self.assertEqual(row["dropped"], 0)
             self.assertLess(row["fitted_per_s"] + row["held_per_s"], 1e6 / emulated.CONVERSION_us[row["osr"]])
