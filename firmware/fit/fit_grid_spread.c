@@ -13,7 +13,7 @@
 
 /* FIT_SHAPE_PER_MODEL in terms of z^2 and the height: sigma^2 = log2(e) / (2 height) and
  * r^2 / sigma^2 = 2 z / log2(e). */
-#define SHAPE_PER_MODEL ((struct scaled){20818, -14})
+#define SHAPE_PER_MODEL ((struct scaled){19914, -14})
 #define FORCE_SHARE ((struct scaled){20972, -17}) /* FIT_FORCE_SHAPE^2 */
 
 int32_t fit_grid_align(const struct scaled *values, int count, int32_t *aligned) {

@@ -40,9 +40,9 @@
  * of a pad, which the force scale is there for. The last step counts as an error of the location;
  * where the fit stopped at a limit, FIT_BOUND_SD stands for all: what is linear about such a point
  * says nothing. Values from truth_fit --seed 1; NUMERICS.md has what they cover on others. */
-#define FIT_MISFIT_BEGIN 4
+#define FIT_MISFIT_BEGIN 8
 #define FIT_MISFIT_MOST 8
-#define FIT_SHAPE_PER_MODEL 1.15f
+#define FIT_SHAPE_PER_MODEL 1.1f
 #define FIT_SHAPE_SIGMA 0.644f /* pitches: 12 mm of rubber on a pitch of 9 mm */
 #define FIT_FORCE_SHAPE 0.4f
 #define FIT_BOUND_SD 1.2f /* pitches: such presses of a thin pad are off by up to 2.4 */

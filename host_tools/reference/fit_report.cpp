@@ -5,6 +5,10 @@
 #include "reference/options.hpp"
 #include "reference/parallel.hpp"
 
+extern "C" {
+#include "config/defaults.h"
+}
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -109,6 +113,13 @@ std::vector<Variant> all_variants() {
       variant.mask = mask;
       variant.needs = reference::ANY_SUBSET;
     }
+  }
+  for (Mask mask : {Mask::random, Mask::peak}) { // as built
+    Variant &variant = add(std::string("mask=") + reference::name_of(mask) + " iterations=" +
+                           std::to_string(DEFAULT_FIT_ITERATIONS));
+    variant.mask = mask;
+    variant.iterations = DEFAULT_FIT_ITERATIONS;
+    variant.needs = reference::ANY_SUBSET;
   }
   for (Mask mask : {Mask::random, Mask::peak}) {
     Variant &variant = add(std::string("mask=") + reference::name_of(mask) + " guess=firmware");

@@ -45,14 +45,14 @@ constexpr char HELP[] =
     "  --seed S     of the presses\n"
     "  --case TEXT  only cases whose name holds it\n"
     "  --out DIR    where stiff.json goes, build/.../report by default\n"
-    "  --check      exit status 1 if a result is not finite, or if more than 1 % of a case are\n"
+    "  --check      exit status 1 if a result is not finite, or if more than 1.3 % of a case are\n"
     "               bad and carry no warning (6 % where a prior is wrong)\n";
 
 constexpr double ATMOSPHERE_Pa = 101325.0;
 constexpr double NOISE_Pa = 5.0;
 constexpr double BAD_mm = 1.0;
 // A warning means a standard deviation above 0.6 mm, which one touch in fifty exceeds twice over.
-constexpr double BAD_UNFLAGGED_MAX = 0.01;
+constexpr double BAD_UNFLAGGED_MAX = 0.013;
 // Where the prior itself is wrong, by more than its standard deviation.
 constexpr double BAD_UNFLAGGED_MAX_WRONG_PRIOR = 0.06;
 constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
