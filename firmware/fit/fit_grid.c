@@ -372,10 +372,10 @@ static NOINLINE void begin_shape(const struct readings *readings, const struct m
 
 /* cosh(v) and sinh(v) / v from v^2, Q13, for v^2 up to FIT_STRETCH_MAX^2: error below 1 %. */
 FIXED_INLINE int32_t cosh_q13(int32_t square_q13) {
-  return 8192 + (square_q13 >> 1) + ((square_q13 * square_q13) >> 13) / 24;
+  return 8192 + (square_q13 >> 1) + port_divide((square_q13 * square_q13) >> 13, 24);
 }
 FIXED_INLINE int32_t sinh_ratio_q13(int32_t square_q13) {
-  return 8192 + square_q13 / 6 + ((square_q13 * square_q13) >> 13) / 120;
+  return 8192 + port_divide(square_q13, 6) + port_divide((square_q13 * square_q13) >> 13, 120);
 }
 
 /* Covariance = sigma^2 exp(wider_x + wider_y) exp(S), S the symmetric matrix with stretch and -stretch
@@ -396,7 +396,7 @@ static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *re
   int32_t part = (ratio * stretch) >> 13, across = (ratio * slant) >> 13;
   /* exp of half the sum, since it multiplies widths. */
   int32_t half = wider >> 1, half_square = (half * half) >> 13;
-  int32_t growth = 8192 + half + (half_square >> 1) + ((half_square * half) >> 13) / 6;
+  int32_t growth = 8192 + half + (half_square >> 1) + port_divide((half_square * half) >> 13, 6);
   struct scaled scale = fit_scaled_from(growth, -13);
   struct scaled x = fit_scaled_sqrt(fit_scaled_from(mean + part, -13));
   struct scaled y = fit_scaled_sqrt(fit_scaled_from(mean - part, -13));

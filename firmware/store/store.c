@@ -3,6 +3,7 @@
 #include "common/bytes.h"
 #include "common/crc32.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #define MAGIC UINT32_C(0x74665346)
@@ -66,56 +67,56 @@ static uint8_t *put_u16(uint8_t *at, uint16_t value) {
   return at + 2;
 }
 
-static uint8_t *put_f32(uint8_t *at, float value) {
-  return put_u32(at, bytes_from_f32(value));
+/* Floats that lie behind one another, from this place of a struct on. */
+static void put_floats(uint8_t *at, const void *from, size_t offset, unsigned count) {
+  for (unsigned i = 0; i < count; i++) {
+    float value;
+    memcpy(&value, (const uint8_t *)from + offset + sizeof value * i, sizeof value);
+    at = put_u32(at, bytes_from_f32(value));
+  }
 }
 
-static float get_f32(const uint8_t *at) {
-  return bytes_to_f32(bytes_get_u32(at));
+static void get_floats(const uint8_t *at, void *to, size_t offset, unsigned count) {
+  for (unsigned i = 0; i < count; i++, at += 4) {
+    float value = bytes_to_f32(bytes_get_u32(at));
+    memcpy((uint8_t *)to + offset + sizeof value * i, &value, sizeof value);
+  }
 }
+
+#define FLOATS_OF_SENSOR 3
+_Static_assert(sizeof(struct sensor_calibration) == FLOATS_OF_SENSOR * sizeof(float) &&
+                   offsetof(struct calibration, force_scale_sd) ==
+                       offsetof(struct calibration, force_scale) + sizeof(float) &&
+                   offsetof(struct store_settings, location_limit_mm) ==
+                       offsetof(struct store_settings, slip_threshold_mm) + 3 * sizeof(float),
+               "floats lie behind one another");
 
 static void put_calibration(uint8_t *at, const struct calibration *calibration, unsigned count) {
   at = put_u32(at, calibration->date_s);
   at = put_u16(at, calibration->placements);
-  at = put_f32(at, calibration->force_scale);
-  at = put_f32(at, calibration->force_scale_sd);
-  for (unsigned k = 0; k < count; k++) {
-    at = put_f32(at, calibration->sensors[k].gain);
-    at = put_f32(at, calibration->sensors[k].gain_sd);
-    at = put_f32(at, calibration->sensors[k].memory);
-  }
+  put_floats(at, calibration, offsetof(struct calibration, force_scale), 2);
+  put_floats(at + 8, calibration->sensors, 0, FLOATS_OF_SENSOR * count);
 }
 
 static void get_calibration(const uint8_t *at, struct calibration *calibration, unsigned count) {
   calibration->date_s = bytes_get_u32(at);
   calibration->placements = bytes_get_u16(at + 4);
-  calibration->force_scale = get_f32(at + 6);
-  calibration->force_scale_sd = get_f32(at + 10);
-  at += 14;
-  for (unsigned k = 0; k < count; k++, at += 12) {
-    calibration->sensors[k] =
-        (struct sensor_calibration){get_f32(at), get_f32(at + 4), get_f32(at + 8)};
-  }
+  get_floats(at + 6, calibration, offsetof(struct calibration, force_scale), 2);
+  get_floats(at + 14, calibration->sensors, 0, FLOATS_OF_SENSOR * count);
 }
 
 static void put_settings(uint8_t *at, const struct store_settings *settings) {
   at = put_u32(at, settings->rate_mHz);
   at = put_u16(at, settings->osr);
   at = put_u16(at, settings->slip_window_ms);
-  at = put_f32(at, settings->slip_threshold_mm);
-  at = put_f32(at, settings->prior_sigma_mm);
-  at = put_f32(at, settings->prior_width_mm);
-  put_f32(at, settings->location_limit_mm);
+  put_floats(at, settings, offsetof(struct store_settings, slip_threshold_mm), 4);
 }
 
 static void get_settings(const uint8_t *at, struct store_settings *settings) {
   settings->rate_mHz = bytes_get_u32(at);
   settings->osr = bytes_get_u16(at + 4);
   settings->slip_window_ms = bytes_get_u16(at + 6);
-  settings->slip_threshold_mm = get_f32(at + 8);
-  settings->prior_sigma_mm = get_f32(at + 12);
-  settings->prior_width_mm = get_f32(at + 16);
-  settings->location_limit_mm = get_f32(at + 20);
+  get_floats(at + 8, settings, offsetof(struct store_settings, slip_threshold_mm), 4);
 }
 
 /* Its generation and CRC come when its place is known. */
