@@ -175,17 +175,22 @@ std::optional<Placement> PlacementFinder::settled(double t_s) {
   double frames = 0.0, slots = 0.0;
   std::vector<double> changes(sensors_, 0.0);
   for (std::size_t k = 0; k < sensors_; k++) {
-    double tt = 0.0, tp = 0.0, pp = 0.0, count = 0.0;
+    double count = 0.0, t1 = 0.0, p1 = 0.0, tt = 0.0, tp = 0.0, pp = 0.0;
     for (const Slot &slot : slots_) {
       if (slot.begin_s >= begin_s - 1e-9 && slot.begin_s < t_s - 1e-9 && slot.counts[k] > 0) {
-        const double t = slot.begin_s - placement.t_s, off = slot.means[k] - mean[k];
+        const double t = slot.begin_s - begin_s, off = slot.means[k] - mean[k];
+        count += 1.0;
+        t1 += t;
+        p1 += off;
         tt += t * t;
         tp += t * off;
         pp += off * off;
-        count += 1.0;
       }
     }
     if (seen >> k & 1u && count >= SLOTS_MIN) {
+      tt -= t1 * t1 / count;
+      tp -= t1 * p1 / count;
+      pp -= p1 * p1 / count;
       changes[k] = tp / tt * (t_s - begin_s);
       common += changes[k];
       const double left = std::max(pp - tp * tp / tt, 0.0);

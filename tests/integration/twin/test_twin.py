@@ -60,7 +60,7 @@ class TwinTest(unittest.TestCase):
 class Files(TwinTest):
     def test_every_kind_is_read_by_python_and_emulator_alike(self):
         names = [line.split()[0] for line in self.run_twin("list")[0].split("\n\n")[0].splitlines()[1:]]
-        self.assertEqual(sorted(names), sorted(["grid", "taps", "high", "pokes", "cycle", "slip", "twist", "rolloff", "two"]))
+        self.assertEqual(sorted(names), sorted(["grid", "taps", "high", "placements", "pokes", "cycle", "slip", "twist", "rolloff", "two"]))
         for kind in names:
             with self.subTest(kind):
                 seconds = 34 if kind == "cycle" else 12
@@ -74,7 +74,7 @@ class Files(TwinTest):
                 self.assertEqual(emulator["rows"], len(scene.t_s))
                 self.assertEqual(emulator["metadata"], scene.metadata)
                 self.assertEqual(scene.metadata["name"],
-                                 f"{kind}-sphere6-h12-gain10-drift-relaxation-hysteresis-temperature-bias-clip")
+                                 f"{kind}-{'sphere15' if kind == 'placements' else 'sphere6'}-h12-gain10-drift-relaxation-hysteresis-temperature-bias-clip")
                 for t_s, sensors in zip(times, emulator["at"]):
                     for k, sensor in enumerate(sensors):
                         self.assertAlmostEqual(

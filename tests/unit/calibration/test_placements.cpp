@@ -126,9 +126,9 @@ TEST(Placements, relaxing_rubber_is_still) {
 }
 
 TEST(Placements, a_hand_is_none) {
-  /* It sways by 0.4 mm, or trembles by 3 %, at a few hertz. */
-  Feed sways, trembles;
-  for (Feed *feed : {&sways, &trembles}) {
+  /* It sways by 0.4 mm or trembles by 3 % at a few hertz, slides, or presses harder and harder. */
+  Feed sways, trembles, slides, grows;
+  for (Feed *feed : {&sways, &trembles, &slides, &grows}) {
     feed->rest(1.0);
     feed->run(0.3, [](double t) { return t / 0.3; });
   }
@@ -139,7 +139,13 @@ TEST(Placements, a_hand_is_none) {
       });
   trembles.run(
       8.0, [](double t) { return 1.0 + 0.03 * std::sin(20.0 * t) + 0.03 * std::sin(13.0 * t); });
-  for (Feed *feed : {&sways, &trembles}) {
+  slides.run(
+      8.0, [](double) { return 1.0; },
+      [](double t) {
+        return std::pair{2.0 - 0.8 * t, 3.0};
+      });
+  grows.run(8.0, [](double t) { return std::exp(0.25 * t); });
+  for (Feed *feed : {&sways, &trembles, &slides, &grows}) {
     EXPECT_TRUE(feed->found.empty());
     EXPECT_EQ(feed->finder.state(), State::refused);
     EXPECT_EQ(feed->finder.refusal(), PlacementFinder::Refusal::unsteady);
@@ -147,7 +153,7 @@ TEST(Placements, a_hand_is_none) {
     feed->run(0.2, [](double t) { return 1.0 - t / 0.2; });
     feed->rest(1.0);
     feed->place();
-    EXPECT_EQ(feed->found.size(), 1u);
+    ASSERT_EQ(feed->found.size(), 1u);
     EXPECT_LT(feed->error(feed->found[0]), 0.003);
   }
 }

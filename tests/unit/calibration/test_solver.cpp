@@ -195,19 +195,22 @@ TEST(Solver, is_deterministic_and_refuses_nonsense) {
 TEST(Solver, wants_the_place_that_tells_most) {
   const KnownPad pad(11);
   Random random(11, 3, 0);
-  std::vector<Placement> placements;
-  for (int i = 0; i < 12; i++) { /* none at the upper end */
-    placements.push_back(
-        pad.place({random.uniform(-9, 9), random.uniform(-18, 4)}, 4.0 * i, random));
+  for (double bare : {1.0, -1.0}) { /* none at the upper end; at the lower */
+    std::vector<Placement> placements;
+    for (int i = 0; i < 12; i++) {
+      const double x = random.uniform(-9, 9);
+      placements.push_back(pad.place({x, bare * random.uniform(-18, 4)}, 4.0 * i, random));
+    }
+    const Solution s = solve(pad.array, placements);
+    const Wanted wanted = next_place(pad.array, placements, s);
+    EXPECT_GE(bare * wanted.y_mm, 9.0);
+    EXPECT_LT(wanted.worst_shape_sd, s.worst_shape_sd());
+    auto asked = placements, elsewhere = placements;
+    asked.push_back(pad.place({wanted.x_mm, wanted.y_mm}, 60.0, random));
+    elsewhere.push_back(pad.place({0.0, -9.0 * bare}, 60.0, random));
+    EXPECT_LT(solve(pad.array, asked).worst_shape_sd(),
+              solve(pad.array, elsewhere).worst_shape_sd());
   }
-  const Solution s = solve(pad.array, placements);
-  const Wanted wanted = next_place(pad.array, placements, s);
-  EXPECT_GE(wanted.y_mm, 9.0);
-  EXPECT_LT(wanted.worst_shape_sd, s.worst_shape_sd());
-  auto asked = placements, elsewhere = placements;
-  asked.push_back(pad.place({wanted.x_mm, wanted.y_mm}, 60.0, random));
-  elsewhere.push_back(pad.place({0.0, -9.0}, 60.0, random));
-  EXPECT_LT(solve(pad.array, asked).worst_shape_sd(), solve(pad.array, elsewhere).worst_shape_sd());
   /* The first in the middle, and then away from it. */
   const Wanted first = next_place(pad.array, {}, Solution{});
   EXPECT_NEAR(std::hypot(first.x_mm, first.y_mm), 0.0, 1e-9);

@@ -95,6 +95,29 @@ File written(const Scene &scene) {
   return file;
 }
 
+TEST(Scenes, placements_are_one_weight_that_stands) {
+  SceneOptions options;
+  options.kind = "placements";
+  const Scene scene = make_scene(options, table_of("sphere15"));
+  EXPECT_EQ(scene.options.indenter, "sphere15");
+  EXPECT_GE(scene.acts.size(), 30u);
+  double farthest_x = 0.0, farthest_y = 0.0;
+  for (const Act &act : scene.acts) {
+    ASSERT_EQ(act.phases.size(), 3u);
+    EXPECT_EQ(act.phases[1].name, "hold");
+    EXPECT_NEAR(act.phases[1].end_s - act.phases[1].begin_s, 2.0, 1e-9);
+    const double middle_s = 0.5 * (act.phases[1].begin_s + act.phases[1].end_s) - act.begin_s;
+    EXPECT_EQ(act.tracks[0].at(middle_s).force_N, 3.0);
+    farthest_x = std::max(farthest_x, std::abs(act.tracks[0].x_mm));
+    farthest_y = std::max(farthest_y, std::abs(act.tracks[0].y_mm));
+  }
+  /* To the outer sensors, and not beyond. */
+  EXPECT_GT(farthest_x, 7.5);
+  EXPECT_LE(farthest_x, 9.0);
+  EXPECT_GT(farthest_y, 16.0);
+  EXPECT_LE(farthest_y, 18.0);
+}
+
 TEST(Scenes, HaveQuietTimeAndNoJumps) {
   for (const SceneKind &kind : scene_kinds()) {
     const Scene scene = scene_of(kind.name);
