@@ -258,8 +258,8 @@ double Pad::left_behind(Rubber &r, const Aftereffect &effect, double base_Pa) co
   const double rate = step_s_ > 0.0 ? (felt_Pa - r.felt_Pa) / step_s_ : 0.0;
   const double lag = rate * effect.time_s;
   // Exact as above, and where the pressure overtakes what is remembered.
-  r.remembered_Pa = std::max(
-      felt_Pa, felt_Pa - lag + (r.remembered_Pa - r.felt_Pa + lag) * r.forgetting);
+  r.remembered_Pa =
+      std::max(felt_Pa, felt_Pa - lag + (r.remembered_Pa - r.felt_Pa + lag) * r.forgetting);
   r.felt_Pa = felt_Pa;
   return effect.share * (r.remembered_Pa - felt_Pa);
 }

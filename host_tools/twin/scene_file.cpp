@@ -336,7 +336,8 @@ Written write_scene(const Scene &scene, const Layer &layer, const ContactTable &
   const SceneOptions &options = scene.options;
   OutputFile truth(truth_path(path), replace, OutputFile::Appears::when_finished);
   OutputFile file(path, replace, OutputFile::Appears::when_finished);
-  const bool temperature = options.effects.count("temperature") + options.effects.count("branch") > 0;
+  const bool temperature =
+      options.effects.count("temperature") + options.effects.count("branch") > 0;
   const std::size_t sensors = geometry.sensor_count;
   Pad pad(options.effects, sensors, layer.thickness_mm, AMBIENT_Pa, *options.pad_seed);
   const BestGaussian gaussian(table, layer.thickness_mm);

@@ -1,4 +1,4 @@
-"""The twin command, and its files in the hands of their readers: usage test_twin.py TWIN TABLES [unittest arguments]."""
+"""The twin command, and its files in the hands of their readers: usage test_twin.py TWIN TABLES PLAYER [unittest arguments]."""
 import csv
 import json
 import os
@@ -11,7 +11,7 @@ import tempfile
 import time
 import unittest
 
-TWIN, TABLES = (os.path.abspath(path) for path in sys.argv[1:3])
+TWIN, TABLES, PLAYER = (os.path.abspath(path) for path in sys.argv[1:4])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PATIENCE_s = 60
 sys.path.insert(0, str(ROOT / "host_tools/python"))
@@ -116,6 +116,25 @@ class Files(TwinTest):
             quiet = (scene.t_s > end + 0.002) & (scene.t_s < begin - 0.002)
             self.assertFalse(scene.sensors_Pa[quiet].any())
 
+    def test_a_cold_pad_reads_one_step_and_old_temperatures(self):
+        # Almost no force; the firmware keeps a branch for 0.3 K, 3 s, and its temperature for half a second: 24 Pa at 0.1 K/s.
+        self.scene("taps", "--force", "0.02", "--quiet", "60", "--seconds", "58", "--effects", "branch=7")
+        recording = str(self.folder / "recording.csv")
+        subprocess.run([PLAYER, "play", self.csv, "-o", recording, "--quiet", "--raw", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s)
+        scene, played = fingertip_files.read_scenario(self.csv), fingertip_files.read_recording(recording)
+        t_s, read_Pa = played["t_us"] * 1e-6, played.sensors_Pa - 101325
+        crossing_s = 10 * (9.665 - 7)
+        for k in range(15):
+            with self.subTest(sensor=k):
+                off_Pa = read_Pa[:, k] - fingertip_files.np.interp(t_s, scene.t_s, scene.sensors_Pa[:, k])
+                for begin_s, end_s in ((3, crossing_s - 2), (crossing_s + 8, 58)):
+                    steady = (t_s > begin_s) & (t_s < end_s)
+                    self.assertLess(off_Pa[steady].max(), 1)
+                    self.assertTrue(-30 < off_Pa[steady].min() < -20, off_Pa[steady].min())
+                late = (t_s > crossing_s + 1) & (t_s < crossing_s + 2.5)
+                self.assertLess(read_Pa[late, k].max(), 10)
+                self.assertGreater(read_Pa[(t_s > crossing_s + 8) & (t_s < 58), k].max(), 40)
+
     def test_long_scenes_stay_small(self):
         self.scene("slip", "--seconds", "400", "--effects", "all", "--stick-slip", "1")
         self.assertLess(os.path.getsize(self.csv), 60e6 * 400 / 2000)
@@ -215,5 +234,5 @@ class Usage(TwinTest):
 
 
 if __name__ == "__main__":
-    del sys.argv[1:3]
+    del sys.argv[1:4]
     unittest.main(verbosity=2)

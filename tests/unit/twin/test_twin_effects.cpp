@@ -227,8 +227,8 @@ TEST(Effects, AftereffectDoesNotDependOnTheStep) {
 TEST(Effects, AftereffectOfAPressThatIsSmallerAddsNothing) {
   Pad one = pad_with("aftereffect"), two = pad_with("aftereffect");
   const std::vector<double> a = along(one, {{0, 0}, {1, 50000}, {1.5, 0}, {3, 0}}, 0.1);
-  const std::vector<double> b = along(
-      two, {{0, 0}, {1, 50000}, {1.5, 0}, {1.7, 0}, {1.8, 50}, {1.9, 0}, {3, 0}}, 0.1);
+  const std::vector<double> b =
+      along(two, {{0, 0}, {1, 50000}, {1.5, 0}, {1.7, 0}, {1.8, 50}, {1.9, 0}, {3, 0}}, 0.1);
   EXPECT_NEAR(a.back(), b.back(), 0.1 * std::abs(a.back()));
   EXPECT_NE(a.back(), 0.0);
 }
