@@ -24,10 +24,20 @@ constexpr double SPECIFIED_Pa = 120000.0, RANGE_END_Pa = 200000.0;
 // Silicone rubber: 0.2 W/(m K), 1100 kg/m3, 1500 J/(kg K).
 constexpr double DIFFUSIVITY_mm2_s = 0.12;
 
+// About the usual 4 %: what stood off was 0.4..8 % of the peak, what dipped 1..9 %.
+constexpr double STANDS_OFF_LEAST = 0.4 / 4.0, STANDS_OFF_MOST = 8.0 / 4.0;
+constexpr double DIPS_LEAST = 1.0 / 4.0, DIPS_MOST = 9.0 / 4.0;
+constexpr double DIPS_SHARE = 1.0 / 3.0; // of the sensors; assumed
+constexpr double BACK_LEAST_s = 0.5, BACK_MOST_s = 10.0;
+// Coefficients C1 to C4 and C6 of the data sheet's example (MS5837-02BA, page 7) and their spread,
+// assumed as the players assume it.
+constexpr std::array<double, 5> PROM{46372.0, 43981.0, 29059.0, 27842.0, 28165.0};
+constexpr double PROM_SPREAD = 0.03;
+
 const char STRIP[] = "recordings of a real strip of four MPL3115A2 under rubber: "
                      "JiannnH/MTL-BaroTactileSensor, Imperial College London, 2023";
 
-enum Stream : std::uint64_t { GAIN = 101, DRIFT, RELAXATION };
+enum Stream : std::uint64_t { GAIN = 101, DRIFT, RELAXATION, AFTEREFFECT, BRANCH };
 
 const Effect &effect(const std::string &name) {
   std::string names;
@@ -58,6 +68,22 @@ double prony_factor(double share) {
   return share / (during_hold + share * in_ramp);
 }
 
+// What the step of the compensation at 10.00 degC does to a part with these coefficients.
+Pad::Branch branch_of(const std::array<double, PROM.size()> &c, double ambient_Pa) {
+  constexpr double BELOW = -1000.0; // 10.00 degC less 20.00 degC
+  constexpr double SQUARE = BELOW * BELOW;
+  const double dT = BELOW * 0x1p23 / c[4];
+  // From 10 degC on 30 / 2^8 of the square is taken off the offset and nothing off the sensitivity;
+  // below 35 / 2^3 and 63 / 2^5.
+  const double offset = c[1] * 0x1p17 + c[3] * dT * 0x1p-6 - 30.0 * SQUARE * 0x1p-8;
+  const double sensitivity = c[0] * 0x1p16 + c[2] * dT * 0x1p-7;
+  const double offset_step = (35.0 * 0x1p-3 - 30.0 * 0x1p-8) * SQUARE;
+  const double slope = 63.0 * 0x1p-5 * SQUARE / sensitivity;
+  // The temperature itself loses 14 / 2^35 of dT^2 below and 12 / 2^35 above: the middle.
+  return {0.01 * (1000.0 - 13.0 * dT * dT * 0x1p-35),
+          slope * (ambient_Pa + offset * 0x1p-15) - offset_step * 0x1p-15, slope};
+}
+
 } // namespace
 
 const std::vector<Effect> &effects() {
@@ -73,10 +99,20 @@ const std::vector<Effect> &effects() {
       {"hysteresis", "%", 3.0, 0.0, 20.0,
        "loop of loading and unloading at any speed, as a share of the work of loading",
        "2.7 to 4.2 % at 0.1 Hz in silicone pads: Romano et al., Soft Science 4:31, 2024, table 2"},
+      {"aftereffect", "%", 4.0, 0.0, 20.0,
+       "after a release each sensor stands off by 0.1 to 2 times this share of its peak, one in "
+       "three undershoots by 0.25 to 2.25 times, back with a time constant of 0.5 to 10 s",
+       std::string(STRIP) + ": 0.4 to 8 % above or 1 to 9 % below, back in 0.5 to 10 s; how many "
+                            "undershoot is assumed"},
       {"temperature", "K", 6.0, -40.0, 40.0,
        "the sensors warm up slowly by this, as in a hand; pressures are compensated",
        "assumed: room at 25 degC, skin at 31; time from the diffusivity of silicone rubber, "
        "0.12 mm2/s"},
+      {"branch", "degC", 5.0, -20.0, 25.0,
+       "the sensors begin at this and warm up by 0.1 K/s to 25 degC: at 10 degC their compensation "
+       "steps by some 51 Pa, 66 Pa/bar more under pressure, each sensor by its own amount",
+       "second-order compensation (TE MS5840-02BA data sheet) of the coefficients of its example, "
+       "drawn +-3 %; the rate is assumed: a cold finger in a hand"},
       {"bias", "%", 1.0, 0.0, 10.0, "readings above 1.2 bar come out low, at 2 bar by this",
        "1.2 bar ends the specified accuracy (TE MS5840-02BA data sheet); the amount is assumed"},
       {"clip", "bar", 2.02, 1.2, 10.0, "readings end here",
@@ -149,6 +185,25 @@ Pad::Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, doub
       }
     } else if (name == "hysteresis") {
       hysteresis_ = 0.01 * value;
+    } else if (name == "aftereffect") {
+      for (std::size_t k = 0; k < sensors; k++) {
+        Random random(seed, AFTEREFFECT, k);
+        const bool dips = random.uniform(0.0, 1.0) < DIPS_SHARE;
+        const double times = dips ? -random.uniform(DIPS_LEAST, DIPS_MOST)
+                                  : random.uniform(STANDS_OFF_LEAST, STANDS_OFF_MOST);
+        aftereffects_.push_back(
+            {0.01 * value * times, random.log_uniform(BACK_LEAST_s, BACK_MOST_s)});
+      }
+    } else if (name == "branch") {
+      start_degC_ = value;
+      for (std::size_t k = 0; k < sensors; k++) {
+        Random random(seed, BRANCH, k);
+        std::array<double, PROM.size()> drawn = PROM;
+        for (double &coefficient : drawn) {
+          coefficient *= random.uniform(1.0 - PROM_SPREAD, 1.0 + PROM_SPREAD);
+        }
+        branches_.push_back(branch_of(drawn, ambient_Pa));
+      }
     } else if (name == "temperature") {
       warming_K_ = value;
       warming_s_ = 4.0 * layer_mm * layer_mm / (M_PI * M_PI * DIFFUSIVITY_mm2_s);
@@ -198,6 +253,17 @@ double Pad::relaxed(Rubber &r, double pressure_Pa) {
   return std::clamp(pressure_Pa - loss_Pa, std::min(pressure_Pa, 0.0), std::max(pressure_Pa, 0.0));
 }
 
+double Pad::left_behind(Rubber &r, const Aftereffect &effect, double base_Pa) const {
+  const double felt_Pa = std::max(base_Pa, 0.0);
+  const double rate = step_s_ > 0.0 ? (felt_Pa - r.felt_Pa) / step_s_ : 0.0;
+  const double lag = rate * effect.time_s;
+  // Exact as above, and where the pressure overtakes what is remembered.
+  r.remembered_Pa =
+      std::max(felt_Pa, felt_Pa - lag + (r.remembered_Pa - r.felt_Pa + lag) * r.forgetting);
+  r.felt_Pa = felt_Pa;
+  return effect.share * (r.remembered_Pa - felt_Pa);
+}
+
 void Pad::report(double t_s, const std::vector<double> &base_Pa, std::vector<double> &reported_Pa) {
   if (!begun_) {
     begun_ = true;
@@ -209,8 +275,12 @@ void Pad::report(double t_s, const std::vector<double> &base_Pa, std::vector<dou
     for (std::size_t i = 0; i < TIMES_s.size(); i++) {
       decay_[i] = std::exp(-step_s / TIMES_s[i]);
     }
+    for (std::size_t k = 0; k < aftereffects_.size(); k++) {
+      rubber_[k].forgetting = std::exp(-step_s / aftereffects_[k].time_s);
+    }
   }
   t_s_ = t_s;
+  const double sensors_degC = temperature_degC(t_s);
   for (std::size_t k = 0; k < rubber_.size(); k++) {
     double pressure_Pa = base_Pa[k];
     if (hysteresis_ > 0.0) {
@@ -219,11 +289,21 @@ void Pad::report(double t_s, const std::vector<double> &base_Pa, std::vector<dou
     if (relaxes_) {
       pressure_Pa = relaxed(rubber_[k], pressure_Pa);
     }
+    if (!aftereffects_.empty()) {
+      pressure_Pa += left_behind(rubber_[k], aftereffects_[k], base_Pa[k]);
+    }
     if (!gain_errors_.empty()) {
       pressure_Pa *= 1.0 + gain_errors_[k];
     }
     if (!drifts_Pa_s_.empty()) {
       pressure_Pa += drifts_Pa_s_[k] * (t_s - begin_s_);
+    }
+    if (!branches_.empty()) {
+      const Branch &branch = branches_[k];
+      // What begins above the edge has no step before it.
+      if (start_degC_ < branch.edge_degC && sensors_degC >= branch.edge_degC) {
+        pressure_Pa += branch.step_Pa + branch.slope * pressure_Pa;
+      }
     }
     const double excess =
         (ambient_Pa_ + pressure_Pa - SPECIFIED_Pa) / (RANGE_END_Pa - SPECIFIED_Pa);
@@ -234,8 +314,10 @@ void Pad::report(double t_s, const std::vector<double> &base_Pa, std::vector<dou
   }
 }
 
-double Pad::temperature_rise_K(double t_s) const {
-  return warming_K_ == 0.0 ? 0.0 : warming_K_ * (1.0 - std::exp(-t_s / warming_s_));
+double Pad::temperature_degC(double t_s) const {
+  // What begins at ROOM_degC stays there.
+  const double degC = std::min(start_degC_ + WARMING_K_s * t_s, ROOM_degC);
+  return warming_K_ == 0.0 ? degC : degC + warming_K_ * (1.0 - std::exp(-t_s / warming_s_));
 }
 
 } // namespace fingertip::twin

@@ -9,12 +9,26 @@
 //                z_i follows p with the time constant TIMES_s[i]. g are scaled so that a hold of
 //                8 s after a press of 1.3 s loses V of its peak, V drawn for each sensor. No
 //                reading leaves the range from 0 to p: rubber does not pull.
+//   aftereffect  plus a share of the peak that each sensor remembers and p has left: a (m - p).
+//                m is p while p rises above it, and otherwise returns to p with a time constant of
+//                0.5 to 10 s. So presses and holds are as they were, and after a release the
+//                reading stands off by a of the peak. a is 0.1 to 2 V for two sensors of three
+//                and -0.25 to -2.25 V, an undershoot, for the third; both drawn for each sensor.
+//                p is the pressure on the base: relaxation makes nothing to be remembered.
 //   gain         p times 1 + V normal, drawn for each sensor, at most three standard deviations
 //   drift        p plus a ramp in time, drawn for each sensor: slope and sign
+//   branch       the sensors begin at V degC and warm up by WARMING_K_s to ROOM_degC. Where they
+//                cross 10.00 degC of the first order, the MS5840's compensation changes to other
+//                second-order terms that do not meet there: from then on readings are higher by
+//                some 51 Pa, and 66 Pa more for each bar above ambient. How much, and at which
+//                temperature, follows from the rule and coefficients drawn for each sensor.
+//                That a temperature is old when it is used costs some 24 to 48 Pa more. It is not
+//                in the pressure: the players' sensors and their firmware do it by themselves.
 //   bias         reads low above 1.2 bar absolute: by V at 2 bar, growing with the square
 //   clip         never above V absolute
 //   temperature  not in the pressure: the sensors, whose PROM corrects for it, warm up by V with
-//                the slowest time constant 4 h^2 / (pi^2 a) of a layer h warmed from above
+//                the slowest time constant 4 h^2 / (pi^2 a) of a layer h warmed from above, from
+//                ROOM_degC or on top of what `branch` says
 //
 // Relaxation and hysteresis act on the reported pressure while the scene's force is what it is: as
 // if the press were force-controlled and the sensor's share of the load went down. Where a robot
@@ -28,6 +42,8 @@
 #include <vector>
 
 namespace fingertip::twin {
+
+constexpr double ROOM_degC = 25.0;
 
 struct Effect {
   std::string name;
@@ -50,6 +66,7 @@ EffectValues parse_effects(const std::string &text);
 class Pad {
 public:
   static constexpr std::array<double, 2> TIMES_s{1.0, 10.0};
+  static constexpr double WARMING_K_s = 0.1; // of `branch`
 
   Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, double ambient_Pa,
       std::uint64_t seed);
@@ -58,12 +75,21 @@ public:
   // base. Times must increase; between them the pressure on the base is linear. The first time is
   // the beginning: the pad is at rest until then.
   void report(double t_s, const std::vector<double> &base_Pa, std::vector<double> &reported_Pa);
-  double temperature_rise_K(double t_s) const;
+  double temperature_degC(double t_s) const;
 
   // Drawn, [sensor]; empty where the effect is off.
   const std::vector<double> &gain_errors() const { return gain_errors_; }
   const std::vector<double> &drifts_Pa_s() const { return drifts_Pa_s_; }
   const std::vector<double> &relaxations() const { return relaxations_; } // share lost in the hold
+  struct Aftereffect {
+    double share, time_s; // share of the peak, below 0 an undershoot
+  };
+  const std::vector<Aftereffect> &aftereffects() const { return aftereffects_; }
+  struct Branch {
+    double edge_degC;      // compensated temperature where it changes
+    double step_Pa, slope; // at ambient pressure, and of the pressure above it
+  };
+  const std::vector<Branch> &branches() const { return branches_; }
 
 private:
   struct Rubber { // of one sensor
@@ -74,15 +100,21 @@ private:
     double pressure_Pa = 0.0, lacks_Pa = 0.0;
     bool falls = false;
     double turn_Pa = 0.0, turn_lacks_Pa = 0.0, largest_Pa = 0.0;
+    // After-effect: the pressure at the last time, what is remembered, its decay over a step.
+    double felt_Pa = 0.0, remembered_Pa = 0.0, forgetting = 1.0;
   };
   double with_hysteresis(Rubber &rubber, double pressure_Pa) const;
   double relaxed(Rubber &rubber, double pressure_Pa);
+  double left_behind(Rubber &rubber, const Aftereffect &effect, double base_Pa) const;
 
   double ambient_Pa_;
   double hysteresis_ = 0.0; // share of the loop
   double bias_ = 0.0, clip_Pa_ = 0.0, warming_K_ = 0.0, warming_s_ = 0.0;
+  double start_degC_ = ROOM_degC;
   bool relaxes_ = false;
   std::vector<double> gain_errors_, drifts_Pa_s_, relaxations_;
+  std::vector<Aftereffect> aftereffects_;
+  std::vector<Branch> branches_;
   std::vector<Rubber> rubber_;
   double t_s_ = 0.0, step_s_ = 0.0, begin_s_ = 0.0;
   bool begun_ = false;

@@ -220,7 +220,7 @@ void describe(Text &text, const Scene &scene, const Layer &layer, const Pad &pad
   metadata(text, "seed", std::to_string(options.seed));
   metadata(text, "pad_seed", std::to_string(*options.pad_seed));
   metadata(text, "ambient_Pa", number(AMBIENT_Pa));
-  metadata(text, "temperature_degC", number(ROOM_degC));
+  metadata(text, "temperature_degC", number(pad.temperature_degC(0.0)));
   metadata(text, "sensors", std::to_string(geometry.sensor_count));
   metadata(text, "indenter", options.indenter + ", " + indenter(options.indenter).description);
   if (options.kind == "two") {
@@ -254,6 +254,22 @@ void describe(Text &text, const Scene &scene, const Layer &layer, const Pad &pad
   }
   if (!pad.relaxations().empty()) {
     metadata(text, "relaxations_percent", list(pad.relaxations(), 100.0, 2));
+  }
+  if (!pad.aftereffects().empty()) {
+    std::vector<double> shares, times_s;
+    for (const Pad::Aftereffect &effect : pad.aftereffects()) {
+      shares.push_back(effect.share);
+      times_s.push_back(effect.time_s);
+    }
+    metadata(text, "aftereffects_percent", list(shares, 100.0, 3));
+    metadata(text, "aftereffect_times_s", list(times_s, 1.0, 3));
+  }
+  if (!pad.branches().empty()) {
+    std::vector<double> steps_Pa;
+    for (const Pad::Branch &branch : pad.branches()) {
+      steps_Pa.push_back(branch.step_Pa);
+    }
+    metadata(text, "branch_steps_Pa", list(steps_Pa, 1.0, 2));
   }
   metadata(text, "gaussian",
            scene.options.kind == "two" ? "none: p0_Pa and sigma_mm are 0"
@@ -320,7 +336,8 @@ Written write_scene(const Scene &scene, const Layer &layer, const ContactTable &
   const SceneOptions &options = scene.options;
   OutputFile truth(truth_path(path), replace, OutputFile::Appears::when_finished);
   OutputFile file(path, replace, OutputFile::Appears::when_finished);
-  const bool temperature = options.effects.count("temperature") > 0;
+  const bool temperature =
+      options.effects.count("temperature") + options.effects.count("branch") > 0;
   const std::size_t sensors = geometry.sensor_count;
   Pad pad(options.effects, sensors, layer.thickness_mm, AMBIENT_Pa, *options.pad_seed);
   const BestGaussian gaussian(table, layer.thickness_mm);
@@ -343,7 +360,7 @@ Written write_scene(const Scene &scene, const Layer &layer, const ContactTable &
   const auto add = [&](double t_s, const std::vector<double> &base_Pa) {
     row.t_s = t_s;
     pad.report(t_s, base_Pa, row.sensors_Pa);
-    row.temperature_degC = ROOM_degC + pad.temperature_rise_K(t_s);
+    row.temperature_degC = pad.temperature_degC(t_s);
     written.peak_Pa =
         std::max(written.peak_Pa, *std::max_element(row.sensors_Pa.begin(), row.sensors_Pa.end()));
     writer.add(row);

@@ -11,7 +11,7 @@
 //   p0_Pa sigma_mm  the Gaussian that is closest to the pressure on the base without errors
 //              (best_gaussian.hpp); 0 with two contacts
 //   slip       see scenes.hpp
-//   temperature_degC  only with the effect "temperature"
+//   temperature_degC  only with the effects "temperature" and "branch"
 //
 // FILE.truth.csv has one row for each phase of each contact:
 //   # fingertip-truth 1

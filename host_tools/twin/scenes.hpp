@@ -32,7 +32,6 @@ namespace fingertip::twin {
 
 constexpr double START_QUIET_s = 1.5;
 constexpr double AMBIENT_Pa = 101325.0;
-constexpr double ROOM_degC = 25.0;
 constexpr double PAD_HALF_WIDTH_mm = 15.0; // in x; the paper's box is 30 mm by 50 mm
 
 struct SceneKind {

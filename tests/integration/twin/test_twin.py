@@ -1,4 +1,4 @@
-"""The twin command, and its files in the hands of their readers: usage test_twin.py TWIN TABLES [unittest arguments]."""
+"""The twin command, and its files in the hands of their readers: usage test_twin.py TWIN TABLES PLAYER [unittest arguments]."""
 import csv
 import json
 import os
@@ -11,7 +11,7 @@ import tempfile
 import time
 import unittest
 
-TWIN, TABLES = (os.path.abspath(path) for path in sys.argv[1:3])
+TWIN, TABLES, PLAYER = (os.path.abspath(path) for path in sys.argv[1:4])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PATIENCE_s = 60
 sys.path.insert(0, str(ROOT / "host_tools/python"))
@@ -60,7 +60,7 @@ class TwinTest(unittest.TestCase):
 class Files(TwinTest):
     def test_every_kind_is_read_by_python_and_emulator_alike(self):
         names = [line.split()[0] for line in self.run_twin("list")[0].split("\n\n")[0].splitlines()[1:]]
-        self.assertEqual(sorted(names), sorted(["grid", "taps", "high", "placements", "pokes", "cycle", "slip", "twist", "rolloff", "two"]))
+        self.assertEqual(sorted(names), sorted(["grid", "taps", "high", "pokes", "cycle", "slip", "twist", "rolloff", "placements", "two"]))
         for kind in names:
             with self.subTest(kind):
                 seconds = 34 if kind == "cycle" else 12
@@ -74,12 +74,12 @@ class Files(TwinTest):
                 self.assertEqual(emulator["rows"], len(scene.t_s))
                 self.assertEqual(emulator["metadata"], scene.metadata)
                 self.assertEqual(scene.metadata["name"],
-                                 f"{kind}-{'sphere15' if kind == 'placements' else 'sphere6'}-h12-gain10-drift-relaxation-hysteresis-temperature-bias-clip")
+                                 f"{kind}-{'sphere15' if kind == 'placements' else 'sphere6'}-h12-gain10-drift-relaxation-hysteresis-aftereffect-temperature-branch-bias-clip")
                 for t_s, sensors in zip(times, emulator["at"]):
                     for k, sensor in enumerate(sensors):
                         self.assertAlmostEqual(
                             sensor["pressure_Pa"] - 101325, fingertip_files.np.interp(t_s, scene.t_s, scene.sensors_Pa[:, k]), places=6)
-                        self.assertTrue(25 <= sensor["temperature_degC"] < 31)
+                        self.assertTrue(5 <= sensor["temperature_degC"] < 31)
                 events = self.events()
                 held = [row for row in events if float(row["force_N"]) > 0 or float(row["force_end_N"]) > 0]
                 self.assertGreater(len(held), 1)
@@ -115,6 +115,25 @@ class Files(TwinTest):
             self.assertGreaterEqual(begin - end, 1.2)
             quiet = (scene.t_s > end + 0.002) & (scene.t_s < begin - 0.002)
             self.assertFalse(scene.sensors_Pa[quiet].any())
+
+    def test_a_cold_pad_reads_one_step_and_old_temperatures(self):
+        # Almost no force; the firmware keeps a branch for 0.3 K, 3 s, and its temperature for half a second: 24 Pa at 0.1 K/s.
+        self.scene("taps", "--force", "0.02", "--quiet", "60", "--seconds", "58", "--effects", "branch=7")
+        recording = str(self.folder / "recording.csv")
+        subprocess.run([PLAYER, "play", self.csv, "-o", recording, "--quiet", "--raw", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s)
+        scene, played = fingertip_files.read_scenario(self.csv), fingertip_files.read_recording(recording)
+        t_s, read_Pa = played["t_us"] * 1e-6, played.sensors_Pa - 101325
+        crossing_s = 10 * (9.665 - 7)
+        for k in range(15):
+            with self.subTest(sensor=k):
+                off_Pa = read_Pa[:, k] - fingertip_files.np.interp(t_s, scene.t_s, scene.sensors_Pa[:, k])
+                for begin_s, end_s in ((3, crossing_s - 2), (crossing_s + 8, 58)):
+                    steady = (t_s > begin_s) & (t_s < end_s)
+                    self.assertLess(off_Pa[steady].max(), 1)
+                    self.assertTrue(-30 < off_Pa[steady].min() < -20, off_Pa[steady].min())
+                late = (t_s > crossing_s + 1) & (t_s < crossing_s + 2.5)
+                self.assertLess(read_Pa[late, k].max(), 10)
+                self.assertGreater(read_Pa[(t_s > crossing_s + 8) & (t_s < 58), k].max(), 40)
 
     def test_long_scenes_stay_small(self):
         self.scene("slip", "--seconds", "400", "--effects", "all", "--stick-slip", "1")
@@ -215,5 +234,5 @@ class Usage(TwinTest):
 
 
 if __name__ == "__main__":
-    del sys.argv[1:3]
+    del sys.argv[1:4]
     unittest.main(verbosity=2)

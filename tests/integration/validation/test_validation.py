@@ -66,6 +66,15 @@ class Validation(unittest.TestCase):
         self.assertEqual(spreads, sorted(spreads))
         self.assertGreater(spreads[1], 1.5 * budget["hysteresis 3 %"])
 
+    def test_rubber_that_remembers_and_a_cold_beginning_are_in_the_budget(self):
+        budget = {row["effect"]: row for row in self.found["budget"]}
+        nothing = budget["nothing but the model"]
+        self.assertGreater(budget["after-effect of 4 %"]["p95_mm"], 1.3 * nothing["p95_mm"])
+        self.assertGreater(budget["after-effect of 4 %"]["force"]["mape_percent"], 1.5 * nothing["force"]["mape_percent"])
+        cold = budget["warming across a branch of the compensation"]
+        self.assertGreater(cold["force"]["mape_percent"], 1.1 * nothing["force"]["mape_percent"])
+        self.assertLess(cold["median_mm"], 1.5 * nothing["median_mm"])
+
     def test_slips_are_found(self):
         self.assertGreater(self.found["slip_steps"], 100)
         self.assertGreater(self.found["slip_success_percent"], 85)

@@ -2,6 +2,7 @@
 #include "twin/effects.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <gtest/gtest.h>
 
@@ -49,7 +50,7 @@ TEST(Effects, NoneChangesNothing) {
     EXPECT_EQ(reported(pad, t_s, base_Pa), std::vector<double>(SENSORS, base_Pa));
     t_s += 1.0;
   }
-  EXPECT_EQ(pad.temperature_rise_K(1000.0), 0.0);
+  EXPECT_EQ(pad.temperature_degC(1000.0), ROOM_degC);
 }
 
 TEST(Effects, RelaxationLosesItsShareInTheHoldItIsDefinedBy) {
@@ -142,6 +143,96 @@ TEST(Effects, HysteresisRemembersItsLargestPressureAndClosesInnerLoops) {
   }
 }
 
+TEST(Effects, AftereffectLeavesPressesAndHoldsAsTheyWere) {
+  Pad pad = pad_with("aftereffect");
+  double t_s = 0.0;
+  for (double base_Pa : {0.0, 400.0, 20000.0, 20000.0, 30000.0, 30000.0, 30000.0}) {
+    EXPECT_EQ(reported(pad, t_s, base_Pa), std::vector<double>(SENSORS, base_Pa)) << t_s;
+    t_s += 1.7;
+  }
+  Pad pulled = pad_with("aftereffect"); // rubber that was pulled remembers nothing
+  for (double base_Pa : {0.0, -300.0, 0.0}) {
+    EXPECT_EQ(reported(pulled, t_s, base_Pa), std::vector<double>(SENSORS, base_Pa));
+    t_s += 1.0;
+  }
+}
+
+TEST(Effects, AftereffectIsAShareOfThePeakThatGoesBackInItsTime) {
+  for (double peak_Pa : {5000.0, 80000.0}) {
+    for (double held_s : {0.1, 20.0}) {
+      Pad pad = pad_with("aftereffect");
+      reported(pad, 0.0, 0.0);
+      reported(pad, 0.2, peak_Pa);
+      reported(pad, 0.2 + held_s, peak_Pa);
+      const double released_s = 0.2 + held_s + 1e-6;
+      const std::vector<double> after = reported(pad, released_s, 0.0);
+      const std::vector<double> later = reported(pad, released_s + 3.0, 0.0);
+      for (std::size_t k = 0; k < SENSORS; k++) {
+        const Pad::Aftereffect &effect = pad.aftereffects()[k];
+        EXPECT_NEAR(after[k], effect.share * peak_Pa, 1e-5 * peak_Pa);
+        EXPECT_NEAR(later[k], after[k] * std::exp(-3.0 / effect.time_s), 1e-6 * peak_Pa);
+      }
+      const std::vector<double> gone = reported(pad, released_s + 300.0, 0.0);
+      for (double reading_Pa : gone) {
+        EXPECT_NEAR(reading_Pa, 0.0, 1e-6);
+      }
+    }
+  }
+}
+
+TEST(Effects, AftereffectsStandOffOrUndershootAsMeasured) {
+  int sensors = 0, dips = 0, slow = 0;
+  double least = 1.0, most = 0.0, least_dip = 1.0, most_dip = 0.0;
+  for (std::uint64_t seed = 0; seed < 200; seed++) {
+    const Pad pad = pad_with("aftereffect", seed), twice = pad_with("aftereffect=8", seed);
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      const auto [share, time_s] = pad.aftereffects()[k];
+      EXPECT_NEAR(twice.aftereffects()[k].share, 2.0 * share, 1e-12);
+      EXPECT_EQ(twice.aftereffects()[k].time_s, time_s);
+      EXPECT_GE(time_s, 0.5);
+      EXPECT_LE(time_s, 10.0);
+      slow += time_s > std::sqrt(5.0);
+      double &low = share < 0.0 ? least_dip : least, &high = share < 0.0 ? most_dip : most;
+      low = std::min(low, std::abs(share));
+      high = std::max(high, std::abs(share));
+      dips += share < 0.0;
+      sensors++;
+    }
+  }
+  EXPECT_NEAR(double(dips) / sensors, 1.0 / 3.0, 0.03);
+  EXPECT_NEAR(double(slow) / sensors, 0.5, 0.03);
+  EXPECT_NEAR(least, 0.004, 2e-4);
+  EXPECT_NEAR(most, 0.08, 2e-4);
+  EXPECT_NEAR(least_dip, 0.01, 5e-4);
+  EXPECT_NEAR(most_dip, 0.09, 5e-4);
+  EXPECT_GE(least, 0.004);
+  EXPECT_LE(most, 0.08);
+  EXPECT_GE(least_dip, 0.01);
+  EXPECT_LE(most_dip, 0.09);
+}
+
+TEST(Effects, AftereffectDoesNotDependOnTheStep) {
+  // Presses that overtake what is remembered of the one before, or do not.
+  const std::vector<Corner> path{{0, 0},      {0.4, 9000},  {1, 9000}, {1.2, 0},    {2, 0},
+                                 {2.4, 3000}, {2.6, 30000}, {3, 1000}, {3.5, 4000}, {6, 0}};
+  for (std::uint64_t seed = 1; seed <= 8; seed++) {
+    Pad fine = pad_with("aftereffect", seed), coarse = pad_with("aftereffect", seed);
+    const std::vector<double> a = along(fine, path, 0.001), b = along(coarse, path, 0.1);
+    for (std::size_t i = 0; i < b.size(); i++) {
+      EXPECT_NEAR(a[100 * i], b[i], 1e-6) << 0.1 * double(i);
+    }
+  }
+}
+
+TEST(Effects, AftereffectOfAPressThatIsSmallerAddsNothing) {
+  Pad one = pad_with("aftereffect"), two = pad_with("aftereffect");
+  const std::vector<double> a = along(one, {{0, 0}, {1, 50000}, {1.5, 0}, {3, 0}}, 0.1);
+  const std::vector<double> b =
+      along(two, {{0, 0}, {1, 50000}, {1.5, 0}, {1.7, 0}, {1.8, 50}, {1.9, 0}, {3, 0}}, 0.1);
+  EXPECT_NEAR(a.back(), b.back(), 0.1 * std::abs(a.back()));
+  EXPECT_NE(a.back(), 0.0);
+}
+
 TEST(Effects, GainsAreNormalAndTheSamePadAtAnySpread) {
   double sum = 0.0, squares = 0.0, largest = 0.0;
   int beyond_sd = 0;
@@ -216,11 +307,88 @@ TEST(Effects, ClipEndsReadings) {
 TEST(Effects, TemperatureRisesThroughTheLayerAndLeavesPressuresAlone) {
   Pad thick = pad_with("temperature");
   const Pad thin(parse_effects("temperature"), SENSORS, 6.0, AMBIENT_Pa, 1);
-  EXPECT_EQ(thick.temperature_rise_K(0), 0.0);
-  EXPECT_NEAR(thick.temperature_rise_K(486.3), 6.0 * (1 - std::exp(-1.0)), 0.01);
-  EXPECT_NEAR(thin.temperature_rise_K(486.3 / 4), 6.0 * (1 - std::exp(-1.0)), 0.01);
-  EXPECT_NEAR(thick.temperature_rise_K(1e5), 6.0, 1e-9);
+  EXPECT_EQ(thick.temperature_degC(0), 25.0);
+  EXPECT_NEAR(thick.temperature_degC(486.3), 25.0 + 6.0 * (1 - std::exp(-1.0)), 0.01);
+  EXPECT_NEAR(thin.temperature_degC(486.3 / 4), 25.0 + 6.0 * (1 - std::exp(-1.0)), 0.01);
+  EXPECT_NEAR(thick.temperature_degC(1e5), 31.0, 1e-9);
   EXPECT_EQ(reported(thick, 0, 1234.0)[3], 1234.0);
+}
+
+// The rule itself, in real numbers: what a part says whose codes are these.
+double compensated_Pa(const std::array<double, 6> &c, double d1, double dT, bool very_cold) {
+  const double below = dT * c[5] / 0x1p23;
+  double offset = c[1] * 0x1p17 + c[3] * dT / 0x1p6;
+  double sensitivity = c[0] * 0x1p16 + c[2] * dT / 0x1p7;
+  offset -= below * below * (very_cold ? 35.0 / 8.0 : 30.0 / 256.0);
+  sensitivity -= very_cold ? 63.0 * below * below / 32.0 : 0.0;
+  return (d1 * sensitivity / 0x1p21 - offset) / 0x1p15;
+}
+
+TEST(Effects, BranchStepsByWhatTheRuleStepsBy) {
+  const std::array<double, 6> typical{46372, 43981, 29059, 27842, 31553, 28165};
+  const double dT = -1000.0 * 0x1p23 / typical[5];
+  double sum_Pa[2]{}, least_Pa = 1e9, most_Pa = 0.0;
+  const double bases_Pa[2]{0.0, 60000.0};
+  constexpr int PADS = 200;
+  for (std::uint64_t seed = 0; seed < PADS; seed++) {
+    for (int i = 0; i < 2; i++) {
+      Pad pad = pad_with("branch", seed);
+      const std::vector<double> before = reported(pad, 45.0, bases_Pa[i]);
+      const std::vector<double> after = reported(pad, 48.0, bases_Pa[i]);
+      for (std::size_t k = 0; k < SENSORS; k++) {
+        EXPECT_EQ(before[k], bases_Pa[i]);
+        sum_Pa[i] += (after[k] - before[k]) / (PADS * SENSORS);
+        if (i == 0) {
+          EXPECT_EQ(after[k], pad.branches()[k].step_Pa);
+          least_Pa = std::min(least_Pa, after[k]);
+          most_Pa = std::max(most_Pa, after[k]);
+        }
+      }
+    }
+  }
+  for (int i = 0; i < 2; i++) {
+    // The code at which the part, in the middle branch, reads this pressure.
+    double low = 0.0, high = 0x1p24;
+    while (high - low > 1e-3) {
+      const double code = 0.5 * (low + high);
+      (compensated_Pa(typical, code, dT, false) < AMBIENT_Pa + bases_Pa[i] ? low : high) = code;
+    }
+    const double step_Pa =
+        compensated_Pa(typical, low, dT, false) - compensated_Pa(typical, low, dT, true);
+    EXPECT_NEAR(sum_Pa[i], step_Pa, 0.6) << i;
+    EXPECT_NEAR(step_Pa, i == 0 ? 51.1 : 90.9, 0.2);
+  }
+  EXPECT_GT(least_Pa, 40.0);
+  EXPECT_LT(least_Pa, 46.0);
+  EXPECT_GT(most_Pa, 57.0);
+  EXPECT_LT(most_Pa, 63.0);
+}
+
+TEST(Effects, BranchIsCrossedOnceAndWhereItIs) {
+  Pad pad = pad_with("branch");
+  EXPECT_EQ(pad.temperature_degC(0.0), 5.0);
+  EXPECT_NEAR(pad.temperature_degC(30.0), 8.0, 1e-12);
+  EXPECT_EQ(pad.temperature_degC(200.0), ROOM_degC);
+  EXPECT_EQ(pad.temperature_degC(5000.0), ROOM_degC);
+  std::vector<double> before(SENSORS, 0.0);
+  std::vector<int> crossings(SENSORS, 0);
+  for (int ms = 0; ms <= 220000; ms += 10) {
+    const std::vector<double> now = reported(pad, 1e-3 * ms, 0.0);
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      if (now[k] != before[k]) {
+        crossings[k]++;
+        EXPECT_NEAR(1e-3 * ms, (pad.branches()[k].edge_degC - 5.0) / 0.1, 0.02);
+        EXPECT_NEAR(pad.branches()[k].edge_degC, 9.665, 0.05);
+      }
+    }
+    before = now;
+  }
+  EXPECT_EQ(crossings, std::vector<int>(SENSORS, 1));
+  // What begins beyond the edge has nothing to cross; what warms from above adds to it.
+  Pad warm = pad_with("branch=12"), held = pad_with("branch=25,temperature");
+  EXPECT_EQ(reported(warm, 0.0, 0.0), std::vector<double>(SENSORS, 0.0));
+  EXPECT_EQ(reported(warm, 100.0, 0.0), std::vector<double>(SENSORS, 0.0));
+  EXPECT_NEAR(held.temperature_degC(1e5), 31.0, 1e-9);
 }
 
 TEST(Effects, AreParsed) {

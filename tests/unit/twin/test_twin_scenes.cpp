@@ -446,4 +446,49 @@ TEST(SceneFile, HasItsEffectsInIt) {
   EXPECT_EQ(plain.column.count("temperature_degC"), 0u);
 }
 
+TEST(SceneFile, HasAftereffectsAndAColdBeginningInIt) {
+  const Scene scene = scene_of("taps", [](SceneOptions &o) {
+    o.seconds = 40;
+    o.effects = parse_effects("aftereffect,branch=8");
+  });
+  const File file = written(scene);
+  const File plain = written(scene_of("taps", [](SceneOptions &o) { o.seconds = 40; }));
+  const File cold = written(scene_of("taps", [](SceneOptions &o) {
+    o.seconds = 40;
+    o.effects = parse_effects("branch=8");
+  }));
+  const auto shares = split(file.metadata.at("aftereffects_percent"), ' ');
+  const auto times_s = split(file.metadata.at("aftereffect_times_s"), ' ');
+  const auto steps_Pa = split(file.metadata.at("branch_steps_Pa"), ' ');
+  ASSERT_EQ(shares.size(), 15u);
+  ASSERT_EQ(times_s.size(), 15u);
+  ASSERT_EQ(steps_Pa.size(), 15u);
+  EXPECT_EQ(file.metadata.at("temperature_degC"), "8");
+  EXPECT_NEAR(file.at("temperature_degC", 17.0), 9.7, 0.003);
+  // From the first release on, a share of its peak; after the branch, near 17 s, the step.
+  const double end_s = scene.acts[0].end_s, wait_s = scene.acts[1].begin_s - end_s;
+  ASSERT_GT(wait_s, 1.0);
+  ASSERT_LT(end_s, 16.0);
+  ASSERT_EQ(plain.at("contact", 39.9), 0.0);
+  for (std::size_t k = 0; k < 15; k++) {
+    const std::string name = "s" + std::to_string(k) + "_Pa";
+    double peak_Pa = 0.0;
+    for (double t_s = 0.0; t_s < end_s; t_s += 0.01) {
+      peak_Pa = std::max(peak_Pa, plain.at(name, t_s));
+    }
+    const double share = 0.01 * to_double(shares[k]).value();
+    const double tau_s = to_double(times_s[k]).value();
+    const double later = file.at(name, end_s + 0.9), sooner = file.at(name, end_s + 0.1);
+    EXPECT_NEAR(later, sooner * std::exp(-0.8 / tau_s), 1.0) << k;
+    // The release takes a moment, in which some is forgotten.
+    EXPECT_LE(std::abs(sooner), std::abs(share) * peak_Pa + 0.5) << k;
+    EXPECT_GE(std::abs(sooner), std::abs(share) * peak_Pa * std::exp(-0.5 / tau_s) - 0.5) << k;
+    EXPECT_GE(sooner * share, -0.01) << k;
+    EXPECT_EQ(cold.at(name, 16.0), plain.at(name, 16.0)) << k;
+    EXPECT_NEAR(cold.at(name, 39.9), to_double(steps_Pa[k]).value(), 0.01) << k;
+  }
+  EXPECT_EQ(plain.metadata.count("aftereffects_percent"), 0u);
+  EXPECT_EQ(plain.metadata.at("temperature_degC"), "25");
+}
+
 } // namespace
