@@ -111,8 +111,8 @@ const std::vector<Effect> &effects() {
       {"branch", "degC", 5.0, -20.0, 25.0,
        "the sensors begin at this and warm up by 0.1 K/s to 25 degC: at 10 degC their compensation "
        "steps by some 51 Pa, 66 Pa/bar more under pressure, each sensor by its own amount",
-       "second-order compensation (TE MS5840-02BA data sheet) of the coefficients of its example, "
-       "drawn +-3 %; the rate is assumed: a cold finger in a hand"},
+       "second-order compensation (TE MS5840-02BA data sheet) with the coefficients of the "
+       "MS5837-02BA's example +-3 %; the rate is assumed: a cold finger in a hand"},
       {"bias", "%", 1.0, 0.0, 10.0, "readings above 1.2 bar come out low, at 2 bar by this",
        "1.2 bar ends the specified accuracy (TE MS5840-02BA data sheet); the amount is assumed"},
       {"clip", "bar", 2.02, 1.2, 10.0, "readings end here",

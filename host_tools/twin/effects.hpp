@@ -22,8 +22,9 @@
 //                second-order terms that do not meet there: from then on readings are higher by
 //                some 51 Pa, and 66 Pa more for each bar above ambient. How much, and at which
 //                temperature, follows from the rule and coefficients drawn for each sensor.
-//                That a temperature is old when it is used costs some 24 to 48 Pa more. It is not
-//                in the pressure: the players' sensors and their firmware do it by themselves.
+//                That a temperature is old when it is used costs some 25 Pa for each half second
+//                of its age. It is not in the pressure: the players' sensors and their firmware do
+//                it by themselves.
 //   bias         reads low above 1.2 bar absolute: by V at 2 bar, growing with the square
 //   clip         never above V absolute
 //   temperature  not in the pressure: the sensors, whose PROM corrects for it, warm up by V with

@@ -117,8 +117,8 @@ class Files(TwinTest):
             self.assertFalse(scene.sensors_Pa[quiet].any())
 
     def test_a_cold_pad_reads_one_step_and_old_temperatures(self):
-        # Almost no force; the firmware keeps a branch for 0.3 K, 3 s, and its temperature for half a second: 24 Pa at 0.1 K/s.
-        self.scene("taps", "--force", "0.02", "--quiet", "60", "--seconds", "58", "--effects", "branch=7")
+        # Almost no force; the firmware keeps a branch for 0.3 K, 3 s, and its temperature for half a second: some 24 Pa at 0.1 K/s.
+        self.scene("taps", "--force", "0.02", "--quiet", "60", "--seconds", "70", "--effects", "branch=7")
         recording = str(self.folder / "recording.csv")
         subprocess.run([PLAYER, "play", self.csv, "-o", recording, "--quiet", "--raw", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s)
         scene, played = fingertip_files.read_scenario(self.csv), fingertip_files.read_recording(recording)
@@ -130,7 +130,7 @@ class Files(TwinTest):
                 for begin_s, end_s in ((3, crossing_s - 2), (crossing_s + 8, 58)):
                     steady = (t_s > begin_s) & (t_s < end_s)
                     self.assertLess(off_Pa[steady].max(), 1)
-                    self.assertTrue(-30 < off_Pa[steady].min() < -20, off_Pa[steady].min())
+                    self.assertTrue(-32 < off_Pa[steady].min() < -17, off_Pa[steady].min())
                 late = (t_s > crossing_s + 1) & (t_s < crossing_s + 2.5)
                 self.assertLess(read_Pa[late, k].max(), 10)
                 self.assertGreater(read_Pa[(t_s > crossing_s + 8) & (t_s < 58), k].max(), 40)
