@@ -215,7 +215,7 @@ class PicoMux(unittest.TestCase):
         again = [(7.0, "dtr 1"), (7.01, encoded("stream", "contact,raw,health")), (7.3, encoded("health"))]
         run = Run(self.folder.name, "host", self.scenario, 7.5, again, faults).finish()
         t_s = self.truth.times_s(run.recording, run.report)
-        for from_s, to_s in ((5.85, 6.15), (7.1, 7.5)):
+        for from_s, to_s in ((5.85, 6.15), (7.1, 7.49)):
             rows = (t_s > from_s) & (t_s < to_s)
             self.assertGreater(rows.sum(), 190 * (to_s - from_s))
             self.assertTrue((run.recording["valid"][rows & ~run.recording.flag(FLAG_HELD)] == 0x7FFF).all())
