@@ -99,7 +99,7 @@ FIXED_INLINE int32_t normalise(int32_t *column, uint32_t size, int32_t raw_q,
   *q = raw_q - shift;
   int32_t finer = 2 * (ridge->finest_q - *q);
   int32_t norm = (ridge->norm >> (finer > 31 ? 31 : finer)) + (1 << 13);
-  UNROLL_BY(NODES)
+  UNROLL
   for (int k = 0; k < NODES; k++) {
     int32_t value = *column >> shift;
     *column = value;
@@ -237,7 +237,7 @@ static NOINLINE void orthogonalise(const struct readings *readings, const struct
 
   int32_t g21 = 0, g31 = 0, g32 = 0;
   const struct node *node = c->node;
-  UNROLL_BY(NODES)
+  UNROLL
   for (int k = 0; k < NODES; k++) {
     int32_t p1 = node->p1, p2 = node->p2, p3 = node->p3;
     g21 += (p1 * p2) >> NORM_SHIFT;

@@ -18,7 +18,7 @@ const MASKED_CYCLES_MAX = 48000;
 /** A fit with every sensor that looks for an outlier and finds none. */
 const SEARCH_CYCLES_MAX = 47000;
 /** A fit that finds an outlier: the fit, the search, and the fit without it. */
-const OUTLIER_CYCLES_MAX = 93000;
+const OUTLIER_CYCLES_MAX = 95000;
 /** Between the cheapest and the dearest press, share of the dearest: a contact at a bound has no widths to tell. */
 const SPREAD_MAX = 0.1;
 /** FINGERTIP_FIT_ITERATIONS. */
