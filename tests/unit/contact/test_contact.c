@@ -123,6 +123,11 @@ static void test_doubtful_locations_end_the_history(void) {
     assert_history_begins_anew();
   }
   fill_history();
+  input.zero_doubtful = true;
+  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_SLIP, update());
+  TEST_ASSERT_EQUAL_UINT16(0, history.count);
+  setUp();
+  fill_history();
   fit.flags = 0;
   update();
   TEST_ASSERT_EQUAL_UINT16(0, history.count);
