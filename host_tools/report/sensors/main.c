@@ -48,7 +48,8 @@ static void condition_one(void) {
 }
 
 static void fit(void) {
-  const struct fit_settings settings = {.iterations = 7, .noise_Pa_q10 = NOISE_Pa_q10};
+  const struct fit_settings settings = {.iterations = FINGERTIP_FIT_ITERATIONS,
+                                        .noise_Pa_q10 = NOISE_Pa_q10};
   fit_gaussian(&array, conditioned.pressure_Pa_q10, conditioned.usable, &settings, &result);
 }
 
