@@ -17,12 +17,13 @@
 #define TARE_FEWEST 3
 
 /* Of real sensors at rest: 130 to 210 Pa in 16 min, 0.22 Pa/s at most (source as in condition.h).
- * The zero may follow at 0.31; what drifted in a contact is taken to be up to 0.24 Pa/s of it, 900
- * Pa at most. */
-#define DRIFT_SLEW_q4 5
+ * The zero may follow at 0.5 Pa/s, 512 / 1024 in a second: at 0.31 it is too slow to know the drift
+ * after a minute. What drifted in a contact is taken to be up to 0.24 Pa/s of it, 900 Pa at most.
+ */
+#define DRIFT_SLEW_SHIFT 1
 #define DRIFT_IN_CONTACT_SHIFT 2
 #define DRIFT_IN_CONTACT_MAX_Pa 900
-#define DRIFT_FASTEST_q12 (DRIFT_SLEW_q4 << 8)
+#define DRIFT_FASTEST_q12 1280 /* 0.31 Pa/s */
 #define DRIFT_GOES_ON_ms ((uint32_t)SECONDS(3600))
 
 #define IDLE_ms SECONDS(2)     /* time constants of the level, */
@@ -254,7 +255,7 @@ static void track_free(struct condition *condition, uint8_t k, const struct look
   int32_t above_level = above_zero + remainder;
   int32_t deepest = -((memory >> DIP_SHIFT) + warm);
 
-  int32_t slew = (step_ms * DRIFT_SLEW_q4) >> 4;
+  int32_t slew = step_ms >> DRIFT_SLEW_SHIFT;
   int32_t creep = slew, keep = 0;
   if (!unsure) {
     int32_t goal = clamp(above_level, deepest, (memory >> BAND_SHIFT) + warm);

@@ -6,9 +6,9 @@
  * after a tare, or after another sensor took its place, the smallest and the largest left out (of
  * three and more when they took a second, at rates below 16 Hz). It is good to the noise at once
  * and goes on improving: for some ten seconds it may move by CONDITION_WARM_Pa, since rubber and
- * sensors warm up, then only at CONDITION_DRIFT_Pa_s - no barometer drifts faster, and a force that
- * rises faster is no drift. In a contact the zero stands but for the drift that was seen in the
- * calm before it, which goes on for an hour.
+ * sensors warm up, then only at 0.5 Pa/s: barometers drift by up to 0.22, and a force
+ * that rises faster is no drift. In a contact the zero stands but for the drift that was seen in
+ * the calm before it, which goes on for an hour.
  *
  * Release. Rubber does not let go at once: a sensor stands off by 0.4 to 13 % of its last pressure,
  * or below its zero by 1 to 15 %, returns within 0.5 to 20 s, and keeps some of it (strips of
@@ -16,7 +16,8 @@
  * that is left. So a contact closes when every sensor is below an eighth of the strongest it felt
  * lately (or a sixteenth of what any sensor felt), and the zero is then level + remainder: the
  * remainder follows the reading within that band, upward only for CONDITION_FRESH_s after the
- * release, and the level follows the remainder by 1/256 of the memory a second. The memory fades
+ * release, and never as fast as a press rises; then the level follows the remainder by 1/256
+ * of the memory a second. The memory fades
  * with CONDITION_MEMORY_s. A sudden press opens the gate above a sixteenth of it.
  *
  * Doubt. .zero_doubtful says that what is pressed, or is not, cannot be told from a zero that has
@@ -58,7 +59,6 @@
 #define CONDITION_FRESH_s 2
 #define CONDITION_MEMORY_s 20
 #define CONDITION_BELOW_s 10
-#define CONDITION_DRIFT_Pa_s 0.31f
 #define CONDITION_SNAPSHOTS 8
 
 struct condition {
