@@ -9,7 +9,7 @@ usage() {
   echo "usage: sh cmake/bootstrap.sh demo|test|report" >&2
   echo "  demo    build everything, play presses and slips to the emulated fingertip, draw what it felt" >&2
   echo "  test    build everything and run the whole test suite" >&2
-  echo "  report  build everything, measure fit, rate and cost, repeat the published experiments in simulation, write build/report" >&2
+  echo "  report  build everything, measure fit, rate, cost and truth, repeat the published experiments in simulation, write build/report" >&2
   exit 2
 }
 [ $# -eq 1 ] || usage
@@ -114,5 +114,8 @@ case $1 in
     /usr/bin/python3 host_tools/twin/validation.py --build build/host \
       --image build/pico_mux/fingertip-pico_mux.bin -o build/report \
       --picture host_tools/twin/validation_force.png
+    say "how far from the truth: gains, shapes, time, and what is kept"
+    /usr/bin/python3 host_tools/report/truth/truth.py --build build/host --boards build -o build/report \
+      --picture host_tools/report/truth/truth.png
     ;;
 esac

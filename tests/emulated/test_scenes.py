@@ -18,8 +18,8 @@ TOOLS = argparse.Namespace()
 BOARD = "pico_parallel"
 # Of a packet, firmware/wire/PROTOCOL.md: types, and bytes of the body without what belongs to a capability.
 CONTACT, RAW, INFO, HEALTH, ACK = 0x01, 0x02, 0x03, 0x04, 0x05
-INFO_BYTES, HEALTH_BYTES = 89 + 8 * 15, 68
-OF_FIT = {INFO: 1, HEALTH: 4}
+INFO_BYTES, HEALTH_BYTES = 93 + 8 * 15, 72
+OF_FIT = {INFO: 13, HEALTH: 4}
 UNKNOWN_COMMAND, OUT_OF_RANGE = "1", "2"
 
 

@@ -1,0 +1,115 @@
+"""What truth.py measured as text and as a picture."""
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402
+from fingertip_files import write_text  # noqa: E402
+from goals import goal_table_md  # noqa: E402
+
+INK, FAINT, GRID, GOAL, BLUE, ORANGE = "#22252e", "#8a8f9c", "#e6e8ee", "#2a9d4a", "#1f6fd6", "#d98a1f"
+# Share of truths within one and two radial standard deviations of a normal distribution in the plane.
+IDEAL_PERCENT = (63.2, 98.2)
+
+
+def text_of(value):
+    if value is None:
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def table_md(rows):
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    return lines + ["| " + " | ".join(text_of(row.get(name)) for name in columns) + " |" for row in rows]
+
+
+def tables_of(found):
+    """(name, rows) of every table in it: a list of rows, each a dict of plain values."""
+    for name, value in found.items():
+        if isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
+            yield name, [{key: cell for key, cell in row.items() if not isinstance(cell, (list, dict))} for row in value]
+
+
+def write(found, path):
+    lines = ["# From the optimum to the truth", "", "Written by `sh cmake/bootstrap.sh report`. Simulated pads and presses, the firmware's own code;",
+             "`real_...`: recordings of real strips, where they are at hand. ![Coverage, calibration, warnings](truth.png)", "", *goal_table_md(found), ""]
+    for name, rows in tables_of(found):
+        lines += [f"## {name.replace('_', ' ')}", "", *table_md(rows), ""]
+    write_text(path, "\n".join(lines))
+
+
+def tidy(axes, title, label):
+    axes.set_title(title, loc="left", size=10, color=INK)
+    axes.set_ylabel(label, size=9)
+    axes.grid(axis="y", color=GRID)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(labelsize=8)
+
+
+def named(axes, names):
+    axes.set_xticks(range(len(names)), names, rotation=25, ha="right")
+
+
+def draw_coverage(axes, cases):
+    places = range(len(cases))
+    for offset, key, colour, label in ((-0.2, "cover_1sd", BLUE, "within 1 sd"), (0.2, "cover_2sd", ORANGE, "within 2 sd")):
+        axes.bar([x + offset for x in places], [row[key] for row in cases], 0.38, color=colour, label=label)
+    for ideal in IDEAL_PERCENT:
+        axes.axhline(ideal, color=GOAL, lw=1, ls="--")
+    named(axes, [row["case"] for row in cases])
+    axes.set_ylim(0, 115)
+    axes.legend(fontsize=8, frameon=False, ncols=2, loc="upper right")
+    tidy(axes, "True places within the predicted standard deviation (dashed: ideal)", "% of touches")
+
+
+def draw_warnings(axes, cases):
+    places = range(len(cases))
+    axes.bar([x - 0.2 for x in places], [row["warned"] for row in cases], 0.38, color=BLUE, label="warned")
+    axes.bar([x + 0.2 for x in places], [row["bad"] for row in cases], 0.38, color=ORANGE, label="off by more than 1 mm")
+    for x, row in enumerate(cases):
+        axes.annotate(f"{row['bad_unflagged']:.2g}", (x + 0.2, row["bad"]), ha="center", va="bottom", size=8, color=INK)
+    named(axes, [row["case"] for row in cases])
+    axes.legend(fontsize=8, frameon=False)
+    tidy(axes, "Warnings (number: % off by more than 1 mm and not warned)", "% of touches")
+
+
+def draw_placements(axes, calibration, before_mm):
+    rows = calibration["by_placements"]
+    axes.plot([row["placements"] for row in rows], [row["median_mm"] for row in rows], "o-", color=BLUE, label="after calibration")
+    axes.axhline(before_mm, color=FAINT, ls="--", lw=1, label="never calibrated")
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("placements of one weight", size=9)
+    axes.legend(fontsize=8, frameon=False)
+    tidy(axes, "Location on pads of 10 % gain spread", "median error, mm")
+
+
+def draw_iterations(axes, rows):
+    for layer, colour in ((12, BLUE), (6, ORANGE)):
+        for gain, style in ((0, "o-"), (10, "s--")):
+            line = [row for row in rows if row["layer_mm"] == layer and round(row["gain_percent"]) == gain]
+            axes.plot([row["iterations"] for row in line], [row["error_p50_mm"] for row in line], style, color=colour, ms=4,
+                      label=f"{layer} mm, gains {gain} %")
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("iterations of the fit", size=9)
+    axes.legend(fontsize=8, frameon=False)
+    tidy(axes, "What iterations do to the truth", "median error, mm")
+
+
+def draw(found, path):
+    """Only what was measured."""
+    panels = []
+    if "cases" in found:
+        panels += [lambda axes: draw_coverage(axes, found["cases"]), lambda axes: draw_warnings(axes, found["cases"])]
+    if "truth_calibration" in found:
+        panels.append(lambda axes: draw_placements(axes, found["truth_calibration"], found["before_cal_median_mm"]))
+    if "iterations" in found:
+        panels.append(lambda axes: draw_iterations(axes, found["iterations"]))
+    figure, places = plt.subplots(2, 2, figsize=(12, 8), layout="constrained")
+    for axes, panel in zip(places.flat, panels):
+        panel(axes)
+    for axes in places.flat[len(panels):]:
+        axes.set_axis_off()
+    figure.suptitle("From the optimum to the truth: simulated pads, the firmware's own code", x=0.01, ha="left", size=12, weight="bold")
+    figure.savefig(path, dpi=90)
+    plt.close(figure)
