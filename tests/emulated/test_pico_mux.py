@@ -23,8 +23,8 @@ FLAG_HELD = 1 << 6
 FLAG_SENSOR_MASKED = 1 << 14
 # Noise of a conversion at OSR 1024, rms: MS5840 datasheet.
 NOISE_Pa = 3.9
-# A location without a warning is never off by more, whatever befalls the array.
-UNWARNED_mm = 0.5
+# Two standard deviations at the limit of UNCERTAIN: a location without a warning is not off by more, whatever befalls the array.
+UNWARNED_mm = 1.2
 
 
 def encoded(*command):

@@ -21,8 +21,8 @@ TOOLS = argparse.Namespace()
 ALL = 0x7FFF
 # Noise of a conversion, rms: MS5840 datasheet.
 NOISE_Pa = {256: 11.0, 1024: 3.9}
-# A location without a warning is never off by more, whatever befalls the array.
-UNWARNED_mm = 0.5
+# Two standard deviations at the limit of UNCERTAIN: a location without a warning is not off by more, whatever befalls the array.
+UNWARNED_mm = 1.2
 SENSOR_DOUBTFUL = 1 << 18
 
 

@@ -8,8 +8,8 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "host_tools
 import fingertip_files  # noqa: E402
 
 HELD = 1 << 6
-# A location without one of these is meant to be right: LOW_SIGNAL to AT_BOUND but for SENSOR_MASKED, which only tells why.
-WARNINGS = 0xBF00
+# A location without one of these is meant to be right: LOW_SIGNAL to SENSOR_DOUBTFUL but for SENSOR_MASKED, which only tells why.
+WARNINGS = 0x7BF00
 # The readings of a frame are of one moment, its time stamp; within this long around it the truth may be met.
 MOMENT_s = 1e-3
 
