@@ -27,7 +27,7 @@ int32_t fit_grid_align(const struct scaled *values, int count, int32_t *aligned)
   }
   exponent += 15 - COEFFICIENT_BITS;
   for (int i = 0; i < count; i++) {
-    int32_t shift = exponent - values[i].exponent;
+    uint32_t shift = (uint32_t)(exponent - values[i].exponent); /* of a zero anything */
     aligned[i] = values[i].mantissa >> (shift < 31 ? shift : 31);
   }
   return exponent;
