@@ -15,9 +15,9 @@
 #define ARRAYS 12
 #define SEED UINT64_C(0x66696E676572)
 
-static const uint32_t always =
-    CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_SENSOR_MASKED |
-    CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_ELONGATED;
+static const uint32_t always = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
+                               CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_WIDTHS_VALID |
+                               CONTACT_FLAG_ELONGATED;
 static const uint32_t warnings = CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_FLAT |
                                  CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL |
                                  CONTACT_FLAG_AT_BOUND;
