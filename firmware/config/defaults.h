@@ -38,7 +38,7 @@
  * to 1.2 % of the touches (truth_fit). */
 #define DEFAULT_GAIN_SD 0.105f
 /* Of a layer of rubber against the Gaussian, as a share of the largest reading: with it one
- * standard deviation covers 60 to 74 % of the errors on pads of 6 and 12 mm (truth_fit, cover_*).
+ * standard deviation covers 57 to 74 % of the errors on pads of 6 and 12 mm (truth_fit).
  */
 #define DEFAULT_MODEL_SD 0.0065f
 
