@@ -31,14 +31,15 @@
 #define DEFAULT_PRIOR_WIDTH_mm                                                                     \
   (FINGERTIP_PRIOR_SIGMA_UM > 0 ? 0.001f * FINGERTIP_PRIOR_WIDTH_UM : 0.0f)
 
-/* Of a pad that was never calibrated: relative standard deviation of a sensor's gain. The gains of a
- * real strip of four barometers under rubber differ by +-10 % (JiannnH/MTL-BaroTactileSensor,
- * Imperial College London, 2023); that this is one standard deviation is the stricter reading, and a
- * twentieth more, as four sensors hardly tell, takes bad locations without a warning from 1.4 to 1.2 %
- * of the touches (truth_fit). */
+/* Of a pad that was never calibrated: relative standard deviation of a sensor's gain. The gains of
+ * a real strip of four barometers under rubber differ by +-10 % (JiannnH/MTL-BaroTactileSensor,
+ * Imperial College London, 2023); that this is one standard deviation is the stricter reading, and
+ * a twentieth more, as four sensors hardly tell, takes bad locations without a warning from 1.4
+ * to 1.2 % of the touches (truth_fit). */
 #define DEFAULT_GAIN_SD 0.105f
-/* Of a layer of rubber against the Gaussian, as a share of the largest reading: with it one standard
- * deviation covers 60 to 74 % of the errors on pads of 6 and 12 mm (truth_fit, cover_*). */
+/* Of a layer of rubber against the Gaussian, as a share of the largest reading: with it one
+ * standard deviation covers 57 to 74 % of the errors on pads of 6 and 12 mm (truth_fit).
+ */
 #define DEFAULT_MODEL_SD 0.0065f
 
 #endif

@@ -46,7 +46,8 @@ struct fit_settings {
   float prior_sigma_mm, prior_width_mm;
   /* What an honest standard deviation needs besides the noise. */
   uint16_t gain_sd_q16[FT_MAX_SENSORS]; /* [sensor] relative sd of its gain; 0: exact */
-  uint16_t model_sd_q16; /* sd of the model's own error, as a share of the largest reading; 0: none */
+  uint16_t
+      model_sd_q16; /* sd of the model's own error, as a share of the largest reading; 0: none */
   float location_sd_limit_mm; /* UNCERTAIN above it; 0: FIT_LOCATION_SD_LIMIT_mm */
 };
 #define FIT_LOCATION_SD_LIMIT_mm 0.6f
@@ -66,14 +67,14 @@ struct fit_result {
   float x_mm, y_mm;
   float p0_Pa;
   float sigma_mm;
-  float force_N;         /* 2 pi p0 sigma^2 */
-  float residual_rms_Pa; /* over the sensors used */
-  float location_sd_mm;  /* radial: 63 % of errors are smaller, 98 % smaller than twice it */
+  float force_N;           /* 2 pi p0 sigma^2 */
+  float residual_rms_Pa;   /* over the sensors used */
+  float location_sd_mm;    /* radial: 63 % of errors are smaller, 98 % smaller than twice it */
   float location_noise_mm; /* what of it is noise: how far a contact at rest jitters */
   float force_sd_N;
   float sigma_x_mm, sigma_y_mm; /* WIDTHS_VALID: of an elliptic Gaussian, along the axes */
   float width_correlation;      /* and its correlation, -1..1: 0 unless it lies aslant */
-  uint32_t used;  /* bitmap of the sensors that entered */
+  uint32_t used;                /* bitmap of the sensors that entered */
   uint32_t flags; /* of enum contact_flag: FIT_VALID, UNCERTAINTY_VALID, LOW_SIGNAL, FLAT,
                      UNCERTAIN, MODEL, AT_BOUND, SENSOR_MASKED, WIDTHS_VALID, ELONGATED */
 };
@@ -90,8 +91,8 @@ enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count
                                    const float *y_mm, float pitch_mm);
 
 /* A sensor whose reading does not belong to the others' (fit_limits.h) is left out of a second fit;
- * SENSOR_MASKED and `used` tell. Only residuals that are rough, and more than noise, gains and model
- * explain, make it look for one.
+ * SENSOR_MASKED and `used` tell. Only residuals that are rough, and more than noise, gains and
+ * model explain, make it look for one.
  *
  * Widths and ELONGATED need every sensor of the grid.
  *
@@ -112,8 +113,8 @@ void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa
  * build, 2 to 6 each way) with every sensor usable; sigma from 0.216 pitch.
  * fit_grid_masked: the same with any sensors missing, at twice the cost.
  * fit_general: float32, any positions, any sensors missing; leaves an outlier out by itself.
- * The former two return whether they have settled with residuals that are rough and more than noise,
- * gains and model explain, as with an outlier. */
+ * The former two return whether they have settled with residuals that are rough and more than
+ * noise, gains and model explain, as with an outlier. */
 bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
               const struct fit_settings *settings, struct fit_result *result);
 bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,

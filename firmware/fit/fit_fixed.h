@@ -40,7 +40,8 @@ FIXED_INLINE int32_t fixed_mul_q26(int32_t a, int32_t b) {
   return a_high * b_high * 64 + ((a_high * b_low + a_low * b_high) >> 10) + (int32_t)(low >> 26);
 }
 
-/* a * b / 2^28 from three products, with the mean of the fourth in its place: error below 6 units. */
+/* a * b / 2^28 from three products, with the mean of the fourth in its place: error below 6 units.
+ */
 FIXED_INLINE int32_t fixed_mul_near_q28(int32_t a, int32_t b) {
   int32_t a_high = a >> 16, a_low = (uint16_t)a;
   int32_t b_high = b >> 16, b_low = (uint16_t)b;

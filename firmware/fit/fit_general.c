@@ -309,8 +309,8 @@ static int outlier_of(const struct samples *samples, const struct parameters *th
   return alone && others * (float)(FIT_OUTLIER * FIT_OUTLIER) < worst * freedom ? outlier : -1;
 }
 
-/* Pitches, and shares of the force, by which a unit of the right-hand side moves the result; and what
- * of these an error of variance 1 of every reading makes. */
+/* Pitches, and shares of the force, by which a unit of the right-hand side moves the result; and
+ * what of these an error of variance 1 of every reading makes. */
 struct influence {
   float gain; /* sigma^2 / p0 */
   float x[PARAMETERS], y[PARAMETERS], force[PARAMETERS];
@@ -363,7 +363,8 @@ struct own_errors {
 };
 
 static void add_own_errors(const struct samples *samples, const struct fit_settings *settings,
-                           const struct parameters *at, const struct influence *influence, struct own_errors *own) {
+                           const struct parameters *at, const struct influence *influence,
+                           struct own_errors *own) {
   float inverse = 1.0f / (at->sigma * at->sigma), log2_scale = 0.5f * LOG2_E * inverse;
   float shape_x = 0.0f, shape_y = 0.0f, shape_force = 0.0f;
   own->gains = own->location = own->force = 0.0f;

@@ -40,8 +40,8 @@
 #define GUESS_HEIGHT_MIN_Q26 1936353
 #define GUESS_HEIGHT_MAX_Q26 484088133 /* sigma 0.316 pitch */
 
-/* FIT_STRETCH_LEAST^2, FIT_STRETCH_SURE^2, FIT_STRETCH_SD_MAX^2, FIT_STRETCH_LINEAR^2, and the height
- * of FIT_SHAPE_LEAST. */
+/* FIT_STRETCH_LEAST^2, FIT_STRETCH_SURE^2, FIT_STRETCH_SD_MAX^2, FIT_STRETCH_LINEAR^2, and the
+ * height of FIT_SHAPE_LEAST. */
 #define ROUND_SQUARE ((struct scaled){20972, -21})
 #define SURE_SQUARE ((struct scaled){25600, -12})
 #define KNOWN_SQUARE ((struct scaled){16384, -18})
@@ -307,8 +307,10 @@ static NOINLINE void finish(const struct readings *readings, const struct moment
  * the same for a contact turned by 45 degrees; together they are the logarithm of the longer width
  * over the shorter. */
 struct shape {
-  struct scaled wider_x, wider_y, stretch, slant; /* wider: log of sigma_x / sigma, sigma_y / sigma */
-  struct scaled noise_form; /* by which the readings' variance gives that of (length of both)^2 / 2 */
+  struct scaled wider_x, wider_y, stretch,
+      slant; /* wider: log of sigma_x / sigma, sigma_y / sigma */
+  struct scaled
+      noise_form; /* by which the readings' variance gives that of (length of both)^2 / 2 */
   int32_t x, y, xy, exponent; /* how one unit of each column moves that square, halved */
   uint32_t by_gains;          /* sum over the sensors, as in struct fit_spread */
 };
@@ -333,7 +335,8 @@ static NOINLINE void begin_shape(const struct readings *readings, const struct m
                                  const struct fit_system *system, const struct fit_spread *spread,
                                  struct shape *shape) {
   const struct factor *x = &m->x, *y = &m->y;
-  struct scaled mass_x = fit_scaled_from(x->mass_q26, -26), mass_y = fit_scaled_from(y->mass_q26, -26);
+  struct scaled mass_x = fit_scaled_from(x->mass_q26, -26),
+                mass_y = fit_scaled_from(y->mass_q26, -26);
   int32_t norm_q = 3 - 2 * m->square_q;
   struct scaled inverse_x =
       fit_grid_reciprocal(scaled_mul(fit_scaled_from(x->square_norm, norm_q), mass_y));
@@ -352,12 +355,12 @@ static NOINLINE void begin_shape(const struct readings *readings, const struct m
   shape->stretch = fit_scaled_short(scaled_sub(shape->wider_x, shape->wider_y));
   shape->slant = scaled_mul(project_slant(m, readings, system->residual_shift), along_xy);
 
-  struct scaled values[3] = {scaled_mul(shape->stretch, along_x), scaled_mul(shape->stretch, along_y),
+  struct scaled values[3] = {scaled_mul(shape->stretch, along_x),
+                             scaled_mul(shape->stretch, along_y),
                              scaled_mul(shape->slant, along_xy)};
-  shape->noise_form =
-      scaled_add(scaled_add(scaled_mul(values[0], shape->stretch),
-                                    scaled_mul(values[1], shape->stretch)),
-                     scaled_mul(values[2], shape->slant));
+  shape->noise_form = scaled_add(
+      scaled_add(scaled_mul(values[0], shape->stretch), scaled_mul(values[1], shape->stretch)),
+      scaled_mul(values[2], shape->slant));
   shape->noise_form = scaled_mul(shape->noise_form, softness);
   values[0].exponent -= m->square_q;
   values[1].exponent -= m->square_q;
@@ -378,10 +381,11 @@ FIXED_INLINE int32_t sinh_ratio_q13(int32_t square_q13) {
   return 8192 + port_divide(square_q13, 6) + port_divide((square_q13 * square_q13) >> 13, 120);
 }
 
-/* Covariance = sigma^2 exp(wider_x + wider_y) exp(S), S the symmetric matrix with stretch and -stretch
- * on its diagonal and slant beside it. */
+/* Covariance = sigma^2 exp(wider_x + wider_y) exp(S), S the symmetric matrix with stretch and
+ * -stretch on its diagonal and slant beside it. */
 static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *result) {
-  int32_t stretch = fit_scaled_to_fixed(shape->stretch, 13), slant = fit_scaled_to_fixed(shape->slant, 13);
+  int32_t stretch = fit_scaled_to_fixed(shape->stretch, 13),
+          slant = fit_scaled_to_fixed(shape->slant, 13);
   int32_t wider = fit_scaled_to_fixed(scaled_add(shape->wider_x, shape->wider_y), 13);
   const int32_t most = (int32_t)(FIT_STRETCH_MAX * 8192.0f);
   if (fixed_size(stretch) > (uint32_t)most || fixed_size(slant) > (uint32_t)most ||
@@ -400,7 +404,7 @@ static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *re
   struct scaled scale = fit_scaled_from(growth, -13);
   struct scaled x = fit_scaled_sqrt(fit_scaled_from(mean + part, -13));
   struct scaled y = fit_scaled_sqrt(fit_scaled_from(mean - part, -13));
-  struct scaled correlation = 
+  struct scaled correlation =
       scaled_mul(fit_scaled_from(across, -13), fit_grid_reciprocal(scaled_mul(x, y)));
   x = scaled_mul(x, scale);
   y = scaled_mul(y, scale);
@@ -479,7 +483,8 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
   fit_grid_end_spread(settings, system, spread);
 }
 
-/* The flags of the shape that apply. If it is elongated, separate widths would move the location. */
+/* The flags of the shape that apply. If it is elongated, separate widths would move the location.
+ */
 static NOINLINE uint32_t judge_shape(const struct readings *readings,
                                      const struct fit_settings *settings,
                                      const struct fit_system *system, const struct shape *shape,
@@ -493,11 +498,12 @@ static NOINLINE uint32_t judge_shape(const struct readings *readings,
   struct scaled noise = fit_scaled_from(settings->noise_Pa_q10, readings->shift - 28);
   struct scaled by_gains = scaled_mul(
       fit_scaled_from((int32_t)shape->by_gains,
-                  SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * shape->exponent),
+                      SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * shape->exponent),
       scaled_mul(spread->amplitude, spread->amplitude));
-  struct scaled variance =
-      fit_scaled_short(scaled_add(scaled_mul(scaled_mul(noise, noise), shape->noise_form), by_gains));
-  struct scaled least = scaled_add(scaled_mul(length_square, ROUND_SQUARE), scaled_mul(variance, SURE_SQUARE));
+  struct scaled variance = fit_scaled_short(
+      scaled_add(scaled_mul(scaled_mul(noise, noise), shape->noise_form), by_gains));
+  struct scaled least =
+      scaled_add(scaled_mul(length_square, ROUND_SQUARE), scaled_mul(variance, SURE_SQUARE));
   uint32_t flags = 0;
   if (scaled_sub(scaled_mul(length_square, length_square), least).mantissa > 0) {
     flags |= CONTACT_FLAG_ELONGATED;
@@ -639,8 +645,7 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   uint32_t flags = judge_shape(&readings, settings, &system, &shape, &spread);
   bool rough =
       fit_grid_conclude(grid, &readings, settings, &system, &spread, &state, NODES, result);
-  if (!(result->flags &
-        (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL))) {
+  if (!(result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL))) {
     if ((flags & CONTACT_FLAG_WIDTHS_VALID) && !set_widths(&shape, result)) {
       flags &= ~(uint32_t)CONTACT_FLAG_WIDTHS_VALID;
     }

@@ -1,11 +1,12 @@
 /* The grid fit without some of its sensors. The polynomials that make the normal matrix of a full
  * rectangle diagonal do not stay orthogonal when nodes are missing, and correcting the full matrix
  * for them loses everything where the missing sensor held nearly all of it. So the columns are
- * formed at the sensors that are there, relative to the strongest of those, and made orthogonal over
- * them: each is the model times a polynomial, a part along x plus one along y, whose coefficients
- * come from the iteration before and are nearly right already; an L D L^T of three columns takes out
- * what is left and mends the coefficients for the next. Rounding in any of it turns a step a little;
- * where the fit ends is decided by the residual against columns of 15 bits, as in fit_grid.c.
+ * formed at the sensors that are there, relative to the strongest of those, and made orthogonal
+ * over them: each is the model times a polynomial, a part along x plus one along y, whose
+ * coefficients come from the iteration before and are nearly right already; an L D L^T of three
+ * columns takes out what is left and mends the coefficients for the next. Rounding in any of it
+ * turns a step a little; where the fit ends is decided by the residual against columns of 15 bits,
+ * as in fit_grid.c.
  */
 #include "common/contact_flags.h"
 #include "fit/fit_grid_solve.h"
@@ -464,8 +465,8 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
 
 enum accuracy { COARSE, FINE, LAST };
 
-static NOINLINE void evaluate(const struct readings *readings, enum accuracy accuracy, struct columns *c,
-                              struct fit_system *system) {
+static NOINLINE void evaluate(const struct readings *readings, enum accuracy accuracy,
+                              struct columns *c, struct fit_system *system) {
   system->rise_q22 = set_model(&system->at, readings->residual, c);
   orthogonalise(readings, &rounding_ridge, c);
   system->amplitude_q28 =

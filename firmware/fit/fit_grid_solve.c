@@ -15,8 +15,8 @@
 #define PEAK_RISE_MAX_Q22 (20 << 22)                      /* a factor of a million */
 #define MODEL_INVERSE_SQUARE ((struct scaled){22756, -9}) /* 1 / FIT_MODEL_RESIDUAL^2 */
 #define ROUGH_INVERSE_SQUARE ((struct scaled){20000, -3}) /* 1 / FIT_ROUGH_RESIDUAL^2 */
-#define FLAT_HEIGHT_Q26 2016200     /* FIT_FLAT_SIGMA */
-#define BOUND_SD ((struct scaled){19661, -14}) /* FIT_BOUND_SD */
+#define FLAT_HEIGHT_Q26 2016200                           /* FIT_FLAT_SIGMA */
+#define BOUND_SD ((struct scaled){19661, -14})            /* FIT_BOUND_SD */
 
 FIXED_INLINE struct scaled scaled_square(struct scaled a) {
   return scaled_mul(a, a);
@@ -158,7 +158,7 @@ static NOINLINE void widen_for_prior(const struct readings *readings,
   struct scaled excess = scaled_sub(scaled_square(readings->prior_sd), *variance);
   if (excess.mantissa > 0) {
     struct scaled share = scaled_mul(system->prior_row, *inverse3);
-    struct scaled more = 
+    struct scaled more =
         scaled_mul(scaled_mul(excess, scaled_square(share)), fit_grid_reciprocal(*variance));
     *inverse3 = scaled_add(*inverse3, more);
   }
@@ -208,10 +208,10 @@ static NOINLINE uint32_t flags_of(const struct fit_grid_shape *grid,
   return flags;
 }
 
-/* By what the variance of the readings gives that of the force's share, times the amplitude squared:
- * the mean of the model adds one over its mass. */
+/* By what the variance of the readings gives that of the force's share, times the amplitude
+ * squared: the mean of the model adds one over its mass. */
 static NOINLINE struct scaled force_form(const struct fit_spread *spread,
-                                        const struct scaled *inverse3) {
+                                         const struct scaled *inverse3) {
   struct scaled off_x = fit_scaled_from(spread->off_x, -26);
   struct scaled off_y = fit_scaled_from(spread->off_y, -26);
   struct scaled lift = fit_scaled_from(spread->lift_q24, -24);
@@ -228,8 +228,8 @@ static NOINLINE struct scaled location_form(const struct fit_system *system,
   int32_t along_x = (2 * system->at.x - system->slope_x) >> 16; /* Q10 */
   int32_t along_y = (2 * system->at.y - system->slope_y) >> 16;
   struct scaled slopes = fit_scaled_from(along_x * along_x + along_y * along_y, -20);
-  struct scaled form = scaled_add(scaled_add(spread->inverse1, spread->inverse2),
-                                  scaled_mul(slopes, *inverse3));
+  struct scaled form =
+      scaled_add(scaled_add(spread->inverse1, spread->inverse2), scaled_mul(slopes, *inverse3));
   if (system->cross != 0) {
     struct scaled cross = fit_scaled_from(system->cross, -26);
     form = scaled_add(form, scaled_mul(scaled_square(cross), spread->inverse2));
@@ -261,8 +261,8 @@ static NOINLINE void set_scatter(const struct readings *readings,
                                    fit_scaled_from(readings->largest, readings->shift - 28));
   scatter->all = scaled_add(scatter->noise, scaled_square(model));
   struct scaled amplitude_square = scaled_square(spread->amplitude);
-  struct scaled gains = fit_scaled_from((int32_t)spread->gains,
-                                        SPREAD_SQUARE_SHIFT - 32 - 2 * spread->gain_shift);
+  struct scaled gains =
+      fit_scaled_from((int32_t)spread->gains, SPREAD_SQUARE_SHIFT - 32 - 2 * spread->gain_shift);
   gains = scaled_mul(scaled_mean(gains, count), amplitude_square);
   struct scaled expected = scaled_add(scatter->all, gains);
   struct scaled found = scaled_mean(square_sum, count > 4 ? count - 4 : 1);
@@ -271,8 +271,7 @@ static NOINLINE void set_scatter(const struct readings *readings,
   if (excess.mantissa > 0) {
     int32_t ratio_q10 = fit_scaled_to_fixed(scaled_mul(found, fit_grid_reciprocal(expected)), 10);
     scatter->misfit = ratio_q10 > (FIT_MISFIT * FIT_MISFIT) << 10;
-    int32_t times_q10 =
-        fixed_clamp(ratio_q10 / FIT_MISFIT_BEGIN, 1 << 10, FIT_MISFIT_MOST << 10);
+    int32_t times_q10 = fixed_clamp(ratio_q10 / FIT_MISFIT_BEGIN, 1 << 10, FIT_MISFIT_MOST << 10);
     excess = fit_scaled_from(excess.mantissa * times_q10, excess.exponent - 10);
     scatter->all = scaled_add(scatter->all, excess);
   }
@@ -302,7 +301,8 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
                                   scaled_square(scaled_mul(spread->softness, pitch))); /* mm */
   struct scaled sd = fit_scaled_sqrt(scaled_mul(scatter.noise, form));
   result->location_noise_mm = fit_grid_compose(sd.mantissa, sd.exponent);
-  struct scaled move_x = fit_scaled_from(system->move_x_q22, -22); /* what it moved is not settled */
+  struct scaled move_x =
+      fit_scaled_from(system->move_x_q22, -22); /* what it moved is not settled */
   struct scaled move_y = fit_scaled_from(system->move_y_q22, -22);
   struct scaled apart = scaled_add(scaled_square(move_x), scaled_square(move_y));
   apart = scaled_add(scaled_add(spread->location_variance, spread->apart), apart);

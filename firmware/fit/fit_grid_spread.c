@@ -5,9 +5,9 @@
 /* Columns times these stay within 31 bits with four of them. */
 #define COEFFICIENT_BITS 13
 
-/* z^2 e of a sensor in Q21, z = -log2 of the model there, in Q10 and at most 22.6. Where the contact
- * lies among the sensors it is at most 1.2, with room for an e that is up to four times what it is
- * called. */
+/* z^2 e of a sensor in Q21, z = -log2 of the model there, in Q10 and at most 22.6. Where the
+ * contact lies among the sensors it is at most 1.2, with room for an e that is up to four times
+ * what it is called. */
 #define DOWN_MAX_Q10 23170
 #define SHAPE_USUAL_Q21 (10 << 21)
 
@@ -20,14 +20,16 @@ int32_t fit_grid_align(const struct scaled *values, int count, int32_t *aligned)
   int32_t exponent = INT16_MIN;
   for (int i = 0; i < count; i++) {
     uint32_t size = fixed_size(values[i].mantissa);
-    int32_t spare = size >= 1 << 14 ? 0 : size >= 1 << 13 ? 1 : 2; /* products have 13 bits or more */
+    int32_t spare = size >= 1 << 14   ? 0
+                    : size >= 1 << 13 ? 1
+                                      : 2; /* products have 13 bits or more */
     if (size != 0 && values[i].exponent - spare > exponent) {
       exponent = values[i].exponent - spare;
     }
   }
   exponent += 15 - COEFFICIENT_BITS;
   for (int i = 0; i < count; i++) {
-    int32_t shift = exponent - values[i].exponent;
+    uint32_t shift = (uint32_t)(exponent - values[i].exponent); /* of a zero anything */
     aligned[i] = values[i].mantissa >> (shift < 31 ? shift : 31);
   }
   return exponent;
@@ -166,7 +168,8 @@ NOINLINE void fit_grid_end_spread(const struct fit_settings *settings,
   struct scaled sum = scaled_add(scaled_mul(x, x), scaled_mul(y, y));
   sum = scaled_add(sum, fit_scaled_from((int32_t)spread->by_gains, gains_exponent));
   sum = scaled_mul(scaled_mul(sum, spread->amplitude), spread->amplitude);
-  spread->location_variance = (struct scaled){sum.mantissa, sum.exponent + 2 * spread->location_exponent};
+  spread->location_variance =
+      (struct scaled){sum.mantissa, sum.exponent + 2 * spread->location_exponent};
 
   struct scaled force = scaled_mul(fit_scaled_from(spread->shape_force, 0), strength);
   sum = scaled_mul(scaled_mul(force, force), FORCE_SHARE);

@@ -115,8 +115,8 @@ std::vector<Variant> all_variants() {
     }
   }
   for (Mask mask : {Mask::random, Mask::peak}) { // as built
-    Variant &variant = add(std::string("mask=") + reference::name_of(mask) + " iterations=" +
-                           std::to_string(DEFAULT_FIT_ITERATIONS));
+    Variant &variant = add(std::string("mask=") + reference::name_of(mask) +
+                           " iterations=" + std::to_string(DEFAULT_FIT_ITERATIONS));
     variant.mask = mask;
     variant.iterations = DEFAULT_FIT_ITERATIONS;
     variant.needs = reference::ANY_SUBSET;

@@ -6,8 +6,9 @@
 // reading beyond MS5840_MAX_PRESSURE_Pa, and saturation to int32.
 //
 // A warning is UNCERTAIN, MODEL, FLAT, AT_BOUND, LOW_SIGNAL, FORCE_LOWER_BOUND, no contact or no
-// fit. The firmware is told what is so: gains are exact where the case does not spread them. Bad means more than 1 mm from the truth, and any location where there is none to find; of
-// two contacts the truth is the centroid of force.
+// fit. The firmware is told what is so: gains are exact where the case does not spread them. Bad
+// means more than 1 mm from the truth, and any location where there is none to find; of two
+// contacts the truth is the centroid of force.
 #include "common/contact_flags.h"
 #include "reference/dataset.hpp"
 #include "reference/kernels.hpp"
@@ -469,7 +470,8 @@ struct Chain {
     input.saturated = taken.saturated;
     input.fit = readings.contact ? &fit : nullptr;
     slip_history history{};
-    const contact_settings slip{DEFAULT_SLIP_THRESHOLD_mm, DEFAULT_SLIP_WINDOW_ms * 1000u, 1.0f, 0.0f};
+    const contact_settings slip{DEFAULT_SLIP_THRESHOLD_mm, DEFAULT_SLIP_WINDOW_ms * 1000u, 1.0f,
+                                0.0f};
     contact_result said;
     contact_update(&history, &slip, &input, &said);
 

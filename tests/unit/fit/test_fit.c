@@ -75,11 +75,10 @@ static struct press random_press(struct random *random, double reach_mm) {
 }
 
 static void assert_finite_and_defined(void) {
-  const float values[] = {result.x_mm,           result.y_mm,      result.p0_Pa,
-                          result.sigma_mm,       result.force_N,   result.residual_rms_Pa,
-                          result.location_sd_mm, result.force_sd_N,
-                          result.location_noise_mm, result.sigma_x_mm, result.sigma_y_mm,
-                          result.width_correlation};
+  const float values[] = {result.x_mm,           result.y_mm,       result.p0_Pa,
+                          result.sigma_mm,       result.force_N,    result.residual_rms_Pa,
+                          result.location_sd_mm, result.force_sd_N, result.location_noise_mm,
+                          result.sigma_x_mm,     result.sigma_y_mm, result.width_correlation};
   bool valid = result.flags & CONTACT_FLAG_FIT_VALID;
   for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
     TEST_ASSERT_TRUE(isfinite(values[i]));

@@ -15,9 +15,9 @@
 #define ARRAYS 12
 #define SEED UINT64_C(0x66696E676572)
 
-static const uint32_t always =
-    CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_SENSOR_MASKED |
-    CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_ELONGATED;
+static const uint32_t always = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
+                               CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_WIDTHS_VALID |
+                               CONTACT_FLAG_ELONGATED;
 static const uint32_t warnings = CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_FLAT |
                                  CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL |
                                  CONTACT_FLAG_AT_BOUND;
@@ -176,6 +176,10 @@ static struct input draw(uint32_t number) {
   settings->iterations = (uint8_t)random_below(&random, random_below(&random, 8) ? 8 : 21);
   settings->noise_Pa_q10 = (int32_t)(random_u32(&random) >> (1 + random_below(&random, 31)));
   settings->noise_Pa_q10 += settings->noise_Pa_q10 == 0;
+  for (int k = 0; k < FT_MAX_SENSORS && random_below(&random, 8); k++) { /* of some sensors */
+    settings->gain_sd_q16[k] = (uint16_t)(random_u32(&random) >> random_below(&random, 16));
+  }
+  settings->model_sd_q16 = (uint16_t)(random_u32(&random) >> random_below(&random, 32));
   settings->n_largest = random_below(&random, 4) ? 0 : (uint8_t)random_u32(&random);
   switch (random_below(&random, 4)) {
   case 0:

@@ -29,11 +29,10 @@ using namespace fingertip;
 using namespace fingertip::truth;
 using nlohmann::ordered_json;
 
-constexpr char HELP[] =
-    "usage: truth_fit [--seed S] [--pads N] [--cache DIR]\n"
-    "  --seed S     of pads and touches, 20221015 by default\n"
-    "  --pads N     pads of each case, 1500 by default\n"
-    "  --cache DIR  folder of the contact tables\n";
+constexpr char HELP[] = "usage: truth_fit [--seed S] [--pads N] [--cache DIR]\n"
+                        "  --seed S     of pads and touches, 20221015 by default\n"
+                        "  --pads N     pads of each case, 1500 by default\n"
+                        "  --cache DIR  folder of the contact tables\n";
 
 constexpr int TOUCHES = 50; // of each pad
 constexpr double BAD_mm = 1.0;
@@ -117,8 +116,7 @@ public:
     return share([=](const Judged &j) { return (j.fit.flags & flags) != 0; });
   }
   double bad_without(std::uint32_t flags, double bad_mm = BAD_mm) const {
-    return share(
-        [=](const Judged &j) { return j.error_mm > bad_mm && !(j.fit.flags & flags); });
+    return share([=](const Judged &j) { return j.error_mm > bad_mm && !(j.fit.flags & flags); });
   }
   ordered_json row(const std::string &name) const {
     return {{"case", name},
@@ -183,9 +181,8 @@ Results run(const Case &c, const Options &options) {
       if (!(fit.flags & CONTACT_FLAG_FIT_VALID)) {
         continue; // no positive reading among the sensors in use
       }
-      const double error_mm =
-          std::hypot(static_cast<double>(fit.x_mm) - touch.x_mm,
-                     static_cast<double>(fit.y_mm) - touch.y_mm);
+      const double error_mm = std::hypot(static_cast<double>(fit.x_mm) - touch.x_mm,
+                                         static_cast<double>(fit.y_mm) - touch.y_mm);
       judged[p * TOUCHES + static_cast<std::size_t>(t++)] = {error_mm, touch.force_N, fit};
     }
   });
@@ -226,14 +223,10 @@ Pad never_calibrated(Random &random) {
 void judge_coverage(const Options &options, const std::vector<Contact> &thick,
                     const std::vector<Contact> &thin, ordered_json &out) {
   const Case cases[] = {
-      {"noise only", gaussians(1.0), equal, true},
-      {"12 mm, equal gains", thick, equal},
-      {"12 mm, gains 5 %", thick, spread(0.05)},
-      {"12 mm, gains 10 %", thick, never_calibrated},
-      {"12 mm, calibrated", thick, calibrated_pad},
-      {"6 mm, equal gains", thin, equal},
-      {"6 mm, gains 10 %", thin, never_calibrated},
-      {"6 mm, calibrated", thin, calibrated_pad},
+      {"noise only", gaussians(1.0), equal, true},  {"12 mm, equal gains", thick, equal},
+      {"12 mm, gains 5 %", thick, spread(0.05)},    {"12 mm, gains 10 %", thick, never_calibrated},
+      {"12 mm, calibrated", thick, calibrated_pad}, {"6 mm, equal gains", thin, equal},
+      {"6 mm, gains 10 %", thin, never_calibrated}, {"6 mm, calibrated", thin, calibrated_pad},
   };
   constexpr std::size_t JUDGED = 6;
   double least = 100.0, most = 0.0, least_2 = 100.0;
@@ -286,10 +279,9 @@ void judge_elongated(const Options &options, ordered_json &out) {
   double worst = 0.0;
   for (const Shape &shape : shapes) {
     for (const Angle &angle : angles) {
-      const Results results =
-          run({std::string(shape.name) + " at " + angle.name, shape.contacts, calibrated_pad,
-               false, angle.angle_rad},
-              options);
+      const Results results = run({std::string(shape.name) + " at " + angle.name, shape.contacts,
+                                   calibrated_pad, false, angle.angle_rad},
+                                  options);
       const double unflagged = results.bad_without(WARNINGS | CONTACT_FLAG_ELONGATED);
       ordered_json row = results.row(std::string(shape.name) + ", " + angle.name);
       row["bad_and_neither_warned_nor_elongated"] = unflagged;

@@ -87,8 +87,7 @@ Contact gaussian(double shorter_mm, double ratio) {
   const double along = shorter_mm * ratio, across = shorter_mm;
   return {"gaussian", [=](double force_N, double dx_mm, double dy_mm) {
             const double u = dx_mm / along, v = dy_mm / across;
-            return 1e6 * force_N / (2.0 * M_PI * along * across) *
-                   std::exp(-0.5 * (u * u + v * v));
+            return 1e6 * force_N / (2.0 * M_PI * along * across) * std::exp(-0.5 * (u * u + v * v));
           }};
 }
 

@@ -45,12 +45,13 @@ struct Pad {
 };
 
 Pad perfect_pad();
-// Gains as cast, normal about 1 as the twin draws them, and no calibration: the firmware is told this
-// standard deviation.
+// Gains as cast, normal about 1 as the twin draws them, and no calibration: the firmware is told
+// this standard deviation.
 Pad raw_pad(double spread, double told, Random &random);
 // What thirty placements of one weight leave: errors with a standard deviation of 1.2 % that change
-// the shape of a touch, and of 2.5 % along the three that do not: log-gains linear in x, in y and in
-// x^2 + y^2 turn one Gaussian into another. The place where the estimates of a solver would come in.
+// the shape of a touch, and of 2.5 % along the three that do not: log-gains linear in x, in y and
+// in x^2 + y^2 turn one Gaussian into another. The place where the estimates of a solver would come
+// in.
 Pad calibrated_pad(Random &random);
 
 struct Touch {
