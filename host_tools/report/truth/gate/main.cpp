@@ -31,7 +31,7 @@ using nlohmann::ordered_json;
 constexpr char HELP[] =
     "usage: truth_gate [--seed S] [--pads N] [--recordings DIR]\n"
     "  --seed S          of pads and places, 20230706 by default\n"
-    "  --pads N          pads of each case, 8 by default; with 1 only OSR 1024 and 8192\n"
+    "  --pads N          pads of each case, 8 by default; with 1 only OSR 8192\n"
     "  --recordings DIR  folder of the strips' recordings, *.csv; the environment's\n"
     "                    FINGERTIP_RECORDINGS by default\n";
 
@@ -428,9 +428,7 @@ int main(int argc, char **argv) {
     }
     Judge judge{options, modes(), {}};
     if (options.pads == 1) { // a quick look
-      const auto is_left_out = [](const Mode &mode) {
-        return mode.osr != 1024 && mode.osr != 8192;
-      };
+      const auto is_left_out = [](const Mode &mode) { return mode.osr != 8192; };
       judge.all.erase(std::remove_if(judge.all.begin(), judge.all.end(), is_left_out),
                       judge.all.end());
     }

@@ -65,6 +65,14 @@ bool read_row(const std::string &line, StripRow &row) {
   });
 }
 
+double deepest_of(const std::vector<StripRow> &rows) {
+  double deepest = -HUGE_VAL;
+  for (const StripRow &row : rows) {
+    deepest = std::max(deepest, row.depth_steps);
+  }
+  return deepest;
+}
+
 // Rows of one depth near the deepest, for long enough.
 std::vector<std::pair<std::size_t, std::size_t>> plateaus(const std::vector<StripRow> &rows,
                                                           double deepest) {
@@ -157,10 +165,7 @@ bool judge_hold(Strip &strip, std::size_t first, std::size_t last) {
 }
 
 void find_touches(Strip &strip) {
-  double deepest = -HUGE_VAL;
-  for (const StripRow &row : strip.rows) {
-    deepest = std::max(deepest, row.depth_steps);
-  }
+  const double deepest = deepest_of(strip.rows);
   for (const StripRow &row : strip.rows) {
     strip.is_free.push_back(row.depth_steps < FREE_DEPTH * deepest);
   }
@@ -191,7 +196,8 @@ frame frame_of(const std::array<double, STRIP_SENSORS> &pressure_Pa, double t_s,
 struct Press {
   std::array<std::int32_t, STRIP_SENSORS> pressure_Pa_q10;
   std::uint32_t usable;
-  double x_mm; // of the stage
+  double x_mm;  // of the stage
+  bool is_full; // at the full depth
 };
 
 struct Presses {
@@ -216,7 +222,7 @@ std::optional<Response> response_of(const std::vector<Press> &presses, std::size
   // Least squares of c0 + c1 x + c2 x^2, by Cramer's rule.
   double m[5] = {}, v[3] = {}, least_mm = HUGE_VAL, most_mm = -HUGE_VAL;
   for (const Press &press : presses) {
-    if (press.pressure_Pa_q10[k] < RESPONSE_FROM * most) {
+    if (!press.is_full || press.pressure_Pa_q10[k] < RESPONSE_FROM * most) {
       continue;
     }
     const double x = press.x_mm, y = std::log(press.pressure_Pa_q10[k]);
@@ -292,6 +298,7 @@ double sigma_of(const std::vector<Press> &presses) {
 }
 
 Presses presses_of(const Strip &strip) {
+  const double deepest = deepest_of(strip.rows);
   Presses found;
   condition state;
   condition_tare(&state);
@@ -301,7 +308,7 @@ Presses presses_of(const Strip &strip) {
     condition_frame(&state, &taken, nullptr, &readings);
     if (readings.contact && !readings.zero_doubtful &&
         readings.peak_Pa_q10 >= 1024 * LOCATED_LEAST_Pa) {
-      Press press{{}, readings.usable, row.x_mm};
+      Press press{{}, readings.usable, row.x_mm, row.depth_steps >= DEEPEST * deepest};
       std::copy_n(readings.pressure_Pa_q10, STRIP_SENSORS, press.pressure_Pa_q10.begin());
       found.all.push_back(press);
     }
