@@ -15,6 +15,7 @@ import math
 import pathlib
 import re
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -67,6 +68,10 @@ STAGE_TIMES = slice(8, 22)
 # While the press comes on, a reading depends on its microsecond.
 PRESSED_s = 1.2
 STEADY_FROM_FRAME = 300
+# The zero follows by the clock, so that it too depends on microseconds: some hundredths of a pascal, and what they do to a fit.
+RAW_HEAD, CONTACT_HEAD = 23, 12  # bytes before the pairs of pressure and zero, and before the floats
+ZERO_q10 = 512
+CLOSE = 1e-2
 
 
 def cobs_decode(coded):
@@ -91,6 +96,19 @@ def packets_of(stream):
         elif number and coded:
             damaged += 1
     return packets, damaged
+
+
+def alike(kind, a, b):
+    """Whether two bodies, a contact's without its stages, tell the same but for what the zero's clock does."""
+    head = RAW_HEAD if kind == RAW else CONTACT_HEAD
+    if len(a) != len(b) or a[:head] != b[:head]:
+        return False
+    if kind == RAW:
+        words = [struct.unpack(f"<{(len(body) - head) // 4}i", body[head:]) for body in (a, b)]
+        same = words[0][::2] == words[1][::2]
+        return same and all(abs(x - y) <= ZERO_q10 for x, y in zip(words[0][1::2], words[1][1::2]))
+    floats = [struct.unpack(f"<{(len(body) - head) // 4}f", body[head:]) for body in (a, b)]
+    return all(abs(x - y) <= CLOSE * max(1, abs(x)) for x, y in zip(*floats))
 
 
 def gaps(packets):
@@ -329,7 +347,7 @@ class Linux(unittest.TestCase):
                     of_frame[kind, frame] = body
             bodies.append(of_frame)
         shared = set(bodies[0]) & set(bodies[1])
-        different = [key for key in sorted(shared) if bodies[0][key] != bodies[1][key]]
+        different = [key for key in sorted(shared) if not alike(key[0], bodies[0][key], bodies[1][key])]
         REPORT.update(packets_compared=len(shared), different=len(different))
         self.assertEqual(different, [])
         self.assertGreaterEqual(len(shared), PACKETS)
