@@ -92,7 +92,7 @@ def draw_iterations(axes, rows):
                       label=f"{layer} mm, gains {gain} %")
     axes.set_ylim(bottom=0)
     axes.set_xlabel("iterations of the fit", size=9)
-    axes.legend(fontsize=8, frameon=False)
+    axes.legend(fontsize=7.5, frameon=False, loc="lower center", ncols=4)
     tidy(axes, "What iterations do to the truth", "median error, mm")
 
 
