@@ -646,11 +646,13 @@ void app_run(struct app *app) {
   if (!app->active) {
     app->asleep_us += port_now_us() - app->idle_since_us;
   }
-  app->news = news;
   atomic_store_explicit(&app->tick, 0, memory_order_relaxed);
-  app->active = receive_commands(app);
-  /* After the commands: one sent just before the port closed must not outlive it. */
-  follow_port(app);
+  if (news != app->news || tick || app->active) {
+    app->news = news;
+    app->active = receive_commands(app);
+    /* After the commands: one sent just before the port closed must not outlive it. */
+    follow_port(app);
+  }
   uint64_t taken_us = port_now_us(); /* taking compensates the readings */
   bool has_frame = scan_take(&app->scan, &app->frame);
   if (has_frame) {

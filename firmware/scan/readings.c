@@ -102,16 +102,6 @@ static __attribute__((noinline, cold)) uint32_t look_closer(struct readings *rea
   return left_out;
 }
 
-static void compensate(const struct readings *readings, const uint32_t code[], uint32_t usable,
-                       struct frame *frame) {
-  const struct ms5840_thermal *thermal = readings->thermal;
-  int32_t *pressure_Pa_q10 = frame->pressure_Pa_q10;
-  const int32_t *end = pressure_Pa_q10 + frame->sensor_count;
-  for (; pressure_Pa_q10 != end; usable >>= 1, code++, thermal++) {
-    *pressure_Pa_q10++ = usable & 1u ? ms5840_compensate_pressure(thermal, *code) : 0;
-  }
-}
-
 /* Tells most frames, of which nothing else need be asked, from the others. */
 struct glance {
   uint32_t sum;
@@ -119,15 +109,18 @@ struct glance {
 };
 
 /* Keeps the readings on the way. */
-static struct glance glance_at(const struct frame *frame, int32_t kept_Pa_q10[]) {
+static struct glance compensate(const struct readings *readings, const uint32_t code[],
+                                uint32_t usable, struct frame *frame, int32_t kept_Pa_q10[]) {
   struct glance glance = {0, 0};
-  const int32_t *pressure_Pa_q10 = frame->pressure_Pa_q10;
+  const struct ms5840_thermal *thermal = readings->thermal;
+  int32_t *pressure_Pa_q10 = frame->pressure_Pa_q10;
   const int32_t *end = pressure_Pa_q10 + frame->sensor_count;
-  while (pressure_Pa_q10 != end) {
-    const uint32_t value = (uint32_t)*pressure_Pa_q10++;
-    *kept_Pa_q10++ = (int32_t)value;
-    glance.sum += value;
-    glance.signs |= value | (MAX_Pa_q10 - value);
+  for (; pressure_Pa_q10 != end; usable >>= 1, code++, thermal++) {
+    const int32_t value = usable & 1u ? ms5840_compensate_pressure(thermal, *code) : 0;
+    *pressure_Pa_q10++ = value;
+    *kept_Pa_q10++ = value;
+    glance.sum += (uint32_t)value;
+    glance.signs |= (uint32_t)value | (MAX_Pa_q10 - (uint32_t)value);
   }
   return glance;
 }
@@ -135,11 +128,10 @@ static struct glance glance_at(const struct frame *frame, int32_t kept_Pa_q10[])
 bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good,
                              struct frame *frame) {
   const uint32_t usable = good & readings->has_thermal & ~readings->suspects;
-  compensate(readings, code, usable, frame);
   const int32_t *last_Pa_q10 = readings->last_Pa_q10[readings->newest];
   readings->newest ^= 1;
   int32_t *kept_Pa_q10 = readings->last_Pa_q10[readings->newest];
-  const struct glance glance = glance_at(frame, kept_Pa_q10);
+  const struct glance glance = compensate(readings, code, usable, frame, kept_Pa_q10);
 
   /* What steps alone steps in the sum. */
   const uint32_t step = size_of((int32_t)(glance.sum - readings->last_sum));

@@ -187,6 +187,8 @@ static bool is_text(const uint8_t *field, unsigned count) {
 }
 
 #define EXPONENT 0x7F800000u
+/* Added to an exponent of ones, it carries into the sign. */
+#define LOWEST_OF_EXPONENT 0x00800000u
 #define IS_FINITE(bits) (((bits)&EXPONENT) != EXPONENT)
 
 /* From one 32-bit value of a run to the next: of a pair the two take turns. */
@@ -205,25 +207,32 @@ struct writer {
 };
 
 /* Returns whether all would be finite as floats. Most of a packet goes through here. */
-static bool put_u32(struct writer *writer, const uint8_t *field, unsigned count, bool pairs) {
-  struct stride stride = stride_of(pairs);
+static bool put_u32(struct writer *writer, const uint8_t *field, unsigned count) {
   uint8_t *at = writer->at;
+  const uint8_t *end = at + 4 * count;
   uint32_t crc = writer->crc;
-  bool finite = true;
-  for (; count > 0; count--) {
+  uint32_t infinite = 0;
+  while (at != end) {
     uint32_t value;
     memcpy(&value, __builtin_assume_aligned(field, 4), sizeof value);
+    field += 4;
     bytes_put_u32(at, value);
-    crc = crc32_add_u32(crc, value);
-    if (!IS_FINITE(value)) {
-      finite = false;
-    }
     at += 4;
-    field += stride.next;
-    stride = (struct stride){stride.after, stride.next};
+    crc = crc32_add_u32(crc, value);
+    infinite |= (value & EXPONENT) + LOWEST_OF_EXPONENT;
   }
   writer->at = at;
   writer->crc = crc;
+  return infinite >> 31 == 0;
+}
+
+/* From each of two arrays of sensors in turn. */
+static bool put_pairs(struct writer *writer, const uint8_t *field, unsigned count) {
+  bool finite = true;
+  for (; count > 0; count--, field += 4) {
+    finite &= put_u32(writer, field, 1);
+    finite &= put_u32(writer, field + 4 * FT_MAX_SENSORS, 1);
+  }
   return finite;
 }
 
@@ -245,7 +254,7 @@ static void put_bytes(struct writer *writer, const uint8_t *field, unsigned coun
 
 static void put_u64(struct writer *writer, uint64_t value) {
   const uint32_t words[2] = {(uint32_t)value, (uint32_t)(value >> 32)};
-  put_u32(writer, (const uint8_t *)words, 2, false);
+  put_u32(writer, (const uint8_t *)words, 2);
 }
 
 static bool put_run(struct writer *writer, uint8_t kind, const uint8_t *field, unsigned count) {
@@ -262,17 +271,17 @@ static bool put_run(struct writer *writer, uint8_t kind, const uint8_t *field, u
     put_u64(writer, wide);
     return true;
   case U32:
-    put_u32(writer, field, count, false);
+    put_u32(writer, field, count);
     return true;
   case PAIRS:
-    put_u32(writer, field, 2 * count, true);
+    put_pairs(writer, field, count);
     return true;
   case F32:
-    return put_u32(writer, field, count, false);
+    return put_u32(writer, field, count);
   case F32_PAIRS:
-    return put_u32(writer, field, 2 * count, true);
+    return put_pairs(writer, field, count);
   case F32_TRIPLES:
-    return put_u32(writer, field, 3 * count, false);
+    return put_u32(writer, field, 3 * count);
   default:
     put_bytes(writer, field, count);
     return true;
@@ -399,28 +408,26 @@ static bool get_body(const struct wire_layout *layout, const uint8_t *at, size_t
 enum { COBS_RUN = 255 };
 
 /* In place: the first byte of frame is free, length bytes follow, and room for what COBS adds.
- * Returns the length of the whole. */
+ * Returns the length of the whole with its delimiter. */
 static size_t cobs_encode(uint8_t *frame, size_t length) {
   uint8_t *code_at = frame;
-  const uint8_t *end = frame + 1 + length;
-  uint8_t *at = frame + 1;
-  for (;;) {
-    const uint8_t *stop = end - code_at > COBS_RUN ? code_at + COBS_RUN : end;
-    while (at < stop && *at != 0) {
+  uint8_t *at = frame;
+  uint8_t *end = frame + 1 + length;
+  *end = 0; /* the delimiter, which ends the last search too */
+  for (;; code_at = at) {
+    do {
       at++;
-    }
-    if (at == end) {
-      break;
+    } while (*at != 0);
+    if (at - code_at >= COBS_RUN && end - code_at > COBS_RUN) {
+      at = code_at + COBS_RUN; /* no zero gives its place for the next code */
+      end++;
+      memmove(at + 1, at, (size_t)(end - at));
     }
     *code_at = (uint8_t)(at - code_at);
-    if (at == stop) { /* no zero stands there to give its place for the next code */
-      memmove(at + 1, at, (size_t)(end - at));
-      end++;
+    if (at == end) {
+      return (size_t)(end + 1 - frame);
     }
-    code_at = at++;
   }
-  *code_at = (uint8_t)(at - code_at);
-  return (size_t)(end - frame);
 }
 
 /* In place. Returns 0 for bytes that no COBS encoder produces. */
@@ -459,9 +466,7 @@ enum ft_status wire_encode(const struct wire_layout *layout, const struct wire_p
     return FT_ERR_ARGUMENT;
   }
   bytes_put_u32(writer.at, ~writer.crc);
-  size_t out = cobs_encode(frame, (size_t)(writer.at + WIRE_CRC_BYTES - (frame + 1)));
-  frame[out++] = 0;
-  *length = out;
+  *length = cobs_encode(frame, (size_t)(writer.at + WIRE_CRC_BYTES - (frame + 1)));
   return FT_OK;
 }
 
