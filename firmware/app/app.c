@@ -480,6 +480,17 @@ static int keep_settings(struct app *app, uint8_t keep) {
   return result_of_put(app, store_put_settings(&app->store, keep ? &settings : NULL));
 }
 
+static enum wire_result tare(struct app *app, uint8_t force) {
+  if (force > 1) {
+    return WIRE_RESULT_OUT_OF_RANGE;
+  }
+  if (read_counter(&app->scan.admitted) == 0 || (app->conditioned.contact && !force)) {
+    return WIRE_RESULT_NOT_NOW;
+  }
+  condition_tare(&app->condition);
+  return WIRE_RESULT_DONE;
+}
+
 /* An enum wire_result, or LATER. */
 static int obey(struct app *app, const struct wire_packet *command, uint64_t now_us) {
   switch (command->type) {
@@ -490,11 +501,7 @@ static int obey(struct app *app, const struct wire_packet *command, uint64_t now
     app->streams = command->body.cmd_stream.streams;
     return WIRE_RESULT_DONE;
   case WIRE_CMD_TARE:
-    if (read_counter(&app->scan.admitted) == 0) {
-      return WIRE_RESULT_NOT_NOW;
-    }
-    condition_tare(&app->condition);
-    return WIRE_RESULT_DONE;
+    return tare(app, command->body.cmd_tare.force);
   case WIRE_CMD_RATE:
     return set_rate(app, command->body.cmd_rate.rate_mHz);
   case WIRE_CMD_OSR:

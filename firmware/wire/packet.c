@@ -118,7 +118,8 @@ LAYOUT(wire_ack, WIRE_ACK);
 
 static const struct run cmd_stream_runs[] = {RUN(BYTES, 1, cmd_stream.streams)};
 static LAYOUT(cmd_stream, WIRE_CMD_STREAM);
-EMPTY_LAYOUT(cmd_tare, WIRE_CMD_TARE);
+static const struct run cmd_tare_runs[] = {RUN(BYTES, 1, cmd_tare.force)};
+static LAYOUT(cmd_tare, WIRE_CMD_TARE);
 static const struct run cmd_rate_runs[] = {RUN(U32, 1, cmd_rate.rate_mHz)};
 static LAYOUT(cmd_rate, WIRE_CMD_RATE);
 static const struct run cmd_osr_runs[] = {RUN(U16, 1, cmd_osr.osr)};

@@ -73,8 +73,8 @@ enum wire_result {
   WIRE_RESULT_DONE = 0,
   WIRE_RESULT_UNKNOWN_COMMAND = 1,
   WIRE_RESULT_OUT_OF_RANGE = 2,
-  WIRE_RESULT_NOT_NOW = 3, /* tare while no sensor answers; a change of what is stored while one is
-                              being written, or where the flash fails */
+  WIRE_RESULT_NOT_NOW = 3, /* tare while no sensor answers, or in contact and not forced; a change of
+                              what is stored while one is being written, or where the flash fails */
 };
 
 /* Bits of the word that says what the fingertip keeps without power. */
@@ -233,6 +233,10 @@ struct wire_cmd_calibrate {
   uint8_t sensor_count; /* that of the fingertip */
   struct calibration calibration;
 };
+struct wire_cmd_tare {
+  uint8_t force; /* 1: whatever touches; 0: not while contact is reported */
+};
+
 struct wire_cmd_keep {
   uint8_t keep; /* 1: the present settings; 0: none, the build's own from the next start on */
 };
@@ -259,6 +263,7 @@ struct wire_packet {
     struct wire_cmd_slip cmd_slip;
     struct wire_cmd_loader cmd_loader;
     struct wire_cmd_calibrate cmd_calibrate;
+    struct wire_cmd_tare cmd_tare;
     struct wire_cmd_keep cmd_keep;
     struct wire_cmd_prior cmd_prior;
     struct wire_cmd_location_limit cmd_location_limit;

@@ -322,7 +322,7 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
       {"stream",
        {1, "stream none|contact,raw,health",
         [&] { return command_stream(streams_from_text(word(1))); }}},
-      {"tare", {0, "tare", command_tare}},
+      {"tare", {0, "tare", [] { return command_tare(); }}},
       {"rate", {1, "rate HZ|max", [&] { return command_rate_mHz(rate_mHz_from_text(word(1))); }}},
       {"osr", {1, "osr N", [&] { return command_osr(osr_from_text(word(1))); }}},
       {"slip",

@@ -112,8 +112,10 @@ wire_packet command_stream(std::uint8_t streams) {
   return packet;
 }
 
-wire_packet command_tare() {
-  return packet_of(WIRE_CMD_TARE);
+wire_packet command_tare(bool force) {
+  wire_packet packet = packet_of(WIRE_CMD_TARE);
+  packet.body.cmd_tare.force = force ? 1 : 0;
+  return packet;
 }
 
 wire_packet command_rate_mHz(std::uint32_t rate_mHz) {

@@ -15,7 +15,7 @@ std::uint8_t possible_streams(const wire_info &info, std::uint8_t streams);
 
 /* Sequence and time are filled in by whoever sends. */
 wire_packet command_stream(std::uint8_t streams);
-wire_packet command_tare();
+wire_packet command_tare(bool force = false); /* refused in contact unless forced */
 wire_packet command_rate_mHz(std::uint32_t rate_mHz);
 wire_packet command_osr(std::uint32_t osr);
 wire_packet command_slip(float threshold_mm, std::uint32_t window_ms);

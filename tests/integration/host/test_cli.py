@@ -175,7 +175,7 @@ class Usage(CliTest):
 
     def test_encode(self):
         # COBS of version, type, sequence, time, body and CRC, worked out by zlib.crc32 and hand
-        self.assertEqual(self.run_cli("encode", "tare")[0], "030481010101010101010101054f17bcce00\n")
+        self.assertEqual(self.run_cli("encode", "tare")[0], "03048101010101010101010101059b0faf3400\n")
         timed = self.run_cli("encode", "--sequence", "258", "--time", "1", "osr", "8192")[0].strip()
         self.assertTrue(timed.startswith("0604830201"), timed)
         self.assertIn("slip THRESHOLD_MM WINDOW_MS", self.error("encode", "slip", "0.75", status=2))

@@ -492,6 +492,26 @@ static void a_tare_takes_the_present_as_zero(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.02f, 4.0f, last.force_N);
 }
 
+static void a_tare_in_contact_is_refused_unless_forced(void) {
+  struct wire_packet tare = {.type = WIRE_CMD_TARE};
+  native_cdc_open();
+  run_for(1000);
+  press.force_N = 3.0;
+  run_for(50);
+  TEST_ASSERT_EQUAL(WIRE_RESULT_NOT_NOW, ask(tare));
+  start_streams(WIRE_STREAM_CONTACT);
+  run_for(100);
+  struct wire_contact refused = last_contact();
+  TEST_ASSERT_TRUE(refused.flags & CONTACT_FLAG_CONTACT);
+  TEST_ASSERT_FLOAT_WITHIN(0.02f, 3.0f, refused.force_N);
+  tare.body.cmd_tare.force = 2;
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(tare));
+  tare.body.cmd_tare.force = 1;
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(tare));
+  run_for(100);
+  TEST_ASSERT_FALSE(last_contact().flags & CONTACT_FLAG_CONTACT);
+}
+
 static void a_tare_without_sensors_is_refused(void) {
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     array.absent[k] = true;
@@ -672,6 +692,7 @@ int main(void) {
   RUN_TEST(priors_and_limits_are_checked);
   RUN_TEST(at_20_Hz_frames_are_50_ms_apart);
   RUN_TEST(a_tare_takes_the_present_as_zero);
+  RUN_TEST(a_tare_in_contact_is_refused_unless_forced);
   RUN_TEST(a_tare_without_sensors_is_refused);
   RUN_TEST(damage_is_counted_and_unknown_commands_are_answered);
   RUN_TEST(closing_the_port_ends_the_streams);

@@ -243,6 +243,7 @@ static void test_commands(void) {
   packet.body.cmd_stream.streams = WIRE_STREAM_ALL;
   check("command_stream.txt", &packet);
   packet = blank(0x81, 0, 0);
+  packet.body.cmd_tare.force = 1;
   check("command_tare.txt", &packet);
   packet = blank(0x82, 2, 20);
   packet.body.cmd_rate.rate_mHz = WIRE_RATE_MAX_mHz;

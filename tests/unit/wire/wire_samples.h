@@ -268,6 +268,9 @@ static inline void sample_packet(struct sampler *sampler, uint8_t type,
     sample_calibration(sampler, packet->body.cmd_calibrate.sensor_count,
                        &packet->body.cmd_calibrate.calibration);
     break;
+  case WIRE_CMD_TARE:
+    packet->body.cmd_tare.force = (uint8_t)sample_u32(sampler);
+    break;
   case WIRE_CMD_KEEP:
     packet->body.cmd_keep.keep = (uint8_t)sample_u32(sampler);
     break;
