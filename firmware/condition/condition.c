@@ -29,7 +29,10 @@
 #define IDLE_ms SECONDS(2)     /* time constants of the level, */
 #define FOLLOW_ms MS(700)      /* of the remainder, */
 #define FOLLOW_DOWN_ms MS(100) /* when a force goes at last, */
-#define RISE_SIGMA 3           /* a remainder does not rise by so much noise in TRACK_ms */
+/* In TRACK_ms a remainder rises by less than so much noise, and falls by less than so much and a
+ * quarter of it. */
+#define STILL_SIGMA 3
+#define FALL_SHIFT 2
 #define WANDER_ms SECONDS(120) /* and of what it counts as risen lately */
 #define WARM_ms SECONDS(8)
 #define WARM_SHIFT 3 /* share of what may have moved that does in a second */
@@ -234,7 +237,7 @@ struct look {
   int32_t step_ms;
   int32_t above_zero;
   int32_t calm_lag; /* so far the level may lag in a calm */
-  bool rises;       /* by more than noise since it was looked at last: no remainder does */
+  bool moves;       /* as a press or a release does, since it was looked at last */
 };
 
 /* While nothing touches for certain, or what does cannot be told from a drift (unsure). */
@@ -259,7 +262,7 @@ static void track_free(struct condition *condition, uint8_t k, const struct look
   if (!unsure) {
     int32_t goal = clamp(above_level, deepest, (memory >> BAND_SHIFT) + warm);
     int32_t highest = remainder > 0 ? remainder : 0;
-    if ((!fresh || look->rises) && goal > highest) {
+    if ((!fresh || look->moves) && goal > highest) {
       goal = highest;
     }
     int32_t follow_ms = goal > remainder || remainder < 0 ? FOLLOW_ms : FOLLOW_DOWN_ms;
@@ -344,14 +347,26 @@ static void watch_calm(struct condition *condition, const struct conditioned *co
   take_snapshot(condition, count);
 }
 
-static void press_or_release(struct condition *condition, bool over) {
+/* Whether it feels more than its zero has wandered. */
+static void look_how_firm(struct condition *condition, const struct conditioned *conditioned,
+                          uint8_t k) {
+  int32_t risen = condition->risen_Pa_q10[k];
+  int32_t wandered = risen < 0 ? -risen : risen;
+  set_bit(&condition->firm, k,
+          conditioned->pressure_Pa_q10[k] > condition->open_Pa_q10 + 3 * wandered / 2);
+}
+
+static void press_or_release(struct condition *condition, const struct conditioned *conditioned,
+                             uint8_t count, bool over) {
   if (over == condition->pressed) {
     return;
   }
   condition->pressed = over;
   if (over) {
     condition->pressed_ms = 0;
-    condition->firm = UINT32_MAX;
+    for (uint8_t k = 0; k < count; k++) {
+      look_how_firm(condition, conditioned, k);
+    }
     condition->snapshots = 0;
     condition->pad_reached_Pa_q10 = 0;
     memset(condition->reached_Pa_q10, 0, sizeof condition->reached_Pa_q10);
@@ -400,19 +415,18 @@ static void track_sensor(struct condition *condition, const struct frame *frame,
   if (memory > condition->pad_memory_Pa_q10) {
     condition->pad_memory_Pa_q10 = memory;
   }
-  int32_t risen = condition->risen_Pa_q10[k];
-  set_bit(&condition->firm, k,
-          conditioned->pressure_Pa_q10[k] >
-              condition->open_Pa_q10 + 3 * (risen < 0 ? -risen : risen) / 2);
+  look_how_firm(condition, conditioned, k);
   if (condition->pressed && !condition->unsure) {
     track_pressed(condition, k, step_ms, steady);
   } else {
     int32_t above = clamped_difference(reading, condition->zero_Pa_q10[k]);
+    int32_t rise = clamp(clamped_difference(reading, before), -GAINED_MAX, GAINED_MAX);
+    int32_t still = STILL_SIGMA * frame->noise_Pa_q10;
     const struct look look = {
         .step_ms = step_ms,
         .above_zero = clamp(above, -SUM_RANGE, SUM_RANGE),
         .calm_lag = Pa_q10(CALM_LAG_Pa) + frame->noise_Pa_q10 / 2,
-        .rises = clamped_difference(reading, before) > RISE_SIGMA * frame->noise_Pa_q10,
+        .moves = rise > still || rise < -still - (above > 0 ? above >> FALL_SHIFT : 0),
     };
     track_free(condition, k, &look);
   }
@@ -517,8 +531,8 @@ void condition_frame(struct condition *condition, const struct frame *frame,
     conditioned->usable = tare_sensors(condition, frame, readable);
   }
   uint8_t strongest = read_sensors(condition, frame, gains, conditioned);
-  press_or_release(condition, is_over(condition, frame, conditioned, strongest,
-                                      condition->pressed ? close : open));
+  bool over = is_over(condition, frame, conditioned, strongest, condition->pressed ? close : open);
+  press_or_release(condition, conditioned, frame->sensor_count, over);
   if (!condition->pressed) {
     sum_up(condition, frame, conditioned->usable);
   }
