@@ -436,6 +436,9 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
     send_raw(app);
   }
 #endif
+  if (!frame->held) {
+    condition_follow(&app->condition, frame, &app->conditioned);
+  }
 }
 
 /* The result of a command whose acknowledgement has to wait. */

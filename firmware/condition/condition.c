@@ -29,7 +29,10 @@
 #define IDLE_ms SECONDS(2)     /* time constants of the level, */
 #define FOLLOW_ms MS(700)      /* of the remainder, */
 #define FOLLOW_DOWN_ms MS(100) /* when a force goes at last, */
-#define RISE_SIGMA 3           /* a remainder does not rise by so much noise in TRACK_ms */
+/* In TRACK_ms a remainder rises by less than so much noise, and falls by less than so much and a
+ * quarter of it. */
+#define STILL_SIGMA 3
+#define FALL_SHIFT 2
 #define WANDER_ms SECONDS(120) /* and of what it counts as risen lately */
 #define WARM_ms SECONDS(8)
 #define WARM_SHIFT 3 /* share of what may have moved that does in a second */
@@ -233,14 +236,13 @@ static void watch_below(struct condition *condition, uint8_t k, int32_t step_ms,
 struct look {
   int32_t step_ms;
   int32_t above_zero;
-  int32_t open;     /* the gate, */
-  int32_t calm_lag; /* and what the level may lag in a calm */
-  bool rises;       /* by more than noise since it was looked at last: no remainder does */
+  int32_t calm_lag; /* so far the level may lag in a calm */
+  bool moves;       /* as a press or a release does, since it was looked at last */
 };
 
-/* While nothing touches for certain, or what does cannot be told from a drift (`unsure`). */
-static void track_free(struct condition *condition, uint8_t k, const struct look *look,
-                       bool unsure) {
+/* While nothing touches for certain, or what does cannot be told from a drift (unsure). */
+static void track_free(struct condition *condition, uint8_t k, const struct look *look) {
+  bool unsure = condition->unsure;
   int32_t memory = in_all(condition->memory_Pa_q10[k], condition->pad_memory_Pa_q10);
   int32_t warm = condition->warm_Pa_q10;
   bool fresh = condition->released_ms < FRESH_ms || condition->tared_ms < WARM_FRESH_ms;
@@ -260,7 +262,7 @@ static void track_free(struct condition *condition, uint8_t k, const struct look
   if (!unsure) {
     int32_t goal = clamp(above_level, deepest, (memory >> BAND_SHIFT) + warm);
     int32_t highest = remainder > 0 ? remainder : 0;
-    if ((!fresh || look->rises) && goal > highest) {
+    if ((!fresh || look->moves) && goal > highest) {
       goal = highest;
     }
     int32_t follow_ms = goal > remainder || remainder < 0 ? FOLLOW_ms : FOLLOW_DOWN_ms;
@@ -282,7 +284,7 @@ static void track_free(struct condition *condition, uint8_t k, const struct look
                                         : (memory >> REOPEN_SHIFT) + (warm >> 2);
   set_bit(&condition->restless, k, above_level > look->calm_lag || above_level < -look->calm_lag);
   set_bit(&condition->stands_off, k, remainder + risen > Pa_q10(CONDITION_OPEN_Pa));
-  watch_below(condition, k, step_ms, above_level, deepest - look->open);
+  watch_below(condition, k, step_ms, above_level, deepest - condition->open_Pa_q10);
 }
 
 /* The drift of each sensor from the oldest to the latest level, while there is a calm to see it. */
@@ -345,14 +347,26 @@ static void watch_calm(struct condition *condition, const struct conditioned *co
   take_snapshot(condition, count);
 }
 
-static void press_or_release(struct condition *condition, bool over) {
+/* Whether it feels more than its zero has wandered. */
+static void look_how_firm(struct condition *condition, const struct conditioned *conditioned,
+                          uint8_t k) {
+  int32_t risen = condition->risen_Pa_q10[k];
+  int32_t wandered = risen < 0 ? -risen : risen;
+  set_bit(&condition->firm, k,
+          conditioned->pressure_Pa_q10[k] > condition->open_Pa_q10 + 3 * wandered / 2);
+}
+
+static void press_or_release(struct condition *condition, const struct conditioned *conditioned,
+                             uint8_t count, bool over) {
   if (over == condition->pressed) {
     return;
   }
   condition->pressed = over;
   if (over) {
     condition->pressed_ms = 0;
-    condition->firm = UINT32_MAX;
+    for (uint8_t k = 0; k < count; k++) {
+      look_how_firm(condition, conditioned, k);
+    }
     condition->snapshots = 0;
     condition->pad_reached_Pa_q10 = 0;
     memset(condition->reached_Pa_q10, 0, sizeof condition->reached_Pa_q10);
@@ -367,8 +381,7 @@ static void press_or_release(struct condition *condition, bool over) {
 }
 
 static void track_sensor(struct condition *condition, const struct frame *frame,
-                         const struct conditioned *conditioned, uint8_t k, int32_t open,
-                         bool unsure) {
+                         const struct conditioned *conditioned, uint8_t k) {
   uint32_t bit = UINT32_C(1) << k;
   uint32_t gap_ms = condition->now_ms - condition->tracked_ms[k];
   int32_t step_ms = gap_ms < STEP_MAX_ms ? (int32_t)gap_ms : STEP_MAX_ms;
@@ -402,37 +415,21 @@ static void track_sensor(struct condition *condition, const struct frame *frame,
   if (memory > condition->pad_memory_Pa_q10) {
     condition->pad_memory_Pa_q10 = memory;
   }
-  int32_t risen = condition->risen_Pa_q10[k];
-  set_bit(&condition->firm, k,
-          conditioned->pressure_Pa_q10[k] > open + 3 * (risen < 0 ? -risen : risen) / 2);
-  if (condition->pressed && !unsure) {
+  look_how_firm(condition, conditioned, k);
+  if (condition->pressed && !condition->unsure) {
     track_pressed(condition, k, step_ms, steady);
   } else {
     int32_t above = clamped_difference(reading, condition->zero_Pa_q10[k]);
+    int32_t rise = clamp(clamped_difference(reading, before), -GAINED_MAX, GAINED_MAX);
+    int32_t still = STILL_SIGMA * frame->noise_Pa_q10;
     const struct look look = {
         .step_ms = step_ms,
         .above_zero = clamp(above, -SUM_RANGE, SUM_RANGE),
-        .open = open,
         .calm_lag = Pa_q10(CALM_LAG_Pa) + frame->noise_Pa_q10 / 2,
-        .rises = clamped_difference(reading, before) > RISE_SIGMA * frame->noise_Pa_q10,
+        .moves = rise > still || rise < -still - (above > 0 ? above >> FALL_SHIFT : 0),
     };
-    track_free(condition, k, &look, unsure);
+    track_free(condition, k, &look);
   }
-}
-
-/* As many sensors as are due, in turn. */
-static void track(struct condition *condition, const struct frame *frame,
-                  const struct conditioned *conditioned, int32_t step_ms, int32_t open,
-                  bool unsure) {
-  int32_t most = frame->sensor_count * TRACK_ms;
-  int32_t due = condition->due_ms + step_ms * frame->sensor_count;
-  due = due < most ? due : most;
-  for (; due >= TRACK_ms; due -= TRACK_ms) {
-    uint8_t k = condition->next < frame->sensor_count ? condition->next : 0;
-    condition->next = (uint8_t)(k + 1);
-    track_sensor(condition, frame, conditioned, k, open, unsure);
-  }
-  condition->due_ms = due;
 }
 
 /* Takes the readings of sensors that are tared now, and leaves the bitmap of those that were. */
@@ -506,6 +503,15 @@ static void sum_up(struct condition *condition, const struct frame *frame, uint3
   }
 }
 
+void condition_follow(struct condition *condition, const struct frame *frame,
+                      const struct conditioned *conditioned) {
+  for (; condition->due_ms >= TRACK_ms; condition->due_ms -= TRACK_ms) {
+    uint8_t k = condition->next < frame->sensor_count ? condition->next : 0;
+    condition->next = (uint8_t)(k + 1);
+    track_sensor(condition, frame, conditioned, k);
+  }
+}
+
 void condition_frame(struct condition *condition, const struct frame *frame,
                      const struct condition_gains *gains, struct conditioned *conditioned) {
   uint32_t now_ms = (uint32_t)(frame->t_us >> 10);
@@ -517,6 +523,7 @@ void condition_frame(struct condition *condition, const struct frame *frame,
   condition->tared_ms = older(condition->tared_ms, step_ms);
 
   int32_t open = Pa_q10(CONDITION_OPEN_Pa) + CONDITION_OPEN_SIGMA * frame->noise_Pa_q10;
+  condition->open_Pa_q10 = open;
   int32_t close = Pa_q10(CONDITION_CLOSE_Pa) + CONDITION_CLOSE_SIGMA * frame->noise_Pa_q10;
   uint32_t readable = frame->valid & ~frame->saturated;
   conditioned->usable = readable;
@@ -524,20 +531,26 @@ void condition_frame(struct condition *condition, const struct frame *frame,
     conditioned->usable = tare_sensors(condition, frame, readable);
   }
   uint8_t strongest = read_sensors(condition, frame, gains, conditioned);
-  press_or_release(condition, is_over(condition, frame, conditioned, strongest,
-                                      condition->pressed ? close : open));
+  bool over = is_over(condition, frame, conditioned, strongest, condition->pressed ? close : open);
+  press_or_release(condition, conditioned, frame->sensor_count, over);
   if (!condition->pressed) {
     sum_up(condition, frame, conditioned->usable);
   }
-  bool unsure = condition->pressed && frame->saturated == 0 &&
-                ((condition->firm & conditioned->usable) == 0 ||
-                 conditioned->peak_Pa_q10 < drift_in_contact(condition));
-  track(condition, frame, conditioned, step_ms, open, unsure);
+  condition->unsure = condition->pressed && frame->saturated == 0 &&
+                      ((condition->firm & conditioned->usable) == 0 ||
+                       conditioned->peak_Pa_q10 < drift_in_contact(condition));
+  int32_t most = frame->sensor_count * TRACK_ms;
+  int32_t due = condition->due_ms + step_ms * frame->sensor_count;
+  condition->due_ms = due < most ? due : most;
+  if (!condition->pressed || condition->unsure) { /* what is tracked is part of the answer */
+    condition_follow(condition, frame, conditioned);
+  }
 
   conditioned->contact = condition->pressed || conditioned->peak_Pa_q10 > open;
   conditioned->tared = readable != 0 && conditioned->usable == readable &&
                        (condition->below & conditioned->usable) == 0;
   watch_calm(condition, conditioned, frame->sensor_count);
   bool stands_off = (condition->stands_off & conditioned->usable) != 0;
-  conditioned->zero_doubtful = condition->pressed ? unsure : conditioned->contact || stands_off;
+  conditioned->zero_doubtful =
+      condition->pressed ? condition->unsure : conditioned->contact || stands_off;
 }

@@ -426,6 +426,7 @@ struct Chain {
     conditioned ignored;
     for (int i = 0; i < CONDITION_TARE_FRAMES; i++) {
       condition_frame(&tared, &quiet, nullptr, &ignored);
+      condition_follow(&tared, &quiet, &ignored);
     }
   }
 
@@ -453,6 +454,7 @@ struct Chain {
     const frame taken = frame_of(press);
     conditioned readings;
     condition_frame(&state, &taken, nullptr, &readings);
+    condition_follow(&state, &taken, &readings);
     fit_settings settings{};
     settings.iterations = DEFAULT_FIT_ITERATIONS;
     settings.noise_Pa_q10 = taken.noise_Pa_q10;

@@ -99,8 +99,8 @@ class TruthGate(unittest.TestCase):
             if located["name"] != "stays.csv":
                 self.assertGreater(located["fits"], 11 * 2 * ROWS_PER_S)
                 self.assertAlmostEqual(located["sigma_mm"], 2.4 if located["name"] == "test_good.csv" else 2.1, delta=0.02)
-                self.assertLess(located["median_mm"], 0.02)
-        self.assertLess(self.found["real_median_mm_worst_test"], 0.02)
+                self.assertLess(located["median_mm"], 0.06)
+        self.assertLess(self.found["real_median_mm_worst_test"], 0.06)
 
     def test_nothing_is_said_of_recordings_that_are_not_there(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -27,6 +27,7 @@ static void run(int count) {
   for (int i = 0; i < count; i++) {
     frame.t_us += period_us;
     condition_frame(&condition, &frame, NULL, &conditioned);
+    condition_follow(&condition, &frame, &conditioned);
   }
 }
 
@@ -592,6 +593,7 @@ static void test_gains_act_on_what_is_above_zero(void) {
       frame.pressure_Pa_q10[7] = AMBIENT + above[j];
       frame.pressure_Pa_q10[8] = AMBIENT + above[j];
       condition_frame(&condition, &frame, &gains, &conditioned);
+      condition_follow(&condition, &frame, &conditioned);
       int64_t wanted = (int64_t)above[j] * inverses_q16[i];
       wanted = (wanted - (wanted & 0xFFFF)) / 65536;
       TEST_ASSERT_INT32_WITHIN(1, (int32_t)wanted, conditioned.pressure_Pa_q10[7]);
@@ -603,6 +605,41 @@ static void test_gains_act_on_what_is_above_zero(void) {
     int32_t most = conditioned.pressure_Pa_q10[7];
     condition_frame(&condition, &frame, &gains, &conditioned);
     TEST_ASSERT_EQUAL_INT32(most, conditioned.pressure_Pa_q10[7]);
+  }
+}
+
+static void assert_condition_is(const struct condition *expected) {
+  TEST_ASSERT_EQUAL_MEMORY(expected, &condition, sizeof condition);
+}
+
+/* The zeros that an answer is sent with are those it was measured from. */
+static void test_what_the_answer_does_not_need_can_wait(void) {
+  struct condition before;
+  begin_calm(1000);
+  memcpy(&before, &condition, sizeof before);
+  condition_follow(&condition, &frame, &conditioned);
+  assert_condition_is(&before);
+  press(20000 * Pa);
+  int32_t reached = 0;
+  for (int i = 0; i < 200; i++) {
+    memcpy(&before, &condition, sizeof before);
+    frame.t_us += period_us;
+    condition_frame(&condition, &frame, NULL, &conditioned);
+    TEST_ASSERT_TRUE(conditioned.contact && !conditioned.zero_doubtful);
+    TEST_ASSERT_EQUAL_INT32_ARRAY(before.zero_Pa_q10, condition.zero_Pa_q10, SENSORS);
+    TEST_ASSERT_EQUAL_INT32_ARRAY(before.memory_Pa_q10, condition.memory_Pa_q10, SENSORS);
+    TEST_ASSERT_EQUAL_UINT32_ARRAY(before.tracked_ms, condition.tracked_ms, SENSORS);
+    condition_follow(&condition, &frame, &conditioned);
+    if (condition.memory_Pa_q10[7] > reached) {
+      reached = condition.memory_Pa_q10[7];
+    }
+    memcpy(&before, &condition, sizeof before);
+    condition_follow(&condition, &frame, &conditioned);
+    assert_condition_is(&before);
+  }
+  TEST_ASSERT_INT32_WITHIN(500 * Pa, 20000 * Pa, reached);
+  for (int k = 0; k < SENSORS; k++) {
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(70, condition.now_ms - condition.tracked_ms[k]);
   }
 }
 
@@ -708,6 +745,7 @@ int main(void) {
   RUN_TEST(test_tare_during_contact);
   RUN_TEST(test_reading_below_zero_is_tared_anew_when_it_stays);
   RUN_TEST(test_gains_act_on_what_is_above_zero);
+  RUN_TEST(test_what_the_answer_does_not_need_can_wait);
   RUN_TEST(test_extremes);
   RUN_TEST(test_random_frames);
   RUN_TEST(test_another_sensor_is_tared_anew);

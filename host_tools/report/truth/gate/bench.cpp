@@ -145,6 +145,7 @@ void Bench::run(double seconds, const Feels &feels, const Sees &sees) {
     frame_.number++;
     frame_.t_us = static_cast<std::uint64_t>(1e6 * t_s_);
     condition_frame(&condition_, &frame_, nullptr, &readings_);
+    condition_follow(&condition_, &frame_, &readings_);
     if (sees) {
       sees(t_s_ - begin_s, {readings_.contact, readings_.zero_doubtful});
     }

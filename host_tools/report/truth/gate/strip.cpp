@@ -306,6 +306,7 @@ Presses presses_of(const Strip &strip) {
     const frame taken = frame_of(row.pressure_Pa, row.t_s - strip.rows.front().t_s, NOISE_Pa);
     conditioned readings;
     condition_frame(&state, &taken, nullptr, &readings);
+    condition_follow(&state, &taken, &readings);
     if (readings.contact && !readings.zero_doubtful &&
         readings.peak_Pa_q10 >= 1024 * LOCATED_LEAST_Pa) {
       Press press{{}, readings.usable, row.x_mm, row.depth_steps >= DEEPEST * deepest};
@@ -445,6 +446,7 @@ Touches gate_on(const Strip &strip, double frames_per_s, double noise_Pa) {
       }
       const frame taken = frame_of(pressure_Pa, t_s - begin_s, noise_Pa);
       condition_frame(&state, &taken, nullptr, &readings);
+      condition_follow(&state, &taken, &readings);
     }
     const double step_s = std::clamp(gap_s, 0.0, GAP_MAX_s);
     const bool certain = readings.contact && !readings.zero_doubtful;
