@@ -73,8 +73,9 @@ enum wire_result {
   WIRE_RESULT_DONE = 0,
   WIRE_RESULT_UNKNOWN_COMMAND = 1,
   WIRE_RESULT_OUT_OF_RANGE = 2,
-  WIRE_RESULT_NOT_NOW = 3, /* tare while no sensor answers, or in contact and not forced; a change of
-                              what is stored while one is being written, or where the flash fails */
+  WIRE_RESULT_NOT_NOW =
+      3, /* tare while no sensor answers, or in contact and not forced; a change of
+            what is stored while one is being written, or where the flash fails */
 };
 
 /* Bits of the word that says what the fingertip keeps without power. */
