@@ -105,15 +105,15 @@ case $1 in
   test) exec ctest --preset host -j 2 ;;
   report)
     say "the fit: error against run time"
-    /usr/bin/python3 host_tools/reference/report.py --build build/host \
-      --image build/pico_mux/fit_cycles.bin -o build/report --plot host_tools/reference/fit_report.png
+    /usr/bin/python3 host_tools/report/fit/fit.py --build build/host \
+      --image build/pico_mux/fit_cycles.bin -o build/report --plot host_tools/report/fit/fit_report.png
     say "rate, latency and cost, in emulated time"
-    /usr/bin/python3 host_tools/report/rate.py --build build/host --boards build -o build/report \
-      --plot host_tools/report/rate.png
+    /usr/bin/python3 host_tools/report/rate/rate.py --build build/host --boards build -o build/report \
+      --plot host_tools/report/rate/rate.png
     say "the published experiments on the simulated fingertip"
-    /usr/bin/python3 host_tools/twin/validation.py --build build/host \
+    /usr/bin/python3 host_tools/report/validation/validation.py --build build/host \
       --image build/pico_mux/fingertip-pico_mux.bin -o build/report \
-      --picture host_tools/twin/validation_force.png
+      --picture host_tools/report/validation/validation_force.png
     say "how far from the truth: gains, shapes, time, and what is kept"
     /usr/bin/python3 host_tools/report/truth/truth.py --build build/host --boards build -o build/report \
       --picture host_tools/report/truth/truth.png

@@ -21,8 +21,6 @@ extern "C" {
 namespace fingertip::reference {
 namespace {
 
-constexpr double GATE_SIGMAS = 20.0;
-
 // One press in the cache file, as this machine stores it: the file never leaves its build folder.
 struct Record {
   std::uint64_t key;

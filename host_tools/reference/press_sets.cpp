@@ -11,7 +11,6 @@ namespace {
 constexpr double POISSON = 0.49;
 // Young's modulus of silicone rubber of Shore hardness 15 A by Gent's relation.
 constexpr double YOUNG_Pa = 0.56e6;
-constexpr double GATE_SIGMAS = 20.0;
 constexpr double TABLE_REACH = 24.0; // thicknesses
 constexpr int STEPS_PER_THICKNESS = 128;
 

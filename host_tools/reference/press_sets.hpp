@@ -29,6 +29,10 @@ namespace fingertip::reference {
 
 using fingertip::Random;
 
+// A press counts if its largest reading is at least so many times the noise, as at the firmware's
+// gate.
+constexpr double GATE_SIGMAS = 20.0;
+
 enum class PressSet { A, B, C, D };
 constexpr std::array<PressSet, 4> ALL_PRESS_SETS{PressSet::A, PressSet::B, PressSet::C,
                                                  PressSet::D};

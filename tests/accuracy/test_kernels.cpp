@@ -1,14 +1,16 @@
 // The kernels of the report against the reference.
 #include "common/contact_flags.h"
 #include "reference/dataset.hpp"
-#include "reference/kernels.hpp"
+#include "report/fit/kernels.hpp"
 
 #include <cmath>
 #include <cstring>
 #include <gtest/gtest.h>
 
-namespace fingertip::reference {
+namespace fingertip::fitting {
 namespace {
+
+using namespace reference;
 
 constexpr std::uint64_t SEED = 5;
 const std::string cache_dir = FINGERTIP_TEST_CACHE_DIR;
@@ -93,4 +95,4 @@ TEST(Kernels, NothingPositiveIsNoFit) {
 }
 
 } // namespace
-} // namespace fingertip::reference
+} // namespace fingertip::fitting

@@ -9,7 +9,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { Prng } from '../../host_tools/emulator/prng.mjs';
-import { Bench } from '../../host_tools/reference/on_chip/fit_on_chip.mjs';
+import { Bench } from '../../host_tools/report/fit/on_chip/fit_on_chip.mjs';
 
 /** The build's iterations from cold, with everything: readings, guess, amplitude, force, errors, shape, flags. */
 const COLD_CYCLES_MAX = 31000;

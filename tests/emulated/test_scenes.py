@@ -10,7 +10,7 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "host_tools" / "report"))
+sys.path.insert(0, str(ROOT / "host_tools/report/shared"))
 import emulated  # noqa: E402
 import fingertip_files  # noqa: E402
 

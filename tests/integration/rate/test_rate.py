@@ -11,9 +11,9 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT / "host_tools" / "report"))
+sys.path.insert(0, str(ROOT / "host_tools/report/rate"))
+import rate  # noqa: E402, adds the path of the next
 import emulated  # noqa: E402
-import rate  # noqa: E402
 
 OPTIONS = argparse.Namespace()
 FIGURES = (
@@ -23,7 +23,7 @@ FIGURES = (
 
 
 def report(*options):
-    return subprocess.run([sys.executable, str(ROOT / "host_tools/report/rate.py"), *options], capture_output=True, text=True)
+    return subprocess.run([sys.executable, str(ROOT / "host_tools/report/rate/rate.py"), *options], capture_output=True, text=True)
 
 
 class Rate(unittest.TestCase):

@@ -16,7 +16,7 @@ OPTIONS = argparse.Namespace()
 
 def validate(folder, *more):
     return subprocess.run(
-        [sys.executable, str(ROOT / "host_tools/twin/validation.py"), "--build", OPTIONS.build, "--image", OPTIONS.image, "-o", str(folder),
+        [sys.executable, str(ROOT / "host_tools/report/validation/validation.py"), "--build", OPTIONS.build, "--image", OPTIONS.image, "-o", str(folder),
          "--tables", str(pathlib.Path(OPTIONS.build) / "tests/contact_tables"), "--indenters", "sphere6,cube6,sphere12", "--scale", "0.05", "--pads", "2",
          "--emulated-seconds", "4", *more], capture_output=True, text=True)
 
@@ -92,7 +92,7 @@ class Validation(unittest.TestCase):
         self.assertFalse((self.folder / "validation_work").exists())
 
     def test_a_missing_build_is_said(self):
-        done = subprocess.run([sys.executable, str(ROOT / "host_tools/twin/validation.py"), "--build", str(self.folder), "--image", "no.bin", "-o",
+        done = subprocess.run([sys.executable, str(ROOT / "host_tools/report/validation/validation.py"), "--build", str(self.folder), "--image", "no.bin", "-o",
                                str(self.folder / "none")], capture_output=True, text=True)
         self.assertEqual(done.returncode, 1)
         self.assertIn("cmake --build", done.stderr)

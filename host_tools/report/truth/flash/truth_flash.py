@@ -22,7 +22,7 @@ import sys
 import tempfile
 import zlib
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "shared"))
 import numpy as np  # noqa: E402
 
 from emulated import CONVERSION_us, MARGIN, ROOT, Tools, contact_times_us, distribution, run, scenario  # noqa: E402

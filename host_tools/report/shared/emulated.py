@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
 from fingertip_files import CONTACT, FIT_VALID, InputError, read_recording  # noqa: E402
 

@@ -27,8 +27,8 @@ import time
 
 import numpy as np
 
-HERE = pathlib.Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent / "python"))
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 from fingertip_files import FIT_VALID, SLIP, InputError, read_recording, run_tool, write_text  # noqa: E402
 from goals import judge, print_goals  # noqa: E402
 from validation_report import draw, write_report  # noqa: E402
@@ -218,7 +218,7 @@ class Workshop:
             self.seed, "--cache", self.tables, "-o", scenario, "--overwrite")
         commands = [run(self.fingertip, "encode", *words).strip() for words in (("stream", "contact,raw"), ("info",), ("tare",))]
         script.write_text("0.7 dtr 1\n" + "".join(f"{0.72 + 0.01 * i:.2f} {word}\n" for i, word in enumerate(commands)))
-        run("node", HERE.parent / "emulator/main.mjs", "--board", "pico_mux", "--image", self.image, "--scenario", scenario,
+        run("node", ROOT / "host_tools/emulator/main.mjs", "--board", "pico_mux", "--image", self.image, "--scenario", scenario,
             "--host-script", script, "--capture", capture, "--fast-enumeration")
         return json.loads(run(self.player, "repeat", capture))
 

@@ -13,8 +13,10 @@ import pathlib
 import sys
 import tempfile
 
-from emulated import BOARDS, CONVERSION_us, ROOT, Steps, run, scenario
-from fingertip_files import InputError, run_tool, write_text
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+from emulated import BOARDS, CONVERSION_us, Steps, run, scenario  # noqa: E402
+from fingertip_files import InputError, run_tool, write_text  # noqa: E402
 
 SCENES = ("raw", "press", "slip", "paper")
 STREAM = {"raw": "raw", "press": "contact", "slip": "contact", "paper": "contact"}
@@ -61,7 +63,7 @@ def cycles(fingertip, place, scene, board, osrs, folder):
         t_s = begin_s + WINDOW_s
     files = [pathlib.Path(folder) / f"{scene}-{board}.{suffix}" for suffix in ("script", "json")]
     files[0].write_text("".join(f"{at_s:.3f} {what}\n" for at_s, what in sorted(script)))
-    run("node", ROOT / "host_tools/report/stage_cycles.mjs", "--image", place / f"fingertip-{board}", "--board", board, "--scenario",
+    run("node", ROOT / "host_tools/report/rate/stage_cycles.mjs", "--image", place / f"fingertip-{board}", "--board", board, "--scenario",
         scenario(folder, "wander", t_s + 1, f"{scene}-{board}"), "--host-script", files[0], "--json", files[1],
         *(word for name, from_s, to_s in windows for word in ("--window", f"{name}:{from_s:.3f}:{to_s:.3f}")))
     found = json.loads(files[1].read_text())

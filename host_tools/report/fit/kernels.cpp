@@ -1,7 +1,7 @@
-#include "reference/kernels.hpp"
+#include "report/fit/kernels.hpp"
 
-#include "reference/double_kernel.hpp"
-#include "reference/separable.hpp"
+#include "report/fit/double_kernel.hpp"
+#include "report/fit/separable.hpp"
 
 extern "C" {
 #include "alternatives/alternatives.h"
@@ -14,7 +14,7 @@ extern "C" {
 #include <cmath>
 #include <stdexcept>
 
-namespace fingertip::reference {
+namespace fingertip::fitting {
 namespace {
 
 std::uint32_t largest_readings(const fit_array &array, const std::int32_t *pressure_Pa_q10,
@@ -148,4 +148,4 @@ fit_array firmware_fit_array() {
   return array;
 }
 
-} // namespace fingertip::reference
+} // namespace fingertip::fitting

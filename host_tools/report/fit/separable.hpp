@@ -8,12 +8,12 @@
 // general kernel. It stops when it has settled: settings.iterations is the most it takes.
 #pragma once
 
-#include "reference/kernels.hpp"
+#include "report/fit/kernels.hpp"
 
-namespace fingertip::reference {
+namespace fingertip::fitting {
 
 // No flag but FIT_VALID, and none without a positive reading or a rectangle of the build's size.
 KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q10,
                        std::uint32_t usable, const KernelSettings &settings);
 
-} // namespace fingertip::reference
+} // namespace fingertip::fitting

@@ -1,8 +1,6 @@
 // The fits that are compared, behind one call.
 #pragma once
 
-#include "reference/reference.hpp"
-
 extern "C" {
 #include "fit/fit.h"
 }
@@ -10,7 +8,7 @@ extern "C" {
 #include <cstdint>
 #include <vector>
 
-namespace fingertip::reference {
+namespace fingertip::fitting {
 
 // Where the iteration starts. The firmware's kernels have a guess of their own.
 enum class Guess {
@@ -60,7 +58,7 @@ struct Kernel {
 // double   the general kernel's iteration in double precision, same guess and limits: what is left
 //          between it and the reference is the optimiser's doing, the rest is rounding
 // separable
-//          the grid kernel's iteration in double precision, for the host: reference/separable.hpp
+//          the grid kernel's iteration in double precision, for the host: separable.hpp
 // naive_float, naive_double, lm_float, lm_double
 //          what one would write instead: alternatives/alternatives.h
 const std::vector<Kernel> &all_kernels();
@@ -68,4 +66,4 @@ const std::vector<Kernel> &all_kernels();
 // The firmware's array. Throws std::runtime_error if its geometry is refused.
 fit_array firmware_fit_array();
 
-} // namespace fingertip::reference
+} // namespace fingertip::fitting

@@ -2,11 +2,11 @@
 // not judge itself: no flag but FIT_VALID.
 #pragma once
 
-#include "reference/kernels.hpp"
+#include "report/fit/kernels.hpp"
 
 #include <array>
 
-namespace fingertip::reference {
+namespace fingertip::fitting {
 
 // The readings that enter, in pitches and units of the largest.
 struct Samples {
@@ -31,4 +31,4 @@ Gaussian first_guess(const Samples &samples, double noise_Pa, Guess guess = Gues
 KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10,
                            std::uint32_t usable, const KernelSettings &settings);
 
-} // namespace fingertip::reference
+} // namespace fingertip::fitting

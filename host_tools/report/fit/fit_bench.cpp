@@ -1,8 +1,8 @@
 // fit_bench: time and error of one fit, our kernels and host libraries on the same presses.
 #include "reference/dataset.hpp"
-#include "reference/kernels.hpp"
-#include "reference/libraries.hpp"
 #include "reference/options.hpp"
+#include "report/fit/kernels.hpp"
+#include "report/fit/libraries.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -18,9 +18,10 @@
 
 namespace {
 
+namespace fitting = fingertip::fitting;
 namespace reference = fingertip::reference;
+using fitting::Kernel;
 using reference::Case;
-using reference::Kernel;
 
 const char USAGE[] =
     R"(fit_bench: time and error of one fit, our kernels and host libraries on the same presses.
@@ -32,7 +33,7 @@ them into blocks and lets every kernel fit block after block, in an order that r
 of them see the same machine. A fit starts at the readings as the firmware receives them and ends at
 location, peak, width and force. Kernels that run a number of iterations run seven; separable goes
 on until it has settled, twelve at the most, which leaves it no more error than any library; what
-those do is in reference/libraries.hpp. Writes fit_bench.json to --out, prints:
+those do is in report/fit/libraries.hpp. Writes fit_bench.json to --out, prints:
   us          processor time of one fit: median over blocks and passes, 10 % and 90 % quantiles
   ratio       the same block's time by this kernel over that by separable: median, 10 %, 90 %
   p50_um ..   distance of the location from the reference optimum; not a number counts as
@@ -90,7 +91,7 @@ std::vector<Case> mixed_cases(std::uint64_t limit, std::uint64_t seed, const std
 
 std::vector<Measured> measure(const std::vector<Kernel> &kernels, const std::vector<Case> &cases,
                               std::uint64_t passes) {
-  const fit_array array = reference::firmware_fit_array();
+  const fit_array array = fitting::firmware_fit_array();
   std::vector<Measured> all;
   for (const Kernel &kernel : kernels) {
     all.push_back({kernel.name, {}, std::vector<double>(cases.size())});
@@ -101,7 +102,7 @@ std::vector<Measured> measure(const std::vector<Kernel> &kernels, const std::vec
       for (std::size_t i = 0; i < kernels.size(); i++) {
         const std::size_t k = (i + turn) % kernels.size();
         const int iterations = iterations_of(kernels[k].name);
-        reference::KernelResult results[BLOCK];
+        fitting::KernelResult results[BLOCK];
         const double before_us = processor_time_us();
         for (std::size_t n = 0; n < BLOCK; n++) {
           const Case &c = cases[start + n];
@@ -151,11 +152,11 @@ int bench(int argc, char **argv) {
   if (cases.empty() || passes == 0) {
     throw std::runtime_error("too few presses: raise --limit to 1000 at least, --passes to 1");
   }
-  std::vector<Kernel> kernels = reference::all_kernels();
+  std::vector<Kernel> kernels = fitting::all_kernels();
   std::stable_partition(kernels.begin(), kernels.end(), [](const Kernel &kernel) {
     return std::strcmp(kernel.name, HOST_KERNEL) == 0;
   });
-  for (const Kernel &kernel : reference::library_kernels()) {
+  for (const Kernel &kernel : fitting::library_kernels()) {
     kernels.push_back(kernel);
   }
   const std::vector<Measured> all = measure(kernels, cases, passes);

@@ -1,4 +1,4 @@
-#include "reference/double_kernel.hpp"
+#include "report/fit/double_kernel.hpp"
 
 #include "common/contact_flags.h"
 
@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace fingertip::reference {
+namespace fingertip::fitting {
 namespace {
 
 using Vector4 = Eigen::Vector4d;
@@ -215,4 +215,4 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
   return result;
 }
 
-} // namespace fingertip::reference
+} // namespace fingertip::fitting

@@ -1,9 +1,9 @@
 // fit_report: how far the on-chip fit lies from the reference optimum, and how well its flags tell.
 #include "common/contact_flags.h"
 #include "reference/dataset.hpp"
-#include "reference/kernels.hpp"
 #include "reference/options.hpp"
 #include "reference/parallel.hpp"
+#include "report/fit/kernels.hpp"
 
 extern "C" {
 #include "config/defaults.h"
@@ -21,9 +21,10 @@ extern "C" {
 
 namespace {
 
+namespace fitting = fingertip::fitting;
 namespace reference = fingertip::reference;
+using fitting::Guess;
 using reference::Case;
-using reference::Guess;
 using reference::Mask;
 using reference::PressSet;
 
@@ -33,7 +34,7 @@ const char USAGE[] =
 usage: fit_report [--kernel NAME] [--variant TEXT] [--set A|B|C|D] [--limit N] [--seed S]
                   [--out DIR] [--cache DIR] [--jobs FILE.json]
 
---kernel (reference/kernels.hpp), --variant (part of a variant's name) and --set choose rows;
+--kernel (report/fit/kernels.hpp), --variant (part of a variant's name) and --set choose rows;
 --limit takes N presses in all (120 000 by default: A, B a third each, C, D a sixth each), with one
 sensor masked half of them, with two and three a tenth. Writes fit_error.json to --out and prints
 the same. One row per kernel, variant, set (ABCD: all together) and observability; variants
@@ -83,12 +84,12 @@ std::vector<Variant> all_variants() {
   for (int k : {20, 50}) {
     Variant &variant = add("iterations=" + std::to_string(k));
     variant.iterations = k;
-    variant.needs = reference::ENDS_EARLY;
+    variant.needs = fitting::ENDS_EARLY;
   }
   for (int n = 4; n <= 15; n++) {
     Variant &variant = add("n_largest=" + std::to_string(n));
     variant.n_largest = n;
-    variant.needs = reference::N_LARGEST;
+    variant.needs = fitting::N_LARGEST;
   }
   for (int denominator : {1, 16, 100, 1024}) {
     Variant &variant = add("lsb_Pa=1/" + std::to_string(denominator));
@@ -100,18 +101,18 @@ std::vector<Variant> all_variants() {
     Variant &variant = add("prior_mm=" + std::to_string(prior_sigma_mm).substr(0, 3));
     variant.prior_sigma_mm = prior_sigma_mm;
     variant.prior_width_mm = 0.5;
-    variant.needs = reference::PRIOR;
+    variant.needs = fitting::PRIOR;
   }
   for (Guess guess : {Guess::maximum, Guess::centroid, Guess::firmware}) {
-    Variant &variant = add(std::string("guess=") + reference::name_of(guess));
+    Variant &variant = add(std::string("guess=") + fitting::name_of(guess));
     variant.guess = guess;
-    variant.needs = guess == Guess::firmware ? reference::FIRMWARE_GUESS : reference::GUESSES;
+    variant.needs = guess == Guess::firmware ? fitting::FIRMWARE_GUESS : fitting::GUESSES;
   }
   for (Mask mask : reference::ALL_MASKS) {
     if (mask != Mask::none) {
       Variant &variant = add(std::string("mask=") + reference::name_of(mask));
       variant.mask = mask;
-      variant.needs = reference::ANY_SUBSET;
+      variant.needs = fitting::ANY_SUBSET;
     }
   }
   for (Mask mask : {Mask::random, Mask::peak}) { // as built
@@ -119,18 +120,18 @@ std::vector<Variant> all_variants() {
                            " iterations=" + std::to_string(DEFAULT_FIT_ITERATIONS));
     variant.mask = mask;
     variant.iterations = DEFAULT_FIT_ITERATIONS;
-    variant.needs = reference::ANY_SUBSET;
+    variant.needs = fitting::ANY_SUBSET;
   }
   for (Mask mask : {Mask::random, Mask::peak}) {
     Variant &variant = add(std::string("mask=") + reference::name_of(mask) + " guess=firmware");
     variant.mask = mask;
     variant.guess = Guess::firmware;
-    variant.needs = reference::ANY_SUBSET | reference::FIRMWARE_GUESS;
+    variant.needs = fitting::ANY_SUBSET | fitting::FIRMWARE_GUESS;
   }
   return variants;
 }
 
-bool has(const reference::Kernel &kernel, const Variant &variant) {
+bool has(const fitting::Kernel &kernel, const Variant &variant) {
   return (variant.needs & ~kernel.capabilities) == 0;
 }
 
@@ -238,7 +239,7 @@ private:
   std::vector<double> um_, truth_mm_;
 };
 
-std::vector<Outcome> run(const reference::Kernel &kernel, const fit_array &array,
+std::vector<Outcome> run(const fitting::Kernel &kernel, const fit_array &array,
                          const Variant &variant, const std::vector<Case> &cases) {
   std::vector<Outcome> outcomes(cases.size());
   reference::in_parallel(cases.size(), [&](std::size_t i) {
@@ -314,12 +315,12 @@ void write_jobs(const Options &options) {
   file.precision(17);
   file << "{\"variants\": [";
   const char *separator = "\n";
-  for (const reference::Kernel &kernel : reference::all_kernels()) {
+  for (const fitting::Kernel &kernel : fitting::all_kernels()) {
     for (const Variant &v : all_variants()) {
       if (has(kernel, v) && v.on_chip) {
         file << separator << "{\"kernel\": \"" << kernel.name << "\", \"variant\": \"" << v.name
              << "\", \"iterations\": " << v.iterations << ", \"n_largest\": " << v.n_largest
-             << ", \"guess\": \"" << reference::name_of(v.guess) << "\", \"mask\": \""
+             << ", \"guess\": \"" << fitting::name_of(v.guess) << "\", \"mask\": \""
              << reference::name_of(v.mask) << "\", \"prior_sigma_mm\": " << v.prior_sigma_mm
              << ", \"prior_width_mm\": " << v.prior_width_mm << '}';
         separator = ",\n";
@@ -364,7 +365,7 @@ int report(const Options &options) {
     return 0;
   }
   std::filesystem::create_directories(options.out);
-  const fit_array array = reference::firmware_fit_array();
+  const fit_array array = fitting::firmware_fit_array();
   std::map<std::pair<PressSet, Mask>, std::vector<Case>> loaded;
   const auto cases_of = [&](PressSet set, Mask mask) -> const std::vector<Case> & {
     auto &cases = loaded[{set, mask}];
@@ -376,7 +377,7 @@ int report(const Options &options) {
   };
   std::vector<Row> rows;
   print_header();
-  for (const reference::Kernel &kernel : reference::all_kernels()) {
+  for (const fitting::Kernel &kernel : fitting::all_kernels()) {
     if (!options.kernel.empty() && options.kernel != kernel.name) {
       continue;
     }

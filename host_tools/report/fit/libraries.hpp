@@ -13,11 +13,11 @@
 // The fits use every sensor of a fully usable array and report no flags but FIT_VALID.
 #pragma once
 
-#include "reference/kernels.hpp"
+#include "report/fit/kernels.hpp"
 
-namespace fingertip::reference {
+namespace fingertip::fitting {
 
 // Not for several threads at once: some keep their workspace.
 const std::vector<Kernel> &library_kernels();
 
-} // namespace fingertip::reference
+} // namespace fingertip::fitting

@@ -1,7 +1,7 @@
-#include "reference/libraries.hpp"
+#include "report/fit/libraries.hpp"
 
 #include "common/contact_flags.h"
-#include "reference/double_kernel.hpp"
+#include "report/fit/double_kernel.hpp"
 
 #include <Eigen/Dense>
 #include <ceres/ceres.h>
@@ -12,7 +12,7 @@
 #include <limits>
 #include <memory>
 
-namespace fingertip::reference {
+namespace fingertip::fitting {
 namespace {
 
 constexpr int SENSORS = 15;
@@ -231,4 +231,4 @@ const std::vector<Kernel> &library_kernels() {
   return kernels;
 }
 
-} // namespace fingertip::reference
+} // namespace fingertip::fitting

@@ -11,9 +11,9 @@
 // contacts the truth is the centroid of force.
 #include "common/contact_flags.h"
 #include "reference/dataset.hpp"
-#include "reference/kernels.hpp"
 #include "reference/options.hpp"
 #include "reference/parallel.hpp"
+#include "report/fit/kernels.hpp"
 
 extern "C" {
 #include "condition/condition.h"
@@ -37,6 +37,7 @@ extern "C" {
 
 namespace {
 
+namespace fitting = fingertip::fitting;
 namespace reference = fingertip::reference;
 using reference::Random;
 

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Error of the fit against its run time, beside every alternative: build/report.
 
-    report.py --build build/host --image build/pico_mux/fit_cycles.bin -o build/report
+    fit.py --build build/host --image build/pico_mux/fit_cycles.bin -o build/report
 
 Runs fit_report (error against the reference), on_chip/bench.mjs (cycles on the emulated chip), fit_bench (time on this
 host, paired), and fit_stiff, and merges what they find:
@@ -23,7 +23,8 @@ import sys
 import time
 
 HERE = pathlib.Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent / "python"))
+ROOT = HERE.parents[2]
+sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 from fingertip_files import InputError, run_tool, write_text  # noqa: E402
 from goals import goal_table_md, judge, missed, print_goals  # noqa: E402
 
@@ -55,7 +56,7 @@ class Steps:
 
 def measure(options, out):
     steps = Steps(out)
-    tools = pathlib.Path(options.build) / "host_tools/reference"
+    tools = pathlib.Path(options.build) / "host_tools/report/fit"
     for tool in ("fit_report", "fit_bench"):
         if not (tools / tool).exists():
             raise InputError(f"{tools / tool} is not there; build it: cmake --build --preset host")
@@ -380,4 +381,4 @@ def main(argv):
 
 
 if __name__ == "__main__":
-    sys.exit(run_tool("report.py", main))
+    sys.exit(run_tool("fit.py", main))

@@ -1,4 +1,4 @@
-#include "reference/separable.hpp"
+#include "report/fit/separable.hpp"
 
 #include "common/contact_flags.h"
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstring>
 
-namespace fingertip::reference {
+namespace fingertip::fitting {
 namespace {
 
 constexpr int COLUMNS = FIT_GRID_COLUMNS, ROWS = FIT_GRID_ROWS;
@@ -33,8 +33,8 @@ constexpr double SETTLED = 3e-8;
 
 using Readings = double[COLUMNS][ROWS]; // in units of the largest
 
-// To 1e-11: an error of an exponential here moves location and width as little as itself, and leaves
-// the model a Gaussian. |x| below 700.
+// To 1e-11: an error of an exponential here moves location and width as little as itself, and
+// leaves the model a Gaussian. |x| below 700.
 inline double quick_exp(double x) {
   constexpr double ROUND = 0x1.8p52; // adding it leaves the nearest whole number in the low bits
   const double shifted = x * 1.4426950408889634 + ROUND;
@@ -276,4 +276,4 @@ KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q
   return result;
 }
 
-} // namespace fingertip::reference
+} // namespace fingertip::fitting

@@ -21,11 +21,13 @@ import tempfile
 
 import numpy as np
 
-import rate_report
-import scenes
-from emulated import BOARDS, CLOCK_Hz, CONVERSION_us, FROM_s, ROOT, Measurement, Steps, Tools, distribution, run, scenario
-from fingertip_files import InputError, check_output, run_tool, write_text
-from goals import judge, missed, print_goals
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+import rate_report  # noqa: E402
+import scenes  # noqa: E402
+from emulated import BOARDS, CLOCK_Hz, CONVERSION_us, FROM_s, Measurement, Steps, Tools, distribution, run, scenario  # noqa: E402
+from fingertip_files import InputError, check_output, run_tool, write_text  # noqa: E402
+from goals import judge, missed, print_goals  # noqa: E402
 
 GOALS = (
     ("parallel_fps_osr256", ">=", 1250), ("parallel_fps_osr1024", ">=", 410), ("mux_fps_osr256", ">=", 260),
@@ -67,7 +69,7 @@ def by_osr(runs):
 
 def by_sensors(tools, runs):
     """Cycles counted on the chip for each number of sensors, and the rates and latencies at OSR 256 that follow from them."""
-    rows = json.loads(run("node", ROOT / "host_tools/report/sensors/sensor_cycles.mjs", tools.boards / BOARDS[0]))
+    rows = json.loads(run("node", ROOT / "host_tools/report/rate/sensors/sensor_cycles.mjs", tools.boards / BOARDS[0]))
 
     def cycles(row):
         return row["take"] + row["condition"] + row["fit"]

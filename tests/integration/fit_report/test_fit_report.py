@@ -1,6 +1,6 @@
 """The report on few presses: every tool runs, the figures are there and make sense.
 
-usage: test_report.py --build BUILD --image fit_cycles.bin
+usage: test_fit_report.py --build BUILD --image fit_cycles.bin
 """
 import argparse
 import csv
@@ -17,14 +17,14 @@ FIGURES = (
     "observable_presses", "p99_9_um", "above_100um", "masked_p99_9_um", "masked_p99_um_d", "masked_peak_p99_um",
     "masked_peak_above_100um_d", "bad_unflagged_percent_worst", "good_flagged_percent_c", "good_flagged_percent_d", "cold_cycles",
     "masked_cycles", "speed_vs_ceres", "speed_vs_tinysolver", "speed_vs_cminpack")
-# Worst over the presses measured here; the goals are in report.py.
+# Worst over the presses measured here; the goals are in fit.py.
 COLD_CYCLES_MAX = 31000
 MASKED_CYCLES_MAX = 62000
 
 
 def report(folder, *more):
     return subprocess.run(
-        [sys.executable, str(ROOT / "host_tools/reference/report.py"), "--build", OPTIONS.build, "--image", OPTIONS.image,
+        [sys.executable, str(ROOT / "host_tools/report/fit/fit.py"), "--build", OPTIONS.build, "--image", OPTIONS.image,
          "-o", str(folder), "--limit", "600", "--budget", "0.25", "--passes", "1", *more], capture_output=True, text=True)
 
 
@@ -71,7 +71,7 @@ class Report(unittest.TestCase):
 
     def test_cycles_are_deterministic(self):
         again = self.folder / "again.csv"
-        subprocess.run(["node", str(ROOT / "host_tools/reference/on_chip/bench.mjs"), "--image", OPTIONS.image, "--jobs",
+        subprocess.run(["node", str(ROOT / "host_tools/report/fit/on_chip/bench.mjs"), "--image", OPTIONS.image, "--jobs",
                         str(self.folder / "fit_jobs.json"), "--out", str(again), "--budget", "0.25", "--kernel", "fit"],
                        check=True, capture_output=True)
         with open(again, newline="") as file:
@@ -93,7 +93,7 @@ class Report(unittest.TestCase):
 
     def test_a_missing_image_is_one_line(self):
         done = subprocess.run(
-            [sys.executable, str(ROOT / "host_tools/reference/report.py"), "--build", OPTIONS.build, "--image",
+            [sys.executable, str(ROOT / "host_tools/report/fit/fit.py"), "--build", OPTIONS.build, "--image",
              str(self.folder / "none.bin"), "-o", str(self.folder / "other")], capture_output=True, text=True)
         self.assertEqual(done.returncode, 1)
         self.assertEqual(len(done.stderr.strip().split("\n")), 1)
