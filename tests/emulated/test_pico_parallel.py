@@ -129,10 +129,15 @@ class PicoParallel(unittest.TestCase):
     def test_scattered_nacks_cost_a_frame_each(self):
         plan = [{"type": "sensor_nack", "sensor": 4 * i % 15, "from_s": 0.7 + 0.0503 * i} for i in range(24)]
         run = Run(self.folder.name, "nacks", self.truth, 2.2, 256, plan, [(2.1, encoded("health"))])
+        # A code that looks torn by chance, see check_rate, is taken for one: of a sensor that no fault struck within a frame or two.
+        by_chance = 0
+        for i in np.flatnonzero((run.valid != 0) & (run.valid != ALL) & run.between(0, 2.1)):
+            struck = {fault["sensor"] for fault in plan if abs(fault["from_s"] - run.t_s[i]) < 0.002}
+            by_chance += sum(not run.valid[i] >> k & 1 for k in range(15) if k not in struck)
+        self.assertLessEqual(by_chance, 2)
         end = run.recording.health()[-1]
-        self.assertEqual(end["bus_nacks"], 24)
-        self.assertLessEqual(end["frames_incomplete"], 26)  # and up to two by chance, see check_rate
-        self.assertGreaterEqual(end["frames_incomplete"], 24)
+        self.assertEqual(end["bus_nacks"], 24 + by_chance)
+        self.assertEqual(end["frames_incomplete"], 24 + by_chance)
         self.assertFalse(run.doubtful.any())
         self.assert_nothing_is_wrong_and_unflagged(run)
 

@@ -422,6 +422,34 @@ static void test_press_after_a_release_is_not_taken_for_a_remainder(void) {
   }
 }
 
+static void press_in_steps(int32_t from, int32_t to, float seconds) {
+  int count = frames_in(seconds);
+  for (int i = 1; i <= count; i++) {
+    press(from + (to - from) / count * i);
+    run(1);
+  }
+}
+
+/* What the end of a release feels is no remainder. */
+static void test_presses_in_quick_succession_move_no_zero(void) {
+  static const float falls_s[] = {0.05f, 0.1f, 0.2f, 0.4f};
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    for (size_t j = 0; j < sizeof falls_s / sizeof falls_s[0]; j++) {
+      begin_calm(periods_us[i]);
+      int32_t worst = 0;
+      for (int touches = 0; touches < 10; touches++) {
+        press_in_steps(0, 20000 * Pa, 0.1f);
+        run_s(0.2f);
+        press_in_steps(20000 * Pa, 0, falls_s[j]);
+        run_s(0.1f);
+        int32_t off = condition.zero_Pa_q10[7] - AMBIENT;
+        worst = off > worst ? off : worst;
+      }
+      TEST_ASSERT_LESS_THAN_INT32(20 * Pa, worst);
+    }
+  }
+}
+
 /* Sensors that felt nothing stand off by a share of what others felt. */
 static void test_far_sensors_stand_off_too(void) {
   begin_calm(4854);
@@ -460,6 +488,9 @@ static void test_contact_on_a_wandering_zero_is_in_doubt(void) {
     }
     run_s(60);
     frame.pressure_Pa_q10[7] += 350 * Pa;
+    run(1);
+    TEST_ASSERT_TRUE(conditioned.contact);
+    TEST_ASSERT_EQUAL(wanders, conditioned.zero_doubtful);
     run_s(1);
     TEST_ASSERT_TRUE(conditioned.contact);
     TEST_ASSERT_EQUAL(wanders, conditioned.zero_doubtful);
@@ -736,6 +767,7 @@ int main(void) {
   RUN_TEST(test_what_rubber_does_after_a_release_is_no_contact);
   RUN_TEST(test_a_force_left_after_a_release_is_flagged);
   RUN_TEST(test_press_after_a_release_is_not_taken_for_a_remainder);
+  RUN_TEST(test_presses_in_quick_succession_move_no_zero);
   RUN_TEST(test_far_sensors_stand_off_too);
   RUN_TEST(test_weak_contact_for_long_is_in_doubt);
   RUN_TEST(test_contact_on_a_wandering_zero_is_in_doubt);
