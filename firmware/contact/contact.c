@@ -2,8 +2,6 @@
 
 #include "common/contact_flags.h"
 
-#include <math.h>
-
 static bool fewer_bits_than(uint32_t bitmap, int limit) {
   int bits = 0;
   for (; bitmap && bits < limit; bitmap &= bitmap - 1) {
@@ -23,11 +21,10 @@ static bool tells_motion(const struct contact_input *input, uint32_t flags) {
 
 struct contact_force contact_weigh(const struct contact_settings *settings,
                                    const struct fit_result *fit) {
-  float of_fit_N = settings->force_scale * fit->force_sd_N;
-  float of_scale_N = settings->force_scale_sd * fit->force_N;
   struct contact_force weighed = {settings->force_scale * fit->force_N, 0.0f};
   if (fit->flags & CONTACT_FLAG_UNCERTAINTY_VALID) {
-    weighed.force_sd_N = sqrtf(of_fit_N * of_fit_N + of_scale_N * of_scale_N);
+    weighed.force_sd_N = fit_quadrature(settings->force_scale, fit->force_sd_N,
+                                        settings->force_scale_sd, fit->force_N);
   }
   return weighed;
 }

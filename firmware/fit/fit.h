@@ -107,6 +107,10 @@ void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa
                        uint32_t usable, const struct fit_settings *settings,
                        struct fit_result *result);
 
+/* sqrt((a b)^2 + (c d)^2) within 0.1 %, for standard deviations: some 800 cycles less than in soft
+ * float, and the same bits everywhere. All are finite and not negative; at most 1e9. */
+float fit_quadrature(float a, float b, float c, float d);
+
 /* The kernels behind fit_gaussian, to compare them.
  *
  * fit_grid: fixed point, for a full rectangle of FIT_GRID_COLUMNS x FIT_GRID_ROWS nodes (of the

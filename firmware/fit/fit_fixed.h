@@ -93,10 +93,23 @@ struct scaled {
   int32_t exponent;
 };
 
+/* A struct of two words is returned in memory, 64 bits are in registers. */
+FIXED_INLINE uint64_t scaled_pack(struct scaled a) {
+  return (uint64_t)(uint32_t)a.exponent << 32 | (uint32_t)a.mantissa;
+}
+FIXED_INLINE struct scaled scaled_unpack(uint64_t packed) {
+  return (struct scaled){(int32_t)(uint32_t)packed, (int32_t)(uint32_t)(packed >> 32)};
+}
+
 FIXED_INLINE struct scaled scaled_from(int32_t value, int32_t exponent) {
   int32_t shift = fixed_bits(fixed_size(value) | 1) - 15;
   struct scaled result = {shift >= 0 ? value >> shift : value * (1 << -shift), exponent + shift};
   return result;
+}
+
+/* A value up to 2^30 of which 15 bits are enough although it may be smaller. */
+FIXED_INLINE struct scaled scaled_near(int32_t value, int32_t exponent) {
+  return (struct scaled){value >> 15, exponent + 15};
 }
 
 /* The product of two normalised mantissas keeps 14 of its 15 bits at least. */

@@ -370,7 +370,6 @@ static NOINLINE void begin_shape(const struct readings *readings, const struct m
   shape->x = aligned[0];
   shape->y = -aligned[1];
   shape->xy = aligned[2];
-  shape->by_gains = 0;
 }
 
 /* cosh(v) and sinh(v) / v from v^2, Q13, for v^2 up to FIT_STRETCH_MAX^2: error below 1 %. */
@@ -401,15 +400,15 @@ static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *re
   /* exp of half the sum, since it multiplies widths. */
   int32_t half = wider >> 1, half_square = (half * half) >> 13;
   int32_t growth = 8192 + half + (half_square >> 1) + port_divide((half_square * half) >> 13, 6);
-  struct scaled scale = fit_scaled_from(growth, -13);
+  struct scaled scale = scaled_mul(fit_scaled_from(growth, -13), fit_grid_scaled(result->sigma_mm));
   struct scaled x = fit_scaled_sqrt(fit_scaled_from(mean + part, -13));
   struct scaled y = fit_scaled_sqrt(fit_scaled_from(mean - part, -13));
   struct scaled correlation =
       scaled_mul(fit_scaled_from(across, -13), fit_grid_reciprocal(scaled_mul(x, y)));
   x = scaled_mul(x, scale);
   y = scaled_mul(y, scale);
-  result->sigma_x_mm = result->sigma_mm * fit_grid_compose(x.mantissa, x.exponent);
-  result->sigma_y_mm = result->sigma_mm * fit_grid_compose(y.mantissa, y.exponent);
+  result->sigma_x_mm = fit_grid_compose(x.mantissa, x.exponent);
+  result->sigma_y_mm = fit_grid_compose(y.mantissa, y.exponent);
   int32_t limited = fixed_clamp(fit_scaled_to_fixed(correlation, 15), -32767, 32767);
   result->width_correlation = fit_grid_compose(limited, -15);
   return true;
@@ -421,13 +420,40 @@ struct moves {
   int32_t column[COLUMNS], row[ROWS];
 };
 
-static NOINLINE void set_moves(const struct moments *m, const struct moves *moves, int32_t *moved) {
+/* As fit_grid_add_moves, without the room for the moves. */
+static NOINLINE void add_moves(const struct moments *m, const struct moves *moves,
+                               const struct readings *room, uint32_t *by_gains, int32_t *by_shape) {
+  const int32_t *errors = room->q14, *shapes = room->residual;
+  uint32_t squares = *by_gains;
+  int32_t sum = 0;
   for (int i = 0; i < COLUMNS; i++) {
     int32_t column = moves->column[i], g = m->x.g_q14[i];
     UNROLL for (int j = 0; j < ROWS; j++) {
-      *moved++ = (column * m->y.g_q14[j] + moves->row[j] * g) >> 15;
+      int32_t move = (column * m->y.g_q14[j] + moves->row[j] * g) >> 15;
+      int32_t high = (move * *errors++) >> 16;
+      squares += (uint32_t)(high * high) >> SPREAD_SQUARE_SHIFT;
+      sum += (move * *shapes++) >> 4;
     }
   }
+  *by_gains = squares;
+  *by_shape = sum;
+}
+
+/* The same for the shape's two columns, of the gains alone. */
+static NOINLINE void add_shape_moves(const struct moments *m, const struct moves *moves,
+                                     const struct readings *room, struct shape *shape) {
+  const int32_t *errors = room->q14;
+  uint32_t squares = 0;
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t column = moves->column[i], g = m->x.g_q14[i];
+    int32_t slant = (shape->xy * m->x.linear[i]) >> 15;
+    UNROLL for (int j = 0; j < ROWS; j++) {
+      int32_t move = (column * m->y.g_q14[j] + moves->row[j] * g + slant * m->y.linear[j]) >> 15;
+      int32_t high = (move * *errors++) >> 16;
+      squares += (uint32_t)(high * high) >> SPREAD_SQUARE_SHIFT;
+    }
+  }
+  shape->by_gains = squares;
 }
 
 /* A coefficient times the linear and one times the square column of an axis. */
@@ -451,35 +477,23 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
       *moved++ = (g * y->g_q14[j]) >> 13;
     }
   }
-  moved = room->q28;
   fit_grid_set_errors(grid, settings, &system->at, room, spread);
   struct moves moves;
   set_parts(x, COLUMNS, spread->x1, spread->x3, moves.column);
   set_parts(y, ROWS, 0, spread->x3, moves.row);
-  set_moves(m, &moves, moved);
-  fit_grid_add_moves(room, &spread->by_gains, &spread->shape_x);
+  add_moves(m, &moves, room, &spread->by_gains, &spread->shape_x);
   set_parts(x, COLUMNS, 0, spread->y3, moves.column);
   set_parts(y, ROWS, spread->y2, spread->y3, moves.row);
-  set_moves(m, &moves, moved);
-  fit_grid_add_moves(room, &spread->by_gains, &spread->shape_y);
+  add_moves(m, &moves, room, &spread->by_gains, &spread->shape_y);
   set_parts(x, COLUMNS, spread->f1, spread->f3, moves.column);
   set_parts(y, ROWS, spread->f2, spread->f3, moves.row);
   UNROLL for (int j = 0; j < ROWS; j++) {
     moves.row[j] += (spread->f0 * y->g_q14[j]) >> 13;
   }
-  set_moves(m, &moves, moved);
-  fit_grid_add_moves(room, &spread->force_by_gains, &spread->shape_force);
+  add_moves(m, &moves, room, &spread->force_by_gains, &spread->shape_force);
   set_parts(x, COLUMNS, 0, shape->x * 2, moves.column);
   set_parts(y, ROWS, 0, shape->y * 2, moves.row);
-  set_moves(m, &moves, moved);
-  for (int i = 0; i < COLUMNS; i++) {
-    int32_t slant = (shape->xy * x->linear[i]) >> 15;
-    UNROLL for (int j = 0; j < ROWS; j++) {
-      *moved++ += (slant * y->linear[j]) >> 15;
-    }
-  }
-  int32_t unused;
-  fit_grid_add_moves(room, &shape->by_gains, &unused);
+  add_shape_moves(m, &moves, room, shape);
   fit_grid_end_spread(settings, system, spread);
 }
 

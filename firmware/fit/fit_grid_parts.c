@@ -31,28 +31,33 @@ float fit_grid_compose(int32_t mantissa, int32_t exponent) {
   return value;
 }
 
-struct scaled fit_scaled_from(int32_t value, int32_t exponent) {
-  return scaled_from(value, exponent);
+uint64_t fit_packed_from(int32_t value, int32_t exponent) {
+  return scaled_pack(scaled_from(value, exponent));
 }
 
-struct scaled fit_scaled_short(struct scaled a) {
-  return scaled_from(a.mantissa, a.exponent);
-}
-
-struct scaled fit_scaled_sqrt(struct scaled a) {
-  return scaled_sqrt(a);
+uint64_t fit_packed_sqrt(struct scaled a) {
+  return scaled_pack(scaled_sqrt(a));
 }
 
 int32_t fit_scaled_to_fixed(struct scaled a, int32_t q) {
   return scaled_to_fixed(a, q);
 }
 
-struct scaled fit_grid_scaled(float value) {
+uint64_t fit_packed_float(float value) {
   uint32_t bits = bytes_from_f32(value);
   if (bits >> 23 == 0) {
-    return (struct scaled){0, 0};
+    return 0;
   }
-  return scaled_from((int32_t)((bits & 0x7FFFFFu) | 0x800000u), (int32_t)(bits >> 23) - 150);
+  int32_t mantissa = (int32_t)((bits & 0x7FFFFFu) | 0x800000u);
+  return scaled_pack((struct scaled){mantissa >> 9, (int32_t)(bits >> 23) - 141});
+}
+
+float fit_quadrature(float a, float b, float c, float d) {
+  struct scaled first = scaled_mul(fit_grid_scaled(a), fit_grid_scaled(b));
+  struct scaled second = scaled_mul(fit_grid_scaled(c), fit_grid_scaled(d));
+  struct scaled root =
+      fit_scaled_sqrt(scaled_add(scaled_mul(first, first), scaled_mul(second, second)));
+  return fit_grid_compose(root.mantissa, root.exponent);
 }
 
 /* One Newton step of sigma = (log2(e) / 2) / (height sigma) from 11 bits: 22 of them, or 2e-7. */

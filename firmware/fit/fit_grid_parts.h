@@ -65,9 +65,17 @@ FIXED_INLINE int32_t log2_q15(int32_t value) {
 
 /* As their namesakes of fit_fixed.h, once in the image: for what is done once for a result, where
  * twenty cycles of a call count less than flash. */
-struct scaled fit_scaled_from(int32_t value, int32_t exponent);
-struct scaled fit_scaled_short(struct scaled a);
-struct scaled fit_scaled_sqrt(struct scaled a);
+uint64_t fit_packed_from(int32_t value, int32_t exponent);
+uint64_t fit_packed_sqrt(struct scaled a);
+FIXED_INLINE struct scaled fit_scaled_from(int32_t value, int32_t exponent) {
+  return scaled_unpack(fit_packed_from(value, exponent));
+}
+FIXED_INLINE struct scaled fit_scaled_short(struct scaled a) {
+  return fit_scaled_from(a.mantissa, a.exponent);
+}
+FIXED_INLINE struct scaled fit_scaled_sqrt(struct scaled a) {
+  return scaled_unpack(fit_packed_sqrt(a));
+}
 int32_t fit_scaled_to_fixed(struct scaled a, int32_t q);
 
 /* usable: bitmap of the sensors, of which those left out read 0. False: nothing positive. */
@@ -79,7 +87,10 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
 float fit_grid_compose(int32_t mantissa, int32_t exponent);
 
 /* value >= 0 and finite. */
-struct scaled fit_grid_scaled(float value);
+uint64_t fit_packed_float(float value);
+FIXED_INLINE struct scaled fit_grid_scaled(float value) {
+  return scaled_unpack(fit_packed_float(value));
+}
 
 /* sigma in Q26 pitches. */
 int32_t fit_grid_sigma(int32_t height);

@@ -134,14 +134,9 @@ static int32_t peak_of(const struct readings *readings, const struct fit_system 
   return peak;
 }
 
-struct scaled fit_grid_reciprocal(struct scaled value) {
+uint64_t fit_packed_reciprocal(struct scaled value) {
   struct scaled a = scaled_from(value.mantissa < 1 ? 1 : value.mantissa, value.exponent);
-  return (struct scaled){port_divide(1 << 29, a.mantissa), -29 - a.exponent};
-}
-
-/* A value of 29 or 30 bits. */
-FIXED_INLINE struct scaled scaled_top(int32_t value, int32_t exponent) {
-  return (struct scaled){value >> 15, exponent + 15};
+  return scaled_pack((struct scaled){port_divide(1 << 29, a.mantissa), -29 - a.exponent});
 }
 
 /* square_sum / count */
@@ -184,7 +179,7 @@ static NOINLINE struct scaled set_values(const struct fit_grid_shape *grid,
   result->sigma_mm = fit_grid_compose(fixed_mul_q32(sigma, grid->pitch), pitch_exponent);
   result->p0_Pa = fit_grid_compose(peak, peak_exponent);
   result->force_N = fit_grid_compose(force, force_exponent);
-  return fit_scaled_from(force, force_exponent);
+  return scaled_near(force, force_exponent);
 }
 
 /* The flags that need no variance. */
@@ -296,7 +291,7 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
     widen_for_prior(readings, system, &scatter.all, &inverse3);
   }
 
-  struct scaled pitch = scaled_top(grid->pitch, grid->pitch_exponent - 6);
+  struct scaled pitch = scaled_near(grid->pitch, grid->pitch_exponent - 6);
   struct scaled form = scaled_mul(location_form(system, spread, &inverse3),
                                   scaled_square(scaled_mul(spread->softness, pitch))); /* mm */
   struct scaled sd = fit_scaled_sqrt(scaled_mul(scatter.noise, form));

@@ -83,7 +83,10 @@ void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system,
                    struct state *state);
 
 /* 1 / value; what is not positive counts as the last place. */
-struct scaled fit_grid_reciprocal(struct scaled value);
+uint64_t fit_packed_reciprocal(struct scaled value);
+FIXED_INLINE struct scaled fit_grid_reciprocal(struct scaled value) {
+  return scaled_unpack(fit_packed_reciprocal(value));
+}
 
 struct fit_spread;
 

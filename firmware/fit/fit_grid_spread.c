@@ -159,8 +159,8 @@ NOINLINE void fit_grid_add_moves(const struct readings *room, uint32_t *by_gains
 NOINLINE void fit_grid_end_spread(const struct fit_settings *settings,
                                   const struct fit_system *system, struct fit_spread *spread) {
   const int32_t gains_exponent = SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift;
-  struct scaled strength = scaled_mul(fit_scaled_from(settings->model_sd_q16, -16),
-                                      fit_scaled_from(system->at.height, -26));
+  uint32_t bend = (uint32_t)settings->model_sd_q16 * (uint32_t)(system->at.height >> 14);
+  struct scaled strength = fit_scaled_from((int32_t)(bend >> 1), 1 - 16 - 12);
   strength = scaled_mul(strength, SHAPE_PER_MODEL);
   strength.exponent += 4 - 21 + spread->shape_shift;
   struct scaled x = scaled_mul(fit_scaled_from(spread->shape_x, 0), strength);

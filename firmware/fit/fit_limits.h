@@ -72,11 +72,11 @@ static inline float fit_location_sd_limit_mm(const struct fit_settings *settings
 #define FIT_PRIOR_WIDTH_MIN_mm 0.001f
 #define FIT_PRIOR_MAX_mm 10000.0f
 
-/* No comparison with a NaN holds. */
+/* By the bits, likewise: NaN and -0 are above the limits. */
 static inline bool fit_has_prior(const struct fit_settings *settings) {
-  return settings->prior_width_mm >= FIT_PRIOR_WIDTH_MIN_mm &&
-         settings->prior_width_mm <= FIT_PRIOR_MAX_mm && settings->prior_sigma_mm >= 0.0f &&
-         settings->prior_sigma_mm <= FIT_PRIOR_MAX_mm;
+  uint32_t least = bytes_from_f32(FIT_PRIOR_WIDTH_MIN_mm), most = bytes_from_f32(FIT_PRIOR_MAX_mm);
+  return bytes_from_f32(settings->prior_width_mm) - least <= most - least &&
+         bytes_from_f32(settings->prior_sigma_mm) <= most;
 }
 
 /* Whether the fit without an outlier is the better one; rough: its residuals still are. An outlier

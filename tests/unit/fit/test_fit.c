@@ -766,6 +766,19 @@ static void test_sensors_on_a_line(void) {
   }
 }
 
+static void test_quadrature(void) {
+  struct random random = {94};
+  for (int i = 0; i < 100000; i++) {
+    float v[4];
+    for (int k = 0; k < 4; k++) {
+      v[k] = i % 16 >> k & 1 ? 0.0f : (float)exp(random_between(&random, -12.0, 9.0));
+    }
+    const double expected = hypot((double)v[0] * (double)v[1], (double)v[2] * (double)v[3]);
+    const double found = (double)fit_quadrature(v[0], v[1], v[2], v[3]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3 * expected, expected, found);
+  }
+}
+
 static void test_repeated_fits_give_the_same_bits(void) {
   struct random random = {93};
   struct press press = random_press(&random, 0.0);
@@ -803,6 +816,7 @@ int main(void) {
   RUN_TEST(test_any_layout);
   RUN_TEST(test_duplicate_positions);
   RUN_TEST(test_sensors_on_a_line);
+  RUN_TEST(test_quadrature);
   RUN_TEST(test_repeated_fits_give_the_same_bits);
   return UNITY_END();
 }
