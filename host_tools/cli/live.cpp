@@ -1,33 +1,286 @@
 #include "cli/live.hpp"
 
+#include "cli/joint_progress.hpp"
+#include "cli/keeper.hpp"
 #include "cli/view.hpp"
 #include "libfingertip/command.hpp"
+#include "libfingertip/device_loop.hpp"
 #include "libfingertip/output_file.hpp"
-#include "libfingertip/recording.hpp"
-#include "libfingertip/recording_transport.hpp"
-#include "libfingertip/session.hpp"
+#include "libfingertip/packet_fields.hpp"
+#include "libfingertip/packet_file.hpp"
 #include "libfingertip/text.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
-#include <ctime>
 #include <memory>
-#include <thread>
 
 namespace fingertip {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds POLL{20};
-constexpr milliseconds REOPEN_INTERVAL{200};
-/* Without a frame for so long the streams are asked for again: the device may have restarted
- * without the port noticing. */
-constexpr milliseconds REVIVE_AFTER{3000};
+/* How long a row may wait for earlier ones of other fingertips. */
+constexpr double SETTLE_us = 250e3;
 
-/* Before the port is opened, so that a wrong path costs nothing. */
+class Live {
+public:
+  Live(const LiveOptions &options, const std::vector<Way> &ways)
+      : options_(options), models_(ways.size()), ready_(ways.size()), early_(ways.size()) {
+    DeviceLoop::Options wanted;
+    wanted.streams = WIRE_STREAM_ALL;
+    wanted.follow_clock = several();
+    wanted.bytes = !options.raw_bytes.empty();
+    wanted.wait_for_back = !options.until_gone;
+    for (std::size_t i = 0; i < models_.size(); i++) {
+      loops_.push_back(std::make_unique<DeviceLoop>(i, ways[i], wanted, feed_));
+      models_[i].set_source(loops_[i]->name());
+    }
+    running_ = loops_.size();
+    if (!options.recording.empty() && !to_standard_output_) {
+      note_ = "recording to " + printable(options.recording);
+    }
+    if (!several()) {
+      view_ = options.monitor       ? make_monitor_view(options.colour)
+              : to_standard_output_ ? make_state_view()
+                                    : make_progress_view();
+    }
+  }
+
+  int run() {
+    while (running_ > 0) {
+      take_news();
+      show();
+      if (reason_.empty()) {
+        reason_ = reason_to_end();
+        if (!reason_.empty()) {
+          stop();
+        }
+      }
+    }
+    update_statistics();
+    view_.reset();
+    progress_.reset();
+    for (const auto &loop : loops_) {
+      loop->rethrow();
+    }
+    if (!begun_ && stop_requested()) {
+      throw Interrupted();
+    }
+    finish();
+    if (!several() && models_[0].frames() == 0 && reason_ == "gone") {
+      throw Gone(loops_[0]->name() + ": vanished before the first frame");
+    }
+    return 0;
+  }
+
+private:
+  bool several() const { return models_.size() > 1; }
+
+  void take_news() {
+    /* Asked first: what was read until then is in the feed. A row waits for those of a fingertip
+     * whose thread got no time to read them. */
+    double settled_us = static_cast<double>(steady_now_us());
+    for (const auto &loop : loops_) {
+      settled_us = std::min(settled_us, loop->read_until_us());
+    }
+    for (DeviceNews &news : feed_.take(POLL)) {
+      take(news);
+    }
+    if (keeper_) {
+      keeper_->settle(settled_us - SETTLE_us);
+    }
+  }
+
+  void take(DeviceNews &news) {
+    using Kind = DeviceNews::Kind;
+    Model &model = models_[news.device];
+    switch (news.kind) {
+    case Kind::packet:
+      model.take(news.packet);
+      if (keeper_) {
+        keeper_->packet(news);
+      } else if (ready_[news.device]) {
+        early_[news.device].push_back(std::move(news));
+      }
+      break;
+    case Kind::ready:
+      ready_[news.device] = std::move(news);
+      if (std::all_of(ready_.begin(), ready_.end(), [](const auto &each) { return each; })) {
+        begin();
+      }
+      break;
+    case Kind::back:
+      model.set_state(Model::State::live);
+      event(news.device, EVENT_BACK);
+      break;
+    case Kind::gone:
+      model.set_state(Model::State::gone);
+      any_gone_ = true;
+      event(news.device, EVENT_GONE);
+      break;
+    case Kind::mute:
+      event(news.device, "no answer to the end of the streams");
+      break;
+    case Kind::bytes:
+      if (!raw_bytes_) {
+        raw_bytes_ = std::make_unique<OutputFile>(options_.raw_bytes, options_.overwrite,
+                                                  OutputFile::Appears::at_once);
+      }
+      raw_bytes_->append(news.bytes.data(), news.bytes.size());
+      break;
+    case Kind::clock:
+      if (keeper_) {
+        keeper_->clock(news);
+      }
+      break;
+    case Kind::ended:
+      running_--;
+      stop(); /* the others end too; what was written stays */
+      break;
+    }
+  }
+
+  /* Every one of them has answered. */
+  void begin() {
+    std::vector<DeviceNews> ready;
+    std::vector<std::string> ports;
+    for (std::size_t i = 0; i < loops_.size(); i++) {
+      const char *serial = ready_[i]->packet.body.info.serial;
+      for (const DeviceNews &other : ready) {
+        if (std::memcmp(other.packet.body.info.serial, serial, WIRE_TEXT_BYTES) == 0) {
+          throw Error(loops_[i]->name() + ": is the same fingertip as another; name each once");
+        }
+      }
+      ready.push_back(*ready_[i]);
+      ports.push_back(loops_[i]->name());
+    }
+    zero_us_ = steady_now_us();
+    if (!options_.recording.empty()) {
+      keeper_ = make_keeper(options_, ready, ports, zero_us_);
+      for (const auto &early : early_) {
+        for (const DeviceNews &news : early) {
+          keeper_->packet(news);
+        }
+      }
+    }
+    begun_ = true;
+    for (std::size_t i = 0; i < loops_.size(); i++) {
+      models_[i].set_state(Model::State::live);
+      loops_[i]->start();
+    }
+    if (several()) {
+      progress_ = std::make_unique<JointProgress>();
+    }
+  }
+
+  void event(std::size_t device, const std::string &text) {
+    if (keeper_) {
+      keeper_->event(device, text);
+    }
+  }
+
+  void stop() {
+    for (const auto &loop : loops_) {
+      loop->stop();
+    }
+  }
+
+  double seconds() const {
+    return several() ? static_cast<double>(steady_now_us() - zero_us_) / 1e6 : models_[0].seconds();
+  }
+
+  /* "" to go on. */
+  std::string reason_to_end() const {
+    if (options_.until_gone && any_gone_) {
+      return "gone";
+    }
+    if (stop_requested() || quit_ || (to_standard_output_ && !is_standard_output_read())) {
+      return "interrupted";
+    }
+    if (begun_ && options_.seconds && models_[0].frames() > 0 && seconds() >= *options_.seconds) {
+      return "seconds";
+    }
+    return "";
+  }
+
+  void update_statistics() {
+    for (std::size_t i = 0; i < loops_.size(); i++) {
+      models_[i].set_statistics(loops_[i]->statistics());
+    }
+  }
+
+  void show() {
+    update_statistics();
+    if (progress_) {
+      progress_->update(models_, seconds(), keeper_->alignment_us());
+    }
+    if (!view_) {
+      return;
+    }
+    view_->update(models_[0], note_);
+    while (auto key = view_->key()) {
+      if (*key == 'q') {
+        quit_ = true;
+      } else if (*key == 't' && models_[0].state() == Model::State::live) {
+        loops_[0]->send(command_tare());
+      }
+    }
+  }
+
+  void finish() {
+    std::vector<LineStatistics> statistics;
+    LineStatistics sum;
+    for (const Model &model : models_) {
+      statistics.push_back(model.statistics());
+      sum += model.statistics();
+    }
+    if (keeper_) {
+      keeper_->finish(statistics, reason_);
+    }
+    std::string name = keeper_ && !to_standard_output_ ? printable(options_.recording) + ": " : "";
+    if (!several()) {
+      std::fprintf(options_.monitor ? stdout : stderr, "%s%s\n", name.c_str(),
+                   summary_text(models_[0]).c_str());
+      return;
+    }
+    std::uint64_t frames = 0;
+    for (std::size_t i = 0; i < models_.size(); i++) {
+      frames += keeper_->frames(i);
+    }
+    std::fprintf(stderr,
+                 "%s%llu frames of %zu fingertips, aligned to %s us or better, %llu packets "
+                 "dropped, %llu CRC errors\n",
+                 name.c_str(), static_cast<unsigned long long>(frames), models_.size(),
+                 fixed(keeper_->alignment_us(), 0).c_str(),
+                 static_cast<unsigned long long>(sum.dropped_packets),
+                 static_cast<unsigned long long>(sum.crc_errors));
+  }
+
+  const LiveOptions &options_;
+  const bool to_standard_output_ = options_.recording == STANDARD_OUTPUT;
+  DeviceFeed feed_;
+  std::vector<Model> models_;
+  std::vector<std::optional<DeviceNews>> ready_;
+  std::vector<std::vector<DeviceNews>> early_; /* packets before all were ready */
+  std::unique_ptr<OutputFile> raw_bytes_;
+  std::unique_ptr<Keeper> keeper_;
+  std::unique_ptr<View> view_;
+  std::unique_ptr<JointProgress> progress_;
+  std::string note_;
+  std::string reason_;
+  std::int64_t zero_us_ = 0;
+  std::size_t running_ = 0;
+  bool begun_ = false;
+  bool any_gone_ = false;
+  bool quit_ = false;
+  std::vector<std::unique_ptr<DeviceLoop>> loops_; /* end first: their threads use the feed */
+};
+
+} // namespace
+
 void check_outputs(const LiveOptions &options) {
   for (const std::string &path : {options.recording, options.raw_bytes}) {
     if (!path.empty() && path != STANDARD_OUTPUT) {
@@ -40,234 +293,8 @@ void check_outputs(const LiveOptions &options) {
   }
 }
 
-class Live {
-public:
-  explicit Live(const LiveOptions &options)
-      : options_(options), transport_(open_way(choose_way(options.choice))),
-        session_(*transport_, [this] { return is_stop_wanted(); }) {
-    if (!options.raw_bytes.empty()) {
-      session_.on_bytes([this](const std::uint8_t *bytes, std::size_t length) {
-        if (!raw_bytes_) {
-          raw_bytes_ = std::make_unique<OutputFile>(options_.raw_bytes, options_.overwrite,
-                                                    OutputFile::Appears::at_once);
-        }
-        raw_bytes_->append(bytes, length);
-      });
-    }
-    session_.on_packet([this](const wire_packet &packet) {
-      model_.take(packet);
-      if (recording_ && can_write()) {
-        recording_->packet(packet);
-      }
-    });
-    model_.set_source(transport_->description());
-    if (!options.recording.empty() && !to_standard_output_) {
-      note_ = "recording to " + printable(options.recording);
-    }
-    view_ = options.monitor       ? make_monitor_view(options.colour)
-            : to_standard_output_ ? make_state_view()
-                                  : make_progress_view();
-  }
-
-  int run() {
-    std::string reason;
-    try {
-      reason = stream_until_end();
-    } catch (const Interrupted &) {
-      reason = "interrupted";
-    }
-    stopping_ = true;
-    if (reason != "gone") {
-      stop_streams();
-    }
-    model_.set_statistics(session_.statistics());
-    view_.reset();
-    std::string summary = summary_text(model_);
-    if (recording_) {
-      if (can_write()) {
-        recording_->finish(session_.statistics(), reason);
-      }
-      summary = (to_standard_output_ ? "" : printable(recording_->path()) + ": ") + summary;
-    }
-    std::fprintf(options_.monitor ? stdout : stderr, "%s\n", summary.c_str());
-    if (model_.frames() == 0 && reason == "gone") {
-      throw Error(transport_->description() + ": vanished before the first frame");
-    }
-    return 0;
-  }
-
-private:
-  bool is_stop_wanted() {
-    if (stopping_) {
-      return false;
-    }
-    show();
-    return stop_requested() || quit_ || (to_standard_output_ && !is_standard_output_read());
-  }
-
-  /* A reader of standard output that is slow is waited for, unless the end is wanted. */
-  bool can_write() const { return !to_standard_output_ || wait_for_standard_output(); }
-
-  void show() {
-    model_.set_statistics(session_.statistics());
-    view_->update(model_, note_);
-    while (auto key = view_->key()) {
-      if (*key == 'q') {
-        quit_ = true;
-      } else if (*key == 't' && model_.state() == Model::State::live) {
-        session_.send(command_tare());
-      }
-    }
-  }
-
-  /* Returns once streams run. Gone if the port vanishes. */
-  void connect() {
-    model_.set_state(Model::State::connecting);
-    session_.info();
-    /* The first answer may have waited for the device to start; this one tells its clock. */
-    wire_packet info = session_.info();
-    streams_ = possible_streams(info.body.info, options_.streams);
-    if (recording_) {
-      event("back");
-    } else if (!options_.recording.empty()) {
-      start_recording(info);
-    }
-    session_.command(command_stream(streams_));
-    revived_ = Clock::now();
-    model_.set_state(Model::State::live);
-  }
-
-  void start_recording(const wire_packet &info) {
-    Metadata extra = {{"recorded_by", "fingertip " FINGERTIP_VERSION},
-                      {"started_utc", utc_now()},
-                      {"port", transport_->description()}};
-    if (auto clock = session_.clock()) {
-      auto device_us = steady_now_us() + clock->device_minus_host_us;
-      extra.emplace_back("started_device_us", std::to_string(device_us));
-      extra.emplace_back("started_uncertainty_us", std::to_string(clock->uncertainty_us));
-    }
-    recording_ = std::make_unique<RecordingWriter>(
-        options_.recording, options_.overwrite, &info.body.info, info.body.info.sensor_count, extra,
-        raw_expected(),
-        to_standard_output_ ? OutputFile::Appears::on_standard_output
-                            : OutputFile::Appears::at_once);
-    recording_->packet(info);
-  }
-
-  /* A raw packet follows each contact packet. */
-  bool raw_expected() const {
-    return (streams_ & WIRE_STREAM_RAW) != 0 && (streams_ & WIRE_STREAM_CONTACT) != 0;
-  }
-
-  void event(const std::string &text) {
-    if (recording_ && can_write()) {
-      recording_->event(text + " " + utc_now());
-    }
-  }
-
-  /* Waits for the port and starts it anew. */
-  void wait_for_return() {
-    model_.set_state(Model::State::gone);
-    event(EVENT_GONE);
-    for (;;) {
-      while (!session_.reopen()) {
-        if (is_stop_wanted()) {
-          throw Interrupted();
-        }
-        std::this_thread::sleep_for(REOPEN_INTERVAL);
-      }
-      try {
-        connect();
-        return;
-      } catch (const Gone &) {
-        model_.set_state(Model::State::gone);
-      }
-    }
-  }
-
-  void revive_if_stalled() {
-    auto silence_s = model_.seconds_since_frame();
-    auto now = Clock::now();
-    if (now - revived_ > REVIVE_AFTER &&
-        (!silence_s || *silence_s > std::chrono::duration<double>(REVIVE_AFTER).count())) {
-      revived_ = now;
-      session_.send(command_stream(streams_));
-    }
-  }
-
-  /* Why it ended. */
-  std::string stream_until_end() {
-    bool there = true;
-    try {
-      connect();
-    } catch (const Gone &) {
-      there = false;
-    }
-    for (;;) {
-      if (is_stop_wanted()) {
-        return "interrupted";
-      }
-      if (options_.seconds && model_.frames() > 0 && model_.seconds() >= *options_.seconds) {
-        return "seconds";
-      }
-      if (!there) {
-        if (options_.until_gone) {
-          return "gone";
-        }
-        wait_for_return();
-        there = true;
-      }
-      there = session_.poll(POLL) != Transport::Result::gone;
-      revive_if_stalled();
-    }
-  }
-
-  void stop_streams() {
-    if (model_.state() != Model::State::live) {
-      return;
-    }
-    try {
-      session_.command(command_stream(0), {milliseconds(500), 2});
-    } catch (const Gone &) {
-      event(EVENT_GONE);
-    } catch (const Error &) {
-      event("no answer to the end of the streams");
-    }
-  }
-
-  const LiveOptions &options_;
-  std::unique_ptr<Transport> transport_;
-  Session session_;
-  const bool to_standard_output_ = options_.recording == STANDARD_OUTPUT;
-  std::unique_ptr<OutputFile> raw_bytes_;
-  std::unique_ptr<RecordingWriter> recording_;
-  Model model_;
-  std::unique_ptr<View> view_;
-  std::string note_;
-  std::uint8_t streams_ = 0; /* of those wanted, what the firmware has */
-  bool stopping_ = false;
-  bool quit_ = false;
-  Clock::time_point revived_{};
-};
-
-} // namespace
-
-std::string utc_now() {
-  auto now = std::chrono::system_clock::now();
-  std::time_t seconds = std::chrono::system_clock::to_time_t(now);
-  auto ms = std::chrono::duration_cast<milliseconds>(now.time_since_epoch()).count() % 1000;
-  std::tm parts{};
-  gmtime_r(&seconds, &parts);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &parts);
-  char whole[48];
-  std::snprintf(whole, sizeof whole, "%s.%03dZ", text, static_cast<int>(ms));
-  return whole;
-}
-
-int run_live(const LiveOptions &options) {
-  check_outputs(options);
-  return Live(options).run();
+int run_live(const LiveOptions &options, const std::vector<Way> &ways) {
+  return Live(options, ways).run();
 }
 
 } // namespace fingertip

@@ -1,4 +1,4 @@
-/* A fingertip on its port, shown and recorded until something ends it. */
+/* Fingertips on their ports, shown and recorded until something ends it; one and many alike. */
 #pragma once
 
 #include "cli/terminal.hpp"
@@ -7,27 +7,27 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace fingertip {
 
 inline constexpr const char *STANDARD_OUTPUT = "-";
 
 struct LiveOptions {
-  Choice choice;
-  std::uint8_t streams = 0;
-  std::optional<double> seconds; /* of device time, counted from the first frame */
+  std::optional<double> seconds; /* of device time from the first frame; of several fingertips, of
+                                    the host's time from their common start */
   std::string recording;         /* empty: none; "-": standard output, if it is no monitor */
-  std::string raw_bytes;         /* empty: none */
+  std::string raw_bytes;         /* of one fingertip; empty: none */
   bool overwrite = false;
-  bool until_gone = false; /* end when the port vanishes, instead of waiting for it */
+  bool until_gone = false; /* end when a port vanishes, instead of waiting for it */
   bool monitor = true;     /* else a line of progress */
   ColourMode colour = ColourMode::automatic;
 };
 
-/* Now, as recordings write it. */
-std::string utc_now();
+/* Before a port is opened, so that a wrong path costs nothing. Throws Error. */
+void check_outputs(const LiveOptions &options);
 
 /* Exit status. Throws Error. */
-int run_live(const LiveOptions &options);
+int run_live(const LiveOptions &options, const std::vector<Way> &ways);
 
 } // namespace fingertip

@@ -1,8 +1,8 @@
 #include "cli/monitor.hpp"
 
-#include "libfingertip/error.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/text.hpp"
+#include "tool/advice.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,9 @@
 #include "cli/view.hpp"
 
 #include "cli/monitor.hpp"
-#include "libfingertip/error.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/text.hpp"
+#include "tool/advice.hpp"
 
 #include <chrono>
 #include <cstdio>

@@ -24,7 +24,8 @@ wire_packet packet_of(wire_type type) {
 
 [[noreturn]] void out_of_range(const char *what, const std::string &value,
                                const std::string &range) {
-  throw Error(std::string(what) + " " + value + " is out of range; give " + range);
+  throw Error(ErrorCode::bad_value,
+              std::string(what) + " " + value + " is out of range; give " + range);
 }
 
 std::string rate_range() {
@@ -157,7 +158,7 @@ wire_packet command_loader() {
 wire_packet command_calibrate(const calibration &calibration, std::uint8_t sensor_count) {
   if (sensor_count < 1 || sensor_count > FT_MAX_SENSORS ||
       !calibration_is_valid(&calibration, sensor_count)) {
-    throw Error("the calibration holds a value out of range; calibrate anew");
+    throw Error(ErrorCode::bad_value, "the calibration holds a value out of range");
   }
   wire_packet packet = packet_of(WIRE_CMD_CALIBRATE);
   packet.body.cmd_calibrate.sensor_count = sensor_count;
@@ -196,7 +197,7 @@ std::uint32_t rate_mHz_from_text(const std::string &text) {
   }
   auto rate_Hz = to_double(text);
   if (!rate_Hz) {
-    throw Error("rate \"" + text + "\" is no number; give " + rate_range());
+    throw Error(ErrorCode::bad_value, "rate \"" + text + "\" is no number; give " + rate_range());
   }
   if (*rate_Hz * 1000 < WIRE_RATE_MIN_mHz || *rate_Hz * 1000 > WIRE_RATE_MAX_mHz) {
     out_of_range("rate", text, rate_range());
@@ -207,7 +208,8 @@ std::uint32_t rate_mHz_from_text(const std::string &text) {
 std::uint32_t osr_from_text(const std::string &text) {
   auto osr = to_u64(text);
   if (!osr) {
-    throw Error("osr \"" + text + "\" is no whole number; give " + osr_range());
+    throw Error(ErrorCode::bad_value,
+                "osr \"" + text + "\" is no whole number; give " + osr_range());
   }
   check_osr(*osr);
   return static_cast<std::uint32_t>(*osr);
@@ -216,7 +218,8 @@ std::uint32_t osr_from_text(const std::string &text) {
 float slip_threshold_mm_from_text(const std::string &text) {
   auto threshold_mm = to_float(text);
   if (!threshold_mm) {
-    throw Error("slip threshold \"" + text + "\" is no number; give " + threshold_range());
+    throw Error(ErrorCode::bad_value,
+                "slip threshold \"" + text + "\" is no number; give " + threshold_range());
   }
   check_threshold(*threshold_mm);
   return *threshold_mm;
@@ -225,7 +228,8 @@ float slip_threshold_mm_from_text(const std::string &text) {
 std::uint32_t slip_window_ms_from_text(const std::string &text) {
   auto window_ms = to_u64(text);
   if (!window_ms) {
-    throw Error("slip window \"" + text + "\" is no whole number; give " + window_range());
+    throw Error(ErrorCode::bad_value,
+                "slip window \"" + text + "\" is no whole number; give " + window_range());
   }
   check_window(*window_ms);
   return static_cast<std::uint32_t>(*window_ms);
@@ -239,7 +243,7 @@ Prior prior_from_text(const std::string &text) {
   auto sigma_mm = to_float(text.substr(0, colon));
   auto width_mm = colon == std::string::npos ? PRIOR_WIDTH_mm : to_float(text.substr(colon + 1));
   if (!sigma_mm || !width_mm) {
-    throw Error("prior \"" + text + "\" is no number; give " + prior_range());
+    throw Error(ErrorCode::bad_value, "prior \"" + text + "\" is no number; give " + prior_range());
   }
   if (*sigma_mm == 0) {
     out_of_range("prior", text, prior_range());
@@ -251,7 +255,7 @@ Prior prior_from_text(const std::string &text) {
 float location_limit_mm_from_text(const std::string &text) {
   auto limit_mm = to_float(text);
   if (!limit_mm) {
-    throw Error("limit \"" + text + "\" is no number; give " + limit_range());
+    throw Error(ErrorCode::bad_value, "limit \"" + text + "\" is no number; give " + limit_range());
   }
   check_limit(*limit_mm);
   return *limit_mm;

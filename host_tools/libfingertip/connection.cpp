@@ -28,22 +28,37 @@ bool never() {
 }
 
 [[noreturn]] void no_way(const Found &found) {
-  throw Error(found.serial + ": has no serial port; its driver cdc_acm is not loaded, or another "
-                             "program uses it by libusb: try --transport usb");
+  throw Error(ErrorCode::no_driver, found.serial +
+                                        ": has no serial port: its driver cdc_acm is not "
+                                        "loaded, or another program uses it by libusb");
 }
 
-/* Throws Error with the reason to choose another. */
-Way only_one(const std::vector<Found> &found, Reach reach, const char *none) {
+/* Its serial number; where it does not tell, its port. */
+std::string name_of(const Found &found, Reach reach, const std::string &root) {
+  if (!found.serial.empty()) {
+    return found.serial;
+  }
+  try {
+    if (auto way = way_to(found, reach)) {
+      return serial_of(ask(*way, never, root)) + " (" + found.port + ")";
+    }
+  } catch (const Error &) {
+    /* the port has to do */
+  }
+  return found.port;
+}
+
+Way only_one(const std::vector<Found> &found, Reach reach, const std::string &root,
+             const char *none) {
   if (found.empty()) {
-    throw Error(none);
+    throw Error(ErrorCode::no_fingertip, none);
   }
   if (found.size() > 1) {
     std::string names;
     for (const Found &each : found) {
-      names += " " + (each.serial.empty() ? each.port : each.serial);
+      names += (names.empty() ? "" : ", ") + name_of(each, reach, root);
     }
-    throw Error("several fingertips found; choose one with " +
-                std::string(found[0].serial.empty() ? "--port:" : "--device:") + names);
+    throw Error(ErrorCode::several_fingertips, "several fingertips found: " + names);
   }
   auto way = way_to(found[0], reach);
   if (!way) {
@@ -82,10 +97,10 @@ Way with_wanted_serial(const Choice &choice, const std::string &root) {
     }
     others += " " + way->serial;
   }
-  throw Error("no fingertip " + choice.device + " here; " +
-              (!others.empty()    ? "there are:" + others
-               : !unasked.empty() ? unasked
-                                  : "plug it in, then see `fingertip list`"));
+  throw Error(ErrorCode::no_such_fingertip, "no fingertip " + choice.device + " here" +
+                                                (!others.empty()    ? ", there are:" + others
+                                                 : !unasked.empty() ? "; " + unasked
+                                                                    : ""));
 }
 
 } // namespace
@@ -109,14 +124,14 @@ wire_info ask(const Way &way, const std::function<bool()> &stop, const std::stri
 Way choose_way(const Choice &choice, const std::string &root) {
   if (!choice.port.empty()) {
     if (choice.reach == Reach::usb) {
-      throw Error("--transport usb takes no --port; choose the fingertip with --device");
+      throw Error(ErrorCode::wrong_choice, "a serial port is not reached by libusb");
     }
     Way way = {"", stable_port(choice.port, root), false};
     if (!choice.device.empty()) {
       way.serial = serial_of(ask(way, never, root));
       if (!is_same_serial(way.serial, choice.device)) {
-        throw Error(choice.port + ": is fingertip " + way.serial + ", not " + choice.device +
-                    "; leave out --port, or see `fingertip list`");
+        throw Error(ErrorCode::other_fingertip,
+                    choice.port + ": is fingertip " + way.serial + ", not " + choice.device);
       }
     }
     return way;
@@ -126,12 +141,11 @@ Way choose_way(const Choice &choice, const std::string &root) {
   }
   auto in_environment = find_in_environment();
   if (!in_environment.empty() && choice.reach != Reach::usb) {
-    return only_one(in_environment, choice.reach, "");
+    return only_one(in_environment, choice.reach, root, "");
   }
-  return only_one(find_usb(root), choice.reach,
-                  choice.reach == Reach::usb
-                      ? "no fingertip found by libusb; plug one in"
-                      : "no fingertip found; plug one in, or name its port with --port PATH");
+  return only_one(find_usb(root), choice.reach, root,
+                  choice.reach == Reach::usb ? "no fingertip found by libusb"
+                                             : "no fingertip found");
 }
 
 std::vector<Way> all_ways(Reach reach, const std::string &root) {

@@ -1,5 +1,7 @@
 #include "libfingertip/decoder.hpp"
 
+#include <utility>
+
 namespace fingertip {
 
 std::string LineStatistics::text() const {
@@ -10,6 +12,24 @@ std::string LineStatistics::text() const {
          pair("out_of_order", out_of_order) + " " + pair("crc_errors", crc_errors) + " " +
          pair("format_errors", format_errors) + " " + pair("version_errors", version_errors) + " " +
          pair("unknown_types", unknown_types);
+}
+
+bool LineStatistics::set(std::string_view key, std::uint64_t value) {
+  const std::pair<std::string_view, std::uint64_t &> fields[] = {
+      {"packets", packets},
+      {"dropped_packets", dropped_packets},
+      {"out_of_order", out_of_order},
+      {"crc_errors", crc_errors},
+      {"format_errors", format_errors},
+      {"version_errors", version_errors},
+      {"unknown_types", unknown_types}};
+  for (const auto &[name, field] : fields) {
+    if (name == key) {
+      field = value;
+      return true;
+    }
+  }
+  return false;
 }
 
 LineStatistics &LineStatistics::operator+=(const LineStatistics &other) {
@@ -31,19 +51,19 @@ Decoder::Decoder() {
 void Decoder::restart() {
   wire_receiver_init(&receiver_, wire_all_layouts);
   joining_ = true;
-  expected_sequence_.reset();
+  sequence_.restart();
 }
 
-void Decoder::follow_sequence(std::uint16_t sequence) {
-  if (expected_sequence_) {
-    auto ahead = static_cast<std::uint16_t>(sequence - *expected_sequence_);
+void SequenceFollower::follow(std::uint16_t sequence, LineStatistics &statistics) {
+  if (expected_) {
+    auto ahead = static_cast<std::uint16_t>(sequence - *expected_);
     if (ahead < 0x8000) {
-      statistics_.dropped_packets += ahead;
+      statistics.dropped_packets += ahead;
     } else {
-      statistics_.out_of_order++;
+      statistics.out_of_order++;
     }
   }
-  expected_sequence_ = static_cast<std::uint16_t>(sequence + 1);
+  expected_ = static_cast<std::uint16_t>(sequence + 1);
 }
 
 void Decoder::feed(const std::uint8_t *bytes, std::size_t length, const Handler &handler) {
@@ -60,12 +80,12 @@ void Decoder::feed(const std::uint8_t *bytes, std::size_t length, const Handler 
       break;
     case FT_OK:
       statistics_.packets++;
-      follow_sequence(packet.sequence);
+      sequence_.follow(packet.sequence, statistics_);
       handler(packet);
       break;
     case FT_ERR_TYPE:
       statistics_.unknown_types++;
-      follow_sequence(packet.sequence);
+      sequence_.follow(packet.sequence, statistics_);
       break;
     case FT_ERR_VERSION:
       statistics_.version_errors++;

@@ -12,6 +12,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 
 namespace fingertip {
 
@@ -25,10 +26,23 @@ struct LineStatistics {
   std::uint64_t version_errors = 0;
   std::uint64_t unknown_types = 0; /* undamaged, from a newer firmware */
 
-  /* "dropped_packets=0 crc_errors=0 ...", as recordings end with. */
+  /* "packets=7 dropped_packets=0 ...", as recordings end with. */
   std::string text() const;
+  /* Takes one of these; false if it is none. */
+  bool set(std::string_view key, std::uint64_t value);
 
   LineStatistics &operator+=(const LineStatistics &other);
+};
+
+/* What the sequence numbers tell. */
+class SequenceFollower {
+public:
+  void follow(std::uint16_t sequence, LineStatistics &statistics);
+  /* Expect no particular number next. */
+  void restart() { expected_.reset(); }
+
+private:
+  std::optional<std::uint16_t> expected_;
 };
 
 class Decoder {
@@ -48,11 +62,9 @@ public:
   std::uint8_t other_version() const { return other_version_; }
 
 private:
-  void follow_sequence(std::uint16_t sequence);
-
   wire_receiver receiver_;
   bool joining_ = true;
-  std::optional<std::uint16_t> expected_sequence_;
+  SequenceFollower sequence_;
   LineStatistics statistics_;
   std::uint8_t other_version_ = 0;
 };

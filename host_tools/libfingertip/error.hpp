@@ -1,5 +1,6 @@
-/* What a user can mend: one line that says what is wrong and what to do. Anything else that is
- * thrown is a bug of ours. */
+/* What a user can mend, as facts: a code for programs, and a line for people that says what is
+ * wrong and of what. What to do about it says the program, which knows its own options and how much
+ * its user may do. Anything else that is thrown is a bug of ours. */
 #pragma once
 
 #include <stdexcept>
@@ -7,18 +8,66 @@
 
 namespace fingertip {
 
-class Error : public std::runtime_error {
-public:
-  using std::runtime_error::runtime_error;
+enum class ErrorCode {
+  other, /* only the text tells */
+
+  /* Ways to a fingertip. */
+  no_port,            /* nothing has this name, or not any more */
+  not_a_port,         /* something has, but it is no serial port */
+  port_in_use,        /* by another program */
+  permission_denied,  /* this user may not open it */
+  cannot_open,        /* for the system's reason in the text */
+  no_fingertip,       /* none is plugged in or named */
+  several_fingertips, /* none was chosen; the text names them */
+  no_such_fingertip,  /* none has the wanted serial number; the text names those that are there */
+  other_fingertip,    /* the port's is not the wanted one, or not the one that was there before */
+  no_driver,          /* on USB, but without a serial port */
+  not_a_fingertip,    /* our USB ids, but not our interfaces */
+  usb_failed,         /* libusb cannot go on */
+  wrong_choice,       /* of fingertip and way, that exclude each other */
+
+  /* Conversations. */
+  gone,            /* the port vanished */
+  no_answer,       /* to a command, in all the time that it was given */
+  other_version,   /* it speaks another version of the protocol */
+  unknown_command, /* refused: to its firmware */
+  refused_value,   /* refused: out of its firmware's range */
+  not_now,         /* refused: in the state that it is in */
+  refused,         /* for a reason that is newer than this library */
+
+  /* Values. */
+  bad_value, /* the text says which are good */
+
+  /* Files. */
+  cannot_read,        /* for the system's reason in the text */
+  cannot_write,       /* likewise, and nothing was written */
+  file_exists,        /* and was not to be replaced */
+  is_folder,          /* where a file is to be */
+  write_undone,       /* a write failed, the file is as it was before */
+  write_cut,          /* a write failed, the file holds all whole lines until then */
+  write_torn,         /* a write failed, the file's last line is torn */
+  not_a_recording,    /* nor a capture of the line */
+  other_format,       /* of a recording: newer or older than this library */
+  damaged_line,       /* of a recording: the lines after it can be read */
+  damaged_head,       /* of a recording: without it no row can be read */
+  several_in_file,    /* fingertips, and none was chosen; the text names them */
+  no_such_in_file,    /* no fingertip of this serial number; the text names those in it */
+  other_sensor_count, /* the rows of one file have equally many sensors */
+  not_firmware,       /* no UF2 file, or none of ours */
+  other_chip,         /* firmware for another chip than the RP2040 */
+  damaged_firmware,
 };
 
-/* For the end of a sentence about a device that may not be opened. */
-inline constexpr const char *PERMISSION_ADVICE =
-    "permission denied; install the udev rule: fingertip rule | sudo tee "
-    "/etc/udev/rules.d/60-fingertip.rules, then sudo udevadm control --reload, and plug it in "
-    "again";
+class Error : public std::runtime_error {
+public:
+  Error(ErrorCode code, const std::string &facts) : std::runtime_error(facts), code_(code) {}
+  /* A text that leaves nothing to say. */
+  explicit Error(const std::string &text) : Error(ErrorCode::other, text) {}
 
-/* While something streams: it is waited for. */
-inline constexpr const char *GONE_ADVICE = "gone, plug it in again";
+  ErrorCode code() const { return code_; }
+
+private:
+  ErrorCode code_;
+};
 
 } // namespace fingertip

@@ -87,15 +87,13 @@ std::string result_text(std::uint8_t result) {
   case WIRE_RESULT_DONE:
     return "done";
   case WIRE_RESULT_UNKNOWN_COMMAND:
-    return "its firmware does not know this command; see what it can do (fingertip info) or update "
-           "it";
+    return "its firmware does not know this command";
   case WIRE_RESULT_OUT_OF_RANGE:
     return "the value is out of range for this firmware";
   case WIRE_RESULT_NOT_NOW:
-    return "not possible now; see that its sensors answer and nothing is being stored (fingertip "
-           "info)";
+    return "not possible now";
   default:
-    return "result " + std::to_string(result) + "; update these tools";
+    return "result " + std::to_string(result);
   }
 }
 
@@ -157,8 +155,9 @@ std::uint8_t streams_from_text(const std::string &text) {
       }
     }
     if (!known) {
-      throw Error("stream \"" + std::string(part) +
-                  "\" is unknown; give none, or some of contact,raw,health");
+      throw Error(ErrorCode::bad_value,
+                  "stream \"" + std::string(part) +
+                      "\" is unknown; give none, or some of contact,raw,health");
     }
   }
   return streams;

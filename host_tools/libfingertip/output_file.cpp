@@ -20,11 +20,11 @@ namespace fs = std::filesystem;
 [[noreturn]] void fail(const std::string &path, int error) {
   switch (error) {
   case EEXIST:
-    throw Error(path + ": exists already; choose another name, or --overwrite");
+    throw Error(ErrorCode::file_exists, path + ": exists already");
   case EISDIR:
-    throw Error(path + ": is a folder; give the name of a file in it");
+    throw Error(ErrorCode::is_folder, path + ": is a folder");
   default:
-    throw Error(path + ": " + std::strerror(error) + "; choose another place");
+    throw Error(ErrorCode::cannot_write, path + ": " + std::strerror(error));
   }
 }
 
@@ -108,13 +108,12 @@ void OutputFile::append(const void *bytes, std::size_t length) {
       int error = count == 0 ? ENOSPC : errno;
       std::string what = path_ + ": " + std::strerror(error);
       if (!temporary_.empty()) {
-        throw Error(what + "; nothing was changed, make room and try again");
+        throw Error(ErrorCode::write_undone, what + "; nothing was changed");
       }
       if (to_standard_output_ || ftruncate(fd_, length_) != 0) {
-        throw Error(what + "; its last line is torn, read it with --salvage");
+        throw Error(ErrorCode::write_torn, what + "; its last line is torn");
       }
-      throw Error(what +
-                  "; what was written until now stays readable, make room and start a new file");
+      throw Error(ErrorCode::write_cut, what + "; what was written until now stays readable");
     }
     next += count;
     left -= static_cast<std::size_t>(count);

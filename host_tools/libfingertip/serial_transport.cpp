@@ -19,20 +19,22 @@ namespace {
 
 constexpr int WRITE_TIMEOUT_ms = 1000;
 
-std::string open_error(const std::string &path, int error) {
+Error open_error(const std::string &path, int error) {
   switch (error) {
   case ENOENT:
   case ENODEV:
   case ENXIO:
-    return path + ": no such port; plug the fingertip in, then see `fingertip list`";
+    return Error(ErrorCode::no_port, path + ": no such port");
   case EBUSY:
   case EWOULDBLOCK:
-    return path + ": in use by another program; end that one first (who: fuser -v " + path + ")";
+    return Error(ErrorCode::port_in_use, path + ": in use by another program");
   case EACCES:
   case EPERM:
-    return path + ": " + PERMISSION_ADVICE;
+    return Error(ErrorCode::permission_denied, path + ": permission denied");
+  case ENOTTY:
+    return Error(ErrorCode::not_a_port, path + ": no serial port");
   default:
-    return path + ": cannot open (" + std::strerror(error) + "); check the path";
+    return Error(ErrorCode::cannot_open, path + ": cannot open (" + std::strerror(error) + ")");
   }
 }
 
@@ -74,10 +76,7 @@ SerialTransport::SerialTransport(const std::string &path, std::function<std::str
   int error = 0;
   fd_ = open_port(path_, &error);
   if (fd_ < 0) {
-    if (error == ENOTTY) {
-      throw Error(path_ + ": no serial port; a recording is shown with `fingertip replay`");
-    }
-    throw Error(open_error(path_, error));
+    throw open_error(path_, error);
   }
 }
 
@@ -150,7 +149,7 @@ bool SerialTransport::reopen() {
   int error = 0;
   fd_ = open_port(path_, &error);
   if (fd_ < 0 && (error == EBUSY || error == EWOULDBLOCK)) {
-    throw Error(open_error(path_, error));
+    throw open_error(path_, error);
   }
   return fd_ >= 0;
 }
@@ -171,7 +170,7 @@ void SerialTransport::check_unused(const std::string &path) {
   if (fd >= 0) {
     ::close(fd);
   } else if (error == EBUSY || error == EWOULDBLOCK) {
-    throw Error(open_error(path, error));
+    throw open_error(path, error);
   }
 }
 

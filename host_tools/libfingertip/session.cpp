@@ -14,6 +14,19 @@ constexpr std::chrono::milliseconds POLL_INTERVAL{50};
 /* A fingertip does not answer a version that it does not speak: it is asked in these too. */
 constexpr int NEWER_VERSIONS = 2;
 
+ErrorCode refusal_code(std::uint8_t result) {
+  switch (result) {
+  case WIRE_RESULT_UNKNOWN_COMMAND:
+    return ErrorCode::unknown_command;
+  case WIRE_RESULT_OUT_OF_RANGE:
+    return ErrorCode::refused_value;
+  case WIRE_RESULT_NOT_NOW:
+    return ErrorCode::not_now;
+  default:
+    return ErrorCode::refused;
+  }
+}
+
 } // namespace
 
 std::int64_t steady_now_us() {
@@ -103,11 +116,11 @@ wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_ty
       auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - now) +
                   std::chrono::milliseconds(1);
       if (poll(std::min(left, POLL_INTERVAL)) == Transport::Result::gone) {
-        throw Gone(transport_.description() + ": vanished before it answered \"" + name +
-                   "\"; plug it in and try again");
+        throw Gone(transport_.description() + ": vanished before it answered \"" + name + "\"");
       }
       if (ack_ && ack_->result != WIRE_RESULT_DONE) {
-        throw Error("the fingertip refused \"" + name + "\": " + result_text(ack_->result));
+        throw Error(refusal_code(ack_->result),
+                    "the fingertip refused \"" + name + "\": " + result_text(ack_->result));
       }
       if (ack_ && (answer_ || answer_type == 0)) {
         awaited_command_ = 0;
@@ -116,14 +129,13 @@ wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_ty
       }
     }
     if (statistics().version_errors > version_errors) {
-      throw Error(transport_.description() + ": speaks protocol version " +
-                  std::to_string(decoder_.other_version()) + ", this tool version " +
-                  std::to_string(WIRE_VERSION) +
-                  "; install this tool's firmware with `fingertip flash`, or use the other's tool");
+      throw Error(ErrorCode::other_version, transport_.description() +
+                                                ": speaks protocol version " +
+                                                std::to_string(decoder_.other_version()) +
+                                                ", not " + std::to_string(WIRE_VERSION));
     }
   }
-  throw Error(transport_.description() + ": no answer to \"" + name +
-              "\"; is it a fingertip? unplug it and plug it in again");
+  throw Error(ErrorCode::no_answer, transport_.description() + ": no answer to \"" + name + "\"");
 }
 
 void Session::command(const wire_packet &command, Policy policy) {

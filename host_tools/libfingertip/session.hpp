@@ -19,7 +19,7 @@ namespace fingertip {
 /* The port vanished in the middle of a command. */
 class Gone : public Error {
 public:
-  using Error::Error;
+  explicit Gone(const std::string &facts) : Error(ErrorCode::gone, facts) {}
 };
 
 /* The stop function of the session said so, in the middle of a command. */

@@ -1,5 +1,5 @@
 /* Where the bytes of a fingertip come from: a serial port or pseudo-terminal
- * (serial_transport.hpp), libusb (usb_transport.hpp), or a file (recording_transport.hpp).
+ * (serial_transport.hpp), or libusb (usb_transport.hpp).
  */
 #pragma once
 
@@ -15,7 +15,7 @@ public:
   enum class Result {
     data,    /* at least one byte */
     timeout, /* none came in time */
-    gone,    /* the other end vanished, or the file is at its end */
+    gone,    /* the other end vanished */
   };
 
   virtual ~Transport() = default;

@@ -161,7 +161,7 @@ private:
   Link() {
     if (libusb_init(&context_) != 0) {
       context_ = nullptr;
-      throw Error("usb: libusb cannot start; see that /dev/bus/usb is there");
+      throw Error(ErrorCode::usb_failed, "usb: libusb cannot start: is there no /dev/bus/usb?");
     }
   }
 
@@ -205,8 +205,8 @@ private:
   /* False: it vanished meanwhile. */
   bool claim() {
     if (!layout_.is_complete()) {
-      throw Error(description_ +
-                  ": its interfaces are not those of a fingertip; flash its firmware");
+      throw Error(ErrorCode::not_a_fingertip,
+                  description_ + ": its interfaces are not those of a fingertip");
     }
     for (int interface : {layout_.control_interface, layout_.data_interface}) {
       int result = 0;
@@ -224,10 +224,10 @@ private:
       case LIBUSB_ERROR_NOT_FOUND:
         return false;
       case LIBUSB_ERROR_BUSY:
-        throw Error(description_ + ": in use by another program; end that one first");
+        throw Error(ErrorCode::port_in_use, description_ + ": in use by another program");
       default:
-        throw Error(description_ + ": cannot claim its interfaces (" + libusb_error_name(result) +
-                    "); unplug it and plug it in again");
+        throw Error(ErrorCode::usb_failed, description_ + ": cannot claim its interfaces (" +
+                                               libusb_error_name(result) + ")");
       }
     }
     return true;
@@ -239,7 +239,7 @@ private:
       slot = {this, libusb_alloc_transfer(0), std::vector<std::uint8_t>(layout_.in_packet_bytes),
               false};
       if (!slot.transfer) {
-        throw Error(description_ + ": no memory for its transfers; end other programs");
+        throw Error(ErrorCode::usb_failed, description_ + ": no memory for its transfers");
       }
       libusb_fill_bulk_transfer(slot.transfer, handle_, layout_.in, slot.buffer.data(),
                                 static_cast<int>(slot.buffer.size()), received, &slot, 0);
@@ -374,9 +374,8 @@ UsbTransport::UsbTransport(const std::string &serial) : serial_(serial) {
   bool denied = false;
   link_ = Link::open(serial, &denied);
   if (!link_) {
-    throw Error(failure(serial, denied
-                                    ? PERMISSION_ADVICE
-                                    : "no such fingertip; plug it in, then see `fingertip list`"));
+    throw Error(denied ? ErrorCode::permission_denied : ErrorCode::no_port,
+                failure(serial, denied ? "permission denied" : "no such fingertip"));
   }
 }
 

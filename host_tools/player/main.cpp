@@ -8,6 +8,7 @@
 #include "player/native_fingertip.h"
 #include "player/repeat.h"
 #include "player/scenario.hpp"
+#include "tool/advice.hpp"
 
 extern "C" {
 #include "native/native_cdc.h"
@@ -341,7 +342,7 @@ int main(int argc, char **argv) {
   try {
     return fingertip::run(argc, argv);
   } catch (const fingertip::Error &error) {
-    std::fprintf(stderr, "fingertip_player: %s\n", fingertip::printable(error.what()).c_str());
+    fingertip::tell("fingertip_player", error);
   }
   return 1;
 }

@@ -4,6 +4,7 @@
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/text.hpp"
+#include "tool/advice.hpp"
 #include "twin/best_gaussian.hpp"
 #include "twin/scene_file.hpp"
 
@@ -346,6 +347,9 @@ int run(int argc, char **argv) {
 int main(int argc, char **argv) {
   try {
     return run(argc, argv);
+  } catch (const Error &error) {
+    tell("twin", error);
+    return 1;
   } catch (const std::exception &error) {
     std::fprintf(stderr, "twin: %s\n", printable(error.what()).c_str());
     return 1;

@@ -1,12 +1,12 @@
-#include "cli/flash.hpp"
-
+#include "cli/commands/commands.hpp"
 #include "cli/terminal.hpp"
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
-#include "libfingertip/recording.hpp"
+#include "libfingertip/packet_fields.hpp"
 #include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
 #include "libfingertip/uf2.hpp"
+#include "tool/advice.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -27,6 +27,12 @@
 namespace fingertip {
 
 namespace {
+
+struct FlashOptions {
+  Choice choice;
+  std::string file;
+  std::string volume;
+};
 
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
@@ -182,10 +188,6 @@ private:
   bool mounted_here_;
 };
 
-std::string field(const char *text) {
-  return std::string(text, strnlen(text, WIRE_TEXT_BYTES));
-}
-
 /* Asks the fingertip into its loader; its serial number if it told. */
 std::string ask_into_loader(const FlashOptions &options, const FirmwareImage &image,
                             const Way &way) {
@@ -194,12 +196,12 @@ std::string ask_into_loader(const FlashOptions &options, const FirmwareImage &im
   std::string serial = way.serial;
   try {
     wire_info info = session.info(QUICK).body.info;
-    if (field(info.board) != image.board) {
+    if (text_field(info.board) != image.board) {
       throw Error(options.file + ": for board " + image.board + ", but fingertip " +
-                  field(info.serial) + " is a " + field(info.board) + "; give fingertip-" +
-                  field(info.board) + ".uf2");
+                  text_field(info.serial) + " is a " + text_field(info.board) +
+                  "; give fingertip-" + text_field(info.board) + ".uf2");
     }
-    serial = field(info.serial);
+    serial = text_field(info.serial);
     session.command(command_loader(), QUICK);
     return serial;
   } catch (const Gone &) {
@@ -229,7 +231,7 @@ std::unique_ptr<Volume> wait_for_volume(const std::string &given) {
 
 /* The fingertip as it came back; nothing if it did and may not be opened. */
 std::optional<wire_info> wait_for_return(const Choice &choice) {
-  std::string last = "nothing answered";
+  Error last("nothing answered");
   auto begin = Clock::now();
   auto not_refused = begin;
   while (Clock::now() - begin < RETURN_TIMEOUT) {
@@ -237,22 +239,20 @@ std::optional<wire_info> wait_for_return(const Choice &choice) {
     try {
       return ask(choose_way(choice), stop_requested);
     } catch (const Error &error) {
-      last = error.what();
+      last = error;
     }
-    if (last.find(PERMISSION_ADVICE) == std::string::npos) {
+    if (last.code() != ErrorCode::permission_denied) {
       not_refused = Clock::now();
     } else if (Clock::now() - not_refused > PERMITTED_WITHIN) {
       std::fprintf(stderr, "written, and it came back; its version was not read: %s\n",
-                   printable(last).c_str());
+                   told(last).c_str());
       return std::nullopt;
     }
   }
-  throw Error("written, but it did not come back (" + last + "); " + PRESS);
+  throw Error("written, but it did not come back (" + std::string(last.what()) + "); " + PRESS);
 }
 
-} // namespace
-
-int run_flash(const FlashOptions &options) {
+int flash(const FlashOptions &options) {
   FirmwareImage image = read_firmware(options.file);
   Choice choice = options.choice;
   std::unique_ptr<Volume> volume;
@@ -271,7 +271,7 @@ int run_flash(const FlashOptions &options) {
     try {
       way = choose_way(choice);
     } catch (const Error &error) {
-      throw Error(std::string(error.what()) + "; or " + PRESS);
+      throw Error(told(error) + "; or " + PRESS);
     }
     std::string serial = ask_into_loader(options, image, *way);
     if (choice.port.empty() && !serial.empty()) {
@@ -294,15 +294,32 @@ int run_flash(const FlashOptions &options) {
     version += key == "firmware" ? value : "";
   }
   if (version != image.version ||
-      field(info.git_hash) != image.git_hash.substr(0, WIRE_TEXT_BYTES) ||
-      field(info.board) != image.board) {
-    throw Error("written, but fingertip " + field(info.serial) + " came back with firmware " +
-                version + " " + field(info.git_hash) + " instead of " + image.version + " " +
+      text_field(info.git_hash) != image.git_hash.substr(0, WIRE_TEXT_BYTES) ||
+      text_field(info.board) != image.board) {
+    throw Error("written, but fingertip " + text_field(info.serial) + " came back with firmware " +
+                version + " " + text_field(info.git_hash) + " instead of " + image.version + " " +
                 image.git_hash + "; " + PRESS);
   }
-  std::printf("fingertip %s: firmware %s %s, board %s\n", printable(field(info.serial)).c_str(),
-              version.c_str(), field(info.git_hash).c_str(), field(info.board).c_str());
+  std::printf("fingertip %s: firmware %s %s, board %s\n",
+              printable(text_field(info.serial)).c_str(), version.c_str(),
+              text_field(info.git_hash).c_str(), text_field(info.board).c_str());
   return 0;
+}
+
+} // namespace
+
+void add_flash(CommandLine &line) {
+  auto options = std::make_shared<FlashOptions>();
+  CLI::App *command = line.add("flash", "Install firmware and see it come back",
+                               [options] { return flash(*options); });
+  with_port(command, options->choice);
+  command->add_option("image", options->file, "The firmware, build/BOARD/fingertip-BOARD.uf2")
+      ->required()
+      ->type_name("IMAGE.uf2");
+  command
+      ->add_option("--volume", options->volume,
+                   "Where the loader's drive RPI-RP2 is mounted; default: found, or mounted")
+      ->type_name("FOLDER");
 }
 
 } // namespace fingertip

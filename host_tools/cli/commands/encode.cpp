@@ -1,0 +1,99 @@
+#include "cli/commands/commands.hpp"
+#include "cli/usage.hpp"
+#include "libfingertip/command.hpp"
+#include "libfingertip/names.hpp"
+#include "libfingertip/text.hpp"
+
+#include <cstdio>
+#include <functional>
+#include <map>
+#include <memory>
+
+namespace fingertip {
+
+namespace {
+
+struct EncodeOptions {
+  std::vector<std::string> words;
+  unsigned sequence = 0;
+  std::uint64_t time_us = 0;
+};
+
+wire_packet packet_from_words(const std::vector<std::string> &words) {
+  struct Form {
+    std::size_t arguments;
+    std::string usage;
+    std::function<wire_packet()> make;
+  };
+  auto word = [&](std::size_t i) { return words[i]; };
+  const std::map<std::string, Form> forms = {
+      {"stream",
+       {1, "stream none|contact,raw,health",
+        [&] { return command_stream(streams_from_text(word(1))); }}},
+      {"tare", {0, "tare", [] { return command_tare(); }}},
+      {"tare-force", {0, "tare-force", [] { return command_tare(true); }}},
+      {"rate", {1, "rate HZ|max", [&] { return command_rate_mHz(rate_mHz_from_text(word(1))); }}},
+      {"osr", {1, "osr N", [&] { return command_osr(osr_from_text(word(1))); }}},
+      {"slip",
+       {2, "slip THRESHOLD_MM WINDOW_MS",
+        [&] {
+          return command_slip(slip_threshold_mm_from_text(word(1)),
+                              slip_window_ms_from_text(word(2)));
+        }}},
+      {"info", {0, "info", command_info}},
+      {"health", {0, "health", command_health}},
+      {"loader", {0, "loader", command_loader}},
+      {"prior",
+       {1, "prior SIGMA[:WIDTH]|none",
+        [&] {
+          Prior prior = prior_from_text(word(1));
+          return command_prior(prior.sigma_mm, prior.width_mm);
+        }}},
+      {"limit",
+       {1, "limit MM",
+        [&] { return command_location_limit(location_limit_mm_from_text(word(1))); }}},
+      {"keep", {0, "keep", [] { return command_keep(true); }}},
+      {"forget", {0, "forget", [] { return command_keep(false); }}},
+      {"erase", {0, "erase", command_erase_calibration}},
+  };
+  auto form = forms.find(words[0]);
+  if (form == forms.end()) {
+    throw Error("command \"" + words[0] +
+                "\" is unknown; give stream, tare, tare-force, rate, osr, slip, prior, limit, "
+                "keep, forget, "
+                "erase, info, health or loader");
+  }
+  if (words.size() != 1 + form->second.arguments) {
+    throw Error("wrong arguments; give: fingertip encode " + form->second.usage);
+  }
+  return form->second.make();
+}
+
+int encode(const EncodeOptions &options) {
+  wire_packet packet = typed([&] { return packet_from_words(options.words); });
+  packet.sequence = static_cast<std::uint16_t>(options.sequence);
+  packet.t_us = options.time_us;
+  std::printf("%s\n", hex(frame_bytes(packet)).c_str());
+  return 0;
+}
+
+} // namespace
+
+void add_encode(CommandLine &line) {
+  auto options = std::make_shared<EncodeOptions>();
+  CLI::App *command = line.add("encode", "Print the frame of a command as hexadecimal digits",
+                               [options] { return encode(*options); });
+  command
+      ->add_option("command", options->words,
+                   "stream none|contact,raw,health; tare; rate HZ|max; osr N; slip THRESHOLD_MM "
+                   "WINDOW_MS; prior SIGMA[:WIDTH]|none; limit MM; keep; forget; erase (the "
+                   "calibration); info; health; loader")
+      ->required()
+      ->type_name("COMMAND [ARGS]");
+  command->add_option("--sequence", options->sequence, "Sequence number; default 0")
+      ->check(CLI::Range(0, 65535))
+      ->type_name("N");
+  command->add_option("--time", options->time_us, "Time of the header; default 0")->type_name("US");
+}
+
+} // namespace fingertip

@@ -1,0 +1,65 @@
+#include "cli/commands/commands.hpp"
+#include "libfingertip/packet_fields.hpp"
+#include "libfingertip/text.hpp"
+#include "tool/advice.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+
+namespace fingertip {
+
+namespace {
+
+/* "serial /dev/ttyACM0, usb 001/005" */
+std::string reached_text(const Found &found) {
+  std::string text = found.port.empty() ? "" : (found.usb ? "serial " : "port ") + found.port;
+  if (found.usb) {
+    char place[32];
+    std::snprintf(place, sizeof place, "usb %03u/%03u", found.usb->bus, found.usb->address);
+    text += (text.empty() ? "" : ", ") + std::string(place);
+  }
+  return text;
+}
+
+int list(Reach reach) {
+  std::vector<Found> all = find_usb();
+  for (const Found &found : find_in_environment()) {
+    all.push_back(found);
+  }
+  if (all.empty()) {
+    throw Error(ErrorCode::no_fingertip, "no fingertip found");
+  }
+  for (const Found &found : all) {
+    Metadata info = {{"serial", found.serial}, {"board", ""}, {"scene", ""}, {"firmware", ""}};
+    std::string reached = reached_text(found);
+    try {
+      auto way = way_to(found, reach);
+      if (way) {
+        info = info_metadata(ask(*way, stop_requested));
+      }
+    } catch (const Error &error) {
+      reached += " (" + told(error) + ")";
+    }
+    for (const char *key : {"serial", "board", "firmware"}) {
+      auto pair = std::find_if(info.begin(), info.end(), [&](auto &p) { return p.first == key; });
+      std::printf("%s\t", pair->second.empty() ? "-" : printable(pair->second).c_str());
+    }
+    std::printf("%s\n", printable(reached).c_str());
+  }
+  return 0;
+}
+
+} // namespace
+
+void add_list(CommandLine &line) {
+  auto choice = std::make_shared<Choice>();
+  with_transport(
+      line.add("list",
+               "List the fingertips plugged in, and the paths in $FINGERTIP_PORT: serial "
+               "number, board, firmware, how it is reached",
+               [choice] { return list(choice->reach); }),
+      *choice);
+}
+
+} // namespace fingertip

@@ -1,0 +1,42 @@
+#include "cli/commands/commands.hpp"
+#include "cli/live.hpp"
+#include "cli/recording_options.hpp"
+#include "cli/usage.hpp"
+
+#include <memory>
+
+namespace fingertip {
+
+namespace {
+
+struct MonitorOptions {
+  Choice choice;
+  LiveOptions live;
+};
+
+int monitor(const MonitorOptions &options) {
+  if (options.live.recording == STANDARD_OUTPUT) {
+    throw WrongUsage("monitor shows on standard output; give --record a file, or use `fingertip "
+                     "record -`");
+  }
+  if (options.live.raw_bytes == STANDARD_OUTPUT) {
+    throw WrongUsage("--raw-bytes needs a file; give it a name");
+  }
+  check_outputs(options.live);
+  return run_live(options.live, {choose_way(options.choice)});
+}
+
+} // namespace
+
+void add_monitor(CommandLine &line) {
+  auto options = std::make_shared<MonitorOptions>();
+  CLI::App *command = line.add("monitor", "Show live what the fingertip feels",
+                               [options] { return monitor(*options); });
+  with_port(command, options->choice);
+  with_recording(command, options->live);
+  command->add_option("--record", options->live.recording, "Record at the same time")
+      ->type_name("FILE.csv");
+  with_colour(command, options->live.colour);
+}
+
+} // namespace fingertip

@@ -1,0 +1,38 @@
+/* What is kept of what fingertips say: a recording of one, or of several on one clock. */
+#pragma once
+
+#include "cli/live.hpp"
+#include "libfingertip/device_loop.hpp"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace fingertip {
+
+/* Now, as recordings write it. */
+std::string utc_now();
+
+class Keeper {
+public:
+  virtual ~Keeper() = default;
+
+  virtual void packet(const DeviceNews &news) = 0;
+  virtual void event(std::size_t device, const std::string &text) = 0;
+  virtual void clock(const DeviceNews &) {}
+  /* What waits to be put in order with news of other fingertips waits no longer, if it is older. */
+  virtual void settle(double /*host_us*/) {}
+  virtual void finish(const std::vector<LineStatistics> &statistics, const std::string &reason) = 0;
+
+  virtual std::uint64_t frames(std::size_t device) const = 0;
+  /* The bound on the distance in time of two rows of different fingertips, so far. */
+  virtual double alignment_us() const { return 0; }
+};
+
+/* ready: the news of that kind of each fingertip, and its port. */
+std::unique_ptr<Keeper> make_keeper(const LiveOptions &options,
+                                    const std::vector<DeviceNews> &ready,
+                                    const std::vector<std::string> &ports,
+                                    std::int64_t host_zero_us);
+
+} // namespace fingertip

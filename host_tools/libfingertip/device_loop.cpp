@@ -1,0 +1,264 @@
+#include "libfingertip/device_loop.hpp"
+
+#include "libfingertip/command.hpp"
+#include "libfingertip/error.hpp"
+#include "libfingertip/packet_fields.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+namespace fingertip {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+using Kind = DeviceNews::Kind;
+
+constexpr milliseconds POLL{20};
+constexpr milliseconds REOPEN_INTERVAL{200};
+/* Without a frame for so long the streams are asked for again: the device may have restarted
+ * without the port noticing. */
+constexpr milliseconds REVIVE_AFTER{3000};
+/* Exchanges before the streams begin, when nothing delays them; then one this often. */
+constexpr int FIRST_EXCHANGES = 32;
+constexpr milliseconds EXCHANGE_INTERVAL{100};
+/* How far behind a loop may be with reading, for the others' rows to wait for it. */
+constexpr std::int64_t LONGEST_BACKLOG_us = 2000000;
+/* A second and a half at the highest rate, 2000 frames of two packets. */
+constexpr std::size_t FEED_CAPACITY = 6000;
+constexpr Session::Policy LAST_WORD = {milliseconds(500), 2};
+
+} // namespace
+
+std::vector<DeviceNews> DeviceFeed::take(milliseconds timeout) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  filled_.wait_for(lock, timeout, [this] { return !news_.empty(); });
+  std::vector<DeviceNews> taken(std::make_move_iterator(news_.begin()),
+                                std::make_move_iterator(news_.end()));
+  news_.clear();
+  drained_.notify_all();
+  return taken;
+}
+
+void DeviceFeed::put(DeviceNews news, const std::atomic<bool> &abandoned) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  drained_.wait(lock, [&] { return news_.size() < FEED_CAPACITY || abandoned; });
+  if (!abandoned) {
+    news_.push_back(std::move(news));
+    filled_.notify_one();
+  }
+}
+
+void DeviceFeed::wake() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  drained_.notify_all();
+}
+
+DeviceLoop::DeviceLoop(std::size_t number, const Way &way, const Options &options, DeviceFeed &feed)
+    : number_(number), options_(options), feed_(feed), transport_(open_way(way)),
+      session_(*transport_, [this] { return stop_ && !ending_; }),
+      name_(transport_->description()) {
+  if (options.follow_clock) {
+    session_.on_exchange([this](const ClockExchange &exchange) {
+      fit_.add(exchange);
+      if (started_) {
+        DeviceNews news{Kind::clock, number_};
+        news.estimate = *fit_.estimate();
+        news.jumps = fit_.jumps();
+        put(std::move(news));
+      }
+    });
+  }
+  if (options.bytes) {
+    session_.on_bytes([this](const std::uint8_t *bytes, std::size_t length) {
+      DeviceNews news{Kind::bytes, number_};
+      news.bytes.assign(bytes, bytes + length);
+      put(std::move(news));
+    });
+  }
+  session_.on_packet([this](const wire_packet &packet) { take(packet); });
+  thread_ = std::thread([this] { run(); });
+}
+
+DeviceLoop::~DeviceLoop() {
+  stop_ = true;
+  abandoned_ = true;
+  feed_.wake();
+  thread_.join();
+}
+
+void DeviceLoop::send(const wire_packet &command) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  wanted_.push_back(command);
+}
+
+std::string DeviceLoop::name() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return name_;
+}
+
+LineStatistics DeviceLoop::statistics() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return statistics_;
+}
+
+double DeviceLoop::read_until_us() const {
+  return nothing_expected_ ? std::numeric_limits<double>::infinity()
+                           : static_cast<double>(read_until_us_);
+}
+
+void DeviceLoop::rethrow() const {
+  if (failure_) {
+    std::rethrow_exception(failure_);
+  }
+}
+
+void DeviceLoop::run() {
+  try {
+    stream();
+  } catch (const Interrupted &) {
+  } catch (...) {
+    failure_ = std::current_exception();
+  }
+  publish();
+  nothing_expected_ = true;
+  put(Kind::ended);
+}
+
+void DeviceLoop::stream() {
+  for (bool again = false;; again = info_.has_value()) {
+    try {
+      greet(again);
+      follow();
+      end_streams();
+      return;
+    } catch (const Gone &) {
+      nothing_expected_ = true;
+      put(Kind::gone);
+    }
+    if (!options_.wait_for_back || ending_) {
+      return;
+    }
+    wait_for_port();
+  }
+}
+
+/* Who is there, and how its clock goes. */
+void DeviceLoop::greet(bool again) {
+  fit_ = ClockFit();
+  wire_packet info = session_.info();
+  if (again && std::memcmp(info.body.info.serial, info_->serial, WIRE_TEXT_BYTES) != 0) {
+    throw Error(ErrorCode::other_fingertip,
+                name() + ": another fingertip came back there; it had " +
+                    text_field(info_->serial) + ", now " + text_field(info.body.info.serial));
+  }
+  fit_ = ClockFit(); /* the first answers may have waited for the device to start */
+  for (int i = 0; options_.follow_clock && i < FIRST_EXCHANGES; i++) {
+    session_.command(command_stream(0));
+  }
+  DeviceNews news{again ? Kind::back : Kind::ready, number_};
+  news.health = session_.health().body.health;
+  news.packet = session_.info();
+  news.relation = session_.clock();
+  news.host_us = static_cast<double>(steady_now_us());
+  info_ = news.packet.body.info;
+  streams_ = possible_streams(*info_, options_.streams);
+  publish();
+  read_until_us_ = steady_now_us();
+  nothing_expected_ = false;
+  put(std::move(news));
+  while (!started_) {
+    if (stop_) {
+      throw Interrupted();
+    }
+    std::this_thread::sleep_for(milliseconds(2));
+  }
+  session_.command(command_stream(streams_));
+  asked_ = last_frame_ = Clock::now();
+}
+
+void DeviceLoop::follow() {
+  while (!stop_) {
+    std::int64_t begun_us = steady_now_us();
+    Transport::Result result = session_.poll(POLL);
+    publish();
+    if (result == Transport::Result::gone) {
+      throw Gone(name() + ": vanished");
+    }
+    if (result == Transport::Result::timeout) {
+      read_until_us_ = begun_us;
+    }
+    send_wanted();
+    /* Repeating the wish is an exchange, and wakes a device that restarted unnoticed. */
+    auto now = Clock::now();
+    if (options_.follow_clock ? now - asked_ >= EXCHANGE_INTERVAL
+                              : now - std::max(asked_, last_frame_) > REVIVE_AFTER) {
+      session_.send(command_stream(streams_));
+      asked_ = now;
+    }
+  }
+}
+
+void DeviceLoop::send_wanted() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  std::deque<wire_packet> commands = std::exchange(wanted_, {});
+  lock.unlock();
+  for (const wire_packet &command : commands) {
+    session_.send(command);
+  }
+}
+
+void DeviceLoop::wait_for_port() {
+  while (!session_.reopen()) {
+    if (stop_) {
+      throw Interrupted();
+    }
+    std::this_thread::sleep_for(REOPEN_INTERVAL);
+  }
+  publish();
+}
+
+void DeviceLoop::end_streams() {
+  ending_ = true;
+  try {
+    session_.command(command_stream(0), LAST_WORD);
+  } catch (const Gone &) {
+    throw;
+  } catch (const Error &) {
+    put(Kind::mute);
+  }
+}
+
+void DeviceLoop::take(const wire_packet &packet) {
+  std::int64_t now_us = steady_now_us();
+  DeviceNews news{Kind::packet, number_};
+  news.packet = packet;
+  news.host_us =
+      fit_.estimate() ? fit_.estimate()->host_at(packet.t_us) : static_cast<double>(now_us);
+  if (packet.type == WIRE_CONTACT || packet.type == WIRE_RAW) {
+    last_frame_ = Clock::now();
+  }
+  auto until_us =
+      std::clamp(static_cast<std::int64_t>(news.host_us), now_us - LONGEST_BACKLOG_us, now_us);
+  put(std::move(news));
+  read_until_us_ = until_us;
+}
+
+void DeviceLoop::publish() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  statistics_ = session_.statistics();
+  name_ = transport_->description();
+}
+
+void DeviceLoop::put(DeviceNews news) {
+  feed_.put(std::move(news), abandoned_);
+}
+
+void DeviceLoop::put(Kind kind) {
+  put(DeviceNews{kind, number_});
+}
+
+} // namespace fingertip

@@ -1,0 +1,152 @@
+/* A fingertip from its first answer to the end of its streams: greeted, streaming, waited for when
+ * its port vanishes, greeted again. Each has a thread of its own, so that none waits for another
+ * and arrivals are timed as they happen; what happens to all of them comes out of one feed. One
+ * fingertip and many are followed alike.
+ *
+ *   DeviceFeed feed;
+ *   DeviceLoop loop(0, way, options, feed);
+ *   for (bool over = false; !over;) {
+ *     for (const DeviceNews &news : feed.take(20ms)) {
+ *       if (news.kind == DeviceNews::Kind::ready) loop.start();
+ *       ...
+ *       over = over || news.kind == DeviceNews::Kind::ended;
+ *     }
+ *     if (enough) loop.stop();
+ *   }
+ *   loop.rethrow();
+ */
+#pragma once
+
+#include "libfingertip/clock_fit.hpp"
+#include "libfingertip/connection.hpp"
+#include "libfingertip/session.hpp"
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace fingertip {
+
+struct DeviceNews {
+  enum class Kind {
+    packet, /* every one that came, in order */
+    ready,  /* it answered for the first time: packet is the last info packet; it waits for start */
+    gone,   /* its port vanished */
+    back,   /* it answered again: as ready, but its streams follow */
+    mute,   /* it did not answer to the end of its streams */
+    bytes,  /* of the line, before the packets in them; only if they are wanted */
+    clock,  /* another estimate; only if clocks are followed */
+    ended,  /* the last news */
+  };
+
+  DeviceNews(Kind what, std::size_t number) : kind(what), device(number) {}
+
+  Kind kind;
+  std::size_t device;
+  wire_packet packet{};
+  double host_us = 0;                    /* of the packet's t_us on the host's steady clock; of its
+                                            arrival where the clock is not known or followed */
+  wire_health health{};                  /* ready, back */
+  std::optional<ClockRelation> relation; /* ready */
+  std::vector<std::uint8_t> bytes;
+  ClockEstimate estimate{}; /* clock */
+  unsigned jumps = 0;       /* clock */
+};
+
+/* From the loops' threads to the one that takes. Holds some seconds of news at the highest rate;
+ * when it is full the loops stop reading, and the fingertips drop and count what they cannot
+ * send. */
+class DeviceFeed {
+public:
+  /* All there is, waiting at most this long for the first. */
+  std::vector<DeviceNews> take(std::chrono::milliseconds timeout);
+
+private:
+  friend class DeviceLoop;
+
+  void put(DeviceNews news, const std::atomic<bool> &abandoned);
+  void wake();
+
+  std::mutex mutex_;
+  std::condition_variable filled_, drained_;
+  std::deque<DeviceNews> news_;
+};
+
+class DeviceLoop {
+public:
+  struct Options {
+    std::uint8_t streams = 0;  /* those wanted: of them come those that its firmware has */
+    bool follow_clock = false; /* exchanges ten times a second, news of kind clock */
+    bool bytes = false;        /* news of kind bytes */
+    bool wait_for_back = true; /* else it ends where the port vanishes */
+  };
+
+  /* number: of its news. Throws Error if the port cannot be opened. The feed must outlive it. */
+  DeviceLoop(std::size_t number, const Way &way, const Options &options, DeviceFeed &feed);
+  /* Ends the streams first; what is in the feed stays there. */
+  ~DeviceLoop();
+  DeviceLoop(const DeviceLoop &) = delete;
+  DeviceLoop &operator=(const DeviceLoop &) = delete;
+
+  /* Once ready: stream. */
+  void start() { started_ = true; }
+  /* End the streams, and then itself; packets come until it has ended. */
+  void stop() { stop_ = true; }
+  /* A command that nobody waits for; its acknowledgement is among the packets. */
+  void send(const wire_packet &command);
+
+  std::string name() const;
+  LineStatistics statistics() const;
+  /* Until when everything that came was read, on the host's steady clock; endless while nothing is
+   * expected: gone, or ended. */
+  double read_until_us() const;
+  /* After news of kind ended: throws what ended it, if it was an error. */
+  void rethrow() const;
+
+private:
+  void run();
+  void stream();
+  void greet(bool again);
+  void follow();
+  void wait_for_port();
+  void end_streams();
+  void take(const wire_packet &packet);
+  void send_wanted();
+  void put(DeviceNews news);
+  void put(DeviceNews::Kind kind);
+  void publish();
+
+  std::size_t number_;
+  Options options_;
+  DeviceFeed &feed_;
+  std::unique_ptr<Transport> transport_;
+  Session session_;
+  ClockFit fit_;
+  std::uint8_t streams_ = 0; /* those wanted that its firmware has */
+  std::optional<wire_info> info_;
+  wire_health health_{};
+  std::chrono::steady_clock::time_point asked_{}, last_frame_{};
+  bool ending_ = false; /* its last command is not interrupted */
+
+  std::atomic<bool> started_{false}, stop_{false}, abandoned_{false};
+  std::atomic<bool> nothing_expected_{false};
+  std::atomic<std::int64_t> read_until_us_{0};
+  mutable std::mutex mutex_; /* of what follows */
+  LineStatistics statistics_;
+  std::string name_;
+  std::deque<wire_packet> wanted_; /* commands */
+
+  std::exception_ptr failure_;
+  std::thread thread_;
+};
+
+} // namespace fingertip

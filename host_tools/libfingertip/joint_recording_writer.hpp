@@ -1,0 +1,64 @@
+/* Writes several fingertips into one recording on one clock; recording.hpp has the format. */
+#pragma once
+
+#include "libfingertip/clock_fit.hpp"
+#include "libfingertip/decoder.hpp"
+#include "libfingertip/output_file.hpp"
+#include "libfingertip/recording_lines.hpp"
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace fingertip {
+
+class JointRecordingWriter {
+public:
+  /* All of them with equally many sensors, or Error. */
+  JointRecordingWriter(const std::string &path, bool replace, const std::vector<wire_info> &infos,
+                       const Metadata &extra, std::int64_t host_zero_us, bool raw_expected,
+                       OutputFile::Appears appears);
+
+  /* host_us: its time on the recorder's clock. */
+  void packet(std::size_t device, const wire_packet &packet, double host_us);
+  void event(std::size_t device, const std::string &text);
+  void clock(std::size_t device, const ClockEstimate &estimate, unsigned jumps);
+  /* Lines older than this on the recorder's clock may go to the file. */
+  void settle(double host_us);
+  void finish(const std::vector<LineStatistics> &statistics, const std::string &reason);
+
+  std::uint64_t frames() const;
+  std::uint64_t frames(std::size_t device) const { return devices_[device].lines.frames(); }
+  /* The bound on the distance in time of two rows of different fingertips, so far. */
+  double alignment_us() const { return alignment_us_; }
+  const std::string &path() const { return file_.path(); }
+
+private:
+  struct Device {
+    explicit Device(PacketLines packet_lines) : lines(std::move(packet_lines)) {}
+    PacketLines lines;
+    std::uint64_t packet_t_us = 0; /* of the packet under way, */
+    double packet_host_us = 0;     /* on both clocks */
+    double last_line_us = 0;       /* where its last line stands among those that wait */
+    std::optional<ClockEstimate> clock;
+    unsigned jumps = 0;
+    double clock_written_us = 0;
+  };
+
+  void line(const std::string &text);
+  /* Among those that wait, but never before an earlier one of the same fingertip. */
+  void line(std::size_t device, double host_us, const std::string &text);
+  std::string time_text(double host_us) const;
+
+  OutputFile file_;
+  std::int64_t host_zero_us_;
+  std::vector<Device> devices_;
+  bool head_written_ = false;
+  std::multimap<double, std::string> waiting_; /* lines by their time */
+  double alignment_us_ = 0;
+  double last_us_ = 0;
+};
+
+} // namespace fingertip

@@ -1,0 +1,25 @@
+/* What packets hold, by the names that recordings and people use. */
+#pragma once
+
+#include "libfingertip/wire.hpp"
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace fingertip {
+
+using Metadata = std::vector<std::pair<std::string, std::string>>;
+
+/* Of a field that is padded with zeros, if there is room. */
+std::string text_field(const char *field);
+
+/* The scalar fields of an info packet, the sensor positions, and the calibration if there is one.
+ */
+Metadata info_metadata(const wire_info &info);
+
+/* The counters of a health packet. */
+std::vector<std::pair<std::string, std::uint32_t>> health_fields(const wire_health &health);
+
+} // namespace fingertip

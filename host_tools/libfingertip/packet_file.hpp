@@ -1,0 +1,54 @@
+/* The packets in a file: a recording (CSV, recording.hpp), or the bytes of the line as they came
+ * (.ftr, also what the emulator captures). A recording is told by its first line. */
+#pragma once
+
+#include "libfingertip/decoder.hpp"
+#include "libfingertip/recording_reader.hpp"
+
+#include <cstdint>
+#include <deque>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace fingertip {
+
+/* Events in recordings: the port vanished here, and was there again. */
+inline constexpr const char *EVENT_GONE = "gone";
+inline constexpr const char *EVENT_BACK = "back";
+
+class PacketFile {
+public:
+  using Item = RecordingReader::Item;
+
+  /* Throws Error if the file cannot be read; so does next for a damaged line, unless salvaging.
+   * device: the serial number of one of several fingertips in the file. */
+  PacketFile(const std::string &path, bool salvage, const std::string &device = "");
+
+  /* Nothing at the end of the file. */
+  std::optional<Item> next();
+
+  /* What the packets until now tell of the line. At the end of a recording what its recorder
+   * counted, which saw the line itself. */
+  const LineStatistics &statistics() const { return statistics_; }
+  /* At the end of the file: a recording without its end line. */
+  bool is_cut_short() const { return ended_ && reader_ && !reader_->has_end(); }
+  std::uint64_t skipped_lines() const { return reader_ ? reader_->skipped_lines() : 0; }
+  /* The recorder's own keys, once the first item was read. */
+  Metadata recorder_metadata() const { return reader_ ? reader_->recorder_metadata() : Metadata(); }
+
+private:
+  std::optional<Item> next_of_recording();
+  std::optional<Item> next_of_capture();
+
+  std::unique_ptr<RecordingReader> reader_; /* of a recording */
+  SequenceFollower sequence_;
+  std::ifstream bytes_; /* of a capture */
+  Decoder decoder_;
+  std::deque<Item> decoded_;
+  LineStatistics statistics_;
+  bool ended_ = false;
+};
+
+} // namespace fingertip

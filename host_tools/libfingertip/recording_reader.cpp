@@ -1,0 +1,332 @@
+#include "libfingertip/recording_reader.hpp"
+
+#include "libfingertip/discovery.hpp"
+#include "libfingertip/error.hpp"
+#include "libfingertip/recording_fields.hpp"
+#include "libfingertip/text.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <map>
+
+namespace fingertip {
+
+using namespace recording;
+
+namespace {
+
+/* Of the first line, "1" or "2". Throws Error with what it is instead. */
+std::string format_of(const std::string &path, const std::string &line) {
+  std::string_view words = trim(line);
+  std::string_view begin = FIRST_WORDS;
+  if (words.substr(0, begin.size()) == begin) {
+    std::string format(words.substr(begin.size()));
+    if (format != FORMAT_OF_ONE && format != FORMAT_OF_SEVERAL) {
+      throw Error(ErrorCode::other_format, path + ":1: recording format \"" + format +
+                                               "\" is unknown, " + FORMAT_OF_ONE + " and " +
+                                               FORMAT_OF_SEVERAL + " are known");
+    }
+    return format;
+  }
+  std::string_view ours = "# fingertip-";
+  std::string kind(words.substr(0, ours.size()) == ours ? words.substr(ours.size()) : "");
+  throw Error(ErrorCode::not_a_recording,
+              path + (kind.empty()
+                          ? ":1: no recording; its first line is not \"" + std::string(begin) +
+                                FORMAT_OF_ONE + "\""
+                          : ": a " + kind.substr(0, kind.find(' ')) + ", not a recording"));
+}
+
+} // namespace
+
+RecordingReader::RecordingReader(const std::string &path, bool salvage, const std::string &device)
+    : path_(path), salvage_(salvage), file_(path, std::ios::binary), wanted_(device) {
+  if (!file_) {
+    throw Error(ErrorCode::cannot_read, path + ": " + std::strerror(errno));
+  }
+  std::memset(&info_, 0, sizeof info_);
+  std::string first;
+  std::getline(file_, first);
+  line_number_ = 1;
+  joint_ = format_of(path, first) == FORMAT_OF_SEVERAL;
+}
+
+std::optional<RecordingReader::Item> RecordingReader::next() {
+  std::string text;
+  while (items_.empty() && std::getline(file_, text)) {
+    line_number_++;
+    try {
+      if (file_.eof() && !text.empty()) {
+        throw Damage{"the last line is torn"};
+      }
+      if (!text.empty() && text.back() == '\r') {
+        text.pop_back(); /* somebody's editor */
+      }
+      read_line(text);
+    } catch (const Damage &damage) {
+      if (!salvage_ || !header_seen_) {
+        throw Error(header_seen_ ? ErrorCode::damaged_line : ErrorCode::damaged_head,
+                    path_ + ":" + std::to_string(line_number_) + ": " + damage.what);
+      }
+      skipped_lines_++;
+    }
+  }
+  if (items_.empty()) {
+    if (!header_seen_) {
+      throw Error(ErrorCode::damaged_head, path_ + ": no header line");
+    }
+    return std::nullopt;
+  }
+  Item item = items_.front();
+  items_.pop_front();
+  return item;
+}
+
+void RecordingReader::read_line(const std::string &text) {
+  if (trim(text).empty()) {
+    return;
+  }
+  if (text[0] == '#') {
+    read_comment(text);
+  } else if (header_seen_ && joint_) {
+    auto mine = number_ + ",";
+    std::size_t time = text.find(',');
+    std::size_t rest = time == std::string::npos ? time : text.find(',', time + 1);
+    if (rest == std::string::npos) {
+      throw Damage{"neither a comment nor a row"};
+    }
+    if (text.compare(0, mine.size(), mine) == 0) {
+      read_row(std::string_view(text).substr(rest + 1));
+    }
+  } else if (header_seen_) {
+    read_row(text);
+  } else {
+    std::string text_of_one = text;
+    if (joint_) {
+      if (text.rfind(JOINT_COLUMNS, 0) != 0 || number_.empty()) {
+        throw Damage{"unknown header"};
+      }
+      text_of_one = text.substr(std::string(JOINT_COLUMNS).size());
+    }
+    auto columns =
+        static_cast<std::size_t>(std::count(text_of_one.begin(), text_of_one.end(), ',')) + 1;
+    std::size_t fixed_columns = 2 + contact_columns() + RAW_COLUMNS;
+    std::size_t sensors = columns > fixed_columns ? (columns - fixed_columns) / 2 : 0;
+    if (sensors > FT_MAX_SENSORS ||
+        text_of_one != header_text(static_cast<std::uint8_t>(sensors))) {
+      throw Damage{"unknown header"};
+    }
+    sensor_count_ = static_cast<std::uint8_t>(sensors);
+    header_seen_ = true;
+  }
+}
+
+void RecordingReader::read_comment(const std::string &text) {
+  std::size_t colon = text.find(": ");
+  if (colon == std::string::npos) {
+    throw Damage{"neither a comment \"# key: value\" nor a row"};
+  }
+  std::string key(trim(std::string_view(text).substr(1, colon - 1)));
+  if (std::size_t slash = key.find('/'); joint_ && slash != std::string::npos) {
+    if (key.compare(0, slash, number_) != 0) {
+      return;
+    }
+    key = key.substr(slash + 1);
+    if (key == "end") {
+      read_end(std::string_view(text).substr(colon + 2));
+      return;
+    }
+  } else if (joint_ && key == "devices") {
+    choose_device(text.substr(colon + 2));
+    return;
+  }
+  std::string value(text.substr(colon + 2));
+  Item item{};
+  std::map<std::string, std::string, std::less<>> pairs;
+  if (key == "packet") {
+    auto words = split(value, ' ');
+    for (std::size_t i = 1; i < words.size(); i++) {
+      std::size_t equals = words[i].find('=');
+      if (equals == std::string_view::npos) {
+        throw Damage{"\"" + std::string(words[i]) + "\" is not key=value"};
+      }
+      pairs.emplace(words[i].substr(0, equals), words[i].substr(equals + 1));
+    }
+    PairReader reader{pairs};
+    item.kind = Item::Kind::packet;
+    reader("sequence", item.packet.sequence);
+    reader("t_us", item.packet.t_us);
+    if (words[0] == PACKET_HEALTH) {
+      item.packet.type = WIRE_HEALTH;
+      visit_health(reader, item.packet.body.health);
+    } else if (words[0] == PACKET_ACK) {
+      item.packet.type = WIRE_ACK;
+      visit_ack(reader, item.packet.body.ack);
+    } else if (words[0] == PACKET_INFO) {
+      if (info_.sensor_count < 1 || info_.sensor_count > FT_MAX_SENSORS) {
+        throw Damage{"an info packet without \"# sensors:\" before it"};
+      }
+      item.packet.type = WIRE_INFO;
+      item.packet.body.info = info_;
+      if (!(info_.stored & WIRE_STORED_CALIBRATION)) {
+        item.packet.body.info.calibration = {};
+      }
+    } else {
+      throw Damage{"packet \"" + std::string(words[0]) + "\" is unknown"};
+    }
+    items_.push_back(item);
+  } else if (key == "event") {
+    item.kind = Item::Kind::event;
+    item.event = value;
+    items_.push_back(item);
+  } else if (key == "end") {
+    has_end_ = true;
+    if (!joint_) {
+      read_end(value);
+    }
+  } else {
+    read_info_field(key, value);
+  }
+}
+
+void RecordingReader::read_end(std::string_view text) {
+  LineStatistics statistics;
+  for (std::string_view word : split(text, ' ')) {
+    std::size_t equals = word.find('=');
+    if (equals == std::string_view::npos) {
+      throw Damage{"\"" + std::string(word) + "\" is not key=value"};
+    }
+    if (auto count = to_u64(word.substr(equals + 1))) {
+      statistics.set(word.substr(0, equals), *count);
+    }
+  }
+  end_statistics_ = statistics;
+}
+
+void RecordingReader::read_info_field(const std::string &key, const std::string &value) {
+  auto copy_text = [&](char *field) {
+    if (!std::all_of(value.begin(), value.end(), [](char c) { return c >= 0x20 && c <= 0x7E; })) {
+      throw Damage{key + " is no printable ASCII"};
+    }
+    std::memset(field, 0, WIRE_TEXT_BYTES);
+    std::memcpy(field, value.data(), std::min<std::size_t>(value.size(), WIRE_TEXT_BYTES));
+  };
+  auto read_list = [&](auto value_of) {
+    auto numbers = split(value, ' ');
+    if (numbers.size() > FT_MAX_SENSORS) {
+      throw Damage{key + " has too many values"};
+    }
+    for (std::size_t k = 0; k < numbers.size() && !value.empty(); k++) {
+      parse_cell(key, numbers[k], value_of(k));
+    }
+  };
+  if (key == "serial") {
+    copy_text(info_.serial);
+  } else if (key == "board") {
+    copy_text(info_.board);
+  } else if (key == "scene") {
+    copy_text(info_.scene);
+  } else if (key == "git") {
+    copy_text(info_.git_hash);
+  } else if (key == "firmware") {
+    auto parts = split(value, '.');
+    if (parts.size() != 3) {
+      throw Damage{"firmware is \"" + value + "\""};
+    }
+    for (std::size_t i = 0; i < 3; i++) {
+      parse_cell(key, parts[i], info_.firmware_version[i]);
+    }
+  } else if (key == "x_mm") {
+    read_list([&](std::size_t k) -> float & { return info_.x_mm[k]; });
+  } else if (key == "y_mm") {
+    read_list([&](std::size_t k) -> float & { return info_.y_mm[k]; });
+  } else {
+    bool known = false;
+    for (const SensorList &each : sensor_lists) {
+      if (key == each.name) {
+        known = true;
+        read_list(
+            [&](std::size_t k) -> float & { return info_.calibration.sensors[k].*each.value; });
+      }
+    }
+    auto visit = [&](const std::string &name, auto &field) {
+      if (name == key) {
+        known = true;
+        parse_cell(name, value, field);
+      }
+    };
+    visit_info(visit, info_);
+    visit_calibration(visit, info_.calibration);
+    if (!known && !header_seen_) {
+      recorder_metadata_.emplace_back(key, value);
+    }
+  }
+}
+
+void RecordingReader::choose_device(const std::string &serials) {
+  auto all = split(serials, ' ');
+  for (std::size_t i = 0; i < all.size(); i++) {
+    std::string serial(trim(all[i]));
+    if (wanted_.empty() ? all.size() == 1 : is_same_serial(serial, wanted_)) {
+      number_ = std::to_string(i);
+      return;
+    }
+  }
+  std::string names(trim(serials));
+  if (wanted_.empty()) {
+    throw Error(ErrorCode::several_in_file, path_ + ": holds several fingertips: " + names);
+  }
+  throw Error(ErrorCode::no_such_in_file,
+              path_ + ": no fingertip " + wanted_ + " in it, there are: " + names);
+}
+
+void RecordingReader::read_row(std::string_view text) {
+  auto cells = split(text, ',');
+  std::size_t contact_count = contact_columns();
+  std::size_t raw_count = RAW_COLUMNS + 2 * std::size_t{sensor_count_};
+  if (cells.size() != 2 + contact_count + raw_count) {
+    throw Damage{std::to_string(cells.size()) + " columns where the header has " +
+                 std::to_string(2 + contact_count + raw_count)};
+  }
+  auto is_empty = [&](std::size_t from, std::size_t count) {
+    return std::all_of(cells.begin() + static_cast<std::ptrdiff_t>(from),
+                       cells.begin() + static_cast<std::ptrdiff_t>(from + count),
+                       [](std::string_view cell) { return cell.empty(); });
+  };
+  std::uint64_t t_us = 0;
+  std::uint32_t frame = 0;
+  parse_cell("t_us", cells[0], t_us);
+  parse_cell("frame", cells[1], frame);
+  std::vector<Item> items;
+  if (!is_empty(2, contact_count)) {
+    Item item{};
+    item.kind = Item::Kind::packet;
+    item.packet.type = WIRE_CONTACT;
+    item.packet.t_us = t_us;
+    RowReader reader{cells, 2};
+    visit_contact(reader, item.packet);
+    item.packet.body.contact.frame = frame;
+    items.push_back(item);
+  }
+  if (!is_empty(2 + contact_count, raw_count)) {
+    if (sensor_count_ == 0) {
+      throw Damage{"pressures in a recording without sensors"};
+    }
+    Item item{};
+    item.kind = Item::Kind::packet;
+    item.packet.type = WIRE_RAW;
+    item.packet.t_us = t_us;
+    RowReader reader{cells, 2 + contact_count};
+    visit_raw(reader, item.packet, sensor_count_);
+    item.packet.body.raw.frame = frame;
+    item.packet.body.raw.sensor_count = sensor_count_;
+    items.push_back(item);
+  }
+  if (items.empty()) {
+    throw Damage{"a row without a packet"};
+  }
+  items_.insert(items_.end(), items.begin(), items.end());
+}
+
+} // namespace fingertip

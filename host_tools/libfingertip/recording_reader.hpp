@@ -1,0 +1,65 @@
+/* Reads recordings; recording.hpp has the format. */
+#pragma once
+
+#include "libfingertip/decoder.hpp"
+#include "libfingertip/packet_fields.hpp"
+#include "libfingertip/wire.hpp"
+
+#include <cstdint>
+#include <deque>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace fingertip {
+
+class RecordingReader {
+public:
+  struct Item {
+    enum class Kind { packet, event } kind;
+    wire_packet packet;
+    std::string event;
+  };
+
+  /* salvage: skip damaged lines and count them, instead of throwing Error with file and line.
+   * device: the serial number of one of several fingertips; empty: the only one. */
+  RecordingReader(const std::string &path, bool salvage, const std::string &device = "");
+
+  /* Nothing at the end of the file. */
+  std::optional<Item> next();
+
+  std::uint64_t skipped_lines() const { return skipped_lines_; }
+  /* Whether the end line was seen: without one the recording was cut short. */
+  bool has_end() const { return has_end_; }
+  /* Of this fingertip, as its recorder counted; once the end was seen. */
+  const std::optional<LineStatistics> &end_statistics() const { return end_statistics_; }
+  /* The recorder's own keys (recorded_by, started_utc, port, ...), once the first item was read. */
+  const Metadata &recorder_metadata() const { return recorder_metadata_; }
+
+private:
+  void read_line(const std::string &text);
+  void read_comment(const std::string &text);
+  void read_row(std::string_view text);
+  void choose_device(const std::string &serials);
+  void read_end(std::string_view text);
+  void read_info_field(const std::string &key, const std::string &value);
+
+  std::string path_;
+  bool salvage_;
+  std::ifstream file_;
+  std::uint64_t line_number_ = 0;
+  std::uint64_t skipped_lines_ = 0;
+  bool header_seen_ = false;
+  bool has_end_ = false;
+  std::optional<LineStatistics> end_statistics_;
+  Metadata recorder_metadata_;
+  std::uint8_t sensor_count_ = 0;
+  bool joint_ = false; /* of several fingertips */
+  std::string wanted_; /* serial number */
+  std::string number_; /* of the wanted one in a joint recording */
+  wire_info info_;
+  std::deque<Item> items_;
+};
+
+} // namespace fingertip

@@ -1,0 +1,50 @@
+#include "libfingertip/recording_writer.hpp"
+
+#include "libfingertip/recording_fields.hpp"
+
+namespace fingertip {
+
+using namespace recording;
+
+RecordingWriter::RecordingWriter(const std::string &path, bool replace, const wire_info *info,
+                                 std::uint8_t sensor_count, const Metadata &extra,
+                                 bool raw_expected, OutputFile::Appears appears)
+    : file_(path, replace, appears),
+      lines_(
+          path, sensor_count, raw_expected,
+          [this](const std::string &key, const std::string &value) {
+            line("# " + key + ": " + value);
+          },
+          [this](std::uint64_t, const std::string &cells) { line(cells); }) {
+  line(std::string(FIRST_WORDS) + FORMAT_OF_ONE);
+  for (const auto &[key, value] : extra) {
+    line("# " + key + ": " + printable(value));
+  }
+  if (info) {
+    lines_.info(*info);
+  }
+  line(header_text(sensor_count));
+}
+
+void RecordingWriter::line(const std::string &text) {
+  std::string whole = text + "\n";
+  file_.append(whole.data(), whole.size());
+}
+
+void RecordingWriter::packet(const wire_packet &packet) {
+  lines_.packet(packet);
+}
+
+void RecordingWriter::event(const std::string &text) {
+  lines_.write_pending();
+  line("# event: " + text);
+}
+
+void RecordingWriter::finish(const LineStatistics &statistics, const std::string &reason) {
+  lines_.write_pending();
+  line("# end: reason=" + reason + " frames=" + std::to_string(lines_.frames()) +
+       " seconds=" + fixed(lines_.seconds(), 6) + " " + statistics.text());
+  file_.finish();
+}
+
+} // namespace fingertip
