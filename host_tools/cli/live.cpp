@@ -276,12 +276,12 @@ private:
     }
   }
 
+  /* What a person must see first, first: at 80 columns there is room for some thirty. */
   std::string note() const {
-    std::string text = tare_.is_asked() ? "tare? nothing may touch the pad: y, or any other key"
-                       : !said_.empty() ? said_
-                                        : note_;
+    std::string text =
+        tare_.is_asked() ? "tare, pad free? y/n  " : said_ + (said_.empty() ? "" : "  ");
     std::uint32_t missing = models_[0].missing_sensors();
-    return (missing ? "sensors missing: " + sensors_text(missing) + "  " : "") + text;
+    return text + (missing ? "sensors missing: " + sensors_text(missing) + "  " : "") + note_;
   }
 
   /* For programs and log files: once, and when it changes. */
