@@ -2,9 +2,12 @@
 
 #include "cli/joint_progress.hpp"
 #include "cli/keeper.hpp"
+#include "cli/keys.hpp"
+#include "cli/names_of_values.hpp"
 #include "cli/view.hpp"
 #include "libfingertip/command.hpp"
 #include "libfingertip/device_loop.hpp"
+#include "libfingertip/names.hpp"
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/packet_file.hpp"
@@ -14,6 +17,7 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <unistd.h>
 
 namespace fingertip {
 
@@ -24,11 +28,14 @@ using std::chrono::milliseconds;
 constexpr milliseconds POLL{20};
 /* How long a row may wait for earlier ones of other fingertips. */
 constexpr double SETTLE_us = 250e3;
+/* What was said to a key stays this long. */
+constexpr milliseconds SAID_FOR{5000};
 
 class Live {
 public:
   Live(const LiveOptions &options, const std::vector<Way> &ways)
-      : options_(options), models_(ways.size()), ready_(ways.size()), early_(ways.size()) {
+      : options_(options), models_(ways.size()), ready_(ways.size()), early_(ways.size()),
+        told_missing_(ways.size()) {
     DeviceLoop::Options wanted;
     wanted.streams = WIRE_STREAM_ALL;
     wanted.follow_clock = several();
@@ -73,6 +80,12 @@ public:
     if (!several() && models_[0].frames() == 0 && reason_ == "gone") {
       throw Gone(loops_[0]->name() + ": vanished before the first frame");
     }
+    for (std::size_t i = 0; i < models_.size(); i++) {
+      if (models_[i].is_without_sensors()) {
+        throw Error(loops_[i]->name() + ": none of its sensors answers; see their wiring and "
+                                        "supply (fingertip info)");
+      }
+    }
     return 0;
   }
 
@@ -100,6 +113,11 @@ private:
     switch (news.kind) {
     case Kind::packet:
       model.take(news.packet);
+      if (news.packet.type == WIRE_HEALTH) {
+        tell_missing(news.device);
+      } else if (news.packet.type == WIRE_ACK) {
+        take_answer(news.packet.body.ack);
+      }
       if (keeper_) {
         keeper_->packet(news);
       } else if (ready_[news.device]) {
@@ -220,14 +238,65 @@ private:
     if (!view_) {
       return;
     }
-    view_->update(models_[0], note_);
+    view_->update(models_[0], note());
+    auto now = std::chrono::steady_clock::now();
     while (auto key = view_->key()) {
-      if (*key == 'q') {
-        quit_ = true;
-      } else if (*key == 't' && models_[0].state() == Model::State::live) {
-        loops_[0]->send(command_tare());
-      }
+      take_key(*key, now);
     }
+    tare_.expire(now);
+    if (now > said_until_) {
+      said_.clear();
+    }
+  }
+
+  void take_key(char key, KeyTime now) {
+    if (tare_.is_asked()) {
+      if (tare_.answer(key, now)) {
+        loops_[0]->send(command_tare());
+        say("taring");
+      } else {
+        say("not tared");
+      }
+    } else if (key == 'q') {
+      quit_ = true;
+    } else if (key == 't' && models_[0].state() == Model::State::live) {
+      tare_.ask(now);
+    }
+  }
+
+  void say(const std::string &text) {
+    said_ = text;
+    said_until_ = std::chrono::steady_clock::now() + SAID_FOR;
+  }
+
+  /* What the fingertip answered to a key. */
+  void take_answer(const wire_ack &ack) {
+    if (ack.command == WIRE_CMD_TARE) {
+      say(ack.result == WIRE_RESULT_DONE ? "tared" : "not tared: " + result_text(ack.result));
+    }
+  }
+
+  /* What a person must see first, first: at 80 columns there is room for some thirty. */
+  std::string note() const {
+    std::string text =
+        tare_.is_asked() ? "tare, pad free? y/n  " : said_ + (said_.empty() ? "" : "  ");
+    std::uint32_t missing = models_[0].missing_sensors();
+    return text + (missing ? "sensors missing: " + sensors_text(missing) + "  " : "") + note_;
+  }
+
+  /* For programs and log files: once, and when it changes. */
+  void tell_missing(std::size_t device) {
+    std::uint32_t missing = models_[device].missing_sensors();
+    if (options_.monitor || missing == told_missing_[device]) {
+      return;
+    }
+    told_missing_[device] = missing;
+    std::fprintf(stderr, "%s%s: %s\n", isatty(STDERR_FILENO) ? "\r\x1b[K" : "",
+                 printable(loops_[device]->name()).c_str(),
+                 missing ? ("sensors missing: " + sensors_text(missing) +
+                            "; see their wiring (fingertip info)")
+                               .c_str()
+                         : "all sensors answer");
   }
 
   void finish() {
@@ -270,6 +339,10 @@ private:
   std::unique_ptr<View> view_;
   std::unique_ptr<JointProgress> progress_;
   std::string note_;
+  std::string said_;
+  KeyTime said_until_{};
+  Confirmation tare_;
+  std::vector<std::uint32_t> told_missing_;
   std::string reason_;
   std::int64_t zero_us_ = 0;
   std::size_t running_ = 0;

@@ -1,5 +1,7 @@
 #include "cli/model.hpp"
 
+#include "cli/names_of_values.hpp"
+
 #include <algorithm>
 
 namespace fingertip {
@@ -85,6 +87,17 @@ void Model::take_contact(const wire_contact &contact, std::uint64_t t_us) {
   }
   forces_.back().peak_N = std::max(forces_.back().peak_N, contact.force_N);
   forces_.back().slip = forces_.back().slip || slip;
+}
+
+std::uint32_t Model::missing_sensors() const {
+  return info_ && health_
+             ? fingertip::missing_sensors(health_->sensors_present, info_->sensor_count)
+             : 0;
+}
+
+bool Model::is_without_sensors() const {
+  return info_ && info_->sensor_count > 0 &&
+         missing_sensors() == fingertip::missing_sensors(0, info_->sensor_count);
 }
 
 double Model::seconds() const {

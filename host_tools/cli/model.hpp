@@ -37,6 +37,9 @@ public:
   const std::optional<wire_contact> &contact() const { return contact_; }
   const std::optional<wire_raw> &raw() const { return raw_; }
   const std::optional<wire_health> &health() const { return health_; }
+  /* Bits of the sensors that do not answer, as of the last health packet. */
+  std::uint32_t missing_sensors() const;
+  bool is_without_sensors() const;
 
   /* Frames since the first, and their device time. */
   std::uint64_t frames() const { return frames_; }

@@ -251,7 +251,9 @@ void draw_title(Canvas &canvas, const Model &model, const std::string &note) {
     colour = ACCENT;
     break;
   case Model::State::live:
-    if (silence_s && *silence_s <= STALLED_s) {
+    if (model.is_without_sensors()) {
+      state = "no sensor answers";
+    } else if (silence_s && *silence_s <= STALLED_s) {
       state = "live";
       colour = GOOD;
     } else {

@@ -139,12 +139,12 @@ void Screen::enter() {
     settings.c_cc[VTIME] = 0;
     tcsetattr(STDIN_FILENO, TCSANOW, &settings);
   }
-  /* alternate screen, cursor and line wrap off */
-  write_all("\x1b[?1049h\x1b[?25l\x1b[?7l\x1b[2J");
+  /* alternate screen, cursor and line wrap off, pasted text marked */
+  write_all("\x1b[?1049h\x1b[?25l\x1b[?7l\x1b[?2004h\x1b[2J");
 }
 
 void Screen::leave() {
-  write_all("\x1b[0m\x1b[?7h\x1b[?25h\x1b[?1049l");
+  write_all("\x1b[0m\x1b[?2004l\x1b[?7h\x1b[?25h\x1b[?1049l");
   if (has_input_) {
     tcsetattr(STDIN_FILENO, TCSANOW, &before_);
   }
@@ -169,11 +169,12 @@ void Screen::draw(const std::string &ansi) {
 }
 
 std::optional<char> Screen::key() {
-  char pressed = 0;
-  if (has_input_ && read(STDIN_FILENO, &pressed, 1) == 1) {
-    return pressed;
+  char bytes[256];
+  ssize_t count = has_input_ ? read(STDIN_FILENO, bytes, sizeof bytes) : 0;
+  if (count > 0) {
+    keys_.feed(bytes, static_cast<std::size_t>(count), std::chrono::steady_clock::now());
   }
-  return std::nullopt;
+  return keys_.next();
 }
 
 } // namespace fingertip

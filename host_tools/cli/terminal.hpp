@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/canvas.hpp"
+#include "cli/keys.hpp"
 
 #include <optional>
 #include <string>
@@ -38,7 +39,7 @@ public:
   int columns() const;
   int rows() const;
   void draw(const std::string &ansi);
-  /* A key that was pressed, or nothing. */
+  /* A key that somebody pressed, or nothing. */
   std::optional<char> key();
 
 private:
@@ -47,6 +48,7 @@ private:
 
   bool has_input_;
   termios before_;
+  KeyParser keys_;
 };
 
 } // namespace fingertip

@@ -54,7 +54,10 @@ std::string state_text(const Model &model) {
   case Model::State::gone:
     return GONE_ADVICE;
   case Model::State::live:
-    return !silence_s ? "no frames yet" : *silence_s > STALLED_s ? "STALLED" : "";
+    return !silence_s                   ? "no frames yet"
+           : *silence_s > STALLED_s     ? "STALLED"
+           : model.is_without_sensors() ? "no sensor answers"
+                                        : "";
   case Model::State::replay:
     break;
   }

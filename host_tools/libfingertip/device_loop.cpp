@@ -137,7 +137,10 @@ void DeviceLoop::stream() {
       return;
     } catch (const Gone &) {
       nothing_expected_ = true;
-      put(Kind::gone);
+      held_.clear();
+      if (!std::exchange(gone_, true)) {
+        put(Kind::gone);
+      }
     }
     if (!options_.wait_for_back || ending_) {
       return;
@@ -169,6 +172,10 @@ void DeviceLoop::greet(bool again) {
   publish();
   read_until_us_ = steady_now_us();
   nothing_expected_ = false;
+  gone_ = false;
+  for (DeviceNews &answer : std::exchange(held_, {})) {
+    put(std::move(answer));
+  }
   put(std::move(news));
   while (!started_) {
     if (stop_) {
@@ -253,8 +260,13 @@ void DeviceLoop::publish() {
   name_ = transport_->description();
 }
 
+/* What a fingertip answers before its port vanishes again is as if it never was. */
 void DeviceLoop::put(DeviceNews news) {
-  feed_.put(std::move(news), abandoned_);
+  if (gone_ && (news.kind == Kind::packet || news.kind == Kind::clock)) {
+    held_.push_back(std::move(news));
+  } else {
+    feed_.put(std::move(news), abandoned_);
+  }
 }
 
 void DeviceLoop::put(Kind kind) {

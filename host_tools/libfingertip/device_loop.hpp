@@ -135,7 +135,9 @@ private:
   std::optional<wire_info> info_;
   wire_health health_{};
   std::chrono::steady_clock::time_point asked_{}, last_frame_{};
-  bool ending_ = false; /* its last command is not interrupted */
+  bool gone_ = false;            /* and not back yet */
+  std::vector<DeviceNews> held_; /* until it is back */
+  bool ending_ = false;          /* its last command is not interrupted */
 
   std::atomic<bool> started_{false}, stop_{false}, abandoned_{false};
   std::atomic<bool> nothing_expected_{false};

@@ -114,13 +114,12 @@ def add_recording_options(parser):
     parser.add_argument("--device", metavar="SERIAL", help="one of several fingertips in the recording")
 
 
-def load_recording(options):
-    recording = read_recording(options.recording, options.salvage, options.device)
+def load_recording(options, **how):
+    recording = read_recording(options.recording, options.salvage, options.device, **how)
     if recording.skipped_lines:
         print(f"{printable(options.recording)}: {recording.skipped_lines} damaged lines skipped", file=sys.stderr)
-    if not recording.end and not options.salvage:
-        raise InputError(f"{options.recording}: no end line, the recorder was killed; use --salvage to take what there is")
-    check_time(recording)
+    if not recording.end:
+        print(f"{printable(options.recording)}: no end line: the recording was cut short", file=sys.stderr)
     return recording
 
 
@@ -130,8 +129,7 @@ def check_time(recording):
     restarts = np.flatnonzero((np.diff(t_us) < 0) | (np.diff(frame) < 0))
     contact = np.flatnonzero(recording.has_contact)
     repeated = contact[1:][np.diff(t_us[contact]) == 0]
-    for rows, what in ((restarts + 1, "the fingertip restarted here; record anew, or cut the file before this line "
-                                      "and use --salvage"),
+    for rows, what in ((restarts + 1, "the fingertip restarted here; record anew, or cut the file before this line"),
                        (repeated, "a second frame of the same time; remove the line")):
         if len(rows):
             raise InputError(f"{recording.path}:{recording.line_numbers[rows[0]]}: {what}")
@@ -146,7 +144,9 @@ def main(argv):
     add_recording_options(parser)
     options = parser.parse_args(argv)
     check_output(options.output, options.recording, options.scenario, options.run)
-    comparison = Comparison(load_recording(options), read_scenario(options.scenario), read_run(options.run))
+    recording = load_recording(options)
+    check_time(recording)
+    comparison = Comparison(recording, read_scenario(options.scenario), read_run(options.run))
     write_text(options.output, json.dumps(comparison.summary, indent=2) + "\n")
     return 0
 

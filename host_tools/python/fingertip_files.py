@@ -14,7 +14,7 @@ Recording (CSV, UTF-8): what a fingertip said, written by `fingertip record`; on
     t_us,frame,...            device time; see RECORDING_COLUMNS, then s<k>_Pa (absolute) and tare<k>_Pa
     # packet: ... | # event: ...     between the rows
     # end: key=value ...      counts of the whole recording; absent if the recorder was killed
-Cells of a packet that did not come are empty, and NaN here.
+Cells of a packet that did not come are empty, and those of a quantity whose flag is off (no fit, no x); NaN here.
 
 Of several fingertips on one clock, format 2, written by `fingertip record --device A --device B`: see
 host_tools/libfingertip/recording.hpp. Read as the recording of one of them, with time_us, the recorder's clock.
@@ -23,6 +23,7 @@ Run report (JSON): what the emulator measured; used are device_time_zero_s and w
 
 Every error is an InputError whose text is one line that names file and line and says what to do.
 """
+import array
 import json
 import math
 import os
@@ -211,8 +212,8 @@ class Recording:
         self.time_us = time_us
         self.line_numbers = np.array(line_numbers)
         self.metadata = metadata
-        self.columns = {name: table[:, i] for i, name in enumerate(names[:len(RECORDING_COLUMNS)])}
-        first = len(RECORDING_COLUMNS)
+        first = len(names) - 2 * sensors
+        self.columns = {name: table[:, i] for i, name in enumerate(names[:first])}
         self.sensors_Pa = table[:, first:first + sensors]
         self.tare_Pa = table[:, first + sensors:first + 2 * sensors]
         self.events = events
@@ -250,12 +251,40 @@ def _packet(text):
     return words[0], dict(field.split("=", 1) for field in words[1:] if "=" in field)
 
 
+# Some 20 MB are read in a second: below this nobody waits.
+WORTH_WAITING_bytes = 10_000_000
+
+
+class _RecordingLines:
+    """The lines of a recording, one after the other: number, text without its end, whether it is torn."""
+
+    def __init__(self, path, progress=None):
+        self.path, self.progress = path, progress
+        first = next(iter(self), (1, "", True))[1]
+        self.format = _check_kind(path, [first], "recording", ("1", "2"))
+
+    def __iter__(self):
+        try:
+            with open(self.path, "rb") as file:
+                size, read, told = os.fstat(file.fileno()).st_size, 0, 0
+                for number, line in enumerate(file, 1):
+                    read += len(line)
+                    if self.progress and size > WORTH_WAITING_bytes and read - told > size // 100:
+                        told = read
+                        self.progress(read / size)
+                    yield number, line.rstrip(b"\r\n").decode("utf-8"), not line.endswith(b"\n")
+        except OSError as error:
+            raise InputError(f"{self.path}: {error.strerror}; check the path") from None
+        except UnicodeDecodeError:
+            raise InputError(f"{self.path}: no text file; give a CSV file") from None
+
+
 def recorded_devices(path):
     """Serial numbers of the fingertips in a recording of several; of one, an empty list."""
-    lines = read_lines(path)
-    if _check_kind(path, lines, "recording", ("1", "2")) == "1":
+    lines = _RecordingLines(path)
+    if lines.format == "1":
         return []
-    for line in lines:
+    for _, line, _ in lines:
         if line.startswith("# devices:"):
             return line.split(":", 1)[1].split()
     raise InputError(f'{path}: no line "# devices: ..."; record anew')
@@ -288,21 +317,34 @@ def _of_one_device(line, number, advice):
     return cells[2], _number("", 0, "time_us", cells[1], False)
 
 
-def read_recording(path, salvage=False, device=None):
-    """device: the serial number of one of several fingertips."""
-    lines = read_lines(path)
-    _check_kind(path, lines, "recording", ("1", "2"))
+def _row(path, number, header, wanted, cells):
+    """The wanted cells as numbers, NaN where they are empty."""
+    try:
+        row = [float(cells[i]) if cells[i] else math.nan for i in wanted]
+        # what float() takes and no recording holds
+        plain = math.inf not in row and -math.inf not in row and all(cells[i] for i in wanted if i < 2) and not any(
+            value != value and cells[i] for i, value in zip(wanted, row))
+    except ValueError:
+        plain = False
+    if not plain:
+        row = [_number(path, number, header[i], cells[i], i >= 2) for i in wanted]
+    return row
+
+
+def read_recording(path, salvage=False, device=None, columns=None, progress=None):
+    """device: the serial number of one of several fingertips. columns: only these (t_us and frame among them), for recordings
+    that are too large to hold whole; then there are no sensors. progress: called now and then with the share that was read."""
+    lines = _RecordingLines(path, progress)
     devices = recorded_devices(path)
     number_in_file = _choose_device(path, devices, device) if devices else None
-    times_us = []
-    complete = lines[-1] == ""
-    metadata, header, rows, line_numbers, events, packets, end, skipped, sensors = {}, None, [], [], [], [], {}, 0, 0
+    metadata, header, events, packets, end, skipped = {}, None, [], [], {}, 0
+    table, line_numbers, times_us, wanted, sensors = array.array("d"), array.array("q"), array.array("d"), (), 0
     advice = "use --salvage to skip damaged lines"
-    for number, line in enumerate(lines[1:], 2):
-        if not line.strip():
+    for number, line, torn in lines:
+        if number == 1 or not line.strip():
             continue
         try:
-            if number == len(lines) and not complete:
+            if torn:
                 raise InputError(f"{path}:{number}: the last line is torn; {advice}")
             time_us = None
             if devices:
@@ -330,25 +372,27 @@ def read_recording(path, salvage=False, device=None):
                 if cells != expected:
                     raise InputError(f"{path}:{number}: wrong header; record anew with this version of fingertip")
                 header = cells
+                wanted = tuple(range(len(header))) if columns is None else tuple(sorted(header.index(name) for name in columns))
                 continue
             if len(cells) != len(header):
                 raise InputError(f"{path}:{number}: {len(cells)} columns where the header has {len(header)}; {advice}")
-            row = [_number(path, number, name, cell, i >= 2) for i, (name, cell) in enumerate(zip(header, cells))]
+            row = _row(path, number, header, wanted, cells)
             if row[0] < 0:
                 raise InputError(f"{path}:{number}: t_us is {cells[0]}; device time starts at 0; {advice}")
-            rows.append(row)
+            table.extend(row)
             line_numbers.append(number)
-            times_us.append(time_us)
+            if devices:
+                times_us.append(time_us)
         except InputError:
             if not salvage or header is None:
                 raise
             skipped += 1
     if header is None:
         raise InputError(f"{path}: no header line; record anew")
-    if not rows:
+    if not table:
         raise InputError(f"{path}: no frames; record again while the fingertip streams")
-    return Recording(path, metadata, header, np.array(rows), line_numbers, sensors, events, packets, end, skipped,
-                     np.array(times_us) if devices else None)
+    return Recording(path, metadata, [header[i] for i in wanted], np.frombuffer(table).reshape(-1, len(wanted)), line_numbers,
+                     sensors if columns is None else 0, events, packets, end, skipped, np.array(times_us) if devices else None)
 
 
 def read_run(path):

@@ -501,10 +501,11 @@ class Linux(unittest.TestCase):
         listed = [line.split("\t") for line in self.tool("list").splitlines()]
         self.assertEqual({serial: board for serial, board, *_ in listed}, boards)
         self.assertEqual({re.search("ttyACM[01]", reached)[0] for *_, reached in listed}, {"ttyACM0", "ttyACM1"})
-        self.assertEqual(self.guest.run("fingertip info"), (1, f"fingertip: several fingertips found; choose one with --device: "
-                                                               f"{SERIAL} {OTHER_SERIAL}\n"))
+        self.assertEqual(self.guest.run("fingertip info"), (1, f"fingertip: several fingertips found: {SERIAL}, {OTHER_SERIAL}; "
+                                                               "choose one with --device SERIAL\n"))
         self.assertEqual(self.guest.run("fingertip info --device 1234"),
-                         (1, f"fingertip: no fingertip 1234 here; there are: {SERIAL} {OTHER_SERIAL}\n"))
+                         (1, f"fingertip: no fingertip 1234 here, there are: {SERIAL} {OTHER_SERIAL}; "
+                             "plug it in, then see `fingertip list`\n"))
         for serial, board in boards.items():
             for transport in ("serial", "usb"):
                 told = self.pairs(self.tool(f"info --device {serial} --transport {transport}"))

@@ -12,7 +12,10 @@
  *     flip=N           every Nth frame has a flipped bit
  *     stall=N          says nothing more after N frames
  *     flags=BITS       of every contact packet
- *     absent=K         sensor K is not there
+ *     absent=K,K...    these sensors are not there
+ *     health=N         a health packet after every Nth frame, before its raw packet is sent; else
+ *                      one after the first frame
+ *     tared=FILE       made when a tare is asked for
  *     mute=1           never says anything
  *     refuse=1         answers every command but stream, info and health with "not now"
  *     calibrated=1     a calibration is stored
@@ -156,8 +159,10 @@ private:
 
   void send_health() {
     wire_packet packet = test::make_health(0, now_us());
-    if (long absent = number("absent", -1); absent >= 0) {
-      packet.body.health.sensors_present &= ~(1u << absent);
+    for (std::string_view absent : fingertip::split(options_["absent"], ',')) {
+      if (auto sensor = fingertip::to_u64(absent)) {
+        packet.body.health.sensors_present &= ~(1u << *sensor);
+      }
     }
     send(packet);
   }
@@ -253,8 +258,12 @@ private:
       return;
     }
     send(contact, flip && frame_ % flip == 0);
+    long health = number("health", 0);
+    if (health && frame_ % health == 0) {
+      send_health();
+    }
     send(test::make_raw(0, t_us, frame));
-    if (frame_ == 1) {
+    if (!health && frame_ == 1) {
       send_health();
     }
   }
@@ -309,6 +318,9 @@ private:
     send(test::make_ack(0, now_us(), command.type, result, command.sequence, command.t_us));
     if (result != WIRE_RESULT_DONE) {
       return false;
+    }
+    if (command.type == WIRE_CMD_TARE && !options_["tared"].empty()) {
+      close(open(options_["tared"].c_str(), O_WRONLY | O_CREAT, 0644));
     }
     switch (command.type) {
     case WIRE_CMD_STREAM:

@@ -147,6 +147,23 @@ class Usage(CliTest):
         for value in ("abc", "0", "nan", "-1", "1001"):
             self.assertIn("give 0.01 to 1000, or max", self.error("replay", self.csv, "--speed", value, status=2))
 
+    def test_what_the_parser_says_is_for_people(self):
+        self.assertEqual(self.error("info", "--port", "a", "--port", "b", status=2),
+                         "fingertip: --port is given twice; give it once; see fingertip info --help\n")
+        self.assertEqual(self.error("record", status=2), "fingertip: FILE.csv|- is missing; see fingertip record --help\n")
+        self.assertEqual(self.error("encode", status=2), "fingertip: COMMAND [ARGS] is missing; see fingertip encode --help\n")
+
+    def test_help_fits_into_80_columns(self):
+        pages = {(): self.run_cli("--help")[0]}
+        for command in re.findall(r"^  (\w+) ", pages[()].split("Subcommands:")[1], re.M):
+            pages[command] = self.run_cli(command, "--help")[0]
+        for command, page in pages.items():
+            for line in page.splitlines():
+                self.assertLessEqual(len(line), 80, (command, line))
+            words = page.split()
+            self.assertIn("Usage:", words)
+        self.assertIn("slip_window=MS (5 to 1000, and 160 frames at most), prior=SIGMA[:WIDTH]|none", " ".join(pages["set"].split()))
+
     def test_names_cannot_speak_to_the_terminal(self):
         name = self.folder + "/\x1b[31m\n.csv"
         err = self.error("replay", name)
@@ -295,6 +312,38 @@ class Several(CliTest):
         self.assertEqual((len(one.events), len(two.events)), (0, 2))
         self.assertTrue((np.diff(two.time_us) > 0).all())
         self.assertTrue((np.diff(one["frame"]) == 1).all())
+
+    def test_all_agree_on_what_came(self):
+        """Recorder, replay, conversion and reader of a joint recording whose fingertip was unplugged."""
+        with self.device("serial=AAAA", "health=7"), self.device("serial=BBBB", "health=5", "vanish=103,500", port=self.other):
+            process = self.start("record", self.csv, "--all")
+            self.wait_for(lambda: os.path.exists(self.csv) and any("1/event: back" in c for c in self.rows()[1]))
+            self.wait_for(lambda: sum(row["device"] == "1" for row in self.rows()[0]) > 150)
+            process.send_signal(signal.SIGINT)
+            _, err = process.communicate(timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, 0, err)
+        self.assertIn(" 0 packets dropped, 0 CRC errors", err)
+        text = pathlib.Path(self.csv).read_text(encoding="utf-8")
+        cut = os.path.join(self.folder, "cut.csv")  # its recorder killed: only the lines themselves tell
+        pathlib.Path(cut).write_text(re.sub(r"(?m)^# (\d/)?end: .*\n", "", text), encoding="utf-8")
+        for number, serial in enumerate(("AAAA", "BBBB")):
+            end = re.search(rf"(?m)^# {number}/end: frames=(\d+) .* packets=(\d+) dropped_packets=0 out_of_order=0 crc_errors=0", text)
+            recording = files.read_recording(self.csv, device=serial)
+            self.assertEqual(len(recording["frame"]), int(end[1]))
+            for path in (self.csv, cut):
+                out, _ = self.run_cli("replay", path, "--device", serial, "--speed", "max")
+                self.assertRegex(out, r" 0 packets dropped, 0 CRC errors")
+                converted = os.path.join(self.folder, "c.csv")
+                out, _ = self.run_cli("replay", path, "--device", serial, "--to-csv", converted, "--overwrite")
+                self.assertRegex(out, f": {end[1]} frames, packets=\\d+ dropped_packets=0 out_of_order=0 ")
+                again = files.read_recording(converted)
+                self.assertEqual(again.end["dropped_packets"], "0")
+                self.assertEqual(again.end["out_of_order"], "0")
+                self.assertEqual(len(again["frame"]), int(end[1]))
+                self.assertEqual(len(again.events), 2 if serial == "BBBB" else 0)
+                if path == self.csv:
+                    self.assertEqual(again.end["packets"], end[2])
+                self.assertIn(" 0 packets dropped", self.run_cli("replay", converted, "--speed", "max")[0])
 
     def test_errors_of_several(self):
         with self.device("serial=AAAA"), self.device("serial=AAAA", port=self.other):
@@ -611,6 +660,26 @@ class Commands(CliTest):
     def test_info_names_missing_sensors(self):
         with self.device("absent=7"):
             self.assertRegex(self.run_cli("info", "--port", self.port)[0], r"(?m)^sensors_present +14 of 15, missing: 7$")
+
+    MISSING_ALL = "absent=" + ",".join(str(k) for k in range(15))
+
+    def test_a_recorder_names_missing_sensors(self):
+        with self.device("absent=3,7", "frames=50"):
+            _, err = self.run_cli("record", self.csv, "--port", self.port, "--until-gone")
+        self.assertIn(f"{self.port}: sensors missing: 3 7; see their wiring (fingertip info)\n", err)
+        self.assertEqual(err.count("see their wiring"), 1)
+        with self.device("frames=50"):
+            self.assertNotIn("missing", self.run_cli("record", self.ftr, "--port", self.port, "--until-gone")[1])
+
+    def test_without_any_sensor_it_fails(self):
+        with self.device(self.MISSING_ALL, "frames=50"):
+            _, err = self.run_cli("record", self.csv, "--port", self.port, "--until-gone", status=1)
+        self.assertIn("none of its sensors answers; see their wiring", err.splitlines()[-1])
+        with self.device(self.MISSING_ALL, "frames=50"):
+            out, err = self.run_cli("monitor", "--port", self.port, "--until-gone", status=1)
+        self.assertIn("no sensor answers", out)
+        self.assertIn("sensors missing: 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14", out)
+        self.assertIn("none of its sensors answers", err)
 
     def test_refusal(self):
         with self.device("refuse=1"):
@@ -939,6 +1008,51 @@ class Replay(CliTest):
         self.run_cli("replay", self.ftr, "--to-csv", self.csv, "--overwrite")
         self.assertIn("reason=converted", self.rows()[1][-1])
 
+    def test_salvage_is_advised_only_where_it_helps(self):
+        self.record()
+        text = pathlib.Path(self.csv).read_text(encoding="utf-8")
+        bad = os.path.join(self.folder, "bad.csv")
+        for content, problem in ((text.replace("t_us,frame", "t_us,fame"), "unknown header"), (text.split("t_us,frame")[0], "no header line"),
+                                 (text.replace("recording 1", "recording 9"), 'recording format "9" is unknown'),
+                                 (text.replace("recording 1", "scenario 1"), "a scenario, not a recording")):
+            pathlib.Path(bad).write_text(content, encoding="utf-8")
+            for option in ([], ["--salvage"]):
+                err = self.run_cli("replay", bad, "--speed", "max", *option, status=1)[1]
+                self.assertIn(problem, err)
+                self.assertNotIn("--salvage", err)
+
+    def test_line_ends_of_another_system(self):
+        self.record()
+        windows = os.path.join(self.folder, "w.csv")
+        pathlib.Path(windows).write_bytes(pathlib.Path(self.csv).read_bytes().replace(b"\n", b"\r\n"))
+        self.assertIn(" 100 frames in", self.run_cli("replay", windows, "--speed", "max")[0])
+        self.assertEqual(len(files.read_recording(windows)["frame"]), 100)
+
+    def test_a_conversion_keeps_what_the_recorder_knew(self):
+        self.record()
+        converted = os.path.join(self.folder, "c.csv")
+        self.run_cli("replay", self.csv, "--to-csv", converted)
+        before, after = (files.read_recording(path) for path in (self.csv, converted))
+        for key in ("started_utc", "started_device_us", "started_uncertainty_us", "port", "serial"):
+            self.assertEqual(after.metadata[key], before.metadata[key])
+        self.assertEqual(after.metadata["source"], self.csv)
+        self.assertEqual({key: value for key, value in after.end.items() if key != "reason"},
+                         {key: value for key, value in before.end.items() if key != "reason"})
+        # once more, and still each key once
+        twice = os.path.join(self.folder, "d.csv")
+        self.run_cli("replay", converted, "--to-csv", twice)
+        text = pathlib.Path(twice).read_text(encoding="utf-8")
+        for key in ("recorded_by", "source", "port", "started_utc"):
+            self.assertEqual(text.count(f"\n# {key}: "), 1, key)
+
+    def test_without_a_fit_there_are_no_numbers(self):
+        with self.device("frames=40", "flags=33"):  # CONTACT and TARED
+            self.run_cli("record", self.csv, "--port", self.port, "--until-gone")
+        for name in ("x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N", "slip_mm", "location_sd_mm", "sigma_x_mm"):
+            self.assertEqual({row[name] for row in self.rows()[0]}, {""}, name)
+        self.assertTrue(np.isnan(files.read_recording(self.csv)["force_N"]).all())
+        self.assertIn(" 40 frames in", self.run_cli("replay", self.csv, "--speed", "max")[0])
+
     def test_other_files(self):
         noise = os.path.join(self.folder, "noise.ftr")
         with open(noise, "wb") as file:
@@ -957,14 +1071,17 @@ class Replay(CliTest):
 class Monitor(CliTest):
     """On a terminal of 80 x 24 that this test reads."""
 
-    def on_terminal(self, *arguments, until, then, environment=(("COLORTERM", "truecolor"), ("TERM", "xterm"))):
-        """Output up to the end; once `until` was seen, `then` (a signal, or keys) is sent."""
+    BETWEEN_KEYS_s = 0.5  # a person's pace
+
+    def on_terminal(self, *arguments, until, then, finally_="", environment=(("COLORTERM", "truecolor"), ("TERM", "xterm"))):
+        """Output up to the end; once `until` was seen, `then` (a signal, or keys) is sent. A list of keys is typed, and q
+        a moment after them, but not before `finally_` was seen."""
         pid, terminal = pty.fork()
         if pid == 0:
             os.execve(FINGERTIP, [FINGERTIP, *arguments], {**self.environment, **dict(environment)})
         try:
             before = termios.tcgetattr(terminal)
-            output, sent, limit = b"", False, time.monotonic() + PATIENCE_s
+            output, sent, pending, typed_at, limit = b"", False, [], 0.0, time.monotonic() + PATIENCE_s
             while True:
                 self.assertLess(time.monotonic(), limit, output[-2000:])
                 if not select.select([terminal], [], [], 0.1)[0]:
@@ -976,9 +1093,17 @@ class Monitor(CliTest):
                 if not chunk:
                     break
                 output += chunk
+                if pending and time.monotonic() - typed_at > self.BETWEEN_KEYS_s and (
+                        len(pending) > 1 or not finally_ or re.search(finally_.encode(), output[-20000:])):
+                    typed_at = time.monotonic()
+                    os.write(terminal, pending.pop(0))
                 if not sent and re.search(until.encode(), output, re.S):
                     sent = True
-                    if isinstance(then, bytes):
+                    if isinstance(then, list):
+                        pending = [*then, b"q"]
+                        typed_at = time.monotonic()
+                        os.write(terminal, pending.pop(0))
+                    elif isinstance(then, bytes):
                         os.write(terminal, then)
                     else:
                         os.kill(pid, then)
@@ -1095,6 +1220,43 @@ class Monitor(CliTest):
         self.assertIn("\x1b[?1049h", output)
         self.assertGreater(output.rfind("\x1b[?1049l"), output.rfind("\x1b[?1049h"))
         self.assertIn("No space left on device", output[output.rfind("\x1b[?1049l"):])
+
+    def on_terminal_tare(self, keys, until, *options):
+        """Whether pressing these keys, a moment after each other, tares; and what the screen said."""
+        tared = os.path.join(self.folder, "tared")
+        pathlib.Path(tared).unlink(missing_ok=True)
+        with self.device(f"tared={tared}", *options):
+            output, status, _, _ = self.on_terminal("monitor", "--port", self.port, until="live.*live", then=keys, finally_=until)
+        self.assertEqual(status, 0)
+        self.assert_restored(output)
+        return os.path.exists(tared), re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", output)
+
+    def test_a_tare_is_asked_for_and_reported(self):
+        done, text = self.on_terminal_tare([b"t", b"y"], "tared")
+        self.assertTrue(done)
+        self.assertIn("tare, pad free? y/n", text)
+        done, text = self.on_terminal_tare([b"t", b"y"], "not tared", "refuse=1")
+        self.assertIn("not tared: not possible now", text)
+        self.assertFalse(done)
+
+    def test_nothing_but_a_person_tares(self):
+        for keys in ([b"t", b"n"], [b"ty"], [b"tytytyty\n"], [b"t", b"ty"], [b"\x1b[200~t\x1b[201~", b"y"], [b"\x1b[8;24;80t", b"y"],
+                     [b"\x1b]11;rgb:t/t/t\x07", b"y"]):
+            self.assertFalse(self.on_terminal_tare(keys, None)[0], keys)
+
+    def test_a_recording_that_cannot_be_gives_the_terminal_back(self):
+        pathlib.Path(self.csv).write_text("# fingertip-recording 1\n" + self.header_without_sensors() + "\n1000,1" + 22 * ","
+                                          + ",7,0,0,0,0,20.00\n", encoding="utf-8")
+        output, status, before, after = self.on_terminal("replay", self.csv, until="never", then=b"q")
+        self.assertEqual(status, 1)
+        self.assertGreater(output.rfind("\x1b[?1049l"), output.rfind("\x1b[?1049h"))
+        self.assertIn("pressures in a recording without sensors", output[output.rfind("\x1b[?1049l"):])
+        if after:
+            self.assertEqual(before, after)
+
+    @staticmethod
+    def header_without_sensors():
+        return ",".join(files.RECORDING_COLUMNS)
 
     def test_lines_where_there_is_no_terminal(self):
         with self.device("frames=300"):

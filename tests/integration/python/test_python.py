@@ -1,7 +1,9 @@
 """Scenarios, evaluation and plots on data whose answer is known."""
 import json
 import math
+import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -13,6 +15,7 @@ TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools" / "python"
 sys.path.insert(0, str(TOOLS))
 
 import fingertip_files as files  # noqa: E402
+import plot  # noqa: E402
 
 CONTACT, FIT_VALID, SLIP_VALID, SLIP, TARED = 1, 2, 8, 16, 32
 
@@ -254,10 +257,11 @@ class Evaluation(ToolTest):
     def test_a_killed_recorder(self):
         scenario = self.scenario()
         recording = self.recording(scenario, end=False)
-        arguments = (recording, scenario, "-o", self.folder / "s.json", "--run", self.run_report())
-        self.assertIn("use --salvage", self.error("evaluate.py", *arguments))
-        summary = self.summary(recording, scenario, "--run", self.run_report(), "--salvage")
+        summary = self.summary(recording, scenario, "--run", self.run_report())
         self.assertIsNone(summary["dropped_packets"])
+        self.assertEqual({key: value for key, value in self.summary(self.recording(scenario), scenario, "--run", self.run_report()).items()
+                          if value != summary[key]}, {"dropped_packets": 3, "crc_errors": 2, "format_errors": 1})
+        self.tool("plot.py", recording, "-o", self.folder / "p.png")
 
     def test_unrelated_files(self):
         scenario = self.scenario()
@@ -281,14 +285,15 @@ class Evaluation(ToolTest):
     def assert_restart(self, recording, scenario, frame):
         line = recording.read_text(encoding="utf-8").split("\n").index(",".join(files.RECORDING_COLUMNS + tuple(
             [f"s{k}_Pa" for k in range(15)] + [f"tare{k}_Pa" for k in range(15)]))) + 2 + frame
-        for arguments in (("evaluate.py", recording, scenario), ("plot.py", recording), ("plot.py", recording, "--truth", scenario)):
+        self.tool("plot.py", recording, "-o", self.folder / "restarted.png")
+        for arguments in (("evaluate.py", recording, scenario), ("plot.py", recording, "--truth", scenario)):
             err = self.error(*arguments, "--run", self.run_report(), "-o", self.folder / "p.png")
             self.assertIn(f"{recording}:{line}: the fingertip restarted here; ", err)
         self.assertFalse((self.folder / "p.png").exists())
         # what it advises to do works
         lines = recording.read_text(encoding="utf-8").split("\n")
         recording.write_text("\n".join(lines[:line - 1]) + "\n", encoding="utf-8")
-        self.tool("plot.py", recording, "--salvage", "-o", self.folder / "p.png")
+        self.tool("plot.py", recording, "--truth", scenario, "-o", self.folder / "p.png")
 
     def test_a_time_that_repeats(self):
         scenario = self.scenario()
@@ -364,6 +369,39 @@ class Plots(ToolTest):
         picture.unlink()
         self.tool("plot.py", recording, "-o", picture)
         self.assert_png(picture)
+
+    def test_a_hundred_megabytes(self):
+        """A quarter of an hour at 243 frames a second, with a restart in the middle and no end line."""
+        recording = self.recording(self.scenario(), until_s=3, end=False)
+        lines = recording.read_text(encoding="utf-8").splitlines()
+        head = [line for line in lines if not line[0].isdigit()]
+        cells = lines[-1].split(",", 2)[2].replace(",0,", ",101325.0000,")
+        rows = 100_000_000 // (len(cells) + 18)
+        with open(recording, "w", encoding="utf-8") as file:
+            file.write("\n".join(head) + "\n")
+            for frame in range(rows):
+                since = frame % (rows // 2)
+                file.write(f"{1000 + 4115 * since},{since},{cells}\n")
+        self.assertGreater(recording.stat().st_size, 99e6)
+        picture = self.folder / "p.png"
+        process = subprocess.Popen([sys.executable, TOOLS / "plot.py", recording, "-o", picture], stderr=subprocess.PIPE, text=True)
+        with process:
+            told = process.stderr.read()
+            _, status, used = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+        self.assertEqual(process.returncode, 0, told)
+        self.assertEqual(re.findall(r"(?m)^reading (\d+) %$", told), [str(percent) for percent in range(10, 100, 10)])
+        self.assertIn("no end line", told)
+        self.assertLess(used.ru_maxrss, 200_000)  # KiB
+        self.assert_png(picture)
+
+    def test_runs_of_a_restarted_fingertip_follow_one_another(self):
+        recording = files.read_recording(self.recording(self.scenario(), change=lambda row: {
+            **row, "t_us": row["t_us"] - 3000000 * (row["frame"] >= 600), "frame": row["frame"] % 600}))
+        t_s, restarts_s = plot.continuous_time_s(recording, recording.has_contact)
+        self.assertTrue((np.diff(t_s) > 0).all())
+        self.assertAlmostEqual(np.diff(t_s)[599], 0.005, delta=1e-9)
+        self.assertEqual(list(restarts_s), list(t_s[600::600]))
 
     def test_where_nothing_can_be_written(self):
         recording = self.recording(self.scenario())

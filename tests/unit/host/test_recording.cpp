@@ -4,8 +4,10 @@
 #include "libfingertip/recording.hpp"
 #include "support/host_packets.hpp"
 
+#include <algorithm>
 #include <csignal>
 #include <fstream>
+#include <functional>
 #include <gtest/gtest.h>
 #include <sstream>
 #include <sys/resource.h>
@@ -304,6 +306,161 @@ TEST(Recording, OtherFilesAreRefused) {
   EXPECT_NE(error_of(folder / "h.csv").find(":2: unknown header"), std::string::npos);
   write(folder / "e.csv", "# fingertip-recording 1\n");
   EXPECT_NE(error_of(folder / "e.csv").find("no header line"), std::string::npos);
+}
+
+TEST(Recording, TheErrorSaysWhatKindOfFileItIs) {
+  test::TemporaryFolder folder;
+  write(folder / "s.csv", "# fingertip-scenario 1\nt_s\n");
+  EXPECT_EQ(thrown_by(folder / "s.csv").code(), ErrorCode::not_a_recording);
+  EXPECT_NE(error_of(folder / "s.csv").find("a scenario, not a recording"), std::string::npos);
+  write(folder / "n.csv", "# fingertip-recording 3\n");
+  EXPECT_EQ(thrown_by(folder / "n.csv").code(), ErrorCode::other_format);
+  EXPECT_NE(error_of(folder / "n.csv").find("format \"3\" is unknown"), std::string::npos);
+}
+
+/* Skipping lines helps where lines are damaged, not where the head is. */
+TEST(Recording, ADamagedHeadIsToldFromADamagedLine) {
+  test::TemporaryFolder folder;
+  record(folder / "r.csv", all_kinds());
+  std::string whole = contents(folder / "r.csv");
+  std::string headless = whole;
+  headless.replace(headless.find("t_us,frame"), 4, "t_xx");
+  write(folder / "head.csv", headless);
+  EXPECT_EQ(thrown_by(folder / "head.csv").code(), ErrorCode::damaged_head);
+  EXPECT_EQ(thrown_by(folder / "head.csv", true).code(), ErrorCode::damaged_head);
+  std::string damaged = whole;
+  damaged.replace(damaged.find("\n1000,") + 1, 4, "1x00");
+  write(folder / "line.csv", damaged);
+  EXPECT_EQ(thrown_by(folder / "line.csv").code(), ErrorCode::damaged_line);
+}
+
+TEST(Recording, LinesMayEndAsOnWindows) {
+  test::TemporaryFolder folder;
+  record(folder / "r.csv", all_kinds());
+  std::string windows;
+  for (char c : contents(folder / "r.csv")) {
+    windows += c == '\n' ? "\r\n" : std::string(1, c);
+  }
+  write(folder / "w.csv", windows);
+  EXPECT_EQ(frames_of(read_all(folder / "w.csv")), frames_of(all_kinds()));
+  PacketFile file(folder / "w.csv", false);
+  while (file.next()) {
+  }
+  EXPECT_FALSE(file.is_cut_short());
+}
+
+TEST(Recording, WithoutAFitItsCellsAreEmptyAndNothingIsLost) {
+  test::TemporaryFolder folder;
+  wire_packet none = test::make_packet(WIRE_CONTACT, 1, 1000);
+  none.body.contact.frame = 1;
+  none.body.contact.flags = CONTACT_FLAG_TARED;
+  wire_packet fitted = test::make_contact(2, 2000, 2);
+  fitted.body.contact.flags &= ~static_cast<std::uint32_t>(CONTACT_FLAG_SLIP_VALID);
+  fitted.body.contact.x_mm = 0;
+  fitted.body.contact.slip_mm = 0;
+  /* no firmware of ours, but what came is kept */
+  wire_packet odd = test::make_contact(3, 3000, 3);
+  odd.body.contact.flags = 0;
+  odd.body.contact.y_mm = -0.0f;
+  std::vector<wire_packet> packets = {none, fitted, odd};
+  record(folder / "r.csv", packets);
+  std::string text = contents(folder / "r.csv");
+  EXPECT_NE(text.find("\n1000,1,1,32,0,,,,,,,,,,,,,0,0,0,0,0,0,0,"), std::string::npos) << text;
+  EXPECT_NE(text.find("\n2000,2,2,167,32767,0,-3.3333333,41234.566,5.7000003,1e-07,,12.5,"),
+            std::string::npos)
+      << text;
+  EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(packets));
+  /* an empty cell under its flag is damage */
+  text.replace(text.find(",5.7000003,"), 11, ",,");
+  write(folder / "bad.csv", text);
+  EXPECT_NE(error_of(folder / "bad.csv").find("sigma_mm is \"\""), std::string::npos);
+}
+
+TEST(Recording, PressuresWithoutSensorsAreDamage) {
+  test::TemporaryFolder folder;
+  { RecordingWriter(folder / "r.csv", false, nullptr, 0, {}, false, AT_ONCE); }
+  std::ofstream(folder / "r.csv", std::ios::app)
+      << "1000,1" << std::string(22, ',') << ",7,0,0,0,0,20.00\n";
+  EXPECT_NE(error_of(folder / "r.csv").find("pressures in a recording without sensors"),
+            std::string::npos)
+      << error_of(folder / "r.csv");
+}
+
+TEST(Recording, TheRecordersOwnKeysAreKept) {
+  test::TemporaryFolder folder;
+  record(folder / "r.csv", all_kinds());
+  PacketFile file(folder / "r.csv", false);
+  file.next();
+  EXPECT_EQ(file.recorder_metadata(), (Metadata{{"note", "a: b"}}));
+}
+
+/* The counts of a joint recording, from its lines alone and at its end. */
+LineStatistics counts_of_joint(const std::vector<wire_packet> &packets, bool finish,
+                               const std::function<double(const wire_packet &)> &host_us,
+                               std::vector<std::uint64_t> *t_us = nullptr) {
+  test::TemporaryFolder folder;
+  {
+    wire_packet one = test::make_info(0, 0), two = test::make_info(0, 0);
+    one.body.info.serial[0] = 'A';
+    two.body.info.serial[0] = 'B';
+    JointRecordingWriter writer(folder / "j.csv", false, {one.body.info, two.body.info}, {}, 0,
+                                true, AT_ONCE);
+    for (const wire_packet &packet : packets) {
+      writer.packet(0, packet, host_us(packet));
+      writer.settle(host_us(packet) - 3000);
+      writer.packet(1, packet, host_us(packet));
+    }
+    if (finish) {
+      writer.finish(std::vector<LineStatistics>(2), "test");
+    }
+  }
+  PacketFile file(folder / "j.csv", false, std::string("A") + "660583883265A2C");
+  while (auto item = file.next()) {
+    if (t_us && item->packet.type == WIRE_CONTACT) {
+      t_us->push_back(item->packet.t_us);
+    }
+  }
+  return file.statistics();
+}
+
+std::vector<wire_packet> everything_in_sequence() {
+  std::vector<wire_packet> packets;
+  std::uint16_t sequence = 0;
+  for (std::uint32_t frame = 1; frame <= 50; frame++) {
+    std::uint64_t t_us = 1000u * frame;
+    packets.push_back(test::make_contact(sequence++, t_us, frame));
+    packets.push_back(test::make_raw(sequence++, t_us, frame));
+    if (frame % 5 == 0) {
+      /* said after the frames of that time were measured, before they are sent */
+      packets.push_back(test::make_health(sequence++, t_us + 3500));
+      packets.push_back(test::make_ack(sequence++, t_us + 200, WIRE_CMD_STREAM, WIRE_RESULT_DONE,
+                                       frame & 0xFFFF, 7));
+    }
+  }
+  return packets;
+}
+
+TEST(Recording, AJointOneInventsNoLosses) {
+  for (bool finish : {false, true}) {
+    LineStatistics counts =
+        counts_of_joint(everything_in_sequence(), finish,
+                        [](const wire_packet &packet) { return static_cast<double>(packet.t_us); });
+    EXPECT_EQ(counts.dropped_packets, 0u) << finish;
+    EXPECT_EQ(counts.out_of_order, 0u) << finish;
+  }
+}
+
+TEST(Recording, AClockThatJumpsBackTurnsNoRowsAround) {
+  std::vector<std::uint64_t> t_us;
+  LineStatistics counts = counts_of_joint(
+      everything_in_sequence(), false,
+      [](const wire_packet &packet) {
+        return static_cast<double>(packet.t_us) - (packet.t_us > 20000 ? 7500.0 : 0.0);
+      },
+      &t_us);
+  EXPECT_TRUE(std::is_sorted(t_us.begin(), t_us.end()));
+  EXPECT_EQ(t_us.size(), 50u);
+  EXPECT_EQ(counts.out_of_order, 0u);
 }
 
 TEST(Recording, ExistingFilesAreKeptUnlessReplaced) {

@@ -1,0 +1,47 @@
+/* What a person types, told from what else comes in from a terminal. */
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <deque>
+#include <optional>
+#include <string>
+
+namespace fingertip {
+
+using KeyTime = std::chrono::steady_clock::time_point;
+
+/* Plain keys out of the bytes of a terminal: its answers, arrow and other special keys, and pasted
+ * text where the terminal marks it (bracketed paste) are no keys. */
+class KeyParser {
+public:
+  void feed(const char *bytes, std::size_t length, KeyTime now);
+  std::optional<char> next();
+
+private:
+  enum class State { plain, escape, control, single, text, text_escape };
+
+  State state_ = State::plain;
+  KeyTime last_{};
+  std::string parameters_; /* of a control sequence */
+  bool pasting_ = false;
+  std::deque<char> keys_;
+};
+
+/* A question before something that cannot be taken back. Text that is pasted does not answer it,
+ * whatever is in it: there must be silence between the question and the answer. */
+class Confirmation {
+public:
+  void ask(KeyTime now);
+  bool is_asked() const { return asked_; }
+  /* Every key while it is asked: true for y. Any other, or y too early, withdraws the question. */
+  bool answer(char key, KeyTime now);
+  /* Withdraws it where nobody answers. */
+  void expire(KeyTime now);
+
+private:
+  bool asked_ = false;
+  KeyTime since_{};
+};
+
+} // namespace fingertip
