@@ -12,8 +12,7 @@ bool calibration_is_valid(const struct calibration *calibration, unsigned sensor
   for (unsigned k = 0; k < sensor_count; k++) {
     const struct sensor_calibration *sensor = &calibration->sensors[k];
     valid = valid && is_within(sensor->gain, CALIBRATION_GAIN_MIN, CALIBRATION_GAIN_MAX) &&
-            is_within(sensor->gain_sd, 0.0f, CALIBRATION_GAIN_SD_MAX) &&
-            is_within(sensor->memory, 0.0f, CALIBRATION_MEMORY_MAX);
+            is_within(sensor->gain_sd, 0.0f, CALIBRATION_GAIN_SD_MAX);
   }
   return valid;
 }

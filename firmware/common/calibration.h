@@ -12,7 +12,6 @@
 struct sensor_calibration {
   float gain;    /* sensitivity relative to the pad's mean: pressure = reading / gain */
   float gain_sd; /* relative standard deviation */
-  float memory; /* share of a contact's peak that the sensor remembers after the release; 0: none */
 };
 
 struct calibration {
@@ -27,7 +26,6 @@ struct calibration {
 #define CALIBRATION_GAIN_MIN 0.25f
 #define CALIBRATION_GAIN_MAX 4.0f
 #define CALIBRATION_GAIN_SD_MAX 0.5f /* from 0 */
-#define CALIBRATION_MEMORY_MAX 0.5f  /* from 0 */
 #define CALIBRATION_FORCE_SCALE_MIN 0.1f
 #define CALIBRATION_FORCE_SCALE_MAX 10.0f
 #define CALIBRATION_FORCE_SCALE_SD_MAX 1.0f /* from 0 */

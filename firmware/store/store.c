@@ -33,7 +33,7 @@ enum {
   MAX_ATTEMPTS = 3,
 };
 _Static_assert((int)STORE_RECORD_BYTES == (int)SEALED_AT &&
-                   MAX_PAYLOAD >= CALIBRATION_AT + 14 + 12 * FT_MAX_SENSORS + SETTINGS_BYTES,
+                   MAX_PAYLOAD >= CALIBRATION_AT + 14 + 8 * FT_MAX_SENSORS + SETTINGS_BYTES,
                "a record fits into its slot");
 
 /* The longest erase of a sector takes 400 ms (W25Q16JV), and the longest write of a page 3 ms. */
@@ -52,7 +52,7 @@ static uint32_t read_u32(uint32_t at) {
 }
 
 static unsigned calibration_bytes(unsigned sensor_count) {
-  return 14 + 12 * sensor_count;
+  return 14 + 8 * sensor_count;
 }
 
 /* Record ------------------------------------------------------------------------------------- */
@@ -83,7 +83,7 @@ static void get_floats(const uint8_t *at, void *to, size_t offset, unsigned coun
   }
 }
 
-#define FLOATS_OF_SENSOR 3
+#define FLOATS_OF_SENSOR 2
 _Static_assert(sizeof(struct sensor_calibration) == FLOATS_OF_SENSOR * sizeof(float) &&
                    offsetof(struct calibration, force_scale_sd) ==
                        offsetof(struct calibration, force_scale) + sizeof(float) &&

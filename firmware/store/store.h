@@ -17,7 +17,7 @@
  *     508  u32  final: 0. The seal is whole
  *
  * Payload of version 1: u8 parts (bit 0 calibration, bit 1 settings), u8 n sensors, u16 0; the
- * calibration as in the command that brings it, without its n: 14 + 12 n bytes, zeros where there
+ * calibration as in the command that brings it, without its n: 14 + 8 n bytes, zeros where there
  * is none; the settings: u32 rate mHz, u16 OSR, u16 slip window ms, f32 slip threshold mm, f32 f32
  * prior mm, f32 location limit mm. Later versions keep the slot as it is and change the payload.
  *

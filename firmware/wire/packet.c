@@ -16,10 +16,10 @@ enum kind {
   U32,
   U64,
   F32,
-  PAIRS,       /* of 32 bits: for each sensor an element of each of two arrays behind one another */
-  F32_PAIRS,   /* likewise */
-  F32_TRIPLES, /* for each sensor three behind one another */
-  WHEN,        /* no field: the next run is there if bit `count` of this word is set */
+  PAIRS,     /* of 32 bits: for each sensor an element of each of two arrays behind one another */
+  F32_PAIRS, /* likewise */
+  F32_TWOS,  /* for each sensor two behind one another */
+  WHEN,      /* no field: the next run is there if bit `count` of this word is set */
 };
 struct run {
   uint8_t kind;
@@ -39,7 +39,7 @@ struct wire_layout {
   const struct wire_layout name##_layout = {type, sizeof name##_runs / sizeof name##_runs[0],      \
                                             name##_runs}
 #define EMPTY_LAYOUT(name, type) static const struct wire_layout name##_layout = {type, 0, NULL}
-_Static_assert(sizeof(struct sensor_calibration) == 3 * sizeof(float), "F32_TRIPLES");
+_Static_assert(sizeof(struct sensor_calibration) == 2 * sizeof(float), "F32_TWOS");
 _Static_assert(offsetof(struct wire_packet, body.raw.baseline_Pa_q10) ==
                        offsetof(struct wire_packet, body.raw.pressure_Pa_q10) +
                            4 * FT_MAX_SENSORS &&
@@ -94,7 +94,7 @@ static const struct run wire_info_runs[] = {
     RUN(WHEN, 0, info.stored),
     RUN(F32, 2, info.calibration.force_scale),
     RUN(WHEN, 0, info.stored),
-    RUN(F32_TRIPLES, 1, info.calibration.sensors),
+    RUN(F32_TWOS, 1, info.calibration.sensors),
 };
 _Static_assert(WIRE_CAPABILITY_FIT == 1 << 0 && WIRE_CAPABILITY_SLIP == 1 << 1 &&
                    WIRE_STORED_CALIBRATION == 1 << 0,
@@ -139,7 +139,7 @@ static const struct run cmd_calibrate_runs[] = {
     RUN(U32, 1, cmd_calibrate.calibration.date_s),
     RUN(U16, 1, cmd_calibrate.calibration.placements),
     RUN(F32, 2, cmd_calibrate.calibration.force_scale),
-    RUN(F32_TRIPLES, 1, cmd_calibrate.calibration.sensors),
+    RUN(F32_TWOS, 1, cmd_calibrate.calibration.sensors),
 };
 static LAYOUT(cmd_calibrate, WIRE_CMD_CALIBRATE);
 EMPTY_LAYOUT(cmd_erase_calibration, WIRE_CMD_ERASE_CALIBRATION);
@@ -281,8 +281,8 @@ static bool put_run(struct writer *writer, uint8_t kind, const uint8_t *field, u
     return put_u32(writer, field, count);
   case F32_PAIRS:
     return put_pairs(writer, field, count);
-  case F32_TRIPLES:
-    return put_u32(writer, field, 3 * count);
+  case F32_TWOS:
+    return put_u32(writer, field, 2 * count);
   default:
     put_bytes(writer, field, count);
     return true;
@@ -329,8 +329,8 @@ static bool get_run(const uint8_t *at, uint8_t kind, uint8_t *field, unsigned co
     return get_u32(at, field, count, false);
   case F32_PAIRS:
     return get_u32(at, field, 2 * count, true);
-  case F32_TRIPLES:
-    return get_u32(at, field, 3 * count, false);
+  case F32_TWOS:
+    return get_u32(at, field, 2 * count, false);
   default:
     memcpy(field, at, count);
     return true;
@@ -375,7 +375,7 @@ static const uint8_t bytes_of_kind[] = {[BYTES] = 1,        [TEXTS] = WIRE_TEXT_
                                         [SENSOR_COUNT] = 1, [U16] = 2,
                                         [U32] = 4,          [U64] = 8,
                                         [F32] = 4,          [PAIRS] = 8,
-                                        [F32_PAIRS] = 8,    [F32_TRIPLES] = 12};
+                                        [F32_PAIRS] = 8,    [F32_TWOS] = 8};
 
 /* False: a value is refused, or the body has another length. */
 static bool get_body(const struct wire_layout *layout, const uint8_t *at, size_t length,

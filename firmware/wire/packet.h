@@ -24,7 +24,7 @@
 enum {
   WIRE_HEADER_BYTES = 12,
   WIRE_CRC_BYTES = 4,
-  WIRE_MAX_BODY_BYTES = 126 + 20 * FT_MAX_SENSORS, /* info of a calibrated fingertip */
+  WIRE_MAX_BODY_BYTES = 126 + 16 * FT_MAX_SENSORS, /* info of a calibrated fingertip */
   WIRE_MAX_PACKET_BYTES = WIRE_HEADER_BYTES + WIRE_MAX_BODY_BYTES + WIRE_CRC_BYTES,
   /* COBS adds one byte, and one more for each full 254 bytes; then the delimiter. */
   WIRE_MAX_FRAME_BYTES = WIRE_MAX_PACKET_BYTES + WIRE_MAX_PACKET_BYTES / 254 + 2,

@@ -161,7 +161,7 @@ calibration made_of(const Work &work, std::optional<double> force_N) {
   }
   for (std::size_t k = 0; k < solution.gain.size(); k++) {
     made.sensors[k] = {static_cast<float>(solution.gain[k]),
-                       static_cast<float>(solution.gain_sd[k]), 0.0f};
+                       static_cast<float>(solution.gain_sd[k])};
   }
   if (!calibration_is_valid(&made, static_cast<unsigned>(solution.gain.size()))) {
     throw Error("a gain is out of range, which no sensor under rubber has: see that every sensor "

@@ -19,7 +19,7 @@ std::string date_text(std::uint32_t date_s) {
 void print_gains(const calibration &calibration, std::uint8_t sensor_count) {
   constexpr int HALF = 10;
   constexpr double PER_MARK = 0.02;
-  std::printf("\nsensor    gain    sd %%  memory %%%*s-20 %%      mean      +20 %%\n", 3, "");
+  std::printf("\nsensor    gain    sd %%%*s-20 %%      mean      +20 %%\n", 3, "");
   for (int k = 0; k < sensor_count; k++) {
     const sensor_calibration &sensor = calibration.sensors[k];
     int marks =
@@ -27,9 +27,8 @@ void print_gains(const calibration &calibration, std::uint8_t sensor_count) {
                    -HALF, HALF);
     std::string below(static_cast<std::size_t>(std::max(-marks, 0)), '#');
     std::string above(static_cast<std::size_t>(std::max(marks, 0)), '#');
-    std::printf("%6d  %6.3f  %6.1f  %8.1f   %*s%s|%s\n", k, static_cast<double>(sensor.gain),
+    std::printf("%6d  %6.3f  %6.1f   %*s%s|%s\n", k, static_cast<double>(sensor.gain),
                 100.0 * static_cast<double>(sensor.gain_sd),
-                100.0 * static_cast<double>(sensor.memory),
                 HALF + 2 - static_cast<int>(below.size()), "", below.c_str(), above.c_str());
   }
 }

@@ -153,8 +153,7 @@ struct SensorList {
   float sensor_calibration::*value;
 };
 inline constexpr SensorList sensor_lists[] = {{"gains", &sensor_calibration::gain},
-                                              {"gain_sds", &sensor_calibration::gain_sd},
-                                              {"memories", &sensor_calibration::memory}};
+                                              {"gain_sds", &sensor_calibration::gain_sd}};
 
 struct Namer {
   std::string text;

@@ -68,7 +68,7 @@ inline calibration make_calibration() {
   made.force_scale_sd = 0.021f;
   for (int k = 0; k < 15; k++) {
     made.sensors[k] = {0.86f + 0.02f * static_cast<float>(k),
-                       0.008f + 0.0001f * static_cast<float>(k), k == 3 ? 0.05f : 0.0f};
+                       0.008f + 0.0001f * static_cast<float>(k)};
   }
   return made;
 }

@@ -38,7 +38,7 @@ int info(const Choice &choice) {
   wire_health health = device.session.health().body.health;
   Metadata pairs = info_metadata(info);
   auto is_of_sensors = [](const std::pair<std::string, std::string> &pair) {
-    return pair.first == "gains" || pair.first == "gain_sds" || pair.first == "memories";
+    return pair.first == "gains" || pair.first == "gain_sds";
   };
   pairs.erase(std::remove_if(pairs.begin(), pairs.end(), is_of_sensors), pairs.end());
   pairs.insert(pairs.begin(), {"port", printable(device.transport->description())});

@@ -652,10 +652,10 @@ class Commands(CliTest):
         self.assertRegex(out, r"(?m)^stored +calibration$")
         self.assertRegex(out, r"(?m)^calibration_date_s +1785931200 \(2026-08-05 12:00 UTC\)$")
         self.assertRegex(out, r"(?m)^force_scale +1.0625$")
-        rows = re.findall(r"(?m)^ +(\d+) +(\d\.\d+) +([\d.]+) +([\d.]+) +(#*)\|(#*)$", out)
+        rows = re.findall(r"(?m)^ +(\d+) +(\d\.\d+) +([\d.]+) +(#*)\|(#*)$", out)
         self.assertEqual(len(rows), 15)
-        self.assertEqual(rows[3], ("3", "0.920", "0.8", "5.0", "####", ""))
-        self.assertEqual(rows[12], ("12", "1.100", "0.9", "0.0", "", "#####"))
+        self.assertEqual(rows[3], ("3", "0.920", "0.8", "####", ""))
+        self.assertEqual(rows[12], ("12", "1.100", "0.9", "", "#####"))
 
     def test_info_names_missing_sensors(self):
         with self.device("absent=7"):

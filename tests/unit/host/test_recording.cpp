@@ -235,7 +235,7 @@ TEST(Recording, TheCalibrationIsKeptWithItsChanges) {
   calibrated.body.info.stored = WIRE_STORED_CALIBRATION | WIRE_STORED_SETTINGS;
   calibrated.body.info.calibration = test::make_calibration();
   wire_packet anew = calibrated, erased = test::make_info(5, 6);
-  anew.body.info.calibration.sensors[14].memory = 0.125f;
+  anew.body.info.calibration.sensors[14].gain_sd = 0.125f;
   anew.body.info.calibration.force_scale = 0.9375f;
   erased.body.info.stored = WIRE_STORED_SETTINGS;
   std::vector<wire_packet> packets = {calibrated, test::make_contact(2, 3, 1), anew, erased, anew};

@@ -21,7 +21,7 @@ static size_t body_length(const struct wire_packet *packet) {
     const struct wire_info *info = &packet->body.info;
     return 93u + (info->capabilities & WIRE_CAPABILITY_FIT ? 13 : 0) +
            (info->capabilities & WIRE_CAPABILITY_SLIP ? 6 : 0) + 8u * info->sensor_count +
-           (info->stored & WIRE_STORED_CALIBRATION ? 14 + 12u * info->sensor_count : 0);
+           (info->stored & WIRE_STORED_CALIBRATION ? 14 + 8u * info->sensor_count : 0);
   }
   case WIRE_HEALTH:
     return 72u + (packet->body.health.capabilities & WIRE_CAPABILITY_FIT ? 4 : 0);
@@ -38,7 +38,7 @@ static size_t body_length(const struct wire_packet *packet) {
   case WIRE_CMD_PRIOR:
     return 8;
   case WIRE_CMD_CALIBRATE:
-    return 15 + 12u * packet->body.cmd_calibrate.sensor_count;
+    return 15 + 8u * packet->body.cmd_calibrate.sensor_count;
   case WIRE_CMD_OSR:
     return 2;
   case WIRE_CMD_SLIP:
@@ -191,9 +191,8 @@ static void assert_calibration_guarded(uint8_t type, size_t body_offset,
   assert_float_guarded(type, body_offset + 10, &calibration->force_scale_sd, packet);
   for (size_t k = 0; k < FT_MAX_SENSORS; k++) {
     struct sensor_calibration *sensor = &calibration->sensors[k];
-    assert_float_guarded(type, body_offset + 14 + 12 * k, &sensor->gain, packet);
-    assert_float_guarded(type, body_offset + 18 + 12 * k, &sensor->gain_sd, packet);
-    assert_float_guarded(type, body_offset + 22 + 12 * k, &sensor->memory, packet);
+    assert_float_guarded(type, body_offset + 14 + 8 * k, &sensor->gain, packet);
+    assert_float_guarded(type, body_offset + 18 + 8 * k, &sensor->gain_sd, packet);
   }
 }
 

@@ -142,7 +142,7 @@ static struct calibration calibration_of_two(void) {
       .placements = 30,
       .force_scale = 1.0625f,
       .force_scale_sd = 0.03125f,
-      .sensors = {{0.875f, 0.0078125f, 0.0f}, {1.125f, 0.015625f, 0.0625f}},
+      .sensors = {{0.875f, 0.0078125f}, {1.125f, 0.015625f}},
   };
 }
 

@@ -151,7 +151,6 @@ static inline void sample_calibration(struct sampler *sampler, unsigned sensor_c
   for (unsigned k = 0; k < sensor_count; k++) {
     calibration->sensors[k].gain = sample_f32(sampler);
     calibration->sensors[k].gain_sd = sample_f32(sampler);
-    calibration->sensors[k].memory = sample_f32(sampler);
   }
 }
 

@@ -36,7 +36,6 @@ static struct calibration calibration_of(uint32_t number) {
   for (uint32_t k = 0; k < SENSORS; k++) {
     calibration.sensors[k].gain = 0.7f + (float)((number + 11 * k) % 61) * 0.01f;
     calibration.sensors[k].gain_sd = (float)((number + 5 * k) % 17) * 0.01f;
-    calibration.sensors[k].memory = (float)((number + 3 * k) % 7) * 0.01f;
   }
   return calibration;
 }
