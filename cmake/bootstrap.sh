@@ -48,6 +48,7 @@ sigrok-cli sigrok-cli
 /usr/include/nlohmann/json.hpp nlohmann-json3-dev
 /usr/lib/python3/dist-packages/numpy/__init__.py python3-numpy
 /usr/lib/python3/dist-packages/matplotlib/__init__.py python3-matplotlib
+/usr/lib/python3/dist-packages/markdown/__init__.py python3-markdown
 LIST
 }
 
@@ -106,10 +107,10 @@ case $1 in
   report)
     say "the fit: error against run time"
     /usr/bin/python3 host_tools/report/fit/fit.py --build build/host \
-      --image build/pico_mux/fit_cycles.bin -o build/report --plot host_tools/report/fit/fit_report.png
+      --image build/pico_mux/fit_cycles.bin -o build/report --picture host_tools/report/fit/fit_report.png
     say "rate, latency and cost, in emulated time"
     /usr/bin/python3 host_tools/report/rate/rate.py --build build/host --boards build -o build/report \
-      --plot host_tools/report/rate/rate.png
+      --picture host_tools/report/rate/rate.png
     say "the published experiments on the simulated fingertip"
     /usr/bin/python3 host_tools/report/validation/validation.py --build build/host \
       --image build/pico_mux/fingertip-pico_mux.bin -o build/report \
@@ -117,5 +118,6 @@ case $1 in
     say "how far from the truth: gains, shapes, time, and what is kept"
     /usr/bin/python3 host_tools/report/truth/truth.py --build build/host --boards build -o build/report \
       --picture host_tools/report/truth/truth.png
+    say "every table and picture: $root/build/report/index.html"
     ;;
 esac

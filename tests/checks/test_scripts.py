@@ -129,6 +129,35 @@ class Bootstrap(Folder):
             self.assertEqual(self.up_to_npm(**versions).returncode, 33)
 
 
+class BootstrapReport(Folder):
+    """bootstrap.sh report with a stand-in for each program that it calls."""
+
+    def test_it_ends_with_the_place_of_the_page(self):
+        for folder in ("cmake", "host_tools/emulator/node_modules", "bin"):
+            (self.folder / folder).mkdir(parents=True)
+        shutil.copy(ROOT / "cmake/bootstrap.sh", self.folder / "cmake")
+        (self.folder / "host_tools/emulator/package-lock.json").write_text("{}")
+        for name, body in (("apt-get", ""), ("sudo", ""), ("npm", ""), ("cmake", "echo cmake version 3.25.1"), ("node", "echo v18.0.0")):
+            program = self.folder / "bin" / name
+            program.write_text(f"#!/bin/sh\n{body}\n")
+            program.chmod(0o755)
+        for report in ("fit/fit", "rate/rate", "validation/validation", "truth/truth"):
+            self.assertTrue((ROOT / f"host_tools/report/{report}.py").is_file())
+            script = self.folder / f"host_tools/report/{report}.py"
+            script.parent.mkdir(parents=True)
+            script.write_text("import sys\nprint('ran', sys.argv[0], sys.argv[sys.argv.index('-o') + 1], sys.argv[sys.argv.index('--picture') + 1])\n")
+        done = subprocess.run(["sh", self.folder / "cmake/bootstrap.sh", "report"], capture_output=True, text=True, timeout=60,
+                              env={**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
+        self.assertEqual(done.returncode, 0, done.stderr)
+        lines = done.stdout.splitlines()
+        self.assertEqual(lines[-1], f"== every table and picture: {self.folder.resolve()}/build/report/index.html")
+        ran = [line.split()[1:] for line in lines if line.startswith("ran ")]
+        self.assertEqual([place for _, place, _ in ran], 4 * ["build/report"])
+        for _, _, picture in ran:  # those of the README
+            self.assertTrue((ROOT / picture).is_file(), picture)
+            self.assertIn(f"({picture})", (ROOT / "README.md").read_text(encoding="utf-8"))
+
+
 class Demo(Folder):
     """demo.sh alone, with a stand-in for each program that it calls."""
 

@@ -12,21 +12,21 @@ host, paired), and fit_stiff, and merges what they find:
 
 Errors are distances of the location from the reference optimum over the observable presses of the sets A to D.
 """
-import argparse
 import csv
 import json
 import math
 import pathlib
-import shutil
 import subprocess
 import sys
-import time
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+from drawing import BLUE, FAINT, GOAL, INK, plt, save  # noqa: E402
 from fingertip_files import InputError, run_tool, write_text  # noqa: E402
-from goals import goal_table_md, judge, missed, print_goals  # noqa: E402
+from goals import goal_table_md, judge  # noqa: E402
+from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
+from tables import table_md  # noqa: E402
 
 CLOCK_Hz = 125e6
 SETS = ("A", "B", "C", "D")
@@ -37,48 +37,37 @@ MASKS = ("mask=random", "mask=peak", "mask=random2", "mask=random3")
 BUILT_MASKS = tuple(f"{mask} {BUILT}" for mask in MASKS[:2])
 
 
-class Steps:
-    """Runs the tools one after the other and says so."""
+def measure(options, out):
+    steps = Steps()
+    tools = pathlib.Path(options.build) / "host_tools/report/fit"
 
-    def __init__(self, folder):
-        self.folder = folder
-        self.start_s = time.monotonic()
-
-    def run(self, what, *command):
-        """Output goes to a log beside the results; progress of the reference to the terminal."""
-        print(f"{time.monotonic() - self.start_s:5.0f} s  {what}", flush=True)
-        log = self.folder / f"{pathlib.Path(command[0] if command[0] != 'node' else command[1]).stem}.log"
+    def logged(name, what, *command):
+        """Output goes to NAME.log beside the results; progress of the reference to the terminal."""
+        steps.say(what)
+        log = out / f"{name}.log"
         with open(log, "w", encoding="utf-8") as file:
             done = subprocess.run([str(part) for part in command], stdout=file)
         if done.returncode != 0:
             raise InputError(f"{what} failed, exit status {done.returncode}; see above and {log}")
 
-
-def measure(options, out):
-    steps = Steps(out)
-    tools = pathlib.Path(options.build) / "host_tools/report/fit"
-    for tool in ("fit_report", "fit_bench"):
+    for tool in ("fit_report", "fit_bench", "fit_stiff"):
         if not (tools / tool).exists():
             raise InputError(f"{tools / tool} is not there; build it: cmake --build --preset host")
     if not pathlib.Path(options.image).exists():
         raise InputError(f"{options.image} is not there; build it: cmake --preset pico_mux && cmake --build --preset pico_mux")
     common = ("--limit", options.limit, "--seed", options.seed, "--out", out, "--cache", out / "cache")
-    steps.run("error against the reference (the first run solves the reference, about eight minutes on two cores)", tools / "fit_report", *common)
+    logged("fit_error", "error against the reference (the first run solves the reference, about eight minutes on two cores)", tools / "fit_report", *common)
     jobs = out / "fit_jobs.json"
-    steps.run("presses for the chip", tools / "fit_report", *common, "--jobs", jobs)
-    steps.run("cycles on the emulated chip", "node", HERE / "on_chip/bench.mjs", "--image", options.image, "--jobs", jobs,
+    logged("fit_jobs", "presses for the chip", tools / "fit_report", *common, "--jobs", jobs)
+    logged("fit_cycles", "cycles on the emulated chip", "node", HERE / "on_chip/bench.mjs", "--image", options.image, "--jobs", jobs,
               "--out", out / "fit_cycles.csv", "--budget", options.budget)
-    steps.run("time on this host", tools / "fit_bench", "--limit", max(1200, options.limit // 10), "--passes", options.passes,
+    logged("fit_bench", "time on this host", tools / "fit_bench", "--limit", max(1200, options.limit // 10), "--passes", options.passes,
               "--seed", options.seed, "--out", out, "--cache", out / "cache")
-    (out / "stiff.json").unlink(missing_ok=True)
-    if (tools / "fit_stiff").exists():
-        steps.run("fit_stiff", tools / "fit_stiff", "--out", out, "--limit", max(200, options.limit // 15))
-    print(f"{time.monotonic() - steps.start_s:5.0f} s  table and plot", flush=True)
+    logged("stiff", "what is hard, extreme, or no press", tools / "fit_stiff", "--out", out, "--limit", max(200, options.limit // 15))
+    steps.say("table and picture")
 
 
 def read_json(path):
-    if not path.exists():
-        return None
     return json.loads(path.read_text(encoding="utf-8"))
 
 
@@ -152,7 +141,7 @@ def figures(results):
         "masked_peak_above_100um_d": r.error("fit", "mask=peak", "D", "above_100um"),
         "masked_peak_above_100um_d_double": r.error("double", "mask=peak guess=firmware", "D", "above_100um"),
         "masked_observable_presses": {mask[5:]: sum(r.error("fit", mask, s, "presses") for s in SETS) for mask in MASKS},
-        "bad_unflagged_percent_worst": None if r.stiff is None else 100 * r.stiff["bad_unflagged_worst"],
+        "bad_unflagged_percent_worst": 100 * r.stiff["bad_unflagged_worst"],
         "bad_unflagged_percent_per_set": {s: r.percent_of_all("fit", USUAL, s, "bad_unflagged") for s in SETS},
         "good_flagged_percent_c": r.percent_of_all("fit", USUAL, "C", "good_flagged"),
         "good_flagged_percent_d": r.percent_of_all("fit", USUAL, "D", "good_flagged"),
@@ -168,13 +157,6 @@ def figures(results):
         "processor": r.bench["processor"],
     }
     return judge(found, GOALS)
-
-
-def finite(value):
-    """For JSON, which has no infinity."""
-    if isinstance(value, dict):
-        return {key: finite(item) for key, item in value.items()}
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def table(results):
@@ -226,14 +208,12 @@ def write_table_md(path, rows, found):
              "Written by `sh cmake/bootstrap.sh report`. Cycles: emulated Cortex-M0+, median; ms at 125 MHz. um: distance of the location from",
              f"the reference optimum over the observable presses of sets A to D, seed {found['seed']}. host us: {found['processor']}.", "",
              *goal_table_md(found)]
-    lines += ["", "| kernel | variant | cycles | ms | host us | p50 | p99 | p99.9 | A p99.9 | B | C | D | above 100 um | C, D: p99 mm to the truth |",
-              "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|"]
-    for row in rows:
-        cells = [row["kernel"], row["variant"], row.get("cycles_median", ""), number(row.get("ms"), 3), number(row["host_us"], 3),
-                 *(number(row.get(key)) for key in ("p50_um", "p99_um", "p999_um", *(f"p999_um_{s}" for s in SETS))),
-                 f"{row['above_100um']} of {row['presses']}",
-                 ", ".join(number(row[f"truth_p99_mm_{s}"]) for s in "CD" if f"truth_p99_mm_{s}" in row)]
-        lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
+    cells = [[row["kernel"], row["variant"], row.get("cycles_median", ""), number(row.get("ms"), 3), number(row["host_us"], 3),
+              *(number(row.get(key)) for key in ("p50_um", "p99_um", "p999_um", *(f"p999_um_{s}" for s in SETS))),
+              f"{row['above_100um']} of {row['presses']}",
+              ", ".join(number(row[f"truth_p99_mm_{s}"]) for s in "CD" if f"truth_p99_mm_{s}" in row)] for row in rows]
+    lines += ["", *table_md(("kernel", "variant", "cycles", "ms", "host us", "p50", "p99", "p99.9", "A p99.9", "B", "C", "D", "above 100 um",
+                             "C, D: p99 mm to the truth"), cells)]
     write_text(path, "\n".join(lines) + "\n")
 
 
@@ -247,14 +227,8 @@ def pareto(points):
 
 
 def plot(path, results, found):
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    ink, faint, grid = "#22252e", "#8a8f9c", "#e6e8ee"
-    colours = {"fit": "#1f6fd6", "general": "#0e9aa7", "naive_float": "#e08a1e", "naive_double": "#b5651d", "lm_float": "#a05cc5",
-               "lm_double": "#6f3d94", "double": "#8a8f9c", "separable": "#2a9d4a"}
+    colours = {"fit": BLUE, "general": "#0e9aa7", "naive_float": "#e08a1e", "naive_double": "#b5651d", "lm_float": "#a05cc5",
+               "lm_double": "#6f3d94", "double": FAINT, "separable": GOAL}
     labels = {"fit": "firmware, fixed point", "general": "firmware, float32, any layout", "naive_float": "Gauss-Newton, expf",
               "naive_double": "Gauss-Newton, exp", "lm_float": "Levenberg-Marquardt, float", "lm_double": "Levenberg-Marquardt, double"}
     # on the host: name, whether it stands left or right of the bar or else above the point, lifted by so many points
@@ -269,9 +243,6 @@ def plot(path, results, found):
     def shown(um):
         return min(max(um, low_um), high_um)
 
-    plt.rcParams.update({
-        "font.size": 9, "axes.edgecolor": "#b4bac6", "axes.labelcolor": ink, "xtick.color": faint, "ytick.color": faint,
-        "text.color": ink, "axes.spines.top": False, "axes.spines.right": False, "axes.titlecolor": faint})
     figure, (chip, host) = plt.subplots(1, 2, figsize=(13, 6.6), width_ratios=[1.5, 1], sharey=True)
     figure.subplots_adjust(left=0.06, right=0.985, top=0.8, bottom=0.09, wspace=0.06)
 
@@ -304,17 +275,17 @@ def plot(path, results, found):
               label="Pareto front", zorder=1)
     chip.set_xlabel("cycles of one cold fit on the emulated Cortex-M0+, median (numbers: iterations)")
     chip.set_ylabel("p99.9 distance to the least-squares optimum, um")
-    chip.set_title("on the chip", loc="left", size=10)
-    chip.legend(loc="lower left", bbox_to_anchor=(0.1, 0), ncol=2, fontsize=7.5, frameon=False)
+    chip.set_title("on the chip", loc="left", size=10, color=FAINT)
+    chip.legend(loc="lower left", bbox_to_anchor=(0.1, 0), ncol=2, fontsize=7.5)
     top = chip.secondary_xaxis("top", functions=(lambda c: c / CLOCK_Hz * 1e3, lambda ms: ms * CLOCK_Hz / 1e3))
-    top.set_xlabel("ms at 125 MHz", size=8, color=faint, loc="right")
+    top.set_xlabel("ms at 125 MHz", size=8, color=FAINT, loc="right")
     top.spines["top"].set_visible(False)
 
     for kernel, row in results.host.items():
         if kernel in ("grid", "ceres_new"):
             continue  # as fit, and as ceres_reused
         error = math.inf if row["p999_um"] is None else row["p999_um"]
-        colour = colours.get(kernel, ink)
+        colour = colours.get(kernel, INK)
         host.errorbar(row["us"], shown(error), xerr=[[row["us"] - row["us_p10"]], [row["us_p90"] - row["us"]]], fmt="o", ms=5,
                       color=colour, elinewidth=0.8, zorder=3)
         name, side, up = host_labels[kernel]
@@ -322,18 +293,16 @@ def plot(path, results, found):
         host.annotate(name, (at_us, shown(error)), (outwards, up), textcoords="offset points", size=7.5, va="center",
                       ha="left" if side.endswith("right") else "right", color=colour)
     host.set_xlabel("us of one fit on the host, median and 10..90 %, paired")
-    host.set_title("on this host, each from one start", loc="left", size=10)
+    host.set_title("on this host, each from one start", loc="left", size=10, color=FAINT)
     for axes in (chip, host):
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_ylim(low_um * 0.7, high_um * 1.5)
-        axes.grid(color=grid, lw=0.6)
-        axes.set_axisbelow(True)
+        axes.grid()
     figure.text(0.06, 0.945, "The fit: error against run time", size=15, weight="bold")
     figure.text(0.06, 0.905, f"{found['observable_presses']} observable presses of sets A to D (simulated), seed {found['seed']}; errors outside the "
                 f"axis are drawn on its edge; host: {found['processor']}", size=8.5)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    save(figure, path)
 
 
 def whole(text):
@@ -344,23 +313,15 @@ def whole(text):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", required=True, metavar="DIR", help="build folder of the host tools")
+    parser = option_parser(__doc__)
     parser.add_argument("--image", required=True, metavar="fit_cycles.bin", help="built with the board's firmware")
-    parser.add_argument("-o", "--output", required=True, metavar="DIR")
     parser.add_argument("--limit", type=whole, default=120000, help="presses, in all (default: %(default)s)")
     parser.add_argument("--seed", type=whole, default=20221015)
     parser.add_argument("--budget", type=float, default=15.0, help="million emulated cycles for each variant (default: %(default)s)")
     parser.add_argument("--passes", type=whole, default=3, help="of the timing on the host (default: %(default)s)")
-    parser.add_argument("--plot", metavar="FILE.png", help="a second copy of the plot")
     parser.add_argument("--only-merge", action="store_true", help="measure nothing, take what is in the folder")
-    parser.add_argument("--check", action="store_true", help="exit status 1 if a goal is not met")
     options = parser.parse_args(argv)
-    out = pathlib.Path(options.output)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{out}: {error.strerror}; choose another place") from None
+    out = output_folder(options)
     if not options.only_merge:
         measure(options, out)
     try:
@@ -369,15 +330,11 @@ def main(argv):
     except (KeyError, OSError, TypeError) as error:
         raise InputError(f"{out}: the results there are incomplete ({error!r}); run without --only-merge") from None
     rows = table(results)
-    write_text(out / "fit.json", json.dumps(finite(found), indent=2) + "\n")
+    write_json(out / "fit.json", found)
     write_table_csv(out / "fit_table.csv", rows)
     write_table_md(out / "fit_table.md", rows, found)
     plot(out / "fit_report.png", results, found)
-    if options.plot:
-        shutil.copyfile(out / "fit_report.png", options.plot)
-    print_goals(found)
-    print(f"report: {out / 'fit.json'}, {out / 'fit_table.md'}, {out / 'fit_report.png'}")
-    return 1 if options.check and missed(found) else 0
+    return finish(found, options, ("fit.json", "fit_table.md", "fit_report.png"))
 
 
 if __name__ == "__main__":

@@ -12,10 +12,8 @@ pressures measured for them; the others are held: they repeat the fit before whi
 Latencies count from the end of the longest conversion that the datasheet allows. A packet is offered when the firmware gives its
 first part to the USB controller, and delivered with its last byte on the wire. Runs are the same bit for bit each time.
 """
-import argparse
 import json
 import pathlib
-import shutil
 import sys
 import tempfile
 
@@ -25,9 +23,10 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 import rate_report  # noqa: E402
 import scenes  # noqa: E402
-from emulated import BOARDS, CLOCK_Hz, CONVERSION_us, FROM_s, Measurement, Steps, Tools, distribution, run, scenario  # noqa: E402
-from fingertip_files import InputError, check_output, run_tool, write_text  # noqa: E402
-from goals import judge, missed, print_goals  # noqa: E402
+from emulated import BOARDS, CLOCK_Hz, CONVERSION_us, FROM_s, Measurement, Tools, distribution, scenario  # noqa: E402
+from fingertip_files import InputError, run_tool, write_text  # noqa: E402
+from goals import judge  # noqa: E402
+from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
 
 GOALS = (
     ("parallel_fps_osr256", ">=", 1250), ("parallel_fps_osr1024", ">=", 410), ("mux_fps_osr256", ">=", 260),
@@ -115,37 +114,23 @@ def figures(runs, resting, rows):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", required=True, metavar="DIR", help="build folder of the host tools")
+    parser = option_parser(__doc__)
     parser.add_argument("--boards", required=True, metavar="DIR", help="folder of the boards' builds; the scenes are built there, too")
-    parser.add_argument("-o", "--output", required=True, metavar="DIR")
-    parser.add_argument("--plot", metavar="FILE.png", help="a second copy of the picture")
     parser.add_argument("--seconds", type=float, default=30, help="emulated, of the longest runs (default: %(default)s)")
     parser.add_argument("--quick", action="store_true", help="OSR 256 and 1024, scenes raw and slip on one board")
-    parser.add_argument("--check", action="store_true", help="exit status 1 if a goal is missed")
     options = parser.parse_args(argv)
     if not 1 <= options.seconds <= 600:
         raise InputError(f"--seconds {options.seconds:g} is out of range; give 1 to 600")
-    if options.plot:
-        check_output(options.plot)
-    tools, out, steps = Tools(options.build, options.boards), pathlib.Path(options.output), Steps()
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{out}: {error.strerror}; choose another place") from None
+    tools, out, steps = Tools(options.build, options.boards), output_folder(options), Steps()
     few = {"scenes": ("raw", "slip"), "boards": BOARDS[:1], "osrs": QUICK_OSRS} if options.quick else {}
     rows = scenes.measure(tools.fingertip, tools.boards / "scenes", steps, **few)
     runs, resting = measure(tools, options, steps)
     found = judge(figures(runs, resting, rows), GOALS)
     found |= {"by_osr": by_osr(runs), "by_sensors": by_sensors(tools, runs), "scenes": rows}
-    write_text(out / "rate.json", json.dumps(found, indent=2) + "\n")
+    write_json(out / "rate.json", found)
     write_text(out / "rate.md", rate_report.text(found, __doc__.split("\n\n")[-1]))
     rate_report.draw(out / "rate.png", found, runs["pico_parallel", 256])
-    if options.plot:
-        shutil.copyfile(out / "rate.png", options.plot)
-    print_goals(found)
-    print(f"report: {out / 'rate.json'}, {out / 'rate.md'}, {out / 'rate.png'}")
-    return 1 if options.check and missed(found) else 0
+    return finish(found, options, ("rate.json", "rate.md", "rate.png"))
 
 
 if __name__ == "__main__":

@@ -1,13 +1,14 @@
 """rate.json as text and as a picture."""
+import matplotlib
 import scenes
+from drawing import BLUE, FAINT, GOAL, ORANGE, plt, save
 from emulated import BOARDS, CONVERSION_us
-from fingertip_files import InputError
 from goals import goal_table_md
+from tables import table_md
 
 # Twenty-six pins on a Pico's edge, one for SCL.
 DATA_PINS = 25
-COLOURS = {"pico_parallel": "#1f6fd6", "pico_mux": "#d98a1f"}
-INK, FAINT, GRID, GOAL = "#22252e", "#8a8f9c", "#e6e8ee", "#2a9d4a"
+COLOURS = {"pico_parallel": BLUE, "pico_mux": ORANGE}
 
 
 def number(value):
@@ -18,13 +19,12 @@ def number(value):
 
 def table(rows, columns):
     """columns: heading -> function of a row."""
-    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
-    return lines + ["| " + " | ".join(number(cell(row)) for cell in columns.values()) + " |" for row in rows]
+    return table_md(columns, [[number(cell(row)) for cell in columns.values()] for row in rows])
 
 
 def text(found, how):
     field = lambda *names: lambda row: row[names[0]] if len(names) == 1 else row[names[0]][names[1]]
-    lines = ["# Rate, latency and cost", "", "Written by `sh cmake/bootstrap.sh report`. ![Rates, latency, cycles](rate.png)", "",
+    lines = ["# Rate, latency and cost", "", "Written by `sh cmake/bootstrap.sh report`.", "", "![Rates, latency, cycles](rate.png)", "",
              *goal_table_md(found), "", how.strip(), "",
              f"On pico_parallel at OSR 256, over {found['seconds']:.0f} s at {found['contact_frames_per_s']:.0f} frames/s:", "",
              *table([{"what": what, **{name: found[f"{key}_parallel_{name}_us"] for name in ("median", "p99", "p99_9", "max")}}
@@ -51,33 +51,20 @@ def text(found, how):
         "condition": field("condition"), "fit": field("fit"), "worst location, um": lambda row: f"{row['error_um']:.3f}",
         "pico_parallel frames/s": field("parallel_fps"), "latency, us": field("parallel_latency_us"), "pico_mux frames/s": field("mux_fps"),
         "latency, us ": field("mux_latency_us")})
-    return "\n".join([*lines, "", "## By scene", "", *scenes.table_md(found["scenes"])]) + "\n"
+    return "\n".join([*lines, "", "## By scene", "", *scenes.text(found["scenes"])]) + "\n"
 
 
 def draw(path, found, parallel):
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    plt.rcParams.update({
-        "font.size": 9, "axes.edgecolor": "#b4bac6", "axes.labelcolor": INK, "xtick.color": FAINT, "ytick.color": FAINT, "text.color": INK,
-        "axes.spines.top": False, "axes.spines.right": False})
     figure, ((rate, latency), (stages, sensors)) = plt.subplots(2, 2, figsize=(12, 8))
     draw_rates(rate, found)
     draw_latency(latency, found, parallel)
     draw_stages(stages, found)
     draw_sensors(sensors, found)
     for axes in (rate, latency, stages, sensors):
-        axes.grid(color=GRID, lw=0.6)
-        axes.set_axisbelow(True)
-        axes.legend(frameon=False, fontsize=8)
+        axes.grid()
+        axes.legend(fontsize=8)
     figure.tight_layout()
-    try:
-        figure.savefig(path, dpi=120, metadata={"Software": None})
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}; choose another place") from None
-    plt.close(figure)
+    save(figure, path)
 
 
 def draw_rates(axes, found):
@@ -98,7 +85,7 @@ def draw_rates(axes, found):
 
 
 def draw_latency(axes, found, parallel):
-    for name, values, colour in (("offered to the USB controller", parallel.offered_us, "#1f6fd6"), ("last byte on the wire", parallel.delivered_us, "#8a8f9c")):
+    for name, values, colour in (("offered to the USB controller", parallel.offered_us, BLUE), ("last byte on the wire", parallel.delivered_us, FAINT)):
         axes.hist(values, bins=120, histtype="stepfilled", alpha=0.6, color=colour, label=name, log=True)
     goal_us = float(found["goals"]["latency_parallel_us"]["goal"].split()[1])
     axes.axvline(goal_us, color=GOAL, lw=2, label=f"goal of the first: {goal_us:.0f} us")
@@ -106,8 +93,6 @@ def draw_latency(axes, found, parallel):
 
 
 def draw_stages(axes, found):
-    import matplotlib
-
     rows = found["scenes"][::-1]
     labels = [f"{row['scene']}\n{row['board']}" for row in rows]
     left = [0] * len(rows)

@@ -15,8 +15,10 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
-from emulated import BOARDS, CONVERSION_us, Steps, run, scenario  # noqa: E402
+from emulated import BOARDS, CONVERSION_us, scenario  # noqa: E402
 from fingertip_files import InputError, run_tool, write_text  # noqa: E402
+from reporting import Steps, run, write_json  # noqa: E402
+from tables import table_md  # noqa: E402
 
 SCENES = ("raw", "press", "slip", "paper")
 STREAM = {"raw": "raw", "press": "contact", "slip": "contact", "paper": "contact"}
@@ -85,23 +87,20 @@ def measure(fingertip, scenes_folder, steps, scenes=SCENES, boards=BOARDS, osrs=
         return list(steps.run_all(jobs).values())
 
 
-def table_md(rows):
+def text(rows):
     """Lines of Markdown."""
     osrs = list(rows[0]["frames_per_s"])
     lines = [
         "RAM is constants, variables and the whole stack; code runs from SRAM and is counted apart. Stack: the worst case by the call",
         f"graph. Cycles of a frame are counted at OSR {osrs[0]}, in contact and at rest; frames are those that hold new pressures.", ""]
     names = ["board", "scene", "flash", "RAM", "code in SRAM", "stack", "cycles in contact", "at rest", *(f"frames/s, OSR {osr}" for osr in osrs)]
-    lines += ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
-    for row in rows:
-        cells = [row["board"], row["scene"], *(row[f"{name}_bytes"] for name in ("flash", "ram", "code_in_sram", "stack")),
-                 row["cycles_of_frame"], row["cycles_of_frame_at_rest"], *(f"{rate:.0f}" for rate in row["frames_per_s"].values())]
-        lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
+    lines += table_md(names, [
+        [row["board"], row["scene"], *(row[f"{name}_bytes"] for name in ("flash", "ram", "code_in_sram", "stack")),
+         row["cycles_of_frame"], row["cycles_of_frame_at_rest"], *(f"{rate:.0f}" for rate in row["frames_per_s"].values())] for row in rows])
     stages = list(rows[0]["cycles_by_stage"])
     lines += ["", "Cycles of a frame in contact by stage; what an interrupt takes is its own stage, wherever it strikes.", ""]
-    lines += ["| " + " | ".join(["board", "scene", *stages]) + " |", "|" + "---|" * (2 + len(stages))]
-    for row in rows:
-        lines.append("| " + " | ".join(str(cell) for cell in (row["board"], row["scene"], *(row["cycles_by_stage"][stage] for stage in stages))) + " |")
+    lines += table_md(["board", "scene", *stages],
+                      [[row["board"], row["scene"], *(row["cycles_by_stage"][stage] for stage in stages)] for row in rows])
     return lines
 
 
@@ -116,8 +115,8 @@ def main(argv):
         raise InputError(f"{fingertip}: is not there; build it: cmake --preset host && cmake --build --preset host")
     out.mkdir(parents=True, exist_ok=True)
     rows = measure(fingertip, options.scenes, Steps())
-    write_text(out / "scenes.json", json.dumps(rows, indent=2) + "\n")
-    write_text(out / "scenes.md", "\n".join(["# Scenes", "", *table_md(rows)]) + "\n")
+    write_json(out / "scenes.json", rows)
+    write_text(out / "scenes.md", "\n".join(["# Scenes", "", *text(rows)]) + "\n")
     print(f"report: {out / 'scenes.json'}, {out / 'scenes.md'}")
     return 0
 

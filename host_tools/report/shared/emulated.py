@@ -1,18 +1,15 @@
 """Measurements of the release images in the emulator: rates, latencies, sleep. The same bit for bit each time."""
-import concurrent.futures
 import csv
 import json
 import pathlib
-import subprocess
 import sys
-import threading
-import time
 
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
 from fingertip_files import CONTACT, FIT_VALID, InputError, read_recording  # noqa: E402
+from reporting import run  # noqa: E402
 
 HELD = 1 << 6
 # Of a packet, firmware/wire/PROTOCOL.md.
@@ -26,42 +23,6 @@ CONVERSION_us = {256: 560, 512: 1100, 1024: 2170, 2048: 4320, 4096: 8610, 8192: 
 FROM_s = 1.0
 # The firmware waits for a conversion by this much longer than the datasheet's maximum.
 MARGIN = 1.05
-
-
-class Steps:
-    """Runs what is to be done, some at a time, and says what is done and when."""
-
-    def __init__(self):
-        self.start_s = time.monotonic()
-        self.lock = threading.Lock()
-
-    def say(self, what):
-        with self.lock:
-            print(f"{time.monotonic() - self.start_s:5.0f} s  {what}", flush=True)
-
-    def run_all(self, jobs, workers=2):
-        """jobs: key -> (what, function). key -> result."""
-        def one(what, function):
-            result = function()
-            self.say(what)
-            return result
-
-        with concurrent.futures.ThreadPoolExecutor(workers) as pool:
-            futures = {key: pool.submit(one, *job) for key, job in jobs.items()}
-            try:
-                return {key: future.result() for key, future in futures.items()}
-            except BaseException:
-                pool.shutdown(cancel_futures=True)
-                raise
-
-
-def run(*call):
-    """What it printed."""
-    done = subprocess.run([str(part) for part in call], capture_output=True, text=True)
-    if done.returncode != 0:
-        shown = " ".join(str(part) for part in call[:3])
-        raise InputError(f"{shown} ... failed: {(done.stderr or done.stdout).strip()[-500:]}")
-    return done.stdout
 
 
 class Tools:

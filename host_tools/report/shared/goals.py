@@ -3,7 +3,10 @@
 A goal is (name, sign, limit): sign ">=" or "<="; limit a number or the name of another figure. A figure that was not
 measured is None.
 """
+from tables import table_md, text_of
+
 VERDICTS = {True: "met", False: "MISSED", None: "not measured"}
+HEADER = ("figure", "found", "goal", "verdict")
 
 
 def judge(found, goals):
@@ -24,18 +27,12 @@ def missed(found):
 
 def goal_rows(found, digits=4):
     """(figure, found, goal, verdict) for a table."""
-    def text(value):
-        if value is None:
-            return ""
-        return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
-
-    return [(name, text(found[name]), goal["goal"], VERDICTS[goal["met"]]) for name, goal in found["goals"].items()]
+    return [(name, text_of(found[name], digits), goal["goal"], VERDICTS[goal["met"]]) for name, goal in found["goals"].items()]
 
 
 def goal_table_md(found):
     """Lines of Markdown."""
-    return ["| figure | found | goal | verdict |", "|---|---|---|---|",
-            *("| " + " | ".join(row) + " |" for row in goal_rows(found))]
+    return table_md(HEADER, goal_rows(found))
 
 
 def print_goals(found):

@@ -12,11 +12,9 @@ real strips are used where they are at hand (--recordings, or the environment's 
 elsewhere. Constants were chosen with other seeds and other pads than those that judge here. Cycles are those of the fit report in
 the same folder.
 """
-import argparse
 import json
 import os
 import pathlib
-import shutil
 import subprocess
 import sys
 
@@ -24,8 +22,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 
 import truth_report  # noqa: E402
-from fingertip_files import InputError, run_tool, write_text  # noqa: E402
-from goals import judge, missed, print_goals  # noqa: E402
+from fingertip_files import InputError, run_tool  # noqa: E402
+from goals import judge  # noqa: E402
+from reporting import finish, option_parser, output_folder, write_json  # noqa: E402
 
 # part: what it does, its program below the build folder
 PARTS = {
@@ -88,22 +87,17 @@ def cycles(out):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", required=True, metavar="DIR", help="of the host tools")
+    parser = option_parser(__doc__)
     parser.add_argument("--boards", default="build", metavar="DIR", help="folder of the boards' builds; default build")
-    parser.add_argument("-o", "--output", required=True, metavar="DIR")
     parser.add_argument("--recordings", default=os.environ.get("FINGERTIP_RECORDINGS"), metavar="DIR", help="of real strips")
     parser.add_argument("--seed", type=int, metavar="N")
     parser.add_argument("--pads", type=int, metavar="N", help="where pads differ; default 200 or more")
     parser.add_argument("--parts", metavar="NAME,...", help=f"only these of {','.join(PARTS)}; the others from the folder's truth.json")
-    parser.add_argument("--picture", metavar="FILE.png", help="where the picture goes too")
-    parser.add_argument("--check", action="store_true", help="exit status 1 if a goal is missed")
     options = parser.parse_args(argv)
     parts = options.parts.split(",") if options.parts else list(PARTS)
     if unknown := [part for part in parts if part not in PARTS]:
         raise InputError(f"--parts: {unknown[0]} is none of {','.join(PARTS)}")
-    out = pathlib.Path(options.output)
-    out.mkdir(parents=True, exist_ok=True)
+    out = output_folder(options)
     path = out / "truth.json"
     found = {name: None for name, _, _ in GOALS}
     if options.parts and path.is_file():
@@ -111,14 +105,10 @@ def main(argv):
     for part in parts:
         found |= run_part(part, options)
     found = judge({**found, **cycles(out)}, GOALS)
-    write_text(path, json.dumps(found, indent=1) + "\n")
+    write_json(path, found)
     truth_report.write(found, out / "truth.md")
     truth_report.draw(found, out / "truth.png")
-    if options.picture:
-        shutil.copy(out / "truth.png", options.picture)
-    print_goals(found)
-    print(f"truth: {path}, {out / 'truth.md'}, {out / 'truth.png'}")
-    return 1 if options.check and missed(found) else 0
+    return finish(found, options, ("truth.json", "truth.md", "truth.png"))
 
 
 if __name__ == "__main__":

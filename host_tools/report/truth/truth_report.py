@@ -1,26 +1,11 @@
 """What truth.py measured as text and as a picture."""
-import matplotlib
+from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save
+from fingertip_files import write_text
+from goals import goal_table_md
+from tables import table_of_dicts_md
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
-from fingertip_files import write_text  # noqa: E402
-from goals import goal_table_md  # noqa: E402
-
-INK, FAINT, GRID, GOAL, BLUE, ORANGE = "#22252e", "#8a8f9c", "#e6e8ee", "#2a9d4a", "#1f6fd6", "#d98a1f"
 # Share of truths within one and two radial standard deviations of a normal distribution in the plane.
 IDEAL_PERCENT = (63.2, 98.2)
-
-
-def text_of(value):
-    if value is None:
-        return ""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def table_md(rows):
-    columns = list(dict.fromkeys(name for row in rows for name in row))
-    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
-    return lines + ["| " + " | ".join(text_of(row.get(name)) for name in columns) + " |" for row in rows]
 
 
 def tables_of(found):
@@ -32,18 +17,16 @@ def tables_of(found):
 
 def write(found, path):
     lines = ["# From the optimum to the truth", "", "Written by `sh cmake/bootstrap.sh report`. Simulated pads and presses, the firmware's own code;",
-             "`real_...`: recordings of real strips, where they are at hand. ![Coverage, calibration, warnings](truth.png)", "", *goal_table_md(found), ""]
+             "`real_...`: recordings of real strips, where they are at hand.", "", "![Coverage, calibration, warnings](truth.png)", "", *goal_table_md(found), ""]
     for name, rows in tables_of(found):
-        lines += [f"## {name.replace('_', ' ')}", "", *table_md(rows), ""]
+        lines += [f"## {name.replace('_', ' ')}", "", *table_of_dicts_md(rows), ""]
     write_text(path, "\n".join(lines))
 
 
 def tidy(axes, title, label):
     axes.set_title(title, loc="left", size=10, color=INK)
     axes.set_ylabel(label, size=9)
-    axes.grid(axis="y", color=GRID)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(axis="y")
     axes.tick_params(labelsize=8)
 
 
@@ -59,7 +42,7 @@ def draw_coverage(axes, cases):
         axes.axhline(ideal, color=GOAL, lw=1, ls="--")
     named(axes, [row["case"] for row in cases])
     axes.set_ylim(0, 115)
-    axes.legend(fontsize=8, frameon=False, ncols=2, loc="upper right")
+    axes.legend(fontsize=8, ncols=2, loc="upper right")
     tidy(axes, "True places within the predicted standard deviation (dashed: ideal)", "% of touches")
 
 
@@ -70,7 +53,7 @@ def draw_warnings(axes, cases):
     for x, row in enumerate(cases):
         axes.annotate(f"{row['bad_unflagged']:.2g}", (x + 0.2, row["bad"]), ha="center", va="bottom", size=8, color=INK)
     named(axes, [row["case"] for row in cases])
-    axes.legend(fontsize=8, frameon=False)
+    axes.legend(fontsize=8)
     tidy(axes, "Warnings (number: % off by more than 1 mm and not warned)", "% of touches")
 
 
@@ -80,7 +63,7 @@ def draw_placements(axes, calibration, before_mm):
     axes.axhline(before_mm, color=FAINT, ls="--", lw=1, label="never calibrated")
     axes.set_ylim(bottom=0)
     axes.set_xlabel("placements of one weight", size=9)
-    axes.legend(fontsize=8, frameon=False)
+    axes.legend(fontsize=8)
     tidy(axes, "Location on pads of 10 % gain spread", "median error, mm")
 
 
@@ -92,7 +75,7 @@ def draw_iterations(axes, rows):
                       label=f"{layer} mm, gains {gain} %")
     axes.set_ylim(bottom=0)
     axes.set_xlabel("iterations of the fit", size=9)
-    axes.legend(fontsize=7.5, frameon=False, loc="lower center", ncols=4)
+    axes.legend(fontsize=7.5, loc="lower right", ncols=2)
     tidy(axes, "What iterations do to the truth", "median error, mm")
 
 
@@ -111,5 +94,4 @@ def draw(found, path):
     for axes in places.flat[len(panels):]:
         axes.set_axis_off()
     figure.suptitle("From the optimum to the truth: simulated pads, the firmware's own code", x=0.01, ha="left", size=12, weight="bold")
-    figure.savefig(path, dpi=90)
-    plt.close(figure)
+    save(figure, path)

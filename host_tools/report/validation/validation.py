@@ -14,13 +14,11 @@ pad costs, not how good a fingertip is.
 A sample is a frame in contact that was fitted. Localisation errors are of samples of at least 1 N. Contact tables are
 cached beside the results.
 """
-import argparse
 import concurrent.futures
 import csv
 import dataclasses
 import json
 import pathlib
-import shutil
 import subprocess
 import sys
 import time
@@ -29,8 +27,9 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
-from fingertip_files import FIT_VALID, SLIP, InputError, read_recording, run_tool, write_text  # noqa: E402
-from goals import judge, print_goals  # noqa: E402
+from fingertip_files import FIT_VALID, SLIP, InputError, read_recording, run_tool  # noqa: E402
+from goals import judge  # noqa: E402
+from reporting import finish, option_parser, output_folder, run, write_json  # noqa: E402
 from validation_report import draw, write_report  # noqa: E402
 
 SATURATED = 1 << 12
@@ -67,14 +66,6 @@ GOALS = (
     ("samples", ">=", 40000), ("seconds", "<=", 300), ("h12_gain0_median_mm", "<=", 0.12), ("h12_gain10_median_mm", "<=", 0.40),
     ("force_mape_scaled_gain0_percent", "<=", 0.5), ("force_mape_scaled_gain10_percent", "<=", 3.5), ("h6_prior_p99_mm", "<=", 1.5),
     ("h6_bad_unflagged_percent", "<=", 0.5), ("saturated_median_mm", "<=", 0.1), ("emulated_frames_different", "<=", 0))
-
-
-def run(*command):
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
-    if done.returncode != 0:
-        said = (done.stderr or done.stdout).strip().splitlines() or ["nothing said"]
-        raise InputError(f"{pathlib.Path(str(command[0])).name} failed: {said[-1]}")
-    return done.stdout
 
 
 class Progress:
@@ -470,11 +461,8 @@ def curves(shop):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", required=True, metavar="DIR", help="of the host tools")
+    parser = option_parser(__doc__)
     parser.add_argument("--image", required=True, metavar="FILE.bin", help="firmware for pico_mux")
-    parser.add_argument("-o", "--output", required=True, metavar="DIR")
-    parser.add_argument("--picture", metavar="FILE.png", help="where the picture of the force goes too")
     parser.add_argument("--tables", metavar="DIR", help="cache of the contact tables; default: contact_tables in the output")
     parser.add_argument("--seed", type=int, default=1, metavar="N")
     parser.add_argument("--scale", type=float, default=1, metavar="FACTOR", help="of the scenes' lengths; default 1")
@@ -486,8 +474,7 @@ def main(argv):
         raise InputError(f"--pads {options.pads} is out of range; give 1 to 100")
     if not 0.01 <= options.scale <= 100:
         raise InputError(f"--scale {options.scale:g} is out of range; give 0.01 to 100")
-    out = pathlib.Path(options.output)
-    out.mkdir(parents=True, exist_ok=True)
+    out = output_folder(options)
     shop = Workshop(options, out)
     plan(shop)
     shop.build_tables()
@@ -498,14 +485,10 @@ def main(argv):
         file.unlink()
     shop.work.rmdir()
     found = measure(shop, seconds, emulated)
-    write_text(out / "validation.json", json.dumps(found, indent=1) + "\n")
-    draw(curves(shop), out)
-    if options.picture:
-        shutil.copy(out / "validation_force.png", options.picture)
+    write_json(out / "validation.json", found)
+    pictures = draw(curves(shop), out)
     write_report(found, out / "validation.md")
-    print_goals(found)
-    print(f"validation: {out / 'validation.json'}, {out / 'validation.md'}")
-    return 0
+    return finish(found, options, ("validation.json", "validation.md", *pictures))
 
 
 if __name__ == "__main__":

@@ -2,13 +2,11 @@
 
 write_report takes the dict that is in validation.json, draw the arrays of validation.curves; neither measures anything.
 """
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
-import numpy as np  # noqa: E402
-from fingertip_files import SENSOR_X_mm, SENSOR_Y_mm, write_text  # noqa: E402
-from goals import goal_table_md  # noqa: E402
+import numpy as np
+from drawing import BLUE, FAINT, INK, ORANGE, plt, save
+from fingertip_files import SENSOR_X_mm, SENSOR_Y_mm, write_text
+from goals import goal_table_md
+from tables import table_md
 
 NAMES = {
     "sphere6": "Small spherical indenter", "sphere15": "Large spherical indenter", "cylinder6": "Cylindrical indenter",
@@ -40,9 +38,7 @@ class Report:
         self.lines += [*lines, ""]
 
     def table(self, header, rows):
-        self.lines += ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-        self.lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
-        self.lines.append("")
+        self.lines += [*table_md(header, rows), ""]
 
     def write(self, path):
         write_text(path, "\n".join(self.lines))
@@ -225,42 +221,38 @@ def write_budget(found, r):
             for row in found["other"]])
 
 
-def save(figure, path):
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
-
-
 def draw(curves, folder):
-    """validation_force.png, validation_signals.png, validation_slip.png."""
-    grey, blue, orange = "#8a8f9c", "#2463a8", "#e07b39"
+    """validation_force.png, validation_signals.png, validation_slip.png: the names of those that were drawn."""
+    drawn = ["validation_force.png"]
     figure, axes = plt.subplots(2, 2, figsize=(11, 7.5), layout="constrained")
     shown = curves["force"]
     for axis, name, title in ((axes[0, 0], "taps", "(a) taps, small sphere"), (axes[0, 1], "object", "(b) ping-pong ball")):
         if name not in shown:
             axis.set_axis_off()
             continue
-        axis.plot(shown[name]["time_s"], shown[name]["true_N"], color=orange, label="true")
-        axis.plot(shown[name]["time_s"], shown[name]["said_N"], ".-", color=blue, ms=3, lw=0.8, label="estimated")
+        axis.plot(shown[name]["time_s"], shown[name]["true_N"], color=ORANGE, label="true")
+        axis.plot(shown[name]["time_s"], shown[name]["said_N"], ".-", color=BLUE, ms=3, lw=0.8, label="estimated")
         axis.set(title=title, xlabel="time, s", ylabel="force, N")
-        axis.legend(frameon=False)
-    axes[1, 0].plot(shown["all"]["true_N"], shown["all"]["said_N"], ",", color=blue, rasterized=True)
-    axes[1, 0].plot((0, 50), (0, 50), color=grey, lw=0.8)
+        axis.legend()
+    axes[1, 0].plot(shown["all"]["true_N"], shown["all"]["said_N"], ",", color=BLUE, rasterized=True)
+    axes[1, 0].plot((0, 50), (0, 50), color=FAINT, lw=0.8)
     axes[1, 0].set(title="(c) all samples, gain spread 10 %", xlabel="true force, N", ylabel="estimated force, N")
     if "cycle" in shown:
-        axes[1, 1].plot(shown["cycle"]["true_N"], shown["cycle"]["said_N"], color=blue)
-        axes[1, 1].plot((0, 20), (0, 20), color=grey, lw=0.8)
+        axes[1, 1].plot(shown["cycle"]["true_N"], shown["cycle"]["said_N"], color=BLUE)
+        axes[1, 1].plot((0, 20), (0, 20), color=FAINT, lw=0.8)
         axes[1, 1].set(title="(d) slow load cycle, relaxation and hysteresis", xlabel="true force, N", ylabel="estimated force, N")
     figure.suptitle("Simulated fingertip, as the paper's Fig. 7")
-    save(figure, folder / "validation_force.png")
+    save(figure, folder / drawn[-1])
 
     if shown := curves["signals"]:
         figure, axis = plt.subplots(figsize=(11, 4), layout="constrained")
         axis.plot(shown["time_s"], 1e-3 * shown["above_Pa"], lw=0.9)
         other = axis.twinx()
-        other.plot(shown["time_s"], shown["true_N"], color="black", lw=1.2, ls="--")
+        other.plot(shown["time_s"], shown["true_N"], color=INK, lw=1.2, ls="--")
         other.set_ylabel("true force, N (dashed)")
         axis.set(xlabel="time, s", ylabel="pressure above tare, kPa", title="Readings of the fifteen sensors, simulated")
-        save(figure, folder / "validation_signals.png")
+        drawn.append("validation_signals.png")
+        save(figure, folder / drawn[-1])
 
     if shown := curves["slip"]:
         figure, axes = plt.subplots(1, 5, figsize=(11, 4.2), layout="constrained")
@@ -275,4 +267,6 @@ def draw(curves, folder):
             axis.set_title(f"{1e3 * (at['time_s'] - shown['time_s'][0]):.0f} ms", fontsize=9)
         figure.colorbar(image, ax=axes, label="kPa", shrink=0.7)
         figure.suptitle("Slip at 20 mm/s, simulated: reconstructed pressure, true place +")
-        save(figure, folder / "validation_slip.png")
+        drawn.append("validation_slip.png")
+        save(figure, folder / drawn[-1])
+    return drawn

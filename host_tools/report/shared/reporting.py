@@ -1,0 +1,97 @@
+"""What every report does besides measuring: its options, its steps, its files, and how it ends."""
+import argparse
+import concurrent.futures
+import json
+import math
+import pathlib
+import shutil
+import subprocess
+import threading
+import time
+
+import page
+from fingertip_files import InputError, check_output, write_text
+from goals import missed, print_goals
+
+
+def option_parser(description):
+    """With the options that every report has."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", required=True, metavar="DIR", help="build folder of the host tools")
+    parser.add_argument("-o", "--output", required=True, metavar="DIR")
+    parser.add_argument("--picture", metavar="FILE.png", help="a second copy of the picture, the first if there are several")
+    parser.add_argument("--check", action="store_true", help="exit status 1 if a goal is missed")
+    return parser
+
+
+def output_folder(options):
+    """There; called before anything is measured, so that a wrong place costs no time."""
+    if options.picture:
+        check_output(options.picture)
+    out = pathlib.Path(options.output)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{out}: {error.strerror}; choose another place") from None
+    return out
+
+
+def run(*call):
+    """What it printed."""
+    done = subprocess.run([str(part) for part in call], capture_output=True, text=True)
+    if done.returncode != 0:
+        shown = " ".join(str(part) for part in call[:3])
+        raise InputError(f"{shown} ... failed: {(done.stderr or done.stdout).strip()[-500:]}")
+    return done.stdout
+
+
+class Steps:
+    """Runs what is to be done, some at a time, and says what is done and when."""
+
+    def __init__(self):
+        self.start_s = time.monotonic()
+        self.lock = threading.Lock()
+
+    def say(self, what):
+        with self.lock:
+            print(f"{time.monotonic() - self.start_s:5.0f} s  {what}", flush=True)
+
+    def run_all(self, jobs, workers=2):
+        """jobs: key -> (what, function). key -> result."""
+        def one(what, function):
+            result = function()
+            self.say(what)
+            return result
+
+        with concurrent.futures.ThreadPoolExecutor(workers) as pool:
+            futures = {key: pool.submit(one, *job) for key, job in jobs.items()}
+            try:
+                return {key: future.result() for key, future in futures.items()}
+            except BaseException:
+                pool.shutdown(cancel_futures=True)
+                raise
+
+
+def finite(value):
+    """For JSON, which has no infinity."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def write_json(path, found):
+    write_text(path, json.dumps(finite(found), indent=1) + "\n")
+
+
+def finish(found, options, files):
+    """Says what came out and makes the page anew. files: in the output folder, all that was written; the first picture goes to
+    --picture, too. Exit status."""
+    out = pathlib.Path(options.output)
+    if options.picture:
+        shutil.copyfile(out / next(name for name in files if name.endswith(".png")), options.picture)
+    print_goals(found)
+    print(f"report: {', '.join(str(out / name) for name in files)}")
+    print(f"page: {page.write(out)}")
+    return 1 if options.check and missed(found) else 0
