@@ -115,9 +115,8 @@ private:
       model.take(news.packet);
       if (news.packet.type == WIRE_HEALTH) {
         tell_missing(news.device);
-      } else if (news.packet.type == WIRE_ACK) {
-        take_answer(news.packet.body.ack);
       }
+      take_answer(news.packet);
       if (keeper_) {
         keeper_->packet(news);
       } else if (ready_[news.device]) {
@@ -189,7 +188,7 @@ private:
       models_[i].set_state(Model::State::live);
       loops_[i]->start();
     }
-    if (several()) {
+    if (several() && keeper_) {
       progress_ = std::make_unique<JointProgress>();
     }
   }
@@ -269,10 +268,20 @@ private:
     said_until_ = std::chrono::steady_clock::now() + SAID_FOR;
   }
 
-  /* What the fingertip answered to a key. */
-  void take_answer(const wire_ack &ack) {
-    if (ack.command == WIRE_CMD_TARE) {
-      say(ack.result == WIRE_RESULT_DONE ? "tared" : "not tared: " + result_text(ack.result));
+  /* What the fingertip answered to a key: done is a tare once frames say so. */
+  void take_answer(const wire_packet &packet) {
+    if (packet.type == WIRE_ACK && packet.body.ack.command == WIRE_CMD_TARE) {
+      taring_ = packet.body.ack.result == WIRE_RESULT_DONE;
+      if (!taring_) {
+        say("not tared: " + result_text(packet.body.ack.result));
+      }
+    } else if (taring_ && (packet.type == WIRE_RAW || packet.type == WIRE_CONTACT)) {
+      std::uint32_t flags =
+          packet.type == WIRE_RAW ? packet.body.raw.flags : packet.body.contact.flags;
+      if (flags & CONTACT_FLAG_TARED) {
+        taring_ = false;
+        say("tared");
+      }
     }
   }
 
@@ -342,6 +351,7 @@ private:
   std::string said_;
   KeyTime said_until_{};
   Confirmation tare_;
+  bool taring_ = false; /* accepted, and under way */
   std::vector<std::uint32_t> told_missing_;
   std::string reason_;
   std::int64_t zero_us_ = 0;

@@ -418,7 +418,8 @@ class ErrorsPeopleMeet(CliTest):
             with self.device() as device:
                 process = self.start(*command)
                 stream = getattr(process, told)
-                self.assertIn("frames", stream.readline())
+                while not re.search(r" [1-9]\d* frames", line := stream.readline()):
+                    self.assertIn("frames", line)
                 device.terminate()
                 while "gone, plug it in again" not in (line := stream.readline()):
                     self.assertIn("frames", line)
