@@ -18,6 +18,9 @@ constexpr double END_SHARE = 1.0 / 3.0;
 /* What one scale leaves between round and flat objects, 1 to 15 N, and of the firmware's fit
  * (truth_calibration, table "force"). */
 constexpr double FORCE_MODEL_SD = 0.01;
+/* How far the force of a tap is off, over what the readings lose from 0.5 to 1 s, on the twin's
+ * pads that relax by 9 to 26 % in 8 s (truth_calibration --seed 500, "relaxing"). */
+constexpr double FADED_BEFORE = 2.7;
 /* Evidence against a session speaks for itself from so many placements, or when it is so many times
  * the bound from fewer; until then it only keeps a session from being good. */
 constexpr std::size_t EVIDENCE_SURE = 24, EVIDENCE_MIN = 8;
@@ -305,12 +308,13 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
 std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements,
                                       const Solution &solution, double force_N) {
   FirmwareFit fit(array);
-  std::vector<double> forces;
+  std::vector<double> forces, fadings;
   for (std::size_t i = 0; i < placements.size(); i++) {
     const auto fitted =
         solution.placements[i].kept ? fit(placements[i], solution.gain) : std::nullopt;
     if (fitted) {
       forces.push_back(static_cast<double>(fitted->force_N));
+      fadings.push_back(placements[i].fading);
     }
   }
   if (forces.size() < PLACEMENTS_MIN) {
@@ -323,7 +327,9 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
   }
   /* Of a median: 1.2533 of a mean's; of a normal spread: 1.4826 of the median deviation. */
   const double by_chance = 1.2533 * 1.4826 * median(off) / std::sqrt(double(off.size()));
-  return ForceScale{force_N / middle, force_N / middle * std::hypot(by_chance, FORCE_MODEL_SD)};
+  const double faded = FADED_BEFORE * median(fadings);
+  return ForceScale{force_N / middle,
+                    force_N / middle * std::hypot(by_chance, FORCE_MODEL_SD, faded)};
 }
 
 Scatter scatter(const Array &array, const std::vector<Placement> &placements,

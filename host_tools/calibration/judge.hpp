@@ -67,7 +67,9 @@ struct Judgement {
 /* last: there will be no more placements, so what is not good is refused. */
 Judgement judge(const Array &array, const std::vector<Placement> &placements, bool last);
 
-/* Force over 2 pi p0 sigma^2 of the firmware's own fit to the readings over their gains. */
+/* Force over 2 pi p0 sigma^2 of the firmware's own fit to the readings over their gains, half a
+ * second to a second after the weight was down. Rubber that relaxes reads more before and less
+ * after: sd holds what the readings' fading in that time says of it. */
 struct ForceScale {
   double scale = 1.0, sd = 0.0;
 };

@@ -210,6 +210,7 @@ std::optional<Placement> PlacementFinder::settled(double t_s) {
   }
   /* With that of the level before. */
   placement.noise_Pa = std::sqrt(left_squares / std::max(left_count, 1.0) * 2.0 / slots);
+  placement.fading = -common / std::max(sum, 1.0);
   double shift = 0.0;
   for (std::size_t k = 0; k < sensors_; k++) {
     const double share = std::max(placement.reading_Pa[k], 0.0) / std::max(sum, 1.0);

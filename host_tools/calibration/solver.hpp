@@ -54,6 +54,7 @@ struct Placement {
   std::uint32_t usable = 0;       /* bitmap of the sensors whose reading is a measurement */
   double noise_Pa = 0.0;          /* sd of a mean */
   std::vector<double> earlier_Pa; /* [sensor] M; empty: of the placements before it in the list */
+  double fading = 0.0; /* share of them that the readings together lose in the half second */
 };
 
 /* Fills in earlier_Pa where it is empty: placements in order of time. Of each placement before,

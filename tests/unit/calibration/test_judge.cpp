@@ -194,6 +194,16 @@ TEST(Force, one_known_weight_gives_the_scale) {
   EXPECT_GT(right, 1.0);
   EXPECT_LT(right, 1.15);
   EXPECT_FALSE(force_scale(pad.array, {}, Solution{}, 3.0));
+  /* Rubber that loses 4 % in the half second: a tap may be off by more than that. */
+  auto fading = placements;
+  for (Placement &placement : fading) {
+    placement.fading = 0.04;
+  }
+  const auto faded = force_scale(pad.array, fading, s, 3.0);
+  EXPECT_EQ(faded->scale, scale->scale);
+  EXPECT_GT(faded->sd / faded->scale, 0.08);
+  EXPECT_LT(faded->sd / faded->scale, 0.14);
+  EXPECT_LT(scale->sd / scale->scale, 0.02);
 }
 
 TEST(Scatter, gains_bring_the_placements_together) {

@@ -122,7 +122,8 @@ TEST(Placements, relaxing_rubber_is_still) {
   feed.rest(1.0);
   feed.run(0.3, [](double t) { return t / 0.3; });
   feed.run(2.0, [](double t) { return 1.0 - 0.16 * (1.0 - std::exp(-t)) - 0.01 * t; });
-  EXPECT_EQ(feed.found.size(), 1u);
+  ASSERT_EQ(feed.found.size(), 1u);
+  EXPECT_NEAR(feed.found[0].fading, 0.046, 0.006);
 }
 
 TEST(Placements, a_hand_is_none) {

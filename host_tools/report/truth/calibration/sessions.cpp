@@ -101,12 +101,16 @@ calibrating::Placement SessionPad::place(const twin::ContactTable &foot, double 
   placement.noise_Pa =
       noise_of_one_Pa() / std::sqrt(FRAMES_PER_s * (SETTLED_END_s - SETTLED_BEGIN_s));
   placement.reading_Pa.assign(x_mm_.size(), 0.0);
+  double first_Pa = 0.0, last_Pa = 0.0;
   for (int i = 0; i < SETTLED_STEPS; i++) {
     report(i == 0 ? SETTLED_BEGIN_s : (SETTLED_END_s - SETTLED_BEGIN_s) / (SETTLED_STEPS - 1), 1.0);
     for (std::size_t k = 0; k < x_mm_.size(); k++) {
       placement.reading_Pa[k] += reported_Pa_[k] / SETTLED_STEPS;
+      first_Pa += i == 0 ? reported_Pa_[k] : 0.0;
+      last_Pa += i + 1 == SETTLED_STEPS ? reported_Pa_[k] : 0.0;
     }
   }
+  placement.fading = 2.0 * (first_Pa - last_Pa) / (first_Pa + last_Pa);
   for (double &reading : placement.reading_Pa) {
     reading += placement.noise_Pa * noise_.normal();
   }

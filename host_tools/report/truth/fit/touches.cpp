@@ -16,8 +16,7 @@ namespace {
 
 constexpr double FORCE_MIN_N = 1.0, FORCE_MAX_N = 15.0;
 constexpr double GAIN_SIGMAS_MAX = 3.0; // as the twin's pads
-constexpr double SHAPE_SD = 0.012, GAUGE_SD = 0.025;
-constexpr double EDGE_mm = 0.4; // as the twin's cylinders
+constexpr double EDGE_mm = 0.4;         // as the twin's cylinders
 
 const twin::Indenter &long_indenter(const std::string &name) {
   using Shape = twin::Indenter::Shape;
@@ -37,39 +36,6 @@ double normal_within_limit(Random &random) {
       return sigmas;
     }
   }
-}
-
-// Orthonormal over the sensors: a constant, x, y, x^2 + y^2.
-std::array<Readings, 4> make_gauge() {
-  const fit_array array = firmware_array();
-  std::array<Readings, 4> basis{};
-  for (std::size_t k = 0; k < SENSORS; k++) {
-    const double x = array.x[k], y = array.y[k];
-    basis[0][k] = 1.0;
-    basis[1][k] = x;
-    basis[2][k] = y;
-    basis[3][k] = x * x + y * y;
-  }
-  const auto product = [](const Readings &a, const Readings &b) {
-    double sum = 0.0;
-    for (std::size_t k = 0; k < SENSORS; k++) {
-      sum += a[k] * b[k];
-    }
-    return sum;
-  };
-  for (std::size_t i = 0; i < basis.size(); i++) {
-    for (std::size_t j = 0; j < i; j++) {
-      const double share = product(basis[i], basis[j]);
-      for (std::size_t k = 0; k < SENSORS; k++) {
-        basis[i][k] -= share * basis[j][k];
-      }
-    }
-    const double length = std::sqrt(product(basis[i], basis[i]));
-    for (double &value : basis[i]) {
-      value /= length;
-    }
-  }
-  return basis;
 }
 
 } // namespace
@@ -106,33 +72,11 @@ Pad raw_pad(double spread, double told, Random &random) {
   return pad;
 }
 
-Pad calibrated_pad(Random &random) {
-  static const std::array<Readings, 4> gauge = make_gauge();
-  Readings error{}, drawn{};
-  std::generate(drawn.begin(), drawn.end(), [&] { return SHAPE_SD * normal_within_limit(random); });
-  error = drawn;
-  // The mean of the gains is 1 by definition; the gauge has a standard deviation of its own, spread
-  // over three directions.
-  const double along_sd = GAUGE_SD * std::sqrt(SENSORS / 3.0);
+Pad calibrated_pad(const Calibrated &session) {
   Pad pad{};
-  for (std::size_t i = 0; i < gauge.size(); i++) {
-    double part = 0.0;
-    for (std::size_t k = 0; k < SENSORS; k++) {
-      part += gauge[i][k] * drawn[k];
-    }
-    const double wanted = i == 0 ? 0.0 : along_sd * normal_within_limit(random);
-    for (std::size_t k = 0; k < SENSORS; k++) {
-      error[k] += (wanted - part) * gauge[i][k];
-    }
-  }
   for (std::size_t k = 0; k < SENSORS; k++) {
-    double shape = 1.0, along = 0.0;
-    for (std::size_t i = 0; i < gauge.size(); i++) {
-      shape -= gauge[i][k] * gauge[i][k];
-      along += i == 0 ? 0.0 : gauge[i][k] * gauge[i][k];
-    }
-    pad.gain[k] = 1.0 + error[k];
-    pad.gain_sd[k] = std::sqrt(SHAPE_SD * SHAPE_SD * shape + along_sd * along_sd * along);
+    pad.gain[k] = session.remaining_gain[k];
+    pad.gain_sd[k] = session.gain_sd[k];
   }
   return pad;
 }

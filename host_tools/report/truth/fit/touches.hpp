@@ -6,6 +6,7 @@
 #pragma once
 
 #include "libfingertip/random.hpp"
+#include "truth/calibration/sessions.hpp"
 #include "twin/contact_table.hpp"
 
 extern "C" {
@@ -48,11 +49,10 @@ Pad perfect_pad();
 // Gains as cast, normal about 1 as the twin draws them, and no calibration: the firmware is told
 // this standard deviation.
 Pad raw_pad(double spread, double told, Random &random);
-// What thirty placements of one weight leave: errors with a standard deviation of 1.2 % that change
-// the shape of a touch, and of 2.5 % along the three that do not: log-gains linear in x, in y and
-// in x^2 + y^2 turn one Gaussian into another. The place where the estimates of a solver would come
-// in.
-Pad calibrated_pad(Random &random);
+// What a calibration left of the gains, which is all that acts on a touch here: it does not relax,
+// and sensors are where they should be. The same on any layer, though on 6 mm none would be
+// accepted.
+Pad calibrated_pad(const Calibrated &session);
 
 struct Touch {
   double x_mm, y_mm, force_N;
