@@ -2,6 +2,7 @@
 // Exit status: 0 done; 1 something went wrong, said in one line; 2 wrong usage.
 #include "libfingertip/text.hpp"
 #include "reference/dataset.hpp"
+#include "reference/options.hpp"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -237,7 +238,9 @@ int run(int argc, char **argv) {
   draw->add_option("--count", options.count, "How many")
       ->check(CLI::Range(std::size_t{1}, PRESSES_MAX))
       ->capture_default_str();
-  draw->add_option("--seed", options.seed, "Of the presses")->capture_default_str();
+  draw->add_option("--seed", options.seed, "Of the presses")
+      ->check(whole_number())
+      ->capture_default_str();
   draw->callback([&] { action = [&] { return presses(options); }; });
 
   CLI::App *solve = app.add_subcommand(

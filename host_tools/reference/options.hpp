@@ -1,52 +1,58 @@
-// Command line of the form --name value, and --help.
+// Command line of the form --name value, and --help, for the programs that measure.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace fingertip::reference {
 
+// CLI11 alone lets a negative number wrap.
+inline CLI::Validator whole_number() {
+  const auto complaint = [](const std::string &text) {
+    const bool whole = !text.empty() && text.size() <= 18 &&
+                       text.find_first_not_of("0123456789") == std::string::npos;
+    return whole ? std::string() : "needs a whole number, not '" + text + "'";
+  };
+  return CLI::Validator(complaint, "N");
+}
+
 struct Option {
   const char *name;
-  std::string *text = nullptr; // exactly one of the two is set
+  std::string *text = nullptr; // exactly one of the three is set
   std::uint64_t *number = nullptr;
+  bool *flag = nullptr; // without a value
 };
 
-// Throws std::runtime_error with a message for the user. On --help, prints the usage, if there is
-// one, and ends.
+// Throws std::runtime_error with a message for the user. On --help, prints the usage and ends.
 inline void parse_options(int argc, char **argv, const std::vector<Option> &options,
-                          const char *usage = nullptr) {
-  for (int i = 1; i < argc; i += 2) {
-    const std::string name = argv[i];
-    if (usage && name == "--help") {
-      std::fputs(usage, stdout);
-      std::exit(0);
-    }
-    const Option *found = nullptr;
-    std::string known;
-    for (const Option &option : options) {
-      known += std::string(" ") + option.name;
-      found = name == option.name ? &option : found;
-    }
-    if (!found) {
-      throw std::runtime_error("unknown option " + name + "; known are" + known);
-    }
-    if (i + 1 == argc) {
-      throw std::runtime_error(name + " needs a value");
-    }
-    const std::string value = argv[i + 1];
-    if (found->text) {
-      *found->text = value;
-    } else if (value.empty() || value.size() > 18 ||
-               value.find_first_not_of("0123456789") != std::string::npos) {
-      throw std::runtime_error(name + " needs a whole number, not '" + value + "'");
+                          const std::string &usage) {
+  CLI::App app;
+  auto formatter = std::make_shared<CLI::FormatterLambda>(
+      [&](const CLI::App *, std::string, CLI::AppFormatMode) { return usage; });
+  app.formatter(formatter);
+  app.set_help_flag("--help");
+  for (const Option &option : options) {
+    if (option.text) {
+      app.add_option(option.name, *option.text);
+    } else if (option.number) {
+      app.add_option(option.name, *option.number)->check(whole_number());
     } else {
-      *found->number = std::stoull(value);
+      app.add_flag(option.name, *option.flag);
     }
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp &) {
+    std::fputs(app.help().c_str(), stdout);
+    std::exit(0);
+  } catch (const CLI::ParseError &error) {
+    throw std::runtime_error(std::string(error.what()) + "; see --help");
   }
 }
 

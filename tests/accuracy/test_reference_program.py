@@ -103,7 +103,7 @@ class Reference(unittest.TestCase):
             self.assertEqual(done.returncode, 1, words)
             self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
             self.assertIn(words, done.stderr)
-        for options in (("fit", "--noise", "0"), ("presses", "--set", "E"), ("presses", "--count", "0"), ()):
+        for options in (("fit", "--noise", "0"), ("presses", "--set", "E"), ("presses", "--count", "0"), ("presses", "--count", "-1"), ("presses", "--seed", "-1"), ()):
             done = run(*options)
             self.assertEqual(done.returncode, 2, options)
             self.assertEqual(done.stderr.count("\n"), 1, done.stderr)

@@ -1,6 +1,7 @@
 // fit_bench: time and error of one fit, our kernels and host libraries on the same presses.
 #include "reference/dataset.hpp"
 #include "reference/options.hpp"
+#include "report/fit/json_file.hpp"
 #include "report/fit/kernels.hpp"
 #include "report/fit/libraries.hpp"
 
@@ -161,15 +162,10 @@ int bench(int argc, char **argv) {
   }
   const std::vector<Measured> all = measure(kernels, cases, passes);
 
-  const std::string path = out + "/fit_bench.json";
-  std::ofstream json(path);
-  json << "{\"processor\": \"" << processor() << "\", \"compiler\": \"" << __VERSION__
-       << "\", \"presses\": " << cases.size() << ", \"passes\": " << passes
-       << ", \"seed\": " << seed << ", \"rows\": [";
+  auto rows = nlohmann::ordered_json::array();
   std::printf("%zu observable presses, %s\n", cases.size(), processor().c_str());
   std::printf("%-13s %8s %17s %8s %17s %10s %10s %7s\n", "kernel", "us", "10 %..90 %", "ratio",
               "10 %..90 %", "p50_um", "p99.9_um", ">100um");
-  const char *separator = "\n";
   for (const Measured &m : all) {
     std::vector<double> ratio;
     for (std::size_t i = 0; i < m.block_us.size(); i++) {
@@ -186,19 +182,19 @@ int bench(int argc, char **argv) {
                 values[7], above);
     const char *names[] = {"us",        "us_p10",    "us_p90", "ratio",
                            "ratio_p10", "ratio_p90", "p50_um", "p999_um"};
-    json << separator << "{\"kernel\": \"" << m.name << "\"";
-    for (std::size_t i = 0; i < 8; i++) {
-      json << ", \"" << names[i] << "\": ";
-      std::isfinite(values[i]) ? json << values[i] : json << "null";
+    nlohmann::ordered_json row{{"kernel", m.name}};
+    for (std::size_t i = 0; i < std::size(names); i++) {
+      row[names[i]] = values[i];
     }
-    json << ", \"above_100um\": " << above << '}';
-    separator = ",\n";
+    row["above_100um"] = above;
+    rows.push_back(std::move(row));
   }
-  json << "\n]}\n";
-  json.close();
-  if (!json) {
-    throw std::runtime_error("cannot write " + path);
-  }
+  fitting::write_json(out + "/fit_bench.json", {{"processor", processor()},
+                                                {"compiler", __VERSION__},
+                                                {"presses", cases.size()},
+                                                {"passes", passes},
+                                                {"seed", seed},
+                                                {"rows", std::move(rows)}});
   return 0;
 }
 

@@ -3,6 +3,7 @@
 #include "reference/dataset.hpp"
 #include "reference/options.hpp"
 #include "reference/parallel.hpp"
+#include "report/fit/json_file.hpp"
 #include "report/fit/kernels.hpp"
 
 extern "C" {
@@ -13,7 +14,6 @@ extern "C" {
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <stdexcept>
@@ -274,89 +274,69 @@ void print(const Row &row) {
   std::fflush(stdout);
 }
 
-void write_json(const std::string &path, const std::vector<Row> &rows, const Options &options) {
-  std::ofstream file(path);
-  file << "{\"seed\": " << options.seed << ", \"presses\": " << options.limit << ", \"rows\": [";
-  const char *separator = "\n";
-  // JSON has no word for a quantile of nothing but null.
-  const auto number = [&](const char *name, double value) {
-    file << ", \"" << name << "\": ";
-    std::isfinite(value) ? file << value : file << "null";
-  };
+void write_rows(const std::vector<Row> &rows, const Options &options) {
+  auto list = nlohmann::ordered_json::array();
   for (const Row &r : rows) {
-    file << separator << "{\"kernel\": \"" << r.kernel << "\", \"variant\": \"" << r.variant
-         << "\", \"set\": \"" << r.set
-         << "\", \"observable\": " << (r.observable ? "true" : "false")
-         << ", \"presses\": " << r.presses << ", \"without_fit\": " << r.without_fit
-         << ", \"outlier\": " << r.outlier << ", \"above_10um\": " << r.above_10um
-         << ", \"above_100um\": " << r.above_100um;
-    number("p50_um", r.p50_um);
-    number("p99_um", r.p99_um);
-    number("p999_um", r.p999_um);
-    number("worst_um", r.worst_um);
-    number("truth_p50_mm", r.truth_p50_mm);
-    number("truth_p99_mm", r.truth_p99_mm);
-    number("bad_unflagged", r.bad_unflagged);
-    number("good_flagged", r.good_flagged);
-    file << '}';
-    separator = ",\n";
+    list.push_back({{"kernel", r.kernel},
+                    {"variant", r.variant},
+                    {"set", r.set},
+                    {"observable", r.observable},
+                    {"presses", r.presses},
+                    {"without_fit", r.without_fit},
+                    {"outlier", r.outlier},
+                    {"above_10um", r.above_10um},
+                    {"above_100um", r.above_100um},
+                    {"p50_um", r.p50_um},
+                    {"p99_um", r.p99_um},
+                    {"p999_um", r.p999_um},
+                    {"worst_um", r.worst_um},
+                    {"truth_p50_mm", r.truth_p50_mm},
+                    {"truth_p99_mm", r.truth_p99_mm},
+                    {"bad_unflagged", r.bad_unflagged},
+                    {"good_flagged", r.good_flagged}});
   }
-  file << "\n]}\n";
-  file.close();
-  if (!file) {
-    throw std::runtime_error("cannot write " + path);
-  }
+  fitting::write_json(
+      options.out + "/fit_error.json",
+      {{"seed", options.seed}, {"presses", options.limit}, {"rows", std::move(list)}});
 }
 
 // {"variants": [{"kernel": .., "variant": .., settings}], "presses": {mask: [press]}}
 void write_jobs(const Options &options) {
   constexpr std::size_t SHARE = 1000; // of the presses
-  std::ofstream file(options.jobs);
-  file.precision(17);
-  file << "{\"variants\": [";
-  const char *separator = "\n";
+  auto variants = nlohmann::ordered_json::array();
   for (const fitting::Kernel &kernel : fitting::all_kernels()) {
     for (const Variant &v : all_variants()) {
       if (has(kernel, v) && v.on_chip) {
-        file << separator << "{\"kernel\": \"" << kernel.name << "\", \"variant\": \"" << v.name
-             << "\", \"iterations\": " << v.iterations << ", \"n_largest\": " << v.n_largest
-             << ", \"guess\": \"" << fitting::name_of(v.guess) << "\", \"mask\": \""
-             << reference::name_of(v.mask) << "\", \"prior_sigma_mm\": " << v.prior_sigma_mm
-             << ", \"prior_width_mm\": " << v.prior_width_mm << '}';
-        separator = ",\n";
+        variants.push_back({{"kernel", kernel.name},
+                            {"variant", v.name},
+                            {"iterations", v.iterations},
+                            {"n_largest", v.n_largest},
+                            {"guess", fitting::name_of(v.guess)},
+                            {"mask", reference::name_of(v.mask)},
+                            {"prior_sigma_mm", v.prior_sigma_mm},
+                            {"prior_width_mm", v.prior_width_mm}});
       }
     }
   }
-  file << "\n], \"presses\": {";
-  separator = "\n";
+  nlohmann::ordered_json presses;
   for (Mask mask : reference::ALL_MASKS) {
-    file << separator << '"' << reference::name_of(mask) << "\": [";
-    separator = "\n";
+    auto &of_mask = presses[reference::name_of(mask)];
     for (PressSet set : reference::ALL_PRESS_SETS) {
       const std::size_t count =
           std::max<std::size_t>(1, presses_of(set, Mask::none, options.limit) / SHARE);
       for (const Case &c : reference::load_cases(set, mask, options.seed, count, options.cache)) {
-        file << separator << "{\"set\": \"" << reference::name_of(set)
-             << "\", \"observable\": " << (c.observable ? "true" : "false")
-             << ", \"usable\": " << c.usable
-             << ", \"noise_Pa_q10\": " << static_cast<std::int32_t>(c.press.noise_Pa * 1024.0)
-             << ", \"best_x_mm\": " << c.best.theta.x_mm << ", \"best_y_mm\": " << c.best.theta.y_mm
-             << ", \"readings\": [";
-        for (std::size_t k = 0; k < c.pressure_Pa_q10.size(); k++) {
-          file << (k ? ", " : "") << c.pressure_Pa_q10[k];
-        }
-        file << "]}";
-        separator = ",\n";
+        of_mask.push_back({{"set", std::string(1, reference::name_of(set))},
+                           {"observable", c.observable},
+                           {"usable", c.usable},
+                           {"noise_Pa_q10", static_cast<std::int32_t>(c.press.noise_Pa * 1024.0)},
+                           {"best_x_mm", c.best.theta.x_mm},
+                           {"best_y_mm", c.best.theta.y_mm},
+                           {"readings", c.pressure_Pa_q10}});
       }
     }
-    file << "\n]";
-    separator = ",\n";
   }
-  file << "\n}}\n";
-  file.close();
-  if (!file) {
-    throw std::runtime_error("cannot write " + options.jobs);
-  }
+  fitting::write_json(options.jobs,
+                      {{"variants", std::move(variants)}, {"presses", std::move(presses)}});
 }
 
 int report(const Options &options) {
@@ -416,7 +396,7 @@ int report(const Options &options) {
   if (rows.empty()) {
     throw std::runtime_error("no kernel, variant and set match");
   }
-  write_json(options.out + "/fit_error.json", rows, options);
+  write_rows(rows, options);
   return 0;
 }
 

@@ -13,6 +13,7 @@
 #include "reference/dataset.hpp"
 #include "reference/options.hpp"
 #include "reference/parallel.hpp"
+#include "report/fit/json_file.hpp"
 #include "report/fit/kernels.hpp"
 
 extern "C" {
@@ -26,9 +27,7 @@ extern "C" {
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <limits>
 #include <stdexcept>
@@ -557,36 +556,23 @@ void print_header() {
 }
 
 void write_json(const std::string &path, const std::vector<Row> &rows, std::uint64_t seed) {
-  std::ofstream file(path);
-  const auto number = [&](const char *name, double value) {
-    file << ", \"" << name << "\": ";
-    std::isfinite(value) ? file << value : file << "null";
-  };
   double worst = 0;
+  auto cases = nlohmann::ordered_json::array();
   for (const Row &r : rows) {
     worst = std::max(worst, r.bad_unflagged_max > BAD_UNFLAGGED_MAX ? 0.0 : r.bad_unflagged);
-  }
-  file << "{\"seed\": " << seed << ", \"bad_unflagged_worst\": " << worst << ", \"cases\": [";
-  const char *separator = "\n";
-  for (const Row &r : rows) {
-    file << separator << "{\"case\": \"" << r.name << "\", \"presses\": " << r.presses
-         << ", \"fits\": " << r.fits << ", \"not_finite\": " << r.not_finite;
-    number("p50_mm", r.p50_mm);
-    number("p95_mm", r.p95_mm);
-    number("worst_mm", r.worst_mm);
+    nlohmann::ordered_json row{{"case", r.name},        {"presses", r.presses},
+                               {"fits", r.fits},        {"not_finite", r.not_finite},
+                               {"p50_mm", r.p50_mm},    {"p95_mm", r.p95_mm},
+                               {"worst_mm", r.worst_mm}};
     for (std::size_t i = 0; i < FLAG_COUNT; i++) {
-      number(FLAGS[i].name, r.share[i]);
+      row[FLAGS[i].name] = r.share[i];
     }
-    number("bad_unflagged", r.bad_unflagged);
-    number("good_flagged", r.good_flagged);
-    file << '}';
-    separator = ",\n";
+    row["bad_unflagged"] = r.bad_unflagged;
+    row["good_flagged"] = r.good_flagged;
+    cases.push_back(std::move(row));
   }
-  file << "\n]}\n";
-  file.close();
-  if (!file) {
-    throw std::runtime_error("cannot write " + path);
-  }
+  fingertip::fitting::write_json(
+      path, {{"seed", seed}, {"bad_unflagged_worst", worst}, {"cases", std::move(cases)}});
 }
 
 struct Options {
@@ -647,19 +633,12 @@ int run(const Options &options) {
 int main(int argc, char **argv) {
   try {
     Options options;
-    std::vector<char *> named{argv[0]};
-    for (int i = 1; i < argc; i++) {
-      if (std::strcmp(argv[i], "--check") == 0) {
-        options.check = true;
-      } else {
-        named.push_back(argv[i]);
-      }
-    }
-    reference::parse_options(static_cast<int>(named.size()), named.data(),
+    reference::parse_options(argc, argv,
                              {{"--case", &options.name},
                               {"--out", &options.out},
                               {"--limit", nullptr, &options.limit},
-                              {"--seed", nullptr, &options.seed}},
+                              {"--seed", nullptr, &options.seed},
+                              {"--check", nullptr, nullptr, &options.check}},
                              HELP);
     return run(options);
   } catch (const std::exception &error) {
