@@ -10,6 +10,8 @@
 #define POSITION_MAX_mm 10000.0f
 #define MARGIN 1.5f   /* pitches around the array in which a contact may lie */
 #define ON_NODE 1e-4f /* pitches; and off a line, likewise */
+/* Of a location, with a pitch of 2^23 to 2^24: the array and its margin beside it fit into 2^30. */
+#define ORIGIN_MAX 1073741824.0f
 
 /* value > 0 as mantissa * 2^exponent with a mantissa of 2^29 .. 2^30. */
 static int32_t split(float value, int32_t *exponent) {
@@ -58,8 +60,12 @@ static void find_grid(struct fit_array *made, const float *x_mm, const float *y_
   grid->pitch_exponent = exponent + 6;
   uint8_t origin = grid->sensor[(columns / 2) * rows + rows / 2];
   float unit = bytes_to_f32((uint32_t)(127 - grid->pitch_exponent) << 23); /* a power of 2 */
-  grid->x_origin = (int32_t)(x_mm[origin] * unit);
-  grid->y_origin = (int32_t)(y_mm[origin] * unit);
+  float x_origin = x_mm[origin] * unit, y_origin = y_mm[origin] * unit;
+  if (fabsf(x_origin) > ORIGIN_MAX || fabsf(y_origin) > ORIGIN_MAX) {
+    return;
+  }
+  grid->x_origin = (int32_t)x_origin;
+  grid->y_origin = (int32_t)y_origin;
   grid->force_scale =
       split(6.28318531e-6f * made->pitch_mm * made->pitch_mm, &grid->force_exponent);
   float settled = FIT_SETTLED_mm / made->pitch_mm * 4194304.0f;
@@ -166,6 +172,10 @@ static void leave_outlier_out(const struct fit_array *array, const int32_t *pres
 void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
                        uint32_t usable, const struct fit_settings *settings,
                        struct fit_result *result) {
+  if (settings->noise_Pa_q10 < 1) {
+    *result = (struct fit_result){0};
+    return;
+  }
   uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
   usable &= all;
   bool rough = usable == all ? fit_grid(array, pressure_Pa_q10, settings, result)
@@ -178,7 +188,7 @@ void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa
 void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                   const struct fit_settings *settings, struct fit_result *result) {
   bool some = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
-  if (is_grid(array) && !some) {
+  if ((is_grid(array) && !some) || settings->noise_Pa_q10 < 1) {
     fit_gaussian_grid(array, pressure_Pa_q10, usable, settings, result);
   } else {
     fit_general(array, pressure_Pa_q10, usable, settings, result);

@@ -36,7 +36,7 @@ struct fit_array {
 struct fit_settings {
   uint8_t iterations;   /* 0 (the guess)..FIT_MAX_ITERATIONS; 4 come as near to the truth as more
                            do, 7 bring 99.9 % of observable presses within 1 um of the optimum */
-  int32_t noise_Pa_q10; /* rms noise of a reading, 1/1024 Pa, at least 1 */
+  int32_t noise_Pa_q10; /* rms noise of a reading, 1/1024 Pa; below 1 there is no fit */
   uint8_t n_largest;    /* fit the n largest readings only, of equal ones those of lower number, as
                            the paper does; 0: all, which is more accurate. Fewer than a fit
                            needs give none. Takes the general kernel. */
@@ -80,7 +80,8 @@ struct fit_result {
 };
 
 /* FT_ERR_ARGUMENT: sensor_count outside 1..FT_MAX_SENSORS, pitch outside 0.01..10000 mm, or a
- * position outside +-10000 mm. */
+ * position outside +-10000 mm. Arrays more than 2^30 / 2^24 .. 2^23 = 64 to 128 pitches off the
+ * origin take the general kernel. */
 enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
                               const float *y_mm, float pitch_mm);
 

@@ -4,12 +4,6 @@
 
 /* Supply and sensors settle: power-on reset of the family takes under 10 ms (recalled). */
 #define POWER_UP_us 10000u
-/* After an admission of all sensors the next one waits so many times as long as it took. */
-#define ADMISSION_REST 20u
-/* After one that left a sensor out, or that was for a suspect; then doubled. */
-#define ADMISSION_INTERVAL_MIN_us 1000000u
-#define ADMISSION_INTERVAL_MAX_us 8000000u
-#define PROM_PASSES 3
 #define TEMPERATURE_INTERVAL_us (SCAN_TEMPERATURE_INTERVAL_ms * 1000u)
 #define TEMPERATURE_INTERVAL_MAX_us (SCAN_TEMPERATURE_INTERVAL_MAX_ms * 1000u)
 /* After a temperature reading that a sensor missed, or one in doubt. */
@@ -84,7 +78,7 @@ enum ft_status scan_init(struct scan *scan, const struct array_bus *bus,
   scan->state = SCAN_WAIT_POWER;
   scan->wait_until_us = POWER_UP_us;
   scan->recovery_delay_us = RECOVERY_DELAY_MIN_us;
-  scan->admission_interval_us = ADMISSION_INTERVAL_MIN_us;
+  bring_up_init(&scan->bring_up, settings->sensor_count);
   set(&scan->temperature_interval_us, TEMPERATURE_INTERVAL_us);
   scan->readings.presses_are_shared = settings->presses_are_shared;
   return FT_OK;
@@ -119,92 +113,24 @@ static void convert(struct scan *scan, bool is_temperature, bool is_frame) {
   enter(scan, SCAN_CONVERT);
 }
 
-static void begin_admission(struct scan *scan, uint64_t now_us) {
+static void begin_bring_up(struct scan *scan, uint64_t now_us) {
   const uint32_t admitted = get(&scan->admitted);
   const uint32_t suspects = get(&scan->suspects) & admitted;
   set(&scan->admitted, admitted & ~suspects);
-  scan->admits_suspects = suspects != 0;
-  scan->admission_began_us = now_us;
-  scan->next_admission_us = now_us + scan->admission_interval_us;
-  scan->prom_pass = 0;
-  scan->prom_word = 0;
-  scan->prom_answered = all_sensors(scan);
-  scan->prom_good = 0;
+  bring_up_begin(&scan->bring_up, suspects != 0, now_us);
   enter(scan, SCAN_RESET);
 }
 
-/* Another PROM is another sensor: nothing that was known of this one holds. */
-static void store_prom(struct scan *scan, uint8_t k) {
-  if (memcmp(&scan->prom[k], &scan->prom_read[k], sizeof scan->prom[k]) != 0) {
-    scan->prom[k] = scan->prom_read[k];
-    scan->prom_changed |= UINT32_C(1) << k;
-  }
-}
-
-/* Judges one complete reading of all PROMs. What is good is kept; what is not is read again, and
- * after the last pass a PROM with a wrong CRC is used and reported. */
-static void end_prom_pass(struct scan *scan, uint64_t now_us) {
-  uint32_t differs = 0;
-  uint32_t blank = 0;
-  for (uint8_t k = 0; k < scan->sensor_count; k++) {
-    uint32_t bit = UINT32_C(1) << k;
-    if (!(scan->prom_answered & bit) || (scan->prom_good & bit)) {
-      continue;
-    }
-    switch (ms5840_check_prom(&scan->prom_read[k])) {
-    case MS5840_PROM_GOOD:
-      scan->prom_good |= bit;
-      store_prom(scan, k);
-      break;
-    case MS5840_PROM_CRC_DIFFERS:
-      differs |= bit;
-      break;
-    case MS5840_PROM_BLANK:
-      blank |= bit;
-      break;
-    }
-  }
-  scan->prom_pass++;
-  if (scan->prom_good != all_sensors(scan) && scan->prom_pass < PROM_PASSES) {
-    scan->prom_word = 0;
-    scan->prom_answered = all_sensors(scan);
-    enter(scan, SCAN_READ_PROM);
-    return;
-  }
-  for (uint8_t k = 0; k < scan->sensor_count; k++) {
-    if (differs & (UINT32_C(1) << k)) {
-      store_prom(scan, k);
-    }
-  }
-  uint32_t admitted = scan->prom_good | differs;
-  if (admitted == all_sensors(scan) && !scan->admits_suspects) {
-    scan->next_admission_us = now_us + ADMISSION_REST * (now_us - scan->admission_began_us);
-    scan->admission_interval_us = ADMISSION_INTERVAL_MIN_us;
-  } else if (scan->admission_interval_us < ADMISSION_INTERVAL_MAX_us) {
-    scan->admission_interval_us *= 2;
-  }
-  scan->returned |= admitted & ~get(&scan->admitted);
-  set(&scan->admitted, admitted);
-  set(&scan->prom_bad, differs | blank);
+static void end_bring_up(struct scan *scan, uint64_t now_us) {
+  const struct bring_up_result result = bring_up_end(&scan->bring_up, now_us);
+  scan->returned |= result.admitted & ~get(&scan->admitted);
+  set(&scan->admitted, result.admitted);
+  set(&scan->prom_bad, result.bad);
   scan->void_next = 0;
   scan->was_zero = 0;
   scan->missed_once = 0;
   scan->missed_twice = 0;
   convert(scan, true, false);
-}
-
-static void take_prom_word(struct scan *scan, uint64_t now_us) {
-  for (uint8_t k = 0; k < scan->sensor_count; k++) {
-    const uint8_t *bytes = scan->result.bytes[k];
-    scan->prom_read[k].word[scan->prom_word] = (uint16_t)(bytes[0] << 8 | bytes[1]);
-  }
-  scan->prom_answered &= scan->result.acknowledged;
-  scan->prom_word++;
-  if (scan->prom_word < MS5840_PROM_WORDS) {
-    enter(scan, SCAN_READ_PROM);
-  } else {
-    end_prom_pass(scan, now_us);
-  }
 }
 
 /* Where the codes of this conversion go; NULL while the main context reads the last ones. */
@@ -308,9 +234,9 @@ static void take_reading(struct scan *scan, const struct scan_conversion *conver
   slot->conversion = *conversion;
   slot->good = good;
   if (conversion->is_temperature) {
-    slot->prom_changed = scan->prom_changed;
+    slot->prom_changed = scan->bring_up.changed;
     slot->returned = scan->returned;
-    scan->prom_changed = 0;
+    scan->bring_up.changed = 0;
     scan->returned = 0;
   }
   hand_over(conversion->is_temperature ? &scan->temperature_state : &scan->slot_state,
@@ -351,8 +277,8 @@ static uint64_t earlier(uint64_t a, uint64_t b) {
 static void leave_idle(struct scan *scan, uint64_t now_us) {
   /* A temperature that was read just now still has to go into its slot. */
   bool prom_is_free = !temperature_waits(scan) && !scan->last_was_temperature;
-  if (scan->wants_admission && now_us >= scan->next_admission_us && prom_is_free) {
-    begin_admission(scan, now_us);
+  if (scan->wants_admission && now_us >= scan->bring_up.next_us && prom_is_free) {
+    begin_bring_up(scan, now_us);
     return;
   }
   heed_wish(scan, now_us);
@@ -384,8 +310,8 @@ static enum ft_status start_operation(struct scan *scan, uint64_t now_us) {
   case SCAN_RESET:
     return bus->start_command(bus->context, MS5840_CMD_RESET, now_us);
   case SCAN_READ_PROM:
-    return bus->start_read(bus->context, (uint8_t)(MS5840_CMD_READ_PROM + 2 * scan->prom_word), 2,
-                           now_us);
+    return bus->start_read(bus->context, (uint8_t)(MS5840_CMD_READ_PROM + 2 * scan->bring_up.word),
+                           2, now_us);
   case SCAN_CONVERT:
     conversion->osr = get_osr(scan);
     conversion->t_begin_us = now_us;
@@ -480,7 +406,11 @@ static void end_operation(struct scan *scan, uint64_t now_us) {
     wait_in(scan, SCAN_WAIT_RESET, now_us + MS5840_RESET_us);
     break;
   case SCAN_READ_PROM:
-    take_prom_word(scan, now_us);
+    if (bring_up_take_word(&scan->bring_up, &scan->result)) {
+      enter(scan, SCAN_READ_PROM);
+    } else {
+      end_bring_up(scan, now_us);
+    }
     break;
   case SCAN_CONVERT:
     scan->conversion->heard = scan->result.acknowledged;
@@ -501,7 +431,7 @@ static void end_operation(struct scan *scan, uint64_t now_us) {
 static void end_wait(struct scan *scan, uint64_t now_us) {
   switch (scan->state) {
   case SCAN_WAIT_POWER:
-    begin_admission(scan, now_us);
+    begin_bring_up(scan, now_us);
     break;
   case SCAN_WAIT_RESET:
     enter(scan, SCAN_READ_PROM);
@@ -515,7 +445,7 @@ static void end_wait(struct scan *scan, uint64_t now_us) {
     } else if (temperature_waits(scan)) {
       scan->wait_until_us = now_us + SLOT_POLL_us;
     } else {
-      begin_admission(scan, now_us);
+      begin_bring_up(scan, now_us);
     }
     break;
   default:
@@ -573,7 +503,7 @@ static void adapt_interval(struct scan *scan, uint32_t news) {
 
 static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
   const struct readings_temperature taken = {
-      .prom = scan->prom,
+      .prom = scan->bring_up.prom,
       .code = slot->code,
       .good = slot->good,
       .prom_changed = slot->prom_changed,

@@ -8,23 +8,18 @@
  * that holds the newest frame: a processor that falls behind takes the frames it can, and those
  * that were overwritten are counted.
  *
- * A sensor is admitted when it has acknowledged its whole calibration PROM. Only admitted sensors
- * yield valid readings. Where a sensor does not acknowledge, that reading is missing, and the next
- * one too where nobody can tell whether it heard its command: else it might be an old one. The
- * third in a row costs the admission. So does a reading of 0 (no conversion had finished) from a
- * sensor that had acknowledged the command; where a branch acknowledges as one, the reading after a
- * 0 is void too, and two in a row cost the admission. A reading whose last sixteen bits are ones,
- * far from the sensor's last one, comes from a sensor that lost count of the clocks and stopped
- * sending: see scan.c. What else makes a reading or a sensor implausible is in readings.h.
+ * Only admitted sensors yield valid readings: see bring_up.h. Where a sensor does not acknowledge,
+ * that reading is missing, and the next one too where nobody can tell whether it heard its command:
+ * else it might be an old one. The third in a row costs the admission. So does a reading of 0 (no
+ * conversion had finished) from a sensor that had acknowledged the command; where a branch
+ * acknowledges as one, the reading after a 0 is void too, and two in a row cost the admission. A
+ * reading whose last sixteen bits are ones, far from the sensor's last one, comes from a sensor
+ * that lost count of the clocks and stopped sending: see scan.c. What else makes a reading or a
+ * sensor implausible is in readings.h.
  *
  * So scattered NACKs of single reads leave 0.4, 1.0, 2.8, 10 and 28 % of 186 frames a second
  * incomplete at 0.3, 1, 3, 10 and 30 of them a second on a simulated bus that acknowledges commands
  * as one, half as much where each sensor answers for itself, and none where the bus asks again.
- *
- * To admit, all sensors are reset and their PROMs read anew. That costs 5 ms of frames with a data
- * line for each sensor and some 25 ms behind multiplexers, so it takes at most 5 % of the time; while
- * it leaves a sensor out, or is for a suspect, the next one comes after 1, 2, 4 and then 8 s. A
- * sensor that does not answer at all costs no admission.
  *
  * Temperatures are converted twice a second, less often while they stand still. Where the
  * requested rate leaves a pause, that is done in the pause before a frame; else it takes the place
@@ -39,6 +34,7 @@
 #include "array_bus/array_bus.h"
 #include "frame/frame.h"
 #include "ms5840/ms5840.h"
+#include "scan/bring_up.h"
 #include "scan/readings.h"
 
 #include <stdatomic.h>
@@ -132,24 +128,15 @@ struct scan {
   uint64_t wait_until_us;
   uint64_t next_frame_us;
   uint64_t next_temperature_us;
-  uint64_t next_admission_us;
-  uint64_t admission_interval_us;
-  uint64_t admission_began_us;
-  bool admits_suspects; /* the admission under way was asked for by the main context */
   bool wants_admission; /* somebody is there who is not admitted, or a suspect */
   uint64_t recovery_delay_us;
   uint32_t frame_number;
-  uint32_t void_next;     /* bitmap: the next reading does not count */
-  uint32_t was_zero;      /* bitmap: the last reading was 0 */
-  uint32_t missed_once;   /* bitmap: the last reading was not acknowledged, ... */
-  uint32_t missed_twice;  /* ... nor the one before */
-  uint32_t prom_answered; /* bitmap: every word of this pass */
-  uint32_t prom_good;     /* bitmap: in some pass of this admission */
-  uint32_t prom_changed;  /* bitmap: another PROM than before this admission */
-  uint32_t returned;      /* bitmap: admitted, and was not before */
-  uint8_t prom_word, prom_pass;
+  uint32_t void_next;    /* bitmap: the next reading does not count */
+  uint32_t was_zero;     /* bitmap: the last reading was 0 */
+  uint32_t missed_once;  /* bitmap: the last reading was not acknowledged, ... */
+  uint32_t missed_twice; /* ... nor the one before */
+  uint32_t returned;     /* bitmap: admitted, and was not before */
   struct array_bus_result result;
-  struct ms5840_prom prom_read[FT_MAX_SENSORS];
 
   /* Written by the event context while the slot of its kind is not claimed, read by the main
    * context while it is. A temperature is never overwritten, and while it waits no PROM changes. */
@@ -157,7 +144,7 @@ struct scan {
   _Atomic uint32_t slot_state; /* enum scan_slot_state */
   struct scan_slot temperature_slot;
   _Atomic uint32_t temperature_state;
-  struct ms5840_prom prom[FT_MAX_SENSORS];
+  struct bring_up bring_up; /* of which the main context reads prom */
 
   /* Written by the event context, readable from any. */
   _Atomic uint32_t present;  /* bitmap: acknowledged at the last attempt */

@@ -104,6 +104,44 @@ static void assert_finite_and_defined(void) {
   }
 }
 
+static void test_an_array_far_from_the_origin_is_none_for_the_grid(void) {
+  static const struct press press = {3.1, -5.2, 4000.0, 7.0};
+  static const float offsets_mm[] = {900.0f, 1100.0f, 2100.0f, -9900.0f};
+  read_press(&press, 0.0, NULL);
+  for (size_t i = 0; i < 4; i++) {
+    struct fit_array far;
+    float y[SENSORS];
+    for (int k = 0; k < SENSORS; k++) {
+      y[k] = y_mm[k] + offsets_mm[i];
+    }
+    TEST_ASSERT_EQUAL_INT(i == 0 ? FT_OK : FT_ERR_ARGUMENT,
+                          fit_array_init_grid(&far, SENSORS, x_mm, y, PITCH_mm));
+    TEST_ASSERT_EQUAL_INT(FT_OK, fit_array_init(&far, SENSORS, x_mm, y, PITCH_mm));
+    fit_gaussian(&far, readings, ALL, &usual, &result);
+    TEST_ASSERT_TRUE(result.flags & CONTACT_FLAG_FIT_VALID);
+    TEST_ASSERT_FLOAT_WITHIN(0.02f, 3.1f, result.x_mm);
+    TEST_ASSERT_FLOAT_WITHIN(0.02f, -5.2f, result.y_mm - offsets_mm[i]);
+  }
+}
+
+static void test_without_noise_there_is_no_fit(void) {
+  static const struct press press = {3.1, -5.2, 4000.0, 7.0};
+  static const int32_t noises[] = {0, -1, INT32_MIN};
+  read_press(&press, 0.0, NULL);
+  for (size_t i = 0; i < 3; i++) {
+    for (int largest = 0; largest < 6; largest += 5) {
+      for (uint32_t usable = ALL; usable >= ALL - 1; usable--) {
+        struct fit_settings settings = usual;
+        settings.noise_Pa_q10 = noises[i];
+        settings.n_largest = (uint8_t)largest;
+        fit_gaussian(&array, readings, usable, &settings, &result);
+        TEST_ASSERT_EQUAL_HEX32(0, result.flags);
+        TEST_ASSERT_EQUAL_HEX32(0, result.used);
+      }
+    }
+  }
+}
+
 static void test_array_arguments(void) {
   struct fit_array made;
   memset(&made, 0x5A, sizeof made);
@@ -838,6 +876,8 @@ static void test_repeated_fits_give_the_same_bits(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_array_arguments);
+  RUN_TEST(test_an_array_far_from_the_origin_is_none_for_the_grid);
+  RUN_TEST(test_without_noise_there_is_no_fit);
   RUN_TEST(test_noise_free_presses_are_recovered);
   RUN_TEST(test_residual_is_that_of_the_readings);
   RUN_TEST(test_scale_invariance);

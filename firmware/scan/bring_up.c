@@ -1,0 +1,98 @@
+#include "scan/bring_up.h"
+
+#include <string.h>
+
+/* After an admission of all sensors the next one waits so many times as long as it took. */
+#define REST 20u
+/* After one that left a sensor out, or that was for a suspect; then doubled. */
+#define INTERVAL_MIN_us 1000000u
+#define INTERVAL_MAX_us 8000000u
+#define PASSES 3
+
+static uint32_t all_sensors(const struct bring_up *bring_up) {
+  return UINT32_MAX >> (FT_MAX_SENSORS - bring_up->sensor_count);
+}
+
+void bring_up_init(struct bring_up *bring_up, uint8_t sensor_count) {
+  memset(bring_up, 0, sizeof *bring_up);
+  bring_up->sensor_count = sensor_count;
+  bring_up->interval_us = INTERVAL_MIN_us;
+}
+
+void bring_up_begin(struct bring_up *bring_up, bool of_suspects, uint64_t now_us) {
+  bring_up->of_suspects = of_suspects;
+  bring_up->began_us = now_us;
+  bring_up->next_us = now_us + bring_up->interval_us;
+  bring_up->pass = 0;
+  bring_up->word = 0;
+  bring_up->answered = all_sensors(bring_up);
+  bring_up->good = 0;
+}
+
+/* Another PROM is another sensor: nothing that was known of this one holds. */
+static void use_prom(struct bring_up *bring_up, uint8_t k) {
+  if (memcmp(&bring_up->prom[k], &bring_up->read[k], sizeof bring_up->prom[k]) != 0) {
+    bring_up->prom[k] = bring_up->read[k];
+    bring_up->changed |= UINT32_C(1) << k;
+  }
+}
+
+/* Of one complete reading of all PROMs. What is good is kept. */
+static void judge_pass(struct bring_up *bring_up) {
+  bring_up->differs = 0;
+  bring_up->blank = 0;
+  for (uint8_t k = 0; k < bring_up->sensor_count; k++) {
+    uint32_t bit = UINT32_C(1) << k;
+    if (!(bring_up->answered & bit) || (bring_up->good & bit)) {
+      continue;
+    }
+    switch (ms5840_check_prom(&bring_up->read[k])) {
+    case MS5840_PROM_GOOD:
+      bring_up->good |= bit;
+      use_prom(bring_up, k);
+      break;
+    case MS5840_PROM_CRC_DIFFERS:
+      bring_up->differs |= bit;
+      break;
+    case MS5840_PROM_BLANK:
+      bring_up->blank |= bit;
+      break;
+    }
+  }
+}
+
+bool bring_up_take_word(struct bring_up *bring_up, const struct array_bus_result *result) {
+  for (uint8_t k = 0; k < bring_up->sensor_count; k++) {
+    const uint8_t *bytes = result->bytes[k];
+    bring_up->read[k].word[bring_up->word] = (uint16_t)(bytes[0] << 8 | bytes[1]);
+  }
+  bring_up->answered &= result->acknowledged;
+  bring_up->word++;
+  if (bring_up->word < MS5840_PROM_WORDS) {
+    return true;
+  }
+  judge_pass(bring_up);
+  bring_up->pass++;
+  bring_up->word = 0;
+  if (bring_up->good == all_sensors(bring_up) || bring_up->pass >= PASSES) {
+    return false;
+  }
+  bring_up->answered = all_sensors(bring_up);
+  return true;
+}
+
+struct bring_up_result bring_up_end(struct bring_up *bring_up, uint64_t now_us) {
+  for (uint8_t k = 0; k < bring_up->sensor_count; k++) {
+    if (bring_up->differs >> k & 1u) {
+      use_prom(bring_up, k);
+    }
+  }
+  const uint32_t admitted = bring_up->good | bring_up->differs;
+  if (admitted == all_sensors(bring_up) && !bring_up->of_suspects) {
+    bring_up->next_us = now_us + REST * (now_us - bring_up->began_us);
+    bring_up->interval_us = INTERVAL_MIN_us;
+  } else if (bring_up->interval_us < INTERVAL_MAX_us) {
+    bring_up->interval_us *= 2;
+  }
+  return (struct bring_up_result){admitted, bring_up->differs | bring_up->blank};
+}

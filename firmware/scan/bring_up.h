@@ -1,0 +1,53 @@
+/* To admit sensors: all are reset, and their calibration PROMs are read and judged. Event context;
+ * scan.c moves the bytes.
+ *
+ * A sensor is admitted when it has acknowledged its whole PROM. PROMs are read up to three times,
+ * until all of them are good; one whose CRC still differs is used and reported, a blank one is not.
+ *
+ * That costs 5 ms of frames with a data line for each sensor and some 25 ms behind multiplexers, so
+ * it takes at most 5 % of the time; while it leaves a sensor out, or is for a suspect, the next one
+ * comes after 1, 2, 4 and then 8 s. A sensor that does not answer at all costs no admission.
+ */
+#ifndef SCAN_BRING_UP_H
+#define SCAN_BRING_UP_H
+
+#include "array_bus/array_bus.h"
+#include "common/limits.h"
+#include "ms5840/ms5840.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct bring_up {
+  uint8_t sensor_count;
+  uint8_t word, pass; /* of the PROM, to be read next */
+  bool of_suspects;   /* this one was asked for by the main context */
+  uint32_t answered;  /* bitmap: every word of this pass */
+  uint32_t good;      /* bitmap: in some pass of this one */
+  uint32_t differs;   /* bitmap: the CRC does, in the last pass */
+  uint32_t blank;     /* bitmap: likewise */
+  uint32_t changed;   /* bitmap: another PROM than before; who has told others of it clears it */
+  uint64_t began_us;
+  uint64_t interval_us;
+  uint64_t next_us;                        /* the next one not before */
+  struct ms5840_prom read[FT_MAX_SENSORS]; /* in this pass */
+  struct ms5840_prom prom[FT_MAX_SENSORS]; /* [sensor] in use */
+};
+
+struct bring_up_result {
+  uint32_t admitted; /* bitmap */
+  uint32_t bad;      /* bitmap: the CRC differs, or the PROM is blank */
+};
+
+void bring_up_init(struct bring_up *bring_up, uint8_t sensor_count);
+
+/* After it a reset of all sensors, then word 0 of their PROMs. */
+void bring_up_begin(struct bring_up *bring_up, bool of_suspects, uint64_t now_us);
+
+/* What came of the last word. True: read .word next. False: that was the last; see bring_up_end.
+ * The last word of a pass costs some 20 000 Cortex-M0+ cycles. */
+bool bring_up_take_word(struct bring_up *bring_up, const struct array_bus_result *result);
+
+struct bring_up_result bring_up_end(struct bring_up *bring_up, uint64_t now_us);
+
+#endif
