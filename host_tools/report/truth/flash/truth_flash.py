@@ -49,7 +49,7 @@ def stuffed(packet):
 
 def calibrate_frame(number):
     body = struct.pack("<BIHff", SENSORS, 1785931200 + number, 30, 1 + 0.001 * number, 0.02)
-    body += b"".join(struct.pack("<fff", 0.9 + 0.01 * ((k + number) % 20), 0.01, 0) for k in range(SENSORS))
+    body += b"".join(struct.pack("<ff", 0.9 + 0.01 * ((k + number) % 20), 0.01) for k in range(SENSORS))
     packet = struct.pack("<BBHQ", WIRE_VERSION, CALIBRATE, number, 0) + body
     return stuffed(packet + struct.pack("<I", zlib.crc32(packet))).hex()
 
