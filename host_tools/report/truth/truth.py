@@ -104,8 +104,8 @@ def main(argv):
         found |= json.loads(path.read_text())
     for part in parts:
         found |= run_part(part, options)
-    found = judge({**found, **cycles(out)}, GOALS)
-    write_json(path, found)
+        found = judge({**found, **cycles(out)}, GOALS)
+        write_json(path, found)  # what is found is kept though a later part fails
     truth_report.write(found, out / "truth.md")
     truth_report.draw(found, out / "truth.png")
     return finish(found, options, ("truth.json", "truth.md", "truth.png"))
