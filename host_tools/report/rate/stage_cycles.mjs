@@ -108,8 +108,8 @@ export class StageMeter {
         if (at >= 0 && at < 1 << 18) meter.byPlace[at >> 1] += spent;
         else meter.elsewhere += spent;
         if (meter.left) {
-          stage = calls.pop().stage;
-          depth -= 1;
+          stage = calls.pop()?.stage ?? other; // none: the counting began within this exception
+          depth = Math.max(0, depth - 1);
         }
       }
     };
