@@ -34,6 +34,11 @@
 #define STILL_SIGMA 3
 #define FALL_SHIFT 2
 #define WANDER_ms SECONDS(120) /* and of what it counts as risen lately */
+/* What a reading rises by less than 16 Pa/s, 2^4, may be a drift: some real sensors crept by 2 kPa
+ * in minutes. Seen through a low pass, or the noise would be clipped too. */
+#define CREEPING_SHIFT 4
+#define CREEPING_ms SECONDS(1)
+#define CREPT_MAX_Pa 2500
 #define WARM_ms SECONDS(8)
 #define WARM_SHIFT 3 /* share of what may have moved that does in a second */
 #define MEMORY_ms SECONDS(CONDITION_MEMORY_s)
@@ -86,6 +91,7 @@ static void begin_tare(struct condition *condition, uint8_t k) {
   condition->reached_Pa_q10[k] = 0;
   condition->margin_Pa_q10[k] = 0;
   condition->risen_Pa_q10[k] = 0;
+  condition->crept_Pa_q10[k] = 0;
   condition->sum_Pa_q10[k] = 0;
   condition->drift_q16[k] = 0;
   condition->below_ms[k] = 0;
@@ -133,7 +139,7 @@ static void tare_step(struct condition *condition, uint8_t k, int32_t pressure_P
   int64_t sum = condition->tare_sum[k] - condition->tare_min[k] - condition->tare_max[k];
   condition->level_Pa_q10[k] = condition->zero_Pa_q10[k] =
       clamp(mean_of(sum, taken - 2), -ZERO_MAX, ZERO_MAX);
-  condition->before_Pa_q10[k] = condition->zero_Pa_q10[k];
+  condition->before_Pa_q10[k] = condition->slow_Pa_q10[k] = condition->zero_Pa_q10[k];
   condition->tracked_ms[k] = condition->now_ms;
   condition->tared_ms = 0;
   condition->snapshots = 0;
@@ -347,13 +353,27 @@ static void watch_calm(struct condition *condition, const struct conditioned *co
   take_snapshot(condition, count);
 }
 
-/* Whether it feels more than its zero has wandered. */
+/* Adds up what it creeps, but for a sure press on it: that relaxes. */
+static void watch_creep(struct condition *condition, uint8_t k, int32_t step_ms, int32_t reading) {
+  int32_t change = clamped_difference(reading, condition->slow_Pa_q10[k]);
+  change = part_of(clamp(change, -GAINED_MAX, GAINED_MAX), share_in(step_ms, CREEPING_ms));
+  condition->slow_Pa_q10[k] += change;
+  int32_t crept = condition->crept_Pa_q10[k];
+  crept = condition->pressed ? crept : faded(crept, step_ms, WANDER_ms);
+  int32_t most = step_ms << CREEPING_SHIFT;
+  condition->crept_Pa_q10[k] = clamp(crept + clamp(change, -most, most), 0, Pa_q10(CREPT_MAX_Pa));
+}
+
+/* Whether it feels more than its zero has wandered, or it has crept. */
 static void look_how_firm(struct condition *condition, const struct conditioned *conditioned,
                           uint8_t k) {
   int32_t risen = condition->risen_Pa_q10[k];
   int32_t wandered = risen < 0 ? -risen : risen;
   set_bit(&condition->firm, k,
           conditioned->pressure_Pa_q10[k] > condition->open_Pa_q10 + 3 * wandered / 2);
+  int32_t crept = condition->crept_Pa_q10[k];
+  set_bit(&condition->sudden, k,
+          conditioned->pressure_Pa_q10[k] > condition->open_Pa_q10 + 3 * crept / 2);
 }
 
 static void press_or_release(struct condition *condition, const struct conditioned *conditioned,
@@ -415,6 +435,7 @@ static void track_sensor(struct condition *condition, const struct frame *frame,
   if (memory > condition->pad_memory_Pa_q10) {
     condition->pad_memory_Pa_q10 = memory;
   }
+  watch_creep(condition, k, step_ms, reading);
   look_how_firm(condition, conditioned, k);
   if (condition->pressed && !condition->unsure) {
     track_pressed(condition, k, step_ms, steady);
@@ -551,6 +572,7 @@ void condition_frame(struct condition *condition, const struct frame *frame,
                        (condition->below & conditioned->usable) == 0;
   watch_calm(condition, conditioned, frame->sensor_count);
   bool stands_off = (condition->stands_off & conditioned->usable) != 0;
-  conditioned->zero_doubtful =
-      condition->pressed ? condition->unsure : conditioned->contact || stands_off;
+  bool sure = frame->saturated != 0 ||
+              (!condition->unsure && (condition->sudden & conditioned->usable) != 0);
+  conditioned->zero_doubtful = condition->pressed ? !sure : conditioned->contact || stands_off;
 }

@@ -240,7 +240,8 @@ static void release(float share, float time_constant_s, float seconds) {
   }
 }
 
-/* 0.005 N/s above one sensor and between four, and a fifth of it: what it lost is about 0.02 N. */
+/* 0.005 N/s above one sensor and between four, and a fifth of it: what it lost is about 0.02 N.
+ * Below 3.9 kPa it cannot be told from the drift of some sensors. */
 static void test_no_slow_force_is_taken_for_a_drift(void) {
   static const float slopes_Pa_s[] = {22, 12, 2.4f};
   for (size_t i = 0; i < PERIODS; i++) {
@@ -248,9 +249,10 @@ static void test_no_slow_force_is_taken_for_a_drift(void) {
       begin_calm(periods_us[i]);
       watch_s(4000 / slopes_Pa_s[s], slopes_Pa_s[s], 1u << 7);
       TEST_ASSERT_TRUE(conditioned.contact);
-      TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+      TEST_ASSERT_TRUE(contact_s > 0.85f * 4000 / slopes_Pa_s[s] - 20);
       TEST_ASSERT_INT32_WITHIN(110 * Pa, 4000 * Pa, conditioned.pressure_Pa_q10[7]);
-      TEST_ASSERT_TRUE(unflagged_s > 0.85f * 4000 / slopes_Pa_s[s] - 20);
+      watch_s(500 / slopes_Pa_s[s], slopes_Pa_s[s], 1u << 7);
+      TEST_ASSERT_FALSE(conditioned.zero_doubtful);
     }
   }
 }
@@ -494,6 +496,32 @@ static void test_contact_on_a_wandering_zero_is_in_doubt(void) {
     run_s(1);
     TEST_ASSERT_TRUE(conditioned.contact);
     TEST_ASSERT_EQUAL(wanders, conditioned.zero_doubtful);
+  }
+}
+
+/* Some real sensors creep by 10 Pa/s for minutes: more than the zero may follow. */
+static void test_what_crept_up_is_in_doubt_and_what_is_sudden_is_not(void) {
+  for (int p = 0; p < FAST_PERIODS; p++) {
+    begin_calm(periods_us[p]);
+    watch_s(60, 10.0f, 1 << 3);
+    TEST_ASSERT_GREATER_THAN(30.0f, contact_s);
+    TEST_ASSERT_FLOAT_WITHIN(0.5f, 0.0f, unflagged_s);
+    watch_s(60, 0.0f, 0);
+    TEST_ASSERT_TRUE(conditioned.contact);
+    TEST_ASSERT_FLOAT_WITHIN(0.5f, 0.0f, unflagged_s);
+    int32_t crept = frame.pressure_Pa_q10[3];
+    press(3000 * 1024);
+    frame.pressure_Pa_q10[3] += crept - AMBIENT;
+    run_s(0.2f);
+    TEST_ASSERT_TRUE(conditioned.contact);
+    run_s((float)SENSORS * 0.064f);
+    TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+
+    begin_calm(periods_us[p]);
+    watch_s(30, 100.0f, 1 << 7); /* 0.02 N/s on 12 mm of rubber */
+    TEST_ASSERT_GREATER_THAN(25.0f, contact_s);
+    TEST_ASSERT_FLOAT_WITHIN(1.5f, 0.0f, unflagged_s - contact_s);
+    TEST_ASSERT_FALSE(conditioned.zero_doubtful);
   }
 }
 
@@ -771,6 +799,7 @@ int main(void) {
   RUN_TEST(test_far_sensors_stand_off_too);
   RUN_TEST(test_weak_contact_for_long_is_in_doubt);
   RUN_TEST(test_contact_on_a_wandering_zero_is_in_doubt);
+  RUN_TEST(test_what_crept_up_is_in_doubt_and_what_is_sudden_is_not);
   RUN_TEST(test_invalid_sensors_are_left_out);
   RUN_TEST(test_doubtful_readings_move_no_zero);
   RUN_TEST(test_saturated_sensor_means_contact_and_is_left_out);
