@@ -397,7 +397,7 @@ static void track_sensor(struct condition *condition, const struct frame *frame,
     condition->memory_Pa_q10[k] = condition->reached_Pa_q10[k] = Pa_q10(SATURATED_Pa);
     condition->margin_Pa_q10[k] = Pa_q10(SATURATED_Pa) >> BAND_SHIFT;
   }
-  if (!(conditioned->usable & bit) || frame->doubtful & bit) {
+  if (!(conditioned->usable & bit) || frame->unsettled & bit) {
     return;
   }
   /* One disturbed reading is no pressure to remember. */
