@@ -46,6 +46,7 @@ enum class Reason {
   residual,  /* no such profile */
   halves,    /* odd and even placements say different gains */
   layout,    /* sensors are not where the firmware says */
+  silent,    /* a sensor has no reading in any placement */
 };
 
 /* A word for programs: "too_few", "cluster", ... */
@@ -62,6 +63,7 @@ struct Judgement {
   double offset_share = 0.0, drift_share = 0.0; /* rms over the sensors beyond what is by chance, of
                                                    the peak */
   std::vector<std::size_t> unsure; /* sensors whose gain is not known well enough yet */
+  std::vector<std::size_t> silent; /* of those, the ones without a reading in any placement */
 };
 
 /* last: there will be no more placements, so what is not good is refused. */

@@ -52,6 +52,17 @@ TEST(Judge, accepts_good_sessions) {
   }
 }
 
+TEST(Judge, names_a_sensor_without_readings_before_long) {
+  const KnownPad pad(62);
+  auto placements = good_session(pad, 8, 62);
+  for (Placement &placement : placements) {
+    placement.usable &= ~(1u << 7);
+  }
+  expect_refused(judge(pad.array, placements, false), Reason::silent, "sensors 7 gave no reading");
+  placements.back().usable |= 1u << 7;
+  EXPECT_EQ(judge(pad.array, placements, false).state, State::more);
+}
+
 TEST(Judge, asks_for_more_until_it_is_good) {
   const KnownPad pad(61);
   const auto placements = good_session(pad, PLACEMENTS_MAX, 61);
