@@ -350,8 +350,11 @@ static void storing_is_as_quick_at_the_slowest_rate(void) {
   run_for(1000);
   struct wire_packet packet, command = calibrate_command();
   send_packet(&command);
-  run_for(100); /* until the main loop looks at what the host has sent */
-  run_for(100);
+  for (int ms = 0; ms < 100 && !store_is_writing(&app.store); ms++) {
+    run_for(1); /* until the main loop looks at what the host has sent */
+  }
+  TEST_ASSERT_TRUE(store_is_writing(&app.store));
+  run_for(40);
   TEST_ASSERT_TRUE(next_of_type(WIRE_ACK, &packet));
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, packet.body.ack.result);
 }
@@ -362,9 +365,12 @@ static void the_loader_waits_for_what_is_being_stored(void) {
   struct wire_packet calibrate = calibrate_command();
   struct wire_packet loader = {.type = WIRE_CMD_LOADER, .body.cmd_loader = {WIRE_LOADER_MAGIC}};
   send_packet(&loader);
-  run_for(45); /* it leaves 50 ms after the command */
+  while (app.loader_at_us == 0 || port_now_us() + 2000 < app.loader_at_us) {
+    run_for(1);
+  }
   send_packet(&calibrate);
-  TEST_ASSERT_EQUAL(NATIVE_TIME_UP, run_for(20));
+  TEST_ASSERT_EQUAL(NATIVE_TIME_UP, native_run_until(app.loader_at_us + 3000, main_round, &app));
+  TEST_ASSERT_TRUE(store_is_writing(&app.store));
   TEST_ASSERT_EQUAL(NATIVE_LOADER, run_for(200));
   TEST_ASSERT_TRUE(info_after_restart().stored & WIRE_STORED_CALIBRATION);
 }
