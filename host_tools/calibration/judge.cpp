@@ -221,7 +221,7 @@ Evidence against(const Judgement &j) {
 
 /* The firmware's fit to a placement. */
 struct FirmwareFit {
-  explicit FirmwareFit(const Array &array) {
+  FirmwareFit(const Array &array, const Prior &prior) {
     std::vector<float> x, y;
     for (std::size_t k = 0; k < array.sensors(); k++) {
       x.push_back(static_cast<float>(array.x_mm[k]));
@@ -231,6 +231,8 @@ struct FirmwareFit {
                                   y.data(), static_cast<float>(array.pitch_mm)) == FT_OK;
     settings.iterations = ITERATIONS;
     settings.noise_Pa_q10 = NOISE_Pa_Q10;
+    settings.prior_sigma_mm = static_cast<float>(prior.sigma_mm);
+    settings.prior_width_mm = static_cast<float>(prior.width_mm);
   }
   std::optional<fit_result> operator()(const Placement &placement,
                                        const std::vector<double> &gain) {
@@ -323,8 +325,9 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
 }
 
 std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements,
-                                      const Solution &solution, double force_N) {
-  FirmwareFit fit(array);
+                                      const Solution &solution, double force_N,
+                                      const Prior &prior) {
+  FirmwareFit fit(array, prior);
   std::vector<double> forces, fadings;
   for (std::size_t i = 0; i < placements.size(); i++) {
     const auto fitted =
@@ -350,8 +353,8 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
 }
 
 Scatter scatter(const Array &array, const std::vector<Placement> &placements,
-                const Solution &solution, bool with_gains) {
-  FirmwareFit fit(array);
+                const Solution &solution, bool with_gains, const Prior &prior) {
+  FirmwareFit fit(array, prior);
   const std::vector<double> ones(array.sensors(), 1.0);
   std::vector<double> distances, forces;
   for (std::size_t i = 0; i < placements.size(); i++) {

@@ -75,8 +75,14 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
 struct ForceScale {
   double scale = 1.0, sd = 0.0;
 };
+/* That the fingertip's fit has, see fit.h; none by default. It moves forces by percents where the
+ * contact is of another width. */
+struct Prior {
+  double sigma_mm = 0.0, width_mm = 0.0;
+};
 std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements,
-                                      const Solution &solution, double force_N);
+                                      const Solution &solution, double force_N,
+                                      const Prior &prior = {});
 
 /* What a calibration is for: how far the firmware's fit scatters over the placements without and
  * with the gains. Medians: of the distance of its locations from those of the solution, of the
@@ -85,6 +91,6 @@ struct Scatter {
   double location_mm = 0.0, force = 0.0;
 };
 Scatter scatter(const Array &array, const std::vector<Placement> &placements,
-                const Solution &solution, bool with_gains);
+                const Solution &solution, bool with_gains, const Prior &prior = {});
 
 } // namespace fingertip::calibrating

@@ -205,6 +205,9 @@ TEST(Force, one_known_weight_gives_the_scale) {
   EXPECT_GT(right, 1.0);
   EXPECT_LT(right, 1.15);
   EXPECT_FALSE(force_scale(pad.array, {}, Solution{}, 3.0));
+  /* A fit with a prior on a narrower contact says less, and its scale makes up for it. */
+  const auto narrower = force_scale(pad.array, placements, s, 3.0, {3.1, 0.1});
+  EXPECT_GT(narrower->scale, 1.03 * scale->scale);
   /* Rubber that loses 4 % in the half second: a tap may be off by more than that. */
   auto fading = placements;
   for (Placement &placement : fading) {
