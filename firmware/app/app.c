@@ -494,6 +494,9 @@ static enum wire_result tare(struct app *app, uint8_t force) {
     return WIRE_RESULT_NOT_NOW;
   }
   condition_tare(&app->condition);
+  /* A frame that is held may come first: of the one before it what stays true. */
+  app->contact.flags &= CONTACT_FLAG_CALIBRATED | CONTACT_FLAG_SENSOR_MASKED;
+  app->conditioned.contact = false;
   return WIRE_RESULT_DONE;
 }
 
