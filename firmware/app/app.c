@@ -48,9 +48,12 @@ _Static_assert(DEFAULT_FIT_N_LARGEST == 0, "n_largest needs FINGERTIP_FIT_GENERA
 void app_on_event(struct app *app) {
   uint64_t now_us = port_now_us();
   uint64_t wake_us = scan_step(&app->scan, now_us);
+  uint64_t tick_us = now_us + atomic_load_explicit(&app->tick_interval_us, memory_order_relaxed);
   if (now_us >= app->next_tick_us) {
-    app->next_tick_us = now_us + atomic_load_explicit(&app->tick_interval_us, memory_order_relaxed);
+    app->next_tick_us = tick_us;
     atomic_store_explicit(&app->tick, 1, memory_order_relaxed);
+  } else if (tick_us < app->next_tick_us) { /* the interval has become shorter */
+    app->next_tick_us = tick_us;
   }
   port_alarm_at_us(wake_us < app->next_tick_us ? wake_us : app->next_tick_us);
 }
@@ -491,6 +494,9 @@ static enum wire_result tare(struct app *app, uint8_t force) {
     return WIRE_RESULT_NOT_NOW;
   }
   condition_tare(&app->condition);
+  /* A frame that is held may come first: of the one before it what stays true. */
+  app->contact.flags &= CONTACT_FLAG_CALIBRATED | CONTACT_FLAG_SENSOR_MASKED;
+  app->conditioned.contact = false;
   return WIRE_RESULT_DONE;
 }
 

@@ -232,7 +232,13 @@ static void watch_below(struct condition *condition, uint8_t k, int32_t step_ms,
     return;
   }
   condition->below_ms[k] = (uint16_t)(condition->below_ms[k] + step_ms);
-  if (condition->below_ms[k] >= (under > Pa_q10(FAR_BELOW_Pa) ? FAR_BELOW_ms : BELOW_ms)) {
+  bool far = under > Pa_q10(FAR_BELOW_Pa);
+  if (condition->below_ms[k] >= (far ? FAR_BELOW_ms : BELOW_ms)) {
+    /* It was tared under a press, and so were the others that are below now. */
+    uint32_t others = far ? condition->below : 0;
+    for (uint8_t j = 0; others != 0; j++, others >>= 1) {
+      condition->below_ms[j] = others & 1u ? BELOW_ms : condition->below_ms[j];
+    }
     begin_tare(condition, k);
     condition->memory_Pa_q10[k] = clamp(-above_level, 0, Pa_q10(RETURN_MAX_Pa)) << BAND_SHIFT;
   }
@@ -417,7 +423,7 @@ static void track_sensor(struct condition *condition, const struct frame *frame,
     condition->memory_Pa_q10[k] = condition->reached_Pa_q10[k] = Pa_q10(SATURATED_Pa);
     condition->margin_Pa_q10[k] = Pa_q10(SATURATED_Pa) >> BAND_SHIFT;
   }
-  if (!(conditioned->usable & bit) || frame->doubtful & bit) {
+  if (!(conditioned->usable & bit) || frame->unsettled & bit) {
     return;
   }
   /* One disturbed reading is no pressure to remember. */

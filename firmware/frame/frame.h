@@ -23,6 +23,7 @@ struct frame {
   uint32_t renewed;        /* bitmap: another sensor than in the frame before, with another zero */
   uint32_t valid;          /* bitmap: pressure is a measurement */
   uint32_t doubtful;       /* bitmap: valid, but there is reason to doubt the reading */
+  uint32_t unsettled;      /* bitmap: doubtful until the next temperature settles it */
   uint32_t saturated;      /* bitmap: beyond the range in which the sensor reads true */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* [sensor]; 0 where not valid */
 };

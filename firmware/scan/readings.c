@@ -154,6 +154,7 @@ bool readings_take_pressures(struct readings *readings, const uint32_t code[], u
   frame->valid = valid;
   frame->saturated &= valid;
   frame->doubtful = valid & readings->doubtful;
+  frame->unsettled = valid & readings->doubted;
   frame->renewed = readings->renewed;
   readings->renewed = 0;
   return left_out != 0;

@@ -95,9 +95,9 @@ enum readings_news {
 uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count,
                                    const struct readings_temperature *taken);
 
-/* Fills in pressures, valid, doubtful, saturated and renewed. code: [sensor]; good: bitmap. Returns
- * whether it left any out: left_out and perhaps suspects have changed. Cost: some 140 Cortex-M0+
- * cycles a sensor. */
+/* Fills in pressures, valid, doubtful, unsettled, saturated and renewed. code: [sensor]; good:
+ * bitmap. Returns whether it left any out: left_out and perhaps suspects have changed. Cost: some
+ * 140 Cortex-M0+ cycles a sensor. */
 bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good,
                              struct frame *frame);
 

@@ -193,6 +193,10 @@ std::string text_of(const Judgement &j, std::size_t placements) {
   case Reason::layout:
     return "the sensors seem to sit " + std::to_string(s.spread.position_mm).substr(0, 4) +
            " mm from where the firmware has them: see geometry.c";
+  case Reason::silent:
+    return "sensors " + list_of(j.silent) +
+           " gave no reading to rely on: fingertip info says whether they answer and their PROM is "
+           "good";
   }
   return "";
 }
@@ -217,7 +221,7 @@ Evidence against(const Judgement &j) {
 
 /* The firmware's fit to a placement. */
 struct FirmwareFit {
-  explicit FirmwareFit(const Array &array) {
+  FirmwareFit(const Array &array, const Prior &prior) {
     std::vector<float> x, y;
     for (std::size_t k = 0; k < array.sensors(); k++) {
       x.push_back(static_cast<float>(array.x_mm[k]));
@@ -227,6 +231,8 @@ struct FirmwareFit {
                                   y.data(), static_cast<float>(array.pitch_mm)) == FT_OK;
     settings.iterations = ITERATIONS;
     settings.noise_Pa_q10 = NOISE_Pa_Q10;
+    settings.prior_sigma_mm = static_cast<float>(prior.sigma_mm);
+    settings.prior_width_mm = static_cast<float>(prior.width_mm);
   }
   std::optional<fit_result> operator()(const Placement &placement,
                                        const std::vector<double> &gain) {
@@ -257,7 +263,7 @@ struct FirmwareFit {
 const char *name_of(Reason reason) {
   static const char *const names[] = {"none",     "too_few",   "cluster", "one_end", "unsure",
                                       "weights",  "elongated", "offsets", "drift",   "stray",
-                                      "residual", "halves",    "layout"};
+                                      "residual", "halves",    "layout",  "silent"};
   return names[static_cast<int>(reason)];
 }
 
@@ -265,9 +271,16 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
   Judgement j;
   j.solution = solve(array, placements);
   const Solution &s = j.solution;
+  std::uint32_t seen = 0;
+  for (const Placement &placement : placements) {
+    seen |= placement.usable;
+  }
   for (std::size_t k = 0; k < array.sensors(); k++) {
     if (!s.solved || s.shape_sd[k] > SHAPE_SD_MAX) {
       j.unsure.push_back(k);
+    }
+    if (!(seen >> k & 1u)) {
+      j.silent.push_back(k);
     }
   }
   if (s.solved) {
@@ -277,6 +290,12 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
     j.kept_share = double(s.kept) / double(placements.size());
     j.offset_share = rms_beyond(s.offset_Pa, s.offset_sd_Pa) / s.peak_Pa;
     j.drift_share = rms_beyond(s.drift_Pa, s.drift_sd_Pa) / s.peak_Pa;
+  }
+  if (placements.size() >= EVIDENCE_MIN && !j.silent.empty()) {
+    j.state = Judgement::State::refused;
+    j.reason = Reason::silent;
+    j.text = text_of(j, placements.size());
+    return j;
   }
   last = last || placements.size() >= PLACEMENTS_MAX;
   const Evidence evidence = s.solved ? against(j) : Evidence{};
@@ -306,8 +325,9 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
 }
 
 std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements,
-                                      const Solution &solution, double force_N) {
-  FirmwareFit fit(array);
+                                      const Solution &solution, double force_N,
+                                      const Prior &prior) {
+  FirmwareFit fit(array, prior);
   std::vector<double> forces, fadings;
   for (std::size_t i = 0; i < placements.size(); i++) {
     const auto fitted =
@@ -333,8 +353,8 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
 }
 
 Scatter scatter(const Array &array, const std::vector<Placement> &placements,
-                const Solution &solution, bool with_gains) {
-  FirmwareFit fit(array);
+                const Solution &solution, bool with_gains, const Prior &prior) {
+  FirmwareFit fit(array, prior);
   const std::vector<double> ones(array.sensors(), 1.0);
   std::vector<double> distances, forces;
   for (std::size_t i = 0; i < placements.size(); i++) {

@@ -46,6 +46,7 @@ enum class Reason {
   residual,  /* no such profile */
   halves,    /* odd and even placements say different gains */
   layout,    /* sensors are not where the firmware says */
+  silent,    /* a sensor has no reading in any placement */
 };
 
 /* A word for programs: "too_few", "cluster", ... */
@@ -62,6 +63,7 @@ struct Judgement {
   double offset_share = 0.0, drift_share = 0.0; /* rms over the sensors beyond what is by chance, of
                                                    the peak */
   std::vector<std::size_t> unsure; /* sensors whose gain is not known well enough yet */
+  std::vector<std::size_t> silent; /* of those, the ones without a reading in any placement */
 };
 
 /* last: there will be no more placements, so what is not good is refused. */
@@ -73,8 +75,14 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
 struct ForceScale {
   double scale = 1.0, sd = 0.0;
 };
+/* That the fingertip's fit has, see fit.h; none by default. It moves forces by percents where the
+ * contact is of another width. */
+struct Prior {
+  double sigma_mm = 0.0, width_mm = 0.0;
+};
 std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements,
-                                      const Solution &solution, double force_N);
+                                      const Solution &solution, double force_N,
+                                      const Prior &prior = {});
 
 /* What a calibration is for: how far the firmware's fit scatters over the placements without and
  * with the gains. Medians: of the distance of its locations from those of the solution, of the
@@ -83,6 +91,6 @@ struct Scatter {
   double location_mm = 0.0, force = 0.0;
 };
 Scatter scatter(const Array &array, const std::vector<Placement> &placements,
-                const Solution &solution, bool with_gains);
+                const Solution &solution, bool with_gains, const Prior &prior = {});
 
 } // namespace fingertip::calibrating

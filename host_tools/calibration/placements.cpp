@@ -40,22 +40,27 @@ void PlacementFinder::begin_anew() {
 }
 
 std::optional<Placement> PlacementFinder::take(const Frame &frame) {
-  if (begun_ && (frame.t_s <= last_s_ || frame.t_s > last_s_ + GAP_s)) {
+  double t_s = frame.t_s + ahead_s_;
+  if (begun_ && (t_s <= last_s_ || t_s > last_s_ + GAP_s)) {
     begin_anew();
+    if (t_s <= last_s_) {
+      ahead_s_ += last_s_ + GAP_s - t_s;
+      t_s = last_s_ + GAP_s;
+    }
   }
-  last_s_ = frame.t_s;
+  last_s_ = t_s;
   if (!begun_) {
     begun_ = true;
     zero_Pa_ = frame.zero_Pa;
-    rest_from_s_ = frame.t_s;
+    rest_from_s_ = t_s;
   }
   std::optional<Placement> found;
-  if (open_.frames > 0 && frame.t_s >= open_.begin_s + SLOT_s) {
+  if (open_.frames > 0 && t_s >= open_.begin_s + SLOT_s) {
     found = close(open_);
     open_ = Slot{};
   }
   if (open_.frames == 0) {
-    open_.begin_s = frame.t_s;
+    open_.begin_s = t_s;
     open_.counts.assign(sensors_, 0);
     open_.means.assign(sensors_, 0.0);
   }

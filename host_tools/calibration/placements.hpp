@@ -54,7 +54,7 @@ public:
   explicit PlacementFinder(std::size_t sensors);
 
   /* The placement that this frame completes. Frames whose time does not rise, or after a gap of
-   * half a second, begin anew. */
+   * half a second, begin anew; the times of placements go on when a fingertip restarted. */
   std::optional<Placement> take(const Frame &frame);
 
   State state() const { return state_; }
@@ -81,7 +81,7 @@ private:
   State state_ = State::resting;
   Refusal refusal_ = Refusal::none;
   bool begun_ = false;
-  double last_s_ = 0.0;
+  double last_s_ = 0.0, ahead_s_ = 0.0; /* ahead_s_: of the frames' own time, since a restart */
   Slot open_;
   std::deque<Slot> slots_; /* of the last seconds, oldest first */
   std::vector<double> rest_Pa_, zero_Pa_, above_Pa_;

@@ -94,7 +94,10 @@ void check_firmware(const wire_info &info, const std::string &what) {
 /* A placement after the other, and what they make. */
 class Work {
 public:
-  explicit Work(const wire_info &info) : array_(array_of(info)), finder_(array_.sensors()) {}
+  explicit Work(const wire_info &info)
+      : array_(array_of(info)), prior_{static_cast<double>(info.prior_sigma_mm),
+                                       static_cast<double>(info.prior_width_mm)},
+        finder_(array_.sensors()) {}
 
   /* True if it completed a placement. */
   bool take(const wire_packet &packet) {
@@ -127,12 +130,14 @@ public:
             wanted_};
   }
   const Array &array() const { return array_; }
+  const calibrating::Prior &prior() const { return prior_; }
   const Judgement &judgement() const { return judgement_; }
   const std::vector<Placement> &placements() const { return placements_; }
   std::uint64_t frames() const { return frames_; }
 
 private:
   Array array_;
+  calibrating::Prior prior_;
   calibrating::PlacementFinder finder_;
   std::vector<Placement> placements_;
   Judgement judgement_;
@@ -149,7 +154,7 @@ calibration made_of(const Work &work, std::optional<double> force_N) {
   made.force_scale_sd = DEFAULT_FORCE_SCALE_SD;
   if (force_N) {
     const auto scale =
-        calibrating::force_scale(work.array(), work.placements(), solution, *force_N);
+        calibrating::force_scale(work.array(), work.placements(), solution, *force_N, work.prior());
     if (!scale || scale->scale < static_cast<double>(CALIBRATION_FORCE_SCALE_MIN) ||
         scale->scale > static_cast<double>(CALIBRATION_FORCE_SCALE_MAX)) {
       throw Error("the readings are not those of " + fixed(*force_N, 2) + " N: they make " +
@@ -173,7 +178,8 @@ calibration made_of(const Work &work, std::optional<double> force_N) {
 void print_result(const Work &work, const calibration &made, std::optional<double> force_N) {
   const Judgement &judgement = work.judgement();
   const auto scatter = [&](bool with_gains) {
-    return calibrating::scatter(work.array(), work.placements(), judgement.solution, with_gains);
+    return calibrating::scatter(work.array(), work.placements(), judgement.solution, with_gains,
+                                work.prior());
   };
   const calibrating::Scatter before = scatter(false), after = scatter(true);
   std::printf("%s, from %zu of %zu placements\n", judgement.text.c_str(), judgement.solution.kept,

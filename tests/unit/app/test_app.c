@@ -302,6 +302,32 @@ static void settings_are_kept_when_asked_for_and_forgotten_likewise(void) {
   TEST_ASSERT_EQUAL_FLOAT(built.prior_width_mm, info.prior_width_mm);
 }
 
+/* A frame that is held after it must not say what was so before: who waits for TARED would go on.
+ */
+static void after_a_tare_no_frame_says_tared_before_it_is(void) {
+  press.force_N = 5.0;
+  native_cdc_open();
+  run_for(300);
+  ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {8192}});
+  start_streams(WIRE_STREAM_CONTACT);
+  int held = 0;
+  for (uint32_t i = 0; i < 300; i++) {
+    run_for(400 + i * 7 % 50);
+    struct wire_packet packet, command = {.type = WIRE_CMD_TARE, .body.cmd_tare = {1}};
+    while (next_packet(&packet)) {
+    }
+    send_packet(&command);
+    run_for(100);
+    TEST_ASSERT_TRUE(next_of_type(WIRE_ACK, &packet));
+    TEST_ASSERT_TRUE(next_of_type(WIRE_CONTACT, &packet));
+    held += (packet.body.contact.flags & CONTACT_FLAG_HELD) != 0;
+    TEST_ASSERT_EQUAL_HEX32(0,
+                            packet.body.contact.flags & (CONTACT_FLAG_TARED | CONTACT_FLAG_CONTACT |
+                                                         CONTACT_FLAG_FIT_VALID));
+  }
+  TEST_ASSERT_GREATER_THAN(0, held);
+}
+
 /* The answer to a command that stores is late; until then all goes on as before. */
 static void storing_takes_its_time_and_keeps_nobody_waiting(void) {
   native_cdc_open();
@@ -350,8 +376,11 @@ static void storing_is_as_quick_at_the_slowest_rate(void) {
   run_for(1000);
   struct wire_packet packet, command = calibrate_command();
   send_packet(&command);
-  run_for(100); /* until the main loop looks at what the host has sent */
-  run_for(100);
+  for (int ms = 0; ms < 100 && !store_is_writing(&app.store); ms++) {
+    run_for(1); /* until the main loop looks at what the host has sent */
+  }
+  TEST_ASSERT_TRUE(store_is_writing(&app.store));
+  run_for(40);
   TEST_ASSERT_TRUE(next_of_type(WIRE_ACK, &packet));
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, packet.body.ack.result);
 }
@@ -362,9 +391,12 @@ static void the_loader_waits_for_what_is_being_stored(void) {
   struct wire_packet calibrate = calibrate_command();
   struct wire_packet loader = {.type = WIRE_CMD_LOADER, .body.cmd_loader = {WIRE_LOADER_MAGIC}};
   send_packet(&loader);
-  run_for(45); /* it leaves 50 ms after the command */
+  while (app.loader_at_us == 0 || port_now_us() + 2000 < app.loader_at_us) {
+    run_for(1);
+  }
   send_packet(&calibrate);
-  TEST_ASSERT_EQUAL(NATIVE_TIME_UP, run_for(20));
+  TEST_ASSERT_EQUAL(NATIVE_TIME_UP, native_run_until(app.loader_at_us + 3000, main_round, &app));
+  TEST_ASSERT_TRUE(store_is_writing(&app.store));
   TEST_ASSERT_EQUAL(NATIVE_LOADER, run_for(200));
   TEST_ASSERT_TRUE(info_after_restart().stored & WIRE_STORED_CALIBRATION);
 }
@@ -682,6 +714,7 @@ int main(void) {
   RUN_TEST(settings_are_kept_when_asked_for_and_forgotten_likewise);
   RUN_TEST(storing_takes_its_time_and_keeps_nobody_waiting);
   RUN_TEST(storing_is_as_quick_at_the_slowest_rate);
+  RUN_TEST(after_a_tare_no_frame_says_tared_before_it_is);
   RUN_TEST(the_loader_waits_for_what_is_being_stored);
   RUN_TEST(a_flash_that_fails_is_no_calibration);
   RUN_TEST(damage_is_told_and_not_used);

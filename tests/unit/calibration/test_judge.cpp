@@ -52,6 +52,17 @@ TEST(Judge, accepts_good_sessions) {
   }
 }
 
+TEST(Judge, names_a_sensor_without_readings_before_long) {
+  const KnownPad pad(62);
+  auto placements = good_session(pad, 8, 62);
+  for (Placement &placement : placements) {
+    placement.usable &= ~(1u << 7);
+  }
+  expect_refused(judge(pad.array, placements, false), Reason::silent, "sensors 7 gave no reading");
+  placements.back().usable |= 1u << 7;
+  EXPECT_EQ(judge(pad.array, placements, false).state, State::more);
+}
+
 TEST(Judge, asks_for_more_until_it_is_good) {
   const KnownPad pad(61);
   const auto placements = good_session(pad, PLACEMENTS_MAX, 61);
@@ -194,6 +205,9 @@ TEST(Force, one_known_weight_gives_the_scale) {
   EXPECT_GT(right, 1.0);
   EXPECT_LT(right, 1.15);
   EXPECT_FALSE(force_scale(pad.array, {}, Solution{}, 3.0));
+  /* A fit with a prior on a narrower contact says less, and its scale makes up for it. */
+  const auto narrower = force_scale(pad.array, placements, s, 3.0, {3.1, 0.1});
+  EXPECT_GT(narrower->scale, 1.03 * scale->scale);
   /* Rubber that loses 4 % in the half second: a tap may be off by more than that. */
   auto fading = placements;
   for (Placement &placement : fading) {

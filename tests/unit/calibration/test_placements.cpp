@@ -205,6 +205,21 @@ TEST(Placements, a_gap_or_a_restart_begins_anew) {
   }
 }
 
+TEST(Placements, follow_one_another_in_time_over_a_restart) {
+  Feed feed;
+  feed.t_s = 1000.0;
+  for (int i = 0; i < 3; i++) {
+    feed.rest(1.0);
+    feed.place();
+    feed.t_s = 3.0;
+  }
+  ASSERT_EQ(feed.found.size(), 3u);
+  for (std::size_t i = 1; i < 3; i++) {
+    EXPECT_NEAR(feed.found[i].t_s - feed.found[i - 1].t_s, 4.6, 0.8);
+    EXPECT_LT(feed.error(feed.found[i]), 0.003);
+  }
+}
+
 TEST(Placements, sensors_that_are_not_measured_are_left_out) {
   Feed feed;
   feed.rest(1.0);

@@ -227,6 +227,36 @@ static void test_zero_follows_any_drift_of_a_barometer(void) {
   }
 }
 
+/* The flanks of the press are below too, by less; what its peak comes back by is none of theirs. */
+static void test_a_tare_under_a_press_is_mended_for_all_sensors(void) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    begin(periods_us[i]);
+    press(5000 * Pa);
+    run_s(40);
+    fill(AMBIENT);
+    run_s(3);
+    for (int t = 3; t < 60; t++) {
+      run_s(1);
+      for (int k = 0; k < SENSORS; k++) {
+        TEST_ASSERT_INT32_WITHIN(5 * Pa, AMBIENT, condition.zero_Pa_q10[k]);
+      }
+    }
+  }
+}
+
+/* One whose PROM has a wrong CRC is used, and doubtful for good: its zero drifts like the others'.
+ */
+static void test_zero_follows_the_drift_of_a_doubtful_sensor(void) {
+  for (size_t i = 0; i < PERIODS; i++) {
+    begin(periods_us[i]);
+    frame.doubtful = 1u << 3;
+    run_s(60);
+    watch_s(900, 0.22f, 0x1249);
+    TEST_ASSERT_EQUAL_FLOAT(0, contact_s);
+    TEST_ASSERT_INT32_WITHIN(5 * Pa, 0, conditioned.pressure_Pa_q10[3]);
+  }
+}
+
 /* After a release: `share` of the press stays, and comes back with a time constant. */
 static void release(float share, float time_constant_s, float seconds) {
   contact_s = unflagged_s = 0;
@@ -555,13 +585,13 @@ static void test_invalid_sensors_are_left_out(void) {
   TEST_ASSERT_EQUAL_INT32(AMBIENT + 777, condition.zero_Pa_q10[2]);
 }
 
-static void test_doubtful_readings_move_no_zero(void) {
+static void test_unsettled_readings_move_no_zero(void) {
   begin_calm(4854);
-  frame.doubtful = 1u << 7;
+  frame.doubtful = frame.unsettled = 1u << 7;
   frame.pressure_Pa_q10[7] += 100 * Pa;
   run_s(60);
   TEST_ASSERT_INT32_WITHIN(Pa, AMBIENT, condition.zero_Pa_q10[7]);
-  frame.doubtful = 0;
+  frame.doubtful = frame.unsettled = 0;
   run_s(400);
   TEST_ASSERT_INT32_WITHIN(Pa, AMBIENT + 100 * Pa, condition.zero_Pa_q10[7]);
 }
@@ -785,6 +815,8 @@ int main(void) {
   RUN_TEST(test_gate_has_a_hysteresis_in_pascals_and_sigmas);
   RUN_TEST(test_one_disturbed_reading_moves_no_zero);
   RUN_TEST(test_zero_follows_any_drift_of_a_barometer);
+  RUN_TEST(test_a_tare_under_a_press_is_mended_for_all_sensors);
+  RUN_TEST(test_zero_follows_the_drift_of_a_doubtful_sensor);
   RUN_TEST(test_no_slow_force_is_taken_for_a_drift);
   RUN_TEST(test_what_compensation_costs_is_no_contact);
   RUN_TEST(test_zero_stands_still_during_contact);
@@ -801,7 +833,7 @@ int main(void) {
   RUN_TEST(test_contact_on_a_wandering_zero_is_in_doubt);
   RUN_TEST(test_what_crept_up_is_in_doubt_and_what_is_sudden_is_not);
   RUN_TEST(test_invalid_sensors_are_left_out);
-  RUN_TEST(test_doubtful_readings_move_no_zero);
+  RUN_TEST(test_unsettled_readings_move_no_zero);
   RUN_TEST(test_saturated_sensor_means_contact_and_is_left_out);
   RUN_TEST(test_tare_during_contact);
   RUN_TEST(test_reading_below_zero_is_tared_anew_when_it_stays);

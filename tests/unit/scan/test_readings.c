@@ -261,6 +261,7 @@ static void test_a_temperature_step_needs_a_second_and_the_others(void) {
     take_pressures(ALL);
     expect(ALL, 0);
     TEST_ASSERT_EQUAL_HEX32(ONE_BIT, frame.doubtful);
+    TEST_ASSERT_EQUAL_HEX32(ONE_BIT, frame.unsettled);
     TEST_ASSERT_DOUBLE_WITHIN(0.01, rest_Pa, frame.pressure_Pa_q10[ONE] / 1024.0);
     d2[ONE] = rest;
     warm_by(ONE, cases[i].second_degC);
@@ -334,6 +335,7 @@ static void test_a_first_temperature_far_from_the_others_is_believed_after_a_res
   take_pressures(ALL);
   expect(ALL, 0);
   TEST_ASSERT_EQUAL_HEX32(ONE_BIT, frame.doubtful);
+  TEST_ASSERT_EQUAL_HEX32(0, frame.unsettled);
   warm_by(ONE, -12);
   temperature.returned = ONE_BIT;
   take_temperature();
@@ -417,6 +419,7 @@ static void test_a_sensor_with_a_bad_prom_must_read_like_the_others(void) {
     take_pressures(ALL);
     expect(cases[i].used ? ALL : ALL & ~ONE_BIT, 0);
     TEST_ASSERT_EQUAL_HEX32(cases[i].used ? ONE_BIT : 0, frame.doubtful);
+    TEST_ASSERT_EQUAL_HEX32(0, frame.unsettled);
     /* Once it did, presses do not matter. */
     for (int k = 0; k < SENSORS; k++) {
       step_by(k, k == ONE ? 40e3 : 8e3);
