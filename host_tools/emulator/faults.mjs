@@ -10,8 +10,10 @@
  *     sensor_nack (sensor)          does not acknowledge its address, once, the first time from from_s on
  *     sensor_brown_out (sensor)     its supply dips at from_s: a conversion is lost, and until a reset its codes are 1/16 too small
  *     sensor_d2_corrupt (sensor)    every temperature has one bit inverted
+ *     sensor_noisy (sensor)         ten times the noise of the datasheet
  *     sda_stuck_low (sensor)        pulls SDA from from_s until nine clocks reached it or its multiplexer was reset
  *     mux_stuck (mux)               acknowledges nothing until its RESET line was pulsed
+ *     mux_dead (mux)                acknowledges nothing and connects nothing
  *     sensor_missing (sensor)       is not there; when it comes back it has just been powered
  *     line_stuck_low (sensor)       its SDA is tied to ground; behind a multiplexer the bus feels it while it is on
  *     line_stuck_high (sensor)      its SDA is tied to VDD
@@ -35,8 +37,10 @@ const TARGET = {
   sensor_nack: 'sensor',
   sensor_brown_out: 'sensor',
   sensor_d2_corrupt: 'sensor',
+  sensor_noisy: 'sensor',
   sda_stuck_low: 'sensor',
   mux_stuck: 'mux',
+  mux_dead: 'mux',
   sensor_missing: 'sensor',
   line_stuck_low: 'sensor',
   line_stuck_high: 'sensor',
@@ -106,7 +110,7 @@ export class Faults {
     this.active = new Set();
     const key = {
       sensor_dead: 'dead', sensor_prom_corrupt: 'promCorrupt', sensor_prom_bit: 'promBit', sensor_adc_zero: 'adcZero',
-      sensor_d2_corrupt: 'd2Corrupt',
+      sensor_d2_corrupt: 'd2Corrupt', sensor_noisy: 'noisy',
     };
     /** How many have begun. */
     const times = { sensor_nack: 'nacks', sensor_brown_out: 'brownOuts' };

@@ -13,7 +13,7 @@ std::string advice(ErrorCode code) {
   case ErrorCode::not_a_port:
     return "a recording is shown with `fingertip replay`";
   case ErrorCode::port_in_use:
-    return "end that one first (fuser -v tells which)";
+    return "end that one first (`fingertip doctor` names it)";
   case ErrorCode::permission_denied:
     return "install the udev rule: fingertip rule | sudo tee "
            "/etc/udev/rules.d/60-fingertip.rules, then sudo udevadm control --reload, and plug it "

@@ -7,6 +7,7 @@ namespace fingertip {
 
 void add_list(CommandLine &line);
 void add_info(CommandLine &line);
+void add_doctor(CommandLine &line);
 void add_monitor(CommandLine &line);
 void add_record(CommandLine &line);
 void add_replay(CommandLine &line);

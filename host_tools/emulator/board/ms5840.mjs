@@ -16,6 +16,8 @@ const RESET_NS = 2.8e6;
 const CONVERSION_FRACTION = 0.96;
 const OSCILLATOR_TOLERANCE = 0.04;
 const CODE_MAX = 0xffffff;
+/** Of a noisy sensor, times the datasheet's noise. */
+const NOISY = 10;
 
 /** By osr field / 2: maximum conversion time, pressure noise rms, temperature noise rms. */
 export const OSR = [
@@ -95,7 +97,7 @@ export class Ms5840 extends I2cTarget {
   /**
    * @param options index; prng: this sensor's own; now_ns: () => time; report: Report;
    *   stimulus: (index, t_ns) => { pressure_Pa, temperature_degC }, absolute;
-   *   faults: (index) => { dead, promCorrupt, promBit, adcZero, d2Corrupt } of this moment, { nacks, brownOuts } so far
+   *   faults: (index) => { dead, promCorrupt, promBit, adcZero, d2Corrupt, noisy } of this moment, { nacks, brownOuts } so far
    */
   constructor({ index, prng, now_ns, report, stimulus, faults = () => ({}) }) {
     super(ADDRESS);
@@ -227,7 +229,7 @@ export class Ms5840 extends I2cTarget {
 
   #code({ isPressure, osr, start_ns, end_ns, spoiled, wrong }) {
     const { pressure_Pa, temperature_degC } = this.stimulus(this.index, (start_ns + end_ns) / 2);
-    const noise = this.prng.normal();
+    const noise = this.prng.normal() * (this.faults(this.index).noisy ? NOISY : 1);
     const codes = isPressure
       ? codesFor(this.prom, pressure_Pa + noise * osr.noise_Pa, temperature_degC).d1
       : codesFor(this.prom, pressure_Pa, temperature_degC + noise * osr.noise_degC).d2;

@@ -76,6 +76,10 @@ export class PicoMux {
       mux_stuck: (mux, active) => {
         this.muxes[mux].stuck = active;
       },
+      mux_dead: (mux, active) => {
+        this.muxes[mux].dead = active;
+        this.bus.linesChanged();
+      },
     };
   }
 

@@ -17,6 +17,8 @@ export class Tca9548a extends I2cTarget {
     this.inReset = false;
     /** Fault: answers nothing and stays as it is until its RESET is pulsed. */
     this.stuck = false;
+    /** Fault: answers nothing and connects nothing. */
+    this.dead = false;
     this.onReset = () => {};
   }
 
@@ -25,7 +27,7 @@ export class Tca9548a extends I2cTarget {
   }
 
   get connected() {
-    if (this.inReset) return [];
+    if (this.inReset || this.dead) return [];
     return this.channels.flatMap((targets, channel) => ((this.control >> channel) & 1 ? targets : []));
   }
 
@@ -45,7 +47,7 @@ export class Tca9548a extends I2cTarget {
   }
 
   acknowledgesAddress() {
-    return !this.inReset && !this.stuck;
+    return !this.inReset && !this.stuck && !this.dead;
   }
 
   receive(byte) {

@@ -148,9 +148,9 @@ test('sensor: conversion time stays below the maximum, differs between parts, sa
 });
 
 test('sensor: noise has the rms of its oversampling and repeats with its seed', () => {
-  const sample = (seed) => {
+  const sample = (seed, faults) => {
     let now = 0;
-    const s = new Ms5840({ index: 0, prng: new Prng(seed), now_ns: () => now, report: new Report(), stimulus: () => ({ pressure_Pa: 1e5, temperature_degC: 25 }) });
+    const s = new Ms5840({ index: 0, prng: new Prng(seed), now_ns: () => now, report: new Report(), stimulus: () => ({ pressure_Pa: 1e5, temperature_degC: 25 }), faults });
     s.wasReset = true;
     const d2 = codesFor(s.prom, 1e5, 25).d2;
     return Array.from({ length: 2000 }, () => {
@@ -161,10 +161,15 @@ test('sensor: noise has the rms of its oversampling and repeats with its seed', 
     });
   };
   const values = sample(5);
-  const mean = values.reduce((a, v) => a + v, 0) / values.length;
-  const rms = Math.sqrt(values.reduce((a, v) => a + (v - mean) ** 2, 0) / values.length);
+  const statistics = (list) => {
+    const mean = list.reduce((a, v) => a + v, 0) / list.length;
+    return { mean, rms: Math.sqrt(list.reduce((a, v) => a + (v - mean) ** 2, 0) / list.length) };
+  };
+  const { mean, rms } = statistics(values);
   assert.ok(Math.abs(mean - 1e5) < 0.4, `${mean}`);
   assert.ok(Math.abs(rms / 3.9 - 1) < 0.06, `${rms}`);
+  const noisy = statistics(sample(5, () => ({ noisy: true })));
+  assert.ok(Math.abs(noisy.rms / 39 - 1) < 0.06, `${noisy.rms} with the fault`);
   assert.deepEqual(sample(5).slice(0, 20), values.slice(0, 20));
   assert.notDeepEqual(sample(6).slice(0, 20), values.slice(0, 20));
 });
@@ -205,6 +210,22 @@ test('multiplexer: broadcast acknowledges if any sensor does; RESET disconnects'
   assert.ok(!b.write(0x76, 0x48));
   b.mux.setReset(true);
   assert.ok(!b.write(0x70, 1), 'held in reset');
+});
+
+test('multiplexer: a dead one answers nothing, whatever its RESET does, and frees what it connected', () => {
+  const b = muxBench();
+  b.write(0x70, 1);
+  b.sensor.tied = true;
+  assert.ok(b.mux.holdsSda);
+  b.mux.dead = true;
+  assert.ok(!b.mux.holdsSda);
+  b.mux.setReset(true);
+  b.mux.setReset(false);
+  assert.ok(!b.write(0x70, 1));
+  assert.ok(!b.write(0x76, 0x1e));
+  b.mux.dead = false;
+  assert.ok(b.write(0x70, 2));
+  assert.ok(b.write(0x76, 0x1e));
 });
 
 test('bus: two sensors answering one read are ANDed and reported', () => {

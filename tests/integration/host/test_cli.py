@@ -373,7 +373,7 @@ class ErrorsPeopleMeet(CliTest):
             for command in (["info"], ["monitor"], ["record", self.ftr]):
                 self.assertEqual(self.error(*command, "--port", self.port),
                                  f"fingertip: {self.port}: in use by another program; end that one first "
-                                 "(fuser -v tells which)\n")
+                                 "(`fingertip doctor` names it)\n")
             process.send_signal(signal.SIGINT)
             process.communicate(timeout=PATIENCE_s)
 

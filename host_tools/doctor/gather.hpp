@@ -1,0 +1,23 @@
+/* Asks computer and fingertip for the facts. */
+#pragma once
+
+#include "doctor/judge.hpp"
+#include "libfingertip/connection.hpp"
+
+#include <functional>
+#include <string>
+
+namespace fingertip {
+
+struct Examination {
+  Choice choice;
+  double seconds = 10;    /* of the measurement, device time */
+  std::string root = "/"; /* of the system's files */
+};
+
+/* Whatever ends it early is one of the facts. stop: asked while waiting; true throws Interrupted.
+ * progress: told the share of the measurement that is over, 0..1. Leaves the streams off. */
+Facts gather(const Examination &examination, const std::function<bool()> &stop,
+             const std::function<void(double)> &progress);
+
+} // namespace fingertip

@@ -1,0 +1,201 @@
+"""What `fingertip doctor` says of emulated fingertips, each with one thing wrong, and of good ones.
+
+usage: test_doctor.py --boards FOLDER --fingertip TOOL --node NODE
+"""
+import argparse
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "host_tools" / "python"))
+import fingertip_files as files  # noqa: E402
+
+TOOLS = argparse.Namespace()
+BOARDS = ("pico_mux", "pico_parallel")
+PATIENCE_s = 120
+SENSORS = 15
+
+
+def write_scenario(path, *rows):
+    names = ["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(SENSORS))]
+    lines = [",".join(str(value) for value in (t_s, *[0] * len(files.TRUTH_COLUMNS), *pressures)) for t_s, *pressures in rows]
+    path.write_text("\n".join(["# fingertip-scenario 1", ",".join(names), *lines]) + "\n")
+    return path
+
+
+class Doctor(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        holder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(holder.cleanup)
+        cls.folder = pathlib.Path(holder.name)
+        cls.at_rest = write_scenario(cls.folder / "rest.csv", [0, *[0] * SENSORS])
+        # a system with the rule, and one without
+        for name in ("with_rule", "without_rule"):
+            rules = cls.folder / name / "etc/udev/rules.d"
+            rules.mkdir(parents=True)
+            for shared in ("dev", "proc", "sys"):
+                (cls.folder / name / shared).symlink_to(f"/{shared}")
+        (cls.folder / "with_rule/etc/udev/rules.d/60-fingertip.rules").write_text(
+            subprocess.run([TOOLS.fingertip, "rule"], capture_output=True, text=True, check=True).stdout)
+
+    def plug_in(self, board, faults=(), scenario=None):
+        """An emulated fingertip; returns its port."""
+        port, plan = self.folder / f"{self.id()}-{board}", self.folder / f"{self.id()}-{board}.json"
+        plan.write_text(json.dumps([{"from_s": 0, **fault} for fault in faults]))
+        emulator = subprocess.Popen(
+            [TOOLS.node, ROOT / "host_tools/emulator/main.mjs", "--board", board,
+             "--image", pathlib.Path(TOOLS.boards) / board / f"fingertip-{board}.bin", "--scenario", scenario or self.at_rest,
+             "--faults", plan, "--seconds", "3600", "--pty", port, "--wait-open", "--fast-enumeration"],
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.addCleanup(emulator.communicate)
+        self.addCleanup(emulator.kill)
+        end_s = time.monotonic() + PATIENCE_s
+        while not os.path.lexists(port):
+            self.assertIsNone(emulator.poll(), "the emulator did not start")
+            self.assertLess(time.monotonic(), end_s, "the emulator did not start")
+            time.sleep(0.02)
+        return port
+
+    def examine(self, port, *arguments, system="with_rule", seconds=2):
+        """The findings that are not well."""
+        for _ in range(3):  # a busy computer may lose packets, but hardly thrice in a row
+            wrong = self.examined(port, arguments, system, seconds)
+            if all(finding["check"] != "packets" for finding in wrong):
+                break
+        return wrong
+
+    def examined(self, port, arguments, system, seconds):
+        done = subprocess.run([TOOLS.fingertip, "doctor", "--port", port, "--json", "--seconds", str(seconds), "--root",
+                               self.folder / system, *arguments], capture_output=True, text=True, timeout=PATIENCE_s)
+        self.assertEqual(done.stderr, "")
+        self.result = json.loads(done.stdout)
+        wrong = [finding for finding in self.result["findings"] if finding["verdict"] != "ok"]
+        self.assertEqual(done.returncode, 1 if any(finding["verdict"] == "bad" for finding in wrong) else 0)
+        return wrong
+
+    def only(self, findings, check, verdict):
+        """The one finding of this check; what else is there are consequences."""
+        found = [finding for finding in findings if finding["check"] == check]
+        self.assertEqual([finding["verdict"] for finding in found], [verdict], findings)
+        return found[0]
+
+    def test_nothing_is_wrong_with_good_ones(self):
+        for board in BOARDS:
+            port = self.plug_in(board)
+            self.assertEqual(self.examine(port, seconds=10), [], board)
+            self.assertEqual(self.result["board"], board)
+            self.assertGreaterEqual(self.result["measured"]["seconds"], 10)
+            for sensor in self.result["measured"]["sensors"]:
+                self.assertLess(abs(sensor["noise_Pa"] / self.result["measured"]["expected_noise_Pa"] - 1), 0.1)
+
+    def test_nothing_is_wrong_at_any_oversampling(self):
+        for board in BOARDS:
+            port = self.plug_in(board)
+            for osr in (256, 8192):
+                subprocess.run([TOOLS.fingertip, "set", "--port", port, f"osr={osr}"], check=True, capture_output=True)
+                findings = self.examine(port)
+                if osr == 256:  # what a busy computer does not take in time is lost
+                    findings = [finding for finding in findings if finding["check"] != "packets"]
+                self.assertEqual(findings, [], (board, osr))
+
+    def test_a_missing_sensor(self):
+        findings = self.examine(self.plug_in("pico_mux", [{"type": "sensor_dead", "sensor": 7}]))
+        finding = self.only(findings, "sensors", "bad")
+        self.assertEqual(finding["sensors"], [{"sensor": 7, "strip": 1, "channel": 2, "multiplexer": 0x71}])
+        self.assertIn("sensor 7 (strip 1, channel 2 of multiplexer 0x71) does not answer", finding["text"])
+        self.assertIn("SD2 and SC2", finding["advice"])
+        self.assertEqual({finding["check"] for finding in findings}, {"sensors", "bus"})
+        findings = self.examine(self.plug_in("pico_parallel", [{"type": "sensor_missing", "sensor": 7}]))
+        finding = self.only(findings, "sensors", "bad")
+        self.assertEqual(finding["sensors"], [{"sensor": 7, "strip": 1, "position": 2, "gpio": 7}])
+        self.assertIn("GP7 (pin 10)", finding["text"])
+
+    def test_all_sensors_missing(self):
+        for board in BOARDS:
+            findings = self.examine(self.plug_in(board, [{"type": "sensor_dead", "sensor": k} for k in range(SENSORS)]))
+            finding = self.only(findings, "sensors", "bad")
+            self.assertIn("none of the 15 sensors answers", finding["text"])
+            self.assertIn({"pico_mux": "SCL on GP5 (pin 7)", "pico_parallel": "SCL on GP15 (pin 20)"}[board], finding["advice"])
+
+    def test_a_dead_multiplexer(self):
+        findings = self.examine(self.plug_in("pico_mux", [{"type": "mux_dead", "mux": 1}]))
+        finding = self.only(findings, "sensors", "bad")
+        self.assertIn("multiplexer 0x71 does not answer", finding["text"])
+        self.assertIn("RESET on GP7 (pin 10)", finding["advice"])
+        self.assertEqual([sensor["sensor"] for sensor in finding["sensors"]], [5, 6, 7, 8, 9])
+
+    def test_a_line_held_low(self):
+        findings = self.examine(self.plug_in("pico_mux", [{"type": "line_stuck_low", "sensor": 12}]))
+        finding = self.only(findings, "sensors", "bad")
+        self.assertIn("strip 2, sensors 10, 11, 12, 13, 14: a line behind multiplexer 0x72 is held low", finding["text"])
+        findings = self.examine(self.plug_in("pico_parallel", [{"type": "line_stuck_low", "sensor": 12}]))
+        finding = self.only(findings, "sensors", "bad")
+        self.assertIn("SDA on GP12 (pin 16)", finding["text"])
+        self.assertIn("held low", finding["advice"])
+
+    def test_a_bad_prom(self):
+        for board in BOARDS:
+            findings = self.examine(self.plug_in(board, [{"type": "sensor_prom_bit", "sensor": 3}]))
+            finding = self.only(findings, "prom", "bad")
+            self.assertEqual([sensor["sensor"] for sensor in finding["sensors"]], [3])
+            self.assertEqual({finding["check"] for finding in findings}, {"prom"})
+
+    def test_a_noisy_sensor(self):
+        for board in BOARDS:
+            findings = self.examine(self.plug_in(board, [{"type": "sensor_noisy", "sensor": 11}]))
+            finding = self.only(findings, "noise", "bad")
+            self.assertEqual([sensor["sensor"] for sensor in finding["sensors"]], [11])
+            self.assertLessEqual({finding["check"] for finding in findings}, {"noise", "zero"})
+            noise_Pa = [sensor["noise_Pa"] for sensor in self.result["measured"]["sensors"]]
+            self.assertAlmostEqual(noise_Pa[11], 39, delta=4)
+            self.assertLess(max(noise_Pa[:11]), 4.5)
+
+    def test_a_drifting_sensor(self):
+        drift = write_scenario(self.folder / "drift.csv", [0, *[0] * SENSORS], [100, *[0] * 4, 300, *[0] * 10])
+        findings = self.examine(self.plug_in("pico_mux", scenario=drift), seconds=10)
+        finding = self.only(findings, "drift", "warn")
+        self.assertEqual([sensor["sensor"] for sensor in finding["sensors"]], [4])
+        self.assertAlmostEqual(self.result["measured"]["sensors"][4]["drift_Pa_per_s"], 3, delta=1)
+
+    def test_something_touches(self):
+        press = write_scenario(self.folder / "press.csv", [0, *[0] * SENSORS], [1, *[0] * SENSORS],
+                               [1.1, *[0] * 6, 3000, 9000, 3000, *[0] * 6])
+        findings = self.examine(self.plug_in("pico_mux", scenario=press), seconds=3)
+        self.assertIn("something touches the pad", self.only(findings, "zero", "warn")["text"])
+        self.assertEqual(len(findings), 1, findings)
+
+    def test_disturbed_transfers(self):
+        faults = [{"type": "sensor_nack", "sensor": i % SENSORS, "from_s": 0.05 * i} for i in range(1, 400)]
+        findings = self.examine(self.plug_in("pico_parallel", faults))
+        self.assertIn("NACKs/s", self.only(findings, "bus", "warn")["text"])
+
+    def test_a_missing_rule(self):
+        findings = self.examine(self.plug_in("pico_mux"), system="without_rule", seconds=1)
+        self.assertEqual([(finding["check"], finding["verdict"]) for finding in findings], [("rule", "warn")])
+        self.assertIn("fingertip rule | sudo tee", findings[0]["advice"])
+
+    def test_a_port_in_use(self):
+        port = self.plug_in("pico_mux")
+        recorder = subprocess.Popen([TOOLS.fingertip, "record", "-", "--port", port], stdout=subprocess.PIPE,
+                                    stderr=subprocess.DEVNULL)
+        self.addCleanup(recorder.communicate)
+        self.addCleanup(recorder.kill)
+        recorder.stdout.readline()
+        findings = self.examine(port)
+        self.assertEqual([(finding["check"], finding["verdict"]) for finding in findings], [("port", "bad")])
+        self.assertIn(f"in use by another program: fingertip (process {recorder.pid})", findings[0]["text"])
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    for name in ("boards", "fingertip", "node"):
+        parser.add_argument(f"--{name}", required=True)
+    _, rest = parser.parse_known_args(namespace=TOOLS)
+    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)

@@ -1,0 +1,161 @@
+"""`fingertip doctor` against a fake device: usage test_doctor.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
+import contextlib
+import json
+import os
+import pathlib
+import pty
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+FINGERTIP, FAKE_DEVICE = (os.path.abspath(path) for path in sys.argv[1:3])
+PATIENCE_s = 30
+LINE = re.compile(r"(ok|warn|bad) +([a-z]+)  (.+)")
+
+
+def tool_version():
+    return subprocess.run([FINGERTIP, "--version"], capture_output=True, text=True, check=True).stdout.split()[1]
+
+
+class DoctorTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        self.port = os.path.join(self.folder, "tty")
+        rules = pathlib.Path(self.folder, "etc/udev/rules.d")
+        rules.mkdir(parents=True)
+        self.rule = rules / "60-fingertip.rules"
+        self.rule.write_text(subprocess.run([FINGERTIP, "rule"], capture_output=True, text=True, check=True).stdout)
+        for shared in ("dev", "proc", "sys"):
+            os.symlink(f"/{shared}", os.path.join(self.folder, shared))
+        self.environment = {k: v for k, v in os.environ.items() if k not in ("FINGERTIP_PORT", "NO_COLOR", "TERM")}
+
+    def plug_in(self, *options):
+        process = subprocess.Popen([FAKE_DEVICE, self.port, *options])
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        end_s = time.monotonic() + PATIENCE_s
+        while not os.path.lexists(self.port):
+            self.assertLess(time.monotonic(), end_s)
+            time.sleep(0.01)
+
+    def examine(self, *arguments, tool=FINGERTIP, **options):
+        return subprocess.run([tool, "doctor", "--port", self.port, "--seconds", "1", "--root", self.folder, *arguments],
+                              capture_output=True, text=True, env=self.environment, timeout=PATIENCE_s, **options)
+
+    def findings(self, *arguments, **options):
+        """[(verdict, check, text)] of the lines."""
+        done = self.examine(*arguments, **options)
+        self.assertEqual(done.stderr, "")
+        found = [LINE.fullmatch(line).groups() for line in done.stdout.splitlines()]
+        self.assertEqual(done.returncode, 1 if any(verdict == "bad" for verdict, _, _ in found) else 0)
+        return found
+
+    def finding(self, check, *arguments, **options):
+        found = [(verdict, text) for verdict, name, text in self.findings(*arguments, **options) if name == check]
+        self.assertEqual(len(found), 1, found)
+        return found[0]
+
+    def test_another_protocol_version(self):
+        self.plug_in("version=3")
+        verdict, text = self.finding("protocol")
+        self.assertEqual(verdict, "bad")
+        self.assertIn("speaks protocol version 3, not 4; install this tool's firmware", text)
+
+    def test_another_firmware_version(self):
+        self.plug_in("firmware=0.0.9")
+        verdict, text = self.finding("firmware")
+        self.assertEqual(verdict, "warn")
+        self.assertIn(f"0.0.9 (0123456789ab+), board pico_mux, scene slip; this tool is of version {tool_version()}", text)
+
+    def test_the_same_firmware_version(self):
+        self.plug_in(f"firmware={tool_version()}")
+        self.assertEqual(self.finding("firmware")[0], "ok")
+
+    def test_no_answer(self):
+        self.plug_in("mute=1")
+        verdict, text = self.finding("protocol")
+        self.assertEqual(verdict, "bad")
+        self.assertIn('no answer to "info"', text)
+
+    def test_no_port_and_no_rule(self):
+        self.rule.unlink()
+        found = self.findings()
+        self.assertEqual([line[:2] for line in found], [("warn", "rule"), ("bad", "port")])
+        self.assertIn("no such port; plug the fingertip in", found[1][2])
+
+    def test_permission_denied(self):
+        self.plug_in()
+        os.chmod(os.path.realpath(self.port), 0)
+        os.chmod(self.folder, 0o777)
+        tool, user = FINGERTIP, {}
+        if os.geteuid() == 0:
+            tool, user = os.path.join(self.folder, "fingertip"), {"user": 65534, "group": 65534, "extra_groups": []}
+            shutil.copy(FINGERTIP, tool)  # where everybody may run it
+        self.assertEqual([line[:2] for line in self.findings(tool=tool, **user)], [("ok", "rule"), ("bad", "port")])
+        self.rule.unlink()
+        self.assertEqual([line[:2] for line in self.findings(tool=tool, **user)], [("bad", "rule"), ("bad", "port")])
+
+    def test_lost_and_damaged_packets(self):
+        self.plug_in("drop=20", "flip=30")
+        verdict, text = self.finding("packets")
+        self.assertEqual(verdict, "warn")
+        self.assertRegex(text, r"[1-9][0-9]* lost, [1-9][0-9]* damaged")
+
+    def test_what_vanishes_meanwhile(self):
+        self.plug_in("frames=20")
+        self.assertIn("vanished while it was examined", self.finding("port")[1])
+
+    def test_a_watchdog_reset_is_told(self):
+        self.plug_in()
+        self.assertEqual(self.finding("restarts")[0], "warn")
+
+    def test_json_has_all_of_it(self):
+        self.plug_in("absent=3")
+        done = self.examine("--json")
+        told = json.loads(done.stdout)
+        self.assertEqual((told["verdict"], told["board"], told["serial"]), ("bad", "pico_mux", "E660583883265A2C"))
+        self.assertEqual(done.returncode, 1)
+        missing = [finding for finding in told["findings"] if finding["check"] == "sensors" and finding["verdict"] == "bad"]
+        self.assertEqual([finding["sensors"] for finding in missing],
+                         [[{"sensor": 3, "strip": 0, "channel": 3, "multiplexer": 0x70}]])
+        self.assertEqual(len(told["measured"]["sensors"]), 15)
+        self.assertAlmostEqual(told["measured"]["rate_Hz"], 200, delta=20)
+        self.assertEqual(told["health"]["stack_free_bytes"], 18)
+
+    def on_terminal(self, **environment):
+        """What a terminal is shown."""
+        master, slave = pty.openpty()
+        process = subprocess.Popen([FINGERTIP, "doctor", "--port", self.port, "--seconds", "1", "--root", self.folder], stdin=slave,
+                                   stdout=slave, stderr=slave, env={**self.environment, "TERM": "xterm", **environment})
+        os.close(slave)
+        shown = b""
+        with contextlib.suppress(OSError):
+            while chunk := os.read(master, 4096):
+                shown += chunk
+        process.wait(PATIENCE_s)
+        os.close(master)
+        return shown.decode()
+
+    def test_colour_only_on_a_terminal_that_wants_it(self):
+        self.plug_in()
+        self.assertNotIn("\x1b[3", self.examine().stdout)
+        shown = self.on_terminal()
+        self.assertIn("\x1b[32mok  \x1b[0m  rule", shown)
+        self.assertIn("measuring, touch nothing", shown)
+        self.assertNotIn("\x1b[3", self.on_terminal(NO_COLOR="1"))
+
+    def test_seconds_are_checked(self):
+        for seconds in ("0", "601", "x", ""):
+            done = subprocess.run([FINGERTIP, "doctor", "--seconds", seconds], capture_output=True, text=True, env=self.environment)
+            self.assertEqual((done.returncode, done.stdout), (2, ""))
+            self.assertIn("give 1 to 600", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]], verbosity=2)

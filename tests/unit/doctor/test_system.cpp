@@ -1,0 +1,117 @@
+#include "doctor/system.hpp"
+#include "support/host_packets.hpp"
+
+#include <algorithm>
+#include <fcntl.h>
+#include <filesystem>
+#include <fstream>
+#include <gtest/gtest.h>
+#include <stdlib.h>
+#include <sys/wait.h>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+const char *const TTY_RULE =
+    "SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"1209\", ATTRS{idProduct}==\"0001\", MODE=\"0660\"\n";
+
+class System : public ::testing::Test {
+protected:
+  void write(const std::string &path, const std::string &text) {
+    fs::create_directories(fs::path(folder_ / path).parent_path());
+    std::ofstream(folder_ / path) << text;
+  }
+  std::string rule() const { return fingertip::find_rule(folder_.path()); }
+
+  test::TemporaryFolder folder_;
+};
+
+/* A pseudo-terminal that another process has open. */
+class HeldPort {
+public:
+  HeldPort() : master_(posix_openpt(O_RDWR | O_NOCTTY)) {
+    grantpt(master_);
+    unlockpt(master_);
+    path_ = ptsname(master_);
+    int ready[2];
+    if (pipe(ready) != 0) {
+      std::abort();
+    }
+    child_ = fork();
+    if (child_ == 0) {
+      close(master_);
+      int port = open(path_.c_str(), O_RDWR | O_NOCTTY);
+      if (port < 0 || ::write(ready[1], "!", 1) != 1) {
+        _exit(1);
+      }
+      pause();
+      _exit(0);
+    }
+    close(ready[1]);
+    char byte;
+    EXPECT_EQ(read(ready[0], &byte, 1), 1);
+    close(ready[0]);
+  }
+  ~HeldPort() {
+    release();
+    close(master_);
+  }
+  void release() {
+    if (child_ > 0) {
+      kill(child_, SIGKILL);
+      waitpid(child_, nullptr, 0);
+      child_ = 0;
+    }
+  }
+  const std::string &path() const { return path_; }
+  int process() const { return child_; }
+
+private:
+  int master_;
+  std::string path_;
+  pid_t child_ = 0;
+};
+
+} // namespace
+
+TEST_F(System, RuleIsFoundWhereUdevLooks) {
+  EXPECT_EQ(rule(), "");
+  for (const char *path :
+       {"etc/udev/rules.d/60-fingertip.rules", "usr/lib/udev/rules.d/60-fingertip.rules",
+        "usr/local/lib/udev/rules.d/99-mine.rules"}) {
+    write(path, TTY_RULE);
+    EXPECT_EQ(rule(), folder_ / path);
+    fs::remove(folder_ / path);
+  }
+}
+
+TEST_F(System, WhatDoesNotActIsNoRule) {
+  write("etc/udev/rules.d/60-fingertip.rules", std::string("# ") + TTY_RULE);
+  EXPECT_EQ(rule(), "") << "a comment";
+  write("etc/udev/rules.d/60-fingertip.rules.old", TTY_RULE);
+  EXPECT_EQ(rule(), "") << "udev reads *.rules only";
+  write("etc/udev/rules.d/60-fingertip.rules",
+        "SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"1209\", ATTRS{idProduct}==\"0002\"\n");
+  EXPECT_EQ(rule(), "") << "another device";
+}
+
+TEST_F(System, HolderIsNamed) {
+  HeldPort port;
+  auto holders = fingertip::holders_of(port.path(), "/");
+  ASSERT_EQ(holders.seen.size(), 1u);
+  EXPECT_EQ(holders.seen[0].process, port.process());
+  EXPECT_FALSE(holders.seen[0].name.empty());
+  /* by another name of the same device */
+  fs::create_symlink(port.path(), folder_ / "link");
+  EXPECT_EQ(fingertip::holders_of(folder_ / "link", "/").seen.size(), 1u);
+}
+
+TEST_F(System, NobodyHoldsWhatWasReleasedOrIsMine) {
+  HeldPort port;
+  port.release();
+  int mine = open(port.path().c_str(), O_RDWR | O_NOCTTY);
+  EXPECT_TRUE(fingertip::holders_of(port.path(), "/").seen.empty());
+  close(mine);
+  EXPECT_TRUE(fingertip::holders_of(folder_ / "none", "/").seen.empty());
+}
