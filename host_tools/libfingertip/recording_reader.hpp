@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 class RecordingReader {
@@ -63,3 +64,4 @@ private:
 };
 
 } // namespace fingertip
+#pragma GCC visibility pop

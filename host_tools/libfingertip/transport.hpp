@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <string>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 class Transport {
@@ -40,3 +41,4 @@ public:
 };
 
 } // namespace fingertip
+#pragma GCC visibility pop
