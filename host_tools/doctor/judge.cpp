@@ -20,8 +20,7 @@ namespace {
 /* The model of the rate is right within 3 % (wiring.cpp); what brings sensors up takes at most 5 %
  * of the time, and only while one is missing. */
 constexpr double RATE_SHARE_MIN = 0.97;
-/* Below, sensors that answer keep less than the three quarters that a control loop could rely on:
- * even a sensor that needs to be brought up all the time costs 5 %. */
+/* No disturbance that the firmware mends by itself costs a quarter. */
 constexpr double RATE_SHARE_BAD = 0.75;
 /* Of frames without a sensor's reading: a NACK a second leaves 1 % of 186 frames a second
  * incomplete (firmware/scan/scan.h). */
@@ -340,14 +339,12 @@ private:
     std::uint32_t recoveries = now.bus_recoveries - then.bus_recoveries;
     std::uint32_t odd = now.implausible_readings - then.implausible_readings + now.zero_readings -
                         then.zero_readings;
-    std::string text = fixed(nacks / seconds(), 1) + " NACKs/s, " + count(recoveries, "recover") +
-                       ", " + count(timeouts, "timeout") + ", " + count(odd, "reading") +
-                       " left out";
-    text.replace(text.find("recover"), recoveries == 1 ? 7 : 8,
-                 recoveries == 1 ? "recovery" : "recoveries");
+    std::string text = fixed(nacks / seconds(), 1) + " NACKs/s, " + std::to_string(recoveries) +
+                       (recoveries == 1 ? " recovery, " : " recoveries, ") +
+                       count(timeouts, "timeout") + ", " + count(odd, "reading") + " left out";
     if (nacks + timeouts + recoveries + odd == 0) {
       add(Verdict::ok, "bus",
-          text + "; since its start " + std::to_string(now.bus_nacks) + " and " +
+          text + "; since its start " + count(now.bus_nacks, "NACK") + " and " +
               count(now.bus_timeouts, "timeout"));
     } else if (missing_) {
       add(Verdict::warn, "bus", text, "see to the missing sensors first");

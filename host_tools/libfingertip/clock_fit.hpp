@@ -14,6 +14,7 @@
 #include <deque>
 #include <optional>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 struct ClockExchange {
@@ -47,3 +48,4 @@ private:
 };
 
 } // namespace fingertip
+#pragma GCC visibility pop

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 /* Those of the streams that this firmware has. */
@@ -50,3 +51,4 @@ std::vector<std::uint8_t> frame_bytes(const wire_packet &packet);
 std::vector<std::uint8_t> info_frame_of_version(std::uint8_t version);
 
 } // namespace fingertip
+#pragma GCC visibility pop

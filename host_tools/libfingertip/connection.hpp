@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 enum class Reach {
@@ -59,3 +60,4 @@ std::optional<Way> way_to(const Found &found, Reach reach);
 wire_info ask(const Way &way, const std::function<bool()> &stop, const std::string &root = "/");
 
 } // namespace fingertip
+#pragma GCC visibility pop

@@ -14,6 +14,7 @@
 #include <string>
 #include <string_view>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 struct LineStatistics {
@@ -70,3 +71,4 @@ private:
 };
 
 } // namespace fingertip
+#pragma GCC visibility pop

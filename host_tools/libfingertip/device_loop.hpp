@@ -34,6 +34,7 @@
 #include <thread>
 #include <vector>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 struct DeviceNews {
@@ -152,3 +153,4 @@ private:
 };
 
 } // namespace fingertip
+#pragma GCC visibility pop

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 struct UsbPlace {
@@ -35,3 +36,4 @@ std::string stable_port(const std::string &path, const std::string &root = "/");
 bool is_same_serial(const std::string &a, const std::string &b);
 
 } // namespace fingertip
+#pragma GCC visibility pop

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 enum class ErrorCode {
@@ -75,3 +76,4 @@ private:
 };
 
 } // namespace fingertip
+#pragma GCC visibility pop

@@ -32,6 +32,14 @@ const std::vector<FlagName> &flag_names() {
   return names;
 }
 
+std::uint32_t warning_flags() {
+  std::uint32_t warnings = 0;
+  for (const FlagName &flag : flag_names()) {
+    warnings |= flag.warning ? flag.bit : 0;
+  }
+  return warnings;
+}
+
 std::string flags_text(std::uint32_t flags) {
   std::string text;
   auto add = [&](const std::string &name) { text += (text.empty() ? "" : " ") + name; };

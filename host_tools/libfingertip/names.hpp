@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 struct FlagName {
@@ -15,6 +16,9 @@ struct FlagName {
 
 /* Every flag of the contact packet, lowest bit first. */
 const std::vector<FlagName> &flag_names();
+
+/* The bits of all warnings: whoever trusts a contact heeds them. */
+std::uint32_t warning_flags();
 
 /* "CONTACT FIT_VALID", an unknown bit as "bit9". */
 std::string flags_text(std::uint32_t flags);
@@ -36,3 +40,4 @@ std::string streams_text(std::uint8_t streams);
 std::uint8_t streams_from_text(const std::string &text);
 
 } // namespace fingertip
+#pragma GCC visibility pop

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 using Metadata = std::vector<std::pair<std::string, std::string>>;
@@ -23,3 +24,4 @@ Metadata info_metadata(const wire_info &info);
 std::vector<std::pair<std::string, std::uint32_t>> health_fields(const wire_health &health);
 
 } // namespace fingertip
+#pragma GCC visibility pop

@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 /* Events in recordings: the port vanished here, and was there again. */
@@ -65,3 +66,4 @@ private:
 };
 
 } // namespace fingertip
+#pragma GCC visibility pop

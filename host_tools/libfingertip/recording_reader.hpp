@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 /* Serial numbers of the fingertips in a joint recording; of any other file none. */
@@ -79,3 +80,4 @@ private:
 };
 
 } // namespace fingertip
+#pragma GCC visibility pop

@@ -14,6 +14,7 @@
 #include <functional>
 #include <optional>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 /* The port vanished in the middle of a command. */
@@ -101,3 +102,4 @@ private:
 };
 
 } // namespace fingertip
+#pragma GCC visibility pop

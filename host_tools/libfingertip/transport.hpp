@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#pragma GCC visibility push(default)
 namespace fingertip {
 
 class Transport {
@@ -46,3 +47,4 @@ public:
 };
 
 } // namespace fingertip
+#pragma GCC visibility pop

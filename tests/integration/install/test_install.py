@@ -1,0 +1,190 @@
+"""What `cmake --install` gives: tool and library, from a prefix that was moved, used as a stranger would.
+
+usage: test_install.py --cmake CMAKE --build FOLDER --fake-device PROGRAM [--node NODE --image pico_mux.bin]
+"""
+import argparse
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+EXAMPLE = ROOT / "host_tools/libfingertip/example"
+TOOLS = argparse.Namespace()
+PATIENCE_s = 60
+PUBLIC = {"clock_fit.hpp", "command.hpp", "connection.hpp", "decoder.hpp", "device_loop.hpp", "discovery.hpp", "error.hpp", "names.hpp",
+          "packet_fields.hpp", "packet_file.hpp", "recording_reader.hpp", "session.hpp", "transport.hpp", "wire.hpp",
+          "common/calibration.h", "common/contact_flags.h", "common/limits.h", "common/status.h", "wire/packet.h"}
+FLAG_CONTACT, FLAG_FIT_VALID, FLAG_UNCERTAIN = 1 << 0, 1 << 1, 1 << 10
+
+
+def run(*command, **environment):
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, timeout=PATIENCE_s,
+                          env={**os.environ, **{name: str(value) for name, value in environment.items()}})
+    if done.returncode:
+        raise AssertionError(f"{command}: {done.stdout}{done.stderr}")
+    return done.stdout
+
+
+class Install(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        holder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
+        cls.addClassCleanup(holder.cleanup)
+        cls.folder = pathlib.Path(holder.name)
+        first = cls.folder / "first"
+        manifest = pathlib.Path(TOOLS.build) / "install_manifest.txt"  # by it a true installation is removed
+        before = manifest.read_bytes() if manifest.exists() else None
+        run(TOOLS.cmake, "--install", TOOLS.build, "--prefix", first)
+        if before is None:
+            manifest.unlink()
+        else:
+            manifest.write_bytes(before)
+        cls.prefix = cls.folder / "moved"
+        first.rename(cls.prefix)
+        cls.library = next(cls.prefix.rglob("libfingertip.so"))
+        cls.pkgconfig = cls.library.parent / "pkgconfig"
+        # what the fingertip's users are to build
+        cls.by_cmake = cls.folder / "by_cmake/follow"
+        run(TOOLS.cmake, "-S", EXAMPLE, "-B", cls.by_cmake.parent, f"-DCMAKE_PREFIX_PATH={cls.prefix}")
+        run(TOOLS.cmake, "--build", cls.by_cmake.parent)
+        flags = run("pkg-config", "--cflags", "--libs", "fingertip", PKG_CONFIG_PATH=cls.pkgconfig).split()
+        cls.by_pkg_config = cls.folder / "follow"
+        run("c++", "-std=c++17", "-Wall", "-Wextra", "-Werror", EXAMPLE / "follow.cpp", *flags, "-o", cls.by_pkg_config)
+
+    def installed(self):
+        return [path for path in self.prefix.rglob("*") if path.is_file()]
+
+    def test_everything_is_there(self):
+        names = {path.relative_to(self.prefix).name for path in self.installed()}
+        self.assertLessEqual({"fingertip", "60-fingertip.rules", "fingertip.1", "_fingertip", "fingertip.fish", "fingertip.pc",
+                              "fingertipConfig.cmake", "fingertipConfigVersion.cmake", "fingertipTargets.cmake", "PROTOCOL.md"}, names)
+        headers = self.prefix / "include/fingertip"
+        self.assertEqual({str(path.relative_to(headers)) for path in headers.rglob("*") if path.is_file()}, PUBLIC)
+
+    def test_no_file_names_the_build_tree(self):
+        for path in self.installed():
+            content = path.read_bytes()
+            for tree in (str(ROOT), str(pathlib.Path(TOOLS.build).resolve()), str(self.folder)):
+                self.assertNotIn(tree.encode(), content, path)
+        for path in (self.prefix / "bin/fingertip", self.library):
+            dynamic = run("readelf", "-d", path)
+            self.assertIn("NEEDED", dynamic)
+            for entry in re.findall(r"\((?:RPATH|RUNPATH)\).*\[(.*)\]", dynamic):
+                self.assertTrue(entry.startswith("$ORIGIN"), entry)
+
+    def test_the_tool_runs_where_it_was_moved_to(self):
+        tool = self.prefix / "bin/fingertip"
+        version = run(tool, "--version").split()[1]
+        self.assertEqual(self.library.resolve().name, f"libfingertip.so.{version}")
+        self.assertIn("idVendor", run(tool, "rule"))
+
+    def test_versions(self):
+        version = run(self.prefix / "bin/fingertip", "--version").split()[1]
+        self.assertEqual(run("pkg-config", "--modversion", "fingertip", PKG_CONFIG_PATH=self.pkgconfig).strip(), version)
+        major, minor, _ = version.split(".")
+        self.assertIn(f"[libfingertip.so.{major}.{minor}]", run("readelf", "-d", self.library))
+        self.assertIn(f"libfingertip.so.{major}.{minor}]", run("readelf", "-d", self.by_pkg_config))
+        project = self.folder / "wrong"
+        project.mkdir()
+        (project / "CMakeLists.txt").write_text(
+            "cmake_minimum_required(VERSION 3.16)\nproject(wrong LANGUAGES CXX)\nfind_package(fingertip 99.0 REQUIRED)\n")
+        with self.assertRaisesRegex(AssertionError, "99.0"):
+            run(TOOLS.cmake, "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}")
+
+    def test_each_header_stands_alone(self):
+        for header in sorted(PUBLIC):
+            language = "c++" if header.endswith(".hpp") else "c"
+            source = self.folder / f"alone.{language}"
+            source.write_text(f"#include <fingertip/{header}>\n")
+            run("cc", "-x", language, f"-std={'c++17' if language == 'c++' else 'c11'}", "-Wall", "-Wextra", "-Werror", "-fsyntax-only",
+                f"-I{self.prefix / 'include'}", source)
+
+    def test_only_the_public_is_visible(self):
+        symbols = run("nm", "-DC", "--defined-only", self.library)
+        ours = {part for name in re.findall(r"^\S+ [TDR] ((?:\w+::)*\w+)", symbols, re.M) for part in name.split("::")}
+        for name in ("Session", "Decoder", "DeviceLoop", "PacketFile", "RecordingReader", "choose_way", "open_way", "find_usb",
+                     "command_stream", "osr_from_text", "flags_text", "warning_flags", "info_metadata", "wire_encode", "wire_decode"):
+            self.assertIn(name, ours)
+        for name in ("SerialTransport", "UsbTransport", "RecordingWriter", "ProgressBar", "OutputFile", "read_firmware", "printable"):
+            self.assertNotIn(name, ours)
+        # nothing that is declared to the public is missing
+        declared = set()
+        for header in (self.prefix / "include/fingertip").glob("*.hpp"):
+            text = re.sub(r"/\*.*?\*/", "", header.read_text(), flags=re.S)
+            declared |= set(re.findall(r"^[\w:<>, &*]+?[ &*](\w+)\([^;{]*\)(?: const)?;", text, re.M))
+        self.assertGreater(len(declared), 30)
+        self.assertLessEqual(declared, ours)
+
+    def wait_for(self, path, process):
+        end_s = time.monotonic() + PATIENCE_s
+        while not os.path.lexists(path):
+            self.assertIsNone(process.poll())
+            self.assertLess(time.monotonic(), end_s)
+            time.sleep(0.02)
+
+    def start(self, *command):
+        process = subprocess.Popen([str(part) for part in command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        return process
+
+    def follow(self, program, port):
+        """The lines that the example prints before the fingertip vanishes."""
+        return run(program, FINGERTIP_PORT=port, LD_LIBRARY_PATH=self.library.parent).splitlines()
+
+    def test_the_example_prints_where_and_how_hard(self):
+        for program in (self.by_cmake, self.by_pkg_config):
+            port = self.folder / f"tty-{program.parent.name}"
+            self.wait_for(port, self.start(TOOLS.fake_device, port, "frames=40"))
+            lines = self.follow(program, port)
+            self.assertEqual(len(lines), 40)
+            for line in lines:
+                x_mm, y_mm, force_N = map(float, re.fullmatch(r"(\S+) mm (\S+) mm (\S+) N", line).groups())
+                self.assertAlmostEqual((x_mm / 8) ** 2 + (y_mm / 16) ** 2, 1, delta=0.01)
+                self.assertEqual(force_N, 5)
+
+    def test_the_example_heeds_flags(self):
+        for flags, expected in ((FLAG_CONTACT, set()),
+                                (FLAG_CONTACT | FLAG_FIT_VALID | FLAG_UNCERTAIN, {"not to be trusted: UNCERTAIN"})):
+            port = self.folder / f"tty-{flags}"
+            self.wait_for(port, self.start(TOOLS.fake_device, port, "frames=20", f"flags={flags}"))
+            self.assertEqual(set(self.follow(self.by_pkg_config, port)), expected)
+
+    def test_the_example_on_the_emulated_fingertip(self):
+        if not TOOLS.image:
+            self.skipTest("no image was built")
+        scenario = self.folder / "press.csv"
+        truth = "contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip"
+        sensors_mm = [(9 * (k // 5 - 1), 9 * (k % 5 - 2)) for k in range(15)]
+        p0_Pa, sigma_mm, at_mm = 20000, 7, (2, -3)
+        pressed = [p0_Pa * 2.718281828 ** (-((x - at_mm[0]) ** 2 + (y - at_mm[1]) ** 2) / 2 / sigma_mm ** 2) for x, y in sensors_mm]
+        rows = [(t_s, *[0] * 7, *(pressed if touched else [0] * 15)) for t_s, touched in ((0, 0), (0.5, 0), (0.6, 1), (3, 1))]
+        scenario.write_text("\n".join(["# fingertip-scenario 1", f"t_s,{truth}," + ",".join(f"s{k}_Pa" for k in range(15)),
+                                       *(",".join(map(str, row)) for row in rows)]) + "\n")
+        port = self.folder / "tty-emulated"
+        emulator = self.start(TOOLS.node, ROOT / "host_tools/emulator/main.mjs", "--board", "pico_mux", "--image", TOOLS.image,
+                              "--scenario", scenario, "--seconds", "3", "--pty", port, "--wait-open", "--fast-enumeration")
+        self.wait_for(port, emulator)
+        lines = self.follow(self.by_cmake, port)
+        located = [tuple(map(float, found.groups())) for line in lines if (found := re.fullmatch(r"(\S+) mm (\S+) mm (\S+) N", line))]
+        self.assertGreater(len(located), 100)
+        force_N = 2 * 3.14159265 * p0_Pa * (sigma_mm * 1e-3) ** 2
+        for x_mm, y_mm, found_N in located[-50:]:
+            self.assertAlmostEqual(x_mm, at_mm[0], delta=0.1)
+            self.assertAlmostEqual(y_mm, at_mm[1], delta=0.1)
+            self.assertAlmostEqual(found_N, force_N, delta=0.05 * force_N)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    for name in ("cmake", "build", "fake-device"):
+        parser.add_argument(f"--{name}", required=True)
+    for name in ("node", "image"):
+        parser.add_argument(f"--{name}")
+    _, rest = parser.parse_known_args(namespace=TOOLS)
+    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
