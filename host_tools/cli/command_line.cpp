@@ -65,11 +65,13 @@ std::string problem_of(const CLI::App *failed, const CLI::Error &error) {
 }
 
 Reach reach_from_text(const std::string &text) {
-  static const std::map<std::string, Reach> kinds = {
-      {"auto", Reach::automatic}, {"serial", Reach::serial}, {"usb", Reach::usb}};
+  static const std::map<std::string, Reach> kinds = {{"auto", Reach::automatic},
+                                                     {"socket", Reach::socket},
+                                                     {"serial", Reach::serial},
+                                                     {"usb", Reach::usb}};
   auto kind = kinds.find(text);
   if (kind == kinds.end()) {
-    wrong_value("--transport", text, "auto, serial or usb");
+    wrong_value("--transport", text, "auto, socket, serial or usb");
   }
   return kind->second;
 }
@@ -136,7 +138,8 @@ void with_transport(CLI::App *command, Choice &choice) {
       ->add_option_function<std::string>(
           "--transport",
           [&choice](const std::string &text) { choice.reach = reach_from_text(text); },
-          "serial, usb (libusb, past the system's driver), or auto: serial where there is a port")
+          "socket (of fingertip serve), serial, usb (libusb, past the system's driver), or auto: "
+          "the first of these that there is")
       ->type_name("KIND");
 }
 

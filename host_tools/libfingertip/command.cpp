@@ -1,15 +1,11 @@
 #include "libfingertip/command.hpp"
 
 #include "libfingertip/error.hpp"
+#include "libfingertip/framing.hpp"
 #include "libfingertip/text.hpp"
 
 #include <cmath>
 #include <cstring>
-
-extern "C" {
-#include "common/bytes.h"
-#include "common/crc32.h"
-}
 
 namespace fingertip {
 
@@ -277,25 +273,11 @@ std::vector<std::uint8_t> frame_bytes(const wire_packet &packet) {
 }
 
 std::vector<std::uint8_t> info_frame_of_version(std::uint8_t version) {
-  std::uint8_t packet[WIRE_HEADER_BYTES + WIRE_CRC_BYTES] = {version, WIRE_CMD_INFO};
-  bytes_put_u32(packet + WIRE_HEADER_BYTES, crc32_iso_hdlc(packet, WIRE_HEADER_BYTES));
-  /* COBS: each run up to a zero, or to the end, with its length + 1 before it. */
-  std::vector<std::uint8_t> frame;
-  std::vector<std::uint8_t> run;
-  auto end_run = [&] {
-    frame.push_back(static_cast<std::uint8_t>(run.size() + 1));
-    frame.insert(frame.end(), run.begin(), run.end());
-    run.clear();
-  };
-  for (std::uint8_t byte : packet) {
-    if (byte == 0) {
-      end_run();
-    } else {
-      run.push_back(byte);
-    }
-  }
-  end_run();
-  frame.push_back(0);
+  Bytes packet(WIRE_HEADER_BYTES);
+  packet[0] = version;
+  packet[1] = WIRE_CMD_INFO;
+  Bytes frame;
+  Envelope(std::move(packet)).append_frame(frame);
   return frame;
 }
 

@@ -2,10 +2,12 @@
 
 #include "libfingertip/error.hpp"
 #include "libfingertip/serial_transport.hpp"
+#include "libfingertip/share_socket.hpp"
 #include "libfingertip/usb_transport.hpp"
 
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
 
 namespace fingertip {
 
@@ -27,7 +29,11 @@ bool never() {
   return false;
 }
 
-[[noreturn]] void no_way(const Found &found) {
+[[noreturn]] void no_way(const Found &found, Reach reach) {
+  if (reach == Reach::socket) {
+    throw Error(ErrorCode::not_shared,
+                (found.serial.empty() ? found.port : found.serial) + ": nobody shares it");
+  }
   throw Error(ErrorCode::no_driver, found.serial +
                                         ": has no serial port: its driver cdc_acm is not "
                                         "loaded, or another program uses it by libusb");
@@ -62,26 +68,26 @@ Way only_one(const std::vector<Found> &found, Reach reach, const std::string &ro
   }
   auto way = way_to(found[0], reach);
   if (!way) {
-    no_way(found[0]);
+    no_way(found[0], reach);
   }
   return *way;
 }
 
 Way with_wanted_serial(const Choice &choice, const std::string &root) {
-  auto usb = find_usb(root);
-  if (const Found *found = with_serial(usb, choice.device)) {
+  Finds finds = find_fingertips(root);
+  if (const Found *found = with_serial(finds.here, choice.device)) {
     auto way = way_to(*found, choice.reach);
     if (!way) {
-      no_way(*found);
+      no_way(*found, choice.reach);
     }
     return *way;
   }
   std::string others;
   std::string unasked;
-  for (const Found &found : usb) {
+  for (const Found &found : finds.here) {
     others += " " + found.serial;
   }
-  for (const Found &found : find_in_environment()) {
+  for (const Found &found : finds.in_environment) {
     auto way = way_to(found, choice.reach);
     if (!way) {
       continue;
@@ -103,13 +109,48 @@ Way with_wanted_serial(const Choice &choice, const std::string &root) {
                                                                     : ""));
 }
 
+/* Takes out the one that is shared from there; nothing: none. */
+std::string take_socket(std::vector<Shared> &shared, const std::string &serial,
+                        const std::string &port) {
+  std::error_code none;
+  std::string real_port = port.empty() ? "" : std::filesystem::canonical(port, none).string();
+  auto at = std::find_if(shared.begin(), shared.end(), [&](const Shared &each) {
+    return (!serial.empty() && is_same_serial(each.serial, serial)) ||
+           (!real_port.empty() && each.port == real_port);
+  });
+  if (at == shared.end()) {
+    return "";
+  }
+  std::string socket = at->socket;
+  shared.erase(at);
+  return socket;
+}
+
 } // namespace
 
+Finds find_fingertips(const std::string &root) {
+  std::vector<Shared> shared = find_shared();
+  Finds finds = {find_usb(root), find_in_environment()};
+  for (Found &found : finds.here) {
+    found.socket = take_socket(shared, found.serial, found.port);
+  }
+  for (Found &found : finds.in_environment) {
+    found.socket = take_socket(shared, "", found.port);
+  }
+  for (const Shared &other : shared) {
+    finds.here.push_back({other.serial, "", other.port, {}, other.socket});
+  }
+  return finds;
+}
+
 std::optional<Way> way_to(const Found &found, Reach reach) {
+  if (!found.socket.empty() && (reach == Reach::automatic || reach == Reach::socket)) {
+    return Way{found.serial, found.port, found.usb.has_value(), found.socket};
+  }
   if (found.usb && (reach == Reach::usb || (reach == Reach::automatic && found.port.empty()))) {
     return Way{found.serial, "", true};
   }
-  if (found.port.empty() || reach == Reach::usb) {
+  if (found.port.empty() || reach == Reach::usb || reach == Reach::socket) {
     return std::nullopt;
   }
   return Way{found.serial, found.port, found.usb.has_value()};
@@ -126,7 +167,14 @@ Way choose_way(const Choice &choice, const std::string &root) {
     if (choice.reach == Reach::usb) {
       throw Error(ErrorCode::wrong_choice, "a serial port is not reached by libusb");
     }
-    Way way = {"", stable_port(choice.port, root), false};
+    Found found = {"", "", stable_port(choice.port, root), {}};
+    std::vector<Shared> shared = find_shared();
+    found.socket = take_socket(shared, "", choice.port);
+    auto possible = way_to(found, choice.reach);
+    if (!possible) {
+      no_way(found, choice.reach);
+    }
+    Way way = *possible;
     if (!choice.device.empty()) {
       way.serial = serial_of(ask(way, never, root));
       if (!is_same_serial(way.serial, choice.device)) {
@@ -139,25 +187,26 @@ Way choose_way(const Choice &choice, const std::string &root) {
   if (!choice.device.empty()) {
     return with_wanted_serial(choice, root);
   }
-  auto in_environment = find_in_environment();
-  if (!in_environment.empty() && choice.reach != Reach::usb) {
-    return only_one(in_environment, choice.reach, root, "");
+  Finds finds = find_fingertips(root);
+  if (!finds.in_environment.empty() && choice.reach != Reach::usb) {
+    return only_one(finds.in_environment, choice.reach, root, "");
   }
-  return only_one(find_usb(root), choice.reach, root,
+  return only_one(finds.here, choice.reach, root,
                   choice.reach == Reach::usb ? "no fingertip found by libusb"
                                              : "no fingertip found");
 }
 
 std::vector<Way> all_ways(Reach reach, const std::string &root) {
   std::vector<Way> ways;
-  for (const Found &found : find_usb(root)) {
+  Finds finds = find_fingertips(root);
+  for (const Found &found : finds.here) {
     auto way = way_to(found, reach);
     if (!way) {
-      no_way(found);
+      no_way(found, reach);
     }
     ways.push_back(*way);
   }
-  for (const Found &found : find_in_environment()) {
+  for (const Found &found : finds.in_environment) {
     if (auto way = way_to(found, reach)) {
       way->serial = serial_of(ask(*way, never, root));
       ways.push_back(*way);
@@ -167,6 +216,9 @@ std::vector<Way> all_ways(Reach reach, const std::string &root) {
 }
 
 std::unique_ptr<Transport> open_way(const Way &way, const std::string &root) {
+  if (!way.socket.empty()) {
+    return std::make_unique<SocketTransport>(way.socket);
+  }
   auto find_again = [serial = way.serial, root] {
     auto found = find_usb(root);
     const Found *again = with_serial(found, serial);

@@ -13,7 +13,9 @@
 namespace fingertip {
 
 enum class Reach {
-  automatic, /* by its serial port if it has one, else by libusb */
+  automatic, /* by the socket of whoever shares it, else by its serial port if it has one, else by
+                libusb */
+  socket,
   serial,
   usb,
 };
@@ -26,10 +28,18 @@ struct Choice {
 
 /* A way to one fingertip. */
 struct Way {
-  std::string serial; /* by USB, or as it answered; empty: unknown */
-  std::string port;   /* empty: by libusb */
-  bool found_by_usb;  /* and found so again when it was gone */
+  std::string serial;      /* by USB, or as it answered; empty: unknown */
+  std::string port;        /* empty: by libusb */
+  bool found_by_usb;       /* and found so again when it was gone */
+  std::string socket = ""; /* of whoever shares it; then the rest only tells about it */
 };
+
+/* All there are. */
+struct Finds {
+  std::vector<Found> here;           /* by USB, or shared by somebody who has them otherwise */
+  std::vector<Found> in_environment; /* the paths there */
+};
+Finds find_fingertips(const std::string &root = "/");
 
 /* Throws Error if there is none, several to choose from, or another one than was wanted. A port
  * whose fingertip USB does not tell is asked for its serial number where one is wanted. Without

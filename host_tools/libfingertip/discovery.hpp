@@ -18,6 +18,7 @@ struct Found {
   std::string port;    /* the stable name under /dev/serial/by-id where there is one, else under
                           /dev; empty: no driver serves it as a serial port */
   std::optional<UsbPlace> usb;
+  std::string socket = ""; /* of whoever shares it; find_usb and find_in_environment do not ask */
 };
 
 /* Devices with our USB ids, sorted by serial number. root: where to look for sys/ and dev/, "/" but

@@ -25,6 +25,10 @@ enum class ErrorCode {
   not_a_fingertip,    /* our USB ids, but not our interfaces */
   usb_failed,         /* libusb cannot go on */
   wrong_choice,       /* of fingertip and way, that exclude each other */
+  not_shared,         /* nobody serves it to others */
+  share_denied,       /* somebody does, but not to this user */
+  shared_already,     /* another program serves it */
+  cannot_share,       /* for the system's reason in the text */
 
   /* Conversations. */
   gone,            /* the port vanished */

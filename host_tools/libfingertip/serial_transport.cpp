@@ -154,6 +154,10 @@ bool SerialTransport::reopen() {
   return fd_ >= 0;
 }
 
+std::vector<pollfd> SerialTransport::poll_descriptors() const {
+  return fd_ < 0 ? std::vector<pollfd>() : std::vector<pollfd>{{fd_, POLLIN, 0}};
+}
+
 bool SerialTransport::ask_loader() {
   termios settings;
   if (fd_ < 0 || tcgetattr(fd_, &settings) != 0 || cfsetspeed(&settings, B1200) != 0 ||

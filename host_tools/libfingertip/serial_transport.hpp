@@ -28,6 +28,7 @@ public:
   bool reopen() override;
   bool ask_loader() override;
   std::string description() const override { return path_; }
+  std::vector<pollfd> poll_descriptors() const override;
 
   /* Throws Error if another program has the port. */
   static void check_unused(const std::string &path);

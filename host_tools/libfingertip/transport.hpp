@@ -1,12 +1,14 @@
 /* Where the bytes of a fingertip come from: a serial port or pseudo-terminal
- * (serial_transport.hpp), or libusb (usb_transport.hpp).
+ * (serial_transport.hpp), libusb (usb_transport.hpp), or whoever shares it (share_socket.hpp).
  */
 #pragma once
 
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <poll.h>
 #include <string>
+#include <vector>
 
 namespace fingertip {
 
@@ -34,6 +36,10 @@ public:
   /* Asks for the USB loader without a packet, as any firmware of ours understands it, of whatever
    * protocol version: 1200 baud, then DTR down. False: not possible here. */
   virtual bool ask_loader() { return false; }
+
+  /* For who waits for several: once poll(2) reports one of these, read may have something. To be
+   * asked for anew before each wait, after reading all there was. None while it is gone. */
+  virtual std::vector<pollfd> poll_descriptors() const { return {}; }
 
   /* For people: what this is. */
   virtual std::string description() const = 0;

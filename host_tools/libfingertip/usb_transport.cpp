@@ -148,6 +148,17 @@ public:
 
   bool ask_loader() { return set_baud(LOADER_BAUD) && set_lines(0); }
 
+  /* The transfers have no timeouts that would have to be served in time. */
+  std::vector<pollfd> poll_descriptors() const {
+    std::vector<pollfd> all;
+    const libusb_pollfd **list = libusb_get_pollfds(context_);
+    for (const libusb_pollfd **each = list; each && *each; each++) {
+      all.push_back({(*each)->fd, (*each)->events, 0});
+    }
+    libusb_free_pollfds(list);
+    return all;
+  }
+
 private:
   struct Slot {
     Link *link;
@@ -417,6 +428,10 @@ bool UsbTransport::reopen() {
 
 bool UsbTransport::ask_loader() {
   return link_ && link_->ask_loader();
+}
+
+std::vector<pollfd> UsbTransport::poll_descriptors() const {
+  return link_ ? link_->poll_descriptors() : std::vector<pollfd>();
 }
 
 std::string UsbTransport::description() const {

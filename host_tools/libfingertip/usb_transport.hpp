@@ -28,6 +28,7 @@ public:
   bool reopen() override;
   bool ask_loader() override;
   std::string description() const override;
+  std::vector<pollfd> poll_descriptors() const override;
 
 private:
   class Link;

@@ -40,6 +40,14 @@ std::string advice(ErrorCode code) {
     return "unplug it and plug it in again";
   case ErrorCode::wrong_choice:
     return "choose the fingertip with --device";
+  case ErrorCode::not_shared:
+    return "share it with `fingertip serve`, or leave out --transport socket";
+  case ErrorCode::share_denied:
+    return "join the group, or have it shared with serve --group";
+  case ErrorCode::shared_already:
+    return "use it as if it were your own, or end that one first";
+  case ErrorCode::cannot_share:
+    return "set XDG_RUNTIME_DIR to a folder of your own";
   case ErrorCode::gone:
     return "plug it in and try again";
   case ErrorCode::no_answer:

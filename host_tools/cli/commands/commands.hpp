@@ -10,6 +10,7 @@ void add_info(CommandLine &line);
 void add_monitor(CommandLine &line);
 void add_record(CommandLine &line);
 void add_replay(CommandLine &line);
+void add_serve(CommandLine &line);
 void add_tare(CommandLine &line);
 void add_calibrate(CommandLine &line);
 void add_set(CommandLine &line);

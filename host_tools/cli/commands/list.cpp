@@ -11,9 +11,12 @@ namespace fingertip {
 
 namespace {
 
-/* "serial /dev/ttyACM0, usb 001/005" */
+/* "socket /run/fingertip/E66..2C.sock, serial /dev/ttyACM0, usb 001/005" */
 std::string reached_text(const Found &found) {
-  std::string text = found.port.empty() ? "" : (found.usb ? "serial " : "port ") + found.port;
+  std::string text = found.socket.empty() ? "" : "socket " + found.socket;
+  if (!found.port.empty()) {
+    text += (text.empty() ? "" : ", ") + std::string(found.usb ? "serial " : "port ") + found.port;
+  }
   if (found.usb) {
     char place[32];
     std::snprintf(place, sizeof place, "usb %03u/%03u", found.usb->bus, found.usb->address);
@@ -23,10 +26,9 @@ std::string reached_text(const Found &found) {
 }
 
 int list(Reach reach) {
-  std::vector<Found> all = find_usb();
-  for (const Found &found : find_in_environment()) {
-    all.push_back(found);
-  }
+  Finds finds = find_fingertips();
+  std::vector<Found> all = finds.here;
+  all.insert(all.end(), finds.in_environment.begin(), finds.in_environment.end());
   if (all.empty()) {
     throw Error(ErrorCode::no_fingertip, "no fingertip found");
   }

@@ -1,0 +1,60 @@
+/* Fingertips that `fingertip serve` shares: each is a Unix socket SERIAL.sock, and beside it the
+ * link SERIAL.port to its serial port, if it has one. A connection to the socket is a line to the
+ * fingertip (PROTOCOL.md), which others have at the same time. The socket is there as long as the
+ * fingertip is. Who may connect is the socket's owner and group.
+ *
+ * They are in the folder of whoever serves: $XDG_RUNTIME_DIR/fingertip; without that variable
+ * /run/fingertip for root and /tmp/fingertip-UID for others. All look into /run/fingertip too. */
+#pragma once
+
+#include "libfingertip/transport.hpp"
+
+#include <string>
+#include <vector>
+
+namespace fingertip {
+
+struct Shared {
+  std::string serial; /* as far as it can be the name of a file */
+  std::string socket;
+  std::string port; /* as realpath has it; empty: by libusb */
+};
+
+/* Those that somebody serves now, also if this user may not connect to them. */
+std::vector<Shared> find_shared();
+
+/* Where this user's fingertips are shared, and where everybody's are. */
+std::string own_share_folder();
+inline constexpr const char *COMMON_SHARE_FOLDER = "/run/fingertip";
+
+std::string share_socket_name(const std::string &serial);
+std::string share_port_name(const std::string &serial);
+
+class SocketTransport : public Transport {
+public:
+  /* Throws Error: not shared, not allowed. */
+  explicit SocketTransport(const std::string &path);
+  ~SocketTransport() override;
+  SocketTransport(const SocketTransport &) = delete;
+  SocketTransport &operator=(const SocketTransport &) = delete;
+
+  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
+              std::chrono::milliseconds timeout) override;
+  bool write(const std::uint8_t *bytes, std::size_t length) override;
+  bool reopen() override;
+  /* Who serves it does so for a fingertip that does not speak this version of the protocol. */
+  bool ask_loader() override;
+  std::string description() const override { return path_; }
+  std::vector<pollfd> poll_descriptors() const override;
+
+  /* Whether somebody serves there now. */
+  static bool is_served(const std::string &path);
+
+private:
+  void close();
+
+  std::string path_;
+  int fd_ = -1;
+};
+
+} // namespace fingertip
