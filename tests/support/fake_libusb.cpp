@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <libusb.h>
+#include <poll.h>
 
 namespace fake_libusb {
 
@@ -323,6 +324,17 @@ int LIBUSB_CALL libusb_handle_events_timeout_completed(libusb_context *context, 
     complete(first, LIBUSB_TRANSFER_COMPLETED);
   }
   return 0;
+}
+
+const libusb_pollfd **LIBUSB_CALL libusb_get_pollfds(libusb_context *) {
+  static libusb_pollfd events = {fake_libusb::EVENTS_FD, POLLIN};
+  fake_libusb::balance++;
+  return new const libusb_pollfd *[2] { &events, nullptr };
+}
+
+void LIBUSB_CALL libusb_free_pollfds(const libusb_pollfd **list) {
+  fake_libusb::balance--;
+  delete[] list;
 }
 
 const char *LIBUSB_CALL libusb_error_name(int) {

@@ -30,6 +30,9 @@ struct Device {
   int most_waiting = 0; /* bulk IN transfers at once */
 };
 
+/* What is waited for; nothing is behind it. */
+inline constexpr int EVENTS_FD = 4711;
+
 /* The bus; a context sees what was plugged in when it was made. */
 std::vector<std::shared_ptr<Device>> &bus();
 /* Contexts, handles and transfers that were not given back. */

@@ -179,3 +179,15 @@ TEST_F(Usb, TheLoaderIsAskedForByTheBaudRate) {
   EXPECT_EQ(device.baud, 1200u);
   EXPECT_EQ(device.lines, 0);
 }
+
+TEST_F(Usb, SaysWhatToWaitFor) {
+  auto &device = plug_in("A");
+  UsbTransport transport("A");
+  auto all = transport.poll_descriptors();
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_EQ(all[0].fd, fake_libusb::EVENTS_FD);
+  EXPECT_EQ(all[0].events, POLLIN);
+  device.is_plugged_in = false;
+  read_all(transport, Result::gone);
+  EXPECT_TRUE(transport.poll_descriptors().empty());
+}
