@@ -6,7 +6,7 @@ _fingertip() {
   else
     case $before in
       --device) words=$(fingertip list 2> /dev/null | cut -f 1) ;;
-      --transport) words='auto serial usb' ;;
+      --transport) words='auto socket serial usb' ;;
       --colour) words='auto truecolour 256 plain' ;;
     esac
     if [ -z "$words" ] && [ "${current#-}" != "$current" ]; then

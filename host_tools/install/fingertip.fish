@@ -2,6 +2,6 @@
 complete -c fingertip -n __fish_use_subcommand -f \
   -a "(fingertip --help | sed -n '/^Subcommands:/,\$s/^  \([a-z]*\) .*/\1/p')"
 complete -c fingertip -n 'not __fish_use_subcommand' -l device -x -a "(fingertip list 2> /dev/null | cut -f 1)"
-complete -c fingertip -n 'not __fish_use_subcommand' -l transport -x -a 'auto serial usb'
+complete -c fingertip -n 'not __fish_use_subcommand' -l transport -x -a 'auto socket serial usb'
 complete -c fingertip -n 'not __fish_use_subcommand' -n 'string match -q -- "-*" (commandline -ct)' \
   -a "(fingertip (commandline -opc)[2] --help 2> /dev/null | grep -o -- '--[a-z][a-z-]*')"

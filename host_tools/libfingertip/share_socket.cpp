@@ -45,11 +45,15 @@ int connect_to(const std::string &path, int *error) {
   return fd;
 }
 
-/* Where everybody may make folders this has to be this user's own. */
-bool is_trusted(const std::string &folder) {
+/* Where everybody may make folders. */
+std::string own_folder_in_tmp() {
+  return "/tmp/fingertip-" + std::to_string(geteuid());
+}
+
+bool is_of_this_user(const std::string &folder) {
   struct stat status;
-  return folder.rfind("/tmp/", 0) != 0 || (lstat(folder.c_str(), &status) == 0 &&
-                                           S_ISDIR(status.st_mode) && status.st_uid == geteuid());
+  return lstat(folder.c_str(), &status) == 0 && S_ISDIR(status.st_mode) &&
+         status.st_uid == geteuid();
 }
 
 /* What is in no name of a file becomes '_'. */
@@ -67,7 +71,7 @@ std::string own_share_folder() {
   if (runtime && *runtime) {
     return std::string(runtime) + "/fingertip";
   }
-  return geteuid() == 0 ? COMMON_SHARE_FOLDER : "/tmp/fingertip-" + std::to_string(geteuid());
+  return geteuid() == 0 ? COMMON_SHARE_FOLDER : own_folder_in_tmp();
 }
 
 std::string share_socket_name(const std::string &serial) {
@@ -86,7 +90,7 @@ std::vector<Shared> find_shared() {
   std::vector<Shared> all;
   for (const std::string &folder : folders) {
     std::error_code none;
-    if (!is_trusted(folder)) {
+    if (folder == own_folder_in_tmp() && !is_of_this_user(folder)) {
       continue;
     }
     for (const auto &entry : fs::directory_iterator(folder, none)) {

@@ -26,8 +26,8 @@
  * by 1200 baud version=V        speaks this protocol version, answers nothing else clock_ppm=P its
  * clock is fast by so much, over the whole of its life zero_log=FILE    writes there when its clock
  * was zero, us of CLOCK_MONOTONIC started=S        its clock was started S seconds before
- *
- *     life=S           ends after this time, default 60
+ *     mirror=LINK      the same bytes, a moment before, on a second terminal that hears nothing and
+ * has to be read life=S           ends after this time, default 60
  *
  * Ends by SIGTERM too. */
 #include "libfingertip/command.hpp"
@@ -82,8 +82,17 @@ public:
       read_recording(options_["play"]);
     }
     power_on();
+    if (!options_["mirror"].empty()) {
+      mirror_ = open_terminal(options_["mirror"]);
+    }
   }
-  ~FakeDevice() { power_off(); }
+  ~FakeDevice() {
+    power_off();
+    if (mirror_ >= 0) {
+      unlink(options_["mirror"].c_str());
+      close(mirror_);
+    }
+  }
 
   void run() {
     auto end = Clock::now() + std::chrono::seconds(number("life", 60));
@@ -167,21 +176,26 @@ private:
     send(packet);
   }
 
-  void power_on() {
-    master_ = posix_openpt(O_RDWR | O_NOCTTY);
-    if (master_ < 0 || grantpt(master_) != 0 || unlockpt(master_) != 0) {
+  static int open_terminal(const std::string &link) {
+    int master = posix_openpt(O_RDWR | O_NOCTTY);
+    if (master < 0 || grantpt(master) != 0 || unlockpt(master) != 0) {
       perror("posix_openpt");
       std::exit(1);
     }
     termios settings;
-    tcgetattr(master_, &settings);
+    tcgetattr(master, &settings);
     cfmakeraw(&settings);
-    tcsetattr(master_, TCSANOW, &settings);
-    unlink(link_.c_str());
-    if (symlink(ptsname(master_), link_.c_str()) != 0) {
-      perror(link_.c_str());
+    tcsetattr(master, TCSANOW, &settings);
+    unlink(link.c_str());
+    if (symlink(ptsname(master), link.c_str()) != 0) {
+      perror(link.c_str());
       std::exit(1);
     }
+    return master;
+  }
+
+  void power_on() {
+    master_ = open_terminal(link_);
     wire_receiver_init(&receiver_, wire_commands);
     started_ = Clock::now();
     if (!options_["zero_log"].empty()) {
@@ -231,6 +245,9 @@ private:
     auto bytes = fingertip::frame_bytes(packet);
     if (flip) {
       bytes[bytes.size() / 2] = static_cast<std::uint8_t>(bytes[bytes.size() / 2] ^ 0x80);
+    }
+    if (mirror_ >= 0 && write(mirror_, bytes.data(), bytes.size()) < 0) {
+      return;
     }
     if (number("mute", 0) || write(master_, bytes.data(), bytes.size()) < 0) {
       return;
@@ -356,6 +373,7 @@ private:
       return false;
     case WIRE_CMD_INFO:
       info_.t_us = now_us();
+      info_.body.info.streams = streams_;
       send(info_);
       return false;
     case WIRE_CMD_LOADER:
@@ -377,7 +395,7 @@ private:
 
   std::string link_;
   std::map<std::string, std::string> options_;
-  int master_ = -1;
+  int master_ = -1, mirror_ = -1;
   wire_receiver receiver_;
   wire_packet info_ = test::make_info(0, 0);
   Clock::time_point started_;

@@ -18,7 +18,7 @@ namespace {
 struct ServeOptions {
   Choice choice; /* without the device */
   std::vector<std::string> devices;
-  std::string group;
+  std::optional<gid_t> group;
   bool common = false;
 };
 
@@ -29,10 +29,7 @@ void say(const std::string &line) {
   std::fprintf(stderr, "%s\n", printable(line).c_str());
 }
 
-std::optional<gid_t> group_of(const std::string &name) {
-  if (name.empty()) {
-    return std::nullopt;
-  }
+gid_t group_of(const std::string &name) {
   const group *found = getgrnam(name.c_str());
   if (!found) {
     wrong_value("--group", name, "the name of a group (getent group)");
@@ -70,8 +67,7 @@ private:
 };
 
 int serve(const ServeOptions &options) {
-  Server server(
-      {options.common ? COMMON_SHARE_FOLDER : own_share_folder(), group_of(options.group)}, say);
+  Server server({options.common ? COMMON_SHARE_FOLDER : own_share_folder(), options.group}, say);
   bool all = options.devices.empty() && options.choice.port.empty();
   Watch watch(server, options.choice.reach);
   if (all) {
@@ -115,8 +111,9 @@ void add_serve(CommandLine &line) {
       ->type_name("SERIAL");
   with_port_only(command, options->choice);
   command
-      ->add_option("--group", options->group,
-                   "Who may use them beside this user; default: this user's group")
+      ->add_option_function<std::string>(
+          "--group", [options](const std::string &name) { options->group = group_of(name); },
+          "Who may use them beside this user; default: this user's group")
       ->type_name("NAME");
   command->add_flag("--common", options->common,
                     "Share in /run/fingertip, where all users look, instead of in this user's "

@@ -51,6 +51,7 @@ class CliTest(unittest.TestCase):
         self.ftr = os.path.join(self.folder, "r.ftr")
         self.environment = {k: v for k, v in os.environ.items() if k != "FINGERTIP_PORT" and not k.startswith("LC_")}
         self.environment["LC_ALL"] = "C.UTF-8"
+        self.environment["XDG_RUNTIME_DIR"] = self.folder  # where nobody shares a fingertip
 
     @contextlib.contextmanager
     def device(self, *options, port=None):
@@ -126,7 +127,7 @@ class Usage(CliTest):
         self.assertRegex(self.run_cli("--version")[0], r"^fingertip \d+\.\d+\.\d+\n$")
         commands = re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
         self.assertEqual(sorted(commands), sorted(
-            ["list", "info", "monitor", "record", "replay", "tare", "calibrate", "set", "flash", "rule", "loader", "encode"]))
+            ["list", "info", "monitor", "record", "replay", "tare", "calibrate", "set", "serve", "flash", "rule", "loader", "encode"]))
         for command in commands:
             self.assertIn(f"Usage: fingertip {command}", self.run_cli(command, "--help")[0])
 
@@ -181,7 +182,7 @@ class Usage(CliTest):
                          f"-\t-\t-\tport {self.port} \\(.*no such port; plug .*\\)\n-\t-\t-\tport {self.folder} \\(.*\\)\n")
         self.assertIn("no fingertip 1234 here", self.error("info", "--device", "1234"))
         self.assertIn("choose the fingertip with --device", self.error("info", "--port", self.port, "--transport", "usb"))
-        self.assertIn("give auto, serial or usb", self.error("info", "--transport", "bluetooth", status=2))
+        self.assertIn("give auto, socket, serial or usb", self.error("info", "--transport", "bluetooth", status=2))
 
     def test_ranges_are_found_before_a_port_is_opened(self):
         for setting, allowed in [("rate=0", "0.1 to 2000 Hz, or max"), ("rate=x", "0.1 to 2000 Hz, or max"),
@@ -611,7 +612,7 @@ class Install(CliTest):
         self.assertEqual(sorted(complete("fingertip")("")), sorted(self.commands()))
         self.assertEqual(complete("fingertip")("mon"), ["monitor"])
         self.assertIn("--transport", complete("fingertip", "info")("--"))
-        self.assertEqual(complete("fingertip", "info", "--transport")("s"), ["serial"])
+        self.assertEqual(complete("fingertip", "info", "--transport")("s"), ["socket", "serial"])
         self.environment["FINGERTIP_PORT"] = self.port
         with self.device("serial=AAAA"):
             self.assertEqual(complete("fingertip", "info", "--device")(""), ["AAAA"])

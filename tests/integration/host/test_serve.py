@@ -1,0 +1,323 @@
+"""Several programs on one fingertip, through fingertip serve: usage test_serve.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
+import contextlib
+import grp
+import os
+import re
+import shutil
+import signal
+import stat
+import subprocess
+import sys
+import threading
+import time
+import unittest
+
+from test_cli import FINGERTIP, PATIENCE_s, CliTest, files
+
+SERIAL = "E660583883265A2C"  # of the fake device where none is said
+
+
+def drained(path, kept):
+    """A thread that reads a terminal to its end."""
+    fd = os.open(path, os.O_RDONLY | os.O_NOCTTY)
+
+    def read():
+        with contextlib.suppress(OSError):  # its other end is gone
+            while True:
+                kept.append(os.read(fd, 65536))
+        os.close(fd)
+
+    thread = threading.Thread(target=read)
+    thread.start()
+    return thread
+
+
+class ServeTest(CliTest):
+    def setUp(self):
+        super().setUp()
+        self.environment["FINGERTIP_PORT"] = self.port
+        self.sockets = os.path.join(self.folder, "fingertip")
+        self.log = os.path.join(self.folder, "serve.log")
+
+    def socket(self, serial=SERIAL):
+        return os.path.join(self.sockets, f"{serial}.sock")
+
+    def said(self):
+        with open(self.log, encoding="utf-8") as file:
+            return file.read()
+
+    @contextlib.contextmanager
+    def served(self, *arguments, serials=(SERIAL,)):
+        with open(self.log, "w", encoding="utf-8") as log:
+            process = subprocess.Popen([FINGERTIP, "serve", *arguments], env=self.environment, stdin=subprocess.DEVNULL, stderr=log)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        self.wait_for(lambda: all(f"{serial}: shared as" in self.said() for serial in serials))
+        yield process
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(PATIENCE_s), 0, self.said())
+
+    def finished(self, process, status=0):
+        _, err = process.communicate(timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, status, err)
+        return err
+
+    def rows_but_numbers(self, path):
+        """Of packets: each client has its own."""
+        return [{key: value for key, value in row.items() if key not in ("sequence", "raw_sequence")} for row in self.rows(path)[0]]
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def recording(self, name, *arguments):
+        """A recorder that has rows, and its file."""
+        path = self.path(name)
+        process = self.start("record", path, "--until-gone", *arguments)
+        self.wait_for(lambda: os.path.exists(path) and len(self.rows(path)[0]) > 5)
+        return process, path
+
+
+class Sharing(ServeTest):
+    def test_all_at_once_and_each_recording_is_what_the_line_said(self):
+        mirror, kept = self.path("mirror"), []
+        with self.device("frames=700", "health=50", f"mirror={mirror}"):
+            reader = drained(mirror, kept)
+            with self.served():
+                first, first_csv = self.recording("first.csv", "--raw-bytes", self.ftr)
+                second, second_csv = self.recording("second.csv")
+                monitor = self.start("monitor", "--until-gone")
+                together = [self.start(*command) for command in (
+                    ["tare"], ["set", "osr=256"], ["set", "rate=400"], ["info"], ["list"], ["set", "limit=0.5", "--keep"],
+                    ["info", "--device", SERIAL.lower()], ["set", "slip_threshold=0.25"])]
+                for process in together:
+                    self.finished(process)
+                out = self.run_cli("info")[0]
+                for said in (r"osr +256", r"rate_mHz +400000", r"location_limit_mm +0.5", r"slip_threshold_mm +0.25", f"port +{self.socket()}"):
+                    self.assertRegex(out, rf"(?m)^{said}$")
+                for process in (first, second, monitor):
+                    self.finished(process)
+            reader.join(PATIENCE_s)
+        line = self.path("line.ftr")
+        with open(line, "wb") as file:
+            file.write(b"".join(kept))
+        direct = self.path("direct.csv")
+        self.run_cli("replay", line, "--to-csv", direct)
+        expected = self.rows_but_numbers(direct)
+        self.assertEqual(sorted({int(row["frame"]) for row in expected}), list(range(1, 701)))
+        for path in (first_csv, second_csv):
+            rows, comments = self.rows_but_numbers(path), self.rows(path)[1]
+            begin = int(rows[0]["frame"])
+            self.assertTrue(rows == [row for row in expected if int(row["frame"]) >= begin], path)
+            self.assertRegex(comments[-1], rf"reason=gone frames={len(rows)} .*dropped_packets=0 out_of_order=0 crc_errors=0 format_errors=0")
+            self.assertIn(f" {701 - begin} frames in ", self.run_cli("replay", path, "--speed", "max")[0])
+            self.assertTrue(any(c.startswith(f"# port: {self.socket()}") for c in comments))
+            # its own exchanges alone: before, the streams on, and none of the others' answers
+            self.assertFalse(any("packet: ack" in c and "command=129" in c for c in comments), comments)
+        self.assertEqual(int(self.rows(first_csv)[0][0]["frame"]), 1)
+        # what the client's own line held is the same again
+        again = self.path("again.csv")
+        self.run_cli("replay", self.ftr, "--to-csv", again)
+        self.assertEqual(self.rows(again)[0], self.rows(first_csv)[0])
+
+    def test_two_fingertips_on_one_clock_while_others_look(self):
+        other = self.port + "2"
+        self.environment["FINGERTIP_PORT"] = self.port + ":" + other
+        with self.device("serial=AAAA"), self.device("serial=BBBB", port=other), self.served(serials=("AAAA", "BBBB")):
+            self.assertEqual(self.run_cli("list")[0],
+                             f"AAAA\tpico_mux\t1.20.3\tsocket {self.socket('AAAA')}, port {self.port}\n"
+                             f"BBBB\tpico_mux\t1.20.3\tsocket {self.socket('BBBB')}, port {other}\n")
+            joint = [self.start("record", self.path(name), "--all", "--seconds", "1.5") for name in ("j.csv", "k.csv")]
+            self.assertEqual(self.run_cli("tare", "--device", "BBBB")[0], "tared\n")
+            for process in joint:
+                self.assertIn(" of 2 fingertips, aligned to ", self.finished(process))
+            self.assertIn("choose one with --device", self.error("info"))
+        for name in ("j.csv", "k.csv"):
+            for serial in ("AAAA", "BBBB"):
+                recording = files.read_recording(self.path(name), device=serial)
+                self.assertEqual(recording.end["dropped_packets"], "0")
+                self.assertTrue(((recording["frame"][1:] - recording["frame"][:-1]) == 1).all())
+
+    def test_losses_of_the_line_are_everybodys(self):
+        with self.device("drop=20", "flip=25", "frames=400"), self.served():
+            (one, one_csv), (other, other_csv) = self.recording("one.csv"), self.recording("other.csv")
+            self.finished(one)
+            self.finished(other)
+        for path in (one_csv, other_csv):
+            rows, comments = self.rows(path)
+            begin = int(rows[0]["frame"])
+            dropped = sum(2 for frame in range(begin, 400) if frame % 20 == 0)
+            damaged = sum(1 for frame in range(begin, 400) if frame % 25 == 0 and frame % 20 != 0)
+            self.assertRegex(comments[-1], rf"dropped_packets={dropped + damaged} out_of_order=0 crc_errors={damaged} format_errors=0")
+
+    def test_a_fingertip_that_goes_and_comes_back(self):
+        with self.device("vanish=100,700"), self.served():
+            waiting = self.start("record", self.csv)
+            self.wait_for(lambda: os.path.exists(self.csv) and any("event: back" in c for c in self.rows()[1]))
+            self.assertRegex(self.said(), rf"(?s){SERIAL}: gone.*{SERIAL}: shared as")
+            self.wait_for(lambda: len(self.rows()[0]) >= 220)
+            self.assertRegex(self.run_cli("info")[0], f"(?m)^port +{self.socket()}$")
+            waiting.send_signal(signal.SIGINT)
+            self.finished(waiting)
+        rows, comments = self.rows()
+        frames = [int(row["frame"]) for row in rows]
+        restart = frames.index(1, 1)
+        self.assertEqual(frames[:restart], list(range(1, 101)))
+        self.assertEqual(frames[restart:], list(range(1, len(frames) - restart + 1)))
+        self.assertIn("dropped_packets=0", comments[-1])
+
+    def test_without_it_there_is_no_socket(self):
+        with self.served(serials=()) as server:
+            self.wait_for(lambda: self.said())
+            self.assertIn("no such port", self.said())
+            self.assertEqual(server.wait(PATIENCE_s), 1)
+            server.returncode = 0  # as it should
+        self.environment.pop("FINGERTIP_PORT")
+        with self.served(serials=()):
+            self.wait_for(lambda: "no fingertip here yet; each that is plugged in will be shared" in self.said())
+
+    def test_into_the_loader(self):
+        with self.device("loader=1") as device, self.served():
+            recorder, path = self.recording("r.csv")
+            self.assertIn("RPI-RP2", self.run_cli("loader")[0])
+            self.assertEqual(device.wait(PATIENCE_s), 0)
+            self.finished(recorder)
+            self.wait_for(lambda: not os.path.exists(self.socket()))
+        self.assertIn("reason=gone", self.rows(path)[1][-1])
+
+
+class Clients(ServeTest):
+    def test_a_stopped_client_loses_its_own_packets_counted_and_nobody_elses(self):
+        with self.device("rate=1500"), self.served():
+            (stopped, stopped_csv), (other, other_csv) = self.recording("stopped.csv"), self.recording("other.csv")
+            stopped.send_signal(signal.SIGSTOP)
+            self.wait_for(lambda: "does not read in time and loses packets" in self.said())
+            self.assertEqual(self.run_cli("tare")[0], "tared\n")
+            time.sleep(0.5)
+            stopped.send_signal(signal.SIGCONT)
+            last = self.rows(other_csv)[0][-1]["frame"]
+            self.wait_for(lambda: int(self.rows(stopped_csv)[0][-1]["frame"]) > int(last) + 200)
+            for process in (stopped, other):
+                process.send_signal(signal.SIGINT)
+                self.finished(process)
+            self.wait_for(lambda: " lost " in self.said())
+        lost = int(re.search(rf"{SERIAL}: pid {stopped.pid}, fingertip lost (\d+) packets", self.said())[1])
+        self.assertGreater(lost, 500)
+        self.assertEqual(self.said().count(" lost "), 1)
+        rows, comments = self.rows(other_csv)
+        self.assertIn("dropped_packets=0 out_of_order=0", comments[-1])
+        self.assertEqual([int(row["frame"]) for row in rows], list(range(int(rows[0]["frame"]), int(rows[0]["frame"]) + len(rows))))
+        self.assertIn(f"dropped_packets={lost} out_of_order=0 crc_errors=0 format_errors=0", self.rows(stopped_csv)[1][-1])
+
+    def test_a_client_that_dies_is_nobodys_problem(self):
+        with self.device("frames=300"), self.served():
+            (killed, _), (other, other_csv) = self.recording("killed.csv"), self.recording("other.csv")
+            killed.kill()
+            self.finished(other)
+        self.assertIn("dropped_packets=0", self.rows(other_csv)[1][-1])
+        self.assertEqual(self.rows(other_csv)[0][-1]["frame"], "300")
+
+    def test_a_past_client_is_streamed_nothing(self):
+        with self.device(), self.served() as server:
+            killed, _ = self.recording("killed.csv")
+            killed.kill()
+            killed.communicate()
+            self.wait_for(lambda: re.search(r"(?m)^streams +none$", self.run_cli("info")[0]))
+            ticks = self.cpu_ticks(server)
+            time.sleep(1)
+            self.assertLess(self.cpu_ticks(server) - ticks, 0.1 * os.sysconf("SC_CLK_TCK"), "idle is idle")
+
+    @staticmethod
+    def cpu_ticks(process):
+        with open(f"/proc/{process.pid}/stat", encoding="utf-8") as file:
+            fields = file.read().rsplit(")", 1)[1].split()
+        return int(fields[11]) + int(fields[12])
+
+    def test_noise_from_a_client_harms_nobody(self):
+        import socket
+        with self.device("frames=300"), self.served():
+            recorder, path = self.recording("r.csv")
+            with socket.socket(socket.AF_UNIX) as noisy:
+                noisy.connect(self.socket())
+                noisy.sendall(os.urandom(50000) + b"\0" + b"\x55" * 50000)
+            self.run_cli("info")
+            self.finished(recorder)
+        self.assertIn("dropped_packets=0", self.rows(path)[1][-1])
+
+
+class Server(ServeTest):
+    def test_the_end_of_it(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            with self.device(), self.served() as server:
+                recorder, path = self.recording(f"{number}.csv")
+                server.send_signal(number)
+                self.assertEqual(server.wait(PATIENCE_s), 0)
+                self.assertEqual(os.listdir(self.sockets), [])
+                self.finished(recorder)
+                self.assertRegex(self.run_cli("info")[0], f"(?m)^port +{self.port}$")
+            self.assertRegex(self.rows(path)[1][-1], "reason=gone .*dropped_packets=0")
+
+    def test_a_second_one_is_refused(self):
+        with self.device(), self.served():
+            self.assertEqual(self.error("serve"), f"fingertip: {self.socket()}: another program shares this fingertip; "
+                                                  "use it as if it were your own, or end that one first\n")
+            self.run_cli("info")
+
+    def test_what_a_killed_one_leaves_is_replaced(self):
+        with self.device():
+            with self.served() as server:
+                server.kill()
+                server.wait()
+                server.returncode = 0
+            self.assertTrue(os.path.exists(self.socket()))
+            self.assertRegex(self.run_cli("info")[0], f"(?m)^port +{self.port}$")
+            self.assertNotIn("socket", self.run_cli("list")[0])
+            with self.served():
+                self.assertRegex(self.run_cli("info")[0], f"(?m)^port +{self.socket()}$")
+            self.assertFalse(os.path.exists(self.socket()))
+
+    def test_past_it_and_only_by_it(self):
+        with self.device():
+            self.assertIn("nobody shares it; share it with `fingertip serve`", self.error("info", "--transport", "socket"))
+            with self.served():
+                self.assertIn("in use by another program", self.error("info", "--transport", "serial"))
+                self.run_cli("info", "--transport", "socket")
+                self.run_cli("info", "--port", os.path.realpath(self.port), "--transport", "socket")
+
+    def test_who_may(self):
+        with self.device(), self.served():
+            self.assertEqual(stat.S_IMODE(os.stat(self.sockets).st_mode), 0o750)
+            self.assertEqual(stat.S_IMODE(os.stat(self.socket()).st_mode), 0o660)
+
+    def as_nobody(self, *arguments, group):
+        os.chmod(self.folder, 0o755)
+        tool = self.path("tool")
+        shutil.copy(FINGERTIP, tool)
+        return subprocess.run([tool, *arguments], capture_output=True, text=True, env=self.environment, timeout=PATIENCE_s, user=65534,
+                              group=group, extra_groups=[])
+
+    @unittest.skipUnless(os.geteuid() == 0, "only root changes groups and users")
+    def test_the_group_may_and_others_may_not(self):
+        group = grp.getgrnam("dialout")
+        with self.device(), self.served("--group", group.gr_name):
+            self.assertEqual((os.stat(self.sockets).st_gid, os.stat(self.socket()).st_gid), (group.gr_gid, group.gr_gid))
+            allowed = self.as_nobody("info", group=group.gr_gid)
+            self.assertEqual((allowed.returncode, allowed.stderr), (0, ""))
+            denied = self.as_nobody("info", group=65534)
+            self.assertEqual((denied.returncode, denied.stdout), (1, ""))
+            os.chmod(self.sockets, 0o755)
+            denied = self.as_nobody("info", group=65534)
+            self.assertEqual(denied.stderr, f"fingertip: {self.socket()}: permission denied: it is its owner's and group's; "
+                                            "join the group, or have it shared with serve --group\n")
+
+    def test_wrong_places_and_names(self):
+        self.assertIn('--group "no such" is not possible; give the name of a group', self.error("serve", "--group", "no such", status=2))
+        os.symlink("/tmp", self.sockets)
+        self.assertIn("is no folder of this user", self.error("serve"))
+        os.unlink(self.sockets)
+        self.environment["XDG_RUNTIME_DIR"] = self.path("none")
+        self.assertIn("cannot share there (No such file or directory); set XDG_RUNTIME_DIR", self.error("serve"))
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
