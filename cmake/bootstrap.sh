@@ -118,6 +118,8 @@ case $1 in
     say "how far from the truth: gains, shapes, time, and what is kept"
     /usr/bin/python3 host_tools/report/truth/truth.py --build build/host --boards build -o build/report \
       --picture host_tools/report/truth/truth.png
+    say "many programs on one fingertip"
+    /usr/bin/python3 host_tools/report/tools/tools.py --build build/host -o build/report
     say "every table and picture: $root/build/report/index.html"
     ;;
 esac

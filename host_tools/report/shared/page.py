@@ -63,6 +63,9 @@ PARTS = (
          f"{REPORT}/truth/truth.py --build build/host --boards build -o build/report", SIMULATED,
          (("real_*", RECORDED), ("strips", RECORDED), ("locations", RECORDED), ("flash*", EMULATED), ("*_cycles", EMULATED), ("seed", SAID), ("pads", SAID)),
          pictures=(("truth.png", "Coverage, warnings, placements, iterations: simulated"),)),
+    Part("tools", "The tools", "What the tools do to those who use them, with simulated fingertips on pseudo-terminals of this computer.",
+         f"{REPORT}/tools/tools.py --build build/host -o build/report", SIMULATED,
+         (("*_us", CLOCK), ("*_fps", CLOCK), ("*_percent", CLOCK), ("*_seconds", SAID), ("*_clients", SAID), ("*_fingertips", SAID))),
     Part("usb", "USB and clocks", "The image's USB device before a Debian kernel in a virtual machine, and two fingertips on one clock.",
          "sh cmake/bootstrap.sh test", EMULATED, (("alignment_fake_*", SIMULATED), ("*_test_s", CLOCK), ("*_seconds", SAID))),
 )
