@@ -56,8 +56,8 @@ class Processes(contextlib.ExitStack):
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-        if process.stdout:
-            process.stdout.close()
+        for pipe in filter(None, (process.stdin, process.stdout)):
+            pipe.close()
 
 
 def wait_for(condition, what):
@@ -97,7 +97,7 @@ def measure(build, seconds, steps):
             processes.start(fake, port, f"serial={serial}", f"rate={RATE_Hz}", f"life={seconds + 2 * PATIENCE_s:.0f}", *more)
         wait_for(lambda: mirror.is_symlink() and all(port.is_symlink() for port in ports), "simulated fingertips")
         direct_file = folder / "direct"
-        direct = processes.start(client, mirror, last_frame, direct_file, stdout=subprocess.PIPE, text=True)
+        direct = processes.start(client, mirror, last_frame, direct_file, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         log = folder / "serve.log"
         with open(log, "w", encoding="utf-8") as file:
             server = processes.start(fingertip, "serve", env=environment, stderr=file)
