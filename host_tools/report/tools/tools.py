@@ -145,7 +145,8 @@ def added(direct, through):
 def text(found):
     return "\n".join(["# The tools", "", "## Many programs on one fingertip", "", __doc__.split("\n\n")[-1].strip(), "", *goal_table_md(found), "",
                       f"The server took {found['serve_cpu_percent']:.0f} % of a core for {found['serve_packets']} packets in {found['serve_seconds']:g} s. "
-                      f"One frame in a hundred came {found['serve_added_p99_us']:.0f} us or more later than directly: it waited for a processor. "
+                      f"One frame in a hundred came {found['serve_added_p99_us']:.0f} us or more later than directly, "
+                      "which depends on what else the computer does. "
                       f"The stopped client lost {found['serve_lost_by_stopped']} packets of its own.", ""])
 
 
