@@ -14,7 +14,9 @@
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <poll.h>
 #include <string>
+#include <unistd.h>
 #include <vector>
 
 using namespace fingertip;
@@ -58,6 +60,11 @@ struct Got {
   }
 };
 
+bool is_over() {
+  pollfd waiting = {STDIN_FILENO, POLLIN, 0};
+  return poll(&waiting, 1, 0) > 0;
+}
+
 } // namespace
 
 int main(int argc, char **argv) {
@@ -89,11 +96,11 @@ int main(int argc, char **argv) {
       }
       auto wait = milliseconds((TICK_us - now_us % TICK_us) / 1000 + 1);
       auto result = session.poll(wait);
-      gone = result == Transport::Result::gone || now_us - heard_us > SILENCE_us;
+      gone = result == Transport::Result::gone || (!listens && now_us - heard_us > SILENCE_us);
       heard_us = result == Transport::Result::data ? now_us : heard_us;
     }
     std::int64_t until_us = steady_now_us() + LAST_ANSWERS_us;
-    while (!gone && got.acks < sent && steady_now_us() < until_us) {
+    while (!gone && (listens ? !is_over() : got.acks < sent && steady_now_us() < until_us)) {
       gone = session.poll(milliseconds(50)) == Transport::Result::gone;
     }
     std::ofstream arrivals(argv[3]);

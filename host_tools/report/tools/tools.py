@@ -56,8 +56,8 @@ class Processes(contextlib.ExitStack):
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-        if process.stdout:
-            process.stdout.close()
+        for pipe in filter(None, (process.stdin, process.stdout)):
+            pipe.close()
 
 
 def wait_for(condition, what):
@@ -97,7 +97,7 @@ def measure(build, seconds, steps):
             processes.start(fake, port, f"serial={serial}", f"rate={RATE_Hz}", f"life={seconds + 2 * PATIENCE_s:.0f}", *more)
         wait_for(lambda: mirror.is_symlink() and all(port.is_symlink() for port in ports), "simulated fingertips")
         direct_file = folder / "direct"
-        direct = processes.start(client, mirror, last_frame, direct_file, stdout=subprocess.PIPE, text=True)
+        direct = processes.start(client, mirror, last_frame, direct_file, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         log = folder / "serve.log"
         with open(log, "w", encoding="utf-8") as file:
             server = processes.start(fingertip, "serve", env=environment, stderr=file)
@@ -145,7 +145,8 @@ def added(direct, through):
 def text(found):
     return "\n".join(["# The tools", "", "## Many programs on one fingertip", "", __doc__.split("\n\n")[-1].strip(), "", *goal_table_md(found), "",
                       f"The server took {found['serve_cpu_percent']:.0f} % of a core for {found['serve_packets']} packets in {found['serve_seconds']:g} s. "
-                      f"One frame in a hundred came {found['serve_added_p99_us']:.0f} us or more later than directly: it waited for a processor. "
+                      f"One frame in a hundred came {found['serve_added_p99_us']:.0f} us or more later than directly, "
+                      "which depends on what else the computer does. "
                       f"The stopped client lost {found['serve_lost_by_stopped']} packets of its own.", ""])
 
 

@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import signal
+import socket
 import stat
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import threading
 import time
 import unittest
 
+import test_cli
 from test_cli import FINGERTIP, PATIENCE_s, CliTest, files
 
 SERIAL = "E660583883265A2C"  # of the fake device where none is said
@@ -39,7 +41,7 @@ class ServeTest(CliTest):
         self.sockets = os.path.join(self.folder, "fingertip")
         self.log = os.path.join(self.folder, "serve.log")
 
-    def socket(self, serial=SERIAL):
+    def socket_of(self, serial=SERIAL):
         return os.path.join(self.sockets, f"{serial}.sock")
 
     def said(self):
@@ -93,7 +95,7 @@ class Sharing(ServeTest):
                 for process in together:
                     self.finished(process)
                 out = self.run_cli("info")[0]
-                for said in (r"osr +256", r"rate_mHz +400000", r"location_limit_mm +0.5", r"slip_threshold_mm +0.25", f"port +{self.socket()}"):
+                for said in (r"osr +256", r"rate_mHz +400000", r"location_limit_mm +0.5", r"slip_threshold_mm +0.25", f"port +{self.socket_of()}"):
                     self.assertRegex(out, rf"(?m)^{said}$")
                 for process in (first, second, monitor):
                     self.finished(process)
@@ -111,7 +113,7 @@ class Sharing(ServeTest):
             self.assertTrue(rows == [row for row in expected if int(row["frame"]) >= begin], path)
             self.assertRegex(comments[-1], rf"reason=gone frames={len(rows)} .*dropped_packets=0 out_of_order=0 crc_errors=0 format_errors=0")
             self.assertIn(f" {701 - begin} frames in ", self.run_cli("replay", path, "--speed", "max")[0])
-            self.assertTrue(any(c.startswith(f"# port: {self.socket()}") for c in comments))
+            self.assertTrue(any(c.startswith(f"# port: {self.socket_of()}") for c in comments))
             # its own exchanges alone: before, the streams on, and none of the others' answers
             self.assertFalse(any("packet: ack" in c and "command=129" in c for c in comments), comments)
         self.assertEqual(int(self.rows(first_csv)[0][0]["frame"]), 1)
@@ -125,8 +127,8 @@ class Sharing(ServeTest):
         self.environment["FINGERTIP_PORT"] = self.port + ":" + other
         with self.device("serial=AAAA"), self.device("serial=BBBB", port=other), self.served(serials=("AAAA", "BBBB")):
             self.assertEqual(self.run_cli("list")[0],
-                             f"AAAA\tpico_mux\t1.20.3\tsocket {self.socket('AAAA')}, port {self.port}\n"
-                             f"BBBB\tpico_mux\t1.20.3\tsocket {self.socket('BBBB')}, port {other}\n")
+                             f"AAAA\tpico_mux\t1.20.3\tsocket {self.socket_of('AAAA')}, port {self.port}\n"
+                             f"BBBB\tpico_mux\t1.20.3\tsocket {self.socket_of('BBBB')}, port {other}\n")
             joint = [self.start("record", self.path(name), "--all", "--seconds", "1.5") for name in ("j.csv", "k.csv")]
             self.assertEqual(self.run_cli("tare", "--device", "BBBB")[0], "tared\n")
             for process in joint:
@@ -156,7 +158,7 @@ class Sharing(ServeTest):
             self.wait_for(lambda: os.path.exists(self.csv) and any("event: back" in c for c in self.rows()[1]))
             self.assertRegex(self.said(), rf"(?s){SERIAL}: gone.*{SERIAL}: shared as")
             self.wait_for(lambda: len(self.rows()[0]) >= 220)
-            self.assertRegex(self.run_cli("info")[0], f"(?m)^port +{self.socket()}$")
+            self.assertRegex(self.run_cli("info")[0], f"(?m)^port +{self.socket_of()}$")
             waiting.send_signal(signal.SIGINT)
             self.finished(waiting)
         rows, comments = self.rows()
@@ -182,8 +184,30 @@ class Sharing(ServeTest):
             self.assertIn("RPI-RP2", self.run_cli("loader")[0])
             self.assertEqual(device.wait(PATIENCE_s), 0)
             self.finished(recorder)
-            self.wait_for(lambda: not os.path.exists(self.socket()))
+            self.wait_for(lambda: not os.path.exists(self.socket_of()))
         self.assertIn("reason=gone", self.rows(path)[1][-1])
+
+
+class Flash(ServeTest):
+    uf2, make_volume = test_cli.Flash.uf2, test_cli.Flash.make_volume
+
+    def test_new_firmware_while_others_wait(self):
+        image, self.volume = self.uf2(), self.path("RPI-RP2")
+        with self.device("loader=1") as device, self.served():
+            recorder = self.start("record", self.csv)
+            self.wait_for(lambda: os.path.exists(self.csv))
+            flash = self.start("flash", image, "--volume", self.volume)
+            self.assertEqual(device.wait(PATIENCE_s), 0)
+            self.make_volume()
+            written = os.path.join(self.volume, "fingertip.uf2")
+            self.wait_for(lambda: os.path.exists(written) and os.path.getsize(written) == os.path.getsize(image))
+            os.unlink(os.path.join(self.volume, "INFO_UF2.TXT"))
+            with self.device("board=pico_mux", "git=abcdef012345", "firmware=9.8.7"):
+                out, err = flash.communicate(timeout=PATIENCE_s)
+                self.assertEqual(out, f"fingertip {SERIAL}: firmware 9.8.7 abcdef012345, board pico_mux\n", err)
+                self.wait_for(lambda: any("event: back" in comment for comment in self.rows()[1]))
+                recorder.send_signal(signal.SIGINT)
+                self.finished(recorder)
 
 
 class Clients(ServeTest):
@@ -234,11 +258,10 @@ class Clients(ServeTest):
         return int(fields[11]) + int(fields[12])
 
     def test_noise_from_a_client_harms_nobody(self):
-        import socket
         with self.device("frames=300"), self.served():
             recorder, path = self.recording("r.csv")
             with socket.socket(socket.AF_UNIX) as noisy:
-                noisy.connect(self.socket())
+                noisy.connect(self.socket_of())
                 noisy.sendall(os.urandom(50000) + b"\0" + b"\x55" * 50000)
             self.run_cli("info")
             self.finished(recorder)
@@ -259,7 +282,7 @@ class Server(ServeTest):
 
     def test_a_second_one_is_refused(self):
         with self.device(), self.served():
-            self.assertEqual(self.error("serve"), f"fingertip: {self.socket()}: another program shares this fingertip; "
+            self.assertEqual(self.error("serve"), f"fingertip: {self.socket_of()}: another program shares this fingertip; "
                                                   "use it as if it were your own, or end that one first\n")
             self.run_cli("info")
 
@@ -269,12 +292,12 @@ class Server(ServeTest):
                 server.kill()
                 server.wait()
                 server.returncode = 0
-            self.assertTrue(os.path.exists(self.socket()))
+            self.assertTrue(os.path.exists(self.socket_of()))
             self.assertRegex(self.run_cli("info")[0], f"(?m)^port +{self.port}$")
             self.assertNotIn("socket", self.run_cli("list")[0])
             with self.served():
-                self.assertRegex(self.run_cli("info")[0], f"(?m)^port +{self.socket()}$")
-            self.assertFalse(os.path.exists(self.socket()))
+                self.assertRegex(self.run_cli("info")[0], f"(?m)^port +{self.socket_of()}$")
+            self.assertFalse(os.path.exists(self.socket_of()))
 
     def test_past_it_and_only_by_it(self):
         with self.device():
@@ -287,7 +310,7 @@ class Server(ServeTest):
     def test_who_may(self):
         with self.device(), self.served():
             self.assertEqual(stat.S_IMODE(os.stat(self.sockets).st_mode), 0o750)
-            self.assertEqual(stat.S_IMODE(os.stat(self.socket()).st_mode), 0o660)
+            self.assertEqual(stat.S_IMODE(os.stat(self.socket_of()).st_mode), 0o660)
 
     def as_nobody(self, *arguments, group):
         os.chmod(self.folder, 0o755)
@@ -300,14 +323,14 @@ class Server(ServeTest):
     def test_the_group_may_and_others_may_not(self):
         group = grp.getgrnam("dialout")
         with self.device(), self.served("--group", group.gr_name):
-            self.assertEqual((os.stat(self.sockets).st_gid, os.stat(self.socket()).st_gid), (group.gr_gid, group.gr_gid))
+            self.assertEqual((os.stat(self.sockets).st_gid, os.stat(self.socket_of()).st_gid), (group.gr_gid, group.gr_gid))
             allowed = self.as_nobody("info", group=group.gr_gid)
             self.assertEqual((allowed.returncode, allowed.stderr), (0, ""))
             denied = self.as_nobody("info", group=65534)
             self.assertEqual((denied.returncode, denied.stdout), (1, ""))
             os.chmod(self.sockets, 0o755)
             denied = self.as_nobody("info", group=65534)
-            self.assertEqual(denied.stderr, f"fingertip: {self.socket()}: permission denied: it is its owner's and group's; "
+            self.assertEqual(denied.stderr, f"fingertip: {self.socket_of()}: permission denied: it is its owner's and group's; "
                                             "join the group, or have it shared with serve --group\n")
 
     def test_wrong_places_and_names(self):
