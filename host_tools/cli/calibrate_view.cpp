@@ -130,19 +130,17 @@ Canvas draw(const CalibrateStatus &status, int columns, int rows) {
 
 class ScreenCalibrateView : public CalibrateView {
 public:
-  explicit ScreenCalibrateView(ColourDepth depth) : depth_(depth) {}
+  explicit ScreenCalibrateView(ColourDepth depth) : screen_(depth) {}
   void update(const CalibrateStatus &status, bool news) override {
     const auto now = Clock::now();
     if (news || now >= next_) {
       next_ = now + REDRAW;
-      screen_.draw(draw(status, screen_.columns(), screen_.rows()).ansi(depth_, characters_));
+      screen_.draw(draw(status, screen_.columns(), screen_.rows()));
     }
   }
-  std::optional<char> key() override { return screen_.key(); }
+  std::optional<Key> key() override { return screen_.key(); }
 
 private:
-  ColourDepth depth_;
-  Characters characters_ = screen_characters();
   Screen screen_;
   Clock::time_point next_{};
 };

@@ -30,7 +30,7 @@ public:
   virtual ~CalibrateView() = default;
   /* Called often. news: a placement was taken or taken back. */
   virtual void update(const CalibrateStatus &status, bool news) = 0;
-  virtual std::optional<char> key() { return std::nullopt; }
+  virtual std::optional<Key> key() { return std::nullopt; }
 };
 
 /* The pad on a terminal, elsewhere a line for each placement. */

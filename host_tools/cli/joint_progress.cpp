@@ -1,6 +1,5 @@
 #include "cli/joint_progress.hpp"
 
-#include "cli/monitor.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/text.hpp"
 #include "tool/advice.hpp"

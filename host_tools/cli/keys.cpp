@@ -28,7 +28,7 @@ void KeyParser::feed(const char *bytes, std::size_t length, KeyTime now) {
       if (byte == ESCAPE) {
         state_ = State::escape;
       } else if (!pasting_) {
-        keys_.push_back(byte);
+        keys_.push_back(static_cast<unsigned char>(byte));
       }
       break;
     case State::escape:
@@ -46,10 +46,13 @@ void KeyParser::feed(const char *bytes, std::size_t length, KeyTime now) {
       }
       if (byte == '~' && (parameters_ == "200" || parameters_ == "201")) {
         pasting_ = parameters_ == "200";
+      } else {
+        take_special(byte);
       }
       state_ = State::plain;
       break;
     case State::single:
+      take_special(byte);
       state_ = State::plain;
       break;
     case State::text: /* up to BEL or ESC \ */
@@ -62,11 +65,29 @@ void KeyParser::feed(const char *bytes, std::size_t length, KeyTime now) {
   }
 }
 
-std::optional<char> KeyParser::next() {
+/* As xterm, the Linux console and rxvt send them. */
+void KeyParser::take_special(char final_byte) {
+  struct Special {
+    const char *parameters;
+    char final_byte;
+    Key key;
+  };
+  constexpr Special specials[] = {{"", 'A', KEY_UP},    {"", 'B', KEY_DOWN},  {"", 'C', KEY_RIGHT},
+                                  {"", 'D', KEY_LEFT},  {"", 'H', KEY_HOME},  {"", 'F', KEY_END},
+                                  {"1", '~', KEY_HOME}, {"7", '~', KEY_HOME}, {"4", '~', KEY_END},
+                                  {"8", '~', KEY_END}};
+  for (const Special &special : specials) {
+    if (!pasting_ && final_byte == special.final_byte && parameters_ == special.parameters) {
+      keys_.push_back(special.key);
+    }
+  }
+}
+
+std::optional<Key> KeyParser::next() {
   if (keys_.empty()) {
     return std::nullopt;
   }
-  char key = keys_.front();
+  Key key = keys_.front();
   keys_.pop_front();
   return key;
 }
@@ -76,7 +97,7 @@ void Confirmation::ask(KeyTime now) {
   since_ = now;
 }
 
-bool Confirmation::answer(char key, KeyTime now) {
+bool Confirmation::answer(Key key, KeyTime now) {
   bool in_time = now - since_ >= READING && now - since_ <= PATIENCE;
   bool yes = asked_ && in_time && (key == 'y' || key == 'Y');
   asked_ = false;

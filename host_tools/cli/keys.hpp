@@ -11,21 +11,27 @@ namespace fingertip {
 
 using KeyTime = std::chrono::steady_clock::time_point;
 
-/* Plain keys out of the bytes of a terminal: its answers, arrow and other special keys, and pasted
- * text where the terminal marks it (bracketed paste) are no keys. */
+/* A character, or one of these. */
+using Key = int;
+enum : Key { KEY_LEFT = 256, KEY_RIGHT, KEY_UP, KEY_DOWN, KEY_HOME, KEY_END };
+
+/* Keys out of the bytes of a terminal: its answers, other special keys, and pasted text where the
+ * terminal marks it (bracketed paste) are none. */
 class KeyParser {
 public:
   void feed(const char *bytes, std::size_t length, KeyTime now);
-  std::optional<char> next();
+  std::optional<Key> next();
 
 private:
+  void take_special(char final_byte);
+
   enum class State { plain, escape, control, single, text, text_escape };
 
   State state_ = State::plain;
   KeyTime last_{};
   std::string parameters_; /* of a control sequence */
   bool pasting_ = false;
-  std::deque<char> keys_;
+  std::deque<Key> keys_;
 };
 
 /* A question before something that cannot be taken back. Text that is pasted does not answer it,
@@ -35,7 +41,7 @@ public:
   void ask(KeyTime now);
   bool is_asked() const { return asked_; }
   /* Every key while it is asked: true for y. Any other, or y too early, withdraws the question. */
-  bool answer(char key, KeyTime now);
+  bool answer(Key key, KeyTime now);
   /* Withdraws it where nobody answers. */
   void expire(KeyTime now);
 

@@ -35,7 +35,7 @@ class Live {
 public:
   Live(const LiveOptions &options, const std::vector<Way> &ways)
       : options_(options), models_(ways.size()), ready_(ways.size()), early_(ways.size()),
-        told_missing_(ways.size()) {
+        taring_(ways.size()), accepted_(ways.size()), told_missing_(ways.size()) {
     DeviceLoop::Options wanted;
     wanted.streams = WIRE_STREAM_ALL;
     wanted.follow_clock = several();
@@ -49,7 +49,7 @@ public:
     if (!options.recording.empty() && !to_standard_output_) {
       note_ = "recording to " + printable(options.recording);
     }
-    if (!several()) {
+    if (options.monitor || !several()) {
       view_ = options.monitor       ? make_monitor_view(options.colour)
               : to_standard_output_ ? make_state_view()
                                     : make_progress_view();
@@ -116,7 +116,7 @@ private:
       if (news.packet.type == WIRE_HEALTH) {
         tell_missing(news.device);
       }
-      take_answer(news.packet);
+      take_answer(news.device, news.packet);
       if (keeper_) {
         keeper_->packet(news);
       } else if (ready_[news.device]) {
@@ -188,7 +188,7 @@ private:
       models_[i].set_state(Model::State::live);
       loops_[i]->start();
     }
-    if (several() && keeper_) {
+    if (several() && keeper_ && !view_) {
       progress_ = std::make_unique<JointProgress>();
     }
   }
@@ -237,10 +237,11 @@ private:
     if (!view_) {
       return;
     }
-    view_->update(models_[0], note());
+    view_->update(models_, caption());
     auto now = std::chrono::steady_clock::now();
     while (auto key = view_->key()) {
       take_key(*key, now);
+      view_->hurry();
     }
     tare_.expire(now);
     if (now > said_until_) {
@@ -248,17 +249,22 @@ private:
     }
   }
 
-  void take_key(char key, KeyTime now) {
+  void take_key(Key key, KeyTime now) {
     if (tare_.is_asked()) {
       if (tare_.answer(key, now)) {
-        loops_[0]->send(command_tare());
+        taring_.assign(loops_.size(), true);
+        for (const auto &loop : loops_) {
+          loop->send(command_tare());
+        }
         say("taring");
       } else {
         say("not tared");
       }
     } else if (key == 'q') {
       quit_ = true;
-    } else if (key == 't' && models_[0].state() == Model::State::live) {
+    } else if (key == 't' && std::all_of(models_.begin(), models_.end(), [](const Model &model) {
+                 return model.state() == Model::State::live;
+               })) {
       tare_.ask(now);
     }
   }
@@ -268,29 +274,52 @@ private:
     said_until_ = std::chrono::steady_clock::now() + SAID_FOR;
   }
 
-  /* What the fingertip answered to a key: done is a tare once frames say so. */
-  void take_answer(const wire_packet &packet) {
+  /* What the fingertips answered to a key: done is a tare once frames of all say so. */
+  void take_answer(std::size_t device, const wire_packet &packet) {
     if (packet.type == WIRE_ACK && packet.body.ack.command == WIRE_CMD_TARE) {
-      taring_ = packet.body.ack.result == WIRE_RESULT_DONE;
-      if (!taring_) {
-        say("not tared: " + result_text(packet.body.ack.result));
+      accepted_[device] = packet.body.ack.result == WIRE_RESULT_DONE;
+      if (!accepted_[device]) {
+        taring_[device] = false;
+        say((is_refused() ? said_ + "; " : "") + name_of(device) +
+            "not tared: " + result_text(packet.body.ack.result));
       }
-    } else if (taring_ && (packet.type == WIRE_RAW || packet.type == WIRE_CONTACT)) {
+    } else if (accepted_[device] && (packet.type == WIRE_RAW || packet.type == WIRE_CONTACT)) {
       std::uint32_t flags =
           packet.type == WIRE_RAW ? packet.body.raw.flags : packet.body.contact.flags;
       if (flags & CONTACT_FLAG_TARED) {
-        taring_ = false;
-        say("tared");
+        accepted_[device] = taring_[device] = false;
+        if (!is_refused() &&
+            std::none_of(taring_.begin(), taring_.end(), [](bool each) { return each; })) {
+          say("tared");
+        }
       }
     }
   }
 
-  /* What a person must see first, first: at 80 columns there is room for some thirty. */
-  std::string note() const {
-    std::string text =
-        tare_.is_asked() ? "tare, pad free? y/n  " : said_ + (said_.empty() ? "" : "  ");
-    std::uint32_t missing = models_[0].missing_sensors();
-    return text + (missing ? "sensors missing: " + sensors_text(missing) + "  " : "") + note_;
+  bool is_refused() const { return said_.find("not tared: ") != std::string::npos; }
+
+  /* Which of several. */
+  std::string name_of(std::size_t device) const {
+    const Model &model = models_[device];
+    return !several() || !model.info() ? "" : text_field(model.info()->serial) + ": ";
+  }
+
+  Caption caption() const {
+    Caption caption;
+    caption.keys = "q quit  t tare";
+    if (tare_.is_asked()) {
+      caption.question = several() ? "tare all, pads free? y/n" : "tare, pad free? y/n";
+    }
+    auto add = [&](const std::string &text) {
+      caption.note += (caption.note.empty() || text.empty() ? "" : "  ") + text;
+    };
+    add(said_);
+    for (std::size_t i = 0; i < models_.size(); i++) {
+      std::uint32_t missing = models_[i].missing_sensors();
+      add(missing ? name_of(i) + "sensors missing: " + sensors_text(missing) : "");
+    }
+    add(note_);
+    return caption;
   }
 
   /* For programs and log files: once, and when it changes. */
@@ -324,6 +353,12 @@ private:
                    summary_text(models_[0]).c_str());
       return;
     }
+    if (!keeper_) {
+      for (std::size_t i = 0; i < models_.size(); i++) {
+        std::printf("%s%s\n", name_of(i).c_str(), summary_text(models_[i]).c_str());
+      }
+      return;
+    }
     std::uint64_t frames = 0;
     for (std::size_t i = 0; i < models_.size(); i++) {
       frames += keeper_->frames(i);
@@ -351,7 +386,7 @@ private:
   std::string said_;
   KeyTime said_until_{};
   Confirmation tare_;
-  bool taring_ = false; /* accepted, and under way */
+  std::vector<bool> taring_, accepted_; /* asked for, and not refused; under way */
   std::vector<std::uint32_t> told_missing_;
   std::string reason_;
   std::int64_t zero_us_ = 0;
@@ -377,6 +412,9 @@ void check_outputs(const LiveOptions &options) {
 }
 
 int run_live(const LiveOptions &options, const std::vector<Way> &ways) {
+  if (ways.size() > 1 && !options.raw_bytes.empty()) {
+    throw Error("--raw-bytes keeps one fingertip's line; leave it out, or choose one fingertip");
+  }
   return Live(options, ways).run();
 }
 

@@ -1,5 +1,6 @@
 #include "cli/model.hpp"
 
+#include "cli/doubt.hpp"
 #include "cli/names_of_values.hpp"
 
 #include <algorithm>
@@ -48,6 +49,7 @@ void Model::take_frame(std::uint64_t t_us) {
     last_slip_us_.reset();
     recent_us_.clear();
     trail_.clear();
+    samples_.clear();
   }
   first_us_ = first_us_.value_or(t_us);
   last_us_ = t_us;
@@ -64,29 +66,62 @@ void Model::take_contact(const wire_contact &contact, std::uint64_t t_us) {
   if (slip) {
     last_slip_us_ = t_us;
   }
-  if (contact.flags & CONTACT_FLAG_FIT_VALID) {
-    trail_.push_back({t_us, contact.x_mm, contact.y_mm});
-  } else {
+  if (!(contact.flags & CONTACT_FLAG_FIT_VALID)) {
     trail_.clear();
+  } else if (!warnings_of(contact.flags)) {
+    trail_.push_back({t_us, contact.x_mm, contact.y_mm});
   }
   while (!trail_.empty() && t_us - trail_.front().t_us > TRAIL_SPAN_us) {
     trail_.pop_front();
   }
-  std::uint64_t interval = t_us / FORCE_INTERVAL_us;
-  if (forces_.empty() || interval < force_interval_) {
-    forces_.assign(1, {0, false});
+  sample(contact, t_us);
+}
+
+void Model::sample(const wire_contact &contact, std::uint64_t t_us) {
+  std::uint64_t interval = t_us / SAMPLE_INTERVAL_us;
+  if (samples_.empty() || interval < last_interval_) {
+    samples_.assign(1, {});
   } else {
-    for (std::uint64_t i = std::min<std::uint64_t>(interval - force_interval_, FORCE_INTERVALS);
-         i > 0; i--) {
-      forces_.push_back({0, false});
+    for (std::uint64_t i = std::min<std::uint64_t>(interval - last_interval_, SAMPLES); i > 0;
+         i--) {
+      samples_.emplace_back();
     }
   }
-  force_interval_ = interval;
-  while (forces_.size() > FORCE_INTERVALS) {
-    forces_.pop_front();
+  last_interval_ = interval;
+  while (samples_.size() > SAMPLES) {
+    samples_.pop_front();
   }
-  forces_.back().peak_N = std::max(forces_.back().peak_N, contact.force_N);
-  forces_.back().slip = forces_.back().slip || slip;
+  Sample &last = samples_.back();
+  if (contact.flags & CONTACT_FLAG_FIT_VALID) {
+    bool doubtful = warnings_of(contact.flags) != 0;
+    if (!last.fitted || last.doubtful) {
+      if (!doubtful) {
+        last.force_N = 0;
+      }
+      last.doubtful = doubtful;
+    }
+    if (last.doubtful == doubtful) {
+      last.fitted = true;
+      last.x_mm = contact.x_mm;
+      last.y_mm = contact.y_mm;
+      last.force_N = std::max(last.force_N, contact.force_N);
+    }
+  }
+  if (contact.flags & CONTACT_FLAG_SLIP_VALID) {
+    last.slip_valid = true;
+    last.slip_mm = std::max(last.slip_mm, contact.slip_mm);
+  }
+  last.slip = last.slip || (contact.flags & CONTACT_FLAG_SLIP);
+}
+
+bool Model::is_current() const {
+  auto silence_s = seconds_since_frame();
+  return state_ == State::replay || (state_ == State::live && silence_s && *silence_s <= STALLED_s);
+}
+
+bool Model::is_tared() const {
+  return raw_ ? raw_->flags & CONTACT_FLAG_TARED
+              : contact_ && (contact_->flags & CONTACT_FLAG_TARED);
 }
 
 std::uint32_t Model::missing_sensors() const {

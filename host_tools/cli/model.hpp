@@ -10,6 +10,9 @@
 
 namespace fingertip {
 
+/* No frame for so long is shown as a stall. */
+inline constexpr double STALLED_s = 0.7;
+
 class Model {
 public:
   enum class State { connecting, live, gone, replay };
@@ -18,12 +21,18 @@ public:
     std::uint64_t t_us;
     float x_mm, y_mm;
   };
-  struct Force {
-    float peak_N; /* highest of the interval */
-    bool slip;
+  /* Of an interval: frames that carry a warning count only where there is no other. */
+  struct Sample {
+    bool fitted = false;
+    bool doubtful = false;
+    float x_mm = 0, y_mm = 0; /* the last */
+    float force_N = 0;        /* the highest */
+    bool slip_valid = false;
+    float slip_mm = 0; /* the highest */
+    bool slip = false;
   };
-  static constexpr std::uint64_t FORCE_INTERVAL_us = 50000;
-  static constexpr std::size_t FORCE_INTERVALS = 400;
+  static constexpr std::uint64_t SAMPLE_INTERVAL_us = 50000;
+  static constexpr std::size_t SAMPLES = 800;
 
   void take(const wire_packet &packet);
   void set_statistics(const LineStatistics &statistics) { statistics_ = statistics; }
@@ -52,13 +61,21 @@ public:
   bool slipped_lately() const;
   /* Since the last frame, by the host's clock; nothing before the first. */
   std::optional<double> seconds_since_frame() const;
-  /* Of the last second, oldest first; emptied where contact ends. */
+  /* Whether what the last frame told is still so: false where none came for STALLED_s, and where
+   * the fingertip is gone. */
+  bool is_current() const;
+  /* The numbers of the last frame are differences from a measured zero. */
+  bool is_tared() const;
+  /* Those without a warning in the last second, oldest first; emptied where contact ends. */
   const std::deque<Location> &trail() const { return trail_; }
-  const std::deque<Force> &forces() const { return forces_; }
+  /* Oldest first; the last is the interval of this number since the device started. */
+  const std::deque<Sample> &samples() const { return samples_; }
+  std::uint64_t last_interval() const { return last_interval_; }
 
 private:
   void take_frame(std::uint64_t t_us);
   void take_contact(const wire_contact &contact, std::uint64_t t_us);
+  void sample(const wire_contact &contact, std::uint64_t t_us);
 
   State state_ = State::connecting;
   std::string source_;
@@ -76,8 +93,8 @@ private:
   std::optional<std::chrono::steady_clock::time_point> last_arrival_;
   std::deque<std::uint64_t> recent_us_;
   std::deque<Location> trail_;
-  std::deque<Force> forces_;
-  std::uint64_t force_interval_ = 0;
+  std::deque<Sample> samples_;
+  std::uint64_t last_interval_ = 0;
 };
 
 } // namespace fingertip

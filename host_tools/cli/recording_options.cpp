@@ -16,6 +16,34 @@ double seconds_from_text(const std::string &text) {
 
 } // namespace
 
+void with_several(CLI::App *command, Several &several) {
+  command
+      ->add_option("--device", several.devices,
+                   "Serial number of the fingertip; several are taken on one clock")
+      ->take_all()
+      ->expected(1)
+      ->type_name("SERIAL");
+  with_port_only(command, several.choice);
+  command->add_flag("--all", several.all, "Every fingertip there is, on one clock");
+}
+
+std::vector<Way> ways_of(const Several &several) {
+  if (several.all) {
+    auto ways = all_ways(several.choice.reach);
+    if (!ways.empty()) {
+      return ways;
+    }
+  }
+  std::vector<Way> ways;
+  for (const std::string &device : several.devices) {
+    ways.push_back(choose_way({several.choice.port, device, several.choice.reach}));
+  }
+  if (ways.empty()) {
+    ways.push_back(choose_way(several.choice));
+  }
+  return ways;
+}
+
 void with_recording(CLI::App *command, LiveOptions &options) {
   command
       ->add_option_function<std::string>(

@@ -92,6 +92,10 @@ std::optional<ColourDepth> screen_depth(ColourMode mode) {
   if (mode == ColourMode::truecolour) {
     return ColourDepth::truecolour;
   }
+  const char *no_colour = std::getenv("NO_COLOR");
+  if (mode == ColourMode::automatic && no_colour && *no_colour) {
+    return ColourDepth::none;
+  }
   const char *colours = std::getenv("COLORTERM");
   bool truecolour =
       colours && (!std::strcmp(colours, "truecolor") || !std::strcmp(colours, "24bit"));
@@ -121,7 +125,8 @@ Characters screen_characters() {
   return utf_8 ? Characters::utf_8 : Characters::ascii;
 }
 
-Screen::Screen() : has_input_(tcgetattr(STDIN_FILENO, &before_) == 0) {
+Screen::Screen(ColourDepth depth)
+    : has_input_(tcgetattr(STDIN_FILENO, &before_) == 0), painter_(depth, screen_characters()) {
   handle(SIGTSTP, on_suspend);
   enter();
 }
@@ -157,18 +162,22 @@ int Screen::rows() const {
   return window().ws_row;
 }
 
-void Screen::draw(const std::string &ansi) {
+void Screen::draw(const Canvas &canvas) {
   if (suspend_signal) {
     suspend_signal = 0;
     leave();
     raise(SIGSTOP);
     enter();
+    painter_.forget();
   }
-  /* begin and end of a synchronised update: no tearing where the terminal knows it */
-  write_all("\x1b[?2026h" + ansi + "\x1b[?2026l");
+  std::string bytes = painter_.paint(canvas);
+  if (!bytes.empty()) {
+    /* begin and end of a synchronised update: no tearing where the terminal knows it */
+    write_all("\x1b[?2026h" + bytes + "\x1b[?2026l");
+  }
 }
 
-std::optional<char> Screen::key() {
+std::optional<Key> Screen::key() {
   char bytes[256];
   ssize_t count = has_input_ ? read(STDIN_FILENO, bytes, sizeof bytes) : 0;
   if (count > 0) {

@@ -1,8 +1,8 @@
 /* The user's terminal and signals. */
 #pragma once
 
-#include "cli/canvas.hpp"
 #include "cli/keys.hpp"
+#include "cli/painter.hpp"
 
 #include <optional>
 #include <string>
@@ -22,7 +22,8 @@ bool wait_for_standard_output();
 
 enum class ColourMode { automatic, truecolour, palette_256, plain };
 
-/* What standard output can show: nothing if it is no terminal, a dumb one, or plain is wanted. */
+/* What standard output can show: nothing if it is no terminal, a dumb one, or plain is wanted. In
+ * automatic mode NO_COLOR (no-color.org) is heeded. */
 std::optional<ColourDepth> screen_depth(ColourMode mode);
 
 /* What the locale says that the terminal can show: UTF-8 or, in any other, ASCII. */
@@ -31,16 +32,16 @@ Characters screen_characters();
 /* The full screen, given back as it was when this ends; also over a suspend (Ctrl-Z). */
 class Screen {
 public:
-  Screen();
+  explicit Screen(ColourDepth depth);
   ~Screen();
   Screen(const Screen &) = delete;
   Screen &operator=(const Screen &) = delete;
 
   int columns() const;
   int rows() const;
-  void draw(const std::string &ansi);
+  void draw(const Canvas &canvas);
   /* A key that somebody pressed, or nothing. */
-  std::optional<char> key();
+  std::optional<Key> key();
 
 private:
   void enter();
@@ -49,6 +50,7 @@ private:
   bool has_input_;
   termios before_;
   KeyParser keys_;
+  Painter painter_;
 };
 
 } // namespace fingertip

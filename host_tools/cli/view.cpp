@@ -1,7 +1,8 @@
 #include "cli/view.hpp"
 
-#include "cli/monitor.hpp"
+#include "cli/doubt.hpp"
 #include "libfingertip/names.hpp"
+#include "libfingertip/packet_fields.hpp"
 #include "libfingertip/text.hpp"
 #include "tool/advice.hpp"
 
@@ -66,49 +67,69 @@ std::string state_text(const Model &model) {
 
 std::string status_line(const Model &model) {
   const LineStatistics &line = model.statistics();
-  std::string text = fixed(model.seconds(), 1) + " s  " + std::to_string(model.frames()) +
-                     " frames  " + fixed(model.frames_per_s(), 1) + "/s  dropped " +
-                     std::to_string(line.dropped_packets) + "  CRC errors " +
-                     std::to_string(line.crc_errors);
+  std::string text =
+      fixed(model.seconds(), 1) + " s  " + std::to_string(model.frames()) + " frames  " +
+      (model.state() == Model::State::gone ? "" : fixed(model.frames_per_s(), 1) + "/s  ") +
+      "dropped " + std::to_string(line.dropped_packets) + "  CRC errors " +
+      std::to_string(line.crc_errors);
   std::string state = state_text(model);
   return state.empty() ? text : text + "  " + state;
 }
 
 class ScreenView : public View {
 public:
-  explicit ScreenView(ColourDepth depth) : depth_(depth) {}
-  void update(const Model &model, const std::string &note) override {
-    if (interval_.is_due()) {
-      Canvas canvas = draw_monitor(model, note, screen_.columns(), screen_.rows());
-      screen_.draw(canvas.ansi(depth_, characters_));
+  explicit ScreenView(ColourDepth depth) : screen_(depth) {}
+  void update(const std::vector<Model> &models, const Caption &caption) override {
+    if (interval_.is_due(hurry_)) {
+      hurry_ = false;
+      screen_.draw(draw_monitor(models, caption, screen_.columns(), screen_.rows()));
     }
   }
-  std::optional<char> key() override { return screen_.key(); }
+  void hurry() override { hurry_ = true; }
+  std::optional<Key> key() override { return screen_.key(); }
 
 private:
-  ColourDepth depth_;
-  Characters characters_ = screen_characters();
   Screen screen_;
+  bool hurry_ = false;
   Interval interval_{std::chrono::milliseconds(40)};
 };
 
+/* Of the last frame: a doubtful one says so before its numbers. */
+std::string contact_text(const Model &model) {
+  if (!model.contact() || !model.is_current()) {
+    return "";
+  }
+  const wire_contact &contact = *model.contact();
+  std::string text;
+  if (contact.flags & CONTACT_FLAG_FIT_VALID) {
+    bool least = contact.flags & CONTACT_FLAG_FORCE_LOWER_BOUND;
+    text = std::string(warnings_of(contact.flags) ? "  doubtful:" : "") + "  x " +
+           fixed(static_cast<double>(contact.x_mm), 2) + " mm  y " +
+           fixed(static_cast<double>(contact.y_mm), 2) + " mm  force " +
+           (least ? "at least " : "") + fixed(static_cast<double>(contact.force_N), 2) + " N";
+  }
+  return text + "  " + flags_text(contact.flags);
+}
+
 class LineView : public View {
 public:
-  void update(const Model &model, const std::string &note) override {
-    if (!interval_.is_due(change_.is_new(state_text(model)))) {
+  void update(const std::vector<Model> &models, const Caption &caption) override {
+    std::string states;
+    for (const Model &model : models) {
+      states += state_text(model) + "\n";
+    }
+    if (!interval_.is_due(change_.is_new(states))) {
       return;
     }
-    std::string text = status_line(model);
-    if (model.contact()) {
-      const wire_contact &contact = *model.contact();
-      if (contact.flags & CONTACT_FLAG_FIT_VALID) {
-        text += "  x " + fixed(static_cast<double>(contact.x_mm), 2) + " mm  y " +
-                fixed(static_cast<double>(contact.y_mm), 2) + " mm  force " +
-                fixed(static_cast<double>(contact.force_N), 2) + " N";
-      }
-      text += "  " + flags_text(contact.flags);
+    for (const Model &model : models) {
+      std::string name =
+          models.size() < 2
+              ? ""
+              : printable(model.info() ? text_field(model.info()->serial) : model.source()) + "  ";
+      std::printf("%s%s%s%s%s\n", name.c_str(), status_line(model).c_str(),
+                  contact_text(model).c_str(), caption.note.empty() ? "" : "  ",
+                  caption.note.c_str());
     }
-    std::printf("%s%s%s\n", text.c_str(), note.empty() ? "" : "  ", note.c_str());
     std::fflush(stdout);
   }
 
@@ -124,12 +145,13 @@ public:
       std::fputs("\r\x1b[K", stderr);
     }
   }
-  void update(const Model &model, const std::string &note) override {
+  void update(const std::vector<Model> &models, const Caption &caption) override {
+    const Model &model = models.front();
     if (!interval_.is_due(change_.is_new(state_text(model)))) {
       return;
     }
     shown_ = true;
-    std::string text = status_line(model) + (note.empty() ? "" : "  " + note);
+    std::string text = status_line(model) + (caption.note.empty() ? "" : "  " + caption.note);
     std::fprintf(stderr, in_place_ ? "\r\x1b[K%s" : "%s\n", text.c_str());
     std::fflush(stderr);
   }
@@ -144,11 +166,11 @@ private:
 class StateView : public View {
 public:
   StateView() { interval_.is_due(); }
-  void update(const Model &model, const std::string &) override {
+  void update(const std::vector<Model> &models, const Caption &) override {
     if (!interval_.is_due()) {
       return;
     }
-    std::string state = state_text(model);
+    std::string state = state_text(models.front());
     if (change_.is_new(state)) {
       std::fprintf(stderr, "%s\n", state.empty() ? "streaming" : state.c_str());
     }

@@ -1,11 +1,13 @@
-/* Ways to show a model while it changes. */
+/* Ways to show fingertips while they change. */
 #pragma once
 
 #include "cli/model.hpp"
+#include "cli/monitor.hpp"
 #include "cli/terminal.hpp"
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 namespace fingertip {
 
@@ -13,11 +15,13 @@ class View {
 public:
   virtual ~View() = default;
   /* Called often; draws as often as it sees fit. */
-  virtual void update(const Model &model, const std::string &note) = 0;
-  virtual std::optional<char> key() { return std::nullopt; }
+  virtual void update(const std::vector<Model> &models, const Caption &caption) = 0;
+  /* What update has to draw cannot wait: somebody pressed a key. */
+  virtual void hurry() {}
+  virtual std::optional<Key> key() { return std::nullopt; }
 };
 
-/* The monitor on a terminal, or one line a second elsewhere. */
+/* The monitor on a terminal, or one line a second for each fingertip elsewhere. */
 std::unique_ptr<View> make_monitor_view(ColourMode mode);
 /* One line on standard error, renewed in place if that is a terminal. */
 std::unique_ptr<View> make_progress_view();

@@ -62,4 +62,34 @@ std::optional<PacketFile::Item> PacketFile::next_of_capture() {
   return item;
 }
 
+PacketFile::Place PacketFile::place() {
+  Place place;
+  if (reader_) {
+    place.in_recording = reader_->place();
+  } else {
+    bytes_.clear(); /* of the end */
+    place.offset = bytes_.tellg();
+  }
+  place.decoder = decoder_;
+  place.decoded = decoded_;
+  place.sequence = sequence_;
+  place.statistics = statistics_;
+  place.ended = ended_;
+  return place;
+}
+
+void PacketFile::go_to(const Place &place) {
+  if (place.in_recording) {
+    reader_->go_to(*place.in_recording);
+  } else {
+    bytes_.clear();
+    bytes_.seekg(place.offset);
+  }
+  decoder_ = place.decoder;
+  decoded_ = place.decoded;
+  sequence_ = place.sequence;
+  statistics_ = place.statistics;
+  ended_ = place.ended;
+}
+
 } // namespace fingertip

@@ -29,6 +29,19 @@ public:
   /* Nothing at the end of the file. */
   std::optional<Item> next();
 
+  /* Where reading stands, to go back to. */
+  struct Place {
+    std::optional<RecordingReader::Place> in_recording;
+    std::streamoff offset = 0; /* in a capture */
+    Decoder decoder;
+    std::deque<Item> decoded;
+    SequenceFollower sequence;
+    LineStatistics statistics;
+    bool ended = false;
+  };
+  Place place();
+  void go_to(const Place &place);
+
   /* What the packets until now tell of the line. At the end of a recording what its recorder
    * counted, which saw the line itself. */
   const LineStatistics &statistics() const { return statistics_; }

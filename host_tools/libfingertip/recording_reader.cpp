@@ -97,7 +97,11 @@ void RecordingReader::read_line(const std::string &text) {
       throw Damage{"neither a comment nor a row"};
     }
     if (text.compare(0, mine.size(), mine) == 0) {
-      read_row(std::string_view(text).substr(rest + 1));
+      auto time_us = to_double(std::string_view(text).substr(mine.size(), rest - mine.size()));
+      if (!time_us) {
+        throw Damage{"time_us is no number"};
+      }
+      read_row(std::string_view(text).substr(rest + 1), time_us);
     }
   } else if (header_seen_) {
     read_row(text);
@@ -281,7 +285,7 @@ void RecordingReader::choose_device(const std::string &serials) {
               path_ + ": no fingertip " + wanted_ + " in it, there are: " + names);
 }
 
-void RecordingReader::read_row(std::string_view text) {
+void RecordingReader::read_row(std::string_view text, std::optional<double> time_us) {
   auto cells = split(text, ',');
   std::size_t contact_count = contact_columns();
   std::size_t raw_count = RAW_COLUMNS + 2 * std::size_t{sensor_count_};
@@ -326,7 +330,47 @@ void RecordingReader::read_row(std::string_view text) {
   if (items.empty()) {
     throw Damage{"a row without a packet"};
   }
-  items_.insert(items_.end(), items.begin(), items.end());
+  for (Item &item : items) {
+    item.time_us = time_us;
+    items_.push_back(item);
+  }
+}
+
+RecordingReader::Place RecordingReader::place() {
+  file_.clear(); /* of the end */
+  return {file_.tellg(), line_number_, skipped_lines_, header_seen_, has_end_, info_, items_};
+}
+
+void RecordingReader::go_to(const Place &place) {
+  file_.clear();
+  file_.seekg(place.offset);
+  line_number_ = place.line_number;
+  skipped_lines_ = place.skipped_lines;
+  header_seen_ = place.header_seen;
+  has_end_ = place.has_end;
+  info_ = place.info;
+  items_ = place.items;
+}
+
+std::vector<std::string> fingertips_in(const std::string &path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string line;
+  std::vector<std::string> serials;
+  constexpr std::string_view key = "# devices: ";
+  /* It is the second line; a capture of the line has no lines. */
+  for (int i = 0; i < 2 && std::getline(file, line); i++) {
+    bool ours = i == 0 ? line.rfind("# fingertip-recording", 0) == 0 : line.rfind(key, 0) == 0;
+    if (!ours) {
+      break;
+    }
+    for (std::string_view serial :
+         split(trim(std::string_view(line).substr(i == 1 ? key.size() : line.size())), ' ')) {
+      if (!serial.empty()) {
+        serials.emplace_back(serial);
+      }
+    }
+  }
+  return serials;
 }
 
 } // namespace fingertip

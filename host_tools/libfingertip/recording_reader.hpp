@@ -11,8 +11,12 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace fingertip {
+
+/* Serial numbers of the fingertips in a joint recording; of any other file none. */
+std::vector<std::string> fingertips_in(const std::string &path);
 
 class RecordingReader {
 public:
@@ -20,6 +24,7 @@ public:
     enum class Kind { packet, event } kind;
     wire_packet packet;
     std::string event;
+    std::optional<double> time_us = {}; /* of a joint recording's rows, on the recorder's clock */
   };
 
   /* salvage: skip damaged lines and count them, instead of throwing Error with file and line.
@@ -28,6 +33,17 @@ public:
 
   /* Nothing at the end of the file. */
   std::optional<Item> next();
+
+  /* Where reading stands, to go back to. */
+  struct Place {
+    std::streamoff offset = 0;
+    std::uint64_t line_number = 0, skipped_lines = 0;
+    bool header_seen = false, has_end = false;
+    wire_info info{};
+    std::deque<Item> items;
+  };
+  Place place();
+  void go_to(const Place &place);
 
   std::uint64_t skipped_lines() const { return skipped_lines_; }
   /* Whether the end line was seen: without one the recording was cut short. */
@@ -40,7 +56,7 @@ public:
 private:
   void read_line(const std::string &text);
   void read_comment(const std::string &text);
-  void read_row(std::string_view text);
+  void read_row(std::string_view text, std::optional<double> time_us = {});
   void choose_device(const std::string &serials);
   void read_end(std::string_view text);
   void read_info_field(const std::string &key, const std::string &value);

@@ -10,7 +10,7 @@ namespace fingertip {
 namespace {
 
 struct MonitorOptions {
-  Choice choice;
+  Several several;
   LiveOptions live;
 };
 
@@ -23,16 +23,16 @@ int monitor(const MonitorOptions &options) {
     throw WrongUsage("--raw-bytes needs a file; give it a name");
   }
   check_outputs(options.live);
-  return run_live(options.live, {choose_way(options.choice)});
+  return run_live(options.live, ways_of(options.several));
 }
 
 } // namespace
 
 void add_monitor(CommandLine &line) {
   auto options = std::make_shared<MonitorOptions>();
-  CLI::App *command = line.add("monitor", "Show live what the fingertip feels",
+  CLI::App *command = line.add("monitor", "Show live what fingertips feel",
                                [options] { return monitor(*options); });
-  with_port(command, options->choice);
+  with_several(command, options->several);
   with_recording(command, options->live);
   command->add_option("--record", options->live.recording, "Record at the same time")
       ->type_name("FILE.csv");

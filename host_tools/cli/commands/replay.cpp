@@ -1,14 +1,15 @@
 #include "cli/commands/commands.hpp"
+#include "cli/playback.hpp"
 #include "cli/view.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/output_file.hpp"
+#include "libfingertip/packet_fields.hpp"
 #include "libfingertip/packet_file.hpp"
 #include "libfingertip/recording_writer.hpp"
 #include "libfingertip/text.hpp"
 
 #include <algorithm>
 #include <cstdio>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -18,7 +19,6 @@ namespace fingertip {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using std::chrono::milliseconds;
 
 struct ReplayOptions {
   std::string file;
@@ -127,74 +127,33 @@ int convert(const ReplayOptions &options) {
   return 0;
 }
 
-class Ended : public std::exception {};
-
-/* Keeps the recorded pace. */
-class Pace {
-public:
-  explicit Pace(double speed) : speed_(speed) {}
-
-  /* When to show a frame of this device time. */
-  Clock::time_point due(std::uint64_t t_us) {
-    if (!begun_ || t_us < last_us_) {
-      begun_ = true;
-      zero_us_ = t_us; /* begin, or the device restarted */
-      zero_ = Clock::now();
-    }
-    last_us_ = t_us;
-    return zero_ +
-           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double, std::micro>(
-               static_cast<double>(t_us - zero_us_) / speed_));
-  }
-
-private:
-  double speed_;
-  bool begun_ = false;
-  std::uint64_t zero_us_ = 0;
-  std::uint64_t last_us_ = 0;
-  Clock::time_point zero_;
-};
-
 int show(const ReplayOptions &options) {
-  PacketFile file = open_file(options);
-  Model model;
-  model.set_state(Model::State::replay);
+  Playback playback(options.file, options.salvage, options.device, options.speed);
+  std::string name = printable(options.file);
   std::unique_ptr<View> view = make_monitor_view(options.colour);
-  Pace pace(options.speed);
-  std::string note = printable(options.file);
-  auto update = [&] {
-    view->update(model, note);
-    auto key = view->key();
-    if (stop_requested() || (key && *key == 'q')) {
-      throw Ended();
+  while (!playback.is_over() && !stop_requested()) {
+    playback.step(Clock::now());
+    view->update(playback.models(), playback.caption(name));
+    while (auto key = view->key()) {
+      playback.key(*key);
+      view->hurry();
     }
-  };
-  try {
-    while (auto item = file.next()) {
-      model.set_statistics(file.statistics());
-      if (item->kind != Kind::packet) {
-        continue;
-      }
-      if (is_frame(item->packet) && options.speed > 0) {
-        auto due = pace.due(item->packet.t_us);
-        while (Clock::now() < due) {
-          update();
-          std::this_thread::sleep_until(std::min(due, Clock::now() + milliseconds(20)));
-        }
-      }
-      model.take(item->packet);
-      update();
-    }
-    model.set_statistics(file.statistics());
-  } catch (const Ended &) {
+    std::this_thread::sleep_until(playback.next_step(Clock::now()));
   }
   view.reset();
-  if (model.frames() == 0) {
-    throw Error(options.file +
-                ": no frames in it; give a recording or capture of a streaming fingertip");
+  for (std::size_t i = 0; i < playback.tracks().size(); i++) {
+    const Track &track = playback.tracks()[i];
+    const Model &model = playback.models()[i];
+    if (model.frames() == 0 && track.is_ended()) {
+      throw Error(options.file +
+                  ": no frames in it; give a recording or capture of a streaming fingertip");
+    }
+    report_losses(options, track.file());
+    bool several = playback.tracks().size() > 1;
+    std::printf("%s: %s%s\n", name.c_str(),
+                several && model.info() ? (text_field(model.info()->serial) + ": ").c_str() : "",
+                summary_text(model).c_str());
   }
-  report_losses(options, file);
-  std::printf("%s: %s\n", printable(options.file).c_str(), summary_text(model).c_str());
   return 0;
 }
 
@@ -215,7 +174,7 @@ void add_replay(CommandLine &line) {
       ->type_name("X|max");
   command
       ->add_option("--device", options->device,
-                   "Serial number of one of several fingertips in the recording")
+                   "Serial number of one of several fingertips in the recording; default: show all")
       ->type_name("SERIAL");
   command->add_flag("--salvage", options->salvage, "Skip damaged lines and count them");
   command->add_option("--to-csv", options->to_csv, "Write a recording instead of showing it")

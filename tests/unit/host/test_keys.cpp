@@ -15,7 +15,7 @@ std::string keys_of(const std::vector<std::string> &pieces, milliseconds gap = m
   for (const std::string &piece : pieces) {
     parser.feed(piece.data(), piece.size(), now += gap);
     while (auto key = parser.next()) {
-      keys += *key;
+      keys += *key < KEY_LEFT ? static_cast<char>(*key) : "<>^vhe"[*key - KEY_LEFT];
     }
   }
   return keys;
@@ -36,13 +36,20 @@ TEST(Keys, PlainOnesComeInOrder) {
 }
 
 TEST(Keys, WhatATerminalAnswersIsNone) {
-  for (const char *answer : {"\x1b[8;24;80t", "\x1b[?2026;2$y", "\x1b[>41;354;0c", "\x1b[A",
-                             "\x1bOt", "\x1b[1;5t", "\x1b]11;rgb:0000/ttyy/ffff\x1b\\",
-                             "\x1b]11;rgb:tt/yy/qq\a", "\x1bP1$r0 t\x1b\\", "\x1b[I", "\x1bt"}) {
+  for (const char *answer :
+       {"\x1b[8;24;80t", "\x1b[?2026;2$y", "\x1b[>41;354;0c", "\x1b[Z", "\x1bOt", "\x1b[1;5t",
+        "\x1b]11;rgb:0000/ttyy/ffff\x1b\\", "\x1b]11;rgb:tt/yy/qq\a", "\x1bP1$r0 t\x1b\\", "\x1b[I",
+        "\x1bt", "\x1b[12;40R", "\x1b[6n", "\x1b[3~"}) {
     EXPECT_EQ(keys_of({answer}), "") << answer + 1;
     EXPECT_EQ(keys_of(bytewise(answer)), "") << answer + 1;
     EXPECT_EQ(keys_of({std::string(answer) + "q"}), "q") << answer + 1;
   }
+}
+
+TEST(Keys, ArrowsHomeAndEndAsTerminalsSendThem) {
+  EXPECT_EQ(keys_of({"\x1b[D\x1b[C\x1b[A\x1b[B", "\x1b[H\x1b[F"}), "<>^vhe");
+  EXPECT_EQ(keys_of({"\x1bOD\x1bOC\x1bOA\x1bOB\x1bOH\x1bOF"}), "<>^vhe");
+  EXPECT_EQ(keys_of(bytewise("\x1b[1~\x1b[4~\x1b[7~\x1b[8~")), "hehe");
 }
 
 TEST(Keys, WhatIsPastedIsNone) {

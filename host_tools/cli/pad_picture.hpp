@@ -1,0 +1,15 @@
+/* The pad as the monitor draws it: the fitted pressure as colour, over it each sensor with its
+ * number, what it measured, and what the fit says of it. */
+#pragma once
+
+#include "cli/canvas.hpp"
+#include "cli/ink.hpp"
+#include "cli/model.hpp"
+
+namespace fingertip {
+
+/* In its frame, at the upper left corner of what is available; the area that it took. The model
+ * must know its sensors. */
+Area draw_pad(Canvas &canvas, const Area &available, const Model &model);
+
+} // namespace fingertip

@@ -1,0 +1,96 @@
+/* A file of one fingertip or several shown as it was recorded: played at any speed, paused, and
+ * sought in both directions. */
+#pragma once
+
+#include "cli/keys.hpp"
+#include "cli/model.hpp"
+#include "cli/monitor.hpp"
+#include "libfingertip/packet_file.hpp"
+
+#include <chrono>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace fingertip {
+
+/* One fingertip of a file, up to a time that can be chosen: the model, which is always the same
+ * one, is what was known then. */
+class Track {
+public:
+  /* Throws Error as PacketFile does; so does what reads on. */
+  Track(const std::string &path, bool salvage, const std::string &device);
+
+  const PacketFile &file() const { return file_; }
+  bool is_ended() const { return !next_; }
+  /* Of the next frame, us from the file's beginning; of the last one where none follows. */
+  double next_us() const { return next_us_; }
+  double last_us() const { return last_us_; }
+
+  /* Takes at most so many packets, up to this time; false if there are more. */
+  bool read_to(double time_us, int packets, Model &model);
+  /* Back to somewhere not after this time, from where it can be read. */
+  void go_back(double time_us, Model &model);
+
+private:
+  /* Where to go back to, all so many us. */
+  static constexpr double MARKS_us = 10e6;
+
+  /* Time of frames: a device that restarted goes on where it was. */
+  struct Clock {
+    bool begun = false;
+    std::uint64_t zero_us = 0, last_us = 0;
+    double before_us = 0;
+    double take(std::uint64_t t_us);
+  };
+  struct Mark {
+    double time_us;
+    PacketFile::Place place;
+    Model model;
+    Clock clock;
+    std::optional<PacketFile::Item> next;
+    double next_us, last_us;
+  };
+
+  void read_next();
+
+  PacketFile file_;
+  Clock clock_;
+  std::optional<PacketFile::Item> next_;
+  double next_us_ = 0, last_us_ = 0;
+  std::vector<Mark> marks_;
+};
+
+class Playback {
+public:
+  using Clock = std::chrono::steady_clock;
+
+  /* speed: times the recorded one; 0: as fast as it can be read. Of a joint recording without a
+   * device all of its fingertips. */
+  Playback(const std::string &path, bool salvage, const std::string &device, double speed);
+
+  /* Goes on to where it should be now, or as far as it gets in a moment. */
+  void step(Clock::time_point now);
+  /* When there is something to do. */
+  Clock::time_point next_step(Clock::time_point now) const;
+  /* Played to its end, or quit. */
+  bool is_over() const;
+  void key(Key key);
+
+  const std::vector<Track> &tracks() const { return tracks_; }
+  const std::vector<Model> &models() const { return models_; }
+  Caption caption(const std::string &name) const;
+
+private:
+  void seek(double time_us);
+
+  std::vector<Track> tracks_;
+  std::vector<Model> models_; /* of the tracks */
+  double speed_;
+  double time_us_ = 0; /* shown, or to be shown as soon as it is read; infinite: the end */
+  bool paused_ = false, quit_ = false, is_there_ = false;
+  std::optional<Clock::time_point> last_;
+};
+
+} // namespace fingertip

@@ -1,0 +1,15 @@
+/* Location, force and slip over time, each with its axes. */
+#pragma once
+
+#include "cli/canvas.hpp"
+#include "cli/ink.hpp"
+#include "cli/model.hpp"
+
+namespace fingertip {
+
+/* Force, x, y and slip below one another, the newest at the right; at least a row for each and one
+ * for the time. What carries a warning is dashed, and left out where it is
+ * beyond the axis that the others need. */
+void draw_traces(Canvas &canvas, const Area &area, const Model &model);
+
+} // namespace fingertip

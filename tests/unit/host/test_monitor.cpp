@@ -1,0 +1,328 @@
+/* What the monitor draws, and how much of it goes to the terminal. */
+#include "cli/monitor.hpp"
+#include "cli/painter.hpp"
+#include "support/host_packets.hpp"
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <gtest/gtest.h>
+
+using namespace fingertip;
+
+namespace {
+
+constexpr std::uint32_t GOOD = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID |
+                               CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_SLIP_VALID |
+                               CONTACT_FLAG_TARED;
+
+Model model_with_info() {
+  Model model;
+  model.set_state(Model::State::replay);
+  model.take(test::make_info(0, 0));
+  model.take(test::make_health(0, 0));
+  return model;
+}
+
+/* A contact of 5.7 mm and 5 N, and what the sensors under it measure. */
+void take_frame(Model &model, std::uint64_t t_us, std::uint32_t frame, float x_mm, float y_mm,
+                float force_N, std::uint32_t flags) {
+  constexpr float sigma_mm = 5.7f, pi = 3.14159265f;
+  float p0_Pa = force_N / (2 * pi * sigma_mm * sigma_mm * 1e-6f);
+  wire_packet contact = test::make_contact(0, t_us, frame);
+  contact.body.contact.flags = flags;
+  contact.body.contact.x_mm = x_mm;
+  contact.body.contact.y_mm = y_mm;
+  contact.body.contact.p0_Pa = p0_Pa;
+  contact.body.contact.sigma_mm = sigma_mm;
+  contact.body.contact.force_N = force_N;
+  model.take(contact);
+  wire_packet raw = test::make_raw(0, t_us, frame);
+  raw.body.raw.flags = flags & (CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED);
+  raw.body.raw.valid = 0x7FFF;
+  raw.body.raw.saturated = raw.body.raw.doubtful = 0;
+  const wire_info &info = *model.info();
+  for (int k = 0; k < info.sensor_count; k++) {
+    float dx = info.x_mm[k] - x_mm, dy = info.y_mm[k] - y_mm;
+    float Pa = p0_Pa * std::exp(-(dx * dx + dy * dy) / (2 * sigma_mm * sigma_mm));
+    raw.body.raw.baseline_Pa_q10[k] = flags & CONTACT_FLAG_TARED ? 101325 * 1024 : 0;
+    raw.body.raw.pressure_Pa_q10[k] = 101325 * 1024 + static_cast<std::int32_t>(Pa * 1024);
+  }
+  model.take(raw);
+}
+
+std::string text_of(const Canvas &canvas) {
+  std::string text;
+  for (int row = 0; row < canvas.rows(); row++) {
+    for (int column = 0; column < canvas.columns(); column++) {
+      const Canvas::Cell &cell = canvas.cell(column, row);
+      text += cell.halves ? " " : cell.character;
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+bool shows(const Canvas &canvas, const std::string &text) {
+  return text_of(canvas).find(text) != std::string::npos;
+}
+
+Canvas one(const Model &model, int columns = 80, int rows = 24) {
+  return draw_monitor({model}, {"keys", "note", ""}, columns, rows);
+}
+
+/* Bytes in ten seconds at 25 pictures a second, of a contact that never rests: a circle of 8 by
+ * 16 mm in two seconds, as tests/support/fake_device.cpp plays it, its force from 1 to 9 N. */
+struct Sent {
+  std::size_t changes = 0, all = 0;
+};
+
+Sent sent_in_ten_seconds(int columns, int rows, std::uint32_t flags) {
+  Model model = model_with_info();
+  Painter painter(ColourDepth::truecolour, Characters::utf_8);
+  Sent sent;
+  constexpr int rate_per_s = 400, per_picture = 16;
+  for (std::uint32_t frame = 0; frame < 10 * rate_per_s; frame++) {
+    float t_s = static_cast<float>(frame) / rate_per_s;
+    take_frame(model, 1000000 + frame * (1000000 / rate_per_s), frame, 8 * std::cos(3.14f * t_s),
+               16 * std::sin(3.14f * t_s), 5 + 4 * std::sin(t_s), flags);
+    if (frame % per_picture == 0) {
+      Canvas canvas = one(model, columns, rows);
+      sent.changes += painter.paint(canvas).size();
+      Painter anew(ColourDepth::truecolour, Characters::utf_8);
+      sent.all += anew.paint(canvas).size();
+    }
+  }
+  return sent;
+}
+
+void report(const std::string &json) {
+  if (const char *path = std::getenv("FINGERTIP_REPORT")) {
+    std::filesystem::create_directories(std::filesystem::path(path).parent_path());
+    std::ofstream(path) << json;
+  }
+}
+
+} // namespace
+
+TEST(Monitor, SendsATenthOfWhatFullPicturesTook) {
+  /* Measured at 200 x 60 before: every cell at 25 Hz, 2.3 MB/s. */
+  constexpr std::size_t before = 23000000;
+  Sent sent = sent_in_ten_seconds(200, 60, GOOD);
+  EXPECT_LE(sent.changes, before / 10);
+  EXPECT_LT(sent.changes, sent.all / 2);
+  EXPECT_LE(sent_in_ten_seconds(200, 60, GOOD | CONTACT_FLAG_UNCERTAIN).changes, before / 10);
+  report("{\n  \"monitor_200x60_10_s_bytes\": " + std::to_string(sent.changes) +
+         ",\n  \"monitor_200x60_10_s_bytes_of_full_pictures\": " + std::to_string(sent.all) +
+         "\n}\n");
+}
+
+TEST(Monitor, SendsNothingWhereNothingChanged) {
+  Model model = model_with_info();
+  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, GOOD);
+  Painter painter(ColourDepth::truecolour, Characters::utf_8);
+  EXPECT_GT(painter.paint(one(model)).size(), 1000u);
+  EXPECT_EQ(painter.paint(one(model)), "");
+  painter.forget();
+  EXPECT_GT(painter.paint(one(model)).size(), 1000u);
+  EXPECT_NE(painter.paint(one(model, 81)).find("\x1b[2J"), std::string::npos) << "another size";
+}
+
+TEST(Monitor, ADoubtfulLocationLooksDoubtful) {
+  Model model = model_with_info();
+  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, GOOD);
+  Canvas good = one(model);
+  EXPECT_TRUE(shows(good, "5.00 N")) << text_of(good);
+  EXPECT_TRUE(shows(good, "┼"));
+  for (std::uint32_t flag :
+       {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_FLAT, CONTACT_FLAG_UNCERTAIN, CONTACT_FLAG_MODEL,
+        CONTACT_FLAG_SATURATED, CONTACT_FLAG_FORCE_LOWER_BOUND, CONTACT_FLAG_SENSOR_MASKED,
+        CONTACT_FLAG_AT_BOUND, CONTACT_FLAG_ELONGATED, CONTACT_FLAG_ZERO_DOUBTFUL,
+        CONTACT_FLAG_SENSOR_DOUBTFUL}) {
+    take_frame(model, 2000000, 2, 4.5f, 4.5f, 5, GOOD | flag);
+    Canvas doubtful = one(model);
+    EXPECT_TRUE(shows(doubtful, "5.00?N")) << text_of(doubtful);
+    EXPECT_TRUE(shows(doubtful, "x   +4.50?") && shows(doubtful, "y   +4.50?"))
+        << text_of(doubtful);
+    EXPECT_FALSE(shows(doubtful, "┼")) << text_of(doubtful);
+    EXPECT_TRUE(shows(doubtful, "╌")) << text_of(doubtful);
+  }
+  EXPECT_TRUE(shows(one(model), "SENSOR_DOUBTFUL, a sensor is in doubt"));
+  take_frame(model, 3000000, 3, 4.5f, 4.5f, 5, GOOD | CONTACT_FLAG_UNCERTAIN);
+  EXPECT_TRUE(shows(one(model), "UNCERTAIN, may be off by more than 0.60 mm"));
+  take_frame(model, 4000000, 4, 4.5f, 4.5f, 5, GOOD | CONTACT_FLAG_FORCE_LOWER_BOUND);
+  EXPECT_TRUE(shows(one(model), "≥5.00?N"));
+  take_frame(model, 5000000, 5, 1, 2, 5, CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED);
+  Canvas unfitted = one(model);
+  EXPECT_TRUE(shows(unfitted, "contact, but no location")) << text_of(unfitted);
+  EXPECT_FALSE(shows(unfitted, "+4.50"));
+}
+
+TEST(Monitor, EveryWarningAtOnceIsNamed) {
+  Model model = model_with_info();
+  take_frame(model, 1000000, 1, 1, 2, 5, 0x7FFFF);
+  for (const char *name :
+       {"LOW_SIGNAL", "FLAT", "UNCERTAIN", "MODEL", "SATURATED", "FORCE_LOWER_BOUND",
+        "SENSOR_MASKED", "AT_BOUND", "ELONGATED", "ZERO_DOUBTFUL", "SENSOR_DOUBTFUL"}) {
+    EXPECT_TRUE(shows(one(model), name)) << text_of(one(model));
+  }
+}
+
+TEST(Monitor, AForceAtLiftOffDoesNotScaleTheTrace) {
+  Model model = model_with_info();
+  for (std::uint32_t frame = 0; frame < 100; frame++) {
+    take_frame(model, 1000000 + 20000 * frame, frame, 1, 2, 4, GOOD);
+  }
+  Canvas before = one(model);
+  take_frame(model, 3050000, 100, -40, 2, 76254, GOOD | CONTACT_FLAG_AT_BOUND);
+  Canvas after = one(model);
+  EXPECT_TRUE(shows(before, "force  5 N┤")) << text_of(before);
+  EXPECT_TRUE(shows(after, "force  5 N┤")) << text_of(after);
+  EXPECT_TRUE(shows(after, "76254.00?N")) << text_of(after);
+}
+
+TEST(Monitor, TracesHaveAxesAndSensorsNumbersAndBothPressures) {
+  Model model = model_with_info();
+  for (std::uint32_t frame = 0; frame < 100; frame++) {
+    take_frame(model, 1000000 + 20000 * frame, frame, 0, 0, 5, GOOD);
+  }
+  Canvas canvas = one(model, 120, 40);
+  for (const char *text : {"force  5 N┤", "x    15 mm┤", "-15┤", "y    24 mm┤", "-24┤",
+                           "slip  1 mm┤", "0 s", "-5", "no., measured, fitted"}) {
+    EXPECT_TRUE(shows(canvas, text)) << text << "\n" << text_of(canvas);
+  }
+  for (int k = 0; k < 15; k++) {
+    EXPECT_TRUE(shows(canvas, " " + std::to_string(k) + " ")) << k << "\n" << text_of(canvas);
+  }
+  /* Of 5 N over 2 pi (5.7 mm)^2, 24.5 kPa, exp(-81 / 2 / 5.7^2) at 9 mm: 7.0 kPa; over a gain of a
+   * half 14 kPa. */
+  wire_packet info = test::make_info(0, 0);
+  info.body.info.stored = WIRE_STORED_CALIBRATION;
+  EXPECT_TRUE(shows(canvas, "7.0")) << text_of(canvas);
+  info.body.info.calibration = test::make_calibration();
+  for (int k = 0; k < 15; k++) {
+    info.body.info.calibration.sensors[k].gain = 0.5f;
+  }
+  model.take(info);
+  EXPECT_TRUE(shows(one(model, 120, 40), "14")) << text_of(one(model, 120, 40));
+}
+
+TEST(Monitor, WhileTaringThereAreNoPressures) {
+  Model model = model_with_info();
+  take_frame(model, 1000000, 1, 1, 2, 5, 0);
+  EXPECT_FALSE(shows(one(model), "101"));
+  EXPECT_TRUE(shows(one(model), "no zero yet"));
+}
+
+TEST(Monitor, WhatIsGoneHasNoRateAndNoNumbers) {
+  Model model = model_with_info();
+  for (std::uint32_t frame = 0; frame < 100; frame++) {
+    take_frame(model, 1000000 + 20000 * frame, frame, 4.5f, 4.5f, 5, GOOD);
+  }
+  EXPECT_TRUE(shows(one(model), "frames/s   50.0"));
+  model.set_state(Model::State::gone);
+  Canvas gone = one(model);
+  EXPECT_TRUE(shows(gone, "frames/s      -")) << text_of(gone);
+  EXPECT_TRUE(shows(gone, "gone, plug it in again"));
+  EXPECT_FALSE(shows(gone, "5.00 N"));
+}
+
+TEST(Monitor, EachCounterIsColouredByItself) {
+  Model model = model_with_info();
+  wire_packet health = test::make_health(0, 0);
+  health.body.health.bus_timeouts = health.body.health.bus_recoveries =
+      health.body.health.fit_failures = health.body.health.packets_dropped = 0;
+  health.body.health.bus_nacks = 1;
+  model.take(health);
+  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, GOOD);
+  Canvas canvas = one(model);
+  /* The colour of the number after a label. */
+  auto colour_after = [&](const std::string &label) {
+    for (int row = 0; row < canvas.rows(); row++) {
+      std::string line;
+      for (int column = 0; column < canvas.columns(); column++) {
+        const std::string &character = canvas.cell(column, row).character;
+        line += character.size() == 1 ? character : "?";
+      }
+      auto at = line.find(label);
+      if (at != std::string::npos) {
+        auto digit = line.find_first_of("0123456789", at);
+        return canvas.cell(static_cast<int>(digit), row).style.front;
+      }
+    }
+    return std::optional<Colour>();
+  };
+  auto plain = colour_after("stack free");
+  ASSERT_TRUE(plain);
+  EXPECT_FALSE(colour_after("NACKs") == plain);
+  for (const char *zero : {"timeouts", "recoveries", "no fit", "device drops", "dropped"}) {
+    EXPECT_TRUE(colour_after(zero) == plain) << zero;
+  }
+}
+
+TEST(Monitor, EverySizeIsLaidOut) {
+  Model model = model_with_info();
+  for (std::uint32_t frame = 0; frame < 100; frame++) {
+    take_frame(model, 1000000 + 20000 * frame, frame, 4.5f, 4.5f, 5, GOOD);
+  }
+  for (int columns = 80; columns <= 200; columns += 3) {
+    for (int rows = 24; rows <= 60; rows++) {
+      Canvas canvas = one(model, columns, rows);
+      for (const char *text : {"E660583883265A2C", "5.00 N", "x   +4.50", "y   +4.50", "frames/s",
+                               "no fit", "NACKs", "convert", "force  ", "x    15 mm┤",
+                               "y    24 mm┤", "slip  1 mm┤", "0 s", "keys", "note", "╯"}) {
+        ASSERT_TRUE(shows(canvas, text)) << text << " at " << columns << "x" << rows << "\n"
+                                         << text_of(canvas);
+      }
+    }
+  }
+  for (auto [columns, rows] : {std::pair{79, 24}, {80, 23}, {40, 10}, {10, 3}, {1, 1}}) {
+    Canvas canvas = one(model, columns, rows);
+    EXPECT_TRUE(columns < 40 || shows(canvas, "window too small")) << text_of(canvas);
+    EXPECT_TRUE(columns < 40 || shows(canvas, "5.00 N")) << text_of(canvas);
+  }
+}
+
+TEST(Monitor, SeveralStandSideBySide) {
+  std::vector<Model> models;
+  for (int i = 0; i < 12; i++) {
+    Model model = model_with_info();
+    wire_packet info = test::make_info(0, 0);
+    info.body.info.serial[0] = static_cast<char>('A' + i);
+    model.take(info);
+    for (std::uint32_t frame = 0; frame < 100; frame++) {
+      take_frame(model, 1000000 + 20000 * frame, frame, static_cast<float>(i), 2, 5, GOOD);
+    }
+    models.push_back(model);
+  }
+  auto serial = [](int i) {
+    return std::string(1, static_cast<char>('A' + i)) + "660583883265A2C";
+  };
+  for (auto [columns, rows, shown] :
+       {std::tuple{80, 24, 2}, {120, 24, 3}, {80, 46, 4}, {200, 60, 10}}) {
+    for (int count = 2; count <= 12; count++) {
+      Canvas canvas = draw_monitor({models.begin(), models.begin() + count}, {"keys", "note", ""},
+                                   columns, rows);
+      for (int i = 0; i < std::min(count, shown); i++) {
+        ASSERT_TRUE(shows(canvas, serial(i))) << text_of(canvas);
+        ASSERT_TRUE(shows(canvas, "+" + std::to_string(i) + ".00")) << text_of(canvas);
+      }
+      EXPECT_TRUE(shows(canvas, "x   ") && shows(canvas, "slip ") && shows(canvas, "0 s"))
+          << text_of(canvas);
+      EXPECT_EQ(shows(canvas, "a larger window shows more"), count > shown) << text_of(canvas);
+    }
+  }
+}
+
+TEST(Painter, WithoutColourTheLocationIsStillSeen) {
+  Model model = model_with_info();
+  take_frame(model, 1000000, 1, 4.5f, 4.5f, 15, GOOD);
+  for (auto characters : {Characters::utf_8, Characters::ascii}) {
+    std::string bytes = Painter(ColourDepth::none, characters).paint(one(model));
+    EXPECT_EQ(bytes.find("38;"), std::string::npos);
+    EXPECT_EQ(bytes.find("48;"), std::string::npos);
+    EXPECT_NE(bytes.find(characters == Characters::utf_8 ? "┼" : "-+-"), std::string::npos);
+    EXPECT_NE(bytes.find(characters == Characters::utf_8 ? "▒" : ":"), std::string::npos);
+  }
+}
