@@ -7,7 +7,7 @@ cd "$root"
 
 usage() {
   echo "usage: sh cmake/bootstrap.sh demo|test|report" >&2
-  echo "  demo    build everything, play presses and slips to the emulated fingertip, draw what it felt" >&2
+  echo "  demo    build everything, let a lime slip on two emulated fingertips, say and draw what they felt" >&2
   echo "  test    build everything and run the whole test suite" >&2
   echo "  report  build everything, measure fit, rate, cost and truth, repeat the published experiments in simulation, write build/report" >&2
   exit 2
@@ -49,6 +49,7 @@ sigrok-cli sigrok-cli
 /usr/lib/python3/dist-packages/numpy/__init__.py python3-numpy
 /usr/lib/python3/dist-packages/matplotlib/__init__.py python3-matplotlib
 /usr/lib/python3/dist-packages/markdown/__init__.py python3-markdown
+/usr/lib/python3/dist-packages/pyte/__init__.py python3-pyte
 LIST
 }
 
@@ -102,7 +103,11 @@ cmake --preset host > build/configure.log 2>&1 || { cat build/configure.log >&2;
 cmake --build --preset host
 
 case $1 in
-  demo) exec sh host_tools/demo/demo.sh ;;
+  demo)
+    stay=
+    [ -t 0 ] && [ -t 1 ] && stay=--stay
+    exec sh host_tools/demo/demo.sh $stay
+    ;;
   test) exec ctest --preset host -j 2 ;;
   report)
     say "the fit: error against run time"

@@ -162,7 +162,7 @@ void draw_warnings(Canvas &canvas, const Area &area, const Model &model, const N
     return;
   }
   if ((flags & CONTACT_FLAG_CONTACT) && !(flags & CONTACT_FLAG_FIT_VALID)) {
-    canvas.text(area.left, area.top, first_columns("contact, but no location", area.width),
+    canvas.text(area.left, area.top, first_columns("contact, no location", area.width),
                 text_style(WARNING, true));
     draw_warnings(canvas, {area.left, area.top + 1, area.width, area.height - 1}, model,
                   {{}, {}, {}, {}, {}, {}, {}, {}, {}, false, warnings_of(flags)});

@@ -1,38 +1,98 @@
 #!/bin/sh
-# Plays ten seconds of presses and slips to the emulated fingertip and draws what it felt.
+# A lime is gripped and slips, three times, on two emulated fingertips side by side: one with a pad of rubber and its
+# errors, one with an ideal pad. Says how far each was off, and draws what the one of rubber felt.
 # Everything goes to build/demo; run by `sh cmake/bootstrap.sh demo`.
+# usage: demo.sh [--stay]; --stay: goes on with the lime until Enter, for whoever wants to look
 set -eu
 root=$(cd "$(dirname "$0")/../.." && pwd)
 cd "$root"
 out=build/demo
 python=/usr/bin/python3
+tool=build/host/host_tools/cli/fingertip
+seconds=12 # three slips: at 20, 50 and 100 mm/s
+rubber=000000000000B0BB
+ideal=000000000001DEA1
 rm -rf $out
 mkdir -p $out
 
 fail() {
-  tail -n 20 $out/emulator.log >&2
-  echo "demo: $1; the emulator's whole log is $out/emulator.log" >&2
+  for name in rubber ideal; do
+    [ ! -s $out/$name.log ] || tail -n 10 $out/$name.log >&2
+  done
+  echo "demo: $1; the emulators' whole logs are $out/*.log" >&2
   exit 1
 }
 
-$python host_tools/python/scenario.py demo -o $out/scenario.csv
+# NAME SERIAL SCENARIO SECONDS [OPTION...]: its process is $!
+emulate() {
+  name=$1 serial=$2 scenario=$3 length=$4
+  shift 4
+  node host_tools/emulator/main.mjs --board pico_parallel --image build/pico_parallel/fingertip-pico_parallel.bin \
+    --serial "$serial" --scenario "$scenario" --seconds "$length" --pty $out/$name.tty --wait-open "$@" > $out/$name.log 2>&1 &
+}
 
-node host_tools/emulator/main.mjs --board pico_mux --image build/pico_mux/fingertip-pico_mux.bin \
-  --scenario $out/scenario.csv --pty $out/fingertip.tty --wait-open --report $out/run.json \
-  > $out/emulator.log 2>&1 &
-emulator=$!
-trap 'kill $emulator 2> /dev/null || true' EXIT
-while [ ! -e $out/fingertip.tty ]; do
-  kill -0 $emulator 2> /dev/null || fail "the emulator did not start"
-  sleep 0.1
+# NAME PROCESS
+wait_for_port() {
+  while [ ! -e $out/$1.tty ]; do
+    kill -0 "$2" 2> /dev/null || fail "the emulator did not start"
+    sleep 0.1
+  done
+}
+
+build/host/host_tools/twin/twin scene slip --indenter lime --layer 12 --effects gain=5,relaxation --seconds 600 --seed 3 \
+  --cache build/host/contact_tables -o $out/lime.csv > $out/twin.log 2>&1 || { cat $out/twin.log >&2; fail "the pad could not be computed"; }
+$python host_tools/demo/ideal.py $out/lime.csv -o $out/ideal.csv
+
+processes=
+trap 'kill $processes 2> /dev/null || true' EXIT
+emulate rubber $rubber $out/lime.csv $seconds --report $out/rubber.json
+rubber_process=$!
+processes=$rubber_process
+emulate ideal $ideal $out/ideal.csv $seconds --report $out/ideal.json --seed 2
+ideal_process=$!
+processes="$rubber_process $ideal_process"
+wait_for_port rubber $rubber_process
+wait_for_port ideal $ideal_process
+
+echo "== two fingertips at full rate: $rubber is of rubber, $ideal has an ideal pad"
+for name in rubber ideal; do
+  $tool set --port $out/$name.tty osr=256 rate=max > /dev/null || fail "the fingertip cannot be set"
 done
-
-build/host/host_tools/cli/fingertip monitor --port $out/fingertip.tty --until-gone --record $out/recording.csv ||
+FINGERTIP_PORT=$out/rubber.tty:$out/ideal.tty $tool monitor --device $rubber --device $ideal --until-gone --record $out/recording.csv ||
   fail "the monitor ended with an error"
-wait $emulator || fail "the emulator found something wrong"
-trap - EXIT
+for process in $processes; do
+  wait "$process" || fail "the emulator found something wrong"
+done
+processes=
 
-$python host_tools/python/evaluate.py $out/recording.csv $out/scenario.csv --run $out/run.json -o $out/summary.json
-$python host_tools/python/plot.py $out/recording.csv --truth $out/scenario.csv --run $out/run.json -o $out/demo.png
-cat $out/summary.json
+for name in rubber ideal; do
+  [ $name = rubber ] && serial=$rubber scenario=$out/lime.csv || serial=$ideal scenario=$out/ideal.csv
+  $python host_tools/python/evaluate.py $out/recording.csv "$scenario" --device "$serial" --run $out/$name.json -o $out/$name.summary.json
+done
+$python host_tools/python/plot.py $out/recording.csv --device $rubber --truth $out/lime.csv --run $out/rubber.json -o $out/demo.png
+$python host_tools/demo/errors.py "12 mm of rubber=$out/rubber.summary.json" "ideal=$out/ideal.summary.json"
+echo "The rubber's sensors differ by 5 %, it relaxes, and a lime's pressure is no Gaussian: fingertip calibrate finds what of it can be found."
 echo "picture: $out/demo.png"
+
+if [ "${1:-}" != --stay ]; then
+  echo "once more: $tool replay $out/recording.csv"
+  exit
+fi
+emulate rubber $rubber $out/lime.csv 600
+processes=$!
+wait_for_port rubber $processes
+cat << END
+
+The lime goes on slipping for ten minutes on a fingertip at FINGERTIP_PORT=$root/$out/rubber.tty. In another terminal, after
+
+    export FINGERTIP_PORT=$root/$out/rubber.tty PATH=\$PATH:$root/${tool%/*}
+
+try
+
+    fingertip monitor                          # space would pause a replay, q ends, t tares
+    fingertip info                             # who it is, how it is set, how its sensors are
+    fingertip record - --seconds 5 | head      # its numbers, for a program of your own
+
+Enter ends it.
+END
+read -r _ || true

@@ -15,6 +15,7 @@ without contact belong to neither.
     force_mape_frames          only frames with a true force above 0.2 N count for it
     contact_missed, contact_false     frames above 0.2 N without CONTACT; frames without contact but with CONTACT
     slip_found, slip_missed    true slips of at least 50 ms with, without a SLIP frame between start and end + 0.1 s
+    slip_delay_ms              of the found ones, from the start of the slip to the first SLIP frame
     slip_valid_lost            of these true slips, those with a frame without SLIP_VALID between start and end
     slip_false                 SLIP frames outside of all true slips; a slip's end is widened by the slip window,
                                over which the measure looks back
@@ -66,7 +67,8 @@ class Comparison:
 
         recorded = (self.t_s[0], self.t_s[-1])
         self.slips = [s for s in scenario.intervals("slip") if recorded[0] <= s[0] and s[1] <= recorded[1]]
-        found = missed = valid_lost = 0
+        missed = valid_lost = 0
+        delays_ms = []
         window_s = float(recording.metadata.get("slip_window_ms", DEFAULT_SLIP_WINDOW_ms)) / 1000
         outside = self.slip.copy()
         for start, end in scenario.intervals("slip"):
@@ -74,8 +76,9 @@ class Comparison:
         for start, end in self.slips:
             if end - start < SLIP_MIN_s:
                 continue
-            if (self.slip & (self.t_s >= start) & (self.t_s <= end + SLIP_LATE_s)).any():
-                found += 1
+            told = self.t_s[self.slip & (self.t_s >= start) & (self.t_s <= end + SLIP_LATE_s)]
+            if len(told):
+                delays_ms.append(round(1000 * float(told[0] - start), 1))
             else:
                 missed += 1
             during = (self.t_s >= start) & (self.t_s <= end)
@@ -97,8 +100,9 @@ class Comparison:
             "force_mape_frames": int(self.strong.sum()),
             "contact_missed": int((in_contact & (self.true_force_N > FORCE_MIN_N) & ~flag[CONTACT]).sum()),
             "contact_false": int((scenario.is_off("contact", self.t_s) & flag[CONTACT]).sum()),
-            "slip_found": found,
+            "slip_found": len(delays_ms),
             "slip_missed": missed,
+            "slip_delay_ms": delays_ms,
             "slip_valid_lost": valid_lost,
             "slip_false": int(outside.sum()),
             "total_us_median": float(np.median(total)),

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """The build's and the demo's scripts: what they compute, and the one line they end with when something is missing."""
+import json
 import os
 import pathlib
 import random
@@ -164,12 +165,14 @@ class Demo(Folder):
     def setUp(self):
         super().setUp()
         shutil.copytree(ROOT / "host_tools/demo", self.folder / "host_tools/demo")
-        for name in ("scenario", "evaluate", "plot"):
-            self.write(f"host_tools/python/{name}.py", """
+        for script in ("python/evaluate.py", "python/plot.py", "demo/ideal.py"):
+            self.write(f"host_tools/{script}", """
                 import sys
                 open(sys.argv[sys.argv.index("-o") + 1], "w").write("{}")
                 """)
-        self.monitor('test -e "$3"')
+        self.write("host_tools/demo/errors.py", "print('errors')\n")
+        self.write("build/host/host_tools/twin/twin", "#!/bin/sh\n").chmod(0o755)
+        self.monitor('case $1 in set) test -e "$3" ;; esac')
 
     def write(self, path, text):
         file = self.folder / path
@@ -188,14 +191,14 @@ class Demo(Folder):
     def monitor(self, body):
         self.write("build/host/host_tools/cli/fingertip", f"#!/bin/sh\n{body}\n").chmod(0o755)
 
-    def play(self):
-        return subprocess.run(["sh", self.folder / "host_tools/demo/demo.sh"], capture_output=True, text=True, timeout=60)
+    def play(self, *options, **how):
+        return subprocess.run(["sh", self.folder / "host_tools/demo/demo.sh", *options], capture_output=True, text=True, timeout=60, **how)
 
     def assert_fails(self, message, log):
         done = self.play()
         self.assertEqual(done.returncode, 1, done.stderr)
         lines = done.stderr.splitlines()
-        self.assertEqual(lines[-1], f"demo: {message}; the emulator's whole log is build/demo/emulator.log")
+        self.assertEqual(lines[-1], f"demo: {message}; the emulators' whole logs are build/demo/*.log")
         self.assertEqual(lines[-2], log)
         self.assertLessEqual(len(lines), 21)
 
@@ -204,6 +207,28 @@ class Demo(Folder):
         done = self.play()
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("picture: build/demo/demo.png", done.stdout)
+        self.assertIn("errors\n", done.stdout)
+
+    def test_it_stays_until_somebody_has_seen_enough(self):
+        self.emulator("writeFileSync(link, ''); later(process.argv.includes('600') ? 40000 : 500, () => { writeFileSync(link + '.late', ''); });")
+        done = self.play("--stay", input="\n")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for command in ("monitor", "info", "record - --seconds 5"):
+            self.assertIn(f"\n    fingertip {command} ", done.stdout)
+        self.assertIn("Enter ends it.", done.stdout)
+        self.assertIn(f"export FINGERTIP_PORT={self.folder.resolve()}/build/demo/rubber.tty", done.stdout)
+
+    def test_what_the_errors_are(self):
+        summary = {"frames_per_s": 1308.4, "localisation_median_mm": 0.426, "localisation_p95_mm": 1.05, "force_mape_percent": None, "slip_found": 2,
+                   "slip_missed": 1, "slip_delay_ms": [78.4, 30.0], "slip_false": 0, "dropped_packets": 0}
+        path = self.folder / "a.json"
+        path.write_text(json.dumps(summary))
+        done = subprocess.run([sys.executable, ROOT / "host_tools/demo/errors.py", f"rubber={path}", f"ideal={path}"], capture_output=True, text=True)
+        self.assertEqual(done.stderr, "")
+        self.assertIn("what the fingertip felt, against the truth         rubber        ideal\n", done.stdout)
+        self.assertRegex(done.stdout, r"location off by, median +0\.43 mm +0\.43 mm\n")
+        self.assertRegex(done.stdout, r"force off by, median +- +-\n")
+        self.assertRegex(done.stdout, r"slips found +2 of 3 +2 of 3\nafter their start by +78, 30 ms")
 
     def test_an_emulator_that_does_not_start(self):
         self.emulator("for (let i = 0; i < 100; i++) console.error(`line ${i}`); process.exitCode = 2;")

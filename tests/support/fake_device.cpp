@@ -11,7 +11,7 @@
  *     drop=N           every Nth frame loses its packets
  *     flip=N           every Nth frame has a flipped bit
  *     stall=N          says nothing more after N frames
- *     flags=BITS       of every contact packet
+ *     flags=BITS       of every contact packet; and whether they are tared, of raw packets
  *     absent=K,K...    these sensors are not there
  *     health=N         a health packet after every Nth frame, before its raw packet is sent; else
  *                      one after the first frame
@@ -262,7 +262,11 @@ private:
     if (health && frame_ % health == 0) {
       send_health();
     }
-    send(test::make_raw(0, t_us, frame));
+    wire_packet raw = test::make_raw(0, t_us, frame);
+    if (!(contact.body.contact.flags & CONTACT_FLAG_TARED)) {
+      raw.body.raw.flags &= ~std::uint32_t{CONTACT_FLAG_TARED};
+    }
+    send(raw);
     if (!health && frame_ == 1) {
       send_health();
     }

@@ -155,7 +155,7 @@ TEST(Monitor, ADoubtfulLocationLooksDoubtful) {
   EXPECT_TRUE(shows(one(model), "≥5.00?N"));
   take_frame(model, 5000000, 5, 1, 2, 5, CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED);
   Canvas unfitted = one(model);
-  EXPECT_TRUE(shows(unfitted, "contact, but no location")) << text_of(unfitted);
+  EXPECT_TRUE(shows(unfitted, "contact, no location")) << text_of(unfitted);
   EXPECT_FALSE(shows(unfitted, "+4.50"));
 }
 
