@@ -9,7 +9,7 @@ cd "$root"
 out=build/demo
 python=/usr/bin/python3
 tool=build/host/host_tools/cli/fingertip
-seconds=12 # three slips: at 20, 50 and 100 mm/s
+seconds=14 # three slips: at 20, 50 and 100 mm/s
 rubber=000000000000B0BB
 ideal=000000000001DEA1
 rm -rf $out
@@ -39,8 +39,12 @@ wait_for_port() {
   done
 }
 
-build/host/host_tools/twin/twin scene slip --indenter lime --layer 12 --effects gain=5,relaxation --seconds 600 --seed 3 \
-  --cache build/host/contact_tables -o $out/lime.csv > $out/twin.log 2>&1 || { cat $out/twin.log >&2; fail "the pad could not be computed"; }
+# SECONDS FILE
+play_lime() {
+  build/host/host_tools/twin/twin scene slip --indenter lime --layer 12 --effects gain=5,relaxation --seconds $1 --seed 3 \
+    --cache build/host/contact_tables -o $2 > $out/twin.log 2>&1 || { cat $out/twin.log >&2; fail "the pad could not be computed"; }
+}
+play_lime $seconds $out/lime.csv
 $python host_tools/demo/ideal.py $out/lime.csv -o $out/ideal.csv
 
 processes=
@@ -78,7 +82,8 @@ if [ "${1:-}" != --stay ]; then
   echo "once more: $tool replay $out/recording.csv"
   exit
 fi
-emulate rubber $rubber $out/lime.csv 600
+play_lime 600 $out/long.csv
+emulate rubber $rubber $out/long.csv 600
 processes=$!
 wait_for_port rubber $processes
 cat << END

@@ -47,6 +47,7 @@ RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *RAW_COLUMNS)
 
 # Flag bits of the contact packet, firmware/wire/PROTOCOL.md.
 CONTACT, FIT_VALID, SLIP_VALID, SLIP = 1 << 0, 1 << 1, 1 << 3, 1 << 4
+WARNINGS = 0x7FF00  # LOW_SIGNAL to SENSOR_DOUBTFUL, firmware/common/contact_flags.h: the numbers deserve less trust
 
 
 class InputError(Exception):

@@ -16,9 +16,9 @@ from matplotlib.patches import FancyBboxPatch
 
 from evaluate import Comparison, add_recording_options, check_time, load_recording
 from fingertip_files import (
-    FIT_VALID, SLIP, STAGES, InputError, check_output, read_run, read_scenario, run_tool, write_bytes)
+    FIT_VALID, SLIP, STAGES, WARNINGS, InputError, check_output, read_run, read_scenario, run_tool, write_bytes)
 
-INK, FAINT, TRUTH, MEASURED, SLIPPING = "#22252e", "#8a8f9c", "#b4bac6", "#1f6fd6", "#d93a3a"
+INK, FAINT, TRUTH, MEASURED, SLIPPING, DOUBTFUL = "#22252e", "#8a8f9c", "#b4bac6", "#1f6fd6", "#d93a3a", "#d08a00"
 RIM_mm = 6.0
 # All that a picture needs: 250 000 rows of these are 30 MB, of all columns 130.
 COLUMNS = ("t_us", "frame", "flags", "x_mm", "y_mm", "force_N")
@@ -64,7 +64,7 @@ def continuous_time_s(recording, rows):
     return t_s, t_s[restarts]
 
 
-def draw_pad(axes, recording, t_s, x, y, fitted, truth):
+def draw_pad(axes, recording, t_s, x, y, good, doubtful, truth):
     sensor_x, sensor_y = positions(recording)
     if len(sensor_x):
         corner = (sensor_x.min() - RIM_mm, sensor_y.min() - RIM_mm)
@@ -79,7 +79,8 @@ def draw_pad(axes, recording, t_s, x, y, fitted, truth):
         on = truth.truth["contact"] > 0.5
         axes.plot(np.where(on, truth.truth["x_mm"], np.nan), np.where(on, truth.truth["y_mm"], np.nan),
                   color=TRUTH, lw=5, solid_capstyle="round", zorder=2)
-    points = axes.scatter(x[fitted], y[fitted], c=t_s[fitted], s=9, cmap="plasma", lw=0, zorder=3)
+    axes.scatter(x[doubtful], y[doubtful], s=9, fc="none", ec=DOUBTFUL, lw=0.5, zorder=3)
+    points = axes.scatter(x[good], y[good], c=t_s[good], s=9, cmap="plasma", lw=0, zorder=3)
     bar = plt.colorbar(points, ax=axes, orientation="horizontal", pad=0.07, fraction=0.03, aspect=40)
     bar.set_label("time, s", size=8)
     bar.outline.set_visible(False)
@@ -95,7 +96,7 @@ def runs(t_s, on):
     return list(zip(t_s[np.flatnonzero(edges == 1)], t_s[np.flatnonzero(edges == -1) - 1]))
 
 
-def draw_over_time(axes, t_s, restarts_s, series, fitted, slip, truth):
+def draw_over_time(axes, t_s, restarts_s, series, good, doubtful, slip, truth):
     for panel in axes:
         for i, at_s in enumerate(restarts_s):
             panel.axvline(at_s, color=FAINT, lw=1, ls=":", label="restarted" if i == 0 else None)
@@ -105,7 +106,13 @@ def draw_over_time(axes, t_s, restarts_s, series, fitted, slip, truth):
             panel.plot(truth.t_s, np.where(on, truth.truth[name], np.nan), color=TRUTH, lw=4, label="truth", zorder=1)
             for start, end in truth.intervals("slip"):
                 panel.axvspan(start, end, color=SLIPPING, alpha=0.10, lw=0, zorder=0)
-        panel.plot(t_s, gaps_as_nan(t_s, values, fitted), color=MEASURED, lw=1.1, label="measured", zorder=2)
+        panel.plot(t_s, gaps_as_nan(t_s, values, good), color=MEASURED, lw=1.1, label="measured", zorder=2)
+        # What carries a warning is shown, but no axis is made for it.
+        low, high = panel.get_ylim()
+        panel.scatter(t_s[doubtful], values[doubtful], s=7, fc="none", ec=DOUBTFUL, lw=0.5, label="doubtful" if doubtful.any() else None, zorder=2)
+        if good.any() or truth is not None:
+            panel.set_ylim(low, high)
+        panel.set_xlim(t_s[0], t_s[-1])
         panel.set_ylabel(label)
         panel.grid(color="#e6e8ee", lw=0.6)
         panel.tick_params(labelbottom=panel is axes[-1])
@@ -115,7 +122,7 @@ def draw_over_time(axes, t_s, restarts_s, series, fitted, slip, truth):
         axes[-1].plot([start, max(end, start + 1e-3)], [mark, mark], color=SLIPPING, lw=4, solid_capstyle="butt",
                       label="slip found" if i == 0 else None)
     axes[-1].set_ylim(mark - 0.04 * (high - low), high)
-    axes[-1].legend(loc="upper right", ncol=3, fontsize=8, frameon=False)
+    axes[-1].legend(loc="upper right", ncol=4, fontsize=8, frameon=False)
     axes[-1].set_xlabel("time, s")
     axes[0].set_title("over time" + (" (shaded: true slip)" if truth is not None else ""), loc="left", size=10)
 
@@ -176,6 +183,8 @@ def main(argv):
     t_s, restarts_s = (comparison.t_s, ()) if comparison else continuous_time_s(recording, rows)
     x, y, force = (recording[name][rows] for name in ("x_mm", "y_mm", "force_N"))
     fitted, slip = recording.flag(FIT_VALID)[rows], recording.flag(SLIP)[rows]
+    doubtful = fitted & recording.flag(WARNINGS)[rows]
+    good = fitted & ~doubtful
 
     plt.rcParams.update({
         "font.size": 9, "axes.edgecolor": TRUTH, "axes.labelcolor": INK, "xtick.color": FAINT, "ytick.color": FAINT,
@@ -183,11 +192,11 @@ def main(argv):
     figure = plt.figure(figsize=(14, 9.2))
     grid = figure.add_gridspec(4 if comparison else 3, 3, width_ratios=[1.25, 1, 1], hspace=0.38, wspace=0.27,
                                left=0.055, right=0.985, top=0.87, bottom=0.06)
-    draw_pad(figure.add_subplot(grid[:, 0]), recording, t_s, x, y, fitted, truth)
+    draw_pad(figure.add_subplot(grid[:, 0]), recording, t_s, x, y, good, doubtful, truth)
     first = figure.add_subplot(grid[0, 1:])
     panels = [first, figure.add_subplot(grid[1, 1:], sharex=first), figure.add_subplot(grid[2, 1:], sharex=first)]
     series = [("x, mm", "x_mm", x), ("y, mm", "y_mm", y), ("force, N", "force_N", force)]
-    draw_over_time(panels, t_s, restarts_s, series, fitted, slip, truth)
+    draw_over_time(panels, t_s, restarts_s, series, good, doubtful, slip, truth)
     if comparison:
         draw_errors([figure.add_subplot(grid[3, 1]), figure.add_subplot(grid[3, 2])], comparison)
     title, lines = header(recording, comparison, t_s, options.run is not None)

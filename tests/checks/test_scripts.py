@@ -225,7 +225,7 @@ class Demo(Folder):
         path.write_text(json.dumps(summary))
         done = subprocess.run([sys.executable, ROOT / "host_tools/demo/errors.py", f"rubber={path}", f"ideal={path}"], capture_output=True, text=True)
         self.assertEqual(done.stderr, "")
-        self.assertIn("what the fingertip felt, against the truth         rubber        ideal\n", done.stdout)
+        self.assertIn("what the fingertip felt, against the truth      rubber       ideal\n", done.stdout)
         self.assertRegex(done.stdout, r"location off by, median +0\.43 mm +0\.43 mm\n")
         self.assertRegex(done.stdout, r"force off by, median +- +-\n")
         self.assertRegex(done.stdout, r"slips found +2 of 3 +2 of 3\nafter their start by +78, 30 ms")
@@ -240,7 +240,7 @@ class Demo(Folder):
 
     def test_a_monitor_that_fails(self):
         self.emulator("console.error('ready'); writeFileSync(link, ''); later(20000, () => {});")
-        self.monitor("exit 3")
+        self.monitor('test $1 = set || exit 3')
         self.assert_fails("the monitor ended with an error", "ready")
 
 

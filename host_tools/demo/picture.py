@@ -1,0 +1,140 @@
+#!/usr/bin/python3
+"""Draws the monitor's screen while it replays a recording, as an SVG.
+
+    picture.py RECORDING.csv -o FILE.svg [--device SERIAL] [--at S] [--size COLUMNSxROWS] [--tool PATH]
+
+The picture in the project's README is that of the end of the second slip on the rubber pad of the demo, at S seconds:
+
+    sh cmake/bootstrap.sh demo
+    /usr/bin/python3 host_tools/demo/picture.py build/demo/recording.csv --device 000000000000B0BB --at S -o host_tools/demo/monitor.svg
+"""
+import argparse
+import fcntl
+import html
+import os
+import pathlib
+import pty
+import re
+import select
+import struct
+import sys
+import termios
+import time
+
+import pyte
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "host_tools/python"))
+from fingertip_files import InputError, check_output, run_tool, write_text  # noqa: E402
+
+PATIENCE_s = 60
+SPEED = "8"  # times the recorded one, so that nobody waits
+WIDTH, HEIGHT = 8, 16  # of a cell
+BACKGROUND, FOREGROUND = "#0c0d16", "#dededf"
+
+
+def screen_at(command, columns, rows, at_s):
+    """The screen once it says that it is at this time."""
+    pid, terminal = pty.fork()
+    if pid == 0:
+        time.sleep(0.1)  # until the terminal has its size
+        environment = {k: v for k, v in os.environ.items() if k != "NO_COLOR"}
+        os.execve(command[0], command, {**environment, "TERM": "xterm", "COLORTERM": "truecolor", "LC_ALL": "C.UTF-8"})
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+    screen = pyte.Screen(columns, rows)
+    stream = pyte.ByteStream(screen)
+    end = time.monotonic() + PATIENCE_s
+    try:
+        while time.monotonic() < end:
+            if not select.select([terminal], [], [], 0.1)[0]:
+                continue
+            try:
+                output = os.read(terminal, 65536)
+            except OSError:
+                break
+            for part in re.split(rb"(?<=\x1b\[\?2026l)", output):
+                stream.feed(part)
+                told = re.search(r"at (\d+\.\d) s of ", screen.display[-1])
+                if part.endswith(b"\x1b[?2026l") and told and float(told.group(1)) >= at_s:
+                    os.write(terminal, b"q")
+                    return screen
+    finally:
+        os.close(terminal)
+        os.waitpid(pid, 0)
+    raise InputError(f"the monitor never came to {at_s} s; its last line: {screen.display[-1].strip()}")
+
+
+def colour(name, default):
+    return default if name == "default" else f"#{name}"
+
+
+def shapes(column, row, cell):
+    """A cell's character where it is better drawn than written."""
+    x, y, ink = column * WIDTH, row * HEIGHT, colour(cell.fg, FOREGROUND)
+    if cell.data in "▀▄":
+        return [f'<rect x="{x}" y="{y + (HEIGHT // 2 if cell.data == "▄" else 0)}" width="{WIDTH}" height="{HEIGHT // 2}" fill="{ink}"/>']
+    dots = ord(cell.data[0]) - 0x2800 if cell.data else -1
+    if 0 <= dots < 256:
+        places = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (0, 3), (1, 3)]
+        return [f'<circle cx="{x + 2 + 4 * i}" cy="{y + 2 + 4 * j}" r="1.4" fill="{ink}"/>' for bit, (i, j) in enumerate(places) if dots >> bit & 1]
+    return None
+
+
+def svg(screen):
+    columns, rows = screen.columns, screen.lines
+    out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {columns * WIDTH + 16} {rows * HEIGHT + 16}">',
+           f'<rect width="100%" height="100%" rx="8" fill="{BACKGROUND}"/>',
+           '<g transform="translate(8 8)" shape-rendering="crispEdges" font-family="DejaVu Sans Mono, Menlo, Consolas, monospace" font-size="13">']
+    marks, texts = [], []
+    for row in range(rows):
+        cells = [screen.buffer[row][column] for column in range(columns)]
+        start = 0
+        while start < columns:  # backgrounds, as long as they stay the same
+            end = start
+            while end < columns and cells[end].bg == cells[start].bg:
+                end += 1
+            if cells[start].bg != "default":
+                out.append(f'<rect x="{start * WIDTH}" y="{row * HEIGHT}" width="{(end - start) * WIDTH}" height="{HEIGHT}" '
+                           f'fill="{colour(cells[start].bg, BACKGROUND)}"/>')
+            start = end
+        column = 0
+        while column < columns:
+            cell = cells[column]
+            drawn = shapes(column, row, cell)
+            if drawn is not None or cell.data in " ":
+                marks += drawn or []
+                column += 1
+                continue
+            end = column  # a word of one style
+            while end < columns and cells[end].data != " " and shapes(end, row, cells[end]) is None \
+                    and (cells[end].fg, cells[end].bold) == (cell.fg, cell.bold):
+                end += 1
+            word = "".join(each.data for each in cells[column:end])
+            weight = ' font-weight="bold"' if cell.bold else ""
+            texts.append(f'<text x="{column * WIDTH}" y="{row * HEIGHT + 12}" textLength="{(end - column) * WIDTH}" '
+                         f'fill="{colour(cell.fg, FOREGROUND)}"{weight}>{html.escape(word)}</text>')
+            column = end
+    return "\n".join([*out, *marks, '<g shape-rendering="auto">', *texts, "</g></g>", "</svg>"]) + "\n"
+
+
+def main(argv):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("recording", metavar="RECORDING.csv")
+    parser.add_argument("-o", "--output", required=True, metavar="FILE.svg")
+    parser.add_argument("--device", metavar="SERIAL", help="one of several fingertips in the recording")
+    parser.add_argument("--at", type=float, default=0.0, metavar="S", help="time in the recording")
+    parser.add_argument("--size", default="110x32", metavar="COLUMNSxROWS")
+    parser.add_argument("--tool", default=str(ROOT / "build/host/host_tools/cli/fingertip"), metavar="PATH")
+    options = parser.parse_args(argv)
+    size = re.fullmatch(r"(\d+)x(\d+)", options.size)
+    if not size:
+        raise InputError(f"--size {options.size}: give COLUMNSxROWS, as 110x32")
+    check_output(options.output, options.recording)
+    recording = os.path.relpath(options.recording)
+    command = [options.tool, "replay", recording, "--speed", SPEED, *(["--device", options.device] if options.device else [])]
+    write_text(options.output, svg(screen_at(command, int(size[1]), int(size[2]), options.at)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run_tool("picture.py", main))
