@@ -41,7 +41,7 @@ wait_for_port() {
 
 # SECONDS FILE
 play_lime() {
-  build/host/host_tools/twin/twin scene slip --indenter lime --layer 12 --effects gain=5,relaxation --seconds $1 --seed 3 \
+  build/host/host_tools/twin/twin scenario slip --indenter lime --layer 12 --effects gain=5,relaxation --seconds $1 --seed 3 \
     --cache build/host/contact_tables -o $2 > $out/twin.log 2>&1 || { cat $out/twin.log >&2; fail "the pad could not be computed"; }
 }
 play_lime $seconds $out/lime.csv

@@ -1,12 +1,12 @@
-// twin: writes scenes that emulator and native pipeline play. Exit status: 0 done; 1 something went
-// wrong, said in one line; 2 wrong usage.
+// twin: writes scenarios that emulator and native pipeline play. Exit status: 0 done; 1 something
+// went wrong, said in one line; 2 wrong usage.
 #include "libfingertip/error.hpp"
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/text.hpp"
 #include "tool/advice.hpp"
 #include "twin/best_gaussian.hpp"
-#include "twin/scene_file.hpp"
+#include "twin/scenario_file.hpp"
 
 #include <CLI/CLI.hpp>
 #include <atomic>
@@ -27,7 +27,7 @@ constexpr double LAYER_MIN_mm = 3.0, LAYER_MAX_mm = 20.0;
 constexpr double WIDTH_FORCE_N = 2.0;
 
 struct Options {
-  SceneOptions scene;
+  ScenarioOptions scenario;
   std::string effects;
   std::string gain;
   std::string output;
@@ -81,8 +81,8 @@ std::filesystem::path cache_of(const Options &options) {
 }
 
 int list() {
-  std::printf("Scenes (twin scene KIND), usual length and force:\n");
-  for (const SceneKind &kind : scene_kinds()) {
+  std::printf("Scenarios (twin scenario KIND), usual length and force:\n");
+  for (const ScenarioKind &kind : scenario_kinds()) {
     std::printf("  %-14s%s; %s s, %s N\n", kind.name.c_str(), kind.description.c_str(),
                 number(kind.usual_seconds).c_str(), kind.usual_forces.c_str());
   }
@@ -168,8 +168,8 @@ ContactTable table_of(const std::string &name, const Layer &layer, const Options
 }
 
 int width(const Options &options) {
-  const Layer layer = layer_of(options.scene.layer_mm);
-  const std::string name = complete(options.scene).indenter;
+  const Layer layer = layer_of(options.scenario.layer_mm);
+  const std::string name = complete(options.scenario).indenter;
   const BestGaussian gaussian(table_of(name, layer, options), layer.thickness_mm);
   const BestGaussian::Fit fit = gaussian.at(WIDTH_FORCE_N);
   const double force_N = 2e-6 * M_PI * fit.p0_Pa * fit.sigma_mm * fit.sigma_mm;
@@ -178,8 +178,8 @@ int width(const Options &options) {
   return 0;
 }
 
-int scene(Options &options) {
-  SceneOptions &chosen = options.scene;
+int scenario(Options &options) {
+  ScenarioOptions &chosen = options.scenario;
   chosen.effects = parse_effects(options.effects);
   if (!options.gain.empty()) {
     const double percent = parse_effects("gain=" + options.gain).at("gain");
@@ -196,12 +196,12 @@ int scene(Options &options) {
   const ContactTable table = table_of(chosen.indenter, layer, options);
   const bool other = !chosen.second_indenter.empty() && chosen.second_indenter != chosen.indenter;
   const ContactTable second = other ? table_of(chosen.second_indenter, layer, options) : table;
-  const Scene made = make_scene(chosen, table);
+  const Scenario made = make_scenario(chosen, table);
   Written written;
   {
     ProgressBar bar(made.name, ProgressBar::Lines::none);
-    written = write_scene(made, layer, table, second, options.output, options.overwrite,
-                          [&](double share) { show(bar, share); });
+    written = write_scenario(made, layer, table, second, options.output, options.overwrite,
+                             [&](double share) { show(bar, share); });
   }
   std::printf("%s: %s, %zu contacts in %s s, %zu rows, %s MB, at most %s kPa\n",
               printable(options.output).c_str(), made.name.c_str(), made.acts.size(),
@@ -242,7 +242,7 @@ int run(int argc, char **argv) {
         ->type_name("DIR");
   };
 
-  app.add_subcommand("list", "Explain scenes, indenters, layers and effects")->callback([&] {
+  app.add_subcommand("list", "Explain scenarios, indenters, layers and effects")->callback([&] {
     action = list;
   });
 
@@ -260,10 +260,10 @@ int run(int argc, char **argv) {
 
   const auto with_contact = [&](CLI::App *command) {
     command
-        ->add_option("--indenter", options.scene.indenter,
+        ->add_option("--indenter", options.scenario.indenter,
                      "What presses; default sphere6, for placements sphere15")
         ->type_name("NAME");
-    command->add_option("--layer", options.scene.layer_mm, "Thickness of the rubber; default 12")
+    command->add_option("--layer", options.scenario.layer_mm, "Thickness of the rubber; default 12")
         ->type_name("MM");
   };
 
@@ -275,8 +275,8 @@ int run(int argc, char **argv) {
   fit->callback([&] { action = [&] { return width(options); }; });
 
   CLI::App *write =
-      app.add_subcommand("scene", "Write a scenario, and its events beside it: FILE.truth.csv");
-  SceneOptions &s = options.scene;
+      app.add_subcommand("scenario", "Write a scenario, and its events beside it: FILE.truth.csv");
+  ScenarioOptions &s = options.scenario;
   write->add_option("kind", s.kind, "What happens: see twin list")->required()->type_name("KIND");
   write->add_option("-o,--output", options.output, "The scenario to write")
       ->required()
@@ -284,7 +284,7 @@ int run(int argc, char **argv) {
   with_contact(write);
   write
       ->add_option("--second", s.second_indenter,
-                   "What presses too, in scenes of two contacts; "
+                   "What presses too, in scenarios of two contacts; "
                    "default: the same")
       ->type_name("NAME");
   write->add_option("--gain", options.gain, "Short for the effect gain; 0: none")
@@ -331,7 +331,7 @@ int run(int argc, char **argv) {
   write->add_option("--quiet", s.quiet_s, "Time between contacts; default 1.2")->type_name("S");
   write->add_flag("--overwrite", options.overwrite, "Replace files that exist");
   with_cache(write);
-  write->callback([&] { action = [&] { return scene(options); }; });
+  write->callback([&] { action = [&] { return scenario(options); }; });
 
   try {
     app.parse(argc, argv);

@@ -4,6 +4,7 @@ import json
 import os
 import pathlib
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -154,9 +155,15 @@ class BootstrapReport(Folder):
         self.assertEqual(lines[-1], f"== every table and picture: {self.folder.resolve()}/build/report/index.html")
         ran = [line.split()[1:] for line in lines if line.startswith("ran ")]
         self.assertEqual([place for _, place, _ in ran], 4 * ["build/report"])
-        for _, _, picture in ran:  # those of the README
+        for _, _, picture in ran:  # those that the report's README shows
             self.assertTrue((ROOT / picture).is_file(), picture)
-            self.assertIn(f"({picture})", (ROOT / "README.md").read_text(encoding="utf-8"))
+            place = os.path.relpath(picture, "host_tools/report")
+            self.assertIn(f"({place})", (ROOT / "host_tools/report/README.md").read_text(encoding="utf-8"))
+
+    def test_the_manuals_links_lead_somewhere(self):
+        for manual in ("README.md", *(str(path.relative_to(ROOT)) for path in ROOT.glob("*/*/README.md")), "host_tools/README.md"):
+            for link in re.findall(r"\]\((?!http)([^)#]+)", (ROOT / manual).read_text(encoding="utf-8")):
+                self.assertTrue(((ROOT / manual).parent / link).exists(), f"{manual}: {link}")
 
 
 class Demo(Folder):

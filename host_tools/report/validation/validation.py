@@ -3,7 +3,7 @@
 
     validation.py --build build/host --image build/pico_mux/fingertip-pico_mux.bin -o build/report
 
-Writes scenes with twin, plays them with fingertip_player through the firmware's own code, and compares what it says with
+Writes scenarios with twin, plays them with fingertip_player through the firmware's own code, and compares what it says with
 the truth, beside the figures of De Clercq et al., RA-L 2022 ("the paper"). Theirs are of hardware, these are of a
 simulation: they tell how far the method and this code carry on a pad that is as the model says, and what each error of a
 pad costs, not how good a fingertip is.
@@ -41,7 +41,7 @@ FORCE_MIN_N = 1.0
 STIFF_LAYER_mm = 6
 PRIOR_WIDTH_mm = 0.5
 SLIP_MARGIN_s = 0.5  # before and after the pusher moves
-SECONDS_MIN = 40  # of a scene that is made shorter: one contact of each kind at least
+SECONDS_MIN = 40  # of a scenario that is made shorter: one contact of each kind at least
 
 INDENTERS = ("sphere6", "sphere15", "cylinder6", "cube6")
 OBJECTS = ("ball_bearing", "bottle_cap", "lime", "ping_pong", "rubber_duck")
@@ -51,7 +51,7 @@ GAINS = (0, 10)
 STIFF_MARGINS_mm = (0, 4.5, 10)
 
 BUDGET_GAINS = (2, 5, 10, 15)
-# Every effect; the shortest scenes, too, get across the compensation's branch, which is 7 s from 9 degC.
+# Every effect; the shortest scenarios, too, get across the compensation's branch, which is 7 s from 9 degC.
 ALL = "all,branch=9"
 # What, effects, noise of the sensors.
 BUDGET = (
@@ -76,7 +76,7 @@ class Progress:
     def step(self, what):
         self.done += 1
         elapsed_s = time.monotonic() - self.start_s
-        text = f"{elapsed_s:5.0f} s  scene {self.done} of {self.total}: {what}"
+        text = f"{elapsed_s:5.0f} s  scenario {self.done} of {self.total}: {what}"
         if sys.stdout.isatty():
             print(f"\r{text:<78}", end="\n" if self.done == self.total else "", flush=True)
         elif self.done % 10 == 0 or self.done == self.total:
@@ -84,7 +84,7 @@ class Progress:
 
 
 @dataclasses.dataclass(frozen=True)
-class Scene:
+class Scenario:
     what: str  # what it is played for
     kind: str
     indenter: str
@@ -98,14 +98,14 @@ class Scene:
     noise: int = 1
     rate: object = PAPER_RATE_Hz
     raw: bool = False
-    options: tuple = ()  # more of twin scene
+    options: tuple = ()  # more of twin scenario
 
     def __str__(self):
         return f"{self.what}, {self.indenter}, {self.case}" + (f", pad {self.pad}" if self.pad > 1 else "")
 
 
 class Played:
-    """Arrays over the frames of one scene: time_s, truth and what was said; phases: rows of the truth file."""
+    """Arrays over the frames of one scenario: time_s, truth and what was said; phases: rows of the truth file."""
 
     def __init__(self, scenario, recording, truth):
         # The truth columns only: t_s, contact, x_mm, y_mm, force_N, (p0, sigma), slip
@@ -129,7 +129,7 @@ class Played:
 
 
 class Workshop:
-    """Scenes are written, played and read; the files go, the arrays stay."""
+    """Scenarios are written, played and read; the files go, the arrays stay."""
 
     def __init__(self, options, out):
         tools = pathlib.Path(options.build) / "host_tools"
@@ -143,12 +143,12 @@ class Workshop:
         self.work.mkdir(parents=True, exist_ok=True)
         self.indenters = set(options.indenters.split(",")) if options.indenters else None
         self.pads = options.pads
-        self.scenes, self.played, self.gaussians = [], {}, []
+        self.scenarios, self.played, self.gaussians = [], {}, []
 
     def add(self, what, kind, indenter, **more):
         """Nothing if its indenter is not among those asked for."""
         if self.indenters is None or indenter in self.indenters:
-            self.scenes.append(Scene(what, kind, indenter, **more))
+            self.scenarios.append(Scenario(what, kind, indenter, **more))
 
     def add_on_pads(self, what, kind, indenter, seconds, gain, **more):
         """Unequal sensors are drawn anew for each pad, the presses too: one pad's luck is not what the spread costs."""
@@ -158,7 +158,7 @@ class Workshop:
 
     def build_tables(self):
         """And the Gaussian that comes closest to each pressure on the base."""
-        pairs = sorted({(scene.indenter, scene.layer_mm) for scene in self.scenes})
+        pairs = sorted({(scenario.indenter, scenario.layer_mm) for scenario in self.scenarios})
         print(f"        contact tables: {len(pairs)} (the first time some five minutes)", flush=True)
         for layer_mm in sorted({layer for _, layer in pairs}):
             names = ",".join(sorted({name for name, layer in pairs if layer == layer_mm}))
@@ -176,36 +176,36 @@ class Workshop:
         """Of the stiff layer: the mean over what presses there, for a prior does not know which it will be."""
         return float(np.mean([g["sigma_mm"] for g in self.gaussians if g["layer_mm"] == STIFF_LAYER_mm]))
 
-    def play_one(self, scene):
-        name = f"scene{self.scenes.index(scene)}"
-        scenario, recording = self.work / f"{name}.csv", self.work / f"{name}.recording.csv"
-        seed = self.seed + scene.pad - 1
-        run(self.twin, "scene", scene.kind, "--indenter", scene.indenter, "--layer", scene.layer_mm, "--effects", scene.effects or "none",
-            "--seed", seed, "--seconds", min(scene.seconds, max(SECONDS_MIN, scene.seconds * self.scale)), "--cache", self.tables,
-            "-o", scenario, "--overwrite", *(() if scene.margin_mm is None else ("--margin", scene.margin_mm)), *scene.options)
-        run(self.player, "play", scenario, "-o", recording, "--overwrite", "--quiet", "--rate", scene.rate, "--noise", scene.noise,
-            "--seed", seed, *(("--raw",) if scene.raw else ()),
-            *(("--prior-sigma", self.prior_sigma_mm, "--prior-width", PRIOR_WIDTH_mm) if scene.prior else ()))
-        played = Played(scenario, recording, scenario.with_suffix(".truth.csv"))
-        for file in (scenario, scenario.with_suffix(".truth.csv"), recording):
+    def play_one(self, scenario):
+        name = f"scenario{self.scenarios.index(scenario)}"
+        path, recording = self.work / f"{name}.csv", self.work / f"{name}.recording.csv"
+        seed = self.seed + scenario.pad - 1
+        run(self.twin, "scenario", scenario.kind, "--indenter", scenario.indenter, "--layer", scenario.layer_mm, "--effects", scenario.effects or "none",
+            "--seed", seed, "--seconds", min(scenario.seconds, max(SECONDS_MIN, scenario.seconds * self.scale)), "--cache", self.tables,
+            "-o", path, "--overwrite", *(() if scenario.margin_mm is None else ("--margin", scenario.margin_mm)), *scenario.options)
+        run(self.player, "play", path, "-o", recording, "--overwrite", "--quiet", "--rate", scenario.rate, "--noise", scenario.noise,
+            "--seed", seed, *(("--raw",) if scenario.raw else ()),
+            *(("--prior-sigma", self.prior_sigma_mm, "--prior-width", PRIOR_WIDTH_mm) if scenario.prior else ()))
+        played = Played(path, recording, path.with_suffix(".truth.csv"))
+        for file in (path, path.with_suffix(".truth.csv"), recording):
             file.unlink()
         return played
 
     def play_all(self):
-        progress = Progress(len(self.scenes))
+        progress = Progress(len(self.scenarios))
         with concurrent.futures.ThreadPoolExecutor(2) as pool:
-            running = {pool.submit(self.play_one, scene): scene for scene in self.scenes}
+            running = {pool.submit(self.play_one, scenario): scenario for scenario in self.scenarios}
             for done in concurrent.futures.as_completed(running):
                 self.played[running[done]] = done.result()
                 progress.step(running[done])
         return time.monotonic() - progress.start_s
 
     def emulate(self, seconds):
-        """The image on the emulated chip plays a scene; its contact packets computed here from its pressures."""
+        """The image on the emulated chip plays a scenario; its contact packets computed here from its pressures."""
         if not self.image.exists():
             raise InputError(f"{self.image} is not there; build it: cmake --preset pico_mux && cmake --build --preset pico_mux")
         scenario, script, capture = self.work / "emulated.csv", self.work / "emulated.txt", self.work / "emulated.bin"
-        run(self.twin, "scene", "taps", "--indenter", "sphere6", "--layer", 12, "--effects", ALL, "--seconds", seconds, "--seed",
+        run(self.twin, "scenario", "taps", "--indenter", "sphere6", "--layer", 12, "--effects", ALL, "--seconds", seconds, "--seed",
             self.seed, "--cache", self.tables, "-o", scenario, "--overwrite")
         commands = [run(self.fingertip, "encode", *words).strip() for words in (("stream", "contact,raw"), ("info",), ("tare",))]
         script.write_text("0.7 dtr 1\n" + "".join(f"{0.72 + 0.01 * i:.2f} {word}\n" for i, word in enumerate(commands)))
@@ -214,9 +214,9 @@ class Workshop:
         return json.loads(run(self.player, "repeat", capture))
 
     def select(self, what, **wanted):
-        """What was played for it, those scenes only that have these members."""
-        return [self.played[scene] for scene in self.scenes
-                if scene.what == what and all(getattr(scene, name) == value for name, value in wanted.items())]
+        """What was played for it, those scenarios only that have these members."""
+        return [self.played[scenario] for scenario in self.scenarios
+                if scenario.what == what and all(getattr(scenario, name) == value for name, value in wanted.items())]
 
     def first(self, what, **wanted):
         return next(iter(self.select(what, **wanted)), None)
@@ -264,11 +264,11 @@ def plan(shop):
 
 
 class Samples:
-    """The located samples of some scenes."""
+    """The located samples of some scenarios."""
 
-    def __init__(self, scenes):
+    def __init__(self, scenarios):
         def gathered(member):
-            return np.concatenate([member(played)[played.located] for played in scenes])
+            return np.concatenate([member(played)[played.located] for played in scenarios])
 
         self.error_mm, self.flags = gathered(lambda p: p.error_mm), gathered(lambda p: p.flags)
         self.force_N, self.said_N = gathered(lambda p: p.force_N), gathered(lambda p: p.said["force_N"])
@@ -307,10 +307,10 @@ def scaled_force(pads):
             "mape_percent": float(100 * np.median(relative)), "p95_percent": float(100 * np.quantile(relative, 0.95))}
 
 
-def slip_steps(scenes):
-    """Of each act of slip scenes: speed, steps judged, steps right, seconds from the pusher's start to the first SLIP (NaN: none)."""
+def slip_steps(scenarios):
+    """Of each act of slip scenarios: speed, steps judged, steps right, seconds from the pusher's start to the first SLIP (NaN: none)."""
     rows = []
-    for played in scenes:
+    for played in scenarios:
         said = (played.flags & SLIP) != 0
         acts = {}
         for phase in played.phases:
@@ -340,8 +340,8 @@ def measure_location(shop):
     for kind in ("grid", "taps"):
         for indenter in INDENTERS:
             for case in (*GAINS, "all"):
-                if scenes := shop.select(kind, indenter=indenter, case=case):
-                    rows.append({"kind": kind, "indenter": indenter, "case": case, **Samples(scenes).location()})
+                if scenarios := shop.select(kind, indenter=indenter, case=case):
+                    rows.append({"kind": kind, "indenter": indenter, "case": case, **Samples(scenarios).location()})
     near_mm = {}
     for played in shop.select("grid", case=10):
         for phase in played.phases:
@@ -355,8 +355,8 @@ def measure_force(shop, scale):
     rows = []
     for kind in ("taps", "pokes", "high"):
         for gain in GAINS:
-            if scenes := shop.select(kind, case=gain):
-                samples = Samples(scenes)
+            if scenarios := shop.select(kind, case=gain):
+                samples = Samples(scenarios)
                 rows.append({"kind": kind, "gain": gain, "raw": samples.force(), "scaled": samples.force(scale)})
     every = Samples([p for kind in ("grid", "taps", "pokes", "high", "high biased") for p in shop.select(kind)])
     return {"force": rows, "force_r": every.force()["r"], "gaussians": shop.gaussians}
@@ -383,7 +383,7 @@ def measure_slip(shop):
     steady, fast = slip_steps(shop.select("slip", case="steady")), slip_steps(shop.select("slip fast"))
     speeds = [{"speed_mm_s": speed, "paper_rate": slip_success(steady[steady[:, 0] == speed]), "every_frame": slip_success(fast[fast[:, 0] == speed])}
               for speed in sorted(set(steady[:, 0]))]
-    dead = [{"dead_travel_mm": scene.case, **slip_success(slip_steps([shop.played[scene]]))} for scene in shop.scenes if scene.what == "dead travel"]
+    dead = [{"dead_travel_mm": scenario.case, **slip_success(slip_steps([shop.played[scenario]]))} for scenario in shop.scenarios if scenario.what == "dead travel"]
     every = slip_success(steady)
     return {"slip_success_percent": every["success_percent"], "slip_steps": every["steps"], "slip_by_object": rows, "slip_by_speed": speeds,
             "slip_by_dead_travel": dead}
@@ -395,11 +395,11 @@ def measure_budget(shop):
         if pads := shop.pads_of("budget", case=what):
             rows.append({"effect": what, "gain": gain_of(effects), "pads": len(pads), **Samples(shop.select("budget", case=what)).location(), "force": scaled_force(pads)})
     other = []
-    for scene in shop.scenes:
-        if scene.what == "other":
-            played = shop.played[scene]
+    for scenario in shop.scenarios:
+        if scenario.what == "other":
+            played = shop.played[scenario]
             samples = Samples([played])
-            other.append({"scene": scene.kind, **samples.trust(), **samples.location(),
+            other.append({"scenario": scenario.kind, **samples.trust(), **samples.location(),
                           "slip_percent": float(100 * np.mean((played.flags[played.touched] & SLIP) != 0))})
     return {"budget": rows, "other": other}
 
@@ -465,9 +465,9 @@ def main(argv):
     parser.add_argument("--image", required=True, metavar="FILE.bin", help="firmware for pico_mux")
     parser.add_argument("--tables", metavar="DIR", help="cache of the contact tables; default: contact_tables in the output")
     parser.add_argument("--seed", type=int, default=1, metavar="N")
-    parser.add_argument("--scale", type=float, default=1, metavar="FACTOR", help="of the scenes' lengths; default 1")
+    parser.add_argument("--scale", type=float, default=1, metavar="FACTOR", help="of the scenarios' lengths; default 1")
     parser.add_argument("--pads", type=int, default=8, metavar="N", help="with unequal sensors; default 8")
-    parser.add_argument("--indenters", metavar="NAME,...", help="only scenes with these; sphere6 must be among them")
+    parser.add_argument("--indenters", metavar="NAME,...", help="only scenarios with these; sphere6 must be among them")
     parser.add_argument("--emulated-seconds", type=float, default=12, metavar="S", help="of the image on the emulated chip; default 12")
     options = parser.parse_args(argv)
     if not 1 <= options.pads <= 100:

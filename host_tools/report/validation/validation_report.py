@@ -182,7 +182,7 @@ def write_slip(found, r):
     r.text("## Slip, step by step",
            "Success per step of 50 ms: SLIP against whether the pusher moves, from half a second before it starts to half a second after it "
            "stops; eq. (7), n = 2, threshold 0.75 mm, 20 Hz; speeds 20, 50, 100, 150 and 200 mm/s over 24 mm; elastic dead travel of 1 mm, which "
-           "counts as slip as in the paper. The contact moves as the kinematics of `twin scene slip` say: in the paper friction decides.")
+           "counts as slip as in the paper. The contact moves as the kinematics of `twin scenario slip` say: in the paper friction decides.")
     rows = []
     for row in found["slip_by_object"]:
         name = row["indenter"]
@@ -215,9 +215,9 @@ def write_budget(found, r):
         (row["effect"], row["pads"], f"{row['median_mm']:.3f}", f"{row['p95_mm']:.3f}", f"{row['force']['mape_percent']:.2f}",
          f"{row['force']['rmse_N']:.3f}", f"{row['force']['scale']:.3f}") for row in found["budget"]])
     if found["other"]:
-        r.text("Other scenes: share of samples with a warning, and of those off by more than 1 mm without one.")
-        r.table(("scene", "warned", "off by 1 mm, not warned", "median mm", "frames with SLIP"), [
-            (row["scene"], f"{row['warned_percent']:.1f} %", f"{row['bad_unflagged_percent']:.1f} %", f"{row['median_mm']:.2f}", f"{row['slip_percent']:.1f} %")
+        r.text("Other scenarios: share of samples with a warning, and of those off by more than 1 mm without one.")
+        r.table(("scenario", "warned", "off by 1 mm, not warned", "median mm", "frames with SLIP"), [
+            (row["scenario"], f"{row['warned_percent']:.1f} %", f"{row['bad_unflagged_percent']:.1f} %", f"{row['median_mm']:.2f}", f"{row['slip_percent']:.1f} %")
             for row in found["other"]])
 
 

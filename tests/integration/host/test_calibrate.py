@@ -1,4 +1,4 @@
-"""Calibrating, from the twin's scene to what the fingertip keeps: usage
+"""Calibrating, from the twin's scenario to what the fingertip keeps: usage
 test_calibrate.py FINGERTIP FAKE_DEVICE TWIN PLAYER TABLES [unittest arguments]."""
 import os
 import pathlib
@@ -32,7 +32,7 @@ def setUpModule():
 
 def make_recording(name, kind, *options, raw=True, rate="40"):
     scenario, played = (os.path.join(folder.name, name + end) for end in (".csv", ".recording.csv"))
-    subprocess.run([TWIN, "scene", kind, *options, "-o", scenario, "--cache", TABLES], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([TWIN, "scenario", kind, *options, "-o", scenario, "--cache", TABLES], check=True, stdout=subprocess.DEVNULL)
     subprocess.run([PLAYER, "play", scenario, "-o", played, "--quiet", "--rate", rate, *(["--raw"] if raw else [])],
                    check=True, stdout=subprocess.DEVNULL)
     return played, scenario

@@ -31,15 +31,15 @@ class TwinTest(unittest.TestCase):
         folder = tempfile.TemporaryDirectory(prefix="twin-test-")
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
-        self.csv = str(self.folder / "scene.csv")
+        self.csv = str(self.folder / "played.csv")
 
     def run_twin(self, *arguments, status=0, **options):
         done = subprocess.run([TWIN, *arguments], capture_output=True, text=True, timeout=PATIENCE_s, **options)
         self.assertEqual(done.returncode, status, (arguments, done.stdout, done.stderr))
         return done.stdout, done.stderr
 
-    def scene(self, *arguments, path=None, **options):
-        return self.run_twin("scene", *arguments, "-o", path or self.csv, "--cache", TABLES, **options)
+    def scenario(self, *arguments, path=None, **options):
+        return self.run_twin("scenario", *arguments, "-o", path or self.csv, "--cache", TABLES, **options)
 
     def error(self, *arguments, status=1, **options):
         out, err = self.run_twin(*arguments, status=status, **options)
@@ -48,11 +48,11 @@ class TwinTest(unittest.TestCase):
         self.assertTrue(err.startswith("twin: "), err)
         return err
 
-    def scene_error(self, *arguments, **options):
-        return self.error("scene", *arguments, "-o", self.csv, "--cache", TABLES, **options)
+    def scenario_error(self, *arguments, **options):
+        return self.error("scenario", *arguments, "-o", self.csv, "--cache", TABLES, **options)
 
     def events(self):
-        lines = (self.folder / "scene.truth.csv").read_text().splitlines()
+        lines = (self.folder / "played.truth.csv").read_text().splitlines()
         self.assertEqual(lines[0], "# fingertip-truth 1")
         return list(csv.DictReader(line for line in lines if not line.startswith("#")))
 
@@ -64,21 +64,21 @@ class Files(TwinTest):
         for kind in names:
             with self.subTest(kind):
                 seconds = 34 if kind == "cycle" else 12
-                self.scene(kind, "--seconds", str(seconds), "--effects", "all", "--overwrite")
-                scene = fingertip_files.read_scenario(self.csv)
+                self.scenario(kind, "--seconds", str(seconds), "--effects", "all", "--overwrite")
+                scenario = fingertip_files.read_scenario(self.csv)
                 times = [0, 1.8, 7.3, seconds]
                 done = subprocess.run(["node", "--input-type=module", "-e", READ_AS_THE_EMULATOR_DOES, self.csv, *map(str, times)],
                                       capture_output=True, text=True, check=True, timeout=PATIENCE_s)
                 emulator = json.loads(done.stdout)
                 self.assertEqual(emulator["end_s"], seconds)
-                self.assertEqual(emulator["rows"], len(scene.t_s))
-                self.assertEqual(emulator["metadata"], scene.metadata)
-                self.assertEqual(scene.metadata["name"],
+                self.assertEqual(emulator["rows"], len(scenario.t_s))
+                self.assertEqual(emulator["metadata"], scenario.metadata)
+                self.assertEqual(scenario.metadata["name"],
                                  f"{kind}-{'sphere15' if kind == 'placements' else 'sphere6'}-h12-gain10-drift-relaxation-hysteresis-aftereffect-temperature-branch-bias-clip")
                 for t_s, sensors in zip(times, emulator["at"]):
                     for k, sensor in enumerate(sensors):
                         self.assertAlmostEqual(
-                            sensor["pressure_Pa"] - 101325, fingertip_files.np.interp(t_s, scene.t_s, scene.sensors_Pa[:, k]), places=6)
+                            sensor["pressure_Pa"] - 101325, fingertip_files.np.interp(t_s, scenario.t_s, scenario.sensors_Pa[:, k]), places=6)
                         self.assertTrue(5 <= sensor["temperature_degC"] < 31)
                 events = self.events()
                 held = [row for row in events if float(row["force_N"]) > 0 or float(row["force_end_N"]) > 0]
@@ -86,47 +86,47 @@ class Files(TwinTest):
                 # Where the events say that something presses, so does the scenario.
                 for row in events:
                     middle = (float(row["t_begin_s"]) + float(row["t_end_s"])) / 2
-                    self.assertTrue(scene.is_on("contact", middle), row)
+                    self.assertTrue(scenario.is_on("contact", middle), row)
                     slips = row["phase"] in ("dead_travel", "slip")
-                    self.assertEqual(bool(scene.is_on("slip", middle)), slips, row)
+                    self.assertEqual(bool(scenario.is_on("slip", middle)), slips, row)
                     force = float(row["force_end_N"]) + float(row["force2_end_N"] or 0)
-                    self.assertAlmostEqual(scene.at("force_N", float(row["t_end_s"])), force, delta=0.02, msg=row)
+                    self.assertAlmostEqual(scenario.at("force_N", float(row["t_end_s"])), force, delta=0.02, msg=row)
                 acts = {row["act"]: row for row in events}
-                self.assertEqual(len(scene.intervals("contact")), len(acts))
+                self.assertEqual(len(scenario.intervals("contact")), len(acts))
 
     def test_same_options_same_bytes_and_other_seeds_others(self):
         options = ("taps", "--seconds", "20", "--gain", "10", "--effects", "relaxation,hysteresis")
         files = {}
         for name, more in {"a": (), "b": (), "seed": ("--seed", "2"), "pad": ("--pad", "2")}.items():
-            path = self.folder / name / "scene.csv"
+            path = self.folder / name / "played.csv"
             path.parent.mkdir()
-            self.scene(*options, *more, path=str(path))
-            files[name] = (path.read_bytes(), (path.parent / "scene.truth.csv").read_bytes())
+            self.scenario(*options, *more, path=str(path))
+            files[name] = (path.read_bytes(), (path.parent / "played.truth.csv").read_bytes())
         self.assertEqual(files["a"], files["b"])
         self.assertNotEqual(files["a"][1], files["seed"][1])
         self.assertEqual(files["a"][1], files["pad"][1])
         self.assertNotEqual(files["a"][0], files["pad"][0])
 
     def test_readings_return_to_zero_between_contacts(self):
-        self.scene("high", "--seconds", "20", "--effects", "relaxation,hysteresis,gain,clip,bias")
-        scene = fingertip_files.read_scenario(self.csv)
-        intervals = scene.intervals("contact")
+        self.scenario("high", "--seconds", "20", "--effects", "relaxation,hysteresis,gain,clip,bias")
+        scenario = fingertip_files.read_scenario(self.csv)
+        intervals = scenario.intervals("contact")
         for (_, end), (begin, _) in zip(intervals, intervals[1:]):
             self.assertGreaterEqual(begin - end, 1.2)
-            quiet = (scene.t_s > end + 0.002) & (scene.t_s < begin - 0.002)
-            self.assertFalse(scene.sensors_Pa[quiet].any())
+            quiet = (scenario.t_s > end + 0.002) & (scenario.t_s < begin - 0.002)
+            self.assertFalse(scenario.sensors_Pa[quiet].any())
 
     def test_a_cold_pad_reads_one_step_and_old_temperatures(self):
         # Almost no force; the firmware keeps a branch for 0.3 K, 3 s, and its temperature for half a second: some 24 Pa at 0.1 K/s.
-        self.scene("taps", "--force", "0.02", "--quiet", "60", "--seconds", "70", "--effects", "branch=7")
+        self.scenario("taps", "--force", "0.02", "--quiet", "60", "--seconds", "70", "--effects", "branch=7")
         recording = str(self.folder / "recording.csv")
         subprocess.run([PLAYER, "play", self.csv, "-o", recording, "--quiet", "--raw", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s)
-        scene, played = fingertip_files.read_scenario(self.csv), fingertip_files.read_recording(recording)
+        scenario, played = fingertip_files.read_scenario(self.csv), fingertip_files.read_recording(recording)
         t_s, read_Pa = played["t_us"] * 1e-6, played.sensors_Pa - 101325
         crossing_s = 10 * (9.665 - 7)
         for k in range(15):
             with self.subTest(sensor=k):
-                off_Pa = read_Pa[:, k] - fingertip_files.np.interp(t_s, scene.t_s, scene.sensors_Pa[:, k])
+                off_Pa = read_Pa[:, k] - fingertip_files.np.interp(t_s, scenario.t_s, scenario.sensors_Pa[:, k])
                 for begin_s, end_s in ((3, crossing_s - 2), (crossing_s + 8, 58)):
                     steady = (t_s > begin_s) & (t_s < end_s)
                     self.assertLess(off_Pa[steady].max(), 1)
@@ -135,16 +135,16 @@ class Files(TwinTest):
                 self.assertLess(read_Pa[late, k].max(), 10)
                 self.assertGreater(read_Pa[(t_s > crossing_s + 8) & (t_s < 58), k].max(), 40)
 
-    def test_long_scenes_stay_small(self):
-        self.scene("slip", "--seconds", "400", "--effects", "all", "--stick-slip", "1")
+    def test_long_scenarios_stay_small(self):
+        self.scenario("slip", "--seconds", "400", "--effects", "all", "--stick-slip", "1")
         self.assertLess(os.path.getsize(self.csv), 60e6 * 400 / 2000)
 
     def test_nothing_but_the_two_files_is_left(self):
-        self.scene("taps", "--seconds", "5")
-        self.assertEqual(sorted(os.listdir(self.folder)), ["scene.csv", "scene.truth.csv"])
+        self.scenario("taps", "--seconds", "5")
+        self.assertEqual(sorted(os.listdir(self.folder)), ["played.csv", "played.truth.csv"])
 
     def test_an_interrupt_leaves_nothing(self):
-        twin = subprocess.Popen([TWIN, "scene", "slip", "--seconds", "7200", "--effects", "all", "-o", self.csv, "--cache", TABLES],
+        twin = subprocess.Popen([TWIN, "scenario", "slip", "--seconds", "7200", "--effects", "all", "-o", self.csv, "--cache", TABLES],
                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         end = time.monotonic() + PATIENCE_s
         while not any(path.stat().st_size for path in self.folder.iterdir()):
@@ -156,17 +156,17 @@ class Files(TwinTest):
         self.assertEqual(os.listdir(self.folder), [])
 
     def test_a_full_disk_leaves_older_files_as_they_were(self):
-        self.scene("taps", "--seconds", "5")
-        before = [(self.folder / name).read_bytes() for name in ("scene.csv", "scene.truth.csv")]
+        self.scenario("taps", "--seconds", "5")
+        before = [(self.folder / name).read_bytes() for name in ("played.csv", "played.truth.csv")]
 
         def small_disk():
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (100000, 100000))
 
-        err = self.scene_error("taps", "--seconds", "60", "--overwrite", preexec_fn=small_disk)
-        self.assertIn("scene.csv", err)
-        self.assertEqual(before, [(self.folder / name).read_bytes() for name in ("scene.csv", "scene.truth.csv")])
-        self.assertEqual(sorted(os.listdir(self.folder)), ["scene.csv", "scene.truth.csv"])
+        err = self.scenario_error("taps", "--seconds", "60", "--overwrite", preexec_fn=small_disk)
+        self.assertIn("played.csv", err)
+        self.assertEqual(before, [(self.folder / name).read_bytes() for name in ("played.csv", "played.truth.csv")])
+        self.assertEqual(sorted(os.listdir(self.folder)), ["played.csv", "played.truth.csv"])
 
 
 class Usage(TwinTest):
@@ -188,25 +188,25 @@ class Usage(TwinTest):
         self.assertAlmostEqual(float(found["force_share"]), 0.9, delta=0.02)
 
     def test_existing_files_stay_unless_told(self):
-        self.scene("taps", "--seconds", "5")
-        self.assertIn("exists already; choose another name, or --overwrite", self.scene_error("taps", "--seconds", "5"))
+        self.scenario("taps", "--seconds", "5")
+        self.assertIn("exists already; choose another name, or --overwrite", self.scenario_error("taps", "--seconds", "5"))
         os.remove(self.csv)
-        self.assertIn("scene.truth.csv: exists already", self.scene_error("taps", "--seconds", "5"))
-        self.scene("taps", "--seconds", "5", "--overwrite")
+        self.assertIn("played.truth.csv: exists already", self.scenario_error("taps", "--seconds", "5"))
+        self.scenario("taps", "--seconds", "5", "--overwrite")
 
     def test_wrong_words_are_told_before_a_table_is_solved(self):
         for arguments in (("slide",), ("taps", "--seconds", "0"), ("taps", "--force", "x")):
-            self.error("scene", *arguments, "-o", self.csv, "--cache", str(self.folder / "cache"))
+            self.error("scenario", *arguments, "-o", self.csv, "--cache", str(self.folder / "cache"))
             self.assertFalse((self.folder / "cache").exists())
 
     def test_the_help_is_the_same_for_everybody(self):
-        out, _ = self.run_twin("scene", "--help", env={**os.environ, "XDG_CACHE_HOME": "/somewhere/else"})
+        out, _ = self.run_twin("scenario", "--help", env={**os.environ, "XDG_CACHE_HOME": "/somewhere/else"})
         self.assertIn("~/.cache/fingertip/contact-tables", out)
         self.assertNotIn("/somewhere/else", out)
 
     def test_wrong_words_are_told_in_one_line(self):
         for arguments, what in {
-            ("slide",): 'there is no kind of scene "slide"; give one of: grid, taps',
+            ("slide",): 'there is no kind of scenario "slide"; give one of: grid, taps',
             ("taps", "--indenter", "finger"): 'there is no indenter "finger"',
             ("two", "--second", "finger"): 'there is no indenter "finger"',
             ("taps", "--layer", "1"): "--layer 1 is out of range; give 3 to 20 mm",
@@ -218,18 +218,18 @@ class Usage(TwinTest):
             ("taps", "--force", "much"): '--force "much" is not possible',
             ("taps", "--speed", "20"): "--speed says nothing",
         }.items():
-            self.assertIn(what, self.scene_error(*arguments))
+            self.assertIn(what, self.scenario_error(*arguments))
             self.assertEqual(os.listdir(self.folder), [])
-        self.assertIn("/no/such/place.csv: No such file or directory", self.error("scene", "taps", "-o", "/no/such/place.csv"))
-        for arguments in (("scene",), ("scene", "taps"), ("draw",), ("scene", "taps", "-o", self.csv, "--seed", "-1"),
-                          ("scene", "taps", "-o", self.csv, "--pad", "1.5"),
-                          ("scene", "taps", "-o", self.csv, "--seconds", "x"), ()):
+        self.assertIn("/no/such/place.csv: No such file or directory", self.error("scenario", "taps", "-o", "/no/such/place.csv"))
+        for arguments in (("scenario",), ("scenario", "taps"), ("draw",), ("scenario", "taps", "-o", self.csv, "--seed", "-1"),
+                          ("scenario", "taps", "-o", self.csv, "--pad", "1.5"),
+                          ("scenario", "taps", "-o", self.csv, "--seconds", "x"), ()):
             self.error(*arguments, status=2)
 
     def test_a_cache_that_cannot_be_is_told(self):
         blocked = self.folder / "file"
         blocked.write_text("")
-        err = self.error("scene", "taps", "-o", self.csv, "--cache", str(blocked / "cache"), "--indenter", "sphere6", "--layer", "12")
+        err = self.error("scenario", "taps", "-o", self.csv, "--cache", str(blocked / "cache"), "--indenter", "sphere6", "--layer", "12")
         self.assertIn("file/cache: cannot keep contact tables here; give another --cache", err)
 
 

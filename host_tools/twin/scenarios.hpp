@@ -1,6 +1,6 @@
-// Scenes: what happens to a pad over time, each composed from a kind, an indenter, a layer and the
-// errors of a pad. kinds() lists the kinds; De Clercq et al., RA-L 2022 ("the paper"), section IV,
-// is what they follow. scene_file.hpp writes them down.
+// Scenarios: what happens to a pad over time, each composed from a kind, an indenter, a layer and
+// the errors of a pad. kinds() lists the kinds; De Clercq et al., RA-L 2022 ("the paper"), section
+// IV, is what they follow. scenario_file.hpp writes them down.
 //
 // Nothing touches the pad for the first START_QUIET_s, nor for quiet_s after each contact: time for
 // the 16 frames of the firmware's tare at 20 frames a second; the paper, too, sets its readings to
@@ -34,13 +34,13 @@ constexpr double START_QUIET_s = 1.5;
 constexpr double AMBIENT_Pa = 101325.0;
 constexpr double PAD_HALF_WIDTH_mm = 15.0; // in x; the paper's box is 30 mm by 50 mm
 
-struct SceneKind {
+struct ScenarioKind {
   std::string name;
   double usual_seconds;
   std::string usual_forces;
   std::string description;
 };
-const std::vector<SceneKind> &scene_kinds();
+const std::vector<ScenarioKind> &scenario_kinds();
 
 // "5": always that; "1,2,5": one after the other; "1..15": anywhere between, uniform. In N.
 class Forces {
@@ -55,7 +55,7 @@ private:
   bool range_ = false;
 };
 
-struct SceneOptions {
+struct ScenarioOptions {
   std::string kind = "taps";
   std::string indenter;        // empty: the kind's usual one
   std::string second_indenter; // kind "two"; empty: as the first
@@ -74,7 +74,7 @@ struct SceneOptions {
 // A stretch of one act in which one thing goes on.
 struct Phase {
   std::string name;
-  double begin_s, end_s; // in the scene
+  double begin_s, end_s; // in the scenario
   bool slip = false;
 };
 
@@ -90,18 +90,18 @@ struct Act {
   bool slips(double t_s) const;
 };
 
-struct Scene {
-  SceneOptions options; // complete
+struct Scenario {
+  ScenarioOptions options; // complete
   std::string name;
   std::vector<Act> acts; // in order of time, none overlap
 };
 
 // With all that was left open filled in. Throws Error for an unknown kind or what is out of
 // range.
-SceneOptions complete(const SceneOptions &options);
+ScenarioOptions complete(const ScenarioOptions &options);
 
 // The tables are those of the indenters on the layer: creep and rolling need the contact's size.
-// Throws Error as complete does, and if the scene is too short for one contact.
-Scene make_scene(const SceneOptions &options, const ContactTable &table);
+// Throws Error as complete does, and if the scenario is too short for one contact.
+Scenario make_scenario(const ScenarioOptions &options, const ContactTable &table);
 
 } // namespace fingertip::twin

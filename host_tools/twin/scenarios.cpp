@@ -1,4 +1,4 @@
-#include "twin/scenes.hpp"
+#include "twin/scenarios.hpp"
 
 #include "libfingertip/error.hpp"
 #include "libfingertip/random.hpp"
@@ -53,11 +53,11 @@ struct Place {
 // Puts acts one after the other.
 class Stage {
 public:
-  Stage(const SceneOptions &scene_options, const ContactTable &contact_table,
+  Stage(const ScenarioOptions &scenario_options, const ContactTable &contact_table,
         const Forces &pressing)
-      : options(scene_options), table(contact_table), forces(pressing), t_s_(START_QUIET_s) {}
+      : options(scenario_options), table(contact_table), forces(pressing), t_s_(START_QUIET_s) {}
 
-  // The act's times count from its beginning; false, and the scene is full, if it does not fit.
+  // The act's times count from its beginning; false, and the scenario is full, if it does not fit.
   bool play(Act act) {
     const double length_s = act.phases.back().end_s;
     if (t_s_ + length_s + options.quiet_s > *options.seconds + 1e-9) {
@@ -80,7 +80,7 @@ public:
     return {at_x, random.uniform(-y, y)};
   }
 
-  const SceneOptions &options;
+  const ScenarioOptions &options;
   const ContactTable &table;
   const Forces &forces;
   std::vector<Act> acts;
@@ -337,7 +337,7 @@ Act two(const Stage &stage, std::size_t n) {
 }
 
 struct Kind {
-  SceneKind kind;
+  ScenarioKind kind;
   Act (*act)(const Stage &stage, std::size_t n);
   const char *usual_indenter = "sphere6";
   double usual_margin_mm = 0.5 * GRID_STEP_mm;
@@ -367,7 +367,7 @@ const std::vector<Kind> &all_kinds() {
   return all;
 }
 
-const Kind &kind_of(const SceneOptions &options) {
+const Kind &kind_of(const ScenarioOptions &options) {
   std::string names;
   for (const Kind &one : all_kinds()) {
     if (one.kind.name == options.kind) {
@@ -375,7 +375,7 @@ const Kind &kind_of(const SceneOptions &options) {
     }
     names += (names.empty() ? "" : ", ") + one.kind.name;
   }
-  throw Error("there is no kind of scene \"" + printable(options.kind) +
+  throw Error("there is no kind of scenario \"" + printable(options.kind) +
               "\"; give one of: " + names);
 }
 
@@ -387,7 +387,7 @@ void check(const char *option, double value, double lowest, double highest) {
 }
 
 // What shows all that differs but the seeds, the length and the kind's own settings.
-std::string name_of(const SceneOptions &options) {
+std::string name_of(const ScenarioOptions &options) {
   std::string name = options.kind + "-" + options.indenter;
   if (!options.second_indenter.empty()) {
     name += "+" + options.second_indenter;
@@ -406,9 +406,9 @@ std::string name_of(const SceneOptions &options) {
 
 } // namespace
 
-const std::vector<SceneKind> &scene_kinds() {
-  static const std::vector<SceneKind> kinds = [] {
-    std::vector<SceneKind> list;
+const std::vector<ScenarioKind> &scenario_kinds() {
+  static const std::vector<ScenarioKind> kinds = [] {
+    std::vector<ScenarioKind> list;
     for (const Kind &one : all_kinds()) {
       list.push_back(one.kind);
     }
@@ -460,9 +460,9 @@ bool Act::slips(double t_s) const {
   return slips;
 }
 
-SceneOptions complete(const SceneOptions &options) {
-  const SceneKind &kind = kind_of(options).kind;
-  SceneOptions chosen = options;
+ScenarioOptions complete(const ScenarioOptions &options) {
+  const ScenarioKind &kind = kind_of(options).kind;
+  ScenarioOptions chosen = options;
   chosen.seconds = milliseconds(options.seconds.value_or(kind.usual_seconds));
   chosen.indenter = options.indenter.empty() ? kind_of(options).usual_indenter : options.indenter;
   chosen.margin_mm = options.margin_mm.value_or(kind_of(options).usual_margin_mm);
@@ -478,22 +478,22 @@ SceneOptions complete(const SceneOptions &options) {
     check("--speed", speed_mm_s, 1.0, 1000.0);
   }
   if (!chosen.speeds_mm_s.empty() && chosen.kind != "slip" && chosen.kind != "rolloff") {
-    throw Error("--speed says nothing in a scene of \"" + chosen.kind +
+    throw Error("--speed says nothing in a scenario of \"" + chosen.kind +
                 "\"; leave it out, or choose slip or rolloff");
   }
   if (!chosen.second_indenter.empty() && chosen.kind != "two") {
-    throw Error("--second says nothing in a scene of \"" + chosen.kind +
+    throw Error("--second says nothing in a scenario of \"" + chosen.kind +
                 "\"; leave it out, or choose two");
   }
   static_cast<void>(Forces(chosen.forces));
   return chosen;
 }
 
-Scene make_scene(const SceneOptions &options, const ContactTable &table) {
+Scenario make_scenario(const ScenarioOptions &options, const ContactTable &table) {
   const Kind &kind = kind_of(options);
-  Scene scene;
-  scene.options = complete(options);
-  const SceneOptions &chosen = scene.options;
+  Scenario scenario;
+  scenario.options = complete(options);
+  const ScenarioOptions &chosen = scenario.options;
   const Forces forces(chosen.forces);
   Stage stage(chosen, table, forces);
   for (std::size_t n = 0; stage.play(kind.act(stage, n)); n++) {
@@ -502,9 +502,9 @@ Scene make_scene(const SceneOptions &options, const ContactTable &table) {
     throw Error("--seconds " + number(*chosen.seconds) + " is too short for one contact of \"" +
                 chosen.kind + "\"; leave it out for " + number(kind.kind.usual_seconds));
   }
-  scene.acts = std::move(stage.acts);
-  scene.name = name_of(chosen);
-  return scene;
+  scenario.acts = std::move(stage.acts);
+  scenario.name = name_of(chosen);
+  return scenario;
 }
 
 } // namespace fingertip::twin

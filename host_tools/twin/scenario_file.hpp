@@ -1,4 +1,4 @@
-// Scenes as files: the scenario that emulator and native pipeline play, and the events in it.
+// Scenarios as files: the scenario that emulator and native pipeline play, and the events in it.
 //
 // FILE.csv is a scenario ("# fingertip-scenario 1", host_tools/emulator/scenario.mjs): truth, then
 // what each sensor reports above ambient with all effects in it. It is linear between rows.
@@ -10,12 +10,12 @@
 //   force_N    on the pad, of all contacts
 //   p0_Pa sigma_mm  the Gaussian that is closest to the pressure on the base without errors
 //              (best_gaussian.hpp); 0 with two contacts
-//   slip       see scenes.hpp
+//   slip       see scenarios.hpp
 //   temperature_degC  only with the effects "temperature" and "branch"
 //
 // FILE.truth.csv has one row for each phase of each contact:
 //   # fingertip-truth 1
-//   # scene: name                  # scenario: FILE.csv without its folder
+//   # name: name                   # scenario: FILE.csv without its folder
 //   act         number of the contact, from 1
 //   press       what the contact is: tap press hold placement poke cycle grip roll two
 //   phase       touch hold release; poke; load unload; dead_travel slip after; twist; roll
@@ -28,7 +28,7 @@
 // The indenter is in the metadata of both.
 #pragma once
 
-#include "twin/scenes.hpp"
+#include "twin/scenarios.hpp"
 
 #include <functional>
 #include <string>
@@ -44,8 +44,8 @@ struct Written {
 
 // Both files, whole or not at all. `second` is the table of the second indenter, for two contacts.
 // Throws Error.
-Written write_scene(const Scene &scene, const Layer &layer, const ContactTable &table,
-                    const ContactTable &second, const std::string &path, bool replace,
-                    const std::function<void(double share)> &on_progress = {});
+Written write_scenario(const Scenario &scenario, const Layer &layer, const ContactTable &table,
+                       const ContactTable &second, const std::string &path, bool replace,
+                       const std::function<void(double share)> &on_progress = {});
 
 } // namespace fingertip::twin

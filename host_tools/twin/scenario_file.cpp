@@ -1,4 +1,4 @@
-#include "twin/scene_file.hpp"
+#include "twin/scenario_file.hpp"
 
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/text.hpp"
@@ -206,16 +206,17 @@ std::string file_name(const std::string &path) {
   return std::filesystem::path(path).filename().string();
 }
 
-const SceneKind &kind_of(const Scene &scene) {
-  return *std::find_if(scene_kinds().begin(), scene_kinds().end(),
-                       [&](const SceneKind &kind) { return kind.name == scene.options.kind; });
+const ScenarioKind &kind_of(const Scenario &scenario) {
+  return *std::find_if(
+      scenario_kinds().begin(), scenario_kinds().end(),
+      [&](const ScenarioKind &kind) { return kind.name == scenario.options.kind; });
 }
 
-void describe(Text &text, const Scene &scene, const Layer &layer, const Pad &pad,
+void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pad &pad,
               const std::string &path) {
-  const SceneOptions &options = scene.options;
-  metadata(text, "name", scene.name);
-  metadata(text, "description", kind_of(scene).description + "; simulated by twin");
+  const ScenarioOptions &options = scenario.options;
+  metadata(text, "name", scenario.name);
+  metadata(text, "description", kind_of(scenario).description + "; simulated by twin");
   metadata(text, "kind", options.kind);
   metadata(text, "seed", std::to_string(options.seed));
   metadata(text, "pad_seed", std::to_string(*options.pad_seed));
@@ -272,23 +273,24 @@ void describe(Text &text, const Scene &scene, const Layer &layer, const Pad &pad
     metadata(text, "branch_steps_Pa", list(steps_Pa, 1.0, 2));
   }
   metadata(text, "gaussian",
-           scene.options.kind == "two" ? "none: p0_Pa and sigma_mm are 0"
-                                       : "p0_Pa and sigma_mm: closest to the pressure on the base");
+           scenario.options.kind == "two"
+               ? "none: p0_Pa and sigma_mm are 0"
+               : "p0_Pa and sigma_mm: closest to the pressure on the base");
   metadata(text, "truth", file_name(truth_path(path)));
 }
 
-std::string truth_of(const Scene &scene, const std::string &path) {
+std::string truth_of(const Scenario &scenario, const std::string &path) {
   Text text;
   text << "# fingertip-truth 1\n";
-  metadata(text, "scene", scene.name);
+  metadata(text, "name", scenario.name);
   metadata(text, "scenario", file_name(path));
-  metadata(text, "indenter", scene.options.indenter);
+  metadata(text, "indenter", scenario.options.indenter);
   text << "act,press,phase,t_begin_s,t_end_s,x_mm,y_mm,force_N,angle_deg,x_end_mm,y_end_mm,"
           "force_end_N,angle_end_deg,x2_mm,y2_mm,force2_N,force2_end_N,sensors_near,speed_mm_s,"
           "dead_travel_mm,stick_slip_mm\n";
-  for (std::size_t n = 0; n < scene.acts.size(); n++) {
-    const Act &act = scene.acts[n];
-    const bool pushed = scene.options.kind == "slip";
+  for (std::size_t n = 0; n < scenario.acts.size(); n++) {
+    const Act &act = scenario.acts[n];
+    const bool pushed = scenario.options.kind == "slip";
     for (const Phase &phase : act.phases) {
       const double begin_s = phase.begin_s - act.begin_s, end_s = phase.end_s - act.begin_s;
       text << std::to_string(n + 1) << "," << act.press << "," << phase.name;
@@ -312,8 +314,8 @@ std::string truth_of(const Scene &scene, const std::string &path) {
       }
       text << "," << std::to_string(act.sensors_near);
       text.cell(act.speed_mm_s, 1);
-      text.cell(pushed ? scene.options.dead_travel_mm : 0.0, 3);
-      text.cell(pushed ? scene.options.stick_slip_mm : 0.0, 3);
+      text.cell(pushed ? scenario.options.dead_travel_mm : 0.0, 3);
+      text.cell(pushed ? scenario.options.stick_slip_mm : 0.0, 3);
       text << "\n";
     }
   }
@@ -330,10 +332,10 @@ std::string truth_path(const std::string &scenario_path) {
   return path.string() + ".truth.csv";
 }
 
-Written write_scene(const Scene &scene, const Layer &layer, const ContactTable &table,
-                    const ContactTable &second, const std::string &path, bool replace,
-                    const std::function<void(double share)> &on_progress) {
-  const SceneOptions &options = scene.options;
+Written write_scenario(const Scenario &scenario, const Layer &layer, const ContactTable &table,
+                       const ContactTable &second, const std::string &path, bool replace,
+                       const std::function<void(double share)> &on_progress) {
+  const ScenarioOptions &options = scenario.options;
   OutputFile truth(truth_path(path), replace, OutputFile::Appears::when_finished);
   OutputFile file(path, replace, OutputFile::Appears::when_finished);
   const bool temperature =
@@ -345,7 +347,7 @@ Written write_scene(const Scene &scene, const Layer &layer, const ContactTable &
 
   Text head;
   head << "# fingertip-scenario 1\n";
-  describe(head, scene, layer, pad, path);
+  describe(head, scenario, layer, pad, path);
   head << "t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip";
   for (std::size_t k = 0; k < sensors; k++) {
     head << ",s" << std::to_string(k) << "_Pa";
@@ -377,7 +379,7 @@ Written write_scene(const Scene &scene, const Layer &layer, const ContactTable &
 
   std::vector<Touch> contacts, before;
   std::vector<double> base_Pa(sensors);
-  for (const Act &act : scene.acts) {
+  for (const Act &act : scenario.acts) {
     quiet_until(act.begin_s);
     const long long steps = std::llround((act.end_s - act.begin_s) / STEP_s);
     before.clear();
@@ -425,7 +427,7 @@ Written write_scene(const Scene &scene, const Layer &layer, const ContactTable &
   add(*options.seconds, none_Pa);
   writer.finish();
 
-  const std::string events = truth_of(scene, path);
+  const std::string events = truth_of(scenario, path);
   truth.append(events.data(), events.size());
   truth.finish();
   file.finish();

@@ -1,7 +1,7 @@
 #include "libfingertip/error.hpp"
 #include "libfingertip/random.hpp"
 #include "libfingertip/text.hpp"
-#include "twin/scene_file.hpp"
+#include "twin/scenario_file.hpp"
 
 extern "C" {
 #include "config/geometry.h"
@@ -35,13 +35,14 @@ const ContactTable &table_of(const std::string &name) {
       .first->second;
 }
 
-Scene scene_of(const std::string &kind, const std::function<void(SceneOptions &)> &change = {}) {
-  SceneOptions options;
+Scenario scenario_of(const std::string &kind,
+                     const std::function<void(ScenarioOptions &)> &change = {}) {
+  ScenarioOptions options;
   options.kind = kind;
   if (change) {
     change(options);
   }
-  return make_scene(options, table_of("sphere6"));
+  return make_scenario(options, table_of("sphere6"));
 }
 
 struct File {
@@ -63,11 +64,11 @@ struct File {
   }
 };
 
-File written(const Scene &scene) {
-  const std::string path = testing::TempDir() + "twin_scene.csv";
-  const std::string &first = scene.options.indenter, &second = scene.options.second_indenter;
-  write_scene(scene, silicone(LAYER_mm), table_of(first), table_of(second.empty() ? first : second),
-              path, true);
+File written(const Scenario &scenario) {
+  const std::string path = testing::TempDir() + "twin_scenario.csv";
+  const std::string &first = scenario.options.indenter, &second = scenario.options.second_indenter;
+  write_scenario(scenario, silicone(LAYER_mm), table_of(first),
+                 table_of(second.empty() ? first : second), path, true);
   std::stringstream text;
   text << std::ifstream(path).rdbuf();
   File file;
@@ -95,14 +96,14 @@ File written(const Scene &scene) {
   return file;
 }
 
-TEST(Scenes, placements_are_one_weight_that_stands) {
-  SceneOptions options;
+TEST(Scenarios, placements_are_one_weight_that_stands) {
+  ScenarioOptions options;
   options.kind = "placements";
-  const Scene scene = make_scene(options, table_of("sphere15"));
-  EXPECT_EQ(scene.options.indenter, "sphere15");
-  EXPECT_GE(scene.acts.size(), 30u);
+  const Scenario scenario = make_scenario(options, table_of("sphere15"));
+  EXPECT_EQ(scenario.options.indenter, "sphere15");
+  EXPECT_GE(scenario.acts.size(), 30u);
   double farthest_x = 0.0, farthest_y = 0.0;
-  for (const Act &act : scene.acts) {
+  for (const Act &act : scenario.acts) {
     ASSERT_EQ(act.phases.size(), 3u);
     EXPECT_EQ(act.phases[1].name, "hold");
     EXPECT_NEAR(act.phases[1].end_s - act.phases[1].begin_s, 2.0, 1e-9);
@@ -118,15 +119,15 @@ TEST(Scenes, placements_are_one_weight_that_stands) {
   EXPECT_LE(farthest_y, 18.0);
 }
 
-TEST(Scenes, HaveQuietTimeAndNoJumps) {
-  for (const SceneKind &kind : scene_kinds()) {
-    const Scene scene = scene_of(kind.name);
-    ASSERT_GE(scene.acts.size(), 3u) << kind.name;
+TEST(Scenarios, HaveQuietTimeAndNoJumps) {
+  for (const ScenarioKind &kind : scenario_kinds()) {
+    const Scenario scenario = scenario_of(kind.name);
+    ASSERT_GE(scenario.acts.size(), 3u) << kind.name;
     double free_s = START_QUIET_s;
-    for (const Act &act : scene.acts) {
+    for (const Act &act : scenario.acts) {
       EXPECT_GE(act.begin_s, free_s - 1e-9) << kind.name;
-      free_s = act.end_s + scene.options.quiet_s;
-      EXPECT_LE(free_s, *scene.options.seconds + 1e-9);
+      free_s = act.end_s + scenario.options.quiet_s;
+      EXPECT_LE(free_s, *scenario.options.seconds + 1e-9);
       EXPECT_EQ(act.phases.front().begin_s, act.begin_s);
       EXPECT_NEAR(act.phases.back().end_s, act.end_s, 1e-9);
       for (std::size_t i = 1; i < act.phases.size(); i++) {
@@ -154,10 +155,10 @@ TEST(Scenes, HaveQuietTimeAndNoJumps) {
   }
 }
 
-TEST(Scenes, SlipIsTruthWhereThePusherMovesAndNowhereElse) {
-  for (const SceneKind &kind : scene_kinds()) {
-    const Scene scene = scene_of(kind.name);
-    for (const Act &act : scene.acts) {
+TEST(Scenarios, SlipIsTruthWhereThePusherMovesAndNowhereElse) {
+  for (const ScenarioKind &kind : scenario_kinds()) {
+    const Scenario scenario = scenario_of(kind.name);
+    for (const Act &act : scenario.acts) {
       const Track &track = act.tracks[0];
       int slipping = 0;
       for (long ms = 0; ms < std::lround(1e3 * (act.end_s - act.begin_s)); ms++) {
@@ -175,10 +176,10 @@ TEST(Scenes, SlipIsTruthWhereThePusherMovesAndNowhereElse) {
   }
 }
 
-TEST(Scenes, SlipHasDeadTravelThenSpeed) {
-  const Scene scene = scene_of("slip", [](SceneOptions &o) { o.dead_travel_mm = 2.0; });
+TEST(Scenarios, SlipHasDeadTravelThenSpeed) {
+  const Scenario scenario = scenario_of("slip", [](ScenarioOptions &o) { o.dead_travel_mm = 2.0; });
   std::set<double> speeds;
-  for (const Act &act : scene.acts) {
+  for (const Act &act : scenario.acts) {
     speeds.insert(act.speed_mm_s);
     const auto phase = [&](const std::string &name) {
       return *std::find_if(act.phases.begin(), act.phases.end(),
@@ -196,11 +197,11 @@ TEST(Scenes, SlipHasDeadTravelThenSpeed) {
   EXPECT_EQ(speeds, (std::set<double>{20, 50, 100, 150, 200}));
 }
 
-TEST(Scenes, GridIsThePapers) {
-  const Scene scene = scene_of("grid", [](SceneOptions &o) { o.seconds = 1100; });
+TEST(Scenarios, GridIsThePapers) {
+  const Scenario scenario = scenario_of("grid", [](ScenarioOptions &o) { o.seconds = 1100; });
   std::map<std::pair<double, double>, std::set<double>> forces;
   std::map<std::pair<double, double>, int> near;
-  for (const Act &act : scene.acts) {
+  for (const Act &act : scenario.acts) {
     const Touch held = act.tracks[0].at(act.phases[1].end_s - act.begin_s);
     forces[{held.x_mm, held.y_mm}].insert(held.force_N);
     near[{held.x_mm, held.y_mm}] = act.sensors_near;
@@ -225,10 +226,10 @@ TEST(Scenes, GridIsThePapers) {
   EXPECT_EQ(count[4], 8);
 }
 
-TEST(Scenes, RandomPlacesFillTheAreaAndForcesTheRange) {
-  const Scene scene = scene_of("taps", [](SceneOptions &o) { o.seconds = 2000; });
+TEST(Scenarios, RandomPlacesFillTheAreaAndForcesTheRange) {
+  const Scenario scenario = scenario_of("taps", [](ScenarioOptions &o) { o.seconds = 2000; });
   double x_max = 0, y_max = 0, force_min = 99, force_max = 0;
-  for (const Act &act : scene.acts) {
+  for (const Act &act : scenario.acts) {
     const Touch held = act.tracks[0].at(act.phases[1].begin_s - act.begin_s);
     x_max = std::max(x_max, std::abs(held.x_mm));
     y_max = std::max(y_max, std::abs(held.y_mm));
@@ -245,9 +246,9 @@ TEST(Scenes, RandomPlacesFillTheAreaAndForcesTheRange) {
   EXPECT_LE(force_max, 15.0);
 }
 
-TEST(Scenes, TwoContactsAreApartAsTold) {
+TEST(Scenarios, TwoContactsAreApartAsTold) {
   std::set<long> distances;
-  for (const Act &act : scene_of("two").acts) {
+  for (const Act &act : scenario_of("two").acts) {
     ASSERT_EQ(act.tracks.size(), 2u);
     const Touch a = act.tracks[0].at(0.4), b = act.tracks[1].at(0.4);
     distances.insert(std::lround(std::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm) * 1e6));
@@ -258,60 +259,60 @@ TEST(Scenes, TwoContactsAreApartAsTold) {
             (std::set<long>{6000000, 9000000, 12000000, 15000000, 18000000, 24000000, 30000000}));
 }
 
-TEST(Scenes, LongerOnesBeginAlikeAndEffectsDoNotMoveContacts) {
-  const Scene brief = scene_of("taps"), longer = scene_of("taps", [](SceneOptions &o) {
-                                          o.seconds = 300;
-                                          o.effects = parse_effects("all");
-                                          o.pad_seed = 77;
-                                        });
+TEST(Scenarios, LongerOnesBeginAlikeAndEffectsDoNotMoveContacts) {
+  const Scenario brief = scenario_of("taps"), longer = scenario_of("taps", [](ScenarioOptions &o) {
+                                                o.seconds = 300;
+                                                o.effects = parse_effects("all");
+                                                o.pad_seed = 77;
+                                              });
   ASSERT_GT(longer.acts.size(), brief.acts.size());
   for (std::size_t i = 0; i < brief.acts.size(); i++) {
     EXPECT_EQ(brief.acts[i].begin_s, longer.acts[i].begin_s);
     EXPECT_EQ(brief.acts[i].tracks[0].at(0.2), longer.acts[i].tracks[0].at(0.2));
   }
-  const Scene other = scene_of("taps", [](SceneOptions &o) { o.seed = 2; });
+  const Scenario other = scenario_of("taps", [](ScenarioOptions &o) { o.seed = 2; });
   EXPECT_FALSE(brief.acts[0].tracks[0].at(0.2) == other.acts[0].tracks[0].at(0.2));
 }
 
-TEST(Scenes, WrongOptionsAreToldInOneLine) {
+TEST(Scenarios, WrongOptionsAreToldInOneLine) {
   const auto message = [](const std::string &kind,
-                          const std::function<void(SceneOptions &)> &change) {
+                          const std::function<void(ScenarioOptions &)> &change) {
     try {
-      scene_of(kind, change);
+      scenario_of(kind, change);
     } catch (const Error &error) {
       return std::string(error.what());
     }
     return std::string();
   };
   for (const std::string &text :
-       {message("slide", {}), message("taps", [](SceneOptions &o) { o.seconds = 2; }),
-        message("taps", [](SceneOptions &o) { o.seconds = 1e9; }),
-        message("taps", [](SceneOptions &o) { o.seconds = NAN; }),
-        message("taps", [](SceneOptions &o) { o.forces = "0"; }),
-        message("taps", [](SceneOptions &o) { o.forces = "1..51"; }),
-        message("taps", [](SceneOptions &o) { o.forces = "9..2"; }),
-        message("taps", [](SceneOptions &o) { o.forces = "5,"; }),
-        message("taps", [](SceneOptions &o) { o.margin_mm = -1; }),
-        message("taps", [](SceneOptions &o) { o.speeds_mm_s = {20}; }),
-        message("slip", [](SceneOptions &o) { o.speeds_mm_s = {0}; }),
-        message("slip", [](SceneOptions &o) { o.second_indenter = "cube6"; }),
-        message("slip", [](SceneOptions &o) { o.dead_travel_mm = 11; })}) {
+       {message("slide", {}), message("taps", [](ScenarioOptions &o) { o.seconds = 2; }),
+        message("taps", [](ScenarioOptions &o) { o.seconds = 1e9; }),
+        message("taps", [](ScenarioOptions &o) { o.seconds = NAN; }),
+        message("taps", [](ScenarioOptions &o) { o.forces = "0"; }),
+        message("taps", [](ScenarioOptions &o) { o.forces = "1..51"; }),
+        message("taps", [](ScenarioOptions &o) { o.forces = "9..2"; }),
+        message("taps", [](ScenarioOptions &o) { o.forces = "5,"; }),
+        message("taps", [](ScenarioOptions &o) { o.margin_mm = -1; }),
+        message("taps", [](ScenarioOptions &o) { o.speeds_mm_s = {20}; }),
+        message("slip", [](ScenarioOptions &o) { o.speeds_mm_s = {0}; }),
+        message("slip", [](ScenarioOptions &o) { o.second_indenter = "cube6"; }),
+        message("slip", [](ScenarioOptions &o) { o.dead_travel_mm = 11; })}) {
     EXPECT_NE(text.find("; "), std::string::npos) << text;
     EXPECT_EQ(text.find('\n'), std::string::npos) << text;
   }
 }
 
-TEST(SceneFile, IsThePressureOnTheBaseWithinItsTolerance) {
+TEST(ScenarioFile, IsThePressureOnTheBaseWithinItsTolerance) {
   for (const char *kind : {"taps", "slip", "rolloff"}) {
-    const Scene scene = scene_of(kind, [](SceneOptions &o) { o.seconds = 30; });
-    const File file = written(scene);
+    const Scenario scenario = scenario_of(kind, [](ScenarioOptions &o) { o.seconds = 30; });
+    const File file = written(scenario);
     Random random(7, 7, 7);
     for (int i = 0; i < 3000; i++) {
       const double t_s = 1e-3 * std::round(random.uniform(0.0, 30000.0)); // where it was computed
-      const auto act = std::find_if(scene.acts.begin(), scene.acts.end(), [&](const Act &one) {
-        return t_s >= one.begin_s && t_s < one.end_s;
-      });
-      const bool touched = act != scene.acts.end();
+      const auto act =
+          std::find_if(scenario.acts.begin(), scenario.acts.end(),
+                       [&](const Act &one) { return t_s >= one.begin_s && t_s < one.end_s; });
+      const bool touched = act != scenario.acts.end();
       const Touch touch = touched ? act->tracks[0].at(t_s - act->begin_s) : Touch{};
       double peak_Pa = 0.0, expected[15];
       for (int k = 0; k < 15; k++) {
@@ -336,8 +337,8 @@ TEST(SceneFile, IsThePressureOnTheBaseWithinItsTolerance) {
   }
 }
 
-TEST(SceneFile, IsSparseWhereNothingHappens) {
-  const File file = written(scene_of("grid"));
+TEST(ScenarioFile, IsSparseWhereNothingHappens) {
+  const File file = written(scenario_of("grid"));
   EXPECT_EQ(file.rows.front()[0], 0.0);
   EXPECT_EQ(file.rows.back()[0], 200.0);
   EXPECT_LT(file.bytes.size(), 60e6 * 200 / 2000);
@@ -346,8 +347,8 @@ TEST(SceneFile, IsSparseWhereNothingHappens) {
   }
 }
 
-TEST(SceneFile, HasTheClosestGaussian) {
-  const File file = written(scene_of("taps", [](SceneOptions &o) {
+TEST(ScenarioFile, HasTheClosestGaussian) {
+  const File file = written(scenario_of("taps", [](ScenarioOptions &o) {
     o.seconds = 5;
     o.forces = "10";
   }));
@@ -375,8 +376,8 @@ TEST(SceneFile, HasTheClosestGaussian) {
   EXPECT_LT(held, 0.95);
 }
 
-TEST(SceneFile, AddsTwoContactsAndTurnsObjects) {
-  const Scene two = scene_of("two", [](SceneOptions &o) {
+TEST(ScenarioFile, AddsTwoContactsAndTurnsObjects) {
+  const Scenario two = scenario_of("two", [](ScenarioOptions &o) {
     o.seconds = 5;
     o.second_indenter = "cube6";
   });
@@ -398,15 +399,15 @@ TEST(SceneFile, AddsTwoContactsAndTurnsObjects) {
   EXPECT_EQ(file.metadata.at("second_indenter").substr(0, 5), "cube6");
 }
 
-TEST(SceneFile, TurnsObjects) {
-  SceneOptions options;
+TEST(ScenarioFile, TurnsObjects) {
+  ScenarioOptions options;
   options.kind = "twist";
   options.indenter = "cube6";
   options.seconds = 10;
-  const Scene scene = make_scene(options, table_of("cube6"));
-  const File file = written(scene);
+  const Scenario scenario = make_scenario(options, table_of("cube6"));
+  const File file = written(scenario);
   // The pressure is the same after a quarter turn, another after an eighth.
-  const Act &act = scene.acts[0];
+  const Act &act = scenario.acts[0];
   const Phase &twist = act.phases[2];
   EXPECT_EQ(twist.name, "twist");
   const auto angle = [&](double t_s) { return act.tracks[0].at(t_s - act.begin_s).angle_rad; };
@@ -423,12 +424,12 @@ TEST(SceneFile, TurnsObjects) {
   EXPECT_GT(difference_Pa, 1e-3 * peak_Pa);
 }
 
-TEST(SceneFile, HasItsEffectsInIt) {
-  const File file = written(scene_of("taps", [](SceneOptions &o) {
+TEST(ScenarioFile, HasItsEffectsInIt) {
+  const File file = written(scenario_of("taps", [](ScenarioOptions &o) {
     o.seconds = 40;
     o.effects = parse_effects("gain=5,drift=200,temperature=8");
   }));
-  const File plain = written(scene_of("taps", [](SceneOptions &o) { o.seconds = 40; }));
+  const File plain = written(scenario_of("taps", [](ScenarioOptions &o) { o.seconds = 40; }));
   EXPECT_EQ(file.metadata.at("effect_gain").substr(0, 4), "5 %;");
   const auto gains = split(file.metadata.at("gain_errors_percent"), ' ');
   const auto drifts = split(file.metadata.at("drifts_Pa_s"), ' ');
@@ -446,14 +447,14 @@ TEST(SceneFile, HasItsEffectsInIt) {
   EXPECT_EQ(plain.column.count("temperature_degC"), 0u);
 }
 
-TEST(SceneFile, HasAftereffectsAndAColdBeginningInIt) {
-  const Scene scene = scene_of("taps", [](SceneOptions &o) {
+TEST(ScenarioFile, HasAftereffectsAndAColdBeginningInIt) {
+  const Scenario scenario = scenario_of("taps", [](ScenarioOptions &o) {
     o.seconds = 40;
     o.effects = parse_effects("aftereffect,branch=8");
   });
-  const File file = written(scene);
-  const File plain = written(scene_of("taps", [](SceneOptions &o) { o.seconds = 40; }));
-  const File cold = written(scene_of("taps", [](SceneOptions &o) {
+  const File file = written(scenario);
+  const File plain = written(scenario_of("taps", [](ScenarioOptions &o) { o.seconds = 40; }));
+  const File cold = written(scenario_of("taps", [](ScenarioOptions &o) {
     o.seconds = 40;
     o.effects = parse_effects("branch=8");
   }));
@@ -466,7 +467,7 @@ TEST(SceneFile, HasAftereffectsAndAColdBeginningInIt) {
   EXPECT_EQ(file.metadata.at("temperature_degC"), "8");
   EXPECT_NEAR(file.at("temperature_degC", 17.0), 9.7, 0.003);
   // From the first release on, a share of its peak; after the branch, near 17 s, the step.
-  const double end_s = scene.acts[0].end_s, wait_s = scene.acts[1].begin_s - end_s;
+  const double end_s = scenario.acts[0].end_s, wait_s = scenario.acts[1].begin_s - end_s;
   ASSERT_GT(wait_s, 1.0);
   ASSERT_LT(end_s, 16.0);
   ASSERT_EQ(plain.at("contact", 39.9), 0.0);
