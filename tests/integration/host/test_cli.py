@@ -333,6 +333,7 @@ class Several(CliTest):
             end = re.search(rf"(?m)^# {number}/end: frames=(\d+) .* packets=(\d+) dropped_packets=0 out_of_order=0 crc_errors=0", text)
             recording = files.read_recording(self.csv, device=serial)
             self.assertEqual(len(recording["frame"]), int(end[1]))
+            self.assertEqual((recording.end["frames"], recording.end["packets"]), end.groups())  # its own, not those of all
             for path in (self.csv, cut):
                 out, _ = self.run_cli("replay", path, "--device", serial, "--speed", "max")
                 self.assertRegex(out, r" 0 packets dropped, 0 CRC errors")
