@@ -281,7 +281,7 @@ private:
       if (!accepted_[device]) {
         taring_[device] = false;
         say((is_refused() ? said_ + "; " : "") + name_of(device) +
-            "not tared: " + result_text(packet.body.ack.result));
+            "not tared: " + refusal(device, packet.body.ack.result));
       }
     } else if (accepted_[device] && (packet.type == WIRE_RAW || packet.type == WIRE_CONTACT)) {
       std::uint32_t flags =
@@ -294,6 +294,13 @@ private:
         }
       }
     }
+  }
+
+  std::string refusal(std::size_t device, std::uint8_t result) const {
+    const auto &contact = models_[device].contact();
+    return result == WIRE_RESULT_NOT_NOW && contact && (contact->flags & CONTACT_FLAG_CONTACT)
+               ? "it reports a contact, let go of the pad"
+               : result_text(result);
   }
 
   bool is_refused() const { return said_.find("not tared: ") != std::string::npos; }

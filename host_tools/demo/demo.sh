@@ -52,7 +52,7 @@ trap 'kill $processes 2> /dev/null || true' EXIT
 emulate rubber $rubber $out/lime.csv $seconds --report $out/rubber.json
 rubber_process=$!
 processes=$rubber_process
-emulate ideal $ideal $out/ideal.csv $seconds --report $out/ideal.json --seed 2
+emulate ideal $ideal $out/ideal.csv 600 --report $out/ideal.json --seed 2
 ideal_process=$!
 processes="$rubber_process $ideal_process"
 wait_for_port rubber $rubber_process
@@ -64,9 +64,9 @@ for name in rubber ideal; do
 done
 FINGERTIP_PORT=$out/rubber.tty:$out/ideal.tty $tool monitor --device $rubber --device $ideal --until-gone --record $out/recording.csv ||
   fail "the monitor ended with an error"
-for process in $processes; do
-  wait "$process" || fail "the emulator found something wrong"
-done
+wait $rubber_process || fail "the emulator found something wrong"
+kill -INT $ideal_process 2> /dev/null || true # however far it came: it ends with the other
+wait $ideal_process || fail "the emulator found something wrong"
 processes=
 
 for name in rubber ideal; do

@@ -300,13 +300,16 @@ def _choose_device(path, devices, wanted):
     raise InputError(f"{path}: {problem}; choose one with --device: {' '.join(devices)}")
 
 
+OWN_END = "end of this one"  # of several
+
+
 def _of_one_device(line, number, advice):
     """A line of format 2 as format 1 has it, and its time; nothing for another fingertip's line."""
     if line.startswith("#"):
         key, separator, rest = line[1:].partition("/")
         if separator and key.strip().isdigit():
-            mine = int(key) == number and not rest.startswith("end:")
-            return ("# " + rest if mine else None), None
+            mine = int(key) == number
+            return ("# " + rest.replace("end:", f"{OWN_END}:", 1) if mine else None), None
         return line, None
     cells = line.split(",", 2)
     if cells[:2] == ["device", "time_us"]:
@@ -338,7 +341,7 @@ def read_recording(path, salvage=False, device=None, columns=None, progress=None
     lines = _RecordingLines(path, progress)
     devices = recorded_devices(path)
     number_in_file = _choose_device(path, devices, device) if devices else None
-    metadata, header, events, packets, end, skipped = {}, None, [], [], {}, 0
+    metadata, header, events, packets, end, own_end, skipped = {}, None, [], [], {}, {}, 0
     table, line_numbers, times_us, wanted, sensors = array.array("d"), array.array("q"), array.array("d"), (), 0
     advice = "use --salvage to skip damaged lines"
     for number, line, torn in lines:
@@ -358,7 +361,9 @@ def read_recording(path, salvage=False, device=None, columns=None, progress=None
             if line.startswith("#"):
                 key, value = _metadata(line)
                 if key == "end":
-                    end = _end_counts(path, number, value)
+                    end = {**_end_counts(path, number, value), **own_end}
+                elif key == OWN_END:
+                    own_end = _end_counts(path, number, value)
                 elif key == "event":
                     events.append(value)
                 elif key == "packet":

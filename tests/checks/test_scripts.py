@@ -191,6 +191,7 @@ class Demo(Folder):
         self.write("host_tools/emulator/main.mjs", f"""
             import {{ writeFileSync }} from 'node:fs';
             const link = process.argv[process.argv.indexOf('--pty') + 1];
+            process.on('SIGINT', () => process.exit());
             const later = (ms, action) => setTimeout(action, ms);
             {body}
             """)

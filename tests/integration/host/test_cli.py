@@ -334,6 +334,7 @@ class Several(CliTest):
             end = re.search(rf"(?m)^# {number}/end: frames=(\d+) .* packets=(\d+) dropped_packets=0 out_of_order=0 crc_errors=0", text)
             recording = files.read_recording(self.csv, device=serial)
             self.assertEqual(len(recording["frame"]), int(end[1]))
+            self.assertEqual((recording.end["frames"], recording.end["packets"]), end.groups())  # its own, not those of all
             for path in (self.csv, cut):
                 out, _ = self.run_cli("replay", path, "--device", serial, "--speed", "max")
                 self.assertRegex(out, r" 0 packets dropped, 0 CRC errors")
@@ -1239,7 +1240,7 @@ class Monitor(CliTest):
         with self.device("serial=AAAA"), self.device("serial=BBBB", "refuse=1", port=other):
             self.on_terminal("monitor", "--device", "AAAA", "--device", "BBBB", until="live.*live", then=[b"t", b"y"], finally_="not tared")
         self.assertTrue(any("tare all, pads free? y/n" in line for line in self.seen))
-        self.assertIn("BBBB: not tared: not possible now", self.shown)
+        self.assertIn("BBBB: not tared: it reports a contact", self.shown)
         # and what was recorded
         self.on_terminal("replay", self.csv, until="AAAA pico_mux .*replay.*BBBB pico_mux .*replay", then=b"q")
         out, _ = self.run_cli("replay", self.csv, "--speed", "max")
@@ -1356,9 +1357,10 @@ class Monitor(CliTest):
         done, text = self.on_terminal_tare([b"t", b"y"], "t tare +tared")
         self.assertTrue(done)
         self.assertIn("tare, pad free? y/n", text)
-        done, text = self.on_terminal_tare([b"t", b"y"], "not tared", "refuse=1")
-        self.assertIn("not tared: not possible now", text)
-        self.assertFalse(done)
+        for flags, why in ((self.CONTACT | self.TARED, "it reports a contact, let go of the pad"), (self.TARED, "not possible now")):
+            done, text = self.on_terminal_tare([b"t", b"y"], "not tared", "refuse=1", f"flags={flags}")
+            self.assertIn(f"not tared: {why}", text)
+            self.assertFalse(done)
 
     def test_nothing_but_a_person_tares(self):
         for keys in ([b"t", b"n"], [b"ty"], [b"tytytyty\n"], [b"t", b"ty"], [b"\x1b[200~t\x1b[201~", b"y"], [b"\x1b[8;24;80t", b"y"],
