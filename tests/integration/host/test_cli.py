@@ -130,7 +130,8 @@ class Usage(CliTest):
         self.assertRegex(self.run_cli("--version")[0], r"^fingertip \d+\.\d+\.\d+\n$")
         commands = re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
         self.assertEqual(sorted(commands), sorted(
-            ["list", "info", "monitor", "record", "replay", "tare", "calibrate", "set", "serve", "flash", "rule", "loader", "encode"]))
+            ["list", "info", "doctor", "monitor", "record", "replay", "tare", "calibrate", "set", "serve", "flash", "rule", "loader",
+             "encode"]))
         for command in commands:
             self.assertIn(f"Usage: fingertip {command}", self.run_cli(command, "--help")[0])
 
@@ -139,7 +140,7 @@ class Usage(CliTest):
         self.assertIn("see fingertip record --help", self.error("record", status=2))
         self.error("monitor", "--bogus", status=2)
         for words, problem in (([], "a command is missing"), (["moniter"], '"moniter" is no command'), (["moniter", "--port", "x"], "is no command")):
-            self.assertRegex(self.error(*words, status=2), f"{problem}; give one of list, info, monitor, .*; see fingertip --help")
+            self.assertRegex(self.error(*words, status=2), f"{problem}; give one of list, info, doctor, monitor, .*; see fingertip --help")
 
     def test_wrong_values_say_what_is_right(self):
         for value in ("nan", "-1", "0", "inf", "1x"):
@@ -572,9 +573,9 @@ class Install(CliTest):
     def commands(self):
         return re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
 
-    def test_the_build_installs_all_of_it(self):
+    def test_the_build_installs_all_of_the_tool(self):
         build = pathlib.Path(FINGERTIP).parents[2]
-        subprocess.run(["cmake", "--install", build, "--prefix", self.folder], check=True, capture_output=True)
+        subprocess.run(["cmake", "--install", build, "--component", "tool", "--prefix", self.folder], check=True, capture_output=True)
         installed = {os.path.relpath(os.path.join(folder, name), self.folder)
                      for folder, _, names in os.walk(self.folder) for name in names}
         self.assertEqual(installed, {
