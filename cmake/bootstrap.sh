@@ -120,11 +120,11 @@ case $1 in
     /usr/bin/python3 host_tools/report/validation/validation.py --build build/host \
       --image build/pico_mux/fingertip-pico_mux.bin -o build/report \
       --picture host_tools/report/validation/validation_force.png
+    say "many programs on one fingertip"
+    /usr/bin/python3 host_tools/report/tools/tools.py --build build/host -o build/report
     say "how far from the truth: gains, shapes, time, and what is kept"
     /usr/bin/python3 host_tools/report/truth/truth.py --build build/host --boards build -o build/report \
       --picture host_tools/report/truth/truth.png
-    say "many programs on one fingertip"
-    /usr/bin/python3 host_tools/report/tools/tools.py --build build/host -o build/report
     say "every table and picture: $root/build/report/index.html"
     ;;
 esac

@@ -34,6 +34,9 @@ constexpr milliseconds TICK{500};
 constexpr milliseconds LAST_PACKETS{2000};
 /* At once from one line, so that each gets its turn: 50 ms at the highest rate. */
 constexpr int READS_IN_A_ROW = 4;
+/* At most on one fingertip: with sixteen of these the process is still within 1024 descriptors,
+ * which is what systems allow by default. */
+constexpr std::size_t MOST_CLIENTS = 60;
 /* Of a client at once: some dozen commands. */
 constexpr std::size_t CLIENT_BYTES = 256;
 
@@ -155,10 +158,8 @@ public:
     begin();
   }
   ~Station() {
-    if (transport_) {
-      auto end = frame_bytes(command_stream(0));
-      transport_->write(end.data(), end.size());
-    }
+    auto end = frame_bytes(command_stream(0));
+    transport_->write(end.data(), end.size());
   }
 
   const Way &way() const { return way_; }
@@ -230,16 +231,18 @@ private:
 
   void begin() {
     hub_.emplace();
-    told_.clear();
     serial_ = way_.found_by_usb ? way_.serial : "";
     hub_->tick(Clock::now());
     flush_line();
     open_for_clients();
   }
 
+  /* Not the same twice in a row. */
   void tell(const std::string &what) {
-    told_ = what;
-    server_.tell_(what);
+    if (told_ != what) {
+      told_ = what;
+      server_.tell_(what);
+    }
   }
 
   void open_for_clients() {
@@ -261,6 +264,10 @@ private:
         return;
       }
       std::string peer = peer_of(fd.get());
+      if (connections_.size() == MOST_CLIENTS) {
+        tell(name() + ": " + peer + " is one too many, after " + std::to_string(MOST_CLIENTS));
+        continue;
+      }
       connections_.push_back({std::move(fd), hub_->join(), std::move(peer)});
     }
   }
@@ -372,9 +379,7 @@ private:
       }
     } catch (const Error &error) {
       hub_.reset();
-      if (told_ != error.what()) {
-        tell(error.what());
-      }
+      tell(error.what());
     }
   }
 

@@ -257,6 +257,20 @@ class Clients(ServeTest):
             fields = file.read().rsplit(")", 1)[1].split()
         return int(fields[11]) + int(fields[12])
 
+    def test_too_many_are_turned_away(self):
+        with self.device(), self.served(), contextlib.ExitStack() as many:
+            recorder, path = self.recording("r.csv")
+            for _ in range(59):
+                client = many.enter_context(socket.socket(socket.AF_UNIX))
+                client.connect(self.socket_of())
+            self.assertIn("vanished", self.error("info"))
+            self.assertIn(", fingertip is one too many, after 60", self.said())
+            many.close()
+            self.run_cli("info")
+            recorder.send_signal(signal.SIGINT)
+            self.finished(recorder)
+        self.assertIn("dropped_packets=0", self.rows(path)[1][-1])
+
     def test_noise_from_a_client_harms_nobody(self):
         with self.device("frames=300"), self.served():
             recorder, path = self.recording("r.csv")
