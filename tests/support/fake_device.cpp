@@ -244,7 +244,8 @@ private:
     packet.sequence = sequence_++;
     auto bytes = fingertip::frame_bytes(packet);
     if (flip) {
-      bytes[bytes.size() / 2] = static_cast<std::uint8_t>(bytes[bytes.size() / 2] ^ 0x80);
+      std::uint8_t &byte = bytes[bytes.size() / 2];
+      byte = static_cast<std::uint8_t>(byte ^ (byte == 0x80 ? 0x40 : 0x80)); /* no delimiter */
     }
     if (mirror_ >= 0 && write(mirror_, bytes.data(), bytes.size()) < 0) {
       return;
