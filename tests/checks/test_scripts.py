@@ -143,7 +143,7 @@ class BootstrapReport(Folder):
             program = self.folder / "bin" / name
             program.write_text(f"#!/bin/sh\n{body}\n")
             program.chmod(0o755)
-        for report in ("fit/fit", "rate/rate", "validation/validation", "truth/truth"):
+        for report in ("fit/fit", "rate/rate", "validation/validation", "truth/truth", "tools/tools"):
             self.assertTrue((ROOT / f"host_tools/report/{report}.py").is_file())
             script = self.folder / f"host_tools/report/{report}.py"
             script.parent.mkdir(parents=True)

@@ -40,7 +40,7 @@ class Calibrate(unittest.TestCase):
         cls.folder = pathlib.Path(temporary.name)
         cls.tool = OPTIONS.build / "host_tools/cli/fingertip"
         cls.scenario = cls.folder / "placements.csv"
-        run(OPTIONS.build / "host_tools/twin/twin", "scene", "placements", "-o", cls.scenario, "--gain", 10, "--seed", 41, "--pad", 7,
+        run(OPTIONS.build / "host_tools/twin/twin", "scenario", "placements", "-o", cls.scenario, "--gain", 10, "--seed", 41, "--pad", 7,
             "--cache", OPTIONS.build / "contact_tables")
 
     def start(self, name, *options):

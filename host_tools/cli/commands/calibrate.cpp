@@ -44,15 +44,15 @@ void add_calibrate(CommandLine &line) {
                                 },
                                 "The weight's, where it is known: then forces are calibrated too")
                             ->type_name("GRAMS");
-  command
-      ->add_option_function<std::string>(
-          "--force",
-          [options](const std::string &text) {
-            options->force_N = weight_N_from_text("--force", text, 1.0);
-          },
-          "The same in newtons")
-      ->excludes(weight)
-      ->type_name("N");
+  CLI::Option *force = command
+                           ->add_option_function<std::string>(
+                               "--force",
+                               [options](const std::string &text) {
+                                 options->force_N = weight_N_from_text("--force", text, 1.0);
+                               },
+                               "The same in newtons")
+                           ->excludes(weight)
+                           ->type_name("N");
   CLI::Option *from =
       command
           ->add_option("--from", options->from,
@@ -62,9 +62,9 @@ void add_calibrate(CommandLine &line) {
   CLI::Option *yes = command->add_flag("--yes", options->yes, "Write, or erase, without asking");
   CLI::Option *show =
       command->add_flag("--show", options->show, "Show what the fingertip is calibrated by")
-          ->excludes(weight, from, dry_run, yes);
+          ->excludes(weight, force, from, dry_run, yes);
   command->add_flag("--erase", options->erase, "Have it forget its calibration; it asks")
-      ->excludes(weight, from, dry_run, show);
+      ->excludes(weight, force, from, dry_run, show);
   with_colour(command, options->colour);
 }
 
