@@ -17,6 +17,7 @@ struct LayerWave {
   double base_per_pressure;  // T: pressure on the base per pressure on the surface
   double sinks_per_pressure; // downward displacement of the surface, h / G
   double base_per_traction;  // Q: the base's pressure is -i Q per traction along k
+  double moves_per_traction; // displacement of the surface along k, h / G
 };
 
 inline LayerWave solve_layer_wave(double H, double poisson, int order) {
@@ -58,7 +59,7 @@ inline LayerWave solve_layer_wave(double H, double poisson, int order) {
   load(0, 1) = -1.0; // traction 1 is shear i (-i)
   const Eigen::MatrixXd moved = system.fullPivLu().solve(load);
   const Eigen::RowVectorXd base = -tension_at(order) * moved;
-  return {base(0), -moved(n, 0), -base(1)};
+  return {base(0), -moved(n, 0), -base(1), -moved(0, 1)};
 }
 
 } // namespace fingertip::twin
