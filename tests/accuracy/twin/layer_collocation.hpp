@@ -18,6 +18,7 @@ struct LayerWave {
   double sinks_per_pressure; // downward displacement of the surface, h / G
   double base_per_traction;  // Q: the base's pressure is -i Q per traction along k
   double moves_per_traction; // displacement of the surface along k, h / G
+  double rises_per_traction; // upward displacement of the surface is i times this, h / G
 };
 
 inline LayerWave solve_layer_wave(double H, double poisson, int order) {
@@ -59,7 +60,7 @@ inline LayerWave solve_layer_wave(double H, double poisson, int order) {
   load(0, 1) = -1.0; // traction 1 is shear i (-i)
   const Eigen::MatrixXd moved = system.fullPivLu().solve(load);
   const Eigen::RowVectorXd base = -tension_at(order) * moved;
-  return {base(0), -moved(n, 0), -base(1), -moved(0, 1)};
+  return {base(0), -moved(n, 0), -base(1), -moved(0, 1), moved(n, 1)};
 }
 
 } // namespace fingertip::twin
