@@ -1,6 +1,7 @@
 #include "twin/force_planes.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace fingertip::twin {

@@ -5,8 +5,8 @@
 // is nothing.
 #pragma once
 
-#include <array>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 namespace fingertip::twin {
