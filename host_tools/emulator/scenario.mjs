@@ -3,13 +3,13 @@
  *
  *     # fingertip-scenario 1
  *     # key: value                     name, ambient_Pa (101325), temperature_degC (25), sensors (15), ...
- *     t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip,s0_Pa,...,s14_Pa[,temperature_degC]
+ *     t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip,s0_Pa,...,s14_Pa[,Qx_N,Qy_N][,temperature_degC]
  *     0,0,0,0,0,0,0,0,0,...
  *
  * Rows have strictly increasing t_s >= 0; s<k>_Pa is the pressure on sensor k above ambient, at most 1e7 Pa to
  * either side. The last line ends with a newline: a file without it was cut off and is refused. Between rows
- * everything is linear, before the first and after the last it holds. contact .. slip are the truth for whoever
- * judges the answer and are not used here. Time 0 is power-on.
+ * everything is linear, before the first and after the last it holds. contact .. slip and Qx_N, Qy_N are the
+ * truth for whoever judges the answer and are not used here. Time 0 is power-on.
  */
 import { readFileSync } from 'node:fs';
 import { InputError, inWords } from './errors.mjs';
@@ -17,6 +17,8 @@ import { InputError, inWords } from './errors.mjs';
 /** Far above what a sensor takes, far below what its arithmetic cannot hold. */
 const PRESSURE_LIMIT_Pa = 1e7;
 const TRUTH = ['contact', 'x_mm', 'y_mm', 'force_N', 'p0_Pa', 'sigma_mm', 'slip'];
+/** After the sensors, in any order. */
+const OPTIONAL = ['Qx_N', 'Qy_N', 'temperature_degC'];
 
 export class Scenario {
   constructor(metadata, times_s, pressures_Pa, temperatures_degC) {
@@ -69,7 +71,7 @@ export function parseScenario(text, file) {
   const pressures_Pa = [];
   const temperatures_degC = [];
   let sensors = 0;
-  let hasTemperature = false;
+  let temperatureAt = -1;
   lines.forEach((line, index) => {
     const number = index + 1;
     if (index === 0 || line.trim() === '') return;
@@ -88,11 +90,12 @@ export function parseScenario(text, file) {
       }
       if (Math.abs(metadata.ambient_Pa ?? 0) > PRESSURE_LIMIT_Pa) fail(number, `metadata "ambient_Pa" is "${metadata.ambient_Pa}"; give at most 1e7 Pa`);
       const expected = ['t_s', ...TRUTH, ...Array.from({ length: sensors }, (_, k) => `s${k}_Pa`)];
-      hasTemperature = cells.length === expected.length + 1 && cells.at(-1) === 'temperature_degC';
-      const named = hasTemperature ? cells.slice(0, -1) : cells;
-      const wrong = expected.findIndex((name, i) => named[i] !== name);
-      if (wrong >= 0) fail(number, `column ${wrong + 1} is "${named[wrong] ?? ''}"; expected "${expected[wrong]}"`);
-      if (named.length !== expected.length) fail(number, `${named.length} columns; expected ${expected.length} (or one more, temperature_degC)`);
+      const wrong = expected.findIndex((name, i) => cells[i] !== name);
+      if (wrong >= 0) fail(number, `column ${wrong + 1} is "${cells[wrong] ?? ''}"; expected "${expected[wrong]}"`);
+      cells.slice(expected.length).forEach((name, i, more) => {
+        if (!OPTIONAL.includes(name) || more.indexOf(name) !== i) fail(number, `column ${expected.length + i + 1} is "${name}"; after the sensors there may be, once each: ${OPTIONAL.join(', ')}`);
+      });
+      temperatureAt = cells.indexOf('temperature_degC');
       return;
     }
     if (cells.length !== header.length) fail(number, `${cells.length} columns; the header has ${header.length}`);
@@ -109,7 +112,7 @@ export function parseScenario(text, file) {
     });
     times_s.push(t);
     pressures_Pa.push(Float64Array.from(values.slice(1 + TRUTH.length, 1 + TRUTH.length + sensors)));
-    temperatures_degC.push(hasTemperature ? values.at(-1) : Number(metadata.temperature_degC ?? 25));
+    temperatures_degC.push(temperatureAt >= 0 ? values[temperatureAt] : Number(metadata.temperature_degC ?? 25));
   });
   if (!header) fail(lines.length, 'no header line; add "t_s,contact,x_mm,..."');
   if (!times_s.length) fail(lines.length, 'no rows; add at least one');

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <sstream>
 
 namespace fingertip {
@@ -17,6 +18,8 @@ namespace {
 constexpr double PRESSURE_LIMIT_Pa = 1e7;
 constexpr const char *TRUTH[] = {"contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip"};
 constexpr std::size_t TRUTHS = std::size(TRUTH);
+/* After the sensors, in any order. */
+constexpr const char *OPTIONAL[] = {"Qx_N", "Qy_N", "temperature_degC"};
 
 std::string trimmed(const std::string &text) {
   const std::size_t first = text.find_first_not_of(" \t\r");
@@ -49,7 +52,7 @@ Scenario::Scenario(const std::string &path) {
   };
   std::map<std::string, std::string> metadata;
   std::vector<std::string> header;
-  bool has_temperature = false;
+  std::optional<std::size_t> temperature_at;
   double temperature_degC = 25.0;
   std::vector<double> values;
   for (std::string line; std::getline(file, line);) {
@@ -100,19 +103,22 @@ Scenario::Scenario(const std::string &path) {
       for (unsigned k = 0; k < sensors_; k++) {
         expected.push_back("s" + std::to_string(k) + "_Pa");
       }
-      has_temperature = header.size() == expected.size() + 1 && header.back() == "temperature_degC";
-      if (has_temperature) {
-        expected.push_back("temperature_degC");
-      }
       for (std::size_t i = 0; i < expected.size(); i++) {
         if (i >= header.size() || header[i] != expected[i]) {
           fail("column " + std::to_string(i + 1) + " is \"" + (i < header.size() ? header[i] : "") +
                "\"; expected \"" + expected[i] + "\"");
         }
       }
-      if (header.size() != expected.size()) {
-        fail(std::to_string(header.size()) + " columns; expected " +
-             std::to_string(expected.size()));
+      const auto more = header.begin() + static_cast<std::ptrdiff_t>(expected.size());
+      for (auto name = more; name != header.end(); ++name) {
+        if (std::find(std::begin(OPTIONAL), std::end(OPTIONAL), *name) == std::end(OPTIONAL) ||
+            std::find(more, name, *name) != name) {
+          fail("column " + std::to_string(name - header.begin() + 1) + " is \"" + *name +
+               "\"; after the sensors there may be, once each: Qx_N, Qy_N, temperature_degC");
+        }
+        if (*name == "temperature_degC") {
+          temperature_at = static_cast<std::size_t>(name - header.begin());
+        }
       }
       continue;
     }
@@ -148,7 +154,7 @@ Scenario::Scenario(const std::string &path) {
       pressures_Pa_.push_back(static_cast<float>(pressure));
     }
     temperatures_degC_.push_back(
-        static_cast<float>(has_temperature ? values.back() : temperature_degC));
+        static_cast<float>(temperature_at ? values[*temperature_at] : temperature_degC));
   }
   if (times_s_.empty()) {
     fail("no rows; add at least one");

@@ -2,8 +2,8 @@
  * emulator plays.
  *
  *   # fingertip-scenario 1
- *   # key: value                     name, ambient_Pa (101325), temperature_degC (25), sensors
- * (15), ... t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip,s0_Pa,...,s14_Pa[,temperature_degC]
+ *   # key: value                     name, ambient_Pa (101325), temperature_degC (25), sensors (15)
+ *   t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip,s0_Pa,...,s14_Pa[,Qx_N,Qy_N][,temperature_degC]
  *
  * Rows have strictly increasing t_s >= 0; s<k>_Pa is the pressure on sensor k above ambient, at
  * most 1e7 Pa to either side. The last line ends with a newline. Between rows everything is linear,

@@ -3,9 +3,9 @@
 Scenario (CSV, UTF-8): what the sensors feel.
     # fingertip-scenario 1
     # key: value              name, description, ambient_Pa, temperature_degC, sensors
-    t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip,s0_Pa,...,s14_Pa
+    t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip,s0_Pa,...,s14_Pa[,Qx_N,Qy_N][,temperature_degC]
 One row each millisecond, t_s strictly increasing from 0 = power-on; linear between rows. s<k>_Pa is the pressure
-above ambient on sensor k. contact .. slip are the truth.
+above ambient on sensor k. contact .. slip are the truth, and so is the tangential force Qx_N, Qy_N; without, there is none.
 
 Recording (CSV, UTF-8): what a fingertip said, written by `fingertip record`; one row per frame.
     # fingertip-recording 1
@@ -38,6 +38,7 @@ SENSOR_Y_mm = np.tile(np.arange(-2, 3), 3) * PITCH_mm
 SLIP_SPEED_mm_s = 10.0
 
 TRUTH_COLUMNS = ("contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip")
+OPTIONAL_COLUMNS = ("Qx_N", "Qy_N", "temperature_degC")  # after the sensors, in any order
 STAGES = ("convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us")
 CONTACT_COLUMNS = (
     "sequence", "flags", "sensors_used", "x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N", "slip_mm", "residual_rms_Pa",
@@ -132,12 +133,14 @@ def _metadata(line):
 
 
 class Scenario:
-    """t_s[n], the TRUTH_COLUMNS as arrays[n], sensors_Pa[n][sensor], metadata."""
+    """t_s[n], the TRUTH_COLUMNS and the tangential force as arrays[n], sensors_Pa[n][sensor], metadata."""
 
-    def __init__(self, metadata, table, sensors):
+    def __init__(self, metadata, header, table, sensors):
         self.metadata = metadata
         self.t_s = table[:, 0]
         self.truth = {name: table[:, 1 + i] for i, name in enumerate(TRUTH_COLUMNS)}
+        for name in ("Qx_N", "Qy_N"):
+            self.truth[name] = table[:, header.index(name)] if name in header else np.zeros(len(table))
         self.sensors_Pa = table[:, 1 + len(TRUTH_COLUMNS):1 + len(TRUTH_COLUMNS) + sensors]
 
     def at(self, name, t_s):
@@ -176,8 +179,10 @@ def read_scenario(path):
             header = cells
             sensors = sum(name.startswith("s") and name[1:].removesuffix("_Pa").isdigit() for name in cells)
             expected = ["t_s", *TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(sensors))]
-            if cells[:len(expected)] != expected or not sensors or cells[len(expected):] not in ([], ["temperature_degC"]):
-                raise InputError(f"{path}:{number}: wrong header; it must be {','.join(['t_s', *TRUTH_COLUMNS])},s0_Pa,...")
+            more = cells[len(expected):]
+            if cells[:len(expected)] != expected or not sensors or not set(more) <= set(OPTIONAL_COLUMNS) or len(set(more)) < len(more):
+                raise InputError(f"{path}:{number}: wrong header; it must be {','.join(['t_s', *TRUTH_COLUMNS])},s0_Pa,... "
+                                 f"and after the sensors, once each, any of {', '.join(OPTIONAL_COLUMNS)}")
             continue
         if len(cells) != len(header):
             raise InputError(f"{path}:{number}: {len(cells)} columns where the header has {len(header)}; write the scenario anew")
@@ -189,7 +194,7 @@ def read_scenario(path):
         rows.append(row)
     if not rows:
         raise InputError(f"{path}: no rows; write the scenario anew")
-    return Scenario(metadata, np.array(rows), sensors)
+    return Scenario(metadata, header, np.array(rows), sensors)
 
 
 def write_scenario(path, metadata, columns):

@@ -1,9 +1,9 @@
 #include "twin/contact.hpp"
 
+#include "twin/transform.hpp"
+
 #include <algorithm>
 #include <cmath>
-#include <fftw3.h>
-#include <mutex>
 #include <stdexcept>
 #include <string>
 
@@ -18,9 +18,6 @@ constexpr double ROOM_THICKNESSES = 3.0;
 constexpr int STEPS_MAX = 2000;
 // Change of the pressure in one step, relative to the force.
 constexpr double SETTLED = 1e-7;
-
-// Planning in FFTW is not safe in several threads.
-std::mutex planning;
 
 } // namespace
 
@@ -37,24 +34,18 @@ Grid grid_for(const Indenter &indenter, const Layer &layer) {
 
 struct ContactSolver::Work {
   Grid grid;
-  std::size_t nodes2, waves;
+  std::size_t nodes2;
+  Transform transform;
   std::vector<double> height_mm;  // of the indenter, infinite where it has no surface
   std::vector<double> compliance; // mm per Pa of each wave, the transforms' norm in it
   std::vector<double> transfer;   // to the base, likewise
   std::vector<double> pressure_Pa;
   double yield_mm_Pa; // of one node under its own pressure
-  double *real;
-  fftw_complex *spectrum;
-  fftw_plan forward, backward;
 
   Work(const Indenter &indenter, const Layer &layer, const Grid &g)
-      : grid(g), nodes2(std::size_t(g.nodes) * std::size_t(g.nodes)),
-        waves(std::size_t(g.nodes) * std::size_t(g.nodes / 2 + 1)), height_mm(nodes2),
-        compliance(waves), transfer(waves), pressure_Pa(nodes2, 0.0), real(fftw_alloc_real(nodes2)),
-        spectrum(fftw_alloc_complex(waves)) {
-    const std::lock_guard<std::mutex> lock(planning);
-    forward = fftw_plan_dft_r2c_2d(g.nodes, g.nodes, real, spectrum, FFTW_ESTIMATE);
-    backward = fftw_plan_dft_c2r_2d(g.nodes, g.nodes, spectrum, real, FFTW_ESTIMATE);
+      : grid(g), nodes2(std::size_t(g.nodes) * std::size_t(g.nodes)), transform(g.nodes),
+        height_mm(nodes2), compliance(transform.waves()), transfer(transform.waves()),
+        pressure_Pa(nodes2, 0.0) {
     for (int i = 0; i < g.nodes; i++) {
       for (int j = 0; j < g.nodes; j++) {
         height_mm[at(i, j)] =
@@ -68,8 +59,7 @@ struct ContactSolver::Work {
         indenter.youngs_modulus_Pa > 0.0 ? 2.0 * (1.0 - nu * nu) / indenter.youngs_modulus_Pa : 0.0;
     for (int i = 0; i < g.nodes; i++) {
       for (int j = 0; j <= g.nodes / 2; j++) {
-        const int wave = i <= g.nodes / 2 ? i : i - g.nodes;
-        const double k = unit * std::hypot(wave, j), h = layer.thickness_mm;
+        const double k = unit * std::hypot(transform.i_of(i), j), h = layer.thickness_mm;
         const std::size_t n = std::size_t(i) * std::size_t(g.nodes / 2 + 1) + std::size_t(j);
         compliance[n] = norm * of_layer * h * surface_compliance(k * h, nu);
         if (k > 0.0) { // the mean of a half-space's displacement is a matter of definition
@@ -79,35 +69,12 @@ struct ContactSolver::Work {
       }
     }
     pressure_Pa.front() = 1.0;
-    apply(pressure_Pa, compliance);
-    yield_mm_Pa = real[0];
+    yield_mm_Pa = transform.apply(pressure_Pa, compliance)[0];
     pressure_Pa.front() = 0.0;
   }
 
-  ~Work() {
-    const std::lock_guard<std::mutex> lock(planning);
-    fftw_destroy_plan(forward);
-    fftw_destroy_plan(backward);
-    fftw_free(real);
-    fftw_free(spectrum);
-  }
-
-  Work(const Work &) = delete;
-  Work &operator=(const Work &) = delete;
-
   std::size_t at(int i, int j) const {
     return std::size_t(i) * std::size_t(grid.nodes) + std::size_t(j);
-  }
-
-  // real := the field after this response.
-  void apply(const std::vector<double> &field, const std::vector<double> &response) {
-    std::copy(field.begin(), field.end(), real);
-    fftw_execute(forward);
-    for (std::size_t n = 0; n < waves; n++) {
-      spectrum[n][0] *= response[n];
-      spectrum[n][1] *= response[n];
-    }
-    fftw_execute(backward);
   }
 };
 
@@ -116,8 +83,8 @@ ContactSolver::ContactSolver(const Indenter &indenter, const Layer &layer, const
 ContactSolver::~ContactSolver() = default;
 
 std::vector<double> ContactSolver::displacement_mm(const std::vector<double> &pressure_Pa) {
-  work_->apply(pressure_Pa, work_->compliance);
-  return {work_->real, work_->real + work_->nodes2};
+  const double *sunk_mm = work_->transform.apply(pressure_Pa, work_->compliance);
+  return {sunk_mm, sunk_mm + work_->nodes2};
 }
 
 Contact ContactSolver::solve(double force_N) {
@@ -143,11 +110,11 @@ Contact ContactSolver::solve(double force_N) {
   double before = 1.0, approach_mm = 0.0;
   bool conjugate = false;
   for (int step = 1; step <= STEPS_MAX; step++) {
-    w.apply(p, w.compliance);
+    const double *sunk_mm = w.transform.apply(p, w.compliance);
     double mean = 0.0;
     std::size_t touching = 0;
     for (std::size_t n = 0; n < w.nodes2; n++) {
-      gap[n] = w.real[n] + w.height_mm[n];
+      gap[n] = sunk_mm[n] + w.height_mm[n];
       if (p[n] > 0.0) {
         mean += gap[n];
         touching++;
@@ -165,17 +132,17 @@ Contact ContactSolver::solve(double force_N) {
     for (std::size_t n = 0; n < w.nodes2; n++) {
       direction[n] = p[n] > 0.0 ? gap[n] + share * direction[n] : 0.0;
     }
-    w.apply(direction, w.compliance);
+    const double *answer_mm = w.transform.apply(direction, w.compliance);
     double mean_response = 0.0;
     for (std::size_t n = 0; n < w.nodes2; n++) {
-      mean_response += p[n] > 0.0 ? w.real[n] : 0.0;
+      mean_response += p[n] > 0.0 ? answer_mm[n] : 0.0;
     }
     mean_response /= static_cast<double>(touching);
     double along = 0.0, curvature = 0.0;
     for (std::size_t n = 0; n < w.nodes2; n++) {
       if (p[n] > 0.0) {
         along += gap[n] * direction[n];
-        curvature += (w.real[n] - mean_response) * direction[n];
+        curvature += (answer_mm[n] - mean_response) * direction[n];
       }
     }
     // One node alone has no neighbour to share with, but those that overlap shall still join.
@@ -204,8 +171,8 @@ Contact ContactSolver::solve(double force_N) {
       for (double value : p) {
         contact.contact_area_mm2 += value > 0.0 ? w.grid.step_mm * w.grid.step_mm : 0.0;
       }
-      w.apply(p, w.transfer);
-      std::copy(w.real, w.real + w.nodes2, contact.base_Pa.begin());
+      const double *base_Pa = w.transform.apply(p, w.transfer);
+      std::copy(base_Pa, base_Pa + w.nodes2, contact.base_Pa.begin());
       return contact;
     }
   }

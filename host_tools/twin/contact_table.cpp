@@ -1,7 +1,6 @@
 #include "twin/contact_table.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -14,19 +13,12 @@
 namespace fingertip::twin {
 namespace {
 
-constexpr int FORCES = 20;
-constexpr double STEP_mm = 0.5;
-// One node more than the reach on the far side, for the cubic.
-constexpr int NODES = static_cast<int>(ContactTable::REACH_mm / STEP_mm) + 2;
-constexpr std::size_t PLANE = std::size_t(NODES) * std::size_t(NODES);
+constexpr int FORCES = ForcePlanes::FORCES, NODES = ForcePlanes::NODES;
+constexpr double STEP_mm = ForcePlanes::STEP_mm;
+constexpr std::size_t PLANE = ForcePlanes::PLANE;
 constexpr std::size_t VALUES = FORCES * PLANE;
 // To be raised whenever a solution changes.
 constexpr int VERSION = 1;
-
-double force_at(int n) {
-  constexpr double LOWEST_N = ContactTable::FORCE_MIN_N;
-  return LOWEST_N * std::pow(ContactTable::FORCE_MAX_N / LOWEST_N, double(n) / (FORCES - 1));
-}
 
 std::uint64_t fnv1a(const void *data, std::size_t length) {
   std::uint64_t hash = 0xcbf29ce484222325u;
@@ -50,66 +42,14 @@ std::string key_of(const Indenter &indenter, const Layer &layer, const Grid &gri
   return text;
 }
 
-// Weights of the cubic through four equally spaced nodes, at `t` between the second and the third.
-std::array<double, 4> cubic(double t) {
-  return {-t * (t - 1.0) * (t - 2.0) / 6.0, (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
-          -(t + 1.0) * t * (t - 2.0) / 2.0, (t + 1.0) * t * (t - 1.0) / 6.0};
-}
-
 } // namespace
 
-struct ContactTable::Between {
-  int first;
-  std::array<double, 4> weight;
-};
-
-ContactTable::Between ContactTable::between(double force_N) const {
-  const double at = std::log(std::clamp(force_N, FORCE_MIN_N, FORCE_MAX_N) / FORCE_MIN_N) *
-                    (FORCES - 1) / std::log(FORCE_MAX_N / FORCE_MIN_N);
-  const int first = std::clamp(static_cast<int>(at) - 1, 0, FORCES - 4);
-  return {first, cubic(at - first - 1)};
-}
-
-double ContactTable::base_pressure_Pa(double force_N, double dx_mm, double dy_mm) const {
-  const double x = std::abs(dx_mm) / STEP_mm, y = std::abs(dy_mm) / STEP_mm;
-  if (force_N <= 0.0 || x >= NODES - 2 || y >= NODES - 2) {
-    return 0.0;
-  }
-  const int i = static_cast<int>(x), j = static_cast<int>(y);
-  const std::array<double, 4> of_x = cubic(x - i), of_y = cubic(y - j);
-  const Between force = between(force_N);
-  double sum = 0.0;
-  for (int f = 0; f < 4; f++) {
-    const float *plane = per_force_.data() + std::size_t(force.first + f) * PLANE;
-    double over_x = 0.0;
-    for (int a = 0; a < 4; a++) {
-      const float *line = plane + std::abs(i + a - 1) * NODES; // even in x
-      double over_y = 0.0;
-      for (int b = 0; b < 4; b++) {
-        over_y += of_y[std::size_t(b)] * static_cast<double>(line[std::abs(j + b - 1)]);
-      }
-      over_x += of_x[std::size_t(a)] * over_y;
-    }
-    sum += force.weight[std::size_t(f)] * over_x;
-  }
-  return sum * force_N;
-}
-
-double ContactTable::interpolated(const std::vector<float> &values, double force_N) const {
-  const Between force = between(force_N);
-  double sum = 0.0;
-  for (int f = 0; f < 4; f++) {
-    sum += force.weight[std::size_t(f)] * static_cast<double>(values[std::size_t(force.first + f)]);
-  }
-  return sum;
-}
-
 double ContactTable::indentation_mm(double force_N) const {
-  return force_N > 0.0 ? interpolated(indentation_mm_, force_N) : 0.0;
+  return force_N > 0.0 ? ForcePlanes::between_forces(indentation_mm_, force_N) : 0.0;
 }
 
 double ContactTable::contact_radius_mm(double force_N) const {
-  return force_N > 0.0 ? interpolated(radius_mm_, force_N) : 0.0;
+  return force_N > 0.0 ? ForcePlanes::between_forces(radius_mm_, force_N) : 0.0;
 }
 
 ContactTable ContactTable::load_or_build(const Indenter &indenter, const Layer &layer,
@@ -140,7 +80,7 @@ ContactTable ContactTable::load_or_build(const Indenter &indenter, const Layer &
     ContactSolver solver(indenter, layer, grid);
     const int stride = static_cast<int>(std::lround(STEP_mm / grid.step_mm));
     for (int f = 0; f < FORCES; f++) {
-      const Contact contact = solver.solve(force_at(f));
+      const Contact contact = solver.solve(ForcePlanes::force_at(f));
       for (int i = 0; i < NODES; i++) {
         for (int j = 0; j < NODES; j++) {
           const std::size_t from =
@@ -175,7 +115,8 @@ ContactTable ContactTable::load_or_build(const Indenter &indenter, const Layer &
   }
   ContactTable table;
   const auto begin = values.begin();
-  table.per_force_.assign(begin, begin + VALUES);
+  table.pressure_ = {
+      {begin, begin + VALUES}, ForcePlanes::Symmetry::even, ForcePlanes::Symmetry::even};
   table.indentation_mm_.assign(begin + VALUES, begin + VALUES + FORCES);
   table.radius_mm_.assign(begin + VALUES + FORCES, values.end());
   return table;

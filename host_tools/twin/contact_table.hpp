@@ -1,13 +1,13 @@
 // The pressure on the base under one indenter on one layer, for any force and place: computed once
 // (contact.hpp), kept in a file, interpolated.
 //
-// Forces 0..50 N; below 0.02 N the contact is as if at 0.02 N. Places up to 45 mm away; beyond, the
-// pressure is taken to be none. The interpolation is cubic in x, y and the logarithm of the force;
-// the tests hold it to 0.2 % of the peak of a solution of its own; a flat indenter, whose edge
-// takes hold node by node, needs that much. Some 0.2 us per pressure.
+// force_planes.hpp says for which forces and places; the tests hold it to 0.2 % of the peak of a
+// solution of its own; a flat indenter, whose edge takes hold node by node, needs that much. Some
+// 0.2 us per pressure.
 #pragma once
 
 #include "twin/contact.hpp"
+#include "twin/force_planes.hpp"
 
 #include <filesystem>
 #include <functional>
@@ -17,8 +17,8 @@ namespace fingertip::twin {
 
 class ContactTable {
 public:
-  static constexpr double FORCE_MIN_N = 0.02, FORCE_MAX_N = 50.0;
-  static constexpr double REACH_mm = 45.0;
+  static constexpr double FORCE_MIN_N = ForcePlanes::FORCE_MIN_N;
+  static constexpr double FORCE_MAX_N = ForcePlanes::FORCE_MAX_N;
 
   // From the cache if it holds this very table, else solved (half a minute at most) and kept there;
   // a damaged file is solved anew. on_progress gets the share done, 0..1. Throws
@@ -28,16 +28,15 @@ public:
                                     const std::function<void(double)> &on_progress = {});
 
   // On the base, by dx, dy from the middle of the contact, along the indenter's own axes.
-  double base_pressure_Pa(double force_N, double dx_mm, double dy_mm) const;
+  double base_pressure_Pa(double force_N, double dx_mm, double dy_mm) const {
+    return pressure_.at(force_N, dx_mm, dy_mm);
+  }
+  const ForcePlanes &pressure() const { return pressure_; } // Pa
   double indentation_mm(double force_N) const;
   double contact_radius_mm(double force_N) const; // of a disc of the contact's area
 
 private:
-  struct Between; // four neighbouring forces and their weights
-  Between between(double force_N) const;
-  double interpolated(const std::vector<float> &values, double force_N) const;
-
-  std::vector<float> per_force_;                  // [force][x][y], Pa / N
+  ForcePlanes pressure_;
   std::vector<float> indentation_mm_, radius_mm_; // [force]
 };
 

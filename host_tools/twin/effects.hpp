@@ -31,8 +31,8 @@
 //                the slowest time constant 4 h^2 / (pi^2 a) of a layer h warmed from above, from
 //                ROOM_degC or on top of what `branch` says
 //
-// Relaxation and hysteresis act on the reported pressure while the scenario's force is what it is: as
-// if the press were force-controlled and the sensor's share of the load went down. Where a robot
+// Relaxation and hysteresis act on the reported pressure while the scenario's force is what it is:
+// as if the press were force-controlled and the sensor's share of the load went down. Where a robot
 // holds its position the force goes down as well, and less of the effect is an error.
 #pragma once
 

@@ -12,7 +12,7 @@ constexpr double H_LARGE = 300.0;
 // Below, W / H by its limit: the error is of the order of H^2.
 constexpr double H_SMALL = 1e-4;
 
-// The denominator of T and W.
+// The denominator of T, W and Q.
 double denominator(double H, double poisson) {
   const double cosh = std::cosh(H), b = 1.0 - 2.0 * poisson;
   return (3.0 - 4.0 * poisson) * cosh * cosh + H * H + b * b;
@@ -34,6 +34,15 @@ double base_transfer(double H, double poisson) {
   }
   const double a = 2.0 * (1.0 - poisson);
   return a * (a * std::cosh(H) + H * std::sinh(H)) / denominator(H, poisson);
+}
+
+double tangential_share(double H, double poisson) {
+  const double sinh_per_cosh = std::tanh(H);
+  return (H + (1.0 - 2.0 * poisson) * sinh_per_cosh) / (2.0 * (1.0 - poisson) + H * sinh_per_cosh);
+}
+
+double tangential_transfer(double H, double poisson) {
+  return base_transfer(H, poisson) * tangential_share(H, poisson);
 }
 
 double surface_compliance(double H, double poisson) {

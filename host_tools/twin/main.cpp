@@ -309,12 +309,18 @@ int run(int argc, char **argv) {
                    "\"5\", in turn \"1,2,5\", any of \"1..15\"; default: see "
                    "twin list")
       ->type_name("N");
+  write
+      ->add_option("--tangential", s.tangential,
+                   "Pulled along the rubber by this share of the force; without an angle in any "
+                   "direction. In lifts the weight, default 0.3; else 0")
+      ->type_name("SHARE[,DEG]");
+  write->add_option("--friction", s.friction, "Holds what is pulled; default 0.5")->type_name("MU");
   write->add_option("--speed", s.speeds_mm_s, "In turn, of slip and rolloff")
       ->delimiter(',')
       ->type_name("MM_PER_S,...");
   write
       ->add_option("--dead-travel", s.dead_travel_mm,
-                   "The pusher's way before the object slips; default 1")
+                   "Way of the pusher, in lifts of the object, before it slips; default 1")
       ->type_name("MM");
   write
       ->add_option("--creep", s.creep_share,

@@ -3,6 +3,7 @@
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/text.hpp"
 #include "twin/best_gaussian.hpp"
+#include "twin/traction_table.hpp"
 
 extern "C" {
 #include "config/geometry.h"
@@ -52,6 +53,7 @@ struct Row {
   double t_s = 0.0;
   bool contact = false, slip = false;
   double x_mm = 0.0, y_mm = 0.0, force_N = 0.0, p0_Pa = 0.0, sigma_mm = 0.0;
+  double pull_x_N = 0.0, pull_y_N = 0.0;
   double temperature_degC = ROOM_degC;
   std::vector<double> sensors_Pa;
 };
@@ -59,7 +61,8 @@ struct Row {
 // Leaves out rows that the line through their neighbours tells.
 class RowWriter {
 public:
-  RowWriter(OutputFile &file, bool temperature) : file_(file), temperature_(temperature) {}
+  RowWriter(OutputFile &file, bool pulls, bool temperature)
+      : file_(file), pulls_(pulls), temperature_(temperature) {}
 
   void add(const Row &row) {
     if (!anchor_) {
@@ -108,6 +111,8 @@ private:
         {row.force_N, 1e-4 + 1e-4 * row.force_N},
         {row.p0_Pa, 0.2 + 1e-4 * row.p0_Pa},
         {row.sigma_mm, 1e-3},
+        {row.pull_x_N, 1e-4 + 1e-4 * row.force_N},
+        {row.pull_y_N, 1e-4 + 1e-4 * row.force_N},
         {row.temperature_degC, 2e-3},
     };
     for (double sensor_Pa : row.sensors_Pa) {
@@ -151,6 +156,10 @@ private:
     for (double sensor_Pa : row.sensors_Pa) {
       text_.cell(sensor_Pa, 2);
     }
+    if (pulls_) {
+      text_.cell(row.pull_x_N, 5);
+      text_.cell(row.pull_y_N, 5);
+    }
     if (temperature_) {
       text_.cell(row.temperature_degC, 3);
     }
@@ -177,7 +186,7 @@ private:
   }
 
   OutputFile &file_;
-  bool temperature_;
+  bool pulls_, temperature_;
   Text text_;
   std::vector<Channel> channels_;
   bool anchor_ = false, pending_ = false;
@@ -235,6 +244,13 @@ void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pa
   metadata(text, "force_N", options.forces);
   metadata(text, "margin_mm", number(*options.margin_mm));
   metadata(text, "quiet_s", number(options.quiet_s));
+  if (scenario.pulls) {
+    metadata(text, "tangential", options.tangential);
+    metadata(text, "friction", number(options.friction));
+  }
+  if (options.kind == "lift") {
+    metadata(text, "dead_travel_mm", number(options.dead_travel_mm));
+  }
   if (options.kind == "slip") {
     metadata(text, "dead_travel_mm", number(options.dead_travel_mm));
     metadata(text, "creep_share", number(options.creep_share));
@@ -287,7 +303,8 @@ std::string truth_of(const Scenario &scenario, const std::string &path) {
   metadata(text, "indenter", scenario.options.indenter);
   text << "act,press,phase,t_begin_s,t_end_s,x_mm,y_mm,force_N,angle_deg,x_end_mm,y_end_mm,"
           "force_end_N,angle_end_deg,x2_mm,y2_mm,force2_N,force2_end_N,sensors_near,speed_mm_s,"
-          "dead_travel_mm,stick_slip_mm\n";
+          "dead_travel_mm,stick_slip_mm"
+       << (scenario.pulls ? ",Qx_N,Qy_N,Qx_end_N,Qy_end_N\n" : "\n");
   for (std::size_t n = 0; n < scenario.acts.size(); n++) {
     const Act &act = scenario.acts[n];
     const bool pushed = scenario.options.kind == "slip";
@@ -314,8 +331,16 @@ std::string truth_of(const Scenario &scenario, const std::string &path) {
       }
       text << "," << std::to_string(act.sensors_near);
       text.cell(act.speed_mm_s, 1);
-      text.cell(pushed ? scenario.options.dead_travel_mm : 0.0, 3);
+      text.cell(pushed || scenario.options.kind == "lift" ? scenario.options.dead_travel_mm : 0.0,
+                3);
       text.cell(pushed ? scenario.options.stick_slip_mm : 0.0, 3);
+      if (scenario.pulls) {
+        for (double t_s : {begin_s, end_s}) {
+          const Touch contact = act.tracks[0].at(t_s);
+          text.cell(contact.pull_x_N, 5);
+          text.cell(contact.pull_y_N, 5);
+        }
+      }
       text << "\n";
     }
   }
@@ -343,6 +368,10 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
   const std::size_t sensors = geometry.sensor_count;
   Pad pad(options.effects, sensors, layer.thickness_mm, AMBIENT_Pa, *options.pad_seed);
   const BestGaussian gaussian(table, layer.thickness_mm);
+  std::vector<TractionTable> tractions; // of the first and the second indenter
+  if (scenario.pulls) {
+    tractions = {TractionTable(table, layer), TractionTable(second, layer)};
+  }
   Written written;
 
   Text head;
@@ -352,10 +381,11 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
   for (std::size_t k = 0; k < sensors; k++) {
     head << ",s" << std::to_string(k) << "_Pa";
   }
+  head << (scenario.pulls ? ",Qx_N,Qy_N" : "");
   head << (temperature ? ",temperature_degC\n" : "\n");
   file.append(head.bytes().data(), head.bytes().size());
 
-  RowWriter writer(file, temperature);
+  RowWriter writer(file, scenario.pulls, temperature);
   const std::vector<double> none_Pa(sensors, 0.0);
   Row row;
   row.sensors_Pa.resize(sensors);
@@ -371,6 +401,7 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
   const auto quiet_until = [&](double end_s) {
     row.contact = row.slip = false;
     row.x_mm = row.y_mm = row.force_N = row.p0_Pa = row.sigma_mm = 0.0;
+    row.pull_x_N = row.pull_y_N = 0.0;
     while (t_s < end_s - 1e-9) {
       add(t_s, none_Pa);
       t_s = std::min(t_s + QUIET_STEP_s, end_s);
@@ -391,17 +422,25 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
       }
       if (contacts != before) {
         std::fill(base_Pa.begin(), base_Pa.end(), 0.0);
-        row.x_mm = row.y_mm = row.force_N = 0.0;
+        row.x_mm = row.y_mm = row.force_N = row.pull_x_N = row.pull_y_N = 0.0;
         for (std::size_t c = 0; c < contacts.size(); c++) {
           const Touch &contact = contacts[c];
           const double cosine = std::cos(contact.angle_rad), sine = std::sin(contact.angle_rad);
           for (std::size_t k = 0; k < sensors; k++) {
             const double dx = static_cast<double>(geometry.x_mm[k]) - contact.x_mm;
             const double dy = static_cast<double>(geometry.y_mm[k]) - contact.y_mm;
-            base_Pa[k] += (c == 0 ? table : second)
-                              .base_pressure_Pa(contact.force_N, cosine * dx + sine * dy,
-                                                cosine * dy - sine * dx);
+            const double along_x = cosine * dx + sine * dy, along_y = cosine * dy - sine * dx;
+            base_Pa[k] +=
+                (c == 0 ? table : second).base_pressure_Pa(contact.force_N, along_x, along_y);
+            if (scenario.pulls) {
+              const TractionTable::Load load{contact.force_N, contact.stuck_N,
+                                             cosine * contact.pull_x_N + sine * contact.pull_y_N,
+                                             cosine * contact.pull_y_N - sine * contact.pull_x_N};
+              base_Pa[k] += tractions[c].base_pressure_Pa(load, along_x, along_y);
+            }
           }
+          row.pull_x_N += contact.pull_x_N;
+          row.pull_y_N += contact.pull_y_N;
           row.force_N += contact.force_N;
           row.x_mm += contact.force_N * contact.x_mm;
           row.y_mm += contact.force_N * contact.y_mm;

@@ -11,20 +11,27 @@
 //   p0_Pa sigma_mm  the Gaussian that is closest to the pressure on the base without errors
 //              (best_gaussian.hpp); 0 with two contacts
 //   slip       see scenarios.hpp
+//   Qx_N Qy_N  tangential force of all objects on the rubber; only if the scenario has any. p0_Pa
+//   and
+//              sigma_mm are then without it
 //   temperature_degC  only with the effects "temperature" and "branch"
 //
 // FILE.truth.csv has one row for each phase of each contact:
 //   # fingertip-truth 1
 //   # name: name                   # scenario: FILE.csv without its folder
 //   act         number of the contact, from 1
-//   press       what the contact is: tap press hold placement poke cycle grip roll two
-//   phase       touch hold release; poke; load unload; dead_travel slip after; twist; roll
+//   press       what the contact is: tap press hold placement poke cycle grip roll two lift
+//   phase       touch hold release; poke; load unload; dead_travel slip after; twist; roll;
+//               lift carry lower
 //   t_begin_s t_end_s              on the scenario's clock
 //   x_mm y_mm force_N angle_deg    at its beginning, of the first contact
 //   x_end_mm y_end_mm force_end_N angle_end_deg   at its end
 //   x2_mm y2_mm force2_N force2_end_N   of the second contact; empty if there is none
 //   sensors_near                   grid: 1 above a sensor, 2 between two, 4 between four; else 0
-//   speed_mm_s dead_travel_mm stick_slip_mm       of the pusher; 0 where there is none
+//   speed_mm_s dead_travel_mm stick_slip_mm       of the pusher, in lifts of the object; 0 where
+//                                  there is none
+//   Qx_N Qy_N Qx_end_N Qy_end_N    of the first contact; only if the scenario has any tangential
+//   force
 // The indenter is in the metadata of both.
 #pragma once
 

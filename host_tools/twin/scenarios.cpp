@@ -22,6 +22,7 @@ constexpr double DEGREE = M_PI / 180.0;
 constexpr std::array<double, 5> SLIP_SPEEDS_mm_s{20, 50, 100, 150, 200}; // the paper: 5 of them
 constexpr std::array<double, 3> ROLL_SPEEDS_mm_s{10, 25, 50};
 constexpr std::array<double, 4> TWIST_RATES_deg_s{30, 60, 120, 180};
+constexpr std::array<double, 3> LIFTS_s{0.1, 0.3, 1.0};
 constexpr std::array<double, 7> DISTANCES_mm{6, 9, 12, 15, 18, 24, 30};
 
 // One for each kind, so that kinds with the same seed have nothing in common.
@@ -35,7 +36,9 @@ enum Stream : std::uint64_t {
   TWIST,
   ROLLOFF,
   TWO,
-  PLACEMENTS
+  PLACEMENTS,
+  LIFT,
+  DIRECTION
 };
 
 std::string number(double value) {
@@ -54,8 +57,9 @@ struct Place {
 class Stage {
 public:
   Stage(const ScenarioOptions &scenario_options, const ContactTable &contact_table,
-        const Forces &pressing)
-      : options(scenario_options), table(contact_table), forces(pressing), t_s_(START_QUIET_s) {}
+        const Forces &pressing, const Tangential &pulling)
+      : options(scenario_options), table(contact_table), forces(pressing), tangential(pulling),
+        t_s_(START_QUIET_s) {}
 
   // The act's times count from its beginning; false, and the scenario is full, if it does not fit.
   bool play(Act act) {
@@ -83,6 +87,7 @@ public:
   const ScenarioOptions &options;
   const ContactTable &table;
   const Forces &forces;
+  const Tangential &tangential;
   std::vector<Act> acts;
 
 private:
@@ -319,6 +324,53 @@ Act rolloff(const Stage &stage, std::size_t n) {
   return act;
 }
 
+// A gripped object whose weight the pad takes over, carries and gives back.
+Act lift(const Stage &stage, std::size_t n) {
+  constexpr double CARRIES_s = 1.0;
+  Random random(stage.options.seed, LIFT, n);
+  const Place place = stage.random_place(random);
+  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+  const double lift_s = LIFTS_s[n % LIFTS_s.size()];
+  Act act;
+  act.press = "lift";
+  Track track = track_at(place);
+  track.force_N.ease(0.3, force_N);
+  phase(act, "touch", track.force_N.end_s());
+  track.force_N.hold(random.uniform(0.5, 0.7));
+  const double begin_s = track.force_N.end_s();
+  phase(act, "hold", begin_s);
+  Profile &load_N = track.pull.load_N;
+  load_N.hold(begin_s);
+  load_N.ease(lift_s, stage.tangential.share * force_N);
+  phase(act, "lift", load_N.end_s());
+  load_N.hold(CARRIES_s);
+  phase(act, "carry", load_N.end_s());
+  load_N.ease(lift_s, 0.0);
+  phase(act, "lower", load_N.end_s());
+  track.force_N.hold(load_N.end_s() - begin_s + 0.3);
+  phase(act, "after", track.force_N.end_s());
+  track.force_N.ease(0.3, 0.0);
+  phase(act, "release", track.force_N.end_s());
+  act.tracks.push_back(track);
+  return act;
+}
+
+// Gives the nth act its tangential force.
+void pull(Act &act, const Stage &stage, std::size_t n) {
+  Random random(stage.options.seed, DIRECTION, n);
+  const double drawn_deg = random.uniform(-180.0, 180.0);
+  const double angle = stage.tangential.angle_deg.value_or(drawn_deg) * DEGREE;
+  for (Track &track : act.tracks) {
+    track.pull.along_x = std::cos(angle);
+    track.pull.along_y = std::sin(angle);
+    track.pull.friction = stage.options.friction;
+    track.pull.travel_mm = stage.options.dead_travel_mm;
+    if (stage.options.kind != "lift") {
+      track.pull.share = stage.tangential.share;
+    }
+  }
+}
+
 Act two(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, TWO, n);
   const double distance = DISTANCES_mm[n % DISTANCES_mm.size()];
@@ -341,6 +393,7 @@ struct Kind {
   Act (*act)(const Stage &stage, std::size_t n);
   const char *usual_indenter = "sphere6";
   double usual_margin_mm = 0.5 * GRID_STEP_mm;
+  const char *usual_tangential = "0";
 };
 
 const std::vector<Kind> &all_kinds() {
@@ -362,6 +415,12 @@ const std::vector<Kind> &all_kinds() {
        placement,
        "sphere15",
        GRID_STEP_mm}, // to the outer sensors
+      {{"lift", 120, "6",
+        "a gripped object's weight, 0.3 of the grip's force, is taken over in 0.1, 0.3 and 1 s"},
+       lift,
+       "sphere6",
+       0.5 * GRID_STEP_mm,
+       "0.3"},
       {{"two", 60, "4..10", "two contacts at once, 6 to 30 mm apart"}, two},
   };
   return all;
@@ -400,6 +459,10 @@ std::string name_of(const ScenarioOptions &options) {
     if (chosen != options.effects.end() && effect.name != "gain") {
       name += "-" + effect.name + (chosen->second == effect.usual ? "" : number(chosen->second));
     }
+  }
+  const Tangential tangential(options.tangential, options.friction);
+  if (tangential.share > 0.0) {
+    name += "-tangential" + number(tangential.share);
   }
   return name;
 }
@@ -449,6 +512,25 @@ double Forces::largest() const {
   return *std::max_element(values_.begin(), values_.end());
 }
 
+Tangential::Tangential(const std::string &text, double friction) {
+  const std::vector<std::string_view> parts = split(text, ',');
+  const auto given = to_double(trim(parts[0]));
+  if (parts.size() > 1) {
+    angle_deg = to_double(trim(parts[1]));
+  }
+  if (!given || parts.size() > 2 || (parts.size() == 2 && !angle_deg) ||
+      std::abs(angle_deg.value_or(0.0)) > 360.0) {
+    throw Error("--tangential \"" + printable(text) +
+                "\" is not possible; give a share of the normal force, as 0.3, or with its "
+                "direction in degrees 0.3,90");
+  }
+  if (!(*given >= 0.0 && *given <= friction)) {
+    throw Error("--tangential " + number(*given) + " does not hold; give 0 to " + number(friction) +
+                ", or another --friction");
+  }
+  share = *given;
+}
+
 bool Act::slips(double t_s) const {
   constexpr double ROUNDING_s = 1e-7;
   bool slips = false;
@@ -473,6 +555,7 @@ ScenarioOptions complete(const ScenarioOptions &options) {
   check("--quiet", chosen.quiet_s, 0.1, 60.0);
   check("--dead-travel", chosen.dead_travel_mm, 0.0, 10.0);
   check("--creep", chosen.creep_share, 0.0, 1.0);
+  check("--friction", chosen.friction, 0.05, 5.0);
   check("--stick-slip", chosen.stick_slip_mm, 0.0, 5.0);
   for (double speed_mm_s : chosen.speeds_mm_s) {
     check("--speed", speed_mm_s, 1.0, 1000.0);
@@ -480,6 +563,13 @@ ScenarioOptions complete(const ScenarioOptions &options) {
   if (!chosen.speeds_mm_s.empty() && chosen.kind != "slip" && chosen.kind != "rolloff") {
     throw Error("--speed says nothing in a scenario of \"" + chosen.kind +
                 "\"; leave it out, or choose slip or rolloff");
+  }
+  chosen.tangential =
+      options.tangential.empty() ? kind_of(options).usual_tangential : options.tangential;
+  const Tangential tangential(chosen.tangential, chosen.friction);
+  if (tangential.share > 0.0 && (chosen.kind == "slip" || chosen.kind == "rolloff")) {
+    throw Error("--tangential says nothing in a scenario of \"" + chosen.kind +
+                "\"; leave it out, or choose another");
   }
   if (!chosen.second_indenter.empty() && chosen.kind != "two") {
     throw Error("--second says nothing in a scenario of \"" + chosen.kind +
@@ -495,8 +585,17 @@ Scenario make_scenario(const ScenarioOptions &options, const ContactTable &table
   scenario.options = complete(options);
   const ScenarioOptions &chosen = scenario.options;
   const Forces forces(chosen.forces);
-  Stage stage(chosen, table, forces);
-  for (std::size_t n = 0; stage.play(kind.act(stage, n)); n++) {
+  const Tangential tangential(chosen.tangential, chosen.friction);
+  scenario.pulls = tangential.share > 0.0;
+  Stage stage(chosen, table, forces, tangential);
+  for (std::size_t n = 0;; n++) {
+    Act act = kind.act(stage, n);
+    if (scenario.pulls) {
+      pull(act, stage, n);
+    }
+    if (!stage.play(std::move(act))) {
+      break;
+    }
   }
   if (stage.acts.empty()) {
     throw Error("--seconds " + number(*chosen.seconds) + " is too short for one contact of \"" +

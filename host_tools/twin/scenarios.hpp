@@ -15,8 +15,13 @@
 // moves. So the dead travel, in which nothing slides yet, counts as slip; the events tell it apart.
 // A twist and a contact that rolls are no slip.
 //
-// Left out: edges of the rubber, tangential load (which moves the middle of the pressure on the
-// base by up to friction times thickness), influence of two contacts on each other's shape.
+// Objects pull along the rubber only if `tangential` says so: then in each contact, in one
+// direction, with that share of the normal force, rising and falling with it; in a lift with an
+// object's weight, which is that share of the force of the grip.
+//
+// Left out: edges of the rubber, friction where something slips (which moves the middle of the
+// pressure on the base by up to friction times thickness), influence of two contacts on each
+// other's shape.
 #pragma once
 
 #include "twin/contact_table.hpp"
@@ -55,6 +60,15 @@ private:
   bool range_ = false;
 };
 
+// "0.3": this share of the normal force, in a direction drawn for each contact; "0.3,90": in that
+// one, degrees from x towards y.
+struct Tangential {
+  // Throws Error unless both are numbers and the share is from 0 to friction.
+  Tangential(const std::string &text, double friction);
+  double share = 0.0;
+  std::optional<double> angle_deg;
+};
+
 struct ScenarioOptions {
   std::string kind = "taps";
   std::string indenter;        // empty: the kind's usual one
@@ -62,12 +76,15 @@ struct ScenarioOptions {
   double layer_mm = 12.0;
   EffectValues effects;
   std::uint64_t seed = 1;
-  std::optional<std::uint64_t> pad_seed; // of the pad's errors; else seed
-  std::optional<double> seconds;         // else usual_seconds
-  std::string forces;                    // empty: usual_forces
-  std::vector<double> speeds_mm_s;       // kinds "slip" and "rolloff"; empty: usual ones
-  double dead_travel_mm = 1.0, creep_share = 0.5, stick_slip_mm = 0.0; // Grip, kind "slip"
-  std::optional<double> margin_mm;                                     // else the kind's usual one
+  std::optional<std::uint64_t> pad_seed;         // of the pad's errors; else seed
+  std::optional<double> seconds;                 // else usual_seconds
+  std::string forces;                            // empty: usual_forces
+  std::string tangential;                        // empty: the kind's usual one
+  double friction = 0.5;                         // of what is pulled; assumed, as in Grip
+  std::vector<double> speeds_mm_s;               // kinds "slip" and "rolloff"; empty: usual ones
+  double dead_travel_mm = 1.0;                   // kinds "slip", Grip, and "lift", Pull
+  double creep_share = 0.5, stick_slip_mm = 0.0; // Grip, kind "slip"
+  std::optional<double> margin_mm;               // else the kind's usual one
   double quiet_s = 1.2;
 };
 
@@ -93,6 +110,7 @@ struct Act {
 struct Scenario {
   ScenarioOptions options; // complete
   std::string name;
+  bool pulls = false;    // something tangential is in it
   std::vector<Act> acts; // in order of time, none overlap
 };
 

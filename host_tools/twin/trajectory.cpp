@@ -1,5 +1,7 @@
 #include "twin/trajectory.hpp"
 
+#include "twin/traction_table.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -100,12 +102,27 @@ double Grip::pusher_mm(double way_mm) const {
 
 Touch Track::at(double t_s) const {
   const double way = grip.way_mm(pusher_mm.at(t_s));
-  Touch contact{force_N.at(t_s), x_mm + along_x * way, y_mm + along_y * way, angle_rad.at(t_s)};
+  Touch contact;
+  contact.force_N = force_N.at(t_s);
+  contact.x_mm = x_mm + along_x * way;
+  contact.y_mm = y_mm + along_y * way;
+  contact.angle_rad = angle_rad.at(t_s);
   if (contact.x_mm + radius_mm > edge_x_mm) {
     const DiscPart part = disc_before_edge((edge_x_mm - contact.x_mm) / radius_mm);
     contact.x_mm -= part.back * radius_mm;
     contact.force_N *= part.share;
   }
+  const double load_N = pull.load_N.at(t_s);
+  if (load_N > 0.0) {
+    contact.stuck_N = stuck_force_N(contact.force_N, load_N, pull.friction);
+    const double moved =
+        pull.travel_mm * (1.0 - std::pow(contact.stuck_N / contact.force_N, 2.0 / 3.0));
+    contact.x_mm += pull.along_x * moved;
+    contact.y_mm += pull.along_y * moved;
+  }
+  const double pull_N = pull.share * contact.force_N + load_N;
+  contact.pull_x_N = pull_N * pull.along_x;
+  contact.pull_y_N = pull_N * pull.along_y;
   return contact;
 }
 

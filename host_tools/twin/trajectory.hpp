@@ -63,12 +63,27 @@ struct Grip {
   double pusher_mm(double way_mm) const;
 };
 
+// The tangential force of an object on the rubber, along one direction: a share of the normal force
+// that rises and falls with it, as in an oblique push, or a load that comes while the normal force
+// stays, as a weight does. Under a load the object and its contact move along: by travel_mm when
+// all slides and by 1 - (1 - Q / (friction F))^(2/3) of it before (Mindlin, as in Grip).
+struct Pull {
+  double along_x = 1.0, along_y = 0.0; // unit vector
+  double share = 0.0;
+  Profile load_N; // at most friction times the normal force, 0 as long as share is not
+  double friction = 1.0;
+  double travel_mm = 0.0;
+};
+
 struct Touch {
   double force_N = 0.0;
   double x_mm = 0.0, y_mm = 0.0, angle_rad = 0.0; // the object is turned by the angle
+  double pull_x_N = 0.0, pull_y_N = 0.0;
+  double stuck_N = 0.0; // TractionTable::Load
   bool operator==(const Touch &other) const {
     return force_N == other.force_N && x_mm == other.x_mm && y_mm == other.y_mm &&
-           angle_rad == other.angle_rad;
+           angle_rad == other.angle_rad && pull_x_N == other.pull_x_N &&
+           pull_y_N == other.pull_y_N && stuck_N == other.stuck_N;
   }
 };
 
@@ -80,6 +95,7 @@ struct Track {
   Profile pusher_mm;
   Grip grip;
   Profile angle_rad;
+  Pull pull;
   // Where the pad ends in x, and the radius of the contact then: what is beyond carries nothing.
   // The disc's part on the pad acts at that part's centre, with its share of the force.
   double edge_x_mm = std::numeric_limits<double>::infinity();

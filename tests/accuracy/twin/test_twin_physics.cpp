@@ -1,4 +1,5 @@
 #include "axisymmetric_fem.hpp"
+#include "layer_collocation.hpp"
 #include "twin/best_gaussian.hpp"
 
 #include <algorithm>
@@ -39,6 +40,38 @@ TEST(TwinLayer, ShortAndLongWavesHaveTheirLimits) {
     EXPECT_NEAR(surface_compliance(1.01e-4, nu), bulk, 1e-5 * bulk);
     EXPECT_NEAR(surface_compliance(50.0, nu), 1.0 / 50.0, 1e-12);
     EXPECT_NEAR(surface_compliance(1e6, nu), 1e-6, 1e-15);
+  }
+}
+
+TEST(TwinLayer, CollocationAgrees) {
+  for (double nu : {0.0, 0.3, 0.45, 0.49, 0.499}) {
+    for (double H : {1e-3, 0.01, 0.1, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0}) {
+      const LayerWave wave = solve_layer_wave(H, nu, 36);
+      EXPECT_NEAR(wave.base_per_pressure, base_transfer(H, nu), 1e-10) << "H " << H << " nu " << nu;
+      EXPECT_NEAR(wave.base_per_traction, tangential_transfer(H, nu), 1e-10)
+          << "H " << H << " nu " << nu;
+      EXPECT_NEAR(wave.sinks_per_pressure, (1.0 - nu) * surface_compliance(H, nu), 1e-10)
+          << "H " << H << " nu " << nu;
+    }
+  }
+}
+
+// The base carries the moment of a traction and no force; short waves press as pressure does.
+TEST(TwinLayer, TractionHasItsLimits) {
+  for (double nu : {0.3, 0.49, 0.499}) {
+    EXPECT_EQ(tangential_transfer(0.0, nu), 0.0);
+    EXPECT_NEAR(tangential_transfer(1e-9, nu), 1e-9, 1e-20);
+    EXPECT_NEAR(tangential_share(1e-9, nu), 1e-9, 1e-20);
+    const double a = 2.0 * (1.0 - nu);
+    EXPECT_NEAR(tangential_transfer(20.0, nu) * std::exp(20.0),
+                2.0 * a * (20.0 + 1.0 - 2.0 * nu) / (3.0 - 4.0 * nu), 1e-6);
+    EXPECT_EQ(tangential_transfer(1e6, nu), 0.0);
+    EXPECT_NEAR(tangential_share(1e6, nu), 1.0, 1e-6);
+    for (double H : {0.2, 1.0, 3.0, 10.0}) { // as one fraction
+      const double b = 1.0 - 2.0 * nu, cosh = std::cosh(H);
+      const double D = (3.0 - 4.0 * nu) * cosh * cosh + H * H + b * b;
+      EXPECT_NEAR(tangential_transfer(H, nu), a * (H * cosh + b * std::sinh(H)) / D, 1e-15);
+    }
   }
 }
 

@@ -269,6 +269,14 @@ test('scenario: temperature column', () => {
   assert.equal(s.at_ns(0, 1e9).temperature_degC, 25);
 });
 
+test('scenario: the truth of a tangential force stands beside the temperature, in any order', () => {
+  for (const [names, cells] of [['Qx_N,Qy_N', '1,2'], ['Qx_N,Qy_N,temperature_degC', '1,2,20'], ['temperature_degC,Qy_N,Qx_N', '20,1,2']]) {
+    const s = scenario('# fingertip-scenario 1', `${HEADER},${names}`, `${row(0, 7)},${cells}`);
+    assert.equal(s.at_ns(14, 0).temperature_degC, names.includes('temperature') ? 20 : 25);
+    assert.equal(s.at_ns(14, 0).pressure_Pa, 101332);
+  }
+});
+
 for (const [name, lines, expected] of [
   ['no version', ['t_s'], /^s\.csv:1: not a scenario/],
   ['unknown version', ['# fingertip-scenario 2', HEADER, row(0)], /^s\.csv:1: scenario version 2/],
@@ -278,6 +286,8 @@ for (const [name, lines, expected] of [
   ['equal times', ['# fingertip-scenario 1', HEADER, row(1), row(1)], /^s\.csv:4: t_s 1 does not increase/],
   ['missing column', ['# fingertip-scenario 1', HEADER, row(0).slice(0, -2)], /^s\.csv:3: 22 columns; the header has 23/],
   ['wrong header', ['# fingertip-scenario 1', HEADER.replace('sigma_mm', 'sigma'), row(0)], /^s\.csv:2: column 7 is "sigma"/],
+  ['unknown column', ['# fingertip-scenario 1', `${HEADER},Qz_N`, `${row(0)},1`], /^s\.csv:2: column 24 is "Qz_N"; after the sensors there may be, once each: Qx_N, Qy_N, temperature_degC/],
+  ['column given twice', ['# fingertip-scenario 1', `${HEADER},Qx_N,Qx_N`, `${row(0)},1,1`], /^s\.csv:2: column 25 is "Qx_N"/],
   ['no rows', ['# fingertip-scenario 1', HEADER], /no rows/],
   ['no header', ['# fingertip-scenario 1'], /no header/],
   ['pressure no sensor takes', ['# fingertip-scenario 1', HEADER, row(0), row(1, -1.1e7)], /^s\.csv:4: column "s0_Pa" is -11000000; give at most 1e7 Pa/],

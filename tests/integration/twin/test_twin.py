@@ -60,7 +60,7 @@ class TwinTest(unittest.TestCase):
 class Files(TwinTest):
     def test_every_kind_is_read_by_python_and_emulator_alike(self):
         names = [line.split()[0] for line in self.run_twin("list")[0].split("\n\n")[0].splitlines()[1:]]
-        self.assertEqual(sorted(names), sorted(["grid", "taps", "high", "pokes", "cycle", "slip", "twist", "rolloff", "placements", "two"]))
+        self.assertEqual(sorted(names), sorted(["grid", "taps", "high", "pokes", "cycle", "slip", "twist", "rolloff", "placements", "two", "lift"]))
         for kind in names:
             with self.subTest(kind):
                 seconds = 34 if kind == "cycle" else 12
@@ -74,7 +74,7 @@ class Files(TwinTest):
                 self.assertEqual(emulator["rows"], len(scenario.t_s))
                 self.assertEqual(emulator["metadata"], scenario.metadata)
                 self.assertEqual(scenario.metadata["name"],
-                                 f"{kind}-{'sphere15' if kind == 'placements' else 'sphere6'}-h12-gain10-drift-relaxation-hysteresis-aftereffect-temperature-branch-bias-clip")
+                                 f"{kind}-{'sphere15' if kind == 'placements' else 'sphere6'}-h12-gain10-drift-relaxation-hysteresis-aftereffect-temperature-branch-bias-clip{'-tangential0.3' if kind == 'lift' else ''}")
                 for t_s, sensors in zip(times, emulator["at"]):
                     for k, sensor in enumerate(sensors):
                         self.assertAlmostEqual(
@@ -115,6 +115,36 @@ class Files(TwinTest):
             self.assertGreaterEqual(begin - end, 1.2)
             quiet = (scenario.t_s > end + 0.002) & (scenario.t_s < begin - 0.002)
             self.assertFalse(scenario.sensors_Pa[quiet].any())
+
+    def test_the_tangential_force_is_read_by_its_name_and_moves_what_the_firmware_finds(self):
+        self.scenario("taps", "--force", "5", "--seconds", "40", "--tangential", "0.3,90", "--effects", "temperature")
+        scenario = fingertip_files.read_scenario(self.csv)
+        fingertip_files.np.testing.assert_allclose(scenario.truth["Qx_N"], 0, atol=1e-9)
+        fingertip_files.np.testing.assert_allclose(scenario.truth["Qy_N"], 0.3 * scenario.truth["force_N"], atol=2e-5)
+        self.assertGreater(scenario.truth["Qy_N"].max(), 1.49)
+        row = max(self.events(), key=lambda row: float(row["Qy_N"]))
+        self.assertEqual((row["Qx_N"], row["Qy_N"]), ("0.00000", "1.50000"))
+        done = subprocess.run(["node", "--input-type=module", "-e", READ_AS_THE_EMULATOR_DOES, self.csv, "1.8"],
+                              capture_output=True, text=True, check=True, timeout=PATIENCE_s)
+        for k, sensor in enumerate(json.loads(done.stdout)["at"][0]):
+            self.assertAlmostEqual(sensor["pressure_Pa"] - 101325, fingertip_files.np.interp(1.8, scenario.t_s, scenario.sensors_Pa[:, k]), places=6)
+        recording = str(self.folder / "recording.csv")
+        subprocess.run([PLAYER, "play", self.csv, "-o", recording, "--quiet", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s)
+        played = fingertip_files.read_recording(recording)
+        t_s = played["t_us"] * 1e-6
+        pressed = (scenario.at("force_N", t_s) > 4.9) & ~fingertip_files.np.isnan(played["y_mm"])
+        self.assertGreater(pressed.sum(), 100)
+        off_mm = (played["y_mm"] - scenario.at("y_mm", t_s))[pressed]
+        self.assertAlmostEqual(fingertip_files.np.median(off_mm), 1.05, delta=0.15)
+        text = pathlib.Path(self.csv).read_text()
+        for name, what in (("Qz_N", 'column 24 is "Qz_N"; after the sensors there may be, once each: Qx_N, Qy_N, temperature_degC'),
+                           ("Qy_N", 'column 25 is "Qy_N"; after the sensors')):
+            pathlib.Path(self.csv).write_text(text.replace("Qx_N", name, 1))
+            refused = subprocess.run([PLAYER, "play", self.csv, "-o", recording + "2", "--quiet"], capture_output=True, text=True, timeout=PATIENCE_s)
+            self.assertEqual(refused.returncode, 1)
+            self.assertIn(what, refused.stderr)
+            with self.assertRaisesRegex(fingertip_files.InputError, "wrong header.*once each, any of Qx_N, Qy_N, temperature_degC"):
+                fingertip_files.read_scenario(self.csv)
 
     def test_a_cold_pad_reads_one_step_and_old_temperatures(self):
         # Almost no force; the firmware keeps a branch for 0.3 K, 3 s, and its temperature for half a second: some 24 Pa at 0.1 K/s.
@@ -217,6 +247,9 @@ class Usage(TwinTest):
             ("cycle", "--seconds", "20"): '--seconds 20 is too short for one contact of "cycle"',
             ("taps", "--force", "much"): '--force "much" is not possible',
             ("taps", "--speed", "20"): "--speed says nothing",
+            ("slip", "--tangential", "0.3"): "--tangential says nothing",
+            ("taps", "--tangential", "0.6"): "--tangential 0.6 does not hold; give 0 to 0.5, or another --friction",
+            ("taps", "--tangential", "much"): '--tangential "much" is not possible',
         }.items():
             self.assertIn(what, self.scenario_error(*arguments))
             self.assertEqual(os.listdir(self.folder), [])

@@ -2,12 +2,14 @@
 #include "libfingertip/random.hpp"
 #include "libfingertip/text.hpp"
 #include "twin/scenario_file.hpp"
+#include "twin/traction_table.hpp"
 
 extern "C" {
 #include "config/geometry.h"
 }
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -259,6 +261,71 @@ TEST(Scenarios, TwoContactsAreApartAsTold) {
             (std::set<long>{6000000, 9000000, 12000000, 15000000, 18000000, 24000000, 30000000}));
 }
 
+TEST(Scenarios, LiftsTakeAWeightOverWhileTheGripStays) {
+  const Scenario scenario = scenario_of("lift", [](ScenarioOptions &o) {
+    o.forces = "2..8";
+    o.tangential = "0.4";
+    o.dead_travel_mm = 1.5;
+  });
+  EXPECT_TRUE(scenario.pulls);
+  std::set<long> times_ms;
+  std::set<int> quadrants;
+  for (const Act &act : scenario.acts) {
+    std::map<std::string, Phase> phases;
+    for (const Phase &one : act.phases) {
+      EXPECT_FALSE(one.slip);
+      phases[one.name] = one;
+    }
+    const auto at = [&](double t_s) { return act.tracks[0].at(t_s - act.begin_s); };
+    const auto pull_N = [&](double t_s) { return std::hypot(at(t_s).pull_x_N, at(t_s).pull_y_N); };
+    const Phase &lift = phases.at("lift"), &carry = phases.at("carry"), &lower = phases.at("lower");
+    times_ms.insert(std::lround(1e3 * (lift.end_s - lift.begin_s)));
+    EXPECT_NEAR(lower.end_s - lower.begin_s, lift.end_s - lift.begin_s, 1e-9);
+    const Touch held = at(lift.begin_s), carried = at(carry.begin_s);
+    EXPECT_EQ(carried.force_N, held.force_N);
+    EXPECT_NEAR(pull_N(lift.begin_s), 0.0, 1e-9);
+    EXPECT_NEAR(pull_N(0.5 * (lift.begin_s + lift.end_s)), 0.2 * held.force_N, 1e-9);
+    EXPECT_NEAR(pull_N(carry.begin_s), 0.4 * held.force_N, 1e-9);
+    EXPECT_NEAR(pull_N(carry.end_s), 0.4 * held.force_N, 1e-9);
+    EXPECT_NEAR(pull_N(lower.end_s), 0.0, 1e-9);
+    // At 0.8 of what friction holds a fifth of the force's contact sticks.
+    EXPECT_NEAR(carried.stuck_N, 0.2 * held.force_N, 1e-9);
+    const double moved = std::hypot(carried.x_mm - held.x_mm, carried.y_mm - held.y_mm);
+    EXPECT_NEAR(moved, 1.5 * (1.0 - std::cbrt(0.04)), 1e-9);
+    EXPECT_NEAR((carried.x_mm - held.x_mm) * carried.pull_y_N,
+                (carried.y_mm - held.y_mm) * carried.pull_x_N, 1e-9);
+    EXPECT_GT((carried.x_mm - held.x_mm) * carried.pull_x_N +
+                  (carried.y_mm - held.y_mm) * carried.pull_y_N,
+              0.0);
+    EXPECT_NEAR(at(lower.end_s).x_mm, held.x_mm, 1e-9);
+    quadrants.insert((carried.pull_x_N > 0.0) + 2 * (carried.pull_y_N > 0.0));
+  }
+  EXPECT_EQ(times_ms, (std::set<long>{100, 300, 1000}));
+  EXPECT_EQ(quadrants.size(), 4u);
+}
+
+TEST(Scenarios, WhatIsPulledIsPressedAsBefore) {
+  const Scenario plain = scenario_of("taps");
+  const Scenario pulled = scenario_of("taps", [](ScenarioOptions &o) { o.tangential = "0.3"; });
+  const Scenario aimed = scenario_of("taps", [](ScenarioOptions &o) { o.tangential = "0.3,-120"; });
+  EXPECT_FALSE(plain.pulls);
+  ASSERT_EQ(plain.acts.size(), pulled.acts.size());
+  for (std::size_t i = 0; i < plain.acts.size(); i++) {
+    EXPECT_EQ(plain.acts[i].begin_s, pulled.acts[i].begin_s);
+    for (double t_s : {0.05, 0.2, 0.45}) {
+      const Touch before = plain.acts[i].tracks[0].at(t_s);
+      const Touch now = pulled.acts[i].tracks[0].at(t_s), there = aimed.acts[i].tracks[0].at(t_s);
+      EXPECT_EQ(now.force_N, before.force_N);
+      EXPECT_EQ(now.x_mm, before.x_mm);
+      EXPECT_EQ(now.y_mm, before.y_mm);
+      EXPECT_EQ(now.stuck_N, 0.0);
+      EXPECT_NEAR(std::hypot(now.pull_x_N, now.pull_y_N), 0.3 * now.force_N, 1e-12);
+      EXPECT_NEAR(there.pull_x_N, -0.15 * now.force_N, 1e-12);
+      EXPECT_NEAR(there.pull_y_N, -0.3 * std::sqrt(0.75) * now.force_N, 1e-12);
+    }
+  }
+}
+
 TEST(Scenarios, LongerOnesBeginAlikeAndEffectsDoNotMoveContacts) {
   const Scenario brief = scenario_of("taps"), longer = scenario_of("taps", [](ScenarioOptions &o) {
                                                 o.seconds = 300;
@@ -285,7 +352,8 @@ TEST(Scenarios, WrongOptionsAreToldInOneLine) {
     return std::string();
   };
   for (const std::string &text :
-       {message("slide", {}), message("taps", [](ScenarioOptions &o) { o.seconds = 2; }),
+       {message("slide", {}),
+        message("taps", [](ScenarioOptions &o) { o.seconds = 2; }),
         message("taps", [](ScenarioOptions &o) { o.seconds = 1e9; }),
         message("taps", [](ScenarioOptions &o) { o.seconds = NAN; }),
         message("taps", [](ScenarioOptions &o) { o.forces = "0"; }),
@@ -295,6 +363,13 @@ TEST(Scenarios, WrongOptionsAreToldInOneLine) {
         message("taps", [](ScenarioOptions &o) { o.margin_mm = -1; }),
         message("taps", [](ScenarioOptions &o) { o.speeds_mm_s = {20}; }),
         message("slip", [](ScenarioOptions &o) { o.speeds_mm_s = {0}; }),
+        message("slip", [](ScenarioOptions &o) { o.tangential = "0.3"; }),
+        message("taps", [](ScenarioOptions &o) { o.tangential = "0.51"; }),
+        message("taps", [](ScenarioOptions &o) { o.tangential = "-0.1"; }),
+        message("taps", [](ScenarioOptions &o) { o.tangential = "0.3,"; }),
+        message("taps", [](ScenarioOptions &o) { o.tangential = "0.3,0,0"; }),
+        message("lift", [](ScenarioOptions &o) { o.friction = 0.2; }),
+        message("lift", [](ScenarioOptions &o) { o.friction = NAN; }),
         message("slip", [](ScenarioOptions &o) { o.second_indenter = "cube6"; }),
         message("slip", [](ScenarioOptions &o) { o.dead_travel_mm = 11; })}) {
     EXPECT_NE(text.find("; "), std::string::npos) << text;
@@ -422,6 +497,79 @@ TEST(ScenarioFile, TurnsObjects) {
     peak_Pa = std::max(peak_Pa, file.at(name, middle_s));
   }
   EXPECT_GT(difference_Pa, 1e-3 * peak_Pa);
+}
+
+TEST(ScenarioFile, HasTheTangentialPressureInIt) {
+  static const TractionTable round(table_of("sphere6"), silicone(LAYER_mm));
+  static const TractionTable flat(table_of("cube6"), silicone(LAYER_mm));
+  for (const char *kind : {"taps", "lift", "two", "twist"}) {
+    const bool cube = std::string(kind) == "twist";
+    ScenarioOptions options;
+    options.kind = kind;
+    options.seconds = 30;
+    options.indenter = cube ? "cube6" : "sphere6";
+    options.tangential = "0.35";
+    const ContactTable &pressure = table_of(options.indenter);
+    const TractionTable &traction = cube ? flat : round;
+    const Scenario scenario = make_scenario(options, pressure);
+    const File file = written(scenario);
+    EXPECT_EQ(file.metadata.at("tangential"), "0.35");
+    double most_Pa = 0.0;
+    for (double t_s = 0.05; t_s < 30.0; t_s += 0.05) {
+      std::array<double, 15> expected_Pa{};
+      double pull_x_N = 0.0, pull_y_N = 0.0, force_N = 0.0, peak_Pa = 0.0;
+      for (const Act &act : scenario.acts) {
+        for (const Track &track : act.tracks) {
+          const Touch touch = track.at(t_s - act.begin_s);
+          if (t_s < act.begin_s || t_s >= act.end_s) {
+            continue;
+          }
+          force_N += touch.force_N;
+          pull_x_N += touch.pull_x_N;
+          pull_y_N += touch.pull_y_N;
+          // Turns by the object's angle: places and forces in its own axes.
+          const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
+          for (std::size_t k = 0; k < 15; k++) {
+            const double x = double(geometry.x_mm[k]) - touch.x_mm;
+            const double y = double(geometry.y_mm[k]) - touch.y_mm;
+            const TractionTable::Load load{touch.force_N, touch.stuck_N,
+                                           c * touch.pull_x_N + s * touch.pull_y_N,
+                                           c * touch.pull_y_N - s * touch.pull_x_N};
+            const double sheared_Pa = traction.base_pressure_Pa(load, c * x + s * y, c * y - s * x);
+            most_Pa = std::max(most_Pa, std::abs(sheared_Pa));
+            expected_Pa[k] +=
+                pressure.base_pressure_Pa(touch.force_N, c * x + s * y, c * y - s * x) + sheared_Pa;
+            peak_Pa = std::max(peak_Pa, std::abs(expected_Pa[k]));
+          }
+        }
+      }
+      for (std::size_t k = 0; k < 15; k++) {
+        EXPECT_NEAR(file.at("s" + std::to_string(k) + "_Pa", t_s), expected_Pa[k],
+                    0.25 + 1.1e-4 * peak_Pa)
+            << kind << " " << t_s;
+      }
+      EXPECT_NEAR(file.at("Qx_N", t_s), pull_x_N, 2e-4 + 1.1e-4 * force_N);
+      EXPECT_NEAR(file.at("Qy_N", t_s), pull_y_N, 2e-4 + 1.1e-4 * force_N);
+    }
+    EXPECT_GT(most_Pa, 1000.0) << kind;
+  }
+}
+
+TEST(ScenarioFile, WithoutTangentialForceIsAsBefore) {
+  for (const char *kind : {"taps", "twist"}) {
+    const auto bytes = [&](const char *tangential) {
+      return written(scenario_of(kind, [&](ScenarioOptions &o) {
+        o.seconds = 20;
+        o.tangential = tangential;
+      }));
+    };
+    const File plain = bytes(""), none = bytes("0"), some = bytes("0.3");
+    EXPECT_EQ(plain.bytes, none.bytes);
+    EXPECT_EQ(plain.column.count("Qx_N"), 0u);
+    EXPECT_EQ(plain.metadata.count("tangential"), 0u);
+    EXPECT_EQ(some.column.count("Qx_N"), 1u);
+    EXPECT_NE(plain.metadata.at("name"), some.metadata.at("name"));
+  }
 }
 
 TEST(ScenarioFile, HasItsEffectsInIt) {

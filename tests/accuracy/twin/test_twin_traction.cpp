@@ -1,0 +1,515 @@
+#include "layer_collocation.hpp"
+#include "partial_slip.hpp"
+#include "twin/best_gaussian.hpp"
+#include "twin/traction_table.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <gtest/gtest.h>
+#include <map>
+#include <tuple>
+
+namespace fingertip::twin {
+namespace {
+
+const std::filesystem::path CACHE = FINGERTIP_TEST_CACHE_DIR;
+
+struct Pair {
+  ContactTable pressure;
+  TractionTable traction;
+};
+
+const Pair &tables_of(const std::string &name, double thickness_mm) {
+  static std::map<std::pair<std::string, double>, Pair> known;
+  const auto key = std::make_pair(name, thickness_mm);
+  if (known.find(key) == known.end()) {
+    const Layer layer = silicone(thickness_mm);
+    const ContactTable table = ContactTable::load_or_build(indenter(name), layer, CACHE);
+    known.emplace(key, Pair{table, TractionTable(table, layer)});
+  }
+  return known.at(key);
+}
+
+std::size_t at(const Grid &grid, int i, int j) {
+  return std::size_t(grid.nodes / 2 + i) * std::size_t(grid.nodes) +
+         std::size_t(grid.nodes / 2 + j);
+}
+
+double largest(const std::vector<double> &field) {
+  double most = 0.0;
+  for (double value : field) {
+    most = std::max(most, std::abs(value));
+  }
+  return most;
+}
+
+std::vector<double> times(const std::vector<double> &field, double factor) {
+  std::vector<double> product = field;
+  for (double &value : product) {
+    value *= factor;
+  }
+  return product;
+}
+
+// friction (p(F) - p(S)), as TractionTable has it.
+std::vector<double> stuck_within(const Contact &whole, const Contact &stuck, double friction) {
+  std::vector<double> traction = times(whole.pressure_Pa, friction);
+  for (std::size_t n = 0; n < traction.size(); n++) {
+    traction[n] -= friction * stuck.pressure_Pa[n];
+  }
+  return traction;
+}
+
+// The wave's response on the traction itself, on the contact's own grid and with its room.
+TEST(TwinTraction, TheTableIsTheTransformOfTheTraction) {
+  struct Case {
+    const char *name;
+    double thickness_mm, allowed, allowed_far; // in parts of the peak, to 30 and 44.5 mm
+  };
+  for (const Case &one : {Case{"sphere6", 12.0, 0.004, 0.013}, Case{"cube6", 6.0, 0.002, 0.002},
+                          Case{"ball_bearing", 6.0, 0.008, 0.008}}) {
+    const Layer layer = silicone(one.thickness_mm);
+    const Grid grid = grid_for(indenter(one.name), layer);
+    ContactSolver solver(indenter(one.name), layer, grid);
+    PartialSlip surface(layer, grid);
+    const TractionTable &table = tables_of(one.name, one.thickness_mm).traction;
+    const double force_N = 4.4, stuck_N = 3.1, friction = 0.5;
+    const Contact whole = solver.solve(force_N), stuck = solver.solve(stuck_N);
+    const std::vector<double> none(whole.pressure_Pa.size(), 0.0);
+    for (bool slides : {true, false}) {
+      const std::vector<double> traction =
+          slides ? times(whole.pressure_Pa, friction) : stuck_within(whole, stuck, friction);
+      const double carried_N = friction * (slides ? force_N : force_N - stuck_N);
+      for (bool along_x : {true, false}) {
+        const std::vector<double> base =
+            surface.base_Pa(along_x ? Traction{traction, none} : Traction{none, traction});
+        const TractionTable::Load load{force_N, slides ? 0.0 : stuck_N, along_x ? carried_N : 0.0,
+                                       along_x ? 0.0 : carried_N};
+        const double peak = largest(base);
+        const auto off = [&](double reach_mm) {
+          double most = 0.0;
+          const int reach = static_cast<int>(reach_mm / grid.step_mm);
+          for (int i = -reach; i <= reach; i += 3) {
+            for (int j = -reach; j <= reach; j += 3) {
+              const double found = table.base_pressure_Pa(load, i * grid.step_mm, j * grid.step_mm);
+              most = std::max(most, std::abs(found - base[at(grid, i, j)]));
+            }
+          }
+          return most / peak;
+        };
+        EXPECT_LT(off(30.0), one.allowed) << one.name << (slides ? " slides" : " sticks");
+        EXPECT_LT(off(44.5), one.allowed_far) << one.name << (slides ? " slides" : " sticks");
+      }
+    }
+  }
+}
+
+// Without any grid or transform: with p(k) the Hankel transform of a round pressure, the base's is
+// cos(theta) / (2 pi) times the integral of Q(k h) p(k) J1(k r) k, positive ahead.
+TEST(TwinTraction, ARoundContactIsItsHankelTransform) {
+  const Layer layer = silicone(12.0);
+  const Grid grid{384, 0.15};
+  const double force_N = 5.0;
+  const Contact contact = ContactSolver(indenter("sphere15"), layer, grid).solve(force_N);
+  const double k_step = 0.008, k_end = 1.6; // per mm; Q(1.6 h) is 1e-7
+  std::vector<double> response;
+  for (double k = 0.0; k < k_end; k += k_step) {
+    double p_of_k = 0.0;
+    for (int i = 1; i < 60; i++) {
+      const double r = i * grid.step_mm;
+      p_of_k +=
+          contact.pressure_Pa[at(grid, i, 0)] * std::cyl_bessel_j(0, k * r) * r * grid.step_mm;
+    }
+    response.push_back(tangential_transfer(k * layer.thickness_mm, layer.poisson) * p_of_k);
+  }
+  const auto exact = [&](double r) {
+    double sum = 0.0;
+    for (std::size_t n = 0; n < response.size(); n++) {
+      const double k = k_step * static_cast<double>(n);
+      sum += response[n] * std::cyl_bessel_j(1, k * r) * k * k_step;
+    }
+    return sum;
+  };
+  const TractionTable &table = tables_of("sphere15", 12.0).traction;
+  double peak = 0.0, off = 0.0;
+  for (double r = 0.4; r < 30.0; r += 1.1) {
+    peak = std::max(peak, exact(r));
+    for (double angle : {0.0, 0.7, 2.6}) {
+      const double found = table.base_pressure_Pa({force_N, 0.0, force_N, 0.0}, r * std::cos(angle),
+                                                  r * std::sin(angle));
+      off = std::max(off, std::abs(found - exact(r) * std::cos(angle)));
+    }
+  }
+  EXPECT_LT(off, 0.005 * peak);
+  EXPECT_NEAR(peak / largest(contact.base_Pa), 0.316, 0.003);
+}
+
+TEST(TwinTraction, TheBaseCarriesItsMomentAndNoForce) {
+  const double thickness_mm = 3.0, step_mm = 0.5; // 45 mm are all there is
+  const TractionTable &table = tables_of("cube6", thickness_mm).traction;
+  const TractionTable::Load load{3.0, 1.8, 0.7, -0.4};
+  double force = 0.0, moment_x = 0.0, moment_y = 0.0;
+  for (double x = -44.5; x < 45.0; x += step_mm) {
+    for (double y = -44.5; y < 45.0; y += step_mm) {
+      const double here_N = 1e-6 * step_mm * step_mm * table.base_pressure_Pa(load, x, y);
+      force += here_N;
+      moment_x += x * here_N;
+      moment_y += y * here_N;
+    }
+  }
+  EXPECT_NEAR(force, 0.0, 1e-6);
+  EXPECT_NEAR(moment_x, thickness_mm * load.x_N, 0.002 * thickness_mm * std::abs(load.x_N));
+  EXPECT_NEAR(moment_y, thickness_mm * load.y_N, 0.002 * thickness_mm * std::abs(load.y_N));
+}
+
+TEST(TwinTraction, IsOddAlongItselfAndEvenAcross) {
+  const TractionTable &round = tables_of("sphere6", 12.0).traction;
+  const TractionTable &bar = tables_of("ball_bearing", 12.0).traction;
+  for (double x : {0.2, 3.3, 17.0}) {
+    for (double y : {0.1, 0.3, 8.4}) {
+      const TractionTable::Load along{5.0, 2.0, 1.5, 0.0}, across{5.0, 2.0, 0.0, 1.5};
+      const TractionTable::Load both{5.0, 2.0, 1.5, 1.5};
+      for (const TractionTable *table : {&round, &bar}) {
+        const double here = table->base_pressure_Pa(along, x, y);
+        EXPECT_GT(here, 0.0);
+        EXPECT_EQ(table->base_pressure_Pa(along, -x, y), -here);
+        EXPECT_EQ(table->base_pressure_Pa(along, x, -y), here);
+        const double there = table->base_pressure_Pa(across, x, y);
+        EXPECT_EQ(table->base_pressure_Pa(across, -x, y), there);
+        EXPECT_EQ(table->base_pressure_Pa(across, x, -y), -there);
+        EXPECT_NEAR(table->base_pressure_Pa(both, x, y), here + there, 1e-9);
+      }
+      EXPECT_NEAR(round.base_pressure_Pa(along, x, y), round.base_pressure_Pa(across, y, x), 0.1);
+      // A quarter turn of load and place together.
+      EXPECT_NEAR(round.base_pressure_Pa(along, x, y),
+                  round.base_pressure_Pa({5.0, 2.0, 0.0, 1.5}, -y, x), 0.1);
+    }
+  }
+  // Smooth through the middle.
+  const TractionTable::Load load{5.0, 0.0, 1.5, 0.0};
+  EXPECT_NEAR(round.base_pressure_Pa(load, 0.0, 2.0), 0.0, 1e-9);
+  EXPECT_NEAR(round.base_pressure_Pa(load, 1e-4, 0.0),
+              1e-3 * round.base_pressure_Pa(load, 0.1, 0.0), 1e-3);
+}
+
+// A ring of small contacts, each dragged along the ring: what one presses another relieves.
+TEST(TwinTraction, TorsionIsNotFelt) {
+  const TractionTable &table = tables_of("sphere6", 12.0).traction;
+  const double peak = table.base_pressure_Pa({2.0, 0.0, 1.0, 0.0}, 6.0, 0.0);
+  const auto ring = [&](double turn, double x, double y) { // 0: outward; 90 degrees: torsion
+    constexpr int CONTACTS = 64;
+    double sum = 0.0;
+    for (int n = 0; n < CONTACTS; n++) {
+      const double angle = 2.0 * M_PI * n / CONTACTS;
+      sum += table.base_pressure_Pa({2.0, 0.0, std::cos(angle + turn), std::sin(angle + turn)},
+                                    x - 5.0 * std::cos(angle), y - 5.0 * std::sin(angle)) /
+             CONTACTS;
+    }
+    return sum;
+  };
+  double torsion = 0.0, outward = 0.0;
+  for (double x = 0.0; x < 20.0; x += 1.7) {
+    torsion = std::max(torsion, std::abs(ring(0.5 * M_PI, x, 3.1)));
+    outward = std::max(outward, std::abs(ring(0.0, x, 3.1)));
+  }
+  EXPECT_LT(torsion, 2e-3 * peak);
+  EXPECT_GT(outward, 0.2 * peak);
+}
+
+TEST(TwinTraction, NoLoadIsNothingAndAFullOneSlides) {
+  const TractionTable &table = tables_of("sphere6", 12.0).traction;
+  EXPECT_EQ(stuck_force_N(5.0, 0.0, 0.5), 5.0);
+  EXPECT_EQ(stuck_force_N(5.0, 1.5, 0.5), 2.0);
+  EXPECT_EQ(stuck_force_N(5.0, 2.5, 0.5), 0.0);
+  EXPECT_EQ(stuck_force_N(5.0, 9.0, 0.5), 0.0);
+  EXPECT_EQ(table.base_pressure_Pa({5.0, 5.0, 0.0, 0.0}, 3.0, 2.0), 0.0);
+  EXPECT_EQ(table.base_pressure_Pa({0.0, 0.0, 0.0, 0.0}, 3.0, 2.0), 0.0);
+  EXPECT_EQ(table.base_pressure_Pa({5.0, 0.0, 0.0, 0.0}, 3.0, 2.0), 0.0);
+  // Next to nothing, too, presses in proportion.
+  const auto per_newton = [&](double tangential_N) {
+    return table.base_pressure_Pa({5.0, stuck_force_N(5.0, tangential_N, 0.5), tangential_N, 0.0},
+                                  6.0, 0.0) /
+           tangential_N;
+  };
+  EXPECT_NEAR(per_newton(1e-7) / per_newton(1e-2), 1.0, 1e-3);
+}
+
+// Cattaneo's and Mindlin's traction between spheres: friction p0 (sqrt(1 - r^2 / a^2) - c / a
+// sqrt(1 - r^2 / c^2)), c^3 / a^3 = 1 - Q / (friction F).
+TEST(TwinTraction, OnAThickLayerSpheresSlipAsMindlinSays) {
+  const Layer layer{400.0, 1e6, 0.49};
+  const Grid grid{384, 0.05};
+  ContactSolver solver(indenter("sphere15"), layer, grid);
+  const double radius_mm = 7.5, modulus_MPa = 1.0 / (1.0 - 0.49 * 0.49);
+  const double force_N = 0.4, tangential_N = 0.12, friction = 0.5;
+  const double a = std::cbrt(0.75 * force_N * radius_mm / modulus_MPa);
+  const double c = a * std::cbrt(1.0 - tangential_N / (friction * force_N));
+  const double peak = friction * 1.5e6 * force_N / (M_PI * a * a);
+  const Contact whole = solver.solve(force_N);
+  const Contact stuck = solver.solve(stuck_force_N(force_N, tangential_N, friction));
+  const std::vector<double> traction = stuck_within(whole, stuck, friction);
+  for (double r = 0.0; r < 1.2 * a; r += 0.1) {
+    const auto cap = [&](double edge) {
+      return r < edge ? std::sqrt(1.0 - r * r / (edge * edge)) : 0.0;
+    };
+    const int i = static_cast<int>(std::lround(r / grid.step_mm));
+    if (std::abs(r - a) > 0.06 && std::abs(r - c) > 0.06) { // where the slope has no end
+      EXPECT_NEAR(traction[at(grid, i, 0)], peak * (cap(a) - c / a * cap(c)), 0.02 * peak) << r;
+    }
+  }
+}
+
+TEST(TwinTraction, CollocationAgreesOnTheShiftOfTheSurface) {
+  for (double H : {0.01, 0.5, 2.0, 8.0}) {
+    EXPECT_NEAR(solve_layer_wave(H, 0.49, 36).moves_per_traction, surface_shift_along(H, 0.49),
+                1e-10);
+    EXPECT_NEAR(solve_layer_wave(H, 0.49, 36).rises_per_traction, surface_rise(H, 0.49), 1e-10);
+  }
+}
+
+// Back at no load, the ring that has slid forth has slid back in its outer half only: the traction
+// p(F) - p(S) at most, less twice that of half the load (Mindlin and Deresiewicz).
+TEST(TwinTraction, AFallenLoadLeavesLittle) {
+  const double force_N = 6.0, friction = 0.5, load_N = 1.8;
+  const auto shape = [&](double tangential_N) {
+    return TractionTable::Load{force_N, stuck_force_N(force_N, tangential_N, friction),
+                               tangential_N, 0.0};
+  };
+  for (const auto &[name, thickness_mm, allowed] :
+       {std::tuple{"sphere6", 12.0, 0.01}, {"sphere15", 12.0, 0.025}, {"sphere15", 6.0, 0.07}}) {
+    const TractionTable &table = tables_of(name, thickness_mm).traction;
+    double peak = 0.0, left = 0.0;
+    for (double x = 0.0; x < 30.0; x += 0.25) {
+      const double loaded = table.base_pressure_Pa(shape(load_N), x, 0.0);
+      peak = std::max(peak, loaded);
+      left = std::max(left,
+                      std::abs(loaded - 2.0 * table.base_pressure_Pa(shape(0.5 * load_N), x, 0.0)));
+    }
+    EXPECT_LT(left, allowed * peak) << name << " on " << thickness_mm << " mm";
+  }
+}
+
+// The closest pressure that pulls nowhere and has this sum over the nodes that can touch.
+std::vector<double> possible(std::vector<double> pressure, const std::vector<double> &height_mm,
+                             double sum) {
+  std::vector<double> sorted;
+  for (std::size_t n = 0; n < pressure.size(); n++) {
+    if (std::isfinite(height_mm[n])) {
+      sorted.push_back(pressure[n]);
+    }
+  }
+  std::sort(sorted.begin(), sorted.end(), std::greater<double>());
+  double above = -sum, less = 0.0;
+  for (std::size_t n = 0; n < sorted.size(); n++) {
+    above += sorted[n];
+    if (sorted[n] > above / double(n + 1)) {
+      less = above / double(n + 1);
+    }
+  }
+  for (std::size_t n = 0; n < pressure.size(); n++) {
+    pressure[n] = std::isfinite(height_mm[n]) ? std::max(0.0, pressure[n] - less) : 0.0;
+  }
+  return pressure;
+}
+
+// Rubber that is pulled along rises ahead and sinks behind, so the pressure moves ahead, and the
+// base feels that too. Solved for both at once, a pull of 0.3 of the force in proportion to
+// pressure: what superposition lacks, in parts of the tangential field's peak.
+TEST(TwinTraction, ThePressureHardlyMovesWithTheTraction) {
+  struct Case {
+    const char *name;
+    double thickness_mm, force_N, least, most;
+  };
+  const double share = 0.3;
+  for (const Case &one :
+       {Case{"sphere6", 12.0, 8.0, 0.0, 0.003}, Case{"sphere15", 12.0, 8.0, 0.009, 0.015},
+        Case{"sphere15", 6.0, 8.0, 0.10, 0.14}}) {
+    const Layer layer = silicone(one.thickness_mm);
+    const Grid grid{192, 0.25};
+    const Indenter &object = indenter(one.name);
+    ContactSolver solver(object, layer, grid);
+    PartialSlip surface(layer, grid);
+    const Contact alone = solver.solve(one.force_N);
+    const std::size_t size = alone.pressure_Pa.size();
+    std::vector<double> height_mm(size);
+    for (int i = -grid.nodes / 2; i < grid.nodes / 2; i++) {
+      for (int j = -grid.nodes / 2; j < grid.nodes / 2; j++) {
+        height_mm[at(grid, i, j)] = object.profile_mm(i * grid.step_mm, j * grid.step_mm);
+      }
+    }
+    const double sum = one.force_N / (1e-6 * grid.step_mm * grid.step_mm);
+    // No wave yields more than this, mm / Pa.
+    double softest = 0.0;
+    for (double H = 0.0; H < 20.0; H += 0.01) {
+      softest = std::max(softest, surface_compliance(H, layer.poisson));
+    }
+    softest *=
+        2.0 * (1.0 - layer.poisson * layer.poisson) * layer.thickness_mm / layer.youngs_modulus_Pa;
+    std::vector<double> p = alone.pressure_Pa, ahead = p;
+    double t = 1.0;
+    for (int step = 0; step < 400; step++) {
+      const std::vector<double> sunk = solver.displacement_mm(ahead);
+      const std::vector<double> risen = surface.rise_mm(times(ahead, share));
+      std::vector<double> next(size);
+      for (std::size_t n = 0; n < size; n++) {
+        next[n] = std::isfinite(height_mm[n])
+                      ? ahead[n] - (sunk[n] - risen[n] + height_mm[n]) / softest
+                      : 0.0;
+      }
+      next = possible(std::move(next), height_mm, sum);
+      const double after = 0.5 * (1.0 + std::sqrt(1.0 + 4.0 * t * t));
+      for (std::size_t n = 0; n < size; n++) {
+        ahead[n] = next[n] + (t - 1.0) / after * (next[n] - p[n]);
+      }
+      p = std::move(next);
+      t = after;
+    }
+    const std::vector<double> none(size, 0.0);
+    const auto tangential = [&](const std::vector<double> &pressure) {
+      return surface.base_Pa({times(pressure, share), none});
+    };
+    // The base's pressure is that of the moved pressure, less that of the one alone.
+    std::vector<double> moved = p;
+    for (std::size_t n = 0; n < size; n++) {
+      moved[n] -= alone.pressure_Pa[n];
+    }
+    std::vector<double> lacks = surface.under_pressure_Pa(moved);
+    const std::vector<double> first = tangential(alone.pressure_Pa), more = tangential(moved);
+    double most = 0.0;
+    for (std::size_t n = 0; n < size; n++) {
+      most = std::max(most, std::abs(lacks[n] + more[n]));
+    }
+    const double off = most / largest(first);
+    EXPECT_GE(off, one.least) << one.name << " on " << one.thickness_mm << " mm";
+    EXPECT_LT(off, one.most) << one.name << " on " << one.thickness_mm << " mm";
+  }
+}
+
+// Traction shaped by pressures against the traction that the layer's own tangential displacements
+// ask for: how far the base can tell them apart, in parts of the peak.
+TEST(TwinTraction, WhatSticksOnALayerIsNearlyTheContactOfLessForce) {
+  struct Case {
+    const char *name;
+    double thickness_mm, force_N, shift_mm, allowed;
+  };
+  const double friction = 0.5;
+  for (const Case &one :
+       {Case{"sphere6", 12.0, 5.0, 0.35, 0.002}, Case{"sphere15", 12.0, 8.0, 0.5, 0.005},
+        Case{"sphere15", 6.0, 8.0, 0.5, 0.013}, Case{"cube6", 12.0, 5.0, 0.4, 0.012},
+        Case{"cube6", 6.0, 5.0, 0.4, 0.03}}) {
+    const Layer layer = silicone(one.thickness_mm);
+    const Grid grid{192, 0.25};
+    ContactSolver solver(indenter(one.name), layer, grid);
+    PartialSlip surface(layer, grid);
+    const Contact whole = solver.solve(one.force_N);
+    const Traction found = surface.solve(whole.pressure_Pa, friction, one.shift_mm);
+    const double tangential_N = surface.force_N(found.x_Pa);
+    const double share = tangential_N / (friction * one.force_N);
+    ASSERT_GT(share, 0.3) << one.name;
+    ASSERT_LT(share, 0.9) << one.name;
+    const Contact stuck = solver.solve(stuck_force_N(one.force_N, tangential_N, friction));
+    const std::vector<double> none(found.y_Pa.size(), 0.0);
+    const std::vector<double> exact = surface.base_Pa(found);
+    const auto off = [&](const std::vector<double> &traction) {
+      const std::vector<double> base = surface.base_Pa({traction, none});
+      double most = 0.0;
+      for (std::size_t n = 0; n < base.size(); n++) {
+        most = std::max(most, std::abs(base[n] - exact[n]));
+      }
+      return most / largest(exact);
+    };
+    const double shaped = off(stuck_within(whole, stuck, friction));
+    const double sliding = off(times(whole.pressure_Pa, tangential_N / one.force_N));
+    EXPECT_LT(shaped, one.allowed) << one.name << " on " << one.thickness_mm << " mm";
+    if (one.name[0] == 's') { // the difference from plain sliding is more than that
+      EXPECT_GT(sliding, 3.0 * shaped) << one.name << " on " << one.thickness_mm << " mm";
+    }
+  }
+}
+
+// What the firmware's Gaussian makes of it, seen by sensors 9 mm apart as on the pad.
+struct Gaussian {
+  double p0, x, y, sigma;
+};
+
+Gaussian fit(const std::array<double, 15> &pressure, Gaussian g) {
+  for (int step = 0; step < 30; step++) {
+    Eigen::Matrix<double, 15, 4> jacobian;
+    Eigen::Matrix<double, 15, 1> rest;
+    for (int k = 0; k < 15; k++) {
+      const double dx = 9.0 * (k / 5 - 1) - g.x, dy = 9.0 * (k % 5 - 2) - g.y;
+      const double r2 = dx * dx + dy * dy, s2 = g.sigma * g.sigma;
+      const double e = std::exp(-0.5 * r2 / s2);
+      rest[k] = pressure[static_cast<std::size_t>(k)] - g.p0 * e;
+      jacobian.row(k) << e, g.p0 * e * dx / s2, g.p0 * e * dy / s2, g.p0 * e * r2 / (s2 * g.sigma);
+    }
+    const Eigen::Vector4d by = jacobian.colPivHouseholderQr().solve(rest);
+    g.p0 += by[0];
+    g.x += by[1];
+    g.y += by[2];
+    g.sigma += by[3];
+  }
+  return g;
+}
+
+// Per unit of Q / F, in thicknesses: median over places inside the array.
+double slope(double thickness_mm, double ratio, double force_N) {
+  const Pair &tables = tables_of("sphere6", thickness_mm);
+  std::vector<double> slopes;
+  for (double x = -6.0; x <= 6.0; x += 3.0) {
+    for (double y = -12.0; y <= 12.0; y += 3.0) {
+      for (double angle = 0.0; angle < 6.2; angle += M_PI / 4.0) {
+        const double qx = ratio * force_N * std::cos(angle), qy = ratio * force_N * std::sin(angle);
+        std::array<double, 15> plain{}, loaded{};
+        for (std::size_t k = 0; k < 15; k++) {
+          const double dx = 9.0 * (double(k / 5) - 1) - x, dy = 9.0 * (double(k % 5) - 2) - y;
+          plain[k] = tables.pressure.base_pressure_Pa(force_N, dx, dy);
+          loaded[k] = plain[k] + tables.traction.base_pressure_Pa({force_N, 0.0, qx, qy}, dx, dy);
+        }
+        const Gaussian start{*std::max_element(plain.begin(), plain.end()), x, y,
+                             0.45 * thickness_mm};
+        const Gaussian before = fit(plain, start), after = fit(loaded, start);
+        slopes.push_back(
+            ((after.x - before.x) * std::cos(angle) + (after.y - before.y) * std::sin(angle)) /
+            (ratio * thickness_mm));
+      }
+    }
+  }
+  std::nth_element(slopes.begin(), slopes.begin() + long(slopes.size() / 2), slopes.end());
+  return slopes[slopes.size() / 2];
+}
+
+TEST(TwinTraction, MovesTheGaussianOfTheFit) {
+  // 0.28 thicknesses, and 1.08 mm at 0.3 on 12 mm, was found by an independent simulation.
+  EXPECT_NEAR(slope(12.0, 0.1, 5.0), 0.28, 0.02);
+  EXPECT_NEAR(0.3 * 12.0 * slope(12.0, 0.3, 5.0), 1.08, 0.05);
+  EXPECT_NEAR(slope(9.0, 0.3, 5.0), 0.37, 0.02);
+  EXPECT_NEAR(slope(15.0, 0.3, 5.0), 0.27, 0.02);
+}
+
+// To the first order, with sensors everywhere.
+TEST(TwinTraction, MovesTheClosestGaussianByAShareOfTheThickness) {
+  // On 6 mm the contact is not small beside the thickness.
+  for (const auto &[thickness_mm, expected] :
+       {std::pair{6.0, 0.296}, {9.0, 0.28}, {12.0, 0.28}, {15.0, 0.28}}) {
+    const Pair &tables = tables_of("sphere6", thickness_mm);
+    const double force_N = 5.0;
+    const BestGaussian::Fit g = BestGaussian(tables.pressure, thickness_mm).at(force_N);
+    double with = 0.0, square = 0.0;
+    for (double x = -30.0; x <= 30.0; x += 0.5) {
+      for (double y = -30.0; y <= 30.0; y += 0.5) {
+        const double s2 = g.sigma_mm * g.sigma_mm;
+        const double along = g.p0_Pa * std::exp(-0.5 * (x * x + y * y) / s2) * x / s2;
+        with += along * tables.traction.base_pressure_Pa({force_N, 0.0, force_N, 0.0}, x, y);
+        square += along * along;
+      }
+    }
+    EXPECT_NEAR(with / square / thickness_mm, expected, 0.01);
+  }
+}
+
+} // namespace
+} // namespace fingertip::twin
