@@ -80,6 +80,7 @@ Facts gather(const Examination &examination, const std::function<bool()> &stop,
   try {
     facts.port = examination.choice.port;
     Way way = choose_way(examination.choice, examination.root);
+    facts.is_shared = !way.socket.empty();
     facts.port = device_of(way, examination.root);
     facts.holders = holders_of(facts.port, examination.root);
     auto transport = open_way(way, examination.root);

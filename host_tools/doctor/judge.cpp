@@ -150,7 +150,10 @@ private:
   void port() {
     std::string holders = holders_text();
     if (!facts_.failure) {
-      if (holders.empty()) {
+      if (facts_.is_shared) {
+        add(Verdict::ok, "port",
+            facts_.port + (holders.empty() ? ", shared" : ", shared by " + holders));
+      } else if (holders.empty()) {
         add(Verdict::ok, "port", facts_.port + ", nobody else has it open");
       } else {
         add(Verdict::warn, "port", facts_.port + ": also open in " + holders,

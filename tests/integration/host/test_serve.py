@@ -140,6 +140,12 @@ class Sharing(ServeTest):
                 self.assertEqual(recording.end["dropped_packets"], "0")
                 self.assertTrue(((recording["frame"][1:] - recording["frame"][:-1]) == 1).all())
 
+    def test_the_doctor_knows_it(self):
+        with self.device(), self.served() as server:
+            done = subprocess.run([FINGERTIP, "doctor", "--seconds", "1"], env=self.environment, capture_output=True, text=True, timeout=PATIENCE_s)
+        self.assertRegex(done.stdout, rf"(?m)^ok +port +{self.socket_of()}, shared by fingertip \(process {server.pid}\)$")
+        self.assertRegex(done.stdout, r"(?m)^ok +packets +\d+ packets, 0 lost, 0 damaged$")
+
     def test_losses_of_the_line_are_everybodys(self):
         with self.device("drop=20", "flip=25", "frames=400"), self.served():
             (one, one_csv), (other, other_csv) = self.recording("one.csv"), self.recording("other.csv")
