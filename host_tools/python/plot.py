@@ -156,7 +156,8 @@ def header(recording, comparison, t_s, simulated):
             + f"RMSE {s['force_rmse_N']:.3f} N  ·  slips: {s['slip_found']} found, {s['slip_missed']} missed, "
             f"{s['slip_false']} false frames  ·  dropped packets: {'?' if s['dropped_packets'] is None else s['dropped_packets']}")
     else:
-        lines.append(f"{len(t_s)} frames in {t_s[-1] - t_s[0]:.1f} s")
+        dropped = (recording.end or {}).get("dropped_packets", "?")
+        lines.append(f"{len(recording.has_contact)} frames in {t_s[-1] - t_s[0]:.1f} s  ·  dropped packets: {dropped}")
     return ("Fingertip, simulated sensors" if simulated else "Fingertip"), lines
 
 
@@ -206,6 +207,7 @@ def main(argv):
     picture = io.BytesIO()
     figure.savefig(picture, dpi=110, format="png")
     write_bytes(options.output, picture.getvalue())
+    print(f"{options.output}: {lines[-1]}")
     return 0
 
 

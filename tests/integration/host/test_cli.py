@@ -23,7 +23,8 @@ import pyte
 
 FINGERTIP, FAKE_DEVICE = (os.path.abspath(path) for path in sys.argv[1:3])
 PATIENCE_s = 30
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools" / "python"))
+PYTHON_TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"
+sys.path.insert(0, str(PYTHON_TOOLS))
 import fingertip_files as files  # noqa: E402
 
 
@@ -319,7 +320,7 @@ class Several(CliTest):
         self.assertTrue((np.diff(one["frame"]) == 1).all())
 
     def test_all_agree_on_what_came(self):
-        """Recorder, replay, conversion and reader of a joint recording whose fingertip was unplugged."""
+        """Recorder, replay, conversion, reader and plot of a joint recording whose fingertip was unplugged."""
         with self.device("serial=AAAA", "health=7"), self.device("serial=BBBB", "health=5", "vanish=103,500", port=self.other):
             process = self.start("record", self.csv, "--all")
             self.wait_for(lambda: os.path.exists(self.csv) and any("1/event: back" in c for c in self.rows()[1]))
@@ -350,6 +351,9 @@ class Several(CliTest):
                 if path == self.csv:
                     self.assertEqual(again.end["packets"], end[2])
                 self.assertIn(" 0 packets dropped", self.run_cli("replay", converted, "--speed", "max")[0])
+            drawn = subprocess.run([sys.executable, PYTHON_TOOLS / "plot.py", self.csv, "--device", serial, "-o",
+                                    os.path.join(self.folder, f"{serial}.png")], capture_output=True, text=True, check=True).stdout
+            self.assertRegex(drawn, rf": {end[1]} frames in [\d.]+ s  ·  dropped packets: 0\n$")
 
     def test_errors_of_several(self):
         with self.device("serial=AAAA"), self.device("serial=AAAA", port=self.other):
