@@ -43,10 +43,10 @@
  *
  * The constants were chosen on four of that strip's recordings and on pads of other seeds than the
  * truth report judges; half or twice of any time, and half of any band but the eighth (one of the
- * strips keeps 13 %), leaves that judgement as it is. Of twenty other recordings seventeen report a
- * contact without doubt in at most 4.3 % of the time in which nothing touches; three do not: one
- * stands off by 15 to 30 % for minutes after presses of 30 kPa and more (69 %), and on two, two
- * sensors drift by 2 kPa (10 and 19 to 42 %).
+ * strips keeps 13 %), leaves that judgement as it is. Of twenty other recordings, which chose only
+ * what counts as creeping, seventeen report a contact without doubt in at most 4.3 % of the time in
+ * which nothing touches; three do not: one stands off by 15 to 30 % for minutes after presses of
+ * 30 kPa and more (69 %), and on two, two sensors drift by 2 kPa (10 and 19 to 42 %).
  */
 #ifndef CONDITION_CONDITION_H
 #define CONDITION_CONDITION_H
