@@ -5,7 +5,6 @@
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
-#include <poll.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
@@ -16,8 +15,6 @@
 namespace fingertip {
 
 namespace {
-
-constexpr int WRITE_TIMEOUT_ms = 1000;
 
 Error open_error(const std::string &path, int error) {
   switch (error) {
@@ -72,7 +69,7 @@ int open_port(const std::string &path, int *error) {
 } // namespace
 
 SerialTransport::SerialTransport(const std::string &path, std::function<std::string()> find_again)
-    : path_(path), find_again_(std::move(find_again)) {
+    : DescriptorTransport(path), find_again_(std::move(find_again)) {
   int error = 0;
   fd_ = open_port(path_, &error);
   if (fd_ < 0) {
@@ -80,61 +77,8 @@ SerialTransport::SerialTransport(const std::string &path, std::function<std::str
   }
 }
 
-SerialTransport::~SerialTransport() {
-  close();
-}
-
-void SerialTransport::close() {
-  if (fd_ >= 0) {
-    ::close(fd_);
-    fd_ = -1;
-  }
-}
-
-Transport::Result SerialTransport::read(std::uint8_t *bytes, std::size_t capacity,
-                                        std::size_t *length, std::chrono::milliseconds timeout) {
-  *length = 0;
-  if (fd_ < 0) {
-    return Result::gone;
-  }
-  pollfd waiting = {fd_, POLLIN, 0};
-  int ready = poll(&waiting, 1, static_cast<int>(timeout.count()));
-  if (ready <= 0) {
-    return Result::timeout;
-  }
-  if (waiting.revents & POLLIN) {
-    ssize_t count = ::read(fd_, bytes, capacity);
-    if (count > 0) {
-      *length = static_cast<std::size_t>(count);
-      return Result::data;
-    }
-    if (count < 0 && (errno == EAGAIN || errno == EINTR)) {
-      return Result::timeout;
-    }
-  }
-  close();
-  return Result::gone;
-}
-
-bool SerialTransport::write(const std::uint8_t *bytes, std::size_t length) {
-  while (length > 0) {
-    if (fd_ < 0) {
-      return false;
-    }
-    ssize_t count = ::write(fd_, bytes, length);
-    if (count >= 0) {
-      bytes += count;
-      length -= static_cast<std::size_t>(count);
-    } else if (errno == EAGAIN) {
-      pollfd waiting = {fd_, POLLOUT, 0};
-      if (poll(&waiting, 1, WRITE_TIMEOUT_ms) <= 0) {
-        return false;
-      }
-    } else if (errno != EINTR) {
-      return false;
-    }
-  }
-  return true;
+ssize_t SerialTransport::put(const std::uint8_t *bytes, std::size_t length) {
+  return ::write(fd_, bytes, length);
 }
 
 bool SerialTransport::reopen() {
@@ -152,10 +96,6 @@ bool SerialTransport::reopen() {
     throw open_error(path_, error);
   }
   return fd_ >= 0;
-}
-
-std::vector<pollfd> SerialTransport::poll_descriptors() const {
-  return fd_ < 0 ? std::vector<pollfd>() : std::vector<pollfd>{{fd_, POLLIN, 0}};
 }
 
 bool SerialTransport::ask_loader() {

@@ -6,39 +6,28 @@
  */
 #pragma once
 
-#include "libfingertip/transport.hpp"
+#include "libfingertip/descriptor_transport.hpp"
 
 #include <functional>
 
 namespace fingertip {
 
-class SerialTransport : public Transport {
+class SerialTransport : public DescriptorTransport {
 public:
   /* find_again: the path where it is back after it was gone, empty while it is not; without it, the
    * same path. Throws Error if the port is absent, in use, not allowed, or no terminal. */
   explicit SerialTransport(const std::string &path, std::function<std::string()> find_again = {});
-  ~SerialTransport() override;
-  SerialTransport(const SerialTransport &) = delete;
-  SerialTransport &operator=(const SerialTransport &) = delete;
-
-  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
-              std::chrono::milliseconds timeout) override;
-  bool write(const std::uint8_t *bytes, std::size_t length) override;
   /* Throws Error if the port is there but was taken by somebody else. */
   bool reopen() override;
   bool ask_loader() override;
-  std::string description() const override { return path_; }
-  std::vector<pollfd> poll_descriptors() const override;
 
   /* Throws Error if another program has the port. */
   static void check_unused(const std::string &path);
 
 private:
-  void close();
+  ssize_t put(const std::uint8_t *bytes, std::size_t length) override;
 
-  std::string path_;
   std::function<std::string()> find_again_;
-  int fd_ = -1;
 };
 
 } // namespace fingertip

@@ -9,7 +9,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -21,7 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int WRITE_TIMEOUT_ms = 1000;
 constexpr const char *SOCKET_END = ".sock";
 constexpr const char *PORT_END = ".port";
 
@@ -116,7 +114,7 @@ bool SocketTransport::is_served(const std::string &path) {
   return fd >= 0 || error == EACCES || error == EPERM || error == EAGAIN;
 }
 
-SocketTransport::SocketTransport(const std::string &path) : path_(path) {
+SocketTransport::SocketTransport(const std::string &path) : DescriptorTransport(path) {
   int error = 0;
   fd_ = connect_to(path, &error);
   if (fd_ >= 0) {
@@ -132,58 +130,8 @@ SocketTransport::SocketTransport(const std::string &path) : path_(path) {
   throw Error(ErrorCode::cannot_open, path + ": cannot open (" + std::strerror(error) + ")");
 }
 
-SocketTransport::~SocketTransport() {
-  close();
-}
-
-void SocketTransport::close() {
-  if (fd_ >= 0) {
-    ::close(fd_);
-    fd_ = -1;
-  }
-}
-
-Transport::Result SocketTransport::read(std::uint8_t *bytes, std::size_t capacity,
-                                        std::size_t *length, std::chrono::milliseconds timeout) {
-  *length = 0;
-  if (fd_ < 0) {
-    return Result::gone;
-  }
-  pollfd waiting = {fd_, POLLIN, 0};
-  if (poll(&waiting, 1, static_cast<int>(timeout.count())) <= 0) {
-    return Result::timeout;
-  }
-  ssize_t count = recv(fd_, bytes, capacity, 0);
-  if (count > 0) {
-    *length = static_cast<std::size_t>(count);
-    return Result::data;
-  }
-  if (count < 0 && (errno == EAGAIN || errno == EINTR)) {
-    return Result::timeout;
-  }
-  close();
-  return Result::gone;
-}
-
-bool SocketTransport::write(const std::uint8_t *bytes, std::size_t length) {
-  while (length > 0) {
-    if (fd_ < 0) {
-      return false;
-    }
-    ssize_t count = send(fd_, bytes, length, MSG_NOSIGNAL);
-    if (count >= 0) {
-      bytes += count;
-      length -= static_cast<std::size_t>(count);
-    } else if (errno == EAGAIN) {
-      pollfd waiting = {fd_, POLLOUT, 0};
-      if (poll(&waiting, 1, WRITE_TIMEOUT_ms) <= 0) {
-        return false;
-      }
-    } else if (errno != EINTR) {
-      return false;
-    }
-  }
-  return true;
+ssize_t SocketTransport::put(const std::uint8_t *bytes, std::size_t length) {
+  return send(fd_, bytes, length, MSG_NOSIGNAL);
 }
 
 bool SocketTransport::reopen() {
@@ -196,10 +144,6 @@ bool SocketTransport::reopen() {
 bool SocketTransport::ask_loader() {
   auto bytes = frame_bytes(command_loader());
   return write(bytes.data(), bytes.size());
-}
-
-std::vector<pollfd> SocketTransport::poll_descriptors() const {
-  return fd_ < 0 ? std::vector<pollfd>() : std::vector<pollfd>{{fd_, POLLIN, 0}};
 }
 
 } // namespace fingertip

@@ -7,7 +7,7 @@
  * /run/fingertip for root and /tmp/fingertip-UID for others. All look into /run/fingertip too. */
 #pragma once
 
-#include "libfingertip/transport.hpp"
+#include "libfingertip/descriptor_transport.hpp"
 
 #include <string>
 #include <vector>
@@ -30,31 +30,19 @@ inline constexpr const char *COMMON_SHARE_FOLDER = "/run/fingertip";
 std::string share_socket_name(const std::string &serial);
 std::string share_port_name(const std::string &serial);
 
-class SocketTransport : public Transport {
+class SocketTransport : public DescriptorTransport {
 public:
   /* Throws Error: not shared, not allowed. */
   explicit SocketTransport(const std::string &path);
-  ~SocketTransport() override;
-  SocketTransport(const SocketTransport &) = delete;
-  SocketTransport &operator=(const SocketTransport &) = delete;
-
-  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
-              std::chrono::milliseconds timeout) override;
-  bool write(const std::uint8_t *bytes, std::size_t length) override;
   bool reopen() override;
   /* Who serves it does so for a fingertip that does not speak this version of the protocol. */
   bool ask_loader() override;
-  std::string description() const override { return path_; }
-  std::vector<pollfd> poll_descriptors() const override;
 
   /* Whether somebody serves there now. */
   static bool is_served(const std::string &path);
 
 private:
-  void close();
-
-  std::string path_;
-  int fd_ = -1;
+  ssize_t put(const std::uint8_t *bytes, std::size_t length) override;
 };
 
 } // namespace fingertip

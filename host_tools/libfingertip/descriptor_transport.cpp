@@ -1,0 +1,77 @@
+#include "libfingertip/descriptor_transport.hpp"
+
+#include <cerrno>
+#include <poll.h>
+#include <unistd.h>
+
+namespace fingertip {
+
+namespace {
+
+constexpr int WRITE_TIMEOUT_ms = 1000;
+
+} // namespace
+
+DescriptorTransport::~DescriptorTransport() {
+  close();
+}
+
+void DescriptorTransport::close() {
+  if (fd_ >= 0) {
+    ::close(fd_);
+    fd_ = -1;
+  }
+}
+
+Transport::Result DescriptorTransport::read(std::uint8_t *bytes, std::size_t capacity,
+                                            std::size_t *length,
+                                            std::chrono::milliseconds timeout) {
+  *length = 0;
+  if (fd_ < 0) {
+    return Result::gone;
+  }
+  pollfd waiting = {fd_, POLLIN, 0};
+  int ready = poll(&waiting, 1, static_cast<int>(timeout.count()));
+  if (ready <= 0) {
+    return Result::timeout;
+  }
+  if (waiting.revents & POLLIN) {
+    ssize_t count = ::read(fd_, bytes, capacity);
+    if (count > 0) {
+      *length = static_cast<std::size_t>(count);
+      return Result::data;
+    }
+    if (count < 0 && (errno == EAGAIN || errno == EINTR)) {
+      return Result::timeout;
+    }
+  }
+  close();
+  return Result::gone;
+}
+
+bool DescriptorTransport::write(const std::uint8_t *bytes, std::size_t length) {
+  while (length > 0) {
+    if (fd_ < 0) {
+      return false;
+    }
+    ssize_t count = put(bytes, length);
+    if (count >= 0) {
+      bytes += count;
+      length -= static_cast<std::size_t>(count);
+    } else if (errno == EAGAIN) {
+      pollfd waiting = {fd_, POLLOUT, 0};
+      if (poll(&waiting, 1, WRITE_TIMEOUT_ms) <= 0) {
+        return false;
+      }
+    } else if (errno != EINTR) {
+      return false;
+    }
+  }
+  return true;
+}
+
+std::vector<pollfd> DescriptorTransport::poll_descriptors() const {
+  return fd_ < 0 ? std::vector<pollfd>() : std::vector<pollfd>{{fd_, POLLIN, 0}};
+}
+
+} // namespace fingertip

@@ -1,0 +1,36 @@
+/* What serial port and socket have in common: a descriptor that neither reads nor writes wait for.
+ */
+#pragma once
+
+#include "libfingertip/transport.hpp"
+
+#include <string>
+#include <sys/types.h>
+
+namespace fingertip {
+
+class DescriptorTransport : public Transport {
+public:
+  ~DescriptorTransport() override;
+  DescriptorTransport(const DescriptorTransport &) = delete;
+  DescriptorTransport &operator=(const DescriptorTransport &) = delete;
+
+  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
+              std::chrono::milliseconds timeout) override;
+  bool write(const std::uint8_t *bytes, std::size_t length) override;
+  std::string description() const override { return path_; }
+  std::vector<pollfd> poll_descriptors() const override;
+
+protected:
+  explicit DescriptorTransport(const std::string &path) : path_(path) {}
+  void close();
+
+  std::string path_;
+  int fd_ = -1; /* -1: gone */
+
+private:
+  /* As write(2). */
+  virtual ssize_t put(const std::uint8_t *bytes, std::size_t length) = 0;
+};
+
+} // namespace fingertip
