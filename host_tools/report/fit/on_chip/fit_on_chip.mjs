@@ -4,7 +4,7 @@ import { SimulatedTime } from '../../../emulator/clock.mjs';
 import { Report } from '../../../emulator/report.mjs';
 
 /** In the order of `kernels` in main.c. */
-export const KERNELS = ['nothing', 'fit', 'grid', 'masked', 'general', 'naive_float', 'naive_double', 'lm_float', 'lm_double'];
+export const KERNELS = ['nothing', 'fit', 'grid', 'masked', 'general', 'naive_float', 'naive_double', 'lm_float', 'lm_double', 'tangential'];
 const [NEXT_JOB, START, STOP] = [1, 2, 3];
 /** Words of `job` in main.c. */
 const FIELDS = { kernel: 0, iterations: 1, n_largest: 2, guess: 3, noise_Pa_q10: 4, prior_sigma_mm: 5, prior_width_mm: 6, usable: 7, readings: 8, x_mm: 40, y_mm: 41 };

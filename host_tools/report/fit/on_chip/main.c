@@ -4,6 +4,7 @@
 #include "alternatives/alternatives.h"
 #include "config/geometry.h"
 #include "fit/fit.h"
+#include "fit/fit_tangential.h"
 #include "port/port.h"
 
 /* Words of 32 bits, in this order, as fit_on_chip.mjs writes and reads them. */
@@ -28,6 +29,8 @@ enum { CALL_NEXT_JOB = 1, CALL_START = 2, CALL_STOP = 3 };
 static struct fit_array array;
 static struct fit_settings settings;
 static struct fit_result result;
+static struct fit_pad pad;
+static struct fit_tangential tangential_result;
 
 static void nothing(void) {}
 
@@ -55,6 +58,23 @@ static void general(void) {
   job.y_mm = result.y_mm;
 }
 
+/* Of 12 mm of rubber. */
+static const struct pad_profile profile = {
+    .thickness_mm = 12.0f,
+    .normal = {{0.0962158f, 3.563492f}, {0.8206275f, 5.739365f}},
+    .tangential = {{1.051876f, 4.802645f}, {4.015438f, 7.883257f}, {5.430944f, 19.82153f}},
+    .spread_mm2 = 4.0f,
+    .spread_sd_mm2 = 6.0f,
+    .tangential_scale = 1.0f,
+};
+
+/* After `fit` of the same readings, which is not counted. */
+static void tangential(void) {
+  fit_tangential(&array, &pad, job.pressure_Pa_q10, &settings, &result, &tangential_result);
+  job.x_mm = tangential_result.x_mm;
+  job.y_mm = tangential_result.y_mm;
+}
+
 #define ALTERNATIVE(name, solver, real)                                                            \
   static void name(void) {                                                                         \
     const struct alternative_settings chosen = {(int)job.iterations,                               \
@@ -71,11 +91,12 @@ ALTERNATIVE(lm_double, lm, double)
 
 /* The order is that of KERNELS in fit_on_chip.mjs. */
 static void (*const kernels[])(void) = {nothing,     fit,          grid,     masked,   general,
-                                        naive_float, naive_double, lm_float, lm_double};
+                                        naive_float, naive_double, lm_float, lm_double, tangential};
 
 int main(void) {
   if (fit_array_init(&array, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
-                     geometry.pitch_mm) != FT_OK) {
+                     geometry.pitch_mm) != FT_OK ||
+      fit_pad_init(&pad, &array, &profile) != FT_OK) {
     port_panic();
   }
   for (;;) {
@@ -90,6 +111,9 @@ int main(void) {
     settings.prior_sigma_mm = job.prior_sigma_mm;
     settings.prior_width_mm = job.prior_width_mm;
     void (*kernel)(void) = kernels[job.kernel];
+    if (kernel == tangential) {
+      fit();
+    }
     CALL_DEBUGGER(CALL_START);
     kernel();
     CALL_DEBUGGER(CALL_STOP);

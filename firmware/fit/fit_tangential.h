@@ -1,0 +1,74 @@
+/* Tangential load from the normal pressures: what pulls along the rubber presses the base ahead of
+ * it and relieves it behind, broader than a shift of the contact does.
+ *
+ * From the Gaussian fit, FIT_TANGENTIAL_STEPS Gauss-Newton steps of eight unknowns: normal force,
+ * location, the contact's own spread and its two elongations, and the tangential force along x and
+ * y. The pad's profile (common/pad_profile.h) says how its rubber spreads what presses and what
+ * pulls. Elongation is in the model because a long contact looks like a pulled one to a fit that
+ * knows no other explanation: a prior holds it near round, wide where the Gaussian fit has called
+ * the contact elongated, and the residual says whether the model was right. Readings count by their
+ * noise, gain error and model error. Fixed point, the same bits on every machine, any sensors
+ * missing, no state between frames. NUMERICS.md has the derivation, the conditioning and the
+ * limits.
+ *
+ * On infinite and exactly known layers; a pad that ends changes the zero of the tangential force
+ * (pad_profile.h, from_touch). No measurement on a real pad confirms it yet.
+ */
+#ifndef FIT_FIT_TANGENTIAL_H
+#define FIT_FIT_TANGENTIAL_H
+
+#include "common/pad_profile.h"
+#include "fit/fit.h"
+#include "fit/fit_fixed.h"
+
+#define FIT_TANGENTIAL_STEPS 3
+#define FIT_TANGENTIAL_UNKNOWNS 8
+#define FIT_TANGENTIAL_TERMS (PAD_NORMAL_TERMS + PAD_TANGENTIAL_TERMS)
+#define FIT_TANGENTIAL_NODES (FIT_GRID_COLUMNS * FIT_GRID_ROWS)
+
+/* Working memory of one estimate: in no need of being kept between two. */
+struct fit_tangential_room {
+  int32_t weight_q12[FIT_TANGENTIAL_NODES];
+  int32_t column[FIT_TANGENTIAL_UNKNOWNS][FIT_TANGENTIAL_NODES];
+  int32_t residual[FIT_TANGENTIAL_NODES];
+  int32_t matrix[FIT_TANGENTIAL_UNKNOWNS][FIT_TANGENTIAL_UNKNOWNS];
+};
+
+/* A profile as the estimate needs it, and its working memory. Fill with fit_pad_init. */
+struct fit_pad {
+  float unit_mm, per_unit; /* length that all below is in: twice the widest normal term's sd */
+  int32_t variance_q26[FIT_TANGENTIAL_TERMS]; /* of each term without the contact's own */
+  int32_t strength_q26[FIT_TANGENTIAL_TERMS]; /* share, or moment */
+  int32_t pitch_q26;
+  int32_t spread_q26, spread_sd_q26; /* what to expect of the contact's own variance */
+  int32_t long_sd_q26;               /* and of its elongations */
+  float force_unit_N;                /* normal force of amplitude 1 at 1 Pa */
+  struct scaled per_force;           /* amplitude of the Gaussian's 1 N at 1 Pa */
+  struct fit_tangential_room room;
+};
+
+/* FT_ERR_ARGUMENT: the array is no full rectangle of the grid that this build knows, or the profile
+ * is not valid (pad_profile.h). */
+enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
+                            const struct pad_profile *profile);
+
+/* Every member is finite. Where `valid` is off all are zero. */
+struct fit_tangential {
+  bool valid;
+  float x_mm, y_mm;
+  float location_sd_mm, location_noise_mm; /* as in fit_result */
+  float force_N, force_sd_N;               /* normal force */
+  float qx_N, qy_N;                        /* of the object on the rubber, along x and y */
+  float q_sd_N;                            /* standard deviation of either */
+};
+
+/* start: the fit of the same readings. `valid` stays off without FIT_VALID, with fewer than
+ * FIT_TANGENTIAL_SENSORS in use, where a parameter ends at its limit, where the readings are not
+ * those of one contact on this pad, and where q_sd_N exceeds FIT_TANGENTIAL_SD_MAX of the force. */
+#define FIT_TANGENTIAL_SENSORS 8
+#define FIT_TANGENTIAL_SD_MAX 0.2f
+void fit_tangential(const struct fit_array *array, struct fit_pad *pad,
+                    const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
+                    const struct fit_result *start, struct fit_tangential *result);
+
+#endif
