@@ -14,6 +14,8 @@ namespace fingertip::twin {
 constexpr double GRID_STEP_mm = 4.5;
 constexpr double GRID_HALF_X_mm = 4.5, GRID_HALF_Y_mm = 13.5;
 constexpr double SPEED_UP_s = 0.01;
+constexpr double SLIDE_SPEED_MAX_mm_s =
+    200.0; // of the hand; faster, an object is thrown off the pad
 constexpr double DEGREE = M_PI / 180.0;
 
 constexpr std::array<double, 4> TWIST_RATES_deg_s{30, 60, 120, 180};

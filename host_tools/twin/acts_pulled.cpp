@@ -223,8 +223,9 @@ Course run(const Script &script, const Stage &stage) {
     }
     const double t_s = MS_s * (ms + 1), force_N = grip_N.at(t_s);
     const double holds_N = object.friction() * force_N;
-    // The last step's, and the rubber's damping with it, at the friction that it met.
-    const double pull_N = std::clamp(object.tangential_N(), -holds_N, holds_N);
+    // Friction and force have gone on since the last step began.
+    const double pull_N = object.slips() ? std::copysign(holds_N, object.tangential_N())
+                                         : std::clamp(object.tangential_N(), -holds_N, holds_N);
     course.force_N.push_back(force_N);
     course.way_mm.push_back(object.way_mm());
     course.pull_N.push_back(pull_N);
@@ -285,7 +286,7 @@ double slide_force_N(double mass_kg, double friction, double kinetic_share) {
 // A gripped object that friction holds, or does not: pulled by hand, heavier than the grip can
 // hold, held by a grip that loosens, or carried.
 Act slide(const Stage &stage, std::size_t n) {
-  constexpr double RESERVE = 0.7; // share of static friction that the weight alone may take
+  constexpr double RESERVE = 0.6; // of kinetic friction: what the weight takes in a firm grip
   constexpr double FORCE_MIN_N = 1.0;
   constexpr double WAY_MAX_mm = 13.0; // fits between the usual borders, whatever its direction
   constexpr double TAKES_s = 0.3, CARRIES_s = 0.5;
@@ -296,20 +297,27 @@ Act slide(const Stage &stage, std::size_t n) {
   script.mass_kg = stage.mass_kg.at(random.uniform(0.0, 1.0));
   const double gripped_N = stage.forces.pick(n / 4, random.uniform(0.0, 1.0));
   double weight_N = 0.5 * GRAVITY_m_s2 * script.mass_kg, force_N = gripped_N, speed_mm_s = 0.0;
-  switch (n % 4) {
-  case 0: {
-    script.name = "pull";
-    force_N = std::max(gripped_N, weight_N / (RESERVE * script.friction));
-    const std::vector<double> &given_mm_s = stage.options.speeds_mm_s;
-    const double drawn_mm_s = random.log_uniform(2.0, 200.0);
-    speed_mm_s = given_mm_s.empty() ? drawn_mm_s : given_mm_s[n / 4 % given_mm_s.size()];
-    script.weight_N.ease(TAKES_s, weight_N);
-    script.hand_begin_s = TAKES_s + CARRIES_s;
-    const double way_mm =
-        rubber.dead_travel_mm(force_N, script.friction) + random.uniform(3.0, 9.0);
+  const double kinetic = stage.options.kinetic_share * script.friction;
+  const double firm_N = weight_N / (RESERVE * kinetic);
+  double slides_mm = 0.0;
+  const auto pull_by_hand = [&] {
+    const double way_mm = rubber.dead_travel_mm(force_N, script.friction) + slides_mm;
+    script.hand_mm = Profile();
     script.hand_mm.hold(script.hand_begin_s);
     script.hand_mm.travel(way_mm, speed_mm_s, std::min(SPEED_UP_s, 0.25 * way_mm / speed_mm_s));
     script.over_s = script.hand_mm.end_s() + CARRIES_s;
+  };
+  switch (n % 4) {
+  case 0: {
+    script.name = "pull";
+    force_N = std::max(gripped_N, firm_N);
+    const std::vector<double> &given_mm_s = stage.options.speeds_mm_s;
+    const double drawn_mm_s = random.log_uniform(2.0, SLIDE_SPEED_MAX_mm_s);
+    speed_mm_s = given_mm_s.empty() ? drawn_mm_s : given_mm_s[n / 4 % given_mm_s.size()];
+    script.weight_N.ease(TAKES_s, weight_N);
+    script.hand_begin_s = TAKES_s + CARRIES_s;
+    slides_mm = random.uniform(3.0, 9.0);
+    pull_by_hand();
     script.grip_N = Profile(force_N);
     break;
   }
@@ -324,7 +332,7 @@ Act slide(const Stage &stage, std::size_t n) {
   }
   case 2: {
     script.name = "loosen";
-    force_N = std::max(gripped_N, weight_N / (RESERVE * script.friction));
+    force_N = std::max(gripped_N, firm_N);
     script.weight_N.ease(TAKES_s, weight_N);
     const double slackest_N = 0.5 * weight_N / script.friction;
     script.grip_N = Profile(force_N);
@@ -344,13 +352,16 @@ Act slide(const Stage &stage, std::size_t n) {
   if (script.over_s == std::numeric_limits<double>::infinity()) {
     script.notice_s = random.log_uniform(0.03, 0.15);
     script.notice_mm = random.uniform(1.0, 4.0);
-    script.caught_N =
-        std::max(force_N, BRAKES * weight_N / (stage.options.kinetic_share * script.friction));
+    script.caught_N = std::max(force_N, BRAKES * weight_N / kinetic);
   }
   Course course = run(script, stage);
   for (int i = 0; i < 8 && course.farthest_mm > WAY_MAX_mm; i++) {
     script.notice_s *= 0.7;
     script.notice_mm *= 0.7;
+    if (slides_mm > 0.0) {
+      slides_mm *= 0.7;
+      pull_by_hand();
+    }
     course = run(script, stage);
   }
 

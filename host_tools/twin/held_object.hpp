@@ -33,7 +33,7 @@ namespace fingertip::twin {
 class HeldObject {
 public:
   static constexpr double SETTLES_mm = 0.2, HEALS_s = 0.1, LOSS_s = 1e-3;
-  // Where it ends is off by at most 1e-4 mm, as the tests find.
+  // A slide of up to 30 mm ends within 3 um of where steps fifty times shorter end it.
   static constexpr double STEP_s = 5e-5;
 
   // kinetic_share: kinetic friction per static one.

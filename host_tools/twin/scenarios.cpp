@@ -473,7 +473,7 @@ ScenarioOptions complete(const ScenarioOptions &options) {
   check("--kinetic", chosen.kinetic_share, 0.5, 1.0);
   check("--stick-slip", chosen.stick_slip_mm, 0.0, 5.0);
   for (double speed_mm_s : chosen.speeds_mm_s) {
-    check("--speed", speed_mm_s, 1.0, 1000.0);
+    check("--speed", speed_mm_s, 1.0, chosen.kind == "slide" ? SLIDE_SPEED_MAX_mm_s : 1000.0);
   }
   const auto is = [&](std::initializer_list<const char *> names) {
     return std::find(names.begin(), names.end(), chosen.kind) != names.end();
@@ -506,7 +506,7 @@ ScenarioOptions complete(const ScenarioOptions &options) {
                 " does not hold; give 0 to " + number(friction.lowest) + ", or another --friction");
   }
   if (is({"slide"})) {
-    check("--dead-travel", chosen.dead_travel_mm, 0.1, 10.0);
+    check("--dead-travel", chosen.dead_travel_mm, 0.1, 4.0);
     check_slide(chosen, friction.lowest);
   }
   if (!chosen.second_indenter.empty() && chosen.kind != "two") {
