@@ -72,6 +72,28 @@ TEST(WindUp, BeginsLikeASpringAndEndsWhereAllSlides) {
   EXPECT_NEAR(before, 0.21895 * FRICTION_N / (SHEAR_MPa * RADIUS_mm * RADIUS_mm), 1e-3 * before);
 }
 
+TEST(WindUp, IsNearLubkinsIntegrals) {
+  // The stiffness of what sticks, a disc of radius c, (16 / 3) G c^3, over the turn that leaves it:
+  // 3 mu F / (4 pi G a^2) (K - E), elliptic integrals of k, k^2 = 1 - (c / a)^2. All in their
+  // units.
+  const double limit = 3.0 * M_PI / 16.0;
+  constexpr int STEPS = 20000;
+  double torque = 0.0;
+  std::vector<std::pair<double, double>> errors{{0.2, -0.004}, {0.5, -0.034}, {0.8, -0.140}};
+  for (int i = 0; i < STEPS; i++) {
+    const double k = (i + 0.5) / STEPS, rest = std::sqrt(1.0 - k * k);
+    const double turn = 3.0 / (4.0 * M_PI) * (std::comp_ellint_1(k) - std::comp_ellint_2(k));
+    torque += 4.0 / M_PI * k * rest * std::comp_ellint_2(k) / STEPS;
+    if (!errors.empty() && torque >= errors.front().first * limit) {
+      EXPECT_NEAR(wind_up_rad(torque / limit, 1.0, 1.0, 1.0) / turn - 1.0, errors.front().second,
+                  0.001);
+      errors.erase(errors.begin());
+    }
+  }
+  EXPECT_TRUE(errors.empty());
+  EXPECT_NEAR(torque, limit, 1e-5); // where nothing sticks
+}
+
 TEST(Grip, CreepsThenFollows) {
   const Grip grip{2.0, 0.25, 0.0};
   EXPECT_EQ(grip.way_mm(0.0), 0.0);
