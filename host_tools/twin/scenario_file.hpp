@@ -25,7 +25,7 @@
 //               lift carry lower; of drags load carry pull slip unload after; of screws load wind
 //               spin unwind lower after; of slides sticks, partial_slip (since half of the normal
 //               force's contact slid, until three quarters of it stick again) and slip (all
-//               slides), as they come, to the millisecond
+//               slides), as they come; of the first two none shorter than 5 ms
 //   t_begin_s t_end_s              on the scenario's clock
 //   x_mm y_mm force_N angle_deg    at its beginning, of the first contact
 //   x_end_mm y_end_mm force_end_N angle_end_deg   at its end
