@@ -261,7 +261,7 @@ int run(int argc, char **argv) {
   const auto with_contact = [&](CLI::App *command) {
     command
         ->add_option("--indenter", options.scenario.indenter,
-                     "What presses; default sphere6, for placements sphere15")
+                     "What presses; default sphere6, for placements and drags sphere15")
         ->type_name("NAME");
     command->add_option("--layer", options.scenario.layer_mm, "Thickness of the rubber; default 12")
         ->type_name("MM");
@@ -311,16 +311,25 @@ int run(int argc, char **argv) {
       ->type_name("N");
   write
       ->add_option("--tangential", s.tangential,
-                   "Pulled along the rubber by this share of the force; without an angle in any "
-                   "direction. In lifts the weight, default 0.3; else 0")
+                   "Pulled along the rubber by this share of the force, as 0.3 or any of 0.1..0.4; "
+                   "without an angle in any direction. In lifts the weight, in drags what hangs on "
+                   "the string, default 0.3; else 0")
       ->type_name("SHARE[,DEG]");
-  write->add_option("--friction", s.friction, "Holds what is pulled; default 0.5")->type_name("MU");
-  write->add_option("--speed", s.speeds_mm_s, "In turn, of slip and rolloff")
+  write
+      ->add_option("--friction", s.friction,
+                   "Holds what is pulled, as 0.5 or any of 0.3..0.8; default 0.5, in slides "
+                   "0.3..0.8")
+      ->type_name("MU");
+  write->add_option("--kinetic", s.kinetic_share, "Kinetic friction per static, in slides; 0.8")
+      ->type_name("SHARE");
+  write->add_option("--mass", s.mass_kg, "Of the object, in slides; default 0.1..0.5")
+      ->type_name("KG");
+  write->add_option("--speed", s.speeds_mm_s, "In turn, of slip, rolloff, drag, the hand in slides")
       ->delimiter(',')
       ->type_name("MM_PER_S,...");
   write
       ->add_option("--dead-travel", s.dead_travel_mm,
-                   "Way of the pusher, in lifts of the object, before it slips; default 1")
+                   "Way of the pusher, or of the pulled object, before it slips; default 1")
       ->type_name("MM");
   write
       ->add_option("--creep", s.creep_share,

@@ -221,6 +221,10 @@ const ScenarioKind &kind_of(const Scenario &scenario) {
       [&](const ScenarioKind &kind) { return kind.name == scenario.options.kind; });
 }
 
+bool moves_under_load(const std::string &kind) {
+  return kind == "lift" || kind == "drag" || kind == "slide" || kind == "screw";
+}
+
 void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pad &pad,
               const std::string &path) {
   const ScenarioOptions &options = scenario.options;
@@ -246,10 +250,14 @@ void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pa
   metadata(text, "quiet_s", number(options.quiet_s));
   if (scenario.pulls) {
     metadata(text, "tangential", options.tangential);
-    metadata(text, "friction", number(options.friction));
+    metadata(text, "friction", options.friction);
   }
-  if (options.kind == "lift") {
+  if (moves_under_load(options.kind)) {
     metadata(text, "dead_travel_mm", number(options.dead_travel_mm));
+  }
+  if (options.kind == "slide") {
+    metadata(text, "kinetic_share", number(options.kinetic_share));
+    metadata(text, "mass_kg", options.mass_kg);
   }
   if (options.kind == "slip") {
     metadata(text, "dead_travel_mm", number(options.dead_travel_mm));
@@ -304,7 +312,7 @@ std::string truth_of(const Scenario &scenario, const std::string &path) {
   text << "act,press,phase,t_begin_s,t_end_s,x_mm,y_mm,force_N,angle_deg,x_end_mm,y_end_mm,"
           "force_end_N,angle_end_deg,x2_mm,y2_mm,force2_N,force2_end_N,sensors_near,speed_mm_s,"
           "dead_travel_mm,stick_slip_mm"
-       << (scenario.pulls ? ",Qx_N,Qy_N,Qx_end_N,Qy_end_N\n" : "\n");
+       << (scenario.pulls ? ",Qx_N,Qy_N,Qx_end_N,Qy_end_N,friction,mass_kg\n" : "\n");
   for (std::size_t n = 0; n < scenario.acts.size(); n++) {
     const Act &act = scenario.acts[n];
     const bool pushed = scenario.options.kind == "slip";
@@ -331,7 +339,8 @@ std::string truth_of(const Scenario &scenario, const std::string &path) {
       }
       text << "," << std::to_string(act.sensors_near);
       text.cell(act.speed_mm_s, 1);
-      text.cell(pushed || scenario.options.kind == "lift" ? scenario.options.dead_travel_mm : 0.0,
+      text.cell(pushed || moves_under_load(scenario.options.kind) ? scenario.options.dead_travel_mm
+                                                                  : 0.0,
                 3);
       text.cell(pushed ? scenario.options.stick_slip_mm : 0.0, 3);
       if (scenario.pulls) {
@@ -340,6 +349,8 @@ std::string truth_of(const Scenario &scenario, const std::string &path) {
           text.cell(contact.pull_x_N, 5);
           text.cell(contact.pull_y_N, 5);
         }
+        text.cell(act.friction, 4);
+        text.cell(act.mass_kg, 4);
       }
       text << "\n";
     }

@@ -11,27 +11,32 @@
 //   p0_Pa sigma_mm  the Gaussian that is closest to the pressure on the base without errors
 //              (best_gaussian.hpp); 0 with two contacts
 //   slip       see scenarios.hpp
-//   Qx_N Qy_N  tangential force of all objects on the rubber; only if the scenario has any. p0_Pa
-//   and
-//              sigma_mm are then without it
+//   Qx_N Qy_N  tangential force of all objects on the rubber; only if the scenario has any.
+//              p0_Pa and sigma_mm are then without it
 //   temperature_degC  only with the effects "temperature" and "branch"
 //
 // FILE.truth.csv has one row for each phase of each contact:
 //   # fingertip-truth 1
 //   # name: name                   # scenario: FILE.csv without its folder
 //   act         number of the contact, from 1
-//   press       what the contact is: tap press hold placement poke cycle grip roll two lift
+//   press       what the contact is: tap press hold placement poke cycle grip roll two lift drag
+//               screw; of slides what happens: pull overload loosen carry
 //   phase       touch hold release; poke; load unload; dead_travel slip after; twist; roll;
-//               lift carry lower
+//               lift carry lower; of drags load carry pull slip unload after; of screws load wind
+//               spin unwind lower after; of slides sticks, partial_slip (since half of the normal
+//               force's contact slid, until three quarters of it stick again) and slip (all
+//               slides), as they come; of the first two none shorter than 5 ms
 //   t_begin_s t_end_s              on the scenario's clock
 //   x_mm y_mm force_N angle_deg    at its beginning, of the first contact
 //   x_end_mm y_end_mm force_end_N angle_end_deg   at its end
 //   x2_mm y2_mm force2_N force2_end_N   of the second contact; empty if there is none
 //   sensors_near                   grid: 1 above a sensor, 2 between two, 4 between four; else 0
-//   speed_mm_s dead_travel_mm stick_slip_mm       of the pusher, in lifts of the object; 0 where
-//                                  there is none
+//   speed_mm_s dead_travel_mm stick_slip_mm       of the pusher or of what is pulled, of slides the
+//                                  highest in gross slip; 0 where there is none
 //   Qx_N Qy_N Qx_end_N Qy_end_N    of the first contact; only if the scenario has any tangential
-//   force
+//                                  force, and so
+//   friction mass_kg               static, of what is pulled; of the object, two fingers', or of
+//                                  the weight; 0 where there is none
 // The indenter is in the metadata of both.
 #pragma once
 

@@ -1,8 +1,8 @@
 #include "twin/scenarios.hpp"
 
 #include "libfingertip/error.hpp"
-#include "libfingertip/random.hpp"
 #include "libfingertip/text.hpp"
+#include "twin/acts.hpp"
 
 #include <algorithm>
 #include <array>
@@ -12,99 +12,15 @@
 namespace fingertip::twin {
 namespace {
 
-constexpr double GRID_STEP_mm = 4.5;
-constexpr double GRID_HALF_X_mm = 4.5, GRID_HALF_Y_mm = 13.5;
 constexpr int GRID_PLACES_X = 3, GRID_PLACES_Y = 7;
 constexpr double SLIP_WAY_mm = 24.0, SLIP_SPAN_mm = 28.0;
-constexpr double SPEED_UP_s = 0.01;
-constexpr double DEGREE = M_PI / 180.0;
 
 constexpr std::array<double, 5> SLIP_SPEEDS_mm_s{20, 50, 100, 150, 200}; // the paper: 5 of them
 constexpr std::array<double, 3> ROLL_SPEEDS_mm_s{10, 25, 50};
-constexpr std::array<double, 4> TWIST_RATES_deg_s{30, 60, 120, 180};
-constexpr std::array<double, 3> LIFTS_s{0.1, 0.3, 1.0};
 constexpr std::array<double, 7> DISTANCES_mm{6, 9, 12, 15, 18, 24, 30};
-
-// One for each kind, so that kinds with the same seed have nothing in common.
-enum Stream : std::uint64_t {
-  GRID_ORDER = 1,
-  GRID,
-  TAPS,
-  POKES,
-  CYCLE,
-  SLIP,
-  TWIST,
-  ROLLOFF,
-  TWO,
-  PLACEMENTS,
-  LIFT,
-  DIRECTION
-};
 
 std::string number(double value) {
   return shortest(static_cast<float>(value));
-}
-
-double milliseconds(double seconds) {
-  return 1e-3 * std::round(1e3 * seconds);
-}
-
-struct Place {
-  double x_mm, y_mm;
-};
-
-// Puts acts one after the other.
-class Stage {
-public:
-  Stage(const ScenarioOptions &scenario_options, const ContactTable &contact_table,
-        const Forces &pressing, const Tangential &pulling)
-      : options(scenario_options), table(contact_table), forces(pressing), tangential(pulling),
-        t_s_(START_QUIET_s) {}
-
-  // The act's times count from its beginning; false, and the scenario is full, if it does not fit.
-  bool play(Act act) {
-    const double length_s = act.phases.back().end_s;
-    if (t_s_ + length_s + options.quiet_s > *options.seconds + 1e-9) {
-      return false;
-    }
-    act.begin_s = t_s_;
-    act.end_s = t_s_ + length_s;
-    for (Phase &phase : act.phases) {
-      phase.begin_s += t_s_;
-      phase.end_s += t_s_;
-    }
-    t_s_ = milliseconds(act.end_s + options.quiet_s);
-    acts.push_back(std::move(act));
-    return true;
-  }
-
-  Place random_place(Random &random) const {
-    const double x = GRID_HALF_X_mm + *options.margin_mm, y = GRID_HALF_Y_mm + *options.margin_mm;
-    const double at_x = random.uniform(-x, x);
-    return {at_x, random.uniform(-y, y)};
-  }
-
-  const ScenarioOptions &options;
-  const ContactTable &table;
-  const Forces &forces;
-  const Tangential &tangential;
-  std::vector<Act> acts;
-
-private:
-  double t_s_;
-};
-
-// Phases of an act that end where its profiles' pieces do.
-void phase(Act &act, const std::string &name, double end_s, bool slip = false) {
-  const double begin_s = act.phases.empty() ? 0.0 : act.phases.back().end_s;
-  act.phases.push_back({name, begin_s, milliseconds(end_s), slip});
-}
-
-Track track_at(Place place) {
-  Track track;
-  track.x_mm = place.x_mm;
-  track.y_mm = place.y_mm;
-  return track;
 }
 
 // Press, hold and let go at one place.
@@ -219,12 +135,6 @@ Act cycle(const Stage &stage, std::size_t n) {
   return act;
 }
 
-template <std::size_t N>
-double speed_mm_s(const Stage &stage, std::size_t n, const std::array<double, N> &usual_mm_s) {
-  const std::vector<double> &given_mm_s = stage.options.speeds_mm_s;
-  return given_mm_s.empty() ? usual_mm_s[n % N] : given_mm_s[n % given_mm_s.size()];
-}
-
 // When the pusher's way, which never falls, first is this long; whole milliseconds.
 double time_of(const Profile &way, double length_mm, double begin_s, double end_s) {
   double low = begin_s, high = end_s;
@@ -243,7 +153,7 @@ Act slip(const Stage &stage, std::size_t n) {
   const double y_mm = -0.5 * SLIP_WAY_mm + random.uniform(-slack_mm, slack_mm);
   Act act;
   act.press = "grip";
-  act.speed_mm_s = speed_mm_s(stage, n, SLIP_SPEEDS_mm_s);
+  act.speed_mm_s = stage.speed_mm_s(n, SLIP_SPEEDS_mm_s);
   Track track = track_at({x_mm, upward ? y_mm : -y_mm});
   track.along_y = upward ? 1.0 : -1.0;
   track.grip = {stage.options.dead_travel_mm, stage.options.creep_share,
@@ -303,7 +213,7 @@ Act rolloff(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, ROLLOFF, n);
   Act act;
   act.press = "roll";
-  act.speed_mm_s = speed_mm_s(stage, n, ROLL_SPEEDS_mm_s);
+  act.speed_mm_s = stage.speed_mm_s(n, ROLL_SPEEDS_mm_s);
   Track track =
       track_at({random.uniform(-2.0, 2.0), random.uniform(-GRID_HALF_Y_mm, GRID_HALF_Y_mm)});
   track.along_x = 1.0;
@@ -324,53 +234,6 @@ Act rolloff(const Stage &stage, std::size_t n) {
   return act;
 }
 
-// A gripped object whose weight the pad takes over, carries and gives back.
-Act lift(const Stage &stage, std::size_t n) {
-  constexpr double CARRIES_s = 1.0;
-  Random random(stage.options.seed, LIFT, n);
-  const Place place = stage.random_place(random);
-  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
-  const double lift_s = LIFTS_s[n % LIFTS_s.size()];
-  Act act;
-  act.press = "lift";
-  Track track = track_at(place);
-  track.force_N.ease(0.3, force_N);
-  phase(act, "touch", track.force_N.end_s());
-  track.force_N.hold(random.uniform(0.5, 0.7));
-  const double begin_s = track.force_N.end_s();
-  phase(act, "hold", begin_s);
-  Profile &load_N = track.pull.load_N;
-  load_N.hold(begin_s);
-  load_N.ease(lift_s, stage.tangential.share * force_N);
-  phase(act, "lift", load_N.end_s());
-  load_N.hold(CARRIES_s);
-  phase(act, "carry", load_N.end_s());
-  load_N.ease(lift_s, 0.0);
-  phase(act, "lower", load_N.end_s());
-  track.force_N.hold(load_N.end_s() - begin_s + 0.3);
-  phase(act, "after", track.force_N.end_s());
-  track.force_N.ease(0.3, 0.0);
-  phase(act, "release", track.force_N.end_s());
-  act.tracks.push_back(track);
-  return act;
-}
-
-// Gives the nth act its tangential force.
-void pull(Act &act, const Stage &stage, std::size_t n) {
-  Random random(stage.options.seed, DIRECTION, n);
-  const double drawn_deg = random.uniform(-180.0, 180.0);
-  const double angle = stage.tangential.angle_deg.value_or(drawn_deg) * DEGREE;
-  for (Track &track : act.tracks) {
-    track.pull.along_x = std::cos(angle);
-    track.pull.along_y = std::sin(angle);
-    track.pull.friction = stage.options.friction;
-    track.pull.travel_mm = stage.options.dead_travel_mm;
-    if (stage.options.kind != "lift") {
-      track.pull.share = stage.tangential.share;
-    }
-  }
-}
-
 Act two(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, TWO, n);
   const double distance = DISTANCES_mm[n % DISTANCES_mm.size()];
@@ -388,12 +251,16 @@ Act two(const Stage &stage, std::size_t n) {
   return act;
 }
 
+constexpr const char *USUAL_FRICTION = "0.5", *USUAL_MASS_kg = "0.1..0.5"; // assumed
+
 struct Kind {
   ScenarioKind kind;
   Act (*act)(const Stage &stage, std::size_t n);
   const char *usual_indenter = "sphere6";
   double usual_margin_mm = 0.5 * GRID_STEP_mm;
   const char *usual_tangential = "0";
+  const char *usual_friction = USUAL_FRICTION;
+  bool pulls_itself = false;
 };
 
 const std::vector<Kind> &all_kinds() {
@@ -420,7 +287,33 @@ const std::vector<Kind> &all_kinds() {
        lift,
        "sphere6",
        0.5 * GRID_STEP_mm,
-       "0.3"},
+       "0.3",
+       USUAL_FRICTION,
+       true},
+      {{"drag", 120, "3",
+        "a weight on the pad is pulled along by a string: by 0.3 of it, then by what slides"},
+       drag,
+       "sphere15",
+       0.5 * GRID_STEP_mm,
+       "0.3",
+       USUAL_FRICTION,
+       true},
+      {{"slide", 240, "6",
+        "a gripped object of 0.1 to 0.5 kg slips where friction gives way: pulled, too heavy, let "
+        "loose, or carried"},
+       slide,
+       "sphere6",
+       0.5 * GRID_STEP_mm,
+       "0",
+       "0.3..0.8",
+       true},
+      {{"screw", 60, "6", "a gripped object is turned by a torque until it spins, to either side"},
+       screw,
+       "sphere6",
+       0.5 * GRID_STEP_mm,
+       "0",
+       USUAL_FRICTION,
+       true},
       {{"two", 60, "4..10", "two contacts at once, 6 to 30 mm apart"}, two},
   };
   return all;
@@ -445,6 +338,19 @@ void check(const char *option, double value, double lowest, double highest) {
   }
 }
 
+void check_slide(const ScenarioOptions &options, double friction) {
+  const Range mass_kg("--mass", options.mass_kg);
+  for (double end : {mass_kg.lowest, mass_kg.highest}) {
+    check("--mass", end, 0.01, 5.0);
+  }
+  const double grip_N = slide_force_N(mass_kg.highest, friction, options.kinetic_share);
+  if (grip_N > ContactTable::FORCE_MAX_N) {
+    throw Error("--mass " + number(mass_kg.highest) + " needs a grip of up to " + number(grip_N) +
+                " N at --friction " + number(friction) + ", above " +
+                number(ContactTable::FORCE_MAX_N) + "; give less mass or more friction");
+  }
+}
+
 // What shows all that differs but the seeds, the length and the kind's own settings.
 std::string name_of(const ScenarioOptions &options) {
   std::string name = options.kind + "-" + options.indenter;
@@ -460,9 +366,12 @@ std::string name_of(const ScenarioOptions &options) {
       name += "-" + effect.name + (chosen->second == effect.usual ? "" : number(chosen->second));
     }
   }
-  const Tangential tangential(options.tangential, options.friction);
-  if (tangential.share > 0.0) {
-    name += "-tangential" + number(tangential.share);
+  const Range share = Tangential(options.tangential).share;
+  if (share.highest > 0.0) {
+    name += "-tangential" + number(share.lowest);
+    if (share.highest > share.lowest) {
+      name += ".." + number(share.highest);
+    }
   }
   return name;
 }
@@ -512,23 +421,29 @@ double Forces::largest() const {
   return *std::max_element(values_.begin(), values_.end());
 }
 
-Tangential::Tangential(const std::string &text, double friction) {
-  const std::vector<std::string_view> parts = split(text, ',');
-  const auto given = to_double(trim(parts[0]));
-  if (parts.size() > 1) {
-    angle_deg = to_double(trim(parts[1]));
+Range::Range(const std::string &option, const std::string &text) {
+  const std::size_t dots = text.find("..");
+  const auto low = to_double(trim(std::string_view(text).substr(0, dots)));
+  const auto high =
+      dots == std::string::npos ? low : to_double(trim(std::string_view(text).substr(dots + 2)));
+  if (!low || !high || !(*low <= *high)) {
+    throw Error(option + " \"" + printable(text) +
+                "\" is not possible; give a number, or any of a range as 0.1..0.4");
   }
-  if (!given || parts.size() > 2 || (parts.size() == 2 && !angle_deg) ||
-      std::abs(angle_deg.value_or(0.0)) > 360.0) {
-    throw Error("--tangential \"" + printable(text) +
-                "\" is not possible; give a share of the normal force, as 0.3, or with its "
-                "direction in degrees 0.3,90");
+  lowest = *low;
+  highest = *high;
+}
+
+Tangential::Tangential(const std::string &text)
+    : share("--tangential", text.substr(0, text.find(','))) {
+  const std::size_t comma = text.find(',');
+  if (comma != std::string::npos) {
+    angle_deg = to_double(trim(std::string_view(text).substr(comma + 1)));
+    if (!angle_deg || !(std::abs(*angle_deg) <= 360.0)) {
+      throw Error("--tangential \"" + printable(text) +
+                  "\" has no direction; after the comma give degrees from -360 to 360, as 0.3,90");
+    }
   }
-  if (!(*given >= 0.0 && *given <= friction)) {
-    throw Error("--tangential " + number(*given) + " does not hold; give 0 to " + number(friction) +
-                ", or another --friction");
-  }
-  share = *given;
 }
 
 bool Act::slips(double t_s) const {
@@ -555,21 +470,44 @@ ScenarioOptions complete(const ScenarioOptions &options) {
   check("--quiet", chosen.quiet_s, 0.1, 60.0);
   check("--dead-travel", chosen.dead_travel_mm, 0.0, 10.0);
   check("--creep", chosen.creep_share, 0.0, 1.0);
-  check("--friction", chosen.friction, 0.05, 5.0);
+  check("--kinetic", chosen.kinetic_share, 0.5, 1.0);
   check("--stick-slip", chosen.stick_slip_mm, 0.0, 5.0);
   for (double speed_mm_s : chosen.speeds_mm_s) {
-    check("--speed", speed_mm_s, 1.0, 1000.0);
+    check("--speed", speed_mm_s, 1.0, chosen.kind == "slide" ? SLIDE_SPEED_MAX_mm_s : 1000.0);
   }
-  if (!chosen.speeds_mm_s.empty() && chosen.kind != "slip" && chosen.kind != "rolloff") {
-    throw Error("--speed says nothing in a scenario of \"" + chosen.kind +
-                "\"; leave it out, or choose slip or rolloff");
+  const auto is = [&](std::initializer_list<const char *> names) {
+    return std::find(names.begin(), names.end(), chosen.kind) != names.end();
+  };
+  const auto says_nothing = [&](const char *option, const char *others) {
+    throw Error(std::string(option) + " says nothing in a scenario of \"" + chosen.kind +
+                "\"; leave it out, or choose " + others);
+  };
+  if (!chosen.speeds_mm_s.empty() && !is({"slip", "rolloff", "drag", "slide"})) {
+    says_nothing("--speed", "slip, rolloff, drag or slide");
   }
-  chosen.tangential =
-      options.tangential.empty() ? kind_of(options).usual_tangential : options.tangential;
-  const Tangential tangential(chosen.tangential, chosen.friction);
-  if (tangential.share > 0.0 && (chosen.kind == "slip" || chosen.kind == "rolloff")) {
-    throw Error("--tangential says nothing in a scenario of \"" + chosen.kind +
-                "\"; leave it out, or choose another");
+  const Kind &usual = kind_of(options);
+  chosen.tangential = options.tangential.empty() ? usual.usual_tangential : options.tangential;
+  chosen.friction = options.friction.empty() ? usual.usual_friction : options.friction;
+  if (is({"slide"})) {
+    chosen.mass_kg = options.mass_kg.empty() ? USUAL_MASS_kg : options.mass_kg;
+  } else if (!options.mass_kg.empty()) {
+    says_nothing("--mass", "slide");
+  }
+  const Range share = Tangential(chosen.tangential).share;
+  const Range friction("--friction", chosen.friction);
+  for (double end : {friction.lowest, friction.highest}) {
+    check("--friction", end, 0.05, 5.0);
+  }
+  if (share.highest > 0.0 && is({"slip", "rolloff", "slide"})) {
+    says_nothing("--tangential", "another");
+  }
+  if (!(share.lowest >= 0.0 && share.highest <= friction.lowest)) {
+    throw Error("--tangential " + number(share.lowest < 0.0 ? share.lowest : share.highest) +
+                " does not hold; give 0 to " + number(friction.lowest) + ", or another --friction");
+  }
+  if (is({"slide"})) {
+    check("--dead-travel", chosen.dead_travel_mm, 0.1, 4.0);
+    check_slide(chosen, friction.lowest);
   }
   if (!chosen.second_indenter.empty() && chosen.kind != "two") {
     throw Error("--second says nothing in a scenario of \"" + chosen.kind +
@@ -584,13 +522,12 @@ Scenario make_scenario(const ScenarioOptions &options, const ContactTable &table
   Scenario scenario;
   scenario.options = complete(options);
   const ScenarioOptions &chosen = scenario.options;
-  const Forces forces(chosen.forces);
-  const Tangential tangential(chosen.tangential, chosen.friction);
-  scenario.pulls = tangential.share > 0.0;
-  Stage stage(chosen, table, forces, tangential);
+  const bool pulled_by_share = Tangential(chosen.tangential).share.highest > 0.0;
+  scenario.pulls = pulled_by_share || chosen.kind == "drag" || chosen.kind == "slide";
+  Stage stage(chosen, table);
   for (std::size_t n = 0;; n++) {
     Act act = kind.act(stage, n);
-    if (scenario.pulls) {
+    if (pulled_by_share && !kind.pulls_itself) {
       pull(act, stage, n);
     }
     if (!stage.play(std::move(act))) {

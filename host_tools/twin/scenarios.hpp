@@ -11,17 +11,19 @@
 // to the outer sensors. Slips go along y through the middle of the pad, with x anywhere on the
 // grid.
 //
-// What the truth calls slip is what the paper calls it (section IV.D): the pusher is in contact and
-// moves. So the dead travel, in which nothing slides yet, counts as slip; the events tell it apart.
-// A twist and a contact that rolls are no slip.
+// What the truth calls slip in the kind "slip" is what the paper calls it (section IV.D): the
+// pusher is in contact and moves. So the dead travel, in which nothing slides yet, counts as slip;
+// the events tell it apart. In "drag" and "slide" it is gross slip: all of the contact slides. A
+// twist, a screw and a contact that rolls are no slip.
 //
-// Objects pull along the rubber only if `tangential` says so: then in each contact, in one
-// direction, with that share of the normal force, rising and falling with it; in a lift with an
-// object's weight, which is that share of the force of the grip.
+// Objects pull along the rubber if `tangential` says so: then in each contact, in one direction,
+// with that share of the normal force, rising and falling with it; in a lift with an object's
+// weight, which is that share of the force of the grip, in a drag with a known load, in a screw
+// with a constant one. In a slide what pulls follows from motion and friction (held_object.hpp).
 //
-// Left out: edges of the rubber, friction where something slips (which moves the middle of the
-// pressure on the base by up to friction times thickness), influence of two contacts on each
-// other's shape.
+// Left out: edges of the rubber, friction where a kinematic slip slides, which moves the middle of
+// the pressure on the base by up to friction times thickness ("drag" and "slide" have it),
+// influence of two contacts on each other's shape.
 #pragma once
 
 #include "twin/contact_table.hpp"
@@ -60,12 +62,20 @@ private:
   bool range_ = false;
 };
 
-// "0.3": this share of the normal force, in a direction drawn for each contact; "0.3,90": in that
-// one, degrees from x towards y.
+// "0.3": always that; "0.1..0.4": anywhere between, uniform.
+struct Range {
+  // Throws Error, which names the option, unless it is one of these.
+  Range(const std::string &option, const std::string &text);
+  double at(double random_share) const { return lowest + random_share * (highest - lowest); }
+  double lowest, highest;
+};
+
+// "0.3" or "0.1..0.4": such a share of the normal force, in a direction drawn for each contact;
+// "0.3,90": in that one, degrees from x towards y.
 struct Tangential {
-  // Throws Error unless both are numbers and the share is from 0 to friction.
-  Tangential(const std::string &text, double friction);
-  double share = 0.0;
+  // Throws Error unless these are numbers.
+  explicit Tangential(const std::string &text);
+  Range share;
   std::optional<double> angle_deg;
 };
 
@@ -79,10 +89,11 @@ struct ScenarioOptions {
   std::optional<std::uint64_t> pad_seed;         // of the pad's errors; else seed
   std::optional<double> seconds;                 // else usual_seconds
   std::string forces;                            // empty: usual_forces
-  std::string tangential;                        // empty: the kind's usual one
-  double friction = 0.5;                         // of what is pulled; assumed, as in Grip
-  std::vector<double> speeds_mm_s;               // kinds "slip" and "rolloff"; empty: usual ones
-  double dead_travel_mm = 1.0;                   // kinds "slip", Grip, and "lift", Pull
+  std::string tangential, friction;              // Range; empty: the kind's usual ones
+  std::string mass_kg;                           // Range, kind "slide"; empty: usual
+  double kinetic_share = 0.8;                    // kind "slide": kinetic friction per static one
+  std::vector<double> speeds_mm_s;               // of what moves by a speed; empty: usual ones
+  double dead_travel_mm = 1.0;                   // Grip; Pull; of a slide at 6 N, friction 0.5
   double creep_share = 0.5, stick_slip_mm = 0.0; // Grip, kind "slip"
   std::optional<double> margin_mm;               // else the kind's usual one
   double quiet_s = 1.2;
@@ -103,6 +114,7 @@ struct Act {
   std::vector<Phase> phases;
   int sensors_near = 0; // grid: as many sensors are nearest to the place, 1, 2 or 4; else 0
   double speed_mm_s = 0.0;
+  double friction = 0.0, mass_kg = 0.0; // static, of what is pulled; of the object; 0: none
 
   bool slips(double t_s) const;
 };
@@ -110,7 +122,7 @@ struct Act {
 struct Scenario {
   ScenarioOptions options; // complete
   std::string name;
-  bool pulls = false;    // something tangential is in it
+  bool pulls = false;    // something tangential may be in it
   std::vector<Act> acts; // in order of time, none overlap
 };
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace fingertip::twin {
@@ -60,6 +61,28 @@ Profile &Profile::travel(double distance, double speed, double accelerate_s) {
   return *this;
 }
 
+Profile &Profile::trace(const std::vector<double> &values, double tolerance) {
+  for (std::size_t begin = 0; begin < values.size();) {
+    // As far as a straight line leaves none of them.
+    double lowest = -std::numeric_limits<double>::infinity(), highest = -lowest;
+    std::size_t end = begin;
+    for (std::size_t i = begin; i < values.size(); i++) {
+      const double steps = static_cast<double>(i - begin + 1), change = values[i] - value_;
+      if (change / steps >= lowest && change / steps <= highest) {
+        end = i;
+      }
+      lowest = std::max(lowest, (change - tolerance) / steps);
+      highest = std::min(highest, (change + tolerance) / steps);
+      if (lowest > highest) {
+        break;
+      }
+    }
+    line(1e-3 * static_cast<double>(end - begin + 1), values[end]);
+    begin = end + 1;
+  }
+  return *this;
+}
+
 double Profile::at(double t_s) const {
   if (pieces_.empty() || t_s >= pieces_.back().end_s) {
     return value_;
@@ -113,10 +136,10 @@ Touch Track::at(double t_s) const {
     contact.force_N *= part.share;
   }
   const double load_N = pull.load_N.at(t_s);
-  if (load_N > 0.0) {
-    contact.stuck_N = stuck_force_N(contact.force_N, load_N, pull.friction);
-    const double moved =
-        pull.travel_mm * (1.0 - std::pow(contact.stuck_N / contact.force_N, 2.0 / 3.0));
+  if (load_N != 0.0) {
+    contact.stuck_N = stuck_force_N(contact.force_N, std::abs(load_N), pull.friction.at(t_s));
+    const double moved = std::copysign(pull.travel_mm, load_N) *
+                         (1.0 - std::pow(contact.stuck_N / contact.force_N, 2.0 / 3.0));
     contact.x_mm += pull.along_x * moved;
     contact.y_mm += pull.along_y * moved;
   }
@@ -124,6 +147,14 @@ Touch Track::at(double t_s) const {
   contact.pull_x_N = pull_N * pull.along_x;
   contact.pull_y_N = pull_N * pull.along_y;
   return contact;
+}
+
+double wind_up_rad(double torque_share, double friction_N, double shear_modulus_MPa,
+                   double radius_mm) {
+  const double root = std::sqrt(1.0 - 1.5 * 3.0 * M_PI / 16.0 * std::abs(torque_share));
+  const double turn = 0.125 * (1.0 - root) * (3.0 - root) * friction_N /
+                      (shear_modulus_MPa * radius_mm * radius_mm);
+  return std::copysign(turn, torque_share);
 }
 
 DiscPart disc_before_edge(double ahead) {

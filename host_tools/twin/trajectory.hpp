@@ -1,7 +1,7 @@
 // How contacts move over the pad and how hard they press: smooth functions of time.
 //
-// All of it is kinematic: what slips when is set here, not found from friction. Of the elastic dead
-// travel and of stick-slip only the motions are modelled (Grip).
+// All of it is kinematic: what slips when is set here, or was found before by held_object.hpp. Of
+// the elastic dead travel and of stick-slip only the motions are modelled (Grip).
 #pragma once
 
 #include <limits>
@@ -24,6 +24,8 @@ public:
   // By `distance`, at this speed but for a constant acceleration at either end. Throws
   // std::invalid_argument if the accelerations alone would take the distance.
   Profile &travel(double distance, double speed, double accelerate_s);
+  // Through these values, one for each millisecond to come, but for less than the tolerance.
+  Profile &trace(const std::vector<double> &values, double tolerance);
 
   double at(double t_s) const; // before its beginning and after its end it stays
   double end_s() const { return 1e-3 * static_cast<double>(end_ms_); }
@@ -66,12 +68,13 @@ struct Grip {
 // The tangential force of an object on the rubber, along one direction: a share of the normal force
 // that rises and falls with it, as in an oblique push, or a load that comes while the normal force
 // stays, as a weight does. Under a load the object and its contact move along: by travel_mm when
-// all slides and by 1 - (1 - Q / (friction F))^(2/3) of it before (Mindlin, as in Grip).
+// all slides and by 1 - (1 - Q / (friction F))^(2/3) of it before (Mindlin, as in Grip), and back
+// the same way. Where a HeldObject moves, its way is the pusher's, and travel_mm is 0.
 struct Pull {
   double along_x = 1.0, along_y = 0.0; // unit vector
   double share = 0.0;
   Profile load_N; // at most friction times the normal force, 0 as long as share is not
-  double friction = 1.0;
+  Profile friction{1.0};
   double travel_mm = 0.0;
 };
 
@@ -103,6 +106,15 @@ struct Track {
 
   Touch at(double t_s) const;
 };
+
+// How far, in radians, a torque turns a sphere of this contact radius on rubber of this shear
+// modulus, a half-space, before it spins: the closed form of Deresiewicz, "Contact of elastic
+// spheres under an oscillating torsional couple", J. Appl. Mech. 21, 1954. torque_share is that of
+// the torque at which all slides, (3 pi / 16) mu F a; -1..1. It is less than Lubkin's integrals
+// ("The torsion of elastic spheres in contact", J. Appl. Mech. 18, 1951) by 3 % at half of that, by
+// 14 % at 0.8; theirs grows beyond any bound at the end, as a logarithm, where this spins.
+double wind_up_rad(double torque_share, double friction_N, double shear_modulus_MPa,
+                   double radius_mm);
 
 // Share of a disc's area that lies before a straight edge, and how far the centre of that part lies
 // before the disc's, both for an edge `ahead` radii ahead of the centre (-1..1).

@@ -60,7 +60,7 @@ class TwinTest(unittest.TestCase):
 class Files(TwinTest):
     def test_every_kind_is_read_by_python_and_emulator_alike(self):
         names = [line.split()[0] for line in self.run_twin("list")[0].split("\n\n")[0].splitlines()[1:]]
-        self.assertEqual(sorted(names), sorted(["grid", "taps", "high", "pokes", "cycle", "slip", "twist", "rolloff", "placements", "two", "lift"]))
+        self.assertEqual(sorted(names), sorted(["grid", "taps", "high", "pokes", "cycle", "slip", "twist", "rolloff", "placements", "two", "lift", "drag", "slide", "screw"]))
         for kind in names:
             with self.subTest(kind):
                 seconds = 34 if kind == "cycle" else 12
@@ -74,7 +74,7 @@ class Files(TwinTest):
                 self.assertEqual(emulator["rows"], len(scenario.t_s))
                 self.assertEqual(emulator["metadata"], scenario.metadata)
                 self.assertEqual(scenario.metadata["name"],
-                                 f"{kind}-{'sphere15' if kind == 'placements' else 'sphere6'}-h12-gain10-drift-relaxation-hysteresis-aftereffect-temperature-branch-bias-clip{'-tangential0.3' if kind == 'lift' else ''}")
+                                 f"{kind}-{'sphere15' if kind in ('placements', 'drag') else 'sphere6'}-h12-gain10-drift-relaxation-hysteresis-aftereffect-temperature-branch-bias-clip{'-tangential0.3' if kind in ('lift', 'drag') else ''}")
                 for t_s, sensors in zip(times, emulator["at"]):
                     for k, sensor in enumerate(sensors):
                         self.assertAlmostEqual(
@@ -145,6 +145,33 @@ class Files(TwinTest):
             self.assertIn(what, refused.stderr)
             with self.assertRaisesRegex(fingertip_files.InputError, "wrong header.*once each, any of Qx_N, Qy_N, temperature_degC"):
                 fingertip_files.read_scenario(self.csv)
+
+    def test_a_slide_tells_where_friction_gave_way(self):
+        self.scenario("slide", "--seconds", "40", "--effects", "gain")
+        scenario, events = fingertip_files.read_scenario(self.csv), self.events()
+        truth = scenario.truth
+        pulled = fingertip_files.np.hypot(truth["Qx_N"], truth["Qy_N"])
+        slid = 0
+        for act in {row["act"] for row in events}:
+            rows = [row for row in events if row["act"] == act]
+            friction, mass_kg = float(rows[0]["friction"]), float(rows[0]["mass_kg"])
+            self.assertTrue(0.3 <= friction <= 0.8 and 0.1 <= mass_kg <= 0.5, rows[0])
+            inside = (scenario.t_s >= float(rows[0]["t_begin_s"])) & (scenario.t_s <= float(rows[-1]["t_end_s"]))
+            # Rows are within 0.1 mN + 1e-4 of the force, in each column.
+            self.assertLess((pulled - friction * truth["force_N"])[inside].max(), 0.002)
+            sliding = inside & (truth["slip"] > 0)
+            self.assertEqual(sliding.any(), rows[0]["press"] != "carry")
+            if sliding.any():
+                slid += 1
+                share = pulled[sliding] / truth["force_N"][sliding] / friction
+                self.assertGreater(share.min(), 0.8 - 0.003)
+                told = [row for row in rows if row["phase"] == "slip"]
+                self.assertAlmostEqual(scenario.t_s[sliding][0], float(told[0]["t_begin_s"]), delta=0.0021)
+                self.assertAlmostEqual(scenario.t_s[sliding][-1], float(told[-1]["t_end_s"]), delta=0.0021)
+        self.assertGreater(slid, 4)
+        recording = str(self.folder / "recording.csv")
+        subprocess.run([PLAYER, "play", self.csv, "-o", recording, "--quiet", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s)
+        self.assertGreater(fingertip_files.read_recording(recording).has_contact.sum(), 1000)
 
     def test_a_cold_pad_reads_one_step_and_old_temperatures(self):
         # Almost no force; the firmware keeps a branch for 0.3 K, 3 s, and its temperature for half a second: some 24 Pa at 0.1 K/s.
@@ -225,7 +252,7 @@ class Usage(TwinTest):
         self.scenario("taps", "--seconds", "5", "--overwrite")
 
     def test_wrong_words_are_told_before_a_table_is_solved(self):
-        for arguments in (("slide",), ("taps", "--seconds", "0"), ("taps", "--force", "x")):
+        for arguments in (("glide",), ("taps", "--seconds", "0"), ("taps", "--force", "x")):
             self.error("scenario", *arguments, "-o", self.csv, "--cache", str(self.folder / "cache"))
             self.assertFalse((self.folder / "cache").exists())
 
@@ -236,7 +263,7 @@ class Usage(TwinTest):
 
     def test_wrong_words_are_told_in_one_line(self):
         for arguments, what in {
-            ("slide",): 'there is no kind of scenario "slide"; give one of: grid, taps',
+            ("glide",): 'there is no kind of scenario "glide"; give one of: grid, taps',
             ("taps", "--indenter", "finger"): 'there is no indenter "finger"',
             ("two", "--second", "finger"): 'there is no indenter "finger"',
             ("taps", "--layer", "1"): "--layer 1 is out of range; give 3 to 20 mm",
@@ -249,7 +276,14 @@ class Usage(TwinTest):
             ("taps", "--speed", "20"): "--speed says nothing",
             ("slip", "--tangential", "0.3"): "--tangential says nothing",
             ("taps", "--tangential", "0.6"): "--tangential 0.6 does not hold; give 0 to 0.5, or another --friction",
-            ("taps", "--tangential", "much"): '--tangential "much" is not possible',
+            ("taps", "--tangential", "much"): '--tangential "much" is not possible; give a number, or any of a range as 0.1..0.4',
+            ("taps", "--tangential", "0.3,left"): '--tangential "0.3,left" has no direction; after the comma give degrees',
+            ("lift", "--tangential", "0.1..0.6"): "--tangential 0.6 does not hold; give 0 to 0.5, or another --friction",
+            ("lift", "--friction", "9"): "--friction 9 is out of range; give 0.05 to 5",
+            ("lift", "--mass", "0.2"): '--mass says nothing in a scenario of "lift"; leave it out, or choose slide',
+            ("slide", "--tangential", "0.2"): "--tangential says nothing",
+            ("slide", "--mass", "2", "--friction", "0.3"): "--mass 2 needs a grip of up to 81.75 N at --friction 0.3, above 50; give less mass or more friction",
+            ("slide", "--speed", "300"): "--speed 300 is out of range; give 1 to 200",
         }.items():
             self.assertIn(what, self.scenario_error(*arguments))
             self.assertEqual(os.listdir(self.folder), [])

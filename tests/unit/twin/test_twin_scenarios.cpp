@@ -1,6 +1,7 @@
 #include "libfingertip/error.hpp"
 #include "libfingertip/random.hpp"
 #include "libfingertip/text.hpp"
+#include "scenes.hpp"
 #include "twin/scenario_file.hpp"
 #include "twin/traction_table.hpp"
 
@@ -22,30 +23,6 @@ namespace {
 
 using namespace fingertip;
 using namespace fingertip::twin;
-
-constexpr double LAYER_mm = 12.0;
-
-const ContactTable &table_of(const std::string &name) {
-  static std::map<std::string, ContactTable> tables;
-  const auto found = tables.find(name);
-  if (found != tables.end()) {
-    return found->second;
-  }
-  return tables
-      .emplace(name, ContactTable::load_or_build(indenter(name), silicone(LAYER_mm),
-                                                 FINGERTIP_TEST_TABLES))
-      .first->second;
-}
-
-Scenario scenario_of(const std::string &kind,
-                     const std::function<void(ScenarioOptions &)> &change = {}) {
-  ScenarioOptions options;
-  options.kind = kind;
-  if (change) {
-    change(options);
-  }
-  return make_scenario(options, table_of("sphere6"));
-}
 
 struct File {
   std::map<std::string, std::string> metadata;
@@ -145,11 +122,15 @@ TEST(Scenarios, HaveQuietTimeAndNoJumps) {
           const Touch now = track.at(t_s);
           EXPECT_LE(now.force_N, ContactTable::FORCE_MAX_N);
           EXPECT_GE(now.force_N, 0.0);
-          // At most 15 N in 0.1 s, 200 mm/s and 180 degrees a second.
-          EXPECT_LT(std::abs(now.force_N - before.force_N), 0.3) << kind.name << t_s;
-          EXPECT_LT(std::hypot(now.x_mm - before.x_mm, now.y_mm - before.y_mm), 0.202)
+          // At most 15 N in 0.1 s, what slides is caught faster; 200 mm/s and 180 degrees a second,
+          // what falls or winds up is a little faster.
+          const bool slides = kind.name == "slide", turned = kind.name == "screw";
+          EXPECT_LT(std::abs(now.force_N - before.force_N), slides ? 0.6 : 0.3) << kind.name << t_s;
+          EXPECT_LT(std::hypot(now.x_mm - before.x_mm, now.y_mm - before.y_mm),
+                    slides ? 0.27 : 0.202)
               << kind.name << t_s;
-          EXPECT_LT(std::abs(now.angle_rad - before.angle_rad), 3.2e-3) << kind.name << t_s;
+          EXPECT_LT(std::abs(now.angle_rad - before.angle_rad), turned ? 5e-3 : 3.2e-3)
+              << kind.name << t_s;
           before = now;
         }
       }
@@ -159,6 +140,10 @@ TEST(Scenarios, HaveQuietTimeAndNoJumps) {
 
 TEST(Scenarios, SlipIsTruthWhereThePusherMovesAndNowhereElse) {
   for (const ScenarioKind &kind : scenario_kinds()) {
+    if (kind.name == "slide") {
+      continue; // there it is found
+    }
+    const bool set = kind.name == "slip" || kind.name == "drag";
     const Scenario scenario = scenario_of(kind.name);
     for (const Act &act : scenario.acts) {
       const Track &track = act.tracks[0];
@@ -169,11 +154,11 @@ TEST(Scenarios, SlipIsTruthWhereThePusherMovesAndNowhereElse) {
         const bool moved = track.pusher_mm.at(local_s) > track.pusher_mm.at(local_s - 5e-4);
         const bool moves = track.pusher_mm.at(local_s + 5e-4) > track.pusher_mm.at(local_s);
         const bool slips = act.slips(act.begin_s + local_s);
-        EXPECT_EQ(slips, kind.name == "slip" && moved && moves) << kind.name << local_s;
+        EXPECT_EQ(slips, set && moved && moves) << kind.name << local_s;
         EXPECT_TRUE(!slips || track.at(local_s).force_N > 0.0);
         slipping += slips;
       }
-      EXPECT_EQ(slipping > 100, kind.name == "slip");
+      EXPECT_EQ(slipping > 100, set);
     }
   }
 }
@@ -352,7 +337,7 @@ TEST(Scenarios, WrongOptionsAreToldInOneLine) {
     return std::string();
   };
   for (const std::string &text :
-       {message("slide", {}),
+       {message("glide", {}),
         message("taps", [](ScenarioOptions &o) { o.seconds = 2; }),
         message("taps", [](ScenarioOptions &o) { o.seconds = 1e9; }),
         message("taps", [](ScenarioOptions &o) { o.seconds = NAN; }),
@@ -368,8 +353,23 @@ TEST(Scenarios, WrongOptionsAreToldInOneLine) {
         message("taps", [](ScenarioOptions &o) { o.tangential = "-0.1"; }),
         message("taps", [](ScenarioOptions &o) { o.tangential = "0.3,"; }),
         message("taps", [](ScenarioOptions &o) { o.tangential = "0.3,0,0"; }),
-        message("lift", [](ScenarioOptions &o) { o.friction = 0.2; }),
-        message("lift", [](ScenarioOptions &o) { o.friction = NAN; }),
+        message("lift", [](ScenarioOptions &o) { o.friction = "0.2"; }),
+        message("lift", [](ScenarioOptions &o) { o.friction = "nan"; }),
+        message("lift", [](ScenarioOptions &o) { o.tangential = "0.1..0.6"; }),
+        message("lift", [](ScenarioOptions &o) { o.tangential = "0.4..0.1"; }),
+        message("lift", [](ScenarioOptions &o) { o.tangential = "0.1.."; }),
+        message("lift",
+                [](ScenarioOptions &o) {
+                  o.friction = "0.3..0.5";
+                  o.tangential = "0.4";
+                }),
+        message("lift", [](ScenarioOptions &o) { o.mass_kg = "0.2"; }),
+        message("slide", [](ScenarioOptions &o) { o.tangential = "0.3"; }),
+        message("slide", [](ScenarioOptions &o) { o.mass_kg = "5"; }),
+        message("slide", [](ScenarioOptions &o) { o.mass_kg = "0..1"; }),
+        message("slide", [](ScenarioOptions &o) { o.kinetic_share = 1.1; }),
+        message("slide", [](ScenarioOptions &o) { o.dead_travel_mm = 0; }),
+        message("slide", [](ScenarioOptions &o) { o.speeds_mm_s = {500}; }),
         message("slip", [](ScenarioOptions &o) { o.second_indenter = "cube6"; }),
         message("slip", [](ScenarioOptions &o) { o.dead_travel_mm = 11; })}) {
     EXPECT_NE(text.find("; "), std::string::npos) << text;

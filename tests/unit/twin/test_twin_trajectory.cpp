@@ -41,6 +41,59 @@ TEST(Profile, TravelsAtConstantSpeedBetweenConstantAccelerations) {
   EXPECT_THROW(Profile().travel(0.5, 100.0, 0.01), std::invalid_argument);
 }
 
+TEST(Profile, TracesValuesWithFewerPieces) {
+  std::vector<double> values;
+  for (int i = 1; i <= 4000; i++) {
+    values.push_back(i < 2000 ? std::sin(1e-3 * i) : i < 3000 ? 5.0 : 5.0 + 0.01 * (i - 3000));
+  }
+  Profile profile(0.0);
+  profile.hold(0.5).trace(values, 1e-3);
+  EXPECT_NEAR(profile.end_s(), 4.5, 1e-9);
+  EXPECT_EQ(profile.at(0.3), 0.0);
+  for (int i = 1; i <= 4000; i++) {
+    EXPECT_NEAR(profile.at(0.5 + 1e-3 * i), values[std::size_t(i - 1)], 1e-3 + 1e-12) << i;
+  }
+  EXPECT_EQ(profile.at(4.5), values.back());
+}
+
+TEST(WindUp, BeginsLikeASpringAndEndsWhereAllSlides) {
+  constexpr double FRICTION_N = 3.0, SHEAR_MPa = 0.19, RADIUS_mm = 2.5;
+  const double limit_Nmm = 3.0 * M_PI / 16.0 * FRICTION_N * RADIUS_mm;
+  const double spring_Nmm = 16.0 / 3.0 * SHEAR_MPa * std::pow(RADIUS_mm, 3);
+  EXPECT_NEAR(wind_up_rad(1e-3, FRICTION_N, SHEAR_MPa, RADIUS_mm), 1e-3 * limit_Nmm / spring_Nmm,
+              1e-3 * 1e-3 * limit_Nmm / spring_Nmm);
+  double before = 0.0;
+  for (double share = 0.05; share < 1.01; share += 0.05) {
+    const double now = wind_up_rad(share, FRICTION_N, SHEAR_MPa, RADIUS_mm);
+    EXPECT_GT(now - before, 0.05 * limit_Nmm / spring_Nmm); // softer and softer
+    EXPECT_EQ(wind_up_rad(-share, FRICTION_N, SHEAR_MPa, RADIUS_mm), -now);
+    before = now;
+  }
+  EXPECT_NEAR(before, 0.21895 * FRICTION_N / (SHEAR_MPa * RADIUS_mm * RADIUS_mm), 1e-3 * before);
+}
+
+TEST(WindUp, IsNearLubkinsIntegrals) {
+  // The stiffness of what sticks, a disc of radius c, (16 / 3) G c^3, over the turn that leaves it:
+  // 3 mu F / (4 pi G a^2) (K - E), elliptic integrals of k, k^2 = 1 - (c / a)^2. All in their
+  // units.
+  const double limit = 3.0 * M_PI / 16.0;
+  constexpr int STEPS = 20000;
+  double torque = 0.0;
+  std::vector<std::pair<double, double>> errors{{0.2, -0.004}, {0.5, -0.034}, {0.8, -0.140}};
+  for (int i = 0; i < STEPS; i++) {
+    const double k = (i + 0.5) / STEPS, rest = std::sqrt(1.0 - k * k);
+    const double turn = 3.0 / (4.0 * M_PI) * (std::comp_ellint_1(k) - std::comp_ellint_2(k));
+    torque += 4.0 / M_PI * k * rest * std::comp_ellint_2(k) / STEPS;
+    if (!errors.empty() && torque >= errors.front().first * limit) {
+      EXPECT_NEAR(wind_up_rad(torque / limit, 1.0, 1.0, 1.0) / turn - 1.0, errors.front().second,
+                  0.001);
+      errors.erase(errors.begin());
+    }
+  }
+  EXPECT_TRUE(errors.empty());
+  EXPECT_NEAR(torque, limit, 1e-5); // where nothing sticks
+}
+
 TEST(Grip, CreepsThenFollows) {
   const Grip grip{2.0, 0.25, 0.0};
   EXPECT_EQ(grip.way_mm(0.0), 0.0);
