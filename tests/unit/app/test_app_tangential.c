@@ -73,7 +73,7 @@ static struct wire_contact last_contact(uint64_t from_us, uint64_t t_us, uint32_
       count++;
     }
   }
-  TEST_ASSERT_GREATER_THAN(30, count);
+  TEST_ASSERT_GREATER_THAN(10, count);
   return last;
 }
 
