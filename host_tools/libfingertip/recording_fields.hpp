@@ -184,13 +184,13 @@ struct PadList {
   float &(*value)(pad_profile &pad, std::size_t term);
 };
 inline constexpr PadList pad_lists[] = {
-    {"pad_normal_shares", PAD_NORMAL_TERMS,
+    {"pad_shares", PAD_NORMAL_TERMS,
      [](pad_profile &pad, std::size_t j) -> float & { return pad.normal[j].share; }},
-    {"pad_normal_sds_mm", PAD_NORMAL_TERMS,
+    {"pad_sds_mm", PAD_NORMAL_TERMS,
      [](pad_profile &pad, std::size_t j) -> float & { return pad.normal[j].sd_mm; }},
-    {"pad_tangential_moments_mm", PAD_TANGENTIAL_TERMS,
+    {"pad_moments_mm", PAD_TANGENTIAL_TERMS,
      [](pad_profile &pad, std::size_t j) -> float & { return pad.tangential[j].moment_mm; }},
-    {"pad_tangential_sds_mm", PAD_TANGENTIAL_TERMS,
+    {"pad_moment_sds_mm", PAD_TANGENTIAL_TERMS,
      [](pad_profile &pad, std::size_t j) -> float & { return pad.tangential[j].sd_mm; }}};
 
 struct Namer {

@@ -4,8 +4,11 @@
 
 #include "common/pad_profile.h"
 
+#include <string.h>
+
 static inline struct pad_profile pad_of_12_mm(void) {
-  struct pad_profile pad = {0};
+  struct pad_profile pad;
+  memset(&pad, 0, sizeof pad);
   pad.thickness_mm = 12.0f;
   pad.overhang_mm = 9.0f;
   pad.normal[0].share = 0.0952f;
