@@ -13,9 +13,10 @@ endif()
 # A scene is a named set of capabilities and defaults for one use of the fingertip.
 #   raw    every frame the sensors can give; pressures and tare only
 #   press  every frame; location and force, no slip and no raw packets
-#   slip   every frame; all there is
-#   paper  all there is, in the published setting: 20 Hz, slip by eq. (7) with n = 2
-set(FINGERTIP_SCENES raw press slip paper)
+#   slip   every frame; location, force, slip, raw packets
+#   grasp  every frame; all there is: tangential load besides
+#   paper  as slip, in the published setting: 20 Hz, slip by eq. (7) with n = 2
+set(FINGERTIP_SCENES raw press slip grasp paper)
 set(FINGERTIP_SCENE slip CACHE STRING "Scene: one of ${FINGERTIP_SCENES}")
 set_property(CACHE FINGERTIP_SCENE PROPERTY STRINGS ${FINGERTIP_SCENES})
 if(NOT FINGERTIP_SCENE IN_LIST FINGERTIP_SCENES)
@@ -23,10 +24,11 @@ if(NOT FINGERTIP_SCENE IN_LIST FINGERTIP_SCENES)
 endif()
 
 # Capabilities: what is off is not compiled (firmware/config/capabilities.h).
-set(FINGERTIP_CAPABILITIES FIT SLIP RAW_STREAM)
+set(FINGERTIP_CAPABILITIES FIT SLIP TANGENTIAL RAW_STREAM)
 set(capabilities_of_raw RAW_STREAM)
 set(capabilities_of_press FIT)
 set(capabilities_of_slip FIT SLIP RAW_STREAM)
+set(capabilities_of_grasp FIT SLIP TANGENTIAL RAW_STREAM)
 set(capabilities_of_paper FIT SLIP RAW_STREAM)
 foreach(capability IN LISTS FINGERTIP_CAPABILITIES)
   set(option FINGERTIP_${capability})
@@ -47,6 +49,9 @@ foreach(capability IN LISTS FINGERTIP_CAPABILITIES)
 endforeach()
 if(has_SLIP AND NOT has_FIT)
   message(FATAL_ERROR "FINGERTIP_SLIP needs FINGERTIP_FIT: slip is found from fits")
+endif()
+if(has_TANGENTIAL AND NOT has_FIT)
+  message(FATAL_ERROR "FINGERTIP_TANGENTIAL needs FINGERTIP_FIT: tangential load is found from fits")
 endif()
 if(NOT has_FIT AND NOT has_RAW_STREAM)
   message(FATAL_ERROR "with FINGERTIP_FIT and FINGERTIP_RAW_STREAM off nothing would be streamed; switch one on")

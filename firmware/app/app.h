@@ -11,7 +11,9 @@
 #include "condition/condition.h"
 #include "config/capabilities.h"
 #include "contact/contact.h"
+#include "contact/tangential.h"
 #include "fit/fit.h"
+#include "fit/fit_tangential.h"
 #include "scan/scan.h"
 #include "store/store.h"
 #include "wire/packet.h"
@@ -30,6 +32,12 @@ struct app {
   struct condition_gains gains;          /* of it */
   struct contact_settings contact_settings;
 #endif
+#if FT_WITH_TANGENTIAL
+  const struct pad_profile *pad;                  /* that acts; NULL: none */
+  struct fit_pad fit_pad;                         /* of it */
+  struct tangential_settings tangential_settings; /* of it and the calibration */
+  struct tangential_history tangential_history;
+#endif
 #if FT_WITH_SLIP
   struct slip_history slip_history;
 #endif
@@ -43,6 +51,10 @@ struct app {
 #if FT_WITH_FIT
   struct fit_result fit;
   struct contact_force force;
+#endif
+#if FT_WITH_TANGENTIAL
+  struct fit_tangential tangential;
+  struct tangential_load load;
 #endif
   struct contact_result contact;
   struct wire_packet packet;                         /* in or out, one at a time */
@@ -93,6 +105,11 @@ void app_process_frame(struct app *app, uint64_t taken_us);
  * none.
  */
 void app_use_calibration(struct app *app, const struct calibration *calibration);
+#endif
+
+#if FT_WITH_TANGENTIAL
+/* The same of a pad's profile. */
+void app_use_pad(struct app *app, const struct pad_profile *pad);
 #endif
 
 /* One round of the main loop: does what is due, or sleeps until something happens. */

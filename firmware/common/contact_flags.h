@@ -33,7 +33,13 @@ enum contact_flag {
   CONTACT_FLAG_SENSOR_DOUBTFUL = 1 << 18, /* a sensor in use gives reason to doubt it */
 
   /* State, continued */
-  CONTACT_FLAG_CALIBRATED = 1 << 19, /* gains and force scale of a calibration act */
+  CONTACT_FLAG_CALIBRATED = 1 << 19,       /* gains and force scale of a calibration act */
+  CONTACT_FLAG_TANGENTIAL_VALID = 1 << 20, /* the tangential load has values; location, force and
+                                              their standard deviations are corrected for it */
+  CONTACT_FLAG_TANGENTIAL_FROM_TOUCH = 1 << 21, /* it is what changed since the first touch */
+  CONTACT_FLAG_VELOCITY_VALID = 1 << 22,        /* the velocity of the contact has values */
+  CONTACT_FLAG_MOVING = 1 << 23,                /* its speed is above the threshold */
+  CONTACT_FLAG_SLIDING = 1 << 24,               /* and the tangential load does not explain it */
 };
 
 #endif

@@ -1,6 +1,6 @@
-/* How the rubber of one pad spreads what presses on it and what pulls along it: as the host computes
- * it from the pad's thickness and overhang (`fingertip pad`), as the packets carry it and the
- * fingertip keeps it, and as the estimate of tangential load uses it (fit_tangential.h).
+/* How the rubber of one pad spreads what presses on it and what pulls along it: as the host
+ * computes it from the pad's thickness and overhang (`fingertip pad`), as the packets carry it and
+ * the fingertip keeps it, and as the estimate of tangential load uses it (fit_tangential.h).
  *
  * Lengths are those of one bonded layer, so all of them grow with its thickness. A contact of its
  * own spread t2 (variance of its pressure along one axis, mm^2) presses on the base with
@@ -12,6 +12,7 @@
 #define COMMON_PAD_PROFILE_H
 
 #include <stdbool.h>
+#include <stdint.h>
 
 enum { PAD_NORMAL_TERMS = 2, PAD_TANGENTIAL_TERMS = 3 };
 
@@ -25,15 +26,33 @@ struct pad_profile {
     float moment_mm, sd_mm; /* the moments add up to about the thickness */
   } tangential[PAD_TANGENTIAL_TERMS];
   float spread_mm2, spread_sd_mm2; /* what to expect of t2 */
-  float tangential_scale;          /* tangential force is this times what the profile says */
-  float tangential_scale_sd;
-  bool from_touch; /* the pad's edges spoil the zero: tell what changed since the first touch */
+  float force_ratio;      /* 2 pi p0 sigma^2 of a usual contact over its force: what a calibration's
+                             force scale holds of it */
+  float tangential_scale; /* tangential force is this times what the profile says */
+  float tangential_scale_sd; /* standard deviation of tangential_scale */
+  uint8_t from_touch;        /* 1: the pad's edges spoil the zero, so tell what changed since the
+                                first touch; 0 */
 };
+
+/* The values before from_touch, behind one another. */
+#define PAD_PROFILE_FLOATS (4 + 2 * PAD_NORMAL_TERMS + 2 * PAD_TANGENTIAL_TERMS + 3)
 
 /* Ranges. */
 #define PAD_THICKNESS_MIN_mm 5.0f
 #define PAD_THICKNESS_MAX_mm 20.0f
 #define PAD_OVERHANG_MAX_mm 100.0f /* from 0 */
+/* Of a profile's own: a term that holds nothing, or twice all there is, is none of a layer. */
+#define PAD_SHARE_MIN 0.001f
+#define PAD_SHARE_MAX 2.0f
+#define PAD_MOMENT_MIN_mm 0.01f
+#define PAD_MOMENT_MAX_mm 40.0f
+#define PAD_SD_MIN_mm 0.5f
+#define PAD_SD_MAX_mm 100.0f
+#define PAD_SPREAD_MAX_mm2 100.0f /* from 0 */
+#define PAD_SPREAD_SD_MIN_mm2 0.1f
+#define PAD_SPREAD_SD_MAX_mm2 100.0f
+#define PAD_FORCE_RATIO_MIN 0.5f
+#define PAD_FORCE_RATIO_MAX 2.0f
 #define PAD_TANGENTIAL_SCALE_MIN 0.25f
 #define PAD_TANGENTIAL_SCALE_MAX 4.0f
 #define PAD_TANGENTIAL_SCALE_SD_MAX 1.0f /* from 0 */

@@ -19,6 +19,11 @@
 #define FT_WITH_SLIP FINGERTIP_SLIP
 #endif
 
+/* Tangential load, and the commands that bring and erase the pad's profile. */
+#ifndef FT_WITH_TANGENTIAL
+#define FT_WITH_TANGENTIAL FINGERTIP_TANGENTIAL
+#endif
+
 /* The raw packets. */
 #ifndef FT_WITH_RAW_STREAM
 #define FT_WITH_RAW_STREAM FINGERTIP_RAW_STREAM
@@ -26,6 +31,9 @@
 
 #if FT_WITH_SLIP && !FT_WITH_FIT
 #error "slip is found from fits: switch FINGERTIP_FIT on too"
+#endif
+#if FT_WITH_TANGENTIAL && !FT_WITH_FIT
+#error "tangential load is found from fits: switch FINGERTIP_FIT on too"
 #endif
 #if !FT_WITH_FIT && !FT_WITH_RAW_STREAM
 #error "nothing would be streamed: switch FINGERTIP_FIT or FINGERTIP_RAW_STREAM on"

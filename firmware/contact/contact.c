@@ -29,6 +29,10 @@ struct contact_force contact_weigh(const struct contact_settings *settings,
   return weighed;
 }
 
+bool contact_is_lower_bound(const struct fit_result *fit, uint32_t saturated) {
+  return saturated && fewer_bits_than(fit->used, CONTACT_MIN_UNSATURATED);
+}
+
 void contact_judge(const struct contact_input *input, struct contact_result *result) {
   uint32_t flags = input->fit ? input->fit->flags : 0;
   flags |= input->contact ? (uint32_t)CONTACT_FLAG_CONTACT : 0;
@@ -39,7 +43,7 @@ void contact_judge(const struct contact_input *input, struct contact_result *res
   flags |= input->sensor_doubtful ? (uint32_t)CONTACT_FLAG_SENSOR_DOUBTFUL : 0;
   if (input->saturated) {
     flags |= CONTACT_FLAG_SATURATED;
-    if (!input->fit || fewer_bits_than(input->fit->used, CONTACT_MIN_UNSATURATED)) {
+    if (!input->fit || contact_is_lower_bound(input->fit, input->saturated)) {
       flags |= CONTACT_FLAG_FORCE_LOWER_BOUND;
     }
   }

@@ -6,6 +6,7 @@
 
 #include "contact/slip.h"
 #include "fit/fit.h"
+#include "fit/fit_tangential.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -28,6 +29,7 @@ struct contact_input {
   bool calibrated;              /* gains and force scale of a calibration act */
   uint32_t saturated;           /* bitmap: left out of the fit for being beyond their range */
   const struct fit_result *fit; /* NULL where nothing was fitted */
+  const struct fit_tangential *tangential; /* NULL where nothing was estimated */
 };
 
 struct contact_result {
@@ -42,6 +44,8 @@ struct contact_force {
 /* With fewer unsaturated sensors than this the peak is extrapolated, and the force a lower bound.
  */
 #define CONTACT_MIN_UNSATURATED 5
+
+bool contact_is_lower_bound(const struct fit_result *fit, uint32_t saturated);
 
 /* The force of a fit, scaled; its standard deviation holds that of the scale. */
 struct contact_force contact_weigh(const struct contact_settings *settings,

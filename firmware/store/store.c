@@ -11,7 +11,8 @@
 #define MARK UINT32_C(0)
 
 enum {
-  VERSION = 1,
+  VERSION = 2,
+  VERSION_WITHOUT_PROFILE = 1,
   /* In a slot */
   BEGUN_AT = 0,
   MAGIC_AT = 4,
@@ -26,14 +27,17 @@ enum {
   /* In a payload */
   HAS_CALIBRATION = 1 << 0,
   HAS_SETTINGS = 1 << 1,
+  HAS_PROFILE = 1 << 2,
   CALIBRATION_AT = 4,
   SETTINGS_BYTES = 24,
+  PROFILE_BYTES = 4 * PAD_PROFILE_FLOATS + 1,
   /* A slot that does not hold what was written is given up; so often in a row is a flash that
      fails. */
   MAX_ATTEMPTS = 3,
 };
 _Static_assert((int)STORE_RECORD_BYTES == (int)SEALED_AT &&
-                   MAX_PAYLOAD >= CALIBRATION_AT + 14 + 8 * FT_MAX_SENSORS + SETTINGS_BYTES,
+                   MAX_PAYLOAD >=
+                       CALIBRATION_AT + 14 + 8 * FT_MAX_SENSORS + SETTINGS_BYTES + PROFILE_BYTES,
                "a record fits into its slot");
 
 /* The longest erase of a sector takes 400 ms (W25Q16JV), and the longest write of a page 3 ms. */
@@ -119,20 +123,41 @@ static void get_settings(const uint8_t *at, struct store_settings *settings) {
   get_floats(at + 8, settings, offsetof(struct store_settings, slip_threshold_mm), 4);
 }
 
+static void put_profile(uint8_t *at, const struct pad_profile *profile) {
+  put_floats(at, profile, 0, PAD_PROFILE_FLOATS);
+  at[PROFILE_BYTES - 1] = profile->from_touch;
+}
+
+static void get_profile(const uint8_t *at, struct pad_profile *profile) {
+  get_floats(at, profile, 0, PAD_PROFILE_FLOATS);
+  profile->from_touch = at[PROFILE_BYTES - 1];
+}
+
+/* What a record is made of; NULL: it has none. */
+struct parts {
+  const struct calibration *calibration;
+  const struct store_settings *settings;
+  const struct pad_profile *profile;
+};
+
 /* Its generation and CRC come when its place is known. */
-static void make_record(struct store *store, const struct calibration *calibration,
-                        const struct store_settings *settings) {
+static void make_record(struct store *store, const struct parts *parts) {
   uint8_t *payload = store->record + PAYLOAD_AT;
   bytes_put_u32(store->record + BEGUN_AT, MARK);
-  unsigned length = CALIBRATION_AT + calibration_bytes(store->sensor_count) + SETTINGS_BYTES;
+  unsigned settings_at = CALIBRATION_AT + calibration_bytes(store->sensor_count);
+  unsigned length = settings_at + SETTINGS_BYTES + PROFILE_BYTES;
   memset(payload, 0, length);
-  payload[0] = (uint8_t)((calibration ? HAS_CALIBRATION : 0) | (settings ? HAS_SETTINGS : 0));
+  payload[0] = (uint8_t)((parts->calibration ? HAS_CALIBRATION : 0) |
+                         (parts->settings ? HAS_SETTINGS : 0) | (parts->profile ? HAS_PROFILE : 0));
   payload[1] = store->sensor_count;
-  if (calibration) {
-    put_calibration(payload + CALIBRATION_AT, calibration, store->sensor_count);
+  if (parts->calibration) {
+    put_calibration(payload + CALIBRATION_AT, parts->calibration, store->sensor_count);
   }
-  if (settings) {
-    put_settings(payload + length - SETTINGS_BYTES, settings);
+  if (parts->settings) {
+    put_settings(payload + settings_at, parts->settings);
+  }
+  if (parts->profile) {
+    put_profile(payload + settings_at + SETTINGS_BYTES, parts->profile);
   }
   store->record_length = (uint16_t)(PAYLOAD_AT + length);
 }
@@ -162,9 +187,12 @@ static bool take_record(struct store *store) {
   struct store_content *content = &store->content;
   const uint8_t *payload = store->record + PAYLOAD_AT;
   const unsigned length = store->record_length - PAYLOAD_AT;
+  const unsigned version = bytes_get_u16(store->record + VERSION_AT);
+  const unsigned settings_at = CALIBRATION_AT + calibration_bytes(store->sensor_count);
+  const unsigned profile_at = settings_at + SETTINGS_BYTES;
   memset(content, 0, sizeof *content);
-  if (bytes_get_u16(store->record + VERSION_AT) != VERSION ||
-      length != CALIBRATION_AT + calibration_bytes(store->sensor_count) + SETTINGS_BYTES ||
+  if (length != (version == VERSION ? profile_at + PROFILE_BYTES : profile_at) ||
+      (version != VERSION && version != VERSION_WITHOUT_PROFILE) ||
       payload[1] != store->sensor_count) {
     return false;
   }
@@ -178,8 +206,16 @@ static bool take_record(struct store *store) {
     }
   }
   if (payload[0] & HAS_SETTINGS) {
-    get_settings(payload + length - SETTINGS_BYTES, &content->settings);
+    get_settings(payload + settings_at, &content->settings);
     content->has_settings = true;
+  }
+  if (version == VERSION && payload[0] & HAS_PROFILE) {
+    get_profile(payload + profile_at, &content->profile);
+    content->has_profile = pad_profile_is_valid(&content->profile);
+    if (!content->has_profile) {
+      memset(content, 0, sizeof *content);
+      return false;
+    }
   }
   return true;
 }
@@ -365,19 +401,17 @@ static bool read_back(struct store *store) {
   return equal;
 }
 
-static const struct calibration *kept_calibration(const struct store *store) {
-  return store->content.has_calibration ? &store->content.calibration : NULL;
-}
-
-static const struct store_settings *kept_settings(const struct store *store) {
-  return store->content.has_settings ? &store->content.settings : NULL;
+static struct parts kept_parts(const struct store *store) {
+  const struct store_content *content = &store->content;
+  return (struct parts){content->has_calibration ? &content->calibration : NULL,
+                        content->has_settings ? &content->settings : NULL,
+                        content->has_profile ? &content->profile : NULL};
 }
 
 /* The deadline has passed: a flash that is still busy with what has failed is not waited for. */
-static void put(struct store *store, const struct calibration *calibration,
-                const struct store_settings *settings) {
+static void put(struct store *store, const struct parts *parts) {
   store->attempts = 0;
-  make_record(store, calibration, settings);
+  make_record(store, parts);
   store->step = STORE_PUT;
   store->step_ends_us = 0;
 }
@@ -387,7 +421,8 @@ enum ft_status store_poll(struct store *store, uint64_t now_us) {
     if (!store->must_settle) {
       return FT_OK;
     }
-    put(store, kept_calibration(store), kept_settings(store));
+    const struct parts parts = kept_parts(store);
+    put(store, &parts);
   }
   if (port_flash_poll()) {
     return now_us < store->step_ends_us ? FT_PENDING : fail(store, FT_ERR_TIMEOUT);
@@ -437,24 +472,32 @@ enum ft_status store_poll(struct store *store, uint64_t now_us) {
   return FT_PENDING;
 }
 
-enum ft_status store_put_calibration(struct store *store, const struct calibration *calibration) {
+/* has: there is something of this part now. */
+static enum ft_status change(struct store *store, const struct parts *parts, bool puts, bool has) {
   if (store_is_writing(store)) {
     return FT_ERR_BUSY;
   }
-  if (!calibration && !store->content.has_calibration && !store->damaged) {
+  if (!puts && !has && !store->damaged) {
     return FT_OK;
   }
-  put(store, calibration, kept_settings(store));
+  put(store, parts);
   return FT_PENDING;
 }
 
+enum ft_status store_put_calibration(struct store *store, const struct calibration *calibration) {
+  struct parts parts = kept_parts(store);
+  parts.calibration = calibration;
+  return change(store, &parts, calibration != NULL, store->content.has_calibration);
+}
+
 enum ft_status store_put_settings(struct store *store, const struct store_settings *settings) {
-  if (store_is_writing(store)) {
-    return FT_ERR_BUSY;
-  }
-  if (!settings && !store->content.has_settings && !store->damaged) {
-    return FT_OK;
-  }
-  put(store, kept_calibration(store), settings);
-  return FT_PENDING;
+  struct parts parts = kept_parts(store);
+  parts.settings = settings;
+  return change(store, &parts, settings != NULL, store->content.has_settings);
+}
+
+enum ft_status store_put_profile(struct store *store, const struct pad_profile *profile) {
+  struct parts parts = kept_parts(store);
+  parts.profile = profile;
+  return change(store, &parts, profile != NULL, store->content.has_profile);
 }

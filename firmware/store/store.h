@@ -1,6 +1,6 @@
-/* What a fingertip keeps without power: a calibration, and settings to start with. Power lost at
- * any moment leaves what was there before or what was being written, never a mixture and never
- * nothing.
+/* What a fingertip keeps without power: a calibration, the pad's profile, and settings to start
+ * with. Power lost at any moment leaves what was there before or what was being written, never a
+ * mixture and never nothing.
  *
  * The flash is a log. A sector holds eight slots; a record, which is all that is kept, goes into
  * the next free one, and into the first of the other sector once that is erased. The newest
@@ -8,7 +8,7 @@
  *
  *     0    u32  begun: 0. From now on the slot is used, whatever it holds
  *     4    u32  magic 0x74665346
- *     8    u16  version 1
+ *     8    u16  version 2; 1 is read too
  *     10   u16  length of the payload
  *     12   u32  generation: one more than that of the other sector when this one was erased
  *     16   u32  CRC-32/ISO-HDLC of bytes 4 to 15 and the payload
@@ -19,7 +19,9 @@
  * Payload of version 1: u8 parts (bit 0 calibration, bit 1 settings), u8 n sensors, u16 0; the
  * calibration as in the command that brings it, without its n: 14 + 8 n bytes, zeros where there
  * is none; the settings: u32 rate mHz, u16 OSR, u16 slip window ms, f32 slip threshold mm, f32 f32
- * prior mm, f32 location limit mm. Later versions keep the slot as it is and change the payload.
+ * prior mm, f32 location limit mm. Version 2 has a part more, bit 2 the pad's profile, behind the
+ * settings: as in the command that brings it, 69 bytes. Later versions keep the slot as it is and
+ * change the payload.
  *
  * Bits whose change was cut short may read as they like, differently each time. So a record that is
  * not final may be there today and gone tomorrow, or the other way round: where start-up meets one,
@@ -34,6 +36,7 @@
 #define STORE_STORE_H
 
 #include "common/calibration.h"
+#include "common/pad_profile.h"
 #include "common/status.h"
 #include "port/flash.h"
 
@@ -51,9 +54,10 @@ struct store_settings {
 
 /* What is in the flash for good. */
 struct store_content {
-  bool has_calibration, has_settings;
+  bool has_calibration, has_settings, has_profile;
   struct calibration calibration;
   struct store_settings settings;
+  struct pad_profile profile;
 };
 
 enum {
@@ -108,6 +112,7 @@ void store_init(struct store *store, uint8_t sensor_count);
  * return. FT_OK: nothing had to be written. FT_PENDING. FT_ERR_BUSY: a write is under way. */
 enum ft_status store_put_calibration(struct store *store, const struct calibration *calibration);
 enum ft_status store_put_settings(struct store *store, const struct store_settings *settings);
+enum ft_status store_put_profile(struct store *store, const struct pad_profile *profile);
 
 /* To be called at least each millisecond or so while a write is under way; a call takes less than
  * 10 us on the RP2040. FT_PENDING: a write is under way. FT_OK: none is, and .content is what was

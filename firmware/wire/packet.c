@@ -38,7 +38,7 @@ struct wire_layout {
 #define LAYOUT(name, type)                                                                         \
   const struct wire_layout name##_layout = {type, sizeof name##_runs / sizeof name##_runs[0],      \
                                             name##_runs}
-#define EMPTY_LAYOUT(name, type) static const struct wire_layout name##_layout = {type, 0, NULL}
+#define EMPTY_LAYOUT(name, type) const struct wire_layout name##_layout = {type, 0, NULL}
 _Static_assert(sizeof(struct sensor_calibration) == 2 * sizeof(float), "F32_TWOS");
 _Static_assert(offsetof(struct wire_packet, body.raw.baseline_Pa_q10) ==
                        offsetof(struct wire_packet, body.raw.pressure_Pa_q10) +
@@ -48,15 +48,19 @@ _Static_assert(offsetof(struct wire_packet, body.raw.baseline_Pa_q10) ==
                "PAIRS");
 
 static const struct run wire_contact_runs[] = {
-    RUN(U32, 2, contact.frame),  RUN(U16, 7, contact.stages),
-    RUN(WHEN, 1, contact.flags), RUN(U32, 1, contact.sensors_used),
-    RUN(WHEN, 1, contact.flags), RUN(F32, 6, contact.x_mm),
-    RUN(WHEN, 2, contact.flags), RUN(F32, 2, contact.location_sd_mm),
-    RUN(WHEN, 3, contact.flags), RUN(F32, 1, contact.slip_mm),
-    RUN(WHEN, 7, contact.flags), RUN(F32, 3, contact.sigma_x_mm),
+    RUN(U32, 2, contact.frame),   RUN(U16, 7, contact.stages),
+    RUN(WHEN, 1, contact.flags),  RUN(U32, 1, contact.sensors_used),
+    RUN(WHEN, 1, contact.flags),  RUN(F32, 6, contact.x_mm),
+    RUN(WHEN, 2, contact.flags),  RUN(F32, 2, contact.location_sd_mm),
+    RUN(WHEN, 3, contact.flags),  RUN(F32, 1, contact.slip_mm),
+    RUN(WHEN, 7, contact.flags),  RUN(F32, 3, contact.sigma_x_mm),
+    RUN(WHEN, 20, contact.flags), RUN(F32, 4, contact.qx_N),
+    RUN(WHEN, 22, contact.flags), RUN(F32, 2, contact.vx_mm_s),
 };
 _Static_assert(CONTACT_FLAG_FIT_VALID == 1 << 1 && CONTACT_FLAG_UNCERTAINTY_VALID == 1 << 2 &&
-                   CONTACT_FLAG_SLIP_VALID == 1 << 3 && CONTACT_FLAG_WIDTHS_VALID == 1 << 7,
+                   CONTACT_FLAG_SLIP_VALID == 1 << 3 && CONTACT_FLAG_WIDTHS_VALID == 1 << 7 &&
+                   CONTACT_FLAG_TANGENTIAL_VALID == 1 << 20 &&
+                   CONTACT_FLAG_VELOCITY_VALID == 1 << 22,
                "bits in wire_contact_runs");
 LAYOUT(wire_contact, WIRE_CONTACT);
 
@@ -95,9 +99,13 @@ static const struct run wire_info_runs[] = {
     RUN(F32, 2, info.calibration.force_scale),
     RUN(WHEN, 0, info.stored),
     RUN(F32_TWOS, 1, info.calibration.sensors),
+    RUN(WHEN, 4, info.stored),
+    RUN(F32, PAD_PROFILE_FLOATS, info.pad.thickness_mm),
+    RUN(WHEN, 4, info.stored),
+    RUN(BYTES, 1, info.pad.from_touch),
 };
 _Static_assert(WIRE_CAPABILITY_FIT == 1 << 0 && WIRE_CAPABILITY_SLIP == 1 << 1 &&
-                   WIRE_STORED_CALIBRATION == 1 << 0,
+                   WIRE_STORED_CALIBRATION == 1 << 0 && WIRE_STORED_PAD == 1 << 4,
                "bits in wire_info_runs and wire_health_runs");
 LAYOUT(wire_info, WIRE_INFO);
 
@@ -117,22 +125,22 @@ static const struct run wire_ack_runs[] = {
 LAYOUT(wire_ack, WIRE_ACK);
 
 static const struct run cmd_stream_runs[] = {RUN(BYTES, 1, cmd_stream.streams)};
-static LAYOUT(cmd_stream, WIRE_CMD_STREAM);
+LAYOUT(cmd_stream, WIRE_CMD_STREAM);
 static const struct run cmd_tare_runs[] = {RUN(BYTES, 1, cmd_tare.force)};
-static LAYOUT(cmd_tare, WIRE_CMD_TARE);
+LAYOUT(cmd_tare, WIRE_CMD_TARE);
 static const struct run cmd_rate_runs[] = {RUN(U32, 1, cmd_rate.rate_mHz)};
-static LAYOUT(cmd_rate, WIRE_CMD_RATE);
+LAYOUT(cmd_rate, WIRE_CMD_RATE);
 static const struct run cmd_osr_runs[] = {RUN(U16, 1, cmd_osr.osr)};
-static LAYOUT(cmd_osr, WIRE_CMD_OSR);
+LAYOUT(cmd_osr, WIRE_CMD_OSR);
 static const struct run cmd_slip_runs[] = {
     RUN(F32, 1, cmd_slip.threshold_mm),
     RUN(U16, 1, cmd_slip.window_ms),
 };
-static LAYOUT(cmd_slip, WIRE_CMD_SLIP);
+LAYOUT(cmd_slip, WIRE_CMD_SLIP);
 EMPTY_LAYOUT(cmd_info, WIRE_CMD_INFO);
 EMPTY_LAYOUT(cmd_health, WIRE_CMD_HEALTH);
 static const struct run cmd_loader_runs[] = {RUN(U32, 1, cmd_loader.magic)};
-static LAYOUT(cmd_loader, WIRE_CMD_LOADER);
+LAYOUT(cmd_loader, WIRE_CMD_LOADER);
 
 static const struct run cmd_calibrate_runs[] = {
     RUN(SENSOR_COUNT, 1, cmd_calibrate.sensor_count),
@@ -141,27 +149,32 @@ static const struct run cmd_calibrate_runs[] = {
     RUN(F32, 2, cmd_calibrate.calibration.force_scale),
     RUN(F32_TWOS, 1, cmd_calibrate.calibration.sensors),
 };
-static LAYOUT(cmd_calibrate, WIRE_CMD_CALIBRATE);
+LAYOUT(cmd_calibrate, WIRE_CMD_CALIBRATE);
 EMPTY_LAYOUT(cmd_erase_calibration, WIRE_CMD_ERASE_CALIBRATION);
 static const struct run cmd_keep_runs[] = {RUN(BYTES, 1, cmd_keep.keep)};
-static LAYOUT(cmd_keep, WIRE_CMD_KEEP);
+LAYOUT(cmd_keep, WIRE_CMD_KEEP);
 static const struct run cmd_prior_runs[] = {RUN(F32, 2, cmd_prior.sigma_mm)};
-static LAYOUT(cmd_prior, WIRE_CMD_PRIOR);
+LAYOUT(cmd_prior, WIRE_CMD_PRIOR);
 static const struct run cmd_location_limit_runs[] = {RUN(F32, 1, cmd_location_limit.limit_mm)};
-static LAYOUT(cmd_location_limit, WIRE_CMD_LOCATION_LIMIT);
+LAYOUT(cmd_location_limit, WIRE_CMD_LOCATION_LIMIT);
 
-#define COMMANDS_WITHOUT_FIT                                                                       \
-  &cmd_stream_layout, &cmd_tare_layout, &cmd_rate_layout, &cmd_osr_layout, &cmd_info_layout,       \
-      &cmd_health_layout, &cmd_loader_layout, &cmd_keep_layout
-#define COMMANDS_WITHOUT_SLIP                                                                      \
-  COMMANDS_WITHOUT_FIT, &cmd_calibrate_layout, &cmd_erase_calibration_layout, &cmd_prior_layout,   \
-      &cmd_location_limit_layout
-const struct wire_layout *const wire_commands_without_fit[] = {COMMANDS_WITHOUT_FIT, NULL};
-const struct wire_layout *const wire_commands_without_slip[] = {COMMANDS_WITHOUT_SLIP, NULL};
-const struct wire_layout *const wire_commands[] = {COMMANDS_WITHOUT_SLIP, &cmd_slip_layout, NULL};
-const struct wire_layout *const wire_all_layouts[] = {
-    &wire_contact_layout, &wire_raw_layout,      &wire_info_layout, &wire_health_layout,
-    &wire_ack_layout,     COMMANDS_WITHOUT_SLIP, &cmd_slip_layout,  NULL};
+static const struct run cmd_pad_runs[] = {
+    RUN(F32, PAD_PROFILE_FLOATS, cmd_pad.profile.thickness_mm),
+    RUN(BYTES, 1, cmd_pad.profile.from_touch),
+};
+LAYOUT(cmd_pad, WIRE_CMD_PAD);
+EMPTY_LAYOUT(cmd_erase_pad, WIRE_CMD_ERASE_PAD);
+
+#define ALL_COMMANDS                                                                               \
+  WIRE_COMMANDS, WIRE_COMMANDS_OF_FIT, WIRE_COMMANDS_OF_SLIP, WIRE_COMMANDS_OF_TANGENTIAL
+const struct wire_layout *const wire_commands[] = {ALL_COMMANDS, NULL};
+const struct wire_layout *const wire_all_layouts[] = {&wire_contact_layout,
+                                                      &wire_raw_layout,
+                                                      &wire_info_layout,
+                                                      &wire_health_layout,
+                                                      &wire_ack_layout,
+                                                      ALL_COMMANDS,
+                                                      NULL};
 
 const struct wire_layout *wire_find_layout(const struct wire_layout *const *set, uint8_t type) {
   while (*set && (*set)->type != type) {

@@ -14,17 +14,20 @@
 
 #include "common/calibration.h"
 #include "common/limits.h"
+#include "common/pad_profile.h"
 #include "common/status.h"
 
 #include <stddef.h>
 #include <stdint.h>
 
-#define WIRE_VERSION 4
+#define WIRE_VERSION 5
 
 enum {
   WIRE_HEADER_BYTES = 12,
   WIRE_CRC_BYTES = 4,
-  WIRE_MAX_BODY_BYTES = 126 + 16 * FT_MAX_SENSORS, /* info of a calibrated fingertip */
+  WIRE_PAD_BYTES = 4 * PAD_PROFILE_FLOATS + 1,
+  /* Info of a calibrated fingertip that knows its pad. */
+  WIRE_MAX_BODY_BYTES = 126 + 16 * FT_MAX_SENSORS + WIRE_PAD_BYTES,
   WIRE_MAX_PACKET_BYTES = WIRE_HEADER_BYTES + WIRE_MAX_BODY_BYTES + WIRE_CRC_BYTES,
   /* COBS adds one byte, and one more for each full 254 bytes; then the delimiter. */
   WIRE_MAX_FRAME_BYTES = WIRE_MAX_PACKET_BYTES + WIRE_MAX_PACKET_BYTES / 254 + 2,
@@ -51,6 +54,8 @@ enum wire_type {
   WIRE_CMD_KEEP = 0x8A,
   WIRE_CMD_PRIOR = 0x8B,
   WIRE_CMD_LOCATION_LIMIT = 0x8C,
+  WIRE_CMD_PAD = 0x8D,
+  WIRE_CMD_ERASE_PAD = 0x8E,
 };
 
 /* Bits of the stream mask. */
@@ -66,6 +71,7 @@ enum wire_capability {
   WIRE_CAPABILITY_FIT = 1 << 0,        /* contact packets: location and force; and calibrations */
   WIRE_CAPABILITY_SLIP = 1 << 1,       /* and slip, and the command that sets it */
   WIRE_CAPABILITY_RAW_STREAM = 1 << 2, /* raw packets */
+  WIRE_CAPABILITY_TANGENTIAL = 1 << 3, /* tangential load, where the pad's profile is stored */
 };
 
 /* The result code of an ACK. */
@@ -85,6 +91,7 @@ enum wire_stored {
   WIRE_STORED_WRITING = 1 << 2,     /* a change is on its way into the flash */
   WIRE_STORED_DAMAGED = 1 << 3, /* what is there cannot be read, or is of a later firmware: it is
                                    not used */
+  WIRE_STORED_PAD = 1 << 4,     /* the pad's profile; it acts */
 };
 
 /* Ranges of the settings that commands carry; the device answers OUT_OF_RANGE beyond them. */
@@ -137,6 +144,12 @@ struct wire_contact {
   /* WIDTHS_VALID: of an elliptic Gaussian */
   float sigma_x_mm, sigma_y_mm; /* standard deviations along the axes */
   float width_correlation;      /* -1..1; 0 unless it lies aslant */
+  /* TANGENTIAL_VALID: location, force and their standard deviations are corrected for it */
+  float qx_N, qy_N;       /* tangential load on the rubber, along x and y */
+  float q_sd_N;           /* predicted standard deviation of either */
+  float tangential_ratio; /* its size over the force */
+  /* VELOCITY_VALID */
+  float vx_mm_s, vy_mm_s; /* of the contact */
 };
 
 /* The readings of one frame. header.t_us as in the contact packet of the same frame number. */
@@ -179,6 +192,7 @@ struct wire_info {
   float location_limit_mm;              /* UNCERTAIN where location_sd_mm is above it */
   uint32_t stored;                      /* enum wire_stored */
   struct calibration calibration;       /* with WIRE_STORED_CALIBRATION, else 0 */
+  struct pad_profile pad;               /* with WIRE_STORED_PAD, else 0 */
 };
 
 /* Counters since start, modulo 2^32, and present state. */
@@ -247,6 +261,9 @@ struct wire_cmd_prior {
 struct wire_cmd_location_limit {
   float limit_mm;
 };
+struct wire_cmd_pad {
+  struct pad_profile profile;
+};
 
 struct wire_packet {
   uint8_t type;      /* enum wire_type */
@@ -268,6 +285,7 @@ struct wire_packet {
     struct wire_cmd_keep cmd_keep;
     struct wire_cmd_prior cmd_prior;
     struct wire_cmd_location_limit cmd_location_limit;
+    struct wire_cmd_pad cmd_pad;
   } body;
 };
 
@@ -275,12 +293,23 @@ struct wire_packet {
 struct wire_layout;
 extern const struct wire_layout wire_contact_layout, wire_raw_layout, wire_info_layout,
     wire_health_layout, wire_ack_layout;
+extern const struct wire_layout cmd_stream_layout, cmd_tare_layout, cmd_rate_layout, cmd_osr_layout,
+    cmd_info_layout, cmd_health_layout, cmd_loader_layout, cmd_keep_layout, cmd_calibrate_layout,
+    cmd_erase_calibration_layout, cmd_prior_layout, cmd_location_limit_layout, cmd_slip_layout,
+    cmd_pad_layout, cmd_erase_pad_layout;
 
-/* Sets of layouts, ended by NULL: those of the commands, without that for slip, without those that
- * concern the fit either, and all there are. */
+/* The commands that every fingertip knows, and those of its capabilities, for its set. */
+#define WIRE_COMMANDS                                                                              \
+  &cmd_stream_layout, &cmd_tare_layout, &cmd_rate_layout, &cmd_osr_layout, &cmd_info_layout,       \
+      &cmd_health_layout, &cmd_loader_layout, &cmd_keep_layout
+#define WIRE_COMMANDS_OF_FIT                                                                       \
+  &cmd_calibrate_layout, &cmd_erase_calibration_layout, &cmd_prior_layout,                         \
+      &cmd_location_limit_layout
+#define WIRE_COMMANDS_OF_SLIP &cmd_slip_layout
+#define WIRE_COMMANDS_OF_TANGENTIAL &cmd_pad_layout, &cmd_erase_pad_layout
+
+/* Sets of layouts, ended by NULL: those of all commands, and all there are. */
 extern const struct wire_layout *const wire_commands[];
-extern const struct wire_layout *const wire_commands_without_slip[];
-extern const struct wire_layout *const wire_commands_without_fit[];
 extern const struct wire_layout *const wire_all_layouts[];
 
 /* NULL: the set has no such type. */

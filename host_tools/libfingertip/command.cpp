@@ -187,6 +187,19 @@ wire_packet command_location_limit(float limit_mm) {
   return packet;
 }
 
+wire_packet command_pad(const pad_profile &profile) {
+  if (!pad_profile_is_valid(&profile)) {
+    throw Error(ErrorCode::bad_value, "the pad's profile holds a value out of range");
+  }
+  wire_packet packet = packet_of(WIRE_CMD_PAD);
+  packet.body.cmd_pad.profile = profile;
+  return packet;
+}
+
+wire_packet command_erase_pad() {
+  return packet_of(WIRE_CMD_ERASE_PAD);
+}
+
 std::uint32_t rate_mHz_from_text(const std::string &text) {
   if (text == "max") {
     return 0;

@@ -28,6 +28,8 @@ wire_packet command_erase_calibration();
 wire_packet command_keep(bool keep);                       /* the present settings, or none */
 wire_packet command_prior(float sigma_mm, float width_mm); /* 0 and 0: none */
 wire_packet command_location_limit(float limit_mm);
+wire_packet command_pad(const pad_profile &profile);
+wire_packet command_erase_pad();
 
 /* Values as people type them. Each throws Error if the text is no number or out of range. */
 std::uint32_t rate_mHz_from_text(const std::string &text); /* Hz, or "max" */

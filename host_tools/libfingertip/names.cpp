@@ -17,6 +17,11 @@ const std::vector<FlagName> &flag_names() {
       {CONTACT_FLAG_HELD, "HELD", false},
       {CONTACT_FLAG_WIDTHS_VALID, "WIDTHS_VALID", false},
       {CONTACT_FLAG_CALIBRATED, "CALIBRATED", false},
+      {CONTACT_FLAG_TANGENTIAL_VALID, "TANGENTIAL_VALID", false},
+      {CONTACT_FLAG_TANGENTIAL_FROM_TOUCH, "TANGENTIAL_FROM_TOUCH", false},
+      {CONTACT_FLAG_VELOCITY_VALID, "VELOCITY_VALID", false},
+      {CONTACT_FLAG_MOVING, "MOVING", false},
+      {CONTACT_FLAG_SLIDING, "SLIDING", false},
       {CONTACT_FLAG_LOW_SIGNAL, "LOW_SIGNAL", true},
       {CONTACT_FLAG_FLAT, "FLAT", true},
       {CONTACT_FLAG_UNCERTAIN, "UNCERTAIN", true},
@@ -85,6 +90,10 @@ std::string command_name(std::uint8_t type) {
     return "prior";
   case WIRE_CMD_LOCATION_LIMIT:
     return "limit";
+  case WIRE_CMD_PAD:
+    return "pad";
+  case WIRE_CMD_ERASE_PAD:
+    return "erase pad";
   default:
     return "0x" + hex({type});
   }
@@ -116,12 +125,14 @@ constexpr BitName stream_names[] = {
 
 constexpr BitName capability_names[] = {{WIRE_CAPABILITY_FIT, "fit"},
                                         {WIRE_CAPABILITY_SLIP, "slip"},
-                                        {WIRE_CAPABILITY_RAW_STREAM, "raw"}};
+                                        {WIRE_CAPABILITY_RAW_STREAM, "raw"},
+                                        {WIRE_CAPABILITY_TANGENTIAL, "tangential"}};
 
 constexpr BitName stored_names[] = {{WIRE_STORED_CALIBRATION, "calibration"},
                                     {WIRE_STORED_SETTINGS, "settings"},
                                     {WIRE_STORED_WRITING, "writing"},
-                                    {WIRE_STORED_DAMAGED, "damaged"}};
+                                    {WIRE_STORED_DAMAGED, "damaged"},
+                                    {WIRE_STORED_PAD, "pad"}};
 
 template <std::size_t count>
 std::string bits_text(const BitName (&names)[count], std::uint32_t bits,

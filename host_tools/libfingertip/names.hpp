@@ -29,10 +29,10 @@ std::string command_name(std::uint8_t type);
 /* What an acknowledgement's result means, for the end of a sentence. */
 std::string result_text(std::uint8_t result);
 
-/* "fit,slip,raw": what a firmware can do; "none". */
+/* "fit,slip,raw,tangential": what a firmware can do; "none". */
 std::string capabilities_text(std::uint32_t capabilities);
 
-/* "calibration,settings": what a fingertip keeps without power; "nothing". */
+/* "calibration,settings,pad": what a fingertip keeps without power; "nothing". */
 std::string stored_text(std::uint32_t stored);
 
 /* "contact,raw" and back; "none" is 0. Throws Error on an unknown name. */

@@ -10,9 +10,9 @@ using namespace recording;
 
 namespace {
 
-template <typename ValueOf> std::string list_text(ValueOf value_of, std::uint8_t count) {
+template <typename ValueOf> std::string list_text(ValueOf value_of, std::size_t count) {
   std::string text;
-  for (int k = 0; k < count; k++) {
+  for (std::size_t k = 0; k < count; k++) {
     text += (k ? " " : "") + shortest(value_of(k));
   }
   return text;
@@ -41,14 +41,23 @@ Metadata info_metadata(const wire_info &info) {
   auto list = [&](const char *name, auto value_of) {
     pairs.emplace_back(name, list_text(value_of, info.sensor_count));
   };
-  list("x_mm", [&](int k) { return info.x_mm[k]; });
-  list("y_mm", [&](int k) { return info.y_mm[k]; });
+  list("x_mm", [&](std::size_t k) { return info.x_mm[k]; });
+  list("y_mm", [&](std::size_t k) { return info.y_mm[k]; });
   if (info.stored & WIRE_STORED_CALIBRATION) {
     PairWriter of_calibration;
     visit_calibration(of_calibration, copy.calibration);
     pairs.insert(pairs.end(), of_calibration.pairs.begin(), of_calibration.pairs.end());
     for (const SensorList &each : sensor_lists) {
-      list(each.name, [&](int k) { return info.calibration.sensors[k].*each.value; });
+      list(each.name, [&](std::size_t k) { return info.calibration.sensors[k].*each.value; });
+    }
+  }
+  if (info.stored & WIRE_STORED_PAD) {
+    PairWriter of_pad;
+    visit_pad(of_pad, copy.pad);
+    pairs.insert(pairs.end(), of_pad.pairs.begin(), of_pad.pairs.end());
+    for (const PadList &each : pad_lists) {
+      auto value_of = [&](std::size_t j) { return each.value(copy.pad, j); };
+      pairs.emplace_back(each.name, list_text(value_of, each.terms));
     }
   }
   return pairs;

@@ -16,8 +16,8 @@ using Metadata = std::vector<std::pair<std::string, std::string>>;
 /* Of a field that is padded with zeros, if there is room. */
 std::string text_field(const char *field);
 
-/* The scalar fields of an info packet, the sensor positions, and the calibration if there is one.
- */
+/* The scalar fields of an info packet, the sensor positions, and the calibration and the pad's
+ * profile where there are any. */
 Metadata info_metadata(const wire_info &info);
 
 /* The counters of a health packet. */

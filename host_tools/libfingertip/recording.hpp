@@ -2,13 +2,17 @@
  *
  *   # fingertip-recording 1
  *   # key: value
- *   t_us,frame,sequence,flags,...,total_us,raw_sequence,...,s0_Pa,...,tare0_Pa,...
+ *   t_us,frame,sequence,flags,...,total_us,qx_N,...,vy_mm_s,raw_sequence,...,s0_Pa,...,tare0_Pa,...
  *   (rows and comments)
  *   # end: reason=... frames=... seconds=... packets=... dropped_packets=... crc_errors=... ...
  *
  * Keys: those of the info packet (serial, board, scene, firmware, git, sensors, rate_mHz, osr, ...,
  * x_mm and y_mm of the sensors), of a calibrated fingertip (stored, bit 0) also date, force scale,
- * gains, ...; and the recorder's own (recorded_by, started_utc, port, ...).
+ * gains, ...; of one that knows its pad pad_thickness_mm, ...; and the recorder's own (recorded_by,
+ * started_utc, port, ...).
+ *
+ * Recordings of before there was a tangential load have no columns from qx_N to vy_mm_s; a reader
+ * takes them.
  *
  * A row is a frame: a contact and a raw packet. Cells of a packet that did not come are empty, and
  * so are those of a quantity whose flag is off (contact_flags.h): no fit, no x.

@@ -45,8 +45,10 @@ struct Quantity {
 
 /* One walk over the fields of each packet serves the header, the rows and the reader; the order
  * here is the order of the columns. A quantity that holds only under a flag names it: where the
- * flag is off the field is zero (contact_flags.h), and its cell empty. */
-template <typename Visitor> void visit_contact(Visitor &visit, wire_packet &packet) {
+ * flag is off the field is zero (contact_flags.h), and its cell empty. Recordings of before there
+ * was a tangential load have no columns for it: has_tangential. */
+template <typename Visitor>
+void visit_contact(Visitor &visit, wire_packet &packet, bool has_tangential = true) {
   wire_contact &contact = packet.body.contact;
   visit("sequence", packet.sequence);
   visit("flags", contact.flags);
@@ -73,6 +75,15 @@ template <typename Visitor> void visit_contact(Visitor &visit, wire_packet &pack
   visit("fit_us", contact.stages.fit_us);
   visit("contact_us", contact.stages.contact_us);
   visit("total_us", contact.stages.total_us);
+  if (!has_tangential) {
+    return;
+  }
+  quantity("qx_N", contact.qx_N, CONTACT_FLAG_TANGENTIAL_VALID);
+  quantity("qy_N", contact.qy_N, CONTACT_FLAG_TANGENTIAL_VALID);
+  quantity("q_sd_N", contact.q_sd_N, CONTACT_FLAG_TANGENTIAL_VALID);
+  quantity("tangential_ratio", contact.tangential_ratio, CONTACT_FLAG_TANGENTIAL_VALID);
+  quantity("vx_mm_s", contact.vx_mm_s, CONTACT_FLAG_VELOCITY_VALID);
+  quantity("vy_mm_s", contact.vy_mm_s, CONTACT_FLAG_VELOCITY_VALID);
 }
 
 template <typename Visitor>
@@ -154,6 +165,33 @@ struct SensorList {
 };
 inline constexpr SensorList sensor_lists[] = {{"gains", &sensor_calibration::gain},
                                               {"gain_sds", &sensor_calibration::gain_sd}};
+
+/* What there is only where a pad's profile is stored: numbers, and lists with one for each term. */
+template <typename Visitor> void visit_pad(Visitor &visit, pad_profile &pad) {
+  visit("pad_thickness_mm", pad.thickness_mm);
+  visit("pad_overhang_mm", pad.overhang_mm);
+  visit("pad_spread_mm2", pad.spread_mm2);
+  visit("pad_spread_sd_mm2", pad.spread_sd_mm2);
+  visit("pad_force_ratio", pad.force_ratio);
+  visit("pad_tangential_scale", pad.tangential_scale);
+  visit("pad_tangential_scale_sd", pad.tangential_scale_sd);
+  visit("pad_from_touch", pad.from_touch);
+}
+
+struct PadList {
+  const char *name;
+  std::size_t terms;
+  float &(*value)(pad_profile &pad, std::size_t term);
+};
+inline constexpr PadList pad_lists[] = {
+    {"pad_shares", PAD_NORMAL_TERMS,
+     [](pad_profile &pad, std::size_t j) -> float & { return pad.normal[j].share; }},
+    {"pad_sds_mm", PAD_NORMAL_TERMS,
+     [](pad_profile &pad, std::size_t j) -> float & { return pad.normal[j].sd_mm; }},
+    {"pad_moments_mm", PAD_TANGENTIAL_TERMS,
+     [](pad_profile &pad, std::size_t j) -> float & { return pad.tangential[j].moment_mm; }},
+    {"pad_moment_sds_mm", PAD_TANGENTIAL_TERMS,
+     [](pad_profile &pad, std::size_t j) -> float & { return pad.tangential[j].sd_mm; }}};
 
 struct Namer {
   std::string text;
@@ -266,20 +304,20 @@ struct PairReader {
   }
 };
 
-inline std::string header_text(std::uint8_t sensor_count) {
+inline std::string header_text(std::uint8_t sensor_count, bool has_tangential = true) {
   wire_packet packet;
   std::memset(&packet, 0, sizeof packet);
   Namer namer;
-  visit_contact(namer, packet);
+  visit_contact(namer, packet, has_tangential);
   visit_raw(namer, packet, sensor_count);
   return "t_us,frame" + namer.text;
 }
 
-inline std::size_t contact_columns() {
+inline std::size_t contact_columns(bool has_tangential = true) {
   wire_packet packet;
   std::memset(&packet, 0, sizeof packet);
   Namer namer;
-  visit_contact(namer, packet);
+  visit_contact(namer, packet, has_tangential);
   return static_cast<std::size_t>(std::count(namer.text.begin(), namer.text.end(), ','));
 }
 

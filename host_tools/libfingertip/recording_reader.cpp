@@ -115,10 +115,11 @@ void RecordingReader::read_line(const std::string &text) {
     }
     auto columns =
         static_cast<std::size_t>(std::count(text_of_one.begin(), text_of_one.end(), ',')) + 1;
-    std::size_t fixed_columns = 2 + contact_columns() + RAW_COLUMNS;
+    has_tangential_ = text_of_one.find(",qx_N,") != std::string::npos;
+    std::size_t fixed_columns = 2 + contact_columns(has_tangential_) + RAW_COLUMNS;
     std::size_t sensors = columns > fixed_columns ? (columns - fixed_columns) / 2 : 0;
     if (sensors > FT_MAX_SENSORS ||
-        text_of_one != header_text(static_cast<std::uint8_t>(sensors))) {
+        text_of_one != header_text(static_cast<std::uint8_t>(sensors), has_tangential_)) {
       throw Damage{"unknown header"};
     }
     sensor_count_ = static_cast<std::uint8_t>(sensors);
@@ -176,6 +177,9 @@ void RecordingReader::read_comment(const std::string &text) {
       if (!(info_.stored & WIRE_STORED_CALIBRATION)) {
         item.packet.body.info.calibration = {};
       }
+      if (!(info_.stored & WIRE_STORED_PAD)) {
+        item.packet.body.info.pad = {};
+      }
     } else {
       throw Damage{"packet \"" + std::string(words[0]) + "\" is unknown"};
     }
@@ -216,9 +220,9 @@ void RecordingReader::read_info_field(const std::string &key, const std::string 
     std::memset(field, 0, WIRE_TEXT_BYTES);
     std::memcpy(field, value.data(), std::min<std::size_t>(value.size(), WIRE_TEXT_BYTES));
   };
-  auto read_list = [&](auto value_of) {
+  auto read_list = [&](auto value_of, std::size_t most = FT_MAX_SENSORS) {
     auto numbers = split(value, ' ');
-    if (numbers.size() > FT_MAX_SENSORS) {
+    if (numbers.size() > most) {
       throw Damage{key + " has too many values"};
     }
     for (std::size_t k = 0; k < numbers.size() && !value.empty(); k++) {
@@ -254,6 +258,12 @@ void RecordingReader::read_info_field(const std::string &key, const std::string 
             [&](std::size_t k) -> float & { return info_.calibration.sensors[k].*each.value; });
       }
     }
+    for (const PadList &each : pad_lists) {
+      if (key == each.name) {
+        known = true;
+        read_list([&](std::size_t j) -> float & { return each.value(info_.pad, j); }, each.terms);
+      }
+    }
     auto visit = [&](const std::string &name, auto &field) {
       if (name == key) {
         known = true;
@@ -262,6 +272,7 @@ void RecordingReader::read_info_field(const std::string &key, const std::string 
     };
     visit_info(visit, info_);
     visit_calibration(visit, info_.calibration);
+    visit_pad(visit, info_.pad);
     if (!known && !header_seen_) {
       recorder_metadata_.emplace_back(key, value);
     }
@@ -287,7 +298,7 @@ void RecordingReader::choose_device(const std::string &serials) {
 
 void RecordingReader::read_row(std::string_view text, std::optional<double> time_us) {
   auto cells = split(text, ',');
-  std::size_t contact_count = contact_columns();
+  std::size_t contact_count = contact_columns(has_tangential_);
   std::size_t raw_count = RAW_COLUMNS + 2 * std::size_t{sensor_count_};
   if (cells.size() != 2 + contact_count + raw_count) {
     throw Damage{std::to_string(cells.size()) + " columns where the header has " +
@@ -309,7 +320,7 @@ void RecordingReader::read_row(std::string_view text, std::optional<double> time
     item.packet.type = WIRE_CONTACT;
     item.packet.t_us = t_us;
     RowReader reader{cells, 2};
-    visit_contact(reader, item.packet);
+    visit_contact(reader, item.packet, has_tangential_);
     item.packet.body.contact.frame = frame;
     items.push_back(item);
   }

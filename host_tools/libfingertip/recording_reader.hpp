@@ -72,9 +72,10 @@ private:
   std::optional<LineStatistics> end_statistics_;
   Metadata recorder_metadata_;
   std::uint8_t sensor_count_ = 0;
-  bool joint_ = false; /* of several fingertips */
-  std::string wanted_; /* serial number */
-  std::string number_; /* of the wanted one in a joint recording */
+  bool has_tangential_ = true; /* its columns */
+  bool joint_ = false;         /* of several fingertips */
+  std::string wanted_;         /* serial number */
+  std::string number_;         /* of the wanted one in a joint recording */
   wire_info info_;
   std::deque<Item> items_;
 };

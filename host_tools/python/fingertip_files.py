@@ -43,11 +43,13 @@ STAGES = ("convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contac
 CONTACT_COLUMNS = (
     "sequence", "flags", "sensors_used", "x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N", "slip_mm", "residual_rms_Pa",
     "location_sd_mm", "force_sd_N", "sigma_x_mm", "sigma_y_mm", "width_correlation", *STAGES, "total_us")
+TANGENTIAL_COLUMNS = ("qx_N", "qy_N", "q_sd_N", "tangential_ratio", "vx_mm_s", "vy_mm_s")  # NaN in recordings of before there were any
 RAW_COLUMNS = ("raw_sequence", "raw_flags", "valid", "saturated", "doubtful", "temperature_degC")
-RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *RAW_COLUMNS)
+RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *TANGENTIAL_COLUMNS, *RAW_COLUMNS)
 
 # Flag bits of the contact packet, firmware/wire/PROTOCOL.md.
 CONTACT, FIT_VALID, SLIP_VALID, SLIP = 1 << 0, 1 << 1, 1 << 3, 1 << 4
+TANGENTIAL_VALID, TANGENTIAL_FROM_TOUCH, VELOCITY_VALID, MOVING, SLIDING = (1 << bit for bit in range(20, 25))
 WARNINGS = 0x7FF00  # LOW_SIGNAL to SENSOR_DOUBTFUL, firmware/common/contact_flags.h: the numbers deserve less trust
 
 
@@ -220,6 +222,8 @@ class Recording:
         self.metadata = metadata
         first = len(names) - 2 * sensors
         self.columns = {name: table[:, i] for i, name in enumerate(names[:first])}
+        missing = set(TANGENTIAL_COLUMNS).difference(self.columns)
+        self.columns |= {name: np.full(len(table), math.nan) for name in missing}
         self.sensors_Pa = table[:, first:first + sensors]
         self.tare_Pa = table[:, first + sensors:first + 2 * sensors]
         self.events = events
@@ -378,12 +382,13 @@ def read_recording(path, salvage=False, device=None, columns=None, progress=None
                 continue
             cells = line.split(",")
             if header is None:
-                sensors = (len(cells) - len(RECORDING_COLUMNS)) // 2
-                expected = [*RECORDING_COLUMNS, *(f"s{k}_Pa" for k in range(sensors)), *(f"tare{k}_Pa" for k in range(sensors))]
-                if cells != expected:
+                has = [name for name in RECORDING_COLUMNS if name in cells or name not in TANGENTIAL_COLUMNS]
+                sensors = (len(cells) - len(has)) // 2
+                expected = [*has, *(f"s{k}_Pa" for k in range(sensors)), *(f"tare{k}_Pa" for k in range(sensors))]
+                if cells != expected or len(has) not in (len(RECORDING_COLUMNS), len(RECORDING_COLUMNS) - len(TANGENTIAL_COLUMNS)):
                     raise InputError(f"{path}:{number}: wrong header; record anew with this version of fingertip")
                 header = cells
-                wanted = tuple(range(len(header))) if columns is None else tuple(sorted(header.index(name) for name in columns))
+                wanted = tuple(range(len(header))) if columns is None else tuple(sorted(header.index(name) for name in columns if name in has))
                 continue
             if len(cells) != len(header):
                 raise InputError(f"{path}:{number}: {len(cells)} columns where the header has {len(header)}; {advice}")

@@ -2,7 +2,7 @@
 """Checks a linked RP2040 image: that the boot ROM will start it, that it lies where it should, and
 that it holds nothing that the firmware's rules forbid.
 
-usage: check_image.py IMAGE.elf [--bin IMAGE.bin] [--json FILE]
+usage: check_image.py IMAGE.elf [--bin IMAGE.bin] [--flash-limit BYTES] [--json FILE]
 
 Prints the sizes; --json writes them. Exit 1 and one line for the first thing that is wrong.
 """
@@ -117,6 +117,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("elf")
     parser.add_argument("--bin", help="the raw image: must be what the ELF file loads")
+    parser.add_argument("--flash-limit", type=int, help="bytes that the image may have")
     parser.add_argument("--json", help="write the sizes to this file")
     args = parser.parse_args()
 
@@ -143,6 +144,8 @@ def main():
     }
     for name, value in sizes.items():
         print(f"{name:28}{value:8}")
+    if args.flash_limit and len(image) > args.flash_limit:
+        fail(f"the image has {len(image)} bytes; {args.flash_limit} are allowed")
     if args.json:
         with open(args.json, "w") as file:
             json.dump(sizes, file, indent=2)

@@ -15,21 +15,33 @@ from elf import Elf, fail
 
 # Objects below firmware/CMakeFiles, and names of other symbols.
 OWNED = {
-    "FIT": ("ft_fit.dir/fit/*.obj", r"wire_contact_\w+|contact_weigh|app_use_calibration|cmd_(calibrate|prior|location_limit)_\w+"),
-    "SLIP": ("ft_contact.dir/contact/slip.c.obj", r"contact_update|cmd_slip_\w+"),
-    "RAW_STREAM": (None, r"wire_raw_\w+"),
+    "FIT": (["ft_fit.dir/fit/*.obj"], r"wire_contact_\w+|contact_weigh|app_use_calibration|cmd_(calibrate|prior|location_limit)_\w+"),
+    "SLIP": (["ft_contact.dir/contact/slip.c.obj"], r"contact_update|cmd_slip_\w+"),
+    "TANGENTIAL": (["ft_fit.dir/fit/fit_tangential*.obj", "ft_contact.dir/contact/tangential.c.obj"],
+                   r"store_put_profile|app_use_pad|cmd_(pad|erase_pad)_\w+"),
+    "RAW_STREAM": ([], r"wire_raw_\w+"),
 }
 
 
-def defined_in(build, pattern):
-    objects = sorted((pathlib.Path(build) / "firmware/CMakeFiles").glob(pattern))
-    if not objects:
-        fail(f"{build}: no objects {pattern}; build the image there first")
+def symbols_of(objects):
     try:
         lines = subprocess.run(["arm-none-eabi-nm", "--defined-only", *objects], check=True, capture_output=True, text=True).stdout
     except (OSError, subprocess.CalledProcessError) as error:
         fail(f"arm-none-eabi-nm: {error}")
     return {name for name in re.findall(r"(?m)^[0-9a-f]+ \w (\S+)$", lines) if not name.startswith(("$", "."))}
+
+
+def defined_in(build, patterns):
+    """Symbols of these objects; not names of functions of a file that another file has too."""
+    folder = pathlib.Path(build) / "firmware/CMakeFiles"
+    owned = set()
+    for pattern in patterns:
+        objects = set(folder.glob(pattern))
+        if not objects:
+            fail(f"{build}: no objects {pattern}; build the image there first")
+        owned |= objects
+    others = set(folder.glob("**/*.obj")) - owned
+    return symbols_of(owned) - (symbols_of(others) if others else set()) if owned else set()
 
 
 def main():
@@ -41,7 +53,7 @@ def main():
 
     names = {symbol.name for symbol in Elf(args.elf).symbols if not symbol.is_file}
     for capability, (objects, pattern) in OWNED.items():
-        owned = defined_in(args.build, objects) if objects else set()
+        owned = defined_in(args.build, objects)
         there = sorted(name for name in names if name in owned or re.fullmatch(pattern, name))
         if capability in args.capabilities and not there:
             fail(f"{args.elf}: {capability} is on, but the image has no symbol of it")

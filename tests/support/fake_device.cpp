@@ -19,6 +19,7 @@
  *     mute=1           never says anything
  *     refuse=1         answers every command but stream, info and health with "not now"
  *     calibrated=1     a calibration is stored
+ *     pad=1            a pad's profile is stored
  *     capabilities=BITS  of its firmware
  *     play=FILE        its raw packets, and its sensors, are those of this recording, as fast as
  * they are read; then nothing more serial=HEX       its serial number; board=NAME, git=HASH,
@@ -34,6 +35,7 @@
 #include "libfingertip/recording.hpp"
 #include "libfingertip/text.hpp"
 #include "support/host_packets.hpp"
+#include "support/pad.h"
 
 #include <algorithm>
 #include <chrono>
@@ -74,6 +76,10 @@ public:
     if (number("calibrated", 0)) {
       info.calibration = test::make_calibration();
       store(WIRE_STORED_CALIBRATION, true);
+    }
+    if (number("pad", 0)) {
+      info.pad = pad_of_12_mm();
+      store(WIRE_STORED_PAD, true);
     }
     if (number("capabilities", -1) >= 0) {
       info.capabilities = static_cast<std::uint32_t>(number("capabilities", 0));
@@ -375,6 +381,14 @@ private:
     case WIRE_CMD_ERASE_CALIBRATION:
       info_.body.info.calibration = {};
       store(WIRE_STORED_CALIBRATION, false);
+      return false;
+    case WIRE_CMD_PAD:
+      info_.body.info.pad = command.body.cmd_pad.profile;
+      store(WIRE_STORED_PAD, true);
+      return false;
+    case WIRE_CMD_ERASE_PAD:
+      info_.body.info.pad = {};
+      store(WIRE_STORED_PAD, false);
       return false;
     case WIRE_CMD_INFO:
       info_.t_us = now_us();

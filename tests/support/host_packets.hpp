@@ -24,7 +24,8 @@ inline wire_packet make_contact(std::uint16_t sequence, std::uint64_t t_us, std:
   wire_contact &contact = packet.body.contact;
   contact.frame = frame;
   contact.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
-                  CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED | CONTACT_FLAG_WIDTHS_VALID;
+                  CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED | CONTACT_FLAG_WIDTHS_VALID |
+                  CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID;
   contact.sensors_used = 0x7FFF;
   contact.x_mm = 0.1f + static_cast<float>(frame % 10);
   contact.y_mm = -3.3333333f;
@@ -38,6 +39,12 @@ inline wire_packet make_contact(std::uint16_t sequence, std::uint64_t t_us, std:
   contact.sigma_x_mm = 5.9f;
   contact.sigma_y_mm = 5.4000001f;
   contact.width_correlation = -0.03f;
+  contact.qx_N = -0.31234567f;
+  contact.qy_N = 1.0e-9f;
+  contact.q_sd_N = 0.0123f;
+  contact.tangential_ratio = 0.29999998f;
+  contact.vx_mm_s = 123.45678f;
+  contact.vy_mm_s = -0.007f;
   contact.stages = {2501, 3206, 1449, 23, 6918, 30, 14127};
   return packet;
 }

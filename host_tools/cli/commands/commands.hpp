@@ -14,6 +14,7 @@ void add_replay(CommandLine &line);
 void add_serve(CommandLine &line);
 void add_tare(CommandLine &line);
 void add_calibrate(CommandLine &line);
+void add_pad(CommandLine &line);
 void add_set(CommandLine &line);
 void add_loader(CommandLine &line);
 void add_flash(CommandLine &line);

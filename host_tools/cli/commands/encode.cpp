@@ -3,7 +3,13 @@
 #include "libfingertip/command.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/text.hpp"
+#include "pad/profile.hpp"
 
+extern "C" {
+#include "config/geometry.h"
+}
+
+#include <algorithm>
 #include <cstdio>
 #include <functional>
 #include <map>
@@ -18,6 +24,21 @@ struct EncodeOptions {
   unsigned sequence = 0;
   std::uint64_t time_us = 0;
 };
+
+/* Over the sensors of this tool's own build. */
+wire_packet pad_of(const std::string &thickness, const std::string &overhang, bool from_touch) {
+  wire_info info{};
+  info.sensor_count = geometry.sensor_count;
+  info.pitch_mm = geometry.pitch_mm;
+  std::copy(std::begin(geometry.x_mm), std::end(geometry.x_mm), info.x_mm);
+  std::copy(std::begin(geometry.y_mm), std::end(geometry.y_mm), info.y_mm);
+  auto thickness_mm = to_double(thickness), overhang_mm = to_double(overhang);
+  if (!thickness_mm || !overhang_mm) {
+    throw Error("\"" + thickness + "\" and \"" + overhang +
+                "\" must be numbers; give thickness and overhang of the rubber, mm");
+  }
+  return command_pad(pad::profile_of({*thickness_mm, *overhang_mm, from_touch}, info));
+}
 
 wire_packet packet_from_words(const std::vector<std::string> &words) {
   struct Form {
@@ -55,13 +76,18 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
       {"keep", {0, "keep", [] { return command_keep(true); }}},
       {"forget", {0, "forget", [] { return command_keep(false); }}},
       {"erase", {0, "erase", command_erase_calibration}},
+      {"pad",
+       {2, "pad THICKNESS_MM OVERHANG_MM", [&] { return pad_of(word(1), word(2), false); }}},
+      {"pad-from-touch",
+       {2, "pad-from-touch THICKNESS_MM OVERHANG_MM",
+        [&] { return pad_of(word(1), word(2), true); }}},
+      {"erase-pad", {0, "erase-pad", command_erase_pad}},
   };
   auto form = forms.find(words[0]);
   if (form == forms.end()) {
     throw Error("command \"" + words[0] +
                 "\" is unknown; give stream, tare, tare-force, rate, osr, slip, prior, limit, "
-                "keep, forget, "
-                "erase, info, health or loader");
+                "keep, forget, erase, pad, pad-from-touch, erase-pad, info, health or loader");
   }
   if (words.size() != 1 + form->second.arguments) {
     throw Error("wrong arguments; give: fingertip encode " + form->second.usage);
@@ -87,7 +113,8 @@ void add_encode(CommandLine &line) {
       ->add_option("command", options->words,
                    "stream none|contact,raw,health; tare; rate HZ|max; osr N; slip THRESHOLD_MM "
                    "WINDOW_MS; prior SIGMA[:WIDTH]|none; limit MM; keep; forget; erase (the "
-                   "calibration); info; health; loader")
+                   "calibration); pad THICKNESS_MM OVERHANG_MM, pad-from-touch likewise; "
+                   "erase-pad; info; health; loader")
       ->required()
       ->type_name("COMMAND [ARGS]");
   command->add_option("--sequence", options->sequence, "Sequence number; default 0")

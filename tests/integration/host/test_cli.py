@@ -131,7 +131,7 @@ class Usage(CliTest):
         self.assertRegex(self.run_cli("--version")[0], r"^fingertip \d+\.\d+\.\d+\n$")
         commands = re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
         self.assertEqual(sorted(commands), sorted(
-            ["list", "info", "doctor", "monitor", "record", "replay", "tare", "calibrate", "set", "serve", "flash", "rule", "loader",
+            ["list", "info", "doctor", "monitor", "record", "replay", "tare", "calibrate", "pad", "set", "serve", "flash", "rule", "loader",
              "encode"]))
         for command in commands:
             self.assertIn(f"Usage: fingertip {command}", self.run_cli(command, "--help")[0])
@@ -198,12 +198,18 @@ class Usage(CliTest):
 
     def test_encode(self):
         # COBS of version, type, sequence, time, body and CRC, worked out by zlib.crc32 and hand
-        self.assertEqual(self.run_cli("encode", "tare")[0], "03048101010101010101010101059b0faf3400\n")
+        self.assertEqual(self.run_cli("encode", "tare")[0], "03058101010101010101010101051ed639e900\n")
         timed = self.run_cli("encode", "--sequence", "258", "--time", "1", "osr", "8192")[0].strip()
-        self.assertTrue(timed.startswith("0604830201"), timed)
+        self.assertTrue(timed.startswith("0605830201"), timed)
         self.assertIn("slip THRESHOLD_MM WINDOW_MS", self.error("encode", "slip", "0.75", status=2))
         self.assertIn("0.1 to 2000", self.error("encode", "rate", "3000", status=2))
         self.assertIn("unknown", self.error("encode", "bogus", status=2))
+        self.assertEqual(self.run_cli("encode", "erase-pad")[0], "03058e01010101010101010105e6afe1c600\n")
+        from_zero, from_touch = (self.run_cli("encode", command, "12", "9")[0] for command in ("pad", "pad-from-touch"))
+        self.assertIn("4041" + "012b" + "1041", from_zero)  # 12 and 9 mm; COBS has a code for each zero
+        self.assertNotEqual(from_zero, from_touch)
+        self.assertIn("4 to 20 mm", self.error("encode", "pad", "3", "9", status=2))
+        self.assertIn("must be numbers", self.error("encode", "pad", "thick", "9", status=2))
 
 
 class Several(CliTest):
@@ -412,11 +418,11 @@ class ErrorsPeopleMeet(CliTest):
                              f"fingertip: {self.port}: is fingertip AAAA, not BBBB; see `fingertip list`, and choose by --device alone\n")
 
     def test_older_or_newer_protocol_version(self):
-        for version in (1, 3, 5):
+        for version in (1, 4, 6):
             with self.device(f"version={version}"):
                 for command in (["info"], ["set", "rate=max"]):
                     self.assertEqual(self.error(*command, "--port", self.port),
-                                     f"fingertip: {self.port}: speaks protocol version {version}, not 4; install "
+                                     f"fingertip: {self.port}: speaks protocol version {version}, not 5; install "
                                      "this tool's firmware with `fingertip flash`, or use the other's tool\n")
 
     def test_cable_pulled(self):
@@ -667,6 +673,43 @@ class Commands(CliTest):
         self.assertEqual(len(rows), 15)
         self.assertEqual(rows[3], ("3", "0.920", "0.8", "####", ""))
         self.assertEqual(rows[12], ("12", "1.100", "0.9", "", "#####"))
+
+    def test_a_pad_is_told_and_shown_and_erased(self):
+        self.environment["FINGERTIP_PORT"] = self.port
+        with self.device("capabilities=15"):
+            self.assertNotIn("pad_", self.run_cli("info")[0])
+            out, err = self.run_cli("pad", "--thickness", "12", "--overhang", "9")
+            self.assertRegex(out, r"^thickness=12 overhang=9 force_ratio=0\.9\d\d kept\n$")
+            self.assertEqual(err, "")
+            out = self.run_cli("info")[0]
+            self.assertRegex(out, r"(?m)^capabilities +fit,slip,raw,tangential$")
+            self.assertRegex(out, r"(?m)^stored +pad$")
+            self.assertRegex(out, r"(?m)^pad_thickness_mm +12$")
+            self.assertRegex(out, r"(?m)^pad_overhang_mm +9$")
+            self.assertRegex(out, r"(?m)^pad_from_touch +0$")
+            self.assertRegex(out, r"(?m)^pad_moments_mm +1\.12\d* 4\.03\d* 5\.56\d*$")
+            out, err = self.run_cli("pad", "--thickness", "12", "--overhang", "4.5")
+            self.assertEqual(err.count("spoils the zero"), 1)
+            out, err = self.run_cli("pad", "--thickness", "12", "--overhang", "4.5", "--from-touch")
+            self.assertIn(" from_touch ", out)
+            self.assertEqual(err, "")
+            self.assertRegex(self.run_cli("info")[0], r"(?m)^pad_from_touch +1$")
+            self.assertIn("overhang=? ", self.run_cli("pad", "--thickness", "6")[0])
+            self.assertIn("erased", self.run_cli("pad", "--erase")[0])
+            self.assertRegex(self.run_cli("info")[0], r"(?m)^stored +nothing$")
+            for wrong in (["--thickness", "3"], ["--thickness", "12", "--overhang", "200"]):
+                self.assertIn("out of range; give", self.error("pad", *wrong, status=2))
+        self.assertIn("excludes", self.error("pad", "--erase", "--thickness", "12", status=2))
+        self.assertIn("--thickness", self.error("pad", "--from-touch", status=2))
+        self.assertIn("give --thickness MM", self.error("pad", status=2))
+        with self.device():
+            self.assertIn("of scene slip, tells no tangential load; install one of scene grasp", self.error("pad", "--thickness", "12"))
+        with self.device("capabilities=15", "refuse=1"):
+            self.assertIn("pad refused", self.error("pad", "--thickness", "12"))
+
+    def test_info_shows_a_pad_that_was_stored(self):
+        with self.device("capabilities=15", "pad=1"):
+            self.assertRegex(self.run_cli("info", "--port", self.port)[0], r"(?m)^pad_sds_mm +3.554 5.737$")
 
     def test_info_names_missing_sensors(self):
         with self.device("absent=7"):
@@ -1373,7 +1416,7 @@ class Monitor(CliTest):
             self.assertFalse(self.on_terminal_tare(keys, None)[0], keys)
 
     def test_a_recording_that_cannot_be_gives_the_terminal_back(self):
-        pathlib.Path(self.csv).write_text("# fingertip-recording 1\n" + self.header_without_sensors() + "\n# event: then\n1000,1" + 22 * ","
+        pathlib.Path(self.csv).write_text("# fingertip-recording 1\n" + self.header_without_sensors() + "\n# event: then\n1000,1" + 28 * ","
                                           + ",7,0,0,0,0,20.00\n", encoding="utf-8")
         output, status, before, after = self.on_terminal("replay", self.csv, until="never", then=b"q")
         self.assertEqual(status, 1)
@@ -1390,7 +1433,8 @@ class Monitor(CliTest):
         with self.device("frames=300"):
             out, _ = self.run_cli("monitor", "--port", self.port, "--until-gone")
         self.assertNotIn("\x1b", out)
-        self.assertRegex(out, r"(?m)^\d\.\d s  \d+ frames .* force 5\.00 N  CONTACT FIT_VALID UNCERTAINTY_VALID SLIP_VALID TARED WIDTHS_VALID$")
+        self.assertRegex(out, r"(?m)^\d\.\d s  \d+ frames .* force 5\.00 N  CONTACT FIT_VALID UNCERTAINTY_VALID SLIP_VALID TARED WIDTHS_VALID "
+                         r"TANGENTIAL_VALID VELOCITY_VALID$")
 
 
 if __name__ == "__main__":

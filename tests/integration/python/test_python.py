@@ -46,12 +46,12 @@ class ToolTest(unittest.TestCase):
         self.tool("scenario.py", name, "-o", path, *arguments)
         return path
 
-    def recording(self, scenario, rate_Hz=200, zero_s=0.25, change=lambda row: row, until_s=None, end=True):
+    def recording(self, scenario, rate_Hz=200, zero_s=0.25, change=lambda row: row, until_s=None, end=True, columns=files.RECORDING_COLUMNS):
         """What a perfect fingertip would record of a scenario, after change(row)."""
         truth = files.read_scenario(scenario)
         window_us, threshold_mm = 100000, 0.75
         path = self.folder / "recording.csv"
-        names = [*files.RECORDING_COLUMNS, *(f"s{k}_Pa" for k in range(15)), *(f"tare{k}_Pa" for k in range(15))]
+        names = [*columns, *(f"s{k}_Pa" for k in range(15)), *(f"tare{k}_Pa" for k in range(15))]
         lines = ["# fingertip-recording 1", "# serial: 0123456789ABCDEF", "# slip_window_ms: 100",
                  "# x_mm: " + " ".join(f"{v:g}" for v in files.SENSOR_X_mm),
                  "# y_mm: " + " ".join(f"{v:g}" for v in files.SENSOR_Y_mm), ",".join(names)]
@@ -303,6 +303,29 @@ class Evaluation(ToolTest):
     def test_names_cannot_speak_to_the_terminal(self):
         err = self.error("evaluate.py", self.folder / "\x1b[31m\n", "x", "-o", self.folder / "s")
         self.assertIn("\\x1b[31m\\n: No such file", err)
+
+
+class EarlierRecordings(ToolTest):
+    EARLIER = tuple(name for name in files.RECORDING_COLUMNS if name not in files.TANGENTIAL_COLUMNS)
+
+    def test_without_the_columns_of_the_tangential_load_they_are_read(self):
+        scenario = self.scenario()
+        whole = files.read_recording(self.recording(scenario, change=lambda row: {**row, "qx_N": 0.5}))
+        self.assertTrue((whole["qx_N"] == 0.5).all())
+        path = self.recording(scenario, columns=self.EARLIER)
+        earlier = files.read_recording(path)
+        self.assertTrue(np.isnan(earlier["qx_N"]).all() and np.isnan(earlier["vy_mm_s"]).all())
+        for name in self.EARLIER:
+            np.testing.assert_array_equal(earlier[name], whole[name])
+        np.testing.assert_array_equal(earlier.sensors_Pa, whole.sensors_Pa)
+        some = files.read_recording(path, columns=("t_us", "frame", "flags", "qx_N"))
+        self.assertTrue(np.isnan(some["qx_N"]).all())
+        np.testing.assert_array_equal(some["flags"], whole["flags"])
+
+    def test_some_of_the_columns_are_no_recording(self):
+        path = self.recording(self.scenario(), columns=tuple(name for name in files.RECORDING_COLUMNS if name != "q_sd_N"))
+        with self.assertRaisesRegex(files.InputError, "wrong header"):
+            files.read_recording(path)
 
 
 class MalformedFiles(ToolTest):

@@ -32,18 +32,23 @@ static struct {
 /* Of a sensor, relative to the mean; NULL: all are alike. */
 static double (*world_gain)(unsigned sensor);
 
+/* Pressure on the pad, Pa, so far from the contact's centre; NULL: the Gaussian of the press. */
+static double (*world_field_Pa)(double dx_mm, double dy_mm, uint64_t t_us);
+
 static inline double world_pressure_Pa(void *context, unsigned sensor, uint64_t t_us) {
   (void)context;
   if (press.force_N == 0.0 || t_us < press.from_us) {
     return AMBIENT_Pa;
   }
-  const double sigma_mm = 5.7;
-  double p0_Pa = press.force_N / (2.0 * PI * sigma_mm * sigma_mm * 1e-6);
   double y_mm = press.y_mm + press.speed_y_mm_s * (double)(t_us - press.from_us) * 1e-6;
   double dx = (double)geometry.x_mm[sensor] - press.x_mm;
   double dy = (double)geometry.y_mm[sensor] - y_mm;
-  return AMBIENT_Pa + (world_gain ? world_gain(sensor) : 1.0) * p0_Pa *
-                          exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm));
+  const double sigma_mm = 5.7;
+  double p0_Pa = press.force_N / (2.0 * PI * sigma_mm * sigma_mm * 1e-6);
+  double pressure_Pa = world_field_Pa
+                           ? world_field_Pa(dx, dy, t_us)
+                           : p0_Pa * exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm));
+  return AMBIENT_Pa + (world_gain ? world_gain(sensor) : 1.0) * pressure_Pa;
 }
 
 static inline uint64_t next_event_us(const void *context) {
@@ -76,6 +81,7 @@ static inline void rig_power_up(void) {
 static inline void rig_start(void) {
   memset(&press, 0, sizeof press);
   world_gain = NULL;
+  world_field_Pa = NULL;
   native_flash_reset(1);
   rig_power_up();
 }
@@ -124,7 +130,8 @@ static inline bool next_of_type(uint8_t type, struct wire_packet *packet) {
  */
 static inline uint8_t ask(struct wire_packet command) {
   struct wire_packet packet;
-  bool stores = command.type >= WIRE_CMD_CALIBRATE && command.type <= WIRE_CMD_KEEP;
+  bool stores = (command.type >= WIRE_CMD_CALIBRATE && command.type <= WIRE_CMD_KEEP) ||
+                command.type == WIRE_CMD_PAD || command.type == WIRE_CMD_ERASE_PAD;
   send_packet(&command);
   run_for(stores ? 100 : 30);
   TEST_ASSERT_TRUE_MESSAGE(next_of_type(WIRE_ACK, &packet), "no acknowledgement");

@@ -2,6 +2,7 @@
 #include "app_rig.h"
 #include "common/contact_flags.h"
 #include "config/defaults.h"
+#include "support/pad.h"
 
 void setUp(void) {
   rig_start();
@@ -13,7 +14,8 @@ void tearDown(void) {
 
 static const uint32_t CAPABILITIES = (FT_WITH_FIT ? WIRE_CAPABILITY_FIT : 0) |
                                      (FT_WITH_SLIP ? WIRE_CAPABILITY_SLIP : 0) |
-                                     (FT_WITH_RAW_STREAM ? WIRE_CAPABILITY_RAW_STREAM : 0);
+                                     (FT_WITH_RAW_STREAM ? WIRE_CAPABILITY_RAW_STREAM : 0) |
+                                     (FT_WITH_TANGENTIAL ? WIRE_CAPABILITY_TANGENTIAL : 0);
 static const uint8_t STREAMS =
     (FT_WITH_FIT ? WIRE_STREAM_CONTACT : 0) | (FT_WITH_RAW_STREAM ? WIRE_STREAM_RAW : 0);
 
@@ -50,6 +52,11 @@ static void it_refuses_streams_and_commands_that_it_lacks(void) {
       ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {1}}));
   TEST_ASSERT_EQUAL_UINT8(FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
                           ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
+  uint8_t of_tangential = FT_WITH_TANGENTIAL ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND;
+  TEST_ASSERT_EQUAL_UINT8(
+      of_tangential,
+      ask((struct wire_packet){.type = WIRE_CMD_PAD, .body.cmd_pad = {pad_of_12_mm()}}));
+  TEST_ASSERT_EQUAL_UINT8(of_tangential, ask((struct wire_packet){.type = WIRE_CMD_ERASE_PAD}));
 }
 
 static void it_streams_what_it_has(void) {
@@ -109,6 +116,9 @@ static void it_keeps_settings(void) {
   }
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&app.store, &calibration));
   run_for(500);
+  const struct pad_profile pad = pad_of_12_mm();
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&app.store, &pad));
+  run_for(500);
   ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {512}});
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
                     ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}}));
@@ -117,8 +127,11 @@ static void it_keeps_settings(void) {
   run_for(300);
   struct wire_info info = get_info();
   TEST_ASSERT_EQUAL_UINT16(512, info.osr);
-  TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_SETTINGS | (FT_WITH_FIT ? WIRE_STORED_CALIBRATION : 0),
+  TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_SETTINGS | (FT_WITH_FIT ? WIRE_STORED_CALIBRATION : 0) |
+                              (FT_WITH_TANGENTIAL ? WIRE_STORED_PAD : 0),
                           info.stored);
+  TEST_ASSERT_EQUAL_FLOAT(FT_WITH_TANGENTIAL ? 12.0f : 0.0f, info.pad.thickness_mm);
+  TEST_ASSERT_EQUAL_FLOAT(12.0f, app.store.content.profile.thickness_mm);
   TEST_ASSERT_EQUAL_UINT16(20, app.store.content.calibration.placements);
 }
 

@@ -1,7 +1,9 @@
 #include "common/bytes.h"
 #include "common/crc32.h"
+#include "support/pad.h"
 #include "support/random.h"
 
+#include <math.h>
 #include <string.h>
 #include <unity.h>
 
@@ -121,6 +123,53 @@ static void test_floats_travel_by_their_bits(void) {
   }
 }
 
+static void test_pad_profiles_are_in_their_ranges(void) {
+  struct pad_profile pad = pad_of_12_mm();
+  TEST_ASSERT_TRUE(pad_profile_is_valid(&pad));
+  const struct {
+    float *value;
+    float least, greatest;
+  } ranges[] = {
+      {&pad.thickness_mm, PAD_THICKNESS_MIN_mm, PAD_THICKNESS_MAX_mm},
+      {&pad.overhang_mm, 0.0f, PAD_OVERHANG_MAX_mm},
+      {&pad.normal[0].share, PAD_SHARE_MIN, PAD_SHARE_MAX},
+      {&pad.normal[0].sd_mm, PAD_SD_MIN_mm, pad.normal[1].sd_mm},
+      {&pad.normal[1].share, PAD_SHARE_MIN, PAD_SHARE_MAX},
+      {&pad.normal[1].sd_mm, pad.normal[0].sd_mm, PAD_SD_MAX_mm},
+      {&pad.tangential[0].moment_mm, PAD_MOMENT_MIN_mm, PAD_MOMENT_MAX_mm},
+      {&pad.tangential[0].sd_mm, PAD_SD_MIN_mm, pad.tangential[1].sd_mm},
+      {&pad.tangential[1].moment_mm, PAD_MOMENT_MIN_mm, PAD_MOMENT_MAX_mm},
+      {&pad.tangential[1].sd_mm, pad.tangential[0].sd_mm, pad.tangential[2].sd_mm},
+      {&pad.tangential[2].moment_mm, PAD_MOMENT_MIN_mm, PAD_MOMENT_MAX_mm},
+      {&pad.tangential[2].sd_mm, pad.tangential[1].sd_mm, PAD_SD_MAX_mm},
+      {&pad.spread_mm2, 0.0f, PAD_SPREAD_MAX_mm2},
+      {&pad.spread_sd_mm2, PAD_SPREAD_SD_MIN_mm2, PAD_SPREAD_SD_MAX_mm2},
+      {&pad.force_ratio, PAD_FORCE_RATIO_MIN, PAD_FORCE_RATIO_MAX},
+      {&pad.tangential_scale, PAD_TANGENTIAL_SCALE_MIN, PAD_TANGENTIAL_SCALE_MAX},
+      {&pad.tangential_scale_sd, 0.0f, PAD_TANGENTIAL_SCALE_SD_MAX},
+  };
+  TEST_ASSERT_EQUAL_size_t(PAD_PROFILE_FLOATS, sizeof ranges / sizeof ranges[0]);
+  for (size_t i = 0; i < sizeof ranges / sizeof ranges[0]; i++) {
+    const float was = *ranges[i].value;
+    const float good[] = {ranges[i].least, ranges[i].greatest};
+    const float bad[] = {ranges[i].least - 1e-3f, ranges[i].greatest * 1.001f, -INFINITY, INFINITY,
+                         NAN};
+    for (size_t j = 0; j < sizeof good / sizeof good[0]; j++) {
+      *ranges[i].value = good[j];
+      TEST_ASSERT_TRUE(pad_profile_is_valid(&pad));
+    }
+    for (size_t j = 0; j < sizeof bad / sizeof bad[0]; j++) {
+      *ranges[i].value = bad[j];
+      TEST_ASSERT_FALSE(pad_profile_is_valid(&pad));
+    }
+    *ranges[i].value = was;
+  }
+  for (int from_touch = 0; from_touch < 256; from_touch++) {
+    pad.from_touch = (uint8_t)from_touch;
+    TEST_ASSERT_EQUAL(from_touch <= 1, pad_profile_is_valid(&pad));
+  }
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_crc_check_value);
@@ -130,5 +179,6 @@ int main(void) {
   RUN_TEST(test_bytes_are_little_endian);
   RUN_TEST(test_bytes_round_trip_at_every_alignment);
   RUN_TEST(test_floats_travel_by_their_bits);
+  RUN_TEST(test_pad_profiles_are_in_their_ranges);
   return UNITY_END();
 }

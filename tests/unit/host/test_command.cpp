@@ -3,6 +3,7 @@
 #include "libfingertip/names.hpp"
 #include "libfingertip/text.hpp"
 #include "support/host_packets.hpp"
+#include "support/pad.h"
 
 #include <gtest/gtest.h>
 
@@ -34,6 +35,11 @@ TEST(Command, CarriesItsValue) {
   EXPECT_EQ(prior.body.cmd_prior.width_mm, 0.4f);
   EXPECT_EQ(decoded(command_location_limit(0.8f)).body.cmd_location_limit.limit_mm, 0.8f);
   EXPECT_EQ(decoded(command_erase_calibration()).type, WIRE_CMD_ERASE_CALIBRATION);
+  pad_profile pad = pad_of_12_mm();
+  EXPECT_EQ(decoded(command_pad(pad)).body.cmd_pad.profile.tangential[2].sd_mm, 20.39f);
+  pad.force_ratio = 3;
+  EXPECT_THROW(command_pad(pad), Error);
+  EXPECT_EQ(decoded(command_erase_pad()).type, WIRE_CMD_ERASE_PAD);
   wire_packet calibrate = decoded(command_calibrate(test::make_calibration(), 15));
   EXPECT_EQ(calibrate.body.cmd_calibrate.sensor_count, 15);
   EXPECT_EQ(calibrate.body.cmd_calibrate.calibration.sensors[14].gain,
@@ -110,7 +116,9 @@ TEST(Names, StreamsBothWays) {
 TEST(Names, EveryFlagBitHasAName) {
   EXPECT_EQ(flags_text(0), "");
   EXPECT_EQ(flags_text(CONTACT_FLAG_CONTACT | CONTACT_FLAG_SLIP), "CONTACT SLIP");
-  EXPECT_EQ(flags_text(1u << 20 | 1u << 31), "bit20 bit31");
+  EXPECT_EQ(flags_text(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_SLIDING),
+            "TANGENTIAL_VALID SLIDING");
+  EXPECT_EQ(flags_text(1u << 25 | 1u << 31), "bit25 bit31");
 }
 
 TEST(Text, NumbersReadBackTheSame) {

@@ -3,6 +3,7 @@
 #include "libfingertip/packet_file.hpp"
 #include "libfingertip/recording.hpp"
 #include "support/host_packets.hpp"
+#include "support/pad.h"
 
 #include <algorithm>
 #include <csignal>
@@ -244,6 +245,67 @@ TEST(Recording, TheCalibrationIsKeptWithItsChanges) {
   EXPECT_NE(contents(folder / "r.csv").find("\n# gains: 0.86 0.88 "), std::string::npos);
 }
 
+TEST(Recording, ThePadIsKeptWithItsChanges) {
+  test::TemporaryFolder folder;
+  wire_packet known = test::make_info(1, 2);
+  known.body.info.stored = WIRE_STORED_PAD;
+  known.body.info.pad = pad_of_12_mm();
+  wire_packet anew = known, erased = test::make_info(5, 6);
+  anew.body.info.pad.tangential[1].moment_mm = 4.125f;
+  anew.body.info.pad.from_touch = 1;
+  std::vector<wire_packet> packets = {known, test::make_contact(2, 3, 1), anew, erased, anew};
+  record(folder / "r.csv", packets);
+  EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(packets));
+  EXPECT_NE(contents(folder / "r.csv").find("\n# pad_moment_sds_mm: 4.8537 7.9913 20.39\n"),
+            std::string::npos);
+  std::string four = contents(folder / "r.csv");
+  four.insert(four.find("\n# pad_moment_sds_mm: ") + 21, " 3.5");
+  write(folder / "four.csv", four);
+  EXPECT_NE(error_of(folder / "four.csv").find("too many values"), std::string::npos);
+}
+
+/* Without the columns of the tangential load, as they were written before there was one. */
+TEST(Recording, EarlierOnesAreRead) {
+  test::TemporaryFolder folder;
+  record(folder / "r.csv", all_kinds());
+  std::istringstream lines(contents(folder / "r.csv"));
+  std::string text;
+  std::size_t first = 0, columns = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line[0] != '#') {
+      std::vector<std::string> cells;
+      std::string cell;
+      std::istringstream row(line + ",");
+      while (std::getline(row, cell, ',')) {
+        cells.push_back(cell);
+      }
+      if (first == 0) {
+        auto at = [&](const char *name) { return std::find(cells.begin(), cells.end(), name); };
+        first = static_cast<std::size_t>(at("qx_N") - cells.begin());
+        columns = static_cast<std::size_t>(at("vy_mm_s") - at("qx_N")) + 1;
+      }
+      cells.erase(cells.begin() + static_cast<std::ptrdiff_t>(first),
+                  cells.begin() + static_cast<std::ptrdiff_t>(first + columns));
+      line.clear();
+      for (const std::string &each : cells) {
+        line += (line.empty() ? "" : ",") + each;
+      }
+    }
+    text += line + "\n";
+  }
+  EXPECT_EQ(columns, 6u);
+  write(folder / "earlier.csv", text);
+  std::vector<wire_packet> expected = all_kinds();
+  for (wire_packet &packet : expected) {
+    if (packet.type == WIRE_CONTACT) {
+      wire_contact &contact = packet.body.contact;
+      contact.qx_N = contact.qy_N = contact.q_sd_N = contact.tangential_ratio = 0;
+      contact.vx_mm_s = contact.vy_mm_s = 0;
+    }
+  }
+  EXPECT_EQ(frames_of(read_all(folder / "earlier.csv")), frames_of(expected));
+}
+
 TEST(Recording, AKilledRecorderLosesAtMostTheLastFrame) {
   test::TemporaryFolder folder;
   record(folder / "r.csv", all_kinds(), false);
@@ -365,8 +427,8 @@ TEST(Recording, WithoutAFitItsCellsAreEmptyAndNothingIsLost) {
   std::vector<wire_packet> packets = {none, fitted, odd};
   record(folder / "r.csv", packets);
   std::string text = contents(folder / "r.csv");
-  EXPECT_NE(text.find("\n1000,1,1,32,0,,,,,,,,,,,,,0,0,0,0,0,0,0,"), std::string::npos) << text;
-  EXPECT_NE(text.find("\n2000,2,2,167,32767,0,-3.3333333,41234.566,5.7000003,1e-07,,12.5,"),
+  EXPECT_NE(text.find("\n1000,1,1,32,0,,,,,,,,,,,,,0,0,0,0,0,0,0,,,,,,,"), std::string::npos) << text;
+  EXPECT_NE(text.find("\n2000,2,2,5243047,32767,0,-3.3333333,41234.566,5.7000003,1e-07,,12.5,"),
             std::string::npos)
       << text;
   EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(packets));
@@ -380,7 +442,7 @@ TEST(Recording, PressuresWithoutSensorsAreDamage) {
   test::TemporaryFolder folder;
   { RecordingWriter(folder / "r.csv", false, nullptr, 0, {}, false, AT_ONCE); }
   std::ofstream(folder / "r.csv", std::ios::app)
-      << "1000,1" << std::string(22, ',') << ",7,0,0,0,0,20.00\n";
+      << "1000,1" << std::string(28, ',') << ",7,0,0,0,0,20.00\n";
   EXPECT_NE(error_of(folder / "r.csv").find("pressures in a recording without sensors"),
             std::string::npos)
       << error_of(folder / "r.csv");

@@ -3,12 +3,14 @@
 #include "common/crc32.h"
 #include "native/native_flash.h"
 #include "store/store.h"
+#include "support/pad.h"
 #include "support/random.h"
 
 #include <string.h>
 #include <unity.h>
 
-enum { SENSORS = 15, UPDATES = 10000 };
+/* PROFILE_BYTES: without the struct's padding. */
+enum { SENSORS = 15, UPDATES = 10000, PROFILE_BYTES = 4 * PAD_PROFILE_FLOATS + 1 };
 
 static struct store store;
 static struct random random;
@@ -45,19 +47,31 @@ static struct store_settings some_settings(void) {
                                  .location_limit_mm = (float)random_between(&random, 0.1, 2.0)};
 }
 
+static struct pad_profile some_profile(void) {
+  struct pad_profile profile = pad_of_12_mm();
+  profile.thickness_mm = (float)random_between(&random, 6.0, 15.0);
+  profile.tangential[2].sd_mm = (float)random_between(&random, 10.0, 30.0);
+  profile.tangential_scale_sd = (float)random_between(&random, 0.0, 0.5);
+  profile.from_touch = (uint8_t)random_below(&random, 2);
+  return profile;
+}
+
 /* A change of what is kept. */
 struct change {
-  enum { CALIBRATE, ERASE_CALIBRATION, KEEP, FORGET } kind;
+  enum { CALIBRATE, ERASE_CALIBRATION, PAD, ERASE_PAD, KEEP, FORGET } kind;
   struct calibration calibration;
   struct store_settings settings;
+  struct pad_profile profile;
 };
 
 static struct change some_change(void) {
   static const int kinds[] = {CALIBRATE, CALIBRATE, CALIBRATE, ERASE_CALIBRATION,
-                              KEEP,      KEEP,      KEEP,      FORGET};
-  struct change change = {.kind = kinds[random_below(&random, 8)]};
+                              KEEP,      KEEP,      KEEP,      FORGET,
+                              PAD,       PAD,       PAD,       ERASE_PAD};
+  struct change change = {.kind = kinds[random_below(&random, sizeof kinds / sizeof kinds[0])]};
   change.calibration = some_calibration();
   change.settings = some_settings();
+  change.profile = some_profile();
   return change;
 }
 
@@ -65,12 +79,18 @@ static struct store_content changed(const struct store_content *before,
                                     const struct change *change) {
   static const struct calibration no_calibration;
   static const struct store_settings no_settings;
+  static const struct pad_profile no_profile;
   struct store_content after = *before;
   switch (change->kind) {
   case CALIBRATE:
   case ERASE_CALIBRATION:
     after.has_calibration = change->kind == CALIBRATE;
     after.calibration = after.has_calibration ? change->calibration : no_calibration;
+    break;
+  case PAD:
+  case ERASE_PAD:
+    after.has_profile = change->kind == PAD;
+    after.profile = after.has_profile ? change->profile : no_profile;
     break;
   default:
     after.has_settings = change->kind == KEEP;
@@ -83,9 +103,11 @@ static struct store_content changed(const struct store_content *before,
 static bool is(const struct store_content *expected) {
   return store.content.has_calibration == expected->has_calibration &&
          store.content.has_settings == expected->has_settings &&
+         store.content.has_profile == expected->has_profile &&
          memcmp(&store.content.calibration, &expected->calibration, sizeof expected->calibration) ==
              0 &&
-         memcmp(&store.content.settings, &expected->settings, sizeof expected->settings) == 0;
+         memcmp(&store.content.settings, &expected->settings, sizeof expected->settings) == 0 &&
+         memcmp(&store.content.profile, &expected->profile, PROFILE_BYTES) == 0;
 }
 
 static enum ft_status put(const struct change *change) {
@@ -94,6 +116,10 @@ static enum ft_status put(const struct change *change) {
     return store_put_calibration(&store, &change->calibration);
   case ERASE_CALIBRATION:
     return store_put_calibration(&store, NULL);
+  case PAD:
+    return store_put_profile(&store, &change->profile);
+  case ERASE_PAD:
+    return store_put_profile(&store, NULL);
   case KEEP:
     return store_put_settings(&store, &change->settings);
   default:
@@ -120,9 +146,11 @@ static void restart(void) {
 
 static void a_new_fingertip_keeps_nothing(void) {
   TEST_ASSERT_FALSE(store.content.has_calibration || store.content.has_settings);
+  TEST_ASSERT_FALSE(store.content.has_profile);
   TEST_ASSERT_FALSE(store.damaged || store_is_writing(&store));
   TEST_ASSERT_EQUAL(FT_OK, store_put_calibration(&store, NULL));
   TEST_ASSERT_EQUAL(FT_OK, store_put_settings(&store, NULL));
+  TEST_ASSERT_EQUAL(FT_OK, store_put_profile(&store, NULL));
   TEST_ASSERT_EQUAL(0, native_flash_steps());
 }
 
@@ -239,9 +267,13 @@ static void power_may_come_and_go(void) {
 }
 
 static struct store_content keep_something(void) {
-  struct store_content content = {.has_calibration = true, .has_settings = true};
+  struct store_content content = {
+      .has_calibration = true, .has_settings = true, .has_profile = true};
   content.calibration = some_calibration();
   content.settings = some_settings();
+  content.profile = some_profile();
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&store, &content.profile));
+  TEST_ASSERT_EQUAL(FT_OK, finish());
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &content.calibration));
   TEST_ASSERT_EQUAL(FT_OK, finish());
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, &content.settings));
@@ -249,13 +281,13 @@ static struct store_content keep_something(void) {
   return content;
 }
 
-/* The newest record, the second one, is damaged: the one before it is not what the user has stored
+/* The newest record, the third one, is damaged: the one before it is not what the user has stored
  * last, so it is not used in its place. */
 static void damage_is_told_and_nothing_is_used(void) {
   static const struct store_content nothing;
   keep_something();
   const struct native_flash whole = native_flash;
-  for (uint32_t at = STORE_SLOT_BYTES + 8; at < STORE_SLOT_BYTES + 180; at++) {
+  for (uint32_t at = 2 * STORE_SLOT_BYTES + 8; at < 2 * STORE_SLOT_BYTES + 249; at++) {
     native_flash = whole;
     native_flash.bytes[at] ^= (uint8_t)(1u << at % 8);
     const struct native_flash damaged = native_flash;
@@ -276,7 +308,7 @@ static void damage_is_told_and_nothing_is_used(void) {
 
 static void forgetting_mends_damage(void) {
   keep_something();
-  native_flash.bytes[STORE_SLOT_BYTES + 100] ^= 1;
+  native_flash.bytes[2 * STORE_SLOT_BYTES + 100] ^= 1;
   restart();
   TEST_ASSERT_TRUE(store.damaged);
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, NULL));
@@ -302,12 +334,13 @@ static void what_another_firmware_wrote_is_left_alone(void) {
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &calibration));
   TEST_ASSERT_EQUAL(FT_OK, finish());
   const struct native_flash ours = native_flash;
-  alter_record(8, 1); /* as it was: the bytes are where the header says */
+  alter_record(8, 2); /* as it was: the bytes are where the header says */
   TEST_ASSERT_EQUAL_MEMORY(&ours, &native_flash, sizeof ours);
   static const struct {
     uint32_t at;
     uint16_t value;
-  } others[] = {{8, 2}, {8, UINT16_MAX}, {20, 14 << 8 | 1}, {10, 60}, {10, 487}, {32, 0x42C8}};
+  } others[] = {{8, 1},   {8, 3},    {8, UINT16_MAX}, {20, 14 << 8 | 1},
+                {10, 60}, {10, 487}, {10, 162},       {32, 0x42C8}};
   for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
     native_flash = ours;
     alter_record(others[i].at, others[i].value);
@@ -318,6 +351,53 @@ static void what_another_firmware_wrote_is_left_alone(void) {
     TEST_ASSERT_EQUAL(FT_OK, finish());
     TEST_ASSERT_EQUAL_MEMORY_MESSAGE(&other, &native_flash, sizeof other, "reading wrote");
   }
+}
+
+/* As the firmware before pad profiles wrote it: without their bytes, whatever bit 2 of the parts
+ * said. The next write brings it to this version. */
+static void records_of_version_1_are_read(void) {
+  struct store_content kept = keep_something();
+  native_flash_reset(7);
+  store_init(&store, SENSORS);
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &kept.calibration));
+  TEST_ASSERT_EQUAL(FT_OK, finish());
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, &kept.settings));
+  TEST_ASSERT_EQUAL(FT_OK, finish());
+  memcpy(native_flash.bytes, native_flash.bytes + STORE_SLOT_BYTES, STORE_SLOT_BYTES);
+  memset(native_flash.bytes + STORE_SLOT_BYTES, 0xFF, STORE_SLOT_BYTES);
+  enum { LENGTH_1 = 4 + 14 + 8 * SENSORS + 24 };
+  memset(native_flash.bytes + 20 + LENGTH_1, 0xFF, 69);
+  alter_record(8, 1);
+  alter_record(10, LENGTH_1);
+  kept.has_profile = false;
+  memset(&kept.profile, 0, sizeof kept.profile);
+  for (int parts = 3; parts < 8; parts += 4) {
+    alter_record(20, (uint16_t)(SENSORS << 8 | parts));
+    restart();
+    TEST_ASSERT_FALSE(store.damaged || store_is_writing(&store));
+    TEST_ASSERT_TRUE(is(&kept));
+  }
+  kept.has_profile = true;
+  kept.profile = some_profile();
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&store, &kept.profile));
+  TEST_ASSERT_EQUAL(FT_OK, finish());
+  restart();
+  TEST_ASSERT_TRUE(is(&kept));
+}
+
+/* Whole by its CRC, but no profile: nothing of the record is used. */
+static void a_profile_out_of_range_is_damage(void) {
+  static const struct store_content nothing;
+  struct pad_profile profile = some_profile();
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&store, &profile));
+  TEST_ASSERT_EQUAL(FT_OK, finish());
+  const uint32_t thickness_at = 20 + 4 + 14 + 8 * SENSORS + 24;
+  TEST_ASSERT_EQUAL_HEX32(bytes_from_f32(profile.thickness_mm),
+                          bytes_get_u32(native_flash.bytes + thickness_at));
+  alter_record(thickness_at + 2, 0x42C8); /* 100 mm */
+  restart();
+  TEST_ASSERT_TRUE(store.damaged);
+  TEST_ASSERT_TRUE(is(&nothing));
 }
 
 /* Sectors that something else has used before. */
@@ -373,13 +453,17 @@ static void the_largest_array_fits(void) {
   for (int k = SENSORS; k < FT_MAX_SENSORS; k++) {
     calibration.sensors[k] = (struct sensor_calibration){1.0f + 0.001f * (float)k, 0.01f};
   }
+  const struct pad_profile profile = some_profile();
   for (int i = 0; i < 20; i++) {
     calibration.date_s++;
+    TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&store, &profile));
+    TEST_ASSERT_EQUAL(FT_OK, finish());
     TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &calibration));
     TEST_ASSERT_EQUAL(FT_OK, finish());
     native_flash_power_up();
     store_init(&store, FT_MAX_SENSORS);
     TEST_ASSERT_EQUAL_MEMORY(&calibration, &store.content.calibration, sizeof calibration);
+    TEST_ASSERT_EQUAL_MEMORY(&profile, &store.content.profile, PROFILE_BYTES);
   }
 }
 
@@ -390,6 +474,8 @@ int main(void) {
   RUN_TEST(damage_is_told_and_nothing_is_used);
   RUN_TEST(forgetting_mends_damage);
   RUN_TEST(what_another_firmware_wrote_is_left_alone);
+  RUN_TEST(records_of_version_1_are_read);
+  RUN_TEST(a_profile_out_of_range_is_damage);
   RUN_TEST(rubbish_is_no_damage_and_in_nobodys_way);
   RUN_TEST(a_flash_that_has_worn_out_is_told_and_what_was_stays);
   RUN_TEST(a_flash_that_does_not_answer_is_not_waited_for);

@@ -13,7 +13,10 @@ static size_t body_length(const struct wire_packet *packet) {
     uint32_t flags = packet->body.contact.flags;
     return 22u + (flags & CONTACT_FLAG_FIT_VALID ? 28 : 0) +
            (flags & CONTACT_FLAG_UNCERTAINTY_VALID ? 8 : 0) +
-           (flags & CONTACT_FLAG_SLIP_VALID ? 4 : 0) + (flags & CONTACT_FLAG_WIDTHS_VALID ? 12 : 0);
+           (flags & CONTACT_FLAG_SLIP_VALID ? 4 : 0) +
+           (flags & CONTACT_FLAG_WIDTHS_VALID ? 12 : 0) +
+           (flags & CONTACT_FLAG_TANGENTIAL_VALID ? 16 : 0) +
+           (flags & CONTACT_FLAG_VELOCITY_VALID ? 8 : 0);
   }
   case WIRE_RAW:
     return 23 + 8u * packet->body.raw.sensor_count;
@@ -21,7 +24,8 @@ static size_t body_length(const struct wire_packet *packet) {
     const struct wire_info *info = &packet->body.info;
     return 93u + (info->capabilities & WIRE_CAPABILITY_FIT ? 13 : 0) +
            (info->capabilities & WIRE_CAPABILITY_SLIP ? 6 : 0) + 8u * info->sensor_count +
-           (info->stored & WIRE_STORED_CALIBRATION ? 14 + 8u * info->sensor_count : 0);
+           (info->stored & WIRE_STORED_CALIBRATION ? 14 + 8u * info->sensor_count : 0) +
+           (info->stored & WIRE_STORED_PAD ? 69 : 0);
   }
   case WIRE_HEALTH:
     return 72u + (packet->body.health.capabilities & WIRE_CAPABILITY_FIT ? 4 : 0);
@@ -39,6 +43,8 @@ static size_t body_length(const struct wire_packet *packet) {
     return 8;
   case WIRE_CMD_CALIBRATE:
     return 15 + 8u * packet->body.cmd_calibrate.sensor_count;
+  case WIRE_CMD_PAD:
+    return 69;
   case WIRE_CMD_OSR:
     return 2;
   case WIRE_CMD_SLIP:
@@ -98,17 +104,17 @@ static void test_quantities_travel_under_their_flags(void) {
   static const struct {
     uint32_t flag;
     size_t length;
-  } parts[] = {{CONTACT_FLAG_FIT_VALID, 28},
-               {CONTACT_FLAG_UNCERTAINTY_VALID, 8},
-               {CONTACT_FLAG_SLIP_VALID, 4},
-               {CONTACT_FLAG_WIDTHS_VALID, 12}};
-  for (unsigned present = 0; present < 16; present++) {
+  } parts[] = {{CONTACT_FLAG_FIT_VALID, 28},        {CONTACT_FLAG_UNCERTAINTY_VALID, 8},
+               {CONTACT_FLAG_SLIP_VALID, 4},        {CONTACT_FLAG_WIDTHS_VALID, 12},
+               {CONTACT_FLAG_TANGENTIAL_VALID, 16}, {CONTACT_FLAG_VELOCITY_VALID, 8}};
+  enum { PARTS = sizeof parts / sizeof parts[0] };
+  for (unsigned present = 0; present < 1u << PARTS; present++) {
     struct sampler sampler = {SAMPLE_GREATEST, {12}};
     struct wire_packet packet;
     sample_packet(&sampler, WIRE_CONTACT, &packet);
     packet.body.contact.flags = 0;
     size_t expected = 22;
-    for (unsigned i = 0; i < 4; i++) {
+    for (unsigned i = 0; i < PARTS; i++) {
       if (present >> i & 1) {
         packet.body.contact.flags |= parts[i].flag;
         expected += parts[i].length;
@@ -132,23 +138,38 @@ static void test_quantities_travel_under_their_flags(void) {
     TEST_ASSERT_EQUAL_FLOAT(widths, contact->sigma_x_mm);
     TEST_ASSERT_EQUAL_FLOAT(widths, contact->sigma_y_mm);
     TEST_ASSERT_EQUAL_FLOAT(widths, contact->width_correlation);
+    float tangential = present & 16 ? FLT_MAX : 0, velocity = present & 32 ? FLT_MAX : 0;
+    TEST_ASSERT_EQUAL_FLOAT(tangential, contact->qx_N);
+    TEST_ASSERT_EQUAL_FLOAT(tangential, contact->qy_N);
+    TEST_ASSERT_EQUAL_FLOAT(tangential, contact->q_sd_N);
+    TEST_ASSERT_EQUAL_FLOAT(tangential, contact->tangential_ratio);
+    TEST_ASSERT_EQUAL_FLOAT(velocity, contact->vx_mm_s);
+    TEST_ASSERT_EQUAL_FLOAT(velocity, contact->vy_mm_s);
     TEST_ASSERT_EQUAL_UINT16(UINT16_MAX, contact->stages.total_us);
   }
 }
 
 /* What a device decodes: its commands, and nothing that itself sends. */
 static void test_sets_of_commands(void) {
+  static const struct wire_layout *const always[] = {WIRE_COMMANDS, NULL},
+                                         *const of_fit[] = {WIRE_COMMANDS_OF_FIT, NULL},
+                                         *const of_slip[] = {WIRE_COMMANDS_OF_SLIP, NULL},
+                                         *const of_tangential[] = {WIRE_COMMANDS_OF_TANGENTIAL,
+                                                                   NULL};
   for (size_t i = 0; i < WIRE_TYPES; i++) {
-    bool command = wire_types[i] >= 0x80;
-    bool slip = wire_types[i] == WIRE_CMD_SLIP;
-    bool fit = wire_types[i] == WIRE_CMD_CALIBRATE || wire_types[i] == WIRE_CMD_ERASE_CALIBRATION ||
-               wire_types[i] == WIRE_CMD_PRIOR || wire_types[i] == WIRE_CMD_LOCATION_LIMIT;
-    TEST_ASSERT_NOT_NULL(wire_find_layout(wire_all_layouts, wire_types[i]));
-    TEST_ASSERT_EQUAL(command, wire_find_layout(wire_commands, wire_types[i]) != NULL);
-    TEST_ASSERT_EQUAL(command && !slip,
-                      wire_find_layout(wire_commands_without_slip, wire_types[i]) != NULL);
-    TEST_ASSERT_EQUAL(command && !slip && !fit,
-                      wire_find_layout(wire_commands_without_fit, wire_types[i]) != NULL);
+    uint8_t type = wire_types[i];
+    bool command = type >= 0x80;
+    bool slip = type == WIRE_CMD_SLIP;
+    bool fit = type == WIRE_CMD_CALIBRATE || type == WIRE_CMD_ERASE_CALIBRATION ||
+               type == WIRE_CMD_PRIOR || type == WIRE_CMD_LOCATION_LIMIT;
+    bool tangential = type == WIRE_CMD_PAD || type == WIRE_CMD_ERASE_PAD;
+    TEST_ASSERT_NOT_NULL(wire_find_layout(wire_all_layouts, type));
+    TEST_ASSERT_EQUAL(command, wire_find_layout(wire_commands, type) != NULL);
+    TEST_ASSERT_EQUAL(fit, wire_find_layout(of_fit, type) != NULL);
+    TEST_ASSERT_EQUAL(slip, wire_find_layout(of_slip, type) != NULL);
+    TEST_ASSERT_EQUAL(tangential, wire_find_layout(of_tangential, type) != NULL);
+    TEST_ASSERT_EQUAL(command && !fit && !slip && !tangential,
+                      wire_find_layout(always, type) != NULL);
   }
   struct sampler sampler = {SAMPLE_RANDOM, {12}};
   struct wire_packet packet, decoded;
@@ -156,8 +177,7 @@ static void test_sets_of_commands(void) {
   uint8_t frame[WIRE_MAX_FRAME_BYTES];
   size_t length = 0;
   TEST_ASSERT_EQUAL_INT(FT_OK, encode(&packet, frame, &length));
-  TEST_ASSERT_EQUAL_INT(FT_ERR_TYPE,
-                        wire_decode(wire_commands_without_slip, frame, length - 1, &decoded));
+  TEST_ASSERT_EQUAL_INT(FT_ERR_TYPE, wire_decode(of_fit, frame, length - 1, &decoded));
   TEST_ASSERT_EQUAL_HEX8(WIRE_CMD_SLIP, decoded.type);
   TEST_ASSERT_EQUAL_UINT16(packet.sequence, decoded.sequence);
 }
@@ -196,15 +216,36 @@ static void assert_calibration_guarded(uint8_t type, size_t body_offset,
   }
 }
 
+static void assert_pad_guarded(uint8_t type, size_t body_offset, struct pad_profile *pad,
+                               struct wire_packet *packet) {
+  for (size_t i = 0; i < PAD_PROFILE_FLOATS; i++) {
+    assert_float_guarded(type, body_offset + 4 * i, (float *)(void *)pad + i, packet);
+  }
+}
+
+/* PROTOCOL.md says how long a frame may be. */
+static void test_the_longest_frame_is_as_documented(void) {
+  TEST_ASSERT_EQUAL(727, WIRE_MAX_FRAME_BYTES);
+  struct sampler sampler = {SAMPLE_GREATEST, {16}};
+  struct wire_packet packet;
+  sample_packet(&sampler, WIRE_INFO, &packet);
+  TEST_ASSERT_EQUAL_size_t(WIRE_MAX_BODY_BYTES, body_length(&packet));
+}
+
 static void test_infinity_and_nan_are_refused_both_ways(void) {
   struct sampler sampler = {SAMPLE_GREATEST, {13}};
   struct wire_packet packet;
   sample_packet(&sampler, WIRE_CONTACT, &packet);
   struct wire_contact *contact = &packet.body.contact;
-  float *fields[] = {&contact->x_mm,           &contact->y_mm,       &contact->p0_Pa,
-                     &contact->sigma_mm,       &contact->force_N,    &contact->residual_rms_Pa,
-                     &contact->location_sd_mm, &contact->force_sd_N, &contact->slip_mm,
-                     &contact->sigma_x_mm,     &contact->sigma_y_mm, &contact->width_correlation};
+  float *fields[] = {&contact->x_mm,           &contact->y_mm,
+                     &contact->p0_Pa,          &contact->sigma_mm,
+                     &contact->force_N,        &contact->residual_rms_Pa,
+                     &contact->location_sd_mm, &contact->force_sd_N,
+                     &contact->slip_mm,        &contact->sigma_x_mm,
+                     &contact->sigma_y_mm,     &contact->width_correlation,
+                     &contact->qx_N,           &contact->qy_N,
+                     &contact->q_sd_N,         &contact->tangential_ratio,
+                     &contact->vx_mm_s,        &contact->vy_mm_s};
   for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
     assert_float_guarded(WIRE_CONTACT, 26 + 4 * i, fields[i], &packet);
   }
@@ -221,6 +262,7 @@ static void test_infinity_and_nan_are_refused_both_ways(void) {
     assert_float_guarded(WIRE_INFO, 352 + 4 * i, settings[i], &packet);
   }
   assert_calibration_guarded(WIRE_INFO, 368, &info->calibration, &packet);
+  assert_pad_guarded(WIRE_INFO, 638, &info->pad, &packet);
   sample_packet(&sampler, WIRE_CMD_CALIBRATE, &packet);
   assert_calibration_guarded(WIRE_CMD_CALIBRATE, 1, &packet.body.cmd_calibrate.calibration,
                              &packet);
@@ -230,6 +272,8 @@ static void test_infinity_and_nan_are_refused_both_ways(void) {
   sample_packet(&sampler, WIRE_CMD_LOCATION_LIMIT, &packet);
   assert_float_guarded(WIRE_CMD_LOCATION_LIMIT, 0, &packet.body.cmd_location_limit.limit_mm,
                        &packet);
+  sample_packet(&sampler, WIRE_CMD_PAD, &packet);
+  assert_pad_guarded(WIRE_CMD_PAD, 0, &packet.body.cmd_pad.profile, &packet);
   sample_packet(&sampler, WIRE_CMD_SLIP, &packet);
   assert_float_guarded(WIRE_CMD_SLIP, 0, &packet.body.cmd_slip.threshold_mm, &packet);
 }
@@ -422,6 +466,7 @@ int main(void) {
   RUN_TEST(test_round_trip_of_every_type);
   RUN_TEST(test_quantities_travel_under_their_flags);
   RUN_TEST(test_sets_of_commands);
+  RUN_TEST(test_the_longest_frame_is_as_documented);
   RUN_TEST(test_infinity_and_nan_are_refused_both_ways);
   RUN_TEST(test_sensor_counts_outside_their_range_are_refused_both_ways);
   RUN_TEST(test_text_is_printable);

@@ -87,7 +87,9 @@ static void test_contact(void) {
       .frame = 70000,
       .flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
                CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED | CONTACT_FLAG_LOW_SIGNAL |
-               CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_CALIBRATED,
+               CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_CALIBRATED |
+               CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH |
+               CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_MOVING,
       .sensors_used = 0x7FEF,
       .x_mm = -4.5f,
       .y_mm = 12.25f,
@@ -101,11 +103,23 @@ static void test_contact(void) {
       .sigma_x_mm = 5.75f,
       .sigma_y_mm = 5.5f,
       .width_correlation = -0.125f,
+      .qx_N = -0.4375f,
+      .qy_N = 0.1875f,
+      .q_sd_N = 0.03125f,
+      .tangential_ratio = 0.3125f,
+      .vx_mm_s = -17.5f,
+      .vy_mm_s = 2.25f,
       .stages = {2300, 3001, 12, 34, 2760, 56, 8163},
   };
-  check("contact.txt", &packet);
+  check("contact_grasp.txt", &packet);
 
   struct wire_contact *contact = &packet.body.contact;
+  contact->flags &= ~(uint32_t)(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH |
+                                CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_MOVING);
+  contact->qx_N = contact->qy_N = contact->q_sd_N = contact->tangential_ratio = 0.0f;
+  contact->vx_mm_s = contact->vy_mm_s = 0.0f;
+  check("contact.txt", &packet);
+
   contact->flags &=
       ~(uint32_t)(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_CALIBRATED);
   contact->slip_mm = 0.0f;
@@ -146,6 +160,22 @@ static struct calibration calibration_of_two(void) {
   };
 }
 
+/* Every value has its own. */
+static struct pad_profile some_pad(void) {
+  return (struct pad_profile){
+      .thickness_mm = 12.0f,
+      .overhang_mm = 9.0f,
+      .normal = {{0.09375f, 3.5f}, {0.8125f, 5.75f}},
+      .tangential = {{1.125f, 4.875f}, {4.0f, 8.0f}, {5.5f, 20.375f}},
+      .spread_mm2 = 4.25f,
+      .spread_sd_mm2 = 6.0f,
+      .force_ratio = 0.9375f,
+      .tangential_scale = 1.0625f,
+      .tangential_scale_sd = 0.03125f,
+      .from_touch = 1,
+  };
+}
+
 static void test_info(void) {
   struct wire_packet packet = blank(0x03, 7, 1000000);
   struct wire_info *info = &packet.body.info;
@@ -175,6 +205,13 @@ static void test_info(void) {
   info->stored = WIRE_STORED_CALIBRATION | WIRE_STORED_SETTINGS;
   info->calibration = calibration_of_two();
   check("info.txt", &packet);
+
+  memcpy(info->scene, "grasp", 5);
+  info->capabilities |= WIRE_CAPABILITY_TANGENTIAL;
+  info->stored |= WIRE_STORED_PAD;
+  info->pad = some_pad();
+  check("info_grasp.txt", &packet);
+  memset(&info->pad, 0, sizeof info->pad);
 
   memcpy(info->scene, "press", 5);
   info->capabilities = WIRE_CAPABILITY_FIT;
@@ -274,6 +311,11 @@ static void test_commands(void) {
   packet = blank(0x8C, 11, 110);
   packet.body.cmd_location_limit.limit_mm = 0.625f;
   check("command_location_limit.txt", &packet);
+  packet = blank(0x8D, 12, 120);
+  packet.body.cmd_pad.profile = some_pad();
+  check("command_pad.txt", &packet);
+  packet = blank(0x8E, 13, 130);
+  check("command_erase_pad.txt", &packet);
 }
 
 int main(void) {

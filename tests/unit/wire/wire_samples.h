@@ -17,7 +17,8 @@ static const uint8_t wire_types[] = {
     WIRE_CMD_TARE,   WIRE_CMD_RATE,      WIRE_CMD_OSR,
     WIRE_CMD_SLIP,   WIRE_CMD_INFO,      WIRE_CMD_HEALTH,
     WIRE_CMD_LOADER, WIRE_CMD_CALIBRATE, WIRE_CMD_ERASE_CALIBRATION,
-    WIRE_CMD_KEEP,   WIRE_CMD_PRIOR,     WIRE_CMD_LOCATION_LIMIT};
+    WIRE_CMD_KEEP,   WIRE_CMD_PRIOR,     WIRE_CMD_LOCATION_LIMIT,
+    WIRE_CMD_PAD,    WIRE_CMD_ERASE_PAD};
 enum { WIRE_TYPES = sizeof wire_types };
 
 enum sample_kind { SAMPLE_ZERO, SAMPLE_GREATEST, SAMPLE_LEAST, SAMPLE_RANDOM, SAMPLE_KINDS };
@@ -126,6 +127,16 @@ static inline void sample_contact(struct sampler *sampler, struct wire_contact *
     contact->sigma_y_mm = sample_f32(sampler);
     contact->width_correlation = sample_f32(sampler);
   }
+  if (contact->flags & CONTACT_FLAG_TANGENTIAL_VALID) {
+    contact->qx_N = sample_f32(sampler);
+    contact->qy_N = sample_f32(sampler);
+    contact->q_sd_N = sample_f32(sampler);
+    contact->tangential_ratio = sample_f32(sampler);
+  }
+  if (contact->flags & CONTACT_FLAG_VELOCITY_VALID) {
+    contact->vx_mm_s = sample_f32(sampler);
+    contact->vy_mm_s = sample_f32(sampler);
+  }
 }
 
 static inline void sample_raw(struct sampler *sampler, struct wire_raw *raw) {
@@ -152,6 +163,13 @@ static inline void sample_calibration(struct sampler *sampler, unsigned sensor_c
     calibration->sensors[k].gain = sample_f32(sampler);
     calibration->sensors[k].gain_sd = sample_f32(sampler);
   }
+}
+
+static inline void sample_pad(struct sampler *sampler, struct pad_profile *pad) {
+  for (size_t i = 0; i < PAD_PROFILE_FLOATS; i++) {
+    ((float *)(void *)pad)[i] = sample_f32(sampler);
+  }
+  pad->from_touch = (uint8_t)sample_u32(sampler);
 }
 
 static inline void sample_info(struct sampler *sampler, struct wire_info *info) {
@@ -189,6 +207,9 @@ static inline void sample_info(struct sampler *sampler, struct wire_info *info) 
   info->stored = sample_u32(sampler);
   if (info->stored & WIRE_STORED_CALIBRATION) {
     sample_calibration(sampler, info->sensor_count, &info->calibration);
+  }
+  if (info->stored & WIRE_STORED_PAD) {
+    sample_pad(sampler, &info->pad);
   }
 }
 
@@ -279,6 +300,9 @@ static inline void sample_packet(struct sampler *sampler, uint8_t type,
     break;
   case WIRE_CMD_LOCATION_LIMIT:
     packet->body.cmd_location_limit.limit_mm = sample_f32(sampler);
+    break;
+  case WIRE_CMD_PAD:
+    sample_pad(sampler, &packet->body.cmd_pad.profile);
     break;
   default:
     break;

@@ -1,0 +1,65 @@
+/* What the fingertip says about the tangential load of one frame: the estimate of fit_tangential.h
+ * in the scales of the pad, and, where the pad's edges spoil the zero, only what changed since the
+ * first touch.
+ */
+#ifndef CONTACT_TANGENTIAL_H
+#define CONTACT_TANGENTIAL_H
+
+#include "contact/contact.h"
+#include "fit/fit_tangential.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct tangential_settings {
+  float force_scale; /* force is this times the estimate's */
+  float force_scale_sd;
+  float tangential_scale; /* tangential load is this and force_scale times the estimate's */
+  float tangential_scale_sd;
+  bool from_touch;
+  float location_sd_limit_mm; /* UNCERTAIN above it */
+};
+
+/* The scales of this profile, with the calibration whose scales are in settings or, if it is not
+ * calibrated, without one. */
+void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile,
+                    const struct contact_settings *settings, bool calibrated);
+
+/* The load of a contact that begins counts as none: the mean of Q / F over so long after its first
+ * estimate. Long enough for the mean of a hundred frames, short before any lift. */
+#define TANGENTIAL_ZERO_us 100000u
+
+/* Of the contact under way. */
+struct tangential_history {
+  uint64_t first_us; /* of its first estimate */
+  uint32_t count;    /* of estimates in the sums; 0: none yet */
+  bool settled;      /* the zero stands */
+  float x_sum, y_sum;
+  float zero_x, zero_y; /* Q / F */
+};
+
+/* All zeros unless TANGENTIAL_VALID. */
+struct tangential_load {
+  float x_mm, y_mm, location_sd_mm;
+  float force_N, force_sd_N;
+  float qx_N, qy_N; /* of the object on the rubber */
+  float q_sd_N;     /* of either, those of the scales in it */
+  float ratio;      /* |Q| / F */
+};
+
+/* Whether an estimate from this fit is worth its time; saturated: bitmap of the sensors that were
+ * left out for it. */
+bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated);
+
+/* Forgets the contact. */
+void tangential_reset(struct tangential_history *history);
+
+/* After contact_judge or contact_update, of the same input: adds TANGENTIAL_VALID and
+ * TANGENTIAL_FROM_TOUCH to result->flags, and with the former has UNCERTAIN speak of the corrected
+ * location. */
+void tangential_update(struct tangential_history *history,
+                       const struct tangential_settings *settings,
+                       const struct contact_input *input, struct contact_result *result,
+                       struct tangential_load *load);
+
+#endif

@@ -1,0 +1,93 @@
+#include "cli/commands/commands.hpp"
+#include "cli/device.hpp"
+#include "cli/usage.hpp"
+#include "libfingertip/command.hpp"
+#include "libfingertip/packet_fields.hpp"
+#include "libfingertip/text.hpp"
+#include "pad/profile.hpp"
+
+#include <cstdio>
+#include <memory>
+#include <optional>
+
+namespace fingertip {
+
+namespace {
+
+struct PadOptions {
+  Choice choice;
+  std::optional<double> thickness_mm;
+  double overhang_mm = 0;
+  bool from_touch = false, erase = false;
+};
+
+int erase_pad(Session &session) {
+  session.command(command_erase_pad());
+  std::printf("pad erased; no tangential load from now on\n");
+  return 0;
+}
+
+int pad_command(const PadOptions &options) {
+  if (!options.erase && !options.thickness_mm) {
+    throw WrongUsage(
+        "give --thickness MM of the pad's rubber, or --erase; see fingertip pad --help");
+  }
+  Device device(options.choice);
+  Session &session = device.session;
+  wire_info info = session.info().body.info;
+  if (!(info.capabilities & WIRE_CAPABILITY_TANGENTIAL)) {
+    throw Error("its firmware, of scene " + text_field(info.scene) +
+                ", tells no tangential load; install one of scene grasp");
+  }
+  if (options.erase) {
+    return erase_pad(session);
+  }
+  const pad::Shape shape{*options.thickness_mm, options.overhang_mm, options.from_touch};
+  const pad_profile profile = typed([&] { return pad::profile_of(shape, info); });
+  session.command(command_pad(profile));
+  std::printf("thickness=%s overhang=%s%s force_ratio=%s kept\n",
+              shortest(profile.thickness_mm).c_str(),
+              profile.overhang_mm > 0 ? shortest(profile.overhang_mm).c_str() : "?",
+              profile.from_touch ? " from_touch" : "",
+              fixed(static_cast<double>(profile.force_ratio), 3).c_str());
+  if (pad::edges_spoil_the_zero(shape) && !options.from_touch) {
+    std::fprintf(stderr,
+                 "fingertip: the rubber ends %s mm beyond the outer sensors, which spoils the "
+                 "zero of the tangential load; --from-touch tells what changed instead\n",
+                 shortest(profile.overhang_mm).c_str());
+  }
+  return 0;
+}
+
+} // namespace
+
+void add_pad(CommandLine &line) {
+  auto options = std::make_shared<PadOptions>();
+  CLI::App *command = line.add(
+      "pad",
+      "Tell the fingertip its pad, so that it tells the tangential load (kept without power)",
+      [options] { return pad_command(*options); });
+  with_port(command, options->choice);
+  CLI::Option *thickness = command
+                               ->add_option("--thickness", options->thickness_mm,
+                                            "Of the rubber above the sensors, 4 to 20 mm")
+                               ->type_name("MM");
+  CLI::Option *overhang =
+      command
+          ->add_option("--overhang", options->overhang_mm,
+                       "Of the rubber beyond the outer sensors, up to 100 mm; not told by default")
+          ->type_name("MM")
+          ->needs(thickness);
+  CLI::Option *from_touch =
+      command
+          ->add_flag("--from-touch", options->from_touch,
+                     "Tell what changed since the first 100 ms of each contact: for pads whose "
+                     "rubber ends within three quarters of its thickness of the outer sensors")
+          ->needs(thickness);
+  command->add_flag("--erase", options->erase, "Forget the pad: no tangential load")
+      ->excludes(thickness)
+      ->excludes(overhang)
+      ->excludes(from_touch);
+}
+
+} // namespace fingertip

@@ -1,0 +1,219 @@
+/* Tangential load, from sensors to packets: on the pad that the profile describes. */
+#include "app_rig.h"
+#include "common/contact_flags.h"
+#include "support/pad.h"
+
+/* What the object does to the rubber. */
+static struct {
+  double force_N, qx_N, qy_N;
+  double later_qx_N; /* from later_us on */
+  uint64_t later_us;
+} load;
+
+/* By the definition in pad_profile.h. */
+static double field_Pa(double dx_mm, double dy_mm, uint64_t t_us) {
+  const struct pad_profile pad = pad_of_12_mm();
+  const double r2 = dx_mm * dx_mm + dy_mm * dy_mm, t2 = 4.0;
+  double qx_N = load.later_us != 0 && t_us >= load.later_us ? load.later_qx_N : load.qx_N;
+  double sum = 0.0; /* N/mm^2 */
+  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+    double v = (double)pad.normal[j].sd_mm * (double)pad.normal[j].sd_mm + t2;
+    sum += load.force_N * (double)pad.normal[j].share / (2 * PI * v) * exp(-r2 / (2 * v));
+  }
+  for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
+    double v = (double)pad.tangential[j].sd_mm * (double)pad.tangential[j].sd_mm + 1.3 * t2;
+    sum += (qx_N * dx_mm + load.qy_N * dy_mm) * (double)pad.tangential[j].moment_mm /
+           (2 * PI * v * v) * exp(-r2 / (2 * v));
+  }
+  return sum * 1e6;
+}
+
+void setUp(void) {
+  rig_start();
+  world_field_Pa = field_Pa;
+  memset(&load, 0, sizeof load);
+  press.force_N = load.force_N = 5.0;
+  press.x_mm = 1.5;
+  press.y_mm = -4.0;
+  press.from_us = 1500000;
+}
+
+void tearDown(void) {
+  rig_end();
+}
+
+static struct wire_packet pad_command(void) {
+  return (struct wire_packet){.type = WIRE_CMD_PAD, .body.cmd_pad = {pad_of_12_mm()}};
+}
+
+static void store_pad(const struct wire_packet *command) {
+  native_cdc_open();
+  run_for(300);
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(*command));
+}
+
+/* The last contact packet of the time until t_us; its flags hold for all from from_us on. */
+static struct wire_contact last_contact(uint64_t from_us, uint64_t t_us, uint32_t high,
+                                        uint32_t low) {
+  struct wire_packet packet;
+  struct wire_contact last;
+  memset(&last, 0, sizeof last);
+  start_streams(WIRE_STREAM_CONTACT);
+  run_for((uint32_t)((t_us - port_now_us()) / 1000));
+  unsigned count = 0;
+  while (next_packet(&packet)) {
+    if (packet.type == WIRE_CONTACT && packet.t_us > from_us) {
+      last = packet.body.contact;
+      TEST_ASSERT_BITS_HIGH(high, last.flags);
+      TEST_ASSERT_BITS_LOW(low, last.flags);
+      const struct wire_stages *stages = &last.stages;
+      TEST_ASSERT_EQUAL_UINT16(stages->convert_us + stages->read_us + stages->queue_us +
+                                   stages->condition_us + stages->fit_us + stages->contact_us,
+                               stages->total_us);
+      count++;
+    }
+  }
+  TEST_ASSERT_GREATER_THAN(10, count);
+  return last;
+}
+
+static const uint32_t TANGENTIAL =
+    CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH;
+
+/* The Gaussian fit is pulled along by the load; with the profile it is not, and the load is told.
+ */
+static void a_profile_tells_the_load_and_corrects_the_location(void) {
+  load.qx_N = 1.2;
+  load.qy_N = -0.9;
+  struct wire_packet command = pad_command();
+  store_pad(&command);
+  struct wire_contact contact = last_contact(1600000, 1800000, CONTACT_FLAG_TANGENTIAL_VALID,
+                                             CONTACT_FLAG_TANGENTIAL_FROM_TOUCH);
+  TEST_ASSERT_FLOAT_WITHIN(0.15f, 1.2f, contact.qx_N);
+  TEST_ASSERT_FLOAT_WITHIN(0.15f, -0.9f, contact.qy_N);
+  TEST_ASSERT_FLOAT_WITHIN(0.03f, 0.3f, contact.tangential_ratio);
+  TEST_ASSERT_FLOAT_WITHIN(0.2f, 5.0f, contact.force_N);
+  TEST_ASSERT_FLOAT_WITHIN(0.2f, 1.5f, contact.x_mm);
+  TEST_ASSERT_FLOAT_WITHIN(0.2f, -4.0f, contact.y_mm);
+  TEST_ASSERT_TRUE(app.fit.x_mm > 1.5f + 0.5f);
+  TEST_ASSERT_TRUE(app.fit.y_mm < -4.0f - 0.4f);
+  TEST_ASSERT_TRUE(contact.q_sd_N > 0.0f && contact.location_sd_mm > 0.0f);
+  TEST_ASSERT_EQUAL_FLOAT(app.fit.p0_Pa, contact.p0_Pa);
+  TEST_ASSERT_EQUAL_FLOAT(app.fit.sigma_mm, contact.sigma_mm);
+}
+
+static void without_a_profile_there_is_none_and_the_fit_stays_as_it_is(void) {
+  load.qx_N = 1.2;
+  native_cdc_open();
+  run_for(300);
+  TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
+  struct wire_contact contact = last_contact(1600000, 1800000, CONTACT_FLAG_FIT_VALID, TANGENTIAL);
+  TEST_ASSERT_EQUAL_FLOAT(app.fit.x_mm, contact.x_mm);
+  TEST_ASSERT_EQUAL_FLOAT(app.fit.force_N, contact.force_N);
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.qx_N);
+}
+
+static void a_profile_outlives_power_until_it_is_erased(void) {
+  struct wire_packet command = pad_command();
+  store_pad(&command);
+  for (int restart = 0; restart < 2; restart++) {
+    struct wire_info info = get_info();
+    TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_PAD, info.stored);
+    TEST_ASSERT_EQUAL_MEMORY(&command.body.cmd_pad.profile, &info.pad, 4 * PAD_PROFILE_FLOATS + 1);
+    TEST_ASSERT_NOT_NULL(app.pad);
+    rig_power_up();
+    native_cdc_open();
+    run_for(300);
+  }
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_ERASE_PAD}));
+  TEST_ASSERT_NULL(app.pad);
+  TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
+  rig_power_up();
+  TEST_ASSERT_NULL(app.pad);
+}
+
+static void a_profile_out_of_range_is_refused(void) {
+  native_cdc_open();
+  run_for(300);
+  struct wire_packet command = pad_command();
+  command.body.cmd_pad.profile.thickness_mm = 3.9f;
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
+  command = pad_command();
+  command.body.cmd_pad.profile.from_touch = 2;
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
+  TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
+  TEST_ASSERT_NULL(app.pad);
+}
+
+static void a_calibration_and_the_scale_of_the_profile_act(void) {
+  load.qx_N = 1.2;
+  struct wire_packet command = pad_command();
+  command.body.cmd_pad.profile.tangential_scale = 1.5f;
+  store_pad(&command);
+  struct wire_packet calibrate = {.type = WIRE_CMD_CALIBRATE,
+                                  .body.cmd_calibrate = {.sensor_count = geometry.sensor_count}};
+  calibrate.body.cmd_calibrate.calibration =
+      (struct calibration){.placements = 20, .force_scale = 1.25f, .force_scale_sd = 0.0f};
+  for (unsigned k = 0; k < geometry.sensor_count; k++) {
+    calibrate.body.cmd_calibrate.calibration.sensors[k] = (struct sensor_calibration){1.0f, 0.01f};
+  }
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate));
+  struct wire_contact contact =
+      last_contact(1600000, 1800000, CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_CALIBRATED, 0);
+  const float scale = 1.25f * command.body.cmd_pad.profile.force_ratio;
+  TEST_ASSERT_FLOAT_WITHIN(0.2f, scale * 5.0f, contact.force_N);
+  TEST_ASSERT_FLOAT_WITHIN(0.2f, 1.5f * scale * 1.2f, contact.qx_N);
+  TEST_ASSERT_EQUAL_FLOAT(scale * app.tangential.force_N, contact.force_N);
+  TEST_ASSERT_FLOAT_WITHIN(1e-5f, 1.5f * scale * app.tangential.qx_N, contact.qx_N);
+}
+
+static void from_touch_tells_what_changed(void) {
+  load.qx_N = 1.2;
+  load.later_qx_N = 0.2;
+  load.later_us = 1800000;
+  struct wire_packet command = pad_command();
+  command.body.cmd_pad.profile.from_touch = 1;
+  store_pad(&command);
+  last_contact(1510000, 1595000, CONTACT_FLAG_FIT_VALID, TANGENTIAL);
+  struct wire_contact contact = last_contact(1620000, 1790000, TANGENTIAL, 0);
+  TEST_ASSERT_FLOAT_WITHIN(0.1f, 0.0f, contact.qx_N);
+  contact = last_contact(1830000, 1980000, TANGENTIAL, 0);
+  TEST_ASSERT_FLOAT_WITHIN(0.15f, -1.0f, contact.qx_N);
+}
+
+/* While the sensors measure their temperature the frame before goes out again, whole. */
+static void a_held_frame_repeats_the_load(void) {
+  load.qx_N = 1.2;
+  struct wire_packet packet, command = pad_command();
+  store_pad(&command);
+  start_streams(WIRE_STREAM_CONTACT);
+  run_for((uint32_t)((1700000 - port_now_us()) / 1000));
+  while (next_packet(&packet)) {
+  }
+  struct wire_contact before = {0};
+  unsigned held = 0;
+  run_for(1500);
+  while (next_packet(&packet)) {
+    const struct wire_contact *contact = &packet.body.contact;
+    if (packet.type == WIRE_CONTACT && before.flags && contact->flags & CONTACT_FLAG_HELD) {
+      held++;
+      TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TANGENTIAL_VALID, contact->flags);
+      TEST_ASSERT_EQUAL_FLOAT(before.qx_N, contact->qx_N);
+      TEST_ASSERT_EQUAL_FLOAT(before.x_mm, contact->x_mm);
+    }
+    before = packet.type == WIRE_CONTACT ? *contact : before;
+  }
+  TEST_ASSERT_GREATER_THAN(0, held);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(a_profile_tells_the_load_and_corrects_the_location);
+  RUN_TEST(without_a_profile_there_is_none_and_the_fit_stays_as_it_is);
+  RUN_TEST(a_profile_outlives_power_until_it_is_erased);
+  RUN_TEST(a_profile_out_of_range_is_refused);
+  RUN_TEST(a_calibration_and_the_scale_of_the_profile_act);
+  RUN_TEST(from_touch_tells_what_changed);
+  RUN_TEST(a_held_frame_repeats_the_load);
+  return UNITY_END();
+}

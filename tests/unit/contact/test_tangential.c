@@ -1,0 +1,215 @@
+#include "common/contact_flags.h"
+#include "contact/tangential.h"
+#include "support/pad.h"
+
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+static struct tangential_settings settings;
+static struct tangential_history history;
+static struct fit_tangential found;
+static struct contact_input input;
+static struct contact_result result;
+static struct tangential_load load;
+
+void setUp(void) {
+  settings = (struct tangential_settings){
+      .force_scale = 1.0f, .tangential_scale = 1.0f, .location_sd_limit_mm = 0.6f};
+  tangential_reset(&history);
+  found = (struct fit_tangential){.valid = true,
+                                  .x_mm = 2.5f,
+                                  .y_mm = -7.0f,
+                                  .location_sd_mm = 0.15f,
+                                  .force_N = 4.0f,
+                                  .force_sd_N = 0.128f,
+                                  .qx_N = 0.75f,
+                                  .qy_N = -1.0f,
+                                  .q_sd_N = 0.04f};
+  input = (struct contact_input){.t_us = 5000000, .contact = true, .tangential = &found};
+}
+
+void tearDown(void) {}
+
+static uint32_t update(uint32_t flags) {
+  memset(&load, 0xA5, sizeof load);
+  result = (struct contact_result){.flags = flags, .slip_mm = 0.25f};
+  tangential_update(&history, &settings, &input, &result, &load);
+  input.t_us += 1000;
+  TEST_ASSERT_EQUAL_FLOAT(0.25f, result.slip_mm);
+  return result.flags;
+}
+
+static void assert_nothing(uint32_t flags) {
+  static const struct tangential_load none;
+  TEST_ASSERT_EQUAL_HEX32(flags, update(flags));
+  TEST_ASSERT_EQUAL_MEMORY(&none, &load, sizeof load);
+}
+
+static void an_estimate_that_is_not_there_says_nothing(void) {
+  const uint32_t flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_UNCERTAIN;
+  found.valid = false;
+  assert_nothing(flags);
+  input.tangential = NULL;
+  assert_nothing(flags);
+  setUp();
+  found.force_N = 0.0f; /* no ratio to it */
+  assert_nothing(flags);
+}
+
+static void an_estimate_passes_as_it_is_with_scales_of_one(void) {
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_CONTACT | CONTACT_FLAG_TANGENTIAL_VALID,
+                          update(CONTACT_FLAG_CONTACT));
+  TEST_ASSERT_EQUAL_FLOAT(2.5f, load.x_mm);
+  TEST_ASSERT_EQUAL_FLOAT(-7.0f, load.y_mm);
+  TEST_ASSERT_EQUAL_FLOAT(0.15f, load.location_sd_mm);
+  TEST_ASSERT_EQUAL_FLOAT(4.0f, load.force_N);
+  TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.128f, 0.128f, load.force_sd_N);
+  TEST_ASSERT_EQUAL_FLOAT(0.75f, load.qx_N);
+  TEST_ASSERT_EQUAL_FLOAT(-1.0f, load.qy_N);
+  TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.04f, 0.04f, load.q_sd_N);
+  TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.3125f, 0.3125f, load.ratio); /* 1.25 of 4 N */
+}
+
+static void scales_and_their_uncertainties_enter(void) {
+  settings.force_scale = 1.25f;
+  settings.force_scale_sd = 0.03f;
+  settings.tangential_scale = 0.8f;
+  settings.tangential_scale_sd = 0.05f;
+  update(0);
+  TEST_ASSERT_EQUAL_FLOAT(5.0f, load.force_N);
+  TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.2f, 0.2f, load.force_sd_N); /* 0.16 and 0.12 */
+  TEST_ASSERT_EQUAL_FLOAT(0.75f, load.qx_N);                      /* 1.25 times 0.8 is 1 */
+  TEST_ASSERT_EQUAL_FLOAT(-1.0f, load.qy_N);
+  /* Of 1.25 N: 0.05 / 0.8 and 0.03 / 1.25. */
+  const float of_scales = 1.25f * sqrtf(0.0625f * 0.0625f + 0.024f * 0.024f);
+  const float expected = sqrtf(0.04f * 0.04f + of_scales * of_scales);
+  TEST_ASSERT_FLOAT_WITHIN(0.002f * expected, expected, load.q_sd_N);
+  TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.25f, 0.25f, load.ratio);
+}
+
+static void a_calibration_scales_what_its_force_scale_was_found_with(void) {
+  struct pad_profile pad = pad_of_12_mm();
+  pad.tangential_scale = 1.5f;
+  pad.from_touch = 1;
+  const struct contact_settings scales = {.force_scale = 1.25f, .force_scale_sd = 0.04f};
+  tangential_use(&settings, &pad, &scales, true);
+  TEST_ASSERT_FLOAT_WITHIN(1e-6f, 1.25f * 0.9375f, settings.force_scale);
+  TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.04f * 0.9375f, settings.force_scale_sd);
+  TEST_ASSERT_EQUAL_FLOAT(1.5f, settings.tangential_scale);
+  TEST_ASSERT_EQUAL_FLOAT(0.125f, settings.tangential_scale_sd);
+  TEST_ASSERT_TRUE(settings.from_touch);
+  TEST_ASSERT_EQUAL_FLOAT(0.6f, settings.location_sd_limit_mm);
+  pad.from_touch = 0;
+  tangential_use(&settings, &pad, &scales, false);
+  TEST_ASSERT_EQUAL_FLOAT(1.0f, settings.force_scale);
+  TEST_ASSERT_EQUAL_FLOAT(0.04f, settings.force_scale_sd);
+  TEST_ASSERT_FALSE(settings.from_touch);
+}
+
+static void uncertain_speaks_of_the_corrected_location(void) {
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID, update(CONTACT_FLAG_UNCERTAIN));
+  found.location_sd_mm = 0.61f;
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_UNCERTAIN, update(0));
+}
+
+/* 1000 frames a second; the ratio wavers about (0.1, -0.05) for 100 ms. */
+static void touch(void) {
+  for (int i = 0; i < 100; i++) {
+    found.force_N = 2.0f + 0.01f * (float)i;
+    float waver = i % 2 ? 0.02f : -0.02f;
+    found.qx_N = (0.1f + waver) * found.force_N;
+    found.qy_N = (-0.05f - waver) * found.force_N;
+    assert_nothing(CONTACT_FLAG_CONTACT);
+  }
+}
+
+static void assert_from_touch(float qx_N, float qy_N) {
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_CONTACT | CONTACT_FLAG_TANGENTIAL_VALID |
+                              CONTACT_FLAG_TANGENTIAL_FROM_TOUCH,
+                          update(CONTACT_FLAG_CONTACT));
+  TEST_ASSERT_FLOAT_WITHIN(1e-4f, qx_N, load.qx_N);
+  TEST_ASSERT_FLOAT_WITHIN(1e-4f, qy_N, load.qy_N);
+  const float size_N = sqrtf(qx_N * qx_N + qy_N * qy_N);
+  TEST_ASSERT_FLOAT_WITHIN(1e-3f, size_N / load.force_N, load.ratio);
+}
+
+static void from_touch_takes_the_first_100_ms_for_none(void) {
+  settings.from_touch = true;
+  touch();
+  found.force_N = 5.0f;
+  found.qx_N = 0.5f;
+  found.qy_N = -0.25f;
+  assert_from_touch(0.0f, 0.0f);
+  found.qx_N = 0.5f + 1.0f;
+  assert_from_touch(1.0f, 0.0f);
+  TEST_ASSERT_EQUAL_FLOAT(2.5f, load.x_mm);
+  found.force_N = 10.0f; /* the zero is one of Q / F */
+  found.qx_N = found.qy_N = 0.0f;
+  assert_from_touch(-1.0f, 0.5f);
+}
+
+static void a_new_contact_has_a_zero_of_its_own(void) {
+  settings.from_touch = true;
+  touch();
+  found.valid = false; /* for a while only: the contact goes on */
+  for (int i = 0; i < 500; i++) {
+    assert_nothing(CONTACT_FLAG_CONTACT);
+  }
+  found.valid = true;
+  found.force_N = 5.0f;
+  found.qx_N = 1.5f;
+  found.qy_N = -0.25f;
+  assert_from_touch(1.0f, 0.0f);
+  input.contact = false;
+  input.tangential = NULL;
+  assert_nothing(0);
+  input.contact = true;
+  input.tangential = &found;
+  touch();
+  found.force_N = 5.0f;
+  found.qx_N = 0.5f;
+  found.qy_N = 0.75f;
+  assert_from_touch(0.0f, 1.0f);
+}
+
+static void slow_frames_settle_with_those_there_were(void) {
+  settings.from_touch = true;
+  assert_nothing(0);
+  input.t_us += 2000000;
+  found.qx_N = 1.75f;
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TANGENTIAL_VALID, update(0));
+  TEST_ASSERT_FLOAT_WITHIN(1e-5f, 1.0f, load.qx_N);
+  TEST_ASSERT_FLOAT_WITHIN(1e-5f, 0.0f, load.qy_N);
+}
+
+static void fits_that_an_estimate_is_worthwhile_for(void) {
+  struct fit_result fit = {.flags = CONTACT_FLAG_FIT_VALID, .used = 0x7FFF};
+  TEST_ASSERT_TRUE(tangential_is_worthwhile(&fit, 0));
+  TEST_ASSERT_TRUE(tangential_is_worthwhile(&fit, 1));
+  fit.used = 0xF;
+  TEST_ASSERT_TRUE(tangential_is_worthwhile(&fit, 0));
+  TEST_ASSERT_FALSE(tangential_is_worthwhile(&fit, 0x10));
+  static const uint32_t spoilers[] = {CONTACT_FLAG_FLAT, CONTACT_FLAG_AT_BOUND};
+  fit.used = 0x7FFF;
+  for (size_t i = 0; i < 2; i++) {
+    fit.flags = CONTACT_FLAG_FIT_VALID | spoilers[i];
+    TEST_ASSERT_FALSE(tangential_is_worthwhile(&fit, 0));
+  }
+  fit.flags = 0;
+  TEST_ASSERT_FALSE(tangential_is_worthwhile(&fit, 0));
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(an_estimate_that_is_not_there_says_nothing);
+  RUN_TEST(an_estimate_passes_as_it_is_with_scales_of_one);
+  RUN_TEST(scales_and_their_uncertainties_enter);
+  RUN_TEST(a_calibration_scales_what_its_force_scale_was_found_with);
+  RUN_TEST(uncertain_speaks_of_the_corrected_location);
+  RUN_TEST(from_touch_takes_the_first_100_ms_for_none);
+  RUN_TEST(a_new_contact_has_a_zero_of_its_own);
+  RUN_TEST(slow_frames_settle_with_those_there_were);
+  RUN_TEST(fits_that_an_estimate_is_worthwhile_for);
+  return UNITY_END();
+}
