@@ -144,7 +144,7 @@ static void estimate_tangential_load(struct app *app) {
   memset(&app->tangential, 0, sizeof app->tangential);
   if (app->pad && app->conditioned.contact &&
       tangential_is_worthwhile(&app->fit, app->frame.saturated)) {
-    fit_tangential(&app->fit_array, &app->fit_pad, app->conditioned.pressure_Pa_q10,
+    fit_tangential_load(&app->fit_array, &app->fit_pad, app->conditioned.pressure_Pa_q10,
                    &app->fit_settings, &app->fit, &app->tangential);
   }
 }

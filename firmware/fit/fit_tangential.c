@@ -596,9 +596,9 @@ NOINLINE static void conclude(const struct fit_array *array, const struct proble
       unit_N * root_of(scaled_mul(variance_of(room, outcome, AMPLITUDE), variance));
 }
 
-void fit_tangential(const struct fit_array *array, struct fit_pad *pad,
-                    const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                    const struct fit_result *start, struct fit_tangential *result) {
+void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
+                         const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
+                         const struct fit_result *start, struct fit_tangential *result) {
   *result = (struct fit_tangential){0};
   struct problem problem = {.pad = pad};
   if (!(start->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||

@@ -70,7 +70,7 @@ static const struct pad_profile profile = {
 
 /* After `fit` of the same readings, which is not counted. */
 static void tangential(void) {
-  fit_tangential(&array, &pad, job.pressure_Pa_q10, &settings, &result, &tangential_result);
+  fit_tangential_load(&array, &pad, job.pressure_Pa_q10, &settings, &result, &tangential_result);
   job.x_mm = tangential_result.x_mm;
   job.y_mm = tangential_result.y_mm;
 }
