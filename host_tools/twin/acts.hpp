@@ -43,10 +43,6 @@ inline double milliseconds(double seconds) {
   return 1e-3 * std::round(1e3 * seconds);
 }
 
-struct Place {
-  double x_mm, y_mm;
-};
-
 // Puts acts one after the other.
 class Stage {
 public:

@@ -8,6 +8,7 @@
 
 #include "twin/contact.hpp"
 #include "twin/force_planes.hpp"
+#include "twin/table_file.hpp"
 
 #include <filesystem>
 #include <functional>
@@ -39,9 +40,5 @@ private:
   ForcePlanes pressure_;
   std::vector<float> indentation_mm_, radius_mm_; // [force]
 };
-
-// Where the tables of a user are kept, if not said otherwise: fingertip/contact-tables in
-// XDG_CACHE_HOME or ~/.cache.
-std::filesystem::path default_cache_directory();
 
 } // namespace fingertip::twin

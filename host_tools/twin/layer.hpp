@@ -15,8 +15,8 @@
 // more pressure ahead of it, as much less behind, and no force.
 // (Plane or axisymmetric Navier equations with u = 0 at z = 0; the tests solve them numerically.)
 //
-// What it leaves out: the pad's edges, large strain, the sensors' own stiffness in the base, and
-// time (effects.hpp).
+// What it leaves out: the pad's edges (block.hpp), large strain, the sensors' own stiffness in the
+// base, and time (effects.hpp).
 #pragma once
 
 namespace fingertip::twin {

@@ -197,11 +197,17 @@ int scenario(Options &options) {
   const bool other = !chosen.second_indenter.empty() && chosen.second_indenter != chosen.indenter;
   const ContactTable second = other ? table_of(chosen.second_indenter, layer, options) : table;
   const Scenario made = make_scenario(chosen, table);
+  std::optional<BlockTable> block;
+  if (chosen.overhang_mm) {
+    ProgressBar bar("table of the pad's edges, once", ProgressBar::Lines::none);
+    block = BlockTable::load_or_build(block_around(layer, *chosen.overhang_mm), sensor_places(),
+                                      cache_of(options), [&](double share) { show(bar, share); });
+  }
   Written written;
   {
     ProgressBar bar(made.name, ProgressBar::Lines::none);
-    written = write_scenario(made, layer, table, second, options.output, options.overwrite,
-                             [&](double share) { show(bar, share); });
+    written = write_scenario(made, layer, table, second, block ? &*block : nullptr, options.output,
+                             options.overwrite, [&](double share) { show(bar, share); });
   }
   std::printf("%s: %s, %zu contacts in %s s, %zu rows, %s MB, at most %s kPa\n",
               printable(options.output).c_str(), made.name.c_str(), made.acts.size(),
@@ -282,6 +288,10 @@ int run(int argc, char **argv) {
       ->required()
       ->type_name("FILE.csv");
   with_contact(write);
+  write
+      ->add_option("--overhang", s.overhang_mm,
+                   "The pad ends so far beyond its outer sensors; default: never")
+      ->type_name("MM");
   write
       ->add_option("--second", s.second_indenter,
                    "What presses too, in scenarios of two contacts; "

@@ -1,5 +1,6 @@
 #include "twin/scenario_file.hpp"
 
+#include "libfingertip/error.hpp"
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/text.hpp"
 #include "twin/best_gaussian.hpp"
@@ -243,6 +244,9 @@ void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pa
     metadata(text, "second_indenter", second + ", " + indenter(second).description);
   }
   metadata(text, "layer_mm", number(layer.thickness_mm));
+  if (options.overhang_mm) {
+    metadata(text, "overhang_mm", number(*options.overhang_mm));
+  }
   metadata(text, "layer_youngs_modulus_MPa", fixed(1e-6 * layer.youngs_modulus_Pa, 4));
   metadata(text, "layer_poisson", number(layer.poisson));
   metadata(text, "force_N", options.forces);
@@ -358,6 +362,19 @@ std::string truth_of(const Scenario &scenario, const std::string &path) {
   return text.bytes();
 }
 
+// A contact that rolls off has its edge already.
+void check_inside(const Block &block, const Touch &contact, const Track &track, double radius_mm) {
+  const bool rolls = std::isfinite(track.edge_x_mm);
+  const double room_mm = rolls ? 0.0 : radius_mm;
+  if (contact.force_N > 0.0 && (std::abs(contact.x_mm) + room_mm > block.half_x_mm ||
+                                std::abs(contact.y_mm) + room_mm > block.half_y_mm)) {
+    throw Error("a contact of " + fixed(radius_mm, 1) + " mm radius at " + fixed(contact.x_mm, 1) +
+                ", " + fixed(contact.y_mm, 1) + " mm leaves the pad, which ends at " +
+                fixed(block.half_x_mm, 1) + ", " + fixed(block.half_y_mm, 1) +
+                " mm; give a larger --overhang, a smaller --margin or less --force");
+  }
+}
+
 } // namespace
 
 std::string truth_path(const std::string &scenario_path) {
@@ -369,8 +386,8 @@ std::string truth_path(const std::string &scenario_path) {
 }
 
 Written write_scenario(const Scenario &scenario, const Layer &layer, const ContactTable &table,
-                       const ContactTable &second, const std::string &path, bool replace,
-                       const std::function<void(double share)> &on_progress) {
+                       const ContactTable &second, const BlockTable *block, const std::string &path,
+                       bool replace, const std::function<void(double share)> &on_progress) {
   const ScenarioOptions &options = scenario.options;
   OutputFile truth(truth_path(path), replace, OutputFile::Appears::when_finished);
   OutputFile file(path, replace, OutputFile::Appears::when_finished);
@@ -436,13 +453,22 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
         row.x_mm = row.y_mm = row.force_N = row.pull_x_N = row.pull_y_N = 0.0;
         for (std::size_t c = 0; c < contacts.size(); c++) {
           const Touch &contact = contacts[c];
+          const ContactTable &pressing = c == 0 ? table : second;
+          const double radius_mm = pressing.contact_radius_mm(contact.force_N);
+          if (block) {
+            check_inside(block->block(), contact, act.tracks[c], radius_mm);
+          }
           const double cosine = std::cos(contact.angle_rad), sine = std::sin(contact.angle_rad);
           for (std::size_t k = 0; k < sensors; k++) {
             const double dx = static_cast<double>(geometry.x_mm[k]) - contact.x_mm;
             const double dy = static_cast<double>(geometry.y_mm[k]) - contact.y_mm;
             const double along_x = cosine * dx + sine * dy, along_y = cosine * dy - sine * dx;
-            base_Pa[k] +=
-                (c == 0 ? table : second).base_pressure_Pa(contact.force_N, along_x, along_y);
+            base_Pa[k] += pressing.base_pressure_Pa(contact.force_N, along_x, along_y);
+            if (block) {
+              base_Pa[k] += block->added_Pa(
+                  k, {contact.force_N, contact.pull_x_N, contact.pull_y_N, radius_mm}, contact.x_mm,
+                  contact.y_mm);
+            }
             if (scenario.pulls) {
               const TractionTable::Load load{contact.force_N, contact.stuck_N,
                                              cosine * contact.pull_x_N + sine * contact.pull_y_N,

@@ -9,7 +9,7 @@
 //   x_mm y_mm  middle of the contact; of two, their centre of force
 //   force_N    on the pad, of all contacts
 //   p0_Pa sigma_mm  the Gaussian that is closest to the pressure on the base without errors
-//              (best_gaussian.hpp); 0 with two contacts
+//              (best_gaussian.hpp), of a layer without end; 0 with two contacts
 //   slip       see scenarios.hpp
 //   Qx_N Qy_N  tangential force of all objects on the rubber; only if the scenario has any.
 //              p0_Pa and sigma_mm are then without it
@@ -40,6 +40,7 @@
 // The indenter is in the metadata of both.
 #pragma once
 
+#include "twin/block_table.hpp"
 #include "twin/scenarios.hpp"
 
 #include <functional>
@@ -54,10 +55,11 @@ struct Written {
   double peak_Pa = 0.0; // largest reading above ambient
 };
 
-// Both files, whole or not at all. `second` is the table of the second indenter, for two contacts.
-// Throws Error.
+// Both files, whole or not at all. `second` is the table of the second indenter, for two contacts;
+// `block` is null for a layer without end. Throws Error, also if a contact leaves the block, but by
+// rolling off.
 Written write_scenario(const Scenario &scenario, const Layer &layer, const ContactTable &table,
-                       const ContactTable &second, const std::string &path, bool replace,
-                       const std::function<void(double share)> &on_progress = {});
+                       const ContactTable &second, const BlockTable *block, const std::string &path,
+                       bool replace, const std::function<void(double share)> &on_progress = {});
 
 } // namespace fingertip::twin

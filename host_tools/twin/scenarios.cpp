@@ -4,6 +4,10 @@
 #include "libfingertip/text.hpp"
 #include "twin/acts.hpp"
 
+extern "C" {
+#include "config/geometry.h"
+}
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -208,6 +212,18 @@ Act twist(const Stage &stage, std::size_t n) {
   return act;
 }
 
+double outermost(const float *places_mm) {
+  double most = 0.0;
+  for (std::size_t k = 0; k < geometry.sensor_count; k++) {
+    most = std::max(most, std::abs(static_cast<double>(places_mm[k])));
+  }
+  return most;
+}
+
+double half_width_mm(const ScenarioOptions &options) {
+  return options.overhang_mm ? outermost(geometry.x_mm) + *options.overhang_mm : PAD_HALF_WIDTH_mm;
+}
+
 // The contact rolls across the pad's long edge, until nothing of it is left on the pad.
 Act rolloff(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, ROLLOFF, n);
@@ -219,14 +235,14 @@ Act rolloff(const Stage &stage, std::size_t n) {
   track.along_x = 1.0;
   track.along_y = 0.0;
   const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
-  track.edge_x_mm = PAD_HALF_WIDTH_mm;
+  track.edge_x_mm = half_width_mm(stage.options);
   track.radius_mm = stage.table.contact_radius_mm(force_N);
   track.force_N.ease(0.3, force_N);
   phase(act, "touch", track.force_N.end_s());
   track.force_N.hold(random.uniform(0.4, 0.6));
   phase(act, "hold", track.force_N.end_s());
   track.pusher_mm.hold(track.force_N.end_s());
-  track.pusher_mm.travel(PAD_HALF_WIDTH_mm + track.radius_mm - track.x_mm, act.speed_mm_s,
+  track.pusher_mm.travel(track.edge_x_mm + track.radius_mm - track.x_mm, act.speed_mm_s,
                          SPEED_UP_s);
   track.force_N.hold(track.pusher_mm.end_s() - track.force_N.end_s());
   phase(act, "roll", track.force_N.end_s());
@@ -358,6 +374,9 @@ std::string name_of(const ScenarioOptions &options) {
     name += "+" + options.second_indenter;
   }
   name += "-h" + number(options.layer_mm);
+  if (options.overhang_mm) {
+    name += "-overhang" + number(*options.overhang_mm);
+  }
   const auto gain = options.effects.find("gain");
   name += "-gain" + number(gain == options.effects.end() ? 0.0 : gain->second);
   for (const Effect &effect : effects()) {
@@ -457,6 +476,19 @@ bool Act::slips(double t_s) const {
   return slips;
 }
 
+Block block_around(const Layer &layer, double overhang_mm) {
+  return {layer, outermost(geometry.x_mm) + overhang_mm, outermost(geometry.y_mm) + overhang_mm};
+}
+
+std::vector<Place> sensor_places() {
+  std::vector<Place> places;
+  for (std::size_t k = 0; k < geometry.sensor_count; k++) {
+    places.push_back(
+        {static_cast<double>(geometry.x_mm[k]), static_cast<double>(geometry.y_mm[k])});
+  }
+  return places;
+}
+
 ScenarioOptions complete(const ScenarioOptions &options) {
   const ScenarioKind &kind = kind_of(options).kind;
   ScenarioOptions chosen = options;
@@ -466,6 +498,10 @@ ScenarioOptions complete(const ScenarioOptions &options) {
   chosen.pad_seed = options.pad_seed.value_or(options.seed);
   chosen.forces = options.forces.empty() ? kind.usual_forces : options.forces;
   check("--seconds", *chosen.seconds, 1.0, 7200.0);
+  if (chosen.overhang_mm) {
+    check("--overhang", *chosen.overhang_mm, 3.0, 20.0);
+    check("--layer of a pad that ends", chosen.layer_mm, 4.0, 20.0);
+  }
   check("--margin", *chosen.margin_mm, 0.0, 10.0);
   check("--quiet", chosen.quiet_s, 0.1, 60.0);
   check("--dead-travel", chosen.dead_travel_mm, 0.0, 10.0);

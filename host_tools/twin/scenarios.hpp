@@ -21,11 +21,13 @@
 // weight, which is that share of the force of the grip, in a drag with a known load, in a screw
 // with a constant one. In a slide what pulls follows from motion and friction (held_object.hpp).
 //
-// Left out: edges of the rubber, friction where a kinematic slip slides, which moves the middle of
-// the pressure on the base by up to friction times thickness ("drag" and "slide" have it),
+// Left out: edges of the rubber, unless `overhang_mm` says where they are, friction where a
+// kinematic slip slides, which moves the middle of the pressure on the base by up to friction times
+// thickness ("drag" and "slide" have it),
 // influence of two contacts on each other's shape.
 #pragma once
 
+#include "twin/block.hpp"
 #include "twin/contact_table.hpp"
 #include "twin/effects.hpp"
 #include "twin/trajectory.hpp"
@@ -39,7 +41,8 @@ namespace fingertip::twin {
 
 constexpr double START_QUIET_s = 1.5;
 constexpr double AMBIENT_Pa = 101325.0;
-constexpr double PAD_HALF_WIDTH_mm = 15.0; // in x; the paper's box is 30 mm by 50 mm
+// In x, if overhang_mm does not say; the paper's box is 30 mm by 50 mm.
+constexpr double PAD_HALF_WIDTH_mm = 15.0;
 
 struct ScenarioKind {
   std::string name;
@@ -84,6 +87,7 @@ struct ScenarioOptions {
   std::string indenter;        // empty: the kind's usual one
   std::string second_indenter; // kind "two"; empty: as the first
   double layer_mm = 12.0;
+  std::optional<double> overhang_mm; // rubber beyond the outer sensors; else no end
   EffectValues effects;
   std::uint64_t seed = 1;
   std::optional<std::uint64_t> pad_seed;         // of the pad's errors; else seed
@@ -125,6 +129,10 @@ struct Scenario {
   bool pulls = false;    // something tangential may be in it
   std::vector<Act> acts; // in order of time, none overlap
 };
+
+// The block that reaches so far beyond the outer sensors, and these.
+Block block_around(const Layer &layer, double overhang_mm);
+std::vector<Place> sensor_places();
 
 // With all that was left open filled in. Throws Error for an unknown kind or what is out of
 // range.

@@ -173,6 +173,21 @@ class Files(TwinTest):
         subprocess.run([PLAYER, "play", self.csv, "-o", recording, "--quiet", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s)
         self.assertGreater(fingertip_files.read_recording(recording).has_contact.sum(), 1000)
 
+    def test_a_pad_that_ends_reads_more_near_its_edge(self):
+        options = ("taps", "--force", "5", "--seconds", "20")
+        self.scenario(*options)
+        endless = pathlib.Path(self.csv).read_text()
+        out, err = self.scenario(*options, "--overhang", "6", "--overwrite")
+        self.assertIn("taps-sphere6-h12-overhang6-gain0", out)
+        ends = pathlib.Path(self.csv).read_text()
+        self.assertIn("# overhang_mm: 6\n", ends)
+        self.assertEqual(len(list(pathlib.Path(TABLES).glob("block30x48-h12-*.table"))), 1)
+
+        def largest(text):
+            rows = csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
+            return max(float(row[f"s{k}_Pa"]) for row in rows for k in range(15))
+        self.assertGreater(abs(largest(ends) - largest(endless)), 10.0)
+
     def test_a_cold_pad_reads_one_step_and_old_temperatures(self):
         # Almost no force; the firmware keeps a branch for 0.3 K, 3 s, and its temperature for half a second: some 24 Pa at 0.1 K/s.
         self.scenario("taps", "--force", "0.02", "--quiet", "60", "--seconds", "70", "--effects", "branch=7")
@@ -270,6 +285,8 @@ class Usage(TwinTest):
             ("taps", "--layer", "nan"): "--layer nan is out of range",
             ("taps", "--effects", "noise"): 'there is no effect "noise"; give some of: gain, drift',
             ("taps", "--gain", "ten"): 'effect gain is "ten"; give 0 to 30 (%)',
+            ("taps", "--overhang", "2"): "--overhang 2 is out of range; give 3 to 20",
+            ("taps", "--overhang", "9", "--layer", "3"): "--layer of a pad that ends 3 is out of range; give 4 to 20",
             ("taps", "--seconds", "0"): "--seconds 0 is out of range; give 1 to 7200",
             ("cycle", "--seconds", "20"): '--seconds 20 is too short for one contact of "cycle"',
             ("taps", "--force", "much"): '--force "much" is not possible',

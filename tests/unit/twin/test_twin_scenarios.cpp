@@ -43,11 +43,11 @@ struct File {
   }
 };
 
-File written(const Scenario &scenario) {
+File written(const Scenario &scenario, const BlockTable *block = nullptr) {
   const std::string path = testing::TempDir() + "twin_scenario.csv";
   const std::string &first = scenario.options.indenter, &second = scenario.options.second_indenter;
   write_scenario(scenario, silicone(LAYER_mm), table_of(first),
-                 table_of(second.empty() ? first : second), path, true);
+                 table_of(second.empty() ? first : second), block, path, true);
   std::stringstream text;
   text << std::ifstream(path).rdbuf();
   File file;
@@ -552,6 +552,85 @@ TEST(ScenarioFile, HasTheTangentialPressureInIt) {
       EXPECT_NEAR(file.at("Qy_N", t_s), pull_y_N, 2e-4 + 1.1e-4 * force_N);
     }
     EXPECT_GT(most_Pa, 1000.0) << kind;
+  }
+}
+
+TEST(ScenarioFile, HasThePadsEdgesInIt) {
+  const Block pad = block_around(silicone(LAYER_mm), 6.0);
+  EXPECT_EQ(pad.half_x_mm, 15.0);
+  EXPECT_EQ(pad.half_y_mm, 24.0);
+  const BlockTable block = BlockTable::load_or_build(pad, sensor_places(), FINGERTIP_TEST_TABLES);
+  for (const char *kind : {"taps", "lift", "two"}) {
+    ScenarioOptions options;
+    options.kind = kind;
+    options.seconds = 20;
+    options.tangential = "0.35";
+    options.overhang_mm = 6.0;
+    const Scenario scenario = make_scenario(options, table_of("sphere6"));
+    EXPECT_NE(scenario.name.find("-overhang6-"), std::string::npos);
+    const File ends = written(scenario, &block), endless = written(scenario);
+    EXPECT_EQ(ends.metadata.at("overhang_mm"), "6");
+    double most_Pa = 0.0;
+    for (double t_s = 0.05; t_s < 20.0; t_s += 0.05) {
+      std::array<double, 15> added_Pa{};
+      for (const Act &act : scenario.acts) {
+        for (const Track &track : act.tracks) {
+          const Touch touch = track.at(t_s - act.begin_s);
+          if (t_s < act.begin_s || t_s >= act.end_s) {
+            continue;
+          }
+          for (std::size_t k = 0; k < 15; k++) {
+            added_Pa[k] += block.added_Pa(k,
+                                          {touch.force_N, touch.pull_x_N, touch.pull_y_N,
+                                           table_of("sphere6").contact_radius_mm(touch.force_N)},
+                                          touch.x_mm, touch.y_mm);
+            most_Pa = std::max(most_Pa, std::abs(added_Pa[k]));
+          }
+        }
+      }
+      double peak_Pa = 0.0;
+      for (int k = 0; k < 15; k++) {
+        peak_Pa = std::max(peak_Pa, endless.at("s" + std::to_string(k) + "_Pa", t_s));
+      }
+      for (std::size_t k = 0; k < 15; k++) {
+        const std::string name = "s" + std::to_string(k) + "_Pa";
+        EXPECT_NEAR(ends.at(name, t_s) - endless.at(name, t_s), added_Pa[k], 0.5 + 2.4e-4 * peak_Pa)
+            << kind << " " << t_s;
+      }
+    }
+    EXPECT_GT(most_Pa, 400.0) << kind;
+  }
+}
+
+TEST(ScenarioFile, ContactsLeaveThePadOnlyByRolling) {
+  const BlockTable block = BlockTable::load_or_build(block_around(silicone(LAYER_mm), 3.0),
+                                                     sensor_places(), FINGERTIP_TEST_TABLES);
+  ScenarioOptions options;
+  options.overhang_mm = 3.0;
+  options.seconds = 60;
+  options.margin_mm = 5.5; // to 10 of 12 mm
+  try {
+    written(make_scenario(options, table_of("sphere6")), &block);
+    ADD_FAILURE() << "a contact left the pad";
+  } catch (const Error &error) {
+    EXPECT_NE(std::string(error.what()).find("leaves the pad, which ends at 12.0, 21.0 mm"),
+              std::string::npos)
+        << error.what();
+  }
+  options.margin_mm = 2.25;
+  written(make_scenario(options, table_of("sphere6")), &block);
+  options.kind = "rolloff";
+  const Scenario rolls = make_scenario(options, table_of("sphere6"));
+  EXPECT_EQ(rolls.acts[0].tracks[0].edge_x_mm, 12.0);
+  written(rolls, &block);
+}
+
+TEST(Scenarios, PadsEndWithinWhatTheBlockIsHeldTo) {
+  for (const auto &[overhang_mm, layer_mm] : {std::pair{2.9, 12.0}, {20.1, 12.0}, {9.0, 3.5}}) {
+    ScenarioOptions options;
+    options.overhang_mm = overhang_mm;
+    options.layer_mm = layer_mm;
+    EXPECT_THROW(complete(options), Error) << overhang_mm << " " << layer_mm;
   }
 }
 
