@@ -5,10 +5,12 @@
 #include "twin/layer.hpp"
 
 extern "C" {
+#include "config/geometry.h"
 #include "fit/fit.h"
 }
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -236,6 +238,15 @@ pad_profile profile_of(const Shape &shape, const wire_info &info) {
   profile.tangential_scale_sd = 0.1F;
   profile.from_touch = shape.from_touch ? 1 : 0;
   return profile;
+}
+
+pad_profile profile_over_own_sensors(const Shape &shape) {
+  wire_info info{};
+  info.sensor_count = geometry.sensor_count;
+  info.pitch_mm = geometry.pitch_mm;
+  std::copy(std::begin(geometry.x_mm), std::end(geometry.x_mm), info.x_mm);
+  std::copy(std::begin(geometry.y_mm), std::end(geometry.y_mm), info.y_mm);
+  return profile_of(shape, info);
 }
 
 bool edges_spoil_the_zero(const Shape &shape) {

@@ -28,6 +28,9 @@ struct Shape {
 // sensors are no array on which a contact can be fitted.
 pad_profile profile_of(const Shape &shape, const wire_info &info);
 
+// Of a pad over the sensors of this build.
+pad_profile profile_over_own_sensors(const Shape &shape);
+
 // So little overhang that the zero of the tangential load cannot be believed: it is off by 0.09 of
 // the normal force where the rubber goes on for a thickness, by 0.11 at three quarters of one, by
 // 0.26 at three eighths (finite elements of blocks of 12 mm, no real pad).

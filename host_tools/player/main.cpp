@@ -5,6 +5,7 @@
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/recording.hpp"
 #include "libfingertip/text.hpp"
+#include "pad/profile.hpp"
 #include "player/native_fingertip.h"
 #include "player/repeat.h"
 #include "player/scenario.hpp"
@@ -32,6 +33,9 @@ struct PlayOptions {
   double noise = 1.0, prom_spread = 3.0, seconds = 0.0;
   std::uint64_t seed = 1;
   float prior_sigma_mm = 0.0F, prior_width_mm = 0.0F;
+  std::optional<double> pad_mm;
+  double overhang_mm = 0.0;
+  bool from_touch = false;
   bool raw = false, replace = false, quiet = false;
 };
 
@@ -67,6 +71,10 @@ int play(const PlayOptions &options) {
   if ((options.prior_sigma_mm > 0.0F) != (options.prior_width_mm > 0.0F)) {
     throw Error("--prior-sigma and --prior-width belong together; give both");
   }
+  std::optional<pad_profile> pad;
+  if (options.pad_mm) {
+    pad = pad::profile_over_own_sensors({*options.pad_mm, options.overhang_mm, options.from_touch});
+  }
   check_output(options.recording, options.replace);
   Scenario scenario(options.scenario);
   const double seconds = options.seconds > 0.0 ? options.seconds : scenario.end_s();
@@ -78,7 +86,11 @@ int play(const PlayOptions &options) {
   settings.prior_sigma_mm = options.prior_sigma_mm;
   settings.prior_width_mm = options.prior_width_mm;
   settings.world = {&scenario, pressure_Pa, temperature_degC};
-  native_fingertip_start(&settings);
+  settings.pad = pad ? &*pad : nullptr;
+  if (!native_fingertip_start(&settings)) {
+    throw Error("--pad: this player tells no tangential load; build it with "
+                "-DFINGERTIP_SCENE=grasp");
+  }
   native_cdc_open();
   send(osr);
   send(rate);
@@ -300,6 +312,14 @@ int run(int argc, char **argv) {
   player->add_option("--prior-width", play_options.prior_width_mm, "Its standard deviation")
       ->check(CLI::Range(0.001, 100.0))
       ->type_name("MM");
+  CLI::Option *pad = player
+                         ->add_option("--pad", play_options.pad_mm,
+                                      "Thickness of the pad: the firmware tells tangential load")
+                         ->type_name("MM");
+  player->add_option("--overhang", play_options.overhang_mm, "Of the pad")
+      ->type_name("MM")
+      ->needs(pad);
+  player->add_flag("--from-touch", play_options.from_touch, "As of fingertip pad")->needs(pad);
   player->add_option("--noise", play_options.noise, "Times the datasheet's; default 1")
       ->check(CLI::Range(0.0, 1000.0))
       ->type_name("FACTOR");

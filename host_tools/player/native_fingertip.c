@@ -22,7 +22,7 @@ static uint64_t bus_next_us(const void *context) {
   return sim_array_next_event_us(context);
 }
 
-void native_fingertip_start(const struct native_fingertip_settings *settings) {
+bool native_fingertip_start(const struct native_fingertip_settings *settings) {
   native_start(false);
   native_cdc_reset();
   native_flash_reset(settings->seed);
@@ -37,6 +37,12 @@ void native_fingertip_start(const struct native_fingertip_settings *settings) {
     app.fit_settings.prior_sigma_mm = settings->prior_sigma_mm;
     app.fit_settings.prior_width_mm = settings->prior_width_mm;
   }
+#if FT_WITH_TANGENTIAL
+  app_use_pad(&app, settings->pad);
+  return true;
+#else
+  return !settings->pad;
+#endif
 }
 
 bool native_fingertip_run_until(uint64_t t_us) {

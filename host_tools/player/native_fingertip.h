@@ -6,6 +6,7 @@
 #ifndef PLAYER_NATIVE_FINGERTIP_H
 #define PLAYER_NATIVE_FINGERTIP_H
 
+#include "common/pad_profile.h"
 #include "native/sim_array.h"
 
 #include <stdbool.h>
@@ -18,6 +19,7 @@ struct native_fingertip_settings {
                            this share; the firmware reads it and calculates with it */
   float prior_sigma_mm; /* prior on the width; prior_width_mm 0: the build's own */
   float prior_width_mm;
+  const struct pad_profile *pad; /* that acts, and outlives the fingertip; NULL: none */
   struct sim_world world;
 };
 
@@ -25,8 +27,8 @@ struct native_fingertip_settings {
 extern "C" {
 #endif
 
-/* Powers up at time 0. */
-void native_fingertip_start(const struct native_fingertip_settings *settings);
+/* Powers up at time 0. False: there is a pad, and this build tells no tangential load. */
+bool native_fingertip_start(const struct native_fingertip_settings *settings);
 
 /* Runs to t_us. False: the firmware left for the loader or panicked. */
 bool native_fingertip_run_until(uint64_t t_us);

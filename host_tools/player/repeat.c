@@ -7,6 +7,9 @@
 
 static struct app app;
 static struct calibration calibration;
+#if FT_WITH_TANGENTIAL
+static struct pad_profile pad;
+#endif
 
 bool repeat_begin(const struct wire_info *info) {
   memset(&app, 0, sizeof app);
@@ -25,6 +28,10 @@ bool repeat_begin(const struct wire_info *info) {
   fit_set_errors(&app.fit_settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
   calibration = info->calibration;
   app_use_calibration(&app, info->stored & WIRE_STORED_CALIBRATION ? &calibration : NULL);
+#if FT_WITH_TANGENTIAL
+  pad = info->pad;
+  app_use_pad(&app, info->stored & WIRE_STORED_PAD ? &pad : NULL);
+#endif
   app.contact_settings.slip_threshold_mm = info->slip_threshold_mm;
   app.contact_settings.slip_window_us = info->slip_window_ms * 1000u;
   repeat_tare();

@@ -5,11 +5,6 @@
 #include "libfingertip/text.hpp"
 #include "pad/profile.hpp"
 
-extern "C" {
-#include "config/geometry.h"
-}
-
-#include <algorithm>
 #include <cstdio>
 #include <functional>
 #include <map>
@@ -25,19 +20,13 @@ struct EncodeOptions {
   std::uint64_t time_us = 0;
 };
 
-/* Over the sensors of this tool's own build. */
 wire_packet pad_of(const std::string &thickness, const std::string &overhang, bool from_touch) {
-  wire_info info{};
-  info.sensor_count = geometry.sensor_count;
-  info.pitch_mm = geometry.pitch_mm;
-  std::copy(std::begin(geometry.x_mm), std::end(geometry.x_mm), info.x_mm);
-  std::copy(std::begin(geometry.y_mm), std::end(geometry.y_mm), info.y_mm);
   auto thickness_mm = to_double(thickness), overhang_mm = to_double(overhang);
   if (!thickness_mm || !overhang_mm) {
     throw Error("\"" + thickness + "\" and \"" + overhang +
                 "\" must be numbers; give thickness and overhang of the rubber, mm");
   }
-  return command_pad(pad::profile_of({*thickness_mm, *overhang_mm, from_touch}, info));
+  return command_pad(pad::profile_over_own_sensors({*thickness_mm, *overhang_mm, from_touch}));
 }
 
 wire_packet packet_from_words(const std::vector<std::string> &words) {
@@ -76,8 +65,7 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
       {"keep", {0, "keep", [] { return command_keep(true); }}},
       {"forget", {0, "forget", [] { return command_keep(false); }}},
       {"erase", {0, "erase", command_erase_calibration}},
-      {"pad",
-       {2, "pad THICKNESS_MM OVERHANG_MM", [&] { return pad_of(word(1), word(2), false); }}},
+      {"pad", {2, "pad THICKNESS_MM OVERHANG_MM", [&] { return pad_of(word(1), word(2), false); }}},
       {"pad-from-touch",
        {2, "pad-from-touch THICKNESS_MM OVERHANG_MM",
         [&] { return pad_of(word(1), word(2), true); }}},

@@ -705,7 +705,7 @@ class Commands(CliTest):
         with self.device():
             self.assertIn("of scene slip, tells no tangential load; install one of scene grasp", self.error("pad", "--thickness", "12"))
         with self.device("capabilities=15", "refuse=1"):
-            self.assertIn("pad refused", self.error("pad", "--thickness", "12"))
+            self.assertIn('refused "pad": not possible now', self.error("pad", "--thickness", "12"))
 
     def test_info_shows_a_pad_that_was_stored(self):
         with self.device("capabilities=15", "pad=1"):
