@@ -211,11 +211,7 @@ static bool take_record(struct store *store) {
   }
   if (version == VERSION && payload[0] & HAS_PROFILE) {
     get_profile(payload + profile_at, &content->profile);
-    content->has_profile = pad_profile_is_valid(&content->profile);
-    if (!content->has_profile) {
-      memset(content, 0, sizeof *content);
-      return false;
-    }
+    content->has_profile = true;
   }
   return true;
 }

@@ -57,7 +57,7 @@ struct store_content {
   bool has_calibration, has_settings, has_profile;
   struct calibration calibration;
   struct store_settings settings;
-  struct pad_profile profile;
+  struct pad_profile profile; /* kept by every firmware, judged by who uses it */
 };
 
 enum {

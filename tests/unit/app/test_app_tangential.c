@@ -145,6 +145,24 @@ static void a_profile_out_of_range_is_refused(void) {
   TEST_ASSERT_NULL(app.pad);
 }
 
+/* Of a firmware that knew other ranges. */
+static void a_stored_profile_out_of_range_does_not_act(void) {
+  native_cdc_open();
+  run_for(300);
+  struct pad_profile pad = pad_of_12_mm();
+  pad.thickness_mm = 25.0f;
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&app.store, &pad));
+  run_for(100);
+  for (int restart = 0; restart < 2; restart++) {
+    TEST_ASSERT_TRUE(app.store.content.has_profile);
+    TEST_ASSERT_NULL(app.pad);
+    TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
+    rig_power_up();
+    native_cdc_open();
+    run_for(300);
+  }
+}
+
 static void a_calibration_and_the_scale_of_the_profile_act(void) {
   load.qx_N = 1.2;
   struct wire_packet command = pad_command();
@@ -212,6 +230,7 @@ int main(void) {
   RUN_TEST(without_a_profile_there_is_none_and_the_fit_stays_as_it_is);
   RUN_TEST(a_profile_outlives_power_until_it_is_erased);
   RUN_TEST(a_profile_out_of_range_is_refused);
+  RUN_TEST(a_stored_profile_out_of_range_does_not_act);
   RUN_TEST(a_calibration_and_the_scale_of_the_profile_act);
   RUN_TEST(from_touch_tells_what_changed);
   RUN_TEST(a_held_frame_repeats_the_load);

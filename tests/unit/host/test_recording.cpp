@@ -256,6 +256,7 @@ TEST(Recording, ThePadIsKeptWithItsChanges) {
   std::vector<wire_packet> packets = {known, test::make_contact(2, 3, 1), anew, erased, anew};
   record(folder / "r.csv", packets);
   EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(packets));
+  EXPECT_EQ(read_all(folder / "r.csv")[3].body.info.pad.thickness_mm, 0);
   EXPECT_NE(contents(folder / "r.csv").find("\n# pad_moment_sds_mm: 4.8537 7.9913 20.39\n"),
             std::string::npos);
   std::string four = contents(folder / "r.csv");

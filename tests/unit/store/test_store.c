@@ -385,21 +385,6 @@ static void records_of_version_1_are_read(void) {
   TEST_ASSERT_TRUE(is(&kept));
 }
 
-/* Whole by its CRC, but no profile: nothing of the record is used. */
-static void a_profile_out_of_range_is_damage(void) {
-  static const struct store_content nothing;
-  struct pad_profile profile = some_profile();
-  TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&store, &profile));
-  TEST_ASSERT_EQUAL(FT_OK, finish());
-  const uint32_t thickness_at = 20 + 4 + 14 + 8 * SENSORS + 24;
-  TEST_ASSERT_EQUAL_HEX32(bytes_from_f32(profile.thickness_mm),
-                          bytes_get_u32(native_flash.bytes + thickness_at));
-  alter_record(thickness_at + 2, 0x42C8); /* 100 mm */
-  restart();
-  TEST_ASSERT_TRUE(store.damaged);
-  TEST_ASSERT_TRUE(is(&nothing));
-}
-
 /* Sectors that something else has used before. */
 static void rubbish_is_no_damage_and_in_nobodys_way(void) {
   for (int kind = 0; kind < 3; kind++) {
@@ -475,7 +460,6 @@ int main(void) {
   RUN_TEST(forgetting_mends_damage);
   RUN_TEST(what_another_firmware_wrote_is_left_alone);
   RUN_TEST(records_of_version_1_are_read);
-  RUN_TEST(a_profile_out_of_range_is_damage);
   RUN_TEST(rubbish_is_no_damage_and_in_nobodys_way);
   RUN_TEST(a_flash_that_has_worn_out_is_told_and_what_was_stays);
   RUN_TEST(a_flash_that_does_not_answer_is_not_waited_for);
