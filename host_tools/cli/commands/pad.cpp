@@ -70,7 +70,7 @@ void add_pad(CommandLine &line) {
   with_port(command, options->choice);
   CLI::Option *thickness = command
                                ->add_option("--thickness", options->thickness_mm,
-                                            "Of the rubber above the sensors, 4 to 20 mm")
+                                            "Of the rubber above the sensors, 5 to 20 mm")
                                ->type_name("MM");
   CLI::Option *overhang =
       command

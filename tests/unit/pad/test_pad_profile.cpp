@@ -125,7 +125,7 @@ TEST(PadProfile, GrowsWithTheThickness) {
     EXPECT_FLOAT_EQ(thick.tangential[j].moment_mm, 2 * thin.tangential[j].moment_mm);
     EXPECT_FLOAT_EQ(thick.tangential[j].sd_mm, 2 * thin.tangential[j].sd_mm);
   }
-  for (double thickness_mm : {4.0, 20.0}) {
+  for (double thickness_mm : {5.0, 20.0}) {
     pad_profile pad = profile_of(thickness_mm);
     EXPECT_TRUE(pad_profile_is_valid(&pad)) << thickness_mm;
   }
