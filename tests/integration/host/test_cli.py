@@ -208,7 +208,7 @@ class Usage(CliTest):
         from_zero, from_touch = (self.run_cli("encode", command, "12", "9")[0] for command in ("pad", "pad-from-touch"))
         self.assertIn("4041" + "012b" + "1041", from_zero)  # 12 and 9 mm; COBS has a code for each zero
         self.assertNotEqual(from_zero, from_touch)
-        self.assertIn("4 to 20 mm", self.error("encode", "pad", "3", "9", status=2))
+        self.assertIn("5 to 20 mm", self.error("encode", "pad", "3", "9", status=2))
         self.assertIn("must be numbers", self.error("encode", "pad", "thick", "9", status=2))
 
 

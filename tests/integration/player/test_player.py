@@ -154,7 +154,7 @@ class Player(unittest.TestCase):
         out = ("-o", self.folder / "never.csv")
         self.assertIn("256", self.refused("play", self.scenario, *out, "--osr", "300"))
         self.assertIn("belong together", self.refused("play", self.scenario, *out, "--prior-sigma", "3"))
-        self.assertIn("4 to 20 mm", self.refused("play", self.scenario, *out, "--pad", "3"))
+        self.assertIn("5 to 20 mm", self.refused("play", self.scenario, *out, "--pad", "3"))
         self.assertIn("belong together", self.refused("play", self.scenario, *out, "--slip-window", "50"))
 
     def capture(self, name, *commands):

@@ -1,8 +1,9 @@
-/* The app of scene slip, all there is. */
+/* The app of scene slip. */
 #include "app_rig.h"
 #include "common/bytes.h"
 #include "common/contact_flags.h"
 #include "common/crc32.h"
+#include "config/build_info.h"
 
 void setUp(void) {
   rig_start();
@@ -112,7 +113,7 @@ static void info_tells_what_this_is(void) {
   struct wire_info info = get_info();
   TEST_ASSERT_EQUAL_UINT8(15, info.sensor_count);
   TEST_ASSERT_EQUAL_STRING("native", info.board);
-  TEST_ASSERT_EQUAL_STRING("slip", info.scene);
+  TEST_ASSERT_EQUAL_STRING(build_info.scene, info.scene);
   TEST_ASSERT_EQUAL_FLOAT(9.0f, info.pitch_mm);
   TEST_ASSERT_EQUAL_FLOAT(-18.0f, info.y_mm[0]);
   TEST_ASSERT_EQUAL_UINT16(1024, info.osr);

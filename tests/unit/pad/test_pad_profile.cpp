@@ -125,7 +125,7 @@ TEST(PadProfile, GrowsWithTheThickness) {
     EXPECT_FLOAT_EQ(thick.tangential[j].moment_mm, 2 * thin.tangential[j].moment_mm);
     EXPECT_FLOAT_EQ(thick.tangential[j].sd_mm, 2 * thin.tangential[j].sd_mm);
   }
-  for (double thickness_mm : {5.0, 20.0}) {
+  for (double thickness_mm : {double(PAD_THICKNESS_MIN_mm), double(PAD_THICKNESS_MAX_mm)}) {
     pad_profile pad = profile_of(thickness_mm);
     EXPECT_TRUE(pad_profile_is_valid(&pad)) << thickness_mm;
   }
@@ -152,7 +152,7 @@ TEST(PadProfile, HasWhatItIsTold) {
 }
 
 TEST(PadProfile, RefusesWhatIsNoPad) {
-  for (double thickness_mm : {3.9, 20.1, -1.0, double(NAN)}) {
+  for (double thickness_mm : {double(PAD_THICKNESS_MIN_mm) - 0.1, 20.1, -1.0, double(NAN)}) {
     EXPECT_THROW(profile_of(thickness_mm), Error) << thickness_mm;
   }
   EXPECT_THROW(pad::profile_of({12, -1}, INFO), Error);
