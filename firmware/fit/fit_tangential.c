@@ -424,16 +424,18 @@ NOINLINE static void form(struct fit_tangential_room *room, const int32_t *scale
   set_elements(room, scale, 6, 0, 1, 2);
 }
 
-/* One step's normal equations, solved. L D L^T in place: below the diagonal L, Q12; above it D L,
- * Q15. A direction whose pivot is below PIVOT_LEAST is not told: it takes no step. */
+/* One step's normal equations, solved. L D L^T in place, with a power of two for each pivot between
+ * the factors, 2^half about 1 / sqrt(pivot), so that both have all of their 16 bits: below the
+ * diagonal L / 2^half, Q14; above it D L 2^half, Q15. A direction whose pivot is below PIVOT_LEAST
+ * is not told: it takes no step. */
 struct solution {
-  int32_t step_q20[UNKNOWNS];    /* of the normalised columns */
-  int32_t inverse_q12[UNKNOWNS]; /* of the pivots */
-  int32_t explained_q30;         /* what the step takes from the square sum of the residuals */
+  int32_t step_q20[UNKNOWNS]; /* of the normalised columns */
+  int32_t half[UNKNOWNS];
+  int32_t inverse_q13[UNKNOWNS]; /* of pivot 4^half, 1 to 4 */
+  int32_t explained_q30; /* what the step takes from the square sum of the residuals */
 };
 
 #define STEP_MAX_Q20 (1 << 26)
-#define FACTOR_MAX (1 << 14) /* 8 at the largest divisor */
 
 /* a - b modulo 2^32: rounding may take what a matrix that is nearly singular leaves anywhere. */
 FIXED_INLINE int32_t less(int32_t a, uint32_t b) {
@@ -442,22 +444,22 @@ FIXED_INLINE int32_t less(int32_t a, uint32_t b) {
 
 NOINLINE static void solve(int32_t matrix[UNKNOWNS][UNKNOWNS], const int32_t *right_q26,
                            struct solution *solution) {
-  int32_t y_q26[UNKNOWNS];
+  int32_t y_q26[UNKNOWNS]; /* 2^half of it */
   solution->explained_q30 = 0;
   for (int j = 0; j < UNKNOWNS; j++) {
     int32_t *own = matrix[j];
     uint32_t known = 0;
     for (int k = 0; k < j; k++) {
-      known += (uint32_t)fixed_mul_16(y_q26[k], own[k]);
+      known += (uint32_t)scaled_by(y_q26[k], own[k], 14);
     }
-    int32_t y = fixed_clamp(less(right_q26[j], known << 4), -(1 << 26), 1 << 26);
+    int32_t y = fixed_clamp(less(right_q26[j], known), -(1 << 26), 1 << 26);
     for (int i = UNKNOWNS - 1; i >= j; i--) {
       int32_t *row = matrix[i];
       uint32_t sum = 0;
       for (int k = 0; k < j; k++) {
         sum += (uint32_t)(row[k] * matrix[k][j]);
       }
-      row[j] = less(row[j], sum << 3);
+      row[j] = less(row[j], sum << 1);
     }
     int32_t pivot = own[j];
     if (pivot < PIVOT_LEAST) {
@@ -465,30 +467,33 @@ NOINLINE static void solve(int32_t matrix[UNKNOWNS][UNKNOWNS], const int32_t *ri
         matrix[j][i] = matrix[i][j] = 0;
       }
       y_q26[j] = solution->step_q20[j] = 0;
-      solution->inverse_q12[j] = 1 << 24;
+      solution->half[j] = 6;
+      solution->inverse_q13[j] = 1 << 13;
       continue;
     }
-    int32_t up = 30 - fixed_bits((uint32_t)pivot - 1);
+    int32_t up = 30 - fixed_bits((uint32_t)pivot);
     up = up < 0 ? 0 : up;
     int32_t inverse = port_divide((1 << 29) - 1, pivot >> (15 - up)); /* 2^14 .. 2^15 */
+    int32_t half = up >> 1, odd = up & 1;
     for (int i = j + 1; i < UNKNOWNS; i++) {
-      int32_t element = matrix[i][j];
-      int32_t factor = fixed_clamp(element >> (18 - up), -FACTOR_MAX, FACTOR_MAX);
-      own[i] = element >> 15;
-      matrix[i][j] = rounded(factor * inverse, 14);
+      int32_t element = fixed_clamp(rounded(matrix[i][j], 15 - half), -INT16_MAX, INT16_MAX);
+      own[i] = element;
+      matrix[i][j] = rounded(element * inverse, 15 - odd);
     }
-    y_q26[j] = y;
     int32_t z_q20 = shifted(fixed_mul_16(y, inverse), up - 4);
     solution->step_q20[j] = z_q20 = fixed_clamp(z_q20, -STEP_MAX_Q20, STEP_MAX_Q20);
-    solution->inverse_q12[j] = inverse * (1 << up) / 4;
+    solution->half[j] = half;
+    solution->inverse_q13[j] = (inverse << odd) >> 1;
     solution->explained_q30 += (y >> 11) * (fixed_clamp(z_q20, -(1 << 20), 1 << 20) >> 5);
+    y_q26[j] = shifted(y, half);
   }
   for (int i = UNKNOWNS - 2; i >= 0; i--) {
     uint32_t known = 0;
     for (int k = i + 1; k < UNKNOWNS; k++) {
-      known += (uint32_t)fixed_mul_16(solution->step_q20[k], matrix[k][i]);
+      known += (uint32_t)scaled_by(solution->step_q20[k], matrix[k][i], 14);
     }
-    solution->step_q20[i] = fixed_clamp(less(solution->step_q20[i], known << 4), -STEP_MAX_Q20, STEP_MAX_Q20);
+    int32_t z_q20 = solution->step_q20[i] - shifted((int32_t)known, solution->half[i]);
+    solution->step_q20[i] = fixed_clamp(z_q20, -STEP_MAX_Q20, STEP_MAX_Q20);
   }
 }
 
@@ -625,29 +630,22 @@ NOINLINE static void begin(const struct fit_array *array, const struct fit_pad *
   at->amplitude_q24 = fixed_clamp(fit_scaled_to_fixed(amplitude, 24), 1 << 18, AMPLITUDE_MAX_Q24);
 }
 
-/* Element i of the diagonal of the inverse matrix, Q12. */
-static struct scaled inverse_element(const struct fit_tangential_room *room,
-                                     const struct solution *solution, int i) {
-  int32_t w_q12[UNKNOWNS];
-  struct scaled sum = {0, 0};
-  for (int k = i; k < UNKNOWNS; k++) {
-    int32_t w = k == i ? 1 << 12 : 0;
-    for (int m = i; m < k; m++) {
-      w -= (room->matrix[k][m] * w_q12[m]) >> 12;
-    }
-    w_q12[k] = w = fixed_clamp(w, -INT16_MAX, INT16_MAX);
-    struct scaled square = fit_scaled_from(w * w, -24);
-    sum = scaled_add(sum, scaled_mul(square, fit_scaled_from(solution->inverse_q12[k], -12)));
-  }
-  return sum;
-}
-
-/* Variance of an unknown, in its unit squared, of readings whose variance is 1. */
+/* Variance of an unknown, in its unit squared, of readings whose variance is 1: an element of the
+ * diagonal of the inverse matrix. */
 static struct scaled variance_of(const struct fit_tangential_room *room,
                                  const struct outcome *outcome, int u) {
-  struct scaled variance = inverse_element(room, &outcome->solution, u);
-  variance.exponent += 2 * outcome->column_q[u] - 30;
-  return variance;
+  const struct solution *solution = &outcome->solution;
+  int32_t w_q8[UNKNOWNS]; /* row of the inverse of L, times 2^half */
+  int32_t sum_q11 = 0;
+  for (int k = u; k < UNKNOWNS; k++) {
+    int32_t w = k == u ? 1 << 8 : 0;
+    for (int m = u; m < k; m++) {
+      w -= (room->matrix[k][m] * w_q8[m]) >> 14;
+    }
+    w_q8[k] = w = fixed_clamp(shifted(w, solution->half[k]), -INT16_MAX, INT16_MAX);
+    sum_q11 += (((w * w) >> 9) * (solution->inverse_q13[k] >> 6)) >> 3;
+  }
+  return fit_scaled_from(sum_q11, 2 * outcome->column_q[u] - 30 - 11);
 }
 
 static float root_of(struct scaled square) {
