@@ -59,7 +59,8 @@ struct problem {
   struct readings readings;
   int32_t base_q22;    /* standard deviation of a reading of weight 1, of the unit of readings */
   int32_t noise_q22;   /* likewise */
-  int32_t long_sd_q26; /* prior of e1 and e2: the amplitude at the beginning is in it */
+  /* Rows of the priors of t and of e1 and e2, whose scale is the amplitude at the beginning. */
+  int32_t spread_prior_q26, long_prior_q26;
 };
 
 static int32_t q26_from(float value) {
@@ -88,6 +89,7 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
   pad->unit_mm = unit_mm;
   pad->per_unit = per_unit;
   pad->pitch_q26 = q26_from(array->pitch_mm * per_unit);
+  pad->pitch_square_q26 = fixed_mul_q26(pad->pitch_q26, pad->pitch_q26);
   pad->spread_q26 = q26_from(profile->spread_mm2 * per_square);
   pad->spread_sd_q26 = q26_from(profile->spread_sd_mm2 * per_square);
   pad->long_sd_q26 = q26_from(ELONGATION_SD_mm2 * per_square);
@@ -96,197 +98,243 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
   return FT_OK;
 }
 
-/* (1 / v) / 16 in Q26 for v in Q26, at least 2^-7. */
-static int32_t sixteenth_of_inverse(int32_t v_q26) {
-  return fixed_div_q26(1 << 22, v_q26);
+/* a * b / 2^shift, 16 < shift <= 32, from three 16-bit products, for |a|, |b| <= 2^30: error below
+ * 1 + 2^(32 - shift) units. */
+FIXED_INLINE int32_t product(int32_t a, int32_t b, int shift) {
+  int32_t a_high = a >> 16, a_low = (uint16_t)a;
+  int32_t b_high = b >> 16, b_low = (uint16_t)b;
+  return a_high * b_high * (1 << (32 - shift)) +
+         ((a_high * b_low + a_low * b_high) >> (shift - 16));
 }
 
-/* Of a contact at the state's place: where the sensors lie, along each axis. */
-struct offsets {
-  int32_t x_q26[COLUMNS], y_q26[ROWS];
-  int32_t xx_q24[COLUMNS], yy_q24[ROWS]; /* squares */
+/* The same with the fourth product: error below 2 units. */
+FIXED_INLINE int32_t whole_product(int32_t a, int32_t b, int shift) {
+  uint32_t low = (uint32_t)(uint16_t)a * (uint16_t)b;
+  return product(a, b, shift) + (int32_t)(shift < 32 ? low >> shift : 0);
+}
+
+/* a * b / 2^shift, shift <= 16, for |b| < 2^15, from two: error below one unit. */
+FIXED_INLINE int32_t scaled_by(int32_t a, int32_t b, int shift) {
+  return (a >> 16) * b * (1 << (16 - shift)) + (((int32_t)(uint16_t)a * b) >> shift);
+}
+
+/* value / 2^shift to the nearest. */
+FIXED_INLINE int32_t rounded(int32_t value, int shift) {
+  return (value + (1 << (shift - 1))) >> shift;
+}
+
+/* Of a contact at the state's place: where the sensors lie along one axis, and what of the model
+ * depends on that alone. */
+struct offset {
+  int32_t d_q26, d_q12;
+  int32_t half_square_q23;
+  int32_t pulled_q24;             /* B d */
+  int32_t longer_q26;             /* e1 d^2 / 2 */
+  int32_t along_q28, across_q28;  /* e1 d, e2 d */
 };
 
-static void set_offsets(int32_t pitch_q26, const struct unknowns *at, struct offsets *off) {
-  for (int i = 0; i < COLUMNS; i++) {
-    off->x_q26[i] = (i - COLUMNS / 2) * pitch_q26 - at->x_q26;
-    off->xx_q24[i] = fixed_mul_q28(off->x_q26[i], off->x_q26[i]);
-  }
-  for (int k = 0; k < ROWS; k++) {
-    off->y_q26[k] = (k - ROWS / 2) * pitch_q26 - at->y_q26;
-    off->yy_q24[k] = fixed_mul_q28(off->y_q26[k], off->y_q26[k]);
-  }
+static void set_offset(int32_t d_q26, int32_t pull_q24, const struct unknowns *at,
+                       struct offset *off) {
+  off->d_q26 = d_q26;
+  off->d_q12 = rounded(d_q26, 14);
+  off->half_square_q23 = fixed_mul_q28(d_q26, d_q26) >> 2;
+  off->pulled_q24 = fixed_mul_q26(pull_q24, d_q26);
+  off->longer_q26 = whole_product(at->e1_q26 * 64, off->half_square_q23, 29);
+  off->across_q28 = whole_product(at->e2_q26 * 64, d_q26, 30);
+  off->along_q28 = product(at->e1_q26 * 64, d_q26, 30);
 }
 
-/* The factors of one term, strength V0 / v exp(-d' d / (2 v)). */
+/* One term, strength V0 / v exp(-d' d / (2 v)). */
 struct term {
-  int32_t x_q28[COLUMNS]; /* with the strength, at most 2 */
+  int32_t x_q28[COLUMNS]; /* with the strength */
   int32_t y_q30[ROWS];
-  int32_t inverse_q10; /* 1 / v, at most 16 */
+  int32_t inverse_q11; /* 1 / v, at most 16 */
 };
+
+/* d' d / (2 v) in Q22 and powers of 2, along one axis: bend (i pitch - place)^2, exactly a parabola
+ * in the node number, so that rounding moves the term's place and width and never the residual. */
+struct parabola {
+  int32_t square_q26, by_pitch_q26; /* place^2, place pitch */
+};
+
+#define Z_LEAST_Q22 16 /* rounding takes no exponent below zero */
+
+NOINLINE static void set_exponentials(int32_t bend_q26, int32_t by_square, int32_t nodes,
+                                      const struct parabola *axis, int32_t *value_q30) {
+  uint32_t at_origin = (uint32_t)fixed_mul_q26(bend_q26, axis->square_q26) + Z_LEAST_Q22;
+  int32_t slope = fixed_mul_q26(bend_q26, axis->by_pitch_q26) * 2;
+  for (int32_t k = 0, i = -(nodes / 2); k < nodes; k++, i++) {
+    value_q30[k] = exp2_negative(at_origin + (uint32_t)i * ((uint32_t)(i * by_square) - (uint32_t)slope));
+  }
+}
 
 #define LEAST_VARIANCE_Q26 (ONE_Q26 / 16)
-#define EXPONENT_MAX_Q20 (1 << 29)
-#define LONGER_MAX_Q24 ((4 << 24) - 1)
 
 NOINLINE static void set_term(const struct fit_pad *pad, int j, int32_t t_q26,
-                              const struct offsets *off, struct term *term) {
+                              const struct parabola *axes, struct term *term) {
   int32_t v = pad->variance_q26[j] + t_q26;
-  int32_t inverse = sixteenth_of_inverse(v < LEAST_VARIANCE_Q26 ? LEAST_VARIANCE_Q26 : v);
-  int32_t height = fixed_mul_q26(inverse, pad->strength_q26[j]) * 4 /* V0 / v of it */;
+  int32_t inverse_q22 =
+      fixed_div_q26(1 << 22, v < LEAST_VARIANCE_Q26 ? LEAST_VARIANCE_Q26 : v); /* 1 / v */
+  int32_t height_q24 = fixed_mul_q26(inverse_q22, pad->strength_q26[j]); /* V0 / v of it, V0 1/4 */
   if (j >= PAD_NORMAL_TERMS) {
-    height = fixed_mul_q26(height, inverse) * 16; /* moment V0 / v^2 */
+    height_q24 = fixed_mul_q26(height_q24, inverse_q22) * 16; /* moment V0 / v^2 */
   }
-  height = fixed_clamp(height, 0, 2 << 26);
-  int32_t bend = fixed_mul_q26(inverse, LOG2E_HALF_Q26);
+  int32_t height_q28 = fixed_clamp(height_q24, 0, (2 << 24) - 1) * 16;
+  int32_t bend_q26 = fixed_mul_q26(inverse_q22, LOG2E_HALF_Q26);
+  int32_t by_square = fixed_mul_q26(bend_q26, pad->pitch_square_q26);
+  set_exponentials(bend_q26, by_square, COLUMNS, &axes[0], term->x_q28);
+  set_exponentials(bend_q26, by_square, ROWS, &axes[1], term->y_q30);
   for (int i = 0; i < COLUMNS; i++) {
-    int32_t z_q20 = fixed_clamp(fixed_mul_q26(bend, off->xx_q24[i]), 0, EXPONENT_MAX_Q20);
-    term->x_q28[i] = fixed_mul_q28(exp2_negative((uint32_t)z_q20 << 2), height);
+    term->x_q28[i] = product(term->x_q28[i], height_q28, 30);
   }
-  for (int k = 0; k < ROWS; k++) {
-    int32_t z_q20 = fixed_clamp(fixed_mul_q26(bend, off->yy_q24[k]), 0, EXPONENT_MAX_Q20);
-    term->y_q30[k] = exp2_negative((uint32_t)z_q20 << 2);
-  }
-  term->inverse_q10 = inverse >> 12;
+  term->inverse_q11 = fixed_clamp(rounded(inverse_q22, 11), 0, INT16_MAX);
 }
+
+/* struct fit_tangential_sums of every node. */
+NOINLINE static void set_sums(const struct term *terms, union fit_tangential_node *node) {
+  for (int i = 0; i < COLUMNS; i++) {
+    for (int k = 0; k < ROWS; k++, node++) {
+      struct fit_tangential_sums *sums = &node->sums;
+      int32_t s0 = 0, s1 = 0, s2 = 0, s3 = 0, s4 = 0;
+      const struct term *term = terms;
+      for (int j = 0; j < PAD_NORMAL_TERMS; j++, term++) {
+        int32_t w_q28 = product(term->x_q28[i], term->y_q30[k], 30);
+        int32_t over = term->inverse_q11;
+        s0 += w_q28;
+        int32_t w_q25 = scaled_by(w_q28, over, 14);
+        s1 += w_q25;
+        int32_t w_q22 = scaled_by(w_q25, over, 14);
+        s2 += w_q22;
+        int32_t w_q17 = scaled_by(w_q22, over, 16);
+        s3 += w_q17;
+        s4 += scaled_by(w_q17, over, 14);
+      }
+      sums->s0_q28 = s0;
+      sums->s1_q25 = s1;
+      sums->s2_q22 = s2;
+      sums->s3_q17 = s3;
+      sums->s4_q14 = s4;
+      int32_t f0 = 0, f1 = 0, f2 = 0;
+      for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++, term++) {
+        int32_t w_q28 = product(term->x_q28[i], term->y_q30[k], 30);
+        int32_t over = term->inverse_q11;
+        f0 += w_q28;
+        int32_t w_q25 = scaled_by(w_q28, over, 14);
+        f1 += w_q25;
+        f2 += scaled_by(w_q25, over, 14);
+      }
+      sums->f0_q28 = f0;
+      sums->f1_q25 = f1;
+      sums->f2_q22 = f2;
+    }
+  }
+}
+
+#define LONGER_MAX_Q26 ((4 << 26) - 1)
+#define PULLED_MAX_Q24 (12 << 24)
+#define SPREAD_COLUMN_MAX_Q13 (60 << 13)
+
+/* Qs in which the columns leave linearise. */
+static const uint8_t column_q[UNKNOWNS] = {16, 13, 13, 13, 16, 16, 16, 16};
 
 FIXED_INLINE int32_t weighed(int32_t value, int32_t weight_q12) {
-  return (value * weight_q12 + (1 << 11)) >> 12;
+  return rounded(value * weight_q12, 12);
 }
 
-/* One step's model and Jacobian. With w_j a term at a node, s_i and f_i the sums of w_j / v_j^i
- * over the normal and the tangential terms, d = (dx, dy) and r2 = d' d: m     = A s0 + P s2 + (B'
- * d) f0,     P = e1 (dx^2 - dy^2) / 2 + e2 dx dy dm/dx = dx (A s1 + P s3 + (B' d) f1) - (e1 dx + e2
- * dy) s2 - Bx f0 dm/dt = A (r2 s2 / 2 - s1) + P (r2 s4 / 2 - 3 s3) + KAPPA (B' d) (r2 f2 / 2 - 2
- * f1) (e1 and e2 with the amplitude in them). Columns leave weighed, in Q14, residuals in Q24. */
-NOINLINE static void linearise(struct problem *problem, const struct unknowns *at,
+/* One step's model and Jacobian, weighed; residuals in Q24. With d = (dx, dy), r2 = d' d and
+ * b = Bx dx + By dy:
+ *   m     = A s0 + P s2 + b f0,     P = e1 (dx^2 - dy^2) / 2 + e2 dx dy
+ *   dm/dx = dx (A s1 + P s3 + b f1) - (e1 dx + e2 dy) s2 - Bx f0
+ *   dm/dt = r2 / 2 (A s2 + P s4 + KAPPA b f2) - (A s1 + 3 P s3 + 2 KAPPA b f1)
+ * (e1 and e2 with the amplitude in them). */
+NOINLINE static void linearise(const struct problem *problem, const struct unknowns *at,
                                struct fit_tangential_room *room) {
-  struct offsets off;
+  const struct fit_pad *pad = problem->pad;
+  struct offset off_x[COLUMNS], off_y[ROWS];
   struct term terms[FIT_TANGENTIAL_TERMS];
-  set_offsets(problem->pad->pitch_q26, at, &off);
+  const struct parabola axes[2] = {
+      {fixed_mul_q26(at->x_q26, at->x_q26), fixed_mul_q26(at->x_q26, pad->pitch_q26)},
+      {fixed_mul_q26(at->y_q26, at->y_q26), fixed_mul_q26(at->y_q26, pad->pitch_q26)}};
+  for (int i = 0; i < COLUMNS; i++) {
+    set_offset((i - COLUMNS / 2) * pad->pitch_q26 - at->x_q26, at->pull_x_q24, at, &off_x[i]);
+  }
+  for (int k = 0; k < ROWS; k++) {
+    set_offset((k - ROWS / 2) * pad->pitch_q26 - at->y_q26, at->pull_y_q24, at, &off_y[k]);
+  }
   int32_t wider_q26 = fixed_mul_16(at->t_q26, KAPPA_Q14) * 4;
   for (int j = 0; j < FIT_TANGENTIAL_TERMS; j++) {
-    set_term(problem->pad, j, j < PAD_NORMAL_TERMS ? at->t_q26 : wider_q26, &off, &terms[j]);
+    set_term(pad, j, j < PAD_NORMAL_TERMS ? at->t_q26 : wider_q26, axes, &terms[j]);
   }
-  int32_t a_q10 = at->amplitude_q24 >> 14;
-  int32_t bx_q12 = at->pull_x_q24 >> 12, by_q12 = at->pull_y_q24 >> 12;
-  int32_t e1_q17 = at->e1_q26 >> 9, e2_q17 = at->e2_q26 >> 9;
-  int node = 0;
+  set_sums(terms, room->node);
+  int32_t a_q28 = at->amplitude_q24 * 16, a_q13 = fixed_clamp(rounded(at->amplitude_q24, 11), 0, INT16_MAX);
+  int32_t bx_q28 = at->pull_x_q24 * 16, by_q28 = at->pull_y_q24 * 16;
+  int n = 0;
   for (int i = 0; i < COLUMNS; i++) {
-    int32_t dx = off.x_q26[i] >> 14; /* Q12 */
-    int32_t pulled_x = fixed_mul_q26(at->pull_x_q24, off.x_q26[i]);
-    int32_t xx = off.xx_q24[i];
-    for (int k = 0; k < ROWS; k++, node++) {
-      int32_t weight = room->weight_q12[node];
-      int32_t dy = off.y_q26[k] >> 14;
-      int32_t yy = off.yy_q24[k];
-      int32_t half_r2 = (xx + yy) >> 11; /* Q14 */
+    const struct offset *x = &off_x[i];
+    for (int k = 0; k < ROWS; k++, n++) {
+      const struct offset *y = &off_y[k];
+      union fit_tangential_node *node = &room->node[n];
+      struct fit_tangential_sums sums = node->sums;
+      int32_t weight = room->weight_q12[n];
 
-      int32_t s0_q28 = 0, s1 = 0, s2_q12 = 0, s3 = 0, s4 = 0; /* Q14, Q12, Q8, Q4 */
-      _Pragma("GCC unroll 2") for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
-        int32_t w_q28 = fixed_mul_q30(terms[j].x_q28[i], terms[j].y_q30[k]);
-        int32_t over = terms[j].inverse_q10;
-        s0_q28 += w_q28;
-        int32_t w = ((w_q28 >> 13) * over) >> 11;
-        s1 += w;
-        w = ((w >> 2) * over) >> 10;
-        s2_q12 += w;
-        w = ((w >> 4) * over) >> 10;
-        s3 += w;
-        s4 += ((w >> 4) * over) >> 10;
-      }
-      int32_t f0_q28 = 0, f1 = 0, f2 = 0; /* Q14, Q12 */
-      _Pragma("GCC unroll 3") for (int j = PAD_NORMAL_TERMS; j < FIT_TANGENTIAL_TERMS; j++) {
-        int32_t w_q28 = fixed_mul_q30(terms[j].x_q28[i], terms[j].y_q30[k]);
-        int32_t over = terms[j].inverse_q10;
-        f0_q28 += w_q28;
-        int32_t w = ((w_q28 >> 13) * over) >> 11;
-        f1 += w;
-        f2 += ((w >> 2) * over) >> 10;
-      }
-      int32_t pulled = pulled_x + fixed_mul_q26(at->pull_y_q24, off.y_q26[k]); /* Q24 */
-      int32_t stretch_q24 = (xx - yy) >> 1;                                    /* of unit 1/2 */
-      int32_t slant_q24 = fixed_mul_q28(off.x_q26[i], off.y_q26[k]);
-      int32_t longer_q24 =
-          fixed_mul_q26(stretch_q24, at->e1_q26) + fixed_mul_q26(slant_q24, at->e2_q26);
-      longer_q24 = fixed_clamp(longer_q24, -LONGER_MAX_Q24, LONGER_MAX_Q24); /* P */
-      room->residual[node] =
-          (problem->readings.q28[node] >> 4) - fixed_mul_q28(at->amplitude_q24, s0_q28) -
-          fixed_mul_q28(pulled, f0_q28) - fixed_mul_q26(longer_q24 * 16, s2_q12 * 1024);
+      int32_t pulled_q24 = fixed_clamp(x->pulled_q24 + y->pulled_q24, -PULLED_MAX_Q24, PULLED_MAX_Q24);
+      int32_t longer_q26 = x->longer_q26 - y->longer_q26 + whole_product(x->across_q28, y->d_q26, 28);
+      longer_q26 = fixed_clamp(longer_q26, -LONGER_MAX_Q26, LONGER_MAX_Q26);
+      int32_t residual = (problem->readings.q28[n] >> 4) - product(a_q28, sums.s0_q28, 32) -
+          whole_product(pulled_q24 * 4, sums.f0_q28 * 2, 31) - whole_product(longer_q26 * 4, sums.s2_q22 * 2, 27);
+      room->residual[n] = scaled_by(residual, weight, 12);
 
-      int32_t s2 = s2_q12 >> 2;                               /* Q10 */
-      int32_t f = f0_q28 >> 14;                               /* Q14 */
-      int32_t b = pulled >> 12;                               /* Q12 */
-      int32_t p = longer_q24 >> 8;                            /* Q16 */
-      int32_t bf1 = (b * f1) >> 12, as1 = (a_q10 * s1) >> 10; /* Q14 */
-      int32_t radial = as1 + ((p * s3) >> 10) + bf1;
-      int32_t along_x = (e1_q17 * dx + e2_q17 * dy) >> 12; /* Q17 */
-      int32_t along_y = (e2_q17 * dx - e1_q17 * dy) >> 12;
-      int32_t *column = &room->column[0][node];
-      int32_t place_x = ((radial * dx) >> 12) - ((along_x * s2) >> 13) - ((bx_q12 * f) >> 12);
-      int32_t place_y = ((radial * dy) >> 12) - ((along_y * s2) >> 13) - ((by_q12 * f) >> 12);
-      int32_t bend = ((a_q10 * s2) >> 10) + ((p * s4) >> 10); /* Q10 */
-      int32_t widen = ((half_r2 * bend) >> 10) - as1 - 3 * ((p * s3) >> 10);
-      int32_t pulled_widen = ((half_r2 * ((b * f2) >> 14)) >> 10) - 2 * bf1;
-      widen += (pulled_widen * (KAPPA_Q14 >> 4)) >> 10;
-      column[AMPLITUDE * NODES] = weighed(s0_q28 >> 14, weight);
-      column[PLACE_X * NODES] = weighed(place_x, weight);
-      column[PLACE_Y * NODES] = weighed(place_y, weight);
-      column[SPREAD * NODES] = weighed(widen, weight);
-      column[STRETCH * NODES] = weighed(((stretch_q24 >> 10) * s2) >> 10, weight);
-      column[SLANT * NODES] = weighed(((slant_q24 >> 10) * s2) >> 10, weight);
-      column[PULL_X * NODES] = weighed((f * dx) >> 12, weight);
-      column[PULL_Y * NODES] = weighed((f * dy) >> 12, weight);
+      int32_t p_q28 = longer_q26 * 4;
+      int32_t as1_q20 = scaled_by(sums.s1_q25, a_q13, 16) >> 2;
+      int32_t ps3_q20 = product(sums.s3_q17, p_q28, 25);
+      int32_t bf1_q20 = product(sums.f1_q25, pulled_q24 * 4, 31);
+      int32_t radial_q20 = as1_q20 + ps3_q20 + bf1_q20;
+      int32_t bend_q20 = scaled_by(sums.s2_q22, a_q13, 15) +
+                         whole_product(sums.s4_q14, p_q28, 22) +
+                         product(sums.f2_q22, scaled_by(pulled_q24, KAPPA_Q14, 12), 28);
+      int32_t flat_q13 = rounded(as1_q20 + 3 * ps3_q20 + scaled_by(bf1_q20, KAPPA_Q14, 13), 7);
+      int32_t f_q14 = rounded(sums.f0_q28, 14);
+      int32_t along_x = product(sums.s2_q22, x->along_q28 + y->across_q28, 32); /* Q18 */
+      int32_t along_y = product(sums.s2_q22, x->across_q28 - y->along_q28, 32);
+      int32_t place_x_q14 = product(radial_q20, x->d_q26, 32) - (along_x >> 4) - (product(bx_q28, sums.f0_q28, 32) >> 10);
+      int32_t place_y_q14 = product(radial_q20, y->d_q26, 32) - (along_y >> 4) - (product(by_q28, sums.f0_q28, 32) >> 10);
+      int32_t half_square_q23 = x->half_square_q23 + y->half_square_q23;
+      int32_t widen_q13 = product(half_square_q23, bend_q20, 30) - flat_q13;
+      widen_q13 = fixed_clamp(widen_q13, -SPREAD_COLUMN_MAX_Q13, SPREAD_COLUMN_MAX_Q13);
+      int32_t stretch_q23 = x->half_square_q23 - y->half_square_q23;
+      int32_t slant_q22 = product(x->d_q26, y->d_q26, 30);
+
+      int32_t *column = node->column;
+      column[AMPLITUDE] = weighed(rounded(sums.s0_q28, 12), weight);
+      column[PLACE_X] = weighed(rounded(place_x_q14, 1), weight);
+      column[PLACE_Y] = weighed(rounded(place_y_q14, 1), weight);
+      column[SPREAD] = weighed(widen_q13, weight);
+      column[STRETCH] = weighed(product(stretch_q23, sums.s2_q22, 29), weight);
+      column[SLANT] = weighed(product(slant_q22 * 2, sums.s2_q22, 29), weight);
+      column[PULL_X] = weighed(rounded(f_q14 * x->d_q12, 10), weight);
+      column[PULL_Y] = weighed(rounded(f_q14 * y->d_q12, 10), weight);
     }
   }
 }
 
 /* The rows that priors add: of SPREAD, STRETCH and SLANT, each alone in its own. */
 struct priors {
-  int32_t row[UNKNOWNS];      /* as the column it belongs to */
-  int32_t residual[UNKNOWNS]; /* as the residuals */
+  int32_t row_q26[UNKNOWNS];
+  int32_t residual[UNKNOWNS]; /* Q24, then as the residuals */
 };
 
 static void set_priors(const struct problem *problem, const struct unknowns *at,
                        struct priors *priors) {
   memset(priors, 0, sizeof *priors);
-  int32_t base_q26 = problem->base_q22 << 4;
-  int32_t spread_q26 = fixed_div_q26(base_q26, problem->pad->spread_sd_q26);
-  int32_t long_q26 = fixed_div_q26(base_q26, problem->long_sd_q26);
-  const int32_t missing[UNKNOWNS] = {[SPREAD] = problem->pad->spread_q26 - at->t_q26,
-                                     [STRETCH] = -at->e1_q26,
-                                     [SLANT] = -at->e2_q26};
-  for (int u = SPREAD; u <= SLANT; u++) {
-    priors->row[u] = fixed_clamp(u == SPREAD ? spread_q26 : long_q26, 1, 2 * ONE_Q26);
-    priors->residual[u] = fixed_mul_q28(missing[u], priors->row[u]);
-  }
+  priors->row_q26[SPREAD] = problem->spread_prior_q26;
+  priors->row_q26[STRETCH] = priors->row_q26[SLANT] = problem->long_prior_q26;
+  priors->residual[SPREAD] = fixed_mul_q28(problem->pad->spread_q26 - at->t_q26, problem->spread_prior_q26);
+  priors->residual[STRETCH] = fixed_mul_q28(-at->e1_q26, problem->long_prior_q26);
+  priors->residual[SLANT] = fixed_mul_q28(-at->e2_q26, problem->long_prior_q26);
 }
 
-/* Brings column, Q14, and prior, Q26, to 13 bits at most, so that their square sum is below 2^30;
- * returns their Q. */
-static int32_t normalise_column(int32_t *column, int32_t *prior) {
-  uint32_t largest = fixed_size(*prior) >> 12;
-  _Pragma("GCC unroll 15") for (int k = 0; k < NODES; k++) {
-    largest |= fixed_size(column[k]);
-  }
-  int32_t shift = fixed_bits(largest) - 13;
-  if (shift > 0) {
-    int32_t half = 1 << (shift - 1);
-    _Pragma("GCC unroll 15") for (int k = 0; k < NODES; k++) {
-      column[k] = (column[k] + half) >> shift;
-    }
-  } else {
-    _Pragma("GCC unroll 15") for (int k = 0; k < NODES; k++) {
-      column[k] *= 1 << -shift;
-    }
-  }
-  *prior = (*prior + (1 << (11 + shift))) >> (12 + shift);
-  return 14 - shift;
-}
-
-/* Brings residuals to 13 bits, and weighs those of the sensors; returns their Q. */
-NOINLINE static int32_t normalise_residuals(const int32_t *weight_q12, int32_t *residual,
-                                            struct priors *priors) {
+/* Brings residuals to 14 bits; returns their Q less one. */
+NOINLINE static int32_t normalise_residuals(int32_t *residual, struct priors *priors) {
   uint32_t largest = 1;
   for (int k = 0; k < NODES; k++) {
     largest |= fixed_size(residual[k]);
@@ -294,81 +342,158 @@ NOINLINE static int32_t normalise_residuals(const int32_t *weight_q12, int32_t *
   for (int u = SPREAD; u <= SLANT; u++) {
     largest |= fixed_size(priors->residual[u]);
   }
-  int32_t shift = fixed_bits(largest) - 13;
+  /* What rounding carries over counts as a bit more. */
+  int32_t shift = fixed_bits(largest + (largest >> 8)) - 14;
   int32_t down = shift > 0 ? shift : 0, up = shift < 0 ? -shift : 0;
+  int32_t half = (1 << down) >> 1;
   for (int k = 0; k < NODES; k++) {
-    residual[k] = (((residual[k] >> down) * (1 << up)) * weight_q12[k]) >> 12;
+    residual[k] = ((residual[k] + half) >> down) * (1 << up);
   }
   for (int u = SPREAD; u <= SLANT; u++) {
-    priors->residual[u] = (priors->residual[u] >> down) * (1 << up);
+    priors->residual[u] = ((priors->residual[u] + half) >> down) * (1 << up);
   }
-  return 24 - shift;
+  return 24 - shift - 1;
 }
 
-static int32_t dot(const int32_t *a, const int32_t *b) {
-  int32_t sum = 0;
-  _Pragma("GCC unroll 15") for (int k = 0; k < NODES; k++) {
-    sum += a[k] * b[k];
+/* The normal equations, each unknown scaled so that its diagonal element is 2^28 .. 2^30. */
+struct equations {
+  int32_t right_q26[UNKNOWNS];
+  int32_t column_q[UNKNOWNS]; /* a column's integer is its value times 2^q */
+  int32_t scale[UNKNOWNS];
+};
+
+/* Brings a column to 13 bits, and its prior with it. */
+NOINLINE static void normalise_column(struct fit_tangential_room *room, int u, int32_t prior_q26,
+                                      int32_t prior_residual, struct equations *equations) {
+  int32_t *column = &room->node[0].column[u];
+  int32_t q = column_q[u];
+  uint32_t largest = fixed_size(prior_q26) >> (26 - q);
+  for (int k = 0; k < NODES; k++) {
+    largest |= fixed_size(column[k * UNKNOWNS]);
   }
-  return sum;
+  int32_t shift = fixed_bits(largest + (largest >> 8)) - 13;
+  int32_t down = shift > 0 ? shift : 0, up = shift < 0 ? -shift : 0;
+  int32_t half = (1 << down) >> 1;
+  q -= shift;
+  int32_t row = shifted(prior_q26, q - 26);
+  int32_t own = row * row, right = row * prior_residual;
+  const int32_t *residual = room->residual;
+  for (int k = 0; k < NODES; k++) {
+    int32_t value = ((column[k * UNKNOWNS] + half) >> down) * (1 << up);
+    column[k * UNKNOWNS] = value;
+    own += value * value;
+    right += value * residual[k];
+  }
+  int32_t scale = (30 - fixed_bits((uint32_t)own)) >> 1;
+  scale = scale > 2 ? 2 : scale;
+  equations->scale[u] = scale;
+  equations->column_q[u] = q + scale;
+  equations->right_q26[u] = right >> (5 - scale);
+  room->matrix[u][u] = own * (1 << (2 * scale));
 }
 
-/* One step's normal equations, solved. L D L^T in place: below the diagonal L, Q12; above it D L,
- * Q15. A direction whose pivot is below PIVOT_LEAST is not told: it takes no step. */
+/* The elements of four pairs of unknowns. */
+FIXED_INLINE void set_elements(struct fit_tangential_room *room, const int32_t *scale, int a, int b, int c, int d) {
+  const int last = UNKNOWNS - 1;
+  int32_t ab = 0, ac = 0, ad = 0, al = 0;
+  const int32_t *column = room->node[0].column, *end = column + NODES * UNKNOWNS;
+  do {
+    for (int k = 0; k < 3; k++) {
+      int32_t own = column[a + k * UNKNOWNS];
+      ab += column[b + k * UNKNOWNS] * own;
+      ac += column[c + k * UNKNOWNS] * own;
+      ad += column[d + k * UNKNOWNS] * own;
+      al += column[last + k * UNKNOWNS] * own;
+    }
+    column += 3 * UNKNOWNS;
+  } while (column < end);
+  room->matrix[a > b ? a : b][a > b ? b : a] = ab * (1 << (scale[a] + scale[b]));
+  room->matrix[a > c ? a : c][a > c ? c : a] = ac * (1 << (scale[a] + scale[c]));
+  room->matrix[a > d ? a : d][a > d ? d : a] = ad * (1 << (scale[a] + scale[d]));
+  room->matrix[last][a] = al * (1 << (scale[a] + scale[last]));
+}
+
+NOINLINE static void form(struct fit_tangential_room *room, const int32_t *scale) {
+  _Static_assert(UNKNOWNS == 8, "every pair is in one of these");
+  set_elements(room, scale, 0, 1, 2, 3);
+  set_elements(room, scale, 1, 2, 3, 4);
+  set_elements(room, scale, 2, 3, 4, 5);
+  set_elements(room, scale, 3, 4, 5, 6);
+  set_elements(room, scale, 4, 5, 6, 0);
+  set_elements(room, scale, 5, 6, 0, 1);
+  set_elements(room, scale, 6, 0, 1, 2);
+}
+
+/* One step's normal equations, solved. L D L^T in place, with a power of two for each pivot between
+ * the factors, 2^half about 1 / sqrt(pivot), so that both have all of their 16 bits: below the
+ * diagonal L / 2^half, Q14; above it D L 2^half, Q15. A direction whose pivot is below PIVOT_LEAST
+ * is not told: it takes no step. */
 struct solution {
-  int32_t step_q20[UNKNOWNS];    /* of the normalised columns */
-  int32_t inverse_q12[UNKNOWNS]; /* of the pivots */
-  int32_t explained_q30;         /* what the step takes from the square sum of the residuals */
+  int32_t step_q20[UNKNOWNS]; /* of the normalised columns */
+  int32_t half[UNKNOWNS];
+  int32_t inverse_q13[UNKNOWNS]; /* of pivot 4^half, 1 to 4 */
+  int32_t explained_q30; /* what the step takes from the square sum of the residuals */
 };
 
 #define STEP_MAX_Q20 (1 << 26)
 
-NOINLINE static void solve(int32_t matrix[UNKNOWNS][UNKNOWNS], const int32_t *right_q30,
+/* a - b modulo 2^32: rounding may take what a matrix that is nearly singular leaves anywhere. */
+FIXED_INLINE int32_t less(int32_t a, uint32_t b) {
+  return (int32_t)((uint32_t)a - b);
+}
+
+NOINLINE static void solve(int32_t matrix[UNKNOWNS][UNKNOWNS], const int32_t *right_q26,
                            struct solution *solution) {
-  int32_t y_q26[UNKNOWNS];
+  int32_t y_q26[UNKNOWNS]; /* 2^half of it */
   solution->explained_q30 = 0;
   for (int j = 0; j < UNKNOWNS; j++) {
-    int32_t y = right_q30[j] >> 4;
+    int32_t *own = matrix[j];
+    uint32_t known = 0;
     for (int k = 0; k < j; k++) {
-      y -= fixed_mul_16(y_q26[k], matrix[j][k]) * 16;
+      known += (uint32_t)scaled_by(y_q26[k], own[k], 14);
     }
-    for (int i = j; i < UNKNOWNS; i++) {
-      int32_t sum = matrix[i][j];
+    int32_t y = fixed_clamp(less(right_q26[j], known), -(1 << 26), 1 << 26);
+    for (int i = UNKNOWNS - 1; i >= j; i--) {
+      int32_t *row = matrix[i];
+      uint32_t sum = 0;
       for (int k = 0; k < j; k++) {
-        sum -= matrix[k][j] * matrix[i][k] * 8;
+        sum += (uint32_t)(row[k] * matrix[k][j]);
       }
-      matrix[i][j] = sum;
+      row[j] = less(row[j], sum << 1);
     }
-    int32_t pivot = matrix[j][j];
+    int32_t pivot = own[j];
     if (pivot < PIVOT_LEAST) {
       for (int i = j + 1; i < UNKNOWNS; i++) {
         matrix[j][i] = matrix[i][j] = 0;
       }
       y_q26[j] = solution->step_q20[j] = 0;
-      solution->inverse_q12[j] = 1 << 24;
+      solution->half[j] = 6;
+      solution->inverse_q13[j] = 1 << 13;
       continue;
     }
-    int32_t up = 30 - fixed_bits((uint32_t)pivot - 1);
+    int32_t up = 30 - fixed_bits((uint32_t)pivot);
     up = up < 0 ? 0 : up;
-    int32_t divisor = pivot >> (15 - up); /* 2^14 .. 2^15 */
+    int32_t inverse = port_divide((1 << 29) - 1, pivot >> (15 - up)); /* 2^14 .. 2^15 */
+    int32_t half = up >> 1, odd = up & 1;
     for (int i = j + 1; i < UNKNOWNS; i++) {
-      int32_t sum = matrix[i][j];
-      matrix[j][i] = sum >> 15;
-      matrix[i][j] = fixed_clamp(port_divide(shifted(sum, up - 3), divisor), -INT16_MAX, INT16_MAX);
+      int32_t element = fixed_clamp(rounded(matrix[i][j], 15 - half), -INT16_MAX, INT16_MAX);
+      own[i] = element;
+      matrix[i][j] = rounded(element * inverse, 15 - odd);
     }
-    y_q26[j] = y = fixed_clamp(y, -(1 << 26), 1 << 26);
-    int32_t z_q20 = shifted(port_divide(y * (1 << 4), divisor), 5 + up);
+    int32_t z_q20 = shifted(fixed_mul_16(y, inverse), up - 4);
     solution->step_q20[j] = z_q20 = fixed_clamp(z_q20, -STEP_MAX_Q20, STEP_MAX_Q20);
-    solution->inverse_q12[j] = port_divide(1 << 27, divisor) * (1 << up);
+    solution->half[j] = half;
+    solution->inverse_q13[j] = (inverse << odd) >> 1;
     solution->explained_q30 += (y >> 11) * (fixed_clamp(z_q20, -(1 << 20), 1 << 20) >> 5);
+    y_q26[j] = shifted(y, half);
   }
   for (int i = UNKNOWNS - 2; i >= 0; i--) {
-    int32_t z_q20 = solution->step_q20[i];
+    uint32_t known = 0;
     for (int k = i + 1; k < UNKNOWNS; k++) {
-      z_q20 -= fixed_mul_16(solution->step_q20[k], matrix[k][i]) * 16;
-      z_q20 = fixed_clamp(z_q20, -STEP_MAX_Q20, STEP_MAX_Q20);
+      known += (uint32_t)scaled_by(solution->step_q20[k], matrix[k][i], 14);
     }
-    solution->step_q20[i] = z_q20;
+    int32_t z_q20 = solution->step_q20[i] - shifted((int32_t)known, solution->half[i]);
+    solution->step_q20[i] = fixed_clamp(z_q20, -STEP_MAX_Q20, STEP_MAX_Q20);
   }
 }
 
@@ -431,42 +556,26 @@ NOINLINE static void take_step(const struct problem *problem, const struct outco
   at->e2_q26 = clamp_told(at->e2_q26 + move[SLANT], -LONG_MAX_Q26, LONG_MAX_Q26, at_bound);
 }
 
-/* The normal equations, each unknown scaled so that its diagonal element is 2^28 .. 2^30. */
-NOINLINE static void form(struct fit_tangential_room *room, const struct priors *priors,
-                          int32_t *column_q, int32_t *right_q30) {
-  int32_t scale[UNKNOWNS];
-  for (int u = 0; u < UNKNOWNS; u++) {
-    const int32_t *column = room->column[u];
-    int32_t own = dot(column, column) + priors->row[u] * priors->row[u];
-    int32_t up = (30 - fixed_bits((uint32_t)own)) >> 1;
-    scale[u] = up;
-    column_q[u] += up;
-    room->matrix[u][u] = own * (1 << (2 * up));
-    int32_t right = dot(column, room->residual) + priors->row[u] * priors->residual[u];
-    right_q30[u] = right * (1 << up);
-    for (int v = 0; v < u; v++) {
-      room->matrix[u][v] = dot(column, room->column[v]) * (1 << (up + scale[v]));
-    }
-  }
-}
-
-static void improve(struct problem *problem, struct unknowns *at, struct fit_tangential_room *room,
-                    struct outcome *outcome) {
+static void improve(const struct problem *problem, struct unknowns *at,
+                    struct fit_tangential_room *room, struct outcome *outcome) {
   struct priors priors;
-  int32_t right_q30[UNKNOWNS];
+  struct equations equations;
   linearise(problem, at, room);
   set_priors(problem, at, &priors);
-  int32_t residual_q = normalise_residuals(room->weight_q12, room->residual, &priors);
+  int32_t residual_q = normalise_residuals(room->residual, &priors);
   for (int u = 0; u < UNKNOWNS; u++) {
-    outcome->column_q[u] = normalise_column(room->column[u], &priors.row[u]);
+    normalise_column(room, u, priors.row_q26[u], priors.residual[u], &equations);
+    outcome->column_q[u] = equations.column_q[u];
   }
-  form(room, &priors, outcome->column_q, right_q30);
-  solve(room->matrix, right_q30, &outcome->solution);
-  int32_t squares = dot(room->residual, room->residual);
+  form(room, equations.scale);
+  solve(room->matrix, equations.right_q26, &outcome->solution);
+  int32_t squares = -outcome->solution.explained_q30;
+  for (int k = 0; k < NODES; k++) {
+    squares += (room->residual[k] * room->residual[k]) >> 2;
+  }
   for (int u = SPREAD; u <= SLANT; u++) {
-    squares += priors.residual[u] * priors.residual[u];
+    squares += (priors.residual[u] * priors.residual[u]) >> 2;
   }
-  squares -= outcome->solution.explained_q30;
   outcome->misfit = fit_scaled_from(squares > 0 ? squares : 0, -2 * residual_q);
   take_step(problem, outcome, residual_q, at, &outcome->at_bound);
 }
@@ -521,29 +630,22 @@ NOINLINE static void begin(const struct fit_array *array, const struct fit_pad *
   at->amplitude_q24 = fixed_clamp(fit_scaled_to_fixed(amplitude, 24), 1 << 18, AMPLITUDE_MAX_Q24);
 }
 
-/* Element i of the diagonal of the inverse matrix, Q12. */
-static struct scaled inverse_element(const struct fit_tangential_room *room,
-                                     const struct solution *solution, int i) {
-  int32_t w_q12[UNKNOWNS];
-  struct scaled sum = {0, 0};
-  for (int k = i; k < UNKNOWNS; k++) {
-    int32_t w = k == i ? 1 << 12 : 0;
-    for (int m = i; m < k; m++) {
-      w -= (room->matrix[k][m] * w_q12[m]) >> 12;
-    }
-    w_q12[k] = w = fixed_clamp(w, -INT16_MAX, INT16_MAX);
-    struct scaled square = fit_scaled_from(w * w, -24);
-    sum = scaled_add(sum, scaled_mul(square, fit_scaled_from(solution->inverse_q12[k], -12)));
-  }
-  return sum;
-}
-
-/* Variance of an unknown, in its unit squared, of readings whose variance is 1. */
+/* Variance of an unknown, in its unit squared, of readings whose variance is 1: an element of the
+ * diagonal of the inverse matrix. */
 static struct scaled variance_of(const struct fit_tangential_room *room,
                                  const struct outcome *outcome, int u) {
-  struct scaled variance = inverse_element(room, &outcome->solution, u);
-  variance.exponent += 2 * outcome->column_q[u] - 30;
-  return variance;
+  const struct solution *solution = &outcome->solution;
+  int32_t w_q8[UNKNOWNS]; /* row of the inverse of L, times 2^half */
+  int32_t sum_q11 = 0;
+  for (int k = u; k < UNKNOWNS; k++) {
+    int32_t w = k == u ? 1 << 8 : 0;
+    for (int m = u; m < k; m++) {
+      w -= (room->matrix[k][m] * w_q8[m]) >> 14;
+    }
+    w_q8[k] = w = fixed_clamp(shifted(w, solution->half[k]), -INT16_MAX, INT16_MAX);
+    sum_q11 += (((w * w) >> 9) * (solution->inverse_q13[k] >> 6)) >> 3;
+  }
+  return fit_scaled_from(sum_q11, 2 * outcome->column_q[u] - 30 - 11);
 }
 
 static float root_of(struct scaled square) {
@@ -596,6 +698,10 @@ NOINLINE static void conclude(const struct fit_array *array, const struct proble
       unit_N * root_of(scaled_mul(variance_of(room, outcome, AMPLITUDE), variance));
 }
 
+static int32_t prior_row(int32_t base_q22, int32_t sd_q26) {
+  return fixed_clamp(fixed_div_q26(base_q22 * 16, sd_q26), 1, 2 * ONE_Q26);
+}
+
 void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
                          const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
                          const struct fit_result *start, struct fit_tangential *result) {
@@ -609,7 +715,9 @@ void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
   struct unknowns at;
   struct outcome outcome;
   begin(array, pad, start, problem.readings.shift, &at);
-  problem.long_sd_q26 = fixed_mul_q28(at.amplitude_q24 * 4, pad->long_sd_q26) * 4;
+  int32_t long_sd_q26 = fixed_mul_q28(at.amplitude_q24 * 4, pad->long_sd_q26) * 4;
+  problem.spread_prior_q26 = prior_row(problem.base_q22, pad->spread_sd_q26);
+  problem.long_prior_q26 = prior_row(problem.base_q22, long_sd_q26);
   for (int step = 0; step < FIT_TANGENTIAL_STEPS; step++) {
     improve(&problem, &at, &pad->room, &outcome);
   }

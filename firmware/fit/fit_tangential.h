@@ -27,9 +27,16 @@
 #define FIT_TANGENTIAL_NODES (FIT_GRID_COLUMNS * FIT_GRID_ROWS)
 
 /* Working memory of one estimate: in no need of being kept between two. */
+union fit_tangential_node {
+  struct fit_tangential_sums { /* over w / v^i of the normal and the tangential terms */
+    int32_t s0_q28, s1_q25, s2_q22, s3_q17, s4_q14;
+    int32_t f0_q28, f1_q25, f2_q22;
+  } sums;
+  int32_t column[FIT_TANGENTIAL_UNKNOWNS]; /* what the Jacobian has there */
+};
 struct fit_tangential_room {
   int32_t weight_q12[FIT_TANGENTIAL_NODES];
-  int32_t column[FIT_TANGENTIAL_UNKNOWNS][FIT_TANGENTIAL_NODES];
+  union fit_tangential_node node[FIT_TANGENTIAL_NODES];
   int32_t residual[FIT_TANGENTIAL_NODES];
   int32_t matrix[FIT_TANGENTIAL_UNKNOWNS][FIT_TANGENTIAL_UNKNOWNS];
 };
@@ -39,7 +46,7 @@ struct fit_pad {
   float unit_mm, per_unit; /* length that all below is in: twice the widest normal term's sd */
   int32_t variance_q26[FIT_TANGENTIAL_TERMS]; /* of each term without the contact's own */
   int32_t strength_q26[FIT_TANGENTIAL_TERMS]; /* share, or moment */
-  int32_t pitch_q26;
+  int32_t pitch_q26, pitch_square_q26;
   int32_t spread_q26, spread_sd_q26; /* what to expect of the contact's own variance */
   int32_t long_sd_q26;               /* and of its elongations */
   float force_unit_N;                /* normal force of amplitude 1 at 1 Pa */

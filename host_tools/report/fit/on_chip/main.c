@@ -65,6 +65,7 @@ static const struct pad_profile profile = {
     .tangential = {{1.051876f, 4.802645f}, {4.015438f, 7.883257f}, {5.430944f, 19.82153f}},
     .spread_mm2 = 4.0f,
     .spread_sd_mm2 = 6.0f,
+    .force_ratio = 1.0f,
     .tangential_scale = 1.0f,
 };
 
