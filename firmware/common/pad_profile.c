@@ -1,6 +1,7 @@
 #include "common/pad_profile.h"
 
 #include <stddef.h>
+#include <string.h>
 
 _Static_assert(offsetof(struct pad_profile, from_touch) == PAD_PROFILE_FLOATS * sizeof(float),
                "floats lie behind one another");
@@ -20,6 +21,12 @@ bool pad_profile_is_valid(const struct pad_profile *profile) {
       is_within(profile->tangential_scale, PAD_TANGENTIAL_SCALE_MIN, PAD_TANGENTIAL_SCALE_MAX) &&
       is_within(profile->tangential_scale_sd, 0.0f, PAD_TANGENTIAL_SCALE_SD_MAX) &&
       profile->from_touch <= 1;
+  float edges[PAD_EDGE_FLOATS];
+  _Static_assert(sizeof edges == sizeof profile->edges, "edges are floats alone");
+  memcpy(edges, &profile->edges, sizeof edges);
+  for (int i = 0; i < PAD_EDGE_FLOATS; i++) {
+    valid = valid && is_within(edges[i], -PAD_EDGE_MAX, PAD_EDGE_MAX);
+  }
   float narrowest_mm = PAD_SD_MIN_mm;
   for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
     valid = valid && is_within(profile->normal[j].share, PAD_SHARE_MIN, PAD_SHARE_MAX) &&

@@ -14,7 +14,25 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { PAD_NORMAL_TERMS = 2, PAD_TANGENTIAL_TERMS = 3 };
+enum { PAD_NORMAL_TERMS = 2, PAD_TANGENTIAL_TERMS = 3, PAD_EDGE_TERMS = 3 };
+
+/* What the ends of a pad make of the estimate, which knows none, by the place (x, y) that it tells:
+ * with u = x / PAD_EDGE_UNIT_mm and v = y / PAD_EDGE_UNIT_mm
+ *   even(c) = c[0] + c[1] u^2 + c[2] v^2
+ *   odd(c)  = u even(c) of what is along x, v even(c) of what is along y
+ * An estimate of ratios q = Q / F, place and F then stands for
+ *   q' = (q - odd(ratio)) / (1 + even(gain))
+ *   place' = place - odd(place) - q' even(pull)
+ *   F' = F / (1 + even(force))
+ * All zeros: the pad has no ends. */
+struct pad_edges {
+  float ratio_x[PAD_EDGE_TERMS], ratio_y[PAD_EDGE_TERMS];
+  float gain_x[PAD_EDGE_TERMS], gain_y[PAD_EDGE_TERMS];
+  float place_x_mm[PAD_EDGE_TERMS], place_y_mm[PAD_EDGE_TERMS];
+  float pull_x_mm[PAD_EDGE_TERMS], pull_y_mm[PAD_EDGE_TERMS];
+  float force[PAD_EDGE_TERMS];
+};
+#define PAD_EDGE_UNIT_mm 10.0f
 
 struct pad_profile {
   float thickness_mm;
@@ -30,12 +48,15 @@ struct pad_profile {
                              force scale holds of it */
   float tangential_scale; /* tangential force is this times what the profile says */
   float tangential_scale_sd; /* standard deviation of tangential_scale */
-  uint8_t from_touch;        /* 1: the pad's edges spoil the zero, so tell what changed since the
-                                first touch; 0 */
+  struct pad_edges edges;
+  uint8_t from_touch; /* 1: the pad's edges spoil the zero, so tell what changed since the
+                         first touch; 0 */
 };
 
 /* The values before from_touch, behind one another. */
-#define PAD_PROFILE_FLOATS (4 + 2 * PAD_NORMAL_TERMS + 2 * PAD_TANGENTIAL_TERMS + 3)
+#define PAD_EDGE_FLOATS (9 * PAD_EDGE_TERMS)
+#define PAD_PROFILE_FLOATS                                                                         \
+  (4 + 2 * PAD_NORMAL_TERMS + 2 * PAD_TANGENTIAL_TERMS + 3 + PAD_EDGE_FLOATS)
 
 /* Ranges. */
 #define PAD_THICKNESS_MIN_mm 5.0f
@@ -56,6 +77,7 @@ struct pad_profile {
 #define PAD_TANGENTIAL_SCALE_MIN 0.25f
 #define PAD_TANGENTIAL_SCALE_MAX 4.0f
 #define PAD_TANGENTIAL_SCALE_SD_MAX 1.0f /* from 0 */
+#define PAD_EDGE_MAX 10.0f               /* from -10: each coefficient */
 
 /* Every value of it is finite and in its range, and the terms are in order of width. */
 bool pad_profile_is_valid(const struct pad_profile *profile);

@@ -15,6 +15,7 @@ void tangential_use(struct tangential_settings *tangential, const struct pad_pro
   tangential->tangential_scale = profile->tangential_scale;
   tangential->tangential_scale_sd = profile->tangential_scale_sd;
   tangential->from_touch = profile->from_touch != 0;
+  tangential->edges = profile->edges;
 }
 
 bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated) {
@@ -25,6 +26,41 @@ bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated) 
 
 void tangential_reset(struct tangential_history *history) {
   memset(history, 0, sizeof *history);
+}
+
+/* Of a place: its squares, in the unit of pad_edges. */
+struct from_middle {
+  float u, v, uu, vv;
+};
+
+static float even(const float *terms, const struct from_middle *at) {
+  return terms[0] + terms[1] * at->uu + terms[2] * at->vv;
+}
+
+/* pad_profile.h has the formulas. False: the load shows too little of itself. */
+static bool without_edges(const struct pad_edges *edges, const struct fit_tangential *found,
+                          struct fit_tangential *mended) {
+  const float u = found->x_mm * (1.0f / PAD_EDGE_UNIT_mm);
+  const float v = found->y_mm * (1.0f / PAD_EDGE_UNIT_mm);
+  const struct from_middle at = {u, v, u * u, v * v};
+  const float gain_x = 1.0f + even(edges->gain_x, &at), gain_y = 1.0f + even(edges->gain_y, &at);
+  const float force = 1.0f + even(edges->force, &at);
+  if (!(gain_x >= TANGENTIAL_GAIN_MIN && gain_y >= TANGENTIAL_GAIN_MIN &&
+        force >= TANGENTIAL_GAIN_MIN)) {
+    return false;
+  }
+  const float per_force = 1.0f / found->force_N;
+  const float ratio_x = (found->qx_N * per_force - u * even(edges->ratio_x, &at)) / gain_x;
+  const float ratio_y = (found->qy_N * per_force - v * even(edges->ratio_y, &at)) / gain_y;
+  *mended = *found;
+  mended->force_N = found->force_N / force;
+  mended->force_sd_N = found->force_sd_N / force;
+  mended->x_mm -= u * even(edges->place_x_mm, &at) + ratio_x * even(edges->pull_x_mm, &at);
+  mended->y_mm -= v * even(edges->place_y_mm, &at) + ratio_y * even(edges->pull_y_mm, &at);
+  mended->qx_N = ratio_x * mended->force_N;
+  mended->qy_N = ratio_y * mended->force_N;
+  mended->q_sd_N = found->q_sd_N / (force * (gain_x < gain_y ? gain_x : gain_y));
+  return true;
 }
 
 /* Of the first touch; whether it stands. */
@@ -48,12 +84,14 @@ void tangential_update(struct tangential_history *history,
                        const struct tangential_settings *settings,
                        const struct contact_input *input, struct contact_result *result,
                        struct tangential_load *load) {
-  const struct fit_tangential *found = input->tangential;
+  struct fit_tangential mended;
+  const struct fit_tangential *found = &mended;
   memset(load, 0, sizeof *load);
   if (!input->contact) {
     tangential_reset(history);
   }
-  if (!found || !found->valid || !(found->force_N > 0.0f)) {
+  if (!input->tangential || !input->tangential->valid || !(input->tangential->force_N > 0.0f) ||
+      !without_edges(&settings->edges, input->tangential, &mended)) {
     return;
   }
   float qx_N = found->qx_N, qy_N = found->qy_N;

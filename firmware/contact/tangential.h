@@ -17,6 +17,7 @@ struct tangential_settings {
   float tangential_scale; /* tangential load is this and force_scale times the estimate's */
   float tangential_scale_sd;
   bool from_touch;
+  struct pad_edges edges;
   float location_sd_limit_mm; /* UNCERTAIN above it */
 };
 
@@ -56,7 +57,9 @@ void tangential_reset(struct tangential_history *history);
 
 /* After contact_judge or contact_update, of the same input: adds TANGENTIAL_VALID and
  * TANGENTIAL_FROM_TOUCH to result->flags, and with the former has UNCERTAIN speak of the corrected
- * location. */
+ * location. Where the pad's edges hide so much of a load that it shows less than
+ * TANGENTIAL_GAIN_MIN of itself, there is none. */
+#define TANGENTIAL_GAIN_MIN 0.25f
 void tangential_update(struct tangential_history *history,
                        const struct tangential_settings *settings,
                        const struct contact_input *input, struct contact_result *result,

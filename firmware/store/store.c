@@ -288,9 +288,10 @@ void store_init(struct store *store, uint8_t sensor_count) {
   store->sure_slot = current->sure_slot;
   store->other_is_quiet = !other->first_is_bad;
   if (current->generation == 0) {
-    /* A single slot begun, in the first sector: the first record of all was cut short. */
+    /* The first record of all was cut short, and perhaps what was to settle that. */
     store->damaged = current->lost || other->lost;
-    store->must_settle = !store->damaged && current->used == 1 && other->used == 0;
+    store->must_settle = !store->damaged && current->used > 0 && current->used < STORE_SLOTS &&
+                         other->used == 0;
     return;
   }
   if (current->lost) {

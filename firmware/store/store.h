@@ -20,7 +20,7 @@
  * calibration as in the command that brings it, without its n: 14 + 8 n bytes, zeros where there
  * is none; the settings: u32 rate mHz, u16 OSR, u16 slip window ms, f32 slip threshold mm, f32 f32
  * prior mm, f32 location limit mm. Version 2 has a part more, bit 2 the pad's profile, behind the
- * settings: as in the command that brings it, 69 bytes. Later versions keep the slot as it is and
+ * settings: as in the command that brings it, 177 bytes. Later versions keep the slot as it is and
  * change the payload.
  *
  * Bits whose change was cut short may read as they like, differently each time. So a record that is

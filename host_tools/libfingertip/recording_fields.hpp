@@ -191,7 +191,25 @@ inline constexpr PadList pad_lists[] = {
     {"pad_moments_mm", PAD_TANGENTIAL_TERMS,
      [](pad_profile &pad, std::size_t j) -> float & { return pad.tangential[j].moment_mm; }},
     {"pad_moment_sds_mm", PAD_TANGENTIAL_TERMS,
-     [](pad_profile &pad, std::size_t j) -> float & { return pad.tangential[j].sd_mm; }}};
+     [](pad_profile &pad, std::size_t j) -> float & { return pad.tangential[j].sd_mm; }},
+    {"pad_edge_ratio_x", PAD_EDGE_TERMS,
+     [](pad_profile &pad, std::size_t j) -> float & { return pad.edges.ratio_x[j]; }},
+    {"pad_edge_ratio_y", PAD_EDGE_TERMS,
+     [](pad_profile &pad, std::size_t j) -> float & { return pad.edges.ratio_y[j]; }},
+    {"pad_edge_gain_x", PAD_EDGE_TERMS,
+     [](pad_profile &pad, std::size_t j) -> float & { return pad.edges.gain_x[j]; }},
+    {"pad_edge_gain_y", PAD_EDGE_TERMS,
+     [](pad_profile &pad, std::size_t j) -> float & { return pad.edges.gain_y[j]; }},
+    {"pad_edge_place_x_mm", PAD_EDGE_TERMS,
+     [](pad_profile &pad, std::size_t j) -> float & { return pad.edges.place_x_mm[j]; }},
+    {"pad_edge_place_y_mm", PAD_EDGE_TERMS,
+     [](pad_profile &pad, std::size_t j) -> float & { return pad.edges.place_y_mm[j]; }},
+    {"pad_edge_pull_x_mm", PAD_EDGE_TERMS,
+     [](pad_profile &pad, std::size_t j) -> float & { return pad.edges.pull_x_mm[j]; }},
+    {"pad_edge_pull_y_mm", PAD_EDGE_TERMS,
+     [](pad_profile &pad, std::size_t j) -> float & { return pad.edges.pull_y_mm[j]; }},
+    {"pad_edge_force", PAD_EDGE_TERMS,
+     [](pad_profile &pad, std::size_t j) -> float & { return pad.edges.force[j]; }}};
 
 struct Namer {
   std::string text;

@@ -240,17 +240,21 @@ pad_profile profile_of(const Shape &shape, const wire_info &info) {
   return profile;
 }
 
-pad_profile profile_over_own_sensors(const Shape &shape) {
+wire_info own_sensors() {
   wire_info info{};
   info.sensor_count = geometry.sensor_count;
   info.pitch_mm = geometry.pitch_mm;
   std::copy(std::begin(geometry.x_mm), std::end(geometry.x_mm), info.x_mm);
   std::copy(std::begin(geometry.y_mm), std::end(geometry.y_mm), info.y_mm);
-  return profile_of(shape, info);
+  return info;
+}
+
+pad_profile profile_over_own_sensors(const Shape &shape) {
+  return profile_of(shape, own_sensors());
 }
 
 bool edges_spoil_the_zero(const Shape &shape) {
-  return shape.overhang_mm > 0 && shape.overhang_mm < 0.75 * shape.thickness_mm;
+  return shape.overhang_mm > 0 && shape.overhang_mm < 0.5 * shape.thickness_mm;
 }
 
 Misfit misfit(const pad_profile &profile) {

@@ -31,9 +31,11 @@ pad_profile profile_of(const Shape &shape, const wire_info &info);
 // Of a pad over the sensors of this build.
 pad_profile profile_over_own_sensors(const Shape &shape);
 
-// So little overhang that the zero of the tangential load cannot be believed: it is off by 0.09 of
-// the normal force where the rubber goes on for a thickness, by 0.11 at three quarters of one, by
-// 0.26 at three eighths (finite elements of blocks of 12 mm, no real pad).
+// The sensors of this build, as profile_of takes them.
+wire_info own_sensors();
+
+// So little overhang that even what edges_of (pad/edges.hpp) takes back leaves the tangential load
+// doubtful: less than half a thickness (blocks of 12 mm in the report's part shear, no real pad).
 bool edges_spoil_the_zero(const Shape &shape);
 
 // Root mean square errors of the two sums over the plane, relative to that of T and of Q.

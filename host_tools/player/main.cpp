@@ -5,11 +5,13 @@
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/recording.hpp"
 #include "libfingertip/text.hpp"
+#include "pad/edges.hpp"
 #include "pad/profile.hpp"
 #include "player/native_fingertip.h"
 #include "player/repeat.h"
 #include "player/scenario.hpp"
 #include "tool/advice.hpp"
+#include "twin/table_file.hpp"
 
 extern "C" {
 #include "native/native_cdc.h"
@@ -74,6 +76,10 @@ int play(const PlayOptions &options) {
   std::optional<pad_profile> pad;
   if (options.pad_mm) {
     pad = pad::profile_over_own_sensors({*options.pad_mm, options.overhang_mm, options.from_touch});
+    if (options.overhang_mm >= pad::EDGE_OVERHANG_MIN_mm &&
+        options.overhang_mm <= pad::EDGE_OVERHANG_MAX_mm) {
+      pad->edges = pad::edges_of(*pad, pad::own_sensors(), twin::default_cache_directory());
+    }
   }
   check_output(options.recording, options.replace);
   Scenario scenario(options.scenario);

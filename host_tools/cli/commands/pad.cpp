@@ -3,8 +3,11 @@
 #include "cli/usage.hpp"
 #include "libfingertip/command.hpp"
 #include "libfingertip/packet_fields.hpp"
+#include "libfingertip/progress_bar.hpp"
 #include "libfingertip/text.hpp"
+#include "pad/edges.hpp"
 #include "pad/profile.hpp"
+#include "twin/table_file.hpp"
 
 #include <cstdio>
 #include <memory>
@@ -43,17 +46,27 @@ int pad_command(const PadOptions &options) {
     return erase_pad(session);
   }
   const pad::Shape shape{*options.thickness_mm, options.overhang_mm, options.from_touch};
-  const pad_profile profile = typed([&] { return pad::profile_of(shape, info); });
+  pad_profile profile = typed([&] { return pad::profile_of(shape, info); });
+  const bool ends = shape.overhang_mm >= pad::EDGE_OVERHANG_MIN_mm &&
+                    shape.overhang_mm <= pad::EDGE_OVERHANG_MAX_mm;
+  if (ends) {
+    ProgressBar bar("the pad's ends", ProgressBar::Lines::none);
+    profile.edges = typed([&] {
+      return pad::edges_of(profile, info, twin::default_cache_directory(),
+                           [&](double share) { bar.show(share); });
+    });
+  }
   session.command(command_pad(profile));
-  std::printf("thickness=%s overhang=%s%s force_ratio=%s kept\n",
+  std::printf("thickness=%s overhang=%s%s%s force_ratio=%s kept\n",
               shortest(profile.thickness_mm).c_str(),
               profile.overhang_mm > 0 ? shortest(profile.overhang_mm).c_str() : "?",
-              profile.from_touch ? " from_touch" : "",
+              ends ? " ends" : "", profile.from_touch ? " from_touch" : "",
               fixed(static_cast<double>(profile.force_ratio), 3).c_str());
   if (pad::edges_spoil_the_zero(shape) && !options.from_touch) {
     std::fprintf(stderr,
-                 "fingertip: the rubber ends %s mm beyond the outer sensors, which spoils the "
-                 "zero of the tangential load; --from-touch tells what changed instead\n",
+                 "fingertip: the rubber ends %s mm beyond the outer sensors, less than "
+                 "half its thickness, which spoils the zero of the tangential load; --from-touch "
+                 "tells what changed instead\n",
                  shortest(profile.overhang_mm).c_str());
   }
   return 0;
@@ -75,14 +88,16 @@ void add_pad(CommandLine &line) {
   CLI::Option *overhang =
       command
           ->add_option("--overhang", options->overhang_mm,
-                       "Of the rubber beyond the outer sensors, up to 100 mm; not told by default")
+                       "Of the rubber beyond the outer sensors, up to 100 mm; from 3 to 20 mm what "
+                       "the ends do "
+                       "is found and taken back. Not told by default: a pad without end")
           ->type_name("MM")
           ->needs(thickness);
   CLI::Option *from_touch =
       command
           ->add_flag("--from-touch", options->from_touch,
                      "Tell what changed since the first 100 ms of each contact: for pads whose "
-                     "rubber ends within three quarters of its thickness of the outer sensors")
+                     "rubber ends within half its thickness of the outer sensors")
           ->needs(thickness);
   command->add_flag("--erase", options->erase, "Forget the pad: no tangential load")
       ->excludes(thickness)

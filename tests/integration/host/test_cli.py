@@ -679,7 +679,7 @@ class Commands(CliTest):
         with self.device("capabilities=15"):
             self.assertNotIn("pad_", self.run_cli("info")[0])
             out, err = self.run_cli("pad", "--thickness", "12", "--overhang", "9")
-            self.assertRegex(out, r"^thickness=12 overhang=9 force_ratio=0\.9\d\d kept\n$")
+            self.assertRegex(out, r"^thickness=12 overhang=9 ends force_ratio=0\.9\d\d kept\n$")
             self.assertEqual(err, "")
             out = self.run_cli("info")[0]
             self.assertRegex(out, r"(?m)^capabilities +fit,slip,raw,tangential$")
@@ -688,6 +688,7 @@ class Commands(CliTest):
             self.assertRegex(out, r"(?m)^pad_overhang_mm +9$")
             self.assertRegex(out, r"(?m)^pad_from_touch +0$")
             self.assertRegex(out, r"(?m)^pad_moments_mm +1\.12\d* 4\.03\d* 5\.56\d*$")
+            self.assertRegex(out, r"(?m)^pad_edge_ratio_x +0\.2[3-6]\d* -0\.0\d+ -0\.0\d+$")
             out, err = self.run_cli("pad", "--thickness", "12", "--overhang", "4.5")
             self.assertEqual(err.count("spoils the zero"), 1)
             out, err = self.run_cli("pad", "--thickness", "12", "--overhang", "4.5", "--from-touch")

@@ -148,7 +148,18 @@ static void test_pad_profiles_are_in_their_ranges(void) {
       {&pad.tangential_scale, PAD_TANGENTIAL_SCALE_MIN, PAD_TANGENTIAL_SCALE_MAX},
       {&pad.tangential_scale_sd, 0.0f, PAD_TANGENTIAL_SCALE_SD_MAX},
   };
-  TEST_ASSERT_EQUAL_size_t(PAD_PROFILE_FLOATS, sizeof ranges / sizeof ranges[0]);
+  TEST_ASSERT_EQUAL_size_t(PAD_PROFILE_FLOATS, sizeof ranges / sizeof ranges[0] + PAD_EDGE_FLOATS);
+  for (size_t i = 0; i < PAD_EDGE_FLOATS; i++) {
+    float *value = (float *)(void *)&pad.edges + i;
+    const float wrong[] = {-1.001f * PAD_EDGE_MAX, 1.001f * PAD_EDGE_MAX, NAN};
+    for (size_t j = 0; j < 3; j++) {
+      *value = wrong[j];
+      TEST_ASSERT_FALSE(pad_profile_is_valid(&pad));
+    }
+    *value = i % 2 ? PAD_EDGE_MAX : -PAD_EDGE_MAX;
+    TEST_ASSERT_TRUE(pad_profile_is_valid(&pad));
+    *value = 0.0f;
+  }
   for (size_t i = 0; i < sizeof ranges / sizeof ranges[0]; i++) {
     const float was = *ranges[i].value;
     const float good[] = {ranges[i].least, ranges[i].greatest};

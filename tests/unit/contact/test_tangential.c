@@ -71,6 +71,39 @@ static void an_estimate_passes_as_it_is_with_scales_of_one(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.3125f, 0.3125f, load.ratio); /* 1.25 of 4 N */
 }
 
+/* At u = 0.25, v = -0.75: u^2 = 0.0625, v^2 = 0.5625. */
+static void edges_are_taken_back(void) {
+  found.x_mm = 2.5f;
+  found.y_mm = -7.5f;
+  const struct pad_edges edges = {
+      .ratio_x = {0.25f, 0.0f, 0.0f},
+      .ratio_y = {0.0f, 0.0f, 0.25f},
+      .gain_x = {-0.5f, 0.0f, 0.0f},
+      .gain_y = {0.0f, 4.0f, 0.0f},
+      .place_x_mm = {1.0f, 16.0f, 0.0f},
+      .place_y_mm = {0.0f, 0.0f, 1.0f},
+      .pull_x_mm = {2.0f, 0.0f, 0.0f},
+      .pull_y_mm = {0.0f, 8.0f, 0.0f},
+      .force = {0.0f, 4.0f, 0.0f},
+  };
+  settings.edges = edges;
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID, update(0));
+  /* 4 N of which 1.25 is 1; (0.1875 - 0.0625) / 0.5 and (-0.25 + 0.10546875) / 1.25 of it. */
+  TEST_ASSERT_FLOAT_WITHIN(1e-6f, 3.2f, load.force_N);
+  TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.25f * 3.2f, load.qx_N);
+  TEST_ASSERT_FLOAT_WITHIN(1e-6f, -0.115625f * 3.2f, load.qy_N);
+  TEST_ASSERT_FLOAT_WITHIN(1e-5f, 2.5f - 0.5f - 0.5f, load.x_mm);
+  TEST_ASSERT_FLOAT_WITHIN(1e-5f, -7.5f + 0.421875f + 0.115625f * 0.5f, load.y_mm);
+  TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.064f, 0.064f, load.q_sd_N); /* 0.04 / (1.25 0.5) */
+}
+
+static void a_load_that_edges_hide_is_not_told(void) {
+  settings.edges.gain_y[0] = -0.74f;
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID, update(0));
+  settings.edges.gain_y[0] = -0.76f;
+  assert_nothing(0);
+}
+
 static void scales_and_their_uncertainties_enter(void) {
   settings.force_scale = 1.25f;
   settings.force_scale_sd = 0.03f;
@@ -204,6 +237,8 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(an_estimate_that_is_not_there_says_nothing);
   RUN_TEST(an_estimate_passes_as_it_is_with_scales_of_one);
+  RUN_TEST(edges_are_taken_back);
+  RUN_TEST(a_load_that_edges_hide_is_not_told);
   RUN_TEST(scales_and_their_uncertainties_enter);
   RUN_TEST(a_calibration_scales_what_its_force_scale_was_found_with);
   RUN_TEST(uncertain_speaks_of_the_corrected_location);

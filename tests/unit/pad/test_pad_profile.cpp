@@ -164,6 +164,6 @@ TEST(PadProfile, RefusesWhatIsNoPad) {
 
 TEST(PadProfile, KnowsWhenEdgesSpoilTheZero) {
   EXPECT_FALSE(pad::edges_spoil_the_zero({12}));
-  EXPECT_FALSE(pad::edges_spoil_the_zero({12, 9}));
-  EXPECT_TRUE(pad::edges_spoil_the_zero({12, 8.9}));
+  EXPECT_FALSE(pad::edges_spoil_the_zero({12, 6}));
+  EXPECT_TRUE(pad::edges_spoil_the_zero({12, 5.9}));
 }

@@ -172,6 +172,18 @@ static struct pad_profile some_pad(void) {
       .force_ratio = 0.9375f,
       .tangential_scale = 1.0625f,
       .tangential_scale_sd = 0.03125f,
+      .edges =
+          {
+              .ratio_x = {0.125f, -0.0625f, 0.25f},
+              .ratio_y = {0.375f, 0.0078125f, -0.5f},
+              .gain_x = {1.25f, -0.3125f, 0.015625f},
+              .gain_y = {0.75f, -0.1875f, 0.046875f},
+              .place_x_mm = {0.625f, -1.0f, 2.0f},
+              .place_y_mm = {1.75f, -2.25f, 3.0f},
+              .pull_x_mm = {-3.25f, 3.5f, 0.21875f},
+              .pull_y_mm = {-1.5f, 0.65625f, 0.6875f},
+              .force = {-0.09375f, 0.28125f, 0.0390625f},
+          },
       .from_touch = 1,
   };
 }

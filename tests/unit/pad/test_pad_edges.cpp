@@ -1,0 +1,135 @@
+#include "libfingertip/error.hpp"
+#include "pad/edges.hpp"
+#include "pad/profile.hpp"
+#include "twin/block_table.hpp"
+
+extern "C" {
+#include "contact/tangential.h"
+}
+
+#include <array>
+#include <cmath>
+#include <gtest/gtest.h>
+
+using namespace fingertip;
+
+namespace {
+
+constexpr double OVERHANG_mm = 9.0;
+
+pad_profile profile() {
+  return pad::profile_over_own_sensors({12.0, OVERHANG_mm, false});
+}
+
+twin::BlockTable block(const wire_info &info) {
+  std::vector<twin::Place> sensors;
+  for (int k = 0; k < info.sensor_count; k++) {
+    sensors.push_back({double(info.x_mm[k]), double(info.y_mm[k])});
+  }
+  return twin::BlockTable::load_or_build(
+      {twin::silicone(12.0), 9.0 + OVERHANG_mm, 18.0 + OVERHANG_mm}, sensors, FINGERTIP_TABLES_DIR);
+}
+
+struct Told {
+  double x_mm, y_mm, qx, qy, force;
+};
+
+/* What the firmware says of a contact 3 mm wide on the pad that ends. The layer's part is written
+ * anew here, from the formulas of pad_profile.h. */
+Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_mm, double y_mm, double qx,
+          double qy) {
+  const wire_info info = pad::own_sensors();
+  constexpr double FORCE_N = 4.0, SPREAD_mm2 = 3.0;
+  std::array<std::int32_t, FT_MAX_SENSORS> readings{};
+  for (std::size_t k = 0; k < info.sensor_count; k++) {
+    const double dx = double(info.x_mm[k]) - x_mm, dy = double(info.y_mm[k]) - y_mm;
+    double Pa = 0.0;
+    for (const auto &term : pad.normal) {
+      const double v = std::pow(double(term.sd_mm), 2) + SPREAD_mm2;
+      Pa += double(term.share) / v * std::exp(-(dx * dx + dy * dy) / (2 * v));
+    }
+    for (const auto &term : pad.tangential) {
+      const double v = std::pow(double(term.sd_mm), 2) + 1.3 * SPREAD_mm2;
+      Pa += (qx * dx + qy * dy) * double(term.moment_mm) / (v * v) *
+            std::exp(-(dx * dx + dy * dy) / (2 * v));
+    }
+    Pa *= 1e6 * FORCE_N / (2 * M_PI);
+    Pa += ends.added_Pa(k, {FORCE_N, qx * FORCE_N, qy * FORCE_N, 3.0}, x_mm, y_mm);
+    readings[k] = static_cast<std::int32_t>(std::lround(1024 * Pa));
+  }
+  fit_array array;
+  struct fit_pad prepared;
+  EXPECT_EQ(FT_OK, fit_array_init(&array, info.sensor_count, info.x_mm, info.y_mm, info.pitch_mm));
+  EXPECT_EQ(FT_OK, fit_pad_init(&prepared, &array, &pad));
+  fit_settings fitting{};
+  fitting.iterations = 4;
+  fitting.noise_Pa_q10 = 1024;
+  fit_result fit;
+  struct fit_tangential found;
+  fit_gaussian_grid(&array, readings.data(), UINT32_MAX >> (FT_MAX_SENSORS - info.sensor_count),
+                    &fitting, &fit);
+  fit_tangential_load(&array, &prepared, readings.data(), &fitting, &fit, &found);
+  contact_settings weighing{};
+  tangential_settings settings{};
+  settings.location_sd_limit_mm = 0.6F;
+  tangential_use(&settings, &pad, &weighing, false);
+  tangential_history history{};
+  contact_input input{};
+  input.contact = true;
+  input.tangential = &found;
+  contact_result result{};
+  tangential_load load;
+  tangential_update(&history, &settings, &input, &result, &load);
+  EXPECT_TRUE(result.flags & CONTACT_FLAG_TANGENTIAL_VALID);
+  return {double(load.x_mm), double(load.y_mm), double(load.qx_N / load.force_N),
+          double(load.qy_N / load.force_N), double(load.force_N) / FORCE_N};
+}
+
+} // namespace
+
+TEST(PadEdges, TakeBackWhatTheEndsDo) {
+  const pad_profile endless = profile();
+  pad_profile mended = endless;
+  mended.edges = pad::edges_of(endless, pad::own_sensors(), FINGERTIP_TABLES_DIR);
+  EXPECT_TRUE(pad_profile_is_valid(&mended));
+  const twin::BlockTable ends = block(pad::own_sensors());
+  double without = 0.0, with = 0.0;
+  int count = 0;
+  for (double x_mm = -7.3; x_mm < 9.0; x_mm += 4.9) {
+    for (double y_mm = -15.1; y_mm < 18.0; y_mm += 6.1) {
+      for (const double qx : {0.0, 0.25}) {
+        const double qy = -0.6 * qx;
+        const Told raw = told(endless, ends, x_mm, y_mm, qx, qy);
+        const Told good = told(mended, ends, x_mm, y_mm, qx, qy);
+        without += std::hypot(raw.qx - qx, raw.qy - qy);
+        with += std::hypot(good.qx - qx, good.qy - qy);
+        count++;
+        EXPECT_LT(std::hypot(good.qx - qx, good.qy - qy), 0.07) << x_mm << ' ' << y_mm;
+        EXPECT_LT(std::hypot(good.x_mm - x_mm, good.y_mm - y_mm), 0.4) << x_mm << ' ' << y_mm;
+        EXPECT_NEAR(good.force, 1.0, 0.05) << x_mm << ' ' << y_mm;
+      }
+    }
+  }
+  EXPECT_GT(without / count, 0.10);
+  EXPECT_LT(with / count, 0.03);
+}
+
+TEST(PadEdges, SayLittleFarFromThem) {
+  pad_profile near = profile(), far = profile();
+  far.overhang_mm = 20.0F;
+  near.edges = pad::edges_of(near, pad::own_sensors(), FINGERTIP_TABLES_DIR);
+  far.edges = pad::edges_of(far, pad::own_sensors(), FINGERTIP_TABLES_DIR);
+  EXPECT_LT(std::abs(far.edges.ratio_x[0]), 0.4F * std::abs(near.edges.ratio_x[0]));
+  EXPECT_LT(std::abs(far.edges.force[0]), 0.5F * std::abs(near.edges.force[0]));
+}
+
+TEST(PadEdges, AreRefusedWhereTheyAreNotKnown) {
+  pad_profile pad = profile();
+  for (const float overhang_mm : {0.0F, 2.9F, 20.1F, NAN}) {
+    pad.overhang_mm = overhang_mm;
+    EXPECT_THROW(pad::edges_of(pad, pad::own_sensors(), FINGERTIP_TABLES_DIR), Error);
+  }
+  wire_info line = pad::own_sensors();
+  line.sensor_count = 5;
+  EXPECT_THROW(pad::edges_of(profile(), line, FINGERTIP_TABLES_DIR), Error);
+}
