@@ -126,7 +126,7 @@ FIXED_INLINE int32_t rounded(int32_t value, int shift) {
 /* Of a contact at the state's place: where the sensors lie along one axis, and what of the model
  * depends on that alone. */
 struct offset {
-  int32_t d_q26, d_q12;
+  int32_t d_q26, d_q13;
   int32_t half_square_q23;
   int32_t pulled_q24;             /* B d */
   int32_t longer_q26;             /* e1 d^2 / 2 */
@@ -136,7 +136,7 @@ struct offset {
 static void set_offset(int32_t d_q26, int32_t pull_q24, const struct unknowns *at,
                        struct offset *off) {
   off->d_q26 = d_q26;
-  off->d_q12 = rounded(d_q26, 14);
+  off->d_q13 = rounded(d_q26, 13);
   off->half_square_q23 = fixed_mul_q28(d_q26, d_q26) >> 2;
   off->pulled_q24 = fixed_mul_q26(pull_q24, d_q26);
   off->longer_q26 = whole_product(at->e1_q26 * 64, off->half_square_q23, 29);
@@ -232,13 +232,17 @@ NOINLINE static void set_sums(const struct term *terms, union fit_tangential_nod
 
 #define LONGER_MAX_Q26 ((4 << 26) - 1)
 #define PULLED_MAX_Q24 (12 << 24)
-#define SPREAD_COLUMN_MAX_Q13 (60 << 13)
+#define COLUMN_MAX_Q15 (15 << 15)
 
 /* Qs in which the columns leave linearise. */
-static const uint8_t column_q[UNKNOWNS] = {16, 13, 13, 13, 16, 16, 16, 16};
+static const uint8_t column_q[UNKNOWNS] = {16, 15, 15, 15, 16, 16, 16, 16};
 
 FIXED_INLINE int32_t weighed(int32_t value, int32_t weight_q12) {
   return rounded(value * weight_q12, 12);
+}
+
+FIXED_INLINE int32_t limited_q15(int32_t value_q20) {
+  return fixed_clamp(rounded(value_q20, 5), -COLUMN_MAX_Q15, COLUMN_MAX_Q15);
 }
 
 /* One step's model and Jacobian, weighed; residuals in Q24. With d = (dx, dy), r2 = d' d and
@@ -292,27 +296,26 @@ NOINLINE static void linearise(const struct problem *problem, const struct unkno
       int32_t bend_q20 = scaled_by(sums.s2_q22, a_q13, 15) +
                          whole_product(sums.s4_q14, p_q28, 22) +
                          product(sums.f2_q22, scaled_by(pulled_q24, KAPPA_Q14, 12), 28);
-      int32_t flat_q13 = rounded(as1_q20 + 3 * ps3_q20 + scaled_by(bf1_q20, KAPPA_Q14, 13), 7);
-      int32_t f_q14 = rounded(sums.f0_q28, 14);
-      int32_t along_x = product(sums.s2_q22, x->along_q28 + y->across_q28, 32); /* Q18 */
-      int32_t along_y = product(sums.s2_q22, x->across_q28 - y->along_q28, 32);
-      int32_t place_x_q14 = product(radial_q20, x->d_q26, 32) - (along_x >> 4) - (product(bx_q28, sums.f0_q28, 32) >> 10);
-      int32_t place_y_q14 = product(radial_q20, y->d_q26, 32) - (along_y >> 4) - (product(by_q28, sums.f0_q28, 32) >> 10);
+      int32_t flat_q20 = as1_q20 + 3 * ps3_q20 + scaled_by(bf1_q20, KAPPA_Q14, 13);
+      int32_t along_x_q20 = product(sums.s2_q22, x->along_q28 + y->across_q28, 30);
+      int32_t along_y_q20 = product(sums.s2_q22, x->across_q28 - y->along_q28, 30);
+      int32_t place_x_q20 = product(radial_q20, x->d_q26, 26) - along_x_q20 - (product(bx_q28, sums.f0_q28, 32) >> 4);
+      int32_t place_y_q20 = product(radial_q20, y->d_q26, 26) - along_y_q20 - (product(by_q28, sums.f0_q28, 32) >> 4);
       int32_t half_square_q23 = x->half_square_q23 + y->half_square_q23;
-      int32_t widen_q13 = product(half_square_q23, bend_q20, 30) - flat_q13;
-      widen_q13 = fixed_clamp(widen_q13, -SPREAD_COLUMN_MAX_Q13, SPREAD_COLUMN_MAX_Q13);
+      int32_t widen_q20 = whole_product(half_square_q23, bend_q20, 23) - flat_q20;
+      int32_t f_q16 = rounded(sums.f0_q28, 12);
       int32_t stretch_q23 = x->half_square_q23 - y->half_square_q23;
       int32_t slant_q22 = product(x->d_q26, y->d_q26, 30);
 
       int32_t *column = node->column;
       column[AMPLITUDE] = weighed(rounded(sums.s0_q28, 12), weight);
-      column[PLACE_X] = weighed(rounded(place_x_q14, 1), weight);
-      column[PLACE_Y] = weighed(rounded(place_y_q14, 1), weight);
-      column[SPREAD] = weighed(widen_q13, weight);
+      column[PLACE_X] = weighed(limited_q15(place_x_q20), weight);
+      column[PLACE_Y] = weighed(limited_q15(place_y_q20), weight);
+      column[SPREAD] = weighed(limited_q15(widen_q20), weight);
       column[STRETCH] = weighed(product(stretch_q23, sums.s2_q22, 29), weight);
       column[SLANT] = weighed(product(slant_q22 * 2, sums.s2_q22, 29), weight);
-      column[PULL_X] = weighed(rounded(f_q14 * x->d_q12, 10), weight);
-      column[PULL_Y] = weighed(rounded(f_q14 * y->d_q12, 10), weight);
+      column[PULL_X] = weighed(rounded(f_q16 * x->d_q13, 13), weight);
+      column[PULL_Y] = weighed(rounded(f_q16 * y->d_q13, 13), weight);
     }
   }
 }
