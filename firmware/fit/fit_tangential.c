@@ -126,7 +126,7 @@ FIXED_INLINE int32_t rounded(int32_t value, int shift) {
 /* Of a contact at the state's place: where the sensors lie along one axis, and what of the model
  * depends on that alone. */
 struct offset {
-  int32_t d_q26, d_q12;
+  int32_t d_q26, d_q13;
   int32_t half_square_q23;
   int32_t pulled_q24;             /* B d */
   int32_t longer_q26;             /* e1 d^2 / 2 */
@@ -136,7 +136,7 @@ struct offset {
 static void set_offset(int32_t d_q26, int32_t pull_q24, const struct unknowns *at,
                        struct offset *off) {
   off->d_q26 = d_q26;
-  off->d_q12 = rounded(d_q26, 14);
+  off->d_q13 = rounded(d_q26, 13);
   off->half_square_q23 = fixed_mul_q28(d_q26, d_q26) >> 2;
   off->pulled_q24 = fixed_mul_q26(pull_q24, d_q26);
   off->longer_q26 = whole_product(at->e1_q26 * 64, off->half_square_q23, 29);
@@ -190,8 +190,9 @@ NOINLINE static void set_term(const struct fit_pad *pad, int j, int32_t t_q26,
   term->inverse_q11 = fixed_clamp(rounded(inverse_q22, 11), 0, INT16_MAX);
 }
 
-/* struct fit_tangential_sums of every node. */
-NOINLINE static void set_sums(const struct term *terms, union fit_tangential_node *node) {
+/* struct fit_tangential_sums of every node. Of a round contact that does not pull s3, s4, f1 and f2
+ * are in no column. */
+NOINLINE static void set_sums(const struct term *terms, bool round, union fit_tangential_node *node) {
   for (int i = 0; i < COLUMNS; i++) {
     for (int k = 0; k < ROWS; k++, node++) {
       struct fit_tangential_sums *sums = &node->sums;
@@ -205,9 +206,11 @@ NOINLINE static void set_sums(const struct term *terms, union fit_tangential_nod
         s1 += w_q25;
         int32_t w_q22 = scaled_by(w_q25, over, 14);
         s2 += w_q22;
-        int32_t w_q17 = scaled_by(w_q22, over, 16);
-        s3 += w_q17;
-        s4 += scaled_by(w_q17, over, 14);
+        if (!round) {
+          int32_t w_q17 = scaled_by(w_q22, over, 16);
+          s3 += w_q17;
+          s4 += scaled_by(w_q17, over, 14);
+        }
       }
       sums->s0_q28 = s0;
       sums->s1_q25 = s1;
@@ -217,11 +220,13 @@ NOINLINE static void set_sums(const struct term *terms, union fit_tangential_nod
       int32_t f0 = 0, f1 = 0, f2 = 0;
       for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++, term++) {
         int32_t w_q28 = product(term->x_q28[i], term->y_q30[k], 30);
-        int32_t over = term->inverse_q11;
         f0 += w_q28;
-        int32_t w_q25 = scaled_by(w_q28, over, 14);
-        f1 += w_q25;
-        f2 += scaled_by(w_q25, over, 14);
+        if (!round) {
+          int32_t over = term->inverse_q11;
+          int32_t w_q25 = scaled_by(w_q28, over, 14);
+          f1 += w_q25;
+          f2 += scaled_by(w_q25, over, 14);
+        }
       }
       sums->f0_q28 = f0;
       sums->f1_q25 = f1;
@@ -232,13 +237,17 @@ NOINLINE static void set_sums(const struct term *terms, union fit_tangential_nod
 
 #define LONGER_MAX_Q26 ((4 << 26) - 1)
 #define PULLED_MAX_Q24 (12 << 24)
-#define SPREAD_COLUMN_MAX_Q13 (60 << 13)
+#define COLUMN_MAX_Q15 (15 << 15)
 
 /* Qs in which the columns leave linearise. */
-static const uint8_t column_q[UNKNOWNS] = {16, 13, 13, 13, 16, 16, 16, 16};
+static const uint8_t column_q[UNKNOWNS] = {16, 15, 15, 15, 16, 16, 16, 16};
 
 FIXED_INLINE int32_t weighed(int32_t value, int32_t weight_q12) {
   return rounded(value * weight_q12, 12);
+}
+
+FIXED_INLINE int32_t limited_q15(int32_t value_q20) {
+  return fixed_clamp(rounded(value_q20, 5), -COLUMN_MAX_Q15, COLUMN_MAX_Q15);
 }
 
 /* One step's model and Jacobian, weighed; residuals in Q24. With d = (dx, dy), r2 = d' d and
@@ -246,8 +255,73 @@ FIXED_INLINE int32_t weighed(int32_t value, int32_t weight_q12) {
  *   m     = A s0 + P s2 + b f0,     P = e1 (dx^2 - dy^2) / 2 + e2 dx dy
  *   dm/dx = dx (A s1 + P s3 + b f1) - (e1 dx + e2 dy) s2 - Bx f0
  *   dm/dt = r2 / 2 (A s2 + P s4 + KAPPA b f2) - (A s1 + 3 P s3 + 2 KAPPA b f1)
- * (e1 and e2 with the amplitude in them). */
-NOINLINE static void linearise(const struct problem *problem, const struct unknowns *at,
+ * (e1 and e2 with the amplitude in them). In parts, for the eight low registers. */
+struct place {
+  const struct offset *x, *y;
+  const struct unknowns *at;
+  int32_t weight;
+  int32_t pulled_q26, longer_q28; /* b and P */
+};
+
+NOINLINE static void set_shape(struct place *place) {
+  int32_t pulled_q24 = place->x->pulled_q24 + place->y->pulled_q24;
+  place->pulled_q26 = fixed_clamp(pulled_q24, -PULLED_MAX_Q24, PULLED_MAX_Q24) * 4;
+  int32_t longer_q26 = place->x->longer_q26 - place->y->longer_q26 +
+                       whole_product(place->x->across_q28, place->y->d_q26, 28);
+  place->longer_q28 = fixed_clamp(longer_q26, -LONGER_MAX_Q26, LONGER_MAX_Q26) * 4;
+}
+
+NOINLINE static int32_t model_of(const struct place *place, const struct fit_tangential_sums *sums) {
+  return product(place->at->amplitude_q24 * 16, sums->s0_q28, 32) +
+         whole_product(place->pulled_q26, sums->f0_q28 * 2, 31) +
+         whole_product(place->longer_q28, sums->s2_q22 * 2, 27);
+}
+
+/* Columns of the place and the spread. */
+NOINLINE static void set_moving(const struct place *place, int32_t a_q13, bool round,
+                                union fit_tangential_node *node) {
+  const struct fit_tangential_sums *sums = &node->sums;
+  const struct offset *x = place->x, *y = place->y;
+  int32_t radial_q20 = scaled_by(sums->s1_q25, a_q13, 16) >> 2;
+  int32_t bend_q20 = scaled_by(sums->s2_q22, a_q13, 15);
+  int32_t flat_q20 = radial_q20, along_x_q20 = 0, along_y_q20 = 0;
+  if (!round) {
+    int32_t p_q28 = place->longer_q28, b_q26 = place->pulled_q26;
+    int32_t ps3_q20 = product(sums->s3_q17, p_q28, 25);
+    int32_t bf1_q20 = product(sums->f1_q25, b_q26, 31);
+    bend_q20 += whole_product(sums->s4_q14, p_q28, 22);
+    bend_q20 += product(sums->f2_q22, scaled_by(b_q26, KAPPA_Q14, 14), 28);
+    flat_q20 += 3 * ps3_q20 + scaled_by(bf1_q20, KAPPA_Q14, 13);
+    radial_q20 += ps3_q20 + bf1_q20;
+    along_x_q20 = product(sums->s2_q22, x->along_q28 + y->across_q28, 30) +
+                  (product(place->at->pull_x_q24 * 16, sums->f0_q28, 32) >> 4);
+    along_y_q20 = product(sums->s2_q22, x->across_q28 - y->along_q28, 30) +
+                  (product(place->at->pull_y_q24 * 16, sums->f0_q28, 32) >> 4);
+  }
+  int32_t weight = place->weight;
+  int32_t widen_q20 = whole_product(x->half_square_q23 + y->half_square_q23, bend_q20, 23) - flat_q20;
+  node->column[SPREAD] = weighed(limited_q15(widen_q20), weight);
+  /* Last s2, where PLACE_Y's column is, which STRETCH and SLANT consist of. */
+  int32_t s2_q22 = sums->s2_q22;
+  node->column[PLACE_X] = weighed(limited_q15(product(radial_q20, x->d_q26, 26) - along_x_q20), weight);
+  node->column[PLACE_Y] = weighed(limited_q15(product(radial_q20, y->d_q26, 26) - along_y_q20), weight);
+  node->column[STRETCH] = weighed(product(x->half_square_q23 - y->half_square_q23, s2_q22, 29), weight);
+  node->column[SLANT] = s2_q22; /* until set_still */
+}
+
+/* The other columns, of the unknowns that the model is linear in. */
+NOINLINE static void set_still(const struct place *place, int32_t f0_q28, union fit_tangential_node *node) {
+  const struct offset *x = place->x, *y = place->y;
+  int32_t weight = place->weight;
+  int32_t slant_q23 = product(x->d_q26, y->d_q26, 30) * 2;
+  node->column[SLANT] = weighed(product(slant_q23, node->column[SLANT], 29), weight);
+  node->column[AMPLITUDE] = weighed(rounded(node->sums.s0_q28, 12), weight);
+  int32_t f_q16 = rounded(f0_q28, 12);
+  node->column[PULL_X] = weighed(rounded(f_q16 * x->d_q13, 13), weight);
+  node->column[PULL_Y] = weighed(rounded(f_q16 * y->d_q13, 13), weight);
+}
+
+NOINLINE static void linearise(const struct problem *problem, const struct unknowns *at, bool round,
                                struct fit_tangential_room *room) {
   const struct fit_pad *pad = problem->pad;
   struct offset off_x[COLUMNS], off_y[ROWS];
@@ -265,54 +339,21 @@ NOINLINE static void linearise(const struct problem *problem, const struct unkno
   for (int j = 0; j < FIT_TANGENTIAL_TERMS; j++) {
     set_term(pad, j, j < PAD_NORMAL_TERMS ? at->t_q26 : wider_q26, axes, &terms[j]);
   }
-  set_sums(terms, room->node);
-  int32_t a_q28 = at->amplitude_q24 * 16, a_q13 = fixed_clamp(rounded(at->amplitude_q24, 11), 0, INT16_MAX);
-  int32_t bx_q28 = at->pull_x_q24 * 16, by_q28 = at->pull_y_q24 * 16;
-  int n = 0;
-  for (int i = 0; i < COLUMNS; i++) {
-    const struct offset *x = &off_x[i];
+  set_sums(terms, round, room->node);
+  int32_t a_q13 = fixed_clamp(rounded(at->amplitude_q24, 11), 0, INT16_MAX);
+  struct place place = {.at = at};
+  for (int n = 0, i = 0; i < COLUMNS; i++) {
+    place.x = &off_x[i];
     for (int k = 0; k < ROWS; k++, n++) {
-      const struct offset *y = &off_y[k];
       union fit_tangential_node *node = &room->node[n];
-      struct fit_tangential_sums sums = node->sums;
-      int32_t weight = room->weight_q12[n];
-
-      int32_t pulled_q24 = fixed_clamp(x->pulled_q24 + y->pulled_q24, -PULLED_MAX_Q24, PULLED_MAX_Q24);
-      int32_t longer_q26 = x->longer_q26 - y->longer_q26 + whole_product(x->across_q28, y->d_q26, 28);
-      longer_q26 = fixed_clamp(longer_q26, -LONGER_MAX_Q26, LONGER_MAX_Q26);
-      int32_t residual = (problem->readings.q28[n] >> 4) - product(a_q28, sums.s0_q28, 32) -
-          whole_product(pulled_q24 * 4, sums.f0_q28 * 2, 31) - whole_product(longer_q26 * 4, sums.s2_q22 * 2, 27);
-      room->residual[n] = scaled_by(residual, weight, 12);
-
-      int32_t p_q28 = longer_q26 * 4;
-      int32_t as1_q20 = scaled_by(sums.s1_q25, a_q13, 16) >> 2;
-      int32_t ps3_q20 = product(sums.s3_q17, p_q28, 25);
-      int32_t bf1_q20 = product(sums.f1_q25, pulled_q24 * 4, 31);
-      int32_t radial_q20 = as1_q20 + ps3_q20 + bf1_q20;
-      int32_t bend_q20 = scaled_by(sums.s2_q22, a_q13, 15) +
-                         whole_product(sums.s4_q14, p_q28, 22) +
-                         product(sums.f2_q22, scaled_by(pulled_q24, KAPPA_Q14, 12), 28);
-      int32_t flat_q13 = rounded(as1_q20 + 3 * ps3_q20 + scaled_by(bf1_q20, KAPPA_Q14, 13), 7);
-      int32_t f_q14 = rounded(sums.f0_q28, 14);
-      int32_t along_x = product(sums.s2_q22, x->along_q28 + y->across_q28, 32); /* Q18 */
-      int32_t along_y = product(sums.s2_q22, x->across_q28 - y->along_q28, 32);
-      int32_t place_x_q14 = product(radial_q20, x->d_q26, 32) - (along_x >> 4) - (product(bx_q28, sums.f0_q28, 32) >> 10);
-      int32_t place_y_q14 = product(radial_q20, y->d_q26, 32) - (along_y >> 4) - (product(by_q28, sums.f0_q28, 32) >> 10);
-      int32_t half_square_q23 = x->half_square_q23 + y->half_square_q23;
-      int32_t widen_q13 = product(half_square_q23, bend_q20, 30) - flat_q13;
-      widen_q13 = fixed_clamp(widen_q13, -SPREAD_COLUMN_MAX_Q13, SPREAD_COLUMN_MAX_Q13);
-      int32_t stretch_q23 = x->half_square_q23 - y->half_square_q23;
-      int32_t slant_q22 = product(x->d_q26, y->d_q26, 30);
-
-      int32_t *column = node->column;
-      column[AMPLITUDE] = weighed(rounded(sums.s0_q28, 12), weight);
-      column[PLACE_X] = weighed(rounded(place_x_q14, 1), weight);
-      column[PLACE_Y] = weighed(rounded(place_y_q14, 1), weight);
-      column[SPREAD] = weighed(widen_q13, weight);
-      column[STRETCH] = weighed(product(stretch_q23, sums.s2_q22, 29), weight);
-      column[SLANT] = weighed(product(slant_q22 * 2, sums.s2_q22, 29), weight);
-      column[PULL_X] = weighed(rounded(f_q14 * x->d_q12, 10), weight);
-      column[PULL_Y] = weighed(rounded(f_q14 * y->d_q12, 10), weight);
+      place.y = &off_y[k];
+      place.weight = room->weight_q12[n];
+      set_shape(&place);
+      int32_t residual = (problem->readings.q28[n] >> 4) - model_of(&place, &node->sums);
+      room->residual[n] = scaled_by(residual, place.weight, 12);
+      int32_t f0_q28 = node->sums.f0_q28;
+      set_moving(&place, a_q13, round, node);
+      set_still(&place, f0_q28, node);
     }
   }
 }
@@ -362,28 +403,68 @@ struct equations {
   int32_t scale[UNKNOWNS];
 };
 
+/* Over a column, whose elements are UNKNOWNS apart. */
+NOINLINE static uint32_t column_size(const int32_t *column, uint32_t largest) {
+  const int32_t *end = column + NODES * UNKNOWNS;
+  do {
+    largest |= fixed_size(column[0]) | fixed_size(column[UNKNOWNS]) |
+               fixed_size(column[2 * UNKNOWNS]);
+    column += 3 * UNKNOWNS;
+  } while (column != end);
+  return largest;
+}
+
+NOINLINE static void shift_column(int32_t *column, int32_t shift) {
+  const int32_t *end = column + NODES * UNKNOWNS;
+  if (shift > 0) {
+    int32_t half = (1 << shift) >> 1;
+    do {
+      column[0] = (column[0] + half) >> shift;
+      column[UNKNOWNS] = (column[UNKNOWNS] + half) >> shift;
+      column[2 * UNKNOWNS] = (column[2 * UNKNOWNS] + half) >> shift;
+      column += 3 * UNKNOWNS;
+    } while (column != end);
+  } else if (shift < 0) {
+    int32_t up = 1 << -shift;
+    do {
+      column[0] *= up;
+      column[UNKNOWNS] *= up;
+      column[2 * UNKNOWNS] *= up;
+      column += 3 * UNKNOWNS;
+    } while (column != end);
+  }
+}
+
+NOINLINE static int32_t square_sum(const int32_t *column, const int32_t *residual,
+                                   int32_t *right) {
+  const int32_t *end = residual + NODES;
+  int32_t own = 0, other = *right;
+  do {
+    _Pragma("GCC unroll 3") for (int k = 0; k < 3; k++) {
+      int32_t value = column[k * UNKNOWNS];
+      other += value * residual[k];
+      own += value * value;
+    }
+    column += 3 * UNKNOWNS;
+    residual += 3;
+  } while (residual != end);
+  *right = other;
+  return own;
+}
+_Static_assert(NODES % 3 == 0, "three at a time");
+
 /* Brings a column to 13 bits, and its prior with it. */
 NOINLINE static void normalise_column(struct fit_tangential_room *room, int u, int32_t prior_q26,
                                       int32_t prior_residual, struct equations *equations) {
   int32_t *column = &room->node[0].column[u];
   int32_t q = column_q[u];
-  uint32_t largest = fixed_size(prior_q26) >> (26 - q);
-  for (int k = 0; k < NODES; k++) {
-    largest |= fixed_size(column[k * UNKNOWNS]);
-  }
+  uint32_t largest = column_size(column, fixed_size(prior_q26) >> (26 - q));
   int32_t shift = fixed_bits(largest + (largest >> 8)) - 13;
-  int32_t down = shift > 0 ? shift : 0, up = shift < 0 ? -shift : 0;
-  int32_t half = (1 << down) >> 1;
+  shift_column(column, shift);
   q -= shift;
   int32_t row = shifted(prior_q26, q - 26);
-  int32_t own = row * row, right = row * prior_residual;
-  const int32_t *residual = room->residual;
-  for (int k = 0; k < NODES; k++) {
-    int32_t value = ((column[k * UNKNOWNS] + half) >> down) * (1 << up);
-    column[k * UNKNOWNS] = value;
-    own += value * value;
-    right += value * residual[k];
-  }
+  int32_t right = row * prior_residual;
+  int32_t own = square_sum(column, room->residual, &right) + row * row;
   int32_t scale = (30 - fixed_bits((uint32_t)own)) >> 1;
   scale = scale > 2 ? 2 : scale;
   equations->scale[u] = scale;
@@ -392,36 +473,53 @@ NOINLINE static void normalise_column(struct fit_tangential_room *room, int u, i
   room->matrix[u][u] = own * (1 << (2 * scale));
 }
 
-/* The elements of four pairs of unknowns. */
-FIXED_INLINE void set_elements(struct fit_tangential_room *room, const int32_t *scale, int a, int b, int c, int d) {
-  const int last = UNKNOWNS - 1;
+/* The products of column a with columns b, c, d and the last, summed over the nodes: four in as many
+ * registers as a Cortex-M0+ has for them. */
+FIXED_INLINE void sum_products(const int32_t *column, int32_t *sums, int a, int b, int c, int d) {
   int32_t ab = 0, ac = 0, ad = 0, al = 0;
-  const int32_t *column = room->node[0].column, *end = column + NODES * UNKNOWNS;
+  const int32_t *end = column + NODES * UNKNOWNS;
   do {
-    for (int k = 0; k < 3; k++) {
-      int32_t own = column[a + k * UNKNOWNS];
-      ab += column[b + k * UNKNOWNS] * own;
-      ac += column[c + k * UNKNOWNS] * own;
-      ad += column[d + k * UNKNOWNS] * own;
-      al += column[last + k * UNKNOWNS] * own;
-    }
-    column += 3 * UNKNOWNS;
-  } while (column < end);
-  room->matrix[a > b ? a : b][a > b ? b : a] = ab * (1 << (scale[a] + scale[b]));
-  room->matrix[a > c ? a : c][a > c ? c : a] = ac * (1 << (scale[a] + scale[c]));
-  room->matrix[a > d ? a : d][a > d ? d : a] = ad * (1 << (scale[a] + scale[d]));
-  room->matrix[last][a] = al * (1 << (scale[a] + scale[last]));
+    int32_t own = column[a];
+    ab += column[b] * own;
+    ac += column[c] * own;
+    ad += column[d] * own;
+    al += column[UNKNOWNS - 1] * own;
+    column += UNKNOWNS;
+  } while (column != end);
+  sums[0] = ab;
+  sums[1] = ac;
+  sums[2] = ad;
+  sums[3] = al;
 }
 
-NOINLINE static void form(struct fit_tangential_room *room, const int32_t *scale) {
-  _Static_assert(UNKNOWNS == 8, "every pair is in one of these");
-  set_elements(room, scale, 0, 1, 2, 3);
-  set_elements(room, scale, 1, 2, 3, 4);
-  set_elements(room, scale, 2, 3, 4, 5);
-  set_elements(room, scale, 3, 4, 5, 6);
-  set_elements(room, scale, 4, 5, 6, 0);
-  set_elements(room, scale, 5, 6, 0, 1);
-  set_elements(room, scale, 6, 0, 1, 2);
+/* Every pair of the first seven unknowns is a, a + 1, a + 2 or a + 3 modulo 7 of one a. */
+_Static_assert(UNKNOWNS == 8, "every pair is in one of these");
+#define SUM_PRODUCTS(a)                                                                            \
+  NOINLINE static void sum_products_##a(const int32_t *column, int32_t *sums) {                    \
+    sum_products(column, sums, a, (a + 1) % 7, (a + 2) % 7, (a + 3) % 7);                          \
+  }
+SUM_PRODUCTS(0)
+SUM_PRODUCTS(1)
+SUM_PRODUCTS(2)
+SUM_PRODUCTS(3)
+SUM_PRODUCTS(4)
+SUM_PRODUCTS(5)
+SUM_PRODUCTS(6)
+
+static void form(struct fit_tangential_room *room, const int32_t *scale) {
+  static void (*const sum[UNKNOWNS - 1])(const int32_t *, int32_t *) = {
+      sum_products_0, sum_products_1, sum_products_2, sum_products_3,
+      sum_products_4, sum_products_5, sum_products_6};
+  for (int a = 0; a < UNKNOWNS - 1; a++) {
+    int32_t sums[4];
+    sum[a](room->node[0].column, sums);
+    int32_t up = scale[a];
+    for (int k = 0, b = a; k < 3; k++) {
+      b = b == UNKNOWNS - 2 ? 0 : b + 1;
+      room->matrix[a > b ? a : b][a > b ? b : a] = sums[k] * (1 << (up + scale[b]));
+    }
+    room->matrix[UNKNOWNS - 1][a] = sums[3] * (1 << (up + scale[UNKNOWNS - 1]));
+  }
 }
 
 /* One step's normal equations, solved. L D L^T in place, with a power of two for each pivot between
@@ -442,50 +540,65 @@ FIXED_INLINE int32_t less(int32_t a, uint32_t b) {
   return (int32_t)((uint32_t)a - b);
 }
 
+/* Takes from column j of the matrix what the unknowns before j explain. */
+FIXED_INLINE void reduce(int32_t matrix[UNKNOWNS][UNKNOWNS], int j) {
+  int32_t *row = matrix[UNKNOWNS - 1];
+  do {
+    uint32_t sum = 0;
+    _Pragma("GCC unroll 8") for (int k = 0; k < j; k++) {
+      sum += (uint32_t)(row[k] * matrix[k][j]);
+    }
+    row[j] = less(row[j], sum << 1);
+    row -= UNKNOWNS;
+  } while (row != matrix[j - 1]);
+}
+
+NOINLINE static void take_pivot(int32_t matrix[UNKNOWNS][UNKNOWNS], int32_t j, int32_t right_q26,
+                                int32_t *y_q26, struct solution *solution) {
+  int32_t *own = matrix[j];
+  uint32_t known = 0;
+  for (int32_t k = 0; k < j; k++) {
+    known += (uint32_t)scaled_by(y_q26[k], own[k], 14);
+  }
+  int32_t y = fixed_clamp(less(right_q26, known), -(1 << 26), 1 << 26);
+  int32_t pivot = own[j];
+  if (pivot < PIVOT_LEAST) {
+    for (int32_t i = j + 1; i < UNKNOWNS; i++) {
+      matrix[j][i] = matrix[i][j] = 0;
+    }
+    y_q26[j] = solution->step_q20[j] = 0;
+    solution->half[j] = 6;
+    solution->inverse_q13[j] = 1 << 13;
+    return;
+  }
+  int32_t up = 30 - fixed_bits((uint32_t)pivot);
+  up = up < 0 ? 0 : up;
+  int32_t inverse = port_divide((1 << 29) - 1, pivot >> (15 - up)); /* 2^14 .. 2^15 */
+  int32_t half = up >> 1, odd = up & 1;
+  int32_t down = 15 - half, round = 1 << down >> 1;
+  int32_t *column = own + j;
+  for (int32_t i = j + 1; i < UNKNOWNS; i++) {
+    column += UNKNOWNS;
+    int32_t element = fixed_clamp((*column + round) >> down, -INT16_MAX, INT16_MAX);
+    own[i] = element;
+    *column = rounded(element * inverse, 15 - odd);
+  }
+  int32_t z_q20 = shifted(fixed_mul_16(y, inverse), up - 4);
+  solution->step_q20[j] = z_q20 = fixed_clamp(z_q20, -STEP_MAX_Q20, STEP_MAX_Q20);
+  solution->half[j] = half;
+  solution->inverse_q13[j] = (inverse << odd) >> 1;
+  solution->explained_q30 += (y >> 11) * (fixed_clamp(z_q20, -(1 << 20), 1 << 20) >> 5);
+  y_q26[j] = shifted(y, half);
+}
+
 NOINLINE static void solve(int32_t matrix[UNKNOWNS][UNKNOWNS], const int32_t *right_q26,
                            struct solution *solution) {
   int32_t y_q26[UNKNOWNS]; /* 2^half of it */
   solution->explained_q30 = 0;
-  for (int j = 0; j < UNKNOWNS; j++) {
-    int32_t *own = matrix[j];
-    uint32_t known = 0;
-    for (int k = 0; k < j; k++) {
-      known += (uint32_t)scaled_by(y_q26[k], own[k], 14);
-    }
-    int32_t y = fixed_clamp(less(right_q26[j], known), -(1 << 26), 1 << 26);
-    for (int i = UNKNOWNS - 1; i >= j; i--) {
-      int32_t *row = matrix[i];
-      uint32_t sum = 0;
-      for (int k = 0; k < j; k++) {
-        sum += (uint32_t)(row[k] * matrix[k][j]);
-      }
-      row[j] = less(row[j], sum << 1);
-    }
-    int32_t pivot = own[j];
-    if (pivot < PIVOT_LEAST) {
-      for (int i = j + 1; i < UNKNOWNS; i++) {
-        matrix[j][i] = matrix[i][j] = 0;
-      }
-      y_q26[j] = solution->step_q20[j] = 0;
-      solution->half[j] = 6;
-      solution->inverse_q13[j] = 1 << 13;
-      continue;
-    }
-    int32_t up = 30 - fixed_bits((uint32_t)pivot);
-    up = up < 0 ? 0 : up;
-    int32_t inverse = port_divide((1 << 29) - 1, pivot >> (15 - up)); /* 2^14 .. 2^15 */
-    int32_t half = up >> 1, odd = up & 1;
-    for (int i = j + 1; i < UNKNOWNS; i++) {
-      int32_t element = fixed_clamp(rounded(matrix[i][j], 15 - half), -INT16_MAX, INT16_MAX);
-      own[i] = element;
-      matrix[i][j] = rounded(element * inverse, 15 - odd);
-    }
-    int32_t z_q20 = shifted(fixed_mul_16(y, inverse), up - 4);
-    solution->step_q20[j] = z_q20 = fixed_clamp(z_q20, -STEP_MAX_Q20, STEP_MAX_Q20);
-    solution->half[j] = half;
-    solution->inverse_q13[j] = (inverse << odd) >> 1;
-    solution->explained_q30 += (y >> 11) * (fixed_clamp(z_q20, -(1 << 20), 1 << 20) >> 5);
-    y_q26[j] = shifted(y, half);
+  take_pivot(matrix, 0, right_q26[0], y_q26, solution);
+  _Pragma("GCC unroll 8") for (int j = 1; j < UNKNOWNS; j++) {
+    reduce(matrix, j);
+    take_pivot(matrix, j, right_q26[j], y_q26, solution);
   }
   for (int i = UNKNOWNS - 2; i >= 0; i--) {
     uint32_t known = 0;
@@ -557,10 +670,10 @@ NOINLINE static void take_step(const struct problem *problem, const struct outco
 }
 
 static void improve(const struct problem *problem, struct unknowns *at,
-                    struct fit_tangential_room *room, struct outcome *outcome) {
+                    bool round, struct fit_tangential_room *room, struct outcome *outcome) {
   struct priors priors;
   struct equations equations;
-  linearise(problem, at, room);
+  linearise(problem, at, round, room);
   set_priors(problem, at, &priors);
   int32_t residual_q = normalise_residuals(room->residual, &priors);
   for (int u = 0; u < UNKNOWNS; u++) {
@@ -719,7 +832,7 @@ void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
   problem.spread_prior_q26 = prior_row(problem.base_q22, pad->spread_sd_q26);
   problem.long_prior_q26 = prior_row(problem.base_q22, long_sd_q26);
   for (int step = 0; step < FIT_TANGENTIAL_STEPS; step++) {
-    improve(&problem, &at, &pad->room, &outcome);
+    improve(&problem, &at, step == 0, &pad->room, &outcome);
   }
   conclude(array, &problem, &at, &outcome, result);
 }
