@@ -1,11 +1,12 @@
 #include "cli/calibrate.hpp"
 
+#include "cli/calibrate_device.hpp"
+#include "cli/calibrate_drag.hpp"
 #include "cli/calibrate_view.hpp"
 #include "cli/gains.hpp"
-#include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
+#include "libfingertip/packet_fields.hpp"
 #include "libfingertip/recording.hpp"
-#include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
 
 extern "C" {
@@ -15,11 +16,8 @@ extern "C" {
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <ctime>
 #include <limits>
-#include <poll.h>
-#include <unistd.h>
 
 namespace fingertip {
 
@@ -28,16 +26,8 @@ namespace {
 using calibrating::Array;
 using calibrating::Judgement;
 using calibrating::Placement;
-using std::chrono::milliseconds;
 
-constexpr milliseconds POLL{20};
-constexpr std::int64_t PATIENCE_us = 5000000; /* without a frame */
 constexpr double Q10 = 1024.0;
-
-/* Of a field that is padded with zeros, if there is room. */
-std::string text_of(const char *field) {
-  return printable(std::string(field, strnlen(field, WIRE_TEXT_BYTES)));
-}
 
 Array array_of(const wire_info &info) {
   Array array;
@@ -76,12 +66,12 @@ calibrating::Frame frame_of(const wire_packet &packet) {
 void check_firmware(const wire_info &info, const std::string &what) {
   if (!(info.capabilities & WIRE_CAPABILITY_FIT)) {
     throw Error(
-        what + ": its firmware (scene " + text_of(info.scene) +
+        what + ": its firmware (scene " + text_field(info.scene) +
         ") computes no locations, so there is nothing to calibrate; flash one of scene slip");
   }
   if (!(info.capabilities & WIRE_CAPABILITY_RAW_STREAM)) {
     throw Error(
-        what + ": its firmware (scene " + text_of(info.scene) +
+        what + ": its firmware (scene " + text_field(info.scene) +
         ") sends no pressures; flash one of scene slip, calibrate, and go back if you like: "
         "the calibration stays");
   }
@@ -200,99 +190,10 @@ void print_result(const Work &work, const calibration &made, std::optional<doubl
   std::fflush(stdout);
 }
 
-/* Throws Error unless the answer is yes, Interrupted. */
-void ask(const CalibrateOptions &options, const std::string &question,
-         const std::string &otherwise) {
-  if (options.yes) {
-    return;
-  }
-  if (!isatty(STDIN_FILENO)) {
-    throw Error(otherwise + "; give --yes where nobody can be asked");
-  }
-  std::printf("\n%s [y/N] ", question.c_str());
-  std::fflush(stdout);
-  char line[64] = "";
-  pollfd waiting = {STDIN_FILENO, POLLIN, 0};
-  while (poll(&waiting, 1, 100) <= 0) {
-    if (stop_requested()) {
-      throw Interrupted();
-    }
-  }
-  if (!std::fgets(line, sizeof line, stdin) || (line[0] != 'y' && line[0] != 'Y')) {
-    throw Error(otherwise);
-  }
-}
-
-class Device {
-public:
-  explicit Device(const CalibrateOptions &options)
-      : transport_(open_way(choose_way(options.choice))),
-        session_(*transport_, [this] { return !ending_ && stop_requested(); }),
-        info_(session_.info().body.info) {}
-  ~Device() {
-    if (streaming_) {
-      session_.send(command_stream(0));
-    }
-  }
-
-  void check() {
-    check_firmware(info_, name());
-    const std::uint32_t all =
-        static_cast<std::uint32_t>((std::uint64_t{1} << info_.sensor_count) - 1u);
-    const std::uint32_t missing = all & ~session_.health().body.health.sensors_present;
-    if (missing) {
-      std::string text;
-      for (int k = 0; k < info_.sensor_count; k++) {
-        text += missing >> k & 1u ? " " + std::to_string(k) : "";
-      }
-      throw Error(name() + ": sensors do not answer:" + text +
-                  "; mend their wiring first, a calibration is of all of them");
-    }
-  }
-
-  void stream() {
-    session_.command(command_stream(WIRE_STREAM_RAW));
-    streaming_ = true;
-  }
-  void end_stream() {
-    streaming_ = false;
-    session_.command(command_stream(0));
-  }
-
-  void write(const calibration &made) {
-    ending_ = true; /* what is begun is done whole */
-    session_.command(command_calibrate(made, info_.sensor_count));
-    info_ = session_.info().body.info;
-    if (!(info_.stored & WIRE_STORED_CALIBRATION) || info_.calibration.date_s != made.date_s) {
-      throw Error(name() + ": did not keep the calibration; see fingertip info");
-    }
-  }
-  void erase() {
-    ending_ = true;
-    session_.command(command_erase_calibration());
-  }
-
-  Session &session() { return session_; }
-  const wire_info &info() const { return info_; }
-  std::string name() const { return transport_->description(); }
-
-private:
-  std::unique_ptr<Transport> transport_;
-  bool ending_ = false;
-  Session session_;
-  wire_info info_;
-  bool streaming_ = false;
-};
-
-void work_live(Device &device, Work &work, ColourMode colour) {
+void work_live(CalibratedDevice &device, Work &work, ColourMode colour) {
   std::unique_ptr<CalibrateView> view = make_calibrate_view(colour);
   bool news = false;
-  std::int64_t last_frame_us = steady_now_us();
-  device.session().on_packet([&](const wire_packet &packet) {
-    if (packet.type != WIRE_RAW) {
-      return;
-    }
-    last_frame_us = steady_now_us();
+  const auto take = [&](const wire_packet &packet) {
     if (work.judgement().state == Judgement::State::more && work.take(packet)) {
       work.judge(false);
       news = true;
@@ -301,9 +202,8 @@ void work_live(Device &device, Work &work, ColourMode colour) {
       view->update(work.status(), true);
       news = false;
     }
-  });
-  device.stream();
-  while (work.judgement().state == Judgement::State::more) {
+  };
+  device.follow(WIRE_STREAM_RAW, WIRE_RAW, take, [&] {
     view->update(work.status(), false);
     while (auto key = view->key()) {
       if (*key == 'q') {
@@ -312,19 +212,8 @@ void work_live(Device &device, Work &work, ColourMode colour) {
         work.take_back();
       }
     }
-    if (stop_requested()) {
-      throw Interrupted();
-    }
-    if (device.session().poll(POLL) == Transport::Result::gone) {
-      throw Error(device.name() + ": vanished; nothing was written, plug it in and try again");
-    }
-    if (steady_now_us() - last_frame_us > PATIENCE_us) {
-      throw Error(device.name() +
-                  ": sends no frames; see that its sensors answer (fingertip info)");
-    }
-  }
-  device.session().on_packet({});
-  device.end_stream();
+    return work.judgement().state == Judgement::State::more;
+  });
 }
 
 /* Of the fingertip that the recording is of. */
@@ -364,7 +253,7 @@ void refuse_unless_good(const Judgement &judgement) {
 }
 
 int show(const CalibrateOptions &options) {
-  Device device(options);
+  CalibratedDevice device(options);
   const wire_info &info = device.info();
   if (!(info.stored & WIRE_STORED_CALIBRATION)) {
     std::printf("not calibrated%s\n",
@@ -380,23 +269,24 @@ int show(const CalibrateOptions &options) {
 }
 
 int erase(const CalibrateOptions &options) {
-  Device device(options);
+  CalibratedDevice device(options);
   if (!(device.info().stored & (WIRE_STORED_CALIBRATION | WIRE_STORED_DAMAGED))) {
     std::printf("not calibrated\n");
     return 0;
   }
-  ask(options, "Forget the calibration of " + text_of(device.info().serial) + "?", "not erased");
+  ask(options, "Forget the calibration of " + text_field(device.info().serial) + "?", "not erased");
   device.erase();
   std::printf("erased: it is as if never calibrated\n");
   return 0;
 }
 
 int calibrate(const CalibrateOptions &options) {
-  std::optional<Device> device;
+  std::optional<CalibratedDevice> device;
   std::optional<Work> work;
   if (options.from.empty()) {
     device.emplace(options);
-    device->check();
+    check_firmware(device->info(), device->name());
+    device->check_sensors();
     work.emplace(device->info());
     work_live(*device, *work, options.colour);
   } else {
@@ -405,11 +295,7 @@ int calibrate(const CalibrateOptions &options) {
     refuse_unless_good(work->judgement());
     if (!options.dry_run) {
       device.emplace(options);
-      if (std::strncmp(info.serial, device->info().serial, WIRE_TEXT_BYTES) != 0) {
-        throw Error(printable(options.from) + ": is of fingertip " + text_of(info.serial) +
-                    ", and this is " + text_of(device->info().serial) +
-                    "; calibrate each by its own");
-      }
+      device->check_is(info, options.from);
     }
   }
   refuse_unless_good(work->judgement());
@@ -418,7 +304,7 @@ int calibrate(const CalibrateOptions &options) {
   if (!device) {
     return 0;
   }
-  ask(options, "Write this into " + text_of(device->info().serial) + "?", "not written");
+  ask(options, "Write this into " + text_field(device->info().serial) + "?", "not written");
   device->write(made);
   std::printf("calibrated: it acts from now on\n");
   return 0;
@@ -428,7 +314,10 @@ int calibrate(const CalibrateOptions &options) {
 
 int run_calibrate(const CalibrateOptions &options) {
   try {
-    return options.show ? show(options) : options.erase ? erase(options) : calibrate(options);
+    return options.show    ? show(options)
+           : options.erase ? erase(options)
+           : options.drag  ? calibrate_drag(options)
+                           : calibrate(options);
   } catch (const Interrupted &) {
     throw Error("interrupted; the fingertip is as it was");
   }

@@ -1,5 +1,6 @@
 /* fingertip calibrate: gains of the sensors, and the scale of the force, from placements of one
- * weight, live or in a recording, and into the fingertip. */
+ * weight, or the scale of the tangential force from pulls of one, live or in a recording, and into
+ * the fingertip. */
 #pragma once
 
 #include "cli/terminal.hpp"
@@ -12,7 +13,8 @@ namespace fingertip {
 
 struct CalibrateOptions {
   Choice choice;
-  std::optional<double> force_N; /* of the weight, where it is known */
+  std::optional<double> force_N; /* of the weight, where it is known; pulls must have it */
+  bool drag = false;             /* pulls along the rubber instead of placements */
   std::string from;              /* a recording; empty: live */
   bool dry_run = false;          /* of a recording, write nothing */
   bool yes = false;              /* ask nothing */
@@ -20,8 +22,8 @@ struct CalibrateOptions {
   ColourMode colour = ColourMode::automatic;
 };
 
-/* Exit status. Throws Error: also where the placements do not make a calibration, with the reason,
- * and where the user ends it; then the fingertip is as it was. */
+/* Exit status. Throws Error: also where what was recorded does not make a calibration, with the
+ * reason, and where the user ends it; then the fingertip is as it was. */
 int run_calibrate(const CalibrateOptions &options);
 
 } // namespace fingertip

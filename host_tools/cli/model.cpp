@@ -47,6 +47,8 @@ void Model::take_frame(std::uint64_t t_us) {
     before_restart_us_ += last_us_ - *first_us_;
     first_us_.reset();
     last_slip_us_.reset();
+    last_sliding_us_.reset();
+    last_moving_us_.reset();
     recent_us_.clear();
     trail_.clear();
     samples_.clear();
@@ -62,10 +64,12 @@ void Model::take_frame(std::uint64_t t_us) {
 
 void Model::take_contact(const wire_contact &contact, std::uint64_t t_us) {
   contact_ = contact;
-  bool slip = contact.flags & CONTACT_FLAG_SLIP;
-  if (slip) {
-    last_slip_us_ = t_us;
-  }
+  auto note = [&](contact_flag flag, std::optional<std::uint64_t> &at_us) {
+    at_us = contact.flags & flag ? t_us : at_us;
+  };
+  note(CONTACT_FLAG_SLIP, last_slip_us_);
+  note(CONTACT_FLAG_SLIDING, last_sliding_us_);
+  note(CONTACT_FLAG_MOVING, last_moving_us_);
   if (!(contact.flags & CONTACT_FLAG_FIT_VALID)) {
     trail_.clear();
   } else if (!warnings_of(contact.flags)) {
@@ -97,6 +101,7 @@ void Model::sample(const wire_contact &contact, std::uint64_t t_us) {
     if (!last.fitted || last.doubtful) {
       if (!doubtful) {
         last.force_N = 0;
+        last.pulled = false;
       }
       last.doubtful = doubtful;
     }
@@ -105,6 +110,11 @@ void Model::sample(const wire_contact &contact, std::uint64_t t_us) {
       last.x_mm = contact.x_mm;
       last.y_mm = contact.y_mm;
       last.force_N = std::max(last.force_N, contact.force_N);
+      if (contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) {
+        last.pulled = true;
+        last.qx_N = contact.qx_N;
+        last.qy_N = contact.qy_N;
+      }
     }
   }
   if (contact.flags & CONTACT_FLAG_SLIP_VALID) {
@@ -112,6 +122,7 @@ void Model::sample(const wire_contact &contact, std::uint64_t t_us) {
     last.slip_mm = std::max(last.slip_mm, contact.slip_mm);
   }
   last.slip = last.slip || (contact.flags & CONTACT_FLAG_SLIP);
+  last.sliding = last.sliding || (contact.flags & CONTACT_FLAG_SLIDING);
 }
 
 bool Model::is_current() const {
@@ -151,8 +162,16 @@ double Model::mean_frames_per_s() const {
   return frames_ > 1 && seconds() > 0 ? static_cast<double>(frames_ - 1) / seconds() : 0;
 }
 
-bool Model::slipped_lately() const {
-  return last_slip_us_ && last_us_ - *last_slip_us_ <= SLIP_SHOWN_us;
+bool Model::is_late(const std::optional<std::uint64_t> &at_us) const {
+  return at_us && last_us_ - *at_us <= SLIP_SHOWN_us;
+}
+
+bool Model::tells_tangential() const {
+  return info_ && (info_->capabilities & WIRE_CAPABILITY_TANGENTIAL);
+}
+
+bool Model::has_pad() const {
+  return tells_tangential() && (info_->stored & WIRE_STORED_PAD);
 }
 
 std::optional<double> Model::seconds_since_frame() const {

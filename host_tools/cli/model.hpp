@@ -30,6 +30,9 @@ public:
     bool slip_valid = false;
     float slip_mm = 0; /* the highest */
     bool slip = false;
+    bool pulled = false;      /* qx_N, qy_N hold a load */
+    float qx_N = 0, qy_N = 0; /* the last */
+    bool sliding = false;
   };
   static constexpr std::uint64_t SAMPLE_INTERVAL_us = 50000;
   static constexpr std::size_t SAMPLES = 800;
@@ -57,8 +60,13 @@ public:
   double frames_per_s() const;
   /* Over everything. */
   double mean_frames_per_s() const;
-  /* A slip flag within the last 0.15 s of device time: long enough to be seen. */
-  bool slipped_lately() const;
+  /* One of these flags within the last 0.15 s of device time: long enough to be seen. */
+  bool slipped_lately() const { return is_late(last_slip_us_); }
+  bool slid_lately() const { return is_late(last_sliding_us_); }
+  bool moved_lately() const { return is_late(last_moving_us_); }
+  /* Its firmware can tell tangential load; and knows the pad, without which it does not. */
+  bool tells_tangential() const;
+  bool has_pad() const;
   /* Since the last frame, by the host's clock; nothing before the first. */
   std::optional<double> seconds_since_frame() const;
   /* Whether what the last frame told is still so: false where none came for STALLED_s, and where
@@ -76,6 +84,7 @@ private:
   void take_frame(std::uint64_t t_us);
   void take_contact(const wire_contact &contact, std::uint64_t t_us);
   void sample(const wire_contact &contact, std::uint64_t t_us);
+  bool is_late(const std::optional<std::uint64_t> &at_us) const;
 
   State state_ = State::connecting;
   std::string source_;
@@ -89,7 +98,7 @@ private:
   std::uint64_t before_restart_us_ = 0; /* device time of earlier runs of the device */
   std::optional<std::uint64_t> first_us_;
   std::uint64_t last_us_ = 0;
-  std::optional<std::uint64_t> last_slip_us_;
+  std::optional<std::uint64_t> last_slip_us_, last_sliding_us_, last_moving_us_;
   std::optional<std::chrono::steady_clock::time_point> last_arrival_;
   std::deque<std::uint64_t> recent_us_;
   std::deque<Location> trail_;

@@ -18,6 +18,8 @@ namespace {
 constexpr int LEAST_COLUMNS = 40, LEAST_ROWS = 22;
 /* From this width on the numbers stand in lines, below it one to a line. */
 constexpr int WIDE = 60;
+/* Of firmware that could tell tangential load. */
+constexpr const char *NO_PAD = "no pad profile:", *PAD_COMMAND = "fingertip pad";
 
 std::string right_aligned(const std::string &text, int width) {
   return std::string(static_cast<std::size_t>(std::max(0, width - columns_of(text))), ' ') + text;
@@ -109,6 +111,7 @@ int draw_lamp(Canvas &canvas, int column, int row, bool on, const std::string &n
 /* Of the last frame, as far as it holds them. */
 struct Numbers {
   std::optional<std::string> force, force_sd, x, y, location_sd, sigma, peak, residual, slip;
+  std::optional<std::string> qx, qy, q_sd, ratio, ratio_sd;
   bool doubtful = false;
   std::uint32_t flags = 0;
 };
@@ -137,6 +140,15 @@ Numbers numbers_of(const Model &model) {
   if (contact.flags & CONTACT_FLAG_SLIP_VALID) {
     numbers.slip = number(contact.slip_mm, 2);
   }
+  if (contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) {
+    numbers.qx = signed_number(contact.qx_N, 2);
+    numbers.qy = signed_number(contact.qy_N, 2);
+    numbers.q_sd = number(contact.q_sd_N, 3);
+    numbers.ratio = number(contact.tangential_ratio, 3);
+    if (contact.force_N > 0) {
+      numbers.ratio_sd = number(contact.q_sd_N / contact.force_N, 3);
+    }
+  }
   return numbers;
 }
 
@@ -155,6 +167,12 @@ std::vector<std::string> flowed(const std::vector<std::string> &parts, const std
   return lines;
 }
 
+Numbers numbers_of_warnings(std::uint32_t flags) {
+  Numbers numbers;
+  numbers.flags = warnings_of(flags);
+  return numbers;
+}
+
 /* In words where there is room for them, else their names, else as many as fit. */
 void draw_warnings(Canvas &canvas, const Area &area, const Model &model, const Numbers &numbers) {
   std::uint32_t flags = numbers.flags;
@@ -165,7 +183,7 @@ void draw_warnings(Canvas &canvas, const Area &area, const Model &model, const N
     canvas.text(area.left, area.top, first_columns("contact, no location", area.width),
                 text_style(WARNING, true));
     draw_warnings(canvas, {area.left, area.top + 1, area.width, area.height - 1}, model,
-                  {{}, {}, {}, {}, {}, {}, {}, {}, {}, false, warnings_of(flags)});
+                  numbers_of_warnings(flags));
     return;
   }
   auto words = warnings_in_words(flags, model.info() ? model.info()->location_limit_mm : 0);
@@ -201,7 +219,14 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
   bool doubtful = numbers.doubtful;
   bool contact = numbers.flags & CONTACT_FLAG_CONTACT;
   bool slipped = model.is_current() && model.slipped_lately();
+  bool slid = model.is_current() && model.slid_lately();
+  bool moved = model.is_current() && model.moved_lately();
+  bool from_touch = numbers.flags & CONTACT_FLAG_TANGENTIAL_FROM_TOUCH;
   std::string of = slip_unit(model);
+  auto lamps_of_motion = [&](int column) {
+    column = draw_lamp(canvas, column, row, moved, "MOVING", WARNING);
+    return draw_lamp(canvas, column + 2, row, slid, "SLIDING", BAD);
+  };
   auto quantity = [&](int column, const char *label, const std::optional<std::string> &value,
                       int width, const char *unit, bool may_doubt) {
     return draw_quantity(canvas, column, row, {label, value, width, unit, may_doubt && doubtful});
@@ -223,6 +248,22 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
     row++;
     draw_lamp(canvas, draw_lamp(canvas, left, row, contact, "CONTACT", GOOD) + 2, row, slipped,
               "SLIP", BAD);
+    row++;
+    if (!model.tells_tangential()) {
+      return row;
+    }
+    lamps_of_motion(left);
+    row++;
+    if (!model.has_pad()) {
+      canvas.text(left, row, NO_PAD, text_style(WARNING));
+      canvas.text(left, row + 1, PAD_COMMAND, text_style(WARNING));
+      return row + 2;
+    }
+    quantity(left + 10, "", numbers.qy, 6, "N", true);
+    quantity(left, "q", numbers.qx, 6, "", true);
+    row++;
+    quantity(left, from_touch ? "ΔQ/F" : "Q/F ", numbers.ratio, 5, "", true);
+    quantity(left + 11, "sd", numbers.ratio_sd, 5, "", false);
     return row + 1;
   }
   int second = left + 22;
@@ -237,6 +278,22 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
   quantity(left + 11, "peak", numbers.peak, 6, "kPa", true);
   quantity(left + 28, "residual", numbers.residual, 5, "Pa", false);
   row++;
+  if (model.has_pad()) {
+    quantity(left, "qx", numbers.qx, 6, "", true);
+    quantity(left + 11, "qy", numbers.qy, 6, "", true);
+    quantity(second, "sd", numbers.q_sd, 6, "N", false);
+    canvas.text(second + 13, row, from_touch ? "since touch" : "", text_style(WARNING));
+    row++;
+    quantity(left, "Q/F", numbers.ratio, 5, "", true);
+    quantity(left + 11, "sd", numbers.ratio_sd, 6, "", false);
+    lamps_of_motion(second + 4);
+    row++;
+  } else if (model.tells_tangential()) {
+    canvas.text(left, row, std::string(NO_PAD) + " " + PAD_COMMAND, text_style(WARNING));
+    row++;
+    lamps_of_motion(left);
+    row++;
+  }
   int column = draw_lamp(canvas, left, row, contact, "CONTACT", GOOD);
   column = draw_lamp(canvas, column + 2, row, slipped, "SLIP", BAD);
   column = quantity(column + 1, "", numbers.slip, 5, of.c_str(), true);

@@ -22,6 +22,13 @@ constexpr float FINEST_mm = 0.75f;
 constexpr float NOTED_Pa = 500;
 /* As a doubtful fit is drawn, beside one that can be trusted. */
 constexpr float DOUBTFUL_PART = 0.45f;
+/* Length of the arrow whose tangential load is as large as the normal force: rubber slides at a
+ * half to one of it, and the array is 36 mm long. */
+constexpr float ARROW_mm = 40.0f;
+/* A load below so many of its standard deviations has no direction. */
+constexpr float ARROW_SDS = 2.0f;
+/* As what the arrow may be is drawn, beside what it is for sure. */
+constexpr float UNSURE_PART = 0.4f;
 
 /* Perceptually ordered, dark to bright, for 0 to 1. */
 Colour heat(float part) {
@@ -74,6 +81,7 @@ public:
   int pixel_row_of(float y_mm) const {
     return static_cast<int>(std::floor((top_mm_ - y_mm) / pixel_mm_));
   }
+  float pixel_mm() const { return pixel_mm_; }
   int cells_of(float mm) const { return static_cast<int>(mm / pixel_mm_); }
   Colour *pixel(int column, int pixel_row) {
     if (column < 0 || column >= columns_ || pixel_row < 0 || pixel_row >= 2 * rows_) {
@@ -121,6 +129,61 @@ void paint_fit(Picture &picture, const Model &model, const wire_contact &contact
       float age = (newest_us - static_cast<float>(past.t_us)) / 1e6f;
       picture.paint(picture.column_of(past.x_mm), picture.pixel_row_of(past.y_mm), ACCENT,
                     0.2f * std::round(4 * (1 - age)));
+    }
+  }
+}
+
+/* Tangential load over normal force as an arrow from the contact: solid as far as it is for sure,
+ * around it where it ends but for one standard deviation. A load that may be none is a round spot
+ * of that size. */
+struct Arrow {
+  float along_x, along_y, length_mm, sd_mm;
+  Colour colour;
+  float part; /* of the colour */
+
+  explicit Arrow(const wire_contact &contact) {
+    float size_N = std::hypot(contact.qx_N, contact.qy_N);
+    bool has_direction = size_N > ARROW_SDS * contact.q_sd_N;
+    along_x = has_direction ? contact.qx_N / size_N : 0;
+    along_y = has_direction ? contact.qy_N / size_N : 0;
+    length_mm = has_direction ? ARROW_mm * contact.tangential_ratio : 0;
+    sd_mm = ARROW_mm * contact.q_sd_N / contact.force_N;
+    bool doubtful = warnings_of(contact.flags);
+    colour = doubtful ? WARNING : contact.flags & CONTACT_FLAG_SLIDING ? BAD : GOOD;
+    part = doubtful ? DOUBTFUL_PART : 1;
+  }
+  bool has_direction() const { return length_mm > 0; }
+  /* How much of a pixel so far from the contact is the arrow's. */
+  float covers(float dx_mm, float dy_mm, float pixel_mm) const {
+    float ahead_mm = dx_mm * along_x + dy_mm * along_y;
+    float aside_mm = std::abs(dx_mm * along_y - dy_mm * along_x);
+    if (has_direction() && ahead_mm >= 0 && ahead_mm <= length_mm - sd_mm &&
+        aside_mm <= 0.5f * pixel_mm) {
+      return part;
+    }
+    bool in_cone = has_direction() && ahead_mm >= 0 && ahead_mm <= length_mm &&
+                   aside_mm <= sd_mm * ahead_mm / length_mm;
+    float from_end_mm = std::hypot(dx_mm - length_mm * along_x, dy_mm - length_mm * along_y);
+    return in_cone || from_end_mm <= std::max(sd_mm, 0.5f * pixel_mm) ? UNSURE_PART * part : 0;
+  }
+  const char *head() const {
+    constexpr const char *heads[] = {"→", "↗", "↑", "↖", "←", "↙", "↓", "↘"};
+    constexpr float eighth_rad = 0.7853982f;
+    return heads[std::lround(std::atan2(along_y, along_x) / eighth_rad + 8) % 8];
+  }
+};
+
+std::optional<Arrow> arrow_of(const wire_contact &contact) {
+  bool there = (contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) && contact.force_N > 0;
+  return there ? std::optional<Arrow>(contact) : std::nullopt;
+}
+
+void paint_arrow(Picture &picture, const wire_contact &contact, const Arrow &arrow) {
+  for (int row = 0; row < 2 * picture.rows(); row++) {
+    for (int column = 0; column < picture.columns(); column++) {
+      picture.paint(column, row, arrow.colour,
+                    arrow.covers(picture.x_mm(column) - contact.x_mm,
+                                 picture.y_mm(row) - contact.y_mm, picture.pixel_mm()));
     }
   }
 }
@@ -243,7 +306,10 @@ void draw_sensor(Canvas &canvas, const Picture &picture, const Model &model, int
 
 /* The frame; its upper side says what the numbers are, its lower what the colours mean. */
 void draw_frame(Canvas &canvas, const Area &area, const Model &model) {
-  Style style = text_style(model.slipped_lately() && model.is_current() ? BAD : RULE);
+  bool slides = model.slid_lately() && model.is_current();
+  bool moves = model.moved_lately() && model.is_current();
+  bool alarm = slides || (model.slipped_lately() && model.is_current());
+  Style style = text_style(alarm ? BAD : moves ? WARNING : RULE);
   int right = area.left + area.width - 1, bottom = area.top + area.height - 1;
   for (int i = 1; i + 1 < area.width; i++) {
     canvas.text(area.left + i, area.top, "─", style);
@@ -256,8 +322,13 @@ void draw_frame(Canvas &canvas, const Area &area, const Model &model) {
   canvas.text(right, area.top, "╮", style);
   canvas.text(area.left, bottom, "╰", style);
   canvas.text(right, bottom, "╯", style);
+  if (slides || moves) {
+    std::string told = slides ? " SLIDING " : " MOVING ";
+    canvas.text(area.left + std::max(1, (area.width - columns_of(told)) / 2), area.top, told,
+                {slides ? WHITE : BLACK, slides ? BAD : WARNING, true});
+  }
   for (const char *legend : {"no., measured, fitted", "no., kPa, fit", "no., kPa"}) {
-    if (columns_of(legend) <= area.width - 2) {
+    if (!slides && !moves && columns_of(legend) <= area.width - 2) {
       canvas.text(area.left + 1, area.top, legend, text_style(FAINT));
       break;
     }
@@ -294,22 +365,40 @@ Area draw_pad(Canvas &canvas, const Area &available, const Model &model) {
   Picture picture(*model.info(), available.width - 2, available.height - 2);
   Area area = {available.left, available.top, picture.columns() + 2, picture.rows() + 2};
   const wire_contact *fit = fit_of(model);
+  const std::optional<Arrow> arrow = fit ? arrow_of(*fit) : std::nullopt;
   if (fit) {
     paint_fit(picture, model, *fit);
+  }
+  if (arrow) {
+    paint_arrow(picture, *fit, *arrow);
   }
   draw_frame(canvas, area, model);
   draw_picture(canvas, picture, area.left + 1, area.top + 1);
   for (int k = 0; k < model.info()->sensor_count; k++) {
     draw_sensor(canvas, picture, model, k, area.left + 1, area.top + 1);
   }
+  auto place = [&](int column, int row, const char *shape, Colour colour) {
+    bool inside = column >= 0 && column < picture.columns() && row >= 0 && row < picture.rows();
+    bool free = inside && is_free(canvas.cell(area.left + 1 + column, area.top + 1 + row));
+    if (free) {
+      canvas.text(area.left + 1 + column, area.top + 1 + row, shape, text_style(colour, true));
+    }
+    return free;
+  };
+  if (arrow) {
+    /* At the end, or as near to it as there is room, outside of the location's own cell. */
+    bool placed = false;
+    for (float mm = arrow->length_mm; !placed && mm > 2 * picture.pixel_mm();
+         mm -= picture.pixel_mm()) {
+      placed = place(picture.column_of(fit->x_mm + mm * arrow->along_x),
+                     picture.pixel_row_of(fit->y_mm + mm * arrow->along_y) / 2, arrow->head(),
+                     arrow->colour);
+    }
+  }
   if (fit) {
     Mark mark(picture, *fit);
     for (const auto &[column, row, shape] : mark.cells) {
-      bool inside = column >= 0 && column < picture.columns() && row >= 0 && row < picture.rows();
-      if (inside && is_free(canvas.cell(area.left + 1 + column, area.top + 1 + row))) {
-        canvas.text(area.left + 1 + column, area.top + 1 + row, shape,
-                    text_style(mark.colour, true));
-      }
+      place(column, row, shape, mark.colour);
     }
   }
   return area;

@@ -1,5 +1,6 @@
 /* The pad as the monitor draws it: the fitted pressure as colour, over it each sensor with its
- * number, what it measured, and what the fit says of it. */
+ * number, what it measured, and what the fit says of it, and what pulls along the rubber as an
+ * arrow. */
 #pragma once
 
 #include "cli/canvas.hpp"

@@ -18,6 +18,10 @@ constexpr float RIM_mm = 6.0f; /* beyond the outermost sensors, as the pad is dr
 /* A doubtful force above this is none: the pads are made for less. */
 constexpr float MOST_N = 50;
 
+/* A tangential load below this is hardly more than its standard deviation: no axis is made for it.
+ */
+constexpr float LEAST_PULL_N = 0.5f;
+
 using Sample = Model::Sample;
 
 /* 1, 2 or 5 times a power of ten, not below the value. */
@@ -37,7 +41,8 @@ struct Trace {
   float low, high;
   std::optional<float> line; /* to compare with: zero, or a threshold */
   std::function<std::optional<float>(const Sample &)> value;
-  bool location; /* else it is told red where it slips */
+  bool goes_both_ways; /* a dot shows the last value, else the highest */
+  bool Sample::*alarm; /* told red where it is so; none: never */
 };
 
 /* Times of an area's columns, two dots each. */
@@ -116,7 +121,7 @@ void draw_axis(Canvas &canvas, const Area &area, const Trace &trace) {
 /* The dots of one cell. */
 struct Dots {
   unsigned bits = 0;
-  bool doubtful = false, slip = false;
+  bool doubtful = false, alarm = false;
 };
 
 class Curve {
@@ -130,11 +135,11 @@ public:
     return cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) +
                   static_cast<std::size_t>(column)];
   }
-  void set(int dot, int row, bool doubtful, bool slip) {
+  void set(int dot, int row, bool doubtful, bool alarm) {
     Dots &dots = cell(dot / 2, row / 4);
     dots.bits |= braille_bit(dot % 2, row % 4);
     dots.doubtful = dots.doubtful || doubtful;
-    dots.slip = dots.slip || slip;
+    dots.alarm = dots.alarm || alarm;
   }
 
 private:
@@ -151,16 +156,17 @@ void draw_curve(Canvas &canvas, const Area &area, const Trace &trace, const Time
   int before = -1; /* row of the dot before; none */
   for (int dot = 0; dot < 2 * area.width; dot++) {
     std::optional<float> value;
-    bool doubtful = false, slip = false;
+    bool doubtful = false, alarm = false;
     times.each(dot, [&](const Sample &sample) {
       auto here = trace.value(sample);
-      bool better = here && (!value || (doubtful && !sample.doubtful) ||
-                             (doubtful == sample.doubtful && (trace.location || *here > *value)));
+      bool better =
+          here && (!value || (doubtful && !sample.doubtful) ||
+                   (doubtful == sample.doubtful && (trace.goes_both_ways || *here > *value)));
       if (better) {
         value = here;
         doubtful = sample.doubtful;
       }
-      slip = slip || sample.slip;
+      alarm = alarm || (trace.alarm && sample.*trace.alarm);
     });
     if (!value || *value < trace.low || *value > trace.high) {
       before = -1;
@@ -170,14 +176,14 @@ void draw_curve(Canvas &canvas, const Area &area, const Trace &trace, const Time
     if (doubtful) {
       before = -1;
       if (dot % 2 == 0) {
-        curve.set(dot, row, true, slip);
+        curve.set(dot, row, true, alarm);
       }
       continue;
     }
-    curve.set(dot, row, false, slip);
+    curve.set(dot, row, false, alarm);
     for (int between = before < 0 ? row : before; between != row;
          between += between < row ? 1 : -1) {
-      curve.set(dot, between, false, slip);
+      curve.set(dot, between, false, alarm);
     }
     before = row;
   }
@@ -186,7 +192,7 @@ void draw_curve(Canvas &canvas, const Area &area, const Trace &trace, const Time
     for (int column = 0; column < area.width; column++) {
       const Dots &dots = curve.cell(column, row);
       if (dots.bits) {
-        Colour colour = dots.doubtful ? WARNING : dots.slip && !trace.location ? BAD : ACCENT;
+        Colour colour = dots.doubtful ? WARNING : dots.alarm ? BAD : ACCENT;
         canvas.text(area.left + column, area.top + row, braille(dots.bits), text_style(colour));
       } else if (row == line_row) {
         canvas.text(area.left + column, area.top + row, "╌", text_style(RULE));
@@ -214,13 +220,13 @@ void draw_time(Canvas &canvas, const Area &area, double span_s) {
 } // namespace
 
 void draw_traces(Canvas &canvas, const Area &area, const Model &model) {
-  constexpr int count = 4;
+  constexpr int shortest = 4;
   int columns = area.width - GUTTER;
-  if (columns < 4 || area.height < count + 1) {
+  if (columns < 4 || area.height < shortest + 1) {
     return;
   }
   Times times(model, columns);
-  float force_N = 1, slip_mm = 0.1f;
+  float force_N = 1, pull_N = LEAST_PULL_N, slip_mm = 0.1f;
   float threshold_mm = model.info() ? model.info()->slip_threshold_mm : 0;
   float x_mm = RIM_mm, y_mm = RIM_mm;
   if (model.info()) {
@@ -237,33 +243,47 @@ void draw_traces(Canvas &canvas, const Area &area, const Model &model) {
     } else if (sample.fitted && sample.force_N <= MOST_N) {
       doubtful_N = std::max(doubtful_N, sample.force_N);
     }
+    if (sample.pulled && !sample.doubtful) {
+      pull_N = std::max({pull_N, std::abs(sample.qx_N), std::abs(sample.qy_N)});
+    }
     if (sample.slip_valid && !sample.doubtful) {
       slip_mm = std::max(slip_mm, sample.slip_mm);
     }
   });
   bool good_ones = force_N > 1;
   force_N = good_ones ? force_N : doubtful_N;
-  auto of_fit = [](float Sample::*value) {
-    return [value](const Sample &sample) {
-      return sample.fitted ? std::optional<float>(sample.*value) : std::nullopt;
+  pull_N = round_above(pull_N);
+  auto where = [](bool Sample::*there, float Sample::*value) {
+    return [there, value](const Sample &sample) {
+      return sample.*there ? std::optional<float>(sample.*value) : std::nullopt;
     };
   };
-  const Trace traces[count] = {
-      {"force", "N", 0, round_above(force_N), std::nullopt, of_fit(&Sample::force_N), false},
-      {"x", "mm", -x_mm, x_mm, 0.0f, of_fit(&Sample::x_mm), true},
-      {"y", "mm", -y_mm, y_mm, 0.0f, of_fit(&Sample::y_mm), true},
-      {"slip", "mm", 0, round_above(slip_mm),
-       threshold_mm > 0 ? std::optional<float>(threshold_mm) : std::nullopt,
-       [](const Sample &sample) {
-         return sample.slip_valid ? std::optional<float>(sample.slip_mm) : std::nullopt;
-       },
-       false}};
-  int rows = area.height - 1;
+  auto of_fit = [&](float Sample::*value) { return where(&Sample::fitted, value); };
+  auto of_pull = [&](float Sample::*value) { return where(&Sample::pulled, value); };
+  std::vector<Trace> traces = {{"force", "N", 0, round_above(force_N), std::nullopt,
+                                of_fit(&Sample::force_N), false, &Sample::slip}};
+  const bool three_axes = model.has_pad();
+  if (three_axes) {
+    traces.push_back(
+        {"qx", "N", -pull_N, pull_N, 0.0f, of_pull(&Sample::qx_N), true, &Sample::sliding});
+    traces.push_back(
+        {"qy", "N", -pull_N, pull_N, 0.0f, of_pull(&Sample::qy_N), true, &Sample::sliding});
+  }
+  /* The location is in the picture of the pad too, with its last second. */
+  if (!three_axes || area.height > shortest + 2) {
+    traces.push_back({"x", "mm", -x_mm, x_mm, 0.0f, of_fit(&Sample::x_mm), true, nullptr});
+    traces.push_back({"y", "mm", -y_mm, y_mm, 0.0f, of_fit(&Sample::y_mm), true, nullptr});
+  }
+  traces.push_back({"slip", "mm", 0, round_above(slip_mm),
+                    threshold_mm > 0 ? std::optional<float>(threshold_mm) : std::nullopt,
+                    where(&Sample::slip_valid, &Sample::slip_mm), false, &Sample::slip});
+  int rows = area.height - 1, count = static_cast<int>(traces.size());
   int top = area.top;
   for (int i = 0; i < count; i++) {
+    const Trace &trace = traces[static_cast<std::size_t>(i)];
     int height = rows / count + (i < rows % count ? 1 : 0);
-    draw_axis(canvas, {area.left, top, area.width, height}, traces[i]);
-    draw_curve(canvas, {area.left + GUTTER, top, columns, height}, traces[i], times);
+    draw_axis(canvas, {area.left, top, area.width, height}, trace);
+    draw_curve(canvas, {area.left + GUTTER, top, columns, height}, trace, times);
     top += height;
   }
   draw_time(canvas, {area.left + GUTTER, top, columns, 1}, times.span_s());

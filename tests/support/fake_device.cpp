@@ -21,14 +21,14 @@
  *     calibrated=1     a calibration is stored
  *     pad=1            a pad's profile is stored
  *     capabilities=BITS  of its firmware
- *     play=FILE        its raw packets, and its sensors, are those of this recording, as fast as
- * they are read; then nothing more serial=HEX       its serial number; board=NAME, git=HASH,
- * firmware=A.B.C likewise loader=1         ends when it is asked into the loader, by the command or
- * by 1200 baud version=V        speaks this protocol version, answers nothing else clock_ppm=P its
- * clock is fast by so much, over the whole of its life zero_log=FILE    writes there when its clock
- * was zero, us of CLOCK_MONOTONIC started=S        its clock was started S seconds before
- *     mirror=LINK      the same bytes, a moment before, on a second terminal that hears nothing and
- * has to be read life=S           ends after this time, default 60
+ *     play=FILE        its raw and contact packets, and its sensors, are those of this recording,
+ * as fast as they are read; then nothing more serial=HEX       its serial number; board=NAME,
+ * git=HASH, firmware=A.B.C likewise loader=1         ends when it is asked into the loader, by the
+ * command or by 1200 baud version=V        speaks this protocol version, answers nothing else
+ * clock_ppm=P its clock is fast by so much, over the whole of its life zero_log=FILE    writes
+ * there when its clock was zero, us of CLOCK_MONOTONIC started=S        its clock was started S
+ * seconds before mirror=LINK      the same bytes, a moment before, on a second terminal that hears
+ * nothing and has to be read life=S           ends after this time, default 60
  *
  * Ends by SIGTERM too. */
 #include "libfingertip/command.hpp"
@@ -115,7 +115,10 @@ public:
       }
       if (!options_["play"].empty()) {
         if (played_ < recorded_.size()) {
-          send(recorded_[played_++]);
+          const wire_packet &packet = recorded_[played_++];
+          if (streams_ & (packet.type == WIRE_RAW ? WIRE_STREAM_RAW : WIRE_STREAM_CONTACT)) {
+            send(packet);
+          }
         }
         next_frame = Clock::now();
         continue;
@@ -151,7 +154,7 @@ private:
       if (item->kind != fingertip::RecordingReader::Item::Kind::packet) {
         continue;
       }
-      if (item->packet.type == WIRE_RAW) {
+      if (item->packet.type == WIRE_RAW || item->packet.type == WIRE_CONTACT) {
         recorded_.push_back(item->packet);
       } else if (item->packet.type == WIRE_INFO) {
         wire_info &info = info_.body.info;

@@ -32,6 +32,10 @@ void add_calibrate(CommandLine &line) {
         if (options->dry_run && options->from.empty()) {
           throw WrongUsage("--dry-run goes with --from; without, it asks before it writes");
         }
+        if (options->drag && !options->force_N) {
+          throw WrongUsage("--drag needs to know what pulls: --weight GRAMS on the string, or "
+                           "--force N");
+        }
         return run_calibrate(*options);
       });
   with_port(command, options->choice);
@@ -53,18 +57,22 @@ void add_calibrate(CommandLine &line) {
                                "The same in newtons")
                            ->excludes(weight)
                            ->type_name("N");
+  CLI::Option *drag =
+      command->add_flag("--drag", options->drag,
+                        "The tangential force's scale instead: the weight hangs on a string that "
+                        "pulls an object level along the pad, several times in each direction");
   CLI::Option *from =
       command
           ->add_option("--from", options->from,
-                       "From a recording of such placements, with pressures, instead of live")
+                       "From a recording of it, placements with pressures, instead of live")
           ->type_name("FILE.csv");
   CLI::Option *dry_run = command->add_flag("--dry-run", options->dry_run, "With --from: only show");
   CLI::Option *yes = command->add_flag("--yes", options->yes, "Write, or erase, without asking");
   CLI::Option *show =
       command->add_flag("--show", options->show, "Show what the fingertip is calibrated by")
-          ->excludes(weight, force, from, dry_run, yes);
+          ->excludes(weight, force, drag, from, dry_run, yes);
   command->add_flag("--erase", options->erase, "Have it forget its calibration; it asks")
-      ->excludes(weight, force, from, dry_run, show);
+      ->excludes(weight, force, drag, from, dry_run, show);
   with_colour(command, options->colour);
 }
 

@@ -2,6 +2,7 @@
 #include "cli/monitor.hpp"
 #include "cli/painter.hpp"
 #include "support/host_packets.hpp"
+#include "support/pad.h"
 
 #include <cmath>
 #include <cstdlib>
@@ -25,9 +26,28 @@ Model model_with_info() {
   return model;
 }
 
+constexpr std::uint32_t PULLED = GOOD | CONTACT_FLAG_TANGENTIAL_VALID;
+
+/* Of a fingertip that can tell tangential load. */
+Model model_of_grasp(bool with_pad) {
+  Model model = model_with_info();
+  wire_packet info = test::make_info(0, 0);
+  info.body.info.capabilities |= WIRE_CAPABILITY_TANGENTIAL;
+  if (with_pad) {
+    info.body.info.stored = WIRE_STORED_PAD;
+    info.body.info.pad = pad_of_12_mm();
+  }
+  model.take(info);
+  return model;
+}
+
+struct Pull {
+  float qx_N = 0, qy_N = 0, sd_N = 0.05f;
+};
+
 /* A contact of 5.7 mm and 5 N, and what the sensors under it measure. */
 void take_frame(Model &model, std::uint64_t t_us, std::uint32_t frame, float x_mm, float y_mm,
-                float force_N, std::uint32_t flags) {
+                float force_N, std::uint32_t flags, const Pull &pull = {}) {
   constexpr float sigma_mm = 5.7f, pi = 3.14159265f;
   float p0_Pa = force_N / (2 * pi * sigma_mm * sigma_mm * 1e-6f);
   wire_packet contact = test::make_contact(0, t_us, frame);
@@ -37,6 +57,10 @@ void take_frame(Model &model, std::uint64_t t_us, std::uint32_t frame, float x_m
   contact.body.contact.p0_Pa = p0_Pa;
   contact.body.contact.sigma_mm = sigma_mm;
   contact.body.contact.force_N = force_N;
+  contact.body.contact.qx_N = pull.qx_N;
+  contact.body.contact.qy_N = pull.qy_N;
+  contact.body.contact.q_sd_N = pull.sd_N;
+  contact.body.contact.tangential_ratio = std::hypot(pull.qx_N, pull.qy_N) / force_N;
   model.take(contact);
   wire_packet raw = test::make_raw(0, t_us, frame);
   raw.body.raw.flags = flags & (CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED);
@@ -79,14 +103,15 @@ struct Sent {
 };
 
 Sent sent_in_ten_seconds(int columns, int rows, std::uint32_t flags) {
-  Model model = model_with_info();
+  Model model = flags & CONTACT_FLAG_TANGENTIAL_VALID ? model_of_grasp(true) : model_with_info();
   Painter painter(ColourDepth::truecolour, Characters::utf_8);
   Sent sent;
   constexpr int rate_per_s = 400, per_picture = 16;
   for (std::uint32_t frame = 0; frame < 10 * rate_per_s; frame++) {
     float t_s = static_cast<float>(frame) / rate_per_s;
     take_frame(model, 1000000 + frame * (1000000 / rate_per_s), frame, 8 * std::cos(3.14f * t_s),
-               16 * std::sin(3.14f * t_s), 5 + 4 * std::sin(t_s), flags);
+               16 * std::sin(3.14f * t_s), 5 + 4 * std::sin(t_s), flags,
+               {2 * std::cos(5 * t_s), 2 * std::sin(5 * t_s), 0.2f});
     if (frame % per_picture == 0) {
       Canvas canvas = one(model, columns, rows);
       sent.changes += painter.paint(canvas).size();
@@ -113,7 +138,10 @@ TEST(Monitor, SendsATenthOfWhatFullPicturesTook) {
   EXPECT_LE(sent.changes, before / 10);
   EXPECT_LT(sent.changes, sent.all / 2);
   EXPECT_LE(sent_in_ten_seconds(200, 60, GOOD | CONTACT_FLAG_UNCERTAIN).changes, before / 10);
+  Sent pulled = sent_in_ten_seconds(200, 60, PULLED);
+  EXPECT_LE(pulled.changes, before / 10) << "an arrow that turns with it";
   report("{\n  \"monitor_200x60_10_s_bytes\": " + std::to_string(sent.changes) +
+         ",\n  \"monitor_200x60_10_s_bytes_of_grasp\": " + std::to_string(pulled.changes) +
          ",\n  \"monitor_200x60_10_s_bytes_of_full_pictures\": " + std::to_string(sent.all) +
          "\n}\n");
 }
@@ -281,6 +309,166 @@ TEST(Monitor, EverySizeIsLaidOut) {
     Canvas canvas = one(model, columns, rows);
     EXPECT_TRUE(columns < 40 || shows(canvas, "window too small")) << text_of(canvas);
     EXPECT_TRUE(columns < 40 || shows(canvas, "5.00 N")) << text_of(canvas);
+  }
+}
+
+TEST(Monitor, APullIsAnArrowAndNumbersAndTraces) {
+  Model model = model_of_grasp(true);
+  for (std::uint32_t frame = 0; frame < 100; frame++) {
+    take_frame(model, 1000000 + 20000 * frame, frame, -4.5f, -4.5f, 5, PULLED, {1.5f, 0, 0.05f});
+  }
+  Canvas canvas = one(model, 120, 40);
+  for (const char *text :
+       {"qx  +1.50", "qy  +0.00", "sd  0.050 N", "Q/F 0.300", "sd  0.010", "○ MOVING", "○ SLIDING",
+        "qx     2 N┤", "qy     2 N┤", "force  5 N┤", "x    15 mm┤", "y    24 mm┤", "slip  1 mm┤"}) {
+    EXPECT_TRUE(shows(canvas, text)) << text << "\n" << text_of(canvas);
+  }
+  EXPECT_FALSE(shows(canvas, "since touch"));
+  EXPECT_FALSE(shows(canvas, "no pad profile"));
+  struct {
+    float qx_N, qy_N;
+    const char *head;
+  } cases[] = {{1.5f, 0, "→"},    {1.1f, 1.1f, "↗"},   {0, 1.5f, "↑"},  {-1.1f, 1.1f, "↖"},
+               {-1.5f, 0, "←"},   {-1.1f, -1.1f, "↙"}, {0, -1.5f, "↓"}, {1.1f, -1.1f, "↘"},
+               {1.5f, 0.5f, "→"}, {-1.5f, -0.5f, "←"}};
+  for (const auto &[qx_N, qy_N, head] : cases) {
+    take_frame(model, 4000000, 101, 4.5f, 4.5f, 5, PULLED, {qx_N, qy_N, 0.05f});
+    EXPECT_TRUE(shows(one(model, 120, 40), head)) << head << "\n" << text_of(one(model, 120, 40));
+  }
+}
+
+/* Where the head of an arrow to the right is, columns right of the location. */
+int arrow_columns(const Model &model) {
+  Canvas canvas = one(model, 200, 60);
+  for (int row = 0; row < canvas.rows(); row++) {
+    int cross = -1;
+    for (int column = 0; column < canvas.columns(); column++) {
+      const std::string &character = canvas.cell(column, row).character;
+      if (!canvas.cell(column, row).halves && character == "┼") {
+        cross = column;
+      } else if (!canvas.cell(column, row).halves && character == "→" && cross >= 0) {
+        return column - cross;
+      }
+    }
+  }
+  return 0;
+}
+
+TEST(Monitor, TheArrowIsAsLongAsTheLoadIsOfTheForce) {
+  Model model = model_of_grasp(true);
+  int lengths[3];
+  for (int i = 0; i < 3; i++) {
+    float ratio = 0.15f * static_cast<float>(i + 1);
+    take_frame(model, 1000000, 1, -4.5f, 4.5f, 5, PULLED, {5 * ratio, 0, 0.05f});
+    int of_5_N = lengths[i] = arrow_columns(model);
+    take_frame(model, 1000000, 1, -4.5f, 4.5f, 2, PULLED, {2 * ratio, 0, 0.02f});
+    EXPECT_EQ(arrow_columns(model), of_5_N);
+  }
+  EXPECT_NEAR(lengths[1], 2 * lengths[0], 1);
+  EXPECT_NEAR(lengths[2], 3 * lengths[0], 1);
+  EXPECT_GE(lengths[0], 5);
+}
+
+/* Pixels of the pad that differ between two pictures. */
+int differing(const Canvas &a, const Canvas &b) {
+  int count = 0;
+  for (int row = 0; row < a.rows(); row++) {
+    for (int column = 0; column < a.columns(); column++) {
+      const Style &one_style = a.cell(column, row).style, &other = b.cell(column, row).style;
+      if (a.cell(column, row).halves && b.cell(column, row).halves) {
+        count += !(one_style.front == other.front);
+        count += !(one_style.back == other.back);
+      }
+    }
+  }
+  return count;
+}
+
+TEST(Monitor, AnUnsureArrowIsWideAndOneThatMayBeNothingHasNoDirection) {
+  Model model = model_of_grasp(true);
+  auto picture = [&](float qx_N, float sd_N, std::uint32_t flags) {
+    take_frame(model, 1000000, 1, -4.5f, 4.5f, 5, flags, {qx_N, 0, sd_N});
+    return one(model, 200, 60);
+  };
+  Canvas without = picture(1.5f, 0.05f, GOOD);
+  Canvas sure = picture(1.5f, 0.05f, PULLED), unsure = picture(1.5f, 0.5f, PULLED);
+  Canvas nothing = picture(0.5f, 0.5f, PULLED);
+  EXPECT_GT(differing(sure, without), 10);
+  EXPECT_GT(differing(unsure, without), 2 * differing(sure, without));
+  EXPECT_TRUE(shows(unsure, "→"));
+  EXPECT_FALSE(shows(nothing, "→"));
+  EXPECT_GT(differing(nothing, without), 10);
+  EXPECT_FALSE(shows(without, "→") || shows(without, "+1.50")) << text_of(without);
+  Canvas doubtful = picture(1.5f, 0.05f, PULLED | CONTACT_FLAG_ELONGATED);
+  EXPECT_TRUE(shows(doubtful, "qx  +1.50?")) << text_of(doubtful);
+  EXPECT_TRUE(shows(doubtful, "Q/F 0.300?"));
+}
+
+TEST(Monitor, SlidingIsToldOnThePadAndByALamp) {
+  Model model = model_of_grasp(true);
+  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, PULLED, {1.5f, 0});
+  Canvas rests = one(model);
+  EXPECT_FALSE(shows(rests, "● SLIDING") || shows(rests, "● MOVING") || shows(rests, "─ SLIDING"));
+  take_frame(model, 1020000, 2, 4.5f, 4.5f, 5, PULLED | CONTACT_FLAG_MOVING, {1.5f, 0});
+  Canvas moves = one(model);
+  EXPECT_TRUE(shows(moves, "● MOVING") && shows(moves, "─ MOVING ─")) << text_of(moves);
+  EXPECT_FALSE(shows(moves, "● SLIDING"));
+  take_frame(model, 1040000, 3, 4.5f, 4.5f, 5, PULLED | CONTACT_FLAG_MOVING | CONTACT_FLAG_SLIDING,
+             {1.5f, 0});
+  take_frame(model, 1140000, 4, 4.5f, 4.5f, 5, PULLED, {1.5f, 0});
+  Canvas slides = one(model);
+  EXPECT_TRUE(shows(slides, "● SLIDING") && shows(slides, "─ SLIDING ─")) << text_of(slides);
+  take_frame(model, 1300000, 5, 4.5f, 4.5f, 5, PULLED, {1.5f, 0});
+  EXPECT_FALSE(shows(one(model), "● SLIDING"));
+}
+
+TEST(Monitor, WithoutAPadItSaysWhatIsMissing) {
+  for (auto [columns, rows] : {std::pair{80, 24}, {120, 40}}) {
+    Model model = model_of_grasp(false);
+    take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, GOOD);
+    std::string text = text_of(one(model, columns, rows));
+    auto at = text.find("no pad profile: fingertip pad");
+    EXPECT_NE(at, std::string::npos) << text;
+    EXPECT_EQ(text.find("no pad profile", at + 1), std::string::npos);
+    EXPECT_EQ(text.find("Q/F"), std::string::npos);
+    EXPECT_EQ(text.find("qx"), std::string::npos);
+    EXPECT_FALSE(shows(one(model_with_info(), columns, rows), "no pad profile"));
+  }
+  Model model = model_of_grasp(false);
+  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, GOOD);
+  Canvas two = draw_monitor({model, model}, {"keys", "note", ""}, 80, 24);
+  EXPECT_TRUE(shows(two, "no pad profile:") && shows(two, "fingertip pad ")) << text_of(two);
+}
+
+TEST(Monitor, ALoadSinceTheTouchIsMarked) {
+  Model model = model_of_grasp(true);
+  take_frame(model, 1000000, 1, 4.5f, 4.5f, 5, PULLED | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH,
+             {1.5f, 0});
+  EXPECT_TRUE(shows(one(model), "since touch")) << text_of(one(model));
+  EXPECT_TRUE(shows(draw_monitor({model, model}, {"keys", "note", ""}, 80, 24), "ΔQ/F"));
+}
+
+TEST(Monitor, EverySizeOfAPullIsLaidOut) {
+  Model model = model_of_grasp(true);
+  for (std::uint32_t frame = 0; frame < 100; frame++) {
+    take_frame(model, 1000000 + 20000 * frame, frame, 4.5f, 4.5f, 5, PULLED, {-1.5f, 0.2f});
+  }
+  for (int columns = 80; columns <= 200; columns += 3) {
+    for (int rows = 24; rows <= 60; rows++) {
+      Canvas canvas = one(model, columns, rows);
+      for (const char *text : {"x   +4.50", "qx  -1.50", "qy  +0.20", "Q/F 0.303", "SLIDING",
+                               "CONTACT", "force  5 N┤", "2 N┤", "slip  1 mm┤", "0 s", "NACKs"}) {
+        ASSERT_TRUE(shows(canvas, text)) << text << " at " << columns << "x" << rows << "\n"
+                                         << text_of(canvas);
+      }
+    }
+  }
+  for (auto [columns, rows] : {std::pair{80, 24}, {80, 46}, {200, 60}}) {
+    Canvas canvas = draw_monitor({model, model}, {"keys", "note", ""}, columns, rows);
+    for (const char *text :
+         {"-1.50", "+0.20", "Q/F ", "○ SLIDING", "force  5 N┤", "2 N┤", "slip  1 mm┤", "0 s"}) {
+      EXPECT_TRUE(shows(canvas, text)) << text << "\n" << text_of(canvas);
+    }
   }
 }
 
