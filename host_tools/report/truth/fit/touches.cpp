@@ -84,7 +84,6 @@ Pad calibrated_pad(const Calibrated &session) {
     pad.gain[k] = session.remaining_gain[k];
     pad.gain_sd[k] = session.gain_sd[k];
   }
-  pad.force_scale = session.force_scale;
   return pad;
 }
 

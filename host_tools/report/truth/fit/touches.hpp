@@ -44,7 +44,6 @@ Contact gaussian(double shorter_mm, double ratio);
 // of a calibrated pad it is what is left after the calibration.
 struct Pad {
   Readings gain, gain_sd;
-  double force_scale = 1.0; // force over 2 pi p0 sigma^2, if a calibration has told it
 };
 
 Pad perfect_pad();
