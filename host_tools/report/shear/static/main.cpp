@@ -30,6 +30,7 @@ namespace {
 using namespace fingertip;
 using namespace fingertip::shear;
 using nlohmann::ordered_json;
+using namespace std::string_literals;
 
 constexpr char HELP[] = "usage: shear_static [--seed S] [--pads N] [--cache DIR]\n"
                         "  --seed S     of pads and touches, 20221015 by default\n"
@@ -258,7 +259,7 @@ void Judge::judge_pads() {
 void Judge::judge_places(const Results &usual) {
   constexpr double CELL_mm = 3.0;
   for (const char *place : {"inner", "border", "corner"}) {
-    const auto here = [=](const Judged &j) { return place_of(j.truth) == std::string(place); };
+    const auto here = [=](const Judged &j) { return place == std::string(place_of(j.truth)); };
     out_["by_place"].push_back(usual.where(here).row(place));
     for (std::size_t o = 0; o < SEVEN.size(); o++) {
       const Results some = usual.where([=](const Judged &j) { return here(j) && j.object == o; });
@@ -270,6 +271,12 @@ void Judge::judge_places(const Results &usual) {
           valid.share([](const Judged &j) { return j.direction_error_deg() > 5.0; });
       out_["where_misses_lie"].push_back(row);
     }
+  }
+  const Results rounder = usual.where(
+      [](const Judged &j) { return SEVEN[j.object] != "lime" && place_of(j.truth) != "corner"s; });
+  const ordered_json row = rounder.row("without the lime and the corners");
+  for (const char *key : {"ratio_error_p95", "vector_error_p95", "direction_p90_deg"}) {
+    out_["no_lime_no_corner_" + std::string(key)] = row[key];
   }
   for (double force_N = 1.0; force_N < 10.0; force_N *= 2.0) {
     const double to_N = force_N < 8.0 ? 2.0 * force_N : 10.0;
@@ -485,11 +492,17 @@ void Judge::judge_rubber() {
   const auto rises = [](double t_s, double from_s, double to_s) {
     return std::clamp((t_s - from_s) / (to_s - from_s), 0.0, 1.0);
   };
+  struct Rubber {
+    const char *effects;
+    bool calibrated;
+  };
   const Case c = usual();
   const std::size_t touches = std::max<std::size_t>(20, options_.pads);
-  for (const char *effects :
-       {"none", "relaxation", "hysteresis", "aftereffect", "relaxation,hysteresis,aftereffect"}) {
-    const twin::EffectValues values = twin::parse_effects(effects);
+  for (const Rubber &kind :
+       {Rubber{"none", false}, Rubber{"relaxation", false}, Rubber{"relaxation", true},
+        Rubber{"hysteresis", false}, Rubber{"aftereffect", false},
+        Rubber{"relaxation,hysteresis,aftereffect", true}}) {
+    const twin::EffectValues values = twin::parse_effects(kind.effects);
     std::vector<std::array<Judged, std::size(moments)>> judged(touches);
     reference::in_parallel(touches, [&](std::size_t i) {
       Random random(options_.seed, truth::stream_of("rubber"), i);
@@ -728,7 +741,7 @@ void Judge::judge_overhang() {
       std::snprintf(mm, sizeof mm, "%gmm", overhang_mm);
       for (const char *place : {"anywhere", "inner", "border", "corner"}) {
         const auto here = [=](const Judged &j) {
-          return place == std::string("anywhere") || place_of(j.truth) == std::string(place);
+          return place == std::string("anywhere") || place == std::string(place_of(j.truth));
         };
         const Results z = zeros.where(here), f = full.where(here), s = steps.where(here);
         out_["by_overhang"].push_back({{"overhang_mm", overhang_mm},
