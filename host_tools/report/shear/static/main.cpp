@@ -291,12 +291,16 @@ void Judge::judge_places(const Results &usual) {
         return j.truth.x_mm >= x_mm && j.truth.x_mm < x_mm + CELL_mm && j.truth.y_mm >= y_mm &&
                j.truth.y_mm < y_mm + CELL_mm;
       });
-      const auto vector = [](const Judged &j) { return j.vector_error(); };
+      const bool empty = cell.valid_percent() == 0.0;
+      const auto vector_error = [&](double quantile) {
+        const auto vector = [](const Judged &j) { return j.vector_error(); };
+        return empty ? ordered_json() : ordered_json(cell.valid_at(vector, quantile));
+      };
       out_["map"].push_back({{"x_mm", x_mm + 0.5 * CELL_mm},
                              {"y_mm", y_mm + 0.5 * CELL_mm},
                              {"touches", cell.all().size()},
-                             {"vector_error_p50", cell.valid_at(vector, 0.5)},
-                             {"vector_error_p95", cell.valid_at(vector, 0.95)}});
+                             {"vector_error_p50", vector_error(0.5)},
+                             {"vector_error_p95", vector_error(0.95)}});
     }
   }
 }
@@ -425,17 +429,17 @@ void Judge::judge_bounds() {
   };
   const Limit limits[] = {
       {"noise", Told::nothing, false, 0.0},
-      {"noise, gains after calibration", Told::nothing, true, 0.0},
-      {"noise, model 0.1 % of p0", Told::nothing, false, 0.001},
-      {"noise, model 0.3 % of p0", Told::nothing, false, 0.003},
-      {"noise, model 1 % of p0", Told::nothing, false, 0.01},
-      {"noise, gains, model 0.3 %", Told::nothing, true, 0.003},
-      {"noise, with the priors", Told::priors, false, 0.0},
-      {"noise, gains after calibration, with the priors", Told::priors, true, 0.0},
-      {"noise, model 0.3 % of p0, with the priors", Told::priors, false, 0.003},
-      {"noise, model 1 % of p0, with the priors", Told::priors, false, 0.01},
-      {"noise, gains, model 0.3 %, with the priors", Told::priors, true, 0.003},
-      {"noise, gains, model 0.3 %, told round", Told::round, true, 0.003},
+      {"noise, gains", Told::nothing, true, 0.0},
+      {"noise, model 0.1 %", Told::nothing, false, 0.001},
+      {"noise, model 0.3 %", Told::nothing, false, 0.003},
+      {"noise, model 1 %", Told::nothing, false, 0.01},
+      {"noise; priors", Told::priors, false, 0.0},
+      {"noise, gains; priors", Told::priors, true, 0.0},
+      {"noise, model 0.1 %; priors", Told::priors, false, 0.001},
+      {"noise, model 0.3 %; priors", Told::priors, false, 0.003},
+      {"noise, model 1 %; priors", Told::priors, false, 0.01},
+      {"noise, gains, model 0.1 %; priors", Told::priors, true, 0.001},
+      {"noise, gains, model 0.1 %; told round", Told::round, true, 0.001},
   };
   constexpr std::size_t TOUCHES_MAX = 4000;
   const Case c = usual();
