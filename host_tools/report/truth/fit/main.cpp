@@ -6,6 +6,7 @@
 // them. The constants of fit_limits.h and defaults.h were chosen with --seed 1.
 #include "reference/options.hpp"
 #include "reference/parallel.hpp"
+#include "truth/fit/statistics.hpp"
 #include "truth/fit/touches.hpp"
 
 extern "C" {
@@ -35,10 +36,6 @@ constexpr char HELP[] = "usage: truth_fit [--seed S] [--pads N] [--cache DIR]\n"
                         "  --cache DIR  folder of the contact tables\n";
 
 constexpr int TOUCHES = 50; // of each pad
-// Calibrations that were gone through; pads of the calibrated cases have one each, in turn. Half of
-// them are of pads whose sensors relax by 9 to 26 % and sit 0.1 mm (sd) off.
-constexpr std::size_t SESSIONS_MAX = 100, PADS_PER_SESSION = 10;
-constexpr PadOptions SESSION_PADS[] = {{10.0, 0.0, 0.0}, {10.0, 17.5, 0.1}};
 constexpr double BAD_mm = 1.0;
 constexpr std::uint32_t WARNINGS = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_FLAT |
                                    CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_LOW_SIGNAL;
@@ -66,19 +63,6 @@ struct Judged {
   double error_mm, force_N;
   fit_result fit;
 };
-
-double percent(double part, double whole) {
-  return whole > 0.0 ? 100.0 * part / whole : 0.0;
-}
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) {
-    return 0.0;
-  }
-  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
-}
 
 class Results {
 public:
@@ -142,24 +126,6 @@ private:
   std::vector<Judged> judged_;
 };
 
-std::uint64_t stream_of(const std::string &name) {
-  std::uint64_t stream = 0;
-  for (const char letter : name) {
-    stream = stream * 131 + static_cast<unsigned char>(letter);
-  }
-  return stream;
-}
-
-std::uint32_t choose(std::size_t sensors, Random &random) {
-  std::uint32_t usable = (1u << SENSORS) - 1u;
-  for (std::size_t left = SENSORS; left > sensors;) {
-    const std::uint32_t bit = 1u << random.next() % SENSORS;
-    left -= (usable & bit) ? 1 : 0;
-    usable &= ~bit;
-  }
-  return usable;
-}
-
 Results run(const Case &c, const Options &options) {
   const fit_array array = firmware_array();
   std::vector<Judged> judged(options.pads * TOUCHES);
@@ -176,7 +142,7 @@ Results run(const Case &c, const Options &options) {
       const Contact &contact = c.contacts[random.next() % c.contacts.size()];
       const double noise_Pa = draw_noise_Pa(random);
       const auto readings = readings_of(array, contact, touch, pad, noise_Pa, random);
-      const std::uint32_t usable = choose(c.sensors, random);
+      const std::uint32_t usable = choose_sensors(c.sensors, random);
       fit_settings settings = settings_for(pad, noise_Pa);
       settings.iterations = static_cast<std::uint8_t>(c.iterations);
       settings.model_sd_q16 = c.gaussian ? 0 : settings.model_sd_q16;
@@ -222,21 +188,6 @@ auto spread(double sd) {
 // What the firmware believes of a pad that was never calibrated.
 Pad never_calibrated(Random &random, std::size_t) {
   return raw_pad(0.10, static_cast<double>(DEFAULT_GAIN_SD), random);
-}
-
-using CalibratedPads = std::vector<Pad>;
-
-CalibratedPads calibrate(const Options &options) {
-  const Feet feet(12.0, options.cache);
-  CalibratedPads pads(std::clamp<std::size_t>(options.pads / PADS_PER_SESSION, 1, SESSIONS_MAX));
-  const std::uint64_t stream = stream_of("calibrated sessions");
-  reference::in_parallel(pads.size(), [&](std::size_t i) {
-    const PadOptions &kind = SESSION_PADS[i % std::size(SESSION_PADS)];
-    const std::uint64_t seed = Random(options.seed, stream, i).next();
-    pads[i] = calibrated_pad(calibrated_session(feet, kind, seed));
-  });
-  std::fprintf(stderr, "truth_fit: %zu calibrations\n", pads.size());
-  return pads;
 }
 
 auto one_of(const CalibratedPads &pads) {
@@ -364,7 +315,8 @@ int judge(const Options &options) {
   ordered_json out;
   out["seed"] = options.seed;
   out["pads"] = options.pads;
-  const CalibratedPads calibrated = calibrate(options);
+  const CalibratedPads calibrated = calibrated_pads(options.pads, options.seed, options.cache);
+  std::fprintf(stderr, "truth_fit: %zu calibrations\n", calibrated.size());
   judge_coverage(options, thick, thin, calibrated, out);
   judge_elongated(options, calibrated, out);
   judge_iterations(options, thick, thin, out);

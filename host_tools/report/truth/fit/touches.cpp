@@ -1,5 +1,7 @@
 #include "truth/fit/touches.hpp"
 
+#include "reference/parallel.hpp"
+
 extern "C" {
 #include "config/defaults.h"
 #include "config/geometry.h"
@@ -17,17 +19,9 @@ namespace {
 constexpr double FORCE_MIN_N = 1.0, FORCE_MAX_N = 15.0;
 constexpr double GAIN_SIGMAS_MAX = 3.0; // as the twin's pads
 constexpr double EDGE_mm = 0.4;         // as the twin's cylinders
-
-const twin::Indenter &long_indenter(const std::string &name) {
-  using Shape = twin::Indenter::Shape;
-  static const std::vector<twin::Indenter> all{
-      {"cylinder6x12", "", Shape::roller, 6, 12, 0, EDGE_mm, 0},
-      {"edge20", "", Shape::roller, 2, 20, 0, EDGE_mm, 0},
-  };
-  const auto found =
-      std::find_if(all.begin(), all.end(), [&](const auto &one) { return one.name == name; });
-  return found == all.end() ? twin::indenter(name) : *found;
-}
+constexpr double CALIBRATED_LAYER_mm = 12.0;
+constexpr std::size_t SESSIONS_MAX = 100, PADS_PER_SESSION = 10;
+constexpr PadOptions SESSION_PADS[] = {{10.0, 0.0, 0.0}, {10.0, 17.5, 0.1}};
 
 double normal_within_limit(Random &random) {
   for (;;) {
@@ -40,10 +34,22 @@ double normal_within_limit(Random &random) {
 
 } // namespace
 
+const twin::Indenter &indenter_of(const std::string &name) {
+  using Shape = twin::Indenter::Shape;
+  static const std::vector<twin::Indenter> all{
+      {"cylinder6x12", "", Shape::roller, 6, 12, 0, EDGE_mm, 0},
+      {"edge20", "", Shape::roller, 2, 20, 0, EDGE_mm, 0},
+      {"cube15", "", Shape::flat_square, 15, 15, 0, EDGE_mm, 0},
+  };
+  const auto found =
+      std::find_if(all.begin(), all.end(), [&](const auto &one) { return one.name == name; });
+  return found == all.end() ? twin::indenter(name) : *found;
+}
+
 Contact contact_of(const std::string &name, double layer_mm,
                    const std::filesystem::path &cache_directory) {
   const auto table = std::make_shared<twin::ContactTable>(twin::ContactTable::load_or_build(
-      long_indenter(name), twin::silicone(layer_mm), cache_directory));
+      indenter_of(name), twin::silicone(layer_mm), cache_directory));
   return {name, [table](double force_N, double dx_mm, double dy_mm) {
             return table->base_pressure_Pa(force_N, dx_mm, dy_mm);
           }};
@@ -79,6 +85,36 @@ Pad calibrated_pad(const Calibrated &session) {
     pad.gain_sd[k] = session.gain_sd[k];
   }
   return pad;
+}
+
+CalibratedPads calibrated_pads(std::size_t judged, std::uint64_t seed,
+                               const std::filesystem::path &cache_directory) {
+  const Feet feet(CALIBRATED_LAYER_mm, cache_directory);
+  CalibratedPads pads(std::clamp<std::size_t>(judged / PADS_PER_SESSION, 1, SESSIONS_MAX));
+  const std::uint64_t stream = stream_of("calibrated sessions");
+  reference::in_parallel(pads.size(), [&](std::size_t i) {
+    const PadOptions &kind = SESSION_PADS[i % std::size(SESSION_PADS)];
+    pads[i] = calibrated_pad(calibrated_session(feet, kind, Random(seed, stream, i).next()));
+  });
+  return pads;
+}
+
+std::uint64_t stream_of(const std::string &name) {
+  std::uint64_t stream = 0;
+  for (const char letter : name) {
+    stream = stream * 131 + static_cast<unsigned char>(letter);
+  }
+  return stream;
+}
+
+std::uint32_t choose_sensors(std::size_t sensors, Random &random) {
+  std::uint32_t usable = (1u << SENSORS) - 1u;
+  for (std::size_t left = SENSORS; left > sensors;) {
+    const std::uint32_t bit = 1u << random.next() % SENSORS;
+    left -= (usable & bit) ? 1 : 0;
+    usable &= ~bit;
+  }
+  return usable;
 }
 
 Touch draw_touch(const fit_array &array, Random &random) {

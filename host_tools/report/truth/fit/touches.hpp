@@ -32,8 +32,9 @@ struct Contact {
 };
 
 // The twin's object by its name, or one of these: "cylinder6x12", a cylinder of 6 mm lying on a
-// side of 12 mm; "edge20", a straight edge: a cylinder of 2 mm lying on a side of 20 mm. Its table
-// is solved if the cache does not hold it.
+// side of 12 mm; "edge20", a straight edge: a cylinder of 2 mm lying on a side of 20 mm; "cube15".
+const twin::Indenter &indenter_of(const std::string &name);
+// Its table is solved if the cache does not hold it.
 Contact contact_of(const std::string &name, double layer_mm,
                    const std::filesystem::path &cache_directory);
 // Its width along the first axis is this times the other.
@@ -53,6 +54,18 @@ Pad raw_pad(double spread, double told, Random &random);
 // and sensors are where they should be. The same on any layer, though on 6 mm none would be
 // accepted.
 Pad calibrated_pad(const Calibrated &session);
+
+using CalibratedPads = std::vector<Pad>;
+// One for every ten pads that are judged, a hundred at most: a calibration each, which so many
+// pads have in turn. Half of them are of pads whose sensors relax by 9 to 26 % and sit 0.1 mm (sd)
+// off.
+CalibratedPads calibrated_pads(std::size_t judged, std::uint64_t seed,
+                               const std::filesystem::path &cache_directory);
+
+// Of random numbers, for a name.
+std::uint64_t stream_of(const std::string &name);
+// A bitmap of so many sensors, drawn.
+std::uint32_t choose_sensors(std::size_t sensors, Random &random);
 
 struct Touch {
   double x_mm, y_mm, force_N;

@@ -1,0 +1,108 @@
+#!/usr/bin/python3
+"""Tangential load from the normal pressures: how near to the truth, on which pads, and what it does to every other figure.
+
+    shear.py --build build/host -o build/report
+
+    shear.json    the figures by which it is judged, with their goals; all tables of shear.md
+    shear.md      the same to read
+    shear.png     the same to look at
+
+Pads, touches and sensors are the twin's, the code that judges them is the firmware's own, compiled for the host. No measurement on a
+real pad confirms the size or the accuracy of what is read; that the centroid of the pressure under an infinite layer moves by one
+thickness for each unit of Q / F follows from the balance of moments alone.
+"""
+import json
+import pathlib
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+
+import shear_report  # noqa: E402
+from fingertip_files import InputError, run_tool  # noqa: E402
+from goals import judge  # noqa: E402
+from reporting import finish, option_parser, output_folder, write_json  # noqa: E402
+
+# part: what it does, its program below the build folder
+PARTS = {
+    "static": "one touch: size, direction, place and force by pad, load, object and place; bounds; pads that end",
+    "motion": "objects that are lifted, carried and slip: sliding told from loading",
+}
+# The ratio is |Q| / F, which is what is published; the vector's error has its direction in it and is held to the same.
+GOALS = (
+    ("ratio_error_p50", "<=", 0.02), ("ratio_error_p95", "<=", 0.05), ("vector_error_p50", "<=", 0.02), ("vector_error_p95", "<=", 0.05),
+    ("direction_p90_deg", "<=", 5), ("location_loaded_median_mm", "<=", 0.17), ("location_price_mm", "<=", 0.01), ("equal_ratio_error_p50", "<=", 0.01),
+    ("equal_ratio_error_p95", "<=", 0.03), ("equal_location_loaded_mm", "<=", 0.06), ("elongated_false_percent", "<=", 1), ("screw_ratio", "<=", 0.02),
+    ("screw_change_p95", "<=", 0.02), ("increment_error_p50_13mm", "<=", 0.05), ("increment_error_p50_9mm", "<=", 0.05),
+    ("zero_error_p50_own_tables", "<=", 0.03), ("lift_false_slides", "<=", 0), ("slide_found_percent", ">=", 97), ("slide_latency_p95_ms", "<=", 25),
+    ("optimum_p99_um", "<=", 2), ("optimum_p99_ratio", "<=", 0.001))
+# Of the estimate against an independent one in double precision, by the test that compares them, where it has left them.
+OPTIMUM_FILE, OPTIMUM = "shear_optimum.json", ("optimum_p99_um", "optimum_p99_ratio")
+
+
+def program_of(part, options):
+    return pathlib.Path(options.build) / "host_tools/report/shear" / part / f"shear_{part}"
+
+
+def run_part(part, options):
+    """What it found; its progress goes to stderr as it comes."""
+    program = program_of(part, options)
+    if not program.is_file():
+        raise InputError(f"{program} is not there; build it: cmake --build --preset host")
+    print(f"        {PARTS[part]}", flush=True)
+    command = [str(program), "--cache", str(pathlib.Path(options.output) / "contact_tables")]
+    for name in ("seed", "pads"):
+        if (value := getattr(options, name)) is not None:
+            command += [f"--{name}", str(value)]
+    done = subprocess.run(command, stdout=subprocess.PIPE, text=True)
+    if done.returncode != 0:
+        raise InputError(f"shear_{part} ended with status {done.returncode}; its own words are above")
+    try:
+        return json.loads(done.stdout)
+    except ValueError as error:
+        raise InputError(f"shear_{part} wrote no JSON ({error})") from None
+
+
+def optimum(out):
+    try:
+        found = json.loads((out / OPTIMUM_FILE).read_text())
+    except OSError:
+        found = {}
+    return {name: found.get(name) for name in OPTIMUM}
+
+
+def lifts(found):
+    """Of all rates of lifting together."""
+    false = [value for name, value in found.items() if name.startswith("lift_false_slides_") and value is not None]
+    return {"lift_false_slides": sum(false)} if false else {}
+
+
+def main(argv):
+    parser = option_parser(__doc__)
+    parser.add_argument("--seed", type=int, metavar="N")
+    parser.add_argument("--pads", type=int, metavar="N", help="of each case; default 1500")
+    parser.add_argument("--parts", metavar="NAME,...", help=f"only these of {','.join(PARTS)}; the others from the folder's shear.json")
+    options = parser.parse_args(argv)
+    built = [part for part in PARTS if program_of(part, options).is_file()]
+    parts = options.parts.split(",") if options.parts else built or list(PARTS)
+    if unknown := [part for part in parts if part not in PARTS]:
+        raise InputError(f"--parts: {unknown[0]} is none of {','.join(PARTS)}")
+    out = output_folder(options)
+    path = out / "shear.json"
+    found = {name: None for name, _, _ in GOALS}
+    if options.parts and path.is_file():
+        found |= json.loads(path.read_text())
+    if not options.parts and len(parts) < len(PARTS):
+        print(f"        not built, so not measured: {', '.join(part for part in PARTS if part not in parts)}", flush=True)
+    for part in parts:
+        found |= run_part(part, options)
+        found = judge({**found, **lifts(found), **optimum(out)}, GOALS)
+        write_json(path, found)  # what is found is kept though a later part fails
+    shear_report.write(found, out / "shear.md")
+    shear_report.draw(found, out / "shear.png")
+    return finish(found, options, ("shear.json", "shear.md", "shear.png"))
+
+
+if __name__ == "__main__":
+    sys.exit(run_tool("shear.py", main))

@@ -1,0 +1,144 @@
+#include "shear/static/pulled.hpp"
+
+#include "pad/profile.hpp"
+#include "truth/fit/statistics.hpp"
+#include "twin/scenarios.hpp"
+
+extern "C" {
+#include "common/contact_flags.h"
+#include "config/geometry.h"
+#include "contact/tangential.h"
+#include "ms5840/ms5840.h"
+}
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace fingertip::shear {
+namespace {
+
+constexpr double RANGE_Pa = MS5840_MAX_PRESSURE_Pa - twin::AMBIENT_Pa;
+
+} // namespace
+
+const Object &Objects::on(double layer_mm, const std::string &name) {
+  std::unique_ptr<Object> &object = objects_[{layer_mm, name}];
+  if (!object) {
+    const twin::Layer layer = twin::silicone(layer_mm);
+    twin::ContactTable pressure =
+        twin::ContactTable::load_or_build(truth::indenter_of(name), layer, cache_);
+    twin::TractionTable traction(pressure, layer);
+    object = std::make_unique<Object>(Object{name, std::move(pressure), std::move(traction)});
+  }
+  return *object;
+}
+
+pad_profile profile_of(double thickness_mm) {
+  wire_info info{};
+  info.sensor_count = geometry.sensor_count;
+  info.pitch_mm = geometry.pitch_mm;
+  std::copy_n(geometry.x_mm, geometry.sensor_count, info.x_mm);
+  std::copy_n(geometry.y_mm, geometry.sensor_count, info.y_mm);
+  return pad::profile_of({thickness_mm}, info);
+}
+
+Readings base_Pa(const fit_array &array, const Object &object, const twin::Touch &touch,
+                 const twin::BlockTable *block) {
+  Readings base{};
+  const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
+  const double pitch_mm = static_cast<double>(array.pitch_mm);
+  const bool pulls = touch.pull_x_N != 0.0 || touch.pull_y_N != 0.0;
+  const twin::TractionTable::Load load{touch.force_N, touch.stuck_N,
+                                       c * touch.pull_x_N + s * touch.pull_y_N,
+                                       c * touch.pull_y_N - s * touch.pull_x_N};
+  const twin::BlockTable::Load added{touch.force_N, touch.pull_x_N, touch.pull_y_N,
+                                     object.pressure.contact_radius_mm(touch.force_N)};
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    const double dx = pitch_mm * static_cast<double>(array.x[k]) - touch.x_mm;
+    const double dy = pitch_mm * static_cast<double>(array.y[k]) - touch.y_mm;
+    const double along = c * dx + s * dy, across = c * dy - s * dx;
+    base[k] = object.pressure.base_pressure_Pa(touch.force_N, along, across);
+    if (pulls) {
+      base[k] += object.traction.base_pressure_Pa(load, along, across);
+    }
+    if (block) {
+      base[k] += block->added_Pa(k, added, touch.x_mm, touch.y_mm);
+    }
+  }
+  return base;
+}
+
+Fingertip::Fingertip(const pad_profile &profile)
+    : array_(truth::firmware_array()), profile_(profile) {
+  if (fit_pad_init(&fit_pad_, &array_, &profile) != FT_OK) {
+    throw std::runtime_error("the firmware refuses the pad's profile");
+  }
+}
+
+bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double noise_Pa,
+                     std::uint32_t usable, Random &random, Said &said) {
+  const truth::Pad &pad = known.pad;
+  std::array<std::int32_t, SENSORS> readings{};
+  std::uint32_t saturated = 0;
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    const double reading_Pa = pad.gain[k] * base_Pa[k] + noise_Pa * random.normal();
+    readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * reading_Pa));
+    saturated |= reading_Pa > RANGE_Pa ? 1u << k : 0u;
+  }
+  const fit_settings settings = truth::settings_for(pad, noise_Pa);
+  fit_result fit;
+  fit_tangential found{};
+  fit_gaussian_grid(&array_, readings.data(), usable & ~saturated, &settings, &fit);
+  if (!(fit.flags & CONTACT_FLAG_FIT_VALID)) {
+    return false;
+  }
+  if (tangential_is_worthwhile(&fit, saturated)) {
+    fit_tangential_load(&array_, &fit_pad_, readings.data(), &settings, &fit, &found);
+  }
+  // As tangential_use has it of a pad with and one without a calibration.
+  const double scale = known.force_scale.value_or(1.0);
+  const double corrected = known.force_scale ? static_cast<double>(profile_.force_ratio) : 1.0;
+  said = {};
+  said.gaussian_x_mm = static_cast<double>(fit.x_mm);
+  said.gaussian_y_mm = static_cast<double>(fit.y_mm);
+  said.gaussian_force_N = scale * static_cast<double>(fit.force_N);
+  said.valid = found.valid;
+  if (found.valid) {
+    const double force_N = static_cast<double>(found.force_N);
+    said.x_mm = static_cast<double>(found.x_mm);
+    said.y_mm = static_cast<double>(found.y_mm);
+    said.location_sd_mm = static_cast<double>(found.location_sd_mm);
+    said.force_N = scale * corrected * force_N;
+    said.qx = static_cast<double>(found.qx_N) / force_N;
+    said.qy = static_cast<double>(found.qy_N) / force_N;
+    said.q_sd = static_cast<double>(found.q_sd_N) / force_N;
+  } else {
+    said.x_mm = said.gaussian_x_mm;
+    said.y_mm = said.gaussian_y_mm;
+    said.location_sd_mm = static_cast<double>(fit.location_sd_mm);
+    said.force_N = said.gaussian_force_N;
+  }
+  return true;
+}
+
+KnownPad Fingertip::weighed(const truth::Pad &pad, const Object &sphere15) {
+  constexpr double STEP_mm = 4.5;
+  Random none(0, 0, 0);
+  std::vector<double> scales;
+  for (int i = 0; i < 9; i++) {
+    twin::Touch touch;
+    touch.x_mm = STEP_mm * (i % 3 - 1);
+    touch.y_mm = STEP_mm * (i / 3 - 1);
+    touch.force_N = truth::WEIGHT_N;
+    Said said;
+    // A noise of nothing is none that the fit takes.
+    constexpr double QUIET_Pa = 0.1;
+    if (feel(base_Pa(array_, sphere15, touch), {pad, {}}, QUIET_Pa, ALL_SENSORS, none, said)) {
+      scales.push_back(touch.force_N / said.gaussian_force_N);
+    }
+  }
+  return {pad, truth::quantile(scales, 0.5)};
+}
+
+} // namespace fingertip::shear

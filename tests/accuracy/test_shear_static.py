@@ -1,0 +1,106 @@
+"""shear_static on few pads: its keys are there, repeatable, near what a full run is held to, and all of it can be written and drawn.
+
+usage: test_shear_static.py SHEAR_STATIC SHEAR.PY [unittest arguments]
+"""
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+# (key, least, most): what a full run finds, with room for a fortieth of its pads.
+LIMITS = (
+    ("ratio_error_p50", 0.005, 0.014), ("ratio_error_p95", 0.02, 0.05), ("vector_error_p50", 0.01, 0.023), ("vector_error_p95", 0.03, 0.065),
+    ("direction_p90_deg", 3, 7), ("location_loaded_median_mm", 0.05, 0.1), ("location_loaded_without_mm", 0.95, 1.1), ("location_price_mm", -0.06, -0.02),
+    ("equal_ratio_error_p50", 0.005, 0.011), ("equal_vector_error_p50", 0.01, 0.018), ("equal_location_loaded_mm", 0.04, 0.075), ("valid_percent", 99.5, 100),
+    ("q_cover_1sd", 65, 85), ("q_cover_2sd", 96, 100), ("location_cover_1sd", 60, 82), ("location_cover_2sd", 92, 100), ("force_p50_percent", 0.1, 0.6),
+    ("force_without_p50_percent", 1, 2.2), ("screw_ratio", 0.005, 0.02), ("screw_change_p95", 0.001, 0.012), ("increment_error_p50_13mm", 0.03, 0.06),
+    ("increment_error_p50_9mm", 0.015, 0.045), ("zero_error_p50_9mm", 0.1, 0.18), ("elongated_false_percent", 0, 20))
+PADS = ("--pads", "40")
+
+
+def run(*options):
+    return subprocess.run([PROGRAM, *options], capture_output=True, text=True, check=False)
+
+
+class ShearStatic(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.options = (*PADS, "--seed", "3")
+        cls.text = run(*cls.options).stdout
+        cls.found = json.loads(cls.text)
+
+    def rows(self, table, key):
+        return {row[key]: row for row in self.found[table]}
+
+    def test_limits(self):
+        for key, least, most in LIMITS:
+            with self.subTest(key):
+                self.assertGreaterEqual(self.found[key], least)
+                self.assertLessEqual(self.found[key], most)
+
+    def test_a_load_moves_the_gaussian_by_its_share_of_the_thickness(self):
+        without = {(row["pad"], row["load"]): row["location_without_p50_mm"] for row in self.found["taps"]}
+        self.assertAlmostEqual(without["equal gains", 0.1], 0.1 * 12 * 0.29, delta=0.06)
+        self.assertAlmostEqual(without["equal gains", 0.3], 0.3 * 12 * 0.29, delta=0.06)
+
+    def test_bounds(self):
+        bounds = self.rows("bounds", "case")
+        for key in ("ratio_error_p50", "vector_error_p50", "direction_p90_deg", "location_p50_mm"):
+            row = {name: bound[key] for name, bound in bounds.items()}
+            with self.subTest(key):
+                self.assertLess(row["noise"], row["noise, gains"])
+                self.assertLess(row["noise, model 0.1 %"], 0.5 * row["noise, model 0.3 %"])
+                self.assertLess(row["noise, model 1 %; priors"], row["noise, model 1 %"])
+                self.assertLess(row["noise, gains, model 0.1 %; told round"], row["noise, gains, model 0.1 %; priors"])
+        # Nothing that was found is below what noise and gains allow.
+        self.assertLess(bounds["noise, gains; priors"]["vector_error_p50"], self.found["vector_error_p50"])
+        self.assertLess(bounds["noise; priors"]["location_p50_mm"], self.found["equal_location_loaded_mm"])
+
+    def test_places_objects_and_pads_differ_as_they_should(self):
+        place = self.rows("by_place", "case")
+        self.assertLess(place["inner"]["vector_error_p50"], 0.7 * place["corner"]["vector_error_p50"])
+        self.assertEqual(sum(place[name]["touches"] for name in ("inner", "border", "corner")), 40 * 50)
+        self.assertEqual(sum(cell["touches"] for cell in self.found["map"]), 40 * 50)
+        self.assertEqual(sum(row["touches"] for row in self.found["where_misses_lie"]), 40 * 50)
+        named = self.rows("by_object", "case")
+        self.assertLess(named["sphere15, Q/F 0.3"]["vector_error_p50"], 0.5 * named["cylinder12, Q/F 0.3"]["vector_error_p50"])
+        self.assertIn("cube15, Q/F 0", named)
+        zero = {row["overhang_mm"]: row["zero_error_p50"] for row in self.found["by_overhang"] if (row["pad"], row["place"]) == ("equal gains", "anywhere")}
+        self.assertEqual([zero[mm] for mm in sorted(zero, reverse=True)], sorted(zero.values()))
+        told = self.rows("by_thickness", "case")
+        self.assertLess(told["15 mm, told 15 mm, Q/F 0"]["vector_error_p50"], 0.6 * told["15 mm, told 16.5 mm, Q/F 0"]["vector_error_p50"])
+        rubber = self.rows("by_rubber", "case")
+        at = "{}, 10 s after the load"
+        self.assertLess(rubber[at.format("none")]["vector_error_p50"], 0.5 * rubber[at.format("relaxation, calibrated")]["vector_error_p50"])
+        self.assertLess(rubber[at.format("relaxation, calibrated")]["vector_error_p50"], rubber[at.format("relaxation")]["vector_error_p50"])
+
+    def test_the_same_seed_gives_the_same_and_another_another(self):
+        self.assertEqual(run(*self.options).stdout, self.text)
+        self.assertNotEqual(run(*PADS, "--seed", "4").stdout, self.text)
+
+    def test_wrong_usage_is_one_line(self):
+        for options in (("--pads", "0"), ("--pads", "x"), ("--what", "1")):
+            done = run(*options)
+            self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1))
+
+    def test_all_of_it_is_written_and_drawn(self):
+        """What was found, by a program that only says it again."""
+        with tempfile.TemporaryDirectory() as folder:
+            program = pathlib.Path(folder) / "host_tools/report/shear/static/shear_static"
+            program.parent.mkdir(parents=True)
+            program.write_text(f"#!{sys.executable}\nprint({self.text!r})\n")
+            program.chmod(0o755)
+            done = subprocess.run([sys.executable, REPORT, "--build", folder, "-o", f"{folder}/out"], capture_output=True, text=True)
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+            out = pathlib.Path(folder) / "out"
+            text = (out / "shear.md").read_text()
+            for title in ("By pad and load", "Where the misses lie", "What is physics and what is ours", "Pads that end", "Creep and relaxation", "Screws"):
+                self.assertIn(f"## {title}\n", text)
+            self.assertGreater(len((out / "shear.png").read_bytes()), 50000)
+
+
+if __name__ == "__main__":
+    PROGRAM, REPORT = sys.argv.pop(1), sys.argv.pop(1)
+    unittest.main()
