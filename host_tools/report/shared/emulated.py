@@ -96,10 +96,12 @@ class Measurement:
     temperature.
     """
 
-    def __init__(self, tools, folder, board, osr, path, seconds):
+    def __init__(self, tools, folder, board, osr, path, seconds, before=()):
+        """before: commands, encoded, that are sent before it streams."""
         base = pathlib.Path(folder) / f"{board}-{osr}-{path.stem}"
         script = base.with_suffix(".script")
         script.write_text(f"0.45 dtr 1\n0.452 {tools.encoded('info')}\n0.455 {tools.encoded('osr', osr)}\n"
+                          "".join(f"0.457 {command}\n" for command in before) +
                           f"0.46 {tools.encoded('stream', 'contact,health')}\n")
 
         def emulate(name, until_s):
@@ -111,6 +113,7 @@ class Measurement:
         _, before = emulate("before", FROM_s)
         # A health packet comes with each whole second.
         name, emulated = emulate("run", FROM_s + seconds + 0.02)
+        self.name = name
         self.cycles = emulated["cycles"] - before["cycles"]
         self.sleep_percent = 100 * (1 - self.cycles / ((emulated["emulated_s"] - before["emulated_s"]) * CLOCK_Hz))
         run(tools.fingertip, "replay", f"{name}.ftr", "--to-csv", f"{name}.csv")

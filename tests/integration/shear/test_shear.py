@@ -36,8 +36,8 @@ class Shear(unittest.TestCase):
         path.chmod(0o755)
 
     def run_tool(self, *options):
-        return subprocess.run([sys.executable, str(ROOT / "host_tools/report/shear/shear.py"), "--build", str(self.folder), "-o", str(self.out),
-                               *options], capture_output=True, text=True)
+        return subprocess.run([sys.executable, str(ROOT / "host_tools/report/shear/shear.py"), "--build", str(self.folder), "--boards", str(self.folder),
+                               "-o", str(self.out), *options], capture_output=True, text=True)
 
     def found(self):
         return json.loads((self.out / "shear.json").read_text())

@@ -1,0 +1,51 @@
+"""What the tangential load costs on the chip: the images of scene grasp in the emulator, a pad of 12 mm told to them, and the cycles of
+the estimate alone."""
+import pathlib
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/report/rate"), str(ROOT / "host_tools/python")]
+import numpy as np  # noqa: E402
+import scenes  # noqa: E402
+from emulated import FROM_s, Measurement, Tools, scenario  # noqa: E402
+from fingertip_files import read_recording  # noqa: E402
+from reporting import run  # noqa: E402
+
+BOARD = "pico_parallel"
+OSRS = (256, 1024)
+SECONDS = 6.0
+PAD = ("12", "0")  # thickness and overhang, mm; 0: no ends, which cost as much
+TANGENTIAL_VALID = 1 << 20
+
+
+class GraspTools(Tools):
+    """The images of scene grasp instead of the boards' own."""
+
+    def __init__(self, build, boards):
+        super().__init__(build, boards)
+        self.place = scenes.build("grasp", BOARD, self.boards / "scenes")
+
+    def image(self, board, suffix="bin"):
+        return self.place / f"fingertip-{board}.{suffix}" if hasattr(self, "place") else super().image(board, suffix)
+
+
+def measure(build, boards, say):
+    tools = GraspTools(build, boards)
+    sizes = scenes.sizes(tools.place, BOARD)
+    found = {"chip_flash_bytes": sizes["flash_bytes"], "chip_ram_bytes": sizes["ram_bytes"], "chip_stack_bytes": sizes["stack_bytes"]}
+    with tempfile.TemporaryDirectory() as folder:
+        path = scenario(folder, "wander", FROM_s + SECONDS + 1)
+        for osr in OSRS:
+            measured = Measurement(tools, folder, BOARD, osr, path, SECONDS, before=[tools.encoded("pad", *PAD)])
+            told = read_recording(f"{measured.name}.csv")
+            flags = told["flags"][told.has_contact & (told["t_us"] > told["t_us"][-1] - 1e6 * SECONDS)].astype(np.int64)
+            found |= {
+                f"chip_fps_osr{osr}": measured.fitted_per_s, f"chip_frames_per_s_osr{osr}": measured.frames_per_s,
+                f"chip_frames_skipped_osr{osr}": measured.frames_skipped, f"chip_latency_us_osr{osr}": float(measured.offered_us.max()),
+                f"chip_latency_median_us_osr{osr}": float(np.median(measured.offered_us)),
+                f"chip_fit_us_osr{osr}": measured.stages_us["fit_us"],
+                f"chip_told_percent_osr{osr}": 100 * float(((flags & TANGENTIAL_VALID) != 0).mean()), f"chip_sleep_percent_osr{osr}": measured.sleep_percent}
+            say(f"grasp on {BOARD}, OSR {osr}: {measured.fitted_per_s:.0f} frames/s")
+    cycles = run("node", pathlib.Path(__file__).with_name("cycles.mjs"), pathlib.Path(boards) / "pico_mux/fit_cycles.bin").split()
+    return {**found, "fit_cycles_median": int(cycles[0]), "shear_cycles_median": int(cycles[1]), "shear_cycles": int(cycles[2])}
