@@ -679,6 +679,12 @@ static int32_t in_limits(int32_t value, int32_t limit) {
   return size > (uint32_t)limit * 8 ? 1 << 17 : port_divide((int32_t)size, coarse < 1 ? 1 : coarse);
 }
 
+/* Three quarters of a pitch beyond the outer nodes, for an even number of them beyond those on the
+ * origin's far side too. */
+static int32_t reach(const struct fit_pad *pad, int32_t nodes) {
+  return (4 * (nodes / 2) + 3) * (pad->pitch_q26 >> 2);
+}
+
 NOINLINE static void take_step(const struct problem *problem, const struct outcome *outcome,
                                int32_t residual_q, struct unknowns *at, bool *at_bound) {
   const struct fit_pad *pad = problem->pad;
@@ -700,11 +706,9 @@ NOINLINE static void take_step(const struct problem *problem, const struct outco
     }
   }
   *at_bound = false;
-  int32_t half_x = (4 * (COLUMNS / 2) + 3) * (pad->pitch_q26 >> 2);
-  int32_t half_y = (4 * (ROWS / 2) + 3) * (pad->pitch_q26 >> 2);
-  int32_t even_x = COLUMNS % 2 ? 0 : pad->pitch_q26, even_y = ROWS % 2 ? 0 : pad->pitch_q26;
-  at->x_q26 = clamp_told(at->x_q26 + move[PLACE_X], -half_x, half_x - even_x, at_bound);
-  at->y_q26 = clamp_told(at->y_q26 + move[PLACE_Y], -half_y, half_y - even_y, at_bound);
+  at->x_q26 =
+      clamp_told(at->x_q26 + move[PLACE_X], -reach(pad, COLUMNS), reach(pad, COLUMNS), at_bound);
+  at->y_q26 = clamp_told(at->y_q26 + move[PLACE_Y], -reach(pad, ROWS), reach(pad, ROWS), at_bound);
   at->amplitude_q24 =
       clamp_told(at->amplitude_q24 + move[AMPLITUDE], 1 << 16, AMPLITUDE_MAX_Q24, at_bound);
   at->pull_x_q24 = clamp_told(at->pull_x_q24 + move[PULL_X], -PULL_MAX_Q24, PULL_MAX_Q24, at_bound);
@@ -777,6 +781,8 @@ NOINLINE static void begin(const struct fit_array *array, const struct fit_pad *
   float scale = pad->per_unit * q26;
   at->x_q26 = (int32_t)((start->x_mm - array->x[origin] * array->pitch_mm) * scale);
   at->y_q26 = (int32_t)((start->y_mm - array->y[origin] * array->pitch_mm) * scale);
+  at->x_q26 = fixed_clamp(at->x_q26, -reach(pad, COLUMNS), reach(pad, COLUMNS));
+  at->y_q26 = fixed_clamp(at->y_q26, -reach(pad, ROWS), reach(pad, ROWS));
   float sigma = start->sigma_mm * pad->per_unit;
   float square = sigma * sigma;
   int32_t most = SPREAD_MOST_Q26 + GAUSSIAN_VARIANCE_Q26;

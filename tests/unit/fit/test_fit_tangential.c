@@ -15,7 +15,7 @@ enum { SENSORS = 15, ALL = (1 << SENSORS) - 1 };
 #define PITCH_mm 9.0f
 #define RANDOM_INPUTS 1000000
 #define SEED UINT64_C(0x7461676E)
-#define SDS 4
+#define SDS 1
 
 static struct fit_array array;
 static struct fit_pad pad;
@@ -112,11 +112,14 @@ static bool is_zero(const struct fit_tangential *result) {
   return memcmp(&zero, result, sizeof zero) == 0;
 }
 
-/* Largest distances, mm and share of the force, of 300 contacts; least share of valid ones. */
-static void judge_pad(double thickness_mm, uint32_t usable, double mm, double share, int least) {
+/* Of 300 contacts: the least number of valid ones, and of those the most that may be further off
+ * than mm or share of the force and SDS standard deviations. */
+static void judge_pad(double thickness_mm, uint32_t usable, double mm, double share, int least,
+                      int most_off) {
   use_pad(thickness_mm);
   struct random random = {SEED};
-  int valid = 0;
+  int valid = 0, outside = 0;
+  char text[200] = "";
   for (int i = 0; i < 300; i++) {
     struct contact contact = draw_contact(&random, 0.1 * (i % 4));
     int32_t readings[SENSORS];
@@ -130,31 +133,33 @@ static void judge_pad(double thickness_mm, uint32_t usable, double mm, double sh
     double off_mm = hypot((double)found.x_mm - contact.x_mm, (double)found.y_mm - contact.y_mm);
     double off = hypot((double)found.qx_N - contact.qx_N, (double)found.qy_N - contact.qy_N);
     double sd_mm = (double)found.location_sd_mm, sd_N = (double)found.q_sd_N;
-    char text[160];
-    snprintf(text, sizeof text,
-             "%g mm, press %d at %.1f %.1f: off by %.4f mm (sd %.4f), %.4f of %.3f N (sd %.4f)",
-             thickness_mm, i, contact.x_mm, contact.y_mm, off_mm, sd_mm, off, contact.force_N,
-             sd_N);
     /* What is told loosely is drawn towards the priors. */
-    TEST_ASSERT_TRUE_MESSAGE(off_mm < mm + SDS * sd_mm, text);
-    TEST_ASSERT_TRUE_MESSAGE(off < share * contact.force_N + SDS * sd_N, text);
+    if (off_mm > mm + SDS * sd_mm || off > share * contact.force_N + SDS * sd_N) {
+      outside++;
+      snprintf(text, sizeof text,
+               "%g mm, press %d at %.1f %.1f: off by %.4f mm (sd %.4f), %.4f of %.3f N (sd %.4f)",
+               thickness_mm, i, contact.x_mm, contact.y_mm, off_mm, sd_mm, off, contact.force_N,
+               sd_N);
+    }
   }
+  TEST_ASSERT_TRUE_MESSAGE(outside <= most_off, text);
   TEST_ASSERT_GREATER_OR_EQUAL_INT(least, valid);
 }
 
 static void test_contacts_of_the_model_are_found(void) {
-  judge_pad(12.0, ALL, 0.02, 0.002, 285);
+  judge_pad(12.0, ALL, 0.02, 0.002, 285, 0);
 }
 
+/* On thin pads a contact is narrower than the pitch: a tenth is off by more than it says. */
 static void test_pads_of_5_to_20_mm(void) {
-  judge_pad(5.0, ALL, 0.1, 0.01, 60);
-  judge_pad(6.0, ALL, 0.1, 0.01, 100);
-  judge_pad(20.0, ALL, 0.02, 0.002, 150);
+  judge_pad(5.0, ALL, 0.1, 0.01, 180, 30);
+  judge_pad(6.0, ALL, 0.1, 0.01, 240, 40);
+  judge_pad(20.0, ALL, 0.02, 0.002, 290, 0);
 }
 
 static void test_sensors_missing(void) {
-  judge_pad(12.0, ALL & ~(1 << 7), 0.05, 0.005, 200);
-  judge_pad(12.0, ALL & ~(1 << 0 | 1 << 13), 0.05, 0.005, 200);
+  judge_pad(12.0, ALL & ~(1 << 7), 0.05, 0.005, 290, 0);
+  judge_pad(12.0, ALL & ~(1 << 0 | 1 << 13), 0.05, 0.005, 290, 0);
 }
 
 static void expect_none(const int32_t *readings, uint32_t usable) {
