@@ -57,8 +57,8 @@ struct unknowns {
 struct problem {
   const struct fit_pad *pad;
   struct readings readings;
-  int32_t base_q22;    /* standard deviation of a reading of weight 1, of the unit of readings */
-  int32_t noise_q22;   /* likewise */
+  int32_t base_q22;  /* standard deviation of a reading of weight 1, of the unit of readings */
+  int32_t noise_q22; /* likewise */
   /* Rows of the priors of t and of e1 and e2, whose scale is the amplitude at the beginning. */
   int32_t spread_prior_q26, long_prior_q26;
 };
@@ -67,10 +67,42 @@ static int32_t q26_from(float value) {
   return (int32_t)(value * 67108864.0f);
 }
 
+static int32_t spread_least(const struct fit_pad *pad) {
+  return -fixed_mul_16(pad->variance_q26[0], SPREAD_LEAST_Q15) * 2;
+}
+
+/* What the formats of the sums and of what is made of them carry; layers need 1.3, 9.5 and 97 of
+ * the first three, and pads of 5 to 20 mm a pitch of 0.47 to 1.88 units of 4.8 to 19.1 mm. */
+#define SUM_MAX_0 1.9f
+#define SUM_MAX_1 12.0f
+#define SUM_MAX_2 112.0f
+#define VARIANCE_MAX 7.0f
+#define PITCH_MAX 1.9f
+#define UNIT_MAX_mm 19.5f
+
+/* Whether the sums over these terms of strength V0 / v^i, i from first, stay below their limits for
+ * the most concentrated contact. */
+static bool is_carried(const struct fit_pad *pad, int from, int end, float t, bool pulls) {
+  float sums[3] = {0.0f, 0.0f, 0.0f};
+  for (int j = from; j < end; j++) {
+    float v = (float)pad->variance_q26[j] * (1.0f / 67108864.0f) + t;
+    if (v < 0.0625f) {
+      return false;
+    }
+    float w = (float)pad->strength_q26[j] * (0.25f / 67108864.0f) / (pulls ? v * v : v);
+    sums[0] += w;
+    sums[1] += w / v;
+    sums[2] += w / (v * v);
+  }
+  return sums[0] <= SUM_MAX_0 && sums[1] <= SUM_MAX_1 && sums[2] <= SUM_MAX_2;
+}
+
 enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
                             const struct pad_profile *profile) {
+  float widest_mm = profile->normal[PAD_NORMAL_TERMS - 1].sd_mm;
   if (array->grid.columns != FIT_GRID_COLUMNS || array->grid.rows != FIT_GRID_ROWS ||
-      !pad_profile_is_valid(profile)) {
+      !pad_profile_is_valid(profile) || 2.0f * widest_mm > UNIT_MAX_mm ||
+      array->pitch_mm > PITCH_MAX * 2.0f * widest_mm) {
     return FT_ERR_ARGUMENT;
   }
   float unit_mm = 2.0f * profile->normal[PAD_NORMAL_TERMS - 1].sd_mm;
@@ -82,6 +114,9 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
     float strength = normal ? profile->normal[j].share
                             : profile->tangential[j - PAD_NORMAL_TERMS].moment_mm * per_unit;
     float sd = sd_mm * per_unit;
+    if (sd * sd > VARIANCE_MAX || strength > VARIANCE_MAX) {
+      return FT_ERR_ARGUMENT;
+    }
     pad->variance_q26[j] = q26_from(sd * sd);
     pad->strength_q26[j] = q26_from(strength);
   }
@@ -90,9 +125,15 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
   pad->per_unit = per_unit;
   pad->pitch_q26 = q26_from(array->pitch_mm * per_unit);
   pad->pitch_square_q26 = fixed_mul_q26(pad->pitch_q26, pad->pitch_q26);
-  pad->spread_q26 = q26_from(profile->spread_mm2 * per_square);
-  pad->spread_sd_q26 = q26_from(profile->spread_sd_mm2 * per_square);
+  float spread = profile->spread_mm2 * per_square, spread_sd = profile->spread_sd_mm2 * per_square;
+  pad->spread_q26 = q26_from(spread < VARIANCE_MAX ? spread : VARIANCE_MAX);
+  pad->spread_sd_q26 = q26_from(spread_sd < VARIANCE_MAX ? spread_sd : VARIANCE_MAX);
   pad->long_sd_q26 = q26_from(ELONGATION_SD_mm2 * per_square);
+  float least = (float)spread_least(pad) * (1.0f / 67108864.0f);
+  if (!is_carried(pad, 0, PAD_NORMAL_TERMS, least, false) ||
+      !is_carried(pad, PAD_NORMAL_TERMS, FIT_TANGENTIAL_TERMS, 1.3f * least, true)) {
+    return FT_ERR_ARGUMENT;
+  }
   pad->force_unit_N = 1.57079633e-6f * unit_mm * unit_mm; /* 2 pi V0, V0 = 1/4 */
   pad->per_force = fit_grid_scaled(1.0f / (GAUSSIAN_FORCE * pad->force_unit_N));
   return FT_OK;
@@ -128,9 +169,9 @@ FIXED_INLINE int32_t rounded(int32_t value, int shift) {
 struct offset {
   int32_t d_q26, d_q13;
   int32_t half_square_q23;
-  int32_t pulled_q24;             /* B d */
-  int32_t longer_q26;             /* e1 d^2 / 2 */
-  int32_t along_q28, across_q28;  /* e1 d, e2 d */
+  int32_t pulled_q24;            /* B d */
+  int32_t longer_q26;            /* e1 d^2 / 2 */
+  int32_t along_q28, across_q28; /* e1 d, e2 d */
 };
 
 static void set_offset(int32_t d_q26, int32_t pull_q24, const struct unknowns *at,
@@ -164,7 +205,8 @@ NOINLINE static void set_exponentials(int32_t bend_q26, int32_t by_square, int32
   uint32_t at_origin = (uint32_t)fixed_mul_q26(bend_q26, axis->square_q26) + Z_LEAST_Q22;
   int32_t slope = fixed_mul_q26(bend_q26, axis->by_pitch_q26) * 2;
   for (int32_t k = 0, i = -(nodes / 2); k < nodes; k++, i++) {
-    value_q30[k] = exp2_negative(at_origin + (uint32_t)i * ((uint32_t)(i * by_square) - (uint32_t)slope));
+    value_q30[k] =
+        exp2_negative(at_origin + (uint32_t)i * ((uint32_t)(i * by_square) - (uint32_t)slope));
   }
 }
 
@@ -192,7 +234,8 @@ NOINLINE static void set_term(const struct fit_pad *pad, int j, int32_t t_q26,
 
 /* struct fit_tangential_sums of every node. Of a round contact that does not pull s3, s4, f1 and f2
  * are in no column. */
-NOINLINE static void set_sums(const struct term *terms, bool round, union fit_tangential_node *node) {
+NOINLINE static void set_sums(const struct term *terms, bool round,
+                              union fit_tangential_node *node) {
   for (int i = 0; i < COLUMNS; i++) {
     for (int k = 0; k < ROWS; k++, node++) {
       struct fit_tangential_sums *sums = &node->sums;
@@ -271,7 +314,8 @@ NOINLINE static void set_shape(struct place *place) {
   place->longer_q28 = fixed_clamp(longer_q26, -LONGER_MAX_Q26, LONGER_MAX_Q26) * 4;
 }
 
-NOINLINE static int32_t model_of(const struct place *place, const struct fit_tangential_sums *sums) {
+NOINLINE static int32_t model_of(const struct place *place,
+                                 const struct fit_tangential_sums *sums) {
   return product(place->at->amplitude_q24 * 16, sums->s0_q28, 32) +
          whole_product(place->pulled_q26, sums->f0_q28 * 2, 31) +
          whole_product(place->longer_q28, sums->s2_q22 * 2, 27);
@@ -299,18 +343,23 @@ NOINLINE static void set_moving(const struct place *place, int32_t a_q13, bool r
                   (product(place->at->pull_y_q24 * 16, sums->f0_q28, 32) >> 4);
   }
   int32_t weight = place->weight;
-  int32_t widen_q20 = whole_product(x->half_square_q23 + y->half_square_q23, bend_q20, 23) - flat_q20;
+  int32_t widen_q20 =
+      whole_product(x->half_square_q23 + y->half_square_q23, bend_q20, 23) - flat_q20;
   node->column[SPREAD] = weighed(limited_q15(widen_q20), weight);
   /* Last s2, where PLACE_Y's column is, which STRETCH and SLANT consist of. */
   int32_t s2_q22 = sums->s2_q22;
-  node->column[PLACE_X] = weighed(limited_q15(product(radial_q20, x->d_q26, 26) - along_x_q20), weight);
-  node->column[PLACE_Y] = weighed(limited_q15(product(radial_q20, y->d_q26, 26) - along_y_q20), weight);
-  node->column[STRETCH] = weighed(product(x->half_square_q23 - y->half_square_q23, s2_q22, 29), weight);
+  node->column[PLACE_X] =
+      weighed(limited_q15(product(radial_q20, x->d_q26, 26) - along_x_q20), weight);
+  node->column[PLACE_Y] =
+      weighed(limited_q15(product(radial_q20, y->d_q26, 26) - along_y_q20), weight);
+  node->column[STRETCH] =
+      weighed(product(x->half_square_q23 - y->half_square_q23, s2_q22, 29), weight);
   node->column[SLANT] = s2_q22; /* until set_still */
 }
 
 /* The other columns, of the unknowns that the model is linear in. */
-NOINLINE static void set_still(const struct place *place, int32_t f0_q28, union fit_tangential_node *node) {
+NOINLINE static void set_still(const struct place *place, int32_t f0_q28,
+                               union fit_tangential_node *node) {
   const struct offset *x = place->x, *y = place->y;
   int32_t weight = place->weight;
   int32_t slant_q23 = product(x->d_q26, y->d_q26, 30) * 2;
@@ -369,7 +418,8 @@ static void set_priors(const struct problem *problem, const struct unknowns *at,
   memset(priors, 0, sizeof *priors);
   priors->row_q26[SPREAD] = problem->spread_prior_q26;
   priors->row_q26[STRETCH] = priors->row_q26[SLANT] = problem->long_prior_q26;
-  priors->residual[SPREAD] = fixed_mul_q28(problem->pad->spread_q26 - at->t_q26, problem->spread_prior_q26);
+  priors->residual[SPREAD] =
+      fixed_mul_q28(problem->pad->spread_q26 - at->t_q26, problem->spread_prior_q26);
   priors->residual[STRETCH] = fixed_mul_q28(-at->e1_q26, problem->long_prior_q26);
   priors->residual[SLANT] = fixed_mul_q28(-at->e2_q26, problem->long_prior_q26);
 }
@@ -407,8 +457,8 @@ struct equations {
 NOINLINE static uint32_t column_size(const int32_t *column, uint32_t largest) {
   const int32_t *end = column + NODES * UNKNOWNS;
   do {
-    largest |= fixed_size(column[0]) | fixed_size(column[UNKNOWNS]) |
-               fixed_size(column[2 * UNKNOWNS]);
+    largest |=
+        fixed_size(column[0]) | fixed_size(column[UNKNOWNS]) | fixed_size(column[2 * UNKNOWNS]);
     column += 3 * UNKNOWNS;
   } while (column != end);
   return largest;
@@ -435,8 +485,7 @@ NOINLINE static void shift_column(int32_t *column, int32_t shift) {
   }
 }
 
-NOINLINE static int32_t square_sum(const int32_t *column, const int32_t *residual,
-                                   int32_t *right) {
+NOINLINE static int32_t square_sum(const int32_t *column, const int32_t *residual, int32_t *right) {
   const int32_t *end = residual + NODES;
   int32_t own = 0, other = *right;
   do {
@@ -473,8 +522,8 @@ NOINLINE static void normalise_column(struct fit_tangential_room *room, int u, i
   room->matrix[u][u] = own * (1 << (2 * scale));
 }
 
-/* The products of column a with columns b, c, d and the last, summed over the nodes: four in as many
- * registers as a Cortex-M0+ has for them. */
+/* The products of column a with columns b, c, d and the last, summed over the nodes: four in as
+ * many registers as a Cortex-M0+ has for them. */
 FIXED_INLINE void sum_products(const int32_t *column, int32_t *sums, int a, int b, int c, int d) {
   int32_t ab = 0, ac = 0, ad = 0, al = 0;
   const int32_t *end = column + NODES * UNKNOWNS;
@@ -530,7 +579,7 @@ struct solution {
   int32_t step_q20[UNKNOWNS]; /* of the normalised columns */
   int32_t half[UNKNOWNS];
   int32_t inverse_q13[UNKNOWNS]; /* of pivot 4^half, 1 to 4 */
-  int32_t explained_q30; /* what the step takes from the square sum of the residuals */
+  int32_t explained_q30;         /* what the step takes from the square sum of the residuals */
 };
 
 #define STEP_MAX_Q20 (1 << 26)
@@ -630,8 +679,10 @@ static int32_t in_limits(int32_t value, int32_t limit) {
   return size > (uint32_t)limit * 8 ? 1 << 17 : port_divide((int32_t)size, coarse < 1 ? 1 : coarse);
 }
 
-static int32_t spread_least(const struct fit_pad *pad) {
-  return -fixed_mul_16(pad->variance_q26[0], SPREAD_LEAST_Q15) * 2;
+/* Three quarters of a pitch beyond the outer nodes, for an even number of them beyond those on the
+ * origin's far side too. */
+static int32_t reach(const struct fit_pad *pad, int32_t nodes) {
+  return (4 * (nodes / 2) + 3) * (pad->pitch_q26 >> 2);
 }
 
 NOINLINE static void take_step(const struct problem *problem, const struct outcome *outcome,
@@ -655,11 +706,9 @@ NOINLINE static void take_step(const struct problem *problem, const struct outco
     }
   }
   *at_bound = false;
-  int32_t half_x = (4 * (COLUMNS / 2) + 3) * (pad->pitch_q26 >> 2);
-  int32_t half_y = (4 * (ROWS / 2) + 3) * (pad->pitch_q26 >> 2);
-  int32_t even_x = COLUMNS % 2 ? 0 : pad->pitch_q26, even_y = ROWS % 2 ? 0 : pad->pitch_q26;
-  at->x_q26 = clamp_told(at->x_q26 + move[PLACE_X], -half_x, half_x - even_x, at_bound);
-  at->y_q26 = clamp_told(at->y_q26 + move[PLACE_Y], -half_y, half_y - even_y, at_bound);
+  at->x_q26 =
+      clamp_told(at->x_q26 + move[PLACE_X], -reach(pad, COLUMNS), reach(pad, COLUMNS), at_bound);
+  at->y_q26 = clamp_told(at->y_q26 + move[PLACE_Y], -reach(pad, ROWS), reach(pad, ROWS), at_bound);
   at->amplitude_q24 =
       clamp_told(at->amplitude_q24 + move[AMPLITUDE], 1 << 16, AMPLITUDE_MAX_Q24, at_bound);
   at->pull_x_q24 = clamp_told(at->pull_x_q24 + move[PULL_X], -PULL_MAX_Q24, PULL_MAX_Q24, at_bound);
@@ -669,8 +718,8 @@ NOINLINE static void take_step(const struct problem *problem, const struct outco
   at->e2_q26 = clamp_told(at->e2_q26 + move[SLANT], -LONG_MAX_Q26, LONG_MAX_Q26, at_bound);
 }
 
-static void improve(const struct problem *problem, struct unknowns *at,
-                    bool round, struct fit_tangential_room *room, struct outcome *outcome) {
+static void improve(const struct problem *problem, struct unknowns *at, bool round,
+                    struct fit_tangential_room *room, struct outcome *outcome) {
   struct priors priors;
   struct equations equations;
   linearise(problem, at, round, room);
@@ -732,6 +781,8 @@ NOINLINE static void begin(const struct fit_array *array, const struct fit_pad *
   float scale = pad->per_unit * q26;
   at->x_q26 = (int32_t)((start->x_mm - array->x[origin] * array->pitch_mm) * scale);
   at->y_q26 = (int32_t)((start->y_mm - array->y[origin] * array->pitch_mm) * scale);
+  at->x_q26 = fixed_clamp(at->x_q26, -reach(pad, COLUMNS), reach(pad, COLUMNS));
+  at->y_q26 = fixed_clamp(at->y_q26, -reach(pad, ROWS), reach(pad, ROWS));
   float sigma = start->sigma_mm * pad->per_unit;
   float square = sigma * sigma;
   int32_t most = SPREAD_MOST_Q26 + GAUSSIAN_VARIANCE_Q26;
@@ -812,7 +863,8 @@ NOINLINE static void conclude(const struct fit_array *array, const struct proble
 }
 
 static int32_t prior_row(int32_t base_q22, int32_t sd_q26) {
-  return fixed_clamp(fixed_div_q26(base_q22 * 16, sd_q26), 1, 2 * ONE_Q26);
+  int32_t base_q26 = base_q22 * 16;
+  return base_q26 / 2 >= sd_q26 ? 2 * ONE_Q26 : fixed_div_q26(base_q26, sd_q26) | 1;
 }
 
 void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,

@@ -55,7 +55,8 @@ struct fit_pad {
 };
 
 /* FT_ERR_ARGUMENT: the array is no full rectangle of the grid that this build knows, or the profile
- * is not valid (pad_profile.h). */
+ * is not valid (pad_profile.h) or is no layer's: narrower, stronger or wider terms than layers of
+ * PAD_THICKNESS_MIN_mm to PAD_THICKNESS_MAX_mm have on this pitch. */
 enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
                             const struct pad_profile *profile);
 

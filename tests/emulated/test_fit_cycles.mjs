@@ -19,6 +19,8 @@ const MASKED_CYCLES_MAX = 46800;
 const SEARCH_CYCLES_MAX = 44500;
 /** A fit that finds an outlier: the fit, the search, and the fit without it. */
 const OUTLIER_CYCLES_MAX = 92500;
+/** The tangential estimate, which follows the fit, with the image's pad. */
+const TANGENTIAL_CYCLES_MAX = 125000;
 /** Between the cheapest and the dearest press, share of the dearest: a contact at a bound has no widths to tell. */
 const SPREAD_MAX = 0.1;
 /** FINGERTIP_FIT_ITERATIONS. */
@@ -78,6 +80,24 @@ for (const [what, kernel, limit, usable] of [
     }
   });
 }
+
+/** Readings that rise along the pull. */
+const pulled = (readings, qx, qy) => readings.map((value, k) => Math.round(value * (1 + qx * (Math.floor(k / 5) - 1) + qy * ((k % 5) - 2))));
+
+test(`the tangential estimate takes at most ${TANGENTIAL_CYCLES_MAX} cycles, nor much less where it ends with a result`, (t) => {
+  const run = (readings, usable) => bench.run({ kernel: 'tangential', iterations: ITERATIONS, noise_Pa_q10: 4096, usable, readings });
+  const list = Array.from({ length: 100 }, () => pulled(press(between(-8, 8), between(-17, 17), 10 ** between(3, 5), between(5.5, 6.5), 2), between(-0.1, 0.1), between(-0.1, 0.1)));
+  const answers = list.map((readings, i) => run(readings, i % 4 ? ALL : maskFor(readings, i))).filter((answer) => answer.x_mm !== 0 || answer.y_mm !== 0);
+  assert.ok(answers.length > 60, `${answers.length} results`);
+  const cycles = answers.map((answer) => answer.cycles);
+  const [min, max] = [Math.min(...cycles), Math.max(...cycles)];
+  t.diagnostic(`${answers.length} results: ${min} to ${max} cycles`);
+  assert.ok(max <= TANGENTIAL_CYCLES_MAX, `${max}`);
+  assert.ok(max - min <= SPREAD_MAX * max, `${min} to ${max}`);
+  const worst = Math.max(...[...presses, ...garbage].map((readings, i) => run(readings, i % 2 ? ALL : maskFor(readings, i)).cycles));
+  t.diagnostic(`presses and garbage: at most ${worst} cycles`);
+  assert.ok(worst <= TANGENTIAL_CYCLES_MAX, `garbage: ${worst}`);
+});
 
 test(`looking for an outlier: at most ${SEARCH_CYCLES_MAX} cycles in vain, ${OUTLIER_CYCLES_MAX} with the fit without it`, (t) => {
   const wrong = presses.map((readings, i) => readings.map((value, k) => value + (k === i % SENSORS ? 10000 * 1024 : 0)));

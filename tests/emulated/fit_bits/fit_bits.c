@@ -3,14 +3,17 @@
 #include "common/crc32.h"
 #include "config/geometry.h"
 #include "fit/fit.h"
+#include "fit/fit_tangential.h"
 
 #include <stdbool.h>
 #include <string.h>
 
 #define LAYOUTS 4
+#define PADS 4
 #define ONE_Q16 65536
 
 static struct fit_array layouts[LAYOUTS];
+static struct fit_pad pads[PADS];
 
 /* xorshift64* (Vigna, 2016) */
 static uint64_t state;
@@ -33,6 +36,21 @@ static void stop_unless(enum ft_status status) {
   }
 }
 
+/* Silicone's, the products exact or rounded alike everywhere. */
+static struct pad_profile layer_of(float thickness_mm) {
+  return (struct pad_profile){
+      .thickness_mm = thickness_mm,
+      .normal = {{0.09625f, 0.297f * thickness_mm}, {0.8206f, 0.4783f * thickness_mm}},
+      .tangential = {{0.0877f * thickness_mm, 0.4f * thickness_mm},
+                     {0.3346f * thickness_mm, 0.657f * thickness_mm},
+                     {0.4539f * thickness_mm, 1.652f * thickness_mm}},
+      .spread_mm2 = 4.0f,
+      .spread_sd_mm2 = 6.0f,
+      .force_ratio = 1.0f,
+      .tangential_scale = 1.0f,
+  };
+}
+
 void fit_bits_init(void) {
   float x_mm[FT_MAX_SENSORS], y_mm[FT_MAX_SENSORS];
   stop_unless(fit_array_init(&layouts[0], geometry.sensor_count, geometry.x_mm, geometry.y_mm,
@@ -53,6 +71,10 @@ void fit_bits_init(void) {
     y_mm[k] = k % 8 == 7 ? y_mm[k - 1] : (float)draw_between(-320, 320) / 16.0f;
   }
   stop_unless(fit_array_init(&layouts[3], FT_MAX_SENSORS, x_mm, y_mm, 8.0f));
+  for (int k = 0; k < PADS; k++) {
+    const struct pad_profile profile = layer_of(5.0f * (float)(k + 1));
+    stop_unless(fit_pad_init(&pads[k], &layouts[0], &profile));
+  }
 }
 
 /* 2^-z, z in Q16, in Q30: a parabola between the powers, 0.3 % off. */
@@ -70,14 +92,13 @@ static int32_t to_int32(int64_t value) {
 }
 
 /* A press near the array, of every width and height, and its noise. */
-static void draw_press(const struct fit_array *array, int32_t noise, int32_t *pressure_Pa_q10) {
+static void draw_press(const struct fit_array *array, int64_t height_q16, int32_t noise,
+                       int32_t *pressure_Pa_q10) {
   uint8_t last = (uint8_t)(array->sensor_count - 1);
   int32_t x = draw_between((int32_t)(array->x[0] * 65536.0f) - ONE_Q16,
                            (int32_t)(array->x[last] * 65536.0f) + ONE_Q16);
   int32_t y = draw_between((int32_t)(array->y[0] * 65536.0f) - ONE_Q16,
                            (int32_t)(array->y[last] * 65536.0f) + ONE_Q16);
-  /* 1 / (2 sigma^2) in powers of 2 over pitches squared: sigma 0.2 to 3.4 pitches */
-  int64_t height_q16 = (int64_t)draw_between(ONE_Q16, 2 * ONE_Q16) << draw_between(0, 7) >> 4;
   int64_t peak = (int64_t)draw_between(ONE_Q16, 2 * ONE_Q16) << draw_between(0, 14);
   for (uint8_t k = 0; k <= last; k++) {
     int64_t dx = (int64_t)(array->x[k] * 65536.0f) - x;
@@ -92,6 +113,16 @@ static void draw_press(const struct fit_array *array, int32_t noise, int32_t *pr
   }
 }
 
+/* Makes a press one that pulls: more ahead of it than behind. */
+static void pull(const struct fit_array *array, int32_t *pressure_Pa_q10) {
+  int32_t x = draw_between(-ONE_Q16 / 8, ONE_Q16 / 8), y = draw_between(-ONE_Q16 / 8, ONE_Q16 / 8);
+  for (uint8_t k = 0; k < array->sensor_count; k++) {
+    int64_t more = (int64_t)(array->x[k] * 65536.0f) * x + (int64_t)(array->y[k] * 65536.0f) * y;
+    int64_t part = pressure_Pa_q10[k] * (more >> 16) >> 16;
+    pressure_Pa_q10[k] = to_int32(pressure_Pa_q10[k] + part);
+  }
+}
+
 uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   state = UINT64_C(0x9E3779B97F4A7C15) * (press + 1) ^ (uint64_t)kernel;
   draw();
@@ -101,7 +132,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   struct fit_settings settings;
   memset(&settings, 0, sizeof settings);
   settings.iterations = (uint8_t)(press % 4 ? 7 : draw_between(0, 12));
-  settings.noise_Pa_q10 = draw_between(1, 32 * 1024);
+  settings.noise_Pa_q10 = draw_between(1, (kernel == FIT_BITS_TANGENTIAL ? 4 : 32) * 1024);
   if (kernel == FIT_BITS_GENERAL && press % 5 == 0) {
     settings.n_largest = (uint8_t)draw_between(1, array->sensor_count);
   }
@@ -124,11 +155,22 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
       pressure_Pa_q10[k] = draw_between(INT32_MIN, INT32_MAX) >> shift;
     }
   } else {
-    draw_press(array, settings.noise_Pa_q10, pressure_Pa_q10);
+    /* 1 / (2 sigma^2) in powers of 2 over pitches squared: sigma 0.2 to 3.4 pitches; of a pad what
+     * its thickness makes of a contact. */
+    int32_t any_q16 = draw_between(ONE_Q16, 2 * ONE_Q16);
+    int64_t height_q16 = (int64_t)any_q16 << draw_between(0, 7) >> 4;
+    int64_t thickness = press / 4 % PADS + 1; /* 5 mm */
+    draw_press(array,
+               kernel == FIT_BITS_TANGENTIAL ? (int64_t)any_q16 * 7 / (thickness * thickness)
+                                             : height_q16,
+               settings.noise_Pa_q10, pressure_Pa_q10);
   }
 
   uint32_t usable = UINT32_MAX;
-  if (kernel == FIT_BITS_MASKED) {
+  if (kernel == FIT_BITS_TANGENTIAL && press % 16 != 15) {
+    pull(array, pressure_Pa_q10);
+  }
+  if (kernel == FIT_BITS_MASKED || (kernel == FIT_BITS_TANGENTIAL && press % 4 == 2)) {
     for (int left_out = draw_between(1, 11) / draw_between(1, 11); left_out >= 0; left_out--) {
       usable &= ~(UINT32_C(1) << draw_between(0, array->sensor_count - 1));
     }
@@ -142,8 +184,15 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     fit_grid(array, pressure_Pa_q10, &settings, &result);
   } else if (kernel == FIT_BITS_MASKED) {
     fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
-  } else {
+  } else if (kernel == FIT_BITS_GENERAL) {
     fit_general(array, pressure_Pa_q10, usable, &settings, &result);
+  }
+  if (kernel == FIT_BITS_TANGENTIAL) {
+    struct fit_tangential found;
+    memset(&found, 0, sizeof found);
+    fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
+    fit_tangential(array, &pads[press / 4 % PADS], pressure_Pa_q10, &settings, &result, &found);
+    return crc32_iso_hdlc((const uint8_t *)&found, sizeof found);
   }
   return crc32_iso_hdlc((const uint8_t *)&result, sizeof result);
 }

@@ -4,7 +4,7 @@ usage: test_fit_bits.py --host TOOL --m4f ELF --m0 ELF --rp2040 BIN --qemu QEMU 
 
 Compared with the host build:
 - the Cortex-M4F build, hardware floating point, in QEMU (mps2-an386): all presses, all kernels;
-- the Cortex-M0+ objects of the firmware in the RP2040's emulator: all presses of the fixed-point kernel;
+- the Cortex-M0+ objects of the firmware in the RP2040's emulator: all presses of the fixed-point kernels;
 - those of float32 take a million cycles a fit there. The emulator does the first 200, and QEMU's Cortex-M0 (microbit),
   which has not the RP2040's divider but needs none for this kernel, does all with the same objects.
 """
@@ -14,9 +14,9 @@ import subprocess
 import sys
 import unittest
 
-KERNELS = ["grid", "masked", "general"]  # the order of enum fit_bits_kernel
+KERNELS = ["grid", "masked", "general", "tangential"]  # the order of enum fit_bits_kernel
 PRESSES = 10000
-PRESSES_IN_EMULATOR = {"grid": PRESSES, "masked": PRESSES, "general": 200}
+PRESSES_IN_EMULATOR = {"grid": PRESSES, "masked": PRESSES, "general": 200, "tangential": PRESSES}
 FOLDER = pathlib.Path(__file__).resolve().parent
 TOOLS = argparse.Namespace()
 
@@ -47,7 +47,9 @@ class SameBits(unittest.TestCase):
 
     def test_results_differ_from_press_to_press(self):
         for kernel in KERNELS:
-            self.assertGreater(len(set(on_host(kernel))), 0.85 * PRESSES)
+            # Without a valid result every member is zero.
+            least = 0.55 if kernel == "tangential" else 0.85
+            self.assertGreater(len(set(on_host(kernel))), least * PRESSES)
 
     def test_cortex_m4f(self):
         for kernel in KERNELS:

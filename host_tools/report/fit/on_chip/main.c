@@ -91,7 +91,7 @@ ALTERNATIVE(lm_float, lm, float)
 ALTERNATIVE(lm_double, lm, double)
 
 /* The order is that of KERNELS in fit_on_chip.mjs. */
-static void (*const kernels[])(void) = {nothing,     fit,          grid,     masked,   general,
+static void (*const kernels[])(void) = {nothing,     fit,          grid,     masked,    general,
                                         naive_float, naive_double, lm_float, lm_double, tangential};
 
 int main(void) {

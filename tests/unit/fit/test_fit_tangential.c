@@ -1,0 +1,413 @@
+/* The tangential estimate against readings that its own model makes, at the edges of what it takes,
+ * and on any bits. tests/accuracy holds it to an estimator of its own in double precision. */
+#include "common/contact_flags.h"
+#include "fit/fit_tangential.h"
+#include "support/pad.h"
+#include "support/random.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+#include <unity.h>
+
+enum { SENSORS = 15, ALL = (1 << SENSORS) - 1 };
+#define PITCH_mm 9.0f
+#define RANDOM_INPUTS 1000000
+#define SEED UINT64_C(0x7461676E)
+#define SDS 1
+
+static struct fit_array array;
+static struct fit_pad pad;
+static struct pad_profile profile;
+static struct fit_settings settings;
+
+struct contact {
+  double x_mm, y_mm, force_N, qx_N, qy_N, spread_mm2;
+};
+
+static struct pad_profile profile_of(double thickness_mm) {
+  struct pad_profile scaled = pad_of_12_mm();
+  float by = (float)(thickness_mm / 12.0);
+  scaled.thickness_mm *= by;
+  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+    scaled.normal[j].sd_mm *= by;
+  }
+  for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
+    scaled.tangential[j].sd_mm *= by;
+    scaled.tangential[j].moment_mm *= by;
+  }
+  return scaled;
+}
+
+static void use_pad(double thickness_mm) {
+  profile = profile_of(thickness_mm);
+  TEST_ASSERT_EQUAL(FT_OK, fit_pad_init(&pad, &array, &profile));
+}
+
+void setUp(void) {
+  float x_mm[SENSORS], y_mm[SENSORS];
+  for (int k = 0; k < SENSORS; k++) {
+    x_mm[k] = PITCH_mm * (float)(k / 5 - 1);
+    y_mm[k] = PITCH_mm * (float)(k % 5 - 2);
+  }
+  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, SENSORS, x_mm, y_mm, PITCH_mm));
+  use_pad(12.0);
+  memset(&settings, 0, sizeof settings);
+  settings.iterations = 4;
+  settings.noise_Pa_q10 = 2048;
+  fit_set_errors(&settings, 0.005f, 0.0065f);
+}
+
+void tearDown(void) {}
+
+/* As pad_profile.h has it. */
+static double pressure_Pa(const struct contact *contact, double x_mm, double y_mm) {
+  double dx = x_mm - contact->x_mm, dy = y_mm - contact->y_mm, sum = 0.0;
+  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+    double v = pow((double)profile.normal[j].sd_mm, 2) + contact->spread_mm2;
+    sum += contact->force_N * (double)profile.normal[j].share / v *
+           exp(-(dx * dx + dy * dy) / (2 * v));
+  }
+  for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
+    double v = pow((double)profile.tangential[j].sd_mm, 2) + 1.3 * contact->spread_mm2;
+    sum += (contact->qx_N * dx + contact->qy_N * dy) * (double)profile.tangential[j].moment_mm /
+           (v * v) * exp(-(dx * dx + dy * dy) / (2 * v));
+  }
+  return 1e6 * sum / 6.283185307179586;
+}
+
+static void read_contact(const struct contact *contact, int32_t *readings) {
+  for (int k = 0; k < SENSORS; k++) {
+    double p_Pa =
+        pressure_Pa(contact, (double)(array.x[k] * PITCH_mm), (double)(array.y[k] * PITCH_mm));
+    readings[k] = (int32_t)lround(1024.0 * p_Pa);
+  }
+}
+
+static struct fit_tangential estimate(const int32_t *readings, uint32_t usable) {
+  struct fit_result start;
+  fit_gaussian(&array, readings, usable, &settings, &start);
+  struct fit_tangential result;
+  memset(&result, 0xFF, sizeof result);
+  fit_tangential(&array, &pad, readings, &settings, &start, &result);
+  return result;
+}
+
+static struct contact draw_contact(struct random *random, double ratio) {
+  struct contact contact;
+  contact.x_mm = random_between(random, -7, 7);
+  contact.y_mm = random_between(random, -16, 16);
+  contact.force_N = random_between(random, 1, 10);
+  double q_N = ratio * contact.force_N, angle = random_between(random, 0, 6.283185307179586);
+  contact.qx_N = q_N * cos(angle);
+  contact.qy_N = q_N * sin(angle);
+  contact.spread_mm2 = random_between(random, 2, 6);
+  return contact;
+}
+
+static bool is_zero(const struct fit_tangential *result) {
+  struct fit_tangential zero;
+  memset(&zero, 0, sizeof zero);
+  return memcmp(&zero, result, sizeof zero) == 0;
+}
+
+/* Of 300 contacts: the least number of valid ones, and of those the most that may be further off
+ * than mm or share of the force and SDS standard deviations. */
+static void judge_pad(double thickness_mm, uint32_t usable, double mm, double share, int least,
+                      int most_off) {
+  use_pad(thickness_mm);
+  struct random random = {SEED};
+  int valid = 0, outside = 0;
+  char text[200] = "";
+  for (int i = 0; i < 300; i++) {
+    struct contact contact = draw_contact(&random, 0.1 * (i % 4));
+    int32_t readings[SENSORS];
+    read_contact(&contact, readings);
+    struct fit_tangential found = estimate(readings, usable);
+    if (!found.valid) {
+      TEST_ASSERT_TRUE(is_zero(&found));
+      continue;
+    }
+    valid++;
+    double off_mm = hypot((double)found.x_mm - contact.x_mm, (double)found.y_mm - contact.y_mm);
+    double off = hypot((double)found.qx_N - contact.qx_N, (double)found.qy_N - contact.qy_N);
+    double sd_mm = (double)found.location_sd_mm, sd_N = (double)found.q_sd_N;
+    /* What is told loosely is drawn towards the priors. */
+    if (off_mm > mm + SDS * sd_mm || off > share * contact.force_N + SDS * sd_N) {
+      outside++;
+      snprintf(text, sizeof text,
+               "%g mm, press %d at %.1f %.1f: off by %.4f mm (sd %.4f), %.4f of %.3f N (sd %.4f)",
+               thickness_mm, i, contact.x_mm, contact.y_mm, off_mm, sd_mm, off, contact.force_N,
+               sd_N);
+    }
+  }
+  TEST_ASSERT_TRUE_MESSAGE(outside <= most_off, text);
+  TEST_ASSERT_GREATER_OR_EQUAL_INT(least, valid);
+}
+
+static void test_contacts_of_the_model_are_found(void) {
+  judge_pad(12.0, ALL, 0.02, 0.002, 285, 0);
+}
+
+/* On thin pads a contact is narrower than the pitch: a tenth is off by more than it says. */
+static void test_pads_of_5_to_20_mm(void) {
+  judge_pad(5.0, ALL, 0.1, 0.01, 180, 30);
+  judge_pad(6.0, ALL, 0.1, 0.01, 240, 40);
+  judge_pad(20.0, ALL, 0.02, 0.002, 290, 0);
+}
+
+static void test_sensors_missing(void) {
+  judge_pad(12.0, ALL & ~(1 << 7), 0.05, 0.005, 290, 0);
+  judge_pad(12.0, ALL & ~(1 << 0 | 1 << 13), 0.05, 0.005, 290, 0);
+}
+
+static void expect_none(const int32_t *readings, uint32_t usable) {
+  struct fit_tangential found = estimate(readings, usable);
+  TEST_ASSERT_TRUE(is_zero(&found));
+}
+
+static const struct contact usual = {2.0, 3.0, 5.0, 0.5, -0.3, 4.0};
+
+static void test_too_few_sensors_give_nothing(void) {
+  int32_t readings[SENSORS];
+  read_contact(&usual, readings);
+  uint32_t seven = 0x1C7 | 1 << 12;
+  TEST_ASSERT_EQUAL_INT(FIT_TANGENTIAL_SENSORS - 1, __builtin_popcount(seven));
+  expect_none(readings, seven);
+  TEST_ASSERT_TRUE(estimate(readings, ALL).valid);
+}
+
+static void test_no_fit_gives_nothing(void) {
+  int32_t readings[SENSORS] = {0};
+  expect_none(readings, ALL);
+  read_contact(&usual, readings);
+  struct fit_result start;
+  fit_gaussian(&array, readings, ALL, &settings, &start);
+  start.flags &= ~(uint32_t)CONTACT_FLAG_FIT_VALID;
+  struct fit_tangential found;
+  memset(&found, 0xFF, sizeof found);
+  fit_tangential(&array, &pad, readings, &settings, &start, &found);
+  TEST_ASSERT_TRUE(is_zero(&found));
+}
+
+static void test_two_contacts_give_nothing(void) {
+  struct contact other = {-6.0, -15.0, 5.0, 0.0, 0.0, 4.0}, one = {6.0, 15.0, 5.0, 0.0, 0.0, 4.0};
+  int32_t readings[SENSORS], more[SENSORS];
+  read_contact(&one, readings);
+  read_contact(&other, more);
+  for (int k = 0; k < SENSORS; k++) {
+    readings[k] += more[k];
+  }
+  expect_none(readings, ALL);
+}
+
+static void test_a_contact_far_outside_gives_nothing(void) {
+  struct contact far = {22.0, 28.0, 5.0, 0.0, 0.0, 4.0};
+  int32_t readings[SENSORS];
+  read_contact(&far, readings);
+  expect_none(readings, ALL);
+}
+
+static void test_noise_that_hides_the_force_gives_nothing(void) {
+  int32_t readings[SENSORS];
+  read_contact(&usual, readings);
+  float least = 0.0f;
+  for (int shift = 10; shift < 24; shift++) {
+    settings.noise_Pa_q10 = 1 << shift;
+    struct fit_tangential found = estimate(readings, ALL);
+    if (!found.valid) {
+      TEST_ASSERT_TRUE(least > 0.0f);
+      return;
+    }
+    TEST_ASSERT_TRUE(found.q_sd_N <= FIT_TANGENTIAL_SD_MAX * 1.001f * found.force_N);
+    TEST_ASSERT_TRUE(found.q_sd_N >= least);
+    least = found.q_sd_N;
+  }
+  TEST_FAIL_MESSAGE("valid whatever the noise");
+}
+
+static void test_twice_the_pressure_is_twice_the_force_to_the_bit(void) {
+  struct random random = {SEED};
+  for (int i = 0; i < 200; i++) {
+    struct contact contact = draw_contact(&random, 0.2);
+    int32_t readings[SENSORS], scaled[SENSORS];
+    read_contact(&contact, readings);
+    settings.noise_Pa_q10 = 2048;
+    struct fit_tangential found = estimate(readings, ALL);
+    for (int k = 0; k < SENSORS; k++) {
+      scaled[k] = readings[k] * 4;
+    }
+    settings.noise_Pa_q10 = 8192;
+    struct fit_tangential other = estimate(scaled, ALL);
+    TEST_ASSERT_EQUAL(found.valid, other.valid);
+    TEST_ASSERT_TRUE(found.x_mm == other.x_mm && found.y_mm == other.y_mm);
+    TEST_ASSERT_TRUE(found.location_sd_mm == other.location_sd_mm);
+    TEST_ASSERT_TRUE(4.0f * found.force_N == other.force_N);
+    TEST_ASSERT_TRUE(4.0f * found.qx_N == other.qx_N && 4.0f * found.qy_N == other.qy_N);
+    TEST_ASSERT_TRUE(4.0f * found.q_sd_N == other.q_sd_N);
+  }
+}
+
+static void test_a_mirrored_contact_has_a_mirrored_result(void) {
+  struct random random = {SEED};
+  for (int i = 0; i < 200; i++) {
+    struct contact contact = draw_contact(&random, 0.2);
+    int32_t readings[SENSORS], mirrored[SENSORS];
+    read_contact(&contact, readings);
+    struct fit_tangential found = estimate(readings, ALL);
+    for (int axis = 0; axis < 2; axis++) {
+      for (int k = 0; k < SENSORS; k++) {
+        int column = k / 5, row = k % 5;
+        mirrored[k] = axis ? readings[column * 5 + 4 - row] : readings[(2 - column) * 5 + row];
+      }
+      struct fit_tangential other = estimate(mirrored, ALL);
+      TEST_ASSERT_EQUAL(found.valid, other.valid);
+      float x = axis ? 1.0f : -1.0f, y = -x;
+      TEST_ASSERT_FLOAT_WITHIN(0.01f, found.x_mm, x * other.x_mm);
+      TEST_ASSERT_FLOAT_WITHIN(0.01f, found.y_mm, y * other.y_mm);
+      TEST_ASSERT_FLOAT_WITHIN(0.001f * found.force_N, found.qx_N, x * other.qx_N);
+      TEST_ASSERT_FLOAT_WITHIN(0.001f * found.force_N, found.qy_N, y * other.qy_N);
+    }
+  }
+}
+
+static void test_nothing_stays_from_another_frame(void) {
+  struct random random = {SEED};
+  int32_t readings[SENSORS], other[SENSORS];
+  read_contact(&usual, readings);
+  struct fit_tangential found = estimate(readings, ALL);
+  for (int i = 0; i < 100; i++) {
+    struct contact contact = draw_contact(&random, 0.3);
+    read_contact(&contact, other);
+    estimate(other, ALL & ~(1u << random_below(&random, SENSORS)));
+    memset(&pad.room, (int)random_below(&random, 256), sizeof pad.room);
+    struct fit_tangential again = estimate(readings, ALL);
+    TEST_ASSERT_EQUAL_MEMORY(&found, &again, sizeof found);
+  }
+}
+
+static void test_profiles_that_no_layer_has_are_refused(void) {
+  struct pad_profile wrong = profile_of(12.0);
+  wrong.thickness_mm = 0.0f;
+  TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_pad_init(&pad, &array, &wrong));
+  wrong = profile_of(12.0);
+  wrong.normal[0].sd_mm = 0.6f; /* pressure without bound where the contact is */
+  TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_pad_init(&pad, &array, &wrong));
+  wrong = profile_of(12.0);
+  wrong.normal[0].sd_mm = wrong.normal[1].sd_mm = 1.0f; /* a pitch of many units */
+  TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_pad_init(&pad, &array, &wrong));
+  wrong = profile_of(12.0);
+  wrong.tangential[2].sd_mm = 100.0f;
+  TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_pad_init(&pad, &array, &wrong));
+  wrong = profile_of(12.0);
+  wrong.tangential[0].moment_mm = 40.0f;
+  TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_pad_init(&pad, &array, &wrong));
+  float x_mm[8] = {0, 9, 18, 27, 0, 9, 18, 27}, y_mm[8] = {0, 0, 0, 0, 9, 9, 9, 9};
+  struct fit_array other;
+  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&other, 8, x_mm, y_mm, 9.0f));
+  wrong = profile_of(12.0);
+  TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_pad_init(&pad, &other, &wrong));
+}
+
+static int32_t any_bits(struct random *random) {
+  return (int32_t)(random_u32(random) - UINT32_C(0x80000000));
+}
+
+/* Of any profile that is valid and taken. */
+static void draw_pad(struct random *random) {
+  do {
+    profile = profile_of(random_between(random, 5.0, 20.0));
+    for (int j = 0; j < PAD_NORMAL_TERMS && random_below(random, 2); j++) {
+      profile.normal[j].share *= (float)exp(random_between(random, -2, 1));
+      profile.normal[j].sd_mm *= (float)exp(random_between(random, -0.5, 0.5));
+    }
+    for (int j = 0; j < PAD_TANGENTIAL_TERMS && random_below(random, 2); j++) {
+      profile.tangential[j].moment_mm *= (float)exp(random_between(random, -2, 1));
+      profile.tangential[j].sd_mm *= (float)exp(random_between(random, -0.5, 0.5));
+    }
+    profile.spread_mm2 = (float)random_between(random, 0, 100);
+    profile.spread_sd_mm2 = (float)exp(random_between(random, log(0.11), log(99)));
+  } while (fit_pad_init(&pad, &array, &profile) != FT_OK);
+}
+
+static void draw_readings(struct random *random, int32_t *readings) {
+  uint32_t kind = random_below(random, 6), shift = random_below(random, 31);
+  struct contact contact = draw_contact(random, random_between(random, 0, 4));
+  contact.x_mm *= random_between(random, 0, 4);
+  contact.y_mm *= random_between(random, 0, 2);
+  contact.force_N = exp(random_between(random, -6, 5));
+  contact.spread_mm2 *= random_between(random, 0, 10);
+  if (kind >= 2) {
+    read_contact(&contact, readings);
+  }
+  for (int k = 0; k < SENSORS; k++) {
+    if (kind == 0) {
+      readings[k] = any_bits(random);
+    } else if (kind == 1) {
+      readings[k] = any_bits(random) >> shift;
+    } else if (kind == 2) {
+      readings[k] = random_below(random, 4) ? readings[k] : any_bits(random);
+    } else if (kind == 3) {
+      readings[k] = (int32_t)(readings[k] * random_between(random, 0.7, 1.3));
+    }
+  }
+}
+
+/* The build's sanitizer finds what is undefined. */
+static void test_any_bits_give_finite_results(void) {
+  struct random random = {SEED};
+  uint32_t valid = 0;
+  for (uint32_t i = 0; i < RANDOM_INPUTS; i++) {
+    if (i % 64 == 0) {
+      draw_pad(&random);
+    }
+    int32_t readings[SENSORS];
+    draw_readings(&random, readings);
+    settings.noise_Pa_q10 = (int32_t)(random_u32(&random) >> (1 + random_below(&random, 31))) | 1;
+    for (int k = 0; k < SENSORS; k++) {
+      settings.gain_sd_q16[k] = (uint16_t)(random_u32(&random) >> random_below(&random, 32));
+    }
+    struct fit_tangential found = estimate(
+        readings, random_below(&random, 2) ? ALL : random_u32(&random) | random_u32(&random));
+    const float values[] = {
+        found.x_mm,    found.y_mm,       found.location_sd_mm, found.location_noise_mm,
+        found.force_N, found.force_sd_N, found.qx_N,           found.qy_N,
+        found.q_sd_N};
+    bool good = found.valid || is_zero(&found);
+    for (size_t k = 0; k < sizeof values / sizeof *values; k++) {
+      good = good && isfinite(values[k]);
+    }
+    good = good && (!found.valid || (found.force_N > 0.0f && found.q_sd_N > 0.0f &&
+                                     found.force_sd_N > 0.0f && found.location_sd_mm > 0.0f &&
+                                     fabsf(found.x_mm) < 26.0f && fabsf(found.y_mm) < 35.0f));
+    if (!good) {
+      char text[200];
+      snprintf(text, sizeof text, "input %u: x %g y %g sd %g force %g sd %g q %g %g sd %g",
+               (unsigned)i, (double)found.x_mm, (double)found.y_mm, (double)found.location_sd_mm,
+               (double)found.force_N, (double)found.force_sd_N, (double)found.qx_N,
+               (double)found.qy_N, (double)found.q_sd_N);
+      TEST_FAIL_MESSAGE(text);
+    }
+    valid += found.valid;
+  }
+  TEST_ASSERT_GREATER_THAN_UINT32(RANDOM_INPUTS / 20, valid);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_contacts_of_the_model_are_found);
+  RUN_TEST(test_pads_of_5_to_20_mm);
+  RUN_TEST(test_sensors_missing);
+  RUN_TEST(test_too_few_sensors_give_nothing);
+  RUN_TEST(test_no_fit_gives_nothing);
+  RUN_TEST(test_two_contacts_give_nothing);
+  RUN_TEST(test_a_contact_far_outside_gives_nothing);
+  RUN_TEST(test_noise_that_hides_the_force_gives_nothing);
+  RUN_TEST(test_twice_the_pressure_is_twice_the_force_to_the_bit);
+  RUN_TEST(test_a_mirrored_contact_has_a_mirrored_result);
+  RUN_TEST(test_nothing_stays_from_another_frame);
+  RUN_TEST(test_profiles_that_no_layer_has_are_refused);
+  RUN_TEST(test_any_bits_give_finite_results);
+  return UNITY_END();
+}
