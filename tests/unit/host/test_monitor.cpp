@@ -391,13 +391,13 @@ TEST(Monitor, AnUnsureArrowIsWideAndOneThatMayBeNothingHasNoDirection) {
     return one(model, 200, 60);
   };
   Canvas without = picture(1.5f, 0.05f, GOOD);
-  Canvas sure = picture(1.5f, 0.05f, PULLED), unsure = picture(1.5f, 0.5f, PULLED);
+  Canvas sure = picture(1.5f, 0.05f, PULLED), unsure = picture(1.5f, 0.7f, PULLED);
   Canvas nothing = picture(0.5f, 0.5f, PULLED);
-  EXPECT_GT(differing(sure, without), 10);
+  EXPECT_GT(differing(sure, without), 5);
   EXPECT_GT(differing(unsure, without), 2 * differing(sure, without));
   EXPECT_TRUE(shows(unsure, "→"));
   EXPECT_FALSE(shows(nothing, "→"));
-  EXPECT_GT(differing(nothing, without), 10);
+  EXPECT_GT(differing(nothing, without), 5);
   EXPECT_FALSE(shows(without, "→") || shows(without, "+1.50")) << text_of(without);
   Canvas doubtful = picture(1.5f, 0.05f, PULLED | CONTACT_FLAG_ELONGATED);
   EXPECT_TRUE(shows(doubtful, "qx  +1.50?")) << text_of(doubtful);
