@@ -514,3 +514,12 @@ TEST(Painter, WithoutColourTheLocationIsStillSeen) {
     EXPECT_NE(bytes.find(characters == Characters::utf_8 ? "▒" : ":"), std::string::npos);
   }
 }
+
+TEST(Painter, InAsciiAnArrowHasAHeadToo) {
+  Model model = model_of_grasp(true);
+  for (auto [qx_N, qy_N] : {std::pair{1.1f, 1.1f}, {-1.1f, 1.1f}, {-1.1f, -1.1f}, {1.1f, -1.1f}}) {
+    take_frame(model, 1000000, 1, -4.5f, 4.5f, 5, PULLED, {qx_N, qy_N, 0.05f});
+    std::string bytes = Painter(ColourDepth::none, Characters::ascii).paint(one(model, 200, 60));
+    EXPECT_EQ(bytes.find('?'), std::string::npos) << "a shape without a character";
+  }
+}
