@@ -194,7 +194,8 @@ pad_profile scaled(pad_profile pad, float present_scale, const PullJudgement &ju
   return pad;
 }
 
-void print_result(const Work &work, const pad_profile &before, const pad_profile &after) {
+void print_result(const Work &work, const pad_profile &before, const pad_profile &after,
+                  bool has_force_scale) {
   std::printf("%s, from %zu of %zu pulls\n", work.judgement().text.c_str(), work.judgement().kept,
               work.pulls().size());
   std::printf("tangential scale    %s sd %s before, %s sd %s now\n",
@@ -202,6 +203,10 @@ void print_result(const Work &work, const pad_profile &before, const pad_profile
               fixed(static_cast<double>(before.tangential_scale_sd), 3).c_str(),
               fixed(static_cast<double>(after.tangential_scale), 3).c_str(),
               fixed(static_cast<double>(after.tangential_scale_sd), 3).c_str());
+  if (!has_force_scale) {
+    std::printf("the force's scale is not calibrated, of which this is a multiple: once it is, do "
+                "this again\n");
+  }
   std::fflush(stdout);
 }
 
@@ -232,7 +237,7 @@ int calibrate_drag(const CalibrateOptions &options) {
   }
   const pad_profile made = scaled(device ? device->info().pad : info.pad, info.pad.tangential_scale,
                                   work->judgement(), *options.force_N);
-  print_result(*work, info.pad, made);
+  print_result(*work, info.pad, made, info.stored & WIRE_STORED_CALIBRATION);
   if (!device) {
     return 0;
   }

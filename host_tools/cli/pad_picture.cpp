@@ -24,7 +24,7 @@ constexpr float NOTED_Pa = 500;
 constexpr float DOUBTFUL_PART = 0.45f;
 /* Length of the arrow whose tangential load is as large as the normal force: rubber slides at a
  * half to one of it, and the array is 36 mm long. */
-constexpr float ARROW_mm = 40.0f;
+constexpr float ARROW_mm = 30.0f;
 /* A load below so many of its standard deviations has no direction. */
 constexpr float ARROW_SDS = 2.0f;
 /* As what the arrow may be is drawn, beside what it is for sure. */

@@ -7,6 +7,13 @@ The picture in the project's README is that of the end of the second slip on the
 
     sh cmake/bootstrap.sh demo
     /usr/bin/python3 host_tools/demo/picture.py build/demo/recording.csv --device 000000000000B0BB --at S -o host_tools/demo/monitor.svg
+
+That of a lift in host_tools/README.md is of the firmware on the host:
+
+    cd build/host/host_tools
+    twin/twin scenario lift --seconds 20 --force 6 --tangential 0.35,-40 --gain 2 --seed 5 -o lift_scenario.csv
+    player/fingertip_player play lift_scenario.csv -o lift.csv --raw --pad 12 --rate 200
+    /usr/bin/python3 ../../../host_tools/demo/picture.py lift.csv --at 17.2 -o ../../../host_tools/demo/lift.svg
 """
 import argparse
 import fcntl

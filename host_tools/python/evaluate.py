@@ -13,6 +13,11 @@ without contact belong to neither.
     force_rmse_N               root mean square error of the force
     force_mape_percent         median absolute percentage error, as in De Clercq et al., RA-L 2022, section IV.C
     force_mape_frames          only frames with a true force above 0.2 N count for it
+    tangential_frames          of the fitted ones, those with a tangential load; null, as what follows, unless the scenario says
+                               the true one and the recording has some
+    tangential_ratio_error_p50, tangential_ratio_error_p95      of the load over the normal force, as a vector
+    tangential_direction_p90_deg     only frames with a true ratio above 0.1 count for it
+    tangential_from_touch      frames whose load is what changed since the touch: their truth is taken as it is all the same
     contact_missed, contact_false     frames above 0.2 N without CONTACT; frames without contact but with CONTACT
     slip_found, slip_missed    true slips of at least 50 ms with, without a SLIP frame between start and end + 0.1 s
     slip_delay_ms              of the found ones, from the start of the slip to the first SLIP frame
@@ -31,7 +36,7 @@ import sys
 import numpy as np
 
 from fingertip_files import (
-    CONTACT, FIT_VALID, SLIP, SLIP_VALID, STAGES, InputError, check_output, printable, read_recording, read_run,
+    CONTACT, FIT_VALID, SLIP, SLIP_VALID, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, InputError, check_output, printable, read_recording, read_run,
     read_scenario, run_tool, write_text)
 
 FORCE_MIN_N = 0.2
@@ -39,6 +44,7 @@ SLIP_MIN_s = 0.05
 SLIP_LATE_s = 0.1
 DEFAULT_SLIP_WINDOW_ms = 100
 SATURATED_us = 65535
+RATIO_MIN = 0.1
 
 
 class Comparison:
@@ -98,6 +104,7 @@ class Comparison:
             "force_rmse_N": float(np.sqrt(np.mean(error_N**2))),
             "force_mape_percent": float(np.median(percent)) if len(percent) else None,
             "force_mape_frames": int(self.strong.sum()),
+            **self.tangential(recording, scenario, rows),
             "contact_missed": int((in_contact & (self.true_force_N > FORCE_MIN_N) & ~flag[CONTACT]).sum()),
             "contact_false": int((scenario.is_off("contact", self.t_s) & flag[CONTACT]).sum()),
             "slip_found": len(delays_ms),
@@ -111,6 +118,23 @@ class Comparison:
                for key in ("dropped_packets", "crc_errors", "format_errors")},
             "emulator_warnings": len(run.get("warnings", [])),
         }
+
+    def tangential(self, recording, scenario, rows):
+        """The part of the summary that is about the tangential load."""
+        pulled = self.compared & recording.flag(TANGENTIAL_VALID)[rows] & (self.true_force_N > FORCE_MIN_N)
+        keys = ("frames", "ratio_error_p50", "ratio_error_p95", "direction_p90_deg", "from_touch")
+        if not scenario.has_pull or not pulled.any():
+            return {f"tangential_{key}": None for key in keys}
+        found = np.array([recording[name][rows][pulled] for name in ("qx_N", "qy_N")]) / self.force_N[pulled]
+        truth = np.array([scenario.at(name, self.t_s[pulled]) for name in ("Qx_N", "Qy_N")]) / self.true_force_N[pulled]
+        error = np.hypot(*(found - truth))
+        aimed = np.hypot(*truth) > RATIO_MIN
+        turned = np.arctan2(*found[::-1, aimed]) - np.arctan2(*truth[::-1, aimed])
+        turned_deg = np.degrees(np.abs(np.angle(np.exp(1j * turned))))
+        from_touch = recording.flag(TANGENTIAL_FROM_TOUCH)[rows] & pulled
+        values = (int(pulled.sum()), float(np.median(error)), float(np.percentile(error, 95)),
+                  float(np.percentile(turned_deg, 90)) if aimed.any() else None, int(from_touch.sum()))
+        return {f"tangential_{key}": value for key, value in zip(keys, values)}
 
 
 def add_recording_options(parser):

@@ -135,12 +135,13 @@ def _metadata(line):
 
 
 class Scenario:
-    """t_s[n], the TRUTH_COLUMNS and the tangential force as arrays[n], sensors_Pa[n][sensor], metadata."""
+    """t_s[n], the TRUTH_COLUMNS and the tangential force as arrays[n], has_pull: the file says it, sensors_Pa[n][sensor], metadata."""
 
     def __init__(self, metadata, header, table, sensors):
         self.metadata = metadata
         self.t_s = table[:, 0]
         self.truth = {name: table[:, 1 + i] for i, name in enumerate(TRUTH_COLUMNS)}
+        self.has_pull = "Qx_N" in header and "Qy_N" in header
         for name in ("Qx_N", "Qy_N"):
             self.truth[name] = table[:, header.index(name)] if name in header else np.zeros(len(table))
         self.sensors_Pa = table[:, 1 + len(TRUTH_COLUMNS):1 + len(TRUTH_COLUMNS) + sensors]

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Draws a recording, with the truth behind it if there is one.
+"""Draws a recording, with the truth behind it if there is one; force along three axes where it has tangential loads.
 
     plot.py RECORDING.csv [--truth SCENARIO.csv] [--run run.json] -o FILE.png
 """
@@ -16,12 +16,13 @@ from matplotlib.patches import FancyBboxPatch
 
 from evaluate import Comparison, add_recording_options, check_time, load_recording
 from fingertip_files import (
-    FIT_VALID, SLIP, STAGES, WARNINGS, InputError, check_output, read_run, read_scenario, run_tool, write_bytes)
+    FIT_VALID, MOVING, SLIDING, SLIP, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, WARNINGS, InputError, check_output, read_run, read_scenario, run_tool, write_bytes)
 
 INK, FAINT, TRUTH, MEASURED, SLIPPING, DOUBTFUL = "#22252e", "#8a8f9c", "#b4bac6", "#1f6fd6", "#d93a3a", "#d08a00"
+ALONG_Y = "#0d9488"
 RIM_mm = 6.0
 # All that a picture needs: 250 000 rows of these are 30 MB, of all columns 130.
-COLUMNS = ("t_us", "frame", "flags", "x_mm", "y_mm", "force_N")
+COLUMNS = ("t_us", "frame", "flags", "x_mm", "y_mm", "force_N", "qx_N", "qy_N", "q_sd_N", "tangential_ratio")
 COMPARED_COLUMNS = (*COLUMNS, *STAGES, "total_us")
 
 
@@ -96,6 +97,56 @@ def runs(t_s, on):
     return list(zip(t_s[np.flatnonzero(edges == 1)], t_s[np.flatnonzero(edges == -1) - 1]))
 
 
+def draw_marks(panel, marks):
+    """Below the curves a line for each (t_s, on, colour, label), wherever it is on."""
+    low, high = panel.get_ylim()
+    step = 0.06 * (high - low)
+    for i, (t_s, on, colour, label) in enumerate(marks):
+        for j, (start, end) in enumerate(runs(t_s, on)):
+            panel.plot([start, max(end, start + 1e-3)], [low - (i + 1) * step] * 2, color=colour, lw=4, solid_capstyle="butt",
+                       label=label if j == 0 else None)
+    panel.set_ylim(low - (len(marks) + 0.7) * step, high)
+
+
+def draw_pull(axes, recording, rows, t_s, restarts_s, force, good, doubtful, truth):
+    """Tangential load along x and y, and how large it is beside the normal force."""
+    loads, ratios = axes
+    there = recording.flag(TANGENTIAL_VALID)[rows]
+    good, doubtful = good & there, doubtful & there
+    qx, qy, sd, ratio = (recording[name][rows] for name in ("qx_N", "qy_N", "q_sd_N", "tangential_ratio"))
+    if truth is not None and truth.has_pull:
+        on = truth.truth["contact"] > 0.5
+        for i, name in enumerate(("Qx_N", "Qy_N")):
+            loads.plot(truth.t_s, np.where(on, truth.truth[name], np.nan), color=TRUTH, lw=4, label="truth" if i == 0 else None, zorder=1)
+        true_N = np.where(on & (truth.truth["force_N"] > 0), truth.truth["force_N"], np.nan)
+        ratios.plot(truth.t_s, np.hypot(truth.truth["Qx_N"], truth.truth["Qy_N"]) / true_N, color=TRUTH, lw=4, zorder=1)
+    for values, colour, label in ((qx, MEASURED, "along x"), (qy, ALONG_Y, "along y")):
+        drawn = gaps_as_nan(t_s, values, good)
+        loads.plot(t_s, drawn, color=colour, lw=1.1, label=label, zorder=2)
+        loads.fill_between(t_s, drawn - sd, drawn + sd, color=colour, alpha=0.15, lw=0, zorder=1.5)
+    ratios.plot(t_s, gaps_as_nan(t_s, ratio, good), color=MEASURED, lw=1.1, zorder=2)
+    spread = np.divide(sd, force, out=np.full(len(sd), np.nan), where=force > 0)
+    drawn = gaps_as_nan(t_s, ratio, good)
+    ratios.fill_between(t_s, np.maximum(drawn - spread, 0), drawn + spread, color=MEASURED, alpha=0.15, lw=0, zorder=1.5)
+    for panel, curves in ((loads, (qx, qy)), (ratios, (ratio,))):
+        low, high = panel.get_ylim()
+        for i, values in enumerate(curves):
+            panel.scatter(t_s[doubtful], values[doubtful], s=7, fc="none", ec=DOUBTFUL, lw=0.5,
+                          label="doubtful" if doubtful.any() and i == 0 else None, zorder=2)
+        if good.any() or truth is not None:
+            panel.set_ylim(low, high)
+        for at_s in restarts_s:
+            panel.axvline(at_s, color=FAINT, lw=1, ls=":")
+        panel.grid(color="#e6e8ee", lw=0.6)
+    since = " since touch" if recording.flag(TANGENTIAL_FROM_TOUCH)[rows][there].any() else ""
+    loads.set_ylabel(f"Q{since}, N")
+    ratios.set_ylabel(f"Q/F{since}")
+    draw_marks(ratios, [(t_s, recording.flag(MOVING)[rows], DOUBTFUL, "moving"), (t_s, recording.flag(SLIDING)[rows], SLIPPING, "sliding")])
+    for panel in axes:
+        if panel.get_legend_handles_labels()[0]:
+            panel.legend(loc="upper right", ncol=5, fontsize=8, frameon=False)
+
+
 def draw_over_time(axes, t_s, restarts_s, series, good, doubtful, slip, truth):
     for panel in axes:
         for i, at_s in enumerate(restarts_s):
@@ -115,15 +166,8 @@ def draw_over_time(axes, t_s, restarts_s, series, good, doubtful, slip, truth):
         panel.set_xlim(t_s[0], t_s[-1])
         panel.set_ylabel(label)
         panel.grid(color="#e6e8ee", lw=0.6)
-        panel.tick_params(labelbottom=panel is axes[-1])
-    low, high = axes[-1].get_ylim()
-    mark = low - 0.06 * (high - low)
-    for i, (start, end) in enumerate(runs(t_s, slip)):
-        axes[-1].plot([start, max(end, start + 1e-3)], [mark, mark], color=SLIPPING, lw=4, solid_capstyle="butt",
-                      label="slip found" if i == 0 else None)
-    axes[-1].set_ylim(mark - 0.04 * (high - low), high)
+    draw_marks(axes[-1], [(t_s, slip, SLIPPING, "slip found")])
     axes[-1].legend(loc="upper right", ncol=4, fontsize=8, frameon=False)
-    axes[-1].set_xlabel("time, s")
     axes[0].set_title("over time" + (" (shaded: true slip)" if truth is not None else ""), loc="left", size=10)
 
 
@@ -154,7 +198,9 @@ def header(recording, comparison, t_s, simulated):
             f"95 % {s['localisation_p95_mm']:.3f} mm  ·  force: "
             + (f"median {s['force_mape_percent']:.2f} %, " if s["force_mape_percent"] is not None else "")
             + f"RMSE {s['force_rmse_N']:.3f} N  ·  slips: {s['slip_found']} found, {s['slip_missed']} missed, "
-            f"{s['slip_false']} false frames  ·  dropped packets: {'?' if s['dropped_packets'] is None else s['dropped_packets']}")
+            f"{s['slip_false']} false frames  ·  "
+            + (f"Q/F: median {s['tangential_ratio_error_p50']:.3f}  ·  " if s["tangential_frames"] else "")
+            + f"dropped packets: {'?' if s['dropped_packets'] is None else s['dropped_packets']}")
     else:
         dropped = (recording.end or {}).get("dropped_packets", "?")
         lines.append(f"{len(recording.has_contact)} frames in {t_s[-1] - t_s[0]:.1f} s  ·  dropped packets: {dropped}")
@@ -190,20 +236,29 @@ def main(argv):
     plt.rcParams.update({
         "font.size": 9, "axes.edgecolor": TRUTH, "axes.labelcolor": INK, "xtick.color": FAINT, "ytick.color": FAINT,
         "text.color": INK, "axes.spines.top": False, "axes.spines.right": False, "axes.titlecolor": FAINT})
-    figure = plt.figure(figsize=(14, 9.2))
-    grid = figure.add_gridspec(4 if comparison else 3, 3, width_ratios=[1.25, 1, 1], hspace=0.38, wspace=0.27,
-                               left=0.055, right=0.985, top=0.87, bottom=0.06)
+    pulled = recording.flag(TANGENTIAL_VALID)[rows].any()
+    over_time = 5 if pulled else 3
+    height = 9.2 + 3.6 * pulled
+    from_top = lambda of_usual: 1 - (1 - of_usual) * 9.2 / height
+    figure = plt.figure(figsize=(14, height))
+    grid = figure.add_gridspec(over_time + bool(comparison), 3, width_ratios=[1.25, 1, 1], hspace=0.38, wspace=0.27,
+                               left=0.055, right=0.985, top=from_top(0.87), bottom=0.06 * 9.2 / height)
     draw_pad(figure.add_subplot(grid[:, 0]), recording, t_s, x, y, good, doubtful, truth)
     first = figure.add_subplot(grid[0, 1:])
-    panels = [first, figure.add_subplot(grid[1, 1:], sharex=first), figure.add_subplot(grid[2, 1:], sharex=first)]
+    panels = [first, *(figure.add_subplot(grid[i, 1:], sharex=first) for i in range(1, over_time))]
     series = [("x, mm", "x_mm", x), ("y, mm", "y_mm", y), ("force, N", "force_N", force)]
-    draw_over_time(panels, t_s, restarts_s, series, good, doubtful, slip, truth)
+    draw_over_time(panels[:3], t_s, restarts_s, series, good, doubtful, slip, truth)
+    if pulled:
+        draw_pull(panels[3:], recording, rows, t_s, restarts_s, force, good, doubtful, truth)
+    panels[-1].set_xlabel("time, s")
+    for panel in panels:
+        panel.tick_params(labelbottom=panel is panels[-1])
     if comparison:
-        draw_errors([figure.add_subplot(grid[3, 1]), figure.add_subplot(grid[3, 2])], comparison)
+        draw_errors([figure.add_subplot(grid[over_time, 1]), figure.add_subplot(grid[over_time, 2])], comparison)
     title, lines = header(recording, comparison, t_s, options.run is not None)
-    figure.text(0.055, 0.955, title, size=17, weight="bold")
+    figure.text(0.055, from_top(0.955), title, size=17, weight="bold")
     for i, line in enumerate(lines):
-        figure.text(0.055, 0.93 - 0.022 * i, line, size=9, color=INK if i else FAINT)
+        figure.text(0.055, from_top(0.93 - 0.022 * i), line, size=9, color=INK if i else FAINT)
     picture = io.BytesIO()
     figure.savefig(picture, dpi=110, format="png")
     write_bytes(options.output, picture.getvalue())

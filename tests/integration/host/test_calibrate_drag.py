@@ -161,11 +161,17 @@ class Live(DragTest):
                            "hold on\n", "taken: take it off the pad\n", "; 7 of 8 pulls\n"):
                 self.assertIn(advice, out)
             self.assertNotIn("\x1b", out)
+            self.assertIn("the force's scale is not calibrated, of which this is a multiple: once it is, do this again\n", out)
             self.assertTrue(out.endswith("calibrated: it acts from now on\n"), out)
             scale, _ = self.scale(out)
             self.assertAlmostEqual(scale, self.scale(self.calibrate("--from", recording, "--dry-run")[0])[0], delta=0.02)
             shown, _ = self.run_cli("info", "--port", self.port)
             self.assertAlmostEqual(float(re.search(r"^pad_tangential_scale +(\S+)$", shown, re.M)[1]), scale, delta=6e-4)
+
+    def test_after_the_force_nothing_is_left_to_do(self):
+        with self.device(f"play={recording}", GRASP, "pad=1", "calibrated=1"):
+            out, _ = self.calibrate("--port", self.port, "--yes")
+            self.assertNotIn("do this again", out)
 
     def test_what_cannot_be_calibrated_is_told(self):
         for options, reason in (((SLIP,), "tells no tangential load"), ((GRASP,), "no pad profile"), ((GRASP, "pad=1", "absent=3"), "sensors do not answer: 3")):

@@ -1,4 +1,6 @@
 """Scenarios, evaluation and plots on data whose answer is known."""
+import contextlib
+import io
 import json
 import math
 import os
@@ -376,6 +378,91 @@ class MalformedFiles(ToolTest):
             path.write_text(text, encoding="utf-8")
             with self.assertRaises(files.InputError):
                 files.read_run(path)
+
+
+class TangentialLoad(ToolTest):
+    SHARE, DEGREES = 0.3, 40
+
+    def pulled_scenario(self):
+        """The demo, each contact pulled by 0.3 of its force, 40 degrees from x to y."""
+        path = self.scenario()
+        shares = [self.SHARE * f(math.radians(self.DEGREES)) for f in (math.cos, math.sin)]
+        lines = []
+        for line in path.read_text(encoding="utf-8").splitlines():
+            if line[0].isdigit():
+                force_N = float(line.split(",")[4])
+                line += "".join(f",{share * force_N:.6f}" for share in shares)
+            elif not line.startswith("#"):
+                line += ",Qx_N,Qy_N"
+            lines.append(line)
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return path
+
+    def pulled_recording(self, scenario, share=SHARE, degrees=DEGREES, flags=files.TANGENTIAL_VALID):
+        def change(row):
+            if row["flags"] & FIT_VALID:
+                q_N = share * row["force_N"]
+                row.update(flags=row["flags"] | flags, qx_N=q_N * math.cos(math.radians(degrees)), qy_N=q_N * math.sin(math.radians(degrees)),
+                           q_sd_N=0.1, tangential_ratio=share)
+            return row
+        return self.recording(scenario, change=change)
+
+    def evaluated(self, *arguments, **options):
+        scenario = self.pulled_scenario()
+        return self.summary(self.pulled_recording(scenario, *arguments, **options), scenario, "--run", self.run_report())
+
+    def test_the_error_is_that_of_the_vector(self):
+        exact = self.evaluated()
+        self.assertGreater(exact["tangential_frames"], 500)
+        self.assertAlmostEqual(exact["tangential_ratio_error_p95"], 0, delta=1e-3)
+        self.assertAlmostEqual(exact["tangential_direction_p90_deg"], 0, delta=0.1)
+        self.assertEqual(exact["tangential_from_touch"], 0)
+        stronger = self.evaluated(share=0.34)
+        self.assertAlmostEqual(stronger["tangential_ratio_error_p50"], 0.04, delta=1e-3)
+        turned = self.evaluated(degrees=self.DEGREES - 10)
+        self.assertAlmostEqual(turned["tangential_ratio_error_p50"], 2 * self.SHARE * math.sin(math.radians(5)), delta=1e-3)
+        self.assertAlmostEqual(turned["tangential_direction_p90_deg"], 10, delta=0.1)
+        backwards = self.evaluated(degrees=self.DEGREES + 179)
+        self.assertAlmostEqual(backwards["tangential_direction_p90_deg"], 179, delta=0.2)
+        touched = self.evaluated(flags=files.TANGENTIAL_VALID | files.TANGENTIAL_FROM_TOUCH)
+        self.assertEqual(touched["tangential_from_touch"], touched["tangential_frames"])
+
+    def test_nothing_is_said_without_a_truth_or_a_load(self):
+        keys = [f"tangential_{key}" for key in ("frames", "ratio_error_p50", "ratio_error_p95", "direction_p90_deg", "from_touch")]
+        for found in (self.evaluated(flags=0), self.summary(self.pulled_recording(self.scenario()), self.scenario(), "--run", self.run_report())):
+            self.assertEqual([found[key] for key in keys], [None] * 5)
+
+    def panels(self, recording, *arguments):
+        """The drawn panels by their labels, and what their legends say."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.assertEqual(plot.main([str(recording), "-o", str(self.folder / "p.png"), *map(str, arguments)]), 0)
+        figure = plot.plt.gcf()
+        self.addCleanup(plot.plt.close, figure)
+        return {panel.get_ylabel(): panel for panel in figure.axes}
+
+    def test_three_axes_are_drawn(self):
+        scenario = self.pulled_scenario()
+        moving = files.TANGENTIAL_VALID | files.MOVING | files.SLIDING
+        panels = self.panels(self.pulled_recording(scenario, flags=moving), "--truth", scenario, "--run", self.run_report())
+        legend = lambda label: panels[label].get_legend_handles_labels()[1]
+        self.assertEqual(legend("Q, N"), ["truth", "along x", "along y"])
+        self.assertEqual(legend("Q/F"), ["moving", "sliding"])
+        drawn = {line.get_label(): np.nanmax(line.get_ydata()) for line in panels["Q, N"].lines}
+        force_N = files.read_scenario(scenario).truth["force_N"].max()
+        self.assertAlmostEqual(drawn["along x"], self.SHARE * force_N * math.cos(math.radians(self.DEGREES)), delta=0.02)
+        self.assertAlmostEqual(drawn["along y"], self.SHARE * force_N * math.sin(math.radians(self.DEGREES)), delta=0.02)
+
+    def test_what_is_doubtful_or_since_the_touch_is_marked(self):
+        scenario = self.scenario()
+        panels = self.panels(self.pulled_recording(scenario, flags=files.TANGENTIAL_VALID | files.TANGENTIAL_FROM_TOUCH | 1 << 16))
+        self.assertIn("doubtful", panels["Q since touch, N"].get_legend_handles_labels()[1])
+        for line in panels["Q since touch, N"].lines:
+            self.assertTrue(np.isnan(line.get_ydata()).all(), "no curve of what is doubtful")
+
+    def test_without_loads_there_is_no_panel_of_them(self):
+        panels = self.panels(self.recording(self.scenario()))
+        self.assertIn("force, N", panels)
+        self.assertFalse([label for label in panels if label.startswith("Q")])
 
 
 class Plots(ToolTest):

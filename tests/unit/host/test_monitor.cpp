@@ -391,13 +391,13 @@ TEST(Monitor, AnUnsureArrowIsWideAndOneThatMayBeNothingHasNoDirection) {
     return one(model, 200, 60);
   };
   Canvas without = picture(1.5f, 0.05f, GOOD);
-  Canvas sure = picture(1.5f, 0.05f, PULLED), unsure = picture(1.5f, 0.5f, PULLED);
+  Canvas sure = picture(1.5f, 0.05f, PULLED), unsure = picture(1.5f, 0.7f, PULLED);
   Canvas nothing = picture(0.5f, 0.5f, PULLED);
-  EXPECT_GT(differing(sure, without), 10);
+  EXPECT_GT(differing(sure, without), 5);
   EXPECT_GT(differing(unsure, without), 2 * differing(sure, without));
   EXPECT_TRUE(shows(unsure, "→"));
   EXPECT_FALSE(shows(nothing, "→"));
-  EXPECT_GT(differing(nothing, without), 10);
+  EXPECT_GT(differing(nothing, without), 5);
   EXPECT_FALSE(shows(without, "→") || shows(without, "+1.50")) << text_of(without);
   Canvas doubtful = picture(1.5f, 0.05f, PULLED | CONTACT_FLAG_ELONGATED);
   EXPECT_TRUE(shows(doubtful, "qx  +1.50?")) << text_of(doubtful);
@@ -512,5 +512,14 @@ TEST(Painter, WithoutColourTheLocationIsStillSeen) {
     EXPECT_EQ(bytes.find("48;"), std::string::npos);
     EXPECT_NE(bytes.find(characters == Characters::utf_8 ? "┼" : "-+-"), std::string::npos);
     EXPECT_NE(bytes.find(characters == Characters::utf_8 ? "▒" : ":"), std::string::npos);
+  }
+}
+
+TEST(Painter, InAsciiAnArrowHasAHeadToo) {
+  Model model = model_of_grasp(true);
+  for (auto [qx_N, qy_N] : {std::pair{1.1f, 1.1f}, {-1.1f, 1.1f}, {-1.1f, -1.1f}, {1.1f, -1.1f}}) {
+    take_frame(model, 1000000, 1, -4.5f, 4.5f, 5, PULLED, {qx_N, qy_N, 0.05f});
+    std::string bytes = Painter(ColourDepth::none, Characters::ascii).paint(one(model, 200, 60));
+    EXPECT_EQ(bytes.find('?'), std::string::npos) << "a shape without a character";
   }
 }
