@@ -332,6 +332,7 @@ void Judge::judge_elongated() {
   c.share = 0.0;
   const Results results = run("elongated", c);
   out_["elongated_false_percent"] = results.claimed_percent();
+  out_["elongated_false_unflagged_percent"] = results.claimed_unflagged_percent();
   out_["elongated_valid_percent"] = results.valid_percent();
   for (std::size_t o = 0; o < LONG.size(); o++) {
     out_["elongated"].push_back(

@@ -104,6 +104,7 @@ bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double nois
   said.gaussian_y_mm = static_cast<double>(fit.y_mm);
   said.gaussian_force_N = scale * static_cast<double>(fit.force_N);
   said.valid = found.valid;
+  said.elongated = (fit.flags & CONTACT_FLAG_ELONGATED) != 0;
   if (found.valid) {
     const double force_N = static_cast<double>(found.force_N);
     said.x_mm = static_cast<double>(found.x_mm);

@@ -59,6 +59,7 @@ Readings base_Pa(const fit_array &array, const Object &object, const twin::Touch
 // where the estimate is valid, and the Gaussian's.
 struct Said {
   bool valid;
+  bool elongated; // as the Gaussian fit flags it
   double x_mm, y_mm, location_sd_mm, force_N;
   double qx, qy, q_sd; // per normal force
   double gaussian_x_mm, gaussian_y_mm, gaussian_force_N;

@@ -74,12 +74,22 @@ double Results::location_covered(double sds) const {
   });
 }
 
-double Results::claimed_percent() const {
+namespace {
+
+bool claims(const Judged &j) {
   constexpr double LEAST = 0.05, SDS = 2.0;
-  return share([](const Judged &j) {
-    const double size = std::hypot(j.said.qx, j.said.qy);
-    return j.said.valid && size > LEAST && size > SDS * j.said.q_sd;
-  });
+  const double size = std::hypot(j.said.qx, j.said.qy);
+  return j.said.valid && size > LEAST && size > SDS * j.said.q_sd;
+}
+
+} // namespace
+
+double Results::claimed_percent() const {
+  return share(claims);
+}
+
+double Results::claimed_unflagged_percent() const {
+  return share([](const Judged &j) { return claims(j) && !j.said.elongated; });
 }
 
 ordered_json Results::row(const std::string &name) const {
@@ -88,6 +98,7 @@ ordered_json Results::row(const std::string &name) const {
     return row;
   }
   row["valid_percent"] = valid_percent();
+  row["elongated_percent"] = share([](const Judged &j) { return j.said.elongated; });
   // Of none there is no figure.
   const Results valid = where([](const Judged &j) { return j.said.valid; });
   const auto of_valid = [&](double value) {
@@ -104,6 +115,7 @@ ordered_json Results::row(const std::string &name) const {
         of_valid(valid.at([](const Judged &j) { return j.direction_error_deg(); }, 0.9));
   } else {
     row["claimed_percent"] = claimed_percent();
+    row["claimed_unflagged_percent"] = claimed_unflagged_percent();
   }
   const auto located = [](const Judged &j) { return j.location_error_mm(); };
   const auto gaussian = [](const Judged &j) { return j.gaussian_location_error_mm(); };

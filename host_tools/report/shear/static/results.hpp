@@ -46,6 +46,7 @@ public:
   double location_covered(double sds) const;
   // Claims a load: valid, |Q| / F above 0.05 and above two of its standard deviations.
   double claimed_percent() const;
+  double claimed_unflagged_percent() const; // and is not flagged as elongated
 
   nlohmann::ordered_json row(const std::string &name) const;
 
