@@ -61,7 +61,7 @@ struct Prior {
 
 } // namespace
 
-TangentialFit fit_tangential(const pad_profile &profile,
+TangentialFit fit_tangential_load(const pad_profile &profile,
                              const std::vector<TangentialSample> &samples, double noise_Pa,
                              const TangentialStart &start) {
   double largest_Pa = 0.0;

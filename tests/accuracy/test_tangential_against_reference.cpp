@@ -84,8 +84,8 @@ int main() {
     fit_result start;
     fit_gaussian(&array, readings.data(), all, &settings, &start);
     struct fit_tangential found;
-    fit_tangential(&array, &pad, readings.data(), &settings, &start, &found);
-    const reference::TangentialFit best = reference::fit_tangential(
+    fit_tangential_load(&array, &pad, readings.data(), &settings, &start, &found);
+    const reference::TangentialFit best = reference::fit_tangential_load(
         profile, samples, noise_Pa,
         {static_cast<double>(start.x_mm), static_cast<double>(start.y_mm),
          static_cast<double>(start.sigma_mm), static_cast<double>(start.force_N)});

@@ -191,7 +191,8 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     struct fit_tangential found;
     memset(&found, 0, sizeof found);
     fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
-    fit_tangential(array, &pads[press / 4 % PADS], pressure_Pa_q10, &settings, &result, &found);
+    fit_tangential_load(array, &pads[press / 4 % PADS], pressure_Pa_q10, &settings, &result,
+                        &found);
     return crc32_iso_hdlc((const uint8_t *)&found, sizeof found);
   }
   return crc32_iso_hdlc((const uint8_t *)&result, sizeof result);

@@ -90,7 +90,7 @@ static struct fit_tangential estimate(const int32_t *readings, uint32_t usable) 
   fit_gaussian(&array, readings, usable, &settings, &start);
   struct fit_tangential result;
   memset(&result, 0xFF, sizeof result);
-  fit_tangential(&array, &pad, readings, &settings, &start, &result);
+  fit_tangential_load(&array, &pad, readings, &settings, &start, &result);
   return result;
 }
 
@@ -187,7 +187,7 @@ static void test_no_fit_gives_nothing(void) {
   start.flags &= ~(uint32_t)CONTACT_FLAG_FIT_VALID;
   struct fit_tangential found;
   memset(&found, 0xFF, sizeof found);
-  fit_tangential(&array, &pad, readings, &settings, &start, &found);
+  fit_tangential_load(&array, &pad, readings, &settings, &start, &found);
   TEST_ASSERT_TRUE(is_zero(&found));
 }
 
