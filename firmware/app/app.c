@@ -141,11 +141,18 @@ static void fit_frame(struct app *app) {
 
 #if FT_WITH_TANGENTIAL
 static void estimate_tangential_load(struct app *app) {
+  struct tangential_kept *kept = &app->tangential_kept;
   memset(&app->tangential, 0, sizeof app->tangential);
-  if (app->pad && app->conditioned.contact &&
-      tangential_is_worthwhile(&app->fit, app->frame.saturated)) {
-    fit_tangential_load(&app->fit_array, &app->fit_pad, app->conditioned.pressure_Pa_q10,
-                   &app->fit_settings, &app->fit, &app->tangential);
+  if (!app->pad || !app->conditioned.contact) {
+    kept->is_told = false;
+  } else if (tangential_is_worthwhile(&app->fit, app->frame.saturated)) {
+    if (tangential_is_due(kept, app->frame.t_us)) {
+      fit_tangential_load(&app->fit_array, &app->fit_pad, app->conditioned.pressure_Pa_q10,
+                          &app->fit_settings, &app->fit, &app->tangential);
+      tangential_keep(kept, app->frame.t_us, &app->fit, &app->tangential);
+    } else {
+      tangential_carry(kept, &app->fit, &app->tangential);
+    }
   }
 }
 #endif

@@ -54,6 +54,7 @@ struct app {
 #endif
 #if FT_WITH_TANGENTIAL
   struct fit_tangential tangential;
+  struct tangential_kept tangential_kept;
   struct tangential_load load;
 #endif
   struct contact_result contact;

@@ -152,7 +152,7 @@ static void a_stored_profile_out_of_range_does_not_act(void) {
   struct pad_profile pad = pad_of_12_mm();
   pad.thickness_mm = 25.0f;
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&app.store, &pad));
-  run_for(100);
+  run_for(300);
   for (int restart = 0; restart < 2; restart++) {
     TEST_ASSERT_TRUE(app.store.content.has_profile);
     TEST_ASSERT_NULL(app.pad);
