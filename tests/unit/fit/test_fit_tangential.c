@@ -192,7 +192,7 @@ static void test_no_fit_gives_nothing(void) {
 }
 
 static void test_two_contacts_give_nothing(void) {
-  struct contact other = {-6.0, -15.0, 5.0, 0.0, 0.0, 4.0}, one = {6.0, 15.0, 5.0, 0.0, 0.0, 4.0};
+  struct contact other = {-1.0, -7.0, 5.0, 0.0, 0.0, 4.0}, one = {2.0, 6.0, 4.0, 0.0, 0.0, 4.0};
   int32_t readings[SENSORS], more[SENSORS];
   read_contact(&one, readings);
   read_contact(&other, more);
