@@ -202,6 +202,20 @@ static void test_two_contacts_give_nothing(void) {
   expect_none(readings, ALL);
 }
 
+/* Far sensors that read what one contact does not make: the pull would be told well without. */
+static void test_readings_that_no_contact_makes_give_nothing(void) {
+  int32_t readings[SENSORS], largest = 0;
+  read_contact(&usual, readings);
+  for (int k = 0; k < SENSORS; k++) {
+    largest = readings[k] > largest ? readings[k] : largest;
+  }
+  readings[0] += largest / 28;
+  readings[4] -= largest / 28;
+  readings[10] -= largest / 28;
+  readings[14] += largest / 28;
+  expect_none(readings, ALL);
+}
+
 static void test_a_contact_far_outside_gives_nothing(void) {
   struct contact far = {22.0, 28.0, 5.0, 0.0, 0.0, 4.0};
   int32_t readings[SENSORS];
@@ -402,6 +416,7 @@ int main(void) {
   RUN_TEST(test_too_few_sensors_give_nothing);
   RUN_TEST(test_no_fit_gives_nothing);
   RUN_TEST(test_two_contacts_give_nothing);
+  RUN_TEST(test_readings_that_no_contact_makes_give_nothing);
   RUN_TEST(test_a_contact_far_outside_gives_nothing);
   RUN_TEST(test_noise_that_hides_the_force_gives_nothing);
   RUN_TEST(test_twice_the_pressure_is_twice_the_force_to_the_bit);
