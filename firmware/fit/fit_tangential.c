@@ -18,9 +18,8 @@
  */
 enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKNOWNS };
 
-#define KAPPA_Q14                                                                                  \
-  21299 /* 1.3: an object that holds pulls more at its rim than it presses there                   \
-         */
+/* 1.3: an object that holds pulls more at its rim than it presses there. */
+#define KAPPA_Q14 21299
 
 #define MODEL_SD_Q16 328 /* 0.005 of the largest reading */
 /* Prior of both elongations. */
@@ -346,7 +345,7 @@ NOINLINE static void set_moving(const struct place *place, int32_t a_q13, bool r
   int32_t widen_q20 =
       whole_product(x->half_square_q23 + y->half_square_q23, bend_q20, 23) - flat_q20;
   node->column[SPREAD] = weighed(limited_q15(widen_q20), weight);
-  /* Last s2, where PLACE_Y's column is, which STRETCH and SLANT consist of. */
+  /* The place's columns overwrite it. */
   int32_t s2_q22 = sums->s2_q22;
   node->column[PLACE_X] =
       weighed(limited_q15(product(radial_q20, x->d_q26, 26) - along_x_q20), weight);

@@ -26,7 +26,7 @@ struct TangentialFit {
 };
 
 TangentialFit fit_tangential_load(const pad_profile &profile,
-                             const std::vector<TangentialSample> &samples, double noise_Pa,
-                             const TangentialStart &start);
+                                  const std::vector<TangentialSample> &samples, double noise_Pa,
+                                  const TangentialStart &start);
 
 } // namespace fingertip::reference

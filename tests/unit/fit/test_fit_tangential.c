@@ -192,13 +192,27 @@ static void test_no_fit_gives_nothing(void) {
 }
 
 static void test_two_contacts_give_nothing(void) {
-  struct contact other = {-6.0, -15.0, 5.0, 0.0, 0.0, 4.0}, one = {6.0, 15.0, 5.0, 0.0, 0.0, 4.0};
+  struct contact other = {-1.0, -7.0, 5.0, 0.0, 0.0, 4.0}, one = {2.0, 6.0, 4.0, 0.0, 0.0, 4.0};
   int32_t readings[SENSORS], more[SENSORS];
   read_contact(&one, readings);
   read_contact(&other, more);
   for (int k = 0; k < SENSORS; k++) {
     readings[k] += more[k];
   }
+  expect_none(readings, ALL);
+}
+
+/* Far sensors that read what one contact does not make: the pull would be told well without. */
+static void test_readings_that_no_contact_makes_give_nothing(void) {
+  int32_t readings[SENSORS], largest = 0;
+  read_contact(&usual, readings);
+  for (int k = 0; k < SENSORS; k++) {
+    largest = readings[k] > largest ? readings[k] : largest;
+  }
+  readings[0] += largest / 28;
+  readings[4] -= largest / 28;
+  readings[10] -= largest / 28;
+  readings[14] += largest / 28;
   expect_none(readings, ALL);
 }
 
@@ -402,6 +416,7 @@ int main(void) {
   RUN_TEST(test_too_few_sensors_give_nothing);
   RUN_TEST(test_no_fit_gives_nothing);
   RUN_TEST(test_two_contacts_give_nothing);
+  RUN_TEST(test_readings_that_no_contact_makes_give_nothing);
   RUN_TEST(test_a_contact_far_outside_gives_nothing);
   RUN_TEST(test_noise_that_hides_the_force_gives_nothing);
   RUN_TEST(test_twice_the_pressure_is_twice_the_force_to_the_bit);
