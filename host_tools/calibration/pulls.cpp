@@ -86,6 +86,9 @@ std::optional<PullFrame> PullFinder::still(double span_s, double mean_s) const {
   }
   const auto begin = std::find_if(frames_.begin(), frames_.end(),
                                   [&](const PullFrame &each) { return each.t_s >= begin_s; });
+  if (static_cast<double>(std::distance(begin, frames_.end())) < PULL_RATE_MIN_Hz * span_s) {
+    return std::nullopt; /* too few of them came */
+  }
   const auto middle = begin + std::distance(begin, frames_.end()) / 2;
   const Mean a = mean_of(begin, middle), b = mean_of(middle, frames_.end());
   const auto chance = [&](double of_a, double of_b) {

@@ -25,6 +25,7 @@ constexpr double PULLED_MIN = 0.2; /* of the known force: a pull, whatever the s
  * by chance, four standard deviations of the difference, is allowed for besides. */
 constexpr double DRIFT_PULL_MAX = 0.03, DRIFT_FORCE_MAX = 0.02;
 constexpr double DRIFT_PLACE_MAX_mm = 0.15;
+constexpr double PULL_RATE_MIN_Hz = 10.0; /* of frames: five make the mean of a rest */
 /* From rest to pull: rubber shears by tenths of a millimetre, what goes farther has slid. */
 constexpr double MOVED_MAX_mm = 1.5;
 constexpr double PULL_SDS_MIN = 4.0; /* the known force, in standard deviations at rest */
@@ -82,11 +83,11 @@ private:
 /* Bounds, chosen on simulated pads of 12 mm whose sensors' gains are right within 2 % (twin, drags
  * of 120 s by 0.15 to 0.45 of the normal force, seeds 1 to 40): a pull differs from its session's
  * median by 3 % rms, one in a hundred by 10 %, none by more than 16 %; the ways' means differ by
- * 3.5 % in the median and at most by 11 %. On seeds 41 to 60 none of 59 is refused, and their scales
- * scatter by 0.7 % and claim 1.3. Where gains are off by 10 % pulls differ by 9 % rms. */
+ * 3.5 % in the median and at most by 11 %. On seeds 41 to 60 none of 59 is refused, and their
+ * scales scatter by 0.7 % and claim 1.3. Where gains are off by 10 % pulls differ by 9 % rms. */
 constexpr std::size_t PULLS_WANTED = 8;
 constexpr std::size_t PULLS_OF_AN_AXIS = 3; /* within 45 degrees of x, and of y */
-constexpr double PULL_STRAY_MAX = 0.2; /* from the median, of it: what is farther is left out */
+constexpr double PULL_STRAY_MAX = 0.2;  /* from the median, of it: what is farther is left out */
 constexpr double PULLS_KEPT_MIN = 0.75; /* share */
 /* Between the means of the ways +x, +y, -x, -y that have two pulls at least, beyond two standard
  * deviations of the difference. */

@@ -31,6 +31,10 @@ void check_pad(const wire_info &info, const std::string &what) {
   if (!(info.stored & WIRE_STORED_PAD)) {
     throw Error(what + ": no pad profile; fingertip pad --thickness MM first");
   }
+  if (info.rate_mHz != 0 && info.rate_mHz < 1000.0 * calibrating::PULL_RATE_MIN_Hz) {
+    throw Error(what + ": " + fixed(info.rate_mHz / 1000.0, 1) +
+                " frames a second are too few to see a pull hold still; fingertip set rate=max");
+  }
 }
 
 /* Without its scale's own uncertainty, which is what is sought. */

@@ -180,6 +180,12 @@ class Live(DragTest):
                 self.assertIn(reason, err)
                 self.assertEqual(err.count("\n"), 1)
 
+    def test_too_few_frames_are_told(self):
+        with self.device(GRASP, "pad=1"):
+            self.run_cli("set", "rate=5", "--port", self.port)
+            _, err = self.calibrate("--port", self.port, "--yes", status=1)
+            self.assertIn("5.0 frames a second are too few to see a pull hold still; fingertip set rate=max", err)
+
     def test_interrupted_leaves_it_as_it_was(self):
         with self.device(GRASP, "pad=1"):
             process = self.start("calibrate", "--drag", "--force", "1", "--port", self.port, "--yes")

@@ -152,6 +152,22 @@ TEST(PullFinder, AWarningBreaksAPull) {
   EXPECT_EQ(bench.pulls().size(), 1u);
 }
 
+TEST(PullFinder, FramesThatAreMissingMakeNoMean) {
+  for (double step_s : {0.3, 0.7, 2.0}) {
+    PullFinder finder(KNOWN_N);
+    for (int i = 1; i < 40; i++) {
+      PullFrame frame;
+      frame.t_s = step_s * i;
+      frame.contact = frame.good = true;
+      frame.qx_N = i > 20 ? KNOWN_N : 0.0;
+      frame.q_sd_N = 0.06;
+      frame.force_N = FORCE_N;
+      EXPECT_FALSE(finder.take(frame)) << step_s << " " << i;
+    }
+    EXPECT_EQ(finder.state(), PullFinder::State::settling);
+  }
+}
+
 TEST(PullFinder, RefusesALoadThatTheFingertipHardlyKnows) {
   Bench bench;
   bench.sd_N = 0.3;

@@ -1,0 +1,68 @@
+"""A lift, played by the firmware on the host, as a replay shows it on a terminal: usage
+test_replay_pull.py FINGERTIP TWIN PLAYER TABLES [unittest arguments]."""
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+FINGERTIP, TWIN, PLAYER, TABLES = sys.argv[1:5]
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/demo"))
+import picture  # noqa: E402
+
+FORCE_N, SHARE = 6.0, 0.35
+CARRIED_s = 3.0  # of the first lift: its load has come, and stays
+
+
+def setUpModule():
+    global folder, scenario
+    temporary = tempfile.TemporaryDirectory(prefix="fingertip-test-")
+    unittest.addModuleCleanup(temporary.cleanup)
+    folder = pathlib.Path(temporary.name)
+    scenario = folder / "lift.csv"
+    subprocess.run([TWIN, "scenario", "lift", "--seconds", "6", "--force", f"{FORCE_N}", "--tangential", f"{SHARE},0", "--gain", "0", "--seed", "5",
+                    "-o", scenario, "--cache", TABLES], check=True, stdout=subprocess.DEVNULL)
+
+
+class ReplayPull(unittest.TestCase):
+    def shown(self, *pad, at_s=CARRIED_s):
+        recording = folder / f"{'_'.join(pad)}.csv"
+        if not recording.exists():
+            subprocess.run([PLAYER, "play", scenario, "-o", recording, "--raw", "--rate", "100", "--quiet", *pad], check=True)
+        lines = picture.screen_at([FINGERTIP, "replay", str(recording), "--speed", "8"], 120, 40, at_s).display
+        return "\n".join(lines[:-1])  # without the keys
+
+    def numbers(self, text):
+        return [float(re.search(rf"{name} +([+-]?\d+\.\d+)", text)[1]) for name in ("qx", "qy", "Q/F")]
+
+    def test_the_load_stands_in_numbers_traces_and_an_arrow(self):
+        text = self.shown("--pad", "12")
+        qx_N, qy_N, ratio = self.numbers(text)
+        self.assertAlmostEqual(qx_N, SHARE * FORCE_N, delta=0.3)
+        self.assertAlmostEqual(qy_N, 0, delta=0.3)
+        self.assertAlmostEqual(ratio, SHARE, delta=0.05)
+        self.assertIn("→", text)
+        for trace in ("force", "qx", "qy", "x", "y", "slip"):
+            self.assertRegex(text, rf" {trace} +\d+ (N|mm)┤")
+        self.assertNotIn("since touch", text)
+        self.assertNotIn("no pad profile", text)
+
+    def test_before_the_lift_there_is_no_arrow(self):
+        text = self.shown("--pad", "12", at_s=2.0)
+        self.assertLess(self.numbers(text)[2], 0.05)
+        self.assertNotIn("→", text)
+
+    def test_since_the_touch_is_said(self):
+        text = self.shown("--pad", "12", "--from-touch")
+        self.assertAlmostEqual(self.numbers(text)[0], SHARE * FORCE_N, delta=0.3)
+        self.assertIn("since touch", text)
+
+    def test_without_a_pad_it_is_said_once(self):
+        text = self.shown()
+        self.assertEqual(text.count("no pad profile: fingertip pad"), 1)
+        self.assertNotIn("Q/F", text)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[5:]])
