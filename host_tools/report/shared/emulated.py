@@ -96,13 +96,12 @@ class Measurement:
     temperature.
     """
 
-    def __init__(self, tools, folder, board, osr, path, seconds, before=()):
-        """before: commands, encoded, that are sent before it streams."""
+    def __init__(self, tools, folder, board, osr, path, seconds, commands=()):
+        """commands: encoded, sent as soon as it streams."""
         base = pathlib.Path(folder) / f"{board}-{osr}-{path.stem}"
         script = base.with_suffix(".script")
         script.write_text(f"0.45 dtr 1\n0.452 {tools.encoded('info')}\n0.455 {tools.encoded('osr', osr)}\n"
-                          "".join(f"0.457 {command}\n" for command in before) +
-                          f"0.46 {tools.encoded('stream', 'contact,health')}\n")
+                          f"0.46 {tools.encoded('stream', 'contact,health')}\n" + "".join(f"0.465 {command}\n" for command in commands))
 
         def emulate(name, until_s):
             to = f"{base}.{name}"

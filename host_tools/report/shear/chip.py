@@ -37,7 +37,7 @@ def measure(build, boards, say):
     with tempfile.TemporaryDirectory() as folder:
         path = scenario(folder, "wander", FROM_s + SECONDS + 1)
         for osr in OSRS:
-            measured = Measurement(tools, folder, BOARD, osr, path, SECONDS, before=[tools.encoded("pad", *PAD)])
+            measured = Measurement(tools, folder, BOARD, osr, path, SECONDS, commands=[tools.encoded("pad", *PAD)])
             told = read_recording(f"{measured.name}.csv")
             flags = told["flags"][told.has_contact & (told["t_us"] > told["t_us"][-1] - 1e6 * SECONDS)].astype(np.int64)
             found |= {
