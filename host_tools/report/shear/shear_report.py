@@ -74,7 +74,7 @@ def taps_md(rows):
     header = ("pad", "Q/F", "location before, mm: p50", "p95", "after: p50", "p95", "force before: p50, %", "after", "force scaled before: p50, %", "after",
               "flagged elongated, %")
     names = ("location_without_p50_mm", "location_without_p95_mm", "location_p50_mm", "location_p95_mm", "force_without_p50_percent", "force_p50_percent",
-             "force_scaled_without_p50_percent", "force_scaled_p50_percent")
+             "force_scaled_without_p50_percent", "force_scaled_p50_percent", "elongated_percent")
     return table_md(header, [[row["pad"], text_of(row["load"]), *(text_of(row[name], 3) for name in names)] for row in rows])
 
 
