@@ -64,7 +64,8 @@ PARTS = (
          (("real_*", RECORDED), ("strips", RECORDED), ("locations", RECORDED), ("flash*", EMULATED), ("*_cycles", EMULATED), ("seed", SAID), ("pads", SAID)),
          pictures=(("truth.png", "Coverage, warnings, placements, iterations: simulated"),)),
     Part("shear", "Tangential load", "Size and direction of what pulls along the rubber, from the normal pressures alone: how far from the truth, and what it does "
-         "to every other figure.", f"{REPORT}/shear/shear.py --build build/host -o build/report", SIMULATED, (("shear_seed", SAID), ("shear_pads", SAID)),
+         "to every other figure.", f"{REPORT}/shear/shear.py --build build/host -o build/report", SIMULATED,
+         (("chip_*", EMULATED), ("*_cycles*", EMULATED), ("shear_seed", SAID), ("shear_pads", SAID)),
          pictures=(("shear.png", "Errors by place, arrows, location before and after, bounds, objects, pads that end: simulated"),)),
     Part("tools", "The tools", "What the tools do to those who use them, with simulated fingertips on pseudo-terminals of this computer.",
          f"{REPORT}/tools/tools.py --build build/host -o build/report", SIMULATED,

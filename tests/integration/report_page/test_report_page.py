@@ -153,10 +153,11 @@ class Page(unittest.TestCase):
         self.assertEqual(set(how), {name for goals in GOALS.values() for name, _, _ in goals})
         self.assertEqual({name for name, said in how.items() if said == "from recordings"}, {name for name in how if name.startswith("real_")})
         self.assertEqual({name: how[name] for name in ("p99_9_um", "cold_cycles", "speed_vs_ceres", "samples", "emulated_frames_different",
-                                                       "false_contacts", "flash_lost", "seconds")},
+                                                       "false_contacts", "flash_lost", "seconds",
+                                                       "vector_error_p95", "chip_fps_osr256", "shear_cycles")},
                          {"p99_9_um": "simulated", "cold_cycles": "emulated", "speed_vs_ceres": "timed on this computer", "samples": "simulated",
                           "emulated_frames_different": "emulated", "false_contacts": "simulated", "flash_lost": "emulated",
-                          "seconds": "timed on this computer"})
+                          "seconds": "timed on this computer", "vector_error_p95": "simulated", "chip_fps_osr256": "emulated", "shear_cycles": "emulated"})
         words = "".join(shown.words)
         for part in page.PARTS:
             self.assertIn(part.command, words)

@@ -10,7 +10,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 ROW = {"case": "10 %, calibrated, Q/F 0.3", "touches": 10, "valid_percent": 100.0, "ratio_error_p50": 0.011, "ratio_error_p95": 0.04, "vector_error_p50": 0.019,
        "vector_error_p95": 0.056, "direction_p90_deg": 5.9, "location_p50_mm": 0.08, "location_p95_mm": 0.25, "pad": "10 %, calibrated", "load": 0.3}
 TAP = {"pad": "equal gains", "load": 0.3, "location_without_p50_mm": 1.03, "location_without_p95_mm": 1.3, "location_p50_mm": 0.0612, "location_p95_mm": 0.1,
-       "force_without_p50_percent": 9.1, "force_p50_percent": 0.2, "force_scaled_without_p50_percent": 0.6, "force_scaled_p50_percent": 0.1}
+       "force_without_p50_percent": 9.1, "force_p50_percent": 0.2, "force_scaled_without_p50_percent": 0.6, "force_scaled_p50_percent": 0.1,
+       "elongated_percent": 40.0}
 MISS = {**ROW, "case": "lime, corner", "off_by_0_05_percent": 50.0, "off_by_5_deg_percent": 60.0}
 FOUND = {
     "static": {"ratio_error_p50": 0.011, "vector_error_p95": 0.056, "elongated_false_percent": 14.0, "screw_ratio": 0.015, "by_pad_and_load": [ROW],
@@ -61,7 +62,7 @@ class Shear(unittest.TestCase):
         self.assertIn("| elongated_false_percent | 14 | <= 1 | MISSED |", lines)
         self.assertIn("| noise; priors | 10 | 0.011 | 0.04 | 0.019 | 0.056 | 5.9 | 0.08 | 0.25 |", lines)
         self.assertIn("| found: 10 %, calibrated | 10 | 0.011 | 0.04 | 0.019 | 0.056 | 5.9 | 0.08 | 0.25 |", lines)
-        self.assertIn("| equal gains | 0.3 | 1.03 | 1.3 | 0.0612 | 0.1 | 9.1 | 0.2 | 0.6 | 0.1 |", lines)
+        self.assertIn("| equal gains | 0.3 | 1.03 | 1.3 | 0.0612 | 0.1 | 9.1 | 0.2 | 0.6 | 0.1 | 40 |", lines)
         self.assertIn("Of all touches whose Q / F is off by more than 0.05, most are of: lime, corner (100 %).", lines)
         self.assertIn("| 20 | all of them |", lines)
         for table in "\n".join(lines).split("\n\n"):  # each row has the cells of its header

@@ -6,7 +6,6 @@
 
 extern "C" {
 #include "common/contact_flags.h"
-#include "config/geometry.h"
 #include "contact/tangential.h"
 #include "ms5840/ms5840.h"
 }
@@ -35,12 +34,7 @@ const Object &Objects::on(double layer_mm, const std::string &name) {
 }
 
 pad_profile profile_of(double thickness_mm) {
-  wire_info info{};
-  info.sensor_count = geometry.sensor_count;
-  info.pitch_mm = geometry.pitch_mm;
-  std::copy_n(geometry.x_mm, geometry.sensor_count, info.x_mm);
-  std::copy_n(geometry.y_mm, geometry.sensor_count, info.y_mm);
-  return pad::profile_of({thickness_mm}, info);
+  return pad::profile_over_own_sensors({thickness_mm});
 }
 
 Readings base_Pa(const fit_array &array, const Object &object, const twin::Touch &touch,
@@ -96,24 +90,33 @@ bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double nois
   if (tangential_is_worthwhile(&fit, saturated)) {
     fit_tangential_load(&array_, &fit_pad_, readings.data(), &settings, &fit, &found);
   }
-  // As tangential_use has it of a pad with and one without a calibration.
-  const double scale = known.force_scale.value_or(1.0);
-  const double corrected = known.force_scale ? static_cast<double>(profile_.force_ratio) : 1.0;
+  contact_settings scales{};
+  scales.force_scale = static_cast<float>(known.force_scale.value_or(1.0));
+  tangential_settings published{};
+  tangential_use(&published, &profile_, &scales, known.force_scale.has_value());
+  published.tangential_scale_sd = 0.0F; // the scales are exact here
+  contact_input input{};
+  input.contact = true;
+  input.fit = &fit;
+  input.tangential = &found;
+  tangential_history history{};
+  contact_result result{};
+  tangential_load load;
+  tangential_update(&history, &published, &input, &result, &load);
   said = {};
+  said.elongated = (fit.flags & CONTACT_FLAG_ELONGATED) != 0;
   said.gaussian_x_mm = static_cast<double>(fit.x_mm);
   said.gaussian_y_mm = static_cast<double>(fit.y_mm);
-  said.gaussian_force_N = scale * static_cast<double>(fit.force_N);
-  said.valid = found.valid;
-  said.elongated = (fit.flags & CONTACT_FLAG_ELONGATED) != 0;
-  if (found.valid) {
-    const double force_N = static_cast<double>(found.force_N);
-    said.x_mm = static_cast<double>(found.x_mm);
-    said.y_mm = static_cast<double>(found.y_mm);
-    said.location_sd_mm = static_cast<double>(found.location_sd_mm);
-    said.force_N = scale * corrected * force_N;
-    said.qx = static_cast<double>(found.qx_N) / force_N;
-    said.qy = static_cast<double>(found.qy_N) / force_N;
-    said.q_sd = static_cast<double>(found.q_sd_N) / force_N;
+  said.gaussian_force_N = known.force_scale.value_or(1.0) * static_cast<double>(fit.force_N);
+  said.valid = (result.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
+  if (said.valid) {
+    said.force_N = static_cast<double>(load.force_N);
+    said.x_mm = static_cast<double>(load.x_mm);
+    said.y_mm = static_cast<double>(load.y_mm);
+    said.location_sd_mm = static_cast<double>(load.location_sd_mm);
+    said.qx = static_cast<double>(load.qx_N) / said.force_N;
+    said.qy = static_cast<double>(load.qy_N) / said.force_N;
+    said.q_sd = static_cast<double>(load.q_sd_N) / said.force_N;
   } else {
     said.x_mm = said.gaussian_x_mm;
     said.y_mm = said.gaussian_y_mm;

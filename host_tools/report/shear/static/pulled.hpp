@@ -48,7 +48,7 @@ private:
 
 constexpr std::uint32_t ALL_SENSORS = (1u << SENSORS) - 1u;
 
-// Of a pad of this thickness, told of nothing but it.
+// Of a pad of this thickness without end.
 pad_profile profile_of(double thickness_mm);
 
 // On the base, Pa; block: the pad that ends, nullptr if it does not.
