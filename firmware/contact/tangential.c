@@ -24,8 +24,11 @@ bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated) 
          !contact_is_lower_bound(fit, saturated);
 }
 
-bool tangential_is_due(const struct tangential_kept *kept, uint64_t t_us) {
-  return !kept->is_told || t_us - kept->t_us >= TANGENTIAL_INTERVAL_us;
+bool tangential_is_due(struct tangential_kept *kept, uint64_t t_us) {
+  bool fast = t_us - kept->frame_t_us < TANGENTIAL_FAST_us;
+  kept->frame_t_us = t_us;
+  return !kept->is_told ||
+         t_us - kept->t_us >= (fast ? TANGENTIAL_FAST_INTERVAL_us : TANGENTIAL_INTERVAL_us);
 }
 
 void tangential_keep(struct tangential_kept *kept, uint64_t t_us, const struct fit_result *fit,
@@ -155,7 +158,8 @@ void tangential_update(struct tangential_history *history,
   load->q_sd_N = fit_quadrature(scale, found->q_sd_N, scale_sd, size_N);
   load->ratio = settings->tangential_scale * size_N / found->force_N;
   result->flags |= CONTACT_FLAG_TANGENTIAL_VALID;
-  result->flags &= ~(uint32_t)CONTACT_FLAG_UNCERTAIN;
+  result->flags &= ~(uint32_t)(CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_ELONGATED);
+  result->flags |= found->elongated ? (uint32_t)CONTACT_FLAG_ELONGATED : 0;
   if (load->location_sd_mm > settings->location_sd_limit_mm) {
     result->flags |= CONTACT_FLAG_UNCERTAIN;
   }

@@ -49,21 +49,26 @@ struct tangential_load {
 };
 
 /* An estimate takes the chip about 1 ms, which frames at small oversampling ratios do not have: so
- * long is at least between two, and the frames between carry the last one on with their own fits.
- * Every frame up to 416 a second has an estimate of its own. */
-#define TANGENTIAL_INTERVAL_us 2400u
+ * long is at least between two, and longer where frames are shorter than TANGENTIAL_FAST_us, whose
+ * own work takes more than half of the time. The frames between carry the last one on with their
+ * own fits. On the RP2040 every frame up to 700 a second has an estimate of its own, of 1308 a
+ * second every fifth. */
+#define TANGENTIAL_INTERVAL_us 1400u
+#define TANGENTIAL_FAST_us 1000u
+#define TANGENTIAL_FAST_INTERVAL_us 3400u
 
 /* The last estimate, as it relates to the fit of its own frame. */
 struct tangential_kept {
-  uint64_t t_us; /* of that frame */
-  bool is_told;  /* there has been one in this contact */
+  uint64_t t_us;       /* of that frame */
+  uint64_t frame_t_us; /* of the last frame asked for */
+  bool is_told;        /* there has been one in this contact */
   struct fit_tangential estimate;
   float dx_mm, dy_mm; /* from the fit's place */
   float force_ratio;  /* to the fit's force */
 };
 
-/* An estimate is due for a frame of this time. */
-bool tangential_is_due(const struct tangential_kept *kept, uint64_t t_us);
+/* Whether one is due for the frame of this time; to be asked of every frame once. */
+bool tangential_is_due(struct tangential_kept *kept, uint64_t t_us);
 
 /* After an estimate, valid or not. */
 void tangential_keep(struct tangential_kept *kept, uint64_t t_us, const struct fit_result *fit,
@@ -82,8 +87,9 @@ void tangential_reset(struct tangential_history *history);
 
 /* After contact_judge or contact_update, of the same input: adds TANGENTIAL_VALID and
  * TANGENTIAL_FROM_TOUCH to result->flags, and with the former has UNCERTAIN speak of the corrected
- * location. Where the pad's edges hide so much of a load that it shows less than
- * TANGENTIAL_GAIN_MIN of itself, there is none. */
+ * location and ELONGATED of the estimate, which a load does not make look long. Where the pad's
+ * edges hide so much of a load that it shows less than TANGENTIAL_GAIN_MIN of itself, there is
+ * none. */
 #define TANGENTIAL_GAIN_MIN 0.25f
 void tangential_update(struct tangential_history *history,
                        const struct tangential_settings *settings,

@@ -51,6 +51,7 @@ struct fit_pad {
   int32_t long_sd_q26;               /* and of its elongations */
   float force_unit_N;                /* normal force of amplitude 1 at 1 Pa */
   struct scaled per_force;           /* amplitude of the Gaussian's 1 N at 1 Pa */
+  struct scaled thin;                /* by which variances grow on a pad thinner than the pitch */
   struct fit_tangential_room room;
 };
 
@@ -68,6 +69,7 @@ struct fit_tangential {
   float force_N, force_sd_N;               /* normal force */
   float qx_N, qy_N;                        /* of the object on the rubber, along x and y */
   float q_sd_N;                            /* standard deviation of either */
+  bool elongated; /* the contact is not round, whatever the Gaussian makes of its load */
 };
 
 /* start: the fit of the same readings. `valid` stays off without FIT_VALID, with fewer than

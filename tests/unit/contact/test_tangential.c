@@ -110,7 +110,14 @@ static void an_estimate_is_carried_between_two(void) {
   TEST_ASSERT_TRUE(tangential_is_due(&kept, 1000));
   tangential_keep(&kept, 1000, &fit, &found);
   TEST_ASSERT_FALSE(tangential_is_due(&kept, 1000 + TANGENTIAL_INTERVAL_us - 1));
+  kept.frame_t_us = 1000;
   TEST_ASSERT_TRUE(tangential_is_due(&kept, 1000 + TANGENTIAL_INTERVAL_us));
+  unsigned frames = 0; /* 1308 a second */
+  kept.frame_t_us = 1000;
+  for (uint64_t t_us = 1764; !tangential_is_due(&kept, t_us); t_us += 764) {
+    frames++;
+  }
+  TEST_ASSERT_EQUAL(4, frames);
   struct fit_tangential carried;
   tangential_carry(&kept, &fit, &carried);
   TEST_ASSERT_TRUE(carried.valid);
@@ -171,6 +178,10 @@ static void a_calibration_scales_what_its_force_scale_was_found_with(void) {
 
 static void uncertain_speaks_of_the_corrected_location(void) {
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID, update(CONTACT_FLAG_UNCERTAIN));
+  found.elongated = true;
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_ELONGATED, update(0));
+  found.elongated = false;
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID, update(CONTACT_FLAG_ELONGATED));
   found.location_sd_mm = 0.61f;
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_UNCERTAIN, update(0));
 }
