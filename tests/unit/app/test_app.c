@@ -381,7 +381,7 @@ static void storing_is_as_quick_at_the_slowest_rate(void) {
     run_for(1); /* until the main loop looks at what the host has sent */
   }
   TEST_ASSERT_TRUE(store_is_writing(&app.store));
-  run_for(40);
+  run_for(60);
   TEST_ASSERT_TRUE(next_of_type(WIRE_ACK, &packet));
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, packet.body.ack.result);
 }
