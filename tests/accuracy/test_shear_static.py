@@ -93,7 +93,7 @@ class ShearStatic(unittest.TestCase):
             program.parent.mkdir(parents=True)
             program.write_text(f"#!{sys.executable}\nprint({self.text!r})\n")
             program.chmod(0o755)
-            done = subprocess.run([sys.executable, REPORT, "--build", folder, "-o", f"{folder}/out"], capture_output=True, text=True)
+            done = subprocess.run([sys.executable, REPORT, "--build", folder, "--boards", folder, "-o", f"{folder}/out"], capture_output=True, text=True)
             self.assertEqual((done.returncode, done.stderr), (0, ""))
             out = pathlib.Path(folder) / "out"
             text = (out / "shear.md").read_text()

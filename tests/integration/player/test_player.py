@@ -108,7 +108,7 @@ class Player(unittest.TestCase):
     def test_a_pad_tells_what_pulls_along_it(self):
         scenario = self.sheared()
         for more, from_touch in ((), False), (("--from-touch",), True):
-            path = self.play(f"pad{from_touch}.csv", "--pad", "12", "--overhang", "9", *more, scenario=scenario)
+            path = self.play(f"pad{from_touch}.csv", "--pad", "12", *more, scenario=scenario)
             recording = fingertip_files.read_recording(path)
             self.assertEqual(recording.metadata["pad_thickness_mm"], "12")
             self.assertEqual(recording.metadata["pad_from_touch"], str(int(from_touch)))
