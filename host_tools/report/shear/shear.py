@@ -59,7 +59,7 @@ def run_part(part, options):
     if part == "chip":
         return chip.measure(options.build, options.boards, lambda what: print(f"        {what}", flush=True))
     command = [str(program), "--cache", str(pathlib.Path(options.output) / "contact_tables")]
-    for name in ("seed", "pads"):
+    for name in ("seed", "pads") if part == "static" else ("seed",):
         if (value := getattr(options, name)) is not None:
             command += [f"--{name}", str(value)]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True)

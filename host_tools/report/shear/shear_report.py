@@ -18,7 +18,8 @@ OVER = (
     ("q_cover_*, location_cover_*", "Q/F = 0.3: share of true values within 1 and 2 of the standard deviations that the estimate gives; ideal 63 and 98 %"),
     ("elongated_false_percent", "Q = 0 at every angle: five lying cylinders (6 by 12, 12 by 12, 18 by 18, 24 by 24, 22 by 7 mm) and an edge of 20 mm, equally; "
      "valid and claiming more than 0.05 and more than two standard deviations"),
-    ("elongated_false_unflagged_percent", "those of them that the Gaussian fit does not flag as elongated"),
+    ("elongated_false_surely_percent", "those that claim more than 2.8 standard deviations, which 98 % of a normal distribution in the plane stay below"),
+    ("elongated_false_unflagged_percent", "those of `elongated_false_percent` that the Gaussian fit does not flag as elongated"),
     ("screw_ratio, screw_change_p95", "the twin's screws of a sphere of 15 mm, 6 N: what is read while it spins (median), and by how much that differs from before"),
     ("zero_error_p50_*mm, increment_error_p50_*mm", "a block with so much rubber beyond the outer sensors, the fingertip told its thickness alone: what is read at "
      "Q = 0; at Q/F = 0.3 less what the same touch read at its beginning, at 0.5 to 2 N. As vectors"),
@@ -29,7 +30,7 @@ OVER = (
 COLUMNS = {
     "case": "case", "touches": "touches", "valid_percent": "valid %", "ratio_error_p50": "ratio p50", "ratio_error_p95": "p95",
     "vector_error_p50": "vector p50", "vector_error_p95": "p95 ", "direction_p90_deg": "direction p90, deg", "elongated_percent": "flagged elongated %", "claimed_percent": "claims a load %",
-    "claimed_unflagged_percent": "claims, not flagged %",
+    "claimed_surely_percent": "surely %", "claimed_unflagged_percent": "claims, not flagged %",
     "location_p50_mm": "location p50, mm", "location_p95_mm": "p95  ", "location_without_p50_mm": "without: p50", "location_without_p95_mm": "p95   ",
     "force_p50_percent": "force p50, %", "force_without_p50_percent": "without", "q_cover_1sd": "Q within 1 sd, %", "q_cover_2sd": "2 sd",
     "location_cover_1sd": "place within 1 sd, %", "location_cover_2sd": "2 sd "}

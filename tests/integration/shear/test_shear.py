@@ -90,9 +90,10 @@ class Shear(unittest.TestCase):
         self.assertEqual((goals["optimum_p99_um"]["met"], goals["optimum_p99_ratio"]["met"]), (True, False))
 
     def test_options_reach_the_parts(self):
-        self.program("motion", "import json; print(json.dumps({'said': sys.argv[1:]}))")
-        self.assertEqual(self.run_tool("--parts", "motion", "--seed", "3", "--pads", "2").returncode, 0)
-        self.assertEqual(self.found()["said"], ["--cache", str(self.out / "contact_tables"), "--seed", "3", "--pads", "2"])
+        for part, pads in (("static", ["--pads", "2"]), ("motion", [])):  # motion draws none
+            self.program(part, "import json; print(json.dumps({'said': sys.argv[1:]}))")
+            self.assertEqual(self.run_tool("--parts", part, "--seed", "3", "--pads", "2").returncode, 0)
+            self.assertEqual(self.found()["said"], ["--cache", str(self.out / "contact_tables"), "--seed", "3", *pads])
 
     def test_what_goes_wrong_is_one_line(self):
         self.program("static", "sys.exit(3)")

@@ -339,6 +339,7 @@ void Judge::judge_elongated() {
   c.share = 0.0;
   const Results results = run("elongated", c);
   out_["elongated_false_percent"] = results.claimed_percent();
+  out_["elongated_false_surely_percent"] = results.claimed_surely_percent();
   out_["elongated_false_unflagged_percent"] = results.claimed_unflagged_percent();
   out_["elongated_valid_percent"] = results.valid_percent();
   for (std::size_t o = 0; o < LONG.size(); o++) {
@@ -615,7 +616,7 @@ void Judge::judge_screws() {
                               {"change_p50", truth::quantile(change, 0.5)},
                               {"change_p95", truth::quantile(change, 0.95)}});
   }
-  const ordered_json &usual = out_["screws"][0];
+  const ordered_json usual = out_["screws"][0];
   out_["screw_ratio"] = usual["read_p50"];
   out_["screw_change_p95"] = usual["change_p95"];
   progress("screws");
@@ -744,7 +745,7 @@ void Judge::judge_overhang() {
              {"location_loaded_p50_mm", loaded.at(located, 0.5)},
              {"location_loaded_without_p50_mm", loaded.at(gaussian, 0.5)}});
       }
-      const ordered_json &anywhere = out_["by_overhang"][out_["by_overhang"].size() - 4];
+      const ordered_json anywhere = out_["by_overhang"][out_["by_overhang"].size() - 4];
       const std::string told_ends = knows_ends ? "_own_tables" : "";
       out_["zero_error_p50" + told_ends + mm] = anywhere["zero_error_p50"];
       out_["increment_error_p50" + told_ends + mm] = anywhere["increment_error_p50"];

@@ -76,20 +76,24 @@ double Results::location_covered(double sds) const {
 
 namespace {
 
-bool claims(const Judged &j) {
-  constexpr double LEAST = 0.05, SDS = 2.0;
+bool claims(const Judged &j, double sds) {
+  constexpr double LEAST = 0.05;
   const double size = std::hypot(j.said.qx, j.said.qy);
-  return j.said.valid && size > LEAST && size > SDS * j.said.q_sd;
+  return j.said.valid && size > LEAST && size > sds * j.said.q_sd;
 }
 
 } // namespace
 
 double Results::claimed_percent() const {
-  return share(claims);
+  return share([](const Judged &j) { return claims(j, 2.0); });
 }
 
 double Results::claimed_unflagged_percent() const {
-  return share([](const Judged &j) { return claims(j) && !j.said.elongated; });
+  return share([](const Judged &j) { return claims(j, 2.0) && !j.said.elongated; });
+}
+
+double Results::claimed_surely_percent() const {
+  return share([](const Judged &j) { return claims(j, 2.0 * std::sqrt(2.0)); });
 }
 
 ordered_json Results::row(const std::string &name) const {
@@ -115,6 +119,7 @@ ordered_json Results::row(const std::string &name) const {
         of_valid(valid.at([](const Judged &j) { return j.direction_error_deg(); }, 0.9));
   } else {
     row["claimed_percent"] = claimed_percent();
+    row["claimed_surely_percent"] = claimed_surely_percent();
     row["claimed_unflagged_percent"] = claimed_unflagged_percent();
   }
   const auto located = [](const Judged &j) { return j.location_error_mm(); };
