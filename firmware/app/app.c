@@ -52,6 +52,7 @@ void app_use_pad(struct app *app, const struct pad_profile *pad) {
   app->pad = acts ? pad : NULL;
   use_tangential_scales(app);
   tangential_reset(&app->tangential_history);
+  motion_reset(&app->motion_history);
 }
 #endif
 
@@ -191,6 +192,8 @@ static void judge_frame(struct app *app) {
   app->tangential_settings.location_sd_limit_mm = app->fit_settings.location_sd_limit_mm;
   tangential_update(&app->tangential_history, &app->tangential_settings, &input, &app->contact,
                     &app->load);
+  motion_update(&app->motion_history, &app->tangential_settings, &input, &app->contact,
+                &app->motion);
 #endif
 }
 

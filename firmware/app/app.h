@@ -11,6 +11,7 @@
 #include "condition/condition.h"
 #include "config/capabilities.h"
 #include "contact/contact.h"
+#include "contact/motion.h"
 #include "contact/tangential.h"
 #include "fit/fit.h"
 #include "fit/fit_tangential.h"
@@ -37,6 +38,7 @@ struct app {
   struct fit_pad fit_pad;                         /* of it */
   struct tangential_settings tangential_settings; /* of it and the calibration */
   struct tangential_history tangential_history;
+  struct motion_history motion_history;
 #endif
 #if FT_WITH_SLIP
   struct slip_history slip_history;
@@ -56,6 +58,7 @@ struct app {
   struct fit_tangential tangential;
   struct tangential_kept tangential_kept;
   struct tangential_load load;
+  struct motion motion;
 #endif
   struct contact_result contact;
   struct wire_packet packet;                         /* in or out, one at a time */

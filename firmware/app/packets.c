@@ -165,6 +165,8 @@ void packets_send_contact(struct app *app, const struct wire_stages *stages) {
     contact->q_sd_N = load->q_sd_N;
     contact->tangential_ratio = load->ratio;
   }
+  contact->vx_mm_s = app->motion.vx_mm_s;
+  contact->vy_mm_s = app->motion.vy_mm_s;
 #endif
   send_packet(app, &wire_contact_layout, app->frame.t_us);
 }

@@ -39,7 +39,7 @@ enum contact_flag {
   CONTACT_FLAG_TANGENTIAL_FROM_TOUCH = 1 << 21, /* it is what changed since the first touch */
   CONTACT_FLAG_VELOCITY_VALID = 1 << 22,        /* the velocity of the contact has values */
   CONTACT_FLAG_MOVING = 1 << 23,                /* its speed is above the threshold */
-  CONTACT_FLAG_SLIDING = 1 << 24,               /* and the tangential load does not explain it */
+  CONTACT_FLAG_SLIDING = 1 << 24, /* it moves, however slowly, beyond what the load explains */
 };
 
 #endif

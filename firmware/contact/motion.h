@@ -1,0 +1,108 @@
+/* How the contact moves, and whether it slides: from the location that is corrected for the
+ * tangential load, and from that load.
+ *
+ * Motion alone does not tell a slide. Rubber that takes over a load gives way, and the contact
+ * creeps along: by 1 to 5 mm for each unit of Q / F, tangential over normal force, as Mindlin's
+ * contact does ("Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949), and always
+ * with the load, never against it. Where all of the contact slides it goes on while Q / F stays or,
+ * as friction falls once it has given way, comes down. So what counts is how far the contact has
+ * moved beyond what the change of its load explains:
+ *   |d| - MOTION_PER_LOAD_mm dq . d / |d|,    d: displacement, dq: change of Q / F, both vectors
+ * from an earlier span of time to the latest. Location and load are means over the same frames, so
+ * that no course of a load makes an elastic contact slide.
+ *
+ * Two pairs of spans: a brief one, which shows a slide some 10 ms after 0.1 mm of it, and a slow
+ * one for what creeps at 1 mm/s or more. The latter is believed only as long as the contact still
+ * goes.
+ *
+ * What cannot be told: a contact that rolls, or that is carried along by an object that is held
+ * elsewhere too, moves without a load as a sliding one does. Friction that rises with a slide by
+ * more than 1 / MOTION_PER_LOAD_mm for each mm hides it. A location that jumps because another set
+ * of sensors is in use is no motion: then all starts anew.
+ *
+ * Sums of integers modulo 2^32 and 2^64: what they differ by over a span is exact however long they
+ * have run. The cost does not grow with the number of frames in a span. Main context only: it
+ * divides with port/divide.h.
+ */
+#ifndef CONTACT_MOTION_H
+#define CONTACT_MOTION_H
+
+#include "contact/contact.h"
+#include "contact/tangential.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Least squares over so long, and so many frames at least. At 410 frames a second its noise is a
+ * 30th of that of a location for each ms: 0.3 mm/s where one has 0.01 mm. */
+#define MOTION_VELOCITY_us 30000u
+#define MOTION_VELOCITY_FRAMES 3u
+/* MOVING begins and ends. */
+#define MOTION_MOVING_mm_s 8.0f
+#define MOTION_STANDS_mm_s 6.0f
+/* So many standard deviations count as motion: one frame of a weak contact in a million would do so
+ * by noise, all of which may lie along one line; of others the fixed limits keep more away. */
+#define MOTION_NOISE_SDS 5
+#define MOTION_NOISE_MAX_mm 0.4f /* of one location; noisier ones are passed over */
+
+/* An elastic sphere of 6 to 15 mm under 1 to 10 N moves by 1 to 2.5 mm for each unit of Q / F while
+ * it sticks, by twice that at nine tenths of friction. Any value from 6 to 10 gave the same slides
+ * and lifts (shear_motion's cases, other seeds), whether the dead travel was 0.2, 1 or 2 mm. */
+#define MOTION_PER_LOAD_mm 8
+/* SLIDING ends when none has shown for so long: a caught object rings. */
+#define MOTION_SLIDING_ENDS_us 15000u
+
+/* 64 frames span the brief pair at 1280 frames a second; with more the spans get shorter. */
+#define MOTION_ENTRIES 64u
+#define MOTION_SLOW_STEP_us 5000u
+/* After a longer interval between two locations all starts anew. */
+#define MOTION_PAUSE_us 125000u
+
+/* What all frames before one add up to. */
+struct motion_sums {
+  uint32_t t_us;           /* of that frame */
+  uint32_t count;          /* of frames */
+  uint32_t x, y;           /* location, 1/16 um */
+  uint32_t load_x, load_y; /* MOTION_PER_LOAD_mm Q / F, 1/16 um */
+  uint32_t variance;       /* of the location's noise, um^2 */
+};
+
+/* The same for the least squares: time in 64 us. */
+struct motion_moments {
+  uint32_t t, tt;
+  uint64_t tx, ty;
+};
+
+struct motion_ring {
+  uint32_t newest, count; /* newest counts on; its entry is at newest % MOTION_ENTRIES */
+  struct motion_sums sums[MOTION_ENTRIES];
+};
+
+/* Of all zeros: nothing yet. */
+struct motion_history {
+  struct motion_sums now;         /* with the newest frame in them; t_us is its own */
+  struct motion_moments moments;  /* likewise */
+  struct motion_ring brief, slow; /* every frame; one each MOTION_SLOW_STEP_us */
+  struct motion_moments moments_before[MOTION_ENTRIES]; /* beside brief.sums */
+  uint64_t newest_us;
+  uint64_t slid_us;     /* when SLIDING showed last */
+  int32_t crosstalk_q8; /* of squares: way that is not to be believed per load, newest frame */
+  uint32_t used;        /* bitmap: sensors in use */
+  bool moving, sliding;
+};
+
+/* Zeros unless VELOCITY_VALID. */
+struct motion {
+  float vx_mm_s, vy_mm_s;
+};
+
+/* Forgets the past. */
+void motion_reset(struct motion_history *history);
+
+/* After tangential_update, of the same input: enters the location and adds VELOCITY_VALID, MOVING
+ * and SLIDING to result->flags. */
+void motion_update(struct motion_history *history, const struct tangential_settings *settings,
+                   const struct contact_input *input, struct contact_result *result,
+                   struct motion *motion);
+
+#endif
