@@ -695,10 +695,11 @@ class Commands(CliTest):
             self.assertIn(" from_touch ", out)
             self.assertEqual(err, "")
             self.assertRegex(self.run_cli("info")[0], r"(?m)^pad_from_touch +1$")
-            self.assertIn("overhang=? ", self.run_cli("pad", "--thickness", "6")[0])
+            self.assertIn("overhang=? ", self.run_cli("pad", "--thickness", "9")[0])
             self.assertIn("erased", self.run_cli("pad", "--erase")[0])
             self.assertRegex(self.run_cli("info")[0], r"(?m)^stored +nothing$")
-            for wrong in (["--thickness", "3"], ["--thickness", "12", "--overhang", "200"]):
+            self.assertIn("--thickness goes from 9 to 20 mm", self.error("pad", "--thickness", "8.9", status=2))
+            for wrong in (["--thickness", "21"], ["--thickness", "12", "--overhang", "200"]):
                 self.assertIn("out of range; give", self.error("pad", *wrong, status=2))
         self.assertIn("excludes", self.error("pad", "--erase", "--thickness", "12", status=2))
         self.assertIn("--thickness", self.error("pad", "--from-touch", status=2))
