@@ -36,8 +36,11 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
 #define THICKNESS_PER_UNIT 1.0455f
 
 /* Beyond this share of it the contact is too long to tell a load from its shape: of lying cylinders
- * without load 15 % would claim one, and 2 % of those that are left do. */
-#define LONG_MOST_Q15 1966 /* 0.06 */
+ * without load 15 % would claim one, and 2 % of those that are left do. A pad that ends nearer than
+ * three quarters of its thickness makes round contacts look long: there all are taken. */
+#define LONG_MOST_Q15 1802 /* 0.055 */
+#define LONG_MOST_NEAR_ENDS_Q15 8192
+#define NEAR_ENDS 0.75f
 
 /* A contact is elongated if its elongation exceeds this share of the widest term's variance with t,
  * and so many standard deviations: of round contacts, pulled or not, 0.1 % do, of cylinders 6 by 12
@@ -46,6 +49,7 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
 #define ELONGATED_LEAST 0.05f
 #define ELONGATED_SURE 2.5f
 #define CHI_SQUARE_MAX 8
+#define CHI_SQUARE_MAX_NEAR_ENDS 60
 
 #define GAUSSIAN_VARIANCE_Q26 15300821 /* of the Gaussian that fits a point contact: 0.912 V0 */
 #define GAUSSIAN_FORCE 1.0753f         /* its 2 pi p0 sigma^2 over the force */
@@ -150,6 +154,10 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
     return FT_ERR_ARGUMENT;
   }
   pad->force_unit_N = 1.57079633e-6f * unit_mm * unit_mm; /* 2 pi V0, V0 = 1/4 */
+  bool near_ends =
+      profile->overhang_mm > 0.0f && profile->overhang_mm < NEAR_ENDS * profile->thickness_mm;
+  pad->chi_square_max = near_ends ? CHI_SQUARE_MAX_NEAR_ENDS : CHI_SQUARE_MAX;
+  pad->long_most_q15 = near_ends ? LONG_MOST_NEAR_ENDS_Q15 : LONG_MOST_Q15;
   float thin = array->pitch_mm / (THICKNESS_PER_UNIT * unit_mm);
   thin *= thin;
   pad->thin = fit_grid_scaled(thin > 1.0f ? thin * thin : 1.0f);
@@ -854,11 +862,11 @@ NOINLINE static void conclude(const struct fit_array *array, const struct proble
   struct scaled base = fit_scaled_from(problem->base_q22, -22);
   struct scaled variance = scaled_mul(base, base);
   struct scaled chi_square = scaled_div(outcome->misfit, variance);
-  if (outcome->at_bound || fit_scaled_to_fixed(chi_square, 16) > CHI_SQUARE_MAX << 16) {
+  if (outcome->at_bound || fit_scaled_to_fixed(chi_square, 16) > pad->chi_square_max << 16) {
     return;
   }
   int32_t round_q26 = fixed_mul_q26(at->amplitude_q24 * 4, ONE_Q26 / 4 + at->t_q26); /* A v */
-  int32_t longest_q26 = fixed_mul_16(round_q26, LONG_MOST_Q15) * 2;
+  int32_t longest_q26 = fixed_mul_16(round_q26, pad->long_most_q15) * 2;
   int32_t e1_q16 = at->e1_q26 >> 10, e2_q16 = at->e2_q26 >> 10, longest_q16 = longest_q26 >> 10;
   if (e1_q16 * e1_q16 + e2_q16 * e2_q16 > longest_q16 * longest_q16) {
     return;

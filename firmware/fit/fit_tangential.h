@@ -47,11 +47,12 @@ struct fit_pad {
   int32_t variance_q26[FIT_TANGENTIAL_TERMS]; /* of each term without the contact's own */
   int32_t strength_q26[FIT_TANGENTIAL_TERMS]; /* share, or moment */
   int32_t pitch_q26, pitch_square_q26;
-  int32_t spread_q26, spread_sd_q26; /* what to expect of the contact's own variance */
-  int32_t long_sd_q26;               /* and of its elongations */
-  float force_unit_N;                /* normal force of amplitude 1 at 1 Pa */
-  struct scaled per_force;           /* amplitude of the Gaussian's 1 N at 1 Pa */
-  struct scaled thin;                /* by which variances grow on a pad thinner than the pitch */
+  int32_t spread_q26, spread_sd_q26;     /* what to expect of the contact's own variance */
+  int32_t long_sd_q26;                   /* and of its elongations */
+  float force_unit_N;                    /* normal force of amplitude 1 at 1 Pa */
+  struct scaled per_force;               /* amplitude of the Gaussian's 1 N at 1 Pa */
+  int32_t chi_square_max, long_most_q15; /* beyond which nothing is told */
+  struct scaled thin; /* by which variances grow on a pad thinner than the pitch */
   struct fit_tangential_room room;
 };
 
