@@ -1,13 +1,12 @@
 #include "contact/motion.h"
 
+#include "common/bytes.h"
 #include "common/contact_flags.h"
 #include "port/divide.h"
 
 #include <string.h>
 
-#define SIXTEENTHS_PER_mm 16000.0f
 #define TICK_SHIFT 6 /* 64 us */
-#define TICKS_PER_s 15625.0f
 
 /* Ages of the frames that make a pair. Of the brief ones tried, from 20 to 65 ms in all, this finds
  * slides as soon as any; longer ones still feel the lift that came before. */
@@ -18,15 +17,16 @@ static const struct pair_spans BRIEF = {5000u, 20000u, 50000u};
 static const struct pair_spans SLOW = {40000u, 120000u, 300000u};
 static const struct pair_spans SLOW_LATEST = {40000u, 40000u, 80000u};
 
-/* Less is no motion, and what the load explains may be wrong by so much. Lifts of 1 to 10 N stayed
- * below a half of the latter, slides are above both within some ms of each other. */
+/* Less is no motion; and what the load explains may be wrong by so much. Of 312 lifts with a dead
+ * travel of 2 mm (seed 211) half of the latter, or two thirds of the former, let one to two pass
+ * for slides. Slides are above both within some ms of each other. */
 #define FLOOR_um 30
 #define UNEXPLAINED_um 200
 /* Squares, in 1/256, of mm for each 8 mm that the load explains: a load moves the estimated
- * location by 0.3 mm for each unit of Q / F on calibrated pads. 1.5 mm is not believed, nor 5 times
- * the location's standard deviation, which pads that were never calibrated need. */
+ * location by up to 0.3 mm for each unit of Q / F on calibrated pads. 1.5 mm is not believed, nor 5
+ * times the location's standard deviation, which pads that were never calibrated need. */
 #define CROSSTALK_q8 9
-#define CROSSTALK_PER_SD2_q8 100.0f
+#define CROSSTALK_PER_SD2_q8 100
 /* The slow pair is overruled where the brief one's way is below 1 / 22 of its own, a quarter of
  * what steady motion gives, or its latest span's share below 1 / 8, a half of it. */
 #define STANDS_SHIFT 9
@@ -38,8 +38,11 @@ static const struct pair_spans SLOW_LATEST = {40000u, 40000u, 80000u};
 void motion_reset(struct motion_history *history) {
   history->brief.count = 0;
   history->slow.count = 0;
+  history->velocity_valid = false;
   history->moving = false;
   history->sliding = false;
+  history->stepped = false;
+  history->slow_slides = false;
 }
 
 /* Place of what was entered so many entries before the newest. */
@@ -94,12 +97,18 @@ static int32_t mean_of(uint32_t to, uint32_t from, int32_t count) {
   return port_divide((int32_t)(to - from), count);
 }
 
-static int32_t um_from(int32_t to_16th_um, int32_t from_16th_um) {
-  return clamped((to_16th_um - from_16th_um) / 16, CHANGE_MAX_um);
+static int32_t um_from_q11(int32_t mm_q11) {
+  return clamped(mm_q11 * 125 / 256, CHANGE_MAX_um);
 }
 
-static struct change change_of(const struct motion_ring *ring, const struct motion_sums *now,
+/* What the load explains. */
+static int32_t um_from_ratio(int32_t ratio_q12, int32_t scale_q8) {
+  return clamped(ratio_q12 * (MOTION_PER_LOAD_mm * 125) / 512 * scale_q8 / 256, CHANGE_MAX_um);
+}
+
+static struct change change_of(const struct motion_history *history, const struct motion_ring *ring,
                                const struct pair_spans *spans) {
+  const struct motion_sums *now = &history->now;
   uint32_t latest = back_to(ring, now->t_us, spans->latest_us);
   uint32_t end = back_to(ring, now->t_us, spans->gap_end_us);
   uint32_t begin = back_to(ring, now->t_us, spans->begin_us);
@@ -111,12 +120,14 @@ static struct change change_of(const struct motion_ring *ring, const struct moti
   const struct motion_sums *c = &ring->sums[place_of(ring, latest)];
   int32_t before = (int32_t)(b->count - a->count), since = (int32_t)(now->count - c->count);
   struct change change;
-  change.x_um = um_from(mean_of(now->x, c->x, since), mean_of(b->x, a->x, before));
-  change.y_um = um_from(mean_of(now->y, c->y, since), mean_of(b->y, a->y, before));
+  change.x_um = um_from_q11(mean_of(now->x, c->x, since) - mean_of(b->x, a->x, before));
+  change.y_um = um_from_q11(mean_of(now->y, c->y, since) - mean_of(b->y, a->y, before));
   change.load_x_um =
-      um_from(mean_of(now->load_x, c->load_x, since), mean_of(b->load_x, a->load_x, before));
+      um_from_ratio(mean_of(now->load_x, c->load_x, since) - mean_of(b->load_x, a->load_x, before),
+                    history->scale_q8);
   change.load_y_um =
-      um_from(mean_of(now->load_y, c->load_y, since), mean_of(b->load_y, a->load_y, before));
+      um_from_ratio(mean_of(now->load_y, c->load_y, since) - mean_of(b->load_y, a->load_y, before),
+                    history->scale_q8);
   change.variance_um2 = port_divide(mean_of(now->variance, c->variance, since), since) +
                         port_divide(mean_of(b->variance, a->variance, before), before);
   return change;
@@ -145,37 +156,49 @@ static bool slides(const struct change *change, int32_t crosstalk_q8, bool alrea
                            (uint64_t)(uint32_t)(least_um * least_um) * (uint32_t)way2;
 }
 
-static bool is_sliding(const struct motion_history *history) {
-  const struct motion_sums *now = &history->now;
-  if (!reaches(&history->brief, now->t_us, BRIEF.begin_us)) {
+static bool slides_slowly(const struct motion_history *history, const struct change *brief) {
+  if (!reaches(&history->slow, history->now.t_us, SLOW.begin_us)) {
     return false;
   }
-  struct change brief = change_of(&history->brief, now, &BRIEF);
-  if (slides(&brief, history->crosstalk_q8, history->sliding)) {
-    return true;
-  }
-  if (!reaches(&history->slow, now->t_us, SLOW.begin_us)) {
-    return false;
-  }
-  struct change slow = change_of(&history->slow, now, &SLOW);
+  struct change slow = change_of(history, &history->slow, &SLOW);
   if (!slides(&slow, history->crosstalk_q8, history->sliding) ||
-      squared_way(&slow) >> STANDS_SHIFT > squared_way(&brief) + squared_doubt(&brief, false)) {
+      squared_way(&slow) >> STANDS_SHIFT > squared_way(brief) + squared_doubt(brief, false)) {
     return false;
   }
-  struct change latest = change_of(&history->slow, now, &SLOW_LATEST);
+  struct change latest = change_of(history, &history->slow, &SLOW_LATEST);
   return squared_way(&latest) > squared_doubt(&latest, true) &&
          latest.x_um * slow.x_um + latest.y_um * slow.y_um > squared_way(&slow) / GOES_ON;
 }
 
-/* Within 2^-23; the compiler's own conversion brings double arithmetic into an image. */
-static float float_from(int64_t value) {
-  uint64_t size = value < 0 ? 0u - (uint64_t)value : (uint64_t)value;
-  float magnitude = (float)(uint32_t)(size >> 32) * 4294967296.0f + (float)(uint32_t)size;
-  return value < 0 ? -magnitude : magnitude;
+static bool shows_slide(struct motion_history *history) {
+  if (!reaches(&history->brief, history->now.t_us, BRIEF.begin_us)) {
+    return false;
+  }
+  struct change brief = change_of(history, &history->brief, &BRIEF);
+  if (history->stepped) {
+    history->slow_slides = slides_slowly(history, &brief);
+    history->stepped = false;
+  }
+  return history->slow_slides || slides(&brief, history->crosstalk_q8, history->sliding);
 }
 
+/* numerator / denominator in Q10, within 2^-11 of it; denominator > 0. */
+static int32_t quotient_q10(int64_t numerator, int32_t denominator) {
+  uint64_t size = numerator < 0 ? 0u - (uint64_t)numerator : (uint64_t)numerator;
+  for (size <<= 10; size >> 31 && denominator > 1; size >>= 1) {
+    denominator >>= 1;
+  }
+  int32_t quotient = size >> 31 ? INT32_MAX : port_divide((int32_t)size, denominator);
+  return numerator < 0 ? -quotient : quotient;
+}
+
+/* 2^-11 mm in 64 us, Q10: a thousandth of it is 0.0075 mm/s. */
+#define mm_s_PER_QUOTIENT 0.0074505806f
+#define QUOTIENTS_PER_mm_s 134
+#define QUOTIENT_MAX 30000 /* squares fit: 220 mm/s */
+
 /* Least squares over the frames of the span; false as long as there are too few. */
-static bool find_velocity(struct motion_history *history, struct motion *motion) {
+static bool find_velocity(struct motion_history *history) {
   const struct motion_ring *ring = &history->brief;
   const struct motion_sums *now = &history->now;
   if (ring->count < MOTION_VELOCITY_FRAMES || !reaches(ring, now->t_us, MOTION_VELOCITY_us)) {
@@ -184,70 +207,105 @@ static bool find_velocity(struct motion_history *history, struct motion *motion)
   uint32_t back = back_to(ring, now->t_us, MOTION_VELOCITY_us);
   back = back > MOTION_VELOCITY_FRAMES - 1u ? back : MOTION_VELOCITY_FRAMES - 1u;
   const struct motion_sums *from = &ring->sums[place_of(ring, back)];
+  const struct motion_sums *last = &ring->sums[place_of(ring, 0)];
   const struct motion_moments *before = &history->moments_before[place_of(ring, back)];
-  /* Times count from the newest frame, so that all of it is small. */
-  uint64_t origin = history->newest_us >> TICK_SHIFT;
-  uint32_t low = (uint32_t)origin;
+  /* Times and places count from the newest frame's, so that all but products fit 32 bits. */
+  uint32_t tick = (uint32_t)(history->newest_us >> TICK_SHIFT);
+  uint32_t x = now->x - last->x, y = now->y - last->y;
   uint32_t n = now->count - from->count;
-  uint32_t t_wrapped = history->moments.t - before->t;
-  int32_t t = (int32_t)(t_wrapped - n * low);
-  int32_t tt = (int32_t)(history->moments.tt - before->tt - 2u * low * t_wrapped + n * low * low);
-  int32_t x = (int32_t)(now->x - from->x), y = (int32_t)(now->y - from->y);
-  int64_t tx = (int64_t)(history->moments.tx - before->tx - origin * (uint64_t)(int64_t)x);
-  int64_t ty = (int64_t)(history->moments.ty - before->ty - origin * (uint64_t)(int64_t)y);
+  uint32_t t_sum = history->moments.t - before->t;
+  uint32_t x_sum = now->x - from->x, y_sum = now->y - from->y;
+  int32_t t = (int32_t)(t_sum - n * tick);
+  int32_t tt = (int32_t)(history->moments.tt - before->tt - tick * (2u * t_sum - n * tick));
+  int32_t tx = (int32_t)(history->moments.tx - before->tx - tick * x_sum - x * (uint32_t)t);
+  int32_t ty = (int32_t)(history->moments.ty - before->ty - tick * y_sum - y * (uint32_t)t);
   int64_t spread = (int64_t)n * tt - (int64_t)t * t;
-  if (spread <= 0) {
+  if (spread <= 0 || spread > INT32_MAX) {
     return false;
   }
-  float per_spread = 1.0f / float_from(spread);
-  float scale = TICKS_PER_s / SIXTEENTHS_PER_mm * per_spread;
-  float vx = float_from((int64_t)n * tx - (int64_t)t * x) * scale;
-  float vy = float_from((int64_t)n * ty - (int64_t)t * y) * scale;
-  motion->vx_mm_s = vx;
-  motion->vy_mm_s = vy;
-  /* The slope's variance is that of one location times n / spread. */
-  float variance_mm2 = 1e-6f * (float)(int32_t)(now->variance - from->variance);
-  float noise2 = (float)(MOTION_NOISE_SDS * MOTION_NOISE_SDS) * TICKS_PER_s * TICKS_PER_s *
-                 variance_mm2 * per_spread;
-  float least = history->moving ? MOTION_STANDS_mm_s : MOTION_MOVING_mm_s;
-  float v2 = vx * vx + vy * vy;
-  history->moving = v2 > least * least && v2 > noise2;
+  int64_t along_x = (int64_t)(int32_t)n * tx - (int64_t)t * (int32_t)(x_sum - n * x);
+  int64_t along_y = (int64_t)(int32_t)n * ty - (int64_t)t * (int32_t)(y_sum - n * y);
+  int32_t vx_q10 = quotient_q10(along_x, (int32_t)spread);
+  int32_t vy_q10 = quotient_q10(along_y, (int32_t)spread);
+  history->motion.vx_mm_s = mm_s_PER_QUOTIENT * (float)vx_q10;
+  history->motion.vy_mm_s = mm_s_PER_QUOTIENT * (float)vy_q10;
+  vx_q10 = clamped(vx_q10, QUOTIENT_MAX);
+  vy_q10 = clamped(vy_q10, QUOTIENT_MAX);
+  /* The slope's variance is that of one location times n / spread: um^2 to the quotient's square.
+   */
+  const uint32_t per_um2 = 4398047u * MOTION_NOISE_SDS * MOTION_NOISE_SDS;
+  int32_t least = QUOTIENTS_PER_mm_s * (history->moving ? MOTION_STANDS_mm_s : MOTION_MOVING_mm_s);
+  uint32_t v2 = (uint32_t)(vx_q10 * vx_q10) + (uint32_t)(vy_q10 * vy_q10);
+  history->moving =
+      v2 > (uint32_t)(least * least) &&
+      (uint64_t)v2 * (uint32_t)spread > (uint64_t)(now->variance - from->variance) * per_um2;
   return true;
 }
 
-static int32_t load_from(float load_16th_um) {
-  const float most = 16.0f * CHANGE_MAX_um;
-  return (int32_t)(load_16th_um > most ? most : load_16th_um < -most ? -most : load_16th_um);
+/* value 2^bits, towards zero; what does not fit, and what is not finite, at most +-(2^31 - 1).
+ * A multiplication and a conversion less than in soft float. */
+static int32_t fixed_from(float value, int bits) {
+  uint32_t pattern = bytes_from_f32(value);
+  int shift = (int)(pattern >> 23 & 0xFFu) - 150 + bits;
+  uint32_t size = (pattern & 0x7FFFFFu) | 0x800000u;
+  if (shift > 7) {
+    size = INT32_MAX;
+  } else if (shift >= 0) {
+    size <<= shift;
+  } else {
+    size = shift > -24 ? size >> -shift : 0;
+  }
+  return pattern >> 31 ? -(int32_t)size : (int32_t)size;
 }
 
+/* The normal force's own scale is in both forces. */
+static int32_t ratio_q12(float tangential_N, int32_t force_N_q12) {
+  const int32_t most = 8 << 12;
+  return clamped(port_divide(fixed_from(tangential_N, 24), force_N_q12), most);
+}
+
+static int32_t noise_um(const struct fit_tangential *found) {
+  return clamped(fixed_from(found->location_noise_mm, 20), 1 << 20) * 125 / (1 << 17);
+}
+
+/* force_N_q12 > 0. */
 static void add(struct motion_history *history, const struct tangential_settings *settings,
-                uint64_t t_us, const struct fit_tangential *found) {
+                uint64_t t_us, const struct fit_tangential *found, int32_t force_N_q12) {
   history->now.t_us = (uint32_t)t_us;
   history->moments_before[enter(&history->brief, &history->now)] = history->moments;
   if (history->slow.count == 0 ||
       age_us(&history->slow, 0, history->now.t_us) >= MOTION_SLOW_STEP_us) {
     enter(&history->slow, &history->now);
+    history->stepped = true;
   }
-  int32_t x = (int32_t)(found->x_mm * SIXTEENTHS_PER_mm);
-  int32_t y = (int32_t)(found->y_mm * SIXTEENTHS_PER_mm);
-  /* The normal force's scale is in both forces. */
-  float per_N =
-      (float)MOTION_PER_LOAD_mm * SIXTEENTHS_PER_mm * settings->tangential_scale / found->force_N;
-  float sd_mm = found->location_sd_mm < 2.0f ? found->location_sd_mm : 2.0f;
-  history->crosstalk_q8 = CROSSTALK_q8 + (int32_t)(CROSSTALK_PER_SD2_q8 * sd_mm * sd_mm);
-  int32_t noise_um = (int32_t)(found->location_noise_mm * 1000.0f);
-  uint64_t tick = t_us >> TICK_SHIFT;
+  uint32_t x = (uint32_t)fixed_from(found->x_mm, 11), y = (uint32_t)fixed_from(found->y_mm, 11);
+  uint32_t noise = (uint32_t)noise_um(found);
+  uint32_t tick = (uint32_t)(t_us >> TICK_SHIFT);
+  int32_t sd_mm_q8 = clamped(fixed_from(found->location_sd_mm, 8), 2 << 8);
+  history->scale_q8 = fixed_from(settings->tangential_scale, 8);
+  history->crosstalk_q8 = CROSSTALK_q8 + (sd_mm_q8 * sd_mm_q8 * CROSSTALK_PER_SD2_q8 >> 16);
   history->now.count++;
-  history->now.x += (uint32_t)x;
-  history->now.y += (uint32_t)y;
-  history->now.load_x += (uint32_t)load_from(found->qx_N * per_N);
-  history->now.load_y += (uint32_t)load_from(found->qy_N * per_N);
-  history->now.variance += (uint32_t)(noise_um * noise_um);
-  history->moments.t += (uint32_t)tick;
-  history->moments.tt += (uint32_t)tick * (uint32_t)tick;
-  history->moments.tx += tick * (uint64_t)(int64_t)x;
-  history->moments.ty += tick * (uint64_t)(int64_t)y;
+  history->now.x += x;
+  history->now.y += y;
+  history->now.load_x += (uint32_t)ratio_q12(found->qx_N, force_N_q12);
+  history->now.load_y += (uint32_t)ratio_q12(found->qy_N, force_N_q12);
+  history->now.variance += noise * noise;
+  history->moments.t += tick;
+  history->moments.tt += tick * tick;
+  history->moments.tx += tick * x;
+  history->moments.ty += tick * y;
   history->newest_us = t_us;
+}
+
+static void judge(struct motion_history *history, uint64_t t_us) {
+  history->judged_us = t_us;
+  history->velocity_valid = find_velocity(history);
+  if (shows_slide(history)) {
+    history->sliding = true;
+    history->slid_us = t_us;
+  } else if (t_us - history->slid_us > MOTION_SLIDING_ENDS_us) {
+    history->sliding = false;
+  }
 }
 
 static bool starts_anew(const struct motion_history *history, const struct contact_input *input) {
@@ -265,24 +323,22 @@ void motion_update(struct motion_history *history, const struct tangential_setti
     motion_reset(history);
     return;
   }
-  if (!found || !found->valid || !(found->force_N > 0.0f) ||
-      !(found->location_noise_mm <= MOTION_NOISE_MAX_mm)) {
+  int32_t force_N_q12 = found && found->valid ? fixed_from(found->force_N, 12) : 0;
+  if (force_N_q12 <= 0 || noise_um(found) > MOTION_NOISE_MAX_um) {
     return;
   }
   if (starts_anew(history, input)) {
     motion_reset(history);
   }
   history->used = input->fit->used;
-  add(history, settings, input->t_us, found);
-  if (find_velocity(history, motion)) {
+  add(history, settings, input->t_us, found, force_N_q12);
+  if (history->brief.count == 1 || input->t_us - history->judged_us >= MOTION_JUDGED_us) {
+    judge(history, input->t_us);
+  }
+  if (history->velocity_valid) {
+    *motion = history->motion;
     result->flags |= CONTACT_FLAG_VELOCITY_VALID;
     result->flags |= history->moving ? (uint32_t)CONTACT_FLAG_MOVING : 0;
-  }
-  if (is_sliding(history)) {
-    history->sliding = true;
-    history->slid_us = input->t_us;
-  } else if (input->t_us - history->slid_us > MOTION_SLIDING_ENDS_us) {
-    history->sliding = false;
   }
   result->flags |= history->sliding ? (uint32_t)CONTACT_FLAG_SLIDING : 0;
 }

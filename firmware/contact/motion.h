@@ -20,9 +20,9 @@
  * more than 1 / MOTION_PER_LOAD_mm for each mm hides it. A location that jumps because another set
  * of sensors is in use is no motion: then all starts anew.
  *
- * Sums of integers modulo 2^32 and 2^64: what they differ by over a span is exact however long they
- * have run. The cost does not grow with the number of frames in a span. Main context only: it
- * divides with port/divide.h.
+ * Sums of integers modulo 2^32: what they differ by over a span is exact however long they have
+ * run. The cost does not grow with the number of frames in a span. Main context only: it divides
+ * with port/divide.h.
  */
 #ifndef CONTACT_MOTION_H
 #define CONTACT_MOTION_H
@@ -33,21 +33,22 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Least squares over so long, and so many frames at least. At 410 frames a second its noise is a
- * 30th of that of a location for each ms: 0.3 mm/s where one has 0.01 mm. */
+/* Least squares over so long, and so many frames at least: at 410 frames a second 0.3 mm/s of noise
+ * where one location has 0.01 mm. */
 #define MOTION_VELOCITY_us 30000u
 #define MOTION_VELOCITY_FRAMES 3u
 /* MOVING begins and ends. */
-#define MOTION_MOVING_mm_s 8.0f
-#define MOTION_STANDS_mm_s 6.0f
+#define MOTION_MOVING_mm_s 8
+#define MOTION_STANDS_mm_s 6
 /* So many standard deviations count as motion: one frame of a weak contact in a million would do so
  * by noise, all of which may lie along one line; of others the fixed limits keep more away. */
 #define MOTION_NOISE_SDS 5
-#define MOTION_NOISE_MAX_mm 0.4f /* of one location; noisier ones are passed over */
+#define MOTION_NOISE_MAX_um 400 /* of one location; noisier ones are passed over */
 
-/* An elastic sphere of 6 to 15 mm under 1 to 10 N moves by 1 to 2.5 mm for each unit of Q / F while
- * it sticks, by twice that at nine tenths of friction. Any value from 6 to 10 gave the same slides
- * and lifts (shear_motion's cases, other seeds), whether the dead travel was 0.2, 1 or 2 mm. */
+/* A contact that sticks moves by 2/3 of its dead travel per friction for each unit of Q / F, 1.3 mm
+ * at 1 mm and 0.5, and by twice that at nine tenths of what friction holds. In lifts and slides of
+ * the twin, seeds 201 to 213, dead travel 0.2, 1 and 2 mm, values of 6, 8 and 10 did alike. Of soft
+ * grips (2 mm) one act in four says SLIDING more than 20 ms before all of the contact slides. */
 #define MOTION_PER_LOAD_mm 8
 /* SLIDING ends when none has shown for so long: a caught object rings. */
 #define MOTION_SLIDING_ENDS_us 15000u
@@ -55,6 +56,9 @@
 /* 64 frames span the brief pair at 1280 frames a second; with more the spans get shorter. */
 #define MOTION_ENTRIES 64u
 #define MOTION_SLOW_STEP_us 5000u
+/* Frames nearer to the last that was judged enter, and say what it did: most of the cost is the
+ * judging's. */
+#define MOTION_JUDGED_us 2000u
 /* After a longer interval between two locations all starts anew. */
 #define MOTION_PAUSE_us 125000u
 
@@ -62,15 +66,14 @@
 struct motion_sums {
   uint32_t t_us;           /* of that frame */
   uint32_t count;          /* of frames */
-  uint32_t x, y;           /* location, 1/16 um */
-  uint32_t load_x, load_y; /* MOTION_PER_LOAD_mm Q / F, 1/16 um */
+  uint32_t x, y;           /* location, mm / 2^11 */
+  uint32_t load_x, load_y; /* Q / F, 1 / 2^12 */
   uint32_t variance;       /* of the location's noise, um^2 */
 };
 
 /* The same for the least squares: time in 64 us. */
 struct motion_moments {
-  uint32_t t, tt;
-  uint64_t tx, ty;
+  uint32_t t, tt, tx, ty;
 };
 
 struct motion_ring {
@@ -78,22 +81,26 @@ struct motion_ring {
   struct motion_sums sums[MOTION_ENTRIES];
 };
 
-/* Of all zeros: nothing yet. */
-struct motion_history {
-  struct motion_sums now;         /* with the newest frame in them; t_us is its own */
-  struct motion_moments moments;  /* likewise */
-  struct motion_ring brief, slow; /* every frame; one each MOTION_SLOW_STEP_us */
-  struct motion_moments moments_before[MOTION_ENTRIES]; /* beside brief.sums */
-  uint64_t newest_us;
-  uint64_t slid_us;     /* when SLIDING showed last */
-  int32_t crosstalk_q8; /* of squares: way that is not to be believed per load, newest frame */
-  uint32_t used;        /* bitmap: sensors in use */
-  bool moving, sliding;
-};
-
 /* Zeros unless VELOCITY_VALID. */
 struct motion {
   float vx_mm_s, vy_mm_s;
+};
+
+/* Of all zeros: nothing yet. */
+struct motion_history {
+  struct motion_sums now;                               /* with the newest frame in them */
+  struct motion_moments moments;                        /* likewise */
+  struct motion_ring brief, slow;                       /* every frame; MOTION_SLOW_STEP_us apart */
+  struct motion_moments moments_before[MOTION_ENTRIES]; /* beside brief.sums */
+  uint64_t newest_us;
+  uint64_t judged_us, slid_us; /* when last; when a slide showed last */
+  struct motion motion;        /* as judged */
+  int32_t scale_q8;            /* of the load, newest frame */
+  int32_t crosstalk_q8;        /* likewise: see motion.c */
+  uint32_t used;               /* bitmap: sensors in use */
+  bool velocity_valid, moving, sliding;
+  bool stepped;     /* slow has an entry that is not judged yet */
+  bool slow_slides; /* at the newest that is */
 };
 
 /* Forgets the past. */

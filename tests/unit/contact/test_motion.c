@@ -72,7 +72,7 @@ static void a_steady_velocity_is_told_at_any_rate(void) {
     setUp();
     interval_us = intervals_us[i];
     TEST_ASSERT_EQUAL_HEX32(SAYS, go(0.4f, 12.0f, -9.0f, 0));
-    /* A sixteenth of a micrometre in 30 ms, and 64 us of each of the times. */
+    /* Half a micrometre of each of the places, 64 us of each of the times. */
     TEST_ASSERT_FLOAT_WITHIN(0.06f, 12.0f, motion.vx_mm_s);
     TEST_ASSERT_FLOAT_WITHIN(0.06f, -9.0f, motion.vy_mm_s);
   }
@@ -221,7 +221,7 @@ static void frames_without_an_estimate_say_nothing_and_are_passed_over(void) {
     found.force_N = 0.0f;
     TEST_ASSERT_EQUAL_HEX32(0, update());
     found.force_N = 4.0f;
-    found.location_noise_mm = 1.01f * MOTION_NOISE_MAX_mm;
+    found.location_noise_mm = 0.00101f * MOTION_NOISE_MAX_um + 0.002f;
     TEST_ASSERT_EQUAL_HEX32(0, update());
     found.location_noise_mm = 0.01f;
     input.tangential = NULL;
@@ -232,7 +232,7 @@ static void frames_without_an_estimate_say_nothing_and_are_passed_over(void) {
 }
 
 static void nothing_overflows(void) {
-  found.location_noise_mm = MOTION_NOISE_MAX_mm;
+  found.location_noise_mm = 0.001f * MOTION_NOISE_MAX_um;
   found.location_sd_mm = 1e9f;
   for (int i = 0; i < 2000; i++) {
     const float side = i % 3 == 0 ? -1.0f : 1.0f;
