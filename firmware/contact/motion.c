@@ -303,8 +303,10 @@ static void judge(struct motion_history *history, uint64_t t_us) {
   if (shows_slide(history)) {
     history->sliding = true;
     history->slid_us = t_us;
-  } else if (t_us - history->slid_us > MOTION_SLIDING_ENDS_us) {
+  } else if (history->sliding && t_us - history->slid_us > MOTION_SLIDING_ENDS_us) {
     history->sliding = false;
+    history->slow.count = 0; /* what rings after a slide is not to be compared with before it */
+    history->slow_slides = false;
   }
 }
 

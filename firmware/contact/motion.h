@@ -47,8 +47,7 @@
 
 /* A contact that sticks moves by 2/3 of its dead travel per friction for each unit of Q / F, 1.3 mm
  * at 1 mm and 0.5, and by twice that at nine tenths of what friction holds. In lifts and slides of
- * the twin, seeds 201 to 213, dead travel 0.2, 1 and 2 mm, values of 6, 8 and 10 did alike. Of soft
- * grips (2 mm) one act in four says SLIDING more than 20 ms before all of the contact slides. */
+ * the twin, seeds 201 to 213, dead travel 0.2, 1 and 2 mm, values of 6, 8 and 10 did alike. */
 #define MOTION_PER_LOAD_mm 8
 /* SLIDING ends when none has shown for so long: a caught object rings. */
 #define MOTION_SLIDING_ENDS_us 15000u

@@ -159,6 +159,17 @@ static void a_slide_ends_soon_and_once(void) {
   }
 }
 
+static void what_rings_after_a_slide_is_none(void) {
+  rest(0.4f);
+  go(0.1f, 50.0f, 0, 0);
+  go(0.06f, 0, 0, 0);
+  /* 0.6 mm to and fro, 5 mm for each unit of Q / F. */
+  for (int i = 0; i < 4; i++) {
+    TEST_ASSERT_EQUAL_HEX32(0, go(0.08f, 8.0f, 0, 1.6f) & CONTACT_FLAG_SLIDING);
+    TEST_ASSERT_EQUAL_HEX32(0, go(0.08f, -8.0f, 0, -1.6f) & CONTACT_FLAG_SLIDING);
+  }
+}
+
 static void hours_leave_no_trace(void) {
   interval_us = 1000;
   go(0.5f, 0.02f, 0, 0);
@@ -257,6 +268,7 @@ int main(void) {
   RUN_TEST(a_falling_friction_shows_a_slide_sooner);
   RUN_TEST(a_slow_slide_is_found_by_and_by);
   RUN_TEST(a_slide_ends_soon_and_once);
+  RUN_TEST(what_rings_after_a_slide_is_none);
   RUN_TEST(hours_leave_no_trace);
   RUN_TEST(what_interrupts_a_contact_starts_anew);
   RUN_TEST(frames_without_an_estimate_say_nothing_and_are_passed_over);
