@@ -178,6 +178,7 @@ static void judge_frame(struct app *app) {
 #endif
 #if FT_WITH_TANGENTIAL
     .tangential = &app->tangential,
+    .tangential_is_carried = app->tangential_kept.t_us != frame->t_us,
 #endif
   };
 #if FT_WITH_FIT

@@ -316,6 +316,16 @@ static bool starts_anew(const struct motion_history *history, const struct conta
           input->t_us - history->newest_us > MOTION_PAUSE_us);
 }
 
+static void tell(const struct motion_history *history, struct contact_result *result,
+                 struct motion *motion) {
+  if (history->velocity_valid) {
+    *motion = history->motion;
+    result->flags |= CONTACT_FLAG_VELOCITY_VALID;
+    result->flags |= history->moving ? (uint32_t)CONTACT_FLAG_MOVING : 0;
+  }
+  result->flags |= history->sliding ? (uint32_t)CONTACT_FLAG_SLIDING : 0;
+}
+
 void motion_update(struct motion_history *history, const struct tangential_settings *settings,
                    const struct contact_input *input, struct contact_result *result,
                    struct motion *motion) {
@@ -329,6 +339,10 @@ void motion_update(struct motion_history *history, const struct tangential_setti
   if (force_N_q12 <= 0 || noise_um(found) > MOTION_NOISE_MAX_um) {
     return;
   }
+  if (input->tangential_is_carried) {
+    tell(history, result, motion);
+    return;
+  }
   if (starts_anew(history, input)) {
     motion_reset(history);
   }
@@ -337,10 +351,5 @@ void motion_update(struct motion_history *history, const struct tangential_setti
   if (history->brief.count == 1 || input->t_us - history->judged_us >= MOTION_JUDGED_us) {
     judge(history, input->t_us);
   }
-  if (history->velocity_valid) {
-    *motion = history->motion;
-    result->flags |= CONTACT_FLAG_VELOCITY_VALID;
-    result->flags |= history->moving ? (uint32_t)CONTACT_FLAG_MOVING : 0;
-  }
-  result->flags |= history->sliding ? (uint32_t)CONTACT_FLAG_SLIDING : 0;
+  tell(history, result, motion);
 }
