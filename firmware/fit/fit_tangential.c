@@ -36,15 +36,15 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
 #define THICKNESS_PER_UNIT 1.0455f
 
 /* Beyond this share of it the contact is too long to tell a load from its shape: of lying cylinders
- * without load 15 % would claim one, and 2 % of those that are left do. A pad that ends nearer than
- * three quarters of its thickness makes round contacts look long: there all are taken. */
+ * without load 15 % would claim one, 1.2 % do (report, elongated_false_percent). A pad that ends
+ * nearer than three quarters of its thickness makes round contacts look long: there all are taken.
+ */
 #define LONG_MOST_Q15 1802 /* 0.055 */
 #define LONG_MOST_NEAR_ENDS_Q15 8192
 #define NEAR_ENDS 0.75f
 
 /* A contact is elongated if its elongation exceeds this share of the widest term's variance with t,
- * and so many standard deviations: of round contacts, pulled or not, 0.1 % do, of cylinders 6 by 12
- * mm 98 %.
+ * and so many standard deviations. shear_static tells how many do, by object and load.
  */
 #define ELONGATED_LEAST 0.05f
 #define ELONGATED_SURE 2.5f

@@ -5,14 +5,16 @@
  * location, the contact's own spread and its two elongations, and the tangential force along x and
  * y. The pad's profile (common/pad_profile.h) says how its rubber spreads what presses and what
  * pulls. Elongation is in the model because a long contact looks like a pulled one to a fit that
- * knows no other explanation: a prior holds it near round, wide where the Gaussian fit has called
- * the contact elongated, and the residual says whether the model was right. Readings count by their
+ * knows no other explanation: a prior holds it near round, and what is clearly long, or leaves a
+ * residual that the model does not explain, is not told. Readings count by their
  * noise, gain error and model error. Fixed point, the same bits on every machine, any sensors
  * missing, no state between frames. NUMERICS.md has the derivation, the conditioning and the
  * limits.
  *
- * On infinite and exactly known layers; a pad that ends changes the zero of the tangential force
- * (pad_profile.h, from_touch). No measurement on a real pad confirms it yet.
+ * At most 118 000 cycles on a Cortex-M0+ (test emulated.fit_cycles).
+ *
+ * On infinite and exactly known layers; what a pad that ends makes of it is taken back after it
+ * (pad_profile.h, pad_edges). No measurement on a real pad confirms it yet.
  */
 #ifndef FIT_FIT_TANGENTIAL_H
 #define FIT_FIT_TANGENTIAL_H
@@ -74,8 +76,10 @@ struct fit_tangential {
 };
 
 /* start: the fit of the same readings. `valid` stays off without FIT_VALID, with fewer than
- * FIT_TANGENTIAL_SENSORS in use, where a parameter ends at its limit, where the readings are not
- * those of one contact on this pad, and where q_sd_N exceeds FIT_TANGENTIAL_SD_MAX of the force. */
+ * FIT_TANGENTIAL_SENSORS in use, where a parameter ends at its limit, where the contact is
+ * clearly longer than wide or the readings are not those of one contact on this pad (NUMERICS.md
+ * has the limits, and how they widen where the pad ends near), and where q_sd_N exceeds
+ * FIT_TANGENTIAL_SD_MAX of the force. */
 #define FIT_TANGENTIAL_SENSORS 8
 #define FIT_TANGENTIAL_SD_MAX 0.2f
 void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,

@@ -16,6 +16,7 @@ extern "C" {
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <random>
 #include <vector>
 
@@ -37,7 +38,7 @@ double quantile(std::vector<double> values, double share) {
 
 } // namespace
 
-int main() {
+int main(int argc, char **argv) {
   const pad_profile profile = pad_of_12_mm();
   fit_array array;
   static fit_pad pad;
@@ -116,6 +117,10 @@ int main() {
               quantile(um, 0.99), quantile(um, 1.0));
   std::printf("pull over force p50 %.6f p99 %.6f, force p99 %.6f\n", quantile(pull, 0.5),
               quantile(pull, 0.99), quantile(force, 0.99));
+  if (argc > 1) { // for the report
+    std::ofstream(argv[1]) << "{\"optimum_p99_um\": " << quantile(um, 0.99)
+                           << ", \"optimum_p99_ratio\": " << quantile(pull, 0.99) << "}\n";
+  }
   const bool good = um.size() > PRESSES / 2 && invalid < PRESSES / 100 &&
                     elsewhere <= MOST_ELSEWHERE && quantile(um, 0.5) < MEDIAN_um &&
                     quantile(um, 0.99) < P99_um && quantile(pull, 0.99) < PULL_P99 &&

@@ -1,4 +1,5 @@
-"""The images of the scenes raw and press in the emulator: a packet has no field of what is off, and no command brings it back.
+"""The images of the scenes raw and press in the emulator: a packet has no field of what is off, and no command brings it back; that of
+grasp tells the tangential load in every frame and keeps up.
 
 usage: test_scenes.py --scenes FOLDER --fingertip TOOL --node NODE
 """
@@ -28,16 +29,17 @@ def encoded(*command):
 
 
 class Run:
-    """A second in contact. acks: sequence number of the command -> result; body_bytes: packet type -> lengths of bodies."""
+    """A second in contact. extra: (s, command). acks: sequence number of the command -> result; body_bytes: packet type -> lengths of bodies."""
 
-    def __init__(self, folder, scene, stream):
+    def __init__(self, folder, scene, stream, extra=()):
         base = pathlib.Path(folder) / scene
         path = lambda suffix: str(base.with_suffix("." + suffix))
         subprocess.run([sys.executable, str(ROOT / "host_tools/python/scenario.py"), "wander", "-o", path("scenario"), "--seconds", "3"],
                        check=True)
         script = [(0.45, "dtr 1"), (0.46, encoded("--sequence", "1", "info")), (0.47, encoded("--sequence", "2", "stream", "contact,raw,health")),
                   (0.48, encoded("--sequence", "3", "slip", "1", "100")), (0.49, encoded("--sequence", "4", "stream", f"{stream},health")),
-                  (1.7, encoded("--sequence", "5", "health"))]
+                  (1.7, encoded("--sequence", "5", "health")), *extra]
+        script.sort()
         pathlib.Path(path("script")).write_text("".join(f"{t_s} {what}\n" for t_s, what in script))
         image = pathlib.Path(TOOLS.scenes) / scene / f"fingertip-{BOARD}.bin"
         done = subprocess.run(
@@ -82,6 +84,19 @@ class Scenes(unittest.TestCase):
         self.assertEqual(set(self.press.body_bytes), {CONTACT, INFO, HEALTH, ACK})
         self.assertEqual(self.press.body_bytes[INFO], {INFO_BYTES + OF_FIT[INFO]})
         self.assertEqual(self.press.body_bytes[HEALTH], {HEALTH_BYTES + OF_FIT[HEALTH]})
+
+    def test_grasp_tells_the_tangential_load_in_every_frame(self):
+        """At the fastest, where every fifth has an estimate of its own."""
+        extra = [(0.455, encoded("--sequence", "6", "osr", "256")), (0.5, encoded("--sequence", "7", "pad", "12", "0"))]
+        grasp = Run(self.folder.name, "grasp", "contact", extra)
+        self.assertEqual({name: grasp.acks[name] for name in ("6", "7")}, {"6": "0", "7": "0"})
+        recording = grasp.recording
+        self.assertEqual(recording.metadata["scene"], "grasp")
+        late = recording["t_us"] > recording["t_us"][-1] - 900e3
+        self.assertTrue(recording.flag(fingertip_files.TANGENTIAL_VALID)[late].all())
+        t_us = recording["t_us"][late]
+        self.assertGreater((len(t_us) - 1) / (t_us[-1] - t_us[0]) * 1e6, 1250)
+        self.assertLess(recording.health()[-1]["frames_skipped"], 5)
 
     def test_commands_for_what_is_off_are_refused(self):
         for run in (self.raw, self.press):

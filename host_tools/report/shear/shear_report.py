@@ -26,7 +26,9 @@ OVER = (
     ("*_own_tables_*mm", "the same, the fingertip told what the pad's ends do to the estimate as well"),
     ("zero_error_p50_own_tables", "the worse of 9 and 13 mm"),
     ("lift_*, slide_*", "lifts and slides of the twin; their own tables say which"),
-    ("optimum_*", "the estimate on the chip against an independent one in double precision"))
+    ("optimum_*", "the estimate on the chip against an independent one in double precision, on readings of the model itself"),
+    ("shear_cycles", "of the estimate alone on the emulated chip, most of 100 presses"),
+    ("chip_*", "an image of scene grasp on the emulated pico_parallel; `fps`: frames that tell the load, of which at OSR 256 every fifth is estimated anew"))
 COLUMNS = {
     "case": "case", "touches": "touches", "valid_percent": "valid %", "ratio_error_p50": "ratio p50", "ratio_error_p95": "p95",
     "vector_error_p50": "vector p50", "vector_error_p95": "p95 ", "direction_p90_deg": "direction p90, deg", "elongated_percent": "flagged elongated %", "claimed_percent": "claims a load %",

@@ -301,6 +301,40 @@ static void test_nothing_stays_from_another_frame(void) {
   }
 }
 
+/* Stretched along x by the second derivatives of the layer's narrow part: longer than a load's
+ * marks can be told from; where the pad ends near, its ends do the same. */
+static void test_long_contacts_are_not_told_but_where_the_pad_ends_near(void) {
+  int32_t readings[SENSORS], beside[SENSORS];
+  struct contact contact = usual;
+  contact.qx_N = contact.qy_N = 0.0;
+  contact.x_mm = 1.0;
+  contact.y_mm = 2.0;
+  int told[2] = {0, 0};
+  for (int near = 0; near < 2; near++) {
+    for (int apart = 0; apart < 2; apart++) { /* two halves of the contact, 0 and 9 mm apart */
+      use_pad(12.0);
+      profile.overhang_mm = near ? 6.0f : 12.0f;
+      TEST_ASSERT_EQUAL(FT_OK, fit_pad_init(&pad, &array, &profile));
+      contact.x_mm = 1.0 - 4.5 * apart;
+      read_contact(&contact, readings);
+      contact.x_mm = 1.0 + 4.5 * apart;
+      read_contact(&contact, beside);
+      for (int k = 0; k < SENSORS; k++) {
+        readings[k] = readings[k] / 2 + beside[k] / 2;
+      }
+      struct fit_tangential found = estimate(readings, ALL);
+      if (apart == 0) {
+        TEST_ASSERT_TRUE(found.valid && !found.elongated);
+      } else {
+        told[near] = found.valid;
+        TEST_ASSERT_EQUAL(found.valid, found.elongated);
+      }
+    }
+  }
+  TEST_ASSERT_EQUAL(0, told[0]);
+  TEST_ASSERT_EQUAL(1, told[1]);
+}
+
 static void test_profiles_that_no_layer_has_are_refused(void) {
   struct pad_profile wrong = profile_of(12.0);
   wrong.thickness_mm = 0.0f;
@@ -422,6 +456,7 @@ int main(void) {
   RUN_TEST(test_twice_the_pressure_is_twice_the_force_to_the_bit);
   RUN_TEST(test_a_mirrored_contact_has_a_mirrored_result);
   RUN_TEST(test_nothing_stays_from_another_frame);
+  RUN_TEST(test_long_contacts_are_not_told_but_where_the_pad_ends_near);
   RUN_TEST(test_profiles_that_no_layer_has_are_refused);
   RUN_TEST(test_any_bits_give_finite_results);
   return UNITY_END();
