@@ -70,6 +70,11 @@ int pad_command(const PadOptions &options) {
               profile.overhang_mm > 0 ? shortest(profile.overhang_mm).c_str() : "?",
               ends ? " ends" : "", profile.from_touch ? " from_touch" : "",
               fixed(static_cast<double>(profile.force_ratio), 3).c_str());
+  if (shape.overhang_mm == 0) {
+    std::fprintf(stderr,
+                 "fingertip: a pad without end, as no --overhang was told: where the rubber "
+                 "ends, location and tangential load are off\n");
+  }
   if (pad::edges_spoil_the_zero(shape) && !options.from_touch) {
     std::fprintf(stderr,
                  "fingertip: the rubber ends %s mm beyond the outer sensors, less than "
