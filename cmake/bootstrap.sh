@@ -126,7 +126,6 @@ case $1 in
     /usr/bin/python3 host_tools/report/truth/truth.py --build build/host --boards build -o build/report \
       --picture host_tools/report/truth/truth.png
     say "tangential load: how far from the truth, on which pads"
-    build/host/tests/accuracy/test_tangential_against_reference build/report/shear_optimum.json
     /usr/bin/python3 host_tools/report/shear/shear.py --build build/host -o build/report --picture host_tools/report/shear/shear.png
     say "every table and picture: $root/build/report/index.html"
     ;;
