@@ -1,0 +1,169 @@
+/* The controller of a grasp: frames of two fingertips and a gripper's status in, one command out.
+ *
+ *   struct grip grip;
+ *   grip_init(&grip, &settings, &traits);
+ *   grip_request(&grip, GRIP_REQUEST_GRASP);
+ *   for (;;) {
+ *     grip_take_touch(&grip, finger, &touch);     for every frame of either fingertip
+ *     grip_take_status(&grip, &status);           for every answer of the gripper
+ *     grip_step(&grip, now_us, &command, &report);
+ *   }
+ *
+ * Two modes. `fixed` holds a set force: De Clercq et al., RA-L 2022, eq. (5) and (6). `hold` holds
+ * an object of unknown weight with what its load needs: grip force = margin x tangential load /
+ * friction, more at once where it slides, less slowly while it rests.
+ *
+ * Integers throughout, so that every machine gives the same bits; no clock, no allocation, no
+ * floats. Times are the caller's, in us, on one clock for all inputs, and never go back. Forces
+ * are mN, lengths um, of one fingertip: its normal force is the grip force. Main context only: it
+ * divides with port/divide.h.
+ */
+#ifndef GRIP_GRIP_H
+#define GRIP_GRIP_H
+
+#include "common/contact_flags.h"
+#include "common/status.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define GRIP_FINGERS 2
+
+/* One frame of a fingertip: a contact packet in integers. What its VALID flag does not stand for is
+ * 0. */
+struct grip_touch {
+  uint64_t t_us;  /* when it was measured */
+  uint32_t flags; /* enum contact_flag */
+  int32_t force_mN, force_sd_mN;
+  int32_t x_um, y_um, location_sd_um;
+  int32_t qx_mN, qy_mN, q_sd_mN; /* tangential load of the object on the rubber */
+  int32_t vx_um_s, vy_um_s;
+};
+
+/* What a gripper can do. */
+struct grip_traits {
+  int32_t stroke_um;                  /* between the pads when open; 0 is closed */
+  int32_t step_um;                    /* of the commanded width */
+  int32_t deadband_um;                /* moves shorter than that are not made; 0: none */
+  int32_t speed_min_um_s, speed_max_um_s; /* of the width */
+  int32_t force_min_mN, force_max_mN; /* of its own limit of force; 0: it has none */
+  int32_t latency_us;                 /* from a command to motion */
+  int32_t poll_us;                    /* between two commands, at the least */
+};
+
+enum grip_object { GRIP_OBJECT_UNKNOWN, GRIP_OBJECT_NONE, GRIP_OBJECT_HELD };
+
+/* What a gripper says. */
+struct grip_status {
+  uint64_t t_us; /* when it was asked */
+  int32_t width_um;
+  bool active; /* it has been activated and takes commands */
+  bool moving;
+  uint8_t object; /* enum grip_object: what the gripper itself believes */
+  uint8_t fault;  /* the gripper's own code; 0: none */
+};
+
+/* What the gripper is to do. */
+enum grip_motion {
+  GRIP_STAY,     /* hold the position: nothing is sent but what keeps the line alive */
+  GRIP_ACTIVATE, /* only where nothing is gripped */
+  GRIP_MOVE,     /* to width_um at speed_um_s */
+};
+struct grip_command {
+  uint8_t motion; /* enum grip_motion */
+  int32_t width_um;
+  int32_t speed_um_s;
+  int32_t force_mN; /* the gripper's own limit; 0: its least */
+};
+
+enum grip_mode { GRIP_MODE_FIXED, GRIP_MODE_HOLD };
+
+/* Romano et al., "Human-inspired robotic grasp control with tactile sensing", IEEE Trans. Robotics
+ * 27, 2011, has the course of it. */
+enum grip_state {
+  GRIP_IDLE,     /* nothing is asked */
+  GRIP_ACTIVATING,
+  GRIP_APPROACH, /* closing until both fingertips feel the object */
+  GRIP_SQUEEZE,  /* up to the first force */
+  GRIP_READY,    /* that force stands; what pulls now is counted as no load */
+  GRIP_HOLDING,
+  GRIP_SLIPPING, /* as HOLDING, and an object that slides is being caught */
+  GRIP_RELEASE,  /* opening, because it was asked for */
+  GRIP_OPEN,     /* done */
+  GRIP_DROPPED,  /* nothing is between the fingertips any more; the width stays */
+  GRIP_MISSED,   /* closed, and nothing was there */
+  GRIP_FAULT,    /* the width stays */
+  GRIP_STATES,
+};
+
+/* Why it is not all well; bits. Each is on while it lasts, those of GRIP_FAULT stay. */
+enum grip_trouble {
+  GRIP_FINGER_0_STALE = 1 << 0, /* no frame for settings.stale_us */
+  GRIP_FINGER_1_STALE = 1 << 1,
+  GRIP_FINGER_0_FROZEN = 1 << 2, /* frames whose values never change */
+  GRIP_FINGER_1_FROZEN = 1 << 3,
+  GRIP_FINGER_0_FORCE_ONLY = 1 << 4, /* location and load are not to be trusted: UNCERTAIN, FLAT... */
+  GRIP_FINGER_1_FORCE_ONLY = 1 << 5,
+  GRIP_FINGER_0_OVER = 1 << 6, /* SATURATED or FORCE_LOWER_BOUND: never tightens further */
+  GRIP_FINGER_1_OVER = 1 << 7,
+  GRIP_FINGERS_DIFFER = 1 << 8, /* forces by more than settings.differ_permille */
+  GRIP_AT_CAP = 1 << 9,         /* more force than force_cap_mN is wanted */
+  GRIP_AT_TRAVEL_CAP = 1 << 10, /* closing further than travel_cap_um since the touch is wanted */
+  GRIP_GRIPPER_SILENT = 1 << 11, /* no status for settings.silent_us */
+  GRIP_GRIPPER_FAULT = 1 << 12,  /* its own code in the report */
+  GRIP_GRIPPER_INACTIVE = 1 << 13, /* it was activated and is no longer */
+  GRIP_NO_LOAD = 1 << 14, /* mode hold: neither fingertip can tell a load; settings.blind_mN holds */
+};
+
+enum grip_request { GRIP_REQUEST_GRASP, GRIP_REQUEST_HOLD, GRIP_REQUEST_RELEASE };
+
+/* Of one actuator, for eq. (6): dP = kp e + ki integral(e) + kd e', from the width at which the
+ * controller began. */
+struct grip_gains {
+  int32_t kp_um_per_N;
+  int32_t ki_um_per_Ns;
+  int32_t kd_um_s_per_N;
+};
+
+struct grip_settings {
+  uint8_t mode; /* enum grip_mode */
+  /* Both modes */
+  int32_t touch_mN;          /* of either fingertip: contact */
+  int32_t approach_um_s;     /* of the width, at most 8000 where a contact is near */
+  int32_t force_cap_mN;      /* never asked for more */
+  int32_t travel_cap_um;     /* nor to close further since the touch */
+  int32_t release_um_s, release_width_um;
+  uint32_t stale_us, silent_us;
+  int32_t differ_permille;
+  /* fixed */
+  int32_t set_mN; /* F_des */
+  struct grip_gains gains;
+  uint32_t control_us; /* between two steps of eq. (6) */
+  /* hold */
+  int32_t first_mN;          /* grip before anything pulls; never less */
+  int32_t blind_mN;          /* grip where no load can be told */
+  int32_t friction_permille; /* until a slide tells better */
+  int32_t margin_permille;   /* grip over load / friction */
+  int32_t decay_permille_s;  /* how fast grip comes down to what is wanted */
+  uint32_t rest_us;          /* not before so long after the last slide */
+};
+
+/* As documented beside each field in grip.c; a gripper's gains from its traits. */
+void grip_default_settings(struct grip_settings *settings, const struct grip_traits *traits);
+
+struct grip_report {
+  uint8_t state;    /* enum grip_state */
+  uint32_t trouble; /* enum grip_trouble */
+  uint8_t gripper_fault;
+  int32_t wanted_mN; /* grip force that is aimed at */
+  int32_t force_mN;  /* as told, of both fingertips: what counts for what is wanted */
+  int32_t load_mN;   /* tangential load of one fingertip since READY; 0 where it cannot be told */
+  int32_t margin_permille; /* force x friction / load; 0: no load */
+  int32_t friction_permille;
+  int32_t width_um;
+  uint32_t slides; /* so many since GRASP */
+};
+
+struct grip; /* grip_state.h */
+
+#endif
