@@ -42,13 +42,13 @@ struct grip_touch {
 
 /* What a gripper can do. */
 struct grip_traits {
-  int32_t stroke_um;                  /* between the pads when open; 0 is closed */
-  int32_t step_um;                    /* of the commanded width */
-  int32_t deadband_um;                /* moves shorter than that are not made; 0: none */
+  int32_t stroke_um;                      /* between the pads when open; 0 is closed */
+  int32_t step_um;                        /* of the commanded width */
+  int32_t deadband_um;                    /* moves shorter than that are not made; 0: none */
   int32_t speed_min_um_s, speed_max_um_s; /* of the width */
-  int32_t force_min_mN, force_max_mN; /* of its own limit of force; 0: it has none */
-  int32_t latency_us;                 /* from a command to motion */
-  int32_t poll_us;                    /* between two commands, at the least */
+  int32_t force_min_mN, force_max_mN;     /* of its own limit of force; 0: it has none */
+  int32_t latency_us;                     /* from a command to motion */
+  int32_t poll_us;                        /* between two commands, at the least */
 };
 
 enum grip_object { GRIP_OBJECT_UNKNOWN, GRIP_OBJECT_NONE, GRIP_OBJECT_HELD };
@@ -57,8 +57,8 @@ enum grip_object { GRIP_OBJECT_UNKNOWN, GRIP_OBJECT_NONE, GRIP_OBJECT_HELD };
 struct grip_status {
   uint64_t t_us; /* when it was asked */
   int32_t width_um;
-  bool active; /* it has been activated and takes commands */
-  bool moving;
+  bool is_active; /* it has been activated and takes commands */
+  bool is_moving;
   uint8_t object; /* enum grip_object: what the gripper itself believes */
   uint8_t fault;  /* the gripper's own code; 0: none */
 };
@@ -81,14 +81,15 @@ enum grip_mode { GRIP_MODE_FIXED, GRIP_MODE_HOLD };
 /* Romano et al., "Human-inspired robotic grasp control with tactile sensing", IEEE Trans. Robotics
  * 27, 2011, has the course of it. */
 enum grip_state {
-  GRIP_IDLE,     /* nothing is asked */
+  GRIP_IDLE, /* nothing is asked */
   GRIP_ACTIVATING,
   GRIP_APPROACH, /* closing until both fingertips feel the object */
   GRIP_SQUEEZE,  /* up to the first force */
   GRIP_READY,    /* that force stands; what pulls now is counted as no load */
   GRIP_HOLDING,
   GRIP_SLIPPING, /* as HOLDING, and an object that slides is being caught */
-  GRIP_RELEASE,  /* opening, because it was asked for */
+  GRIP_STILL,    /* the width stays, because it was asked for */
+  GRIP_RELEASE,  /* opening, likewise */
   GRIP_OPEN,     /* done */
   GRIP_DROPPED,  /* nothing is between the fingertips any more; the width stays */
   GRIP_MISSED,   /* closed, and nothing was there */
@@ -102,23 +103,28 @@ enum grip_trouble {
   GRIP_FINGER_1_STALE = 1 << 1,
   GRIP_FINGER_0_FROZEN = 1 << 2, /* frames whose values never change */
   GRIP_FINGER_1_FROZEN = 1 << 3,
-  GRIP_FINGER_0_FORCE_ONLY = 1 << 4, /* location and load are not to be trusted: UNCERTAIN, FLAT... */
+  GRIP_FINGER_0_FORCE_ONLY =
+      1 << 4, /* location and load are not to be trusted: UNCERTAIN, FLAT... */
   GRIP_FINGER_1_FORCE_ONLY = 1 << 5,
   GRIP_FINGER_0_OVER = 1 << 6, /* SATURATED or FORCE_LOWER_BOUND: never tightens further */
   GRIP_FINGER_1_OVER = 1 << 7,
-  GRIP_FINGERS_DIFFER = 1 << 8, /* forces by more than settings.differ_permille */
-  GRIP_AT_CAP = 1 << 9,         /* more force than force_cap_mN is wanted */
-  GRIP_AT_TRAVEL_CAP = 1 << 10, /* closing further than travel_cap_um since the touch is wanted */
+  GRIP_FINGERS_DIFFER = 1 << 8,  /* forces by more than settings.differ_permille */
+  GRIP_AT_CAP = 1 << 9,          /* more force than force_cap_mN is wanted */
+  GRIP_AT_TRAVEL_CAP = 1 << 10,  /* closing further than travel_cap_um since the touch is wanted */
   GRIP_GRIPPER_SILENT = 1 << 11, /* no status for settings.silent_us */
   GRIP_GRIPPER_FAULT = 1 << 12,  /* its own code in the report */
   GRIP_GRIPPER_INACTIVE = 1 << 13, /* it was activated and is no longer */
-  GRIP_NO_LOAD = 1 << 14, /* mode hold: neither fingertip can tell a load; settings.blind_mN holds */
+  GRIP_NO_LOAD = 1 << 14, /* mode hold: neither fingertip tells a load; the grip is not loosened */
+  GRIP_FINGER_0_UNTOLD = 1 << 15, /* frames, but none whose force is a measurement */
+  GRIP_FINGER_1_UNTOLD = 1 << 16,
 };
+
+#define GRIP_GRIPPER_FAULTS (GRIP_GRIPPER_FAULT | GRIP_GRIPPER_INACTIVE)
 
 enum grip_request { GRIP_REQUEST_GRASP, GRIP_REQUEST_HOLD, GRIP_REQUEST_RELEASE };
 
-/* Of one actuator, for eq. (6): dP = kp e + ki integral(e) + kd e', from the width at which the
- * controller began. */
+/* Of one actuator, for eq. (6): dP = kp e + ki integral(e) + kd de/dt, closing from the width at
+ * which both fingertips touched. */
 struct grip_gains {
   int32_t kp_um_per_N;
   int32_t ki_um_per_Ns;
@@ -128,27 +134,28 @@ struct grip_gains {
 struct grip_settings {
   uint8_t mode; /* enum grip_mode */
   /* Both modes */
-  int32_t touch_mN;          /* of either fingertip: contact */
-  int32_t approach_um_s;     /* of the width, at most 8000 where a contact is near */
-  int32_t force_cap_mN;      /* never asked for more */
-  int32_t travel_cap_um;     /* nor to close further since the touch */
-  int32_t release_um_s, release_width_um;
-  uint32_t stale_us, silent_us;
-  int32_t differ_permille;
+  int32_t touch_mN;      /* of a fingertip: contact. 20..2000 */
+  int32_t approach_um_s; /* of the width. 500..8000: faster, and the first touch is a blow */
+  int32_t force_cap_mN;  /* never aimed above. Beyond it a fingertip's force is never added to */
+  int32_t travel_cap_um; /* never closed further since the touch */
+  int32_t release_um_s, release_width_um; /* opening: how fast, until where */
+  uint32_t stale_us;       /* a fingertip without a frame for so long is not believed */
+  uint32_t silent_us;      /* likewise the gripper */
+  int32_t differ_permille; /* of the larger force: fingertips that differ by more say so */
   /* fixed */
   int32_t set_mN; /* F_des */
   struct grip_gains gains;
   uint32_t control_us; /* between two steps of eq. (6) */
   /* hold */
-  int32_t first_mN;          /* grip before anything pulls; never less */
+  int32_t first_mN;          /* grip before anything pulls, and never less */
   int32_t blind_mN;          /* grip where no load can be told */
-  int32_t friction_permille; /* until a slide tells better */
+  int32_t friction_permille; /* until a slide, or a load that does not slide, tells better */
   int32_t margin_permille;   /* grip over load / friction */
   int32_t decay_permille_s;  /* how fast grip comes down to what is wanted */
-  uint32_t rest_us;          /* not before so long after the last slide */
+  uint32_t rest_us;          /* no sooner after a slide */
 };
 
-/* As documented beside each field in grip.c; a gripper's gains from its traits. */
+/* What grip_defaults.c says, for these traits. */
 void grip_default_settings(struct grip_settings *settings, const struct grip_traits *traits);
 
 struct grip_report {
@@ -156,14 +163,94 @@ struct grip_report {
   uint32_t trouble; /* enum grip_trouble */
   uint8_t gripper_fault;
   int32_t wanted_mN; /* grip force that is aimed at */
-  int32_t force_mN;  /* as told, of both fingertips: what counts for what is wanted */
+  int32_t force_mN;  /* as told: the smaller of both fingertips' */
   int32_t load_mN;   /* tangential load of one fingertip since READY; 0 where it cannot be told */
-  int32_t margin_permille; /* force x friction / load; 0: no load */
+  int32_t margin_permille; /* force x friction / load, at most 100 000; 0: no load */
   int32_t friction_permille;
   int32_t width_um;
   uint32_t slides; /* so many since GRASP */
 };
 
-struct grip; /* grip_state.h */
+/* What the fields hold is for the files of this folder. */
+struct grip_finger {
+  struct grip_touch touch;      /* the newest */
+  uint64_t changed_us;          /* when its values last changed */
+  uint64_t told_us;             /* of the newest frame that tells a force, */
+  int32_t force_mN;             /* and that force */
+  uint32_t unchanged;           /* frames whose values are those of the one before */
+  int32_t zero_x_mN, zero_y_mN; /* what pulled before any load */
+  int32_t x_sum_mN, y_sum_mN;   /* while it is measured */
+  uint32_t sums;
+  bool is_heard, is_new, tells_load;
+  int32_t load_mN;
+};
+
+#define GRIP_WIDTHS 16
+struct grip_width {
+  uint64_t t_us;
+  int32_t width_um;
+};
+
+struct grip_hold {
+  int32_t load_mN;      /* as last told */
+  int32_t slow_load_mN; /* behind it */
+  int32_t rate_mN_s;    /* of the load, upwards */
+  uint64_t load_us;     /* when it was told */
+  uint64_t decayed_us;
+  int32_t friction_permille;
+  int32_t floor_mN;   /* since the last slide */
+  uint64_t slid_us;   /* the last frame that told a slide */
+  uint64_t raised_us; /* the last reflex */
+  bool has_told, has_slid, sliding;
+  uint32_t slides;
+};
+
+struct grip_pid {
+  bool runs;
+  uint64_t t_us;
+  int32_t error_mN;
+  int64_t integral_mN_us;
+};
+
+struct grip {
+  struct grip_settings settings;
+  struct grip_traits traits;
+  uint64_t now_us;
+  uint8_t state;
+  uint64_t since_us; /* the state has been */
+  struct grip_finger finger[GRIP_FINGERS];
+  struct grip_status status;
+  bool status_is_heard;
+  struct grip_width widths[GRIP_WIDTHS]; /* ring */
+  uint32_t newest_width, width_count;
+  int32_t touch_width_um;
+  int32_t target_um; /* the width that was last commanded */
+  int32_t wanted_mN;
+  uint64_t empty_us;      /* since when neither fingertip feels anything; 0: one does */
+  uint64_t ramped_us;     /* the last step of an approach or a release */
+  uint32_t trouble;       /* as of the last step */
+  uint32_t fault_trouble; /* that of FAULT */
+  bool may_activate;
+  bool is_entered; /* the state is new */
+  struct grip_hold hold;
+  struct grip_pid pid;
+};
+
+/* FT_ERR_ARGUMENT: a setting or a trait outside its range. */
+enum ft_status grip_init(struct grip *grip, const struct grip_settings *settings,
+                         const struct grip_traits *traits);
+
+/* A frame older than the last of this finger is passed over. */
+void grip_take_touch(struct grip *grip, unsigned finger, const struct grip_touch *touch);
+
+void grip_take_status(struct grip *grip, const struct grip_status *status);
+
+/* GRASP: from IDLE, OPEN, DROPPED, MISSED. HOLD: the width stays, from every state. RELEASE: opens,
+ * from every state but FAULT of the gripper itself. False: not from this state. */
+bool grip_request(struct grip *grip, enum grip_request request);
+
+/* What to do now: to be called after every input, and every 10 ms without one. */
+void grip_step(struct grip *grip, uint64_t now_us, struct grip_command *command,
+               struct grip_report *report);
 
 #endif

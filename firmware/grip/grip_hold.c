@@ -1,0 +1,113 @@
+#include "grip/grip_parts.h"
+#include "port/divide.h"
+
+/* Of the load's rate. */
+#define RATE_us 20000
+/* Beyond the actuator's latency, until what is wanted acts. */
+#define AHEAD_us 10000
+#define AHEAD_MAX_us 80000
+
+/* A slide raises the grip at once by so much, and again each time the gripper has had the time to
+ * answer and it goes on. */
+#define REFLEX_PERMILLE 1300
+#define REFLEX_AGAIN_us 20000
+/* The grip that ended a slide, or this much of it, is not given up. */
+#define FLOOR_PERMILLE 850
+
+/* Q / F of a slide is friction, as far as Q is known. */
+#define SEEN_PERMILLE 950
+#define FRICTION_MIN_PERMILLE 100
+#define FRICTION_MAX_PERMILLE 1500
+
+void grip_hold_begin(struct grip *grip) {
+  grip->hold = (struct grip_hold){.friction_permille = grip->settings.friction_permille};
+}
+
+static void follow_load(struct grip *grip, const struct grip_view *view) {
+  struct grip_hold *hold = &grip->hold;
+  int32_t step_us =
+      grip->now_us - hold->load_us > 100000 ? 100000 : (int32_t)(grip->now_us - hold->load_us);
+  hold->load_us = grip->now_us;
+  hold->has_told = true;
+  hold->load_mN = view->load_mN;
+  int32_t lag_mN = view->load_mN - hold->slow_load_mN;
+  hold->rate_mN_s = lag_mN > 0 ? grip_scale(lag_mN, 1000000, RATE_us) : 0;
+  hold->slow_load_mN += step_us >= RATE_us ? lag_mN : grip_scale(lag_mN, step_us, RATE_us);
+}
+
+static void learn_friction(struct grip *grip, const struct grip_view *view, bool begins) {
+  struct grip_hold *hold = &grip->hold;
+  if (!view->tells_load || view->low_mN < grip->settings.touch_mN * 2) {
+    return;
+  }
+  int32_t seen = grip_scale(view->load_mN, 1000, view->low_mN);
+  seen = grip_clamp(grip_scale(seen, SEEN_PERMILLE, 1000), FRICTION_MIN_PERMILLE,
+                    FRICTION_MAX_PERMILLE);
+  if (begins ? seen < hold->friction_permille : !hold->sliding && seen > hold->friction_permille) {
+    hold->friction_permille = seen;
+  }
+}
+
+static void answer_slide(struct grip *grip, const struct grip_view *view) {
+  struct grip_hold *hold = &grip->hold;
+  bool begins = view->slides && !hold->sliding;
+  learn_friction(grip, view, begins);
+  if (view->slides) {
+    uint64_t again_us = (uint64_t)grip->traits.latency_us + REFLEX_AGAIN_us;
+    if (begins || grip->now_us - hold->raised_us > again_us) {
+      int32_t from_mN = !begins && grip->wanted_mN > view->low_mN ? grip->wanted_mN : view->low_mN;
+      int32_t raised_mN = grip_scale(from_mN, REFLEX_PERMILLE, 1000);
+      raised_mN = grip_clamp(raised_mN, 0, grip->settings.force_cap_mN);
+      hold->floor_mN = raised_mN > hold->floor_mN ? raised_mN : hold->floor_mN;
+      hold->raised_us = grip->now_us;
+      hold->slides += begins;
+    }
+    hold->slid_us = grip->now_us;
+    hold->has_slid = true;
+  } else if (hold->sliding) {
+    hold->floor_mN = grip_scale(hold->floor_mN, FLOOR_PERMILLE, 1000);
+  }
+  hold->sliding = view->slides;
+}
+
+/* Without a load told since GRASP, the grip that is set for that. */
+static int32_t least_force(const struct grip *grip, bool told) {
+  const struct grip_hold *hold = &grip->hold;
+  int32_t least_mN = told || hold->has_told ? grip->settings.first_mN : grip->settings.blind_mN;
+  return hold->floor_mN > least_mN ? hold->floor_mN : least_mN;
+}
+
+/* What the load of some time ahead needs. */
+static int32_t load_force(const struct grip *grip) {
+  const struct grip_hold *hold = &grip->hold;
+  int32_t ahead_us = grip_clamp(grip->traits.latency_us + AHEAD_us, 0, AHEAD_MAX_us);
+  int32_t load_mN = hold->load_mN + grip_scale(hold->rate_mN_s, ahead_us, 1000000);
+  return grip_scale(load_mN, grip->settings.margin_permille, hold->friction_permille);
+}
+
+int32_t grip_hold_wants(struct grip *grip, const struct grip_view *view) {
+  struct grip_hold *hold = &grip->hold;
+  if (view->fresh) {
+    if (view->tells_load) {
+      follow_load(grip, view);
+    }
+    answer_slide(grip, view);
+  }
+  int32_t least_mN = least_force(grip, view->tells_load);
+  int32_t wanted_mN = load_force(grip);
+  wanted_mN = wanted_mN > least_mN ? wanted_mN : least_mN;
+  bool rests = view->tells_load &&
+               !(hold->has_slid && grip->now_us - hold->slid_us < grip->settings.rest_us);
+  uint64_t step_us = grip->now_us - hold->decayed_us;
+  if (wanted_mN >= grip->wanted_mN || !rests || step_us > 1000000) {
+    hold->decayed_us = grip->now_us;
+    return wanted_mN > grip->wanted_mN ? wanted_mN : grip->wanted_mN;
+  }
+  int32_t share = port_divide(grip->settings.decay_permille_s * (int32_t)step_us, 1000);
+  int32_t down_mN = grip_scale(grip->wanted_mN, share, 1000000);
+  if (down_mN < 1) {
+    return grip->wanted_mN;
+  }
+  hold->decayed_us = grip->now_us;
+  return grip->wanted_mN - down_mN > wanted_mN ? grip->wanted_mN - down_mN : wanted_mN;
+}

@@ -1,0 +1,119 @@
+#include "grip/grip_parts.h"
+#include "port/divide.h"
+
+/* Rubber's force grows as its indentation to the 1.6: layers of 12 mm under spheres of 6 to 30 mm,
+ * 1 to 10 N (host_tools/twin). */
+#define EXPONENT_PERMILLE 1600
+#define INDENTATION_MIN_um 300
+#define STIFFNESS_MIN_mN_mm 200
+#define STIFFNESS_MAX_mN_mm 20000
+
+/* Of what a step makes: less is not worth one closing, more is left before one opening. */
+#define TIGHTEN_PERMILLE 250
+#define LOOSEN_PERMILLE 1200
+/* And of the force that is wanted, for grippers of fine steps. */
+#define TOLERANCE_PERMILLE 15
+
+void grip_take_status(struct grip *grip, const struct grip_status *status) {
+  if (grip->status_is_heard && status->t_us <= grip->status.t_us) {
+    return;
+  }
+  grip->status = *status;
+  grip->status_is_heard = true;
+  grip->newest_width = (grip->newest_width + 1) % GRIP_WIDTHS;
+  grip->widths[grip->newest_width] = (struct grip_width){status->t_us, status->width_um};
+  grip->width_count += grip->width_count < GRIP_WIDTHS;
+}
+
+int32_t grip_width_at(const struct grip *grip, uint64_t t_us) {
+  struct grip_width after = grip->widths[grip->newest_width];
+  if (after.t_us <= t_us) {
+    return after.width_um;
+  }
+  for (uint32_t back = 1; back < grip->width_count; back++) {
+    struct grip_width before = grip->widths[(grip->newest_width - back) % GRIP_WIDTHS];
+    if (before.t_us <= t_us) {
+      int32_t span_us = (int32_t)(after.t_us - before.t_us);
+      return before.width_um +
+             grip_scale(after.width_um - before.width_um, (int32_t)(t_us - before.t_us), span_us);
+    }
+    after = before;
+  }
+  return after.width_um;
+}
+
+int32_t grip_stiffness(const struct grip *grip, int32_t force_mN, int32_t width_um) {
+  int32_t indentation_um = grip->touch_width_um - width_um;
+  indentation_um = indentation_um < INDENTATION_MIN_um ? INDENTATION_MIN_um : indentation_um;
+  int32_t stiffness = grip_scale(force_mN, EXPONENT_PERMILLE, indentation_um);
+  return grip_clamp(stiffness, STIFFNESS_MIN_mN_mm, STIFFNESS_MAX_mN_mm);
+}
+
+int32_t grip_allowed_width(const struct grip *grip, const struct grip_view *view, int32_t width_um,
+                           uint32_t *trouble) {
+  int32_t least_um = grip->touch_width_um - grip->settings.travel_cap_um;
+  if (width_um < least_um) {
+    width_um = least_um;
+    *trouble |= GRIP_AT_TRAVEL_CAP;
+  }
+  /* What is not believed to be below the cap is not added to. */
+  if (width_um < grip->target_um && (view->over || view->fingers == 0)) {
+    width_um = grip->target_um;
+  }
+  return grip_clamp(width_um, 0, grip->traits.stroke_um);
+}
+
+/* So many steps that the gripper moves at all. */
+static int32_t least_steps(const struct grip *grip, bool tighten) {
+  int32_t off_um =
+      tighten ? grip->status.width_um - grip->target_um : grip->target_um - grip->status.width_um;
+  int32_t missing_um = grip->traits.deadband_um - off_um;
+  return missing_um <= grip->traits.step_um
+             ? 1
+             : port_divide(missing_um + grip->traits.step_um - 1, grip->traits.step_um);
+}
+
+uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wanted_mN) {
+  uint32_t trouble = 0;
+  const struct grip_settings *settings = &grip->settings;
+  if (wanted_mN >= settings->force_cap_mN) {
+    wanted_mN = settings->force_cap_mN;
+    trouble |= GRIP_AT_CAP;
+  }
+  grip->wanted_mN = wanted_mN;
+  if (view->fingers == 0) {
+    return trouble;
+  }
+  /* Where the force will be once the gripper is where it was sent. */
+  int32_t width_um = grip_width_at(grip, view->t_us);
+  int32_t stiffness = grip_stiffness(grip, view->mean_mN, width_um);
+  int32_t coming_mN = grip_scale(stiffness, width_um - grip->target_um, 1000);
+  int32_t low_mN = view->low_mN + coming_mN, high_mN = view->high_mN + coming_mN;
+  int32_t step_mN = grip_scale(stiffness, grip->traits.step_um, 1000);
+  step_mN = step_mN < 1 ? 1 : step_mN;
+  int32_t tolerance_mN = grip_scale(wanted_mN, TOLERANCE_PERMILLE, 1000);
+  int32_t missing_mN = wanted_mN - low_mN;
+  int32_t steps = 0;
+  if (missing_mN > tolerance_mN && missing_mN > grip_scale(step_mN, TIGHTEN_PERMILLE, 1000)) {
+    steps = port_divide(missing_mN + step_mN - 1, step_mN);
+    int32_t least = least_steps(grip, true);
+    steps = steps < least ? least : steps;
+    int32_t room = high_mN >= settings->force_cap_mN
+                       ? 0
+                       : port_divide(settings->force_cap_mN - high_mN, step_mN);
+    if (steps > room) {
+      steps = room;
+      trouble |= GRIP_AT_CAP;
+    }
+  } else if (-missing_mN > tolerance_mN) {
+    int32_t least = least_steps(grip, false);
+    int32_t spare =
+        port_divide(-missing_mN - grip_scale(step_mN, LOOSEN_PERMILLE - 1000, 1000), step_mN);
+    steps = spare >= least ? -spare : 0;
+  }
+  if (steps != 0) {
+    int32_t aimed_um = grip->target_um - steps * grip->traits.step_um;
+    grip->target_um = grip_allowed_width(grip, view, aimed_um, &trouble);
+  }
+  return trouble;
+}

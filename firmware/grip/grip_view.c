@@ -1,0 +1,185 @@
+#include "grip/grip_parts.h"
+#include "port/divide.h"
+
+/* A fingertip whose values stay to the last bit for so long, and over so many frames, is stuck:
+ * noise changes them with every frame. */
+#define FROZEN_us 50000u
+#define FROZEN_FRAMES 5u
+
+/* A force with a larger standard deviation is no measurement. */
+#define FORCE_SD_MAX_PERMILLE 500
+
+/* What neither location nor load is to be believed with. */
+#define FORCE_ONLY                                                                                 \
+  (CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_SATURATED |   \
+   CONTACT_FLAG_ZERO_DOUBTFUL)
+#define OVER (CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND)
+
+int32_t grip_clamp(int32_t value, int32_t low, int32_t high) {
+  return value < low ? low : value > high ? high : value;
+}
+
+int32_t grip_scale(int32_t value, int32_t numerator, int32_t denominator) {
+  int64_t result = (int64_t)value * numerator / denominator;
+  return result > INT32_MAX ? INT32_MAX : result < INT32_MIN ? INT32_MIN : (int32_t)result;
+}
+
+static uint32_t root_of(uint64_t square) {
+  uint32_t root = 0;
+  for (uint32_t bit = UINT32_C(1) << 31; bit != 0; bit >>= 1) {
+    uint64_t tried = root | bit;
+    if (tried * tried <= square) {
+      root |= bit;
+    }
+  }
+  return root;
+}
+
+#define LENGTH_MAX_mN 1000000
+#define ZERO_FRAMES_MAX 2000u
+
+static int32_t length_of(int32_t x, int32_t y) {
+  x = grip_clamp(x, -LENGTH_MAX_mN, LENGTH_MAX_mN);
+  y = grip_clamp(y, -LENGTH_MAX_mN, LENGTH_MAX_mN);
+  return (int32_t)root_of((uint64_t)((int64_t)x * x) + (uint64_t)((int64_t)y * y));
+}
+
+static bool tells_force(const struct grip_touch *touch) {
+  if (!(touch->flags & CONTACT_FLAG_CONTACT)) {
+    return true; /* none */
+  }
+  return (touch->flags & CONTACT_FLAG_FIT_VALID) != 0 &&
+         (!(touch->flags & CONTACT_FLAG_UNCERTAINTY_VALID) ||
+          touch->force_sd_mN <= grip_scale(touch->force_mN, FORCE_SD_MAX_PERMILLE, 1000));
+}
+
+static bool is_same(const struct grip_touch *a, const struct grip_touch *b) {
+  return a->force_mN == b->force_mN && a->force_sd_mN == b->force_sd_mN && a->x_um == b->x_um &&
+         a->y_um == b->y_um && a->qx_mN == b->qx_mN && a->qy_mN == b->qy_mN;
+}
+
+void grip_take_touch(struct grip *grip, unsigned finger, const struct grip_touch *touch) {
+  if (finger >= GRIP_FINGERS ||
+      (grip->finger[finger].is_heard && touch->t_us <= grip->finger[finger].touch.t_us)) {
+    return;
+  }
+  struct grip_finger *own = &grip->finger[finger];
+  bool says_something =
+      (touch->flags & CONTACT_FLAG_CONTACT) != 0 && (touch->flags & CONTACT_FLAG_HELD) == 0;
+  if (!own->is_heard || !says_something || !is_same(&own->touch, touch)) {
+    own->changed_us = touch->t_us;
+    own->unchanged = 0;
+  } else {
+    own->unchanged++;
+  }
+  own->touch = *touch;
+  own->is_heard = true;
+  own->is_new = true;
+  if (tells_force(touch)) {
+    own->told_us = touch->t_us;
+    own->force_mN = touch->flags & CONTACT_FLAG_CONTACT ? touch->force_mN : 0;
+  }
+  own->tells_load =
+      (touch->flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0 && (touch->flags & FORCE_ONLY) == 0;
+  if (own->tells_load) {
+    own->load_mN = length_of(touch->qx_mN - own->zero_x_mN, touch->qy_mN - own->zero_y_mN);
+    if (own->sums < ZERO_FRAMES_MAX) {
+      own->x_sum_mN += grip_clamp(touch->qx_mN, -LENGTH_MAX_mN, LENGTH_MAX_mN);
+      own->y_sum_mN += grip_clamp(touch->qy_mN, -LENGTH_MAX_mN, LENGTH_MAX_mN);
+      own->sums++;
+    }
+  }
+}
+
+void grip_zero_begin(struct grip *grip) {
+  for (int i = 0; i < GRIP_FINGERS; i++) {
+    struct grip_finger *own = &grip->finger[i];
+    own->x_sum_mN = own->y_sum_mN = own->zero_x_mN = own->zero_y_mN = 0;
+    own->sums = 0;
+  }
+}
+
+void grip_zero_end(struct grip *grip) {
+  for (int i = 0; i < GRIP_FINGERS; i++) {
+    struct grip_finger *own = &grip->finger[i];
+    if (own->sums > 0) {
+      own->zero_x_mN = port_divide(own->x_sum_mN, (int32_t)own->sums);
+      own->zero_y_mN = port_divide(own->y_sum_mN, (int32_t)own->sums);
+    }
+  }
+}
+
+bool grip_zero_has(const struct grip *grip, uint32_t frames) {
+  for (int i = 0; i < GRIP_FINGERS; i++) {
+    if (grip->finger[i].tells_load && grip->finger[i].sums < frames) {
+      return false;
+    }
+  }
+  return true;
+}
+
+static bool is_frozen(const struct grip *grip, const struct grip_finger *own) {
+  return own->unchanged >= FROZEN_FRAMES && own->touch.t_us - own->changed_us >= FROZEN_us &&
+         grip->state != GRIP_IDLE;
+}
+
+void grip_look(struct grip *grip, struct grip_view *view) {
+  *view = (struct grip_view){.low_mN = INT32_MAX, .t_us = UINT64_MAX};
+  int32_t loads = 0, load_sum_mN = 0, load_most_mN = 0;
+  int32_t force_sum_mN = 0;
+  for (int i = 0; i < GRIP_FINGERS; i++) {
+    struct grip_finger *own = &grip->finger[i];
+    bool stale = !own->is_heard || grip->now_us > own->touch.t_us + grip->settings.stale_us;
+    bool frozen = !stale && is_frozen(grip, own);
+    bool untold = !stale && grip->now_us > own->told_us + grip->settings.stale_us;
+    view->fresh = view->fresh || own->is_new;
+    own->is_new = false;
+    view->trouble |= stale ? (uint32_t)GRIP_FINGER_0_STALE << i : 0;
+    view->trouble |= frozen ? (uint32_t)GRIP_FINGER_0_FROZEN << i : 0;
+    view->trouble |= untold ? (uint32_t)GRIP_FINGER_0_UNTOLD << i : 0;
+    if (stale || frozen) {
+      continue;
+    }
+    if (own->touch.flags & OVER) {
+      view->over = true;
+      view->trouble |= (uint32_t)GRIP_FINGER_0_OVER << i;
+    }
+    bool contact = (own->touch.flags & CONTACT_FLAG_CONTACT) != 0;
+    if (contact && (own->touch.flags & FORCE_ONLY) != 0) {
+      view->trouble |= (uint32_t)GRIP_FINGER_0_FORCE_ONLY << i;
+    } else if (contact) {
+      view->slides = view->slides || (own->touch.flags & CONTACT_FLAG_SLIDING) != 0;
+      if (own->tells_load) {
+        loads++;
+        load_sum_mN += own->load_mN;
+        load_most_mN = own->load_mN > load_most_mN ? own->load_mN : load_most_mN;
+      }
+    }
+    view->touches += contact;
+    if (!untold) {
+      view->fingers++;
+      force_sum_mN += own->force_mN;
+      view->low_mN = own->force_mN < view->low_mN ? own->force_mN : view->low_mN;
+      view->high_mN = own->force_mN > view->high_mN ? own->force_mN : view->high_mN;
+      view->t_us = own->told_us < view->t_us ? own->told_us : view->t_us;
+    }
+  }
+  if (view->fingers == 0) {
+    view->low_mN = 0;
+    view->t_us = grip->now_us;
+  } else {
+    view->mean_mN = force_sum_mN / view->fingers;
+  }
+  if (view->high_mN > grip->settings.touch_mN * 4 &&
+      view->high_mN - view->low_mN >
+          grip_scale(view->high_mN, grip->settings.differ_permille, 1000)) {
+    view->trouble |= GRIP_FINGERS_DIFFER;
+  }
+  if (loads > 0) {
+    /* Fingertips share a load; where one carries far more, it is that one's that slides. */
+    int32_t mean_mN = load_sum_mN / loads;
+    int32_t least_mN = grip_scale(load_most_mN, 800, 1000);
+    view->load_mN = mean_mN > least_mN ? mean_mN : least_mN;
+    view->tells_load = true;
+  }
+}
