@@ -310,10 +310,10 @@ static void holds_and_opens_when_asked(void) {
   world_run_to(&world, GRIP_OPEN, 9000);
 }
 
-/* Eq. (5) and (6), by hand: the second step after 20 ms with kp 100, ki 1000, kd 2. */
+/* Eq. (5) and (6), by hand: the second step after 20 ms with kp 100, ki 1000, kd 1. */
 static void fixed_is_a_pid_of_the_mean_force(void) {
   settings.mode = GRIP_MODE_FIXED;
-  settings.gains = (struct grip_gains){100, 1000, 2};
+  settings.gains = (struct grip_gains){100, 1000, 1};
   settings.control_us = 20000;
   settings.set_mN = 5000;
   world.traits.step_um = 1;
@@ -337,8 +337,8 @@ static void fixed_is_a_pid_of_the_mean_force(void) {
   grip_step(grip, 20900, &world.command, &world.report); /* too soon */
   TEST_ASSERT_EQUAL(40000 - 150, world.command.width_um);
   grip_step(grip, 21000, &world.command, &world.report);
-  /* e = 0.5 N: 50 um; its integral 0.01 Ns: 10 um; its derivative -50 N/s: -100 um */
-  TEST_ASSERT_EQUAL(40000 - (50 + 10 - 100), world.command.width_um);
+  /* e = 0.5 N: 50 um; its integral 0.01 Ns: 10 um; its derivative -50 N/s: -50 um */
+  TEST_ASSERT_EQUAL(40000 - (50 + 10 - 50), world.command.width_um);
 }
 
 static void fixed_holds_its_force(void) {
