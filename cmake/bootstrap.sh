@@ -43,6 +43,7 @@ sigrok-cli sigrok-cli
 /usr/include/cminpack-1/cminpack.h libcminpack-dev
 /usr/include/gtest/gtest.h libgtest-dev
 /usr/include/libusb-1.0/libusb.h libusb-1.0-0-dev
+/usr/include/modbus/modbus.h libmodbus-dev
 /usr/include/CLI/CLI.hpp libcli11-dev
 /usr/include/eigen3/Eigen/Dense libeigen3-dev
 /usr/include/nlohmann/json.hpp nlohmann-json3-dev
