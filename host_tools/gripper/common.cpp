@@ -31,7 +31,16 @@ GripperWay complete(GripperWay way, const GripperUsual &usual) {
   if (!(way.jaw_mm >= 10 && way.jaw_mm <= 500)) {
     throw Error(ErrorCode::bad_value, "a jaw is 10 to 500 mm long");
   }
+  if (!(way.timeout_s >= 0.005 && way.timeout_s <= 10)) {
+    throw Error(ErrorCode::bad_value, "an exchange's timeout is 0.005 to 10 s");
+  }
   return way;
+}
+
+Error silent(const GripperWay &way) {
+  return Error(ErrorCode::gripper_silent,
+               way.port + ": no answer from slave " + std::to_string(way.slave) + " within " +
+                   std::to_string(std::lround(way.timeout_s * 1000)) + " ms");
 }
 
 std::string limited_by(const std::string &port, int exchanges) {

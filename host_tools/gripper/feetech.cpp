@@ -19,7 +19,6 @@ constexpr double STALL_Nm = 1.9, FULL_SPEED_rad_s = 4.7; // 45 revolutions a min
 constexpr double LEAST_TORQUE = 0.05;                    // of the stall's, below it does not turn
 constexpr double USUAL_OPEN = 652;                       // counts: a radian
 
-constexpr std::chrono::milliseconds TIMEOUT{50};
 // So far from its goal it stopped for something in its way; half of that is its play.
 constexpr double OFF_GOAL = 22;
 // Until a command shows in its flag.
@@ -112,7 +111,8 @@ Bytes FeetechGripper::exchange(Packet question, std::size_t answer_length) {
     throw Error(ErrorCode::gone, way_.port + ": gone");
   }
   doubtful_ = true;
-  const auto end = std::chrono::steady_clock::now() + TIMEOUT;
+  const auto end = std::chrono::steady_clock::now() +
+                   std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6));
   Bytes came;
   std::size_t noise = 0;
   bool other_slave = false, other_answer = false, echo_gone = false;
@@ -157,8 +157,7 @@ Bytes FeetechGripper::exchange(Packet question, std::size_t answer_length) {
   if (noise + came.size() > 0) {
     throw Error(ErrorCode::gripper_garbled, way_.port + ": an answer is damaged (checksum)");
   }
-  throw Error(ErrorCode::gripper_silent, way_.port + ": no answer from a servo within " +
-                                             std::to_string(TIMEOUT.count()) + " ms");
+  throw silent(way_);
 }
 
 Bytes FeetechGripper::ask(Packet question, std::size_t answer_length) {

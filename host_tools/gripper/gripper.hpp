@@ -6,9 +6,9 @@
 //   gripper->move({.width_mm = 20, .speed_mm_s = 50, .force_N = 20});
 //   GripperStatus now = gripper->poll();
 //
-// Nothing here waits longer than one exchange on the line, whose timeout is 50 ms, but where its
-// comment says so; whoever wants the end of a motion polls for it, at least once a second, for a
-// Robotiq reports a fault after a second of silence. Not for two threads at once.
+// Nothing here waits longer than one exchange on the line, whose timeout is GripperWay's, but where
+// its comment says so; whoever wants the end of a motion polls for it, at least once a second, for
+// a Robotiq reports a fault after a second of silence. Not for two threads at once.
 //
 // Where the comment of a function has no list of its own it throws Error:
 //   gripper_silent    no answer in time; the next call may have one
@@ -61,8 +61,8 @@ public:
   // What the line is and what limits it, for people: "Modbus RTU at 115200 baud, slave 9, ...".
   virtual std::string line() const = 0;
   // Begins what the gripper needs before it moves, dropping what it holds and clearing its faults;
-  // poll tells when it is done. Nothing else ever activates it, or clears a fault. Takes up to
-  // 0.3 s.
+  // poll tells when it is done. Nothing else ever activates it, or clears a fault. Takes some
+  // exchanges, 0.1 s.
   virtual void activate() = 0;
   virtual GripperStatus poll() = 0;
   // Sends and polls in one exchange where the line can do that, else in two. A gripper that is not
@@ -79,7 +79,8 @@ struct GripperWay {
   // Positions that the gripper tells when its pads touch and when it is open; empty: the model's
   // usual. Of a Robotiq 0 to 255, of a servo 0 to 4095, which may turn either way.
   std::optional<int> closed_count = {}, open_count = {};
-  double jaw_mm = 100.0; // of a servo: from its axis to the middle of the pad
+  double jaw_mm = 100.0;   // of a servo: from its axis to the middle of the pad
+  double timeout_s = 0.05; // of one exchange, from 5 ms to 10 s
 };
 
 // Each with its usual counts and jaw.
@@ -89,7 +90,7 @@ const GripperTraits &gripper_traits(const std::string &model);
 
 // Asks it for its status, commands nothing. Throws Error besides: bad_value, an unknown model or
 // counts that cannot be; no_port, not_a_port, port_in_use, permission_denied, cannot_open. Takes up
-// to 0.3 s.
+// to five exchanges.
 std::unique_ptr<Gripper> open_gripper(const GripperWay &way);
 
 } // namespace fingertip

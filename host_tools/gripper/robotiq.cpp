@@ -16,7 +16,6 @@ using namespace robotiq;
 
 namespace {
 
-constexpr std::uint32_t TIMEOUT_us = 50'000;
 constexpr std::uint32_t GAP_us = 20'000; // within an answer: more than a latency timer of 16 ms
 // The manuals ask for 5 ms between commands.
 constexpr std::chrono::milliseconds PAUSE{5};
@@ -29,11 +28,11 @@ constexpr GripperUsual USUAL = {.slave = SLAVE,
                                 .open_count = OPEN_COUNT,
                                 .most_count = 255};
 
-Error gripper_error(const std::string &port, int error) {
+Error gripper_error(const GripperWay &way, int error) {
+  const std::string &port = way.port;
   switch (error) {
   case ETIMEDOUT:
-    return Error(ErrorCode::gripper_silent, port + ": no answer from a gripper within " +
-                                                std::to_string(TIMEOUT_us / 1000) + " ms");
+    return silent(way);
   case EMBBADCRC:
     return Error(ErrorCode::gripper_garbled, port + ": an answer is damaged (CRC)");
   case EMBBADSLAVE:
@@ -79,7 +78,8 @@ RobotiqGripper::RobotiqGripper(const GripperWay &given)
   traits_.step_mm = traits_.stroke_mm / (*way_.closed_count - *way_.open_count);
   modbus_set_slave(modbus_, way_.slave);
   modbus_set_socket(modbus_, line_.descriptor());
-  modbus_set_response_timeout(modbus_, 0, TIMEOUT_us);
+  const auto timeout_us = static_cast<std::uint32_t>(way_.timeout_s * 1e6);
+  modbus_set_response_timeout(modbus_, timeout_us / 1'000'000, timeout_us % 1'000'000);
   modbus_set_byte_timeout(modbus_, 0, GAP_us);
   try {
     try {
@@ -103,7 +103,7 @@ RobotiqGripper::~RobotiqGripper() {
 
 void RobotiqGripper::exchange(const std::function<int()> &ask) {
   if (line_.descriptor() < 0) {
-    throw gripper_error(line_.path(), EIO);
+    throw gripper_error(way_, EIO);
   }
   line_.drop_input();
   began_us_ = steady_us();
@@ -111,7 +111,7 @@ void RobotiqGripper::exchange(const std::function<int()> &ask) {
     const int error = errno;
     // Whoever answers late answers the next question.
     doubtful_ = true;
-    throw gripper_error(line_.path(), error);
+    throw gripper_error(way_, error);
   }
 }
 
