@@ -47,6 +47,7 @@ sigrok-cli sigrok-cli
 /usr/include/CLI/CLI.hpp libcli11-dev
 /usr/include/eigen3/Eigen/Dense libeigen3-dev
 /usr/include/nlohmann/json.hpp nlohmann-json3-dev
+/usr/share/doc/python3-venv python3-venv
 /usr/lib/python3/dist-packages/numpy/__init__.py python3-numpy
 /usr/lib/python3/dist-packages/matplotlib/__init__.py python3-matplotlib
 /usr/lib/python3/dist-packages/markdown/__init__.py python3-markdown
@@ -96,6 +97,13 @@ if ! cmp -s $emulator/package-lock.json $emulator/node_modules/.installed-lock; 
   say "fetching the emulator's one dependency with npm"
   (cd $emulator && npm ci --no-audit --no-fund --loglevel=error)
   cp $emulator/package-lock.json $emulator/node_modules/.installed-lock
+fi
+
+if [ "$1" = test ] && ! cmp -s tests/requirements.txt build/venv/.installed-requirements; then
+  say "fetching the tests' judges with pip"
+  /usr/bin/python3 -m venv --clear build/venv
+  build/venv/bin/pip --quiet --disable-pip-version-check install -r tests/requirements.txt
+  cp tests/requirements.txt build/venv/.installed-requirements
 fi
 
 say "building firmware and host tools into build/"

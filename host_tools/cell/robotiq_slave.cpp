@@ -43,10 +43,10 @@ GripperMove RobotiqSlave::wanted() const {
 void RobotiqSlave::update() {
   const bool was_active = (done_[0] & rACT) != 0, went = (done_[0] & (rGTO | rATR)) != 0;
   if (!says(rACT)) {
-    failed_ = NO_FAULT;
-    released_ = false;
     motion_.power_off();
   } else if (!was_active) {
+    failed_ = NO_FAULT;
+    released_ = false;
     motion_.activate();
   }
   if (says(rACT) && motion_.active() && failed_ == NO_FAULT && !released_) {

@@ -32,7 +32,7 @@ public:
 
   // Without power all that was written is lost.
   void lose_power();
-  // A fault that stays until a reset; of enum Fault.
+  // A fault that stays until the next activation; of enum Fault.
   void fail(std::uint8_t fault) { failed_ = fault; }
 
 private:

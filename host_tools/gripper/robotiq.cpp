@@ -63,17 +63,21 @@ std::uint16_t share(double value, double least, double most) {
   return static_cast<std::uint16_t>(std::lround((clamped - least) / (most - least) * 255.0));
 }
 
+GripperWay robotiq_way(const GripperWay &given) {
+  const GripperWay way = complete(given, USUAL);
+  if (way.open_count > way.closed_count) {
+    throw Error(ErrorCode::bad_value, "the count of a Robotiq gripper grows while it closes");
+  }
+  return way;
+}
+
 } // namespace
 
 RobotiqGripper::RobotiqGripper(const GripperWay &given)
-    : traits_(gripper_traits(given.model)), way_(complete(given, USUAL)), line_(way_.port, BAUD),
+    : traits_(gripper_traits(given.model)), way_(robotiq_way(given)), line_(way_.port, BAUD),
       modbus_(modbus_new_rtu(way_.port.c_str(), BAUD, 'N', 8, 1)) {
   if (modbus_ == nullptr) {
     throw std::bad_alloc();
-  }
-  if (way_.open_count > way_.closed_count) {
-    modbus_free(modbus_);
-    throw Error(ErrorCode::bad_value, "the count of a Robotiq gripper grows while it closes");
   }
   traits_.step_mm = traits_.stroke_mm / (*way_.closed_count - *way_.open_count);
   modbus_set_slave(modbus_, way_.slave);
