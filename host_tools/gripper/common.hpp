@@ -19,8 +19,8 @@ GripperWay complete(GripperWay way, const GripperUsual &usual);
 
 Error silent(const GripperWay &complete);
 
-// "; the USB adapter's latency timer ..." where the adapter's latency timer limits the rate of a
-// command, which takes so many exchanges; "" where it does not.
+// "; the USB adapter's latency timer ..." where that limits the rate of a command, which takes so
+// many exchanges; "" where it does not.
 std::string limited_by(const std::string &port, int exchanges);
 
 std::int64_t steady_us();

@@ -53,14 +53,18 @@ template <typename Act> ErrorCode code_of(Act act) {
 
 } // namespace
 
-/* Feetech, "STS Magnetic Encoding Smart Servo Protocol Manual": pings servo 1; reads two bytes from
- * 56 of it. */
+/* Examples of Feetech's protocol manual for SCS and STS servos: pings servo 1, reads two bytes from
+ * 56 of it, writes position 2048, time 0 and speed 1000; the answer is a read's. */
 TEST(FeetechPacket, IsThatOfTheManual) {
   using feetech::Bytes;
   EXPECT_EQ(feetech::encoded({.id = 1, .code = feetech::PING}),
             (Bytes{0xFF, 0xFF, 0x01, 0x02, 0x01, 0xFB}));
   EXPECT_EQ(feetech::encoded({.id = 1, .code = feetech::READ, .parameters = {0x38, 0x02}}),
             (Bytes{0xFF, 0xFF, 0x01, 0x04, 0x02, 0x38, 0x02, 0xBE}));
+  EXPECT_EQ(feetech::encoded({.id = 1,
+                              .code = feetech::WRITE,
+                              .parameters = {0x2A, 0x00, 0x08, 0x00, 0x00, 0xE8, 0x03}}),
+            (Bytes{0xFF, 0xFF, 0x01, 0x09, 0x03, 0x2A, 0x00, 0x08, 0x00, 0x00, 0xE8, 0x03, 0xD5}));
   Bytes answer = {0xFF, 0xFF, 0x01, 0x04, 0x00, 0x18, 0x05, 0xDD};
   std::size_t skipped = 0;
   const auto packet = feetech::take_packet(&answer, &skipped);
