@@ -162,8 +162,8 @@ class Tool(unittest.TestCase):
             self.assertEqual(server.registers(1001, 1), [100])
 
     def test_what_is_wrong_is_said(self):
-        usual = ("--model", "2f85", "--timeout", "300")
-        for fault, said in (("silent", "no answer from slave 9 within 300 ms; is it powered"), ("garbage", "look for a second program"),
+        usual = ("--model", "2f85", "--timeout", "1500")
+        for fault, said in (("silent", "no answer from slave 9 within 1500 ms; is it powered"), ("garbage", "look for a second program"),
                             ("damaged", "an answer is damaged \\(CRC\\)"), ("other_slave", "another slave answers"),
                             ("refused", "refused with Modbus exception 1")):
             with self.subTest(fault), simulated("--model", "2f85", "--line", fault) as port:
