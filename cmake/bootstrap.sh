@@ -9,7 +9,7 @@ usage() {
   echo "usage: sh cmake/bootstrap.sh demo|test|report" >&2
   echo "  demo    build everything, let a lime slip on two emulated fingertips, say and draw what they felt" >&2
   echo "  test    build everything and run the whole test suite" >&2
-  echo "  report  build everything, measure fit, rate, cost, truth and tangential load, repeat the published experiments in simulation, write build/report" >&2
+  echo "  report  build everything, measure fit, rate, cost, truth, tangential load and grasps, repeat the published experiments in simulation, write build/report" >&2
   exit 2
 }
 [ $# -eq 1 ] || usage
@@ -136,6 +136,8 @@ case $1 in
       --picture host_tools/report/truth/truth.png
     say "tangential load: how far from the truth, on which pads"
     /usr/bin/python3 host_tools/report/shear/shear.py --build build/host -o build/report --picture host_tools/report/shear/shear.png
+    say "grasps in the simulated cell"
+    /usr/bin/python3 host_tools/report/grasp/grasp.py --build build/host -o build/report --picture host_tools/report/grasp/grasp.png
     say "every table and picture: $root/build/report/index.html"
     ;;
 esac
