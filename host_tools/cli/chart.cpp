@@ -113,9 +113,10 @@ ChartPoint point_of(const Curve &curve, const Times &times, int dot) {
   ChartPoint point;
   times.each(curve.last, dot, [&](std::int64_t interval) {
     const ChartPoint here = curve.at(interval);
-    bool better = here.value && (!point.value || (point.doubtful && !here.doubtful) ||
-                                 (point.doubtful == here.doubtful &&
-                                  (curve.goes_both_ways || *here.value > *point.value)));
+    bool better =
+        here.value &&
+        (!point.value || (point.doubtful && !here.doubtful) ||
+         (point.doubtful == here.doubtful && (curve.goes_both_ways || *here.value > *point.value)));
     if (better) {
       point.value = here.value;
       point.doubtful = here.doubtful;

@@ -136,8 +136,7 @@ int CommandLine::run(int argc, char **argv) {
 void with_transport(CLI::App *command, Reach &reach) {
   command
       ->add_option_function<std::string>(
-          "--transport",
-          [&reach](const std::string &text) { reach = reach_from_text(text); },
+          "--transport", [&reach](const std::string &text) { reach = reach_from_text(text); },
           "socket (of fingertip serve), serial, usb (libusb, past the system's driver), or auto: "
           "the first of these that there is")
       ->type_name("KIND");

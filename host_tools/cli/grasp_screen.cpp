@@ -106,7 +106,10 @@ void draw_force(Canvas &canvas, const Area &area, const Felt &felt, float wanted
   bool over = felt.force_N && *felt.force_N > full_N;
   for (int i = 0; i < area.width; i++) {
     canvas.text(area.left + i, area.top, i < filled ? "█" : "░",
-                text_style(i >= filled ? RULE : over ? BAD : felt.doubtful ? WARNING : colour));
+                text_style(i >= filled     ? RULE
+                           : over          ? BAD
+                           : felt.doubtful ? WARNING
+                                           : colour));
   }
   if (wanted_N > 0) {
     int at = std::min(cells(wanted_N), area.width - 1);
@@ -155,17 +158,17 @@ void draw_panel(Canvas &canvas, const Area &area, const std::vector<Model> &fing
   draw_quantity(canvas, column + 1, row, {"cap", number(grip.cap_N(), 1), 5, "N"});
   row++;
   bool loaded = report.load_mN > 0 || report.margin_permille > 0;
-  column = draw_quantity(canvas, area.left, row,
-                         {"load  ", loaded ? std::optional(newton(report.load_mN)) : std::nullopt,
-                          6, "N "});
+  column = draw_quantity(
+      canvas, area.left, row,
+      {"load  ", loaded ? std::optional(newton(report.load_mN)) : std::nullopt, 6, "N "});
   draw_quantity(canvas, column + 1, row,
                 {"margin",
                  report.margin_permille > 0 ? std::optional(fixed(report.margin_permille / 1e3, 2))
                                             : std::nullopt,
                  5, ""});
   row++;
-  column = draw_quantity(canvas, area.left, row,
-                         {"slides", std::to_string(report.slides), 6, "  "});
+  column =
+      draw_quantity(canvas, area.left, row, {"slides", std::to_string(report.slides), 6, "  "});
   draw_quantity(canvas, column + 1, row,
                 {"friction", fixed(report.friction_permille / 1e3, 2), 4, ""});
   row++;
@@ -222,9 +225,17 @@ void draw_over_time(Canvas &canvas, const Area &area, const std::vector<Model> &
   });
   draw_charts(canvas, area, INTERVAL_s,
               {{"force", "N", 0, round_above(force_N), std::nullopt, std::move(forces)},
-               {"load", "N", 0, round_above(load_N), std::nullopt,
+               {"load",
+                "N",
+                0,
+                round_above(load_N),
+                std::nullopt,
                 {grip_curve(grip, &Sample::loaded, &Sample::load_N, ACCENT)}},
-               {"width", "mm", 0, round_above(width_mm), std::nullopt,
+               {"width",
+                "mm",
+                0,
+                round_above(width_mm),
+                std::nullopt,
                 {grip_curve(grip, &Sample::answered, &Sample::width_mm, ACCENT)}}});
 }
 
@@ -240,10 +251,10 @@ Canvas draw_grasp(const std::vector<Model> &fingertips, const GripModel &grip,
                     std::to_string(MONITOR_ROWS),
                 text_style(WARNING, true));
     int row = 1;
-    for (const std::string &line : flowed({state_text(grip.row() ? grip.row()->report.state
-                                                                 : std::uint8_t{GRIP_IDLE}),
-                                           grip_line(grip)},
-                                          "\n", columns)) {
+    for (const std::string &line :
+         flowed({state_text(grip.row() ? grip.row()->report.state : std::uint8_t{GRIP_IDLE}),
+                 grip_line(grip)},
+                "\n", columns)) {
       canvas.text(0, row++, line);
     }
     draw_caption(canvas, caption);

@@ -128,8 +128,7 @@ private:
       models_[i].take(ready[i].packet);
       models_[i].set_state(Model::State::live);
       check_for_grasp(loop_.name(i), info, ready[i].health);
-      for (const std::string &lack :
-           lacks_for_grasp(info, settings_.mode == GRIP_MODE_HOLD)) {
+      for (const std::string &lack : lacks_for_grasp(info, settings_.mode == GRIP_MODE_HOLD)) {
         std::fprintf(stderr, "%s (%s) %s\n", SIDES[i], text_field(info.serial).c_str(),
                      printable(lack).c_str());
       }
@@ -157,8 +156,8 @@ private:
         keeper_->comment(GRIP_ROW_KEY, static_cast<double>(zero_us_), "time_us," + grip_columns());
       });
     }
-    loop_.begin(std::move(gripper), [way] { return open_gripper(way); },
-                settings_);
+    loop_.begin(
+        std::move(gripper), [way] { return open_gripper(way); }, settings_);
   }
 
   void check(Gripper &gripper, const std::string &port) const {
@@ -237,9 +236,7 @@ private:
     case Kind::gone:
     case Kind::back:
       model.set_state(news.kind == Kind::gone ? Model::State::gone : Model::State::live);
-      keep([&] {
-        keeper_->event(news.device, news.kind == Kind::gone ? EVENT_GONE : EVENT_BACK);
-      });
+      keep([&] { keeper_->event(news.device, news.kind == Kind::gone ? EVENT_GONE : EVENT_BACK); });
       break;
     case Kind::ended:
       if (!ending_) {
@@ -275,12 +272,11 @@ private:
 
   void take_step(const GraspNews &news) {
     const grip_report &report = news.report;
-    bool changed = !last_ || report.state != last_->report.state ||
-                   report.trouble != last_->report.trouble ||
-                   report.slides != last_->report.slides ||
-                   news.command.motion != last_->command.motion ||
-                   news.command.width_um != last_->command.width_um ||
-                   (news.status && (!last_->status || news.status->host_us != last_->status->host_us));
+    bool changed =
+        !last_ || report.state != last_->report.state || report.trouble != last_->report.trouble ||
+        report.slides != last_->report.slides || news.command.motion != last_->command.motion ||
+        news.command.width_um != last_->command.width_um ||
+        (news.status && (!last_->status || news.status->host_us != last_->status->host_us));
     if (last_ && report.state != last_->report.state) {
       state_since_us_ = news.host_us;
     }
@@ -330,14 +326,14 @@ private:
       failure_ = "both fingertips are lost";
     }
     bool at_end = is_end_state(state()) && state_us() > TAIL_us;
-    bool is_inactive = state() == GRIP_ACTIVATING &&
-                       (last_->report.trouble & GRIP_GRIPPER_INACTIVE) != 0;
+    bool is_inactive =
+        state() == GRIP_ACTIVATING && (last_->report.trouble & GRIP_GRIPPER_INACTIVE) != 0;
     inactive_since_us_ = is_inactive ? inactive_since_us_ : steady_now_us();
     bool never_active = steady_now_us() - inactive_since_us_ > INACTIVE_us;
     bool opened = state() == GRIP_OPEN && interrupts() > 1;
     return !failure_.empty() || quit_ || end_requested() || interrupts() > 2 || opened ||
-              (!has_keys_ && (at_end || never_active)) ||
-              (options_.seconds && static_cast<double>(since_begin_us) > 1e6 * *options_.seconds);
+           (!has_keys_ && (at_end || never_active)) ||
+           (options_.seconds && static_cast<double>(since_begin_us) > 1e6 * *options_.seconds);
   }
 
   void show() {
@@ -419,7 +415,8 @@ private:
       }
     }
     std::string width = last_ && last_->status ? fixed(last_->status->width_mm, 1) + " mm" : "?";
-    std::fprintf(stderr, "%s; the gripper keeps its position, %s (`fingertip gripper open` opens it)\n",
+    std::fprintf(stderr,
+                 "%s; the gripper keeps its position, %s (`fingertip gripper open` opens it)\n",
                  state_text(state_at_end_).c_str(), width.c_str());
     loop_.rethrow();
     if (!failure_.empty()) {
@@ -451,9 +448,8 @@ private:
 } // namespace
 
 int run_grasp(const GraspOptions &options) {
-  const grip_settings settings = typed([&] {
-    return settings_for(gripper_traits(options.gripper.model), options.limits);
-  });
+  const grip_settings settings =
+      typed([&] { return settings_for(gripper_traits(options.gripper.model), options.limits); });
   if (!options.recording.empty()) {
     check_output(options.recording, options.overwrite);
   }

@@ -24,9 +24,7 @@ std::string only_port() {
 } // namespace
 
 void with_gripper_line(CLI::App *command, GripperWay &way) {
-  command
-      ->add_option("--slave", way.slave,
-                   "Its address on the line; default: 9, of a servo 6")
+  command->add_option("--slave", way.slave, "Its address on the line; default: 9, of a servo 6")
       ->type_name("N");
   command
       ->add_option("--closed", way.closed_count,

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "cli/canvas.hpp"
+#include "cli/caption.hpp"
 #include "cli/model.hpp"
-#include "cli/panel.hpp"
 
 #include <vector>
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "cli/canvas.hpp"
+#include "cli/caption.hpp"
 #include "cli/ink.hpp"
 #include "cli/model.hpp"
 
@@ -11,13 +12,6 @@
 #include <vector>
 
 namespace fingertip {
-
-/* What stands below the fingertips. */
-struct Caption {
-  std::string keys;     /* what they do */
-  std::string note;     /* what else is going on, such as the recording */
-  std::string question; /* instead of both */
-};
 
 struct Told {
   std::string text;

@@ -47,8 +47,8 @@ std::vector<Way> ways_of(const Several &several) {
 void with_seconds(CLI::App *command, std::optional<double> &seconds, const std::string &help) {
   command
       ->add_option_function<std::string>(
-          "--seconds",
-          [&seconds](const std::string &text) { seconds = seconds_from_text(text); }, help)
+          "--seconds", [&seconds](const std::string &text) { seconds = seconds_from_text(text); },
+          help)
       ->type_name("S");
 }
 

@@ -20,7 +20,8 @@ void check_for_grasp(const std::string &name, const wire_info &info, const wire_
   }
   const std::uint32_t all = info.sensor_count < 32 ? (1u << info.sensor_count) - 1 : ~0u;
   if ((health.sensors_present & all) == 0) {
-    throw Error(name + ": none of its sensors answers; see their wiring and supply (fingertip info)");
+    throw Error(name +
+                ": none of its sensors answers; see their wiring and supply (fingertip info)");
   }
 }
 

@@ -61,7 +61,7 @@ grip_status core_status(const GripperStatus &status) {
   core.width_um = thousandths(status.width_mm);
   core.is_active = status.active;
   core.is_moving = status.moving;
-  core.object = !status.object    ? GRIP_OBJECT_UNKNOWN
+  core.object = !status.object   ? GRIP_OBJECT_UNKNOWN
                 : *status.object ? GRIP_OBJECT_HELD
                                  : GRIP_OBJECT_NONE;
   core.fault = status.fault;

@@ -1,6 +1,7 @@
 #include "grasp/grasp_loop.hpp"
 
 #include "grasp/convert.hpp"
+#include "grasp/words.hpp"
 #include "libfingertip/error.hpp"
 
 #include <algorithm>
@@ -43,8 +44,7 @@ double GraspLoop::read_until_us() const {
   return std::min(loops_[0]->read_until_us(), loops_[1]->read_until_us());
 }
 
-std::array<DeviceNews, GraspLoop::FINGERS>
-GraspLoop::meet(const std::function<bool()> &stop) {
+std::array<DeviceNews, GraspLoop::FINGERS> GraspLoop::meet(const std::function<bool()> &stop) {
   std::array<std::optional<DeviceNews>, FINGERS> ready;
   while (!ready[0] || !ready[1]) {
     if (stop()) {
@@ -69,8 +69,7 @@ void GraspLoop::begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen,
   const grip_traits traits = core_traits(gripper->traits());
   if (grip_init(&core_, &settings, &traits) != FT_OK) {
     throw Error(ErrorCode::bad_value, "these limits do not go with a gripper " +
-                                          gripper->traits().model +
-                                          ", or contradict one another");
+                                          gripper->traits().model + ", or contradict one another");
   }
   status_ = gripper->poll();
   const grip_status first = core_status(*status_);
@@ -130,7 +129,9 @@ void GraspLoop::run() {
     obey_interrupts();
     step();
   }
-  request(GRIP_REQUEST_HOLD);
+  if (report_.state != GRIP_IDLE && !is_end_state(report_.state)) {
+    request(GRIP_REQUEST_HOLD);
+  }
   const std::int64_t patience_us = steady_now_us() + LAST_WORD_us;
   do {
     take_devices();
@@ -195,6 +196,7 @@ void GraspLoop::step() {
   if (is_activating_ || news.command.motion == GRIP_ACTIVATE) {
     news.command.motion = is_activating_ ? GRIP_ACTIVATE : GRIP_STAY;
   }
+  report_ = news.report;
   gripper_->command(news.command);
   news.status = status_;
   put(std::move(news));

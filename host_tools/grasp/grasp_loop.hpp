@@ -114,11 +114,11 @@ private:
 
   mutable std::mutex core_mutex_; // of the core
   grip core_{};
-  grip_report report_{};
 
   std::unique_ptr<GripperThread> gripper_;
   std::optional<GripperStatus> status_;
   std::string gripper_trouble_;
+  grip_report report_{}; // of the last step
   bool is_activating_ = false;
   unsigned interrupts_ = 0;
   std::atomic<bool> end_{false}, abandoned_{false};

@@ -40,9 +40,7 @@ template <typename Visitor> void visit(Visitor &visitor, GripRow &row, GripperSt
 
 struct Namer {
   std::string text;
-  void put(const char *name) {
-    text += (text.empty() ? "" : ",") + std::string(name);
-  }
+  void put(const char *name) { text += (text.empty() ? "" : ",") + std::string(name); }
   void state(const char *name, std::uint8_t) { put(name); }
   void trouble(const char *name, std::uint32_t) { put(name); }
   void number(const char *name, const double *, int) { put(name); }
@@ -182,7 +180,8 @@ GripRow grip_row(std::string_view value) {
   static const std::size_t status_us = status_column(columns);
   const auto cells = split(value, ',');
   if (cells.size() != columns.size()) {
-    throw Error(ErrorCode::damaged_line, std::to_string(cells.size()) + " columns of the gripper instead of " +
+    throw Error(ErrorCode::damaged_line, std::to_string(cells.size()) +
+                                             " columns of the gripper instead of " +
                                              std::to_string(columns.size()));
   }
   GripRow row;
@@ -220,8 +219,9 @@ std::optional<GripRow> GripRowReader::next() {
     const std::string_view value = trim(std::string_view(line).substr(beginning.size()));
     if (value.substr(0, 8) == "time_us,") {
       if (value != "time_us," + grip_columns()) {
-        throw Error(ErrorCode::other_format, path_ + ":" + std::to_string(line_number_) +
-                                                 ": other columns of the gripper than this version's");
+        throw Error(ErrorCode::other_format,
+                    path_ + ":" + std::to_string(line_number_) +
+                        ": other columns of the gripper than this version's");
       }
       continue;
     }

@@ -3,8 +3,8 @@
 // between:
 //
 //   # grip: time_us,state,trouble,width_mm,...        once, before the first
-//   # grip: 1530022.0,holding,,34.217,...             the time is the rows', on the recorder's clock
-//   # grip_event: text                                what was asked for and what went wrong
+//   # grip: 1530022.0,holding,,34.217,...             the time is the rows', on the recorder's
+//   clock # grip_event: text                                what was asked for and what went wrong
 //
 // so that `sed -n 's/^# grip: //p' grasp.csv` is a CSV file. A row stands for each change of state,
 // trouble, command or answer, and else for every 10 ms.

@@ -20,8 +20,8 @@ constexpr std::size_t MOST_NEWS = 2000;
 
 bool is_same(const grip_command &a, const grip_command &b) {
   return a.motion == b.motion &&
-         (a.motion != GRIP_MOVE || (a.width_um == b.width_um && a.speed_um_s == b.speed_um_s &&
-                                    a.force_mN == b.force_mN));
+         (a.motion != GRIP_MOVE ||
+          (a.width_um == b.width_um && a.speed_um_s == b.speed_um_s && a.force_mN == b.force_mN));
 }
 
 } // namespace
@@ -79,8 +79,9 @@ GripperStatus GripperThread::exchange() {
   if (is_new && command.motion == GRIP_ACTIVATE) {
     gripper_->activate();
   }
-  const GripperStatus status =
-      is_new && command.motion == GRIP_MOVE ? gripper_->move(gripper_move(command)) : gripper_->poll();
+  const GripperStatus status = is_new && command.motion == GRIP_MOVE
+                                   ? gripper_->move(gripper_move(command))
+                                   : gripper_->poll();
   std::lock_guard lock(mutex_);
   sent_ = number;
   return status;

@@ -29,7 +29,8 @@ double value_of(const GraspSetting &setting, grip_settings settings);
 
 // Defaults of this gripper, and over them what is wanted, by name; "fixed" chooses that mode.
 // Throws Error, code bad_value: a value out of range, or one that contradicts another.
-grip_settings settings_for(const GripperTraits &traits, const std::map<std::string, double> &wanted);
+grip_settings settings_for(const GripperTraits &traits,
+                           const std::map<std::string, double> &wanted);
 
 // For a recording's head: grasp_mode, grasp_touch_N, ...
 Metadata settings_metadata(const grip_settings &settings);

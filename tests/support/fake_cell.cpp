@@ -3,8 +3,8 @@
 //   fake_cell FOLDER [key=value]...       makes FOLDER/left, FOLDER/right, FOLDER/gripper
 //     model=2f85 object=40 stiffness=2 rate=200 active=1
 //
-// object: its width in mm, which does not yield; stiffness: of either pad, N/mm; active: the gripper
-// has been activated. Then each line of standard input is done and answered by the truth,
+// object: its width in mm, which does not yield; stiffness: of either pad, N/mm; active: the
+// gripper has been activated. Then each line of standard input is done and answered by the truth,
 // "WIDTH FORCE": the width in mm and the force on either pad in N.
 //
 //   object MM | load N | slide 0|1 | over 0|1 | stall SIDE 0|1 | freeze SIDE 0|1

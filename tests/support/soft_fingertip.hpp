@@ -51,7 +51,7 @@ public:
   const std::string &link() const { return link_; }
   // Before anybody asks for it.
   wire_info &info() { return info_.body.info; }
-  std::atomic<bool> frozen{false}; // frames, whose values never change
+  std::atomic<bool> frozen{false};  // frames, whose values never change
   std::atomic<bool> stalled{false}; // no frames, but answers
 
   void unplug() {
@@ -102,7 +102,9 @@ private:
     std::uint64_t next_us = 0;
     while (!ended_) {
       const std::uint64_t now = now_us();
-      const int wait_ms = streams_ == 0 ? 5 : next_us > now ? static_cast<int>((next_us - now) / 1000) : 0;
+      const int wait_ms = streams_ == 0   ? 5
+                          : next_us > now ? static_cast<int>((next_us - now) / 1000)
+                                          : 0;
       pollfd waiting = {master_, POLLIN, 0};
       if (poll(&waiting, 1, wait_ms) > 0) {
         std::uint8_t bytes[256];

@@ -59,9 +59,7 @@ void add_grasp(CommandLine &line) {
   for (const GripperTraits &traits : gripper_models()) {
     models += (models.empty() ? "" : ", ") + traits.model;
   }
-  command->add_option("--gripper", options->gripper.model, models)
-      ->required()
-      ->type_name("MODEL");
+  command->add_option("--gripper", options->gripper.model, models)->required()->type_name("MODEL");
   command
       ->add_option("--gripper-port", options->gripper.port,
                    "Its serial line; default: the only one on USB that is no fingertip")
@@ -73,8 +71,7 @@ void add_grasp(CommandLine &line) {
   command->add_flag("--activate", options->activate,
                     "Activate a gripper that is not: it moves, and drops what it holds");
   with_seconds(command, options->seconds, "End after this long, the gripper holding");
-  command->add_option("-o,--record", options->recording, "Record all of it")
-      ->type_name("FILE.csv");
+  command->add_option("-o,--record", options->recording, "Record all of it")->type_name("FILE.csv");
   command->add_flag("--overwrite", options->overwrite, "Replace FILE.csv if it exists");
   command->add_flag("--quiet", options->quiet, "Only what changes, on standard error");
   with_transport(command, options->reach);

@@ -19,8 +19,8 @@ protected:
 
   test::Feel feel() {
     test::Feel feel;
-    feel.force_N = static_cast<float>(
-        std::max(0.0, STIFFNESS_N_mm * (object_mm_ - state_->width_mm()) / 2));
+    feel.force_N =
+        static_cast<float>(std::max(0.0, STIFFNESS_N_mm * (object_mm_ - state_->width_mm()) / 2));
     feel.qy_N = load_N_;
     return feel;
   }
@@ -187,9 +187,8 @@ TEST_F(GraspLoopTest, ASilentGripperIsToldAndTakenUpAgain) {
   ASSERT_TRUE(until_trouble(GRIP_GRIPPER_SILENT, true));
   EXPECT_EQ(last_.command.motion, GRIP_STAY);
   state_->silent = false;
-  ASSERT_TRUE(until([](const GraspNews &news) {
-    return news.kind == Kind::gripper && news.text.empty();
-  }));
+  ASSERT_TRUE(
+      until([](const GraspNews &news) { return news.kind == Kind::gripper && news.text.empty(); }));
   ASSERT_TRUE(until_trouble(GRIP_GRIPPER_SILENT, false));
   EXPECT_EQ(last_.report.state, GRIP_HOLDING);
   end();

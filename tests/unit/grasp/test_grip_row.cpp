@@ -124,7 +124,8 @@ TEST(GripRow, EveryWrongCellIsNamed) {
 TEST_F(GripRowFile, RowsAreFoundBetweenOthersAndFromAnyPlace) {
   const std::string row = grip_cells(row_with_everything());
   write({"# fingertip-recording 2\n", "# grip: time_us," + grip_columns() + "\n", "0,1,2\n",
-         "# grip: 100.0," + row + "\n", "# grip_event: 1.0,hold\n", "# grip: 200.0," + row + "\r\n"});
+         "# grip: 100.0," + row + "\n", "# grip_event: 1.0,hold\n",
+         "# grip: 200.0," + row + "\r\n"});
   GripRowReader reader(path_, false);
   EXPECT_EQ(reader.next()->time_us, 100);
   const auto place = reader.place();
@@ -182,8 +183,8 @@ TEST_F(GripRowFile, AJointRecordingWithThemIsReadAsOneWithoutByWhoeverDoesNotKno
     RecordingReader reader(path_, false, serial);
     std::uint32_t frames = 0;
     while (auto item = reader.next()) {
-      frames += item->kind == RecordingReader::Item::Kind::packet &&
-                item->packet.type == WIRE_CONTACT;
+      frames +=
+          item->kind == RecordingReader::Item::Kind::packet && item->packet.type == WIRE_CONTACT;
     }
     EXPECT_EQ(frames, 10u);
     EXPECT_TRUE(reader.has_end());

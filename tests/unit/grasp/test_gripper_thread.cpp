@@ -49,7 +49,8 @@ TEST_F(GripperThreadTest, TheNewestCommandGoesOutOnceAndAnswersComeBack) {
     std::this_thread::sleep_for(milliseconds(1));
   }
   EXPECT_TRUE(thread.is_done());
-  EXPECT_TRUE(comes(thread, [](const auto &news) { return news.status && news.status->width_mm < 50; }));
+  EXPECT_TRUE(
+      comes(thread, [](const auto &news) { return news.status && news.status->width_mm < 50; }));
   for (int i = 0; i < 5; i++) {
     thread.command({GRIP_MOVE, 38000, 50000, 0}); /* the same */
     EXPECT_TRUE(comes(thread, is_answer));

@@ -9,7 +9,9 @@ using namespace fingertip;
 
 namespace {
 
-const GripperTraits &any() { return gripper_traits("2f85"); }
+const GripperTraits &any() {
+  return gripper_traits("2f85");
+}
 
 std::string error_of(const std::map<std::string, double> &wanted) {
   try {
@@ -96,7 +98,8 @@ TEST(GraspSettings, DefaultsGiveWayButWishesDoNot) {
   const grip_settings settings = settings_for(any(), {{"cap", 5}});
   EXPECT_EQ(settings.blind_mN, 5000);
   EXPECT_EQ(settings_for(any(), {{"cap", 1}}).first_mN, 1000);
-  EXPECT_NE(error_of({{"cap", 5}, {"blind", 6}}).find("--blind is not possible"), std::string::npos);
+  EXPECT_NE(error_of({{"cap", 5}, {"blind", 6}}).find("--blind is not possible"),
+            std::string::npos);
   EXPECT_NE(error_of({{"cap", 5}, {"fixed", 6}}).find("above --cap"), std::string::npos);
   EXPECT_NE(error_of({{"first", 3}, {"blind", 2}}).find("between --first and --cap"),
             std::string::npos);
