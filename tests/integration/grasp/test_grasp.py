@@ -325,6 +325,7 @@ class Trouble(GraspTest):
             process = self.hold()
             self.tell("over 1")
             self.told(process, "beyond its range")
+            time.sleep(0.5)  # what is under way
             before = self.tell("load 6")[1]
             time.sleep(0.5)
             self.assertLessEqual(self.tell()[1], before + 0.4)

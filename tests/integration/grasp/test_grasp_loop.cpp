@@ -116,6 +116,8 @@ TEST_F(GraspLoopTest, NothingMovesBeforeItIsRequestedThenTheObjectIsHeldAsItsLoa
   EXPECT_GT(last_.report.load_mN, 900);
   EXPECT_EQ(state_->activations, 0);
   end();
+  EXPECT_EQ(last_.report.state, GRIP_STILL);
+  EXPECT_EQ(last_.command.motion, GRIP_STAY);
   EXPECT_GT(feel().force_N, 2.5f) << "opened at its end";
   EXPECT_LT(highest_N_, 10.0f);
 }
