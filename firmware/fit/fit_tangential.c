@@ -66,14 +66,12 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
 /* Longest step of the place, and of t in the narrowest term's variance. */
 #define MOVE_MAX_Q26 (ONE_Q26 * 3 / 8)
 
-#define PIVOT_LEAST (1 << 18) /* 2^-12: what is told less is left where it is */
+/* Beyond so long a step, of the longest, an estimate is on its way and not told. */
+#define LENGTH_TOLD_Q14 3277
+/* After so many frames in a row that should be told but are not it begins anew. */
+#define UNTOLD_MOST 255
 
-struct unknowns {
-  int32_t amplitude_q24; /* of the unit of readings */
-  int32_t x_q26, y_q26;  /* from the grid's origin node */
-  int32_t t_q26, e1_q26, e2_q26;
-  int32_t pull_x_q24, pull_y_q24;
-};
+#define PIVOT_LEAST (1 << 18) /* 2^-12: what is told less is left where it is */
 
 /* What of the readings is kept from step to step. */
 struct problem {
@@ -205,7 +203,7 @@ struct offset {
   int32_t along_q28, across_q28; /* e1 d, e2 d */
 };
 
-static void set_offset(int32_t d_q26, int32_t pull_q24, const struct unknowns *at,
+static void set_offset(int32_t d_q26, int32_t pull_q24, const struct fit_tangential_unknowns *at,
                        struct offset *off) {
   off->d_q26 = d_q26;
   off->d_q13 = rounded(d_q26, 13);
@@ -332,7 +330,7 @@ FIXED_INLINE int32_t limited_q15(int32_t value_q20) {
  * (e1 and e2 with the amplitude in them). In parts, for the eight low registers. */
 struct place {
   const struct offset *x, *y;
-  const struct unknowns *at;
+  const struct fit_tangential_unknowns *at;
   int32_t weight;
   int32_t pulled_q26, longer_q28; /* b and P */
 };
@@ -401,7 +399,7 @@ NOINLINE static void set_still(const struct place *place, int32_t f0_q28,
   node->column[PULL_Y] = weighed(rounded(f_q16 * y->d_q13, 13), weight);
 }
 
-NOINLINE static void linearise(const struct problem *problem, const struct unknowns *at, bool round,
+NOINLINE static void linearise(const struct problem *problem, const struct fit_tangential_unknowns *at, bool round,
                                struct fit_tangential_room *room) {
   const struct fit_pad *pad = problem->pad;
   struct offset off_x[COLUMNS], off_y[ROWS];
@@ -444,7 +442,7 @@ struct priors {
   int32_t residual[UNKNOWNS]; /* Q24, then as the residuals */
 };
 
-static void set_priors(const struct problem *problem, const struct unknowns *at,
+static void set_priors(const struct problem *problem, const struct fit_tangential_unknowns *at,
                        struct priors *priors) {
   memset(priors, 0, sizeof *priors);
   priors->row_q26[SPREAD] = problem->spread_prior_q26;
@@ -696,6 +694,7 @@ struct outcome {
   int32_t column_q[UNKNOWNS]; /* a column's integer is its value times 2^q */
   struct scaled misfit;       /* chi^2 in units of the base's square */
   bool at_bound;
+  int32_t length_q14; /* see take_step */
 };
 
 static int32_t clamp_told(int32_t value, int32_t low, int32_t high, bool *at_bound) {
@@ -716,8 +715,10 @@ static int32_t reach(const struct fit_pad *pad, int32_t nodes) {
   return (4 * (nodes / 2) + 3) * (pad->pitch_q26 >> 2);
 }
 
-NOINLINE static void take_step(const struct problem *problem, const struct outcome *outcome,
-                               int32_t residual_q, struct unknowns *at, bool *at_bound) {
+/* Returns how long the step is, Q14 of the longest that is taken. */
+NOINLINE static int32_t take_step(const struct problem *problem, const struct outcome *outcome,
+                                  int32_t residual_q, struct fit_tangential_unknowns *at,
+                                  bool *at_bound) {
   const struct fit_pad *pad = problem->pad;
   int32_t move[UNKNOWNS];
   for (int u = 0; u < UNKNOWNS; u++) {
@@ -725,7 +726,7 @@ NOINLINE static void take_step(const struct problem *problem, const struct outco
     move[u] = shifted(outcome->solution.step_q20[u], outcome->column_q[u] - residual_q - 20 + q);
   }
   int32_t narrow = pad->variance_q26[0] + at->t_q26;
-  int32_t most = 1 << 14;
+  int32_t most = 0;
   for (int u = PLACE_X; u <= SPREAD; u++) {
     int32_t share = in_limits(move[u], u <= PLACE_Y ? MOVE_MAX_Q26 : narrow >> 1);
     most = share > most ? share : most;
@@ -747,9 +748,10 @@ NOINLINE static void take_step(const struct problem *problem, const struct outco
   at->t_q26 = fixed_clamp(at->t_q26 + move[SPREAD], spread_least(pad), SPREAD_MOST_Q26);
   at->e1_q26 = clamp_told(at->e1_q26 + move[STRETCH], -LONG_MAX_Q26, LONG_MAX_Q26, at_bound);
   at->e2_q26 = clamp_told(at->e2_q26 + move[SLANT], -LONG_MAX_Q26, LONG_MAX_Q26, at_bound);
+  return most;
 }
 
-static void improve(const struct problem *problem, struct unknowns *at, bool round,
+static void improve(const struct problem *problem, struct fit_tangential_unknowns *at, bool round,
                     struct fit_tangential_room *room, struct outcome *outcome) {
   struct priors priors;
   struct equations equations;
@@ -770,7 +772,7 @@ static void improve(const struct problem *problem, struct unknowns *at, bool rou
     squares += (priors.residual[u] * priors.residual[u]) >> 2;
   }
   outcome->misfit = fit_scaled_from(squares > 0 ? squares : 0, -2 * residual_q);
-  take_step(problem, outcome, residual_q, at, &outcome->at_bound);
+  outcome->length_q14 = take_step(problem, outcome, residual_q, at, &outcome->at_bound);
 }
 
 /* sqrt(a^2 + b^2) within 7 %, for weights. */
@@ -805,24 +807,55 @@ NOINLINE static bool weigh(const struct fit_array *array, const struct fit_setti
   return sensors >= FIT_TANGENTIAL_SENSORS;
 }
 
-NOINLINE static void begin(const struct fit_array *array, const struct fit_pad *pad,
-                           const struct fit_result *start, int32_t shift, struct unknowns *at) {
+/* What the Gaussian says of the unknowns. */
+NOINLINE static void set_from_fit(const struct fit_array *array, const struct fit_pad *pad,
+                                  const struct fit_result *fit, int32_t shift,
+                                  struct fit_tangential_unknowns *at) {
   const float q26 = 67108864.0f;
   uint8_t origin = array->grid.sensor[COLUMNS / 2 * ROWS + ROWS / 2];
   float scale = pad->per_unit * q26;
-  at->x_q26 = (int32_t)((start->x_mm - array->x[origin] * array->pitch_mm) * scale);
-  at->y_q26 = (int32_t)((start->y_mm - array->y[origin] * array->pitch_mm) * scale);
+  at->x_q26 = (int32_t)((fit->x_mm - array->x[origin] * array->pitch_mm) * scale);
+  at->y_q26 = (int32_t)((fit->y_mm - array->y[origin] * array->pitch_mm) * scale);
   at->x_q26 = fixed_clamp(at->x_q26, -reach(pad, COLUMNS), reach(pad, COLUMNS));
   at->y_q26 = fixed_clamp(at->y_q26, -reach(pad, ROWS), reach(pad, ROWS));
-  float sigma = start->sigma_mm * pad->per_unit;
+  float sigma = fit->sigma_mm * pad->per_unit;
   float square = sigma * sigma;
   int32_t most = SPREAD_MOST_Q26 + GAUSSIAN_VARIANCE_Q26;
   int32_t t_q26 = square < 1.0f ? (int32_t)(square * q26) : most;
   at->t_q26 = fixed_clamp(t_q26 - GAUSSIAN_VARIANCE_Q26, spread_least(pad), SPREAD_MOST_Q26);
   at->e1_q26 = at->e2_q26 = at->pull_x_q24 = at->pull_y_q24 = 0;
-  struct scaled amplitude = scaled_mul(fit_grid_scaled(start->force_N), pad->per_force);
+  struct scaled amplitude = scaled_mul(fit_grid_scaled(fit->force_N), pad->per_force);
   amplitude.exponent += shift - 18;
   at->amplitude_q24 = fixed_clamp(fit_scaled_to_fixed(amplitude, 24), 1 << 18, AMPLITUDE_MAX_Q24);
+}
+
+/* Where the estimate begins: at the Gaussian's, or where the last frame's ended, moved as the
+ * Gaussian has moved and in proportion to its force. */
+NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_state *state,
+                           const struct fit_tangential_unknowns *fit) {
+  struct fit_tangential_unknowns *at = &state->at;
+  int32_t before = state->fit_amplitude_q24, now = fit->amplitude_q24;
+  if (state->steps == 0 || now >> 2 >= before || before >> 2 >= now) {
+    *at = *fit;
+    state->steps = 0;
+  } else {
+    int32_t share_q13 = port_divide(now, before >> 13);
+    at->x_q26 = fixed_clamp(at->x_q26 + fit->x_q26 - state->fit_x_q26, -reach(pad, COLUMNS),
+                            reach(pad, COLUMNS));
+    at->y_q26 =
+        fixed_clamp(at->y_q26 + fit->y_q26 - state->fit_y_q26, -reach(pad, ROWS), reach(pad, ROWS));
+    at->amplitude_q24 =
+        fixed_clamp(scaled_by(at->amplitude_q24, share_q13, 13), 1 << 16, AMPLITUDE_MAX_Q24);
+    at->pull_x_q24 =
+        fixed_clamp(scaled_by(at->pull_x_q24, share_q13, 13), -PULL_MAX_Q24, PULL_MAX_Q24);
+    at->pull_y_q24 =
+        fixed_clamp(scaled_by(at->pull_y_q24, share_q13, 13), -PULL_MAX_Q24, PULL_MAX_Q24);
+    at->e1_q26 = fixed_clamp(scaled_by(at->e1_q26, share_q13, 13), -LONG_MAX_Q26, LONG_MAX_Q26);
+    at->e2_q26 = fixed_clamp(scaled_by(at->e2_q26, share_q13, 13), -LONG_MAX_Q26, LONG_MAX_Q26);
+  }
+  state->fit_x_q26 = fit->x_q26;
+  state->fit_y_q26 = fit->y_q26;
+  state->fit_amplitude_q24 = now;
 }
 
 /* Variance of an unknown, in its unit squared, of readings whose variance is 1: an element of the
@@ -849,7 +882,7 @@ static float root_of(struct scaled square) {
 }
 
 /* Of an elongation whose variance this is. */
-static bool is_elongated(const struct unknowns *at, struct scaled variance) {
+static bool is_elongated(const struct fit_tangential_unknowns *at, struct scaled variance) {
   float e1 = fit_grid_compose(at->e1_q26, -26), e2 = fit_grid_compose(at->e2_q26, -26);
   float square = e1 * e1 + e2 * e2;
   float least = ELONGATED_LEAST * fit_grid_compose(at->amplitude_q24, -24) *
@@ -860,7 +893,7 @@ static bool is_elongated(const struct unknowns *at, struct scaled variance) {
 }
 
 NOINLINE static void conclude(const struct fit_array *array, const struct problem *problem,
-                              const struct unknowns *at, const struct outcome *outcome,
+                              const struct fit_tangential_unknowns *at, const struct outcome *outcome,
                               struct fit_tangential *result) {
   const struct fit_pad *pad = problem->pad;
   const struct fit_tangential_room *room = &pad->room;
@@ -922,22 +955,33 @@ static int32_t prior_row(int32_t base_q22, int32_t sd_q26) {
 
 void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
                          const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                         const struct fit_result *start, struct fit_tangential *result) {
+                         const struct fit_result *fit, struct fit_tangential_state *state,
+                         struct fit_tangential *result) {
   *result = (struct fit_tangential){0};
   struct problem problem = {.pad = pad};
-  if (!(start->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
-      !fit_grid_take_readings(array, pressure_Pa_q10, start->used, settings, &problem.readings) ||
-      !weigh(array, settings, start->used, &problem, &pad->room)) {
+  if (!(fit->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
+      !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, settings, &problem.readings) ||
+      !weigh(array, settings, fit->used, &problem, &pad->room)) {
+    state->steps = 0;
     return;
   }
-  struct unknowns at;
+  struct fit_tangential_unknowns said;
   struct outcome outcome;
-  begin(array, pad, start, problem.readings.shift, &at);
-  int32_t long_sd_q26 = fixed_mul_q28(at.amplitude_q24 * 4, pad->long_sd_q26) * 4;
+  set_from_fit(array, pad, fit, problem.readings.shift, &said);
+  begin(pad, state, &said);
+  int32_t long_sd_q26 = fixed_mul_q28(said.amplitude_q24 * 4, pad->long_sd_q26) * 4;
   problem.spread_prior_q26 = prior_row(problem.base_q22, pad->spread_sd_q26);
   problem.long_prior_q26 = prior_row(problem.base_q22, long_sd_q26);
-  for (int step = 0; step < FIT_TANGENTIAL_STEPS; step++) {
-    improve(&problem, &at, step == 0, &pad->room, &outcome);
+  improve(&problem, &state->at, state->steps == 0, &pad->room, &outcome);
+  if (state->steps < FIT_TANGENTIAL_STEPS) {
+    state->steps++;
   }
-  conclude(array, &problem, &at, &outcome, result);
+  if (state->steps < 2 || outcome.length_q14 > LENGTH_TOLD_Q14) {
+    return;
+  }
+  conclude(array, &problem, &state->at, &outcome, result);
+  state->untold = result->valid ? 0 : state->untold + 1;
+  if (state->untold == UNTOLD_MOST) {
+    *state = (struct fit_tangential_state){0};
+  }
 }

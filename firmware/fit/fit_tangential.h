@@ -64,6 +64,20 @@ struct fit_pad {
 enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
                             const struct pad_profile *profile);
 
+struct fit_tangential_unknowns {
+  int32_t amplitude_q24; /* of the unit of readings */
+  int32_t x_q26, y_q26;  /* from the grid's origin node */
+  int32_t t_q26, e1_q26, e2_q26;
+  int32_t pull_x_q24, pull_y_q24;
+};
+
+/* Of one contact, from frame to frame; of all zeros: nothing yet. */
+struct fit_tangential_state {
+  struct fit_tangential_unknowns at;             /* where the last step ended */
+  int32_t fit_x_q26, fit_y_q26, fit_amplitude_q24; /* what the Gaussian said then */
+  uint8_t steps, untold;
+};
+
 /* Every member is finite. Where `valid` is off all are zero. */
 struct fit_tangential {
   bool valid;
@@ -84,6 +98,7 @@ struct fit_tangential {
 #define FIT_TANGENTIAL_SD_MAX 0.2f
 void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
                          const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                         const struct fit_result *start, struct fit_tangential *result);
+                         const struct fit_result *fit, struct fit_tangential_state *state,
+                         struct fit_tangential *result);
 
 #endif

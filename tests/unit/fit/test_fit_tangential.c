@@ -88,9 +88,12 @@ static void read_contact(const struct contact *contact, int32_t *readings) {
 static struct fit_tangential estimate(const int32_t *readings, uint32_t usable) {
   struct fit_result start;
   fit_gaussian(&array, readings, usable, &settings, &start);
+  struct fit_tangential_state state = {0};
   struct fit_tangential result;
-  memset(&result, 0xFF, sizeof result);
-  fit_tangential_load(&array, &pad, readings, &settings, &start, &result);
+  for (int frame = 0; frame < FIT_TANGENTIAL_STEPS; frame++) {
+    memset(&result, 0xFF, sizeof result);
+    fit_tangential_load(&array, &pad, readings, &settings, &start, &state, &result);
+  }
   return result;
 }
 
@@ -185,9 +188,10 @@ static void test_no_fit_gives_nothing(void) {
   struct fit_result start;
   fit_gaussian(&array, readings, ALL, &settings, &start);
   start.flags &= ~(uint32_t)CONTACT_FLAG_FIT_VALID;
+  struct fit_tangential_state state = {0};
   struct fit_tangential found;
   memset(&found, 0xFF, sizeof found);
-  fit_tangential_load(&array, &pad, readings, &settings, &start, &found);
+  fit_tangential_load(&array, &pad, readings, &settings, &start, &state, &found);
   TEST_ASSERT_TRUE(is_zero(&found));
 }
 
