@@ -24,45 +24,6 @@ bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated) 
          !contact_is_lower_bound(fit, saturated);
 }
 
-bool tangential_is_due(struct tangential_kept *kept, uint64_t t_us) {
-  bool fast = t_us - kept->frame_t_us < TANGENTIAL_FAST_us;
-  kept->frame_t_us = t_us;
-  return !kept->is_told ||
-         t_us - kept->t_us >= (fast ? TANGENTIAL_FAST_INTERVAL_us : TANGENTIAL_INTERVAL_us);
-}
-
-void tangential_keep(struct tangential_kept *kept, uint64_t t_us, const struct fit_result *fit,
-                     const struct fit_tangential *estimate) {
-  kept->t_us = t_us;
-  kept->is_told = true;
-  kept->estimate = *estimate;
-  kept->estimate.valid = estimate->valid && fit->force_N > 0.0f;
-  if (kept->estimate.valid) {
-    kept->dx_mm = estimate->x_mm - fit->x_mm;
-    kept->dy_mm = estimate->y_mm - fit->y_mm;
-    kept->force_ratio = estimate->force_N / fit->force_N;
-  }
-}
-
-void tangential_carry(const struct tangential_kept *kept, const struct fit_result *fit,
-                      struct fit_tangential *estimate) {
-  const struct fit_tangential *last = &kept->estimate;
-  memset(estimate, 0, sizeof *estimate);
-  if (!last->valid || !(last->force_N > 0.0f)) {
-    return;
-  }
-  const float force_N = kept->force_ratio * fit->force_N;
-  const float share = force_N / last->force_N;
-  *estimate = *last;
-  estimate->x_mm = fit->x_mm + kept->dx_mm;
-  estimate->y_mm = fit->y_mm + kept->dy_mm;
-  estimate->force_N = force_N;
-  estimate->force_sd_N = share * last->force_sd_N;
-  estimate->qx_N = share * last->qx_N;
-  estimate->qy_N = share * last->qy_N;
-  estimate->q_sd_N = share * last->q_sd_N;
-}
-
 void tangential_reset(struct tangential_history *history) {
   memset(history, 0, sizeof *history);
 }

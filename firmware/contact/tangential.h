@@ -48,36 +48,6 @@ struct tangential_load {
   float ratio;      /* |Q| / F */
 };
 
-/* An estimate takes the chip about 1 ms, which frames at small oversampling ratios do not have: so
- * long is at least between two, and longer where frames are shorter than TANGENTIAL_FAST_us, whose
- * own work takes more than half of the time. The frames between carry the last one on with their
- * own fits. On the RP2040 every frame up to 700 a second has an estimate of its own, of 1308 a
- * second every fifth. */
-#define TANGENTIAL_INTERVAL_us 1400u
-#define TANGENTIAL_FAST_us 1000u
-#define TANGENTIAL_FAST_INTERVAL_us 3400u
-
-/* The last estimate, as it relates to the fit of its own frame. */
-struct tangential_kept {
-  uint64_t t_us;       /* of that frame */
-  uint64_t frame_t_us; /* of the last frame asked for */
-  bool is_told;        /* there has been one in this contact */
-  struct fit_tangential estimate;
-  float dx_mm, dy_mm; /* from the fit's place */
-  float force_ratio;  /* to the fit's force */
-};
-
-/* Whether one is due for the frame of this time; to be asked of every frame once. */
-bool tangential_is_due(struct tangential_kept *kept, uint64_t t_us);
-
-/* After an estimate, valid or not. */
-void tangential_keep(struct tangential_kept *kept, uint64_t t_us, const struct fit_result *fit,
-                     const struct fit_tangential *estimate);
-
-/* Instead of one: the last with this fit's place and force, and the load in proportion. */
-void tangential_carry(const struct tangential_kept *kept, const struct fit_result *fit,
-                      struct fit_tangential *estimate);
-
 /* Whether an estimate from this fit is worth its time; saturated: bitmap of the sensors that were
  * left out for it. */
 bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated);

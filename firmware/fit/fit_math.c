@@ -1,5 +1,7 @@
 #include "fit/fit_math.h"
 
+#include "common/bytes.h"
+
 #include <string.h>
 
 /* 2^(-k/32), Q30. */
@@ -50,4 +52,18 @@ int32_t fit_log2_q24(uint32_t value) {
   sum = fit_mul_q30(sum, f_q30) + 386181455;
   sum = fit_mul_q30(sum, f_q30);
   return (whole << 24) + (sum >> 4);
+}
+
+int32_t fit_fixed(float value, int q) {
+  uint32_t pattern = bytes_from_f32(value);
+  int shift = (int)(pattern >> 23 & 0xFFu) - 150 + q;
+  uint32_t size = (pattern & 0x7FFFFFu) | 0x800000u;
+  if (shift > 7) {
+    size = INT32_MAX;
+  } else if (shift >= 0) {
+    size <<= shift;
+  } else {
+    size = shift > -24 ? size >> -shift : 0;
+  }
+  return pattern >> 31 ? -(int32_t)size : (int32_t)size;
 }

@@ -30,9 +30,13 @@
 
 /* Working memory of one estimate: in no need of being kept between two. */
 union fit_tangential_node {
-  struct fit_tangential_sums { /* over w / v^i of the normal and the tangential terms */
-    int32_t s0_q28, s1_q25, s2_q22, s3_q17, s4_q14;
-    int32_t f0_q28, f1_q25, f2_q22;
+  struct fit_tangential_terms { /* with the weight, for amplitude 1 */
+    int32_t unused[3], normal_q28[PAD_NORMAL_TERMS], tangential_q28[PAD_TANGENTIAL_TERMS];
+  } terms;
+  struct fit_tangential_sums { /* over w / v^i of the normal and the tangential terms, in an order
+                                  in which the columns overwrite what is no longer needed */
+    int32_t s0_q14, s1_q25, s3_q8, s4_q14, s2_q22;
+    int32_t f1_q12, f0_q14, f2_q22;
   } sums;
   int32_t column[FIT_TANGENTIAL_UNKNOWNS]; /* what the Jacobian has there */
 };
@@ -45,14 +49,16 @@ struct fit_tangential_room {
 
 /* A profile as the estimate needs it, and its working memory. Fill with fit_pad_init. */
 struct fit_pad {
-  float unit_mm, per_unit; /* length that all below is in: twice the widest normal term's sd */
+  /* Length that all below is in: about twice the widest normal term's sd. */
+  int32_t unit_q25_mm, per_unit_q30;
+  int32_t origin_x_q24_mm, origin_y_q24_mm;   /* the grid's origin node */
   int32_t variance_q26[FIT_TANGENTIAL_TERMS]; /* of each term without the contact's own */
   int32_t strength_q26[FIT_TANGENTIAL_TERMS]; /* share, or moment */
   int32_t pitch_q26, pitch_square_q26;
-  int32_t spread_q26, spread_sd_q26;     /* what to expect of the contact's own variance */
-  int32_t long_sd_q26;                   /* and of its elongations */
-  float force_unit_N;                    /* normal force of amplitude 1 at 1 Pa */
-  struct scaled per_force;               /* amplitude of the Gaussian's 1 N at 1 Pa */
+  int32_t spread_q26, spread_sd_q26; /* what to expect of the contact's own variance */
+  int32_t long_sd_q26;               /* and of its elongations */
+  struct scaled force_unit;          /* N, normal force of amplitude 1 at 1 Pa: all of its bits */
+  struct scaled per_force;           /* amplitude of the Gaussian's 1 N at 1 Pa */
   int32_t chi_square_max, long_most_q15; /* beyond which nothing is told */
   struct scaled thin; /* by which variances grow on a pad thinner than the pitch */
   struct fit_tangential_room room;
@@ -73,7 +79,7 @@ struct fit_tangential_unknowns {
 
 /* Of one contact, from frame to frame; of all zeros: nothing yet. */
 struct fit_tangential_state {
-  struct fit_tangential_unknowns at;             /* where the last step ended */
+  struct fit_tangential_unknowns at;               /* where the last step ended */
   int32_t fit_x_q26, fit_y_q26, fit_amplitude_q24; /* what the Gaussian said then */
   uint8_t steps, untold;
 };

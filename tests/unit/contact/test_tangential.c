@@ -104,42 +104,6 @@ static void a_load_that_edges_hide_is_not_told(void) {
   assert_nothing(0);
 }
 
-static void an_estimate_is_carried_between_two(void) {
-  struct tangential_kept kept = {0};
-  struct fit_result fit = {.x_mm = 2.0f, .y_mm = -7.5f, .force_N = 5.0f};
-  TEST_ASSERT_TRUE(tangential_is_due(&kept, 1000));
-  tangential_keep(&kept, 1000, &fit, &found);
-  TEST_ASSERT_FALSE(tangential_is_due(&kept, 1000 + TANGENTIAL_INTERVAL_us - 1));
-  kept.frame_t_us = 1000;
-  TEST_ASSERT_TRUE(tangential_is_due(&kept, 1000 + TANGENTIAL_INTERVAL_us));
-  unsigned frames = 0; /* 1308 a second */
-  kept.frame_t_us = 1000;
-  for (uint64_t t_us = 1764; !tangential_is_due(&kept, t_us); t_us += 764) {
-    frames++;
-  }
-  TEST_ASSERT_EQUAL(4, frames);
-  struct fit_tangential carried;
-  tangential_carry(&kept, &fit, &carried);
-  TEST_ASSERT_TRUE(carried.valid);
-  TEST_ASSERT_EQUAL_FLOAT(found.x_mm, carried.x_mm);
-  TEST_ASSERT_EQUAL_FLOAT(found.qx_N, carried.qx_N);
-  fit.x_mm += 0.25f;
-  fit.y_mm -= 0.5f;
-  fit.force_N = 10.0f;
-  tangential_carry(&kept, &fit, &carried);
-  TEST_ASSERT_EQUAL_FLOAT(2.75f, carried.x_mm);
-  TEST_ASSERT_EQUAL_FLOAT(-7.5f, carried.y_mm);
-  TEST_ASSERT_EQUAL_FLOAT(8.0f, carried.force_N);
-  TEST_ASSERT_EQUAL_FLOAT(1.5f, carried.qx_N);
-  TEST_ASSERT_EQUAL_FLOAT(-2.0f, carried.qy_N);
-  TEST_ASSERT_EQUAL_FLOAT(0.08f, carried.q_sd_N);
-  TEST_ASSERT_EQUAL_FLOAT(0.15f, carried.location_sd_mm);
-  found.valid = false; /* nothing is carried on of what is not told */
-  tangential_keep(&kept, 5000, &fit, &found);
-  tangential_carry(&kept, &fit, &carried);
-  TEST_ASSERT_FALSE(carried.valid);
-}
-
 static void scales_and_their_uncertainties_enter(void) {
   settings.force_scale = 1.25f;
   settings.force_scale_sd = 0.03f;
@@ -277,7 +241,6 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(an_estimate_that_is_not_there_says_nothing);
   RUN_TEST(an_estimate_passes_as_it_is_with_scales_of_one);
-  RUN_TEST(an_estimate_is_carried_between_two);
   RUN_TEST(edges_are_taken_back);
   RUN_TEST(a_load_that_edges_hide_is_not_told);
   RUN_TEST(scales_and_their_uncertainties_enter);
