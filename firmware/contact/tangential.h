@@ -17,8 +17,8 @@ struct tangential_settings {
   float tangential_scale; /* tangential load is this and force_scale times the estimate's */
   float tangential_scale_sd;
   bool from_touch;
-  struct pad_edges edges;
-  float location_sd_limit_mm; /* UNCERTAIN above it */
+  int32_t edges_q20[PAD_EDGE_KINDS][PAD_EDGE_TERMS]; /* of the profile, in the order there */
+  float location_sd_limit_mm;                        /* UNCERTAIN above it */
 };
 
 /* The scales of this profile, with the calibration whose scales are in settings or, if it is not

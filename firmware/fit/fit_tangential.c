@@ -880,7 +880,7 @@ static bool is_elongated(struct scaled square, struct scaled round, struct scale
 }
 
 static float composed(struct scaled value) {
-  return fit_grid_compose(value.mantissa, value.exponent);
+  return fit_float(value.mantissa, value.exponent);
 }
 
 static struct scaled root_of_product(struct scaled a, struct scaled b) {
@@ -931,12 +931,12 @@ NOINLINE static void conclude(const struct problem *problem,
   struct scaled length = {pad->unit_q25_mm >> 15, -10};
   result->valid = true;
   result->x_mm =
-      fit_grid_compose(product(at->x_q26, pad->unit_q25_mm, 27) + pad->origin_x_q24_mm, -24);
+      fit_float(product(at->x_q26, pad->unit_q25_mm, 27) + pad->origin_x_q24_mm, -24);
   result->y_mm =
-      fit_grid_compose(product(at->y_q26, pad->unit_q25_mm, 27) + pad->origin_y_q24_mm, -24);
-  result->force_N = fit_grid_compose(product(at->amplitude_q24 * 16, unit_q30, 32), exponent + 4);
-  result->qx_N = fit_grid_compose(product(at->pull_x_q24 * 32, unit_q30, 32), exponent + 3);
-  result->qy_N = fit_grid_compose(product(at->pull_y_q24 * 32, unit_q30, 32), exponent + 3);
+      fit_float(product(at->y_q26, pad->unit_q25_mm, 27) + pad->origin_y_q24_mm, -24);
+  result->force_N = fit_float(product(at->amplitude_q24 * 16, unit_q30, 32), exponent + 4);
+  result->qx_N = fit_float(product(at->pull_x_q24 * 32, unit_q30, 32), exponent + 3);
+  result->qy_N = fit_float(product(at->pull_y_q24 * 32, unit_q30, 32), exponent + 3);
   result->q_sd_N = composed(scaled_mul(unit, pull_sd));
   result->location_sd_mm = composed(scaled_mul(length, root_of_product(place, variance)));
   struct scaled noise = fit_scaled_from(problem->noise_q22, -22);

@@ -10,6 +10,7 @@
 
 #define LAYOUTS 4
 #define PADS 4
+#define FRAMES 4 /* of one contact */
 #define ONE_Q16 65536
 
 static struct fit_array layouts[LAYOUTS];
@@ -189,15 +190,15 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   }
   if (kernel == FIT_BITS_TANGENTIAL) {
     struct fit_tangential found[FRAMES];
-    struct fit_tangential_state frames_state;
+    struct fit_tangential_state tangential_state;
     memset(found, 0, sizeof found);
-    memset(&frames_state, 0, sizeof frames_state);
+    memset(&tangential_state, 0, sizeof tangential_state);
     for (int frame = 0; frame < FRAMES; frame++) {
       fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
       fit_tangential_load(array, &pads[press / 4 % PADS], pressure_Pa_q10, &settings, &result,
-                          &frames_state, &found[frame]);
-      for (uint8_t k = 0; k < array->sensor_count && frame >= FRAMES - 3; k++) {
-        pressure_Pa_q10[k] += pressure_Pa_q10[k] / 16 * draw_between(-1, 1);
+                          &tangential_state, &found[frame]);
+      for (uint8_t k = 0; k < array->sensor_count; k++) {
+        pressure_Pa_q10[k] -= pressure_Pa_q10[k] / 64 * draw_between(0, 1);
       }
     }
     return crc32_iso_hdlc((const uint8_t *)found, sizeof found);

@@ -71,6 +71,14 @@ static void an_estimate_passes_as_it_is_with_scales_of_one(void) {
   TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.3125f, 0.3125f, load.ratio); /* 1.25 of 4 N */
 }
 
+static void use_edges(const struct pad_edges *edges) {
+  struct pad_profile pad = pad_of_12_mm();
+  pad.edges = *edges;
+  pad.tangential_scale = 1.0f;
+  pad.tangential_scale_sd = 0.0f;
+  tangential_use(&settings, &pad, &(struct contact_settings){.force_scale = 1.0f}, false);
+}
+
 /* At u = 0.25, v = -0.75: u^2 = 0.0625, v^2 = 0.5625. */
 static void edges_are_taken_back(void) {
   found.x_mm = 2.5f;
@@ -86,7 +94,7 @@ static void edges_are_taken_back(void) {
       .pull_y_mm = {0.0f, 8.0f, 0.0f},
       .force = {0.0f, 4.0f, 0.0f},
   };
-  settings.edges = edges;
+  use_edges(&edges);
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID, update(0));
   /* 4 N of which 1.25 is 1; (0.1875 - 0.0625) / 0.5 and (-0.25 + 0.10546875) / 1.25 of it. */
   TEST_ASSERT_FLOAT_WITHIN(1e-6f, 3.2f, load.force_N);
@@ -98,9 +106,11 @@ static void edges_are_taken_back(void) {
 }
 
 static void a_load_that_edges_hide_is_not_told(void) {
-  settings.edges.gain_y[0] = -0.74f;
+  struct pad_edges edges = {.gain_y = {-0.74f, 0.0f, 0.0f}};
+  use_edges(&edges);
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID, update(0));
-  settings.edges.gain_y[0] = -0.76f;
+  edges.gain_y[0] = -0.76f;
+  use_edges(&edges);
   assert_nothing(0);
 }
 

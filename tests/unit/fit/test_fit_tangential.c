@@ -16,6 +16,7 @@ enum { SENSORS = 15, ALL = (1 << SENSORS) - 1 };
 #define RANDOM_INPUTS 1000000
 #define SEED UINT64_C(0x7461676E)
 #define SDS 1
+#define HELD_FRAMES 8
 
 static struct fit_array array;
 static struct fit_pad pad;
@@ -90,7 +91,7 @@ static struct fit_tangential estimate(const int32_t *readings, uint32_t usable) 
   fit_gaussian(&array, readings, usable, &settings, &start);
   struct fit_tangential_state state = {0};
   struct fit_tangential result;
-  for (int frame = 0; frame < FIT_TANGENTIAL_STEPS; frame++) {
+  for (int frame = 0; frame < HELD_FRAMES; frame++) {
     memset(&result, 0xFF, sizeof result);
     fit_tangential_load(&array, &pad, readings, &settings, &start, &state, &result);
   }
