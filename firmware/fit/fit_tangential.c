@@ -74,10 +74,15 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
 /* Longest step of the place, and of t in the narrowest term's variance. */
 #define MOVE_MAX_Q26 (ONE_Q26 * 3 / 8)
 
-/* Beyond so long a step, of the longest, an estimate is on its way and not told. */
+/* The first step leaves what a layer is not a Gaussian; after one longer than 0.2 of the longest
+ * the estimate is off its optimum by some 0.1 mm, after a jump of the Gaussian too. */
+#define STEPS_TOLD 2
 #define LENGTH_TOLD_Q14 3277
-/* After so many frames in a row that should be told but are not it begins anew. */
-#define UNTOLD_MOST 255
+#define JUMP_Q26 (ONE_Q26 / 4)
+/* After so many frames in a row that are not told it begins anew: one more than a contact at rest
+ * takes. Where another contact has come and gone it is found again within ten frames, without this
+ * after hundreds. */
+#define UNTOLD_MOST 6
 
 #define PIVOT_LEAST (1 << 18) /* 2^-12: what is told less is left where it is */
 
@@ -819,15 +824,14 @@ NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_stat
                            const struct fit_tangential_unknowns *fit) {
   struct fit_tangential_unknowns *at = &state->at;
   int32_t before = state->fit_amplitude_q24, now = fit->amplitude_q24;
-  if (state->steps == 0 || now >> 2 >= before || before >> 2 >= now) {
+  int32_t dx_q26 = fit->x_q26 - state->fit_x_q26, dy_q26 = fit->y_q26 - state->fit_y_q26;
+  bool grew = now >> 2 >= before || before >> 2 >= now;
+  if (state->steps == 0 || grew) {
     *at = *fit;
-    state->steps = 0;
   } else {
-    int32_t share_q13 = port_divide(now, before >> 13);
-    at->x_q26 = fixed_clamp(at->x_q26 + fit->x_q26 - state->fit_x_q26, -reach(pad, COLUMNS),
-                            reach(pad, COLUMNS));
-    at->y_q26 =
-        fixed_clamp(at->y_q26 + fit->y_q26 - state->fit_y_q26, -reach(pad, ROWS), reach(pad, ROWS));
+    int32_t share_q13 = fixed_clamp(port_divide(now, before >> 13), 0, INT16_MAX);
+    at->x_q26 = fixed_clamp(at->x_q26 + dx_q26, -reach(pad, COLUMNS), reach(pad, COLUMNS));
+    at->y_q26 = fixed_clamp(at->y_q26 + dy_q26, -reach(pad, ROWS), reach(pad, ROWS));
     at->amplitude_q24 =
         fixed_clamp(scaled_by(at->amplitude_q24, share_q13, 13), 1 << 16, AMPLITUDE_MAX_Q24);
     at->pull_x_q24 =
@@ -836,6 +840,9 @@ NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_stat
         fixed_clamp(scaled_by(at->pull_y_q24, share_q13, 13), -PULL_MAX_Q24, PULL_MAX_Q24);
     at->e1_q26 = fixed_clamp(scaled_by(at->e1_q26, share_q13, 13), -LONG_MAX_Q26, LONG_MAX_Q26);
     at->e2_q26 = fixed_clamp(scaled_by(at->e2_q26, share_q13, 13), -LONG_MAX_Q26, LONG_MAX_Q26);
+  }
+  if (grew || fixed_size(dx_q26) + fixed_size(dy_q26) > JUMP_Q26) {
+    state->steps = 0;
   }
   at->x_q26 = to_multiple(at->x_q26, 26 - PLACE_Q);
   at->y_q26 = to_multiple(at->y_q26, 26 - PLACE_Q);
@@ -871,12 +878,17 @@ static bool exceeds(struct scaled a, struct scaled b) {
   return scaled_sub(a, b).mantissa > 0;
 }
 
-/* Of e1^2 + e2^2, A v and the variance of an elongation. */
-static bool is_elongated(struct scaled square, struct scaled round, struct scaled variance) {
+/* square: e1^2 + e2^2; round: A v. variance: of a reading of weight 1. */
+static bool is_elongated(const struct fit_tangential_room *room, const struct outcome *outcome,
+                         struct scaled square, struct scaled round, struct scaled variance) {
   const struct scaled least = {(int32_t)(ELONGATED_LEAST * ELONGATED_LEAST * 8388608.0f), -23};
-  const struct scaled sure = {(int32_t)(ELONGATED_SURE * ELONGATED_SURE * 4096.0f), -12};
-  return exceeds(square, scaled_mul(least, scaled_mul(round, round))) &&
-         exceeds(square, scaled_mul(sure, variance));
+  if (!exceeds(square, scaled_mul(least, scaled_mul(round, round)))) {
+    return false;
+  }
+  const struct scaled sure = {(int32_t)(ELONGATED_SURE * ELONGATED_SURE * 2048.0f), -12};
+  struct scaled twice =
+      scaled_add(variance_of(room, outcome, STRETCH), variance_of(room, outcome, SLANT));
+  return exceeds(square, scaled_mul(sure, scaled_mul(twice, variance)));
 }
 
 static float composed(struct scaled value) {
@@ -930,10 +942,8 @@ NOINLINE static void conclude(const struct problem *problem,
   struct scaled unit = fit_scaled_from(unit_q30, exponent);
   struct scaled length = {pad->unit_q25_mm >> 15, -10};
   result->valid = true;
-  result->x_mm =
-      fit_float(product(at->x_q26, pad->unit_q25_mm, 27) + pad->origin_x_q24_mm, -24);
-  result->y_mm =
-      fit_float(product(at->y_q26, pad->unit_q25_mm, 27) + pad->origin_y_q24_mm, -24);
+  result->x_mm = fit_float(product(at->x_q26, pad->unit_q25_mm, 27) + pad->origin_x_q24_mm, -24);
+  result->y_mm = fit_float(product(at->y_q26, pad->unit_q25_mm, 27) + pad->origin_y_q24_mm, -24);
   result->force_N = fit_float(product(at->amplitude_q24 * 16, unit_q30, 32), exponent + 4);
   result->qx_N = fit_float(product(at->pull_x_q24 * 32, unit_q30, 32), exponent + 3);
   result->qy_N = fit_float(product(at->pull_y_q24 * 32, unit_q30, 32), exponent + 3);
@@ -944,10 +954,7 @@ NOINLINE static void conclude(const struct problem *problem,
       composed(scaled_mul(length, root_of_product(place, scaled_mul(noise, noise))));
   result->force_sd_N =
       composed(scaled_mul(unit, root_of_product(variance_of(room, outcome, AMPLITUDE), variance)));
-  struct scaled long_variance =
-      scaled_add(variance_of(room, outcome, STRETCH), variance_of(room, outcome, SLANT));
-  long_variance.exponent -= 1;
-  result->elongated = is_elongated(square, round, scaled_mul(long_variance, variance));
+  result->elongated = is_elongated(room, outcome, square, round, variance);
 }
 
 static int32_t prior_row(int32_t base_q22, int32_t sd_q26) {
@@ -960,7 +967,8 @@ void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
                          const struct fit_result *fit, struct fit_tangential_state *state,
                          struct fit_tangential *result) {
   *result = (struct fit_tangential){0};
-  struct problem problem = {.pad = pad};
+  struct problem problem;
+  problem.pad = pad;
   if (!(fit->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
       !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, settings, &problem.readings) ||
       !weigh(array, settings, fit->used, &problem, &pad->room)) {
@@ -975,13 +983,12 @@ void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
   problem.spread_prior_q26 = prior_row(problem.base_q22, pad->spread_sd_q26);
   problem.long_prior_q26 = prior_row(problem.base_q22, long_sd_q26);
   improve(&problem, &state->at, &pad->room, &outcome);
-  if (state->steps < FIT_TANGENTIAL_STEPS) {
+  if (state->steps < STEPS_TOLD) {
     state->steps++;
   }
-  if (state->steps < 2 || outcome.length_q14 > LENGTH_TOLD_Q14) {
-    return;
+  if (state->steps == STEPS_TOLD && outcome.length_q14 <= LENGTH_TOLD_Q14) {
+    conclude(&problem, &state->at, &outcome, result);
   }
-  conclude(&problem, &state->at, &outcome, result);
   state->untold = result->valid ? 0 : state->untold + 1;
   if (state->untold == UNTOLD_MOST) {
     *state = (struct fit_tangential_state){0};

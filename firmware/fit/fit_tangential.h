@@ -1,17 +1,22 @@
 /* Tangential load from the normal pressures: what pulls along the rubber presses the base ahead of
  * it and relieves it behind, broader than a shift of the contact does.
  *
- * From the Gaussian fit, FIT_TANGENTIAL_STEPS Gauss-Newton steps of eight unknowns: normal force,
- * location, the contact's own spread and its two elongations, and the tangential force along x and
- * y. The pad's profile (common/pad_profile.h) says how its rubber spreads what presses and what
+ * Eight unknowns: normal force, location, the contact's own spread and its two elongations, and the
+ * tangential force along x and y. One Gauss-Newton step a frame: of a contact's first frame from
+ * the Gaussian fit, then from where the last frame's ended, moved as the Gaussian has moved and in
+ * proportion to its force. The optimum is that of each frame's own readings: what lingers of
+ * earlier ones is the square of a step, and what a long step leads to is not told. It begins anew
+ * where it says nothing for some frames, so that it cannot stay where another beginning finds
+ * better.
+ *
+ * The pad's profile (common/pad_profile.h) says how its rubber spreads what presses and what
  * pulls. Elongation is in the model because a long contact looks like a pulled one to a fit that
  * knows no other explanation: a prior holds it near round, and what is clearly long, or leaves a
- * residual that the model does not explain, is not told. Readings count by their
- * noise, gain error and model error. Fixed point, the same bits on every machine, any sensors
- * missing, no state between frames. NUMERICS.md has the derivation, the conditioning and the
- * limits.
+ * residual that the model does not explain, is not told. Readings count by their noise, gain error
+ * and model error. Fixed point, the same bits on every machine, any sensors missing. NUMERICS.md
+ * has the derivation, the conditioning and the limits.
  *
- * At most 118 000 cycles on a Cortex-M0+ (test emulated.fit_cycles).
+ * At most 40 000 cycles a frame on a Cortex-M0+ (test emulated.fit_cycles).
  *
  * On infinite and exactly known layers; what a pad that ends makes of it is taken back after it
  * (pad_profile.h, pad_edges). No measurement on a real pad confirms it yet.
@@ -23,7 +28,6 @@
 #include "fit/fit.h"
 #include "fit/fit_fixed.h"
 
-#define FIT_TANGENTIAL_STEPS 3
 #define FIT_TANGENTIAL_UNKNOWNS 8
 #define FIT_TANGENTIAL_TERMS (PAD_NORMAL_TERMS + PAD_TANGENTIAL_TERMS)
 #define FIT_TANGENTIAL_NODES (FIT_GRID_COLUMNS * FIT_GRID_ROWS)
@@ -77,11 +81,13 @@ struct fit_tangential_unknowns {
   int32_t pull_x_q24, pull_y_q24;
 };
 
-/* Of one contact, from frame to frame; of all zeros: nothing yet. */
+/* Of one contact, from frame to frame. All zeros: the next frame is its first; so it is to be made
+ * when a contact has ended, and by frames without an estimate. */
 struct fit_tangential_state {
   struct fit_tangential_unknowns at;               /* where the last step ended */
   int32_t fit_x_q26, fit_y_q26, fit_amplitude_q24; /* what the Gaussian said then */
-  uint8_t steps, untold;
+  uint8_t steps;                                   /* since the beginning, 2 stands for more */
+  uint8_t untold;                                  /* frames in a row */
 };
 
 /* Every member is finite. Where `valid` is off all are zero. */
@@ -95,11 +101,14 @@ struct fit_tangential {
   bool elongated; /* the contact is not round, whatever the Gaussian makes of its load */
 };
 
-/* start: the fit of the same readings. `valid` stays off without FIT_VALID, with fewer than
- * FIT_TANGENTIAL_SENSORS in use, where a parameter ends at its limit, where the contact is
- * clearly longer than wide or the readings are not those of one contact on this pad (NUMERICS.md
- * has the limits, and how they widen where the pad ends near), and where q_sd_N exceeds
- * FIT_TANGENTIAL_SD_MAX of the force. */
+/* A contact at rest is at its optimum after so many frames. */
+#define FIT_TANGENTIAL_FRAMES 5
+
+/* fit: of the same readings. `valid` stays off without FIT_VALID, with fewer than
+ * FIT_TANGENTIAL_SENSORS in use, at the first step and after a long one, where a parameter ends at
+ * its limit, where the contact is clearly longer than wide or the readings are not those of one
+ * contact on this pad (NUMERICS.md has the limits, and how they widen where the pad ends near), and
+ * where q_sd_N exceeds FIT_TANGENTIAL_SD_MAX of the force. */
 #define FIT_TANGENTIAL_SENSORS 8
 #define FIT_TANGENTIAL_SD_MAX 0.2f
 void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,

@@ -27,10 +27,8 @@ namespace {
 // A standard deviation of more than this share of the force is no observation of the pull.
 constexpr double OBSERVABLE = 0.1;
 constexpr int PRESSES = 2000;
-// That each press is held.
-constexpr int FRAMES = 8;
 // Limits: location in um, force and pull in shares of the force.
-constexpr double MEDIAN_um = 0.15, P99_um = 2.5, PULL_P99 = 0.0006, FORCE_P99 = 0.0004;
+constexpr double MEDIAN_um = 0.15, P99_um = 1.5, PULL_P99 = 0.0003, FORCE_P99 = 0.0003;
 constexpr int MOST_ELSEWHERE = PRESSES / 500;
 
 double quantile(std::vector<double> values, double share) {
@@ -92,7 +90,7 @@ int main(int argc, char **argv) {
     fit_gaussian(&array, readings.data(), all, &settings, &start);
     struct fit_tangential found;
     fit_tangential_state state{};
-    for (int frame = 0; frame < FRAMES; frame++) {
+    for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
       fit_tangential_load(&array, &pad, readings.data(), &settings, &start, &state, &found);
     }
     const reference::TangentialFit best = reference::fit_tangential_load(

@@ -70,7 +70,7 @@ static const struct pad_profile profile = {
     .tangential_scale = 1.0f,
 };
 
-/* After `fit` of the same readings and the first steps, which are not counted. */
+/* After `fit` of the same readings and the frames before, which are not counted. */
 static void tangential(void) {
   fit_tangential_load(&array, &pad, job.pressure_Pa_q10, &settings, &result, &tangential_state,
                       &tangential_result);
@@ -117,7 +117,7 @@ int main(void) {
     if (kernel == tangential) {
       fit();
       tangential_state = (struct fit_tangential_state){0};
-      for (int step = 1; step < FIT_TANGENTIAL_STEPS; step++) {
+      for (int frame = 1; frame < FIT_TANGENTIAL_FRAMES; frame++) {
         tangential();
       }
     }

@@ -77,7 +77,7 @@ bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double nois
   fit_result fit;
   fit_tangential found{};
   fit_tangential_state state{};
-  for (int frame = 0; frame < FIT_TANGENTIAL_STEPS; frame++) {
+  for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
     std::array<std::int32_t, SENSORS> readings{};
     std::uint32_t saturated = 0;
     for (std::size_t k = 0; k < SENSORS; k++) {
