@@ -51,6 +51,7 @@ void app_use_pad(struct app *app, const struct pad_profile *pad) {
   bool acts = pad && fit_pad_init(&app->fit_pad, &app->fit_array, pad) == FT_OK;
   app->pad = acts ? pad : NULL;
   use_tangential_scales(app);
+  memset(&app->tangential_state, 0, sizeof app->tangential_state);
   tangential_reset(&app->tangential_history);
   motion_reset(&app->motion_history);
 }
@@ -142,18 +143,13 @@ static void fit_frame(struct app *app) {
 
 #if FT_WITH_TANGENTIAL
 static void estimate_tangential_load(struct app *app) {
-  struct tangential_kept *kept = &app->tangential_kept;
   memset(&app->tangential, 0, sizeof app->tangential);
-  if (!app->pad || !app->conditioned.contact) {
-    kept->is_told = false;
-  } else if (tangential_is_worthwhile(&app->fit, app->frame.saturated)) {
-    if (tangential_is_due(kept, app->frame.t_us)) {
-      fit_tangential_load(&app->fit_array, &app->fit_pad, app->conditioned.pressure_Pa_q10,
-                          &app->fit_settings, &app->fit, &app->tangential);
-      tangential_keep(kept, app->frame.t_us, &app->fit, &app->tangential);
-    } else {
-      tangential_carry(kept, &app->fit, &app->tangential);
-    }
+  if (app->pad && app->conditioned.contact &&
+      tangential_is_worthwhile(&app->fit, app->frame.saturated)) {
+    fit_tangential_load(&app->fit_array, &app->fit_pad, app->conditioned.pressure_Pa_q10,
+                        &app->fit_settings, &app->fit, &app->tangential_state, &app->tangential);
+  } else {
+    memset(&app->tangential_state, 0, sizeof app->tangential_state);
   }
 }
 #endif
@@ -178,7 +174,6 @@ static void judge_frame(struct app *app) {
 #endif
 #if FT_WITH_TANGENTIAL
     .tangential = &app->tangential,
-    .tangential_is_carried = app->tangential_kept.t_us != frame->t_us,
 #endif
   };
 #if FT_WITH_FIT

@@ -37,6 +37,7 @@ struct app {
   const struct pad_profile *pad;                  /* that acts; NULL: none */
   struct fit_pad fit_pad;                         /* of it */
   struct tangential_settings tangential_settings; /* of it and the calibration */
+  struct fit_tangential_state tangential_state;
   struct tangential_history tangential_history;
   struct motion_history motion_history;
 #endif
@@ -56,7 +57,6 @@ struct app {
 #endif
 #if FT_WITH_TANGENTIAL
   struct fit_tangential tangential;
-  struct tangential_kept tangential_kept;
   struct tangential_load load;
   struct motion motion;
 #endif

@@ -33,6 +33,7 @@ struct pad_edges {
   float force[PAD_EDGE_TERMS];
 };
 #define PAD_EDGE_UNIT_mm 10.0f
+enum { PAD_EDGE_KINDS = sizeof(struct pad_edges) / sizeof(float[PAD_EDGE_TERMS]) };
 
 struct pad_profile {
   float thickness_mm;
@@ -54,7 +55,7 @@ struct pad_profile {
 };
 
 /* The values before from_touch, behind one another. */
-#define PAD_EDGE_FLOATS (9 * PAD_EDGE_TERMS)
+#define PAD_EDGE_FLOATS (PAD_EDGE_KINDS * PAD_EDGE_TERMS)
 #define PAD_PROFILE_FLOATS                                                                         \
   (4 + 2 * PAD_NORMAL_TERMS + 2 * PAD_TANGENTIAL_TERMS + 3 + PAD_EDGE_FLOATS)
 

@@ -30,7 +30,6 @@ struct contact_input {
   uint32_t saturated;           /* bitmap: left out of the fit for being beyond their range */
   const struct fit_result *fit; /* NULL where nothing was fitted */
   const struct fit_tangential *tangential; /* NULL where nothing was estimated */
-  bool tangential_is_carried;              /* on from the estimate of an earlier frame */
 };
 
 struct contact_result {

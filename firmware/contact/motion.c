@@ -1,7 +1,7 @@
 #include "contact/motion.h"
 
-#include "common/bytes.h"
 #include "common/contact_flags.h"
+#include "fit/fit_math.h"
 #include "port/divide.h"
 
 #include <string.h>
@@ -242,30 +242,14 @@ static bool find_velocity(struct motion_history *history) {
   return true;
 }
 
-/* value 2^bits, towards zero; what does not fit, and what is not finite, at most +-(2^31 - 1).
- * A multiplication and a conversion less than in soft float. */
-static int32_t fixed_from(float value, int bits) {
-  uint32_t pattern = bytes_from_f32(value);
-  int shift = (int)(pattern >> 23 & 0xFFu) - 150 + bits;
-  uint32_t size = (pattern & 0x7FFFFFu) | 0x800000u;
-  if (shift > 7) {
-    size = INT32_MAX;
-  } else if (shift >= 0) {
-    size <<= shift;
-  } else {
-    size = shift > -24 ? size >> -shift : 0;
-  }
-  return pattern >> 31 ? -(int32_t)size : (int32_t)size;
-}
-
 /* The normal force's own scale is in both forces. */
 static int32_t ratio_q12(float tangential_N, int32_t force_N_q12) {
   const int32_t most = 8 << 12;
-  return clamped(port_divide(fixed_from(tangential_N, 24), force_N_q12), most);
+  return clamped(port_divide(fit_fixed(tangential_N, 24), force_N_q12), most);
 }
 
 static int32_t noise_um(const struct fit_tangential *found) {
-  return clamped(fixed_from(found->location_noise_mm, 20), 1 << 20) * 125 / (1 << 17);
+  return clamped(fit_fixed(found->location_noise_mm, 20), 1 << 20) * 125 / (1 << 17);
 }
 
 /* force_N_q12 > 0. */
@@ -278,11 +262,11 @@ static void add(struct motion_history *history, const struct tangential_settings
     enter(&history->slow, &history->now);
     history->stepped = true;
   }
-  uint32_t x = (uint32_t)fixed_from(found->x_mm, 11), y = (uint32_t)fixed_from(found->y_mm, 11);
+  uint32_t x = (uint32_t)fit_fixed(found->x_mm, 11), y = (uint32_t)fit_fixed(found->y_mm, 11);
   uint32_t noise = (uint32_t)noise_um(found);
   uint32_t tick = (uint32_t)(t_us >> TICK_SHIFT);
-  int32_t sd_mm_q8 = clamped(fixed_from(found->location_sd_mm, 8), 2 << 8);
-  history->scale_q8 = fixed_from(settings->tangential_scale, 8);
+  int32_t sd_mm_q8 = clamped(fit_fixed(found->location_sd_mm, 8), 2 << 8);
+  history->scale_q8 = fit_fixed(settings->tangential_scale, 8);
   history->crosstalk_q8 = CROSSTALK_q8 + (sd_mm_q8 * sd_mm_q8 * CROSSTALK_PER_SD2_q8 >> 16);
   history->now.count++;
   history->now.x += x;
@@ -335,12 +319,8 @@ void motion_update(struct motion_history *history, const struct tangential_setti
     motion_reset(history);
     return;
   }
-  int32_t force_N_q12 = found && found->valid ? fixed_from(found->force_N, 12) : 0;
+  int32_t force_N_q12 = found && found->valid ? fit_fixed(found->force_N, 12) : 0;
   if (force_N_q12 <= 0 || noise_um(found) > MOTION_NOISE_MAX_um) {
-    return;
-  }
-  if (input->tangential_is_carried) {
-    tell(history, result, motion);
     return;
   }
   if (starts_anew(history, input)) {

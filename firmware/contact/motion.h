@@ -106,8 +106,7 @@ struct motion_history {
 void motion_reset(struct motion_history *history);
 
 /* After tangential_update, of the same input: enters the location and adds VELOCITY_VALID, MOVING
- * and SLIDING to result->flags. What is carried on from an earlier frame does not enter: its flags
- * are that frame's. */
+ * and SLIDING to result->flags. */
 void motion_update(struct motion_history *history, const struct tangential_settings *settings,
                    const struct contact_input *input, struct contact_result *result,
                    struct motion *motion);

@@ -1,6 +1,8 @@
 #include "contact/tangential.h"
 
 #include "common/contact_flags.h"
+#include "fit/fit_fixed.h"
+#include "fit/fit_math.h"
 
 #include <math.h>
 #include <string.h>
@@ -15,7 +17,13 @@ void tangential_use(struct tangential_settings *tangential, const struct pad_pro
   tangential->tangential_scale = profile->tangential_scale;
   tangential->tangential_scale_sd = profile->tangential_scale_sd;
   tangential->from_touch = profile->from_touch != 0;
-  tangential->edges = profile->edges;
+  float edges[PAD_EDGE_KINDS][PAD_EDGE_TERMS];
+  memcpy(edges, &profile->edges, sizeof edges);
+  for (int kind = 0; kind < PAD_EDGE_KINDS; kind++) {
+    for (int term = 0; term < PAD_EDGE_TERMS; term++) {
+      tangential->edges_q20[kind][term] = fit_fixed(edges[kind][term], 20);
+    }
+  }
 }
 
 bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated) {
@@ -24,81 +32,96 @@ bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated) 
          !contact_is_lower_bound(fit, saturated);
 }
 
-bool tangential_is_due(struct tangential_kept *kept, uint64_t t_us) {
-  bool fast = t_us - kept->frame_t_us < TANGENTIAL_FAST_us;
-  kept->frame_t_us = t_us;
-  return !kept->is_told ||
-         t_us - kept->t_us >= (fast ? TANGENTIAL_FAST_INTERVAL_us : TANGENTIAL_INTERVAL_us);
-}
-
-void tangential_keep(struct tangential_kept *kept, uint64_t t_us, const struct fit_result *fit,
-                     const struct fit_tangential *estimate) {
-  kept->t_us = t_us;
-  kept->is_told = true;
-  kept->estimate = *estimate;
-  kept->estimate.valid = estimate->valid && fit->force_N > 0.0f;
-  if (kept->estimate.valid) {
-    kept->dx_mm = estimate->x_mm - fit->x_mm;
-    kept->dy_mm = estimate->y_mm - fit->y_mm;
-    kept->force_ratio = estimate->force_N / fit->force_N;
-  }
-}
-
-void tangential_carry(const struct tangential_kept *kept, const struct fit_result *fit,
-                      struct fit_tangential *estimate) {
-  const struct fit_tangential *last = &kept->estimate;
-  memset(estimate, 0, sizeof *estimate);
-  if (!last->valid || !(last->force_N > 0.0f)) {
-    return;
-  }
-  const float force_N = kept->force_ratio * fit->force_N;
-  const float share = force_N / last->force_N;
-  *estimate = *last;
-  estimate->x_mm = fit->x_mm + kept->dx_mm;
-  estimate->y_mm = fit->y_mm + kept->dy_mm;
-  estimate->force_N = force_N;
-  estimate->force_sd_N = share * last->force_sd_N;
-  estimate->qx_N = share * last->qx_N;
-  estimate->qy_N = share * last->qy_N;
-  estimate->q_sd_N = share * last->q_sd_N;
-}
-
 void tangential_reset(struct tangential_history *history) {
   memset(history, 0, sizeof *history);
 }
 
-/* Of a place: its squares, in the unit of pad_edges. */
+/* As struct pad_edges has them. */
+enum edge {
+  RATIO_X,
+  RATIO_Y,
+  GAIN_X,
+  GAIN_Y,
+  PLACE_X_mm,
+  PLACE_Y_mm,
+  PULL_X_mm,
+  PULL_Y_mm,
+  FORCE,
+};
+_Static_assert(FORCE + 1 == PAD_EDGE_KINDS, "all of them");
+
+/* In soft float what follows takes a tenth of a frame at OSR 256. */
+#define UNITS_PER_mm_Q32 429496730 /* of pad_edges */
+#define RATIO_MAX_Q26 ((4 << 26) - 1)
+#define FACTOR_MAX_Q20 ((16 << 20) - 1)
+#define FORCE_MIN_N_Q24 (1 << 14) /* 1 mN */
+
+/* A place in the unit of pad_edges, and its squares. */
 struct from_middle {
-  float u, v, uu, vv;
+  int32_t u_q26, v_q26, uu_q26, vv_q26;
 };
 
-static float even(const float *terms, const struct from_middle *at) {
-  return terms[0] + terms[1] * at->uu + terms[2] * at->vv;
+static int32_t even(const struct tangential_settings *settings, enum edge edge,
+                    const struct from_middle *at) {
+  const int32_t *terms = settings->edges_q20[edge];
+  return terms[0] + fixed_mul_q26(terms[1], at->uu_q26) + fixed_mul_q26(terms[2], at->vv_q26);
 }
 
-/* pad_profile.h has the formulas. False: the load shows too little of itself. */
-static bool without_edges(const struct pad_edges *edges, const struct fit_tangential *found,
-                          struct fit_tangential *mended) {
-  const float u = found->x_mm * (1.0f / PAD_EDGE_UNIT_mm);
-  const float v = found->y_mm * (1.0f / PAD_EDGE_UNIT_mm);
-  const struct from_middle at = {u, v, u * u, v * v};
-  const float gain_x = 1.0f + even(edges->gain_x, &at), gain_y = 1.0f + even(edges->gain_y, &at);
-  const float force = 1.0f + even(edges->force, &at);
-  if (!(gain_x >= TANGENTIAL_GAIN_MIN && gain_y >= TANGENTIAL_GAIN_MIN &&
-        force >= TANGENTIAL_GAIN_MIN)) {
+/* 1 + even, what would not show enough of itself being told by the result. */
+static int32_t factor(const struct tangential_settings *settings, enum edge edge,
+                      const struct from_middle *at) {
+  return fixed_clamp((1 << 20) + even(settings, edge, at), 0, FACTOR_MAX_Q20);
+}
+
+static float inverse(int32_t factor_q20) {
+  return fit_float(fixed_div_q26(1 << 26, factor_q20 * 64), -26);
+}
+
+/* Q / F along one axis without what the pad's ends add, all of which is odd. */
+static int32_t ratio_q26(float tangential_N, int32_t force_N_q24, int32_t added_q20,
+                         int32_t gain_q20) {
+  int32_t up = 28 - fixed_bits((uint32_t)force_N_q24);
+  int32_t force = shifted(force_N_q24, up); /* of many bits for the division */
+  int32_t told_q26 = fixed_div_q26(
+      fixed_clamp(shifted(fit_fixed(tangential_N, 24), up), -4 * force, 4 * force), force);
+  int32_t own_q26 = told_q26 - fixed_clamp(added_q20, -FACTOR_MAX_Q20 / 4, FACTOR_MAX_Q20 / 4) * 64;
+  return fixed_div_q26(fixed_clamp(own_q26, -RATIO_MAX_Q26, RATIO_MAX_Q26), gain_q20 * 64);
+}
+
+/* pad_profile.h has the formulas. False: the load shows too little of itself, or there is hardly a
+ * force. */
+static bool without_edges(const struct tangential_settings *settings,
+                          const struct fit_tangential *found, struct fit_tangential *mended) {
+  const int32_t least_q20 = (int32_t)(TANGENTIAL_GAIN_MIN * 1048576.0f);
+  const int32_t x_q20 = fit_fixed(found->x_mm, 20), y_q20 = fit_fixed(found->y_mm, 20);
+  struct from_middle at = {fixed_mul_q30(x_q20 * 16, UNITS_PER_mm_Q32),
+                           fixed_mul_q30(y_q20 * 16, UNITS_PER_mm_Q32), 0, 0};
+  at.uu_q26 = fixed_mul_q26(at.u_q26, at.u_q26);
+  at.vv_q26 = fixed_mul_q26(at.v_q26, at.v_q26);
+  const int32_t gain_x = factor(settings, GAIN_X, &at), gain_y = factor(settings, GAIN_Y, &at);
+  const int32_t force = factor(settings, FORCE, &at);
+  const int32_t force_N_q24 = fit_fixed(found->force_N, 24);
+  if (gain_x < least_q20 || gain_y < least_q20 || force < least_q20 ||
+      force_N_q24 < FORCE_MIN_N_Q24) {
     return false;
   }
-  const float per_force = 1.0f / found->force_N;
-  const float ratio_x = (found->qx_N * per_force - u * even(edges->ratio_x, &at)) / gain_x;
-  const float ratio_y = (found->qy_N * per_force - v * even(edges->ratio_y, &at)) / gain_y;
+  const int32_t ratio_x = ratio_q26(found->qx_N, force_N_q24,
+                                    fixed_mul_q26(at.u_q26, even(settings, RATIO_X, &at)), gain_x);
+  const int32_t ratio_y = ratio_q26(found->qy_N, force_N_q24,
+                                    fixed_mul_q26(at.v_q26, even(settings, RATIO_Y, &at)), gain_y);
+  const int32_t dx_q20 = fixed_mul_q26(at.u_q26, even(settings, PLACE_X_mm, &at)) +
+                         fixed_mul_q26(ratio_x, even(settings, PULL_X_mm, &at));
+  const int32_t dy_q20 = fixed_mul_q26(at.v_q26, even(settings, PLACE_Y_mm, &at)) +
+                         fixed_mul_q26(ratio_y, even(settings, PULL_Y_mm, &at));
+  const float per_force = inverse(force);
   *mended = *found;
-  mended->force_N = found->force_N / force;
-  mended->force_sd_N = found->force_sd_N / force;
-  mended->x_mm -= u * even(edges->place_x_mm, &at) + ratio_x * even(edges->pull_x_mm, &at);
-  mended->y_mm -= v * even(edges->place_y_mm, &at) + ratio_y * even(edges->pull_y_mm, &at);
-  mended->qx_N = ratio_x * mended->force_N;
-  mended->qy_N = ratio_y * mended->force_N;
-  mended->q_sd_N = found->q_sd_N / (force * (gain_x < gain_y ? gain_x : gain_y));
+  mended->x_mm = fit_float(x_q20 - dx_q20, -20);
+  mended->y_mm = fit_float(y_q20 - dy_q20, -20);
+  mended->force_N = found->force_N * per_force;
+  mended->force_sd_N = found->force_sd_N * per_force;
+  mended->qx_N = fit_float(ratio_x, -26) * mended->force_N;
+  mended->qy_N = fit_float(ratio_y, -26) * mended->force_N;
+  mended->q_sd_N = found->q_sd_N * per_force * inverse(gain_x < gain_y ? gain_x : gain_y);
   return true;
 }
 
@@ -130,7 +153,7 @@ void tangential_update(struct tangential_history *history,
     tangential_reset(history);
   }
   if (!input->tangential || !input->tangential->valid || !(input->tangential->force_N > 0.0f) ||
-      !without_edges(&settings->edges, input->tangential, &mended)) {
+      !without_edges(settings, input->tangential, &mended)) {
     return;
   }
   float qx_N = found->qx_N, qy_N = found->qy_N;

@@ -17,8 +17,8 @@ struct tangential_settings {
   float tangential_scale; /* tangential load is this and force_scale times the estimate's */
   float tangential_scale_sd;
   bool from_touch;
-  struct pad_edges edges;
-  float location_sd_limit_mm; /* UNCERTAIN above it */
+  int32_t edges_q20[PAD_EDGE_KINDS][PAD_EDGE_TERMS]; /* of the profile, in the order there */
+  float location_sd_limit_mm;                        /* UNCERTAIN above it */
 };
 
 /* The scales of this profile, with the calibration whose scales are in settings or, if it is not
@@ -47,36 +47,6 @@ struct tangential_load {
   float q_sd_N;     /* of either, those of the scales in it */
   float ratio;      /* |Q| / F */
 };
-
-/* An estimate takes the chip about 1 ms, which frames at small oversampling ratios do not have: so
- * long is at least between two, and longer where frames are shorter than TANGENTIAL_FAST_us, whose
- * own work takes more than half of the time. The frames between carry the last one on with their
- * own fits. On the RP2040 every frame up to 700 a second has an estimate of its own, of 1308 a
- * second every fifth. */
-#define TANGENTIAL_INTERVAL_us 1400u
-#define TANGENTIAL_FAST_us 1000u
-#define TANGENTIAL_FAST_INTERVAL_us 3400u
-
-/* The last estimate, as it relates to the fit of its own frame. */
-struct tangential_kept {
-  uint64_t t_us;       /* of that frame */
-  uint64_t frame_t_us; /* of the last frame asked for */
-  bool is_told;        /* there has been one in this contact */
-  struct fit_tangential estimate;
-  float dx_mm, dy_mm; /* from the fit's place */
-  float force_ratio;  /* to the fit's force */
-};
-
-/* Whether one is due for the frame of this time; to be asked of every frame once. */
-bool tangential_is_due(struct tangential_kept *kept, uint64_t t_us);
-
-/* After an estimate, valid or not. */
-void tangential_keep(struct tangential_kept *kept, uint64_t t_us, const struct fit_result *fit,
-                     const struct fit_tangential *estimate);
-
-/* Instead of one: the last with this fit's place and force, and the load in proportion. */
-void tangential_carry(const struct tangential_kept *kept, const struct fit_result *fit,
-                      struct fit_tangential *estimate);
 
 /* Whether an estimate from this fit is worth its time; saturated: bitmap of the sensors that were
  * left out for it. */

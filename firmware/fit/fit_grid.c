@@ -16,6 +16,7 @@
 #include "fit/fit_grid_solve.h"
 #include "fit/fit_grid_spread.h"
 #include "fit/fit_limits.h"
+#include "fit/fit_math.h"
 
 #include <stdbool.h>
 #include <string.h>
@@ -407,10 +408,10 @@ static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *re
       scaled_mul(fit_scaled_from(across, -13), fit_grid_reciprocal(scaled_mul(x, y)));
   x = scaled_mul(x, scale);
   y = scaled_mul(y, scale);
-  result->sigma_x_mm = fit_grid_compose(x.mantissa, x.exponent);
-  result->sigma_y_mm = fit_grid_compose(y.mantissa, y.exponent);
+  result->sigma_x_mm = fit_float(x.mantissa, x.exponent);
+  result->sigma_y_mm = fit_float(y.mantissa, y.exponent);
   int32_t limited = fixed_clamp(fit_scaled_to_fixed(correlation, 15), -32767, 32767);
-  result->width_correlation = fit_grid_compose(limited, -15);
+  result->width_correlation = fit_float(limited, -15);
   return true;
 }
 

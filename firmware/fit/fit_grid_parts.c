@@ -2,34 +2,9 @@
 
 #include "common/bytes.h"
 #include "fit/fit_limits.h"
+#include "fit/fit_math.h"
 
 #include <string.h>
-
-float fit_grid_compose(int32_t mantissa, int32_t exponent) {
-  if (mantissa == 0) {
-    return 0.0f;
-  }
-  uint32_t sign = mantissa < 0 ? UINT32_C(1) << 31 : 0;
-  uint32_t size = mantissa < 0 ? 0u - (uint32_t)mantissa : (uint32_t)mantissa;
-  int32_t bits = fixed_bits(size);
-  if (bits > 24) {
-    int32_t shift = bits - 24;
-    size = (size + (UINT32_C(1) << (shift - 1))) >> shift;
-  } else {
-    size <<= 24 - bits;
-  }
-  int32_t biased = exponent + bits - 1 + 127;
-  if (biased <= 0) {
-    return 0.0f;
-  }
-  if (biased >= 156) { /* 2^29: more than any result can mean */
-    return sign ? -FIT_HUGE : FIT_HUGE;
-  }
-  uint32_t word = sign | (((uint32_t)biased << 23) + size - (UINT32_C(1) << 23));
-  float value;
-  memcpy(&value, &word, sizeof value);
-  return value;
-}
 
 uint64_t fit_packed_from(int32_t value, int32_t exponent) {
   return scaled_pack(scaled_from(value, exponent));
@@ -57,7 +32,7 @@ float fit_quadrature(float a, float b, float c, float d) {
   struct scaled second = scaled_mul(fit_grid_scaled(c), fit_grid_scaled(d));
   struct scaled root =
       fit_scaled_sqrt(scaled_add(scaled_mul(first, first), scaled_mul(second, second)));
-  return fit_grid_compose(root.mantissa, root.exponent);
+  return fit_float(root.mantissa, root.exponent);
 }
 
 /* One Newton step of sigma = (log2(e) / 2) / (height sigma) from 11 bits: 22 of them, or 2e-7. */

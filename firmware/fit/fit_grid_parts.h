@@ -83,9 +83,6 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
                             uint32_t usable, const struct fit_settings *settings,
                             struct readings *readings);
 
-/* mantissa * 2^exponent, rounded to nearest, as a float; what is too large becomes FIT_HUGE. */
-float fit_grid_compose(int32_t mantissa, int32_t exponent);
-
 /* value >= 0 and finite. */
 uint64_t fit_packed_float(float value);
 FIXED_INLINE struct scaled fit_grid_scaled(float value) {

@@ -3,6 +3,7 @@
 #include "common/contact_flags.h"
 #include "fit/fit_grid_spread.h"
 #include "fit/fit_limits.h"
+#include "fit/fit_math.h"
 
 /* Longest step: 0.6 pitch in x and y, 0.4 of sigma. A longer one is shortened as a whole: along the
  * bent valleys of a stiff press its direction is what brings it on, and limiting each parameter by
@@ -174,11 +175,11 @@ static NOINLINE struct scaled set_values(const struct fit_grid_shape *grid,
   int32_t force = fixed_mul_q30(fixed_mul_q30(peak, sigma_square), grid->force_scale);
   int32_t force_exponent = peak_exponent + 38 - 2 * up + grid->force_exponent;
   int32_t pitch_exponent = grid->pitch_exponent;
-  result->x_mm = fit_grid_compose(fixed_mul_q32(x, grid->pitch) + grid->x_origin, pitch_exponent);
-  result->y_mm = fit_grid_compose(fixed_mul_q32(y, grid->pitch) + grid->y_origin, pitch_exponent);
-  result->sigma_mm = fit_grid_compose(fixed_mul_q32(sigma, grid->pitch), pitch_exponent);
-  result->p0_Pa = fit_grid_compose(peak, peak_exponent);
-  result->force_N = fit_grid_compose(force, force_exponent);
+  result->x_mm = fit_float(fixed_mul_q32(x, grid->pitch) + grid->x_origin, pitch_exponent);
+  result->y_mm = fit_float(fixed_mul_q32(y, grid->pitch) + grid->y_origin, pitch_exponent);
+  result->sigma_mm = fit_float(fixed_mul_q32(sigma, grid->pitch), pitch_exponent);
+  result->p0_Pa = fit_float(peak, peak_exponent);
+  result->force_N = fit_float(force, force_exponent);
   return scaled_near(force, force_exponent);
 }
 
@@ -249,7 +250,7 @@ static NOINLINE void set_scatter(const struct readings *readings,
                                         scaled_mul(scaled_square(left), spread->inverse_mass));
   square_sum.mantissa = square_sum.mantissa < 0 ? 0 : square_sum.mantissa;
   struct scaled rms = fit_scaled_sqrt(scaled_mean(square_sum, count));
-  result->residual_rms_Pa = fit_grid_compose(rms.mantissa, rms.exponent + 18 - readings->shift);
+  result->residual_rms_Pa = fit_float(rms.mantissa, rms.exponent + 18 - readings->shift);
 
   scatter->noise = scaled_square(fit_scaled_from(settings->noise_Pa_q10, readings->shift - 28));
   struct scaled model = scaled_mul(fit_scaled_from(settings->model_sd_q16, -16),
@@ -295,7 +296,7 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   struct scaled form = scaled_mul(location_form(system, spread, &inverse3),
                                   scaled_square(scaled_mul(spread->softness, pitch))); /* mm */
   struct scaled sd = fit_scaled_sqrt(scaled_mul(scatter.noise, form));
-  result->location_noise_mm = fit_grid_compose(sd.mantissa, sd.exponent);
+  result->location_noise_mm = fit_float(sd.mantissa, sd.exponent);
   struct scaled move_x =
       fit_scaled_from(system->move_x_q22, -22); /* what it moved is not settled */
   struct scaled move_y = fit_scaled_from(system->move_y_q22, -22);
@@ -305,7 +306,7 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   sd = flags & CONTACT_FLAG_AT_BOUND
            ? scaled_mul(BOUND_SD, pitch)
            : fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), apart));
-  result->location_sd_mm = fit_grid_compose(sd.mantissa, sd.exponent);
+  result->location_sd_mm = fit_float(sd.mantissa, sd.exponent);
   struct scaled limit = fit_grid_scaled(fit_location_sd_limit_mm(settings));
   if (scaled_sub(sd, limit).mantissa > 0) {
     flags |= CONTACT_FLAG_UNCERTAIN;
@@ -315,7 +316,7 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
                     fit_grid_reciprocal(scaled_square(spread->amplitude)));
   sd = fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), spread->force_variance));
   sd = scaled_mul(sd, force);
-  result->force_sd_N = fit_grid_compose(sd.mantissa, sd.exponent);
+  result->force_sd_N = fit_float(sd.mantissa, sd.exponent);
 
   if (scatter.other_model) {
     flags |= CONTACT_FLAG_MODEL;

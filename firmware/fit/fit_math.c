@@ -1,5 +1,9 @@
 #include "fit/fit_math.h"
 
+#include "common/bytes.h"
+#include "fit/fit_fixed.h"
+#include "fit/fit_limits.h"
+
 #include <string.h>
 
 /* 2^(-k/32), Q30. */
@@ -50,4 +54,44 @@ int32_t fit_log2_q24(uint32_t value) {
   sum = fit_mul_q30(sum, f_q30) + 386181455;
   sum = fit_mul_q30(sum, f_q30);
   return (whole << 24) + (sum >> 4);
+}
+
+int32_t fit_fixed(float value, int q) {
+  uint32_t pattern = bytes_from_f32(value);
+  int shift = (int)(pattern >> 23 & 0xFFu) - 150 + q;
+  uint32_t size = (pattern & 0x7FFFFFu) | 0x800000u;
+  if (shift > 7) {
+    size = INT32_MAX;
+  } else if (shift >= 0) {
+    size <<= shift;
+  } else {
+    size = shift > -24 ? size >> -shift : 0;
+  }
+  return pattern >> 31 ? -(int32_t)size : (int32_t)size;
+}
+
+float fit_float(int32_t mantissa, int32_t exponent) {
+  if (mantissa == 0) {
+    return 0.0f;
+  }
+  uint32_t sign = mantissa < 0 ? UINT32_C(1) << 31 : 0;
+  uint32_t size = mantissa < 0 ? 0u - (uint32_t)mantissa : (uint32_t)mantissa;
+  int32_t bits = fixed_bits(size);
+  if (bits > 24) {
+    int32_t shift = bits - 24;
+    size = (size + (UINT32_C(1) << (shift - 1))) >> shift;
+  } else {
+    size <<= 24 - bits;
+  }
+  int32_t biased = exponent + bits - 1 + 127;
+  if (biased <= 0) {
+    return 0.0f;
+  }
+  if (biased >= 156) { /* 2^29: more than any result can mean */
+    return sign ? -FIT_HUGE : FIT_HUGE;
+  }
+  uint32_t word = sign | (((uint32_t)biased << 23) + size - (UINT32_C(1) << 23));
+  float value;
+  memcpy(&value, &word, sizeof value);
+  return value;
 }

@@ -2,6 +2,7 @@
 
 #include "common/contact_flags.h"
 #include "fit/fit_grid_parts.h"
+#include "fit/fit_math.h"
 
 #include <string.h>
 
@@ -60,20 +61,30 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
 #define SPREAD_LEAST_Q15 9830 /* 0.3 of the narrowest normal term's variance: as much below 0 */
 #define SPREAD_MOST_Q26 (ONE_Q26 / 2) /* 2 V0 */
 #define LONG_MAX_Q26 (ONE_Q26 / 4 - 1)
-#define AMPLITUDE_MAX_Q24 (4 << 24)
-#define PULL_MAX_Q24 (4 << 24)
+#define AMPLITUDE_MAX_Q24 ((4 << 24) - (1 << 11))
+#define PULL_MAX_Q24 (2 << 24)
+
+/* Where a step begins is rounded, which moves the step and not where it ends: so that what residual
+ * and Jacobian have of it is exact in 16 bits, distances from sensors too, whose pitch is such a
+ * number. */
+#define PLACE_Q 12
+#define HEIGHT_Q 13 /* of A and B */
+#define LONG_Q 17   /* of e1 and e2 */
 
 /* Longest step of the place, and of t in the narrowest term's variance. */
 #define MOVE_MAX_Q26 (ONE_Q26 * 3 / 8)
 
-#define PIVOT_LEAST (1 << 18) /* 2^-12: what is told less is left where it is */
+/* The first step leaves what a layer is not a Gaussian; after one longer than 0.2 of the longest
+ * the estimate is off its optimum by some 0.1 mm, after a jump of the Gaussian too. */
+#define STEPS_TOLD 2
+#define LENGTH_TOLD_Q14 3277
+#define JUMP_Q26 (ONE_Q26 / 4)
+/* After so many frames in a row that are not told it begins anew: one more than a contact at rest
+ * takes. Where another contact has come and gone it is found again within ten frames, without this
+ * after hundreds. */
+#define UNTOLD_MOST 6
 
-struct unknowns {
-  int32_t amplitude_q24; /* of the unit of readings */
-  int32_t x_q26, y_q26;  /* from the grid's origin node */
-  int32_t t_q26, e1_q26, e2_q26;
-  int32_t pull_x_q24, pull_y_q24;
-};
+#define PIVOT_LEAST (1 << 18) /* 2^-12: what is told less is left where it is */
 
 /* What of the readings is kept from step to step. */
 struct problem {
@@ -101,6 +112,7 @@ static int32_t spread_least(const struct fit_pad *pad) {
 #define VARIANCE_MAX 7.0f
 #define PITCH_MAX 1.9f
 #define UNIT_MAX_mm 19.5f
+#define FORCE_UNIT_Q 40 /* 2^25 .. 2^30 */
 
 /* Whether the sums over these terms of strength V0 / v^i, i from first, stay below their limits for
  * the most concentrated contact. */
@@ -127,7 +139,8 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
       array->pitch_mm > PITCH_MAX * 2.0f * widest_mm) {
     return FT_ERR_ARGUMENT;
   }
-  float unit_mm = 2.0f * profile->normal[PAD_NORMAL_TERMS - 1].sd_mm;
+  int32_t pitch_q12 = (int32_t)(array->pitch_mm / (2.0f * widest_mm) * 4096.0f + 0.5f);
+  float unit_mm = array->pitch_mm * 4096.0f / (float)pitch_q12;
   float per_unit = 1.0f / unit_mm;
   for (int j = 0; j < FIT_TANGENTIAL_TERMS; j++) {
     bool normal = j < PAD_NORMAL_TERMS;
@@ -143,9 +156,12 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
     pad->strength_q26[j] = q26_from(strength);
   }
   float per_square = per_unit * per_unit;
-  pad->unit_mm = unit_mm;
-  pad->per_unit = per_unit;
-  pad->pitch_q26 = q26_from(array->pitch_mm * per_unit);
+  uint8_t origin = array->grid.sensor[COLUMNS / 2 * ROWS + ROWS / 2];
+  pad->unit_q25_mm = (int32_t)(unit_mm * 33554432.0f);
+  pad->per_unit_q30 = (int32_t)(per_unit * 1073741824.0f);
+  pad->origin_x_q24_mm = fit_fixed(array->x[origin] * array->pitch_mm, 24);
+  pad->origin_y_q24_mm = fit_fixed(array->y[origin] * array->pitch_mm, 24);
+  pad->pitch_q26 = pitch_q12 * (1 << (26 - PLACE_Q));
   pad->pitch_square_q26 = fixed_mul_q26(pad->pitch_q26, pad->pitch_q26);
   float spread = profile->spread_mm2 * per_square, spread_sd = profile->spread_sd_mm2 * per_square;
   pad->spread_q26 = q26_from(spread < VARIANCE_MAX ? spread : VARIANCE_MAX);
@@ -156,7 +172,8 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
       !is_carried(pad, PAD_NORMAL_TERMS, FIT_TANGENTIAL_TERMS, 1.3f * least, true)) {
     return FT_ERR_ARGUMENT;
   }
-  pad->force_unit_N = 1.57079633e-6f * unit_mm * unit_mm; /* 2 pi V0, V0 = 1/4 */
+  float force_unit_N = 1.57079633e-6f * unit_mm * unit_mm; /* 2 pi V0, V0 = 1/4 */
+  pad->force_unit = (struct scaled){fit_fixed(force_unit_N, FORCE_UNIT_Q), -FORCE_UNIT_Q};
   bool near_ends =
       profile->overhang_mm > 0.0f && profile->overhang_mm < NEAR_ENDS * profile->thickness_mm;
   pad->chi_square_max = near_ends                     ? CHI_SQUARE_MAX_NEAR_ENDS
@@ -166,7 +183,7 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
   float thin = array->pitch_mm / (THICKNESS_PER_UNIT * unit_mm);
   thin *= thin;
   pad->thin = fit_grid_scaled(thin > 1.0f ? thin * thin : 1.0f);
-  pad->per_force = fit_grid_scaled(1.0f / (GAUSSIAN_FORCE * pad->force_unit_N));
+  pad->per_force = fit_grid_scaled(1.0f / (GAUSSIAN_FORCE * force_unit_N));
   return FT_OK;
 }
 
@@ -195,32 +212,35 @@ FIXED_INLINE int32_t rounded(int32_t value, int shift) {
   return (value + (1 << (shift - 1))) >> shift;
 }
 
-/* Of a contact at the state's place: where the sensors lie along one axis, and what of the model
- * depends on that alone. */
-struct offset {
-  int32_t d_q26, d_q13;
-  int32_t half_square_q23;
-  int32_t pulled_q24;            /* B d */
-  int32_t longer_q26;            /* e1 d^2 / 2 */
-  int32_t along_q28, across_q28; /* e1 d, e2 d */
+/* Where a step begins, rounded. */
+struct origin {
+  int32_t x_q12, y_q12, amplitude_q13, pull_x_q13, pull_y_q13, e1_q17, e2_q17;
 };
 
-static void set_offset(int32_t d_q26, int32_t pull_q24, const struct unknowns *at,
-                       struct offset *off) {
-  off->d_q26 = d_q26;
-  off->d_q13 = rounded(d_q26, 13);
-  off->half_square_q23 = fixed_mul_q28(d_q26, d_q26) >> 2;
-  off->pulled_q24 = fixed_mul_q26(pull_q24, d_q26);
-  off->longer_q26 = whole_product(at->e1_q26 * 64, off->half_square_q23, 29);
-  off->across_q28 = whole_product(at->e2_q26 * 64, d_q26, 30);
-  off->along_q28 = product(at->e1_q26 * 64, d_q26, 30);
+/* Of a contact there: where the sensors lie along one axis, and what of the model depends on that
+ * alone. */
+struct offset {
+  int32_t d_q12, half_square_q24;
+  int32_t pulled_q25;               /* B d */
+  int32_t longer_q26;               /* e1 d^2 / 2 */
+  int32_t along_x_q17, along_y_q17; /* in x e1 d and e2 d, in y e2 d and -e1 d */
+};
+
+FIXED_INLINE void set_offset(int32_t d_q12, int32_t pull_q13, int32_t e1_q17, int32_t by_x_q17,
+                             int32_t by_y_q17, struct offset *off) {
+  off->d_q12 = d_q12;
+  off->half_square_q24 = (d_q12 * d_q12) >> 1;
+  off->pulled_q25 = d_q12 * pull_q13;
+  off->longer_q26 = scaled_by(off->half_square_q24, e1_q17, 15);
+  off->along_x_q17 = rounded(d_q12 * by_x_q17, 12);
+  off->along_y_q17 = rounded(d_q12 * by_y_q17, 12);
 }
 
 /* One term, strength V0 / v exp(-d' d / (2 v)). */
 struct term {
   int32_t x_q28[COLUMNS]; /* with the strength */
   int32_t y_q30[ROWS];
-  int32_t inverse_q11; /* 1 / v, at most 16 */
+  int32_t over_q11, over_square_q7; /* 1 / v, at most 16, and its square */
 };
 
 /* d' d / (2 v) in Q22 and powers of 2, along one axis: bend (i pitch - place)^2, exactly a parabola
@@ -260,148 +280,133 @@ NOINLINE static void set_term(const struct fit_pad *pad, int j, int32_t t_q26,
   for (int i = 0; i < COLUMNS; i++) {
     term->x_q28[i] = product(term->x_q28[i], height_q28, 30);
   }
-  term->inverse_q11 = fixed_clamp(rounded(inverse_q22, 11), 0, INT16_MAX);
-}
-
-/* struct fit_tangential_sums of every node. Of a round contact that does not pull s3, s4, f1 and f2
- * are in no column. */
-NOINLINE static void set_sums(const struct term *terms, bool round,
-                              union fit_tangential_node *node) {
-  for (int i = 0; i < COLUMNS; i++) {
-    for (int k = 0; k < ROWS; k++, node++) {
-      struct fit_tangential_sums *sums = &node->sums;
-      int32_t s0 = 0, s1 = 0, s2 = 0, s3 = 0, s4 = 0;
-      const struct term *term = terms;
-      for (int j = 0; j < PAD_NORMAL_TERMS; j++, term++) {
-        int32_t w_q28 = product(term->x_q28[i], term->y_q30[k], 30);
-        int32_t over = term->inverse_q11;
-        s0 += w_q28;
-        int32_t w_q25 = scaled_by(w_q28, over, 14);
-        s1 += w_q25;
-        int32_t w_q22 = scaled_by(w_q25, over, 14);
-        s2 += w_q22;
-        if (!round) {
-          int32_t w_q17 = scaled_by(w_q22, over, 16);
-          s3 += w_q17;
-          s4 += scaled_by(w_q17, over, 14);
-        }
-      }
-      sums->s0_q28 = s0;
-      sums->s1_q25 = s1;
-      sums->s2_q22 = s2;
-      sums->s3_q17 = s3;
-      sums->s4_q14 = s4;
-      int32_t f0 = 0, f1 = 0, f2 = 0;
-      for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++, term++) {
-        int32_t w_q28 = product(term->x_q28[i], term->y_q30[k], 30);
-        f0 += w_q28;
-        if (!round) {
-          int32_t over = term->inverse_q11;
-          int32_t w_q25 = scaled_by(w_q28, over, 14);
-          f1 += w_q25;
-          f2 += scaled_by(w_q25, over, 14);
-        }
-      }
-      sums->f0_q28 = f0;
-      sums->f1_q25 = f1;
-      sums->f2_q22 = f2;
-    }
-  }
+  term->over_q11 = fixed_clamp(rounded(inverse_q22, 11), 0, INT16_MAX);
+  term->over_square_q7 = (term->over_q11 * term->over_q11) >> 15;
 }
 
 #define LONGER_MAX_Q26 ((4 << 26) - 1)
-#define PULLED_MAX_Q24 (12 << 24)
-#define COLUMN_MAX_Q15 (15 << 15)
 
 /* Qs in which the columns leave linearise. */
-static const uint8_t column_q[UNKNOWNS] = {16, 15, 15, 15, 16, 16, 16, 16};
+static const uint8_t column_q[UNKNOWNS] = {14, 14, 14, 14, 14, 14, 16, 16};
 
-FIXED_INLINE int32_t weighed(int32_t value, int32_t weight_q12) {
-  return rounded(value * weight_q12, 12);
+/* The residuals of five nodes but for P s2, and the terms there with the weight, for set_sums. */
+NOINLINE static void set_terms(const struct problem *problem, const struct term *terms, int i,
+                               const struct offset *x, const struct offset *y,
+                               int32_t amplitude_q13, struct fit_tangential_room *room) {
+  for (int k = 0, n = i * ROWS; k < ROWS; k++, n++, y++) {
+    struct fit_tangential_terms *found = &room->node[n].terms;
+    int32_t weight_q12 = room->weight_q12[n];
+    int32_t s0_q28 = 0, f0_q28 = 0;
+    for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+      int32_t w_q28 = product(terms[j].x_q28[i], terms[j].y_q30[k], 30);
+      s0_q28 += w_q28;
+      found->normal_q28[j] = scaled_by(w_q28, weight_q12, 12);
+    }
+    for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
+      const struct term *term = &terms[PAD_NORMAL_TERMS + j];
+      int32_t w_q28 = product(term->x_q28[i], term->y_q30[k], 30);
+      f0_q28 += w_q28;
+      found->tangential_q28[j] = scaled_by(w_q28, weight_q12, 12);
+    }
+    int32_t model_q24 = (scaled_by(s0_q28, amplitude_q13, 16) >> 1) +
+                        whole_product(x->pulled_q25 + y->pulled_q25, f0_q28 * 2, 30);
+    room->residual[n] = scaled_by((problem->readings.q28[n] >> 4) - model_q24, weight_q12, 12);
+  }
 }
 
-FIXED_INLINE int32_t limited_q15(int32_t value_q20) {
-  return fixed_clamp(rounded(value_q20, 5), -COLUMN_MAX_Q15, COLUMN_MAX_Q15);
+/* struct fit_tangential_sums of every node, of its terms. What is multiplied by little has few
+ * bits. */
+NOINLINE static void set_sums(const struct term *terms, union fit_tangential_node *node) {
+  const union fit_tangential_node *end = node + NODES;
+  do {
+    int32_t s0 = 0, s1 = 0, s2 = 0, s3 = 0, s4 = 0;
+    for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+      int32_t over_q11 = terms[j].over_q11, w_q28 = node->terms.normal_q28[j];
+      s0 += w_q28;
+      int32_t w_q25 = scaled_by(w_q28, over_q11, 14);
+      s1 += w_q25;
+      int32_t w_q22 = scaled_by(w_q25, over_q11, 14);
+      s2 += w_q22;
+      int32_t w_q18 = scaled_by(w_q22, over_q11, 15);
+      s3 += w_q18;
+      s4 += scaled_by(w_q18, over_q11, 15);
+    }
+    int32_t f0 = 0, f1 = 0, f2 = 0;
+    for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
+      const struct term *term = &terms[PAD_NORMAL_TERMS + j];
+      int32_t w_q28 = node->terms.tangential_q28[j];
+      f0 += w_q28;
+      f1 += scaled_by(w_q28, term->over_q11, 14);
+      f2 += scaled_by(w_q28, term->over_square_q7, 13);
+    }
+    node->sums.s0_q14 = rounded(s0, 14);
+    node->sums.s1_q25 = s1;
+    node->sums.s2_q22 = s2;
+    node->sums.s3_q8 = s3 >> 10;
+    node->sums.s4_q14 = s4;
+    node->sums.f0_q14 = rounded(f0, 14);
+    node->sums.f1_q12 = rounded(f1, 13);
+    node->sums.f2_q22 = f2;
+  } while (++node != end);
 }
 
-/* One step's model and Jacobian, weighed; residuals in Q24. With d = (dx, dy), r2 = d' d and
- * b = Bx dx + By dy:
+/* Ends the residuals of five nodes and sets their columns of the place and the spread. With
+ * d = (dx, dy), r2 = d' d and b = Bx dx + By dy:
  *   m     = A s0 + P s2 + b f0,     P = e1 (dx^2 - dy^2) / 2 + e2 dx dy
  *   dm/dx = dx (A s1 + P s3 + b f1) - (e1 dx + e2 dy) s2 - Bx f0
  *   dm/dt = r2 / 2 (A s2 + P s4 + KAPPA b f2) - (A s1 + 3 P s3 + 2 KAPPA b f1)
- * (e1 and e2 with the amplitude in them). In parts, for the eight low registers. */
-struct place {
-  const struct offset *x, *y;
-  const struct unknowns *at;
-  int32_t weight;
-  int32_t pulled_q26, longer_q28; /* b and P */
-};
-
-NOINLINE static void set_shape(struct place *place) {
-  int32_t pulled_q24 = place->x->pulled_q24 + place->y->pulled_q24;
-  place->pulled_q26 = fixed_clamp(pulled_q24, -PULLED_MAX_Q24, PULLED_MAX_Q24) * 4;
-  int32_t longer_q26 = place->x->longer_q26 - place->y->longer_q26 +
-                       whole_product(place->x->across_q28, place->y->d_q26, 28);
-  place->longer_q28 = fixed_clamp(longer_q26, -LONGER_MAX_Q26, LONGER_MAX_Q26) * 4;
+ * (e1 and e2 with the amplitude in them). */
+NOINLINE static void set_moving(const struct offset *x, const struct offset *y,
+                                const struct origin *at, union fit_tangential_node *node,
+                                int32_t *residual) {
+  const union fit_tangential_node *end = node + ROWS;
+  do {
+    int32_t longer_q26 =
+        x->longer_q26 - y->longer_q26 + scaled_by(x->d_q12 * y->d_q12, at->e2_q17, 15);
+    int32_t longer_q28 = fixed_clamp(longer_q26, -LONGER_MAX_Q26, LONGER_MAX_Q26) * 4;
+    int32_t s2_q22 = node->sums.s2_q22;
+    *residual++ -= product(longer_q28, s2_q22, 26);
+    int32_t p_q17 = longer_q28 >> 11;
+    int32_t b_q14 = (x->pulled_q25 + y->pulled_q25) >> 11;
+    int32_t more_b_q14 = b_q14 + (((b_q14 >> 1) * (KAPPA_Q14 - (1 << 14))) >> 13);
+    int32_t f1_q12 = node->sums.f1_q12;
+    int32_t as1_q22 = scaled_by(node->sums.s1_q25, at->amplitude_q13, 16);
+    int32_t ps3_q22 = (node->sums.s3_q8 * p_q17) >> 3;
+    int32_t radial_q13 = rounded(as1_q22 + ps3_q22 + ((f1_q12 * b_q14) >> 4), 9);
+    int32_t flat_q22 = as1_q22 + 3 * ps3_q22 + ((f1_q12 * more_b_q14) >> 3);
+    int32_t bend_q20 = scaled_by(s2_q22, at->amplitude_q13, 15) +
+                       whole_product(node->sums.s4_q14, longer_q28, 22) +
+                       product(node->sums.f2_q22, more_b_q14 * (1 << 11), 27);
+    int32_t wider_q22 = whole_product(x->half_square_q24 + y->half_square_q24, bend_q20, 22);
+    node->column[SPREAD] = rounded(wider_q22 - flat_q22, 8);
+    int32_t s2_q8 = rounded(s2_q22, 14), f0_q14 = node->sums.f0_q14;
+    int32_t along_x_q25 =
+        s2_q8 * (x->along_x_q17 + y->along_x_q17) + ((f0_q14 * at->pull_x_q13) >> 2);
+    int32_t along_y_q25 =
+        s2_q8 * (x->along_y_q17 + y->along_y_q17) + ((f0_q14 * at->pull_y_q13) >> 2);
+    node->column[PLACE_X] = rounded(radial_q13 * x->d_q12 - along_x_q25, 11);
+    node->column[PLACE_Y] = rounded(radial_q13 * y->d_q12 - along_y_q25, 11);
+    y++;
+  } while (++node != end);
 }
 
-NOINLINE static int32_t model_of(const struct place *place,
-                                 const struct fit_tangential_sums *sums) {
-  return product(place->at->amplitude_q24 * 16, sums->s0_q28, 32) +
-         whole_product(place->pulled_q26, sums->f0_q28 * 2, 31) +
-         whole_product(place->longer_q28, sums->s2_q22 * 2, 27);
-}
-
-/* Columns of the place and the spread. */
-NOINLINE static void set_moving(const struct place *place, int32_t a_q13, bool round,
-                                union fit_tangential_node *node) {
-  const struct fit_tangential_sums *sums = &node->sums;
-  const struct offset *x = place->x, *y = place->y;
-  int32_t radial_q20 = scaled_by(sums->s1_q25, a_q13, 16) >> 2;
-  int32_t bend_q20 = scaled_by(sums->s2_q22, a_q13, 15);
-  int32_t flat_q20 = radial_q20, along_x_q20 = 0, along_y_q20 = 0;
-  if (!round) {
-    int32_t p_q28 = place->longer_q28, b_q26 = place->pulled_q26;
-    int32_t ps3_q20 = product(sums->s3_q17, p_q28, 25);
-    int32_t bf1_q20 = product(sums->f1_q25, b_q26, 31);
-    bend_q20 += whole_product(sums->s4_q14, p_q28, 22);
-    bend_q20 += product(sums->f2_q22, scaled_by(b_q26, KAPPA_Q14, 14), 28);
-    flat_q20 += 3 * ps3_q20 + scaled_by(bf1_q20, KAPPA_Q14, 13);
-    radial_q20 += ps3_q20 + bf1_q20;
-    along_x_q20 = product(sums->s2_q22, x->along_q28 + y->across_q28, 30) +
-                  (product(place->at->pull_x_q24 * 16, sums->f0_q28, 32) >> 4);
-    along_y_q20 = product(sums->s2_q22, x->across_q28 - y->along_q28, 30) +
-                  (product(place->at->pull_y_q24 * 16, sums->f0_q28, 32) >> 4);
-  }
-  int32_t weight = place->weight;
-  int32_t widen_q20 =
-      whole_product(x->half_square_q23 + y->half_square_q23, bend_q20, 23) - flat_q20;
-  node->column[SPREAD] = weighed(limited_q15(widen_q20), weight);
-  /* The place's columns overwrite it. */
-  int32_t s2_q22 = sums->s2_q22;
-  node->column[PLACE_X] =
-      weighed(limited_q15(product(radial_q20, x->d_q26, 26) - along_x_q20), weight);
-  node->column[PLACE_Y] =
-      weighed(limited_q15(product(radial_q20, y->d_q26, 26) - along_y_q20), weight);
-  node->column[STRETCH] =
-      weighed(product(x->half_square_q23 - y->half_square_q23, s2_q22, 29), weight);
-  node->column[SLANT] = s2_q22; /* until set_still */
-}
-
-/* The other columns, of the unknowns that the model is linear in. */
-NOINLINE static void set_still(const struct place *place, int32_t f0_q28,
+/* The columns of the unknowns that the model is linear in; that of the amplitude is s0. */
+NOINLINE static void set_still(const struct offset *x, const struct offset *y,
                                union fit_tangential_node *node) {
-  const struct offset *x = place->x, *y = place->y;
-  int32_t weight = place->weight;
-  int32_t slant_q23 = product(x->d_q26, y->d_q26, 30) * 2;
-  node->column[SLANT] = weighed(product(slant_q23, node->column[SLANT], 29), weight);
-  node->column[AMPLITUDE] = weighed(rounded(node->sums.s0_q28, 12), weight);
-  int32_t f_q16 = rounded(f0_q28, 12);
-  node->column[PULL_X] = weighed(rounded(f_q16 * x->d_q13, 13), weight);
-  node->column[PULL_Y] = weighed(rounded(f_q16 * y->d_q13, 13), weight);
+  const union fit_tangential_node *end = node + ROWS;
+  do {
+    int32_t s2_q22 = node->sums.s2_q22, f0_q14 = node->sums.f0_q14;
+    node->column[STRETCH] =
+        rounded(product(x->half_square_q24 - y->half_square_q24, s2_q22, 27), 5);
+    node->column[SLANT] = rounded(product(x->d_q12 * y->d_q12, s2_q22, 27), 5);
+    node->column[PULL_X] = rounded(f0_q14 * x->d_q12, 10);
+    node->column[PULL_Y] = rounded(f0_q14 * y->d_q12, 10);
+    y++;
+  } while (++node != end);
 }
 
-NOINLINE static void linearise(const struct problem *problem, const struct unknowns *at, bool round,
+NOINLINE static void linearise(const struct problem *problem,
+                               const struct fit_tangential_unknowns *at,
                                struct fit_tangential_room *room) {
   const struct fit_pad *pad = problem->pad;
   struct offset off_x[COLUMNS], off_y[ROWS];
@@ -409,32 +414,32 @@ NOINLINE static void linearise(const struct problem *problem, const struct unkno
   const struct parabola axes[2] = {
       {fixed_mul_q26(at->x_q26, at->x_q26), fixed_mul_q26(at->x_q26, pad->pitch_q26)},
       {fixed_mul_q26(at->y_q26, at->y_q26), fixed_mul_q26(at->y_q26, pad->pitch_q26)}};
+  const struct origin origin = {
+      at->x_q26 >> (26 - PLACE_Q),          at->y_q26 >> (26 - PLACE_Q),
+      at->amplitude_q24 >> (24 - HEIGHT_Q), at->pull_x_q24 >> (24 - HEIGHT_Q),
+      at->pull_y_q24 >> (24 - HEIGHT_Q),    at->e1_q26 >> (26 - LONG_Q),
+      at->e2_q26 >> (26 - LONG_Q)};
+  int32_t pitch_q12 = pad->pitch_q26 >> (26 - PLACE_Q);
   for (int i = 0; i < COLUMNS; i++) {
-    set_offset((i - COLUMNS / 2) * pad->pitch_q26 - at->x_q26, at->pull_x_q24, at, &off_x[i]);
+    set_offset((i - COLUMNS / 2) * pitch_q12 - origin.x_q12, origin.pull_x_q13, origin.e1_q17,
+               origin.e1_q17, origin.e2_q17, &off_x[i]);
   }
   for (int k = 0; k < ROWS; k++) {
-    set_offset((k - ROWS / 2) * pad->pitch_q26 - at->y_q26, at->pull_y_q24, at, &off_y[k]);
+    set_offset((k - ROWS / 2) * pitch_q12 - origin.y_q12, origin.pull_y_q13, origin.e1_q17,
+               origin.e2_q17, -origin.e1_q17, &off_y[k]);
   }
   int32_t wider_q26 = fixed_mul_16(at->t_q26, KAPPA_Q14) * 4;
   for (int j = 0; j < FIT_TANGENTIAL_TERMS; j++) {
     set_term(pad, j, j < PAD_NORMAL_TERMS ? at->t_q26 : wider_q26, axes, &terms[j]);
   }
-  set_sums(terms, round, room->node);
-  int32_t a_q13 = fixed_clamp(rounded(at->amplitude_q24, 11), 0, INT16_MAX);
-  struct place place = {.at = at};
-  for (int n = 0, i = 0; i < COLUMNS; i++) {
-    place.x = &off_x[i];
-    for (int k = 0; k < ROWS; k++, n++) {
-      union fit_tangential_node *node = &room->node[n];
-      place.y = &off_y[k];
-      place.weight = room->weight_q12[n];
-      set_shape(&place);
-      int32_t residual = (problem->readings.q28[n] >> 4) - model_of(&place, &node->sums);
-      room->residual[n] = scaled_by(residual, place.weight, 12);
-      int32_t f0_q28 = node->sums.f0_q28;
-      set_moving(&place, a_q13, round, node);
-      set_still(&place, f0_q28, node);
-    }
+  for (int i = 0; i < COLUMNS; i++) {
+    set_terms(problem, terms, i, &off_x[i], off_y, origin.amplitude_q13, room);
+  }
+  set_sums(terms, room->node);
+  for (int i = 0; i < COLUMNS; i++) {
+    union fit_tangential_node *node = &room->node[i * ROWS];
+    set_moving(&off_x[i], off_y, &origin, node, &room->residual[i * ROWS]);
+    set_still(&off_x[i], off_y, node);
   }
 }
 
@@ -444,7 +449,7 @@ struct priors {
   int32_t residual[UNKNOWNS]; /* Q24, then as the residuals */
 };
 
-static void set_priors(const struct problem *problem, const struct unknowns *at,
+static void set_priors(const struct problem *problem, const struct fit_tangential_unknowns *at,
                        struct priors *priors) {
   memset(priors, 0, sizeof *priors);
   priors->row_q26[SPREAD] = problem->spread_prior_q26;
@@ -495,33 +500,15 @@ NOINLINE static uint32_t column_size(const int32_t *column, uint32_t largest) {
   return largest;
 }
 
-NOINLINE static void shift_column(int32_t *column, int32_t shift) {
-  const int32_t *end = column + NODES * UNKNOWNS;
-  if (shift > 0) {
-    int32_t half = (1 << shift) >> 1;
-    do {
-      column[0] = (column[0] + half) >> shift;
-      column[UNKNOWNS] = (column[UNKNOWNS] + half) >> shift;
-      column[2 * UNKNOWNS] = (column[2 * UNKNOWNS] + half) >> shift;
-      column += 3 * UNKNOWNS;
-    } while (column != end);
-  } else if (shift < 0) {
-    int32_t up = 1 << -shift;
-    do {
-      column[0] *= up;
-      column[UNKNOWNS] *= up;
-      column[2 * UNKNOWNS] *= up;
-      column += 3 * UNKNOWNS;
-    } while (column != end);
-  }
-}
-
-NOINLINE static int32_t square_sum(const int32_t *column, const int32_t *residual, int32_t *right) {
+/* Divides a column by 2^shift; gives its square sum, and adds its products with the residuals. */
+NOINLINE static int32_t shift_column(int32_t *column, const int32_t *residual, int32_t shift,
+                                     int32_t *right) {
   const int32_t *end = residual + NODES;
-  int32_t own = 0, other = *right;
+  int32_t own = 0, other = *right, half = (1 << shift) >> 1;
   do {
     _Pragma("GCC unroll 3") for (int k = 0; k < 3; k++) {
-      int32_t value = column[k * UNKNOWNS];
+      int32_t value = (column[k * UNKNOWNS] + half) >> shift;
+      column[k * UNKNOWNS] = value;
       other += value * residual[k];
       own += value * value;
     }
@@ -533,18 +520,18 @@ NOINLINE static int32_t square_sum(const int32_t *column, const int32_t *residua
 }
 _Static_assert(NODES % 3 == 0, "three at a time");
 
-/* Brings a column to 13 bits, and its prior with it. */
+/* Brings a column to 13 bits at most, and its prior with it. */
 NOINLINE static void normalise_column(struct fit_tangential_room *room, int u, int32_t prior_q26,
                                       int32_t prior_residual, struct equations *equations) {
   int32_t *column = &room->node[0].column[u];
   int32_t q = column_q[u];
   uint32_t largest = column_size(column, fixed_size(prior_q26) >> (26 - q));
   int32_t shift = fixed_bits(largest + (largest >> 8)) - 13;
-  shift_column(column, shift);
+  shift = shift < 0 ? 0 : shift; /* fewer bits of a column so small, which is no pad's */
   q -= shift;
   int32_t row = shifted(prior_q26, q - 26);
   int32_t right = row * prior_residual;
-  int32_t own = square_sum(column, room->residual, &right) + row * row;
+  int32_t own = shift_column(column, room->residual, shift, &right) + row * row;
   int32_t scale = (30 - fixed_bits((uint32_t)own)) >> 1;
   scale = scale > 2 ? 2 : scale;
   equations->scale[u] = scale;
@@ -696,6 +683,7 @@ struct outcome {
   int32_t column_q[UNKNOWNS]; /* a column's integer is its value times 2^q */
   struct scaled misfit;       /* chi^2 in units of the base's square */
   bool at_bound;
+  int32_t length_q14; /* see take_step */
 };
 
 static int32_t clamp_told(int32_t value, int32_t low, int32_t high, bool *at_bound) {
@@ -716,8 +704,10 @@ static int32_t reach(const struct fit_pad *pad, int32_t nodes) {
   return (4 * (nodes / 2) + 3) * (pad->pitch_q26 >> 2);
 }
 
-NOINLINE static void take_step(const struct problem *problem, const struct outcome *outcome,
-                               int32_t residual_q, struct unknowns *at, bool *at_bound) {
+/* Returns how long the step is, Q14 of the longest that is taken. */
+NOINLINE static int32_t take_step(const struct problem *problem, const struct outcome *outcome,
+                                  int32_t residual_q, struct fit_tangential_unknowns *at,
+                                  bool *at_bound) {
   const struct fit_pad *pad = problem->pad;
   int32_t move[UNKNOWNS];
   for (int u = 0; u < UNKNOWNS; u++) {
@@ -725,7 +715,7 @@ NOINLINE static void take_step(const struct problem *problem, const struct outco
     move[u] = shifted(outcome->solution.step_q20[u], outcome->column_q[u] - residual_q - 20 + q);
   }
   int32_t narrow = pad->variance_q26[0] + at->t_q26;
-  int32_t most = 1 << 14;
+  int32_t most = 0;
   for (int u = PLACE_X; u <= SPREAD; u++) {
     int32_t share = in_limits(move[u], u <= PLACE_Y ? MOVE_MAX_Q26 : narrow >> 1);
     most = share > most ? share : most;
@@ -747,13 +737,14 @@ NOINLINE static void take_step(const struct problem *problem, const struct outco
   at->t_q26 = fixed_clamp(at->t_q26 + move[SPREAD], spread_least(pad), SPREAD_MOST_Q26);
   at->e1_q26 = clamp_told(at->e1_q26 + move[STRETCH], -LONG_MAX_Q26, LONG_MAX_Q26, at_bound);
   at->e2_q26 = clamp_told(at->e2_q26 + move[SLANT], -LONG_MAX_Q26, LONG_MAX_Q26, at_bound);
+  return most;
 }
 
-static void improve(const struct problem *problem, struct unknowns *at, bool round,
+static void improve(const struct problem *problem, struct fit_tangential_unknowns *at,
                     struct fit_tangential_room *room, struct outcome *outcome) {
   struct priors priors;
   struct equations equations;
-  linearise(problem, at, round, room);
+  linearise(problem, at, room);
   set_priors(problem, at, &priors);
   int32_t residual_q = normalise_residuals(room->residual, &priors);
   for (int u = 0; u < UNKNOWNS; u++) {
@@ -770,7 +761,7 @@ static void improve(const struct problem *problem, struct unknowns *at, bool rou
     squares += (priors.residual[u] * priors.residual[u]) >> 2;
   }
   outcome->misfit = fit_scaled_from(squares > 0 ? squares : 0, -2 * residual_q);
-  take_step(problem, outcome, residual_q, at, &outcome->at_bound);
+  outcome->length_q14 = take_step(problem, outcome, residual_q, at, &outcome->at_bound);
 }
 
 /* sqrt(a^2 + b^2) within 7 %, for weights. */
@@ -805,24 +796,64 @@ NOINLINE static bool weigh(const struct fit_array *array, const struct fit_setti
   return sensors >= FIT_TANGENTIAL_SENSORS;
 }
 
-NOINLINE static void begin(const struct fit_array *array, const struct fit_pad *pad,
-                           const struct fit_result *start, int32_t shift, struct unknowns *at) {
-  const float q26 = 67108864.0f;
-  uint8_t origin = array->grid.sensor[COLUMNS / 2 * ROWS + ROWS / 2];
-  float scale = pad->per_unit * q26;
-  at->x_q26 = (int32_t)((start->x_mm - array->x[origin] * array->pitch_mm) * scale);
-  at->y_q26 = (int32_t)((start->y_mm - array->y[origin] * array->pitch_mm) * scale);
+/* What the Gaussian says of the unknowns. */
+NOINLINE static void set_from_fit(const struct fit_pad *pad, const struct fit_result *fit,
+                                  int32_t shift, struct fit_tangential_unknowns *at) {
+  at->x_q26 = product(fit_fixed(fit->x_mm, 24) - pad->origin_x_q24_mm, pad->per_unit_q30, 28);
+  at->y_q26 = product(fit_fixed(fit->y_mm, 24) - pad->origin_y_q24_mm, pad->per_unit_q30, 28);
   at->x_q26 = fixed_clamp(at->x_q26, -reach(pad, COLUMNS), reach(pad, COLUMNS));
   at->y_q26 = fixed_clamp(at->y_q26, -reach(pad, ROWS), reach(pad, ROWS));
-  float sigma = start->sigma_mm * pad->per_unit;
-  float square = sigma * sigma;
-  int32_t most = SPREAD_MOST_Q26 + GAUSSIAN_VARIANCE_Q26;
-  int32_t t_q26 = square < 1.0f ? (int32_t)(square * q26) : most;
-  at->t_q26 = fixed_clamp(t_q26 - GAUSSIAN_VARIANCE_Q26, spread_least(pad), SPREAD_MOST_Q26);
+  int32_t sigma_q26 = product(fit_fixed(fit->sigma_mm, 24), pad->per_unit_q30, 28);
+  sigma_q26 = fixed_clamp(sigma_q26, 0, 2 * ONE_Q26);
+  at->t_q26 = fixed_clamp(fixed_mul_q26(sigma_q26, sigma_q26) - GAUSSIAN_VARIANCE_Q26,
+                          spread_least(pad), SPREAD_MOST_Q26);
   at->e1_q26 = at->e2_q26 = at->pull_x_q24 = at->pull_y_q24 = 0;
-  struct scaled amplitude = scaled_mul(fit_grid_scaled(start->force_N), pad->per_force);
+  struct scaled amplitude = scaled_mul(fit_grid_scaled(fit->force_N), pad->per_force);
   amplitude.exponent += shift - 18;
   at->amplitude_q24 = fixed_clamp(fit_scaled_to_fixed(amplitude, 24), 1 << 18, AMPLITUDE_MAX_Q24);
+}
+
+/* Of 2^bits. */
+static int32_t to_multiple(int32_t value, int bits) {
+  return rounded(value, bits) * (1 << bits);
+}
+
+/* Where the estimate begins: at the Gaussian's, or where the last frame's ended, moved as the
+ * Gaussian has moved and in proportion to its force. */
+NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_state *state,
+                           const struct fit_tangential_unknowns *fit) {
+  struct fit_tangential_unknowns *at = &state->at;
+  int32_t before = state->fit_amplitude_q24, now = fit->amplitude_q24;
+  int32_t dx_q26 = fit->x_q26 - state->fit_x_q26, dy_q26 = fit->y_q26 - state->fit_y_q26;
+  bool grew = now >> 2 >= before || before >> 2 >= now;
+  if (state->steps == 0 || grew) {
+    *at = *fit;
+  } else {
+    int32_t share_q13 = fixed_clamp(port_divide(now, before >> 13), 0, INT16_MAX);
+    at->x_q26 = fixed_clamp(at->x_q26 + dx_q26, -reach(pad, COLUMNS), reach(pad, COLUMNS));
+    at->y_q26 = fixed_clamp(at->y_q26 + dy_q26, -reach(pad, ROWS), reach(pad, ROWS));
+    at->amplitude_q24 =
+        fixed_clamp(scaled_by(at->amplitude_q24, share_q13, 13), 1 << 16, AMPLITUDE_MAX_Q24);
+    at->pull_x_q24 =
+        fixed_clamp(scaled_by(at->pull_x_q24, share_q13, 13), -PULL_MAX_Q24, PULL_MAX_Q24);
+    at->pull_y_q24 =
+        fixed_clamp(scaled_by(at->pull_y_q24, share_q13, 13), -PULL_MAX_Q24, PULL_MAX_Q24);
+    at->e1_q26 = fixed_clamp(scaled_by(at->e1_q26, share_q13, 13), -LONG_MAX_Q26, LONG_MAX_Q26);
+    at->e2_q26 = fixed_clamp(scaled_by(at->e2_q26, share_q13, 13), -LONG_MAX_Q26, LONG_MAX_Q26);
+  }
+  if (grew || fixed_size(dx_q26) + fixed_size(dy_q26) > JUMP_Q26) {
+    state->steps = 0;
+  }
+  at->x_q26 = to_multiple(at->x_q26, 26 - PLACE_Q);
+  at->y_q26 = to_multiple(at->y_q26, 26 - PLACE_Q);
+  at->amplitude_q24 = to_multiple(at->amplitude_q24, 24 - HEIGHT_Q);
+  at->pull_x_q24 = to_multiple(at->pull_x_q24, 24 - HEIGHT_Q);
+  at->pull_y_q24 = to_multiple(at->pull_y_q24, 24 - HEIGHT_Q);
+  at->e1_q26 = to_multiple(at->e1_q26, 26 - LONG_Q);
+  at->e2_q26 = to_multiple(at->e2_q26, 26 - LONG_Q);
+  state->fit_x_q26 = fit->x_q26;
+  state->fit_y_q26 = fit->y_q26;
+  state->fit_amplitude_q24 = now;
 }
 
 /* Variance of an unknown, in its unit squared, of readings whose variance is 1: an element of the
@@ -843,25 +874,34 @@ static struct scaled variance_of(const struct fit_tangential_room *room,
   return fit_scaled_from(sum_q11, 2 * outcome->column_q[u] - 30 - 11);
 }
 
-static float root_of(struct scaled square) {
-  struct scaled root = fit_scaled_sqrt(square);
-  return fit_grid_compose(root.mantissa, root.exponent);
+static bool exceeds(struct scaled a, struct scaled b) {
+  return scaled_sub(a, b).mantissa > 0;
 }
 
-/* Of an elongation whose variance this is. */
-static bool is_elongated(const struct unknowns *at, struct scaled variance) {
-  float e1 = fit_grid_compose(at->e1_q26, -26), e2 = fit_grid_compose(at->e2_q26, -26);
-  float square = e1 * e1 + e2 * e2;
-  float least = ELONGATED_LEAST * fit_grid_compose(at->amplitude_q24, -24) *
-                (0.25f + fit_grid_compose(at->t_q26, -26));
-  return square > least * least &&
-         square > ELONGATED_SURE * ELONGATED_SURE *
-                      fit_grid_compose(variance.mantissa, variance.exponent);
+/* square: e1^2 + e2^2; round: A v. variance: of a reading of weight 1. */
+static bool is_elongated(const struct fit_tangential_room *room, const struct outcome *outcome,
+                         struct scaled square, struct scaled round, struct scaled variance) {
+  const struct scaled least = {(int32_t)(ELONGATED_LEAST * ELONGATED_LEAST * 8388608.0f), -23};
+  if (!exceeds(square, scaled_mul(least, scaled_mul(round, round)))) {
+    return false;
+  }
+  const struct scaled sure = {(int32_t)(ELONGATED_SURE * ELONGATED_SURE * 2048.0f), -12};
+  struct scaled twice =
+      scaled_add(variance_of(room, outcome, STRETCH), variance_of(room, outcome, SLANT));
+  return exceeds(square, scaled_mul(sure, scaled_mul(twice, variance)));
 }
 
-NOINLINE static void conclude(const struct fit_array *array, const struct problem *problem,
-                              const struct unknowns *at, const struct outcome *outcome,
-                              struct fit_tangential *result) {
+static float composed(struct scaled value) {
+  return fit_float(value.mantissa, value.exponent);
+}
+
+static struct scaled root_of_product(struct scaled a, struct scaled b) {
+  return fit_scaled_sqrt(scaled_mul(a, b));
+}
+
+NOINLINE static void conclude(const struct problem *problem,
+                              const struct fit_tangential_unknowns *at,
+                              const struct outcome *outcome, struct fit_tangential *result) {
   const struct fit_pad *pad = problem->pad;
   const struct fit_tangential_room *room = &pad->room;
   struct scaled base = fit_scaled_from(problem->base_q22, -22);
@@ -870,10 +910,14 @@ NOINLINE static void conclude(const struct fit_array *array, const struct proble
   if (outcome->at_bound || fit_scaled_to_fixed(chi_square, 16) > pad->chi_square_max << 16) {
     return;
   }
-  int32_t round_q26 = fixed_mul_q26(at->amplitude_q24 * 4, ONE_Q26 / 4 + at->t_q26); /* A v */
-  int32_t longest_q26 = fixed_mul_16(round_q26, pad->long_most_q15) * 2;
-  int32_t e1_q16 = at->e1_q26 >> 10, e2_q16 = at->e2_q26 >> 10, longest_q16 = longest_q26 >> 10;
-  if (e1_q16 * e1_q16 + e2_q16 * e2_q16 > longest_q16 * longest_q16) {
+  struct scaled e1 = fit_scaled_from(at->e1_q26, -26), e2 = fit_scaled_from(at->e2_q26, -26);
+  struct scaled square = scaled_add(scaled_mul(e1, e1), scaled_mul(e2, e2));
+  struct scaled amplitude = fit_scaled_from(at->amplitude_q24, -24);
+  struct scaled round =
+      scaled_mul(amplitude, fit_scaled_from(ONE_Q26 / 4 + at->t_q26, -26)); /* A v */
+  struct scaled longest = scaled_mul((struct scaled){pad->long_most_q15, -15}, round);
+  longest = fit_scaled_short(longest);
+  if (exceeds(square, scaled_mul(longest, longest))) {
     return;
   }
   chi_square.exponent -= MISFIT_SHIFT;
@@ -882,37 +926,35 @@ NOINLINE static void conclude(const struct fit_array *array, const struct proble
   } else {
     variance = scaled_mul(variance, (struct scaled){MISFIT_LEAST_Q16, -16});
   }
-  variance = scaled_mul(variance, pad->thin);
+  variance = fit_scaled_short(scaled_mul(variance, pad->thin));
   struct scaled pulls =
       scaled_add(variance_of(room, outcome, PULL_X), variance_of(room, outcome, PULL_Y));
   pulls.exponent -= 1;
   struct scaled place =
       scaled_add(variance_of(room, outcome, PLACE_X), variance_of(room, outcome, PLACE_Y));
-  float unit_N = pad->force_unit_N * fit_grid_compose(1, 18 - problem->readings.shift);
-  float amplitude = fit_grid_compose(at->amplitude_q24, -24);
-  float pull_sd = root_of(scaled_mul(pulls, variance));
-  if (pull_sd > FIT_TANGENTIAL_SD_MAX * amplitude) {
+  struct scaled pull_sd = root_of_product(pulls, variance);
+  const struct scaled most = {(int32_t)(FIT_TANGENTIAL_SD_MAX * 32768.0f), -15};
+  if (exceeds(pull_sd, scaled_mul(most, amplitude))) {
     return;
   }
-  uint8_t origin = array->grid.sensor[COLUMNS / 2 * ROWS + ROWS / 2];
+  int32_t exponent = pad->force_unit.exponent + 18 - problem->readings.shift;
+  int32_t unit_q30 = pad->force_unit.mantissa;
+  struct scaled unit = fit_scaled_from(unit_q30, exponent);
+  struct scaled length = {pad->unit_q25_mm >> 15, -10};
   result->valid = true;
-  result->x_mm =
-      fit_grid_compose(at->x_q26, -26) * pad->unit_mm + array->x[origin] * array->pitch_mm;
-  result->y_mm =
-      fit_grid_compose(at->y_q26, -26) * pad->unit_mm + array->y[origin] * array->pitch_mm;
-  result->force_N = unit_N * amplitude;
-  result->qx_N = unit_N * fit_grid_compose(at->pull_x_q24, -24);
-  result->qy_N = unit_N * fit_grid_compose(at->pull_y_q24, -24);
-  result->q_sd_N = unit_N * pull_sd;
-  result->location_sd_mm = pad->unit_mm * root_of(scaled_mul(place, variance));
+  result->x_mm = fit_float(product(at->x_q26, pad->unit_q25_mm, 27) + pad->origin_x_q24_mm, -24);
+  result->y_mm = fit_float(product(at->y_q26, pad->unit_q25_mm, 27) + pad->origin_y_q24_mm, -24);
+  result->force_N = fit_float(product(at->amplitude_q24 * 16, unit_q30, 32), exponent + 4);
+  result->qx_N = fit_float(product(at->pull_x_q24 * 32, unit_q30, 32), exponent + 3);
+  result->qy_N = fit_float(product(at->pull_y_q24 * 32, unit_q30, 32), exponent + 3);
+  result->q_sd_N = composed(scaled_mul(unit, pull_sd));
+  result->location_sd_mm = composed(scaled_mul(length, root_of_product(place, variance)));
   struct scaled noise = fit_scaled_from(problem->noise_q22, -22);
-  result->location_noise_mm = pad->unit_mm * root_of(scaled_mul(place, scaled_mul(noise, noise)));
+  result->location_noise_mm =
+      composed(scaled_mul(length, root_of_product(place, scaled_mul(noise, noise))));
   result->force_sd_N =
-      unit_N * root_of(scaled_mul(variance_of(room, outcome, AMPLITUDE), variance));
-  struct scaled long_variance =
-      scaled_add(variance_of(room, outcome, STRETCH), variance_of(room, outcome, SLANT));
-  long_variance.exponent -= 1;
-  result->elongated = is_elongated(at, scaled_mul(long_variance, variance));
+      composed(scaled_mul(unit, root_of_product(variance_of(room, outcome, AMPLITUDE), variance)));
+  result->elongated = is_elongated(room, outcome, square, round, variance);
 }
 
 static int32_t prior_row(int32_t base_q22, int32_t sd_q26) {
@@ -922,22 +964,33 @@ static int32_t prior_row(int32_t base_q22, int32_t sd_q26) {
 
 void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
                          const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                         const struct fit_result *start, struct fit_tangential *result) {
+                         const struct fit_result *fit, struct fit_tangential_state *state,
+                         struct fit_tangential *result) {
   *result = (struct fit_tangential){0};
-  struct problem problem = {.pad = pad};
-  if (!(start->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
-      !fit_grid_take_readings(array, pressure_Pa_q10, start->used, settings, &problem.readings) ||
-      !weigh(array, settings, start->used, &problem, &pad->room)) {
+  struct problem problem;
+  problem.pad = pad;
+  if (!(fit->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
+      !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, settings, &problem.readings) ||
+      !weigh(array, settings, fit->used, &problem, &pad->room)) {
+    state->steps = 0;
     return;
   }
-  struct unknowns at;
+  struct fit_tangential_unknowns said;
   struct outcome outcome;
-  begin(array, pad, start, problem.readings.shift, &at);
-  int32_t long_sd_q26 = fixed_mul_q28(at.amplitude_q24 * 4, pad->long_sd_q26) * 4;
+  set_from_fit(pad, fit, problem.readings.shift, &said);
+  begin(pad, state, &said);
+  int32_t long_sd_q26 = fixed_mul_q28(said.amplitude_q24 * 4, pad->long_sd_q26) * 4;
   problem.spread_prior_q26 = prior_row(problem.base_q22, pad->spread_sd_q26);
   problem.long_prior_q26 = prior_row(problem.base_q22, long_sd_q26);
-  for (int step = 0; step < FIT_TANGENTIAL_STEPS; step++) {
-    improve(&problem, &at, step == 0, &pad->room, &outcome);
+  improve(&problem, &state->at, &pad->room, &outcome);
+  if (state->steps < STEPS_TOLD) {
+    state->steps++;
   }
-  conclude(array, &problem, &at, &outcome, result);
+  if (state->steps == STEPS_TOLD && outcome.length_q14 <= LENGTH_TOLD_Q14) {
+    conclude(&problem, &state->at, &outcome, result);
+  }
+  state->untold = result->valid ? 0 : state->untold + 1;
+  if (state->untold == UNTOLD_MOST) {
+    *state = (struct fit_tangential_state){0};
+  }
 }

@@ -1,17 +1,22 @@
 /* Tangential load from the normal pressures: what pulls along the rubber presses the base ahead of
  * it and relieves it behind, broader than a shift of the contact does.
  *
- * From the Gaussian fit, FIT_TANGENTIAL_STEPS Gauss-Newton steps of eight unknowns: normal force,
- * location, the contact's own spread and its two elongations, and the tangential force along x and
- * y. The pad's profile (common/pad_profile.h) says how its rubber spreads what presses and what
+ * Eight unknowns: normal force, location, the contact's own spread and its two elongations, and the
+ * tangential force along x and y. One Gauss-Newton step a frame: of a contact's first frame from
+ * the Gaussian fit, then from where the last frame's ended, moved as the Gaussian has moved and in
+ * proportion to its force. The optimum is that of each frame's own readings: what lingers of
+ * earlier ones is the square of a step, and what a long step leads to is not told. It begins anew
+ * where it says nothing for some frames, so that it cannot stay where another beginning finds
+ * better.
+ *
+ * The pad's profile (common/pad_profile.h) says how its rubber spreads what presses and what
  * pulls. Elongation is in the model because a long contact looks like a pulled one to a fit that
  * knows no other explanation: a prior holds it near round, and what is clearly long, or leaves a
- * residual that the model does not explain, is not told. Readings count by their
- * noise, gain error and model error. Fixed point, the same bits on every machine, any sensors
- * missing, no state between frames. NUMERICS.md has the derivation, the conditioning and the
- * limits.
+ * residual that the model does not explain, is not told. Readings count by their noise, gain error
+ * and model error. Fixed point, the same bits on every machine, any sensors missing. NUMERICS.md
+ * has the derivation, the conditioning and the limits.
  *
- * At most 118 000 cycles on a Cortex-M0+ (test emulated.fit_cycles).
+ * At most 40 000 cycles a frame on a Cortex-M0+ (test emulated.fit_cycles).
  *
  * On infinite and exactly known layers; what a pad that ends makes of it is taken back after it
  * (pad_profile.h, pad_edges). No measurement on a real pad confirms it yet.
@@ -23,16 +28,19 @@
 #include "fit/fit.h"
 #include "fit/fit_fixed.h"
 
-#define FIT_TANGENTIAL_STEPS 3
 #define FIT_TANGENTIAL_UNKNOWNS 8
 #define FIT_TANGENTIAL_TERMS (PAD_NORMAL_TERMS + PAD_TANGENTIAL_TERMS)
 #define FIT_TANGENTIAL_NODES (FIT_GRID_COLUMNS * FIT_GRID_ROWS)
 
 /* Working memory of one estimate: in no need of being kept between two. */
 union fit_tangential_node {
-  struct fit_tangential_sums { /* over w / v^i of the normal and the tangential terms */
-    int32_t s0_q28, s1_q25, s2_q22, s3_q17, s4_q14;
-    int32_t f0_q28, f1_q25, f2_q22;
+  struct fit_tangential_terms { /* with the weight, for amplitude 1 */
+    int32_t unused[3], normal_q28[PAD_NORMAL_TERMS], tangential_q28[PAD_TANGENTIAL_TERMS];
+  } terms;
+  struct fit_tangential_sums { /* over w / v^i of the normal and the tangential terms, in an order
+                                  in which the columns overwrite what is no longer needed */
+    int32_t s0_q14, s1_q25, s3_q8, s4_q14, s2_q22;
+    int32_t f1_q12, f0_q14, f2_q22;
   } sums;
   int32_t column[FIT_TANGENTIAL_UNKNOWNS]; /* what the Jacobian has there */
 };
@@ -45,14 +53,16 @@ struct fit_tangential_room {
 
 /* A profile as the estimate needs it, and its working memory. Fill with fit_pad_init. */
 struct fit_pad {
-  float unit_mm, per_unit; /* length that all below is in: twice the widest normal term's sd */
+  /* Length that all below is in: about twice the widest normal term's sd. */
+  int32_t unit_q25_mm, per_unit_q30;
+  int32_t origin_x_q24_mm, origin_y_q24_mm;   /* the grid's origin node */
   int32_t variance_q26[FIT_TANGENTIAL_TERMS]; /* of each term without the contact's own */
   int32_t strength_q26[FIT_TANGENTIAL_TERMS]; /* share, or moment */
   int32_t pitch_q26, pitch_square_q26;
-  int32_t spread_q26, spread_sd_q26;     /* what to expect of the contact's own variance */
-  int32_t long_sd_q26;                   /* and of its elongations */
-  float force_unit_N;                    /* normal force of amplitude 1 at 1 Pa */
-  struct scaled per_force;               /* amplitude of the Gaussian's 1 N at 1 Pa */
+  int32_t spread_q26, spread_sd_q26; /* what to expect of the contact's own variance */
+  int32_t long_sd_q26;               /* and of its elongations */
+  struct scaled force_unit;          /* N, normal force of amplitude 1 at 1 Pa: all of its bits */
+  struct scaled per_force;           /* amplitude of the Gaussian's 1 N at 1 Pa */
   int32_t chi_square_max, long_most_q15; /* beyond which nothing is told */
   struct scaled thin; /* by which variances grow on a pad thinner than the pitch */
   struct fit_tangential_room room;
@@ -63,6 +73,22 @@ struct fit_pad {
  * PAD_THICKNESS_MIN_mm to PAD_THICKNESS_MAX_mm have on this pitch. */
 enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
                             const struct pad_profile *profile);
+
+struct fit_tangential_unknowns {
+  int32_t amplitude_q24; /* of the unit of readings */
+  int32_t x_q26, y_q26;  /* from the grid's origin node */
+  int32_t t_q26, e1_q26, e2_q26;
+  int32_t pull_x_q24, pull_y_q24;
+};
+
+/* Of one contact, from frame to frame. All zeros: the next frame is its first; so it is to be made
+ * when a contact has ended, and by frames without an estimate. */
+struct fit_tangential_state {
+  struct fit_tangential_unknowns at;               /* where the last step ended */
+  int32_t fit_x_q26, fit_y_q26, fit_amplitude_q24; /* what the Gaussian said then */
+  uint8_t steps;                                   /* since the beginning, 2 stands for more */
+  uint8_t untold;                                  /* frames in a row */
+};
 
 /* Every member is finite. Where `valid` is off all are zero. */
 struct fit_tangential {
@@ -75,15 +101,19 @@ struct fit_tangential {
   bool elongated; /* the contact is not round, whatever the Gaussian makes of its load */
 };
 
-/* start: the fit of the same readings. `valid` stays off without FIT_VALID, with fewer than
- * FIT_TANGENTIAL_SENSORS in use, where a parameter ends at its limit, where the contact is
- * clearly longer than wide or the readings are not those of one contact on this pad (NUMERICS.md
- * has the limits, and how they widen where the pad ends near), and where q_sd_N exceeds
- * FIT_TANGENTIAL_SD_MAX of the force. */
+/* A contact at rest is at its optimum after so many frames. */
+#define FIT_TANGENTIAL_FRAMES 5
+
+/* fit: of the same readings. `valid` stays off without FIT_VALID, with fewer than
+ * FIT_TANGENTIAL_SENSORS in use, at the first step and after a long one, where a parameter ends at
+ * its limit, where the contact is clearly longer than wide or the readings are not those of one
+ * contact on this pad (NUMERICS.md has the limits, and how they widen where the pad ends near), and
+ * where q_sd_N exceeds FIT_TANGENTIAL_SD_MAX of the force. */
 #define FIT_TANGENTIAL_SENSORS 8
 #define FIT_TANGENTIAL_SD_MAX 0.2f
 void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
                          const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                         const struct fit_result *start, struct fit_tangential *result);
+                         const struct fit_result *fit, struct fit_tangential_state *state,
+                         struct fit_tangential *result);
 
 #endif

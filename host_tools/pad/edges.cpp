@@ -91,10 +91,13 @@ public:
     }
     fit_result fit;
     struct fit_tangential found;
+    fit_tangential_state state{};
     fit_gaussian_grid(&prepared_.array, readings.data(),
                       UINT32_MAX >> (FT_MAX_SENSORS - info_.sensor_count), &settings_, &fit);
-    fit_tangential_load(&prepared_.array, &prepared_.pad, readings.data(), &settings_, &fit,
-                        &found);
+    for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
+      fit_tangential_load(&prepared_.array, &prepared_.pad, readings.data(), &settings_, &fit,
+                          &state, &found);
+    }
     if (!found.valid) {
       return false;
     }

@@ -28,7 +28,7 @@ namespace {
 constexpr double OBSERVABLE = 0.1;
 constexpr int PRESSES = 2000;
 // Limits: location in um, force and pull in shares of the force.
-constexpr double MEDIAN_um = 0.15, P99_um = 2.5, PULL_P99 = 0.0006, FORCE_P99 = 0.0004;
+constexpr double MEDIAN_um = 0.15, P99_um = 1.5, PULL_P99 = 0.0003, FORCE_P99 = 0.0003;
 constexpr int MOST_ELSEWHERE = PRESSES / 500;
 
 double quantile(std::vector<double> values, double share) {
@@ -89,7 +89,10 @@ int main(int argc, char **argv) {
     fit_result start;
     fit_gaussian(&array, readings.data(), all, &settings, &start);
     struct fit_tangential found;
-    fit_tangential_load(&array, &pad, readings.data(), &settings, &start, &found);
+    fit_tangential_state state{};
+    for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
+      fit_tangential_load(&array, &pad, readings.data(), &settings, &start, &state, &found);
+    }
     const reference::TangentialFit best = reference::fit_tangential_load(
         profile, samples, noise_Pa,
         {static_cast<double>(start.x_mm), static_cast<double>(start.y_mm),

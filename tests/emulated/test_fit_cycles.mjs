@@ -19,8 +19,8 @@ const MASKED_CYCLES_MAX = 46800;
 const SEARCH_CYCLES_MAX = 44500;
 /** A fit that finds an outlier: the fit, the search, and the fit without it. */
 const OUTLIER_CYCLES_MAX = 92500;
-/** The tangential estimate, which follows the fit, with the image's pad. */
-const TANGENTIAL_CYCLES_MAX = 118000;
+/** A frame's tangential estimate, which follows the fit, with the image's pad. */
+const TANGENTIAL_CYCLES_MAX = 40000;
 /** Between the cheapest and the dearest press, share of the dearest: a contact at a bound has no widths to tell. */
 const SPREAD_MAX = 0.1;
 /** FINGERTIP_FIT_ITERATIONS. */

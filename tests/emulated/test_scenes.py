@@ -86,7 +86,7 @@ class Scenes(unittest.TestCase):
         self.assertEqual(self.press.body_bytes[HEALTH], {HEALTH_BYTES + OF_FIT[HEALTH]})
 
     def test_grasp_tells_the_tangential_load_in_every_frame(self):
-        """At the fastest, where every fifth has an estimate of its own."""
+        """At the fastest."""
         extra = [(0.455, encoded("--sequence", "6", "osr", "256")), (0.5, encoded("--sequence", "7", "pad", "12", "0"))]
         grasp = Run(self.folder.name, "grasp", "contact", extra)
         self.assertEqual({name: grasp.acks[name] for name in ("6", "7")}, {"6": "0", "7": "0"})

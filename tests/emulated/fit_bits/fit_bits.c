@@ -10,6 +10,7 @@
 
 #define LAYOUTS 4
 #define PADS 4
+#define FRAMES 4 /* of one contact */
 #define ONE_Q16 65536
 
 static struct fit_array layouts[LAYOUTS];
@@ -188,12 +189,19 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     fit_general(array, pressure_Pa_q10, usable, &settings, &result);
   }
   if (kernel == FIT_BITS_TANGENTIAL) {
-    struct fit_tangential found;
-    memset(&found, 0, sizeof found);
-    fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
-    fit_tangential_load(array, &pads[press / 4 % PADS], pressure_Pa_q10, &settings, &result,
-                        &found);
-    return crc32_iso_hdlc((const uint8_t *)&found, sizeof found);
+    struct fit_tangential found[FRAMES];
+    struct fit_tangential_state tangential_state;
+    memset(found, 0, sizeof found);
+    memset(&tangential_state, 0, sizeof tangential_state);
+    for (int frame = 0; frame < FRAMES; frame++) {
+      fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
+      fit_tangential_load(array, &pads[press / 4 % PADS], pressure_Pa_q10, &settings, &result,
+                          &tangential_state, &found[frame]);
+      for (uint8_t k = 0; k < array->sensor_count; k++) {
+        pressure_Pa_q10[k] -= pressure_Pa_q10[k] / 64 * draw_between(0, 1);
+      }
+    }
+    return crc32_iso_hdlc((const uint8_t *)found, sizeof found);
   }
   return crc32_iso_hdlc((const uint8_t *)&result, sizeof result);
 }

@@ -66,20 +66,6 @@ static void rest(float seconds) {
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_VELOCITY_VALID, go(seconds, 0, 0, 0));
 }
 
-static void what_is_carried_on_tells_what_was_told(void) {
-  interval_us = 2439;
-  uint32_t flags = go(0.2f, 20.0f, 0.0f, 0.0f);
-  TEST_ASSERT_TRUE(flags & CONTACT_FLAG_VELOCITY_VALID);
-  const struct motion told = motion;
-  const struct motion_history before = history;
-  input.tangential_is_carried = true;
-  found.x_mm += 5.0f;
-  TEST_ASSERT_EQUAL_HEX32(flags, update());
-  TEST_ASSERT_EQUAL_MEMORY(&told, &motion, sizeof motion);
-  TEST_ASSERT_EQUAL_MEMORY(&before, &history, sizeof history);
-  input.tangential_is_carried = false;
-}
-
 static void a_steady_velocity_is_told_at_any_rate(void) {
   static const uint32_t intervals_us[] = {50000, 10000, 5000, 2439, 765, 700};
   for (unsigned i = 0; i < sizeof intervals_us / sizeof intervals_us[0]; i++) {
@@ -273,7 +259,6 @@ static void nothing_overflows(void) {
 
 int main(void) {
   UNITY_BEGIN();
-  RUN_TEST(what_is_carried_on_tells_what_was_told);
   RUN_TEST(a_steady_velocity_is_told_at_any_rate);
   RUN_TEST(the_velocity_is_as_uncertain_as_least_squares_are);
   RUN_TEST(noise_alone_never_speaks);

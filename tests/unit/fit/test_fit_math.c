@@ -88,11 +88,37 @@ static void test_log2(void) {
   }
 }
 
+static void test_fixed_and_float(void) {
+  struct random random = {63};
+  for (int i = 0; i < 100000; i++) {
+    int q = 2 + (int)random_below(&random, 29);
+    int32_t value = (int32_t)(random_u32(&random) >> random_below(&random, 32));
+    value = i % 2 ? -(value / 2) : value / 2;
+    double exact = ldexp((double)value, -q);
+    float found = fit_float(value, -q);
+    TEST_ASSERT_TRUE(fabs((double)found - exact) <= fabs(exact) * 0x1p-24);
+    /* Of what is a float towards zero. */
+    int to = (int)random_below(&random, 31);
+    double there = trunc(ldexp((double)found, to));
+    there = fmin(fmax(there, -INT32_MAX), INT32_MAX);
+    int32_t fixed = fit_fixed(found, to);
+    TEST_ASSERT_TRUE(fixed == (int32_t)there);
+  }
+  TEST_ASSERT_EQUAL_INT32(INT32_MAX, fit_fixed(INFINITY, 0));
+  TEST_ASSERT_EQUAL_INT32(-INT32_MAX, fit_fixed(-INFINITY, 0));
+  TEST_ASSERT_EQUAL_INT32(0, fit_fixed(0.0f, 30));
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, fit_float(0, 20));
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, fit_float(1, -200));
+  TEST_ASSERT_EQUAL_FLOAT(1e9f, fit_float(1, 40));
+  TEST_ASSERT_EQUAL_FLOAT(-1e9f, fit_float(-1, 40));
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_mul_q30);
   RUN_TEST(test_exp2);
   RUN_TEST(test_exp2_at_its_ends);
   RUN_TEST(test_log2);
+  RUN_TEST(test_fixed_and_float);
   return UNITY_END();
 }

@@ -85,12 +85,23 @@ static void read_contact(const struct contact *contact, int32_t *readings) {
   }
 }
 
-static struct fit_tangential estimate(const int32_t *readings, uint32_t usable) {
-  struct fit_result start;
-  fit_gaussian(&array, readings, usable, &settings, &start);
+static struct fit_tangential go_on(struct fit_tangential_state *state, const int32_t *readings,
+                                   uint32_t usable) {
+  struct fit_result fit;
+  fit_gaussian(&array, readings, usable, &settings, &fit);
   struct fit_tangential result;
   memset(&result, 0xFF, sizeof result);
-  fit_tangential_load(&array, &pad, readings, &settings, &start, &result);
+  fit_tangential_load(&array, &pad, readings, &settings, &fit, state, &result);
+  return result;
+}
+
+/* Of a contact that is held. */
+static struct fit_tangential estimate(const int32_t *readings, uint32_t usable) {
+  struct fit_tangential_state state = {0};
+  struct fit_tangential result;
+  for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
+    result = go_on(&state, readings, usable);
+  }
   return result;
 }
 
@@ -185,9 +196,10 @@ static void test_no_fit_gives_nothing(void) {
   struct fit_result start;
   fit_gaussian(&array, readings, ALL, &settings, &start);
   start.flags &= ~(uint32_t)CONTACT_FLAG_FIT_VALID;
+  struct fit_tangential_state state = {0};
   struct fit_tangential found;
   memset(&found, 0xFF, sizeof found);
-  fit_tangential_load(&array, &pad, readings, &settings, &start, &found);
+  fit_tangential_load(&array, &pad, readings, &settings, &start, &state, &found);
   TEST_ASSERT_TRUE(is_zero(&found));
 }
 
@@ -299,6 +311,115 @@ static void test_nothing_stays_from_another_frame(void) {
     struct fit_tangential again = estimate(readings, ALL);
     TEST_ASSERT_EQUAL_MEMORY(&found, &again, sizeof found);
   }
+}
+
+static double off_mm(const struct fit_tangential *a, const struct fit_tangential *b) {
+  return hypot((double)(a->x_mm - b->x_mm), (double)(a->y_mm - b->y_mm));
+}
+
+static double off_ratio(const struct fit_tangential *a, const struct fit_tangential *b) {
+  return hypot((double)(a->qx_N / a->force_N - b->qx_N / b->force_N),
+               (double)(a->qy_N / a->force_N - b->qy_N / b->force_N));
+}
+
+static void test_the_first_frame_of_a_contact_is_not_told(void) {
+  int32_t readings[SENSORS];
+  read_contact(&usual, readings);
+  struct fit_tangential_state state = {0};
+  struct fit_tangential first = go_on(&state, readings, ALL);
+  TEST_ASSERT_TRUE(is_zero(&first));
+  int frames = 2;
+  while (!go_on(&state, readings, ALL).valid) {
+    frames++;
+  }
+  TEST_ASSERT_LESS_OR_EQUAL_INT(3, frames);
+}
+
+/* At 100 mm/s and 1300 frames a second, force and load changing by a tenth in ten frames. */
+static void test_a_contact_that_moves_is_followed(void) {
+  struct random random = {SEED};
+  int told = 0;
+  for (int i = 0; i < 30; i++) {
+    struct contact contact = draw_contact(&random, 0.2);
+    contact.x_mm /= 2.0;
+    contact.y_mm /= 2.0;
+    double angle = random_between(&random, 0, 6.283185307179586);
+    struct fit_tangential_state state = {0};
+    for (int frame = 0; frame < 40; frame++) {
+      int32_t readings[SENSORS];
+      read_contact(&contact, readings);
+      struct fit_tangential found = go_on(&state, readings, ALL);
+      struct fit_tangential held = estimate(readings, ALL);
+      TEST_ASSERT_TRUE(held.valid);
+      if (frame >= 3) {
+        TEST_ASSERT_TRUE(found.valid);
+        TEST_ASSERT_TRUE(off_mm(&found, &held) < 0.005);
+        TEST_ASSERT_TRUE(off_ratio(&found, &held) < 0.001);
+        told++;
+      }
+      contact.x_mm += 0.077 * cos(angle);
+      contact.y_mm += 0.077 * sin(angle);
+      contact.force_N *= 1.01;
+      contact.qy_N *= 0.99;
+    }
+  }
+  TEST_ASSERT_EQUAL_INT(30 * 37, told);
+}
+
+/* Without an end between them: what is told on the way is near the optimum, and soon at it. */
+static void test_another_contact_is_found_at_once(void) {
+  struct random random = {SEED};
+  for (int i = 0; i < 300; i++) {
+    struct fit_tangential_state state = {0};
+    int32_t readings[SENSORS];
+    struct contact before = draw_contact(&random, 0.3), contact = draw_contact(&random, 0.1);
+    read_contact(&before, readings);
+    for (int frame = 0; frame < 5; frame++) {
+      go_on(&state, readings, ALL);
+    }
+    read_contact(&contact, readings);
+    struct fit_tangential held = estimate(readings, ALL), found = held;
+    for (int frame = 0; frame < 6 && held.valid; frame++) {
+      found = go_on(&state, readings, ALL);
+      if (found.valid) {
+        TEST_ASSERT_TRUE(off_mm(&found, &held) < 0.3);
+        TEST_ASSERT_TRUE(off_ratio(&found, &held) < 0.03);
+      }
+    }
+    TEST_ASSERT_EQUAL(held.valid, found.valid);
+    TEST_ASSERT_TRUE(!held.valid || off_mm(&found, &held) < 0.002);
+  }
+}
+
+/* What two contacts leave is no beginning for one. */
+static void test_it_begins_anew_where_it_says_nothing(void) {
+  struct random random = {SEED};
+  int begun = 0;
+  for (int i = 0; i < 300; i++) {
+    struct fit_tangential_state state = {0};
+    int32_t readings[SENSORS], more[SENSORS];
+    struct contact contact = draw_contact(&random, 0.1), other = draw_contact(&random, 0.3);
+    read_contact(&contact, readings);
+    struct fit_tangential held = estimate(readings, ALL);
+    read_contact(&other, more);
+    for (int k = 0; k < SENSORS; k++) {
+      more[k] += readings[k];
+    }
+    for (int frame = 0; frame < 20; frame++) {
+      go_on(&state, more, ALL);
+    }
+    struct fit_tangential_state stuck = state;
+    struct fit_tangential found = held;
+    for (int frame = 0; frame < 16; frame++) {
+      found = go_on(&state, readings, ALL);
+      stuck.untold = 0;
+      go_on(&stuck, readings, ALL);
+    }
+    TEST_ASSERT_EQUAL(held.valid, found.valid);
+    TEST_ASSERT_TRUE(!held.valid || off_mm(&found, &held) < 0.01);
+    begun += held.valid && !go_on(&stuck, readings, ALL).valid;
+  }
+  TEST_ASSERT_GREATER_THAN_INT(0, begun);
 }
 
 /* Two halves 6 mm apart are a contact longer than wide; a pad that ends near makes round ones look
@@ -457,6 +578,10 @@ int main(void) {
   RUN_TEST(test_twice_the_pressure_is_twice_the_force_to_the_bit);
   RUN_TEST(test_a_mirrored_contact_has_a_mirrored_result);
   RUN_TEST(test_nothing_stays_from_another_frame);
+  RUN_TEST(test_the_first_frame_of_a_contact_is_not_told);
+  RUN_TEST(test_a_contact_that_moves_is_followed);
+  RUN_TEST(test_another_contact_is_found_at_once);
+  RUN_TEST(test_it_begins_anew_where_it_says_nothing);
   RUN_TEST(test_long_contacts_are_not_told_but_where_the_pad_ends_near);
   RUN_TEST(test_profiles_that_no_layer_has_are_refused);
   RUN_TEST(test_any_bits_give_finite_results);

@@ -69,7 +69,10 @@ Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_mm, dou
   struct fit_tangential found;
   fit_gaussian_grid(&array, readings.data(), UINT32_MAX >> (FT_MAX_SENSORS - info.sensor_count),
                     &fitting, &fit);
-  fit_tangential_load(&array, &prepared, readings.data(), &fitting, &fit, &found);
+  fit_tangential_state state{};
+  for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
+    fit_tangential_load(&array, &prepared, readings.data(), &fitting, &fit, &state, &found);
+  }
   contact_settings weighing{};
   tangential_settings settings{};
   settings.location_sd_limit_mm = 0.6F;

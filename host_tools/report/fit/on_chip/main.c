@@ -30,6 +30,7 @@ static struct fit_array array;
 static struct fit_settings settings;
 static struct fit_result result;
 static struct fit_pad pad;
+static struct fit_tangential_state tangential_state;
 static struct fit_tangential tangential_result;
 
 static void nothing(void) {}
@@ -69,9 +70,10 @@ static const struct pad_profile profile = {
     .tangential_scale = 1.0f,
 };
 
-/* After `fit` of the same readings, which is not counted. */
+/* After `fit` of the same readings and the frames before, which are not counted. */
 static void tangential(void) {
-  fit_tangential_load(&array, &pad, job.pressure_Pa_q10, &settings, &result, &tangential_result);
+  fit_tangential_load(&array, &pad, job.pressure_Pa_q10, &settings, &result, &tangential_state,
+                      &tangential_result);
   job.x_mm = tangential_result.x_mm;
   job.y_mm = tangential_result.y_mm;
 }
@@ -114,6 +116,10 @@ int main(void) {
     void (*kernel)(void) = kernels[job.kernel];
     if (kernel == tangential) {
       fit();
+      tangential_state = (struct fit_tangential_state){0};
+      for (int frame = 1; frame < FIT_TANGENTIAL_FRAMES; frame++) {
+        tangential();
+      }
     }
     CALL_DEBUGGER(CALL_START);
     kernel();

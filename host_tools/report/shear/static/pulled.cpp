@@ -73,22 +73,28 @@ Fingertip::Fingertip(const pad_profile &profile)
 bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double noise_Pa,
                      std::uint32_t usable, Random &random, Said &said) {
   const truth::Pad &pad = known.pad;
-  std::array<std::int32_t, SENSORS> readings{};
-  std::uint32_t saturated = 0;
-  for (std::size_t k = 0; k < SENSORS; k++) {
-    const double reading_Pa = pad.gain[k] * base_Pa[k] + noise_Pa * random.normal();
-    readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * reading_Pa));
-    saturated |= reading_Pa > RANGE_Pa ? 1u << k : 0u;
-  }
   const fit_settings settings = truth::settings_for(pad, noise_Pa);
   fit_result fit;
   fit_tangential found{};
-  fit_gaussian_grid(&array_, readings.data(), usable & ~saturated, &settings, &fit);
-  if (!(fit.flags & CONTACT_FLAG_FIT_VALID)) {
-    return false;
-  }
-  if (tangential_is_worthwhile(&fit, saturated)) {
-    fit_tangential_load(&array_, &fit_pad_, readings.data(), &settings, &fit, &found);
+  fit_tangential_state state{};
+  for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
+    std::array<std::int32_t, SENSORS> readings{};
+    std::uint32_t saturated = 0;
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      const double reading_Pa = pad.gain[k] * base_Pa[k] + noise_Pa * random.normal();
+      readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * reading_Pa));
+      saturated |= reading_Pa > RANGE_Pa ? 1u << k : 0u;
+    }
+    fit_gaussian_grid(&array_, readings.data(), usable & ~saturated, &settings, &fit);
+    if (!(fit.flags & CONTACT_FLAG_FIT_VALID)) {
+      return false;
+    }
+    found = {};
+    if (tangential_is_worthwhile(&fit, saturated)) {
+      fit_tangential_load(&array_, &fit_pad_, readings.data(), &settings, &fit, &state, &found);
+    } else {
+      state = {};
+    }
   }
   contact_settings scales{};
   scales.force_scale = static_cast<float>(known.force_scale.value_or(1.0));
