@@ -20,10 +20,10 @@
 namespace fingertip {
 
 struct GripperTraits {
-  std::string model; // "2f85"
-  double stroke_mm = 0.0; // width between the pads when open
-  double step_mm = 0.0;   // of the commanded width
-  double deadband_mm = 0.0; // moves shorter than this are not made
+  std::string model;                                 // "2f85"
+  double stroke_mm = 0.0;                            // width between the pads when open
+  double step_mm = 0.0;                              // of the commanded width
+  double deadband_mm = 0.0;                          // moves shorter than this are not made
   double speed_min_mm_s = 0.0, speed_max_mm_s = 0.0; // of the width
   double force_min_N = 0.0, force_max_N = 0.0;       // of its own limit of force; 0: it has none
   double latency_s = 0.0;                            // from a command to motion
@@ -70,6 +70,8 @@ struct GripperWay {
 };
 
 std::vector<GripperTraits> gripper_models();
+// Throws Error: an unknown model.
+const GripperTraits &gripper_traits(const std::string &model);
 
 // Throws Error: an unknown model, a port that cannot be opened, no answer.
 std::unique_ptr<Gripper> open_gripper(const GripperWay &way);
