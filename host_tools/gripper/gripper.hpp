@@ -70,6 +70,8 @@ struct GripperWay {
 };
 
 std::vector<GripperTraits> gripper_models();
+// Throws Error: an unknown model.
+const GripperTraits &gripper_traits(const std::string &model);
 
 // Throws Error: an unknown model, a port that cannot be opened, no answer.
 std::unique_ptr<Gripper> open_gripper(const GripperWay &way);
