@@ -86,6 +86,11 @@ Pad::Branch branch_of(const std::array<double, PROM.size()> &c, double ambient_P
 
 } // namespace
 
+std::array<double, Pad::TIMES_s.size()> relaxation_strengths(double share) {
+  const double factor = prony_factor(share);
+  return {factor * PRONY[0], factor * PRONY[1]};
+}
+
 const std::vector<Effect> &effects() {
   static const std::vector<Effect> all{
       {"gain", "%", 10.0, 0.0, 30.0, "gain of each sensor off by a normal share of this sd",
@@ -179,8 +184,9 @@ Pad::Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, doub
         const double share =
             0.01 * value * (1.0 + random.uniform(-RELAXATION_SPREAD, RELAXATION_SPREAD));
         relaxations_.push_back(share);
+        const auto strengths = relaxation_strengths(share);
         for (std::size_t i = 0; i < PRONY.size(); i++) {
-          rubber_[k].strength[i] = prony_factor(share) * PRONY[i];
+          rubber_[k].strength[i] = strengths[i];
         }
       }
     } else if (name == "hysteresis") {

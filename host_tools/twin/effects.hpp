@@ -122,4 +122,7 @@ private:
   std::array<double, TIMES_s.size()> decay_{};
 };
 
+// g of the Prony series that makes a hold of 8 s after a press of 1.3 s lose this share of its peak.
+std::array<double, Pad::TIMES_s.size()> relaxation_strengths(double share);
+
 } // namespace fingertip::twin

@@ -1,0 +1,91 @@
+// One grasp, closed loop, in simulated time: a scene's object in the cell, two fingertips that feel
+// it, a controller, and a gripper's mechanics between them.
+//
+// The line: once every poll_s of the gripper a command goes out, if it is new, and what the gripper
+// says of that moment comes half of that time later. The controller steps after every frame and
+// every status.
+//
+// Deterministic: the same scene, seed and controller give the same bits. A grasp of 6 s takes some
+// 60 ms at 410 frames a second.
+#pragma once
+
+#include "cell/felt_finger.hpp"
+#include "cell/gripper_motion.hpp"
+#include "cell/scene.hpp"
+
+#include <optional>
+#include <vector>
+
+namespace fingertip::cell {
+
+// What decides.
+class Controller {
+public:
+  virtual ~Controller() = default;
+  virtual void take_touch(unsigned finger, const grip_touch &touch) = 0;
+  virtual void take_status(const grip_status &status) = 0;
+  virtual grip_report step(std::uint64_t now_us, grip_command &command) = 0;
+};
+
+// firmware/grip, grasping from the first step on.
+class CoreController : public Controller {
+public:
+  // Throws std::runtime_error where it refuses its settings.
+  CoreController(const grip_settings &settings, const grip_traits &traits);
+  void take_touch(unsigned finger, const grip_touch &touch) override;
+  void take_status(const grip_status &status) override;
+  grip_report step(std::uint64_t now_us, grip_command &command) override;
+
+private:
+  grip core_{};
+};
+
+grip_traits traits_of(const GripperTraits &traits);
+
+struct Trial {
+  Scene scene;
+  GripperMechanics gripper;
+  Sensing sensing;
+  std::array<Rubber, 2> rubber;
+  std::uint64_t seed = 0; // of noise and moments
+  // Instead of a lift: the grip's force is held on the table for so long, and should be that.
+  double still_s = 0.0, set_N = 0.0;
+};
+
+// Where all is known of a moment; for pictures and for tests.
+struct Moment {
+  double t_s;                                // since the beginning
+  double lift_s;                             // since the lift began; below 0 before
+  double width_mm, force_N, least_N, load_N; // of one fingertip: what pulls, the mean of both
+  double way_mm, slid_mm, turned_rad;
+  double friction;
+  bool slips;
+  double felt_N, felt_load_N, wanted_N; // as the controller has it
+  std::uint8_t state;
+  std::uint32_t trouble;
+};
+
+struct Outcome {
+  bool held = false; // to the end
+  // Why not: it slid DROP_mm or the grip lost it; the controller never came to hold.
+  bool dropped = false, never_held = false, crushed = false;
+  double slid_mm = 0.0, turned_rad = 0.0, peak_N = 0.0;
+  double lift_slip_mm = 0.0, disturbance_slip_mm = 0.0; // until the lift is over; after it
+  double margin = 0.0;    // median of force over least force from the lift's end on
+  double holding_s = 0.0; // from the first touch to the controller's HOLDING
+  // Of each slip of SLIP_mm or more: from its beginning to 5 % more force; none: there was never.
+  std::vector<std::optional<double>> reactions_s;
+  // Of a still trial, by the mean of what both fingertips say.
+  std::optional<double> settle_s; // from the touch until it stays within 10 % for SETTLED_s
+  double rms = 0.0;               // of the error, share of the set force, from there on
+  int reversals = 0;              // of the commanded width over the last half of the time
+  std::uint32_t trouble = 0;      // all that was ever on while holding
+};
+
+constexpr double DROP_mm = 22.0, SLIP_mm = 0.3, SETTLED_s = 0.5;
+
+// face must be the scene's. trace: called some thousand times a second.
+Outcome run_trial(const Trial &trial, const Face &face, Controller &controller,
+                  const std::function<void(const Moment &)> &trace = {});
+
+} // namespace fingertip::cell

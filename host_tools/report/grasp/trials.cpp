@@ -1,0 +1,166 @@
+#include "grasp/trials.hpp"
+
+#include "libfingertip/text.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+
+namespace fingertip::grasp {
+
+using namespace cell;
+
+namespace {
+
+constexpr double FORCE_GAIN_SD = 0.05; // of a calibrated fingertip's force scale
+constexpr double LAYER_mm = 12.0;
+constexpr std::size_t CALIBRATED = 400; // as many pads judged have forty calibrations in turn
+constexpr double FAST_Hz = 600.0;
+enum Stream : std::uint64_t { PADS = 831, NOISE, SET };
+
+void change(grip_settings &settings, const std::string &changes) {
+  const std::map<std::string, std::int32_t *> numbers{
+      {"touch_mN", &settings.touch_mN},
+      {"approach_um_s", &settings.approach_um_s},
+      {"force_cap_mN", &settings.force_cap_mN},
+      {"travel_cap_um", &settings.travel_cap_um},
+      {"differ_permille", &settings.differ_permille},
+      {"set_mN", &settings.set_mN},
+      {"kp_um_per_N", &settings.gains.kp_um_per_N},
+      {"ki_um_per_Ns", &settings.gains.ki_um_per_Ns},
+      {"kd_um_s_per_N", &settings.gains.kd_um_s_per_N},
+      {"first_mN", &settings.first_mN},
+      {"blind_mN", &settings.blind_mN},
+      {"friction_permille", &settings.friction_permille},
+      {"margin_permille", &settings.margin_permille},
+      {"decay_permille_s", &settings.decay_permille_s}};
+  const std::map<std::string, std::uint32_t *> times{{"control_us", &settings.control_us},
+                                                     {"rest_us", &settings.rest_us}};
+  for (const std::string_view one : split(changes, ',')) {
+    if (one.empty()) {
+      continue;
+    }
+    const std::size_t equals = one.find('=');
+    const std::string name(one.substr(0, equals));
+    const auto value =
+        equals == std::string_view::npos ? std::nullopt : to_double(one.substr(equals + 1));
+    if (!value) {
+      throw std::runtime_error("the setting " + name + " has no number");
+    }
+    if (const auto number = numbers.find(name); number != numbers.end()) {
+      *number->second = static_cast<std::int32_t>(*value);
+    } else if (const auto time = times.find(name); time != times.end()) {
+      *time->second = static_cast<std::uint32_t>(*value);
+    } else {
+      throw std::runtime_error("the controller has no setting \"" + name + "\"");
+    }
+  }
+}
+
+std::vector<std::string> names_of(const std::string &objects) {
+  if (objects.find_first_of("0123456789_") == std::string::npos) {
+    return faces_of(objects);
+  }
+  std::vector<std::string> names;
+  for (const std::string_view name : split(objects, ',')) {
+    names.emplace_back(name);
+  }
+  return names;
+}
+
+} // namespace
+
+Set::Set(const SetOptions &options)
+    : options_(options), faces_(names_of(options.objects)),
+      gripper_(gripper_mechanics(options.gripper)) {
+  if (options.mode != "hold" && options.mode != "fixed" && options.mode != "still") {
+    throw std::runtime_error("there is no mode \"" + options.mode +
+                             "\"; choose one of: hold fixed still");
+  }
+  if (!(options.rate_Hz >= 1.0 && options.rate_Hz <= 1600.0)) {
+    throw std::runtime_error("a fingertip gives 1 to 1600 frames a second");
+  }
+  sensing_.rate_Hz = options.rate_Hz;
+  sensing_.osr = options.rate_Hz > FAST_Hz ? 256 : 1024;
+  sensing_.tangential = options.effect;
+  for (const std::string &name : faces_) {
+    all_.emplace(name, Face(name, LAYER_mm, options.cache));
+  }
+  pads_ = truth::calibrated_pads(CALIBRATED, options.seed, options.cache);
+}
+
+Trial Set::trial(std::uint64_t n) const {
+  Trial trial;
+  trial.scene = draw_scene(faces_, options_.seed, n);
+  trial.gripper = gripper_;
+  trial.sensing = sensing_;
+  trial.seed = Random(options_.seed, NOISE, n).next();
+  Random random(options_.seed, PADS, n);
+  for (Rubber &rubber : trial.rubber) {
+    const truth::Pad &pad = pads_[random.next() % pads_.size()];
+    rubber = {pad.gain, pad.gain_sd};
+    const double scale = 1.0 + FORCE_GAIN_SD * std::clamp(random.normal(), -3.0, 3.0);
+    for (double &gain : rubber.gain) {
+      gain *= scale;
+    }
+  }
+  trial.still_s = is_still() ? options_.still_s : 0.0;
+  trial.set_N = 1e-3 * settings(n).set_mN;
+  return trial;
+}
+
+grip_settings Set::settings(std::uint64_t n) const {
+  grip_settings settings;
+  const grip_traits traits = traits_of(gripper_.traits);
+  grip_default_settings(&settings, &traits);
+  settings.mode = options_.mode == "hold" ? GRIP_MODE_HOLD : GRIP_MODE_FIXED;
+  if (is_still()) {
+    settings.set_mN =
+        static_cast<std::int32_t>(1e3 * Random(options_.seed, SET, n).log_uniform(2.0, 12.0));
+  }
+  change(settings, options_.settings);
+  return settings;
+}
+
+Outcome Set::run(std::uint64_t n, const std::function<void(const Moment &)> &trace) const {
+  const Trial one = trial(n);
+  CoreController controller(settings(n), traits_of(gripper_.traits));
+  return run_trial(one, all_.at(one.scene.face), controller, trace);
+}
+
+std::vector<Done> run_all(const Set &set, std::uint64_t first, std::uint64_t count,
+                          std::uint64_t jobs) {
+  std::vector<Done> done(count);
+  std::atomic<std::uint64_t> next{0};
+  std::mutex failing;
+  std::exception_ptr failure;
+  std::vector<std::thread> threads;
+  for (std::uint64_t job = 0; job < jobs; job++) {
+    threads.emplace_back([&] {
+      for (std::uint64_t i; (i = next++) < count;) {
+        try {
+          const std::uint64_t n = first + i;
+          done[i] = {set.trial(n).scene, set.run(n)};
+        } catch (...) {
+          const std::lock_guard<std::mutex> lock(failing);
+          failure = std::current_exception();
+          next = count;
+        }
+      }
+    });
+  }
+  for (std::thread &thread : threads) {
+    thread.join();
+  }
+  if (failure) {
+    std::rethrow_exception(failure);
+  }
+  return done;
+}
+
+} // namespace fingertip::grasp

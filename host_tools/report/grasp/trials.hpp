@@ -1,0 +1,59 @@
+// A set of grasps: what was asked for, and how each went.
+#pragma once
+
+#include "cell/trial.hpp"
+#include "truth/fit/touches.hpp"
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace fingertip::grasp {
+
+// Seeds below this are there to choose constants by; the report judges by others.
+constexpr std::uint64_t JUDGING_SEEDS = 1000;
+
+struct SetOptions {
+  std::string gripper = "2f85";  // of gripper_mechanics()
+  std::string mode = "hold";     // hold, fixed, or still: fixed, on the table, no lift
+  std::string objects = "round"; // of cell::faces_of(), or faces split by commas
+  std::string settings;          // of the controller: name=value, split by commas
+  double rate_Hz = 410.0;        // above 600 at OSR 256, else 1024
+  double effect = 1.0;           // share of a pull's field that acts on the readings
+  double still_s = 12.0;         // length of a still grasp
+  std::uint64_t seed = 1;
+  std::string cache; // folder of the contact tables
+};
+
+// All that the grasps of a set share. Throws std::runtime_error or Error for what there is not.
+class Set {
+public:
+  explicit Set(const SetOptions &options);
+
+  bool is_still() const { return options_.mode == "still"; }
+  cell::Trial trial(std::uint64_t n) const;
+  grip_settings settings(std::uint64_t n) const;
+  // For several threads at once.
+  cell::Outcome run(std::uint64_t n,
+                    const std::function<void(const cell::Moment &)> &trace = {}) const;
+
+private:
+  SetOptions options_;
+  std::vector<std::string> faces_;
+  std::map<std::string, cell::Face> all_;
+  GripperMechanics gripper_;
+  truth::CalibratedPads pads_;
+  cell::Sensing sensing_;
+};
+
+struct Done {
+  cell::Scene scene;
+  cell::Outcome outcome;
+};
+
+// Those from `first` on, on so many threads.
+std::vector<Done> run_all(const Set &set, std::uint64_t first, std::uint64_t count,
+                          std::uint64_t jobs);
+
+} // namespace fingertip::grasp
