@@ -6,6 +6,8 @@
 /* Of the zero of the load. */
 #define READY_us 150000u
 #define READY_FRAMES 3u
+/* How fast the first force rises. */
+#define SQUEEZE_mN_s 8000
 /* Squeezing to the first force takes no longer, or it is what it is. */
 #define SQUEEZE_us 3000000u
 /* How near to the first force is there. */
@@ -15,6 +17,8 @@
 #define EMPTY_us 60000u
 /* A gripper that stands where it was sent for so long has closed on nothing. */
 #define STANDS_us 400000u
+/* A move is to take so long, but where the object slides. */
+#define MOVE_us 20000
 /* A width of the gripper's own units. */
 #define WIDTH_SLACK_um 1000
 
@@ -115,8 +119,8 @@ static void ramp(struct grip *grip, int32_t to_um, int32_t speed_um_s) {
   if (steps < 1) {
     return;
   }
-  grip->ramped_us = grip->now_us;
   int32_t off_um = to_um - grip->target_um, made_um = steps * grip->traits.step_um;
+  grip->ramped_us += (uint64_t)grip_scale(made_um, 1000000, speed_um_s);
   grip->target_um += grip_clamp(off_um, -made_um, made_um);
 }
 
@@ -134,9 +138,9 @@ static void approach(struct grip *grip, const struct grip_view *view) {
     return;
   }
   ramp(grip, 0, grip->settings.approach_um_s);
-  bool stands = !grip->status.is_moving && grip->target_um == 0 &&
-                grip->status.t_us > grip->ramped_us + STANDS_us;
-  if (stands) {
+  if (grip->status.is_moving || grip->target_um != 0) {
+    grip->stood_us = grip->now_us;
+  } else if (grip->now_us - grip->stood_us > STANDS_us) {
     enter(grip, GRIP_MISSED);
   }
 }
@@ -145,7 +149,10 @@ static uint32_t squeeze(struct grip *grip, const struct grip_view *view) {
   const struct grip_settings *settings = &grip->settings;
   bool fixed = settings->mode == GRIP_MODE_FIXED;
   int32_t aimed_mN = fixed ? settings->set_mN : settings->first_mN;
-  uint32_t trouble = fixed ? grip_fixed_step(grip, view) : grip_aim(grip, view, aimed_mN);
+  int32_t since_us = (int32_t)(grip->now_us - grip->since_us);
+  int32_t risen_mN = settings->touch_mN + grip_scale(since_us, SQUEEZE_mN_s, 1000000);
+  uint32_t trouble = fixed ? grip_fixed_step(grip, view)
+                           : grip_aim(grip, view, risen_mN < aimed_mN ? risen_mN : aimed_mN);
   bool there = view->low_mN >= grip_scale(aimed_mN, SQUEEZED_PERMILLE, 1000);
   if ((there && !grip->status.is_moving) || grip->now_us - grip->since_us > SQUEEZE_us) {
     grip_zero_begin(grip);
@@ -179,8 +186,12 @@ static uint32_t make_ready(struct grip *grip, const struct grip_view *view) {
   return trouble;
 }
 
+static bool is_empty(const struct grip_view *view) {
+  return view->fingers > 0 && view->touches == 0;
+}
+
 static bool is_gone(struct grip *grip, const struct grip_view *view) {
-  bool empty = view->fingers > 0 && view->touches == 0;
+  bool empty = is_empty(view);
   if (!empty) {
     grip->empty_us = grip->now_us;
   }
@@ -237,7 +248,11 @@ static void tell_command(const struct grip *grip, struct grip_command *command) 
     break;
   case GRIP_SQUEEZE:
   case GRIP_READY:
-  case GRIP_HOLDING:
+  case GRIP_HOLDING: {
+    int32_t off_um = grip->target_um - grip->status.width_um;
+    speed_um_s = grip_scale(off_um < 0 ? -off_um : off_um, 1000000, MOVE_us);
+    break;
+  }
   case GRIP_SLIPPING:
     break;
   default:
@@ -287,7 +302,7 @@ void grip_step(struct grip *grip, uint64_t now_us, struct grip_command *command,
     enter(grip, GRIP_FAULT);
   } else if (is_grasping(before) && is_gone(grip, &view)) {
     enter(grip, GRIP_DROPPED);
-  } else if (!silent) {
+  } else if (!silent && !(is_grasping(before) && is_empty(&view))) {
     grip->trouble |= go_on(grip, &view);
   }
   if (grip->state == before) {

@@ -225,8 +225,10 @@ struct grip {
   uint32_t newest_width, width_count;
   int32_t touch_width_um;
   int32_t target_um; /* the width that was last commanded */
+  uint64_t aimed_us; /* when it last changed for a force */
   int32_t wanted_mN;
   uint64_t empty_us;      /* since when neither fingertip feels anything; 0: one does */
+  uint64_t stood_us;      /* since when the gripper stands where an approach ends */
   uint64_t ramped_us;     /* the last step of an approach or a release */
   uint32_t trouble;       /* as of the last step */
   uint32_t fault_trouble; /* that of FAULT */

@@ -14,6 +14,9 @@
 /* The grip that ended a slide, or this much of it, is not given up. */
 #define FLOOR_PERMILLE 850
 
+/* Grip comes down in steps of so long. */
+#define DECAY_us 50000u
+
 /* Q / F of a slide is friction, as far as Q is known. */
 #define SEEN_PERMILLE 950
 #define FRICTION_MIN_PERMILLE 100
@@ -99,15 +102,15 @@ int32_t grip_hold_wants(struct grip *grip, const struct grip_view *view) {
   bool rests = view->tells_load &&
                !(hold->has_slid && grip->now_us - hold->slid_us < grip->settings.rest_us);
   uint64_t step_us = grip->now_us - hold->decayed_us;
-  if (wanted_mN >= grip->wanted_mN || !rests || step_us > 1000000) {
+  if (wanted_mN >= grip->wanted_mN || !rests || step_us > 2 * DECAY_us) {
     hold->decayed_us = grip->now_us;
     return wanted_mN > grip->wanted_mN ? wanted_mN : grip->wanted_mN;
   }
-  int32_t share = port_divide(grip->settings.decay_permille_s * (int32_t)step_us, 1000);
-  int32_t down_mN = grip_scale(grip->wanted_mN, share, 1000000);
-  if (down_mN < 1) {
+  if (step_us < DECAY_us) {
     return grip->wanted_mN;
   }
   hold->decayed_us = grip->now_us;
-  return grip->wanted_mN - down_mN > wanted_mN ? grip->wanted_mN - down_mN : wanted_mN;
+  int32_t share = port_divide(grip->settings.decay_permille_s * (int32_t)step_us, 1000);
+  int32_t lower_mN = grip->wanted_mN - grip_scale(grip->wanted_mN, share, 1000000);
+  return lower_mN > wanted_mN ? lower_mN : wanted_mN;
 }

@@ -8,9 +8,15 @@
 #define STIFFNESS_MIN_mN_mm 200
 #define STIFFNESS_MAX_mN_mm 20000
 
+/* Opening waits until the last move shows in the force, whatever the clocks of force and width
+ * differ by. */
+#define SETTLES_us 30000u
+
 /* Of what a step makes: less is not worth one closing, more is left before one opening. */
 #define TIGHTEN_PERMILLE 250
 #define LOOSEN_PERMILLE 1200
+/* Of the cap: so much of it is asked for, as the last step may make more than is known. */
+#define CAP_PERMILLE 970
 /* And of the force that is wanted, for grippers of fine steps. */
 #define TOLERANCE_PERMILLE 15
 
@@ -60,7 +66,9 @@ int32_t grip_allowed_width(const struct grip *grip, const struct grip_view *view
   if (width_um < grip->target_um && (view->over || view->fingers == 0)) {
     width_um = grip->target_um;
   }
-  return grip_clamp(width_um, 0, grip->traits.stroke_um);
+  /* Where it touched is as far as it opens without being asked to. */
+  int32_t most_um = grip->target_um > grip->touch_width_um ? grip->target_um : grip->touch_width_um;
+  return grip_clamp(width_um, 0, most_um);
 }
 
 /* So many steps that the gripper moves at all. */
@@ -98,14 +106,14 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
     steps = port_divide(missing_mN + step_mN - 1, step_mN);
     int32_t least = least_steps(grip, true);
     steps = steps < least ? least : steps;
-    int32_t room = high_mN >= settings->force_cap_mN
-                       ? 0
-                       : port_divide(settings->force_cap_mN - high_mN, step_mN);
+    int32_t most_mN = grip_scale(settings->force_cap_mN, CAP_PERMILLE, 1000);
+    int32_t room = high_mN >= most_mN ? 0 : port_divide(most_mN - high_mN, step_mN);
     if (steps > room) {
       steps = room;
       trouble |= GRIP_AT_CAP;
     }
-  } else if (-missing_mN > tolerance_mN) {
+  } else if (-missing_mN > tolerance_mN &&
+             view->t_us > grip->aimed_us + (uint64_t)grip->traits.latency_us + SETTLES_us) {
     int32_t least = least_steps(grip, false);
     int32_t spare =
         port_divide(-missing_mN - grip_scale(step_mN, LOOSEN_PERMILLE - 1000, 1000), step_mN);
@@ -114,6 +122,7 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
   if (steps != 0) {
     int32_t aimed_um = grip->target_um - steps * grip->traits.step_um;
     grip->target_um = grip_allowed_width(grip, view, aimed_um, &trouble);
+    grip->aimed_us = grip->now_us;
   }
   return trouble;
 }

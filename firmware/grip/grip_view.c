@@ -6,6 +6,10 @@
 #define FROZEN_us 50000u
 #define FROZEN_FRAMES 5u
 
+/* A hundred kilograms: more no fingertip means. */
+#define FORCE_MAX_mN 1000000
+#define ZERO_FRAMES_MAX 2000u
+
 /* A force with a larger standard deviation is no measurement. */
 #define FORCE_SD_MAX_PERMILLE 500
 
@@ -35,12 +39,7 @@ static uint32_t root_of(uint64_t square) {
   return root;
 }
 
-#define LENGTH_MAX_mN 1000000
-#define ZERO_FRAMES_MAX 2000u
-
 static int32_t length_of(int32_t x, int32_t y) {
-  x = grip_clamp(x, -LENGTH_MAX_mN, LENGTH_MAX_mN);
-  y = grip_clamp(y, -LENGTH_MAX_mN, LENGTH_MAX_mN);
   return (int32_t)root_of((uint64_t)((int64_t)x * x) + (uint64_t)((int64_t)y * y));
 }
 
@@ -73,19 +72,22 @@ void grip_take_touch(struct grip *grip, unsigned finger, const struct grip_touch
     own->unchanged++;
   }
   own->touch = *touch;
+  own->touch.force_mN = grip_clamp(touch->force_mN, 0, FORCE_MAX_mN);
+  own->touch.qx_mN = grip_clamp(touch->qx_mN, -FORCE_MAX_mN, FORCE_MAX_mN);
+  own->touch.qy_mN = grip_clamp(touch->qy_mN, -FORCE_MAX_mN, FORCE_MAX_mN);
   own->is_heard = true;
   own->is_new = true;
   if (tells_force(touch)) {
     own->told_us = touch->t_us;
-    own->force_mN = touch->flags & CONTACT_FLAG_CONTACT ? touch->force_mN : 0;
+    own->force_mN = touch->flags & CONTACT_FLAG_CONTACT ? own->touch.force_mN : 0;
   }
   own->tells_load =
       (touch->flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0 && (touch->flags & FORCE_ONLY) == 0;
   if (own->tells_load) {
-    own->load_mN = length_of(touch->qx_mN - own->zero_x_mN, touch->qy_mN - own->zero_y_mN);
+    own->load_mN = length_of(own->touch.qx_mN - own->zero_x_mN, own->touch.qy_mN - own->zero_y_mN);
     if (own->sums < ZERO_FRAMES_MAX) {
-      own->x_sum_mN += grip_clamp(touch->qx_mN, -LENGTH_MAX_mN, LENGTH_MAX_mN);
-      own->y_sum_mN += grip_clamp(touch->qy_mN, -LENGTH_MAX_mN, LENGTH_MAX_mN);
+      own->x_sum_mN += own->touch.qx_mN;
+      own->y_sum_mN += own->touch.qy_mN;
       own->sums++;
     }
   }
