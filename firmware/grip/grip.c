@@ -44,7 +44,7 @@ enum ft_status grip_init(struct grip *grip, const struct grip_settings *settings
       in_range(s->gains.kp_um_per_N, 0, 10000) && in_range(s->gains.ki_um_per_Ns, 0, 100000) &&
       in_range(s->gains.kd_um_s_per_N, 0, 10000) && s->control_us >= 500 &&
       s->control_us <= 1000000 && in_range(s->first_mN, 200, s->force_cap_mN) &&
-      in_range(s->blind_mN, s->first_mN, s->force_cap_mN) &&
+      in_range(s->blind_mN, s->first_mN, s->force_cap_mN) && in_range(s->shift_um, 0, 20000) &&
       in_range(s->friction_permille, 100, 1500) && in_range(s->margin_permille, 1000, 5000) &&
       in_range(s->decay_permille_s, 0, 1000) && s->rest_us <= 60000000;
   if (!good) {

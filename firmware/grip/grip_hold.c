@@ -11,15 +11,19 @@
  * answer and it goes on. */
 #define REFLEX_PERMILLE 1300
 #define REFLEX_AGAIN_us 20000
-/* The grip that ended a slide, or this much of it, is not given up. */
+/* This much of the grip that ended a slide is not given up where no load tells what is needed. */
 #define FLOOR_PERMILLE 850
 
 /* Grip comes down in steps of so long. */
 #define DECAY_us 50000u
 
+/* An object that slides at less than this of Q / F pulls more than is told: then the grip that
+ * stopped it is all that is known. Otherwise its load and friction are. */
+#define BELIEVED_PERMILLE 150
+
 /* Q / F of a slide is friction, as far as Q is known. */
 #define SEEN_PERMILLE 950
-#define FRICTION_MIN_PERMILLE 100
+#define FRICTION_MIN_PERMILLE 150
 #define FRICTION_MAX_PERMILLE 1500
 
 void grip_hold_begin(struct grip *grip) {
@@ -44,6 +48,9 @@ static void learn_friction(struct grip *grip, const struct grip_view *view, bool
     return;
   }
   int32_t seen = grip_scale(view->load_mN, 1000, view->low_mN);
+  if (begins) {
+    hold->load_is_believed = seen >= BELIEVED_PERMILLE;
+  }
   seen = grip_clamp(grip_scale(seen, SEEN_PERMILLE, 1000), FRICTION_MIN_PERMILLE,
                     FRICTION_MAX_PERMILLE);
   if (begins ? seen < hold->friction_permille : !hold->sliding && seen > hold->friction_permille) {
@@ -68,7 +75,8 @@ static void answer_slide(struct grip *grip, const struct grip_view *view) {
     hold->slid_us = grip->now_us;
     hold->has_slid = true;
   } else if (hold->sliding) {
-    hold->floor_mN = grip_scale(hold->floor_mN, FLOOR_PERMILLE, 1000);
+    hold->floor_mN = hold->load_is_believed ? 0 : grip_scale(hold->floor_mN, FLOOR_PERMILLE, 1000);
+    grip_guess_anew(grip);
   }
   hold->sliding = view->slides;
 }

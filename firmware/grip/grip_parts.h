@@ -26,6 +26,9 @@ void grip_zero_begin(struct grip *grip);
 void grip_zero_end(struct grip *grip);
 bool grip_zero_has(const struct grip *grip, uint32_t frames);
 
+/* After a slide: what a location has moved by since its zero is no load any more. */
+void grip_guess_anew(struct grip *grip);
+
 /* The width that the gripper had then. */
 int32_t grip_width_at(const struct grip *grip, uint64_t t_us);
 /* mN for each mm that the gripper closes. */
