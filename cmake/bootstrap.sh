@@ -9,7 +9,7 @@ usage() {
   echo "usage: sh cmake/bootstrap.sh demo|test|report" >&2
   echo "  demo    build everything, let a lime slip on two emulated fingertips, say and draw what they felt" >&2
   echo "  test    build everything and run the whole test suite" >&2
-  echo "  report  build everything, measure fit, rate, cost, truth and tangential load, repeat the published experiments in simulation, write build/report" >&2
+  echo "  report  build everything, measure fit, rate, cost, truth, tangential load and grasps, repeat the published experiments in simulation, write build/report" >&2
   exit 2
 }
 [ $# -eq 1 ] || usage
@@ -43,9 +43,11 @@ sigrok-cli sigrok-cli
 /usr/include/cminpack-1/cminpack.h libcminpack-dev
 /usr/include/gtest/gtest.h libgtest-dev
 /usr/include/libusb-1.0/libusb.h libusb-1.0-0-dev
+/usr/include/modbus/modbus.h libmodbus-dev
 /usr/include/CLI/CLI.hpp libcli11-dev
 /usr/include/eigen3/Eigen/Dense libeigen3-dev
 /usr/include/nlohmann/json.hpp nlohmann-json3-dev
+/usr/share/doc/python3-venv python3-venv
 /usr/lib/python3/dist-packages/numpy/__init__.py python3-numpy
 /usr/lib/python3/dist-packages/matplotlib/__init__.py python3-matplotlib
 /usr/lib/python3/dist-packages/markdown/__init__.py python3-markdown
@@ -97,6 +99,13 @@ if ! cmp -s $emulator/package-lock.json $emulator/node_modules/.installed-lock; 
   cp $emulator/package-lock.json $emulator/node_modules/.installed-lock
 fi
 
+if [ "$1" = test ] && ! cmp -s tests/requirements.txt build/venv/.installed-requirements; then
+  say "fetching the tests' judges with pip"
+  /usr/bin/python3 -m venv --clear build/venv
+  build/venv/bin/pip --quiet --disable-pip-version-check install -r tests/requirements.txt
+  cp tests/requirements.txt build/venv/.installed-requirements
+fi
+
 say "building firmware and host tools into build/"
 mkdir -p build
 cmake --preset host > build/configure.log 2>&1 || { cat build/configure.log >&2; exit 1; }
@@ -127,6 +136,8 @@ case $1 in
       --picture host_tools/report/truth/truth.png
     say "tangential load: how far from the truth, on which pads"
     /usr/bin/python3 host_tools/report/shear/shear.py --build build/host -o build/report --picture host_tools/report/shear/shear.png
+    say "grasps in the simulated cell"
+    /usr/bin/python3 host_tools/report/grasp/grasp.py --build build/host -o build/report --picture host_tools/report/grasp/grasp.png
     say "every table and picture: $root/build/report/index.html"
     ;;
 esac

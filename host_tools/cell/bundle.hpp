@@ -10,7 +10,8 @@
 // ellipsoid's normal. So an object that spins carries less, and one that slides is turned easily.
 //
 // Friction falls with gross slip and heals at rest by the twin's law and constants. A turn is
-// TURN_STIFFNESS as stiff as a pull, as on a half-space of nu = 0.5; its damping is the same.
+// TURN_STIFFNESS as stiff as a pull, as on a half-space of nu = 0.5; its damping is the same, so a
+// swing rings on for longer than on real rubber.
 //
 // Left out: the rubber's mass, its tangential relaxation, friction that grows with speed, rolling.
 #pragma once

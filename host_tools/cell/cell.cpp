@@ -11,8 +11,6 @@ namespace {
 
 constexpr double PER_M = 1e3;
 constexpr double SQUEEZE_STEP_mm = 0.005;
-// As twin/acts_pulled.cpp: stiffness lets the usual grip's object slip after the dead travel.
-constexpr double USUAL_N = 6.0, USUAL_FRICTION = 0.5;
 // Of each foot, and of the damper beside it.
 constexpr double TABLE_N_mm = 20.0, TABLE_DAMPING = 0.3;
 constexpr double FEET_BELOW_mm = 40.0; // the centre of mass
@@ -27,8 +25,6 @@ Vector turned(const Vector &v, double rad) {
 Cell::Cell(const Face &face, const Object &object, const Grasp &grasp)
     : face_(face), object_(object),
       grasp_(grasp), down_{std::cos(grasp.down_rad), std::sin(grasp.down_rad)},
-      stiffness_per_radius_(1.5 * USUAL_FRICTION * USUAL_N / grasp.dead_travel_mm /
-                            face.radius_mm(USUAL_N)),
       bundles_{Bundle(object.friction * (1.0 + object.uneven_friction), object.kinetic_share),
                Bundle(object.friction * (1.0 - object.uneven_friction), object.kinetic_share)},
       strength_(twin::relaxation_strengths(grasp.relaxation)), com_mm_(object.com_mm),
@@ -129,7 +125,7 @@ void Cell::step(double seconds, const Drive &drive) {
   press(seconds, drive.width_mm);
   mass_kg_ = drive.mass_kg;
   const double radius_mm = face_.radius_mm(force_N_);
-  const double stiffness_N_mm = stiffness_per_radius_ * radius_mm;
+  const double stiffness_N_mm = grasp_.shear_N_mm2 * radius_mm;
   Wrench held;
   const Motion motion{speed_.x, speed_.y, turning_};
   for (std::size_t f = 0; f < bundles_.size(); f++) {
@@ -205,7 +201,7 @@ Cell::Energy Cell::energy() const {
       (com_mm_s_.dot(com_mm_s_) + object_.gyration_mm * object_.gyration_mm * turning_ * turning_);
   energy.lost = table_lost_mJ_;
   for (const Bundle &bundle : bundles_) {
-    energy.elastic += bundle.elastic_mJ(stiffness_per_radius_ * face_.radius_mm(force_N_));
+    energy.elastic += bundle.elastic_mJ(grasp_.shear_N_mm2 * face_.radius_mm(force_N_));
     energy.lost += bundle.lost_mJ();
   }
   return energy;

@@ -50,12 +50,15 @@ struct Object {
 };
 
 struct Grasp {
-  Vector place_mm;             // where it touches, fingertip 0
-  double angle_rad = 0.0;      // its face is turned by, likewise
-  double down_rad = 0.0;       // direction of gravity from x towards y
-  double relaxation = 0.175;   // share of the force lost in 8 s: twin/effects.hpp
-  double dead_travel_mm = 1.0; // of rubber, at 6 N and a friction of 0.5
-  double fingers_N_mm = 50.0;  // both fingers' own stiffness in a row; assumed
+  Vector place_mm;           // where it touches, fingertip 0
+  double angle_rad = 0.0;    // its face is turned by, likewise
+  double down_rad = 0.0;     // direction of gravity from x towards y
+  double relaxation = 0.175; // share of the force lost in 8 s: twin/effects.hpp
+  // The rubber's tangential stiffness per radius of contact: 8 G / (2 - nu), as on a half-space of
+  // Shore 15 A (Mindlin, J. Appl. Mech. 16, 1949). A sphere of 15 mm then goes 1 mm before it slips
+  // at 6 N and a friction of 0.5.
+  double shear_N_mm2 = 1.0;
+  double fingers_N_mm = 50.0; // both fingers' own stiffness in a row; assumed
 };
 
 // What acts from outside, in the hand's frame.
@@ -116,7 +119,6 @@ private:
   Grasp grasp_;
   Vector down_;
   std::vector<float> force_by_squeeze_; // each SQUEEZE_STEP_mm
-  double stiffness_per_radius_;         // tangential, N/mm per mm
   std::array<Bundle, 2> bundles_;
 
   // Relaxation

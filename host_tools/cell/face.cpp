@@ -1,5 +1,6 @@
 #include "cell/face.hpp"
 
+#include "cell/plate.hpp"
 #include "twin/traction_table.hpp"
 
 extern "C" {
@@ -49,6 +50,10 @@ Between between_forces(double force_N) {
 Face::Face(const std::string &name, double layer_mm, const std::filesystem::path &cache)
     : name_(name), layer_mm_(layer_mm) {
   const twin::Layer layer = twin::silicone(layer_mm);
+  if (name == "plate") {
+    make_plate(layer);
+    return;
+  }
   const auto table = twin::ContactTable::load_or_build(twin::indenter(name), layer, cache);
   const twin::TractionTable traction(table, layer);
   for (std::size_t i = 0; i < ROOTS; i++) {
@@ -78,6 +83,26 @@ Face::Face(const std::string &name, double layer_mm, const std::filesystem::path
   }
 }
 
+void Face::make_plate(const twin::Layer &layer) {
+  double half_x_mm = PAD_OVERHANG_mm, half_y_mm = PAD_OVERHANG_mm;
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    half_x_mm = std::max(half_x_mm, PAD_OVERHANG_mm + static_cast<double>(geometry.x_mm[k]));
+    half_y_mm = std::max(half_y_mm, PAD_OVERHANG_mm + static_cast<double>(geometry.y_mm[k]));
+  }
+  const Plate plate(layer, half_x_mm, half_y_mm);
+  for (std::size_t i = 0; i < ROOTS; i++) {
+    const double root = static_cast<double>(i) / (ROOTS - 1);
+    indentation_mm_.push_back(
+        static_cast<float>(FORCE_MAX_N * root * root / plate.stiffness_N_mm()));
+    radius_mm_.push_back(static_cast<float>(plate.radius_mm()));
+  }
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    const double x = static_cast<double>(geometry.x_mm[k]);
+    const double y = static_cast<double>(geometry.y_mm[k]);
+    plate_.push_back({plate.normal_Pa_N(x, y), plate.along_x_Pa_N(x), plate.along_y_Pa_N(y)});
+  }
+}
+
 double Face::at(const std::vector<float> &values, double force_N) {
   const double at = std::sqrt(std::clamp(force_N / FORCE_MAX_N, 0.0, 1.0)) * (ROOTS - 1);
   const std::size_t i = std::min(static_cast<std::size_t>(at), ROOTS - 2);
@@ -89,6 +114,14 @@ Pressures Face::base_Pa(const twin::Touch &touch, double tangential) const {
   Pressures base_Pa{};
   const double carried_N = touch.force_N - touch.stuck_N;
   if (!(touch.force_N > 0.0)) {
+    return base_Pa;
+  }
+  for (std::size_t k = 0; k < plate_.size(); k++) {
+    base_Pa[k] =
+        touch.force_N * plate_[k][NORMAL] +
+        tangential * (touch.pull_x_N * plate_[k][ALONG_X] + touch.pull_y_N * plate_[k][ALONG_Y]);
+  }
+  if (!plate_.empty()) {
     return base_Pa;
   }
   const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);

@@ -8,6 +8,7 @@
 // the peak of the twin's own on layers of 9 mm and more. Some 2 us per touch, all sensors.
 #pragma once
 
+#include "twin/layer.hpp"
 #include "twin/trajectory.hpp"
 
 #include <array>
@@ -40,11 +41,13 @@ private:
   static constexpr int STRIDE = 2; // of the twin's nodes
   enum Field { NORMAL, ALONG_X, ALONG_Y, FIELDS };
   static double at(const std::vector<float> &values, double force_N);
+  void make_plate(const twin::Layer &layer);
 
   std::string name_;
   double layer_mm_;
   std::vector<float> indentation_mm_, radius_mm_; // equally spaced in the root of the force
   std::vector<float> values_;                     // [x][y][force][field], Pa / N
+  std::vector<std::array<double, FIELDS>> plate_; // [sensor], Pa / N; empty: none
 };
 
 } // namespace fingertip::cell

@@ -39,9 +39,9 @@ GripperMechanics gripper_mechanics(const std::string &model) {
 }
 
 GripperMotion::GripperMotion(const GripperMechanics &mechanics)
-    : mechanics_(mechanics), phase_(mechanics.activation_s > 0 ? Phase::off : Phase::active),
-      drive_mm_(mechanics.traits.stroke_mm), fingers_mm_(drive_mm_), target_mm_(drive_mm_),
-      speed_mm_s_(mechanics.traits.speed_max_mm_s), force_N_(mechanics.traits.force_max_N) {}
+    : mechanics_(mechanics), phase_(Phase::off), drive_mm_(mechanics.traits.stroke_mm),
+      fingers_mm_(drive_mm_), target_mm_(drive_mm_), speed_mm_s_(mechanics.traits.speed_max_mm_s),
+      force_N_(mechanics.traits.force_max_N) {}
 
 bool GripperMotion::blocks(double width_mm, double force_N) const {
   return blocked_at && blocked_at(width_mm, force_N);
@@ -63,6 +63,7 @@ double GripperMotion::told_width_mm() const {
 
 void GripperMotion::activate() {
   commands_.clear();
+  asked_.reset();
   phase_ = mechanics_.activation_s > 0 ? Phase::opening : Phase::active;
   phase_began_s_ = time_s_;
   blocked_ = 0;
@@ -72,19 +73,24 @@ void GripperMotion::activate() {
 
 void GripperMotion::power_off() {
   commands_.clear();
+  asked_.reset();
   phase_ = Phase::off;
   moving_ = false;
   blocked_ = 0;
 }
 
 void GripperMotion::move(const GripperMove &move) {
-  if (active()) {
+  const bool same = asked_ && asked_->width_mm == move.width_mm &&
+                    asked_->speed_mm_s == move.speed_mm_s && asked_->force_N == move.force_N;
+  if (active() && !same) {
+    asked_ = move;
     commands_.push_back({time_s_ + mechanics_.traits.latency_s, false, move});
   }
 }
 
 void GripperMotion::stop() {
   if (active()) {
+    asked_.reset();
     commands_.push_back({time_s_ + mechanics_.traits.latency_s, true, {}});
   }
 }

@@ -19,6 +19,7 @@
 
 #include <deque>
 #include <functional>
+#include <optional>
 #include <string>
 
 namespace fingertip {
@@ -26,7 +27,7 @@ namespace fingertip {
 struct GripperMechanics {
   GripperTraits traits;      // its step, deadband, speeds, latency, stroke
   double backlash_mm = 0.0;  // of the width: what the drive turns before the fingers follow
-  double activation_s = 0.0; // of searching its ends: open, closed, open; 0: needs none
+  double activation_s = 0.0; // of searching its ends: open, closed, open; 0: active at once
 };
 
 // Of gripper_models(), and "ideal": steps of 0.01 mm, 3 ms. Throws Error: an unknown model.
@@ -34,7 +35,7 @@ GripperMechanics gripper_mechanics(const std::string &model);
 
 class GripperMotion {
 public:
-  // Active at once where the model needs no activation. The fingers are open.
+  // Not active yet; the fingers are open.
   explicit GripperMotion(const GripperMechanics &mechanics);
 
   // Whether what is between the fingers pushes back with at least force_N at this width; below 0:
@@ -43,11 +44,13 @@ public:
   // Empty: nothing is there.
   std::function<bool(double width_mm, double force_N)> blocked_at;
 
-  // Opens and closes fully, at whatever force, so that what is held falls; then it takes moves.
+  // Where its ends are searched, opens and closes fully, at whatever force, so that what is held
+  // falls; then it takes moves.
   void activate();
   // Power is lost: the fingers stay, commands do nothing until activate.
   void power_off();
-  // Ignored unless active; values beyond the traits' limits are taken to their ends.
+  // Ignored unless active, and where it says what the last one said; values beyond the traits'
+  // limits are taken to their ends.
   void move(const GripperMove &move);
   // Stops after the latency where the fingers are then.
   void stop();
@@ -64,7 +67,8 @@ public:
   double effort() const;
   bool active() const { return phase_ == Phase::active; }
   bool activating() const { return phase_ != Phase::off && phase_ != Phase::active; }
-  bool moving() const { return moving_ || activating(); }
+  // Or a command has yet to count.
+  bool moving() const { return moving_ || activating() || !commands_.empty(); }
   // Stopped by what blocked_at tells: 1 while opening, -1 while closing; 0: not.
   int blocked() const { return blocked_; }
   double time_s() const { return time_s_; }
@@ -89,7 +93,8 @@ private:
 
   GripperMechanics mechanics_;
   Phase phase_;
-  std::deque<Command> commands_; // not yet counting, in order
+  std::deque<Command> commands_;     // not yet counting, in order
+  std::optional<GripperMove> asked_; // last
   double time_s_ = 0.0;
   double phase_began_s_ = 0.0;
   double drive_mm_, fingers_mm_;

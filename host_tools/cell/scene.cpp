@@ -117,20 +117,29 @@ double Scene::least_N(double t_s) const {
   return now.mass_kg * std::hypot(x, y) / (2.0 * object.friction * now.friction_share);
 }
 
-const std::vector<std::string> &faces_of(const std::string &objects) {
-  static const std::vector<std::string> round{
-      "sphere12", "sphere15",    "sphere18",   "sphere24",   "ping_pong",
-      "lime",     "rubber_duck", "cylinder12", "cylinder18", "cylinder24"};
-  static const std::vector<std::string> faces{"cylinder6", "cube12", "cube18", "cube24",
-                                              "bottle_cap"};
+std::vector<std::string> faces_of(const std::string &objects) {
+  const std::vector<std::string> balls{"sphere12",  "sphere15", "sphere18",   "sphere24",
+                                       "ping_pong", "lime",     "rubber_duck"};
+  const std::vector<std::string> cylinders{"cylinder12", "cylinder18", "cylinder24"};
   if (objects == "round") {
-    return round;
+    std::vector<std::string> all = balls;
+    all.insert(all.end(), cylinders.begin(), cylinders.end());
+    return all;
+  }
+  if (objects == "balls") {
+    return balls;
+  }
+  if (objects == "cylinders") {
+    return cylinders;
   }
   if (objects == "faces") {
-    return faces;
+    return {"cylinder6", "cube12", "cube18", "cube24", "bottle_cap"};
+  }
+  if (objects == "flats") {
+    return {"plate"};
   }
   throw std::runtime_error("there are no objects \"" + objects +
-                           "\"; choose one of: round faces flats");
+                           "\"; choose one of: round balls cylinders faces flats");
 }
 
 Scene draw_scene(const std::vector<std::string> &faces, std::uint64_t seed, std::uint64_t n) {
@@ -151,7 +160,7 @@ Scene draw_scene(const std::vector<std::string> &faces, std::uint64_t seed, std:
     scene.grasp.place_mm = {random.uniform(-4.5, 4.5), random.uniform(-10.0, 10.0)};
     scene.grasp.angle_rad = random.uniform(-M_PI, M_PI);
     scene.grasp.relaxation = random.uniform(0.09, 0.26);
-    scene.grasp.dead_travel_mm = random.log_uniform(0.7, 1.5);
+    scene.grasp.shear_N_mm2 = random.log_uniform(0.7, 1.5);
     scene.opens_mm = random.uniform(2.0, 5.0);
     scene.waits_s = random.uniform(0.1, 0.3);
     scene.lift_mm = random.uniform(3.0, 10.0);

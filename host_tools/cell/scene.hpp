@@ -46,8 +46,9 @@ struct Scene {
 
 constexpr double FORCE_MOST_N = 15.0;
 
-// Faces of the twin (face.hpp): round ones; flat ones within the pad; flats larger than it.
-const std::vector<std::string> &faces_of(const std::string &objects); // round | faces | flats
+// Faces (face.hpp) of objects: balls; cylinders that lie across the pad; both, which are `round`;
+// `faces`, flat ones within the pad; `flats`, larger than it. Throws std::runtime_error for others.
+std::vector<std::string> faces_of(const std::string &objects);
 
 // The n-th of a set. Another seed is another set.
 Scene draw_scene(const std::vector<std::string> &faces, std::uint64_t seed, std::uint64_t n);

@@ -50,33 +50,30 @@ public:
     if (cell.slips()) {
       if (t_s - last_s_ > JOINED_s) {
         end();
-        begin_s_ = t_s;
+        slip_ = Slip{t_s, 0.0, {}};
         begin_N_ = cell.force_N();
         begin_mm_ = cell.slid_mm();
-        reaction_s_.reset();
-        open_ = true;
       }
       last_s_ = t_s;
     }
-    if (open_) {
-      way_mm_ = cell.slid_mm() - begin_mm_;
-      if (!reaction_s_ && cell.force_N() >= MORE_FORCE * begin_N_) {
-        reaction_s_ = t_s - begin_s_;
+    if (slip_) {
+      slip_->way_mm = cell.slid_mm() - begin_mm_;
+      if (!slip_->reaction_s && cell.force_N() >= MORE_FORCE * begin_N_) {
+        slip_->reaction_s = t_s - slip_->begin_s;
       }
     }
   }
   void end() {
-    if (open_ && way_mm_ >= SLIP_mm) {
-      reactions_s.push_back(reaction_s_);
+    if (slip_ && slip_->way_mm >= SLIP_mm) {
+      slips.push_back(*slip_);
     }
-    open_ = false;
+    slip_.reset();
   }
-  std::vector<std::optional<double>> reactions_s;
+  std::vector<Slip> slips;
 
 private:
-  double begin_s_ = 0.0, begin_N_ = 0.0, begin_mm_ = 0.0, way_mm_ = 0.0, last_s_ = -NEVER_s;
-  std::optional<double> reaction_s_;
-  bool open_ = false;
+  std::optional<Slip> slip_;
+  double begin_N_ = 0.0, begin_mm_ = 0.0, last_s_ = -NEVER_s;
 };
 
 // A force that is to be held.
@@ -217,7 +214,7 @@ private:
       touched_s_ = std::min(touched_s_, t_s_);
     }
     if (lift_s_ < NEVER_s) {
-      slips_.look(t_s_, cell_);
+      slips_.look(since_lift_s(t_s_), cell_);
       if (since_lift_s(t_s_) <= trial_.scene.lift_s) {
         outcome_.lift_slip_mm = cell_.slid_mm();
       }
@@ -324,7 +321,7 @@ private:
     outcome_.disturbance_slip_mm = outcome_.slid_mm - outcome_.lift_slip_mm;
     outcome_.margin = median(margins_);
     outcome_.holding_s = held_s_ < NEVER_s && touched_s_ < NEVER_s ? held_s_ - touched_s_ : 0.0;
-    outcome_.reactions_s = slips_.reactions_s;
+    outcome_.slips = slips_.slips;
     if (trial_.still_s > 0.0) {
       set_point_.tell(outcome_);
     }

@@ -65,16 +65,23 @@ struct Moment {
   std::uint32_t trouble;
 };
 
+constexpr double DROP_mm = 22.0, SLIP_mm = 0.3, SETTLED_s = 0.5;
+
+// All of both contacts slid, by SLIP_mm or more in all.
+struct Slip {
+  double begin_s, way_mm;           // since the lift began
+  std::optional<double> reaction_s; // until the grip was 5 % stronger; none: never
+};
+
 struct Outcome {
   bool held = false; // to the end
   // Why not: it slid DROP_mm or the grip lost it; the controller never came to hold.
   bool dropped = false, never_held = false, crushed = false;
   double slid_mm = 0.0, turned_rad = 0.0, peak_N = 0.0;
   double lift_slip_mm = 0.0, disturbance_slip_mm = 0.0; // until the lift is over; after it
-  double margin = 0.0;    // median of force over least force from the lift's end on
-  double holding_s = 0.0; // from the first touch to the controller's HOLDING
-  // Of each slip of SLIP_mm or more: from its beginning to 5 % more force; none: there was never.
-  std::vector<std::optional<double>> reactions_s;
+  double margin = 0.0;     // median of force over least force from the lift's end on
+  double holding_s = 0.0;  // from the first touch to the controller's HOLDING
+  std::vector<Slip> slips; // since the lift began
   // Of a still trial, by the mean of what both fingertips say.
   std::optional<double> settle_s; // from the touch until it stays within 10 % for SETTLED_s
   double rms = 0.0;               // of the error, share of the set force, from there on
@@ -82,9 +89,7 @@ struct Outcome {
   std::uint32_t trouble = 0;      // all that was ever on while holding
 };
 
-constexpr double DROP_mm = 22.0, SLIP_mm = 0.3, SETTLED_s = 0.5;
-
-// face must be the scene's. trace: called some thousand times a second.
+// face must be the scene's. trace: called every 2 ms.
 Outcome run_trial(const Trial &trial, const Face &face, Controller &controller,
                   const std::function<void(const Moment &)> &trace = {});
 

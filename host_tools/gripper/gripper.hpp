@@ -1,12 +1,20 @@
 // The seam to a gripper with two parallel fingers, whatever its maker and its line.
 //
-//   auto gripper = open_gripper({"2f85", "/dev/ttyUSB0"});
+//   auto gripper = open_gripper({.model = "2f85", .port = "/dev/ttyUSB0"});
 //   gripper->activate();
+//   while (!gripper->poll().active) { ... }
 //   gripper->move({.width_mm = 20, .speed_mm_s = 50, .force_N = 20});
 //   GripperStatus now = gripper->poll();
 //
-// Nothing here waits longer than one exchange on the line (its timeout: 50 ms); whoever wants the
-// end of a motion polls for it. Not for two threads at once.
+// Nothing here waits longer than one exchange on the line, whose timeout is GripperWay's, but where
+// its comment says so; whoever wants the end of a motion polls for it, at least once a second, for
+// a Robotiq reports a fault after a second of silence. Not for two threads at once.
+//
+// Where the comment of a function has no list of its own it throws Error:
+//   gripper_silent    no answer in time; the next call may have one
+//   gripper_garbled   an answer that is none: damaged, of another slave, or to another question
+//   gripper_refused   it says no; the text has its code
+//   gone              the port vanished; nothing brings it back but open_gripper
 #pragma once
 
 #include "libfingertip/error.hpp"
@@ -20,10 +28,10 @@
 namespace fingertip {
 
 struct GripperTraits {
-  std::string model;                                 // "2f85"
-  double stroke_mm = 0.0;                            // width between the pads when open
-  double step_mm = 0.0;                              // of the commanded width
-  double deadband_mm = 0.0;                          // moves shorter than this are not made
+  std::string model;        // "2f85"
+  double stroke_mm = 0.0;   // width between the pads when open
+  double step_mm = 0.0;     // of the commanded width; of a servo's jaw the largest
+  double deadband_mm = 0.0; // moves shorter than this are not made
   double speed_min_mm_s = 0.0, speed_max_mm_s = 0.0; // of the width
   double force_min_N = 0.0, force_max_N = 0.0;       // of its own limit of force; 0: it has none
   double latency_s = 0.0;                            // from a command to motion
@@ -31,49 +39,58 @@ struct GripperTraits {
 };
 
 struct GripperStatus {
-  std::int64_t host_us = 0; // of the exchange's middle, on std::chrono::steady_clock
-  bool active = false;      // it has been activated and takes commands
-  bool moving = false;
+  std::int64_t host_us = 0;   // of the exchange's middle, on std::chrono::steady_clock
+  bool active = false;        // it has been activated and takes commands
+  bool moving = false;        // or activating
   std::optional<bool> object; // what the gripper itself believes; empty while it moves
   double width_mm = 0.0;
-  double current_A = 0.0;
+  double current_A = 0.0; // of its motor, as a number without sign
   std::uint8_t fault = 0; // the maker's code; 0: none
 };
 
 struct GripperMove {
-  double width_mm = 0.0;
-  double speed_mm_s = 0.0;
-  double force_N = 0.0; // its own limit; 0: its least
+  double width_mm = 0.0;   // beyond its ends: to that end
+  double speed_mm_s = 0.0; // beyond its limits: the nearest it can
+  double force_N = 0.0;    // its own limit, likewise; 0: its least
 };
 
 class Gripper {
 public:
   virtual ~Gripper() = default;
   virtual const GripperTraits &traits() const = 0;
-  // What the line is and what limits it, for people: "Modbus RTU at 115200 baud, slave 9".
+  // What the line is and what limits it, for people: "Modbus RTU at 115200 baud, slave 9, ...".
   virtual std::string line() const = 0;
-  // Begins what the gripper needs before it moves, dropping what it holds; poll tells when it is
-  // done.
+  // Begins what the gripper needs before it moves, dropping what it holds and clearing its faults;
+  // poll tells when it is done. Nothing else ever activates it, or clears a fault. Takes some
+  // exchanges, 0.1 s.
   virtual void activate() = 0;
-  // Throw Error: ErrorCode::gone without an answer in time, or where the port vanished.
   virtual GripperStatus poll() = 0;
-  // Sends and polls in one exchange where the line can do that.
+  // Sends and polls in one exchange where the line can do that, else in two. A gripper that is not
+  // active ignores it, as the status tells. Throws Error besides: bad_value, of what is no number.
   virtual GripperStatus move(const GripperMove &move) = 0;
-  // What a fault code of poll means, in the maker's terms.
+  // What a fault code of poll means; "" for 0.
   virtual std::string fault_text(std::uint8_t fault) const = 0;
 };
 
 struct GripperWay {
-  std::string model; // one of gripper_models()
-  std::string port;  // of a serial line
-  int slave = 0;     // 0: the model's usual
+  std::string model = {}; // one of gripper_models()
+  std::string port = {};  // of a serial line
+  int slave = 0;          // 0: the model's usual
+  // Positions that the gripper tells when its pads touch and when it is open; empty: the model's
+  // usual. Of a Robotiq 0 to 255, of a servo 0 to 4095, which may turn either way.
+  std::optional<int> closed_count = {}, open_count = {};
+  double jaw_mm = 100.0;   // of a servo: from its axis to the middle of the pad
+  double timeout_s = 0.05; // of one exchange, from 5 ms to 10 s
 };
 
+// Each with its usual counts and jaw.
 std::vector<GripperTraits> gripper_models();
-// Throws Error: an unknown model.
+// Throws Error: bad_value, an unknown model.
 const GripperTraits &gripper_traits(const std::string &model);
 
-// Throws Error: an unknown model, a port that cannot be opened, no answer.
+// Asks it for its status, commands nothing. Throws Error besides: bad_value, an unknown model or
+// counts that cannot be; no_port, not_a_port, port_in_use, permission_denied, cannot_open. Takes up
+// to five exchanges.
 std::unique_ptr<Gripper> open_gripper(const GripperWay &way);
 
 } // namespace fingertip

@@ -8,6 +8,8 @@ _fingertip() {
       --device) words=$(fingertip list 2> /dev/null | cut -f 1) ;;
       --transport) words='auto socket serial usb' ;;
       --colour) words='auto truecolour 256 plain' ;;
+      --model) words='2f85 2f140 hande sts3215' ;;
+      gripper) [ "$COMP_CWORD" -eq 2 ] && words='list info move open close' ;;
     esac
     if [ -z "$words" ] && [ "${current#-}" != "$current" ]; then
       words=$(fingertip "${COMP_WORDS[1]}" --help 2> /dev/null | grep -o -- '--[a-z][a-z-]*')

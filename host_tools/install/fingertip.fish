@@ -3,5 +3,7 @@ complete -c fingertip -n __fish_use_subcommand -f \
   -a "(fingertip --help | sed -n '/^Subcommands:/,\$s/^  \([a-z]*\) .*/\1/p')"
 complete -c fingertip -n 'not __fish_use_subcommand' -l device -x -a "(fingertip list 2> /dev/null | cut -f 1)"
 complete -c fingertip -n 'not __fish_use_subcommand' -l transport -x -a 'auto socket serial usb'
+complete -c fingertip -n '__fish_seen_subcommand_from gripper' -f -a 'list info move open close'
+complete -c fingertip -n '__fish_seen_subcommand_from gripper' -l model -x -a '2f85 2f140 hande sts3215'
 complete -c fingertip -n 'not __fish_use_subcommand' -n 'string match -q -- "-*" (commandline -ct)' \
   -a "(fingertip (commandline -opc)[2] --help 2> /dev/null | grep -o -- '--[a-z][a-z-]*')"

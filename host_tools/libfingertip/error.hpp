@@ -40,6 +40,11 @@ enum class ErrorCode {
   not_now,         /* refused: in the state that it is in */
   refused,         /* for a reason that is newer than this library */
 
+  /* Grippers. */
+  gripper_silent,  /* no answer in time */
+  gripper_garbled, /* an answer that is none: damaged, of another slave, to another question */
+  gripper_refused, /* it says no */
+
   /* Values. */
   bad_value, /* the text says which are good */
 

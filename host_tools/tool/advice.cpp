@@ -60,6 +60,14 @@ std::string advice(ErrorCode code) {
     return "see that its sensors answer and nothing is being stored (fingertip info)";
   case ErrorCode::refused:
     return "update these tools";
+  case ErrorCode::gripper_silent:
+    return "is it powered, its cable right, --model, --port and --slave its own? "
+           "(fingertip gripper list)";
+  case ErrorCode::gripper_garbled:
+    return "look for a second program or device on its line, loose cables, a missing terminator, "
+           "another --model";
+  case ErrorCode::gripper_refused:
+    return "see that --model is its own, turn its power off and on";
   case ErrorCode::cannot_write:
     return "choose another place";
   case ErrorCode::file_exists:
@@ -94,6 +102,21 @@ std::string advice(ErrorCode code) {
     break;
   }
   return "";
+}
+
+std::string gripper_advice(ErrorCode code) {
+  switch (code) {
+  case ErrorCode::no_port:
+    return "plug its adapter in, then see `fingertip gripper list`";
+  case ErrorCode::not_a_port:
+    return "see `fingertip gripper list`";
+  case ErrorCode::permission_denied:
+    return "let your user use serial ports: sudo adduser $USER dialout, then log in again";
+  case ErrorCode::port_in_use:
+    return "end that one first (lsof names it)";
+  default:
+    return advice(code);
+  }
 }
 
 std::string told(const Error &error) {

@@ -17,6 +17,7 @@ void add_calibrate(CommandLine &line);
 void add_pad(CommandLine &line);
 void add_set(CommandLine &line);
 void add_loader(CommandLine &line);
+void add_gripper(CommandLine &line);
 void add_flash(CommandLine &line);
 void add_rule(CommandLine &line);
 void add_encode(CommandLine &line);

@@ -32,8 +32,9 @@ ordered_json percent(std::size_t part, std::size_t whole) {
 }
 
 ordered_json summary(const std::vector<const Done *> &all, bool still) {
-  std::size_t drops = 0, never = 0, slips = 0, unanswered = 0, cycles = 0, unsettled = 0;
-  std::vector<double> margin, reaction_ms, slid_mm, disturbed_mm, peak_N, holding_s, settle_s, rms;
+  std::size_t drops = 0, never = 0, unanswered = 0, cycles = 0, unsettled = 0;
+  std::vector<double> margin, reaction_ms, later_ms, slid_mm, disturbed_mm, peak_N, holding_s,
+      settle_s, rms;
   for (const Done *one : all) {
     const Outcome &o = one->outcome;
     drops += o.dropped ? 1 : 0;
@@ -49,10 +50,13 @@ ordered_json summary(const std::vector<const Done *> &all, bool still) {
       continue;
     }
     holding_s.push_back(o.holding_s);
-    for (const auto &reaction : o.reactions_s) {
-      slips++;
-      unanswered += reaction ? 0 : 1;
-      reaction_ms.push_back(reaction ? 1e3 * *reaction : std::numeric_limits<double>::infinity());
+    for (const Slip &slip : o.slips) {
+      unanswered += slip.reaction_s ? 0 : 1;
+      const double ms = 1e3 * slip.reaction_s.value_or(std::numeric_limits<double>::infinity());
+      reaction_ms.push_back(ms);
+      if (slip.begin_s > one->scene.lift_s) {
+        later_ms.push_back(ms);
+      }
     }
     if (o.held) {
       margin.push_back(o.margin);
@@ -79,10 +83,12 @@ ordered_json summary(const std::vector<const Done *> &all, bool still) {
   out["margin_p50"] = quantile(margin, 0.5);
   out["margin_p5"] = quantile(margin, 0.05);
   out["margin_p95"] = quantile(margin, 0.95);
-  out["slips"] = slips;
+  out["slips"] = reaction_ms.size();
   out["unanswered"] = unanswered;
   out["reaction_p50_ms"] = quantile(reaction_ms, 0.5);
   out["reaction_p95_ms"] = quantile(reaction_ms, 0.95);
+  out["slips_after_lift"] = later_ms.size();
+  out["reaction_after_lift_p50_ms"] = quantile(later_ms, 0.5);
   out["slid_p50_mm"] = quantile(slid_mm, 0.5);
   out["slid_p95_mm"] = quantile(slid_mm, 0.95);
   out["disturbance_slip_p95_mm"] = quantile(disturbed_mm, 0.95);
@@ -169,10 +175,13 @@ ordered_json line_of(std::uint64_t n, const Done &one) {
   line["disturbance_slip_mm"] = rounded(o.disturbance_slip_mm);
   line["turned_deg"] = rounded(o.turned_rad * 180.0 / M_PI);
   line["peak_N"] = rounded(o.peak_N);
-  line["reactions_ms"] = ordered_json::array();
-  for (const auto &reaction : o.reactions_s) {
-    line["reactions_ms"].push_back(reaction ? ordered_json(rounded(1e3 * *reaction))
-                                            : ordered_json(nullptr));
+  line["slips"] = ordered_json::array();
+  for (const Slip &slip : o.slips) {
+    line["slips"].push_back(
+        {{"begin_s", rounded(slip.begin_s)},
+         {"way_mm", rounded(slip.way_mm)},
+         {"reaction_ms", slip.reaction_s ? ordered_json(rounded(1e3 * *slip.reaction_s))
+                                         : ordered_json(nullptr)}});
   }
   line["settle_s"] = o.settle_s ? ordered_json(rounded(*o.settle_s)) : ordered_json(nullptr);
   line["rms_percent"] = rounded(100.0 * o.rms);

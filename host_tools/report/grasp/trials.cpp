@@ -1,6 +1,7 @@
 #include "grasp/trials.hpp"
 
 #include "libfingertip/text.hpp"
+#include "twin/table_file.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -19,7 +20,7 @@ namespace {
 
 constexpr double FORCE_GAIN_SD = 0.05; // of a calibrated fingertip's force scale
 constexpr double LAYER_mm = 12.0;
-constexpr std::size_t CALIBRATED = 400; // as many pads judged have forty calibrations in turn
+constexpr std::size_t CALIBRATIONS = 40;
 constexpr double FAST_Hz = 600.0;
 enum Stream : std::uint64_t { PADS = 831, NOISE, SET };
 
@@ -62,6 +63,40 @@ void change(grip_settings &settings, const std::string &changes) {
   }
 }
 
+// A calibration takes half a second, so they are kept; the first of them is gone through anyway,
+// and tells whether the others still are what they would be.
+truth::CalibratedPads pads_of(std::uint64_t seed, const std::string &cache) {
+  constexpr std::size_t PER_CALIBRATION = 10; // truth::calibrated_pads
+  constexpr std::size_t VALUES = 2 * truth::SENSORS;
+  const auto values_of = [](const truth::CalibratedPads &pads) {
+    std::vector<float> values;
+    for (const truth::Pad &pad : pads) {
+      for (const truth::Readings *part : {&pad.gain, &pad.gain_sd}) {
+        for (const double value : *part) {
+          values.push_back(static_cast<float>(value));
+        }
+      }
+    }
+    return values;
+  };
+  const std::string key = "calibrated-pads seed " + std::to_string(seed);
+  const twin::TableFile file(cache, "calibrated-pads", key);
+  std::vector<float> values(CALIBRATIONS * VALUES);
+  const std::vector<float> first = values_of(truth::calibrated_pads(PER_CALIBRATION, seed, cache));
+  if (!file.read(values) || !std::equal(first.begin(), first.end(), values.begin())) {
+    values = values_of(truth::calibrated_pads(PER_CALIBRATION * CALIBRATIONS, seed, cache));
+    file.write(values);
+  }
+  truth::CalibratedPads pads(CALIBRATIONS);
+  for (std::size_t i = 0; i < CALIBRATIONS; i++) {
+    for (std::size_t k = 0; k < truth::SENSORS; k++) {
+      pads[i].gain[k] = static_cast<double>(values[i * VALUES + k]);
+      pads[i].gain_sd[k] = static_cast<double>(values[i * VALUES + truth::SENSORS + k]);
+    }
+  }
+  return pads;
+}
+
 std::vector<std::string> names_of(const std::string &objects) {
   if (objects.find_first_of("0123456789_") == std::string::npos) {
     return faces_of(objects);
@@ -91,7 +126,7 @@ Set::Set(const SetOptions &options)
   for (const std::string &name : faces_) {
     all_.emplace(name, Face(name, LAYER_mm, options.cache));
   }
-  pads_ = truth::calibrated_pads(CALIBRATED, options.seed, options.cache);
+  pads_ = pads_of(options.seed, options.cache);
 }
 
 Trial Set::trial(std::uint64_t n) const {

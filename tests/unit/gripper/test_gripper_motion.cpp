@@ -21,6 +21,7 @@ GripperMotion activated(const char *model) {
   motion.activate();
   run(motion, motion.mechanics().activation_s + 0.01);
   EXPECT_TRUE(motion.active());
+  EXPECT_FALSE(motion.moving());
   return motion;
 }
 
@@ -190,6 +191,22 @@ TEST(GripperMotion, WithoutPowerTheFingersStay) {
   run(motion, 1.0);
   EXPECT_EQ(motion.width_mm(), stands_mm);
   EXPECT_FALSE(motion.status().active);
+}
+
+TEST(GripperMotion, TheSameCommandAgainIsNone) {
+  GripperMotion motion = activated("2f85");
+  motion.blocked_at = spring(40, 10);
+  const GripperMove grip = {.width_mm = 0, .speed_mm_s = 100, .force_N = 30};
+  motion.move(grip);
+  run(motion, 1.0);
+  motion.move(grip);
+  EXPECT_FALSE(motion.moving());
+  EXPECT_EQ(motion.status().object, true);
+  motion.move({.width_mm = 85, .speed_mm_s = 100, .force_N = 30});
+  EXPECT_TRUE(motion.moving());
+  motion.move(grip);
+  run(motion, 1.0);
+  EXPECT_EQ(motion.status().object, true);
 }
 
 TEST(GripperMotion, TheSameAtAnyStep) {

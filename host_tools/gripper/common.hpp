@@ -1,0 +1,28 @@
+// What all grippers check and tell alike.
+#pragma once
+
+#include "gripper/gripper.hpp"
+
+#include <cstdint>
+#include <string>
+
+namespace fingertip {
+
+// Throws Error: bad_value.
+void check_move(const GripperMove &move);
+
+// way with all that it left to the model. Throws Error: bad_value; counts go from 0 to most_count.
+struct GripperUsual {
+  int slave, most_slave, closed_count, open_count, most_count;
+};
+GripperWay complete(GripperWay way, const GripperUsual &usual);
+
+Error silent(const GripperWay &complete);
+
+// "; the USB adapter's latency timer ..." where that limits the rate of a command, which takes so
+// many exchanges; "" where it does not.
+std::string limited_by(const std::string &port, int exchanges);
+
+std::int64_t steady_us();
+
+} // namespace fingertip

@@ -1,0 +1,278 @@
+#include "gripper/robotiq.hpp"
+
+#include "gripper/common.hpp"
+#include "gripper/robotiq_registers.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <modbus.h>
+#include <thread>
+
+namespace fingertip {
+
+using namespace robotiq;
+
+namespace {
+
+constexpr std::uint32_t GAP_us = 20'000; // within an answer: more than a latency timer of 16 ms
+// The manuals ask for 5 ms between commands.
+constexpr std::chrono::milliseconds PAUSE{5};
+constexpr int RESET_READS = 10;
+constexpr int BOTH_TRIES = 2;
+
+constexpr GripperUsual USUAL = {.slave = SLAVE,
+                                .most_slave = 247,
+                                .closed_count = CLOSED_COUNT,
+                                .open_count = OPEN_COUNT,
+                                .most_count = 255};
+
+Error gripper_error(const GripperWay &way, int error) {
+  const std::string &port = way.port;
+  switch (error) {
+  case ETIMEDOUT:
+    return silent(way);
+  case EMBBADCRC:
+    return Error(ErrorCode::gripper_garbled, port + ": an answer is damaged (CRC)");
+  case EMBBADSLAVE:
+    return Error(ErrorCode::gripper_garbled, port + ": another slave answers");
+  case EMBBADDATA:
+  case EMBMDATA:
+  case EMBBADEXC:
+    return Error(ErrorCode::gripper_garbled,
+                 port + ": an answer is not one to the question, or none of a gripper");
+  case EIO:
+  case EBADF:
+  case ENXIO:
+  case ENODEV:
+  case ECONNRESET:
+    return Error(ErrorCode::gone, port + ": gone");
+  default:
+    if (error > MODBUS_ENOBASE) {
+      return Error(ErrorCode::gripper_refused, port + ": refused with Modbus exception " +
+                                                   std::to_string(error - MODBUS_ENOBASE) + " (" +
+                                                   modbus_strerror(error) + ")");
+    }
+    return Error(ErrorCode::gone, port + ": " + modbus_strerror(error));
+  }
+}
+
+std::uint16_t share(double value, double least, double most) {
+  const double clamped = std::clamp(value, least, most);
+  return static_cast<std::uint16_t>(std::lround((clamped - least) / (most - least) * 255.0));
+}
+
+GripperWay robotiq_way(const GripperWay &given) {
+  const GripperWay way = complete(given, USUAL);
+  if (way.open_count > way.closed_count) {
+    throw Error(ErrorCode::bad_value, "the count of a Robotiq gripper grows while it closes");
+  }
+  return way;
+}
+
+} // namespace
+
+RobotiqGripper::RobotiqGripper(const GripperWay &given)
+    : traits_(gripper_traits(given.model)), way_(robotiq_way(given)), line_(way_.port, BAUD),
+      modbus_(modbus_new_rtu(way_.port.c_str(), BAUD, 'N', 8, 1)) {
+  if (modbus_ == nullptr) {
+    throw std::bad_alloc();
+  }
+  traits_.step_mm = traits_.stroke_mm / (*way_.closed_count - *way_.open_count);
+  modbus_set_slave(modbus_, way_.slave);
+  modbus_set_socket(modbus_, line_.descriptor());
+  const auto timeout_us = static_cast<std::uint32_t>(way_.timeout_s * 1e6);
+  modbus_set_response_timeout(modbus_, timeout_us / 1'000'000, timeout_us % 1'000'000);
+  modbus_set_byte_timeout(modbus_, 0, GAP_us);
+  try {
+    try {
+      read_status();
+    } catch (const Error &error) {
+      if (error.code() == ErrorCode::gone) {
+        throw;
+      }
+      read_function_ = 3;
+      read_status();
+    }
+  } catch (...) {
+    modbus_free(modbus_);
+    throw;
+  }
+}
+
+RobotiqGripper::~RobotiqGripper() {
+  modbus_free(modbus_); // the descriptor is the line's
+}
+
+void RobotiqGripper::exchange(const std::function<int()> &ask) {
+  if (line_.descriptor() < 0) {
+    throw gripper_error(way_, EIO);
+  }
+  line_.drop_input();
+  began_us_ = steady_us();
+  if (ask() < 0) {
+    const int error = errno;
+    // Whoever answers late answers the next question.
+    doubtful_ = true;
+    throw gripper_error(way_, error);
+  }
+}
+
+// Answers have no number: a late one to a read of three registers would pass for that to the next.
+// One register is asked for until its answer comes, which no late one looks like.
+void RobotiqGripper::make_sure() {
+  for (int left = 2; doubtful_; left--) {
+    std::uint16_t one;
+    try {
+      exchange([&] { return read(1, &one); });
+      doubtful_ = false;
+    } catch (const Error &error) {
+      if (left == 0 || error.code() != ErrorCode::gripper_garbled) {
+        throw;
+      }
+    }
+  }
+}
+
+int RobotiqGripper::read(int count, std::uint16_t *to) {
+  return read_function_ == 4 ? modbus_read_input_registers(modbus_, STATUS_REGISTER, count, to)
+                             : modbus_read_registers(modbus_, STATUS_REGISTER, count, to);
+}
+
+GripperStatus RobotiqGripper::read_status() {
+  make_sure();
+  Registers registers;
+  exchange([&] { return read(REGISTERS, registers.data()); });
+  return told(registers);
+}
+
+GripperStatus RobotiqGripper::told(const Registers &registers) {
+  const int gsta = registers[0] >> gSTA_SHIFT & 3, gobj = registers[0] >> gOBJ_SHIFT & 3;
+  goes_ = (registers[0] & gGTO) != 0;
+  active_ = (registers[0] & gACT) != 0 && gsta == ACTIVATED;
+  GripperStatus status;
+  status.host_us = (began_us_ + steady_us()) / 2;
+  status.active = active_;
+  status.moving = gsta == ACTIVATING || (active_ && goes_ && gobj == IN_MOTION);
+  if (active_ && goes_ && gobj != IN_MOTION) {
+    status.object = gobj != AT_REQUEST;
+  }
+  const int count = registers[2] >> 8;
+  status.width_mm =
+      std::clamp((*way_.closed_count - count) * traits_.step_mm, 0.0, traits_.stroke_mm);
+  status.current_A = (registers[2] & 0xFF) * AMPERE_PER_COUNT;
+  status.fault = static_cast<std::uint8_t>(registers[1] >> 8 & 0xF);
+  return status;
+}
+
+void RobotiqGripper::write(int address, int count, const std::uint16_t *values) {
+  exchange([&] { return modbus_write_registers(modbus_, address, count, values); });
+}
+
+void RobotiqGripper::activate() {
+  make_sure();
+  const Registers reset = {0, 0, 0}, set = {rACT, 0, 0};
+  write(COMMAND_REGISTER, REGISTERS, reset.data());
+  // Only a rise of rACT activates: it must have seen the reset.
+  std::uint16_t status = gACT;
+  for (int i = 0; i < RESET_READS && (status & gACT); i++) {
+    std::this_thread::sleep_for(PAUSE);
+    exchange([&] { return read(1, &status); });
+  }
+  if (status & gACT) {
+    throw Error(ErrorCode::gripper_refused, line_.path() + ": does not reset");
+  }
+  write(COMMAND_REGISTER, REGISTERS, set.data());
+  goes_ = active_ = false;
+}
+
+GripperStatus RobotiqGripper::poll() {
+  return read_status();
+}
+
+GripperStatus RobotiqGripper::move(const GripperMove &move) {
+  check_move(move);
+  // At an end all that there is: its count differs from one gripper to the next.
+  const int count =
+      move.width_mm <= 0 ? 255
+      : move.width_mm >= traits_.stroke_mm
+          ? 0
+          : static_cast<int>(std::lround(*way_.closed_count - move.width_mm / traits_.step_mm));
+  const Registers command = {
+      rACT | rGTO, static_cast<std::uint16_t>(count),
+      static_cast<std::uint16_t>(
+          share(move.speed_mm_s, traits_.speed_min_mm_s, traits_.speed_max_mm_s) << 8 |
+          share(move.force_N, traits_.force_min_N, traits_.force_max_N))};
+  make_sure();
+  if (!goes_) {
+    const GripperStatus now = read_status();
+    if (!active_) {
+      return now;
+    }
+    if (!goes_) {
+      write(COMMAND_REGISTER, REGISTERS, command.data());
+      return read_status();
+    }
+  }
+  if (both_at_once_) {
+    Registers registers;
+    try {
+      exchange([&] {
+        return modbus_write_and_read_registers(modbus_, COMMAND_REGISTER + 1, REGISTERS - 1,
+                                               command.data() + 1, STATUS_REGISTER, REGISTERS,
+                                               registers.data());
+      });
+      both_worked_ = true;
+      return told(registers);
+    } catch (const Error &error) {
+      const bool refused = error.code() == ErrorCode::gripper_refused;
+      if (both_worked_ || !(refused || error.code() == ErrorCode::gripper_silent)) {
+        throw;
+      }
+      both_failed_++;
+    }
+    make_sure(); // it is there, but does not answer this
+    both_at_once_ = both_failed_ < BOTH_TRIES;
+  }
+  write(COMMAND_REGISTER + 1, REGISTERS - 1, command.data() + 1);
+  return read_status();
+}
+
+std::string RobotiqGripper::line() const {
+  std::string text = "Modbus RTU at " + std::to_string(BAUD) + " baud, slave " +
+                     std::to_string(way_.slave) + ", function " +
+                     (both_at_once_ ? "23" : "16 and " + std::to_string(read_function_));
+  return text + limited_by(line_.path(), both_at_once_ ? 1 : 2);
+}
+
+std::string RobotiqGripper::fault_text(std::uint8_t fault) const {
+  switch (fault) {
+  case NO_FAULT:
+    return "";
+  case ACTION_DELAYED:
+    return "a move came before activation was complete";
+  case NOT_ACTIVATED:
+    return "a move came without activation";
+  case OVERHEATED:
+    return "too hot, it must cool down";
+  case NO_COMMUNICATION:
+    return "nobody spoke to it for a second";
+  case UNDERVOLTAGE:
+    return "its supply is too low; needs activation";
+  case RELEASING:
+    return "automatic release goes on";
+  case INTERNAL_FAULT:
+    return "internal fault; needs activation";
+  case ACTIVATION_FAULT:
+    return "activation failed, something was in its way; needs activation";
+  case OVERCURRENT:
+    return "too much current; needs activation";
+  case RELEASED:
+    return "automatic release is complete; needs activation";
+  default:
+    return "a fault that its manual does not have";
+  }
+}
+
+} // namespace fingertip

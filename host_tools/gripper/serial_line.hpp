@@ -1,0 +1,44 @@
+// The serial line of a gripper, and what the adapter in between does to its rate.
+#pragma once
+
+#include "libfingertip/serial_transport.hpp"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace fingertip {
+
+class SerialLine {
+public:
+  // 8N1, held exclusively. Throws Error: the port is absent, in use, not allowed, no serial port,
+  // or does not go that fast.
+  SerialLine(const std::string &path, unsigned baud);
+
+  SerialTransport &transport() { return transport_; }
+  const std::string &path() const { return path_; }
+  // Of libmodbus; -1 once the port vanished.
+  int descriptor() const;
+  // Forgets what came and was not read.
+  void drop_input();
+
+private:
+  std::string path_;
+  SerialTransport transport_;
+};
+
+// Milliseconds that a USB adapter holds back an answer that does not fill a packet; empty where its
+// driver tells none. 16 is the usual: an exchange then takes as long, and 62 are made a second.
+// root: where to look for sys/, "/" but in tests.
+std::optional<int> latency_timer_ms(const std::string &port, const std::string &root = "/");
+
+struct GripperPort {
+  std::string path;    // the stable name where there is one
+  std::string adapter; // maker and product as USB tells them; empty: unknown
+  std::optional<int> latency_timer_ms;
+};
+
+// Serial ports on USB that are no fingertip, sorted by path. Nothing is opened.
+std::vector<GripperPort> find_gripper_ports(const std::string &root = "/");
+
+} // namespace fingertip

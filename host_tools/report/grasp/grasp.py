@@ -1,0 +1,151 @@
+#!/usr/bin/python3
+"""Grasps of the controller in the simulated cell: what it drops, how hard it grips, how soon it answers a slip.
+
+    grasp.py --build build/host -o build/report
+
+    grasp.json    the figures by which it is judged, with their goals; a row for each set of grasps
+    grasp.md      the same to read
+    grasp.png     the same to look at, and a slip that is caught
+
+The controller and the fingertips' code are the firmware's own; rubber, objects, sensors and grippers are simulated (host_tools/cell,
+whose headers say what is assumed). The controller's constants were chosen with seeds below 1000; those here are others, and so are the
+pads. Nothing has been checked on hardware.
+"""
+import json
+import pathlib
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+
+import grasp_report  # noqa: E402
+from fingertip_files import InputError, run_tool  # noqa: E402
+from goals import judge  # noqa: E402
+from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
+
+SEED = 1001
+GRIPPERS = {"2f85": "2f85", "sts3215": "servo", "ideal": "ideal"}  # and what the figures call it
+# Of three grippers: 0.374 mm and 25 ms, 0.153 mm and 8 ms, 0.01 mm and 3 ms.
+LIMITS = {
+    "drops_percent": (1, 0.5, 0.2), "margin_median": (2.6, 2.2, 1.8), "reaction_ms": (41, 25, 16), "disturbance_slip_p95_mm": (3, 3, 3),
+    "settle_s": (1.2, 0.3, None), "hold_rms_percent": (5, 1.5, None), "drops_without_load_percent": (5, 2.2, 1), "drops_flats_percent": (5, 5, 5)}
+GOALS = tuple((f"{name}_{called}", "<=", limit) for name, limits in LIMITS.items() for called, limit in zip(GRIPPERS.values(), limits)
+              if limit is not None) + (("limit_cycles", "<=", 0),)
+# set: what it is, its options, whether it is judged; all are of each gripper
+SETS = {
+    "hold": ("round objects at 410 frames a second", (), True),
+    "half": ("the same, half of a load's field acts on the readings", ("--effect", "0.5"), True),
+    "without": ("the same, no load can be felt", ("--effect", "0"), True),
+    "flats": ("flats larger than the pad", ("--objects", "flats"), True),
+    "faces": ("flat faces within the pad", ("--objects", "faces"), False),
+    "hold_20": ("20 frames a second", ("--rate", "20"), False),
+    "hold_100": ("100 frames a second", ("--rate", "100"), False),
+    "hold_1308": ("1308 frames a second, OSR 256", ("--rate", "1308"), False),
+    "fixed": ("a set force of 6 N, eq. (5) and (6)", ("--mode", "fixed", "--set", "set_mN=6000"), False),
+    "fixed_20": ("the same at the paper's 20 Hz", ("--mode", "fixed", "--rate", "20", "--set", "set_mN=6000,control_us=50000"), False),
+    "still": ("a set force of 2 to 12 N held for 12 s, nothing pulls", ("--mode", "still"), False),
+    "minute": ("the same for 60 s", ("--mode", "still", "--still", "60"), False),
+}
+GRASPS, GRASPS_MORE, GRASPS_MINUTE = 1500, 300, 60
+USUAL, USUAL_MORE, USUAL_MINUTE = 150, 40, 10
+# From a set's row to the judged figures.
+FROM = {
+    "hold": (("drops_percent", "drops_percent"), ("margin_median", "margin_p50"), ("reaction_ms", "reaction_p50_ms"),
+             ("disturbance_slip_p95_mm", "disturbance_slip_p95_mm")),
+    "still": (("settle_s", "settle_p50_s"), ("hold_rms_percent", "rms_p50_percent")),
+    "without": (("drops_without_load_percent", "drops_percent"),), "flats": (("drops_flats_percent", "drops_percent"),)}
+QUANTILES = [share / 200 for share in range(201)]
+
+
+def count_of(name, options):
+    if options.grasps:
+        return options.grasps
+    judged = SETS[name][2]
+    if name == "minute":
+        return USUAL_MINUTE if options.usual else GRASPS_MINUTE
+    return (USUAL if judged else USUAL_MORE) if options.usual else (GRASPS if judged else GRASPS_MORE)
+
+
+def trials(options, gripper, more):
+    program = pathlib.Path(options.build) / "host_tools/report/grasp/fingertip_grasp_trials"
+    if not program.is_file():
+        raise InputError(f"{program} is not there; build it: cmake --build --preset host")
+    tables = pathlib.Path(options.output) / "contact_tables"
+    text = run(program, "--gripper", gripper, "--seed", options.seed, "--cache", tables, *more)
+    try:
+        return json.loads(text)
+    except ValueError as error:
+        raise InputError(f"fingertip_grasp_trials wrote no JSON ({error})") from None
+
+
+def quantiles(values):
+    """Of values and of what never came, which is None, at QUANTILES; None where it is that."""
+    values = sorted(float("inf") if value is None else value for value in values)
+    found = [values[round(share * (len(values) - 1))] for share in QUANTILES] if values else []
+    return [None if value == float("inf") else value for value in found]
+
+
+def caught(each):
+    """Number of the grasp whose slip of 1 mm or more went furthest but was answered within 0.1 s, and when that slip began."""
+    slips = [(slip["way_mm"], grasp["n"], slip["begin_s"]) for grasp in each if not grasp["dropped"]
+             for slip in grasp["slips"] if slip["way_mm"] >= 1 and slip["reaction_ms"] is not None and slip["reaction_ms"] < 100]
+    _, number, begin_s = max(slips, default=(0, None, None))
+    return number, begin_s
+
+
+def row_of(name, gripper, options):
+    about, more, _ = SETS[name]
+    found = trials(options, gripper, (*more, "--count", count_of(name, options), *(("--each",) if name == "hold" else ())))
+    row = {"set": name, "gripper": gripper, "about": about, **{key: value for key, value in found.items() if not isinstance(value, (dict, list))
+                                                               and key not in ("mode", "objects", "seed", "effect", "prepared_s", "ran_s")}}
+    row["set"] = name
+    return row, found
+
+
+def measure(options):
+    steps = Steps()
+    found = {"simulated": True, "grasp_seed": options.seed, "rows": []}
+    for name, (about, *_) in SETS.items():
+        for gripper, called in GRIPPERS.items():
+            row, all_of_it = row_of(name, gripper, options)
+            found["rows"].append(row)
+            steps.say(f"{gripper}, {about}: {row['grasps']} grasps")
+            for figure, key in FROM.get(name, ()):
+                found[f"{figure}_{called}"] = row[key]
+            if name == "minute":
+                found["limit_cycles"] = found.get("limit_cycles", 0) + row["limit_cycles"]
+            if name == "hold":
+                each = all_of_it["each"]
+                for group in ("by_object", "by_friction", "by_mass", "by_disturbance"):
+                    found.setdefault(group, []).extend({"gripper": gripper, group[3:]: key, **value} for key, value in all_of_it[group].items())
+                found.setdefault("distributions", []).append({
+                    "gripper": gripper, "margin": quantiles([one["margin"] for one in each if not one["dropped"]]),
+                    "slid_mm": quantiles([one["slid_mm"] for one in each if not one["dropped"]]),
+                    "reaction_ms": quantiles([slip["reaction_ms"] for one in each for slip in one["slips"]])})
+                number, begin_s = caught(each)
+                if "caught" not in found and number is not None:
+                    found["caught"] = {"gripper": gripper, "begin_s": begin_s, **trials(options, gripper, ("--trace", number))}
+    return found
+
+
+def main(argv):
+    parser = option_parser(__doc__)
+    parser.add_argument("--seed", type=int, default=SEED, metavar="N", help="1000 or more; default %(default)s")
+    parser.add_argument("--usual", action="store_true", help="a tenth of the grasps")
+    parser.add_argument("--grasps", type=int, metavar="N", help="of each row")
+    options = parser.parse_args(argv)
+    if options.seed < 1000:
+        raise InputError("seeds below 1000 are those that constants were chosen by")
+    if options.grasps is not None and options.grasps < 1:
+        raise InputError("--grasps needs 1 or more")
+    out = output_folder(options)
+    found = {name: None for name, _, _ in GOALS}
+    found = judge(found | measure(options), GOALS)
+    write_json(out / "grasp.json", found)
+    grasp_report.write(found, out / "grasp.md")
+    grasp_report.draw(found, out / "grasp.png")
+    return finish(found, options, ("grasp.json", "grasp.md", "grasp.png"))
+
+
+if __name__ == "__main__":
+    sys.exit(run_tool("grasp.py", main))

@@ -1,0 +1,93 @@
+"""grasp.py with a program in the place of the trials: what it asks for, judges, writes and refuses."""
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+# Drops 0.5 %, grips 2.0 times what is needed, but a gripper of the fine steps; slips are caught in 30 ms.
+TRIALS = '''
+import json, sys
+options = dict(zip(sys.argv[1::2], sys.argv[2::2]))
+still = options.get("--mode") == "still"
+row = {"gripper": options["--gripper"], "grasps": int(options.get("--count", 1)), "peak_p95_N": 15.0}
+if still:
+    row |= {"settle_p50_s": 0.4, "settle_p95_s": 1.0, "never_settled_percent": 0.0, "rms_p50_percent": 1.0, "limit_cycles": 1}
+else:
+    row |= {"drops_percent": 4.0 if options.get("--effect") == "0" else 0.5, "margin_p50": 2.0, "margin_p5": 1.2, "margin_p95": 3.0, "slips": 2, "unanswered": 1,
+            "reaction_p50_ms": 30.0, "reaction_p95_ms": None, "disturbance_slip_p95_mm": 1.0}
+group = {"sphere15": dict(row)}
+grasp = {"n": 7, "face": "sphere15", "mass_kg": 0.3, "friction": 0.5, "lift_s": 0.2, "disturbances": ["jerk"], "dropped": False, "margin": 2.0, "slid_mm": 2.0,
+         "slips": [{"begin_s": 1.0, "way_mm": 2.0, "reaction_ms": 30.0}]}
+if "--trace" in options:
+    names = ("width_mm", "force_N", "least_N", "load_N", "way_mm", "slid_mm", "slips", "felt_N")
+    times = [i * 0.002 for i in range(1000)]
+    row = {**grasp, "series": {"t_s": times, "lift_s": [t - 0.3 for t in times], **{name: [1.0] * 1000 for name in names}}}
+else:
+    row |= {"by_object": group, "by_friction": group, "by_mass": group, "by_disturbance": group, "prepared_s": 1.0, "ran_s": 1.0}
+    if "--each" in sys.argv:
+        row["each"] = [grasp, {**grasp, "n": 8, "dropped": True, "slips": [{"begin_s": 1.0, "way_mm": 21.0, "reaction_ms": None}]}]
+print(json.dumps(row))
+'''
+
+
+class Grasp(unittest.TestCase):
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        self.folder = pathlib.Path(temporary.name)
+        self.out = self.folder / "out"
+        self.program(TRIALS)
+
+    def program(self, body):
+        path = self.folder / "host_tools/report/grasp/fingertip_grasp_trials"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"#!{sys.executable}\n{body}\n")
+        path.chmod(0o755)
+
+    def run_tool(self, *options):
+        return subprocess.run([sys.executable, str(ROOT / "host_tools/report/grasp/grasp.py"), "--build", str(self.folder), "-o", str(self.out), *options],
+                              capture_output=True, text=True)
+
+    def test_sets_are_judged(self):
+        done = self.run_tool("--usual")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        found = json.loads((self.out / "grasp.json").read_text())
+        met = {name: goal["met"] for name, goal in found["goals"].items()}
+        for name in ("drops_percent_2f85", "margin_median_2f85", "margin_median_servo", "reaction_ms_2f85", "settle_s_2f85", "hold_rms_percent_servo", "drops_flats_percent_ideal",
+                     "drops_without_load_percent_2f85"):
+            self.assertIs(met[name], True, name)
+        for name in ("drops_percent_ideal", "margin_median_ideal", "reaction_ms_servo", "settle_s_servo", "drops_without_load_percent_servo", "limit_cycles"):
+            self.assertIs(met[name], False, name)
+        self.assertEqual(found["limit_cycles"], 3)
+        self.assertTrue(found["simulated"])
+        grasps = {(row["set"], row["gripper"]): row["grasps"] for row in found["rows"]}
+        self.assertEqual((len(grasps), grasps["hold", "2f85"], grasps["hold_20", "ideal"]), (36, 150, 40))
+        self.assertEqual(found["caught"]["n"], 7)
+        self.assertIsNone(found["distributions"][0]["reaction_ms"][-1])
+        self.assertEqual((self.out / "grasp.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual(self.run_tool("--usual", "--check").returncode, 1)
+
+    def test_what_is_written_to_read(self):
+        self.run_tool("--grasps", "5")
+        text = (self.out / "grasp.md").read_text()
+        for words in ("Simulated rubber", "Nothing was checked on hardware", "no load can be felt", "## By friction", "MISSED", "## Set forces"):
+            self.assertIn(words, text)
+
+    def test_refusals(self):
+        for options, words in ((("--seed", "5"), "seeds below 1000"), (("--grasps", "0"), "--grasps")):
+            done = self.run_tool(*options)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)
+            self.assertIn(words, done.stderr)
+        self.program("print('no')")
+        self.assertIn("wrote no JSON", self.run_tool("--grasps", "1").stderr)
+        self.program("import sys; sys.exit('the cell is on fire')")
+        self.assertIn("on fire", self.run_tool("--grasps", "1").stderr)
+        (self.folder / "host_tools/report/grasp/fingertip_grasp_trials").unlink()
+        self.assertIn("is not there", self.run_tool("--grasps", "1").stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,222 @@
+#include "cell/felt_finger.hpp"
+#include "cell/trial.hpp"
+
+extern "C" {
+#include "common/contact_flags.h"
+}
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <set>
+
+namespace {
+
+using namespace fingertip;
+using namespace fingertip::cell;
+
+const Face &face() {
+  static const Face made("sphere15", 12.0, FINGERTIP_TEST_TABLES);
+  return made;
+}
+
+Rubber perfect() {
+  Rubber rubber{};
+  rubber.gain.fill(1.0);
+  return rubber;
+}
+
+Trial trial(std::uint64_t n, const std::string &gripper = "ideal") {
+  Trial made;
+  made.scene = draw_scene({"sphere15"}, 77, n);
+  made.gripper = gripper_mechanics(gripper);
+  made.rubber = {perfect(), perfect()};
+  made.seed = 100 + n;
+  return made;
+}
+
+// A smooth lift of an object at rest, nothing else.
+Trial calm(double mass_kg, double friction) {
+  Trial made = trial(0);
+  made.scene.object = {};
+  made.scene.object.mass_kg = mass_kg;
+  made.scene.object.friction = friction;
+  made.scene.grasp = {};
+  made.scene.grasp.relaxation = 0.0;
+  made.scene.lift_mm = 5.0;
+  made.scene.lift_s = 1.0;
+  made.scene.disturbances.clear();
+  made.scene.ends_s = 2.5;
+  return made;
+}
+
+// Closes to a width and says after a while that it holds; and nothing more.
+class ClosesTo : public Controller {
+public:
+  explicit ClosesTo(double width_mm) : width_mm_(width_mm) {}
+  void take_touch(unsigned finger, const grip_touch &touch) override {
+    touches[finger].push_back(touch);
+  }
+  void take_status(const grip_status &status) override { told_um.insert(status.width_um); }
+  grip_report step(std::uint64_t now_us, grip_command &command) override {
+    now_us_ = now_us;
+    command = {GRIP_MOVE, static_cast<std::int32_t>(1e3 * width_mm_), 20000, 0};
+    grip_report report{};
+    report.state = now_us > 1500000 ? GRIP_HOLDING : GRIP_SQUEEZE;
+    for (const auto &one : touches) {
+      if (!one.empty()) {
+        latest_s = std::max(latest_s, 1e-6 * static_cast<double>(now_us_ - one.back().t_us));
+      }
+    }
+    return report;
+  }
+  std::array<std::vector<grip_touch>, 2> touches;
+  std::set<std::int32_t> told_um;
+  double latest_s = 0.0;
+
+private:
+  double width_mm_;
+  std::uint64_t now_us_ = 0;
+};
+
+double width_mm(const Trial &trial, double force_N) {
+  return trial.scene.object.width_mm - 2.0 * face().indentation_mm(force_N) -
+         force_N / trial.scene.grasp.fingers_N_mm;
+}
+
+TEST(Trial, WhatDoesNothingDropsWhatPhysicsSays) {
+  // What the lift adds to the weight takes 1 % of it.
+  for (const double margin : {0.8, 0.95, 1.06, 1.5}) {
+    const Trial one = calm(0.4, 0.5);
+    const double least_N = 0.4 * GRAVITY_m_s2 / (2.0 * 0.5);
+    ClosesTo controller(width_mm(one, margin * least_N));
+    const Outcome outcome = run_trial(one, face(), controller);
+    EXPECT_EQ(outcome.dropped, margin < 1.0) << margin;
+    EXPECT_EQ(outcome.held, margin > 1.0) << margin;
+    EXPECT_NEAR(outcome.margin, margin, 0.02);
+    EXPECT_FALSE(outcome.never_held);
+    if (margin < 1.0) {
+      ASSERT_FALSE(outcome.slips.empty());
+      EXPECT_FALSE(outcome.slips.back().reaction_s);
+      EXPECT_GT(outcome.slid_mm, 0.9 * DROP_mm);
+    } else {
+      EXPECT_TRUE(outcome.slips.empty());
+      EXPECT_LT(outcome.slid_mm, SLIP_mm);
+    }
+  }
+}
+
+TEST(Trial, CrushesWhatIsWeaker) {
+  Trial one = calm(0.1, 0.8);
+  one.scene.object.crushes_N = 4.0;
+  ClosesTo gentle(width_mm(one, 3.5)), rough(width_mm(one, 4.5));
+  EXPECT_FALSE(run_trial(one, face(), gentle).crushed);
+  const Outcome outcome = run_trial(one, face(), rough);
+  EXPECT_TRUE(outcome.crushed);
+  EXPECT_NEAR(outcome.peak_N, 4.5, 0.1);
+}
+
+TEST(Trial, NeverHoldsWhereNothingCloses) {
+  const Trial one = calm(0.2, 0.5);
+  class Idle : public Controller {
+  public:
+    void take_touch(unsigned, const grip_touch &) override {}
+    void take_status(const grip_status &) override {}
+    grip_report step(std::uint64_t, grip_command &) override { return {}; }
+  } idle;
+  const Outcome outcome = run_trial(one, face(), idle);
+  EXPECT_TRUE(outcome.never_held);
+  EXPECT_FALSE(outcome.held);
+  EXPECT_FALSE(outcome.dropped);
+}
+
+TEST(Trial, FramesAndStatusComeAsTheyWould) {
+  for (const double rate_Hz : {20.0, 100.0, 410.0, 1308.0}) {
+    Trial one = calm(0.2, 0.8);
+    one.gripper = gripper_mechanics("2f85");
+    one.sensing.rate_Hz = rate_Hz;
+    one.sensing.osr = rate_Hz > 600.0 ? 256 : 1024;
+    ClosesTo controller(width_mm(one, 6.0));
+    run_trial(one, face(), controller);
+    const auto &touches = controller.touches[0];
+    ASSERT_GT(touches.size(), 2U);
+    const double span_s = 1e-6 * static_cast<double>(touches.back().t_us - touches.front().t_us);
+    EXPECT_NEAR(static_cast<double>(touches.size() - 1) / span_s, rate_Hz, 0.01 * rate_Hz);
+    EXPECT_GE(controller.latest_s, 1.0 / rate_Hz);
+    const double step_um = 1e3 * one.gripper.traits.step_mm;
+    for (const std::int32_t width_um : controller.told_um) {
+      const double steps = width_um / step_um;
+      EXPECT_NEAR(steps, std::round(steps), 0.01);
+    }
+    const grip_touch &held = touches.back();
+    EXPECT_NE(held.flags & CONTACT_FLAG_TANGENTIAL_VALID, 0U);
+    EXPECT_NEAR(held.force_mN, 6000, 1500); // a step of the gripper is 1.2 N
+    EXPECT_NEAR(std::hypot(held.qx_mN, held.qy_mN), 500.0 * 0.2 * 9.81, 100.0);
+  }
+}
+
+TEST(Trial, ALoadsFieldCanBeTakenAway) {
+  for (const double share : {1.0, 0.5, 0.0}) {
+    Trial one = calm(0.3, 0.8);
+    one.sensing.tangential = share;
+    ClosesTo controller(width_mm(one, 6.0));
+    run_trial(one, face(), controller);
+    const grip_touch &held = controller.touches[1].back();
+    EXPECT_NEAR(std::hypot(held.qx_mN, held.qy_mN), share * 500.0 * 0.3 * 9.81, 80.0) << share;
+  }
+}
+
+TEST(Trial, TheControllersCoreHoldsOnGoodPads) {
+  int held = 0;
+  for (std::uint64_t n = 0; n < 12; n++) {
+    const Trial one = trial(n);
+    grip_settings settings;
+    const grip_traits traits = traits_of(one.gripper.traits);
+    grip_default_settings(&settings, &traits);
+    CoreController controller(settings, traits);
+    held += run_trial(one, face(), controller).held ? 1 : 0;
+  }
+  EXPECT_GE(held, 11);
+}
+
+TEST(Trial, TheSameSeedGivesTheSameBits) {
+  const auto play = [](const Trial &one) {
+    grip_settings settings;
+    const grip_traits traits = traits_of(one.gripper.traits);
+    grip_default_settings(&settings, &traits);
+    CoreController controller(settings, traits);
+    std::vector<double> forces;
+    run_trial(one, face(), controller, [&](const Moment &m) { forces.push_back(m.force_N); });
+    return forces;
+  };
+  Trial one = trial(4, "sts3215");
+  const std::vector<double> forces = play(one);
+  EXPECT_GT(forces.size(), 500U);
+  EXPECT_EQ(play(one), forces);
+  one.seed++;
+  EXPECT_NE(play(one), forces);
+}
+
+TEST(Trial, AStillGraspTellsHowItSettles) {
+  Trial one = calm(0.2, 0.5);
+  one.still_s = 4.0;
+  one.set_N = 5.0;
+  ClosesTo controller(width_mm(one, 5.1));
+  const Outcome outcome = run_trial(one, face(), controller);
+  ASSERT_TRUE(outcome.settle_s);
+  EXPECT_LT(*outcome.settle_s, 0.5);
+  EXPECT_LT(outcome.rms, 0.06);
+  EXPECT_EQ(outcome.reversals, 0);
+  one.set_N = 8.0;
+  ClosesTo wrong(width_mm(one, 5.1));
+  EXPECT_FALSE(run_trial(one, face(), wrong).settle_s);
+}
+
+TEST(Trial, RefusesSettingsThatTheCoreRefuses) {
+  grip_settings settings;
+  const grip_traits traits = traits_of(gripper_mechanics("ideal").traits);
+  grip_default_settings(&settings, &traits);
+  settings.margin_permille = 0;
+  EXPECT_THROW(CoreController(settings, traits), std::runtime_error);
+}
+
+} // namespace

@@ -1,0 +1,288 @@
+#include "gripper/feetech.hpp"
+#include "gripper/feetech_packet.hpp"
+#include "gripper/feetech_table.hpp"
+#include "support/gripper_lines.hpp"
+
+#include <cmath>
+#include <gtest/gtest.h>
+#include <numbers>
+
+using namespace fingertip;
+
+namespace {
+
+GripperServer::Options options() {
+  GripperServer::Options options;
+  options.model = "sts3215";
+  return options;
+}
+
+/* Long enough for any machine; where no answer is to come, it is waited for. */
+constexpr double TIMEOUT_s = 1.5;
+
+std::unique_ptr<Gripper> opened(const std::string &port) {
+  return open_gripper({.model = "sts3215", .port = port, .timeout_s = TIMEOUT_s});
+}
+
+std::unique_ptr<Gripper> activated(const std::string &port) {
+  std::unique_ptr<Gripper> gripper = opened(port);
+  gripper->activate();
+  EXPECT_TRUE(gripper->poll().active);
+  return gripper;
+}
+
+GripperStatus moved(Served &simulated, Gripper &gripper, const GripperMove &move) {
+  GripperStatus status = gripper.move(move);
+  for (int i = 0; i < 100 && status.moving; i++) {
+    simulated.pass(0.3);
+    status = gripper.poll();
+  }
+  EXPECT_FALSE(status.moving);
+  return status;
+}
+
+template <typename Act> ErrorCode code_of(Act act) {
+  try {
+    act();
+  } catch (const Error &error) {
+    return error.code();
+  }
+  ADD_FAILURE() << "nothing was thrown";
+  return ErrorCode::other;
+}
+
+} // namespace
+
+/* Examples of Feetech's protocol manual for SCS and STS servos: pings servo 1, reads two bytes from
+ * 56 of it, writes position 2048, time 0 and speed 1000; the answer is a read's. */
+TEST(FeetechPacket, IsThatOfTheManual) {
+  using feetech::Bytes;
+  EXPECT_EQ(feetech::encoded({.id = 1, .code = feetech::PING}),
+            (Bytes{0xFF, 0xFF, 0x01, 0x02, 0x01, 0xFB}));
+  EXPECT_EQ(feetech::encoded({.id = 1, .code = feetech::READ, .parameters = {0x38, 0x02}}),
+            (Bytes{0xFF, 0xFF, 0x01, 0x04, 0x02, 0x38, 0x02, 0xBE}));
+  EXPECT_EQ(feetech::encoded({.id = 1,
+                              .code = feetech::WRITE,
+                              .parameters = {0x2A, 0x00, 0x08, 0x00, 0x00, 0xE8, 0x03}}),
+            (Bytes{0xFF, 0xFF, 0x01, 0x09, 0x03, 0x2A, 0x00, 0x08, 0x00, 0x00, 0xE8, 0x03, 0xD5}));
+  Bytes answer = {0xFF, 0xFF, 0x01, 0x04, 0x00, 0x18, 0x05, 0xDD};
+  std::size_t skipped = 0;
+  const auto packet = feetech::take_packet(&answer, &skipped);
+  ASSERT_TRUE(packet);
+  EXPECT_EQ(packet->parameters, (Bytes{0x18, 0x05}));
+  EXPECT_EQ(skipped, 0u);
+  EXPECT_TRUE(answer.empty());
+}
+
+TEST(FeetechPacket, IsFoundInNoiseHoweverItComes) {
+  const feetech::Bytes packet =
+      feetech::encoded({.id = 6, .code = 0, .parameters = {0xFF, 0xFF, 1}});
+  feetech::Bytes line = {0xFF, 0x00, 0xFF, 0xFF, 0x06, 0x02, 0x00, 0x12, 0xFF};
+  const std::size_t noise = line.size();
+  line.insert(line.end(), packet.begin(), packet.end());
+  feetech::Bytes came;
+  std::size_t skipped = 0;
+  for (std::size_t i = 0; i < line.size(); i++) {
+    came.push_back(line[i]);
+    const auto found = feetech::take_packet(&came, &skipped);
+    ASSERT_EQ(found.has_value(), i + 1 == line.size()) << i;
+  }
+  EXPECT_EQ(skipped, noise);
+}
+
+TEST(Jaw, IsAChord) {
+  for (const bool turns_down : {false, true}) {
+    const int open = turns_down ? 1024 : 3072;
+    const Jaw jaw(2048, open, 80);
+    EXPECT_NEAR(jaw.width_mm(2048), 0, 1e-12);
+    EXPECT_NEAR(jaw.stroke_mm(), 2 * 80 * std::sin(std::numbers::pi / 4), 1e-9);
+    EXPECT_LT(jaw.width_mm(turns_down ? 2060 : 2036), 0);
+    for (double width_mm : {0.0, 1.0, 30.0, 100.0}) {
+      const double count = jaw.count(width_mm);
+      EXPECT_NEAR(jaw.width_mm(count), width_mm, 1e-9);
+      EXPECT_NEAR(std::abs(jaw.width_mm(count + 0.5) - jaw.width_mm(count - 0.5)),
+                  jaw.slope_mm(width_mm), 1e-4);
+    }
+  }
+}
+
+TEST(Feetech, MovesItsJawOnceActivated) {
+  Served simulated(options());
+  std::unique_ptr<Gripper> gripper = opened(simulated.port());
+  const GripperTraits &traits = gripper->traits();
+  EXPECT_NEAR(traits.step_mm, 0.153, 0.001);
+  EXPECT_FALSE(gripper->move({.width_mm = 10, .speed_mm_s = 100}).active);
+  EXPECT_NEAR(gripper->poll().width_mm, traits.stroke_mm, 0.1);
+
+  gripper->activate();
+  EXPECT_TRUE(gripper->poll().active);
+  EXPECT_NEAR(gripper->poll().width_mm, traits.stroke_mm, 0.1);
+  for (double width_mm : {50.0, 10.0, 0.0, 90.0}) {
+    const GripperStatus status =
+        moved(simulated, *gripper, {.width_mm = width_mm, .speed_mm_s = 400});
+    EXPECT_NEAR(status.width_mm, width_mm, traits.step_mm / 2 + 1e-6);
+    EXPECT_EQ(status.object, false);
+    EXPECT_EQ(status.fault, 0);
+  }
+}
+
+TEST(Feetech, KnowsAnObjectByWhereItStops) {
+  Served simulated(options());
+  std::unique_ptr<Gripper> gripper = activated(simulated.port());
+  simulated.with([](GripperServer &, GripperMotion &motion) {
+    motion.blocked_at = [](double width_mm, double force_N) {
+      return force_N > 0 && width_mm < 40 && (40 - width_mm) * 2 >= force_N;
+    };
+  });
+  const GripperStatus status =
+      moved(simulated, *gripper, {.width_mm = 0, .speed_mm_s = 300, .force_N = 8});
+  EXPECT_EQ(status.object, true);
+  EXPECT_GT(status.current_A, 0.5);
+  EXPECT_NEAR(
+      simulated.with([](GripperServer &, GripperMotion &motion) { return motion.width_mm(); }), 36,
+      0.05);
+}
+
+TEST(Feetech, SaysWhatIsWrongWithAnAnswerAndGoesOn) {
+  Served simulated(options());
+  std::unique_ptr<Gripper> gripper = activated(simulated.port());
+  const struct {
+    LineFault fault;
+    ErrorCode code;
+  } CASES[] = {{LineFault::silent, ErrorCode::gripper_silent},
+               {LineFault::garbage, ErrorCode::gripper_garbled},
+               {LineFault::damaged, ErrorCode::gripper_garbled},
+               {LineFault::other_slave, ErrorCode::gripper_garbled}};
+  for (const auto &one : CASES) {
+    for (const bool polls : {true, false}) {
+      LineTrouble trouble;
+      trouble.fault = one.fault;
+      trouble.answers = 1;
+      simulated.with([&](GripperServer &server, GripperMotion &) { server.trouble(trouble); });
+      EXPECT_EQ(code_of([&] {
+                  polls ? gripper->poll() : gripper->move({.width_mm = 50, .speed_mm_s = 100});
+                }),
+                one.code)
+          << static_cast<int>(one.fault) << polls;
+      EXPECT_TRUE(gripper->poll().active);
+    }
+  }
+}
+
+TEST(Feetech, FaultsAreBits) {
+  Served simulated(options());
+  std::unique_ptr<Gripper> gripper = activated(simulated.port());
+  simulated.with([](GripperServer &server, GripperMotion &) {
+    server.fail(feetech::OVERLOAD | feetech::TEMPERATURE);
+  });
+  const GripperStatus status = gripper->poll();
+  EXPECT_EQ(status.fault, feetech::OVERLOAD | feetech::TEMPERATURE);
+  EXPECT_EQ(gripper->fault_text(status.fault), "too hot, overloaded");
+  EXPECT_EQ(gripper->fault_text(0), "");
+  EXPECT_EQ(gripper->fault_text(0x80), "a fault that its memory table does not have");
+}
+
+TEST(Feetech, IsNotActivatedByAMoveAfterItsPowerWasLost) {
+  Served simulated(options());
+  std::unique_ptr<Gripper> gripper = activated(simulated.port());
+  moved(simulated, *gripper, {.width_mm = 40, .speed_mm_s = 400});
+  simulated.with([](GripperServer &server, GripperMotion &) { server.power(false); });
+  EXPECT_EQ(code_of([&] { gripper->poll(); }), ErrorCode::gripper_silent);
+  simulated.with([](GripperServer &server, GripperMotion &) { server.power(true); });
+  for (int i = 0; i < 3; i++) {
+    EXPECT_FALSE(gripper->move({.width_mm = 85, .speed_mm_s = 150}).active);
+  }
+  EXPECT_NEAR(gripper->poll().width_mm, 40, 0.1);
+}
+
+namespace {
+
+/* Exchanges of a tape. */
+using feetech::Bytes;
+using feetech::Packet;
+
+std::string text(const Packet &packet) {
+  std::string digits;
+  for (std::uint8_t byte : feetech::encoded(packet)) {
+    char two[4];
+    std::snprintf(two, sizeof two, "%02X", byte);
+    digits += (digits.empty() ? "" : " ") + std::string(two);
+  }
+  return digits;
+}
+
+const Packet ASK_TABLE = {6, feetech::READ, {feetech::MODEL, 31}};
+const Packet ASK_STATUS = {6, feetech::READ, {feetech::TORQUE_ENABLE, 31}};
+const Packet ASK_MODEL = {6, feetech::READ, {feetech::MODEL, 2}};
+
+Packet table() {
+  Bytes bytes(31);
+  bytes[0] = feetech::STS3215 & 0xFF;
+  bytes[1] = feetech::STS3215 >> 8;
+  return {6, 0, bytes};
+}
+
+Packet status(int position) {
+  Bytes bytes(31);
+  bytes[feetech::PRESENT_POSITION - feetech::TORQUE_ENABLE] =
+      static_cast<std::uint8_t>(position & 0xFF);
+  bytes[feetech::PRESENT_POSITION - feetech::TORQUE_ENABLE + 1] =
+      static_cast<std::uint8_t>(position >> 8);
+  return {6, 0, bytes};
+}
+
+} // namespace
+
+/* Some adapters hear what they send: it comes back before the answer. */
+TEST(FeetechFrames, TheirOwnEchoIsIgnored) {
+  const auto exchange = [](const Packet &question, const Packet &answer) {
+    return std::pair(text(question), text(question) + " " + text(answer));
+  };
+  Tape tape({exchange(ASK_TABLE, table()), exchange(ASK_STATUS, status(2304)),
+             exchange(ASK_STATUS, status(2304))});
+  {
+    std::unique_ptr<Gripper> gripper = opened(tape.port());
+    EXPECT_NEAR(gripper->poll().width_mm, 200 * std::sin(std::numbers::pi / 16), 1e-9);
+    EXPECT_NE(gripper->line().find("servo model 777"), std::string::npos);
+  }
+  EXPECT_EQ(tape.complaint(), "");
+}
+
+TEST(FeetechFrames, NoLateAnswerIsTakenForThatToTheNextQuestion) {
+  Tape tape({{text(ASK_TABLE), text(table())},
+             {text(ASK_STATUS), text(status(2304))},
+             {text(ASK_STATUS), ""},
+             {text(ASK_MODEL), text(status(2304)) + " " + text({6, 0, {0x09, 0x03}})},
+             {text(ASK_STATUS), text(status(2176))}});
+  {
+    std::unique_ptr<Gripper> gripper = opened(tape.port());
+    EXPECT_EQ(code_of([&] { gripper->poll(); }), ErrorCode::gripper_silent);
+    EXPECT_NEAR(gripper->poll().width_mm, 200 * std::sin(std::numbers::pi / 32), 1e-9);
+  }
+  EXPECT_EQ(tape.complaint(), "");
+}
+
+TEST(Feetech, SaysWhenItsPortIsGone) {
+  auto simulated = std::make_unique<Served>(options());
+  std::unique_ptr<Gripper> gripper = opened(simulated->port());
+  simulated.reset();
+  for (int i = 0; i < 3; i++) {
+    EXPECT_EQ(code_of([&] { gripper->poll(); }), ErrorCode::gone);
+  }
+}
+
+TEST(Feetech, RefusesWhatCannotBe) {
+  Served simulated(options());
+  const auto code = [&](GripperWay way) {
+    way.model = "sts3215";
+    way.port = simulated.port();
+    return code_of([&] { open_gripper(way); });
+  };
+  EXPECT_EQ(code({.slave = 254}), ErrorCode::bad_value);
+  EXPECT_EQ(code({.closed_count = 0, .open_count = 3000}), ErrorCode::bad_value);
+  EXPECT_EQ(code({.closed_count = 5000}), ErrorCode::bad_value);
+  EXPECT_EQ(code({.jaw_mm = 0}), ErrorCode::bad_value);
+  EXPECT_EQ(code({.jaw_mm = NAN}), ErrorCode::bad_value);
+  EXPECT_EQ(code({.slave = 7, .timeout_s = 0.1}), ErrorCode::gripper_silent);
+  EXPECT_EQ(code({.timeout_s = 0}), ErrorCode::bad_value);
+}

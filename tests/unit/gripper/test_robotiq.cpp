@@ -1,0 +1,398 @@
+#include "gripper/robotiq.hpp"
+#include "gripper/robotiq_registers.hpp"
+#include "support/gripper_lines.hpp"
+
+#include <cmath>
+#include <gtest/gtest.h>
+
+using namespace fingertip;
+using namespace std::chrono_literals;
+
+namespace {
+
+GripperServer::Options served(const char *model, std::vector<int> functions = {3, 4, 16, 23}) {
+  GripperServer::Options options;
+  options.model = model;
+  options.functions = functions;
+  return options;
+}
+
+/* Long enough for any machine; where no answer is to come, it is waited for. */
+constexpr double TIMEOUT_s = 1.5;
+
+std::unique_ptr<Gripper> opened(const std::string &model, const std::string &port) {
+  return open_gripper({.model = model, .port = port, .timeout_s = TIMEOUT_s});
+}
+
+/* Less than a second passes from one poll to the next: it would be a fault. */
+template <typename Until> GripperStatus wait_for(Served &simulated, Gripper &gripper, Until until) {
+  for (int i = 0; i < 100; i++) {
+    const GripperStatus status = gripper.poll();
+    if (until(status)) {
+      return status;
+    }
+    simulated.pass(0.3);
+  }
+  ADD_FAILURE() << "it never came";
+  return {};
+}
+
+bool rests(const GripperStatus &status) {
+  return !status.moving;
+}
+
+bool is_active(const GripperStatus &status) {
+  return status.active;
+}
+
+std::unique_ptr<Gripper> activated(const std::string &model, Served &simulated) {
+  std::unique_ptr<Gripper> gripper = opened(model, simulated.port());
+  gripper->activate();
+  wait_for(simulated, *gripper, is_active);
+  return gripper;
+}
+
+GripperStatus moved(Served &simulated, Gripper &gripper, const GripperMove &move) {
+  const GripperStatus first = gripper.move(move);
+  EXPECT_TRUE(first.active);
+  EXPECT_FALSE(first.moving && first.object);
+  return wait_for(simulated, gripper, rests);
+}
+
+template <typename Act> ErrorCode code_of(Act act) {
+  try {
+    act();
+  } catch (const Error &error) {
+    EXPECT_NE(std::string(error.what()), "");
+    return error.code();
+  }
+  ADD_FAILURE() << "nothing was thrown";
+  return ErrorCode::other;
+}
+
+} // namespace
+
+/* Requests and answers are printed in Robotiq's "2F-85 & 2F-140 Instruction Manual" and "Hand-E
+ * Gripper Instruction Manual", section Modbus RTU example; those with function 3 in the "2-Finger
+ * Adaptive Gripper" manuals of 2013 and 2016; of one of them the 2013 edition prints the checksum
+ * F7 8B beside another, this one is the packet's own. The two lines marked are no examples of
+ * theirs. */
+TEST(RobotiqFrames, AreThoseOfTheManual) {
+  Tape tape({
+      {"09 04 07 D0 00 03 B1 CE", ""}, // before function 4 nobody answers
+      {"09 03 07 D0 00 01 85 CF", "09 03 02 31 00 4C 15"},
+      {"09 03 07 D0 00 03 04 0E", "09 03 06 F9 00 00 00 0D 00 56 4C"},
+      // activate
+      {"09 10 03 E8 00 03 06 00 00 00 00 00 00 73 30", "09 10 03 E8 00 03 01 30"},
+      {"09 03 07 D0 00 01 85 CF", "09 03 02 11 00 55 D5"},
+      {"09 03 07 D0 00 01 85 CF", with_crc("09 03 02 00 00")}, // marked
+      {"09 10 03 E8 00 03 06 01 00 00 00 00 00 72 E1", "09 10 03 E8 00 03 01 30"},
+      // move: closes, for it says active without gGTO
+      {"09 03 07 D0 00 03 04 0E", with_crc("09 03 06 31 00 00 00 0D 00")}, // marked
+      {"09 10 03 E8 00 03 06 09 00 00 FF FF FF 42 29", "09 10 03 E8 00 03 01 30"},
+      {"09 03 07 D0 00 03 04 0E", "09 03 06 39 00 00 FF 0E 0A F7 8B"},
+      {"09 03 07 D0 00 03 04 0E", "09 03 06 B9 00 00 FF BD 00 1D 7C"},
+      // opens
+      {"09 03 07 D0 00 03 04 0E", with_crc("09 03 06 31 00 00 00 BD 00")}, // marked
+      {"09 03 07 D0 00 03 04 0E", with_crc("09 03 06 31 00 00 00 BD 00")}, // marked
+      {"09 10 03 E8 00 03 06 09 00 00 00 FF FF 72 19", "09 10 03 E8 00 03 01 30"},
+      {"09 03 07 D0 00 03 04 0E", "09 03 06 F9 00 00 00 0D 00 56 4C"},
+  });
+  {
+    std::unique_ptr<Gripper> gripper = opened("2f85", tape.port());
+    gripper->activate();
+    GripperStatus status = gripper->move({.width_mm = 0, .speed_mm_s = 150, .force_N = 235});
+    EXPECT_TRUE(status.active);
+    EXPECT_TRUE(status.moving);
+    EXPECT_FALSE(status.object);
+    EXPECT_NEAR(status.width_mm, (230 - 0x0E) * 85.0 / 227, 1e-9);
+    EXPECT_DOUBLE_EQ(status.current_A, 0.1);
+    status = gripper->poll();
+    EXPECT_FALSE(status.moving);
+    EXPECT_EQ(status.object, true);
+    EXPECT_NEAR(status.width_mm, (230 - 0xBD) * 85.0 / 227, 1e-9);
+    EXPECT_EQ(status.fault, 0);
+    EXPECT_FALSE(gripper->poll().moving);
+    status = gripper->move({.width_mm = 85, .speed_mm_s = 150, .force_N = 235});
+    EXPECT_FALSE(status.moving);
+    EXPECT_EQ(status.object, false);
+  }
+  EXPECT_EQ(tape.complaint(), "");
+}
+
+/* The newer manuals' status request and answer. */
+TEST(RobotiqFrames, ReadWithFunctionFour) {
+  Tape tape({{"09 04 07 D0 00 03 B1 CE", "09 04 06 F9 00 00 00 0D 00 17 AA"},
+             {"09 04 07 D0 00 03 B1 CE", "09 04 06 F9 00 00 00 0D 00 17 AA"}});
+  {
+    std::unique_ptr<Gripper> gripper = opened("hande", tape.port());
+    const GripperStatus status = gripper->poll();
+    EXPECT_TRUE(status.active);
+    EXPECT_NEAR(status.width_mm, (230 - 0x0D) * 50.0 / 227, 1e-9);
+  }
+  EXPECT_EQ(tape.complaint(), "");
+}
+
+/* The manuals' example of function 23: position E6, speed 3C, force C8. */
+TEST(RobotiqFrames, TheSimulatedOneUnderstandsTheManualsFunction23) {
+  Served simulated(served("2f85"));
+  activated("2f85", simulated)->move({.width_mm = 85, .speed_mm_s = 150});
+  EXPECT_EQ(asked(simulated.port(), "09 17 07 D0 00 02 03 E9 00 02 04 00 E6 3C C8 2D 0C", 9),
+            with_crc("09 17 04 39 00 00 E6"));
+  std::unique_ptr<Gripper> gripper = opened("2f85", simulated.port());
+  EXPECT_EQ(wait_for(simulated, *gripper, rests).width_mm, 0.0);
+}
+
+TEST(Robotiq, GripsAnObjectAndLosesIt) {
+  Served simulated(served("2f85"));
+  std::unique_ptr<Gripper> gripper = opened("2f85", simulated.port());
+  EXPECT_FALSE(gripper->poll().active);
+  /* Not active, it moves not and is not activated by it. */
+  EXPECT_FALSE(gripper->move({.width_mm = 0, .speed_mm_s = 50}).active);
+  EXPECT_EQ(gripper->poll().width_mm, 85.0);
+
+  gripper->activate();
+  EXPECT_TRUE(gripper->poll().moving);
+  wait_for(simulated, *gripper, is_active);
+  EXPECT_EQ(gripper->poll().fault, 0);
+  simulated.with([](GripperServer &, GripperMotion &motion) {
+    motion.blocked_at = [](double width_mm, double force_N) {
+      return force_N > 0 && (40 - width_mm) * 10 >= force_N && width_mm < 40;
+    };
+  });
+  GripperStatus status =
+      moved(simulated, *gripper, {.width_mm = 0, .speed_mm_s = 150, .force_N = 20});
+  EXPECT_EQ(status.object, true);
+  EXPECT_NEAR(status.width_mm, 38, 0.2);
+  EXPECT_GT(status.current_A, 0.05);
+  status = moved(simulated, *gripper, {.width_mm = 60, .speed_mm_s = 150, .force_N = 20});
+  EXPECT_EQ(status.object, false);
+  EXPECT_NEAR(status.width_mm, 60, 0.19);
+  EXPECT_NE(gripper->line().find("function 23"), std::string::npos);
+}
+
+TEST(Robotiq, WidthsOfAllModels) {
+  for (const char *model : {"2f85", "2f140", "hande"}) {
+    Served simulated(served(model));
+    std::unique_ptr<Gripper> gripper = activated(model, simulated);
+    const GripperTraits &traits = gripper->traits();
+    EXPECT_EQ(gripper->poll().width_mm, traits.stroke_mm);
+    for (double part : {0.5, 0.25, 0.0, 1.0}) {
+      const GripperStatus status =
+          moved(simulated, *gripper, {.width_mm = part * traits.stroke_mm, .speed_mm_s = 1e6});
+      EXPECT_NEAR(status.width_mm, part * traits.stroke_mm, traits.step_mm / 2 + 1e-9) << model;
+      EXPECT_NEAR(
+          simulated.with([](GripperServer &, GripperMotion &motion) { return motion.width_mm(); }),
+          status.width_mm, 1e-9);
+    }
+  }
+}
+
+TEST(Robotiq, FindsTheFunctionsThatItAnswers) {
+  const struct {
+    std::vector<int> functions;
+    const char *line;
+  } CASES[] = {{{3, 4, 16, 23}, "function 23"},
+               {{3, 16}, "function 16 and 3"},
+               {{4, 16}, "function 16 and 4"}};
+  for (const auto &one : CASES) {
+    Served simulated(served("2f85", one.functions));
+    std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
+    for (double width_mm : {70.0, 60.0, 50.0, 40.0}) {
+      moved(simulated, *gripper, {.width_mm = width_mm, .speed_mm_s = 150});
+    }
+    EXPECT_NEAR(gripper->poll().width_mm, 40, 0.19);
+    EXPECT_NE(gripper->line().find(one.line), std::string::npos) << gripper->line();
+  }
+}
+
+TEST(Robotiq, SaysWhatIsWrongWithAnAnswerAndGoesOn) {
+  Served simulated(served("2f85"));
+  std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
+  const GripperMove move = {.width_mm = 85, .speed_mm_s = 150};
+  gripper->move(move);
+  gripper->move(move); // function 23
+  const struct {
+    LineFault fault;
+    ErrorCode code;
+  } CASES[] = {{LineFault::silent, ErrorCode::gripper_silent},
+               {LineFault::garbage, ErrorCode::gripper_garbled},
+               {LineFault::damaged, ErrorCode::gripper_garbled},
+               {LineFault::other_slave, ErrorCode::gripper_garbled},
+               {LineFault::refused, ErrorCode::gripper_refused}};
+  for (const auto &one : CASES) {
+    for (const bool polls : {true, false}) {
+      LineTrouble trouble;
+      trouble.fault = one.fault;
+      trouble.answers = 1;
+      simulated.with([&](GripperServer &server, GripperMotion &) { server.trouble(trouble); });
+      EXPECT_EQ(code_of([&] { polls ? gripper->poll() : gripper->move(move); }), one.code)
+          << static_cast<int>(one.fault) << polls;
+      EXPECT_TRUE(gripper->poll().active);
+    }
+  }
+  EXPECT_NE(gripper->line().find("function 23"), std::string::npos);
+}
+
+/* An answer that comes when the next question has been asked says what was, not what is. */
+TEST(RobotiqFrames, NoLateAnswerIsTakenForThatToTheNextQuestion) {
+  const std::string stale = with_crc("09 04 06 F9 00 00 00 40 00"),
+                    fresh = with_crc("09 04 06 F9 00 00 00 80 00"),
+                    one = with_crc("09 04 07 D0 00 01");
+  Tape tape({{"09 04 07 D0 00 03 B1 CE", stale},
+             {"09 04 07 D0 00 03 B1 CE", ""},
+             {one, stale},
+             {one, with_crc("09 04 02 F9 00")},
+             {"09 04 07 D0 00 03 B1 CE", fresh}});
+  {
+    std::unique_ptr<Gripper> gripper = opened("2f85", tape.port());
+    EXPECT_EQ(code_of([&] { gripper->poll(); }), ErrorCode::gripper_silent);
+    EXPECT_NEAR(gripper->poll().width_mm, (230 - 0x80) * 85.0 / 227, 1e-9);
+  }
+  EXPECT_EQ(tape.complaint(), "");
+}
+
+TEST(Robotiq, TellsASecondOfSilenceOnce) {
+  Served simulated(served("2f85"));
+  std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
+  simulated.pass(1.1);
+  const GripperStatus status = gripper->poll();
+  EXPECT_EQ(status.fault, robotiq::NO_COMMUNICATION);
+  EXPECT_EQ(gripper->fault_text(status.fault), "nobody spoke to it for a second");
+  EXPECT_TRUE(status.active);
+  EXPECT_EQ(gripper->poll().fault, 0);
+}
+
+TEST(Robotiq, IsNotActivatedByAMoveAfterItsPowerWasLost) {
+  Served simulated(served("2f85"));
+  std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
+  moved(simulated, *gripper, {.width_mm = 40, .speed_mm_s = 150});
+  simulated.with([](GripperServer &server, GripperMotion &) { server.power(false); });
+  EXPECT_EQ(code_of([&] { gripper->poll(); }), ErrorCode::gripper_silent);
+  simulated.with([](GripperServer &server, GripperMotion &) { server.power(true); });
+  for (int i = 0; i < 20; i++) {
+    EXPECT_FALSE(gripper->move({.width_mm = 85, .speed_mm_s = 150}).active);
+  }
+  EXPECT_NEAR(gripper->poll().width_mm, 40, 0.19);
+  simulated.with([](GripperServer &, GripperMotion &motion) { EXPECT_FALSE(motion.activating()); });
+
+  /* Nor in the very exchange after which it knows. */
+  gripper->activate();
+  wait_for(simulated, *gripper, is_active);
+  moved(simulated, *gripper, {.width_mm = 40, .speed_mm_s = 150});
+  simulated.with([](GripperServer &server, GripperMotion &) {
+    server.power(false);
+    server.power(true);
+  });
+  EXPECT_FALSE(gripper->move({.width_mm = 85, .speed_mm_s = 150}).moving);
+  EXPECT_NEAR(gripper->poll().width_mm, 40, 0.19);
+}
+
+TEST(Robotiq, OnlyActivateClearsAFault) {
+  Served simulated(served("2f85"));
+  std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
+  moved(simulated, *gripper, {.width_mm = 40, .speed_mm_s = 150});
+  simulated.with([](GripperServer &server, GripperMotion &) { server.fail(robotiq::OVERCURRENT); });
+  for (int i = 0; i < 3; i++) {
+    const GripperStatus status = gripper->move({.width_mm = 85, .speed_mm_s = 150});
+    EXPECT_EQ(status.fault, robotiq::OVERCURRENT);
+    EXPECT_FALSE(status.active);
+  }
+  EXPECT_NEAR(gripper->poll().width_mm, 40, 0.19);
+  gripper->activate();
+  EXPECT_EQ(wait_for(simulated, *gripper, is_active).fault, 0);
+}
+
+/* What the manuals say of moves that come at the wrong time, and of automatic release. */
+TEST(Robotiq, TheSimulatedOneFaultsAsDocumented) {
+  Served simulated(served("2f85"));
+  const auto fault = [&] {
+    return asked(simulated.port(), "09 04 07 D0 00 03 B1 CE", 11).substr(6 * 3 - 3, 2);
+  };
+  asked(simulated.port(), with_crc("09 10 03 E8 00 03 06 08 00 00 FF FF FF"), 8);
+  EXPECT_EQ(fault(), "07");
+  asked(simulated.port(), with_crc("09 10 03 E8 00 03 06 09 00 00 FF FF FF"), 8);
+  EXPECT_EQ(fault(), "05");
+  std::unique_ptr<Gripper> gripper = opened("2f85", simulated.port());
+  /* Then it goes where it was told to. */
+  EXPECT_EQ(wait_for(simulated, *gripper,
+                     [](const GripperStatus &status) { return status.active && !status.moving; })
+                .width_mm,
+            0.0);
+  gripper.reset();
+  asked(simulated.port(), with_crc("09 10 03 E8 00 03 06 39 00 00 FF FF FF"), 8);
+  EXPECT_EQ(fault(), "0B");
+  gripper = opened("2f85", simulated.port());
+  wait_for(simulated, *gripper, [](const GripperStatus &status) { return status.fault == 0x0F; });
+  EXPECT_EQ(gripper->poll().width_mm, 85.0);
+  EXPECT_FALSE(gripper->poll().active);
+}
+
+TEST(Robotiq, SaysWhenItsPortIsGone) {
+  auto simulated = std::make_unique<Served>(served("2f85"));
+  std::unique_ptr<Gripper> gripper = opened("2f85", simulated->port());
+  simulated.reset();
+  for (int i = 0; i < 3; i++) {
+    EXPECT_EQ(code_of([&] { gripper->poll(); }), ErrorCode::gone);
+  }
+  EXPECT_EQ(code_of([&] { gripper->move({}); }), ErrorCode::gone);
+}
+
+TEST(Robotiq, RefusesWhatCannotBe) {
+  Served simulated(served("2f85"));
+  std::unique_ptr<Gripper> gripper = opened("2f85", simulated.port());
+  EXPECT_EQ(code_of([&] { gripper->move({.width_mm = NAN}); }), ErrorCode::bad_value);
+  EXPECT_EQ(code_of([&] { gripper->move({.speed_mm_s = -1}); }), ErrorCode::bad_value);
+  EXPECT_EQ(code_of([&] { opened("3f", simulated.port()); }), ErrorCode::bad_value);
+  EXPECT_EQ(code_of([&] { opened("2f85", "/dev/none"); }), ErrorCode::no_port);
+  EXPECT_EQ(code_of([&] { opened("2f85", "/dev/null"); }), ErrorCode::not_a_port);
+  EXPECT_EQ(code_of([&] { opened("2f85", simulated.port()); }), ErrorCode::port_in_use);
+  gripper.reset();
+  EXPECT_EQ(code_of([&] {
+              open_gripper(
+                  {.model = "2f85", .port = simulated.port(), .slave = 10, .timeout_s = 0.1});
+            }),
+            ErrorCode::gripper_silent);
+  EXPECT_EQ(
+      code_of([&] { open_gripper({.model = "2f85", .port = simulated.port(), .slave = 300}); }),
+      ErrorCode::bad_value);
+  for (int closed : {3, 2, 256, -1}) {
+    EXPECT_EQ(code_of([&] {
+                open_gripper({.model = "2f85", .port = simulated.port(), .closed_count = closed});
+              }),
+              ErrorCode::bad_value);
+  }
+}
+
+/* A latency timer of 16 ms, and answers that take 30: no exchange can be faster. */
+TEST(Robotiq, WorksThroughASlowLine) {
+  Served simulated(served("2f85"));
+  std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
+  const auto ten_moves = [&](const LineTrouble &trouble) {
+    simulated.with([&](GripperServer &server, GripperMotion &) { server.trouble(trouble); });
+    const auto begin = std::chrono::steady_clock::now();
+    for (int i = 0; i < 10; i++) {
+      EXPECT_TRUE(gripper->move({.width_mm = 85.0 - i, .speed_mm_s = 150}).active);
+    }
+    return std::chrono::steady_clock::now() - begin;
+  };
+  LineTrouble timer, late;
+  timer.latency_timer_s = 0.016;
+  EXPECT_GT(ten_moves(timer), 9 * 16ms);
+  late.late_s = 0.03;
+  EXPECT_GT(ten_moves(late), 10 * 30ms);
+}
+
+/* libmodbus as it comes, without any of the simulated gripper. */
+TEST(Robotiq, IsServedByLibmodbus) {
+  PlainSlave slave;
+  std::unique_ptr<Gripper> gripper = opened("2f140", slave.port());
+  GripperStatus status = gripper->poll();
+  EXPECT_TRUE(status.active);
+  EXPECT_NEAR(status.width_mm, (230 - 100) * 140.0 / 227, 1e-9);
+  EXPECT_DOUBLE_EQ(status.current_A, 0.42);
+  gripper->move({.width_mm = 70, .speed_mm_s = 250, .force_N = 10});
+  EXPECT_EQ(slave.command(), (std::array<int, 3>{0, 117, 0xFF00}));
+  gripper->activate();
+  EXPECT_EQ(slave.command(), (std::array<int, 3>{0x100, 0, 0}));
+}
