@@ -19,6 +19,8 @@
 #define STANDS_us 400000u
 /* A move is to take so long, but where the object slides. */
 #define MOVE_us 20000
+/* The gripper's own limit of force, in case the fingertips' is not kept: of the cap. */
+#define LIMIT_PERMILLE 1250
 /* A width of the gripper's own units. */
 #define WIDTH_SLACK_um 1000
 
@@ -46,7 +48,7 @@ enum ft_status grip_init(struct grip *grip, const struct grip_settings *settings
       s->control_us <= 1000000 && in_range(s->first_mN, 200, s->force_cap_mN) &&
       in_range(s->blind_mN, s->first_mN, s->force_cap_mN) && in_range(s->shift_um, 0, 20000) &&
       in_range(s->friction_permille, 100, 1500) && in_range(s->margin_permille, 1000, 5000) &&
-      in_range(s->decay_permille_s, 0, 1000) && s->rest_us <= 60000000;
+      in_range(s->decay_permille_s, 0, 5000) && s->rest_us <= 60000000;
   if (!good) {
     return FT_ERR_ARGUMENT;
   }
@@ -125,11 +127,12 @@ static void ramp(struct grip *grip, int32_t to_um, int32_t speed_um_s) {
 }
 
 static void approach(struct grip *grip, const struct grip_view *view) {
-  if (view->fingers == 0) {
+  if (view->fingers == 0 && view->touches == 0) {
     return; /* blind: no further */
   }
   /* One fingertip alone pushes the object to the other. Where that one is missing, it decides. */
-  bool touches = view->touches == view->fingers && view->low_mN >= grip->settings.touch_mN;
+  bool touches = view->fingers == 0 || (view->touches >= view->fingers &&
+                                        view->low_mN >= grip->settings.touch_mN);
   bool pushes_hard = view->high_mN >= 4 * grip->settings.touch_mN;
   if (touches || pushes_hard) {
     grip->touch_width_um = grip_width_at(grip, view->t_us);
@@ -262,6 +265,8 @@ static void tell_command(const struct grip *grip, struct grip_command *command) 
     return;
   }
   command->motion = GRIP_MOVE;
+  int32_t force_mN = grip_scale(grip->settings.force_cap_mN, LIMIT_PERMILLE, 1000);
+  command->force_mN = grip_clamp(force_mN, traits->force_min_mN, traits->force_max_mN);
   command->speed_um_s = grip_clamp(speed_um_s, traits->speed_min_um_s, traits->speed_max_um_s);
 }
 

@@ -73,7 +73,7 @@ struct grip_command {
   uint8_t motion; /* enum grip_motion */
   int32_t width_um;
   int32_t speed_um_s;
-  int32_t force_mN; /* the gripper's own limit; 0: its least */
+  int32_t force_mN; /* the gripper's own limit; 0: it has none */
 };
 
 enum grip_mode { GRIP_MODE_FIXED, GRIP_MODE_HOLD };
@@ -149,8 +149,8 @@ struct grip_settings {
   /* hold */
   int32_t first_mN;          /* grip before anything pulls, and never less */
   int32_t blind_mN;          /* grip where no load can be told */
-  int32_t shift_um;          /* by which a tangential load as large as the force moves the location
-                                that is not corrected for it: 0.28 of the rubber's thickness */
+  int32_t shift_um;          /* by which a tangential load as large as the force moves a location
+                                that is not corrected for it; 0: loads are not guessed by that */
   int32_t friction_permille; /* until a slide, or a load that does not slide, tells better */
   int32_t margin_permille;   /* grip over load / friction */
   int32_t decay_permille_s;  /* how fast grip comes down to what is wanted */
@@ -189,8 +189,10 @@ struct grip_finger {
   struct grip_zero place;  /* um, of a location that is not corrected */
   uint64_t pulled_us;      /* the newest frame that told a tangential load */
   bool is_heard, is_new, has_pulled, has_place;
-  bool tells_load, guesses_load; /* itself; from how the location has moved */
+  bool tells_load, guesses_load; /* itself; from how the location has moved, */
+  bool shifts;                   /* by more than a load moves it */
   int32_t load_mN;
+  int32_t share_x_permille, share_y_permille; /* of the force, as last told */
 };
 
 #define GRIP_WIDTHS 16
@@ -206,6 +208,7 @@ struct grip_hold {
   uint64_t load_us;     /* when it was told */
   uint64_t decayed_us;
   int32_t friction_permille;
+  int32_t share_permille; /* largest load over force of late */
   int32_t floor_mN;   /* since the last slide */
   uint64_t slid_us;   /* the last frame that told a slide */
   uint64_t raised_us; /* the last reflex */

@@ -26,7 +26,7 @@ void grip_default_settings(struct grip_settings *settings, const struct grip_tra
       .control_us = 10000,
       .first_mN = 1500,
       .blind_mN = 8000,
-      .shift_um = 3400,
+      .shift_um = 5500,
       .friction_permille = 400,
       .margin_permille = 1300,
       .decay_permille_s = 150,

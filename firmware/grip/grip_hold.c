@@ -9,8 +9,8 @@
 
 /* A slide raises the grip at once by so much, and again each time the gripper has had the time to
  * answer and it goes on. */
-#define REFLEX_PERMILLE 1300
-#define REFLEX_AGAIN_us 20000
+#define REFLEX_PERMILLE 1200
+#define REFLEX_AGAIN_us 50000
 /* This much of the grip that ended a slide is not given up where no load tells what is needed. */
 #define FLOOR_PERMILLE 850
 
@@ -23,11 +23,22 @@
 
 /* Q / F of a slide is friction, as far as Q is known. */
 #define SEEN_PERMILLE 950
+#define SHARE_us 60000
 #define FRICTION_MIN_PERMILLE 150
 #define FRICTION_MAX_PERMILLE 1500
 
 void grip_hold_begin(struct grip *grip) {
   grip->hold = (struct grip_hold){.friction_permille = grip->settings.friction_permille};
+}
+
+/* By when a slide is told the grip may hold again: what counts is the largest share of late. */
+static void follow_share(struct grip *grip, const struct grip_view *view, int32_t step_us) {
+  struct grip_hold *hold = &grip->hold;
+  hold->share_permille -= grip_scale(hold->share_permille, step_us, SHARE_us);
+  if (view->low_mN >= grip->settings.touch_mN * 2) {
+    int32_t share = grip_scale(view->load_mN, 1000, view->low_mN);
+    hold->share_permille = share > hold->share_permille ? share : hold->share_permille;
+  }
 }
 
 static void follow_load(struct grip *grip, const struct grip_view *view) {
@@ -39,21 +50,22 @@ static void follow_load(struct grip *grip, const struct grip_view *view) {
   hold->load_mN = view->load_mN;
   int32_t lag_mN = view->load_mN - hold->slow_load_mN;
   hold->rate_mN_s = lag_mN > 0 ? grip_scale(lag_mN, 1000000, RATE_us) : 0;
+  follow_share(grip, view, step_us > SHARE_us ? SHARE_us : step_us);
   hold->slow_load_mN += step_us >= RATE_us ? lag_mN : grip_scale(lag_mN, step_us, RATE_us);
 }
 
 static void learn_friction(struct grip *grip, const struct grip_view *view, bool begins) {
   struct grip_hold *hold = &grip->hold;
-  if (!view->tells_load || view->low_mN < grip->settings.touch_mN * 2) {
+  if (!view->tells_load) {
     return;
   }
-  int32_t seen = grip_scale(view->load_mN, 1000, view->low_mN);
   if (begins) {
-    hold->load_is_believed = seen >= BELIEVED_PERMILLE;
+    hold->load_is_believed = hold->share_permille >= BELIEVED_PERMILLE;
   }
-  seen = grip_clamp(grip_scale(seen, SEEN_PERMILLE, 1000), FRICTION_MIN_PERMILLE,
-                    FRICTION_MAX_PERMILLE);
-  if (begins ? seen < hold->friction_permille : !hold->sliding && seen > hold->friction_permille) {
+  int32_t seen = grip_clamp(grip_scale(hold->share_permille, SEEN_PERMILLE, 1000),
+                            FRICTION_MIN_PERMILLE, FRICTION_MAX_PERMILLE);
+  if (begins ? seen < hold->friction_permille
+             : !hold->sliding && !view->slides && seen > hold->friction_permille) {
     hold->friction_permille = seen;
   }
 }
@@ -119,6 +131,5 @@ int32_t grip_hold_wants(struct grip *grip, const struct grip_view *view) {
   }
   hold->decayed_us = grip->now_us;
   int32_t share = port_divide(grip->settings.decay_permille_s * (int32_t)step_us, 1000);
-  int32_t lower_mN = grip->wanted_mN - grip_scale(grip->wanted_mN, share, 1000000);
-  return lower_mN > wanted_mN ? lower_mN : wanted_mN;
+  return grip->wanted_mN - grip_scale(grip->wanted_mN - wanted_mN, share, 1000000);
 }

@@ -17,7 +17,7 @@
 #define GUESSED_AFTER_PERMILLE 300
 
 /* A force with a larger standard deviation is no measurement. */
-#define FORCE_SD_MAX_PERMILLE 500
+#define FORCE_SD_MAX_PERMILLE 1000
 
 /* What neither location nor load is to be believed with. */
 #define FORCE_ONLY                                                                                 \
@@ -85,16 +85,27 @@ static void take_load(const struct grip *grip, struct grip_finger *own) {
   if (own->tells_load) {
     own->pulled_us = touch->t_us;
     own->has_pulled = true;
-    own->load_mN = length_of(touch->qx_mN - own->pull.x, touch->qy_mN - own->pull.y);
+    int32_t x_mN = touch->qx_mN - own->pull.x, y_mN = touch->qy_mN - own->pull.y;
+    own->load_mN = length_of(x_mN, y_mN);
+    int32_t force_mN = own->force_mN < 1 ? 1 : own->force_mN;
+    own->share_x_permille = grip_clamp(grip_scale(x_mN, 1000, force_mN), -2000, 2000);
+    own->share_y_permille = grip_clamp(grip_scale(y_mN, 1000, force_mN), -2000, 2000);
     add_to_zero(&own->pull, touch->qx_mN, touch->qy_mN);
   } else if (contact && (touch->flags & CONTACT_FLAG_FIT_VALID) != 0 &&
              (touch->flags & (NO_PLACE | CONTACT_FLAG_TANGENTIAL_VALID)) == 0 &&
              !(own->has_pulled && touch->t_us - own->pulled_us < PULLED_us) &&
              grip->settings.shift_um > 0) {
     own->guesses_load = true;
+    if (own->has_pulled && !own->has_place) {
+      /* What was told last, of this contact, goes on. */
+      own->place.x = touch->x_um - grip_scale(own->share_x_permille, grip->settings.shift_um, 1000);
+      own->place.y = touch->y_um - grip_scale(own->share_y_permille, grip->settings.shift_um, 1000);
+      own->has_place = true;
+    }
     int32_t shift_um = length_of(touch->x_um - own->place.x, touch->y_um - own->place.y);
     int32_t most_um = grip_scale(grip->settings.shift_um, GUESSED_MOST_PERMILLE, 1000);
-    shift_um = shift_um > most_um ? most_um : shift_um;
+    own->shifts = shift_um > most_um;
+    shift_um = own->shifts ? most_um : shift_um;
     own->load_mN = grip_scale(own->force_mN, shift_um, grip->settings.shift_um);
     add_to_zero(&own->place, touch->x_um, touch->y_um);
   }
@@ -177,6 +188,15 @@ static bool is_frozen(const struct grip *grip, const struct grip_finger *own) {
          grip->state != GRIP_IDLE;
 }
 
+/* Eq. (7) takes loads for slides: it counts only where nothing else tells either. */
+static bool slides(const struct grip_finger *own) {
+  if (own->tells_load) {
+    return (own->touch.flags & CONTACT_FLAG_SLIDING) != 0;
+  }
+  return own->guesses_load && own->has_place ? own->shifts
+                                             : (own->touch.flags & CONTACT_FLAG_SLIP) != 0;
+}
+
 void grip_look(struct grip *grip, struct grip_view *view) {
   *view = (struct grip_view){.low_mN = INT32_MAX, .t_us = UINT64_MAX};
   int32_t loads = 0, load_sum_mN = 0, load_most_mN = 0;
@@ -203,9 +223,7 @@ void grip_look(struct grip *grip, struct grip_view *view) {
       view->trouble |= (uint32_t)GRIP_FINGER_0_FORCE_ONLY << i;
     }
     if (contact) {
-      uint32_t slide = own->tells_load ? (uint32_t)CONTACT_FLAG_SLIDING
-                                       : (uint32_t)(CONTACT_FLAG_SLIDING | CONTACT_FLAG_SLIP);
-      view->slides = view->slides || (own->touch.flags & slide) != 0;
+      view->slides = view->slides || slides(own);
       if (own->tells_load || (own->guesses_load && own->has_place)) {
         loads++;
         load_sum_mN += own->load_mN;
