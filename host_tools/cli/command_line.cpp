@@ -133,11 +133,10 @@ int CommandLine::run(int argc, char **argv) {
   return chosen_();
 }
 
-void with_transport(CLI::App *command, Choice &choice) {
+void with_transport(CLI::App *command, Reach &reach) {
   command
       ->add_option_function<std::string>(
-          "--transport",
-          [&choice](const std::string &text) { choice.reach = reach_from_text(text); },
+          "--transport", [&reach](const std::string &text) { reach = reach_from_text(text); },
           "socket (of fingertip serve), serial, usb (libusb, past the system's driver), or auto: "
           "the first of these that there is")
       ->type_name("KIND");
@@ -149,7 +148,7 @@ void with_port_only(CLI::App *command, Choice &choice) {
                    "Serial port or pseudo-terminal; default: $FINGERTIP_PORT, or a fingertip "
                    "plugged in")
       ->type_name("PATH");
-  with_transport(command, choice);
+  with_transport(command, choice.reach);
 }
 
 void with_port(CLI::App *command, Choice &choice) {

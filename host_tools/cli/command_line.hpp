@@ -27,7 +27,7 @@ private:
 };
 
 /* --transport; --port too; --device too. */
-void with_transport(CLI::App *command, Choice &choice);
+void with_transport(CLI::App *command, Reach &reach);
 void with_port_only(CLI::App *command, Choice &choice);
 void with_port(CLI::App *command, Choice &choice);
 void with_colour(CLI::App *command, ColourMode &mode);

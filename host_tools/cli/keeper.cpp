@@ -17,8 +17,10 @@ bool raw_expected(const wire_info &info) {
   return (info.capabilities & CAN_BOTH) == CAN_BOTH;
 }
 
-Metadata begun() {
-  return {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"started_utc", utc_now()}};
+Metadata begun(const Metadata &extra = {}) {
+  Metadata all = {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"started_utc", utc_now()}};
+  all.insert(all.end(), extra.begin(), extra.end());
+  return all;
 }
 
 class OneKeeper : public Keeper {
@@ -76,8 +78,8 @@ private:
 class JointKeeper : public Keeper {
 public:
   JointKeeper(const LiveOptions &options, const std::vector<DeviceNews> &ready,
-              std::int64_t host_zero_us)
-      : writer_(options.recording, options.overwrite, infos(ready), begun(), host_zero_us,
+              std::int64_t host_zero_us, const Metadata &extra)
+      : writer_(options.recording, options.overwrite, infos(ready), begun(extra), host_zero_us,
                 raw_expected(ready[0].packet.body.info), OutputFile::Appears::at_once) {
     for (std::size_t i = 0; i < ready.size(); i++) {
       writer_.packet(i, ready[i].packet, static_cast<double>(host_zero_us));
@@ -92,6 +94,9 @@ public:
   }
   void clock(const DeviceNews &news) override {
     writer_.clock(news.device, news.estimate, news.jumps);
+  }
+  void comment(const std::string &key, double host_us, const std::string &value) override {
+    writer_.comment(key, host_us, value);
   }
   void settle(double host_us) override { writer_.settle(host_us); }
   void finish(const std::vector<LineStatistics> &statistics, const std::string &reason) override {
@@ -131,11 +136,11 @@ std::string utc_now() {
 std::unique_ptr<Keeper> make_keeper(const LiveOptions &options,
                                     const std::vector<DeviceNews> &ready,
                                     const std::vector<std::string> &ports,
-                                    std::int64_t host_zero_us) {
+                                    std::int64_t host_zero_us, const Metadata &extra) {
   if (ready.size() == 1) {
     return std::make_unique<OneKeeper>(options, ready[0], ports[0]);
   }
-  return std::make_unique<JointKeeper>(options, ready, host_zero_us);
+  return std::make_unique<JointKeeper>(options, ready, host_zero_us, extra);
 }
 
 } // namespace fingertip

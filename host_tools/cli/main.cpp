@@ -1,5 +1,5 @@
 /* fingertip: the command line tool. Exit status: 0 done; 1 something went wrong, said in one line;
- * 2 wrong usage. */
+ * 2 wrong usage; of grasp also those of GraspEnd. */
 #include "cli/commands/commands.hpp"
 #include "cli/usage.hpp"
 #include "libfingertip/session.hpp"
@@ -14,8 +14,8 @@ int main(int argc, char **argv) {
         "Talks to Fingertip tactile sensors: shows, records and replays what they feel.",
         FINGERTIP_VERSION);
     for (auto add : {add_list, add_info, add_doctor, add_monitor, add_record, add_replay, add_tare,
-                     add_calibrate, add_pad, add_set, add_serve, add_gripper, add_loader, add_flash,
-                     add_rule, add_encode}) {
+                     add_calibrate, add_pad, add_set, add_serve, add_gripper, add_grasp, add_loader,
+                     add_flash, add_rule, add_encode}) {
       add(line);
     }
     return line.run(argc, argv);

@@ -4,9 +4,9 @@
 #include "cli/ink.hpp"
 #include "cli/names_of_values.hpp"
 #include "cli/pad_picture.hpp"
+#include "cli/panel.hpp"
 #include "cli/traces.hpp"
 #include "libfingertip/packet_fields.hpp"
-#include "tool/advice.hpp"
 
 #include <algorithm>
 
@@ -21,48 +21,10 @@ constexpr int WIDE = 60;
 /* Of firmware that could tell tangential load. */
 constexpr const char *NO_PAD = "no pad profile:", *PAD_COMMAND = "fingertip pad";
 
-std::string right_aligned(const std::string &text, int width) {
-  return std::string(static_cast<std::size_t>(std::max(0, width - columns_of(text))), ' ') + text;
-}
-
 /* "+3.20": always with a sign, so that columns stand still. */
 std::string signed_number(float value, int digits) {
   std::string text = number(value, digits);
   return text[0] == '-' ? text : "+" + text;
-}
-
-struct Told {
-  std::string text;
-  Colour colour;
-};
-
-Told state_of(const Model &model) {
-  auto silence_s = model.seconds_since_frame();
-  switch (model.state()) {
-  case Model::State::connecting:
-    return {"waiting for an answer", WARNING};
-  case Model::State::gone:
-    return {GONE_ADVICE, BAD};
-  case Model::State::replay:
-    return {"replay", ACCENT};
-  case Model::State::live:
-    break;
-  }
-  if (model.is_without_sensors()) {
-    return {"no sensor answers", BAD};
-  }
-  if (!silence_s) {
-    return {"no frames yet", BAD};
-  }
-  if (*silence_s > STALLED_s) {
-    return {"STALLED for " + fixed(*silence_s, 1) + " s", BAD};
-  }
-  return model.is_tared() ? Told{"live", GOOD} : Told{"taring", WARNING};
-}
-
-void draw_bar(Canvas &canvas, const Area &area) {
-  canvas.text(area.left, area.top, std::string(static_cast<std::size_t>(area.width), ' '),
-              {FAINT, BAR, false});
 }
 
 /* Name at the left, state at the right. */
@@ -82,30 +44,6 @@ void draw_header(Canvas &canvas, const Area &area, const Model &model, bool alon
   auto [state, colour] = state_of(model);
   std::string text = first_columns(" ● " + state, area.width - 1) + " ";
   canvas.text(area.left + area.width - columns_of(text), area.top, text, {colour, BAR, true});
-}
-
-/* A number with its label and unit. */
-struct Quantity {
-  const char *label;
-  std::optional<std::string> value;
-  int width;
-  const char *unit;
-  bool doubtful = false;
-};
-
-int draw_quantity(Canvas &canvas, int column, int row, const Quantity &quantity) {
-  bool doubtful = quantity.value && quantity.doubtful;
-  column = canvas.text(column, row, std::string(quantity.label) + " ", text_style(FAINT));
-  column = canvas.text(column, row, right_aligned(quantity.value.value_or("-"), quantity.width),
-                       text_style(doubtful ? WARNING : WHITE, !doubtful));
-  column = canvas.text(column, row, doubtful ? "?" : " ", text_style(WARNING));
-  return canvas.text(column, row, quantity.unit, text_style(FAINT));
-}
-
-int draw_lamp(Canvas &canvas, int column, int row, bool on, const std::string &name,
-              Colour colour) {
-  column = canvas.text(column, row, on ? "● " : "○ ", text_style(on ? colour : RULE, true));
-  return canvas.text(column, row, name, text_style(on ? colour : FAINT, on));
 }
 
 /* Of the last frame, as far as it holds them. */
@@ -150,21 +88,6 @@ Numbers numbers_of(const Model &model) {
     }
   }
   return numbers;
-}
-
-/* Lines of at most this many columns out of parts that stay whole. */
-std::vector<std::string> flowed(const std::vector<std::string> &parts, const std::string &separator,
-                                int columns) {
-  std::vector<std::string> lines;
-  for (const std::string &part : parts) {
-    std::string longer = lines.empty() ? part : lines.back() + separator + part;
-    if (!lines.empty() && columns_of(longer) <= columns) {
-      lines.back() = longer;
-    } else {
-      lines.push_back(part);
-    }
-  }
-  return lines;
 }
 
 Numbers numbers_of_warnings(std::uint32_t flags) {
@@ -413,16 +336,6 @@ void draw_fingertip(Canvas &canvas, const Area &area, const Model &model, bool a
         {area.left, std::max(below, row), area.width - 1, traces_end - std::max(below, row)},
         model);
   }
-}
-
-void draw_caption(Canvas &canvas, const Caption &caption) {
-  int row = canvas.rows() - 1;
-  if (!caption.question.empty()) {
-    canvas.text(1, row, caption.question, text_style(WARNING, true));
-    return;
-  }
-  int column = canvas.text(1, row, caption.keys, text_style(FAINT)) + 3;
-  canvas.text(column, row, caption.note, text_style(ACCENT, true));
 }
 
 void draw_small(Canvas &canvas, const std::vector<Model> &models, const Caption &caption) {

@@ -3,19 +3,12 @@
 #pragma once
 
 #include "cli/canvas.hpp"
+#include "cli/caption.hpp"
 #include "cli/model.hpp"
 
-#include <string>
 #include <vector>
 
 namespace fingertip {
-
-/* What stands below the fingertips. */
-struct Caption {
-  std::string keys;     /* what they do */
-  std::string note;     /* what else is going on, such as the recording */
-  std::string question; /* instead of both */
-};
 
 inline constexpr int MONITOR_COLUMNS = 80, MONITOR_ROWS = 24;
 

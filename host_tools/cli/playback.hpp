@@ -1,7 +1,8 @@
-/* A file of one fingertip or several shown as it was recorded: played at any speed, paused, and
- * sought in both directions. */
+/* A file of one fingertip or several, or of a grasp, shown as it was recorded: played at any speed,
+ * paused, and sought in both directions. */
 #pragma once
 
+#include "cli/grip_model.hpp"
 #include "cli/keys.hpp"
 #include "cli/model.hpp"
 #include "cli/monitor.hpp"
@@ -34,9 +35,6 @@ public:
   void go_back(double time_us, Model &model);
 
 private:
-  /* Where to go back to, all so many us. */
-  static constexpr double MARKS_us = 10e6;
-
   /* Time of frames: a device that restarted goes on where it was. */
   struct Clock {
     bool begun = false;
@@ -62,6 +60,35 @@ private:
   std::vector<Mark> marks_;
 };
 
+/* The gripper of a file, likewise. */
+class GripTrack {
+public:
+  /* Nothing for a file without one. */
+  static std::optional<GripTrack> open(const std::string &path, bool salvage);
+
+  bool is_ended() const { return !next_; }
+  double next_us() const { return next_ ? next_->time_us : last_us_; }
+  double last_us() const { return last_us_; }
+  bool read_to(double time_us, int rows, GripModel &model);
+  void go_back(double time_us, GripModel &model);
+
+private:
+  struct Mark {
+    double time_us;
+    GripRowReader::Place place;
+    GripModel model;
+    std::optional<GripRow> next;
+    double last_us;
+  };
+
+  explicit GripTrack(GripRowReader reader) : reader_(std::move(reader)) {}
+
+  GripRowReader reader_;
+  std::optional<GripRow> next_;
+  double last_us_ = 0;
+  std::vector<Mark> marks_;
+};
+
 class Playback {
 public:
   using Clock = std::chrono::steady_clock;
@@ -80,6 +107,8 @@ public:
 
   const std::vector<Track> &tracks() const { return tracks_; }
   const std::vector<Model> &models() const { return models_; }
+  /* Of a grasp that is shown whole. */
+  const GripModel *grip() const { return grip_track_ ? &grip_ : nullptr; }
   Caption caption(const std::string &name) const;
 
 private:
@@ -87,6 +116,8 @@ private:
 
   std::vector<Track> tracks_;
   std::vector<Model> models_; /* of the tracks */
+  std::optional<GripTrack> grip_track_;
+  GripModel grip_;
   double speed_;
   double time_us_ = 0; /* shown, or to be shown as soon as it is read; infinite: the end */
   bool paused_ = false, quit_ = false, is_there_ = false;

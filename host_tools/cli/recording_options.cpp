@@ -44,13 +44,16 @@ std::vector<Way> ways_of(const Several &several) {
   return ways;
 }
 
-void with_recording(CLI::App *command, LiveOptions &options) {
+void with_seconds(CLI::App *command, std::optional<double> &seconds, const std::string &help) {
   command
       ->add_option_function<std::string>(
-          "--seconds",
-          [&options](const std::string &text) { options.seconds = seconds_from_text(text); },
-          "End after this much device time")
+          "--seconds", [&seconds](const std::string &text) { seconds = seconds_from_text(text); },
+          help)
       ->type_name("S");
+}
+
+void with_recording(CLI::App *command, LiveOptions &options) {
+  with_seconds(command, options.seconds, "End after this much device time");
   command
       ->add_option("--raw-bytes", options.raw_bytes, "Also keep the bytes of the line as they came")
       ->type_name("FILE.ftr");

@@ -19,6 +19,7 @@ void with_several(CLI::App *command, Several &several);
 /* Throws Error if there is none, or it is not clear which. */
 std::vector<Way> ways_of(const Several &several);
 
+void with_seconds(CLI::App *command, std::optional<double> &seconds, const std::string &help);
 void with_recording(CLI::App *command, LiveOptions &options);
 
 } // namespace fingertip

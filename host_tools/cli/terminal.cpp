@@ -1,6 +1,7 @@
 #include "cli/terminal.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cctype>
 #include <cerrno>
 #include <csignal>
@@ -17,10 +18,17 @@ namespace fingertip {
 namespace {
 
 volatile std::sig_atomic_t stop_signal = 0;
+std::atomic<unsigned> interrupt_count{0}; /* the handler may run in several threads */
+volatile std::sig_atomic_t end_signal = 0;
 volatile std::sig_atomic_t suspend_signal = 0;
 
 void on_stop(int signal) {
   stop_signal = signal;
+  if (signal == SIGINT) {
+    interrupt_count++;
+  } else {
+    end_signal = signal;
+  }
 }
 void on_suspend(int signal) {
   suspend_signal = signal;
@@ -82,6 +90,14 @@ bool wait_for_standard_output() {
 
 bool stop_requested() {
   return stop_signal != 0;
+}
+
+unsigned interrupts() {
+  return interrupt_count;
+}
+
+bool end_requested() {
+  return end_signal != 0;
 }
 
 std::optional<ColourDepth> screen_depth(ColourMode mode) {

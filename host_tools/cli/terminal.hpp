@@ -13,6 +13,10 @@ namespace fingertip {
 /* SIGINT, SIGTERM and SIGHUP from now on only ask to stop, SIGPIPE is ignored. */
 void catch_signals();
 bool stop_requested();
+/* Of these, how often SIGINT came, for programs that do not end by the first; and whether another
+ * did. */
+unsigned interrupts();
+bool end_requested();
 
 /* Whether a pipe's other end is still there. */
 bool is_standard_output_read();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/canvas.hpp"
+#include "cli/chart.hpp"
 #include "cli/ink.hpp"
 #include "cli/model.hpp"
 
@@ -12,5 +13,8 @@ namespace fingertip {
  * there is no room for all. What carries a warning is dashed, and left out where it is
  * beyond the axis that the others need. */
 void draw_traces(Canvas &canvas, const Area &area, const Model &model);
+
+/* Of the model, which must outlive it; in intervals of Model::SAMPLE_INTERVAL_us. */
+Curve force_curve(const Model &model);
 
 } // namespace fingertip

@@ -1,6 +1,8 @@
 #include "cli/view.hpp"
 
 #include "cli/doubt.hpp"
+#include "cli/grasp_screen.hpp"
+#include "grasp/words.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/text.hpp"
@@ -8,6 +10,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <functional>
 #include <unistd.h>
 
 namespace fingertip {
@@ -78,11 +81,13 @@ std::string status_line(const Model &model) {
 
 class ScreenView : public View {
 public:
-  explicit ScreenView(ColourDepth depth) : screen_(depth) {}
+  using Draw = std::function<Canvas(const std::vector<Model> &models, const Caption &caption,
+                                    int columns, int rows)>;
+  ScreenView(ColourDepth depth, Draw draw) : screen_(depth), draw_(std::move(draw)) {}
   void update(const std::vector<Model> &models, const Caption &caption) override {
     if (interval_.is_due(hurry_)) {
       hurry_ = false;
-      screen_.draw(draw_monitor(models, caption, screen_.columns(), screen_.rows()));
+      screen_.draw(draw_(models, caption, screen_.columns(), screen_.rows()));
     }
   }
   void hurry() override { hurry_ = true; }
@@ -90,6 +95,7 @@ public:
 
 private:
   Screen screen_;
+  Draw draw_;
   bool hurry_ = false;
   Interval interval_{std::chrono::milliseconds(40)};
 };
@@ -134,6 +140,31 @@ public:
   }
 
 private:
+  Change change_;
+  Interval interval_{std::chrono::milliseconds(1000)};
+};
+
+class GraspLineView : public View {
+public:
+  GraspLineView(const GripModel &grip, bool quiet) : grip_(grip), quiet_(quiet) {}
+  void update(const std::vector<Model> &, const Caption &caption) override {
+    if (!grip_.row() || grip_.row()->report.state == GRIP_IDLE) {
+      return;
+    }
+    const grip_report &report = grip_.row()->report;
+    bool changed = change_.is_new(state_name(report.state) + trouble_names(report.trouble));
+    if (!changed && (quiet_ || !interval_.is_due())) {
+      return;
+    }
+    std::FILE *to = quiet_ ? stderr : stdout;
+    std::fprintf(to, "%s%s%s\n", grip_line(grip_).c_str(), caption.note.empty() ? "" : "  ",
+                 caption.note.c_str());
+    std::fflush(to);
+  }
+
+private:
+  const GripModel &grip_;
+  bool quiet_;
   Change change_;
   Interval interval_{std::chrono::milliseconds(1000)};
 };
@@ -185,9 +216,22 @@ private:
 
 std::unique_ptr<View> make_monitor_view(ColourMode mode) {
   if (auto depth = screen_depth(mode)) {
-    return std::make_unique<ScreenView>(*depth);
+    return std::make_unique<ScreenView>(*depth, draw_monitor);
   }
   return std::make_unique<LineView>();
+}
+
+std::unique_ptr<View> make_grasp_view(ColourMode mode, const GripModel &grip) {
+  if (auto depth = screen_depth(mode)) {
+    return std::make_unique<ScreenView>(
+        *depth, [&grip](const std::vector<Model> &models, const Caption &caption, int columns,
+                        int rows) { return draw_grasp(models, grip, caption, columns, rows); });
+  }
+  return std::make_unique<GraspLineView>(grip, false);
+}
+
+std::unique_ptr<View> make_quiet_grasp_view(const GripModel &grip) {
+  return std::make_unique<GraspLineView>(grip, true);
 }
 
 std::unique_ptr<View> make_progress_view() {

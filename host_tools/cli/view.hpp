@@ -1,6 +1,7 @@
 /* Ways to show fingertips while they change. */
 #pragma once
 
+#include "cli/grip_model.hpp"
 #include "cli/model.hpp"
 #include "cli/monitor.hpp"
 #include "cli/terminal.hpp"
@@ -23,6 +24,10 @@ public:
 
 /* The monitor on a terminal, or one line a second for each fingertip elsewhere. */
 std::unique_ptr<View> make_monitor_view(ColourMode mode);
+/* Likewise a grasp, whose lines come when its state or trouble changes too; quiet: only then, and
+ * only on standard error. The model must outlive the view. */
+std::unique_ptr<View> make_grasp_view(ColourMode mode, const GripModel &grip);
+std::unique_ptr<View> make_quiet_grasp_view(const GripModel &grip);
 /* One line on standard error, renewed in place if that is a terminal. */
 std::unique_ptr<View> make_progress_view();
 /* On standard error only what is wrong for a second or more, and that it has ended. */

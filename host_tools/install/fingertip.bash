@@ -5,8 +5,9 @@ _fingertip() {
     words=$(fingertip --help | sed -n '/^Subcommands:/,$s/^  \([a-z]*\) .*/\1/p')
   else
     case $before in
-      --device) words=$(fingertip list 2> /dev/null | cut -f 1) ;;
+      --device|--left|--right) words=$(fingertip list 2> /dev/null | cut -f 1) ;;
       --transport) words='auto socket serial usb' ;;
+      --gripper) words='2f85 2f140 hande sts3215' ;;
       --colour) words='auto truecolour 256 plain' ;;
       --model) words='2f85 2f140 hande sts3215' ;;
       gripper) [ "$COMP_CWORD" -eq 2 ] && words='list info move open close' ;;

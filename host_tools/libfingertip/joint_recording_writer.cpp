@@ -104,6 +104,11 @@ void JointRecordingWriter::clock(std::size_t device, const ClockEstimate &estima
   }
 }
 
+void JointRecordingWriter::comment(const std::string &key, double host_us,
+                                   const std::string &value) {
+  waiting_.emplace(host_us, "# " + key + ": " + printable(value));
+}
+
 void JointRecordingWriter::settle(double host_us) {
   while (!waiting_.empty() && waiting_.begin()->first <= host_us) {
     line(waiting_.begin()->second);

@@ -44,6 +44,9 @@
  * uncertainty; a positive drift is a fast fingertip. alignment_us: no two rows of different
  * fingertips were ever further from their true distance in time.
  *
+ * Between the rows the recorder may have lines of its own, "# key: value", whose keys no reader has
+ * to know; those of a grasp are in grasp/grip_row.hpp.
+ *
  * What one fingertip said stands in the order in which it said it, so that its sequence numbers
  * tell what was lost. Rows of different fingertips are in order of time_us, unless one came more
  * than a quarter of a second late; and where a fingertip's clock turns out to be another than

@@ -19,6 +19,8 @@ Cells of a packet that did not come are empty, and those of a quantity whose fla
 Of several fingertips on one clock, format 2, written by `fingertip record --device A --device B`: see
 host_tools/libfingertip/recording.hpp. Read as the recording of one of them, with time_us, the recorder's clock.
 
+Of a grasp also the gripper's and the controller's rows, "# grip: ..." between the others: see host_tools/grasp/grip_row.hpp, read_grip.
+
 Run report (JSON): what the emulator measured; used are device_time_zero_s and warnings.
 
 Every error is an InputError whose text is one line that names file and line and says what to do.
@@ -410,6 +412,53 @@ def read_recording(path, salvage=False, device=None, columns=None, progress=None
         raise InputError(f"{path}: no frames; record again while the fingertip streams")
     return Recording(path, metadata, [header[i] for i in wanted], np.frombuffer(table).reshape(-1, len(wanted)), line_numbers,
                      sensors if columns is None else 0, events, packets, end, skipped, np.array(times_us) if devices else None)
+
+
+GRIP_WORDS = ("state", "trouble")  # its columns that are names
+GRIP_STATES = ("idle", "activating", "approach", "squeeze", "ready", "holding", "slipping", "still", "release", "open", "dropped", "missed", "fault")
+GRIP_ROW, GRIP_EVENT = "# grip: ", "# grip_event: "
+
+
+def _grip_values(path, number, columns, cells):
+    if len(cells) != len(columns):
+        raise InputError(f"{path}:{number}: {len(cells)} columns of the gripper where its header has {len(columns)}; use --salvage to skip the line")
+    if cells[columns.index("state")] not in GRIP_STATES:
+        raise InputError(f'{path}:{number}: state is "{cells[columns.index("state")]}"; use --salvage to skip the line')
+    return [cell if name in GRIP_WORDS else _number(path, number, name, cell, name != "time_us") for name, cell in zip(columns, cells)]
+
+
+def read_grip(path, salvage=False):
+    """The gripper's rows in the recording of a grasp: {column: array}, NaN where empty; of any other recording an empty dictionary."""
+    columns, rows = None, []
+    for number, line, torn in _RecordingLines(path):
+        if not line.startswith(GRIP_ROW):
+            continue
+        cells = line[len(GRIP_ROW):].split(",")
+        if columns is None:
+            if cells[0] != "time_us" or "state" not in cells:
+                raise InputError(f"{path}:{number}: a row of the gripper before its header; record anew")
+            columns = cells
+            continue
+        try:
+            if torn:
+                raise InputError(f"{path}:{number}: the last line is torn; use --salvage to skip the line")
+            rows.append(_grip_values(path, number, columns, cells))
+        except InputError:
+            if not salvage:
+                raise
+    if not rows:
+        return {}
+    return {name: np.array(values, dtype=None if name in GRIP_WORDS else float) for name, values in zip(columns, zip(*rows))}
+
+
+def read_grip_events(path):
+    """What was asked of the gripper and what went wrong: [(time_us, text)]."""
+    events = []
+    for number, line, torn in _RecordingLines(path):
+        if line.startswith(GRIP_EVENT) and not torn:
+            time_us, _, text = line[len(GRIP_EVENT):].partition(",")
+            events.append((_number(path, number, "time_us", time_us, False), text))
+    return events
 
 
 def read_run(path):

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
 """Draws a recording, with the truth behind it if there is one; force along three axes where it has tangential loads.
+Of a grasp it draws what was wanted and felt, load, width and state, unless --device chooses one of its fingertips.
 
     plot.py RECORDING.csv [--truth SCENARIO.csv] [--run run.json] -o FILE.png
 """
@@ -16,13 +17,15 @@ from matplotlib.patches import FancyBboxPatch
 
 from evaluate import Comparison, add_recording_options, check_time, load_recording
 from fingertip_files import (
-    FIT_VALID, MOVING, SLIDING, SLIP, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, WARNINGS, InputError, check_output, read_run, read_scenario, run_tool, write_bytes)
+    FIT_VALID, MOVING, SLIDING, SLIP, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, WARNINGS, InputError, check_output, read_grip, read_run, read_scenario, recorded_devices,
+    run_tool, write_bytes)
 
 INK, FAINT, TRUTH, MEASURED, SLIPPING, DOUBTFUL = "#22252e", "#8a8f9c", "#b4bac6", "#1f6fd6", "#d93a3a", "#d08a00"
 ALONG_Y = "#0d9488"
 RIM_mm = 6.0
 # All that a picture needs: 250 000 rows of these are 30 MB, of all columns 130.
 COLUMNS = ("t_us", "frame", "flags", "x_mm", "y_mm", "force_N", "qx_N", "qy_N", "q_sd_N", "tangential_ratio")
+GRASP_COLUMNS = ("t_us", "frame", "flags", "force_N")
 COMPARED_COLUMNS = (*COLUMNS, *STAGES, "total_us")
 
 
@@ -188,6 +191,80 @@ def draw_errors(axes, comparison):
         panel.set_ylabel("frames")
 
 
+def spans(t_s, on):
+    """(start, end) of consecutive rows that are on, each to the next row."""
+    ends = np.append(t_s[1:], t_s[-1])
+    edges = np.diff(np.concatenate(([0], on.astype(int), [0])))
+    return [(t_s[a], ends[b]) for a, b in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1)]
+
+
+def draw_grasp(path, grip, fingertips):
+    """Into this file; what a line says of it."""
+    set_style()
+    figure = plt.figure(figsize=(14, 8.5))
+    grid = figure.add_gridspec(4, 1, height_ratios=[3, 1.6, 1.6, 0.7], hspace=0.18, left=0.055, right=0.985, top=0.9, bottom=0.07)
+    force = figure.add_subplot(grid[0])
+    panels = [force, *(figure.add_subplot(grid[i], sharex=force) for i in range(1, 4))]
+    _, load, width, state = panels
+    t_s = grip["time_us"] / 1e6
+    controlled = np.isin(grip["state"], ("squeeze", "ready", "holding", "slipping"))
+    for recording, colour, label in zip(fingertips, (MEASURED, ALONG_Y), ("left", "right")):
+        rows = recording.has_contact
+        felt_s, flags = recording.time_us[rows] / 1e6, recording.flag(FIT_VALID)[rows]
+        doubtful = flags & recording.flag(WARNINGS)[rows]
+        values = recording["force_N"][rows]
+        force.plot(felt_s, gaps_as_nan(felt_s, values, flags & ~doubtful), color=colour, lw=1.1, label=label, zorder=2)
+        low, high = force.get_ylim()
+        force.scatter(felt_s[doubtful], values[doubtful], s=7, fc="none", ec=DOUBTFUL, lw=0.5, zorder=2)
+        force.set_ylim(low, high)
+    force.plot(t_s, np.where(controlled, grip["wanted_N"], np.nan), color=INK, lw=1.4, drawstyle="steps-post", label="wanted", zorder=3)
+    load.plot(t_s, np.where(controlled & (grip["margin"] > 0), grip["load_N"], np.nan), color=MEASURED, lw=1.1)
+    width.plot(t_s, grip["width_mm"], color=MEASURED, lw=1.1, label="told")
+    width.plot(t_s, np.where(grip["motion"] == 2, grip["command_mm"], np.nan), color=INK, lw=0.9, ls=":", label="commanded")
+    slipping = spans(t_s, grip["state"] == "slipping")
+    for panel in panels[:3]:
+        for start, end in slipping:
+            panel.axvspan(start, max(end, start + 1e-3), color=SLIPPING, alpha=0.15, lw=0, zorder=0)
+        panel.grid(color="#e6e8ee", lw=0.6)
+        panel.tick_params(labelbottom=False)
+    for start, _ in slipping:
+        force.axvline(start, color=SLIPPING, lw=1, zorder=1)
+    colours = {"slipping": SLIPPING, "dropped": SLIPPING, "missed": SLIPPING, "fault": SLIPPING, "holding": ALONG_Y, "ready": ALONG_Y}
+    for name in dict.fromkeys(grip["state"]):
+        for start, end in spans(t_s, grip["state"] == name):
+            state.barh(0.5, end - start, left=start, height=1, color=colours.get(name, TRUTH), ec="white", lw=0.5)
+            if end - start > 0.05 * (t_s[-1] - t_s[0]):
+                state.text((start + end) / 2, 0.5, name, ha="center", va="center", size=8, color="white" if name in colours else INK)
+    troubled = spans(t_s, grip["trouble"] != "")
+    for start, end in troubled:
+        state.plot([start, max(end, start + 1e-3)], [-0.2] * 2, color=DOUBTFUL, lw=4, solid_capstyle="butt")
+    state.set_ylim(-0.5, 1)
+    state.set_yticks([])
+    state.set_xlabel("time, s" + (" (below: something was wrong)" if troubled else ""))
+    force.set_ylabel("force, N")
+    load.set_ylabel("load, N")
+    width.set_ylabel("width, mm")
+    force.set_ylim(bottom=0)
+    force.set_xlim(t_s[0], t_s[-1])
+    force.legend(loc="upper left", ncol=3, fontsize=8, frameon=False)
+    width.legend(loc="upper right", ncol=2, fontsize=8, frameon=False)
+    slides = int(grip["slides"].max())
+    told = (f"{slides} slide{'' if slides == 1 else 's'}, held by at most {np.nanmax(grip['force_N']):.1f} N, at last {grip['state'][-1]}")
+    figure.text(0.055, 0.955, "Fingertip, a grasp", size=17, weight="bold")
+    identity = "  ·  ".join(text for text in (*(f.metadata.get("serial", "") for f in fingertips), fingertips[0].metadata.get("grasp_gripper", "")) if text)
+    figure.text(0.055, 0.925, f"{identity}  ·  {told}", size=9, color=FAINT)
+    picture = io.BytesIO()
+    figure.savefig(picture, dpi=110, format="png")
+    write_bytes(path, picture.getvalue())
+    return told
+
+
+def set_style():
+    plt.rcParams.update({
+        "font.size": 9, "axes.edgecolor": TRUTH, "axes.labelcolor": INK, "xtick.color": FAINT, "ytick.color": FAINT,
+        "text.color": INK, "axes.spines.top": False, "axes.spines.right": False, "axes.titlecolor": FAINT})
+
+
 def header(recording, comparison, t_s, simulated):
     identity = "  ·  ".join(recording.metadata[key] for key in ("serial", "board", "scene", "git") if recording.metadata.get(key))
     lines = [identity]
@@ -218,6 +295,13 @@ def main(argv):
     if not options.output.lower().endswith(".png"):
         raise InputError(f"{options.output}: no name of a picture; give one that ends in .png")
     check_output(options.output, options.recording, options.truth, options.run)
+    if not options.device and not options.truth and len(recorded_devices(options.recording)) == 2:
+        grip = read_grip(options.recording, options.salvage)
+        if grip:
+            fingertips = [load_recording(argparse.Namespace(**{**vars(options), "device": serial}), columns=GRASP_COLUMNS)
+                          for serial in recorded_devices(options.recording)]
+            print(f"{options.output}: {draw_grasp(options.output, grip, fingertips)}")
+            return 0
     run = read_run(options.run)
     truth = read_scenario(options.truth) if options.truth else None
     recording = load_recording(options, columns=COMPARED_COLUMNS if truth else COLUMNS, progress=show_progress)
@@ -233,9 +317,7 @@ def main(argv):
     doubtful = fitted & recording.flag(WARNINGS)[rows]
     good = fitted & ~doubtful
 
-    plt.rcParams.update({
-        "font.size": 9, "axes.edgecolor": TRUTH, "axes.labelcolor": INK, "xtick.color": FAINT, "ytick.color": FAINT,
-        "text.color": INK, "axes.spines.top": False, "axes.spines.right": False, "axes.titlecolor": FAINT})
+    set_style()
     pulled = recording.flag(TANGENTIAL_VALID)[rows].any()
     over_time = 5 if pulled else 3
     height = 9.2 + 3.6 * pulled

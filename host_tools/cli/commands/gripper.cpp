@@ -1,12 +1,12 @@
 #include "gripper/gripper.hpp"
 
 #include "cli/commands/commands.hpp"
+#include "cli/gripper_options.hpp"
 #include "cli/usage.hpp"
 #include "gripper/serial_line.hpp"
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
-#include "tool/advice.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -31,7 +31,6 @@ struct GripperOptions {
   std::string action;
   std::optional<double> width_mm;
   GripperWay way;
-  double timeout_ms = 50.0;
   std::optional<double> speed_mm_s;
   double force_N = 0.0;
   bool activate = false;
@@ -86,19 +85,6 @@ int list_grippers() {
     advise_about_timer(port.path);
   }
   return 0;
-}
-
-std::string only_port() {
-  const std::vector<GripperPort> ports = find_gripper_ports();
-  if (ports.size() == 1) {
-    return ports.front().path;
-  }
-  std::string names;
-  for (const GripperPort &port : ports) {
-    names += " " + port.path;
-  }
-  throw WrongUsage(ports.empty() ? "no serial port on USB is here; name the gripper's with --port"
-                                 : "choose one with --port:" + names);
 }
 
 // An answer may get lost; several in a row are told.
@@ -244,12 +230,8 @@ int gripper_command(GripperOptions options) {
                                       : "WIDTH is missing: fingertip gripper move MM");
   }
   typed([&] { return gripper_traits(options.way.model); });
-  if (options.way.port.empty()) {
-    options.way.port = only_port();
-  }
-  options.way.timeout_s = options.timeout_ms / 1000;
   try {
-    const std::unique_ptr<Gripper> gripper = open_gripper(options.way);
+    const std::unique_ptr<Gripper> gripper = reach_gripper(options.way);
     if (options.action != "info") {
       return move(*gripper, options);
     }
@@ -260,11 +242,7 @@ int gripper_command(GripperOptions options) {
   } catch (const WrongUsage &) {
     throw;
   } catch (const Error &error) {
-    if (error.code() == ErrorCode::bad_value) {
-      throw WrongUsage(error.what());
-    }
-    const std::string what_to_do = gripper_advice(error.code());
-    throw Error(error.what() + (what_to_do.empty() ? "" : "; " + what_to_do));
+    throw with_gripper_advice(error);
   }
 }
 
@@ -299,10 +277,6 @@ void add_gripper(CommandLine &line) {
                    "Of its serial line; default: the only one on USB that is no fingertip")
       ->type_name("PATH");
   command
-      ->add_option("--slave", options->way.slave,
-                   "Its address on the line; default: 9, of a servo 6")
-      ->type_name("N");
-  command
       ->add_option("--speed", options->speed_mm_s,
                    "Of the width; default: 50 mm/s, or the nearest that it can")
       ->type_name("MM/S");
@@ -315,20 +289,7 @@ void add_gripper(CommandLine &line) {
   command->add_flag("--activate", options->activate,
                     "Activate it first, which clears its faults; a Robotiq opens and closes fully, "
                     "and whatever it holds falls");
-  command
-      ->add_option("--closed", options->way.closed_count,
-                   "Position that it tells when its pads touch; default: 230, of a servo 2048")
-      ->type_name("COUNT");
-  command
-      ->add_option("--open", options->way.open_count,
-                   "Position that it tells when it is open; default: 3, of a servo 2700")
-      ->type_name("COUNT");
-  command
-      ->add_option("--jaw", options->way.jaw_mm,
-                   "Of a servo: from its axis to the middle of the pad; default: 100 mm")
-      ->type_name("MM");
-  command->add_option("--timeout", options->timeout_ms, "Of one answer; default: 50 ms")
-      ->type_name("MS");
+  with_gripper_line(command, options->way);
 }
 
 } // namespace fingertip

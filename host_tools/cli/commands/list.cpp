@@ -61,7 +61,7 @@ void add_list(CommandLine &line) {
                "List the fingertips plugged in, and the paths in $FINGERTIP_PORT: serial "
                "number, board, firmware, how it is reached",
                [choice] { return list(choice->reach); }),
-      *choice);
+      choice->reach);
 }
 
 } // namespace fingertip

@@ -130,7 +130,8 @@ int convert(const ReplayOptions &options) {
 int show(const ReplayOptions &options) {
   Playback playback(options.file, options.salvage, options.device, options.speed);
   std::string name = printable(options.file);
-  std::unique_ptr<View> view = make_monitor_view(options.colour);
+  std::unique_ptr<View> view = playback.grip() ? make_grasp_view(options.colour, *playback.grip())
+                                               : make_monitor_view(options.colour);
   while (!playback.is_over() && !stop_requested()) {
     playback.step(Clock::now());
     view->update(playback.models(), playback.caption(name));

@@ -131,7 +131,7 @@ class Usage(CliTest):
         self.assertRegex(self.run_cli("--version")[0], r"^fingertip \d+\.\d+\.\d+\n$")
         commands = re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
         self.assertEqual(sorted(commands), sorted(
-            ["list", "info", "doctor", "monitor", "record", "replay", "tare", "calibrate", "pad", "set", "serve", "flash", "rule", "loader",
+            ["list", "info", "doctor", "monitor", "record", "replay", "grasp", "gripper", "tare", "calibrate", "pad", "set", "serve", "flash", "rule", "loader",
              "encode"]))
         for command in commands:
             self.assertIn(f"Usage: fingertip {command}", self.run_cli(command, "--help")[0])
@@ -628,6 +628,8 @@ class Install(CliTest):
         self.assertEqual(complete("fingertip")("mon"), ["monitor"])
         self.assertIn("--transport", complete("fingertip", "info")("--"))
         self.assertEqual(complete("fingertip", "info", "--transport")("s"), ["socket", "serial"])
+        models = re.search(r"--gripper MODEL REQUIRED +(.*)", self.run_cli("grasp", "--help")[0])[1].split(", ")
+        self.assertEqual(complete("fingertip", "grasp", "--gripper")(""), models)
         self.environment["FINGERTIP_PORT"] = self.port
         with self.device("serial=AAAA"):
             self.assertEqual(complete("fingertip", "info", "--device")(""), ["AAAA"])

@@ -1,0 +1,57 @@
+/* What is known of a grasp at this moment beside its fingertips, gathered from the rows of a
+ * recording, for views to show. */
+#pragma once
+
+#include "grasp/grip_row.hpp"
+#include "libfingertip/packet_fields.hpp"
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+
+namespace fingertip {
+
+class GripModel {
+public:
+  /* Of an interval: the last values, and whether it ever was so. */
+  struct Sample {
+    bool controlled = false; /* wanted_N holds */
+    bool loaded = false;     /* load_N holds */
+    bool answered = false;   /* width_mm holds */
+    bool slipping = false;
+    float wanted_N = 0, load_N = 0, width_mm = 0;
+  };
+  static constexpr std::uint64_t INTERVAL_us = 50000;
+  static constexpr std::size_t SAMPLES = 800;
+
+  void take(const GripRow &row);
+  /* Of the recording's head: gripper and cap. */
+  void take(const Metadata &head);
+  void set_gripper(const std::string &gripper) { gripper_ = gripper; }
+  void set_cap_N(float cap_N) { cap_N_ = cap_N; }
+
+  const std::optional<GripRow> &row() const { return row_; }
+  const std::string &gripper() const { return gripper_; }
+  float cap_N() const { return cap_N_; }
+  double seconds() const { return row_ ? row_->time_us / 1e6 : 0; }
+  /* The last of before this grasp's newest state: for how long it has been. */
+  double state_seconds() const { return row_ ? (row_->time_us - state_since_us_) / 1e6 : 0; }
+
+  /* Of an interval of time, 0 the recording's first. */
+  const Sample &sample(std::int64_t interval) const;
+  std::int64_t last_interval() const { return last_interval_; }
+
+private:
+  std::string gripper_;
+  float cap_N_ = 0;
+  std::optional<GripRow> row_;
+  double state_since_us_ = 0;
+  std::deque<Sample> samples_;
+  std::int64_t last_interval_ = 0;
+};
+
+/* "left 4.02 N" and so on: what a line of text tells. */
+std::string grip_line(const GripModel &grip);
+
+} // namespace fingertip

@@ -1,0 +1,18 @@
+// What fingertips and grippers say, as the controller's core takes it: integers, on the host's
+// steady clock in us. Numbers beyond a field's range end at its limits.
+#pragma once
+
+#include "grasp/core.hpp"
+#include "gripper/gripper.hpp"
+#include "libfingertip/wire.hpp"
+
+namespace fingertip {
+
+// host_us: when the frame was measured.
+grip_touch touch_from_packet(const wire_packet &contact, double host_us);
+
+grip_traits core_traits(const GripperTraits &traits);
+grip_status core_status(const GripperStatus &status);
+GripperMove gripper_move(const grip_command &command);
+
+} // namespace fingertip

@@ -1,0 +1,6 @@
+// The controller's core, for C++.
+#pragma once
+
+extern "C" {
+#include "grip/grip.h"
+}

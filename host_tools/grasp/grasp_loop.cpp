@@ -1,0 +1,205 @@
+#include "grasp/grasp_loop.hpp"
+
+#include "grasp/convert.hpp"
+#include "grasp/words.hpp"
+#include "libfingertip/error.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace fingertip {
+
+namespace {
+
+using std::chrono::milliseconds;
+using Kind = GraspNews::Kind;
+
+constexpr milliseconds STEP{5};
+// At the end: for the gripper to have heard the last command.
+constexpr std::int64_t LAST_WORD_us = 500000;
+// Of news that nobody takes: ten seconds of two fingertips at 1308 frames a second, and the steps.
+constexpr std::size_t MOST_NEWS = 80000;
+
+} // namespace
+
+GraspLoop::GraspLoop(const std::array<Way, FINGERS> &ways, Options options)
+    : options_(std::move(options)) {
+  DeviceLoop::Options wanted;
+  wanted.streams = options_.streams;
+  wanted.follow_clock = true;
+  for (std::size_t i = 0; i < FINGERS; i++) {
+    loops_[i] = std::make_unique<DeviceLoop>(i, ways[i], wanted, feed_);
+  }
+}
+
+GraspLoop::~GraspLoop() {
+  abandoned_ = true;
+  end();
+  if (thread_.joinable()) {
+    thread_.join();
+  }
+}
+
+double GraspLoop::read_until_us() const {
+  return std::min(loops_[0]->read_until_us(), loops_[1]->read_until_us());
+}
+
+std::array<DeviceNews, GraspLoop::FINGERS> GraspLoop::meet(const std::function<bool()> &stop) {
+  std::array<std::optional<DeviceNews>, FINGERS> ready;
+  while (!ready[0] || !ready[1]) {
+    if (stop()) {
+      throw Interrupted();
+    }
+    for (DeviceNews &news : feed_.take(milliseconds(20))) {
+      if (news.kind == DeviceNews::Kind::ready) {
+        ready[news.device] = std::move(news);
+      } else if (news.kind == DeviceNews::Kind::ended) {
+        loops_[news.device]->rethrow();
+        throw Interrupted();
+      } else if (ready[news.device]) {
+        early_.push_back(std::move(news));
+      }
+    }
+  }
+  return {std::move(*ready[0]), std::move(*ready[1])};
+}
+
+void GraspLoop::begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen,
+                      const grip_settings &settings) {
+  const grip_traits traits = core_traits(gripper->traits());
+  if (grip_init(&core_, &settings, &traits) != FT_OK) {
+    throw Error(ErrorCode::bad_value, "these limits do not go with a gripper " +
+                                          gripper->traits().model + ", or contradict one another");
+  }
+  status_ = gripper->poll();
+  const grip_status first = core_status(*status_);
+  grip_take_status(&core_, &first);
+  gripper_ = std::make_unique<GripperThread>(std::move(gripper), std::move(reopen));
+  for (DeviceNews &news : early_) {
+    put({Kind::device, steady_now_us(), std::move(news)});
+  }
+  early_.clear();
+  for (const auto &loop : loops_) {
+    loop->start();
+  }
+  thread_ = std::thread([this] { run(); });
+}
+
+bool GraspLoop::request(enum grip_request wanted) {
+  std::lock_guard lock(core_mutex_);
+  return grip_request(&core_, wanted);
+}
+
+std::vector<GraspNews> GraspLoop::take(milliseconds timeout) {
+  std::unique_lock lock(news_mutex_);
+  filled_.wait_for(lock, timeout, [this] { return !news_.empty(); });
+  std::vector<GraspNews> taken = std::exchange(news_, {});
+  if (const std::uint64_t count = std::exchange(dropped_, 0)) {
+    GraspNews dropped{Kind::dropped, steady_now_us()};
+    dropped.count = count;
+    taken.push_back(std::move(dropped));
+  }
+  return taken;
+}
+
+void GraspLoop::put(GraspNews news) {
+  std::lock_guard lock(news_mutex_);
+  if (news_.size() >= MOST_NEWS && news.kind != Kind::ended) {
+    dropped_++;
+    return;
+  }
+  news_.push_back(std::move(news));
+  filled_.notify_one();
+}
+
+void GraspLoop::end() {
+  end_ = true;
+}
+
+void GraspLoop::rethrow() const {
+  for (const auto &loop : loops_) {
+    loop->rethrow();
+  }
+}
+
+void GraspLoop::run() {
+  while (!end_) {
+    take_devices();
+    take_gripper();
+    obey_interrupts();
+    step();
+  }
+  if (report_.state != GRIP_IDLE && !is_end_state(report_.state)) {
+    request(GRIP_REQUEST_HOLD);
+  }
+  const std::int64_t patience_us = steady_now_us() + LAST_WORD_us;
+  do {
+    take_devices();
+    take_gripper();
+    step();
+  } while (!abandoned_ && !gripper_->is_done() && steady_now_us() < patience_us);
+  gripper_.reset();
+  for (const auto &loop : loops_) {
+    loop->stop();
+  }
+  while (running_ > 0 && !abandoned_) {
+    take_devices();
+  }
+  put({Kind::ended, steady_now_us()});
+}
+
+void GraspLoop::take_devices() {
+  for (DeviceNews &news : feed_.take(STEP)) {
+    if (news.kind == DeviceNews::Kind::packet && news.packet.type == WIRE_CONTACT) {
+      const double now_us = static_cast<double>(steady_now_us());
+      const grip_touch touch = touch_from_packet(news.packet, std::min(news.host_us, now_us));
+      std::lock_guard lock(core_mutex_);
+      grip_take_touch(&core_, static_cast<unsigned>(news.device), &touch);
+    }
+    running_ -= news.kind == DeviceNews::Kind::ended;
+    put({Kind::device, steady_now_us(), std::move(news)});
+  }
+}
+
+void GraspLoop::take_gripper() {
+  for (GripperThread::News &news : gripper_->take()) {
+    if (news.status) {
+      status_ = news.status;
+      const grip_status status = core_status(*status_);
+      std::lock_guard lock(core_mutex_);
+      grip_take_status(&core_, &status);
+    }
+    if (news.trouble != gripper_trouble_) {
+      gripper_trouble_ = news.trouble;
+      GraspNews told{Kind::gripper, steady_now_us()};
+      told.text = std::move(news.trouble);
+      put(std::move(told));
+    }
+  }
+}
+
+void GraspLoop::obey_interrupts() {
+  for (const unsigned wanted = options_.interrupts(); interrupts_ < wanted; interrupts_++) {
+    request(interrupts_ == 0 ? GRIP_REQUEST_HOLD : GRIP_REQUEST_RELEASE);
+  }
+}
+
+void GraspLoop::step() {
+  GraspNews news{Kind::step, steady_now_us()};
+  {
+    std::lock_guard lock(core_mutex_);
+    grip_step(&core_, static_cast<std::uint64_t>(news.host_us), &news.command, &news.report);
+  }
+  /* Begun once it goes on, whatever the fingers touch on their way. */
+  is_activating_ = news.report.state == GRIP_ACTIVATING && options_.activate &&
+                   (is_activating_ || news.command.motion == GRIP_ACTIVATE);
+  if (is_activating_ || news.command.motion == GRIP_ACTIVATE) {
+    news.command.motion = is_activating_ ? GRIP_ACTIVATE : GRIP_STAY;
+  }
+  report_ = news.report;
+  gripper_->command(news.command);
+  news.status = status_;
+  put(std::move(news));
+}
+
+} // namespace fingertip

@@ -1,0 +1,134 @@
+// A grasp from its first step to its last: frames of two fingertips and a gripper's answers into
+// the controller's core, commands out of it.
+//
+//   GraspLoop loop({left, right}, {});
+//   auto met = loop.meet([] { return stop_requested(); });      who they are
+//   loop.begin(open_gripper(way), [&] { return open_gripper(way); }, settings);
+//   loop.request(GRIP_REQUEST_GRASP);
+//   while (!over) {
+//     for (GraspNews &news : loop.take(20ms)) ...
+//   }
+//   loop.end();                                                 the width stays
+//
+// Threads: one for each fingertip (DeviceLoop), one for the gripper (GripperThread), and one that
+// steps the core at each frame and answer, and every 5 ms without any. None waits for whoever takes
+// the news, which are dropped and counted when nobody takes them for long. All times are of the
+// host's steady clock; the core has no other.
+//
+// What goes wrong is a trouble in the report and never opens the gripper: a fingertip or a gripper
+// that is gone is waited for, and goes on where it is back. Where this process dies the gripper
+// goes where it was last told to, some tenths of a millimetre away, and stays.
+#pragma once
+
+#include "grasp/core.hpp"
+#include "grasp/gripper_thread.hpp"
+#include "libfingertip/device_loop.hpp"
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace fingertip {
+
+struct GraspNews {
+  enum class Kind {
+    device,  // of a fingertip: device holds it
+    step,    // of the core: what it was told and what it told
+    gripper, // text: what is wrong with it, its fault or why it does not answer; "": nothing now
+    dropped, // count: so many news of other kinds were not taken in time
+    ended,   // the last
+  };
+  Kind kind;
+  std::int64_t host_us = 0;
+  std::optional<DeviceNews> device = {};
+  grip_command command = {};
+  grip_report report = {};
+  std::optional<GripperStatus> status = {}; // the newest answer
+  std::string text = {};
+  std::uint64_t count = 0;
+};
+
+class GraspLoop {
+public:
+  static constexpr std::size_t FINGERS = GRIP_FINGERS;
+
+  struct Options {
+    std::uint8_t streams = WIRE_STREAM_ALL;
+    bool activate = false; // where the core asks for it; else it is never passed on
+    // How often somebody wants it still, for callers whose own thread may be held up by a terminal:
+    // asked with every step. The first time the width stays, the second time it opens.
+    std::function<unsigned()> interrupts = [] { return 0u; };
+  };
+
+  // Opens both ports; the left is 0. Throws Error.
+  GraspLoop(const std::array<Way, FINGERS> &ways, Options options);
+  // As end, but waits for nobody.
+  ~GraspLoop();
+  GraspLoop(const GraspLoop &) = delete;
+  GraspLoop &operator=(const GraspLoop &) = delete;
+
+  std::string name(std::size_t finger) const { return loops_[finger]->name(); }
+  LineStatistics statistics(std::size_t finger) const { return loops_[finger]->statistics(); }
+  // As DeviceLoop has it, of both.
+  double read_until_us() const;
+
+  // Their news of kind ready, once both have answered. Throws Error, and Interrupted once stop says
+  // so.
+  std::array<DeviceNews, FINGERS> meet(const std::function<bool()> &stop);
+
+  // Fingertips stream, the core steps; nothing moves before it is requested. Throws Error where the
+  // settings are out of range for this gripper, and where it does not answer.
+  void begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen, const grip_settings &settings);
+  // False: not from this state.
+  bool request(enum grip_request wanted);
+  // All there is, waiting at most this long for the first.
+  std::vector<GraspNews> take(std::chrono::milliseconds timeout);
+  // The width stays, streams end; news come until the one of kind ended.
+  void end();
+  // After it: what ended a fingertip, if it was an error.
+  void rethrow() const;
+
+private:
+  void run();
+  void take_devices();
+  void take_gripper();
+  void step();
+  void obey_interrupts();
+  void put(GraspNews news);
+
+  Options options_;
+  DeviceFeed feed_;
+  std::array<std::unique_ptr<DeviceLoop>, FINGERS> loops_;
+  std::vector<DeviceNews> early_; // packets before the beginning
+  std::size_t running_ = FINGERS;
+
+  mutable std::mutex core_mutex_; // of the core
+  grip core_{};
+
+  std::unique_ptr<GripperThread> gripper_;
+  std::optional<GripperStatus> status_;
+  std::string gripper_trouble_;
+  grip_report report_{}; // of the last step
+  bool is_activating_ = false;
+  unsigned interrupts_ = 0;
+  std::atomic<bool> end_{false}, abandoned_{false};
+
+  std::mutex news_mutex_;
+  std::condition_variable filled_;
+  std::vector<GraspNews> news_;
+  std::uint64_t dropped_ = 0;
+
+  std::thread thread_;
+};
+
+} // namespace fingertip

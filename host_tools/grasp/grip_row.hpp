@@ -1,0 +1,67 @@
+// The gripper's and the controller's rows in a recording of a grasp, which is a joint recording of
+// its two fingertips (libfingertip/recording.hpp), 0 the left and 1 the right, with these lines
+// between:
+//
+//   # grip: time_us,state,trouble,width_mm,...        once, before the first
+//   # grip: 1530022.0,holding,,34.217,...             the time is the rows', on the recorder's
+//   clock # grip_event: text                                what was asked for and what went wrong
+//
+// so that `sed -n 's/^# grip: //p' grasp.csv` is a CSV file. A row stands for each change of state,
+// trouble, command or answer, and else for every 10 ms.
+//
+// state and trouble: names (words.hpp). width_mm, moving, object (-1: unknown), active, fault and
+// current_A: as the gripper answered status_us; before its first answer status_us is empty. motion:
+// 0 stay, 1 activate, 2 move; command_*: of move. Forces are of one fingertip; margin: 0 without a
+// load; slides: counted since the grasp began.
+#pragma once
+
+#include "grasp/core.hpp"
+#include "gripper/gripper.hpp"
+
+#include <cstdint>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace fingertip {
+
+inline constexpr const char *GRIP_ROW_KEY = "grip";
+inline constexpr const char *GRIP_EVENT_KEY = "grip_event";
+
+struct GripRow {
+  double time_us = 0; // from the recording's zero
+  grip_report report{};
+  grip_command command{};
+  std::optional<GripperStatus> status; // host_us from the recording's zero too
+};
+
+// Without time_us, which the writer of the recording puts before them.
+std::string grip_columns();
+std::string grip_cells(const GripRow &row);
+// Of a line's value, time_us first. Throws Error that says which cell is wrong.
+GripRow grip_row(std::string_view value);
+
+// The rows of a file; none in any other file.
+class GripRowReader {
+public:
+  // salvage: damaged rows are skipped, else next throws Error with file and line.
+  GripRowReader(const std::string &path, bool salvage);
+
+  std::optional<GripRow> next();
+
+  struct Place {
+    std::streamoff offset = 0;
+    std::uint64_t line_number = 0;
+  };
+  Place place();
+  void go_to(const Place &place);
+
+private:
+  std::string path_;
+  bool salvage_;
+  std::ifstream file_;
+  std::uint64_t line_number_ = 0;
+};
+
+} // namespace fingertip

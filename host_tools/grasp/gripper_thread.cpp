@@ -1,0 +1,119 @@
+#include "grasp/gripper_thread.hpp"
+
+#include "grasp/convert.hpp"
+#include "libfingertip/session.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace fingertip {
+
+namespace {
+
+// No gripper answers sooner; and a line that fails at once is not asked without pause.
+constexpr std::int64_t SHORTEST_us = 1000;
+// A port that is gone is tried so often.
+constexpr std::int64_t REOPEN_us = 200000;
+// Answers that nobody takes: some seconds of them.
+constexpr std::size_t MOST_NEWS = 2000;
+
+bool is_same(const grip_command &a, const grip_command &b) {
+  return a.motion == b.motion &&
+         (a.motion != GRIP_MOVE ||
+          (a.width_um == b.width_um && a.speed_um_s == b.speed_um_s && a.force_mN == b.force_mN));
+}
+
+} // namespace
+
+GripperThread::GripperThread(std::unique_ptr<Gripper> gripper, OpenGripper reopen)
+    : gripper_(std::move(gripper)), reopen_(std::move(reopen)),
+      poll_us_(std::max(SHORTEST_us, static_cast<std::int64_t>(1e6 * gripper_->traits().poll_s))),
+      thread_([this] { run(); }) {}
+
+GripperThread::~GripperThread() {
+  {
+    std::lock_guard lock(mutex_);
+    end_ = true;
+  }
+  ended_.notify_all();
+  thread_.join();
+}
+
+void GripperThread::command(const grip_command &command) {
+  std::lock_guard lock(mutex_);
+  if (!is_same(command, command_)) {
+    command_ = command;
+    number_++;
+  }
+}
+
+std::deque<GripperThread::News> GripperThread::take() {
+  std::lock_guard lock(mutex_);
+  return std::exchange(news_, {});
+}
+
+bool GripperThread::is_done() const {
+  std::lock_guard lock(mutex_);
+  return sent_ == number_;
+}
+
+void GripperThread::put(News news) {
+  std::lock_guard lock(mutex_);
+  if (news_.size() == MOST_NEWS) {
+    news_.pop_front();
+  }
+  news_.push_back(std::move(news));
+}
+
+GripperStatus GripperThread::exchange() {
+  grip_command command{};
+  std::uint64_t number = 0;
+  bool is_new = false;
+  {
+    std::lock_guard lock(mutex_);
+    command = command_;
+    number = number_;
+    is_new = number_ != sent_;
+  }
+  if (is_new && command.motion == GRIP_ACTIVATE) {
+    gripper_->activate();
+  }
+  const GripperStatus status = is_new && command.motion == GRIP_MOVE
+                                   ? gripper_->move(gripper_move(command))
+                                   : gripper_->poll();
+  std::lock_guard lock(mutex_);
+  sent_ = number;
+  return status;
+}
+
+void GripperThread::run() {
+  for (bool end = false; !end;) {
+    std::int64_t next_us = steady_now_us() + poll_us_;
+    try {
+      if (!gripper_) {
+        gripper_ = reopen_();
+      }
+      const GripperStatus status = exchange();
+      put({status, status.fault != 0 ? gripper_->fault_text(status.fault) : ""});
+      told_.clear();
+    } catch (const Error &error) {
+      if (told_ != error.what()) {
+        told_ = error.what();
+        put({std::nullopt, told_});
+      }
+      if (error.code() == ErrorCode::gone) {
+        gripper_.reset();
+      }
+      if (!gripper_) {
+        next_us = steady_now_us() + REOPEN_us;
+      }
+    }
+    std::unique_lock lock(mutex_);
+    ended_.wait_for(lock, std::chrono::microseconds(next_us - steady_now_us()),
+                    [this] { return end_; });
+    end = end_;
+  }
+}
+
+} // namespace fingertip

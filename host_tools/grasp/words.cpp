@@ -1,0 +1,110 @@
+#include "grasp/words.hpp"
+
+#include "libfingertip/text.hpp"
+
+namespace fingertip {
+
+namespace {
+
+struct State {
+  const char *name, *text;
+};
+constexpr State STATES[GRIP_STATES] = {
+    {"idle", "idle, the width stays"},
+    {"activating", "the gripper is being activated"},
+    {"approach", "closing until both fingertips feel the object"},
+    {"squeeze", "squeezing up to the first force"},
+    {"ready", "squeezed; what pulls now counts as no load"},
+    {"holding", "holding"},
+    {"slipping", "holding, the object slides"},
+    {"still", "the width stays, nothing is controlled"},
+    {"release", "opening"},
+    {"open", "open"},
+    {"dropped", "nothing is between the fingertips any more; the width stays"},
+    {"missed", "closed, and nothing was there"},
+    {"fault", "fault; the width stays"},
+};
+
+struct Trouble {
+  grip_trouble bit;
+  const char *name, *text;
+};
+constexpr Trouble TROUBLES[] = {
+    {GRIP_FINGER_0_STALE, "finger_0_stale", "left: no frames"},
+    {GRIP_FINGER_1_STALE, "finger_1_stale", "right: no frames"},
+    {GRIP_FINGER_0_FROZEN, "finger_0_frozen", "left: its values never change"},
+    {GRIP_FINGER_1_FROZEN, "finger_1_frozen", "right: its values never change"},
+    {GRIP_FINGER_0_FORCE_ONLY, "finger_0_force_only", "left: tells force alone"},
+    {GRIP_FINGER_1_FORCE_ONLY, "finger_1_force_only", "right: tells force alone"},
+    {GRIP_FINGER_0_OVER, "finger_0_over", "left: beyond its range, not tightened further"},
+    {GRIP_FINGER_1_OVER, "finger_1_over", "right: beyond its range, not tightened further"},
+    {GRIP_FINGERS_DIFFER, "fingers_differ", "the fingertips' forces differ"},
+    {GRIP_AT_CAP, "at_cap", "more force than the cap is wanted"},
+    {GRIP_AT_TRAVEL_CAP, "at_travel_cap", "closed as far as the travel cap allows"},
+    {GRIP_GRIPPER_SILENT, "gripper_silent", "the gripper does not answer"},
+    {GRIP_GRIPPER_FAULT, "gripper_fault", "the gripper reports a fault"},
+    {GRIP_GRIPPER_INACTIVE, "gripper_inactive", "the gripper is not active"},
+    {GRIP_NO_LOAD, "no_load", "no load can be told"},
+    {GRIP_FINGER_0_UNTOLD, "finger_0_untold", "left: no force can be told"},
+    {GRIP_FINGER_1_UNTOLD, "finger_1_untold", "right: no force can be told"},
+};
+
+} // namespace
+
+std::string state_name(std::uint8_t state) {
+  return state < GRIP_STATES ? STATES[state].name : std::to_string(state);
+}
+
+std::optional<std::uint8_t> state_of_name(std::string_view name) {
+  for (std::uint8_t state = 0; state < GRIP_STATES; state++) {
+    if (name == STATES[state].name) {
+      return state;
+    }
+  }
+  return std::nullopt;
+}
+
+std::string state_text(std::uint8_t state) {
+  return state < GRIP_STATES ? STATES[state].text : std::to_string(state);
+}
+
+bool is_end_state(std::uint8_t state) {
+  return state == GRIP_OPEN || state == GRIP_DROPPED || state == GRIP_MISSED || state == GRIP_FAULT;
+}
+
+std::string trouble_names(std::uint32_t trouble) {
+  std::string names;
+  for (const Trouble &each : TROUBLES) {
+    if ((trouble & each.bit) != 0) {
+      names += (names.empty() ? "" : " ") + std::string(each.name);
+    }
+  }
+  return names;
+}
+
+std::optional<std::uint32_t> trouble_of_names(std::string_view names) {
+  std::uint32_t trouble = 0;
+  for (const std::string_view name : split(names, ' ')) {
+    std::uint32_t bit = 0;
+    for (const Trouble &each : TROUBLES) {
+      bit = name == each.name ? std::uint32_t{each.bit} : bit;
+    }
+    if (bit == 0 && !names.empty()) {
+      return std::nullopt;
+    }
+    trouble |= bit;
+  }
+  return trouble;
+}
+
+std::vector<std::string> trouble_texts(std::uint32_t trouble) {
+  std::vector<std::string> texts;
+  for (const Trouble &each : TROUBLES) {
+    if ((trouble & each.bit) != 0) {
+      texts.emplace_back(each.text);
+    }
+  }
+  return texts;
+}
+
+} // namespace fingertip

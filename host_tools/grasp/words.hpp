@@ -1,0 +1,29 @@
+// The core's states and troubles as words: short ones for recordings, sentences for people.
+#pragma once
+
+#include "grasp/core.hpp"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace fingertip {
+
+// "slipping"
+std::string state_name(std::uint8_t state);
+std::optional<std::uint8_t> state_of_name(std::string_view name);
+// "holding, the object slides"
+std::string state_text(std::uint8_t state);
+// Nothing goes on any more by itself: open, dropped, missed, fault.
+bool is_end_state(std::uint8_t state);
+
+// "finger_0_stale at_cap"; "" for none
+std::string trouble_names(std::uint32_t trouble);
+// Nothing where a word is none of them.
+std::optional<std::uint32_t> trouble_of_names(std::string_view names);
+// One for each bit; finger 0 is called left, 1 right.
+std::vector<std::string> trouble_texts(std::uint32_t trouble);
+
+} // namespace fingertip

@@ -1,0 +1,571 @@
+"""fingertip grasp against simulated fingertips and a simulated gripper: usage test_grasp.py FINGERTIP FAKE_CELL [unittest arguments]."""
+import contextlib
+import fcntl
+import os
+import pathlib
+import pty
+import re
+import resource
+import select
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import termios
+import time
+import unittest
+
+import numpy as np
+import pyte
+
+FINGERTIP, FAKE_CELL = (os.path.abspath(path) for path in sys.argv[1:3])
+PATIENCE_s = 60
+PYTHON_TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"
+sys.path.insert(0, str(PYTHON_TOOLS))
+import fingertip_files as files  # noqa: E402
+
+MISSED, DROPPED, FAULT = 3, 4, 5
+# A limit that no slow machine meets.
+PATIENT = ("--silent", "2000")
+
+
+def end(process):
+    process.kill()
+    with process:
+        pass
+
+
+class GraspTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        self.csv = os.path.join(self.folder, "grasp.csv")
+        self.environment = {k: v for k, v in os.environ.items() if k != "FINGERTIP_PORT" and not k.startswith("LC_")}
+        self.environment |= {"LC_ALL": "C.UTF-8", "XDG_RUNTIME_DIR": self.folder, "PYTHONDONTWRITEBYTECODE": "1"}
+        self.environment["FINGERTIP_PORT"] = f"{self.folder}/left:{self.folder}/right"
+
+    @contextlib.contextmanager
+    def cell(self, *options):
+        process = subprocess.Popen([FAKE_CELL, self.folder, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.process = process
+        try:
+            self.assertEqual(process.stdout.readline(), "ready\n")
+            yield
+        finally:
+            end(process)
+
+    def tell(self, command="truth"):
+        """Opening in mm and force on either pad in N, as they are."""
+        self.process.stdin.write(command + "\n")
+        self.process.stdin.flush()
+        return tuple(float(word) for word in self.process.stdout.readline().split())
+
+    def wait_for(self, condition):
+        limit = time.monotonic() + PATIENCE_s
+        while not condition():
+            self.assertLess(time.monotonic(), limit, "waited too long")
+            time.sleep(0.02)
+
+    ARGUMENTS = ("grasp", "--gripper", "2f85", "--gripper-port")
+
+    def start(self, *arguments, **options):
+        process = subprocess.Popen([FINGERTIP, *self.ARGUMENTS, f"{self.folder}/gripper", *PATIENT, *arguments], env=self.environment, text=True,
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options)
+        self.addCleanup(end, process)
+        return process
+
+    def run_grasp(self, *arguments, status=0, **options):
+        process = self.start(*arguments, **options)
+        out, err = process.communicate(timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, status, (out, err))
+        return out, err
+
+    def run_cli(self, *arguments, status=0):
+        done = subprocess.run([FINGERTIP, *arguments], env=self.environment, capture_output=True, text=True, timeout=PATIENCE_s)
+        self.assertEqual(done.returncode, status, (done.stdout, done.stderr))
+        return done.stdout, done.stderr
+
+    def until_state(self, process, state):
+        """Lines of standard output up to the one that tells this state."""
+        lines = []
+        limit = time.monotonic() + PATIENCE_s
+        while time.monotonic() < limit:
+            line = process.stdout.readline()
+            lines.append(line)
+            self.assertTrue(line, (lines, process.stderr.read() if process.poll() is not None else ""))
+            if f" s  {state} " in line:
+                return lines
+        self.fail(lines)
+
+    def rows(self):
+        return files.read_grip(self.csv)
+
+
+class Usage(GraspTest):
+    def test_limits_are_checked_before_a_port_is_opened(self):
+        for arguments, words in ((("--cap", "0.1"), '--cap "0.1" is not possible; give N, 0.5 to 100'),
+                                 (("--approach", "9"), "mm/s, 0.5 to 8"), (("--margin", "x"), "give 1 to 5"),
+                                 (("--fixed", "nan"), "N, 0.1 to 100"),
+                                 (("--fixed", "6", "--cap", "5"), "--fixed is not possible; it is above --cap"),
+                                 (("--open-width", "90"), "2f85 opens to 85.0 mm")):
+            _, err = self.run_grasp(*arguments, status=2)
+            self.assertIn(words, err)
+        err = self.run_cli("grasp", "--gripper", "claw", "--gripper-port", "x", status=2)[1]
+        self.assertIn("no gripper model claw; there are 2f85, ", err)
+
+    def test_two_fingertips_are_needed_and_two_different_ones(self):
+        self.environment["FINGERTIP_PORT"] = ""
+        self.assertIn("two fingertips", self.run_grasp(status=1)[1])
+        with self.cell():
+            left = f"{self.folder}/left"
+            self.assertIn("name the same fingertip", self.run_grasp("--left", left, "--right", left, status=2)[1])
+            os.symlink(os.readlink(left), f"{self.folder}/again")
+            self.run_grasp("--left", left, "--right", f"{self.folder}/again", status=1)
+            self.environment["FINGERTIP_PORT"] = f"{self.folder}/left:{self.folder}/right"
+            _, err = self.run_grasp("--left", "BBBB", "--seconds", "0.2", "-o", self.csv)
+            self.assertEqual(files.recorded_devices(self.csv), ["BBBB", "AAAA"])
+            self.assertIn("no fingertip CCCC", self.run_grasp("--right", "CCCC", status=1)[1])
+
+    def test_a_gripper_that_is_not_active_is_activated_only_when_asked(self):
+        with self.cell("active=0", "object=0"):
+            _, err = self.run_grasp(status=1)
+            self.assertIn("not active", err)
+            self.assertIn("--activate", err)
+            process = self.start("--activate")
+            self.until_state(process, "approach")
+            self.tell("object 40")
+            self.until_state(process, "holding")
+            process.terminate()
+            self.assertEqual(process.wait(PATIENCE_s), 0)
+
+    def test_what_is_not_there_is_said(self):
+        with self.cell():
+            process = self.start("--seconds", "0.1")
+            process.communicate(timeout=PATIENCE_s)
+            os.unlink(f"{self.folder}/gripper")
+            self.assertIn("no such port", self.run_grasp(status=1)[1])
+        with self.cell():
+            self.tell("line silent")
+            self.assertIn("no answer", self.run_grasp(status=1)[1])
+            self.tell("line none")
+            self.tell("fault 9")
+            self.assertIn("fault", self.run_grasp(status=1)[1])
+
+
+class Course(GraspTest):
+    def test_holds_until_the_end_is_asked_for_and_then_opens_when_told_to(self):
+        with self.cell():
+            process = self.start()
+            self.until_state(process, "holding")
+            self.tell("load 2")
+            self.wait_for(lambda: self.tell()[1] > 2.5)
+            process.terminate()
+            out, err = process.communicate(timeout=PATIENCE_s)
+            self.assertEqual(process.returncode, 0, err)
+            self.assertRegex(err, r"holding; the gripper keeps its position, 3\d\.\d mm")
+            width, force = self.tell()
+            time.sleep(0.3)
+            self.assertEqual(self.tell(), (width, force))
+            self.assertGreater(force, 2)
+            # and the next grasp takes up what is held
+            process = self.start()
+            lines = self.until_state(process, "holding")
+            self.assertNotIn("approach", "".join(lines))
+            process.terminate()
+            process.wait(PATIENCE_s)
+            self.assertGreater(self.tell()[1], 1)
+
+    def test_a_set_force(self):
+        with self.cell():
+            process = self.start("--fixed", "4", "-o", self.csv, "--quiet")
+            while " s  holding " not in process.stderr.readline():
+                self.assertIsNone(process.poll())
+            self.wait_for(lambda: abs(self.tell()[1] - 4) < 0.5)
+            process.terminate()
+            out, err = process.communicate(timeout=PATIENCE_s)
+            self.assertEqual((process.returncode, out), (0, ""), err)
+            self.assertIn("frames of 2 fingertips", err)
+
+    def test_nothing_between_is_missed(self):
+        with self.cell("object=0"):
+            out, err = self.run_grasp("--approach", "8", status=MISSED)
+            self.assertIn("nothing was there", err)
+
+    def test_ctrl_c_holds_and_the_second_opens_slowly(self):
+        with self.cell():
+            process = self.start("-o", self.csv, "--open-width", "45")
+            self.until_state(process, "holding")
+            process.send_signal(signal.SIGINT)
+            self.until_state(process, "still")
+            width = self.tell("load 5")[0]
+            time.sleep(0.5)
+            self.assertEqual(self.tell()[0], width)
+            self.assertIsNone(process.poll())
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=PATIENCE_s)
+            self.assertEqual(process.returncode, 0, err)
+            self.assertGreater(self.tell()[0], 43)
+        rows = self.rows()
+        # slowly: 10 mm/s
+        opening = rows["state"] == "release"
+        t_s = rows["time_us"][opening] / 1e6
+        self.assertGreater(t_s[-1] - t_s[0], 0.2)
+
+    def test_a_kill_keeps_the_gripper_where_it_was(self):
+        with self.cell():
+            process = self.start("-o", self.csv)
+            self.until_state(process, "holding")
+            process.kill()
+            process.wait()
+            time.sleep(0.3)
+            width, force = self.tell()
+            time.sleep(0.5)
+            self.assertEqual(self.tell(), (width, force))
+            self.assertGreater(force, 0.5)
+            recording = files.read_recording(self.csv, device="AAAA", salvage=True)
+            self.assertGreater(len(recording["t_us"]), 50)
+            self.assertEqual(recording.end, {})
+
+    def test_a_kill_while_it_closes_stops_it(self):
+        with self.cell("object=0"):
+            process = self.start()
+            self.until_state(process, "approach")
+            self.wait_for(lambda: self.tell()[0] < 75)
+            process.kill()
+            process.wait()
+            width = self.tell()[0]
+            time.sleep(1)
+            self.assertGreater(self.tell()[0], width - 3)
+
+
+class Trouble(GraspTest):
+    """Nothing of this opens the gripper or tightens it."""
+
+    def hold(self, *arguments):
+        process = self.start("-o", self.csv, *arguments)
+        self.until_state(process, "holding")
+        self.tell("load 1")
+        self.wait_for(lambda: self.tell()[1] > 2.2)  # what it wants when a load comes as suddenly as that
+        return process
+
+    def finish(self, process, status=0):
+        process.terminate()
+        out, err = process.communicate(timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, status, err)
+        return out, err
+
+    def assert_stays(self, seconds=0.7):
+        width = self.tell()[0]
+        time.sleep(seconds)
+        self.assertAlmostEqual(self.tell()[0], width, delta=0.8)
+
+    def told(self, process, words):
+        limit = time.monotonic() + PATIENCE_s
+        while time.monotonic() < limit:
+            line = process.stdout.readline()
+            self.assertTrue(line, process.poll())
+            if words in line:
+                return
+        self.fail(words)
+
+    def test_a_fingertip_is_unplugged_while_it_holds_and_comes_back(self):
+        with self.cell():
+            process = self.hold()
+            self.tell("unplug left")
+            self.told(process, "left: no frames")
+            self.assert_stays()
+            self.tell("unplug right")
+            self.told(process, "right: no frames")
+            time.sleep(0.5)
+            self.tell("load 9")
+            self.assert_stays()
+            self.tell("load 1")
+            self.tell("plug left")
+            self.tell("plug right")
+            limit = time.monotonic() + PATIENCE_s
+            while "no frames" in process.stdout.readline():
+                self.assertLess(time.monotonic(), limit)
+            self.assertGreater(self.tell()[1], 0.8)
+            self.finish(process)
+        self.assertEqual(len(files.read_recording(self.csv, device="AAAA").events), 2)
+
+    def test_a_fingertip_is_unplugged_while_it_closes(self):
+        with self.cell("object=20"):
+            process = self.start()
+            self.until_state(process, "approach")
+            self.tell("unplug left")
+            self.tell("unplug right")
+            self.told(process, "right: no frames")
+            self.assert_stays()
+            self.assertGreater(self.tell()[0], 21)
+            self.finish(process)
+
+    def test_a_fingertip_is_unplugged_while_it_opens(self):
+        with self.cell():
+            process = self.hold()
+            process.send_signal(signal.SIGINT)
+            self.until_state(process, "still")
+            self.tell("unplug left")
+            self.tell("unplug right")
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=PATIENCE_s)
+            self.assertGreater(self.tell()[0], 83)
+
+    def test_a_frozen_fingertip_is_told(self):
+        with self.cell():
+            process = self.hold()
+            self.tell("freeze left 1")
+            self.told(process, "left: its values never change")
+            self.finish(process)
+
+    def test_beyond_its_range_it_is_not_tightened(self):
+        with self.cell():
+            process = self.hold()
+            self.tell("over 1")
+            self.told(process, "beyond its range")
+            time.sleep(0.5)  # what is under way
+            before = self.tell("load 6")[1]
+            time.sleep(0.5)
+            self.assertLessEqual(self.tell()[1], before + 0.4)
+            self.finish(process)
+
+    def test_never_beyond_the_cap(self):
+        with self.cell():
+            process = self.hold("--cap", "5")
+            self.tell("load 9")
+            self.told(process, "more force than the cap")
+            self.assertLess(self.tell()[1], 5.6)
+            self.finish(process)
+            self.assertLess(self.rows()["force_N"].max(), 5.6)
+
+    def test_an_object_that_falls_is_dropped(self):
+        with self.cell():
+            process = self.hold()
+            self.tell("object 1")
+            out, err = process.communicate(timeout=PATIENCE_s)
+            self.assertEqual(process.returncode, DROPPED, err)
+            self.assertIn("nothing is between the fingertips any more", err)
+
+    def test_a_slide_is_answered_with_more_force(self):
+        with self.cell():
+            process = self.hold()
+            before = self.tell()[1]
+            self.tell("slide 1")
+            self.wait_for(lambda: self.tell()[1] > 1.1 * before)
+            self.tell("slide 0")
+            self.finish(process)
+        rows = self.rows()
+        self.assertEqual(rows["slides"].max(), 1)
+        self.assertIn("slipping", set(rows["state"]))
+
+    def test_a_silent_gripper_is_waited_for(self):
+        with self.cell():
+            process = self.hold()
+            for fault in ("silent", "garbage"):
+                self.tell(f"line {fault}")
+                self.told(process, "the gripper does not answer")
+                self.tell("load 5")
+                self.assert_stays()
+                self.tell("load 1")
+                self.tell("line none")
+                limit = time.monotonic() + PATIENCE_s
+                while "the gripper does not answer" in process.stdout.readline():
+                    self.assertLess(time.monotonic(), limit)
+            self.finish(process)
+
+    def test_a_gripper_unplugged_to_the_end_is_a_fault(self):
+        with self.cell():
+            process = self.hold()
+            self.tell("unplug gripper")
+            self.told(process, "the gripper does not answer")
+            _, err = self.finish(process, FAULT)
+            self.assertIn("gripper", err)
+
+    def test_a_fault_of_the_gripper_ends_it(self):
+        with self.cell():
+            process = self.hold()
+            self.tell("fault 8")
+            out, err = process.communicate(timeout=PATIENCE_s)
+            self.assertEqual(process.returncode, FAULT, err)
+            self.assertIn("fault; the width stays", err)
+            self.assertIn("too hot", err)  # what 8 means
+            self.assertGreater(self.tell()[1], 0.8)
+
+    def test_a_full_disk_ends_the_recording_and_not_the_grasp(self):
+        def limit():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (600000, 600000))
+
+        with self.cell():
+            process = self.start("-o", self.csv, preexec_fn=limit)
+            self.until_state(process, "holding")
+            self.told(process, "not recorded any more")
+            self.tell("load 2")
+            self.wait_for(lambda: self.tell()[1] > 2.2)
+            _, err = self.finish(process, 1)
+            self.assertIn("make room", err)
+            self.assertGreater(self.tell()[1], 2)
+        self.assertGreater(len(files.read_recording(self.csv, device="BBBB")["t_us"]), 20)
+
+
+class Recorded(GraspTest):
+    """One grasp, looked at by everything that reads recordings."""
+
+    def record(self):
+        with self.cell():
+            process = self.start("-o", self.csv)
+            self.until_state(process, "holding")
+            self.tell("load 2")
+            self.wait_for(lambda: self.tell()[1] > 2.5)
+            self.tell("slide 1")
+            self.until_state(process, "slipping")
+            self.tell("slide 0")
+            self.until_state(process, "holding")
+            time.sleep(0.5)
+            self.truth = self.tell()
+            process.send_signal(signal.SIGINT)
+            self.until_state(process, "still")
+            process.terminate()
+            self.assertEqual(process.wait(PATIENCE_s), 0)
+
+    def test_everything_reads_it(self):
+        self.record()
+        rows = self.rows()
+        # every state in its order, at least every 10 ms and a little
+        states = [str(state) for i, state in enumerate(rows["state"]) if i == 0 or state != rows["state"][i - 1]]
+        for earlier, later in (("idle", "approach"), ("approach", "squeeze"), ("squeeze", "ready"), ("ready", "holding"), ("holding", "slipping"),
+                               ("slipping", "still")):
+            self.assertLess(states.index(earlier), len(states) - 1 - states[::-1].index(later), states)
+        self.assertTrue((np.diff(rows["time_us"]) > 0).all())
+        self.assertLess(np.median(np.diff(rows["time_us"])), 10500)
+        self.assertAlmostEqual(rows["width_mm"][-1], self.truth[0], delta=0.6)
+        self.assertGreater(rows["load_N"].max(), 0.8)
+        self.assertGreater(rows["margin"].max(), 1)
+        # on the same clock as the fingertips
+        left, right = (files.read_recording(self.csv, device=serial) for serial in ("AAAA", "BBBB"))
+        for recording in (left, right):
+            self.assertEqual(recording.end["dropped_packets"], "0")
+            touched_us = recording.time_us[recording.flag(files.CONTACT)][0]
+            squeezed_us = rows["time_us"][rows["state"] == "squeeze"][0]
+            self.assertLess(abs(touched_us - squeezed_us), 1.5e6)
+        self.assertEqual(left.metadata["grasp_mode"], "hold")
+        self.assertEqual(left.metadata["grasp_cap"], "20 N")
+        self.assertRegex(left.metadata["grasp_gripper"], "2f85 .*gripper, ")
+        events = files.read_grip_events(self.csv)
+        self.assertTrue(any("grasp" in text for _, text in events), events)
+
+        out, _ = self.run_cli("replay", self.csv, "--speed", "max")
+        self.assertRegex(out, r" s  still  width 3\d\.\d mm")
+        self.assertRegex(out, r"AAAA: \d+ frames in")
+        converted = os.path.join(self.folder, "one.csv")
+        self.run_cli("replay", self.csv, "--device", "BBBB", "--to-csv", converted)
+        self.assertTrue(np.array_equal(files.read_recording(converted)["t_us"], right["t_us"]))
+        # the line of the manual
+        plain = subprocess.run(["sed", "-n", "s/^# grip: //p", self.csv], capture_output=True, text=True, check=True).stdout.splitlines()
+        self.assertEqual(len(plain), len(rows["time_us"]) + 1)
+        self.assertTrue(plain[0].startswith("time_us,state,trouble,width_mm,"))
+
+        picture = os.path.join(self.folder, "grasp.png")
+        done = subprocess.run([sys.executable, PYTHON_TOOLS / "plot.py", self.csv, "-o", picture], capture_output=True, text=True,
+                              env=self.environment, timeout=PATIENCE_s)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stdout, r"grasp\.png: 1 slide, held by at most \d\.\d N, at last still")
+        with open(picture, "rb") as file:
+            self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
+        done = subprocess.run([sys.executable, PYTHON_TOOLS / "plot.py", self.csv, "--device", "AAAA", "-o", picture], capture_output=True, text=True,
+                              env=self.environment, timeout=PATIENCE_s)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("frames in", done.stdout)
+
+        # what is damaged is named, and salvaged
+        text = pathlib.Path(self.csv).read_text(encoding="utf-8")
+        number = text[:text.index("# grip: ", text.index(",holding,") - 40)].count("\n") + 1
+        pathlib.Path(self.csv).write_text(text.replace(",holding,", ",hodling,", 1), encoding="utf-8")
+        _, err = self.run_cli("replay", self.csv, "--speed", "max", status=1)
+        self.assertRegex(err, rf':{number}: state is "hodling"; use --salvage')
+        self.run_cli("replay", self.csv, "--speed", "max", "--salvage")
+        with self.assertRaisesRegex(files.InputError, rf":{number}: "):
+            files.read_grip(self.csv)
+        self.assertEqual(len(files.read_grip(self.csv, salvage=True)["time_us"]), len(rows["time_us"]) - 1)
+
+
+class Live(GraspTest):
+    def on_terminal(self, *arguments, steps, size=(80, 24)):
+        """Each step: what the screen shows before the keys are typed. Exit status; self.shown is the last screen."""
+        pid, terminal = pty.fork()
+        if pid == 0:
+            time.sleep(0.05)
+            os.execve(FINGERTIP, [FINGERTIP, *arguments], {**self.environment, "COLORTERM": "truecolor", "TERM": "xterm"})
+        fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", size[1], size[0], 0, 0))
+        screen, self.shown, self.output = pyte.Screen(*size), "", b""
+        stream = pyte.ByteStream(screen)
+        steps = list(steps)
+        try:
+            limit = time.monotonic() + PATIENCE_s
+            while True:
+                self.assertLess(time.monotonic(), limit, (steps, self.shown, self.output[-500:]))
+                if select.select([terminal], [], [], 0.1)[0]:
+                    try:
+                        chunk = os.read(terminal, 65536)
+                    except OSError:
+                        break
+                    if not chunk:
+                        break
+                    self.output += chunk
+                    for part in re.split(rb"(?<=\x1b\[\?2026l)", chunk):
+                        stream.feed(part)
+                        if part.endswith(b"\x1b[?2026l"):
+                            self.shown = "\n".join(screen.display)
+                if steps and re.search(steps[0][0], self.shown, re.S):
+                    step = steps.pop(0)[1]
+                    if callable(step):
+                        step()
+                    else:
+                        os.write(terminal, step)
+            _, status = os.waitpid(pid, 0)
+            pid = 0
+        finally:
+            if pid:
+                os.kill(pid, signal.SIGKILL)
+                os.waitpid(pid, 0)
+            os.close(terminal)
+        self.assertEqual(steps, [])
+        return os.waitstatus_to_exitcode(status)
+
+    def test_shows_both_pads_and_the_gripper_and_obeys_keys(self):
+        for size in ((80, 24), (160, 50)):
+            with self.cell():
+                status = self.on_terminal(*self.ARGUMENTS, f"{self.folder}/gripper", *PATIENT, "-o", self.csv, "--overwrite", size=size, steps=[
+                    (r"HOLDING.*wanted +1\.\d\d N", lambda: self.tell("load 2")),
+                    (r"load +1\.0\d N .*margin +\d\.\d\d", lambda: None),
+                    (r"q end, holding  o open  h hold  g grasp", b"h"),
+                    (r"STILL", b"g"), (r"HOLDING", b"o"), (r"RELEASE", b"h"), (r"STILL", b"q")])
+            self.assertEqual(status, 0)
+            for word in ("left ● AAAA", "right ● BBBB", "width", "cap  20.0 N", "slides", "friction", "SLIP left", "grasp  2f85", "kPa", "force ", " N┤",
+                         "0 s"):
+                self.assertIn(word, self.shown)
+            after = self.output[self.output.rfind(b"\x1b[?1049l") + 8:].decode()
+            self.assertNotIn("\x1b", after)
+            self.assertIn("the gripper keeps its position", after)
+            status = self.on_terminal("replay", self.csv, size=size, steps=[(r"grasp  2f85.*left ● AAAA.*space pause", b" "), ("PAUSED", b"\x1b[F"),
+                                                                             (r"STILL.*PAUSED", b"\x1b[H"), (r"IDLE.*PAUSED at 0", b"q")])
+            self.assertEqual(status, 0)
+
+    def test_pasted_text_and_a_terminals_answers_are_no_keys(self):
+        with self.cell():
+            status = self.on_terminal(*self.ARGUMENTS, f"{self.folder}/gripper", *PATIENT, steps=[
+                ("HOLDING", b"\x1b[200~ohoq\x1b[201~\x1b[8;24;80t"), ("HOLDING", lambda: time.sleep(0.5)), ("HOLDING", b"q")])
+            self.assertEqual(status, 0)
+            self.assertGreater(self.tell()[1], 0.8)
+
+    def test_ctrl_c_on_a_terminal_and_a_window_that_is_too_small(self):
+        with self.cell():
+            status = self.on_terminal(*self.ARGUMENTS, f"{self.folder}/gripper", *PATIENT, "--open-width", "45", size=(79, 24), steps=[
+                (r"needs 80x24.*holding", b"\x03"), (r"Ctrl-C: the width stays", b"\x03")])
+        self.assertEqual(status, 0)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]], verbosity=2)

@@ -1,0 +1,237 @@
+#include "grasp/grasp_loop.hpp"
+#include "grasp/settings.hpp"
+#include "libfingertip/names.hpp"
+#include "support/fake_gripper.hpp"
+#include "support/soft_fingertip.hpp"
+
+#include <gtest/gtest.h>
+
+using namespace fingertip;
+using std::chrono::milliseconds;
+using Kind = GraspNews::Kind;
+
+namespace {
+
+/* Two fingertips on ports and a gripper without a line, an object of 40 mm between. */
+class GraspLoopTest : public ::testing::Test {
+protected:
+  static constexpr double OBJECT_mm = 40.0, STIFFNESS_N_mm = 2.0;
+
+  test::Feel feel() {
+    test::Feel feel;
+    feel.force_N =
+        static_cast<float>(std::max(0.0, STIFFNESS_N_mm * (object_mm_ - state_->width_mm()) / 2));
+    feel.qy_N = load_N_;
+    return feel;
+  }
+  OpenGripper open() {
+    return [state = state_] { return std::make_unique<test::FakeGripper>(state); };
+  }
+  /* Limits that no slow machine meets. */
+  static std::map<std::string, double> patient() {
+    return {{"stale", 1000}, {"silent", 2000}, {"cap", 10}, {"travel-cap", 20}};
+  }
+  void begin(GraspLoop::Options options = {}) {
+    loop_ = std::make_unique<GraspLoop>(
+        std::array<Way, 2>{Way{"", left_.link(), false}, Way{"", right_.link(), false}}, options);
+    const auto met = loop_->meet([] { return false; });
+    EXPECT_EQ(met[0].packet.body.info.serial[0], 'A');
+    EXPECT_EQ(met[1].packet.body.info.serial[0], 'B');
+    auto gripper = open()();
+    const grip_settings settings = settings_for(gripper->traits(), patient());
+    loop_->begin(std::move(gripper), open(), settings);
+  }
+  /* Takes news until it is so. */
+  bool until(const std::function<bool(const GraspNews &)> &is_so) {
+    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (std::chrono::steady_clock::now() < patience) {
+      for (GraspNews &news : loop_->take(milliseconds(20))) {
+        if (news.kind == Kind::step) {
+          highest_N_ = std::max(highest_N_, feel().force_N);
+          steps_++;
+        }
+        frames_ += news.kind == Kind::device && news.device->kind == DeviceNews::Kind::packet &&
+                   news.device->packet.type == WIRE_CONTACT;
+        last_ = news.kind == Kind::step ? news : last_;
+        if (is_so(news)) {
+          return true;
+        }
+      }
+    }
+    ADD_FAILURE() << "waited too long in state " << int{last_.report.state} << ", trouble "
+                  << last_.report.trouble;
+    return false;
+  }
+  bool until_state(std::uint8_t state) {
+    return until([state](const GraspNews &news) {
+      return news.kind == Kind::step && news.report.state == state;
+    });
+  }
+  bool until_trouble(std::uint32_t bit, bool on) {
+    return until([bit, on](const GraspNews &news) {
+      return news.kind == Kind::step && ((news.report.trouble & bit) != 0) == on;
+    });
+  }
+  bool until_frames(int more) {
+    const int goal = frames_ + more;
+    return until([&](const GraspNews &) { return frames_ >= goal; });
+  }
+  /* From both fingertips' first frames. */
+  bool grasp() {
+    until_frames(10);
+    EXPECT_TRUE(loop_->request(GRIP_REQUEST_GRASP));
+    return until_state(GRIP_HOLDING);
+  }
+  void end() {
+    loop_->end();
+    until([](const GraspNews &news) { return news.kind == Kind::ended; });
+    loop_->rethrow();
+  }
+
+  test::TemporaryFolder folder_;
+  std::shared_ptr<test::FakeGripperState> state_ = std::make_shared<test::FakeGripperState>();
+  std::atomic<double> object_mm_{OBJECT_mm};
+  std::atomic<float> load_N_{0};
+  test::SoftFingertip left_{folder_ / "left", "AAAA", 200, [this] { return feel(); }};
+  test::SoftFingertip right_{folder_ / "right", "BBBB", 200, [this] { return feel(); }};
+  std::unique_ptr<GraspLoop> loop_;
+  GraspNews last_{Kind::step};
+  float highest_N_ = 0;
+  int steps_ = 0, frames_ = 0;
+};
+
+} // namespace
+
+TEST_F(GraspLoopTest, NothingMovesBeforeItIsRequestedThenTheObjectIsHeldAsItsLoadNeeds) {
+  begin();
+  until_frames(100);
+  EXPECT_TRUE(state_->moves().empty());
+  EXPECT_EQ(last_.report.state, GRIP_IDLE);
+  ASSERT_TRUE(grasp());
+  const auto force_N = [this] { return feel().force_N; };
+  until([&](const GraspNews &) { return std::abs(force_N() - 1.5f) < 0.3f; });
+  load_N_ = 1.0f; /* margin 1.3 over friction 0.4: 3.25 N, or more where friction is not known */
+  until([&](const GraspNews &) { return force_N() > 3.0f; });
+  EXPECT_LT(force_N(), 4.5f);
+  EXPECT_GT(last_.report.load_mN, 900);
+  EXPECT_EQ(state_->activations, 0);
+  end();
+  EXPECT_EQ(last_.report.state, GRIP_STILL);
+  EXPECT_EQ(last_.command.motion, GRIP_STAY);
+  EXPECT_GT(feel().force_N, 2.5f) << "opened at its end";
+  EXPECT_LT(highest_N_, 10.0f);
+}
+
+TEST_F(GraspLoopTest, InterruptsHoldAndThenOpenWithoutAnybodyTakingNews) {
+  std::atomic<unsigned> interrupts{0};
+  GraspLoop::Options options;
+  options.interrupts = [&interrupts] { return interrupts.load(); };
+  begin(options);
+  ASSERT_TRUE(grasp());
+  interrupts = 1;
+  ASSERT_TRUE(until_state(GRIP_STILL));
+  const std::size_t moves = state_->moves().size();
+  load_N_ = 3.0f;
+  until_frames(100);
+  EXPECT_EQ(state_->moves().size(), moves) << "moves while it is to be still";
+  interrupts = 2;
+  std::this_thread::sleep_for(milliseconds(300)); /* nobody takes */
+  ASSERT_TRUE(until_state(GRIP_OPEN));
+  EXPECT_GT(state_->width_mm(), 45.0);
+  end();
+}
+
+TEST_F(GraspLoopTest, FingertipsThatGoNeverOpenNorTightenItAndComeBack) {
+  begin();
+  ASSERT_TRUE(grasp());
+  load_N_ = 0.5f;
+  until_frames(100);
+  left_.unplug();
+  ASSERT_TRUE(until_trouble(GRIP_FINGER_0_STALE, true));
+  EXPECT_GT(feel().force_N, 1.0f);
+  right_.unplug();
+  ASSERT_TRUE(until_trouble(GRIP_FINGER_1_STALE, true));
+  const double width_mm = state_->width_mm();
+  load_N_ = 5.0f;
+  const int goal = steps_ + 200; /* at least a second: every 5 ms without a frame */
+  until([&](const GraspNews &) { return steps_ >= goal; });
+  EXPECT_NEAR(state_->width_mm(), width_mm, 0.06);
+  load_N_ = 0.5f;
+  left_.plug_in();
+  right_.plug_in();
+  ASSERT_TRUE(until([](const GraspNews &news) {
+    return news.kind == Kind::step &&
+           (news.report.trouble & (GRIP_FINGER_0_STALE | GRIP_FINGER_1_STALE)) == 0;
+  }));
+  EXPECT_TRUE(last_.report.state == GRIP_HOLDING || last_.report.state == GRIP_SLIPPING);
+  end();
+  EXPECT_GT(feel().force_N, 1.0f);
+}
+
+TEST_F(GraspLoopTest, ASlowGripperDelaysNoFrame) {
+  state_->delay_ms = 400;
+  begin();
+  until_frames(10);
+  EXPECT_TRUE(loop_->request(GRIP_REQUEST_GRASP));
+  const int before = state_->exchanges, frames = frames_;
+  until([&](const GraspNews &) { return state_->exchanges >= before + 4; });
+  EXPECT_GT(frames_ - frames, 50 * 2);
+  end();
+}
+
+TEST_F(GraspLoopTest, ASilentGripperIsToldAndTakenUpAgain) {
+  begin();
+  ASSERT_TRUE(grasp());
+  state_->silent = true;
+  ASSERT_TRUE(until([](const GraspNews &news) {
+    return news.kind == Kind::gripper && news.text == "fake: no answer";
+  }));
+  ASSERT_TRUE(until_trouble(GRIP_GRIPPER_SILENT, true));
+  EXPECT_EQ(last_.command.motion, GRIP_STAY);
+  state_->silent = false;
+  ASSERT_TRUE(
+      until([](const GraspNews &news) { return news.kind == Kind::gripper && news.text.empty(); }));
+  ASSERT_TRUE(until_trouble(GRIP_GRIPPER_SILENT, false));
+  EXPECT_EQ(last_.report.state, GRIP_HOLDING);
+  end();
+}
+
+TEST_F(GraspLoopTest, AFaultEndsItWhereItIsAndIsNotActivatedAway) {
+  begin();
+  ASSERT_TRUE(grasp());
+  const double width_mm = state_->width_mm();
+  state_->fault = 9;
+  state_->active = false;
+  ASSERT_TRUE(until_state(GRIP_FAULT));
+  EXPECT_FALSE(loop_->request(GRIP_REQUEST_RELEASE));
+  EXPECT_FALSE(loop_->request(GRIP_REQUEST_GRASP));
+  until_frames(50);
+  EXPECT_NEAR(state_->width_mm(), width_mm, 0.5);
+  EXPECT_EQ(state_->activations, 0);
+  end();
+}
+
+TEST_F(GraspLoopTest, ActivatesOnlyWhereItMay) {
+  state_->active = false;
+  begin();
+  until_frames(10);
+  EXPECT_TRUE(loop_->request(GRIP_REQUEST_GRASP));
+  until_frames(200);
+  EXPECT_EQ(state_->activations, 0);
+  EXPECT_EQ(last_.command.motion, GRIP_STAY);
+  end();
+  loop_.reset();
+  GraspLoop::Options options;
+  options.activate = true;
+  begin(options);
+  ASSERT_TRUE(grasp());
+  EXPECT_EQ(state_->activations, 1);
+  end();
+}
+
+TEST_F(GraspLoopTest, EndsInTheMiddle) {
+  begin();
+  until_frames(10);
+  loop_.reset(); /* ends in the middle, whatever is under way */
+  EXPECT_TRUE(state_->moves().empty());
+}

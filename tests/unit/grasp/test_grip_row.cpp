@@ -1,0 +1,218 @@
+#include "grasp/grip_row.hpp"
+#include "libfingertip/error.hpp"
+#include "libfingertip/joint_recording_writer.hpp"
+#include "libfingertip/recording.hpp"
+#include "libfingertip/text.hpp"
+#include "support/host_packets.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <gtest/gtest.h>
+
+using namespace fingertip;
+
+namespace {
+
+GripRow row_with_everything() {
+  GripRow row;
+  row.time_us = 1530022.5;
+  row.report.state = GRIP_SLIPPING;
+  row.report.trouble = GRIP_FINGER_1_STALE | GRIP_AT_CAP;
+  row.report.gripper_fault = 9;
+  row.report.wanted_mN = 4101;
+  row.report.force_mN = 4019;
+  row.report.load_mN = 1022;
+  row.report.margin_permille = 1573;
+  row.report.friction_permille = 400;
+  row.report.width_um = 34217;
+  row.report.slides = 3;
+  row.command = {GRIP_MOVE, 34201, 150000, 20000};
+  row.status = GripperStatus{-17, true, false, true, 34.217, 0.125, 9};
+  return row;
+}
+
+std::string error_of(const std::string &value) {
+  try {
+    grip_row(value);
+  } catch (const Error &error) {
+    EXPECT_EQ(error.code(), ErrorCode::damaged_line);
+    return error.what();
+  }
+  return "";
+}
+
+/* The value of a line whose cell of this column is another. */
+std::string with_cell(const std::string &column, const std::string &cell) {
+  const std::string header = "time_us," + grip_columns();
+  const std::string value = "1530022.5," + grip_cells(row_with_everything());
+  const auto names = split(header, ',');
+  auto cells = split(value, ',');
+  cells[static_cast<std::size_t>(std::find(names.begin(), names.end(), column) - names.begin())] =
+      cell;
+  std::string all;
+  for (const std::string_view each : cells) {
+    all += (all.empty() ? "" : ",") + std::string(each);
+  }
+  return all;
+}
+
+class GripRowFile : public ::testing::Test {
+protected:
+  void write(const std::vector<std::string> &lines) {
+    std::ofstream file(path_, std::ios::binary);
+    for (const std::string &line : lines) {
+      file << line;
+    }
+  }
+  test::TemporaryFolder folder_;
+  std::string path_ = folder_ / "g.csv";
+};
+
+} // namespace
+
+TEST(GripRow, ReadsWhatItWrote) {
+  const GripRow row = row_with_everything();
+  const GripRow read = grip_row("1530022.5," + grip_cells(row));
+  EXPECT_EQ(read.time_us, row.time_us);
+  EXPECT_EQ(read.report.state, row.report.state);
+  EXPECT_EQ(read.report.trouble, row.report.trouble);
+  EXPECT_EQ(read.report.gripper_fault, row.report.gripper_fault);
+  EXPECT_EQ(read.report.wanted_mN, row.report.wanted_mN);
+  EXPECT_EQ(read.report.force_mN, row.report.force_mN);
+  EXPECT_EQ(read.report.load_mN, row.report.load_mN);
+  EXPECT_EQ(read.report.margin_permille, row.report.margin_permille);
+  EXPECT_EQ(read.report.friction_permille, row.report.friction_permille);
+  EXPECT_EQ(read.report.width_um, row.report.width_um);
+  EXPECT_EQ(read.report.slides, row.report.slides);
+  EXPECT_EQ(read.command.motion, row.command.motion);
+  EXPECT_EQ(read.command.width_um, row.command.width_um);
+  EXPECT_EQ(read.command.speed_um_s, row.command.speed_um_s);
+  EXPECT_EQ(read.command.force_mN, row.command.force_mN);
+  ASSERT_TRUE(read.status);
+  EXPECT_EQ(read.status->host_us, -17);
+  EXPECT_TRUE(read.status->active);
+  EXPECT_FALSE(read.status->moving);
+  EXPECT_EQ(read.status->object, true);
+  EXPECT_DOUBLE_EQ(read.status->width_mm, 34.217);
+  EXPECT_DOUBLE_EQ(read.status->current_A, 0.125);
+  EXPECT_EQ(read.status->fault, 9);
+}
+
+TEST(GripRow, BeforeTheFirstAnswerTheGrippersCellsAreEmpty) {
+  GripRow row = row_with_everything();
+  row.status.reset();
+  const std::string cells = grip_cells(row);
+  EXPECT_NE(cells.find("slipping,finger_1_stale at_cap,,,,,,,,2,"), std::string::npos) << cells;
+  EXPECT_FALSE(grip_row("1," + cells).status);
+  row.status = GripperStatus{};
+  EXPECT_EQ(grip_row("1," + grip_cells(row)).status->object, std::nullopt);
+}
+
+TEST(GripRow, EveryWrongCellIsNamed) {
+  EXPECT_EQ(error_of(with_cell("time_us", "1530022.5")), "");
+  const std::string columns = "time_us," + grip_columns();
+  for (const std::string_view column : split(columns, ',')) {
+    EXPECT_EQ(error_of(with_cell(std::string(column), "x")), std::string(column) + " is \"x\"");
+  }
+  EXPECT_EQ(error_of(with_cell("fault", "256")), "fault is \"256\"");
+  EXPECT_EQ(error_of(with_cell("slides", "-1")), "slides is \"-1\"");
+  EXPECT_EQ(error_of(with_cell("wanted_N", "3000000")), "wanted_N is \"3000000\"");
+  EXPECT_EQ(error_of(with_cell("moving", "")), "moving is \"\"");
+  EXPECT_NE(error_of("1,2,3").find("3 columns of the gripper"), std::string::npos);
+}
+
+TEST_F(GripRowFile, RowsAreFoundBetweenOthersAndFromAnyPlace) {
+  const std::string row = grip_cells(row_with_everything());
+  write({"# fingertip-recording 2\n", "# grip: time_us," + grip_columns() + "\n", "0,1,2\n",
+         "# grip: 100.0," + row + "\n", "# grip_event: 1.0,hold\n",
+         "# grip: 200.0," + row + "\r\n"});
+  GripRowReader reader(path_, false);
+  EXPECT_EQ(reader.next()->time_us, 100);
+  const auto place = reader.place();
+  EXPECT_EQ(reader.next()->time_us, 200);
+  EXPECT_FALSE(reader.next());
+  reader.go_to(place);
+  EXPECT_EQ(reader.next()->time_us, 200);
+}
+
+TEST_F(GripRowFile, DamageIsSaidWithItsLineOrSkipped) {
+  const std::string row = grip_cells(row_with_everything());
+  write({"# grip: time_us," + grip_columns() + "\n", "# grip: 100.0,nonsense\n",
+         "# grip: 200.0," + row + "\n", "# grip: 300.0," + row});
+  GripRowReader strict(path_, false);
+  try {
+    strict.next();
+    FAIL();
+  } catch (const Error &error) {
+    EXPECT_EQ(std::string(error.what()).find(path_ + ":2: "), 0u) << error.what();
+  }
+  GripRowReader salvaging(path_, true);
+  EXPECT_EQ(salvaging.next()->time_us, 200);
+  EXPECT_FALSE(salvaging.next()) << "a torn line";
+  write({"# grip: time_us,other\n"});
+  GripRowReader other(path_, true);
+  try {
+    other.next();
+    FAIL();
+  } catch (const Error &error) {
+    EXPECT_EQ(error.code(), ErrorCode::other_format);
+  }
+  EXPECT_THROW(GripRowReader(folder_ / "absent", false), Error);
+}
+
+TEST_F(GripRowFile, AJointRecordingWithThemIsReadAsOneWithoutByWhoeverDoesNotKnowThem) {
+  wire_info left = test::make_info(0, 0).body.info, right = left;
+  std::memcpy(right.serial, "BBBB\0", 5);
+  {
+    JointRecordingWriter writer(path_, true, {left, right}, {{"grasp_cap", "20 N"}}, 1000000, false,
+                                OutputFile::Appears::at_once);
+    writer.comment(GRIP_ROW_KEY, 1000000, "time_us," + grip_columns());
+    for (std::uint32_t i = 0; i < 10; i++) {
+      const double host_us = 1000100 + 1000.0 * i;
+      for (std::size_t device : {0u, 1u}) {
+        writer.packet(device, test::make_contact(0, 5000 + 1000 * i, i), host_us);
+      }
+      writer.comment(GRIP_ROW_KEY, host_us + 500,
+                     fixed(host_us + 500 - 1000000, 1) + "," + grip_cells(row_with_everything()));
+      writer.comment(GRIP_EVENT_KEY, host_us + 500, "1,line\nbroken");
+    }
+    writer.settle(1004000);
+    writer.finish({{}, {}}, "ended");
+  }
+  for (const std::string &serial : fingertips_in(path_)) {
+    RecordingReader reader(path_, false, serial);
+    std::uint32_t frames = 0;
+    while (auto item = reader.next()) {
+      frames +=
+          item->kind == RecordingReader::Item::Kind::packet && item->packet.type == WIRE_CONTACT;
+    }
+    EXPECT_EQ(frames, 10u);
+    EXPECT_TRUE(reader.has_end());
+    EXPECT_NE(std::find(reader.recorder_metadata().begin(), reader.recorder_metadata().end(),
+                        std::pair<std::string, std::string>("grasp_cap", "20 N")),
+              reader.recorder_metadata().end());
+  }
+  GripRowReader rows(path_, false);
+  double last_us = -1;
+  int count = 0;
+  while (auto row = rows.next()) {
+    EXPECT_GT(row->time_us, last_us);
+    last_us = row->time_us;
+    count++;
+  }
+  EXPECT_EQ(count, 10);
+  /* in order of time with the rows of the fingertips */
+  std::ifstream file(path_);
+  std::string line;
+  double before_us = -1;
+  while (std::getline(file, line)) {
+    const bool grip = line.rfind("# grip: ", 0) == 0;
+    if ((!grip && line[0] == '#') || line.find("time_us") != std::string::npos) {
+      continue;
+    }
+    const auto time_us = to_double(split(std::string_view(line).substr(grip ? 8 : 2), ',')[0]);
+    ASSERT_TRUE(time_us) << line;
+    EXPECT_GE(*time_us, before_us) << line;
+    before_us = *time_us;
+  }
+}

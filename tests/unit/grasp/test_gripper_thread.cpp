@@ -1,0 +1,132 @@
+#include "grasp/gripper_thread.hpp"
+#include "support/fake_gripper.hpp"
+
+#include <functional>
+#include <gtest/gtest.h>
+
+using namespace fingertip;
+using std::chrono::milliseconds;
+
+namespace {
+
+class GripperThreadTest : public ::testing::Test {
+protected:
+  OpenGripper open() {
+    return [state = state_] { return std::make_unique<test::FakeGripper>(state); };
+  }
+  /* Takes news until one of them is so. */
+  bool comes(GripperThread &thread, const std::function<bool(const GripperThread::News &)> &is_so) {
+    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (std::chrono::steady_clock::now() < patience) {
+      for (const GripperThread::News &news : thread.take()) {
+        all_.push_back(news);
+        if (is_so(news)) {
+          return true;
+        }
+      }
+      std::this_thread::sleep_for(milliseconds(1));
+    }
+    return false;
+  }
+  static bool is_answer(const GripperThread::News &news) { return news.status.has_value(); }
+  static bool is_trouble(const GripperThread::News &news) { return !news.status; }
+
+  std::shared_ptr<test::FakeGripperState> state_ = std::make_shared<test::FakeGripperState>();
+  std::vector<GripperThread::News> all_;
+};
+
+} // namespace
+
+TEST_F(GripperThreadTest, TheNewestCommandGoesOutOnceAndAnswersComeBack) {
+  state_->delay_ms = 5;
+  GripperThread thread(open()(), open());
+  EXPECT_TRUE(comes(thread, is_answer));
+  for (int um : {40000, 39000, 38000}) {
+    thread.command({GRIP_MOVE, um, 50000, 0});
+  }
+  const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!thread.is_done() && std::chrono::steady_clock::now() < patience) {
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  EXPECT_TRUE(thread.is_done());
+  EXPECT_TRUE(
+      comes(thread, [](const auto &news) { return news.status && news.status->width_mm < 50; }));
+  for (int i = 0; i < 5; i++) {
+    thread.command({GRIP_MOVE, 38000, 50000, 0}); /* the same */
+    EXPECT_TRUE(comes(thread, is_answer));
+  }
+  const auto moves = state_->moves();
+  ASSERT_GE(moves.size(), 1u);
+  EXPECT_LE(moves.size(), 3u);
+  EXPECT_EQ(moves.back().width_mm, 38.0);
+  EXPECT_EQ(state_->activations, 0);
+  /* staying sends nothing */
+  const std::size_t before = moves.size();
+  thread.command({GRIP_STAY, 10000, 0, 0});
+  EXPECT_TRUE(comes(thread, is_answer));
+  EXPECT_EQ(state_->moves().size(), before);
+}
+
+TEST_F(GripperThreadTest, ActivatesOnceForEachCommand) {
+  GripperThread thread(open()(), open());
+  for (int i = 0; i < 10; i++) {
+    thread.command({GRIP_ACTIVATE, 0, 0, 0});
+    EXPECT_TRUE(comes(thread, is_answer));
+  }
+  EXPECT_EQ(state_->activations, 1);
+}
+
+TEST_F(GripperThreadTest, SilenceIsToldOnceAndTheNewestCommandWaitsForTheEndOfIt) {
+  GripperThread thread(open()(), open());
+  EXPECT_TRUE(comes(thread, is_answer));
+  state_->silent = true;
+  EXPECT_TRUE(comes(thread, is_trouble));
+  thread.command({GRIP_MOVE, 30000, 50000, 0});
+  thread.command({GRIP_MOVE, 20000, 50000, 0});
+  const int before = state_->exchanges;
+  while (state_->exchanges < before + 20) {
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  EXPECT_FALSE(thread.is_done());
+  EXPECT_EQ(thread.take().size(), 0u) << "told again";
+  state_->silent = false;
+  EXPECT_TRUE(comes(thread, is_answer));
+  EXPECT_TRUE(comes(thread, [&](const auto &) { return !state_->moves().empty(); }));
+  EXPECT_EQ(state_->moves().size(), 1u);
+  EXPECT_EQ(state_->moves().back().width_mm, 20.0);
+}
+
+TEST_F(GripperThreadTest, APortThatVanishedIsOpenedAgainWhereItIsBack) {
+  GripperThread thread(open()(), open());
+  EXPECT_TRUE(comes(thread, is_answer));
+  EXPECT_EQ(state_->opened, 1);
+  state_->unplugged = true;
+  EXPECT_TRUE(comes(thread, is_trouble));
+  const int before = state_->exchanges;
+  while (state_->exchanges < before + 3) {
+    std::this_thread::sleep_for(milliseconds(1)); /* attempts to open it */
+  }
+  state_->unplugged = false;
+  EXPECT_TRUE(comes(thread, is_answer));
+  EXPECT_EQ(state_->opened, 2);
+  EXPECT_EQ(state_->activations, 0);
+}
+
+TEST_F(GripperThreadTest, AFaultIsExplained) {
+  state_->fault = 9;
+  GripperThread thread(open()(), open());
+  EXPECT_TRUE(comes(thread, [](const auto &news) {
+    return news.status && news.status->fault == 9 && news.trouble == "fault 9";
+  }));
+}
+
+TEST_F(GripperThreadTest, EndsWhileTheLineIsSlow) {
+  state_->delay_ms = 30;
+  {
+    GripperThread thread(open()(), open());
+    thread.command({GRIP_MOVE, 30000, 50000, 0});
+  }
+  const int after = state_->exchanges;
+  std::this_thread::sleep_for(milliseconds(100));
+  EXPECT_EQ(state_->exchanges, after) << "goes on after its end";
+}
