@@ -131,12 +131,11 @@ static void approach(struct grip *grip, const struct grip_view *view) {
     return; /* blind: no further */
   }
   /* One fingertip alone pushes the object to the other. Where that one is missing, it decides. */
-  bool touches = view->fingers == 0 || (view->touches >= view->fingers &&
-                                        view->low_mN >= grip->settings.touch_mN);
+  bool touches = view->fingers == 0 ||
+                 (view->touches >= view->fingers && view->low_mN >= grip->settings.touch_mN);
   bool pushes_hard = view->high_mN >= 4 * grip->settings.touch_mN;
   if (touches || pushes_hard) {
     grip->touch_width_um = grip_width_at(grip, view->t_us);
-    grip->target_um = grip->status.width_um;
     enter(grip, GRIP_SQUEEZE);
     return;
   }
@@ -168,7 +167,7 @@ static uint32_t hold(struct grip *grip, const struct grip_view *view) {
   if (grip->settings.mode == GRIP_MODE_FIXED) {
     return grip_fixed_step(grip, view);
   }
-  uint32_t trouble = view->tells_load ? 0 : GRIP_NO_LOAD;
+  uint32_t trouble = view->has_load ? 0 : GRIP_NO_LOAD;
   trouble |= grip_aim(grip, view, grip_hold_wants(grip, view));
   if (grip->state == GRIP_HOLDING && grip->hold.sliding) {
     enter(grip, GRIP_SLIPPING);
@@ -210,7 +209,7 @@ static uint32_t go_on(struct grip *grip, const struct grip_view *view) {
       return 0;
     }
     /* Activating opens a gripper: not with something between its fingers. */
-    grip->may_activate = view->fingers > 0 && view->touches == 0;
+    grip->may_activate = grip->may_activate || (view->fingers > 0 && view->touches == 0);
     return grip->may_activate && grip->now_us - grip->since_us < ACTIVATION_us
                ? 0
                : GRIP_GRIPPER_INACTIVE;
@@ -284,7 +283,7 @@ static void tell_report(const struct grip *grip, const struct grip_view *view,
       .slides = hold->slides,
   };
   bool loaded = grip->state == GRIP_HOLDING || grip->state == GRIP_SLIPPING;
-  if (loaded && view->tells_load && grip->settings.mode == GRIP_MODE_HOLD) {
+  if (loaded && view->has_load && grip->settings.mode == GRIP_MODE_HOLD) {
     report->load_mN = view->load_mN;
     report->margin_permille =
         view->load_mN < 1

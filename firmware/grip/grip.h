@@ -153,7 +153,7 @@ struct grip_settings {
                                 that is not corrected for it; 0: loads are not guessed by that */
   int32_t friction_permille; /* until a slide, or a load that does not slide, tells better */
   int32_t margin_permille;   /* grip over load / friction */
-  int32_t decay_permille_s;  /* how fast grip comes down to what is wanted */
+  int32_t decay_permille_s;  /* how fast what is too much goes, share of it a second */
   uint32_t rest_us;          /* no sooner after a slide */
 };
 
@@ -192,7 +192,7 @@ struct grip_finger {
   bool tells_load, guesses_load; /* itself; from how the location has moved, */
   bool shifts;                   /* by more than a load moves it */
   int32_t load_mN;
-  int32_t share_x_permille, share_y_permille; /* of the force, as last told */
+  int32_t told_x_mN, told_y_mN; /* the load that was told last */
 };
 
 #define GRIP_WIDTHS 16
@@ -209,9 +209,9 @@ struct grip_hold {
   uint64_t decayed_us;
   int32_t friction_permille;
   int32_t share_permille; /* largest load over force of late */
-  int32_t floor_mN;   /* since the last slide */
-  uint64_t slid_us;   /* the last frame that told a slide */
-  uint64_t raised_us; /* the last reflex */
+  int32_t floor_mN;       /* since the last slide */
+  uint64_t slid_us;       /* the last frame that told a slide */
+  uint64_t raised_us;     /* the last reflex */
   bool has_told, has_slid, sliding, load_is_believed;
   uint32_t slides;
 };

@@ -56,7 +56,7 @@ static void follow_load(struct grip *grip, const struct grip_view *view) {
 
 static void learn_friction(struct grip *grip, const struct grip_view *view, bool begins) {
   struct grip_hold *hold = &grip->hold;
-  if (!view->tells_load) {
+  if (!view->has_load) {
     return;
   }
   if (begins) {
@@ -111,12 +111,12 @@ static int32_t load_force(const struct grip *grip) {
 int32_t grip_hold_wants(struct grip *grip, const struct grip_view *view) {
   struct grip_hold *hold = &grip->hold;
   if (view->fresh) {
-    if (view->tells_load) {
+    if (view->has_load) {
       follow_load(grip, view);
     }
     answer_slide(grip, view);
   }
-  int32_t least_mN = least_force(grip, view->tells_load);
+  int32_t least_mN = least_force(grip, view->has_load);
   int32_t wanted_mN = load_force(grip);
   wanted_mN = wanted_mN > least_mN ? wanted_mN : least_mN;
   bool rests = view->tells_load &&

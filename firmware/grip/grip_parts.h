@@ -6,14 +6,14 @@
 
 /* What both fingertips say, as far as they are to be believed. */
 struct grip_view {
-  uint32_t trouble;                 /* those of the fingertips */
-  uint8_t fingers, touches;         /* so many tell a force; feel a contact */
-  int32_t low_mN, high_mN, mean_mN; /* of those; 0 without any */
-  uint64_t t_us;                    /* of the older of them */
-  bool fresh;                       /* there has been a frame since the last step */
-  bool over;                        /* never tighten */
-  bool tells_load, slides;
-  int32_t load_mN; /* tangential load of one fingertip, since its zero */
+  uint32_t trouble;                  /* those of the fingertips */
+  uint8_t fingers, touches;          /* so many tell a force; feel a contact */
+  int32_t low_mN, high_mN, mean_mN;  /* of those; 0 without any */
+  uint64_t t_us;                     /* of the older of them */
+  bool fresh;                        /* there has been a frame since the last step */
+  bool over;                         /* never tighten */
+  bool has_load, tells_load, slides; /* tells_load: it is no guess */
+  int32_t load_mN;                   /* tangential load of one fingertip, since its zero */
 };
 
 int32_t grip_clamp(int32_t value, int32_t low, int32_t high);

@@ -74,6 +74,18 @@ static void add_to_zero(struct grip_zero *zero, int32_t x, int32_t y) {
   }
 }
 
+/* From now on the location tells changes of this load. */
+static void guess_from(const struct grip *grip, struct grip_finger *own, int32_t x_mN,
+                       int32_t y_mN) {
+  int32_t force_mN = own->force_mN < 1 ? 1 : own->force_mN;
+  int32_t most_um = grip_scale(grip->settings.shift_um, GUESSED_AFTER_PERMILLE, 1000);
+  int32_t x_um = grip_scale(grip->settings.shift_um, x_mN, force_mN);
+  int32_t y_um = grip_scale(grip->settings.shift_um, y_mN, force_mN);
+  own->place.x = own->touch.x_um - grip_clamp(x_um, -most_um, most_um);
+  own->place.y = own->touch.y_um - grip_clamp(y_um, -most_um, most_um);
+  own->has_place = true;
+}
+
 /* What pulls: as it is told, or, of contacts too long to tell it, from how far the location has
  * moved since the zero. */
 static void take_load(const struct grip *grip, struct grip_finger *own) {
@@ -87,9 +99,8 @@ static void take_load(const struct grip *grip, struct grip_finger *own) {
     own->has_pulled = true;
     int32_t x_mN = touch->qx_mN - own->pull.x, y_mN = touch->qy_mN - own->pull.y;
     own->load_mN = length_of(x_mN, y_mN);
-    int32_t force_mN = own->force_mN < 1 ? 1 : own->force_mN;
-    own->share_x_permille = grip_clamp(grip_scale(x_mN, 1000, force_mN), -2000, 2000);
-    own->share_y_permille = grip_clamp(grip_scale(y_mN, 1000, force_mN), -2000, 2000);
+    own->told_x_mN = x_mN;
+    own->told_y_mN = y_mN;
     add_to_zero(&own->pull, touch->qx_mN, touch->qy_mN);
   } else if (contact && (touch->flags & CONTACT_FLAG_FIT_VALID) != 0 &&
              (touch->flags & (NO_PLACE | CONTACT_FLAG_TANGENTIAL_VALID)) == 0 &&
@@ -97,10 +108,7 @@ static void take_load(const struct grip *grip, struct grip_finger *own) {
              grip->settings.shift_um > 0) {
     own->guesses_load = true;
     if (own->has_pulled && !own->has_place) {
-      /* What was told last, of this contact, goes on. */
-      own->place.x = touch->x_um - grip_scale(own->share_x_permille, grip->settings.shift_um, 1000);
-      own->place.y = touch->y_um - grip_scale(own->share_y_permille, grip->settings.shift_um, 1000);
-      own->has_place = true;
+      guess_from(grip, own, own->told_x_mN, own->told_y_mN); /* it goes on as it was told last */
     }
     int32_t shift_um = length_of(touch->x_um - own->place.x, touch->y_um - own->place.y);
     int32_t most_um = grip_scale(grip->settings.shift_um, GUESSED_MOST_PERMILLE, 1000);
@@ -162,12 +170,16 @@ void grip_zero_end(struct grip *grip) {
 void grip_guess_anew(struct grip *grip) {
   for (int i = 0; i < GRIP_FINGERS; i++) {
     struct grip_finger *own = &grip->finger[i];
-    int32_t x_um = own->touch.x_um - own->place.x, y_um = own->touch.y_um - own->place.y;
-    int32_t shift_um = length_of(x_um, y_um);
-    int32_t most_um = grip_scale(grip->settings.shift_um, GUESSED_AFTER_PERMILLE, 1000);
-    if (own->guesses_load && shift_um > most_um) {
-      own->place.x = own->touch.x_um - grip_scale(x_um, most_um, shift_um);
-      own->place.y = own->touch.y_um - grip_scale(y_um, most_um, shift_um);
+    if (own->guesses_load && own->has_pulled) {
+      guess_from(grip, own, own->told_x_mN, own->told_y_mN);
+    } else if (own->guesses_load) {
+      int32_t x_um = own->touch.x_um - own->place.x, y_um = own->touch.y_um - own->place.y;
+      int32_t shift_um = length_of(x_um, y_um);
+      int32_t most_um = grip_scale(grip->settings.shift_um, GUESSED_AFTER_PERMILLE, 1000);
+      if (shift_um > most_um) {
+        own->place.x = own->touch.x_um - grip_scale(x_um, most_um, shift_um);
+        own->place.y = own->touch.y_um - grip_scale(y_um, most_um, shift_um);
+      }
     }
   }
 }
@@ -224,7 +236,12 @@ void grip_look(struct grip *grip, struct grip_view *view) {
     }
     if (contact) {
       view->slides = view->slides || slides(own);
-      if (own->tells_load || (own->guesses_load && own->has_place)) {
+      bool guesses = own->guesses_load && own->has_place;
+      if (own->tells_load && !view->tells_load) {
+        loads = load_sum_mN = load_most_mN = 0; /* what is told counts, not what is guessed */
+        view->tells_load = true;
+      }
+      if (own->tells_load || (guesses && !view->tells_load)) {
         loads++;
         load_sum_mN += own->load_mN;
         load_most_mN = own->load_mN > load_most_mN ? own->load_mN : load_most_mN;
@@ -255,6 +272,6 @@ void grip_look(struct grip *grip, struct grip_view *view) {
     int32_t mean_mN = load_sum_mN / loads;
     int32_t least_mN = grip_scale(load_most_mN, 800, 1000);
     view->load_mN = mean_mN > least_mN ? mean_mN : least_mN;
-    view->tells_load = true;
+    view->has_load = true;
   }
 }
