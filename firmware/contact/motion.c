@@ -242,10 +242,21 @@ static bool find_velocity(struct motion_history *history) {
   return true;
 }
 
-/* The normal force's own scale is in both forces. */
-static int32_t ratio_q12(float tangential_N, int32_t force_N_q12) {
-  const int32_t most = 8 << 12;
-  return clamped(port_divide(fit_fixed(tangential_N, 24), force_N_q12), most);
+#define LOAD_MAX_q24 (32 << 24)
+
+/* Enters a load: what it has changed by, over the force of now. The normal force's own scale is in
+ * both. Exact over any number of frames of one force. */
+static void follow_load(struct motion_load *load, int32_t tangential_N_q24, int32_t force_N_q12,
+                        bool first) {
+  if (first) {
+    load->remainder = 0;
+  } else {
+    int32_t change = tangential_N_q24 - load->newest_q24 + load->remainder;
+    int32_t ratio_q12 = port_divide(change, force_N_q12);
+    load->remainder = change - ratio_q12 * force_N_q12;
+    load->ratio_q12 += (uint32_t)ratio_q12;
+  }
+  load->newest_q24 = tangential_N_q24;
 }
 
 static int32_t noise_um(const struct fit_tangential *found) {
@@ -255,6 +266,7 @@ static int32_t noise_um(const struct fit_tangential *found) {
 /* force_N_q12 > 0. */
 static void add(struct motion_history *history, const struct tangential_settings *settings,
                 uint64_t t_us, const struct fit_tangential *found, int32_t force_N_q12) {
+  bool first = history->brief.count == 0;
   history->now.t_us = (uint32_t)t_us;
   history->moments_before[enter(&history->brief, &history->now)] = history->moments;
   if (history->slow.count == 0 ||
@@ -271,8 +283,12 @@ static void add(struct motion_history *history, const struct tangential_settings
   history->now.count++;
   history->now.x += x;
   history->now.y += y;
-  history->now.load_x += (uint32_t)ratio_q12(found->qx_N, force_N_q12);
-  history->now.load_y += (uint32_t)ratio_q12(found->qy_N, force_N_q12);
+  follow_load(&history->load_x, clamped(fit_fixed(found->qx_N, 24), LOAD_MAX_q24), force_N_q12,
+              first);
+  follow_load(&history->load_y, clamped(fit_fixed(found->qy_N, 24), LOAD_MAX_q24), force_N_q12,
+              first);
+  history->now.load_x += history->load_x.ratio_q12;
+  history->now.load_y += history->load_y.ratio_q12;
   history->now.variance += noise * noise;
   history->moments.t += tick;
   history->moments.tt += tick * tick;

@@ -66,8 +66,15 @@ struct motion_sums {
   uint32_t t_us;           /* of that frame */
   uint32_t count;          /* of frames */
   uint32_t x, y;           /* location, mm / 2^11 */
-  uint32_t load_x, load_y; /* Q / F, 1 / 2^12 */
+  uint32_t load_x, load_y; /* integral of dQ / F, 1 / 2^12 */
   uint32_t variance;       /* of the location's noise, um^2 */
+};
+
+/* Integral of dQ / F along one axis: Q / F as long as F stays. A grip that tightens while the load
+ * grows leaves Q / F as it is, and the rubber gives way all the same. */
+struct motion_load {
+  uint32_t ratio_q12; /* modulo 2^32 */
+  int32_t newest_q24, remainder; /* Q as last entered; what is below the integral's last bit */
 };
 
 /* The same for the least squares: time in 64 us. */
@@ -89,6 +96,7 @@ struct motion {
 struct motion_history {
   struct motion_sums now;                               /* with the newest frame in them */
   struct motion_moments moments;                        /* likewise */
+  struct motion_load load_x, load_y;
   struct motion_ring brief, slow;                       /* every frame; MOTION_SLOW_STEP_us apart */
   struct motion_moments moments_before[MOTION_ENTRIES]; /* beside brief.sums */
   uint64_t newest_us;

@@ -19,6 +19,8 @@
 #define STANDS_us 400000u
 /* A move is to take so long, but where the object slides. */
 #define MOVE_us 20000
+/* The gripper's own limit of force, in case the fingertips' is not kept: of the cap. */
+#define LIMIT_PERMILLE 1250
 /* A width of the gripper's own units. */
 #define WIDTH_SLACK_um 1000
 
@@ -44,9 +46,9 @@ enum ft_status grip_init(struct grip *grip, const struct grip_settings *settings
       in_range(s->gains.kp_um_per_N, 0, 10000) && in_range(s->gains.ki_um_per_Ns, 0, 100000) &&
       in_range(s->gains.kd_um_s_per_N, 0, 10000) && s->control_us >= 500 &&
       s->control_us <= 1000000 && in_range(s->first_mN, 200, s->force_cap_mN) &&
-      in_range(s->blind_mN, s->first_mN, s->force_cap_mN) &&
+      in_range(s->blind_mN, s->first_mN, s->force_cap_mN) && in_range(s->shift_um, 0, 20000) &&
       in_range(s->friction_permille, 100, 1500) && in_range(s->margin_permille, 1000, 5000) &&
-      in_range(s->decay_permille_s, 0, 1000) && s->rest_us <= 60000000;
+      in_range(s->decay_permille_s, 0, 5000) && s->rest_us <= 60000000;
   if (!good) {
     return FT_ERR_ARGUMENT;
   }
@@ -125,15 +127,15 @@ static void ramp(struct grip *grip, int32_t to_um, int32_t speed_um_s) {
 }
 
 static void approach(struct grip *grip, const struct grip_view *view) {
-  if (view->fingers == 0) {
+  if (view->fingers == 0 && view->touches == 0) {
     return; /* blind: no further */
   }
   /* One fingertip alone pushes the object to the other. Where that one is missing, it decides. */
-  bool touches = view->touches == view->fingers && view->low_mN >= grip->settings.touch_mN;
+  bool touches = view->fingers == 0 ||
+                 (view->touches >= view->fingers && view->low_mN >= grip->settings.touch_mN);
   bool pushes_hard = view->high_mN >= 4 * grip->settings.touch_mN;
   if (touches || pushes_hard) {
     grip->touch_width_um = grip_width_at(grip, view->t_us);
-    grip->target_um = grip->status.width_um;
     enter(grip, GRIP_SQUEEZE);
     return;
   }
@@ -165,7 +167,7 @@ static uint32_t hold(struct grip *grip, const struct grip_view *view) {
   if (grip->settings.mode == GRIP_MODE_FIXED) {
     return grip_fixed_step(grip, view);
   }
-  uint32_t trouble = view->tells_load ? 0 : GRIP_NO_LOAD;
+  uint32_t trouble = view->has_load ? 0 : GRIP_NO_LOAD;
   trouble |= grip_aim(grip, view, grip_hold_wants(grip, view));
   if (grip->state == GRIP_HOLDING && grip->hold.sliding) {
     enter(grip, GRIP_SLIPPING);
@@ -207,7 +209,7 @@ static uint32_t go_on(struct grip *grip, const struct grip_view *view) {
       return 0;
     }
     /* Activating opens a gripper: not with something between its fingers. */
-    grip->may_activate = view->fingers > 0 && view->touches == 0;
+    grip->may_activate = grip->may_activate || (view->fingers > 0 && view->touches == 0);
     return grip->may_activate && grip->now_us - grip->since_us < ACTIVATION_us
                ? 0
                : GRIP_GRIPPER_INACTIVE;
@@ -262,6 +264,8 @@ static void tell_command(const struct grip *grip, struct grip_command *command) 
     return;
   }
   command->motion = GRIP_MOVE;
+  int32_t force_mN = grip_scale(grip->settings.force_cap_mN, LIMIT_PERMILLE, 1000);
+  command->force_mN = grip_clamp(force_mN, traits->force_min_mN, traits->force_max_mN);
   command->speed_um_s = grip_clamp(speed_um_s, traits->speed_min_um_s, traits->speed_max_um_s);
 }
 
@@ -279,7 +283,7 @@ static void tell_report(const struct grip *grip, const struct grip_view *view,
       .slides = hold->slides,
   };
   bool loaded = grip->state == GRIP_HOLDING || grip->state == GRIP_SLIPPING;
-  if (loaded && view->tells_load && grip->settings.mode == GRIP_MODE_HOLD) {
+  if (loaded && view->has_load && grip->settings.mode == GRIP_MODE_HOLD) {
     report->load_mN = view->load_mN;
     report->margin_permille =
         view->load_mN < 1

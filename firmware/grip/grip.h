@@ -73,7 +73,7 @@ struct grip_command {
   uint8_t motion; /* enum grip_motion */
   int32_t width_um;
   int32_t speed_um_s;
-  int32_t force_mN; /* the gripper's own limit; 0: its least */
+  int32_t force_mN; /* the gripper's own limit; 0: it has none */
 };
 
 enum grip_mode { GRIP_MODE_FIXED, GRIP_MODE_HOLD };
@@ -149,9 +149,11 @@ struct grip_settings {
   /* hold */
   int32_t first_mN;          /* grip before anything pulls, and never less */
   int32_t blind_mN;          /* grip where no load can be told */
+  int32_t shift_um;          /* by which a tangential load as large as the force moves a location
+                                that is not corrected for it; 0: loads are not guessed by that */
   int32_t friction_permille; /* until a slide, or a load that does not slide, tells better */
   int32_t margin_permille;   /* grip over load / friction */
-  int32_t decay_permille_s;  /* how fast grip comes down to what is wanted */
+  int32_t decay_permille_s;  /* how fast what is too much goes, share of it a second */
   uint32_t rest_us;          /* no sooner after a slide */
 };
 
@@ -172,17 +174,25 @@ struct grip_report {
 };
 
 /* What the fields hold is for the files of this folder. */
-struct grip_finger {
-  struct grip_touch touch;      /* the newest */
-  uint64_t changed_us;          /* when its values last changed */
-  uint64_t told_us;             /* of the newest frame that tells a force, */
-  int32_t force_mN;             /* and that force */
-  uint32_t unchanged;           /* frames whose values are those of the one before */
-  int32_t zero_x_mN, zero_y_mN; /* what pulled before any load */
-  int32_t x_sum_mN, y_sum_mN;   /* while it is measured */
+struct grip_zero {
+  int32_t x, y;         /* before any load */
+  int32_t x_sum, y_sum; /* while it is measured */
   uint32_t sums;
-  bool is_heard, is_new, tells_load;
+};
+struct grip_finger {
+  struct grip_touch touch; /* the newest */
+  uint64_t changed_us;     /* when its values last changed */
+  uint64_t told_us;        /* of the newest frame that tells a force, */
+  int32_t force_mN;        /* and that force */
+  uint32_t unchanged;      /* frames whose values are those of the one before */
+  struct grip_zero pull;   /* mN */
+  struct grip_zero place;  /* um, of a location that is not corrected */
+  uint64_t pulled_us;      /* the newest frame that told a tangential load */
+  bool is_heard, is_new, has_pulled, has_place;
+  bool tells_load, guesses_load; /* itself; from how the location has moved, */
+  bool shifts;                   /* by more than a load moves it */
   int32_t load_mN;
+  int32_t told_x_mN, told_y_mN; /* the load that was told last */
 };
 
 #define GRIP_WIDTHS 16
@@ -198,10 +208,11 @@ struct grip_hold {
   uint64_t load_us;     /* when it was told */
   uint64_t decayed_us;
   int32_t friction_permille;
-  int32_t floor_mN;   /* since the last slide */
-  uint64_t slid_us;   /* the last frame that told a slide */
-  uint64_t raised_us; /* the last reflex */
-  bool has_told, has_slid, sliding;
+  int32_t share_permille; /* largest load over force of late */
+  int32_t floor_mN;       /* since the last slide */
+  uint64_t slid_us;       /* the last frame that told a slide */
+  uint64_t raised_us;     /* the last reflex */
+  bool has_told, has_slid, sliding, load_is_believed;
   uint32_t slides;
 };
 

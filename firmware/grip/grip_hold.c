@@ -9,21 +9,36 @@
 
 /* A slide raises the grip at once by so much, and again each time the gripper has had the time to
  * answer and it goes on. */
-#define REFLEX_PERMILLE 1300
-#define REFLEX_AGAIN_us 20000
-/* The grip that ended a slide, or this much of it, is not given up. */
+#define REFLEX_PERMILLE 1200
+#define REFLEX_AGAIN_us 50000
+/* This much of the grip that ended a slide is not given up where no load tells what is needed. */
 #define FLOOR_PERMILLE 850
 
 /* Grip comes down in steps of so long. */
 #define DECAY_us 50000u
 
+/* An object that slides at less than this of Q / F pulls more than is told: then the grip that
+ * stopped it is all that is known. Otherwise its load and friction are. */
+#define BELIEVED_PERMILLE 150
+
 /* Q / F of a slide is friction, as far as Q is known. */
 #define SEEN_PERMILLE 950
-#define FRICTION_MIN_PERMILLE 100
+#define SHARE_us 60000
+#define FRICTION_MIN_PERMILLE 150
 #define FRICTION_MAX_PERMILLE 1500
 
 void grip_hold_begin(struct grip *grip) {
   grip->hold = (struct grip_hold){.friction_permille = grip->settings.friction_permille};
+}
+
+/* By when a slide is told the grip may hold again: what counts is the largest share of late. */
+static void follow_share(struct grip *grip, const struct grip_view *view, int32_t step_us) {
+  struct grip_hold *hold = &grip->hold;
+  hold->share_permille -= grip_scale(hold->share_permille, step_us, SHARE_us);
+  if (view->low_mN >= grip->settings.touch_mN * 2) {
+    int32_t share = grip_scale(view->load_mN, 1000, view->low_mN);
+    hold->share_permille = share > hold->share_permille ? share : hold->share_permille;
+  }
 }
 
 static void follow_load(struct grip *grip, const struct grip_view *view) {
@@ -35,18 +50,22 @@ static void follow_load(struct grip *grip, const struct grip_view *view) {
   hold->load_mN = view->load_mN;
   int32_t lag_mN = view->load_mN - hold->slow_load_mN;
   hold->rate_mN_s = lag_mN > 0 ? grip_scale(lag_mN, 1000000, RATE_us) : 0;
+  follow_share(grip, view, step_us > SHARE_us ? SHARE_us : step_us);
   hold->slow_load_mN += step_us >= RATE_us ? lag_mN : grip_scale(lag_mN, step_us, RATE_us);
 }
 
 static void learn_friction(struct grip *grip, const struct grip_view *view, bool begins) {
   struct grip_hold *hold = &grip->hold;
-  if (!view->tells_load || view->low_mN < grip->settings.touch_mN * 2) {
+  if (!view->has_load) {
     return;
   }
-  int32_t seen = grip_scale(view->load_mN, 1000, view->low_mN);
-  seen = grip_clamp(grip_scale(seen, SEEN_PERMILLE, 1000), FRICTION_MIN_PERMILLE,
-                    FRICTION_MAX_PERMILLE);
-  if (begins ? seen < hold->friction_permille : !hold->sliding && seen > hold->friction_permille) {
+  if (begins) {
+    hold->load_is_believed = hold->share_permille >= BELIEVED_PERMILLE;
+  }
+  int32_t seen = grip_clamp(grip_scale(hold->share_permille, SEEN_PERMILLE, 1000),
+                            FRICTION_MIN_PERMILLE, FRICTION_MAX_PERMILLE);
+  if (begins ? seen < hold->friction_permille
+             : !hold->sliding && !view->slides && seen > hold->friction_permille) {
     hold->friction_permille = seen;
   }
 }
@@ -68,7 +87,8 @@ static void answer_slide(struct grip *grip, const struct grip_view *view) {
     hold->slid_us = grip->now_us;
     hold->has_slid = true;
   } else if (hold->sliding) {
-    hold->floor_mN = grip_scale(hold->floor_mN, FLOOR_PERMILLE, 1000);
+    hold->floor_mN = hold->load_is_believed ? 0 : grip_scale(hold->floor_mN, FLOOR_PERMILLE, 1000);
+    grip_guess_anew(grip);
   }
   hold->sliding = view->slides;
 }
@@ -91,12 +111,12 @@ static int32_t load_force(const struct grip *grip) {
 int32_t grip_hold_wants(struct grip *grip, const struct grip_view *view) {
   struct grip_hold *hold = &grip->hold;
   if (view->fresh) {
-    if (view->tells_load) {
+    if (view->has_load) {
       follow_load(grip, view);
     }
     answer_slide(grip, view);
   }
-  int32_t least_mN = least_force(grip, view->tells_load);
+  int32_t least_mN = least_force(grip, view->has_load);
   int32_t wanted_mN = load_force(grip);
   wanted_mN = wanted_mN > least_mN ? wanted_mN : least_mN;
   bool rests = view->tells_load &&
@@ -111,6 +131,5 @@ int32_t grip_hold_wants(struct grip *grip, const struct grip_view *view) {
   }
   hold->decayed_us = grip->now_us;
   int32_t share = port_divide(grip->settings.decay_permille_s * (int32_t)step_us, 1000);
-  int32_t lower_mN = grip->wanted_mN - grip_scale(grip->wanted_mN, share, 1000000);
-  return lower_mN > wanted_mN ? lower_mN : wanted_mN;
+  return grip->wanted_mN - grip_scale(grip->wanted_mN - wanted_mN, share, 1000000);
 }

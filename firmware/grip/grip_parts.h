@@ -6,14 +6,14 @@
 
 /* What both fingertips say, as far as they are to be believed. */
 struct grip_view {
-  uint32_t trouble;                 /* those of the fingertips */
-  uint8_t fingers, touches;         /* so many tell a force; feel a contact */
-  int32_t low_mN, high_mN, mean_mN; /* of those; 0 without any */
-  uint64_t t_us;                    /* of the older of them */
-  bool fresh;                       /* there has been a frame since the last step */
-  bool over;                        /* never tighten */
-  bool tells_load, slides;
-  int32_t load_mN; /* tangential load of one fingertip, since its zero */
+  uint32_t trouble;                  /* those of the fingertips */
+  uint8_t fingers, touches;          /* so many tell a force; feel a contact */
+  int32_t low_mN, high_mN, mean_mN;  /* of those; 0 without any */
+  uint64_t t_us;                     /* of the older of them */
+  bool fresh;                        /* there has been a frame since the last step */
+  bool over;                         /* never tighten */
+  bool has_load, tells_load, slides; /* tells_load: it is no guess */
+  int32_t load_mN;                   /* tangential load of one fingertip, since its zero */
 };
 
 int32_t grip_clamp(int32_t value, int32_t low, int32_t high);
@@ -25,6 +25,9 @@ void grip_look(struct grip *grip, struct grip_view *view);
 void grip_zero_begin(struct grip *grip);
 void grip_zero_end(struct grip *grip);
 bool grip_zero_has(const struct grip *grip, uint32_t frames);
+
+/* After a slide: what a location has moved by since its zero is no load any more. */
+void grip_guess_anew(struct grip *grip);
 
 /* The width that the gripper had then. */
 int32_t grip_width_at(const struct grip *grip, uint64_t t_us);

@@ -12,9 +12,10 @@
  * differ by. */
 #define SETTLES_us 30000u
 
-/* Of what a step makes: less is not worth one closing, more is left before one opening. */
-#define TIGHTEN_PERMILLE 250
-#define LOOSEN_PERMILLE 1200
+/* Of what a step makes: less than that is missing, and none is made; so much may be missing after
+ * one that opens. */
+#define TIGHTEN_PERMILLE 500
+#define LOOSEN_PERMILLE 300
 /* Of the cap: so much of it is asked for, as the last step may make more than is known. */
 #define CAP_PERMILLE 970
 /* And of the force that is wanted, for grippers of fine steps. */
@@ -26,9 +27,20 @@ void grip_take_status(struct grip *grip, const struct grip_status *status) {
   }
   grip->status = *status;
   grip->status_is_heard = true;
-  grip->newest_width = (grip->newest_width + 1) % GRIP_WIDTHS;
+  /* The ring spans what a force may be old. */
+  uint32_t before = (grip->newest_width - 1) % GRIP_WIDTHS;
+  if (grip->width_count < 2 || grip->widths[grip->newest_width].t_us - grip->widths[before].t_us >=
+                                   grip->settings.stale_us / (GRIP_WIDTHS - 4)) {
+    grip->newest_width = (grip->newest_width + 1) % GRIP_WIDTHS;
+    grip->width_count += grip->width_count < GRIP_WIDTHS;
+  }
   grip->widths[grip->newest_width] = (struct grip_width){status->t_us, status->width_um};
-  grip->width_count += grip->width_count < GRIP_WIDTHS;
+}
+
+/* Whether the ring tells the width of then. */
+static bool knows_width(const struct grip *grip, uint64_t t_us) {
+  uint32_t oldest = (grip->newest_width - (grip->width_count - 1)) % GRIP_WIDTHS;
+  return grip->width_count > 0 && grip->widths[oldest].t_us <= t_us;
 }
 
 int32_t grip_width_at(const struct grip *grip, uint64_t t_us) {
@@ -89,7 +101,7 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
     trouble |= GRIP_AT_CAP;
   }
   grip->wanted_mN = wanted_mN;
-  if (view->fingers == 0) {
+  if (view->fingers == 0 || !knows_width(grip, view->t_us)) {
     return trouble;
   }
   /* Where the force will be once the gripper is where it was sent. */
@@ -103,7 +115,7 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
   int32_t missing_mN = wanted_mN - low_mN;
   int32_t steps = 0;
   if (missing_mN > tolerance_mN && missing_mN > grip_scale(step_mN, TIGHTEN_PERMILLE, 1000)) {
-    steps = port_divide(missing_mN + step_mN - 1, step_mN);
+    steps = port_divide(missing_mN + step_mN / 2, step_mN);
     int32_t least = least_steps(grip, true);
     steps = steps < least ? least : steps;
     int32_t most_mN = grip_scale(settings->force_cap_mN, CAP_PERMILLE, 1000);

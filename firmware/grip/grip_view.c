@@ -10,13 +10,22 @@
 #define FORCE_MAX_mN 1000000
 #define ZERO_FRAMES_MAX 2000u
 
+/* A location is taken for a load's only where none has been told for so long; and for no more of
+ * one than this of the force: what is beyond is a slide. */
+#define PULLED_us 300000u
+#define GUESSED_MOST_PERMILLE 600
+#define GUESSED_AFTER_PERMILLE 300
+
 /* A force with a larger standard deviation is no measurement. */
-#define FORCE_SD_MAX_PERMILLE 500
+#define FORCE_SD_MAX_PERMILLE 1000
 
 /* What neither location nor load is to be believed with. */
 #define FORCE_ONLY                                                                                 \
   (CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_SATURATED |   \
    CONTACT_FLAG_ZERO_DOUBTFUL)
+/* Without a location that moves as the contact does. */
+#define NO_PLACE                                                                                   \
+  (CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_SATURATED | CONTACT_FLAG_ZERO_DOUBTFUL)
 #define OVER (CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND)
 
 int32_t grip_clamp(int32_t value, int32_t low, int32_t high) {
@@ -57,6 +66,59 @@ static bool is_same(const struct grip_touch *a, const struct grip_touch *b) {
          a->y_um == b->y_um && a->qx_mN == b->qx_mN && a->qy_mN == b->qy_mN;
 }
 
+static void add_to_zero(struct grip_zero *zero, int32_t x, int32_t y) {
+  if (zero->sums < ZERO_FRAMES_MAX) {
+    zero->x_sum += x;
+    zero->y_sum += y;
+    zero->sums++;
+  }
+}
+
+/* From now on the location tells changes of this load. */
+static void guess_from(const struct grip *grip, struct grip_finger *own, int32_t x_mN,
+                       int32_t y_mN) {
+  int32_t force_mN = own->force_mN < 1 ? 1 : own->force_mN;
+  int32_t most_um = grip_scale(grip->settings.shift_um, GUESSED_AFTER_PERMILLE, 1000);
+  int32_t x_um = grip_scale(grip->settings.shift_um, x_mN, force_mN);
+  int32_t y_um = grip_scale(grip->settings.shift_um, y_mN, force_mN);
+  own->place.x = own->touch.x_um - grip_clamp(x_um, -most_um, most_um);
+  own->place.y = own->touch.y_um - grip_clamp(y_um, -most_um, most_um);
+  own->has_place = true;
+}
+
+/* What pulls: as it is told, or, of contacts too long to tell it, from how far the location has
+ * moved since the zero. */
+static void take_load(const struct grip *grip, struct grip_finger *own) {
+  const struct grip_touch *touch = &own->touch;
+  bool contact = (touch->flags & CONTACT_FLAG_CONTACT) != 0;
+  own->tells_load =
+      (touch->flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0 && (touch->flags & FORCE_ONLY) == 0;
+  own->guesses_load = false;
+  if (own->tells_load) {
+    own->pulled_us = touch->t_us;
+    own->has_pulled = true;
+    int32_t x_mN = touch->qx_mN - own->pull.x, y_mN = touch->qy_mN - own->pull.y;
+    own->load_mN = length_of(x_mN, y_mN);
+    own->told_x_mN = x_mN;
+    own->told_y_mN = y_mN;
+    add_to_zero(&own->pull, touch->qx_mN, touch->qy_mN);
+  } else if (contact && (touch->flags & CONTACT_FLAG_FIT_VALID) != 0 &&
+             (touch->flags & (NO_PLACE | CONTACT_FLAG_TANGENTIAL_VALID)) == 0 &&
+             !(own->has_pulled && touch->t_us - own->pulled_us < PULLED_us) &&
+             grip->settings.shift_um > 0) {
+    own->guesses_load = true;
+    if (own->has_pulled && !own->has_place) {
+      guess_from(grip, own, own->told_x_mN, own->told_y_mN); /* it goes on as it was told last */
+    }
+    int32_t shift_um = length_of(touch->x_um - own->place.x, touch->y_um - own->place.y);
+    int32_t most_um = grip_scale(grip->settings.shift_um, GUESSED_MOST_PERMILLE, 1000);
+    own->shifts = shift_um > most_um;
+    shift_um = own->shifts ? most_um : shift_um;
+    own->load_mN = grip_scale(own->force_mN, shift_um, grip->settings.shift_um);
+    add_to_zero(&own->place, touch->x_um, touch->y_um);
+  }
+}
+
 void grip_take_touch(struct grip *grip, unsigned finger, const struct grip_touch *touch) {
   if (finger >= GRIP_FINGERS ||
       (grip->finger[finger].is_heard && touch->t_us <= grip->finger[finger].touch.t_us)) {
@@ -81,39 +143,52 @@ void grip_take_touch(struct grip *grip, unsigned finger, const struct grip_touch
     own->told_us = touch->t_us;
     own->force_mN = touch->flags & CONTACT_FLAG_CONTACT ? own->touch.force_mN : 0;
   }
-  own->tells_load =
-      (touch->flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0 && (touch->flags & FORCE_ONLY) == 0;
-  if (own->tells_load) {
-    own->load_mN = length_of(own->touch.qx_mN - own->zero_x_mN, own->touch.qy_mN - own->zero_y_mN);
-    if (own->sums < ZERO_FRAMES_MAX) {
-      own->x_sum_mN += own->touch.qx_mN;
-      own->y_sum_mN += own->touch.qy_mN;
-      own->sums++;
-    }
+  take_load(grip, own);
+}
+
+static void end_zero(struct grip_zero *zero) {
+  if (zero->sums > 0) {
+    zero->x = port_divide(zero->x_sum, (int32_t)zero->sums);
+    zero->y = port_divide(zero->y_sum, (int32_t)zero->sums);
   }
 }
 
 void grip_zero_begin(struct grip *grip) {
   for (int i = 0; i < GRIP_FINGERS; i++) {
-    struct grip_finger *own = &grip->finger[i];
-    own->x_sum_mN = own->y_sum_mN = own->zero_x_mN = own->zero_y_mN = 0;
-    own->sums = 0;
+    grip->finger[i].pull = grip->finger[i].place = (struct grip_zero){0};
   }
 }
 
 void grip_zero_end(struct grip *grip) {
   for (int i = 0; i < GRIP_FINGERS; i++) {
+    end_zero(&grip->finger[i].pull);
+    end_zero(&grip->finger[i].place);
+    grip->finger[i].has_place = grip->finger[i].place.sums > 0;
+  }
+}
+
+void grip_guess_anew(struct grip *grip) {
+  for (int i = 0; i < GRIP_FINGERS; i++) {
     struct grip_finger *own = &grip->finger[i];
-    if (own->sums > 0) {
-      own->zero_x_mN = port_divide(own->x_sum_mN, (int32_t)own->sums);
-      own->zero_y_mN = port_divide(own->y_sum_mN, (int32_t)own->sums);
+    if (own->guesses_load && own->has_pulled) {
+      guess_from(grip, own, own->told_x_mN, own->told_y_mN);
+    } else if (own->guesses_load) {
+      int32_t x_um = own->touch.x_um - own->place.x, y_um = own->touch.y_um - own->place.y;
+      int32_t shift_um = length_of(x_um, y_um);
+      int32_t most_um = grip_scale(grip->settings.shift_um, GUESSED_AFTER_PERMILLE, 1000);
+      if (shift_um > most_um) {
+        own->place.x = own->touch.x_um - grip_scale(x_um, most_um, shift_um);
+        own->place.y = own->touch.y_um - grip_scale(y_um, most_um, shift_um);
+      }
     }
   }
 }
 
 bool grip_zero_has(const struct grip *grip, uint32_t frames) {
   for (int i = 0; i < GRIP_FINGERS; i++) {
-    if (grip->finger[i].tells_load && grip->finger[i].sums < frames) {
+    const struct grip_finger *own = &grip->finger[i];
+    if ((own->tells_load && own->pull.sums < frames) ||
+        (own->guesses_load && own->place.sums < frames)) {
       return false;
     }
   }
@@ -123,6 +198,15 @@ bool grip_zero_has(const struct grip *grip, uint32_t frames) {
 static bool is_frozen(const struct grip *grip, const struct grip_finger *own) {
   return own->unchanged >= FROZEN_FRAMES && own->touch.t_us - own->changed_us >= FROZEN_us &&
          grip->state != GRIP_IDLE;
+}
+
+/* Eq. (7) takes loads for slides: it counts only where nothing else tells either. */
+static bool slides(const struct grip_finger *own) {
+  if (own->tells_load) {
+    return (own->touch.flags & CONTACT_FLAG_SLIDING) != 0;
+  }
+  return own->guesses_load && own->has_place ? own->shifts
+                                             : (own->touch.flags & CONTACT_FLAG_SLIP) != 0;
 }
 
 void grip_look(struct grip *grip, struct grip_view *view) {
@@ -149,9 +233,15 @@ void grip_look(struct grip *grip, struct grip_view *view) {
     bool contact = (own->touch.flags & CONTACT_FLAG_CONTACT) != 0;
     if (contact && (own->touch.flags & FORCE_ONLY) != 0) {
       view->trouble |= (uint32_t)GRIP_FINGER_0_FORCE_ONLY << i;
-    } else if (contact) {
-      view->slides = view->slides || (own->touch.flags & CONTACT_FLAG_SLIDING) != 0;
-      if (own->tells_load) {
+    }
+    if (contact) {
+      view->slides = view->slides || slides(own);
+      bool guesses = own->guesses_load && own->has_place;
+      if (own->tells_load && !view->tells_load) {
+        loads = load_sum_mN = load_most_mN = 0; /* what is told counts, not what is guessed */
+        view->tells_load = true;
+      }
+      if (own->tells_load || (guesses && !view->tells_load)) {
         loads++;
         load_sum_mN += own->load_mN;
         load_most_mN = own->load_mN > load_most_mN ? own->load_mN : load_most_mN;
@@ -182,6 +272,6 @@ void grip_look(struct grip *grip, struct grip_view *view) {
     int32_t mean_mN = load_sum_mN / loads;
     int32_t least_mN = grip_scale(load_most_mN, 800, 1000);
     view->load_mN = mean_mN > least_mN ? mean_mN : least_mN;
-    view->tells_load = true;
+    view->has_load = true;
   }
 }

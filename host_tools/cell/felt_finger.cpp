@@ -63,7 +63,7 @@ struct FeltFinger::Firmware {
   fit_settings fit{};
   contact_settings contact{};
   tangential_settings tangential{};
-  tangential_kept kept{};
+  fit_tangential_state state{};
   slip_history slip{};
   tangential_history load{};
   motion_history motion{};
@@ -92,18 +92,13 @@ grip_touch FeltFinger::Firmware::frame(std::uint64_t t_us, bool pressed,
                                        const std::int32_t *readings) {
   fit_result fitted{};
   fit_tangential estimate{};
-  if (!pressed) {
-    kept.is_told = false;
-  } else {
+  if (pressed) {
     fit_gaussian_grid(&array, readings, (1U << SENSORS) - 1U, &fit, &fitted);
-    if (tangential_is_worthwhile(&fitted, 0)) {
-      if (tangential_is_due(&kept, t_us)) {
-        fit_tangential_load(&array, &pad, readings, &fit, &fitted, &estimate);
-        tangential_keep(&kept, t_us, &fitted, &estimate);
-      } else {
-        tangential_carry(&kept, &fitted, &estimate);
-      }
-    }
+  }
+  if (pressed && tangential_is_worthwhile(&fitted, 0)) {
+    fit_tangential_load(&array, &pad, readings, &fit, &fitted, &state, &estimate);
+  } else {
+    state = {};
   }
   contact_input input{};
   input.t_us = t_us;
@@ -112,7 +107,6 @@ grip_touch FeltFinger::Firmware::frame(std::uint64_t t_us, bool pressed,
   input.calibrated = true;
   input.fit = pressed ? &fitted : nullptr;
   input.tangential = &estimate;
-  input.tangential_is_carried = kept.t_us != t_us;
   const contact_force force = contact_weigh(&contact, &fitted);
   contact_result result;
   tangential_load pull;

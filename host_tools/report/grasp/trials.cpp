@@ -37,6 +37,7 @@ void change(grip_settings &settings, const std::string &changes) {
       {"kd_um_s_per_N", &settings.gains.kd_um_s_per_N},
       {"first_mN", &settings.first_mN},
       {"blind_mN", &settings.blind_mN},
+      {"shift_um", &settings.shift_um},
       {"friction_permille", &settings.friction_permille},
       {"margin_permille", &settings.margin_permille},
       {"decay_permille_s", &settings.decay_permille_s}};
