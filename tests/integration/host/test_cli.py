@@ -680,7 +680,7 @@ class Commands(CliTest):
         self.environment["FINGERTIP_PORT"] = self.port
         with self.device("capabilities=15"):
             self.assertNotIn("pad_", self.run_cli("info")[0])
-            out, err = self.run_cli("pad", "--thickness", "12", "--overhang", "9")
+            out, err = self.run_cli("pad", "--thickness", "12", "--overhang", "9", patience_s=300)
             self.assertRegex(out, r"^thickness=12 overhang=9 ends force_ratio=0\.9\d\d kept\n$")
             self.assertEqual(err, "")
             out = self.run_cli("info")[0]
@@ -691,9 +691,9 @@ class Commands(CliTest):
             self.assertRegex(out, r"(?m)^pad_from_touch +0$")
             self.assertRegex(out, r"(?m)^pad_moments_mm +1\.12\d* 4\.03\d* 5\.56\d*$")
             self.assertRegex(out, r"(?m)^pad_edge_ratio_x +0\.2[3-6]\d* -0\.0\d+ -0\.0\d+$")
-            out, err = self.run_cli("pad", "--thickness", "12", "--overhang", "4.5")
+            out, err = self.run_cli("pad", "--thickness", "12", "--overhang", "4.5", patience_s=300)
             self.assertEqual(err.count("spoils the zero"), 1)
-            out, err = self.run_cli("pad", "--thickness", "12", "--overhang", "4.5", "--from-touch")
+            out, err = self.run_cli("pad", "--thickness", "12", "--overhang", "4.5", "--from-touch", patience_s=300)
             self.assertIn(" from_touch ", out)
             self.assertEqual(err, "")
             self.assertRegex(self.run_cli("info")[0], r"(?m)^pad_from_touch +1$")
