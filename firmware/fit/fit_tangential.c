@@ -78,7 +78,11 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
  * the estimate is off its optimum by some 0.1 mm, after a jump of the Gaussian too. */
 #define STEPS_TOLD 2
 #define LENGTH_TOLD_Q14 3277
-#define JUMP_Q26 (ONE_Q26 / 4)
+#define JUMP_Q26 (ONE_Q26 / 2)
+/* The Gaussian's place jitters more than the estimate's in the corners. */
+#define MOVED_NOISES 4
+/* Of all readings, the largest of which is 0.5 to 1: less is no contact's. */
+#define SUM_LEAST_Q20 (1 << 18)
 /* After so many frames in a row that are not told it begins anew: one more than a contact at rest
  * takes. Where another contact has come and gone it is found again within ten frames, without this
  * after hundreds. */
@@ -813,35 +817,50 @@ NOINLINE static void set_from_fit(const struct fit_pad *pad, const struct fit_re
   at->amplitude_q24 = fixed_clamp(fit_scaled_to_fixed(amplitude, 24), 1 << 18, AMPLITUDE_MAX_Q24);
 }
 
+static int32_t sum_of(const struct readings *readings) {
+  int32_t sum_q20 = 0;
+  for (int k = 0; k < NODES; k++) {
+    sum_q20 += readings->q28[k] >> 8;
+  }
+  return sum_q20;
+}
+
 /* Of 2^bits. */
 static int32_t to_multiple(int32_t value, int bits) {
   return rounded(value, bits) * (1 << bits);
 }
 
+static int32_t in_proportion(int32_t value, int32_t share_q13, int32_t most) {
+  return fixed_clamp(scaled_by(value, share_q13, 13), -most, most);
+}
+
 /* Where the estimate begins: at the Gaussian's, or where the last frame's ended, moved as the
- * Gaussian has moved and in proportion to its force. */
+ * Gaussian has moved, unless its noise may have done that, and in proportion to the readings. */
 NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_state *state,
-                           const struct fit_tangential_unknowns *fit) {
+                           const struct fit_tangential_unknowns *fit, int32_t noise_q26,
+                           int32_t sum_q20) {
   struct fit_tangential_unknowns *at = &state->at;
-  int32_t before = state->fit_amplitude_q24, now = fit->amplitude_q24;
+  int32_t before = state->sum_q20;
   int32_t dx_q26 = fit->x_q26 - state->fit_x_q26, dy_q26 = fit->y_q26 - state->fit_y_q26;
-  bool grew = now >> 2 >= before || before >> 2 >= now;
-  if (state->steps == 0 || grew) {
+  uint32_t moved_q26 = fixed_size(dx_q26) + fixed_size(dy_q26);
+  bool other = sum_q20 < SUM_LEAST_Q20 || before < SUM_LEAST_Q20 || sum_q20 >> 2 >= before ||
+               before >> 2 >= sum_q20;
+  if (state->steps == 0 || other) {
     *at = *fit;
   } else {
-    int32_t share_q13 = fixed_clamp(port_divide(now, before >> 13), 0, INT16_MAX);
-    at->x_q26 = fixed_clamp(at->x_q26 + dx_q26, -reach(pad, COLUMNS), reach(pad, COLUMNS));
-    at->y_q26 = fixed_clamp(at->y_q26 + dy_q26, -reach(pad, ROWS), reach(pad, ROWS));
-    at->amplitude_q24 =
-        fixed_clamp(scaled_by(at->amplitude_q24, share_q13, 13), 1 << 16, AMPLITUDE_MAX_Q24);
-    at->pull_x_q24 =
-        fixed_clamp(scaled_by(at->pull_x_q24, share_q13, 13), -PULL_MAX_Q24, PULL_MAX_Q24);
-    at->pull_y_q24 =
-        fixed_clamp(scaled_by(at->pull_y_q24, share_q13, 13), -PULL_MAX_Q24, PULL_MAX_Q24);
-    at->e1_q26 = fixed_clamp(scaled_by(at->e1_q26, share_q13, 13), -LONG_MAX_Q26, LONG_MAX_Q26);
-    at->e2_q26 = fixed_clamp(scaled_by(at->e2_q26, share_q13, 13), -LONG_MAX_Q26, LONG_MAX_Q26);
+    if (moved_q26 > (uint32_t)noise_q26 * MOVED_NOISES) {
+      at->x_q26 = fixed_clamp(at->x_q26 + dx_q26, -reach(pad, COLUMNS), reach(pad, COLUMNS));
+      at->y_q26 = fixed_clamp(at->y_q26 + dy_q26, -reach(pad, ROWS), reach(pad, ROWS));
+    }
+    int32_t share_q13 = fixed_clamp(port_divide(sum_q20, before >> 13), 0, INT16_MAX);
+    at->amplitude_q24 = in_proportion(at->amplitude_q24, share_q13, AMPLITUDE_MAX_Q24);
+    at->amplitude_q24 = fixed_clamp(at->amplitude_q24, 1 << 16, AMPLITUDE_MAX_Q24);
+    at->pull_x_q24 = in_proportion(at->pull_x_q24, share_q13, PULL_MAX_Q24);
+    at->pull_y_q24 = in_proportion(at->pull_y_q24, share_q13, PULL_MAX_Q24);
+    at->e1_q26 = in_proportion(at->e1_q26, share_q13, LONG_MAX_Q26);
+    at->e2_q26 = in_proportion(at->e2_q26, share_q13, LONG_MAX_Q26);
   }
-  if (grew || fixed_size(dx_q26) + fixed_size(dy_q26) > JUMP_Q26) {
+  if (other || moved_q26 > JUMP_Q26) {
     state->steps = 0;
   }
   at->x_q26 = to_multiple(at->x_q26, 26 - PLACE_Q);
@@ -853,7 +872,7 @@ NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_stat
   at->e2_q26 = to_multiple(at->e2_q26, 26 - LONG_Q);
   state->fit_x_q26 = fit->x_q26;
   state->fit_y_q26 = fit->y_q26;
-  state->fit_amplitude_q24 = now;
+  state->sum_q20 = sum_q20;
 }
 
 /* Variance of an unknown, in its unit squared, of readings whose variance is 1: an element of the
@@ -978,7 +997,10 @@ void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,
   struct fit_tangential_unknowns said;
   struct outcome outcome;
   set_from_fit(pad, fit, problem.readings.shift, &said);
-  begin(pad, state, &said);
+  begin(pad, state, &said,
+        product(fixed_clamp(fit_fixed(fit->location_noise_mm, 24), 0, 1 << 28), pad->per_unit_q30,
+                28),
+        sum_of(&problem.readings));
   int32_t long_sd_q26 = fixed_mul_q28(said.amplitude_q24 * 4, pad->long_sd_q26) * 4;
   problem.spread_prior_q26 = prior_row(problem.base_q22, pad->spread_sd_q26);
   problem.long_prior_q26 = prior_row(problem.base_q22, long_sd_q26);

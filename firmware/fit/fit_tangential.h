@@ -84,10 +84,11 @@ struct fit_tangential_unknowns {
 /* Of one contact, from frame to frame. All zeros: the next frame is its first; so it is to be made
  * when a contact has ended, and by frames without an estimate. */
 struct fit_tangential_state {
-  struct fit_tangential_unknowns at;               /* where the last step ended */
-  int32_t fit_x_q26, fit_y_q26, fit_amplitude_q24; /* what the Gaussian said then */
-  uint8_t steps;                                   /* since the beginning, 2 stands for more */
-  uint8_t untold;                                  /* frames in a row */
+  struct fit_tangential_unknowns at; /* where the last step ended */
+  int32_t fit_x_q26, fit_y_q26;      /* where the Gaussian was */
+  int32_t sum_q20;                   /* of the readings, in the unit of amplitude */
+  uint8_t steps;                     /* since the beginning, 2 stands for more */
+  uint8_t untold;                    /* frames in a row */
 };
 
 /* Every member is finite. Where `valid` is off all are zero. */

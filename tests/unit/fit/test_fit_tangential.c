@@ -382,8 +382,8 @@ static void test_another_contact_is_found_at_once(void) {
     for (int frame = 0; frame < 6 && held.valid; frame++) {
       found = go_on(&state, readings, ALL);
       if (found.valid) {
-        TEST_ASSERT_TRUE(off_mm(&found, &held) < 0.3);
-        TEST_ASSERT_TRUE(off_ratio(&found, &held) < 0.03);
+        TEST_ASSERT_TRUE(off_mm(&found, &held) < 0.25);
+        TEST_ASSERT_TRUE(off_ratio(&found, &held) < 0.05);
       }
     }
     TEST_ASSERT_EQUAL(held.valid, found.valid);
@@ -395,7 +395,7 @@ static void test_another_contact_is_found_at_once(void) {
 static void test_it_begins_anew_where_it_says_nothing(void) {
   struct random random = {SEED};
   int begun = 0;
-  for (int i = 0; i < 300; i++) {
+  for (int i = 0; i < 1000; i++) {
     struct fit_tangential_state state = {0};
     int32_t readings[SENSORS], more[SENSORS];
     struct contact contact = draw_contact(&random, 0.1), other = draw_contact(&random, 0.3);
@@ -528,9 +528,11 @@ static void draw_readings(struct random *random, int32_t *readings) {
 static void test_any_bits_give_finite_results(void) {
   struct random random = {SEED};
   uint32_t valid = 0;
+  struct fit_tangential_state state = {0};
   for (uint32_t i = 0; i < RANDOM_INPUTS; i++) {
     if (i % 64 == 0) {
       draw_pad(&random);
+      memset(&state, 0, sizeof state);
     }
     int32_t readings[SENSORS];
     draw_readings(&random, readings);
@@ -538,8 +540,9 @@ static void test_any_bits_give_finite_results(void) {
     for (int k = 0; k < SENSORS; k++) {
       settings.gain_sd_q16[k] = (uint16_t)(random_u32(&random) >> random_below(&random, 32));
     }
-    struct fit_tangential found = estimate(
-        readings, random_below(&random, 2) ? ALL : random_u32(&random) | random_u32(&random));
+    uint32_t usable = random_below(&random, 2) ? ALL : random_u32(&random) | random_u32(&random);
+    struct fit_tangential found =
+        i % 2 ? go_on(&state, readings, usable) : estimate(readings, usable);
     const float values[] = {
         found.x_mm,    found.y_mm,       found.location_sd_mm, found.location_noise_mm,
         found.force_N, found.force_sd_N, found.qx_N,           found.qy_N,
@@ -561,7 +564,7 @@ static void test_any_bits_give_finite_results(void) {
     }
     valid += found.valid;
   }
-  TEST_ASSERT_GREATER_THAN_UINT32(RANDOM_INPUTS / 40, valid);
+  TEST_ASSERT_GREATER_THAN_UINT32(RANDOM_INPUTS / 60, valid);
 }
 
 int main(void) {
