@@ -2,7 +2,8 @@
 //
 // The object stands on the table between the fingers. Once the grip's force has stood for a while,
 // or when it is told to, the hand lifts it; disturbances (scene.hpp) come then, planned or when
-// they are told. An object that slid DROP_mm, or that nothing presses any more, is gone.
+// they are told. What slides by less than SLIP_mm at a time has not slipped. An object that slid
+// DROP_mm, or that nothing presses any more, is gone.
 #pragma once
 
 #include "cell/gripper_motion.hpp"
