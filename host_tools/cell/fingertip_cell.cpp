@@ -364,7 +364,10 @@ private:
     world_->advance(1e-6 * static_cast<double>(passed_us));
     fingers_.put(now_us, {world_->pressures_Pa(0), world_->pressures_Pa(1)});
     if (!at_touch_.empty() && world_->touched()) {
-      obey(std::exchange(at_touch_, {}));
+      const std::string commands = std::exchange(at_touch_, {});
+      for (const std::string_view command : split(commands, ';')) {
+        obey(std::string(trim(command)));
+      }
     }
     for (const std::string &event : world_->take_events()) {
       tell_event(event);
@@ -448,9 +451,11 @@ private:
     } else if (verb == "fault" && number && *number >= 0.0 && *number <= 255.0) {
       server_.fail(static_cast<std::uint8_t>(*number));
       return true;
-    } else {
+    } else if (is_disturbance(verb)) {
       const Planned now = planned(verb + ":" + what);
       return world_->disturb(now.kind, now.amount);
+    } else {
+      return false;
     }
     server_.trouble(line_);
     return true;
@@ -459,7 +464,7 @@ private:
   static constexpr const char *COMMANDS =
       "give lift, take, pour|jerk|knock|slick AMOUNT once it is lifted, kill|freeze|thaw "
       "left|right, line none|silent|garbage|damaged|other_slave|refused, late MS, latency_timer "
-      "MS, power on|off, fault CODE, at_touch COMMAND, truth, or quit";
+      "MS, power on|off, fault CODE, at_touch COMMAND; COMMAND..., truth, or quit";
   static constexpr std::pair<const char *, LineFault> FAULTS[] = {
       {"none", LineFault::none},
       {"silent", LineFault::silent},

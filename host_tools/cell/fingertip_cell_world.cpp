@@ -68,6 +68,11 @@ Planned planned(const std::string &text) {
                   "(m/s) or slick:0..0.95 (share of friction), and @SECONDS after the lift");
 }
 
+bool is_disturbance(const std::string &name) {
+  return std::any_of(std::begin(KNOWN), std::end(KNOWN),
+                     [&](const Known &one) { return name == name_of(one.kind); });
+}
+
 World::World(const Options &options, const Face &face, GripperMotion &motion)
     : scene_(scene_of(options)), options_(options), face_(face), motion_(motion),
       cell_(face, options.object, options.grasp) {

@@ -23,6 +23,7 @@ struct Planned {
   double amount, after_s;
 };
 Planned planned(const std::string &text);
+bool is_disturbance(const std::string &name);
 
 class World {
 public:
