@@ -144,8 +144,14 @@ bool port_started_by_watchdog(void) {
   return native.started_by_watchdog;
 }
 
+static char serial_number[17] = "0000000000000001";
+
+void native_set_serial_number(const char *text) {
+  memcpy(serial_number, text, sizeof serial_number - 1);
+}
+
 void port_serial_number(char text[17]) {
-  memcpy(text, "0000000000000001", 17);
+  memcpy(text, serial_number, sizeof serial_number);
 }
 
 /* The host's stack is not watched. */

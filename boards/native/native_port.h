@@ -15,6 +15,9 @@
 /* Start-up: time 0, no alarm, no handler, no source. */
 void native_start(bool by_watchdog);
 
+/* Sixteen characters, for whoever has several; kept over starts. */
+void native_set_serial_number(const char *text);
+
 /* next_us tells when the source has its next event, UINT64_MAX for never. */
 void native_set_event_source(uint64_t (*next_us)(const void *context), const void *context);
 

@@ -68,6 +68,8 @@ public:
   void trouble(const LineTrouble &trouble);
   // Without power it does not answer, and afterwards it is not active.
   void power(bool on);
+  // When bytes last came.
+  std::chrono::steady_clock::time_point heard_at() const { return came_at_; }
   // The gripper's own fault, by the maker's code.
   void fail(std::uint8_t fault);
 

@@ -1,0 +1,334 @@
+"""fingertip grasp in the simulated cell, every part of it real but rubber, object and motor: usage test_grasp_cell.py FINGERTIP FINGERTIP_CELL TABLES
+[unittest arguments].
+
+Judged by the cell's truth. On a machine that is busy the world stands still (--patience), so nothing here depends on how fast it is.
+"""
+import contextlib
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import numpy as np
+
+FINGERTIP, FINGERTIP_CELL, TABLES = (os.path.abspath(path) for path in sys.argv[1:4])
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"))
+import fingertip_files as files  # noqa: E402
+
+PATIENCE_s = 120
+DONE, FAILED, MISSED, DROPPED, FAULT = 0, 1, 3, 4, 5
+
+# How much more than the cap a grip may be: forces are measured within some 10 %, and one count of a 2F-85 on a paper cup is up to 0.4 N.
+OVER_CAP = 1.25
+# How far a grip may open by itself: two counts of a 2F-85 of 0.374 mm, by which a hold that has more force than it needs comes down.
+OPENS_mm = 0.8
+
+
+class CellTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        self.csv, self.truth_csv = f"{self.folder}/grasp.csv", f"{self.folder}/truth.csv"
+        self.environment = {k: v for k, v in os.environ.items() if k != "FINGERTIP_PORT" and not k.startswith("LC_")}
+        self.environment |= {"LC_ALL": "C.UTF-8", "XDG_RUNTIME_DIR": self.folder, "FINGERTIP_PORT": f"{self.folder}/left:{self.folder}/right"}
+
+    @contextlib.contextmanager
+    def cell(self, *options, model="2f85"):
+        self.model = model
+        process = subprocess.Popen([FINGERTIP_CELL, self.folder, "--gripper", model, "--cache", TABLES, "--patience", "5", "--truth", self.truth_csv,
+                                    *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.process = process
+        try:
+            ready = process.stdout.readline()
+            self.assertTrue(ready.startswith("ready: "), process.stderr.read() if not ready else ready)
+            yield
+            self.tell("quit")
+            self.assertEqual(process.wait(PATIENCE_s), 0)
+            self.assertFalse(any(os.path.lexists(f"{self.folder}/{name}") for name in ("left", "right", "gripper")))
+        finally:
+            process.kill()
+            process.communicate()
+
+    def tell(self, command, answer="ok"):
+        self.process.stdin.write(command + "\n")
+        self.process.stdin.flush()
+        told = self.process.stdout.readline().strip()
+        if answer:
+            self.assertEqual(told, answer)
+        return told
+
+    def now(self):
+        """The truth as it is: columns by name."""
+        columns = self.truth_columns()[1:]
+        return dict(zip(columns, map(float, self.tell("truth", None).split(","))))
+
+    def truth_columns(self):
+        with open(self.truth_csv, encoding="ascii") as file:
+            return next(line for line in file if line[0] != "#").strip().split(",")
+
+    def truth(self):
+        """All of it: columns by name, and events as (time in us, text)."""
+        with open(self.truth_csv, encoding="ascii") as file:
+            lines = file.read().splitlines()
+        events = [line.removeprefix("# event: ").split(",", 1) for line in lines if line.startswith("# event: ")]
+        rows = [line.split(",") for line in lines if line[0] != "#"]
+        values = np.array(rows[1:], dtype=float)
+        return {name: values[:, i] for i, name in enumerate(rows[0])}, [(int(time_us), text) for time_us, text in events]
+
+    def wait_for(self, condition, what):
+        limit = time.monotonic() + PATIENCE_s
+        while not condition():
+            self.assertLess(time.monotonic(), limit, what)
+            self.assertIsNone(self.process.poll(), what)
+            time.sleep(0.02)
+
+    def wait_for_event(self, word):
+        def has_come():
+            with open(self.truth_csv, encoding="ascii") as file:
+                return any(line.startswith("# event: ") and line.split(",", 1)[1].startswith(word) for line in file)
+        self.wait_for(has_come, f"{word} never came")
+
+    def pass_time(self, seconds):
+        """Of the world."""
+        until_s = self.now()["world_s"] + seconds
+        self.wait_for(lambda: self.now()["world_s"] >= until_s, "the world stands still")
+
+    def start(self, *arguments):
+        self.out = open(f"{self.folder}/out", "w+", encoding="utf-8")
+        self.err = open(f"{self.folder}/err", "w+", encoding="utf-8")
+        process = subprocess.Popen([FINGERTIP, "grasp", "--gripper", self.model, "--gripper-port", f"{self.folder}/gripper", *arguments],
+                                   env=self.environment, stdin=subprocess.DEVNULL, stdout=self.out, stderr=self.err)
+
+        def end():
+            process.kill()
+            process.wait()
+            self.out.close()
+            self.err.close()
+        self.addCleanup(end)
+        return process
+
+    def said(self):
+        return "".join(pathlib.Path(f"{self.folder}/{name}").read_text(encoding="utf-8") for name in ("out", "err"))
+
+    def wait_for_words(self, words, process):
+        def are_said():
+            done = process.poll() is not None
+            return words in self.said() or (done and self.fail(f"ended without {words!r}: {self.said()}"))
+        self.wait_for(are_said, f"{words!r} was never said: {self.said()}")
+
+
+class Programs(CellTest):
+    def test_bad_usage_is_told(self):
+        def run(*arguments):
+            done = subprocess.run([FINGERTIP_CELL, self.folder, "--cache", TABLES, *arguments], capture_output=True, text=True, timeout=PATIENCE_s,
+                                  stdin=subprocess.DEVNULL)
+            self.assertNotEqual(done.returncode, 0)
+            return done.stderr + done.stdout
+        self.assertIn("is no disturbance; give pour:", run("--then", "earthquake:9"))
+        self.assertIn("is no disturbance", run("--then", "slick:1.2"))
+        self.assertIn("2f85 opens to 85.0 mm", run("--width", "84"))
+        self.assertIn("2f85", run("--gripper", "claw"))
+        self.assertIn("no_such_face", run("--face", "no_such_face"))
+        pathlib.Path(self.truth_csv).touch()
+        self.assertIn("truth.csv", run("--truth", self.truth_csv))
+        with self.cell("--overwrite"):
+            self.assertIn("is there already; end the other cell", run())
+            self.assertIn("give lift, take, pour", self.tell("dance", None))
+            self.assertIn("cannot be", self.tell("knock 0.1", None))  # not lifted yet
+
+    def test_killed_it_leaves_no_process_behind(self):
+        with contextlib.suppress(BrokenPipeError):
+            with self.cell():
+                ports = [os.readlink(f"{self.folder}/{name}") for name in ("left", "right", "gripper")]
+                children = pathlib.Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+                self.assertEqual(len(children), 2)
+                self.process.kill()
+                self.process.wait()
+                for child in children:
+                    limit = time.monotonic() + PATIENCE_s
+                    while os.path.exists(f"/proc/{child}") and pathlib.Path(f"/proc/{child}/stat").read_text().split()[2] != "Z":
+                        self.assertLess(time.monotonic(), limit)
+                        time.sleep(0.02)
+                self.assertEqual(len(set(ports)), 3)
+
+
+class Course(CellTest):
+    """An object is lifted, becomes slick, slips and is caught."""
+
+    def run_course(self, model):
+        with self.cell("--mass", "0.25", "--friction", "0.7", model=model):
+            process = self.start("-o", self.csv)
+            self.wait_for_event("lift")
+            self.pass_time(1.5)
+            now = self.now()
+            # So slick that half as much force again is needed as there is.
+            self.tell(f"slick {1 - now['least_N'] / (1.5 * now['force_N']):.3f}")
+            self.wait_for_event("caught")
+            self.pass_time(0.5)
+            process.terminate()
+            self.assertEqual(process.wait(PATIENCE_s), DONE, self.said())
+        truth, events = self.truth()
+        order = [text.split()[0] for _, text in events if text.split()[0] in ("lift", "slick", "slip", "caught", "dropped")]
+        self.assertEqual(order[:4], ["lift", "slick", "slip", "caught"])
+        self.assertEqual(truth["dropped"].max(), 0)
+        cap_N = 20
+        self.assertLess(truth["peak_N"].max(), OVER_CAP * cap_N)
+        lifted = truth["lifted_mm"] > 9.99
+        self.assertGreater(truth["load_N"][lifted].min(), 0.5)  # carried all the time
+        # What was recorded is what was.
+        rows = files.read_grip(self.csv)
+        self.assertLess({"approach", "squeeze", "holding", "slipping"}, set(rows["state"]))
+        with open(self.csv, encoding="utf-8") as file:
+            zero_us = int(next(line for line in file if line.startswith("# host_zero_us: ")).split()[-1])
+        told = np.isfinite(rows["status_us"])
+        width_mm = np.interp(rows["status_us"][told] + zero_us, truth["time_us"], truth["width_mm"])
+        self.assertLess(np.median(np.abs(rows["width_mm"][told] - width_mm)), 1.2)  # a count, and half of the servo's play
+        serials = files.recorded_devices(self.csv)
+        self.assertEqual(len(serials), 2)
+        for serial in serials:
+            finger = files.read_recording(self.csv, device=serial)
+            presses = finger.flag(files.CONTACT) & (finger.time_us > rows["time_us"][rows["state"] == "holding"][0])
+            self.assertGreater(presses.sum(), 100)
+            force_N = np.interp(finger.time_us[presses] + zero_us, truth["time_us"], truth["force_N"])
+            self.assertLess(np.median(np.abs(finger["force_N"][presses] / force_N - 1)), 0.15)
+
+    def test_2f85(self):
+        self.run_course("2f85")
+
+    def test_sts3215(self):
+        self.run_course("sts3215")
+
+
+class Faults:
+    """While a paper cup is squeezed, or carried: whatever fails, it is not crushed, and the grip does not open by itself."""
+
+    CAP_N = 4.0
+    # Of 50 g, which gives way by 0.2 mm a newton.
+    CUP = ("--mass", "0.05", "--stiffness", "5", "--crushes", str(OVER_CAP * CAP_N), "--friction", "0.6", "--lift-time", "0.3", "--opens", "2")
+    RESTS_s = 0.6  # of the world, after what happened
+
+    @contextlib.contextmanager
+    def grasp(self, *commands, arguments=(), model="2f85", ends=(DONE,), may_open=False):
+        """What the cell is told comes at the touch, or while the cup is carried."""
+        with self.cell(*self.CUP, model=model):
+            if self.STATE == "squeeze" and commands:
+                self.tell("at_touch " + "; ".join(commands))
+            process = self.start("--cap", str(self.CAP_N), *arguments)
+            if self.STATE == "squeeze":
+                self.wait_for(lambda: self.now()["peak_N"] > 0.05, "it never touched")
+            else:
+                self.wait_for_event("lift")
+                self.pass_time(0.6)
+                for command in commands:
+                    self.tell(command)
+            yield process
+            # Whatever goes on now would like more force.
+            self.pass_time(self.RESTS_s)
+            for disturbance in ("pour 1", "slick 0.3"):
+                self.tell(disturbance, None)
+            self.pass_time(self.RESTS_s)
+            if process.poll() is None:
+                process.terminate()
+            self.assertIn(process.wait(PATIENCE_s), ends, self.said())
+            self.pass_time(self.RESTS_s)
+        truth, events = self.truth()
+        self.assertEqual(truth["crushed"].max(), 0, events)
+        self.assertLess(truth["peak_N"].max(), OVER_CAP * self.CAP_N)
+        if not may_open:
+            width_mm = truth["width_mm"][truth["peak_N"] > 0.05]
+            self.assertLess((width_mm - np.minimum.accumulate(width_mm)).max(), OPENS_mm, events)
+
+    def run_fault(self, *commands, words, **options):
+        with self.grasp(*commands, **options) as process:
+            for one in words:
+                self.wait_for_words(one, process)
+
+    def test_nothing(self):
+        self.run_fault(words=[" s  holding "])
+
+    def test_a_fingertip_is_killed(self):
+        self.run_fault("kill left", words=["left: no frames"])
+
+    def test_both_fingertips_are_killed(self):
+        self.run_fault("kill left", "kill right", words=["left: no frames", "right: no frames"])
+
+    def test_a_fingertip_hangs(self):
+        self.run_fault("freeze right", words=["right: no frames"])
+
+    def test_the_gripper_is_silent(self):
+        self.run_fault("line silent", words=["the gripper does not answer"], ends=(FAULT,))
+
+    def test_the_gripper_talks_rubbish(self):
+        self.run_fault("line garbage", words=["the gripper does not answer"], ends=(FAULT,))
+
+    def test_answers_come_late(self):
+        self.run_fault("late 30", words=[" s  holding "])
+
+    def test_answers_come_too_late(self):
+        self.run_fault("late 400", words=["the gripper does not answer"], ends=(FAULT,))
+
+    def test_a_latency_timer(self):
+        self.run_fault("latency_timer 16", words=[" s  holding "])
+
+    def test_power_is_lost(self):
+        self.run_fault("power off", words=["the gripper does not answer"], ends=(FAULT,))
+
+    def test_power_comes_back(self):
+        with self.grasp("power off", ends=(FAULT,)) as process:
+            self.pass_time(0.1)
+            self.tell("power on")
+            self.wait_for_words("the width stays", process)
+
+    def test_fault_9(self):
+        self.run_fault("fault 9", words=["the width stays"], ends=(FAULT,))
+
+    def test_the_object_is_taken_away(self):
+        self.run_fault("take", words=["the gripper keeps its position"], ends=(MISSED, DROPPED))
+
+    def test_ctrl_c_once(self):
+        with self.grasp() as process:
+            process.send_signal(signal.SIGINT)
+            self.wait_for_words(" s  still ", process)
+
+    def test_ctrl_c_twice_opens_slowly(self):
+        with self.grasp(arguments=("--open-width", "45"), may_open=True) as process:
+            process.send_signal(signal.SIGINT)
+            self.wait_for_words(" s  still ", process)
+            process.send_signal(signal.SIGINT)
+            self.wait_for(lambda: process.poll() is not None, "it goes on")
+            self.assertGreater(self.now()["width_mm"], 43)
+
+    def test_killed(self):
+        with self.grasp(ends=(-signal.SIGKILL,)) as process:
+            process.kill()
+
+    def test_a_full_disk(self):
+        with self.grasp(arguments=("-o", "/dev/full"), ends=(FAILED,)) as process:
+            self.wait_for_words("No space left on device", process)
+            self.wait_for_words(" s  holding ", process)
+
+    def test_a_servo_whose_fingertip_is_killed(self):
+        self.run_fault("kill left", words=["left: no frames"], model="sts3215")
+
+    def test_a_silent_servo(self):
+        self.run_fault("line silent", words=["the gripper does not answer"], ends=(FAULT,), model="sts3215")
+
+    def test_a_servo_loses_power(self):
+        self.run_fault("power off", words=["the gripper does not answer"], ends=(FAULT,), model="sts3215")
+
+
+class WhileSqueezing(Faults, CellTest):
+    STATE = "squeeze"
+
+
+class WhileHolding(Faults, CellTest):
+    STATE = "hold"
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[4:]], verbosity=2)
