@@ -1,17 +1,16 @@
 // One grasp, closed loop, in simulated time: a scene's object in the cell, two fingertips that feel
 // it, a controller, and a gripper's mechanics between them.
 //
-// The line: once every poll_s of the gripper a command goes out, if it is new, and what the gripper
-// says of that moment comes half of that time later. The controller steps after every frame and
-// every status.
+// The controller steps after every frame and every status of the gripper (gripper_line.hpp).
 //
 // Deterministic: the same scene, seed and controller give the same bits. A grasp of 6 s takes some
 // 60 ms at 410 frames a second.
 #pragma once
 
 #include "cell/felt_finger.hpp"
-#include "cell/gripper_motion.hpp"
+#include "cell/gripper_line.hpp"
 #include "cell/scene.hpp"
+#include "cell/slips.hpp"
 
 #include <optional>
 #include <vector>
@@ -40,8 +39,6 @@ private:
   grip core_{};
 };
 
-grip_traits traits_of(const GripperTraits &traits);
-
 struct Trial {
   Scene scene;
   GripperMechanics gripper;
@@ -65,13 +62,7 @@ struct Moment {
   std::uint32_t trouble;
 };
 
-constexpr double DROP_mm = 22.0, SLIP_mm = 0.3, SETTLED_s = 0.5;
-
-// All of both contacts slid, by SLIP_mm or more in all.
-struct Slip {
-  double begin_s, way_mm;           // since the lift began
-  std::optional<double> reaction_s; // until the grip was 5 % stronger; none: never
-};
+constexpr double DROP_mm = 22.0, SETTLED_s = 0.5;
 
 struct Outcome {
   bool held = false; // to the end
