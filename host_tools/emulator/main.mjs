@@ -7,6 +7,7 @@ import { findBoard } from './board/boards.mjs';
 import { FLASH_BYTES } from './chip/flash_memory.mjs';
 import { InputError, inWords } from './errors.mjs';
 import { readFaults } from './faults.mjs';
+import { readImage } from './image.mjs';
 import { readHostScript, scheduleHostScript } from './port/host_script.mjs';
 import { PtyPort } from './port/pty_port.mjs';
 import { DEFAULT_SERIAL, Machine } from './machine.mjs';
@@ -122,18 +123,6 @@ function parseOptions(argv) {
   if (values.pace === 'wall' && values.usbredir) throw new InputError('--pace wall and --usbredir exclude each other');
   if (values['wait-open'] && !values.pty) throw new InputError('--wait-open needs --pty');
   return values;
-}
-
-function readImage(path) {
-  let image;
-  try {
-    image = readFileSync(path);
-  } catch (error) {
-    throw new InputError(`${path}: cannot read the image (${inWords(error)}); build it first`);
-  }
-  if (image.length < 512 || image.length > 2 * 1024 * 1024) throw new InputError(`${path}: ${image.length} bytes; a raw flash image has 512 bytes to 2 MiB`);
-  if (image.readUInt32LE(0) === 0x0a324655 || image.readUInt32LE(0) === 0x464c457f) throw new InputError(`${path}: this is a UF2 or ELF file; give the raw .bin image`);
-  return image;
 }
 
 /** Null before there is such a file. */
