@@ -5,12 +5,9 @@
 // emulated time.
 #pragma once
 
+#include "grasp/core.hpp"
 #include "libfingertip/clock_fit.hpp"
 #include "libfingertip/decoder.hpp"
-
-extern "C" {
-#include "grip/grip.h"
-}
 
 #include <cstdint>
 #include <deque>

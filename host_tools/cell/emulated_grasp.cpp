@@ -39,7 +39,8 @@ CalibratedRubber draw_rubber(const pad_profile &profile, Random &random) {
   for (std::size_t k = 0; k < SENSORS; k++) {
     const double gain = 1.0 + PAD_SD * std::clamp(random.normal(), -3.0, 3.0);
     rubber.gain[k] = gain;
-    rubber.told.sensors[k].gain = static_cast<float>(gain * (1.0 + CALIBRATION_SD * random.normal()));
+    rubber.told.sensors[k].gain =
+        static_cast<float>(gain * (1.0 + CALIBRATION_SD * random.normal()));
     rubber.told.sensors[k].gain_sd = static_cast<float>(CALIBRATION_SD);
   }
   return rubber;
@@ -67,21 +68,20 @@ EmulatedGrasp::EmulatedGrasp(const EmulatedTrial &trial, const Face &face,
 
 void EmulatedGrasp::take(std::size_t finger, const std::uint8_t *bytes, std::size_t length,
                          double arrived_s) {
-  fingers_[finger].take(
-      bytes, length, 1e6 * arrived_s, std::llround(1e6 * t_s_),
-      [&](const EmulatedFingertip::Frame &frame) {
-        if (!controller_) {
-          return;
-        }
-        const grip_touch &touch = frame.touch;
-        controller_->take_touch(static_cast<unsigned>(finger), touch);
-        told_.push_back({1e-6 * frame.arrived_us, 1e-6 * frame.measured_us, finger,
-                         (touch.flags & CONTACT_FLAG_SLIDING) != 0,
-                         1e-3 * std::hypot(touch.qx_mN, touch.qy_mN)});
-        frames_[finger]++;
-        loads_[finger] += (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
-        step_controller();
-      });
+  fingers_[finger].take(bytes, length, 1e6 * arrived_s, std::llround(1e6 * t_s_),
+                        [&](const EmulatedFingertip::Frame &frame) {
+                          if (!controller_) {
+                            return;
+                          }
+                          const grip_touch &touch = frame.touch;
+                          controller_->take_touch(static_cast<unsigned>(finger), touch);
+                          told_.push_back({1e-6 * frame.arrived_us, 1e-6 * frame.measured_us,
+                                           finger, (touch.flags & CONTACT_FLAG_SLIDING) != 0,
+                                           1e-3 * std::hypot(touch.qx_mN, touch.qy_mN)});
+                          frames_[finger]++;
+                          loads_[finger] += (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
+                          step_controller();
+                        });
 }
 
 void EmulatedGrasp::step_controller() {
@@ -179,8 +179,7 @@ ordered_json EmulatedGrasp::answer_to(const Slip &slip) const {
   for (const Told &told : told_) {
     if (told.arrived_s < slip.begin_s) {
       load_N[told.finger] = told.load_N;
-    } else if (told.slides ||
-               told.load_N > MORE_LOAD * load_N[told.finger] + MORE_LOAD_N) {
+    } else if (told.slides || told.load_N > MORE_LOAD * load_N[told.finger] + MORE_LOAD_N) {
       first = &told;
       break;
     }

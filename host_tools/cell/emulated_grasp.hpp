@@ -9,9 +9,8 @@
 #include "cell/emulated_fingertip.hpp"
 #include "cell/trial.hpp"
 
-#include <nlohmann/json.hpp>
-
 #include <memory>
+#include <nlohmann/json.hpp>
 
 namespace fingertip::cell {
 

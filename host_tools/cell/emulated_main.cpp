@@ -24,10 +24,10 @@ enum Stream : std::uint64_t { PAD = 842 };
 struct Options {
   std::string gripper = "2f85", cache;
   std::uint64_t seed = 1;
-  double slice_us = 500.0, friction = 0.4, friction_falls = 0.55;
+  double slice_us = 500.0, friction = 0.5, friction_falls = 0.7;
 };
 
-// A can that is held, lifted, and whose friction falls below what the grip needs.
+// Lifted, and then friction falls so far, within 30 ms, that the grip does not hold it.
 Scene scene_of(const Options &options) {
   Scene scene;
   scene.face = "sphere15";
@@ -99,9 +99,8 @@ ordered_json felt(const EmulatedTrial &emulated, const Face &face) {
   }
   const auto spread = [](std::vector<double> &values) {
     std::sort(values.begin(), values.end());
-    return values.empty()
-               ? ordered_json(nullptr)
-               : ordered_json{values.front(), values[values.size() / 2], values.back()};
+    return values.empty() ? ordered_json(nullptr)
+                          : ordered_json{values.front(), values[values.size() / 2], values.back()};
   };
   ordered_json out;
   out["grasps"] = FELT_TRIALS;

@@ -79,18 +79,17 @@ public:
         cell_(face, trial.scene.object, trial.scene.grasp),
         gripper_(trial.gripper, trial.scene.object.width_mm + trial.scene.opens_mm,
                  Random(trial.seed, LINE, 0)),
-        fingers_{FeltFinger(face, trial.rubber[0], trial.sensing,
-                                                    Random(trial.seed, FINGER, 0)),
-                                         FeltFinger(face, trial.rubber[1], trial.sensing,
-                                                    Random(trial.seed, FINGER, 1))},
+        fingers_{FeltFinger(face, trial.rubber[0], trial.sensing, Random(trial.seed, FINGER, 0)),
+                 FeltFinger(face, trial.rubber[1], trial.sensing, Random(trial.seed, FINGER, 1))},
         set_point_(trial) {
     gripper_.press(cell_);
   }
 
   Outcome go() {
     while (!over_) {
-      double next_s = std::min({fingers_[0].next_s(), fingers_[1].next_s(), gripper_.next_s(), sample_s_,
-                                t_s_ + (gripper_.motion().moving() || cell_.slips() ? MOVES_s : STANDS_s)});
+      double next_s =
+          std::min({fingers_[0].next_s(), fingers_[1].next_s(), gripper_.next_s(), sample_s_,
+                    t_s_ + (gripper_.motion().moving() || cell_.slips() ? MOVES_s : STANDS_s)});
       for (const Known &known : line_) {
         next_s = std::min(next_s, known.at_s);
       }
