@@ -1,6 +1,7 @@
 """What grasp.py measured as text and as a picture."""
 import bisect
 
+import emulated_grasp
 from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save
 from fingertip_files import write_text
 from goals import goal_table_md
@@ -40,6 +41,8 @@ def write(found, path):
     for name, title in PARTS.items():
         if name in found:
             lines += [f"## {title}", "", "Round objects, 410 frames a second.", "", *rows_md(found[name], COLUMNS), ""]
+    if "emulated_grasp" in found:
+        lines += ["## With the release image", "", *emulated_grasp.text(found["emulated_grasp"])]
     write_text(path, "\n".join(lines))
 
 

@@ -68,7 +68,7 @@ PARTS = (
          (("chip_*", EMULATED), ("*_cycles*", EMULATED), ("shear_seed", SAID), ("shear_pads", SAID)),
          pictures=(("shear.png", "Errors by place, arrows, location before and after, bounds, objects, pads that end: simulated"),)),
     Part("grasp", "Grasps", "Thousands of grasps in a simulated cell: two fingertips, an object, a gripper, and the firmware's own controller between them.",
-         f"{REPORT}/grasp/grasp.py --build build/host -o build/report", SIMULATED, (("grasp_seed", SAID),),
+         f"{REPORT}/grasp/grasp.py --build build/host -o build/report", SIMULATED, (("grasp_seed", SAID), ("emulated_*", EMULATED)),
          pictures=(("grasp.png", "Drops, grip, reaction, a slip that is caught: simulated"),)),
     Part("tools", "The tools", "What the tools do to those who use them, with simulated fingertips on pseudo-terminals of this computer.",
          f"{REPORT}/tools/tools.py --build build/host -o build/report", SIMULATED,

@@ -47,8 +47,8 @@ class Grasp(unittest.TestCase):
         path.write_text(f"#!{sys.executable}\n{body}\n")
         path.chmod(0o755)
 
-    def run_tool(self, *options):
-        return subprocess.run([sys.executable, str(ROOT / "host_tools/report/grasp/grasp.py"), "--build", str(self.folder), "-o", str(self.out), *options],
+    def run_tool(self, *options, emulated=("--no-emulated",)):
+        return subprocess.run([sys.executable, str(ROOT / "host_tools/report/grasp/grasp.py"), "--build", str(self.folder), "-o", str(self.out), *emulated, *options],
                               capture_output=True, text=True)
 
     def test_sets_are_judged(self):
@@ -66,6 +66,7 @@ class Grasp(unittest.TestCase):
         grasps = {(row["set"], row["gripper"]): row["grasps"] for row in found["rows"]}
         self.assertEqual((len(grasps), grasps["hold", "2f85"], grasps["hold_20", "ideal"]), (36, 150, 40))
         self.assertEqual(found["caught"]["n"], 7)
+        self.assertIsNone(met["emulated_reaction_ms"])
         self.assertIsNone(found["distributions"][0]["reaction_ms"][-1])
         self.assertEqual((self.out / "grasp.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
         self.assertEqual(self.run_tool("--usual", "--check").returncode, 1)
@@ -85,6 +86,7 @@ class Grasp(unittest.TestCase):
         self.assertIn("wrote no JSON", self.run_tool("--grasps", "1").stderr)
         self.program("import sys; sys.exit('the cell is on fire')")
         self.assertIn("on fire", self.run_tool("--grasps", "1").stderr)
+        self.assertIn("fingertip_cell_emulated is not there", self.run_tool("--grasps", "1", emulated=()).stderr)
         (self.folder / "host_tools/report/grasp/fingertip_grasp_trials").unlink()
         self.assertIn("is not there", self.run_tool("--grasps", "1").stderr)
 
