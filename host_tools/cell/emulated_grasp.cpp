@@ -1,5 +1,7 @@
 #include "cell/emulated_grasp.hpp"
 
+#include "grasp/convert.hpp"
+
 extern "C" {
 #include "common/contact_flags.h"
 }
@@ -99,7 +101,7 @@ void EmulatedGrasp::step_controller() {
 void EmulatedGrasp::run(double until_s) {
   if (!controller_ && fingers_[0].is_ready() && fingers_[1].is_ready()) {
     grip_settings settings;
-    const grip_traits traits = traits_of(trial_.gripper.traits);
+    const grip_traits traits = core_traits(trial_.gripper.traits);
     grip_default_settings(&settings, &traits);
     controller_ = std::make_unique<CoreController>(settings, traits);
     asked_s_ = t_s_;

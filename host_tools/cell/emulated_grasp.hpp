@@ -9,8 +9,10 @@
 #include "cell/emulated_fingertip.hpp"
 #include "cell/trial.hpp"
 
+#include <deque>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 namespace fingertip::cell {
 

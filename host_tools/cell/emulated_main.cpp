@@ -1,14 +1,17 @@
 // fingertip_cell_emulated: the world of a grasp for host_tools/emulator/lockstep.mjs, whose
 // protocol it speaks on its standard input and output.
 #include "cell/emulated_grasp.hpp"
+#include "grasp/convert.hpp"
 #include "gripper/gripper.hpp"
 #include "pad/profile.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
-#include <cstring>
 #include <exception>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace {
 
@@ -77,7 +80,7 @@ void put_u32(std::size_t value) {
 ordered_json felt(const EmulatedTrial &emulated, const Face &face) {
   std::vector<double> reactions_ms, slid_mm;
   grip_settings settings;
-  const grip_traits traits = traits_of(emulated.gripper.traits);
+  const grip_traits traits = core_traits(emulated.gripper.traits);
   grip_default_settings(&settings, &traits);
   int drops = 0;
   for (int n = 0; n < FELT_TRIALS; n++) {

@@ -4,15 +4,10 @@
 
 #include "cell/cell.hpp"
 #include "cell/gripper_motion.hpp"
+#include "grasp/core.hpp"
 #include "libfingertip/random.hpp"
 
-extern "C" {
-#include "grip/grip.h"
-}
-
 namespace fingertip::cell {
-
-grip_traits traits_of(const GripperTraits &traits);
 
 class GripperLine {
 public:

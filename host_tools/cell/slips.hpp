@@ -3,6 +3,7 @@
 
 #include "cell/cell.hpp"
 
+#include <limits>
 #include <optional>
 #include <vector>
 

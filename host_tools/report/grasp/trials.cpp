@@ -1,5 +1,6 @@
 #include "grasp/trials.hpp"
 
+#include "grasp/convert.hpp"
 #include "libfingertip/text.hpp"
 #include "twin/table_file.hpp"
 
@@ -152,7 +153,7 @@ Trial Set::trial(std::uint64_t n) const {
 
 grip_settings Set::settings(std::uint64_t n) const {
   grip_settings settings;
-  const grip_traits traits = traits_of(gripper_.traits);
+  const grip_traits traits = core_traits(gripper_.traits);
   grip_default_settings(&settings, &traits);
   settings.mode = options_.mode == "hold" ? GRIP_MODE_HOLD : GRIP_MODE_FIXED;
   if (is_still()) {
@@ -165,7 +166,7 @@ grip_settings Set::settings(std::uint64_t n) const {
 
 Outcome Set::run(std::uint64_t n, const std::function<void(const Moment &)> &trace) const {
   const Trial one = trial(n);
-  CoreController controller(settings(n), traits_of(gripper_.traits));
+  CoreController controller(settings(n), core_traits(gripper_.traits));
   return run_trial(one, all_.at(one.scene.face), controller, trace);
 }
 

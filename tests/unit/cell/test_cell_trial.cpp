@@ -1,5 +1,6 @@
 #include "cell/felt_finger.hpp"
 #include "cell/trial.hpp"
+#include "grasp/convert.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"
@@ -170,7 +171,7 @@ TEST(Trial, TheControllersCoreHoldsOnGoodPads) {
   for (std::uint64_t n = 0; n < 12; n++) {
     const Trial one = trial(n);
     grip_settings settings;
-    const grip_traits traits = traits_of(one.gripper.traits);
+    const grip_traits traits = core_traits(one.gripper.traits);
     grip_default_settings(&settings, &traits);
     CoreController controller(settings, traits);
     held += run_trial(one, face(), controller).held ? 1 : 0;
@@ -181,7 +182,7 @@ TEST(Trial, TheControllersCoreHoldsOnGoodPads) {
 TEST(Trial, TheSameSeedGivesTheSameBits) {
   const auto play = [](const Trial &one) {
     grip_settings settings;
-    const grip_traits traits = traits_of(one.gripper.traits);
+    const grip_traits traits = core_traits(one.gripper.traits);
     grip_default_settings(&settings, &traits);
     CoreController controller(settings, traits);
     std::vector<double> forces;
@@ -213,7 +214,7 @@ TEST(Trial, AStillGraspTellsHowItSettles) {
 
 TEST(Trial, RefusesSettingsThatTheCoreRefuses) {
   grip_settings settings;
-  const grip_traits traits = traits_of(gripper_mechanics("ideal").traits);
+  const grip_traits traits = core_traits(gripper_mechanics("ideal").traits);
   grip_default_settings(&settings, &traits);
   settings.margin_permille = 0;
   EXPECT_THROW(CoreController(settings, traits), std::runtime_error);
