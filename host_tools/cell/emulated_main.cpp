@@ -27,10 +27,10 @@ enum Stream : std::uint64_t { PAD = 842 };
 struct Options {
   std::string gripper = "2f85", cache;
   std::uint64_t seed = 1;
-  double slice_us = 500.0, friction = 0.5, friction_falls = 0.7;
+  double slice_us = 500.0, friction = 0.5, friction_falls = 0.4;
 };
 
-// Lifted, and then friction falls so far, within 30 ms, that the grip does not hold it.
+// Lifted, and then friction falls so far within 30 ms, that the grip does not hold it.
 Scene scene_of(const Options &options) {
   Scene scene;
   scene.face = "sphere15";
