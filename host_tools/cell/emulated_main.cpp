@@ -30,11 +30,7 @@ struct Options {
   double slice_us = 500.0, friction = 0.5, friction_falls = 0.4;
 };
 
-<<<<<<< HEAD
-// Lifted, and then friction falls so far within 30 ms, that the grip does not hold it.
-=======
 // Lifted, and then friction falls so far, within 30 ms, that the grip does not hold it.
->>>>>>> emgrasp
 Scene scene_of(const Options &options) {
   Scene scene;
   scene.face = "sphere15";
