@@ -165,6 +165,7 @@ public:
     if (!options.truth.empty()) {
       file_.emplace(options.truth, options.overwrite, OutputFile::Appears::at_once);
       rows_ = head + "time_us," + World::columns() + "\n";
+      flush();
     }
   }
   ~Truth() {
@@ -408,7 +409,9 @@ private:
     if (!(verb.empty() ? false : act(verb, what))) {
       throw Error(ErrorCode::bad_value, "\"" + printable(command) + "\" cannot be; " + COMMANDS);
     }
-    tell_event(command);
+    if (verb != "lift" && !is_disturbance(verb)) { // which the world tells
+      tell_event(command);
+    }
     return "ok";
   }
 

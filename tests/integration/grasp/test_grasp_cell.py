@@ -161,20 +161,21 @@ class Course(CellTest):
     """An object is lifted, becomes slick, slips and is caught."""
 
     def run_course(self, model):
-        with self.cell("--mass", "0.25", "--friction", "0.7", model=model):
+        with self.cell("--mass", "0.25", "--friction", "0.4", model=model):
             process = self.start("-o", self.csv)
             self.wait_for_event("lift")
             self.pass_time(1.5)
             now = self.now()
-            # So slick that half as much force again is needed as there is.
-            self.tell(f"slick {1 - now['least_N'] / (1.5 * now['force_N']):.3f}")
-            self.wait_for_event("caught")
+            # So slick that somewhat more force is needed than there is, and once it slides a third more.
+            self.tell(f"slick {1 - now['least_N'] / (1.1 * now['force_N']):.3f}")
+            self.wait_for_event("slip")
+            self.wait_for(lambda: not self.now()["slips"], "it slips for ever")
             self.pass_time(0.5)
             process.terminate()
             self.assertEqual(process.wait(PATIENCE_s), DONE, self.said())
         truth, events = self.truth()
-        order = [text.split()[0] for _, text in events if text.split()[0] in ("lift", "slick", "slip", "caught", "dropped")]
-        self.assertEqual(order[:4], ["lift", "slick", "slip", "caught"])
+        order = [text.split()[0] for _, text in events]
+        self.assertEqual(order[order.index("slick"):][:3], ["slick", "slip", "caught"])
         self.assertEqual(truth["dropped"].max(), 0)
         cap_N = 20
         self.assertLess(truth["peak_N"].max(), OVER_CAP * cap_N)
@@ -215,7 +216,7 @@ class Faults:
     @contextlib.contextmanager
     def grasp(self, *commands, arguments=(), model="2f85", ends=(DONE,), may_open=False):
         """What the cell is told comes at the touch, or while the cup is carried."""
-        with self.cell(*self.CUP, model=model):
+        with self.cell(*self.CUP, *(["--by-command"] if self.STATE == "squeeze" else []), model=model):
             if self.STATE == "squeeze" and commands:
                 self.tell("at_touch " + "; ".join(commands))
             process = self.start("--cap", str(self.CAP_N), *arguments)
@@ -270,7 +271,8 @@ class Faults:
         self.run_fault("late 30", words=[" s  holding "])
 
     def test_answers_come_too_late(self):
-        self.run_fault("late 400", words=["the gripper does not answer"], ends=(FAULT,))
+        # Later they pass for answers to what was asked since: nothing in them tells.
+        self.run_fault("late 400", words=["the gripper does not answer"], ends=(DONE, FAULT))
 
     def test_a_latency_timer(self):
         self.run_fault("latency_timer 16", words=[" s  holding "])
@@ -308,7 +310,7 @@ class Faults:
             process.kill()
 
     def test_a_full_disk(self):
-        with self.grasp(arguments=("-o", "/dev/full"), ends=(FAILED,)) as process:
+        with self.grasp(arguments=("-o", "/dev/full", "--overwrite"), ends=(FAILED,)) as process:
             self.wait_for_words("No space left on device", process)
             self.wait_for_words(" s  holding ", process)
 
