@@ -7,7 +7,7 @@ cd "$root"
 
 usage() {
   echo "usage: sh cmake/bootstrap.sh demo|test|report" >&2
-  echo "  demo    build everything, let a lime slip on two emulated fingertips, say and draw what they felt" >&2
+  echo "  demo    build everything, let a lime slip on two emulated fingertips, catch what slips in a simulated gripper, say and draw both" >&2
   echo "  test    build everything and run the whole test suite" >&2
   echo "  report  build everything, measure fit, rate, cost, truth, tangential load and grasps, repeat the published experiments in simulation, write build/report" >&2
   exit 2

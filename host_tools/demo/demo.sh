@@ -1,6 +1,7 @@
 #!/bin/sh
 # A lime is gripped and slips, three times, on two emulated fingertips side by side: one with a pad of rubber and its
-# errors, one with an ideal pad. Says how far each was off, and draws what the one of rubber felt.
+# errors, one with an ideal pad. Says how far each was off, and draws what the one of rubber felt. Then a gripper with two
+# fingertips lifts an object in the simulated cell, which becomes slick and slips. Says how far, and draws it.
 # Everything goes to build/demo; run by `sh cmake/bootstrap.sh demo`.
 # usage: demo.sh [--stay]; --stay: goes on with the lime until Enter, for whoever wants to look
 set -eu
@@ -16,10 +17,10 @@ rm -rf $out
 mkdir -p $out
 
 fail() {
-  for name in rubber ideal; do
+  for name in rubber ideal cell; do
     [ ! -s $out/$name.log ] || tail -n 10 $out/$name.log >&2
   done
-  echo "demo: $1; the emulators' whole logs are $out/*.log" >&2
+  echo "demo: $1; whole logs are $out/*.log" >&2
   exit 1
 }
 
@@ -78,8 +79,24 @@ $python host_tools/demo/errors.py "12 mm of rubber=$out/rubber.summary.json" "id
 echo "The rubber's sensors differ by 5 %, it relaxes, and a lime's pressure is no Gaussian: fingertip calibrate finds what of it can be found."
 echo "picture: $out/demo.png"
 
+echo "== two fingertips on a gripper lift an object that becomes slick; the firmware on the host, all else simulated"
+build/host/host_tools/cell/fingertip_cell $out/cell --gripper 2f85 --mass 0.25 --friction 0.5 --then slick:0.65@1 --seconds 60 --patience 1 \
+  --cache build/host/contact_tables --truth $out/truth.csv < /dev/null > $out/cell.log 2>&1 &
+processes=$!
+while [ ! -e $out/cell/gripper ]; do
+  kill -0 $processes 2> /dev/null || fail "the cell did not start"
+  sleep 0.1
+done
+FINGERTIP_PORT=$out/cell/left:$out/cell/right $tool grasp --gripper 2f85 --gripper-port $out/cell/gripper --seconds 8 -o $out/grasp.csv ||
+  fail "the grasp ended with an error"
+kill $processes
+wait $processes || fail "the cell found something wrong"
+processes=
+$python host_tools/demo/grasp.py $out/grasp.csv $out/truth.csv -o $out/grasp.png
+echo "picture: $out/grasp.png"
+
 if [ "${1:-}" != --stay ]; then
-  echo "once more: $tool replay $out/recording.csv"
+  echo "once more: $tool replay $out/recording.csv, or $out/grasp.csv"
   exit
 fi
 play_lime 600 $out/long.csv

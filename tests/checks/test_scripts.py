@@ -172,13 +172,14 @@ class Demo(Folder):
     def setUp(self):
         super().setUp()
         shutil.copytree(ROOT / "host_tools/demo", self.folder / "host_tools/demo")
-        for script in ("python/evaluate.py", "python/plot.py", "demo/ideal.py"):
+        for script in ("python/evaluate.py", "python/plot.py", "demo/grasp.py", "demo/ideal.py"):
             self.write(f"host_tools/{script}", """
                 import sys
                 open(sys.argv[sys.argv.index("-o") + 1], "w").write("{}")
                 """)
         self.write("host_tools/demo/errors.py", "print('errors')\n")
         self.write("build/host/host_tools/twin/twin", "#!/bin/sh\n").chmod(0o755)
+        self.cell('mkdir "$1"; touch "$1/gripper"; trap exit TERM; while :; do sleep 0.05; done')
         self.monitor('case $1 in set) test -e "$3" ;; esac')
 
     def write(self, path, text):
@@ -199,6 +200,9 @@ class Demo(Folder):
     def monitor(self, body):
         self.write("build/host/host_tools/cli/fingertip", f"#!/bin/sh\n{body}\n").chmod(0o755)
 
+    def cell(self, body):
+        self.write("build/host/host_tools/cell/fingertip_cell", f"#!/bin/sh\n{body}\n").chmod(0o755)
+
     def play(self, *options, **how):
         return subprocess.run(["sh", self.folder / "host_tools/demo/demo.sh", *options], capture_output=True, text=True, timeout=60, **how)
 
@@ -206,7 +210,7 @@ class Demo(Folder):
         done = self.play()
         self.assertEqual(done.returncode, 1, done.stderr)
         lines = done.stderr.splitlines()
-        self.assertEqual(lines[-1], f"demo: {message}; the emulators' whole logs are build/demo/*.log")
+        self.assertEqual(lines[-1], f"demo: {message}; whole logs are build/demo/*.log")
         self.assertEqual(lines[-2], log)
         self.assertLessEqual(len(lines), 21)
 
@@ -215,6 +219,7 @@ class Demo(Folder):
         done = self.play()
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("picture: build/demo/demo.png", done.stdout)
+        self.assertIn("picture: build/demo/grasp.png", done.stdout)
         self.assertIn("errors\n", done.stdout)
 
     def test_it_stays_until_somebody_has_seen_enough(self):
@@ -250,6 +255,17 @@ class Demo(Folder):
         self.emulator("console.error('ready'); writeFileSync(link, ''); later(20000, () => {});")
         self.monitor('test $1 = set || exit 3')
         self.assert_fails("the monitor ended with an error", "ready")
+
+    def test_a_cell_that_does_not_start(self):
+        self.emulator("writeFileSync(link, ''); later(500, () => {});")
+        self.cell("echo no cell >&2; exit 1")
+        self.assert_fails("the cell did not start", "no cell")
+
+    def test_a_grasp_that_fails(self):
+        self.emulator("writeFileSync(link, ''); later(500, () => {});")
+        self.cell('echo dropped; mkdir "$1"; touch "$1/gripper"; trap exit TERM; while :; do sleep 0.05; done')
+        self.monitor('test $1 != grasp || exit 4')
+        self.assert_fails("the grasp ended with an error", "dropped")
 
 
 if __name__ == "__main__":

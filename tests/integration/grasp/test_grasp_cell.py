@@ -6,6 +6,7 @@ Judged by the cell's truth. On a machine that is busy the world stands still (--
 import contextlib
 import os
 import pathlib
+import resource
 import signal
 import subprocess
 import sys
@@ -98,11 +99,11 @@ class CellTest(unittest.TestCase):
         until_s = self.now()["world_s"] + seconds
         self.wait_for(lambda: self.now()["world_s"] >= until_s, "the world stands still")
 
-    def start(self, *arguments):
+    def start(self, *arguments, **how):
         self.out = open(f"{self.folder}/out", "w+", encoding="utf-8")
         self.err = open(f"{self.folder}/err", "w+", encoding="utf-8")
         process = subprocess.Popen([FINGERTIP, "grasp", "--gripper", self.model, "--gripper-port", f"{self.folder}/gripper", *arguments],
-                                   env=self.environment, stdin=subprocess.DEVNULL, stdout=self.out, stderr=self.err)
+                                   env=self.environment, stdin=subprocess.DEVNULL, stdout=self.out, stderr=self.err, **how)
 
         def end():
             process.kill()
@@ -140,6 +141,14 @@ class Programs(CellTest):
             self.assertIn("is there already; end the other cell", run())
             self.assertIn("give lift, take, pour", self.tell("dance", None))
             self.assertIn("cannot be", self.tell("knock 0.1", None))  # not lifted yet
+
+    def test_nothing_moves_where_nothing_can_be_recorded(self):
+        with self.cell():
+            process = self.start("-o", "/dev/full", "--overwrite")
+            self.assertEqual(process.wait(PATIENCE_s), FAILED)
+            self.assertIn("No space left on device", self.said())
+            self.pass_time(0.5)
+            self.assertAlmostEqual(self.now()["width_mm"], 44, delta=1)
 
     def test_killed_it_leaves_no_process_behind(self):
         with contextlib.suppress(BrokenPipeError):
@@ -214,12 +223,12 @@ class Faults:
     RESTS_s = 0.6  # of the world, after what happened
 
     @contextlib.contextmanager
-    def grasp(self, *commands, arguments=(), model="2f85", ends=(DONE,), may_open=False):
+    def grasp(self, *commands, arguments=(), model="2f85", ends=(DONE,), may_open=False, **how):
         """What the cell is told comes at the touch, or while the cup is carried."""
         with self.cell(*self.CUP, *(["--by-command"] if self.STATE == "squeeze" else []), model=model):
             if self.STATE == "squeeze" and commands:
                 self.tell("at_touch " + "; ".join(commands))
-            process = self.start("--cap", str(self.CAP_N), *arguments)
+            process = self.start("--cap", str(self.CAP_N), *arguments, **how)
             if self.STATE == "squeeze":
                 self.wait_for(lambda: self.now()["peak_N"] > 0.05, "it never touched")
             else:
@@ -228,11 +237,10 @@ class Faults:
                 for command in commands:
                     self.tell(command)
             yield process
-            # Whatever goes on now would like more force.
+            # Whatever goes on now would like more force than the cap, where it carries the cup.
             self.pass_time(self.RESTS_s)
-            for disturbance in ("pour 1", "slick 0.3"):
-                self.tell(disturbance, None)
-            self.pass_time(self.RESTS_s)
+            self.tell("pour 5", None)
+            self.pass_time(2 * self.RESTS_s)
             if process.poll() is None:
                 process.terminate()
             self.assertIn(process.wait(PATIENCE_s), ends, self.said())
@@ -310,8 +318,13 @@ class Faults:
             process.kill()
 
     def test_a_full_disk(self):
-        with self.grasp(arguments=("-o", "/dev/full", "--overwrite"), ends=(FAILED,)) as process:
-            self.wait_for_words("No space left on device", process)
+        def limit():  # some seconds of rows, before or after the touch
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            size = {"squeeze": 150000, "hold": 500000}[self.STATE]
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+        with self.grasp(arguments=("-o", self.csv), ends=(FAILED,), preexec_fn=limit) as process:
+            self.wait_for_words("not recorded any more", process)
             self.wait_for_words(" s  holding ", process)
 
     def test_a_servo_whose_fingertip_is_killed(self):
@@ -330,6 +343,11 @@ class WhileSqueezing(Faults, CellTest):
 
 class WhileHolding(Faults, CellTest):
     STATE = "hold"
+
+    def test_more_than_the_cap_is_wanted(self):
+        with self.grasp(ends=(DONE, DROPPED)) as process:
+            self.tell("pour 5")
+            self.wait_for_words("more force than the cap is wanted", process)
 
 
 if __name__ == "__main__":
