@@ -548,6 +548,7 @@ int main(int argc, char **argv) {
   number("--width", object.width_mm, "MM", 1.0, 500.0, "Of the object");
   number("--mass", object.mass_kg, "KG", 0.001, 10.0, "Likewise");
   number("--friction", object.friction, "NUMBER", 0.05, 3.0, "Likewise");
+  number("--kinetic", object.kinetic_share, "SHARE", 0.3, 1.0, "Of the friction, while it slides");
   app.add_option("--stiffness", object.stiffness_N_mm, "Likewise; default: it does not yield")
       ->type_name("N/MM")
       ->check(CLI::Range(0.1, 1e6));

@@ -21,11 +21,11 @@ struct Known {
   Kind kind;
   double low, high, seconds;
 };
-// Ranges keep the physics within its steps; lengths are the middle of scene.hpp's.
+// Ranges keep the physics within its steps; lengths are of scene.hpp's.
 constexpr Known KNOWN[] = {{Kind::pour, 0.0, 5.0, 1.0},
                            {Kind::jerk, 0.0, 20.0, 0.3},
                            {Kind::knock, 0.0, 0.5, 0.02},
-                           {Kind::slick, 0.0, 0.95, 0.2}};
+                           {Kind::slick, 0.0, 0.95, 0.5}};
 
 const Known &known(Kind kind) {
   return *std::find_if(std::begin(KNOWN), std::end(KNOWN),
