@@ -45,14 +45,17 @@ const std::vector<GraspSetting> &grasp_settings() {
           "blind", "N", 0.2, 100, 1e3, [](S &s) -> std::int32_t & { return s.blind_mN; },
           "Force where no load can be told"),
       number(
+          "shift", "mm", 0, 20, 1e3, [](S &s) -> std::int32_t & { return s.shift_um; },
+          "How far a load as large as the force moves a long contact's location"),
+      number(
           "friction", "", 0.1, 1.5, 1e3, [](S &s) -> std::int32_t & { return s.friction_permille; },
           "Friction to begin with"),
       number(
           "margin", "", 1, 5, 1e3, [](S &s) -> std::int32_t & { return s.margin_permille; },
           "Force over load / friction"),
       number(
-          "decay", "%/s", 0, 100, 10, [](S &s) -> std::int32_t & { return s.decay_permille_s; },
-          "How fast force comes down again"),
+          "decay", "%/s", 0, 500, 10, [](S &s) -> std::int32_t & { return s.decay_permille_s; },
+          "How fast what is too much goes"),
       time(
           "rest", "s", 0, 60, 1e6, [](S &s) -> std::uint32_t & { return s.rest_us; },
           "No sooner after a slide"),

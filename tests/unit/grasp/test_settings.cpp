@@ -116,6 +116,6 @@ TEST(GraspSettings, ARecordingTellsThemAll) {
   EXPECT_TRUE(has("grasp_mode", "fixed"));
   EXPECT_TRUE(has("grasp_fixed", "4 N"));
   EXPECT_TRUE(has("grasp_travel_cap", "7.5 mm"));
-  EXPECT_TRUE(has("grasp_margin", "1.3"));
+  EXPECT_TRUE(has("grasp_margin", "1.25"));
   EXPECT_EQ(head.size(), grasp_settings().size() + 1);
 }
