@@ -51,7 +51,7 @@ void app_use_pad(struct app *app, const struct pad_profile *pad) {
   bool acts = pad && fit_pad_init(&app->fit_pad, &app->fit_array, pad) == FT_OK;
   app->pad = acts ? pad : NULL;
   use_tangential_scales(app);
-  memset(&app->tangential_state, 0, sizeof app->tangential_state);
+  memset(&app->tangential_course, 0, sizeof app->tangential_course);
   tangential_reset(&app->tangential_history);
   motion_reset(&app->motion_history);
 }
@@ -143,13 +143,13 @@ static void fit_frame(struct app *app) {
 
 #if FT_WITH_TANGENTIAL
 static void estimate_tangential_load(struct app *app) {
-  memset(&app->tangential, 0, sizeof app->tangential);
-  if (app->pad && app->conditioned.contact &&
-      tangential_is_worthwhile(&app->fit, app->frame.saturated)) {
-    fit_tangential_load(&app->fit_array, &app->fit_pad, app->conditioned.pressure_Pa_q10,
-                        &app->fit_settings, &app->fit, &app->tangential_state, &app->tangential);
+  if (app->pad && app->conditioned.contact) {
+    tangential_estimate(&app->tangential_course, &app->fit_array, &app->fit_pad,
+                        app->conditioned.pressure_Pa_q10, &app->fit_settings, &app->fit,
+                        app->frame.saturated, app->frame.t_us, &app->tangential);
   } else {
-    memset(&app->tangential_state, 0, sizeof app->tangential_state);
+    memset(&app->tangential, 0, sizeof app->tangential);
+    memset(&app->tangential_course, 0, sizeof app->tangential_course);
   }
 }
 #endif

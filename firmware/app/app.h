@@ -37,7 +37,7 @@ struct app {
   const struct pad_profile *pad;                  /* that acts; NULL: none */
   struct fit_pad fit_pad;                         /* of it */
   struct tangential_settings tangential_settings; /* of it and the calibration */
-  struct fit_tangential_state tangential_state;
+  struct tangential_course tangential_course;
   struct tangential_history tangential_history;
   struct motion_history motion_history;
 #endif

@@ -32,6 +32,23 @@ bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated) 
          !contact_is_lower_bound(fit, saturated);
 }
 
+void tangential_estimate(struct tangential_course *course, const struct fit_array *array,
+                         struct fit_pad *pad, const int32_t *pressure_Pa_q10,
+                         const struct fit_settings *settings, const struct fit_result *fit,
+                         uint32_t saturated, uint64_t t_us, struct fit_tangential *estimate) {
+  if (!tangential_is_worthwhile(fit, saturated)) {
+    memset(course, 0, sizeof *course);
+    memset(estimate, 0, sizeof *estimate);
+    return;
+  }
+  bool slow = course->t_us != 0 && t_us - course->t_us >= TANGENTIAL_SLOW_us;
+  int steps = slow ? FIT_TANGENTIAL_FRAMES : 1;
+  course->t_us = t_us;
+  do {
+    fit_tangential_load(array, pad, pressure_Pa_q10, settings, fit, &course->state, estimate);
+  } while (!estimate->valid && --steps > 0);
+}
+
 void tangential_reset(struct tangential_history *history) {
   memset(history, 0, sizeof *history);
 }

@@ -52,6 +52,23 @@ struct tangential_load {
  * left out for it. */
 bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated);
 
+/* The estimate of a contact from frame to frame; of all zeros: of none. */
+struct tangential_course {
+  uint64_t t_us; /* of the last frame */
+  struct fit_tangential_state state;
+};
+
+/* A frame so long after the last has time for more than one step, and what moves has gone further:
+ * until the estimate is told, at most FIT_TANGENTIAL_FRAMES. */
+#define TANGENTIAL_SLOW_us 4500u
+
+/* Of one frame, whose fit is of the same readings. Where it is not worthwhile, nothing, and the
+ * course begins anew. */
+void tangential_estimate(struct tangential_course *course, const struct fit_array *array,
+                         struct fit_pad *pad, const int32_t *pressure_Pa_q10,
+                         const struct fit_settings *settings, const struct fit_result *fit,
+                         uint32_t saturated, uint64_t t_us, struct fit_tangential *estimate);
+
 /* Forgets the contact. */
 void tangential_reset(struct tangential_history *history);
 

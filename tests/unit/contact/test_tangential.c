@@ -247,6 +247,66 @@ static void fits_that_an_estimate_is_worthwhile_for(void) {
   TEST_ASSERT_FALSE(tangential_is_worthwhile(&fit, 0));
 }
 
+enum { SENSORS = 15 };
+
+/* A contact of the pad's own, pressing there. */
+static struct fit_tangential frame(struct tangential_course *course, float x_mm, float y_mm,
+                                   uint64_t t_us, uint32_t flags) {
+  const struct pad_profile profile = pad_of_12_mm();
+  float at_x_mm[SENSORS], at_y_mm[SENSORS];
+  int32_t readings[SENSORS];
+  for (int k = 0; k < SENSORS; k++) {
+    at_x_mm[k] = 9.0f * (float)(k / 5 - 1);
+    at_y_mm[k] = 9.0f * (float)(k % 5 - 2);
+    float dx = at_x_mm[k] - x_mm, dy = at_y_mm[k] - y_mm, sum = 0.0f;
+    for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+      float v = profile.normal[j].sd_mm * profile.normal[j].sd_mm + profile.spread_mm2;
+      sum += profile.normal[j].share / v * expf(-(dx * dx + dy * dy) / (2.0f * v));
+    }
+    readings[k] = (int32_t)(4e8f * sum);
+  }
+  static struct fit_array array;
+  static struct fit_pad pad;
+  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, SENSORS, at_x_mm, at_y_mm, 9.0f));
+  TEST_ASSERT_EQUAL(FT_OK, fit_pad_init(&pad, &array, &profile));
+  struct fit_settings fitting = {.iterations = 4, .noise_Pa_q10 = 4096};
+  struct fit_result fit;
+  fit_gaussian(&array, readings, UINT32_MAX, &fitting, &fit);
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_FIT_VALID, fit.flags);
+  fit.flags |= flags;
+  struct fit_tangential estimate;
+  memset(&estimate, 0xFF, sizeof estimate);
+  tangential_estimate(course, &array, &pad, readings, &fitting, &fit, 0, t_us, &estimate);
+  return estimate;
+}
+
+static void slow_frames_have_time_for_more_steps(void) {
+  for (int slow = 0; slow < 2; slow++) {
+    const uint64_t interval_us = slow ? TANGENTIAL_SLOW_us : TANGENTIAL_SLOW_us - 1;
+    struct tangential_course course = {0};
+    uint64_t t_us = 9000000;
+    TEST_ASSERT_FALSE(frame(&course, 2.0f, 3.0f, t_us, 0).valid);
+    for (int i = 0; i < FIT_TANGENTIAL_FRAMES; i++) {
+      frame(&course, 2.0f, 3.0f, t_us += interval_us, 0);
+    }
+    TEST_ASSERT_TRUE(frame(&course, 2.0f, 3.0f, t_us += interval_us, 0).valid);
+    struct fit_tangential jumped = frame(&course, -3.0f, -8.0f, t_us += interval_us, 0);
+    TEST_ASSERT_EQUAL_INT(slow, jumped.valid);
+    TEST_ASSERT_FLOAT_WITHIN(0.05f, slow ? -3.0f : 0.0f, jumped.x_mm);
+  }
+}
+
+static void what_is_not_worthwhile_ends_the_course(void) {
+  static const struct tangential_course none;
+  static const struct fit_tangential nothing;
+  struct tangential_course course = {0};
+  frame(&course, 2.0f, 3.0f, 1000, 0);
+  TEST_ASSERT_TRUE(memcmp(&course, &none, sizeof course) != 0);
+  struct fit_tangential estimate = frame(&course, 2.0f, 3.0f, 2000, CONTACT_FLAG_FLAT);
+  TEST_ASSERT_EQUAL_MEMORY(&none, &course, sizeof course);
+  TEST_ASSERT_EQUAL_MEMORY(&nothing, &estimate, sizeof estimate);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(an_estimate_that_is_not_there_says_nothing);
@@ -259,6 +319,8 @@ int main(void) {
   RUN_TEST(from_touch_takes_the_first_100_ms_for_none);
   RUN_TEST(a_new_contact_has_a_zero_of_its_own);
   RUN_TEST(slow_frames_settle_with_those_there_were);
+  RUN_TEST(slow_frames_have_time_for_more_steps);
+  RUN_TEST(what_is_not_worthwhile_ends_the_course);
   RUN_TEST(fits_that_an_estimate_is_worthwhile_for);
   return UNITY_END();
 }

@@ -112,7 +112,7 @@ Player::~Player() = default;
 void Player::play(const twin::Act &act, std::uint64_t number,
                   const std::function<void(const Felt &)> &frame) {
   Random random(seed_, NOISE, number);
-  fit_tangential_state state{};
+  tangential_course course{};
   const double first_s = random.uniform(0.0, 1.0) / sensing_.rate_Hz;
   for (std::uint64_t i = 0;; i++) {
     const double t_s = first_s + static_cast<double>(i) / sensing_.rate_Hz;
@@ -137,12 +137,10 @@ void Player::play(const twin::Act &act, std::uint64_t number,
     if (felt.contact) {
       fit_gaussian_grid(&array_, readings, (1u << geometry.sensor_count) - 1u, &settings_,
                         &felt.fit);
-      if (tangential_is_worthwhile(&felt.fit, 0)) {
-        fit_tangential_load(&array_, fit_pad_.get(), readings, &settings_, &felt.fit, &state,
-                            &felt.tangential);
-      }
+      tangential_estimate(&course, &array_, fit_pad_.get(), readings, &settings_, &felt.fit, 0,
+                          felt.t_us, &felt.tangential);
     } else {
-      state = {};
+      course = {};
     }
     frame(felt);
   }
