@@ -40,7 +40,7 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
  * without load 15 % would claim one, 1.2 % do (report, elongated_false_percent). A pad that ends
  * nearer than three quarters of its thickness makes round contacts look long: there all are taken.
  */
-#define LONG_MOST_Q15 1802 /* 0.055 */
+#define LONG_MOST_Q15 1507 /* 0.046 */
 #define LONG_MOST_NEAR_ENDS_Q15 8192
 #define NEAR_ENDS 0.75f
 

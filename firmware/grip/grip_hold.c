@@ -4,15 +4,19 @@
 /* Of the load's rate. */
 #define RATE_us 20000
 /* Beyond the actuator's latency, until what is wanted acts. */
-#define AHEAD_us 10000
+#define AHEAD_us 8000
 #define AHEAD_MAX_us 80000
 
 /* A slide raises the grip at once by so much, and again each time the gripper has had the time to
  * answer and it goes on. */
 #define REFLEX_PERMILLE 1200
-#define REFLEX_AGAIN_us 50000
+#define GOES_ON_PERMILLE 1400
+#define REFLEX_AGAIN_us 35000
 /* This much of the grip that ended a slide is not given up where no load tells what is needed. */
 #define FLOOR_PERMILLE 850
+
+/* A guess of a load may be so far off: what it needs goes no lower than this of it. */
+#define GUESSED_PERMILLE 1150
 
 /* Grip comes down in steps of so long. */
 #define DECAY_us 50000u
@@ -20,9 +24,12 @@
 /* An object that slides at less than this of Q / F pulls more than is told: then the grip that
  * stopped it is all that is known. Otherwise its load and friction are. */
 #define BELIEVED_PERMILLE 150
+#define BELIEVED_OF_PERMILLE 400
+/* What has just been caught swings on the rubber. */
+#define CAUGHT_us 300000u
 
 /* Q / F of a slide is friction, as far as Q is known. */
-#define SEEN_PERMILLE 950
+#define SEEN_PERMILLE 1000
 #define SHARE_us 60000
 #define FRICTION_MIN_PERMILLE 150
 #define FRICTION_MAX_PERMILLE 1500
@@ -59,15 +66,21 @@ static void learn_friction(struct grip *grip, const struct grip_view *view, bool
   if (!view->has_load) {
     return;
   }
-  if (begins) {
-    hold->load_is_believed = hold->share_permille >= BELIEVED_PERMILLE;
-  }
   int32_t seen = grip_clamp(grip_scale(hold->share_permille, SEEN_PERMILLE, 1000),
                             FRICTION_MIN_PERMILLE, FRICTION_MAX_PERMILLE);
-  if (begins ? seen < hold->friction_permille
-             : !hold->sliding && !view->slides && seen > hold->friction_permille) {
-    hold->friction_permille = seen;
+  if (!begins) {
+    if (!hold->sliding && !view->slides && seen > hold->friction_permille) {
+      hold->friction_permille = seen;
+    }
+    return;
   }
+  int32_t least = grip_scale(hold->friction_permille, BELIEVED_OF_PERMILLE, 1000);
+  bool again = hold->slides > 0 && grip->now_us - hold->slid_us < CAUGHT_us;
+  if (again || hold->share_permille < (least > BELIEVED_PERMILLE ? least : BELIEVED_PERMILLE)) {
+    return;
+  }
+  hold->load_is_believed = true;
+  hold->friction_permille = seen < hold->friction_permille ? seen : hold->friction_permille;
 }
 
 static void answer_slide(struct grip *grip, const struct grip_view *view) {
@@ -78,7 +91,7 @@ static void answer_slide(struct grip *grip, const struct grip_view *view) {
     uint64_t again_us = (uint64_t)grip->traits.latency_us + REFLEX_AGAIN_us;
     if (begins || grip->now_us - hold->raised_us > again_us) {
       int32_t from_mN = !begins && grip->wanted_mN > view->low_mN ? grip->wanted_mN : view->low_mN;
-      int32_t raised_mN = grip_scale(from_mN, REFLEX_PERMILLE, 1000);
+      int32_t raised_mN = grip_scale(from_mN, begins ? REFLEX_PERMILLE : GOES_ON_PERMILLE, 1000);
       raised_mN = grip_clamp(raised_mN, 0, grip->settings.force_cap_mN);
       hold->floor_mN = raised_mN > hold->floor_mN ? raised_mN : hold->floor_mN;
       hold->raised_us = grip->now_us;
@@ -119,7 +132,11 @@ int32_t grip_hold_wants(struct grip *grip, const struct grip_view *view) {
   int32_t least_mN = least_force(grip, view->has_load);
   int32_t wanted_mN = load_force(grip);
   wanted_mN = wanted_mN > least_mN ? wanted_mN : least_mN;
-  bool rests = view->tells_load &&
+  if (!view->tells_load && wanted_mN < grip->wanted_mN) {
+    int32_t kept_mN = grip_scale(wanted_mN, GUESSED_PERMILLE, 1000);
+    wanted_mN = kept_mN < grip->wanted_mN ? kept_mN : grip->wanted_mN;
+  }
+  bool rests = view->has_load &&
                !(hold->has_slid && grip->now_us - hold->slid_us < grip->settings.rest_us);
   uint64_t step_us = grip->now_us - hold->decayed_us;
   if (wanted_mN >= grip->wanted_mN || !rests || step_us > 2 * DECAY_us) {

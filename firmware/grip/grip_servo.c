@@ -93,6 +93,17 @@ static int32_t least_steps(const struct grip *grip, bool tighten) {
              : port_divide(missing_um + grip->traits.step_um - 1, grip->traits.step_um);
 }
 
+/* The way that is still to come of the width then. Where the gripper stands, it makes none shorter
+ * than its deadband. */
+static int32_t coming_way(const struct grip *grip, int32_t width_um) {
+  int32_t off_um = grip->status.width_um - grip->target_um;
+  int32_t deadband_um = grip->traits.deadband_um;
+  bool stands = !grip->status.is_moving &&
+                grip->status.t_us > grip->aimed_us + (uint64_t)grip->traits.latency_us + SETTLES_us;
+  bool stays = stands && off_um <= deadband_um && off_um >= -deadband_um;
+  return width_um - (stays ? grip->status.width_um : grip->target_um);
+}
+
 uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wanted_mN) {
   uint32_t trouble = 0;
   const struct grip_settings *settings = &grip->settings;
@@ -107,7 +118,7 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
   /* Where the force will be once the gripper is where it was sent. */
   int32_t width_um = grip_width_at(grip, view->t_us);
   int32_t stiffness = grip_stiffness(grip, view->mean_mN, width_um);
-  int32_t coming_mN = grip_scale(stiffness, width_um - grip->target_um, 1000);
+  int32_t coming_mN = grip_scale(stiffness, coming_way(grip, width_um), 1000);
   int32_t low_mN = view->low_mN + coming_mN, high_mN = view->high_mN + coming_mN;
   int32_t step_mN = grip_scale(stiffness, grip->traits.step_um, 1000);
   step_mN = step_mN < 1 ? 1 : step_mN;
