@@ -8,6 +8,9 @@
 #define STIFFNESS_MIN_mN_mm 200
 #define STIFFNESS_MAX_mN_mm 20000
 
+/* Further than any gripper opens. */
+#define WIDTH_MAX_um 1000000
+
 /* Opening waits until the last move shows in the force, whatever the clocks of force and width
  * differ by. */
 #define SETTLES_us 30000u
@@ -25,7 +28,12 @@ void grip_take_status(struct grip *grip, const struct grip_status *status) {
   if (grip->status_is_heard && status->t_us <= grip->status.t_us) {
     return;
   }
+  /* Between what was said before a silence and after it no width is known. */
+  if (grip->status_is_heard && status->t_us - grip->status.t_us > grip->settings.silent_us) {
+    grip->width_count = 0;
+  }
   grip->status = *status;
+  grip->status.width_um = grip_clamp(status->width_um, -WIDTH_MAX_um, WIDTH_MAX_um);
   grip->status_is_heard = true;
   /* The ring spans what a force may be old. */
   uint32_t before = (grip->newest_width - 1) % GRIP_WIDTHS;
@@ -34,7 +42,7 @@ void grip_take_status(struct grip *grip, const struct grip_status *status) {
     grip->newest_width = (grip->newest_width + 1) % GRIP_WIDTHS;
     grip->width_count += grip->width_count < GRIP_WIDTHS;
   }
-  grip->widths[grip->newest_width] = (struct grip_width){status->t_us, status->width_um};
+  grip->widths[grip->newest_width] = (struct grip_width){status->t_us, grip->status.width_um};
 }
 
 /* Whether the ring tells the width of then. */
