@@ -19,6 +19,9 @@
  * one that opens. */
 #define TIGHTEN_PERMILLE 500
 #define LOOSEN_PERMILLE 300
+/* While it still opens no less is missing than what may be: else what was loosened a moment ago
+ * would be taken back, and more. */
+#define OPENING_PERMILLE 1000
 /* Of the cap: so much of it is asked for, as the last step may make more than is known. */
 #define CAP_PERMILLE 970
 /* And of the force that is wanted, for grippers of fine steps. */
@@ -122,9 +125,13 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
   int32_t tolerance_mN = grip_scale(wanted_mN, TOLERANCE_PERMILLE, 1000);
   int32_t missing_mN = wanted_mN - low_mN;
   int32_t steps = 0;
-  if (missing_mN > tolerance_mN && missing_mN > grip_scale(step_mN, TIGHTEN_PERMILLE, 1000)) {
+  bool opens = grip->target_um > grip->status.width_um;
+  int32_t share = opens ? OPENING_PERMILLE : TIGHTEN_PERMILLE;
+  if (missing_mN > tolerance_mN && missing_mN > grip_scale(step_mN, share, 1000)) {
     steps = port_divide(missing_mN + step_mN / 2, step_mN);
-    int32_t least = least_steps(grip, true);
+    /* To open less needs no more than that. */
+    bool closes = grip->target_um - steps * grip->traits.step_um < grip->status.width_um;
+    int32_t least = closes ? least_steps(grip, true) : 1;
     steps = steps < least ? least : steps;
     int32_t most_mN = grip_scale(settings->force_cap_mN, CAP_PERMILLE, 1000);
     int32_t room = high_mN >= most_mN ? 0 : port_divide(most_mN - high_mN, step_mN);
