@@ -15,6 +15,9 @@
  * differ by. */
 #define SETTLES_us 30000u
 
+/* Forces that are newer than the newest width by more tell nothing while the gripper moves. */
+#define WIDTH_LAGS_us 15000u
+
 /* Of what a step makes: less than that is missing, and none is made; so much may be missing after
  * one that opens. */
 #define TIGHTEN_PERMILLE 500
@@ -114,6 +117,11 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
   grip->wanted_mN = wanted_mN;
   if (view->fingers == 0 || !knows_width(grip, view->t_us)) {
     return trouble;
+  }
+  bool stands = !grip->status.is_moving &&
+                grip->status.t_us > grip->aimed_us + (uint64_t)grip->traits.latency_us;
+  if (!stands && view->t_us > grip->status.t_us + WIDTH_LAGS_us) {
+    return trouble; /* one move at a time */
   }
   /* Where the force will be once the gripper is where it was sent. */
   int32_t width_um = grip_width_at(grip, view->t_us);

@@ -195,7 +195,9 @@ private:
         take_away();
       }
     }
-    outcome_.failed.opened_mm = std::max(outcome_.failed.opened_mm, width_mm - began_mm_);
+    if (is_between_) {
+      outcome_.failed.opened_mm = std::max(outcome_.failed.opened_mm, width_mm - began_mm_);
+    }
     outcome_.failed.peak_N = std::max(outcome_.failed.peak_N, force_N());
   }
 

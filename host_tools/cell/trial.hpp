@@ -83,7 +83,8 @@ constexpr double DROP_mm = 22.0, SETTLED_s = 0.5;
 // Since a fault began.
 struct Failed {
   bool begun = false;
-  double opened_mm = 0.0;    // by how much the fingers ever were wider than when it began
+  double opened_mm =
+      0.0; // the fingers wider than when it began, at most, with the object between them
   double peak_N = 0.0;       // the largest true force of a fingertip
   std::uint32_t trouble = 0; // all that was ever on
   std::uint8_t state = 0;    // at the end
