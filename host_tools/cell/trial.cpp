@@ -16,7 +16,7 @@ constexpr double PATIENCE_s = 8.0;                  // until the controller hold
 constexpr double STEPS_s = 0.01;                    // without any input
 constexpr double BEGINS_s = 12.0;                   // a fault, at the latest
 constexpr double APART_mm = 1e3, FREE_mm = 0.5;
-constexpr double LIFTS_AFTER_s = 0.5, POURS_AFTER_s = 1.0, POURS_s = 0.3, POURED = 2.0;
+constexpr double LIFTS_AFTER_s = 0.8, POURS_AFTER_s = 1.2, POURS_s = 0.4, POURED = 1.0;
 constexpr double SLICK_s = 0.05, SLICK_SHARE = 0.9;
 constexpr double LOST_N = 0.01, TOUCHED_N = 0.05;
 constexpr double SAMPLED_s = 2e-3, NEAR = 0.1;

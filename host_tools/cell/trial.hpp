@@ -59,9 +59,8 @@ struct Trial {
   double asked_after_s = 0.0;
   // So long after the lift friction falls to what does not hold the object any more, by a tenth.
   std::optional<double> slick_after_s;
-  // Ends when it has been watched. Where nothing is lifted by then, the hand lifts half a second
-  // after it began, and there is three times the mass half a second later: whatever controls would
-  // then like more force.
+  // Ends when it has been watched. Where nothing is lifted by then, the hand lifts 0.8 s after it
+  // began; after 1.2 s as much again is poured in: whatever controls would then like more force.
   std::optional<Fault> fault;
 };
 
