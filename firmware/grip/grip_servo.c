@@ -16,7 +16,7 @@
 #define SETTLES_us 30000u
 
 /* Forces that are newer than the newest width by more tell nothing while the gripper moves. */
-#define WIDTH_LAGS_us 15000u
+#define WIDTH_LAGS_us 8000u
 
 /* Of what a step makes: less than that is missing, and none is made; so much may be missing after
  * one that opens. */
