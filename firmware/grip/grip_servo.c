@@ -134,7 +134,8 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
   int32_t missing_mN = wanted_mN - low_mN;
   int32_t steps = 0;
   bool opens = grip->target_um - grip->status.width_um > grip->traits.step_um / 2;
-  int32_t share = opens ? OPENING_PERMILLE : TIGHTEN_PERMILLE;
+  /* What slides is answered by a step at least. */
+  int32_t share = grip->hold.sliding ? 0 : opens ? OPENING_PERMILLE : TIGHTEN_PERMILLE;
   if (missing_mN > tolerance_mN && missing_mN > grip_scale(step_mN, share, 1000)) {
     steps = port_divide(missing_mN + step_mN / 2, step_mN);
     /* To open less needs no more than that. */
