@@ -17,6 +17,9 @@
 #define EMPTY_us 60000u
 /* A gripper that stands where it was sent for so long has closed on nothing. */
 #define STANDS_us 400000u
+/* An approach waits for a status that is no older: where the fingers are when they touch, and that
+ * they follow, is what all forces are turned into widths by. */
+#define WIDTH_STALE_us 100000u
 /* A move is to take so long, but where the object slides. */
 #define MOVE_us 20000
 /* The gripper's own limit of force, in case the fingertips' is not kept: of the cap. */
@@ -62,6 +65,11 @@ static void enter(struct grip *grip, enum grip_state state) {
   grip->is_entered = true;
 }
 
+static bool is_grasping(const struct grip *grip) {
+  return grip->state == GRIP_SQUEEZE || grip->state == GRIP_READY || grip->state == GRIP_HOLDING ||
+         grip->state == GRIP_SLIPPING || (grip->state == GRIP_STILL && grip->still_grasps);
+}
+
 bool grip_request(struct grip *grip, enum grip_request request) {
   switch (request) {
   case GRIP_REQUEST_GRASP:
@@ -80,6 +88,7 @@ bool grip_request(struct grip *grip, enum grip_request request) {
       return false;
     }
     grip->target_um = grip->status.width_um;
+    grip->still_grasps = is_grasping(grip);
     enter(grip, GRIP_STILL);
     return true;
   case GRIP_REQUEST_RELEASE:
@@ -103,11 +112,6 @@ static uint32_t gripper_trouble(const struct grip *grip) {
   bool was_active = grip->state > GRIP_ACTIVATING;
   trouble |= was_active && !grip->status.is_active ? GRIP_GRIPPER_INACTIVE : 0;
   return trouble;
-}
-
-static bool is_grasping(uint8_t state) {
-  return state == GRIP_SQUEEZE || state == GRIP_READY || state == GRIP_HOLDING ||
-         state == GRIP_SLIPPING;
 }
 
 /* A step of the width at this speed since the last. */
@@ -134,6 +138,10 @@ static void approach(struct grip *grip, const struct grip_view *view) {
   bool touches = view->fingers == 0 ||
                  (view->touches >= view->fingers && view->low_mN >= grip->settings.touch_mN);
   bool pushes_hard = view->high_mN >= 4 * grip->settings.touch_mN;
+  if (grip->now_us > grip->status.t_us + WIDTH_STALE_us) {
+    grip->ramped_us = grip->now_us;
+    return;
+  }
   if (touches || pushes_hard) {
     grip->touch_width_um = grip_width_at(grip, view->t_us);
     enter(grip, GRIP_SQUEEZE);
@@ -301,12 +309,13 @@ void grip_step(struct grip *grip, uint64_t now_us, struct grip_command *command,
   grip->trouble = view.trouble | gripper_trouble(grip);
   bool silent = (grip->trouble & GRIP_GRIPPER_SILENT) != 0;
   uint8_t before = grip->state;
+  bool grasps = is_grasping(grip);
   if (before != GRIP_IDLE && before != GRIP_FAULT && (grip->trouble & GRIP_GRIPPER_FAULTS) != 0) {
     grip->fault_trouble = grip->trouble;
     enter(grip, GRIP_FAULT);
-  } else if (is_grasping(before) && is_gone(grip, &view)) {
+  } else if (grasps && is_gone(grip, &view)) {
     enter(grip, GRIP_DROPPED);
-  } else if (!silent && !(is_grasping(before) && is_empty(&view))) {
+  } else if (!silent && !(grasps && is_empty(&view))) {
     grip->trouble |= go_on(grip, &view);
   }
   if (grip->state == before) {

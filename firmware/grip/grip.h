@@ -15,8 +15,11 @@
  *
  * Integers throughout, so that every machine gives the same bits; no clock, no allocation, no
  * floats. Times are the caller's, in us, on one clock for all inputs, and never go back. Forces
- * are mN, lengths um, of one fingertip: its normal force is the grip force. Main context only: it
- * divides with port/divide.h.
+ * are mN, lengths um, of one fingertip: its normal force is the grip force. Values beyond what
+ * there can be are taken to its ends. Main context only: it divides with port/divide.h.
+ *
+ * Cost on a Cortex-M0+: grip_step 8000 cycles in the median, at most 24 000 (test
+ * emulated.fit_bits), 400 bytes of stack (checks.stack_grip).
  */
 #ifndef GRIP_GRIP_H
 #define GRIP_GRIP_H
@@ -244,7 +247,8 @@ struct grip {
   uint32_t trouble;       /* as of the last step */
   uint32_t fault_trouble; /* that of FAULT */
   bool may_activate;
-  bool is_entered; /* the state is new */
+  bool is_entered;   /* the state is new */
+  bool still_grasps; /* STILL with an object */
   struct grip_hold hold;
   struct grip_pid pid;
 };

@@ -8,14 +8,23 @@
 #define STIFFNESS_MIN_mN_mm 200
 #define STIFFNESS_MAX_mN_mm 20000
 
+/* Further than any gripper opens. */
+#define WIDTH_MAX_um 1000000
+
 /* Opening waits until the last move shows in the force, whatever the clocks of force and width
  * differ by. */
 #define SETTLES_us 30000u
+
+/* Forces that are newer than the newest width by more tell nothing while the gripper moves. */
+#define WIDTH_LAGS_us 8000u
 
 /* Of what a step makes: less than that is missing, and none is made; so much may be missing after
  * one that opens. */
 #define TIGHTEN_PERMILLE 500
 #define LOOSEN_PERMILLE 300
+/* While it still opens no less is missing than what may be: else what was loosened a moment ago
+ * would be taken back, and more. */
+#define OPENING_PERMILLE 1000
 /* Of the cap: so much of it is asked for, as the last step may make more than is known. */
 #define CAP_PERMILLE 970
 /* And of the force that is wanted, for grippers of fine steps. */
@@ -25,7 +34,12 @@ void grip_take_status(struct grip *grip, const struct grip_status *status) {
   if (grip->status_is_heard && status->t_us <= grip->status.t_us) {
     return;
   }
+  /* Between what was said before a silence and after it no width is known. */
+  if (grip->status_is_heard && status->t_us - grip->status.t_us > grip->settings.silent_us) {
+    grip->width_count = 0;
+  }
   grip->status = *status;
+  grip->status.width_um = grip_clamp(status->width_um, -WIDTH_MAX_um, WIDTH_MAX_um);
   grip->status_is_heard = true;
   /* The ring spans what a force may be old. */
   uint32_t before = (grip->newest_width - 1) % GRIP_WIDTHS;
@@ -34,7 +48,7 @@ void grip_take_status(struct grip *grip, const struct grip_status *status) {
     grip->newest_width = (grip->newest_width + 1) % GRIP_WIDTHS;
     grip->width_count += grip->width_count < GRIP_WIDTHS;
   }
-  grip->widths[grip->newest_width] = (struct grip_width){status->t_us, status->width_um};
+  grip->widths[grip->newest_width] = (struct grip_width){status->t_us, grip->status.width_um};
 }
 
 /* Whether the ring tells the width of then. */
@@ -115,6 +129,11 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
   if (view->fingers == 0 || !knows_width(grip, view->t_us)) {
     return trouble;
   }
+  bool stands = !grip->status.is_moving &&
+                grip->status.t_us > grip->aimed_us + (uint64_t)grip->traits.latency_us;
+  if (!stands && view->t_us > grip->status.t_us + WIDTH_LAGS_us) {
+    return trouble; /* one move at a time */
+  }
   /* Where the force will be once the gripper is where it was sent. */
   int32_t width_um = grip_width_at(grip, view->t_us);
   int32_t stiffness = grip_stiffness(grip, view->mean_mN, width_um);
@@ -125,9 +144,14 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
   int32_t tolerance_mN = grip_scale(wanted_mN, TOLERANCE_PERMILLE, 1000);
   int32_t missing_mN = wanted_mN - low_mN;
   int32_t steps = 0;
-  if (missing_mN > tolerance_mN && missing_mN > grip_scale(step_mN, TIGHTEN_PERMILLE, 1000)) {
+  bool opens = grip->target_um - grip->status.width_um > grip->traits.step_um / 2;
+  /* What slides is answered by a step at least. */
+  int32_t share = grip->hold.sliding ? 0 : opens ? OPENING_PERMILLE : TIGHTEN_PERMILLE;
+  if (missing_mN > tolerance_mN && missing_mN > grip_scale(step_mN, share, 1000)) {
     steps = port_divide(missing_mN + step_mN / 2, step_mN);
-    int32_t least = least_steps(grip, true);
+    /* To open less needs no more than that. */
+    bool closes = grip->target_um - steps * grip->traits.step_um < grip->status.width_um;
+    int32_t least = closes ? least_steps(grip, true) : 1;
     steps = steps < least ? least : steps;
     int32_t most_mN = grip_scale(settings->force_cap_mN, CAP_PERMILLE, 1000);
     int32_t room = high_mN >= most_mN ? 0 : port_divide(most_mN - high_mN, step_mN);

@@ -8,6 +8,8 @@
 
 /* A hundred kilograms: more no fingertip means. */
 #define FORCE_MAX_mN 1000000
+/* A metre, likewise. */
+#define PLACE_MAX_um 1000000
 #define ZERO_FRAMES_MAX 2000u
 
 /* A location is taken for a load's only where none has been told for so long; and for no more of
@@ -135,6 +137,8 @@ void grip_take_touch(struct grip *grip, unsigned finger, const struct grip_touch
   }
   own->touch = *touch;
   own->touch.force_mN = grip_clamp(touch->force_mN, 0, FORCE_MAX_mN);
+  own->touch.x_um = grip_clamp(touch->x_um, -PLACE_MAX_um, PLACE_MAX_um);
+  own->touch.y_um = grip_clamp(touch->y_um, -PLACE_MAX_um, PLACE_MAX_um);
   own->touch.qx_mN = grip_clamp(touch->qx_mN, -FORCE_MAX_mN, FORCE_MAX_mN);
   own->touch.qy_mN = grip_clamp(touch->qy_mN, -FORCE_MAX_mN, FORCE_MAX_mN);
   own->is_heard = true;

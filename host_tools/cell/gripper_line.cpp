@@ -31,8 +31,9 @@ void GripperLine::press(const Cell &cell) {
 
 GripperLine::Said GripperLine::exchange(const grip_command &command) {
   const double t_s = next_s_, poll_s = motion_.mechanics().traits.poll_s;
-  if (command.motion == GRIP_ACTIVATE) {
+  if (command.motion == GRIP_ACTIVATE && sent_.motion != GRIP_ACTIVATE) {
     motion_.activate();
+    sent_ = command;
   } else if (command.motion == GRIP_MOVE &&
              (command.width_um != sent_.width_um || command.speed_um_s != sent_.speed_um_s)) {
     motion_.move(gripper_move(command));

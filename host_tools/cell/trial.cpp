@@ -8,11 +8,16 @@
 namespace fingertip::cell {
 namespace {
 
-enum Stream : std::uint64_t { FINGER = 821, LINE };
+enum Stream : std::uint64_t { FINGER = 821, LINE, FAULT };
 
 constexpr double NEVER_s = std::numeric_limits<double>::infinity();
 constexpr double MOVES_s = 2.5e-4, STANDS_s = 1e-3; // between two looks at the gripper
 constexpr double PATIENCE_s = 8.0;                  // until the controller holds
+constexpr double STEPS_s = 0.01;                    // without any input
+constexpr double BEGINS_s = 12.0;                   // a fault, at the latest
+constexpr double APART_mm = 1e3, FREE_mm = 0.5;
+constexpr double LIFTS_AFTER_s = 0.8, POURS_AFTER_s = 1.2, POURS_s = 0.4, POURED = 1.0;
+constexpr double SLICK_s = 0.05, SLICK_SHARE = 0.9;
 constexpr double LOST_N = 0.01, TOUCHED_N = 0.05;
 constexpr double SAMPLED_s = 2e-3, NEAR = 0.1;
 
@@ -77,28 +82,41 @@ public:
       const std::function<void(const Moment &)> &trace)
       : trial_(trial), controller_(controller), trace_(trace),
         cell_(face, trial.scene.object, trial.scene.grasp),
-        gripper_(trial.gripper, trial.scene.object.width_mm + trial.scene.opens_mm,
+        gripper_(trial.gripper,
+                 trial.activates ? trial.gripper.traits.stroke_mm
+                                 : trial.scene.object.width_mm + trial.scene.opens_mm,
                  Random(trial.seed, LINE, 0)),
         fingers_{FeltFinger(face, trial.rubber[0], trial.sensing, Random(trial.seed, FINGER, 0)),
                  FeltFinger(face, trial.rubber[1], trial.sensing, Random(trial.seed, FINGER, 1))},
-        set_point_(trial) {
-    gripper_.press(cell_);
+        set_point_(trial), faults_(trial.fault.value_or(Fault{}), Random(trial.seed, FAULT, 0)) {
+    if (trial.activates) {
+      gripper_.motion().power_off();
+    } else {
+      put_between();
+    }
   }
 
   Outcome go() {
     while (!over_) {
       double next_s =
           std::min({fingers_[0].next_s(), fingers_[1].next_s(), gripper_.next_s(), sample_s_,
+                    stepped_s_ + STEPS_s, faults_.has_begun(t_s_) ? NEVER_s : faults_.begins_s(),
                     t_s_ + (gripper_.motion().moving() || cell_.slips() ? MOVES_s : STANDS_s)});
       for (const Known &known : line_) {
         next_s = std::min(next_s, known.at_s);
       }
       advance(next_s);
+      fail();
       deliver();
+      if (stepped_s_ + STEPS_s <= t_s_) {
+        step_controller();
+      }
       for (std::size_t f = 0; f < fingers_.size(); f++) {
         if (fingers_[f].next_s() <= t_s_) {
-          const FeltFinger::Frame frame = fingers_[f].feel(cell_.touch(f));
-          line_.push_back({frame.known_s, f, frame.touch, {}});
+          const double felt_s = fingers_[f].next_s();
+          if (const auto frame = faults_.frame(f, fingers_[f].feel(touch(f)), felt_s)) {
+            line_.push_back({frame->known_s, f, frame->touch, {}});
+          }
         }
       }
       if (gripper_.next_s() <= t_s_) {
@@ -123,6 +141,66 @@ private:
 
   double since_lift_s(double t_s) const { return t_s - lift_s_; }
 
+  void put_between() {
+    gripper_.press(cell_);
+    is_between_ = true;
+  }
+
+  void take_away() {
+    gripper_.motion().blocked_at = nullptr;
+    is_between_ = false;
+    is_taken_ = true;
+  }
+
+  double force_N() const { return is_between_ ? cell_.force_N() : 0.0; }
+
+  twin::Touch touch(std::size_t finger) const {
+    return is_between_ ? cell_.touch(finger) : twin::Touch{};
+  }
+
+  // What the trial adds to its scene.
+  void disturb(Drive &drive, double t_s) {
+    if (trial_.slick_after_s && since_lift_s(t_s) >= *trial_.slick_after_s) {
+      if (slick_s_ == NEVER_s) {
+        slick_s_ = t_s;
+        slick_share_ = std::min(1.0, SLICK_SHARE * trial_.scene.least_N(since_lift_s(t_s)) /
+                                         std::max(cell_.force_N(), LOST_N));
+      }
+      const double gone = std::min(1.0, (t_s - slick_s_) / SLICK_s);
+      drive.friction_share *= 1.0 - gone * (1.0 - slick_share_);
+    }
+    if (trial_.fault && lift_s_ < NEVER_s) {
+      const double poured = (t_s - faults_.begins_s() - POURS_AFTER_s) / POURS_s;
+      drive.mass_kg += POURED * trial_.scene.object.mass_kg * std::clamp(poured, 0.0, 1.0);
+    }
+    drive.width_mm = is_between_ ? gripper_.motion().width_mm() : APART_mm;
+  }
+
+  void fail() {
+    if (!faults_.has_begun(t_s_)) {
+      return;
+    }
+    const double width_mm = gripper_.motion().width_mm();
+    if (!outcome_.failed.begun) {
+      outcome_.failed.begun = true;
+      began_mm_ = width_mm;
+      if (is_between_) {
+        lift_at_s_ = std::min(lift_at_s_, t_s_ + LIFTS_AFTER_s);
+      }
+      if (faults_.is(Fault::Kind::power, t_s_)) {
+        gripper_.motion().power_off();
+      } else if (faults_.is(Fault::Kind::fault, t_s_)) {
+        gripper_.motion().stop();
+      } else if (faults_.is(Fault::Kind::taken, t_s_)) {
+        take_away();
+      }
+    }
+    if (is_between_) {
+      outcome_.failed.opened_mm = std::max(outcome_.failed.opened_mm, width_mm - began_mm_);
+    }
+    outcome_.failed.peak_N = std::max(outcome_.failed.peak_N, force_N());
+  }
+
   void advance(double to_s) {
     const double seconds = to_s - t_s_;
     if (seconds <= 0.0) {
@@ -132,12 +210,15 @@ private:
     // Before the lift, whenever it is.
     const double since_s = lift_s_ < NEVER_s ? since_lift_s(t_s_ + 0.5 * seconds) : -1.0;
     Drive drive = trial_.scene.drive(since_s);
-    drive.width_mm = gripper_.motion().width_mm();
+    disturb(drive, t_s_ + 0.5 * seconds);
     cell_.run(seconds, drive);
     t_s_ = to_s;
-    const double force_N = cell_.force_N();
-    outcome_.peak_N = std::max(outcome_.peak_N, force_N);
-    if (force_N > TOUCHED_N) {
+    if (!is_between_ && !is_taken_ && gripper_.motion().active() &&
+        gripper_.motion().width_mm() > trial_.scene.object.width_mm + FREE_mm) {
+      put_between();
+    }
+    outcome_.peak_N = std::max(outcome_.peak_N, force_N());
+    if (force_N() > TOUCHED_N) {
       touched_s_ = std::min(touched_s_, t_s_);
     }
     if (lift_s_ < NEVER_s) {
@@ -148,7 +229,15 @@ private:
     }
     const Vector way = cell_.way_mm();
     outcome_.dropped = std::hypot(way.x, way.y) >= DROP_mm ||
-                       (lift_s_ < NEVER_s && !drive.table && force_N < LOST_N);
+                       (lift_s_ < NEVER_s && !drive.table && force_N() < LOST_N);
+    if (trial_.fault) {
+      if (outcome_.dropped && is_between_) {
+        take_away();
+      }
+      over_ = faults_.has_begun(t_s_) ? t_s_ >= faults_.begins_s() + trial_.fault->watched_s
+                                      : t_s_ >= BEGINS_s;
+      return;
+    }
     const bool lifted = lift_s_ < NEVER_s && since_lift_s(t_s_) >= trial_.scene.ends_s;
     const bool stood = trial_.still_s > 0.0 && t_s_ - touched_s_ >= trial_.still_s;
     outcome_.never_held = lift_s_ == NEVER_s && trial_.still_s == 0.0 && t_s_ > PATIENCE_s;
@@ -158,6 +247,17 @@ private:
 
   void step_controller() {
     report_ = controller_.step(in_us(t_s_), command_);
+    stepped_s_ = t_s_;
+    faults_.look(t_s_, report_.state);
+    if (faults_.has_begun(t_s_)) {
+      outcome_.failed.trouble |= report_.trouble;
+      outcome_.failed.state = report_.state;
+      outcome_.failed.gripper_fault = report_.gripper_fault;
+    }
+    if (trial_.asked && !has_asked_ && t_s_ >= held_s_ + trial_.asked_after_s) {
+      has_asked_ = true;
+      controller_.ask(*trial_.asked);
+    }
     if (holds(report_)) {
       outcome_.trouble |= report_.trouble;
       if (held_s_ == NEVER_s) {
@@ -190,7 +290,19 @@ private:
   }
 
   void exchange() {
-    const GripperLine::Said said = gripper_.exchange(command_);
+    const Faults::Line line = faults_.line(t_s_);
+    const bool waits = t_s_ < answered_s_;
+    const bool commands = line.commands && !waits;
+    GripperLine::Said said = gripper_.exchange(commands ? command_ : gripper_.sent());
+    if (waits || !line.answers) {
+      return;
+    }
+    if (line.late_s > 0.0) {
+      answered_s_ = said.known_s + line.late_s;
+      said.known_s = answered_s_;
+      said.status.t_us += in_us(0.5 * line.late_s); /* the exchange's middle */
+    }
+    said.status.fault = faults_.is(Fault::Kind::fault, t_s_) ? 9 : said.status.fault;
     line_.push_back({said.known_s, STATUS, {}, said.status});
   }
 
@@ -258,8 +370,11 @@ private:
   Outcome outcome_;
   Slips slips_;
   SetPoint set_point_;
+  Faults faults_;
   std::vector<double> margins_;
-  bool over_ = false;
+  bool over_ = false, is_between_ = false, is_taken_ = false, has_asked_ = false;
+  double began_mm_ = 0.0, stepped_s_ = 0.0, answered_s_ = 0.0;
+  double slick_s_ = NEVER_s, slick_share_ = 1.0;
   double t_s_ = 0.0, sample_s_ = 0.0;
   double touched_s_ = NEVER_s, held_s_ = NEVER_s, lift_at_s_ = NEVER_s, lift_s_ = NEVER_s;
 };
@@ -279,6 +394,10 @@ void CoreController::take_touch(unsigned finger, const grip_touch &touch) {
 
 void CoreController::take_status(const grip_status &status) {
   grip_take_status(&core_, &status);
+}
+
+void CoreController::ask(enum grip_request request) {
+  grip_request(&core_, request);
 }
 
 grip_report CoreController::step(std::uint64_t now_us, grip_command &command) {

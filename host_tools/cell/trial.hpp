@@ -1,12 +1,14 @@
 // One grasp, closed loop, in simulated time: a scene's object in the cell, two fingertips that feel
 // it, a controller, and a gripper's mechanics between them.
 //
-// The controller steps after every frame and every status of the gripper (gripper_line.hpp).
+// The controller steps after every frame and every status of the gripper (gripper_line.hpp), and
+// every 10 ms.
 //
 // Deterministic: the same scene, seed and controller give the same bits. A grasp of 6 s takes some
 // 60 ms at 410 frames a second.
 #pragma once
 
+#include "cell/faults.hpp"
 #include "cell/felt_finger.hpp"
 #include "cell/gripper_line.hpp"
 #include "cell/scene.hpp"
@@ -24,6 +26,7 @@ public:
   virtual void take_touch(unsigned finger, const grip_touch &touch) = 0;
   virtual void take_status(const grip_status &status) = 0;
   virtual grip_report step(std::uint64_t now_us, grip_command &command) = 0;
+  virtual void ask(enum grip_request) {}
 };
 
 // firmware/grip, grasping from the first step on.
@@ -34,6 +37,7 @@ public:
   void take_touch(unsigned finger, const grip_touch &touch) override;
   void take_status(const grip_status &status) override;
   grip_report step(std::uint64_t now_us, grip_command &command) override;
+  void ask(enum grip_request request) override;
 
 private:
   grip core_{};
@@ -47,6 +51,17 @@ struct Trial {
   std::uint64_t seed = 0; // of noise and moments
   // Instead of a lift: the grip's force is held on the table for so long, and should be that.
   double still_s = 0.0, set_N = 0.0;
+  // The gripper is not active at first and open; what it is to grasp comes between its fingers only
+  // once it is active.
+  bool activates = false;
+  // So long after the first HOLDING.
+  std::optional<enum grip_request> asked;
+  double asked_after_s = 0.0;
+  // So long after the lift friction falls to what does not hold the object any more, by a tenth.
+  std::optional<double> slick_after_s;
+  // Ends when it has been watched. Where nothing is lifted by then, the hand lifts 0.8 s after it
+  // began; after 1.2 s as much again is poured in: whatever controls would then like more force.
+  std::optional<Fault> fault;
 };
 
 // Where all is known of a moment; for pictures and for tests.
@@ -64,6 +79,17 @@ struct Moment {
 
 constexpr double DROP_mm = 22.0, SETTLED_s = 0.5;
 
+// Since a fault began.
+struct Failed {
+  bool begun = false;
+  double opened_mm =
+      0.0; // the fingers wider than when it began, at most, with the object between them
+  double peak_N = 0.0;       // the largest true force of a fingertip
+  std::uint32_t trouble = 0; // all that was ever on
+  std::uint8_t state = 0;    // at the end
+  std::uint8_t gripper_fault = 0;
+};
+
 struct Outcome {
   bool held = false; // to the end
   // Why not: it slid DROP_mm or the grip lost it; the controller never came to hold.
@@ -78,6 +104,7 @@ struct Outcome {
   double rms = 0.0;               // of the error, share of the set force, from there on
   int reversals = 0;              // of the commanded width over the last half of the time
   std::uint32_t trouble = 0;      // all that was ever on while holding
+  Failed failed;
 };
 
 // face must be the scene's. trace: called every 2 ms.

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Worst-case use of the main stack of a linked RP2040 image.
 
-usage: stack_usage.py IMAGE.elf --su-dir FOLDER... [--indirect FILE] [--limit BYTES] [--json FILE]
+usage: stack_usage.py IMAGE.elf --su-dir FOLDER... [--indirect FILE] [--of FUNCTION...] [--limit BYTES] [--json FILE]
 
 Frames come from the compiler (GCC's -fstack-usage files below the folders, which hold nothing but
 what the image may be linked from); of functions that it did not compile, from the disassembly, as
@@ -12,7 +12,7 @@ recursion, and a frame of unknown size fail.
 
 All interrupts of an image have one priority, so at most one handler runs on top of the main program:
 worst case = start-up and main + exception frame + deepest handler. A fault can come on top, but it
-ends in a reset.
+ends in a reset. With --of: what each of these functions needs, from its call on, and no more.
 
 The exception frame has 32 bytes, and 4 more when the stack must be aligned (ARMv6-M B1.5.7).
 """
@@ -166,6 +166,27 @@ def worst(function, path=(), memory=None):
     return memory[function]
 
 
+def reachable(function, found):
+    if function not in found:
+        found.add(function)
+        for callee in function.callees:
+            reachable(callee, found)
+    return found
+
+
+def worst_of(names, functions, limit, indirect):
+    by_name = {name: f for f in functions.values() for name in f.names}
+    for name in names:
+        if name not in by_name:
+            fail(f"the image has no function {name}")
+        used = reachable(by_name[name], set())
+        resolve_indirect_calls({f.start: f for f in used}, indirect)
+        size, chain = worst(by_name[name])
+        print(f"{size:5}  {chain_text(chain)}")
+        if limit is not None and size > limit:
+            fail(f"{name} may need {size} bytes of stack, more than the {limit} allowed; see the chain above")
+
+
 def chain_text(chain):
     return " > ".join(f"{f.name} {f.frame}" for f in chain)
 
@@ -175,6 +196,7 @@ def main():
     parser.add_argument("elf")
     parser.add_argument("--su-dir", required=True, nargs="+", help="build folders with the .su files")
     parser.add_argument("--indirect", default=str(pathlib.Path(__file__).with_name("indirect_calls.txt")))
+    parser.add_argument("--of", nargs="+", metavar="FUNCTION", help="of these functions alone")
     parser.add_argument("--limit", type=int, help="fail above this many bytes")
     parser.add_argument("--json", help="write the result to this file")
     args = parser.parse_args()
@@ -183,6 +205,9 @@ def main():
     functions = read_functions(elf)
     disassemble(args.elf, functions)
     set_frames(functions, read_compiler_frames(args.su_dir))
+    if args.of:
+        worst_of(args.of, functions, args.limit, args.indirect)
+        return
     resolve_indirect_calls(functions, args.indirect)
 
     vectors = struct.unpack("<48I", elf.bytes_of(".vectors"))

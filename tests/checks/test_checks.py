@@ -117,6 +117,10 @@ class Checks(unittest.TestCase):
     def test_stack_limit(self):
         self.assert_fails("more than the 100 allowed", "stack_usage.py", "--su-dir", *SU_FOLDERS, "--limit", "100")
 
+    def test_stack_of_functions(self):
+        self.assert_fails("the image has no function fit_nothing", "stack_usage.py", "--su-dir", *SU_FOLDERS, "--of", "fit_nothing")
+        self.assert_fails("boot_main may need", "stack_usage.py", "--su-dir", *SU_FOLDERS, "--limit", "16", "--of", "boot_main")
+
     def test_frames_without_compiler_files(self):
         self.assert_fails("-fstack-usage", "stack_usage.py", "--su-dir", self.folder.name)
 

@@ -19,6 +19,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 
 import emulated_grasp  # noqa: E402
+import faults  # noqa: E402
 import grasp_report  # noqa: E402
 from fingertip_files import InputError, run_tool  # noqa: E402
 from goals import judge  # noqa: E402
@@ -31,7 +32,7 @@ LIMITS = {
     "drops_percent": (1, 0.5, 0.2), "margin_median": (2.6, 2.2, 1.8), "reaction_ms": (41, 25, 16), "disturbance_slip_p95_mm": (3, 3, 3),
     "settle_s": (1.2, 0.3, None), "hold_rms_percent": (5, 1.5, None), "drops_without_load_percent": (5, 2.2, 1), "drops_flats_percent": (5, 5, 5)}
 GOALS = tuple((f"{name}_{called}", "<=", limit) for name, limits in LIMITS.items() for called, limit in zip(GRIPPERS.values(), limits)
-              if limit is not None) + (("limit_cycles", "<=", 0), ("emulated_reaction_ms", "<=", 60))
+              if limit is not None) + (("limit_cycles", "<=", 0), ("emulated_reaction_ms", "<=", 60)) + faults.GOALS
 # set: what it is, its options, whether it is judged; all are of each gripper
 SETS = {
     "hold": ("round objects at 410 frames a second", (), True),
@@ -126,6 +127,8 @@ def measure(options):
                 number, begin_s = caught(each)
                 if "caught" not in found and number is not None:
                     found["caught"] = {"gripper": gripper, "begin_s": begin_s, **trials(options, gripper, ("--trace", number))}
+    found |= faults.measure(options.build, pathlib.Path(options.output) / "contact_tables")
+    steps.say(f"faults: {found['faults_grasps']} grasps")
     if not options.no_emulated:
         found |= emulated_grasp.measure(options.build, options.boards, pathlib.Path(options.output) / "contact_tables")
         steps.say("two emulated fingertips: one grasp")

@@ -2,6 +2,7 @@
 import bisect
 
 import emulated_grasp
+import faults
 from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save
 from fingertip_files import write_text
 from goals import goal_table_md
@@ -41,6 +42,7 @@ def write(found, path):
     for name, title in PARTS.items():
         if name in found:
             lines += [f"## {title}", "", "Round objects, 410 frames a second.", "", *rows_md(found[name], COLUMNS), ""]
+    lines += ["## Faults", "", *faults.text(found)]
     if "emulated_grasp" in found:
         lines += ["## With the release image", "", *emulated_grasp.text(found["emulated_grasp"])]
     write_text(path, "\n".join(lines))

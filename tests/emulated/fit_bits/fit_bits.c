@@ -2,8 +2,10 @@
 
 #include "common/crc32.h"
 #include "config/geometry.h"
+#include "draw.h"
 #include "fit/fit.h"
 #include "fit/fit_tangential.h"
+#include "grip_bits.h"
 
 #include <stdbool.h>
 #include <string.h>
@@ -15,22 +17,6 @@
 
 static struct fit_array layouts[LAYOUTS];
 static struct fit_pad pads[PADS];
-
-/* xorshift64* (Vigna, 2016) */
-static uint64_t state;
-
-static uint32_t draw(void) {
-  state ^= state >> 12;
-  state ^= state << 25;
-  state ^= state >> 27;
-  return (uint32_t)((state * UINT64_C(2685821657736338717)) >> 32);
-}
-
-/* low..high, both included. */
-static int32_t draw_between(int32_t low, int32_t high) {
-  uint64_t span = (uint64_t)((int64_t)high - low) + 1;
-  return (int32_t)(low + (int64_t)(span * draw() >> 32));
-}
 
 static void stop_unless(enum ft_status status) {
   while (status != FT_OK) {
@@ -66,7 +52,7 @@ void fit_bits_init(void) {
     y_mm[k] = 6.0625f * (float)(k / 5) - 9.0f;
   }
   stop_unless(fit_array_init(&layouts[2], 19, x_mm, y_mm, 7.0f));
-  state = 1;
+  draw_from(1);
   for (int k = 0; k < FT_MAX_SENSORS; k++) { /* anywhere, some of them twice */
     x_mm[k] = k % 8 == 7 ? x_mm[k - 1] : (float)draw_between(-320, 320) / 16.0f;
     y_mm[k] = k % 8 == 7 ? y_mm[k - 1] : (float)draw_between(-320, 320) / 16.0f;
@@ -124,9 +110,16 @@ static void pull(const struct fit_array *array, int32_t *pressure_Pa_q10) {
   }
 }
 
+uint32_t fit_bits_presses(enum fit_bits_kernel kernel) {
+  return kernel == FIT_BITS_GRIP ? 1000 : 10000;
+}
+
 uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
-  state = UINT64_C(0x9E3779B97F4A7C15) * (press + 1) ^ (uint64_t)kernel;
+  draw_from(UINT64_C(0x9E3779B97F4A7C15) * (press + 1) ^ (uint64_t)kernel);
   draw();
+  if (kernel == FIT_BITS_GRIP) {
+    return grip_bits_of(press);
+  }
   bool other = kernel == FIT_BITS_GENERAL && press % 2;
   const struct fit_array *array = &layouts[other ? draw_between(1, LAYOUTS - 1) : 0];
 

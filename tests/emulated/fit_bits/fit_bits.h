@@ -1,12 +1,10 @@
-/* Ten thousand presses whose fits are compared bit by bit between machines. They are drawn from
- * their number with integers alone, so that every machine fits the same readings.
+/* Presses whose fits are compared bit by bit between machines, and grasps (grip_bits.h). They are
+ * drawn from their number with integers alone, so that every machine has the same.
  */
 #ifndef FIT_BITS_FIT_BITS_H
 #define FIT_BITS_FIT_BITS_H
 
 #include <stdint.h>
-
-#define FIT_BITS_PRESSES 10000
 
 /* The order is that of KERNELS in test_fit_bits.py. */
 enum fit_bits_kernel {
@@ -15,11 +13,15 @@ enum fit_bits_kernel {
   FIT_BITS_GENERAL,    /* fit_general: the same and other layouts, any subset */
   FIT_BITS_TANGENTIAL, /* fit_tangential after fit_gaussian: pads of 5 to 20 mm, every sensor or not
                         */
+  FIT_BITS_GRIP,       /* firmware/grip: a press is a grasp */
   FIT_BITS_KERNELS
 };
 
 /* Once, before the others. */
 void fit_bits_init(void);
+
+/* So many of them. */
+uint32_t fit_bits_presses(enum fit_bits_kernel kernel);
 
 /* CRC-32 of every byte of the result. */
 uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press);

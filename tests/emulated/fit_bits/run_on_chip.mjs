@@ -1,14 +1,15 @@
 #!/usr/bin/env node
 /**
  * usage: run_on_chip.mjs IMAGE.bin KERNEL COUNT: prints the CRC of each of the first COUNT presses as the image
- * fit_bits_rp2040 computes it on the emulated chip.
+ * fit_bits_rp2040 computes it on the emulated chip; of grasps, after a colon each, the cycles of each step.
  */
 import { readFileSync } from 'node:fs';
 import { Chip, Stopped } from '../../../host_tools/emulator/chip/chip.mjs';
 import { SimulatedTime } from '../../../host_tools/emulator/clock.mjs';
 import { Report } from '../../../host_tools/emulator/report.mjs';
 
-const [NEXT_PRESS, A_MINUTE_ns] = [1, 60e9];
+const [NEXT_PRESS, START, STOP] = [1, 2, 3];
+const A_MINUTE_ns = 60e9;
 
 const [image, kernel, count] = process.argv.slice(2);
 const time = new SimulatedTime();
@@ -16,10 +17,14 @@ const report = new Report(() => time.nanos);
 const chip = new Chip(time, report, { serial: new Uint8Array(8) });
 chip.load(readFileSync(image));
 chip.boot();
+let started = 0;
+let cycles = [];
 const otherBreak = chip.onBreak;
 chip.onBreak = (code) => {
   if (code === NEXT_PRESS) throw new Stopped('next press');
-  otherBreak(code);
+  if (code === START) started = chip.core.cycles;
+  else if (code === STOP) cycles.push(chip.core.cycles - started);
+  else otherBreak(code);
 };
 
 function untilNextPress() {
@@ -37,6 +42,7 @@ const job = new DataView(chip.sram.buffer, chip.sram.byteOffset + chip.core.regi
 for (let press = 0; press < Number(count); press++) {
   job.setUint32(0, Number(kernel), true);
   job.setUint32(4, press, true);
+  cycles = [];
   untilNextPress();
-  process.stdout.write(`${job.getUint32(8, true).toString(16).padStart(8, '0')}\n`);
+  process.stdout.write(`${[job.getUint32(8, true).toString(16).padStart(8, '0'), ...cycles].join(':')}\n`);
 }

@@ -2,6 +2,7 @@
  * "Semihosting for AArch32 and AArch64"), for the kernels that the command line names by their
  * numbers. */
 #include "fit_bits.h"
+#include "grip_bits.h"
 
 #include <stdint.h>
 
@@ -25,6 +26,10 @@ static void print_hex(uint32_t value) {
   call_host(SYS_WRITE0, text);
 }
 
+void grip_bits_count(bool on) {
+  (void)on;
+}
+
 int main(void) {
   static char line[80];
   struct {
@@ -34,8 +39,9 @@ int main(void) {
   call_host(SYS_GET_CMDLINE, &command);
   fit_bits_init();
   for (const char *c = line; *c; c++) {
-    for (uint32_t press = 0; *c >= '0' && *c <= '9' && press < FIT_BITS_PRESSES; press++) {
-      print_hex(fit_bits_of((enum fit_bits_kernel)(*c - '0'), press));
+    enum fit_bits_kernel kernel = (enum fit_bits_kernel)(*c - '0');
+    for (uint32_t press = 0; *c >= '0' && *c <= '9' && press < fit_bits_presses(kernel); press++) {
+      print_hex(fit_bits_of(kernel, press));
     }
   }
   call_host(SYS_EXIT, (const void *)APPLICATION_EXIT);

@@ -1,4 +1,5 @@
-"""The fit computes the same bits on every machine: every byte of the result of 10 000 presses a kernel.
+"""The fit computes the same bits on every machine: every byte of the result of 10 000 presses a kernel. So does the
+controller of a grasp: every command and report of 1000 grasps (grip_bits.h).
 
 usage: test_fit_bits.py --host TOOL --m4f ELF --m0 ELF --rp2040 BIN --qemu QEMU --node NODE
 
@@ -6,17 +7,23 @@ Compared with the host build:
 - the Cortex-M4F build, hardware floating point, in QEMU (mps2-an386): all presses, all kernels;
 - the Cortex-M0+ objects of the firmware in the RP2040's emulator: all presses of the fixed-point kernels;
 - those of float32 take a million cycles a fit there. The emulator does the first 200, and QEMU's Cortex-M0 (microbit),
-  which has not the RP2040's divider but needs none for this kernel, does all with the same objects.
+  which has not the RP2040's divider but needs none for this kernel, does all with the same objects;
+- of grasps the emulator does a tenth, and counts the cycles of each step.
 """
 import argparse
+import functools
 import pathlib
+import statistics
 import subprocess
 import sys
 import unittest
 
-KERNELS = ["grid", "masked", "general", "tangential"]  # the order of enum fit_bits_kernel
-PRESSES = 10000
-PRESSES_IN_EMULATOR = {"grid": PRESSES, "masked": PRESSES, "general": 200, "tangential": PRESSES}
+KERNELS = ["grid", "masked", "general", "tangential", "grip"]  # the order of enum fit_bits_kernel
+PRESSES = {"grid": 10000, "masked": 10000, "general": 10000, "tangential": 10000, "grip": 1000}  # fit_bits_presses
+PRESSES_IN_EMULATOR = PRESSES | {"general": 200, "grip": 100}
+# Of grip_step, as grip.h says: the dearest of all grasps, the median of those that are plausible.
+GRIP_STEP_CYCLES_MAX, GRIP_STEP_CYCLES_USUAL = 24000, 8000
+GRIP_STEPS = 200
 FOLDER = pathlib.Path(__file__).resolve().parent
 TOOLS = argparse.Namespace()
 
@@ -28,8 +35,13 @@ def output_of(*command):
     return done.stdout.split()
 
 
-def on_host(kernel, count=PRESSES):
-    return output_of(TOOLS.host, KERNELS.index(kernel), count)
+def on_host(kernel, count=None):
+    return output_of(TOOLS.host, KERNELS.index(kernel), PRESSES[kernel] if count is None else count)
+
+
+@functools.cache
+def in_emulator(kernel):
+    return output_of(TOOLS.node, FOLDER / "run_on_chip.mjs", TOOLS.rp2040, KERNELS.index(kernel), PRESSES_IN_EMULATOR[kernel])
 
 
 def in_qemu(machine, image, kernel):
@@ -49,21 +61,32 @@ class SameBits(unittest.TestCase):
         for kernel in KERNELS:
             # Without a valid result every member is zero.
             least = 0.35 if kernel == "tangential" else 0.85
-            self.assertGreater(len(set(on_host(kernel))), least * PRESSES)
+            self.assertGreater(len(set(on_host(kernel))), least * PRESSES[kernel])
 
     def test_cortex_m4f(self):
         for kernel in KERNELS:
             with self.subTest(kernel):
-                self.compare(kernel, in_qemu("mps2-an386", TOOLS.m4f, kernel), PRESSES)
+                self.compare(kernel, in_qemu("mps2-an386", TOOLS.m4f, kernel), PRESSES[kernel])
 
     def test_cortex_m0(self):
-        self.compare("general", in_qemu("microbit", TOOLS.m0, "general"), PRESSES)
+        self.compare("general", in_qemu("microbit", TOOLS.m0, "general"), PRESSES["general"])
 
     def test_rp2040(self):
         for kernel, count in PRESSES_IN_EMULATOR.items():
             with self.subTest(kernel):
-                crcs = output_of(TOOLS.node, FOLDER / "run_on_chip.mjs", TOOLS.rp2040, KERNELS.index(kernel), count)
-                self.compare(kernel, crcs, count)
+                self.compare(kernel, [line.split(":")[0] for line in in_emulator(kernel)], count)
+
+
+class Cost(unittest.TestCase):
+    def test_cycles_of_grip_step(self):
+        grasps = [[int(cycles) for cycles in line.split(":")[1:]] for line in in_emulator("grip")]
+        self.assertEqual({len(grasp) for grasp in grasps}, {GRIP_STEPS})
+        usual = statistics.median(cycles for grasp in grasps[::2] for cycles in grasp)
+        most = max(cycles for grasp in grasps for cycles in grasp)
+        print(f"grip_step: {usual:.0f} cycles usually, {most} at most")
+        self.assertLessEqual(most, GRIP_STEP_CYCLES_MAX)
+        self.assertLessEqual(usual, GRIP_STEP_CYCLES_USUAL)
+        self.assertGreater(usual, 0.5 * GRIP_STEP_CYCLES_USUAL)  # they were spent on grasps
 
 
 if __name__ == "__main__":

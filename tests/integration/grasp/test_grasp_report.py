@@ -32,6 +32,14 @@ else:
 print(json.dumps(row))
 '''
 
+# A cup crushed, and once more where nobody could tell.
+FAULTS = '''
+import json
+row = {"fault": "one fingertip gone", "state": "holding", "gripper": "2f85", "object": "paper cup", "begun": True, "untold": False, "said": "finger_0_stale",
+       "ends": "holding", "opened_mm": 0.3, "peak_N": 3.0, "cap_N": 4.0, "most_N": 5.0, "dropped": False, "crushed": True, "opened": False, "beyond_cap": False, "unsaid": False}
+print(json.dumps({"rows": [row, {**row, "gripper": "sts3215", "peak_N": 3.5, "crushed": False}, {**row, "fault": "both frozen", "untold": True, "beyond_cap": True}]}))
+'''
+
 
 class Grasp(unittest.TestCase):
     def setUp(self):
@@ -40,9 +48,10 @@ class Grasp(unittest.TestCase):
         self.folder = pathlib.Path(temporary.name)
         self.out = self.folder / "out"
         self.program(TRIALS)
+        self.program(FAULTS, "faults")
 
-    def program(self, body):
-        path = self.folder / "host_tools/report/grasp/fingertip_grasp_trials"
+    def program(self, body, name="trials"):
+        path = self.folder / f"host_tools/report/grasp/fingertip_grasp_{name}"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f"#!{sys.executable}\n{body}\n")
         path.chmod(0o755)
@@ -67,6 +76,8 @@ class Grasp(unittest.TestCase):
         self.assertEqual((len(grasps), grasps["hold", "2f85"], grasps["hold_20", "ideal"]), (36, 150, 40))
         self.assertEqual(found["caught"]["n"], 7)
         self.assertIsNone(met["emulated_reaction_ms"])
+        self.assertEqual((found["cups_crushed"], met["cups_crushed"], met["faults_beyond_cap"]), (1, False, True))
+        self.assertEqual([(row["fault"], row["grasps"], row["peak_N"]) for row in found["faults"]], [("one fingertip gone", 2, 3.5), ("both frozen", 1, 3.0)])
         self.assertIsNone(found["distributions"][0]["reaction_ms"][-1])
         self.assertEqual((self.out / "grasp.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
         self.assertEqual(self.run_tool("--usual", "--check").returncode, 1)
@@ -74,7 +85,7 @@ class Grasp(unittest.TestCase):
     def test_what_is_written_to_read(self):
         self.run_tool("--grasps", "5")
         text = (self.out / "grasp.md").read_text()
-        for words in ("Simulated rubber", "Nothing was checked on hardware", "no load can be felt", "## By friction", "MISSED", "## Set forces"):
+        for words in ("Simulated rubber", "Nothing was checked on hardware", "no load can be felt", "## By friction", "MISSED", "## Set forces", "## Faults", "both frozen (not counted)"):
             self.assertIn(words, text)
 
     def test_refusals(self):
@@ -82,6 +93,8 @@ class Grasp(unittest.TestCase):
             done = self.run_tool(*options)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)
             self.assertIn(words, done.stderr)
+        self.program(FAULTS.replace("True", "False", 1), "faults")
+        self.assertIn("one fingertip gone never began in holding", self.run_tool("--grasps", "1").stderr)
         self.program("print('no')")
         self.assertIn("wrote no JSON", self.run_tool("--grasps", "1").stderr)
         self.program("import sys; sys.exit('the cell is on fire')")

@@ -6,8 +6,10 @@ extern "C" {
 #include "common/contact_flags.h"
 }
 
+#include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
+#include <iterator>
 #include <set>
 
 namespace {
@@ -210,6 +212,125 @@ TEST(Trial, AStillGraspTellsHowItSettles) {
   one.set_N = 8.0;
   ClosesTo wrong(width_mm(one, 5.1));
   EXPECT_FALSE(run_trial(one, face(), wrong).settle_s);
+}
+
+// As ClosesTo, but for what it does from a moment on.
+class ThenGoesTo : public ClosesTo {
+public:
+  ThenGoesTo(double width_mm, double then_mm) : ClosesTo(width_mm), then_mm_(then_mm) {}
+  void take_status(const grip_status &status) override {
+    ClosesTo::take_status(status);
+    statuses++;
+    fault = status.fault;
+    active = status.is_active;
+  }
+  grip_report step(std::uint64_t now_us, grip_command &command) override {
+    const grip_report report = ClosesTo::step(now_us, command);
+    command.width_um =
+        now_us > 2000000 ? static_cast<std::int32_t>(1e3 * then_mm_) : command.width_um;
+    return report;
+  }
+  int statuses = 0, fault = 0;
+  bool active = false;
+
+private:
+  double then_mm_;
+};
+
+// Begins at 1.6 s: a tenth of a second after HOLDING is said.
+Trial failing(Fault::Kind kind, bool left, bool right) {
+  Trial one = calm(0.1, 0.8);
+  Fault fault;
+  fault.kind = kind;
+  fault.fingers = {left, right};
+  fault.after_s = 0.1;
+  fault.watched_s = 1.0;
+  one.fault = fault;
+  return one;
+}
+
+TEST(TrialFault, TruthTellsWhatAGripDoes) {
+  const Trial one = failing(Fault::Kind::none, false, false);
+  const double at_mm = width_mm(one, 4.0);
+  ThenGoesTo stays(at_mm, at_mm), opens(at_mm, at_mm + 1.0), crushes(at_mm, width_mm(one, 8.0));
+  const Failed stayed = run_trial(one, face(), stays).failed;
+  EXPECT_TRUE(stayed.begun);
+  EXPECT_LT(stayed.opened_mm, 0.02);
+  EXPECT_NEAR(stayed.peak_N, 4.0, 0.1);
+  EXPECT_EQ(stayed.state, GRIP_HOLDING);
+  EXPECT_NEAR(run_trial(one, face(), opens).failed.opened_mm, 1.0, 0.02);
+  EXPECT_NEAR(run_trial(one, face(), crushes).failed.peak_N, 8.0, 0.2);
+}
+
+TEST(TrialFault, FingertipsFailFromThenOn) {
+  const auto play = [](Fault::Kind kind) {
+    const Trial one = failing(kind, true, false);
+    ClosesTo controller(width_mm(one, 4.0));
+    run_trial(one, face(), controller);
+    return controller.touches;
+  };
+  const auto after = [](const std::vector<grip_touch> &touches) {
+    std::vector<grip_touch> late;
+    std::copy_if(touches.begin(), touches.end(), std::back_inserter(late),
+                 [](const grip_touch &touch) { return touch.t_us > 1610000; });
+    return late;
+  };
+  const auto gone = play(Fault::Kind::gone), frozen = play(Fault::Kind::frozen);
+  const auto uncertain = play(Fault::Kind::uncertain), saturated = play(Fault::Kind::saturated);
+  EXPECT_TRUE(after(gone[0]).empty());
+  EXPECT_GT(gone[0].size(), 500U);
+  EXPECT_GT(after(gone[1]).size(), 300U);
+  EXPECT_GT(after(frozen[0]).size(), 300U);
+  for (const grip_touch &touch : after(frozen[0])) {
+    EXPECT_EQ(touch.force_mN, after(frozen[0]).front().force_mN);
+  }
+  for (const grip_touch &touch : after(uncertain[0])) {
+    EXPECT_NE(touch.flags & CONTACT_FLAG_UNCERTAIN, 0U);
+    EXPECT_NEAR(touch.force_mN, 2000, 300);
+  }
+  for (const grip_touch &touch : after(saturated[0])) {
+    EXPECT_NE(touch.flags & CONTACT_FLAG_SATURATED, 0U);
+    EXPECT_NEAR(touch.force_mN, 2000, 300);
+  }
+  EXPECT_EQ(after(saturated[1]).front().flags & CONTACT_FLAG_SATURATED, 0U);
+}
+
+TEST(TrialFault, TheLineFailsFromThenOn) {
+  const auto play = [](Fault::Kind kind) {
+    const Trial one = failing(kind, false, false);
+    const double at_mm = width_mm(one, 4.0);
+    ThenGoesTo controller(at_mm, at_mm - 1.0);
+    const bool moved = run_trial(one, face(), controller).failed.peak_N > 4.5;
+    return std::make_pair(controller, moved);
+  };
+  const auto [well, well_moved] = play(Fault::Kind::none);
+  const auto [silent, silent_moved] = play(Fault::Kind::silent);
+  const auto [unanswered, unanswered_moved] = play(Fault::Kind::unanswered);
+  const auto [late, late_moved] = play(Fault::Kind::late);
+  const auto [faulty, faulty_moved] = play(Fault::Kind::fault);
+  const auto [unpowered, unpowered_moved] = play(Fault::Kind::power);
+  EXPECT_TRUE(well_moved);
+  EXPECT_TRUE(unanswered_moved);
+  EXPECT_TRUE(late_moved);
+  EXPECT_FALSE(silent_moved);
+  EXPECT_FALSE(faulty_moved);
+  EXPECT_FALSE(unpowered_moved);
+  EXPECT_EQ(silent.statuses, unanswered.statuses);
+  EXPECT_LT(silent.statuses, late.statuses);
+  EXPECT_NEAR(late.statuses - silent.statuses, 1.0 / 0.031, 3.0); // one each 31 ms
+  EXPECT_GT(well.statuses, late.statuses + 900);
+  EXPECT_EQ(faulty.fault, 9);
+  EXPECT_EQ(well.fault, 0);
+  EXPECT_TRUE(well.active);
+  EXPECT_FALSE(unpowered.active);
+}
+
+TEST(TrialFault, AnObjectThatIsTakenIsFeltNoMore) {
+  const Trial one = failing(Fault::Kind::taken, false, false);
+  ClosesTo controller(width_mm(one, 4.0));
+  run_trial(one, face(), controller);
+  EXPECT_NE(controller.touches[0][500].flags & CONTACT_FLAG_CONTACT, 0U);
+  EXPECT_EQ(controller.touches[0].back().flags & CONTACT_FLAG_CONTACT, 0U);
 }
 
 TEST(Trial, RefusesSettingsThatTheCoreRefuses) {

@@ -1,0 +1,52 @@
+// Every fault in every state of a grasp, on every gripper and object: what came of it.
+#pragma once
+
+#include "cell/trial.hpp"
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace fingertip::grasp {
+
+// Opening by two counts of a 2F-85 (0.374 mm) is still holding: what is too much comes down.
+constexpr double OPENS_mm = 0.8;
+// Forces are measured within some 10 %, and what a gripper cannot do in finer steps it does in two
+// of its own: by so much a grip may be above its cap.
+constexpr double OVER_CAP = 1.1, OVER_CAP_STEPS = 2.0;
+
+struct FaultTrial {
+  std::string fault, state, gripper, object;
+  cell::Trial trial;
+  double cap_N;
+  // What must be said, of grip_trouble: each of these, one of those; and where it must end.
+  std::uint32_t all_of = 0, any_of = 0;
+  std::vector<std::uint8_t> ends_in; // empty: anywhere
+  std::uint8_t gripper_fault = 0;
+  double opens_mm;        // that it may open; infinity where it is asked to
+  bool is_untold = false; // the frames are those of fingertips that nothing touches
+};
+
+// Of fingertips whose readings froze before they touched (is_untold) nothing can be said.
+std::vector<FaultTrial> fault_trials();
+
+struct FaultOutcome {
+  cell::Outcome outcome;
+  double most_N; // that the cap allows
+  bool opened, beyond_cap, unsaid;
+};
+
+// For several threads at once. cache: folder of the contact tables.
+class FaultRunner {
+public:
+  explicit FaultRunner(const std::string &cache);
+  FaultOutcome run(const FaultTrial &trial) const;
+
+private:
+  double most_N(const FaultTrial &trial) const;
+
+  std::map<std::string, cell::Face> faces_;
+};
+
+} // namespace fingertip::grasp

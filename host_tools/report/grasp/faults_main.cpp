@@ -1,0 +1,116 @@
+// fingertip_grasp_faults: every fault in every state of a grasp in the simulated cell.
+//
+// One JSON object on the standard output: a row each of what was said, how far the fingers opened,
+// the largest true force, whether the object was crushed; and how many of them broke a rule.
+#include "grasp/fault_trials.hpp"
+#include "grasp/words.hpp"
+#include "reference/options.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <thread>
+
+namespace {
+
+using namespace fingertip;
+using namespace fingertip::grasp;
+using nlohmann::ordered_json;
+
+constexpr char HELP[] = "usage: fingertip_grasp_faults [options]\n"
+                        "  --jobs N          threads, 2\n"
+                        "  --fault NAME      this fault alone\n"
+                        "  --state NAME      in this state alone\n"
+                        "  --cache DIR       folder of the contact tables\n";
+
+ordered_json row_of(const FaultTrial &one, const FaultOutcome &done) {
+  const cell::Failed &failed = done.outcome.failed;
+  ordered_json row;
+  row["fault"] = one.fault;
+  row["state"] = one.state;
+  row["gripper"] = one.gripper;
+  row["object"] = one.object;
+  row["begun"] = failed.begun;
+  row["untold"] = one.is_untold;
+  row["said"] = trouble_names(failed.trouble);
+  row["ends"] = state_name(failed.state);
+  row["opened_mm"] = failed.opened_mm;
+  row["peak_N"] = done.outcome.peak_N;
+  row["cap_N"] = one.cap_N;
+  row["most_N"] = done.most_N;
+  row["dropped"] = done.outcome.dropped;
+  row["crushed"] = done.outcome.crushed;
+  row["opened"] = done.opened;
+  row["beyond_cap"] = done.beyond_cap;
+  row["unsaid"] = done.unsaid;
+  return row;
+}
+
+std::vector<FaultOutcome> run_all(const FaultRunner &runner, const std::vector<FaultTrial> &trials,
+                                  std::uint64_t jobs) {
+  std::vector<FaultOutcome> done(trials.size());
+  std::atomic<std::size_t> next{0};
+  std::mutex failing;
+  std::exception_ptr failure;
+  std::vector<std::thread> threads;
+  for (std::uint64_t job = 0; job < jobs; job++) {
+    threads.emplace_back([&] {
+      for (std::size_t i; (i = next++) < trials.size();) {
+        try {
+          done[i] = runner.run(trials[i]);
+        } catch (...) {
+          const std::lock_guard<std::mutex> lock(failing);
+          failure = std::current_exception();
+          next = trials.size();
+        }
+      }
+    });
+  }
+  for (std::thread &thread : threads) {
+    thread.join();
+  }
+  if (failure) {
+    std::rethrow_exception(failure);
+  }
+  return done;
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+  try {
+    std::string cache = FINGERTIP_TABLES_DIR, fault, state;
+    std::uint64_t jobs = 2;
+    reference::parse_options(
+        argc, argv,
+        {{"--cache", &cache}, {"--fault", &fault}, {"--state", &state}, {"--jobs", nullptr, &jobs}},
+        HELP);
+    if (jobs == 0 || jobs > 64) {
+      throw std::runtime_error("--jobs needs 1 to 64");
+    }
+    std::vector<FaultTrial> trials = fault_trials();
+    const auto is_other = [&](const FaultTrial &one) {
+      return (!fault.empty() && one.fault != fault) || (!state.empty() && one.state != state);
+    };
+    trials.erase(std::remove_if(trials.begin(), trials.end(), is_other), trials.end());
+    if (trials.empty()) {
+      throw std::runtime_error("there is no such fault in such a state");
+    }
+    const FaultRunner runner(cache);
+    const std::vector<FaultOutcome> done = run_all(runner, trials, jobs);
+    ordered_json out;
+    for (std::size_t i = 0; i < trials.size(); i++) {
+      out["rows"].push_back(row_of(trials[i], done[i]));
+    }
+    std::cout << out.dump(1) << '\n';
+    return std::cout.flush() ? 0 : 1;
+  } catch (const std::exception &error) {
+    std::fprintf(stderr, "fingertip_grasp_faults: %s\n", error.what());
+    return 1;
+  }
+}

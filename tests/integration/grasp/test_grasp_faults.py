@@ -1,0 +1,93 @@
+"""Every fault in every state of a grasp, in simulated time: the grip never opens by itself, never exceeds its cap, always says what happened, and no
+paper cup is crushed.
+
+usage: test_grasp_faults.py FINGERTIP_GRASP_FAULTS TABLES [unittest arguments]
+"""
+import json
+import pathlib
+import subprocess
+import sys
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "host_tools/report/grasp"), str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+import faults  # noqa: E402
+
+STATES = {"activate", "approach", "squeeze", "ready", "holding", "slipping", "still", "release"}
+LEAST_LIMIT_N = {"2f85": 20.0, "sts3215": 0.0}  # that can be set
+LIMIT = 1.25  # of the gripper's own force, over the cap
+
+
+def run(*options):
+    return subprocess.run([PROGRAM, "--cache", TABLES, *options], capture_output=True, text=True, check=False)
+
+
+def name(row):
+    return ", ".join(row[key] for key in ("fault", "state", "gripper", "object")) + f": {row['said'] or 'nothing'}; {row['ends']}"
+
+
+class Faults(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        done = run()
+        if done.returncode != 0:
+            raise AssertionError(done.stderr)
+        cls.rows = json.loads(done.stdout)["rows"]
+        cls.told = [row for row in cls.rows if not row["untold"]]
+
+    def assert_none(self, rows, why):
+        self.assertFalse(rows, "\n".join([why, *map(name, rows)]))
+
+    def test_every_fault_begins_in_every_state(self):
+        self.assertEqual({row["state"] for row in self.rows}, STATES)
+        kinds = {row["fault"] for row in self.rows}
+        self.assertGreaterEqual(len(kinds), 20)
+        each = {(row["fault"], row["state"], row["gripper"], row["object"]) for row in self.rows}
+        self.assertEqual(len(each), len(self.rows))
+        self.assertEqual(len(each), len(kinds) * len(STATES) * 2 * 3)
+        self.assert_none([row for row in self.rows if not row["begun"]], "never began")
+
+    def test_it_never_opens_by_itself(self):
+        self.assert_none([row for row in self.told if row["opened"]], "opened")
+        released = [row for row in self.rows if row["state"] == "release" and row["fault"] == "nothing"]
+        self.assertTrue(all(row["opened_mm"] > 0.8 for row in released), "where it is asked to it does")
+
+    def test_it_never_exceeds_its_cap(self):
+        self.assert_none([row for row in self.told if row["beyond_cap"]], "beyond the cap")
+        # Whatever holds would like more than the cap in the end, of the ball at least.
+        self.assertTrue(any("at_cap" in row["said"] for row in self.rows if row["fault"] == "nothing"))
+
+    def test_it_always_says_what_happened(self):
+        self.assert_none([row for row in self.told if row["unsaid"]], "unsaid")
+
+    def test_no_cup_is_crushed(self):
+        cups = [row for row in self.told if row["object"] == "paper cup"]
+        self.assertGreater(len(cups), len(self.told) / 4)
+        self.assert_none([row for row in cups if row["crushed"]], "crushed")
+
+    def test_nothing_goes_wrong_without_a_fault(self):
+        for row in self.rows:
+            if row["fault"] == "nothing" and row["state"] not in ("release", "slipping", "still"):  # where twice the mass may fall
+                self.assertIn(row["ends"], ("holding", "slipping"), name(row))
+
+    def test_what_nobody_can_tell_is_limited_by_the_gripper(self):
+        untold = [row for row in self.rows if row["untold"]]
+        self.assertEqual({(row["fault"], row["state"]) for row in untold}, {("both frozen", "activate"), ("both frozen", "approach")})
+        for row in untold:
+            self.assertLess(row["peak_N"], 1.001 * max(LIMIT * row["cap_N"], LEAST_LIMIT_N[row["gripper"]]), name(row))
+
+    def test_the_table_has_the_worst_of_each(self):
+        table = faults.table_of(self.rows)
+        self.assertEqual(sum(row["grasps"] for row in table), len(self.rows))
+        self.assertEqual(max(row["peak_N"] for row in table), max(row["peak_N"] for row in self.rows))
+        self.assertIn("both fingertips gone", "\n".join(faults.text({"faults": table})))
+
+    def test_wrong_usage_is_one_line(self):
+        for options in (("--state", "asleep"), ("--fault", "earthquake"), ("--jobs", "0"), ("--what", "1")):
+            done = run(*options)
+            self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (1, "", 1), options)
+
+
+if __name__ == "__main__":
+    PROGRAM, TABLES = sys.argv.pop(1), sys.argv.pop(1)
+    unittest.main()
