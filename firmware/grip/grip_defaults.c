@@ -24,11 +24,11 @@ void grip_default_settings(struct grip_settings *settings, const struct grip_tra
       .differ_permille = 300,
       .set_mN = 5000,
       .control_us = 10000,
-      .first_mN = 1500 + traits->step_um * 4 / 5, /* what a step may miss */
+      .first_mN = 1500 + traits->step_um * 8 / 5, /* what a step may miss */
       .blind_mN = 8000,
       .shift_um = 5500,
       .friction_permille = 550,
-      .margin_permille = 1220,
+      .margin_permille = 1280,
       .decay_permille_s = 3000,
       .rest_us = 300000,
   };

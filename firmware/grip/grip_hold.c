@@ -136,8 +136,8 @@ int32_t grip_hold_wants(struct grip *grip, const struct grip_view *view) {
     int32_t kept_mN = grip_scale(wanted_mN, GUESSED_PERMILLE, 1000);
     wanted_mN = kept_mN < grip->wanted_mN ? kept_mN : grip->wanted_mN;
   }
-  bool rests = view->has_load &&
-               !(hold->has_slid && grip->now_us - hold->slid_us < grip->settings.rest_us);
+  bool rests =
+      view->has_load && !(hold->has_slid && grip->now_us - hold->slid_us < grip->settings.rest_us);
   uint64_t step_us = grip->now_us - hold->decayed_us;
   if (wanted_mN >= grip->wanted_mN || !rests || step_us > 2 * DECAY_us) {
     hold->decayed_us = grip->now_us;

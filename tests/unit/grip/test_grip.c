@@ -149,8 +149,23 @@ static void never_loosens_while_no_load_is_told(void) {
   world_run(&world, 300);
   double before_mN = world.force_mN;
   world.drop_flags[0] = world.drop_flags[1] = CONTACT_FLAG_TANGENTIAL_VALID;
+  world.add_flags[0] = world.add_flags[1] = CONTACT_FLAG_FLAT;
   world_run(&world, 5000);
   assert_within(0.02, before_mN, world.force_mN);
+}
+
+static void a_guessed_load_keeps_more_than_it_needs(void) {
+  grasp();
+  pull(1000, 300);
+  world_run(&world, 3000);
+  double needed_mN = world.force_mN;
+  world.add_flags[0] = CONTACT_FLAG_SLIDING;
+  world_run(&world, 30);
+  world.add_flags[0] = 0;
+  world.drop_flags[0] = world.drop_flags[1] = CONTACT_FLAG_TANGENTIAL_VALID;
+  world_run(&world, 8000);
+  TEST_ASSERT_TRUE(world.force_mN > 1.1 * needed_mN);
+  TEST_ASSERT_TRUE(world.force_mN < 1.25 * needed_mN);
 }
 
 static void never_exceeds_the_cap(void) {
@@ -446,6 +461,7 @@ int main(void) {
   RUN_TEST(loosens_slowly);
   RUN_TEST(grips_for_the_blind_without_a_load_told);
   RUN_TEST(never_loosens_while_no_load_is_told);
+  RUN_TEST(a_guessed_load_keeps_more_than_it_needs);
   RUN_TEST(never_exceeds_the_cap);
   RUN_TEST(the_larger_force_counts_at_the_cap);
   RUN_TEST(never_travels_beyond_its_cap);
