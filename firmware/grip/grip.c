@@ -8,6 +8,8 @@
 #define READY_FRAMES 3u
 /* How fast the first force rises. */
 #define SQUEEZE_mN_s 8000
+/* An approach or a release that was kept waiting makes up for no more: a leap would be a blow. */
+#define RAMP_us 100000
 /* Squeezing to the first force takes no longer, or it is what it is. */
 #define SQUEEZE_us 3000000u
 /* How near to the first force is there. */
@@ -131,8 +133,13 @@ static void ramp(struct grip *grip, int32_t to_um, int32_t speed_um_s) {
   if (steps < 1) {
     return;
   }
+  int32_t most = port_divide(grip_scale(speed_um_s, RAMP_us, 1000000), grip->traits.step_um);
+  most = most < 1 ? 1 : most;
+  bool paused = steps > most;
+  steps = paused ? most : steps;
   int32_t off_um = to_um - grip->target_um, made_um = steps * grip->traits.step_um;
-  grip->ramped_us += (uint64_t)grip_scale(made_um, 1000000, speed_um_s);
+  grip->ramped_us =
+      paused ? grip->now_us : grip->ramped_us + (uint64_t)grip_scale(made_um, 1000000, speed_um_s);
   grip->target_um += grip_clamp(off_um, -made_um, made_um);
 }
 
