@@ -9,8 +9,10 @@
 #include "native/native_flash.h"
 #include "store/store.h"
 
-/* Its CRC is right. sensor_count: of the payload; its parts and the rest are the input's. */
-static inline void fuzz_put_record(struct fuzz_input *input, uint8_t sensor_count) {
+/* Its CRC is right. generation: of the first sector; that of the other is one more, as in any log.
+ * sensor_count: of the payload, whose parts and all the rest are the input's. */
+static inline void fuzz_put_record(struct fuzz_input *input, uint32_t generation,
+                                   uint8_t sensor_count) {
   const unsigned sector = fuzz_u8(input) % PORT_FLASH_SECTORS;
   const unsigned slot = fuzz_u8(input) % STORE_SLOTS;
   uint8_t *at = native_flash.bytes + sector * PORT_FLASH_SECTOR_BYTES + slot * STORE_SLOT_BYTES;
@@ -23,7 +25,7 @@ static inline void fuzz_put_record(struct fuzz_input *input, uint8_t sensor_coun
   bytes_put_u32(at + 4, UINT32_C(0x74665346));
   bytes_put_u16(at + 8, version);
   bytes_put_u16(at + 10, (uint16_t)length);
-  bytes_put_u32(at + 12, how & 8 ? fuzz_u32(input) : 1 + sector);
+  bytes_put_u32(at + 12, generation + sector);
   size_t given = length;
   const uint8_t *payload = fuzz_bytes(input, &given);
   memcpy(at + 20, payload, given);

@@ -214,7 +214,7 @@ void fuzz_one(const uint8_t *bytes, size_t length) {
       break;
     case STORED:
       native_flash_power_up();
-      fuzz_put_record(&input, geometry.sensor_count);
+      fuzz_put_record(&input, 1, geometry.sensor_count);
       power_up();
       break;
     default:

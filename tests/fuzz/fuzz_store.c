@@ -122,14 +122,16 @@ static void soil(struct fuzz_input *input) {
 
 void fuzz_one(const uint8_t *bytes, size_t length) {
   struct fuzz_input input = {bytes, bytes + length};
-  native_flash_reset(fuzz_u16(&input));
+  const uint16_t seed = fuzz_u16(&input);
+  const uint32_t generation = seed & 1 ? 1 : UINT32_MAX - 1;
+  native_flash_reset(seed);
   now_us = 0;
   start();
   bool ours = true;
   while (fuzz_left(&input) > 0) {
     switch (fuzz_u8(&input) % 8) {
     case 0:
-      fuzz_put_record(&input, SENSORS);
+      fuzz_put_record(&input, generation, SENSORS);
       ours = false;
       start();
       break;
