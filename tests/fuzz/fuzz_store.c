@@ -126,15 +126,15 @@ void fuzz_one(const uint8_t *bytes, size_t length) {
   const uint32_t generation = seed & 1 ? 1 : UINT32_MAX - 1;
   native_flash_reset(seed);
   now_us = 0;
-  start();
   bool ours = true;
+  for (uint8_t records = fuzz_u8(&input) % 8; records > 0; records--) {
+    fuzz_put_record(&input, generation, SENSORS);
+    ours = false;
+  }
+  start();
   while (fuzz_left(&input) > 0) {
     switch (fuzz_u8(&input) % 8) {
     case 0:
-      fuzz_put_record(&input, generation, SENSORS);
-      ours = false;
-      start();
-      break;
     case 1:
       soil(&input);
       ours = false;
