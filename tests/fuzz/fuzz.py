@@ -133,7 +133,9 @@ class Target:
 
     def tell_finding(self, findings, folder, said):
         findings.mkdir(parents=True, exist_ok=True)
-        print("\n".join(said.splitlines()[-60:]), file=sys.stderr)
+        lines = said.splitlines()
+        first = next((i for i, line in enumerate(lines) if any(word in line for word in (*SANITIZERS, "does not hold:", "ERROR: "))), len(lines) - 40)
+        print("\n".join(lines[max(0, first):first + 60]), file=sys.stderr)
         inputs = [path for path in folder.iterdir() if path.is_file() and re.match(r"(crash|leak|oom|timeout)-", path.name)]
         for path in inputs:
             data = path.read_bytes()

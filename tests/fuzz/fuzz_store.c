@@ -92,12 +92,12 @@ static void check_settles(void) {
  * a flash that only the store has written, there is the old or the new, and it stays. */
 static void change(struct fuzz_input *input, bool may_cut) {
   const struct store_content before = store.content;
-  const uint16_t cut_after = fuzz_u16(input);
+  const uint8_t cut_after = fuzz_u8(input);
   if (store_is_writing(&store)) {
     finish();
   }
-  if (may_cut && cut_after < 400) {
-    native_flash_cut_after(cut_after);
+  if (may_cut && cut_after & 0x80) {
+    native_flash_cut_after(cut_after & 0x3F); /* a change takes some thirty */
   }
   struct store_content after;
   const enum ft_status began = begin_change(input, &after);
