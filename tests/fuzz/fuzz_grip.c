@@ -171,7 +171,7 @@ static void step(uint32_t us) {
   FUZZ_CHECK(report.state != GRIP_OPEN || release_was_asked);
   FUZZ_CHECK(state_before != GRIP_FAULT || report.state == GRIP_FAULT);
   FUZZ_CHECK(state_before != GRIP_STILL || report.state == GRIP_STILL ||
-             report.state == GRIP_FAULT);
+             report.state == GRIP_DROPPED || report.state == GRIP_FAULT);
   if (command.motion == GRIP_ACTIVATE) {
     FUZZ_CHECK(report.state == GRIP_ACTIVATING);
   } else if (command.motion == GRIP_MOVE) {
