@@ -1,19 +1,23 @@
 #!/bin/sh
 # Sets up a Debian 12 or Ubuntu 24.04 machine and does one of the project's main jobs.
-# usage: sh cmake/bootstrap.sh demo|test|report
+# usage: sh cmake/bootstrap.sh demo|test|report|fuzz HOURS
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
 
 usage() {
-  echo "usage: sh cmake/bootstrap.sh demo|test|report" >&2
+  echo "usage: sh cmake/bootstrap.sh demo|test|report|fuzz HOURS" >&2
   echo "  demo    build everything, let a lime slip on two emulated fingertips, catch what slips in a simulated gripper, say and draw both" >&2
   echo "  test    build everything and run the whole test suite" >&2
   echo "  report  build everything, measure fit, rate, cost, truth, tangential load and grasps, repeat the published experiments in simulation, write build/report" >&2
+  echo "  fuzz    build the fuzz targets and run them for so many hours; what they find is kept in build/fuzz/findings" >&2
   exit 2
 }
-[ $# -eq 1 ] || usage
-case $1 in demo | test | report) ;; *) usage ;; esac
+case $# in
+  1) case $1 in demo | test | report) ;; *) usage ;; esac ;;
+  2) [ "$1" = fuzz ] || usage ;;
+  *) usage ;;
+esac
 
 say() { printf '%s\n' "== $*"; }
 
@@ -53,6 +57,10 @@ sigrok-cli sigrok-cli
 /usr/lib/python3/dist-packages/markdown/__init__.py python3-markdown
 /usr/lib/python3/dist-packages/pyte/__init__.py python3-pyte
 LIST
+  [ "$1" = demo ] || cat << 'LIST'
+clang-14 clang-14
+/usr/share/doc/libclang-rt-14-dev libclang-rt-14-dev
+LIST
 }
 
 is_there() {
@@ -62,7 +70,7 @@ is_there() {
   esac
 }
 
-missing=$(needed | while read -r probe package; do is_there "$probe" || echo "$package"; done)
+missing=$(needed "$1" | while read -r probe package; do is_there "$probe" || echo "$package"; done)
 if [ -n "$missing" ]; then
   say "missing packages:" $missing
   command -v apt-get > /dev/null 2>&1 || {
@@ -106,9 +114,21 @@ if [ "$1" = test ] && ! cmp -s tests/requirements.txt build/venv/.installed-requ
   cp tests/requirements.txt build/venv/.installed-requirements
 fi
 
-say "building firmware and host tools into build/"
 mkdir -p build
-cmake --preset host > build/configure.log 2>&1 || { cat build/configure.log >&2; exit 1; }
+configure() {
+  cmake --preset "$@" > build/configure.log 2>&1 || { cat build/configure.log >&2; exit 1; }
+}
+if [ "$1" = fuzz ]; then
+  say "building the fuzz targets into build/fuzz"
+  configure fuzz
+  cmake --build --preset fuzz
+  exec /usr/bin/python3 tests/fuzz/fuzz.py --build build/fuzz --hours "$2"
+fi
+say "building firmware and host tools into build/"
+case $1 in
+  demo) configure host ;;
+  *) configure host -DFINGERTIP_FUZZ=ON ;;
+esac
 cmake --build --preset host
 
 case $1 in
@@ -138,6 +158,8 @@ case $1 in
     /usr/bin/python3 host_tools/report/shear/shear.py --build build/host -o build/report --picture host_tools/report/shear/shear.png
     say "grasps in the simulated cell"
     /usr/bin/python3 host_tools/report/grasp/grasp.py --build build/host -o build/report --picture host_tools/report/grasp/grasp.png
+    say "what the fuzzers find"
+    /usr/bin/python3 host_tools/report/reliability/reliability.py --build build/host -o build/report
     say "every table and picture: $root/build/report/index.html"
     ;;
 esac

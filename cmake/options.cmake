@@ -87,3 +87,6 @@ set(FINGERTIP_USB_VID 0x1209 CACHE STRING "USB vendor id")
 set(FINGERTIP_USB_PID 0x0001 CACHE STRING "USB product id")
 
 option(FINGERTIP_SANITIZE "Build for the host with the address and undefined-behaviour sanitizers" OFF)
+
+option(FINGERTIP_FUZZ "Build the fuzz targets by clang into build/fuzz, and run them as tests" OFF)
+option(FINGERTIP_LIBFUZZER "Build for libFuzzer: clang only, cmake --preset fuzz" OFF)

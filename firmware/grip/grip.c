@@ -8,6 +8,8 @@
 #define READY_FRAMES 3u
 /* How fast the first force rises. */
 #define SQUEEZE_mN_s 8000
+/* An approach or a release that was kept waiting makes up for no more: a leap would be a blow. */
+#define RAMP_us 100000
 /* Squeezing to the first force takes no longer, or it is what it is. */
 #define SQUEEZE_us 3000000u
 /* How near to the first force is there. */
@@ -114,19 +116,30 @@ static uint32_t gripper_trouble(const struct grip *grip) {
   return trouble;
 }
 
+/* The core may not have been called for an hour. */
+static int32_t passed_us(const struct grip *grip, uint64_t since_us) {
+  uint64_t passed_us = grip->now_us - since_us;
+  return passed_us > INT32_MAX ? INT32_MAX : (int32_t)passed_us;
+}
+
 /* A step of the width at this speed since the last. */
 static void ramp(struct grip *grip, int32_t to_um, int32_t speed_um_s) {
   if (grip->is_entered) {
     grip->target_um = grip->status.width_um;
     grip->ramped_us = grip->now_us;
   }
-  int32_t way_um = grip_scale(speed_um_s, (int32_t)(grip->now_us - grip->ramped_us), 1000000);
+  int32_t way_um = grip_scale(speed_um_s, passed_us(grip, grip->ramped_us), 1000000);
   int32_t steps = port_divide(way_um, grip->traits.step_um);
   if (steps < 1) {
     return;
   }
+  int32_t most = port_divide(grip_scale(speed_um_s, RAMP_us, 1000000), grip->traits.step_um);
+  most = most < 1 ? 1 : most;
+  bool paused = steps > most;
+  steps = paused ? most : steps;
   int32_t off_um = to_um - grip->target_um, made_um = steps * grip->traits.step_um;
-  grip->ramped_us += (uint64_t)grip_scale(made_um, 1000000, speed_um_s);
+  grip->ramped_us =
+      paused ? grip->now_us : grip->ramped_us + (uint64_t)grip_scale(made_um, 1000000, speed_um_s);
   grip->target_um += grip_clamp(off_um, -made_um, made_um);
 }
 
@@ -159,8 +172,8 @@ static uint32_t squeeze(struct grip *grip, const struct grip_view *view) {
   const struct grip_settings *settings = &grip->settings;
   bool fixed = settings->mode == GRIP_MODE_FIXED;
   int32_t aimed_mN = fixed ? settings->set_mN : settings->first_mN;
-  int32_t since_us = (int32_t)(grip->now_us - grip->since_us);
-  int32_t risen_mN = settings->touch_mN + grip_scale(since_us, SQUEEZE_mN_s, 1000000);
+  int32_t risen_mN =
+      settings->touch_mN + grip_scale(passed_us(grip, grip->since_us), SQUEEZE_mN_s, 1000000);
   uint32_t trouble = fixed ? grip_fixed_step(grip, view)
                            : grip_aim(grip, view, risen_mN < aimed_mN ? risen_mN : aimed_mN);
   bool there = view->low_mN >= grip_scale(aimed_mN, SQUEEZED_PERMILLE, 1000);

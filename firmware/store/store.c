@@ -240,6 +240,16 @@ static bool load_record(struct store *store, unsigned sector, unsigned slot) {
   return bytes_get_u32(record + CRC_AT) == record_crc(store);
 }
 
+/* Generations go round, past 0, which is none: no flash lives that long, but what else has written
+ * to it may have left any. */
+static bool is_older(uint32_t generation, uint32_t than) {
+  return than != 0 && (generation == 0 || generation - than > UINT32_MAX / 2);
+}
+
+static uint32_t next_generation(uint32_t generation) {
+  return generation == UINT32_MAX ? 1 : generation + 1;
+}
+
 /* What start-up finds in one sector. */
 struct sector {
   uint32_t generation; /* 0: no good record */
@@ -265,7 +275,7 @@ static struct sector read_sector(struct store *store, unsigned number) {
     sector.lost = !good && (sector.lost || was_record);
     if (good) {
       sector.generation = bytes_get_u32(store->record + GENERATION_AT);
-      if (sector.generation >= store->generation) { /* now: it need not read the same again */
+      if (!is_older(sector.generation, store->generation)) { /* now: it need not read so again */
         store->generation = sector.generation;
         store->damaged = !take_record(store);
       }
@@ -281,7 +291,7 @@ void store_init(struct store *store, uint8_t sensor_count) {
   memset(store, 0, sizeof *store);
   store->sensor_count = sensor_count;
   const struct sector sectors[PORT_FLASH_SECTORS] = {read_sector(store, 0), read_sector(store, 1)};
-  store->sector = sectors[1].generation > sectors[0].generation;
+  store->sector = is_older(sectors[0].generation, sectors[1].generation);
   const struct sector *current = &sectors[store->sector];
   const struct sector *other = &sectors[!store->sector];
   store->next_slot = current->used;
@@ -290,8 +300,8 @@ void store_init(struct store *store, uint8_t sensor_count) {
   if (current->generation == 0) {
     /* The first record of all was cut short, and perhaps what was to settle that. */
     store->damaged = current->lost || other->lost;
-    store->must_settle = !store->damaged && current->used > 0 && current->used < STORE_SLOTS &&
-                         other->used == 0;
+    store->must_settle =
+        !store->damaged && current->used > 0 && current->used < STORE_SLOTS && other->used == 0;
     return;
   }
   if (current->lost) {
@@ -348,12 +358,12 @@ static void begin_write(struct store *store, uint64_t now_us) {
     begin_step(store, STORE_SECURE, now_us);
     store->to_sector = !store->sector;
     store->to_slot = 0;
-    store->to_generation++;
+    store->to_generation = next_generation(store->generation);
     store->other_is_quiet = false;
   } else { /* all of this sector was cut short: what surely stays, if anything, is in the other */
     store->next_slot = STORE_SLOTS;
     store->to_slot = 0;
-    store->to_generation = store->generation != 0 ? store->generation : 1;
+    store->to_generation = store->generation != 0 ? store->generation : next_generation(0);
     begin_erase(store, now_us);
   }
   address_record(store);

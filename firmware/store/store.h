@@ -10,7 +10,8 @@
  *     4    u32  magic 0x74665346
  *     8    u16  version 2; 1 is read too
  *     10   u16  length of the payload
- *     12   u32  generation: one more than that of the other sector when this one was erased
+ *     12   u32  generation: one more than that of the other sector when this one was erased; after
+ *               2^32 - 1 comes 1
  *     16   u32  CRC-32/ISO-HDLC of bytes 4 to 15 and the payload
  *     20        payload, below
  *     504  u32  sealed: 0. The record was read back and is right

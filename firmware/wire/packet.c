@@ -38,7 +38,8 @@ struct wire_layout {
 #define LAYOUT(name, type)                                                                         \
   const struct wire_layout name##_layout = {type, sizeof name##_runs / sizeof name##_runs[0],      \
                                             name##_runs}
-#define EMPTY_LAYOUT(name, type) const struct wire_layout name##_layout = {type, 0, NULL}
+static const struct run no_runs[1]; /* NULL has no end to go to */
+#define EMPTY_LAYOUT(name, type) const struct wire_layout name##_layout = {type, 0, no_runs}
 _Static_assert(sizeof(struct sensor_calibration) == 2 * sizeof(float), "F32_TWOS");
 _Static_assert(offsetof(struct wire_packet, body.raw.baseline_Pa_q10) ==
                        offsetof(struct wire_packet, body.raw.pressure_Pa_q10) +

@@ -56,7 +56,9 @@ void Session::take(const wire_packet &packet) {
     std::int64_t now_us = steady_now_us();
     auto sent_us = static_cast<std::int64_t>(ack.host_time_us);
     if (sent_us > 0 && sent_us <= now_us) {
-      ClockRelation relation = {static_cast<std::int64_t>(packet.t_us) - (sent_us + now_us) / 2,
+      /* Without a sign until it is known: any time of a device is possible. */
+      auto middle_us = static_cast<std::uint64_t>((sent_us + now_us) / 2);
+      ClockRelation relation = {static_cast<std::int64_t>(packet.t_us - middle_us),
                                 (now_us - sent_us + 1) / 2};
       if (!clock_ || relation.uncertainty_us < clock_->uncertainty_us) {
         clock_ = relation;

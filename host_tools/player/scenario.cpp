@@ -16,6 +16,7 @@ namespace fingertip {
 namespace {
 
 constexpr double PRESSURE_LIMIT_Pa = 1e7;
+constexpr double TEMPERATURE_LIMIT_degC = 1e3;
 constexpr const char *TRUTH[] = {"contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip"};
 constexpr std::size_t TRUTHS = std::size(TRUTH);
 /* After the sensors, in any order. */
@@ -82,21 +83,22 @@ Scenario::Scenario(const std::string &path) {
       for (std::string cell; std::getline(cells, cell, ',');) {
         header.push_back(trimmed(cell));
       }
-      const auto given = [&](const char *key, double usual) {
+      const auto given = [&](const char *key, double usual, double limit, const char *most) {
         const auto found = metadata.find(key);
         const double value = found == metadata.end() ? usual : number(found->second);
-        if (!std::isfinite(value)) {
-          fail(std::string("metadata \"") + key + "\" is \"" + found->second + "\"; give a number");
+        if (!(std::abs(value) <= limit)) {
+          fail(std::string("metadata \"") + key + "\" is \"" + found->second + "\"; give " + most);
         }
         return value;
       };
-      const double sensors = given("sensors", 15);
+      const double sensors = given("sensors", 15, 32, "a whole number from 1 to 32");
       if (sensors < 1 || sensors > 32 || sensors != std::floor(sensors)) {
         fail("metadata \"sensors\" must be a whole number from 1 to 32");
       }
       sensors_ = static_cast<unsigned>(sensors);
-      ambient_Pa_ = given("ambient_Pa", ambient_Pa_);
-      temperature_degC = given("temperature_degC", temperature_degC);
+      ambient_Pa_ = given("ambient_Pa", ambient_Pa_, PRESSURE_LIMIT_Pa, "at most 1e7 Pa");
+      temperature_degC =
+          given("temperature_degC", temperature_degC, TEMPERATURE_LIMIT_degC, "at most 1000 degC");
       name_ = metadata["name"];
       std::vector<std::string> expected{"t_s"};
       expected.insert(expected.end(), std::begin(TRUTH), std::end(TRUTH));
@@ -153,8 +155,13 @@ Scenario::Scenario(const std::string &path) {
       }
       pressures_Pa_.push_back(static_cast<float>(pressure));
     }
-    temperatures_degC_.push_back(
-        static_cast<float>(temperature_at ? values[*temperature_at] : temperature_degC));
+    if (temperature_at) {
+      temperature_degC = values[*temperature_at];
+      if (std::abs(temperature_degC) > TEMPERATURE_LIMIT_degC) {
+        fail("column \"temperature_degC\": give at most 1000 degC");
+      }
+    }
+    temperatures_degC_.push_back(static_cast<float>(temperature_degC));
   }
   if (times_s_.empty()) {
     fail("no rows; add at least one");

@@ -243,6 +243,33 @@ static void stays_without_fingertips(void) {
   TEST_ASSERT_LESS_THAN(before_um, world.sent_um);
 }
 
+/* Nobody calls the controller, and nothing is heard, for so long. */
+static void pass_us(uint64_t us) {
+  world.t_us += us;
+  world.frames = (uint32_t)(world.t_us / world.frame_us);
+}
+
+static void pauses_are_not_made_up_for(void) {
+  static const uint64_t pauses_us[] = {3000000, 2500000000, 5000000000};
+  for (size_t i = 0; i < sizeof pauses_us / sizeof pauses_us[0]; i++) {
+    setUp();
+    grip_request(&world.grip, GRIP_REQUEST_GRASP);
+    world_run_to(&world, GRIP_APPROACH, 1000);
+    world_run(&world, 500);
+    double before_um = world.sent_um;
+    pass_us(pauses_us[i]);
+    world_run(&world, 100);
+    TEST_ASSERT_EQUAL(GRIP_APPROACH, world.report.state);
+    TEST_ASSERT_DOUBLE_WITHIN(20.0, 1600.0, before_um - world.sent_um);
+    world_run_to(&world, GRIP_SQUEEZE, 3000);
+    pass_us(pauses_us[i]);
+    world_run(&world, 1);
+    TEST_ASSERT_GREATER_OR_EQUAL(settings.touch_mN, world.report.wanted_mN);
+    world_run_to(&world, GRIP_HOLDING, 3000);
+    assert_within(0.05, settings.first_mN, world.force_mN);
+  }
+}
+
 static void does_not_believe_a_frozen_fingertip(void) {
   grasp();
   world.is_frozen[0] = world.is_frozen[1] = true;
@@ -468,6 +495,7 @@ int main(void) {
   RUN_TEST(never_tightens_a_saturated_fingertip);
   RUN_TEST(goes_on_with_one_fingertip);
   RUN_TEST(stays_without_fingertips);
+  RUN_TEST(pauses_are_not_made_up_for);
   RUN_TEST(does_not_believe_a_frozen_fingertip);
   RUN_TEST(keeps_still_while_the_gripper_is_silent);
   RUN_TEST(a_gripper_fault_ends_it);

@@ -155,6 +155,23 @@ TEST(Session, RelatesTheClocks) {
             session.clock()->uncertainty_us + 1);
 }
 
+/* What the sanitizers have to say of it: the difference of such times has no room for a sign. */
+TEST(Session, RelatesWhateverTimeADeviceTells) {
+  for (const std::uint64_t device_us : {std::uint64_t{1} << 63, std::uint64_t{UINT64_MAX}}) {
+    FakeTransport line;
+    line.on_command = [&](const wire_packet &command) {
+      line.say(test::make_ack(1, device_us, command.type, WIRE_RESULT_DONE, command.sequence,
+                              command.t_us));
+    };
+    Session session(line);
+    session.command(command_tare(), QUICK);
+    ASSERT_TRUE(session.clock());
+    const auto told_us = static_cast<std::uint64_t>(session.clock()->device_minus_host_us) +
+                         static_cast<std::uint64_t>(steady_now_us());
+    EXPECT_LT(told_us - device_us, 10'000'000u);
+  }
+}
+
 TEST(Session, AVanishedPortAndAStopEndTheWait) {
   FakeTransport line;
   line.gone = true;

@@ -353,6 +353,30 @@ static void what_another_firmware_wrote_is_left_alone(void) {
   }
 }
 
+/* Of the newest record, whoever wrote it. */
+static void generations_go_round(void) {
+  for (uint32_t generation = UINT32_MAX - 2; generation != 3; generation++) {
+    native_flash_reset(7);
+    restart();
+    struct store_content kept = keep_something();
+    alter_record(12, (uint16_t)generation);
+    alter_record(14, (uint16_t)(generation >> 16));
+    memset(native_flash.bytes + STORE_SLOT_BYTES, 0xFF, NATIVE_FLASH_BYTES - STORE_SLOT_BYTES);
+    for (int i = 0; i < 3 * STORE_SLOTS; i++) {
+      restart();
+      finish();
+      kept.has_settings = true;
+      kept.settings = some_settings();
+      TEST_ASSERT_EQUAL(FT_PENDING, store_put_settings(&store, &kept.settings));
+      TEST_ASSERT_EQUAL(FT_OK, finish());
+      restart();
+      TEST_ASSERT_FALSE(store.damaged || store_is_writing(&store));
+      TEST_ASSERT_TRUE(store.content.has_settings);
+      TEST_ASSERT_EQUAL_MEMORY(&kept.settings, &store.content.settings, sizeof kept.settings);
+    }
+  }
+}
+
 /* As the firmware before pad profiles wrote it: without their bytes, whatever bit 2 of the parts
  * said. The next write brings it to this version. */
 static void records_of_version_1_are_read(void) {
@@ -459,6 +483,7 @@ int main(void) {
   RUN_TEST(damage_is_told_and_nothing_is_used);
   RUN_TEST(forgetting_mends_damage);
   RUN_TEST(what_another_firmware_wrote_is_left_alone);
+  RUN_TEST(generations_go_round);
   RUN_TEST(records_of_version_1_are_read);
   RUN_TEST(rubbish_is_no_damage_and_in_nobodys_way);
   RUN_TEST(a_flash_that_has_worn_out_is_told_and_what_was_stays);

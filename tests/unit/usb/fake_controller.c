@@ -26,6 +26,7 @@ static struct {
   bool interrupts_held;
   bool service_requested;
   bool take_at_next_withdrawal;
+  bool host_follows;
 } fake;
 
 static struct endpoint *find(uint8_t endpoint) {
@@ -202,6 +203,7 @@ static int exchange(struct endpoint *e) {
     return HOST_STALL;
   if (!e->held)
     return HOST_NAK;
+  e->host_data1 = fake.host_follows ? e->data1 : e->host_data1;
   TEST_ASSERT_EQUAL_MESSAGE(e->host_data1, e->data1, "wrong data PID");
   e->held = false;
   e->data1 = !e->data1;
@@ -300,4 +302,8 @@ void host_reset_toggles(void) {
 
 void host_reset_toggle(uint8_t endpoint) {
   find(endpoint)->host_data1 = false;
+}
+
+void host_follow_toggles(void) {
+  fake.host_follows = true;
 }

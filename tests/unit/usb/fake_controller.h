@@ -50,4 +50,7 @@ void host_address(uint8_t address);
 void host_reset_toggles(void);
 void host_reset_toggle(uint8_t endpoint);
 
+/* Whatever it does, the host has the device's toggles from now on: for hosts that keep no rule. */
+void host_follow_toggles(void);
+
 #endif

@@ -1,0 +1,114 @@
+"""fuzz.py with stand-ins for the targets: what it feeds, keeps and says."""
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path[:0] = [str(HERE), str(ROOT / "host_tools/report/reliability"), str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+import fuzz  # noqa: E402
+import fuzzing  # noqa: E402
+
+PROGRAM = """#!/usr/bin/python3
+import os, pathlib, struct, sys
+options = dict(word.split("=", 1) for word in sys.argv[1:] if "=" in word)
+folders = [pathlib.Path(word) for word in sys.argv[1:] if "=" not in word]
+seeds = [path.read_bytes() for path in folders[1].iterdir()]
+pathlib.Path(os.environ["FINGERTIP_FUZZ_COUNT"]).write_bytes(struct.pack("<QQ", 7, sum(map(len, seeds))))
+print("#7 DONE cov: 42 ft: 1", file=sys.stderr)
+"""
+CRASHES = """
+pathlib.Path(options["-artifact_prefix"] + "crash-1234").write_bytes(b"wrong")
+print("%s", file=sys.stderr)
+sys.exit(77)
+"""
+
+
+class FuzzTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.build = pathlib.Path(folder.name)
+        (self.build / "tests/fuzz").mkdir(parents=True)
+
+    def target(self, name, more="", options="max_len = 100"):
+        program = self.build / f"tests/fuzz/fuzz_{name}"
+        program.write_text(PROGRAM + more)
+        program.chmod(0o755)
+        program.with_name(program.name + ".options").write_text(f"[libfuzzer]\n{options}\n")
+
+    def fuzz(self, *options):
+        return subprocess.run([sys.executable, HERE / "fuzz.py", "--build", self.build, "--json", self.build / "found.json", *options],
+                              capture_output=True, text=True, timeout=60)
+
+    def found(self):
+        return json.loads((self.build / "found.json").read_text())
+
+    def test_all_targets_run_and_are_added_up(self):
+        self.target("usb")
+        self.target("wire")
+        done = self.fuzz("--runs", "7")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        found = self.found()
+        self.assertEqual([row["target"] for row in found["fuzz_targets"]], ["usb", "wire"])
+        self.assertEqual([row["edges"] for row in found["fuzz_targets"]], [42, 42])
+        self.assertEqual(found["fuzz_bytes"], sum(row["bytes"] for row in found["fuzz_targets"]))
+        vectors = list(fuzz.vectors())
+        self.assertGreaterEqual(len(vectors), 20)
+        self.assertGreater(found["fuzz_targets"][1]["bytes"], sum(len(frame) for _, frame in vectors))
+        self.assertFalse((self.build / "findings").exists())
+
+    def test_a_finding_is_kept_told_and_fails(self):
+        for kind, words in (("crashes", "SUMMARY: libFuzzer: deadly signal"), ("sanitizer_findings", "a.c:1: runtime error: overflow"),
+                            ("sanitizer_findings", "ERROR: AddressSanitizer: heap-use-after-free")):
+            with self.subTest(words):
+                self.target("usb", CRASHES % words)
+                self.target("wire")
+                done = self.fuzz("--seconds", "2")
+                self.assertEqual(done.returncode, 1)
+                found = self.found()
+                self.assertEqual({name: found[name] for name in ("crashes", "sanitizer_findings")}, {"crashes": 0, "sanitizer_findings": 0, kind: 1})
+                kept, = (self.build / "findings").iterdir()
+                self.assertEqual(kept.read_bytes(), b"wrong")
+                self.assertIn(words, done.stderr)
+                self.assertIn(f"to do it again: {self.build / 'tests/fuzz/fuzz_usb'} {kept}", done.stderr)
+                self.assertIn("wire", done.stdout)
+                kept.unlink()
+
+    def test_hours_keep_what_is_new(self):
+        self.target("usb", '(folders[0] / "new").write_bytes(b"x")')
+        self.assertEqual(self.fuzz("--hours", "0.0005").returncode, 0)
+        self.assertEqual((self.build / "corpus/usb/new").read_bytes(), b"x")
+
+    def test_an_interrupted_target_is_no_finding(self):
+        self.target("usb", f"sys.exit({fuzz.INTERRUPTED})")
+        self.assertEqual(self.fuzz("--runs", "1").returncode, 0)
+
+    def test_what_is_missing_is_one_line(self):
+        done = self.fuzz("--runs", "1")
+        self.assertEqual((done.returncode, done.stderr), (1, f"fuzz.py: {self.build}/tests/fuzz: is not there; build it: cmake --preset fuzz && "
+                                                             "cmake --build --preset fuzz\n"))
+        self.target("usb")
+        done = self.fuzz("--runs", "1", "toaster")
+        self.assertEqual((done.returncode, done.stderr), (1, "fuzz.py: no target toaster; there are: usb\n"))
+
+    def test_long_inputs_are_of_the_target(self):
+        recording = (HERE / "corpus/recording/one").read_bytes()
+        long = fuzz.bulk_seed("recording", [recording], 100000)
+        self.assertTrue(long.startswith(recording.split(b"# packet")[0]))
+        self.assertGreater(len(long), 50000)
+        times = [line.split(b",")[0] for line in fuzz.bulk_seed("scenario", [(HERE / "corpus/scenario/two").read_bytes()], 5000).splitlines()
+                 if line[:1].isdigit()]
+        self.assertEqual(sorted(times, key=float), times)
+        self.assertEqual(fuzz.bulk_seed("uf2", [b"ab", b"c"], 8), b"abcabcab")
+
+    def test_the_report_shows_each_target(self):
+        lines = fuzzing.text({"fuzz_targets": [{"target": "usb", "edges": 42}, {"target": "wire", "edges": 43}]})
+        self.assertIn("| usb | 42 |", lines)
+
+
+if __name__ == "__main__":
+    unittest.main()
