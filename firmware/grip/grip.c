@@ -157,6 +157,7 @@ static void approach(struct grip *grip, const struct grip_view *view) {
   }
   if (touches || pushes_hard) {
     grip->touch_width_um = grip_width_at(grip, view->t_us);
+    grip->aimed_us = grip->now_us; /* the approach is still under way */
     enter(grip, GRIP_SQUEEZE);
     return;
   }

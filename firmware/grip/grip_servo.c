@@ -5,6 +5,7 @@
  * 1 to 10 N (host_tools/twin). */
 #define EXPONENT_PERMILLE 1600
 #define INDENTATION_MIN_um 300
+#define FORCE_MIN_mN 50
 #define STIFFNESS_MIN_mN_mm 200
 #define STIFFNESS_MAX_mN_mm 20000
 
@@ -74,11 +75,35 @@ int32_t grip_width_at(const struct grip *grip, uint64_t t_us) {
   return after.width_um;
 }
 
-int32_t grip_stiffness(const struct grip *grip, int32_t force_mN, int32_t width_um) {
+static int32_t indentation_at(const struct grip *grip, int32_t width_um) {
   int32_t indentation_um = grip->touch_width_um - width_um;
-  indentation_um = indentation_um < INDENTATION_MIN_um ? INDENTATION_MIN_um : indentation_um;
-  int32_t stiffness = grip_scale(force_mN, EXPONENT_PERMILLE, indentation_um);
+  return indentation_um < INDENTATION_MIN_um ? INDENTATION_MIN_um : indentation_um;
+}
+
+int32_t grip_stiffness(const struct grip *grip, int32_t force_mN, int32_t width_um) {
+  int32_t stiffness = grip_scale(force_mN, EXPONENT_PERMILLE, indentation_at(grip, width_um));
   return grip_clamp(stiffness, STIFFNESS_MIN_mN_mm, STIFFNESS_MAX_mN_mm);
+}
+
+static uint32_t root_of(uint32_t square) {
+  uint32_t root = 0;
+  for (uint32_t bit = UINT32_C(1) << 15; bit != 0; bit >>= 1) {
+    uint32_t tried = root | bit;
+    root = tried * tried <= square ? tried : root;
+  }
+  return root;
+}
+
+/* The way to close from an indentation, for a force that is to grow from one to the other: by the
+ * power law its indentation grows to (to / from)^(5/8). */
+static int32_t way_to(const struct grip *grip, int32_t width_um, int32_t from_mN, int32_t to_mN) {
+  int32_t indentation_um = indentation_at(grip, width_um);
+  from_mN = from_mN < FORCE_MIN_mN ? FORCE_MIN_mN : from_mN;
+  int32_t ratio_q12 = grip_clamp(grip_scale(to_mN, 4096, from_mN), 4096, (1 << 20) - 1);
+  uint32_t half_q12 = root_of((uint32_t)ratio_q12 << 12);
+  uint32_t eighth_q12 = root_of(root_of(half_q12 << 12) << 12);
+  int32_t grown_q12 = (int32_t)((half_q12 * eighth_q12) >> 12);
+  return grip_scale(indentation_um, grown_q12 - 4096, 4096);
 }
 
 int32_t grip_allowed_width(const struct grip *grip, const struct grip_view *view, int32_t width_um,
@@ -148,7 +173,10 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
   /* What slides is answered by a step at least. */
   int32_t share = grip->hold.sliding ? 0 : opens ? OPENING_PERMILLE : TIGHTEN_PERMILLE;
   if (missing_mN > tolerance_mN && missing_mN > grip_scale(step_mN, share, 1000)) {
-    steps = port_divide(missing_mN + step_mN / 2, step_mN);
+    int32_t way_um = way_to(grip, grip->target_um, low_mN, wanted_mN);
+    int32_t linear = port_divide(missing_mN + step_mN / 2, step_mN);
+    steps = port_divide(way_um + grip->traits.step_um / 2, grip->traits.step_um);
+    steps = steps < linear ? steps : linear;
     /* To open less needs no more than that. */
     bool closes = grip->target_um - steps * grip->traits.step_um < grip->status.width_um;
     int32_t least = closes ? least_steps(grip, true) : 1;

@@ -77,13 +77,12 @@ static void add_to_zero(struct grip_zero *zero, int32_t x, int32_t y) {
   }
 }
 
-/* From now on the location tells changes of this load, up to so much of the force. */
-static void guess_from(const struct grip *grip, struct grip_finger *own, int32_t x_mN, int32_t y_mN,
-                       int32_t most_permille) {
+/* From now on the location tells changes of the load that was told last. */
+static void guess_from(const struct grip *grip, struct grip_finger *own) {
   int32_t force_mN = own->force_mN < 1 ? 1 : own->force_mN;
-  int32_t most_um = grip_scale(grip->settings.shift_um, most_permille, 1000);
-  int32_t x_um = grip_scale(grip->settings.shift_um, x_mN, force_mN);
-  int32_t y_um = grip_scale(grip->settings.shift_um, y_mN, force_mN);
+  int32_t most_um = grip_scale(grip->settings.shift_um, GUESSED_TOLD_PERMILLE, 1000);
+  int32_t x_um = grip_scale(grip->settings.shift_um, own->told_x_mN, force_mN);
+  int32_t y_um = grip_scale(grip->settings.shift_um, own->told_y_mN, force_mN);
   own->place.x = own->touch.x_um - grip_clamp(x_um, -most_um, most_um);
   own->place.y = own->touch.y_um - grip_clamp(y_um, -most_um, most_um);
   own->has_place = true;
@@ -111,8 +110,7 @@ static void take_load(const struct grip *grip, struct grip_finger *own) {
              grip->settings.shift_um > 0) {
     own->guesses_load = true;
     if (own->has_pulled && !own->has_place) {
-      /* It goes on as it was told last. */
-      guess_from(grip, own, own->told_x_mN, own->told_y_mN, GUESSED_TOLD_PERMILLE);
+      guess_from(grip, own);
     }
     int32_t shift_um = length_of(touch->x_um - own->place.x, touch->y_um - own->place.y);
     int32_t most_um = grip_scale(grip->settings.shift_um, GUESSED_MOST_PERMILLE, 1000);
@@ -177,7 +175,7 @@ void grip_guess_anew(struct grip *grip) {
   for (int i = 0; i < GRIP_FINGERS; i++) {
     struct grip_finger *own = &grip->finger[i];
     if (own->guesses_load && own->has_pulled) {
-      guess_from(grip, own, own->told_x_mN, own->told_y_mN, GUESSED_AFTER_PERMILLE);
+      guess_from(grip, own);
     } else if (own->guesses_load) {
       int32_t x_um = own->touch.x_um - own->place.x, y_um = own->touch.y_um - own->place.y;
       int32_t shift_um = length_of(x_um, y_um);

@@ -109,13 +109,14 @@ TEST(GraspSettings, DefaultsGiveWayButWishesDoNot) {
 }
 
 TEST(GraspSettings, ARecordingTellsThemAll) {
-  const Metadata head = settings_metadata(settings_for(any(), {{"fixed", 4}, {"travel-cap", 7.5}}));
+  const Metadata head =
+      settings_metadata(settings_for(any(), {{"fixed", 4}, {"travel-cap", 7.5}, {"margin", 1.4}}));
   const auto has = [&](const std::string &key, const std::string &value) {
     return std::find(head.begin(), head.end(), std::pair(key, value)) != head.end();
   };
   EXPECT_TRUE(has("grasp_mode", "fixed"));
   EXPECT_TRUE(has("grasp_fixed", "4 N"));
   EXPECT_TRUE(has("grasp_travel_cap", "7.5 mm"));
-  EXPECT_TRUE(has("grasp_margin", "1.25"));
+  EXPECT_TRUE(has("grasp_margin", "1.4"));
   EXPECT_EQ(head.size(), grasp_settings().size() + 1);
 }

@@ -33,6 +33,9 @@ void world_set(struct world *world, const struct grip_settings *settings) {
   TEST_ASSERT_EQUAL(FT_OK, grip_init(&world->grip, settings, &world->traits));
 }
 
+/* By which a load as large as the force moves a location that is not corrected for it. */
+#define SHIFT_um 5500
+
 static struct grip_touch feel(const struct world *world, int finger) {
   struct grip_touch touch = {.t_us = world->t_us};
   int32_t force_mN = (int32_t)(world->gain[finger] * world->force_mN);
@@ -46,7 +49,11 @@ static struct grip_touch feel(const struct world *world, int finger) {
   touch.force_mN = force_mN;
   touch.force_sd_mN = force_mN / 50;
   touch.x_um = world->is_frozen[finger] ? 0 : (int32_t)(world->frames % 7);
-  touch.qy_mN = (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) ? world->load_mN : 0;
+  if (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) {
+    touch.qy_mN = world->load_mN;
+  } else {
+    touch.y_um = SHIFT_um * world->load_mN / force_mN;
+  }
   return touch;
 }
 
