@@ -1,10 +1,8 @@
 // The wire codec, in C and in C++: whatever comes down a line.
 #include "fuzz.h"
-#include "libfingertip/command.hpp"
 #include "libfingertip/decoder.hpp"
 #include "line.hpp"
 
-#include <cmath>
 #include <vector>
 
 using namespace fingertip;
