@@ -259,9 +259,14 @@ def _end_counts(path, number, text):
     return counts
 
 
-def _packet(text):
+def _packet(path, number, text):
+    """Its kind, and {field: whole number as it is written}."""
     words = text.split() or [""]
-    return words[0], dict(field.split("=", 1) for field in words[1:] if "=" in field)
+    fields = dict(field.partition("=")[::2] for field in words[1:])
+    for name, value in fields.items():
+        if not (value.isascii() and value.isdigit()):
+            raise InputError(f'{path}:{number}: {name} is "{value}"; use --salvage to skip the line')
+    return words[0], fields
 
 
 # Some 20 MB are read in a second: below this nobody waits.
@@ -379,7 +384,7 @@ def read_recording(path, salvage=False, device=None, columns=None, progress=None
                 elif key == "event":
                     events.append(value)
                 elif key == "packet":
-                    packets.append(_packet(value))
+                    packets.append(_packet(path, number, value))
                 elif key and header is None:
                     metadata[key] = value
                 continue

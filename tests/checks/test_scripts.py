@@ -27,6 +27,17 @@ class Folder(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
 
+    def path_without(self, *missing):
+        """A PATH that leads to every program of this machine but those."""
+        tools = self.folder / "path"
+        tools.mkdir()
+        for folder in os.environ["PATH"].split(":") + ["/usr/bin", "/bin"]:
+            for program in pathlib.Path(folder).glob("*"):
+                link = tools / program.name
+                if program.name not in missing and not os.path.lexists(link):
+                    link.symlink_to(program)
+        return str(tools)
+
 
 class Boot2Checksum(Folder):
     def stage(self, code):
@@ -70,17 +81,6 @@ class Boot2Checksum(Folder):
 
 
 class FetchUnity(Folder):
-    def path_without(self, *missing):
-        """A PATH that leads to every program of this machine but those."""
-        tools = self.folder / "bin"
-        tools.mkdir()
-        for folder in os.environ["PATH"].split(":") + ["/usr/bin", "/bin"]:
-            for program in pathlib.Path(folder).glob("*"):
-                link = tools / program.name
-                if program.name not in missing and not os.path.lexists(link):
-                    link.symlink_to(program)
-        return str(tools)
-
     def test_a_missing_tool_is_named(self):
         shell = shutil.which("sh")
         for tool in ("sha256sum", "apt-get", "awk", "sort", "tar", "xz"):
@@ -106,7 +106,7 @@ class FetchUnity(Folder):
 class Bootstrap(Folder):
     """bootstrap.sh alone, up to its call of npm, with a stand-in for each program that it must not call."""
 
-    def up_to_npm(self, cmake="3.25.1", node="18.20.4"):
+    def up_to_npm(self, cmake="3.25.1", node="18.20.4", job=("demo",), path=os.environ["PATH"]):
         for folder in ("cmake", "host_tools/emulator", "bin"):
             (self.folder / folder).mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / "cmake/bootstrap.sh", self.folder / "cmake")
@@ -115,8 +115,16 @@ class Bootstrap(Folder):
             program = self.folder / "bin" / name
             program.write_text(f"#!/bin/sh\n{body}\n")
             program.chmod(0o755)
-        return subprocess.run(["sh", self.folder / "cmake/bootstrap.sh", "demo"], capture_output=True, text=True, timeout=60,
-                              env={**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
+        return subprocess.run([shutil.which("sh"), self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=60,
+                              env={**os.environ, "PATH": f"{self.folder}/bin:{path}"})
+
+    def test_only_who_fuzzes_needs_clang(self):
+        path = self.path_without("clang-14")
+        for job, needs in ((("demo",), False), (("test",), True), (("report",), True), (("fuzz", "1"), True)):
+            with self.subTest(job):
+                done = self.up_to_npm(job=job, path=path)
+                self.assertEqual(done.returncode, 33)
+                self.assertEqual("clang-14" in done.stdout, needs, done.stdout)
 
     def test_what_is_too_old_is_named(self):
         for tool, version, least in (("cmake", "3.22.1", "3.25"), ("cmake", "2.99", "3.25"), ("node", "12.22.9", "18"), ("node", "", "18")):

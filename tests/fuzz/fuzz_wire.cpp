@@ -1,25 +1,13 @@
 // The wire codec, in C and in C++: whatever comes down a line.
 #include "fuzz.h"
-#include "libfingertip/command.hpp"
 #include "libfingertip/decoder.hpp"
 #include "line.hpp"
 
-#include <cmath>
 #include <vector>
 
 using namespace fingertip;
 
 namespace {
-
-Bytes encoded(const wire_packet &packet) {
-  Bytes frame(WIRE_MAX_FRAME_BYTES);
-  std::size_t length = 0;
-  FUZZ_CHECK(wire_encode(wire_find_layout(wire_all_layouts, packet.type), &packet, frame.data(),
-                         &length) == FT_OK);
-  FUZZ_CHECK(length <= WIRE_MAX_FRAME_BYTES);
-  frame.resize(length);
-  return frame;
-}
 
 struct Heard {
   std::vector<Bytes> packets; // encoded anew
@@ -32,8 +20,9 @@ Heard decoded(const Bytes &line, const std::vector<std::size_t> &pieces) {
   Heard heard;
   for (std::size_t at = 0, i = 0; at < line.size(); i++) {
     const std::size_t length = std::min(pieces[i % pieces.size()], line.size() - at);
-    decoder.feed(line.data() + at, length,
-                 [&](const wire_packet &packet) { heard.packets.push_back(encoded(packet)); });
+    decoder.feed(line.data() + at, length, [&](const wire_packet &packet) {
+      heard.packets.push_back(fuzz::encoded(packet));
+    });
     at += length;
   }
   heard.statistics = decoder.statistics();
@@ -66,7 +55,7 @@ void check_frame(const Bytes &frame, LineStatistics &statistics) {
   FUZZ_CHECK(again.back() == 0);
   if (status == FT_OK) {
     FUZZ_CHECK(packet.type == envelope->type() && packet.sequence == envelope->sequence());
-    FUZZ_CHECK(encoded(packet) == again);
+    FUZZ_CHECK(fuzz::encoded(packet) == again);
   }
 }
 

@@ -6,6 +6,7 @@
 #include "libfingertip/error.hpp"
 #include "libfingertip/packet_file.hpp"
 #include "libfingertip/recording_writer.hpp"
+#include "line.hpp"
 #include "memory_file.hpp"
 
 #include <filesystem>
@@ -15,15 +16,6 @@ namespace fuzz {
 
 using fingertip::PacketFile;
 using Item = PacketFile::Item;
-
-inline std::vector<std::uint8_t> encoded(const wire_packet &packet) {
-  std::vector<std::uint8_t> frame(WIRE_MAX_FRAME_BYTES);
-  std::size_t length = 0;
-  FUZZ_CHECK(wire_encode(wire_find_layout(wire_all_layouts, packet.type), &packet, frame.data(),
-                         &length) == FT_OK);
-  frame.resize(length);
-  return frame;
-}
 
 inline bool is_same(const Item &a, const Item &b) {
   if (a.kind != b.kind || a.event != b.event) {

@@ -141,8 +141,8 @@ class Player(unittest.TestCase):
             "time goes back": (good[:rows[3]] + [good[rows[0]]], "does not increase"),
             "no rows": (good[:rows[0]], "no rows"),
             "too far": (good[:rows[3]] + [",".join(good[rows[3]].split(",")[:8] + ["2e7"] * 15) + "\n"], "at most 1e7"),
-            "no such air": (good[:1] + ["# ambient_Pa: 1e300\n"] + good[1:], "at most 1e7"),
-            "too hot": (good[:1] + ["# temperature_degC: 1e300\n"] + good[1:], "at most 1000 degC"),
+            "no such air": (good[:rows[0] - 1] + ["# ambient_Pa: 1e300\n"] + good[rows[0] - 1:rows[3]], "at most 1e7"),
+            "too hot": (good[:rows[0] - 1] + ["# temperature_degC: 1e300\n"] + good[rows[0] - 1:rows[3]], "at most 1000 degC"),
             "too hot in a row": ([line.rstrip("\n") + (",temperature_degC\n" if line[0] == "t" else ",1e300\n" if line[0].isdigit() else "\n")
                                   for line in good[:rows[3]]], "at most 1000 degC"),
         }

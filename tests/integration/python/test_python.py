@@ -365,6 +365,20 @@ class MalformedFiles(ToolTest):
             self.assertEqual(len(salvaged["t_us"]), len(files.read_recording(path)["t_us"]) - 1)
         self.assert_damage(files.read_recording, path, 6, lambda s: s.replace("flags", "flag"), "wrong header")
 
+    def test_a_damaged_packet_between_the_rows(self):
+        path = self.recording(self.scenario())
+        whole = path.read_text(encoding="utf-8").replace("# end:", "# packet: health sequence=1 frames=7\n# end:")
+        path.write_text(whole, encoding="utf-8")
+        self.assertEqual(files.read_recording(path).health()[-1], {"sequence": 1, "frames": 7})
+        for damage in ("frames=7X", "frames=", "frames", "frames=\u0667"):
+            with self.subTest(damage):
+                path.write_text(whole.replace("frames=7", damage), encoding="utf-8")
+                with self.assertRaisesRegex(files.InputError, "frames is .*; use --salvage"):
+                    files.read_recording(path)
+                salvaged = files.read_recording(path, salvage=True)
+                self.assertEqual(salvaged.skipped_lines, 1)
+                self.assertNotIn({"sequence": 1}, salvaged.health())
+
     def test_a_torn_last_line(self):
         path = self.recording(self.scenario("demo", "--seconds", "2"), end=False)
         path.write_text(path.read_text(encoding="utf-8")[:-20], encoding="utf-8")

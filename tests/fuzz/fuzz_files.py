@@ -1,0 +1,107 @@
+#!/usr/bin/python3
+"""The Python tools' readers on damaged files: recordings, grips, scenarios, truths, run reports. Refused in one line, or read.
+
+    fuzz_files.py --runs 3000 [--seed 1]
+
+libFuzzer cannot see into Python: these are the seeds of `corpus`, damaged at random, without coverage.
+"""
+import argparse
+import pathlib
+import random
+import sys
+import tempfile
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "host_tools/demo")]
+import fingertip_files as files  # noqa: E402
+from grasp import read_truth  # noqa: E402
+
+TRUTH = "# fingertip-truth 1\nt_s,slips,slid_mm,force_N\n0.000,0,0.0,0.1\n0.002,1,0.5,2.5\n"
+RUN = '{"device_time_zero_s": 0.25, "warnings": [], "cycles": 5}\n'
+WORDS = (b"18446744073709551616", b"-1", b"1e400", b"nan", b"inf", b"", b"\n", b"\r\n", b",", b"#", b": ", b"\x00", b"\xff\xfe", b"0x10", b"1_000",
+         b"# end: ", b"# packet: info", b"# grip: ", b"# devices: ", b"\xe2\x80\xa8")
+
+
+def check_recording(path, prng):
+    recording = files.read_recording(path, salvage=prng.random() < 0.5, device=prng.choice((None, "BBBB")))
+    recording.health()
+    assert recording["t_us"].shape == recording.has_contact.shape
+
+
+def check_grip(path, prng):
+    files.read_grip(path, salvage=prng.random() < 0.5)
+    files.read_grip_events(path)
+
+
+def check_scenario(path, _):
+    scenario = files.read_scenario(path)
+    assert scenario is not None
+
+
+def check_truth(path, _):
+    for column in read_truth(path).values():
+        assert column.ndim == 1
+
+
+def check_run(path, _):
+    assert isinstance(files.read_run(path), dict)
+
+
+def damaged(data, prng):
+    for _ in range(prng.randrange(1, 5)):
+        at = prng.randrange(len(data) + 1)
+        end = min(len(data), at + prng.choice((0, 1, 1, 4, 20, 200)))
+        lines = data.splitlines(keepends=True)
+        cells = data.split(b",")
+        kind = prng.randrange(6)
+        if kind == 0:
+            data = data[:at] + prng.choice(WORDS) + data[end:]
+        elif kind == 1:
+            data = data[:at] + bytes([prng.randrange(256)]) + data[at + 1:]
+        elif kind == 2:
+            data = data[:at]
+        elif kind == 3 and lines:
+            line = prng.choice(lines)
+            lines.insert(prng.randrange(len(lines) + 1), line)
+            data = b"".join(lines)
+        elif kind == 4 and lines:
+            del lines[prng.randrange(len(lines))]
+            data = b"".join(lines)
+        else:
+            cells[prng.randrange(len(cells))] = prng.choice(WORDS)
+            data = b",".join(cells)
+    return data
+
+
+def main(argv):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, required=True)
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args(argv)
+    recordings = [path.read_bytes()[1:] for path in sorted((HERE / "corpus/recording").iterdir())]
+    scenarios = [path.read_bytes() for path in sorted((HERE / "corpus/scenario").iterdir())]
+    jobs = ([(check_recording, data) for data in recordings] + [(check_grip, data) for data in recordings] +
+            [(check_scenario, data) for data in scenarios] + [(check_truth, TRUTH.encode()), (check_run, RUN.encode())])
+    prng = random.Random(options.seed)
+    read = 0
+    with tempfile.TemporaryDirectory(prefix="fingertip-") as folder:
+        path = pathlib.Path(folder) / "file"
+        for run in range(options.runs):
+            check, seed = jobs[run % len(jobs)]
+            data = damaged(seed, prng)
+            path.write_bytes(data)
+            try:
+                check(path, prng)
+                read += 1
+            except files.InputError as error:
+                assert "\n" not in files.printable(str(error))
+            except BaseException:
+                print(f"fuzz_files.py: run {run}: {check.__name__} of {data!r}", file=sys.stderr)
+                raise
+    print(f"{options.runs} files, {read} of them read")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
