@@ -240,7 +240,7 @@ void usbctrl_irq_handler(void) {
     on_bus_reset();
   if (interrupts & USB_INT_DEV_SUSPEND) {
     REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_SUSPENDED;
-    set_suspended(true);
+    set_suspended(REG32(USB_SIE_STATUS) & USB_SIE_STATUS_SUSPENDED);
   }
   if (interrupts & USB_INT_DEV_RESUME)
     REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_RESUME;

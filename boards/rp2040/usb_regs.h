@@ -49,6 +49,8 @@
 #define USB_SIE_STATUS_BUS_RESET (1u << 19)
 #define USB_SIE_STATUS_SETUP_REC (1u << 17)
 #define USB_SIE_STATUS_RESUME (1u << 11)
+/* Reads whether the bus is suspended; writing a 1 clears INTS.DEV_SUSPEND, which says that this has
+ * changed (pico-sdk, hardware/regs/usb.h). */
 #define USB_SIE_STATUS_SUSPENDED (1u << 4)
 #define USB_BUFF_STATUS (USB_BASE + 0x58u)
 #define USB_EP_ABORT (USB_BASE + 0x60u)

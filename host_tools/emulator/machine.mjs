@@ -8,6 +8,7 @@
 import { createHash } from 'node:crypto';
 import { Chip, Stopped } from './chip/chip.mjs';
 import { FlashMemory } from './chip/flash_memory.mjs';
+import { Trouble } from './chip/trouble.mjs';
 import { SimulatedTime } from './clock.mjs';
 import { Faults } from './faults.mjs';
 import { Report } from './report.mjs';
@@ -52,6 +53,7 @@ export class Machine {
       scope: this.boardScope, report: this.report, seed, rise_ns, onLevels, onTransfer: onBusTransfer,
       stimulus: (index, t_ns) => scenario.at_ns(index, t_ns), faults: () => this.faults,
     });
+    this.trouble = new Trouble();
     this.boardScope = this.time.scope();
     this.board = this.makeBoard();
     this.host = new UsbHost({ scope: this.scope, report: this.report, fast: fastEnumeration, onPacket: onUsbPacket });
@@ -60,6 +62,9 @@ export class Machine {
     this.faults = new Faults(faults, this.scope, {
       ...Object.fromEntries(Object.keys(this.board.faultActions).map(onBoard)),
       power_cut: (_, active) => (active ? this.#powerDown() : this.#guard(() => this.#powerBack())),
+      usb_late_resume: (_, active) => {
+        this.trouble.lateResume = active;
+      },
       host_stall: (_, active) => this.client.setStalled(active),
       usb_unplug: (_, active) => (active ? this.host.unplug() : this.host.plug()),
     });
@@ -73,7 +78,7 @@ export class Machine {
   }
 
   #powerUp(kept) {
-    this.chip = new Chip(this.time, this.report, { serial: this.serial, seed: this.seed, clock_ppm: this.clock_ppm, memory: this.memory, kept });
+    this.chip = new Chip(this.time, this.report, { serial: this.serial, seed: this.seed, clock_ppm: this.clock_ppm, memory: this.memory, trouble: this.trouble, kept });
     this.chip.load(this.image);
     this.board.attachChip(this.chip);
     this.host.connect(this.chip.usbCtrl);

@@ -30,6 +30,7 @@ import { StrictSio } from './sio.mjs';
 import { Ssi } from './ssi.mjs';
 import { SysClock } from './sys_clock.mjs';
 import { Timer, Watchdog } from './timer_watchdog.mjs';
+import { Trouble } from './trouble.mjs';
 import { UsbBlock } from './usb_block.mjs';
 
 const BOOT2_BYTES = 256;
@@ -89,10 +90,11 @@ export class Chip extends RP2040 {
    * @param time SimulatedTime
    * @param report Report
    * @param options serial: 8-byte flash unique id; seed: of the power-on noise in SRAM; clock_ppm: by how much all of
-   *   the chip's clocks are fast, in this time; memory: the FlashMemory, a new one by default; kept: { sram, watchdog }
+   *   the chip's clocks are fast, in this time; memory: the FlashMemory, a new one by default; trouble: what goes wrong
+   *   in the chip; kept: { sram, watchdog }
    *   of the life before a watchdog reboot
    */
-  constructor(time, report, { serial, seed = 1, clock_ppm = 0, memory = new FlashMemory({ time, serial, seed }), kept = null }) {
+  constructor(time, report, { serial, seed = 1, clock_ppm = 0, memory = new FlashMemory({ time, serial, seed }), trouble = new Trouble(), kept = null }) {
     super(time.scope());
     this.memory = memory;
     memory.fail = (source, message) => this.fail(source, message);
@@ -102,6 +104,7 @@ export class Chip extends RP2040 {
     this.time = time;
     this.report = report;
     this.options = { serial, seed };
+    this.trouble = trouble;
     this.logger = new StrictLogger(this);
     this.core = new StrictCore(this);
     this.sio = new StrictSio(this);

@@ -34,7 +34,11 @@ const ST_SETUP_REC = 1 << 17;
 const ST_CONNECTED = 1 << 16;
 const ST_RESUME = 1 << 11;
 const ST_SUSPENDED = 1 << 4;
-const ST_WRITE_CLEAR = 0xff0f0800 | ST_SUSPENDED;
+const ST_WRITE_CLEAR = 0xff0e0800;
+/** From a change of the bus to that of SUSPENDED, in which a RESUME is told apart from noise. */
+const AWAKE_NS = 3e3;
+/** The same in the fault usb_late_resume. */
+const AWAKE_LATE_NS = 45e6;
 
 const DPRAM_BYTES = 4096;
 
@@ -44,6 +48,7 @@ export class UsbBlock extends BasePeripheral {
     this.onPortChange = () => {};
     /** (endpoint, isIn): the firmware gave the controller a buffer, or set a stall. */
     this.onArmed = () => {};
+    this.awakeAlarm = chip.clock.createAlarm(() => this.#setSuspended(false));
     this.reset();
   }
 
@@ -52,6 +57,8 @@ export class UsbBlock extends BasePeripheral {
     this.mainCtrl = 0;
     this.sieCtrl = 0;
     this.sieStatus = 0;
+    this.suspendChanged = false;
+    this.awakeAlarm.cancel();
     this.buffStatus = 0;
     this.epAbort = 0;
     this.epAbortDone = 0;
@@ -98,7 +105,7 @@ export class UsbBlock extends BasePeripheral {
     const s = this.sieStatus;
     return (
       (this.stallNak ? 1 << 19 : 0) | (this.epAbortDone ? 1 << 18 : 0) | (this.sofPending ? 1 << 17 : 0) |
-      (s & ST_SETUP_REC ? 1 << 16 : 0) | (s & ST_RESUME ? 1 << 15 : 0) | (s & ST_SUSPENDED ? 1 << 14 : 0) |
+      (s & ST_SETUP_REC ? 1 << 16 : 0) | (s & ST_RESUME ? 1 << 15 : 0) | (this.suspendChanged ? 1 << 14 : 0) |
       (s & ST_CONNECTED ? 1 << 13 : 0) | (s & ST_BUS_RESET ? 1 << 12 : 0) | (this.vbusDetected ? 1 << 11 : 0) |
       (s & ST_STALL_REC ? 1 << 10 : 0) | (this.buffStatus ? 1 << 4 : 0) | (s & ST_TRANS_COMPLETE ? 1 << 3 : 0)
     );
@@ -170,6 +177,7 @@ export class UsbBlock extends BasePeripheral {
         break;
       case 0x50:
         this.sieStatus &= ~(this.rawWriteValue & ST_WRITE_CLEAR);
+        if (this.rawWriteValue & ST_SUSPENDED) this.suspendChanged = false;
         break;
       case 0x58:
         this.buffStatus &= ~this.rawWriteValue;
@@ -342,18 +350,28 @@ export class UsbBlock extends BasePeripheral {
     this.endTransaction();
     this.quiet = true;
     this.resetDone = true;
-    this.sieStatus = (this.sieStatus | ST_BUS_RESET | ST_CONNECTED) & ~ST_SUSPENDED;
+    this.sieStatus |= ST_BUS_RESET | ST_CONNECTED;
+    this.#setSuspended(false);
+  }
+
+  /** SUSPENDED is a level that nobody writes; DEV_SUSPEND says that it changed, and is cleared through the same bit. */
+  #setSuspended(is) {
+    this.awakeAlarm.cancel();
+    if (((this.sieStatus & ST_SUSPENDED) !== 0) !== is) {
+      this.sieStatus ^= ST_SUSPENDED;
+      this.suspendChanged = true;
+    }
     this.#update();
   }
 
   suspend() {
-    this.sieStatus |= ST_SUSPENDED;
-    this.#update();
+    this.#setSuspended(true);
   }
 
   resume() {
-    this.sieStatus = (this.sieStatus | ST_RESUME) & ~ST_SUSPENDED;
+    this.sieStatus |= ST_RESUME;
     this.#update();
+    this.awakeAlarm.schedule(this.rp2040.trouble.lateResume ? AWAKE_LATE_NS : AWAKE_NS);
   }
 
   sof(frame) {

@@ -1,0 +1,6 @@
+/** What goes wrong in a chip, by the faults in force (faults.mjs); it outlives a reset and a power cut. */
+export class Trouble {
+  constructor() {
+    this.lateResume = false;
+  }
+}

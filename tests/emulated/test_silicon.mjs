@@ -1,0 +1,112 @@
+/**
+ * The release images on a chip that behaves as silicon does at its worst: each fault is overcome without help, in a
+ * time that is the same in every run.
+ *
+ * usage: test_silicon.mjs BUILD_OF_IMAGES FINGERTIP
+ */
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import { findBoard } from '../../host_tools/emulator/board/boards.mjs';
+import { parseFaults } from '../../host_tools/emulator/faults.mjs';
+import { Machine } from '../../host_tools/emulator/machine.mjs';
+import { steady } from './harness/bench.mjs';
+
+const [images, fingertip] = process.argv.slice(2);
+const BOARDS = ['pico_mux', 'pico_parallel'];
+const encoded = (...command) => Buffer.from(execFileSync(fingertip, ['encode', ...command], { encoding: 'utf8' }).trim(), 'hex');
+const STREAMS = encoded('stream', 'contact,raw,health');
+const HEALTH = encoded('health');
+
+/** A board with a host that opens its port. Times are emulated, in ms. */
+class Bench {
+  constructor(name, { faults = [], ...options } = {}) {
+    const Board = findBoard(name);
+    this.received = [];
+    this.bytes = 0;
+    this.machine = new Machine({
+      image: readFileSync(join(images, name, `fingertip-${name}.bin`)), Board, scenario: steady(), fastEnumeration: true, allowWatchdog: true,
+      faults: parseFaults(JSON.stringify(faults), 'faults', Board),
+      onData: (bytes) => {
+        this.received.push(Buffer.from(bytes));
+        this.bytes += bytes.length;
+      },
+      ...options,
+    });
+    this.machine.client.setDtr(true);
+  }
+
+  get now_ms() {
+    return this.machine.time.nanos / 1e6;
+  }
+
+  run(ms) {
+    const { machine } = this;
+    assert.ok(machine.run(machine.time.nanos + ms * 1e6), `${machine.endReason} ${machine.result.warnings}`);
+  }
+
+  /** Runs until `what()`; the time. */
+  until(what, limit_ms, name) {
+    const end_ms = this.now_ms + limit_ms;
+    while (!what()) {
+      assert.ok(this.now_ms < end_ms, `no ${name} within ${limit_ms} ms`);
+      this.run(1);
+    }
+    return this.now_ms;
+  }
+
+  /** Asks for the streams of a port that was just opened; the time at which they come. */
+  stream(limit_ms = 200) {
+    const { machine } = this;
+    this.until(() => machine.host.configured, limit_ms, 'enumeration');
+    this.run(10);
+    const before = this.bytes;
+    machine.client.write(STREAMS);
+    return this.until(() => this.bytes > before + 100, 100, 'stream');
+  }
+
+  assertStreams(ms) {
+    const before = this.bytes;
+    this.run(ms);
+    assert.ok(this.bytes - before > 20 * ms, `${this.bytes - before} bytes in ${ms} ms`);
+  }
+
+  /** What the device says of itself. */
+  health() {
+    this.machine.client.write(HEALTH);
+    this.run(20);
+    const folder = mkdtempSync(join(tmpdir(), 'silicon-'));
+    try {
+      const [stream, table] = [join(folder, 'stream.ftr'), join(folder, 'stream.csv')];
+      writeFileSync(stream, Buffer.concat(this.received));
+      execFileSync(fingertip, ['replay', stream, '--to-csv', table], { stdio: 'pipe' });
+      const line = readFileSync(table, 'utf8').split('\n').findLast((l) => l.startsWith('# packet: health'));
+      return Object.fromEntries(line.split(' ').slice(3).map((pair) => pair.split('=')).map(([key, value]) => [key, Number(value)]));
+    } finally {
+      rmSync(folder, { recursive: true });
+    }
+  }
+
+  end() {
+    assert.deepEqual(this.machine.result.warnings, []);
+    return this.machine.result;
+  }
+}
+
+test('a change of the suspend state that is told late does not close the port', () => {
+  const bench = new Bench('pico_parallel', { faults: [{ type: 'usb_late_resume', from_s: 0 }] });
+  bench.stream();
+  const { host } = bench.machine;
+  host.suspend();
+  bench.run(20);
+  host.resume();
+  bench.run(31);
+  const before = bench.bytes;
+  bench.machine.client.write(STREAMS);
+  bench.until(() => bench.bytes > before, 20, 'stream after the resume');
+  bench.assertStreams(100);
+  bench.end();
+});
