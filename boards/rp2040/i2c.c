@@ -83,6 +83,7 @@ static enum ft_status load_when_idle(void) {
     }
   }
   IC_TAR = transaction.address;
+  (void)IC_CLR_TX_ABRT;
   (void)IC_CLR_INTR;
   IC_ENABLE = 1;
   if (transaction.read_count == 0) {

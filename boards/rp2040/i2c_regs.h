@@ -27,9 +27,10 @@
 #define IC_INTR_TX_ABRT (1u << 6)
 #define IC_INTR_STOP_DET (1u << 9)
 
-#define IC_CLR_INTR                                                                                \
-  REG32(I2C0_BASE + 0x40u) /* reading clears every interrupt, the abort source                     \
-                              and the flushed state of the FIFOs */
+/* Reading clears every interrupt and the abort source. */
+#define IC_CLR_INTR REG32(I2C0_BASE + 0x40u)
+/* Until it is read, an abort keeps the transmit FIFO flushed (IC_RAW_INTR_STAT.TX_ABRT). */
+#define IC_CLR_TX_ABRT REG32(I2C0_BASE + 0x54u)
 
 #define IC_ENABLE REG32(I2C0_BASE + 0x6cu) /* bit 0; 0 flushes both FIFOs */
 #define IC_RXFLR REG32(I2C0_BASE + 0x78u)

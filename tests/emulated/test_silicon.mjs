@@ -110,3 +110,14 @@ test('a change of the suspend state that is told late does not close the port', 
   bench.assertStreams(100);
   bench.end();
 });
+
+test('an abort of the I2C controller, whose FIFO stays flushed until it is told, costs no recovery of the bus', () => {
+  const faults = Array.from({ length: 20 }, (_, i) => ({ type: 'sensor_nack', sensor: (4 * i) % 15, from_s: 0.1 + 0.0103 * i }));
+  const bench = new Bench('pico_mux', { faults });
+  bench.stream();
+  bench.run(320);
+  const { bus_recoveries, bus_timeouts, bus_nacks } = bench.health();
+  assert.ok(bus_nacks > 5, `${bus_nacks}`);
+  assert.deepEqual([bus_recoveries, bus_timeouts], [0, 0]);
+  bench.end();
+});

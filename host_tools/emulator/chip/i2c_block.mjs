@@ -38,6 +38,8 @@ const ABRT_TXDATA_NOACK = 8;
 const ABRT_ARB_LOST = 1 << 12;
 const ABRT_USER = 1 << 16;
 
+/** The only register whose reading ends the flushed state of the transmit FIFO after an abort (4.3.17). */
+const CLR_TX_ABRT = 0x54;
 /** Reading one of these offsets clears the bits. */
 const CLEARS = new Map(Object.entries({ 0x44: RX_UNDER, 0x48: RX_OVER, 0x4c: TX_OVER, 0x50: 32, 0x54: TX_ABRT, 0x58: 128, 0x5c: ACTIVITY, 0x60: STOP_DET, 0x64: START_DET, 0x68: 2048, 0xa8: 4096 }).map(([k, v]) => [Number(k), v]));
 
@@ -183,15 +185,13 @@ export class I2cBlock extends BasePeripheral {
     const bits = CLEARS.get(offset);
     if (bits === undefined) return super.readUint32(offset);
     const was = this.latched & bits ? 1 : 0;
+    if (offset === CLR_TX_ABRT) this.flushed = false;
     this.#clear(bits);
     return was;
   }
 
   #clear(bits) {
-    if (bits & TX_ABRT && this.latched & TX_ABRT) {
-      this.flushed = false;
-      this.abortSource = 0;
-    }
+    if (bits & TX_ABRT && this.latched & TX_ABRT) this.abortSource = 0;
     this.latched &= ~bits;
     if (this.#active) this.latched |= ACTIVITY;
     this.#update();
