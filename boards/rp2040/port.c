@@ -170,7 +170,7 @@ void port_start(void) {
 
   if (resets_release(RESETS_TIMER) != FT_OK)
     port_panic();
-  TIMER_INTE = TIMER_ALARM0_BIT;
+  REG32_SET(TIMER_INTE) = TIMER_ALARM0_BIT;
   rp2040_irq_enable(RP2040_IRQ_TIMER_0);
 
   read_serial_number();

@@ -6,7 +6,10 @@
  * reset) are fixed in revision B2 of the chip. On B0 and B1 aborts are left out, and E5, whose
  * work-around takes two pins, is not worked around: there the device may not enumerate behind a hub
  * with traffic. E15 (some bus errors in an IN transfer hang the device) stands in all revisions: no
- * bulk IN packet is offered in the last 200 us of a frame, where such errors come from.
+ * bulk IN packet is offered in the last 200 us of a frame, where such errors come from. It can
+ * still strike (TinyUSB pull request 1779, embassy issue 2880), and then nothing but a reset of the
+ * block helps, not even a bus reset. So the block is reset, and the device attached anew, when the
+ * bus is silent and not suspended, or when resets of the bus are followed by no request.
  */
 #include "rp2040/usb_controller.h"
 
@@ -32,6 +35,19 @@ enum { ENDPOINT_NUMBERS = 3 };
 /* A full packet and its handshake take 50 us on the bus. */
 #define ABORT_LIMIT_us 200u
 
+/* How often the bus is looked at, and how long it may be silent: each millisecond a frame begins.
+ */
+#define WATCH_us 250000u
+#define SILENCE_us 1000000u
+/* A host that enumerates follows a reset by a request. A reset lasts 10 ms or more (USB 2.0,
+ * TDRST), so what is told of it within 3 ms is told of one. */
+#define UNASKED_RESETS 2u
+#define RESET_APART_us 3000u
+/* Where no host is the limits above rise by this factor. */
+#define PATIENCE_MAX 8u
+/* Ample for a hub to notice, which debounces for 100 ms (USB 2.0, TATTDB). */
+#define DETACHED_us 100000u
+
 /* One bit for each endpoint, as in BUFF_STATUS */
 static uint32_t data1;    /* the next packet is DATA1 */
 static uint32_t held;     /* it offers a packet, or accepts one */
@@ -41,6 +57,12 @@ static uint32_t bulk;
 static uint32_t frame_start_us;
 static bool suspended;
 static bool can_abort;
+
+static bool detached;
+static uint32_t alive_us; /* when last the bus was not silent, or was asleep */
+static uint32_t reset_us; /* the last reset of the bus */
+static uint32_t unasked_resets;
+static uint32_t patience = 1;
 
 /* The controller reads the control word in its own clock domain, so AVAILABLE is written once the
  * other fields are certain to have arrived there: datasheet 4.1.2.5.1. */
@@ -63,6 +85,7 @@ static bool in_frame_tail(void) {
 
 static void start_frame(void) {
   frame_start_us = TIMER_TIMERAWL;
+  alive_us = frame_start_us;
   for (uint8_t number = 1; deferred && number < ENDPOINT_NUMBERS; number++) {
     uint8_t endpoint = USB_ENDPOINT_IN | number;
     if (deferred & USB_BIT(endpoint))
@@ -179,6 +202,64 @@ void usb_controller_unstall(uint8_t endpoint) {
   data1 &= ~USB_BIT(endpoint);
 }
 
+static void look_in(uint32_t us) {
+  TIMER_ALARM1 = TIMER_TIMERAWL + us;
+}
+
+static void attach(void) {
+  if (resets_release(RESETS_USBCTRL | RESETS_SYSINFO) != FT_OK)
+    port_panic();
+  can_abort = SYSINFO_CHIP_ID_REVISION(SYSINFO_CHIP_ID) >= REVISION_B2;
+  for (uint32_t offset = 0; offset < USB_DPRAM_BYTES; offset += 4)
+    REG32(USB_DPRAM_BASE + offset) = 0;
+
+  USB_MUXING = USB_MUXING_TO_PHY | USB_MUXING_SOFTCON;
+  USB_PWR = USB_PWR_VBUS_DETECT | USB_PWR_VBUS_DETECT_OVERRIDE_EN; /* powered by the bus */
+  USB_MAIN_CTRL = USB_MAIN_CTRL_CONTROLLER_EN;
+  REG32(USB_SIE_CTRL) = USB_SIE_CTRL_EP0_INT_1BUF;
+  USB_INTE = USB_INT_BUS_RESET | USB_INT_SETUP_REQ | USB_INT_BUFF_STATUS | USB_INT_DEV_SUSPEND |
+             USB_INT_DEV_RESUME | USB_INT_DEV_SOF;
+  rp2040_irq_enable(RP2040_IRQ_USBCTRL);
+  REG32_SET(USB_SIE_CTRL) = USB_SIE_CTRL_PULLUP_EN;
+  detached = false;
+  alive_us = TIMER_TIMERAWL;
+  look_in(WATCH_us);
+}
+
+static void start_over(void) {
+  patience = patience < PATIENCE_MAX ? 2 * patience : PATIENCE_MAX;
+  rp2040_irq_disable(RP2040_IRQ_USBCTRL);
+  resets_assert(RESETS_USBCTRL);
+  held = 0;
+  deferred = 0;
+  data1 = 0;
+  suspended = false;
+  unasked_resets = 0;
+  detached = true;
+  usb_device_on_bus_reset();
+  look_in(DETACHED_us);
+}
+
+void timer1_irq_handler(void) {
+  TIMER_INTR = TIMER_ALARM1_BIT;
+  if (detached) {
+    attach();
+    return;
+  }
+  if (REG32(USB_SIE_STATUS) & USB_SIE_STATUS_SUSPENDED)
+    alive_us = TIMER_TIMERAWL;
+  if (TIMER_TIMERAWL - alive_us >= patience * SILENCE_us)
+    start_over();
+  else
+    look_in(WATCH_us);
+}
+
+static bool is_unasked_for(uint32_t now_us) {
+  unasked_resets += now_us - reset_us >= RESET_APART_us;
+  reset_us = now_us;
+  return unasked_resets >= UNASKED_RESETS * patience;
+}
+
 static void on_bus_reset(void) {
   REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_BUS_RESET;
   USB_ADDR_ENDP = 0;
@@ -191,6 +272,8 @@ static void on_bus_reset(void) {
 
 static void on_setup(void) {
   REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_SETUP_REC;
+  unasked_resets = 0;
+  patience = 1;
   uint8_t packet[USB_SETUP_BYTES];
   for (unsigned i = 0; i < sizeof packet; i++)
     packet[i] = *(volatile uint8_t *)(uintptr_t)(USB_SETUP_PACKET + i);
@@ -236,8 +319,13 @@ static void set_suspended(bool now) {
 /* What was finished before a SETUP is handled before it, so that an address set counts. */
 void usbctrl_irq_handler(void) {
   uint32_t interrupts = USB_INTS;
-  if (interrupts & USB_INT_BUS_RESET)
+  if (interrupts & USB_INT_BUS_RESET) {
+    if (is_unasked_for(TIMER_TIMERAWL)) {
+      start_over();
+      return;
+    }
     on_bus_reset();
+  }
   if (interrupts & USB_INT_DEV_SUSPEND) {
     REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_SUSPENDED;
     set_suspended(REG32(USB_SIE_STATUS) & USB_SIE_STATUS_SUSPENDED);
@@ -273,19 +361,8 @@ void usb_controller_request_service(void) {
 
 void usb_controller_start(void) {
   resets_assert(RESETS_USBCTRL);
-  if (resets_release(RESETS_USBCTRL | RESETS_SYSINFO) != FT_OK)
-    port_panic();
-  can_abort = SYSINFO_CHIP_ID_REVISION(SYSINFO_CHIP_ID) >= REVISION_B2;
-  for (uint32_t offset = 0; offset < USB_DPRAM_BYTES; offset += 4)
-    REG32(USB_DPRAM_BASE + offset) = 0;
-
-  USB_MUXING = USB_MUXING_TO_PHY | USB_MUXING_SOFTCON;
-  USB_PWR = USB_PWR_VBUS_DETECT | USB_PWR_VBUS_DETECT_OVERRIDE_EN; /* powered by the bus */
-  USB_MAIN_CTRL = USB_MAIN_CTRL_CONTROLLER_EN;
-  REG32(USB_SIE_CTRL) = USB_SIE_CTRL_EP0_INT_1BUF;
-  USB_INTE = USB_INT_BUS_RESET | USB_INT_SETUP_REQ | USB_INT_BUFF_STATUS | USB_INT_DEV_SUSPEND |
-             USB_INT_DEV_RESUME | USB_INT_DEV_SOF;
-  rp2040_irq_enable(RP2040_IRQ_USBCTRL);
+  REG32_SET(TIMER_INTE) = TIMER_ALARM1_BIT;
+  rp2040_irq_enable(RP2040_IRQ_TIMER_1);
   rp2040_irq_enable(RP2040_IRQ_USB_SERVICE);
-  REG32_SET(USB_SIE_CTRL) = USB_SIE_CTRL_PULLUP_EN;
+  attach();
 }

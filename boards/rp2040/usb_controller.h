@@ -7,4 +7,7 @@ void usbctrl_irq_handler(void);
 /* A line without a block, for usb_controller_request_service(). */
 void usb_service_irq_handler(void);
 
+/* TIMER alarm 1: the watch over the controller. */
+void timer1_irq_handler(void);
+
 #endif

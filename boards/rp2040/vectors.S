@@ -24,7 +24,8 @@ __vectors:
   .word boot_reset
   unexpected 14 /* NMI, HardFault, SVCall, PendSV, SysTick */
   interrupt timer0_irq_handler /* 0 */
-  unexpected 4
+  interrupt timer1_irq_handler
+  unexpected 3
   interrupt usbctrl_irq_handler /* 5 */
   unexpected 1
   interrupt pio0_irq_handler /* 7 */

@@ -21,6 +21,8 @@
  *     clock_glitch (sensor)         sees one clock too many, once, in the first transfer from from_s on
  *     host_stall                    the USB host stops reading the CDC port
  *     usb_unplug                    the cable is out; it comes back at to_s
+ *     usb_deaf                      erratum E15 strikes at from_s: the USB controller answers nothing until its block is reset
+ *     usb_dead                      the same, and it does not hear the bus either
  *     usb_late_resume               the controller says 45 ms after a resume that it is not suspended any more
  *     power_cut                     chip, flash and sensors are without power until to_s; what the flash was doing is cut short
  *
@@ -50,12 +52,14 @@ const TARGET = {
   clock_glitch: 'sensor',
   host_stall: null,
   usb_unplug: null,
+  usb_deaf: null,
+  usb_dead: null,
   usb_late_resume: null,
   power_cut: null,
 };
 
 /** Not of the board. */
-const OF_THE_WORLD = ['host_stall', 'usb_unplug', 'usb_late_resume', 'power_cut'];
+const OF_THE_WORLD = ['host_stall', 'usb_unplug', 'usb_deaf', 'usb_dead', 'usb_late_resume', 'power_cut'];
 const OF_LINES = ['sensor_missing', 'line_stuck_high', 'scl_stuck_low', 'scl_stuck_high', 'clock_glitch'];
 
 export function parseFaults(text, file, { sensors, muxes, lines }) {

@@ -65,6 +65,8 @@ export class Machine {
       usb_late_resume: (_, active) => {
         this.trouble.lateResume = active;
       },
+      usb_deaf: (_, active) => this.#hang('deaf', active),
+      usb_dead: (_, active) => this.#hang('dead', active),
       host_stall: (_, active) => this.client.setStalled(active),
       usb_unplug: (_, active) => (active ? this.host.unplug() : this.host.plug()),
     });
@@ -84,6 +86,11 @@ export class Machine {
     this.host.connect(this.chip.usbCtrl);
     this.chip.boot();
     this.onPowerUp?.(this.chip);
+  }
+
+  /** Erratum E15 of the USB controller: only a reset of the block ends it. */
+  #hang(how, active) {
+    if (active && this.hasPower) this.chip.usbCtrl.hung = how;
   }
 
   /** Everything on the board loses its power; the cable is still there. */

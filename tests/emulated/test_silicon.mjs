@@ -121,3 +121,32 @@ test('an abort of the I2C controller, whose FIFO stays flushed until it is told,
   assert.deepEqual([bus_recoveries, bus_timeouts], [0, 0]);
   bench.end();
 });
+
+for (const name of BOARDS) {
+  for (const [type, limit_ms] of [['usb_deaf', 400], ['usb_dead', 1500]]) {
+    test(`${name}: a USB controller hung as by erratum E15 (${type}) is reset and comes back`, (t) => {
+      const from_s = 0.2;
+      const bench = new Bench(name, { faults: [{ type, from_s }] });
+      bench.stream();
+      bench.assertStreams(1000 * from_s - bench.now_ms);
+      bench.until(() => !bench.machine.host.configured, 10, 'loss of the device');
+      const back_ms = bench.stream(limit_ms) - 1000 * from_s;
+      t.diagnostic(`streams again after ${back_ms} ms`);
+      assert.ok(back_ms < limit_ms, `${back_ms}`);
+      bench.assertStreams(100);
+      const { reboots, usb } = bench.end();
+      assert.deepEqual([reboots, usb.enumerations], [0, 2]);
+    });
+  }
+}
+
+test('a bus that is asleep for long is no reason to attach anew', () => {
+  const bench = new Bench('pico_mux');
+  bench.stream();
+  bench.machine.host.suspend();
+  bench.run(2500);
+  bench.machine.host.resume();
+  bench.run(40);
+  bench.stream();
+  assert.equal(bench.end().usb.enumerations, 1);
+});

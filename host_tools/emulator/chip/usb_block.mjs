@@ -59,6 +59,8 @@ export class UsbBlock extends BasePeripheral {
     this.sieStatus = 0;
     this.suspendChanged = false;
     this.awakeAlarm.cancel();
+    /** By a fault: 'deaf' answers no token any more, 'dead' does not hear the bus at all. */
+    this.hung = null;
     this.buffStatus = 0;
     this.epAbort = 0;
     this.epAbortDone = 0;
@@ -336,7 +338,7 @@ export class UsbBlock extends BasePeripheral {
 
   #hears(address) {
     this.quiet = false;
-    return this.attached && address === this.address;
+    return this.attached && !this.hung && address === this.address;
   }
 
   /** The packet on the bus is through, or the line went dead under it. */
@@ -350,6 +352,7 @@ export class UsbBlock extends BasePeripheral {
     this.endTransaction();
     this.quiet = true;
     this.resetDone = true;
+    if (this.hung === 'dead') return;
     this.sieStatus |= ST_BUS_RESET | ST_CONNECTED;
     this.#setSuspended(false);
   }
@@ -357,6 +360,7 @@ export class UsbBlock extends BasePeripheral {
   /** SUSPENDED is a level that nobody writes; DEV_SUSPEND says that it changed, and is cleared through the same bit. */
   #setSuspended(is) {
     this.awakeAlarm.cancel();
+    if (this.hung === 'dead') return;
     if (((this.sieStatus & ST_SUSPENDED) !== 0) !== is) {
       this.sieStatus ^= ST_SUSPENDED;
       this.suspendChanged = true;
@@ -369,12 +373,14 @@ export class UsbBlock extends BasePeripheral {
   }
 
   resume() {
+    if (this.hung === 'dead') return;
     this.sieStatus |= ST_RESUME;
     this.#update();
     this.awakeAlarm.schedule(this.rp2040.trouble.lateResume ? AWAKE_LATE_NS : AWAKE_NS);
   }
 
   sof(frame) {
+    if (this.hung === 'dead') return;
     this.frame = frame & 0x7ff;
     this.sofPending = true;
     if (this.inte & (1 << 17)) this.#update();

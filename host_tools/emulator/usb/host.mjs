@@ -18,7 +18,8 @@
  * Status is 'ok', 'stall', 'cancelled' or 'gone'. One transaction is on the bus at a time and takes its time:
  * (payload + 13 bytes) at 12 Mbit/s, so at most 19 packets of 64 bytes in a frame. A NAKed bulk or control
  * transaction is retried every 10 us; the retries that would be NAKed again are counted, not simulated.
- * A missing answer, a wrong data PID or a malformed descriptor fails the run.
+ * A missing answer, a wrong data PID or a malformed descriptor fails the run. So does not a device whose controller is
+ * hung by a fault: the hub shuts its port, and it is reset and asked again a few times, then left alone until it detaches.
  */
 const BYTE_NS = 8e3 / 12;
 const OVERHEAD_BYTES = 13;
@@ -32,6 +33,9 @@ const IDLE_SUSPENDS_NS = 3e6;
 const RESUME_NS = 20e6;
 const RESUME_RECOVERY_NS = 10e6;
 const ADDRESS = 5;
+/** Linux tries to enumerate a port so often; between two tries it waits. */
+const TRIES = 6;
+const TRY_AGAIN_NS = 100e6;
 
 const REALISTIC = { debounce_ns: 100e6, reset_ns: 50e6, recovery_ns: 10e6, address_ns: 10e6 };
 const FAST = { debounce_ns: 1e6, reset_ns: 10e6, recovery_ns: 1e6, address_ns: 2e6 };
@@ -223,6 +227,21 @@ export class UsbHost {
 
   #fail(message) {
     this.block.rp2040.fail('usb host', message);
+  }
+
+  #unanswered(message) {
+    if (!this.block.hung) this.#fail(message);
+    this.#gone();
+    this.#enumeration = this.#tryAgain();
+    this.portStep();
+  }
+
+  *#tryAgain() {
+    for (let left = TRIES; left > 0; left--) {
+      yield* this.#resetBus();
+      if (this.block.setup(0, setupPacket(0x80, 6, 1 << 8, 0, 64))) this.#fail('a device that was hung answers without having detached');
+      yield TRY_AGAIN_NS;
+    }
   }
 
   *#resetBus() {
@@ -466,14 +485,20 @@ export class UsbHost {
   }
 
   #setupDone({ pipe, transfer }) {
-    if (!this.block.setup(this.address, transfer.packet)) this.#fail(`no answer to SETUP ${hex(transfer.packet)} at address ${this.address}`);
+    if (!this.block.setup(this.address, transfer.packet)) {
+      this.#unanswered(`no answer to SETUP ${hex(transfer.packet)} at address ${this.address}`);
+      return;
+    }
     this.onPacket({ t_ns: this.scope.nanos, endpoint: 0, isIn: false, setup: true, data: transfer.packet });
     pipe.toggle = 1;
     transfer.stage = transfer.length ? 'data' : 'status';
   }
 
   #refused({ pipe, transfer, armedMeanwhile }, answer) {
-    if (answer === 'none') this.#fail(`no answer from ${pipe.name} at address ${this.address}; is the endpoint enabled?`);
+    if (answer === 'none') {
+      this.#unanswered(`no answer from ${pipe.name} at address ${this.address}; is the endpoint enabled?`);
+      return;
+    }
     if (answer === 'nak') {
       this.statistics.naks += 1;
       if (armedMeanwhile) pipe.retry_ns = this.scope.nanos + RETRY_NS;
@@ -488,7 +513,7 @@ export class UsbHost {
     const { pipe, transfer, interrupt, answer } = t;
     if (interrupt) {
       if (answer.answer === 'nak') this.statistics.naks += 1;
-      else if (answer.answer === 'none') this.#fail(`no answer from interrupt ${pipe.name}; is the endpoint enabled?`);
+      else if (answer.answer === 'none') this.#unanswered(`no answer from interrupt ${pipe.name}; is the endpoint enabled?`);
       if (answer.answer !== 'data') return;
     } else if (answer.answer !== 'data') {
       this.#refused(t, answer.answer);
