@@ -8,7 +8,7 @@ void rp2040_event(void);
 /* Interrupt vector of TIMER alarm 0. */
 void timer0_irq_handler(void);
 
-/* Prepares what port.h offers; the watchdog runs from then on. Called once, before main. */
+/* Prepares what port.h offers. Called once, before main. */
 void port_start(void);
 
 #endif

@@ -164,10 +164,7 @@ void port_start(void) {
   started_by_watchdog = WATCHDOG_REASON != 0 && WATCHDOG_SCRATCH0 == STARTED_MAGIC;
   WATCHDOG_SCRATCH0 = STARTED_MAGIC;
 
-  PSM_WDSEL = PSM_WDSEL_ALL_BUT_OSCILLATORS;
   port_watchdog_feed();
-  REG32_SET(WATCHDOG_CTRL) = WATCHDOG_CTRL_ENABLE;
-
   if (resets_release(RESETS_TIMER) != FT_OK)
     port_panic();
   REG32_SET(TIMER_INTE) = TIMER_ALARM0_BIT;

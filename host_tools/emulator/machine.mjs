@@ -16,7 +16,7 @@ import { CdcClient } from './usb/cdc_client.mjs';
 import { UsbHost } from './usb/host.mjs';
 
 export const DEFAULT_SERIAL = 'e660583883265a2c';
-/** By then the firmware must run at the board's frequency. */
+/** So long after a start the firmware must run at the board's frequency. */
 const CLOCK_CHECK_NS = 200e6;
 
 export class Machine {
@@ -62,6 +62,17 @@ export class Machine {
     this.faults = new Faults(faults, this.scope, {
       ...Object.fromEntries(Object.keys(this.board.faultActions).map(onBoard)),
       power_cut: (_, active) => (active ? this.#powerDown() : this.#guard(() => this.#powerBack())),
+      crystal_dead: (_, active) => {
+        this.trouble.crystalDead = active;
+        this.chip.xosc.count();
+      },
+      crystal_weak: (_, active) => {
+        this.trouble.crystalWeak = active;
+      },
+      pll_late: (_, active) => {
+        this.trouble.pllLate = active;
+        for (const pll of [this.chip.pllSys, this.chip.pllUsb]) pll.lock();
+      },
       usb_late_resume: (_, active) => {
         this.trouble.lateResume = active;
       },
@@ -70,13 +81,13 @@ export class Machine {
       host_stall: (_, active) => this.client.setStalled(active),
       usb_unplug: (_, active) => (active ? this.host.unplug() : this.host.plug()),
     });
-    this.scope.createAlarm(() => this.#checkClock()).scheduleAt(CLOCK_CHECK_NS);
+    this.clockAlarm = this.scope.createAlarm(() => this.#checkClock());
     this.#guard(() => this.#powerUp(null));
   }
 
   #checkClock() {
-    const { clkSys } = this.chip;
-    if (clkSys !== this.Board.clkSys_Hz) this.report.warn('clocks', `clk_sys is ${clkSys / 1e6} MHz; this board runs at ${this.Board.clkSys_Hz / 1e6} MHz`);
+    const { clkSys, wild } = this.chip;
+    if (!wild && clkSys !== this.Board.clkSys_Hz) this.report.warn('clocks', `clk_sys is ${clkSys / 1e6} MHz; this board runs at ${this.Board.clkSys_Hz / 1e6} MHz`);
   }
 
   #powerUp(kept) {
@@ -85,6 +96,7 @@ export class Machine {
     this.board.attachChip(this.chip);
     this.host.connect(this.chip.usbCtrl);
     this.chip.boot();
+    this.clockAlarm.schedule(CLOCK_CHECK_NS);
     this.onPowerUp?.(this.chip);
   }
 

@@ -150,3 +150,25 @@ test('a bus that is asleep for long is no reason to attach anew', () => {
   bench.stream();
   assert.equal(bench.end().usb.enumerations, 1);
 });
+
+/** A start with this fault from power-on to `to_ms`: how often the watchdog must help, and by when the streams come. */
+function starts(what, faults, reboots, limit_ms) {
+  for (const name of BOARDS) {
+    test(`${name}: ${what}`, (t) => {
+      const bench = new Bench(name, { faults });
+      const back_ms = bench.stream(limit_ms);
+      t.diagnostic(`streams after ${back_ms.toFixed(0)} ms`);
+      assert.ok(back_ms < limit_ms, `${back_ms}`);
+      bench.assertStreams(50);
+      assert.equal(bench.end().reboots, reboots);
+    });
+  }
+}
+const until = (type, to_ms) => [{ type, from_s: 0, to_s: to_ms / 1000 }];
+
+starts('a crystal that swings in full after 5 ms', until('crystal_weak', 5), 0, 60);
+starts('a crystal that swings in full after 40 ms, past what is waited for: the watchdog helps', until('crystal_weak', 40), 1, 700);
+starts('a crystal that begins to swing after 70 ms', until('crystal_dead', 70), 0, 130);
+starts('a crystal that begins to swing after 400 ms', until('crystal_dead', 400), 2, 700);
+starts('PLLs that lock after 60 ms', until('pll_late', 60), 0, 130);
+starts('PLLs that lock after 400 ms', until('pll_late', 400), 2, 700);

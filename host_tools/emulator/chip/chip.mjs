@@ -115,6 +115,8 @@ export class Chip extends RP2040 {
     this.hooks = new Map();
     this.slept_since_ns = -1;
     this.sleepCycles = 0;
+    /** Executes nothing that makes sense until it is reset: its clock is none. */
+    this.wild = false;
     this.onWatchdog = null;
     this.onUsbBoot = null;
     this.sysClock = new SysClock(time, this.trueHz(ROSC_HZ));
@@ -251,6 +253,8 @@ export class Chip extends RP2040 {
       for (const block of [this.dma, ...this.pio]) block.clockChanged();
       this.ppb.systickTimer.frequency = this.trueHz(hz);
     } else if (!hz) this.fail('CLOCKS', 'clk_sys stopped');
+    if (this.trouble.crystalWeak && this.clocks.onCrystal) this.wild = true;
+    this.watchdog.tickChanged();
     this.clkUsbHz = this.clocks.usbHz;
     this.clkPeri = this.clocks.periHz || this.clkPeri;
   }
@@ -366,6 +370,11 @@ export class Chip extends RP2040 {
       const next = Math.min(time.next_ns, end_ns);
       if (now < this.starts_ns) {
         time.advanceTo(Math.min(next, this.starts_ns));
+        continue;
+      }
+      if (this.wild) {
+        time.advanceTo(next);
+        time.earliestChanged = false;
         continue;
       }
       if (core.waiting) {
