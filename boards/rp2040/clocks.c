@@ -47,12 +47,19 @@ static void start_pll(uint32_t base, uint32_t feedback_divider, uint32_t post_di
 }
 
 void clocks_start(void) {
-  /* A debugger may come here with everything running. */
+  /* A debugger may come here with everything running, and whatever ran before may have left other
+   * sources and dividers, as pico-sdk's clock_configure() expects too. */
   REG32(CLK_SYS_RESUS_CTRL) = 0;
   REG32_CLEAR(CLK_SYS_CTRL) = CLK_SYS_SRC_AUX;
   wait_for(CLK_SYS_SELECTED, 1u << CLK_SYS_SRC_REF);
+  REG32(CLK_SYS_CTRL) = CLK_SYS_SRC_REF;
   REG32(CLK_REF_CTRL) = CLK_REF_SRC_ROSC;
   wait_for(CLK_REF_SELECTED, 1u << CLK_REF_SRC_ROSC);
+  REG32_CLEAR(CLK_PERI_CTRL) = CLK_CTRL_ENABLE;
+  REG32_CLEAR(CLK_USB_CTRL) = CLK_CTRL_ENABLE;
+  REG32(CLK_REF_DIV) = CLK_DIV_1;
+  REG32(CLK_SYS_DIV) = CLK_DIV_1;
+  REG32(CLK_USB_DIV) = CLK_DIV_1;
   REG32(CLK_PERI_CTRL) = 0;
   REG32(CLK_USB_CTRL) = 0;
   resets_assert(RESETS_ALL & ~(RESETS_IO_QSPI | RESETS_PADS_QSPI));

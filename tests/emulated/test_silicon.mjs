@@ -172,3 +172,16 @@ starts('a crystal that begins to swing after 70 ms', until('crystal_dead', 70), 
 starts('a crystal that begins to swing after 400 ms', until('crystal_dead', 400), 2, 700);
 starts('PLLs that lock after 60 ms', until('pll_late', 60), 0, 130);
 starts('PLLs that lock after 400 ms', until('pll_late', 400), 2, 700);
+
+test('what a debugger left in the clock generators does not stay', () => {
+  const bench = new Bench('pico_mux');
+  const { clocks, core } = bench.machine.chip;
+  bench.until(() => clocks.sysHz === 125e6, 20, 'clock');
+  for (const generator of [clocks.ref, clocks.sys, clocks.usb]) generator.div = 0x200;
+  for (const generator of [clocks.sys, clocks.peri, clocks.usb]) generator.ctrl |= 1 << 5;
+  core.registers[15] = bench.machine.chip.flashView.getUint32(0x104, true) & ~1; // as `load` and `run` do
+  core.registers[13] = bench.machine.chip.flashView.getUint32(0x100, true);
+  bench.stream();
+  assert.deepEqual([clocks.refHz, clocks.sysHz, clocks.periHz, clocks.usbHz], [12e6, 125e6, 125e6, 48e6]);
+  assert.equal(bench.end().reboots, 0);
+});
