@@ -11,6 +11,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { findBoard } from '../../host_tools/emulator/board/boards.mjs';
+import { MemoryFault } from '../../host_tools/emulator/chip/mpu.mjs';
 import { parseFaults } from '../../host_tools/emulator/faults.mjs';
 import { Machine } from '../../host_tools/emulator/machine.mjs';
 import { steady } from './harness/bench.mjs';
@@ -184,4 +185,18 @@ test('what a debugger left in the clock generators does not stay', () => {
   bench.stream();
   assert.deepEqual([clocks.refHz, clocks.sysHz, clocks.periHz, clocks.usbHz], [12e6, 125e6, 125e6, 48e6]);
   assert.equal(bench.end().reboots, 0);
+});
+
+test('a stack that grows out of its bank, and a null pointer, are faults; the image starts anew', (t) => {
+  const bench = new Bench('pico_mux');
+  bench.stream();
+  const { chip } = bench.machine;
+  assert.throws(() => chip.busRead(0x14, 4), MemoryFault);
+  bench.until(() => chip.core.waiting, 10, 'sleep');
+  chip.core.registers[13] = 0x20041008;
+  const from_ms = bench.now_ms;
+  bench.until(() => bench.machine.reboots === 1, 10, 'reboot');
+  const back_ms = bench.stream() - from_ms;
+  t.diagnostic(`streams again after ${back_ms.toFixed(0)} ms`);
+  bench.end();
 });

@@ -23,6 +23,7 @@ import { FLASH_BASE, FLASH_BYTES, RAM_BASE, StrictCore } from './core.mjs';
 import { Dma } from './dma.mjs';
 import { FlashMemory } from './flash_memory.mjs';
 import { I2cBlock } from './i2c_block.mjs';
+import { MemoryFault, Mpu } from './mpu.mjs';
 import { Pins } from './pins.mjs';
 import { Pio } from './pio.mjs';
 import { RegisterFile } from './registers.mjs';
@@ -107,6 +108,7 @@ export class Chip extends RP2040 {
     this.trouble = trouble;
     this.logger = new StrictLogger(this);
     this.core = new StrictCore(this);
+    this.mpu = new Mpu(this, () => this.core.guard(this.mpu.denied));
     this.sio = new StrictSio(this);
     /** Frequencies are nominal here, as the firmware believes them; what passes in time is this many times as fast. */
     this.clockRate = 1 + clock_ppm * 1e-6;
@@ -302,6 +304,7 @@ export class Chip extends RP2040 {
 
   /** A load that did not hit SRAM. */
   busRead(address, bytes) {
+    if (this.core.isGuarded && this.mpu.denies(address)) throw new MemoryFault();
     if (address & (bytes - 1)) this.fail('core', `unaligned ${8 * bytes}-bit read of 0x${address.toString(16)}`);
     const word = (address & ~3) >>> 0;
     let value;
@@ -315,7 +318,8 @@ export class Chip extends RP2040 {
     } else if (address >>> 28 === 0xd) {
       value = this.sio.readUint32(word - 0xd0000000);
     } else if (address >>> 12 === 0xe000e) {
-      value = this.ppb.readUint32(word & 0xfff);
+      const offset = word & 0xfff;
+      value = offset >= 0xd90 && offset <= 0xda0 ? this.mpu.read(offset) : this.ppb.readUint32(offset);
     } else if (address >>> 12 === DPRAM_BASE >>> 12) {
       this.#checkPage(address, 'read of');
       value = this.usbDPRAMView.getUint32(word - DPRAM_BASE, true);
@@ -331,6 +335,7 @@ export class Chip extends RP2040 {
 
   /** A store that did not hit SRAM. Narrow stores to peripherals replicate the value, as the bus does. */
   busWrite(address, value, bytes) {
+    if (this.core.isGuarded && this.mpu.denies(address)) throw new MemoryFault();
     if (address & (bytes - 1)) this.fail('core', `unaligned ${8 * bytes}-bit write of 0x${address.toString(16)}`);
     if (address < 0x4000) this.fail('core', `write to 0x${address.toString(16)} in the boot ROM (null pointer?)`);
     if (address >>> 26 === FLASH_BASE >>> 26) this.fail('core', `write to 0x${address.toString(16)} in flash`);
@@ -345,7 +350,9 @@ export class Chip extends RP2040 {
       this.sio.writeUint32(address - 0xd0000000, value);
     } else if (address >>> 12 === 0xe000e) {
       if (bytes !== 4) this.fail('core', `${8 * bytes}-bit write of system register 0x${address.toString(16)}`);
-      this.ppb.writeUint32(address & 0xfff, value);
+      const offset = address & 0xfff;
+      if (offset >= 0xd90 && offset <= 0xda0) this.mpu.write(offset, value);
+      else this.ppb.writeUint32(offset, value);
     } else {
       const peripheral = this.findPeripheral(address);
       if (!peripheral) this.fail('core', `write to 0x${address.toString(16)}, where nothing is`);
@@ -389,12 +396,17 @@ export class Chip extends RP2040 {
       this.slept_since_ns = -1;
       const stop = core.cycles + Math.max(1, Math.ceil((next - now) / time.ns_per_cycle - 1e-9));
       time.earliestChanged = false;
-      if (this.hooks.size) {
-        do {
-          this.hooks.get(core.registers[15] & ~1)?.(this);
-          core.executeInstruction();
-        } while (core.cycles < stop && !core.waiting && !time.earliestChanged);
-      } else core.execute(stop, time);
+      try {
+        if (this.hooks.size) {
+          do {
+            this.hooks.get(core.registers[15] & ~1)?.(this);
+            core.executeInstruction();
+          } while (core.cycles < stop && !core.waiting && !time.earliestChanged);
+        } else core.execute(stop, time);
+      } catch (error) {
+        if (!(error instanceof MemoryFault)) throw error;
+        core.hardFault();
+      }
     }
   }
 }
