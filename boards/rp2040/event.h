@@ -1,4 +1,5 @@
-/* The event interrupt of port.h: all interrupts have one priority, so handlers never nest. */
+/* The event interrupt of port.h. What leads to it has one priority, so its handlers never nest;
+ * those of USB come above them, and share nothing with them. */
 #ifndef RP2040_EVENT_H
 #define RP2040_EVENT_H
 

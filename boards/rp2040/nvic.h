@@ -12,6 +12,9 @@ enum rp2040_irq {
   RP2040_IRQ_USB_SERVICE = 26, /* wired to no block: for software */
 };
 
+/* Gives every line its priority (vectors.S). */
+void rp2040_irq_set_priorities(void);
+
 /* Forgets what is pending on the line and lets it interrupt. */
 void rp2040_irq_enable(unsigned irq);
 

@@ -185,6 +185,7 @@ void port_start(void) {
   WATCHDOG_SCRATCH0 = STARTED_MAGIC;
 
   guard_memory();
+  rp2040_irq_set_priorities();
   port_watchdog_feed();
   if (resets_release(RESETS_TIMER) != FT_OK)
     port_panic();

@@ -85,6 +85,7 @@ static bool in_frame_tail(void) {
 
 static void start_frame(void) {
   frame_start_us = TIMER_TIMERAWL;
+  (void)USB_SOF_RD;
   alive_us = frame_start_us;
   for (uint8_t number = 1; deferred && number < ENDPOINT_NUMBERS; number++) {
     uint8_t endpoint = USB_ENDPOINT_IN | number;
@@ -319,6 +320,8 @@ static void set_suspended(bool now) {
 /* What was finished before a SETUP is handled before it, so that an address set counts. */
 void usbctrl_irq_handler(void) {
   uint32_t interrupts = USB_INTS;
+  if (interrupts & USB_INT_DEV_SOF)
+    start_frame();
   if (interrupts & USB_INT_BUS_RESET) {
     if (is_unasked_for(TIMER_TIMERAWL)) {
       start_over();
@@ -334,10 +337,6 @@ void usbctrl_irq_handler(void) {
     REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_RESUME;
   if (interrupts & (USB_INT_DEV_RESUME | USB_INT_DEV_SOF | USB_INT_SETUP_REQ | USB_INT_BUFF_STATUS))
     set_suspended(false);
-  if (interrupts & USB_INT_DEV_SOF) {
-    (void)USB_SOF_RD;
-    start_frame();
-  }
   if (interrupts & USB_INT_BUFF_STATUS) {
     uint32_t finished = REG32(USB_BUFF_STATUS);
     for (uint8_t number = 0; number < ENDPOINT_NUMBERS; number++) {

@@ -1,40 +1,60 @@
-/* The vector table in SRAM (ARMv6-M B1.5.3; interrupts: RP2040 datasheet 2.3.2). What nobody
- * handles is a fault. A handler that the image links replaces its weak name here.
+/* The vector table in SRAM (ARMv6-M B1.5.3; interrupts: RP2040 datasheet 2.3.2), and the priority of
+ * each interrupt as NVIC_IPR wants it: 0 comes before 0x40. What nobody handles is a fault. A handler
+ * that the image links replaces its weak name here.
+ *
+ * USB comes first, for the time of a frame's start counts (TinyUSB reads it before anything else) and
+ * so does the time from a SETUP to what answers the next token.
  */
   .syntax unified
   .cpu cortex-m0plus
   .thumb
 
-  .macro interrupt handler
+  .equ FIRST, 0
+  .equ NEXT, 0x40
+
+  .macro interrupt handler, priority
   .weak \handler
   .thumb_set \handler, unexpected_exception
   .word \handler
+  .pushsection .rodata.irq_priorities, "a"
+  .byte \priority
+  .popsection
   .endm
 
   .macro unexpected count
   .rept \count
   .word unexpected_exception
+  .pushsection .rodata.irq_priorities, "a"
+  .byte NEXT
+  .popsection
   .endr
   .endm
+
+  .section .rodata.irq_priorities, "a"
+  .balign 4
+  .global rp2040_irq_priorities
+rp2040_irq_priorities:
 
   .section .vectors, "a"
   .global __vectors
 __vectors:
   .word __stack_top
   .word boot_reset
-  unexpected 14 /* NMI, HardFault, SVCall, PendSV, SysTick */
-  interrupt timer0_irq_handler /* 0 */
-  interrupt timer1_irq_handler
+  .rept 14
+  .word unexpected_exception /* NMI, HardFault, SVCall, PendSV, SysTick */
+  .endr
+  interrupt timer0_irq_handler, NEXT /* 0 */
+  interrupt timer1_irq_handler, FIRST
   unexpected 3
-  interrupt usbctrl_irq_handler /* 5 */
+  interrupt usbctrl_irq_handler, FIRST /* 5 */
   unexpected 1
-  interrupt pio0_irq_handler /* 7 */
+  interrupt pio0_irq_handler, NEXT /* 7 */
   unexpected 3
-  interrupt dma0_irq_handler /* 11 */
+  interrupt dma0_irq_handler, NEXT /* 11 */
   unexpected 11
-  interrupt i2c0_irq_handler /* 23 */
+  interrupt i2c0_irq_handler, NEXT /* 23 */
   unexpected 2
-  interrupt usb_service_irq_handler /* 26 */
+  interrupt usb_service_irq_handler, FIRST /* 26 */
   unexpected 5
 
   .section .text.unexpected_exception, "ax"

@@ -200,3 +200,16 @@ test('a stack that grows out of its bank, and a null pointer, are faults; the im
   t.diagnostic(`streams again after ${back_ms.toFixed(0)} ms`);
   bench.end();
 });
+
+for (const name of BOARDS) {
+  test(`${name}: the start of a frame is seen at once, whatever the sensors need`, (t) => {
+    const faults = [{ type: 'sensor_dead', sensor: 3, from_s: 0.2, to_s: 0.25 }];
+    const bench = new Bench(name, { faults });
+    bench.stream();
+    bench.run(1500); // all PROMs are read and judged again
+    const slowest_us = bench.machine.chip.usbCtrl.slowestSof_ns / 1000;
+    t.diagnostic(`${slowest_us.toFixed(1)} us`);
+    assert.ok(slowest_us < 20, `${slowest_us} us`);
+    bench.end();
+  });
+}

@@ -75,6 +75,9 @@ export class UsbBlock extends BasePeripheral {
     this.intf = 0;
     this.frame = 0;
     this.sofPending = false;
+    this.sof_ns = 0;
+    /** The longest from the start of a frame to the reading of SOF_RD. */
+    this.slowestSof_ns = 0;
     this.phy = new Map();
     this.select = new Uint8Array(32);
     this.fieldsWritten_ns = new Float64Array(64).fill(-1e9);
@@ -124,6 +127,7 @@ export class UsbBlock extends BasePeripheral {
       case 0x40:
         return this.mainCtrl;
       case 0x48:
+        if (this.sofPending) this.slowestSof_ns = Math.max(this.slowestSof_ns, this.rp2040.clock.nanos - this.sof_ns);
         this.sofPending = false;
         this.#update();
         return this.frame;
@@ -382,6 +386,7 @@ export class UsbBlock extends BasePeripheral {
   sof(frame) {
     if (this.hung === 'dead') return;
     this.frame = frame & 0x7ff;
+    if (!this.sofPending) this.sof_ns = this.rp2040.clock.nanos;
     this.sofPending = true;
     if (this.inte & (1 << 17)) this.#update();
   }
