@@ -48,13 +48,23 @@ enum { ENDPOINT_NUMBERS = 3 };
 /* Ample for a hub to notice, which debounces for 100 ms (USB 2.0, TATTDB). */
 #define DETACHED_us 100000u
 
+#define CONTROL_BITS (USB_BIT(USB_ENDPOINT_IN) | USB_BIT(0))
+
+/* What the controller's interrupt leaves to the service interrupt, masked until then. */
+#define SERVED                                                                                     \
+  (USB_INT_BUS_RESET | USB_INT_SETUP_REQ | USB_INT_BUFF_STATUS | USB_INT_DEV_SUSPEND |             \
+   USB_INT_DEV_RESUME)
+
 /* One bit for each endpoint, as in BUFF_STATUS */
 static uint32_t data1;    /* the next packet is DATA1 */
 static uint32_t held;     /* it offers a packet, or accepts one */
 static uint32_t deferred; /* held, but not before the next frame */
 static uint32_t bulk;
 
-static uint32_t frame_start_us;
+/* The controller's own interrupt writes these two; all else belongs to the service interrupt. */
+static volatile uint32_t frame_start_us;
+static volatile bool frame_began;
+
 static bool suspended;
 static bool can_abort;
 
@@ -84,8 +94,7 @@ static bool in_frame_tail(void) {
 }
 
 static void start_frame(void) {
-  frame_start_us = TIMER_TIMERAWL;
-  (void)USB_SOF_RD;
+  frame_began = false;
   alive_us = frame_start_us;
   for (uint8_t number = 1; deferred && number < ENDPOINT_NUMBERS; number++) {
     uint8_t endpoint = USB_ENDPOINT_IN | number;
@@ -105,11 +114,25 @@ static void begin_abort(uint32_t bit) {
   }
 }
 
-static void end_abort(uint32_t bit) {
+/* Not of endpoint 0 while a SETUP waits: see silence_control(). */
+static void end_abort(uint32_t bits) {
   if (!can_abort)
     return;
-  REG32_CLEAR(USB_EP_ABORT_DONE) = bit;
-  REG32_CLEAR(USB_EP_ABORT) = bit;
+  if (REG32(USB_SIE_STATUS) & USB_SIE_STATUS_SETUP_REC)
+    bits &= ~CONTROL_BITS;
+  REG32_CLEAR(USB_EP_ABORT_DONE) = bits;
+  REG32_CLEAR(USB_EP_ABORT) = bits;
+}
+
+/* What a control transfer that the host has abandoned left must not answer for the one that
+ * follows: until on_setup() has taken it back, endpoint 0 answers with NAK. */
+static void silence_control(void) {
+  if (can_abort) {
+    REG32_SET(USB_EP_ABORT) = CONTROL_BITS;
+  } else {
+    USB_BUFFER_CONTROL(USB_ENDPOINT_IN) &= ~USB_BUFFER_AVAILABLE;
+    USB_BUFFER_CONTROL(0) &= ~USB_BUFFER_AVAILABLE;
+  }
 }
 
 bool usb_controller_withdraw(uint8_t endpoint) {
@@ -218,8 +241,7 @@ static void attach(void) {
   USB_PWR = USB_PWR_VBUS_DETECT | USB_PWR_VBUS_DETECT_OVERRIDE_EN; /* powered by the bus */
   USB_MAIN_CTRL = USB_MAIN_CTRL_CONTROLLER_EN;
   REG32(USB_SIE_CTRL) = USB_SIE_CTRL_EP0_INT_1BUF;
-  USB_INTE = USB_INT_BUS_RESET | USB_INT_SETUP_REQ | USB_INT_BUFF_STATUS | USB_INT_DEV_SUSPEND |
-             USB_INT_DEV_RESUME | USB_INT_DEV_SOF;
+  REG32(USB_INTE) = SERVED | USB_INT_DEV_SOF;
   rp2040_irq_enable(RP2040_IRQ_USBCTRL);
   REG32_SET(USB_SIE_CTRL) = USB_SIE_CTRL_PULLUP_EN;
   detached = false;
@@ -235,6 +257,7 @@ static void start_over(void) {
   deferred = 0;
   data1 = 0;
   suspended = false;
+  frame_began = false;
   unasked_resets = 0;
   detached = true;
   usb_device_on_bus_reset();
@@ -283,6 +306,7 @@ static void on_setup(void) {
   usb_controller_withdraw(0);
   USB_BUFFER_CONTROL(USB_ENDPOINT_IN) = 0; /* a stall ends here */
   USB_BUFFER_CONTROL(0) = 0;
+  end_abort(CONTROL_BITS);
   data1 |= USB_BIT(USB_ENDPOINT_IN) | USB_BIT(0);
   usb_device_on_setup(packet);
 }
@@ -318,10 +342,12 @@ static void set_suspended(bool now) {
 }
 
 /* What was finished before a SETUP is handled before it, so that an address set counts. */
-void usbctrl_irq_handler(void) {
-  uint32_t interrupts = USB_INTS;
-  if (interrupts & USB_INT_DEV_SOF)
+static void serve(void) {
+  uint32_t interrupts = USB_INTR & SERVED;
+  if (frame_began) {
     start_frame();
+    interrupts |= USB_INT_DEV_SOF;
+  }
   if (interrupts & USB_INT_BUS_RESET) {
     if (is_unasked_for(TIMER_TIMERAWL)) {
       start_over();
@@ -348,10 +374,28 @@ void usbctrl_irq_handler(void) {
   }
   if (interrupts & USB_INT_SETUP_REQ)
     on_setup();
+  REG32_SET(USB_INTE) = SERVED;
 }
 
 void usb_service_irq_handler(void) {
+  if (!detached)
+    serve();
   usb_device_on_service();
+}
+
+/* What cannot wait, and nothing else: it interrupts the handling of the rest too. A token that
+ * follows a SETUP comes 3 us later. */
+void usbctrl_irq_handler(void) {
+  uint32_t interrupts = USB_INTS;
+  if (interrupts & USB_INT_SETUP_REQ)
+    silence_control();
+  if (interrupts & USB_INT_DEV_SOF) {
+    frame_start_us = TIMER_TIMERAWL;
+    (void)USB_SOF_RD;
+    frame_began = true;
+  }
+  REG32_CLEAR(USB_INTE) = interrupts & SERVED;
+  rp2040_irq_pend(RP2040_IRQ_USB_SERVICE);
 }
 
 void usb_controller_request_service(void) {

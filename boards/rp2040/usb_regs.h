@@ -63,7 +63,8 @@
 #define USB_PWR REG32(USB_BASE + 0x78u)
 #define USB_PWR_VBUS_DETECT (1u << 2)
 #define USB_PWR_VBUS_DETECT_OVERRIDE_EN (1u << 3)
-#define USB_INTE REG32(USB_BASE + 0x90u)
+#define USB_INTR REG32(USB_BASE + 0x8cu) /* masked by nothing */
+#define USB_INTE (USB_BASE + 0x90u)
 #define USB_INTS REG32(USB_BASE + 0x98u)
 #define USB_INT_DEV_SOF (1u << 17)
 #define USB_INT_SETUP_REQ (1u << 16)

@@ -1,16 +1,18 @@
 /* The vector table in SRAM (ARMv6-M B1.5.3; interrupts: RP2040 datasheet 2.3.2), and the priority of
- * each interrupt as NVIC_IPR wants it: 0 comes before 0x40. What nobody handles is a fault. A handler
+ * each interrupt as NVIC_IPR wants it. What nobody handles is a fault. A handler
  * that the image links replaces its weak name here.
  *
- * USB comes first, for the time of a frame's start counts (TinyUSB reads it before anything else) and
- * so does the time from a SETUP to what answers the next token.
+ * The USB controller comes first, for the time of a frame's start counts (TinyUSB reads it before
+ * anything else) and so does the time from a SETUP to what answers the next token. What else USB has to
+ * do comes before the sensors.
  */
   .syntax unified
   .cpu cortex-m0plus
   .thumb
 
   .equ FIRST, 0
-  .equ NEXT, 0x40
+  .equ SECOND, 0x40
+  .equ THIRD, 0x80
 
   .macro interrupt handler, priority
   .weak \handler
@@ -25,7 +27,7 @@
   .rept \count
   .word unexpected_exception
   .pushsection .rodata.irq_priorities, "a"
-  .byte NEXT
+  .byte THIRD
   .popsection
   .endr
   .endm
@@ -43,18 +45,18 @@ __vectors:
   .rept 14
   .word unexpected_exception /* NMI, HardFault, SVCall, PendSV, SysTick */
   .endr
-  interrupt timer0_irq_handler, NEXT /* 0 */
-  interrupt timer1_irq_handler, FIRST
+  interrupt timer0_irq_handler, THIRD /* 0 */
+  interrupt timer1_irq_handler, SECOND
   unexpected 3
   interrupt usbctrl_irq_handler, FIRST /* 5 */
   unexpected 1
-  interrupt pio0_irq_handler, NEXT /* 7 */
+  interrupt pio0_irq_handler, THIRD /* 7 */
   unexpected 3
-  interrupt dma0_irq_handler, NEXT /* 11 */
+  interrupt dma0_irq_handler, THIRD /* 11 */
   unexpected 11
-  interrupt i2c0_irq_handler, NEXT /* 23 */
+  interrupt i2c0_irq_handler, THIRD /* 23 */
   unexpected 2
-  interrupt usb_service_irq_handler, FIRST /* 26 */
+  interrupt usb_service_irq_handler, SECOND /* 26 */
   unexpected 5
 
   .section .text.unexpected_exception, "ax"

@@ -14,6 +14,7 @@ import { findBoard } from '../../host_tools/emulator/board/boards.mjs';
 import { MemoryFault } from '../../host_tools/emulator/chip/mpu.mjs';
 import { parseFaults } from '../../host_tools/emulator/faults.mjs';
 import { Machine } from '../../host_tools/emulator/machine.mjs';
+import { setupPacket } from '../../host_tools/emulator/usb/host.mjs';
 import { steady } from './harness/bench.mjs';
 
 const [images, fingertip] = process.argv.slice(2);
@@ -213,3 +214,26 @@ for (const name of BOARDS) {
     bench.end();
   });
 }
+
+/** A host that gives a request up and begins the next in the same frame; the answer must be to the second. */
+test('a control transfer that the host abandons leaves nothing for the next', () => {
+  const bench = new Bench('pico_parallel');
+  bench.stream();
+  const { client, host, time } = bench.machine;
+  client.write(encoded('osr', '256'));
+  let wrong = 0;
+  for (let i = 0; i < 600; i++) {
+    const abandoned = host.control(setupPacket(0x80, 6, 2 << 8, 0, 67), null, () => {});
+    assert.ok(bench.machine.run(time.nanos + 20e3 + i * 350), bench.machine.endReason);
+    host.cancel(abandoned);
+    let answer = null;
+    host.control(setupPacket(0x80, 8, 0, 0, 1), null, (status, data) => {
+      answer = `${status} ${Buffer.from(data).toString('hex')}`;
+    });
+    bench.until(() => answer, 5, 'answer');
+    wrong += answer !== 'ok 01';
+  }
+  assert.equal(wrong, 0);
+  bench.assertStreams(20);
+  bench.end();
+});

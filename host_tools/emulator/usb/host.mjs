@@ -27,6 +27,8 @@ const HANDSHAKE_ONLY_NS = 8e3;
 const RETRY_NS = 10e3;
 const FRAME_NS = 1e6;
 const SOF_NS = 3e3;
+/** Sync, PID, address, endpoint, CRC and end of a token: the controller answers it with what it has then. */
+const TOKEN_NS = 35e3 / 12;
 const CONTROL_TIMEOUT_NS = 5e9;
 const IDLE_SUSPENDS_NS = 3e6;
 /** USB 2.0, 7.1.7.7: resume signalling lasts 20 ms, and the device has 10 ms to recover. */
@@ -492,6 +494,7 @@ export class UsbHost {
     this.onPacket({ t_ns: this.scope.nanos, endpoint: 0, isIn: false, setup: true, data: transfer.packet });
     pipe.toggle = 1;
     transfer.stage = transfer.length ? 'data' : 'status';
+    this.bus_free_ns += TOKEN_NS;
   }
 
   #refused({ pipe, transfer, armedMeanwhile }, answer) {
