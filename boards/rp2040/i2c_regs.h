@@ -35,6 +35,9 @@
 #define IC_ENABLE REG32(I2C0_BASE + 0x6cu) /* bit 0; 0 flushes both FIFOs */
 #define IC_RXFLR REG32(I2C0_BASE + 0x78u)
 #define IC_SDA_HOLD REG32(I2C0_BASE + 0x7cu) /* written only while disabled */
+/* 0 has the controller lose arbitration to a target that pulls SDA right after SCL falls (Linux,
+ * i2c-designware: "avoid aborted transfers with fast reacting I2C slaves"). */
+#define IC_SDA_HOLD_RX(cycles) ((cycles) << 16)
 
 #define IC_TX_ABRT_SOURCE REG32(I2C0_BASE + 0x80u)
 #define IC_TX_ABRT_7B_ADDR_NOACK (1u << 0)

@@ -11,6 +11,7 @@
  *     sensor_brown_out (sensor)     its supply dips at from_s: a conversion is lost, and until a reset its codes are 1/16 too small
  *     sensor_d2_corrupt (sensor)    every temperature has one bit inverted
  *     sensor_noisy (sensor)         ten times the noise of the datasheet
+ *     sensor_fast (sensor)          acknowledges so soon that an I2C controller without a receive hold takes it for lost arbitration
  *     sda_stuck_low (sensor)        pulls SDA from from_s until nine clocks reached it or its multiplexer was reset
  *     mux_stuck (mux)               acknowledges nothing until its RESET line was pulsed
  *     mux_dead (mux)                acknowledges nothing and connects nothing
@@ -44,6 +45,7 @@ const TARGET = {
   sensor_brown_out: 'sensor',
   sensor_d2_corrupt: 'sensor',
   sensor_noisy: 'sensor',
+  sensor_fast: 'sensor',
   sda_stuck_low: 'sensor',
   mux_stuck: 'mux',
   mux_dead: 'mux',
@@ -122,7 +124,7 @@ export class Faults {
     this.active = new Set();
     const key = {
       sensor_dead: 'dead', sensor_prom_corrupt: 'promCorrupt', sensor_prom_bit: 'promBit', sensor_adc_zero: 'adcZero',
-      sensor_d2_corrupt: 'd2Corrupt', sensor_noisy: 'noisy',
+      sensor_d2_corrupt: 'd2Corrupt', sensor_noisy: 'noisy', sensor_fast: 'fast',
     };
     /** How many have begun. */
     const times = { sensor_nack: 'nacks', sensor_brown_out: 'brownOuts' };

@@ -237,3 +237,12 @@ test('a control transfer that the host abandons leaves nothing for the next', ()
   bench.assertStreams(20);
   bench.end();
 });
+
+test('sensors that acknowledge as soon as SCL falls cost no arbitration', () => {
+  const bench = new Bench('pico_mux', { faults: [3, 7, 14].map((sensor) => ({ type: 'sensor_fast', sensor, from_s: 0 })) });
+  bench.stream();
+  bench.run(200);
+  const { frames_incomplete, bus_recoveries, bus_timeouts } = bench.health();
+  assert.deepEqual([frames_incomplete, bus_recoveries, bus_timeouts], [0, 0, 0]);
+  bench.end();
+});

@@ -97,7 +97,7 @@ export class Ms5840 extends I2cTarget {
   /**
    * @param options index; prng: this sensor's own; now_ns: () => time; report: Report;
    *   stimulus: (index, t_ns) => { pressure_Pa, temperature_degC }, absolute;
-   *   faults: (index) => { dead, promCorrupt, promBit, adcZero, d2Corrupt, noisy } of this moment, { nacks, brownOuts } so far
+   *   faults: (index) => { dead, promCorrupt, promBit, adcZero, d2Corrupt, noisy, fast } of this moment, { nacks, brownOuts } so far
    */
   constructor({ index, prng, now_ns, report, stimulus, faults = () => ({}) }) {
     super(ADDRESS);
@@ -115,6 +115,8 @@ export class Ms5840 extends I2cTarget {
     this.tied = false;
     this.nacks = 0;
     this.brownOuts = 0;
+    /** It pulled SDA as soon as SCL fell. */
+    this.onFast = () => {};
     this.powerUp();
   }
 
@@ -169,6 +171,12 @@ export class Ms5840 extends I2cTarget {
     const faults = this.faults(this.index);
     if (this.#struck(faults)) return false;
     return this.now_ns() >= this.busyUntil_ns && !faults.dead && !this.holdsSda;
+  }
+
+  write(byte) {
+    const acknowledged = super.write(byte);
+    if (acknowledged && this.faults(this.index).fast) this.onFast();
+    return acknowledged;
   }
 
   receive(command) {

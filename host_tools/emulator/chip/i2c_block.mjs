@@ -348,15 +348,27 @@ export class I2cBlock extends BasePeripheral {
   /** True (and the transfer is given up) if somebody else pulls SDA. */
   #arbitrationLost() {
     if (!this.bus.sdaLow) return false;
+    this.#loseArbitration();
+    return true;
+  }
+
+  /** Without a receive hold an acknowledgement right after SCL fell looks like another controller's bit. */
+  #confused() {
+    if (!this.bus.wasFast || this.sdaHold >>> 16) return false;
+    this.#loseArbitration();
+    return true;
+  }
+
+  #loseArbitration() {
     this.state = 'idle';
     this.bus.abandon();
     this.#abort(ABRT_ARB_LOST);
-    return true;
   }
 
   #addressed() {
     if (this.#arbitrationLost()) return;
     const acknowledged = this.bus.writeByte(((this.tar & 0x7f) << 1) | (this.reading ? 1 : 0));
+    if (this.#confused()) return;
     if (!acknowledged) {
       this.#abort(ABRT_7B_ADDR_NOACK);
       this.#stopCondition();
@@ -412,7 +424,9 @@ export class I2cBlock extends BasePeripheral {
 
   #transmitted() {
     if (this.#arbitrationLost()) return;
-    if (!this.bus.writeByte(this.command & 0xff)) {
+    const acknowledged = this.bus.writeByte(this.command & 0xff);
+    if (this.#confused()) return;
+    if (!acknowledged) {
       this.#abort(ABRT_TXDATA_NOACK);
       this.#stopCondition();
       return;
