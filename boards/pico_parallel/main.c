@@ -1,6 +1,7 @@
 #include "app/app.h"
 #include "pico_parallel/parallel_bus.h"
 #include "port/port.h"
+#include "rp2040/pico.h"
 
 static struct parallel_bus parallel_bus;
 static struct array_bus array_bus;
@@ -12,7 +13,7 @@ static void on_event(void *context) {
 }
 
 int main(void) {
-  if (parallel_bus_init(&parallel_bus, &array_bus) != FT_OK) {
+  if (pico_steady_supply() != FT_OK || parallel_bus_init(&parallel_bus, &array_bus) != FT_OK) {
     port_panic();
   }
   port_set_event_handler(on_event, 0);

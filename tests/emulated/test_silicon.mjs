@@ -246,3 +246,12 @@ test('sensors that acknowledge as soon as SCL falls cost no arbitration', () => 
   assert.deepEqual([frames_incomplete, bus_recoveries, bus_timeouts], [0, 0, 0]);
   bench.end();
 });
+
+for (const name of BOARDS) {
+  test(`${name}: the Pico's regulator is held in its quiet mode`, () => {
+    const bench = new Bench(name);
+    bench.stream();
+    assert.equal((bench.machine.chip.pins.high >>> 23) & 1, 1);
+    bench.end();
+  });
+}
