@@ -115,7 +115,8 @@ static void test_time_on_the_bus(void) {
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_UINT64(50, fake.now_us);
   TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
-  TEST_ASSERT_EQUAL_UINT64(50 + 146, fake.now_us);
+  TEST_ASSERT_EQUAL_UINT64(50 + 146 + 5 * FT_READ_STOPS, fake.now_us);
+  TEST_ASSERT_EQUAL_UINT(1 + FT_READ_STOPS, fake.stops_of_first);
 }
 
 static void test_arguments_and_order_of_calls(void) {
