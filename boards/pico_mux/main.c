@@ -2,6 +2,9 @@
 #include "pico_mux/mux_bus.h"
 #include "port/port.h"
 #include "rp2040/pico.h"
+#include "rp2040/usb_controller.h"
+
+const bool usb_controller_has_gpio15 = true;
 
 static struct mux_bus mux_bus;
 static struct array_bus array_bus;

@@ -2,6 +2,9 @@
 #include "pico_parallel/parallel_bus.h"
 #include "port/port.h"
 #include "rp2040/pico.h"
+#include "rp2040/usb_controller.h"
+
+const bool usb_controller_has_gpio15 = false;
 
 static struct parallel_bus parallel_bus;
 static struct array_bus array_bus;

@@ -3,18 +3,20 @@
  * datasheet 4.1.2). Every endpoint is single-buffered.
  *
  * Errata: E2 (an abort blocks the controller for good) and E5 (a busy bus hides the end of a bus
- * reset) are fixed in revision B2 of the chip. On B0 and B1 aborts are left out, and E5, whose
- * work-around takes two pins, is not worked around: there the device may not enumerate behind a hub
- * with traffic. E15 (some bus errors in an IN transfer hang the device) stands in all revisions: no
- * bulk IN packet is offered in the last 200 us of a frame, where such errors come from. It can
- * still strike (TinyUSB pull request 1779, embassy issue 2880), and then nothing but a reset of the
- * block helps, not even a bus reset. So the block is reset, and the device attached anew, when the
- * bus is silent and not suspended, or when resets of the bus are followed by no request.
+ * reset) are fixed in revision B2 of the chip. On B0 and B1 aborts are left out, and against E5 the
+ * bus is made to look idle after a reset, if the board can spare GPIO15 for it: else the device may
+ * not enumerate there behind a hub with traffic (pico-sdk, rp2040_usb_device_enumeration.c). E15
+ * (some bus errors in an IN transfer hang the device) stands in all revisions: no bulk IN packet is
+ * offered in the last 200 us of a frame, where such errors come from. It can still strike (TinyUSB
+ * pull request 1779, embassy issue 2880), and then nothing but a reset of the block helps, not even
+ * a bus reset. So the block is reset, and the device attached anew, when the bus is silent and not
+ * suspended, or when resets of the bus are followed by no request.
  */
 #include "rp2040/usb_controller.h"
 
 #include "port/port.h"
 #include "port/usb_controller.h"
+#include "rp2040/gpio.h"
 #include "rp2040/nvic.h"
 #include "rp2040/resets.h"
 #include "rp2040/timer_regs.h"
@@ -22,7 +24,7 @@
 
 #include <string.h>
 
-enum { ENDPOINT_NUMBERS = 3 };
+enum { ENDPOINT_NUMBERS = 3, PIN_DP = 15, FEIGNED_MAX_ms = 5 };
 
 #define SYSINFO_CHIP_ID REG32(0x40000000u)
 #define SYSINFO_CHIP_ID_REVISION(id) ((id) >> 28)
@@ -66,9 +68,11 @@ static volatile uint32_t frame_start_us;
 static volatile bool frame_began;
 
 static bool suspended;
-static bool can_abort;
+static bool is_old; /* before revision B2 */
 
-static bool detached;
+/* What alarm 1 is for */
+static enum { WATCH, ATTACH, AWAIT_END_OF_RESET, FEIGN_IDLE } next;
+static uint32_t feigned_ms;
 static uint32_t alive_us; /* when last the bus was not silent, or was asleep */
 static uint32_t reset_us; /* the last reset of the bus */
 static uint32_t unasked_resets;
@@ -106,7 +110,7 @@ static void start_frame(void) {
 
 /* Stops the controller from touching the buffer. */
 static void begin_abort(uint32_t bit) {
-  if (!can_abort)
+  if (is_old)
     return;
   REG32_SET(USB_EP_ABORT) = bit;
   uint32_t start_us = TIMER_TIMERAWL;
@@ -116,7 +120,7 @@ static void begin_abort(uint32_t bit) {
 
 /* Not of endpoint 0 while a SETUP waits: see silence_control(). */
 static void end_abort(uint32_t bits) {
-  if (!can_abort)
+  if (is_old)
     return;
   if (REG32(USB_SIE_STATUS) & USB_SIE_STATUS_SETUP_REC)
     bits &= ~CONTROL_BITS;
@@ -127,11 +131,11 @@ static void end_abort(uint32_t bits) {
 /* What a control transfer that the host has abandoned left must not answer for the one that
  * follows: until on_setup() has taken it back, endpoint 0 answers with NAK. */
 static void silence_control(void) {
-  if (can_abort) {
-    REG32_SET(USB_EP_ABORT) = CONTROL_BITS;
-  } else {
+  if (is_old) {
     USB_BUFFER_CONTROL(USB_ENDPOINT_IN) &= ~USB_BUFFER_AVAILABLE;
     USB_BUFFER_CONTROL(0) &= ~USB_BUFFER_AVAILABLE;
+  } else {
+    REG32_SET(USB_EP_ABORT) = CONTROL_BITS;
   }
 }
 
@@ -230,10 +234,30 @@ static void look_in(uint32_t us) {
   TIMER_ALARM1 = TIMER_TIMERAWL + us;
 }
 
+/* Erratum E5: after a reset of the bus the controller waits for 800 us of idle bus, which it may
+ * never see. So it is shown the state J for a millisecond: D+ high, through GPIO15. */
+static void feign_idle(void) {
+  gpio_set_function_reading_high(PIN_DP, GPIO_FUNCTION_USB);
+  REG32_SET(USB_PHY_DIRECT) = USB_PHY_DIRECT_DP_PULLUP_EN;
+  REG32_SET(USB_PHY_DIRECT_OVERRIDE) = USB_PHY_DIRECT_OVERRIDE_DP_PULLUP_EN;
+  USB_MUXING = USB_MUXING_TO_PADS | USB_MUXING_SOFTCON;
+}
+
+static void show_bus(void) {
+  USB_MUXING = USB_MUXING_TO_PHY | USB_MUXING_SOFTCON;
+  REG32_CLEAR(USB_PHY_DIRECT_OVERRIDE) = USB_PHY_DIRECT_OVERRIDE_DP_PULLUP_EN;
+  gpio_set_function(PIN_DP, GPIO_FUNCTION_NULL);
+}
+
+static void watch(void) {
+  next = WATCH;
+  look_in(WATCH_us);
+}
+
 static void attach(void) {
   if (resets_release(RESETS_USBCTRL | RESETS_SYSINFO) != FT_OK)
     port_panic();
-  can_abort = SYSINFO_CHIP_ID_REVISION(SYSINFO_CHIP_ID) >= REVISION_B2;
+  is_old = SYSINFO_CHIP_ID_REVISION(SYSINFO_CHIP_ID) < REVISION_B2;
   for (uint32_t offset = 0; offset < USB_DPRAM_BYTES; offset += 4)
     REG32(USB_DPRAM_BASE + offset) = 0;
 
@@ -244,9 +268,8 @@ static void attach(void) {
   REG32(USB_INTE) = SERVED | USB_INT_DEV_SOF;
   rp2040_irq_enable(RP2040_IRQ_USBCTRL);
   REG32_SET(USB_SIE_CTRL) = USB_SIE_CTRL_PULLUP_EN;
-  detached = false;
   alive_us = TIMER_TIMERAWL;
-  look_in(WATCH_us);
+  watch();
 }
 
 static void start_over(void) {
@@ -259,23 +282,43 @@ static void start_over(void) {
   suspended = false;
   frame_began = false;
   unasked_resets = 0;
-  detached = true;
+  next = ATTACH;
   usb_device_on_bus_reset();
   look_in(DETACHED_us);
 }
 
 void timer1_irq_handler(void) {
   TIMER_INTR = TIMER_ALARM1_BIT;
-  if (detached) {
+  switch (next) {
+  case WATCH:
+    if (REG32(USB_SIE_STATUS) & USB_SIE_STATUS_SUSPENDED)
+      alive_us = TIMER_TIMERAWL;
+    if (TIMER_TIMERAWL - alive_us >= patience * SILENCE_us)
+      start_over();
+    else
+      watch();
+    break;
+  case ATTACH:
     attach();
-    return;
+    break;
+  case AWAIT_END_OF_RESET:
+    if (REG32(USB_SIE_STATUS) & USB_SIE_STATUS_LINES) {
+      feign_idle();
+      feigned_ms = 0;
+      next = FEIGN_IDLE;
+    }
+    look_in(1000);
+    break;
+  case FEIGN_IDLE:
+    feigned_ms++;
+    if (REG32(USB_SIE_STATUS) & USB_SIE_STATUS_CONNECTED || feigned_ms == FEIGNED_MAX_ms) {
+      show_bus();
+      watch();
+    } else {
+      look_in(1000);
+    }
+    break;
   }
-  if (REG32(USB_SIE_STATUS) & USB_SIE_STATUS_SUSPENDED)
-    alive_us = TIMER_TIMERAWL;
-  if (TIMER_TIMERAWL - alive_us >= patience * SILENCE_us)
-    start_over();
-  else
-    look_in(WATCH_us);
 }
 
 static bool is_unasked_for(uint32_t now_us) {
@@ -292,6 +335,10 @@ static void on_bus_reset(void) {
   usb_controller_withdraw(0);
   suspended = false;
   usb_device_on_bus_reset();
+  if (is_old && usb_controller_has_gpio15) {
+    next = AWAIT_END_OF_RESET;
+    look_in(1000);
+  }
 }
 
 static void on_setup(void) {
@@ -378,7 +425,7 @@ static void serve(void) {
 }
 
 void usb_service_irq_handler(void) {
-  if (!detached)
+  if (next != ATTACH)
     serve();
   usb_device_on_service();
 }

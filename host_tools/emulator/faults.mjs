@@ -25,6 +25,7 @@
  *     crystal_dead                  the crystal does not swing before to_s
  *     crystal_weak                  it swings, but what it drives before to_s stops the chip until a reset
  *     pll_late                      no PLL locks before to_s
+ *     usb_busy_hub                  other devices talk on the bus: after a reset of it it is never idle for 800 us
  *     usb_deaf                      erratum E15 strikes at from_s: the USB controller answers nothing until its block is reset
  *     usb_dead                      the same, and it does not hear the bus either
  *     usb_late_resume               the controller says 45 ms after a resume that it is not suspended any more
@@ -60,6 +61,7 @@ const TARGET = {
   crystal_dead: null,
   crystal_weak: null,
   pll_late: null,
+  usb_busy_hub: null,
   usb_deaf: null,
   usb_dead: null,
   usb_late_resume: null,
@@ -67,7 +69,7 @@ const TARGET = {
 };
 
 /** Not of the board. */
-const OF_THE_WORLD = ['host_stall', 'usb_unplug', 'crystal_dead', 'crystal_weak', 'pll_late', 'usb_deaf', 'usb_dead', 'usb_late_resume', 'power_cut'];
+const OF_THE_WORLD = ['host_stall', 'usb_unplug', 'crystal_dead', 'crystal_weak', 'pll_late', 'usb_busy_hub', 'usb_deaf', 'usb_dead', 'usb_late_resume', 'power_cut'];
 const OF_LINES = ['sensor_missing', 'line_stuck_high', 'scl_stuck_low', 'scl_stuck_high', 'clock_glitch'];
 
 export function parseFaults(text, file, { sensors, muxes, lines }) {

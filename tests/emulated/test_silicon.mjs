@@ -255,3 +255,14 @@ for (const name of BOARDS) {
     bench.end();
   });
 }
+
+for (const [name, revision, faults] of [
+  ['pico_mux', 1, [{ type: 'usb_busy_hub', from_s: 0 }]], ['pico_mux', 0, []], ['pico_parallel', 1, []], ['pico_parallel', 2, [{ type: 'usb_busy_hub', from_s: 0 }]],
+]) {
+  test(`${name}: a chip of revision B${revision} enumerates${faults.length ? ' behind a busy hub' : ''}`, (t) => {
+    const bench = new Bench(name, { revision, faults, fastEnumeration: false });
+    t.diagnostic(`streams after ${bench.stream(500).toFixed(0)} ms`);
+    bench.assertStreams(100);
+    assert.equal(bench.end().usb.enumerations, 1);
+  });
+}

@@ -91,11 +91,11 @@ export class Chip extends RP2040 {
    * @param time SimulatedTime
    * @param report Report
    * @param options serial: 8-byte flash unique id; seed: of the power-on noise in SRAM; clock_ppm: by how much all of
-   *   the chip's clocks are fast, in this time; memory: the FlashMemory, a new one by default; trouble: what goes wrong
+   *   the chip's clocks are fast, in this time; revision: 0, 1 or 2 for B0, B1 or B2; memory: the FlashMemory, a new one by default; trouble: what goes wrong
    *   in the chip; kept: { sram, watchdog }
    *   of the life before a watchdog reboot
    */
-  constructor(time, report, { serial, seed = 1, clock_ppm = 0, memory = new FlashMemory({ time, serial, seed }), trouble = new Trouble(), kept = null }) {
+  constructor(time, report, { serial, seed = 1, clock_ppm = 0, revision = 2, memory = new FlashMemory({ time, serial, seed }), trouble = new Trouble(), kept = null }) {
     super(time.scope());
     this.memory = memory;
     memory.fail = (source, message) => this.fail(source, message);
@@ -104,7 +104,7 @@ export class Chip extends RP2040 {
     this.flashView = new DataView(this.flash.buffer);
     this.time = time;
     this.report = report;
-    this.options = { serial, seed };
+    this.options = { serial, seed, revision };
     this.trouble = trouble;
     this.logger = new StrictLogger(this);
     this.core = new StrictCore(this);
@@ -144,7 +144,7 @@ export class Chip extends RP2040 {
       if (offset === 0x0c) this.ssi.forceSelect(((value >>> 8) & 3) === 2);
     };
     Object.assign(this.peripherals, {
-      0x40000: new RegisterFile(this, 'SYSINFO', { 0: [0x20002927, 0], 4: [2, 0] }), // revision B2
+      0x40000: new RegisterFile(this, 'SYSINFO', { 0: [((revision << 28) | 0x2927) >>> 0, 0], 4: [2, 0] }),
       0x14000: new RegisterFile(this, 'XIP_CTRL', { 0: [3, 0xb], 4: [0, 0], 8: [2, 0], 12: [0, 0], 16: [0, 0] }),
       0x18000: this.ssi,
       0x40008: this.clocks,

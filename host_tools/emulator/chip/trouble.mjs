@@ -4,6 +4,7 @@ export class Trouble {
     this.crystalDead = false;
     this.crystalWeak = false;
     this.pllLate = false;
+    this.busyHub = false;
     this.lateResume = false;
   }
 }

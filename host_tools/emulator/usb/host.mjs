@@ -253,6 +253,7 @@ export class UsbHost {
     this.block.busReset();
     this.statistics.resets += 1;
     yield this.wait.reset_ns;
+    this.block.busResetEnded();
     this.state = 'active';
     this.sofAlarm.schedule(0);
     yield this.wait.recovery_ns;
