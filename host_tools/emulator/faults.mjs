@@ -30,6 +30,7 @@
  *     usb_dead                      the same, and it does not hear the bus either
  *     usb_late_resume               the controller says 45 ms after a resume that it is not suspended any more
  *     power_cut                     chip, flash and sensors are without power until to_s; what the flash was doing is cut short
+ *     chip_reset                    the chip alone is held in reset until to_s, as when its brown-out detector trips; its SRAM is lost
  *
  * sensor_missing, line_stuck_high, scl_stuck_* and clock_glitch need a board with a data line for each sensor.
  * `to_s` may be left out: the fault then stays. Times are seconds since power-on.
@@ -66,10 +67,11 @@ const TARGET = {
   usb_dead: null,
   usb_late_resume: null,
   power_cut: null,
+  chip_reset: null,
 };
 
 /** Not of the board. */
-const OF_THE_WORLD = ['host_stall', 'usb_unplug', 'crystal_dead', 'crystal_weak', 'pll_late', 'usb_busy_hub', 'usb_deaf', 'usb_dead', 'usb_late_resume', 'power_cut'];
+const OF_THE_WORLD = ['host_stall', 'usb_unplug', 'crystal_dead', 'crystal_weak', 'pll_late', 'usb_busy_hub', 'usb_deaf', 'usb_dead', 'usb_late_resume', 'power_cut', 'chip_reset'];
 const OF_LINES = ['sensor_missing', 'line_stuck_high', 'scl_stuck_low', 'scl_stuck_high', 'clock_glitch'];
 
 export function parseFaults(text, file, { sensors, muxes, lines }) {

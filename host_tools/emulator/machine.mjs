@@ -63,6 +63,7 @@ export class Machine {
     this.faults = new Faults(faults, this.scope, {
       ...Object.fromEntries(Object.keys(this.board.faultActions).map(onBoard)),
       power_cut: (_, active) => (active ? this.#powerDown() : this.#guard(() => this.#powerBack())),
+      chip_reset: (_, active) => (active ? this.#holdChip() : this.#guard(() => this.#releaseChip())),
       crystal_dead: (_, active) => {
         this.trouble.crystalDead = active;
         this.chip.xosc.count();
@@ -109,14 +110,30 @@ export class Machine {
     if (active && this.hasPower) this.chip.usbCtrl.hung = how;
   }
 
-  /** Everything on the board loses its power; the cable is still there. */
-  #powerDown() {
+  #stopChip() {
     this.hasPower = false;
     this.cyclesBefore += this.chip.core.cycles;
     this.chip.dispose();
-    this.memory.cutPower();
     this.host.disconnect();
+  }
+
+  /** Everything on the board loses its power; the cable is still there. */
+  #powerDown() {
+    this.#stopChip();
+    this.memory.cutPower();
     throw new Stopped('power cut');
+  }
+
+  /** Sensors and flash keep what they are doing. */
+  #holdChip() {
+    this.#stopChip();
+    this.memory.deselect();
+    throw new Stopped('power cut');
+  }
+
+  #releaseChip() {
+    this.hasPower = true;
+    this.#powerUp(null);
   }
 
   #powerBack() {

@@ -2,7 +2,9 @@
  * The release images on a chip that behaves as silicon does at its worst: each fault is overcome without help, in a
  * time that is the same in every run.
  *
- * usage: test_silicon.mjs BUILD_OF_IMAGES FINGERTIP
+ * usage: test_silicon.mjs BUILD_OF_IMAGES FINGERTIP [STEP_us]
+ *
+ * STEP_us: from one interrupted start to the next; 100 takes some minutes. Default: 4000.
  */
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
@@ -17,7 +19,7 @@ import { Machine } from '../../host_tools/emulator/machine.mjs';
 import { setupPacket } from '../../host_tools/emulator/usb/host.mjs';
 import { steady } from './harness/bench.mjs';
 
-const [images, fingertip] = process.argv.slice(2);
+const [images, fingertip, step_us = '4000'] = process.argv.slice(2);
 const BOARDS = ['pico_mux', 'pico_parallel'];
 const encoded = (...command) => Buffer.from(execFileSync(fingertip, ['encode', ...command], { encoding: 'utf8' }).trim(), 'hex');
 const STREAMS = encoded('stream', 'contact,raw,health');
@@ -265,4 +267,23 @@ for (const [name, revision, faults] of [
     bench.assertStreams(100);
     assert.equal(bench.end().usb.enumerations, 1);
   });
+}
+
+for (const name of BOARDS) {
+  for (const type of ['power_cut', 'chip_reset']) {
+    test(`${name}: a start that is interrupted (${type}) at any time is followed by one that succeeds, whatever is in SRAM`, (t) => {
+      const whole_ms = new Bench(name).stream();
+      let [starts, slowest_ms] = [0, 0];
+      for (let at_ms = Number(step_us) / 1000; at_ms < whole_ms + 5; at_ms += Number(step_us) / 1000) {
+        starts += 1;
+        const to_ms = at_ms + 3;
+        const bench = new Bench(name, { seed: starts, faults: [{ type, from_s: at_ms / 1000, to_s: to_ms / 1000 }] });
+        bench.run(to_ms);
+        slowest_ms = Math.max(slowest_ms, bench.stream() - to_ms);
+        assert.equal(bench.end().reboots, 0, `interrupted at ${at_ms} ms`);
+      }
+      t.diagnostic(`${starts} starts, the slowest took ${slowest_ms.toFixed(0)} ms`);
+      assert.ok(slowest_ms < whole_ms + 20, `${slowest_ms}`);
+    });
+  }
 }
