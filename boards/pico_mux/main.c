@@ -16,7 +16,7 @@ static void on_event(void *context) {
 }
 
 int main(void) {
-  if (pico_steady_supply() != FT_OK || mux_bus_init(&mux_bus, &array_bus) != FT_OK) {
+  if (pico_start() != FT_OK || mux_bus_init(&mux_bus, &array_bus) != FT_OK) {
     port_panic();
   }
   port_set_event_handler(on_event, 0);

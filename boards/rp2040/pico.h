@@ -4,8 +4,14 @@
 
 #include "common/status.h"
 
-/* Has the regulator of 3V3, which feeds the sensors, switch at a fixed rate: less ripple at the
- * little that is drawn. FT_ERR_TIMEOUT: a block does not leave reset. */
-enum ft_status pico_steady_supply(void);
+enum pico_supply {
+  PICO_SUPPLY_FRUGAL, /* the regulator of 3V3 switches when it must: it draws less itself */
+  PICO_SUPPLY_STEADY, /* at a fixed rate: less ripple, for it feeds the sensors */
+};
+
+/* Takes the pin into use, steady. FT_ERR_TIMEOUT: a block does not leave reset. */
+enum ft_status pico_start(void);
+
+void pico_set_supply(enum pico_supply supply);
 
 #endif

@@ -247,6 +247,17 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
   }
 }
 
+/* While the bus sleeps so do the sensors, and once they do, the chip. */
+static bool may_save_power(const struct app *app) {
+  return cdc_is_suspended() && scan_rests(&app->scan);
+}
+
+static void follow_suspend(struct app *app) {
+  app->saves_power = may_save_power(app);
+  port_save_power(app->saves_power);
+  scan_rest(&app->scan, cdc_is_suspended());
+}
+
 static void follow_port(struct app *app) {
   uint32_t close_count = cdc_close_count();
   if (close_count != app->close_count) {
@@ -286,7 +297,8 @@ static void each_second(struct app *app, uint64_t now_us, bool after_frame) {
 void app_run(struct app *app) {
   uint32_t news = cdc_news();
   bool tick = atomic_load_explicit(&app->tick, memory_order_relaxed) != 0;
-  if (!app->active && !tick && news == app->news && !scan_has_news(&app->scan)) {
+  if (!app->active && !tick && news == app->news && !scan_has_news(&app->scan) &&
+      may_save_power(app) == app->saves_power) {
     port_sleep();
     return;
   }
@@ -295,6 +307,7 @@ void app_run(struct app *app) {
     app->asleep_us += port_now_us() - app->idle_since_us;
   }
   atomic_store_explicit(&app->tick, 0, memory_order_relaxed);
+  follow_suspend(app);
   if (news != app->news || tick || app->active) {
     app->news = news;
     app->active = commands_receive(app);

@@ -16,7 +16,7 @@ import { CdcClient } from './usb/cdc_client.mjs';
 import { UsbHost } from './usb/host.mjs';
 
 export const DEFAULT_SERIAL = 'e660583883265a2c';
-/** So long after a start the firmware must run at the board's frequency. */
+/** So long after a start the firmware must run at the board's frequency, unless the bus sleeps. */
 const CLOCK_CHECK_NS = 200e6;
 
 export class Machine {
@@ -91,8 +91,8 @@ export class Machine {
   }
 
   #checkClock() {
-    const { clkSys, wild } = this.chip;
-    if (!wild && clkSys !== this.Board.clkSys_Hz) this.report.warn('clocks', `clk_sys is ${clkSys / 1e6} MHz; this board runs at ${this.Board.clkSys_Hz / 1e6} MHz`);
+    const { clkSys, wild, usbCtrl } = this.chip;
+    if (!wild && !usbCtrl.isSuspended && clkSys !== this.Board.clkSys_Hz) this.report.warn('clocks', `clk_sys is ${clkSys / 1e6} MHz; this board runs at ${this.Board.clkSys_Hz / 1e6} MHz`);
   }
 
   #powerUp(kept) {

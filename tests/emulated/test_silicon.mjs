@@ -287,3 +287,35 @@ for (const name of BOARDS) {
     });
   }
 }
+
+for (const name of BOARDS) {
+  test(`${name}: while the bus sleeps sensors and clocks do too, and wake up in time`, (t) => {
+    const bench = new Bench(name);
+    const { host } = bench.machine;
+    const { chip, board } = bench.machine;
+    const steady = () => (chip.pins.high >>> 23) & 1;
+    bench.stream();
+    bench.assertStreams(50);
+    for (const wake of ['resume', 'reset']) {
+      assert.deepEqual([chip.clkSys, steady()], [125e6, 1]);
+      host.suspend();
+      bench.run(13); // 3 ms until the bus counts as idle, and 7 ms to follow (USB 2.0, 7.1.7.6)
+      assert.deepEqual([chip.clkSys, chip.pllSys.outputHz, steady()], [12e6, 0, 0]);
+      const [transactions, cycles] = [board.statistics.transactions, chip.core.cycles];
+      bench.run(1000);
+      assert.equal(board.statistics.transactions, transactions, 'no sensor is asked for anything');
+      const awake = (chip.core.cycles - cycles) / 12e6;
+      t.diagnostic(`awake for ${(100 * awake).toFixed(2)} % of the time, at 12 MHz`);
+      assert.ok(awake < 0.02, `${awake}`);
+      const from_ms = bench.now_ms;
+      if (wake === 'resume') host.resume();
+      else host.resetDevice(() => {});
+      bench.until(() => chip.clkSys === 125e6, 5, 'fast clock'); // before the signalling ends, 20 or 10 ms
+      t.diagnostic(`fast ${(bench.now_ms - from_ms).toFixed(0)} ms after the ${wake} began`);
+      bench.run(45);
+      if (wake === 'resume') bench.stream();
+      bench.until(() => board.statistics.transactions > transactions + 30, 50, 'transactions');
+    }
+    bench.end();
+  });
+}

@@ -402,11 +402,15 @@ export class UsbBlock extends BasePeripheral {
   #setSuspended(is) {
     this.awakeAlarm.cancel();
     if (this.hung === 'dead') return;
-    if (((this.sieStatus & ST_SUSPENDED) !== 0) !== is) {
+    if (this.isSuspended !== is) {
       this.sieStatus ^= ST_SUSPENDED;
       this.suspendChanged = true;
     }
     this.#update();
+  }
+
+  get isSuspended() {
+    return (this.sieStatus & ST_SUSPENDED) !== 0;
   }
 
   suspend() {

@@ -211,6 +211,7 @@ export class UsbHost {
       this.state = 'debounce';
       this.#enumeration = this.#enumerate();
       this.portAlarm.schedule(this.wait.debounce_ns);
+      this.suspendAlarm.schedule(IDLE_SUSPENDS_NS);
     } else if (!attached && this.state !== 'detached') this.#gone();
     if (this.block && this.block.sieCtrl & (1 << 16) && !this.block.attached) this.pullupAlarm.schedule(5e6);
   }
@@ -250,6 +251,7 @@ export class UsbHost {
     this.state = 'reset';
     this.address = 0;
     this.sofAlarm.cancel();
+    this.suspendAlarm.cancel();
     this.block.busReset();
     this.statistics.resets += 1;
     yield this.wait.reset_ns;
