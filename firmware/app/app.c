@@ -13,6 +13,8 @@
 
 /* So long the end of a second waits for a frame to follow, rather than keep one waiting. */
 #define FRAME_WAIT_us 100000u
+/* A zero that nobody follows may be off by 30 Pa after so long: condition.h. */
+#define ZERO_LASTS_us 60000000u
 /* Up to this pitch the neighbours feel what one sensor feels: see READINGS_STILL_NOISES. */
 #define SHARED_PITCH_mm 9.0f
 
@@ -253,8 +255,17 @@ static bool may_save_power(const struct app *app) {
 }
 
 static void follow_suspend(struct app *app) {
-  app->saves_power = may_save_power(app);
-  port_save_power(app->saves_power);
+  const bool saves = may_save_power(app);
+  if (saves != app->saves_power) {
+    port_save_power(saves);
+    const uint64_t now_us = port_now_us();
+    if (saves) {
+      app->saving_since_us = now_us;
+    } else if (now_us - app->saving_since_us >= ZERO_LASTS_us) {
+      condition_tare(&app->condition);
+    }
+    app->saves_power = saves;
+  }
   scan_rest(&app->scan, cdc_is_suspended());
 }
 

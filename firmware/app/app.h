@@ -70,6 +70,7 @@ struct app {
   uint32_t close_count; /* likewise */
   bool active;          /* the last round had something to do, so there may be more */
   bool saves_power;
+  uint64_t saving_since_us; /* if .saves_power */
   uint16_t osr;
   uint32_t rate_mHz;
 

@@ -16,14 +16,17 @@ import { findBoard } from '../../host_tools/emulator/board/boards.mjs';
 import { MemoryFault } from '../../host_tools/emulator/chip/mpu.mjs';
 import { parseFaults } from '../../host_tools/emulator/faults.mjs';
 import { Machine } from '../../host_tools/emulator/machine.mjs';
+import { parseScenario } from '../../host_tools/emulator/scenario.mjs';
 import { setupPacket } from '../../host_tools/emulator/usb/host.mjs';
-import { steady } from './harness/bench.mjs';
+import { HEADER, steady } from './harness/bench.mjs';
 
 const [images, fingertip, step_us = '4000'] = process.argv.slice(2);
 const BOARDS = ['pico_mux', 'pico_parallel'];
 const encoded = (...command) => Buffer.from(execFileSync(fingertip, ['encode', ...command], { encoding: 'utf8' }).trim(), 'hex');
 const STREAMS = encoded('stream', 'contact,raw,health');
 const HEALTH = encoded('health');
+// Flags of a contact (contact_flags.h)
+const [CONTACT, TARED] = [1 << 0, 1 << 5];
 
 /** A board with a host that opens its port. Times are emulated, in ms. */
 class Bench {
@@ -78,20 +81,32 @@ class Bench {
     assert.ok(this.bytes - before > 20 * ms, `${this.bytes - before} bytes in ${ms} ms`);
   }
 
-  /** What the device says of itself. */
-  health() {
-    this.machine.client.write(HEALTH);
-    this.run(20);
+  /** The recording of what was received. */
+  recording() {
     const folder = mkdtempSync(join(tmpdir(), 'silicon-'));
     try {
       const [stream, table] = [join(folder, 'stream.ftr'), join(folder, 'stream.csv')];
       writeFileSync(stream, Buffer.concat(this.received));
       execFileSync(fingertip, ['replay', stream, '--to-csv', table], { stdio: 'pipe' });
-      const line = readFileSync(table, 'utf8').split('\n').findLast((l) => l.startsWith('# packet: health'));
-      return Object.fromEntries(line.split(' ').slice(3).map((pair) => pair.split('=')).map(([key, value]) => [key, Number(value)]));
+      return readFileSync(table, 'utf8').trim().split('\n');
     } finally {
       rmSync(folder, { recursive: true });
     }
+  }
+
+  /** What the device says of itself. */
+  health() {
+    this.machine.client.write(HEALTH);
+    this.run(20);
+    const line = this.recording().findLast((l) => l.startsWith('# packet: health'));
+    return Object.fromEntries(line.split(' ').slice(3).map((pair) => pair.split('=')).map(([key, value]) => [key, Number(value)]));
+  }
+
+  /** Flags of the last frame. */
+  flags() {
+    const lines = this.recording();
+    const column = lines.find((l) => !l.startsWith('#')).split(',').indexOf('flags');
+    return Number(lines.findLast((l) => !l.startsWith('#')).split(',')[column]);
   }
 
   end() {
@@ -319,3 +334,21 @@ for (const name of BOARDS) {
     bench.end();
   });
 }
+
+/** As the weather does. */
+test('what changed while the bus slept for long is no contact', () => {
+  const row = (t_s, Pa) => `${t_s},0,0,0,0,0,0,0,${new Array(15).fill(Pa).join(',')}\n`;
+  const scenario = parseScenario(`# fingertip-scenario 1\n${HEADER}\n${row(0, 0)}${row(1, 0)}${row(60, 800)}`, 'weather.csv');
+  const bench = new Bench('pico_parallel', { scenario });
+  bench.stream();
+  bench.run(200);
+  assert.equal(bench.flags() & (CONTACT | TARED), TARED);
+  bench.machine.host.suspend();
+  bench.run(64e3);
+  bench.machine.host.resume();
+  bench.run(35);
+  bench.stream();
+  bench.run(300);
+  assert.equal(bench.flags() & (CONTACT | TARED), TARED);
+  bench.end();
+});
