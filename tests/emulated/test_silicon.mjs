@@ -295,6 +295,10 @@ for (const name of BOARDS) {
         const bench = new Bench(name, { seed: starts, faults: [{ type, from_s: at_ms / 1000, to_s: to_ms / 1000 }] });
         bench.run(to_ms);
         slowest_ms = Math.max(slowest_ms, bench.stream() - to_ms);
+        bench.run(20);
+        const { frames_incomplete, sensors_present, sensors_prom_bad, bus_nacks } = bench.health();
+        assert.deepEqual([frames_incomplete, sensors_present, sensors_prom_bad], [0, 0x7fff, 0], `interrupted at ${at_ms} ms`);
+        if (name === 'pico_parallel') assert.equal(bus_nacks, 0, `interrupted at ${at_ms} ms`); // sensors in mid-byte got their clocks first
         assert.equal(bench.end().reboots, 0, `interrupted at ${at_ms} ms`);
       }
       t.diagnostic(`${starts} starts, the slowest took ${slowest_ms.toFixed(0)} ms`);
