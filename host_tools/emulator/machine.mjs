@@ -168,7 +168,7 @@ export class Machine {
     this.reboots += 1;
     const old = this.chip;
     this.cyclesBefore += old.core.cycles;
-    const kept = { sram: old.sram, watchdog: { reason, scratch: old.watchdog.scratch } };
+    const kept = { sram: old.sram, usbDPRAM: old.usbDPRAM, watchdog: { reason, scratch: old.watchdog.scratch } };
     old.dispose();
     this.memory.deselect(); // its pads let go; a command that was under way is what came until then
     this.#guard(() => this.#powerUp(kept));

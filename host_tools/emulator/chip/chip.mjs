@@ -11,7 +11,7 @@
  *
  * Boot: the boot ROM's part is played here. The CRC-32 of the 256-byte second stage is checked as the boot ROM
  * checks it, the second stage is copied to 0x20041f00 and entered there with lr = 0, clk_sys on the ring
- * oscillator, and only IO_QSPI, PADS_QSPI and TIMER out of reset. SRAM starts filled with seeded noise.
+ * oscillator, and only IO_QSPI, PADS_QSPI and TIMER out of reset. SRAM and the USB controller's memory start filled with seeded noise.
  *
  * `chip.onCall(address, callback)` runs `callback(chip)` each time the instruction at `address` is about to
  * execute; `chip.core.cycles` is the processor cycle count at that moment (sleep does not count).
@@ -92,7 +92,7 @@ export class Chip extends RP2040 {
    * @param report Report
    * @param options serial: 8-byte flash unique id; seed: of the power-on noise in SRAM; clock_ppm: by how much all of
    *   the chip's clocks are fast, in this time; revision: 0, 1 or 2 for B0, B1 or B2; memory: the FlashMemory, a new one by default; trouble: what goes wrong
-   *   in the chip; kept: { sram, watchdog }
+   *   in the chip; kept: { sram, usbDPRAM, watchdog }
    *   of the life before a watchdog reboot
    */
   constructor(time, report, { serial, seed = 1, clock_ppm = 0, revision = 2, memory = new FlashMemory({ time, serial, seed }), trouble = new Trouble(), kept = null }) {
@@ -165,11 +165,11 @@ export class Chip extends RP2040 {
       0x50300: this.pio[1],
     });
     for (const pin of this.qspi) pin.padValue = 0x56;
-    if (kept) this.sram.set(kept.sram);
-    else {
-      const noise = new Prng(seed ^ 0x5eed);
-      const words = new Uint32Array(this.sram.buffer);
-      for (let i = 0; i < words.length; i++) words[i] = noise.uint32();
+    const noise = new Prng(seed ^ 0x5eed);
+    for (const [memory, before] of [[this.sram, kept?.sram], [this.usbDPRAM, kept?.usbDPRAM]]) {
+      const words = new Uint32Array(memory.buffer);
+      if (before) memory.set(before);
+      else for (let i = 0; i < words.length; i++) words[i] = noise.uint32();
     }
     this.#makeBootRom();
     this.onBreak = (code) => {
