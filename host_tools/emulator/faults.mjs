@@ -9,7 +9,7 @@
  *     sensor_adc_zero (sensor)      every ADC read gives 0
  *     sensor_nack (sensor)          does not acknowledge its address, once, the first time from from_s on
  *     sensor_brown_out (sensor)     its supply dips at from_s: a conversion is lost, and until a reset its codes are 1/16 too small
- *     sensor_d2_corrupt (sensor)    every temperature has one bit inverted
+ *     sensor_d2_corrupt (sensor)    every temperature has one bit inverted, another one each time
  *     sensor_noisy (sensor)         ten times the noise of the datasheet
  *     sensor_fast (sensor)          acknowledges so soon that an I2C controller without a receive hold takes it for lost arbitration
  *     sda_stuck_low (sensor)        pulls SDA from from_s until nine clocks reached it or its multiplexer was reset

@@ -115,6 +115,7 @@ export class Ms5840 extends I2cTarget {
     this.tied = false;
     this.nacks = 0;
     this.brownOuts = 0;
+    this.wrongBit = 0;
     /** It pulled SDA as soon as SCL fell. */
     this.onFast = () => {};
     this.powerUp();
@@ -220,7 +221,13 @@ export class Ms5840 extends I2cTarget {
     const interrupted = this.conversion !== null && now < this.conversion.end_ns;
     const duration_ns = osr.max_ns * this.timeFactor;
     const corrupt = !isPressure && this.faults(this.index).d2Corrupt;
-    this.conversion = { isPressure, osr, start_ns: now, end_ns: now + duration_ns, spoiled: interrupted, wrong: corrupt ? 1 << Math.floor(this.prng.range(0, 24)) : 0 };
+    this.conversion = { isPressure, osr, start_ns: now, end_ns: now + duration_ns, spoiled: interrupted, wrong: corrupt ? 1 << this.#otherBit() : 0 };
+  }
+
+  /** Of a corrupt temperature: never the same twice running, or two would agree. */
+  #otherBit() {
+    this.wrongBit = (this.wrongBit + 1 + Math.floor(this.prng.range(0, 23))) % 24;
+    return this.wrongBit;
   }
 
   #adcRead(now) {
