@@ -320,12 +320,13 @@ for (const name of BOARDS) {
       host.suspend();
       bench.run(13); // 3 ms until the bus counts as idle, and 7 ms to follow (USB 2.0, 7.1.7.6)
       assert.deepEqual([chip.clkSys, chip.pllSys.outputHz, steady()], [12e6, 0, 0]);
-      const [transactions, cycles] = [board.statistics.transactions, chip.core.cycles];
+      const [transactions, cycles, gated_ns] = [board.statistics.transactions, chip.core.cycles, chip.deepSleep_ns];
       bench.run(1000);
       assert.equal(board.statistics.transactions, transactions, 'no sensor is asked for anything');
       const awake = (chip.core.cycles - cycles) / 12e6;
       t.diagnostic(`awake for ${(100 * awake).toFixed(2)} % of the time, at 12 MHz`);
       assert.ok(awake < 0.02, `${awake}`);
+      assert.ok(chip.deepSleep_ns - gated_ns > 0.98e9, 'the clocks of what cannot wake it stand');
       const from_ms = bench.now_ms;
       if (wake === 'resume') host.resume();
       else host.resetDevice(() => {});

@@ -36,6 +36,10 @@ import { UsbBlock } from './usb_block.mjs';
 
 const BOOT2_BYTES = 256;
 const SECTOR_BYTES = 4096;
+const SCR = 0xd10;
+const SCR_SLEEPDEEP = 4;
+/** Interrupt to what wakes by it in deep sleep: the bits of SLEEP_EN0 and SLEEP_EN1. */
+const WAKES = new Map([[0, [0, 1 << 5]], [1, [0, 1 << 5]], [2, [0, 1 << 5]], [3, [0, 1 << 5]], [5, [0, 3 << 10]], [11, [1 << 5, 0]], [12, [1 << 5, 0]], [23, [1 << 6, 0]], [24, [1 << 7, 0]]]);
 const BOOT2_RAM = 0x20041f00;
 const DPRAM_BASE = 0x50100000;
 /** So long the boot ROM tries to load the second stage (datasheet 2.8.1.1); a flash that is still erasing is waited for. */
@@ -117,6 +121,9 @@ export class Chip extends RP2040 {
     this.hooks = new Map();
     this.slept_since_ns = -1;
     this.sleepCycles = 0;
+    this.scr = 0;
+    /** Time in which only what SLEEP_EN names had a clock. */
+    this.deepSleep_ns = 0;
     /** Executes nothing that makes sense until it is reset: its clock is none. */
     this.wild = false;
     this.onWatchdog = null;
@@ -319,7 +326,7 @@ export class Chip extends RP2040 {
       value = this.sio.readUint32(word - 0xd0000000);
     } else if (address >>> 12 === 0xe000e) {
       const offset = word & 0xfff;
-      value = offset >= 0xd90 && offset <= 0xda0 ? this.mpu.read(offset) : this.ppb.readUint32(offset);
+      value = offset === SCR ? this.scr : offset >= 0xd90 && offset <= 0xda0 ? this.mpu.read(offset) : this.ppb.readUint32(offset);
     } else if (address >>> 12 === DPRAM_BASE >>> 12) {
       this.#checkPage(address, 'read of');
       value = this.usbDPRAMView.getUint32(word - DPRAM_BASE, true);
@@ -351,7 +358,8 @@ export class Chip extends RP2040 {
     } else if (address >>> 12 === 0xe000e) {
       if (bytes !== 4) this.fail('core', `${8 * bytes}-bit write of system register 0x${address.toString(16)}`);
       const offset = address & 0xfff;
-      if (offset >= 0xd90 && offset <= 0xda0) this.mpu.write(offset, value);
+      if (offset === SCR) this.#writeScr(value);
+      else if (offset >= 0xd90 && offset <= 0xda0) this.mpu.write(offset, value);
       else this.ppb.writeUint32(offset, value);
     } else {
       const peripheral = this.findPeripheral(address);
@@ -359,6 +367,20 @@ export class Chip extends RP2040 {
       this.#checkPage(address, 'write of');
       peripheral.writeUint32Atomic(address & 0xffc, wide, (address >>> 12) & 3);
       if (peripheral === this.peripherals[0x40014] || peripheral === this.peripherals[0x4001c]) this.pins.reconfigure();
+    }
+  }
+
+  #writeScr(value) {
+    if (value & ~SCR_SLEEPDEEP) this.fail('core', `SCR 0x${value.toString(16)}: only SLEEPDEEP is modelled`);
+    this.scr = value;
+  }
+
+  #checkWake() {
+    const { core, clocks } = this;
+    const pending = core.pendingInterrupts & core.enabledInterrupts;
+    const [en0, en1] = [clocks.readUint32(0xa8), clocks.readUint32(0xac)];
+    for (const [irq, [in0, in1]] of WAKES) {
+      if ((pending >>> irq) & 1 && (in0 & ~en0 || in1 & ~en1)) this.fail('CLOCKS', `woken from deep sleep by interrupt ${irq}, but SLEEP_EN leaves its block without a clock`);
     }
   }
 
@@ -370,8 +392,10 @@ export class Chip extends RP2040 {
   runUntil(end_ns) {
     const { time, core } = this;
     for (;;) {
+      const slept = core.waiting;
       time.fireDue();
       if (core.waiting) core.checkForInterrupts();
+      if (slept && !core.waiting && this.scr & SCR_SLEEPDEEP) this.#checkWake();
       const now = time.nanos;
       if (now >= end_ns) return;
       const next = Math.min(time.next_ns, end_ns);
@@ -391,6 +415,7 @@ export class Chip extends RP2040 {
           this.fail('core', `firmware hung: asleep for ${HUNG_AFTER_NS / 1e9} s without an interrupt`);
         }
         time.advanceTo(Math.min(next, this.slept_since_ns + HUNG_AFTER_NS));
+        if (this.scr & SCR_SLEEPDEEP) this.deepSleep_ns += time.nanos - now;
         continue;
       }
       this.slept_since_ns = -1;
