@@ -392,10 +392,9 @@ export class Chip extends RP2040 {
   runUntil(end_ns) {
     const { time, core } = this;
     for (;;) {
-      const slept = core.waiting;
       time.fireDue();
       if (core.waiting) core.checkForInterrupts();
-      if (slept && !core.waiting && this.scr & SCR_SLEEPDEEP) this.#checkWake();
+      if (this.slept_since_ns >= 0 && !core.waiting && this.scr & SCR_SLEEPDEEP) this.#checkWake();
       const now = time.nanos;
       if (now >= end_ns) return;
       const next = Math.min(time.next_ns, end_ns);
