@@ -82,6 +82,9 @@ foreach(option FINGERTIP_PRIOR_SIGMA_UM FINGERTIP_PRIOR_WIDTH_UM)
   endif()
 endforeach()
 
+# The data sheet of the sibling MS5837-02BA shows it so; drivers of the family do without and work.
+option(FINGERTIP_READ_STOPS "pico_parallel: STOP and START before an answer, not a repeated START" OFF)
+
 # 1209:0001 is the pid.codes id for tests: a product needs its own.
 set(FINGERTIP_USB_VID 0x1209 CACHE STRING "USB vendor id")
 set(FINGERTIP_USB_PID 0x0001 CACHE STRING "USB product id")

@@ -106,6 +106,10 @@ bool cdc_is_open(void) {
   return cdc.open;
 }
 
+bool cdc_is_suspended(void) {
+  return false;
+}
+
 uint32_t cdc_news(void) {
   return cdc.news;
 }

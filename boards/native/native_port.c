@@ -136,6 +136,10 @@ void port_sleep(void) {
   }
 }
 
+void port_save_power(bool saving) {
+  (void)saving;
+}
+
 void port_watchdog_feed(void) {
   native.fed_us = native.now_us;
 }

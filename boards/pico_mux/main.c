@@ -1,6 +1,10 @@
 #include "app/app.h"
 #include "pico_mux/mux_bus.h"
 #include "port/port.h"
+#include "rp2040/pico.h"
+#include "rp2040/usb_controller.h"
+
+const bool usb_controller_has_gpio15 = true;
 
 static struct mux_bus mux_bus;
 static struct array_bus array_bus;
@@ -12,7 +16,7 @@ static void on_event(void *context) {
 }
 
 int main(void) {
-  if (mux_bus_init(&mux_bus, &array_bus) != FT_OK) {
+  if (pico_start() != FT_OK || mux_bus_init(&mux_bus, &array_bus) != FT_OK) {
     port_panic();
   }
   port_set_event_handler(on_event, 0);

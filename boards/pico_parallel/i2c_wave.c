@@ -15,16 +15,17 @@ enum {
   AT_ADDRESS = 1,
   AT_COMMAND = AT_ADDRESS + I2C_WAVE_BYTE_CELLS,
   AT_STOP_OF_COMMAND = AT_COMMAND + I2C_WAVE_BYTE_CELLS,
-  AT_RESTART = AT_COMMAND + I2C_WAVE_BYTE_CELLS,
-  AT_ADDRESS_AGAIN = AT_RESTART + 2,
+  AT_TURN = AT_COMMAND + I2C_WAVE_BYTE_CELLS,
+  AT_ADDRESS_AGAIN = AT_TURN + I2C_WAVE_TURN_CELLS,
   AT_BYTES = AT_ADDRESS_AGAIN + I2C_WAVE_BYTE_CELLS,
   ACK = 8, /* cell of a byte */
   RECOVERY_CLOCKS = 9,
 };
 _Static_assert(I2C_WAVE_CELLS_WITH_BYTE(0) == AT_BYTES + ACK, "cells of a byte");
 _Static_assert(AT_STOP_OF_COMMAND + 1 == I2C_WAVE_COMMAND_CELLS, "cells of a command");
-_Static_assert(AT_BYTES + ARRAY_BUS_MAX_READ_BYTES * I2C_WAVE_BYTE_CELLS + 1 == I2C_WAVE_READ_CELLS,
-               "cells of a read");
+_Static_assert(AT_BYTES + ARRAY_BUS_MAX_READ_BYTES * I2C_WAVE_BYTE_CELLS + 1 + FT_READ_STOPS ==
+                   I2C_WAVE_READ_CELLS,
+               "cells of a read, made even");
 _Static_assert(1 + RECOVERY_CLOCKS + 2 == I2C_WAVE_RECOVERY_CELLS, "cells of a recovery");
 _Static_assert(I2C_WAVE_COMMAND_CELLS % 2 == 0 && I2C_WAVE_READ_CELLS % 2 == 0 &&
                    I2C_WAVE_RECOVERY_CELLS % 2 == 0,
@@ -65,6 +66,18 @@ static void put_stop(uint16_t *bit, unsigned lines) {
   put(bit, SCL | lines, lines, lines, NONE);
 }
 
+/* From the command to the answer. */
+static void put_turn(uint16_t *steps) {
+#if FT_READ_STOPS
+  put_stop(bit_at(steps, AT_TURN), SDA);
+  put(bit_at(steps, AT_TURN + 1), NONE, NONE, NONE, NONE);
+  put(bit_at(steps, AT_TURN + 2), NONE, SDA, SDA, SCL | SDA);
+#else
+  put(bit_at(steps, AT_TURN), SCL, NONE, NONE, NONE);
+  put(bit_at(steps, AT_TURN + 1), SDA, SDA, SDA, SCL | SDA);
+#endif
+}
+
 static void put_start_address_command(uint16_t *steps, uint8_t command) {
   put(&steps[AT_START], SDA, SDA, SCL | SDA, NONE); /* the fourth is the first bit's */
   put_byte(bit_at(steps, AT_ADDRESS), ADDRESS_WRITE);
@@ -83,8 +96,7 @@ void i2c_wave_command(uint16_t steps[I2C_WAVE_COMMAND_STEPS], uint8_t command) {
 
 unsigned i2c_wave_read(uint16_t steps[I2C_WAVE_READ_STEPS], uint8_t command, uint8_t byte_count) {
   put_start_address_command(steps, command);
-  put(bit_at(steps, AT_RESTART), SCL, NONE, NONE, NONE);
-  put(bit_at(steps, AT_RESTART + 1), SDA, SDA, SDA, SCL | SDA);
+  put_turn(steps);
   put_byte(bit_at(steps, AT_ADDRESS_AGAIN), ADDRESS_READ);
   unsigned at = AT_BYTES;
   for (unsigned i = 1; i <= byte_count; i++) {

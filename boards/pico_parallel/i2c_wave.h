@@ -3,7 +3,8 @@
  * its own line: a sample holds one bit of each.
  *
  * Cells, steps and samples are those of rp2040/wave_player.h. A bit, a START and a STOP take a cell
- * each, a repeated START takes two. The last step of a cell prepares the bit of the next one; after
+ * each, a repeated START takes two, and where a build has STOP and START instead (FT_READ_STOPS)
+ * they take three. The last step of a cell prepares the bit of the next one; after
  * a STOP it leaves the bus free for 1.4 us. Pure functions. Sources: UM10204; MS5840-02BA
  * datasheet.
  */
@@ -18,9 +19,10 @@
 
 enum {
   I2C_WAVE_BYTE_CELLS = 9,
-  I2C_WAVE_COMMAND_CELLS = 20,  /* START, address, command, STOP */
-  I2C_WAVE_READ_CELLS = 58,     /* of ARRAY_BUS_MAX_READ_BYTES bytes */
-  I2C_WAVE_RECOVERY_CELLS = 12, /* SCL down, nine clocks, STOP, idle */
+  I2C_WAVE_COMMAND_CELLS = 20, /* START, address, command, STOP */
+  I2C_WAVE_TURN_CELLS = 2 + FT_READ_STOPS,
+  I2C_WAVE_READ_CELLS = 58 + 2 * FT_READ_STOPS, /* of ARRAY_BUS_MAX_READ_BYTES bytes */
+  I2C_WAVE_RECOVERY_CELLS = 12,                 /* SCL down, nine clocks, STOP, idle */
 };
 
 enum {
@@ -35,7 +37,7 @@ enum {
 /* START, sensor address, command, STOP. */
 void i2c_wave_command(uint16_t steps[I2C_WAVE_COMMAND_STEPS], uint8_t command);
 
-/* START, sensor address, command, repeated START, sensor address, byte_count
+/* START, sensor address, command, repeated START or STOP and START, sensor address, byte_count
  * (1..ARRAY_BUS_MAX_READ_BYTES) bytes read, STOP. Returns the number of cells. */
 unsigned i2c_wave_read(uint16_t steps[I2C_WAVE_READ_STEPS], uint8_t command, uint8_t byte_count);
 
@@ -48,7 +50,7 @@ void i2c_wave_set_command(uint16_t steps[], uint8_t command);
 void i2c_wave_recovery(uint16_t steps[I2C_WAVE_RECOVERY_STEPS], uint16_t stop_lines);
 
 /* Cells after which the samples of this byte of a read (0 is the first) are complete. */
-#define I2C_WAVE_CELLS_WITH_BYTE(index) (38u + I2C_WAVE_BYTE_CELLS * (index))
+#define I2C_WAVE_CELLS_WITH_BYTE(index) (36u + I2C_WAVE_TURN_CELLS + I2C_WAVE_BYTE_CELLS * (index))
 
 /* Gives each sensor its byte with this index. Returns the lines that were high in all of its bits;
  * of those only SCL has to be. About 180 Cortex-M0+ cycles. */

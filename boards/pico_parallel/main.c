@@ -1,6 +1,10 @@
 #include "app/app.h"
 #include "pico_parallel/parallel_bus.h"
 #include "port/port.h"
+#include "rp2040/pico.h"
+#include "rp2040/usb_controller.h"
+
+const bool usb_controller_has_gpio15 = false;
 
 static struct parallel_bus parallel_bus;
 static struct array_bus array_bus;
@@ -12,7 +16,7 @@ static void on_event(void *context) {
 }
 
 int main(void) {
-  if (parallel_bus_init(&parallel_bus, &array_bus) != FT_OK) {
+  if (pico_start() != FT_OK || parallel_bus_init(&parallel_bus, &array_bus) != FT_OK) {
     port_panic();
   }
   port_set_event_handler(on_event, 0);

@@ -200,6 +200,7 @@ enum ft_status parallel_bus_init(struct parallel_bus *bus, struct array_bus *arr
     return status;
   }
   i2c_wave_command(bus->command_steps, bus->command);
+  bus->stuck = BOARD_SDA_LINES; /* a reset of this chip alone leaves sensors in mid-byte */
   *array_bus = (struct array_bus){
       .context = bus,
       .read_lead_us = (I2C_WAVE_COMMAND_ns + START_ns) / 1000u,

@@ -7,17 +7,29 @@
 
 #define CLOCKS_BASE 0x40008000u
 #define CLK_REF_CTRL (CLOCKS_BASE + 0x30u)
+#define CLK_REF_DIV (CLOCKS_BASE + 0x34u)
 #define CLK_REF_SELECTED (CLOCKS_BASE + 0x38u) /* bit n: source n drives the clock */
 #define CLK_REF_SRC_ROSC 0u
 #define CLK_REF_SRC_XOSC 2u
 #define CLK_SYS_CTRL (CLOCKS_BASE + 0x3cu)
+#define CLK_SYS_DIV (CLOCKS_BASE + 0x40u)
 #define CLK_SYS_SELECTED (CLOCKS_BASE + 0x44u)
 #define CLK_SYS_SRC_REF 0u
 #define CLK_SYS_SRC_AUX 1u                  /* AUXSRC 0: PLL_SYS */
 #define CLK_PERI_CTRL (CLOCKS_BASE + 0x48u) /* AUXSRC 0: clk_sys */
 #define CLK_USB_CTRL (CLOCKS_BASE + 0x54u)  /* AUXSRC 0: PLL_USB */
+#define CLK_USB_DIV (CLOCKS_BASE + 0x58u)
 #define CLK_CTRL_ENABLE (1u << 11)
+#define CLK_DIV_1 (1u << 8)
 #define CLK_SYS_RESUS_CTRL (CLOCKS_BASE + 0x78u)
+/* What has a clock while the processors are in deep sleep (2.11.2) */
+#define CLOCKS_SLEEP_EN0 REG32(CLOCKS_BASE + 0xa8u)
+#define SLEEP_EN0_PLL_USB (1u << 15)
+#define CLOCKS_SLEEP_EN1 REG32(CLOCKS_BASE + 0xacu)
+#define SLEEP_EN1_TIMER (1u << 5)
+#define SLEEP_EN1_USBCTRL (3u << 10) /* clk_sys and clk_usb */
+#define SLEEP_EN1_WATCHDOG (1u << 12)
+#define SLEEP_EN_ALL UINT32_MAX
 
 #define XOSC_BASE 0x40024000u
 #define XOSC_CTRL (XOSC_BASE + 0x00u)

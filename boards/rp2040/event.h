@@ -1,4 +1,5 @@
-/* The event interrupt of port.h: all interrupts have one priority, so handlers never nest. */
+/* The event interrupt of port.h. What leads to it has one priority, so its handlers never nest;
+ * those of USB come above them, and share nothing with them. */
 #ifndef RP2040_EVENT_H
 #define RP2040_EVENT_H
 
@@ -8,7 +9,7 @@ void rp2040_event(void);
 /* Interrupt vector of TIMER alarm 0. */
 void timer0_irq_handler(void);
 
-/* Prepares what port.h offers; the watchdog runs from then on. Called once, before main. */
+/* Prepares what port.h offers. Called once, before main. */
 void port_start(void);
 
 #endif

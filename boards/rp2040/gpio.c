@@ -4,6 +4,9 @@
 
 #define IO_BANK0_CTRL(pin) (0x40014004u + 8u * (pin))
 
+#define IO_OEOVER_DISABLE (2u << 12)
+#define IO_INOVER_HIGH (3u << 16)
+
 #define PADS_BANK0_GPIO(pin) (0x4001c004u + 4u * (pin))
 #define PAD_INPUT_ENABLE (1u << 6)
 #define PAD_DRIVE_4_MA (1u << 4)
@@ -23,6 +26,10 @@ void gpio_set_pad(unsigned pin, enum gpio_pull pull) {
 
 void gpio_set_function(unsigned pin, enum gpio_function function) {
   REG32(IO_BANK0_CTRL(pin)) = (uint32_t)function;
+}
+
+void gpio_set_function_reading_high(unsigned pin, enum gpio_function function) {
+  REG32(IO_BANK0_CTRL(pin)) = (uint32_t)function | IO_OEOVER_DISABLE | IO_INOVER_HIGH;
 }
 
 void gpio_write(unsigned pin, bool high) {

@@ -12,6 +12,8 @@ enum gpio_function {
   GPIO_FUNCTION_I2C = 3,
   GPIO_FUNCTION_SIO = 5,
   GPIO_FUNCTION_PIO0 = 6,
+  GPIO_FUNCTION_USB = 8, /* for tests of the controller */
+  GPIO_FUNCTION_NULL = 31,
 };
 
 enum gpio_pull { GPIO_PULL_NONE, GPIO_PULL_UP };
@@ -20,6 +22,9 @@ enum gpio_pull { GPIO_PULL_NONE, GPIO_PULL_UP };
 void gpio_set_pad(unsigned pin, enum gpio_pull pull);
 
 void gpio_set_function(unsigned pin, enum gpio_function function);
+
+/* As gpio_set_function, but the pin is never driven, and the function reads it as high. */
+void gpio_set_function_reading_high(unsigned pin, enum gpio_function function);
 
 /* Under GPIO_FUNCTION_SIO: the level to drive, and whether to drive it. */
 void gpio_write(unsigned pin, bool high);

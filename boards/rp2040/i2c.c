@@ -47,7 +47,7 @@ enum ft_status i2c_open(const struct i2c_pins *pins, struct i2c_owner new_owner)
   IC_FS_SCL_HCNT = HCNT;
   IC_FS_SCL_LCNT = LCNT;
   IC_FS_SPKLEN = SPIKE_CYCLES;
-  IC_SDA_HOLD = SDA_HOLD_CYCLES;
+  IC_SDA_HOLD = SDA_HOLD_CYCLES | IC_SDA_HOLD_RX(1u);
   IC_INTR_MASK = 0;
   rp2040_irq_enable(RP2040_IRQ_I2C0);
 
@@ -83,6 +83,7 @@ static enum ft_status load_when_idle(void) {
     }
   }
   IC_TAR = transaction.address;
+  (void)IC_CLR_TX_ABRT;
   (void)IC_CLR_INTR;
   IC_ENABLE = 1;
   if (transaction.read_count == 0) {

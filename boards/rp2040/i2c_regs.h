@@ -27,13 +27,17 @@
 #define IC_INTR_TX_ABRT (1u << 6)
 #define IC_INTR_STOP_DET (1u << 9)
 
-#define IC_CLR_INTR                                                                                \
-  REG32(I2C0_BASE + 0x40u) /* reading clears every interrupt, the abort source                     \
-                              and the flushed state of the FIFOs */
+/* Reading clears every interrupt and the abort source. */
+#define IC_CLR_INTR REG32(I2C0_BASE + 0x40u)
+/* Until it is read, an abort keeps the transmit FIFO flushed (IC_RAW_INTR_STAT.TX_ABRT). */
+#define IC_CLR_TX_ABRT REG32(I2C0_BASE + 0x54u)
 
 #define IC_ENABLE REG32(I2C0_BASE + 0x6cu) /* bit 0; 0 flushes both FIFOs */
 #define IC_RXFLR REG32(I2C0_BASE + 0x78u)
 #define IC_SDA_HOLD REG32(I2C0_BASE + 0x7cu) /* written only while disabled */
+/* 0 has the controller lose arbitration to a target that pulls SDA right after SCL falls (Linux,
+ * i2c-designware: "avoid aborted transfers with fast reacting I2C slaves"). */
+#define IC_SDA_HOLD_RX(cycles) ((cycles) << 16)
 
 #define IC_TX_ABRT_SOURCE REG32(I2C0_BASE + 0x80u)
 #define IC_TX_ABRT_7B_ADDR_NOACK (1u << 0)

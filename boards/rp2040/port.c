@@ -2,6 +2,7 @@
 
 #include "rp2040/event.h"
 #include "rp2040/flash.h"
+#include "rp2040/mpu_regs.h"
 #include "rp2040/nvic.h"
 #include "rp2040/resets.h"
 #include "rp2040/timer_regs.h"
@@ -27,6 +28,24 @@ static struct {
 
 static bool started_by_watchdog;
 static char serial_number[2 * FLASH_ID_BYTES + 1];
+
+/* A stack that grows out of its bank, and a null pointer, are faults instead of silent damage. As
+ * pico-sdk's runtime_init_stack_guard.c, but for the whole bank. */
+static void guard_memory(void) {
+  extern const uint32_t __stack_guard[];
+  MPU_RBAR = (uint32_t)(uintptr_t)__stack_guard | MPU_RBAR_REGION(0u);
+  MPU_RASR = MPU_RASR_NO_ACCESS | MPU_RASR_BYTES(12u) | MPU_RASR_ENABLE;
+  MPU_RBAR = MPU_RBAR_REGION(1u);
+  MPU_RASR = MPU_RASR_NO_ACCESS | MPU_RASR_BYTES(8u) | MPU_RASR_ENABLE;
+  MPU_CTRL = MPU_CTRL_DEFAULT_MAP | MPU_CTRL_ENABLE;
+  __asm volatile("dsb\n isb" ::: "memory");
+}
+
+/* The boot ROM's tables begin at address 0. */
+static void open_memory(void) {
+  MPU_CTRL = 0;
+  __asm volatile("dsb\n isb" ::: "memory");
+}
 
 static uint32_t disable_interrupts(void) {
   uint32_t primask;
@@ -132,6 +151,7 @@ _Noreturn void port_reboot_to_loader(void) {
   const uint32_t code = 'U' | 'B' << 8;
 
   disable_interrupts();
+  open_memory();
   WATCHDOG_SCRATCH0 = 0;
   extern const uint16_t __rom_function_table, __rom_function_lookup;
   const uint16_t *table = (const uint16_t *)(uintptr_t)__rom_function_table;
@@ -164,13 +184,12 @@ void port_start(void) {
   started_by_watchdog = WATCHDOG_REASON != 0 && WATCHDOG_SCRATCH0 == STARTED_MAGIC;
   WATCHDOG_SCRATCH0 = STARTED_MAGIC;
 
-  PSM_WDSEL = PSM_WDSEL_ALL_BUT_OSCILLATORS;
+  guard_memory();
+  rp2040_irq_set_priorities();
   port_watchdog_feed();
-  REG32_SET(WATCHDOG_CTRL) = WATCHDOG_CTRL_ENABLE;
-
   if (resets_release(RESETS_TIMER) != FT_OK)
     port_panic();
-  TIMER_INTE = TIMER_ALARM0_BIT;
+  REG32_SET(TIMER_INTE) = TIMER_ALARM0_BIT;
   rp2040_irq_enable(RP2040_IRQ_TIMER_0);
 
   read_serial_number();

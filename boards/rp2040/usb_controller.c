@@ -3,15 +3,21 @@
  * datasheet 4.1.2). Every endpoint is single-buffered.
  *
  * Errata: E2 (an abort blocks the controller for good) and E5 (a busy bus hides the end of a bus
- * reset) are fixed in revision B2 of the chip. On B0 and B1 aborts are left out, and E5, whose
- * work-around takes two pins, is not worked around: there the device may not enumerate behind a hub
- * with traffic. E15 (some bus errors in an IN transfer hang the device) stands in all revisions: no
- * bulk IN packet is offered in the last 200 us of a frame, where such errors come from.
+ * reset) are fixed in revision B2 of the chip. On B0 and B1 aborts are left out, and against E5 the
+ * bus is made to look idle after a reset, if the board can spare GPIO15 for it: else the device may
+ * not enumerate there behind a hub with traffic (pico-sdk, rp2040_usb_device_enumeration.c). E15
+ * (some bus errors in an IN transfer hang the device) stands in all revisions: no bulk IN packet is
+ * offered in the last 200 us of a frame, where such errors come from. It can still strike (TinyUSB
+ * pull request 1779, embassy issue 2880), and then nothing but a reset of the block helps, not even
+ * a bus reset. So the block is reset, and the device attached anew, when the bus is silent and not
+ * suspended, or when resets of the bus are followed by no request. A hung controller that goes on
+ * seeing frames, under a host that resets nothing, is not noticed.
  */
 #include "rp2040/usb_controller.h"
 
 #include "port/port.h"
 #include "port/usb_controller.h"
+#include "rp2040/gpio.h"
 #include "rp2040/nvic.h"
 #include "rp2040/resets.h"
 #include "rp2040/timer_regs.h"
@@ -19,7 +25,7 @@
 
 #include <string.h>
 
-enum { ENDPOINT_NUMBERS = 3 };
+enum { ENDPOINT_NUMBERS = 3, PIN_DP = 15, FEIGNED_MAX_ms = 5 };
 
 #define SYSINFO_CHIP_ID REG32(0x40000000u)
 #define SYSINFO_CHIP_ID_REVISION(id) ((id) >> 28)
@@ -32,15 +38,46 @@ enum { ENDPOINT_NUMBERS = 3 };
 /* A full packet and its handshake take 50 us on the bus. */
 #define ABORT_LIMIT_us 200u
 
+/* How often the bus is looked at, and how long it may be silent: each millisecond a frame begins.
+ */
+#define WATCH_us 250000u
+#define SILENCE_us 1000000u
+/* A host that enumerates follows a reset by a request. A reset lasts 10 ms or more (USB 2.0,
+ * TDRST), so what is told of it within 3 ms is told of one. */
+#define UNASKED_RESETS 2u
+#define RESET_APART_us 3000u
+/* Where no host is the limits above rise by this factor. */
+#define PATIENCE_MAX 8u
+/* Ample for a hub to notice, which debounces for 100 ms (USB 2.0, TATTDB). */
+#define DETACHED_us 100000u
+
+#define CONTROL_BITS (USB_BIT(USB_ENDPOINT_IN) | USB_BIT(0))
+
+/* What the controller's interrupt leaves to the service interrupt, masked until then. */
+#define SERVED                                                                                     \
+  (USB_INT_BUS_RESET | USB_INT_SETUP_REQ | USB_INT_BUFF_STATUS | USB_INT_DEV_SUSPEND |             \
+   USB_INT_DEV_RESUME)
+
 /* One bit for each endpoint, as in BUFF_STATUS */
 static uint32_t data1;    /* the next packet is DATA1 */
 static uint32_t held;     /* it offers a packet, or accepts one */
 static uint32_t deferred; /* held, but not before the next frame */
 static uint32_t bulk;
 
-static uint32_t frame_start_us;
+/* The controller's own interrupt writes these two; all else belongs to the service interrupt. */
+static volatile uint32_t frame_start_us;
+static volatile bool frame_began;
+
 static bool suspended;
-static bool can_abort;
+static bool is_old; /* before revision B2 */
+
+/* What alarm 1 is for */
+static enum { WATCH, ATTACH, AWAIT_END_OF_RESET, FEIGN_IDLE } next;
+static uint32_t feigned_ms;
+static uint32_t alive_us; /* when last the bus was not silent, or was asleep */
+static uint32_t reset_us; /* the last reset of the bus */
+static uint32_t unasked_resets;
+static uint32_t patience = 1;
 
 /* The controller reads the control word in its own clock domain, so AVAILABLE is written once the
  * other fields are certain to have arrived there: datasheet 4.1.2.5.1. */
@@ -62,7 +99,8 @@ static bool in_frame_tail(void) {
 }
 
 static void start_frame(void) {
-  frame_start_us = TIMER_TIMERAWL;
+  frame_began = false;
+  alive_us = frame_start_us;
   for (uint8_t number = 1; deferred && number < ENDPOINT_NUMBERS; number++) {
     uint8_t endpoint = USB_ENDPOINT_IN | number;
     if (deferred & USB_BIT(endpoint))
@@ -73,7 +111,7 @@ static void start_frame(void) {
 
 /* Stops the controller from touching the buffer. */
 static void begin_abort(uint32_t bit) {
-  if (!can_abort)
+  if (is_old)
     return;
   REG32_SET(USB_EP_ABORT) = bit;
   uint32_t start_us = TIMER_TIMERAWL;
@@ -81,11 +119,25 @@ static void begin_abort(uint32_t bit) {
   }
 }
 
-static void end_abort(uint32_t bit) {
-  if (!can_abort)
+/* Not of endpoint 0 while a SETUP waits: see silence_control(). */
+static void end_abort(uint32_t bits) {
+  if (is_old)
     return;
-  REG32_CLEAR(USB_EP_ABORT_DONE) = bit;
-  REG32_CLEAR(USB_EP_ABORT) = bit;
+  if (REG32(USB_SIE_STATUS) & USB_SIE_STATUS_SETUP_REC)
+    bits &= ~CONTROL_BITS;
+  REG32_CLEAR(USB_EP_ABORT_DONE) = bits;
+  REG32_CLEAR(USB_EP_ABORT) = bits;
+}
+
+/* What a control transfer that the host has abandoned left must not answer for the one that
+ * follows: until on_setup() has taken it back, endpoint 0 answers with NAK. */
+static void silence_control(void) {
+  if (is_old) {
+    USB_BUFFER_CONTROL(USB_ENDPOINT_IN) &= ~USB_BUFFER_AVAILABLE;
+    USB_BUFFER_CONTROL(0) &= ~USB_BUFFER_AVAILABLE;
+  } else {
+    REG32_SET(USB_EP_ABORT) = CONTROL_BITS;
+  }
 }
 
 bool usb_controller_withdraw(uint8_t endpoint) {
@@ -179,6 +231,103 @@ void usb_controller_unstall(uint8_t endpoint) {
   data1 &= ~USB_BIT(endpoint);
 }
 
+static void look_in(uint32_t us) {
+  TIMER_ALARM1 = TIMER_TIMERAWL + us;
+}
+
+/* Erratum E5: after a reset of the bus the controller waits for 800 us of idle bus, which it may
+ * never see. So it is shown the state J for a millisecond: D+ high, through GPIO15. */
+static void feign_idle(void) {
+  gpio_set_function_reading_high(PIN_DP, GPIO_FUNCTION_USB);
+  REG32_SET(USB_PHY_DIRECT) = USB_PHY_DIRECT_DP_PULLUP_EN;
+  REG32_SET(USB_PHY_DIRECT_OVERRIDE) = USB_PHY_DIRECT_OVERRIDE_DP_PULLUP_EN;
+  USB_MUXING = USB_MUXING_TO_PADS | USB_MUXING_SOFTCON;
+}
+
+static void show_bus(void) {
+  USB_MUXING = USB_MUXING_TO_PHY | USB_MUXING_SOFTCON;
+  REG32_CLEAR(USB_PHY_DIRECT_OVERRIDE) = USB_PHY_DIRECT_OVERRIDE_DP_PULLUP_EN;
+  gpio_set_function(PIN_DP, GPIO_FUNCTION_NULL);
+}
+
+static void watch(void) {
+  next = WATCH;
+  look_in(WATCH_us);
+}
+
+static void attach(void) {
+  if (resets_release(RESETS_USBCTRL | RESETS_SYSINFO) != FT_OK)
+    port_panic();
+  is_old = SYSINFO_CHIP_ID_REVISION(SYSINFO_CHIP_ID) < REVISION_B2;
+  for (uint32_t offset = 0; offset < USB_DPRAM_BYTES; offset += 4)
+    REG32(USB_DPRAM_BASE + offset) = 0;
+
+  USB_MUXING = USB_MUXING_TO_PHY | USB_MUXING_SOFTCON;
+  USB_PWR = USB_PWR_VBUS_DETECT | USB_PWR_VBUS_DETECT_OVERRIDE_EN; /* powered by the bus */
+  USB_MAIN_CTRL = USB_MAIN_CTRL_CONTROLLER_EN;
+  REG32(USB_SIE_CTRL) = USB_SIE_CTRL_EP0_INT_1BUF;
+  REG32(USB_INTE) = SERVED | USB_INT_DEV_SOF;
+  rp2040_irq_enable(RP2040_IRQ_USBCTRL);
+  REG32_SET(USB_SIE_CTRL) = USB_SIE_CTRL_PULLUP_EN;
+  alive_us = TIMER_TIMERAWL;
+  watch();
+}
+
+static void start_over(void) {
+  patience = patience < PATIENCE_MAX ? 2 * patience : PATIENCE_MAX;
+  rp2040_irq_disable(RP2040_IRQ_USBCTRL);
+  resets_assert(RESETS_USBCTRL);
+  held = 0;
+  deferred = 0;
+  data1 = 0;
+  suspended = false;
+  frame_began = false;
+  unasked_resets = 0;
+  next = ATTACH;
+  usb_device_on_bus_reset();
+  look_in(DETACHED_us);
+}
+
+void timer1_irq_handler(void) {
+  TIMER_INTR = TIMER_ALARM1_BIT;
+  switch (next) {
+  case WATCH:
+    if (REG32(USB_SIE_STATUS) & USB_SIE_STATUS_SUSPENDED)
+      alive_us = TIMER_TIMERAWL;
+    if (TIMER_TIMERAWL - alive_us >= patience * SILENCE_us)
+      start_over();
+    else
+      watch();
+    break;
+  case ATTACH:
+    attach();
+    break;
+  case AWAIT_END_OF_RESET:
+    if (REG32(USB_SIE_STATUS) & USB_SIE_STATUS_LINES) {
+      feign_idle();
+      feigned_ms = 0;
+      next = FEIGN_IDLE;
+    }
+    look_in(1000);
+    break;
+  case FEIGN_IDLE:
+    feigned_ms++;
+    if (REG32(USB_SIE_STATUS) & USB_SIE_STATUS_CONNECTED || feigned_ms == FEIGNED_MAX_ms) {
+      show_bus();
+      watch();
+    } else {
+      look_in(1000);
+    }
+    break;
+  }
+}
+
+static bool is_unasked_for(uint32_t now_us) {
+  unasked_resets += now_us - reset_us >= RESET_APART_us;
+  reset_us = now_us;
+  return unasked_resets >= UNASKED_RESETS * patience;
+}
+
 static void on_bus_reset(void) {
   REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_BUS_RESET;
   USB_ADDR_ENDP = 0;
@@ -187,10 +336,16 @@ static void on_bus_reset(void) {
   usb_controller_withdraw(0);
   suspended = false;
   usb_device_on_bus_reset();
+  if (is_old && usb_controller_has_gpio15) {
+    next = AWAIT_END_OF_RESET;
+    look_in(1000);
+  }
 }
 
 static void on_setup(void) {
   REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_SETUP_REC;
+  unasked_resets = 0;
+  patience = 1;
   uint8_t packet[USB_SETUP_BYTES];
   for (unsigned i = 0; i < sizeof packet; i++)
     packet[i] = *(volatile uint8_t *)(uintptr_t)(USB_SETUP_PACKET + i);
@@ -199,6 +354,7 @@ static void on_setup(void) {
   usb_controller_withdraw(0);
   USB_BUFFER_CONTROL(USB_ENDPOINT_IN) = 0; /* a stall ends here */
   USB_BUFFER_CONTROL(0) = 0;
+  end_abort(CONTROL_BITS);
   data1 |= USB_BIT(USB_ENDPOINT_IN) | USB_BIT(0);
   usb_device_on_setup(packet);
 }
@@ -234,22 +390,27 @@ static void set_suspended(bool now) {
 }
 
 /* What was finished before a SETUP is handled before it, so that an address set counts. */
-void usbctrl_irq_handler(void) {
-  uint32_t interrupts = USB_INTS;
-  if (interrupts & USB_INT_BUS_RESET)
+static void serve(void) {
+  uint32_t interrupts = USB_INTR & SERVED;
+  if (frame_began) {
+    start_frame();
+    interrupts |= USB_INT_DEV_SOF;
+  }
+  if (interrupts & USB_INT_BUS_RESET) {
+    if (is_unasked_for(TIMER_TIMERAWL)) {
+      start_over();
+      return;
+    }
     on_bus_reset();
+  }
   if (interrupts & USB_INT_DEV_SUSPEND) {
     REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_SUSPENDED;
-    set_suspended(true);
+    set_suspended(REG32(USB_SIE_STATUS) & USB_SIE_STATUS_SUSPENDED);
   }
   if (interrupts & USB_INT_DEV_RESUME)
     REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_RESUME;
   if (interrupts & (USB_INT_DEV_RESUME | USB_INT_DEV_SOF | USB_INT_SETUP_REQ | USB_INT_BUFF_STATUS))
     set_suspended(false);
-  if (interrupts & USB_INT_DEV_SOF) {
-    (void)USB_SOF_RD;
-    start_frame();
-  }
   if (interrupts & USB_INT_BUFF_STATUS) {
     uint32_t finished = REG32(USB_BUFF_STATUS);
     for (uint8_t number = 0; number < ENDPOINT_NUMBERS; number++) {
@@ -261,10 +422,28 @@ void usbctrl_irq_handler(void) {
   }
   if (interrupts & USB_INT_SETUP_REQ)
     on_setup();
+  REG32_SET(USB_INTE) = SERVED;
 }
 
 void usb_service_irq_handler(void) {
+  if (next != ATTACH)
+    serve();
   usb_device_on_service();
+}
+
+/* What cannot wait, and nothing else: it interrupts the handling of the rest too. A token that
+ * follows a SETUP comes 3 us later. */
+void usbctrl_irq_handler(void) {
+  uint32_t interrupts = USB_INTS;
+  if (interrupts & USB_INT_SETUP_REQ)
+    silence_control();
+  if (interrupts & USB_INT_DEV_SOF) {
+    frame_start_us = TIMER_TIMERAWL;
+    (void)USB_SOF_RD;
+    frame_began = true;
+  }
+  REG32_CLEAR(USB_INTE) = interrupts & SERVED;
+  rp2040_irq_pend(RP2040_IRQ_USB_SERVICE);
 }
 
 void usb_controller_request_service(void) {
@@ -273,19 +452,8 @@ void usb_controller_request_service(void) {
 
 void usb_controller_start(void) {
   resets_assert(RESETS_USBCTRL);
-  if (resets_release(RESETS_USBCTRL | RESETS_SYSINFO) != FT_OK)
-    port_panic();
-  can_abort = SYSINFO_CHIP_ID_REVISION(SYSINFO_CHIP_ID) >= REVISION_B2;
-  for (uint32_t offset = 0; offset < USB_DPRAM_BYTES; offset += 4)
-    REG32(USB_DPRAM_BASE + offset) = 0;
-
-  USB_MUXING = USB_MUXING_TO_PHY | USB_MUXING_SOFTCON;
-  USB_PWR = USB_PWR_VBUS_DETECT | USB_PWR_VBUS_DETECT_OVERRIDE_EN; /* powered by the bus */
-  USB_MAIN_CTRL = USB_MAIN_CTRL_CONTROLLER_EN;
-  REG32(USB_SIE_CTRL) = USB_SIE_CTRL_EP0_INT_1BUF;
-  USB_INTE = USB_INT_BUS_RESET | USB_INT_SETUP_REQ | USB_INT_BUFF_STATUS | USB_INT_DEV_SUSPEND |
-             USB_INT_DEV_RESUME | USB_INT_DEV_SOF;
-  rp2040_irq_enable(RP2040_IRQ_USBCTRL);
+  REG32_SET(TIMER_INTE) = TIMER_ALARM1_BIT;
+  rp2040_irq_enable(RP2040_IRQ_TIMER_1);
   rp2040_irq_enable(RP2040_IRQ_USB_SERVICE);
-  REG32_SET(USB_SIE_CTRL) = USB_SIE_CTRL_PULLUP_EN;
+  attach();
 }

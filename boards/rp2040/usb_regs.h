@@ -48,8 +48,12 @@
 #define USB_SIE_STATUS (USB_BASE + 0x50u)
 #define USB_SIE_STATUS_BUS_RESET (1u << 19)
 #define USB_SIE_STATUS_SETUP_REC (1u << 17)
+#define USB_SIE_STATUS_CONNECTED (1u << 16)
 #define USB_SIE_STATUS_RESUME (1u << 11)
+/* Reads whether the bus is suspended; writing a 1 clears INTS.DEV_SUSPEND, which says that this has
+ * changed (pico-sdk, hardware/regs/usb.h). */
 #define USB_SIE_STATUS_SUSPENDED (1u << 4)
+#define USB_SIE_STATUS_LINES (3u << 2) /* 0: both are low */
 #define USB_BUFF_STATUS (USB_BASE + 0x58u)
 #define USB_EP_ABORT (USB_BASE + 0x60u)
 #define USB_EP_ABORT_DONE (USB_BASE + 0x64u)
@@ -57,11 +61,17 @@
 #define USB_EP_STALL_ARM_BOTH 3u
 #define USB_MUXING REG32(USB_BASE + 0x74u)
 #define USB_MUXING_TO_PHY (1u << 0)
+#define USB_MUXING_TO_PADS (1u << 2) /* GPIO15 and 16, with their function 8 */
 #define USB_MUXING_SOFTCON (1u << 3)
 #define USB_PWR REG32(USB_BASE + 0x78u)
 #define USB_PWR_VBUS_DETECT (1u << 2)
 #define USB_PWR_VBUS_DETECT_OVERRIDE_EN (1u << 3)
-#define USB_INTE REG32(USB_BASE + 0x90u)
+#define USB_PHY_DIRECT (USB_BASE + 0x7cu)
+#define USB_PHY_DIRECT_OVERRIDE (USB_BASE + 0x80u)
+#define USB_PHY_DIRECT_DP_PULLUP_EN (1u << 1)
+#define USB_PHY_DIRECT_OVERRIDE_DP_PULLUP_EN (1u << 2)
+#define USB_INTR REG32(USB_BASE + 0x8cu) /* masked by nothing */
+#define USB_INTE (USB_BASE + 0x90u)
 #define USB_INTS REG32(USB_BASE + 0x98u)
 #define USB_INT_DEV_SOF (1u << 17)
 #define USB_INT_SETUP_REQ (1u << 16)

@@ -1,39 +1,62 @@
-/* The vector table in SRAM (ARMv6-M B1.5.3; interrupts: RP2040 datasheet 2.3.2). What nobody
- * handles is a fault. A handler that the image links replaces its weak name here.
+/* The vector table in SRAM (ARMv6-M B1.5.3; interrupts: RP2040 datasheet 2.3.2), and the priority of
+ * each interrupt as NVIC_IPR wants it. What nobody handles is a fault. A handler
+ * that the image links replaces its weak name here.
+ *
+ * The USB controller comes first, for the time of a frame's start counts (TinyUSB reads it before
+ * anything else) and so does the time from a SETUP to what answers the next token. What else USB has to
+ * do comes before the sensors.
  */
   .syntax unified
   .cpu cortex-m0plus
   .thumb
 
-  .macro interrupt handler
+  .equ FIRST, 0
+  .equ SECOND, 0x40
+  .equ THIRD, 0x80
+
+  .macro interrupt handler, priority
   .weak \handler
   .thumb_set \handler, unexpected_exception
   .word \handler
+  .pushsection .rodata.irq_priorities, "a"
+  .byte \priority
+  .popsection
   .endm
 
   .macro unexpected count
   .rept \count
   .word unexpected_exception
+  .pushsection .rodata.irq_priorities, "a"
+  .byte THIRD
+  .popsection
   .endr
   .endm
+
+  .section .rodata.irq_priorities, "a"
+  .balign 4
+  .global rp2040_irq_priorities
+rp2040_irq_priorities:
 
   .section .vectors, "a"
   .global __vectors
 __vectors:
   .word __stack_top
   .word boot_reset
-  unexpected 14 /* NMI, HardFault, SVCall, PendSV, SysTick */
-  interrupt timer0_irq_handler /* 0 */
-  unexpected 4
-  interrupt usbctrl_irq_handler /* 5 */
-  unexpected 1
-  interrupt pio0_irq_handler /* 7 */
+  .rept 14
+  .word unexpected_exception /* NMI, HardFault, SVCall, PendSV, SysTick */
+  .endr
+  interrupt timer0_irq_handler, THIRD /* 0 */
+  interrupt timer1_irq_handler, SECOND
   unexpected 3
-  interrupt dma0_irq_handler /* 11 */
+  interrupt usbctrl_irq_handler, FIRST /* 5 */
+  unexpected 1
+  interrupt pio0_irq_handler, THIRD /* 7 */
+  unexpected 3
+  interrupt dma0_irq_handler, THIRD /* 11 */
   unexpected 11
-  interrupt i2c0_irq_handler /* 23 */
+  interrupt i2c0_irq_handler, THIRD /* 23 */
   unexpected 2
-  interrupt usb_service_irq_handler /* 26 */
+  interrupt usb_service_irq_handler, SECOND /* 26 */
   unexpected 5
 
   .section .text.unexpected_exception, "ax"

@@ -13,6 +13,8 @@
 
 /* So long the end of a second waits for a frame to follow, rather than keep one waiting. */
 #define FRAME_WAIT_us 100000u
+/* A zero that nobody follows may be off by 30 Pa after so long: condition.h. */
+#define ZERO_LASTS_us 60000000u
 /* Up to this pitch the neighbours feel what one sensor feels: see READINGS_STILL_NOISES. */
 #define SHARED_PITCH_mm 9.0f
 
@@ -247,6 +249,26 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
   }
 }
 
+/* While the bus sleeps so do the sensors, and once they do, the chip. */
+static bool may_save_power(const struct app *app) {
+  return cdc_is_suspended() && scan_rests(&app->scan);
+}
+
+static void follow_suspend(struct app *app) {
+  const bool saves = may_save_power(app);
+  if (saves != app->saves_power) {
+    port_save_power(saves);
+    const uint64_t now_us = port_now_us();
+    if (saves) {
+      app->saving_since_us = now_us;
+    } else if (now_us - app->saving_since_us >= ZERO_LASTS_us) {
+      condition_tare(&app->condition);
+    }
+    app->saves_power = saves;
+  }
+  scan_rest(&app->scan, cdc_is_suspended());
+}
+
 static void follow_port(struct app *app) {
   uint32_t close_count = cdc_close_count();
   if (close_count != app->close_count) {
@@ -286,7 +308,8 @@ static void each_second(struct app *app, uint64_t now_us, bool after_frame) {
 void app_run(struct app *app) {
   uint32_t news = cdc_news();
   bool tick = atomic_load_explicit(&app->tick, memory_order_relaxed) != 0;
-  if (!app->active && !tick && news == app->news && !scan_has_news(&app->scan)) {
+  if (!app->active && !tick && news == app->news && !scan_has_news(&app->scan) &&
+      may_save_power(app) == app->saves_power) {
     port_sleep();
     return;
   }
@@ -295,6 +318,7 @@ void app_run(struct app *app) {
     app->asleep_us += port_now_us() - app->idle_since_us;
   }
   atomic_store_explicit(&app->tick, 0, memory_order_relaxed);
+  follow_suspend(app);
   if (news != app->news || tick || app->active) {
     app->news = news;
     app->active = commands_receive(app);

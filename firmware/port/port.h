@@ -22,6 +22,11 @@ void port_alarm_at_us(uint64_t t_us);
  * checked just before it cannot be missed. Main context only. */
 void port_sleep(void);
 
+/* Saving: the processor is slow, and what costs current is off unless USB needs it to wake up; time
+ * and alarms go on. The array bus must rest, and is not to be used until the saving has ended,
+ * which takes 0.1 ms. Main context only; no effect if it is so already. */
+void port_save_power(bool saving);
+
 /* Must be called at least once each PORT_WATCHDOG_PERIOD_us from the main loop. */
 #define PORT_WATCHDOG_PERIOD_us 500000u
 void port_watchdog_feed(void);

@@ -12,6 +12,8 @@
 #define SLOT_POLL_us 1000u
 /* How soon a new rate is noticed while waiting for the next frame of the old one. */
 #define RATE_POLL_us 10000u
+/* How soon the end of a rest is noticed. */
+#define REST_POLL_us 10000u
 #define RECOVERY_DELAY_MIN_us 10000u
 #define RECOVERY_DELAY_MAX_us 1000000u
 /* Transitions in one call: enough for the longest run of states that take no time. */
@@ -95,6 +97,10 @@ enum ft_status scan_set_osr(struct scan *scan, uint16_t osr) {
 
 void scan_set_rate_mHz(struct scan *scan, uint32_t rate_mHz) {
   set(&scan->period_us, rate_mHz == 0 ? 0 : 1000000000u / rate_mHz);
+}
+
+void scan_rest(struct scan *scan, bool resting) {
+  set(&scan->must_rest, resting);
 }
 
 static void wait_in(struct scan *scan, enum scan_state state, uint64_t until_us) {
@@ -273,8 +279,21 @@ static uint64_t earlier(uint64_t a, uint64_t b) {
   return a < b ? a : b;
 }
 
+/* Between two operations: true if none is to follow for now. */
+static bool rest(struct scan *scan, uint64_t now_us) {
+  const bool rests = get(&scan->must_rest) != 0;
+  set(&scan->rests, rests);
+  if (rests) {
+    scan->wait_until_us = now_us + REST_POLL_us;
+  }
+  return rests;
+}
+
 /* Decides what comes next once the last reading is here. */
 static void leave_idle(struct scan *scan, uint64_t now_us) {
+  if (rest(scan, now_us)) {
+    return;
+  }
   /* A temperature that was read just now still has to go into its slot. */
   bool prom_is_free = !temperature_waits(scan) && !scan->last_was_temperature;
   if (scan->wants_admission && now_us >= scan->bring_up.next_us && prom_is_free) {
@@ -431,7 +450,9 @@ static void end_operation(struct scan *scan, uint64_t now_us) {
 static void end_wait(struct scan *scan, uint64_t now_us) {
   switch (scan->state) {
   case SCAN_WAIT_POWER:
-    begin_bring_up(scan, now_us);
+    if (!rest(scan, now_us)) {
+      begin_bring_up(scan, now_us);
+    }
     break;
   case SCAN_WAIT_RESET:
     enter(scan, SCAN_READ_PROM);
@@ -440,6 +461,9 @@ static void end_wait(struct scan *scan, uint64_t now_us) {
     enter(scan, SCAN_READ_ADC);
     break;
   case SCAN_WAIT_RECOVERY:
+    if (rest(scan, now_us)) {
+      break;
+    }
     if (scan->bus_stuck) {
       enter(scan, SCAN_RECOVER);
     } else if (temperature_waits(scan)) {

@@ -115,6 +115,7 @@ struct scan {
   _Atomic uint32_t temperature_within_us;   /* if not 0, the next so soon. Set while the slot of
                                                the temperature is claimed, reset while it is empty */
   _Atomic uint32_t suspects;                /* bitmap: to be reset. Set by the main context */
+  _Atomic uint32_t must_rest;
 
   /* Event context only. */
   enum scan_state state;
@@ -149,6 +150,7 @@ struct scan {
   /* Written by the event context, readable from any. */
   _Atomic uint32_t present;  /* bitmap: acknowledged at the last attempt */
   _Atomic uint32_t admitted; /* bitmap */
+  _Atomic uint32_t rests;    /* as it must: nothing is under way on the bus */
   _Atomic uint32_t prom_bad; /* bitmap: after all attempts its CRC differs, or it is blank */
   struct scan_counters counters;
 
@@ -172,6 +174,15 @@ static inline bool scan_has_news(const struct scan *scan) {
 /* Main context. True: *frame, which must still hold the frame before, holds a new one. False:
  * nothing new (a temperature may have been used up). */
 bool scan_take(struct scan *scan, struct frame *frame);
+
+/* Main context. Resting: what is under way ends, then there is no conversion and nothing on the bus
+ * until the rest ends, 10 ms later at most. */
+void scan_rest(struct scan *scan, bool resting);
+
+/* The bus is as scan_rest() wants it when resting. Any context. */
+static inline bool scan_rests(const struct scan *scan) {
+  return atomic_load_explicit(&scan->rests, memory_order_relaxed) != 0;
+}
 
 /* Main context. Effective from the next frame, for which the old rate's pause is cut short.
  * FT_ERR_ARGUMENT. */

@@ -23,6 +23,7 @@ static struct ring receive_ring = {.bytes = receive_bytes, .size = RECEIVE_BYTES
 
 /* Written in interrupt context, read in the main context */
 static _Atomic uint32_t is_open;
+static _Atomic uint32_t is_suspended;
 static _Atomic uint32_t close_count;
 static _Atomic uint32_t loader_requested;
 static _Atomic uint32_t news;
@@ -34,7 +35,6 @@ static struct {
   uint8_t line_coding[LINE_CODING_BYTES];
   bool configured;
   bool dtr;
-  bool suspended;
 
   /* The packet at the head of the stream: taken from the ring, not yet acknowledged */
   _Alignas(4) uint8_t packet[USB_MAX_PACKET_BYTES];
@@ -82,7 +82,7 @@ static void drop_stream(void) {
 
 static void update_open(void) {
   bool was_open = atomic_load_explicit(&is_open, memory_order_relaxed);
-  bool now_open = port.configured && port.dtr && !port.suspended;
+  bool now_open = port.configured && port.dtr && !cdc_is_suspended();
   if (was_open && !now_open) {
     atomic_store_explicit(&is_open, 0, memory_order_relaxed);
     uint32_t count = atomic_load_explicit(&close_count, memory_order_relaxed);
@@ -158,7 +158,10 @@ void cdc_after_halt_change(void) {
 }
 
 void cdc_on_suspended(bool suspended) {
-  port.suspended = suspended;
+  if (suspended != cdc_is_suspended()) {
+    atomic_store_explicit(&is_suspended, suspended, memory_order_relaxed);
+    add_news();
+  }
   update_open();
 }
 
@@ -189,6 +192,10 @@ void cdc_start(const struct cdc_identity *identity) {
 
 bool cdc_is_open(void) {
   return atomic_load_explicit(&is_open, memory_order_acquire);
+}
+
+bool cdc_is_suspended(void) {
+  return atomic_load_explicit(&is_suspended, memory_order_relaxed) != 0;
 }
 
 uint32_t cdc_news(void) {

@@ -31,8 +31,11 @@ void cdc_start(const struct cdc_identity *identity);
 /* The device is configured and not suspended, and the host has raised DTR. */
 bool cdc_is_open(void);
 
-/* Changes when there is something to read, the port was closed, or the loader was asked for: a main
- * loop that has seen to all that need not look before. */
+/* The bus is suspended: what hangs on it may draw 2.5 mA (USB 2.0, 7.2.3). */
+bool cdc_is_suspended(void);
+
+/* Changes when there is something to read, the port was closed, the bus falls asleep or wakes up,
+ * or the loader was asked for: a main loop that has seen to all that need not look before. */
 uint32_t cdc_news(void);
 
 /* Counts the times the port was closed (DTR dropped, suspended, bus reset, unplugged): streams end

@@ -9,8 +9,9 @@
  *     sensor_adc_zero (sensor)      every ADC read gives 0
  *     sensor_nack (sensor)          does not acknowledge its address, once, the first time from from_s on
  *     sensor_brown_out (sensor)     its supply dips at from_s: a conversion is lost, and until a reset its codes are 1/16 too small
- *     sensor_d2_corrupt (sensor)    every temperature has one bit inverted
+ *     sensor_d2_corrupt (sensor)    every temperature has one bit inverted, another one each time
  *     sensor_noisy (sensor)         ten times the noise of the datasheet
+ *     sensor_fast (sensor)          acknowledges so soon that an I2C controller without a receive hold takes it for lost arbitration
  *     sda_stuck_low (sensor)        pulls SDA from from_s until nine clocks reached it or its multiplexer was reset
  *     mux_stuck (mux)               acknowledges nothing until its RESET line was pulsed
  *     mux_dead (mux)                acknowledges nothing and connects nothing
@@ -21,7 +22,15 @@
  *     clock_glitch (sensor)         sees one clock too many, once, in the first transfer from from_s on
  *     host_stall                    the USB host stops reading the CDC port
  *     usb_unplug                    the cable is out; it comes back at to_s
+ *     crystal_dead                  the crystal does not swing before to_s
+ *     crystal_weak                  it swings, but what it drives before to_s stops the chip until a reset
+ *     pll_late                      no PLL locks before to_s
+ *     usb_busy_hub                  other devices talk on the bus: after a reset of it it is never idle for 800 us
+ *     usb_deaf                      erratum E15 strikes at from_s: the USB controller answers nothing until its block is reset
+ *     usb_dead                      the same, and it does not hear the bus either
+ *     usb_late_resume               the controller says 45 ms after a resume that it is not suspended any more
  *     power_cut                     chip, flash and sensors are without power until to_s; what the flash was doing is cut short
+ *     chip_reset                    the chip alone is held in reset until to_s, as when its brown-out detector trips; its SRAM is lost
  *
  * sensor_missing, line_stuck_high, scl_stuck_* and clock_glitch need a board with a data line for each sensor.
  * `to_s` may be left out: the fault then stays. Times are seconds since power-on.
@@ -38,6 +47,7 @@ const TARGET = {
   sensor_brown_out: 'sensor',
   sensor_d2_corrupt: 'sensor',
   sensor_noisy: 'sensor',
+  sensor_fast: 'sensor',
   sda_stuck_low: 'sensor',
   mux_stuck: 'mux',
   mux_dead: 'mux',
@@ -49,11 +59,19 @@ const TARGET = {
   clock_glitch: 'sensor',
   host_stall: null,
   usb_unplug: null,
+  crystal_dead: null,
+  crystal_weak: null,
+  pll_late: null,
+  usb_busy_hub: null,
+  usb_deaf: null,
+  usb_dead: null,
+  usb_late_resume: null,
   power_cut: null,
+  chip_reset: null,
 };
 
 /** Not of the board. */
-const OF_THE_WORLD = ['host_stall', 'usb_unplug', 'power_cut'];
+const OF_THE_WORLD = ['host_stall', 'usb_unplug', 'crystal_dead', 'crystal_weak', 'pll_late', 'usb_busy_hub', 'usb_deaf', 'usb_dead', 'usb_late_resume', 'power_cut', 'chip_reset'];
 const OF_LINES = ['sensor_missing', 'line_stuck_high', 'scl_stuck_low', 'scl_stuck_high', 'clock_glitch'];
 
 export function parseFaults(text, file, { sensors, muxes, lines }) {
@@ -110,7 +128,7 @@ export class Faults {
     this.active = new Set();
     const key = {
       sensor_dead: 'dead', sensor_prom_corrupt: 'promCorrupt', sensor_prom_bit: 'promBit', sensor_adc_zero: 'adcZero',
-      sensor_d2_corrupt: 'd2Corrupt', sensor_noisy: 'noisy',
+      sensor_d2_corrupt: 'd2Corrupt', sensor_noisy: 'noisy', sensor_fast: 'fast',
     };
     /** How many have begun. */
     const times = { sensor_nack: 'nacks', sensor_brown_out: 'brownOuts' };

@@ -8,6 +8,7 @@
 import { createHash } from 'node:crypto';
 import { Chip, Stopped } from './chip/chip.mjs';
 import { FlashMemory } from './chip/flash_memory.mjs';
+import { Trouble } from './chip/trouble.mjs';
 import { SimulatedTime } from './clock.mjs';
 import { Faults } from './faults.mjs';
 import { Report } from './report.mjs';
@@ -15,19 +16,19 @@ import { CdcClient } from './usb/cdc_client.mjs';
 import { UsbHost } from './usb/host.mjs';
 
 export const DEFAULT_SERIAL = 'e660583883265a2c';
-/** By then the firmware must run at the board's frequency. */
+/** So long after a start the firmware must run at the board's frequency, unless the bus sleeps. */
 const CLOCK_CHECK_NS = 200e6;
 
 export class Machine {
   /**
    * @param options image: Uint8Array; Board; scenario; seed; faults: parsed list; flash: 2 MiB of content, beside the
    *   image, from an earlier life; flashSpeed: see BUSY_NS; serial: 16 hex digits; clock_ppm: by how
-   *   much the chip's clocks are fast; fastEnumeration; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes);
+   *   much the chip's clocks are fast; revision: of the chip, see Chip; fastEnumeration; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes);
    *   rise_ns, onLevels: see the boards; makeClient({ host, report, onData }): what uses the USB device, CdcClient by
    *   default
    */
   constructor({
-    image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, clock_ppm = 0, fastEnumeration = false, allowWatchdog = false,
+    image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, clock_ppm = 0, fastEnumeration = false, allowWatchdog = false, revision,
     flash = null, flashSpeed, rise_ns, onLevels, onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {}, makeClient = (parts) => new CdcClient(parts),
   }) {
     this.image = image;
@@ -35,6 +36,7 @@ export class Machine {
     this.seed = seed;
     this.clock_ppm = clock_ppm;
     this.allowWatchdog = allowWatchdog;
+    this.revision = revision;
     this.serial = Uint8Array.from(serial.match(/../g).map((h) => parseInt(h, 16)));
     this.time = new SimulatedTime();
     this.scope = this.time.scope();
@@ -52,6 +54,7 @@ export class Machine {
       scope: this.boardScope, report: this.report, seed, rise_ns, onLevels, onTransfer: onBusTransfer,
       stimulus: (index, t_ns) => scenario.at_ns(index, t_ns), faults: () => this.faults,
     });
+    this.trouble = new Trouble();
     this.boardScope = this.time.scope();
     this.board = this.makeBoard();
     this.host = new UsbHost({ scope: this.scope, report: this.report, fast: fastEnumeration, onPacket: onUsbPacket });
@@ -60,35 +63,77 @@ export class Machine {
     this.faults = new Faults(faults, this.scope, {
       ...Object.fromEntries(Object.keys(this.board.faultActions).map(onBoard)),
       power_cut: (_, active) => (active ? this.#powerDown() : this.#guard(() => this.#powerBack())),
+      chip_reset: (_, active) => (active ? this.#holdChip() : this.#guard(() => this.#releaseChip())),
+      crystal_dead: (_, active) => {
+        this.trouble.crystalDead = active;
+        this.chip.xosc.count();
+      },
+      crystal_weak: (_, active) => {
+        this.trouble.crystalWeak = active;
+      },
+      pll_late: (_, active) => {
+        this.trouble.pllLate = active;
+        for (const pll of [this.chip.pllSys, this.chip.pllUsb]) pll.lock();
+      },
+      usb_busy_hub: (_, active) => {
+        this.trouble.busyHub = active;
+      },
+      usb_late_resume: (_, active) => {
+        this.trouble.lateResume = active;
+      },
+      usb_deaf: (_, active) => this.#hang('deaf', active),
+      usb_dead: (_, active) => this.#hang('dead', active),
       host_stall: (_, active) => this.client.setStalled(active),
       usb_unplug: (_, active) => (active ? this.host.unplug() : this.host.plug()),
     });
-    this.scope.createAlarm(() => this.#checkClock()).scheduleAt(CLOCK_CHECK_NS);
+    this.clockAlarm = this.scope.createAlarm(() => this.#checkClock());
     this.#guard(() => this.#powerUp(null));
   }
 
   #checkClock() {
-    const { clkSys } = this.chip;
-    if (clkSys !== this.Board.clkSys_Hz) this.report.warn('clocks', `clk_sys is ${clkSys / 1e6} MHz; this board runs at ${this.Board.clkSys_Hz / 1e6} MHz`);
+    const { clkSys, wild, usbCtrl } = this.chip;
+    if (!wild && !usbCtrl.isSuspended && clkSys !== this.Board.clkSys_Hz) this.report.warn('clocks', `clk_sys is ${clkSys / 1e6} MHz; this board runs at ${this.Board.clkSys_Hz / 1e6} MHz`);
   }
 
   #powerUp(kept) {
-    this.chip = new Chip(this.time, this.report, { serial: this.serial, seed: this.seed, clock_ppm: this.clock_ppm, memory: this.memory, kept });
+    this.chip = new Chip(this.time, this.report, { serial: this.serial, seed: this.seed, clock_ppm: this.clock_ppm, revision: this.revision, memory: this.memory, trouble: this.trouble, kept });
     this.chip.load(this.image);
     this.board.attachChip(this.chip);
     this.host.connect(this.chip.usbCtrl);
     this.chip.boot();
+    this.clockAlarm.schedule(CLOCK_CHECK_NS);
     this.onPowerUp?.(this.chip);
+  }
+
+  /** Erratum E15 of the USB controller: only a reset of the block ends it. */
+  #hang(how, active) {
+    if (active && this.hasPower) this.chip.usbCtrl.hung = how;
+  }
+
+  #stopChip() {
+    this.hasPower = false;
+    this.cyclesBefore += this.chip.core.cycles;
+    this.chip.dispose();
+    this.host.disconnect();
   }
 
   /** Everything on the board loses its power; the cable is still there. */
   #powerDown() {
-    this.hasPower = false;
-    this.cyclesBefore += this.chip.core.cycles;
-    this.chip.dispose();
+    this.#stopChip();
     this.memory.cutPower();
-    this.host.disconnect();
     throw new Stopped('power cut');
+  }
+
+  /** Sensors and flash keep what they are doing. */
+  #holdChip() {
+    this.#stopChip();
+    this.memory.deselect();
+    throw new Stopped('power cut');
+  }
+
+  #releaseChip() {
+    this.hasPower = true;
+    this.#powerUp(null);
   }
 
   #powerBack() {
@@ -123,7 +168,7 @@ export class Machine {
     this.reboots += 1;
     const old = this.chip;
     this.cyclesBefore += old.core.cycles;
-    const kept = { sram: old.sram, watchdog: { reason, scratch: old.watchdog.scratch } };
+    const kept = { sram: old.sram, usbDPRAM: old.usbDPRAM, watchdog: { reason, scratch: old.watchdog.scratch } };
     old.dispose();
     this.memory.deselect(); // its pads let go; a command that was under way is what came until then
     this.#guard(() => this.#powerUp(kept));

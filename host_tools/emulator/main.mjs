@@ -27,7 +27,8 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --seed N             noise, sensor tolerances, SRAM content at power-on; default 1
   --serial HEX16       unique id of the flash chip; default ${DEFAULT_SERIAL}
   --clock-ppm P        the chip's clocks are fast by P parts per million of emulated time, -1000 to 1000; default 0
-  --faults FILE.json   faults of sensors, multiplexers, USB, power (format: faults.mjs)
+  --revision N         of the chip: 0, 1 or 2 for B0, B1, B2; default 2
+  --faults FILE.json   faults of sensors, multiplexers, clocks, USB, power (format: faults.mjs)
   --flash FILE         what the flash holds beside the image, 2 MiB, from an earlier run; written anew at the end of this one
   --slow-flash         the flash takes the longest times of its datasheet instead of the typical ones
   --fast-enumeration   shorten the host's debounce and reset waits
@@ -65,7 +66,7 @@ each printed as a line; 2 wrong usage or input.`;
 const OPTIONS = {
   image: { type: 'string' }, board: { type: 'string' }, scenario: { type: 'string' }, seconds: { type: 'string' },
   seed: { type: 'string', default: '1' }, 'clock-ppm': { type: 'string', default: '0' }, serial: { type: 'string', default: DEFAULT_SERIAL }, faults: { type: 'string' },
-  flash: { type: 'string' }, 'slow-flash': { type: 'boolean', default: false },
+  revision: { type: 'string', default: '2' }, flash: { type: 'string' }, 'slow-flash': { type: 'boolean', default: false },
   'fast-enumeration': { type: 'boolean', default: false }, 'allow-watchdog': { type: 'boolean', default: false },
   pty: { type: 'string' }, usbredir: { type: 'string' }, 'wait-open': { type: 'boolean', default: false }, pace: { type: 'string' },
   'host-script': { type: 'string' }, capture: { type: 'string' }, 'bus-log': { type: 'string' }, 'usb-log': { type: 'string' },
@@ -109,6 +110,7 @@ function parseOptions(argv) {
   };
   values.seed = number('seed', (v) => Number.isInteger(v) && v >= 0 && v < 2 ** 32, 'a whole number from 0 to 4294967295');
   values['clock-ppm'] = number('clock-ppm', (v) => Math.abs(v) <= 1000, 'a number from -1000 to 1000');
+  values.revision = number('revision', (v) => [0, 1, 2].includes(v), '0, 1 or 2');
   if (values.seconds !== undefined) values.seconds = number('seconds', (v) => Number.isFinite(v) && v > 0, 'a positive number of seconds');
   for (const name of ['vcd-from', 'vcd-to']) {
     values[name] = values[name] === undefined ? Infinity : number(name, (v) => Number.isFinite(v) && v >= 0, 'a time in seconds, 0 or later');
@@ -200,7 +202,7 @@ async function run(options) {
     while (options['wait-open'] && !pty.isOpen && !interrupted && !pty.failure) await sleep(5);
 
     const machine = new Machine({
-      image, Board, scenario, faults, flash, flashSpeed: options['slow-flash'] ? 'slowest' : 'typical', seed: options.seed, serial: options.serial, clock_ppm: options['clock-ppm'],
+      image, Board, scenario, faults, flash, flashSpeed: options['slow-flash'] ? 'slowest' : 'typical', seed: options.seed, serial: options.serial, clock_ppm: options['clock-ppm'], revision: options.revision,
       fastEnumeration: options['fast-enumeration'], allowWatchdog: options['allow-watchdog'],
       rise_ns: options['rise-ns'], onLevels: vcd ? (levels, t_ns) => vcd.change(levels, t_ns) : undefined,
       onBusTransfer: options['bus-log']

@@ -60,6 +60,12 @@ class Elf:
         s = self.section(name)
         return self.data[s.offset : s.offset + s.size] if s.has_bytes else b""
 
+    def bytes_at(self, name, size):
+        """Of the symbol, in whatever section it is."""
+        at = self.value(name)
+        s = next((s for s in self.sections if s.allocated and s.has_bytes and s.address <= at < s.end), None)
+        return self.data[s.offset + at - s.address :][:size] if s else fail(f"{name} is in no section")
+
     def value(self, name):
         found = [s.value for s in self.symbols if s.name == name]
         return found[0] if found else fail(f"the image has no symbol {name}")

@@ -10,9 +10,10 @@ functions and tail calls can be seen; a tail call counts as a call. Calls throug
 resolved by a table (indirect_calls.txt tells its form). A call that the table does not resolve,
 recursion, and a frame of unknown size fail.
 
-All interrupts of an image have one priority, so at most one handler runs on top of the main program:
-worst case = start-up and main + exception frame + deepest handler. A fault can come on top, but it
-ends in a reset. With --of: what each of these functions needs, from its call on, and no more.
+A handler is interrupted only by one of higher priority, as the table rp2040_irq_priorities has them, so at
+most one of each priority runs on top of the main program: worst case = start-up and main + for each
+priority an exception frame and its deepest handler. A fault can come on top, but it ends in a reset. With
+--of: what each of these functions needs, from its call on, and no more.
 
 The exception frame has 32 bytes, and 4 more when the stack must be aligned (ARMv6-M B1.5.7).
 """
@@ -214,19 +215,26 @@ def main():
     memory = {}
     main_bytes, main_chain = worst(functions[vectors[1] & ~1], memory=memory)
     fault = functions[vectors[3] & ~1]
-    handlers = {functions[v & ~1] for v in vectors[16:]} - {fault}
-    handler_bytes, handler_chain = max((worst(h, memory=memory) for h in handlers), key=lambda d: d[0], default=(0, ()))
-    total = main_bytes + (EXCEPTION_FRAME_BYTES + handler_bytes if handlers else 0)
+    priorities = elf.bytes_at("rp2040_irq_priorities", len(vectors) - 16)
+    deepest = {}
+    for vector, priority in zip(vectors[16:], priorities):
+        if functions[vector & ~1] is not fault:
+            deepest[priority] = max(deepest.get(priority, (0, ())), worst(functions[vector & ~1], memory=memory), key=lambda d: d[0])
+    handler_bytes = sum(d[0] for d in deepest.values())
+    frames_bytes = EXCEPTION_FRAME_BYTES * len(deepest)
+    total = main_bytes + frames_bytes + handler_bytes
     reserved = elf.value("__stack_top") - elf.value("__stack_limit")
 
     print(f"main      {main_bytes:5}  {chain_text(main_chain)}")
-    print(f"interrupt {handler_bytes:5}  {chain_text(handler_chain)}")
-    print(f"worst     {total:5}  of {reserved} reserved, exception frame of {EXCEPTION_FRAME_BYTES} included")
+    for priority, (depth, chain) in sorted(deepest.items()):
+        print(f"interrupt {depth:5}  {chain_text(chain)} (priority {priority >> 6})")
+    print(f"worst     {total:5}  of {reserved} reserved, exception frames of {frames_bytes} included")
     if args.json:
         result = {
             "worst_bytes": total, "main_bytes": main_bytes, "interrupt_bytes": handler_bytes,
-            "exception_frame_bytes": EXCEPTION_FRAME_BYTES, "reserved_bytes": reserved,
-            "main_chain": [f.name for f in main_chain], "interrupt_chain": [f.name for f in handler_chain],
+            "exception_frame_bytes": frames_bytes, "reserved_bytes": reserved,
+            "main_chain": [f.name for f in main_chain],
+            "interrupt_chains": [[f.name for f in deepest[priority][1]] for priority in sorted(deepest)],
         }
         with open(args.json, "w") as file:
             json.dump(result, file, indent=2)

@@ -4,6 +4,7 @@
 usage: test_checks.py IMAGE.elf BUILD
 """
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -120,6 +121,13 @@ class Checks(unittest.TestCase):
     def test_stack_of_functions(self):
         self.assert_fails("the image has no function fit_nothing", "stack_usage.py", "--su-dir", *SU_FOLDERS, "--of", "fit_nothing")
         self.assert_fails("boot_main may need", "stack_usage.py", "--su-dir", *SU_FOLDERS, "--limit", "16", "--of", "boot_main")
+
+    def test_handlers_of_several_priorities_nest(self):
+        worst = lambda: int(re.search(r"worst +(\d+)", self.run_check("stack_usage.py", "--su-dir", *SU_FOLDERS).stdout)[1])
+        nested = worst()
+        at = self.elf.value("rp2040_irq_priorities") - self.elf.section(".rodata").address
+        self.poke(".rodata", at, bytes([0x80] * 32))
+        self.assertLess(worst(), nested - 2 * 36)
 
     def test_frames_without_compiler_files(self):
         self.assert_fails("-fstack-usage", "stack_usage.py", "--su-dir", self.folder.name)

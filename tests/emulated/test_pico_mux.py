@@ -179,8 +179,9 @@ class PicoMux(unittest.TestCase):
         self.assert_nothing_is_wrong_and_unflagged(run)
 
     def test_a_stuck_bus_recovers(self):
-        faults = [{"type": "sda_stuck_low", "sensor": 3, "from_s": 1.0, "to_s": 3.0},
-                  {"type": "mux_stuck", "mux": 1, "from_s": 2.0, "to_s": 3.0}]
+        # A reset of the multiplexer, which is part of each reading, may free it before anybody notices: so at several moments of a frame.
+        faults = [{"type": "sda_stuck_low", "sensor": 3, "from_s": 1.0 + 0.0207 * i, "to_s": 3.0} for i in range(6)]
+        faults += [{"type": "mux_stuck", "mux": 1, "from_s": 2.0, "to_s": 3.0}]
         run = Run(self.folder.name, "stuck", self.scenario, 4.1, faults=faults).finish()
         recording = run.recording
         t_s = recording["t_us"] * 1e-6

@@ -68,6 +68,8 @@ export class I2cBus {
     this.onLines = () => {};
     this.problem = () => null;
     this.muxState = () => '';
+    /** The last byte was acknowledged as soon as SCL fell. */
+    this.wasFast = false;
     this.gpio = { sda: false, scl: false };
     this.current = null;
     this.statistics = { transactions: 0, nacks: 0 };
@@ -101,6 +103,7 @@ export class I2cBus {
 
   writeByte(byte) {
     let acknowledged = false;
+    this.wasFast = false;
     for (const t of this.targets) acknowledged = t.write(byte) || acknowledged;
     this.waveform?.byte((byte << 1) | (acknowledged ? 0 : 1), this.timing, this.now_ns());
     const transfer = this.current;

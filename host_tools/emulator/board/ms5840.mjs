@@ -97,7 +97,7 @@ export class Ms5840 extends I2cTarget {
   /**
    * @param options index; prng: this sensor's own; now_ns: () => time; report: Report;
    *   stimulus: (index, t_ns) => { pressure_Pa, temperature_degC }, absolute;
-   *   faults: (index) => { dead, promCorrupt, promBit, adcZero, d2Corrupt, noisy } of this moment, { nacks, brownOuts } so far
+   *   faults: (index) => { dead, promCorrupt, promBit, adcZero, d2Corrupt, noisy, fast } of this moment, { nacks, brownOuts } so far
    */
   constructor({ index, prng, now_ns, report, stimulus, faults = () => ({}) }) {
     super(ADDRESS);
@@ -115,6 +115,9 @@ export class Ms5840 extends I2cTarget {
     this.tied = false;
     this.nacks = 0;
     this.brownOuts = 0;
+    this.wrongBit = 0;
+    /** It pulled SDA as soon as SCL fell. */
+    this.onFast = () => {};
     this.powerUp();
   }
 
@@ -171,6 +174,12 @@ export class Ms5840 extends I2cTarget {
     return this.now_ns() >= this.busyUntil_ns && !faults.dead && !this.holdsSda;
   }
 
+  write(byte) {
+    const acknowledged = super.write(byte);
+    if (acknowledged && this.faults(this.index).fast) this.onFast();
+    return acknowledged;
+  }
+
   receive(command) {
     const now = this.now_ns();
     if (command === 0x1e) {
@@ -212,7 +221,13 @@ export class Ms5840 extends I2cTarget {
     const interrupted = this.conversion !== null && now < this.conversion.end_ns;
     const duration_ns = osr.max_ns * this.timeFactor;
     const corrupt = !isPressure && this.faults(this.index).d2Corrupt;
-    this.conversion = { isPressure, osr, start_ns: now, end_ns: now + duration_ns, spoiled: interrupted, wrong: corrupt ? 1 << Math.floor(this.prng.range(0, 24)) : 0 };
+    this.conversion = { isPressure, osr, start_ns: now, end_ns: now + duration_ns, spoiled: interrupted, wrong: corrupt ? 1 << this.#otherBit() : 0 };
+  }
+
+  /** Of a corrupt temperature: never the same twice running, or two would agree. */
+  #otherBit() {
+    this.wrongBit = (this.wrongBit + 1 + Math.floor(this.prng.range(0, 23))) % 24;
+    return this.wrongBit;
   }
 
   #adcRead(now) {

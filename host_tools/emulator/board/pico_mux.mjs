@@ -43,6 +43,9 @@ export class PicoMux {
         const index = m * SENSORS_PER_MUX + channel;
         const prng = new Prng(Math.imul(seed, 1000003) + index);
         const sensor = new Ms5840({ index, prng, now_ns, report, stimulus, faults: (i) => faults().sensor(i) });
+        sensor.onFast = () => {
+          this.bus.wasFast = true;
+        };
         this.sensors.push(sensor);
         mux.connect(channel, sensor);
       }

@@ -130,10 +130,20 @@ export class PicoParallel {
       this.low.chip = low & LINES;
       this.#resolve();
     };
+    if (this.chip) this.#letGo();
     this.chip = chip;
     chip.pins.onDriven = drive;
     chip.pins.setLevels(LINES, this.levels);
     drive(chip.pins.low, chip.pins.high);
+  }
+
+  /** The chip was reset, in the middle of a byte perhaps. */
+  #letGo() {
+    this.sclCheck.excused = true;
+    for (const line of this.lines) {
+      line.fault(true);
+      line.fault(false);
+    }
   }
 
   #riser(mask, delay_ns) {

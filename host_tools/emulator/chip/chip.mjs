@@ -11,7 +11,7 @@
  *
  * Boot: the boot ROM's part is played here. The CRC-32 of the 256-byte second stage is checked as the boot ROM
  * checks it, the second stage is copied to 0x20041f00 and entered there with lr = 0, clk_sys on the ring
- * oscillator, and only IO_QSPI, PADS_QSPI and TIMER out of reset. SRAM starts filled with seeded noise.
+ * oscillator, and only IO_QSPI, PADS_QSPI and TIMER out of reset. SRAM and the USB controller's memory start filled with seeded noise.
  *
  * `chip.onCall(address, callback)` runs `callback(chip)` each time the instruction at `address` is about to
  * execute; `chip.core.cycles` is the processor cycle count at that moment (sleep does not count).
@@ -23,6 +23,7 @@ import { FLASH_BASE, FLASH_BYTES, RAM_BASE, StrictCore } from './core.mjs';
 import { Dma } from './dma.mjs';
 import { FlashMemory } from './flash_memory.mjs';
 import { I2cBlock } from './i2c_block.mjs';
+import { MemoryFault, Mpu } from './mpu.mjs';
 import { Pins } from './pins.mjs';
 import { Pio } from './pio.mjs';
 import { RegisterFile } from './registers.mjs';
@@ -30,10 +31,15 @@ import { StrictSio } from './sio.mjs';
 import { Ssi } from './ssi.mjs';
 import { SysClock } from './sys_clock.mjs';
 import { Timer, Watchdog } from './timer_watchdog.mjs';
+import { Trouble } from './trouble.mjs';
 import { UsbBlock } from './usb_block.mjs';
 
 const BOOT2_BYTES = 256;
 const SECTOR_BYTES = 4096;
+const SCR = 0xd10;
+const SCR_SLEEPDEEP = 4;
+/** Interrupt to what wakes by it in deep sleep: the bits of SLEEP_EN0 and SLEEP_EN1. */
+const WAKES = new Map([[0, [0, 1 << 5]], [1, [0, 1 << 5]], [2, [0, 1 << 5]], [3, [0, 1 << 5]], [5, [0, 3 << 10]], [11, [1 << 5, 0]], [12, [1 << 5, 0]], [23, [1 << 6, 0]], [24, [1 << 7, 0]]]);
 const BOOT2_RAM = 0x20041f00;
 const DPRAM_BASE = 0x50100000;
 /** So long the boot ROM tries to load the second stage (datasheet 2.8.1.1); a flash that is still erasing is waited for. */
@@ -89,10 +95,11 @@ export class Chip extends RP2040 {
    * @param time SimulatedTime
    * @param report Report
    * @param options serial: 8-byte flash unique id; seed: of the power-on noise in SRAM; clock_ppm: by how much all of
-   *   the chip's clocks are fast, in this time; memory: the FlashMemory, a new one by default; kept: { sram, watchdog }
+   *   the chip's clocks are fast, in this time; revision: 0, 1 or 2 for B0, B1 or B2; memory: the FlashMemory, a new one by default; trouble: what goes wrong
+   *   in the chip; kept: { sram, usbDPRAM, watchdog }
    *   of the life before a watchdog reboot
    */
-  constructor(time, report, { serial, seed = 1, clock_ppm = 0, memory = new FlashMemory({ time, serial, seed }), kept = null }) {
+  constructor(time, report, { serial, seed = 1, clock_ppm = 0, revision = 2, memory = new FlashMemory({ time, serial, seed }), trouble = new Trouble(), kept = null }) {
     super(time.scope());
     this.memory = memory;
     memory.fail = (source, message) => this.fail(source, message);
@@ -101,9 +108,11 @@ export class Chip extends RP2040 {
     this.flashView = new DataView(this.flash.buffer);
     this.time = time;
     this.report = report;
-    this.options = { serial, seed };
+    this.options = { serial, seed, revision };
+    this.trouble = trouble;
     this.logger = new StrictLogger(this);
     this.core = new StrictCore(this);
+    this.mpu = new Mpu(this, () => this.core.guard(this.mpu.denied));
     this.sio = new StrictSio(this);
     /** Frequencies are nominal here, as the firmware believes them; what passes in time is this many times as fast. */
     this.clockRate = 1 + clock_ppm * 1e-6;
@@ -112,6 +121,11 @@ export class Chip extends RP2040 {
     this.hooks = new Map();
     this.slept_since_ns = -1;
     this.sleepCycles = 0;
+    this.scr = 0;
+    /** Time in which only what SLEEP_EN names had a clock. */
+    this.deepSleep_ns = 0;
+    /** Executes nothing that makes sense until it is reset: its clock is none. */
+    this.wild = false;
     this.onWatchdog = null;
     this.onUsbBoot = null;
     this.sysClock = new SysClock(time, this.trueHz(ROSC_HZ));
@@ -137,7 +151,7 @@ export class Chip extends RP2040 {
       if (offset === 0x0c) this.ssi.forceSelect(((value >>> 8) & 3) === 2);
     };
     Object.assign(this.peripherals, {
-      0x40000: new RegisterFile(this, 'SYSINFO', { 0: [0x20002927, 0], 4: [2, 0] }), // revision B2
+      0x40000: new RegisterFile(this, 'SYSINFO', { 0: [((revision << 28) | 0x2927) >>> 0, 0], 4: [2, 0] }),
       0x14000: new RegisterFile(this, 'XIP_CTRL', { 0: [3, 0xb], 4: [0, 0], 8: [2, 0], 12: [0, 0], 16: [0, 0] }),
       0x18000: this.ssi,
       0x40008: this.clocks,
@@ -158,11 +172,11 @@ export class Chip extends RP2040 {
       0x50300: this.pio[1],
     });
     for (const pin of this.qspi) pin.padValue = 0x56;
-    if (kept) this.sram.set(kept.sram);
-    else {
-      const noise = new Prng(seed ^ 0x5eed);
-      const words = new Uint32Array(this.sram.buffer);
-      for (let i = 0; i < words.length; i++) words[i] = noise.uint32();
+    const noise = new Prng(seed ^ 0x5eed);
+    for (const [memory, before] of [[this.sram, kept?.sram], [this.usbDPRAM, kept?.usbDPRAM]]) {
+      const words = new Uint32Array(memory.buffer);
+      if (before) memory.set(before);
+      else for (let i = 0; i < words.length; i++) words[i] = noise.uint32();
     }
     this.#makeBootRom();
     this.onBreak = (code) => {
@@ -248,6 +262,8 @@ export class Chip extends RP2040 {
       for (const block of [this.dma, ...this.pio]) block.clockChanged();
       this.ppb.systickTimer.frequency = this.trueHz(hz);
     } else if (!hz) this.fail('CLOCKS', 'clk_sys stopped');
+    if (this.trouble.crystalWeak && this.clocks.onCrystal) this.wild = true;
+    this.watchdog.tickChanged();
     this.clkUsbHz = this.clocks.usbHz;
     this.clkPeri = this.clocks.periHz || this.clkPeri;
   }
@@ -295,6 +311,7 @@ export class Chip extends RP2040 {
 
   /** A load that did not hit SRAM. */
   busRead(address, bytes) {
+    if (this.core.isGuarded && this.mpu.denies(address)) throw new MemoryFault();
     if (address & (bytes - 1)) this.fail('core', `unaligned ${8 * bytes}-bit read of 0x${address.toString(16)}`);
     const word = (address & ~3) >>> 0;
     let value;
@@ -308,7 +325,8 @@ export class Chip extends RP2040 {
     } else if (address >>> 28 === 0xd) {
       value = this.sio.readUint32(word - 0xd0000000);
     } else if (address >>> 12 === 0xe000e) {
-      value = this.ppb.readUint32(word & 0xfff);
+      const offset = word & 0xfff;
+      value = offset === SCR ? this.scr : offset >= 0xd90 && offset <= 0xda0 ? this.mpu.read(offset) : this.ppb.readUint32(offset);
     } else if (address >>> 12 === DPRAM_BASE >>> 12) {
       this.#checkPage(address, 'read of');
       value = this.usbDPRAMView.getUint32(word - DPRAM_BASE, true);
@@ -324,6 +342,7 @@ export class Chip extends RP2040 {
 
   /** A store that did not hit SRAM. Narrow stores to peripherals replicate the value, as the bus does. */
   busWrite(address, value, bytes) {
+    if (this.core.isGuarded && this.mpu.denies(address)) throw new MemoryFault();
     if (address & (bytes - 1)) this.fail('core', `unaligned ${8 * bytes}-bit write of 0x${address.toString(16)}`);
     if (address < 0x4000) this.fail('core', `write to 0x${address.toString(16)} in the boot ROM (null pointer?)`);
     if (address >>> 26 === FLASH_BASE >>> 26) this.fail('core', `write to 0x${address.toString(16)} in flash`);
@@ -338,13 +357,30 @@ export class Chip extends RP2040 {
       this.sio.writeUint32(address - 0xd0000000, value);
     } else if (address >>> 12 === 0xe000e) {
       if (bytes !== 4) this.fail('core', `${8 * bytes}-bit write of system register 0x${address.toString(16)}`);
-      this.ppb.writeUint32(address & 0xfff, value);
+      const offset = address & 0xfff;
+      if (offset === SCR) this.#writeScr(value);
+      else if (offset >= 0xd90 && offset <= 0xda0) this.mpu.write(offset, value);
+      else this.ppb.writeUint32(offset, value);
     } else {
       const peripheral = this.findPeripheral(address);
       if (!peripheral) this.fail('core', `write to 0x${address.toString(16)}, where nothing is`);
       this.#checkPage(address, 'write of');
       peripheral.writeUint32Atomic(address & 0xffc, wide, (address >>> 12) & 3);
       if (peripheral === this.peripherals[0x40014] || peripheral === this.peripherals[0x4001c]) this.pins.reconfigure();
+    }
+  }
+
+  #writeScr(value) {
+    if (value & ~SCR_SLEEPDEEP) this.fail('core', `SCR 0x${value.toString(16)}: only SLEEPDEEP is modelled`);
+    this.scr = value;
+  }
+
+  #checkWake() {
+    const { core, clocks } = this;
+    const pending = core.pendingInterrupts & core.enabledInterrupts;
+    const [en0, en1] = [clocks.readUint32(0xa8), clocks.readUint32(0xac)];
+    for (const [irq, [in0, in1]] of WAKES) {
+      if ((pending >>> irq) & 1 && (in0 & ~en0 || in1 & ~en1)) this.fail('CLOCKS', `woken from deep sleep by interrupt ${irq}, but SLEEP_EN leaves its block without a clock`);
     }
   }
 
@@ -358,11 +394,17 @@ export class Chip extends RP2040 {
     for (;;) {
       time.fireDue();
       if (core.waiting) core.checkForInterrupts();
+      if (this.slept_since_ns >= 0 && !core.waiting && this.scr & SCR_SLEEPDEEP) this.#checkWake();
       const now = time.nanos;
       if (now >= end_ns) return;
       const next = Math.min(time.next_ns, end_ns);
       if (now < this.starts_ns) {
         time.advanceTo(Math.min(next, this.starts_ns));
+        continue;
+      }
+      if (this.wild) {
+        time.advanceTo(next);
+        time.earliestChanged = false;
         continue;
       }
       if (core.waiting) {
@@ -372,17 +414,23 @@ export class Chip extends RP2040 {
           this.fail('core', `firmware hung: asleep for ${HUNG_AFTER_NS / 1e9} s without an interrupt`);
         }
         time.advanceTo(Math.min(next, this.slept_since_ns + HUNG_AFTER_NS));
+        if (this.scr & SCR_SLEEPDEEP) this.deepSleep_ns += time.nanos - now;
         continue;
       }
       this.slept_since_ns = -1;
       const stop = core.cycles + Math.max(1, Math.ceil((next - now) / time.ns_per_cycle - 1e-9));
       time.earliestChanged = false;
-      if (this.hooks.size) {
-        do {
-          this.hooks.get(core.registers[15] & ~1)?.(this);
-          core.executeInstruction();
-        } while (core.cycles < stop && !core.waiting && !time.earliestChanged);
-      } else core.execute(stop, time);
+      try {
+        if (this.hooks.size) {
+          do {
+            this.hooks.get(core.registers[15] & ~1)?.(this);
+            core.executeInstruction();
+          } while (core.cycles < stop && !core.waiting && !time.earliestChanged);
+        } else core.execute(stop, time);
+      } catch (error) {
+        if (!(error instanceof MemoryFault)) throw error;
+        core.hardFault();
+      }
     }
   }
 }

@@ -1,7 +1,8 @@
 /**
  * Resets, oscillators, PLLs and clock multiplexers of the RP2040 (datasheet 2.14 to 2.18), with the order
  * in which they may be started enforced: a PLL needs a stable crystal, a multiplexer a running source, the
- * auxiliary input of clk_sys may change only while clk_sys runs from clk_ref.
+ * auxiliary input of clk_sys may change only while clk_sys runs from clk_ref. A crystal that does not swing in
+ * full yet (a fault) counts as stable when its STARTUP has passed, and stops the chip once it drives a clock.
  */
 import { BasePeripheral } from 'rp2040js';
 import { RegisterFile } from './registers.mjs';
@@ -13,6 +14,7 @@ export const ROSC_HZ = 6.5e6;
 const PLL_LOCK_NS = 50e3;
 
 const RESET_BITS = 0x1ffffff;
+const TIMER = 21;
 /** What the boot ROM has released when it enters the second stage: IO_QSPI, PADS_QSPI, TIMER. */
 const RELEASED_BY_BOOT_ROM = (1 << 6) | (1 << 9) | (1 << 21);
 
@@ -45,10 +47,12 @@ export class Resets extends BasePeripheral {
     else if (offset === 0) {
       const held = value & RESET_BITS;
       const entered = held & ~this.held;
+      const left = this.held & ~held;
       this.held = held;
       for (let bit = 0; entered >>> bit; bit++) {
         if ((entered >>> bit) & 1) this.rp2040.resetBlock(bit);
       }
+      if (left >>> TIMER & 1) this.rp2040.timer.tickChanged(this.rp2040.watchdog.tickHz);
     } else super.writeUint32(offset, value);
   }
 }
@@ -66,6 +70,13 @@ export class Xosc extends BasePeripheral {
 
   get enabled() {
     return (this.ctrl >>> 12) === 0xfab;
+  }
+
+  /** The cycles of the crystal are counted up to STARTUP, if there are any. */
+  count() {
+    if (!this.enabled || this.stable || this.rp2040.trouble.crystalDead) return;
+    const cycles = (this.startup & 0x3fff) * 256 * (this.startup & 0x100000 ? 4 : 1);
+    this.alarm.schedule((cycles / this.rp2040.trueHz(XOSC_HZ)) * 1e9);
   }
 
   readUint32(offset) {
@@ -90,8 +101,7 @@ export class Xosc extends BasePeripheral {
       }
       this.ctrl = value & 0xffffff;
       if (this.enabled && !wasEnabled) {
-        const cycles = (this.startup & 0x3fff) * 256 * (this.startup & 0x100000 ? 4 : 1);
-        this.alarm.schedule((cycles / this.rp2040.trueHz(XOSC_HZ)) * 1e9);
+        this.count();
       } else if (!this.enabled) {
         this.stable = false;
         this.alarm.cancel();
@@ -121,6 +131,12 @@ export class Pll extends BasePeripheral {
     this.fbdiv = 0;
     this.prim = 0x77000;
     this.locked = false;
+  }
+
+  /** Powered: on the way to its lock. */
+  lock() {
+    if (this.locked || this.pwr & (PLL_PD | PLL_VCOPD) || this.rp2040.trouble.pllLate) return;
+    this.alarm.schedule(PLL_LOCK_NS);
   }
 
   get vcoHz() {
@@ -169,7 +185,7 @@ export class Pll extends BasePeripheral {
       if (this.vcoHz < 750e6 || this.vcoHz > 1600e6) {
         chip.fail(this.name, `VCO at ${this.vcoHz / 1e6} MHz; it works from 750 to 1600 MHz`);
       }
-      this.alarm.schedule(PLL_LOCK_NS);
+      this.lock();
     } else if (!running) {
       this.locked = false;
       this.alarm.cancel();
@@ -212,6 +228,11 @@ export class Clocks extends BasePeripheral {
     const auxiliary = (this.ref.ctrl >>> 5) & 3;
     const hz = source === 0 ? ROSC_HZ : source === 2 ? (this.rp2040.xosc.stable ? XOSC_HZ : 0) : source === 1 && auxiliary === 0 ? this.rp2040.pllUsb.outputHz : 0;
     return hz / (((this.ref.div >>> 8) & 3) || 4);
+  }
+
+  /** clk_ref or clk_sys comes from the crystal. */
+  get onCrystal() {
+    return (this.ref.ctrl & 3) !== 0 || ((this.sys.ctrl & 1) !== 0 && ((this.sys.ctrl >>> 5) & 7) !== 2);
   }
 
   #auxiliaryHz(generator, sources) {

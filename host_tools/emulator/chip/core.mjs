@@ -10,6 +10,7 @@
  *   already pending (ARMv6-M Architecture Reference Manual, B1.5.18).
  */
 import { RP2040 } from 'rp2040js';
+import { MemoryFault } from './mpu.mjs';
 
 export { RP2040 };
 
@@ -22,6 +23,7 @@ const CortexM0Core = new RP2040().core.constructor;
 
 const EXCEPTION_ENTRY_CYCLES = 15;
 const EXCEPTION_RETURN_CYCLES = 13;
+const HARD_FAULT = 3;
 
 export class StrictCore extends CortexM0Core {
   constructor(chip) {
@@ -31,42 +33,65 @@ export class StrictCore extends CortexM0Core {
     this.ram16 = new Uint16Array(chip.sram.buffer);
     this.ram32 = new Int32Array(chip.sram.buffer);
     this.signed = new Int32Array(this.registers.buffer);
+    this.guard([]);
+  }
+
+  /** The ranges of addresses that fault, one of them in SRAM at most. */
+  guard(ranges) {
+    this.isGuarded = ranges.length > 0;
+    const [[first, bytes] = [RAM_BASE, 0], more] = ranges.filter(([at]) => at >>> 28 === RAM_BASE >>> 28);
+    if (more) this.chip.fail('MPU', 'more than one region in SRAM is not modelled');
+    this.guardFrom = first - RAM_BASE;
+    this.guardBytes = bytes;
+  }
+
+  hardFault() {
+    if (this.IPSR === HARD_FAULT) this.chip.fail('core', 'a fault in the fault handler: the core locks up');
+    this.guard([]);
+    this.waiting = false;
+    this.exceptionEntry(HARD_FAULT);
   }
 
   reset() {}
 
   readUint32(address) {
     const offset = (address - RAM_BASE) >>> 0;
+    if ((offset - this.guardFrom) >>> 0 < this.guardBytes) throw new MemoryFault();
     if (offset < RAM_BYTES && (offset & 3) === 0) return this.ram32[offset >>> 2];
     return this.chip.busRead(address >>> 0, 4);
   }
 
   readUint16(address) {
     const offset = (address - RAM_BASE) >>> 0;
+    if ((offset - this.guardFrom) >>> 0 < this.guardBytes) throw new MemoryFault();
     if (offset < RAM_BYTES && (offset & 1) === 0) return this.ram16[offset >>> 1];
     return this.chip.busRead(address >>> 0, 2);
   }
 
   readUint8(address) {
     const offset = (address - RAM_BASE) >>> 0;
+    if ((offset - this.guardFrom) >>> 0 < this.guardBytes) throw new MemoryFault();
     if (offset < RAM_BYTES) return this.ram8[offset];
     return this.chip.busRead(address >>> 0, 1);
   }
 
   writeUint32(address, value) {
     const offset = (address - RAM_BASE) >>> 0;
+    if ((offset - this.guardFrom) >>> 0 < this.guardBytes) throw new MemoryFault();
     if (offset < RAM_BYTES && (offset & 3) === 0) this.ram32[offset >>> 2] = value;
     else this.chip.busWrite(address >>> 0, value >>> 0, 4);
   }
 
   writeUint16(address, value) {
     const offset = (address - RAM_BASE) >>> 0;
+    if ((offset - this.guardFrom) >>> 0 < this.guardBytes) throw new MemoryFault();
     if (offset < RAM_BYTES && (offset & 1) === 0) this.ram16[offset >>> 1] = value;
     else this.chip.busWrite(address >>> 0, value & 0xffff, 2);
   }
 
   writeUint8(address, value) {
     const offset = (address - RAM_BASE) >>> 0;
+    if ((offset - this.guardFrom) >>> 0 < this.guardBytes) throw new MemoryFault();
     if (offset < RAM_BYTES) this.ram8[offset] = value;
     else this.chip.busWrite(address >>> 0, value & 0xff, 1);
   }

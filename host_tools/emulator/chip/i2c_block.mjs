@@ -38,6 +38,8 @@ const ABRT_TXDATA_NOACK = 8;
 const ABRT_ARB_LOST = 1 << 12;
 const ABRT_USER = 1 << 16;
 
+/** The only register whose reading ends the flushed state of the transmit FIFO after an abort (4.3.17). */
+const CLR_TX_ABRT = 0x54;
 /** Reading one of these offsets clears the bits. */
 const CLEARS = new Map(Object.entries({ 0x44: RX_UNDER, 0x48: RX_OVER, 0x4c: TX_OVER, 0x50: 32, 0x54: TX_ABRT, 0x58: 128, 0x5c: ACTIVITY, 0x60: STOP_DET, 0x64: START_DET, 0x68: 2048, 0xa8: 4096 }).map(([k, v]) => [Number(k), v]));
 
@@ -183,15 +185,13 @@ export class I2cBlock extends BasePeripheral {
     const bits = CLEARS.get(offset);
     if (bits === undefined) return super.readUint32(offset);
     const was = this.latched & bits ? 1 : 0;
+    if (offset === CLR_TX_ABRT) this.flushed = false;
     this.#clear(bits);
     return was;
   }
 
   #clear(bits) {
-    if (bits & TX_ABRT && this.latched & TX_ABRT) {
-      this.flushed = false;
-      this.abortSource = 0;
-    }
+    if (bits & TX_ABRT && this.latched & TX_ABRT) this.abortSource = 0;
     this.latched &= ~bits;
     if (this.#active) this.latched |= ACTIVITY;
     this.#update();
@@ -348,15 +348,27 @@ export class I2cBlock extends BasePeripheral {
   /** True (and the transfer is given up) if somebody else pulls SDA. */
   #arbitrationLost() {
     if (!this.bus.sdaLow) return false;
+    this.#loseArbitration();
+    return true;
+  }
+
+  /** Without a receive hold an acknowledgement right after SCL fell looks like another controller's bit. */
+  #confused() {
+    if (!this.bus.wasFast || this.sdaHold >>> 16) return false;
+    this.#loseArbitration();
+    return true;
+  }
+
+  #loseArbitration() {
     this.state = 'idle';
     this.bus.abandon();
     this.#abort(ABRT_ARB_LOST);
-    return true;
   }
 
   #addressed() {
     if (this.#arbitrationLost()) return;
     const acknowledged = this.bus.writeByte(((this.tar & 0x7f) << 1) | (this.reading ? 1 : 0));
+    if (this.#confused()) return;
     if (!acknowledged) {
       this.#abort(ABRT_7B_ADDR_NOACK);
       this.#stopCondition();
@@ -412,7 +424,9 @@ export class I2cBlock extends BasePeripheral {
 
   #transmitted() {
     if (this.#arbitrationLost()) return;
-    if (!this.bus.writeByte(this.command & 0xff)) {
+    const acknowledged = this.bus.writeByte(this.command & 0xff);
+    if (this.#confused()) return;
+    if (!acknowledged) {
       this.#abort(ABRT_TXDATA_NOACK);
       this.#stopCondition();
       return;

@@ -1,13 +1,14 @@
 /**
  * TIMER and WATCHDOG with the tick generator between them (RP2040 datasheet 4.6 and 4.7).
  *
- * The timer counts ticks of clk_ref / WATCHDOG_TICK.CYCLES, which must be 1 MHz. The counter reaches a
- * value exactly when the tick does, and an alarm fires at that tick, never earlier. The watchdog counts
- * down twice per tick (erratum RP2040-E1) and reboots what PSM_WDSEL selects.
+ * Both count ticks of clk_ref / WATCHDOG_TICK.CYCLES, which must be 1 MHz once the timer is out of reset. The
+ * counter reaches a value exactly when the tick does, and an alarm fires at that tick, never earlier. The
+ * watchdog counts down twice per tick (erratum RP2040-E1) and reboots what PSM_WDSEL selects.
  */
 import { BasePeripheral } from 'rp2040js';
 
 const WATCHDOG_MAX = 0xffffff;
+const TIMER_RESET = 21;
 
 export class Timer extends BasePeripheral {
   constructor(chip) {
@@ -25,7 +26,7 @@ export class Timer extends BasePeripheral {
       a.armed = false;
       a.alarm.cancel();
     }
-    if (this.zero_ns !== null) this.zero_ns = this.rp2040.clock.nanos;
+    this.zero_ns = null;
     this.stopped_us = 0;
     this.latchedHigh = 0;
     this.raw = 0;
@@ -35,12 +36,23 @@ export class Timer extends BasePeripheral {
     this.#interrupts();
   }
 
-  tickStarted() {
+  /** The tick has another rate, or the timer came out of reset. */
+  tickChanged(hz) {
+    const { rp2040 } = this;
+    if (!hz || rp2040.resets.isHeld(TIMER_RESET)) {
+      this.#tickStopped();
+      return;
+    }
+    if (Math.abs(hz - 1e6) > 1) rp2040.fail('WATCHDOG', `tick of ${(hz / 1e6).toFixed(4)} MHz; clk_ref / CYCLES must be 1 MHz for the timer`);
+    this.#tickStarted();
+  }
+
+  #tickStarted() {
     if (this.zero_ns === null) this.zero_ns = this.rp2040.clock.nanos - this.stopped_us * this.tick_ns;
     for (const a of this.alarms) if (a.armed) this.#schedule(a);
   }
 
-  tickStopped() {
+  #tickStopped() {
     if (this.zero_ns === null) return;
     this.stopped_us = this.count_us;
     this.zero_ns = null;
@@ -159,6 +171,7 @@ export class Watchdog extends BasePeripheral {
     this.ctrl = 0x07000000;
     this.tick = 0x200;
     this.load = 0;
+    this.tick_ns = Infinity;
     this.expires_ns = Infinity;
     this.remaining = 0;
     this.alarm = chip.clock.createAlarm(() => this.#expired(1));
@@ -172,16 +185,30 @@ export class Watchdog extends BasePeripheral {
     return (this.tick & 0x200) !== 0 && (this.tick & 0x1ff) !== 0;
   }
 
+  get tickHz() {
+    return this.ticking ? this.rp2040.clocks.refHz / (this.tick & 0x1ff) : 0;
+  }
+
   #left() {
     if (this.expires_ns === Infinity) return this.remaining;
-    return Math.max(0, Math.ceil(((this.expires_ns - this.rp2040.clock.nanos) / this.rp2040.timer.tick_ns) * 2));
+    return Math.max(0, Math.ceil(((this.expires_ns - this.rp2040.clock.nanos) / this.tick_ns) * 2));
+  }
+
+  /** clk_ref or the register behind the tick has changed. */
+  tickChanged() {
+    const tick_ns = this.tickHz ? 1e9 / this.rp2040.trueHz(this.tickHz) : Infinity;
+    if (tick_ns === this.tick_ns) return;
+    this.remaining = this.#left();
+    this.tick_ns = tick_ns;
+    this.#rearm();
+    this.rp2040.timer.tickChanged(this.tickHz);
   }
 
   #rearm() {
     this.alarm.cancel();
     this.expires_ns = Infinity;
-    if (!this.enabled || !this.ticking) return;
-    this.expires_ns = this.rp2040.clock.nanos + (this.remaining / 2) * this.rp2040.timer.tick_ns;
+    if (!this.enabled || this.tick_ns === Infinity) return;
+    this.expires_ns = this.rp2040.clock.nanos + (this.remaining / 2) * this.tick_ns;
     this.alarm.scheduleAt(this.expires_ns);
   }
 
@@ -206,17 +233,8 @@ export class Watchdog extends BasePeripheral {
     } else if (offset >= 0x0c && offset <= 0x28) {
       this.scratch[(offset - 0x0c) >> 2] = value;
     } else if (offset === 0x2c) {
-      const left = this.#left();
       this.tick = value & 0x3ff;
-      this.remaining = left;
-      if (this.ticking) {
-        const hz = this.rp2040.clocks.refHz / (this.tick & 0x1ff);
-        if (Math.abs(hz - 1e6) > 1) {
-          this.rp2040.fail('WATCHDOG', `tick of ${(hz / 1e6).toFixed(4)} MHz; clk_ref / CYCLES must be 1 MHz`);
-        }
-        this.rp2040.timer.tickStarted();
-      } else this.rp2040.timer.tickStopped();
-      this.#rearm();
+      this.tickChanged();
     } else super.writeUint32(offset, value);
   }
 

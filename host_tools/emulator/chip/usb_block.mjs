@@ -4,7 +4,8 @@
  *
  * Fails the run on what hardware would punish: AVAILABLE set in the same write as other fields of a buffer
  * control register or less than one 48 MHz cycle later, a buffer touched while the controller owns it (unless
- * aborted), buffers not 64-byte aligned, wrong data PID, pull-up without VBUS, PHY, clock or controller.
+ * aborted), buffers not 64-byte aligned, wrong data PID, pull-up without VBUS, PHY, clock or controller,
+ * and an abort before revision B2 (erratum E2).
  */
 import { BasePeripheral } from 'rp2040js';
 
@@ -33,10 +34,18 @@ const ST_TRANS_COMPLETE = 1 << 18;
 const ST_SETUP_REC = 1 << 17;
 const ST_CONNECTED = 1 << 16;
 const ST_RESUME = 1 << 11;
+const ST_LINE_J = 1 << 2;
 const ST_SUSPENDED = 1 << 4;
-const ST_WRITE_CLEAR = 0xff0f0800 | ST_SUSPENDED;
+const ST_WRITE_CLEAR = 0xff0e0800;
+/** From a change of the bus to that of SUSPENDED, in which a RESUME is told apart from noise. */
+const AWAKE_NS = 3e3;
+/** The same in the fault usb_late_resume. */
+const AWAKE_LATE_NS = 45e6;
 
 const DPRAM_BYTES = 4096;
+/** So long a controller before revision B2 must see the bus idle after a reset until it takes part (erratum E5). */
+const IDLE_NS = 800e3;
+const MUX_TO_PADS = 0xc;
 
 export class UsbBlock extends BasePeripheral {
   constructor(chip) {
@@ -44,6 +53,10 @@ export class UsbBlock extends BasePeripheral {
     this.onPortChange = () => {};
     /** (endpoint, isIn): the firmware gave the controller a buffer, or set a stall. */
     this.onArmed = () => {};
+    this.idleAlarm = chip.clock.createAlarm(() => {
+      this.connected = true;
+    });
+    this.awakeAlarm = chip.clock.createAlarm(() => this.#setSuspended(false));
     this.reset();
   }
 
@@ -52,6 +65,13 @@ export class UsbBlock extends BasePeripheral {
     this.mainCtrl = 0;
     this.sieCtrl = 0;
     this.sieStatus = 0;
+    this.suspendChanged = false;
+    this.awakeAlarm.cancel();
+    this.idleAlarm.cancel();
+    this.connected = !this.isOld;
+    this.inReset = false;
+    /** By a fault: 'deaf' answers no token any more, 'dead' does not hear the bus at all. */
+    this.hung = null;
     this.buffStatus = 0;
     this.epAbort = 0;
     this.epAbortDone = 0;
@@ -66,6 +86,9 @@ export class UsbBlock extends BasePeripheral {
     this.intf = 0;
     this.frame = 0;
     this.sofPending = false;
+    this.sof_ns = 0;
+    /** The longest from the start of a frame to the reading of SOF_RD. */
+    this.slowestSof_ns = 0;
     this.phy = new Map();
     this.select = new Uint8Array(32);
     this.fieldsWritten_ns = new Float64Array(64).fill(-1e9);
@@ -73,6 +96,17 @@ export class UsbBlock extends BasePeripheral {
     this.resetDone = false;
     this.#update();
     this.onPortChange();
+  }
+
+  /** Before revision B2. */
+  get isOld() {
+    return this.rp2040.options.revision < 2;
+  }
+
+  /** The controller sees D+ high on GPIO15 instead of the bus, on which the pull-up stays. */
+  get feigned() {
+    const { ctrl } = this.rp2040.gpio[15];
+    return this.muxing === MUX_TO_PADS && (ctrl & 0x1f) === 8 && ((ctrl >>> 16) & 3) === 3 && ((this.phy.get(0x7c) ?? 0) & 2) !== 0 && ((this.phy.get(0x80) ?? 0) & 4) !== 0;
   }
 
   get vbusDetected() {
@@ -87,7 +121,7 @@ export class UsbBlock extends BasePeripheral {
   /** Why the pull-up would not make a working device, or null. */
   get attachProblem() {
     if (!(this.mainCtrl & 1)) return 'MAIN_CTRL.CONTROLLER_EN is not set';
-    if (!(this.muxing & 1)) return 'USB_MUXING.TO_PHY is not set';
+    if (!(this.muxing & 1) && !this.feigned) return 'USB_MUXING.TO_PHY is not set';
     if (!(this.muxing & 8)) return 'USB_MUXING.SOFTCON is not set';
     if (!this.vbusDetected) return 'USB_PWR does not say that VBUS is present';
     if (Math.abs(this.rp2040.clkUsbHz - CLK_USB_HZ) > 1) return `clk_usb is ${this.rp2040.clkUsbHz / 1e6} MHz instead of 48 MHz`;
@@ -98,8 +132,8 @@ export class UsbBlock extends BasePeripheral {
     const s = this.sieStatus;
     return (
       (this.stallNak ? 1 << 19 : 0) | (this.epAbortDone ? 1 << 18 : 0) | (this.sofPending ? 1 << 17 : 0) |
-      (s & ST_SETUP_REC ? 1 << 16 : 0) | (s & ST_RESUME ? 1 << 15 : 0) | (s & ST_SUSPENDED ? 1 << 14 : 0) |
-      (s & ST_CONNECTED ? 1 << 13 : 0) | (s & ST_BUS_RESET ? 1 << 12 : 0) | (this.vbusDetected ? 1 << 11 : 0) |
+      (s & ST_SETUP_REC ? 1 << 16 : 0) | (s & ST_RESUME ? 1 << 15 : 0) | (this.suspendChanged ? 1 << 14 : 0) |
+      (this.connected ? 1 << 13 : 0) | (s & ST_BUS_RESET ? 1 << 12 : 0) | (this.vbusDetected ? 1 << 11 : 0) |
       (s & ST_STALL_REC ? 1 << 10 : 0) | (this.buffStatus ? 1 << 4 : 0) | (s & ST_TRANS_COMPLETE ? 1 << 3 : 0)
     );
   }
@@ -115,13 +149,14 @@ export class UsbBlock extends BasePeripheral {
       case 0x40:
         return this.mainCtrl;
       case 0x48:
+        if (this.sofPending) this.slowestSof_ns = Math.max(this.slowestSof_ns, this.rp2040.clock.nanos - this.sof_ns);
         this.sofPending = false;
         this.#update();
         return this.frame;
       case 0x4c:
         return this.sieCtrl >>> 0;
       case 0x50:
-        return (this.sieStatus | (this.vbusDetected ? 1 : 0)) >>> 0;
+        return (this.sieStatus | (this.vbusDetected ? 1 : 0) | (this.inReset && !this.feigned ? 0 : ST_LINE_J) | (this.connected ? ST_CONNECTED : 0)) >>> 0;
       case 0x58:
         return this.buffStatus >>> 0;
       case 0x5c:
@@ -170,11 +205,13 @@ export class UsbBlock extends BasePeripheral {
         break;
       case 0x50:
         this.sieStatus &= ~(this.rawWriteValue & ST_WRITE_CLEAR);
+        if (this.rawWriteValue & ST_SUSPENDED) this.suspendChanged = false;
         break;
       case 0x58:
         this.buffStatus &= ~this.rawWriteValue;
         break;
       case 0x60:
+        if (this.isOld && value) this.rp2040.fail('USB', 'EP_ABORT before revision B2 blocks the controller for good (erratum E2)');
         this.epAbort = value >>> 0;
         this.epAbortDone |= this.epAbort & ~this.inFlight;
         break;
@@ -195,6 +232,8 @@ export class UsbBlock extends BasePeripheral {
         break;
       case 0x74:
         this.muxing = value & 0xf;
+        if (this.feigned) this.#awaitIdle();
+        else if (this.rp2040.trouble.busyHub) this.idleAlarm.cancel();
         break;
       case 0x78:
         this.pwr = value & 0x3f;
@@ -328,7 +367,7 @@ export class UsbBlock extends BasePeripheral {
 
   #hears(address) {
     this.quiet = false;
-    return this.attached && address === this.address;
+    return this.attached && !this.hung && this.connected && !this.feigned && address === this.address;
   }
 
   /** The packet on the bus is through, or the line went dead under it. */
@@ -342,22 +381,53 @@ export class UsbBlock extends BasePeripheral {
     this.endTransaction();
     this.quiet = true;
     this.resetDone = true;
-    this.sieStatus = (this.sieStatus | ST_BUS_RESET | ST_CONNECTED) & ~ST_SUSPENDED;
+    this.inReset = true;
+    this.connected = !this.isOld;
+    this.idleAlarm.cancel();
+    if (this.hung === 'dead') return;
+    this.sieStatus |= ST_BUS_RESET;
+    this.#setSuspended(false);
+  }
+
+  busResetEnded() {
+    this.inReset = false;
+    if (!this.rp2040.trouble.busyHub) this.#awaitIdle();
+  }
+
+  #awaitIdle() {
+    if (!this.connected) this.idleAlarm.schedule(IDLE_NS);
+  }
+
+  /** SUSPENDED is a level that nobody writes; DEV_SUSPEND says that it changed, and is cleared through the same bit. */
+  #setSuspended(is) {
+    this.awakeAlarm.cancel();
+    if (this.hung === 'dead') return;
+    if (this.isSuspended !== is) {
+      this.sieStatus ^= ST_SUSPENDED;
+      this.suspendChanged = true;
+    }
     this.#update();
+  }
+
+  get isSuspended() {
+    return (this.sieStatus & ST_SUSPENDED) !== 0;
   }
 
   suspend() {
-    this.sieStatus |= ST_SUSPENDED;
-    this.#update();
+    this.#setSuspended(true);
   }
 
   resume() {
-    this.sieStatus = (this.sieStatus | ST_RESUME) & ~ST_SUSPENDED;
+    if (this.hung === 'dead') return;
+    this.sieStatus |= ST_RESUME;
     this.#update();
+    this.awakeAlarm.schedule(this.rp2040.trouble.lateResume ? AWAKE_LATE_NS : AWAKE_NS);
   }
 
   sof(frame) {
+    if (this.hung === 'dead' || !this.connected || this.feigned) return;
     this.frame = frame & 0x7ff;
+    if (!this.sofPending) this.sof_ns = this.rp2040.clock.nanos;
     this.sofPending = true;
     if (this.inte & (1 << 17)) this.#update();
   }

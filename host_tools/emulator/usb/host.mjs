@@ -18,7 +18,8 @@
  * Status is 'ok', 'stall', 'cancelled' or 'gone'. One transaction is on the bus at a time and takes its time:
  * (payload + 13 bytes) at 12 Mbit/s, so at most 19 packets of 64 bytes in a frame. A NAKed bulk or control
  * transaction is retried every 10 us; the retries that would be NAKed again are counted, not simulated.
- * A missing answer, a wrong data PID or a malformed descriptor fails the run.
+ * A missing answer, a wrong data PID or a malformed descriptor fails the run. So does not a device whose controller is
+ * hung by a fault: the hub shuts its port, and it is reset and asked again a few times, then left alone until it detaches.
  */
 const BYTE_NS = 8e3 / 12;
 const OVERHEAD_BYTES = 13;
@@ -26,12 +27,17 @@ const HANDSHAKE_ONLY_NS = 8e3;
 const RETRY_NS = 10e3;
 const FRAME_NS = 1e6;
 const SOF_NS = 3e3;
+/** Sync, PID, address, endpoint, CRC and end of a token: the controller answers it with what it has then. */
+const TOKEN_NS = 35e3 / 12;
 const CONTROL_TIMEOUT_NS = 5e9;
 const IDLE_SUSPENDS_NS = 3e6;
 /** USB 2.0, 7.1.7.7: resume signalling lasts 20 ms, and the device has 10 ms to recover. */
 const RESUME_NS = 20e6;
 const RESUME_RECOVERY_NS = 10e6;
 const ADDRESS = 5;
+/** Linux tries to enumerate a port so often; between two tries it waits. */
+const TRIES = 6;
+const TRY_AGAIN_NS = 100e6;
 
 const REALISTIC = { debounce_ns: 100e6, reset_ns: 50e6, recovery_ns: 10e6, address_ns: 10e6 };
 const FAST = { debounce_ns: 1e6, reset_ns: 10e6, recovery_ns: 1e6, address_ns: 2e6 };
@@ -205,6 +211,7 @@ export class UsbHost {
       this.state = 'debounce';
       this.#enumeration = this.#enumerate();
       this.portAlarm.schedule(this.wait.debounce_ns);
+      this.suspendAlarm.schedule(IDLE_SUSPENDS_NS);
     } else if (!attached && this.state !== 'detached') this.#gone();
     if (this.block && this.block.sieCtrl & (1 << 16) && !this.block.attached) this.pullupAlarm.schedule(5e6);
   }
@@ -225,13 +232,30 @@ export class UsbHost {
     this.block.rp2040.fail('usb host', message);
   }
 
+  #unanswered(message) {
+    if (!this.block.hung) this.#fail(message);
+    this.#gone();
+    this.#enumeration = this.#tryAgain();
+    this.portStep();
+  }
+
+  *#tryAgain() {
+    for (let left = TRIES; left > 0; left--) {
+      yield* this.#resetBus();
+      if (this.block.setup(0, setupPacket(0x80, 6, 1 << 8, 0, 64))) this.#fail('a device that was hung answers without having detached');
+      yield TRY_AGAIN_NS;
+    }
+  }
+
   *#resetBus() {
     this.state = 'reset';
     this.address = 0;
     this.sofAlarm.cancel();
+    this.suspendAlarm.cancel();
     this.block.busReset();
     this.statistics.resets += 1;
     yield this.wait.reset_ns;
+    this.block.busResetEnded();
     this.state = 'active';
     this.sofAlarm.schedule(0);
     yield this.wait.recovery_ns;
@@ -466,14 +490,21 @@ export class UsbHost {
   }
 
   #setupDone({ pipe, transfer }) {
-    if (!this.block.setup(this.address, transfer.packet)) this.#fail(`no answer to SETUP ${hex(transfer.packet)} at address ${this.address}`);
+    if (!this.block.setup(this.address, transfer.packet)) {
+      this.#unanswered(`no answer to SETUP ${hex(transfer.packet)} at address ${this.address}`);
+      return;
+    }
     this.onPacket({ t_ns: this.scope.nanos, endpoint: 0, isIn: false, setup: true, data: transfer.packet });
     pipe.toggle = 1;
     transfer.stage = transfer.length ? 'data' : 'status';
+    this.bus_free_ns += TOKEN_NS;
   }
 
   #refused({ pipe, transfer, armedMeanwhile }, answer) {
-    if (answer === 'none') this.#fail(`no answer from ${pipe.name} at address ${this.address}; is the endpoint enabled?`);
+    if (answer === 'none') {
+      this.#unanswered(`no answer from ${pipe.name} at address ${this.address}; is the endpoint enabled?`);
+      return;
+    }
     if (answer === 'nak') {
       this.statistics.naks += 1;
       if (armedMeanwhile) pipe.retry_ns = this.scope.nanos + RETRY_NS;
@@ -488,7 +519,7 @@ export class UsbHost {
     const { pipe, transfer, interrupt, answer } = t;
     if (interrupt) {
       if (answer.answer === 'nak') this.statistics.naks += 1;
-      else if (answer.answer === 'none') this.#fail(`no answer from interrupt ${pipe.name}; is the endpoint enabled?`);
+      else if (answer.answer === 'none') this.#unanswered(`no answer from interrupt ${pipe.name}; is the endpoint enabled?`);
       if (answer.answer !== 'data') return;
     } else if (answer.answer !== 'data') {
       this.#refused(t, answer.answer);

@@ -55,6 +55,32 @@ test('WFI with PRIMASK set wakes before the handler runs', () => {
   assert.deepEqual(results.slice(0, 3), [1, 0, 1]);
 });
 
+const DENY = (base, log2) => `REG(0xe000ed9c) = ${base} | 16; REG(0xe000eda0) = 1 << 28 | ${log2 - 1} << 1 | 1; REG(0xe000ed94) = 5;`;
+
+test('a region of the MPU without access faults, and nothing beside it', () => {
+  const { results } = run(`
+    void isr(void) { RESULT(1) = REG(0x20020000); done(); }
+    void main(void) { RESULT(0) = 0; ${DENY('0x20020000', 12)} REG(0x2001fffc) = 1; REG(0x20021000) = 2;
+      RESULT(0) = REG(0x2001fffc) + REG(0x20021000); REG(0x20020ffc) = 3; RESULT(0) = 99; done(); }`);
+  assert.equal(results[0], 3);
+});
+
+test('so does the null page, for loads too', () => {
+  const { results } = run(`void isr(void) { RESULT(0) = 7; done(); }
+    void main(void) { RESULT(0) = REG(0x10); ${DENY('0', 8)} RESULT(0) = REG(0x10); done(); }`);
+  assert.equal(results[0], 7);
+});
+
+failsWith('MPU with subregions', main('REG(0xe000ed9c) = 0x20020010; REG(0xe000eda0) = 1 << 28 | 0xff00 | 11 << 1 | 1;'), /only whole regions/);
+
+test('before its clocks the watchdog counts ticks of the ring oscillator', () => {
+  const { machine } = run(`void main(void) { SET(0x4000c000) = 1 << 21; REG(0x40010008) = 0x1fffc; REG(0x4005802c) = 0x200 | 12;
+    REG(0x40058004) = 20000; SET(0x40058000) = 1 << 30; for (;;) { } }`, { seconds: 0.03, allowWatchdog: true });
+  assert.equal(machine.reboots, 1); // after 10000 ticks of 12 / 6.5 MHz
+});
+
+failsWith('timer with a tick of another rate', main('REG(0x4005802c) = 0x200 | 12;'), /must be 1 MHz for the timer/);
+
 test('cycles: push/pop, exception entry and exit are charged as the hardware does', () => {
   const { machine } = (() => {
     const m = makeMachine(`__attribute__((naked, noinline)) void leaf(void) { __asm volatile("push {r4, lr}\\n pop {r4, pc}"); }

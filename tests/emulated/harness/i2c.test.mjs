@@ -42,9 +42,9 @@ test('address not acknowledged: source, flush, STOP; data not acknowledged likew
   assert.equal(results[1] & 0xffff, 8);
 });
 
-test('writes to the FIFO are lost until the abort is cleared', () => {
+test('writes to the FIFO are lost until the abort is cleared, by its own register', () => {
   const { results } = run(main(`REG(0x40044004) = 0x33; REG(0x4004406c) = 1; REG(0x40044010) = 0x200;
-    while (!(REG(0x40044034) & 64)) { } REG(0x40044010) = 0x201; RESULT(0) = REG(0x40044074); (void)REG(0x40044054);
+    while (!(REG(0x40044034) & 64)) { } (void)REG(0x40044040); REG(0x40044010) = 0x201; RESULT(0) = REG(0x40044074); (void)REG(0x40044054);
     while (REG(0x40044070) & 32) { } REG(0x40044010) = 0x202; RESULT(1) = REG(0x40044070) >> 5 & 1;`));
   assert.deepEqual(results.slice(0, 2), [0, 1]);
 });

@@ -125,3 +125,13 @@ test('fails: no pull-up leaves the device unseen', () => {
   const { result } = session(device('#define PULLUP_BITS 0'), [], 0.3);
   assert.equal(result.usb.configured, false);
 });
+
+test('fails: an abort before revision B2', () => {
+  const { result } = session(device('', 'REG(0x50110060) = 1;'), [], 0.3, { revision: 1 });
+  assert.match(result.warnings.join('\n'), /erratum E2/);
+});
+
+test('fails: a chip before revision B2 behind a busy hub', () => {
+  const { result } = session(device(), [], 0.3, { revision: 1, faults: [{ type: 'usb_busy_hub', from_s: 0 }] });
+  assert.match(result.warnings.join('\n'), /no answer to SETUP/);
+});

@@ -33,6 +33,7 @@ static uint16_t pulled; /* lines, by us */
 static int64_t time_ns; /* of the step */
 static int64_t scl_fell_ns, scl_rose_ns, sda_changed_ns[BOARD_SENSOR_COUNT];
 static int64_t sda_fell_ns;
+static int64_t sda_rose_ns[BOARD_SENSOR_COUNT]; /* with SCL high: the STOP */
 
 static void misused(const char *how) {
   fake.misuses++;
@@ -152,8 +153,14 @@ static void check_sda_edge(unsigned k, bool rises, bool scl) {
     misused(rises ? "tSU;STO" : "tSU;STA");
   }
   *(rises ? &fake.stops : &fake.starts) |= (uint16_t)(1u << k);
-  if (!rises) {
+  if (rises) {
+    fake.stops_of_first += k == 0;
+    sda_rose_ns[k] = time_ns;
+  } else {
     sda_fell_ns = time_ns;
+    if (time_ns - sda_rose_ns[k] < 1300 + RISE_ns) {
+      misused("tBUF");
+    }
   }
 }
 
@@ -221,8 +228,10 @@ void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_c
   fake.waves++;
   fake.clocks = 0;
   fake.starts = fake.stops = 0;
+  fake.stops_of_first = 0;
   time_ns = 10000; /* of idle lines before it */
   scl_fell_ns = scl_rose_ns = sda_fell_ns = 0;
+  memset(sda_rose_ns, 0, sizeof sda_rose_ns);
   memset(sda_changed_ns, 0, sizeof sda_changed_ns);
   for (unsigned cell = 0; cell < cell_count; cell++) {
     for (unsigned i = 0; i < WAVE_STEPS_PER_CELL; i++) {

@@ -30,6 +30,7 @@ struct fake_lines {
   const char *misuse;
   unsigned opened, waves, clocks;
   uint16_t starts, stops;               /* bitmaps of the lines that had one in the last wave */
+  unsigned stops_of_first;              /* on the line of sensor 0, in the last wave */
   uint8_t commands[BOARD_SENSOR_COUNT]; /* [sensor] the last one it got */
   unsigned received[BOARD_SENSOR_COUNT];
 };

@@ -12,10 +12,22 @@ static struct parallel_bus parallel_bus;
 static struct array_bus bus;
 static struct array_bus_result result;
 
-void setUp(void) {
+static enum ft_status command(uint8_t byte);
+
+static void power_up(void) {
   fake_lines_power_up();
   memset(&result, 0xA5, sizeof result);
   TEST_ASSERT_EQUAL_INT(FT_OK, parallel_bus_init(&parallel_bus, &bus));
+}
+
+/* After the first command, which all lines get their clocks before. */
+void setUp(void) {
+  power_up();
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(READ_ADC));
+  fake.now_us = 0;
+  fake.opened = fake.waves = 0;
+  memset(fake.received, 0, sizeof fake.received);
+  memset(&result, 0xA5, sizeof result);
 }
 
 void tearDown(void) {
@@ -80,6 +92,14 @@ static void expect_good_frame(void) {
   expect_bytes(ALL, READ_ADC, 3);
 }
 
+static void test_sensors_that_an_earlier_life_left_in_mid_byte(void) {
+  power_up();
+  for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k += 2) {
+    fake_lose_its_place(k);
+  }
+  expect_good_frame();
+}
+
 static void test_every_command_reaches_every_sensor(void) {
   for (unsigned byte = 0; byte < 256; byte++) {
     TEST_ASSERT_EQUAL_INT(FT_OK, command((uint8_t)byte));
@@ -115,7 +135,8 @@ static void test_time_on_the_bus(void) {
   TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
   TEST_ASSERT_EQUAL_UINT64(50, fake.now_us);
   TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
-  TEST_ASSERT_EQUAL_UINT64(50 + 146, fake.now_us);
+  TEST_ASSERT_EQUAL_UINT64(50 + 146 + 5 * FT_READ_STOPS, fake.now_us);
+  TEST_ASSERT_EQUAL_UINT(1 + FT_READ_STOPS, fake.stops_of_first);
 }
 
 static void test_arguments_and_order_of_calls(void) {
@@ -323,6 +344,7 @@ static void test_recovery_abandons_whatever_is_under_way(void) {
 
 int main(void) {
   UNITY_BEGIN();
+  RUN_TEST(test_sensors_that_an_earlier_life_left_in_mid_byte);
   RUN_TEST(test_every_command_reaches_every_sensor);
   RUN_TEST(test_reads_of_every_length_and_command);
   RUN_TEST(test_time_on_the_bus);

@@ -1,0 +1,17 @@
+/* What a Raspberry Pi Pico wires to its own chip (pico-sdk, boards/pico.h). */
+#ifndef RP2040_PICO_H
+#define RP2040_PICO_H
+
+#include "common/status.h"
+
+enum pico_supply {
+  PICO_SUPPLY_FRUGAL, /* the regulator of 3V3 switches when it must: it draws less itself */
+  PICO_SUPPLY_STEADY, /* at a fixed rate: less ripple, for it feeds the sensors */
+};
+
+/* Takes the pin into use, steady. FT_ERR_TIMEOUT: a block does not leave reset. */
+enum ft_status pico_start(void);
+
+void pico_set_supply(enum pico_supply supply);
+
+#endif

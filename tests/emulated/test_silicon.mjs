@@ -1,0 +1,359 @@
+/**
+ * The release images on a chip that behaves as silicon does at its worst: each fault is overcome without help, in a
+ * time that is the same in every run.
+ *
+ * usage: test_silicon.mjs BUILD_OF_IMAGES FINGERTIP [STEP_us]
+ *
+ * STEP_us: from one interrupted start to the next; 100 takes some minutes. Default: 4000.
+ */
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import { findBoard } from '../../host_tools/emulator/board/boards.mjs';
+import { MemoryFault } from '../../host_tools/emulator/chip/mpu.mjs';
+import { parseFaults } from '../../host_tools/emulator/faults.mjs';
+import { Machine } from '../../host_tools/emulator/machine.mjs';
+import { parseScenario } from '../../host_tools/emulator/scenario.mjs';
+import { setupPacket } from '../../host_tools/emulator/usb/host.mjs';
+import { HEADER, steady } from './harness/bench.mjs';
+
+const [images, fingertip, step_us = '4000'] = process.argv.slice(2);
+const BOARDS = ['pico_mux', 'pico_parallel'];
+const encoded = (...command) => Buffer.from(execFileSync(fingertip, ['encode', ...command], { encoding: 'utf8' }).trim(), 'hex');
+const STREAMS = encoded('stream', 'contact,raw,health');
+const HEALTH = encoded('health');
+// Flags of a contact (contact_flags.h)
+const [CONTACT, TARED] = [1 << 0, 1 << 5];
+
+/** A board with a host that opens its port. Times are emulated, in ms. */
+class Bench {
+  constructor(name, { faults = [], ...options } = {}) {
+    const Board = findBoard(name);
+    this.received = [];
+    this.bytes = 0;
+    this.machine = new Machine({
+      image: readFileSync(join(images, name, `fingertip-${name}.bin`)), Board, scenario: steady(), fastEnumeration: true, allowWatchdog: true,
+      faults: parseFaults(JSON.stringify(faults), 'faults', Board),
+      onData: (bytes) => {
+        this.received.push(Buffer.from(bytes));
+        this.bytes += bytes.length;
+      },
+      ...options,
+    });
+    this.machine.client.setDtr(true);
+  }
+
+  get now_ms() {
+    return this.machine.time.nanos / 1e6;
+  }
+
+  run(ms) {
+    const { machine } = this;
+    assert.ok(machine.run(machine.time.nanos + ms * 1e6), `${machine.endReason} ${machine.result.warnings}`);
+  }
+
+  /** Runs until `what()`; the time. */
+  until(what, limit_ms, name) {
+    const end_ms = this.now_ms + limit_ms;
+    while (!what()) {
+      assert.ok(this.now_ms < end_ms, `no ${name} within ${limit_ms} ms`);
+      this.run(1);
+    }
+    return this.now_ms;
+  }
+
+  /** Asks for the streams of a port that was just opened; the time at which they come. */
+  stream(limit_ms = 200) {
+    const { machine } = this;
+    this.until(() => machine.host.configured, limit_ms, 'enumeration');
+    this.run(10);
+    const before = this.bytes;
+    machine.client.write(STREAMS);
+    return this.until(() => this.bytes > before + 100, 100, 'stream');
+  }
+
+  assertStreams(ms) {
+    const before = this.bytes;
+    this.run(ms);
+    assert.ok(this.bytes - before > 20 * ms, `${this.bytes - before} bytes in ${ms} ms`);
+  }
+
+  /** The recording of what was received. */
+  recording() {
+    const folder = mkdtempSync(join(tmpdir(), 'silicon-'));
+    try {
+      const [stream, table] = [join(folder, 'stream.ftr'), join(folder, 'stream.csv')];
+      writeFileSync(stream, Buffer.concat(this.received));
+      execFileSync(fingertip, ['replay', stream, '--to-csv', table], { stdio: 'pipe' });
+      return readFileSync(table, 'utf8').trim().split('\n');
+    } finally {
+      rmSync(folder, { recursive: true });
+    }
+  }
+
+  /** What the device says of itself. */
+  health() {
+    this.machine.client.write(HEALTH);
+    this.run(20);
+    const line = this.recording().findLast((l) => l.startsWith('# packet: health'));
+    return Object.fromEntries(line.split(' ').slice(3).map((pair) => pair.split('=')).map(([key, value]) => [key, Number(value)]));
+  }
+
+  /** Flags of the last frame. */
+  flags() {
+    const lines = this.recording();
+    const column = lines.find((l) => !l.startsWith('#')).split(',').indexOf('flags');
+    return Number(lines.findLast((l) => !l.startsWith('#')).split(',')[column]);
+  }
+
+  end() {
+    assert.deepEqual(this.machine.result.warnings, []);
+    return this.machine.result;
+  }
+}
+
+test('a change of the suspend state that is told late does not close the port', () => {
+  const bench = new Bench('pico_parallel', { faults: [{ type: 'usb_late_resume', from_s: 0 }] });
+  bench.stream();
+  const { host } = bench.machine;
+  host.suspend();
+  bench.run(20);
+  host.resume();
+  bench.run(31);
+  const before = bench.bytes;
+  bench.machine.client.write(STREAMS);
+  bench.until(() => bench.bytes > before, 20, 'stream after the resume');
+  bench.assertStreams(100);
+  bench.end();
+});
+
+test('an abort of the I2C controller, whose FIFO stays flushed until it is told, costs no recovery of the bus', () => {
+  const faults = Array.from({ length: 20 }, (_, i) => ({ type: 'sensor_nack', sensor: (4 * i) % 15, from_s: 0.1 + 0.0103 * i }));
+  const bench = new Bench('pico_mux', { faults });
+  bench.stream();
+  bench.run(320);
+  const { bus_recoveries, bus_timeouts, bus_nacks } = bench.health();
+  assert.ok(bus_nacks > 5, `${bus_nacks}`);
+  assert.deepEqual([bus_recoveries, bus_timeouts], [0, 0]);
+  bench.end();
+});
+
+for (const name of BOARDS) {
+  for (const [type, limit_ms] of [['usb_deaf', 400], ['usb_dead', 1500]]) {
+    test(`${name}: a USB controller hung as by erratum E15 (${type}) is reset and comes back`, (t) => {
+      const from_s = 0.2;
+      const bench = new Bench(name, { faults: [{ type, from_s }] });
+      bench.stream();
+      bench.assertStreams(1000 * from_s - bench.now_ms);
+      bench.until(() => !bench.machine.host.configured, 10, 'loss of the device');
+      const back_ms = bench.stream(limit_ms) - 1000 * from_s;
+      t.diagnostic(`streams again after ${back_ms} ms`);
+      assert.ok(back_ms < limit_ms, `${back_ms}`);
+      bench.assertStreams(100);
+      const { reboots, usb } = bench.end();
+      assert.deepEqual([reboots, usb.enumerations], [0, 2]);
+    });
+  }
+}
+
+test('a bus that is asleep for long is no reason to attach anew', () => {
+  const bench = new Bench('pico_mux');
+  bench.stream();
+  bench.machine.host.suspend();
+  bench.run(2500);
+  bench.machine.host.resume();
+  bench.run(40);
+  bench.stream();
+  assert.equal(bench.end().usb.enumerations, 1);
+});
+
+/** A start with this fault from power-on to `to_ms`: how often the watchdog must help, and by when the streams come. */
+function starts(what, faults, reboots, limit_ms) {
+  for (const name of BOARDS) {
+    test(`${name}: ${what}`, (t) => {
+      const bench = new Bench(name, { faults });
+      const back_ms = bench.stream(limit_ms);
+      t.diagnostic(`streams after ${back_ms.toFixed(0)} ms`);
+      assert.ok(back_ms < limit_ms, `${back_ms}`);
+      bench.assertStreams(50);
+      assert.equal(bench.end().reboots, reboots);
+    });
+  }
+}
+const until = (type, to_ms) => [{ type, from_s: 0, to_s: to_ms / 1000 }];
+
+starts('a crystal that swings in full after 5 ms', until('crystal_weak', 5), 0, 60);
+starts('a crystal that swings in full after 40 ms, past what is waited for: the watchdog helps', until('crystal_weak', 40), 1, 700);
+starts('a crystal that begins to swing after 70 ms', until('crystal_dead', 70), 0, 130);
+starts('a crystal that begins to swing after 400 ms', until('crystal_dead', 400), 2, 700);
+starts('PLLs that lock after 60 ms', until('pll_late', 60), 0, 130);
+starts('PLLs that lock after 400 ms', until('pll_late', 400), 2, 700);
+
+test('what a debugger left in the clock generators does not stay', () => {
+  const bench = new Bench('pico_mux');
+  const { clocks, core } = bench.machine.chip;
+  bench.until(() => clocks.sysHz === 125e6, 20, 'clock');
+  for (const generator of [clocks.ref, clocks.sys, clocks.usb]) generator.div = 0x200;
+  for (const generator of [clocks.sys, clocks.peri, clocks.usb]) generator.ctrl |= 1 << 5;
+  core.registers[15] = bench.machine.chip.flashView.getUint32(0x104, true) & ~1; // as `load` and `run` do
+  core.registers[13] = bench.machine.chip.flashView.getUint32(0x100, true);
+  bench.stream();
+  assert.deepEqual([clocks.refHz, clocks.sysHz, clocks.periHz, clocks.usbHz], [12e6, 125e6, 125e6, 48e6]);
+  assert.equal(bench.end().reboots, 0);
+});
+
+test('a stack that grows out of its bank, and a null pointer, are faults; the image starts anew', (t) => {
+  const bench = new Bench('pico_mux');
+  bench.stream();
+  const { chip } = bench.machine;
+  assert.throws(() => chip.busRead(0x14, 4), MemoryFault);
+  bench.until(() => chip.core.waiting, 10, 'sleep');
+  chip.core.registers[13] = 0x20041008;
+  const from_ms = bench.now_ms;
+  bench.until(() => bench.machine.reboots === 1, 10, 'reboot');
+  const back_ms = bench.stream() - from_ms;
+  t.diagnostic(`streams again after ${back_ms.toFixed(0)} ms`);
+  bench.end();
+});
+
+for (const name of BOARDS) {
+  test(`${name}: the start of a frame is seen at once, whatever the sensors need`, (t) => {
+    const faults = [{ type: 'sensor_dead', sensor: 3, from_s: 0.2, to_s: 0.25 }];
+    const bench = new Bench(name, { faults });
+    bench.stream();
+    bench.run(1500); // all PROMs are read and judged again
+    const slowest_us = bench.machine.chip.usbCtrl.slowestSof_ns / 1000;
+    t.diagnostic(`${slowest_us.toFixed(1)} us`);
+    assert.ok(slowest_us < 20, `${slowest_us} us`);
+    bench.end();
+  });
+}
+
+/** A host that gives a request up and begins the next in the same frame; the answer must be to the second. */
+test('a control transfer that the host abandons leaves nothing for the next', () => {
+  const bench = new Bench('pico_parallel');
+  bench.stream();
+  const { client, host, time } = bench.machine;
+  client.write(encoded('osr', '256'));
+  let wrong = 0;
+  for (let i = 0; i < 600; i++) {
+    const abandoned = host.control(setupPacket(0x80, 6, 2 << 8, 0, 67), null, () => {});
+    assert.ok(bench.machine.run(time.nanos + 20e3 + i * 350), bench.machine.endReason);
+    host.cancel(abandoned);
+    let answer = null;
+    host.control(setupPacket(0x80, 8, 0, 0, 1), null, (status, data) => {
+      answer = `${status} ${Buffer.from(data).toString('hex')}`;
+    });
+    bench.until(() => answer, 5, 'answer');
+    wrong += answer !== 'ok 01';
+  }
+  assert.equal(wrong, 0);
+  bench.assertStreams(20);
+  bench.end();
+});
+
+test('sensors that acknowledge as soon as SCL falls cost no arbitration', () => {
+  const bench = new Bench('pico_mux', { faults: [3, 7, 14].map((sensor) => ({ type: 'sensor_fast', sensor, from_s: 0 })) });
+  bench.stream();
+  bench.run(200);
+  const { frames_incomplete, bus_recoveries, bus_timeouts } = bench.health();
+  assert.deepEqual([frames_incomplete, bus_recoveries, bus_timeouts], [0, 0, 0]);
+  bench.end();
+});
+
+for (const name of BOARDS) {
+  test(`${name}: the Pico's regulator is held in its quiet mode`, () => {
+    const bench = new Bench(name);
+    bench.stream();
+    assert.equal((bench.machine.chip.pins.high >>> 23) & 1, 1);
+    bench.end();
+  });
+}
+
+for (const [name, revision, faults] of [
+  ['pico_mux', 1, [{ type: 'usb_busy_hub', from_s: 0 }]], ['pico_mux', 0, []], ['pico_parallel', 1, []], ['pico_parallel', 2, [{ type: 'usb_busy_hub', from_s: 0 }]],
+]) {
+  test(`${name}: a chip of revision B${revision} enumerates${faults.length ? ' behind a busy hub' : ''}`, (t) => {
+    const bench = new Bench(name, { revision, faults, fastEnumeration: false });
+    t.diagnostic(`streams after ${bench.stream(500).toFixed(0)} ms`);
+    bench.assertStreams(100);
+    assert.equal(bench.end().usb.enumerations, 1);
+  });
+}
+
+for (const name of BOARDS) {
+  for (const type of ['power_cut', 'chip_reset']) {
+    test(`${name}: a start that is interrupted (${type}) at any time is followed by one that succeeds, whatever is in SRAM`, (t) => {
+      const whole_ms = new Bench(name).stream();
+      let [starts, slowest_ms] = [0, 0];
+      for (let at_ms = Number(step_us) / 1000; at_ms < whole_ms + 5; at_ms += Number(step_us) / 1000) {
+        starts += 1;
+        const to_ms = at_ms + 3;
+        const bench = new Bench(name, { seed: starts, faults: [{ type, from_s: at_ms / 1000, to_s: to_ms / 1000 }] });
+        bench.run(to_ms);
+        slowest_ms = Math.max(slowest_ms, bench.stream() - to_ms);
+        bench.run(20);
+        const { frames_incomplete, sensors_present, sensors_prom_bad, bus_nacks } = bench.health();
+        assert.deepEqual([frames_incomplete, sensors_present, sensors_prom_bad], [0, 0x7fff, 0], `interrupted at ${at_ms} ms`);
+        if (name === 'pico_parallel') assert.equal(bus_nacks, 0, `interrupted at ${at_ms} ms`); // sensors in mid-byte got their clocks first
+        assert.equal(bench.end().reboots, 0, `interrupted at ${at_ms} ms`);
+      }
+      t.diagnostic(`${starts} starts, the slowest took ${slowest_ms.toFixed(0)} ms`);
+      assert.ok(slowest_ms < whole_ms + 20, `${slowest_ms}`);
+    });
+  }
+}
+
+for (const name of BOARDS) {
+  test(`${name}: while the bus sleeps sensors and clocks do too, and wake up in time`, (t) => {
+    const bench = new Bench(name);
+    const { host } = bench.machine;
+    const { chip, board } = bench.machine;
+    const steady = () => (chip.pins.high >>> 23) & 1;
+    bench.stream();
+    bench.assertStreams(50);
+    for (const wake of ['resume', 'reset']) {
+      assert.deepEqual([chip.clkSys, steady()], [125e6, 1]);
+      host.suspend();
+      bench.run(13); // 3 ms until the bus counts as idle, and 7 ms to follow (USB 2.0, 7.1.7.6)
+      assert.deepEqual([chip.clkSys, chip.pllSys.outputHz, steady()], [12e6, 0, 0]);
+      const [transactions, cycles, gated_ns] = [board.statistics.transactions, chip.core.cycles, chip.deepSleep_ns];
+      bench.run(1000);
+      assert.equal(board.statistics.transactions, transactions, 'no sensor is asked for anything');
+      const awake = (chip.core.cycles - cycles) / 12e6;
+      t.diagnostic(`awake for ${(100 * awake).toFixed(2)} % of the time, at 12 MHz`);
+      assert.ok(awake < 0.02, `${awake}`);
+      assert.ok(chip.deepSleep_ns - gated_ns > 0.98e9, 'the clocks of what cannot wake it stand');
+      const from_ms = bench.now_ms;
+      if (wake === 'resume') host.resume();
+      else host.resetDevice(() => {});
+      bench.until(() => chip.clkSys === 125e6, 5, 'fast clock'); // before the signalling ends, 20 or 10 ms
+      t.diagnostic(`fast ${(bench.now_ms - from_ms).toFixed(0)} ms after the ${wake} began`);
+      bench.run(45);
+      if (wake === 'resume') bench.stream();
+      bench.until(() => board.statistics.transactions > transactions + 30, 50, 'transactions');
+    }
+    bench.end();
+  });
+}
+
+/** As the weather does. */
+test('what changed while the bus slept for long is no contact', () => {
+  const row = (t_s, Pa) => `${t_s},0,0,0,0,0,0,0,${new Array(15).fill(Pa).join(',')}\n`;
+  const scenario = parseScenario(`# fingertip-scenario 1\n${HEADER}\n${row(0, 0)}${row(1, 0)}${row(60, 800)}`, 'weather.csv');
+  const bench = new Bench('pico_parallel', { scenario });
+  bench.stream();
+  bench.run(200);
+  assert.equal(bench.flags() & (CONTACT | TARED), TARED);
+  bench.machine.host.suspend();
+  bench.run(64e3);
+  bench.machine.host.resume();
+  bench.run(35);
+  bench.stream();
+  bench.run(300);
+  assert.equal(bench.flags() & (CONTACT | TARED), TARED);
+  bench.end();
+});
