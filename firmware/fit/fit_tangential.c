@@ -37,7 +37,7 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
 #define THICKNESS_PER_UNIT 1.0455f
 
 /* Beyond this share of it the contact is too long to tell a load from its shape: of lying cylinders
- * without load 15 % would claim one, 1.2 % do (report, elongated_false_percent). A pad that ends
+ * without load 15 % would claim one, 1 % do (report, elongated_false_percent). A pad that ends
  * nearer than three quarters of its thickness makes round contacts look long: there all are taken.
  */
 #define LONG_MOST_Q15 1507 /* 0.046 */

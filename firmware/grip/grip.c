@@ -6,8 +6,8 @@
 /* Of the zero of the load. */
 #define READY_us 150000u
 #define READY_FRAMES 3u
-/* How fast the first force rises. */
-#define SQUEEZE_mN_s 8000
+/* In which the first force rises. */
+#define RISES_us 200000
 /* An approach or a release that was kept waiting makes up for no more: a leap would be a blow. */
 #define RAMP_us 100000
 /* Squeezing to the first force takes no longer, or it is what it is. */
@@ -81,7 +81,7 @@ bool grip_request(struct grip *grip, enum grip_request request) {
     }
     grip_hold_begin(grip);
     grip_fixed_begin(grip);
-    grip->wanted_mN = 0;
+    grip->wanted_mN = grip->tightened_mN = 0;
     grip->may_activate = false;
     enter(grip, GRIP_ACTIVATING);
     return true;
@@ -173,8 +173,8 @@ static uint32_t squeeze(struct grip *grip, const struct grip_view *view) {
   const struct grip_settings *settings = &grip->settings;
   bool fixed = settings->mode == GRIP_MODE_FIXED;
   int32_t aimed_mN = fixed ? settings->set_mN : settings->first_mN;
-  int32_t risen_mN =
-      settings->touch_mN + grip_scale(passed_us(grip, grip->since_us), SQUEEZE_mN_s, 1000000);
+  int32_t since_us = grip_clamp(passed_us(grip, grip->since_us), 0, RISES_us);
+  int32_t risen_mN = settings->touch_mN + grip_scale(aimed_mN, since_us, RISES_us);
   uint32_t trouble = fixed ? grip_fixed_step(grip, view)
                            : grip_aim(grip, view, risen_mN < aimed_mN ? risen_mN : aimed_mN);
   bool there = view->low_mN >= grip_scale(aimed_mN, SQUEEZED_PERMILLE, 1000);

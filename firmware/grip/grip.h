@@ -241,6 +241,7 @@ struct grip {
   int32_t target_um; /* the width that was last commanded */
   uint64_t aimed_us; /* when it last changed for a force */
   int32_t wanted_mN;
+  int32_t tightened_mN;   /* what was wanted when it last closed for a force */
   uint64_t empty_us;      /* since when neither fingertip feels anything; 0: one does */
   uint64_t stood_us;      /* since when the gripper stands where an approach ends */
   uint64_t ramped_us;     /* the last step of an approach or a release */

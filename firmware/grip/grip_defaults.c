@@ -28,7 +28,7 @@ void grip_default_settings(struct grip_settings *settings, const struct grip_tra
       .blind_mN = 8000,
       .shift_um = 5500,
       .friction_permille = 550,
-      .margin_permille = 1280,
+      .margin_permille = 1260,
       .decay_permille_s = 3000,
       .rest_us = 300000,
   };

@@ -23,6 +23,8 @@
  * one that opens. */
 #define TIGHTEN_PERMILLE 500
 #define LOOSEN_PERMILLE 300
+#define FOR_LESS_PERMILLE 300
+#define MUCH_PERMILLE 1600
 /* While it still opens no less is missing than what may be: else what was loosened a moment ago
  * would be taken back, and more. */
 #define OPENING_PERMILLE 1000
@@ -192,12 +194,16 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
     int32_t least = least_steps(grip, false);
     int32_t spare =
         port_divide(-missing_mN - grip_scale(step_mN, LOOSEN_PERMILLE - 1000, 1000), step_mN);
-    steps = spare >= least ? -spare : 0;
+    /* A step makes more than is known: for the same force it is not taken back. */
+    bool for_less = wanted_mN < grip->tightened_mN - grip_scale(step_mN, FOR_LESS_PERMILLE, 1000);
+    bool much = -missing_mN > grip_scale(step_mN, MUCH_PERMILLE, 1000) * least;
+    steps = spare >= least && (for_less || much) ? -spare : 0;
   }
   if (steps != 0) {
     int32_t aimed_um = grip->target_um - steps * grip->traits.step_um;
     grip->target_um = grip_allowed_width(grip, view, aimed_um, &trouble);
     grip->aimed_us = grip->now_us;
+    grip->tightened_mN = steps > 0 ? wanted_mN : grip->tightened_mN;
   }
   return trouble;
 }

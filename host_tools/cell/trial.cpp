@@ -20,9 +20,17 @@ constexpr double LIFTS_AFTER_s = 0.8, POURS_AFTER_s = 1.2, POURS_s = 0.4, POURED
 constexpr double SLICK_s = 0.05, SLICK_SHARE = 0.9;
 constexpr double LOST_N = 0.01, TOUCHED_N = 0.05;
 constexpr double SAMPLED_s = 2e-3, NEAR = 0.1;
+constexpr double SWINGS_mm = 0.02; // a move that counts
 
 std::uint64_t in_us(double s) {
   return static_cast<std::uint64_t>(std::llround(1e6 * s));
+}
+
+// Begins in no state.
+Fault never() {
+  Fault fault;
+  fault.state = GRIP_STATES;
+  return fault;
 }
 
 bool holds(const grip_report &report) {
@@ -47,12 +55,14 @@ public:
       squares_ += off * off;
       samples_++;
     }
-    if (t_s - touched_s > 0.5 * trial_.still_s && width_mm != width_mm_) {
+    if (t_s - touched_s < 0.5 * trial_.still_s) {
+      width_mm_ = width_mm;
+    } else if (std::abs(width_mm - width_mm_) > SWINGS_mm) {
       const int direction = width_mm > width_mm_ ? 1 : -1;
       reversals_ += direction_ == -direction;
       direction_ = direction;
+      width_mm_ = width_mm;
     }
-    width_mm_ = width_mm;
   }
   void tell(Outcome &outcome) const {
     outcome.settle_s = settle_s_;
@@ -88,7 +98,7 @@ public:
                  Random(trial.seed, LINE, 0)),
         fingers_{FeltFinger(face, trial.rubber[0], trial.sensing, Random(trial.seed, FINGER, 0)),
                  FeltFinger(face, trial.rubber[1], trial.sensing, Random(trial.seed, FINGER, 1))},
-        set_point_(trial), faults_(trial.fault.value_or(Fault{}), Random(trial.seed, FAULT, 0)) {
+        set_point_(trial), faults_(trial.fault.value_or(never()), Random(trial.seed, FAULT, 0)) {
     if (trial.activates) {
       gripper_.motion().power_off();
     } else {
@@ -310,7 +320,9 @@ private:
     sample_s_ += SAMPLED_s;
     const double felt_N = 5e-4 * (felt_[0].force_mN + felt_[1].force_mN);
     if (trial_.still_s > 0.0 && touched_s_ < NEVER_s) {
-      set_point_.look(t_s_, felt_N, 1e-3 * gripper_.sent().width_um, touched_s_);
+      const double smaller_N = 1e-3 * std::min(felt_[0].force_mN, felt_[1].force_mN);
+      set_point_.look(t_s_, trial_.set_of_smaller ? smaller_N : felt_N,
+                      1e-3 * gripper_.sent().width_um, touched_s_);
     }
     const double since_s = lift_s_ < NEVER_s ? since_lift_s(t_s_) : -1.0;
     if (since_s >= trial_.scene.lift_s) {

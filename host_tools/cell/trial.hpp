@@ -51,6 +51,7 @@ struct Trial {
   std::uint64_t seed = 0; // of noise and moments
   // Instead of a lift: the grip's force is held on the table for so long, and should be that.
   double still_s = 0.0, set_N = 0.0;
+  bool set_of_smaller = false; // of what both fingertips say, not their mean
   // The gripper is not active at first and open; what it is to grasp comes between its fingers only
   // once it is active.
   bool activates = false;
@@ -99,7 +100,7 @@ struct Outcome {
   double margin = 0.0;     // median of force over least force from the lift's end on
   double holding_s = 0.0;  // from the first touch to the controller's HOLDING
   std::vector<Slip> slips; // since the lift began
-  // Of a still trial, by the mean of what both fingertips say.
+  // Of a still trial.
   std::optional<double> settle_s; // from the touch until it stays within 10 % for SETTLED_s
   double rms = 0.0;               // of the error, share of the set force, from there on
   int reversals = 0;              // of the commanded width over the last half of the time

@@ -45,8 +45,9 @@ SETS = {
     "hold_1308": ("1308 frames a second, OSR 256", ("--rate", "1308"), False),
     "fixed": ("a set force of 6 N, eq. (5) and (6)", ("--mode", "fixed", "--set", "set_mN=6000"), False),
     "fixed_20": ("the same at the paper's 20 Hz", ("--mode", "fixed", "--rate", "20", "--set", "set_mN=6000,control_us=50000"), False),
-    "still": ("a set force of 2 to 12 N held for 12 s, nothing pulls", ("--mode", "still"), False),
+    "still": ("a force of 2 to 12 N held for 12 s, nothing pulls", ("--mode", "still"), False),
     "minute": ("the same for 60 s", ("--mode", "still", "--still", "60"), False),
+    "still_fixed": ("the same force by eq. (5) and (6)", ("--mode", "still-fixed"), False),
 }
 GRASPS, GRASPS_MORE, GRASPS_MINUTE = 1500, 300, 60
 USUAL, USUAL_MORE, USUAL_MINUTE = 150, 40, 10

@@ -115,9 +115,9 @@ std::vector<std::string> names_of(const std::string &objects) {
 Set::Set(const SetOptions &options)
     : options_(options), faces_(names_of(options.objects)),
       gripper_(gripper_mechanics(options.gripper)) {
-  if (options.mode != "hold" && options.mode != "fixed" && options.mode != "still") {
+  if (options.mode != "hold" && options.mode != "fixed" && !is_still()) {
     throw std::runtime_error("there is no mode \"" + options.mode +
-                             "\"; choose one of: hold fixed still");
+                             "\"; choose one of: hold fixed still still-fixed");
   }
   if (!(options.rate_Hz >= 1.0 && options.rate_Hz <= 1600.0)) {
     throw std::runtime_error("a fingertip gives 1 to 1600 frames a second");
@@ -148,6 +148,7 @@ Trial Set::trial(std::uint64_t n) const {
   }
   trial.still_s = is_still() ? options_.still_s : 0.0;
   trial.set_N = 1e-3 * settings(n).set_mN;
+  trial.set_of_smaller = options_.mode == "still";
   return trial;
 }
 
@@ -155,10 +156,14 @@ grip_settings Set::settings(std::uint64_t n) const {
   grip_settings settings;
   const grip_traits traits = core_traits(gripper_.traits);
   grip_default_settings(&settings, &traits);
-  settings.mode = options_.mode == "hold" ? GRIP_MODE_HOLD : GRIP_MODE_FIXED;
+  const bool holds = options_.mode == "hold" || options_.mode == "still";
+  settings.mode = holds ? GRIP_MODE_HOLD : GRIP_MODE_FIXED;
   if (is_still()) {
     settings.set_mN =
         static_cast<std::int32_t>(1e3 * Random(options_.seed, SET, n).log_uniform(2.0, 12.0));
+    settings.first_mN = settings.set_mN;
+    settings.blind_mN = settings.set_mN;
+    settings.shift_um = 0; // nothing pulls: no load is guessed
   }
   change(settings, options_.settings);
   return settings;

@@ -16,7 +16,7 @@ constexpr std::uint64_t JUDGING_SEEDS = 1000;
 
 struct SetOptions {
   std::string gripper = "2f85";  // of gripper_mechanics()
-  std::string mode = "hold";     // hold, fixed, or still: fixed, on the table, no lift
+  std::string mode = "hold";     // hold, fixed, or still, still-fixed: on the table, no lift
   std::string objects = "round"; // of cell::faces_of(), or faces split by commas
   std::string settings;          // of the controller: name=value, split by commas
   double rate_Hz = 410.0;        // above 600 at OSR 256, else 1024
@@ -31,7 +31,7 @@ class Set {
 public:
   explicit Set(const SetOptions &options);
 
-  bool is_still() const { return options_.mode == "still"; }
+  bool is_still() const { return options_.mode.rfind("still", 0) == 0; }
   cell::Trial trial(std::uint64_t n) const;
   grip_settings settings(std::uint64_t n) const;
   // For several threads at once.

@@ -11,7 +11,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 TRIALS = '''
 import json, sys
 options = dict(zip(sys.argv[1::2], sys.argv[2::2]))
-still = options.get("--mode") == "still"
+still = options.get("--mode", "").startswith("still")
 row = {"gripper": options["--gripper"], "grasps": int(options.get("--count", 1)), "peak_p95_N": 15.0}
 if still:
     row |= {"settle_p50_s": 0.4, "settle_p95_s": 1.0, "never_settled_percent": 0.0, "rms_p50_percent": 1.0, "limit_cycles": 1}
@@ -73,7 +73,7 @@ class Grasp(unittest.TestCase):
         self.assertEqual(found["limit_cycles"], 3)
         self.assertTrue(found["simulated"])
         grasps = {(row["set"], row["gripper"]): row["grasps"] for row in found["rows"]}
-        self.assertEqual((len(grasps), grasps["hold", "2f85"], grasps["hold_20", "ideal"]), (36, 150, 40))
+        self.assertEqual((len(grasps), grasps["hold", "2f85"], grasps["hold_20", "ideal"]), (39, 150, 40))
         self.assertEqual(found["caught"]["n"], 7)
         self.assertIsNone(met["emulated_reaction_ms"])
         self.assertEqual((found["cups_crushed"], met["cups_crushed"], met["faults_beyond_cap"]), (1, False, True))

@@ -209,6 +209,8 @@ TEST(Trial, AStillGraspTellsHowItSettles) {
   EXPECT_LT(*outcome.settle_s, 0.5);
   EXPECT_LT(outcome.rms, 0.06);
   EXPECT_EQ(outcome.reversals, 0);
+  EXPECT_FALSE(outcome.failed.begun);
+  EXPECT_EQ(outcome.margin, 0.0); // never lifted
   one.set_N = 8.0;
   ClosesTo wrong(width_mm(one, 5.1));
   EXPECT_FALSE(run_trial(one, face(), wrong).settle_s);
