@@ -7,7 +7,7 @@
 #define READY_us 150000u
 #define READY_FRAMES 3u
 /* In which the first force rises. */
-#define RISES_us 200000
+#define RISES_us 270000
 /* An approach or a release that was kept waiting makes up for no more: a leap would be a blow. */
 #define RAMP_us 100000
 /* Squeezing to the first force takes no longer, or it is what it is. */

@@ -24,6 +24,7 @@
 #define TIGHTEN_PERMILLE 500
 #define LOOSEN_PERMILLE 300
 #define FOR_LESS_PERMILLE 300
+#define OPENS_MOST_um 300 /* at once */
 #define MUCH_PERMILLE 1600
 /* While it still opens no less is missing than what may be: else what was loosened a moment ago
  * would be taken back, and more. */
@@ -134,14 +135,20 @@ static int32_t least_steps(const struct grip *grip, bool tighten) {
              : port_divide(missing_um + grip->traits.step_um - 1, grip->traits.step_um);
 }
 
+/* What was sent last has been made, as far as an answer tells that is itself so late. */
+static bool has_come(const struct grip *grip, uint32_t settles_us) {
+  uint64_t late_us = grip->now_us > grip->status.t_us ? grip->now_us - grip->status.t_us : 0;
+  return !grip->status.is_moving && grip->status.t_us > grip->aimed_us +
+                                                            (uint64_t)grip->traits.latency_us +
+                                                            settles_us + late_us;
+}
+
 /* The way that is still to come of the width then. Where the gripper stands, it makes none shorter
  * than its deadband. */
 static int32_t coming_way(const struct grip *grip, int32_t width_um) {
   int32_t off_um = grip->status.width_um - grip->target_um;
   int32_t deadband_um = grip->traits.deadband_um;
-  bool stands = !grip->status.is_moving &&
-                grip->status.t_us > grip->aimed_us + (uint64_t)grip->traits.latency_us + SETTLES_us;
-  bool stays = stands && off_um <= deadband_um && off_um >= -deadband_um;
+  bool stays = has_come(grip, SETTLES_us) && off_um <= deadband_um && off_um >= -deadband_um;
   return width_um - (stays ? grip->status.width_um : grip->target_um);
 }
 
@@ -156,9 +163,7 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
   if (view->fingers == 0 || !knows_width(grip, view->t_us)) {
     return trouble;
   }
-  bool stands = !grip->status.is_moving &&
-                grip->status.t_us > grip->aimed_us + (uint64_t)grip->traits.latency_us;
-  if (!stands && view->t_us > grip->status.t_us + WIDTH_LAGS_us) {
+  if (!has_come(grip, 0) && view->t_us > grip->status.t_us + WIDTH_LAGS_us) {
     return trouble; /* one move at a time */
   }
   /* Where the force will be once the gripper is where it was sent. */
@@ -197,7 +202,9 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
     /* A step makes more than is known: for the same force it is not taken back. */
     bool for_less = wanted_mN < grip->tightened_mN - grip_scale(step_mN, FOR_LESS_PERMILLE, 1000);
     bool much = -missing_mN > grip_scale(step_mN, MUCH_PERMILLE, 1000) * least;
-    steps = spare >= least && (for_less || much) ? -spare : 0;
+    int32_t most = port_divide(OPENS_MOST_um, grip->traits.step_um);
+    most = !for_less || most < least ? least : most;
+    steps = spare < least || !(for_less || much) ? 0 : spare < most ? -spare : -most;
   }
   if (steps != 0) {
     int32_t aimed_um = grip->target_um - steps * grip->traits.step_um;

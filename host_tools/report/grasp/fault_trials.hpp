@@ -10,8 +10,8 @@
 
 namespace fingertip::grasp {
 
-// Opening by two counts of a 2F-85 (0.374 mm) is still holding: what is too much comes down.
-constexpr double OPENS_mm = 0.8;
+// Opening by less is still holding: a grip that was raised too far comes down.
+constexpr double OPENS_mm = 1.0;
 // Forces are measured within some 10 %, and what a gripper cannot do in finer steps it does in two
 // of its own: by so much a grip may be above its cap.
 constexpr double OVER_CAP = 1.1, OVER_CAP_STEPS = 2.0;
