@@ -44,6 +44,10 @@ const endpointIndex = (address) => ((address & 0x80) >> 3) | (address & 15);
 
 class ProtocolError extends Error {}
 
+// Of what a message of a type holds before its data.
+const LEAST_BYTES = new Map([[TYPE.control, 10], [TYPE.bulk, 10], [TYPE.set_configuration, 1], [TYPE.set_alt_setting, 2],
+  [TYPE.get_alt_setting, 1], [TYPE.start_interrupt, 1], [TYPE.stop_interrupt, 1]]);
+
 /** A message with the short header of a hello or the long one of everything after. */
 export function encodeMessage(type, id, payload = Buffer.alloc(0)) {
   const head = Buffer.alloc(type === TYPE.hello ? 12 : 16);
@@ -305,6 +309,7 @@ export class UsbRedirServer {
       return;
     }
     if (type === TYPE.filter_filter || type === TYPE.device_disconnect_ack || !this.connected) return;
+    if (payload.length < (LEAST_BYTES.get(type) ?? 0)) throw new ProtocolError(`message of type ${type} and ${payload.length} bytes`);
     const untouched = this.untouchedSinceReset;
     this.untouchedSinceReset = false;
     switch (type) {

@@ -45,8 +45,8 @@ test('a message may come in any pieces; a first message that is no hello is refu
   assert.throws(() => new MessageReader(() => {}).take(encodeMessage(3, 7n)));
 });
 
-/** Runs `script(vm)` against the echo device of cdc.h behind a server. */
-async function session(script) {
+/** Runs `script(vm)` against the echo device of cdc.h behind a server; what is warned of matches. */
+async function session(script, warnings = /^$/) {
   const path = join(folder, 'usb.sock');
   const server = await UsbRedirServer.start(path);
   const packets = [];
@@ -61,7 +61,7 @@ async function session(script) {
   const hello = encodeHello();
   hello.writeUInt32LE(0xff, 12 + 64);
   const vm = {
-    machine, packets, server,
+    machine, packets, server, socket,
     send: (type, id, payload) => socket.write(encodeMessage(type, id, payload)),
     setup: (id, hex, data = Buffer.alloc(0)) => {
       const s = Buffer.from(hex, 'hex');
@@ -101,7 +101,7 @@ async function session(script) {
     socket.write(hello);
     for (const type of [4, 5, 1]) await vm.expect(type, 0n);
     await script(vm);
-    assert.deepEqual(machine.result.warnings, []);
+    assert.match(machine.result.warnings.join('\n'), warnings);
   } finally {
     socket.destroy();
     await server.stop();
@@ -123,6 +123,15 @@ test('a device connects once it is enumerated; requests, data and stalls go thro
   const answers = [await vm.next(), await vm.next()].sort((a, b) => a.payload[0] - b.payload[0]);
   assert.deepEqual(answers.map((a) => [a.id, a.payload[1], a.payload.readUInt16LE(2), a.payload.subarray(10).toString()]), [[6n, 0, 3, ''], [5n, 0, 3, 'abc']]);
 }));
+
+for (const [type, length] of [[100, 3], [101, 9], [6, 0], [8, 1]]) {
+  test(`a message of type ${type} and ${length} bytes is too short: it ends the connection and not the machine`, () => session(async (vm) => {
+    vm.send(type, 1n, Buffer.alloc(length));
+    await vm.quiet();
+    assert.ok(vm.socket.closed);
+    assert.equal(vm.machine.endReason ?? null, null);
+  }, /^.*: message of type \d+ and \d+ bytes$/));
+}
 
 test('a cancelled read is answered once and takes no data', () => session(async (vm) => {
   vm.setup(2n, '2122030000000000');
