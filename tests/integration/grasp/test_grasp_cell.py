@@ -170,13 +170,13 @@ class Course(CellTest):
     """An object is lifted, becomes slick, slips and is caught."""
 
     def run_course(self, model):
-        with self.cell("--mass", "0.25", "--friction", "0.4", model=model):
+        with self.cell("--mass", "0.25", "--friction", "0.6", model=model):
             process = self.start("-o", self.csv)
             self.wait_for_event("lift")
             self.pass_time(1.5)
             now = self.now()
             # So slick that somewhat more force is needed than there is, and once it slides a third more.
-            self.tell(f"slick {1 - now['least_N'] / (1.1 * now['force_N']):.3f}")
+            self.tell(f"slick {1 - now['least_N'] / (1.02 * now['force_N']):.3f}")
             self.wait_for_event("slip")
             self.wait_for(lambda: not self.now()["slips"], "it slips for ever")
             self.pass_time(0.5)
