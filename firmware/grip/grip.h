@@ -38,7 +38,7 @@ struct grip_touch {
   uint64_t t_us;  /* when it was measured */
   uint32_t flags; /* enum contact_flag */
   int32_t force_mN, force_sd_mN;
-  int32_t x_um, y_um, location_sd_um;
+  int32_t x_um, y_um, sigma_um;
   int32_t qx_mN, qy_mN, q_sd_mN; /* tangential load of the object on the rubber */
   int32_t vx_um_s, vy_um_s;
 };
@@ -151,7 +151,7 @@ struct grip_settings {
   uint32_t control_us; /* between two steps of eq. (6) */
   /* hold */
   int32_t first_mN;          /* grip before anything pulls, and never less */
-  int32_t blind_mN;          /* grip where no load can be told */
+  int32_t blind_mN;          /* grip where no load can be told, squeezed to before anything pulls */
   int32_t shift_um;          /* by which a tangential load as large as the force moves a location
                                 that is not corrected for it; 0: loads are not guessed by that */
   int32_t friction_permille; /* until a slide, or a load that does not slide, tells better */
@@ -250,6 +250,7 @@ struct grip {
   bool may_activate;
   bool is_entered;   /* the state is new */
   bool still_grasps; /* STILL with an object */
+  bool is_blind;     /* squeezed without a fingertip that could tell a load */
   struct grip_hold hold;
   struct grip_pid pid;
 };

@@ -25,7 +25,7 @@ void grip_default_settings(struct grip_settings *settings, const struct grip_tra
       .set_mN = 5000,
       .control_us = 10000,
       .first_mN = 1500 + traits->step_um * 8 / 5, /* what a step may miss */
-      .blind_mN = 8000,
+      .blind_mN = 12000,
       .shift_um = 5500,
       .friction_permille = 550,
       .margin_permille = 1260,

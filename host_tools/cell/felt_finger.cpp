@@ -123,7 +123,7 @@ grip_touch FeltFinger::Firmware::frame(std::uint64_t t_us, bool pressed,
   told.force_sd_mN = in_thousandths(pulls ? pull.force_sd_N : force.force_sd_N);
   told.x_um = in_thousandths(pulls ? pull.x_mm : fitted.x_mm);
   told.y_um = in_thousandths(pulls ? pull.y_mm : fitted.y_mm);
-  told.location_sd_um = in_thousandths(pulls ? pull.location_sd_mm : fitted.location_sd_mm);
+  told.sigma_um = in_thousandths(fitted.sigma_mm);
   told.qx_mN = in_thousandths(pull.qx_N);
   told.qy_mN = in_thousandths(pull.qy_N);
   told.q_sd_mN = in_thousandths(pull.q_sd_N);

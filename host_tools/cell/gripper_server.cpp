@@ -24,6 +24,8 @@ using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::chrono::milliseconds FRAME_GAP{20}; // what is no whole frame by then is none
 constexpr double BITS_PER_BYTE = 10;
+// While a machine stalls for longer, the gripper's time stands: nobody could have spoken to it.
+constexpr double STALL_s = 0.1;
 constexpr double LONGEST_STEP_s = 0.01; // of the motion
 
 std::uint16_t modbus_crc(const Bytes &bytes, std::size_t count) {
@@ -347,7 +349,9 @@ void GripperServer::step(std::chrono::microseconds longest_wait) {
   const bool something = ppoll(&waiting, 1, &wait, nullptr) > 0;
   const Clock::time_point now = Clock::now();
   if (real_time_) {
-    double passed_s = std::chrono::duration<double>(now - stepped_at_).count();
+    const double late_s = std::chrono::duration<double>(now - stepped_at_).count();
+    double passed_s =
+        std::min(late_s, std::chrono::duration<double>(longest_wait).count() + STALL_s);
     for (; passed_s > 0; passed_s -= LONGEST_STEP_s) {
       motion_.step(std::min(passed_s, LONGEST_STEP_s));
     }

@@ -32,7 +32,7 @@ grip_touch touch_from_packet(const wire_packet &packet, double host_us) {
   touch.x_um = under(CONTACT_FLAG_FIT_VALID, contact.x_mm);
   touch.y_um = under(CONTACT_FLAG_FIT_VALID, contact.y_mm);
   touch.force_sd_mN = under(CONTACT_FLAG_UNCERTAINTY_VALID, contact.force_sd_N);
-  touch.location_sd_um = under(CONTACT_FLAG_UNCERTAINTY_VALID, contact.location_sd_mm);
+  touch.sigma_um = under(CONTACT_FLAG_FIT_VALID, contact.sigma_mm);
   touch.qx_mN = under(CONTACT_FLAG_TANGENTIAL_VALID, contact.qx_N);
   touch.qy_mN = under(CONTACT_FLAG_TANGENTIAL_VALID, contact.qy_N);
   touch.q_sd_mN = under(CONTACT_FLAG_TANGENTIAL_VALID, contact.q_sd_N);

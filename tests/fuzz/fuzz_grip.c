@@ -88,7 +88,7 @@ static void touch(struct fuzz_input *input) {
     touch.x_um = some_value(input);
     touch.y_um = some_value(input);
     touch.force_sd_mN = some_value(input);
-    touch.location_sd_um = some_value(input);
+    touch.sigma_um = some_value(input);
     touch.q_sd_mN = some_value(input);
   }
   if (how & 8) { /* late, or by another clock */

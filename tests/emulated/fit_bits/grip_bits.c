@@ -195,7 +195,7 @@ static uint32_t implausible_grasp(void) {
                                  .force_sd_mN = ONE_IN(5) ? any() : 100,
                                  .x_um = any(),
                                  .y_um = any(),
-                                 .location_sd_um = any(),
+                                 .sigma_um = any(),
                                  .qx_mN = any(),
                                  .qy_mN = any(),
                                  .q_sd_mN = any(),

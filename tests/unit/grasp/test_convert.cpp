@@ -14,7 +14,7 @@ TEST(Convert, ATouchIsThePacketInThousandths) {
   EXPECT_EQ(touch.force_mN, 4020);
   EXPECT_EQ(touch.x_um, 7100);
   EXPECT_EQ(touch.y_um, -3333);
-  EXPECT_EQ(touch.location_sd_um, 12);
+  EXPECT_EQ(touch.sigma_um, 5700);
   EXPECT_EQ(touch.qx_mN, -312);
   EXPECT_EQ(touch.qy_mN, 0);
   EXPECT_EQ(touch.q_sd_mN, 12);
@@ -30,7 +30,7 @@ TEST(Convert, WhatNoFlagStandsForIsZero) {
   EXPECT_EQ(touch.force_mN, 0);
   EXPECT_EQ(touch.force_sd_mN, 0);
   EXPECT_EQ(touch.x_um, 0);
-  EXPECT_EQ(touch.location_sd_um, 0);
+  EXPECT_EQ(touch.sigma_um, 0);
   EXPECT_EQ(touch.qx_mN, 0);
   EXPECT_EQ(touch.vx_um_s, 0);
 }

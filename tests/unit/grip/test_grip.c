@@ -137,10 +137,30 @@ static void loosens_slowly(void) {
 static void grips_for_the_blind_without_a_load_told(void) {
   world.drop_flags[0] = world.drop_flags[1] = CONTACT_FLAG_TANGENTIAL_VALID;
   world.add_flags[0] = world.add_flags[1] = CONTACT_FLAG_FLAT;
-  grasp();
+  grasp(); /* squeezed to it: nothing pulls before */
+  assert_within(0.05, settings.blind_mN, world.force_mN);
   world_run(&world, 1000);
   assert_within(0.05, settings.blind_mN, world.force_mN);
   TEST_ASSERT_BITS_HIGH(GRIP_NO_LOAD, world.report.trouble);
+}
+
+/* A plate's Gaussian holds 2.75 times what the pad takes, and its location stays under a load. */
+static void a_plate_is_gripped_for_the_blind_with_the_force_on_the_pad(void) {
+  world.drop_flags[0] = world.drop_flags[1] = CONTACT_FLAG_TANGENTIAL_VALID;
+  world.sigma_um = 21400;
+  world.gain[0] = world.gain[1] = 2.75;
+  grasp();
+  assert_within(0.05, settings.blind_mN, world.force_mN);
+  assert_within(0.05, settings.blind_mN, world.report.force_mN);
+  world_run(&world, 20);
+  TEST_ASSERT_BITS_HIGH(GRIP_NO_LOAD, world.report.trouble);
+}
+
+static void one_fingertip_that_tells_a_load_is_enough(void) {
+  world.drop_flags[0] = CONTACT_FLAG_TANGENTIAL_VALID;
+  world.add_flags[0] = CONTACT_FLAG_FLAT;
+  grasp();
+  assert_within(0.05, settings.first_mN, world.force_mN);
 }
 
 static void never_loosens_while_no_load_is_told(void) {
@@ -485,6 +505,8 @@ int main(void) {
   RUN_TEST(learns_friction_from_a_slide);
   RUN_TEST(loosens_slowly);
   RUN_TEST(grips_for_the_blind_without_a_load_told);
+  RUN_TEST(a_plate_is_gripped_for_the_blind_with_the_force_on_the_pad);
+  RUN_TEST(one_fingertip_that_tells_a_load_is_enough);
   RUN_TEST(never_loosens_while_no_load_is_told);
   RUN_TEST(a_guessed_load_keeps_more_than_it_needs);
   RUN_TEST(never_exceeds_the_cap);

@@ -48,6 +48,7 @@ static struct grip_touch feel(const struct world *world, int finger) {
   touch.flags &= ~world->drop_flags[finger];
   touch.force_mN = force_mN;
   touch.force_sd_mN = force_mN / 50;
+  touch.sigma_um = world->sigma_um;
   touch.x_um = world->is_frozen[finger] ? 0 : (int32_t)(world->frames % 7);
   if (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) {
     touch.qy_mN = world->load_mN;

@@ -17,7 +17,8 @@ struct world {
   double width_um, sent_um, object_um; /* object_um: none where it is 0 */
   double stiffness;                    /* N at 1 mm of each pad's indentation */
   double force_mN;
-  int32_t load_mN; /* of each fingertip */
+  int32_t load_mN;  /* of each fingertip */
+  int32_t sigma_um; /* of the contact, as fitted */
   uint32_t add_flags[GRIP_FINGERS], drop_flags[GRIP_FINGERS];
   double gain[GRIP_FINGERS];
   bool is_mute[GRIP_FINGERS], is_frozen[GRIP_FINGERS];
