@@ -19,10 +19,14 @@ static struct {
   uint64_t (*source_next_us)(const void *);
   const void *source_context;
   uint64_t fed_us;
+  uint64_t alive_us[PORT_PARTS];
+  bool watched[PORT_PARTS];
   uint64_t events;
   unsigned at_once;
   uint64_t limit_us; /* of the run; sleep ends there */
   bool watchdog_expired;
+  enum crash_event last_event;
+  uint8_t last_event_detail;
   bool started_by_watchdog;
   bool running;
   jmp_buf out;
@@ -141,11 +145,45 @@ void port_save_power(bool saving) {
 }
 
 void port_watchdog_feed(void) {
+  for (unsigned part = 0; part < PORT_PARTS; part++) {
+    if (native.watched[part] && native.now_us - native.alive_us[part] > PORT_PART_LIMIT_us) {
+      return;
+    }
+  }
   native.fed_us = native.now_us;
 }
 
-bool port_started_by_watchdog(void) {
-  return native.started_by_watchdog;
+void port_alive(enum port_part part) {
+  native.alive_us[part] = native.now_us;
+  native.watched[part] = true;
+}
+
+void port_at(enum crash_activity activity) {
+  (void)activity;
+}
+
+void port_event(enum crash_event event, uint8_t detail) {
+  native.last_event = event;
+  native.last_event_detail = detail;
+}
+
+enum crash_event native_last_event(uint8_t *detail) {
+  *detail = native.last_event_detail;
+  return native.last_event;
+}
+
+static struct crash_record last_crash;
+
+void native_set_last_crash(const struct crash_record *crash) {
+  last_crash = *crash;
+}
+
+uint32_t port_watchdog_resets(void) {
+  return native.started_by_watchdog ? 1 : 0;
+}
+
+const struct crash_record *port_last_crash(void) {
+  return last_crash.kind == CRASH_NONE ? NULL : &last_crash;
 }
 
 static char serial_number[17] = "0000000000000001";

@@ -9,6 +9,8 @@
 #ifndef NATIVE_NATIVE_PORT_H
 #define NATIVE_NATIVE_PORT_H
 
+#include "common/crash.h"
+
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -17,6 +19,12 @@ void native_start(bool by_watchdog);
 
 /* Sixteen characters, for whoever has several; kept over starts. */
 void native_set_serial_number(const char *text);
+
+/* How the firmware ended before; kept over starts. */
+void native_set_last_crash(const struct crash_record *crash);
+
+/* What port_event() was last told. */
+enum crash_event native_last_event(uint8_t *detail);
 
 /* next_us tells when the source has its next event, UINT64_MAX for never. */
 void native_set_event_source(uint64_t (*next_us)(const void *context), const void *context);
@@ -31,7 +39,7 @@ enum native_end {
  * nothing to do. NULL: only events. */
 enum native_end native_run_until(uint64_t t_us, void (*main_round)(void *context), void *context);
 
-/* The watchdog would have struck: it was not fed for PORT_WATCHDOG_PERIOD_us. */
+/* The watchdog would have struck: it was not fed for PORT_WATCHDOG_PERIOD_us, or in vain. */
 bool native_watchdog_expired(void);
 
 /* Events since start. */

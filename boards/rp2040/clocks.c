@@ -63,6 +63,7 @@ void clocks_start(void) {
   REG32(CLK_PERI_CTRL) = 0;
   REG32(CLK_USB_CTRL) = 0;
   resets_assert(RESETS_ALL & ~(RESETS_IO_QSPI | RESETS_PADS_QSPI));
+  WATCHDOG_SCRATCH2++; /* starts since the firmware last ran: crash.c */
   start_watchdog();
 
   if ((REG32(XOSC_STATUS) & XOSC_STATUS_STABLE) == 0) {

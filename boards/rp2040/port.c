@@ -1,5 +1,6 @@
 #include "port/port.h"
 
+#include "rp2040/crash.h"
 #include "rp2040/event.h"
 #include "rp2040/flash.h"
 #include "rp2040/mpu_regs.h"
@@ -7,10 +8,6 @@
 #include "rp2040/resets.h"
 #include "rp2040/timer_regs.h"
 #include "rp2040/watchdog_regs.h"
-
-/* In scratch 0 from the first start on: a watchdog reset after that was ours, and not the boot
- * ROM's, which leaves its USB loader in the same way. */
-#define STARTED_MAGIC UINT32_C(0x46546970)
 
 /* ALARM0 compares 32 bits, so nearer than one turn of the low word. */
 #define ALARM_HORIZON_us UINT32_C(0x7fffffff)
@@ -26,7 +23,6 @@ static struct {
   bool is_far; /* due beyond the horizon: what fires is to arm it anew */
 } alarm;
 
-static bool started_by_watchdog;
 static char serial_number[2 * FLASH_ID_BYTES + 1];
 
 /* A stack that grows out of its bank, and a null pointer, are faults instead of silent damage. As
@@ -121,14 +117,6 @@ void port_sleep(void) {
   __asm volatile("wfe" ::: "memory");
 }
 
-void port_watchdog_feed(void) {
-  WATCHDOG_LOAD = 2 * PORT_WATCHDOG_PERIOD_us;
-}
-
-bool port_started_by_watchdog(void) {
-  return started_by_watchdog;
-}
-
 void port_serial_number(char text[17]) {
   for (unsigned i = 0; i < sizeof serial_number; i++)
     text[i] = serial_number[i];
@@ -162,14 +150,6 @@ _Noreturn void port_reboot_to_loader(void) {
   port_panic();
 }
 
-_Noreturn void port_panic(void) {
-  disable_interrupts();
-  PSM_WDSEL = PSM_WDSEL_ALL_BUT_OSCILLATORS;
-  REG32_SET(WATCHDOG_CTRL) = WATCHDOG_CTRL_TRIGGER;
-  for (;;) {
-  }
-}
-
 static void read_serial_number(void) {
   uint8_t id[FLASH_ID_BYTES] = {0};
   if (flash_start() != FT_OK || flash_read_id(id) != FT_OK)
@@ -181,16 +161,14 @@ static void read_serial_number(void) {
 }
 
 void port_start(void) {
-  started_by_watchdog = WATCHDOG_REASON != 0 && WATCHDOG_SCRATCH0 == STARTED_MAGIC;
-  WATCHDOG_SCRATCH0 = STARTED_MAGIC;
-
+  crash_start();
   guard_memory();
   rp2040_irq_set_priorities();
-  port_watchdog_feed();
   if (resets_release(RESETS_TIMER) != FT_OK)
     port_panic();
   REG32_SET(TIMER_INTE) = TIMER_ALARM0_BIT;
   rp2040_irq_enable(RP2040_IRQ_TIMER_0);
 
   read_serial_number();
+  crash_watch();
 }

@@ -298,6 +298,7 @@ void timer1_irq_handler(void) {
       start_over();
     else
       watch();
+    rp2040_irq_pend(RP2040_IRQ_USB_SERVICE);
     break;
   case ATTACH:
     attach();

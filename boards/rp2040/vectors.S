@@ -1,10 +1,10 @@
 /* The vector table in SRAM (ARMv6-M B1.5.3; interrupts: RP2040 datasheet 2.3.2), and the priority of
- * each interrupt as NVIC_IPR wants it. What nobody handles is a fault. A handler
+ * each interrupt as NVIC_IPR wants it. What nobody handles is a fault (fault.S). A handler
  * that the image links replaces its weak name here.
  *
  * The USB controller comes first, for the time of a frame's start counts (TinyUSB reads it before
- * anything else) and so does the time from a SETUP to what answers the next token. What else USB has to
- * do comes before the sensors.
+ * anything else) and so does the time from a SETUP to what answers the next token; and the watchdog's
+ * last warning, which must see whatever hangs. What else USB has to do comes before the sensors.
  */
   .syntax unified
   .cpu cortex-m0plus
@@ -47,7 +47,8 @@ __vectors:
   .endr
   interrupt timer0_irq_handler, THIRD /* 0 */
   interrupt timer1_irq_handler, SECOND
-  unexpected 3
+  interrupt timer2_irq_handler, FIRST
+  unexpected 2
   interrupt usbctrl_irq_handler, FIRST /* 5 */
   unexpected 1
   interrupt pio0_irq_handler, THIRD /* 7 */
@@ -59,10 +60,9 @@ __vectors:
   interrupt usb_service_irq_handler, SECOND /* 26 */
   unexpected 5
 
+  /* The assembler resolves a weak name that stands for one of another file there and then. */
   .section .text.unexpected_exception, "ax"
   .thumb_func
   .type unexpected_exception, %function
 unexpected_exception:
-  ldr r0, =port_panic
-  bx r0
-  .ltorg
+  b rp2040_fault

@@ -38,6 +38,9 @@ void app_on_event(struct app *app) {
     app->next_tick_us = tick_us;
   }
   port_alarm_at_us(wake_us < app->next_tick_us ? wake_us : app->next_tick_us);
+  if (scan_is_well(&app->scan, now_us)) {
+    port_alive(PORT_PART_SCAN);
+  }
 }
 
 #if FT_WITH_FIT
@@ -200,6 +203,7 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
   if (taken_us < frame->t_read_us) { /* it came between the look at the clock and the taking */
     taken_us = frame->t_read_us;
   }
+  port_at(CRASH_AT_CONDITION);
   if (!frame->held) {
 #if FT_WITH_FIT
     const struct condition_gains *gains = app->calibration ? &app->gains : NULL;
@@ -209,6 +213,7 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
     condition_frame(&app->condition, frame, gains, &app->conditioned);
   }
 #if FT_WITH_FIT
+  port_at(CRASH_AT_FIT);
   uint64_t conditioned_us = port_now_us();
   if (!frame->held) {
     fit_frame(app);
@@ -218,12 +223,14 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
   }
   uint64_t fitted_us = port_now_us();
 #endif
+  port_at(CRASH_AT_CONTACT);
   if (frame->held) {
     app->contact.flags |= CONTACT_FLAG_HELD;
     app->contact.flags |= is_sensor_doubtful(app) ? (uint32_t)CONTACT_FLAG_SENSOR_DOUBTFUL : 0;
   } else {
     judge_frame(app);
   }
+  port_at(CRASH_AT_PACKET);
 #if FT_WITH_FIT
   uint64_t judged_us = port_now_us();
   const struct wire_stages stages = {
@@ -244,6 +251,7 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
     packets_send_raw(app);
   }
 #endif
+  port_at(CRASH_AT_CONDITION);
   if (!frame->held) {
     condition_follow(&app->condition, frame, &app->conditioned);
   }
@@ -258,6 +266,7 @@ static void follow_suspend(struct app *app) {
   const bool saves = may_save_power(app);
   if (saves != app->saves_power) {
     port_save_power(saves);
+    port_event(saves ? CRASH_EVENT_ASLEEP : CRASH_EVENT_AWAKE, 0);
     const uint64_t now_us = port_now_us();
     if (saves) {
       app->saving_since_us = now_us;
@@ -273,10 +282,34 @@ static void follow_port(struct app *app) {
   uint32_t close_count = cdc_close_count();
   if (close_count != app->close_count) {
     app->close_count = close_count;
+    port_event(CRASH_EVENT_CLOSED, 0);
     commands_end_session(app);
   }
   if (cdc_loader_requested() && app->loader_at_us == 0) {
     app->loader_at_us = port_now_us() + LOADER_DELAY_us;
+  }
+}
+
+static uint8_t saturate_u8(uint32_t value) {
+  return value < UINT8_MAX ? (uint8_t)value : UINT8_MAX;
+}
+
+static void note_more(uint32_t *before, uint32_t now, enum crash_event event) {
+  if (now != *before) {
+    port_event(event, saturate_u8(now - *before));
+    *before = now;
+  }
+}
+
+/* What went wrong in a second, should worse follow. */
+static void note_second(struct app *app) {
+  const struct scan *scan = &app->scan;
+  note_more(&app->noted.timeouts, read_counter(&scan->counters.bus_timeouts), CRASH_EVENT_BUS);
+  note_more(&app->noted.skipped, read_counter(&scan->counters.frames_skipped), CRASH_EVENT_SKIPPED);
+  const uint32_t present = read_counter(&scan->present);
+  if (present != app->noted.present) {
+    app->noted.present = present;
+    port_event(CRASH_EVENT_SENSORS, 0);
   }
 }
 
@@ -286,6 +319,7 @@ static void each_second(struct app *app, uint64_t now_us, bool after_frame) {
   if (elapsed_us < (after_frame ? 1000000u : 1000000u + FRAME_WAIT_us)) {
     return;
   }
+  port_at(CRASH_AT_HEALTH);
   app->uptime_rest_us += elapsed_us;
   app->uptime_s += app->uptime_rest_us / 1000000u;
   app->uptime_rest_us %= 1000000u;
@@ -298,6 +332,7 @@ static void each_second(struct app *app, uint64_t now_us, bool after_frame) {
   app->second_began_us = now_us;
   app->frames_at_second = frames;
   app->asleep_us = 0;
+  note_second(app);
   if (app->streams & WIRE_STREAM_HEALTH) {
     packets_send_health(app, now_us);
   }
@@ -321,10 +356,12 @@ void app_run(struct app *app) {
   follow_suspend(app);
   if (news != app->news || tick || app->active) {
     app->news = news;
+    port_at(CRASH_AT_COMMANDS);
     app->active = commands_receive(app);
     /* After the commands: one sent just before the port closed must not outlive it. */
     follow_port(app);
   }
+  port_at(CRASH_AT_READINGS);
   uint64_t taken_us = port_now_us(); /* taking compensates the readings */
   bool has_frame = scan_take(&app->scan, &app->frame);
   if (has_frame) {
@@ -338,4 +375,5 @@ void app_run(struct app *app) {
     port_reboot_to_loader();
   }
   app->idle_since_us = now_us;
+  port_at(CRASH_AT_REST);
 }

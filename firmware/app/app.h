@@ -91,6 +91,11 @@ struct app {
   uint32_t measured_rate_mHz;
   uint16_t cpu_busy_permille;
 
+  /* Of the scan, when last looked at for the record of a crash. */
+  struct {
+    uint32_t timeouts, skipped, present;
+  } noted;
+
   uint64_t loader_at_us; /* 0: no reboot is planned */
 };
 

@@ -232,6 +232,7 @@ static int obey(struct app *app, const struct wire_packet *command, uint64_t now
     return keep_settings(app, command->body.cmd_keep.keep);
   case WIRE_CMD_INFO:
   case WIRE_CMD_HEALTH:
+  case WIRE_CMD_CRASH:
     return WIRE_RESULT_DONE;
   case WIRE_CMD_LOADER:
     if (command->body.cmd_loader.magic != WIRE_LOADER_MAGIC) {
@@ -258,6 +259,7 @@ static void answer_command(struct app *app, uint64_t now_us) {
   struct wire_ack ack = {.command = app->packet.type,
                          .sequence = app->packet.sequence,
                          .host_time_us = app->packet.t_us};
+  port_event(CRASH_EVENT_COMMAND, ack.command);
   int result = obey(app, &app->packet, now_us);
   if (result == LATER) {
     app->owed = ack;
@@ -272,6 +274,8 @@ static void answer_command(struct app *app, uint64_t now_us) {
     packets_send_info(app, now_us);
   } else if (ack.command == WIRE_CMD_HEALTH) {
     packets_send_health(app, now_us);
+  } else if (ack.command == WIRE_CMD_CRASH) {
+    packets_send_crash(app, now_us);
   }
 }
 
@@ -279,11 +283,13 @@ void commands_follow_store(struct app *app, uint64_t now_us) {
   if (!store_is_writing(&app->store)) {
     return;
   }
+  port_at(CRASH_AT_STORE);
   enum ft_status status = store_poll(&app->store, now_us);
   if (status == FT_PENDING) {
     return;
   }
   hurry_store(app, false);
+  port_event(CRASH_EVENT_STORED, status != FT_OK);
 #if FT_WITH_FIT
   use_stored_pad(app);
 #endif

@@ -105,14 +105,20 @@ void packets_send_health(struct app *app, uint64_t now_us) {
     .zero_readings = read_counter(&scan->counters.zero_readings),
     .implausible_readings = read_counter(&scan->counters.implausible_readings),
     .sensors_present = read_counter(&scan->present),
-    .sensors_prom_bad = read_counter(&scan->prom_bad),
-    .watchdog_resets = port_started_by_watchdog() ? 1 : 0,
+    .sensors_prom_bad = read_counter(&scan->prom_bad), .watchdog_resets = port_watchdog_resets(),
     .cpu_busy_permille = app->cpu_busy_permille, .stack_free_bytes = saturate_u16(stack_free),
 #if FT_WITH_FIT
     .fit_failures = app->fit_failures,
 #endif
   };
   send_packet(app, &wire_health_layout, now_us);
+}
+
+void packets_send_crash(struct app *app, uint64_t now_us) {
+  static const struct crash_record none;
+  const struct crash_record *crash = port_last_crash();
+  app->packet.body.crash = crash ? *crash : none;
+  send_packet(app, &wire_crash_layout, now_us);
 }
 
 #if FT_WITH_RAW_STREAM

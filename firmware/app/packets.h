@@ -7,6 +7,7 @@
 /* Each sends one packet, or drops it where the queue is full. */
 void packets_send_info(struct app *app, uint64_t now_us);
 void packets_send_health(struct app *app, uint64_t now_us);
+void packets_send_crash(struct app *app, uint64_t now_us);
 void packets_send_ack(struct app *app, const struct wire_ack *ack, uint64_t now_us);
 #if FT_WITH_FIT
 void packets_send_contact(struct app *app, const struct wire_stages *stages);

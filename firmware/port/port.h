@@ -4,6 +4,8 @@
 #ifndef PORT_PORT_H
 #define PORT_PORT_H
 
+#include "common/crash.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -27,10 +29,29 @@ void port_sleep(void);
  * which takes 0.1 ms. Main context only; no effect if it is so already. */
 void port_save_power(bool saving);
 
-/* Must be called at least once each PORT_WATCHDOG_PERIOD_us from the main loop. */
+/* Must be called at least once each PORT_WATCHDOG_PERIOD_us from the main loop, else the chip is
+ * reset. It counts only while every part that is watched is alive. Costs some 60 Cortex-M0+ cycles.
+ */
 #define PORT_WATCHDOG_PERIOD_us 500000u
 void port_watchdog_feed(void);
-bool port_started_by_watchdog(void);
+
+/* A part has made progress, or waits for what is sure to come. From its first call on it is
+ * watched, and must be alive again each PORT_PART_LIMIT_us. Its own context. Costs some 20 cycles.
+ */
+enum port_part { PORT_PART_SCAN, PORT_PART_USB, PORT_PARTS };
+#define PORT_PART_LIMIT_us 400000u
+void port_alive(enum port_part part);
+
+/* For the record of a crash: what the main loop is at, and what happened (common/crash.h for the
+ * details). Main context only. */
+void port_at(enum crash_activity activity);
+void port_event(enum crash_event event, uint8_t detail);
+
+/* Resets by the watchdog since power-on; faults and panics end in one too. */
+uint32_t port_watchdog_resets(void);
+
+/* How the firmware last came to an end since power-on; NULL: it did not. */
+const struct crash_record *port_last_crash(void);
 
 /* Sixteen upper-case hexadecimal digits and a terminating zero: the unique id of the flash chip. */
 void port_serial_number(char text[17]);
@@ -41,7 +62,7 @@ size_t port_stack_free_bytes(void);
 /* Leaves for the boot ROM's USB loader. Does not return. */
 _Noreturn void port_reboot_to_loader(void);
 
-/* A failed assertion or an unexpected exception: resets the chip. Does not return. */
+/* A failed assertion: leaves a record and resets the chip. Does not return. */
 _Noreturn void port_panic(void);
 
 #endif

@@ -72,7 +72,8 @@ void usb_device_on_received(uint8_t endpoint, const uint8_t *bytes, size_t lengt
 void usb_device_on_suspend(void);
 void usb_device_on_resume(void);
 
-/* The answer to usb_controller_request_service(). */
+/* The answer to usb_controller_request_service(); without a request too at least each 0.3 s, also
+ * while the bus sleeps, is silent, or is not there. */
 void usb_device_on_service(void);
 
 #endif

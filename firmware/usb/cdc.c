@@ -1,6 +1,7 @@
 #include "usb/cdc.h"
 
 #include "common/bytes.h"
+#include "port/port.h"
 #include "port/usb_controller.h"
 #include "usb/device.h"
 #include "usb/ring.h"
@@ -181,6 +182,7 @@ void cdc_on_received(uint8_t endpoint, const uint8_t *bytes, size_t length) {
 }
 
 void cdc_on_service(void) {
+  port_alive(PORT_PART_USB);
   transmit();
   accept_packet();
 }

@@ -125,6 +125,17 @@ static const struct run wire_ack_runs[] = {
 };
 LAYOUT(wire_ack, WIRE_ACK);
 
+_Static_assert(offsetof(struct crash_record, r0) % 4 == 0 &&
+                   offsetof(struct crash_record, event_ages_ms) ==
+                       offsetof(struct crash_record, r0) + 9 * 4,
+               "wire_crash_runs");
+static const struct run wire_crash_runs[] = {
+    RUN(BYTES, 5 + 2 * CRASH_EVENTS, crash.kind),
+    RUN(U32, 9 + CRASH_EVENTS, crash.r0),
+    RUN(U64, 1, crash.t_us),
+};
+LAYOUT(wire_crash, WIRE_CRASH);
+
 static const struct run cmd_stream_runs[] = {RUN(BYTES, 1, cmd_stream.streams)};
 LAYOUT(cmd_stream, WIRE_CMD_STREAM);
 static const struct run cmd_tare_runs[] = {RUN(BYTES, 1, cmd_tare.force)};
@@ -140,6 +151,7 @@ static const struct run cmd_slip_runs[] = {
 LAYOUT(cmd_slip, WIRE_CMD_SLIP);
 EMPTY_LAYOUT(cmd_info, WIRE_CMD_INFO);
 EMPTY_LAYOUT(cmd_health, WIRE_CMD_HEALTH);
+EMPTY_LAYOUT(cmd_crash, WIRE_CMD_CRASH);
 static const struct run cmd_loader_runs[] = {RUN(U32, 1, cmd_loader.magic)};
 LAYOUT(cmd_loader, WIRE_CMD_LOADER);
 
@@ -169,13 +181,9 @@ EMPTY_LAYOUT(cmd_erase_pad, WIRE_CMD_ERASE_PAD);
 #define ALL_COMMANDS                                                                               \
   WIRE_COMMANDS, WIRE_COMMANDS_OF_FIT, WIRE_COMMANDS_OF_SLIP, WIRE_COMMANDS_OF_TANGENTIAL
 const struct wire_layout *const wire_commands[] = {ALL_COMMANDS, NULL};
-const struct wire_layout *const wire_all_layouts[] = {&wire_contact_layout,
-                                                      &wire_raw_layout,
-                                                      &wire_info_layout,
-                                                      &wire_health_layout,
-                                                      &wire_ack_layout,
-                                                      ALL_COMMANDS,
-                                                      NULL};
+const struct wire_layout *const wire_all_layouts[] = {
+    &wire_contact_layout, &wire_raw_layout,   &wire_info_layout, &wire_health_layout,
+    &wire_ack_layout,     &wire_crash_layout, ALL_COMMANDS,      NULL};
 
 const struct wire_layout *wire_find_layout(const struct wire_layout *const *set, uint8_t type) {
   while (*set && (*set)->type != type) {

@@ -13,6 +13,7 @@
 #define WIRE_PACKET_H
 
 #include "common/calibration.h"
+#include "common/crash.h"
 #include "common/limits.h"
 #include "common/pad_profile.h"
 #include "common/status.h"
@@ -40,6 +41,7 @@ enum wire_type {
   WIRE_INFO = 0x03,
   WIRE_HEALTH = 0x04,
   WIRE_ACK = 0x05,
+  WIRE_CRASH = 0x06,
   /* host to device */
   WIRE_CMD_STREAM = 0x80,
   WIRE_CMD_TARE = 0x81,
@@ -56,6 +58,7 @@ enum wire_type {
   WIRE_CMD_LOCATION_LIMIT = 0x8C,
   WIRE_CMD_PAD = 0x8D,
   WIRE_CMD_ERASE_PAD = 0x8E,
+  WIRE_CMD_CRASH = 0x8F,
 };
 
 /* Bits of the stream mask. */
@@ -214,7 +217,7 @@ struct wire_health {
   uint32_t sensors_present;      /* bitmap: answered at the last attempt */
   uint32_t sensors_prom_bad;  /* bitmap: calibration CRC differs, streaming all the same; or blank,
                                  and not */
-  uint32_t watchdog_resets;   /* the last start was by the watchdog: 1 */
+  uint32_t watchdog_resets;   /* since power-on; faults and panics end in one too */
   uint16_t cpu_busy_permille; /* over the last second */
   uint16_t stack_free_bytes;  /* never touched since start */
   uint32_t fit_failures;      /* frames in contact whose fit could not be solved; with
@@ -275,6 +278,7 @@ struct wire_packet {
     struct wire_info info;
     struct wire_health health;
     struct wire_ack ack;
+    struct crash_record crash; /* kind CRASH_NONE, all 0: it never came to an end */
     struct wire_cmd_stream cmd_stream;
     struct wire_cmd_rate cmd_rate;
     struct wire_cmd_osr cmd_osr;
@@ -292,16 +296,16 @@ struct wire_packet {
 /* The layout of one body. */
 struct wire_layout;
 extern const struct wire_layout wire_contact_layout, wire_raw_layout, wire_info_layout,
-    wire_health_layout, wire_ack_layout;
+    wire_health_layout, wire_ack_layout, wire_crash_layout;
 extern const struct wire_layout cmd_stream_layout, cmd_tare_layout, cmd_rate_layout, cmd_osr_layout,
     cmd_info_layout, cmd_health_layout, cmd_loader_layout, cmd_keep_layout, cmd_calibrate_layout,
     cmd_erase_calibration_layout, cmd_prior_layout, cmd_location_limit_layout, cmd_slip_layout,
-    cmd_pad_layout, cmd_erase_pad_layout;
+    cmd_pad_layout, cmd_erase_pad_layout, cmd_crash_layout;
 
 /* The commands that every fingertip knows, and those of its capabilities, for its set. */
 #define WIRE_COMMANDS                                                                              \
   &cmd_stream_layout, &cmd_tare_layout, &cmd_rate_layout, &cmd_osr_layout, &cmd_info_layout,       \
-      &cmd_health_layout, &cmd_loader_layout, &cmd_keep_layout
+      &cmd_health_layout, &cmd_loader_layout, &cmd_keep_layout, &cmd_crash_layout
 #define WIRE_COMMANDS_OF_FIT                                                                       \
   &cmd_calibrate_layout, &cmd_erase_calibration_layout, &cmd_prior_layout,                         \
       &cmd_location_limit_layout

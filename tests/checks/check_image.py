@@ -19,7 +19,7 @@ RAM = (0x20000000, 256 * 1024)
 SCRATCH_Y = (0x20041000, 4 * 1024)
 REGIONS = {
     ".boot2": FLASH, ".boot": FLASH, ".vectors": RAM, ".text": RAM, ".rodata": RAM, ".data": RAM,
-    ".bss": RAM, ".stack": SCRATCH_Y,
+    ".bss": RAM, ".noinit": RAM, ".stack": SCRATCH_Y,
 }
 BOOT_EXCEPTIONS = 16
 VECTORS = 48
@@ -136,10 +136,10 @@ def main():
     sizes = {
         "flash_bytes": len(image),
         "start_up_bytes": size(".boot2", ".boot"),
-        "ram_bytes": elf.section(".bss").end - RAM[0],
+        "ram_bytes": elf.section(".noinit").end - RAM[0],
         "code_in_sram_bytes": size(".vectors", ".text"),
         "constants_in_sram_bytes": size(".rodata"),
-        "variables_bytes": size(".data", ".bss"),
+        "variables_bytes": size(".data", ".bss", ".noinit"),
         "stack_reserved_bytes": elf.value("__stack_top") - elf.value("__stack_limit"),
     }
     for name, value in sizes.items():

@@ -42,6 +42,7 @@ class Function:
         self.callees = set()
         self.indirect_at = []
         self.external = 0
+        self.starts_over = False
 
 
 def read_functions(elf):
@@ -84,6 +85,8 @@ def disassemble(path, functions):
                 function.unknown_frame_at = address
         elif operation in ("add", "mov") and re.match(r"sp, r\d+$", operands):
             function.unknown_frame_at = address
+        elif operation == "msr" and operands.startswith("MSP"):
+            function.starts_over = True
         elif operation in ("blx", "bx") and operands not in RETURNS:
             function.indirect_at.append(address)
         elif re.fullmatch(r"bl|b(eq|ne|cs|cc|mi|pl|vs|vc|hi|ls|ge|lt|gt|le)?(\.[nw])?", operation):
@@ -91,7 +94,8 @@ def disassemble(path, functions):
             callee = owner(target)
             # Within a function a branch is no call; a long one is a BL too.
             if callee is not function or operation == "bl" and target == function.start:
-                function.callees.add(callee)
+                if not function.starts_over:
+                    function.callees.add(callee)
 
 
 def count_registers(operands):
