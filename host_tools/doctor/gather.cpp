@@ -1,6 +1,7 @@
 #include "doctor/gather.hpp"
 
 #include "libfingertip/command.hpp"
+#include "libfingertip/packet_fields.hpp"
 #include "libfingertip/session.hpp"
 
 #include <cstdio>
@@ -40,8 +41,42 @@ LineStatistics less(LineStatistics now, const LineStatistics &then) {
   return now;
 }
 
-void measure(Session &session, Facts &facts, double seconds, const std::function<bool()> &stop,
-             const std::function<void(double)> &progress) {
+/* What it was built into, seen from the source's folder. */
+std::string usual_elf(const wire_info &info) {
+  std::string board = text_field(info.board);
+  return "build/" + board + "/fingertip-" + board + ".elf";
+}
+
+Crash told_crash(const crash_record &record, const wire_info &info, const std::string &elf) {
+  std::string path = elf.empty() ? usual_elf(info) : elf;
+  std::error_code ignored;
+  if (elf.empty() && !std::filesystem::exists(path, ignored)) {
+    return with_places(record, std::nullopt);
+  }
+  Symbols symbols = Symbols::of_file(path);
+  if (symbols.holds(text_field(info.git_hash)) && symbols.holds(text_field(info.board))) {
+    return with_places(record, symbols);
+  }
+  Crash crash = with_places(record, std::nullopt);
+  crash.symbols_note = path + " is of other firmware: no names";
+  return crash;
+}
+
+/* Nothing of firmware that does not know the question. */
+std::optional<crash_record> ask_for_crash(Session &session) {
+  try {
+    crash_record record = session.crash().body.crash;
+    return record.kind == CRASH_NONE ? std::nullopt : std::optional(record);
+  } catch (const Error &error) {
+    if (error.code() != ErrorCode::unknown_command) {
+      throw;
+    }
+    return std::nullopt;
+  }
+}
+
+void measure(Session &session, Facts &facts, const std::string &elf, double seconds,
+             const std::function<bool()> &stop, const std::function<void(double)> &progress) {
   RestMeter meter;
   std::int64_t last_us = steady_now_us();
   session.on_packet([&](const wire_packet &packet) {
@@ -51,6 +86,10 @@ void measure(Session &session, Facts &facts, double seconds, const std::function
     meter.add(packet);
   });
   facts.before = session.health().body.health;
+  std::optional<crash_record> crash = ask_for_crash(session);
+  if (crash) {
+    facts.crash = told_crash(*crash, *facts.info, elf);
+  }
   LineStatistics before = session.statistics();
   session.command(
       command_stream(possible_streams(*facts.info, WIRE_STREAM_CONTACT | WIRE_STREAM_RAW)),
@@ -75,6 +114,9 @@ void measure(Session &session, Facts &facts, double seconds, const std::function
 
 Facts gather(const Examination &examination, const std::function<bool()> &stop,
              const std::function<void(double)> &progress) {
+  if (!examination.elf.empty()) {
+    Symbols::of_file(examination.elf);
+  }
   Facts facts;
   facts.rule = find_rule(examination.root);
   try {
@@ -87,7 +129,7 @@ Facts gather(const Examination &examination, const std::function<bool()> &stop,
     facts.port = transport->description();
     Session session(*transport, stop);
     facts.info = session.info(PATIENCE).body.info;
-    measure(session, facts, examination.seconds, stop, progress);
+    measure(session, facts, examination.elf, examination.seconds, stop, progress);
   } catch (const Error &error) {
     facts.failure = Failure{error.code(), error.what()};
     if (!facts.port.empty() && facts.holders.seen.empty()) {

@@ -96,6 +96,9 @@ public:
       calibration_memories();
       bus();
       restarts();
+      if (facts_.crash) {
+        crash();
+      }
       processor();
     }
     if (facts_.rest) {
@@ -363,11 +366,28 @@ private:
     if (facts_.before && now.uptime_s < facts_.before->uptime_s) {
       add(Verdict::bad, "restarts", "it started anew while it was examined", "check its supply");
     } else if (now.watchdog_resets) {
-      add(Verdict::warn, "restarts", up + ", its last start was by the watchdog",
-          "if it does so again, check its supply and report it with the firmware's version");
+      add(Verdict::warn, "restarts",
+          up + ", " + count(now.watchdog_resets, "reset") + " by the watchdog since power-on",
+          facts_.crash ? "see the crash below"
+                       : "if it does so again, check its supply and report it with the firmware's "
+                         "version");
     } else {
       add(Verdict::ok, "restarts", up + ", started by power or command");
     }
+  }
+
+  /* The last; the one before is not known any more. */
+  void crash() {
+    const Crash &crash = *facts_.crash;
+    std::string text = crash_text(crash);
+    std::string events = events_text(crash.record), registers = registers_text(crash.record);
+    text += events.empty() ? "" : "; before that: " + events;
+    text += registers.empty() ? "" : "; " + registers;
+    text += crash.symbols_note.empty() ? "" : "; " + crash.symbols_note;
+    bool is_start = crash.record.kind == CRASH_START;
+    add(is_start ? Verdict::warn : Verdict::bad, "crash", text,
+        is_start ? "check its supply; if it stays, the board's crystal"
+                 : "report this line with the firmware's version; power-off forgets it");
   }
 
   void processor() {

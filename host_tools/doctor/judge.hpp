@@ -1,6 +1,7 @@
 /* What the facts about a fingertip mean. Pure: the same facts, the same findings. */
 #pragma once
 
+#include "doctor/crash.hpp"
 #include "doctor/rest.hpp"
 #include "doctor/system.hpp"
 #include "libfingertip/decoder.hpp"
@@ -28,6 +29,7 @@ struct Facts {
   std::optional<Failure> failure; /* what ended the examination */
   std::optional<wire_info> info;
   std::optional<wire_health> before, after; /* the measurement */
+  std::optional<Crash> crash;               /* the last since power-on */
   std::optional<Rest> rest;
   LineStatistics line; /* in the measurement */
 };

@@ -30,12 +30,14 @@
  *     usb_dead                      the same, and it does not hear the bus either
  *     usb_late_resume               the controller says 45 ms after a resume that it is not suspended any more
  *     power_cut                     chip, flash and sensors are without power until to_s; what the flash was doing is cut short
+ *     sram_upset (address, bytes)   at from_s the bytes, as hexadecimal digits, get into the chip's SRAM at this address
  *     chip_reset                    the chip alone is held in reset until to_s, as when its brown-out detector trips; its SRAM is lost
  *
  * sensor_missing, line_stuck_high, scl_stuck_* and clock_glitch need a board with a data line for each sensor.
  * `to_s` may be left out: the fault then stays. Times are seconds since power-on.
  */
 import { readFileSync } from 'node:fs';
+import { RAM_BASE, RAM_BYTES } from './chip/core.mjs';
 import { InputError, inWords } from './errors.mjs';
 
 const TARGET = {
@@ -68,10 +70,11 @@ const TARGET = {
   usb_late_resume: null,
   power_cut: null,
   chip_reset: null,
+  sram_upset: null,
 };
 
 /** Not of the board. */
-const OF_THE_WORLD = ['host_stall', 'usb_unplug', 'crystal_dead', 'crystal_weak', 'pll_late', 'usb_busy_hub', 'usb_deaf', 'usb_dead', 'usb_late_resume', 'power_cut', 'chip_reset'];
+const OF_THE_WORLD = ['host_stall', 'usb_unplug', 'crystal_dead', 'crystal_weak', 'pll_late', 'usb_busy_hub', 'usb_deaf', 'usb_dead', 'usb_late_resume', 'power_cut', 'chip_reset', 'sram_upset'];
 const OF_LINES = ['sensor_missing', 'line_stuck_high', 'scl_stuck_low', 'scl_stuck_high', 'clock_glitch'];
 
 export function parseFaults(text, file, { sensors, muxes, lines }) {
@@ -94,16 +97,20 @@ export function parseFaults(text, file, { sensors, muxes, lines }) {
     const target = TARGET[fault.type];
     if (OF_LINES.includes(fault.type) && !lines) fail(`${at}: ${fault.type} needs a board with a data line for each sensor`);
     if (target === 'mux' && !muxes) fail(`${at}: ${fault.type} needs a board with multiplexers`);
-    const extra = Object.keys(fault).find((key) => !['type', 'from_s', 'to_s', target].includes(key));
+    const own = fault.type === 'sram_upset' ? ['address', 'bytes'] : ['to_s', target];
+    const extra = Object.keys(fault).find((key) => !['type', 'from_s', ...own].includes(key));
     if (extra) fail(`${at}: key "${extra}" does not belong to ${fault.type}`);
     if (target) {
       const count = target === 'sensor' ? sensors : muxes;
       if (!Number.isInteger(fault[target]) || fault[target] < 0 || fault[target] >= count) fail(`${at}: "${target}" must be 0..${count - 1}`);
     }
+    if (fault.type === 'sram_upset' && !(typeof fault.bytes === 'string' && /^([0-9a-f]{2})+$/i.test(fault.bytes))) fail(`${at}: "bytes" must be pairs of hexadecimal digits`);
+    const upset = fault.type === 'sram_upset' ? { address: fault.address, bytes: Buffer.from(fault.bytes, 'hex') } : null;
+    if (upset && !(Number.isInteger(upset.address) && upset.address >= RAM_BASE && upset.address + upset.bytes.length <= RAM_BASE + RAM_BYTES)) fail(`${at}: "address" must be one of SRAM, and so must be where the bytes end`);
     const { from_s, to_s = Infinity } = fault;
     if (typeof from_s !== 'number' || !(from_s >= 0)) fail(`${at}: "from_s" must be a time >= 0`);
     if (typeof to_s !== 'number' || !(to_s > from_s)) fail(`${at}: "to_s" must be later than "from_s"`);
-    return { type: fault.type, target: target ? fault[target] : null, from_ns: from_s * 1e9, to_ns: to_s * 1e9 };
+    return { type: fault.type, target: upset ?? (target ? fault[target] : null), from_ns: from_s * 1e9, to_ns: to_s * 1e9 };
   });
 }
 

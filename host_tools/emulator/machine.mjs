@@ -7,6 +7,7 @@
  */
 import { createHash } from 'node:crypto';
 import { Chip, Stopped } from './chip/chip.mjs';
+import { RAM_BASE } from './chip/core.mjs';
 import { FlashMemory } from './chip/flash_memory.mjs';
 import { Trouble } from './chip/trouble.mjs';
 import { SimulatedTime } from './clock.mjs';
@@ -83,6 +84,7 @@ export class Machine {
       },
       usb_deaf: (_, active) => this.#hang('deaf', active),
       usb_dead: (_, active) => this.#hang('dead', active),
+      sram_upset: ({ address, bytes }) => this.chip.sram.set(bytes, address - RAM_BASE),
       host_stall: (_, active) => this.client.setStalled(active),
       usb_unplug: (_, active) => (active ? this.host.unplug() : this.host.plug()),
     });

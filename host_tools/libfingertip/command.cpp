@@ -144,6 +144,9 @@ wire_packet command_info() {
 wire_packet command_health() {
   return packet_of(WIRE_CMD_HEALTH);
 }
+wire_packet command_crash() {
+  return packet_of(WIRE_CMD_CRASH);
+}
 
 wire_packet command_loader() {
   wire_packet packet = packet_of(WIRE_CMD_LOADER);

@@ -22,6 +22,7 @@ wire_packet command_osr(std::uint32_t osr);
 wire_packet command_slip(float threshold_mm, std::uint32_t window_ms);
 wire_packet command_info();
 wire_packet command_health();
+wire_packet command_crash();
 wire_packet command_loader();
 wire_packet command_calibrate(const calibration &calibration, std::uint8_t sensor_count);
 wire_packet command_erase_calibration();

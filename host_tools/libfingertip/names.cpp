@@ -78,6 +78,8 @@ std::string command_name(std::uint8_t type) {
     return "info";
   case WIRE_CMD_HEALTH:
     return "health";
+  case WIRE_CMD_CRASH:
+    return "crash";
   case WIRE_CMD_LOADER:
     return "loader";
   case WIRE_CMD_CALIBRATE:

@@ -152,6 +152,10 @@ wire_packet Session::health() {
   return exchange(command_health(), WIRE_HEALTH, Policy());
 }
 
+wire_packet Session::crash() {
+  return exchange(command_crash(), WIRE_CRASH, Policy());
+}
+
 bool Session::reopen() {
   if (!transport_.reopen()) {
     return false;

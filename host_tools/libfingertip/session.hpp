@@ -70,6 +70,7 @@ public:
   wire_packet info(Policy policy);
   wire_packet info() { return info(Policy()); }
   wire_packet health();
+  wire_packet crash();
 
   /* After gone; the line begins anew. */
   bool reopen();

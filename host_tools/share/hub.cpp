@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <map>
 #include <utility>
 
 extern "C" {
@@ -22,6 +23,8 @@ constexpr Hub::Client OURSELVES = 0;
 constexpr seconds PATIENCE{1};
 /* Even a late answer is somebody's. */
 constexpr seconds FORGOTTEN_AFTER{10};
+const std::map<std::uint8_t, std::uint8_t> ANSWER_OF = {
+    {WIRE_CMD_INFO, WIRE_INFO}, {WIRE_CMD_HEALTH, WIRE_HEALTH}, {WIRE_CMD_CRASH, WIRE_CRASH}};
 constexpr std::size_t ACK_COMMAND_AT = 0, ACK_RESULT_AT = 1, ACK_SEQUENCE_AT = 2;
 
 std::optional<wire_packet> decoded(const Envelope &packet) {
@@ -167,6 +170,7 @@ void Hub::take_frame(const Bytes &frame, bool joining) {
     break;
   case WIRE_INFO:
   case WIRE_HEALTH:
+  case WIRE_CRASH:
     take_answer(std::move(*packet));
     break;
   default: /* of a later firmware */
@@ -206,10 +210,9 @@ void Hub::take_acknowledgement(Envelope packet) {
       client->second.streams = command.wanted;
     }
   }
-  if (is_done && (command.type == WIRE_CMD_INFO || command.type == WIRE_CMD_HEALTH)) {
+  if (is_done && ANSWER_OF.count(command.type)) {
     /* in place of one that was lost: commands are done one after the other */
-    answers_[command.type == WIRE_CMD_INFO ? WIRE_INFO : WIRE_HEALTH] = {command.client,
-                                                                         *expected_};
+    answers_[ANSWER_OF.at(command.type)] = {command.client, *expected_};
   }
   if (client != clients_.end()) {
     bytes_put_u16(ack + ACK_SEQUENCE_AT, command.sequence);
@@ -232,7 +235,7 @@ void Hub::take_answer(Envelope packet) {
     if (auto told = decoded(packet)) {
       info_ = told->body.info;
     }
-  } else if (!is_surely_the_answer) {
+  } else if (packet.type() == WIRE_HEALTH && !is_surely_the_answer) {
     for (auto &[client, state] : clients_) {
       if (client != asker && (state.streams & WIRE_STREAM_HEALTH)) {
         give(client, packet);

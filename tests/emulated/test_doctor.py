@@ -105,6 +105,32 @@ class Doctor(unittest.TestCase):
                     findings = [finding for finding in findings if finding["check"] != "packets"]
                 self.assertEqual(findings, [], (board, osr))
 
+    def function(self, board, name):
+        """Its address."""
+        lines = subprocess.run(["arm-none-eabi-nm", self.elf(board)], capture_output=True, text=True, check=True).stdout.splitlines()
+        return next(int(line.split()[0], 16) & ~1 for line in lines if line.split()[-1] == name)
+
+    @staticmethod
+    def elf(board):
+        return pathlib.Path(TOOLS.boards) / board / f"fingertip-{board}.elf"
+
+    def crashed(self, function, code, *arguments):
+        """What is told once the first bytes of this function have been overwritten."""
+        board = "pico_parallel"
+        fault = {"type": "sram_upset", "address": self.function(board, function), "bytes": code, "from_s": 0.5}
+        return self.only(self.examine(self.plug_in(board, [fault]), *arguments), "crash", "bad")["text"]
+
+    def test_a_main_loop_that_stood_still_is_told_with_its_place(self):
+        text = self.crashed("scan_take", "fee7", "--elf", self.elf("pico_parallel"))
+        self.assertRegex(text, r"^the watchdog struck: the main loop stood still; the processor was at scan_take\+0x0 \(0x2000[0-9a-f]{4}\), called "
+                               r"from app_run\+0x[0-9a-f]+ \(.*\), in the main loop, taking readings, 1\.0. s after its start; before that: ")
+        self.assertEqual(self.result["crash"]["place"], "scan_take+0x0")
+
+    def test_names_of_another_image_are_not_told(self):
+        text = self.crashed("scan_take", "fee7", "--elf", self.elf("pico_mux"))
+        self.assertIn("is of other firmware: no names", text)
+        self.assertEqual(self.result["crash"]["place"], "")
+
     def test_a_missing_sensor(self):
         findings = self.examine(self.plug_in("pico_mux", [{"type": "sensor_dead", "sensor": 7}]))
         finding = self.only(findings, "sensors", "bad")

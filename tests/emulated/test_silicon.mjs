@@ -7,111 +7,21 @@
  * STEP_us: from one interrupted start to the next; 100 takes some minutes. Default: 4000.
  */
 import assert from 'node:assert/strict';
-import { execFileSync } from 'node:child_process';
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
-import { tmpdir } from 'node:os';
-import { join } from 'node:path';
 import { test } from 'node:test';
-import { findBoard } from '../../host_tools/emulator/board/boards.mjs';
 import { MemoryFault } from '../../host_tools/emulator/chip/mpu.mjs';
-import { parseFaults } from '../../host_tools/emulator/faults.mjs';
-import { Machine } from '../../host_tools/emulator/machine.mjs';
 import { parseScenario } from '../../host_tools/emulator/scenario.mjs';
 import { setupPacket } from '../../host_tools/emulator/usb/host.mjs';
-import { HEADER, steady } from './harness/bench.mjs';
+import { HEADER } from './harness/bench.mjs';
+import { ImageBench } from './harness/image_bench.mjs';
 
 const [images, fingertip, step_us = '4000'] = process.argv.slice(2);
 const BOARDS = ['pico_mux', 'pico_parallel'];
-const encoded = (...command) => Buffer.from(execFileSync(fingertip, ['encode', ...command], { encoding: 'utf8' }).trim(), 'hex');
-const STREAMS = encoded('stream', 'contact,raw,health');
-const HEALTH = encoded('health');
 // Flags of a contact (contact_flags.h)
 const [CONTACT, TARED] = [1 << 0, 1 << 5];
 
-/** A board with a host that opens its port. Times are emulated, in ms. */
-class Bench {
-  constructor(name, { faults = [], ...options } = {}) {
-    const Board = findBoard(name);
-    this.received = [];
-    this.bytes = 0;
-    this.machine = new Machine({
-      image: readFileSync(join(images, name, `fingertip-${name}.bin`)), Board, scenario: steady(), fastEnumeration: true, allowWatchdog: true,
-      faults: parseFaults(JSON.stringify(faults), 'faults', Board),
-      onData: (bytes) => {
-        this.received.push(Buffer.from(bytes));
-        this.bytes += bytes.length;
-      },
-      ...options,
-    });
-    this.machine.client.setDtr(true);
-  }
-
-  get now_ms() {
-    return this.machine.time.nanos / 1e6;
-  }
-
-  run(ms) {
-    const { machine } = this;
-    assert.ok(machine.run(machine.time.nanos + ms * 1e6), `${machine.endReason} ${machine.result.warnings}`);
-  }
-
-  /** Runs until `what()`; the time. */
-  until(what, limit_ms, name) {
-    const end_ms = this.now_ms + limit_ms;
-    while (!what()) {
-      assert.ok(this.now_ms < end_ms, `no ${name} within ${limit_ms} ms`);
-      this.run(1);
-    }
-    return this.now_ms;
-  }
-
-  /** Asks for the streams of a port that was just opened; the time at which they come. */
-  stream(limit_ms = 200) {
-    const { machine } = this;
-    this.until(() => machine.host.configured, limit_ms, 'enumeration');
-    this.run(10);
-    const before = this.bytes;
-    machine.client.write(STREAMS);
-    return this.until(() => this.bytes > before + 100, 100, 'stream');
-  }
-
-  assertStreams(ms) {
-    const before = this.bytes;
-    this.run(ms);
-    assert.ok(this.bytes - before > 20 * ms, `${this.bytes - before} bytes in ${ms} ms`);
-  }
-
-  /** The recording of what was received. */
-  recording() {
-    const folder = mkdtempSync(join(tmpdir(), 'silicon-'));
-    try {
-      const [stream, table] = [join(folder, 'stream.ftr'), join(folder, 'stream.csv')];
-      writeFileSync(stream, Buffer.concat(this.received));
-      execFileSync(fingertip, ['replay', stream, '--to-csv', table], { stdio: 'pipe' });
-      return readFileSync(table, 'utf8').trim().split('\n');
-    } finally {
-      rmSync(folder, { recursive: true });
-    }
-  }
-
-  /** What the device says of itself. */
-  health() {
-    this.machine.client.write(HEALTH);
-    this.run(20);
-    const line = this.recording().findLast((l) => l.startsWith('# packet: health'));
-    return Object.fromEntries(line.split(' ').slice(3).map((pair) => pair.split('=')).map(([key, value]) => [key, Number(value)]));
-  }
-
-  /** Flags of the last frame. */
-  flags() {
-    const lines = this.recording();
-    const column = lines.find((l) => !l.startsWith('#')).split(',').indexOf('flags');
-    return Number(lines.findLast((l) => !l.startsWith('#')).split(',')[column]);
-  }
-
-  end() {
-    assert.deepEqual(this.machine.result.warnings, []);
-    return this.machine.result;
+class Bench extends ImageBench {
+  constructor(name, options) {
+    super(images, fingertip, name, options);
   }
 }
 
@@ -124,7 +34,7 @@ test('a change of the suspend state that is told late does not close the port', 
   host.resume();
   bench.run(31);
   const before = bench.bytes;
-  bench.machine.client.write(STREAMS);
+  bench.machine.client.write(bench.encoded('stream', 'contact,raw,health'));
   bench.until(() => bench.bytes > before, 20, 'stream after the resume');
   bench.assertStreams(100);
   bench.end();
@@ -237,7 +147,7 @@ test('a control transfer that the host abandons leaves nothing for the next', ()
   const bench = new Bench('pico_parallel');
   bench.stream();
   const { client, host, time } = bench.machine;
-  client.write(encoded('osr', '256'));
+  client.write(bench.encoded('osr', '256'));
   let wrong = 0;
   for (let i = 0; i < 600; i++) {
     const abandoned = host.control(setupPacket(0x80, 6, 2 << 8, 0, 67), null, () => {});

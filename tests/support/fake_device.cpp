@@ -17,7 +17,7 @@
  *                      one after the first frame
  *     tared=FILE       made when a tare is asked for
  *     mute=1           never says anything
- *     refuse=1         answers every command but stream, info and health with "not now"
+ *     refuse=1         answers every command but stream, info, health and crash with "not now"
  *     calibrated=1     a calibration is stored
  *     pad=1            a pad's profile is stored
  *     capabilities=BITS  of its firmware
@@ -344,7 +344,7 @@ private:
 
   bool obey(const wire_packet &command) {
     bool known = command.type == WIRE_CMD_STREAM || command.type == WIRE_CMD_INFO ||
-                 command.type == WIRE_CMD_HEALTH;
+                 command.type == WIRE_CMD_HEALTH || command.type == WIRE_CMD_CRASH;
     std::uint8_t result = number("refuse", 0) && !known ? WIRE_RESULT_NOT_NOW : WIRE_RESULT_DONE;
     send(test::make_ack(0, now_us(), command.type, result, command.sequence, command.t_us));
     if (result != WIRE_RESULT_DONE) {
@@ -404,6 +404,9 @@ private:
       return false;
     case WIRE_CMD_HEALTH:
       send_health();
+      return false;
+    case WIRE_CMD_CRASH:
+      send(test::make_crash(0, now_us()));
       return false;
     default:
       return false;

@@ -118,6 +118,27 @@ inline wire_packet make_health(std::uint16_t sequence, std::uint64_t t_us) {
   return packet;
 }
 
+/* A hard fault in a fit. */
+inline wire_packet make_crash(std::uint16_t sequence, std::uint64_t t_us) {
+  wire_packet packet = make_packet(WIRE_CRASH, sequence, t_us);
+  crash_record &crash = packet.body.crash;
+  crash.kind = CRASH_FAULT;
+  crash.vector = 3;
+  crash.activity = CRASH_AT_FIT;
+  crash.event_codes[0] = CRASH_EVENT_COMMAND;
+  crash.event_details[0] = WIRE_CMD_STREAM;
+  crash.event_ages_ms[0] = 1500;
+  crash.event_codes[1] = CRASH_EVENT_START;
+  crash.event_ages_ms[1] = 250000;
+  crash.r0 = 1;
+  crash.lr = 0x20001235;
+  crash.pc = 0x20001000;
+  crash.xpsr = 0x01000000;
+  crash.sp = 0x20041f00;
+  crash.t_us = 250000000;
+  return packet;
+}
+
 inline wire_packet make_ack(std::uint16_t sequence, std::uint64_t t_us, std::uint8_t command,
                             std::uint8_t result, std::uint16_t command_sequence,
                             std::uint64_t host_time_us) {

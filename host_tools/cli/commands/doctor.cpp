@@ -90,6 +90,24 @@ Json measured_json(const Facts &facts, const std::optional<Wiring> &wiring) {
           {"sensors", sensors}};
 }
 
+Json crash_json(const Crash &crash) {
+  const crash_record &record = crash.record;
+  Json json = {{"kind", record.kind},     {"exception", record.exception},
+               {"vector", record.vector}, {"activity", record.activity},
+               {"stuck", record.stuck},   {"uptime_s", static_cast<double>(record.t_us) / 1e6},
+               {"place", crash.place},    {"caller", crash.caller}};
+  json["registers"] = {{"r0", record.r0}, {"r1", record.r1},     {"r2", record.r2},
+                       {"r3", record.r3}, {"r12", record.r12},   {"lr", record.lr},
+                       {"pc", record.pc}, {"xpsr", record.xpsr}, {"sp", record.sp}};
+  json["events"] = Json::array();
+  for (unsigned i = 0; i < CRASH_EVENTS && record.event_codes[i] != CRASH_EVENT_NONE; i++) {
+    json["events"].push_back({{"code", record.event_codes[i]},
+                              {"detail", record.event_details[i]},
+                              {"age_s", record.event_ages_ms[i] / 1e3}});
+  }
+  return json;
+}
+
 Json to_json(const Facts &facts, const std::vector<Finding> &findings) {
   std::optional<Wiring> wiring;
   Json json = {{"tool_version", FINGERTIP_VERSION},
@@ -115,6 +133,9 @@ Json to_json(const Facts &facts, const std::vector<Finding> &findings) {
                                 {"text", finding.text},
                                 {"advice", finding.advice},
                                 {"sensors", sensors}});
+  }
+  if (facts.crash) {
+    json["crash"] = crash_json(*facts.crash);
   }
   if (facts.rest) {
     json["measured"] = measured_json(facts, wiring);
@@ -167,6 +188,11 @@ void add_doctor(CommandLine &line) {
           },
           "How long to measure noise, drift and rate; default 10")
       ->type_name("S");
+  command
+      ->add_option("--elf", options->examination.elf,
+                   "ELF file of the firmware, for the names in a crash; default "
+                   "build/BOARD/fingertip-BOARD.elf")
+      ->type_name("FILE");
   command->add_flag("--json", options->json, "Print all of it as JSON");
   command
       ->add_option("--root", options->examination.root,

@@ -52,6 +52,7 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
         }}},
       {"info", {0, "info", command_info}},
       {"health", {0, "health", command_health}},
+      {"crash", {0, "crash", command_crash}},
       {"loader", {0, "loader", command_loader}},
       {"prior",
        {1, "prior SIGMA[:WIDTH]|none",
@@ -73,9 +74,10 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
   };
   auto form = forms.find(words[0]);
   if (form == forms.end()) {
-    throw Error("command \"" + words[0] +
-                "\" is unknown; give stream, tare, tare-force, rate, osr, slip, prior, limit, "
-                "keep, forget, erase, pad, pad-from-touch, erase-pad, info, health or loader");
+    throw Error(
+        "command \"" + words[0] +
+        "\" is unknown; give stream, tare, tare-force, rate, osr, slip, prior, limit, "
+        "keep, forget, erase, pad, pad-from-touch, erase-pad, info, health, crash or loader");
   }
   if (words.size() != 1 + form->second.arguments) {
     throw Error("wrong arguments; give: fingertip encode " + form->second.usage);
@@ -102,7 +104,7 @@ void add_encode(CommandLine &line) {
                    "stream none|contact,raw,health; tare; rate HZ|max; osr N; slip THRESHOLD_MM "
                    "WINDOW_MS; prior SIGMA[:WIDTH]|none; limit MM; keep; forget; erase (the "
                    "calibration); pad THICKNESS_MM OVERHANG_MM, pad-from-touch likewise; "
-                   "erase-pad; info; health; loader")
+                   "erase-pad; info; health; crash; loader")
       ->required()
       ->type_name("COMMAND [ARGS]");
   command->add_option("--sequence", options->sequence, "Sequence number; default 0")

@@ -43,6 +43,8 @@ export class StrictCore extends CortexM0Core {
     if (more) this.chip.fail('MPU', 'more than one region in SRAM is not modelled');
     this.guardFrom = first - RAM_BASE;
     this.guardBytes = bytes;
+    /** Of SRAM, before any guard. */
+    this.codeBytes = bytes ? this.guardFrom : RAM_BYTES;
   }
 
   hardFault() {
@@ -150,6 +152,8 @@ export class StrictCore extends CortexM0Core {
   fetch(pc) {
     const offset = (pc - FLASH_BASE) >>> 0;
     const inRam = (pc - RAM_BASE) >>> 0;
+    if (inRam < this.codeBytes) return this.ram16[inRam >>> 1];
+    if (this.isGuarded && this.chip.mpu.denies(pc >>> 0)) throw new MemoryFault();
     if (inRam < RAM_BYTES) return this.ram16[inRam >>> 1];
     if (offset < FLASH_BYTES && this.chip.xipReady) return this.chip.flash16[offset >>> 1];
     return this.chip.busRead(pc & ~1, 2);
@@ -189,7 +193,7 @@ export class StrictCore extends CortexM0Core {
       if (this.interruptsUpdated && this.checkForInterrupts()) this.waiting = false;
       const pc = r[15];
       const offset = (pc - RAM_BASE) >>> 0;
-      const op = offset < RAM_BYTES ? ram16[offset >>> 1] : this.fetch(pc);
+      const op = offset < this.codeBytes ? ram16[offset >>> 1] : this.fetch(pc);
       let cycles = 1;
       switch (op >>> 11) {
         case 0: { // LSLS immediate

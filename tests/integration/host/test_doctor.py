@@ -114,6 +114,15 @@ class DoctorTest(unittest.TestCase):
     def test_a_watchdog_reset_is_told(self):
         self.plug_in()
         self.assertEqual(self.finding("restarts")[0], "warn")
+        verdict, text = self.finding("crash")
+        self.assertEqual(verdict, "bad")
+        self.assertRegex(text, "a hard fault at 0x20001000, .* fitting, .*; before that: command stream 1.50 s, started 4 min; r0 0x00000001")
+
+    def test_an_elf_file_that_is_none_is_an_error(self):
+        self.plug_in()
+        done = self.examine("--elf", __file__)
+        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        self.assertRegex(done.stderr, "no ELF file of a fingertip; give fingertip-BOARD.elf")
 
     def test_json_has_all_of_it(self):
         self.plug_in("absent=3")

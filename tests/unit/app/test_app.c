@@ -654,6 +654,42 @@ static void the_loader_is_reached_by_command_and_by_touch(void) {
   TEST_ASSERT_EQUAL(NATIVE_LOADER, run_for(200));
 }
 
+static struct crash_record get_crash(void) {
+  struct wire_packet packet;
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_CRASH}));
+  TEST_ASSERT_TRUE(next_of_type(WIRE_CRASH, &packet));
+  return packet.body.crash;
+}
+
+static void the_last_crash_is_told_when_asked_for(void) {
+  native_cdc_open();
+  run_for(300);
+  TEST_ASSERT_EQUAL(CRASH_NONE, get_crash().kind);
+  struct crash_record crash = {.kind = CRASH_PANIC, .pc = 0x20000100, .t_us = 7000000};
+  native_set_last_crash(&crash);
+  TEST_ASSERT_EQUAL(CRASH_PANIC, get_crash().kind);
+  TEST_ASSERT_EQUAL_HEX32(0x20000100, get_crash().pc);
+  TEST_ASSERT_EQUAL_UINT64(7000000, get_crash().t_us);
+  crash.kind = CRASH_NONE;
+  native_set_last_crash(&crash);
+}
+
+static void what_happens_is_noted_for_the_record_of_a_crash(void) {
+  uint8_t detail;
+  native_cdc_open();
+  run_for(300);
+  get_health();
+  TEST_ASSERT_EQUAL(CRASH_EVENT_COMMAND, native_last_event(&detail));
+  TEST_ASSERT_EQUAL_HEX8(WIRE_CMD_HEALTH, detail);
+  native_cdc_close();
+  run_for(30);
+  TEST_ASSERT_EQUAL(CRASH_EVENT_CLOSED, native_last_event(&detail));
+  native_cdc_open();
+  ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}});
+  TEST_ASSERT_EQUAL(CRASH_EVENT_STORED, native_last_event(&detail));
+  TEST_ASSERT_EQUAL(0, detail);
+}
+
 static void at_the_slowest_rate_the_watchdog_is_fed(void) {
   native_cdc_open();
   run_for(300);
@@ -730,6 +766,8 @@ int main(void) {
   RUN_TEST(a_host_that_does_not_read_loses_whole_packets_and_sees_the_gap);
   RUN_TEST(health_comes_each_second);
   RUN_TEST(the_loader_is_reached_by_command_and_by_touch);
+  RUN_TEST(the_last_crash_is_told_when_asked_for);
+  RUN_TEST(what_happens_is_noted_for_the_record_of_a_crash);
   RUN_TEST(at_the_slowest_rate_the_watchdog_is_fed);
   RUN_TEST(test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful);
   return UNITY_END();

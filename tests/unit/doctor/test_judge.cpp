@@ -352,6 +352,20 @@ TEST(Judge, RestartsProcessorStackStored) {
   Facts facts = good();
   facts.after->watchdog_resets = 1;
   only(facts, Verdict::warn, "restarts");
+  facts.crash = with_places(test::make_crash(0, 0).body.crash, std::nullopt);
+  facts.crash->symbols_note = "x.elf is of other firmware: no names";
+  auto findings = wrong(facts);
+  ASSERT_EQ(findings.size(), 2u);
+  EXPECT_EQ(findings[0].check, "restarts");
+  EXPECT_TRUE(contains(findings[0].text, "1 reset by the watchdog"));
+  EXPECT_EQ(findings[1].check, "crash");
+  EXPECT_EQ(findings[1].verdict, Verdict::bad);
+  for (const char *part : {"a hard fault at 0x20001000", "before that: command stream",
+                           "sp 0x20041f00", "other firmware"}) {
+    EXPECT_TRUE(contains(findings[1].text, part)) << findings[1].text;
+  }
+  facts.crash->record.kind = CRASH_START;
+  EXPECT_EQ(wrong(facts)[1].verdict, Verdict::warn);
   facts = good();
   facts.after->uptime_s = 3;
   only(facts, Verdict::bad, "restarts");

@@ -95,6 +95,20 @@ static void test_the_watchdog_strikes_if_it_is_not_fed(void) {
   TEST_ASSERT_TRUE(native_watchdog_expired());
 }
 
+static void alive_round(void *context) {
+  fed_round(context);
+  if (port_now_us() < 10 * PORT_WATCHDOG_PERIOD_us) {
+    port_alive(PORT_PART_USB);
+  }
+}
+
+static void test_it_is_fed_in_vain_while_a_part_is_not_alive(void) {
+  native_run_until(10 * PORT_WATCHDOG_PERIOD_us, alive_round, NULL);
+  TEST_ASSERT_FALSE(native_watchdog_expired());
+  native_run_until(13 * PORT_WATCHDOG_PERIOD_us, alive_round, NULL);
+  TEST_ASSERT_TRUE(native_watchdog_expired());
+}
+
 static void to_loader(void *context) {
   (void)context;
   port_reboot_to_loader();
@@ -179,6 +193,7 @@ int main(void) {
   RUN_TEST(test_an_alarm_in_the_past_strikes_at_once);
   RUN_TEST(test_sleep_lasts_until_the_next_event);
   RUN_TEST(test_the_watchdog_strikes_if_it_is_not_fed);
+  RUN_TEST(test_it_is_fed_in_vain_while_a_part_is_not_alive);
   RUN_TEST(test_ends_of_the_program);
   RUN_TEST(test_stream_to_the_host);
   RUN_TEST(test_a_stalled_host_fills_the_queue);

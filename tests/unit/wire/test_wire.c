@@ -31,6 +31,8 @@ static size_t body_length(const struct wire_packet *packet) {
     return 72u + (packet->body.health.capabilities & WIRE_CAPABILITY_FIT ? 4 : 0);
   case WIRE_ACK:
     return 12;
+  case WIRE_CRASH:
+    return 97;
   case WIRE_CMD_STREAM:
   case WIRE_CMD_TARE:
   case WIRE_CMD_KEEP:

@@ -81,6 +81,34 @@ static struct wire_packet blank(uint8_t type, uint16_t sequence, uint64_t t_us) 
   return packet;
 }
 
+static void test_crash(void) {
+  struct wire_packet packet = blank(0x06, 0x0201, UINT64_C(1234567));
+  packet.body.crash = (struct crash_record){
+      .kind = CRASH_WATCHDOG,
+      .exception = 0x10,
+      .vector = 0x12,
+      .activity = CRASH_AT_FIT,
+      .stuck = CRASH_STUCK_MAIN | CRASH_STUCK_USB,
+      .event_codes = {8, 2, 1},
+      .event_details = {5, 0x80, 0},
+      .r0 = 0x01020304,
+      .r1 = 0x11121314,
+      .r2 = 0x21222324,
+      .r3 = 0x31323334,
+      .r12 = 0x41424344,
+      .lr = 0x20001235,
+      .pc = 0x20004321,
+      .xpsr = 0x61000010,
+      .sp = 0x20041FA8,
+      .event_ages_ms = {250, 70000, 4294967295u},
+      .t_us = UINT64_C(0x0102030405060708),
+  };
+  check("crash.txt", &packet);
+
+  packet = blank(0x8F, 0x0302, 77);
+  check("command_crash.txt", &packet);
+}
+
 static void test_contact(void) {
   struct wire_packet packet = blank(0x01, 0xA1B2, UINT64_C(123456789012));
   packet.body.contact = (struct wire_contact){
@@ -333,6 +361,7 @@ static void test_commands(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_contact);
+  RUN_TEST(test_crash);
   RUN_TEST(test_raw);
   RUN_TEST(test_info);
   RUN_TEST(test_health);

@@ -18,7 +18,8 @@ static const uint8_t wire_types[] = {
     WIRE_CMD_SLIP,   WIRE_CMD_INFO,      WIRE_CMD_HEALTH,
     WIRE_CMD_LOADER, WIRE_CMD_CALIBRATE, WIRE_CMD_ERASE_CALIBRATION,
     WIRE_CMD_KEEP,   WIRE_CMD_PRIOR,     WIRE_CMD_LOCATION_LIMIT,
-    WIRE_CMD_PAD,    WIRE_CMD_ERASE_PAD};
+    WIRE_CMD_PAD,    WIRE_CMD_ERASE_PAD, WIRE_CRASH,
+    WIRE_CMD_CRASH};
 enum { WIRE_TYPES = sizeof wire_types };
 
 enum sample_kind { SAMPLE_ZERO, SAMPLE_GREATEST, SAMPLE_LEAST, SAMPLE_RANDOM, SAMPLE_KINDS };
@@ -241,6 +242,25 @@ static inline void sample_health(struct sampler *sampler, struct wire_health *he
   }
 }
 
+static inline void sample_crash(struct sampler *sampler, struct crash_record *crash) {
+  uint8_t *bytes[] = {&crash->kind, &crash->exception, &crash->vector, &crash->activity,
+                      &crash->stuck};
+  for (size_t i = 0; i < sizeof bytes / sizeof bytes[0]; i++) {
+    *bytes[i] = (uint8_t)sample_u32(sampler);
+  }
+  uint32_t *registers[] = {&crash->r0, &crash->r1, &crash->r2,   &crash->r3, &crash->r12,
+                           &crash->lr, &crash->pc, &crash->xpsr, &crash->sp};
+  for (size_t i = 0; i < sizeof registers / sizeof registers[0]; i++) {
+    *registers[i] = sample_u32(sampler);
+  }
+  for (int i = 0; i < CRASH_EVENTS; i++) {
+    crash->event_codes[i] = (uint8_t)sample_u32(sampler);
+    crash->event_details[i] = (uint8_t)sample_u32(sampler);
+    crash->event_ages_ms[i] = sample_u32(sampler);
+  }
+  crash->t_us = sample_u64(sampler);
+}
+
 /* Every byte of the packet is defined, so that two of them may be compared as memory. */
 static inline void sample_packet(struct sampler *sampler, uint8_t type,
                                  struct wire_packet *packet) {
@@ -260,6 +280,9 @@ static inline void sample_packet(struct sampler *sampler, uint8_t type,
     break;
   case WIRE_HEALTH:
     sample_health(sampler, &packet->body.health);
+    break;
+  case WIRE_CRASH:
+    sample_crash(sampler, &packet->body.crash);
     break;
   case WIRE_ACK:
     packet->body.ack.command = (uint8_t)sample_u32(sampler);

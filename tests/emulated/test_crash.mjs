@@ -1,0 +1,334 @@
+/**
+ * What the release images leave when they end in a fault, a panic or by the watchdog, and what the next life tells of it.
+ *
+ * usage: test_crash.mjs BUILD_OF_IMAGES FINGERTIP
+ */
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { test } from 'node:test';
+import { ImageBench } from './harness/image_bench.mjs';
+
+const [images, fingertip] = process.argv.slice(2);
+// crash.h
+const [FAULT, PANIC, WATCHDOG, EXCEPTION, START] = [1, 2, 3, 4, 5];
+const [MAIN, SCAN, USB, INTERRUPTS] = [1, 2, 4, 8];
+const AT = { rest: 1, commands: 2, readings: 3, fit: 5 };
+const EVENT = { start: 1, command: 2, closed: 3 };
+const [TYPE_HEALTH, TYPE_CRASH] = [0x04, 0x06];
+// Instructions: b . ; bx lr ; movs r0, #FT_PENDING and bx lr; ldr r1, =0x7fffffff and movs r0, #0 and bx lr
+const [STAND_STILL, RETURN, RETURN_PENDING, RETURN_FAR] = ['fee7', '7047', '01207047', '0149002070470000ffffff7f'];
+const LAST_WORDS_ms = 20;
+const PERIOD_ms = 500;
+const LIMIT_ms = 400;
+
+class Bench extends ImageBench {
+  constructor(name, options) {
+    super(images, fingertip, name, options);
+    const lines = execFileSync('arm-none-eabi-nm', ['-S', this.elf], { encoding: 'utf8' }).trim().split('\n').map((l) => l.split(' '));
+    this.symbols = new Map(lines.map((words) => [words.at(-1), parseInt(words[0], 16) & ~1]));
+    this.functions = lines.filter((words) => /^[tT]$/.test(words.at(-2)) && !words.at(-1).startsWith('$')).map((words) => [parseInt(words[0], 16) & ~1, words.at(-1)]).sort((a, b) => a[0] - b[0]);
+  }
+
+  address(name) {
+    assert.ok(this.symbols.has(name), `${this.elf} has ${name}`);
+    return this.symbols.get(name);
+  }
+
+  /** The function of an address. */
+  place(address) {
+    return this.functions.findLast(([start]) => start <= address)?.[1];
+  }
+
+  patch(name, hex) {
+    this.machine.chip.sram.set(Buffer.from(hex, 'hex'), this.address(name) - 0x20000000);
+  }
+
+  /** Runs into the reset; how long it took, ms. */
+  untilReset(limit_ms = 2000) {
+    const [from_ms, before] = [this.now_ms, this.machine.reboots];
+    return this.until(() => this.machine.reboots > before, limit_ms, 'reset') - from_ms;
+  }
+
+  /** The body of the answer to a command. */
+  answer(command, type) {
+    this.until(() => this.machine.host.configured, 500, 'enumeration');
+    this.run(10);
+    this.received = [];
+    this.machine.client.write(this.encoded(command));
+    this.run(20);
+    const packet = split(Buffer.concat(this.received)).find((p) => p[1] === type);
+    assert.ok(packet, `no answer to ${command}`);
+    return packet.subarray(12);
+  }
+
+  crash() {
+    return decoded(this.answer('crash', TYPE_CRASH));
+  }
+
+  resets() {
+    return this.answer('health', TYPE_HEALTH).readUInt32LE(4 * 16);
+  }
+
+  /** And that no more is left of it. */
+  end() {
+    this.stream();
+    this.assertStreams(50);
+    return super.end();
+  }
+}
+
+/** The packets on a line (PROTOCOL.md), header first; their CRC is not looked at here. */
+function split(bytes) {
+  const packets = [];
+  for (let from = 0, at; (at = bytes.indexOf(0, from)) >= 0; from = at + 1) {
+    const out = [];
+    for (let i = from; i < at; ) {
+      const code = bytes[i];
+      out.push(...bytes.subarray(i + 1, i + code));
+      i += code;
+      if (code < 255 && i < at) out.push(0);
+    }
+    if (out.length) packets.push(Buffer.from(out));
+  }
+  return packets;
+}
+
+function decoded(body) {
+  const [kind, exception, vector, activity, stuck] = body;
+  const words = Array.from({ length: 9 + 8 }, (_, i) => body.readUInt32LE(21 + 4 * i));
+  const [r0, r1, r2, r3, r12, lr, pc, xpsr, sp] = words;
+  const events = Array.from({ length: 8 }, (_, i) => [body[5 + i], body[13 + i], words[9 + i]]).filter(([code]) => code);
+  return { kind, exception, vector, activity, stuck, r0, r1, r2, r3, r12, lr, pc, xpsr, sp, events, t_us: Number(body.readBigUInt64LE(89)) };
+}
+
+/** Something that was in no crash does not read as one. */
+test('a first start tells of no crash, whatever is in SRAM', () => {
+  for (let seed = 1; seed < 4; seed++) {
+    const bench = new Bench('pico_mux', { seed });
+    bench.stream();
+    assert.equal(bench.crash().kind, 0);
+    assert.equal(bench.resets(), 0);
+    bench.end();
+  }
+});
+
+{
+  const name = 'pico_parallel';
+  test(`${name}: a jump into the guarded page is a hard fault with its registers`, () => {
+    const bench = new Bench(name);
+    bench.stream();
+    bench.run(300);
+    const { core } = bench.machine.chip;
+    bench.until(() => core.waiting && core.IPSR === 0, 10, 'sleep');
+    const sp = core.registers[13];
+    [0x11, 0x22, 0x33, 0x44].forEach((value, i) => (core.registers[i] = value));
+    core.registers[12] = 0x55;
+    core.registers[14] = 0x20001235;
+    core.registers[15] = 0x20040100;
+    core.waiting = false;
+    const at_us = bench.machine.chip.timer.count_us;
+    assert.ok(bench.untilReset() < 3);
+    const crash = bench.crash();
+    assert.deepEqual([crash.kind, crash.exception, crash.vector, crash.activity], [FAULT, 0, 3, AT.rest]);
+    assert.deepEqual([crash.pc, crash.lr, crash.sp], [0x20040100, 0x20001235, sp >>> 0]);
+    assert.deepEqual([crash.r0, crash.r1, crash.r2, crash.r3, crash.r12], [0x11, 0x22, 0x33, 0x44, 0x55]);
+    assert.ok(Math.abs(crash.t_us - at_us) < 100, `${crash.t_us} ${at_us}`);
+    const codes = crash.events.map(([code]) => code);
+    assert.equal(codes.at(-1), EVENT.start);
+    assert.ok(codes.includes(EVENT.command), `${codes}`);
+    assert.ok(Math.abs(crash.events.at(-1)[2] - at_us / 1000) < 5, 'the start was as long ago as the firmware ran');
+    assert.equal(bench.resets(), 1);
+    bench.end();
+  });
+
+  test(`${name}: a call through a null pointer, in an interrupt, is told with both`, () => {
+    const bench = new Bench(name);
+    bench.stream();
+    const { chip } = bench.machine;
+    let fell = false;
+    chip.onCall(bench.address('app_on_event'), () => {
+      if (fell || bench.now_ms < 100) return;
+      fell = true;
+      chip.core.registers[15] = 0;
+    });
+    bench.until(() => bench.now_ms > 100, 200, 'time');
+    bench.untilReset(100);
+    const crash = bench.crash();
+    assert.deepEqual([crash.kind, crash.pc], [FAULT, 0]);
+    assert.ok(crash.exception >= 16, `${crash.exception}`);
+    assert.ok(['on_event', 'rp2040_event'].includes(bench.place(crash.lr & ~1)), bench.place(crash.lr & ~1));
+    bench.end();
+  });
+
+  test(`${name}: a stack that grows out of its bank`, () => {
+    const bench = new Bench(name);
+    bench.stream();
+    const { core } = bench.machine.chip;
+    bench.until(() => core.waiting, 10, 'sleep');
+    core.registers[13] = 0x20041008;
+    assert.ok(bench.untilReset() <= 10);
+    const crash = bench.crash();
+    assert.equal(crash.kind, FAULT);
+    assert.ok(crash.sp < 0x20041028 && crash.sp > 0x20040f00, crash.sp.toString(16));
+    assert.ok(bench.place(crash.pc), crash.pc.toString(16));
+    bench.end();
+  });
+
+  test(`${name}: a panic tells who called it`, () => {
+    const bench = new Bench(name);
+    bench.stream();
+    const { chip } = bench.machine;
+    const [caller, panic] = [bench.address('scan_take'), bench.address('port_panic')];
+    // bl port_panic
+    const offset = panic - (caller + 4);
+    const [s, imm10, imm11] = [(offset >>> 24) & 1, (offset >>> 12) & 0x3ff, (offset >>> 1) & 0x7ff];
+    const [j1, j2] = [23, 22].map((bit) => (((offset >>> bit) & 1) ^ s ^ 1));
+    const code = Buffer.alloc(4);
+    code.writeUInt16LE(0xf000 | (s << 10) | imm10, 0);
+    code.writeUInt16LE(0xd000 | (j1 << 13) | (j2 << 11) | imm11, 2);
+    chip.sram.set(code, caller - 0x20000000);
+    assert.ok(bench.untilReset() <= 100);
+    const crash = bench.crash();
+    assert.deepEqual([crash.kind, crash.vector, crash.exception, crash.pc, crash.activity], [PANIC, 0, 0, caller, AT.readings]);
+    bench.end();
+  });
+
+  test(`${name}: an interrupt that nobody handles`, () => {
+    const bench = new Bench(name);
+    bench.stream();
+    bench.machine.chip.busWrite(0xe000e100, 1 << 20, 4); // UART0
+    bench.machine.chip.busWrite(0xe000e200, 1 << 20, 4);
+    bench.untilReset(10);
+    const crash = bench.crash();
+    assert.deepEqual([crash.kind, crash.vector], [EXCEPTION, 16 + 20]);
+    bench.end();
+  });
+
+  test(`${name}: interrupts that are off for good: the next start tells what it knows`, () => {
+    const bench = new Bench(name);
+    bench.stream();
+    const { chip } = bench.machine;
+    bench.run(100);
+    bench.patch('scan_take', '72b6' + STAND_STILL); // cpsid i
+    const at_us = chip.timer.count_us;
+    const took_ms = bench.untilReset();
+    assert.ok(took_ms > PERIOD_ms && took_ms < PERIOD_ms + LAST_WORDS_ms + 20, `${took_ms}`);
+    const crash = bench.crash();
+    assert.deepEqual([crash.kind, crash.stuck, crash.activity, crash.pc, crash.sp], [WATCHDOG, INTERRUPTS, AT.readings, 0, 0]);
+    assert.ok(Math.abs(crash.t_us - at_us - 1000 * PERIOD_ms) < 20e3, `${crash.t_us} ${at_us}`);
+    assert.ok(crash.events.length >= 2);
+    bench.end();
+  });
+
+  /** While nothing hears it, or nobody comes, nothing is stuck. */
+  test(`${name}: a bus that sleeps, a cable that is out, a host that is silent or does not read are no reason`, () => {
+    const bench = new Bench(name, { faults: [{ type: 'usb_unplug', from_s: 2.5, to_s: 5 }, { type: 'host_stall', from_s: 5.5, to_s: 7 }] });
+    bench.stream();
+    bench.machine.host.suspend();
+    bench.run(1500);
+    bench.machine.host.resume();
+    bench.run(8000 - bench.now_ms);
+    assert.equal(bench.machine.reboots, 0);
+    bench.end();
+  });
+}
+
+for (const name of ['pico_mux', 'pico_parallel']) {
+  test(`${name}: a main loop that stands still`, (t) => {
+    const bench = new Bench(name);
+    bench.stream();
+    bench.run(100);
+    bench.patch('scan_take', STAND_STILL);
+    const took_ms = bench.untilReset();
+    t.diagnostic(`${took_ms.toFixed(0)} ms`);
+    assert.ok(took_ms > PERIOD_ms && took_ms < PERIOD_ms + LAST_WORDS_ms + 20, `${took_ms}`);
+    assert.equal(bench.machine.chip.watchdog.reason, 1, 'by its timer');
+    const crash = bench.crash();
+    assert.deepEqual([crash.kind, crash.stuck, crash.exception, crash.activity], [WATCHDOG, MAIN, 0, AT.readings]);
+    assert.equal(crash.pc, bench.address('scan_take'));
+    assert.equal(bench.resets(), 1);
+    bench.end();
+  });
+
+  test(`${name}: a scan that does not go on, whose alarm is lost`, (t) => {
+    const bench = new Bench(name);
+    bench.stream();
+    bench.run(100);
+    bench.patch('rp2040_event', RETURN);
+    const took_ms = bench.untilReset();
+    t.diagnostic(`${took_ms.toFixed(0)} ms`);
+    assert.ok(took_ms < LIMIT_ms + PERIOD_ms + LAST_WORDS_ms + 100, `${took_ms}`);
+    const crash = bench.crash();
+    assert.deepEqual([crash.kind, crash.stuck], [WATCHDOG, SCAN]);
+    bench.end();
+  });
+
+  for (const [what, where, code] of [['a scan that never wants to be called again', 'scan_step', RETURN_FAR], ['a bus operation that never ends', 'poll', RETURN_PENDING]]) {
+    test(`${name}: ${what}, while its events go on`, () => {
+      const bench = new Bench(name);
+      bench.stream();
+      bench.run(100);
+      bench.patch(where, code);
+      const took_ms = bench.untilReset();
+      assert.ok(took_ms > LIMIT_ms && took_ms < LIMIT_ms + PERIOD_ms + LAST_WORDS_ms + 100, `${took_ms}`);
+      const crash = bench.crash();
+      assert.deepEqual([crash.kind, crash.stuck], [WATCHDOG, SCAN]);
+      bench.end();
+    });
+  }
+
+  test(`${name}: USB that is not served`, (t) => {
+    const bench = new Bench(name);
+    bench.stream();
+    bench.run(100);
+    bench.machine.chip.busWrite(0xe000e180, 1 << 26, 4); // the service interrupt is disabled
+    const took_ms = bench.untilReset();
+    t.diagnostic(`${took_ms.toFixed(0)} ms`);
+    assert.ok(took_ms > LIMIT_ms && took_ms < LIMIT_ms + PERIOD_ms + LAST_WORDS_ms + 100, `${took_ms}`);
+    const crash = bench.crash();
+    assert.deepEqual([crash.kind, crash.stuck], [WATCHDOG, USB]);
+    bench.end();
+  });
+}
+
+test('the slowest rate, and sensors that are all dead, are no reason', () => {
+  const bench = new Bench('pico_mux', { faults: Array.from({ length: 15 }, (_, sensor) => ({ type: 'sensor_dead', sensor, from_s: 1, to_s: 3 })) });
+  bench.stream();
+  bench.machine.client.write(bench.encoded('rate', '0.1'));
+  bench.run(5000);
+  assert.equal(bench.machine.reboots, 0);
+});
+
+test('two crashes: the last is told, both are counted, and power-off forgets them', () => {
+  const bench = new Bench('pico_mux', { faults: [{ type: 'power_cut', from_s: 3, to_s: 3.1 }] });
+  bench.stream();
+  bench.patch('scan_take', STAND_STILL);
+  bench.untilReset();
+  assert.equal(bench.crash().kind, WATCHDOG);
+  bench.stream();
+  bench.machine.chip.core.registers[15] = 0x20040000;
+  bench.machine.chip.core.waiting = false;
+  bench.untilReset();
+  assert.equal(bench.crash().kind, FAULT);
+  assert.equal(bench.resets(), 2);
+  bench.run(3200 - bench.now_ms);
+  assert.equal(bench.crash().kind, 0);
+  assert.equal(bench.resets(), 0);
+  bench.end();
+});
+
+test('a record that was damaged is none', () => {
+  const bench = new Bench('pico_mux');
+  bench.stream();
+  const { chip } = bench.machine;
+  chip.core.registers[15] = 0x20040000;
+  chip.core.waiting = false;
+  const kept = bench.address('kept') - 0x20000000;
+  chip.onWatchdog = () => {
+    chip.sram[kept + 20] ^= 1;
+  };
+  bench.untilReset();
+  const crash = bench.crash();
+  assert.deepEqual([crash.kind, crash.pc], [START, 0], 'only that the chip reset itself');
+  bench.end();
+});
