@@ -43,6 +43,11 @@ void native_start(bool by_watchdog) {
   native.started_by_watchdog = by_watchdog;
 }
 
+void native_set_time(uint64_t now_us) {
+  native.now_us = now_us;
+  native.fed_us = now_us;
+}
+
 void native_set_event_source(uint64_t (*next_us)(const void *context), const void *context) {
   native.source_next_us = next_us;
   native.source_context = context;

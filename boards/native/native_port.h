@@ -17,6 +17,9 @@
 /* Start-up: time 0, no alarm, no handler, no source. */
 void native_start(bool by_watchdog);
 
+/* Right after a start: the clock shows this. */
+void native_set_time(uint64_t now_us);
+
 /* Sixteen characters, for whoever has several; kept over starts. */
 void native_set_serial_number(const char *text);
 

@@ -111,6 +111,7 @@ void app_start(struct app *app, const struct array_bus *bus) {
   store_init(&app->store, geometry.sensor_count);
   condition_tare(&app->condition);
   app->active = true;
+  app->second_began_us = port_now_us();
 
   static char serial[17];
   port_serial_number(serial);

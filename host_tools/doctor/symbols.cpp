@@ -7,8 +7,10 @@
 #include <cstdio>
 #include <cstring>
 #include <elf.h>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <utility>
 
 namespace fingertip {
 
@@ -30,11 +32,14 @@ Part part_at(const std::vector<std::uint8_t> &file, std::size_t at, const std::s
 } // namespace
 
 Symbols Symbols::of_file(const std::string &path) {
+  if (std::filesystem::is_directory(path)) {
+    throw Error(ErrorCode::is_folder, path + ": is a folder");
+  }
   std::ifstream stream(path, std::ios::binary);
   std::vector<std::uint8_t> file((std::istreambuf_iterator<char>(stream)),
                                  std::istreambuf_iterator<char>());
-  if (!stream && !stream.eof()) {
-    throw Error(ErrorCode::cannot_read, path + ": " + std::strerror(errno));
+  if (!stream.is_open() || stream.bad()) {
+    throw Error(ErrorCode::cannot_read, path + ": cannot be read (" + std::strerror(errno) + ")");
   }
   return Symbols(std::move(file), path);
 }

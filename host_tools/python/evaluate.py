@@ -37,7 +37,7 @@ import numpy as np
 
 from fingertip_files import (
     CONTACT, FIT_VALID, SLIP, SLIP_VALID, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, InputError, check_output, printable, read_recording, read_run,
-    read_scenario, run_tool, write_text)
+    read_scenario, restart_rows, run_tool, write_text)
 
 FORCE_MIN_N = 0.2
 SLIP_MIN_s = 0.05
@@ -154,10 +154,10 @@ def load_recording(options, **how):
 def check_time(recording):
     """One run of the device is one axis of time: a recording that crosses a restart has none."""
     t_us, frame = recording["t_us"], recording["frame"]
-    restarts = np.flatnonzero((np.diff(t_us) < 0) | (np.diff(frame) < 0))
+    restarts = restart_rows(t_us, frame)
     contact = np.flatnonzero(recording.has_contact)
     repeated = contact[1:][np.diff(t_us[contact]) == 0]
-    for rows, what in ((restarts + 1, "the fingertip restarted here; record anew, or cut the file before this line"),
+    for rows, what in ((restarts, "the fingertip restarted here; record anew, or cut the file before this line"),
                        (repeated, "a second frame of the same time; remove the line")):
         if len(rows):
             raise InputError(f"{recording.path}:{recording.line_numbers[rows[0]]}: {what}")

@@ -424,6 +424,13 @@ GRIP_STATES = ("idle", "activating", "approach", "squeeze", "ready", "holding", 
 GRIP_ROW, GRIP_EVENT = "# grip: ", "# grip_event: "
 
 
+def restart_rows(t, frame):
+    """The rows, but the first, that a run of a fingertip begins with: the time or the frame's number steps back. Numbers
+    wrap (PROTOCOL.md)."""
+    steps = np.mod(np.diff(frame.astype(np.int64)), 2**32)
+    return np.flatnonzero((np.diff(t) < 0) | (steps >= 2**31)) + 1
+
+
 def _grip_values(path, number, columns, cells):
     if len(cells) != len(columns):
         raise InputError(f"{path}:{number}: {len(cells)} columns of the gripper where its header has {len(columns)}; use --salvage to skip the line")

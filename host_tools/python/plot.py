@@ -18,7 +18,7 @@ from matplotlib.patches import FancyBboxPatch
 from evaluate import Comparison, add_recording_options, check_time, load_recording
 from fingertip_files import (
     FIT_VALID, MOVING, SLIDING, SLIP, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, WARNINGS, InputError, check_output, read_grip, read_run, read_scenario, recorded_devices,
-    run_tool, write_bytes)
+    restart_rows, run_tool, write_bytes)
 
 INK, FAINT, TRUTH, MEASURED, SLIPPING, DOUBTFUL = "#22252e", "#8a8f9c", "#b4bac6", "#1f6fd6", "#d93a3a", "#d08a00"
 ALONG_Y = "#0d9488"
@@ -58,7 +58,7 @@ def continuous_time_s(recording, rows):
     """One axis for all runs of a fingertip that restarted, and where each but the first begins. The recorder's clock
     where there is one; else the runs follow one another, for nobody knows the time between."""
     t_s, frame = recording["t_us"][rows] / 1e6, recording["frame"][rows]
-    restarts = np.flatnonzero((np.diff(t_s) < 0) | (np.diff(frame) < 0)) + 1
+    restarts = restart_rows(t_s, frame)
     if recording.time_us is not None:
         t_s = recording.time_us[rows] / 1e6
     else:

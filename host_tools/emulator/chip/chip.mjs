@@ -95,11 +95,11 @@ export class Chip extends RP2040 {
    * @param time SimulatedTime
    * @param report Report
    * @param options serial: 8-byte flash unique id; seed: of the power-on noise in SRAM; clock_ppm: by how much all of
-   *   the chip's clocks are fast, in this time; revision: 0, 1 or 2 for B0, B1 or B2; memory: the FlashMemory, a new one by default; trouble: what goes wrong
+   *   the chip's clocks are fast, in this time; revision: 0, 1 or 2 for B0, B1 or B2; uptime_us: what the timer begins with; memory: the FlashMemory, a new one by default; trouble: what goes wrong
    *   in the chip; kept: { sram, usbDPRAM, watchdog }
    *   of the life before a watchdog reboot
    */
-  constructor(time, report, { serial, seed = 1, clock_ppm = 0, revision = 2, memory = new FlashMemory({ time, serial, seed }), trouble = new Trouble(), kept = null }) {
+  constructor(time, report, { serial, seed = 1, clock_ppm = 0, revision = 2, uptime_us = 0, memory = new FlashMemory({ time, serial, seed }), trouble = new Trouble(), kept = null }) {
     super(time.scope());
     this.memory = memory;
     memory.fail = (source, message) => this.fail(source, message);
@@ -136,7 +136,7 @@ export class Chip extends RP2040 {
     this.pllSys = new Pll(this, 'PLL_SYS');
     this.pllUsb = new Pll(this, 'PLL_USB');
     this.clocks = new Clocks(this);
-    this.timer = new Timer(this);
+    this.timer = new Timer(this, uptime_us);
     this.watchdog = new Watchdog(this, kept?.watchdog);
     this.ssi = new Ssi(this, memory);
     this.i2c = [new I2cBlock(this, 0), new I2cBlock(this, 1)];

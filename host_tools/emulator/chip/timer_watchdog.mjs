@@ -11,13 +11,14 @@ const WATCHDOG_MAX = 0xffffff;
 const TIMER_RESET = 21;
 
 export class Timer extends BasePeripheral {
-  constructor(chip) {
+  /** @param begin_us what it counts from, out of reset: 0 on silicon */
+  constructor(chip, begin_us = 0) {
     super(chip, 'TIMER');
+    this.begin_us = begin_us;
     this.tick_ns = 1e9 / chip.trueHz(1e6);
     this.alarms = [0, 1, 2, 3].map((i) => ({ armed: false, target: 0, alarm: chip.clock.createAlarm(() => this.#fire(i)) }));
     /** Emulated time at which the counter was 0, or null while no tick runs. */
     this.zero_ns = null;
-    this.stopped_us = 0;
     this.reset();
   }
 
@@ -27,7 +28,7 @@ export class Timer extends BasePeripheral {
       a.alarm.cancel();
     }
     this.zero_ns = null;
-    this.stopped_us = 0;
+    this.stopped_us = this.begin_us;
     this.latchedHigh = 0;
     this.raw = 0;
     this.enable = 0;

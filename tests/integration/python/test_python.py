@@ -284,6 +284,14 @@ class Evaluation(ToolTest):
         scenario = self.scenario()
         self.assert_restart(self.recording(scenario, change=lambda row: {**row, "frame": row["frame"] % 700}), scenario, 700)
 
+    def test_frame_numbers_that_cross_their_end_are_no_restart(self):
+        scenario = self.scenario()
+        recording = self.recording(scenario, change=lambda row: {**row, "frame": (row["frame"] + 2**32 - 700) % 2**32})
+        self.tool("evaluate.py", recording, scenario, "--run", self.run_report(), "-o", self.folder / "wrapped.json")
+        t_us, frame = np.arange(4), np.array([2**32 - 2, 2**32 - 1, 0, 1])
+        self.assertEqual(list(files.restart_rows(t_us, frame)), [])
+        self.assertEqual(list(files.restart_rows(t_us, frame[::-1])), [1, 2, 3])
+
     def assert_restart(self, recording, scenario, frame):
         line = recording.read_text(encoding="utf-8").split("\n").index(",".join(files.RECORDING_COLUMNS + tuple(
             [f"s{k}_Pa" for k in range(15)] + [f"tare{k}_Pa" for k in range(15)]))) + 2 + frame

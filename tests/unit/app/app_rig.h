@@ -63,10 +63,12 @@ static inline void main_round(void *context) {
   app_run(context);
 }
 
-/* Power goes and comes back; what the flash holds stays, and so does the world. */
-static inline void rig_power_up(void) {
+/* Power goes and comes back, when the clock shows this; what the flash holds stays, and so does the
+ * world. */
+static inline void rig_power_up_at(uint64_t t_us) {
   native_flash_power_up();
   native_start(false);
+  native_set_time(t_us);
   native_cdc_reset();
   sim_array_init(&array, geometry.sensor_count, 1);
   array.world = (struct sim_world){.pressure_Pa = world_pressure_Pa};
@@ -76,6 +78,10 @@ static inline void rig_power_up(void) {
   app_start(&app, sim_array_bus(&array));
   wire_receiver_init(&receiver, wire_all_layouts);
   host_sequence = 0;
+}
+
+static inline void rig_power_up(void) {
+  rig_power_up_at(0);
 }
 
 static inline void rig_start(void) {
