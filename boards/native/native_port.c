@@ -188,7 +188,7 @@ uint32_t port_watchdog_resets(void) {
 }
 
 const struct crash_record *port_last_crash(void) {
-  return last_crash.kind == CRASH_NONE ? NULL : &last_crash;
+  return &last_crash;
 }
 
 static char serial_number[17] = "0000000000000001";

@@ -115,9 +115,7 @@ void packets_send_health(struct app *app, uint64_t now_us) {
 }
 
 void packets_send_crash(struct app *app, uint64_t now_us) {
-  static const struct crash_record none;
-  const struct crash_record *crash = port_last_crash();
-  app->packet.body.crash = crash ? *crash : none;
+  app->packet.body.crash = *port_last_crash();
   send_packet(app, &wire_crash_layout, now_us);
 }
 

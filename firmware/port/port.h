@@ -50,7 +50,7 @@ void port_event(enum crash_event event, uint8_t detail);
 /* Resets by the watchdog since power-on; faults and panics end in one too. */
 uint32_t port_watchdog_resets(void);
 
-/* How the firmware last came to an end since power-on; NULL: it did not. */
+/* How the firmware last came to an end since power-on; CRASH_NONE, and all 0: it did not. */
 const struct crash_record *port_last_crash(void);
 
 /* Sixteen upper-case hexadecimal digits and a terminating zero: the unique id of the flash chip. */

@@ -126,7 +126,7 @@ static const struct run wire_ack_runs[] = {
 LAYOUT(wire_ack, WIRE_ACK);
 
 _Static_assert(offsetof(struct crash_record, r0) % 4 == 0 &&
-                   offsetof(struct crash_record, event_ages_ms) ==
+                   offsetof(struct crash_record, event_ages_1024us) ==
                        offsetof(struct crash_record, r0) + 9 * 4,
                "wire_crash_runs");
 static const struct run wire_crash_runs[] = {

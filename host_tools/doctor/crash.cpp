@@ -156,12 +156,16 @@ std::string crash_text(const Crash &crash) {
   }
 }
 
+double event_age_s(const crash_record &record, unsigned event) {
+  return record.event_ages_1024us[event] * 1024e-6;
+}
+
 std::string events_text(const crash_record &record) {
   std::string text;
   for (unsigned i = 0; i < CRASH_EVENTS && record.event_codes[i] != CRASH_EVENT_NONE; i++) {
     text += (text.empty() ? "" : ", ") +
             event_text(record.event_codes[i], record.event_details[i]) + " " +
-            duration_text(record.event_ages_ms[i] / 1e3);
+            duration_text(event_age_s(record, i));
   }
   return text;
 }

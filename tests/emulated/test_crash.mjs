@@ -97,7 +97,7 @@ function decoded(body) {
   const [kind, exception, vector, activity, stuck] = body;
   const words = Array.from({ length: 9 + 8 }, (_, i) => body.readUInt32LE(21 + 4 * i));
   const [r0, r1, r2, r3, r12, lr, pc, xpsr, sp] = words;
-  const events = Array.from({ length: 8 }, (_, i) => [body[5 + i], body[13 + i], words[9 + i]]).filter(([code]) => code);
+  const events = Array.from({ length: 8 }, (_, i) => [body[5 + i], body[13 + i], words[9 + i] * 1.024]).filter(([code]) => code);
   return { kind, exception, vector, activity, stuck, r0, r1, r2, r3, r12, lr, pc, xpsr, sp, events, t_us: Number(body.readBigUInt64LE(89)) };
 }
 

@@ -127,9 +127,9 @@ inline wire_packet make_crash(std::uint16_t sequence, std::uint64_t t_us) {
   crash.activity = CRASH_AT_FIT;
   crash.event_codes[0] = CRASH_EVENT_COMMAND;
   crash.event_details[0] = WIRE_CMD_STREAM;
-  crash.event_ages_ms[0] = 1500;
+  crash.event_ages_1024us[0] = 1465;
   crash.event_codes[1] = CRASH_EVENT_START;
-  crash.event_ages_ms[1] = 250000;
+  crash.event_ages_1024us[1] = 244141;
   crash.r0 = 1;
   crash.lr = 0x20001235;
   crash.pc = 0x20001000;

@@ -103,7 +103,7 @@ Json crash_json(const Crash &crash) {
   for (unsigned i = 0; i < CRASH_EVENTS && record.event_codes[i] != CRASH_EVENT_NONE; i++) {
     json["events"].push_back({{"code", record.event_codes[i]},
                               {"detail", record.event_details[i]},
-                              {"age_s", record.event_ages_ms[i] / 1e3}});
+                              {"age_s", event_age_s(record, i)}});
   }
   return json;
 }

@@ -15,7 +15,7 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
-from emulated import BOARDS, CONVERSION_us, scenario  # noqa: E402
+from emulated import BOARDS, CLOCK_Hz, CONVERSION_us, scenario  # noqa: E402
 from fingertip_files import InputError, run_tool, write_text  # noqa: E402
 from reporting import Steps, run, write_json  # noqa: E402
 from tables import table_md  # noqa: E402
@@ -25,6 +25,8 @@ STREAM = {"raw": "raw", "press": "contact", "slip": "contact", "paper": "contact
 # The contact of the scenario "wander" stands from 0.65 s on; windows of whole temperature intervals.
 REST_s = (0.5, 0.58)
 CONTACT_FROM_s, WINDOW_s, SETTLE_s = 1.0, 1.0, 0.1
+# The watchdog and the record of a crash (boards/rp2040/crash.h): what runs all the time, and what they are compiled from.
+GUARD_FUNCTIONS, GUARD_OBJECTS = ("port_alive", "port_at", "port_event", "port_watchdog_feed", "stuck_parts"), ("crash.c", "fault.S")
 
 
 def build(scene, board, folder):
@@ -47,8 +49,21 @@ def sizes(place, board):
     return {
         "flash_bytes": image["flash_bytes"],
         "ram_bytes": image["constants_in_sram_bytes"] + image["variables_bytes"] + image["stack_reserved_bytes"],
-        "code_in_sram_bytes": image["code_in_sram_bytes"], "stack_bytes": stack["worst_bytes"],
+        "code_in_sram_bytes": image["code_in_sram_bytes"], "stack_bytes": stack["worst_bytes"], **guard_sizes(place),
     }
+
+
+def guard_sizes(place):
+    found = {"guard_flash_bytes": 0, "guard_ram_bytes": 0}
+    for name in GUARD_OBJECTS:
+        sections = run("arm-none-eabi-size", "-A", place / f"boards/rp2040/CMakeFiles/board_rp2040.dir/{name}.obj")
+        for line in sections.splitlines():
+            kind, _, rest = line.partition(" ")
+            if kind.startswith((".text", ".rodata", ".data")):
+                found["guard_flash_bytes"] += int(rest.split()[0])
+            elif kind.startswith((".bss", ".noinit")):
+                found["guard_ram_bytes"] += int(rest.split()[0])
+    return found
 
 
 def cycles(fingertip, place, scene, board, osrs, folder):
@@ -70,7 +85,9 @@ def cycles(fingertip, place, scene, board, osrs, folder):
         *(word for name, from_s, to_s in windows for word in ("--window", f"{name}:{from_s:.3f}:{to_s:.3f}")))
     found = json.loads(files[1].read_text())
     contact = found[str(osrs[0])]
+    guards = sum(cycles for name, cycles in contact["functions"].items() if set(name.split("=")) & set(GUARD_FUNCTIONS))
     return {
+        "guard_cycles": guards, "guard_percent": 100 * guards * contact["frames_per_s"] / CLOCK_Hz,
         "cycles_of_frame_at_rest": found["rest"]["total_cycles_per_frame"], "cycles_of_frame": contact["total_cycles_per_frame"],
         "cycles_by_stage": contact["cycles_per_frame"], "frames_per_s": {str(osr): found[str(osr)]["frames_per_s"] for osr in osrs},
     }
@@ -101,6 +118,12 @@ def text(rows):
     lines += ["", "Cycles of a frame in contact by stage; what an interrupt takes is its own stage, wherever it strikes.", ""]
     lines += table_md(["board", "scene", *stages],
                       [[row["board"], row["scene"], *(row["cycles_by_stage"][stage] for stage in stages)] for row in rows])
+    lines += ["", "What the guards cost: the watchdog that wants signs of life of scan, USB and main loop, and the record of a crash. Cycles of a frame in",
+              "contact, in the functions that run all the time; bytes of the two files, without the calls. Frames at most: what the rate would lose if",
+              "the processor were what limits it. The guarded pages cost nothing but a bank of 4 KiB that is empty anyway.", ""]
+    lines += table_md(["board", "scene", "cycles", "% of the processor", "frames/s at most", "flash", "RAM"], [
+        [row["board"], row["scene"], row["guard_cycles"], f"{row['guard_percent']:.3f}", f"{row['guard_percent'] / 100 * row['frames_per_s'][osrs[0]]:.1f}",
+         row["guard_flash_bytes"], row["guard_ram_bytes"]] for row in rows])
     return lines
 
 

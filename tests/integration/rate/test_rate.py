@@ -73,6 +73,13 @@ class Rate(unittest.TestCase):
         fit = next(row["fit"] for row in self.found["by_sensors"] if row["sensors"] == 15 and row["kernel"] == "fixed point")
         self.assertLess(abs(slip["cycles_by_stage"]["fit"] / fit - 1), 0.05)
 
+    def test_guards_are_there_and_cheap(self):
+        for row in self.found["scenes"]:
+            self.assertGreater(row["guard_cycles"], 100)  # a few calls of some 20 cycles at the least
+            self.assertLess(row["guard_percent"], 1)
+            self.assertGreater(row["guard_flash_bytes"], 500)
+            self.assertGreater(row["guard_ram_bytes"], 200)
+
     def test_more_costs_more(self):
         raw, slip = (next(row for row in self.found["scenes"] if row["scene"] == scene) for scene in ("raw", "slip"))
         for name in ("flash_bytes", "ram_bytes", "code_in_sram_bytes", "stack_bytes", "cycles_of_frame"):

@@ -100,7 +100,7 @@ static void test_crash(void) {
       .pc = 0x20004321,
       .xpsr = 0x61000010,
       .sp = 0x20041FA8,
-      .event_ages_ms = {250, 70000, 4294967295u},
+      .event_ages_1024us = {250, 70000, 4294967295u},
       .t_us = UINT64_C(0x0102030405060708),
   };
   check("crash.txt", &packet);

@@ -256,7 +256,7 @@ static inline void sample_crash(struct sampler *sampler, struct crash_record *cr
   for (int i = 0; i < CRASH_EVENTS; i++) {
     crash->event_codes[i] = (uint8_t)sample_u32(sampler);
     crash->event_details[i] = (uint8_t)sample_u32(sampler);
-    crash->event_ages_ms[i] = sample_u32(sampler);
+    crash->event_ages_1024us[i] = sample_u32(sampler);
   }
   crash->t_us = sample_u64(sampler);
 }
