@@ -145,6 +145,8 @@ case $1 in
     say "rate, latency and cost, in emulated time"
     /usr/bin/python3 host_tools/report/rate/rate.py --build build/host --boards build -o build/report \
       --picture host_tools/report/rate/rate.png
+    say "what a logic analyser shows"
+    /usr/bin/python3 host_tools/report/bringup/traces.py --boards build -o boards
     say "the published experiments on the simulated fingertip"
     /usr/bin/python3 host_tools/report/validation/validation.py --build build/host \
       --image build/pico_mux/fingertip-pico_mux.bin -o build/report \

@@ -14,6 +14,9 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "host_tools/report/shared"))
+from vcd import read_vcd  # noqa: E402
+
 TOOLS = argparse.Namespace()
 
 FROM_S, TO_S = 0.400, 0.420
@@ -42,20 +45,6 @@ def run(folder, rise_ns):
     with open(folder / "bus.csv", newline="") as file:
         log = list(csv.DictReader(file))
     return done, report, log
-
-
-def read_vcd(path):
-    """name -> list of (t_ns, level), the first being the level at the beginning."""
-    names, changes, t_ns = {}, {}, None
-    for line in path.read_text().splitlines():
-        if match := re.fullmatch(r"\$var wire 1 (\S) (\S+) \$end", line):
-            names[match[1]] = match[2]
-            changes[match[2]] = []
-        elif line.startswith("#"):
-            t_ns = int(line[1:])
-        elif line[:1] in "01" and line[1:] in names:
-            changes[names[line[1:]]].append((t_ns, int(line[0])))
-    return changes
 
 
 def decode(path, pairs):
