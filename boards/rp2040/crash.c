@@ -30,6 +30,7 @@ struct fault_frame {
   uint32_t vector;
 };
 extern const struct fault_frame rp2040_fault_frame;
+extern uint32_t __stack_guard[], __stack_limit[];
 
 struct event {
   uint64_t t_us;
@@ -98,7 +99,11 @@ _Noreturn void rp2040_take_crash(void) {
   const struct fault_frame *frame = &rp2040_fault_frame;
   struct crash_record *record = &kept.record;
   memset(record, 0, sizeof *record);
+  const uint32_t guard = (uint32_t)(uintptr_t)__stack_guard;
+  const bool is_below =
+      frame->address >= guard && frame->address < (uint32_t)(uintptr_t)__stack_limit;
   record->kind = frame->vector == VECTOR_PANIC        ? CRASH_PANIC
+                 : is_below                           ? CRASH_OVERFLOW
                  : frame->vector == VECTOR_HARD_FAULT ? CRASH_FAULT
                  : frame->vector == VECTOR_UNFED      ? CRASH_WATCHDOG
                                                       : CRASH_EXCEPTION;
@@ -114,6 +119,7 @@ _Noreturn void rp2040_take_crash(void) {
   tell_events(record);
   kept.crc = kept_crc();
   kept.magic = RECORD_MAGIC;
+  __asm volatile("dsb" ::: "memory");
 
   if (record->kind != CRASH_WATCHDOG) {
     PSM_WDSEL = PSM_WDSEL_ALL_BUT_OSCILLATORS;
@@ -150,6 +156,10 @@ void crash_start(void) {
   WATCHDOG_SCRATCH1 = resets;
   WATCHDOG_SCRATCH2 = 0;
   memset(&trace, 0, sizeof trace);
+  /* A Cortex-M3 runs the handler of a fault though it could not stack the registers (ARM DDI 0337E
+   * 5.12.1); should this core do so too, what is read in their place is to say nothing. */
+  for (uint32_t *word = __stack_guard; word < __stack_limit; word++)
+    *word = 0;
   trace.events[0].code = CRASH_EVENT_START;
   trace.event_count = 1;
   WATCHDOG_LOAD = 2 * PORT_WATCHDOG_PERIOD_us;

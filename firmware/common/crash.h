@@ -12,6 +12,8 @@ enum crash_kind {
   CRASH_PANIC,     /* port_panic(): pc is the call */
   CRASH_WATCHDOG,  /* a part of the firmware stood still; see stuck. pc is what was interrupted */
   CRASH_EXCEPTION, /* one that nobody handles; see vector */
+  CRASH_OVERFLOW,  /* a hard fault whose registers were to be stacked below the stack: all 0 where
+                      they could not be */
   CRASH_START,     /* the start gave up: clocks that do not come, a fault in the start-up code */
 };
 

@@ -137,6 +137,8 @@ std::string crash_text(const Crash &crash) {
   switch (record.kind) {
   case CRASH_FAULT:
     return "a hard fault" + at_text(crash) + where_text(record) + since;
+  case CRASH_OVERFLOW:
+    return "the stack overflowed" + at_text(crash) + where_text(record) + since;
   case CRASH_PANIC:
     return "a panic" + at_text(crash) + where_text(record) + since;
   case CRASH_EXCEPTION:

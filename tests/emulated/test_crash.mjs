@@ -10,7 +10,7 @@ import { ImageBench } from './harness/image_bench.mjs';
 
 const [images, fingertip] = process.argv.slice(2);
 // crash.h
-const [FAULT, PANIC, WATCHDOG, EXCEPTION, START] = [1, 2, 3, 4, 5];
+const [FAULT, PANIC, WATCHDOG, EXCEPTION, OVERFLOW, START] = [1, 2, 3, 4, 5, 6];
 const [MAIN, SCAN, USB, INTERRUPTS] = [1, 2, 4, 8];
 const AT = { rest: 1, commands: 2, readings: 3, fit: 5 };
 const EVENT = { start: 1, command: 2, closed: 3 };
@@ -168,7 +168,7 @@ test('a first start tells of no crash, whatever is in SRAM', () => {
     core.registers[13] = 0x20041008;
     assert.ok(bench.untilReset() <= 10);
     const crash = bench.crash();
-    assert.equal(crash.kind, FAULT);
+    assert.equal(crash.kind, OVERFLOW);
     assert.ok(crash.sp < 0x20041028 && crash.sp > 0x20040f00, crash.sp.toString(16));
     assert.ok(bench.place(crash.pc), crash.pc.toString(16));
     bench.end();

@@ -103,6 +103,9 @@ TEST(Crash, InWords) {
             "a panic at fit_frame+0x0 (0x20001000), in the main loop, fitting, 4 min after its "
             "start");
 
+  EXPECT_EQ(crash_text(with_places(record_of(CRASH_OVERFLOW), symbols)).substr(0, 37),
+            "the stack overflowed at fit_frame+0x0");
+
   crash_record record = record_of(CRASH_WATCHDOG);
   record.stuck = CRASH_STUCK_SCAN | CRASH_STUCK_USB;
   record.exception = 16 + 23;
