@@ -71,6 +71,14 @@ test('so does the null page, for loads too', () => {
   assert.equal(results[0], 7);
 });
 
+for (const [what, base, log2, at] of [['in SRAM', '0x20020000', 12, '0x20020101'], ['at 0', '0', 8, '0x11']]) {
+  test(`and so does a jump there, ${what}`, () => {
+    const { results } = run(`void isr(void) { RESULT(0) = 7; done(); }
+      void main(void) { RESULT(0) = 0; ${DENY(base, log2)} ((void (*)(void))${at})(); }`);
+    assert.equal(results[0], 7);
+  });
+}
+
 failsWith('MPU with subregions', main('REG(0xe000ed9c) = 0x20020010; REG(0xe000eda0) = 1 << 28 | 0xff00 | 11 << 1 | 1;'), /only whole regions/);
 
 test('before its clocks the watchdog counts ticks of the ring oscillator', () => {

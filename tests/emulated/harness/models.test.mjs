@@ -314,6 +314,10 @@ test('faults and host script: what is wrong is named', () => {
     ['[{"type":"sensor_dead","sensor":15,"from_s":0}]', /"sensor" must be 0..14/],
     ['[{"type":"mux_stuck","mux":0}]', /"from_s"/], ['[{"type":"host_stall","from_s":2,"to_s":1}]', /"to_s"/],
     ['[{"type":"host_stall","from_s":2,"mux":1}]', /key "mux"/],
+    ['[{"type":"sram_upset","from_s":1,"address":536870912,"bytes":"f"}]', /"bytes" must be pairs of hexadecimal digits/],
+    ['[{"type":"sram_upset","from_s":1,"address":268435456,"bytes":"ff"}]', /"address" must be one of SRAM/],
+    ['[{"type":"sram_upset","from_s":1,"address":537141247,"bytes":"ffff"}]', /"address" must be one of SRAM/],
+    ['[{"type":"sram_upset","from_s":1,"address":536870912,"bytes":"ff","to_s":2}]', /key "to_s"/],
   ]) assert.throws(() => parseFaults(text, 'f', limits), message);
   assert.deepEqual(parseHostScript('# a\n1 dtr 1\n\n2 0aff # b\n3 baud 1200', 'h').map((s) => s.t_s), [1, 2, 3]);
   for (const bad of ['x dtr 1', '1 dtr 2', '1 0a f', '1 baud 0', '1']) assert.throws(() => parseHostScript(bad, 'h'), /^Error: h:1:|h:1:/);
