@@ -23,11 +23,12 @@ file(CONFIGURE OUTPUT ${OUTPUT} CONTENT [[
   enum { name##_at = sizeof mark - 1 }
 MARKED(git_hash, "fingertip-version=@VERSION@ fingertip-git=", "@hash@");
 MARKED(board, "fingertip-board=", "@BOARD@");
+MARKED(scene, "fingertip-scene=", "@SCENE@");
 
 const struct build_info build_info = {
     .version = {@version_bytes@},
     .git_hash = git_hash + git_hash_at,
     .board = board + board_at,
-    .scene = "@SCENE@",
+    .scene = scene + scene_at,
 };
 ]] @ONLY)

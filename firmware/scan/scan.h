@@ -188,7 +188,7 @@ static inline bool scan_rests(const struct scan *scan) {
  * the bus does, it does so at least each 100 ms. */
 #define SCAN_WAIT_MAX_us 2000000u
 static inline bool scan_is_well(const struct scan *scan, uint64_t now_us) {
-  return !scan->operation_running && scan->wait_until_us - now_us < SCAN_WAIT_MAX_us;
+  return scan->wait_until_us - now_us < SCAN_WAIT_MAX_us; /* past while an operation runs */
 }
 
 /* Main context. Effective from the next frame, for which the old rate's pause is cut short.

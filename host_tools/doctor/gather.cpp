@@ -47,6 +47,7 @@ std::string usual_elf(const wire_info &info) {
   return "build/" + board + "/fingertip-" + board + ".elf";
 }
 
+/* An image is known by what cmake/write_build_info.cmake marks in it. */
 Crash told_crash(const crash_record &record, const wire_info &info, const std::string &elf) {
   std::string path = elf.empty() ? usual_elf(info) : elf;
   std::error_code ignored;
@@ -54,7 +55,11 @@ Crash told_crash(const crash_record &record, const wire_info &info, const std::s
     return with_places(record, std::nullopt);
   }
   Symbols symbols = Symbols::of_file(path);
-  if (symbols.holds(text_field(info.git_hash)) && symbols.holds(text_field(info.board))) {
+  auto is_marked = [&](const std::string &mark, const char *field) {
+    return symbols.holds("fingertip-" + mark + "=" + text_field(field) + '\0');
+  };
+  if (is_marked("git", info.git_hash) && is_marked("board", info.board) &&
+      is_marked("scene", info.scene)) {
     return with_places(record, symbols);
   }
   Crash crash = with_places(record, std::nullopt);
@@ -63,15 +68,16 @@ Crash told_crash(const crash_record &record, const wire_info &info, const std::s
 }
 
 /* Nothing of firmware that does not know the question. */
-std::optional<crash_record> ask_for_crash(Session &session) {
+void ask_for_crash(Session &session, Facts &facts, const std::string &elf) {
   try {
     crash_record record = session.crash().body.crash;
-    return record.kind == CRASH_NONE ? std::nullopt : std::optional(record);
+    if (record.kind != CRASH_NONE) {
+      facts.crash = told_crash(record, *facts.info, elf);
+    }
   } catch (const Error &error) {
     if (error.code() != ErrorCode::unknown_command) {
       throw;
     }
-    return std::nullopt;
   }
 }
 
@@ -86,10 +92,7 @@ void measure(Session &session, Facts &facts, const std::string &elf, double seco
     meter.add(packet);
   });
   facts.before = session.health().body.health;
-  std::optional<crash_record> crash = ask_for_crash(session);
-  if (crash) {
-    facts.crash = told_crash(*crash, *facts.info, elf);
-  }
+  ask_for_crash(session, facts, elf);
   LineStatistics before = session.statistics();
   session.command(
       command_stream(possible_streams(*facts.info, WIRE_STREAM_CONTACT | WIRE_STREAM_RAW)),
@@ -106,6 +109,7 @@ void measure(Session &session, Facts &facts, const std::string &elf, double seco
   facts.line = less(session.statistics(), before);
   facts.rest = meter.result();
   facts.after = session.health().body.health;
+  ask_for_crash(session, facts, elf); /* it may have crashed meanwhile */
   session.on_packet({});
   session.command(command_stream(0), PATIENCE);
 }
