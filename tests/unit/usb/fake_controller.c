@@ -1,5 +1,6 @@
 #include "fake_controller.h"
 
+#include "port/port.h"
 #include "port/usb_controller.h"
 #include "unity.h"
 
@@ -27,6 +28,7 @@ static struct {
   bool service_requested;
   bool take_at_next_withdrawal;
   bool host_follows;
+  unsigned signs_of_life;
 } fake;
 
 static struct endpoint *find(uint8_t endpoint) {
@@ -59,6 +61,22 @@ void usb_controller_request_service(void) {
   fake.service_requested = true;
   if (!fake.interrupts_held)
     fake_run_interrupts();
+}
+
+void port_alive(enum port_part part) {
+  TEST_ASSERT_EQUAL(PORT_PART_USB, part);
+  TEST_ASSERT_TRUE(fake.in_interrupt);
+  fake.signs_of_life++;
+}
+
+unsigned fake_signs_of_life(void) {
+  return fake.signs_of_life;
+}
+
+void fake_service(void) {
+  enter_interrupt();
+  usb_device_on_service();
+  leave_interrupt();
 }
 
 void usb_controller_set_address(uint8_t address) {

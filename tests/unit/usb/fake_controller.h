@@ -24,6 +24,11 @@ void fake_take_at_next_withdrawal(void);
 
 bool fake_accepts(uint8_t endpoint);
 
+/* The controller asks by itself whether USB is looked after; how often it was said since power-on
+ * that it is. */
+void fake_service(void);
+unsigned fake_signs_of_life(void);
+
 void host_bus_reset(void);
 void host_suspend(void);
 void host_resume(void);

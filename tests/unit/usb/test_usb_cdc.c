@@ -272,6 +272,16 @@ static void test_1200_baud_asks_for_the_loader(void) {
   TEST_ASSERT_TRUE(cdc_loader_requested());
 }
 
+/* Whether anybody is there or not. */
+static void test_each_service_is_a_sign_of_life(void) {
+  const unsigned before = fake_signs_of_life();
+  fake_service();
+  TEST_ASSERT_EQUAL(before + 1, fake_signs_of_life());
+  host_suspend();
+  fake_service();
+  TEST_ASSERT_EQUAL(before + 2, fake_signs_of_life());
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_every_length_arrives_without_waiting_for_more);
@@ -289,5 +299,6 @@ int main(void) {
   RUN_TEST(test_line_coding_is_kept);
   RUN_TEST(test_line_coding_of_another_length_than_announced_stalls);
   RUN_TEST(test_1200_baud_asks_for_the_loader);
+  RUN_TEST(test_each_service_is_a_sign_of_life);
   return UNITY_END();
 }
