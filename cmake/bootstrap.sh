@@ -137,7 +137,8 @@ case $1 in
     [ -t 0 ] && [ -t 1 ] && stay=--stay
     exec sh host_tools/demo/demo.sh $stay
     ;;
-  test) exec ctest --preset host -j 2 ;;
+  # One more than there are processors: many tests wait most of the time.
+  test) exec ctest --preset host -j "$(($(nproc) + 1))" ;;
   report)
     say "the fit: error against run time"
     /usr/bin/python3 host_tools/report/fit/fit.py --build build/host \
