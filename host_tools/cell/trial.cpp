@@ -41,7 +41,8 @@ bool holds(const grip_report &report) {
 class SetPoint {
 public:
   explicit SetPoint(const Trial &trial) : trial_(trial) {}
-  void look(double t_s, double felt_N, double width_mm, double touched_s) {
+  // closed_mm: since the touch
+  void look(double t_s, double felt_N, double width_mm, double touched_s, double closed_mm) {
     const double off = felt_N / trial_.set_N - 1.0;
     if (std::abs(off) > NEAR && !settle_s_) {
       near_s_ = NEVER_s;
@@ -54,6 +55,9 @@ public:
     if (settle_s_) {
       squares_ += off * off;
       samples_++;
+      // Rounding, uniform over a step; rubber's force grows as its indentation to the 1.6.
+      const double step = 1.6 * trial_.gripper.traits.step_mm / std::max(closed_mm, 0.1);
+      step_squares_ += step * step / 12.0;
     }
     if (t_s - touched_s < 0.5 * trial_.still_s) {
       width_mm_ = width_mm;
@@ -67,12 +71,13 @@ public:
   void tell(Outcome &outcome) const {
     outcome.settle_s = settle_s_;
     outcome.rms = samples_ > 0 ? std::sqrt(squares_ / samples_) : 0.0;
+    outcome.rms_of_steps = samples_ > 0 ? std::sqrt(step_squares_ / samples_) : 0.0;
     outcome.reversals = reversals_;
   }
 
 private:
   const Trial &trial_;
-  double near_s_ = NEVER_s, width_mm_ = 0.0, squares_ = 0.0;
+  double near_s_ = NEVER_s, width_mm_ = 0.0, squares_ = 0.0, step_squares_ = 0.0;
   std::optional<double> settle_s_;
   int samples_ = 0, direction_ = 0, reversals_ = 0;
 };
@@ -228,8 +233,9 @@ private:
       put_between();
     }
     outcome_.peak_N = std::max(outcome_.peak_N, force_N());
-    if (force_N() > TOUCHED_N) {
-      touched_s_ = std::min(touched_s_, t_s_);
+    if (force_N() > TOUCHED_N && touched_s_ == NEVER_s) {
+      touched_s_ = t_s_;
+      touched_mm_ = gripper_.motion().width_mm();
     }
     if (lift_s_ < NEVER_s) {
       slips_.look(since_lift_s(t_s_), cell_);
@@ -322,7 +328,8 @@ private:
     if (trial_.still_s > 0.0 && touched_s_ < NEVER_s) {
       const double smaller_N = 1e-3 * std::min(felt_[0].force_mN, felt_[1].force_mN);
       set_point_.look(t_s_, trial_.set_of_smaller ? smaller_N : felt_N,
-                      1e-3 * gripper_.sent().width_um, touched_s_);
+                      1e-3 * gripper_.sent().width_um, touched_s_,
+                      touched_mm_ - gripper_.motion().width_mm());
     }
     const double since_s = lift_s_ < NEVER_s ? since_lift_s(t_s_) : -1.0;
     if (since_s >= trial_.scene.lift_s) {
@@ -388,7 +395,8 @@ private:
   double began_mm_ = 0.0, stepped_s_ = 0.0, answered_s_ = 0.0;
   double slick_s_ = NEVER_s, slick_share_ = 1.0;
   double t_s_ = 0.0, sample_s_ = 0.0;
-  double touched_s_ = NEVER_s, held_s_ = NEVER_s, lift_at_s_ = NEVER_s, lift_s_ = NEVER_s;
+  double touched_mm_ = 0.0, touched_s_ = NEVER_s, held_s_ = NEVER_s, lift_at_s_ = NEVER_s,
+         lift_s_ = NEVER_s;
 };
 
 } // namespace

@@ -103,6 +103,7 @@ struct Outcome {
   // Of a still trial.
   std::optional<double> settle_s; // from the touch until it stays within 10 % for SETTLED_s
   double rms = 0.0;               // of the error, share of the set force, from there on
+  double rms_of_steps = 0.0;      // what rounding the width to the gripper's steps makes alone
   int reversals = 0;              // of the commanded width over the last half of the time
   std::uint32_t trouble = 0;      // all that was ever on while holding
   Failed failed;

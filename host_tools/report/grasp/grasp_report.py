@@ -16,7 +16,8 @@ COLUMNS = {"gripper": "gripper", "about": "what", "object": "object", "friction"
            "reaction_after_lift_p50_ms": "after the lift: p50", "slid_p95_mm": "slid, mm: p95", "disturbance_slip_p95_mm": "by disturbances: p95",
            "peak_p95_N": "largest grip, N: p95"}
 STILL = {"gripper": "gripper", "about": "what", "grasps": "grasps", "settle_p50_s": "settles within, s: p50", "settle_p95_s": "p95",
-         "never_settled_percent": "never, %", "rms_p50_percent": "rms error, %: p50", "limit_cycles": "limit cycles"}
+         "never_settled_percent": "never, %", "rms_p50_percent": "rms error, %: p50",
+         "rms_of_steps_p50_percent": "of it by rounding to the gripper's steps", "limit_cycles": "limit cycles"}
 ABOUT = """Written by `sh cmake/bootstrap.sh report`. Simulated rubber, objects, sensors and grippers; the controller and the fingertips' code are the
 firmware's own. Nothing was checked on hardware.
 

@@ -34,7 +34,7 @@ ordered_json percent(std::size_t part, std::size_t whole) {
 ordered_json summary(const std::vector<const Done *> &all, bool still) {
   std::size_t drops = 0, never = 0, unanswered = 0, cycles = 0, unsettled = 0;
   std::vector<double> margin, reaction_ms, later_ms, slid_mm, disturbed_mm, peak_N, holding_s,
-      settle_s, rms;
+      settle_s, rms, rms_of_steps;
   for (const Done *one : all) {
     const Outcome &o = one->outcome;
     drops += o.dropped ? 1 : 0;
@@ -46,6 +46,7 @@ ordered_json summary(const std::vector<const Done *> &all, bool still) {
       settle_s.push_back(o.settle_s.value_or(std::numeric_limits<double>::infinity()));
       if (o.settle_s) {
         rms.push_back(100.0 * o.rms);
+        rms_of_steps.push_back(100.0 * o.rms_of_steps);
       }
       continue;
     }
@@ -75,6 +76,7 @@ ordered_json summary(const std::vector<const Done *> &all, bool still) {
     out["settle_p95_s"] = quantile(settle_s, 0.95);
     out["never_settled_percent"] = percent(unsettled, all.size());
     out["rms_p50_percent"] = quantile(rms, 0.5);
+    out["rms_of_steps_p50_percent"] = quantile(rms_of_steps, 0.5);
     out["limit_cycles"] = cycles;
     return out;
   }
