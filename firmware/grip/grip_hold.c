@@ -5,6 +5,7 @@
 #define RATE_us 20000
 /* Beyond the actuator's latency, until what is wanted acts. */
 #define AHEAD_us 8000
+#define AHEAD_MIN_us 20000
 #define AHEAD_MAX_us 80000
 
 /* A slide raises the grip at once by so much, and again each time the gripper has had the time to
@@ -116,7 +117,7 @@ static int32_t least_force(const struct grip *grip, bool told) {
 /* What the load of some time ahead needs. */
 static int32_t load_force(const struct grip *grip) {
   const struct grip_hold *hold = &grip->hold;
-  int32_t ahead_us = grip_clamp(grip->traits.latency_us + AHEAD_us, 0, AHEAD_MAX_us);
+  int32_t ahead_us = grip_clamp(grip->traits.latency_us + AHEAD_us, AHEAD_MIN_us, AHEAD_MAX_us);
   int32_t load_mN = hold->load_mN + grip_scale(hold->rate_mN_s, ahead_us, 1000000);
   return grip_scale(load_mN, grip->settings.margin_permille, hold->friction_permille);
 }
