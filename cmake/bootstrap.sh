@@ -60,6 +60,8 @@ LIST
   [ "$1" = demo ] || cat << 'LIST'
 clang-14 clang-14
 /usr/share/doc/libclang-rt-14-dev libclang-rt-14-dev
+lintian lintian
+/usr/sbin/debootstrap debootstrap
 LIST
 }
 

@@ -1,0 +1,98 @@
+"""The Debian packages: what lintian says, and installed, used and removed in a bare Debian.
+
+usage: test_package.py --cpack CPACK --build FOLDER --fingertip PROGRAM --fake-device PROGRAM
+"""
+import argparse
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+TOOLS = argparse.Namespace()
+PATIENCE_s = 600
+
+
+def run(*command, **options):
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, timeout=PATIENCE_s, **options)
+    if done.returncode:
+        raise AssertionError(f"{command}: {done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def codename():
+    lines = pathlib.Path("/etc/os-release").read_text().splitlines()
+    return dict(line.split("=", 1) for line in lines if "=" in line)["VERSION_CODENAME"]
+
+
+class Package(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        holder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
+        cls.addClassCleanup(holder.cleanup)
+        cls.folder = pathlib.Path(holder.name)
+        run(TOOLS.cpack, "--config", pathlib.Path(TOOLS.build) / "CPackConfig.cmake", "-B", cls.folder / "packages")
+        cls.packages = sorted((cls.folder / "packages").glob("*.deb"))
+
+    def test_three_packages(self):
+        names = [run("dpkg-deb", "--field", package, "Package").strip() for package in self.packages]
+        version = run(TOOLS.fingertip, "--version").split()[1]
+        self.assertEqual(names, ["fingertip", "libfingertip-dev", f"libfingertip{version.rsplit('.', 1)[0]}"])
+        for package in self.packages:
+            self.assertEqual(run("dpkg-deb", "--field", package, "Version").strip(), version)
+        held = run("dpkg-deb", "--contents", self.packages[0])
+        for path in ("bin/fingertip", "lib/udev/rules.d/60-fingertip.rules", "lib/systemd/user/fingertip.service", "share/man/man1/fingertip.1.gz",
+                     "share/bash-completion/completions/fingertip"):
+            self.assertIn(f"./usr/{path}\n", held)
+
+    def test_lintian_is_content(self):
+        if not shutil.which("lintian"):
+            self.skipTest("lintian is not here")
+        done = subprocess.run(["lintian", "--fail-on", "error,warning", *self.packages], capture_output=True, text=True, timeout=PATIENCE_s)
+        self.assertEqual((done.returncode, done.stdout), (0, ""), done.stderr)
+
+    def test_in_a_bare_debian(self):
+        if os.geteuid() != 0 or not shutil.which("debootstrap"):
+            self.skipTest("a bare Debian needs root and debootstrap")
+        bare = self.folder / "bare"
+        mirror = run("apt-get", "indextargets", "--format", "$(SITE)", "Created-By: Packages").splitlines()[0]
+        run("debootstrap", "--variant=minbase", codename(), bare, mirror)
+        before = set(run("find", bare, "-xdev", "-not", "-path", f"{bare}/var/*", "-not", "-path", f"{bare}/tmp/*").split("\n"))
+
+        def inside(*command):
+            return run("chroot", bare, *command, env={**os.environ, "DEBIAN_FRONTEND": "noninteractive", "LC_ALL": "C"})
+
+        for package in self.packages:
+            shutil.copy(package, bare / "tmp")
+        inside("apt-get", "-qq", "-y", "install", "--no-install-recommends", *(f"/tmp/{package.name}" for package in self.packages))
+        self.assertEqual(inside("fingertip", "--version"), run(TOOLS.fingertip, "--version"))
+        self.assertEqual(inside("fingertip", "rule"), (bare / "usr/lib/udev/rules.d/60-fingertip.rules").read_text())
+        self.assertIn("libfingertip.so", inside("ldconfig", "-p"))
+        recording = self.record()
+        shutil.copy(recording, bare / "tmp/press.csv")
+        inside("fingertip", "replay", "/tmp/press.csv", "--to-csv", "/tmp/again.csv")
+        run(TOOLS.fingertip, "replay", recording, "--to-csv", self.folder / "again.csv")
+        self.assertEqual((bare / "tmp/again.csv").read_bytes(), (self.folder / "again.csv").read_bytes())
+        self.assertGreater(len((bare / "tmp/again.csv").read_bytes()), 10000)
+        names = [package.name.split("_")[0] for package in self.packages]
+        inside("apt-get", "-qq", "-y", "purge", "--auto-remove", *names)
+        after = set(run("find", bare, "-xdev", "-not", "-path", f"{bare}/var/*", "-not", "-path", f"{bare}/tmp/*").split("\n"))
+        self.assertEqual({path for path in after - before if "fingertip" in path}, set())
+
+    def record(self):
+        port, recording = self.folder / "tty", self.folder / "press.csv"
+        device = subprocess.Popen([TOOLS.fake_device, port, "frames=100"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.addCleanup(device.wait)
+        self.addCleanup(device.kill)
+        run("timeout", "-s", "INT", "20", TOOLS.fingertip, "record", recording, "--port", port, "--seconds", "1")
+        return recording
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    for name in ("cpack", "build", "fingertip", "fake-device"):
+        parser.add_argument(f"--{name}", required=True)
+    _, rest = parser.parse_known_args(namespace=TOOLS)
+    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
