@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 TOOLS = argparse.Namespace()
@@ -57,6 +58,7 @@ class Package(unittest.TestCase):
         if os.geteuid() != 0 or not shutil.which("debootstrap"):
             self.skipTest("a bare Debian needs root and debootstrap")
         bare = self.folder / "bare"
+        recording = self.record()
         mirror = run("apt-get", "indextargets", "--format", "$(SITE)", "Created-By: Packages").splitlines()[0]
         run("debootstrap", "--variant=minbase", codename(), bare, mirror)
         before = set(run("find", bare, "-xdev", "-not", "-path", f"{bare}/var/*", "-not", "-path", f"{bare}/tmp/*").split("\n"))
@@ -70,12 +72,13 @@ class Package(unittest.TestCase):
         self.assertEqual(inside("fingertip", "--version"), run(TOOLS.fingertip, "--version"))
         self.assertEqual(inside("fingertip", "rule"), (bare / "usr/lib/udev/rules.d/60-fingertip.rules").read_text())
         self.assertIn("libfingertip.so", inside("ldconfig", "-p"))
-        recording = self.record()
         shutil.copy(recording, bare / "tmp/press.csv")
         inside("fingertip", "replay", "/tmp/press.csv", "--to-csv", "/tmp/again.csv")
         run(TOOLS.fingertip, "replay", recording, "--to-csv", self.folder / "again.csv")
-        self.assertEqual((bare / "tmp/again.csv").read_bytes(), (self.folder / "again.csv").read_bytes())
-        self.assertGreater(len((bare / "tmp/again.csv").read_bytes()), 10000)
+        there, here = ([line for line in path.read_text().splitlines() if "press.csv" not in line]  # where it came from
+                       for path in (bare / "tmp/again.csv", self.folder / "again.csv"))
+        self.assertEqual(there, here)
+        self.assertGreater(len(here), 100)
         names = [package.name.split("_")[0] for package in self.packages]
         inside("apt-get", "-qq", "-y", "purge", "--auto-remove", *names)
         after = set(run("find", bare, "-xdev", "-not", "-path", f"{bare}/var/*", "-not", "-path", f"{bare}/tmp/*").split("\n"))
@@ -83,10 +86,13 @@ class Package(unittest.TestCase):
 
     def record(self):
         port, recording = self.folder / "tty", self.folder / "press.csv"
-        device = subprocess.Popen([TOOLS.fake_device, port, "frames=100"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        device = subprocess.Popen([TOOLS.fake_device, port, "frames=300"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.addCleanup(device.wait)
         self.addCleanup(device.kill)
-        run("timeout", "-s", "INT", "20", TOOLS.fingertip, "record", recording, "--port", port, "--seconds", "1")
+        end_s = time.monotonic() + PATIENCE_s
+        while not os.path.lexists(port) and time.monotonic() < end_s:
+            time.sleep(0.02)
+        run("timeout", "-s", "INT", "20", TOOLS.fingertip, "record", recording, "--port", port, "--seconds", "1", "--until-gone")
         return recording
 
 
