@@ -11,7 +11,7 @@ struct bytes {
 
 static struct {
   const struct cdc_identity *identity;
-  bool open, stalled, loader_requested;
+  bool wanted, suspended, stalled, loader_requested; /* wanted: the host has the port open */
   uint32_t close_count, news;
   struct bytes queued;   /* device to host, not read by the host */
   struct bytes received; /* by the host */
@@ -61,18 +61,35 @@ static void deliver(void) {
   cdc.queued.length = 0;
 }
 
-void native_cdc_open(void) {
-  cdc.open = cdc.identity != NULL;
-}
-
-void native_cdc_close(void) {
-  if (cdc.open) {
+static void lose_what_is_queued(bool was_open) {
+  if (was_open) {
     cdc.close_count++;
     cdc.news++;
   }
-  cdc.open = false;
   cdc.queued.length = 0;
   cdc.sent.length = 0;
+}
+
+void native_cdc_open(void) {
+  cdc.wanted = cdc.identity != NULL;
+}
+
+void native_cdc_close(void) {
+  const bool was_open = cdc_is_open();
+  cdc.wanted = false;
+  lose_what_is_queued(was_open);
+}
+
+void native_cdc_suspend(bool suspended) {
+  if (suspended == cdc.suspended) {
+    return;
+  }
+  const bool was_open = cdc_is_open();
+  cdc.suspended = suspended;
+  cdc.news++;
+  if (suspended) {
+    lose_what_is_queued(was_open);
+  }
 }
 
 void native_cdc_stall(bool stalled) {
@@ -103,11 +120,11 @@ void cdc_start(const struct cdc_identity *identity) {
 }
 
 bool cdc_is_open(void) {
-  return cdc.open;
+  return cdc.wanted && !cdc.suspended;
 }
 
 bool cdc_is_suspended(void) {
-  return false;
+  return cdc.suspended;
 }
 
 uint32_t cdc_news(void) {
@@ -122,7 +139,7 @@ enum ft_status cdc_write(const uint8_t *bytes, size_t length) {
   if (length > NATIVE_CDC_TRANSMIT_BYTES) {
     return FT_ERR_ARGUMENT;
   }
-  if (!cdc.open) {
+  if (!cdc_is_open()) {
     return FT_OK;
   }
   if (cdc.queued.length + length > NATIVE_CDC_TRANSMIT_BYTES) {

@@ -24,6 +24,10 @@ void native_cdc_close(void);
  * on, it gets the queue. */
 void native_cdc_stall(bool stalled);
 
+/* The bus falls asleep or wakes up: asleep the port is closed. It keeps what the host wants of it:
+ * one that was open is so again. */
+void native_cdc_suspend(bool suspended);
+
 /* The host writes; the device gets the bytes at its next reads. FT_ERR_SPACE: the
  * device would hold off the host, none was taken. */
 enum ft_status native_cdc_send(const uint8_t *bytes, size_t length);

@@ -87,6 +87,16 @@ void sim_array_vary_parts(struct sim_array *array, double share) {
   }
 }
 
+void sim_array_restart_bus(struct sim_array *array, uint64_t elapsed_us) {
+  array->operation = SIM_ARRAY_IDLE;
+  array->hangs = false;
+  array->needs_recovery = false;
+  for (unsigned k = 0; k < array->sensor_count; k++) {
+    uint64_t *busy_until_us = &array->sensor[k].busy_until_us;
+    *busy_until_us -= *busy_until_us < elapsed_us ? *busy_until_us : elapsed_us;
+  }
+}
+
 static bool strikes(const struct sim_array *array, enum sim_fault_kind kind) {
   return array->fault.kind == kind && array->fault.transfer == array->transfers;
 }

@@ -97,6 +97,10 @@ void sim_array_init(struct sim_array *array, uint8_t sensor_count, uint64_t seed
  * The sensors are as after power-up. */
 void sim_array_vary_parts(struct sim_array *array, double share);
 
+/* Who drives the bus starts anew, and its time at 0, so long after its last start: what was under
+ * way on the bus is no more, what the sensors do goes on. */
+void sim_array_restart_bus(struct sim_array *array, uint64_t elapsed_us);
+
 /* The array as the firmware sees it; valid as long as *array stays where it is. */
 const struct array_bus *sim_array_bus(struct sim_array *array);
 

@@ -1,0 +1,380 @@
+#include "judge.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+
+namespace soak {
+namespace {
+
+constexpr std::uint32_t WARNINGS = 0x7FF00;
+// More are counted, but not told.
+constexpr std::size_t TOLD = 10;
+// The line and its queue take less, where the host reads.
+constexpr std::uint64_t ANSWER_LIMIT_us = 2500000;
+// What is pressed less than this, or than such a part of what was pressed in the last minute, the
+// gate may take for a zero that has moved (condition.h).
+constexpr double FELT_Pa = 600, FELT_SHARE = 0.25;
+constexpr std::uint64_t FELT_FOR_us = 100000, MEMORY_us = 60000000;
+// A contact may close that late.
+constexpr std::uint64_t RELEASED_FOR_us = 300000;
+constexpr double UPTIME_LAG_s = 2.5;
+
+__attribute__((format(printf, 1, 2))) std::string text(const char *format, ...) {
+  char out[400];
+  va_list values;
+  va_start(values, format);
+  std::vsnprintf(out, sizeof out, format, values);
+  va_end(values);
+  return out;
+}
+
+template <typename T> unsigned long long number(T value) {
+  return static_cast<unsigned long long>(value);
+}
+
+bool is_frame(const wire_packet &packet) {
+  return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW;
+}
+
+} // namespace
+
+void Judge::find(const std::string &kind, std::uint64_t t_us, const std::string &what) {
+  std::uint64_t *count = kind == "time"      ? &figures_.time
+                         : kind == "loss"    ? &figures_.loss
+                         : kind == "damaged" ? &figures_.damaged
+                         : kind == "answer"  ? &figures_.answer
+                         : kind == "wrong"   ? &figures_.wrong
+                                             : nullptr;
+  if (count) {
+    ++*count;
+  }
+  if (findings_.size() < TOLD) {
+    findings_.push_back({kind, t_us, what + "; " + scene_});
+  }
+}
+
+void Judge::wrong(std::uint64_t t_us, const std::string &what) {
+  if (t_us < excused_until_us_) {
+    figures_.excused++;
+  } else {
+    find("wrong", t_us, what);
+  }
+  good_in_a_row_ = 0;
+}
+
+std::uint64_t Judge::bench_us(std::uint64_t device_us) const {
+  return static_cast<std::uint64_t>(std::max(0.0, zero_us_ + static_cast<double>(device_us)));
+}
+
+void Judge::begin_life(std::uint64_t t_us) {
+  close(t_us);
+  zero_us_ = static_cast<double>(t_us);
+  last_answer_us_ = last_frame_us_ = raw_us_ = 0;
+  contact_frame_.reset();
+  raw_frame_.reset();
+  health_of_life_.reset();
+}
+
+void Judge::open(std::uint64_t) {
+  open_ = true;
+  joining_ = true;
+  wire_receiver_init(&receiver_, wire_all_layouts);
+  sequence_.reset();
+  session_missing_ = 0;
+  contact_follows_ = false;
+  counted_.reset();
+  asked_.clear();
+}
+
+void Judge::close(std::uint64_t t_us) {
+  if (open_ && session_missing_ == 0) {
+    for (const auto &[sequence, question] : asked_) {
+      if (t_us > question.t_us + ANSWER_LIMIT_us && last_frame_heard_us_ > question.t_us) {
+        find("loss", t_us,
+             text("command 0x%02x of %llu us was not answered", question.type,
+                  number(question.t_us)));
+      }
+    }
+  }
+  open_ = false;
+}
+
+void Judge::sent(std::uint64_t t_us, const wire_packet &command) {
+  asked_[command.sequence] = {command.type, t_us, command.t_us};
+}
+
+void Judge::received(std::uint64_t t_us, const std::uint8_t *bytes, std::size_t count) {
+  if (!open_) {
+    return; // what a host reads after it has closed is nobody's
+  }
+  for (std::size_t i = 0; i < count; i++) {
+    wire_packet heard;
+    const ft_status status = wire_receive(&receiver_, bytes[i], &heard);
+    if (status == FT_OK) {
+      packet(t_us, heard);
+    } else if (status != FT_PENDING && !joining_) {
+      find("damaged", t_us, text("a damaged packet (%d)", static_cast<int>(status)));
+    }
+    joining_ = joining_ && bytes[i] != 0;
+  }
+}
+
+void Judge::count_sequence(std::uint64_t t_us, const wire_packet &packet) {
+  const std::uint16_t gap =
+      sequence_ ? static_cast<std::uint16_t>(packet.sequence - *sequence_ - 1) : 0;
+  sequence_ = packet.sequence;
+  session_missing_ += gap;
+  figures_.missing += gap;
+  if (gap > 0) {
+    contact_follows_ = false;
+  }
+  if (gap >= 0x8000) {
+    find("loss", t_us, text("the sequence numbers go back by %u", 0x10000u - gap));
+  }
+  if (counted_) {
+    counted_->missing += gap;
+  }
+}
+
+void Judge::check_clock(std::uint64_t t_us, const wire_packet &packet) {
+  if (bench_us(packet.t_us) > t_us) {
+    find("time", t_us,
+         text("packet 0x%02x is of %llu us, which is still to come", packet.type,
+              number(packet.t_us)));
+  }
+  if (is_frame(packet)) {
+    const std::uint64_t other_us = packet.type == WIRE_CONTACT ? raw_us_ : last_frame_us_;
+    if (packet.t_us < other_us) {
+      find("time", t_us,
+           text("frame of %llu us after one of %llu us", number(packet.t_us), number(other_us)));
+    }
+    return;
+  }
+  if (packet.t_us < last_answer_us_ || packet.t_us < last_frame_us_) {
+    find("time", t_us,
+         text("answer of %llu us after %llu us", number(packet.t_us),
+              number(std::max(last_answer_us_, last_frame_us_))));
+  }
+  last_answer_us_ = packet.t_us;
+}
+
+void Judge::packet(std::uint64_t t_us, const wire_packet &packet) {
+  count_sequence(t_us, packet);
+  check_clock(t_us, packet);
+  switch (packet.type) {
+  case WIRE_CONTACT:
+    judge_contact(t_us, packet);
+    break;
+  case WIRE_RAW:
+    judge_raw(t_us, packet);
+    break;
+  case WIRE_HEALTH:
+    judge_health(t_us, packet);
+    break;
+  case WIRE_ACK:
+    judge_ack(t_us, packet);
+    break;
+  default:
+    break;
+  }
+  if (counted_) {
+    counted_->received++;
+  }
+}
+
+void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
+  const wire_contact &contact = packet.body.contact;
+  figures_.frames++;
+  if (contact_frame_) {
+    const std::int32_t step = static_cast<std::int32_t>(contact.frame - *contact_frame_);
+    if (step <= 0 || packet.t_us <= last_frame_us_) {
+      find("time", t_us,
+           text("frame %u of %llu us after frame %u of %llu us", contact.frame, number(packet.t_us),
+                *contact_frame_, number(last_frame_us_)));
+    } else if (contact_follows_) {
+      figures_.skipped += static_cast<std::uint64_t>(step - 1);
+      if (counted_) {
+        counted_->skipped += static_cast<std::uint64_t>(step - 1);
+      }
+    }
+  }
+  contact_frame_ = contact.frame;
+  contact_follows_ = true;
+  last_frame_us_ = packet.t_us;
+  last_frame_heard_us_ = t_us;
+  if (counted_) {
+    counted_->contacts++;
+  }
+  const wire_stages &s = contact.stages;
+  const unsigned sum =
+      s.convert_us + s.read_us + s.queue_us + s.condition_us + s.fit_us + s.contact_us;
+  if (s.total_us != 0xFFFF && sum != s.total_us) {
+    find("answer", t_us,
+         text("stages of frame %u add up to %u us, not %u", contact.frame, sum, s.total_us));
+  }
+  const std::uint32_t flags = contact.flags;
+  if (flags & CONTACT_FLAG_HELD) {
+    return; // it repeats the frame before
+  }
+
+  const std::uint64_t felt_us = bench_us(packet.t_us);
+  const Row truth = world_.at(felt_us);
+  const bool good = (flags & CONTACT_FLAG_TARED) &&
+                    !(flags & (CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_SENSOR_DOUBTFUL));
+  if (good && good_in_a_row_++ == 0) {
+    good_since_us_ = t_us;
+  }
+  good_in_a_row_ = good ? good_in_a_row_ : 0;
+
+  if (flags & WARNINGS) {
+    return;
+  }
+  if (flags & CONTACT_FLAG_FIT_VALID) {
+    figures_.unwarned++;
+    const double error_mm = std::hypot(static_cast<double>(contact.x_mm) - truth.x_mm,
+                                       static_cast<double>(contact.y_mm) - truth.y_mm);
+    const double force_N = truth.force_N();
+    const double error_N = std::fabs(static_cast<double>(contact.force_N) - force_N);
+    const double share = std::max(0.0, error_N - FORCE_BOUND_N) / std::max(force_N, 1e-9);
+    const bool touched =
+        truth.peak_Pa > 0 || felt_us < RELEASED_FOR_us ||
+        world_.at(felt_us - RELEASED_FOR_us).peak_Pa > 0;
+    if (!touched) {
+      wrong(t_us, text("frame %u says %.2f N where nothing touches", contact.frame,
+                       static_cast<double>(contact.force_N)));
+    } else if (truth.peak_Pa > FELT_Pa) {
+      if (error_mm > LOCATION_BOUND_mm || share > FORCE_BOUND_SHARE) {
+        wrong(t_us, text("frame %u, flags %05x: %.2f mm off, %.3f N instead of %.3f, at %.1f %.1f "
+                         "mm, sensors %04x, sd %.2f mm",
+                         contact.frame, flags, error_mm, static_cast<double>(contact.force_N),
+                         force_N, truth.x_mm, truth.y_mm, contact.sensors_used,
+                         static_cast<double>(contact.location_sd_mm)));
+      } else {
+        figures_.worst_mm = std::max(figures_.worst_mm, error_mm);
+        figures_.worst_force = std::max(figures_.worst_force, share);
+      }
+    }
+  } else if ((flags & CONTACT_FLAG_TARED) && !(flags & CONTACT_FLAG_CONTACT)) {
+    figures_.at_rest++;
+    const bool felt_long = felt_us >= FELT_FOR_us &&
+                           world_.at(felt_us - FELT_FOR_us).peak_Pa > FELT_Pa &&
+                           truth.peak_Pa > FELT_Pa;
+    if (felt_long) {
+      double strongest_Pa = 0;
+      for (std::uint64_t back_us = 0; back_us <= std::min(felt_us, MEMORY_us); back_us += 50000) {
+        strongest_Pa = std::max(strongest_Pa, world_.at(felt_us - back_us).peak_Pa);
+      }
+      if (truth.peak_Pa > FELT_SHARE * strongest_Pa) {
+        wrong(t_us, text("frame %u, flags %05x, says that nothing touches, where a sensor feels "
+                         "%.0f Pa",
+                         contact.frame, flags, truth.peak_Pa));
+      }
+    }
+  }
+}
+
+void Judge::judge_raw(std::uint64_t t_us, const wire_packet &packet) {
+  const wire_raw &raw = packet.body.raw;
+  if (raw_frame_ && static_cast<std::int32_t>(raw.frame - *raw_frame_) <= 0) {
+    find("time", t_us, text("readings of frame %u after frame %u", raw.frame, *raw_frame_));
+  }
+  raw_frame_ = raw.frame;
+  raw_us_ = packet.t_us;
+  const std::uint64_t felt_us = bench_us(packet.t_us);
+  const std::uint32_t trusted = raw.valid & ~raw.saturated & ~raw.doubtful;
+  for (unsigned k = 0; k < SENSORS; k++) {
+    if (!(trusted >> k & 1)) {
+      continue;
+    }
+    figures_.readings++;
+    const double off_Pa =
+        std::fabs(raw.pressure_Pa_q10[k] / 1024.0 - world_.pressure_Pa(k, felt_us));
+    if (off_Pa > READING_BOUND_Pa) {
+      wrong(t_us,
+            text("frame %u: sensor %u is off by %.0f Pa, flags %05x", raw.frame, k, off_Pa,
+                 raw.flags));
+    } else {
+      figures_.worst_Pa = std::max(figures_.worst_Pa, off_Pa);
+    }
+  }
+}
+
+void Judge::judge_health(std::uint64_t t_us, const wire_packet &packet) {
+  const wire_health &health = packet.body.health;
+  if (static_cast<std::uint16_t>(health.packets_sent + health.packets_dropped) !=
+      packet.sequence) {
+    find("loss", t_us,
+         text("%u packets sent and %u dropped before the one with number %u", health.packets_sent,
+              health.packets_dropped, packet.sequence));
+  }
+  const double uptime_s = 1e-6 * static_cast<double>(packet.t_us);
+  if (health.uptime_s > uptime_s || health.uptime_s < uptime_s - UPTIME_LAG_s) {
+    find("time", t_us, text("uptime %u s at %.3f s", health.uptime_s, uptime_s));
+  }
+  if (health_of_life_) {
+    const wire_health &before = *health_of_life_;
+    const std::uint32_t rises[] = {
+        health.frames - before.frames,
+        health.frames_incomplete - before.frames_incomplete,
+        health.frames_skipped - before.frames_skipped,
+        health.packets_sent - before.packets_sent,
+        health.packets_dropped - before.packets_dropped,
+        health.commands_done - before.commands_done,
+        health.commands_rejected - before.commands_rejected,
+        health.bus_nacks - before.bus_nacks,
+        health.bus_timeouts - before.bus_timeouts,
+        health.bus_recoveries - before.bus_recoveries,
+        health.zero_readings - before.zero_readings,
+        health.implausible_readings - before.implausible_readings,
+    };
+    if (std::any_of(std::begin(rises), std::end(rises),
+                    [](std::uint32_t rise) { return rise >= 0x80000000u; })) {
+      find("loss", t_us, "a counter of the health packet went back");
+    }
+  }
+  health_of_life_ = health;
+
+  Counted now{health};
+  if (counted_) {
+    const Counted &before = *counted_;
+    const std::uint32_t sent = health.packets_sent - before.health.packets_sent;
+    const std::uint32_t dropped = health.packets_dropped - before.health.packets_dropped;
+    if (before.received != sent || before.missing != dropped) {
+      find("loss", t_us,
+           text("%llu packets came and %llu are missing, where %u were sent and %u dropped",
+                number(before.received), number(before.missing), sent, dropped));
+    }
+    if (before.missing == 0) {
+      // One frame may wait for the processor at either health packet.
+      const std::uint32_t skipped = health.frames_skipped - before.health.frames_skipped;
+      const std::uint32_t frames = health.frames - before.health.frames - skipped;
+      now.contacts_over = before.contacts_over + static_cast<std::int64_t>(before.contacts) - frames;
+      now.skipped_over = before.skipped_over + static_cast<std::int64_t>(before.skipped) - skipped;
+      if (std::abs(now.contacts_over) > 1 || std::abs(now.skipped_over) > 1) {
+        find("loss", t_us,
+             text("%llu frames came and %llu were skipped, where %u were taken and %u skipped",
+                  number(before.contacts), number(before.skipped), frames, skipped));
+        now.contacts_over = now.skipped_over = 0;
+      }
+    }
+  }
+  counted_ = now;
+}
+
+void Judge::judge_ack(std::uint64_t t_us, const wire_packet &packet) {
+  const wire_ack &ack = packet.body.ack;
+  const auto question = asked_.find(ack.sequence);
+  if (question == asked_.end() || question->second.type != ack.command ||
+      question->second.host_time_us != ack.host_time_us) {
+    find("answer", t_us,
+         text("an answer to command 0x%02x with number %u, which was not sent", ack.command,
+              ack.sequence));
+    return;
+  }
+  asked_.erase(question);
+  figures_.answered++;
+}
+
+} // namespace soak

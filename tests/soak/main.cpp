@@ -1,0 +1,86 @@
+// One episode of a soak: see --help.
+#include "emulated_plant.hpp"
+#include "judge.hpp"
+#include "native_plant.hpp"
+#include "storm.hpp"
+#include "world.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+namespace soak {
+namespace {
+
+nlohmann::json told(const Storm &storm, const Judge &judge, std::uint64_t seed) {
+  const Figures &f = judge.figures();
+  nlohmann::json recovery = nlohmann::json::object();
+  for (const auto &[kind, found] : storm.recovery()) {
+    recovery[kind] = {{"bouts", found.bouts}, {"worst_s", found.worst_s}};
+  }
+  nlohmann::json findings = nlohmann::json::array();
+  for (const Finding &finding : judge.findings()) {
+    findings.push_back(finding.kind + " at " + std::to_string(1e-6 * static_cast<double>(finding.t_us)) +
+                       " s: " + finding.text);
+  }
+  return {{"seed", seed},
+          {"seconds", 1e-6 * static_cast<double>(storm.now_us())},
+          {"bouts", storm.bouts()},
+          {"frames", f.frames},
+          {"unwarned", f.unwarned},
+          {"at_rest", f.at_rest},
+          {"readings", f.readings},
+          {"missing", f.missing},
+          {"skipped", f.skipped},
+          {"answered", f.answered},
+          {"excused", f.excused},
+          {"hangs", storm.hangs()},
+          {"wrong_unflagged", f.wrong},
+          {"uncounted_losses", f.loss},
+          {"disorder", f.time + f.damaged + f.answer},
+          {"worst_mm", f.worst_mm},
+          {"worst_force", f.worst_force},
+          {"worst_Pa", f.worst_Pa},
+          {"recovery", recovery},
+          {"findings", findings}};
+}
+
+int run(int argc, char **argv) {
+  CLI::App app("One episode of a soak: a host uses a fingertip while one thing after another goes "
+               "wrong, and what the fingertip says is held against the truth. The same each time "
+               "for a seed. Prints one JSON object. Exit status 1 if anything was found");
+  std::uint64_t seed = 1;
+  double seconds = 600;
+  std::string board;
+  app.add_option("--seed", seed, "Of everything")->check(CLI::Range(1.0, 1e9));
+  app.add_option("--seconds", seconds, "Of device time")->check(CLI::Range(1.0, 86400.0));
+  app.add_option("--emulated", board,
+                 "Board; the bench is emulated.mjs at standard input and output, which starts this "
+                 "program. Default: boards/native, in this process")
+      ->check(CLI::IsMember({"pico_mux", "pico_parallel"}));
+  CLI11_PARSE(app, argc, argv);
+
+  World world(seed);
+  Judge judge(world);
+  std::unique_ptr<Plant> plant;
+  if (board.empty()) {
+    plant = std::make_unique<NativePlant>(world, seed);
+  } else {
+    plant = std::make_unique<EmulatedPlant>(world, board, std::cin, std::cout);
+  }
+  Storm storm(*plant, world, judge, seed);
+  storm.run_to(static_cast<std::uint64_t>(1e6 * seconds));
+  judge.close(storm.now_us());
+  const nlohmann::json result = told(storm, judge, seed);
+  std::cout << result << std::endl;
+  return judge.findings().empty() ? 0 : 1;
+}
+
+} // namespace
+} // namespace soak
+
+int main(int argc, char **argv) {
+  return soak::run(argc, argv);
+}
