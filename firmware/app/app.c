@@ -199,6 +199,16 @@ static void judge_frame(struct app *app) {
 #endif
 }
 
+/* A sensor whose supply dipped reads some 17 kPa less until it is reset. What tells that is its
+ * temperature, which is to be looked at before the zero gives in (condition.h). */
+static void watch_below(struct app *app) {
+  const bool below = (app->condition.below & app->conditioned.usable) != 0;
+  if (below && !app->reads_below) {
+    scan_ask_temperature(&app->scan);
+  }
+  app->reads_below = below;
+}
+
 void app_process_frame(struct app *app, uint64_t taken_us) {
   const struct frame *frame = &app->frame;
   if (taken_us < frame->t_read_us) { /* it came between the look at the clock and the taking */
@@ -255,6 +265,7 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
   port_at(CRASH_AT_CONDITION);
   if (!frame->held) {
     condition_follow(&app->condition, frame, &app->conditioned);
+    watch_below(app);
   }
 }
 

@@ -25,8 +25,13 @@ void bring_up_begin(struct bring_up *bring_up, bool of_suspects, uint64_t now_us
   bring_up->next_us = now_us + bring_up->interval_us;
   bring_up->pass = 0;
   bring_up->word = 0;
-  bring_up->answered = all_sensors(bring_up);
+  bring_up->heard = 0;
   bring_up->good = 0;
+}
+
+void bring_up_take_reset(struct bring_up *bring_up, uint32_t acknowledged) {
+  bring_up->heard = acknowledged & all_sensors(bring_up);
+  bring_up->answered = bring_up->heard;
 }
 
 /* Another PROM is another sensor: nothing that was known of this one holds. */
@@ -77,7 +82,7 @@ bool bring_up_take_word(struct bring_up *bring_up, const struct array_bus_result
   if (bring_up->good == all_sensors(bring_up) || bring_up->pass >= PASSES) {
     return false;
   }
-  bring_up->answered = all_sensors(bring_up);
+  bring_up->answered = bring_up->heard;
   return true;
 }
 

@@ -1,7 +1,7 @@
 /* To admit sensors: all are reset, and their calibration PROMs are read and judged. Event context;
  * scan.c moves the bytes.
  *
- * A sensor is admitted when it has acknowledged its whole PROM. PROMs are read up to three times,
+ * A sensor is admitted when it has acknowledged the reset and its whole PROM. PROMs are read up to three times,
  * until all of them are good; one whose CRC still differs is used and reported, a blank one is not.
  *
  * That costs 5 ms of frames with a data line for each sensor and some 25 ms behind multiplexers, so
@@ -22,6 +22,7 @@ struct bring_up {
   uint8_t sensor_count;
   uint8_t word, pass; /* of the PROM, to be read next */
   bool of_suspects;   /* this one was asked for by the main context */
+  uint32_t heard;     /* bitmap: the reset was acknowledged, by the sensor or its branch */
   uint32_t answered;  /* bitmap: every word of this pass */
   uint32_t good;      /* bitmap: in some pass of this one */
   uint32_t differs;   /* bitmap: the CRC does, in the last pass */
@@ -43,6 +44,9 @@ void bring_up_init(struct bring_up *bring_up, uint8_t sensor_count);
 
 /* After it a reset of all sensors, then word 0 of their PROMs. */
 void bring_up_begin(struct bring_up *bring_up, bool of_suspects, uint64_t now_us);
+
+/* Who acknowledged the reset: bitmap. One that did not may still be what it was to be cured of. */
+void bring_up_take_reset(struct bring_up *bring_up, uint32_t acknowledged);
 
 /* What came of the last word. True: read .word next. False: that was the last; see bring_up_end.
  * The last word of a pass costs some 20 000 Cortex-M0+ cycles. */

@@ -99,6 +99,10 @@ void scan_set_rate_mHz(struct scan *scan, uint32_t rate_mHz) {
   set(&scan->period_us, rate_mHz == 0 ? 0 : 1000000000u / rate_mHz);
 }
 
+void scan_ask_temperature(struct scan *scan) {
+  set(&scan->temperature_within_us, TEMPERATURE_RETRY_us);
+}
+
 void scan_rest(struct scan *scan, bool resting) {
   set(&scan->must_rest, resting);
 }
@@ -422,6 +426,7 @@ static uint32_t read_after_us(const struct scan *scan) {
 static void end_operation(struct scan *scan, uint64_t now_us) {
   switch (scan->state) {
   case SCAN_RESET:
+    bring_up_take_reset(&scan->bring_up, scan->result.acknowledged);
     wait_in(scan, SCAN_WAIT_RESET, now_us + MS5840_RESET_us);
     break;
   case SCAN_READ_PROM:

@@ -175,6 +175,10 @@ static inline bool scan_has_news(const struct scan *scan) {
  * nothing new (a temperature may have been used up). */
 bool scan_take(struct scan *scan, struct frame *frame);
 
+/* Main context. There is reason to look at the temperatures: the next conversion of them comes
+ * within 0.1 s. One that tells that a sensor has lost its state asks for another by itself. */
+void scan_ask_temperature(struct scan *scan);
+
 /* Main context. Resting: what is under way ends, then there is no conversion and nothing on the bus
  * until the rest ends, 10 ms later at most. */
 void scan_rest(struct scan *scan, bool resting);

@@ -104,6 +104,7 @@ static void forget(struct readings *readings, uint32_t sensors) {
   readings->strange &= ~sensors;
   readings->was_near &= ~sensors;
   readings->has_last &= ~sensors;
+  readings->counted &= ~sensors;
   readings->was_low &= ~sensors;
   readings->alone &= ~sensors;
   readings->suspects &= ~sensors;

@@ -34,6 +34,10 @@ template <typename T> unsigned long long number(T value) {
   return static_cast<unsigned long long>(value);
 }
 
+double seconds(std::uint64_t t_us) {
+  return 1e-6 * static_cast<double>(t_us);
+}
+
 bool is_frame(const wire_packet &packet) {
   return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW;
 }
@@ -184,6 +188,18 @@ void Judge::packet(std::uint64_t t_us, const wire_packet &packet) {
   }
 }
 
+bool Judge::is_firm(std::uint64_t t_us) const {
+  const double peak_Pa = world_.at(t_us).peak_Pa;
+  if (peak_Pa < FELT_Pa) {
+    return false;
+  }
+  double strongest_Pa = 0;
+  for (std::uint64_t back_us = 0; back_us <= std::min(t_us, MEMORY_us); back_us += 50000) {
+    strongest_Pa = std::max(strongest_Pa, world_.at(t_us - back_us).peak_Pa);
+  }
+  return peak_Pa > FELT_SHARE * strongest_Pa;
+}
+
 void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
   const wire_contact &contact = packet.body.contact;
   figures_.frames++;
@@ -221,6 +237,11 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
 
   const std::uint64_t felt_us = bench_us(packet.t_us);
   const Row truth = world_.at(felt_us);
+  if (shows(t_us)) {
+    std::fprintf(stderr, "%.4f s contact %u of %.4f s, %05x: %.2f %.2f mm %.3f N, sd %.2f mm; truth %.2f %.2f mm %.3f N, %.0f Pa\n",
+                 seconds(t_us), contact.frame, seconds(felt_us), flags, static_cast<double>(contact.x_mm), static_cast<double>(contact.y_mm),
+                 static_cast<double>(contact.force_N), static_cast<double>(contact.location_sd_mm), truth.x_mm, truth.y_mm, truth.force_N(), truth.peak_Pa);
+  }
   const bool good = (flags & CONTACT_FLAG_TARED) &&
                     !(flags & (CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_SENSOR_DOUBTFUL));
   if (good && good_in_a_row_++ == 0) {
@@ -244,7 +265,7 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
     if (!touched) {
       wrong(t_us, text("frame %u says %.2f N where nothing touches", contact.frame,
                        static_cast<double>(contact.force_N)));
-    } else if (truth.peak_Pa > FELT_Pa) {
+    } else if (is_firm(felt_us)) {
       if (error_mm > LOCATION_BOUND_mm || share > FORCE_BOUND_SHARE) {
         wrong(t_us, text("frame %u, flags %05x: %.2f mm off, %.3f N instead of %.3f, at %.1f %.1f "
                          "mm, sensors %04x, sd %.2f mm",
@@ -258,19 +279,10 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
     }
   } else if ((flags & CONTACT_FLAG_TARED) && !(flags & CONTACT_FLAG_CONTACT)) {
     figures_.at_rest++;
-    const bool felt_long = felt_us >= FELT_FOR_us &&
-                           world_.at(felt_us - FELT_FOR_us).peak_Pa > FELT_Pa &&
-                           truth.peak_Pa > FELT_Pa;
-    if (felt_long) {
-      double strongest_Pa = 0;
-      for (std::uint64_t back_us = 0; back_us <= std::min(felt_us, MEMORY_us); back_us += 50000) {
-        strongest_Pa = std::max(strongest_Pa, world_.at(felt_us - back_us).peak_Pa);
-      }
-      if (truth.peak_Pa > FELT_SHARE * strongest_Pa) {
-        wrong(t_us, text("frame %u, flags %05x, says that nothing touches, where a sensor feels "
-                         "%.0f Pa",
-                         contact.frame, flags, truth.peak_Pa));
-      }
+    if (felt_us >= FELT_FOR_us && is_firm(felt_us - FELT_FOR_us) && is_firm(felt_us)) {
+      wrong(t_us,
+            text("frame %u, flags %05x, says that nothing touches, where a sensor feels %.0f Pa",
+                 contact.frame, flags, truth.peak_Pa));
     }
   }
 }
@@ -283,7 +295,16 @@ void Judge::judge_raw(std::uint64_t t_us, const wire_packet &packet) {
   raw_frame_ = raw.frame;
   raw_us_ = packet.t_us;
   const std::uint64_t felt_us = bench_us(packet.t_us);
-  const std::uint32_t trusted = raw.valid & ~raw.saturated & ~raw.doubtful;
+  if (shows(t_us)) {
+    std::fprintf(stderr, "%.4f s raw %u of %.4f s, valid %04x doubtful %04x, Pa off / zero off:", seconds(t_us),
+                 raw.frame, seconds(felt_us), raw.valid, raw.doubtful);
+    for (unsigned k = 0; k < SENSORS; k++) {
+      std::fprintf(stderr, " %.0f/%.0f", raw.pressure_Pa_q10[k] / 1024.0 - world_.pressure_Pa(k, felt_us), raw.baseline_Pa_q10[k] / 1024.0 - world_.ambient_Pa(k));
+    }
+    std::fputc('\n', stderr);
+  }
+  const bool warned = (raw.flags & WARNINGS) || !(raw.flags & CONTACT_FLAG_TARED);
+  const std::uint32_t trusted = warned ? 0 : raw.valid & ~raw.saturated & ~raw.doubtful;
   for (unsigned k = 0; k < SENSORS; k++) {
     if (!(trusted >> k & 1)) {
       continue;
@@ -337,6 +358,7 @@ void Judge::judge_health(std::uint64_t t_us, const wire_packet &packet) {
   health_of_life_ = health;
 
   Counted now{health};
+  now.follows = contact_follows_;
   if (counted_) {
     const Counted &before = *counted_;
     const std::uint32_t sent = health.packets_sent - before.health.packets_sent;
@@ -346,7 +368,7 @@ void Judge::judge_health(std::uint64_t t_us, const wire_packet &packet) {
            text("%llu packets came and %llu are missing, where %u were sent and %u dropped",
                 number(before.received), number(before.missing), sent, dropped));
     }
-    if (before.missing == 0) {
+    if (before.missing == 0 && before.follows) {
       // One frame may wait for the processor at either health packet.
       const std::uint32_t skipped = health.frames_skipped - before.health.frames_skipped;
       const std::uint32_t frames = health.frames - before.health.frames - skipped;

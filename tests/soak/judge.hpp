@@ -10,11 +10,12 @@
 //   answer   an acknowledgement is of a command that was sent, once; stages add up
 //   wrong    a frame without a warning tells the truth within the bounds below
 //
-// Bounds. The simulated pad is what the fit takes a contact for, its gains are all 1, and a frame
+// Bounds, for contacts of more than a quarter of the strongest in the last minute: of what is
+// pressed less a part may count as rubber that has not let go yet (condition.h). The simulated pad is what the fit takes a contact for, its gains are all 1, and a frame
 // without a warning says that its location is good to 0.6 mm of standard deviation (UNCERTAIN has
 // that limit): LOCATION_BOUND_mm is twice that, FORCE_BOUND what an unwarned corner contact may
-// be off by, and a reading that is called valid and not doubtful is off by at most what a
-// temperature that is 1 degC wrong makes of it, 245 Pa, beside the noise.
+// be off by. READING_BOUND_Pa is what a temperature makes of a reading that is 5 degC wrong: so far
+// from the others a sensor's first one may be (readings.h), 245 Pa a degree; beside the noise.
 #pragma once
 
 #include "world.hpp"
@@ -32,7 +33,7 @@ namespace soak {
 
 constexpr double LOCATION_BOUND_mm = 1.2;
 constexpr double FORCE_BOUND_N = 0.1, FORCE_BOUND_SHARE = 0.15;
-constexpr double READING_BOUND_Pa = 400;
+constexpr double READING_BOUND_Pa = 1300;
 // So many good frames in a row are a recovery, which counts from the first of them.
 constexpr unsigned GOOD_FRAMES = 5;
 
@@ -46,7 +47,7 @@ struct Figures {
   std::uint64_t frames = 0;    // contact packets
   std::uint64_t unwarned = 0;  // of them, with a fit and without a warning
   std::uint64_t at_rest = 0;   // and those that say without a warning that nothing touches
-  std::uint64_t readings = 0;  // valid and not doubtful
+  std::uint64_t readings = 0;  // valid and not doubtful, of tared frames without a warning
   std::uint64_t missing = 0;   // packets
   std::uint64_t skipped = 0;   // frames
   std::uint64_t answered = 0;  // commands
@@ -68,7 +69,8 @@ public:
   void close(std::uint64_t t_us);
   void sent(std::uint64_t t_us, const wire_packet &command);
   void received(std::uint64_t t_us, const std::uint8_t *bytes, std::size_t count);
-  // Bits of a conversion's result were inverted on the way: no check can tell.
+  // Bits of a conversion's result were inverted on the way, which no check can tell: wrong frames
+  // are counted apart.
   void excuse_until(std::uint64_t t_us) { excused_until_us_ = t_us; }
 
   // Counts good frames anew.
@@ -79,6 +81,12 @@ public:
 
   // What happens: told with what is found.
   void set_scene(const std::string &scene) { scene_ = scene; }
+  // Prints what comes within these times on standard error, with the truth.
+  void show(std::uint64_t from_us, std::uint64_t to_us) {
+    show_from_us_ = from_us;
+    show_to_us_ = to_us;
+  }
+
   void find(const std::string &kind, std::uint64_t t_us, const std::string &text);
   const std::vector<Finding> &findings() const { return findings_; }
   const Figures &figures() const { return figures_; }
@@ -92,16 +100,20 @@ private:
     wire_health health;
     std::uint64_t received = 0, missing = 0; // packets, that one included
     std::uint64_t contacts = 0, skipped = 0; // frames
+    bool follows = false; // contact packets came before it
     std::int64_t contacts_over = 0, skipped_over = 0;
   };
 
   void packet(std::uint64_t t_us, const wire_packet &packet);
   void count_sequence(std::uint64_t t_us, const wire_packet &packet);
   void check_clock(std::uint64_t t_us, const wire_packet &packet);
+  // Pressed by more than what the gate may take for a zero that has moved.
+  bool is_firm(std::uint64_t t_us) const;
   void judge_contact(std::uint64_t t_us, const wire_packet &packet);
   void judge_raw(std::uint64_t t_us, const wire_packet &packet);
   void judge_health(std::uint64_t t_us, const wire_packet &packet);
   void judge_ack(std::uint64_t t_us, const wire_packet &packet);
+  bool shows(std::uint64_t t_us) const { return t_us >= show_from_us_ && t_us < show_to_us_; }
   void wrong(std::uint64_t t_us, const std::string &text);
   std::uint64_t bench_us(std::uint64_t device_us) const;
 
@@ -126,6 +138,7 @@ private:
   std::optional<Counted> counted_;
   std::map<std::uint16_t, Question> asked_;
 
+  std::uint64_t show_from_us_ = 0, show_to_us_ = 0;
   std::uint64_t excused_until_us_ = 0;
   unsigned good_in_a_row_ = 0;
   std::uint64_t good_since_us_ = 0, last_frame_heard_us_ = 0;

@@ -53,9 +53,13 @@ int run(int argc, char **argv) {
                "for a seed. Prints one JSON object. Exit status 1 if anything was found");
   std::uint64_t seed = 1;
   double seconds = 600;
+  std::vector<double> show;
   std::string board;
   app.add_option("--seed", seed, "Of everything")->check(CLI::Range(1.0, 1e9));
   app.add_option("--seconds", seconds, "Of device time")->check(CLI::Range(1.0, 86400.0));
+  app.add_option("--show", show, "What comes within these times, on standard error")
+      ->expected(2)
+      ->type_name("FROM_s TO_s");
   app.add_option("--emulated", board,
                  "Board; the bench is emulated.mjs at standard input and output, which starts this "
                  "program. Default: boards/native, in this process")
@@ -64,6 +68,9 @@ int run(int argc, char **argv) {
 
   World world(seed);
   Judge judge(world);
+  if (show.size() == 2) {
+    judge.show(static_cast<std::uint64_t>(1e6 * show[0]), static_cast<std::uint64_t>(1e6 * show[1]));
+  }
   std::unique_ptr<Plant> plant;
   if (board.empty()) {
     plant = std::make_unique<NativePlant>(world, seed);

@@ -14,8 +14,6 @@ extern "C" {
 namespace soak {
 namespace {
 
-// So long a wrong frame may follow inverted bits: until the next temperature but one.
-constexpr std::uint64_t EXCUSED_us = 5000000;
 // What waits for the device goes on in pieces of its queue.
 constexpr std::uint64_t PIECE_us = 1000;
 
@@ -143,7 +141,6 @@ void NativePlant::act(const Change &change, Judge &judge) {
     strike(SIM_FAULT_ONES);
   } else if (kind == "inverted_bits") {
     strike(SIM_FAULT_FLIP, 1, 1u << random_below(&random_, 24));
-    judge.excuse_until(change.t_us + EXCUSED_us);
   } else if (kind == "sensor_power_cycle") {
     strike(SIM_FAULT_POWER_CYCLE);
   } else if (kind == "sensor_brown_out") {

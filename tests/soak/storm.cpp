@@ -16,6 +16,13 @@ constexpr std::uint64_t STARTS_WITHIN_us = 3000000;
 constexpr std::uint64_t ASK_AGAIN_us = 200000;
 constexpr std::uint64_t FIRST_ASK_us = 10000;
 
+// So long a wrong frame may follow inverted bits: until the next temperature but one.
+constexpr std::uint64_t EXCUSED_us = 5000000;
+
+bool inverts_bits(const std::string &kind) {
+  return kind == "inverted_bits" || kind == "d2_corrupt" || kind == "sensor_d2_corrupt";
+}
+
 bool takes_power(const std::string &kind) {
   return kind == "power_cut" || kind == "chip_reset" || kind.rfind("start_", 0) == 0;
 }
@@ -111,7 +118,8 @@ void Storm::write_some_command() {
   default:
     if (!loses_power_ && world_.resting_since_us() != UINT64_MAX &&
         now_us_ > world_.resting_since_us() + 1000000) {
-      world_.keep_off(world_.told_us() + STEP_us, world_.told_us() + 1500000);
+      world_.keep_off(world_.told_us() + STEP_us,
+                      std::max(world_.told_us(), ends_us_) + STARTS_WITHIN_us);
       write(fingertip::command_tare());
     }
   }
@@ -165,6 +173,9 @@ void Storm::add_fault(const Target &target, std::uint64_t from_us) {
     store_until_us_ = fault.to_us;
   } else {
     plant_.schedule(fault);
+  }
+  if (inverts_bits(fault.kind)) {
+    judge_.excuse_until(fault.to_us + EXCUSED_us);
   }
   if (takes_power(fault.kind)) {
     loses_power_ = true;

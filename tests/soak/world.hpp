@@ -44,6 +44,7 @@ public:
   std::uint64_t resting_since_us() const { return resting_since_us_; }
   Row at(std::uint64_t t_us) const; // of the last two minutes
   double pressure_Pa(unsigned sensor, std::uint64_t t_us) const;
+  double ambient_Pa(unsigned sensor) const { return ambient_Pa_[sensor]; } // with its moulding
   double temperature_degC(std::uint64_t t_us) const;
 
 private:
