@@ -62,6 +62,10 @@
 
 #define SATURATED_Pa 100000
 
+/* A sensor that has lost its state is found out within so long; a zero taken since is not its own.
+ */
+#define FOUND_OUT_ms ((uint32_t)SECONDS(5))
+
 #define CALM_AFTER_TARE_ms ((uint32_t)SECONDS(3))
 #define CALM_AFTER_RELEASE_ms ((uint32_t)SECONDS(60)) /* what rubber keeps goes slowly */
 #define CALM_LAG_Pa 2 /* and half a sigma: three sigmas of a mean at the least rate */
@@ -465,7 +469,8 @@ static uint32_t tare_sensors(struct condition *condition, const struct frame *fr
   uint32_t ready = readable;
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
     uint32_t bit = UINT32_C(1) << k;
-    if (frame->renewed & bit) {
+    bool tared_lately = condition->now_ms - condition->tare_begun_ms[k] < FOUND_OUT_ms;
+    if (frame->renewed & bit || (frame->restored & bit && tared_lately)) {
       begin_tare(condition, k);
     }
     if (condition->taring & readable & bit) {
@@ -554,7 +559,7 @@ void condition_frame(struct condition *condition, const struct frame *frame,
   int32_t close = Pa_q10(CONDITION_CLOSE_Pa) + CONDITION_CLOSE_SIGMA * frame->noise_Pa_q10;
   uint32_t readable = frame->valid & ~frame->saturated;
   conditioned->usable = readable;
-  if (condition->taring & readable || frame->renewed) {
+  if (condition->taring & readable || frame->renewed || frame->restored) {
     conditioned->usable = tare_sensors(condition, frame, readable);
   }
   uint8_t strongest = read_sensors(condition, frame, gains, conditioned);

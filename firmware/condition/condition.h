@@ -9,7 +9,8 @@
  * sensors warm up, then only at 0.5 Pa/s: barometers drift by up to 0.22, and a force
  * that rises faster is no drift. In a contact the zero stands but for the drift that was seen in
  * the calm before it, which goes on for an hour. That of a sensor whose temperature is unsettled
- * stands too.
+ * stands too. One that was taken within five seconds of the reset of a sensor that had lost its state
+ * is taken anew.
  *
  * Release. Rubber does not let go at once: a sensor stands off by 0.4 to 13 % of its last pressure,
  * or below its zero by 1 to 15 %, returns within 0.5 to 20 s, and keeps some of it (strips of

@@ -157,5 +157,7 @@ bool readings_take_pressures(struct readings *readings, const uint32_t code[], u
   frame->unsettled = valid & readings->doubted;
   frame->renewed = readings->renewed;
   readings->renewed = 0;
+  frame->restored = readings->restored;
+  readings->restored = 0;
   return left_out != 0;
 }

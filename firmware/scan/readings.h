@@ -59,6 +59,7 @@ struct readings {
   uint8_t doubts_in_a_row;
   uint32_t has_thermal; /* bitmap */
   uint32_t renewed;     /* bitmap: another sensor since the last frame */
+  uint32_t restored;    /* bitmap: a suspect that was reset since the last frame */
   uint32_t doubted;     /* bitmap: the last temperature was not used */
   uint32_t strange;     /* bitmap: a temperature that is not near the others' is in use */
   uint32_t unproven;    /* bitmap: the PROM's CRC differs and the sensor has not read like others */
@@ -95,8 +96,8 @@ enum readings_news {
 uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count,
                                    const struct readings_temperature *taken);
 
-/* Fills in pressures, valid, doubtful, unsettled, saturated and renewed. code: [sensor]; good:
- * bitmap. Returns whether it left any out: left_out and perhaps suspects have changed. Cost: some
+/* Fills in pressures, valid, doubtful, unsettled, saturated, renewed and restored. code: [sensor];
+ * good: bitmap. Returns whether it left any out: left_out and perhaps suspects have changed. Cost: some
  * 140 Cortex-M0+ cycles a sensor. */
 bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good,
                              struct frame *frame);

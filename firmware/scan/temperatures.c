@@ -98,6 +98,7 @@ static bool settle(struct readings *readings, uint8_t k, int16_t now_cC,
 }
 
 static void forget(struct readings *readings, uint32_t sensors) {
+  readings->restored |= readings->suspects & sensors;
   readings->pardoned = (readings->pardoned & ~sensors) | (readings->suspects & sensors);
   readings->has_thermal &= ~sensors;
   readings->doubted &= ~sensors;

@@ -51,7 +51,7 @@ struct Figures {
   std::uint64_t missing = 0;   // packets
   std::uint64_t skipped = 0;   // frames
   std::uint64_t answered = 0;  // commands
-  std::uint64_t excused = 0;   // wrong frames after inverted bits that nothing can tell
+  std::uint64_t excused = 0;   // wrong frames and readings after what nothing can tell
   std::uint64_t time = 0, loss = 0, damaged = 0, answer = 0, wrong = 0; // findings
   double worst_mm = 0, worst_force = 0, worst_Pa = 0; // of the unwarned; force: share beyond the N
 };
@@ -72,6 +72,9 @@ public:
   // Bits of a conversion's result were inverted on the way, which no check can tell: wrong frames
   // are counted apart.
   void excuse_until(std::uint64_t t_us) { excused_until_us_ = t_us; }
+  // The supply of a sensor dipped, which a pad that moves hides until its next temperature
+  // (readings.h): wrong readings, not frames, are counted apart.
+  void excuse_readings_until(std::uint64_t t_us) { readings_excused_until_us_ = t_us; }
 
   // Counts good frames anew.
   void expect_recovery() { good_in_a_row_ = 0; }
@@ -139,7 +142,7 @@ private:
   std::map<std::uint16_t, Question> asked_;
 
   std::uint64_t show_from_us_ = 0, show_to_us_ = 0;
-  std::uint64_t excused_until_us_ = 0;
+  std::uint64_t excused_until_us_ = 0, readings_excused_until_us_ = 0;
   unsigned good_in_a_row_ = 0;
   std::uint64_t good_since_us_ = 0, last_frame_heard_us_ = 0;
 };

@@ -174,6 +174,9 @@ void Storm::add_fault(const Target &target, std::uint64_t from_us) {
   } else {
     plant_.schedule(fault);
   }
+  if (fault.kind == "sensor_brown_out") {
+    judge_.excuse_readings_until(fault.to_us + EXCUSED_us);
+  }
   if (inverts_bits(fault.kind)) {
     judge_.excuse_until(fault.to_us + EXCUSED_us);
   }
