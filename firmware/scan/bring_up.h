@@ -1,13 +1,17 @@
 /* To admit sensors: all are reset, and their calibration PROMs are read and judged. Event context;
  * scan.c moves the bytes.
  *
- * A sensor is admitted when it has acknowledged the reset and its whole PROM. PROMs are read up to three times,
- * until all of them are good; one whose CRC still differs is used and reported, a blank one is not.
+ * A sensor is admitted when it has acknowledged the reset and its whole PROM. PROMs are read up to
+ * three times, until all of them are good; one whose CRC still differs is used and reported, a
+ * blank one is not.
  *
  * That costs 5 ms of frames with a data line for each sensor and some 25 ms behind multiplexers, so
  * it takes at most 5 % of the time; while it leaves a sensor out, or is for a suspect, the next one
- * comes after 1, 2, 4 and then 8 s. A sensor that does not answer at all costs no admission.
+ * comes after 1, 2, 4 and then 8 s. A sensor that does not answer at all costs no admission. One
+ * whose CRC differs costs so many: the bus may have been disturbed.
  */
+#define BRING_UP_RECHECKS 3
+
 #ifndef SCAN_BRING_UP_H
 #define SCAN_BRING_UP_H
 
@@ -27,6 +31,7 @@ struct bring_up {
   uint32_t good;      /* bitmap: in some pass of this one */
   uint32_t differs;   /* bitmap: the CRC does, in the last pass */
   uint32_t blank;     /* bitmap: likewise */
+  uint8_t rechecks;   /* admissions in a row after which a CRC differed */
   uint32_t changed;   /* bitmap: another PROM than before; who has told others of it clears it */
   uint64_t began_us;
   uint64_t interval_us;
@@ -51,6 +56,11 @@ void bring_up_take_reset(struct bring_up *bring_up, uint32_t acknowledged);
 /* What came of the last word. True: read .word next. False: that was the last; see bring_up_end.
  * The last word of a pass costs some 20 000 Cortex-M0+ cycles. */
 bool bring_up_take_word(struct bring_up *bring_up, const struct array_bus_result *result);
+
+/* Whether a PROM should be read again though all sensors are admitted. */
+static inline bool bring_up_wants_recheck(const struct bring_up *bring_up) {
+  return bring_up->differs != 0 && bring_up->rechecks <= BRING_UP_RECHECKS;
+}
 
 struct bring_up_result bring_up_end(struct bring_up *bring_up, uint64_t now_us);
 

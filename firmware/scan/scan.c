@@ -172,8 +172,9 @@ static uint32_t judge_answers(struct scan *scan, uint32_t heard, uint32_t zero) 
   scan->was_zero = zero;
   /* What was not read is still there to be read, and the sensor may miss the next command. */
   scan->void_next = single ? 0 : zero | (missed & ~acknowledged);
-  scan->wants_admission =
-      (acknowledged & ~admitted) != 0 || admitted == 0 || (get(&scan->suspects) & admitted) != 0;
+  scan->wants_admission = (acknowledged & ~admitted) != 0 || admitted == 0 ||
+                          (get(&scan->suspects) & admitted) != 0 ||
+                          bring_up_wants_recheck(&scan->bring_up);
   count(&scan->counters.zero_readings, count_bits(unusable));
   set(&scan->present, acknowledged);
   set(&scan->admitted, admitted);

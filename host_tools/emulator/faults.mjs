@@ -130,29 +130,34 @@ const NONE = Object.freeze({});
 export class Faults {
   constructor(list, scope, on = {}) {
     this.sensors = new Map();
+    this.scope = scope;
     this.on = on;
     /** Those in force that act by themselves. */
     this.active = new Set();
+    for (const fault of list) this.add(fault);
+  }
+
+  /** One more, that begins now or later. */
+  add(fault) {
+    const { scope, on } = this;
     const key = {
       sensor_dead: 'dead', sensor_prom_corrupt: 'promCorrupt', sensor_prom_bit: 'promBit', sensor_adc_zero: 'adcZero',
       sensor_d2_corrupt: 'd2Corrupt', sensor_noisy: 'noisy', sensor_fast: 'fast',
     };
     /** How many have begun. */
     const times = { sensor_nack: 'nacks', sensor_brown_out: 'brownOuts' };
-    for (const fault of list) {
-      const set = (name, value) => this.sensors.set(fault.target, { ...this.sensor(fault.target), [name]: value });
-      const change = (active) => {
-        if (key[fault.type]) set(key[fault.type], active);
-        else if (times[fault.type]) set(times[fault.type], (this.sensor(fault.target)[times[fault.type]] ?? 0) + (active ? 1 : 0));
-        else {
-          if (active) this.active.add(fault);
-          else this.active.delete(fault);
-          on[fault.type]?.(fault.target, active);
-        }
-      };
-      scope.createAlarm(() => change(true)).scheduleAt(fault.from_ns);
-      if (fault.to_ns !== Infinity) scope.createAlarm(() => change(false)).scheduleAt(fault.to_ns);
-    }
+    const set = (name, value) => this.sensors.set(fault.target, { ...this.sensor(fault.target), [name]: value });
+    const change = (active) => {
+      if (key[fault.type]) set(key[fault.type], active);
+      else if (times[fault.type]) set(times[fault.type], (this.sensor(fault.target)[times[fault.type]] ?? 0) + (active ? 1 : 0));
+      else {
+        if (active) this.active.add(fault);
+        else this.active.delete(fault);
+        on[fault.type]?.(fault.target, active);
+      }
+    };
+    scope.createAlarm(() => change(true)).scheduleAt(fault.from_ns);
+    if (fault.to_ns !== Infinity) scope.createAlarm(() => change(false)).scheduleAt(fault.to_ns);
   }
 
   /** On a board that has just been powered. */

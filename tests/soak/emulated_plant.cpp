@@ -69,7 +69,8 @@ void EmulatedPlant::write(const std::vector<std::uint8_t> &bytes) {
 void EmulatedPlant::run_to(std::uint64_t t_us, Judge &judge) {
   nlohmann::json faults = nlohmann::json::array();
   for (const Fault &fault : scheduled_) {
-    nlohmann::json one = {{"type", fault.kind}, {"from_s", 1e-6 * static_cast<double>(fault.from_us)}};
+    nlohmann::json one = {{"type", fault.kind},
+                          {"from_s", 1e-6 * static_cast<double>(fault.from_us)}};
     if (fault.to_us > fault.from_us) {
       one["to_s"] = 1e-6 * static_cast<double>(fault.to_us);
     }

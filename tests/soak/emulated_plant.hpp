@@ -1,7 +1,8 @@
 // The release image in the emulator, run by emulated.mjs at the other end of two streams. Lines of
 // JSON: for each step this end sends one, and gets one back.
 //
-//   {"to_us", "rows": [{"t_us", "Pa": [15], "degC"}], "faults": [{"type", "sensor" | "mux", "from_s",
+//   {"to_us", "rows": [{"t_us", "Pa": [15], "degC"}], "faults": [{"type", "sensor" | "mux",
+//   "from_s",
 //    "to_s"}], "write": hex}     rows: what is felt, told ahead
 //   {"events": [["start" | "open" | "close", t_us] | ["zero", t_us, us] | ["bytes", t_us, hex]],
 //    "unasked", "ended"}         zero: when the device's clock was 0

@@ -59,6 +59,13 @@ void Judge::find(const std::string &kind, std::uint64_t t_us, const std::string 
   }
 }
 
+void Judge::set_scene(const std::string &scene) {
+  scene_ = scene;
+  if (show_to_us_ > 0) {
+    std::fprintf(stderr, "%s\n", scene.c_str());
+  }
+}
+
 void Judge::wrong(std::uint64_t t_us, const std::string &what) {
   if (t_us < excused_until_us_) {
     figures_.excused++;
@@ -238,9 +245,13 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
   const std::uint64_t felt_us = bench_us(packet.t_us);
   const Row truth = world_.at(felt_us);
   if (shows(t_us)) {
-    std::fprintf(stderr, "%.4f s contact %u of %.4f s, %05x: %.2f %.2f mm %.3f N, sd %.2f mm; truth %.2f %.2f mm %.3f N, %.0f Pa\n",
-                 seconds(t_us), contact.frame, seconds(felt_us), flags, static_cast<double>(contact.x_mm), static_cast<double>(contact.y_mm),
-                 static_cast<double>(contact.force_N), static_cast<double>(contact.location_sd_mm), truth.x_mm, truth.y_mm, truth.force_N(), truth.peak_Pa);
+    std::fprintf(stderr,
+                 "%.4f s contact %u of %.4f s, %05x: %.2f %.2f mm %.3f N, sd %.2f mm; truth %.2f "
+                 "%.2f mm %.3f N, %.0f Pa\n",
+                 seconds(t_us), contact.frame, seconds(felt_us), flags,
+                 static_cast<double>(contact.x_mm), static_cast<double>(contact.y_mm),
+                 static_cast<double>(contact.force_N), static_cast<double>(contact.location_sd_mm),
+                 truth.x_mm, truth.y_mm, truth.force_N(), truth.peak_Pa);
   }
   const bool good = (flags & CONTACT_FLAG_TARED) &&
                     !(flags & (CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_SENSOR_DOUBTFUL));
@@ -259,9 +270,8 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
     const double force_N = truth.force_N();
     const double error_N = std::fabs(static_cast<double>(contact.force_N) - force_N);
     const double share = std::max(0.0, error_N - FORCE_BOUND_N) / std::max(force_N, 1e-9);
-    const bool touched =
-        truth.peak_Pa > 0 || felt_us < RELEASED_FOR_us ||
-        world_.at(felt_us - RELEASED_FOR_us).peak_Pa > 0;
+    const bool touched = truth.peak_Pa > 0 || felt_us < RELEASED_FOR_us ||
+                         world_.at(felt_us - RELEASED_FOR_us).peak_Pa > 0;
     if (!touched) {
       wrong(t_us, text("frame %u says %.2f N where nothing touches", contact.frame,
                        static_cast<double>(contact.force_N)));
@@ -296,10 +306,12 @@ void Judge::judge_raw(std::uint64_t t_us, const wire_packet &packet) {
   raw_us_ = packet.t_us;
   const std::uint64_t felt_us = bench_us(packet.t_us);
   if (shows(t_us)) {
-    std::fprintf(stderr, "%.4f s raw %u of %.4f s, valid %04x doubtful %04x, Pa off / zero off:", seconds(t_us),
-                 raw.frame, seconds(felt_us), raw.valid, raw.doubtful);
+    std::fprintf(stderr, "%.4f s raw %u of %.4f s, valid %04x doubtful %04x, Pa off / zero off:",
+                 seconds(t_us), raw.frame, seconds(felt_us), raw.valid, raw.doubtful);
     for (unsigned k = 0; k < SENSORS; k++) {
-      std::fprintf(stderr, " %.0f/%.0f", raw.pressure_Pa_q10[k] / 1024.0 - world_.pressure_Pa(k, felt_us), raw.baseline_Pa_q10[k] / 1024.0 - world_.ambient_Pa(k));
+      std::fprintf(stderr, " %.0f/%.0f",
+                   raw.pressure_Pa_q10[k] / 1024.0 - world_.pressure_Pa(k, felt_us),
+                   raw.baseline_Pa_q10[k] / 1024.0 - world_.ambient_Pa(k));
     }
     std::fputc('\n', stderr);
   }
@@ -315,9 +327,8 @@ void Judge::judge_raw(std::uint64_t t_us, const wire_packet &packet) {
     if (off_Pa > READING_BOUND_Pa && t_us < readings_excused_until_us_) {
       figures_.excused++;
     } else if (off_Pa > READING_BOUND_Pa) {
-      wrong(t_us,
-            text("frame %u: sensor %u is off by %.0f Pa, flags %05x", raw.frame, k, off_Pa,
-                 raw.flags));
+      wrong(t_us, text("frame %u: sensor %u is off by %.0f Pa, flags %05x", raw.frame, k, off_Pa,
+                       raw.flags));
     } else {
       figures_.worst_Pa = std::max(figures_.worst_Pa, off_Pa);
     }
@@ -326,8 +337,7 @@ void Judge::judge_raw(std::uint64_t t_us, const wire_packet &packet) {
 
 void Judge::judge_health(std::uint64_t t_us, const wire_packet &packet) {
   const wire_health &health = packet.body.health;
-  if (static_cast<std::uint16_t>(health.packets_sent + health.packets_dropped) !=
-      packet.sequence) {
+  if (static_cast<std::uint16_t>(health.packets_sent + health.packets_dropped) != packet.sequence) {
     find("loss", t_us,
          text("%u packets sent and %u dropped before the one with number %u", health.packets_sent,
               health.packets_dropped, packet.sequence));
@@ -374,7 +384,8 @@ void Judge::judge_health(std::uint64_t t_us, const wire_packet &packet) {
       // One frame may wait for the processor at either health packet.
       const std::uint32_t skipped = health.frames_skipped - before.health.frames_skipped;
       const std::uint32_t frames = health.frames - before.health.frames - skipped;
-      now.contacts_over = before.contacts_over + static_cast<std::int64_t>(before.contacts) - frames;
+      now.contacts_over =
+          before.contacts_over + static_cast<std::int64_t>(before.contacts) - frames;
       now.skipped_over = before.skipped_over + static_cast<std::int64_t>(before.skipped) - skipped;
       if (std::abs(now.contacts_over) > 1 || std::abs(now.skipped_over) > 1) {
         find("loss", t_us,

@@ -11,16 +11,16 @@
 //   wrong    a frame without a warning tells the truth within the bounds below
 //
 // Bounds, for contacts of more than a quarter of the strongest in the last minute: of what is
-// pressed less a part may count as rubber that has not let go yet (condition.h). The simulated pad is what the fit takes a contact for, its gains are all 1, and a frame
-// without a warning says that its location is good to 0.6 mm of standard deviation (UNCERTAIN has
-// that limit): LOCATION_BOUND_mm is twice that, FORCE_BOUND what an unwarned corner contact may
-// be off by. READING_BOUND_Pa is what a temperature makes of a reading that is 5 degC wrong: so far
-// from the others a sensor's first one may be (readings.h), 245 Pa a degree; beside the noise.
+// pressed less a part may count as rubber that has not let go yet (condition.h). The simulated pad
+// is what the fit takes a contact for, its gains are all 1, and a frame without a warning says that
+// its location is good to 0.6 mm of standard deviation (UNCERTAIN has that limit):
+// LOCATION_BOUND_mm is twice that, FORCE_BOUND what an unwarned corner contact may be off by.
+// READING_BOUND_Pa is what a temperature makes of a reading that is 5 degC wrong: so far from the
+// others a sensor's first one may be (readings.h), 245 Pa a degree; beside the noise.
 #pragma once
 
-#include "world.hpp"
-
 #include "libfingertip/wire.hpp"
+#include "world.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -44,14 +44,14 @@ struct Finding {
 };
 
 struct Figures {
-  std::uint64_t frames = 0;    // contact packets
-  std::uint64_t unwarned = 0;  // of them, with a fit and without a warning
-  std::uint64_t at_rest = 0;   // and those that say without a warning that nothing touches
-  std::uint64_t readings = 0;  // valid and not doubtful, of tared frames without a warning
-  std::uint64_t missing = 0;   // packets
-  std::uint64_t skipped = 0;   // frames
-  std::uint64_t answered = 0;  // commands
-  std::uint64_t excused = 0;   // wrong frames and readings after what nothing can tell
+  std::uint64_t frames = 0;   // contact packets
+  std::uint64_t unwarned = 0; // of them, with a fit and without a warning
+  std::uint64_t at_rest = 0;  // and those that say without a warning that nothing touches
+  std::uint64_t readings = 0; // valid and not doubtful, of tared frames without a warning
+  std::uint64_t missing = 0;  // packets
+  std::uint64_t skipped = 0;  // frames
+  std::uint64_t answered = 0; // commands
+  std::uint64_t excused = 0;  // wrong frames and readings after what nothing can tell
   std::uint64_t time = 0, loss = 0, damaged = 0, answer = 0, wrong = 0; // findings
   double worst_mm = 0, worst_force = 0, worst_Pa = 0; // of the unwarned; force: share beyond the N
 };
@@ -83,7 +83,7 @@ public:
   std::uint64_t last_frame_us() const { return last_frame_heard_us_; }
 
   // What happens: told with what is found.
-  void set_scene(const std::string &scene) { scene_ = scene; }
+  void set_scene(const std::string &scene);
   // Prints what comes within these times on standard error, with the truth.
   void show(std::uint64_t from_us, std::uint64_t to_us) {
     show_from_us_ = from_us;
@@ -103,7 +103,7 @@ private:
     wire_health health;
     std::uint64_t received = 0, missing = 0; // packets, that one included
     std::uint64_t contacts = 0, skipped = 0; // frames
-    bool follows = false; // contact packets came before it
+    bool follows = false;                    // contact packets came before it
     std::int64_t contacts_over = 0, skipped_over = 0;
   };
 

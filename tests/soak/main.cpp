@@ -22,7 +22,8 @@ nlohmann::json told(const Storm &storm, const Judge &judge, std::uint64_t seed) 
   }
   nlohmann::json findings = nlohmann::json::array();
   for (const Finding &finding : judge.findings()) {
-    findings.push_back(finding.kind + " at " + std::to_string(1e-6 * static_cast<double>(finding.t_us)) +
+    findings.push_back(finding.kind + " at " +
+                       std::to_string(1e-6 * static_cast<double>(finding.t_us)) +
                        " s: " + finding.text);
   }
   return {{"seed", seed},
@@ -47,6 +48,37 @@ nlohmann::json told(const Storm &storm, const Judge &judge, std::uint64_t seed) 
           {"findings", findings}};
 }
 
+// What each line of hexadecimal bytes, of one life each, says last of what is kept and of sensors.
+int tell_packets() {
+  for (std::string line; std::getline(std::cin, line);) {
+    wire_receiver receiver;
+    wire_receiver_init(&receiver, wire_all_layouts);
+    nlohmann::json told;
+    unsigned frames = 0, complete = 0;
+    for (std::size_t i = 0; i + 1 < line.size(); i += 2) {
+      wire_packet packet;
+      const auto byte = static_cast<std::uint8_t>(std::stoul(line.substr(i, 2), nullptr, 16));
+      if (wire_receive(&receiver, byte, &packet) != FT_OK) {
+        continue;
+      }
+      if (packet.type == WIRE_INFO) {
+        told["osr"] = packet.body.info.osr;
+        told["stored"] = packet.body.info.stored;
+      } else if (packet.type == WIRE_HEALTH) {
+        told["present"] = packet.body.health.sensors_present;
+        told["prom_bad"] = packet.body.health.sensors_prom_bad;
+      } else if (packet.type == WIRE_RAW) {
+        frames++;
+        complete += packet.body.raw.valid == (1u << SENSORS) - 1;
+      }
+    }
+    told["frames"] = frames;
+    told["complete"] = complete;
+    std::cout << told << '\n';
+  }
+  return 0;
+}
+
 int run(int argc, char **argv) {
   CLI::App app("One episode of a soak: a host uses a fingertip while one thing after another goes "
                "wrong, and what the fingertip says is held against the truth. The same each time "
@@ -64,12 +96,21 @@ int run(int argc, char **argv) {
                  "Board; the bench is emulated.mjs at standard input and output, which starts this "
                  "program. Default: boards/native, in this process")
       ->check(CLI::IsMember({"pico_mux", "pico_parallel"}));
+  bool packets = false;
+  app.add_flag(
+      "--packets", packets,
+      "No episode: of each line of hexadecimal bytes on standard input one JSON object, what "
+      "its packets say last of what is kept and of the sensors");
   CLI11_PARSE(app, argc, argv);
+  if (packets) {
+    return tell_packets();
+  }
 
   World world(seed);
   Judge judge(world);
   if (show.size() == 2) {
-    judge.show(static_cast<std::uint64_t>(1e6 * show[0]), static_cast<std::uint64_t>(1e6 * show[1]));
+    judge.show(static_cast<std::uint64_t>(1e6 * show[0]),
+               static_cast<std::uint64_t>(1e6 * show[1]));
   }
   std::unique_ptr<Plant> plant;
   if (board.empty()) {

@@ -20,7 +20,7 @@ struct Fault {
 
 struct Target {
   const char *kind;
-  int targets;           // it strikes one of so many; 0: all there is
+  int targets;                     // it strikes one of so many; 0: all there is
   std::uint64_t least_us, most_us; // how long; most_us 0: at once, and it is over
 };
 

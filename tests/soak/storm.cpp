@@ -150,13 +150,15 @@ void Storm::add_fault(const Target &target, std::uint64_t from_us) {
   Fault fault;
   fault.kind = target.kind;
   fault.target =
-      target.targets ? static_cast<int>(random_below(&random_, static_cast<std::uint32_t>(target.targets)))
-                     : -1;
+      target.targets
+          ? static_cast<int>(random_below(&random_, static_cast<std::uint32_t>(target.targets)))
+          : -1;
   fault.from_us = from_us;
   fault.to_us = from_us;
   if (target.most_us > 0) {
-    fault.to_us += target.least_us +
-                   random_below(&random_, static_cast<std::uint32_t>(target.most_us - target.least_us) + 1);
+    fault.to_us +=
+        target.least_us +
+        random_below(&random_, static_cast<std::uint32_t>(target.most_us - target.least_us) + 1);
   }
   ends_us_ = std::max(ends_us_, fault.to_us);
   char told[120];
@@ -228,14 +230,16 @@ void Storm::talk() {
   const bool open = plant_.port_is_open();
   if (open && !was_open_) {
     ask_at_us_ = now_us_ + FIRST_ASK_us;
+    has_asked_ = false;
   }
   was_open_ = open;
   if (!open) {
     return;
   }
   if (now_us_ >= ask_at_us_) {
-    if (now_us_ > judge_.last_frame_us() + ASK_AGAIN_us) {
+    if (!has_asked_ || now_us_ > judge_.last_frame_us() + ASK_AGAIN_us) {
       write(fingertip::command_stream(streams_));
+      has_asked_ = true;
     }
     ask_at_us_ = now_us_ + ASK_AGAIN_us;
   }
@@ -287,11 +291,12 @@ void Storm::run_to(std::uint64_t end_us) {
         Recovery &recovery = recovery_[kind_];
         const std::uint64_t since_us = std::max(judge_.good_since_us(), ends_us_);
         recovery.bouts++;
-        recovery.worst_s = std::max(recovery.worst_s, 1e-6 * static_cast<double>(since_us - ends_us_));
+        recovery.worst_s =
+            std::max(recovery.worst_s, 1e-6 * static_cast<double>(since_us - ends_us_));
         recovers_ = false;
         next_us_ = now_us_ + random_below(&random_, 1500000);
       } else if (now_us_ > ends_us_ + RECOVERY_LIMIT_us) {
-        hang("no good frames within 12 s of " + kind_);
+        hang("no good frames within 20 s of " + kind_);
         return;
       }
     } else if (now_us_ >= next_us_) {

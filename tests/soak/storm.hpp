@@ -14,9 +14,9 @@
 namespace soak {
 
 // From the end of a fault to the first of five good frames in a row. The firmware asks lost sensors
-// back after 1, 2, 4 and then every 8 s (bring_up.h), and a sensor that was away tells its
-// temperature anew.
-constexpr std::uint64_t RECOVERY_LIMIT_us = 12000000;
+// back after 1, 2, 4 and then every 8 s (bring_up.h), and a zero that was taken from a wrong
+// temperature gives in after 10 s (condition.h).
+constexpr std::uint64_t RECOVERY_LIMIT_us = 20000000;
 
 struct Recovery {
   std::uint64_t bouts = 0;
@@ -57,7 +57,7 @@ private:
   // The host
   std::uint16_t sequence_ = 0;
   std::uint8_t streams_ = 7;
-  bool was_open_ = false;
+  bool was_open_ = false, has_asked_ = false;
   std::uint64_t ask_at_us_ = 0;
 
   // The bout
