@@ -45,13 +45,13 @@ class Bench {
       this.#look();
       this.events.push(['start', this.#now_us()]);
     };
-    Object.assign(machine.faults.on, {
-      port_closed: (_, active) => {
+    this.ofTheHost = {
+      port_closed: (active) => {
         this.closed += active ? 1 : -1;
         machine.client.setDtr(this.closed === 0);
       },
-      suspend: (_, active) => this.#sleep(active),
-    });
+      suspend: (active) => this.#sleep(active),
+    };
     machine.client.setDtr(true);
   }
 
@@ -108,8 +108,8 @@ class Bench {
       faults.add(late);
       faults.add(off);
       this.mayRestart_ns = late.to_ns + 1e9;
-    } else if (type === 'port_closed' || type === 'suspend') {
-      faults.add({ type, target: null, from_ns: from_s * 1e9, to_ns: fault.to_s * 1e9 });
+    } else if (this.ofTheHost[type]) {
+      for (const [active, t_s] of [[true, from_s], [false, fault.to_s]]) this.machine.scope.createAlarm(() => this.ofTheHost[type](active)).scheduleAt(t_s * 1e9);
     } else {
       faults.add(parseFaults(JSON.stringify([fault]), 'soak', this.Board)[0]);
     }

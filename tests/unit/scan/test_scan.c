@@ -265,8 +265,21 @@ static void test_prom_with_differing_crc_is_used_and_reported(void) {
   assert_good_frame(ALL);
   TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, frame.doubtful);
   TEST_ASSERT_EQUAL_HEX32(0, frame.renewed);
-  run_until(20000000);
-  TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND)); /* and never bothers the others */
+  run_until(60000000);
+  TEST_ASSERT_EQUAL_INT(1 + BRING_UP_RECHECKS, count_entries(0x1E, FAKE_COMMAND)); /* no more */
+}
+
+/* As where the line was disturbed in all of the first admission. */
+static void test_prom_misread_in_a_whole_admission_is_read_again(void) {
+  fake.misread_prom = DISTURBED_BIT;
+  fake.misread_passes = 3;
+  skip_frames(2);
+  TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, value_of(&scan.prom_bad));
+  run_until(3000000);
+  TEST_ASSERT_EQUAL_HEX32(0, value_of(&scan.prom_bad));
+  TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
+  assert_good_frame(ALL);
+  TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
 }
 
 /* One bit of C1, and the sensor reads 28 kPa more than the others: its gain is off by 10 %. */
@@ -1116,6 +1129,7 @@ int main(void) {
   RUN_TEST(test_waits_at_every_osr);
   RUN_TEST(test_prom_misread_once_is_read_again);
   RUN_TEST(test_prom_with_differing_crc_is_used_and_reported);
+  RUN_TEST(test_prom_misread_in_a_whole_admission_is_read_again);
   RUN_TEST(test_prom_that_makes_a_sensor_stand_apart_is_not_used);
   RUN_TEST(test_blank_prom_is_not_admitted_and_asked_ever_more_rarely);
   RUN_TEST(test_nobody_answers);
