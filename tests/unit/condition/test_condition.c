@@ -806,6 +806,24 @@ static void test_another_sensor_is_tared_anew(void) {
   TEST_ASSERT_EQUAL_INT32(0, conditioned.pressure_Pa_q10[4]);
 }
 
+/* Its supply dipped while the zero was taken, which is found out when it has been reset. A zero from
+ * long before is its own. */
+static void test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew(void) {
+  for (int late = 0; late <= 1; late++) {
+    begin(4854);
+    frame.pressure_Pa_q10[4] -= 17000 * 1024;
+    run_s(late ? 6 : 1);
+    TEST_ASSERT_TRUE(conditioned.tared);
+    frame.pressure_Pa_q10[4] += 17000 * 1024;
+    frame.restored = 1u << 4;
+    run(1);
+    frame.restored = 0;
+    run(CONDITION_TARE_FRAMES);
+    TEST_ASSERT_TRUE(conditioned.tared);
+    TEST_ASSERT_EQUAL_INT(late, conditioned.contact);
+  }
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_tare_is_the_mean_without_the_extremes);
@@ -842,5 +860,6 @@ int main(void) {
   RUN_TEST(test_extremes);
   RUN_TEST(test_random_frames);
   RUN_TEST(test_another_sensor_is_tared_anew);
+  RUN_TEST(test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew);
   return UNITY_END();
 }

@@ -170,6 +170,36 @@ static void test_with_a_sensor_missing_every_step_counts(void) {
   expect(ALL & ~1u, 0);
 }
 
+/* Admitted anew between two frames, of which it is missing in none: from its first reading on its
+ * steps are seen. */
+static void test_a_step_after_an_admission_between_frames_is_left_out(void) {
+  start();
+  temperature.returned = ONE_BIT;
+  take_temperature();
+  take_pressures(ALL);
+  expect(ALL, 0);
+  step_by(ONE, -17000);
+  take_pressures(ALL);
+  expect(ALL & ~ONE_BIT, 1);
+}
+
+/* Whose zero may have been taken meanwhile is told once. */
+static void test_a_suspect_that_was_reset_is_told(void) {
+  start();
+  TEST_ASSERT_EQUAL_HEX32(0, frame.restored);
+  warm_by(ONE, -20);
+  take_temperature();
+  take_temperature();
+  TEST_ASSERT_EQUAL_HEX32(ONE_BIT, readings.suspects);
+  warm_by(ONE, 20);
+  temperature.returned = ONE_BIT;
+  take_temperature();
+  take_pressures(ALL);
+  TEST_ASSERT_EQUAL_HEX32(ONE_BIT, frame.restored);
+  take_pressures(ALL);
+  TEST_ASSERT_EQUAL_HEX32(0, frame.restored);
+}
+
 static void test_a_press_of_one_alone_is_at_most_two_frames_late(void) {
   start();
   static const double rise_Pa[] = {20e3, 40e3, 30e3, 10e3};
@@ -439,6 +469,8 @@ int main(void) {
   RUN_TEST(test_a_step_that_another_feels_counts_at_once);
   RUN_TEST(test_where_presses_are_not_shared_every_step_counts);
   RUN_TEST(test_with_a_sensor_missing_every_step_counts);
+  RUN_TEST(test_a_step_after_an_admission_between_frames_is_left_out);
+  RUN_TEST(test_a_suspect_that_was_reset_is_told);
   RUN_TEST(test_a_press_of_one_alone_is_at_most_two_frames_late);
   RUN_TEST(test_steps_alone_amid_the_noise);
   RUN_TEST(test_pressures_below_zero_are_left_out_and_the_second_makes_a_suspect);

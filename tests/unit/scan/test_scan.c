@@ -269,6 +269,34 @@ static void test_prom_with_differing_crc_is_used_and_reported(void) {
   TEST_ASSERT_EQUAL_INT(1 + BRING_UP_RECHECKS, count_entries(0x1E, FAKE_COMMAND)); /* no more */
 }
 
+/* It may not be what it was to be cured of. */
+static void test_who_did_not_hear_the_reset_is_not_admitted(void) {
+  fake.answering = ALL & ~DISTURBED_BIT;
+  while (count_entries(0x1E, FAKE_COMMAND) == 0 || fake.running) {
+    step();
+    if (count_entries(0xA0, FAKE_READ) > 0) {
+      break;
+    }
+  }
+  fake.answering = ALL;
+  skip_frames(2);
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, value_of(&scan.admitted));
+  run_until(2000000);
+  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
+  TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
+}
+
+static void test_temperature_that_is_asked_for_comes_soon(void) {
+  run_until(10000000); /* the interval has grown to its longest */
+  const int before = count_entries(0x54, FAKE_COMMAND);
+  run_until(now_us + 300000);
+  const int without = count_entries(0x54, FAKE_COMMAND) - before;
+  scan_ask_temperature(&scan);
+  run_until(now_us + 130000);
+  TEST_ASSERT_LESS_OR_EQUAL_INT(1, without);
+  TEST_ASSERT_EQUAL_INT(before + without + 1, count_entries(0x54, FAKE_COMMAND));
+}
+
 /* As where the line was disturbed in all of the first admission. */
 static void test_prom_misread_in_a_whole_admission_is_read_again(void) {
   fake.misread_prom = DISTURBED_BIT;
@@ -1130,6 +1158,8 @@ int main(void) {
   RUN_TEST(test_prom_misread_once_is_read_again);
   RUN_TEST(test_prom_with_differing_crc_is_used_and_reported);
   RUN_TEST(test_prom_misread_in_a_whole_admission_is_read_again);
+  RUN_TEST(test_who_did_not_hear_the_reset_is_not_admitted);
+  RUN_TEST(test_temperature_that_is_asked_for_comes_soon);
   RUN_TEST(test_prom_that_makes_a_sensor_stand_apart_is_not_used);
   RUN_TEST(test_blank_prom_is_not_admitted_and_asked_ever_more_rarely);
   RUN_TEST(test_nobody_answers);
