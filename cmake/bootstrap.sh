@@ -1,21 +1,22 @@
 #!/bin/sh
 # Sets up a Debian 12 or Ubuntu 24.04 machine and does one of the project's main jobs.
-# usage: sh cmake/bootstrap.sh demo|test|report|fuzz HOURS
+# usage: sh cmake/bootstrap.sh demo|test|report|fuzz HOURS|soak HOURS
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
 
 usage() {
-  echo "usage: sh cmake/bootstrap.sh demo|test|report|fuzz HOURS" >&2
+  echo "usage: sh cmake/bootstrap.sh demo|test|report|fuzz HOURS|soak HOURS" >&2
   echo "  demo    build everything, let a lime slip on two emulated fingertips, catch what slips in a simulated gripper, say and draw both" >&2
   echo "  test    build everything and run the whole test suite" >&2
   echo "  report  build everything, measure fit, rate, cost, truth, tangential load and grasps, repeat the published experiments in simulation, write build/report" >&2
   echo "  fuzz    build the fuzz targets and run them for so many hours; what they find is kept in build/fuzz/findings" >&2
+  echo "  soak    build everything and let faults storm on the firmware for so many hours, natively and emulated; findings in build/soak/findings" >&2
   exit 2
 }
 case $# in
   1) case $1 in demo | test | report) ;; *) usage ;; esac ;;
-  2) [ "$1" = fuzz ] || usage ;;
+  2) case $1 in fuzz | soak) ;; *) usage ;; esac ;;
   *) usage ;;
 esac
 
@@ -57,7 +58,7 @@ sigrok-cli sigrok-cli
 /usr/lib/python3/dist-packages/markdown/__init__.py python3-markdown
 /usr/lib/python3/dist-packages/pyte/__init__.py python3-pyte
 LIST
-  [ "$1" = demo ] || cat << 'LIST'
+  [ "$1" = demo ] || [ "$1" = soak ] || cat << 'LIST'
 clang-14 clang-14
 /usr/share/doc/libclang-rt-14-dev libclang-rt-14-dev
 lintian lintian
@@ -128,7 +129,7 @@ if [ "$1" = fuzz ]; then
 fi
 say "building firmware and host tools into build/"
 case $1 in
-  demo) configure host ;;
+  demo | soak) configure host ;;
   *) configure host -DFINGERTIP_FUZZ=ON ;;
 esac
 cmake --build --preset host
@@ -141,6 +142,7 @@ case $1 in
     ;;
   # One more than there are processors: many tests wait most of the time.
   test) exec ctest --preset host -j "$(($(nproc) + 1))" ;;
+  soak) exec /usr/bin/python3 tests/soak/soak.py --build build/host --boards build --hours "$2" ;;
   report)
     say "the fit: error against run time"
     /usr/bin/python3 host_tools/report/fit/fit.py --build build/host \
@@ -163,7 +165,7 @@ case $1 in
     /usr/bin/python3 host_tools/report/shear/shear.py --build build/host -o build/report --picture host_tools/report/shear/shear.png
     say "grasps in the simulated cell"
     /usr/bin/python3 host_tools/report/grasp/grasp.py --build build/host -o build/report --picture host_tools/report/grasp/grasp.png
-    say "what the fuzzers find"
+    say "what the fuzzers find, and how faults and power cuts are overcome"
     /usr/bin/python3 host_tools/report/reliability/reliability.py --build build/host -o build/report
     say "every table and picture: $root/build/report/index.html"
     ;;

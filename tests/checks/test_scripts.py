@@ -120,7 +120,7 @@ class Bootstrap(Folder):
 
     def test_only_who_fuzzes_needs_clang(self):
         path = self.path_without("clang-14")
-        for job, needs in ((("demo",), False), (("test",), True), (("report",), True), (("fuzz", "1"), True)):
+        for job, needs in ((("demo",), False), (("test",), True), (("report",), True), (("fuzz", "1"), True), (("soak", "1"), False)):
             with self.subTest(job):
                 done = self.up_to_npm(job=job, path=path)
                 self.assertEqual(done.returncode, 33)

@@ -14,6 +14,7 @@ Cuts the power every N microseconds (100) of
   write   an update of what is kept, into a free slot
   erase   one that needs a sector erased first
   mend    a start that finds an update cut short, and writes what it decides for once more
+  start   a start that finds what it stored in order
   reset   a start of the chip alone: a reset instead, sensors and flash go on
 With a cut the flash keeps of the bits that were to change some, and some read as they like from then on (flash_memory.mjs).
 After each it must start, with all sensors, and hold the old settings or the new ones; and after one more cut of the
@@ -32,7 +33,7 @@ const OFF_MS = 3;
 const MARGIN_NS = 0.3e6;
 const SETTLED_MS = 130;
 const START_LIMIT_MS = 1000;
-const KINDS = ['write', 'erase', 'mend', 'reset'];
+const KINDS = ['write', 'erase', 'mend', 'start', 'reset'];
 
 class Cutter {
   constructor(options) {
@@ -223,7 +224,7 @@ function main(argv) {
   const cutter = new Cutter(values);
   const kept = cutter.prepare();
   if (kinds.includes('mend')) kept.mend = cutter.torn(kept.write);
-  kept.reset = kept.write;
+  kept.start = kept.reset = kept.write;
   process.stdout.write(`${JSON.stringify(Object.fromEntries(kinds.map((kind) => [kind, cutter.sweep(kind, kept[kind], step_us * 1000)])))}\n`);
 }
 
