@@ -180,21 +180,20 @@ def main(argv):
         return options.seconds or EPISODE_s[kind]
 
     first = options.seed or (1 if options.least else int(time.time()) % 10**9)
-    seeds = itertools.count(first)
     earlier = soak.earlier() if options.least else []
     if options.episodes is not None:
         wanted = [(kind, seed, length(kind)) for seed in range(first, first + options.episodes) for kind in options.kinds]
         results = run(soak, options.jobs, wanted, lambda _: False)
     elif options.hours is not None:
         end_s = time.monotonic() + 3600 * options.hours
-        wanted = ((kind, seed, length(kind)) for seed in seeds for kind in options.kinds)
+        wanted = ((kind, seed, length(kind)) for seed in itertools.count(first) for kind in options.kinds)
         results = run(soak, options.jobs, wanted, lambda _: time.monotonic() >= end_s)
     else:
         has = {(result["kind"], result["seed"]) for result in earlier}
         wanted = []
         for kinds, least_h in ((EMULATED, options.least[0]), (("native",), options.least[1])):
             left_s = 3600 * (least_h - hours(earlier, *kinds))
-            for seed, kind in itertools.product(itertools.count(first), kinds):
+            for seed, kind in ((seed, kind) for seed in itertools.count(first) for kind in kinds):
                 if left_s <= 1e-6:
                     break
                 if (kind, seed) not in has:
