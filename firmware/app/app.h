@@ -69,7 +69,7 @@ struct app {
   uint32_t news;        /* of the port, when last looked at */
   uint32_t close_count; /* likewise */
   bool active;          /* the last round had something to do, so there may be more */
-  bool reads_below; /* in the last frame a sensor was below its zero */
+  bool reads_below;     /* in the last frame a sensor was below its zero */
   bool saves_power;
   uint64_t saving_since_us; /* if .saves_power */
   uint16_t osr;

@@ -125,7 +125,9 @@ void Judge::received(std::uint64_t t_us, const std::uint8_t *bytes, std::size_t 
     const ft_status status = wire_receive(&receiver_, bytes[i], &heard);
     if (status == FT_OK) {
       packet(t_us, heard);
-    } else if (status != FT_PENDING && !joining_) {
+    } else if (status != FT_PENDING && joining_) {
+      session_missing_++; // the rest of one from before, and with it perhaps the first answer
+    } else if (status != FT_PENDING) {
       find("damaged", t_us, text("a damaged packet (%d)", static_cast<int>(status)));
     }
     joining_ = joining_ && bytes[i] != 0;

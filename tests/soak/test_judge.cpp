@@ -1,6 +1,5 @@
 // The judge of the soak finds what is wrong, each kind of it, and nothing where nothing is.
 #include "judge.hpp"
-
 #include "libfingertip/command.hpp"
 #include "support/host_packets.hpp"
 
@@ -84,7 +83,8 @@ private:
     contact.frame = frame_;
     contact.flags = CONTACT_FLAG_TARED;
     if (truth.peak_Pa > 200) {
-      contact.flags |= CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
+      contact.flags |=
+          CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
       contact.x_mm = static_cast<float>(truth.x_mm);
       contact.y_mm = static_cast<float>(truth.y_mm);
       contact.force_N = static_cast<float>(truth.force_N());
