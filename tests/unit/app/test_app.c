@@ -698,6 +698,28 @@ static void at_the_slowest_rate_the_watchdog_is_fed(void) {
 }
 
 /* In the frame that is held for the temperature already, and until a temperature says otherwise. */
+/* Two supplies dip at once, so that neither steps alone: the temperatures tell it before the zeros
+ * give in, half a second later. */
+static void test_sensors_that_lost_their_state_are_reset_before_their_zeros_give_in(void) {
+  run_for(8000);
+  while (array.command >> 4 != 5) { /* the next temperature would come in two seconds */
+    native_run_until(port_now_us() + 50, main_round, &app);
+  }
+  run_for(50);
+  const int32_t zero_Pa_q10 = app.condition.zero_Pa_q10[7];
+  sim_ms5840_brown_out(&array.sensor[7]);
+  sim_ms5840_brown_out(&array.sensor[9]);
+  run_for(100);
+  TEST_ASSERT_FALSE(app.conditioned.tared);
+  TEST_ASSERT_TRUE(array.sensor[7].untrimmed);
+  run_for(400);
+  TEST_ASSERT_FALSE(array.sensor[7].untrimmed);
+  run_for(200);
+  TEST_ASSERT_TRUE(app.conditioned.tared);
+  TEST_ASSERT_INT32_WITHIN(20 * 1024, zero_Pa_q10, app.condition.zero_Pa_q10[7]);
+  TEST_ASSERT_EQUAL_HEX32(0x7FFF, app.frame.valid);
+}
+
 static void test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful(void) {
   press.force_N = 5.0;
   press.from_us = 700000;
@@ -769,6 +791,7 @@ int main(void) {
   RUN_TEST(the_last_crash_is_told_when_asked_for);
   RUN_TEST(what_happens_is_noted_for_the_record_of_a_crash);
   RUN_TEST(at_the_slowest_rate_the_watchdog_is_fed);
+  RUN_TEST(test_sensors_that_lost_their_state_are_reset_before_their_zeros_give_in);
   RUN_TEST(test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful);
   return UNITY_END();
 }

@@ -170,6 +170,27 @@ static void test_closing_loses_what_is_queued_and_is_counted(void) {
   TEST_ASSERT_EQUAL_size_t(0, native_cdc_receive(&byte, 1));
 }
 
+static void test_asleep_the_port_is_closed_and_it_wakes_up_open(void) {
+  uint8_t bytes[8];
+  cdc_start(&IDENTITY);
+  native_cdc_open();
+  native_cdc_stall(true);
+  cdc_write((const uint8_t *)"lost", 4);
+  const uint32_t news = cdc_news();
+  native_cdc_suspend(true);
+  native_cdc_suspend(true);
+  TEST_ASSERT_TRUE(cdc_is_suspended());
+  TEST_ASSERT_FALSE(cdc_is_open());
+  TEST_ASSERT_EQUAL_UINT32(1, cdc_close_count());
+  TEST_ASSERT_NOT_EQUAL_UINT32(news, cdc_news());
+  native_cdc_suspend(false);
+  native_cdc_stall(false);
+  TEST_ASSERT_FALSE(cdc_is_suspended());
+  TEST_ASSERT_TRUE(cdc_is_open());
+  TEST_ASSERT_EQUAL_UINT32(1, cdc_close_count());
+  TEST_ASSERT_EQUAL_size_t(0, native_cdc_receive(bytes, sizeof bytes));
+}
+
 static void test_stream_from_the_host(void) {
   uint8_t got[4];
   uint8_t much[NATIVE_CDC_RECEIVE_BYTES] = {0};
@@ -198,6 +219,7 @@ int main(void) {
   RUN_TEST(test_stream_to_the_host);
   RUN_TEST(test_a_stalled_host_fills_the_queue);
   RUN_TEST(test_closing_loses_what_is_queued_and_is_counted);
+  RUN_TEST(test_asleep_the_port_is_closed_and_it_wakes_up_open);
   RUN_TEST(test_stream_from_the_host);
   return UNITY_END();
 }

@@ -250,6 +250,20 @@ static void test_a_stuck_bus_needs_several_recoveries(void) {
   expect_good_frame();
 }
 
+/* What a sensor converts when the chip is reset it has at the same moment as without. */
+static void test_a_restart_of_the_bus_leaves_the_sensors_at_work(void) {
+  TEST_ASSERT_EQUAL_INT(FT_OK, command(CONVERT));
+  TEST_ASSERT_EQUAL_INT(FT_OK, bus->start_read(bus->context, READ_C1, 2, now_us));
+  const uint64_t elapsed_us = now_us;
+  sim_array_restart_bus(&array, elapsed_us);
+  now_us = CONVERT_us;
+  TEST_ASSERT_EQUAL_INT(FT_OK, read_back(READ_ADC, 3));
+  TEST_ASSERT_EQUAL_HEX32(ALL, result.acknowledged);
+  TEST_ASSERT_EQUAL_UINT32(0, array.early_reads);
+  TEST_ASSERT_NOT_EQUAL_UINT32(0, code(3));
+  expect_good_frame();
+}
+
 static void test_arguments_and_order_of_calls(void) {
   uint64_t wake_us;
   TEST_ASSERT_EQUAL_INT(FT_ERR_ARGUMENT, bus->poll(bus->context, now_us, &result, &wake_us));
@@ -275,6 +289,7 @@ int main(void) {
   RUN_TEST(test_a_power_cycle_needs_a_reset);
   RUN_TEST(test_a_timeout_needs_a_recovery);
   RUN_TEST(test_a_stuck_bus_needs_several_recoveries);
+  RUN_TEST(test_a_restart_of_the_bus_leaves_the_sensors_at_work);
   RUN_TEST(test_arguments_and_order_of_calls);
   return UNITY_END();
 }
