@@ -16,7 +16,8 @@
  * since it may be the one that feels it.
  *
  * A suspect is left out until it has been reset and its PROM read again. Then its temperature and
- * its pressure count as its first; its zero still holds, since it is the same sensor.
+ * its pressure count as its first; its zero still holds, since it is the same sensor, but for one
+ * taken shortly before (condition.h).
  *
  * A sensor whose PROM has a wrong CRC is used, for a genuine part is known that has one, and is
  * doubtful. It must have read like the others at two temperatures in a row before.
@@ -97,8 +98,8 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
                                    const struct readings_temperature *taken);
 
 /* Fills in pressures, valid, doubtful, unsettled, saturated, renewed and restored. code: [sensor];
- * good: bitmap. Returns whether it left any out: left_out and perhaps suspects have changed. Cost: some
- * 140 Cortex-M0+ cycles a sensor. */
+ * good: bitmap. Returns whether it left any out: left_out and perhaps suspects have changed. Cost:
+ * some 140 Cortex-M0+ cycles a sensor. */
 bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good,
                              struct frame *frame);
 

@@ -10,7 +10,7 @@ import { Machine } from '../../host_tools/emulator/machine.mjs';
 
 const USAGE = `usage: power_cuts.mjs --image FILE.bin --board NAME --soak PROGRAM --fingertip TOOL [--step-us N] [--kinds LIST]
 
-Cuts the power every N microseconds (100) of
+Cuts the power every N microseconds (100), every two milliseconds while what was written is read back, of
   write   an update of what is kept, into a free slot
   erase   one that needs a sector erased first
   mend    a start that finds an update cut short, and writes what it decides for once more
@@ -31,8 +31,11 @@ const ALL_SENSORS = 0x7fff;
 const OFF_MS = 3;
 /** Before the first step of a write and behind its last. */
 const MARGIN_NS = 0.3e6;
+const PAUSE_NS = 2e6;
 const SETTLED_MS = 130;
 const START_LIMIT_MS = 1000;
+/** More than the answers. */
+const STREAMS_BYTES = 450;
 const KINDS = ['write', 'erase', 'mend', 'start', 'reset'];
 
 class Cutter {
@@ -43,7 +46,7 @@ class Cutter {
     this.encoded = (...command) => Buffer.from(execFileSync(options.fingertip, ['encode', ...command], { encoding: 'utf8' }).trim(), 'hex');
     this.ask = Buffer.concat([this.encoded('stream', 'raw'), this.encoded('info')]);
     this.again = Buffer.concat([this.encoded('info'), this.encoded('health')]);
-    this.update = Object.fromEntries([OLD, NEW].map((osr) => [osr, Buffer.concat([this.encoded('osr', `${osr}`), this.encoded('keep')])]));
+    this.update = Object.fromEntries([OLD, NEW].map((osr) => [osr, Buffer.concat([this.encoded('osr', `${osr}`), this.encoded('rate', '20'), this.encoded('keep')])]));
   }
 
   /** A life of the board with this flash; `kept`: { bytes, unstable, resolvesAtPowerUp }. */
@@ -77,7 +80,7 @@ class Cutter {
     machine.heard.length = 0;
     machine.client.write(this.ask);
     const size = () => machine.heard.reduce((n, bytes) => n + bytes.length, 0);
-    while (size() < 1000) if (machine.time.nanos > end_ns || !this.run(machine, 1)) return null;
+    while (size() < STREAMS_BYTES) if (machine.time.nanos > end_ns || !this.run(machine, 1)) return null;
     return (machine.time.nanos - from_ns) / 1e6;
   }
 
@@ -91,14 +94,26 @@ class Cutter {
     return said;
   }
 
-  /** Stores once more; the times of its first and last step. */
+  /** Stores once more; the times of its steps: beginnings and ends of operations. */
   store(machine, osr) {
     const steps_ns = [];
     machine.memory.onStep = () => steps_ns.push(machine.time.nanos);
     machine.client.write(this.update[osr]);
     this.run(machine, SETTLED_MS);
     machine.memory.onStep = () => {};
-    return [steps_ns[0], steps_ns.at(-1)];
+    return steps_ns;
+  }
+
+  /** When to cut: each step while bits change and shortly before and after, each PAUSE_NS in between, where it is read back. */
+  moments(steps_ns, step_ns) {
+    const moments = [];
+    for (let at_ns = steps_ns[0] - MARGIN_NS; at_ns <= steps_ns.at(-1) + MARGIN_NS; ) {
+      moments.push(at_ns);
+      const changes = steps_ns.some((begin_ns, i) => i % 2 === 0 && at_ns >= begin_ns - MARGIN_NS && at_ns <= steps_ns[i + 1] + MARGIN_NS);
+      const next_ns = Math.min(...steps_ns.filter((begin_ns, i) => i % 2 === 0 && begin_ns - MARGIN_NS > at_ns).map((begin_ns) => begin_ns - MARGIN_NS));
+      at_ns += changes ? step_ns : Math.max(step_ns, Math.min(PAUSE_NS, next_ns - at_ns));
+    }
+    return moments;
   }
 
   /** Flashes that hold the old settings: before a free slot, and before a sector that is full. */
@@ -167,14 +182,11 @@ class Cutter {
     const writes = kind === 'write' || kind === 'erase';
     const first = this.machine(kept, 1);
     const open_ms = this.opens(first, 0);
-    let [from_ns, to_ns] = [step_ns, open_ms * 1e6 + 5e6];
-    if (writes) {
-      [from_ns, to_ns] = this.store(first, NEW);
-      [from_ns, to_ns] = [from_ns - MARGIN_NS, to_ns + MARGIN_NS];
-    }
+    const steps = Math.ceil((open_ms * 1e6 + 5e6) / step_ns);
+    const moments = writes ? this.moments(this.store(first, NEW), step_ns) : Array.from({ length: steps }, (_, i) => (i + 1) * step_ns);
     const found = { cuts: 0, not_started: 0, wrong_values: 0, brought: 0, slowest_ms: 0, what: [] };
     const cuts = [];
-    for (let at_ns = from_ns; at_ns <= to_ns; at_ns += step_ns) {
+    for (const at_ns of moments) {
       cuts.push({ at_ns, ...this.cut(kept, 1 + cuts.length, at_ns, { type: kind === 'reset' ? 'chip_reset' : 'power_cut', writes }) });
     }
     const lines = execFileSync(this.options.soak, ['--packets'], { input: `${cuts.flatMap((c) => c.lives).join('\n')}\n`, encoding: 'utf8', maxBuffer: 1 << 28 });

@@ -34,7 +34,7 @@ test('what is wrong is found', () => {
     const lines = seconds.flatMap((second) => [good, { ...good, ...second }]).map((life) => JSON.stringify(life));
     writeFileSync(program, `#!/bin/sh\nwhile read -r _; do\n${lines.map((line) => `echo '${line}'`).join('; read -r _\n')}\ndone\n`);
     chmodSync(program, 0o755);
-    const { write } = cuts(program, 'write', 900);
+    const { write } = cuts(program, 'write', 1100);
     assert.ok(write.cuts >= seconds.length, `${write.cuts}`);
     const times = (which) => Array.from({ length: write.cuts }, (_, i) => which.includes(i % seconds.length)).filter(Boolean).length;
     assert.deepEqual([write.wrong_values, write.not_started], [times([0, 1, 2]), times([3, 4])]);

@@ -68,7 +68,7 @@ def text(found):
             f"that asks for its streams at once. The worst: {text_of(found['worst_recovery_s'])} s.", "",
             *table_of_dicts_md(found["recovery"]), "",
             "## Power cuts", "",
-            f"Every {STEP_us} us of an update of what is kept into a free slot (write), of one that needs an erase, and of a start that mends what a "
+            f"Every {STEP_us} us, and every 2 ms while what was written is read back, of an update of what is kept into a free slot (write), of one that needs an erase, and of a start that mends what a "
             "cut has left. The emulated flash keeps of the bits that were to change some, and some read as they like. Each must start with "
             "all sensors and hold the old settings or the new (brought), also after one more cut.", "",
             *table_of_dicts_md(found["power_cut_kinds"]), "", *told(found["power_cut_findings"])]
