@@ -37,14 +37,14 @@ class Stop(Exception):
 
 
 class Soak:
-    def __init__(self, build, boards, out):
+    def __init__(self, build, boards, out, kinds):
         self.out = out
         self.program = build / "tests/soak/fingertip_soak"
-        self.images = {board: boards / board / f"fingertip-{board}.bin" for board in EMULATED}
+        self.images = {board: boards / board / f"fingertip-{board}.bin" for board in EMULATED if board in kinds}
         for path in (self.program, *self.images.values()):
             if not path.is_file():
                 raise Stop(f"{path}: is not there; build it: cmake --preset host && cmake --build --preset host")
-        self.keys = {kind: self.key(kind) for kind in KINDS}
+        self.keys = {kind: self.key(kind) for kind in kinds}
 
     def key(self, kind):
         """What an episode is of."""
@@ -96,7 +96,7 @@ class Soak:
                 result = json.loads(line)
             except ValueError:
                 continue  # the end of a run that was killed
-            if result["key"] == self.keys[result["kind"]]:
+            if result["key"] == self.keys.get(result["kind"]):
                 found[result["kind"], result["seed"], result["seconds"]] = result
         return list(found.values())
 
@@ -174,7 +174,7 @@ def main(argv):
     parser.add_argument("--json", type=pathlib.Path, metavar="FILE", help="the figures")
     options = parser.parse_args(argv)
     options.output.mkdir(parents=True, exist_ok=True)
-    soak = Soak(options.build.resolve(), options.boards.resolve(), options.output.resolve())
+    soak = Soak(options.build.resolve(), options.boards.resolve(), options.output.resolve(), KINDS if options.least else options.kinds)
 
     def length(kind):
         return options.seconds or EPISODE_s[kind]

@@ -57,7 +57,8 @@ def text(found):
     return ["## Faults", "",
             "A host uses a fingertip while one thing after another goes wrong, one at a time or several together: sensors, lines, multiplexers, USB, "
             "power, clocks, commands and rubbish (tests/soak/README.md). What the fingertip says is held against the truth of what it feels: a "
-            "frame without a warning that is more than 1.2 mm or 0.1 N and 15 % off is wrong, a packet that is missing must be counted. "
+            "frame without a warning that is more than 1.2 mm or 0.1 N and 15 % off is wrong, a packet that is missing must be counted; times, numbers, "
+            "packets and answers that are out of order are disorder. "
             f"Native: the firmware's code on simulated sensors, {rate(found, 'native')} times faster than real time. Emulated: the release images, "
             f"{rate(found, 'pico_mux')} and {rate(found, 'pico_parallel')} seconds in a second of one processor's time on the wall. Episodes of earlier runs of the same images, by the report "
             f"or by `sh cmake/bootstrap.sh soak`, count (build/soak/results.jsonl); {found['soak_episodes_now']} were run now. Excused are wrong frames "
