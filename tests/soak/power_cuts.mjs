@@ -137,7 +137,7 @@ class Cutter {
     return kept;
   }
 
-  /** The flash that an update leaves whose power was cut while it was written into a free slot. */
+  /** The flash that an update leaves whose power was cut while it was sealed, so that either may be there. */
   torn(kept) {
     for (let seed = 1; seed < 60; seed++) {
       const machine = this.machine(kept, seed);
@@ -147,7 +147,7 @@ class Cutter {
         begun += what === 'begins' ? 1 : 0;
       };
       machine.client.write(this.update[NEW]);
-      while (begun < 3) this.run(machine, 0.1);
+      while (begun < 4) this.run(machine, 0.1);
       this.run(machine, 0.3);
       machine.memory.cutPower();
       const torn = this.keep(machine);
