@@ -19,6 +19,7 @@ import os
 import pathlib
 import sys
 import tempfile
+import threading
 import time
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -48,6 +49,9 @@ class Mutation:
         self.folder = folder
         builds.cover(self.built, folder, jobs)
         self.tree = builds.Tree(self.built, folder / "objects", [], jobs)
+        for program in self.built.programs:  # by its code, so that a comment makes it no other
+            program.digest = digest(program.link, *((self.tree.folder / o.output).read_bytes() for o in program.objects if not o.output.endswith("build_info.c.o")))
+        self.names, self.lock = {}, threading.Lock()
         self.kept = {}
         self.kept_file = folder / "kept.json"
         if self.kept_file.exists():
@@ -66,7 +70,13 @@ class Mutation:
 
     def find_all(self, paths):
         with concurrent.futures.ThreadPoolExecutor(self.jobs) as pool:
-            return dict(zip(paths, pool.map(self.find, paths)))
+            found = dict(zip(paths, pool.map(self.find, paths)))
+        for own in found.values():
+            seen = collections.Counter()
+            for mutant in own:
+                seen[mutant.key] += 1
+                self.names[mutant] = digest(mutant.key, seen[mutant.key])
+        return found
 
     def programs_for(self, mutant):
         """Those that run its line, the fastest first."""
@@ -80,12 +90,15 @@ class Mutation:
     def judge(self, mutant):
         """"not compiled", "same code", "survived", or who killed it."""
         programs = self.programs_for(mutant)
-        name = digest(mutant.path, mutant.begin, mutant.end, mutant.text, *(p.digest for p in programs))
-        if name not in self.kept:
-            self.kept[name] = self.run(mutant, programs)
-        return self.kept[name]
+        with self.lock:
+            kept = self.kept.setdefault(self.names[mutant], {})
+        for program in programs:
+            if kept.get(program.digest):
+                return kept[program.digest]
+        missing = [program for program in programs if program.digest not in kept]
+        return self.run(mutant, programs, missing, kept) if missing or not programs else "survived"
 
-    def run(self, mutant, programs):
+    def run(self, mutant, programs, missing, kept):
         text = (ROOT / mutant.path).read_text(encoding="utf-8")
         with tempfile.TemporaryDirectory(prefix="fingertip-mutant-") as work:
             work = pathlib.Path(work)
@@ -101,19 +114,26 @@ class Mutation:
                 source = file if mutant.path.endswith(".c") else o.source
                 done = builds.run([*o.command, "-iquote", work / "source", "-c", source, "-o", output], cwd=self.built.build)
                 if done.returncode:
-                    return "not compiled"
+                    return self.note(kept, programs, "not compiled")
                 if output.read_bytes() != (self.tree.folder / o.output).read_bytes():
                     changed[o.output] = output
             if programs and not changed:
-                return "same code"
-            for program in programs:
-                if not any(o.output in changed for o in program.objects):
-                    continue
-                self.tree.link(program, work / "test", changed)
-                how = builds.fails(work / "test", math.ceil(HANGS * program.time_s) + HANGS_s, cwd=work)
+                return self.note(kept, programs, "same code")
+            for program in missing:
+                how = ""
+                if any(o.output in changed for o in program.objects):
+                    self.tree.link(program, work / "test", changed)
+                    how = builds.fails(work / "test", math.ceil(HANGS * program.time_s) + HANGS_s, cwd=work)
                 if how:
-                    return f"{program.name.rsplit('/', 1)[-1]}: {how}"
+                    return self.note(kept, [program], f"{program.name.rsplit('/', 1)[-1]}: {how}")
+                self.note(kept, [program], "")
         return "survived"
+
+    def note(self, kept, programs, how):
+        """"": survived this one."""
+        with self.lock:
+            kept.update({program.digest: how for program in programs})
+        return how
 
     def judge_all(self, chosen):
         """(mutant, what became of it) as they come; keeps it."""
@@ -131,7 +151,8 @@ class Mutation:
                 self.keep()
 
     def keep(self):
-        self.kept_file.write_text(json.dumps(dict(self.kept)), encoding="utf-8")
+        with self.lock:
+            self.kept_file.write_text(json.dumps(self.kept), encoding="utf-8")
 
 
 def shares(sizes, count):
