@@ -81,10 +81,12 @@ class Mutation:
     def programs_for(self, mutant):
         """Those that run its line, the fastest first."""
         programs = [p for p in self.built.programs if p.lines.get(mutant.path)]
+        if not programs:  # nothing in it runs: a table
+            programs = [p for p in self.built.programs if any(ROOT / mutant.path in o.depends for o in p.objects)]
         if not mutant.in_macro and mutant.function:
-            known = {line for p in programs for line in p.known[mutant.path] if line <= mutant.line}
+            known = {line for p in programs for line in p.known.get(mutant.path, ()) if line <= mutant.line}
             line = max(known, default=0)
-            programs = [p for p in programs if line in p.lines[mutant.path]]
+            programs = [p for p in programs if line in p.lines.get(mutant.path, ())]
         return sorted(programs, key=lambda program: program.time_s)
 
     def judge(self, mutant):

@@ -93,6 +93,32 @@ static void test_configuration_descriptor_is_well_formed(void) {
   TEST_ASSERT_EQUAL_HEX32(1u << (1 + 16) | 1u << (2 + 16) | 1u << 2, endpoints);
 }
 
+/* Byte by byte: USB 2.0 tables 9-8 to 9-13, CDC 1.20 tables 15 and 16, PSTN 1.2 tables 3 and 4. */
+static void test_descriptors_are_these(void) {
+  static const uint8_t device[] = {18,   1,    0,    2,    0xEF, 2, 1, 64, 0x09,
+                                   0x12, 0x01, 0x00, 0x23, 0x01, 1, 2, 3,  1};
+  static const uint8_t configuration[] = {
+      9, 2,    75,   0,    2,  1,  0,  0x80, 50, /* configuration, 100 mA from the bus */
+      8, 0x0B, 0,    2,    2,  2,  0,  0,        /* association: abstract control model */
+      9, 4,    0,    0,    1,  2,  2,  0,    0,  /* control interface, one endpoint */
+      5, 0x24, 0,    0x20, 1,                    /* header: CDC 1.20 */
+      5, 0x24, 1,    0,    1,                    /* call management: none */
+      4, 0x24, 2,    6,                          /* line coding, control lines, break */
+      5, 0x24, 6,    0,    1,                    /* union */
+      7, 5,    0x81, 3,    16, 0,  16,           /* notifications: interrupt, each 16 ms */
+      9, 4,    1,    0,    2,  10, 0,  0,    0,  /* data interface, two endpoints */
+      7, 5,    0x02, 2,    64, 0,  0,            /* bulk out */
+      7, 5,    0x82, 2,    64, 0,  0,            /* bulk in */
+  };
+  static const uint8_t languages[] = {4, 3, 0x09, 0x04};
+  TEST_ASSERT_EQUAL((int)sizeof device, get_descriptor(DEVICE, 255));
+  TEST_ASSERT_EQUAL_HEX8_ARRAY(device, answer, sizeof device);
+  TEST_ASSERT_EQUAL((int)sizeof configuration, get_descriptor(CONFIGURATION, 255));
+  TEST_ASSERT_EQUAL_HEX8_ARRAY(configuration, answer, sizeof configuration);
+  TEST_ASSERT_EQUAL((int)sizeof languages, get_descriptor(STRING, 255));
+  TEST_ASSERT_EQUAL_HEX8_ARRAY(languages, answer, sizeof languages);
+}
+
 static void test_answer_of_whole_packets_ends_with_an_empty_one_when_shorter_than_asked(void) {
   uint8_t packet[64];
   host_setup(0x80, GET_DESCRIPTOR, STRING | 2, 0x0409, 255);
@@ -335,6 +361,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_enumeration_as_linux_does);
   RUN_TEST(test_configuration_descriptor_is_well_formed);
+  RUN_TEST(test_descriptors_are_these);
   RUN_TEST(test_answer_of_whole_packets_ends_with_an_empty_one_when_shorter_than_asked);
   RUN_TEST(test_answer_is_cut_to_what_was_asked_for);
   RUN_TEST(test_question_for_no_bytes_gets_none);

@@ -1,0 +1,158 @@
+/* Judging contacts to the bit: slip, tangential load and motion of contacts by chance, which rest,
+ * creep, slide, are pulled and let go. What changes a result was meant to, or is a mistake; where
+ * it was meant, the test says what to put here. */
+#include "common/contact_flags.h"
+#include "common/crc32.h"
+#include "contact/contact.h"
+#include "contact/motion.h"
+#include "contact/tangential.h"
+#include "emulated/fit_bits/draw.h"
+#include "unity.h"
+
+#include <string.h>
+
+enum { COURSES = 100, FRAMES = 1200 };
+#define ONE_IN(n) (draw_between(1, (n)) == 1)
+
+static struct contact_settings settings;
+static struct tangential_settings tangential_settings;
+static struct slip_history slip_history;
+static struct tangential_history tangential_history;
+static struct motion_history motion_history;
+static struct fit_result fit;
+static struct fit_tangential found;
+static struct contact_input input;
+
+/* In a frame: of location in mm, of load and force in N. */
+static struct {
+  float x, y, qx, qy, force, noise_mm;
+  int32_t left;
+} course;
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static float between(float low, float high) {
+  return low + (high - low) * (float)(draw() >> 8) / 16777216.0f;
+}
+
+static void change_course(void) {
+  course.left = draw_between(5, 300);
+  const float speed = ONE_IN(3) ? 0.0f : ONE_IN(2) ? 0.002f : 0.1f;
+  course.x = between(-speed, speed);
+  course.y = between(-speed, speed);
+  const float pull = ONE_IN(2) ? 0.0f : 0.02f;
+  course.qx = between(-pull, pull);
+  course.qy = between(-pull, pull);
+  course.force = ONE_IN(2) ? 0.0f : between(-0.02f, 0.03f);
+  input.contact = !ONE_IN(12);
+}
+
+static void draw_settings(void) {
+  settings = (struct contact_settings){.slip_threshold_mm = between(0.2f, 2.0f),
+                                       .slip_window_us = (uint32_t)draw_between(0, 400000),
+                                       .force_scale = between(0.5f, 2.0f),
+                                       .force_scale_sd = between(0.0f, 0.2f)};
+  struct pad_profile profile;
+  memset(&profile, 0, sizeof profile);
+  profile.tangential_scale = between(0.5f, 2.0f);
+  profile.tangential_scale_sd = between(0.0f, 0.2f);
+  tangential_use(&tangential_settings, &profile, &settings, ONE_IN(2));
+  for (int kind = 0; kind < PAD_EDGE_KINDS && ONE_IN(2); kind++) {
+    for (int term = 0; term < PAD_EDGE_TERMS; term++) {
+      tangential_settings.edges_q20[kind][term] = draw_between(-200000, 200000);
+    }
+  }
+  tangential_settings.location_sd_limit_mm = between(0.1f, 1.0f);
+}
+
+static void begin(void) {
+  memset(&slip_history, 0, sizeof slip_history);
+  memset(&tangential_history, 0, sizeof tangential_history);
+  memset(&motion_history, 0, sizeof motion_history);
+  memset(&course, 0, sizeof course);
+  memset(&fit, 0, sizeof fit);
+  memset(&found, 0, sizeof found);
+  draw_settings();
+  input = (struct contact_input){.t_us = draw(), .contact = true, .tared = true, .fit = &fit};
+  course.noise_mm = between(0.0f, 0.05f);
+  found.x_mm = between(-15.0f, 15.0f);
+  found.y_mm = between(-25.0f, 25.0f);
+  found.force_N = between(0.2f, 8.0f);
+}
+
+static void draw_frame(int32_t period_us) {
+  if (course.left-- <= 0) {
+    change_course();
+  }
+  input.t_us += (uint32_t)period_us;
+  input.t_us += ONE_IN(200) ? draw() % 300000 : 0;
+  input.zero_doubtful = ONE_IN(60);
+  input.sensor_doubtful = ONE_IN(60);
+  input.masked = ONE_IN(60);
+  input.saturated = ONE_IN(60) ? draw() & 0x7FFF : 0;
+  input.tangential = ONE_IN(40) ? NULL : &found;
+  found.valid = !ONE_IN(40);
+  found.x_mm += course.x;
+  found.y_mm += course.y;
+  found.qx_N += course.qx;
+  found.qy_N += course.qy;
+  found.force_N += found.force_N < 0.2f ? 0.1f : found.force_N > 20.0f ? -0.1f : course.force;
+  found.force_sd_N = 0.05f * found.force_N;
+  found.q_sd_N = between(0.0f, 0.1f) * found.force_N;
+  found.location_sd_mm = between(0.0f, 0.8f);
+  found.location_noise_mm = course.noise_mm;
+  found.elongated = ONE_IN(50);
+  fit.x_mm = found.x_mm + between(-course.noise_mm, course.noise_mm);
+  fit.y_mm = found.y_mm + between(-course.noise_mm, course.noise_mm);
+  fit.p0_Pa = 1000.0f * found.force_N;
+  fit.sigma_mm = 6.0f;
+  fit.force_N = found.force_N;
+  fit.force_sd_N = found.force_sd_N;
+  fit.location_sd_mm = found.location_sd_mm;
+  fit.location_noise_mm = ONE_IN(40) ? between(0.0f, 0.4f) : course.noise_mm;
+  fit.used = ONE_IN(80) ? draw() & 0x7FFF : 0x7FFF;
+  fit.flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
+  fit.flags |=
+      ONE_IN(40) ? draw() & (CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_FLAT | CONTACT_FLAG_UNCERTAIN |
+                             CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_ELONGATED)
+                 : 0;
+  fit.flags &= ONE_IN(100) ? 0u : UINT32_MAX;
+}
+
+static uint32_t judge(uint32_t crc) {
+  struct {
+    uint32_t crc;
+    struct contact_result result;
+    struct contact_force force;
+    struct tangential_load load;
+    struct motion motion;
+  } told;
+  memset(&told, 0, sizeof told);
+  told.crc = crc;
+  contact_update(&slip_history, &settings, &input, &told.result);
+  tangential_update(&tangential_history, &tangential_settings, &input, &told.result, &told.load);
+  motion_update(&motion_history, &tangential_settings, &input, &told.result, &told.motion);
+  told.force = contact_weigh(&settings, &fit);
+  return crc32_iso_hdlc((const uint8_t *)&told, sizeof told);
+}
+
+static void test_contacts_are_judged_the_same_to_the_bit(void) {
+  uint32_t found_crc = 0;
+  draw_from(UINT64_C(0x736C6964));
+  for (int i = 0; i < COURSES; i++) {
+    begin();
+    const int32_t period_us = draw_between(700, 50000);
+    for (int frame = 0; frame < FRAMES; frame++) {
+      draw_frame(period_us);
+      found_crc = judge(found_crc);
+    }
+  }
+  TEST_ASSERT_EQUAL_HEX32(0xA2244E44, found_crc);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_contacts_are_judged_the_same_to_the_bit);
+  return UNITY_END();
+}
