@@ -64,6 +64,10 @@ clang-14 clang-14
 lintian lintian
 /usr/sbin/debootstrap debootstrap
 LIST
+  case $1 in test | report) cat << 'LIST' ;; esac
+clang-tidy-14 clang-tidy-14
+cppcheck cppcheck
+LIST
 }
 
 is_there() {

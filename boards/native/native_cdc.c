@@ -23,7 +23,7 @@ static void append(struct bytes *to, const uint8_t *data, size_t length) {
     to->capacity = 2 * (to->length + length);
     to->data = realloc(to->data, to->capacity);
     if (!to->data) {
-      fputs("native_cdc: out of memory\n", stderr);
+      (void)fputs("native_cdc: out of memory\n", stderr);
       abort();
     }
   }

@@ -23,7 +23,7 @@ static struct {
 } state;
 
 static _Noreturn void stop(const char *why) {
-  fprintf(stderr, "native_flash: %s\n", why);
+  (void)fprintf(stderr, "native_flash: %s\n", why);
   abort();
 }
 

@@ -33,7 +33,7 @@ static struct {
 } native = {.alarm_us = UINT64_MAX};
 
 static _Noreturn void stop(const char *why) {
-  fprintf(stderr, "native_port: %s at %llu us\n", why, (unsigned long long)native.now_us);
+  (void)fprintf(stderr, "native_port: %s at %llu us\n", why, (unsigned long long)native.now_us);
   abort();
 }
 

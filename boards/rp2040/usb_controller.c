@@ -25,7 +25,8 @@
 
 #include <string.h>
 
-enum { ENDPOINT_NUMBERS = 3, PIN_DP = 15, FEIGNED_MAX_ms = 5 };
+#define ENDPOINT_NUMBERS 3
+enum { PIN_DP = 15, FEIGNED_MAX_ms = 5 };
 
 #define SYSINFO_CHIP_ID REG32(0x40000000u)
 #define SYSINFO_CHIP_ID_REVISION(id) ((id) >> 28)

@@ -63,6 +63,7 @@ enum ft_status wave_player_open(void) {
 
 /* A word holds two steps or two samples, the first in its low half, which leaves the shift register
  * first and enters it first. */
+/* NOLINTNEXTLINE(readability-non-const-parameter): DMA writes the samples */
 void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_count) {
   cells = cell_count;
   DMA_READ_ADDR(CHANNEL_SAMPLES) = PIO0_RXF0_ADDRESS;

@@ -199,6 +199,7 @@ static float linearise(const struct fit_array *array, const struct samples *samp
   for (int k = 0; k < samples->count; k++) {
     float x = samples->x[k] - theta->x;
     float y = samples->y[k] - theta->y;
+    // cppcheck-suppress uninitvar ; the loop above has set as many
     float residual = samples->p[k] - theta->p0 * e[k];
     sum += residual * residual;
     float row[PARAMETERS] = {e[k], e[k] * x, e[k] * y, e[k] * (x * x + y * y)};

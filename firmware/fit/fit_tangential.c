@@ -567,7 +567,7 @@ FIXED_INLINE void sum_products(const int32_t *column, int32_t *sums, int a, int 
 _Static_assert(UNKNOWNS == 8, "every pair is in one of these");
 #define SUM_PRODUCTS(a)                                                                            \
   NOINLINE static void sum_products_##a(const int32_t *column, int32_t *sums) {                    \
-    sum_products(column, sums, a, (a + 1) % 7, (a + 2) % 7, (a + 3) % 7);                          \
+    sum_products(column, sums, (a), ((a) + 1) % 7, ((a) + 2) % 7, ((a) + 3) % 7);                  \
   }
 SUM_PRODUCTS(0)
 SUM_PRODUCTS(1)
@@ -885,6 +885,7 @@ static struct scaled variance_of(const struct fit_tangential_room *room,
   for (int k = u; k < UNKNOWNS; k++) {
     int32_t w = k == u ? 1 << 8 : 0;
     for (int m = u; m < k; m++) {
+      // cppcheck-suppress uninitvar ; m < k, and the rounds before have set those
       w -= (room->matrix[k][m] * w_q8[m]) >> 14;
     }
     w_q8[k] = w = fixed_clamp(shifted(w, solution->half[k]), -INT16_MAX, INT16_MAX);

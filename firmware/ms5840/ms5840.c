@@ -5,7 +5,7 @@
 /* Conversion times and noise: MS5840-02BA datasheet; 1 mbar = 100 Pa. */
 #define ROW(ratio, bits, max_us, noise_Pa)                                                         \
   {                                                                                                \
-    .osr = ratio, .convert_pressure = 0x40 | bits, .convert_temperature = 0x50 | bits,             \
+    .osr = (ratio), .convert_pressure = 0x40 | (bits), .convert_temperature = 0x50 | (bits),       \
     .conversion_us = (max_us)*105u / 100u, .maximum_us = (max_us),                                 \
     .noise_Pa_q10 = (int32_t)((noise_Pa)*1024.0f)                                                  \
   }

@@ -107,7 +107,7 @@ class Built:
     def names(self):
         found = {}
         for output in self.objects:
-            match = re.fullmatch(r"(tests/.*)CMakeFiles/(test_\w+)\.dir/.*", output)
+            match = re.fullmatch(r"(tests/(?:unit|integration)/.*)CMakeFiles/(test_\w+)\.dir/.*", output)
             if match:
                 found["".join(match.groups())] = True
         return list(found)
