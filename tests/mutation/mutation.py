@@ -35,6 +35,8 @@ MUTATED = ("firmware/*/*.[ch]", "boards/pico_mux/mux_bus.c", "boards/pico_parall
 # A test that takes so much longer than it did hangs.
 HANGS = 3
 HANGS_s = 2
+# As the preset sanitize runs the same tests; of those that survive without.
+UNDEFINED = ["-fsanitize=undefined", "-fsanitize-undefined-trap-on-error"]
 LEFT_OUT = ("not compiled", "same code")
 
 
@@ -107,29 +109,43 @@ class Mutation:
             file = work / "source" / mutant.path.split("/", 1)[1]
             file.parent.mkdir(parents=True)
             file.write_text(text[:mutant.begin] + mutant.text + text[mutant.end:])
-            changed = {}
-            for o in self.objects_of(mutant.path):
-                if not any(o in program.objects for program in programs):
-                    continue
-                output = work / digest(o.output)[:8] / pathlib.Path(o.output).name
-                output.parent.mkdir()
-                source = file if mutant.path.endswith(".c") else o.source
-                done = builds.run([*o.command, "-iquote", work / "source", "-c", source, "-o", output], cwd=self.built.build)
-                if done.returncode:
-                    return self.note(kept, programs, "not compiled")
-                if output.read_bytes() != (self.tree.folder / o.output).read_bytes():
-                    changed[o.output] = output
+            changed = self.compile(mutant, file, programs, [])
+            if changed is None:
+                return self.note(kept, programs, "not compiled")
             if programs and not changed:
                 return self.note(kept, programs, "same code")
             for program in missing:
-                how = ""
-                if any(o.output in changed for o in program.objects):
-                    self.tree.link(program, work / "test", changed)
-                    how = builds.fails(work / "test", math.ceil(HANGS * program.time_s) + HANGS_s, cwd=work)
-                if how:
-                    return self.note(kept, [program], f"{program.name.rsplit('/', 1)[-1]}: {how}")
-                self.note(kept, [program], "")
+                if how := self.fails(program, changed, work):
+                    return self.note(kept, [program], how)
+            checked = self.compile(mutant, file, programs, UNDEFINED)
+            for program in missing:
+                if how := self.fails(program, checked, work):
+                    return self.note(kept, [program], how)
+            self.note(kept, missing, "")
         return "survived"
+
+    def compile(self, mutant, file, programs, flags):
+        """{object: file} of those that became another; None if it cannot be."""
+        changed = {}
+        for o in self.objects_of(mutant.path):
+            if not any(o in program.objects for program in programs):
+                continue
+            output = file.parents[2] / digest(o.output, flags)[:8] / pathlib.Path(o.output).name
+            output.parent.mkdir()
+            source = file if mutant.path.endswith(".c") else o.source
+            done = builds.run([*o.command, *flags, "-iquote", file.parents[2] / "source", "-c", source, "-o", output], cwd=self.built.build)
+            if done.returncode:
+                return None
+            if flags or output.read_bytes() != (self.tree.folder / o.output).read_bytes():
+                changed[o.output] = output
+        return changed
+
+    def fails(self, program, changed, work):
+        if not any(o.output in changed for o in program.objects):
+            return ""
+        self.tree.link(program, work / "test", changed)
+        how = builds.fails(work / "test", math.ceil(HANGS * program.time_s) + HANGS_s, cwd=work)
+        return how and f"{program.name.rsplit('/', 1)[-1]}: {how}"
 
     def note(self, kept, programs, how):
         """"": survived this one."""
