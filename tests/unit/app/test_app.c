@@ -1,4 +1,5 @@
 /* The app of scene slip. */
+#include "app/packets.h"
 #include "app_rig.h"
 #include "common/bytes.h"
 #include "common/contact_flags.h"
@@ -761,6 +762,46 @@ static void test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful(void) {
   } while (next_of_type(WIRE_CONTACT, &packet));
 }
 
+static void test_stages_end_at_what_fits(void) {
+  TEST_ASSERT_EQUAL_UINT16(0, saturate_u16(0));
+  TEST_ASSERT_EQUAL_UINT16(65534, saturate_u16(65534));
+  TEST_ASSERT_EQUAL_UINT16(65535, saturate_u16(65535));
+  TEST_ASSERT_EQUAL_UINT16(65535, saturate_u16(65536));
+  TEST_ASSERT_EQUAL_UINT16(65535, saturate_u16(UINT64_MAX));
+}
+
+static void test_uptime_keeps_the_rest_of_each_second(void) {
+  native_cdc_open();
+  run_for(300);
+  ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {1300}});
+  run_for(100000);
+  const uint32_t now_s = (uint32_t)(port_now_us() / 1000000u);
+  TEST_ASSERT_UINT32_WITHIN(2, now_s, get_health().uptime_s);
+}
+
+static void test_whether_the_watchdog_struck_is_told(void) {
+  native_cdc_open();
+  run_for(300);
+  TEST_ASSERT_EQUAL(0, get_health().watchdog_resets);
+  native_start(true);
+  native_set_event_source(next_event_us, &array);
+  port_set_event_handler(on_event, &app);
+  sim_array_init(&array, geometry.sensor_count, 1);
+  array.world = (struct sim_world){.pressure_Pa = world_pressure_Pa};
+  native_cdc_reset();
+  app_start(&app, sim_array_bus(&array));
+  native_cdc_open();
+  run_for(300);
+  TEST_ASSERT_EQUAL(1, get_health().watchdog_resets);
+}
+
+/* USB 2.0, 9.6.1: bcdDevice is 0xJJMN. */
+static void test_the_port_tells_the_version(void) {
+  const uint8_t *version = build_info.version;
+  TEST_ASSERT_EQUAL_HEX16(version[0] * 256 + version[1] * 16 + version[2],
+                          native_cdc_identity()->device_version_bcd);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(nothing_streams_before_a_command);
@@ -793,5 +834,9 @@ int main(void) {
   RUN_TEST(at_the_slowest_rate_the_watchdog_is_fed);
   RUN_TEST(test_sensors_that_lost_their_state_are_reset_before_their_zeros_give_in);
   RUN_TEST(test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful);
+  RUN_TEST(test_stages_end_at_what_fits);
+  RUN_TEST(test_uptime_keeps_the_rest_of_each_second);
+  RUN_TEST(test_whether_the_watchdog_struck_is_told);
+  RUN_TEST(test_the_port_tells_the_version);
   return UNITY_END();
 }

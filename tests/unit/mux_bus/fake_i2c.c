@@ -227,9 +227,12 @@ void gpio_write(unsigned pin, bool high) {
 }
 
 void gpio_drive(unsigned pin, bool enabled) {
-  if (pin - BOARD_PIN_MUX_RESET_0 >= BOARD_MUX_COUNT || !enabled) {
+  const unsigned m = pin - BOARD_PIN_MUX_RESET_0;
+  if (m >= BOARD_MUX_COUNT || !enabled || !mux.in_reset[m]) {
     fake.misuses++;
+    return;
   }
+  fake.driven |= (uint8_t)(1u << m);
 }
 
 void gpio_set_pad(unsigned pin, enum gpio_pull pull) {

@@ -39,6 +39,7 @@ struct fake_i2c {
   unsigned opened;
   bool open;
   unsigned events; /* calls of rp2040_event() */
+  uint8_t driven;  /* bitmap of multiplexers whose RESET line is one, and began low */
 };
 
 extern struct fake_i2c fake;

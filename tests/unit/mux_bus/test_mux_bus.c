@@ -11,6 +11,7 @@
 #define READ_ADC 0x00
 
 enum { COMMAND_TRANSACTIONS = 4, READ_TRANSACTIONS = 31, OPEN_TRANSACTIONS = 3 };
+enum { RECOVERY_us = 24 * 5 };
 enum { FRAME_TRANSACTIONS = COMMAND_TRANSACTIONS + READ_TRANSACTIONS };
 
 static struct mux_bus mux_bus;
@@ -459,6 +460,31 @@ static void test_recovery_abandons_whatever_is_under_way(void) {
   }
 }
 
+static void test_start_resets_every_multiplexer(void) {
+  TEST_ASSERT_EQUAL_HEX8((1u << BOARD_MUX_COUNT) - 1u, fake.driven);
+}
+
+static void test_recovery_lets_every_multiplexer_go(void) {
+  expect_good_frame();
+  TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+  const unsigned before = fake.transactions;
+  expect_good_frame();
+  TEST_ASSERT_EQUAL_UINT(FRAME_TRANSACTIONS, fake.transactions - before);
+}
+
+/* Half periods of 5 us: nine clocks of two, and six of the STOP and the resets. */
+static void test_time_of_a_recovery(void) {
+  const uint64_t begun_us = fake.now_us;
+  TEST_ASSERT_EQUAL_INT(FT_OK, recover());
+  TEST_ASSERT_EQUAL_UINT64(RECOVERY_us, fake.now_us - begun_us);
+}
+
+static void test_a_failure_leaves_the_result_alone(void) {
+  fake.hang_at = fake.transactions + 2;
+  TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, command(CONVERT));
+  TEST_ASSERT_EQUAL_HEX32(0xA5A5A5A5u, result.acknowledged);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_a_command_reaches_all_sensors_in_one_write);
@@ -489,5 +515,9 @@ int main(void) {
   RUN_TEST(test_recovery_by_the_multiplexer_reset);
   RUN_TEST(test_a_line_held_for_good_is_reported_and_asked_again);
   RUN_TEST(test_recovery_abandons_whatever_is_under_way);
+  RUN_TEST(test_start_resets_every_multiplexer);
+  RUN_TEST(test_recovery_lets_every_multiplexer_go);
+  RUN_TEST(test_time_of_a_recovery);
+  RUN_TEST(test_a_failure_leaves_the_result_alone);
   return UNITY_END();
 }

@@ -342,6 +342,27 @@ static void test_recovery_abandons_whatever_is_under_way(void) {
   }
 }
 
+/* All bytes but the last, while that is on its way; before the last cells nothing else is due. */
+static void test_bytes_are_taken_while_the_last_one_comes(void) {
+  uint64_t look_us = 0, end_us = 0;
+  TEST_ASSERT_EQUAL_INT(FT_OK, bus.start_read(bus.context, READ_ADC, 3, fake.now_us));
+  TEST_ASSERT_EQUAL_INT(FT_PENDING, bus.poll(bus.context, fake.now_us, &result, &look_us));
+  fake.now_us = look_us;
+  TEST_ASSERT_TRUE(look_us < fake_lines_next_event_us());
+  TEST_ASSERT_EQUAL_INT(FT_PENDING, bus.poll(bus.context, fake.now_us, &result, &end_us));
+  TEST_ASSERT_EQUAL_UINT(2, parallel_bus.bytes_taken);
+  TEST_ASSERT_EQUAL_HEX8(fake_byte(7, READ_ADC, 1), result.bytes[7][1]);
+  TEST_ASSERT_TRUE(end_us > fake_lines_next_event_us());
+  TEST_ASSERT_EQUAL_INT(FT_OK, finish());
+}
+
+/* START, address and command of 18 clocks at 2.52 us each, up to the sample of the last, and 2 us.
+ */
+static void test_a_read_leads_by_its_command(void) {
+  TEST_ASSERT_EQUAL_UINT((I2C_WAVE_COMMAND_ns + 2000u) / 1000u, bus.read_lead_us);
+  TEST_ASSERT_UINT_WITHIN(5, 48, bus.read_lead_us);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_sensors_that_an_earlier_life_left_in_mid_byte);
@@ -363,5 +384,7 @@ int main(void) {
   RUN_TEST(test_a_wave_that_never_ends);
   RUN_TEST(test_recovery_gives_nine_clocks_and_a_stop_to_all);
   RUN_TEST(test_recovery_abandons_whatever_is_under_way);
+  RUN_TEST(test_bytes_are_taken_while_the_last_one_comes);
+  RUN_TEST(test_a_read_leads_by_its_command);
   return UNITY_END();
 }
