@@ -802,6 +802,22 @@ static void test_the_port_tells_the_version(void) {
                           native_cdc_identity()->device_version_bcd);
 }
 
+static void test_what_is_being_stored_is_told(void) {
+  native_cdc_open();
+  run_for(300);
+  struct wire_packet keep = {.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}};
+  struct wire_packet info = {.type = WIRE_CMD_INFO};
+  send_packet(&keep);
+  send_packet(&info);
+  run_for(10);
+  TEST_ASSERT_TRUE(next_of_type(WIRE_INFO, &info));
+  TEST_ASSERT_TRUE(info.body.info.stored & WIRE_STORED_WRITING);
+  run_for(500);
+  while (next_packet(&info)) {
+  }
+  TEST_ASSERT_FALSE(get_info().stored & WIRE_STORED_WRITING);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(nothing_streams_before_a_command);
@@ -838,5 +854,6 @@ int main(void) {
   RUN_TEST(test_uptime_keeps_the_rest_of_each_second);
   RUN_TEST(test_whether_the_watchdog_struck_is_told);
   RUN_TEST(test_the_port_tells_the_version);
+  RUN_TEST(test_what_is_being_stored_is_told);
   return UNITY_END();
 }

@@ -1,9 +1,11 @@
 #include "common/bytes.h"
+#include "common/calibration.h"
 #include "common/crc32.h"
 #include "support/pad.h"
 #include "support/random.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 #include <unity.h>
 
@@ -123,6 +125,48 @@ static void test_floats_travel_by_their_bits(void) {
   }
 }
 
+static void test_calibrations_are_in_their_ranges(void) {
+  struct calibration calibration = {.force_scale = 1.0f};
+  for (int k = 0; k < FT_MAX_SENSORS; k++) {
+    calibration.sensors[k].gain = 1.0f;
+  }
+  TEST_ASSERT_TRUE(calibration_is_valid(&calibration, FT_MAX_SENSORS));
+  const struct {
+    float *value;
+    float least, greatest;
+  } ranges[] = {
+      {&calibration.force_scale, CALIBRATION_FORCE_SCALE_MIN, CALIBRATION_FORCE_SCALE_MAX},
+      {&calibration.force_scale_sd, 0.0f, CALIBRATION_FORCE_SCALE_SD_MAX},
+      {&calibration.sensors[0].gain, CALIBRATION_GAIN_MIN, CALIBRATION_GAIN_MAX},
+      {&calibration.sensors[14].gain_sd, 0.0f, CALIBRATION_GAIN_SD_MAX},
+  };
+  for (size_t i = 0; i < sizeof ranges / sizeof ranges[0]; i++) {
+    const float was = *ranges[i].value;
+    *ranges[i].value = ranges[i].least;
+    TEST_ASSERT_TRUE(calibration_is_valid(&calibration, 15));
+    *ranges[i].value = ranges[i].greatest;
+    TEST_ASSERT_TRUE(calibration_is_valid(&calibration, 15));
+    const float bad[] = {ranges[i].least - 1e-3f, ranges[i].greatest * 1.001f, INFINITY, NAN};
+    for (size_t j = 0; j < sizeof bad / sizeof bad[0]; j++) {
+      *ranges[i].value = bad[j];
+      TEST_ASSERT_FALSE(calibration_is_valid(&calibration, 15));
+    }
+    *ranges[i].value = was;
+  }
+  calibration.sensors[15].gain = NAN; /* of no sensor */
+  TEST_ASSERT_TRUE(calibration_is_valid(&calibration, 15));
+}
+
+/* What is behind the last coefficient is none. */
+static void test_a_pad_profile_ends_where_it_does(void) {
+  struct pad_profile pad;
+  const struct pad_profile good = pad_of_12_mm();
+  memset(&pad, 0xFF, sizeof pad);
+  memcpy(&pad, &good, offsetof(struct pad_profile, from_touch));
+  pad.from_touch = 1;
+  TEST_ASSERT_TRUE(pad_profile_is_valid(&pad));
+}
+
 static void test_pad_profiles_are_in_their_ranges(void) {
   struct pad_profile pad = pad_of_12_mm();
   TEST_ASSERT_TRUE(pad_profile_is_valid(&pad));
@@ -190,6 +234,8 @@ int main(void) {
   RUN_TEST(test_bytes_are_little_endian);
   RUN_TEST(test_bytes_round_trip_at_every_alignment);
   RUN_TEST(test_floats_travel_by_their_bits);
+  RUN_TEST(test_calibrations_are_in_their_ranges);
+  RUN_TEST(test_a_pad_profile_ends_where_it_does);
   RUN_TEST(test_pad_profiles_are_in_their_ranges);
   return UNITY_END();
 }

@@ -8,7 +8,7 @@
 
 #include <string.h>
 
-enum { SENSORS = 15, COURSES = 60, FRAMES = 1500 };
+enum { SENSORS = 15, COURSES = 60, FRAMES = 6000 };
 #define Pa 1024
 #define ONE_IN(n) (draw_between(1, (n)) == 1)
 
@@ -23,6 +23,7 @@ void tearDown(void) {}
 static struct {
   int32_t pressure[SENSORS], slope[SENSORS];
   int32_t left;
+  int32_t calm; /* changes so much less often */
 } load;
 
 static int32_t bell(int32_t k, int32_t centre, int32_t peak) {
@@ -32,7 +33,7 @@ static int32_t bell(int32_t k, int32_t centre, int32_t peak) {
 
 /* Rest, a press, a slow drift of all, or of one sensor, for a while. */
 static void change_load(void) {
-  load.left = draw_between(10, 400);
+  load.left = draw_between(10, 400) * load.calm;
   int32_t kind = draw_between(0, 4), centre = draw_between(0, SENSORS - 1);
   int32_t peak = draw_between(100, 60000) * Pa;
   for (int32_t k = 0; k < SENSORS; k++) {
@@ -87,6 +88,7 @@ static uint32_t course(void) {
   memset(&condition, 0, sizeof condition);
   memset(&frame, 0, sizeof frame);
   memset(&load, 0, sizeof load);
+  load.calm = ONE_IN(2) ? 10 : 1;
   frame.sensor_count = SENSORS;
   frame.t_us = draw();
   frame.noise_Pa_q10 = draw_between(1, 11) * Pa;
@@ -111,7 +113,7 @@ static void test_frames_are_conditioned_the_same_to_the_bit(void) {
     const uint32_t both[2] = {found, course()};
     found = crc32_iso_hdlc((const uint8_t *)both, sizeof both);
   }
-  TEST_ASSERT_EQUAL_HEX32(0x8841D4F4, found);
+  TEST_ASSERT_EQUAL_HEX32(0xC1E62348, found);
 }
 
 int main(void) {

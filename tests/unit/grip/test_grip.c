@@ -453,6 +453,11 @@ static void refuses_what_is_out_of_range(void) {
   bad = settings;
   bad.blind_mN = bad.force_cap_mN + 1;
   TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, grip_init(&world.grip, &bad, &world.traits));
+  bad = settings;
+  bad.control_us = 499;
+  TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, grip_init(&world.grip, &bad, &world.traits));
+  bad.control_us = 500;
+  TEST_ASSERT_EQUAL(FT_OK, grip_init(&world.grip, &bad, &world.traits));
   struct grip_traits traits = world.traits;
   traits.step_um = 0;
   TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, grip_init(&world.grip, &settings, &traits));

@@ -361,6 +361,7 @@ static void test_bytes_are_taken_while_the_last_one_comes(void) {
 static void test_a_read_leads_by_its_command(void) {
   TEST_ASSERT_EQUAL_UINT((I2C_WAVE_COMMAND_ns + 2000u) / 1000u, bus.read_lead_us);
   TEST_ASSERT_UINT_WITHIN(5, 48, bus.read_lead_us);
+  TEST_ASSERT_TRUE(bus.answers_are_single);
 }
 
 int main(void) {

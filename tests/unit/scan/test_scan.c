@@ -1148,6 +1148,38 @@ static void test_one_and_thirty_two_sensors(void) {
   TEST_ASSERT_EQUAL_INT32(expected_Pa_q10(31), frame.pressure_Pa_q10[31]);
 }
 
+/* What is under way ends first; nothing begins before the end of the rest is noticed. */
+static void test_a_scan_that_rests_leaves_the_bus_alone(void) {
+  skip_frames(3);
+  TEST_ASSERT_FALSE(scan_rests(&scan));
+  scan_rest(&scan, true);
+  for (int steps = 0; !scan_rests(&scan); steps++) {
+    TEST_ASSERT_LESS_THAN(20, steps);
+    step();
+  }
+  TEST_ASSERT_FALSE(fake.running);
+  const int logged = fake.logged;
+  run_until(now_us + 500000);
+  TEST_ASSERT_TRUE(scan_rests(&scan));
+  TEST_ASSERT_EQUAL(logged, fake.logged);
+  scan_rest(&scan, false);
+  const uint64_t until_us = now_us + 10000;
+  while (scan_rests(&scan)) {
+    TEST_ASSERT_LESS_OR_EQUAL_UINT64(until_us, now_us);
+    step();
+  }
+  skip_frames(3);
+}
+
+static void test_a_scan_that_rests_from_its_start_resets_nobody(void) {
+  scan_rest(&scan, true);
+  run_until(500000);
+  TEST_ASSERT_TRUE(scan_rests(&scan));
+  TEST_ASSERT_EQUAL(0, fake.logged);
+  scan_rest(&scan, false);
+  skip_frames(3);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_settings_outside_their_range);
@@ -1199,5 +1231,7 @@ int main(void) {
   RUN_TEST(test_spurious_calls_change_nothing);
   RUN_TEST(test_random_faults_are_survived);
   RUN_TEST(test_one_and_thirty_two_sensors);
+  RUN_TEST(test_a_scan_that_rests_leaves_the_bus_alone);
+  RUN_TEST(test_a_scan_that_rests_from_its_start_resets_nobody);
   return UNITY_END();
 }

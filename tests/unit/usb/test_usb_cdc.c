@@ -242,6 +242,9 @@ static void test_line_coding_is_kept(void) {
   TEST_ASSERT_EQUAL(0, host_control_out(0x21, 0x20, 0, 0, coding, 7));
   TEST_ASSERT_EQUAL(7, host_control_in(0xa1, 0x21, 0, 0, 64, got));
   TEST_ASSERT_EQUAL_HEX8_ARRAY(coding, got, 7);
+  enumerate();
+  TEST_ASSERT_EQUAL(7, host_control_in(0xa1, 0x21, 0, 0, 7, got));
+  TEST_ASSERT_EQUAL_HEX8_ARRAY(initial, got, 7);
   TEST_ASSERT_EQUAL(0, host_control_out(0x21, 0x23, 0xffff, 0, NULL, 0));
 }
 

@@ -337,7 +337,9 @@ static void test_interface_set_empties_the_data_endpoints(void) {
   TEST_ASSERT_EQUAL(3, host_in(0x82, answer));
   TEST_ASSERT_EQUAL_MEMORY("new", answer, 3);
   TEST_ASSERT_EQUAL(0, host_out(0x02, "in", 2));
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"kept", 4));
   TEST_ASSERT_EQUAL(0, host_control_out(0x01, SET_INTERFACE, 0, 0, NULL, 0));
+  TEST_ASSERT_EQUAL(4, host_in(0x82, answer));
 }
 
 static void test_bus_reset_in_mid_transfer(void) {
