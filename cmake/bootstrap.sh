@@ -169,7 +169,7 @@ case $1 in
     /usr/bin/python3 host_tools/report/shear/shear.py --build build/host -o build/report --picture host_tools/report/shear/shear.png
     say "grasps in the simulated cell"
     /usr/bin/python3 host_tools/report/grasp/grasp.py --build build/host -o build/report --picture host_tools/report/grasp/grasp.png
-    say "what the fuzzers find, and how faults and power cuts are overcome"
+    say "what the fuzzers, the analysers and mutation find, and how faults and power cuts are overcome"
     /usr/bin/python3 host_tools/report/reliability/reliability.py --build build/host -o build/report
     say "every table and picture: $root/build/report/index.html"
     ;;

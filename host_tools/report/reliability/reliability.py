@@ -13,13 +13,14 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+import analysis  # noqa: E402
 import fuzzing  # noqa: E402
 import soaking  # noqa: E402
 from fingertip_files import run_tool, write_text  # noqa: E402
 from goals import goal_table_md, judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
 
-PARTS = (fuzzing, soaking)
+PARTS = (fuzzing, soaking, analysis)
 GOALS = tuple(goal for part in PARTS for goal in part.GOALS)
 
 

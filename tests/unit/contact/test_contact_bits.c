@@ -49,10 +49,10 @@ static void change_course(void) {
 }
 
 static void draw_settings(void) {
-  settings = (struct contact_settings){.slip_threshold_mm = between(0.2f, 2.0f),
-                                       .slip_window_us = (uint32_t)draw_between(0, 400000),
-                                       .force_scale = between(0.5f, 2.0f),
-                                       .force_scale_sd = between(0.0f, 0.2f)};
+  settings.slip_threshold_mm = between(0.2f, 2.0f);
+  settings.slip_window_us = (uint32_t)draw_between(0, 400000);
+  settings.force_scale = between(0.5f, 2.0f);
+  settings.force_scale_sd = between(0.0f, 0.2f);
   struct pad_profile profile;
   memset(&profile, 0, sizeof profile);
   profile.tangential_scale = between(0.5f, 2.0f);
