@@ -101,8 +101,13 @@ static int32_t um_from_q11(int32_t mm_q11) {
   return clamped(mm_q11 * 125 / 256, CHANGE_MAX_um);
 }
 
+/* Beyond every CHANGE_MAX_um, whatever the scale: a force that vanishes within a frame leaves dQ /
+ * F of any size. */
+#define RATIO_CHANGE_MAX_q12 500000
+
 /* What the load explains. */
 static int32_t um_from_ratio(int32_t ratio_q12, int32_t scale_q8) {
+  ratio_q12 = clamped(ratio_q12, RATIO_CHANGE_MAX_q12);
   return clamped(ratio_q12 * (MOTION_PER_LOAD_mm * 125) / 512 * scale_q8 / 256, CHANGE_MAX_um);
 }
 

@@ -28,7 +28,8 @@ static struct {
 
 static int32_t bell(int32_t k, int32_t centre, int32_t peak) {
   int32_t across = k / 5 - centre / 5, along = k % 5 - centre % 5;
-  return peak >> (2 * (across * across + along * along));
+  const int32_t off = 2 * (across * across + along * along);
+  return peak >> (off < 31 ? off : 31);
 }
 
 /* Rest, a press, a slow drift of all, or of one sensor, for a while. */
@@ -113,7 +114,7 @@ static void test_frames_are_conditioned_the_same_to_the_bit(void) {
     const uint32_t both[2] = {found, course()};
     found = crc32_iso_hdlc((const uint8_t *)both, sizeof both);
   }
-  TEST_ASSERT_EQUAL_HEX32(0xC1E62348, found);
+  TEST_ASSERT_EQUAL_HEX32(0x12AEA878, found);
 }
 
 int main(void) {
