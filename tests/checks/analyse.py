@@ -111,9 +111,11 @@ def analyse_paths(source, entry):
 
 
 def cppcheck(folder, addon=False):
+    kept = folder / "misra"  # else the addon leaves files beside the sources
+    kept.mkdir(exist_ok=True)
     call = ["cppcheck", f"--project={folder}/compile_commands.json", "--enable=warning,performance,portability", "--inconclusive", "--inline-suppr",
             "--std=c11", "--quiet", "--template={file}:{line}: {severity}: {message} [{id}]", f"-j{os.cpu_count() or 1}",
-            *(f"--suppress={name}" for name in CPPCHECK_OFF), *(["--addon=misra"] if addon else [])]
+            *(f"--suppress={name}" for name in CPPCHECK_OFF), *(["--addon=misra", f"--cppcheck-build-dir={kept}"] if addon else [])]
     lines = [line for line in run(call).stderr.splitlines() if re.search(r" \[[\w.-]+\]$", line)]
     if not addon:
         return lines
