@@ -142,6 +142,7 @@ bool sim_ms5840_read(struct sim_ms5840 *sensor, uint8_t command, uint8_t *bytes,
     value = (uint32_t)sensor->prom[(command - READ_PROM) / 2] << 8;
   }
   for (unsigned i = 0; i < count; i++) {
+    /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): three bytes at most */
     bytes[i] = (uint8_t)(value >> (16 - 8 * i));
   }
   return true;

@@ -47,6 +47,7 @@ static void find_grid(struct fit_array *made, const float *x_mm, const float *y_
     grid->sensor[column * rows + row] = k;
     seen |= UINT32_C(1) << (column * rows + row);
   }
+  /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): at least one sensor */
   if (seen != UINT32_MAX >> (FT_MAX_SENSORS - made->sensor_count)) {
     return;
   }

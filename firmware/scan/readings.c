@@ -3,6 +3,7 @@
 #define MAX_Pa_q10 (MS5840_MAX_PRESSURE_Pa * 1024)
 
 static uint32_t all_sensors(uint8_t sensor_count) {
+  /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): at least one sensor */
   return UINT32_MAX >> (FT_MAX_SENSORS - sensor_count);
 }
 
