@@ -158,6 +158,7 @@ void crash_start(void) {
   memset(&trace, 0, sizeof trace);
   /* A Cortex-M3 runs the handler of a fault though it could not stack the registers (ARM DDI 0337E
    * 5.12.1); should this core do so too, what is read in their place is to say nothing. */
+  // cppcheck-suppress comparePointers ; the linker script says that they are of one array
   for (uint32_t *word = __stack_guard; word < __stack_limit; word++)
     *word = 0;
   trace.events[0].code = CRASH_EVENT_START;
@@ -191,11 +192,11 @@ void port_at(enum crash_activity activity) {
 }
 
 /* One of a kind at a time, so that what goes on does not push out what led to it. */
-void port_event(enum crash_event code, uint8_t detail) {
+void port_event(enum crash_event event, uint8_t detail) {
   struct event *newest = &trace.events[(trace.event_count - 1) % CRASH_EVENTS];
-  if (newest->code != code)
+  if (newest->code != event)
     newest = &trace.events[trace.event_count++ % CRASH_EVENTS];
-  *newest = (struct event){.t_us = port_now_us(), .code = (uint8_t)code, .detail = detail};
+  *newest = (struct event){.t_us = port_now_us(), .code = (uint8_t)event, .detail = detail};
 }
 
 uint32_t port_watchdog_resets(void) {

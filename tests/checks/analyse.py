@@ -84,7 +84,7 @@ def database(found, folder):
     for source, entry, on_chip in found:
         kept = [word for word in entry["words"] if word.startswith(("-I", "-D", "-std="))]
         entries.append({"directory": entry["directory"], "file": str(source),
-                        "arguments": ["clang", "-O1", "-Wall", "-Wextra", *(ON_CHIP if on_chip else []), *kept, "-c", str(source)]})
+                        "arguments": ["clang", "-O1", "-Wall", "-Wextra", "-Wno-unknown-attributes", *(ON_CHIP if on_chip else []), *kept, "-c", str(source)]})
     (folder / "compile_commands.json").write_text(json.dumps(entries), encoding="utf-8")
 
 
