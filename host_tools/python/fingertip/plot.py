@@ -15,8 +15,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import FancyBboxPatch
 
-from evaluate import Comparison, add_recording_options, check_time, load_recording
-from fingertip_files import (
+from .evaluate import Comparison, add_recording_options, check_time, load_recording
+from .files import (
     FIT_VALID, MOVING, SLIDING, SLIP, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, WARNINGS, InputError, check_output, read_grip, read_run, read_scenario, recorded_devices,
     restart_rows, run_tool, write_bytes)
 

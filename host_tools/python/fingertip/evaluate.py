@@ -35,7 +35,7 @@ import sys
 
 import numpy as np
 
-from fingertip_files import (
+from .files import (
     CONTACT, FIT_VALID, SLIP, SLIP_VALID, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, InputError, check_output, printable, read_recording, read_run,
     read_scenario, restart_rows, run_tool, write_text)
 

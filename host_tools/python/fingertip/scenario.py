@@ -17,7 +17,7 @@ import sys
 
 import numpy as np
 
-from fingertip_files import SENSOR_X_mm, SENSOR_Y_mm, SLIP_SPEED_mm_s, InputError, check_output, run_tool, write_scenario
+from .files import SENSOR_X_mm, SENSOR_Y_mm, SLIP_SPEED_mm_s, InputError, check_output, run_tool, write_scenario
 
 STEP_s = 1e-3
 SIGMA_mm = 5.7

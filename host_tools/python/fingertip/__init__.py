@@ -1,0 +1,29 @@
+"""Reads and commands fingertips: fifteen barometers under rubber that tell where they are touched, how hard, and whether it slips.
+
+    from fingertip import Fingertip
+    with Fingertip() as fingertip:
+        for frame in fingertip:
+            if frame.trusted:
+                print(frame.x_mm, frame.y_mm, frame.force_N)
+"""
+from .clock import ClockEstimate, host_now_us
+from .device import Fingertip, list_fingertips
+from .discovery import Found
+from .errors import (
+    BadValueError, FingertipError, GoneError, InputError, NoAnswerError, NoFingertipError, NoFrameError, NoSuchPortError, NotAPortError,
+    NotNowError, NotSharedError, OtherFingertipError, OtherVersionError, PermissionDeniedError, PortError, PortInUseError, RefusedError,
+    RefusedValueError, SeveralFingertipsError, UnknownCommandError)
+from .files import Recording, read_recording
+from .frames import Block, Frame
+from .names import WARNINGS, Capability, Flag, Result, Stored, Streams
+from .recording import RecordingWriter
+from .wire import Calibration, Health, Info, LineStatistics, PadProfile
+
+__version__ = "0.1.0"
+__all__ = [
+    "WARNINGS", "BadValueError", "Block", "Calibration", "Capability", "ClockEstimate", "Fingertip", "FingertipError", "Flag", "Found", "Frame",
+    "GoneError", "Health", "Info", "InputError", "LineStatistics", "NoAnswerError", "NoFingertipError", "NoFrameError", "NoSuchPortError",
+    "NotAPortError", "NotNowError", "NotSharedError", "OtherFingertipError", "OtherVersionError", "PadProfile", "PermissionDeniedError", "PortError",
+    "PortInUseError", "Recording", "RecordingWriter", "RefusedError", "RefusedValueError", "Result", "SeveralFingertipsError", "Stored", "Streams",
+    "UnknownCommandError", "host_now_us", "list_fingertips", "read_recording",
+]

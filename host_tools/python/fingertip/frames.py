@@ -1,0 +1,293 @@
+"""Frames, one by one and as arrays."""
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .clock import ClockEstimate
+from .names import WARNINGS, Flag
+from .wire import Contact, Raw
+
+if TYPE_CHECKING:
+    import pandas
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+Q10 = 1024.0  # the wire's pressures are in 1/1024 Pa
+
+NO_CONTACT = Contact(*(math.nan if name.split("_")[-1] in ("mm", "Pa", "N", "s", "ratio", "correlation") else 0 for name in Contact._fields))
+NO_RAW = Raw(0, 0, 0, 0, 0, 0, 0, ())
+
+
+class Frame:
+    """What a fingertip said of one moment: a contact packet, a raw packet, or both.
+
+    A quantity whose flag is off, or whose packet did not come, is NaN, never 0. Lengths are mm from the centre of the pad, x across the
+    strips and y along them. frame counts every frame since the fingertip's start; t_us is its own clock, the middle of the sensors'
+    conversion; run counts the starts and returns of the fingertip since it was opened, from 0.
+    """
+
+    __slots__ = ("serial", "run", "frame", "t_us", "has_contact", "has_raw", "contact", "raw", "sequence", "raw_sequence", "clock")
+
+    def __init__(self, serial: str, run: int, t_us: int, contact: Contact | None, raw: Raw | None, sequence: int, raw_sequence: int,
+                 clock: ClockEstimate) -> None:
+        self.serial = serial
+        self.run = run
+        self.t_us = t_us
+        self.has_contact = contact is not None
+        self.has_raw = raw is not None
+        self.contact = NO_CONTACT if contact is None else contact
+        self.raw = NO_RAW if raw is None else raw
+        self.frame = self.raw.frame if contact is None else contact.frame
+        self.sequence = sequence
+        self.raw_sequence = raw_sequence
+        self.clock = clock
+        """The relation of the two clocks when this frame came; clock.uncertainty_us bounds the error of host_us."""
+
+    @property
+    def host_us(self) -> float:
+        """t_us on the host's clock: time.perf_counter() in us. NaN before the clocks were compared."""
+        return self.clock.host_at(self.t_us)
+
+    @property
+    def flags(self) -> Flag:
+        return Flag(self.contact.flags if self.has_contact else self.raw.flags)
+
+    @property
+    def warnings(self) -> Flag:
+        """Why the numbers deserve less trust; none: Flag(0)."""
+        return self.flags & WARNINGS
+
+    @property
+    def trusted(self) -> bool:
+        """There is a fit, and no warning."""
+        return self.contact.flags & (Flag.FIT_VALID.value | WARNINGS.value) == Flag.FIT_VALID.value
+
+    @property
+    def sensors_used(self) -> int:
+        """Bitmap of the sensors in the fit; 0 without one."""
+        return self.contact.sensors_used
+
+    @property
+    def x_mm(self) -> float:
+        return self.contact.x_mm
+
+    @property
+    def y_mm(self) -> float:
+        return self.contact.y_mm
+
+    @property
+    def force_N(self) -> float:
+        return self.contact.force_N
+
+    @property
+    def p0_Pa(self) -> float:
+        """Peak of the fitted Gaussian."""
+        return self.contact.p0_Pa
+
+    @property
+    def sigma_mm(self) -> float:
+        """Standard deviation of the fitted Gaussian."""
+        return self.contact.sigma_mm
+
+    @property
+    def residual_rms_Pa(self) -> float:
+        return self.contact.residual_rms_Pa
+
+    @property
+    def location_sd_mm(self) -> float:
+        """Predicted radial standard deviation of the location."""
+        return self.contact.location_sd_mm
+
+    @property
+    def force_sd_N(self) -> float:
+        """Predicted standard deviation of the force."""
+        return self.contact.force_sd_N
+
+    @property
+    def slip_mm(self) -> float:
+        """Distance of the location from its mean over the slip window."""
+        return self.contact.slip_mm
+
+    @property
+    def sigma_x_mm(self) -> float:
+        """Of an elliptic Gaussian, along x."""
+        return self.contact.sigma_x_mm
+
+    @property
+    def sigma_y_mm(self) -> float:
+        """Of an elliptic Gaussian, along y."""
+        return self.contact.sigma_y_mm
+
+    @property
+    def width_correlation(self) -> float:
+        """Of an elliptic Gaussian, -1 to 1; 0 unless it lies aslant."""
+        return self.contact.width_correlation
+
+    @property
+    def qx_N(self) -> float:
+        """Tangential load on the rubber along x."""
+        return self.contact.qx_N
+
+    @property
+    def qy_N(self) -> float:
+        """Tangential load on the rubber along y."""
+        return self.contact.qy_N
+
+    @property
+    def q_sd_N(self) -> float:
+        """Predicted standard deviation of either."""
+        return self.contact.q_sd_N
+
+    @property
+    def tangential_ratio(self) -> float:
+        """Size of the load over force_N."""
+        return self.contact.tangential_ratio
+
+    @property
+    def vx_mm_s(self) -> float:
+        """Velocity of the contact along x."""
+        return self.contact.vx_mm_s
+
+    @property
+    def vy_mm_s(self) -> float:
+        """Velocity of the contact along y."""
+        return self.contact.vy_mm_s
+
+    @property
+    def temperature_degC(self) -> float:
+        """Mean of the sensors; NaN until measured."""
+        return self.raw.temperature_cC / 100 if self.raw.temperature_cC else math.nan
+
+    @property
+    def sensors_Pa(self) -> FloatArray:
+        """Absolute pressure of each sensor; NaN where the reading is no measurement of this frame (missing sensors, held frames)."""
+        return np.where(_bits(self.raw.valid, self.raw.sensors), np.array(self.raw.readings[0::2], dtype=np.float64) / Q10, math.nan)
+
+    @property
+    def tare_Pa(self) -> FloatArray:
+        """The zero of each sensor, in the same unit."""
+        return np.array(self.raw.readings[1::2], dtype=np.float64) / Q10
+
+    def __repr__(self) -> str:
+        what = f"x_mm={self.x_mm:.2f}, y_mm={self.y_mm:.2f}, force_N={self.force_N:.3f}, " if self.has_contact else ""
+        return f"<Frame {self.frame} t_us={self.t_us}, {what}{self.flags!r}>"
+
+
+def _bits(bitmap: int, count: int) -> BoolArray:
+    return (bitmap >> np.arange(count) & 1).astype(bool)
+
+
+class Block:
+    """Frames as arrays, one value for each of the n frames.
+
+    Every quantity of a Frame by the same name, and block["x_mm"] as well; sensors_Pa and tare_Pa are [n][sensor]. A value that is not
+    there is NaN; integers (flags, bitmaps, stages) of a packet that did not come are 0, see has_contact and has_raw.
+    """
+
+    frame: IntArray
+    run: IntArray
+    t_us: IntArray
+    host_us: FloatArray
+    flags: IntArray
+    has_contact: BoolArray
+    has_raw: BoolArray
+    sensors_used: IntArray
+    x_mm: FloatArray
+    y_mm: FloatArray
+    force_N: FloatArray
+    p0_Pa: FloatArray
+    sigma_mm: FloatArray
+    residual_rms_Pa: FloatArray
+    location_sd_mm: FloatArray
+    force_sd_N: FloatArray
+    slip_mm: FloatArray
+    sigma_x_mm: FloatArray
+    sigma_y_mm: FloatArray
+    width_correlation: FloatArray
+    qx_N: FloatArray
+    qy_N: FloatArray
+    q_sd_N: FloatArray
+    tangential_ratio: FloatArray
+    vx_mm_s: FloatArray
+    vy_mm_s: FloatArray
+    convert_us: IntArray
+    read_us: IntArray
+    queue_us: IntArray
+    condition_us: IntArray
+    fit_us: IntArray
+    contact_us: IntArray
+    total_us: IntArray
+    valid: IntArray
+    saturated: IntArray
+    doubtful: IntArray
+    temperature_degC: FloatArray
+    sensors_Pa: FloatArray
+    tare_Pa: FloatArray
+
+    def __init__(self, frames: Sequence[Frame]) -> None:
+        self._names: list[str] = []
+        self._set("frame", np.array([each.frame for each in frames], dtype=np.int64))
+        self._set("run", np.array([each.run for each in frames], dtype=np.int64))
+        self._set("t_us", np.array([each.t_us for each in frames], dtype=np.int64))
+        self._set("host_us", np.array([each.host_us for each in frames], dtype=np.float64))
+        self._set("has_contact", np.array([each.has_contact for each in frames], dtype=np.bool_))
+        self._set("has_raw", np.array([each.has_raw for each in frames], dtype=np.bool_))
+        contacts = np.array([each.contact for each in frames], dtype=np.float64).reshape(-1, len(Contact._fields))
+        integers = {name for name in Contact._fields if not math.isnan(getattr(NO_CONTACT, name))}
+        for i, name in enumerate(Contact._fields[1:], 1):
+            self._set(name, contacts[:, i].astype(np.int64) if name in integers else contacts[:, i])
+        raws = np.array([each.raw[1:6] for each in frames], dtype=np.int64).reshape(-1, 5)
+        self._set("flags", np.where(self.has_contact, self.flags, raws[:, 0]))
+        for i, name in enumerate(("valid", "saturated", "doubtful"), 1):
+            self._set(name, raws[:, i])
+        self._set("temperature_degC", np.where(raws[:, 4] == 0, math.nan, raws[:, 4] / 100))
+        sensors = max((each.raw.sensors for each in frames), default=0)
+        readings = np.full((len(frames), 2 * sensors), math.nan)
+        with_raw = [i for i, each in enumerate(frames) if each.raw.sensors == sensors and sensors]
+        if with_raw:
+            readings[with_raw] = np.array([frames[i].raw.readings for i in with_raw], dtype=np.float64) / Q10
+        measured = (self.valid[:, None] >> np.arange(sensors) & 1).astype(bool)
+        self.sensors_Pa = np.where(measured, readings[:, 0::2], math.nan)
+        self.tare_Pa = readings[:, 1::2]
+
+    def _set(self, name: str, values: Any) -> None:
+        setattr(self, name, values)
+        if name not in self._names:
+            self._names.append(name)
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        values: npt.NDArray[Any] = getattr(self, name)
+        return values
+
+    def flag(self, bits: int) -> BoolArray:
+        """Where any of these flags is set."""
+        return self.flags & int(bits) != 0
+
+    @property
+    def trusted(self) -> BoolArray:
+        """Where there is a fit, and no warning."""
+        return self.flag(Flag.FIT_VALID) & ~self.flag(WARNINGS)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """A row for each frame, the sensors as s0_Pa, ... and tare0_Pa, ... Needs pandas."""
+        columns: dict[str, Any] = {name: self[name] for name in self._names}
+        for kind, values in (("s", self.sensors_Pa), ("tare", self.tare_Pa)):
+            columns |= {f"{kind}{k}_Pa": values[:, k] for k in range(values.shape[1])}
+        return frame_of(columns)
+
+
+def frame_of(columns: dict[str, Any]) -> "pandas.DataFrame":
+    """Raises ImportError with what to install."""
+    try:
+        import pandas
+    except ImportError:
+        raise ImportError('pandas is not installed: pip install "fingertip-tactile[pandas]"') from None
+    return pandas.DataFrame(columns)

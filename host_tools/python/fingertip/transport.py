@@ -1,0 +1,123 @@
+"""Ways to a fingertip: a serial port, or the socket of `fingertip serve`."""
+import contextlib
+import errno
+import os
+import select
+import socket
+import sys
+import time
+from typing import Protocol
+
+from .errors import GoneError, NoSuchPortError, NotAPortError, NotSharedError, PermissionDeniedError, PortError, PortInUseError
+
+BAUD = 115200  # USB does not care
+WRITE_TIMEOUT_s = 1.0
+READ_BYTES = 65536
+
+
+class Transport(Protocol):
+    description: str
+
+    def read(self, wait_s: float, settle_s: float) -> bytes:
+        """What has come, settle_s after its first byte; nothing if none comes in wait_s. Raises GoneError."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Raises GoneError."""
+        ...
+
+    def close(self) -> None: ...
+
+
+def _port_error(path: str, error: OSError) -> PortError:
+    """pyserial has the reason in errno, on Windows only in its text."""
+    text = str(error)
+    code = error.errno
+    if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO) or "FileNotFoundError" in text:
+        return NoSuchPortError(f"{path}: no such port")
+    if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text or (sys.platform == "win32" and "PermissionError" in text):
+        return PortInUseError(f"{path}: in use by another program")
+    if code in (errno.EACCES, errno.EPERM):
+        return PermissionDeniedError(f"{path}: permission denied")
+    if code == errno.ENOTTY or "Could not configure port" in text:
+        return NotAPortError(f"{path}: no serial port")
+    return PortError(f"{path}: cannot open ({error.strerror or text})")
+
+
+class SerialTransport:
+    """pyserial's port. On Linux and macOS it is locked as fingertip's tools lock it: whoever comes second is told so."""
+
+    def __init__(self, path: str) -> None:
+        import serial
+        self.description = path
+        try:
+            self._port = serial.Serial(path, BAUD, timeout=0.05, write_timeout=WRITE_TIMEOUT_s, exclusive=sys.platform != "win32" or None)
+        except (OSError, ValueError) as error:  # SerialException is an OSError
+            raise _port_error(path, error if isinstance(error, OSError) else OSError(None, str(error))) from None
+
+    def read(self, wait_s: float, settle_s: float) -> bytes:
+        try:
+            if self._port.timeout != wait_s:
+                self._port.timeout = wait_s
+            data = self._port.read(1)
+            if data:
+                if settle_s > 0:
+                    time.sleep(settle_s)
+                data += self._port.read(self._port.in_waiting)
+            return bytes(data)
+        except (OSError, TypeError, ValueError):  # the latter two: closed by another thread
+            raise GoneError(f"{self.description}: vanished") from None
+
+    def write(self, data: bytes) -> None:
+        try:
+            self._port.write(data)
+        except (OSError, TypeError, ValueError):
+            raise GoneError(f"{self.description}: takes nothing") from None
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError):
+            self._port.close()
+
+
+class SocketTransport:
+    """A Unix socket of `fingertip serve`; other programs have theirs at the same time."""
+
+    def __init__(self, path: str) -> None:
+        self.description = path
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            self._socket.connect(path)
+        except PermissionError:
+            self._socket.close()
+            raise PermissionDeniedError(f"{path}: permission denied: it is its owner's and group's") from None
+        except OSError:
+            self._socket.close()
+            raise NotSharedError(f"{path}: nobody shares a fingertip there") from None
+        self._socket.settimeout(WRITE_TIMEOUT_s)
+
+    def read(self, wait_s: float, settle_s: float) -> bytes:
+        try:
+            if not select.select([self._socket], [], [], wait_s)[0]:
+                return b""
+            if settle_s > 0:
+                time.sleep(settle_s)
+            data = self._socket.recv(READ_BYTES)
+        except (OSError, ValueError):
+            data = b""
+        if not data:
+            raise GoneError(f"{self.description}: its server ended it")
+        return data
+
+    def write(self, data: bytes) -> None:
+        try:
+            self._socket.sendall(data)
+        except OSError:
+            raise GoneError(f"{self.description}: takes nothing") from None
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def open_way(port: str, share_socket: str) -> Transport:
+    """The socket, if it is there."""
+    return SocketTransport(share_socket) if share_socket else SerialTransport(os.fspath(port))
