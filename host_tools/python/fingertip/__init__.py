@@ -6,6 +6,7 @@
             if frame.trusted:
                 print(frame.x_mm, frame.y_mm, frame.force_N)
 """
+from .aio import AsyncFingertip
 from .clock import ClockEstimate, host_now_us
 from .device import Fingertip, list_fingertips
 from .discovery import Found
@@ -15,13 +16,14 @@ from .errors import (
     RefusedValueError, SeveralFingertipsError, UnknownCommandError)
 from .files import Recording, read_recording
 from .frames import Block, Frame
+from .group import Fingertips
 from .names import WARNINGS, Capability, Flag, Result, Stored, Streams
 from .recording import RecordingWriter
 from .wire import Calibration, Health, Info, LineStatistics, PadProfile
 
-__version__ = "0.1.0"
+from .version import __version__
 __all__ = [
-    "WARNINGS", "BadValueError", "Block", "Calibration", "Capability", "ClockEstimate", "Fingertip", "FingertipError", "Flag", "Found", "Frame",
+    "WARNINGS", "AsyncFingertip", "BadValueError", "Block", "Calibration", "Capability", "ClockEstimate", "Fingertip", "FingertipError", "Fingertips", "Flag", "Found", "Frame",
     "GoneError", "Health", "Info", "InputError", "LineStatistics", "NoAnswerError", "NoFingertipError", "NoFrameError", "NoSuchPortError",
     "NotAPortError", "NotNowError", "NotSharedError", "OtherFingertipError", "OtherVersionError", "PadProfile", "PermissionDeniedError", "PortError",
     "PortInUseError", "Recording", "RecordingWriter", "RefusedError", "RefusedValueError", "Result", "SeveralFingertipsError", "Stored", "Streams",

@@ -7,7 +7,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from types import TracebackType
-from typing import TypeVar
 
 from . import discovery, wire
 from .clock import NO_CLOCK, ClockEstimate, ClockExchange, ClockFit, host_now_us
@@ -22,7 +21,7 @@ from .wire import Acknowledgement, Body, Contact, Health, Info, LineStatistics, 
 
 ATTEMPTS = 3
 ANSWER_TIMEOUT_s = 1.0
-EXCHANGE_INTERVAL_us = 250_000  # the two clocks are compared so often
+EXCHANGE_INTERVAL_us = 500_000  # the two clocks are compared so often
 FIRST_EXCHANGES = 8
 POLL_s = 0.05
 RETURN_INTERVAL_s = 0.25  # a port that has gone is looked for so often
@@ -30,7 +29,11 @@ NEWER_VERSIONS = 2  # a fingertip does not answer a version that it does not spe
 OSRS = (256, 512, 1024, 2048, 4096, 8192)
 FRAMES_MAX = 1 << 20
 
-Answer = TypeVar("Answer", bound=Body)
+REFUSALS: dict[int, tuple[type[RefusedError], str]] = {
+    Result.UNKNOWN_COMMAND: (UnknownCommandError, "its firmware does not know it"),
+    Result.OUT_OF_RANGE: (RefusedValueError, "out of range"),
+    Result.NOT_NOW: (NotNowError, "not now"),
+}
 
 
 def _in_range(name: str, value: float, low: float, high: float, unit: str) -> None:
@@ -59,7 +62,7 @@ class Fingertip:
     """
 
     def __init__(self, port: "str | os.PathLike[str] | None" = None, *, serial: str | None = None, share: bool | None = None,
-                 streams: Streams | None = None, reconnect: bool = False, buffer_frames: int = 16384, latency_ms: float = 5.0,
+                 streams: Streams | None = None, reconnect: bool = False, buffer_frames: int = 16384, latency_ms: float = 8.0,
                  timeout_s: float = 3.0) -> None:
         _in_range("buffer_frames", buffer_frames, 1, FRAMES_MAX, "frames")
         _in_range("latency_ms", latency_ms, 0, 1000, "ms")
@@ -230,10 +233,39 @@ class Fingertip:
                 return
             yield frame
 
-    def _patience_s(self, timeout_s: float | None) -> float:
-        if timeout_s is not None:
-            return timeout_s
+    @property
+    def patience_s(self) -> float:
+        """In which a frame has to come: timeout_s, or two and a half frames where the rate is that low."""
         return max(self._timeout_s, 2500 / self._info.rate_mHz if self._info.rate_mHz else 0)
+
+    @property
+    def is_closed(self) -> bool:
+        return self._closing
+
+    @property
+    def is_returning(self) -> bool:
+        """It has gone, and is waited for (reconnect)."""
+        return self._is_returning
+
+    def take_one(self, timeout_s: float | None = None) -> Frame | None:
+        """The oldest frame that nobody took, if there is one. timeout_s: wait for it, and raise NoFrameError. Raises GoneError."""
+        with contextlib.suppress(IndexError):
+            return self._queue.popleft()
+        if timeout_s is not None:
+            return self._take_frame(timeout_s)
+        if self._error:
+            raise self._error
+        return None
+
+    def take(self) -> list[Frame]:
+        """All frames that nobody took yet, without waiting. Raises GoneError once there are none any more."""
+        taken: list[Frame] = []
+        with contextlib.suppress(IndexError):
+            while True:
+                taken.append(self._queue.popleft())
+        if not taken and self._error:
+            raise self._error
+        return taken
 
     def _take_frame(self, timeout_s: float | None = None) -> Frame | None:
         """Nothing: it is closed."""
@@ -246,7 +278,7 @@ class Fingertip:
 
     def _wait(self, condition: Callable[[], bool], timeout_s: float | None) -> None:
         """Until it holds or this is closed."""
-        patience_s = self._patience_s(timeout_s)
+        patience_s = self.patience_s if timeout_s is None else timeout_s
         with self._changed:
             end_s = time.monotonic() + patience_s
             while not condition() and not self._closing:
@@ -267,15 +299,6 @@ class Fingertip:
         if self._latest is None or self._closing:
             raise GoneError(f"{self.description}: closed")
         return self._latest
-
-    def discard(self) -> int:
-        """Forgets the frames that wait; returns how many."""
-        count = 0
-        with contextlib.suppress(IndexError):
-            while True:
-                self._queue.popleft()
-                count += 1
-        return count
 
     def read_block(self, frames: int | None = None, seconds: float | None = None) -> Block:
         """The next frames as arrays: so many (1 to 1048576), or those of so many seconds of device time (above 0). Fewer if it is closed."""
@@ -405,12 +428,11 @@ class Fingertip:
                 raise BadValueError("it is being recorded already")
             first = self.statistics
             self._recorder = writer
-        writer.on_close(lambda reason: self._end_recording(writer, first, reason))
+        writer.on_close(lambda: self._end_recording(writer, first))
         return writer
 
-    def _end_recording(self, writer: RecordingWriter, first: LineStatistics, reason: str) -> LineStatistics:
+    def _end_recording(self, writer: RecordingWriter, first: LineStatistics) -> LineStatistics:
         """What the line counted while it was recorded."""
-        del reason
         with self._changed:
             if self._recorder is writer:
                 self._recorder = None
@@ -476,9 +498,7 @@ class Fingertip:
                 self._eager_until_us = 0
             ack, answer = self._ack, self._answer
         if ack is not None and ack.result != Result.DONE:
-            kinds = {Result.UNKNOWN_COMMAND: (UnknownCommandError, "its firmware does not know it"),
-                     Result.OUT_OF_RANGE: (RefusedValueError, "out of range"), Result.NOT_NOW: (NotNowError, "not now")}
-            kind, why = kinds.get(ack.result, (RefusedError, f"result {ack.result}"))  # type: ignore[call-overload]
+            kind, why = REFUSALS.get(ack.result, (RefusedError, f"result {ack.result}"))
             raise kind(f"the fingertip refused {name}: {why}", ack.result)
         return answer
 
@@ -611,7 +631,7 @@ class Fingertip:
     def _take(self, packets: list[wire.Packet]) -> None:
         frames: list[Frame] = []
         streams, news, recorder = self._streams, False, self._recorder
-        both = streams & 3 == 3
+        both = int(streams) & 3 == 3
         for packet in packets:
             sequence, t_us, body = packet
             if recorder:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from .clock import ClockEstimate
 from .names import WARNINGS, Flag
-from .wire import Contact, Raw
+from .wire import Contact, Raw, layout_of
 
 if TYPE_CHECKING:
     import pandas
@@ -19,7 +19,9 @@ BoolArray = npt.NDArray[np.bool_]
 
 Q10 = 1024.0  # the wire's pressures are in 1/1024 Pa
 
-NO_CONTACT = Contact(*(math.nan if name.split("_")[-1] in ("mm", "Pa", "N", "s", "ratio", "correlation") else 0 for name in Contact._fields))
+_FIT_VALID = int(Flag.FIT_VALID)
+_JUDGED = int(Flag.FIT_VALID | WARNINGS)
+NO_CONTACT = Contact._make(math.nan if wire.code == "f" else 0 for _, wire in layout_of(Contact))
 NO_RAW = Raw(0, 0, 0, 0, 0, 0, 0, ())
 
 
@@ -65,7 +67,7 @@ class Frame:
     @property
     def trusted(self) -> bool:
         """There is a fit, and no warning."""
-        return self.contact.flags & (Flag.FIT_VALID.value | WARNINGS.value) == Flag.FIT_VALID.value
+        return self.contact.flags & _JUDGED == _FIT_VALID
 
     @property
     def sensors_used(self) -> int:
@@ -179,7 +181,7 @@ class Frame:
 
 
 def _bits(bitmap: int, count: int) -> BoolArray:
-    return (bitmap >> np.arange(count) & 1).astype(bool)
+    return np.array([bitmap >> k & 1 for k in range(count)], dtype=np.bool_)
 
 
 class Block:
@@ -238,9 +240,8 @@ class Block:
         self._set("has_contact", np.array([each.has_contact for each in frames], dtype=np.bool_))
         self._set("has_raw", np.array([each.has_raw for each in frames], dtype=np.bool_))
         contacts = np.array([each.contact for each in frames], dtype=np.float64).reshape(-1, len(Contact._fields))
-        integers = {name for name in Contact._fields if not math.isnan(getattr(NO_CONTACT, name))}
-        for i, name in enumerate(Contact._fields[1:], 1):
-            self._set(name, contacts[:, i].astype(np.int64) if name in integers else contacts[:, i])
+        for i, (name, wire) in enumerate(layout_of(Contact)[1:], 1):
+            self._set(name, contacts[:, i] if wire.code == "f" else contacts[:, i].astype(np.int64))
         raws = np.array([each.raw[1:6] for each in frames], dtype=np.int64).reshape(-1, 5)
         self._set("flags", np.where(self.has_contact, self.flags, raws[:, 0]))
         for i, name in enumerate(("valid", "saturated", "doubtful"), 1):
@@ -269,7 +270,8 @@ class Block:
 
     def flag(self, bits: int) -> BoolArray:
         """Where any of these flags is set."""
-        return self.flags & int(bits) != 0
+        found: BoolArray = self.flags & int(bits) != 0
+        return found
 
     @property
     def trusted(self) -> BoolArray:

@@ -80,7 +80,7 @@ class RecordingWriter:
         self._metadata: dict[str, str] = {}
         self._first_us: int | None = None
         self._last_us = self._before_us = 0
-        self._on_close: Callable[[str], LineStatistics] | None = None
+        self._on_close: Callable[[], LineStatistics] | None = None
         self._closed = False
         self._lock = threading.RLock()
         try:
@@ -180,11 +180,10 @@ class RecordingWriter:
         else:
             cells += self._no_contact
         if raw and isinstance(raw.body, Raw):
-            body = raw.body
-            frame = body.frame
-            cells += [str(raw.sequence), str(body.flags), str(body.valid), str(body.saturated), str(body.doubtful), f"{body.temperature_cC / 100:.2f}"]
-            cells += [f"{value / Q10:.4f}" for value in body.readings[0::2]]
-            cells += [f"{value / Q10:.4f}" for value in body.readings[1::2]]
+            read = raw.body
+            frame = read.frame
+            cells += [str(raw.sequence), str(read.flags), str(read.valid), str(read.saturated), str(read.doubtful), f"{read.temperature_cC / 100:.2f}"]
+            cells += [f"{value / Q10:.4f}" for value in (*read.readings[0::2], *read.readings[1::2])]
         else:
             cells += self._no_raw
         self._line(f"{t_us},{frame}," + ",".join(cells))
@@ -200,7 +199,7 @@ class RecordingWriter:
         """Device time of all rows, over all runs."""
         return (self._before_us + (0 if self._first_us is None else self._last_us - self._first_us)) / 1e6
 
-    def on_close(self, count: Callable[[str], LineStatistics]) -> None:
+    def on_close(self, count: Callable[[], LineStatistics]) -> None:
         """What the line counted, told when the writer is closed."""
         self._on_close = count
 
@@ -216,7 +215,7 @@ class RecordingWriter:
                 return
             self._write_pending()
             if statistics is None:
-                statistics = self._on_close(reason) if self._on_close else LineStatistics()
+                statistics = self._on_close() if self._on_close else LineStatistics()
             self._line(f"# end: reason={reason} frames={self.frames} seconds={self.seconds:.6f} {statistics.text()}")
             self._closed = True
             try:

@@ -29,6 +29,18 @@ class Transport(Protocol):
     def close(self) -> None: ...
 
 
+def _read_descriptor(fd: int, wait_s: float, settle_s: float) -> bytes:
+    """Raises OSError at its end."""
+    if not select.select([fd], [], [], wait_s)[0]:
+        return b""
+    if settle_s > 0:
+        time.sleep(settle_s)
+    data = os.read(fd, READ_BYTES)
+    if not data:
+        raise OSError(errno.EIO, "end")
+    return data
+
+
 def _port_error(path: str, error: OSError) -> PortError:
     """pyserial has the reason in errno, on Windows only in its text."""
     text = str(error)
@@ -57,21 +69,21 @@ class SerialTransport:
 
     def read(self, wait_s: float, settle_s: float) -> bytes:
         try:
-            if self._port.timeout != wait_s:
-                self._port.timeout = wait_s
+            if sys.platform != "win32":
+                return _read_descriptor(self._port.fileno(), wait_s, settle_s)
+            self._port.timeout = wait_s
             data = self._port.read(1)
             if data:
-                if settle_s > 0:
-                    time.sleep(settle_s)
+                time.sleep(settle_s)
                 data += self._port.read(self._port.in_waiting)
             return bytes(data)
-        except (OSError, TypeError, ValueError):  # the latter two: closed by another thread
+        except OSError:
             raise GoneError(f"{self.description}: vanished") from None
 
     def write(self, data: bytes) -> None:
         try:
             self._port.write(data)
-        except (OSError, TypeError, ValueError):
+        except OSError:
             raise GoneError(f"{self.description}: takes nothing") from None
 
     def close(self) -> None:
@@ -97,16 +109,9 @@ class SocketTransport:
 
     def read(self, wait_s: float, settle_s: float) -> bytes:
         try:
-            if not select.select([self._socket], [], [], wait_s)[0]:
-                return b""
-            if settle_s > 0:
-                time.sleep(settle_s)
-            data = self._socket.recv(READ_BYTES)
-        except (OSError, ValueError):
-            data = b""
-        if not data:
-            raise GoneError(f"{self.description}: its server ended it")
-        return data
+            return _read_descriptor(self._socket.fileno(), wait_s, settle_s)
+        except OSError:
+            raise GoneError(f"{self.description}: its server ended it") from None
 
     def write(self, data: bytes) -> None:
         try:

@@ -9,6 +9,7 @@ import operator
 import struct
 import typing
 import zlib
+from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
 from .errors import CrcError, FormatError, PacketError, PacketVersionError, UnknownTypeError
@@ -19,17 +20,17 @@ MAX_FRAME_BYTES = 836  # longer is damage
 SENSORS_MAX = 32
 LOADER_MAGIC = 0x746F6F42
 _HEADER = struct.Struct("<BBHQ")
-_CRC = struct.Struct("<I")
+_CRC = _FLAGS = struct.Struct("<I")
 # CRC-32/ISO-HDLC over anything and its own CRC.
 _CRC_RESIDUE = 0x2144DF1C
 _LONGEST_RUN = 255
 
 
 class Wire(NamedTuple):
-    """How a field travels: struct's code, how many, whether once for each sensor, and under which bit of which field."""
+    """How a field travels: struct's code, how many of it, whether once for each sensor, and under which bit of which field."""
 
     code: str
-    count: int = 1
+    times: int = 1
     each_sensor: bool = False
     when: tuple[str, int] | None = None
     absent: Any = None
@@ -309,9 +310,18 @@ class Packet(NamedTuple):
     body: Body
 
 
-@functools.cache
-def layout_of(body: type[Any]) -> tuple[tuple[str, Wire], ...]:
-    """The fields of a body in their order on the line."""
+Layout = tuple[tuple[str, Wire], ...]
+_layouts: dict[Any, Layout] = {}
+
+
+def layout_of(body: Any) -> Layout:
+    """The fields of a body, its type, in their order on the line."""
+    if body not in _layouts:
+        _layouts[body] = _layout_of(body)
+    return _layouts[body]
+
+
+def _layout_of(body: Any) -> Layout:
     hints = typing.get_type_hints(body, include_extras=True)
     return tuple((name, next(each for each in typing.get_args(hints[name])[1:] if isinstance(each, Wire)))
                  for name in body._fields)
@@ -342,7 +352,7 @@ def _get(body: type[Any], data: bytes, at: int, sensors: int) -> tuple[Any, int]
                 raise FormatError(f"{sensors} sensors")
             at += 1
         else:
-            count = wire.count * (sensors if wire.each_sensor else 1)
+            count = wire.times * (sensors if wire.each_sensor else 1)
             form = f"<{wire.code}" if count == 1 and not wire.each_sensor else f"<{count}{wire.code}"
             found = struct.unpack_from(form, data, at)
             at += struct.calcsize(form)
@@ -350,7 +360,7 @@ def _get(body: type[Any], data: bytes, at: int, sensors: int) -> tuple[Any, int]
                 raise FormatError(f"{name} is not finite")
             if wire.code == "16s":
                 found = (_text(found[0]),)
-            values[name] = found if wire.count > 1 else found[0]
+            values[name] = found if wire.times > 1 else found[0]
     return body(**values), at
 
 
@@ -370,8 +380,8 @@ def _put(body: Any, sensors: int) -> bytes:
             sensors = value
             data += bytes([value])
             continue
-        items: tuple[Any, ...] = value if wire.count > 1 else (value,)
-        if len(items) != wire.count * (sensors if wire.each_sensor else 1):
+        items: tuple[Any, ...] = value if wire.times > 1 else (value,)
+        if len(items) != wire.times * (sensors if wire.each_sensor else 1):
             raise FormatError(f"{name} has {len(items)} values")
         if wire.code == "16s":
             items = (value.encode("ascii", "replace"),)
@@ -459,7 +469,7 @@ class _FixedLayout(NamedTuple):
     """Header and body of one shape at once."""
 
     unpacker: struct.Struct
-    order: "operator.itemgetter[Any] | None"  # of a body's fields in what was unpacked, behind it NaN and 0
+    order: Callable[[tuple[Any, ...]], tuple[Any, ...]]  # a body's fields out of what was unpacked, behind it NaN and 0
     floats: int  # from here on
 
 
@@ -467,7 +477,7 @@ class _ContactLayouts(dict[int, _FixedLayout]):
     """By which of the flags are set under which something is there."""
 
     FIELDS = layout_of(Contact)
-    MASK = functools.reduce(operator.or_, (wire.when[1] for _, wire in FIELDS if wire.when))
+    MASK = functools.reduce(operator.or_, (int(wire.when[1]) for _, wire in FIELDS if wire.when))
 
     def __missing__(self, mask: int) -> _FixedLayout:
         there = [(name, wire) for name, wire in self.FIELDS if not wire.when or mask & wire.when[1]]
@@ -491,6 +501,7 @@ class _RawLayouts(dict[int, struct.Struct]):
 _contact_layouts = _ContactLayouts()
 _raw_layouts = _RawLayouts()
 _ABSENT = (math.nan, 0)
+_new = tuple.__new__  # of a NamedTuple, without its detours
 _FLAGS_AT = 1 + _HEADER.size + 4
 _SENSORS_AT = 1 + _HEADER.size + 22
 _FIRST_READING = 4 + len(Raw._fields) - 1
@@ -500,10 +511,14 @@ def decode_stream_packet(frame: bytes) -> Packet | None:
     """As decode, in a few microseconds, for a contact or a raw packet; nothing for whatever is not one, or has runs of 254 bytes."""
     data = bytearray(frame)
     at, end = 0, len(data)
+    if _LONGEST_RUN in frame:  # perhaps as a code
+        while at < end:
+            if data[at] == _LONGEST_RUN:
+                return None
+            at += data[at]
+        at = 0
     while at < end:  # in place: all codes but the first become the zeros that they stand for
         code = data[at]
-        if code == _LONGEST_RUN:
-            return None
         data[at] = 0
         at += code
     if at != end or end < 1 + _HEADER.size + _CRC.size or zlib.crc32(memoryview(data)[1:]) != _CRC_RESIDUE or data[1] != VERSION:
@@ -511,15 +526,15 @@ def decode_stream_packet(frame: bytes) -> Packet | None:
     length = end - 1 - _CRC.size
     number = data[2]
     if number == CONTACT and length >= _HEADER.size + 22:
-        mask = int.from_bytes(data[_FLAGS_AT:_FLAGS_AT + 4], "little") & _ContactLayouts.MASK
+        mask = _FLAGS.unpack_from(data, _FLAGS_AT)[0] & _ContactLayouts.MASK
         unpacker, order, floats = _contact_layouts[mask]
         if unpacker.size != length:
             return None
         values = unpacker.unpack_from(data, 1)
         # not finite if one of them is not: binary32 does not overflow in binary64
-        if order is None or not math.isfinite(sum(values[floats:])):
+        if not math.isfinite(sum(values[floats:])):
             return None
-        return Packet(values[2], values[3], Contact._make(order(values + _ABSENT)))
+        return _new(Packet, (values[2], values[3], _new(Contact, order(values + _ABSENT))))
     if number == RAW and length >= _HEADER.size + 23:
         sensors = data[_SENSORS_AT]
         if not 1 <= sensors <= SENSORS_MAX:
@@ -528,7 +543,7 @@ def decode_stream_packet(frame: bytes) -> Packet | None:
         if unpacker.size != length:
             return None
         values = unpacker.unpack_from(data, 1)
-        return Packet(values[2], values[3], Raw._make((*values[4:_FIRST_READING], values[_FIRST_READING:])))
+        return _new(Packet, (values[2], values[3], _new(Raw, (*values[4:_FIRST_READING], values[_FIRST_READING:]))))
     return None
 
 

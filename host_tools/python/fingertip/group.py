@@ -1,0 +1,97 @@
+"""Several fingertips on one clock."""
+import contextlib
+import os
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType, TracebackType
+from typing import Any
+
+from . import discovery
+from .clock import host_now_us
+from .device import Fingertip
+from .errors import BadValueError, NoFingertipError
+from .frames import Frame
+
+LATE_us = 250_000  # a fingertip that is later than this is not waited for
+
+
+class Fingertips:
+    """Several fingertips, whose frames come in order of host_us, the host's clock that they share.
+
+        with Fingertips() as fingertips:
+            for frame in fingertips:
+                print(frame.serial, frame.host_us, frame.force_N)
+
+    ports: serial ports; serials: serial numbers; neither: all that are there. options: as for Fingertip, for each of them. by_serial has
+    the fingertips themselves. A frame is out of order only if it came more than a quarter of a second late, or where a clock jumped
+    (Fingertip.clock_jumps). Raises what Fingertip raises, and BadValueError if one is named twice.
+    """
+
+    def __init__(self, ports: "Sequence[str | os.PathLike[str]] | None" = None, *, serials: Sequence[str] | None = None, **options: Any) -> None:
+        if ports is not None and serials is not None:
+            raise BadValueError("give ports or serials")
+        self._news = threading.Event()
+        self._opened: dict[str, Fingertip] = {}
+        self._stack = contextlib.ExitStack()
+        wanted: list[dict[str, Any]]
+        if serials is not None:
+            wanted = [{"serial": serial} for serial in serials]
+        elif ports is not None:
+            wanted = [{"port": port} for port in ports]
+        else:
+            wanted = [{"port": found.port} if found.port else {"serial": found.serial} for found in discovery.find()]
+        if not wanted:
+            raise NoFingertipError("no fingertip found")
+        with self._stack:
+            for each in wanted:
+                fingertip = self._stack.enter_context(Fingertip(**each, **options))
+                if fingertip.serial in self._opened:
+                    raise BadValueError(f"fingertip {fingertip.serial} is named twice")
+                self._opened[fingertip.serial] = fingertip
+                fingertip.on_frames(self._news.set)
+            self._stack = self._stack.pop_all()
+
+    @property
+    def by_serial(self) -> Mapping[str, Fingertip]:
+        return MappingProxyType(self._opened)
+
+    def __enter__(self) -> "Fingertips":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._stack.close()
+
+    def latest(self) -> dict[str, Frame]:
+        """The newest frame of each, by serial number. Raises GoneError, NoFrameError."""
+        return {serial: fingertip.latest() for serial, fingertip in self._opened.items()}
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Every frame of all. Ends when they are closed; raises GoneError and NoFrameError of any of them."""
+        fingertips = list(self._opened.values())
+        heads: list[Frame | None] = [None] * len(fingertips)
+        heard_s = [time.monotonic()] * len(fingertips)
+        while True:
+            self._news.clear()
+            for i, fingertip in enumerate(fingertips):
+                if heads[i] is None:
+                    heads[i] = fingertip.take_one()
+                    if heads[i] or fingertip.is_returning:
+                        heard_s[i] = time.monotonic()
+                    elif time.monotonic() - heard_s[i] > fingertip.patience_s:
+                        fingertip.take_one(0)  # raises
+            there = [(frame.host_us, i) for i, frame in enumerate(heads) if frame]
+            if there:
+                host_us, first = min(there)
+                frame = heads[first]
+                if frame and (len(there) == len(fingertips) or host_now_us() - host_us > LATE_us):
+                    heads[first] = None
+                    yield frame
+                    continue
+            if not there and all(fingertip.is_closed for fingertip in fingertips):
+                return
+            if not self._news.is_set():
+                self._news.wait(0.02)
