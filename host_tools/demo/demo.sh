@@ -72,9 +72,9 @@ processes=
 
 for name in rubber ideal; do
   [ $name = rubber ] && serial=$rubber scenario=$out/lime.csv || serial=$ideal scenario=$out/ideal.csv
-  $python host_tools/python/evaluate.py $out/recording.csv "$scenario" --device "$serial" --run $out/$name.json -o $out/$name.summary.json
+  $python host_tools/python evaluate $out/recording.csv "$scenario" --device "$serial" --run $out/$name.json -o $out/$name.summary.json
 done
-$python host_tools/python/plot.py $out/recording.csv --device $rubber --truth $out/lime.csv --run $out/rubber.json -o $out/demo.png
+$python host_tools/python plot $out/recording.csv --device $rubber --truth $out/lime.csv --run $out/rubber.json -o $out/demo.png
 $python host_tools/demo/errors.py "12 mm of rubber=$out/rubber.summary.json" "ideal=$out/ideal.summary.json"
 echo "The rubber's sensors differ by 5 %, it relaxes, and a lime's pressure is no Gaussian: fingertip calibrate finds what of it can be found."
 echo "picture: $out/demo.png"

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Says what evaluate.py found, a column for each pad.
+"""Says what fingertip-evaluate found, a column for each pad.
 
     errors.py NAME=SUMMARY.json...
 """
@@ -9,7 +9,7 @@ import pathlib
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "python"))
-from fingertip_files import InputError, run_tool  # noqa: E402
+from fingertip.files import InputError, run_tool  # noqa: E402
 
 ROWS = [
     ("frames a second", lambda s: f"{s['frames_per_s']:.0f}"),

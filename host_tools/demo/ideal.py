@@ -13,7 +13,7 @@ import sys
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "python"))
-from fingertip_files import SENSOR_X_mm, SENSOR_Y_mm, TRUTH_COLUMNS, check_output, read_scenario, run_tool, write_scenario  # noqa: E402
+from fingertip.files import SENSOR_X_mm, SENSOR_Y_mm, TRUTH_COLUMNS, check_output, read_scenario, run_tool, write_scenario  # noqa: E402
 
 SIGMA_mm = 5.7
 

@@ -32,7 +32,7 @@ import pyte
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools/python"))
-from fingertip_files import InputError, check_output, run_tool, write_text  # noqa: E402
+from fingertip.files import InputError, check_output, run_tool, write_text  # noqa: E402
 
 PATIENCE_s = 60
 SPEED = "8"  # times the recorded one, so that nobody waits

@@ -298,7 +298,7 @@ int run(int argc, char **argv) {
   PlayOptions play_options;
   CLI::App *player = app.add_subcommand(
       "play", "Play a scenario to simulated sensors and record what the firmware says");
-  player->add_option("scenario", play_options.scenario, "CSV file, from twin or scenario.py")
+  player->add_option("scenario", play_options.scenario, "CSV file, from twin or fingertip-scenario")
       ->required()
       ->type_name("FILE.csv");
   player->add_option("-o,--output", play_options.recording, "Recording, as of fingertip record")

@@ -180,7 +180,7 @@ class Demo(Folder):
     def setUp(self):
         super().setUp()
         shutil.copytree(ROOT / "host_tools/demo", self.folder / "host_tools/demo")
-        for script in ("python/evaluate.py", "python/plot.py", "demo/grasp.py", "demo/ideal.py"):
+        for script in ("python/__main__.py", "demo/grasp.py", "demo/ideal.py"):
             self.write(f"host_tools/{script}", """
                 import sys
                 open(sys.argv[sys.argv.index("-o") + 1], "w").write("{}")

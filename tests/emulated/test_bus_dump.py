@@ -33,7 +33,7 @@ def run(folder, rise_ns):
     """Report, dump and log of a short run."""
     folder = pathlib.Path(folder)
     scenario = folder / "scenario.csv"
-    subprocess.run([sys.executable, str(ROOT / "host_tools/python/scenario.py"), "ideal", "-o", str(scenario), "--seconds", "1"],
+    subprocess.run([sys.executable, str(ROOT / "host_tools/python"), "scenario", "ideal", "-o", str(scenario), "--seconds", "1"],
                    check=True)
     call = [TOOLS.node, str(ROOT / "host_tools/emulator/main.mjs"), "--board", TOOLS.board, "--image", TOOLS.image, "--scenario",
             str(scenario), "--fast-enumeration", "--seconds", str(TO_S + 0.01), "--vcd", str(folder / "bus.vcd"), "--vcd-from",

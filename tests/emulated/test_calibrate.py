@@ -17,7 +17,7 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
-import fingertip_files  # noqa: E402
+from fingertip import files  # noqa: E402
 
 OPTIONS = argparse.Namespace()
 PATIENCE_s = 240
@@ -90,7 +90,7 @@ class Calibrate(unittest.TestCase):
         self.assertLess(np.std(found / true), 0.015)
         self.assertGreater(np.std(true), 0.1)
 
-        recording = fingertip_files.read_recording(recording_path)
+        recording = files.read_recording(recording_path)
         flags = recording["flags"].astype(np.int64)
         self.assertTrue((flags[recording.has_contact] & CALIBRATED).all())
         held_N = recording["force_N"][recording.has_contact & (recording["force_N"] > 0.9 * FORCE_N)]

@@ -14,7 +14,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
-import fingertip_files as files  # noqa: E402
+from fingertip import files  # noqa: E402
 
 TOOLS = argparse.Namespace()
 BOARDS = ("pico_mux", "pico_parallel")

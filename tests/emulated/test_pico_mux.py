@@ -13,7 +13,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
-import fingertip_files  # noqa: E402
+from fingertip import files  # noqa: E402
 from truth import Truth  # noqa: E402
 
 TOOLS = argparse.Namespace()
@@ -61,13 +61,13 @@ class Run:
         self.report = json.loads(self.path("run.json").read_text())
         subprocess.run([TOOLS.fingertip, "replay", str(self.path("ftr")), "--to-csv", str(self.path("csv"))],
                        check=True, capture_output=True)
-        self.recording = fingertip_files.read_recording(self.path("csv"))
+        self.recording = files.read_recording(self.path("csv"))
         return self
 
 
 def make_scenario(folder, name, seconds):
     path = pathlib.Path(folder) / f"{name}.csv"
-    subprocess.run([sys.executable, str(ROOT / "host_tools/python/scenario.py"), name, "-o", str(path), "--seconds",
+    subprocess.run([sys.executable, str(ROOT / "host_tools/python"), "scenario", name, "-o", str(path), "--seconds",
                     str(seconds)], check=True)
     return path
 
@@ -93,7 +93,7 @@ class PicoMux(unittest.TestCase):
 
     def test_ideal_presses_are_located_and_weighed(self):
         out = self.first.path("summary.json")
-        subprocess.run([sys.executable, str(ROOT / "host_tools/python/evaluate.py"), str(self.first.path("csv")),
+        subprocess.run([sys.executable, str(ROOT / "host_tools/python"), "evaluate", str(self.first.path("csv")),
                         str(self.scenario), "--run", str(self.first.path("run.json")), "-o", str(out)], check=True)
         summary = json.loads(out.read_text())
         self.assertLessEqual(summary["localisation_median_mm"], 0.05)
@@ -120,7 +120,7 @@ class PicoMux(unittest.TestCase):
         held = recording.flag(FLAG_HELD)
         checked = 0
         for row in range(len(recording["t_us"])):
-            stages = [recording[name][row] for name in fingertip_files.STAGES]
+            stages = [recording[name][row] for name in files.STAGES]
             if not all(stage == stage for stage in stages):
                 continue  # no contact packet for this frame
             if held[row]:

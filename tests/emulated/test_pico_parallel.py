@@ -14,7 +14,7 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
-import fingertip_files  # noqa: E402
+from fingertip import files  # noqa: E402
 from truth import Truth  # noqa: E402
 
 TOOLS = argparse.Namespace()
@@ -49,7 +49,7 @@ class Run:
             raise AssertionError(f"the emulator found something wrong:\n{done.stderr}")
         self.report = json.loads(path("run.json").read_text())
         subprocess.run([TOOLS.fingertip, "replay", str(path("ftr")), "--to-csv", str(path("csv"))], check=True, capture_output=True)
-        self.recording = fingertip_files.read_recording(path("csv"))
+        self.recording = files.read_recording(path("csv"))
         self.t_s = truth.times_s(self.recording, self.report)
         self.truth, self.osr = truth, osr
         self.valid = np.nan_to_num(self.recording["valid"]).astype(int)
@@ -66,7 +66,7 @@ class PicoParallel(unittest.TestCase):
         cls.folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(cls.folder.cleanup)
         path = pathlib.Path(cls.folder.name) / "ideal.csv"
-        subprocess.run([sys.executable, str(ROOT / "host_tools/python/scenario.py"), "ideal", "-o", str(path), "--seconds", "12"],
+        subprocess.run([sys.executable, str(ROOT / "host_tools/python"), "scenario", "ideal", "-o", str(path), "--seconds", "12"],
                        check=True)
         cls.truth = Truth(path)
 

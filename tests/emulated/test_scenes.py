@@ -13,7 +13,7 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools/report/shared"))
 import emulated  # noqa: E402
-import fingertip_files  # noqa: E402
+from fingertip import files  # noqa: E402
 
 TOOLS = argparse.Namespace()
 BOARD = "pico_parallel"
@@ -34,7 +34,7 @@ class Run:
     def __init__(self, folder, scene, stream, extra=()):
         base = pathlib.Path(folder) / scene
         path = lambda suffix: str(base.with_suffix("." + suffix))
-        subprocess.run([sys.executable, str(ROOT / "host_tools/python/scenario.py"), "wander", "-o", path("scenario"), "--seconds", "3"],
+        subprocess.run([sys.executable, str(ROOT / "host_tools/python"), "scenario", "wander", "-o", path("scenario"), "--seconds", "3"],
                        check=True)
         script = [(0.45, "dtr 1"), (0.46, encoded("--sequence", "1", "info")), (0.47, encoded("--sequence", "2", "stream", "contact,raw,health")),
                   (0.48, encoded("--sequence", "3", "slip", "1", "100")), (0.49, encoded("--sequence", "4", "stream", f"{stream},health")),
@@ -48,7 +48,7 @@ class Run:
         if done.returncode != 0:
             raise AssertionError(f"the emulator found something wrong:\n{done.stderr}")
         subprocess.run([TOOLS.fingertip, "replay", path("ftr"), "--to-csv", path("csv")], check=True, capture_output=True)
-        self.recording = fingertip_files.read_recording(path("csv"))
+        self.recording = files.read_recording(path("csv"))
         self.acks = {fields["command_sequence"]: fields["result"] for kind, fields in self.recording.packets if kind == "ack"}
         self.body_bytes = {}
         for frame in pathlib.Path(path("ftr")).read_bytes().split(b"\0"):
@@ -79,8 +79,8 @@ class Scenes(unittest.TestCase):
         self.assertEqual(self.press.recording.metadata["scene"], "press")
         self.assertTrue(self.press.has_contact.all())
         self.assertFalse(self.press.has_raw.any())
-        self.assertTrue(self.press.recording.flag(fingertip_files.FIT_VALID)[-400:].all())
-        self.assertFalse(self.press.recording.flag(fingertip_files.SLIP | fingertip_files.SLIP_VALID).any())
+        self.assertTrue(self.press.recording.flag(files.FIT_VALID)[-400:].all())
+        self.assertFalse(self.press.recording.flag(files.SLIP | files.SLIP_VALID).any())
         self.assertEqual(set(self.press.body_bytes), {CONTACT, INFO, HEALTH, ACK})
         self.assertEqual(self.press.body_bytes[INFO], {INFO_BYTES + OF_FIT[INFO]})
         self.assertEqual(self.press.body_bytes[HEALTH], {HEALTH_BYTES + OF_FIT[HEALTH]})
@@ -93,7 +93,7 @@ class Scenes(unittest.TestCase):
         recording = grasp.recording
         self.assertEqual(recording.metadata["scene"], "grasp")
         late = recording["t_us"] > recording["t_us"][-1] - 900e3
-        self.assertTrue(recording.flag(fingertip_files.TANGENTIAL_VALID)[late].all())
+        self.assertTrue(recording.flag(files.TANGENTIAL_VALID)[late].all())
         t_us = recording["t_us"][late]
         self.assertGreater((len(t_us) - 1) / (t_us[-1] - t_us[0]) * 1e6, 1250)
         self.assertLess(recording.health()[-1]["frames_skipped"], 5)

@@ -12,7 +12,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
-import fingertip_files  # noqa: E402
+from fingertip import files  # noqa: E402
 
 OPTIONS = argparse.Namespace()
 CALIBRATION, SETTINGS, WRITING, DAMAGED = 1, 2, 4, 8
@@ -51,7 +51,7 @@ class Store(unittest.TestCase):
             "--scenario", self.scenario, "--host-script", script, "--capture", capture, "--faults", faulty, "--seconds", seconds,
             "--flash", self.flash, "--fast-enumeration", *options)
         run(self.tool, "replay", capture, "--to-csv", table, "--overwrite")
-        recording = fingertip_files.read_recording(table)
+        recording = files.read_recording(table)
         results = [int(f["result"]) for kind, f in recording.packets if kind == "ack" and int(f["command"]) == KEEP]
         metadata = {}
         for line in table.read_text().splitlines():

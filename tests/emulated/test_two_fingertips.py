@@ -22,7 +22,7 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
-import fingertip_files as files  # noqa: E402
+from fingertip import files  # noqa: E402
 
 TOOLS = argparse.Namespace()
 CLOCKS_ppm = {"E660583883265A01": 25, "E660583883265A02": -25}

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "host_tools" / "python"))
-import fingertip_files  # noqa: E402
+from fingertip import files  # noqa: E402
 
 HELD = 1 << 6
 # A location without one of these is meant to be right: LOW_SIGNAL to SENSOR_DOUBTFUL but for SENSOR_MASKED, which only tells why.
@@ -17,7 +17,7 @@ MOMENT_s = 1e-3
 class Truth:
     def __init__(self, path):
         self.path = path
-        self.scenario = fingertip_files.read_scenario(path)
+        self.scenario = files.read_scenario(path)
         self.ambient_Pa = float(self.scenario.metadata["ambient_Pa"])
 
     def times_s(self, recording, report):
@@ -36,7 +36,7 @@ class Truth:
     def unwarned_errors_mm(self, recording, t_s):
         """Distances from the truth of all locations without a warning, where the scenario presses with at least 0.3 N."""
         flags = np.nan_to_num(recording["flags"]).astype(int)
-        told = (flags & fingertip_files.FIT_VALID != 0) & (flags & (WARNINGS | HELD) == 0)
+        told = (flags & files.FIT_VALID != 0) & (flags & (WARNINGS | HELD) == 0)
         pressed = (self.scenario.at("force_N", t_s - MOMENT_s) > 0.3) & (self.scenario.at("force_N", t_s + MOMENT_s) > 0.3)
         rows = told & pressed
         return np.hypot(recording["x_mm"][rows] - self.scenario.at("x_mm", t_s[rows]), recording["y_mm"][rows] - self.scenario.at("y_mm", t_s[rows]))

@@ -14,7 +14,7 @@ import tempfile
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "host_tools/demo")]
-import fingertip_files as files  # noqa: E402
+from fingertip import files  # noqa: E402
 from grasp import read_truth  # noqa: E402
 
 TRUTH = "# fingertip-truth 1\nt_s,slips,slid_mm,force_N\n0.000,0,0.0,0.1\n0.002,1,0.5,2.5\n"

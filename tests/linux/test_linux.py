@@ -27,7 +27,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path.insert(0, str(HERE))
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
-import fingertip_files as files  # noqa: E402
+from fingertip import files  # noqa: E402
 import guest as virtual  # noqa: E402
 
 TOOLS = argparse.Namespace()

@@ -1,7 +1,6 @@
-#!/usr/bin/python3
 """Compares a recording with the truth of its scenario.
 
-    evaluate.py RECORDING.csv SCENARIO.csv [--run run.json] -o summary.json
+    fingertip-evaluate RECORDING.csv SCENARIO.csv [--run run.json] -o summary.json
 
 Scenario time = device time + device_time_zero_s of the run report (0 without one). The truth is taken at each
 frame's own time, linear between the scenario's rows. Frames whose time falls between a row with and a row
@@ -164,7 +163,7 @@ def check_time(recording):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(prog="fingertip-evaluate", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recording", metavar="RECORDING.csv")
     parser.add_argument("scenario", metavar="SCENARIO.csv")
     parser.add_argument("--run", metavar="run.json", help="the emulator's report")
@@ -179,5 +178,6 @@ def main(argv):
     return 0
 
 
-if __name__ == "__main__":
-    sys.exit(run_tool("evaluate.py", main))
+def command():
+    """The console command fingertip-evaluate."""
+    return run_tool("fingertip-evaluate", main)

@@ -33,6 +33,8 @@ import sys
 
 import numpy as np
 
+from .errors import InputError
+
 PITCH_mm = 9.0
 # Sensor k = 5 * strip + position along the strip; origin in the centre of the pad.
 SENSOR_X_mm = np.repeat(np.arange(-1, 2), 5) * PITCH_mm
@@ -53,10 +55,6 @@ RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *TANGENTIAL_COLUMNS, *RA
 CONTACT, FIT_VALID, SLIP_VALID, SLIP = 1 << 0, 1 << 1, 1 << 3, 1 << 4
 TANGENTIAL_VALID, TANGENTIAL_FROM_TOUCH, VELOCITY_VALID, MOVING, SLIDING = (1 << bit for bit in range(20, 25))
 WARNINGS = 0x7FF00  # LOW_SIGNAL to SENSOR_DOUBTFUL, firmware/common/contact_flags.h: the numbers deserve less trust
-
-
-class InputError(Exception):
-    """Something the user can mend; one line."""
 
 
 def run_tool(name, main):

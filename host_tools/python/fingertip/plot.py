@@ -1,8 +1,7 @@
-#!/usr/bin/python3
 """Draws a recording, with the truth behind it if there is one; force along three axes where it has tangential loads.
 Of a grasp it draws what was wanted and felt, load, width and state, unless --device chooses one of its fingertips.
 
-    plot.py RECORDING.csv [--truth SCENARIO.csv] [--run run.json] -o FILE.png
+    fingertip-plot RECORDING.csv [--truth SCENARIO.csv] [--run run.json] -o FILE.png
 """
 import argparse
 import io
@@ -285,7 +284,7 @@ def header(recording, comparison, t_s, simulated):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(prog="fingertip-plot", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recording", metavar="RECORDING.csv")
     parser.add_argument("--truth", metavar="SCENARIO.csv", help="the scenario that was played")
     parser.add_argument("--run", metavar="run.json", help="the emulator's report: the recording is of simulated sensors")
@@ -348,5 +347,6 @@ def main(argv):
     return 0
 
 
-if __name__ == "__main__":
-    sys.exit(run_tool("plot.py", main))
+def command():
+    """The console command fingertip-plot."""
+    return run_tool("fingertip-plot", main)

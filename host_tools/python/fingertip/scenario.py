@@ -1,7 +1,6 @@
-#!/usr/bin/python3
 """Writes a scenario: what the fifteen sensors feel over time, and the truth behind it.
 
-    scenario.py NAME -o FILE.csv [--seconds S] [--seed N]
+    fingertip-scenario NAME -o FILE.csv [--seconds S] [--seed N]
 
 ideal   ideal Gaussian presses (sigma 5.7 mm) of 0.5 to 20 N at random places of the array; no slip
 demo    taps of different force and place, two slips, a figure-eight stroke; 10 s
@@ -10,7 +9,7 @@ wander  one contact of 5 N from 0.6 s to the end that never rests: every frame h
 
 The pressure is the Gaussian of De Clercq et al., RA-L 2022, eq. (2), and the force its integral, eq. (4):
 F = 2 pi p0 sigma^2. slip is 1 while the contact moves faster than 10 mm/s. The same name, length and seed
-give the same bytes. The file format is described in fingertip_files.py.
+give the same bytes. The file format is described in files.py.
 """
 import argparse
 import sys
@@ -145,7 +144,7 @@ def wander(seconds, random):
 
 def main(argv):
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+        prog="fingertip-scenario", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("name", choices=sorted(DESCRIPTIONS), metavar="NAME", help=", ".join(sorted(DESCRIPTIONS)))
     parser.add_argument("-o", "--output", required=True, metavar="FILE.csv")
     parser.add_argument("--seconds", type=float, metavar="S", help="length; default: that of the scenario")
@@ -167,5 +166,6 @@ def main(argv):
     return 0
 
 
-if __name__ == "__main__":
-    sys.exit(run_tool("scenario.py", main))
+def command():
+    """The console command fingertip-scenario."""
+    return run_tool("fingertip-scenario", main)

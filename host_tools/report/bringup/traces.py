@@ -18,7 +18,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save  # noqa: E402
 from emulated import BOARDS, scenario  # noqa: E402
-from fingertip_files import InputError, run_tool  # noqa: E402
+from fingertip.files import InputError, run_tool  # noqa: E402
 from reporting import run  # noqa: E402
 from vcd import read_vcd  # noqa: E402
 

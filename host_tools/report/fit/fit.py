@@ -23,7 +23,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 from drawing import BLUE, FAINT, GOAL, INK, plt, save  # noqa: E402
-from fingertip_files import InputError, run_tool, write_text  # noqa: E402
+from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from goals import goal_table_md, judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
 from tables import table_md  # noqa: E402

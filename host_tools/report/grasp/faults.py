@@ -2,7 +2,7 @@
 import json
 import pathlib
 
-from fingertip_files import InputError
+from fingertip.files import InputError
 from reporting import run
 from tables import table_md
 

@@ -21,7 +21,7 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 import emulated_grasp  # noqa: E402
 import faults  # noqa: E402
 import grasp_report  # noqa: E402
-from fingertip_files import InputError, run_tool  # noqa: E402
+from fingertip.files import InputError, run_tool  # noqa: E402
 from goals import judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
 

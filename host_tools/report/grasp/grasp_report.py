@@ -4,7 +4,7 @@ import bisect
 import emulated_grasp
 import faults
 from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save
-from fingertip_files import write_text
+from fingertip.files import write_text
 from goals import goal_table_md
 from tables import table_md, text_of
 

@@ -24,7 +24,7 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 import rate_report  # noqa: E402
 import scenes  # noqa: E402
 from emulated import BOARDS, CLOCK_Hz, CONVERSION_us, FROM_s, Measurement, Tools, distribution, scenario  # noqa: E402
-from fingertip_files import InputError, run_tool, write_text  # noqa: E402
+from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from goals import judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
 

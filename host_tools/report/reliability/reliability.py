@@ -16,7 +16,7 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 import analysis  # noqa: E402
 import fuzzing  # noqa: E402
 import soaking  # noqa: E402
-from fingertip_files import run_tool, write_text  # noqa: E402
+from fingertip.files import run_tool, write_text  # noqa: E402
 from goals import goal_table_md, judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
 

@@ -5,7 +5,7 @@ import pathlib
 import subprocess
 import tempfile
 
-from fingertip_files import InputError
+from fingertip.files import InputError
 from reporting import run
 from tables import table_of_dicts_md, text_of
 

@@ -3,7 +3,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
-from fingertip_files import InputError  # noqa: E402
+from fingertip.files import InputError  # noqa: E402
 
 INK, FAINT, GRID, GOAL, BLUE, ORANGE = "#22252e", "#8a8f9c", "#e6e8ee", "#2a9d4a", "#1f6fd6", "#d98a1f"
 

@@ -8,7 +8,7 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
-from fingertip_files import CONTACT, FIT_VALID, InputError, read_recording  # noqa: E402
+from fingertip.files import CONTACT, FIT_VALID, InputError, read_recording  # noqa: E402
 from reporting import run  # noqa: E402
 
 HELD = 1 << 6
@@ -44,7 +44,7 @@ def scenario(folder, name, seconds, stem=None):
     """"wander" touches from 0.65 s on; "rest" never."""
     path = pathlib.Path(folder) / f"{stem or name}.csv"
     if name != "rest":
-        run(sys.executable, ROOT / "host_tools/python/scenario.py", name, "-o", path, "--seconds", f"{seconds:g}")
+        run(sys.executable, ROOT / "host_tools/python", "scenario", name, "-o", path, "--seconds", f"{seconds:g}")
         return path
     names = ["t_s", "contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip", *(f"s{k}_Pa" for k in range(15))]
     zeros = ",0" * (len(names) - 1)

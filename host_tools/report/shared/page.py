@@ -23,7 +23,7 @@ import markdown
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
-from fingertip_files import InputError, run_tool, write_text  # noqa: E402
+from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from goals import HEADER, goal_rows  # noqa: E402
 from tables import text_of  # noqa: E402
 

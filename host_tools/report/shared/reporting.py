@@ -10,7 +10,7 @@ import threading
 import time
 
 import page
-from fingertip_files import InputError, check_output, write_text
+from fingertip.files import InputError, check_output, write_text
 from goals import missed, print_goals
 
 

@@ -9,7 +9,7 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/r
 import numpy as np  # noqa: E402
 import scenes  # noqa: E402
 from emulated import FROM_s, Measurement, Tools, scenario  # noqa: E402
-from fingertip_files import read_recording  # noqa: E402
+from fingertip.files import read_recording  # noqa: E402
 from reporting import run  # noqa: E402
 
 BOARD = "pico_parallel"

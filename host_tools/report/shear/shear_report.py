@@ -1,7 +1,7 @@
 """What shear.py measured as text and as a picture."""
 import numpy as np
 from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save
-from fingertip_files import write_text
+from fingertip.files import write_text
 from goals import goal_table_md
 from tables import table_md, table_of_dicts_md, text_of
 

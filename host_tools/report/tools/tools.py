@@ -27,7 +27,7 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
-from fingertip_files import InputError, run_tool, write_text  # noqa: E402
+from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from goals import goal_table_md, judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, write_json  # noqa: E402
 

@@ -22,7 +22,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 
 import truth_report  # noqa: E402
-from fingertip_files import InputError, run_tool  # noqa: E402
+from fingertip.files import InputError, run_tool  # noqa: E402
 from goals import judge  # noqa: E402
 from reporting import finish, option_parser, output_folder, write_json  # noqa: E402
 

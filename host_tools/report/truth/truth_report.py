@@ -1,6 +1,6 @@
 """What truth.py measured as text and as a picture."""
 from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save
-from fingertip_files import write_text
+from fingertip.files import write_text
 from goals import goal_table_md
 from tables import table_of_dicts_md
 

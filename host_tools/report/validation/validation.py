@@ -27,7 +27,7 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
-from fingertip_files import FIT_VALID, SLIP, InputError, read_recording, run_tool  # noqa: E402
+from fingertip.files import FIT_VALID, SLIP, InputError, read_recording, run_tool  # noqa: E402
 from goals import judge  # noqa: E402
 from reporting import finish, option_parser, output_folder, run, write_json  # noqa: E402
 from validation_report import draw, write_report  # noqa: E402

@@ -4,7 +4,7 @@ write_report takes the dict that is in validation.json, draw the arrays of valid
 """
 import numpy as np
 from drawing import BLUE, FAINT, INK, ORANGE, plt, save
-from fingertip_files import SENSOR_X_mm, SENSOR_Y_mm, write_text
+from fingertip.files import SENSOR_X_mm, SENSOR_Y_mm, write_text
 from goals import goal_table_md
 from tables import table_md
 

@@ -23,7 +23,7 @@ FINGERTIP, FAKE_CELL = (os.path.abspath(path) for path in sys.argv[1:3])
 PATIENCE_s = 60
 PYTHON_TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"
 sys.path.insert(0, str(PYTHON_TOOLS))
-import fingertip_files as files  # noqa: E402
+from fingertip import files  # noqa: E402
 
 MISSED, DROPPED, FAULT = 3, 4, 5
 # A limit that no slow machine meets.
@@ -475,13 +475,13 @@ class Recorded(GraspTest):
         self.assertTrue(plain[0].startswith("time_us,state,trouble,width_mm,"))
 
         picture = os.path.join(self.folder, "grasp.png")
-        done = subprocess.run([sys.executable, PYTHON_TOOLS / "plot.py", self.csv, "-o", picture], capture_output=True, text=True,
+        done = subprocess.run([sys.executable, PYTHON_TOOLS, "plot", self.csv, "-o", picture], capture_output=True, text=True,
                               env=self.environment, timeout=PATIENCE_s)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertRegex(done.stdout, r"grasp\.png: 1 slide, held by at most \d+\.\d N, at last still")
         with open(picture, "rb") as file:
             self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
-        done = subprocess.run([sys.executable, PYTHON_TOOLS / "plot.py", self.csv, "--device", "AAAA", "-o", picture], capture_output=True, text=True,
+        done = subprocess.run([sys.executable, PYTHON_TOOLS, "plot", self.csv, "--device", "AAAA", "-o", picture], capture_output=True, text=True,
                               env=self.environment, timeout=PATIENCE_s)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("frames in", done.stdout)

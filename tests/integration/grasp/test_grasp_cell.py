@@ -17,7 +17,7 @@ import numpy as np
 
 FINGERTIP, FINGERTIP_CELL, TABLES = (os.path.abspath(path) for path in sys.argv[1:4])
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"))
-import fingertip_files as files  # noqa: E402
+from fingertip import files  # noqa: E402
 
 PATIENCE_s = 120
 DONE, FAILED, MISSED, DROPPED, FAULT = 0, 1, 3, 4, 5

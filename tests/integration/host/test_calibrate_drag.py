@@ -15,7 +15,7 @@ TWIN, PLAYER, TABLES = sys.argv[3:6]
 import test_cli  # noqa: E402
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"))
-import fingertip_files  # noqa: E402
+from fingertip import files  # noqa: E402
 
 FORCE_N, SHARE = 3.0, 0.3
 PULL_N = FORCE_N * SHARE
@@ -40,8 +40,8 @@ def make_recording(name, *options, pad=("--pad", "12"), kind="drag", force_N=FOR
 
 def scale_of_truth(recording, scenario):
     """What the readings of every steady pull have to be multiplied by, from the scenario's own loads."""
-    recording, scenario = fingertip_files.read_recording(recording), fingertip_files.read_scenario(scenario)
-    rows = recording.flag(fingertip_files.TANGENTIAL_VALID)
+    recording, scenario = files.read_recording(recording), files.read_scenario(scenario)
+    rows = recording.flag(files.TANGENTIAL_VALID)
     t_s, read = recording["t_us"][rows] / 1e6, np.column_stack((recording["qx_N"][rows], recording["qy_N"][rows]))
     truth = np.column_stack([scenario.at(name, t_s) for name in ("Qx_N", "Qy_N")])
     size, force = np.hypot(*truth.T), scenario.at("force_N", t_s)

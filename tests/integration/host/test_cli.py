@@ -25,7 +25,7 @@ FINGERTIP, FAKE_DEVICE = (os.path.abspath(path) for path in sys.argv[1:3])
 PATIENCE_s = 30
 PYTHON_TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"
 sys.path.insert(0, str(PYTHON_TOOLS))
-import fingertip_files as files  # noqa: E402
+from fingertip import files  # noqa: E402
 
 
 def report(**numbers):
@@ -357,7 +357,7 @@ class Several(CliTest):
                 if path == self.csv:
                     self.assertEqual(again.end["packets"], end[2])
                 self.assertIn(" 0 packets dropped", self.run_cli("replay", converted, "--speed", "max")[0])
-            drawn = subprocess.run([sys.executable, PYTHON_TOOLS / "plot.py", self.csv, "--device", serial, "-o",
+            drawn = subprocess.run([sys.executable, PYTHON_TOOLS, "plot", self.csv, "--device", serial, "-o",
                                     os.path.join(self.folder, f"{serial}.png")], capture_output=True, text=True, check=True).stdout
             self.assertRegex(drawn, rf": {end[1]} frames in [\d.]+ s  ·  dropped packets: 0\n$")
 

@@ -14,7 +14,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "host_tools/python"))
-import fingertip_files  # noqa: E402
+from fingertip import files  # noqa: E402
 
 OPTIONS = argparse.Namespace()
 PYTHON = ROOT / "host_tools/python"
@@ -38,7 +38,7 @@ class Player(unittest.TestCase):
         cls.addClassCleanup(cls.temporary.cleanup)
         cls.folder = pathlib.Path(cls.temporary.name)
         cls.scenario = cls.folder / "demo.csv"
-        must(sys.executable, PYTHON / "scenario.py", "demo", "-o", cls.scenario)
+        must(sys.executable, PYTHON, "scenario", "demo", "-o", cls.scenario)
 
     def play(self, name, *more, scenario=None):
         recording = self.folder / name
@@ -48,7 +48,7 @@ class Player(unittest.TestCase):
     def evaluated(self, recording):
         summary = self.folder / "summary.json"
         summary.unlink(missing_ok=True)
-        must(sys.executable, PYTHON / "evaluate.py", recording, self.scenario, "-o", summary)
+        must(sys.executable, PYTHON, "evaluate", recording, self.scenario, "-o", summary)
         return json.loads(summary.read_text())
 
     def refused(self, *arguments):
@@ -109,20 +109,20 @@ class Player(unittest.TestCase):
         scenario = self.sheared()
         for more, from_touch in ((), False), (("--from-touch",), True):
             path = self.play(f"pad{from_touch}.csv", "--pad", "12", *more, scenario=scenario)
-            recording = fingertip_files.read_recording(path)
+            recording = files.read_recording(path)
             self.assertEqual(recording.metadata["pad_thickness_mm"], "12")
             self.assertEqual(recording.metadata["pad_from_touch"], str(int(from_touch)))
             at_s = recording["t_us"] * 1e-6
             free, pulled = (at_s > 1) & (at_s < 1.45), at_s > 1.55
-            self.assertTrue(recording.flag(fingertip_files.TANGENTIAL_VALID)[free | pulled].all())
-            self.assertEqual(recording.flag(fingertip_files.TANGENTIAL_FROM_TOUCH)[free | pulled].all(), from_touch)
+            self.assertTrue(recording.flag(files.TANGENTIAL_VALID)[free | pulled].all())
+            self.assertEqual(recording.flag(files.TANGENTIAL_FROM_TOUCH)[free | pulled].all(), from_touch)
             self.assertLess(abs(recording["qy_N"][free].mean()), 0.05)
             self.assertAlmostEqual(recording["qy_N"][pulled].mean(), 1.5, delta=0.1)
             self.assertLess(abs(recording["qx_N"][pulled].mean()), 0.05)
             self.assertAlmostEqual(recording["y_mm"][pulled].mean(), -3, delta=0.1)
             self.assertAlmostEqual(recording["force_N"][pulled].mean(), 5, delta=0.1)
-        plain = fingertip_files.read_recording(self.play("plain.csv", scenario=scenario))
-        self.assertFalse(plain.flag(fingertip_files.TANGENTIAL_VALID).any())
+        plain = files.read_recording(self.play("plain.csv", scenario=scenario))
+        self.assertFalse(plain.flag(files.TANGENTIAL_VALID).any())
         self.assertGreater(plain["y_mm"][plain["t_us"] > 1.55e6].mean(), -3 + 0.7)
 
     def test_a_recording_stays(self):

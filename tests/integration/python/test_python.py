@@ -16,8 +16,8 @@ import numpy as np
 TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools" / "python"
 sys.path.insert(0, str(TOOLS))
 
-import fingertip_files as files  # noqa: E402
-import plot  # noqa: E402
+from fingertip import files  # noqa: E402
+from fingertip import plot  # noqa: E402
 
 CONTACT, FIT_VALID, SLIP_VALID, SLIP, TARED = 1, 2, 8, 16, 32
 
@@ -34,7 +34,7 @@ class ToolTest(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
 
     def tool(self, name, *arguments, status=0):
-        done = subprocess.run([sys.executable, TOOLS / name, *map(str, arguments)], capture_output=True, text=True, check=False)
+        done = subprocess.run([sys.executable, TOOLS, name, *map(str, arguments)], capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, status, done.stderr)
         return done
 
@@ -45,7 +45,7 @@ class ToolTest(unittest.TestCase):
 
     def scenario(self, name="demo", *arguments):
         path = self.folder / f"{name}.csv"
-        self.tool("scenario.py", name, "-o", path, *arguments)
+        self.tool("scenario", name, "-o", path, *arguments)
         return path
 
     def recording(self, scenario, rate_Hz=200, zero_s=0.25, change=lambda row: row, until_s=None, end=True, columns=files.RECORDING_COLUMNS):
@@ -95,7 +95,7 @@ class ToolTest(unittest.TestCase):
 
     def summary(self, recording, scenario, *arguments):
         output = self.folder / "summary.json"
-        self.tool("evaluate.py", recording, scenario, "-o", output, *arguments)
+        self.tool("evaluate", recording, scenario, "-o", output, *arguments)
         return json.loads(output.read_text(encoding="utf-8"))
 
 
@@ -148,9 +148,9 @@ class Scenarios(ToolTest):
         self.assertEqual(len(demo), 3)
 
     def test_ranges(self):
-        self.assertIn("1 to 3600", self.error("scenario.py", "demo", "-o", self.folder / "x", "--seconds", "nan"))
-        self.assertIn("0 or more", self.error("scenario.py", "demo", "-o", self.folder / "x", "--seed", "-1"))
-        self.assertIn("choose another place", self.error("scenario.py", "demo", "-o", self.folder / "no" / "x"))
+        self.assertIn("1 to 3600", self.error("scenario", "demo", "-o", self.folder / "x", "--seconds", "nan"))
+        self.assertIn("0 or more", self.error("scenario", "demo", "-o", self.folder / "x", "--seed", "-1"))
+        self.assertIn("choose another place", self.error("scenario", "demo", "-o", self.folder / "no" / "x"))
 
 
 class Evaluation(ToolTest):
@@ -235,9 +235,9 @@ class Evaluation(ToolTest):
         before = recording.read_bytes()
         linked = self.folder / "linked.png"
         linked.hardlink_to(recording)
-        self.assertIn("give -o another name", self.error("evaluate.py", recording, scenario, "-o", linked))
-        self.assertIn("give -o another name", self.error("plot.py", recording, "-o", linked))
-        self.assertIn("is a folder", self.error("evaluate.py", recording, scenario, "-o", self.folder))
+        self.assertIn("give -o another name", self.error("evaluate", recording, scenario, "-o", linked))
+        self.assertIn("give -o another name", self.error("plot", recording, "-o", linked))
+        self.assertIn("is a folder", self.error("evaluate", recording, scenario, "-o", self.folder))
         self.assertEqual(recording.read_bytes(), before)
 
     def test_stages_that_do_not_add_up(self):
@@ -263,16 +263,16 @@ class Evaluation(ToolTest):
         self.assertIsNone(summary["dropped_packets"])
         self.assertEqual({key: value for key, value in self.summary(self.recording(scenario), scenario, "--run", self.run_report()).items()
                           if value != summary[key]}, {"dropped_packets": 3, "crc_errors": 2, "format_errors": 1})
-        self.tool("plot.py", recording, "-o", self.folder / "p.png")
+        self.tool("plot", recording, "-o", self.folder / "p.png")
 
     def test_unrelated_files(self):
         scenario = self.scenario()
         recording = self.recording(scenario, change=lambda row: {**row, "flags": TARED})
         output = self.folder / "s.json"
-        self.assertIn("no fitted frame", self.error("evaluate.py", recording, scenario, "-o", output))
-        self.assertIn("no recording", self.error("evaluate.py", scenario, scenario, "-o", output))
-        self.assertIn("no scenario", self.error("evaluate.py", recording, recording, "-o", output))
-        self.assertIn("device_time_zero_s", self.error("evaluate.py", recording, scenario, "--run", self.run_report(None), "-o", output))
+        self.assertIn("no fitted frame", self.error("evaluate", recording, scenario, "-o", output))
+        self.assertIn("no recording", self.error("evaluate", scenario, scenario, "-o", output))
+        self.assertIn("no scenario", self.error("evaluate", recording, recording, "-o", output))
+        self.assertIn("device_time_zero_s", self.error("evaluate", recording, scenario, "--run", self.run_report(None), "-o", output))
         self.assertFalse(output.exists())
 
     def test_time_that_runs_backwards(self):
@@ -287,7 +287,7 @@ class Evaluation(ToolTest):
     def test_frame_numbers_that_cross_their_end_are_no_restart(self):
         scenario = self.scenario()
         recording = self.recording(scenario, change=lambda row: {**row, "frame": (row["frame"] + 2**32 - 700) % 2**32})
-        self.tool("evaluate.py", recording, scenario, "--run", self.run_report(), "-o", self.folder / "wrapped.json")
+        self.tool("evaluate", recording, scenario, "--run", self.run_report(), "-o", self.folder / "wrapped.json")
         t_us, frame = np.arange(4), np.array([2**32 - 2, 2**32 - 1, 0, 1])
         self.assertEqual(list(files.restart_rows(t_us, frame)), [])
         self.assertEqual(list(files.restart_rows(t_us, frame[::-1])), [1, 2, 3])
@@ -295,23 +295,23 @@ class Evaluation(ToolTest):
     def assert_restart(self, recording, scenario, frame):
         line = recording.read_text(encoding="utf-8").split("\n").index(",".join(files.RECORDING_COLUMNS + tuple(
             [f"s{k}_Pa" for k in range(15)] + [f"tare{k}_Pa" for k in range(15)]))) + 2 + frame
-        self.tool("plot.py", recording, "-o", self.folder / "restarted.png")
-        for arguments in (("evaluate.py", recording, scenario), ("plot.py", recording, "--truth", scenario)):
+        self.tool("plot", recording, "-o", self.folder / "restarted.png")
+        for arguments in (("evaluate", recording, scenario), ("plot", recording, "--truth", scenario)):
             err = self.error(*arguments, "--run", self.run_report(), "-o", self.folder / "p.png")
             self.assertIn(f"{recording}:{line}: the fingertip restarted here; ", err)
         self.assertFalse((self.folder / "p.png").exists())
         # what it advises to do works
         lines = recording.read_text(encoding="utf-8").split("\n")
         recording.write_text("\n".join(lines[:line - 1]) + "\n", encoding="utf-8")
-        self.tool("plot.py", recording, "--truth", scenario, "-o", self.folder / "p.png")
+        self.tool("plot", recording, "--truth", scenario, "-o", self.folder / "p.png")
 
     def test_a_time_that_repeats(self):
         scenario = self.scenario()
         recording = self.recording(scenario, change=lambda row: {**row, "t_us": row["t_us"] - 5000 * (row["frame"] == 600)})
-        self.assertRegex(self.error("evaluate.py", recording, scenario, "-o", self.folder / "s"), r"\.csv:\d+: a second frame of the same time")
+        self.assertRegex(self.error("evaluate", recording, scenario, "-o", self.folder / "s"), r"\.csv:\d+: a second frame of the same time")
 
     def test_names_cannot_speak_to_the_terminal(self):
-        err = self.error("evaluate.py", self.folder / "\x1b[31m\n", "x", "-o", self.folder / "s")
+        err = self.error("evaluate", self.folder / "\x1b[31m\n", "x", "-o", self.folder / "s")
         self.assertIn("\\x1b[31m\\n: No such file", err)
 
 
@@ -496,10 +496,10 @@ class Plots(ToolTest):
         scenario = self.scenario()
         recording = self.recording(scenario)
         picture = self.folder / "p.png"
-        self.tool("plot.py", recording, "--truth", scenario, "--run", self.run_report(), "-o", picture)
+        self.tool("plot", recording, "--truth", scenario, "--run", self.run_report(), "-o", picture)
         self.assert_png(picture)
         picture.unlink()
-        self.tool("plot.py", recording, "-o", picture)
+        self.tool("plot", recording, "-o", picture)
         self.assert_png(picture)
 
     def test_a_hundred_megabytes(self):
@@ -516,7 +516,7 @@ class Plots(ToolTest):
                 file.write(f"{1000 + 4115 * since},{since},{cells}\n")
         self.assertGreater(recording.stat().st_size, 99e6)
         picture = self.folder / "p.png"
-        process = subprocess.Popen([sys.executable, TOOLS / "plot.py", recording, "-o", picture], stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen([sys.executable, TOOLS, "plot", recording, "-o", picture], stderr=subprocess.PIPE, text=True)
         with process:
             told = process.stderr.read()
             _, status, used = os.wait4(process.pid, 0)
@@ -540,10 +540,10 @@ class Plots(ToolTest):
         (self.folder / "d.png").mkdir()
         for name, expected in (("no/p.png", "there is no folder"), ("p.xyz", "ends in .png"), ("p", "ends in .png"),
                                ("d.png", "is a folder"), ("/proc/p.png", "choose another place")):
-            self.assertIn(expected, self.error("plot.py", recording, "-o", self.folder / name))
+            self.assertIn(expected, self.error("plot", recording, "-o", self.folder / name))
         full = self.folder / "full.png"
         full.symlink_to("/dev/full")
-        self.assertIn("No space left on device; choose another place", self.error("plot.py", recording, "-o", full))
+        self.assertIn("No space left on device; choose another place", self.error("plot", recording, "-o", full))
         self.assertEqual({path.name for path in self.folder.iterdir()}, {"demo.csv", "recording.csv", "d.png", "full.png"})
 
 

@@ -15,7 +15,7 @@ TWIN, TABLES, PLAYER = (os.path.abspath(path) for path in sys.argv[1:4])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PATIENCE_s = 60
 sys.path.insert(0, str(ROOT / "host_tools/python"))
-import fingertip_files  # noqa: E402
+from fingertip import files  # noqa: E402
 
 READ_AS_THE_EMULATOR_DOES = """
 import { readScenario } from '%s';
@@ -65,7 +65,7 @@ class Files(TwinTest):
             with self.subTest(kind):
                 seconds = 34 if kind == "cycle" else 12
                 self.scenario(kind, "--seconds", str(seconds), "--effects", "all", "--overwrite")
-                scenario = fingertip_files.read_scenario(self.csv)
+                scenario = files.read_scenario(self.csv)
                 times = [0, 1.8, 7.3, seconds]
                 done = subprocess.run(["node", "--input-type=module", "-e", READ_AS_THE_EMULATOR_DOES, self.csv, *map(str, times)],
                                       capture_output=True, text=True, check=True, timeout=PATIENCE_s)
@@ -78,7 +78,7 @@ class Files(TwinTest):
                 for t_s, sensors in zip(times, emulator["at"]):
                     for k, sensor in enumerate(sensors):
                         self.assertAlmostEqual(
-                            sensor["pressure_Pa"] - 101325, fingertip_files.np.interp(t_s, scenario.t_s, scenario.sensors_Pa[:, k]), places=6)
+                            sensor["pressure_Pa"] - 101325, files.np.interp(t_s, scenario.t_s, scenario.sensors_Pa[:, k]), places=6)
                         self.assertTrue(5 <= sensor["temperature_degC"] < 31)
                 events = self.events()
                 held = [row for row in events if float(row["force_N"]) > 0 or float(row["force_end_N"]) > 0]
@@ -109,7 +109,7 @@ class Files(TwinTest):
 
     def test_readings_return_to_zero_between_contacts(self):
         self.scenario("high", "--seconds", "20", "--effects", "relaxation,hysteresis,gain,clip,bias")
-        scenario = fingertip_files.read_scenario(self.csv)
+        scenario = files.read_scenario(self.csv)
         intervals = scenario.intervals("contact")
         for (_, end), (begin, _) in zip(intervals, intervals[1:]):
             self.assertGreaterEqual(begin - end, 1.2)
@@ -118,24 +118,24 @@ class Files(TwinTest):
 
     def test_the_tangential_force_is_read_by_its_name_and_moves_what_the_firmware_finds(self):
         self.scenario("taps", "--force", "5", "--seconds", "40", "--tangential", "0.3,90", "--effects", "temperature")
-        scenario = fingertip_files.read_scenario(self.csv)
-        fingertip_files.np.testing.assert_allclose(scenario.truth["Qx_N"], 0, atol=1e-9)
-        fingertip_files.np.testing.assert_allclose(scenario.truth["Qy_N"], 0.3 * scenario.truth["force_N"], atol=2e-5)
+        scenario = files.read_scenario(self.csv)
+        files.np.testing.assert_allclose(scenario.truth["Qx_N"], 0, atol=1e-9)
+        files.np.testing.assert_allclose(scenario.truth["Qy_N"], 0.3 * scenario.truth["force_N"], atol=2e-5)
         self.assertGreater(scenario.truth["Qy_N"].max(), 1.49)
         row = max(self.events(), key=lambda row: float(row["Qy_N"]))
         self.assertEqual((row["Qx_N"], row["Qy_N"]), ("0.00000", "1.50000"))
         done = subprocess.run(["node", "--input-type=module", "-e", READ_AS_THE_EMULATOR_DOES, self.csv, "1.8"],
                               capture_output=True, text=True, check=True, timeout=PATIENCE_s)
         for k, sensor in enumerate(json.loads(done.stdout)["at"][0]):
-            self.assertAlmostEqual(sensor["pressure_Pa"] - 101325, fingertip_files.np.interp(1.8, scenario.t_s, scenario.sensors_Pa[:, k]), places=6)
+            self.assertAlmostEqual(sensor["pressure_Pa"] - 101325, files.np.interp(1.8, scenario.t_s, scenario.sensors_Pa[:, k]), places=6)
         recording = str(self.folder / "recording.csv")
         subprocess.run([PLAYER, "play", self.csv, "-o", recording, "--quiet", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s)
-        played = fingertip_files.read_recording(recording)
+        played = files.read_recording(recording)
         t_s = played["t_us"] * 1e-6
-        pressed = (scenario.at("force_N", t_s) > 4.9) & ~fingertip_files.np.isnan(played["y_mm"])
+        pressed = (scenario.at("force_N", t_s) > 4.9) & ~files.np.isnan(played["y_mm"])
         self.assertGreater(pressed.sum(), 100)
         off_mm = (played["y_mm"] - scenario.at("y_mm", t_s))[pressed]
-        self.assertAlmostEqual(fingertip_files.np.median(off_mm), 1.05, delta=0.15)
+        self.assertAlmostEqual(files.np.median(off_mm), 1.05, delta=0.15)
         text = pathlib.Path(self.csv).read_text()
         for name, what in (("Qz_N", 'column 24 is "Qz_N"; after the sensors there may be, once each: Qx_N, Qy_N, temperature_degC'),
                            ("Qy_N", 'column 25 is "Qy_N"; after the sensors')):
@@ -143,14 +143,14 @@ class Files(TwinTest):
             refused = subprocess.run([PLAYER, "play", self.csv, "-o", recording + "2", "--quiet"], capture_output=True, text=True, timeout=PATIENCE_s)
             self.assertEqual(refused.returncode, 1)
             self.assertIn(what, refused.stderr)
-            with self.assertRaisesRegex(fingertip_files.InputError, "wrong header.*once each, any of Qx_N, Qy_N, temperature_degC"):
-                fingertip_files.read_scenario(self.csv)
+            with self.assertRaisesRegex(files.InputError, "wrong header.*once each, any of Qx_N, Qy_N, temperature_degC"):
+                files.read_scenario(self.csv)
 
     def test_a_slide_tells_where_friction_gave_way(self):
         self.scenario("slide", "--seconds", "40", "--effects", "gain")
-        scenario, events = fingertip_files.read_scenario(self.csv), self.events()
+        scenario, events = files.read_scenario(self.csv), self.events()
         truth = scenario.truth
-        pulled = fingertip_files.np.hypot(truth["Qx_N"], truth["Qy_N"])
+        pulled = files.np.hypot(truth["Qx_N"], truth["Qy_N"])
         slid = 0
         for act in {row["act"] for row in events}:
             rows = [row for row in events if row["act"] == act]
@@ -171,7 +171,7 @@ class Files(TwinTest):
         self.assertGreater(slid, 4)
         recording = str(self.folder / "recording.csv")
         subprocess.run([PLAYER, "play", self.csv, "-o", recording, "--quiet", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s)
-        self.assertGreater(fingertip_files.read_recording(recording).has_contact.sum(), 1000)
+        self.assertGreater(files.read_recording(recording).has_contact.sum(), 1000)
 
     def test_a_pad_that_ends_reads_more_near_its_edge(self):
         options = ("taps", "--force", "5", "--seconds", "20")
@@ -193,12 +193,12 @@ class Files(TwinTest):
         self.scenario("taps", "--force", "0.02", "--quiet", "60", "--seconds", "70", "--effects", "branch=7")
         recording = str(self.folder / "recording.csv")
         subprocess.run([PLAYER, "play", self.csv, "-o", recording, "--quiet", "--raw", "--noise", "0", "--rate", "50"], check=True, timeout=PATIENCE_s)
-        scenario, played = fingertip_files.read_scenario(self.csv), fingertip_files.read_recording(recording)
+        scenario, played = files.read_scenario(self.csv), files.read_recording(recording)
         t_s, read_Pa = played["t_us"] * 1e-6, played.sensors_Pa - 101325
         crossing_s = 10 * (9.665 - 7)
         for k in range(15):
             with self.subTest(sensor=k):
-                off_Pa = read_Pa[:, k] - fingertip_files.np.interp(t_s, scenario.t_s, scenario.sensors_Pa[:, k])
+                off_Pa = read_Pa[:, k] - files.np.interp(t_s, scenario.t_s, scenario.sensors_Pa[:, k])
                 for begin_s, end_s in ((3, crossing_s - 2), (crossing_s + 8, 58)):
                     steady = (t_s > begin_s) & (t_s < end_s)
                     self.assertLess(off_Pa[steady].max(), 1)

@@ -26,7 +26,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "shared"))
 import numpy as np  # noqa: E402
 
 from emulated import CONVERSION_us, MARGIN, ROOT, Tools, contact_times_us, distribution, scenario  # noqa: E402
-from fingertip_files import InputError, read_recording, run_tool  # noqa: E402
+from fingertip.files import InputError, read_recording, run_tool  # noqa: E402
 from reporting import run  # noqa: E402
 
 BOARD, OSR = "pico_parallel", 256

@@ -1,0 +1,15 @@
+"""The package's commands, out of the source tree.
+
+    /usr/bin/python3 host_tools/python plot|scenario|evaluate ...
+
+what pip installs as fingertip-plot, fingertip-scenario and fingertip-evaluate; --help after a command has its options.
+"""
+import importlib
+import sys
+
+COMMANDS = ("plot", "scenario", "evaluate")
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2 or sys.argv[1] not in COMMANDS:
+        sys.exit(__doc__)
+    sys.exit(importlib.import_module(f"fingertip.{sys.argv.pop(1)}").command())
