@@ -41,13 +41,15 @@ class Fingertips:
             wanted = [{"port": port} for port in ports]
         else:
             wanted = [{"port": found.port} if found.port else {"serial": found.serial} for found in discovery.find()]
+        names = [str(name).lower() for name in (*(serials or ()), *(ports or ()))]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise BadValueError(f"{twice} is named twice")
         if not wanted:
             raise NoFingertipError("no fingertip found")
         with self._stack:
             for each in wanted:
                 fingertip = self._stack.enter_context(Fingertip(**each, **options))
-                if fingertip.serial in self._opened:
-                    raise BadValueError(f"fingertip {fingertip.serial} is named twice")
                 self._opened[fingertip.serial] = fingertip
                 fingertip.on_frames(self._news.set)
             self._stack = self._stack.pop_all()

@@ -1,0 +1,621 @@
+"""The Python package against the C codec and fake devices: usage test_package.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
+import asyncio
+import contextlib
+import importlib
+import math
+import os
+import pathlib
+import random
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+import zlib
+from unittest import mock
+
+import numpy as np
+
+FINGERTIP, FAKE_DEVICE = (os.path.abspath(path) for path in sys.argv[1:3])
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+PACKAGE = ROOT / "host_tools/python"
+sys.path.insert(0, str(PACKAGE))
+import fingertip  # noqa: E402
+from fingertip import Fingertip, Fingertips, Flag, Streams, clock, device, errors, transport, wire  # noqa: E402
+
+PATIENCE_s = 60
+SERIAL = "E660583883265A2C"  # of the fake device where none is said
+COUNTS = wire.LineStatistics.COUNTS
+
+
+def vectors():
+    """name -> what a file of tests/vectors/wire calls packet and frame."""
+    found = {}
+    for path in sorted((ROOT / "tests/vectors/wire").glob("*.txt")):
+        words = [word for line in path.read_text(encoding="utf-8").splitlines() for word in line.split("#")[0].split()]
+        middle = words.index("frame")
+        found[path.stem] = {"packet": bytes.fromhex("".join(words[1:middle])), "frame": bytes.fromhex("".join(words[middle + 1:]))}
+    return found
+
+
+def some_value(wire_field, prng, sensors):
+    """Of one field of a packet; floats are exact in binary32."""
+    count = wire_field.times * (sensors if wire_field.each_sensor else 1)
+    bits = {"B": 8, "H": 16, "I": 32, "Q": 63}
+    if wire_field.code in bits:
+        values = [prng.getrandbits(prng.randrange(1, bits[wire_field.code] + 1)) for _ in range(count)]
+    elif wire_field.code in "ih":
+        limit = 1 << (31 if wire_field.code == "i" else 15)
+        values = [prng.choice((0, -limit, limit - 1, prng.randrange(-limit, limit))) for _ in range(count)]
+    elif wire_field.code == "f":
+        values = [float(np.float32(prng.choice((0.0, 1.5, -3e-9, 2e30, prng.gauss(0, 100))))) for _ in range(count)]
+    else:
+        values = ["pico mux+"[:prng.randrange(10)]]
+    return tuple(values) if wire_field.times > 1 else values[0]
+
+
+def some_body(kind, prng, sensors=15):
+    values = {}
+    for name, field in wire.layout_of(kind):
+        if field.when and not values[field.when[0]] & field.when[1]:
+            values[name] = field.absent
+        elif field.code == "n":
+            values[name] = sensors
+        elif field.code in ("Calibration", "PadProfile"):
+            values[name] = some_body(getattr(wire, field.code), prng, sensors)
+        else:
+            values[name] = some_value(field, prng, sensors)
+    return kind(**values)
+
+
+def some_line(prng, packets=400):
+    """A fingertip's stream with everything in it, and its packets."""
+    sent = [wire.Packet(0, 1000, some_body(wire.Info, prng)._replace(serial="0123456789ABCDEF"))]
+    for frame in range(packets):
+        t_us = 2000 + frame * 5000
+        sent.append(wire.Packet(0, t_us, some_body(wire.Contact, prng)._replace(frame=frame)))
+        if prng.random() < 0.9:
+            sent.append(wire.Packet(0, t_us, some_body(wire.Raw, prng)._replace(frame=frame)))
+        if prng.random() < 0.05:
+            sent.append(wire.Packet(0, t_us, some_body(prng.choice((wire.Health, wire.Acknowledgement)), prng)))
+    return [packet._replace(sequence=number & 0xFFFF) for number, packet in enumerate(sent, 65500)]
+
+
+def same(a, b):
+    """Equal, where NaN equals NaN."""
+    return repr(a) == repr(b)
+
+
+class Folder(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        patch = mock.patch.dict(os.environ, {"XDG_RUNTIME_DIR": self.folder, "LC_ALL": "C.UTF-8"})
+        patch.start()
+        self.addCleanup(patch.stop)
+        os.environ.pop("FINGERTIP_PORT", None)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def by_c(self, name, line):
+        """What the C codec and the C++ recorder make of these bytes."""
+        with open(self.path(name + ".ftr"), "wb") as file:
+            file.write(line)
+        done = subprocess.run([FINGERTIP, "replay", self.path(name + ".ftr"), "--to-csv", self.path(name + ".csv")], capture_output=True,
+                              text=True, timeout=PATIENCE_s)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return fingertip.read_recording(self.path(name + ".csv"))
+
+
+class Codec(Folder):
+    def test_vectors(self):
+        found = vectors()
+        self.assertEqual({type(wire.decode(each["frame"][:-1]).body) for each in found.values()}, set(wire.TYPES.values()))
+        for name, vector in found.items():
+            with self.subTest(name):
+                packet = wire.decode(vector["frame"][:-1])
+                self.assertEqual(wire.encode(packet), vector["frame"])
+                self.assertEqual(wire.cobs_decode(vector["frame"][:-1]), vector["packet"])
+                self.assertEqual(wire.cobs_encode(vector["packet"]) + b"\0", vector["frame"])
+                fast = wire.decode_stream_packet(vector["frame"][:-1])
+                self.assertTrue(same(fast, packet if isinstance(packet.body, (wire.Contact, wire.Raw)) else None))
+
+    def test_what_the_vectors_say(self):
+        found = {name: wire.decode(each["frame"][:-1]) for name, each in vectors().items()}
+        contact = found["contact_grasp"].body
+        self.assertEqual((contact.x_mm, contact.y_mm, contact.force_N, contact.slip_mm, contact.qx_N, contact.vy_mm_s, contact.fit_us),
+                         (-4.5, 12.25, 1.5, 0.375, -0.4375, 2.25, 2760))
+        self.assertTrue(math.isnan(found["contact_none"].body.x_mm) and math.isnan(found["contact"].body.qx_N))
+        self.assertEqual(found["info"].body.calibration.gains, (0.875, 1.125))
+        self.assertEqual((found["info"].body.serial, found["info"].body.x_mm, found["info"].body.firmware), ("E66058388347A12C", (-4.5, 4.5), (1, 2, 3)))
+        self.assertIsNone(found["info_raw"].body.slip_window_ms)
+        self.assertEqual((found["command_slip"].body, found["command_slip"].t_us), (wire.SetSlip(0.75, 100), 0x1122334455667788))
+        self.assertIsNone(found["health_raw"].body.fit_failures)
+        self.assertEqual(found["raw"].body.readings[0], 100000 * 1024)
+
+    def test_the_same_as_c_both_ways(self):
+        prng = random.Random(1)
+        sent = some_line(prng)
+        line = b"\0" + b"".join(map(wire.encode, sent))
+        decoder = wire.Decoder()
+        got = [packet for at in range(0, len(line), 997) for packet in decoder.feed(line[at:at + 997])]
+        self.assertTrue(same(got, sent))
+        recording = self.by_c("line", line)
+        self.assertEqual({name: int(recording.end[name]) for name in COUNTS}, {name: getattr(decoder.statistics, name) for name in COUNTS})
+        contacts = [packet.body for packet in sent if isinstance(packet.body, wire.Contact)]
+        self.assertEqual(len(recording.has_contact), len(contacts))
+        for name in set(wire.Contact._fields) - {"frame"}:
+            np.testing.assert_array_equal(np.float32(recording[name]), np.float32([getattr(body, name) for body in contacts]), err_msg=name)
+        # and what Python writes of it reads as what C++ writes
+        with fingertip.RecordingWriter(self.path("python.csv"), sent[0].body) as writer:
+            for packet in sent:
+                writer.packet(packet)
+            writer.close("eof", decoder.statistics)
+        again = fingertip.read_recording(self.path("python.csv"))
+        for name, values in recording.columns.items():
+            np.testing.assert_array_equal(again[name], values, err_msg=name)
+        np.testing.assert_array_equal(again.sensors_Pa, recording.sensors_Pa)
+        np.testing.assert_array_equal(again.tare_Pa, recording.tare_Pa)
+        self.assertEqual(again.packets, recording.packets)
+        numbers = lambda text: [float(word) for word in text.split()]
+        for key in ("serial", "board", "firmware", "git"):
+            self.assertEqual(again.metadata.get(key), recording.metadata.get(key), key)
+        for key in set(recording.metadata) & set(again.metadata) - {"serial", "board", "scene", "firmware", "git", "recorded_by", "started_utc", "port"}:
+            np.testing.assert_array_equal(np.float32(numbers(again.metadata[key])), np.float32(numbers(recording.metadata[key])), err_msg=key)
+        # the C++ reader takes it, and loses nothing
+        done = subprocess.run([FINGERTIP, "replay", self.path("python.csv"), "--to-csv", self.path("back.csv")], capture_output=True, text=True,
+                              timeout=PATIENCE_s)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        back = fingertip.read_recording(self.path("back.csv"))
+        for name, values in recording.columns.items():
+            np.testing.assert_array_equal(back[name], values, err_msg=name)
+
+    def test_damage_counts_as_in_c(self):
+        for seed in range(6):
+            prng = random.Random(seed)
+            sent = some_line(prng, 150)
+            frames = [wire.encode(packet) for packet in sent]
+            for at in prng.sample(range(5, len(frames)), 60):
+                frame = bytearray(frames[at])
+                place = prng.randrange(len(frame))
+                kind = prng.randrange(8)
+                if kind < 3:
+                    frame[place] ^= 1 << prng.randrange(8)
+                elif kind == 3:
+                    del frame[place:place + prng.randrange(1, 20)]
+                elif kind == 4:
+                    frame = frame[:-1] + bytes([7]) * prng.choice((1, 800, 2000)) + b"\0"
+                elif kind == 5:
+                    frame = bytearray()
+                elif kind == 6:
+                    frame = frame + frame
+                else:
+                    version, number = prng.choice(((4, 1), (wire.VERSION, 0x7F)))
+                    data = wire.cobs_decode(bytes(frame[:-1]))[:-4]
+                    data = bytes([version, number]) + data[2:]
+                    frame = bytearray(wire.cobs_encode(data + zlib.crc32(data).to_bytes(4, "little")) + b"\0")
+                frames[at] = bytes(frame)
+            line = b"".join(frames)[prng.randrange(3):]
+            decoder = wire.Decoder()
+            packets = [packet for at in range(0, len(line), 333) for packet in decoder.feed(line[at:at + 333])]
+            end = self.by_c(f"damaged{seed}", line).end
+            self.assertEqual({name: int(end[name]) for name in COUNTS}, {name: getattr(decoder.statistics, name) for name in COUNTS}, seed)
+            self.assertEqual(len(packets), decoder.statistics.packets)
+            self.assertGreater(decoder.statistics.crc_errors + decoder.statistics.format_errors, 10)
+
+    def test_values_that_the_protocol_forbids(self):
+        contact = wire.decode(vectors()["contact"]["frame"][:-1])
+        for bad in (contact._replace(body=contact.body._replace(x_mm=math.inf)), contact._replace(sequence=65536),
+                    contact._replace(body=contact.body._replace(frame=-1)),
+                    wire.Packet(0, 0, wire.Raw(0, 0, 0, 0, 0, 0, 33, (0,) * 66)), wire.Packet(0, 0, wire.Raw(0, 0, 0, 0, 0, 0, 2, (0,) * 3))):
+            with self.assertRaises(errors.FormatError):
+                wire.encode(bad)
+        data = bytearray(vectors()["contact"]["packet"][:-4])
+        data[46:50] = b"\0\0\xc0\x7f"  # a NaN in a float
+        frame = wire.cobs_encode(bytes(data) + zlib.crc32(data).to_bytes(4, "little"))
+        self.assertIsNone(wire.decode_stream_packet(frame))
+        self.assertRaises(errors.FormatError, wire.decode, frame)
+
+    def test_cobs(self):
+        prng = random.Random(3)
+        for length in (*range(1, 20), 253, 254, 255, 256, 507, 508, 509, 760):
+            for zeros in (0, 0.02, 0.5, 1):
+                packet = bytes(0 if prng.random() < zeros else prng.randrange(1, 256) for _ in range(length))
+                coded = wire.cobs_encode(packet)
+                self.assertNotIn(0, coded)
+                self.assertLessEqual(len(coded), length + 1 + length // 254)
+                self.assertEqual(wire.cobs_decode(coded), packet)
+
+    def test_flags_and_constants_are_those_of_the_firmware(self):
+        header = (ROOT / "firmware/common/contact_flags.h").read_text(encoding="utf-8")
+        self.assertEqual({name: 1 << int(bit) for name, bit in re.findall(r"CONTACT_FLAG_(\w+)\s*=\s*1\s*<<\s*(\d+)", header)},
+                         {flag.name: flag.value for flag in Flag})
+        packet_h = (ROOT / "firmware/wire/packet.h").read_text(encoding="utf-8")
+        for prefix, names in (("STREAM", fingertip.Streams), ("CAPABILITY", fingertip.Capability), ("STORED", fingertip.Stored)):
+            self.assertEqual({name: 1 << int(bit) for name, bit in re.findall(rf"WIRE_{prefix}_(\w+) = 1 << (\d+)", packet_h)},
+                             {each.name: each.value for each in names if each.value and each.value & each.value - 1 == 0})
+        self.assertIn(f"#define WIRE_VERSION {wire.VERSION}\n", packet_h)
+
+
+class Clock(unittest.TestCase):
+    def exchanges(self, prng, count, drift_ppm, offset_us=0):
+        """Every 0.5 s, with what the way there and back takes; and the truth."""
+        for i in range(count):
+            host = 10_000_000 + i * 500_000
+            there, back = (round(prng.expovariate(1 / 300)) + 60 for _ in range(2))
+            yield clock.ClockExchange(host, host + there + back, round((host + there + offset_us) * (1 + drift_ppm * 1e-6))), host + there
+
+    def test_the_bound_holds_and_the_drift_is_found(self):
+        for seed, drift_ppm in enumerate((0, 40, -90)):
+            fit = clock.ClockFit()
+            for exchange, host in self.exchanges(random.Random(seed), 90, drift_ppm):
+                fit.add(exchange)
+                self.assertLessEqual(abs(fit.estimate.host_at(exchange.device_us) - host), fit.estimate.uncertainty_us + 1)
+            self.assertAlmostEqual(fit.estimate.drift_ppm, drift_ppm, delta=12)
+            self.assertLess(fit.estimate.uncertainty_us, 250)
+            self.assertEqual(fit.jumps, 0)
+
+    def test_only_lines_that_limit_are_kept(self):
+        prng = random.Random(5)
+        for _ in range(50):
+            lines = sorted(((prng.randrange(5000), prng.randrange(30_000_000)) for _ in range(60)), key=lambda line: -line[1])
+            kept = clock._lowest_lines(lines)
+            for slope in (-1, -2e-4, -1e-5, 0, 3e-5, 2e-4, 1):
+                value = lambda line, slope=slope: line[0] + line[1] * slope
+                self.assertAlmostEqual(min(map(value, kept)), min(map(value, lines)), places=6)
+
+    def test_a_jump_is_told_and_survived(self):
+        fit, prng = clock.ClockFit(), random.Random(7)
+        for exchange, _ in self.exchanges(prng, 20, 10):
+            fit.add(exchange)
+        for exchange, host in list(self.exchanges(prng, 60, 10, 50_000))[20:]:
+            fit.add(exchange)
+        self.assertGreaterEqual(fit.jumps, 1)
+        self.assertLessEqual(abs(fit.estimate.host_at(exchange.device_us) - host), fit.estimate.uncertainty_us + 1)
+        before = fit.estimate
+        fit.add(clock.ClockExchange(10, 5, exchange.device_us + 1))  # ends before it began
+        fit.add(clock.ClockExchange(5, 10, 3))  # the fingertip's clock does not run backwards
+        self.assertEqual(fit.estimate, before)
+
+
+class DeviceTest(Folder):
+    def setUp(self):
+        super().setUp()
+        self.port = self.path("tty")
+
+    @contextlib.contextmanager
+    def device(self, *options, port=None):
+        port = port or self.port
+        process = subprocess.Popen([FAKE_DEVICE, port, *options])
+        try:
+            self.wait_for(lambda: os.path.lexists(port))
+            yield process
+        finally:
+            process.kill()
+            process.wait()
+            with contextlib.suppress(FileNotFoundError):
+                os.unlink(port)
+
+    def wait_for(self, condition):
+        end_s = time.monotonic() + PATIENCE_s
+        while not condition():
+            self.assertLess(time.monotonic(), end_s, "waited too long")
+            time.sleep(0.01)
+
+    def impatient(self):
+        """Answers are waited for a moment only."""
+        patch = mock.patch.object(device, "ANSWER_TIMEOUT_s", 0.2)
+        patch.start()
+        self.addCleanup(patch.stop)
+
+    def until_gone(self, fingertip_):
+        frames = []
+        with self.assertRaises(fingertip.GoneError):
+            for frame in fingertip_:
+                frames.append(frame)
+        return frames
+
+
+class Streaming(DeviceTest):
+    def test_every_frame_in_order_then_gone(self):
+        with self.device("frames=300"), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
+            self.assertEqual((tip.serial, tip.info.board, tip.info.sensors), (SERIAL, "pico_mux", 15))
+            frames = self.until_gone(tip)
+            self.assertEqual([frame.frame for frame in frames], list(range(1, 301)))
+            self.assertTrue(all(frame.has_contact and frame.has_raw and frame.run == 0 for frame in frames))
+            self.assertEqual((tip.statistics.dropped_packets, tip.statistics.crc_errors, tip.overrun_frames), (0, 0, 0))
+            frame = frames[-1]
+            self.assertEqual(frame.force_N, 5)
+            self.assertIn(Flag.FIT_VALID, frame.flags)
+            self.assertTrue(math.isnan(frame.sensors_Pa[0]) and abs(frame.sensors_Pa[1] - 101325) < 100)  # sensor 0 is no measurement there
+            self.assertLess(np.max(np.diff([frame.host_us for frame in frames])), 1e6)
+            self.assertLess(abs(fingertip.host_now_us() - frame.host_us), PATIENCE_s * 1e6)
+            self.assertRaises(fingertip.GoneError, tip.latest)
+            self.assertRaises(fingertip.GoneError, tip.tare)
+
+    def test_losses_and_damage_are_counted(self):
+        with self.device("frames=200", "drop=50", "flip=40"), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
+            frames = self.until_gone(tip)
+            # 4 frames lose both packets, the last one unseen; 4 (the 200th is lost whole) their contact to a flipped bit
+            self.assertEqual(len(frames), 196)
+            without = [frame for frame in frames if not frame.has_contact]
+            self.assertEqual([frame.frame for frame in without], [40, 80, 120, 160])
+            self.assertTrue(all(math.isnan(frame.x_mm) and math.isnan(frame.force_N) and not frame.trusted for frame in without))
+            statistics = tip.statistics
+            self.assertEqual(statistics.crc_errors + statistics.format_errors, 4)
+            self.assertEqual(statistics.dropped_packets, 6 + 4)
+
+    def test_quantities_without_their_flag_are_nan(self):
+        with self.device(f"flags={int(Flag.CONTACT | Flag.TARED)}"), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
+            block = tip.read_block(20)
+            for name in ("x_mm", "force_N", "slip_mm", "sigma_x_mm", "qx_N", "vx_mm_s", "location_sd_mm"):
+                self.assertTrue(np.isnan(block[name]).all(), name)
+            self.assertTrue(block.flag(Flag.CONTACT).all() and not block.trusted.any())
+
+    def test_blocks(self):
+        with self.device(), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
+            block = tip.read_block(50)
+            self.assertEqual((len(block), block.sensors_Pa.shape, block.tare_Pa.shape), (50, (50, 15), (50, 15)))
+            np.testing.assert_array_equal(np.diff(block.frame), 1)
+            np.testing.assert_allclose(np.hypot(block.x_mm / 8, block.y_mm / 16), 1, rtol=1e-4)
+            block = tip.read_block(seconds=0.1)
+            self.assertGreaterEqual(block.t_us[-1] - block.t_us[0], 100_000)
+            for block, _ in zip(tip.blocks(10), range(2)):
+                self.assertEqual(len(block), 10)
+            self.assertGreater(tip.latest().frame, block.frame[0])
+            tip.close()
+            list(tip)  # what waited is still there
+            self.assertEqual((len(list(tip)), len(tip.read_block(5))), (0, 0))
+
+    def test_only_what_was_asked_for(self):
+        with self.device(), Fingertip(self.port, streams=Streams.CONTACT, timeout_s=PATIENCE_s) as tip:
+            self.assertEqual(tip.read_info().streams, Streams.CONTACT)
+            self.assertTrue(next(iter(tip)).has_contact)
+            tip.set_streams(Streams.RAW)
+            self.assertEqual(tip.read_info().streams, Streams.RAW)
+            self.assertRaises(fingertip.BadValueError, tip.set_streams, 8)
+
+    def test_a_late_program_loses_the_oldest_and_is_told(self):
+        with self.device("frames=200"), Fingertip(self.port, buffer_frames=20, timeout_s=PATIENCE_s) as tip:
+            self.wait_for(lambda: tip.statistics.packets > 400 and tip.is_closed is False and tip._error is not None)
+            self.assertEqual([frame.frame for frame in self.until_gone(tip)], list(range(181, 201)))
+            self.assertEqual(tip.overrun_frames, 180)
+
+    def test_silence_is_told(self):
+        with self.device("stall=20"), Fingertip(self.port, timeout_s=0.3) as tip:
+            with self.assertRaisesRegex(fingertip.NoFrameError, "no frame in 0.3 s"):
+                for _ in tip:
+                    pass
+
+    def test_closing_ends_iteration_in_another_thread(self):
+        with self.device(), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
+            taken = []
+            thread = threading.Thread(target=lambda: taken.extend(tip))
+            thread.start()
+            self.wait_for(lambda: taken)
+            tip.close()
+            thread.join(PATIENCE_s)
+            self.assertFalse(thread.is_alive())
+
+    def test_unplugged_and_back(self):
+        with self.device("vanish=60,400"), Fingertip(self.port, reconnect=True, timeout_s=PATIENCE_s) as tip:
+            with tip.record(self.path("r.csv")):
+                frames = []
+                for frame in tip:
+                    frames.append(frame)
+                    if frame.run == 1 and frame.frame >= 40:
+                        break
+            self.assertEqual([frame.frame for frame in frames if frame.run == 0], list(range(frames[0].frame, 61)))
+            returned = [frame for frame in frames if frame.run == 1]
+            self.assertEqual([frame.frame for frame in returned], list(range(1, len(returned) + 1)))
+            self.assertLess(returned[0].t_us, frames[0].t_us + 1_000_000)
+            self.assertFalse(math.isnan(returned[0].host_us))
+            self.assertEqual((tip.run, tip.statistics.dropped_packets), (1, 0))
+            tip.tare()
+        self.assertEqual(fingertip.read_recording(self.path("r.csv")).events, ["gone", "back"])
+
+    def test_another_one_comes_back(self):
+        with self.device("serial=AAAA", "frames=40"), Fingertip(self.port, reconnect=True, timeout_s=PATIENCE_s) as tip:
+            iterator = iter(tip)
+            next(iterator)
+            self.wait_for(lambda: tip.is_returning)
+            with self.device("serial=BBBB"):
+                with self.assertRaisesRegex(fingertip.OtherFingertipError, "is fingertip BBBB, not AAAA"):
+                    for _ in iterator:
+                        pass
+
+    def test_recorded_as_the_tool_records(self):
+        with self.device("frames=250", "calibrated=1", "pad=1"), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
+            self.assertEqual(len(tip.info.calibration.gains), 15)
+            self.assertEqual(len(tip.info.pad.normal), 4)
+            with tip.record(self.path("r.csv")) as writer:
+                frames = self.until_gone(tip)
+            self.assertRaises(fingertip.InputError, fingertip.RecordingWriter, writer.path, tip.info)
+        done = subprocess.run([FINGERTIP, "replay", self.path("r.csv"), "--speed", "max"], capture_output=True, text=True, timeout=PATIENCE_s)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        recording = fingertip.read_recording(self.path("r.csv"))
+        self.assertEqual((recording.end["reason"], recording.end["dropped_packets"]), ("gone", "0"))
+        recorded = {int(frame): i for i, frame in enumerate(recording["frame"])}
+        rows = [recorded[frame.frame] for frame in frames if frame.frame in recorded]
+        self.assertGreater(len(rows), 200)
+        np.testing.assert_array_equal(np.float32(recording["x_mm"][rows]), np.float32([frame.x_mm for frame in frames if frame.frame in recorded]))
+        self.assertEqual(recording.metadata["gains"].split()[0], f"{tip.info.calibration.gains[0]:g}")
+
+
+class Commands(DeviceTest):
+    def test_set_tare_and_health(self):
+        with self.device(f"tared={self.path('tared')}"), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
+            tip.tare()
+            self.assertTrue(os.path.exists(self.path("tared")))
+            info = tip.set(rate_Hz=400, osr=256, slip_threshold_mm=0.25, prior_sigma_mm=3, location_limit_mm=0.5, keep=True)
+            self.assertEqual((info.rate_mHz, info.osr, info.slip_threshold_mm, info.prior_sigma_mm, info.prior_width_mm, info.location_limit_mm),
+                             (400000, 256, 0.25, 3.0, 0.5, 0.5))
+            self.assertTrue(info.stored & fingertip.Stored.SETTINGS)
+            self.assertEqual(tip.set(prior_sigma_mm=0).prior_sigma_mm, 0)
+            self.assertEqual(tip.read_health().stack_free_bytes, tip.health.stack_free_bytes)
+            self.assertLess(tip.clock.uncertainty_us, 1e6)
+
+    def test_wrong_values_are_named_and_nothing_is_sent(self):
+        with self.device(), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
+            sent = tip.read_info()
+            for wrong, said in (({"osr": 300}, "256, 512"), ({"rate_Hz": 3000}, "0.1 to 2000 Hz"), ({"rate_Hz": math.nan}, "out of range"),
+                                ({"slip_window_ms": 2}, "5 to 1000 ms"), ({"prior_sigma_mm": 0.1}, "0.5 to 100 mm"), ({"prior_width_mm": 1}, "needs"),
+                                ({"location_limit_mm": 0}, "0.01 to 100 mm"), ({}, "nothing to set"), ({"osr": 512, "rate_Hz": -1}, "rate_Hz -1")):
+                with self.assertRaisesRegex(fingertip.BadValueError, said):
+                    tip.set(**wrong)
+            self.assertEqual(tip.read_info()._replace(measured_rate_mHz=0), sent._replace(measured_rate_mHz=0))
+            self.assertRaises(fingertip.BadValueError, tip.read_block)
+            self.assertRaises(fingertip.BadValueError, tip.read_block, 0)
+        for wrong in ({"buffer_frames": 0}, {"latency_ms": -1}, {"timeout_s": 0}):
+            self.assertRaises(fingertip.BadValueError, Fingertip, self.port, **wrong)
+
+    def test_refusals_have_their_type(self):
+        with self.device("refuse=1"), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
+            with self.assertRaisesRegex(fingertip.NotNowError, "refused Tare: not now"):
+                tip.tare()
+            self.assertTrue(next(iter(tip)).frame)
+
+    def test_no_answer_and_another_version(self):
+        self.impatient()
+        with self.device("mute=1"), self.assertRaisesRegex(fingertip.NoAnswerError, "no answer to AskInfo"):
+            Fingertip(self.port)
+        with self.device("version=4"), self.assertRaisesRegex(fingertip.OtherVersionError, "speaks protocol version 4, not 5"):
+            Fingertip(self.port)
+
+
+class Choosing(DeviceTest):
+    def test_nothing_there(self):
+        with self.assertRaisesRegex(fingertip.NoSuchPortError, "no such port"):
+            Fingertip(self.path("nothing"))
+        with self.assertRaisesRegex(fingertip.NotAPortError, "no serial port"):
+            Fingertip("/dev/null")
+        with mock.patch("fingertip.discovery.find_usb", return_value=[]):
+            self.assertRaisesRegex(fingertip.NoFingertipError, "no fingertip found", Fingertip)
+            self.assertRaisesRegex(fingertip.NoFingertipError, "no fingertip AA here", Fingertip, serial="AA")
+        self.assertRaises(fingertip.NotSharedError, Fingertip, self.path("x"), share=True)
+
+    def test_reasons_of_the_system(self):
+        for error, kind in ((PermissionError(13, "x"), errors.PermissionDeniedError), (OSError(16, "x"), errors.PortInUseError),
+                            (OSError(None, "could not open port 'COM9': FileNotFoundError(2, 'x')"), errors.NoSuchPortError)):
+            self.assertIs(type(transport._port_error("p", error)), kind)
+
+    def test_one_port_one_program(self):
+        with self.device(), Fingertip(self.port, timeout_s=PATIENCE_s):
+            with self.assertRaisesRegex(fingertip.PortInUseError, "in use by another program"):
+                Fingertip(self.port)
+
+    def test_by_serial_number(self):
+        other = self.path("tty2")
+        os.environ["FINGERTIP_PORT"] = f"{self.port}:{other}"
+        with self.device("serial=AAAA"), self.device("serial=BBBB", port=other):
+            self.assertRaisesRegex(fingertip.SeveralFingertipsError, "choose one", Fingertip)
+            with Fingertip(serial="bbbb", timeout_s=PATIENCE_s) as tip:
+                self.assertEqual((tip.serial, tip.description), ("BBBB", other))
+            self.assertRaisesRegex(fingertip.NoFingertipError, "there are: AAAA, BBBB", Fingertip, serial="CCCC")
+            self.assertRaisesRegex(fingertip.OtherFingertipError, "is fingertip AAAA, not BBBB", Fingertip, self.port, serial="BBBB")
+
+    def test_the_share_socket(self):
+        os.environ["FINGERTIP_PORT"] = self.port
+        with self.device(), open(self.path("log"), "w", encoding="utf-8") as log:
+            server = subprocess.Popen([FINGERTIP, "serve"], stdin=subprocess.DEVNULL, stderr=log)
+            try:
+                self.wait_for(lambda: os.path.exists(self.path(f"fingertip/{SERIAL}.sock")))
+                with Fingertip(timeout_s=PATIENCE_s) as one, Fingertip(serial=SERIAL, share=True, timeout_s=PATIENCE_s) as two:
+                    for tip in (one, two):
+                        self.assertTrue(tip.description.endswith(f"{SERIAL}.sock"), tip.description)
+                        np.testing.assert_array_equal(np.diff(tip.read_block(50).frame), 1)
+                    one.set(osr=512)
+                    self.assertEqual(two.read_info().osr, 512)
+                    self.assertRaises(fingertip.PortInUseError, Fingertip, self.port, share=False)
+                    server.send_signal(signal.SIGINT)
+                    self.until_gone(two)
+            finally:
+                server.kill()
+                server.wait()
+
+
+class Together(DeviceTest):
+    def test_two_fingertips_on_one_clock(self):
+        other = self.path("tty2")
+        os.environ["FINGERTIP_PORT"] = f"{self.port}:{other}"
+        with self.device("serial=AAAA"), self.device("serial=BBBB", "started=1000", "rate=150", port=other):
+            with Fingertips(timeout_s=PATIENCE_s) as both:
+                self.assertEqual(set(both.by_serial), {"AAAA", "BBBB"})
+                frames = [frame for frame, _ in zip(both, range(200))]
+                self.assertEqual(set(both.latest()), {"AAAA", "BBBB"})
+                for serial in ("AAAA", "BBBB"):
+                    numbers = [frame.frame for frame in frames if frame.serial == serial]
+                    self.assertGreater(len(numbers), 40)
+                    np.testing.assert_array_equal(np.diff(numbers), 1)
+                self.assertGreater(min(frame.t_us for frame in frames if frame.serial == "BBBB"), 1e9)
+                jumps = sum(tip.clock_jumps for tip in both.by_serial.values())
+                host_us = [frame.host_us for frame in frames]
+                self.assertLess(max(host_us) - min(host_us), PATIENCE_s * 1e6)
+                if not jumps:  # late ones apart, which a busy computer makes
+                    self.assertLess(np.count_nonzero(np.diff(host_us) < -2 * max(tip.clock.uncertainty_us for tip in both.by_serial.values())), 20)
+            self.assertRaisesRegex(fingertip.BadValueError, "named twice", Fingertips, serials=["AAAA", "AAAA"], share=None)
+
+    def test_asyncio(self):
+        async def talk():
+            async with fingertip.AsyncFingertip(self.port, timeout_s=PATIENCE_s) as tip:
+                await tip.set(osr=512)
+                await tip.tare()
+                self.assertEqual((await tip.read_info()).osr, 512)
+                self.assertEqual((await tip.read_health()).capabilities & 1, 1)
+                numbers = []
+                async for frame in tip:
+                    numbers.append(frame.frame)
+                    if len(numbers) == 60:
+                        break
+                self.assertEqual(numbers, list(range(numbers[0], numbers[0] + 60)))
+                self.assertEqual(len(await tip.read_block(10)), 10)
+
+        async def gone():
+            async with fingertip.AsyncFingertip(self.port, timeout_s=PATIENCE_s) as tip:
+                async for _ in tip:
+                    pass
+
+        with self.device():
+            asyncio.run(talk())
+        with self.device("frames=30"), self.assertRaises(fingertip.GoneError):
+            asyncio.run(gone())
+
+
+class Examples(DeviceTest):
+    """The code in the manuals runs."""
+
+    def blocks(self, path, language="python"):
+        return re.findall(rf"```{language}\n(.*?)```", (ROOT / path).read_text(encoding="utf-8"), re.S)
+
+    def test_package_readme(self):
+        os.environ["FINGERTIP_PORT"] = self.port
+        examples = self.blocks("host_tools/python/README.md")
+        self.assertGreater(len(examples), 3)
+        for code in examples:
+            with self.subTest(code), self.device("frames=120"):
+                shown = []
+                os.chdir(self.folder)
+                self.addCleanup(os.chdir, ROOT)
+                with contextlib.suppress(fingertip.GoneError):
+                    exec(compile(code, "README.md", "exec"), {"print": lambda *values: shown.append(values), "__name__": "__main__"})
+                self.assertTrue(shown, code)
+
+
+class WithoutPandas(unittest.TestCase):
+    def test_said_what_to_install(self):
+        with mock.patch.dict(sys.modules, {"pandas": None}):
+            with self.assertRaisesRegex(ImportError, r"pip install \"fingertip-tactile\[pandas\]\""):
+                fingertip.Block([]).to_pandas()
+
+    def test_import_needs_no_port(self):
+        with mock.patch.dict(sys.modules, {"serial": None}):
+            importlib.reload(fingertip)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1] + sys.argv[3:])
