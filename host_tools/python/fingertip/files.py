@@ -30,10 +30,22 @@ import json
 import math
 import os
 import sys
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
+from . import names
 from .errors import InputError
+from .frames import frame_of
+from .names import Flag
+
+if TYPE_CHECKING:
+    import pandas
+
+Array = npt.NDArray[np.float64]
+Path = str | os.PathLike[str]
 
 PITCH_mm = 9.0
 # Sensor k = 5 * strip + position along the strip; origin in the centre of the pad.
@@ -51,13 +63,12 @@ TANGENTIAL_COLUMNS = ("qx_N", "qy_N", "q_sd_N", "tangential_ratio", "vx_mm_s", "
 RAW_COLUMNS = ("raw_sequence", "raw_flags", "valid", "saturated", "doubtful", "temperature_degC")
 RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *TANGENTIAL_COLUMNS, *RAW_COLUMNS)
 
-# Flag bits of the contact packet, firmware/wire/PROTOCOL.md.
-CONTACT, FIT_VALID, SLIP_VALID, SLIP = 1 << 0, 1 << 1, 1 << 3, 1 << 4
-TANGENTIAL_VALID, TANGENTIAL_FROM_TOUCH, VELOCITY_VALID, MOVING, SLIDING = (1 << bit for bit in range(20, 25))
-WARNINGS = 0x7FF00  # LOW_SIGNAL to SENSOR_DOUBTFUL, firmware/common/contact_flags.h: the numbers deserve less trust
+CONTACT, FIT_VALID, SLIP_VALID, SLIP, TANGENTIAL_VALID, TANGENTIAL_FROM_TOUCH, VELOCITY_VALID, MOVING, SLIDING, WARNINGS = map(int, (
+    Flag.CONTACT, Flag.FIT_VALID, Flag.SLIP_VALID, Flag.SLIP, Flag.TANGENTIAL_VALID, Flag.TANGENTIAL_FROM_TOUCH, Flag.VELOCITY_VALID, Flag.MOVING,
+    Flag.SLIDING, names.WARNINGS))
 
 
-def run_tool(name, main):
+def run_tool(name: str, main: Callable[[list[str]], int]) -> int:
     """Exit status of a command line tool: 0, or 1 after one line on stderr."""
     try:
         return main(sys.argv[1:])
@@ -66,12 +77,12 @@ def run_tool(name, main):
         return 1
 
 
-def printable(text):
+def printable(text: str) -> str:
     """In one line and harmless to a terminal: control characters and stray bytes as \\x1b."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
-def check_output(path, *inputs):
+def check_output(path: Path, *inputs: Path | None) -> None:
     """Fails before any work where write_text or write_bytes would fail, or would replace an input."""
     if os.path.isdir(path):
         raise InputError(f"{path}: is a folder; give the name of a file in it")
@@ -85,7 +96,7 @@ def check_output(path, *inputs):
             raise InputError(f"{path}: is a file to read; give -o another name")
 
 
-def read_lines(path):
+def read_lines(path: Path) -> list[str]:
     try:
         with open(path, encoding="utf-8") as file:
             return file.read().split("\n")
@@ -95,11 +106,11 @@ def read_lines(path):
         raise InputError(f"{path}: no text file; give a CSV file") from None
 
 
-def write_text(path, text):
+def write_text(path: Path, text: str) -> None:
     write_bytes(path, text.encode("utf-8"))
 
 
-def write_bytes(path, content):
+def write_bytes(path: Path, content: bytes) -> None:
     try:
         with open(path, "wb") as file:
             file.write(content)
@@ -107,7 +118,7 @@ def write_bytes(path, content):
         raise InputError(f"{path}: {error.strerror}; choose another place") from None
 
 
-def _number(path, line, column, cell, empty_allowed):
+def _number(path: Path, line: int, column: str, cell: str, empty_allowed: bool) -> float:
     if cell == "" and empty_allowed:
         return math.nan
     try:
@@ -119,7 +130,7 @@ def _number(path, line, column, cell, empty_allowed):
     return value
 
 
-def _check_kind(path, lines, kind, formats=("1",)):
+def _check_kind(path: Path, lines: Sequence[str], kind: str, formats: Collection[str] = ("1",)) -> str:
     """The format's number."""
     first = lines[0].strip().split()
     if first[:2] != ["#", f"fingertip-{kind}"] or len(first) != 3:
@@ -129,15 +140,15 @@ def _check_kind(path, lines, kind, formats=("1",)):
     return first[2]
 
 
-def _metadata(line):
+def _metadata(line: str) -> tuple[str, str]:
     key, separator, value = line[1:].partition(":")
-    return (key.strip(), value.strip()) if separator else (None, None)
+    return (key.strip(), value.strip()) if separator else ("", "")
 
 
 class Scenario:
     """t_s[n], the TRUTH_COLUMNS and the tangential force as arrays[n], has_pull: the file says it, sensors_Pa[n][sensor], metadata."""
 
-    def __init__(self, metadata, header, table, sensors):
+    def __init__(self, metadata: dict[str, str], header: list[str], table: Array, sensors: int) -> None:
         self.metadata = metadata
         self.t_s = table[:, 0]
         self.truth = {name: table[:, 1 + i] for i, name in enumerate(TRUTH_COLUMNS)}
@@ -146,28 +157,31 @@ class Scenario:
             self.truth[name] = table[:, header.index(name)] if name in header else np.zeros(len(table))
         self.sensors_Pa = table[:, 1 + len(TRUTH_COLUMNS):1 + len(TRUTH_COLUMNS) + sensors]
 
-    def at(self, name, t_s):
+    def at(self, name: str, t_s: Any) -> Any:
         """The truth at these times, linear between rows."""
         return np.interp(t_s, self.t_s, self.truth[name])
 
-    def is_on(self, name, t_s):
+    def is_on(self, name: str, t_s: Any) -> Any:
         """True where contact or slip is on at both rows around each time."""
         return self.at(name, t_s) > 1 - 1e-9
 
-    def is_off(self, name, t_s):
+    def is_off(self, name: str, t_s: Any) -> Any:
         return self.at(name, t_s) < 1e-9
 
-    def intervals(self, name):
+    def intervals(self, name: str) -> list[tuple[float, float]]:
         """(start_s, end_s) of every run of rows in which contact or slip is on."""
         on = np.concatenate(([0], (self.truth[name] > 0.5).astype(int), [0]))
         starts, ends = np.flatnonzero(np.diff(on) == 1), np.flatnonzero(np.diff(on) == -1) - 1
         return [(float(self.t_s[a]), float(self.t_s[b])) for a, b in zip(starts, ends)]
 
 
-def read_scenario(path):
+def read_scenario(path: Path) -> Scenario:
     lines = read_lines(path)
     _check_kind(path, lines, "scenario")
-    metadata, header, rows, sensors = {}, None, [], 0
+    metadata: dict[str, str] = {}
+    header: list[str] | None = None
+    rows: list[list[float]] = []
+    sensors = 0
     for number, line in enumerate(lines[1:], 2):
         line = line.strip()
         if not line:
@@ -195,12 +209,12 @@ def read_scenario(path):
         if rows and row[0] <= rows[-1][0]:
             raise InputError(f"{path}:{number}: t_s {cells[0]} does not increase; sort the rows by time")
         rows.append(row)
-    if not rows:
+    if header is None or not rows:
         raise InputError(f"{path}: no rows; write the scenario anew")
     return Scenario(metadata, header, np.array(rows), sensors)
 
 
-def write_scenario(path, metadata, columns):
+def write_scenario(path: Path, metadata: Mapping[str, Any], columns: Mapping[str, Any]) -> None:
     """columns: t_s, the TRUTH_COLUMNS, and sensors_Pa[n][sensor]."""
     sensors = columns["sensors_Pa"].shape[1]
     header = ["t_s", *TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(sensors))]
@@ -213,10 +227,12 @@ def write_scenario(path, metadata, columns):
 
 
 class Recording:
-    """metadata, columns (name -> array[n], NaN where empty), sensors_Pa and tare_Pa [n][sensor], events, end; packets, those
-    that are no frame: (type, {field: text}); line_numbers[n] of the rows in the file; time_us[n] on the recorder's clock, None in a recording of one."""
+    """metadata, columns (name -> array[n], NaN where empty), sensors_Pa and tare_Pa [n][sensor] as the file has them (valid says which are
+    measurements), events, end; packets, those that are no frame: (type, {field: text}); line_numbers[n] of the rows in the file;
+    time_us[n] on the recorder's clock, None in a recording of one."""
 
-    def __init__(self, path, metadata, names, table, line_numbers, sensors, events, packets, end, skipped_lines, time_us=None):
+    def __init__(self, path: Path, metadata: dict[str, str], names: list[str], table: Array, line_numbers: Any, sensors: int, events: list[str],
+                 packets: list[tuple[str, dict[str, str]]], end: dict[str, str], skipped_lines: int, time_us: Array | None = None) -> None:
         self.path = path
         self.time_us = time_us
         self.line_numbers = np.array(line_numbers)
@@ -232,22 +248,32 @@ class Recording:
         self.end = end
         self.skipped_lines = skipped_lines
 
-    def __getitem__(self, name):
+    def __getitem__(self, name: str) -> Array:
         return self.columns[name]
 
     @property
-    def has_contact(self):
+    def has_contact(self) -> npt.NDArray[np.bool_]:
         return ~np.isnan(self["flags"])
 
-    def health(self):
+    def to_pandas(self) -> "pandas.DataFrame":
+        """A row for each frame: all columns, the sensors as s0_Pa, ... and tare0_Pa, ... Needs pandas."""
+        columns: dict[str, Any] = dict(self.columns)
+        if self.time_us is not None:
+            columns = {"time_us": self.time_us, **columns}
+        for kind, values in (("s", self.sensors_Pa), ("tare", self.tare_Pa)):
+            columns |= {f"{kind}{k}_Pa": values[:, k] for k in range(values.shape[1])}
+        return frame_of(columns)
+
+    def health(self) -> list[dict[str, int]]:
         """Counters and state as of each health packet: {field: number}."""
         return [{name: int(text) for name, text in fields.items()} for kind, fields in self.packets if kind == "health"]
 
-    def flag(self, bit):
-        return (np.nan_to_num(self["flags"]).astype(np.int64) & bit) != 0
+    def flag(self, bit: int) -> npt.NDArray[np.bool_]:
+        found: npt.NDArray[np.bool_] = (np.nan_to_num(self["flags"]).astype(np.int64) & bit) != 0
+        return found
 
 
-def _end_counts(path, number, text):
+def _end_counts(path: Path, number: int, text: str) -> dict[str, str]:
     counts = {}
     for pair in text.split():
         key, separator, value = pair.partition("=")
@@ -257,7 +283,7 @@ def _end_counts(path, number, text):
     return counts
 
 
-def _packet(path, number, text):
+def _packet(path: Path, number: int, text: str) -> tuple[str, dict[str, str]]:
     """Its kind, and {field: whole number as it is written}."""
     words = text.split() or [""]
     fields = dict(field.partition("=")[::2] for field in words[1:])
@@ -274,12 +300,12 @@ WORTH_WAITING_bytes = 10_000_000
 class _RecordingLines:
     """The lines of a recording, one after the other: number, text without its end, whether it is torn."""
 
-    def __init__(self, path, progress=None):
+    def __init__(self, path: Path, progress: Callable[[float], None] | None = None) -> None:
         self.path, self.progress = path, progress
         first = next(iter(self), (1, "", True))[1]
         self.format = _check_kind(path, [first], "recording", ("1", "2"))
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[tuple[int, str, bool]]:
         try:
             with open(self.path, "rb") as file:
                 size, read, told = os.fstat(file.fileno()).st_size, 0, 0
@@ -295,7 +321,7 @@ class _RecordingLines:
             raise InputError(f"{self.path}: no text file; give a CSV file") from None
 
 
-def recorded_devices(path):
+def recorded_devices(path: Path) -> list[str]:
     """Serial numbers of the fingertips in a recording of several; of one, an empty list."""
     lines = _RecordingLines(path)
     if lines.format == "1":
@@ -306,7 +332,7 @@ def recorded_devices(path):
     raise InputError(f'{path}: no line "# devices: ..."; record anew')
 
 
-def _choose_device(path, devices, wanted):
+def _choose_device(path: Path, devices: list[str], wanted: str | None) -> int:
     """The number of the wanted fingertip."""
     for number, serial in enumerate(devices):
         if serial.lower() == wanted.lower() if wanted else len(devices) == 1:
@@ -318,7 +344,7 @@ def _choose_device(path, devices, wanted):
 OWN_END = "end of this one"  # of several
 
 
-def _of_one_device(line, number, advice):
+def _of_one_device(line: str, number: int | None, advice: str) -> tuple[str | None, float | None]:
     """A line of format 2 as format 1 has it, and its time; nothing for another fingertip's line."""
     if line.startswith("#"):
         key, separator, rest = line[1:].partition("/")
@@ -336,7 +362,7 @@ def _of_one_device(line, number, advice):
     return cells[2], _number("", 0, "time_us", cells[1], False)
 
 
-def _row(path, number, header, wanted, cells):
+def _row(path: Path, number: int, header: list[str], wanted: tuple[int, ...], cells: list[str]) -> list[float]:
     """The wanted cells as numbers, NaN where they are empty."""
     try:
         row = [float(cells[i]) if cells[i] else math.nan for i in wanted]
@@ -350,14 +376,21 @@ def _row(path, number, header, wanted, cells):
     return row
 
 
-def read_recording(path, salvage=False, device=None, columns=None, progress=None):
+def read_recording(path: Path, salvage: bool = False, device: str | None = None, columns: Collection[str] | None = None,
+                   progress: Callable[[float], None] | None = None) -> Recording:
     """device: the serial number of one of several fingertips. columns: only these (t_us and frame among them), for recordings
     that are too large to hold whole; then there are no sensors. progress: called now and then with the share that was read."""
     lines = _RecordingLines(path, progress)
     devices = recorded_devices(path)
     number_in_file = _choose_device(path, devices, device) if devices else None
-    metadata, header, events, packets, end, own_end, skipped = {}, None, [], [], {}, {}, 0
-    table, line_numbers, times_us, wanted, sensors = array.array("d"), array.array("q"), array.array("d"), (), 0
+    metadata: dict[str, str] = {}
+    header: list[str] | None = None
+    events: list[str] = []
+    packets: list[tuple[str, dict[str, str]]] = []
+    end: dict[str, str] = {}
+    own_end: dict[str, str] = {}
+    wanted: tuple[int, ...] = ()
+    table, line_numbers, times_us, sensors, skipped = array.array("d"), array.array("q"), array.array("d"), 0, 0
     advice = "use --salvage to skip damaged lines"
     for number, line, torn in lines:
         if number == 1 or not line.strip():
@@ -365,14 +398,15 @@ def read_recording(path, salvage=False, device=None, columns=None, progress=None
         try:
             if torn:
                 raise InputError(f"{path}:{number}: the last line is torn; {advice}")
-            time_us = None
+            time_us: float | None = None
             if devices:
                 try:
-                    line, time_us = _of_one_device(line, number_in_file, advice)
+                    own_line, time_us = _of_one_device(line, number_in_file, advice)
                 except InputError:
                     raise InputError(f"{path}:{number}: is no row of this recording; {advice}") from None
-                if line is None:
+                if own_line is None:
                     continue
+                line = own_line
             if line.startswith("#"):
                 key, value = _metadata(line)
                 if key == "end":
@@ -403,7 +437,7 @@ def read_recording(path, salvage=False, device=None, columns=None, progress=None
                 raise InputError(f"{path}:{number}: t_us is {cells[0]}; device time starts at 0; {advice}")
             table.extend(row)
             line_numbers.append(number)
-            if devices:
+            if time_us is not None:
                 times_us.append(time_us)
         except InputError:
             if not salvage or header is None:
@@ -422,14 +456,14 @@ GRIP_STATES = ("idle", "activating", "approach", "squeeze", "ready", "holding", 
 GRIP_ROW, GRIP_EVENT = "# grip: ", "# grip_event: "
 
 
-def restart_rows(t, frame):
+def restart_rows(t: npt.NDArray[Any], frame: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
     """The rows, but the first, that a run of a fingertip begins with: the time or the frame's number steps back. Numbers
     wrap (PROTOCOL.md)."""
     steps = np.mod(np.diff(frame.astype(np.int64)), 2**32)
     return np.flatnonzero((np.diff(t) < 0) | (steps >= 2**31)) + 1
 
 
-def _grip_values(path, number, columns, cells):
+def _grip_values(path: Path, number: int, columns: list[str], cells: list[str]) -> list[Any]:
     if len(cells) != len(columns):
         raise InputError(f"{path}:{number}: {len(cells)} columns of the gripper where its header has {len(columns)}; use --salvage to skip the line")
     if cells[columns.index("state")] not in GRIP_STATES:
@@ -437,9 +471,10 @@ def _grip_values(path, number, columns, cells):
     return [cell if name in GRIP_WORDS else _number(path, number, name, cell, name != "time_us") for name, cell in zip(columns, cells)]
 
 
-def read_grip(path, salvage=False):
+def read_grip(path: Path, salvage: bool = False) -> dict[str, Any]:
     """The gripper's rows in the recording of a grasp: {column: array}, NaN where empty; of any other recording an empty dictionary."""
-    columns, rows = None, []
+    columns: list[str] | None = None
+    rows: list[list[Any]] = []
     for number, line, torn in _RecordingLines(path):
         if not line.startswith(GRIP_ROW):
             continue
@@ -456,12 +491,12 @@ def read_grip(path, salvage=False):
         except InputError:
             if not salvage:
                 raise
-    if not rows:
+    if columns is None or not rows:
         return {}
     return {name: np.array(values, dtype=None if name in GRIP_WORDS else float) for name, values in zip(columns, zip(*rows))}
 
 
-def read_grip_events(path):
+def read_grip_events(path: Path) -> list[tuple[float, str]]:
     """What was asked of the gripper and what went wrong: [(time_us, text)]."""
     events = []
     for number, line, torn in _RecordingLines(path):
@@ -471,7 +506,7 @@ def read_grip_events(path):
     return events
 
 
-def read_run(path):
+def read_run(path: Path | None) -> dict[str, Any]:
     """The emulator's report; without a file an empty one."""
     if path is None:
         return {}

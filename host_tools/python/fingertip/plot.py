@@ -7,7 +7,10 @@ import argparse
 import io
 import sys
 
-import matplotlib
+try:
+    import matplotlib
+except ImportError:
+    sys.exit('fingertip-plot: matplotlib is not installed: pip install "fingertip-tactile[plot]"')
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

@@ -1,0 +1,104 @@
+"""Wheel and source distribution of the Python package, and its types: usage test_wheel.py FAKE_DEVICE [unittest arguments]."""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+import time
+import unittest
+import zipfile
+
+FAKE_DEVICE = os.path.abspath(sys.argv[1])
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+PACKAGE = ROOT / "host_tools/python"
+PATIENCE_s = 120
+
+
+def run(*call, **options):
+    done = subprocess.run(list(map(str, call)), capture_output=True, text=True, timeout=PATIENCE_s, **options)
+    if done.returncode != 0:
+        raise AssertionError(f"{call}: {done.stdout}{done.stderr}")
+    return done.stdout
+
+
+class Distribution(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+        cls.source = cls.folder / "source"
+        shutil.copytree(PACKAGE, cls.source, ignore=shutil.ignore_patterns("__pycache__"))
+        cls.dist = cls.folder / "dist"
+        cls.dist.mkdir()
+        backend = f"from setuptools import build_meta as b; b.build_sdist({str(cls.dist)!r}); b.build_wheel({str(cls.dist)!r})"
+        run(sys.executable, "-c", backend, cwd=cls.source)
+        cls.wheel, = cls.dist.glob("*.whl")
+        cls.sdist, = cls.dist.glob("*.tar.gz")
+
+    def test_names(self):
+        self.assertRegex(self.wheel.name, r"^fingertip_tactile-\d+\.\d+\.\d+-py3-none-any\.whl$")
+        self.assertRegex(self.sdist.name, r"^fingertip[-_]tactile-\d+\.\d+\.\d+\.tar\.gz$")
+        with zipfile.ZipFile(self.wheel) as wheel:
+            names = set(wheel.namelist())
+            metadata, = (wheel.read(name).decode() for name in names if name.endswith(".dist-info/METADATA"))
+        modules = {f"fingertip/{path.name}" for path in (PACKAGE / "fingertip").iterdir() if path.is_file()}
+        self.assertEqual({name for name in names if ".dist-info/" not in name}, modules)
+        self.assertIn("fingertip/py.typed", names)
+        for line in (r"Name: fingertip[-_]tactile", r"Requires-Dist: numpy", r"Requires-Dist: pyserial", r"Requires-Python: >=3.10"):
+            self.assertRegex(metadata, f"(?m)^{line}")
+
+    def test_the_source_distribution_builds_the_same_wheel(self):
+        with tarfile.open(self.sdist) as file:
+            file.extractall(self.folder / "sdist")
+        unpacked, = (self.folder / "sdist").iterdir()
+        again = self.folder / "again"
+        again.mkdir()
+        run(sys.executable, "-c", f"from setuptools import build_meta as b; b.build_wheel({str(again)!r})", cwd=unpacked)
+        contents = [{name: wheel.read(name) for name in wheel.namelist()} for wheel in map(zipfile.ZipFile, (self.wheel, *again.glob("*.whl")))]
+        self.assertEqual(*contents)
+
+    def test_in_a_clean_environment(self):
+        clean = self.folder / "clean"
+        run("/usr/bin/python3", "-m", "venv", "--without-pip", clean)
+        run(sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", clean / "bin/python", "install", "--no-index", "--no-deps", self.wheel)
+        site, = clean.glob("lib/python3*/site-packages")
+        for module in ("numpy", "serial"):  # what pip would fetch
+            place = pathlib.Path(run(sys.executable, "-c", f"import {module}; print({module}.__file__)").strip()).parent
+            (site / module).symlink_to(place)
+            for libraries in place.parent.glob(f"{module}.libs"):
+                (site / libraries.name).symlink_to(libraries)
+        scenario = self.folder / "demo.csv"
+        run(clean / "bin/fingertip-scenario", "demo", "-o", scenario, "--seconds", "1", cwd=self.folder)
+        self.assertTrue(scenario.read_text(encoding="utf-8").startswith("# fingertip-scenario 1\n"))
+        self.assertIn("usage: fingertip-evaluate", run(clean / "bin/fingertip-evaluate", "--help", cwd=self.folder))
+        done = subprocess.run([clean / "bin/fingertip-plot", "x.csv", "-o", "x.png"], capture_output=True, text=True, cwd=self.folder, timeout=PATIENCE_s)
+        self.assertEqual((done.returncode, done.stderr),
+                         (1, 'fingertip-plot: matplotlib is not installed: pip install "fingertip-tactile[plot]"\n'))
+        port = self.folder / "tty"
+        fake = subprocess.Popen([FAKE_DEVICE, port])
+        try:
+            end_s = time.monotonic() + PATIENCE_s
+            while not port.is_symlink() and time.monotonic() < end_s:
+                time.sleep(0.01)
+            code = "import fingertip, sys\nwith fingertip.Fingertip(sys.argv[1]) as f: print(fingertip.__file__, len(f.read_block(20)))"
+            where, count = run(clean / "bin/python", "-c", code, port, cwd=self.folder, env={"XDG_RUNTIME_DIR": str(self.folder)}).split()
+            self.assertEqual((where.startswith(str(clean)), count), (True, "20"))
+        finally:
+            fake.kill()
+            fake.wait()
+
+
+class Types(unittest.TestCase):
+    def test_strict(self):
+        with tempfile.TemporaryDirectory(prefix="fingertip-test-") as folder:
+            done = subprocess.run([sys.executable, "-m", "mypy", "--cache-dir", folder], cwd=PACKAGE, capture_output=True, text=True, timeout=PATIENCE_s)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertTrue(re.search(r"no issues found in \d\d source files", done.stdout), done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1] + sys.argv[2:])
