@@ -57,6 +57,7 @@ sigrok-cli sigrok-cli
 /usr/lib/python3/dist-packages/matplotlib/__init__.py python3-matplotlib
 /usr/lib/python3/dist-packages/markdown/__init__.py python3-markdown
 /usr/lib/python3/dist-packages/pyte/__init__.py python3-pyte
+/usr/lib/python3/dist-packages/serial/__init__.py python3-serial
 LIST
   [ "$1" = demo ] || [ "$1" = soak ] || cat << 'LIST'
 clang-14 clang-14
@@ -171,6 +172,8 @@ case $1 in
     /usr/bin/python3 host_tools/report/grasp/grasp.py --build build/host -o build/report --picture host_tools/report/grasp/grasp.png
     say "what the fuzzers, the analysers and mutation find, and how faults and power cuts are overcome"
     /usr/bin/python3 host_tools/report/reliability/reliability.py --build build/host -o build/report
+    say "in programs of others"
+    /usr/bin/python3 host_tools/report/ecosystem/ecosystem.py --build build/host -o build/report
     say "every table and picture: $root/build/report/index.html"
     ;;
 esac

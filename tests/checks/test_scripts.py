@@ -151,7 +151,8 @@ class BootstrapReport(Folder):
             program = self.folder / "bin" / name
             program.write_text(f"#!/bin/sh\n{body}\n")
             program.chmod(0o755)
-        for report in ("fit/fit", "rate/rate", "validation/validation", "truth/truth", "shear/shear", "grasp/grasp", "tools/tools", "reliability/reliability", "bringup/traces"):
+        for report in ("fit/fit", "rate/rate", "validation/validation", "truth/truth", "shear/shear", "grasp/grasp", "tools/tools", "reliability/reliability", "bringup/traces",
+                       "ecosystem/ecosystem"):
             self.assertTrue((ROOT / f"host_tools/report/{report}.py").is_file())
             script = self.folder / f"host_tools/report/{report}.py"
             script.parent.mkdir(parents=True)
@@ -162,7 +163,7 @@ class BootstrapReport(Folder):
         lines = done.stdout.splitlines()
         self.assertEqual(lines[-1], f"== every table and picture: {self.folder.resolve()}/build/report/index.html")
         ran = [line.split()[1:] for line in lines if line.startswith("ran ")]
-        self.assertEqual([place for _, place, *_ in ran], 2 * ["build/report"] + ["boards"] + 6 * ["build/report"])
+        self.assertEqual([place for _, place, *_ in ran], 2 * ["build/report"] + ["boards"] + 7 * ["build/report"])
         for picture in (picture for _, _, *pictures in ran for picture in pictures):  # those that the report's README shows
             self.assertTrue((ROOT / picture).is_file(), picture)
             place = os.path.relpath(picture, "host_tools/report")

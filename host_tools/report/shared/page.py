@@ -76,6 +76,8 @@ PARTS = (
     Part("reliability", "Reliability", "What the firmware, its protocol and the tools do with whatever they are fed, and what faults and power cuts do to it.",
          f"{REPORT}/reliability/reliability.py --build build/host -o build/report", RUN, (("fuzz_seconds", SAID), ("fuzz_seed", SAID), ("soak_hours_emulated", EMULATED), ("power_cut*", EMULATED), ("soak*", SIMULATED), ("recovery", SIMULATED),
           ("worst_recovery_s", SIMULATED))),
+    Part("ecosystem", "Ecosystem", "The fingertip in programs of others.", f"{REPORT}/ecosystem/ecosystem.py --build build/host -o build/report", SIMULATED,
+         (("*_percent", CLOCK), ("*_us*", CLOCK), ("*_fps", CLOCK), ("*_seconds", SAID), ("python_vectors*", RUN))),
     Part("usb", "USB and clocks", "The image's USB device before a Debian kernel in a virtual machine, and two fingertips on one clock.",
          "sh cmake/bootstrap.sh test", EMULATED, (("alignment_fake_*", SIMULATED), ("*_test_s", CLOCK), ("*_seconds", SAID))),
 )
