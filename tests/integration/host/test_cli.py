@@ -886,7 +886,6 @@ class Recording(CliTest):
 class LiveData(CliTest):
     """record -: the recording for another program, as it happens."""
 
-    ROOT = pathlib.Path(__file__).resolve().parents[3]
 
     def read_row(self, process):
         while (line := process.stdout.readline()) and not line[0].isdigit():
@@ -970,34 +969,6 @@ class LiveData(CliTest):
                                      stdout=file, stderr=subprocess.PIPE, preexec_fn=limit, timeout=PATIENCE_s)
         self.assertEqual(process.returncode, 1)
         self.assertIn("precious\n# fingertip-recording 1\n", pathlib.Path(self.csv).read_text(encoding="utf-8"))
-
-    def example_of_the_manual(self):
-        readme = (self.ROOT / "README.md").read_text(encoding="utf-8")
-        example = re.search(r"(?m)^    import csv.*\n(?:    .*\n)+", readme).group()
-        environment = {**self.environment, "PATH": os.path.dirname(FINGERTIP) + ":" + self.environment["PATH"], "FINGERTIP_PORT": self.port}
-        process = subprocess.Popen([sys.executable, "-u", "-c", "\n".join(line[4:] for line in example.splitlines())],
-                                   env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-        self.addCleanup(end, process)
-        return process
-
-    def test_the_example_of_the_manual(self):
-        with self.device("frames=60"):
-            process = self.example_of_the_manual()
-            shown = [process.stdout.readline() for _ in range(60)]
-            process.terminate()
-            process.communicate(timeout=PATIENCE_s)
-        self.assertEqual(shown[0], "7.999014 0.25118968 5\n")
-        for line in shown:
-            self.assertRegex(line, r"^-?\d+\.\d+ -?\d+\.\d+ 5\n$")
-
-    def test_the_example_of_the_manual_heeds_warnings(self):
-        for bit in range(8, 19):
-            with self.device("frames=60", f"flags={3 | 1 << bit}", f"heard={self.port}.heard"):
-                process = self.example_of_the_manual()
-                self.wait_for(lambda: not os.path.lexists(self.port))  # all were read
-                process.terminate()
-                out, _ = process.communicate(timeout=PATIENCE_s)
-            self.assertEqual(out, "", bit)
 
 
 class Replay(CliTest):

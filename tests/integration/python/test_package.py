@@ -606,6 +606,25 @@ class Examples(DeviceTest):
                 self.assertTrue(shown, code)
 
 
+    def test_readme(self):
+        """Frames with a warning are not shown, whichever it is."""
+        os.environ["FINGERTIP_PORT"] = self.port
+        text = (ROOT / "README.md").read_text(encoding="utf-8")
+        code = re.search(r"(?m)^    import matplotlib.*\n(?:    .*\n|\n)+", text).group().replace("\n    ", "\n")[4:]
+        self.assertIn("seconds=10", code)
+        plots = mock.MagicMock()
+        with mock.patch.dict(sys.modules, {"matplotlib": plots, "matplotlib.pyplot": plots.pyplot}):
+            for bit in (None, *range(8, 19)):
+                shown = []
+                flags = int(Flag.CONTACT | Flag.FIT_VALID) | (0 if bit is None else 1 << bit)
+                with self.device("rate=1000", "frames=300", f"flags={flags}"), self.assertRaises(fingertip.GoneError):
+                    exec(compile(code.replace("seconds=10", "seconds=0.1"), "README.md", "exec"), {"print": lambda *values: shown.append(values)})
+                self.assertEqual(bool(shown), bit is None, bit)
+        t_s, force_N = plots.pyplot.plot.call_args.args
+        self.assertEqual(len(t_s), len(force_N))
+        self.assertEqual(plots.pyplot.show.call_count, 12)
+
+
 class WithoutPandas(unittest.TestCase):
     def test_said_what_to_install(self):
         with mock.patch.dict(sys.modules, {"pandas": None}):
