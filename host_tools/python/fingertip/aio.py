@@ -53,7 +53,7 @@ class AsyncFingertip:
         """Every frame, in order. Ends when it is closed; raises GoneError, NoFrameError."""
         while True:
             self._news.clear()
-            for frame in self.sync.take():
+            while (frame := self.sync.take_one()) is not None:
                 yield frame
             if self.sync.is_closed:
                 return

@@ -11,7 +11,7 @@ from types import TracebackType
 from . import discovery, wire
 from .clock import NO_CLOCK, ClockEstimate, ClockExchange, ClockFit, host_now_us
 from .errors import (
-    BadValueError, FingertipError, GoneError, NoAnswerError, NoFingertipError, NoFrameError, NotNowError, OtherFingertipError, OtherVersionError,
+    BadValueError, FingertipError, GoneError, InputError, NoAnswerError, NoFingertipError, NoFrameError, NotNowError, OtherFingertipError, OtherVersionError,
     RefusedError, RefusedValueError, UnknownCommandError)
 from .frames import Block, Frame
 from .names import Capability, Result, Streams
@@ -78,6 +78,7 @@ class Fingertip:
         self._queue: collections.deque[Frame] = collections.deque()
         self._buffer_frames = int(buffer_frames)
         self._latest: Frame | None = None
+        self._latest_s = 0.0
         self._health: Health | None = None
         self._pending: tuple[int, int, Contact] | None = None
         self._run = 0
@@ -113,9 +114,12 @@ class Fingertip:
         """The way to the wanted one; each is asked who it is."""
         others: list[str] = []
         for way in ways:
+            self._decoder = wire.Decoder()
+            self._clock_fit = ClockFit()
+            self._estimate = NO_CLOCK
+            self._error = None
             try:
                 self._transport = open_way(way.port, way.share_socket)
-                self._error = None
                 self._thread = threading.Thread(target=self._read_on, name="fingertip", daemon=True)
                 self._thread.start()
                 info = self._ask_info()
@@ -247,33 +251,21 @@ class Fingertip:
         """It has gone, and is waited for (reconnect)."""
         return self._is_returning
 
-    def take_one(self, timeout_s: float | None = None) -> Frame | None:
-        """The oldest frame that nobody took, if there is one. timeout_s: wait for it, and raise NoFrameError. Raises GoneError."""
+    def take_one(self) -> Frame | None:
+        """The oldest frame that nobody took, if there is one, without waiting. Raises GoneError once there are none any more."""
         with contextlib.suppress(IndexError):
             return self._queue.popleft()
-        if timeout_s is not None:
-            return self._take_frame(timeout_s)
         if self._error:
             raise self._error
         return None
 
-    def take(self) -> list[Frame]:
-        """All frames that nobody took yet, without waiting. Raises GoneError once there are none any more."""
-        taken: list[Frame] = []
-        with contextlib.suppress(IndexError):
-            while True:
-                taken.append(self._queue.popleft())
-        if not taken and self._error:
-            raise self._error
-        return taken
-
-    def _take_frame(self, timeout_s: float | None = None) -> Frame | None:
+    def _take_frame(self) -> Frame | None:
         """Nothing: it is closed."""
         try:
             return self._queue.popleft()
         except IndexError:
             pass
-        self._wait(lambda: bool(self._queue), timeout_s)
+        self._wait(lambda: bool(self._queue), None)
         return self._queue.popleft() if self._queue else None
 
     def _wait(self, condition: Callable[[], bool], timeout_s: float | None) -> None:
@@ -292,13 +284,15 @@ class Fingertip:
                 self._changed.wait(min(left_s, 0.2))
 
     def latest(self, timeout_s: float | None = None) -> Frame:
-        """The newest frame, at once if there has been one; takes none away from iteration. Raises GoneError, NoFrameError."""
+        """The newest frame, at once unless it is older than that; takes none away from iteration. Raises GoneError, NoFrameError."""
         if self._error:
             raise self._error
-        self._wait(lambda: self._latest is not None, timeout_s)
-        if self._latest is None or self._closing:
+        patience_s = self.patience_s if timeout_s is None else timeout_s
+        self._wait(lambda: self._latest is not None and time.monotonic() - self._latest_s <= patience_s, timeout_s)
+        latest = self._latest
+        if latest is None or self._closing:
             raise GoneError(f"{self.description}: closed")
-        return self._latest
+        return latest
 
     def read_block(self, frames: int | None = None, seconds: float | None = None) -> Block:
         """The next frames as arrays: so many (1 to 1048576), or those of so many seconds of device time (above 0). Fewer if it is closed."""
@@ -391,13 +385,13 @@ class Fingertip:
         """What it sends from now on; NONE is silence."""
         if not 0 <= streams <= Streams.ALL:
             raise BadValueError(f"streams {int(streams)} is out of range; give 0 to {int(Streams.ALL)}")
-        before, self._streams = self._streams, Streams(streams)
+        before, self._streams = (self._streams, self._wants_stream), Streams(streams)
+        self._wants_stream = True  # the first frame comes with the answer
         try:
             self._command(wire.SetStreams(int(streams)))
         except FingertipError:
-            self._streams = before
+            self._streams, self._wants_stream = before
             raise
-        self._wants_stream = True
 
     def read_info(self) -> Info:
         """Who it is and how it is set, as of now."""
@@ -444,7 +438,10 @@ class Fingertip:
     def _finish_recording(self, reason: str) -> None:
         recorder = self._recorder
         if recorder:
-            recorder.close(reason)
+            try:
+                recorder.close(reason)
+            except InputError as error:
+                recorder.fail(error)
 
     # The conversation
 
@@ -553,10 +550,6 @@ class Fingertip:
                 if self._error:
                     self._finish_recording("gone")
                     return
-            except FingertipError as error:  # of the recording
-                self._error = error
-                self._tell()
-                return
 
     def _finish_pending(self) -> None:
         frames: list[Frame] = []
@@ -567,8 +560,8 @@ class Fingertip:
         """Looks for the port until it is back or this is closed."""
         self._is_returning = True
         self._finish_pending()
-        if self._recorder:
-            self._recorder.event("gone")
+        self._latest = None
+        self._note("gone")
         self._tell()
         self._transport.close()
         while not self._closing:
@@ -615,8 +608,7 @@ class Fingertip:
         self._run += 1
         self._is_returning = False
         self._next_exchange_us = 0
-        if self._recorder:
-            self._recorder.event("back")
+        self._note("back")
 
     def _relate(self, t_us: int, ack: Acknowledgement) -> None:
         now_us = host_now_us()
@@ -625,20 +617,35 @@ class Fingertip:
             self._estimate = self._clock_fit.estimate or NO_CLOCK
 
     def _record(self, packet: wire.Packet) -> None:
-        if self._recorder:
-            self._recorder.packet(packet)
+        recorder = self._recorder
+        if recorder:
+            try:
+                recorder.packet(packet)
+            except InputError as error:  # the disk is full: the recording ends, the frames go on
+                self._recorder = None
+                recorder.fail(error)
+
+    def _note(self, event: str) -> None:
+        recorder = self._recorder
+        if recorder:
+            try:
+                recorder.event(event)
+            except InputError as error:
+                self._recorder = None
+                recorder.fail(error)
 
     def _take(self, packets: list[wire.Packet]) -> None:
         frames: list[Frame] = []
-        streams, news, recorder = self._streams, False, self._recorder
-        both = int(streams) & 3 == 3
+        news, wanted, both = False, self._wants_stream, int(self._streams) & 3 == 3
         for packet in packets:
             sequence, t_us, body = packet
-            if recorder:
-                recorder.packet(packet)
+            if self._recorder:
+                self._record(packet)
+            if isinstance(body, (Raw, Contact)) and not wanted:
+                continue  # asked for by somebody before
             if isinstance(body, Raw):
                 pending = self._pending
-                if pending and pending[2].frame == body.frame:
+                if pending and pending[2].frame == body.frame and pending[1] == t_us:
                     self._pending = None
                     frames.append(Frame(self._info.serial, self._run, t_us, pending[2], body, pending[0], sequence, self._estimate))
                 else:
@@ -667,7 +674,7 @@ class Fingertip:
 
     def _keep(self, frames: list[Frame]) -> None:
         if frames:
-            self._latest = frames[-1]
+            self._latest, self._latest_s = frames[-1], time.monotonic()
             self._queue.extend(frames)
             with contextlib.suppress(IndexError):
                 while len(self._queue) > self._buffer_frames:
@@ -682,10 +689,11 @@ class Fingertip:
                 self._eager_until_us = 0
             elif body.command == awaited[0] and body.command_sequence - awaited[1] & 0xFFFF < self._sequence - awaited[1] & 0xFFFF:
                 self._ack = body
-        elif isinstance(body, Health):
-            self._health = self._answer = body
-        elif self._ack:
-            self._answer = body
+        else:
+            if isinstance(body, Health):
+                self._health = body
+            if self._ack:
+                self._answer = body
 
 
 def list_fingertips() -> list[discovery.Found]:

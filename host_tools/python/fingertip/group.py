@@ -10,7 +10,7 @@ from typing import Any
 from . import discovery
 from .clock import host_now_us
 from .device import Fingertip
-from .errors import BadValueError, NoFingertipError
+from .errors import BadValueError, NoFingertipError, NoFrameError
 from .frames import Frame
 
 LATE_us = 250_000  # a fingertip that is later than this is not waited for
@@ -84,7 +84,7 @@ class Fingertips:
                     if heads[i] or fingertip.is_returning:
                         heard_s[i] = time.monotonic()
                     elif time.monotonic() - heard_s[i] > fingertip.patience_s:
-                        fingertip.take_one(0)  # raises
+                        raise NoFrameError(f"{fingertip.description}: no frame in {fingertip.patience_s:g} s")
             there = [(frame.host_us, i) for i, frame in enumerate(heads) if frame]
             if there:
                 host_us, first = min(there)

@@ -1,4 +1,5 @@
 """Writes recordings as `fingertip record` does (host_tools/libfingertip/recording.hpp has the format); read_recording reads them."""
+import contextlib
 import datetime
 import math
 import os
@@ -82,9 +83,10 @@ class RecordingWriter:
         self._last_us = self._before_us = 0
         self._on_close: Callable[[], LineStatistics] | None = None
         self._closed = False
+        self._failure: InputError | None = None
         self._lock = threading.RLock()
         try:
-            self._file = open(self.path, "wb" if replace else "xb", buffering=1 << 16)
+            self._file = open(self.path, "wb" if replace else "xb", buffering=0)
         except FileExistsError:
             raise InputError(f"{self.path}: exists; give replace=True or another name") from None
         except OSError as error:
@@ -107,8 +109,10 @@ class RecordingWriter:
         self.close()
 
     def _line(self, text: str) -> None:
+        line = text.encode("utf-8") + b"\n"
         try:
-            self._file.write(text.encode("utf-8") + b"\n")
+            while line:
+                line = line[self._file.write(line):]
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; the file ends early") from None
 
@@ -205,12 +209,22 @@ class RecordingWriter:
 
     def abandon(self) -> None:
         """Closes without an end line."""
-        self._closed = True
-        self._file.close()
+        with self._lock:
+            self._closed = True
+            with contextlib.suppress(OSError):
+                self._file.close()
+
+    def fail(self, error: InputError) -> None:
+        """Closes without an end line; close() will raise this."""
+        self._failure = error
+        self.abandon()
 
     def close(self, reason: str = "closed", statistics: LineStatistics | None = None) -> None:
-        """Writes the end line. Does nothing the second time. Raises InputError where the disk is full."""
+        """Writes the end line. Does nothing the second time. Raises InputError where the disk was full, then or before."""
         with self._lock:
+            failure, self._failure = self._failure, None
+            if failure:
+                raise failure
             if self._closed:
                 return
             self._write_pending()

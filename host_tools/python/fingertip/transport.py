@@ -71,7 +71,8 @@ class SerialTransport:
         try:
             if sys.platform != "win32":
                 return _read_descriptor(self._port.fileno(), wait_s, settle_s)
-            self._port.timeout = wait_s
+            if self._port.timeout != wait_s:
+                self._port.timeout = wait_s
             data = self._port.read(1)
             if data:
                 time.sleep(settle_s)

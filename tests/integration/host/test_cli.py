@@ -886,7 +886,6 @@ class Recording(CliTest):
 class LiveData(CliTest):
     """record -: the recording for another program, as it happens."""
 
-
     def read_row(self, process):
         while (line := process.stdout.readline()) and not line[0].isdigit():
             pass

@@ -13,6 +13,7 @@ import sys
 import tempfile
 import threading
 import time
+import tty
 import unittest
 import zlib
 from unittest import mock
@@ -386,8 +387,40 @@ class Streaming(DeviceTest):
             self.assertEqual([frame.frame for frame in self.until_gone(tip)], list(range(181, 201)))
             self.assertEqual(tip.overrun_frames, 180)
 
+    def test_a_full_disk_ends_the_recording_alone(self):
+        with self.device(), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
+            self.assertRaisesRegex(fingertip.InputError, "No space left on device", tip.record, "/dev/full", replace=True)
+            writer = tip.record(self.path("r.csv"))
+            self.assertRaises(fingertip.BadValueError, tip.record, self.path("other.csv"))
+            tip.read_block(20)
+            full = open("/dev/full", "wb", buffering=0)
+            self.addCleanup(full.close)
+            real, writer._file = writer._file, full
+            tip.read_block(60)
+            real.close()
+            self.assertRaisesRegex(fingertip.InputError, "No space left on device; the file ends early", writer.close)
+            np.testing.assert_array_equal(np.diff(tip.read_block(20).frame), 1)
+            with tip.record(self.path("other2.csv")):
+                tip.read_block(20)
+        for name in ("r.csv", "other2.csv"):
+            self.assertGreater(len(fingertip.read_recording(self.path(name)).has_contact), 10)
+
+    def test_one_that_streams_already(self):
+        with self.device("rate=1000"):
+            other = os.open(self.port, os.O_RDWR | os.O_NOCTTY)
+            self.addCleanup(os.close, other)
+            tty.setraw(other)
+            os.write(other, wire.encode(wire.Packet(0, 0, wire.SetStreams(7))))
+            self.assertTrue(os.read(other, 10))
+            with Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
+                np.testing.assert_array_equal(np.diff(tip.read_block(50).frame), 1)
+
     def test_silence_is_told(self):
         with self.device("stall=20"), Fingertip(self.port, timeout_s=0.3) as tip:
+            self.wait_for(lambda: tip.statistics.packets > 40)
+            with self.assertRaises(fingertip.NoFrameError):
+                while True:  # what is old is not the latest
+                    tip.latest()
             with self.assertRaisesRegex(fingertip.NoFrameError, "no frame in 0.3 s"):
                 for _ in tip:
                     pass
