@@ -23,9 +23,10 @@ from .wire import Calibration, Health, Info, LineStatistics, PadProfile
 
 from .version import __version__
 __all__ = [
-    "WARNINGS", "AsyncFingertip", "BadValueError", "Block", "Calibration", "Capability", "ClockEstimate", "Fingertip", "FingertipError", "Fingertips", "Flag", "Found", "Frame",
-    "GoneError", "Health", "Info", "InputError", "LineStatistics", "NoAnswerError", "NoFingertipError", "NoFrameError", "NoSuchPortError",
-    "NotAPortError", "NotNowError", "NotSharedError", "OtherFingertipError", "OtherVersionError", "PadProfile", "PermissionDeniedError", "PortError",
-    "PortInUseError", "Recording", "RecordingWriter", "RefusedError", "RefusedValueError", "Result", "SeveralFingertipsError", "Stored", "Streams",
-    "UnknownCommandError", "host_now_us", "list_fingertips", "read_recording",
+    "WARNINGS", "__version__", "AsyncFingertip", "BadValueError", "Block", "Calibration", "Capability", "ClockEstimate", "Fingertip",
+    "FingertipError", "Fingertips", "Flag", "Found", "Frame", "GoneError", "Health", "host_now_us", "Info", "InputError", "LineStatistics",
+    "list_fingertips", "NoAnswerError", "NoFingertipError", "NoFrameError", "NoSuchPortError", "NotAPortError", "NotNowError", "NotSharedError",
+    "OtherFingertipError", "OtherVersionError", "PadProfile", "PermissionDeniedError", "PortError", "PortInUseError", "read_recording",
+    "Recording", "RecordingWriter", "RefusedError", "RefusedValueError", "Result", "SeveralFingertipsError", "Stored", "Streams",
+    "UnknownCommandError",
 ]

@@ -91,16 +91,23 @@ class RecordingWriter:
             raise InputError(f"{self.path}: exists; give replace=True or another name") from None
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; choose another place") from None
+        try:
+            self._head(info, extra or {})
+        except InputError:
+            self.abandon()
+            raise
+        self._no_contact = [""] * (len(CONTACT_COLUMNS) + len(TANGENTIAL_COLUMNS))
+        self._no_raw = [""] * (len(RAW_COLUMNS) + 2 * self._sensors)
+
+    def _head(self, info: Info, extra: Mapping[str, str]) -> None:
         started = datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
         self._line("# fingertip-recording 1")
-        for key, value in {"recorded_by": "fingertip-tactile", "started_utc": started, **(extra or {})}.items():
+        for key, value in {"recorded_by": "fingertip-tactile", "started_utc": started, **extra}.items():
             self._comment(key, "".join(c if c.isprintable() else "?" for c in value))
         self._info(info)
         sensors = range(self._sensors)
         self._line(",".join(["t_us", "frame", *CONTACT_COLUMNS, *TANGENTIAL_COLUMNS, *RAW_COLUMNS, *(f"s{k}_Pa" for k in sensors),
                              *(f"tare{k}_Pa" for k in sensors)]))
-        self._no_contact = [""] * (len(CONTACT_COLUMNS) + len(TANGENTIAL_COLUMNS))
-        self._no_raw = [""] * (len(RAW_COLUMNS) + 2 * self._sensors)
 
     def __enter__(self) -> "RecordingWriter":
         return self

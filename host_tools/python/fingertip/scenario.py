@@ -12,7 +12,6 @@ F = 2 pi p0 sigma^2. slip is 1 while the contact moves faster than 10 mm/s. The 
 give the same bytes. The file format is described in files.py.
 """
 import argparse
-import sys
 
 import numpy as np
 
