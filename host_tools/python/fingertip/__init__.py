@@ -19,9 +19,9 @@ from .frames import Block, Frame
 from .group import Fingertips
 from .names import WARNINGS, Capability, Flag, Result, Stored, Streams
 from .recording import RecordingWriter
+from .version import __version__
 from .wire import Calibration, Health, Info, LineStatistics, PadProfile
 
-from .version import __version__
 __all__ = [
     "WARNINGS", "__version__", "AsyncFingertip", "BadValueError", "Block", "Calibration", "Capability", "ClockEstimate", "Fingertip",
     "FingertipError", "Fingertips", "Flag", "Found", "Frame", "GoneError", "Health", "host_now_us", "Info", "InputError", "LineStatistics",

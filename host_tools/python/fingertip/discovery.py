@@ -6,6 +6,7 @@ import os
 import pathlib
 import socket
 import stat
+import sys
 from typing import NamedTuple
 
 from .errors import NoFingertipError, NotSharedError, SeveralFingertipsError
@@ -24,6 +25,8 @@ class Found(NamedTuple):
 
 def _is_served(path: pathlib.Path) -> bool:
     """Also if this user may not connect."""
+    if sys.platform == "win32":
+        return False
     with contextlib.closing(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)) as probe:
         try:
             probe.connect(str(path))
@@ -33,7 +36,9 @@ def _is_served(path: pathlib.Path) -> bool:
 
 
 def _share_folders() -> list[pathlib.Path]:
-    """This user's, and everybody's."""
+    """This user's, and everybody's; none on Windows."""
+    if sys.platform == "win32":
+        return []
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     if runtime:
         own = pathlib.Path(runtime) / "fingertip"
@@ -50,8 +55,6 @@ def _share_folders() -> list[pathlib.Path]:
 
 def find_shared() -> list[Found]:
     """Those that somebody serves now; none on Windows."""
-    if not hasattr(socket, "AF_UNIX") or not hasattr(os, "geteuid"):
-        return []
     found: list[Found] = []
     for folder in _share_folders():
         with contextlib.suppress(OSError):

@@ -97,6 +97,8 @@ class SocketTransport:
 
     def __init__(self, path: str) -> None:
         self.description = path
+        if sys.platform == "win32":
+            raise NotSharedError(f"{path}: nobody shares a fingertip on Windows")
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             self._socket.connect(path)

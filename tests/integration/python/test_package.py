@@ -363,6 +363,7 @@ class Streaming(DeviceTest):
             block = tip.read_block(50)
             self.assertEqual((len(block), block.sensors_Pa.shape, block.tare_Pa.shape), (50, (50, 15), (50, 15)))
             np.testing.assert_array_equal(np.diff(block.frame), 1)
+            self.assertTrue(np.isnan(block.sensors_Pa[:, 0]).all() and np.isfinite(block.sensors_Pa[:, 1:]).all())
             np.testing.assert_allclose(np.hypot(block.x_mm / 8, block.y_mm / 16), 1, rtol=1e-4)
             block = tip.read_block(seconds=0.1)
             self.assertGreaterEqual(block.t_us[-1] - block.t_us[0], 100_000)

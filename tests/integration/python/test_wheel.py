@@ -94,10 +94,12 @@ class Distribution(unittest.TestCase):
 
 class Types(unittest.TestCase):
     def test_strict(self):
-        with tempfile.TemporaryDirectory(prefix="fingertip-test-") as folder:
-            done = subprocess.run([sys.executable, "-m", "mypy", "--cache-dir", folder], cwd=PACKAGE, capture_output=True, text=True, timeout=PATIENCE_s)
-        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-        self.assertTrue(re.search(r"no issues found in \d\d source files", done.stdout), done.stdout)
+        for platform in ("linux", "darwin", "win32"):
+            with self.subTest(platform), tempfile.TemporaryDirectory(prefix="fingertip-test-") as folder:
+                done = subprocess.run([sys.executable, "-m", "mypy", "--platform", platform, "--cache-dir", folder], cwd=PACKAGE,
+                                      capture_output=True, text=True, timeout=PATIENCE_s)
+                self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+                self.assertTrue(re.search(r"no issues found in \d\d source files", done.stdout), done.stdout)
 
 
 if __name__ == "__main__":
