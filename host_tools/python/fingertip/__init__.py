@@ -18,13 +18,13 @@ from .files import Recording, read_recording
 from .frames import Block, Frame
 from .group import Fingertips
 from .names import WARNINGS, Capability, Flag, Result, Stored, Streams
-from .recording import RecordingWriter
+from .recording import JointRecordingWriter, RecordingWriter
 from .version import __version__
 from .wire import Calibration, Health, Info, LineStatistics, PadProfile
 
 __all__ = [
     "WARNINGS", "__version__", "AsyncFingertip", "BadValueError", "Block", "Calibration", "Capability", "ClockEstimate", "Fingertip",
-    "FingertipError", "Fingertips", "Flag", "Found", "Frame", "GoneError", "Health", "host_now_us", "Info", "InputError", "LineStatistics",
+    "FingertipError", "Fingertips", "Flag", "Found", "Frame", "GoneError", "Health", "host_now_us", "Info", "InputError", "JointRecordingWriter", "LineStatistics",
     "list_fingertips", "NoAnswerError", "NoFingertipError", "NoFrameError", "NoSuchPortError", "NotAPortError", "NotNowError", "NotSharedError",
     "OtherFingertipError", "OtherVersionError", "PadProfile", "PermissionDeniedError", "PortError", "PortInUseError", "read_recording",
     "Recording", "RecordingWriter", "RefusedError", "RefusedValueError", "Result", "SeveralFingertipsError", "Stored", "Streams",

@@ -15,7 +15,7 @@ from .errors import (
     RefusedError, RefusedValueError, UnknownCommandError)
 from .frames import Block, Frame
 from .names import Capability, Result, Streams
-from .recording import RecordingWriter
+from .recording import Recorder, RecordingWriter
 from .transport import Transport, open_way
 from .wire import Acknowledgement, Body, Contact, Health, Info, LineStatistics, Raw
 
@@ -98,7 +98,7 @@ class Fingertip:
         self._answer: Body | None = None
         self._awaited: tuple[int, int] | None = None  # type of the command, sequence of its first attempt
         self._listeners: list[Callable[[], None]] = []
-        self._recorder: RecordingWriter | None = None
+        self._recorder: Recorder | None = None
         self._thread: threading.Thread | None = None
 
         self._transport, self._info = self._open(discovery.choose(None if port is None else os.fspath(port), serial, share))
@@ -206,7 +206,7 @@ class Fingertip:
     @property
     def statistics(self) -> LineStatistics:
         """What the line lost and damaged since it was opened: dropped_packets and the others."""
-        return self._decoder.statistics.copy()
+        return self._decoder.statistics + LineStatistics()
 
     @property
     def overrun_frames(self) -> int:
@@ -414,26 +414,27 @@ class Fingertip:
 
         Frames are there for iteration at the same time. Raises InputError.
         """
+        if self._recorder:
+            raise BadValueError("it is being recorded already")
         writer = RecordingWriter(path, self._info, replace=replace, raw_expected=bool(self._streams & Streams.RAW),
-                                 extra={"port": self.description})
-        with self._changed:
-            if self._recorder:
-                writer.abandon()
-                raise BadValueError("it is being recorded already")
-            first = self.statistics
-            self._recorder = writer
-        writer.on_close(lambda: self._end_recording(writer, first))
+                                 extra={"port": self.description}, count=lambda: self.detach(writer) - first)
+        first = self.attach(writer)
         return writer
 
-    def _end_recording(self, writer: RecordingWriter, first: LineStatistics) -> LineStatistics:
-        """What the line counted while it was recorded."""
+    def attach(self, recorder: Recorder) -> LineStatistics:
+        """It is told every packet from now on, by the reading thread; what the line has counted until now. Raises BadValueError."""
         with self._changed:
-            if self._recorder is writer:
+            if self._recorder:
+                raise BadValueError("it is being recorded already")
+            self._recorder = recorder
+            return self.statistics
+
+    def detach(self, recorder: Recorder) -> LineStatistics:
+        """It is told no more; what the line has counted until now."""
+        with self._changed:
+            if self._recorder is recorder:
                 self._recorder = None
-            last = self.statistics
-        for name in LineStatistics.COUNTS:
-            setattr(last, name, getattr(last, name) - getattr(first, name))
-        return last
+            return self.statistics
 
     def _finish_recording(self, reason: str) -> None:
         recorder = self._recorder

@@ -10,10 +10,34 @@ from typing import Any
 from . import discovery
 from .clock import host_now_us
 from .device import Fingertip
-from .errors import BadValueError, NoFingertipError, NoFrameError
+from .errors import BadValueError, InputError, NoFingertipError, NoFrameError
 from .frames import Frame
+from .names import Capability
+from .recording import JointRecordingWriter
+from .wire import LineStatistics, Packet
 
 LATE_us = 250_000  # a fingertip that is later than this is not waited for
+
+
+class _Side:
+    """One fingertip's recorder, which is a part of a joint one."""
+
+    def __init__(self, writer: JointRecordingWriter, number: int, fingertip: Fingertip) -> None:
+        self._writer = writer
+        self._number = number
+        self._fingertip = fingertip
+
+    def packet(self, packet: Packet) -> None:
+        self._writer.packet(self._number, packet, self._fingertip.clock, self._fingertip.clock_jumps)
+
+    def event(self, text: str) -> None:
+        self._writer.event(self._number, text)
+
+    def fail(self, error: InputError) -> None:
+        self._writer.fail(error)
+
+    def close(self, reason: str = "closed") -> None:
+        """The others go on."""
 
 
 class Fingertips:
@@ -66,6 +90,28 @@ class Fingertips:
 
     def close(self) -> None:
         self._stack.close()
+
+    def record(self, path: "str | os.PathLike[str]", replace: bool = False) -> JointRecordingWriter:
+        """Writes everything that they say from now on, on one clock, as `fingertip record --all` does, until the writer is closed.
+        Raises InputError."""
+        fingertips = list(self._opened.values())
+        sides: list[_Side] = []
+        first: list[LineStatistics] = []
+
+        def count() -> list[LineStatistics]:
+            return [tip.detach(side) - before for tip, side, before in zip(fingertips, sides, first)]
+
+        writer = JointRecordingWriter(path, [tip.info for tip in fingertips], replace=replace, count=count,
+                                      raw_expected=all(tip.info.capabilities & Capability.RAW_STREAM for tip in fingertips))
+        try:
+            for number, tip in enumerate(fingertips):
+                sides.append(_Side(writer, number, tip))
+                first.append(tip.attach(sides[-1]))
+        except BadValueError:
+            count()
+            writer.abandon()
+            raise
+        return writer
 
     def latest(self) -> dict[str, Frame]:
         """The newest frame of each, by serial number. Raises GoneError, NoFrameError."""

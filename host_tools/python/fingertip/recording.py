@@ -1,20 +1,24 @@
 """Writes recordings as `fingertip record` does (host_tools/libfingertip/recording.hpp has the format); read_recording reads them."""
 import contextlib
 import datetime
+import heapq
 import math
 import os
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import TracebackType
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
+from .clock import ClockEstimate, host_now_us
 from .errors import InputError
 from .files import CONTACT_COLUMNS, RAW_COLUMNS, TANGENTIAL_COLUMNS
 from .frames import Q10
 from .wire import Acknowledgement, Calibration, Contact, Health, Info, LineStatistics, Packet, PadProfile, Raw
 
+LATE_us = 250_000  # rows wait so long for those of others
+CLOCK_LINES_us = 1e6
 _QUANTITIES = [name for name in (*CONTACT_COLUMNS, *TANGENTIAL_COLUMNS) if name not in ("sequence", "flags")]
 
 
@@ -64,58 +68,19 @@ def info_metadata(info: Info) -> dict[str, str]:
             **(_calibration_metadata(info.calibration) if info.calibration else {}), **(_pad_metadata(info.pad) if info.pad else {})}
 
 
-class RecordingWriter:
-    """A recording of one fingertip, from its packets in the order in which they came.
+class _LineFile:
+    """Whole lines, one at a time. Raises InputError."""
 
-    Lines are written whole. The file is there from the beginning; a recorder that is killed leaves one without an end line, which
-    every reader takes. replace: over a file that exists. raw_expected: a contact waits for the raw packet of its frame. Raises InputError.
-    """
-
-    def __init__(self, path: "str | os.PathLike[str]", info: Info, *, replace: bool = False, raw_expected: bool = True,
-                 extra: Mapping[str, str] | None = None) -> None:
+    def __init__(self, path: "str | os.PathLike[str]", replace: bool) -> None:
         self.path = os.fspath(path)
-        self.frames = 0
-        self._sensors = info.sensors
-        self._raw_expected = raw_expected
-        self._pending: Packet | None = None
-        self._metadata: dict[str, str] = {}
-        self._first_us: int | None = None
-        self._last_us = self._before_us = 0
-        self._on_close: Callable[[], LineStatistics] | None = None
-        self._closed = False
-        self._failure: InputError | None = None
-        self._lock = threading.RLock()
         try:
             self._file = open(self.path, "wb" if replace else "xb", buffering=0)
         except FileExistsError:
             raise InputError(f"{self.path}: exists; give replace=True or another name") from None
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; choose another place") from None
-        try:
-            self._head(info, extra or {})
-        except InputError:
-            self.abandon()
-            raise
-        self._no_contact = [""] * (len(CONTACT_COLUMNS) + len(TANGENTIAL_COLUMNS))
-        self._no_raw = [""] * (len(RAW_COLUMNS) + 2 * self._sensors)
 
-    def _head(self, info: Info, extra: Mapping[str, str]) -> None:
-        started = datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
-        self._line("# fingertip-recording 1")
-        for key, value in {"recorded_by": "fingertip-tactile", "started_utc": started, **extra}.items():
-            self._comment(key, "".join(c if c.isprintable() else "?" for c in value))
-        self._info(info)
-        sensors = range(self._sensors)
-        self._line(",".join(["t_us", "frame", *CONTACT_COLUMNS, *TANGENTIAL_COLUMNS, *RAW_COLUMNS, *(f"s{k}_Pa" for k in sensors),
-                             *(f"tare{k}_Pa" for k in sensors)]))
-
-    def __enter__(self) -> "RecordingWriter":
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.close()
-
-    def _line(self, text: str) -> None:
+    def line(self, text: str) -> None:
         line = text.encode("utf-8") + b"\n"
         try:
             while line:
@@ -123,10 +88,47 @@ class RecordingWriter:
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; the file ends early") from None
 
-    def _comment(self, key: str, value: str) -> None:
-        self._line(f"# {key}: {value}")
+    def close(self) -> None:
+        try:
+            self._file.close()
+        except OSError as error:
+            raise InputError(f"{self.path}: {error.strerror}; the file ends early") from None
 
-    def _info(self, info: Info) -> None:
+
+def _header(sensors: int) -> str:
+    return ",".join(["t_us", "frame", *CONTACT_COLUMNS, *TANGENTIAL_COLUMNS, *RAW_COLUMNS, *(f"s{k}_Pa" for k in range(sensors)),
+                     *(f"tare{k}_Pa" for k in range(sensors))])
+
+
+def _own_keys(extra: Mapping[str, str] | None) -> dict[str, str]:
+    started = datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
+    keys = {"recorded_by": "fingertip-tactile", "started_utc": started, **(extra or {})}
+    return {key: "".join(c if c.isprintable() else "?" for c in value) for key, value in keys.items()}
+
+
+class _PacketLines:
+    """The packets of one fingertip as comments and rows."""
+
+    def __init__(self, path: str, sensors: int, raw_expected: bool, comment: Callable[[str, str], None], row: Callable[[int, str], None]) -> None:
+        self.frames = 0
+        self._path = path
+        self._sensors = sensors
+        self._raw_expected = raw_expected
+        self._comment = comment
+        self._write_row = row
+        self._pending: Packet | None = None
+        self._metadata: dict[str, str] = {}
+        self._first_us: int | None = None
+        self._last_us = self._before_us = 0
+        self._no_contact = [""] * (len(CONTACT_COLUMNS) + len(TANGENTIAL_COLUMNS))
+        self._no_raw = [""] * (len(RAW_COLUMNS) + 2 * sensors)
+
+    @property
+    def seconds(self) -> float:
+        """Device time of all rows, over all runs."""
+        return (self._before_us + (0 if self._first_us is None else self._last_us - self._first_us)) / 1e6
+
+    def info(self, info: Info) -> None:
         now = info_metadata(info)
         for key, value in now.items():
             if self._metadata.get(key) != value:
@@ -138,42 +140,32 @@ class RecordingWriter:
         self._comment("packet", kind + "".join(f" {name}={_cell(value)}" for name, value in pairs.items()))
 
     def packet(self, packet: Packet) -> None:
-        """Of any type; commands are left out."""
         body = packet.body
-        with self._lock:
-            if self._closed:
-                return
-            if isinstance(body, Contact):
-                self._write_pending()
-                if self._raw_expected:
-                    self._pending = packet
-                else:
-                    self._row(packet, None)
-            elif isinstance(body, Raw):
-                if body.sensors != self._sensors:
-                    raise InputError(f"{self.path}: the fingertip now has {body.sensors} sensors instead of {self._sensors}")
-                pending = self._pending
-                if pending and pending.t_us == packet.t_us and isinstance(pending.body, Contact) and pending.body.frame == body.frame:
-                    self._pending = None
-                    self._row(pending, packet)
-                else:
-                    self._write_pending()
-                    self._row(None, packet)
-            elif isinstance(body, (Health, Info, Acknowledgement)):
-                self._write_pending()
-                if isinstance(body, Info):
-                    self._info(body)
-                    self._packet_line("info", packet, {})
-                else:
-                    self._packet_line("ack" if isinstance(body, Acknowledgement) else "health", packet, body._asdict())
+        if isinstance(body, Contact):
+            self.write_pending()
+            if self._raw_expected:
+                self._pending = packet
+            else:
+                self._row(packet, None)
+        elif isinstance(body, Raw):
+            if body.sensors != self._sensors:
+                raise InputError(f"{self._path}: the fingertip now has {body.sensors} sensors instead of {self._sensors}")
+            pending = self._pending
+            if pending and pending.t_us == packet.t_us and isinstance(pending.body, Contact) and pending.body.frame == body.frame:
+                self._pending = None
+                self._row(pending, packet)
+            else:
+                self.write_pending()
+                self._row(None, packet)
+        elif isinstance(body, (Health, Info, Acknowledgement)):
+            self.write_pending()
+            if isinstance(body, Info):
+                self.info(body)
+                self._packet_line("info", packet, {})
+            else:
+                self._packet_line("ack" if isinstance(body, Acknowledgement) else "health", packet, body._asdict())
 
-    def event(self, text: str) -> None:
-        """Something else that happened: "gone", "back"."""
-        with self._lock:
-            self._write_pending()
-            self._comment("event", text)
-
-    def _write_pending(self) -> None:
+    def write_pending(self) -> None:
         if self._pending:
             pending, self._pending = self._pending, None
             self._row(pending, None)
@@ -197,7 +189,7 @@ class RecordingWriter:
             cells += [f"{value / Q10:.4f}" for value in (*read.readings[0::2], *read.readings[1::2])]
         else:
             cells += self._no_raw
-        self._line(f"{t_us},{frame}," + ",".join(cells))
+        self._write_row(t_us, f"{t_us},{frame}," + ",".join(cells))
         self.frames += 1
         if self._first_us is not None and t_us < self._last_us:
             self._before_us += self._last_us - self._first_us
@@ -205,28 +197,42 @@ class RecordingWriter:
         self._first_us = t_us if self._first_us is None else self._first_us
         self._last_us = t_us
 
-    @property
-    def seconds(self) -> float:
-        """Device time of all rows, over all runs."""
-        return (self._before_us + (0 if self._first_us is None else self._last_us - self._first_us)) / 1e6
 
-    def on_close(self, count: Callable[[], LineStatistics]) -> None:
-        """What the line counted, told when the writer is closed."""
-        self._on_close = count
+class Recorder(Protocol):
+    """What a Fingertip tells what it says, from its reading thread."""
 
-    def abandon(self) -> None:
-        """Closes without an end line."""
-        with self._lock:
-            self._closed = True
-            with contextlib.suppress(OSError):
-                self._file.close()
+    def packet(self, packet: Packet) -> None: ...
+
+    def event(self, text: str) -> None: ...
+
+    def fail(self, error: InputError) -> None: ...
+
+    def close(self, reason: str = "closed") -> None: ...
+
+
+class _Writer:
+    """What writers of either format share: a file, its lock, and how it ends."""
+
+    def __init__(self, path: "str | os.PathLike[str]", replace: bool) -> None:
+        self.path = os.fspath(path)
+        self._lock = threading.RLock()
+        self._closed = False
+        self._failure: InputError | None = None
+        self._file = _LineFile(path, replace)
 
     def fail(self, error: InputError) -> None:
         """Closes without an end line; close() will raise this."""
         self._failure = error
         self.abandon()
 
-    def close(self, reason: str = "closed", statistics: LineStatistics | None = None) -> None:
+    def abandon(self) -> None:
+        """Closes without an end line."""
+        with self._lock:
+            self._closed = True
+            with contextlib.suppress(InputError):
+                self._file.close()
+
+    def close(self, reason: str = "closed") -> None:
         """Writes the end line. Does nothing the second time. Raises InputError where the disk was full, then or before."""
         with self._lock:
             failure, self._failure = self._failure, None
@@ -234,12 +240,189 @@ class RecordingWriter:
                 raise failure
             if self._closed:
                 return
-            self._write_pending()
-            if statistics is None:
-                statistics = self._on_close() if self._on_close else LineStatistics()
-            self._line(f"# end: reason={reason} frames={self.frames} seconds={self.seconds:.6f} {statistics.text()}")
+            self._end(reason)
             self._closed = True
-            try:
-                self._file.close()
-            except OSError as error:
-                raise InputError(f"{self.path}: {error.strerror}; the file ends early") from None
+            self._file.close()
+
+    def _end(self, reason: str) -> None:
+        raise NotImplementedError
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+
+class RecordingWriter(_Writer):
+    """A recording of one fingertip, from its packets in the order in which they came.
+
+    Lines are written whole. The file is there from the beginning; a recorder that is killed leaves one without an end line, which
+    every reader takes. replace: over a file that exists. raw_expected: a contact waits for the raw packet of its frame. count: what the
+    line counted, asked for when it ends. Raises InputError.
+    """
+
+    def __init__(self, path: "str | os.PathLike[str]", info: Info, *, replace: bool = False, raw_expected: bool = True,
+                 extra: Mapping[str, str] | None = None, count: Callable[[], LineStatistics] = LineStatistics) -> None:
+        super().__init__(path, replace)
+        self._count = count
+        self._lines = _PacketLines(self.path, info.sensors, raw_expected, self._comment, lambda _, cells: self._file.line(cells))
+        try:
+            self._file.line("# fingertip-recording 1")
+            for key, value in _own_keys(extra).items():
+                self._comment(key, value)
+            self._lines.info(info)
+            self._file.line(_header(info.sensors))
+        except InputError:
+            self.abandon()
+            raise
+
+    def __enter__(self) -> "RecordingWriter":
+        return self
+
+    def _comment(self, key: str, value: str) -> None:
+        self._file.line(f"# {key}: {value}")
+
+    @property
+    def frames(self) -> int:
+        """Rows until now."""
+        return self._lines.frames
+
+    def packet(self, packet: Packet) -> None:
+        """Of any type; commands are left out."""
+        with self._lock:
+            if not self._closed:
+                self._lines.packet(packet)
+
+    def event(self, text: str) -> None:
+        """Something else that happened: "gone", "back"."""
+        with self._lock:
+            if not self._closed:
+                self._lines.write_pending()
+                self._comment("event", text)
+
+    def _end(self, reason: str) -> None:
+        self._lines.write_pending()
+        lines = self._lines
+        self._file.line(f"# end: reason={reason} frames={lines.frames} seconds={lines.seconds:.6f} {self._count().text()}")
+
+
+class _Member:
+    """One fingertip of a joint recording."""
+
+    def __init__(self, number: int, lines: _PacketLines) -> None:
+        self.number = number
+        self.lines = lines
+        self.packet_us = (0, 0.0)  # of the packet under way: device and host
+        self.last_line_us = -math.inf
+        self.clock: ClockEstimate | None = None
+        self.clock_written_us = -math.inf
+        self.jumps = 0
+
+
+class JointRecordingWriter(_Writer):
+    """A recording of several fingertips on the host's clock (format 2).
+
+    Rows of different fingertips are in order of time unless one is more than a quarter of a second late. Raises InputError.
+    """
+
+    def __init__(self, path: "str | os.PathLike[str]", infos: Sequence[Info], *, replace: bool = False, raw_expected: bool = True,
+                 extra: Mapping[str, str] | None = None, count: Callable[[], Sequence[LineStatistics]] | None = None) -> None:
+        if len({info.sensors for info in infos}) != 1:
+            raise InputError(f"{os.fspath(path)}: fingertips with different numbers of sensors do not fit into one file")
+        super().__init__(path, replace)
+        self._count = count
+        self._host_zero_us = host_now_us()
+        self._waiting: list[tuple[float, int, str]] = []
+        self._order = 0
+        self._last_us = float(self._host_zero_us)
+        self._alignment_us = 0.0
+        self._members: list[_Member] = []
+        try:
+            self._file.line("# fingertip-recording 2")
+            self._file.line("# devices: " + " ".join(info.serial for info in infos))
+            self._file.line(f"# host_zero_us: {self._host_zero_us}")
+            for key, value in _own_keys(extra).items():
+                self._file.line(f"# {key}: {value}")
+            for number, info in enumerate(infos):
+                self._members.append(self._member(number, info, raw_expected))
+            self._head_written = True
+            self._file.line("device,time_us," + _header(infos[0].sensors))
+        except InputError:
+            self.abandon()
+            raise
+
+    _head_written = False
+
+    def __enter__(self) -> "JointRecordingWriter":
+        return self
+
+    def _member(self, number: int, info: Info, raw_expected: bool) -> _Member:
+        def comment(key: str, value: str) -> None:
+            text = f"# {number}/{key}: {value}"
+            if self._head_written:
+                self._wait(member, member.packet_us[1], text)
+            else:
+                self._file.line(text)
+
+        def row(t_us: int, cells: str) -> None:
+            device_us, packet_host_us = member.packet_us
+            host_us = packet_host_us + (t_us - device_us)
+            self._wait(member, host_us, f"{number},{self._time(host_us)},{cells}")
+            self._last_us = max(self._last_us, host_us)
+
+        member = _Member(number, _PacketLines(self.path, info.sensors, raw_expected, comment, row))
+        member.lines.info(info)
+        return member
+
+    def _time(self, host_us: float) -> str:
+        return f"{host_us - self._host_zero_us:.1f}"
+
+    def _wait(self, member: _Member, host_us: float, text: str) -> None:
+        """What one fingertip said stays in the order in which it said it."""
+        member.last_line_us = max(member.last_line_us, host_us)
+        self._order += 1
+        heapq.heappush(self._waiting, (member.last_line_us, self._order, text))
+
+    def _settle(self, host_us: float) -> None:
+        while self._waiting and self._waiting[0][0] <= host_us:
+            self._file.line(heapq.heappop(self._waiting)[2])
+
+    def packet(self, number: int, packet: Packet, clock: ClockEstimate, jumps: int) -> None:
+        """Of the fingertip of this number, with its clock at this time."""
+        with self._lock:
+            if self._closed or math.isnan(clock.host_us):
+                return
+            member = self._members[number]
+            member.packet_us = (packet.t_us, clock.host_at(packet.t_us))
+            if clock is not member.clock:
+                self._clock(member, clock, jumps)
+            member.lines.packet(packet)
+            self._settle(host_now_us() - LATE_us)
+
+    def _clock(self, member: _Member, clock: ClockEstimate, jumps: int) -> None:
+        member.clock, member.jumps = clock, jumps
+        bounds = sorted((each.clock.uncertainty_us for each in self._members if each.clock), reverse=True)
+        self._alignment_us = max(self._alignment_us, sum(bounds[:2]))
+        if clock.host_us - member.clock_written_us >= CLOCK_LINES_us:
+            member.clock_written_us = clock.host_us
+            self._wait(member, clock.host_us, f"# {member.number}/clock: t_us={clock.device_us} time_us={self._time(clock.host_us)} "
+                                              f"drift_ppm={clock.drift_ppm:.3f} uncertainty_us={clock.uncertainty_us:.1f}")
+
+    def event(self, number: int, text: str) -> None:
+        with self._lock:
+            if not self._closed:
+                member = self._members[number]
+                member.lines.write_pending()
+                self._wait(member, member.last_line_us, f"# {number}/event: {text}")
+
+    def _end(self, reason: str) -> None:
+        for member in self._members:
+            member.lines.write_pending()
+        self._settle(math.inf)
+        counts = self._count() if self._count else [LineStatistics() for _ in self._members]
+        total = LineStatistics()
+        for member, statistics in zip(self._members, counts):
+            total += statistics
+            clock = f" drift_ppm={member.clock.drift_ppm:.3f} uncertainty_us={member.clock.uncertainty_us:.1f}" if member.clock else ""
+            self._file.line(f"# {member.number}/end: frames={member.lines.frames} jumps={member.jumps}{clock} {statistics.text()}")
+        frames = sum(member.lines.frames for member in self._members)
+        seconds = (self._last_us - self._host_zero_us) / 1e6 if frames else 0
+        self._file.line(f"# end: reason={reason} frames={frames} seconds={seconds:.6f} alignment_us={self._alignment_us:.1f} {total.text()}")

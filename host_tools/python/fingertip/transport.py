@@ -95,6 +95,8 @@ class SerialTransport:
 class SocketTransport:
     """A Unix socket of `fingertip serve`; other programs have theirs at the same time."""
 
+    _socket: socket.socket
+
     def __init__(self, path: str) -> None:
         self.description = path
         if sys.platform == "win32":

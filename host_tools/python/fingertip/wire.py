@@ -561,11 +561,17 @@ class LineStatistics:
         self.bytes = self.packets = self.dropped_packets = self.out_of_order = 0
         self.crc_errors = self.format_errors = self.version_errors = self.unknown_types = 0
 
-    def copy(self) -> "LineStatistics":
-        other = LineStatistics()
+    def __add__(self, other: "LineStatistics") -> "LineStatistics":
+        return self._with(other, 1)
+
+    def __sub__(self, other: "LineStatistics") -> "LineStatistics":
+        return self._with(other, -1)
+
+    def _with(self, other: "LineStatistics", sign: int) -> "LineStatistics":
+        result = LineStatistics()
         for name in self.__slots__:
-            setattr(other, name, getattr(self, name))
-        return other
+            setattr(result, name, getattr(self, name) + sign * getattr(other, name))
+        return result
 
     def text(self) -> str:
         """packets=7 dropped_packets=0 ..."""

@@ -153,11 +153,11 @@ class Codec(Folder):
         for name in set(wire.Contact._fields) - {"frame"}:
             np.testing.assert_array_equal(np.float32(recording[name]), np.float32([getattr(body, name) for body in contacts]), err_msg=name)
         # and what Python writes of it reads as what C++ writes
-        with fingertip.RecordingWriter(self.path("python.csv"), sent[0].body) as writer:
+        with fingertip.RecordingWriter(self.path("python.csv"), sent[0].body, count=lambda: decoder.statistics) as writer:
             for packet in sent:
                 writer.packet(packet)
-            writer.close("eof", decoder.statistics)
         again = fingertip.read_recording(self.path("python.csv"))
+        self.assertEqual({name: again.end[name] for name in COUNTS}, {name: recording.end[name] for name in COUNTS})
         for name, values in recording.columns.items():
             np.testing.assert_array_equal(again[name], values, err_msg=name)
         np.testing.assert_array_equal(again.sensors_Pa, recording.sensors_Pa)
@@ -396,7 +396,7 @@ class Streaming(DeviceTest):
             tip.read_block(20)
             full = open("/dev/full", "wb", buffering=0)
             self.addCleanup(full.close)
-            real, writer._file = writer._file, full
+            real, writer._file._file = writer._file._file, full
             tip.read_block(60)
             real.close()
             self.assertRaisesRegex(fingertip.InputError, "No space left on device; the file ends early", writer.close)
@@ -593,6 +593,30 @@ class Together(DeviceTest):
                 if not jumps:  # late ones apart, which a busy computer makes
                     self.assertLess(np.count_nonzero(np.diff(host_us) < -2 * max(tip.clock.uncertainty_us for tip in both.by_serial.values())), 20)
             self.assertRaisesRegex(fingertip.BadValueError, "named twice", Fingertips, serials=["AAAA", "AAAA"], share=None)
+
+    def test_recorded_on_one_clock(self):
+        other = self.path("tty2")
+        with self.device("serial=AAAA"), self.device("serial=BBBB", "started=1000", "rate=150", port=other):
+            with Fingertips([self.port, other], timeout_s=PATIENCE_s) as both:
+                with both.record(self.path("j.csv")):
+                    self.assertRaises(fingertip.BadValueError, both.by_serial["BBBB"].record, self.path("x.csv"))
+                    frames = [frame for frame, _ in zip(both, range(250))]
+        text = pathlib.Path(self.path("j.csv")).read_text(encoding="utf-8")
+        self.assertRegex(text, r"(?m)^# 1/clock: t_us=\d{10} time_us=")
+        for serial in ("AAAA", "BBBB"):
+            recording = fingertip.read_recording(self.path("j.csv"), device=serial)
+            self.assertEqual((recording.end["dropped_packets"], recording.end["reason"]), ("0", "closed"))
+            done = subprocess.run([FINGERTIP, "replay", self.path("j.csv"), "--device", serial, "--to-csv", self.path(serial)], capture_output=True,
+                                  text=True, timeout=PATIENCE_s)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            alone = fingertip.read_recording(self.path(serial))
+            np.testing.assert_array_equal(alone["x_mm"], recording["x_mm"])
+            self.assertEqual(alone.packets, recording.packets)
+            taken = {frame.frame: frame for frame in frames if frame.serial == serial}
+            rows = [i for i, number in enumerate(recording["frame"]) if number in taken]
+            self.assertGreater(len(rows), 40)
+            zero_us = int(re.search(r"# host_zero_us: (\d+)", text).group(1))
+            np.testing.assert_allclose(recording.time_us[rows] + zero_us, [taken[recording["frame"][i]].host_us for i in rows], atol=2e5)
 
     def test_asyncio(self):
         async def talk():
