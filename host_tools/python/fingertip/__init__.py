@@ -20,10 +20,10 @@ from .group import Fingertips
 from .names import WARNINGS, Capability, Flag, Result, Stored, Streams
 from .recording import JointRecordingWriter, RecordingWriter
 from .version import __version__
-from .wire import Calibration, Health, Info, LineStatistics, PadProfile
+from .wire import Calibration, Crash, Health, Info, LineStatistics, PadProfile
 
 __all__ = [
-    "WARNINGS", "__version__", "AsyncFingertip", "BadValueError", "Block", "Calibration", "Capability", "ClockEstimate", "Fingertip",
+    "WARNINGS", "__version__", "AsyncFingertip", "BadValueError", "Block", "Calibration", "Capability", "ClockEstimate", "Crash", "Fingertip",
     "FingertipError", "Fingertips", "Flag", "Found", "Frame", "GoneError", "Health", "host_now_us", "Info", "InputError", "JointRecordingWriter", "LineStatistics",
     "list_fingertips", "NoAnswerError", "NoFingertipError", "NoFrameError", "NoSuchPortError", "NotAPortError", "NotNowError", "NotSharedError",
     "OtherFingertipError", "OtherVersionError", "PadProfile", "PermissionDeniedError", "PortError", "PortInUseError", "read_recording",

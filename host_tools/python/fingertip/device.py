@@ -17,7 +17,7 @@ from .frames import Block, Frame
 from .names import Capability, Result, Streams
 from .recording import Recorder, RecordingWriter
 from .transport import Transport, open_way
-from .wire import Acknowledgement, Body, Contact, Health, Info, LineStatistics, Raw
+from .wire import Acknowledgement, Body, Contact, Crash, Health, Info, LineStatistics, Raw
 
 ATTEMPTS = 3
 ANSWER_TIMEOUT_s = 1.0
@@ -403,6 +403,12 @@ class Fingertip:
         answer = self._exchange(wire.AskHealth(), Health)
         assert isinstance(answer, Health)
         return answer
+
+    def read_crash(self) -> Crash | None:
+        """How its firmware last came to an end since power-on; nothing: it did not. Firmware of before raises UnknownCommandError."""
+        answer = self._exchange(wire.AskCrash(), Crash)
+        assert isinstance(answer, Crash)
+        return answer if answer.kind else None
 
     # Recording
 

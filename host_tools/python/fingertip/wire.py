@@ -227,6 +227,29 @@ class Acknowledgement(NamedTuple):
     host_time_us: U64
 
 
+class Crash(NamedTuple):
+    """How the firmware last came to an end since power-on; kind 0: it did not. event_ages: in 1024 us; end_us: since the start before it."""
+
+    kind: U8
+    exception: U8
+    vector: U8
+    activity: U8
+    stuck: U8
+    events: Annotated[tuple[int, ...], Wire("B", 8)]
+    event_details: Annotated[tuple[int, ...], Wire("B", 8)]
+    r0: U32
+    r1: U32
+    r2: U32
+    r3: U32
+    r12: U32
+    lr: U32
+    pc: U32
+    xpsr: U32
+    sp: U32
+    event_ages: Annotated[tuple[int, ...], Wire("I", 8)]
+    end_us: U64
+
+
 class SetStreams(NamedTuple):
     streams: U8
 
@@ -290,13 +313,18 @@ class ErasePad(NamedTuple):
     pass
 
 
-Body = (Contact | Raw | Info | Health | Acknowledgement | SetStreams | Tare | SetRate | SetOsr | SetSlip | AskInfo | AskHealth | Loader
-        | StoreCalibration | EraseCalibration | Keep | SetPrior | SetLocationLimit | StorePad | ErasePad)
+class AskCrash(NamedTuple):
+    pass
+
+
+Body = (Contact | Raw | Info | Health | Acknowledgement | Crash | SetStreams | Tare | SetRate | SetOsr | SetSlip | AskInfo | AskHealth | Loader
+        | StoreCalibration | EraseCalibration | Keep | SetPrior | SetLocationLimit | StorePad | ErasePad | AskCrash)
 CONTACT, RAW = 0x01, 0x02
 TYPES: dict[int, type[Body]] = {
-    CONTACT: Contact, RAW: Raw, 0x03: Info, 0x04: Health, 0x05: Acknowledgement,
+    CONTACT: Contact, RAW: Raw, 0x03: Info, 0x04: Health, 0x05: Acknowledgement, 0x06: Crash,
     0x80: SetStreams, 0x81: Tare, 0x82: SetRate, 0x83: SetOsr, 0x84: SetSlip, 0x85: AskInfo, 0x86: AskHealth, 0x87: Loader,
     0x88: StoreCalibration, 0x89: EraseCalibration, 0x8A: Keep, 0x8B: SetPrior, 0x8C: SetLocationLimit, 0x8D: StorePad, 0x8E: ErasePad,
+    0x8F: AskCrash,
 }
 _TYPE_OF: dict[type[Body], int] = {body: number for number, body in TYPES.items()}
 _NESTED: dict[str, Any] = {"Calibration": Calibration, "PadProfile": PadProfile}

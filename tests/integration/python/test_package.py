@@ -116,7 +116,10 @@ class Folder(unittest.TestCase):
 class Codec(Folder):
     def test_vectors(self):
         found = vectors()
-        self.assertEqual({type(wire.decode(each["frame"][:-1]).body) for each in found.values()}, set(wire.TYPES.values()))
+        protocol = (ROOT / "firmware/wire/PROTOCOL.md").read_text(encoding="utf-8")
+        specified = {int(number, 16) for number in re.findall(r"(?m)^(?:### |\| )0x([0-9A-F]{2}) \w", protocol)}
+        self.assertEqual({each["packet"][1] for each in found.values()}, specified)
+        self.assertGreaterEqual(len(specified), 20)
         for name, vector in found.items():
             with self.subTest(name):
                 packet = wire.decode(vector["frame"][:-1])
