@@ -1,4 +1,5 @@
-"""The Python package against the C codec and fake devices: usage test_package.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
+"""The Python package against the C codec, fake devices and the firmware in the simulated cell: usage
+test_package.py FINGERTIP FAKE_DEVICE FINGERTIP_CELL [unittest arguments]."""
 import asyncio
 import contextlib
 import importlib
@@ -20,7 +21,7 @@ from unittest import mock
 
 import numpy as np
 
-FINGERTIP, FAKE_DEVICE = (os.path.abspath(path) for path in sys.argv[1:3])
+FINGERTIP, FAKE_DEVICE, FINGERTIP_CELL = (os.path.abspath(path) for path in sys.argv[1:4])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PACKAGE = ROOT / "host_tools/python"
 sys.path.insert(0, str(PACKAGE))
@@ -647,6 +648,39 @@ class Together(DeviceTest):
             asyncio.run(gone())
 
 
+class Firmware(DeviceTest):
+    """The firmware's own code on two ports, an object and a gripper between them."""
+
+    def test_a_grip_is_felt_and_no_zero(self):
+        cell = self.path("cell")
+        process = subprocess.Popen([FINGERTIP_CELL, cell, "--lift-after", "1000", "--seconds", str(PATIENCE_s)], stdin=subprocess.PIPE,
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            self.wait_for(lambda: os.path.lexists(os.path.join(cell, "gripper")))
+            with Fingertips([os.path.join(cell, side) for side in ("left", "right")], timeout_s=PATIENCE_s) as both:
+                for tip in both.by_serial.values():
+                    tip.tare()
+                    self.wait_for(lambda tip=tip: Flag.TARED in tip.latest().flags)
+                    block = tip.read_block(60)
+                    self.assertTrue(np.isnan(block.force_N).all() and not block.flag(Flag.CONTACT).any())
+                done = subprocess.run([FINGERTIP, "gripper", "move", "30", "--force", "30", "--activate", "--model", "2f85", "--port",
+                                       os.path.join(cell, "gripper")], capture_output=True, text=True, timeout=PATIENCE_s)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.wait_for(lambda: all(frame.force_N > 25 for frame in both.latest().values()))
+                for tip, frame in zip(both.by_serial.values(), both.latest().values()):
+                    self.assertLess(math.hypot(frame.x_mm, frame.y_mm), 3)
+                    self.assertAlmostEqual(frame.force_N, 30, delta=5)
+                    self.assertEqual((frame.trusted, Flag.SATURATED in frame.warnings), (False, True))
+                    self.assertRaises(fingertip.NotNowError, tip.tare)
+                    tip.tare(force=True)
+                    self.assertEqual(tip.read_health().commands_rejected, 1)
+                    self.assertEqual(tip.set(osr=256, slip_window_ms=50).slip_window_ms, 50)
+                    self.assertEqual(tip.statistics.dropped_packets + tip.statistics.crc_errors, 0)
+        finally:
+            process.kill()
+            process.communicate()
+
+
 class Examples(DeviceTest):
     """The code in the manuals runs."""
 
@@ -698,4 +732,4 @@ class WithoutPandas(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1] + sys.argv[3:])
+    unittest.main(argv=sys.argv[:1] + sys.argv[4:])
