@@ -4,7 +4,7 @@ import pathlib
 import subprocess
 import tempfile
 
-from fingertip_files import InputError
+from fingertip.files import InputError
 from tables import table_of_dicts_md
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
