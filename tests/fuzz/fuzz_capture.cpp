@@ -7,10 +7,10 @@ using namespace fingertip;
 
 namespace {
 
-// Without what a recording has elsewhere, or not at all: commands, and raw packets of another
-// number of sensors.
+// Without what a recording has elsewhere, or not at all: commands, raw packets of another number of
+// sensors, and how the firmware last ended, which only who asks is told.
 bool is_recorded(const wire_packet &packet, std::uint8_t sensors) {
-  return packet.type < WIRE_CMD_STREAM &&
+  return packet.type < WIRE_CMD_STREAM && packet.type != WIRE_CRASH &&
          (packet.type != WIRE_RAW || packet.body.raw.sensor_count == sensors);
 }
 
