@@ -8,10 +8,8 @@
  * That costs 5 ms of frames with a data line for each sensor and some 25 ms behind multiplexers, so
  * it takes at most 5 % of the time; while it leaves a sensor out, or is for a suspect, the next one
  * comes after 1, 2, 4 and then 8 s. A sensor that does not answer at all costs no admission. One
- * whose CRC differs costs so many: the bus may have been disturbed.
+ * whose CRC differs costs BRING_UP_RECHECKS: the bus may have been disturbed.
  */
-#define BRING_UP_RECHECKS 3
-
 #ifndef SCAN_BRING_UP_H
 #define SCAN_BRING_UP_H
 
@@ -21,6 +19,8 @@
 
 #include <stdbool.h>
 #include <stdint.h>
+
+#define BRING_UP_RECHECKS 3
 
 struct bring_up {
   uint8_t sensor_count;

@@ -23,10 +23,10 @@ def figures_of(*command):
         return json.loads(result.read_text(encoding="utf-8"))
 
 
-def measure(steps):
-    found = figures_of(ROOT / "tests/checks/analyse.py", "--build", ROOT / "build", "--all")
+def measure(build, steps):
+    found = figures_of(ROOT / "tests/checks/analyse.py", "--build", build.parent, "--all")
     steps.say(f"analysis of {found['analyzed_files']} files")
-    found.update(figures_of(ROOT / "tests/mutation/mutation.py", "--build", ROOT / "build/host", "--count", COUNT, "--seed", SEED))
+    found.update(figures_of(ROOT / "tests/mutation/mutation.py", "--build", build, "--count", COUNT, "--seed", SEED))
     steps.say(f"{found['mutants']} mutants")
     return found
 

@@ -13,11 +13,11 @@ SEED = 1
 GOALS = (("fuzz_bytes", ">=", 1e9), ("crashes", "<=", 0), ("sanitizer_findings", "<=", 0))
 
 
-def measure(steps):
+def measure(build, steps):
     """Findings do not end it: they are figures, and told."""
     with tempfile.TemporaryDirectory(prefix="fingertip-") as folder:
         result = pathlib.Path(folder) / "fuzz.json"
-        done = subprocess.run(["/usr/bin/python3", ROOT / "tests/fuzz/fuzz.py", "--build", ROOT / "build/fuzz", "--seconds", str(SECONDS),
+        done = subprocess.run(["/usr/bin/python3", ROOT / "tests/fuzz/fuzz.py", "--build", build.parent / "fuzz", "--seconds", str(SECONDS),
                                "--seed", str(SEED), "--json", result], check=False)
         if not result.exists():
             raise InputError(f"the fuzz targets did not run (status {done.returncode}), see above")

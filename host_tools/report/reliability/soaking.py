@@ -20,13 +20,13 @@ GOALS = (("soak_hours_emulated", ">=", EMULATED_h), ("soak_hours_native", ">=", 
          ("power_cuts_wrong_values", "<=", 0))
 
 
-def power_cuts(steps):
-    program = ROOT / "build/host/tests/soak/fingertip_soak"
+def power_cuts(build, steps):
+    program = build / "tests/soak/fingertip_soak"
 
     def one(board, kind):
-        image = ROOT / f"build/{board}/fingertip-{board}.bin"
+        image = build.parent / f"{board}/fingertip-{board}.bin"
         return json.loads(run("node", SOAK / "power_cuts.mjs", "--image", image, "--board", board, "--soak", program, "--fingertip",
-                              ROOT / "build/host/host_tools/cli/fingertip", "--step-us", STEP_us, "--kinds", kind))[kind]
+                              build / "host_tools/cli/fingertip", "--step-us", STEP_us, "--kinds", kind))[kind]
 
     found = steps.run_all({(board, kind): (f"power cuts of {board}: {kind}", lambda b=board, k=kind: one(b, k)) for board in BOARDS for kind in CUTS},
                           os.cpu_count() or 1)
@@ -36,17 +36,17 @@ def power_cuts(steps):
             "power_cut_findings": [what for one_of in found.values() for what in one_of["what"]]}
 
 
-def measure(steps):
+def measure(build, steps):
     """Findings do not end it: they are figures, and told."""
     with tempfile.TemporaryDirectory(prefix="fingertip-") as folder:
         result = pathlib.Path(folder) / "soak.json"
-        done = subprocess.run(["/usr/bin/python3", SOAK / "soak.py", "--build", ROOT / "build/host", "--boards", ROOT / "build", "--least", str(EMULATED_h),
+        done = subprocess.run(["/usr/bin/python3", SOAK / "soak.py", "--build", build, "--boards", build.parent, "--least", str(EMULATED_h),
                                str(NATIVE_h), "--json", result], check=False)
         if not result.exists():
             raise InputError(f"the soak did not run (status {done.returncode}), see above")
         found = json.loads(result.read_text(encoding="utf-8"))
     steps.say(f"{found['soak_hours_emulated']:.2f} h emulated and {found['soak_hours_native']:.2f} h native")
-    return {**{("soak_findings" if name == "findings" else name): value for name, value in found.items()}, **power_cuts(steps)}
+    return {**{("soak_findings" if name == "findings" else name): value for name, value in found.items()}, **power_cuts(build, steps)}
 
 
 def told(lines):

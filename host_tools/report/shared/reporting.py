@@ -11,7 +11,7 @@ import time
 
 import page
 from fingertip.files import InputError, check_output, write_text
-from goals import missed, print_goals
+from goals import goal_table_md, judge, missed, print_goals
 
 
 def option_parser(description):
@@ -95,3 +95,17 @@ def finish(found, options, files):
     print(f"report: {', '.join(str(out / name) for name in files)}")
     print(f"page: {page.write(out)}")
     return 1 if options.check and missed(found) else 0
+
+
+def report_of_parts(argv, description, name, parts):
+    """A report of parts, each a module: GOALS, measure(build, steps) -> figures by name, text(figures) -> lines of Markdown. Writes
+    name.json and name.md. Exit status."""
+    options = option_parser(description).parse_args(argv)
+    out, steps, found = output_folder(options), Steps(), {}
+    for part in parts:
+        found.update(part.measure(pathlib.Path(options.build).resolve(), steps))
+    found = judge(found, tuple(goal for part in parts for goal in part.GOALS))
+    write_json(out / f"{name}.json", found)
+    lines = [f"# {name.capitalize()}", "", "Written by `sh cmake/bootstrap.sh report`.", "", *goal_table_md(found), ""]
+    write_text(out / f"{name}.md", "\n".join(lines + [line for part in parts for line in part.text(found)]))
+    return finish(found, options, (f"{name}.json", f"{name}.md"))

@@ -481,7 +481,7 @@ class Commands(DeviceTest):
     def test_set_tare_and_health(self):
         with self.device(f"tared={self.path('tared')}"), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
             tip.tare()
-            self.assertTrue(os.path.exists(self.path("tared")))
+            self.wait_for(lambda: os.path.exists(self.path("tared")))  # the device answers before it tares
             info = tip.set(rate_Hz=400, osr=256, slip_threshold_mm=0.25, prior_sigma_mm=3, location_limit_mm=0.5, keep=True)
             self.assertEqual((info.rate_mHz, info.osr, info.slip_threshold_mm, info.prior_sigma_mm, info.prior_width_mm, info.location_limit_mm),
                              (400000, 256, 0.25, 3.0, 0.5, 0.5))
