@@ -15,7 +15,7 @@ namespace fingertip {
 
 namespace {
 
-constexpr std::chrono::milliseconds POLL{20};
+constexpr std::chrono::milliseconds DEVICE_POLL{20};
 constexpr std::int64_t PATIENCE_us = 5000000; /* without a frame */
 
 } // namespace
@@ -85,7 +85,7 @@ void CalibratedDevice::follow(std::uint8_t streams, std::uint8_t of_frames,
     if (stop_requested()) {
       throw Interrupted();
     }
-    if (session_.poll(POLL) == Transport::Result::gone) {
+    if (session_.poll(DEVICE_POLL) == Transport::Result::gone) {
       throw Error(name() + ": vanished; nothing was written, plug it in and try again");
     }
     if (steady_now_us() - last_frame_us > PATIENCE_us) {

@@ -47,9 +47,9 @@ double sd_without_scale_N(const wire_contact &contact, const pad_profile &pad) {
   return std::sqrt(std::max(0.0, sd_N * sd_N - of_scale_N * of_scale_N));
 }
 
-class Work {
+class PullWork {
 public:
-  Work(const wire_info &info, double known_N)
+  PullWork(const wire_info &info, double known_N)
       : pad_(info.pad), known_N_(known_N), finder_(known_N) {
     judge(false);
   }
@@ -123,7 +123,7 @@ private:
   PullJudgement judgement_;
 };
 
-void work_live(CalibratedDevice &device, Work &work) {
+void pull_live(CalibratedDevice &device, PullWork &work) {
   std::string said;
   const auto say = [&] {
     if (work.advice() != said) {
@@ -144,9 +144,9 @@ void work_live(CalibratedDevice &device, Work &work) {
                 [&] { return work.judgement().state == PullJudgement::State::more; });
 }
 
-Work work_from(const CalibrateOptions &options, wire_info &info) {
+PullWork pull_work_from(const CalibrateOptions &options, wire_info &info) {
   RecordingReader reader(options.from, false, options.choice.device);
-  std::optional<Work> work;
+  std::optional<PullWork> work;
   std::string weak;
   while (auto item = reader.next()) {
     if (item->kind != RecordingReader::Item::Kind::packet) {
@@ -198,7 +198,7 @@ pad_profile scaled(pad_profile pad, float present_scale, const PullJudgement &ju
   return pad;
 }
 
-void print_result(const Work &work, const pad_profile &before, const pad_profile &after,
+void print_result(const PullWork &work, const pad_profile &before, const pad_profile &after,
                   bool has_force_scale) {
   std::printf("%s, from %zu of %zu pulls\n", work.judgement().text.c_str(), work.judgement().kept,
               work.pulls().size());
@@ -218,7 +218,7 @@ void print_result(const Work &work, const pad_profile &before, const pad_profile
 
 int calibrate_drag(const CalibrateOptions &options) {
   std::optional<CalibratedDevice> device;
-  std::optional<Work> work;
+  std::optional<PullWork> work;
   wire_info info{};
   if (options.from.empty()) {
     device.emplace(options);
@@ -226,9 +226,9 @@ int calibrate_drag(const CalibrateOptions &options) {
     check_pad(info, device->name());
     device->check_sensors();
     work.emplace(info, *options.force_N);
-    work_live(*device, *work);
+    pull_live(*device, *work);
   } else {
-    work.emplace(work_from(options, info));
+    work.emplace(pull_work_from(options, info));
   }
   if (work->judgement().state != PullJudgement::State::good) {
     throw Error("not calibrated: " + work->judgement().text);

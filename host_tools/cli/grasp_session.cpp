@@ -29,7 +29,7 @@ using std::chrono::milliseconds;
 
 constexpr std::size_t FINGERS = GraspLoop::FINGERS;
 constexpr const char *SIDES[FINGERS] = {"left", "right"};
-constexpr milliseconds POLL{20};
+constexpr milliseconds NEWS_POLL{20};
 /* As live.cpp has them. */
 constexpr double SETTLE_us = 250e3;
 constexpr milliseconds SAID_FOR{5000};
@@ -197,7 +197,7 @@ private:
   bool take_news() {
     double settled_us = std::min(static_cast<double>(steady_now_us()), loop_.read_until_us());
     bool ended = false;
-    for (GraspNews &news : loop_.take(POLL)) {
+    for (GraspNews &news : loop_.take(NEWS_POLL)) {
       switch (news.kind) {
       case GraspNews::Kind::device:
         take_device(*news.device);

@@ -11,7 +11,7 @@ namespace fingertip {
 namespace {
 
 constexpr double INTERVAL_s = Model::SAMPLE_INTERVAL_us / 1e6;
-constexpr float RIM_mm = 6.0f; /* beyond the outermost sensors, as the pad is drawn */
+constexpr float AXIS_RIM_mm = 6.0f; /* beyond the outermost sensors, as the pad is drawn */
 
 /* A doubtful force above this is none: the pads are made for less. */
 constexpr float MOST_N = 50;
@@ -54,12 +54,12 @@ void draw_traces(Canvas &canvas, const Area &area, const Model &model) {
   }
   float force_N = 1, pull_N = LEAST_PULL_N, slip_mm = 0.1f;
   float threshold_mm = model.info() ? model.info()->slip_threshold_mm : 0;
-  float x_mm = RIM_mm, y_mm = RIM_mm;
+  float x_mm = AXIS_RIM_mm, y_mm = AXIS_RIM_mm;
   if (model.info()) {
     slip_mm = std::max(slip_mm, 1.2f * threshold_mm);
     for (int k = 0; k < model.info()->sensor_count; k++) {
-      x_mm = std::max(x_mm, RIM_mm + std::abs(model.info()->x_mm[k]));
-      y_mm = std::max(y_mm, RIM_mm + std::abs(model.info()->y_mm[k]));
+      x_mm = std::max(x_mm, AXIS_RIM_mm + std::abs(model.info()->x_mm[k]));
+      y_mm = std::max(y_mm, AXIS_RIM_mm + std::abs(model.info()->y_mm[k]));
     }
   }
   float doubtful_N = force_N;
