@@ -7,7 +7,7 @@ cd "$root"
 
 usage() {
   echo "usage: sh cmake/bootstrap.sh demo|test|report|fuzz HOURS|soak HOURS" >&2
-  echo "  demo    build everything, let a lime slip on two emulated fingertips, catch what slips in a simulated gripper, say and draw both" >&2
+  echo "  demo    build what it needs, let a lime slip on two emulated fingertips, catch what slips in a simulated gripper, say and draw both" >&2
   echo "  test    build everything and run the whole test suite" >&2
   echo "  report  build everything, measure fit, rate, cost, truth, tangential load and grasps, repeat the published experiments in simulation, write build/report" >&2
   echo "  fuzz    build the fuzz targets and run them for so many hours; what they find is kept in build/fuzz/findings" >&2
@@ -34,30 +34,32 @@ pkg-config pkg-config
 node nodejs
 npm npm
 python3 python3
-xz xz-utils
 arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/lib/arm-none-eabi/newlib/nano.specs libnewlib-arm-none-eabi
+/usr/include/fftw3.h libfftw3-dev
+/usr/include/libusb-1.0/libusb.h libusb-1.0-0-dev
+/usr/include/modbus/modbus.h libmodbus-dev
+/usr/include/CLI/CLI.hpp libcli11-dev
+/usr/include/eigen3/Eigen/Dense libeigen3-dev
+/usr/include/nlohmann/json.hpp nlohmann-json3-dev
+/usr/lib/python3/dist-packages/numpy/__init__.py python3-numpy
+/usr/lib/python3/dist-packages/matplotlib/__init__.py python3-matplotlib
+/usr/lib/python3/dist-packages/serial/__init__.py python3-serial
+LIST
+  [ "$1" = demo ] || cat << 'LIST'
+xz xz-utils
 qemu-system-arm qemu-system-arm
 qemu-system-x86_64 qemu-system-x86
 /bin/busybox busybox-static
 lsusb usbutils
 sigrok-cli sigrok-cli
 /usr/include/ceres/ceres.h libceres-dev
-/usr/include/fftw3.h libfftw3-dev
 /usr/include/gsl/gsl_multifit_nlinear.h libgsl-dev
 /usr/include/cminpack-1/cminpack.h libcminpack-dev
 /usr/include/gtest/gtest.h libgtest-dev
-/usr/include/libusb-1.0/libusb.h libusb-1.0-0-dev
-/usr/include/modbus/modbus.h libmodbus-dev
-/usr/include/CLI/CLI.hpp libcli11-dev
-/usr/include/eigen3/Eigen/Dense libeigen3-dev
-/usr/include/nlohmann/json.hpp nlohmann-json3-dev
 /usr/share/doc/python3-venv python3-venv
-/usr/lib/python3/dist-packages/numpy/__init__.py python3-numpy
-/usr/lib/python3/dist-packages/matplotlib/__init__.py python3-matplotlib
 /usr/lib/python3/dist-packages/markdown/__init__.py python3-markdown
 /usr/lib/python3/dist-packages/pyte/__init__.py python3-pyte
-/usr/lib/python3/dist-packages/serial/__init__.py python3-serial
 LIST
   [ "$1" = demo ] || [ "$1" = soak ] || cat << 'LIST'
 clang-14 clang-14
@@ -134,10 +136,19 @@ if [ "$1" = fuzz ]; then
 fi
 say "building firmware and host tools into build/"
 case $1 in
-  demo | soak) configure host ;;
-  *) configure host -DFINGERTIP_FUZZ=ON ;;
+  demo)
+    configure host -DBUILD_TESTING=OFF
+    cmake --build --preset host --target fingertip twin fingertip_cell_program image_pico_parallel
+    ;;
+  soak)
+    configure host -DBUILD_TESTING=ON
+    cmake --build --preset host
+    ;;
+  *)
+    configure host -DBUILD_TESTING=ON -DFINGERTIP_FUZZ=ON
+    cmake --build --preset host
+    ;;
 esac
-cmake --build --preset host
 
 case $1 in
   demo)

@@ -89,6 +89,8 @@ option(FINGERTIP_READ_STOPS "pico_parallel: STOP and START before an answer, not
 set(FINGERTIP_USB_VID 0x1209 CACHE STRING "USB vendor id")
 set(FINGERTIP_USB_PID 0x0001 CACHE STRING "USB product id")
 
+option(BUILD_TESTING "On the host: build the tests, the reference fit and the reports too" ON)
+
 option(FINGERTIP_SANITIZE "Build for the host with the address and undefined-behaviour sanitizers" OFF)
 
 option(FINGERTIP_FUZZ "Build the fuzz targets by clang into build/fuzz, and run them as tests" OFF)
