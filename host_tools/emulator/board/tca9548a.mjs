@@ -7,6 +7,8 @@
  */
 import { I2cTarget } from './i2c_bus.mjs';
 
+const NONE = Object.freeze([]);
+
 export class Tca9548a extends I2cTarget {
   constructor(address, index) {
     super(address);
@@ -19,16 +21,24 @@ export class Tca9548a extends I2cTarget {
     this.stuck = false;
     /** Fault: answers nothing and connects nothing. */
     this.dead = false;
+    /** What each control byte connects, as far as it was asked for. */
+    this.connectedBy = new Map();
     this.onReset = () => {};
   }
 
   connect(channel, target) {
     this.channels[channel].push(target);
+    this.connectedBy.clear();
   }
 
   get connected() {
-    if (this.inReset || this.dead) return [];
-    return this.channels.flatMap((targets, channel) => ((this.control >> channel) & 1 ? targets : []));
+    if (this.inReset || this.dead) return NONE;
+    let connected = this.connectedBy.get(this.control);
+    if (!connected) {
+      connected = this.channels.flatMap((targets, channel) => ((this.control >> channel) & 1 ? targets : []));
+      this.connectedBy.set(this.control, connected);
+    }
+    return connected;
   }
 
   get holdsSda() {

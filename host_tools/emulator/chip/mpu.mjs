@@ -17,16 +17,11 @@ export class Mpu {
     this.ctrl = 0;
     this.number = 0;
     this.regions = Array.from({ length: 8 }, () => ({ base: 0, attributes: 0 }));
-  }
-
-  /** [first address, bytes] of what the processor may not touch. */
-  get denied() {
-    if (!(this.ctrl & CTRL_ENABLE)) return [];
-    return this.regions.filter((r) => r.attributes & 1).map((r) => [r.base, 2 ** (((r.attributes >>> 1) & 31) + 1)]);
+    /** [first address, bytes] of what the processor may not touch. */
+    this.denied = [];
   }
 
   denies(address) {
-    if (!(this.ctrl & CTRL_ENABLE)) return false;
     return this.denied.some(([first, bytes]) => address >= first && address - first < bytes);
   }
 
@@ -49,6 +44,8 @@ export class Mpu {
       if (value & 1 && this.regions[this.number].base % size) this.chip.fail('MPU', 'the base of a region is not aligned to its size');
       this.regions[this.number].attributes = value >>> 0;
     }
+    this.denied = this.ctrl & CTRL_ENABLE
+      ? this.regions.filter((r) => r.attributes & 1).map((r) => [r.base, 2 ** (((r.attributes >>> 1) & 31) + 1)]) : [];
     this.onChange();
   }
 }
