@@ -15,11 +15,12 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 import analysis  # noqa: E402
 import fuzzing  # noqa: E402
+import same_bits  # noqa: E402
 import soaking  # noqa: E402
 from fingertip.files import run_tool  # noqa: E402
 from reporting import report_of_parts  # noqa: E402
 
-PARTS = (fuzzing, soaking, analysis)
+PARTS = (same_bits, fuzzing, soaking, analysis)
 
 
 def main(argv):
