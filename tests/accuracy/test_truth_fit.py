@@ -45,10 +45,10 @@ class TruthFit(unittest.TestCase):
         self.assertLess(rows["noise only"]["error_p50_mm"], 0.01)
 
     def test_the_same_seed_gives_the_same(self):
-        self.assertEqual(run(*self.options).stdout, self.text)
+        self.assertEqual(run("--pads", "15", "--seed", "3").stdout, run("--pads", "15", "--seed", "3").stdout)
 
     def test_another_seed_gives_another(self):
-        self.assertNotEqual(run("--pads", "150", "--seed", "4").stdout, self.text)
+        self.assertNotEqual(run("--pads", "15", "--seed", "4").stdout, run("--pads", "15", "--seed", "3").stdout)
 
     def test_wrong_usage_is_one_line(self):
         for options in (("--pads", "0"), ("--pads", "x"), ("--what", "1")):

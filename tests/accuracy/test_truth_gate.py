@@ -46,9 +46,9 @@ def write_recording(path, sigma_mm, stays_Pa=0, seed=1):
     path.write_text("Sensor_0,Sensor_1,Sensor_2,Sensor_3,x,z,time\n" + "\n".join(rows) + "\n")
 
 
-def judged(*more):
+def judged(pads, *more):
     environment = {name: value for name, value in os.environ.items() if name != "FINGERTIP_RECORDINGS"}
-    done = subprocess.run([PROGRAM, "--pads", "1", *map(str, more)], capture_output=True, text=True, env=environment)
+    done = subprocess.run([PROGRAM, "--pads", pads, *map(str, more)], capture_output=True, text=True, env=environment)
     if done.returncode != 0:
         raise AssertionError(done.stderr)
     return json.loads(done.stdout)
@@ -63,7 +63,7 @@ class TruthGate(unittest.TestCase):
         write_recording(folder / "test_good.csv", 2.4)
         write_recording(folder / "other.csv", 2.1, seed=2)
         write_recording(folder / "stays.csv", 2.2, stays_Pa=3000, seed=3)
-        cls.found = judged("--recordings", folder)
+        cls.found = judged("1", "--recordings", folder)
         cls.strips = {}
         for strip in cls.found["strips"]:
             cls.strips.setdefault(strip["name"], []).append(strip)
@@ -104,14 +104,13 @@ class TruthGate(unittest.TestCase):
 
     def test_nothing_is_said_of_recordings_that_are_not_there(self):
         with tempfile.TemporaryDirectory() as folder:
-            found = judged("--recordings", folder)
+            found = judged("0", "--recordings", folder)
         for name in REAL:
             self.assertIsNone(found[name], name)
-        for name in GOALS:
-            self.assertEqual(found[name], self.found[name], name)
+        self.assertFalse(GOALS.keys() & found.keys())
 
     def test_wrong_words_are_named(self):
-        for words, what in ((("--pads", "0"), "--pads"), (("--recordings", "/nowhere"), "/nowhere"), (("--other", "1"), "--other")):
+        for words, what in ((("--pads", "x"), "--pads"), (("--recordings", "/nowhere"), "/nowhere"), (("--other", "1"), "--other")):
             done = subprocess.run([PROGRAM, *words], capture_output=True, text=True)
             self.assertEqual(done.returncode, 1)
             self.assertIn(what, done.stderr)

@@ -10,7 +10,7 @@
 #include <unity.h>
 
 /* PROFILE_BYTES: without the struct's padding. */
-enum { SENSORS = 15, UPDATES = 10000, PROFILE_BYTES = 4 * PAD_PROFILE_FLOATS + 1 };
+enum { SENSORS = 15, UPDATES = 2000, PROFILE_BYTES = 4 * PAD_PROFILE_FLOATS + 1 };
 
 static struct store store;
 static struct random random;

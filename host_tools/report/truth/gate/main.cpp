@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -31,7 +32,8 @@ using nlohmann::ordered_json;
 constexpr char HELP[] =
     "usage: truth_gate [--seed S] [--pads N] [--recordings DIR]\n"
     "  --seed S          of pads and places, 20230706 by default\n"
-    "  --pads N          pads of each case, 8 by default; with 1 only OSR 8192\n"
+    "  --pads N          pads of each case, 8 by default; with 1 only OSR 8192,\n"
+    "                    with 0 the recordings alone\n"
     "  --recordings DIR  folder of the strips' recordings, *.csv; the environment's\n"
     "                    FINGERTIP_RECORDINGS by default\n";
 
@@ -398,11 +400,13 @@ struct Judge {
   }
 
   int operator()() {
-    judge_slow_forces();
-    judge_rest();
-    judge_recovery();
-    judge_stand_offs();
-    judge_left_forces();
+    if (options.pads > 0) {
+      judge_slow_forces();
+      judge_rest();
+      judge_recovery();
+      judge_stand_offs();
+      judge_left_forces();
+    }
     judge_strips();
     std::cout << out.dump(1) << '\n';
     std::cout.flush();
@@ -423,8 +427,8 @@ int main(int argc, char **argv) {
                               {"--seed", nullptr, &options.seed},
                               {"--pads", nullptr, &options.pads}},
                              HELP);
-    if (options.pads == 0) {
-      throw std::runtime_error("--pads needs at least one pad");
+    if (!options.recordings.empty() && !std::filesystem::is_directory(options.recordings)) {
+      throw std::runtime_error(options.recordings + " is no folder");
     }
     Judge judge{options, modes(), {}};
     if (options.pads == 1) { // a quick look
