@@ -334,6 +334,10 @@ private:
     const double since_s = lift_s_ < NEVER_s ? since_lift_s(t_s_) : -1.0;
     if (since_s >= trial_.scene.lift_s) {
       margins_.push_back(cell_.force_N() / trial_.scene.least_N(since_s));
+      if (force_N() > LOST_N) {
+        told_.push_back(felt_N / force_N());
+        taken_.push_back(1e-3 * report_.force_mN / force_N());
+      }
     }
     if (trace_) {
       const twin::Touch one = cell_.touch(0), other = cell_.touch(1);
@@ -368,6 +372,8 @@ private:
     outcome_.turned_rad = cell_.turned_rad();
     outcome_.disturbance_slip_mm = outcome_.slid_mm - outcome_.lift_slip_mm;
     outcome_.margin = median(margins_);
+    outcome_.force_told = median(told_);
+    outcome_.force_taken = median(taken_);
     outcome_.holding_s = held_s_ < NEVER_s && touched_s_ < NEVER_s ? held_s_ - touched_s_ : 0.0;
     outcome_.slips = slips_.slips;
     if (trial_.still_s > 0.0) {
@@ -390,7 +396,7 @@ private:
   Slips slips_;
   SetPoint set_point_;
   Faults faults_;
-  std::vector<double> margins_;
+  std::vector<double> margins_, told_, taken_;
   bool over_ = false, is_between_ = false, is_taken_ = false, has_asked_ = false;
   double began_mm_ = 0.0, stepped_s_ = 0.0, answered_s_ = 0.0;
   double slick_s_ = NEVER_s, slick_share_ = 1.0;

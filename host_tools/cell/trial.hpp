@@ -97,7 +97,9 @@ struct Outcome {
   bool dropped = false, never_held = false, crushed = false;
   double slid_mm = 0.0, turned_rad = 0.0, peak_N = 0.0;
   double lift_slip_mm = 0.0, disturbance_slip_mm = 0.0; // until the lift is over; after it
-  double margin = 0.0;     // median of force over least force from the lift's end on
+  // Medians from the lift's end on: force over least force; over the true force what the fingertips
+  // tell, and what the controller takes it for.
+  double margin = 0.0, force_told = 0.0, force_taken = 0.0;
   double holding_s = 0.0;  // from the first touch to the controller's HOLDING
   std::vector<Slip> slips; // since the lift began
   // Of a still trial.

@@ -11,8 +11,8 @@ from tables import table_md, text_of
 COLOURS = {"2f85": ORANGE, "sts3215": BLUE, "ideal": GOAL}
 # key: what its column is called
 COLUMNS = {"gripper": "gripper", "about": "what", "object": "object", "friction": "friction", "mass": "mass", "disturbance": "disturbance", "grasps": "grasps",
-           "drops_percent": "dropped, %", "margin_p50": "grip over least grip: p50", "margin_p5": "p5", "margin_p95": "p95", "slips": "slips",
-           "unanswered": "never answered", "reaction_p50_ms": "slip to 5 % more grip, ms: p50", "reaction_p95_ms": "p95 ",
+           "drops_percent": "dropped, %", "margin_p50": "grip over least grip: p50", "margin_p5": "p5", "margin_p95": "p95",
+           "force_told_p50": "force told over true", "force_taken_p50": "taken for over true", "slips": "slips", "unanswered": "never answered", "reaction_p50_ms": "slip to 5 % more grip, ms: p50", "reaction_p95_ms": "p95 ",
            "reaction_after_lift_p50_ms": "after the lift: p50", "slid_p95_mm": "slid, mm: p95", "disturbance_slip_p95_mm": "by disturbances: p95",
            "peak_p95_N": "largest grip, N: p95"}
 STILL = {"gripper": "gripper", "about": "what", "grasps": "grasps", "settle_p50_s": "settles within, s: p50", "settle_p95_s": "p95",
@@ -25,7 +25,8 @@ Each grasp: an object of 0.1 to 1 kg with a friction of 0.25 to 1 stands on a ta
 two of: 30 to 150 % more mass is poured in, the hand jerks by 2 to 9 m/s2, a knock of 0.03 to 0.12 m/s, friction falls by 20 to 45 %. What would take more than
 15 N to hold at its worst is not drawn. The rubber relaxes by 9 to 26 % in 8 s, each fingertip's force is off by 5 % (sd), gains are those after a
 calibration. Dropped: slid by 22 mm, or lost. Least grip: load / (2 friction), without
-what a turning object takes of the friction. A slip: all of both contacts slides, 0.3 mm or more. Settled: within 10 % for
+what a turning object takes of the friction. Force told: the mean of what both fingertips say; taken for: what the controller reckons with, the smaller
+of both and of flats what lies on the pad. A slip: all of both contacts slides, 0.3 mm or more. Settled: within 10 % for
 0.5 s, by what the fingertips say. A limit cycle: the commanded width turns four times or more in the last half of a hold."""
 PARTS = {"by_object": "By object", "by_friction": "By friction", "by_mass": "By mass", "by_disturbance": "By disturbance"}
 

@@ -33,7 +33,7 @@ ordered_json percent(std::size_t part, std::size_t whole) {
 
 ordered_json summary(const std::vector<const Done *> &all, bool still) {
   std::size_t drops = 0, never = 0, unanswered = 0, cycles = 0, unsettled = 0;
-  std::vector<double> margin, reaction_ms, later_ms, slid_mm, disturbed_mm, peak_N, holding_s,
+  std::vector<double> margin, told, taken, reaction_ms, later_ms, slid_mm, disturbed_mm, peak_N, holding_s,
       settle_s, rms, rms_of_steps;
   for (const Done *one : all) {
     const Outcome &o = one->outcome;
@@ -61,6 +61,8 @@ ordered_json summary(const std::vector<const Done *> &all, bool still) {
     }
     if (o.held) {
       margin.push_back(o.margin);
+      told.push_back(o.force_told);
+      taken.push_back(o.force_taken);
       slid_mm.push_back(o.slid_mm);
       if (!one->scene.disturbances.empty()) {
         disturbed_mm.push_back(o.disturbance_slip_mm);
@@ -85,6 +87,8 @@ ordered_json summary(const std::vector<const Done *> &all, bool still) {
   out["margin_p50"] = quantile(margin, 0.5);
   out["margin_p5"] = quantile(margin, 0.05);
   out["margin_p95"] = quantile(margin, 0.95);
+  out["force_told_p50"] = quantile(told, 0.5);
+  out["force_taken_p50"] = quantile(taken, 0.5);
   out["slips"] = reaction_ms.size();
   out["unanswered"] = unanswered;
   out["reaction_p50_ms"] = quantile(reaction_ms, 0.5);

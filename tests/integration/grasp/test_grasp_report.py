@@ -16,7 +16,7 @@ row = {"gripper": options["--gripper"], "grasps": int(options.get("--count", 1))
 if still:
     row |= {"settle_p50_s": 0.4, "settle_p95_s": 1.0, "never_settled_percent": 0.0, "rms_p50_percent": 1.0, "limit_cycles": 1}
 else:
-    row |= {"drops_percent": 4.0 if options.get("--effect") == "0" else 0.5, "margin_p50": 2.0, "margin_p5": 1.2, "margin_p95": 3.0, "slips": 2, "unanswered": 1,
+    row |= {"drops_percent": 4.0 if options.get("--effect") == "0" else 0.5, "margin_p50": 2.0, "margin_p5": 1.2, "margin_p95": 3.0, "force_told_p50": 1.0, "force_taken_p50": 0.95, "slips": 2, "unanswered": 1,
             "reaction_p50_ms": 30.0, "reaction_p95_ms": None, "disturbance_slip_p95_mm": 1.0}
 group = {"sphere15": dict(row)}
 grasp = {"n": 7, "face": "sphere15", "mass_kg": 0.3, "friction": 0.5, "lift_s": 0.2, "disturbances": ["jerk"], "dropped": False, "margin": 2.0, "slid_mm": 2.0,
