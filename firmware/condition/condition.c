@@ -39,6 +39,9 @@
 #define CREEPING_SHIFT 4
 #define CREEPING_ms SECONDS(1)
 #define CREPT_MAX_Pa 2500
+/* A contact so many times what its zeros have taken lately is off by a fifth at most. At 5 a hold
+ * of the real strips is in doubt. */
+#define TAKEN_FACTOR 4
 #define WARM_ms SECONDS(8)
 #define WARM_SHIFT 3 /* share of what may have moved that does in a second */
 #define MEMORY_ms SECONDS(CONDITION_MEMORY_s)
@@ -386,6 +389,19 @@ static void look_how_firm(struct condition *condition, const struct conditioned 
           conditioned->pressure_Pa_q10[k] > condition->open_Pa_q10 + 3 * crept / 2);
 }
 
+/* By so much a zero may be off: what it took of a touch that came on within the band, or was left
+ * there. The zeros stand in a contact, and with them this. */
+static int32_t taken_into_zeros(const struct condition *condition, uint32_t usable, uint8_t count) {
+  int32_t most = 0;
+  for (uint8_t k = 0; k < count; k++, usable >>= 1) {
+    int32_t taken =
+        condition->zero_Pa_q10[k] - condition->level_Pa_q10[k] + condition->risen_Pa_q10[k];
+    taken = taken < 0 ? -taken : taken;
+    most = usable & 1u && taken > most ? taken : most;
+  }
+  return most;
+}
+
 static void press_or_release(struct condition *condition, const struct conditioned *conditioned,
                              uint8_t count, bool over) {
   if (over == condition->pressed) {
@@ -397,6 +413,8 @@ static void press_or_release(struct condition *condition, const struct condition
     for (uint8_t k = 0; k < count; k++) {
       look_how_firm(condition, conditioned, k);
     }
+    condition->strong_Pa_q10 =
+        TAKEN_FACTOR * taken_into_zeros(condition, conditioned->usable, count);
     condition->snapshots = 0;
     condition->pad_reached_Pa_q10 = 0;
     memset(condition->reached_Pa_q10, 0, sizeof condition->reached_Pa_q10);
@@ -584,6 +602,7 @@ void condition_frame(struct condition *condition, const struct frame *frame,
   watch_calm(condition, conditioned, frame->sensor_count);
   bool stands_off = (condition->stands_off & conditioned->usable) != 0;
   bool sure = frame->saturated != 0 ||
-              (!condition->unsure && (condition->sudden & conditioned->usable) != 0);
+              (!condition->unsure && (condition->sudden & conditioned->usable) != 0 &&
+               conditioned->peak_Pa_q10 >= condition->strong_Pa_q10);
   conditioned->zero_doubtful = condition->pressed ? !sure : conditioned->contact || stands_off;
 }
