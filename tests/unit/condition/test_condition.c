@@ -478,7 +478,10 @@ static void test_a_touch_that_a_zero_took_part_of_stays_in_doubt(void) {
     TEST_ASSERT_TRUE(conditioned.contact);
     TEST_ASSERT_LESS_THAN_INT32(4000 * Pa, conditioned.peak_Pa_q10);
     TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
-    press_in_steps(5100 * Pa, 47000 * Pa, 0.2f);
+    press_in_steps(5100 * Pa, 15000 * Pa, 0.2f);
+    run_s(1);
+    TEST_ASSERT_TRUE(conditioned.zero_doubtful);
+    press_in_steps(15000 * Pa, 47000 * Pa, 0.2f);
     run_s(1);
     TEST_ASSERT_FALSE(conditioned.zero_doubtful);
     press_in_steps(47000 * Pa, 5100 * Pa, 0.2f);
@@ -854,6 +857,25 @@ static void test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew(void) {
   }
 }
 
+/* A zero taken under a press would be off by it. */
+static void test_one_sensor_is_not_tared_in_a_contact(void) {
+  begin_calm(4854);
+  press(20000 * Pa);
+  run_s(0.5f);
+  frame.renewed = 1u << 8;
+  run(1);
+  frame.renewed = 0;
+  run_s(5);
+  TEST_ASSERT_TRUE(conditioned.contact);
+  TEST_ASSERT_FALSE(conditioned.tared);
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << 8), conditioned.usable);
+  press(0);
+  run(2 + CONDITION_TARE_FRAMES);
+  TEST_ASSERT_TRUE(conditioned.tared);
+  TEST_ASSERT_EQUAL_HEX32(ALL, conditioned.usable);
+  TEST_ASSERT_EQUAL_INT32(AMBIENT, condition.zero_Pa_q10[8]);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_tare_is_the_mean_without_the_extremes);
@@ -892,5 +914,6 @@ int main(void) {
   RUN_TEST(test_random_frames);
   RUN_TEST(test_another_sensor_is_tared_anew);
   RUN_TEST(test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew);
+  RUN_TEST(test_one_sensor_is_not_tared_in_a_contact);
   return UNITY_END();
 }
