@@ -39,6 +39,10 @@
 #define CREEPING_SHIFT 4
 #define CREEPING_ms SECONDS(1)
 #define CREPT_MAX_Pa 2500
+/* A contact so many times what its zeros have taken lately is off by a fifth at most. What they
+ * took of it itself counts twice, for where it then moves they are off as before. At 5 holds of the
+ * real strips are in doubt. */
+#define TAKEN_FACTOR 4
 #define WARM_ms SECONDS(8)
 #define WARM_SHIFT 3 /* share of what may have moved that does in a second */
 #define MEMORY_ms SECONDS(CONDITION_MEMORY_s)
@@ -62,8 +66,8 @@
 
 #define SATURATED_Pa 100000
 
-/* A sensor that has lost its state is found out within so long; a zero taken since is not its own.
- */
+/* A sensor that has lost its state, or a wrong temperature, is found out within so long; a zero
+ * taken meanwhile is not its own. */
 #define FOUND_OUT_ms ((uint32_t)SECONDS(5))
 
 #define CALM_AFTER_TARE_ms ((uint32_t)SECONDS(3))
@@ -386,6 +390,19 @@ static void look_how_firm(struct condition *condition, const struct conditioned 
           conditioned->pressure_Pa_q10[k] > condition->open_Pa_q10 + 3 * crept / 2);
 }
 
+/* By so much a zero may be off: what it took of a touch that came on within the band, or was left
+ * there. The zeros stand in a contact, and with them this. */
+static int32_t taken_into_zeros(const struct condition *condition, uint32_t usable, uint8_t count) {
+  int32_t most = 0;
+  for (uint8_t k = 0; k < count; k++, usable >>= 1) {
+    int32_t taken =
+        condition->zero_Pa_q10[k] - condition->level_Pa_q10[k] + condition->risen_Pa_q10[k];
+    taken = taken < 0 ? -taken : taken;
+    most = usable & 1u && taken > most ? taken : most;
+  }
+  return most;
+}
+
 static void press_or_release(struct condition *condition, const struct conditioned *conditioned,
                              uint8_t count, bool over) {
   if (over == condition->pressed) {
@@ -397,6 +414,9 @@ static void press_or_release(struct condition *condition, const struct condition
     for (uint8_t k = 0; k < count; k++) {
       look_how_firm(condition, conditioned, k);
     }
+    int32_t taken = taken_into_zeros(condition, conditioned->usable, count);
+    int32_t of_this = taken - condition->taken_before_Pa_q10;
+    condition->strong_Pa_q10 = TAKEN_FACTOR * (of_this > 0 ? taken + of_this : taken);
     condition->snapshots = 0;
     condition->pad_reached_Pa_q10 = 0;
     memset(condition->reached_Pa_q10, 0, sizeof condition->reached_Pa_q10);
@@ -463,10 +483,12 @@ static void track_sensor(struct condition *condition, const struct frame *frame,
   }
 }
 
-/* Takes the readings of sensors that are tared now, and leaves the bitmap of those that were. */
+/* Takes the readings of sensors that are tared now, and leaves the bitmap of those that were. In a
+ * contact that others feel it waits. */
 static uint32_t tare_sensors(struct condition *condition, const struct frame *frame,
                              uint32_t readable) {
   uint32_t ready = readable;
+  bool is_felt = condition->pressed && !condition->unsure && (readable & ~condition->taring) != 0;
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
     uint32_t bit = UINT32_C(1) << k;
     bool tared_lately = condition->now_ms - condition->tare_begun_ms[k] < FOUND_OUT_ms;
@@ -475,7 +497,9 @@ static uint32_t tare_sensors(struct condition *condition, const struct frame *fr
     }
     if (condition->taring & readable & bit) {
       ready &= ~bit;
-      tare_step(condition, k, frame->pressure_Pa_q10[k]);
+      if (!is_felt) {
+        tare_step(condition, k, frame->pressure_Pa_q10[k]);
+      }
     }
   }
   return ready;
@@ -579,11 +603,17 @@ void condition_frame(struct condition *condition, const struct frame *frame,
   }
 
   conditioned->contact = condition->pressed || conditioned->peak_Pa_q10 > open;
+  if (conditioned->contact && !condition->touched && !condition->pressed) {
+    condition->taken_before_Pa_q10 =
+        taken_into_zeros(condition, conditioned->usable, frame->sensor_count);
+  }
+  condition->touched = conditioned->contact;
   conditioned->tared = readable != 0 && conditioned->usable == readable &&
                        (condition->below & conditioned->usable) == 0;
   watch_calm(condition, conditioned, frame->sensor_count);
   bool stands_off = (condition->stands_off & conditioned->usable) != 0;
   bool sure = frame->saturated != 0 ||
-              (!condition->unsure && (condition->sudden & conditioned->usable) != 0);
+              (!condition->unsure && (condition->sudden & conditioned->usable) != 0 &&
+               conditioned->peak_Pa_q10 >= condition->strong_Pa_q10);
   conditioned->zero_doubtful = condition->pressed ? !sure : conditioned->contact || stands_off;
 }

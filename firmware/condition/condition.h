@@ -9,8 +9,9 @@
  * sensors warm up, then only at 0.5 Pa/s: barometers drift by up to 0.22, and a force
  * that rises faster is no drift. In a contact the zero stands but for the drift that was seen in
  * the calm before it, which goes on for an hour. That of a sensor whose temperature is unsettled
- * stands too. One that was taken within five seconds of the reset of a sensor that had lost its state
- * is taken anew.
+ * stands too. One that was taken in the five seconds before its sensor was reset, as it had lost
+ * its state, or before its temperature turned out to be another, is taken anew. No single sensor is
+ * tared in a contact that others feel: it waits.
  *
  * Release. Rubber does not let go at once: a sensor stands off by 0.4 to 13 % of its last pressure,
  * or below its zero by 1 to 15 %, returns within 0.5 to 20 s, and keeps some of it (strips of
@@ -27,6 +28,8 @@
  *   - contact, but within the band above: what remains after a release
  *   - no contact, but more than CONDITION_OPEN_Pa was taken for a zero that had risen: by a
  *     remainder now, or by the level within the last minutes
+ *   - contact, but less than four times what its zeros had taken when it left the band, or eight
+ *     times what they had taken of it
  *   - contact that is no stronger than the drift of so long a contact, or than one and a half times
  *     what the zero of the sensor has wandered lately
  * The zero follows the last kind slowly as if nothing touched.
@@ -77,15 +80,18 @@ struct condition {
   int32_t open_Pa_q10;                        /* the gate, but for the margins */
   int32_t warm_Pa_q10;                        /* so far any zero may have moved, fading */
   int32_t pad_memory_Pa_q10, pad_reached_Pa_q10;
-  uint32_t taring;     /* bitmap: tare_left is not 0 */
-  uint32_t restless;   /* bitmap: the level does not keep up, no calm */
-  uint32_t firm;       /* bitmap: stronger than what the zero has wandered */
-  uint32_t sudden;     /* bitmap: stronger than what may have crept up */
-  uint32_t stands_off; /* bitmap: taken for a zero that has risen */
-  uint32_t below;      /* bitmap: too far below zero */
-  uint8_t next;        /* sensor to track */
-  bool pressed;        /* contact that is no remainder, */
-  bool unsure;         /* but may be a drift */
+  int32_t taken_before_Pa_q10; /* into zeros, when the contact came, in doubt or not */
+  int32_t strong_Pa_q10;       /* of this contact: so far above what its zeros may be off by */
+  uint32_t taring;             /* bitmap: tare_left is not 0 */
+  uint32_t restless;           /* bitmap: the level does not keep up, no calm */
+  uint32_t firm;               /* bitmap: stronger than what the zero has wandered */
+  uint32_t sudden;             /* bitmap: stronger than what may have crept up */
+  uint32_t stands_off;         /* bitmap: taken for a zero that has risen */
+  uint32_t below;              /* bitmap: too far below zero */
+  uint8_t next;                /* sensor to track */
+  bool pressed;                /* contact that is no remainder, */
+  bool touched;                /* as .contact of the last frame */
+  bool unsure;                 /* but may be a drift */
 
   int32_t zero_Pa_q10[FT_MAX_SENSORS]; /* [sensor] 1/1024 Pa, as all here: level + remainder */
   int32_t level_Pa_q10[FT_MAX_SENSORS];

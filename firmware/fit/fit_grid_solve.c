@@ -151,7 +151,7 @@ FIXED_INLINE struct scaled scaled_mean(struct scaled sum, int count) {
 static NOINLINE void widen_for_prior(const struct readings *readings,
                                      const struct fit_system *system, const struct scaled *variance,
                                      struct scaled *inverse3) {
-  struct scaled excess = scaled_sub(scaled_square(readings->prior_sd), *variance);
+  struct scaled excess = fit_scaled_short(scaled_sub(scaled_square(readings->prior_sd), *variance));
   if (excess.mantissa > 0) {
     struct scaled share = scaled_mul(system->prior_row, *inverse3);
     struct scaled more =

@@ -4,10 +4,11 @@
  * Temperatures. One that differs by more than READINGS_TEMPERATURE_STEP_MAX_cC from the sensor's
  * last, while the others' have not stepped along, is no change of temperature. It is used when the
  * next one agrees with it and both are near the other sensors'. Until then the last one stays in
- * use, and the sensor is doubtful: each degree is worth some 240 Pa. Two that agree with each other
- * and are near nobody's come from a sensor that has lost its state as its supply failed: it becomes
- * a suspect. The first temperature of a sensor must be near the others', too; one that says the
- * same twice before and after a reset is believed, and the sensor stays doubtful.
+ * use, and the sensor is doubtful: each degree is worth some 240 Pa. A zero taken shortly before is
+ * taken anew then, for the last one may have been wrong (condition.h). Two that agree with each
+ * other and are near nobody's come from a sensor that has lost its state as its supply failed: it
+ * becomes a suspect. The first temperature of a sensor must be near the others', too; one that says
+ * the same twice before and after a reset is believed, and the sensor stays doubtful.
  *
  * Pressures. One below zero is left out, and a second in a row makes the sensor a suspect. A large
  * step of one sensor alone is left out as well, for rubber lets its neighbours feel any press; when
@@ -60,7 +61,7 @@ struct readings {
   uint8_t doubts_in_a_row;
   uint32_t has_thermal; /* bitmap */
   uint32_t renewed;     /* bitmap: another sensor since the last frame */
-  uint32_t restored;    /* bitmap: a suspect that was reset since the last frame */
+  uint32_t restored;    /* bitmap: since the last frame, as in frame.h */
   uint32_t doubted;     /* bitmap: the last temperature was not used */
   uint32_t strange;     /* bitmap: a temperature that is not near the others' is in use */
   uint32_t unproven;    /* bitmap: the PROM's CRC differs and the sensor has not read like others */

@@ -82,10 +82,11 @@ static bool settle(struct readings *readings, uint8_t k, int16_t now_cC,
     use = near || (agrees && possible && (readings->pardoned & bit));
     insists = agrees && !use;
   } else {
-    use = within(now_cC - readings->thermal[k].first_order_cC - company->step_cC,
-                 READINGS_TEMPERATURE_STEP_MAX_cC) ||
-          (agrees && near);
+    bool steps = !within(now_cC - readings->thermal[k].first_order_cC - company->step_cC,
+                         READINGS_TEMPERATURE_STEP_MAX_cC);
+    use = !steps || (agrees && near);
     insists = agrees && !near;
+    readings->restored |= use && steps ? bit : 0;
   }
   if (!use) {
     readings->suspects |= insists ? bit : 0;

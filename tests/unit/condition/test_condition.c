@@ -462,6 +462,39 @@ static void press_in_steps(int32_t from, int32_t to, float seconds) {
   }
 }
 
+/* Held, a touch that the band lets in part into the zero comes out of the band: what the zero took
+ * stays in doubt, and a strong press on it is none. */
+static void test_a_touch_that_a_zero_took_part_of_stays_in_doubt(void) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    begin_calm(periods_us[i]);
+    press_in_steps(0, 47000 * Pa, 0.2f);
+    run_s(4);
+    press_in_steps(47000 * Pa, 0, 0.1f);
+    run_s(1.2f);
+    press_in_steps(0, 5100 * Pa, 0.15f);
+    watch_s(0.7f, 0, 0);
+    TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
+    watch_s(6, 0, 0);
+    TEST_ASSERT_TRUE(conditioned.contact);
+    TEST_ASSERT_LESS_THAN_INT32(4000 * Pa, conditioned.peak_Pa_q10);
+    TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
+    press_in_steps(5100 * Pa, 15000 * Pa, 0.2f);
+    run_s(1);
+    TEST_ASSERT_TRUE(conditioned.zero_doubtful);
+    press_in_steps(15000 * Pa, 47000 * Pa, 0.2f);
+    run_s(1);
+    TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+    press_in_steps(47000 * Pa, 5100 * Pa, 0.2f);
+    run_s(0.1f);
+    TEST_ASSERT_TRUE(conditioned.zero_doubtful);
+    press(0);
+    run_s(5);
+    press_in_steps(0, 20000 * Pa, 0.1f);
+    run_s(1);
+    TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+  }
+}
+
 /* What the end of a release feels is no remainder. */
 static void test_presses_in_quick_succession_move_no_zero(void) {
   static const float falls_s[] = {0.05f, 0.1f, 0.2f, 0.4f};
@@ -824,6 +857,25 @@ static void test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew(void) {
   }
 }
 
+/* A zero taken under a press would be off by it. */
+static void test_one_sensor_is_not_tared_in_a_contact(void) {
+  begin_calm(4854);
+  press(20000 * Pa);
+  run_s(0.5f);
+  frame.renewed = 1u << 8;
+  run(1);
+  frame.renewed = 0;
+  run_s(5);
+  TEST_ASSERT_TRUE(conditioned.contact);
+  TEST_ASSERT_FALSE(conditioned.tared);
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << 8), conditioned.usable);
+  press(0);
+  run(2 + CONDITION_TARE_FRAMES);
+  TEST_ASSERT_TRUE(conditioned.tared);
+  TEST_ASSERT_EQUAL_HEX32(ALL, conditioned.usable);
+  TEST_ASSERT_EQUAL_INT32(AMBIENT, condition.zero_Pa_q10[8]);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_tare_is_the_mean_without_the_extremes);
@@ -845,6 +897,7 @@ int main(void) {
   RUN_TEST(test_what_rubber_does_after_a_release_is_no_contact);
   RUN_TEST(test_a_force_left_after_a_release_is_flagged);
   RUN_TEST(test_press_after_a_release_is_not_taken_for_a_remainder);
+  RUN_TEST(test_a_touch_that_a_zero_took_part_of_stays_in_doubt);
   RUN_TEST(test_presses_in_quick_succession_move_no_zero);
   RUN_TEST(test_far_sensors_stand_off_too);
   RUN_TEST(test_weak_contact_for_long_is_in_doubt);
@@ -861,5 +914,6 @@ int main(void) {
   RUN_TEST(test_random_frames);
   RUN_TEST(test_another_sensor_is_tared_anew);
   RUN_TEST(test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew);
+  RUN_TEST(test_one_sensor_is_not_tared_in_a_contact);
   return UNITY_END();
 }

@@ -312,6 +312,39 @@ static void a_prior_pulls_sigma_alike_in_both(void) {
   }
 }
 
+/* Little but the prior speaks of the width where one sensor feels something beside noise: what the
+ * prior makes of the deviations may be many times what the readings do. */
+static void a_prior_leaves_what_is_uncertain_so(void) {
+  struct fit_settings settings = usual;
+  settings.iterations = 4;
+  settings.prior_sigma_mm = 6.5f;
+  settings.prior_width_mm = 3.0f;
+  fit_set_errors(&settings, 0.01f, 0.0065f);
+  struct random random = {12};
+  int compared = 0;
+  for (int i = 0; i < 3000; i++) {
+    press(0, 0, 0.0, 1.0, 5.0, &random);
+    readings[random_below(&random, SENSORS)] += (int32_t)random_between(&random, 150e3, 4000e3);
+    struct fit_result grid, general;
+    if (i % 2) {
+      fit_grid(&array, readings, &settings, &grid);
+    } else {
+      fit_grid_masked(&array, readings, ALL & ~(UINT32_C(1) << random_below(&random, SENSORS)),
+                      &settings, &grid);
+    }
+    if (!(grid.flags & CONTACT_FLAG_FIT_VALID)) {
+      continue;
+    }
+    fit_general(&array, readings, grid.used, &settings, &general);
+    if (!((grid.flags | general.flags) & CONTACT_FLAG_AT_BOUND)) {
+      TEST_ASSERT_TRUE(grid.flags & CONTACT_FLAG_UNCERTAIN ||
+                       grid.location_sd_mm > 0.3f * general.location_sd_mm);
+      compared++;
+    }
+  }
+  TEST_ASSERT_GREATER_THAN_INT(500, compared);
+}
+
 static void warnings_are_given(void) {
   struct fit_result result;
   for (int k = 0; k < SENSORS; k++) {
@@ -398,6 +431,7 @@ int main(void) {
   RUN_TEST(more_iterations_come_nearer);
   RUN_TEST(a_fit_that_still_moves_says_how_far);
   RUN_TEST(a_prior_pulls_sigma_alike_in_both);
+  RUN_TEST(a_prior_leaves_what_is_uncertain_so);
   RUN_TEST(warnings_are_given);
   RUN_TEST(any_bits_give_finite_results);
   return UNITY_END();

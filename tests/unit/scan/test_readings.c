@@ -299,6 +299,7 @@ static void test_a_temperature_step_needs_a_second_and_the_others(void) {
     take_pressures(ALL);
     TEST_ASSERT_EQUAL_HEX32(cases[i].suspect ? ONE_BIT : 0, readings.suspects);
     TEST_ASSERT_EQUAL_HEX32(cases[i].used || cases[i].suspect ? 0 : ONE_BIT, frame.doubtful);
+    TEST_ASSERT_EQUAL_HEX32(cases[i].used ? ONE_BIT : 0, frame.restored);
     if (!cases[i].suspect) {
       TEST_ASSERT_DOUBLE_WITHIN(0.01, cases[i].used ? true_Pa(ONE, d2[ONE]) : rest_Pa,
                                 frame.pressure_Pa_q10[ONE] / 1024.0);
