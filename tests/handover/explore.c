@@ -17,6 +17,7 @@ struct explorer {
   unsigned known, made; /* choices */
   bool active;
   unsigned priority; /* of what runs */
+  unsigned highest;  /* of all interrupts */
   unsigned came[INTERRUPTS_MAX], came_in_all;
   const char *stack;
   unsigned long runs, points;
@@ -84,12 +85,15 @@ static void let_interrupts_come(void) {
 
 static void point(const void *address) {
   const char *here = (const char *)&address;
-  if (!explorer || !explorer->active ||
-      ((const char *)address > here && (const char *)address < explorer->stack)) {
+  struct explorer *now = explorer;
+  if (!now || !now->active ||
+      ((const char *)address > here && (const char *)address < now->stack)) {
     return;
   }
-  explorer->points++;
-  let_interrupts_come();
+  now->points++;
+  if (now->came_in_all < now->most && now->priority < now->highest) { /* else none may come */
+    let_interrupts_come();
+  }
 }
 
 void explore_begin(void) {
@@ -114,6 +118,10 @@ unsigned long explore(void (*run)(void), const struct explore_interrupt *interru
   explorer->count = count;
   explorer->most = most;
   explorer->stack = &here;
+  for (unsigned i = 0; i < count; i++) {
+    unsigned priority = interrupts[i].priority;
+    explorer->highest = priority > explorer->highest ? priority : explorer->highest;
+  }
   __real_memcpy(before, __data_start, size);
   do {
     __real_memcpy(__data_start, before, size);

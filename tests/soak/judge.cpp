@@ -13,8 +13,9 @@ constexpr std::uint32_t WARNINGS = 0x7FF00;
 constexpr std::size_t TOLD = 10;
 // The line and its queue take less, where the host reads.
 constexpr std::uint64_t ANSWER_LIMIT_us = 2500000;
-// What is pressed less than this, or than such a part of what was pressed in the last minute, the
-// gate may take for a zero that has moved (condition.h).
+// A weaker touch is little more than noise. One of less than such a part of what was pressed in the
+// last minute the gate may take for a zero that has moved, and say that nothing touches
+// (condition.h).
 constexpr double FELT_Pa = 600, FELT_SHARE = 0.25;
 constexpr std::uint64_t FELT_FOR_us = 100000, MEMORY_us = 60000000;
 // A contact may close that late.
@@ -277,7 +278,7 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
     if (!touched) {
       wrong(t_us, text("frame %u says %.2f N where nothing touches", contact.frame,
                        static_cast<double>(contact.force_N)));
-    } else if (is_firm(felt_us)) {
+    } else if (truth.peak_Pa >= FELT_Pa) {
       if (error_mm > LOCATION_BOUND_mm || share > FORCE_BOUND_SHARE) {
         wrong(t_us, text("frame %u, flags %05x: %.2f mm off, %.3f N instead of %.3f, at %.1f %.1f "
                          "mm, sensors %04x, sd %.2f mm",

@@ -10,9 +10,9 @@
 //   answer   an acknowledgement is of a command that was sent, once; stages add up
 //   wrong    a frame without a warning tells the truth within the bounds below
 //
-// Bounds, for contacts of more than a quarter of the strongest in the last minute: of what is
-// pressed less a part may count as rubber that has not let go yet (condition.h). The simulated pad
-// is what the fit takes a contact for, its gains are all 1, and a frame without a warning says that
+// A contact of less than a quarter of the strongest in the last minute may go unfelt, for it may be
+// rubber that has not let go yet (condition.h). Bounds of what is said of any: the simulated pad is
+// what the fit takes a contact for, its gains are all 1, and a frame without a warning says that
 // its location is good to 0.6 mm of standard deviation (UNCERTAIN has that limit):
 // LOCATION_BOUND_mm is twice that, FORCE_BOUND what an unwarned corner contact may be off by.
 // READING_BOUND_Pa is what a temperature makes of a reading that is 5 degC wrong: so far from the

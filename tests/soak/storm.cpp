@@ -180,7 +180,6 @@ void Storm::add_fault(const Target &target, std::uint64_t from_us) {
     judge_.excuse_readings_until(fault.to_us + EXCUSED_us);
   }
   if (inverts_bits(fault.kind)) {
-    inverts_bits_ = true;
     judge_.excuse_until(fault.to_us + EXCUSED_us);
   }
   if (takes_power(fault.kind)) {
@@ -196,7 +195,7 @@ void Storm::begin_bout() {
       static_cast<std::uint32_t>(own.size() + std::size(ON_THE_LINE)) + 1; // and STORE_CUT
   bouts_++;
   in_bout_ = true;
-  loses_power_ = inverts_bits_ = false;
+  loses_power_ = false;
   ends_us_ = now_us_;
   scene_.clear();
   const std::uint64_t from_us =
@@ -209,18 +208,15 @@ void Storm::begin_bout() {
     const std::uint64_t later_us = several ? from_us + random_below(r, 300000) : from_us;
     if (kind == kinds - 1) { // power is cut at some moment of the writing, or of its erase
       kind_ = STORE_CUT;
-      if (!loses_power_ && !inverts_bits_) {
+      if (!loses_power_) {
         store_until_us_ = from_us + 200000;
         add_fault({"power_cut", 0, 3000, 50000}, from_us + random_below(r, 150000));
       }
       continue;
     }
     const Target &target = kind < own.size() ? own[kind] : ON_THE_LINE[kind - own.size()];
-    if (takes_power(target.kind) && (loses_power_ || inverts_bits_)) {
+    if (takes_power(target.kind) && loses_power_) {
       continue;
-    }
-    if (inverts_bits(target.kind) && loses_power_) {
-      continue; // a zero that is taken from inverted bits stays wrong for long
     }
     kind_ = target.kind;
     add_fault(target, later_us);

@@ -3,6 +3,7 @@
 #include "libfingertip/command.hpp"
 #include "support/host_packets.hpp"
 
+#include <algorithm>
 #include <functional>
 #include <gtest/gtest.h>
 
@@ -64,11 +65,15 @@ public:
   std::uint64_t now_us() const { return now_us_; }
   const World &world() const { return world_; }
   Judge &judge() { return judge_; }
-  std::uint64_t pressed_at_us() { // a moment well within a firm touch
+  // A moment well within a firm touch, or one that is weaker than such a part of those before.
+  std::uint64_t pressed_at_us(double share = 1) {
+    double strongest_Pa = share < 1 ? 0 : 1e9;
     for (std::uint64_t t_us = 3000000;; t_us += STEP_us) {
       world_.extend_to(t_us);
       const Row row = world_.at(t_us);
-      if (row.peak_Pa > 1500 && row.p0_Pa == world_.at(t_us - 200000).p0_Pa) {
+      strongest_Pa = std::max(strongest_Pa, row.peak_Pa);
+      if (row.peak_Pa > 1500 && row.peak_Pa < share * strongest_Pa &&
+          row.p0_Pa == world_.at(t_us - 200000).p0_Pa) {
         return t_us;
       }
     }
@@ -254,6 +259,17 @@ TEST(Judge, FindsAContactThatIsNoneAndOneThatIsMissed) {
   line.spoil = [](wire_packet &packet) { packet.body.contact.flags = CONTACT_FLAG_TARED; };
   line.run_to(line.spoil_at_us + 100000);
   EXPECT_EQ(found(line), "wrong; wrong; ");
+}
+
+TEST(Judge, AWeakTouchAfterAStrongOneMayGoUnfeltButNotBeWrong) {
+  Line line;
+  line.spoil_at_us = line.pressed_at_us(0.1);
+  line.spoil = [](wire_packet &packet) { packet.body.contact.flags = CONTACT_FLAG_TARED; };
+  line.run_to(line.spoil_at_us + 50000);
+  EXPECT_EQ(found(line), "");
+  line.spoil = [](wire_packet &packet) { packet.body.contact.force_N *= 0.6f; };
+  line.run_to(line.now_us() + 50000);
+  EXPECT_EQ(found(line), "wrong; ");
 }
 
 TEST(Judge, FindsReadingsThatAreWrong) {
