@@ -3,7 +3,7 @@
 
     soak.py --build build/host --boards build --hours 8            episodes of every kind, from another seed each time
     soak.py --build build/host --boards build --least 1 24         until one hour is emulated and 24 are native, earlier runs of the
-                                                                   same images and programs included
+                                                                   same images and programs, whatever commit, included
     soak.py --build build/host --boards build --kinds native --episodes 3 --seconds 30 --seed 1    the same each time
 
 Kinds: native (boards/native in one process), pico_mux, pico_parallel (emulated). What is found is kept in build/soak/findings, named and
@@ -16,8 +16,10 @@ import itertools
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
+import tempfile
 import time
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -28,6 +30,7 @@ EPISODE_s = {"native": 600, "pico_mux": 60, "pico_parallel": 60}
 COUNTS = ("hangs", "wrong_unflagged", "uncounted_losses", "disorder")
 SUMS = ("seconds", "bouts", "frames", "unwarned", "at_rest", "readings", "missing", "skipped", "answered", "excused", *COUNTS)
 WORST = ("worst_mm", "worst_force", "worst_Pa")
+COMMIT = re.compile(rb"fingertip-git=[0-9a-z]+\+?\0")  # write_build_info.cmake
 # No machine is too slow for an episode in this; one that takes longer hangs.
 HANGS_s = 3600
 
@@ -47,11 +50,14 @@ class Soak:
         self.keys = {kind: self.key(kind) for kind in kinds}
 
     def key(self, kind):
-        """What an episode is of."""
-        digest = hashlib.sha256(self.program.read_bytes())
+        """What an episode is of: code and constants of the program and the image, whatever commit they name."""
+        with tempfile.NamedTemporaryFile() as stripped:
+            subprocess.run(["objcopy", "-O", "binary", "--only-section=.text", "--only-section=.rodata", "--only-section=.data", self.program,
+                            stripped.name], check=True)
+            parts = [pathlib.Path(stripped.name).read_bytes()]
         if kind in self.images:
-            digest.update(self.images[kind].read_bytes())
-        return digest.hexdigest()[:16]
+            parts.append(self.images[kind].read_bytes())
+        return hashlib.sha256(b"".join(COMMIT.sub(b"", part) for part in parts)).hexdigest()[:16]
 
     def command(self, kind, seed, seconds):
         if kind == "native":
