@@ -14,7 +14,7 @@ SOAK = ROOT / "tests/soak"
 EMULATED_h, NATIVE_h = 1, 24
 STEP_us = 100
 BOARDS = ("pico_mux", "pico_parallel")
-CUTS = ("write", "erase", "mend")
+CUTS = ("write", "erase", "mend", "start", "reset")
 GOALS = (("soak_hours_emulated", ">=", EMULATED_h), ("soak_hours_native", ">=", NATIVE_h), ("hangs", "<=", 0), ("wrong_unflagged", "<=", 0),
          ("uncounted_losses", "<=", 0), ("disorder", "<=", 0), ("power_cuts", ">=", 1000), ("power_cuts_not_started", "<=", 0),
          ("power_cuts_wrong_values", "<=", 0))
@@ -69,8 +69,8 @@ def text(found):
             f"that asks for its streams at once. The worst: {text_of(found['worst_recovery_s'])} s.", "",
             *table_of_dicts_md(found["recovery"]), "",
             "## Power cuts", "",
-            f"Every {STEP_us} us, and every 2 ms while what was written is read back, of an update of what is kept into a free slot (write), of one that needs an erase, and of a start that mends what a "
-            "cut has left. The emulated flash keeps of the bits that were to change some, and some read as they like. Each must start with "
+            f"Every {STEP_us} us, and every 2 ms while what was written is read back, of an update of what is kept into a free slot (write), of one that needs an erase, of a start that mends what a "
+            "cut has left (mend), of one that finds all in order (start), and of one of the chip alone (reset). The emulated flash keeps of the bits that were to change some, and some read as they like. Each must start with "
             "all sensors and hold the old settings or the new (brought), also after one more cut.", "",
             *table_of_dicts_md(found["power_cut_kinds"]), "", *told(found["power_cut_findings"])]
 
