@@ -15,7 +15,7 @@ from .files import MCAP_MAGIC as MAGIC
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX, ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, \
     SUMMARY_OFFSET, DATA_END = range(1, 16)
 CHUNK_bytes, CHUNK_ns = 1 << 20, 1_000_000_000  # a chunk ends once it is that large or that long
-CHUNK_MOST_bytes = 1 << 28  # of one that is read
+CHUNK_MOST_bytes = 1 << 26  # of one that is read
 
 
 def zstandard_module() -> types.ModuleType:

@@ -13,7 +13,6 @@ there and in the topics, for ROS. Contact and Line together are the CSV file, by
 the recording is also metadata (fingertip_recording), a calibration and a pad's profile also an attachment. Chunks last a second.
 """
 import calendar
-import json
 import math
 import os
 import re
@@ -28,7 +27,6 @@ from .mcap_file import McapReader, McapWriter, Message
 from .names import WARNINGS, Flag
 from .recording import LineFile, shortest
 from .ros_messages import decode, encode, schema_of
-from .version import __version__
 
 CONTACT_TYPE, LINE_TYPE, WRENCH_TYPE, PLACE_TYPE, PRESSURES_TYPE, DIAGNOSTICS_TYPE = (
     "fingertip_msgs/Contact", "fingertip_msgs/Line", "geometry_msgs/WrenchStamped", "geometry_msgs/PointStamped", "sensor_msgs/PointCloud2",
@@ -167,12 +165,9 @@ class _Device:
 
     def calibration(self) -> str:
         """What there is of gains, force scale and pad, as JSON; nothing without."""
-        found: dict[str, Any] = {}
-        for key, value in self.keys.items():
-            if key.startswith(("calibration_", "force_scale", "gain", "pad_")):
-                numbers = [json.loads(word) for word in value.split()]
-                found[key] = numbers if key in _LISTS else numbers[0]
-        return json.dumps({"serial": self.serial, **found}) if found else ""
+        found = [f'"{key}": ' + (f'[{", ".join(value.split())}]' if key in _LISTS else value) for key, value in self.keys.items()
+                 if key.startswith(("calibration_", "force_scale", "gain", "pad_"))]
+        return "{" + ", ".join([f'"serial": "{self.serial}"', *found]) + "}" if found else ""
 
 
 _LISTS = {"gains", "gain_sds", "pad_shares", "pad_sds_mm", "pad_moments_mm", "pad_moment_sds_mm",
@@ -185,7 +180,7 @@ class McapLines:
     def __init__(self, path: "str | os.PathLike[str]", replace: bool) -> None:
         self._file = LineFile(path, replace)
         try:
-            self._writer = McapWriter(self._file.append, "ros2", f"fingertip-tactile {__version__}")
+            self._writer = McapWriter(self._file.append, "ros2", "fingertip")
         except InputError:
             self._file.close()
             raise
@@ -269,7 +264,7 @@ class McapLines:
         if own == "event":
             self._clock.event(value)
         elif device and own == "packet" and value.startswith("health "):
-            fields = dict(pair.partition("=")[::2] for pair in value.split()[1:])
+            fields = dict(pair.partition("=")[::2] for pair in value.split()[1:] if not pair.startswith(("sequence=", "t_us=")))
             self._diagnose(health_status(device.serial, device.sensors, fields))
         elif device and own in ("x_mm", "y_mm", "sensors"):
             device.key(own, value)

@@ -29,7 +29,7 @@ def schema_of(name: str) -> str:
     """The definition with all that it needs, as the schema encoding ros2msg has them. name: "geometry_msgs/WrenchStamped"."""
     needed = [name]
     for each in needed:  # grows
-        needed += [kind for _, kind, _ in _fields(each) if "/" in kind and kind not in needed]
+        needed += dict.fromkeys(kind for _, kind, _ in _fields(each) if "/" in kind and kind not in needed)
     return ("=" * 80 + "\n").join(("" if each == name else f"MSG: {each}\n") + _definition(each) for each in needed)
 
 
