@@ -315,16 +315,17 @@ void McapLineSink::comment(const std::string &text) {
   if (key == "event") {
     clock_.event(value);
   } else if (device && key == "packet") {
-    try {
-      PacketWords words = packet_words(value);
-      if (words.name == PACKET_HEALTH) {
-        wire_health health{};
-        PairReader reader{words.pairs};
-        visit_health(reader, health);
-        diagnose(ros::health({clock_.now_ns(), ""}, device->serial, device->sensors, health));
+    auto words = split(value, ' ');
+    Metadata fields;
+    for (std::string_view word : words) {
+      std::size_t equals = word.find('=');
+      std::string name(word.substr(0, equals));
+      if (equals != std::string_view::npos && name != "sequence" && name != "t_us") {
+        fields.emplace_back(name, word.substr(equals + 1));
       }
-    } catch (const Damage &) {
-      /* The line is there all the same; who reads it will say. */
+    }
+    if (words[0] == PACKET_HEALTH) {
+      diagnose(ros::health({clock_.now_ns(), ""}, device->serial, device->sensors, fields));
     }
   } else if (device) {
     device_key(*device, key, value);

@@ -429,23 +429,4 @@ inline std::optional<Columns> columns_of(const std::string &header) {
   return Columns{static_cast<std::uint8_t>(sensors), has_tangential};
 }
 
-/* key=value of a comment "packet: NAME key=value ...", and its NAME. Throws Damage. */
-struct PacketWords {
-  std::string name;
-  std::map<std::string, std::string, std::less<>> pairs;
-};
-inline PacketWords packet_words(std::string_view value) {
-  PacketWords found;
-  auto words = split(value, ' ');
-  found.name = words[0];
-  for (std::size_t i = 1; i < words.size(); i++) {
-    std::size_t equals = words[i].find('=');
-    if (equals == std::string_view::npos) {
-      throw Damage{"\"" + std::string(words[i]) + "\" is not key=value"};
-    }
-    found.pairs.emplace(words[i].substr(0, equals), words[i].substr(equals + 1));
-  }
-  return found;
-}
-
 } // namespace fingertip::recording

@@ -170,18 +170,26 @@ void RecordingReader::read_comment(const std::string &text) {
   std::string value(text.substr(colon + 2));
   Item item{};
   if (key == "packet") {
-    PacketWords words = packet_words(value);
-    PairReader reader{words.pairs};
+    std::map<std::string, std::string, std::less<>> pairs;
+    auto words = split(value, ' ');
+    for (std::size_t i = 1; i < words.size(); i++) {
+      std::size_t equals = words[i].find('=');
+      if (equals == std::string_view::npos) {
+        throw Damage{"\"" + std::string(words[i]) + "\" is not key=value"};
+      }
+      pairs.emplace(words[i].substr(0, equals), words[i].substr(equals + 1));
+    }
+    PairReader reader{pairs};
     item.kind = Item::Kind::packet;
     reader("sequence", item.packet.sequence);
     reader("t_us", item.packet.t_us);
-    if (words.name == PACKET_HEALTH) {
+    if (words[0] == PACKET_HEALTH) {
       item.packet.type = WIRE_HEALTH;
       visit_health(reader, item.packet.body.health);
-    } else if (words.name == PACKET_ACK) {
+    } else if (words[0] == PACKET_ACK) {
       item.packet.type = WIRE_ACK;
       visit_ack(reader, item.packet.body.ack);
-    } else if (words.name == PACKET_INFO) {
+    } else if (words[0] == PACKET_INFO) {
       if (info_.sensor_count < 1 || info_.sensor_count > FT_MAX_SENSORS) {
         throw Damage{"an info packet without \"# sensors:\" before it"};
       }
@@ -194,7 +202,7 @@ void RecordingReader::read_comment(const std::string &text) {
         item.packet.body.info.pad = {};
       }
     } else {
-      throw Damage{"packet \"" + words.name + "\" is unknown"};
+      throw Damage{"packet \"" + std::string(words[0]) + "\" is unknown"};
     }
     items_.push_back(item);
   } else if (key == "event") {

@@ -62,7 +62,7 @@ void put(CdrWriter &writer, const Vector &vector) {
 
 std::string status(const Header &header, const std::string &name, const std::string &trouble,
                    const std::string &otherwise, const std::string &serial,
-                   const std::vector<std::pair<std::string, std::uint32_t>> &values) {
+                   const Metadata &values) {
   enum : std::uint8_t { OK, WARN };
   CdrWriter writer = begun(header);
   writer.count(1);
@@ -73,7 +73,7 @@ std::string status(const Header &header, const std::string &name, const std::str
   writer.count(values.size());
   for (const auto &[key, value] : values) {
     writer.put(key);
-    writer.put(std::to_string(value));
+    writer.put(value);
   }
   return writer.bytes();
 }
@@ -170,11 +170,11 @@ std::string wrench(const Header &header, const wire_contact &contact) {
         CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH;
     bool trusted = is_trusted(contact.flags);
     bool sure = trusted && (contact.flags & tangential) == CONTACT_FLAG_TANGENTIAL_VALID;
-    double x_m = trusted ? metres(contact.x_mm) : NOT_A_NUMBER;
-    double y_m = trusted ? metres(contact.y_mm) : NOT_A_NUMBER;
+    double x_m = metres(contact.x_mm), y_m = metres(contact.y_mm);
     force = {sure ? double{contact.qx_N} : NOT_A_NUMBER, sure ? double{contact.qy_N} : NOT_A_NUMBER,
              trusted ? -double{contact.force_N} : NOT_A_NUMBER};
-    torque = {y_m * force.z, -x_m * force.z, x_m * force.y - y_m * force.x};
+    torque = {trusted ? y_m * force.z : NOT_A_NUMBER, trusted ? -x_m * force.z : NOT_A_NUMBER,
+              sure ? x_m * force.y - y_m * force.x : NOT_A_NUMBER};
   }
   CdrWriter writer = begun(header);
   put(writer, force);
@@ -223,18 +223,23 @@ std::string pressures(const Header &header, const wire_raw &raw, const std::vect
 }
 
 std::string health(const Header &header, const std::string &serial, unsigned sensors,
-                   const wire_health &health) {
+                   const Metadata &fields) {
+  std::uint64_t present = 0, bad = 0;
+  for (const auto &[key, value] : fields) {
+    if (key == "sensors_present" || key == "sensors_prom_bad") {
+      (key == "sensors_present" ? present : bad) = to_u64(value).value_or(0);
+    }
+  }
   std::string missing, damaged;
   for (unsigned k = 0; k < sensors; k++) {
-    missing += health.sensors_present >> k & 1 ? "" : " " + std::to_string(k);
-    damaged += health.sensors_prom_bad >> k & 1 ? " " + std::to_string(k) : "";
+    missing += present >> k & 1 ? "" : " " + std::to_string(k);
+    damaged += bad >> k & 1 ? " " + std::to_string(k) : "";
   }
   std::string trouble = missing.empty() ? "" : "sensors missing:" + missing;
   if (!damaged.empty()) {
     trouble += (trouble.empty() ? "" : "; ") + ("damaged PROM of sensors:" + damaged);
   }
-  return status(header, "fingertip " + serial, trouble, "all sensors are there", serial,
-                health_fields(health));
+  return status(header, "fingertip " + serial, trouble, "all sensors are there", serial, fields);
 }
 
 std::string warnings(const Header &header, const std::string &serial, std::uint32_t flags) {

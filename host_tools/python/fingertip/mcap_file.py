@@ -211,7 +211,7 @@ class _Fields:
 class McapReader:
     """The messages of a file in the order in which they were written, from its begin, without its index.
 
-    After the last one torn says whether the file ends without the records that end one. Raises InputError for a file that cannot be
+    After the last one torn says whether the file ends within a record. Raises InputError for a file that cannot be
     read, or is none; for a damaged chunk too, unless salvage, which skips and counts it.
     """
 
@@ -239,7 +239,7 @@ class McapReader:
                     head = file.read(9)
                     opcode, length = struct.unpack("<BQ", head) if len(head) == 9 else (0, 0)
                     if len(head) < 9 or length > size - at - 9:
-                        self.torn = True
+                        self.torn = bool(head)  # a killed writer leaves whole chunks
                         return
                     if opcode == DATA_END:
                         return

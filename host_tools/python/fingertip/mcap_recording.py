@@ -60,9 +60,11 @@ def wrench(flags: int, x_mm: float, y_mm: float, force_N: float, qx_N: float, qy
         return {"force": {"x": 0.0, "y": 0.0, "z": 0.0}, "torque": {"x": 0.0, "y": 0.0, "z": 0.0}}
     trusted = flags & _JUDGED == Flag.FIT_VALID
     sure = trusted and flags & _TANGENTIAL == Flag.TANGENTIAL_VALID
-    x_m, y_m, z_N = (x_mm / 1000, y_mm / 1000, -force_N) if trusted else (math.nan,) * 3
-    x_N, y_N = (qx_N, qy_N) if sure else (math.nan,) * 2
-    return {"force": {"x": x_N, "y": y_N, "z": z_N}, "torque": {"x": y_m * z_N, "y": -x_m * z_N, "z": x_m * y_N - y_m * x_N}}
+    x_m, y_m, z_N = x_mm / 1000, y_mm / 1000, -force_N if trusted else math.nan
+    x_N, y_N = (qx_N, qy_N) if sure else (math.nan, math.nan)
+    return {"force": {"x": x_N, "y": y_N, "z": z_N},
+            "torque": {"x": y_m * z_N if trusted else math.nan, "y": -x_m * z_N if trusted else math.nan,
+                       "z": x_m * y_N - y_m * x_N if sure else math.nan}}
 
 
 def place(flags: int, x_mm: float, y_mm: float) -> dict[str, float]:
@@ -343,17 +345,23 @@ class McapLineReader:
 
     def __init__(self, path: "str | os.PathLike[str]", salvage: bool = False, progress: Callable[[float], None] | None = None) -> None:
         self._reader = McapReader(path, salvage, progress)
+        self._salvage = salvage
         self._names: list[str] = []
 
     def __iter__(self) -> Iterator[tuple[int, str, bool]]:
-        found = False
+        last = 0
         for message in self._reader:
             name = message.channel.schema.name.replace("/msg/", "/") if message.channel.schema else ""
             if name in (LINE_TYPE, CONTACT_TYPE):
-                found = True
-                yield self._line(name, message)
-        if not found:
+                line = self._line(name, message)
+                if line[0] > last + 1 and not self._salvage:
+                    raise InputError(f"{self._reader.path}: {line[0] - last - 1} lines are missing before line {line[0]}; use --salvage to go on")
+                last = line[0]
+                yield line
+        if not last:
             raise InputError(f"{self._reader.path}: no recording of a fingertip; give one that fingertip has written")
+        if self._reader.torn and not self._salvage:
+            raise InputError(f"{self._reader.path}: the last chunk is torn; use --salvage to do without")
 
     def _line(self, name: str, message: Message) -> tuple[int, str, bool]:
         try:
