@@ -400,7 +400,8 @@ bool McapLineSource::next(Line &line) {
           throw mcap::Damage("a message on " + printable(message.topic) + " is damaged");
         }
         line = {decoded->number, decoded->text, decoded->torn};
-        if (number_ == 0) {
+        if (!has_first_) {
+          has_first_ = true;
           joint_ = line.text == std::string(FIRST_WORDS) + FORMAT_OF_SEVERAL;
         }
         if (!has_header_ && !line.text.empty() && line.text[0] != '#') {
@@ -425,7 +426,7 @@ bool McapLineSource::next(Line &line) {
   } catch (const mcap::Damage &damage) {
     throw Error(ErrorCode::damaged_line, path_ + ": " + damage.what());
   }
-  if (number_ == 0) {
+  if (!has_first_) {
     throw Error(ErrorCode::not_a_recording,
                 path_ + (reader_.is_torn() ? ": breaks off before a recording begins"
                                            : ": an MCAP file, but no recording of a fingertip"));

@@ -119,7 +119,8 @@ private:
   std::uint64_t number_ = 0;
   bool joint_ = false;
   std::uint8_t sensor_count_ = 0;
-  bool has_tangential_ = true, has_header_ = false;
+  bool has_tangential_ = true;
+  bool has_first_ = false, has_header_ = false; /* lines seen */
   bool told_torn_ = false;
 };
 

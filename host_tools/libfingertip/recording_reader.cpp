@@ -43,8 +43,13 @@ RecordingReader::RecordingReader(const std::string &path, bool salvage, const st
     : path_(path), salvage_(salvage), source_(open_lines(path)), wanted_(device) {
   std::memset(&info_, 0, sizeof info_);
   LineSource::Line first;
-  if (!source_->next(first)) {
-    first.text.clear();
+  try {
+    if (!source_->next(first)) {
+      first.text.clear();
+    }
+  } catch (const Error &error) {
+    bool damaged = error.code() == ErrorCode::damaged_line;
+    throw Error(damaged ? ErrorCode::damaged_head : error.code(), error.what());
   }
   line_number_ = 1;
   joint_ = format_of(path, first.text) == FORMAT_OF_SEVERAL;
