@@ -30,7 +30,7 @@ bool is_kept(const wire_packet &packet) {
 
 void check_paths(const Conversion &conversion) {
   if (is_same_file(conversion.from, conversion.to)) {
-    throw Error(conversion.to + ": is the file to read; give the other one another name");
+    throw Error(conversion.to + ": is the file to read; give another name");
   }
   check_output(conversion.to, conversion.overwrite);
 }
