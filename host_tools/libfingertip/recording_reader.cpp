@@ -93,10 +93,10 @@ bool RecordingReader::read_next() {
     damaged(error.what(), 0); /* how many lines are lost tells the next one's number */
     return true;
   }
-  std::string place = path_ + ":" + std::to_string(line.number) + ": ";
+  auto place = [&] { return path_ + ":" + std::to_string(line.number) + ": "; };
   if (line.number > line_number_ + 1) {
     std::uint64_t lost = line.number - line_number_ - 1;
-    damaged(place + std::to_string(lost) + " lines are missing before it", lost);
+    damaged(place() + std::to_string(lost) + " lines are missing before it", lost);
   }
   line_number_ = line.number;
   try {
@@ -108,7 +108,7 @@ bool RecordingReader::read_next() {
     }
     read_line(line.text);
   } catch (const Damage &damage) {
-    damaged(place + damage.what, 1);
+    damaged(place() + damage.what, 1);
   }
   return true;
 }

@@ -73,14 +73,23 @@ def place(flags: int, x_mm: float, y_mm: float) -> dict[str, float]:
     return {"x": x_mm / 1000, "y": y_mm / 1000, "z": 0.0} if trusted else {"x": math.nan, "y": math.nan, "z": math.nan}
 
 
-def pressure_cloud(x_mm: list[float], y_mm: list[float], valid: int, pressures_Pa: list[float], tare_Pa: list[float]) -> dict[str, Any]:
-    """sensor_msgs/PointCloud2 of a raw packet, without its header."""
-    count = len(pressures_Pa)
-    data = b"".join(struct.pack("<4f", x_mm[k] / 1000, y_mm[k] / 1000, 0.0, pressures_Pa[k] - tare_Pa[k] if valid >> k & 1 else math.nan)
-                    for k in range(count))
-    fields = [{"name": name, "offset": 4 * i, "datatype": 7, "count": 1} for i, name in enumerate(("x", "y", "z", "pressure_pa"))]
-    return {"height": 1, "width": count, "fields": fields, "is_bigendian": False, "point_step": 16, "row_step": 16 * count, "data": data,
-            "is_dense": False}
+class _Cloud:
+    """sensor_msgs/PointCloud2 of raw packets, all of whose bytes but stamp and pressures are the same each time."""
+
+    def __init__(self, frame_id: str, x_mm: list[float], y_mm: list[float], sensors: int) -> None:
+        fields = [{"name": name, "offset": 4 * i, "datatype": 7, "count": 1} for i, name in enumerate(("x", "y", "z", "pressure_pa"))]
+        places = [struct.pack("<4f", x_mm[k] / 1000, y_mm[k] / 1000, 0.0, math.nan) for k in range(sensors)]
+        self._bytes = bytearray(encode(PRESSURES_TYPE, {
+            "header": {"stamp": stamp(0), "frame_id": frame_id}, "height": 1, "width": sensors, "fields": fields, "is_bigendian": False,
+            "point_step": 16, "row_step": 16 * sensors, "data": b"".join(places), "is_dense": False}))
+        end = len(self._bytes) - 1  # behind the data is_dense
+        self._places = range(end - 16 * sensors + 12, end, 16)
+
+    def message(self, time_ns: int, valid: int, pressures_Pa: list[float], tare_Pa: list[float]) -> bytes:
+        struct.pack_into("<iI", self._bytes, 4, *stamp(time_ns).values())
+        for k, place in enumerate(self._places):
+            struct.pack_into("<f", self._bytes, place, pressures_Pa[k] - tare_Pa[k] if valid >> k & 1 else math.nan)
+        return bytes(self._bytes)
 
 
 def health_status(serial: str, sensors: int, fields: dict[str, str]) -> dict[str, Any]:
@@ -157,9 +166,17 @@ class _Device:
         self.x_mm: list[float] = []
         self.y_mm: list[float] = []
         self.sensors = 0
+        self._cloud: _Cloud | None = None
+
+    def cloud(self, sensors: int) -> _Cloud | None:
+        """Of rows with so many sensors; nothing where their places are unknown."""
+        if self._cloud is None and min(len(self.x_mm), len(self.y_mm)) >= sensors:
+            self._cloud = _Cloud(self.frame_id, self.x_mm, self.y_mm, sensors)
+        return self._cloud
 
     def key(self, key: str, value: str) -> None:
         self.keys[key] = value
+        self._cloud = None
         if key in ("x_mm", "y_mm"):
             setattr(self, key, [float(word) for word in value.split()])
         elif key == "sensors":
@@ -301,8 +318,10 @@ class McapLines:
             x_mm, y_mm, *forces_N = _as_binary32(row["x_mm"], row["y_mm"], row["force_n"], row["qx_n"], row["qy_n"])
             put(WRENCH_TYPE, {"wrench": wrench(flags, x_mm, y_mm, *forces_N)})
             put(PLACE_TYPE, {"point": place(flags, x_mm, y_mm)})
-        if row["has_raw"] and min(len(device.x_mm), len(device.y_mm)) >= len(row["pressure_pa"]):
-            put(PRESSURES_TYPE, pressure_cloud(device.x_mm, device.y_mm, row["valid"], row["pressure_pa"], row["tare_pa"]))
+        cloud = device.cloud(len(row["pressure_pa"])) if row["has_raw"] else None
+        if cloud:
+            now_ns = self._clock.last_ns
+            self._writer.message(device.channels[PRESSURES_TYPE], now_ns, cloud.message(now_ns, row["valid"], row["pressure_pa"], row["tare_pa"]))
         if row["has_contact"] and device.warnings != row["flags"] & WARNINGS:
             device.warnings = row["flags"] & WARNINGS
             self._diagnose(warning_status(device.serial, device.warnings))

@@ -9,6 +9,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 from unittest import mock
 
@@ -150,6 +151,28 @@ class TestMcap(unittest.TestCase):
         bag = self.convert(self.csv, "cut_from.mcap")
         most, unread = bags.truncations(FINGERTIP, bag, self.csv, self.folder, 24, 3)
         self.assertEqual((most, unread), (1, 0))
+
+    def test_of_a_killed_recorder_every_written_chunk_is_read(self):
+        port, bag = self.folder / "killed_port", self.folder / "killed.mcap"
+        device = subprocess.Popen([FAKE_DEVICE, port, f"rate={bags.RATE_Hz}", f"life={bags.PATIENCE_s}"])
+        recorder = None
+        try:
+            end_s = time.monotonic() + bags.PATIENCE_s
+            while not port.is_symlink() and time.monotonic() < end_s:
+                time.sleep(0.02)
+            recorder = subprocess.Popen([FINGERTIP, "record", bag, "--port", port], stderr=subprocess.DEVNULL)
+            while not (bag.exists() and any(topic.endswith("/contact") for topic, _, _ in bags.by_mcap_stream(bag))):
+                self.assertLess(time.monotonic(), end_s)
+                time.sleep(0.02)
+        finally:
+            for process in filter(None, (recorder, device)):
+                process.kill()
+                process.wait()
+        whole = self.convert(bag, "killed.csv").read_bytes()
+        self.assertNotIn(b"\n# end:", whole)
+        rows = [line for line in whole.splitlines() if line[:1].isdigit()]
+        self.assertGreater(len(rows), 0)
+        self.assertEqual(sum(topic.endswith("/contact") for topic, _, _ in bags.by_mcap_stream(bag)), len(rows))
 
     def test_a_damaged_chunk_is_named_and_the_others_are_read(self):
         path = self.damaged("damaged.mcap")
