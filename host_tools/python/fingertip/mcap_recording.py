@@ -73,15 +73,23 @@ def place(flags: int, x_mm: float, y_mm: float) -> dict[str, float]:
     return {"x": x_mm / 1000, "y": y_mm / 1000, "z": 0.0} if trusted else {"x": math.nan, "y": math.nan, "z": math.nan}
 
 
+def pressure_cloud(x_mm: list[float], y_mm: list[float], valid: int, pressures_Pa: list[float], tare_Pa: list[float]) -> dict[str, Any]:
+    """sensor_msgs/PointCloud2 of a raw packet, without its header."""
+    count = len(pressures_Pa)
+    data = b"".join(struct.pack("<4f", x_mm[k] / 1000, y_mm[k] / 1000, 0.0, pressures_Pa[k] - tare_Pa[k] if valid >> k & 1 else math.nan)
+                    for k in range(count))
+    fields = [{"name": name, "offset": 4 * i, "datatype": 7, "count": 1} for i, name in enumerate(("x", "y", "z", "pressure_pa"))]
+    return {"height": 1, "width": count, "fields": fields, "is_bigendian": False, "point_step": 16, "row_step": 16 * count, "data": data,
+            "is_dense": False}
+
+
 class _Cloud:
     """sensor_msgs/PointCloud2 of raw packets, all of whose bytes but stamp and pressures are the same each time."""
 
     def __init__(self, frame_id: str, x_mm: list[float], y_mm: list[float], sensors: int) -> None:
-        fields = [{"name": name, "offset": 4 * i, "datatype": 7, "count": 1} for i, name in enumerate(("x", "y", "z", "pressure_pa"))]
-        places = [struct.pack("<4f", x_mm[k] / 1000, y_mm[k] / 1000, 0.0, math.nan) for k in range(sensors)]
-        self._bytes = bytearray(encode(PRESSURES_TYPE, {
-            "header": {"stamp": stamp(0), "frame_id": frame_id}, "height": 1, "width": sensors, "fields": fields, "is_bigendian": False,
-            "point_step": 16, "row_step": 16 * sensors, "data": b"".join(places), "is_dense": False}))
+        zeros = [0.0] * sensors
+        cloud = {"header": {"stamp": stamp(0), "frame_id": frame_id}, **pressure_cloud(x_mm, y_mm, 0, zeros, zeros)}
+        self._bytes = bytearray(encode(PRESSURES_TYPE, cloud))
         end = len(self._bytes) - 1  # behind the data is_dense
         self._places = range(end - 16 * sensors + 12, end, 16)
 

@@ -29,6 +29,7 @@ from mcap.reader import make_reader  # noqa: E402
 from mcap.records import Message  # noqa: E402
 from mcap.stream_reader import StreamReader  # noqa: E402
 from mcap_ros2.decoder import DecoderFactory  # noqa: E402
+from python_package import wait_for  # noqa: E402
 from rosbags.highlevel import AnyReader  # noqa: E402
 
 PATIENCE_s = 60
@@ -50,11 +51,7 @@ def record(tool, fake_device, folder, seconds, **options):
     options = {"rate": RATE_Hz, "life": 2 * PATIENCE_s, **options}
     device = subprocess.Popen([fake_device, port, *(f"{key}={value}" for key, value in options.items())])
     try:
-        end_s = time.monotonic() + PATIENCE_s
-        while not port.is_symlink():
-            if time.monotonic() > end_s:
-                raise InputError(f"the simulated fingertip: waited {PATIENCE_s} s in vain")
-            time.sleep(0.02)
+        wait_for(port)
         call(tool, "record", bag, "--port", port, "--seconds", seconds, "--raw-bytes", capture, "--overwrite")
     finally:
         device.kill()

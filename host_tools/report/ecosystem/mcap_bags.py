@@ -6,7 +6,7 @@ import subprocess
 from fingertip.files import InputError
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-SECONDS = 10
+SECONDS = 4
 TRUNCATIONS = 1000
 PATIENCE_s = 1800
 GOALS = (("mcap_messages_differ", "<=", 0), ("mcap_bags_differ", "<=", 0), ("mcap_round_trips_differ", "<=", 0), ("mcap_chunks_lost", "<=", 1),

@@ -157,9 +157,8 @@ class TestMcap(unittest.TestCase):
         device = subprocess.Popen([FAKE_DEVICE, port, f"rate={bags.RATE_Hz}", f"life={bags.PATIENCE_s}"])
         recorder = None
         try:
+            bags.wait_for(port)
             end_s = time.monotonic() + bags.PATIENCE_s
-            while not port.is_symlink() and time.monotonic() < end_s:
-                time.sleep(0.02)
             recorder = subprocess.Popen([FINGERTIP, "record", bag, "--port", port], stderr=subprocess.DEVNULL)
             while not (bag.exists() and any(topic.endswith("/contact") for topic, _, _ in bags.by_mcap_stream(bag))):
                 self.assertLess(time.monotonic(), end_s)
