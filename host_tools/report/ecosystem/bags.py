@@ -310,7 +310,7 @@ def main(tool, fake_device, seconds, count):
     with tempfile.TemporaryDirectory(prefix="fingertip-") as name:
         folder = pathlib.Path(name)
         os.environ["XDG_RUNTIME_DIR"] = name
-        bag, capture = record(tool, fake_device, folder, seconds, calibrated=1, pad=1, drop=97, health=500)
+        bag, capture = record(tool, fake_device, folder, seconds, rate=400, calibrated=1, pad=1, drop=97, health=500)
         told = folder / "told.csv"
         call(tool, "convert", bag, told)
         random_csv = folder / "random.csv"

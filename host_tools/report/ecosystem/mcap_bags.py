@@ -6,7 +6,7 @@ import subprocess
 from fingertip.files import InputError
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-SECONDS = 4
+SECONDS = 5
 TRUNCATIONS = 1000
 PATIENCE_s = 1800
 GOALS = (("mcap_messages_differ", "<=", 0), ("mcap_bags_differ", "<=", 0), ("mcap_round_trips_differ", "<=", 0), ("mcap_chunks_lost", "<=", 1),
@@ -29,7 +29,7 @@ def measure(build, steps):
 
 def text(found):
     return ["## MCAP", "",
-            f"A recording of a simulated fingertip by the tool ({found['mcap_seconds']} s, 1300 frames a second, packets lost on purpose), and one of random "
+            f"A recording of a simulated fingertip by the tool ({found['mcap_seconds']} s, 400 frames a second, packets lost on purpose), and one of random "
             "packets by the Python package with all flags, restarts and missing packets. Each as the tool writes it and as the package does, which must "
             f"be equal; {found['mcap_messages']} messages in all, read by PyPI's mcap with mcap-ros2-support, by mcap without the index, and by rosbags, "
             "and compared with one another and with the cells of the CSV file ([bags.py](bags.py)). Round trips, byte by byte: CSV, MCAP, CSV; MCAP, CSV, "
