@@ -39,6 +39,7 @@ arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/include/fftw3.h libfftw3-dev
 /usr/include/libusb-1.0/libusb.h libusb-1.0-0-dev
 /usr/include/modbus/modbus.h libmodbus-dev
+/usr/include/zstd.h libzstd-dev
 /usr/include/CLI/CLI.hpp libcli11-dev
 /usr/include/eigen3/Eigen/Dense libeigen3-dev
 /usr/include/nlohmann/json.hpp nlohmann-json3-dev
@@ -117,8 +118,8 @@ if ! cmp -s $emulator/package-lock.json $emulator/node_modules/.installed-lock; 
   cp $emulator/package-lock.json $emulator/node_modules/.installed-lock
 fi
 
-if [ "$1" = test ] && ! cmp -s tests/requirements.txt build/venv/.installed-requirements; then
-  say "fetching the tests' judges with pip"
+if { [ "$1" = test ] || [ "$1" = report ]; } && ! cmp -s tests/requirements.txt build/venv/.installed-requirements; then
+  say "fetching the judges with pip"
   /usr/bin/python3 -m venv --clear build/venv
   build/venv/bin/pip --quiet --disable-pip-version-check install -r tests/requirements.txt
   cp tests/requirements.txt build/venv/.installed-requirements

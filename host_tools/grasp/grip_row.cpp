@@ -4,9 +4,7 @@
 #include "libfingertip/error.hpp"
 #include "libfingertip/text.hpp"
 
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <vector>
 
 namespace fingertip {
@@ -202,53 +200,46 @@ GripRow grip_row(std::string_view value) {
 }
 
 GripRowReader::GripRowReader(const std::string &path, bool salvage)
-    : path_(path), salvage_(salvage), file_(path, std::ios::binary) {
-  if (!file_) {
-    throw Error(ErrorCode::cannot_read, path + ": " + std::strerror(errno));
-  }
-}
+    : path_(path), salvage_(salvage), lines_(open_lines(path)) {}
 
 std::optional<GripRow> GripRowReader::next() {
   static const std::string beginning = std::string("# ") + GRIP_ROW_KEY + ": ";
-  std::string line;
-  while (std::getline(file_, line)) {
-    line_number_++;
-    if (line.compare(0, beginning.size(), beginning) != 0) {
+  LineSource::Line line;
+  for (;;) {
+    try {
+      if (!lines_->next(line)) {
+        return std::nullopt;
+      }
+    } catch (const Error &error) {
+      if (!salvage_ || error.code() != ErrorCode::damaged_line) {
+        throw;
+      }
       continue;
     }
-    const std::string_view value = trim(std::string_view(line).substr(beginning.size()));
+    if (line.text.compare(0, beginning.size(), beginning) != 0) {
+      continue;
+    }
+    const std::string_view value = trim(std::string_view(line.text).substr(beginning.size()));
     if (value.substr(0, 8) == "time_us,") {
       if (value != "time_us," + grip_columns()) {
         throw Error(ErrorCode::other_format,
-                    path_ + ":" + std::to_string(line_number_) +
+                    path_ + ":" + std::to_string(line.number) +
                         ": other columns of the gripper than this version's");
       }
       continue;
     }
     try {
-      if (file_.eof()) {
+      if (line.torn) {
         throw Error(ErrorCode::damaged_line, "the last line is torn");
       }
       return grip_row(value);
     } catch (const Error &error) {
       if (!salvage_) {
         throw Error(ErrorCode::damaged_line,
-                    path_ + ":" + std::to_string(line_number_) + ": " + error.what());
+                    path_ + ":" + std::to_string(line.number) + ": " + error.what());
       }
     }
   }
-  return std::nullopt;
-}
-
-GripRowReader::Place GripRowReader::place() {
-  file_.clear();
-  return {file_.tellg(), line_number_};
-}
-
-void GripRowReader::go_to(const Place &place) {
-  file_.clear();
-  file_.seekg(place.offset);
-  line_number_ = place.line_number;
 }
 
 } // namespace fingertip

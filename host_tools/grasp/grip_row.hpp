@@ -17,9 +17,10 @@
 
 #include "grasp/core.hpp"
 #include "gripper/gripper.hpp"
+#include "libfingertip/line_source.hpp"
 
 #include <cstdint>
-#include <fstream>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -50,18 +51,14 @@ public:
 
   std::optional<GripRow> next();
 
-  struct Place {
-    std::streamoff offset = 0;
-    std::uint64_t line_number = 0;
-  };
-  Place place();
-  void go_to(const Place &place);
+  using Place = LineSource::Place;
+  Place place() { return lines_->place(); }
+  void go_to(const Place &place) { lines_->go_to(place); }
 
 private:
   std::string path_;
   bool salvage_;
-  std::ifstream file_;
-  std::uint64_t line_number_ = 0;
+  std::unique_ptr<LineSource> lines_;
 };
 
 } // namespace fingertip

@@ -15,7 +15,7 @@ JointRecordingWriter::JointRecordingWriter(const std::string &path, bool replace
                                            const std::vector<wire_info> &infos,
                                            const Metadata &extra, std::int64_t host_zero_us,
                                            bool raw_expected, OutputFile::Appears appears)
-    : file_(path, replace, appears), host_zero_us_(host_zero_us) {
+    : file_(make_lines(path, replace, appears)), host_zero_us_(host_zero_us) {
   std::string serials;
   for (std::size_t i = 0; i < infos.size(); i++) {
     if (infos[i].sensor_count != infos[0].sensor_count) {
@@ -58,8 +58,7 @@ JointRecordingWriter::JointRecordingWriter(const std::string &path, bool replace
 }
 
 void JointRecordingWriter::line(const std::string &text) {
-  std::string whole = text + "\n";
-  file_.append(whole.data(), whole.size());
+  file_->line(text);
 }
 
 void JointRecordingWriter::line(std::size_t device, double host_us, const std::string &text) {
@@ -144,7 +143,7 @@ void JointRecordingWriter::finish(const std::vector<LineStatistics> &statistics,
   double seconds = frames() > 0 ? (last_us_ - static_cast<double>(host_zero_us_)) / 1e6 : 0;
   line("# end: reason=" + reason + " frames=" + std::to_string(frames()) + " seconds=" +
        fixed(seconds, 6) + " alignment_us=" + fixed(alignment_us_, 1) + " " + sum.text());
-  file_.finish();
+  file_->finish();
 }
 
 } // namespace fingertip

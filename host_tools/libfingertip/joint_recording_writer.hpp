@@ -3,11 +3,12 @@
 
 #include "libfingertip/clock_fit.hpp"
 #include "libfingertip/decoder.hpp"
-#include "libfingertip/output_file.hpp"
+#include "libfingertip/line_sink.hpp"
 #include "libfingertip/recording_lines.hpp"
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,7 +37,7 @@ public:
   std::uint64_t frames(std::size_t device) const { return devices_[device].lines.frames(); }
   /* The bound on the distance in time of two rows of different fingertips, so far. */
   double alignment_us() const { return alignment_us_; }
-  const std::string &path() const { return file_.path(); }
+  const std::string &path() const { return file_->path(); }
 
 private:
   struct Device {
@@ -55,7 +56,7 @@ private:
   void line(std::size_t device, double host_us, const std::string &text);
   std::string time_text(double host_us) const;
 
-  OutputFile file_;
+  std::unique_ptr<LineSink> file_;
   std::int64_t host_zero_us_;
   std::vector<Device> devices_;
   bool head_written_ = false;

@@ -16,7 +16,7 @@ PacketFile::PacketFile(const std::string &path, bool salvage, const std::string 
   start.resize(static_cast<std::size_t>(bytes_.gcount()));
   bytes_.clear();
   bytes_.seekg(0);
-  if (start.rfind("# fingertip-", 0) == 0) {
+  if (start.rfind("# fingertip-", 0) == 0 || is_mcap(path)) {
     bytes_.close();
     reader_ = std::make_unique<RecordingReader>(path, salvage, device);
   } else if (!start.empty() && start.find('\0') == std::string::npos) {

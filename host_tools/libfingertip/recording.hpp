@@ -1,4 +1,5 @@
-/* Recordings: what a fingertip said, as a CSV file that people, pandas and numpy read as it is.
+/* Recordings: what a fingertip said, as a CSV file that people, pandas and numpy read as it is; or,
+ * where its name ends with .mcap, the same lines as ROS 2 messages (mcap_recording.hpp).
  *
  *   # fingertip-recording 1
  *   # key: value

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -337,6 +338,95 @@ inline std::size_t contact_columns(bool has_tangential = true) {
   Namer namer;
   visit_contact(namer, packet, has_tangential);
   return static_cast<std::size_t>(std::count(namer.text.begin(), namer.text.end(), ','));
+}
+
+/* The packets of a row. */
+struct RowPackets {
+  std::optional<wire_packet> contact, raw; /* one of them at least */
+};
+
+/* From t_us on. */
+inline std::string row_text(const wire_packet *contact, const wire_packet *raw,
+                            std::uint8_t sensor_count, bool has_tangential = true) {
+  const wire_packet &any = contact ? *contact : *raw;
+  std::uint32_t frame = contact ? contact->body.contact.frame : raw->body.raw.frame;
+  RowWriter writer;
+  writer.text = std::to_string(any.t_us) + "," + std::to_string(frame);
+  if (contact) {
+    wire_packet copy = *contact;
+    visit_contact(writer, copy, has_tangential);
+  } else {
+    writer.text += std::string(contact_columns(has_tangential), ',');
+  }
+  if (raw) {
+    wire_packet copy = *raw;
+    visit_raw(writer, copy, sensor_count);
+  } else {
+    writer.text += std::string(RAW_COLUMNS + 2u * sensor_count, ',');
+  }
+  return writer.text;
+}
+
+/* Back. Throws Damage. */
+inline RowPackets parse_row(std::string_view text, std::uint8_t sensor_count, bool has_tangential) {
+  auto cells = split(text, ',');
+  std::size_t contact_count = contact_columns(has_tangential);
+  std::size_t raw_count = RAW_COLUMNS + 2 * std::size_t{sensor_count};
+  if (cells.size() != 2 + contact_count + raw_count) {
+    throw Damage{std::to_string(cells.size()) + " columns where the header has " +
+                 std::to_string(2 + contact_count + raw_count)};
+  }
+  auto is_empty = [&](std::size_t from, std::size_t count) {
+    return std::all_of(cells.begin() + static_cast<std::ptrdiff_t>(from),
+                       cells.begin() + static_cast<std::ptrdiff_t>(from + count),
+                       [](std::string_view cell) { return cell.empty(); });
+  };
+  std::uint64_t t_us = 0;
+  std::uint32_t frame = 0;
+  parse_cell("t_us", cells[0], t_us);
+  parse_cell("frame", cells[1], frame);
+  RowPackets row;
+  if (!is_empty(2, contact_count)) {
+    wire_packet &packet = row.contact.emplace();
+    packet.type = WIRE_CONTACT;
+    packet.t_us = t_us;
+    RowReader reader{cells, 2};
+    visit_contact(reader, packet, has_tangential);
+    packet.body.contact.frame = frame;
+  }
+  if (!is_empty(2 + contact_count, raw_count)) {
+    if (sensor_count == 0) {
+      throw Damage{"pressures in a recording without sensors"};
+    }
+    wire_packet &packet = row.raw.emplace();
+    packet.type = WIRE_RAW;
+    packet.t_us = t_us;
+    RowReader reader{cells, 2 + contact_count};
+    visit_raw(reader, packet, sensor_count);
+    packet.body.raw.frame = frame;
+    packet.body.raw.sensor_count = sensor_count;
+  }
+  if (!row.contact && !row.raw) {
+    throw Damage{"a row without a packet"};
+  }
+  return row;
+}
+
+/* The columns of a header, from t_us on. */
+struct Columns {
+  std::uint8_t sensor_count;
+  bool has_tangential;
+};
+inline std::optional<Columns> columns_of(const std::string &header) {
+  auto columns = static_cast<std::size_t>(std::count(header.begin(), header.end(), ',')) + 1;
+  bool has_tangential = header.find(",qx_N,") != std::string::npos;
+  std::size_t fixed_columns = 2 + contact_columns(has_tangential) + RAW_COLUMNS;
+  std::size_t sensors = columns > fixed_columns ? (columns - fixed_columns) / 2 : 0;
+  if (sensors > FT_MAX_SENSORS ||
+      header != header_text(static_cast<std::uint8_t>(sensors), has_tangential)) {
+    return std::nullopt;
+  }
+  return Columns{static_cast<std::uint8_t>(sensors), has_tangential};
 }
 
 } // namespace fingertip::recording

@@ -30,22 +30,7 @@ double PacketLines::seconds() const {
 
 void PacketLines::row(const wire_packet *contact, const wire_packet *raw) {
   const wire_packet &any = contact ? *contact : *raw;
-  std::uint32_t frame = contact ? contact->body.contact.frame : raw->body.raw.frame;
-  RowWriter writer;
-  writer.text = std::to_string(any.t_us) + "," + std::to_string(frame);
-  if (contact) {
-    wire_packet copy = *contact;
-    visit_contact(writer, copy);
-  } else {
-    writer.text += std::string(contact_columns(), ',');
-  }
-  if (raw) {
-    wire_packet copy = *raw;
-    visit_raw(writer, copy, sensor_count_);
-  } else {
-    writer.text += std::string(RAW_COLUMNS + 2u * sensor_count_, ',');
-  }
-  row_(any.t_us, writer.text);
+  row_(any.t_us, row_text(contact, raw, sensor_count_));
   frames_++;
   if (first_us_ && any.t_us < last_us_) {
     before_restart_us_ += last_us_ - *first_us_;

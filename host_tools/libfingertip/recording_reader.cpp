@@ -6,7 +6,6 @@
 #include "libfingertip/text.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 #include <map>
 
@@ -41,36 +40,27 @@ std::string format_of(const std::string &path, const std::string &line) {
 } // namespace
 
 RecordingReader::RecordingReader(const std::string &path, bool salvage, const std::string &device)
-    : path_(path), salvage_(salvage), file_(path, std::ios::binary), wanted_(device) {
-  if (!file_) {
-    throw Error(ErrorCode::cannot_read, path + ": " + std::strerror(errno));
-  }
+    : path_(path), salvage_(salvage), source_(open_lines(path)), wanted_(device) {
   std::memset(&info_, 0, sizeof info_);
-  std::string first;
-  std::getline(file_, first);
+  LineSource::Line first;
+  try {
+    if (!source_->next(first)) {
+      first.text.clear();
+    }
+  } catch (const Error &error) {
+    bool damaged = error.code() == ErrorCode::damaged_line;
+    throw Error(damaged ? ErrorCode::damaged_head : error.code(), error.what());
+  }
   line_number_ = 1;
-  joint_ = format_of(path, first) == FORMAT_OF_SEVERAL;
+  joint_ = format_of(path, first.text) == FORMAT_OF_SEVERAL;
 }
 
+RecordingReader::~RecordingReader() = default;
+RecordingReader::RecordingReader(RecordingReader &&) noexcept = default;
+RecordingReader &RecordingReader::operator=(RecordingReader &&) noexcept = default;
+
 std::optional<RecordingReader::Item> RecordingReader::next() {
-  std::string text;
-  while (items_.empty() && std::getline(file_, text)) {
-    line_number_++;
-    try {
-      if (file_.eof() && !text.empty()) {
-        throw Damage{"the last line is torn"};
-      }
-      if (!text.empty() && text.back() == '\r') {
-        text.pop_back(); /* somebody's editor */
-      }
-      read_line(text);
-    } catch (const Damage &damage) {
-      if (!salvage_ || !header_seen_) {
-        throw Error(header_seen_ ? ErrorCode::damaged_line : ErrorCode::damaged_head,
-                    path_ + ":" + std::to_string(line_number_) + ": " + damage.what);
-      }
-      skipped_lines_++;
-    }
+  while (items_.empty() && read_next()) {
   }
   if (items_.empty()) {
     if (!header_seen_) {
@@ -81,6 +71,46 @@ std::optional<RecordingReader::Item> RecordingReader::next() {
   Item item = items_.front();
   items_.pop_front();
   return item;
+}
+
+/* False at the end. */
+bool RecordingReader::read_next() {
+  LineSource::Line line;
+  auto damaged = [&](const std::string &what, std::uint64_t lines) {
+    if (!salvage_ || !header_seen_) {
+      throw Error(header_seen_ ? ErrorCode::damaged_line : ErrorCode::damaged_head, what);
+    }
+    skipped_lines_ += lines;
+  };
+  try {
+    if (!source_->next(line)) {
+      return false;
+    }
+  } catch (const Error &error) {
+    if (error.code() != ErrorCode::damaged_line) {
+      throw;
+    }
+    damaged(error.what(), 0); /* how many lines are lost tells the next one's number */
+    return true;
+  }
+  auto place = [&] { return path_ + ":" + std::to_string(line.number) + ": "; };
+  if (line.number > line_number_ + 1) {
+    std::uint64_t lost = line.number - line_number_ - 1;
+    damaged(place() + std::to_string(lost) + " lines are missing before it", lost);
+  }
+  line_number_ = line.number;
+  try {
+    if (line.torn && !line.text.empty()) {
+      throw Damage{"the last line is torn"};
+    }
+    if (!line.text.empty() && line.text.back() == '\r') {
+      line.text.pop_back(); /* somebody's editor */
+    }
+    read_line(line.text);
+  } catch (const Damage &damage) {
+    damaged(place() + damage.what, 1);
+  }
+  return true;
 }
 
 void RecordingReader::read_line(const std::string &text) {
@@ -113,16 +143,12 @@ void RecordingReader::read_line(const std::string &text) {
       }
       text_of_one = text.substr(std::string(JOINT_COLUMNS).size());
     }
-    auto columns =
-        static_cast<std::size_t>(std::count(text_of_one.begin(), text_of_one.end(), ',')) + 1;
-    has_tangential_ = text_of_one.find(",qx_N,") != std::string::npos;
-    std::size_t fixed_columns = 2 + contact_columns(has_tangential_) + RAW_COLUMNS;
-    std::size_t sensors = columns > fixed_columns ? (columns - fixed_columns) / 2 : 0;
-    if (sensors > FT_MAX_SENSORS ||
-        text_of_one != header_text(static_cast<std::uint8_t>(sensors), has_tangential_)) {
+    auto columns = columns_of(text_of_one);
+    if (!columns) {
       throw Damage{"unknown header"};
     }
-    sensor_count_ = static_cast<std::uint8_t>(sensors);
+    sensor_count_ = columns->sensor_count;
+    has_tangential_ = columns->has_tangential;
     header_seen_ = true;
   }
 }
@@ -148,8 +174,8 @@ void RecordingReader::read_comment(const std::string &text) {
   }
   std::string value(text.substr(colon + 2));
   Item item{};
-  std::map<std::string, std::string, std::less<>> pairs;
   if (key == "packet") {
+    std::map<std::string, std::string, std::less<>> pairs;
     auto words = split(value, ' ');
     for (std::size_t i = 1; i < words.size(); i++) {
       std::size_t equals = words[i].find('=');
@@ -297,64 +323,20 @@ void RecordingReader::choose_device(const std::string &serials) {
 }
 
 void RecordingReader::read_row(std::string_view text, std::optional<double> time_us) {
-  auto cells = split(text, ',');
-  std::size_t contact_count = contact_columns(has_tangential_);
-  std::size_t raw_count = RAW_COLUMNS + 2 * std::size_t{sensor_count_};
-  if (cells.size() != 2 + contact_count + raw_count) {
-    throw Damage{std::to_string(cells.size()) + " columns where the header has " +
-                 std::to_string(2 + contact_count + raw_count)};
-  }
-  auto is_empty = [&](std::size_t from, std::size_t count) {
-    return std::all_of(cells.begin() + static_cast<std::ptrdiff_t>(from),
-                       cells.begin() + static_cast<std::ptrdiff_t>(from + count),
-                       [](std::string_view cell) { return cell.empty(); });
-  };
-  std::uint64_t t_us = 0;
-  std::uint32_t frame = 0;
-  parse_cell("t_us", cells[0], t_us);
-  parse_cell("frame", cells[1], frame);
-  std::vector<Item> items;
-  if (!is_empty(2, contact_count)) {
-    Item item{};
-    item.kind = Item::Kind::packet;
-    item.packet.type = WIRE_CONTACT;
-    item.packet.t_us = t_us;
-    RowReader reader{cells, 2};
-    visit_contact(reader, item.packet, has_tangential_);
-    item.packet.body.contact.frame = frame;
-    items.push_back(item);
-  }
-  if (!is_empty(2 + contact_count, raw_count)) {
-    if (sensor_count_ == 0) {
-      throw Damage{"pressures in a recording without sensors"};
+  RowPackets row = parse_row(text, sensor_count_, has_tangential_);
+  for (const auto &packet : {row.contact, row.raw}) {
+    if (packet) {
+      items_.push_back({Item::Kind::packet, *packet, "", time_us});
     }
-    Item item{};
-    item.kind = Item::Kind::packet;
-    item.packet.type = WIRE_RAW;
-    item.packet.t_us = t_us;
-    RowReader reader{cells, 2 + contact_count};
-    visit_raw(reader, item.packet, sensor_count_);
-    item.packet.body.raw.frame = frame;
-    item.packet.body.raw.sensor_count = sensor_count_;
-    items.push_back(item);
-  }
-  if (items.empty()) {
-    throw Damage{"a row without a packet"};
-  }
-  for (Item &item : items) {
-    item.time_us = time_us;
-    items_.push_back(item);
   }
 }
 
 RecordingReader::Place RecordingReader::place() {
-  file_.clear(); /* of the end */
-  return {file_.tellg(), line_number_, skipped_lines_, header_seen_, has_end_, info_, items_};
+  return {source_->place(), line_number_, skipped_lines_, header_seen_, has_end_, info_, items_};
 }
 
 void RecordingReader::go_to(const Place &place) {
-  file_.clear();
-  file_.seekg(place.offset);
+  source_->go_to(place.in_file);
   line_number_ = place.line_number;
   skipped_lines_ = place.skipped_lines;
   header_seen_ = place.header_seen;
@@ -364,22 +346,28 @@ void RecordingReader::go_to(const Place &place) {
 }
 
 std::vector<std::string> fingertips_in(const std::string &path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string line;
   std::vector<std::string> serials;
   constexpr std::string_view key = "# devices: ";
-  /* It is the second line; a capture of the line has no lines. */
-  for (int i = 0; i < 2 && std::getline(file, line); i++) {
-    bool ours = i == 0 ? line.rfind("# fingertip-recording", 0) == 0 : line.rfind(key, 0) == 0;
-    if (!ours) {
-      break;
-    }
-    for (std::string_view serial :
-         split(trim(std::string_view(line).substr(i == 1 ? key.size() : line.size())), ' ')) {
-      if (!serial.empty()) {
-        serials.emplace_back(serial);
+  try {
+    auto lines = open_lines(path);
+    LineSource::Line line;
+    /* It is the second line; a capture of the line has no lines. */
+    for (int i = 0; i < 2 && lines->next(line); i++) {
+      bool ours =
+          i == 0 ? line.text.rfind("# fingertip-recording", 0) == 0 : line.text.rfind(key, 0) == 0;
+      if (!ours) {
+        break;
+      }
+      for (std::string_view serial :
+           split(trim(std::string_view(line.text).substr(i == 1 ? key.size() : line.text.size())),
+                 ' ')) {
+        if (!serial.empty()) {
+          serials.emplace_back(serial);
+        }
       }
     }
+  } catch (const Error &) {
+    serials.clear(); /* who reads it will say */
   }
   return serials;
 }

@@ -1,13 +1,14 @@
-/* Reads recordings; recording.hpp has the format. */
+/* Reads recordings, CSV or MCAP; recording.hpp has the format. */
 #pragma once
 
 #include "libfingertip/decoder.hpp"
+#include "libfingertip/line_source.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/wire.hpp"
 
 #include <cstdint>
 #include <deque>
-#include <fstream>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -32,12 +33,16 @@ public:
    * device: the serial number of one of several fingertips; empty: the only one. */
   RecordingReader(const std::string &path, bool salvage, const std::string &device = "");
 
+  ~RecordingReader();
+  RecordingReader(RecordingReader &&) noexcept;
+  RecordingReader &operator=(RecordingReader &&) noexcept;
+
   /* Nothing at the end of the file. */
   std::optional<Item> next();
 
   /* Where reading stands, to go back to. */
   struct Place {
-    std::streamoff offset = 0;
+    LineSource::Place in_file;
     std::uint64_t line_number = 0, skipped_lines = 0;
     bool header_seen = false, has_end = false;
     wire_info info{};
@@ -55,6 +60,7 @@ public:
   const Metadata &recorder_metadata() const { return recorder_metadata_; }
 
 private:
+  bool read_next();
   void read_line(const std::string &text);
   void read_comment(const std::string &text);
   void read_row(std::string_view text, std::optional<double> time_us = {});
@@ -64,7 +70,7 @@ private:
 
   std::string path_;
   bool salvage_;
-  std::ifstream file_;
+  std::unique_ptr<LineSource> source_;
   std::uint64_t line_number_ = 0;
   std::uint64_t skipped_lines_ = 0;
   bool header_seen_ = false;

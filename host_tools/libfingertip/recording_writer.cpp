@@ -9,7 +9,7 @@ using namespace recording;
 RecordingWriter::RecordingWriter(const std::string &path, bool replace, const wire_info *info,
                                  std::uint8_t sensor_count, const Metadata &extra,
                                  bool raw_expected, OutputFile::Appears appears)
-    : file_(path, replace, appears),
+    : file_(make_lines(path, replace, appears)),
       lines_(
           path, sensor_count, raw_expected,
           [this](const std::string &key, const std::string &value) {
@@ -27,8 +27,7 @@ RecordingWriter::RecordingWriter(const std::string &path, bool replace, const wi
 }
 
 void RecordingWriter::line(const std::string &text) {
-  std::string whole = text + "\n";
-  file_.append(whole.data(), whole.size());
+  file_->line(text);
 }
 
 void RecordingWriter::packet(const wire_packet &packet) {
@@ -44,7 +43,7 @@ void RecordingWriter::finish(const LineStatistics &statistics, const std::string
   lines_.write_pending();
   line("# end: reason=" + reason + " frames=" + std::to_string(lines_.frames()) +
        " seconds=" + fixed(lines_.seconds(), 6) + " " + statistics.text());
-  file_.finish();
+  file_->finish();
 }
 
 } // namespace fingertip

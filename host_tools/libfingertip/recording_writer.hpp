@@ -2,10 +2,11 @@
 #pragma once
 
 #include "libfingertip/decoder.hpp"
-#include "libfingertip/output_file.hpp"
+#include "libfingertip/line_sink.hpp"
 #include "libfingertip/recording_lines.hpp"
 
 #include <cstdint>
+#include <memory>
 #include <string>
 
 namespace fingertip {
@@ -25,12 +26,12 @@ public:
   void finish(const LineStatistics &statistics, const std::string &reason);
 
   std::uint64_t frames() const { return lines_.frames(); }
-  const std::string &path() const { return file_.path(); }
+  const std::string &path() const { return file_->path(); }
 
 private:
   void line(const std::string &text);
 
-  OutputFile file_;
+  std::unique_ptr<LineSink> file_;
   PacketLines lines_;
 };
 

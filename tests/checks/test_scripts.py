@@ -147,6 +147,9 @@ class BootstrapReport(Folder):
             (self.folder / folder).mkdir(parents=True)
         shutil.copy(ROOT / "cmake/bootstrap.sh", self.folder / "cmake")
         (self.folder / "host_tools/emulator/package-lock.json").write_text("{}")
+        for path in ("tests/requirements.txt", "build/venv/.installed-requirements"):
+            (self.folder / path).parent.mkdir(parents=True)
+            (self.folder / path).write_text("")
         for name, body in (("apt-get", ""), ("sudo", ""), ("npm", ""), ("cmake", "echo cmake version 3.25.1"), ("node", "echo v18.0.0")):
             program = self.folder / "bin" / name
             program.write_text(f"#!/bin/sh\n{body}\n")

@@ -11,6 +11,7 @@ void add_doctor(CommandLine &line);
 void add_monitor(CommandLine &line);
 void add_record(CommandLine &line);
 void add_replay(CommandLine &line);
+void add_convert(CommandLine &line);
 void add_grasp(CommandLine &line);
 void add_serve(CommandLine &line);
 void add_tare(CommandLine &line);

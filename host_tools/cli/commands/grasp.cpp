@@ -71,8 +71,8 @@ void add_grasp(CommandLine &line) {
   command->add_flag("--activate", options->activate,
                     "Activate a gripper that is not: it moves, and drops what it holds");
   with_seconds(command, options->seconds, "End after this long, the gripper holding");
-  command->add_option("-o,--record", options->recording, "Record all of it")->type_name("FILE.csv");
-  command->add_flag("--overwrite", options->overwrite, "Replace FILE.csv if it exists");
+  command->add_option("-o,--record", options->recording, "Record all of it")->type_name("FILE.csv|FILE.mcap");
+  command->add_flag("--overwrite", options->overwrite, "Replace the recording if it exists");
   command->add_flag("--quiet", options->quiet, "Only what changes, on standard error");
   with_transport(command, options->reach);
   with_colour(command, options->colour);

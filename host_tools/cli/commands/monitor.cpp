@@ -35,7 +35,7 @@ void add_monitor(CommandLine &line) {
   with_several(command, options->several);
   with_recording(command, options->live);
   command->add_option("--record", options->live.recording, "Record at the same time")
-      ->type_name("FILE.csv");
+      ->type_name("FILE.csv|FILE.mcap");
   with_colour(command, options->live.colour);
 }
 

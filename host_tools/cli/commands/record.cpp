@@ -32,14 +32,16 @@ int record(const RecordOptions &options) {
 void add_record(CommandLine &line) {
   auto options = std::make_shared<RecordOptions>();
   options->live.monitor = false;
-  CLI::App *command = line.add("record", "Record every frame to a CSV file, until Ctrl-C",
+  CLI::App *command = line.add("record", "Record every frame to a CSV or MCAP file, until Ctrl-C",
                                [options] { return record(*options); });
   with_several(command, options->several);
   command
-      ->add_option("file", options->live.recording,
-                   "The recording to write; -: standard output, each row as it comes")
+      ->add_option(
+          "file", options->live.recording,
+          "The recording to write, CSV or MCAP by its name; -: standard output, each row as "
+          "it comes")
       ->required()
-      ->type_name("FILE.csv|-");
+      ->type_name("FILE.csv|FILE.mcap|-");
   with_recording(command, options->live);
 }
 

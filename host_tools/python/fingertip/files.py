@@ -293,21 +293,27 @@ def _packet(path: Path, number: int, text: str) -> tuple[str, dict[str, str]]:
     return words[0], fields
 
 
+MCAP_MAGIC = b"\x89MCAP0\r\n"
 # Some 20 MB are read in a second: below this nobody waits.
 WORTH_WAITING_bytes = 10_000_000
 
 
 class _RecordingLines:
-    """The lines of a recording, one after the other: number, text without its end, whether it is torn."""
+    """The lines of a recording, CSV or MCAP, one after the other: number, text without its end, whether it is torn."""
 
-    def __init__(self, path: Path, progress: Callable[[float], None] | None = None) -> None:
-        self.path, self.progress = path, progress
+    def __init__(self, path: Path, progress: Callable[[float], None] | None = None, salvage: bool = False) -> None:
+        self.path, self.progress, self.salvage = path, progress, salvage
         first = next(iter(self), (1, "", True))[1]
         self.format = _check_kind(path, [first], "recording", ("1", "2"))
 
     def __iter__(self) -> Iterator[tuple[int, str, bool]]:
         try:
             with open(self.path, "rb") as file:
+                if file.read(len(MCAP_MAGIC)) == MCAP_MAGIC:
+                    from .mcap_recording import McapLineReader
+                    yield from McapLineReader(self.path, self.salvage, self.progress)
+                    return
+                file.seek(0)
                 size, read, told = os.fstat(file.fileno()).st_size, 0, 0
                 for number, line in enumerate(file, 1):
                     read += len(line)
@@ -380,7 +386,7 @@ def read_recording(path: Path, salvage: bool = False, device: str | None = None,
                    progress: Callable[[float], None] | None = None) -> Recording:
     """device: the serial number of one of several fingertips. columns: only these (t_us and frame among them), for recordings
     that are too large to hold whole; then there are no sensors. progress: called now and then with the share that was read."""
-    lines = _RecordingLines(path, progress)
+    lines = _RecordingLines(path, progress, salvage)
     devices = recorded_devices(path)
     number_in_file = _choose_device(path, devices, device) if devices else None
     metadata: dict[str, str] = {}
@@ -475,7 +481,7 @@ def read_grip(path: Path, salvage: bool = False) -> dict[str, Any]:
     """The gripper's rows in the recording of a grasp: {column: array}, NaN where empty; of any other recording an empty dictionary."""
     columns: list[str] | None = None
     rows: list[list[Any]] = []
-    for number, line, torn in _RecordingLines(path):
+    for number, line, torn in _RecordingLines(path, salvage=salvage):
         if not line.startswith(GRIP_ROW):
             continue
         cells = line[len(GRIP_ROW):].split(",")

@@ -7,7 +7,7 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import TracebackType
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -17,12 +17,15 @@ from .files import CONTACT_COLUMNS, RAW_COLUMNS, TANGENTIAL_COLUMNS
 from .frames import Q10
 from .wire import Acknowledgement, Calibration, Contact, Health, Info, LineStatistics, Packet, PadProfile, Raw
 
+if TYPE_CHECKING:
+    from . import mcap_recording
+
 LATE_us = 250_000  # rows wait so long for those of others
 CLOCK_LINES_us = 1e6
 _QUANTITIES = [name for name in (*CONTACT_COLUMNS, *TANGENTIAL_COLUMNS) if name not in ("sequence", "flags")]
 
 
-def _shortest(value: float) -> str:
+def shortest(value: float) -> str:
     """The shortest text that reads back the same binary32; nothing for NaN."""
     if math.isnan(value):
         return ""
@@ -32,7 +35,7 @@ def _shortest(value: float) -> str:
 def _cell(value: Any) -> str:
     if value is None:
         return "0"
-    return _shortest(value) if isinstance(value, float) else str(value)
+    return shortest(value) if isinstance(value, float) else str(value)
 
 
 def _number(value: Any) -> str:
@@ -68,7 +71,7 @@ def info_metadata(info: Info) -> dict[str, str]:
             **(_calibration_metadata(info.calibration) if info.calibration else {}), **(_pad_metadata(info.pad) if info.pad else {})}
 
 
-class _LineFile:
+class LineFile:
     """Whole lines, one at a time. Raises InputError."""
 
     def __init__(self, path: "str | os.PathLike[str]", replace: bool) -> None:
@@ -81,10 +84,12 @@ class _LineFile:
             raise InputError(f"{self.path}: {error.strerror}; choose another place") from None
 
     def line(self, text: str) -> None:
-        line = text.encode("utf-8") + b"\n"
+        self.append(text.encode("utf-8") + b"\n")
+
+    def append(self, data: bytes) -> None:
         try:
-            while line:
-                line = line[self._file.write(line):]
+            while data:
+                data = data[self._file.write(data):]
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; the file ends early") from None
 
@@ -93,6 +98,14 @@ class _LineFile:
             self._file.close()
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; the file ends early") from None
+
+
+def _open_lines(path: "str | os.PathLike[str]", replace: bool) -> "LineFile | mcap_recording.McapLines":
+    """What becomes of the lines of a recording; the name says it. Raises InputError."""
+    if os.fspath(path).lower().endswith(".mcap"):
+        from . import mcap_recording
+        return mcap_recording.McapLines(path, replace)
+    return LineFile(path, replace)
 
 
 def _header(sensors: int) -> str:
@@ -218,7 +231,7 @@ class _Writer:
         self._lock = threading.RLock()
         self._closed = False
         self._failure: InputError | None = None
-        self._file = _LineFile(path, replace)
+        self._file = _open_lines(path, replace)
 
     def fail(self, error: InputError) -> None:
         """Closes without an end line; close() will raise this."""
@@ -252,7 +265,8 @@ class _Writer:
 
 
 class RecordingWriter(_Writer):
-    """A recording of one fingertip, from its packets in the order in which they came.
+    """A recording of one fingertip, from its packets in the order in which they came: MCAP where the name ends with .mcap
+    (mcap_recording.py), or CSV.
 
     Lines are written whole. The file is there from the beginning; a recorder that is killed leaves one without an end line, which
     every reader takes. replace: over a file that exists. raw_expected: a contact waits for the raw packet of its frame. count: what the

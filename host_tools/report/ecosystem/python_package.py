@@ -34,6 +34,14 @@ def vectors_that_differ():
     return len(paths), differ
 
 
+def wait_for(port):
+    end_s = time.monotonic() + PATIENCE_s
+    while not port.is_symlink():
+        if time.monotonic() > end_s:
+            raise InputError(f"the simulated fingertip: waited {PATIENCE_s} s in vain")
+        time.sleep(0.02)
+
+
 def reading(build):
     fake = build / "tests/integration/host/fake_device"
     if not fake.exists():
@@ -42,11 +50,7 @@ def reading(build):
         port = pathlib.Path(folder) / "port"
         device = subprocess.Popen([fake, port, f"rate={RATE_Hz}", f"life={SECONDS + 2 * PATIENCE_s}"])
         try:
-            end_s = time.monotonic() + PATIENCE_s
-            while not port.is_symlink():
-                if time.monotonic() > end_s:
-                    raise InputError(f"the simulated fingertip: waited {PATIENCE_s} s in vain")
-                time.sleep(0.02)
+            wait_for(port)
             done = subprocess.run([sys.executable, ROOT / "host_tools/report/ecosystem/reader.py", port, str(SECONDS)], capture_output=True,
                                   text=True, timeout=SECONDS + PATIENCE_s, env={**os.environ, "XDG_RUNTIME_DIR": folder}, check=False)
         finally:

@@ -131,7 +131,7 @@ class Usage(CliTest):
         self.assertRegex(self.run_cli("--version")[0], r"^fingertip \d+\.\d+\.\d+\n$")
         commands = re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
         self.assertEqual(sorted(commands), sorted(
-            ["list", "info", "doctor", "monitor", "record", "replay", "grasp", "gripper", "tare", "calibrate", "pad", "set", "serve", "flash", "rule", "loader",
+            ["list", "info", "doctor", "monitor", "record", "replay", "convert", "grasp", "gripper", "tare", "calibrate", "pad", "set", "serve", "flash", "rule", "loader",
              "encode"]))
         for command in commands:
             self.assertIn(f"Usage: fingertip {command}", self.run_cli(command, "--help")[0])
@@ -156,7 +156,7 @@ class Usage(CliTest):
     def test_what_the_parser_says_is_for_people(self):
         self.assertEqual(self.error("info", "--port", "a", "--port", "b", status=2),
                          "fingertip: --port is given twice; give it once; see fingertip info --help\n")
-        self.assertEqual(self.error("record", status=2), "fingertip: FILE.csv|- is missing; see fingertip record --help\n")
+        self.assertEqual(self.error("record", status=2), "fingertip: FILE.csv|FILE.mcap|- is missing; see fingertip record --help\n")
         self.assertEqual(self.error("encode", status=2), "fingertip: COMMAND [ARGS] is missing; see fingertip encode --help\n")
 
     def test_help_fits_into_80_columns(self):
@@ -1034,7 +1034,7 @@ class Replay(CliTest):
         os.symlink("r.csv", self.folder + "/soft.csv")
         for name in ("r.csv", "./r.csv", "hard.csv", "soft.csv"):
             err = self.error("replay", self.csv, "--to-csv", os.path.join(self.folder, name), "--overwrite")
-            self.assertIn("give --to-csv another name", err)
+            self.assertIn("is the file to read; give another name", err)
         self.assertIn("is a folder", self.error("replay", self.ftr, "--to-csv", self.folder, "--overwrite"))
         self.assertIn("exists already", self.error("replay", self.ftr, "--to-csv", self.csv))
 

@@ -1,0 +1,31 @@
+/* Where the lines of a recording go: a CSV file, or an MCAP file (mcap_recording.hpp) if its name
+ * ends with .mcap. */
+#pragma once
+
+#include "libfingertip/output_file.hpp"
+
+#include <memory>
+#include <string>
+
+namespace fingertip {
+
+class LineSink {
+public:
+  virtual ~LineSink() = default;
+
+  /* Without its end. Throws Error if the disk is full, or the file cannot hold it. */
+  virtual void line(const std::string &text) = 0;
+  /* A last one that has no end. */
+  virtual void torn_line(const std::string &text) = 0;
+  /* Last of all. */
+  virtual void finish() = 0;
+  virtual const std::string &path() const = 0;
+};
+
+bool is_mcap_name(const std::string &path);
+
+/* Throws Error as OutputFile does. */
+std::unique_ptr<LineSink> make_lines(const std::string &path, bool replace,
+                                     OutputFile::Appears appears);
+
+} // namespace fingertip

@@ -1,0 +1,43 @@
+/* The lines of a recording, whatever file they are in: CSV, or MCAP (mcap_recording.hpp). */
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <ios>
+#include <memory>
+#include <string>
+
+#pragma GCC visibility push(default)
+namespace fingertip {
+
+class LineSource {
+public:
+  struct Line {
+    std::uint64_t number; /* from 1; where lines are lost, the next one's */
+    std::string text;     /* without its end */
+    bool torn;            /* the file ends within it */
+  };
+  struct Place {
+    std::streamoff offset = 0;
+    std::size_t message = 0; /* of a chunk that begins there */
+    std::uint64_t number = 0;
+  };
+
+  virtual ~LineSource() = default;
+
+  /* False at the end. Throws Error with file and place where they are damaged; the next call goes
+   * on behind the damage. */
+  virtual bool next(Line &line) = 0;
+  /* Where reading stands, to go back to. */
+  virtual Place place() = 0;
+  virtual void go_to(const Place &place) = 0;
+};
+
+/* Whether it begins as an MCAP file does. */
+bool is_mcap(const std::string &path);
+
+/* Throws Error if it cannot be read. */
+std::unique_ptr<LineSource> open_lines(const std::string &path);
+
+} // namespace fingertip
+#pragma GCC visibility pop

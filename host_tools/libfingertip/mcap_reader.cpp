@@ -1,0 +1,190 @@
+#include "libfingertip/mcap_reader.hpp"
+
+#include "libfingertip/error.hpp"
+#include "libfingertip/little_endian.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <zstd.h>
+
+namespace fingertip::mcap {
+
+namespace {
+
+/* Of a chunk, as little memory for a lie; others write up to some MB. */
+constexpr std::uint64_t CHUNK_MOST_bytes = 1 << 26;
+
+/* The fields of a record's content. */
+class Fields {
+public:
+  explicit Fields(std::string_view bytes) : bytes_(bytes) {}
+
+  template <typename Number> Number get() {
+    std::string_view bytes = take(sizeof(Number));
+    return number_at<Number>(bytes, 0);
+  }
+  template <typename Length = std::uint32_t> std::string_view text() {
+    auto length = get<Length>();
+    return take(length);
+  }
+  std::string_view rest() { return take(bytes_.size()); }
+
+private:
+  std::string_view take(std::uint64_t length) {
+    if (length > bytes_.size()) {
+      throw Damage("a record ends within a field");
+    }
+    std::string_view taken = bytes_.substr(0, length);
+    bytes_.remove_prefix(length);
+    return taken;
+  }
+  std::string_view bytes_;
+};
+
+std::string unpacked(std::string_view packed, std::uint64_t size) {
+  if (size > CHUNK_MOST_bytes) {
+    throw Damage("a chunk of " + std::to_string(size) + " bytes");
+  }
+  unsigned long long told = ZSTD_getFrameContentSize(packed.data(), packed.size());
+  if (told != size && told != ZSTD_CONTENTSIZE_UNKNOWN) {
+    throw Damage("a chunk's length is wrong");
+  }
+  std::string bytes(size, '\0');
+  std::size_t length = ZSTD_decompress(bytes.data(), bytes.size(), packed.data(), packed.size());
+  if (ZSTD_isError(length) || length != size) {
+    throw Damage("a chunk cannot be unpacked");
+  }
+  return bytes;
+}
+
+} // namespace
+
+Reader::Reader(const std::string &path) : file_(path, std::ios::binary) {
+  file_.seekg(0, std::ios::end);
+  size_ = file_.tellg();
+  if (!file_) {
+    throw Error(ErrorCode::cannot_read, path + ": " + std::strerror(errno));
+  }
+}
+
+bool Reader::next(Message &message) {
+  while (at_message_ == messages_.size()) {
+    if (!read_record()) {
+      return false;
+    }
+  }
+  message = messages_[at_message_++];
+  return true;
+}
+
+/* False at the end. */
+bool Reader::read_record() {
+  messages_.clear();
+  at_message_ = 0;
+  record_ = next_;
+  if (ended_) {
+    return false;
+  }
+  char head[RECORD_HEAD_BYTES];
+  file_.clear();
+  file_.seekg(record_);
+  auto left = static_cast<std::uint64_t>(size_ - record_);
+  if (left < sizeof head || !file_.read(head, sizeof head)) {
+    torn_ = left > 0; /* a killed writer leaves whole chunks */
+    ended_ = true;
+    return false;
+  }
+  auto opcode = static_cast<std::uint8_t>(head[0]);
+  auto length = number_at<std::uint64_t>({head, sizeof head}, 1);
+  if (length > left - sizeof head) {
+    torn_ = ended_ = true;
+    return false;
+  }
+  next_ = record_ + static_cast<std::streamoff>(sizeof head + length);
+  if (opcode == DATA_END) {
+    ended_ = true;
+    return false;
+  }
+  if (opcode == SCHEMA || opcode == CHANNEL || opcode == MESSAGE || opcode == CHUNK) {
+    std::string content(length, '\0');
+    if (!file_.read(content.data(), static_cast<std::streamsize>(length))) {
+      throw Damage("byte " + std::to_string(record_) + ": it cannot be read");
+    }
+    try {
+      judge(opcode, content, 0);
+    } catch (const Damage &damage) {
+      messages_.clear();
+      const std::streamoff at = record_;
+      record_ = next_;
+      throw Damage("byte " + std::to_string(at) + ": " + damage.what());
+    }
+  }
+  return true;
+}
+
+void Reader::judge(std::uint8_t opcode, std::string_view content, int depth) {
+  Fields fields(content);
+  if (opcode == SCHEMA) {
+    auto id = fields.get<std::uint16_t>();
+    schemas_[id] = fields.text();
+  } else if (opcode == CHANNEL) {
+    auto id = fields.get<std::uint16_t>();
+    auto schema = fields.get<std::uint16_t>();
+    Channel channel;
+    channel.topic = fields.text();
+    channel.encoding = fields.text();
+    channel.type = schemas_[schema];
+    channels_[id] = channel;
+  } else if (opcode == MESSAGE) {
+    auto channel = channels_.find(fields.get<std::uint16_t>());
+    if (channel == channels_.end()) {
+      throw Damage("a message on an unknown channel");
+    }
+    fields.get<std::uint32_t>(); /* sequence */
+    fields.get<std::uint64_t>(); /* times */
+    fields.get<std::uint64_t>();
+    const Channel &found = channel->second;
+    messages_.push_back({found.topic, found.type, found.encoding, std::string(fields.rest())});
+  } else if (opcode == CHUNK && depth == 0) {
+    read_chunk(content);
+  }
+}
+
+void Reader::read_chunk(std::string_view content) {
+  Fields fields(content);
+  fields.get<std::uint64_t>(); /* times */
+  fields.get<std::uint64_t>();
+  auto size = fields.get<std::uint64_t>();
+  auto crc = fields.get<std::uint32_t>();
+  std::string_view compression = fields.text();
+  std::string_view packed = fields.text<std::uint64_t>();
+  if (!compression.empty() && compression != "zstd") {
+    throw Damage("compression \"" + std::string(compression.substr(0, 20)) + "\" is unknown");
+  }
+  const std::string records = compression.empty() ? std::string(packed) : unpacked(packed, size);
+  if (records.size() != size || (crc != 0 && crc_of(records) != crc)) {
+    throw Damage("a chunk's CRC is wrong");
+  }
+  std::string_view rest = records;
+  while (!rest.empty()) {
+    Fields record(rest);
+    auto opcode = record.get<std::uint8_t>();
+    std::string_view inner = record.text<std::uint64_t>();
+    judge(opcode, inner, 1);
+    rest.remove_prefix(RECORD_HEAD_BYTES + inner.size());
+  }
+}
+
+void Reader::go_to(const Place &place) {
+  next_ = place.offset;
+  ended_ = torn_ = false;
+  messages_.clear();
+  at_message_ = 0;
+  if (place.message > 0) {
+    read_record();
+    at_message_ = std::min(place.message, messages_.size());
+  }
+}
+
+} // namespace fingertip::mcap

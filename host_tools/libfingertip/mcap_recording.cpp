@@ -1,0 +1,458 @@
+#include "libfingertip/mcap_recording.hpp"
+
+#include "libfingertip/error.hpp"
+#include "libfingertip/names.hpp"
+#include "libfingertip/recording_fields.hpp"
+#include "libfingertip/text.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+
+namespace fingertip {
+
+using namespace recording;
+
+namespace {
+
+constexpr const char *CONTACT = "fingertip_msgs/Contact";
+constexpr const char *LINE = "fingertip_msgs/Line";
+
+/* As schemas name them: "fingertip_msgs/msg/Line". */
+std::string full_name(const std::string &name) {
+  std::size_t slash = name.find('/');
+  return name.substr(0, slash) + "/msg" + name.substr(slash);
+}
+
+/* Of a time as recordings write it, ns since 1970. */
+std::optional<std::uint64_t> utc_ns(const std::string &text) {
+  std::tm parts{};
+  const char *rest = strptime(text.c_str(), "%Y-%m-%dT%H:%M:%S", &parts);
+  if (!rest) {
+    return std::nullopt;
+  }
+  std::string_view fraction = rest;
+  std::uint64_t ms = 0;
+  if (fraction.size() == 5 && fraction[0] == '.') {
+    auto read = to_u64(fraction.substr(1, 3));
+    if (!read) {
+      return std::nullopt;
+    }
+    ms = *read;
+    fraction.remove_prefix(4);
+  }
+  std::time_t seconds = timegm(&parts);
+  if (fraction != "Z" || seconds < 0) {
+    return std::nullopt;
+  }
+  return static_cast<std::uint64_t>(seconds) * 1'000'000'000 + ms * 1'000'000;
+}
+
+/* Later, or earlier, in the range of a message's time. */
+std::uint64_t shifted_ns(std::uint64_t ns, double by_us) {
+  double by_ns = std::round(by_us * 1000);
+  double most = static_cast<double>(ros::LATEST_ns);
+  if (by_ns < 0) {
+    auto less = static_cast<std::uint64_t>(std::min(-by_ns, most));
+    return less > ns ? 0 : ns - less;
+  }
+  return std::min(ros::LATEST_ns, ns + static_cast<std::uint64_t>(std::min(by_ns, most)));
+}
+
+bool is_list(const std::string &key) {
+  auto is_it = [&](const auto &each) { return key == each.name; };
+  return std::any_of(std::begin(sensor_lists), std::end(sensor_lists), is_it) ||
+         std::any_of(std::begin(pad_lists), std::end(pad_lists), is_it);
+}
+
+bool begins_with(const std::string &text, const char *begin) {
+  return text.rfind(begin, 0) == 0;
+}
+
+bool is_of_calibration(const std::string &key) {
+  return begins_with(key, "calibration_") || begins_with(key, "force_scale") ||
+         begins_with(key, "gain") || begins_with(key, "pad_");
+}
+
+/* "# key: value" taken apart; nothing of other lines. */
+std::optional<std::pair<std::string, std::string>> key_and_value(const std::string &text) {
+  std::size_t colon = text.find(": ");
+  if (text.empty() || text[0] != '#' || colon == std::string::npos) {
+    return std::nullopt;
+  }
+  return std::pair(std::string(trim(std::string_view(text).substr(1, colon - 1))),
+                   std::string(trim(std::string_view(text).substr(colon + 2))));
+}
+
+void set(mcap::Pairs &pairs, const std::string &key, const std::string &value) {
+  auto found =
+      std::find_if(pairs.begin(), pairs.end(), [&](const auto &pair) { return pair.first == key; });
+  if (found == pairs.end()) {
+    pairs.emplace_back(key, value);
+  } else {
+    found->second = value;
+  }
+}
+
+std::string json(const std::string &serial, const mcap::Pairs &pairs) {
+  std::string text = "{\"serial\": \"" + serial + "\"";
+  for (const auto &[key, value] : pairs) {
+    std::string numbers;
+    for (std::string_view word : split(value, ' ')) {
+      numbers += (numbers.empty() ? "" : ", ") + std::string(word);
+    }
+    text += ", \"" + key + "\": " + (is_list(key) ? "[" + numbers + "]" : value);
+  }
+  return text + "}";
+}
+
+/* UTF-8 without zeros; tabs and the end of a DOS line are none of the printable characters. */
+bool is_text(const std::string &text) {
+  std::string plain = text;
+  std::replace_if(
+      plain.begin(), plain.end(), [](char c) { return c == '\t' || c == '\r'; }, ' ');
+  return printable(plain) == plain;
+}
+
+std::string joint_cells(std::uint32_t device, double time_us) {
+  return std::to_string(device) + "," + fixed(time_us, 1) + ",";
+}
+
+} // namespace
+
+McapLineSink::LogClock::LogClock(const std::string &started_utc,
+                                 const std::string &started_device_us)
+    : begin_ns_(utc_ns(started_utc).value_or(0)), now_ns_(begin_ns_) {
+  if (auto device_us = to_u64(started_device_us)) {
+    anchor_ = {begin_ns_, *device_us};
+  }
+}
+
+void McapLineSink::LogClock::event(std::string_view text) {
+  std::size_t blank = text.rfind(' ');
+  event_ns_ = utc_ns(std::string(text.substr(blank == std::string_view::npos ? 0 : blank + 1)))
+                  .value_or(event_ns_);
+}
+
+void McapLineSink::LogClock::row(std::uint64_t t_us, std::optional<double> time_us) {
+  if (time_us) {
+    now_ns_ = shifted_ns(begin_ns_, *time_us);
+    return;
+  }
+  if (!anchor_) {
+    anchor_ = {begin_ns_, t_us};
+  } else if (t_us < last_us_) { /* it started anew */
+    anchor_ = {std::max(event_ns_, now_ns_), t_us};
+  }
+  last_us_ = t_us;
+  now_ns_ = shifted_ns(anchor_->utc_ns, t_us >= anchor_->device_us
+                                            ? static_cast<double>(t_us - anchor_->device_us)
+                                            : -static_cast<double>(anchor_->device_us - t_us));
+}
+
+McapLineSink::McapLineSink(const std::string &path, bool replace, OutputFile::Appears appears)
+    : file_(path, replace, appears),
+      writer_([this](const std::string &bytes) { file_.append(bytes.data(), bytes.size()); },
+              "ros2", "fingertip") {}
+
+void McapLineSink::line(const std::string &text) {
+  take(text, false);
+}
+
+void McapLineSink::torn_line(const std::string &text) {
+  take(text, true);
+}
+
+void McapLineSink::take(const std::string &text, bool torn) {
+  if (!in_head_) {
+    put(text, torn);
+    return;
+  }
+  head_.emplace_back(text, torn);
+  if (!text.empty() && text[0] != '#') {
+    begin();
+  }
+}
+
+void McapLineSink::finish() {
+  if (in_head_) {
+    begin();
+  }
+  writer_.finish();
+  file_.finish();
+}
+
+McapLineSink::Device *McapLineSink::device_of(std::string &key) {
+  if (!joint_) {
+    return devices_.data();
+  }
+  std::size_t slash = key.find('/');
+  auto number = to_u64(std::string_view(key).substr(0, slash));
+  if (slash == std::string::npos || !number || *number >= devices_.size()) {
+    return nullptr;
+  }
+  key = key.substr(slash + 1);
+  return &devices_[*number];
+}
+
+void McapLineSink::device_key(Device &device, const std::string &key, const std::string &value) {
+  if (key == "x_mm" || key == "y_mm") {
+    std::vector<float> &places = key == "x_mm" ? device.x_mm : device.y_mm;
+    places.clear();
+    for (std::string_view word : split(value, ' ')) {
+      places.push_back(to_float(word).value_or(NAN));
+    }
+  } else if (key == "sensors") {
+    device.sensors =
+        static_cast<unsigned>(std::min<std::uint64_t>(to_u64(value).value_or(0), FT_MAX_SENSORS));
+  } else if (is_of_calibration(key)) {
+    set(device.calibration, key, value);
+  }
+}
+
+/* The head is complete. */
+void McapLineSink::begin() {
+  in_head_ = false;
+  const auto head = std::move(head_);
+  head_.clear();
+  mcap::Pairs keys;
+  for (const auto &[text, torn] : head) {
+    if (auto pair = key_and_value(text)) {
+      set(keys, pair->first, pair->second);
+    }
+  }
+  auto value = [&](const char *key) {
+    auto found =
+        std::find_if(keys.begin(), keys.end(), [&](const auto &pair) { return pair.first == key; });
+    return found == keys.end() ? std::string() : found->second;
+  };
+  joint_ = head[0].first == std::string(FIRST_WORDS) + FORMAT_OF_SEVERAL;
+  const std::string serials = value(joint_ ? "devices" : "serial");
+  for (std::string_view serial : split(serials, joint_ ? ' ' : '\0')) {
+    Device &device = devices_.emplace_back();
+    device.serial = serial;
+    device.frame_id = "fingertip_" + ros::name_in_ros(device.serial);
+  }
+  for (const auto &[key, text] : keys) {
+    std::string own = key;
+    if (Device *device = device_of(own)) {
+      device_key(*device, own, text);
+    }
+  }
+  std::string header = head.back().first;
+  bool is_joint_header = header.rfind(JOINT_COLUMNS, 0) == 0;
+  if (joint_ && is_joint_header) {
+    header = header.substr(std::string(JOINT_COLUMNS).size());
+  }
+  if (auto columns = columns_of(header); columns && is_joint_header == joint_) {
+    sensor_count_ = columns->sensor_count;
+    has_tangential_ = columns->has_tangential;
+    has_rows_ = true;
+  }
+  clock_ = LogClock(value("started_utc"), value("started_device_us"));
+  writer_.metadata("fingertip_recording", keys);
+  for (const Device &device : devices_) {
+    if (!device.calibration.empty()) {
+      writer_.attachment(clock_.now_ns(), "calibration_" + device.serial + ".json",
+                         "application/json", json(device.serial, device.calibration));
+    }
+  }
+  std::map<std::string, std::uint16_t> schemas;
+  for (const char *name :
+       {CONTACT, LINE, "geometry_msgs/WrenchStamped", "geometry_msgs/PointStamped",
+        "sensor_msgs/PointCloud2", "diagnostic_msgs/DiagnosticArray"}) {
+    schemas[name] = writer_.schema(full_name(name), "ros2msg", ros::schema_of(name));
+  }
+  auto channel = [&](const std::string &topic, const char *name) {
+    return writer_.channel(topic, schemas[name], "cdr", {{"offered_qos_profiles", ""}});
+  };
+  lines_ = channel("/fingertip/lines", LINE);
+  diagnostics_ = channel("/diagnostics", "diagnostic_msgs/DiagnosticArray");
+  for (Device &device : devices_) {
+    std::string root = "/fingertip/" + ros::name_in_ros(device.serial) + "/";
+    device.contact = channel(root + "contact", CONTACT);
+    device.wrench = channel(root + "wrench", "geometry_msgs/WrenchStamped");
+    device.place = channel(root + "place", "geometry_msgs/PointStamped");
+    device.pressures = channel(root + "pressures", "sensor_msgs/PointCloud2");
+  }
+  for (const auto &[text, torn] : head) {
+    put_line(text, torn);
+  }
+  writer_.end_chunk();
+}
+
+void McapLineSink::put(const std::string &text, bool torn) {
+  if (!torn && has_rows_ && !text.empty() && text[0] != '#' && put_row(text)) {
+    return;
+  }
+  put_line(text, torn);
+  if (!torn) {
+    comment(text);
+  }
+}
+
+void McapLineSink::put_line(const std::string &text, bool torn) {
+  number_++;
+  if (!is_text(text)) {
+    throw Error(path() + ": line " + std::to_string(number_) +
+                " is no UTF-8 text, which an MCAP file cannot hold");
+  }
+  writer_.message(lines_, clock_.now_ns(),
+                  ros::encode({clock_.now_ns(), ""}, ros::Line{number_, text, torn}));
+}
+
+void McapLineSink::diagnose(const std::string &message) {
+  writer_.message(diagnostics_, clock_.now_ns(), message);
+}
+
+void McapLineSink::comment(const std::string &text) {
+  auto pair = key_and_value(text);
+  if (!pair) {
+    return;
+  }
+  auto &[key, value] = *pair;
+  Device *device = device_of(key);
+  if (key == "event") {
+    clock_.event(value);
+  } else if (device && key == "packet") {
+    auto words = split(value, ' ');
+    Metadata fields;
+    for (std::string_view word : words) {
+      std::size_t equals = word.find('=');
+      std::string name(word.substr(0, equals));
+      if (equals != std::string_view::npos && name != "sequence" && name != "t_us") {
+        fields.emplace_back(name, word.substr(equals + 1));
+      }
+    }
+    if (words[0] == PACKET_HEALTH) {
+      diagnose(ros::health({clock_.now_ns(), ""}, device->serial, device->sensors, fields));
+    }
+  } else if (device) {
+    device_key(*device, key, value);
+  }
+}
+
+/* False if it is not written as this library writes rows. */
+bool McapLineSink::put_row(const std::string &text) {
+  ros::Row row;
+  std::string_view cells = text;
+  try {
+    if (joint_) {
+      auto device = to_u64(cells.substr(0, cells.find(',')));
+      cells.remove_prefix(std::min(cells.find(','), cells.size() - 1) + 1);
+      row.time_us = to_double(cells.substr(0, cells.find(',')));
+      cells.remove_prefix(std::min(cells.find(','), cells.size() - 1) + 1);
+      if (!device || *device >= devices_.size() || !row.time_us) {
+        return false;
+      }
+      row.device = static_cast<std::uint32_t>(*device);
+    }
+    RowPackets packets = parse_row(cells, sensor_count_, has_tangential_);
+    row.contact = packets.contact;
+    row.raw = packets.raw;
+  } catch (const Damage &) {
+    return false;
+  }
+  std::string as_written = joint_ ? joint_cells(row.device, *row.time_us) : "";
+  as_written += row_text(row.contact ? &*row.contact : nullptr, row.raw ? &*row.raw : nullptr,
+                         sensor_count_, has_tangential_);
+  if (as_written != text) {
+    return false;
+  }
+  row.number = ++number_;
+  clock_.row(row.contact ? row.contact->t_us : row.raw->t_us, row.time_us);
+  Device &device = devices_[row.device];
+  const ros::Header header = {clock_.now_ns(), device.frame_id};
+  auto put = [&](std::uint16_t channel, const std::string &message) {
+    writer_.message(channel, header.time_ns, message);
+  };
+  put(device.contact, ros::encode(header, row));
+  if (row.contact) {
+    put(device.wrench, ros::wrench(header, row.contact->body.contact));
+    put(device.place, ros::place(header, row.contact->body.contact));
+  }
+  if (row.raw && std::min(device.x_mm.size(), device.y_mm.size()) >= sensor_count_) {
+    put(device.pressures, ros::pressures(header, row.raw->body.raw, device.x_mm, device.y_mm));
+  }
+  if (row.contact) {
+    std::uint32_t warnings = row.contact->body.contact.flags & warning_flags();
+    if (device.warnings != warnings) {
+      device.warnings = warnings;
+      diagnose(ros::warnings({header.time_ns, ""}, device.serial, warnings));
+    }
+  }
+  return true;
+}
+
+McapLineSource::McapLineSource(const std::string &path) : path_(path), reader_(path) {}
+
+bool McapLineSource::next(Line &line) {
+  mcap::Reader::Message message;
+  try {
+    while (reader_.next(message)) {
+      bool is_line = message.type == full_name(LINE);
+      if (!is_line && message.type != full_name(CONTACT)) {
+        continue;
+      }
+      if (is_line) {
+        auto decoded = ros::decode_line(message.data);
+        if (!decoded || decoded->text.find('\n') != std::string::npos) {
+          throw mcap::Damage("a message on " + printable(message.topic) + " is damaged");
+        }
+        line = {decoded->number, decoded->text, decoded->torn};
+        if (!has_first_) {
+          has_first_ = true;
+          joint_ = line.text == std::string(FIRST_WORDS) + FORMAT_OF_SEVERAL;
+        }
+        if (!has_header_ && !line.text.empty() && line.text[0] != '#') {
+          bool joint_header = line.text.rfind(JOINT_COLUMNS, 0) == 0;
+          auto columns =
+              columns_of(line.text.substr(joint_header ? std::string(JOINT_COLUMNS).size() : 0));
+          sensor_count_ = columns ? columns->sensor_count : std::uint8_t{0};
+          has_tangential_ = !columns || columns->has_tangential;
+          has_header_ = true;
+        }
+      } else {
+        auto row = ros::decode_row(message.data);
+        if (!row || row->time_us.has_value() != joint_ ||
+            (row->raw && row->raw->body.raw.sensor_count != sensor_count_)) {
+          throw mcap::Damage("a message on " + printable(message.topic) + " is damaged");
+        }
+        line = {row->number, text_of(*row), false};
+      }
+      number_ = line.number;
+      return true;
+    }
+  } catch (const mcap::Damage &damage) {
+    throw Error(ErrorCode::damaged_line, path_ + ": " + damage.what());
+  }
+  if (!has_first_) {
+    throw Error(ErrorCode::not_a_recording,
+                path_ + (reader_.is_torn() ? ": breaks off before a recording begins"
+                                           : ": an MCAP file, but no recording of a fingertip"));
+  }
+  if (reader_.is_torn() && !told_torn_) {
+    told_torn_ = true;
+    throw Error(ErrorCode::damaged_line, path_ + ": the last chunk is torn");
+  }
+  return false;
+}
+
+std::string McapLineSource::text_of(const ros::Row &row) const {
+  return (joint_ ? joint_cells(row.device, *row.time_us) : "") +
+         row_text(row.contact ? &*row.contact : nullptr, row.raw ? &*row.raw : nullptr,
+                  sensor_count_, has_tangential_);
+}
+
+LineSource::Place McapLineSource::place() {
+  auto place = reader_.place();
+  return {place.offset, place.message, number_};
+}
+
+void McapLineSource::go_to(const Place &place) {
+  reader_.go_to({place.offset, place.message});
+  number_ = place.number;
+  told_torn_ = false;
+}
+
+} // namespace fingertip

@@ -1,0 +1,350 @@
+#include "libfingertip/ros_messages.hpp"
+
+#include "libfingertip/cdr.hpp"
+#include "libfingertip/names.hpp"
+#include "libfingertip/recording_fields.hpp"
+#include "libfingertip/ros_definitions.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <limits>
+
+namespace fingertip::ros {
+
+using namespace recording;
+
+namespace {
+
+constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+
+double metres(float mm) {
+  return double{mm} / 1000;
+}
+
+CdrWriter begun(const Header &header) {
+  constexpr std::uint64_t NS_IN_A_S = 1'000'000'000;
+  CdrWriter writer;
+  writer.put(static_cast<std::int32_t>(header.time_ns / NS_IN_A_S));
+  writer.put(static_cast<std::uint32_t>(header.time_ns % NS_IN_A_S));
+  writer.put(header.frame_id);
+  return writer;
+}
+
+void skip_header(CdrReader &reader) {
+  std::int32_t s;
+  std::uint32_t ns;
+  std::string frame_id;
+  reader.get(s);
+  reader.get(ns);
+  reader.get(frame_id);
+}
+
+bool is_trusted(std::uint32_t flags) {
+  return (flags & (CONTACT_FLAG_FIT_VALID | warning_flags())) == CONTACT_FLAG_FIT_VALID;
+}
+
+/* Tared, and without a warning nothing presses. */
+bool is_untouched(std::uint32_t flags) {
+  return (flags & (CONTACT_FLAG_CONTACT | CONTACT_FLAG_TARED | warning_flags())) ==
+         CONTACT_FLAG_TARED;
+}
+
+struct Vector {
+  double x, y, z;
+};
+
+void put(CdrWriter &writer, const Vector &vector) {
+  writer.put(vector.x);
+  writer.put(vector.y);
+  writer.put(vector.z);
+}
+
+std::string status(const Header &header, const std::string &name, const std::string &trouble,
+                   const std::string &otherwise, const std::string &serial,
+                   const Metadata &values) {
+  enum : std::uint8_t { OK, WARN };
+  CdrWriter writer = begun(header);
+  writer.count(1);
+  writer.put(static_cast<std::uint8_t>(trouble.empty() ? OK : WARN));
+  writer.put(name);
+  writer.put(trouble.empty() ? otherwise : trouble);
+  writer.put(serial);
+  writer.count(values.size());
+  for (const auto &[key, value] : values) {
+    writer.put(key);
+    writer.put(value);
+  }
+  return writer.bytes();
+}
+
+/* The fields of a packet in their order, for visit_contact and visit_raw. */
+struct CdrPut {
+  CdrWriter &writer;
+  bool is_there; /* the packet */
+  template <typename Value> void operator()(const std::string &, const Value &value) {
+    using Plain = std::decay_t<Value>;
+    if constexpr (std::is_same_v<Plain, Quantity>) {
+      writer.put(cell_text(value).empty() ? std::numeric_limits<float>::quiet_NaN() : value.value);
+    } else if constexpr (std::is_integral_v<Plain>) {
+      writer.put(value);
+    } else {
+      writer.put(is_there ? value.raw / value.scale : NOT_A_NUMBER);
+    }
+  }
+};
+
+/* What another program made of a message. */
+struct NoPacket {};
+
+template <typename Integer> Integer scaled(double value, double scale) {
+  double raw = std::round(value * scale);
+  if (!(raw >= static_cast<double>(std::numeric_limits<Integer>::min()) &&
+        raw <= static_cast<double>(std::numeric_limits<Integer>::max()))) {
+    throw NoPacket();
+  }
+  return static_cast<Integer>(raw);
+}
+
+struct CdrGet {
+  CdrReader &reader;
+  bool is_there; /* the packet */
+  template <typename Value> void operator()(const std::string &, Value &&value) {
+    using Plain = std::decay_t<Value>;
+    if constexpr (std::is_same_v<Plain, Quantity>) {
+      reader.get(value.value);
+      if (std::isnan(value.value)) {
+        if (value.valid && is_there) {
+          throw NoPacket();
+        }
+        value.value = 0;
+      }
+    } else if constexpr (std::is_integral_v<Plain>) {
+      reader.get(value);
+    } else {
+      double number;
+      reader.get(number);
+      value.raw = is_there ? scaled<std::decay_t<decltype(value.raw)>>(number, value.scale) : 0;
+    }
+  }
+};
+
+constexpr std::uint8_t WITHOUT_SENSORS = 0;
+
+std::uint32_t frame_of(const Row &row) {
+  return row.contact ? row.contact->body.contact.frame : row.raw->body.raw.frame;
+}
+
+} // namespace
+
+std::string schema_of(const std::string &name) {
+  std::vector<std::string> needed = {name};
+  std::string text;
+  for (std::size_t i = 0; i < needed.size(); i++) { /* grows */
+    const std::string each = needed[i];
+    const std::string &definition = definitions().at(each);
+    text += (i > 0 ? std::string(80, '=') + "\nMSG: " + each + "\n" : "") + definition;
+    for (std::string_view line : split(definition, '\n')) {
+      std::string type(line.substr(0, line.find_first_of(" [")));
+      if (definitions().count(type) &&
+          std::find(needed.begin(), needed.end(), type) == needed.end()) {
+        needed.push_back(type);
+      }
+    }
+  }
+  return text;
+}
+
+std::string name_in_ros(const std::string &serial) {
+  std::string name = serial.empty() ? "unknown" : serial;
+  for (char &c : name) {
+    c = std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
+  }
+  return (std::isdigit(static_cast<unsigned char>(name[0])) ? "s" : "") + name;
+}
+
+std::string wrench(const Header &header, const wire_contact &contact) {
+  Vector force = {0, 0, 0}, torque = {0, 0, 0};
+  if (!is_untouched(contact.flags)) {
+    constexpr std::uint32_t tangential =
+        CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH;
+    bool trusted = is_trusted(contact.flags);
+    bool sure = trusted && (contact.flags & tangential) == CONTACT_FLAG_TANGENTIAL_VALID;
+    double x_m = metres(contact.x_mm), y_m = metres(contact.y_mm);
+    force = {sure ? double{contact.qx_N} : NOT_A_NUMBER, sure ? double{contact.qy_N} : NOT_A_NUMBER,
+             trusted ? -double{contact.force_N} : NOT_A_NUMBER};
+    torque = {trusted ? y_m * force.z : NOT_A_NUMBER, trusted ? -x_m * force.z : NOT_A_NUMBER,
+              sure ? x_m * force.y - y_m * force.x : NOT_A_NUMBER};
+  }
+  CdrWriter writer = begun(header);
+  put(writer, force);
+  put(writer, torque);
+  return writer.bytes();
+}
+
+std::string place(const Header &header, const wire_contact &contact) {
+  CdrWriter writer = begun(header);
+  put(writer, is_trusted(contact.flags) ? Vector{metres(contact.x_mm), metres(contact.y_mm), 0}
+                                        : Vector{NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER});
+  return writer.bytes();
+}
+
+std::string pressures(const Header &header, const wire_raw &raw, const std::vector<float> &x_mm,
+                      const std::vector<float> &y_mm) {
+  constexpr std::uint8_t FLOAT32 = 7;
+  constexpr std::uint32_t SIZE = sizeof(float);
+  const char *const names[] = {"x", "y", "z", "pressure_pa"};
+  const std::uint32_t step = SIZE * static_cast<std::uint32_t>(std::size(names));
+  const std::uint32_t width = raw.sensor_count;
+  CdrWriter writer = begun(header);
+  writer.put(std::uint32_t{1});
+  writer.put(width);
+  writer.count(std::size(names));
+  for (std::uint32_t i = 0; i < std::size(names); i++) {
+    writer.put(names[i]);
+    writer.put(i * SIZE);
+    writer.put(FLOAT32);
+    writer.put(std::uint32_t{1});
+  }
+  writer.put(false); /* is_bigendian */
+  writer.put(step);
+  writer.put(step * width);
+  writer.count(step * width);
+  for (std::uint32_t k = 0; k < width; k++) {
+    bool valid = raw.valid >> k & 1;
+    double pressure_Pa = raw.pressure_Pa_q10[k] / Q10 - raw.baseline_Pa_q10[k] / Q10;
+    for (double value :
+         {metres(x_mm[k]), metres(y_mm[k]), 0.0, valid ? pressure_Pa : NOT_A_NUMBER}) {
+      writer.put(static_cast<float>(value)); /* aligned: the bytes begin at a multiple of four */
+    }
+  }
+  writer.put(false); /* is_dense */
+  return writer.bytes();
+}
+
+std::string health(const Header &header, const std::string &serial, unsigned sensors,
+                   const Metadata &fields) {
+  std::uint64_t present = 0, bad = 0;
+  for (const auto &[key, value] : fields) {
+    if (key == "sensors_present" || key == "sensors_prom_bad") {
+      (key == "sensors_present" ? present : bad) = to_u64(value).value_or(0);
+    }
+  }
+  std::string missing, damaged;
+  for (unsigned k = 0; k < sensors; k++) {
+    missing += present >> k & 1 ? "" : " " + std::to_string(k);
+    damaged += bad >> k & 1 ? " " + std::to_string(k) : "";
+  }
+  std::string trouble = missing.empty() ? "" : "sensors missing:" + missing;
+  if (!damaged.empty()) {
+    trouble += (trouble.empty() ? "" : "; ") + ("damaged PROM of sensors:" + damaged);
+  }
+  return status(header, "fingertip " + serial, trouble, "all sensors are there", serial, fields);
+}
+
+std::string warnings(const Header &header, const std::string &serial, std::uint32_t flags) {
+  std::uint32_t warned = flags & warning_flags();
+  return status(header, "fingertip " + serial + " contact", warned ? flags_text(warned) : "",
+                "no warning", serial, {});
+}
+
+std::string encode(const Header &header, const Line &line) {
+  CdrWriter writer = begun(header);
+  writer.put(line.number);
+  writer.put(line.text);
+  writer.put(line.torn);
+  return writer.bytes();
+}
+
+std::optional<Line> decode_line(std::string_view bytes) {
+  CdrReader reader(bytes);
+  Line line;
+  skip_header(reader);
+  reader.get(line.number);
+  reader.get(line.text);
+  reader.get(line.torn);
+  return reader.is_good() ? std::optional(line) : std::nullopt;
+}
+
+std::string encode(const Header &header, const Row &row) {
+  CdrWriter writer = begun(header);
+  writer.put(row.number);
+  writer.put(row.device);
+  writer.put(row.time_us.value_or(NOT_A_NUMBER));
+  writer.put(row.contact ? row.contact->t_us : row.raw->t_us);
+  writer.put(frame_of(row));
+  wire_packet contact = row.contact.value_or(wire_packet{}), raw = row.raw.value_or(wire_packet{});
+  CdrPut put_contact{writer, row.contact.has_value()}, put_raw{writer, row.raw.has_value()};
+  writer.put(put_contact.is_there);
+  visit_contact(put_contact, contact);
+  writer.put(put_raw.is_there);
+  visit_raw(put_raw, raw, WITHOUT_SENSORS);
+  for (const std::int32_t *readings :
+       {raw.body.raw.pressure_Pa_q10, raw.body.raw.baseline_Pa_q10}) {
+    writer.count(raw.body.raw.sensor_count);
+    for (unsigned k = 0; k < raw.body.raw.sensor_count; k++) {
+      writer.put(readings[k] / Q10);
+    }
+  }
+  return writer.bytes();
+}
+
+std::optional<Row> decode_row(std::string_view bytes) {
+  CdrReader reader(bytes);
+  Row row;
+  double time_us = 0;
+  std::uint64_t t_us = 0;
+  std::uint32_t frame = 0;
+  bool has_contact = false, has_raw = false;
+  wire_packet contact{}, raw{};
+  skip_header(reader);
+  reader.get(row.number);
+  reader.get(row.device);
+  reader.get(time_us);
+  reader.get(t_us);
+  reader.get(frame);
+  try {
+    reader.get(has_contact);
+    CdrGet get_contact{reader, has_contact};
+    visit_contact(get_contact, contact);
+    reader.get(has_raw);
+    CdrGet get_raw{reader, has_raw};
+    visit_raw(get_raw, raw, WITHOUT_SENSORS);
+    std::uint32_t count = 0;
+    for (std::int32_t *readings : {raw.body.raw.pressure_Pa_q10, raw.body.raw.baseline_Pa_q10}) {
+      reader.get(count);
+      if (!reader.is_good() || count > FT_MAX_SENSORS) {
+        return std::nullopt;
+      }
+      for (std::uint32_t k = 0; k < count; k++) {
+        double pressure_Pa;
+        reader.get(pressure_Pa);
+        readings[k] = scaled<std::int32_t>(pressure_Pa, Q10);
+      }
+    }
+    raw.body.raw.sensor_count = static_cast<std::uint8_t>(count);
+  } catch (const NoPacket &) {
+    return std::nullopt;
+  }
+  if (!reader.is_good() || (!has_contact && !has_raw) || std::isinf(time_us)) {
+    return std::nullopt;
+  }
+  if (!std::isnan(time_us)) {
+    row.time_us = time_us;
+  }
+  if (has_contact) {
+    contact.type = WIRE_CONTACT;
+    contact.t_us = t_us;
+    contact.body.contact.frame = frame;
+    row.contact = contact;
+  }
+  if (has_raw) {
+    raw.type = WIRE_RAW;
+    raw.t_us = t_us;
+    raw.body.raw.frame = frame;
+    row.raw = raw;
+  }
+  return row;
+}
+
+} // namespace fingertip::ros

@@ -1,0 +1,403 @@
+"""Recordings as MCAP files of ROS 2 messages (profile ros2, schemas ros2msg, CDR), written and read line by line.
+
+    /fingertip/SERIAL/contact     fingertip_msgs/msg/Contact            each frame: all that its packets carry
+    /fingertip/SERIAL/wrench      geometry_msgs/msg/WrenchStamped       for programs that know no fingertip: what may be trusted, or NaN
+    /fingertip/SERIAL/place       geometry_msgs/msg/PointStamped
+    /fingertip/SERIAL/pressures   sensor_msgs/msg/PointCloud2
+    /diagnostics                  diagnostic_msgs/msg/DiagnosticArray   each health packet; and warnings, where they change
+    /fingertip/lines              fingertip_msgs/msg/Line               every other line of the CSV file
+
+with what the numbers mean in the definitions (the folder msg beside this module). The frames of a fingertip are in the coordinate frame
+fingertip_SERIAL: x across the strips, y along them, z out of the rubber. A serial number that begins with a digit has an "s" before it
+there and in the topics, for ROS. Contact and Line together are the CSV file, byte by byte; the others repeat what is in them. The head of
+the recording is also metadata (fingertip_recording), a calibration and a pad's profile also an attachment. Chunks last a second.
+"""
+import calendar
+import math
+import os
+import re
+import struct
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from .errors import InputError
+from .files import CONTACT_COLUMNS, RAW_COLUMNS, TANGENTIAL_COLUMNS
+from .frames import Q10
+from .mcap_file import McapReader, McapWriter, Message
+from .names import WARNINGS, Flag
+from .recording import LineFile, shortest
+from .ros_messages import decode, encode, schema_of
+
+CONTACT_TYPE, LINE_TYPE, WRENCH_TYPE, PLACE_TYPE, PRESSURES_TYPE, DIAGNOSTICS_TYPE = (
+    "fingertip_msgs/Contact", "fingertip_msgs/Line", "geometry_msgs/WrenchStamped", "geometry_msgs/PointStamped", "sensor_msgs/PointCloud2",
+    "diagnostic_msgs/DiagnosticArray")
+TYPES = (CONTACT_TYPE, LINE_TYPE, WRENCH_TYPE, PLACE_TYPE, PRESSURES_TYPE, DIAGNOSTICS_TYPE)
+LATEST_ns = (2**31 - 1) * 10**9  # that a ROS message can say
+
+_JUDGED = int(Flag.FIT_VALID | WARNINGS)
+_TANGENTIAL = int(Flag.TANGENTIAL_VALID | Flag.TANGENTIAL_FROM_TOUCH)
+_NOTHING = int(Flag.CONTACT | Flag.TARED | WARNINGS)
+_COUNTS = ("sequence", "flags", "sensors_used", "convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us", "total_us")
+_QUANTITIES = [name for name in (*CONTACT_COLUMNS, *TANGENTIAL_COLUMNS) if name not in _COUNTS]
+_FIRST_RAW = 2 + len(CONTACT_COLUMNS) + len(TANGENTIAL_COLUMNS)
+_FIRST_SENSOR = _FIRST_RAW + len(RAW_COLUMNS)
+_UTC = re.compile(r"(\d{4})-(\d\d)-(\d\d)T(\d\d):(\d\d):(\d\d)(?:\.(\d{3}))?Z")
+
+
+def name_in_ros(serial: str) -> str:
+    """As a part of topics and coordinate frames."""
+    name = re.sub("[^A-Za-z0-9_]", "_", serial) or "unknown"
+    return "s" + name if name[0].isdigit() else name
+
+
+def stamp(time_ns: int) -> dict[str, int]:
+    return {"sec": time_ns // 10**9, "nanosec": time_ns % 10**9}
+
+
+def wrench(flags: int, x_mm: float, y_mm: float, force_N: float, qx_N: float, qy_N: float) -> dict[str, dict[str, float]]:
+    """geometry_msgs/Wrench of a contact packet; its definition says what it is."""
+    if flags & _NOTHING == Flag.TARED:
+        return {"force": {"x": 0.0, "y": 0.0, "z": 0.0}, "torque": {"x": 0.0, "y": 0.0, "z": 0.0}}
+    trusted = flags & _JUDGED == Flag.FIT_VALID
+    sure = trusted and flags & _TANGENTIAL == Flag.TANGENTIAL_VALID
+    x_m, y_m, z_N = x_mm / 1000, y_mm / 1000, -force_N if trusted else math.nan
+    x_N, y_N = (qx_N, qy_N) if sure else (math.nan, math.nan)
+    return {"force": {"x": x_N, "y": y_N, "z": z_N},
+            "torque": {"x": y_m * z_N if trusted else math.nan, "y": -x_m * z_N if trusted else math.nan,
+                       "z": x_m * y_N - y_m * x_N if sure else math.nan}}
+
+
+def place(flags: int, x_mm: float, y_mm: float) -> dict[str, float]:
+    """geometry_msgs/Point of a contact packet."""
+    trusted = flags & _JUDGED == Flag.FIT_VALID
+    return {"x": x_mm / 1000, "y": y_mm / 1000, "z": 0.0} if trusted else {"x": math.nan, "y": math.nan, "z": math.nan}
+
+
+def pressure_cloud(x_mm: list[float], y_mm: list[float], valid: int, pressures_Pa: list[float], tare_Pa: list[float]) -> dict[str, Any]:
+    """sensor_msgs/PointCloud2 of a raw packet, without its header."""
+    count = len(pressures_Pa)
+    data = b"".join(struct.pack("<4f", x_mm[k] / 1000, y_mm[k] / 1000, 0.0, pressures_Pa[k] - tare_Pa[k] if valid >> k & 1 else math.nan)
+                    for k in range(count))
+    fields = [{"name": name, "offset": 4 * i, "datatype": 7, "count": 1} for i, name in enumerate(("x", "y", "z", "pressure_pa"))]
+    return {"height": 1, "width": count, "fields": fields, "is_bigendian": False, "point_step": 16, "row_step": 16 * count, "data": data,
+            "is_dense": False}
+
+
+class _Cloud:
+    """sensor_msgs/PointCloud2 of raw packets, all of whose bytes but stamp and pressures are the same each time."""
+
+    def __init__(self, frame_id: str, x_mm: list[float], y_mm: list[float], sensors: int) -> None:
+        zeros = [0.0] * sensors
+        cloud = {"header": {"stamp": stamp(0), "frame_id": frame_id}, **pressure_cloud(x_mm, y_mm, 0, zeros, zeros)}
+        self._bytes = bytearray(encode(PRESSURES_TYPE, cloud))
+        end = len(self._bytes) - 1  # behind the data is_dense
+        self._places = range(end - 16 * sensors + 12, end, 16)
+
+    def message(self, time_ns: int, valid: int, pressures_Pa: list[float], tare_Pa: list[float]) -> bytes:
+        struct.pack_into("<iI", self._bytes, 4, *stamp(time_ns).values())
+        for k, place in enumerate(self._places):
+            struct.pack_into("<f", self._bytes, place, pressures_Pa[k] - tare_Pa[k] if valid >> k & 1 else math.nan)
+        return bytes(self._bytes)
+
+
+def health_status(serial: str, sensors: int, fields: dict[str, str]) -> dict[str, Any]:
+    """diagnostic_msgs/DiagnosticStatus of a health packet."""
+    present, bad = (int(fields.get(name, "0")) for name in ("sensors_present", "sensors_prom_bad"))
+    missing = " ".join(str(k) for k in range(sensors) if not present >> k & 1)
+    doubtful = " ".join(str(k) for k in range(sensors) if bad >> k & 1)
+    said = [text for text in (f"sensors missing: {missing}" * bool(missing), f"damaged PROM of sensors: {doubtful}" * bool(doubtful)) if text]
+    return {"level": 1 if said else 0, "name": f"fingertip {serial}", "message": "; ".join(said) or "all sensors are there", "hardware_id": serial,
+            "values": [{"key": key, "value": value} for key, value in fields.items()]}
+
+
+def warning_status(serial: str, warnings: int) -> dict[str, Any]:
+    """diagnostic_msgs/DiagnosticStatus of a contact packet's warnings."""
+    names = " ".join(flag.name or "" for flag in Flag if flag & WARNINGS & warnings)
+    return {"level": 1 if names else 0, "name": f"fingertip {serial} contact", "message": names or "no warning", "hardware_id": serial, "values": []}
+
+
+def _utc_ns(text: str) -> int | None:
+    """Of the last word."""
+    match = _UTC.fullmatch(text.rpartition(" ")[2])
+    if not match:
+        return None
+    return calendar.timegm(tuple(int(match[i]) for i in range(1, 7))) * 10**9 + int(match[7] or 0) * 10**6
+
+
+def _as_binary32(*values: float) -> tuple[float, ...]:
+    """As the fingertip sent them."""
+    form = f"<{len(values)}f"
+    return struct.unpack(form, struct.pack(form, *values))
+
+
+def _clamp_ns(time_ns: int) -> int:
+    return min(max(time_ns, 0), LATEST_ns)
+
+
+class _LogClock:
+    """When a row was measured, ns since 1970: the begin of the recording by the computer's clock, and then device time, or in a recording of
+    several the recorder's."""
+
+    def __init__(self, head: dict[str, str]) -> None:
+        self._utc_ns = self.last_ns = _utc_ns(head.get("started_utc", "")) or 0
+        started = head.get("started_device_us", "")
+        self._anchor = (self._utc_ns, int(started)) if started.isascii() and started.isdigit() else None
+        self._event_ns = 0
+        self._last_us = 0
+
+    def event(self, text: str) -> None:
+        self._event_ns = _utc_ns(text) or self._event_ns
+
+    def row(self, t_us: int, time_us: float) -> int:
+        if math.isnan(time_us):
+            if self._anchor is None:
+                self._anchor = (self._utc_ns, t_us)
+            elif t_us < self._last_us:  # it started anew
+                self._anchor = (max(self._event_ns, self.last_ns), t_us)
+            self._last_us = t_us
+            self.last_ns = _clamp_ns(self._anchor[0] + (t_us - self._anchor[1]) * 1000)
+        else:
+            self.last_ns = _clamp_ns(self._utc_ns + round(time_us * 1000))
+        return self.last_ns
+
+
+class _Device:
+    """One fingertip of the recording, by the comments about it."""
+
+    def __init__(self, number: int, serial: str) -> None:
+        self.number = number
+        self.keys: dict[str, str] = {}
+        self.serial = serial
+        self.frame_id = "fingertip_" + name_in_ros(serial)
+        self.channels: dict[str, int] = {}
+        self.warnings: int | None = None
+        self.x_mm: list[float] = []
+        self.y_mm: list[float] = []
+        self.sensors = 0
+        self._cloud: _Cloud | None = None
+
+    def cloud(self, sensors: int) -> _Cloud | None:
+        """Of rows with so many sensors; nothing where their places are unknown."""
+        if self._cloud is None and min(len(self.x_mm), len(self.y_mm)) >= sensors:
+            self._cloud = _Cloud(self.frame_id, self.x_mm, self.y_mm, sensors)
+        return self._cloud
+
+    def key(self, key: str, value: str) -> None:
+        self.keys[key] = value
+        self._cloud = None
+        if key in ("x_mm", "y_mm"):
+            setattr(self, key, [float(word) for word in value.split()])
+        elif key == "sensors":
+            self.sensors = int(value)
+
+    def calibration(self) -> str:
+        """What there is of gains, force scale and pad, as JSON; nothing without."""
+        found = [f'"{key}": ' + (f'[{", ".join(value.split())}]' if key in _LISTS else value) for key, value in self.keys.items()
+                 if key.startswith(("calibration_", "force_scale", "gain", "pad_"))]
+        return "{" + ", ".join([f'"serial": "{self.serial}"', *found]) + "}" if found else ""
+
+
+_LISTS = {"gains", "gain_sds", "pad_shares", "pad_sds_mm", "pad_moments_mm", "pad_moment_sds_mm",
+          *(f"pad_edge_{name}" for name in ("ratio_x", "ratio_y", "gain_x", "gain_y", "place_x_mm", "place_y_mm", "pull_x_mm", "pull_y_mm", "force"))}
+
+
+class McapLines:
+    """The lines of a recording as an MCAP file. Raises InputError."""
+
+    def __init__(self, path: "str | os.PathLike[str]", replace: bool) -> None:
+        self._file = LineFile(path, replace)
+        try:
+            self._writer = McapWriter(self._file.append, "ros2", "fingertip")
+        except InputError:
+            self._file.close()
+            raise
+        self._number = 0
+        self._head: list[str] | None = []  # until the row of columns
+        self._joint = False
+        self._devices: list[_Device] = []
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[str, int] = {}
+        self._clock = _LogClock({})
+        self._closed = False
+
+    def line(self, text: str) -> None:
+        if self._head is None:
+            self._put(text)
+            return
+        self._head.append(text)
+        if not text.startswith("#"):
+            self._begin()
+
+    def close(self) -> None:
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            if self._head is not None:
+                self._begin()
+            self._writer.finish()
+        finally:
+            self._file.close()
+
+    def _begin(self) -> None:
+        """The head is complete."""
+        head, self._head = self._head or [], None
+        pairs = [text[1:].strip().partition(": ")[::2] for text in head if text.startswith("#") and ": " in text]
+        keys = dict(pairs)
+        self._joint = head[:1] == ["# fingertip-recording 2"]
+        serials = keys.get("devices", "").split() if self._joint else [keys.get("serial", "")]
+        self._devices = [_Device(number, serial) for number, serial in enumerate(serials)]
+        for key, value in pairs:
+            device, own = self._device_of(key)
+            if device:
+                device.key(own, value)
+        self._clock = _LogClock(keys)
+        now_ns = self._clock.last_ns
+        self._writer.metadata("fingertip_recording", keys)
+        for device in self._devices:
+            calibration = device.calibration()
+            if calibration:
+                self._writer.attachment(now_ns, f"calibration_{device.serial}.json", "application/json", calibration.encode("utf-8"))
+        for name in TYPES:
+            self._schemas[name] = self._writer.schema(name.replace("/", "/msg/"), "ros2msg", schema_of(name).encode("utf-8"))
+        self._channels = {name: self._channel(topic, name) for name, topic in ((LINE_TYPE, "/fingertip/lines"), (DIAGNOSTICS_TYPE, "/diagnostics"))}
+        for device in self._devices:
+            root = f"/fingertip/{name_in_ros(device.serial)}/"
+            device.channels = {name: self._channel(root + topic, name) for name, topic in (
+                (CONTACT_TYPE, "contact"), (WRENCH_TYPE, "wrench"), (PLACE_TYPE, "place"), (PRESSURES_TYPE, "pressures"))}
+        for text in head:
+            self._put_line(text)
+        self._writer.end_chunk()
+
+    def _channel(self, topic: str, name: str) -> int:
+        return self._writer.channel(topic, self._schemas[name], "cdr", {"offered_qos_profiles": ""})
+
+    def _device_of(self, key: str) -> tuple[_Device | None, str]:
+        """The fingertip that a comment is about, and the key without its number."""
+        if not self._joint:
+            return (self._devices[0] if self._devices else None), key
+        number, slash, own = key.partition("/")
+        if slash and number.isascii() and number.isdigit() and int(number) < len(self._devices):
+            return self._devices[int(number)], own
+        return None, key
+
+    def _put(self, text: str) -> None:
+        if not text.startswith("#"):
+            self._put_row(text)
+            return
+        self._put_line(text)
+        key, _, value = text[1:].strip().partition(": ")
+        device, own = self._device_of(key)
+        if own == "event":
+            self._clock.event(value)
+        elif device and own == "packet" and value.startswith("health "):
+            fields = dict(pair.partition("=")[::2] for pair in value.split()[1:] if not pair.startswith(("sequence=", "t_us=")))
+            self._diagnose(health_status(device.serial, device.sensors, fields))
+        elif device and own in ("x_mm", "y_mm", "sensors"):
+            device.key(own, value)
+
+    def _message(self, channel: int, name: str, frame_id: str, message: dict[str, Any]) -> None:
+        now_ns = self._clock.last_ns
+        self._writer.message(channel, now_ns, encode(name, {"header": {"stamp": stamp(now_ns), "frame_id": frame_id}, **message}))
+
+    def _put_line(self, text: str) -> None:
+        self._number += 1
+        self._message(self._channels[LINE_TYPE], LINE_TYPE, "", {"line": self._number, "text": text, "torn": False})
+
+    def _diagnose(self, status: dict[str, Any]) -> None:
+        self._message(self._channels[DIAGNOSTICS_TYPE], DIAGNOSTICS_TYPE, "", {"status": [status]})
+
+    def _put_row(self, text: str) -> None:
+        self._number += 1
+        cells = text.split(",")
+        device, time_us = self._devices[0], math.nan
+        if self._joint:
+            device, time_us = self._devices[int(cells[0])], float(cells[1])
+            del cells[:2]
+        row = contact_of(cells)
+        self._clock.row(row["t_us"], time_us)
+
+        def put(name: str, message: dict[str, Any]) -> None:
+            self._message(device.channels[name], name, device.frame_id, message)
+
+        put(CONTACT_TYPE, {**row, "line": self._number, "device": device.number, "time_us": time_us})
+        if row["has_contact"]:
+            flags = row["flags"]
+            x_mm, y_mm, *forces_N = _as_binary32(row["x_mm"], row["y_mm"], row["force_n"], row["qx_n"], row["qy_n"])
+            put(WRENCH_TYPE, {"wrench": wrench(flags, x_mm, y_mm, *forces_N)})
+            put(PLACE_TYPE, {"point": place(flags, x_mm, y_mm)})
+        cloud = device.cloud(len(row["pressure_pa"])) if row["has_raw"] else None
+        if cloud:
+            now_ns = self._clock.last_ns
+            self._writer.message(device.channels[PRESSURES_TYPE], now_ns, cloud.message(now_ns, row["valid"], row["pressure_pa"], row["tare_pa"]))
+        if row["has_contact"] and device.warnings != row["flags"] & WARNINGS:
+            device.warnings = row["flags"] & WARNINGS
+            self._diagnose(warning_status(device.serial, device.warnings))
+
+
+def contact_of(cells: list[str]) -> dict[str, Any]:
+    """Cells of a row from t_us on, with all its columns, as the fields of fingertip_msgs/Contact that they hold."""
+    row: dict[str, Any] = {"t_us": int(cells[0]), "frame": int(cells[1]), "has_contact": cells[2] != "", "has_raw": cells[_FIRST_RAW] != ""}
+    for name, cell in zip((*CONTACT_COLUMNS, *TANGENTIAL_COLUMNS), cells[2:]):
+        row[name.lower()] = int(cell or "0") if name in _COUNTS else float(cell) if cell else math.nan
+    for name, cell in zip(RAW_COLUMNS, cells[_FIRST_RAW:]):
+        row[name.lower()] = (float(cell) if cell else math.nan) if name == "temperature_degC" else int(cell or "0")
+    pressures = [round(float(cell) * Q10) / Q10 for cell in cells[_FIRST_SENSOR:]] if row["has_raw"] else []
+    row["pressure_pa"], row["tare_pa"] = pressures[:len(pressures) // 2], pressures[len(pressures) // 2:]
+    return row
+
+
+def _cells_of(row: dict[str, Any], names: list[str]) -> str:
+    """The columns of these names, out of a fingertip_msgs/Contact."""
+    sensors = {f"s{k}_Pa": value for k, value in enumerate(row["pressure_pa"])} | {f"tare{k}_Pa": value for k, value in enumerate(row["tare_pa"])}
+    cells = []
+    for name in names:
+        own = row.get(name.lower())
+        if name in sensors:
+            cells.append(f"{sensors[name]:.4f}")
+        elif own is None or (name in RAW_COLUMNS and not row["has_raw"]) or (
+                (name in CONTACT_COLUMNS or name in TANGENTIAL_COLUMNS) and not row["has_contact"]):
+            cells.append("")
+        elif name == "temperature_degC":
+            cells.append(f"{own:.2f}")
+        elif name == "time_us":
+            cells.append(f"{own:.1f}")
+        else:
+            cells.append(shortest(own) if name in _QUANTITIES else str(own))
+    return ",".join(cells)
+
+
+class McapLineReader:
+    """The lines of a recording in an MCAP file, with their number, and whether they are torn. Raises InputError."""
+
+    def __init__(self, path: "str | os.PathLike[str]", salvage: bool = False, progress: Callable[[float], None] | None = None) -> None:
+        self._reader = McapReader(path, salvage, progress)
+        self._salvage = salvage
+        self._names: list[str] = []
+
+    def __iter__(self) -> Iterator[tuple[int, str, bool]]:
+        last = 0
+        for message in self._reader:
+            name = message.channel.schema.name.replace("/msg/", "/") if message.channel.schema else ""
+            if name in (LINE_TYPE, CONTACT_TYPE):
+                line = self._line(name, message)
+                if line[0] > last + 1 and not self._salvage:
+                    raise InputError(f"{self._reader.path}: {line[0] - last - 1} lines are missing before line {line[0]}; use --salvage to go on")
+                last = line[0]
+                yield line
+        if not last:
+            raise InputError(f"{self._reader.path}: no recording of a fingertip; give one that fingertip has written")
+        if self._reader.torn and not self._salvage:
+            raise InputError(f"{self._reader.path}: the last chunk is torn; use --salvage to do without")
+
+    def _line(self, name: str, message: Message) -> tuple[int, str, bool]:
+        try:
+            row = decode(name, message.data)
+        except ValueError as error:
+            raise InputError(f"{self._reader.path}: a damaged message on {message.channel.topic} ({error})") from None
+        if name == CONTACT_TYPE:
+            return row["line"], _cells_of(row, self._names), False
+        text: str = row["text"]
+        if not self._names and not text.startswith("#"):
+            self._names = text.split(",")
+        return row["line"], text, row["torn"]

@@ -1,0 +1,248 @@
+"""MCAP recordings of the tool and of the Python package, by readers of others: usage test_mcap.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
+import contextlib
+import os
+import pathlib
+import random
+import resource
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+from unittest import mock
+
+import numpy as np
+
+FINGERTIP, FAKE_DEVICE = (os.path.abspath(path) for path in sys.argv[1:3])
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "host_tools/report/ecosystem"))
+import bags  # noqa: E402  finds the package too
+from fingertip import InputError, JointRecordingWriter, RecordingWriter, files, mcap_file, read_recording  # noqa: E402
+from mcap.reader import make_reader  # noqa: E402
+from mcap.writer import Writer  # noqa: E402
+
+TWO = ROOT / "tests/fuzz/corpus/recording/two"
+
+
+class TestMcap(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="fingertip-")))
+        cls.enterClassContext(mock.patch.dict(os.environ, {"XDG_RUNTIME_DIR": str(cls.folder), "NO_COLOR": "1"}))
+        cls.bag, cls.capture = bags.record(FINGERTIP, FAKE_DEVICE, cls.folder, 0.4, calibrated=1, pad=1, drop=50, health=60, flags=0x17ff)
+        cls.csv = cls.convert(cls.bag, "bag.csv")
+        cls.random_csv = cls.folder / "random.csv"
+        bags.write_random(cls.random_csv, 1234, 300)
+        cls.several_csv = cls.folder / "several.csv"
+        cls.several_csv.write_bytes(TWO.read_bytes()[1:])
+
+    @classmethod
+    def convert(cls, start, name, *options):
+        path = cls.folder / name
+        bags.call(FINGERTIP, "convert", start, path, "--overwrite", *options)
+        return path
+
+    def refused(self, *words, **keys):
+        """The one line that the tool says."""
+        done = subprocess.run([FINGERTIP, *map(str, words)], capture_output=True, text=True, timeout=bags.PATIENCE_s, **keys)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        lines = done.stderr.splitlines()
+        self.assertEqual(len(lines), 1, done.stderr)
+        return lines[0]
+
+    def damaged(self, name):
+        """A copy with a flipped byte in the middle of the second chunk, and the numbers of the lines in it."""
+        with open(self.bag, "rb") as file:
+            chunk = make_reader(file).get_summary().chunk_indexes[1]
+        data = bytearray(self.bag.read_bytes())
+        data[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 1
+        path = self.folder / name
+        path.write_bytes(data)
+        return path
+
+    def test_three_readers_find_every_message_as_the_csv_file_has_it(self):
+        for path in (self.csv, self.random_csv):
+            for bag in (self.convert(path, "judged.mcap"), self.folder / "python.mcap"):
+                if bag.name == "python.mcap":
+                    bags.of_python(path, bag)
+                messages, differ = bags.differences(path, bag)
+                self.assertGreater(messages, 1000)
+                self.assertEqual(differ, 0)
+
+    def test_the_judges_notice_what_is_wrong(self):
+        wrong, bag = self.folder / "wrong.csv", self.convert(self.random_csv, "right.mcap")
+        lines = self.random_csv.read_text(encoding="utf-8").splitlines()
+        head = next(number for number, line in enumerate(lines) if line.startswith("t_us,"))
+        names = lines[head].split(",")
+        rows = [number for number in range(head + 1, len(lines)) if not lines[number].startswith("#")]
+        for name in ("t_us", "sequence", "force_N", "qx_N", "valid", "tare14_Pa", "line"):
+            changed = list(lines)
+            if name == "line":
+                changed[2] += "x"
+            else:
+                at = names.index(name)
+                number = next(number for number in rows if lines[number].split(",")[at] not in ("", "0"))
+                cells = lines[number].split(",")
+                cells[at] = str(float(cells[at]) * 2) if "." in cells[at] else str(int(float(cells[at])) ^ 1)
+                changed[number] = ",".join(cells)
+            wrong.write_text("\n".join(changed) + "\n", encoding="utf-8")
+            self.assertGreater(bags.differences(wrong, bag)[1], 0, name)
+
+    def test_tool_and_package_write_the_same(self):
+        for path in (self.csv, self.random_csv, self.several_csv):
+            bags.of_python(path, self.folder / "same.mcap")
+            self.assertEqual(bags.contents(self.convert(path, "tool.mcap")), bags.contents(self.folder / "same.mcap"))
+        self.assertEqual(bags.contents(self.bag), bags.contents(self.convert(self.csv, "again.mcap")), "as it came and converted")
+
+    def test_nothing_is_lost_on_the_way_and_back(self):
+        ways = [(self.csv, ".mcap"), (self.random_csv, ".mcap"), (self.several_csv, ".mcap"), (self.bag, ".csv"), (self.capture, ".mcap"),
+                (self.capture, ".csv")]
+        for start, middle in ways:
+            there = self.convert(start, f"there{middle}")
+            back = self.convert(there, f"back{start.suffix}")
+            self.assertEqual(back.read_bytes(), start.read_bytes(), (start.name, middle))
+
+    def test_whatever_an_editor_made_of_a_csv_file_comes_back(self):
+        prng = random.Random(5)
+        text = self.several_csv.read_bytes()
+        for number in range(25):
+            data = bytearray(text)
+            for _ in range(2):
+                at = prng.randrange(24, len(data))
+                data[at:at + prng.randrange(3)] = prng.choice((b"", b"\r\n", b",,", b"-0", b"1e3", b"#", b"\n\n", b" ", "µ".encode()))
+            data = data[:prng.randrange(len(data) // 2, len(data) + 1)]
+            path = self.folder / "edited.csv"
+            path.write_bytes(data)
+            try:
+                data.decode("utf-8")
+            except UnicodeDecodeError:
+                continue
+            self.assertEqual(self.convert(self.convert(path, "edited.mcap"), "edited_back.csv").read_bytes(), data, number)
+        path.write_bytes(text + b"# note: \xff\n")
+        self.assertIn("is no UTF-8 text, which an MCAP file cannot hold", self.refused("convert", path, self.folder / "no.mcap"))
+
+    def test_the_package_reads_it_as_the_csv_file(self):
+        for path, device in ((self.csv, None), (self.random_csv, None), (self.several_csv, "BBBB")):
+            one, other = read_recording(path, device=device), read_recording(self.convert(path, "read.mcap"), device=device)
+            self.assertEqual((one.metadata, one.packets, one.events, one.end), (other.metadata, other.packets, other.events, other.end))
+            for name in one.columns:
+                np.testing.assert_array_equal(one[name], other[name])
+            np.testing.assert_array_equal(one.sensors_Pa, other.sensors_Pa)
+
+    def test_several_fingertips_have_topics_of_their_own(self):
+        infos = [next(bags.some_packets(seed, 0)).body for seed in (1, 2)]
+        path = self.folder / "joint.mcap"
+        JointRecordingWriter(path, infos).close()
+        with open(path, "rb") as file:
+            reader = make_reader(file)
+            topics = {channel.topic for channel in reader.get_summary().channels.values()}
+            names = [each.name for each in reader.iter_attachments()]
+        self.assertIn("/fingertip/s0001ABCD/contact", topics, "no topic begins with a digit")
+        self.assertIn("/fingertip/s0002ABCD/wrench", topics)
+        self.assertEqual(names, ["calibration_0001ABCD.json", "calibration_0002ABCD.json"])
+        bag = self.convert(self.several_csv, "two.mcap")
+        rows = [line.split(",")[0] for line in self.several_csv.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+        counts = {topic: sum(each[0] == topic for each in bags.by_rosbags(bag)) for topic in ("/fingertip/AAAA/contact", "/fingertip/BBBB/contact")}
+        self.assertEqual(list(counts.values()), [rows.count("0"), rows.count("1")])
+
+    def test_cut_anywhere_a_chunk_is_lost(self):
+        bag = self.convert(self.csv, "cut_from.mcap")
+        most, unread = bags.truncations(FINGERTIP, bag, self.csv, self.folder, 24, 3)
+        self.assertEqual((most, unread), (1, 0))
+
+    def test_of_a_killed_recorder_every_written_chunk_is_read(self):
+        port, bag = self.folder / "killed_port", self.folder / "killed.mcap"
+        device = subprocess.Popen([FAKE_DEVICE, port, f"rate={bags.RATE_Hz}", f"life={bags.PATIENCE_s}"])
+        recorder = None
+        try:
+            bags.wait_for(port)
+            end_s = time.monotonic() + bags.PATIENCE_s
+            recorder = subprocess.Popen([FINGERTIP, "record", bag, "--port", port], stderr=subprocess.DEVNULL)
+            while not (bag.exists() and any(topic.endswith("/contact") for topic, _, _ in bags.by_mcap_stream(bag))):
+                self.assertLess(time.monotonic(), end_s)
+                time.sleep(0.02)
+        finally:
+            for process in filter(None, (recorder, device)):
+                process.kill()
+                process.wait()
+        whole = self.convert(bag, "killed.csv").read_bytes()
+        self.assertNotIn(b"\n# end:", whole)
+        rows = [line for line in whole.splitlines() if line[:1].isdigit()]
+        self.assertGreater(len(rows), 0)
+        self.assertEqual(sum(topic.endswith("/contact") for topic, _, _ in bags.by_mcap_stream(bag)), len(rows))
+
+    def test_a_damaged_chunk_is_named_and_the_others_are_read(self):
+        path = self.damaged("damaged.mcap")
+        self.assertRegex(self.refused("convert", path, self.folder / "no.csv"), r"damaged.mcap: byte \d+: .*; use --salvage")
+        self.assertFalse((self.folder / "no.csv").exists())
+        out = self.folder / "saved.csv"
+        done = bags.call(FINGERTIP, "convert", path, out, "--salvage", "--overwrite")
+        self.assertRegex(done.stderr, r"lines are lost before line \d+|chunk")
+        saved, whole = out.read_bytes().splitlines(), self.csv.read_bytes().splitlines()
+        self.assertTrue(set(saved) < set(whole) and len(saved) >= 30)
+        with self.assertRaisesRegex(InputError, "use --salvage"):
+            read_recording(path)
+        self.assertEqual([line.encode() for _, line, _ in files._RecordingLines(path, salvage=True)], saved)
+
+    def test_what_is_no_recording_is_said(self):
+        other = self.folder / "other.mcap"
+        writer = Writer(str(other))
+        writer.start()
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        channel = writer.register_channel("/chatter", "cdr", schema)
+        writer.add_message(channel, 1, b"\0\1\0\0\1\0\0\0\0", 1)
+        writer.finish()
+        with contextlib.suppress(FileNotFoundError):
+            (self.folder / "out.csv").unlink()
+        for words, said in (((other,), "an MCAP file, but no recording of a fingertip; give a file that `fingertip record` wrote"),
+                            ((self.folder / "none.mcap",), "No such file or directory; check the path"), ((__file__,), "neither a recording nor bytes")):
+            self.assertIn(said, self.refused("convert", *words, self.folder / "out.csv"))
+        self.assertIn("is the file to read", self.refused("convert", self.bag, self.bag, "--overwrite"))
+        head = self.folder / "head.mcap"
+        head.write_bytes(self.bag.read_bytes()[:50])
+        self.assertIn("breaks off before a recording begins", self.refused("replay", head))
+        with self.assertRaisesRegex(InputError, "no recording of a fingertip"):
+            read_recording(other)
+        huge = self.folder / "huge.mcap"  # a chunk that says it is 2^62 bytes
+        huge.write_bytes(mcap_file.MAGIC + struct.pack("<BQ", mcap_file.CHUNK, 48) + struct.pack("<QQQI", 0, 0, 1 << 62, 0) + struct.pack("<I", 4) +
+                         b"zstd" + struct.pack("<Q", 4) + bytes(4))
+        self.assertIn("a chunk of 4611686018427387904 bytes", self.refused("convert", huge, self.folder / "out.csv"))
+        self.assertFalse((self.folder / "out.csv").exists())
+
+    def test_a_full_disk_is_said_and_leaves_what_was_there(self):
+        def with_little_room():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (15000, 15000))
+
+        full = self.folder / "full.mcap"
+        self.assertIn("nothing was changed", self.refused("convert", self.csv, full, preexec_fn=with_little_room))
+        self.assertFalse(full.exists())
+        packets = bags.some_packets(3, 4000)
+        info = next(packets)
+        writer = RecordingWriter(full, info.body)
+        old = resource.getrlimit(resource.RLIMIT_FSIZE)
+        handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 18, old[1]))
+        try:
+            with self.assertRaisesRegex(InputError, "File too large; the file ends early"):
+                for packet in packets:
+                    writer.packet(packet)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, old)
+            signal.signal(signal.SIGXFSZ, handler)
+            writer.abandon()
+        self.assertGreater(len(read_recording(full, salvage=True)["t_us"]), 20)
+
+    def test_it_is_replayed_as_the_csv_file(self):
+        told = [bags.call(FINGERTIP, "replay", path, "--speed", "max").stdout.replace(path.name, "") for path in (self.csv, self.bag)]
+        self.assertEqual(told[0].splitlines()[-1].replace(str(self.folder), ""), told[1].splitlines()[-1].replace(str(self.folder), ""))
+
+    def test_without_zstandard_it_says_what_to_install(self):
+        with mock.patch.dict(sys.modules, {"zstandard": None}), self.assertRaisesRegex(InputError, r"fingertip-tactile\[mcap\]"):
+            RecordingWriter(self.folder / "without.mcap", next(bags.some_packets(1, 0)).body)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
