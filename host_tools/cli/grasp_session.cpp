@@ -30,9 +30,6 @@ using std::chrono::milliseconds;
 constexpr std::size_t FINGERS = GraspLoop::FINGERS;
 constexpr const char *SIDES[FINGERS] = {"left", "right"};
 constexpr milliseconds NEWS_POLL{20};
-/* As live.cpp has them. */
-constexpr double SETTLE_us = 250e3;
-constexpr milliseconds SAID_FOR{5000};
 /* Between two rows of the gripper where nothing changes. */
 constexpr std::int64_t ROW_us = 10000;
 /* A fingertip that starts measures its zero for half a second. */

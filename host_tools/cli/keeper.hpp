@@ -11,6 +11,9 @@
 
 namespace fingertip {
 
+/* How long a row may wait for earlier ones of other fingertips. */
+constexpr double SETTLE_us = 250e3;
+
 /* Now, as recordings write it. */
 std::string utc_now();
 

@@ -26,10 +26,6 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds POLL{20};
-/* How long a row may wait for earlier ones of other fingertips. */
-constexpr double SETTLE_us = 250e3;
-/* What was said to a key stays this long. */
-constexpr milliseconds SAID_FOR{5000};
 
 class Live {
 public:

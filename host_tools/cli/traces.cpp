@@ -10,7 +10,7 @@ namespace fingertip {
 
 namespace {
 
-constexpr double INTERVAL_s = Model::SAMPLE_INTERVAL_us / 1e6;
+constexpr double SAMPLE_INTERVAL_s = Model::SAMPLE_INTERVAL_us / 1e6;
 constexpr float AXIS_RIM_mm = 6.0f; /* beyond the outermost sensors, as the pad is drawn */
 
 /* A doubtful force above this is none: the pads are made for less. */
@@ -64,7 +64,7 @@ void draw_traces(Canvas &canvas, const Area &area, const Model &model) {
   }
   float doubtful_N = force_N;
   const auto last = static_cast<std::int64_t>(model.last_interval());
-  each_shown(area, INTERVAL_s, last, [&](std::int64_t interval) {
+  each_shown(area, SAMPLE_INTERVAL_s, last, [&](std::int64_t interval) {
     const Sample &sample = sample_of(model, interval);
     if (sample.fitted && !sample.doubtful) {
       force_N = std::max(force_N, sample.force_N);
@@ -105,7 +105,7 @@ void draw_traces(Canvas &canvas, const Area &area, const Model &model) {
        round_above(slip_mm),
        threshold_mm > 0 ? std::optional<float>(threshold_mm) : std::nullopt,
        {curve_of(model, &Sample::slip_valid, &Sample::slip_mm, false, &Sample::slip)}});
-  draw_charts(canvas, area, INTERVAL_s, charts);
+  draw_charts(canvas, area, SAMPLE_INTERVAL_s, charts);
 }
 
 } // namespace fingertip

@@ -6,11 +6,15 @@
 #include "cli/monitor.hpp"
 #include "cli/terminal.hpp"
 
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <vector>
 
 namespace fingertip {
+
+/* What was said to a key stays this long. */
+constexpr std::chrono::milliseconds SAID_FOR{5000};
 
 class View {
 public:

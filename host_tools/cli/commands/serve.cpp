@@ -23,7 +23,7 @@ struct ServeOptions {
 };
 
 using Clock = std::chrono::steady_clock;
-constexpr std::chrono::milliseconds LOOK_INTERVAL{1000};
+constexpr std::chrono::milliseconds DEVICE_LOOK_INTERVAL{1000};
 
 void say(const std::string &line) {
   std::fprintf(stderr, "%s\n", printable(line).c_str());
@@ -86,8 +86,8 @@ int serve(const ServeOptions &options) {
   }
   Clock::time_point looked = Clock::now();
   while (!stop_requested()) {
-    server.step(LOOK_INTERVAL);
-    if (all && Clock::now() - looked > LOOK_INTERVAL) {
+    server.step(DEVICE_LOOK_INTERVAL);
+    if (all && Clock::now() - looked > DEVICE_LOOK_INTERVAL) {
       looked = Clock::now();
       watch.look();
     }
