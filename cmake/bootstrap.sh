@@ -71,6 +71,7 @@ LIST
   case $1 in test | report) cat << 'LIST' ;; esac
 clang-tidy-14 clang-tidy-14
 cppcheck cppcheck
+/usr/include/fastdds/dds/topic/TopicDataType.hpp libfastrtps-dev
 LIST
 }
 
