@@ -66,11 +66,12 @@ LIST
 clang-14 clang-14
 /usr/share/doc/libclang-rt-14-dev libclang-rt-14-dev
 lintian lintian
-/usr/sbin/debootstrap debootstrap
+/usr/sbin/piuparts piuparts
 LIST
   case $1 in test | report) cat << 'LIST' ;; esac
 clang-tidy-14 clang-tidy-14
 cppcheck cppcheck
+/usr/include/fastdds/dds/topic/TopicDataType.hpp libfastrtps-dev
 LIST
 }
 

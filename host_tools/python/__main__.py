@@ -1,13 +1,13 @@
 """The package's commands, out of the source tree.
 
-    /usr/bin/python3 host_tools/python plot|scenario|evaluate ...
+    /usr/bin/python3 host_tools/python plot|scenario|evaluate|ros2 ...
 
-what pip installs as fingertip-plot, fingertip-scenario and fingertip-evaluate; --help after a command has its options.
+what pip installs as fingertip-plot, fingertip-scenario, fingertip-evaluate and fingertip-ros2; --help after a command has its options.
 """
 import importlib
 import sys
 
-COMMANDS = ("plot", "scenario", "evaluate")
+COMMANDS = ("plot", "scenario", "evaluate", "ros2")
 
 if __name__ == "__main__":
     if len(sys.argv) < 2 or sys.argv[1] not in COMMANDS:

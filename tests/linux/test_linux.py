@@ -1,6 +1,6 @@
-"""The emulated device judged by a stock Debian kernel, and the host tool run on that kernel.
+"""The emulated device judged by a stock Debian kernel, and the host tool, out of its Debian package, run on that kernel.
 
-usage: test_linux.py --image F.bin --parallel F.bin --fingertip TOOL --node NODE --cache FOLDER --report usb.json
+usage: test_linux.py --image F.bin --parallel F.bin --cpack CPACK --build FOLDER --node NODE --cache FOLDER --report usb.json
 
 The tests are one story and run in order: a first boot of the device streams over the serial port and ends with the
 boot loader request, a second one over libusb and ends with a 1200-baud touch, the third is of the other board, and
@@ -183,6 +183,15 @@ def write_press(path):
     path.write_text("\n".join(["# fingertip-scenario 1", ",".join(names), *rows]) + "\n")
 
 
+def packaged_tool(folder):
+    """fingertip as the Debian package holds it."""
+    packed, unpacked = folder / "packages", folder / "unpacked"
+    subprocess.run([TOOLS.cpack, "--config", pathlib.Path(TOOLS.build) / "CPackConfig.cmake", "-B", packed], check=True, stdout=subprocess.DEVNULL)
+    [package] = packed.glob("fingertip_*.deb")
+    subprocess.run(["dpkg-deb", "--extract", package, unpacked], check=True)
+    return unpacked / "usr/bin/fingertip"
+
+
 class Linux(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -192,7 +201,8 @@ class Linux(unittest.TestCase):
         cls.scenario = cls.folder / "scenario.csv"
         write_press(cls.scenario)
         cls.sockets = [cls.folder / f"usb{number}.sock" for number in range(2)]
-        programs = [TOOLS.fingertip, "/usr/bin/lsusb", "/usr/bin/usbreset"]
+        cls.fingertip = packaged_tool(cls.folder)
+        programs = [cls.fingertip, "/usr/bin/lsusb", "/usr/bin/usbreset"]
         cls.guest = virtual.Guest(cls.folder, TOOLS.kernel, programs, cls.sockets)
         cls.addClassCleanup(cls.guest.stop)
         cls.heard = len(cls.kernel_log())
@@ -440,7 +450,7 @@ class Linux(unittest.TestCase):
         self.wait_for_port()
 
     def encoded(self, *command):
-        done = subprocess.run([TOOLS.fingertip, "encode", *command], capture_output=True, text=True, check=True)
+        done = subprocess.run([self.fingertip, "encode", *command], capture_output=True, text=True, check=True)
         return re.sub("(..)", r"\\x\1", done.stdout.strip())
 
     def test_15_echo_of_a_terminal_not_yet_raw(self):
@@ -560,7 +570,7 @@ def write_report(path):
 
 def main():
     parser = argparse.ArgumentParser()
-    for name in ("image", "parallel", "fingertip", "node", "cache", "report"):
+    for name in ("image", "parallel", "cpack", "build", "node", "cache", "report"):
         parser.add_argument(f"--{name}", required=True)
     parser.parse_known_args(namespace=TOOLS)
     try:

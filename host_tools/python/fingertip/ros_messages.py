@@ -18,7 +18,7 @@ def _definition(name: str) -> str:
 
 
 @functools.cache
-def _fields(name: str) -> tuple[tuple[str, str, bool], ...]:
+def fields_of(name: str) -> tuple[tuple[str, str, bool], ...]:
     """(field, type, whether a sequence) of a message, "geometry_msgs/Wrench"."""
     found = filter(None, map(_FIELD.match, _definition(name).splitlines()))
     return tuple((match[3], match[1], bool(match[2])) for match in found)
@@ -29,7 +29,7 @@ def schema_of(name: str) -> str:
     """The definition with all that it needs, as the schema encoding ros2msg has them. name: "geometry_msgs/WrenchStamped"."""
     needed = [name]
     for each in needed:  # grows
-        needed += dict.fromkeys(kind for _, kind, _ in _fields(each) if "/" in kind and kind not in needed)
+        needed += dict.fromkeys(kind for _, kind, _ in fields_of(each) if "/" in kind and kind not in needed)
     return ("=" * 80 + "\n").join(("" if each == name else f"MSG: {each}\n") + _definition(each) for each in needed)
 
 
@@ -46,7 +46,7 @@ def _packer(codes: tuple[str, ...]) -> struct.Struct:
 
 
 def _flatten(name: str, message: dict[str, Any], codes: list[str], flat: list[Any]) -> None:
-    for field, kind, is_sequence in _fields(name):
+    for field, kind, is_sequence in fields_of(name):
         value = message[field]
         if is_sequence:
             codes.append("I")
@@ -108,7 +108,7 @@ class _Reader:
         return tuple(self.value(kind) for _ in range(min(count, len(self.data))))
 
     def message(self, name: str) -> dict[str, Any]:
-        return {field: (self.sequence if is_sequence else self.value)(kind) for field, kind, is_sequence in _fields(name)}
+        return {field: (self.sequence if is_sequence else self.value)(kind) for field, kind, is_sequence in fields_of(name)}
 
 
 def decode(name: str, data: bytes) -> dict[str, Any]:

@@ -703,9 +703,10 @@ class Examples(DeviceTest):
 
     def setUp(self):
         super().setUp()
-        patch = mock.patch.dict(Fingertip.__init__.__kwdefaults__, {"timeout_s": PATIENCE_s})
-        patch.start()
-        self.addCleanup(patch.stop)
+        for patch in (mock.patch.dict(Fingertip.__init__.__kwdefaults__, {"timeout_s": PATIENCE_s}),
+                      mock.patch.dict(os.environ, {"ROS_LOCALHOST_ONLY": "1"})):
+            patch.start()
+            self.addCleanup(patch.stop)
 
     def blocks(self, path, language="python"):
         return re.findall(rf"```{language}\n(.*?)```", (ROOT / path).read_text(encoding="utf-8"), re.S)

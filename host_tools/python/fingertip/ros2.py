@@ -1,0 +1,251 @@
+"""Fingertips as topics of ROS 2, from a computer without ROS: DDS by cyclonedds, the messages of MCAP recordings (mcap_recording.py).
+
+    from fingertip import Fingertip
+    from fingertip.ros2 import Publisher
+    with Fingertip() as fingertip, Publisher() as publisher:
+        publisher.add(fingertip)
+        for frame in fingertip:
+            publisher.frame(frame)
+
+    fingertip-ros2 [--device SERIAL ...] [--port PORT ...] [--domain N] [--seconds S]
+
+Header stamps are the computer's clock (system time) at the middle of the sensors' conversion. QoS: reliable, volatile, the last 1000
+of each topic: readers of sensor data hear it too, and one that stalls for longer than 0.7 s misses what is older, while this goes on.
+ROS_DOMAIN_ID, ROS_LOCALHOST_ONLY=1 and ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST act as in ROS 2, CYCLONEDDS_URI as in cyclonedds. Judged by
+Fast DDS and rosbags; not run against ROS 2.
+"""
+import argparse
+import math
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from .device import Fingertip
+from .errors import BadValueError, FingertipError, InputError
+from .files import run_tool
+from .frames import Q10, Frame
+from .group import Fingertips
+from .mcap_recording import (
+    CONTACT_TYPE, DIAGNOSTICS_TYPE, PLACE_TYPE, PRESSURES_TYPE, WRENCH_TYPE, health_status, name_in_ros, place, pressure_cloud, stamp, warning_status,
+    wrench)
+from .names import WARNINGS
+from .ros_messages import encode
+from .wire import Contact, Health
+
+if TYPE_CHECKING:
+    from .dds import Participant, Topic
+
+DOMAIN_MAX = 232  # whose ports are below 65536
+POLL_s = 0.1
+FRAME_TOPICS = {"contact": CONTACT_TYPE, "wrench": WRENCH_TYPE, "place": PLACE_TYPE, "pressures": PRESSURES_TYPE}
+_CONTACT_FIELDS = tuple(name.lower() for name in Contact._fields)
+
+
+def domain_of_environment() -> int:
+    """ROS_DOMAIN_ID, or 0. Raises BadValueError."""
+    text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
+    if not (text.isascii() and text.isdigit() and int(text) <= DOMAIN_MAX):
+        raise BadValueError(f"ROS_DOMAIN_ID {text} is out of range; give 0 to {DOMAIN_MAX}")
+    return int(text)
+
+
+def contact_of_frame(frame: Frame) -> dict[str, Any]:
+    """fingertip_msgs/Contact, without its header: of no recording, hence of no line."""
+    raw = frame.raw
+    return {**dict(zip(_CONTACT_FIELDS, frame.contact)), "line": 0, "device": 0, "time_us": math.nan, "t_us": frame.t_us, "frame": frame.frame,
+            "has_contact": frame.has_contact, "sequence": frame.sequence if frame.has_contact else 0, "has_raw": frame.has_raw,
+            "raw_sequence": frame.raw_sequence if frame.has_raw else 0, "raw_flags": raw.flags, "valid": raw.valid, "saturated": raw.saturated,
+            "doubtful": raw.doubtful, "temperature_degc": raw.temperature_cC / 100 if frame.has_raw else math.nan,
+            "pressure_pa": [value / Q10 for value in raw.readings[0::2]], "tare_pa": [value / Q10 for value in raw.readings[1::2]]}
+
+
+def _system_minus_host_ns() -> int:
+    """Of three looks at both clocks the one in which least time passed: in between another program may have had its turn."""
+    looks = []
+    for _ in range(3):
+        before_ns, now_ns, after_ns = time.perf_counter_ns(), time.time_ns(), time.perf_counter_ns()
+        looks.append((after_ns - before_ns, now_ns - before_ns))
+    return min(looks)[1]
+
+
+def utc_ns(frame: Frame) -> int:
+    """When it was measured, ns since 1970; now, if the clocks were not compared yet."""
+    host_us = frame.host_us
+    return time.time_ns() if math.isnan(host_us) else _system_minus_host_ns() + round(host_us * 1000)
+
+
+class _Device:
+    """One fingertip and its topics."""
+
+    def __init__(self, participant: "Participant", fingertip: Fingertip) -> None:
+        self.fingertip = fingertip
+        name = name_in_ros(fingertip.serial)
+        self.frame_id = "fingertip_" + name
+        self.topics: "dict[str, Topic]" = {kind: participant.topic(f"/fingertip/{name}/{topic}", kind) for topic, kind in FRAME_TOPICS.items()}
+        self.frames = 0
+        self.warnings: int | None = None
+        self.health: Health | None = None
+        self.is_gone = False
+
+    def send(self, kind: str, time_ns: int, message: dict[str, Any]) -> None:
+        header = {"stamp": stamp(time_ns), "frame_id": self.frame_id}
+        self.topics[kind].send(encode(kind, {"header": header, **message}), time_ns)
+
+
+class Publisher:
+    """The topics of fingertips, and /diagnostics. domain: as ROS_DOMAIN_ID has it, if not given. frame() may be called from a thread for each
+    fingertip. Raises BadValueError, InputError."""
+
+    def __init__(self, domain: int | None = None) -> None:
+        from . import dds  # says what to install
+        loopback_only = os.environ.get("ROS_LOCALHOST_ONLY", "") == "1" or os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
+        self.domain = domain_of_environment() if domain is None else domain
+        if not 0 <= self.domain <= DOMAIN_MAX:
+            raise BadValueError(f"domain {self.domain} is out of range; give 0 to {DOMAIN_MAX}")
+        self._participant = dds.Participant(self.domain, loopback_only)
+        self._diagnostics = self._participant.topic("/diagnostics", DIAGNOSTICS_TYPE)
+        self._lock = threading.Lock()
+        self._devices: dict[str, _Device] = {}
+
+    def __enter__(self) -> "Publisher":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """The topics vanish. sent and refused stay."""
+        self._participant.close()
+
+    def add(self, fingertip: Fingertip) -> None:
+        self._devices[fingertip.serial] = _Device(self._participant, fingertip)
+
+    def frame(self, frame: Frame) -> None:
+        """Says it on the topics of its fingertip."""
+        device = self._devices[frame.serial]
+        time_ns = utc_ns(frame)
+        device.frames += 1
+        device.send(CONTACT_TYPE, time_ns, contact_of_frame(frame))
+        contact, raw = frame.contact, frame.raw
+        if frame.has_contact:
+            device.send(WRENCH_TYPE, time_ns, {"wrench": wrench(contact.flags, contact.x_mm, contact.y_mm, contact.force_N, contact.qx_N, contact.qy_N)})
+            device.send(PLACE_TYPE, time_ns, {"point": place(contact.flags, contact.x_mm, contact.y_mm)})
+            if device.warnings != contact.flags & WARNINGS:
+                device.warnings = contact.flags & WARNINGS
+                self._diagnose(warning_status(frame.serial, device.warnings), time_ns)
+        info = device.fingertip.info
+        if frame.has_raw and min(len(info.x_mm), len(info.y_mm)) >= raw.sensors:
+            pressures, tares = ([value / Q10 for value in raw.readings[first::2]] for first in (0, 1))
+            device.send(PRESSURES_TYPE, time_ns, pressure_cloud(list(info.x_mm), list(info.y_mm), raw.valid, pressures, tares))
+
+    def state(self) -> None:
+        """Says on /diagnostics what fingertips said of their health since the last time, and which have gone or are there again."""
+        for serial, device in self._devices.items():
+            tip = device.fingertip
+            if tip.is_returning != device.is_gone:
+                device.is_gone = tip.is_returning
+                said = "gone; it is waited for" if device.is_gone else "there again"
+                self._diagnose({"level": 2 if device.is_gone else 0, "name": f"fingertip {serial} line", "message": said, "hardware_id": serial,
+                                "values": []}, time.time_ns())
+            health = tip.health
+            if health is not None and health is not device.health:
+                device.health = health
+                fields = {name: str(0 if value is None else value) for name, value in health._asdict().items()}
+                self._diagnose(health_status(serial, tip.info.sensors, fields), time.time_ns())
+
+    def _diagnose(self, status: dict[str, Any], time_ns: int) -> None:
+        with self._lock:
+            self._diagnostics.send(encode(DIAGNOSTICS_TYPE, {"header": {"stamp": stamp(time_ns), "frame_id": ""}, "status": [status]}), time_ns)
+
+    @property
+    def frames(self) -> dict[str, int]:
+        """Of each fingertip, by serial number."""
+        return {serial: device.frames for serial, device in self._devices.items()}
+
+    @property
+    def sent(self) -> dict[str, int]:
+        """Messages by topic."""
+        return {topic.name: topic.sent for topic in self._topics()}
+
+    @property
+    def listeners(self) -> dict[str, int]:
+        """Readers by topic, while this is open: those that get what is sent from now on."""
+        return {topic.name: topic.listeners for topic in self._topics()}
+
+    @property
+    def refused(self) -> int:
+        """Messages that a late reader had no room for, and nobody got."""
+        return sum(topic.refused for topic in self._topics())
+
+    def _topics(self) -> "list[Topic]":
+        return [*(topic for device in self._devices.values() for topic in device.topics.values()), self._diagnostics]
+
+
+def _follow(publisher: Publisher, fingertip: Fingertip, failures: list[FingertipError]) -> None:
+    try:
+        for frame in fingertip:
+            publisher.frame(frame)
+    except FingertipError as error:
+        failures.append(error)
+
+
+def publish(publisher: Publisher, fingertips: Fingertips, is_over: Callable[[], bool]) -> None:
+    """Until it is over. Raises FingertipError if one of them ends before."""
+    failures: list[FingertipError] = []
+    tips = list(fingertips.by_serial.values())
+    for tip in tips:
+        publisher.add(tip)
+    threads = [threading.Thread(target=_follow, args=(publisher, tip, failures)) for tip in tips]
+    for thread in threads:
+        thread.start()
+    try:
+        while not is_over() and not failures:
+            publisher.state()
+            time.sleep(POLL_s)
+    finally:
+        fingertips.close()
+        for thread in threads:
+            thread.join()
+    if failures:
+        raise failures[0]
+
+
+def main(argv: list[str]) -> int:
+    description = "Says what fingertips feel on topics of ROS 2, without ROS. Not run against ROS 2."
+    parser = argparse.ArgumentParser(prog="fingertip-ros2", description=description)
+    parser.add_argument("--device", action="append", metavar="SERIAL", help="a fingertip; all that are there, if none is named")
+    parser.add_argument("--port", action="append", metavar="PORT", help="the same, by its serial port")
+    parser.add_argument("--domain", type=int, metavar="N", help="0 to 232; as ROS_DOMAIN_ID has it, if not given")
+    parser.add_argument("--seconds", type=float, default=math.inf, metavar="S", help="how long; until Ctrl-C, if not given")
+    options = parser.parse_args(argv)
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    try:
+        with Publisher(options.domain) as publisher:
+            fingertips = Fingertips(options.port, serials=options.device, reconnect=True)
+            end_s = time.monotonic() + options.seconds
+            print(f"domain {publisher.domain}: " + " ".join(f"/fingertip/{name_in_ros(serial)}" for serial in fingertips.by_serial), flush=True)
+            publish(publisher, fingertips, lambda: stop.is_set() or time.monotonic() >= end_s)
+            for serial, tip in fingertips.by_serial.items():
+                print(f"{serial}: {publisher.frames[serial]} frames, lost {tip.statistics.dropped_packets + tip.overrun_frames}")
+            print("".join(f"{name}: {count} messages\n" for name, count in publisher.sent.items()) + f"refused: {publisher.refused}")
+    except InputError:
+        raise
+    except FingertipError as error:
+        raise InputError(str(error)) from None
+    return 0
+
+
+def command() -> int:
+    """The console command fingertip-ros2."""
+    return run_tool("fingertip-ros2", main)
+
+
+if __name__ == "__main__":
+    sys.exit(command())
