@@ -24,7 +24,7 @@ import validation  # noqa: E402
 from goals import goal_table_md, judge  # noqa: E402
 
 GOALS = {"fit": fit.GOALS, "rate": rate.GOALS, "validation": validation.GOALS, "truth": truth.GOALS, "shear": shear.GOALS, "grasp": grasp.GOALS, "tools": tools.GOALS,
-         "reliability": reliability.GOALS}
+         "reliability": tuple(goal for part in reliability.PARTS for goal in part.GOALS)}
 VOID = {"meta", "img", "br", "hr"}
 PARTS = {part.name: part for part in page.PARTS}
 
