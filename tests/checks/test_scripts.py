@@ -160,13 +160,15 @@ class BootstrapReport(Folder):
             script = self.folder / f"host_tools/report/{report}.py"
             script.parent.mkdir(parents=True)
             script.write_text("import sys\nprint('ran', sys.argv[0], *(sys.argv[sys.argv.index(o) + 1] for o in ('-o', '--picture') if o in sys.argv))\n")
-        done = subprocess.run(["sh", self.folder / "cmake/bootstrap.sh", "report"], capture_output=True, text=True, timeout=60,
-                              env={**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
-        self.assertEqual(done.returncode, 0, done.stderr)
-        lines = done.stdout.splitlines()
-        self.assertEqual(lines[-1], f"== every table and picture: {self.folder.resolve()}/build/report/index.html")
-        ran = [line.split()[1:] for line in lines if line.startswith("ran ")]
-        self.assertEqual([place for _, place, *_ in ran], 2 * ["build/report"] + ["boards"] + 7 * ["build/report"])
+        for job, after_traces in (("report",), 6), (("report", "all"), 7):
+            done = subprocess.run(["sh", self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=60,
+                                  env={**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
+            self.assertEqual(done.returncode, 0, done.stderr)
+            lines = done.stdout.splitlines()
+            self.assertEqual(lines[-1], f"== every table and picture: {self.folder.resolve()}/build/report/index.html")
+            ran = [line.split()[1:] for line in lines if line.startswith("ran ")]
+            self.assertEqual([place for _, place, *_ in ran], 2 * ["build/report"] + ["boards"] + after_traces * ["build/report"])
+        self.assertIn("host_tools/report/shear/shear.png", [picture for _, _, *pictures in ran for picture in pictures])
         for picture in (picture for _, _, *pictures in ran for picture in pictures):  # those that the report's README shows
             self.assertTrue((ROOT / picture).is_file(), picture)
             place = os.path.relpath(picture, "host_tools/report")
