@@ -91,7 +91,7 @@ class _Published:
             return  # until the clocks were compared
         offset_ns, shared = _offset_ns(), int(self.tip.description.endswith(".sock"))
         for name, t_us, data, line, number, taken_ns in self._early:
-            stamp = Stamp(line, number, taken_ns, round(clock.host_at(t_us) * 1000) + offset_ns, clock.uncertainty_us, clock.drift_ppm, shared).bytes()
+            stamp = Stamp(line, number, taken_ns, round(clock.host_at(t_us) * 1000) + offset_ns, clock.uncertainty_us, clock.drift_ppm, shared).packed()
             self._kept[line, number] = (name, data, stamp)
             self._queue.append((name, data, stamp, line, number))
         self._early.clear()

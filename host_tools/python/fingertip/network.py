@@ -51,7 +51,7 @@ class Stamp(NamedTuple):
     drift_ppm: float
     shared: int
 
-    def bytes(self) -> bytes:
+    def packed(self) -> bytes:
         return _STAMP.pack(*self)
 
     @staticmethod
