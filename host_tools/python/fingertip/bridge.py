@@ -45,9 +45,8 @@ class _Published:
         self._session = session
         self._keep = keep
         self._clock_of_host = clock_of_host
-        self._lines = collections.deque(maxlen=KEPT_LINES)  # [line, number of its last packet that was given out]
+        self._lines = collections.deque(maxlen=KEPT_LINES)  # [line, number of its last packet that was read, and that was published]
         self._kept = collections.OrderedDict()  # (line, number) -> (name, frame, stamp)
-        self._first_kept = 0
         self._line = self._number = 0
         self._expected = None
         self._early = []
@@ -73,7 +72,10 @@ class _Published:
 
     def _begin_line(self):
         self._line, self._number, self._expected = max(time.time_ns(), self._line + 1), 0, None
-        self._lines.append([self._line, 0])
+        self._lines.append([self._line, 0, 0])
+
+    def _note(self, column, line, number):
+        next(each for each in reversed(self._lines) if each[0] == line)[column] = number
 
     def _hear(self, packet, frame):
         if packet is None:
@@ -94,6 +96,7 @@ class _Published:
             stamp = Stamp(line, number, taken_ns, round(clock.host_at(t_us) * 1000) + offset_ns, clock.uncertainty_us, clock.drift_ppm, shared).packed()
             self._kept[line, number] = (name, data, stamp)
             self._queue.append((name, data, stamp, line, number))
+            self._note(1, line, number)
         self._early.clear()
         while len(self._kept) > self._keep:
             self._kept.popitem(last=False)
@@ -112,13 +115,11 @@ class _Published:
                     self._publishers[name].put(data, attachment=stamp)
                 else:
                     self.skipped += 1
-                for each in self._lines:
-                    if each[0] == line:
-                        each[1] = number
+                self._note(2, line, number)
             if time.monotonic() >= next_status_s:
                 next_status_s = time.monotonic() + STATUS_s
                 self._watch()
-                self._publishers["status"].put(self._status())
+                self._publishers["status"].put(self._status(2))
 
     def _watch(self):
         there = not self.tip.is_returning
@@ -128,12 +129,13 @@ class _Published:
             token, self._token = self._token, None
             token.undeclare()
 
-    def _status(self):
+    def _status(self, column):
+        """column: 1, packets that were read; 2, those that were published."""
         clock, line = self._clock_of_host(), self.tip.statistics
         return json.dumps({
             "host": platform.node(), "process": os.getpid(), "port": self.tip.description, "there": not self.tip.is_returning, "now_ns": time.time_ns(),
             "clock": {"disciplined": clock.disciplined, "bound_us": clock.bound_us if clock.disciplined else None, "text": clock.text},
-            "lines": list(self._lines), "unpublished": self.skipped, "line": {name: getattr(line, name) for name in line.COUNTS}})
+            "lines": [(each[0], each[column]) for each in list(self._lines)], "unpublished": self.skipped, "line": {name: getattr(line, name) for name in line.COUNTS}})
 
     # Answers
 
@@ -171,7 +173,7 @@ class _Published:
         self._reply_info(query, "info", self.tip.info if self.tip.is_returning else self.tip.read_info())
 
     def _tell_status(self, query):
-        query.reply(f"{self._root}/status", self._status())
+        query.reply(f"{self._root}/status", self._status(1))
 
     def _again(self, query):
         asked = self._parameters(query)

@@ -3,7 +3,8 @@
     fingertip/SERIAL/contact, raw, health, info   the packet's frame as it stood on the line, without its closing zero: wire.decode
                                                   reads it; firmware/wire/PROTOCOL.md is its format. The attachment is a Stamp.
     fingertip/SERIAL/other                        likewise what else it says: acknowledgements, crashes
-    fingertip/SERIAL/status                       JSON, twice a second, and asked: Status
+    fingertip/SERIAL/status                       JSON, twice a second, and asked: host, its clock by its own time daemon, lines with the number of
+                                                  the last packet that was published, or asked, that was read, and what the line counts
     fingertip/SERIAL/tare, set, info              to be asked; tare?force=1 and set?osr=256;rate_Hz=0 take the arguments of Fingertip.tare
                                                   and Fingertip.set. The answer is an info packet, or an error with its reason
     fingertip/SERIAL/again?line=L;first=A;last=B  to be asked: these packets once more, as far as they are kept, and then JSON: oldest, the

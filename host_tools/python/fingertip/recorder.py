@@ -85,7 +85,7 @@ class Account:
 
     def _look(self, line, now_s):
         is_stuck = line.high >= line.next and line.next not in line.early
-        line.stuck_s = (line.stuck_s or now_s) if is_stuck else None
+        line.stuck_s = (now_s if line.stuck_s is None else line.stuck_s) if is_stuck else None
 
     def heard(self, told, now_s):
         if not self.lines:
@@ -200,6 +200,7 @@ class _Source:
         self.clock_line = 0
         self.wanted = None  # (line, first, last) to be asked for
         self.status_s = time.monotonic()
+        self.must_answer = False
         self.asked = 0
         self.recovered = 0
 
@@ -247,8 +248,8 @@ class Recording:
                     line, first, last = wanted
                     self._ask(source, f"{ROOT}/{source.serial}/again?line={line};first={first};last={last}", "again")
                     source.asked += 1
-                elif time.monotonic() - source.status_s > STATUS_AGE_s:
-                    self._ask(source, f"{ROOT}/{source.serial}/status", "status")
+                elif source.must_answer or time.monotonic() - source.status_s > STATUS_AGE_s:
+                    self._ask(source, f"{ROOT}/{source.serial}/status", "answer")
             except self._zenoh.ZError:
                 pass  # not now; asked once more
             self._ended.wait(ASK_s / 10 if source.wanted else ASK_s)
@@ -268,13 +269,13 @@ class Recording:
         while not ended.is_set() and time.monotonic() < end_s:
             self._work(0.1)
         for source in self.sources.values():  # what has it sent until now?
-            source.status_s = -math.inf
+            source.must_answer = True
         asked_s = time.monotonic()
         while time.monotonic() - asked_s < patience_s:
             self._work(0.1)
-            if all(source.status_s >= asked_s and source.account.is_complete for source in self.sources.values()):
+            if not any(source.must_answer or not source.account.is_complete for source in self.sources.values()):
                 break
-        self.unheard = [source.serial for source in self.sources.values() if source.status_s < asked_s]
+        self.unheard = [source.serial for source in self.sources.values() if source.must_answer]
         self._ended.set()
         self._subscriber.undeclare()
         for source in self.sources.values():
@@ -297,8 +298,8 @@ class Recording:
                 if name in RECORDED and serial not in self.unrecorded:
                     self.unrecorded.add(serial)
                     self._say(f"{serial} came after the recording had begun, and is not recorded")
-            elif name == "status":
-                self._take_status(source, data)
+            elif name in ("status", "answer"):
+                self._take_status(source, data, name == "answer")
                 touched.add(source)
             elif name in RECORDED or name == "again":
                 self._take(source, name, data, attachment)
@@ -309,13 +310,14 @@ class Recording:
                 self._write(source)
                 source.wanted = source.account.ask(now_s)
 
-    def _take_status(self, source, data):
+    def _take_status(self, source, data, is_answer):
         try:
             lines = [(int(line), int(number)) for line, number in json.loads(data)["lines"]]
         except (ValueError, KeyError, TypeError):
             self.damaged += 1
             return
         source.status_s = time.monotonic()
+        source.must_answer &= not is_answer
         source.account.heard(lines, time.monotonic())
 
     def _take(self, source, name, data, attachment):
