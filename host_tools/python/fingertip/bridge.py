@@ -10,6 +10,7 @@ import concurrent.futures
 import contextlib
 import json
 import os
+import pathlib
 import platform
 import signal
 import sys
@@ -33,6 +34,14 @@ NAMES = {wire.Contact: "contact", wire.Raw: "raw", wire.Health: "health", wire.I
 def _offset_ns():
     """What the clock of Fingertip.clock is behind the time of day."""
     return time.time_ns() - time.perf_counter_ns()
+
+
+def _boot():
+    """What only processes of the same computer say: they have one clock."""
+    try:
+        return pathlib.Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+    except OSError:
+        return platform.node()
 
 
 class _Published:
@@ -133,7 +142,7 @@ class _Published:
         """column: 1, packets that were read; 2, those that were published."""
         clock, line = self._clock_of_host(), self.tip.statistics
         return json.dumps({
-            "host": platform.node(), "process": os.getpid(), "port": self.tip.description, "there": not self.tip.is_returning, "now_ns": time.time_ns(),
+            "host": platform.node(), "boot": _boot(), "port": self.tip.description, "there": not self.tip.is_returning, "now_ns": time.time_ns(),
             "clock": {"disciplined": clock.disciplined, "bound_us": clock.bound_us if clock.disciplined else None, "text": clock.text},
             "lines": [(each[0], each[column]) for each in list(self._lines)], "unpublished": self.skipped, "line": {name: getattr(line, name) for name in line.COUNTS}})
 
@@ -206,14 +215,14 @@ class Bridge:
         self._say = say
         self._published = {}
         self._complaints = {}
-        self._clock = host_clock()
+        self.clock = host_clock()
         self._next_clock_s = time.monotonic() + CHRONY_s
 
     def look(self):
         """For fingertips that came, and how this computer's clock is kept."""
         if time.monotonic() >= self._next_clock_s:
             self._next_clock_s = time.monotonic() + CHRONY_s
-            self._clock = host_clock()
+            self.clock = host_clock()
         for way, one in list(self._published.items()):
             try:
                 one.tip.take_one()
@@ -241,7 +250,7 @@ class Bridge:
         if any(one.tip.serial == tip.serial for one in self._published.values()):  # it is waited for already, and has another name now
             tip.close()
             return
-        self._published[way] = _Published(self._session, tip, self._keep, lambda: self._clock)
+        self._published[way] = _Published(self._session, tip, self._keep, lambda: self.clock)
         self._say(f"{tip.serial} at {tip.description}")
 
     def close(self):
@@ -271,7 +280,7 @@ def main(argv):
 
     with open_session(options, options.router) as session:
         bridge = Bridge(session, options.port, options.keep, options.latency_ms, say)
-        say(bridge._clock.text)
+        say(bridge.clock.text)
         try:
             while not ended.is_set():
                 bridge.look()

@@ -5,6 +5,7 @@ file too. It ends by Ctrl-C or --seconds.
 Exit status: 0 nothing was lost, 3 something was, and is counted, 1 an error.
 """
 import argparse
+import itertools
 import json
 import math
 import queue
@@ -12,6 +13,7 @@ import signal
 import sys
 import threading
 import time
+from typing import NamedTuple
 
 from . import wire
 from .clock import ClockEstimate
@@ -248,6 +250,7 @@ class Recording:
                     line, first, last = wanted
                     self._ask(source, f"{ROOT}/{source.serial}/again?line={line};first={first};last={last}", "again")
                     source.asked += 1
+                    source.wanted = None  # judged anew by what has come
                 elif source.must_answer or time.monotonic() - source.status_s > STATUS_AGE_s:
                     self._ask(source, f"{ROOT}/{source.serial}/status", "answer")
             except self._zenoh.ZError:
@@ -386,7 +389,10 @@ def find(session, serials, expect, wait_s):
     while True:
         for serial, (data, _, _) in ask(session, f"{ROOT}/*/info", 2.0).items():
             if not serials or serial in serials:
-                infos[serial] = wire.decode(data).body
+                try:
+                    infos[serial] = wire.decode(data).body
+                except PacketError as error:
+                    raise InputError(f"{serial}: its info packet is damaged, or of another version ({error})") from None
         missing = [serial for serial in serials if serial not in infos]
         if infos and not missing and len(infos) >= expect:
             return dict(sorted(infos.items()))
@@ -397,34 +403,58 @@ def find(session, serials, expect, wait_s):
         time.sleep(0.2)
 
 
-def judge_clocks(session, serials, bound_us, may_be_undisciplined):
-    """What is to be noted of each host's clock. Raises InputError where one may be, or is, further off than the bound from another."""
-    bounds, notes, measured = {}, {}, {}
-    for serial in serials:
-        best = (math.inf, 0.0)
-        for _ in range(PINGS):
-            answer = ask(session, f"{ROOT}/{serial}/status").get(serial)
-            if answer is None:
-                raise InputError(f"{serial}: its bridge does not say how its clock is kept")
+class _HostClock(NamedTuple):
+    """Of a fingertip's host: where it was measured to stand against this computer's, within half of the way there and back."""
+
+    host: str
+    boot: str
+    disciplined: bool
+    bound_us: float
+    text: str
+    ahead_us: float
+    within_us: float
+
+    def note(self):
+        bound = f"{self.bound_us:.0f} us" if self.disciplined else "unknown"
+        return f"host {self.host}; {self.text}; bound {bound}; measured {self.ahead_us:.0f} us from the recorder's, within {self.within_us:.0f} us"
+
+
+def _clock_of(session, serial):
+    best = (math.inf, 0.0)
+    for _ in range(PINGS):
+        answer = ask(session, f"{ROOT}/{serial}/status").get(serial)
+        if answer is None:
+            raise InputError(f"{serial}: its bridge does not say how its clock is kept")
+        try:
             status = json.loads(answer[0])
             best = min(best, ((answer[2] - answer[1]) / 2000, (status["now_ns"] - (answer[1] + answer[2]) / 2) / 1000))
-        clock = status["clock"]
-        if not clock["disciplined"] and not may_be_undisciplined:
-            raise InputError(f"{status['host']} ({serial}): {clock['text']}; let chrony keep the clock, or give --undisciplined")
-        bounds[serial] = clock["bound_us"] if clock["disciplined"] else 0.0
-        measured[serial] = best
-        known = f"{clock['bound_us']:.0f} us" if clock["disciplined"] else "unknown"
-        notes[serial] = f"host {status['host']}; {clock['text']}; bound {known}; measured {best[1]:.0f} us from the recorder's, within {best[0]:.0f} us"
-    for one in serials:
-        for other in serials:
-            sum_us = bounds[one] + bounds[other] if one < other else 0.0
-            if sum_us > bound_us:
-                raise InputError(f"the clocks of {one} and {other} may be {sum_us:.0f} us apart by chrony's estimate, more than --clock-bound-us {bound_us:g}")
-            apart_us = measured[one][1] - measured[other][1]
-            sure_us = apart_us - measured[one][0] - measured[other][0]
-            if sure_us > bound_us:
-                raise InputError(f"the clocks of {one} and {other} are at least {sure_us:.0f} us apart, more than --clock-bound-us {bound_us:g}")
-    return notes
+            clock = status["clock"]
+            found = _HostClock(str(status["host"]), str(status["boot"]), bool(clock["disciplined"]), float(clock["bound_us"] or 0), str(clock["text"]),
+                           best[1], best[0])
+        except (ValueError, KeyError, TypeError):
+            raise InputError(f"{serial}: its bridge says its clock in a way that is not known here; it is of another version") from None
+    return found
+
+
+def judge_clocks(session, serials, bound_us, may_be_undisciplined):
+    """Serial number -> what is to be noted of its host's clock. Raises InputError where one may be, or is, further off than the bound
+    from another host's."""
+    clocks = {}
+    for serial in serials:
+        clocks[serial] = clock = _clock_of(session, serial)
+        if not clock.disciplined and not may_be_undisciplined:
+            raise InputError(f"{clock.host} ({serial}): {clock.text}; let chrony keep the clock, or give --undisciplined")
+    for one, other in itertools.combinations(serials, 2):
+        a, b = clocks[one], clocks[other]
+        if a.boot == b.boot:
+            continue
+        if a.disciplined and b.disciplined and a.bound_us + b.bound_us > bound_us:
+            raise InputError(f"the clocks of {one} and {other} may be {a.bound_us + b.bound_us:.0f} us apart by chrony's estimate, more than "
+                             f"--clock-bound-us {bound_us:g}")
+        surely_us = abs(a.ahead_us - b.ahead_us) - a.within_us - b.within_us
+        if surely_us > bound_us:
+            raise InputError(f"the clocks of {one} and {other} are at least {surely_us:.0f} us apart, more than --clock-bound-us {bound_us:g}")
+    return {serial: clock.note() for serial, clock in clocks.items()}
 
 
 def main(argv):

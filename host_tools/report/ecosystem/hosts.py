@@ -27,7 +27,8 @@ from fingertip.mcap_recording import McapLineReader  # noqa: E402
 from fingertip.network import Stamp, parts_of  # noqa: E402
 
 HOSTS, TIPS, RATE_Hz, FULL_RATE_Hz = 4, 4, 50, 1310
-PATIENCE_s = 60
+UNPLUGGED = "F100"  # and back, after half of its frames
+PATIENCE_s = 90
 PORT = 7447
 
 
@@ -163,7 +164,8 @@ def cuts(fake_device, seconds):
         ports = {f"F1{host}{tip}": folder / f"F1{host}{tip}" for host in range(HOSTS) for tip in range(TIPS)}
         mirrors = {serial: folder / f"mirror{serial}" for serial in ports}
         for serial, port in ports.items():
-            start([fake_device, port, f"serial={serial}", f"mirror={mirrors[serial]}", f"rate={RATE_Hz}", f"frames={RATE_Hz * seconds}", "life=600"])
+            unplugged = [f"vanish={RATE_Hz * seconds // 2},1500"] if serial == UNPLUGGED else []
+            start([fake_device, port, f"serial={serial}", f"mirror={mirrors[serial]}", f"rate={RATE_Hz}", f"frames={RATE_Hz * seconds}", "life=600", *unplugged])
         wait_for(lambda: all(path.is_symlink() for path in (*ports.values(), *mirrors.values())), "the fingertips")
         truth = Mirrors(mirrors)
 
@@ -217,7 +219,8 @@ def cuts(fake_device, seconds):
                 "zenoh_before_the_recording": before, "zenoh_lost_counted": sum(by_host), "zenoh_lost_uncounted": uncounted,
                 "zenoh_not_sent_but_recorded": strangers, "zenoh_lost_by_network": sum(by_host) - by_host[2], "zenoh_lost_by_killed_bridge": by_host[2],
                 "zenoh_losses_in_file": events, "zenoh_asked_again": sum(each["recovered"] for each in told.values()),
-                "zenoh_device_restarts": sum(each["restarts"] for each in told.values())}
+                "zenoh_device_restarts": sum(each["restarts"] for each in told.values()),
+                "zenoh_restarts_missed": sum(abs(each["restarts"] - (serial == UNPLUGGED)) for serial, each in told.items())}
 
 
 def busy_s(process):
