@@ -26,7 +26,7 @@ from .network import AGAIN_MOST, ROOT, Stamp, add_session_options, host_clock, o
 LOOK_s = 1.0  # for fingertips that came
 STATUS_s = 0.5
 CHRONY_s = 5.0
-BACKLOG_MOST = 4000  # packets that wait to be published; what exceeds them is not published, but kept for who asks
+LIVE_s = 0.5  # what waited longer for the network is not published, but kept for who asks
 KEPT_LINES = 8
 NAMES = {wire.Contact: "contact", wire.Raw: "raw", wire.Health: "health", wire.Info: "info"}
 
@@ -104,7 +104,7 @@ class _Published:
         for name, t_us, data, line, number, taken_ns in self._early:
             stamp = Stamp(line, number, taken_ns, round(clock.host_at(t_us) * 1000) + offset_ns, clock.uncertainty_us, clock.drift_ppm, shared).packed()
             self._kept[line, number] = (name, data, stamp)
-            self._queue.append((name, data, stamp, line, number))
+            self._queue.append((name, data, stamp, line, number, time.monotonic()))
             self._note(1, line, number)
         self._early.clear()
         while len(self._kept) > self._keep:
@@ -119,8 +119,8 @@ class _Published:
             self._news.wait(STATUS_s / 2)
             self._news.clear()
             while self._queue:
-                name, data, stamp, line, number = self._queue.popleft()
-                if len(self._queue) < BACKLOG_MOST:
+                name, data, stamp, line, number, kept_s = self._queue.popleft()
+                if time.monotonic() - kept_s < LIVE_s:
                     self._publishers[name].put(data, attachment=stamp)
                 else:
                     self.skipped += 1

@@ -42,6 +42,12 @@ def system(*words):
         raise SystemExit(f"hosts.py: {' '.join(map(str, words))}: {done.stderr.strip()}")
 
 
+def busy_s(process):
+    """Processor time of all its threads."""
+    cells = pathlib.Path(f"/proc/{process.pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
+    return (int(cells[11]) + int(cells[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def wait_for(condition, what):
     end_s = time.monotonic() + PATIENCE_s
     while not condition():
@@ -181,6 +187,7 @@ def cuts(fake_device, seconds):
         recorder = start(command("recorder", recording, "--connect", endpoint, "--expect", HOSTS * TIPS, "--wait", 60, "--undisciplined", "--json"),
                          network.name, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         wait_for(lambda: recording.exists() or recorder.poll() is not None, "the recorder")
+        begun_s, busy_before_s = time.monotonic(), busy_s(recorder)
         time.sleep(3)
         the_router.kill()
         time.sleep(3)
@@ -198,6 +205,7 @@ def cuts(fake_device, seconds):
         network.link(3, "up")
         wait_for(lambda: truth.is_over, "the fingertips to end")
         time.sleep(1)
+        core_percent = round(100 * (busy_s(recorder) - busy_before_s) / (time.monotonic() - begun_s), 1)
         recorder.send_signal(signal.SIGINT)
         stdout, stderr = recorder.communicate(timeout=PATIENCE_s)
         if not stdout:
@@ -218,15 +226,9 @@ def cuts(fake_device, seconds):
         return {"zenoh_hosts": HOSTS, "zenoh_fingertips": HOSTS * TIPS, "zenoh_sent": sent, "zenoh_recorded": sum(map(len, in_file.values())),
                 "zenoh_before_the_recording": before, "zenoh_lost_counted": sum(by_host), "zenoh_lost_uncounted": uncounted,
                 "zenoh_not_sent_but_recorded": strangers, "zenoh_lost_by_network": sum(by_host) - by_host[2], "zenoh_lost_by_killed_bridge": by_host[2],
-                "zenoh_losses_in_file": events, "zenoh_asked_again": sum(each["recovered"] for each in told.values()),
+                "zenoh_losses_in_file": events, "zenoh_recorder_core_percent": core_percent, "zenoh_rate_Hz": RATE_Hz, "zenoh_asked_again": sum(each["recovered"] for each in told.values()),
                 "zenoh_device_restarts": sum(each["restarts"] for each in told.values()),
                 "zenoh_restarts_missed": sum(abs(each["restarts"] - (serial == UNPLUGGED)) for serial, each in told.items())}
-
-
-def busy_s(process):
-    """Processor time of all its threads."""
-    cells = pathlib.Path(f"/proc/{process.pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
-    return (int(cells[11]) + int(cells[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def latency(fake_device, seconds):
