@@ -144,7 +144,8 @@ class _Published:
         return json.dumps({
             "host": platform.node(), "boot": _boot(), "port": self.tip.description, "there": not self.tip.is_returning, "now_ns": time.time_ns(),
             "clock": {"disciplined": clock.disciplined, "bound_us": clock.bound_us if clock.disciplined else None, "text": clock.text},
-            "lines": [(each[0], each[column]) for each in list(self._lines)], "unpublished": self.skipped, "line": {name: getattr(line, name) for name in line.COUNTS}})
+            "lines": [(each[0], each[column]) for each in list(self._lines)], "unpublished": self.skipped,
+            "line": {name: getattr(line, name) for name in line.COUNTS}})
 
     # Answers
 

@@ -219,7 +219,8 @@ class Recording:
         self._arrived = queue.SimpleQueue()
         self._ended = threading.Event()
         self.damaged = 0
-        self.unrecorded = set()
+        self.unrecorded = set()  # came later
+        self.unheard = []  # did not say at the end what they had sent
         self._writer = JointRecordingWriter(path, infos, replace=replace, extra=extra, count=self._counts,
                                             raw_expected=all(info.capabilities & Capability.RAW_STREAM for info in infos))
         self._subscriber = session.declare_subscriber(f"{ROOT}/*/*", self._hear)

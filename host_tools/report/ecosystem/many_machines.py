@@ -53,13 +53,14 @@ def text(found):
     if found["zenoh_skipped"]:
         lines += [f"Hosts that are cut off: not measured, {found['zenoh_skipped']}.", ""]
     else:
-        lines += [f"{found['zenoh_fingertips']} simulated fingertips of {found['zenoh_rate_Hz']} frames a second at {found['zenoh_hosts']} hosts (network namespaces on one computer) are recorded by one "
-                  "`fingertip-recorder` over a Zenoh router, while the router is killed for 3 s, a host is cut off for 5 s and another one for 15 s, longer "
-                  "than Zenoh's lease, a bridge is killed for 2 s, and a fingertip unplugged for 1.5 s ([hosts.py](hosts.py)). The truth is what each fingertip sent, read on a second "
-                  f"terminal: {found['zenoh_sent']} packets since the recording began. {found['zenoh_recorded']} are in the file, "
-                  f"{found['zenoh_asked_again']} of them were asked for again. {found['zenoh_lost_counted']} are counted as lost, "
-                  f"{found['zenoh_lost_by_killed_bridge']} of them at the host whose bridge was killed with what it kept. The recorder needs {found['zenoh_recorder_core_percent']} % of a "
-                  "processor's core, writing all that; a second core does not help it. Hosts share one clock here: how far real hosts' clocks "
+        lines += [f"{found['zenoh_fingertips']} simulated fingertips of {found['zenoh_rate_Hz']} frames a second at {found['zenoh_hosts']} hosts (network "
+                  "namespaces on one computer) are recorded by one `fingertip-recorder` over a Zenoh router, while the router is killed "
+                  "for 3 s, a host is cut off for 5 s and another one for 15 s, longer than Zenoh's lease, a bridge is killed for 2 s, and a fingertip unplugged for 1.5 s ([hosts.py](hosts.py)). The truth is what "
+                  f"each fingertip sent, read on a second terminal: {found['zenoh_sent']} packets since the recording began. "
+                  f"{found['zenoh_recorded']} are in the file, {found['zenoh_asked_again']} of them were asked for again. {found['zenoh_lost_counted']} are counted as lost, "
+                  f"{found['zenoh_lost_by_killed_bridge']} of them at the host whose bridge was killed with what it kept, the answers "
+                  f"while the next one opened its fingertips among them. The recorder needs {found['zenoh_recorder_core_percent']} % of a processor's core, "
+                  "writing all that; a second core does not help it. Hosts share one clock here: how far real hosts' clocks "
                   "are apart was not measured.", ""]
     return lines + [f"On this computer's loopback, at {found['zenoh_fps']} frames a second of contact and raw packets: from when the bridge has read a packet to "
                     f"a Python subscriber's callback, through a router, {found['zenoh_latency_median_ms']} ms in the median, {found['zenoh_latency_99_ms']} ms "

@@ -329,12 +329,12 @@ class OnZenoh(unittest.TestCase):
             self.assertIn("clock not disciplined", refused.communicate(timeout=PATIENCE_s)[1])
             self.assertEqual((refused.returncode, (self.folder / "x.mcap").exists()), (1, False))
 
-    def certificate(self, name, authority="ca"):
-        """name.pem and name.key."""
-        own = [] if name == authority else ["-CA", f"{authority}.pem", "-CAkey", f"{authority}.key"]
-        extensions = ["-addext", "subjectAltName=DNS:localhost", "-addext", "basicConstraints=critical,CA:FALSE"] if own else []
-        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2", "-keyout", f"{name}.key",
-                        "-out", f"{name}.pem", "-subj", f"/CN={name}", *own, *extensions], cwd=self.folder, check=True, capture_output=True)
+    def certificate(self, name, authority=True):
+        """name.pem and name.key, by the commands that the example has."""
+        text = (PACKAGE / "zenoh/router.json5").read_text(encoding="utf-8")
+        own, by_authority = re.findall(r"//     (openssl .*)", text)
+        command = by_authority.replace("NAME", name).replace("HOST", "localhost") if authority else re.sub(r"\bca\b", name, own)
+        subprocess.run(command.split(), cwd=self.folder, check=True, capture_output=True)
 
     def example(self, name, own, **replaced):
         """A configuration out of host_tools/python/zenoh, with our files and port."""
@@ -347,8 +347,8 @@ class OnZenoh(unittest.TestCase):
         return path
 
     def test_tls_and_access_control_as_in_the_examples(self):
-        self.certificate("ca")
-        self.certificate("strange", "strange")
+        self.certificate("ca", authority=False)
+        self.certificate("strange", authority=False)
         for name in ("router", "bridge", "operator", "viewer"):
             self.certificate(name)
         with zenoh.open(zenoh.Config.from_file(self.example("router.json5", "router"))) as router:
