@@ -72,6 +72,8 @@ LIST
   case $1 in test | report) cat << 'LIST' ;; esac
 clang-tidy-14 clang-tidy-14
 cppcheck cppcheck
+openssl openssl
+/bin/ip iproute2
 /usr/include/fastdds/dds/topic/TopicDataType.hpp libfastrtps-dev
 LIST
 }

@@ -325,6 +325,11 @@ class Fingertip:
         """Called by the reading thread after frames came and when it ends; must be quick."""
         self._listeners.append(listener)
 
+    def on_packets(self, listener: Callable[[wire.Packet | None, bytes], None]) -> None:
+        """Told by the reading thread each packet from now on, with its frame on the line without the delimiter; must be quick. Nothing
+        instead of a packet: the line was interrupted, and sequence numbers begin anew."""
+        self._decoder.listener = listener
+
     # Commands. Each returns once the fingertip has done it, and raises RefusedError (NotNowError, RefusedValueError, UnknownCommandError),
     # NoAnswerError or GoneError.
 

@@ -619,12 +619,16 @@ class Decoder:
     def __init__(self) -> None:
         self.statistics = LineStatistics()
         self.other_version = 0
+        self.listener: Callable[[Packet | None, bytes], None] | None = None
+        """Told each packet with its frame, without the delimiter; nothing: the line was interrupted, and begins anew."""
         self._rest = b""
         self._joining = True
         self._expected = -1
 
     def restart(self) -> None:
         """The line was interrupted: join anew, and expect no particular sequence number."""
+        if self.listener:
+            self.listener(None, b"")
         self._rest = b""
         self._joining = True
         self._expected = -1
@@ -648,6 +652,8 @@ class Decoder:
                     else:
                         self._expected = packet[0] + 1 & 0xFFFF
                     packets.append(packet)
+                    if self.listener:
+                        self.listener(packet, frame)
             self._joining = False
         return packets
 

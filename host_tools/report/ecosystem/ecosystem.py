@@ -13,13 +13,14 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+import many_machines  # noqa: E402
 import mcap_bags  # noqa: E402
 import python_package  # noqa: E402
 import ros2_dds  # noqa: E402
 from fingertip.files import run_tool  # noqa: E402
 from reporting import report_of_parts  # noqa: E402
 
-PARTS = (python_package, mcap_bags, ros2_dds)
+PARTS = (python_package, mcap_bags, ros2_dds, many_machines)
 
 
 def main(argv):

@@ -1,0 +1,158 @@
+"""What fingertip-bridge and fingertip-recorder say to each other on Zenoh (zenoh.io), and how they open a session.
+
+    fingertip/SERIAL/contact, raw, health, info   the packet's frame as it stood on the line, without its closing zero: wire.decode
+                                                  reads it; firmware/wire/PROTOCOL.md is its format. The attachment is a Stamp.
+    fingertip/SERIAL/other                        likewise what else it says: acknowledgements, crashes
+    fingertip/SERIAL/status                       JSON, twice a second, and asked: host, its clock by its own time daemon, lines with the number of
+                                                  the last packet that was published, or asked, that was read, and what the line counts
+    fingertip/SERIAL/tare, set, info              to be asked; tare?force=1 and set?osr=256;rate_Hz=0 take the arguments of Fingertip.tare
+                                                  and Fingertip.set. The answer is an info packet, or an error with its reason
+    fingertip/SERIAL/again?line=L;first=A;last=B  to be asked: these packets once more, as far as they are kept, and then JSON: oldest, the
+                                                  first number that is kept
+    fingertip/SERIAL/alive                        liveliness token, while the fingertip is there
+
+A live subscriber may miss packets: they are sent with congestion control "drop", and what the network does not take in time is left out.
+All packets of a fingertip, of whatever key, are numbered in one row, so that a recorder sees what it misses; it asks for that again, which
+is reliable and blocks. Zenoh's own AdvancedSubscriber numbers each key by itself, so that a contact cannot be told to belong before a raw
+packet that came again.
+
+Needs the package eclipse-zenoh, which `pip install "fingertip-tactile[zenoh]"` brings.
+"""
+import argparse
+import json
+import re
+import shutil
+import struct
+import subprocess
+import types
+from typing import Any, NamedTuple
+
+from .errors import BadValueError, InputError
+
+ROOT = "fingertip"
+AGAIN_MOST = 4000  # packets that one question asks for
+CHRONYC_TIMEOUT_s = 5
+_STAMP = struct.Struct("<QQqqffI")
+
+
+class Stamp(NamedTuple):
+    """The attachment of a packet: 44 bytes, little-endian, in this order.
+
+    line: u64, begins anew when the bridge or the fingertip does, and only grows. number: u64, counts from 1 the packets that the fingertip sent
+    on this line, with those that the line lost. taken_ns: i64, the host's clock, ns since 1970, when it was read. measured_ns: i64, likewise
+    when the fingertip's clock stood at the packet's t_us, good to uncertainty_us, f32; drift_ppm: f32, of the fingertip's clock against the
+    host's. shared: u32, 1 where it came through `fingertip serve`, whose sequence numbers are not the fingertip's.
+    """
+
+    line: int
+    number: int
+    taken_ns: int
+    measured_ns: int
+    uncertainty_us: float
+    drift_ppm: float
+    shared: int
+
+    def packed(self) -> bytes:
+        return _STAMP.pack(*self)
+
+    @staticmethod
+    def of(data: bytes) -> "Stamp":
+        """Raises InputError."""
+        if len(data) != _STAMP.size:
+            raise InputError(f"an attachment of {len(data)} bytes instead of {_STAMP.size}; the bridge is of another version")
+        return Stamp(*_STAMP.unpack(data))
+
+
+class HostClock(NamedTuple):
+    """How a host's clock is kept. bound_us: no error is larger, by chrony's own estimate; infinite without."""
+
+    disciplined: bool
+    bound_us: float
+    text: str
+
+
+def judge_tracking(text: str) -> HostClock:
+    """What `chronyc -c tracking` said: chrony bounds the error by the correction under way, root dispersion and half the root delay
+    (chrony.conf(5), maxclockerror; chronyc(1), tracking)."""
+    cells = text.strip().split(",")
+    try:
+        offset_s, delay_s, dispersion_s, leap = float(cells[4]), float(cells[10]), float(cells[11]), cells[13]
+    except (IndexError, ValueError):
+        return HostClock(False, float("inf"), "clock not disciplined: chronyc said something else than expected")
+    if leap == "Not synchronised" or int(cells[2]) == 0:
+        return HostClock(False, float("inf"), "clock not disciplined: chrony is not synchronised")
+    bound_us = 1e6 * (abs(offset_s) + dispersion_s + delay_s / 2)
+    return HostClock(True, bound_us, f"chrony, stratum {cells[2]}, source {cells[1] or cells[0]}")
+
+
+def host_clock() -> HostClock:
+    """This host's, now. Takes some ms."""
+    chronyc = shutil.which("chronyc")
+    if not chronyc:
+        return HostClock(False, float("inf"), "clock not disciplined: no chrony here")
+    try:
+        done = subprocess.run([chronyc, "-c", "tracking"], capture_output=True, text=True, timeout=CHRONYC_TIMEOUT_s, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return HostClock(False, float("inf"), "clock not disciplined: chronyc does not answer")
+    if done.returncode != 0:
+        return HostClock(False, float("inf"), "clock not disciplined: chrony does not run")
+    return judge_tracking(done.stdout)
+
+
+def zenoh_module() -> types.ModuleType:
+    try:
+        import zenoh
+    except ImportError:
+        raise InputError('this needs the package eclipse-zenoh; pip install "fingertip-tactile[zenoh]"') from None
+    return zenoh
+
+
+def add_session_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--connect", action="append", default=[], metavar="ENDPOINT", help="a router, as tcp/192.168.1.2:7447; it is waited for. "
+                        "Without, others are found by multicast")
+    parser.add_argument("--listen", action="append", default=[], metavar="ENDPOINT", help="where others reach this, as tcp/0.0.0.0:7447")
+    parser.add_argument("--config", metavar="FILE.json5", help="Zenoh's own configuration, with TLS and access control; the options above add to it")
+
+
+def open_session(options: argparse.Namespace, router: bool = False) -> Any:
+    """A zenoh.Session. Raises InputError."""
+    zenoh = zenoh_module()
+    zenoh.init_log_from_env_or("error")
+    try:
+        config = zenoh.Config.from_file(options.config) if options.config else zenoh.Config()
+        if router or options.connect:
+            config.insert_json5("mode", json.dumps("router" if router else "client"))
+            config.insert_json5("scouting/multicast/enabled", "false")
+        if options.connect:
+            config.insert_json5("connect/endpoints", json.dumps(options.connect))
+        if options.listen:
+            config.insert_json5("listen/endpoints", json.dumps(options.listen))
+        if not options.config:  # started before the router, it waits
+            config.insert_json5("connect/timeout_ms", "-1")
+            config.insert_json5("connect/exit_on_failure", "false")
+            # a full queue is waited for so long, by a thread that may, before a live packet is dropped
+            config.insert_json5("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "50000")
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        raise InputError(f"no Zenoh session: {error}; see --connect, --listen and --config") from None
+
+
+def parts_of(key: str) -> tuple[str, str]:
+    """Serial number and what it is about; nothing where it is not one of these keys."""
+    match = re.fullmatch(rf"{ROOT}/([^/]+)/([^/]+)", key)
+    return (match[1], match[2]) if match else ("", "")
+
+
+def settings_of(parameters: dict[str, str]) -> dict[str, Any]:
+    """The arguments of Fingertip.set. Raises BadValueError."""
+    kinds: dict[str, Any] = {"osr": int, "slip_window_ms": int, "keep": lambda text: bool(int(text))}
+    known = ("rate_Hz", "osr", "slip_threshold_mm", "slip_window_ms", "prior_sigma_mm", "prior_width_mm", "location_limit_mm", "keep")
+    settings: dict[str, Any] = {}
+    for name, text in parameters.items():
+        if name not in known:
+            raise BadValueError(f"{name} is no setting; there are: {', '.join(known)}")
+        try:
+            settings[name] = kinds.get(name, float)(text)
+        except ValueError:
+            raise BadValueError(f"{name}={text} is no number") from None
+    return settings

@@ -1,0 +1,293 @@
+#!/usr/bin/python3
+"""Several computers on one network, each with fingertips, as network namespaces of this one; and what reached a recorder.
+
+    hosts.py FAKE_DEVICE cuts SECONDS          the account of a recording with its mishaps, as JSON; needs root
+    hosts.py FAKE_DEVICE latency SECONDS       what the way over Zenoh costs at the highest rate, as JSON
+    hosts.py router ENDPOINT                   a router, until it is killed
+
+The truth of cuts is a second terminal of each fingertip (fake_device's mirror), which gets the same bytes a moment before the first.
+"""
+import contextlib
+import json
+import os
+import pathlib
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import tty
+
+PACKAGE = pathlib.Path(__file__).resolve().parents[2] / "python"
+sys.path.insert(0, str(PACKAGE))
+from fingertip import wire  # noqa: E402
+from fingertip.mcap_recording import McapLineReader  # noqa: E402
+from fingertip.network import Stamp, parts_of  # noqa: E402
+
+HOSTS, TIPS, RATE_Hz, FULL_RATE_Hz = 4, 4, 50, 1310
+UNPLUGGED = "F100"  # and back, after half of its frames
+PATIENCE_s = 90
+PORT = 7447
+
+
+def command(*words):
+    return [sys.executable, str(PACKAGE), *map(str, words)]
+
+
+def system(*words):
+    done = subprocess.run(list(map(str, words)), check=False, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise SystemExit(f"hosts.py: {' '.join(map(str, words))}: {done.stderr.strip()}")
+
+
+def busy_s(process):
+    """Processor time of all its threads."""
+    cells = pathlib.Path(f"/proc/{process.pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
+    return (int(cells[11]) + int(cells[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def wait_for(condition, what):
+    end_s = time.monotonic() + PATIENCE_s
+    while not condition():
+        if time.monotonic() > end_s:
+            raise SystemExit(f"hosts.py: waited {PATIENCE_s} s for {what}")
+        time.sleep(0.02)
+
+
+class Mirrors:
+    """Everything that the fingertips sent: serial number -> (sequence, t_us) in order."""
+
+    def __init__(self, ports):
+        self.sent = {serial: [] for serial in ports}
+        self._decoders = {}
+        for serial, port in ports.items():
+            fd = os.open(port, os.O_RDWR | os.O_NOCTTY)
+            tty.setraw(fd)
+            self._decoders[fd] = (serial, wire.Decoder())
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self):
+        while self._decoders:
+            for fd in select.select(list(self._decoders), [], [], 1)[0]:
+                serial, decoder = self._decoders[fd]
+                try:
+                    data = os.read(fd, 65536)
+                except OSError:
+                    data = b""
+                if data:
+                    self.sent[serial] += [packet[:2] for packet in decoder.feed(data)]
+                else:
+                    del self._decoders[fd]
+                    os.close(fd)
+
+    @property
+    def is_over(self):
+        return not self._decoders
+
+
+def recorded_packets(path):
+    """Serial number -> (sequence, t_us) of each packet in a recording of several, in the order of the file; and its text lines."""
+    found, names, serials, lines = {}, None, [], []
+    for _, text, _ in McapLineReader(path):
+        if text.startswith("#"):
+            lines.append(text)
+            key, _, value = text[2:].partition(": ")
+            if key == "devices":
+                serials = value.split()
+                found = {serial: [] for serial in serials}
+            elif key.endswith("/packet"):
+                fields = dict(pair.split("=") for pair in value.split()[1:])
+                found[serials[int(key.split("/")[0])]].append((int(fields["sequence"]), int(fields["t_us"])))
+        elif names is None:
+            names = text.split(",")
+        else:
+            row = dict(zip(names, text.split(",")))
+            for name in ("sequence", "raw_sequence"):
+                if row[name]:
+                    found[serials[int(row["device"])]].append((int(row[name]), int(row["t_us"])))
+    return found, lines
+
+
+class Network:
+    """A switch with a router and a recorder in one namespace, the hosts in one each."""
+
+    def __init__(self):
+        self.name = f"ft{os.getpid()}"
+        self.spaces = [f"{self.name}h{k}" for k in range(HOSTS)]
+
+    def __enter__(self):
+        try:
+            self._make()
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def _make(self):
+        system("ip", "netns", "add", self.name)
+        system("ip", "-n", self.name, "link", "set", "lo", "up")
+        system("ip", "-n", self.name, "link", "add", "name", "switch0", "type", "bridge")
+        system("ip", "-n", self.name, "addr", "add", "10.77.0.1/24", "dev", "switch0")
+        system("ip", "-n", self.name, "link", "set", "switch0", "up")
+        for k, space in enumerate(self.spaces):
+            system("ip", "netns", "add", space)
+            system("ip", "-n", space, "link", "set", "lo", "up")
+            system("ip", "-n", self.name, "link", "add", f"v{k}", "type", "veth", "peer", "name", "eth", "netns", space)
+            system("ip", "-n", space, "addr", "add", f"10.77.0.{10 + k}/24", "dev", "eth")
+            system("ip", "-n", space, "link", "set", "eth", "up")
+            system("ip", "-n", self.name, "link", "set", f"v{k}", "master", "switch0", "up")
+
+    def __exit__(self, *_):
+        for space in (*self.spaces, self.name):
+            subprocess.run(["ip", "netns", "del", space], check=False, capture_output=True)
+
+    def link(self, host, state):
+        system("ip", "-n", self.name, "link", "set", f"v{host}", state)
+
+
+def cuts(fake_device, seconds):
+    endpoint = f"tcp/10.77.0.1:{PORT}"
+    with contextlib.ExitStack() as stack:
+        folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="fingertip-")))
+        network = stack.enter_context(Network())
+        environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder)}
+        processes = []
+
+        def start(words, space=None, **options):
+            words = (["ip", "netns", "exec", space] if space else []) + list(map(str, words))
+            process = subprocess.Popen(words, env=environment, **options)
+            processes.append(process)
+            return process
+
+        def end_all():
+            for process in processes:
+                process.kill()
+                process.wait()
+
+        stack.callback(end_all)
+        ports = {f"F1{host}{tip}": folder / f"F1{host}{tip}" for host in range(HOSTS) for tip in range(TIPS)}
+        mirrors = {serial: folder / f"mirror{serial}" for serial in ports}
+        for serial, port in ports.items():
+            unplugged = [f"vanish={RATE_Hz * seconds // 2},1500"] if serial == UNPLUGGED else []
+            start([fake_device, port, f"serial={serial}", f"mirror={mirrors[serial]}", f"rate={RATE_Hz}", f"frames={RATE_Hz * seconds}", "life=600", *unplugged])
+        wait_for(lambda: all(path.is_symlink() for path in (*ports.values(), *mirrors.values())), "the fingertips")
+        truth = Mirrors(mirrors)
+
+        def router():
+            return start([sys.executable, __file__, "router", endpoint], network.name)
+
+        def bridge(host):
+            own = [word for serial, port in ports.items() if serial.startswith(f"F1{host}") for word in ("--port", port)]
+            return start(command("bridge", "--connect", endpoint, *own), network.spaces[host], stderr=subprocess.DEVNULL)
+
+        the_router, bridges = router(), [bridge(host) for host in range(HOSTS)]
+        recording = folder / "all.mcap"
+        recorder = start(command("recorder", recording, "--connect", endpoint, "--expect", HOSTS * TIPS, "--wait", 60, "--undisciplined", "--json"),
+                         network.name, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        wait_for(lambda: recording.exists() or recorder.poll() is not None, "the recorder")
+        begun_s, busy_before_s = time.monotonic(), busy_s(recorder)
+        time.sleep(3)
+        the_router.kill()
+        time.sleep(3)
+        router()
+        time.sleep(4)
+        network.link(1, "down")
+        time.sleep(5)
+        network.link(1, "up")
+        time.sleep(2)
+        network.link(3, "down")  # longer than Zenoh's lease of 10 s
+        bridges[2].kill()
+        time.sleep(2)
+        bridge(2)
+        time.sleep(13)
+        network.link(3, "up")
+        wait_for(lambda: truth.is_over, "the fingertips to end")
+        time.sleep(1)
+        core_percent = round(100 * (busy_s(recorder) - busy_before_s) / (time.monotonic() - begun_s), 1)
+        recorder.send_signal(signal.SIGINT)
+        stdout, stderr = recorder.communicate(timeout=PATIENCE_s)
+        if not stdout:
+            raise SystemExit(f"hosts.py: the recorder failed: {stderr.strip()[-500:]}")
+        told = json.loads(stdout)["fingertips"]
+        in_file, lines = recorded_packets(recording)
+        events = sum("event: lost " in line for line in lines)
+        uncounted = strangers = sent = before = 0
+        by_host = [0] * HOSTS
+        for serial, of_file in in_file.items():
+            of_device = truth.sent[serial]
+            first = of_device.index(of_file[0])
+            before += first
+            sent += len(of_device) - first
+            strangers += len(set(of_file) - set(of_device)) + len(of_file) - len(set(of_file)) + abs(len(of_file) - told[serial]["recorded"])
+            uncounted += abs(len(of_device) - first - len(of_file) - told[serial]["lost"])
+            by_host[int(serial[2])] += told[serial]["lost"]
+        return {"zenoh_hosts": HOSTS, "zenoh_fingertips": HOSTS * TIPS, "zenoh_sent": sent, "zenoh_recorded": sum(map(len, in_file.values())),
+                "zenoh_before_the_recording": before, "zenoh_lost_counted": sum(by_host), "zenoh_lost_uncounted": uncounted,
+                "zenoh_not_sent_but_recorded": strangers, "zenoh_lost_by_network": sum(by_host) - by_host[2], "zenoh_lost_by_killed_bridge": by_host[2],
+                "zenoh_losses_in_file": events, "zenoh_recorder_core_percent": core_percent, "zenoh_rate_Hz": RATE_Hz,
+                "zenoh_asked_again": sum(each["recovered"] for each in told.values()),
+                "zenoh_device_restarts": sum(each["restarts"] for each in told.values()),
+                "zenoh_restarts_missed": sum(abs(each["restarts"] - (serial == UNPLUGGED)) for serial, each in told.items())}
+
+
+def latency(fake_device, seconds):
+    import zenoh
+    endpoint = f"tcp/127.0.0.1:{PORT + os.getpid() % 1000}"
+    with tempfile.TemporaryDirectory(prefix="fingertip-") as name:
+        port = pathlib.Path(name) / "port"
+        environment = {**os.environ, "XDG_RUNTIME_DIR": name}
+        device = subprocess.Popen([fake_device, port, f"rate={FULL_RATE_Hz}", "life=600"])
+        bridge = None
+        try:
+            wait_for(port.is_symlink, "the fingertip")
+            bridge = subprocess.Popen(command("bridge", "--listen", endpoint, "--router", "--port", port), env=environment, stderr=subprocess.DEVNULL)
+            config = zenoh.Config()
+            config.insert_json5("mode", '"client"')
+            config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+            config.insert_json5("connect/timeout_ms", "-1")
+            late_ns, taken, last = [], {"raw": 0}, [0]
+
+            def hear(sample):
+                kind = parts_of(str(sample.key_expr))[1]
+                if kind != "status":
+                    stamp = Stamp.of(sample.attachment.to_bytes())
+                    late_ns.append(time.time_ns() - stamp.taken_ns)
+                    taken[kind] = taken.get(kind, 0) + 1
+                    last[0] = stamp.number
+
+            with zenoh.open(config) as session:
+                subscriber = session.declare_subscriber("fingertip/*/*", hear)
+                wait_for(lambda: len(late_ns) > 2 * FULL_RATE_Hz, "packets")
+                begun_s, busy_before_s, frames, number = time.perf_counter(), busy_s(bridge), taken["raw"], last[0]
+                late_ns.clear()
+                time.sleep(seconds)
+                wall_s, cpu_s, frames, number = time.perf_counter() - begun_s, busy_s(bridge) - busy_before_s, taken["raw"] - frames, last[0] - number
+                found = sorted(late_ns)
+                subscriber.undeclare()
+        finally:
+            for process in (bridge, device):
+                if process:
+                    process.kill()
+                    process.wait()
+    return {"zenoh_latency_median_ms": round(found[len(found) // 2] / 1e6, 3), "zenoh_latency_99_ms": round(found[len(found) * 99 // 100] / 1e6, 3),
+            "zenoh_fps": round(frames / wall_s, 1), "zenoh_bridge_core_percent": round(100 * cpu_s / wall_s, 1),
+            "zenoh_live_percent": round(100 * len(found) / max(number, 1), 2), "zenoh_seconds": seconds}
+
+
+def router(endpoint):
+    import zenoh
+    config = zenoh.Config()
+    config.insert_json5("mode", '"router"')
+    config.insert_json5("listen/endpoints", json.dumps([endpoint]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    with zenoh.open(config):
+        signal.pause()
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "router":
+        router(sys.argv[2])
+    else:
+        print(json.dumps({"cuts": cuts, "latency": latency}[sys.argv[2]](sys.argv[1], int(sys.argv[3]))))
