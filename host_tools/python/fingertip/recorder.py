@@ -52,13 +52,18 @@ class Account:
 
     offer: a packet that came, in any order, any number of times. heard: what its bridge says to have given out, [line, number]s, the
     present line last; what is missing of a line that is not among them is lost. take: the packets whose turn it is, each with how many
-    were lost right before it and why. ask: the range to ask for again. sent == recorded + lost, always, after take.
+    were lost right before it and why. ask: the range to ask for again. sent == recorded + lost, always, after take. Lines follow one another
+    as their bridge says or as they came, whatever their numbers: a computer's clock may have been set back. unread_frames: between two lines
+    of a fingertip that went on; firmware sends nothing while no program has its port, and sequence numbers wrap.
     """
 
     def __init__(self):
         self.lines = []
         self.recorded = self.lost = self.duplicates = self.sent = self.restarts = 0
-        self.lost_between_lines = 0
+        self.lost_between_lines = self.unread_frames = 0
+        self._finished = set()  # numbers of lines
+        self._is_new_line = False
+        self._frame = 0
         self._last = None  # (stamp, packet) of the last one that was taken
         self._last_frame = None
         self._kinds = set()
@@ -80,7 +85,7 @@ class Account:
         for line in self.lines:
             if line.number == number:
                 return line
-        if self.lines and number < self.lines[-1].number or self._last and number <= self._last[0].line:
+        if number in self._finished:
             return None
         self.lines.append(Line(number, first if self._last is None and not self.lines else 1))
         return self.lines[-1]
@@ -90,22 +95,25 @@ class Account:
         line.stuck_s = (now_s if line.stuck_s is None else line.stuck_s) if is_stuck else None
 
     def heard(self, told, now_s):
-        if not self.lines:
+        if not self.lines or not told or told[-1][0] in self._finished:
             return
-        known = dict(map(tuple, told))
-        for line in self.lines:
-            line.is_over |= bool(told) and told[-1][0] > line.number
-            if line.number in known:
-                line.high = max(line.high, known[line.number])
-                self._look(line, now_s)
-            elif line.is_over:
+        place = len(self.lines)  # of the line told before, from the end
+        for number, last in reversed(told):
+            at = next((at for at, line in enumerate(self.lines) if line.number == number), None)
+            if at is None:
+                if not last or number in self._finished or (place == 0 and self._last):
+                    continue
+                self.lines.insert(place, Line(number, 1))
+                at = place
+            line, place = self.lines[at], at
+            line.high = max(line.high, last)
+            self._look(line, now_s)
+        known = dict(told)
+        present = next((at for at, line in enumerate(self.lines) if line.number == told[-1][0]), len(self.lines))
+        for line in self.lines[:present]:
+            line.is_over = True
+            if line.number not in known:
                 line.given_up = line.high
-        for number, last in told:
-            if last and number > self.lines[-1].number:
-                line = self._line(number, 1)
-                if line:
-                    line.high = last
-                    self._look(line, now_s)
 
     def answered(self, number, last):
         """What was asked for up to here and did not come will not come."""
@@ -158,7 +166,7 @@ class Account:
                 yield None, None, lost, False
             if len(self.lines) == 1 or not line.is_over or line.next <= line.high:
                 return
-            self.lines.pop(0)
+            self._finished.add(self.lines.pop(0).number)
 
     def _count(self, recorded, lost):
         self.recorded += recorded
@@ -180,7 +188,13 @@ class Account:
                 lost = packet.sequence - last.sequence - 1 & 0xFFFF
                 self._last_frame = None
             self._shared_gap = bool(stamp.shared or before.shared) and not restarted
+            self._is_new_line = not restarted
         if frame is not None:
+            passed = frame - self._frame & 0xFFFFFFFF
+            if self._is_new_line and self._kinds and passed < 1 << 31:
+                self.unread_frames += max(0, passed - 1)
+            self._is_new_line = False
+            self._frame = frame
             if self._shared_gap and self._last_frame is not None:
                 lost += max(0, (frame - self._last_frame - 1) * len(self._kinds))
             self._shared_gap = False
@@ -204,6 +218,7 @@ class _Source:
         self.status_s = time.monotonic()
         self.must_answer = False
         self.asked = 0
+        self.unread_frames = 0
         self.recovered = 0
 
 
@@ -317,7 +332,7 @@ class Recording:
     def _take_status(self, source, data, is_answer):
         try:
             lines = [(int(line), int(number)) for line, number in json.loads(data)["lines"]]
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
             self.damaged += 1
             return
         source.status_s = time.monotonic()
@@ -332,7 +347,7 @@ class Recording:
                 return
             stamp = Stamp.of(attachment)
             packet = wire.decode_stream_packet(data) or wire.decode(data)
-        except (ValueError, KeyError, TypeError, InputError, PacketError):
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError, InputError, PacketError):
             self.damaged += 1
             return
         before = source.account.duplicates
@@ -348,6 +363,9 @@ class Recording:
                 self._event(source, "restarted: what it said in between is not known")
             if lost:
                 self._event(source, f"lost {lost} packets")
+            if source.account.unread_frames > source.unread_frames:
+                self._event(source, f"{source.account.unread_frames - source.unread_frames} frames were read by no bridge")
+                source.unread_frames = source.account.unread_frames
             if packet is None:
                 continue
             t_us = packet.t_us
@@ -361,11 +379,12 @@ class Recording:
     @staticmethod
     def _summary(source):
         account = source.account
-        return f"network: sent={account.sent} recorded={account.recorded} lost={account.lost} came_again={source.recovered} restarts={account.restarts}"
+        return (f"network: sent={account.sent} recorded={account.recorded} lost={account.lost} "
+                f"unread_frames={account.unread_frames} came_again={source.recovered} restarts={account.restarts}")
 
     def figures(self):
         return {source.serial: {"sent": source.account.sent, "recorded": source.account.recorded, "lost": source.account.lost,
-                                "lost_between_lines": source.account.lost_between_lines, "recovered": source.recovered, "asked": source.asked,
+                                "lost_between_lines": source.account.lost_between_lines, "unread_frames": source.account.unread_frames, "recovered": source.recovered, "asked": source.asked,
                                 "restarts": source.account.restarts, "unheard": source.serial in self.unheard} for source in self.sources.values()}
 
 
@@ -498,7 +517,7 @@ def main(argv):
         say(f"{recording.damaged} messages were damaged, and count as lost")
     if options.json:
         print(json.dumps({"fingertips": figures, "damaged": recording.damaged, "unrecorded": sorted(recording.unrecorded)}))
-    return 3 if any(each["lost"] or each["restarts"] or each["unheard"] for each in figures.values()) else 0
+    return 3 if any(each["lost"] or each["restarts"] or each["unread_frames"] or each["unheard"] for each in figures.values()) else 0
 
 
 def command():

@@ -114,6 +114,56 @@ class Accounts(unittest.TestCase):
         account.heard([(2, 1)], 0.0)
         self.assertEqual(self.taken(account)[-1], ((2, 1), 9, False))
 
+    def test_a_clock_that_was_set_back(self):
+        account = recorder.Account()
+        for number in (1, 2):
+            self.offer(account, 9, number)
+        self.assertEqual(len(self.taken(account)), 2)
+        for number in (1, 2, 4):
+            t_us = 9 * 10**9 + 10_000 + 1000 * number
+            account.offer(a_stamp(3, number, t_us), a_packet(2 + number, t_us, 2 + number), 0.0)
+        account.heard([(3, 4)], 0.0)
+        self.assertEqual(self.taken(account), [((3, 1), 0, False), ((3, 2), 0, False)])
+        self.assertEqual(account.ask(2.0), (3, 3, 4))
+        self.offer(account, 9, 2)  # once more, of the line that is over
+        self.assertEqual((account.recorded, account.duplicates), (4, 1))
+
+    def test_a_line_that_began_and_ended_unheard(self):
+        account = recorder.Account()
+        self.offer(account, 1, 1)
+        self.taken(account)
+        self.offer(account, 3, 1)  # the first after a cut; the bridge keeps line 2
+        account.heard([(1, 1), (2, 2), (3, 1)], 0.0)
+        self.assertEqual(self.taken(account), [])
+        self.assertEqual(account.ask(1.0), (2, 1, 2))
+        self.offer(account, 2, 1)
+        self.offer(account, 2, 2)
+        self.assertEqual([place for place, _, _ in self.taken(account)], [(2, 1), (2, 2), (3, 1)])
+        account.heard([(1, 1), (2, 2)], 0.0)  # said before the last line began
+        self.offer(account, 3, 3)
+        account.heard([(1, 1), (2, 2)], 0.0)
+        self.assertEqual((self.taken(account), account.ask(1.0)), ([], (3, 2, 3)))
+
+    def test_frames_that_no_bridge_read(self):
+        for frames, told in ((0, 0), (1, 0), (70_001, 70_000)):
+            account = recorder.Account()
+            self.offer(account, 1, 1, sequence=5)
+            t_us = 10**9 + 1000 + 400 * frames
+            account.offer(a_stamp(2, 1, t_us), a_packet(6, t_us, 1 + frames), 0.0)
+            account.heard([(2, 1)], 0.0)
+            self.assertEqual(len(self.taken(account)), 2)
+            self.assertEqual((account.lost, account.restarts, account.unread_frames), (0, 0, told))
+
+    def test_damaged_messages_are_counted(self):
+        recording = recorder.Recording.__new__(recorder.Recording)
+        recording.damaged = 0
+        source = recorder._Source("AAAA", 0, None)
+        damaged = (b"", b"5", b"[]", b"\xff", b"[" * 100_000, b'{"lines": [[1, Infinity]], "line": 1, "first": 1, "last": Infinity}')
+        for data in damaged:
+            recording._take_status(source, data, False)
+            recording._take(source, "again", data, b"")
+        self.assertEqual(recording.damaged, 2 * len(damaged))
+
 
 class Frames(unittest.TestCase):
     def test_each_packet_is_told_with_its_frame_and_interruptions_too(self):
@@ -349,10 +399,11 @@ class OnZenoh(unittest.TestCase):
     def test_tls_and_access_control_as_in_the_examples(self):
         self.certificate("ca", authority=False)
         self.certificate("strange", authority=False)
-        for name in ("router", "bridge", "operator", "viewer"):
+        tared = self.folder / "tared"
+        for name in ("router", "bridge", "recorder", "operator", "viewer", "unlisted"):
             self.certificate(name)
         with zenoh.open(zenoh.Config.from_file(self.example("router.json5", "router"))) as router:
-            self.bridge("--config", self.example("client.json5", "bridge"), "--port", self.device("AAAA"))
+            self.bridge("--config", self.example("client.json5", "bridge"), "--port", self.device("AAAA", f"tared={tared}"))
             with zenoh.open(zenoh.Config.from_file(self.example("client.json5", "viewer"))) as viewer, \
                     zenoh.open(zenoh.Config.from_file(self.example("client.json5", "operator"))) as operator:
                 self.wait_for(lambda: self.ask(viewer, "fingertip/AAAA/info"))
@@ -361,8 +412,19 @@ class OnZenoh(unittest.TestCase):
                 self.wait_for(lambda: heard)
                 self.assertEqual(wire.decode(heard[0].payload.to_bytes()).body.force_N, 5)
                 subscriber.undeclare()
-                self.assertIsNone(self.ask(viewer, "fingertip/AAAA/set?osr=512"))
+                recording = self.recorder(self.folder / "one.mcap", "--config", self.example("client.json5", "recorder"), "--undisciplined", "--seconds", "1")
+                recording.communicate(timeout=PATIENCE_s)
+                self.assertEqual(recording.returncode, 0)
+                for name in ("viewer", "recorder", "bridge", "unlisted"):
+                    with zenoh.open(zenoh.Config.from_file(self.example("client.json5", name))) as other:
+                        for selector in ("AAAA/tare", "AAAA/tare?force=1", "*/tare?force=1", "*/*?force=1", "**", "AAAA/set?osr=512"):
+                            self.assertIsNone(self.ask(other, f"fingertip/{selector}"), (name, selector))
+                        if name in ("bridge", "unlisted"):
+                            self.assertIsNone(self.ask(other, "fingertip/AAAA/info"), name)
                 self.assertEqual(self.ask(operator, "fingertip/AAAA/set?osr=2048").osr, 2048)
+                self.assertFalse(tared.exists())
+                self.assertEqual(self.ask(operator, "fingertip/AAAA/tare?force=1").serial, "AAAA")
+                self.assertTrue(tared.exists())
             known = len(list(router.info.transports()))
             once = {"timeout_ms: -1": "timeout_ms: 1000", "exit_on_failure: false": "exit_on_failure: true"}
             for own, replaced in (("nobody", {"connect_certificate": "//", "connect_private_key": "//"}), ("strange", {})):
