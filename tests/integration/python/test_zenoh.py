@@ -351,7 +351,7 @@ class OnZenoh(unittest.TestCase):
         self.certificate("strange", authority=False)
         for name in ("router", "bridge", "operator", "viewer"):
             self.certificate(name)
-        with zenoh.open(zenoh.Config.from_file(self.example("router.json5", "router"))) as router:
+        with zenoh.open(zenoh.Config.from_file(self.example("router.json5", "router"))):
             self.bridge("--config", self.example("client.json5", "bridge"), "--port", self.device("AAAA"))
             with zenoh.open(zenoh.Config.from_file(self.example("client.json5", "viewer"))) as viewer, \
                     zenoh.open(zenoh.Config.from_file(self.example("client.json5", "operator"))) as operator:
@@ -363,14 +363,13 @@ class OnZenoh(unittest.TestCase):
                 subscriber.undeclare()
                 self.assertIsNone(self.ask(viewer, "fingertip/AAAA/set?osr=512"))
                 self.assertEqual(self.ask(operator, "fingertip/AAAA/set?osr=2048").osr, 2048)
-            known = len(list(router.info.transports()))
             once = {"timeout_ms: -1": "timeout_ms: 1000", "exit_on_failure: false": "exit_on_failure: true"}
             for own, replaced in (("nobody", {"connect_certificate": "//", "connect_private_key": "//"}), ("strange", {})):
                 config = zenoh.Config.from_file(self.example("client.json5", own, **replaced, **once))
                 with self.assertRaises(zenoh.ZError, msg=own):
                     zenoh.open(config).close()
+            once["timeout_ms: -1"] = f"timeout_ms: {PATIENCE_s * 1000}"
             zenoh.open(zenoh.Config.from_file(self.example("client.json5", "viewer", **once))).close()  # the others were refused for their certificates
-            self.assertLessEqual(len(list(router.info.transports())), known)
 
 
 if __name__ == "__main__":
