@@ -28,6 +28,7 @@ ASK_s = 0.3
 ASK_TIMEOUT_s = 5.0
 PINGS = 8
 AHEAD_MOST = 200_000  # packets that wait for one that is missing; then it is lost
+WAITING_MOST = 200_000  # live packets that wait to be written; more are asked for again later
 CLOCK_s = 0.5
 STATUS_AGE_s = 1.5
 END_GAP_s = 1.0
@@ -232,8 +233,10 @@ class Recording:
         self._zero_us = (time.time_ns() - time.perf_counter_ns()) / 1000
         self.sources = {info.serial: _Source(info.serial, number, info) for number, info in enumerate(infos)}
         self._arrived = queue.SimpleQueue()
+        self._ending = False
         self._ended = threading.Event()
         self.damaged = 0
+        self.behind = self._said_behind = False  # too much for this computer
         self.unrecorded = set()  # came later
         self.unheard = []  # did not say at the end what they had sent
         self._writer = JointRecordingWriter(path, infos, replace=replace, extra=extra, count=self._counts,
@@ -252,6 +255,9 @@ class Recording:
         return counts
 
     def _hear(self, sample):
+        if self._arrived.qsize() >= WAITING_MOST:
+            self.behind = True
+            return
         serial, name = parts_of(str(sample.key_expr))
         attachment = sample.attachment
         self._arrived.put((serial, name, sample.payload.to_bytes(), attachment.to_bytes() if attachment else b""))
@@ -267,7 +273,7 @@ class Recording:
                     self._ask(source, f"{ROOT}/{source.serial}/again?line={line};first={first};last={last}", "again")
                     source.asked += 1
                     source.wanted = None  # judged anew by what has come
-                elif source.must_answer or time.monotonic() - source.status_s > STATUS_AGE_s:
+                elif source.must_answer or not self._ending and time.monotonic() - source.status_s > STATUS_AGE_s:
                     self._ask(source, f"{ROOT}/{source.serial}/status", "answer")
             except self._zenoh.ZError:
                 pass  # not now; asked once more
@@ -287,8 +293,10 @@ class Recording:
         end_s = time.monotonic() + seconds
         while not ended.is_set() and time.monotonic() < end_s:
             self._work(0.1)
-        for source in self.sources.values():  # what has it sent until now?
+        self._subscriber.undeclare()
+        for source in self.sources.values():  # what has it sent until now? That, and no more, is waited for
             source.must_answer = True
+        self._ending = True
         asked_s = time.monotonic()
         while time.monotonic() - asked_s < patience_s:
             self._work(0.1)
@@ -296,7 +304,6 @@ class Recording:
                 break
         self.unheard = [source.serial for source in self.sources.values() if source.must_answer]
         self._ended.set()
-        self._subscriber.undeclare()
         for source in self.sources.values():
             source.account.give_up()
             self._write(source)
@@ -323,6 +330,9 @@ class Recording:
             elif name in RECORDED or name == "again":
                 self._take(source, name, data, attachment)
                 touched.add(source)
+        if self.behind and not self._said_behind:
+            self._said_behind = True
+            self._say("more comes than this computer writes: what does not fit is asked for again, and lost once no bridge keeps it; record fewer, or slower")
         now_s = time.monotonic()
         for source in self.sources.values():
             if source in touched or source.account.lines:
