@@ -390,7 +390,8 @@ class Recording:
     def _summary(source):
         account = source.account
         return (f"network: sent={account.sent} recorded={account.recorded} lost={account.lost} "
-                f"unread_frames={account.unread_frames} came_again={source.recovered} restarts={account.restarts}")
+                f"unread_frames={account.unread_frames} came_again={source.recovered} restarts={account.restarts} "
+                f"unheard={int(source.must_answer)}")
 
     def figures(self):
         return {source.serial: {"sent": source.account.sent, "recorded": source.account.recorded, "lost": source.account.lost,
