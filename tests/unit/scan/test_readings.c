@@ -44,7 +44,9 @@ static uint32_t take_temperature(void) {
 }
 
 static void take_pressures(uint32_t good) {
-  readings_take_pressures(&readings, d1, good, &frame);
+  const uint32_t before = readings.left_out;
+  const bool told = readings_take_pressures(&readings, d1, good, &frame);
+  TEST_ASSERT_EQUAL(readings.left_out != before, told);
   for (int k = 0; k < SENSORS; k++) {
     TEST_ASSERT_TRUE((frame.valid >> k & 1u) || frame.pressure_Pa_q10[k] == 0);
   }
@@ -152,6 +154,16 @@ static void test_a_step_that_another_feels_counts_at_once(void) {
   take_pressures(ALL);
   expect(ALL, 0);
   TEST_ASSERT_EQUAL_HEX32(0, readings.suspects);
+}
+
+/* Whichever it is, the caller is told. */
+static void test_a_step_of_any_sensor_alone_is_told(void) {
+  for (int k = 0; k < SENSORS; k++) {
+    next_case();
+    step_by(k, 20e3);
+    take_pressures(ALL);
+    expect(ALL & ~(1u << k), 1);
+  }
 }
 
 static void test_where_presses_are_not_shared_every_step_counts(void) {
@@ -468,6 +480,7 @@ int main(void) {
   RUN_TEST(test_a_sensor_that_stays_where_it_stepped_is_suspect_until_it_returns);
   RUN_TEST(test_a_step_behind_a_gap_is_noticed);
   RUN_TEST(test_a_step_that_another_feels_counts_at_once);
+  RUN_TEST(test_a_step_of_any_sensor_alone_is_told);
   RUN_TEST(test_where_presses_are_not_shared_every_step_counts);
   RUN_TEST(test_with_a_sensor_missing_every_step_counts);
   RUN_TEST(test_a_step_after_an_admission_between_frames_is_left_out);

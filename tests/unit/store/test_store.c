@@ -238,6 +238,36 @@ static void power_may_be_lost_at_any_step(void) {
   TEST_ASSERT_GREATER_THAN_UINT(UPDATES, new_ones);
 }
 
+/* The same of changes one after another without a restart between, over both sectors and back. */
+static void power_may_be_lost_amid_many_changes(void) {
+  struct store_content before = {0};
+  for (int update = 0; update < 5 * STORE_SLOTS; update++) {
+    const struct native_flash start = native_flash;
+    const struct store then = store;
+    struct change change;
+    do {
+      change = some_change();
+      store = then;
+    } while (put(&change) != FT_PENDING);
+    struct store_content after = changed(&before, &change);
+    for (uint64_t step = 0;; step++) {
+      native_flash = start;
+      native_flash_power_up();
+      store = then;
+      native_flash_cut_after(step);
+      TEST_ASSERT_EQUAL(FT_PENDING, put(&change));
+      finish();
+      if (!native_flash_is_dead()) {
+        break;
+      }
+      restart();
+      TEST_ASSERT_TRUE_MESSAGE(is(&before) || is(&after), "lost or mixed");
+    }
+    TEST_ASSERT_TRUE(is(&after));
+    before = after;
+  }
+}
+
 /* A supply that comes and goes: each mending is cut short in its turn, many times in a row, so that
  * whole sectors fill with records that were never sealed. */
 static void power_may_come_and_go(void) {
@@ -441,6 +471,25 @@ static void a_flash_that_has_worn_out_is_told_and_what_was_stays(void) {
   TEST_ASSERT_TRUE(is(&kept));
 }
 
+/* Bits that no erase has brought back: the slots behind are taken, up to the third. */
+static void slots_that_do_not_hold_what_is_written_are_given_up(void) {
+  for (int bad = 0; bad <= 3; bad++) {
+    setUp();
+    struct store_content kept = keep_something();
+    for (int slot = 0; slot < bad; slot++) {
+      uint32_t at = store.sector * PORT_FLASH_SECTOR_BYTES;
+      memset(&native_flash.bytes[at + (uint32_t)(store.next_slot + slot) * STORE_SLOT_BYTES + 100],
+             0, 4);
+    }
+    struct calibration other = some_calibration();
+    TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &other));
+    TEST_ASSERT_EQUAL(bad < 3 ? FT_OK : FT_ERR_CRC, finish());
+    TEST_ASSERT_EQUAL(bad == 3, is(&kept));
+    restart();
+    TEST_ASSERT_EQUAL(bad == 3, is(&kept));
+  }
+}
+
 static void a_flash_that_does_not_answer_is_not_waited_for(void) {
   native_flash_cut_after(2);
   struct store_settings settings = some_settings();
@@ -487,9 +536,11 @@ int main(void) {
   RUN_TEST(records_of_version_1_are_read);
   RUN_TEST(rubbish_is_no_damage_and_in_nobodys_way);
   RUN_TEST(a_flash_that_has_worn_out_is_told_and_what_was_stays);
+  RUN_TEST(slots_that_do_not_hold_what_is_written_are_given_up);
   RUN_TEST(a_flash_that_does_not_answer_is_not_waited_for);
   RUN_TEST(the_largest_array_fits);
   RUN_TEST(power_may_be_lost_at_any_step);
+  RUN_TEST(power_may_be_lost_amid_many_changes);
   RUN_TEST(power_may_come_and_go);
   return UNITY_END();
 }
