@@ -51,10 +51,12 @@ class Soak:
 
     def key(self, kind):
         """What an episode is of: code and constants of the program and the image, whatever commit they name."""
-        with tempfile.NamedTemporaryFile() as stripped:
-            subprocess.run(["objcopy", "-O", "binary", "--only-section=.text", "--only-section=.rodata", "--only-section=.data", self.program,
-                            stripped.name], check=True)
-            parts = [pathlib.Path(stripped.name).read_bytes()]
+        parts = [self.program.read_bytes()]
+        if parts[0].startswith(b"\x7fELF"):
+            with tempfile.NamedTemporaryFile() as stripped:
+                subprocess.run(["objcopy", "-O", "binary", "--only-section=.text", "--only-section=.rodata", "--only-section=.data", self.program,
+                                stripped.name], check=True)
+                parts = [pathlib.Path(stripped.name).read_bytes()]
         if kind in self.images:
             parts.append(self.images[kind].read_bytes())
         return hashlib.sha256(b"".join(COMMIT.sub(b"", part) for part in parts)).hexdigest()[:16]
