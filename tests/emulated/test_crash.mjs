@@ -235,19 +235,27 @@ test('a first start tells of no crash, whatever is in SRAM', () => {
 
 for (const name of ['pico_mux', 'pico_parallel']) {
   test(`${name}: a main loop that stands still`, (t) => {
-    const bench = new Bench(name);
-    bench.stream();
-    bench.run(100);
-    bench.patch('scan_take', STAND_STILL);
-    const took_ms = bench.untilReset();
-    t.diagnostic(`${took_ms.toFixed(0)} ms`);
-    assert.ok(took_ms > PERIOD_ms && took_ms < PERIOD_ms + LAST_WORDS_ms + 20, `${took_ms}`);
-    assert.equal(bench.machine.chip.watchdog.reason, 1, 'by its timer');
-    const crash = bench.crash();
-    assert.deepEqual([crash.kind, crash.stuck, crash.exception, crash.activity], [WATCHDOG, MAIN, 0, AT.readings]);
-    assert.equal(crash.pc, bench.address('scan_take'));
-    assert.equal(bench.resets(), 1);
-    bench.end();
+    // The last words may come amid an interrupt of the bus, and tell that.
+    let told = 0;
+    for (const from_ms of [100, 103, 107]) {
+      const bench = new Bench(name);
+      bench.stream();
+      bench.run(from_ms);
+      bench.patch('scan_take', STAND_STILL);
+      const took_ms = bench.untilReset();
+      t.diagnostic(`${took_ms.toFixed(0)} ms`);
+      assert.ok(took_ms > PERIOD_ms && took_ms < PERIOD_ms + LAST_WORDS_ms + 20, `${took_ms}`);
+      assert.equal(bench.machine.chip.watchdog.reason, 1, 'by its timer');
+      const crash = bench.crash();
+      assert.deepEqual([crash.kind, crash.stuck, crash.activity], [WATCHDOG, MAIN, AT.readings]);
+      if (crash.exception === 0) {
+        assert.equal(crash.pc, bench.address('scan_take'));
+        told += 1;
+      }
+      assert.equal(bench.resets(), 1);
+      bench.end();
+    }
+    assert.ok(told > 0);
   });
 
   test(`${name}: a scan that does not go on, whose alarm is lost`, (t) => {
