@@ -426,11 +426,6 @@ static void press_or_release(struct condition *condition, const struct condition
     memset(condition->margin_Pa_q10, 0, sizeof condition->margin_Pa_q10);
     return;
   }
-  for (uint8_t k = 0; k < count; k++) {
-    if (condition->guessed >> k & 1u) {
-      begin_tare(condition, k);
-    }
-  }
   condition->released_ms = 0;
   int32_t drift = drift_in_contact(condition);
   if (drift > condition->warm_Pa_q10) {
@@ -497,11 +492,12 @@ static void track_sensor(struct condition *condition, const struct frame *frame,
 static uint32_t tare_sensors(struct condition *condition, const struct frame *frame,
                              uint32_t readable) {
   uint32_t ready = readable;
+  uint32_t guesses = condition->pressed ? 0 : condition->guessed;
   bool is_felt = condition->pressed && !condition->unsure && (readable & ~condition->taring) != 0;
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
     uint32_t bit = UINT32_C(1) << k;
     bool tared_lately = condition->now_ms - condition->tare_begun_ms[k] < FOUND_OUT_ms;
-    if (frame->renewed & bit || (frame->restored & bit && tared_lately)) {
+    if ((frame->renewed | guesses) & bit || (frame->restored & bit && tared_lately)) {
       begin_tare(condition, k);
     }
     if (condition->taring & readable & bit) {
@@ -594,7 +590,7 @@ void condition_frame(struct condition *condition, const struct frame *frame,
   int32_t close = Pa_q10(CONDITION_CLOSE_Pa) + CONDITION_CLOSE_SIGMA * frame->noise_Pa_q10;
   uint32_t readable = frame->valid & ~frame->saturated;
   conditioned->usable = readable;
-  if (condition->taring & readable || frame->renewed || frame->restored) {
+  if (condition->taring & readable || frame->renewed || frame->restored || condition->guessed) {
     conditioned->usable = tare_sensors(condition, frame, readable);
   }
   uint8_t strongest = read_sensors(condition, frame, gains, conditioned);
