@@ -35,8 +35,8 @@ fs::path page_folder() {
       return folder;
     }
   }
-  throw Error("the page is not built; in the project's tree `sh cmake/bootstrap.sh web` builds and "
-              "opens it, `cmake --build build/host --target web` builds it");
+  throw Error("the page is not built; `sh cmake/bootstrap.sh web` in the project's tree builds and "
+              "serves it");
 }
 
 /* Whether there is a desktop whose browser was asked to. */
