@@ -9,10 +9,10 @@ import contextlib
 import json
 import os
 import pathlib
+import re
 import select
 import shutil
 import subprocess
-import tempfile
 import time
 
 PATIENCE_s = 60
@@ -23,6 +23,31 @@ FLAGS = ("--headless", "--no-sandbox", "--remote-debugging-pipe", "--no-first-ru
          "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-default-apps", "--disable-breakpad",
          "--disable-dev-shm-usage", "--mute-audio", "--hide-scrollbars", "--force-color-profile=srgb", "--force-device-scale-factor=1",
          "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+FAINT = """(() => {
+  const paint = new OffscreenCanvas(1, 1).getContext('2d', {willReadFrequently: true});
+  const parts = colour => {
+    paint.clearRect(0, 0, 1, 1);
+    paint.fillStyle = colour;
+    paint.fillRect(0, 0, 1, 1);
+    const [r, g, b, a] = paint.getImageData(0, 0, 1, 1).data;
+    return [r, g, b, a / 255];
+  };
+  const over = (top, under) => top.slice(0, 3).map((c, i) => c * top[3] + under[i] * (1 - top[3]));
+  const luminance = rgb => rgb.map(c => c / 255).map(c => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)
+    .reduce((sum, c, i) => sum + c * [0.2126, 0.7152, 0.0722][i], 0);
+  const behind = element => element ? over(parts(getComputedStyle(element).backgroundColor), behind(element.parentElement)) : [255, 255, 255];
+  const found = [];
+  for (const element of document.body.querySelectorAll('*')) {
+    const text = [...element.childNodes].filter(node => node.nodeType === 3).map(node => node.data).join('').trim();
+    const style = getComputedStyle(element);
+    if (!text || !element.checkVisibility({opacityProperty: true, visibilityProperty: true}) || element.matches(':disabled')) continue;
+    const under = behind(element), [dark, light] = [luminance(under), luminance(over(parts(style.color), under))].sort((a, b) => a - b);
+    const contrast = (light + 0.05) / (dark + 0.05), size_px = parseFloat(style.fontSize);
+    const large = size_px >= 24 || (size_px >= 18.66 && style.fontWeight >= 700);
+    if (contrast < (large ? 3 : 4.5)) found.push([text, contrast]);
+  }
+  return found;
+})()"""
 START = 'mount --bind "$1" "$2" && shift 2 && exec "$@" 3<&"$FROM_TEST" 4>&"$TO_TEST"'
 
 
@@ -89,6 +114,7 @@ class Browser:
         os.close(to_test)
         self._received = b""
         self._answers = {}
+        self._awaited = set()
         self._number = 0
         self._pages = {}
         self.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(self.downloads), eventsEnabled=True)
@@ -125,25 +151,35 @@ class Browser:
             raise PageError(f"the browser has ended: {log[-2000:]}")
         *messages, self._received = (self._received + chunk).split(b"\0")
         for message in map(json.loads, messages):
+            page = self._pages.get(message.get("sessionId"))
             if "id" in message:
-                self._answers[message["id"]] = message
-            else:
-                page = self._pages.get(message.get("sessionId"))
-                if page is not None:
-                    page.events.append((message["method"], message["params"]))
+                if message["id"] in self._awaited:
+                    self._answers[message["id"]] = message
+            elif page is not None:
+                page.events.append((message["method"], message["params"]))
+                if message["method"] == "Target.attachedToTarget":  # a worker of the page waits
+                    session = message["params"]["sessionId"]
+                    self._pages[session] = page
+                    for method in ("Network.enable", "Log.enable", "Runtime.enable", "Runtime.runIfWaitingForDebugger"):
+                        self._send(method, session, {})
 
-    def call(self, method, session=None, **parameters):
+    def _send(self, method, session, parameters):
         self._number += 1
-        number = self._number
-        message = {"id": number, "method": method, "params": parameters} | ({"sessionId": session} if session else {})
+        message = {"id": self._number, "method": method, "params": parameters} | ({"sessionId": session} if session else {})
         data = json.dumps(message).encode() + b"\0"
         while data:
             data = data[os.write(self._to_browser, data):]
+        return self._number
+
+    def call(self, method, session=None, **parameters):
+        number = self._send(method, session, parameters)
+        self._awaited.add(number)
         end_s = time.monotonic() + PATIENCE_s
         while number not in self._answers:
             if time.monotonic() > end_s:
                 raise PageError(f"no answer to {method}")
             self._take(1)
+        self._awaited.remove(number)
         answer = self._answers.pop(number)
         if "error" in answer:
             raise PageError(f"{method}: {answer['error']['message']}")
@@ -163,8 +199,9 @@ class Browser:
         session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         page = Page(self, target, session)
         self._pages[session] = page
-        for domain in ("Page", "Runtime", "Network", "Log", "Audits"):
+        for domain in ("Page", "Runtime", "Network", "Log", "Audits", "DOM", "Accessibility"):
             page.call(f"{domain}.enable")
+        page.call("Target.setAutoAttach", autoAttach=True, waitForDebuggerOnStart=True, flatten=True)
         page.size(width, height)
         if before:
             page.call("Page.addScriptToEvaluateOnNewDocument", source=before)
@@ -179,6 +216,8 @@ class Page:
         self._target = target
         self._session = session
         self.events = []  # (method, parameters) of all that was heard
+        self._at = (0, 0)
+        self._held = False
 
     def call(self, method, **parameters):
         return self.browser.call(method, self._session, **parameters)
@@ -217,6 +256,85 @@ class Page:
             if time.monotonic() > end_s:
                 raise PageError(f"never became true: {expression}")
             self.browser.pump(0.05)
+
+    # What a reader of the screen is told.
+
+    def accessible(self):
+        """(role, name, backend node) of all that is not left out of the accessibility tree."""
+        return [(node["role"]["value"], node.get("name", {}).get("value", "").strip(), node.get("backendDOMNodeId"))
+                for node in self.call("Accessibility.getFullAXTree")["nodes"] if not node["ignored"]]
+
+    def has(self, role, name):
+        return self._find(role, name) is not None
+
+    def _find(self, role, name):
+        pattern = re.compile(name)
+        return next((node for its_role, its_name, node in self.accessible() if its_role == role and pattern.fullmatch(its_name)), None)
+
+    def find(self, role, name, patience_s=PATIENCE_s):
+        """The backend node, once it is there; name: a regular expression of the whole name."""
+        end_s = time.monotonic() + patience_s
+        while (node := self._find(role, name)) is None:
+            if time.monotonic() > end_s:
+                raise PageError(f"no {role} named {name} among {sorted(set(each[:2] for each in self.accessible() if each[1]))}")
+            self.browser.pump(0.1)
+        return node
+
+    def click(self, role, name):
+        """As a pointer does: on what lies there."""
+        node = self.find(role, name)
+        self.call("DOM.scrollIntoViewIfNeeded", backendNodeId=node)
+        quad = self.call("DOM.getContentQuads", backendNodeId=node)["quads"][0]
+        self.press_at(sum(quad[0::2]) / 4, sum(quad[1::2]) / 4)
+        self.release()
+
+    def press_at(self, x, y):
+        self._at = (x, y)
+        for kind in ("mouseMoved", "mousePressed"):
+            self._mouse(kind)
+
+    def drag_to(self, x, y):
+        self._at = (x, y)
+        self._mouse("mouseMoved")
+
+    def release(self):
+        self._mouse("mouseReleased")
+
+    def _mouse(self, kind):
+        x, y = self._at
+        held = kind == "mousePressed" or (kind == "mouseMoved" and self._held)
+        self._held = kind != "mouseReleased" and held
+        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left" if kind != "mouseMoved" or held else "none",
+                  buttons=int(held), clickCount=1)
+
+    def key(self, key, code=None):
+        for kind in ("keyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=code or key, **({"text": key} if kind == "keyDown" and len(key) == 1 else {}))
+
+    def type(self, role, name, text):
+        """Into a field, instead of what it holds."""
+        node = self.find(role, name)
+        self.call("DOM.focus", backendNodeId=node)
+        self.run("document.activeElement.select?.()")
+        self.call("Input.insertText", text=text)
+        self.run("document.activeElement.dispatchEvent(new Event('change', {bubbles: true}))")
+
+    def give(self, selector, *paths):
+        """Files to an <input type=file>."""
+        found = self.call("Runtime.evaluate", expression=f"document.querySelector({json.dumps(selector)})")["result"]
+        self.call("DOM.setFileInputFiles", files=[str(path) for path in paths], objectId=found["objectId"])
+
+    def faint(self):
+        """(text, contrast) of what is shown with less contrast to the colours that lie behind it than WCAG 2.1 asks for (1.4.3, level AA)."""
+        return [tuple(found) for found in self.run(FAINT)]
+
+    def foreign(self):
+        """Addresses asked for, or refused by its policy, that are not of the page's own origin."""
+        origin = self.run("location.origin")
+        asked = [each["request"]["url"] for each in self.of("Network.requestWillBeSent")]
+        asked += [each["url"] for each in self.of("Network.webSocketCreated")]
+        broken = [json.dumps(each["issue"]["details"]) for each in self.of("Audits.issueAdded") if each["issue"]["code"] == "ContentSecurityPolicyIssue"]
+        return [url for url in asked if not url.startswith((origin + "/", "data:", "blob:", "about:"))] + broken
 
     def of(self, *methods):
         """What was heard of these events."""
