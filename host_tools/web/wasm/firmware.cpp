@@ -2,7 +2,7 @@
 // are in microseconds since power-up; what feels them is the scenario or the pad of the page.
 #include "player/native_fingertip.h"
 #include "player/samples.hpp"
-#include "web/wasm/pad.hpp"
+#include "web/wasm/world.hpp"
 
 extern "C" {
 #include "config/geometry.h"
@@ -11,7 +11,11 @@ extern "C" {
 #include "native/native_port.h"
 }
 
-#include <cstring>
+#include <algorithm>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <vector>
 
 #define EXPORT(name) extern "C" __attribute__((export_name(#name)))
 
@@ -41,8 +45,16 @@ double pressure_of_rows_Pa(void *, unsigned sensor, std::uint64_t t_us) {
 double temperature_of_rows_degC(void *, unsigned, std::uint64_t t_us) {
   return rows.temperature_degC(t_us);
 }
-double pressure_of_pad_Pa(void *, unsigned sensor, std::uint64_t t_us) {
-  return pad().pressure_Pa(sensor, t_us);
+
+std::vector<std::uint8_t> file;
+std::string errors;
+std::unique_ptr<World> world;
+std::vector<std::uint8_t> pad_command;
+// As World's Truth; contact and slips are 0 or 1.
+double truth[8];
+
+double pressure_of_world_Pa(void *, unsigned sensor, std::uint64_t t_us) {
+  return world->pressure_Pa(sensor, t_us);
 }
 
 std::uint8_t line[NATIVE_CDC_TRANSMIT_BYTES];
@@ -83,6 +95,57 @@ EXPORT(rows_temperatures) float *rows_temperatures() {
 EXPORT(serial_number) char *serial_number() {
   return serial;
 }
+// Room for the file of objects and for the errors of the pad as text (twin::parse_effects), to be
+// filled in; then the world is made of both.
+EXPORT(objects_begin) std::uint8_t *objects_begin(unsigned bytes) {
+  file.assign(bytes, 0);
+  return file.data();
+}
+EXPORT(errors_begin) char *errors_begin(unsigned bytes) {
+  errors.assign(bytes, ' ');
+  return errors.data();
+}
+EXPORT(world_begin) void world_begin(double seed) {
+  ObjectsFile read = read_objects(file.data(), file.size());
+  pad_command = std::move(read.pad_command);
+  world = std::make_unique<World>(std::move(read.objects), twin::parse_effects(errors),
+                                  static_cast<std::uint64_t>(seed));
+  file = {};
+}
+// The command that tells the firmware its pad.
+EXPORT(pad_command_at) const std::uint8_t *pad_command_at() {
+  return pad_command.data();
+}
+EXPORT(pad_command_bytes) unsigned pad_command_bytes() {
+  return static_cast<unsigned>(pad_command.size());
+}
+EXPORT(world_choose) void world_choose(unsigned object) {
+  world->choose(object);
+}
+EXPORT(world_press) void world_press(double x_mm, double y_mm, double force_N) {
+  world->press(x_mm, y_mm, force_N);
+}
+EXPORT(world_hold)
+void world_hold(double x_mm, double y_mm, double force_N, double load_N, double angle_rad) {
+  world->hold(x_mm, y_mm, force_N, load_N, angle_rad);
+}
+EXPORT(world_drop) void world_drop(double x_mm, double y_mm, double mass_kg) {
+  world->drop(x_mm, y_mm, mass_kg);
+}
+EXPORT(world_lift) void world_lift() {
+  world->lift();
+}
+EXPORT(world_friction) void world_friction(double friction) {
+  world->set_friction(friction);
+}
+EXPORT(world_truth) const double *world_truth() {
+  const Truth &now = world->truth();
+  const double values[] = {now.t_s,  now.contact ? 1.0 : 0.0, now.x_mm, now.y_mm, now.force_N,
+                           now.qx_N, now.qy_N,                now.slips ? 1.0 : 0.0};
+  std::copy(std::begin(values), std::end(values), truth);
+  return truth;
+}
+
 // What it keeps without power: to be filled in before power-up where keeps is 1, read at any time.
 EXPORT(flash_to_start_with) std::uint8_t *flash_to_start_with() {
   return kept;
@@ -106,7 +169,7 @@ void power_up(double seed, double noise, double prom_spread, int parallel_bus, i
   settings.parallel_bus = parallel_bus != 0;
   settings.flash = keeps ? kept : nullptr;
   settings.world = of_rows ? sim_world{nullptr, pressure_of_rows_Pa, temperature_of_rows_degC}
-                           : sim_world{nullptr, pressure_of_pad_Pa, nullptr};
+                           : sim_world{nullptr, pressure_of_world_Pa, nullptr};
   (void)native_fingertip_start(&settings); // refuses pads only, and there is none
 }
 // Imports fingertip.leave where the firmware ends itself.

@@ -26,6 +26,61 @@ export class Firmware {
     this.ofRows = true;
   }
 
+  /**
+   * The pad and its objects: objects of the file web_tables writes, errors as of `twin scenario
+   * --effects`. Throws WasmError.
+   */
+  setWorld({ objects, errors = 'none', seed = 1 }) {
+    const text = new TextEncoder().encode(errors);
+    this.wasm.bytes(this.wasm.call('errors_begin', text.length), text.length).set(text);
+    this.wasm.bytes(this.wasm.call('objects_begin', objects.length), objects.length).set(objects);
+    this.wasm.call('world_begin', seed);
+  }
+
+  /** The command that tells the firmware its pad; not before setWorld. */
+  padCommand() {
+    return this.wasm
+      .bytes(this.wasm.call('pad_command_at'), this.wasm.call('pad_command_bytes'))
+      .slice();
+  }
+
+  /** What the hand does from now on; world.hpp. */
+  choose(object) {
+    this.wasm.call('world_choose', object);
+  }
+  press({ x_mm, y_mm, force_N }) {
+    this.wasm.call('world_press', x_mm, y_mm, force_N);
+  }
+  hold({ x_mm, y_mm, force_N, load_N, angle_deg }) {
+    this.wasm.call('world_hold', x_mm, y_mm, force_N, load_N, (angle_deg * Math.PI) / 180);
+  }
+  drop(x_mm, y_mm, mass_g) {
+    this.wasm.call('world_drop', x_mm, y_mm, 1e-3 * mass_g);
+  }
+  lift() {
+    this.wasm.call('world_lift');
+  }
+  setFriction(friction) {
+    this.wasm.call('world_friction', friction);
+  }
+
+  truth() {
+    const [t_s, contact, x_mm, y_mm, force_N, qx_N, qy_N, slips] = this.wasm.doubles(
+      this.wasm.call('world_truth'),
+      8,
+    );
+    return {
+      t_us: Math.round(1e6 * t_s),
+      contact: contact !== 0,
+      x_mm,
+      y_mm,
+      force_N,
+      qx_N,
+      qy_N,
+      slips: slips !== 0,
+    };
+  }
+
   /** Time 0. kept: of an earlier one's kept(). */
   powerUp({ serial, seed = 1, noise = 1, promSpread = 0.03, parallelBus = false, kept = null }) {
     if (serial) {
