@@ -9,11 +9,13 @@ extern "C" {
 #include "native/native_cdc.h"
 #include "native/native_flash.h"
 #include "native/native_port.h"
+#include "wire/packet.h"
 }
 
 #include <algorithm>
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -59,6 +61,7 @@ double pressure_of_world_Pa(void *, unsigned sensor, std::uint64_t t_us) {
 
 std::uint8_t line[NATIVE_CDC_TRANSMIT_BYTES];
 std::uint8_t kept[NATIVE_FLASH_BYTES];
+std::optional<pad_profile> profile;
 char serial[17] = "0000000000000001";
 
 } // namespace
@@ -157,6 +160,18 @@ EXPORT(flash_bytes) unsigned flash_bytes() {
   return NATIVE_FLASH_BYTES;
 }
 
+// The pad's profile that acts from the start on, without being kept: that of a command of so many
+// bytes in line_bytes. 1: it is none.
+EXPORT(pad_of_command) int pad_of_command(unsigned length) {
+  wire_packet packet;
+  if (length < 1 || wire_decode(wire_commands, line, length - 1, &packet) != FT_OK ||
+      packet.type != WIRE_CMD_PAD) {
+    return 1;
+  }
+  profile = packet.body.cmd_pad.profile;
+  return 0;
+}
+
 // Power-up at time 0. of_rows: the scenario acts, else the pad. A module powers up once.
 EXPORT(power_up)
 void power_up(double seed, double noise, double prom_spread, int parallel_bus, int of_rows,
@@ -168,9 +183,10 @@ void power_up(double seed, double noise, double prom_spread, int parallel_bus, i
   settings.prom_spread = prom_spread;
   settings.parallel_bus = parallel_bus != 0;
   settings.flash = keeps ? kept : nullptr;
+  settings.pad = profile ? &*profile : nullptr;
   settings.world = of_rows ? sim_world{nullptr, pressure_of_rows_Pa, temperature_of_rows_degC}
                            : sim_world{nullptr, pressure_of_world_Pa, nullptr};
-  (void)native_fingertip_start(&settings); // refuses pads only, and there is none
+  (void)native_fingertip_start(&settings); // this scene refuses nothing
 }
 // Imports fingertip.leave where the firmware ends itself.
 EXPORT(run_until) void run_until(double t_us) {

@@ -44,6 +44,14 @@ export class Firmware {
       .slice();
   }
 
+  /** Acts from power-up on without being kept: a command as padCommand's. */
+  usePad(command) {
+    this.wasm.bytes(this.wasm.call('line_bytes'), command.length).set(command);
+    if (this.wasm.call('pad_of_command', command.length) !== 0) {
+      throw new Error('no command that tells a pad');
+    }
+  }
+
   /** What the hand does from now on; world.hpp. */
   choose(object) {
     this.wasm.call('world_choose', object);

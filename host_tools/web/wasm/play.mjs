@@ -1,7 +1,8 @@
 // What fingertip_player does with a scenario, by the firmware in simulated.wasm: the bytes of the
 // line.
-// usage: node play.mjs simulated.wasm SCENARIO.csv COMMANDS OUTPUT.ftr [SECONDS]
-// COMMANDS: those of fingertip_player --commands. Prints {"seconds", "cpu_s", "bytes"}.
+// usage: node play.mjs simulated.wasm SCENARIO.csv COMMANDS OUTPUT.ftr [objects.bin]
+// COMMANDS: those of fingertip_player --commands. With a file of objects its pad acts, 12 mm without
+// ends, as by fingertip_player --pad 12. Prints {"seconds", "cpu_s", "bytes"}.
 import fs from 'node:fs';
 import { Firmware } from './firmware.mjs';
 
@@ -43,11 +44,15 @@ function rowsOf(path, sensors) {
   };
 }
 
-const [wasm, scenario, commands, output, given_s] = process.argv.slice(2);
+const [wasm, scenario, commands, output, objects] = process.argv.slice(2);
 const firmware = await Firmware.of(new WebAssembly.Module(fs.readFileSync(wasm)));
 const rows = rowsOf(scenario, firmware.sensors);
-const seconds = given_s ? Number(given_s) : rows.times_s.at(-1);
+const seconds = rows.times_s.at(-1);
 firmware.setRows(rows);
+if (objects) {
+  firmware.setWorld({ objects: fs.readFileSync(objects) });
+  firmware.usePad(firmware.padCommand());
+}
 firmware.powerUp({});
 firmware.open();
 const sent = fs.readFileSync(commands);

@@ -63,6 +63,7 @@ void World::touch_anew(Way way, double x_mm, double y_mm) {
   x_mm_ = x_mm;
   y_mm_ = y_mm;
   vx_mm_s_ = vy_mm_s_ = force_N_ = 0.0;
+  load_x_N_ = load_y_N_ = wanted_load_x_N_ = wanted_load_y_N_ = 0.0;
 }
 
 void World::press(double x_mm, double y_mm, double force_N) {
@@ -86,8 +87,8 @@ void World::hold(double x_mm, double y_mm, double force_N, double load_N, double
   }
   wanted_force_N_ = std::clamp(force_N, 0.0, FORCE_MAX_N);
   const double pulls_N = std::clamp(load_N, 0.0, FORCE_MAX_N);
-  load_x_N_ = pulls_N * std::cos(angle_rad);
-  load_y_N_ = pulls_N * std::sin(angle_rad);
+  wanted_load_x_N_ = pulls_N * std::cos(angle_rad);
+  wanted_load_y_N_ = pulls_N * std::sin(angle_rad);
   mass_kg_ = std::clamp(mN_PER_N * pulls_N / GRAVITY_mm_s2, MASS_MIN_kg, MASS_MAX_kg);
 }
 
@@ -97,7 +98,6 @@ void World::drop(double x_mm, double y_mm, double mass_kg) {
   }
   touch_anew(Way::fallen, x_mm, y_mm);
   mass_kg_ = std::clamp(mass_kg, MASS_MIN_kg, MASS_MAX_kg);
-  load_x_N_ = load_y_N_ = 0.0;
   depth_mm_ = -DROP_mm;
   deeper_mm_s_ = 0.0;
 }
@@ -129,6 +129,8 @@ void World::move(double seconds) {
   } else {
     force_N_ += (wanted_force_N_ - force_N_) * seconds / FOLLOWS_s;
   }
+  load_x_N_ += (wanted_load_x_N_ - load_x_N_) * seconds / LOAD_FOLLOWS_s;
+  load_y_N_ += (wanted_load_y_N_ - load_y_N_) * seconds / LOAD_FOLLOWS_s;
   if (way_ == Way::hand) {
     vx_mm_s_ = (wanted_x_mm_ - x_mm_) / FOLLOWS_s;
     vy_mm_s_ = (wanted_y_mm_ - y_mm_) / FOLLOWS_s;

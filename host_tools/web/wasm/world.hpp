@@ -14,8 +14,9 @@
 //           contact: nothing pulls.
 //   drop    from DROP_mm: m z'' = F - m g, F that of the table at its depth, times 1 + LOSS_s_mm z'
 //           while it goes deeper (Hunt and Crossley, J. Appl. Mech. 42, 1975). It bounces, and lies.
-//   hold    as press, but along the pad the object is free: m x'' = load - Q. One that slid off
-//           stays lost until it is lifted, pressed or dropped
+//   hold    as press, but along the pad the object is free: m x'' = load - Q, where the load follows
+//           what is asked within LOAD_FOLLOWS_s. One that slid off stays lost until it is lifted,
+//           pressed or dropped
 //
 // Time goes on in steps of STEP_s; between them readings are linear. Deterministic: the same calls
 // at the same times give the same bits. Some 25 us a millisecond while something touches.
@@ -45,7 +46,8 @@ public:
   static constexpr double HALF_WIDTH_mm = 15.0, HALF_LENGTH_mm = 25.0;
   static constexpr double FORCE_MAX_N = 50.0, MASS_MIN_kg = 0.02, MASS_MAX_kg = 2.0;
   static constexpr double FRICTION_MIN = 0.1, FRICTION_MAX = 1.5, KINETIC_SHARE = 0.8;
-  static constexpr double FOLLOWS_s = 0.015, DROP_mm = 3.0, LOSS_s_mm = 0.01;
+  static constexpr double FOLLOWS_s = 0.015, LOAD_FOLLOWS_s = 0.1;
+  static constexpr double DROP_mm = 3.0, LOSS_s_mm = 0.01;
   static constexpr double STEP_s = 1e-3;
 
   // errors: of the pad, by name.
@@ -84,6 +86,7 @@ private:
   cell::Bundle bundle_;
   double friction_ = 0.5;
   double wanted_x_mm_ = 0.0, wanted_y_mm_ = 0.0, wanted_force_N_ = 0.0;
+  double wanted_load_x_N_ = 0.0, wanted_load_y_N_ = 0.0;
   double load_x_N_ = 0.0, load_y_N_ = 0.0, mass_kg_ = 0.3;
   double x_mm_ = 0.0, y_mm_ = 0.0, vx_mm_s_ = 0.0, vy_mm_s_ = 0.0, force_N_ = 0.0;
   double depth_mm_ = 0.0, deeper_mm_s_ = 0.0;
