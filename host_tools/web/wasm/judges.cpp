@@ -7,6 +7,7 @@
 #include "libfingertip/error.hpp"
 #include "web/wasm/json.hpp"
 
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -70,6 +71,21 @@ const char *name_of(PullFinder::State state) {
          : state == State::pulled   ? "pulled"
          : state == State::taken    ? "taken"
                                     : "refused";
+}
+
+// What may end an examination by a page.
+ErrorCode code_of(const std::string &name) {
+  static const std::map<std::string, ErrorCode> codes{
+      {"no_port", ErrorCode::no_port},
+      {"port_in_use", ErrorCode::port_in_use},
+      {"cannot_open", ErrorCode::cannot_open},
+      {"not_a_fingertip", ErrorCode::not_a_fingertip},
+      {"gone", ErrorCode::gone},
+      {"no_answer", ErrorCode::no_answer},
+      {"other_version", ErrorCode::other_version},
+  };
+  const auto found = codes.find(name);
+  return found == codes.end() ? ErrorCode::other : found->second;
 }
 
 void tell(const Json &json) {
@@ -274,9 +290,12 @@ void doctor_line(Examined *examined, double bytes, double packets, double droppe
   line.crc_errors = static_cast<std::uint64_t>(crc_errors);
   line.format_errors = static_cast<std::uint64_t>(format_errors);
 }
-// What the page gave is the text; code: the place in libfingertip/error.hpp's list.
-EXPORT(doctor_failure) void doctor_failure(Examined *examined, unsigned code) {
-  examined->facts.failure = Failure{static_cast<ErrorCode>(code), given_text()};
+// What the page gave is the code's name, a new line, and the text.
+EXPORT(doctor_failure) void doctor_failure(Examined *examined) {
+  const std::string all = given_text();
+  const std::size_t line = all.find('\n');
+  examined->facts.failure =
+      Failure{code_of(all.substr(0, line)), line == std::string::npos ? "" : all.substr(line + 1)};
 }
 EXPORT(doctor_tell) void doctor_tell(Examined *examined) {
   if (examined->measured) {

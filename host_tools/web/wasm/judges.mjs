@@ -1,31 +1,6 @@
 // The tool's judgement from judges.wasm: src/judges/judges.ts says what each part is.
 import { start } from './module.mjs';
 
-// Places in libfingertip/error.hpp's enum ErrorCode.
-const FAILURES = [
-  'other',
-  'no_port',
-  'not_a_port',
-  'port_in_use',
-  'permission_denied',
-  'cannot_open',
-  'no_fingertip',
-  'several_fingertips',
-  'no_such_fingertip',
-  'other_fingertip',
-  'no_driver',
-  'not_a_fingertip',
-  'usb_failed',
-  'wrong_choice',
-  'not_shared',
-  'share_denied',
-  'shared_already',
-  'cannot_share',
-  'gone',
-  'no_answer',
-  'other_version',
-];
-
 class Session {
   constructor(wasm, kind, handle) {
     Object.assign(this, { wasm, kind, handle });
@@ -111,7 +86,7 @@ class Doctor extends Session {
     this.ask('line', null, bytes, packets, dropped_packets, out_of_order, crc_errors, format_errors);
   }
   failure(code, text) {
-    this.ask('failure', new TextEncoder().encode(text), Math.max(FAILURES.indexOf(code), 0));
+    this.ask('failure', new TextEncoder().encode(`${code}\n${text}`));
   }
   findings() {
     return this.told('tell');

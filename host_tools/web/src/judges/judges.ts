@@ -116,6 +116,17 @@ export interface Finding {
   sensors: number[];
 }
 
+/** As in libfingertip/error.hpp. */
+export type FailureCode =
+  | 'no_port'
+  | 'port_in_use'
+  | 'cannot_open'
+  | 'not_a_fingertip'
+  | 'gone'
+  | 'no_answer'
+  | 'other_version'
+  | 'other';
+
 /** What the line counted during the measurement. */
 export interface LineCounts {
   bytes: number;
@@ -140,8 +151,8 @@ export interface Examination {
   seconds(): number;
   after(health_frame: Uint8Array): void;
   line(counts: LineCounts): void;
-  /** What ended it early; code: a name of libfingertip/error.hpp, "no_answer", "other_version". */
-  failure(code: string, text: string): void;
+  /** What ended it early. */
+  failure(code: FailureCode, text: string): void;
   findings(): Finding[];
   free(): void;
 }
