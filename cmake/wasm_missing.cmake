@@ -11,7 +11,7 @@ function(wasm_missing name)
   if(missing)
     string(PREPEND missing "the page's WebAssembly cannot be built without")
     string(APPEND missing "; apt-get install clang-14 lld-14 llvm-14 wasi-libc libclang-rt-14-dev-wasm32 "
-      "libc++-14-dev-wasm32 libc++abi-14-dev-wasm32, or configure with -DFINGERTIP_WEB_WASM=OFF")
+      "libc++-14-dev-wasm32 libc++abi-14-dev-wasm32, or configure with -DFINGERTIP_WEB=OFF")
   endif()
   set(${name} "${missing}" PARENT_SCOPE)
 endfunction()
