@@ -21,6 +21,8 @@ struct native_fingertip_settings {
   float prior_width_mm;
   const struct pad_profile *pad; /* that acts, and outlives the fingertip; NULL: none */
   struct sim_world world;
+  bool parallel_bus;    /* a data line for each sensor (sim_array.h): faster than multiplexers */
+  const uint8_t *flash; /* [NATIVE_FLASH_BYTES] what it had kept (native_flash.h); NULL: nothing */
 };
 
 #ifdef __cplusplus

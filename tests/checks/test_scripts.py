@@ -118,9 +118,9 @@ class Bootstrap(Folder):
         return subprocess.run([shutil.which("sh"), self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=60,
                               env={**os.environ, "PATH": f"{self.folder}/bin:{path}"})
 
-    def test_only_who_fuzzes_needs_clang(self):
+    def test_only_who_fuzzes_or_builds_the_page_needs_clang(self):
         path = self.path_without("clang-14")
-        for job, needs in ((("demo",), False), (("test",), True), (("report",), True), (("fuzz", "1"), True), (("soak", "1"), False)):
+        for job, needs in ((("demo",), False), (("web",), True), (("test",), True), (("report",), True), (("fuzz", "1"), True), (("soak", "1"), False)):
             with self.subTest(job):
                 done = self.up_to_npm(job=job, path=path)
                 self.assertEqual(done.returncode, 33)
