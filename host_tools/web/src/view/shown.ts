@@ -55,6 +55,10 @@ export interface ShownHistory {
   readonly qx_N: Float32Array;
   readonly qy_N: Float32Array;
   readonly q_sd_N: Float32Array;
+  readonly p0_Pa: Float32Array;
+  readonly sigma_mm: Float32Array;
+  /** Row i's, where they are kept. */
+  readingsAt?(i: number): ShownReadings | null;
 }
 
 /** Level: how much it matters, and so its colour. */
@@ -65,4 +69,57 @@ export interface Fact {
   readonly name: string;
   readonly value: string;
   readonly level?: Level;
+}
+
+export interface FactGroup {
+  readonly title: string;
+  readonly facts: readonly Fact[];
+}
+
+/** A fingertip that is there, was there, is simulated or replayed. */
+export interface ShownFingertip {
+  /** Stays the same when it comes back. */
+  readonly key: string;
+  /** Short. */
+  readonly name: string;
+  /** 0..7: which of the colours. */
+  readonly finger: number;
+  readonly source: 'port' | 'simulated' | 'recording';
+  /** "live", "stalled for 1.2 s". */
+  readonly state: { readonly words: string; readonly level: Level };
+  /** Whether what the newest frame told is still so. */
+  readonly current: boolean;
+  readonly recording: boolean;
+  /** Null before its info came. */
+  readonly layout: ShownLayout | null;
+  readonly slip_threshold_mm: number;
+  readonly location_limit_mm: number;
+  /** Its firmware tells tangential load and knows the pad. */
+  readonly tangential: boolean;
+  readonly frames_per_s: number;
+  readonly contact: ShownContact | null;
+  /** Of the last frame that was not held. */
+  readonly readings: ShownReadings | null;
+  readonly history: ShownHistory;
+  readonly health: readonly FactGroup[];
+  /** Of a simulated one: what can press on it. */
+  readonly hand: Hand | null;
+}
+
+/** SimulatedFingertip of src/simulated offers this. */
+export interface Hand {
+  readonly objects: readonly { readonly name: string; readonly title: string }[];
+  readonly truth: {
+    readonly contact: boolean;
+    readonly x_mm: number;
+    readonly y_mm: number;
+    readonly force_N: number;
+  };
+  choose(name: string): void;
+  press(hand: { x_mm: number; y_mm: number; force_N: number } | null): void;
+  drop(x_mm: number, y_mm: number): void;
+  hold(
+    grip: { x_mm: number; y_mm: number; force_N: number; load_N: number; angle_deg: number } | null,
+  ): void;
+  setFriction(friction: number): void;
 }
