@@ -361,7 +361,7 @@ export class Fingertip {
 
   private receive(bytes: Uint8Array, at_ms: number): void {
     this.heard_ms = at_ms;
-    if (this.state === 'silent') {
+    if (this.state === 'silent' || (this.is_replay && this.state === 'opening')) {
       this.state = 'live';
       this.changed();
     }
@@ -378,7 +378,8 @@ export class Fingertip {
         break;
       case PacketType.RAW:
         this.raws++;
-        this.history?.addRaw(packet);
+        this.history ??= new History(packet.sensor_count);
+        this.history.addRaw(packet);
         break;
       case PacketType.ACK:
         this.acknowledge(packet);
