@@ -1,6 +1,7 @@
 # What the web page runs as WebAssembly, built from here into build/wasm exactly as `cmake --preset wasm`
 # does, and what the twin tells its simulated pad: all of it in build/host/host_tools/web/wasm, by the
 # target web_wasm.
+include_guard(GLOBAL)
 include(ExternalProject)
 include(wasm_missing)
 wasm_missing(missing)

@@ -7,6 +7,12 @@ namespace fingertip {
 
 namespace {
 
+template <typename Number, typename... Format> std::string written(Number value, Format... format) {
+  char buffer[400];
+  auto result = std::to_chars(buffer, buffer + sizeof buffer, value, format...);
+  return std::string(buffer, result.ptr);
+}
+
 template <typename Number> std::optional<Number> parsed(std::string_view text) {
   Number value{};
   auto result = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -21,6 +27,14 @@ template <typename Number> std::optional<Number> finite(std::optional<Number> va
 }
 
 } // namespace
+
+std::string shortest(float value) {
+  return written(value);
+}
+
+std::string fixed(double value, int digits) {
+  return written(value, std::chars_format::fixed, digits);
+}
 
 std::optional<double> to_double(std::string_view text) {
   return finite(parsed<double>(text));

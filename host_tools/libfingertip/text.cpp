@@ -1,17 +1,10 @@
 #include "libfingertip/text.hpp"
 
 #include <algorithm>
-#include <charconv>
 
 namespace fingertip {
 
 namespace {
-
-template <typename Number, typename... Format> std::string written(Number value, Format... format) {
-  char buffer[400];
-  auto result = std::to_chars(buffer, buffer + sizeof buffer, value, format...);
-  return std::string(buffer, result.ptr);
-}
 
 /* Of the character that the text begins with: 0 if it is none, or a control character. */
 std::size_t printable_length(std::string_view text) {
@@ -41,14 +34,6 @@ std::size_t printable_length(std::string_view text) {
 }
 
 } // namespace
-
-std::string shortest(float value) {
-  return written(value);
-}
-
-std::string fixed(double value, int digits) {
-  return written(value, std::chars_format::fixed, digits);
-}
 
 std::vector<std::string_view> split(std::string_view text, char separator) {
   std::vector<std::string_view> parts;

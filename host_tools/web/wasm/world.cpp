@@ -167,9 +167,9 @@ void World::report() {
     truth_.qy_N = bundle_.pull_y_N();
     truth_.slips = bundle_.slips();
     const double pull_N = std::hypot(truth_.qx_N, truth_.qy_N);
-    const twin::TractionLoad load{
-        force_N_, truth_.slips ? 0.0 : twin::stuck_force_N(force_N_, pull_N, bundle_.friction()),
-        truth_.qx_N, truth_.qy_N};
+    const twin::TractionLoad load{force_N_,
+                                  twin::stuck_force_N(force_N_, pull_N, bundle_.friction()),
+                                  truth_.qx_N, truth_.qy_N};
     for (std::size_t k = 0; k < base_Pa_.size(); k++) {
       const double dx_mm = static_cast<double>(geometry.x_mm[k]) - x_mm_;
       const double dy_mm = static_cast<double>(geometry.y_mm[k]) - y_mm_;

@@ -47,7 +47,7 @@ public:
   static constexpr double FORCE_MAX_N = 50.0, MASS_MIN_kg = 0.02, MASS_MAX_kg = 2.0;
   static constexpr double FRICTION_MIN = 0.1, FRICTION_MAX = 1.5, KINETIC_SHARE = 0.8;
   static constexpr double FOLLOWS_s = 0.015, LOAD_FOLLOWS_s = 0.1;
-  static constexpr double DROP_mm = 3.0, LOSS_s_mm = 0.01;
+  static constexpr double DROP_mm = 3.0, LOSS_s_mm = 0.006;
   static constexpr double STEP_s = 1e-3;
 
   // errors: of the pad, by name.

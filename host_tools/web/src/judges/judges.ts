@@ -3,8 +3,10 @@
  * numbers, bounds and sentences as `fingertip calibrate` and `fingertip doctor`.
  *
  * A fingertip's packets go in as frames: the bytes of one frame of the line, COBS encoded, without
- * its delimiter. Whatever C++ throws comes out as JudgeError, whose message says what to do.
+ * its delimiter. Whatever C++ throws comes out as a JudgeError, whose message says what to do.
  */
+import { load } from '../../wasm/judges.mjs';
+import { WasmError } from '../../wasm/module.mjs';
 
 /** What the judges know; one for the page. */
 export interface Judges {
@@ -15,10 +17,17 @@ export interface Judges {
   examination(facts: { port: string; tool_version: [number, number, number] }): Examination;
 }
 
-/** From the bytes of judges.wasm; some 20 ms. */
-export declare function loadJudges(wasm: BufferSource): Promise<Judges>;
+export { WasmError as JudgeError };
 
-export class JudgeError extends Error {}
+/** Fetched once, when a dialog needs them: 130 kB compressed. files: the folder of judges.wasm. */
+export async function loadJudges(files = 'wasm/'): Promise<Judges> {
+  const url = new URL(`${files}judges.wasm`, document.baseURI);
+  const response = await fetch(url);
+  if (!response.ok) {
+    throw new WasmError(`${url.href}: ${response.status}; load the page anew`);
+  }
+  return load(await response.arrayBuffer());
+}
 
 export type SessionState = 'more' | 'good' | 'refused';
 
@@ -92,9 +101,9 @@ export interface PullSession {
   /** A contact packet's frame. True: a pull was completed. */
   take(frame: Uint8Array): boolean;
   status(): PullStatus;
-  /** What the pad command carries beside the profile the fingertip has. Throws JudgeError unless
-   * good. */
-  result(): { tangential_scale: number; tangential_scale_sd: number };
+  /** What the pad command carries beside the rest of the profile that the fingertip has now, by its
+   * info. Throws JudgeError unless good. */
+  result(info_frame: Uint8Array): { tangential_scale: number; tangential_scale_sd: number };
   free(): void;
 }
 
@@ -106,6 +115,17 @@ export interface Finding {
   advice: string;
   sensors: number[];
 }
+
+/** As in libfingertip/error.hpp. */
+export type FailureCode =
+  | 'no_port'
+  | 'port_in_use'
+  | 'cannot_open'
+  | 'not_a_fingertip'
+  | 'gone'
+  | 'no_answer'
+  | 'other_version'
+  | 'other';
 
 /** What the line counted during the measurement. */
 export interface LineCounts {
@@ -131,8 +151,8 @@ export interface Examination {
   seconds(): number;
   after(health_frame: Uint8Array): void;
   line(counts: LineCounts): void;
-  /** What ended it early; code: a name of libfingertip/error.hpp, "no_answer", "other_version". */
-  failure(code: string, text: string): void;
+  /** What ended it early. */
+  failure(code: FailureCode, text: string): void;
   findings(): Finding[];
   free(): void;
 }
