@@ -37,19 +37,18 @@ def compressed_kB(page):
 
 def cpu_s(pid):
     """Of a process and all that came of it and has not ended."""
-    tree, parents = [pid], {}
+    ticks, children = {}, {}
     for path in pathlib.Path("/proc").glob("[0-9]*/stat"):
         try:
             fields = path.read_text(encoding="utf-8").rsplit(")", 1)[1].split()
-        except OSError:
+        except OSError:  # it has just ended
             continue
-        parents.setdefault(int(fields[1]), []).append((int(path.parent.name), int(fields[11]) + int(fields[12])))
-    total = 0
+        ticks[int(path.parent.name)] = int(fields[11]) + int(fields[12])
+        children.setdefault(int(fields[1]), []).append(int(path.parent.name))
+    tree = [pid]
     for parent in tree:
-        for child, ticks in parents.get(parent, ()):
-            tree.append(child)
-            total += ticks
-    return total / os.sysconf("SC_CLK_TCK")
+        tree += children.get(parent, [])
+    return sum(ticks.get(each, 0) for each in tree) / os.sysconf("SC_CLK_TCK")
 
 
 def held_kB(page):
