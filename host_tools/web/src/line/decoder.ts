@@ -122,10 +122,10 @@ export class Decoder {
     }
     if (packet[0] !== WIRE_VERSION) {
       counts.version_errors++;
-      this.other_version = packet[0] as number;
+      this.other_version = packet[0];
       return;
     }
-    const type = packet[1] as number;
+    const type = packet[1];
     const sequence = view.getUint16(2, true);
     let to_packet: DevicePacket;
     switch (type) {

@@ -19,8 +19,8 @@ const CRC_TABLES = (() => {
   let before = first;
   for (const table of others) {
     for (let byte = 0; byte < 256; byte++) {
-      const crc = before[byte] as number;
-      table[byte] = (crc >>> 8) ^ (first[crc & 0xff] as number);
+      const crc = before[byte];
+      table[byte] = (crc >>> 8) ^ first[crc & 0xff];
     }
     before = table;
   }
@@ -34,18 +34,18 @@ export function crc32(bytes: Uint8Array, length = bytes.length): number {
   let i = 0;
   for (; i + 4 <= length; i += 4) {
     crc ^=
-      (bytes[i] as number) |
-      ((bytes[i + 1] as number) << 8) |
-      ((bytes[i + 2] as number) << 16) |
-      ((bytes[i + 3] as number) << 24);
+      bytes[i] |
+      (bytes[i + 1] << 8) |
+      (bytes[i + 2] << 16) |
+      (bytes[i + 3] << 24);
     crc =
-      (t3[crc & 0xff] as number) ^
-      (t2[(crc >>> 8) & 0xff] as number) ^
-      (t1[(crc >>> 16) & 0xff] as number) ^
-      (t0[crc >>> 24] as number);
+      t3[crc & 0xff] ^
+      t2[(crc >>> 8) & 0xff] ^
+      t1[(crc >>> 16) & 0xff] ^
+      t0[crc >>> 24];
   }
   for (; i < length; i++) {
-    crc = (crc >>> 8) ^ (t0[(crc ^ (bytes[i] as number)) & 0xff] as number);
+    crc = (crc >>> 8) ^ t0[(crc ^ bytes[i]) & 0xff];
   }
   return ~crc >>> 0;
 }
@@ -60,7 +60,7 @@ export function cobsEncode(bytes: Uint8Array, length = bytes.length): Uint8Array
       frame[code_at] = 255;
       code_at = out++;
     }
-    const byte = bytes[i] as number;
+    const byte = bytes[i];
     if (byte === 0) {
       frame[code_at] = out - code_at;
       code_at = out++;
@@ -78,13 +78,13 @@ export function cobsEncode(bytes: Uint8Array, length = bytes.length): Uint8Array
 export function cobsDecode(frame: Uint8Array, from: number, to: number, out: Uint8Array): number {
   let length = 0;
   while (from < to) {
-    const code = frame[from++] as number;
+    const code = frame[from++];
     const end = from + code - 1;
     if (code === 0 || end > to) {
       return 0;
     }
     while (from < end) {
-      const byte = frame[from++] as number;
+      const byte = frame[from++];
       if (byte === 0) {
         return 0;
       }

@@ -574,13 +574,13 @@ class Body {
         }
         case 'array':
           for (let k = 0; k < each.count; k++) {
-            this.putValue(each.of, (from[each.field] as Float32Array)[k] as number, each.field);
+            this.putValue(each.of, (from[each.field] as Float32Array)[k], each.field);
           }
           break;
         case 'pairs':
           for (let k = 0; k < (from['sensor_count'] as number); k++) {
             for (const field of each.fields) {
-              this.putValue(each.of, (from[field] as Float32Array)[k] as number, field);
+              this.putValue(each.of, (from[field] as Float32Array)[k], field);
             }
           }
           break;

@@ -11,6 +11,7 @@ import {
   Capability,
   PacketType,
   Result,
+  Stored,
   Stream,
   encodePacket,
   infoFrameOfVersion,
@@ -144,6 +145,9 @@ export class Fingertip {
     this.why = '';
     this.decoder.restart();
     this.clock.restart();
+    if (this.history && this.heard_ms > 0) {
+      this.history.gap_s = (performance.now() - this.heard_ms) / 1000;
+    }
     this.changed();
     try {
       await line.open(
@@ -330,7 +334,11 @@ export class Fingertip {
         timer: setTimeout(
           () => {
             this.forget(waiting);
-            failed(new Error(`${name}: the fingertip does not answer`));
+            failed(
+              new Error(
+                `${name}: the fingertip does not answer; unplug it and plug it in again`,
+              ),
+            );
           },
           is_stored ? STORED_ms : ANSWER_ms,
         ),
@@ -380,6 +388,8 @@ export class Fingertip {
           this.history = new History(packet.sensor_count);
         }
         this.info = packet;
+        this.history.gain =
+          packet.stored & Stored.CALIBRATION ? packet.gain : new Float32Array(0);
         break;
       case PacketType.HEALTH:
         this.health = packet;
