@@ -214,6 +214,8 @@ case $1 in
       say "what the fuzzers, the analysers and mutation find, and how faults and power cuts are overcome"
       /usr/bin/python3 host_tools/report/reliability/reliability.py --build build/host -o build/report
     fi
+    say "the page, in a browser"
+    /usr/bin/python3 host_tools/report/web/web.py --build build/host -o build/report
     say "in programs of others"
     /usr/bin/python3 host_tools/report/ecosystem/ecosystem.py --build build/host -o build/report
     say "every table and picture: $root/build/report/index.html"

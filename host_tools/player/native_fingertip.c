@@ -44,7 +44,9 @@ bool native_fingertip_start(const struct native_fingertip_settings *settings) {
     app.fit_settings.prior_width_mm = settings->prior_width_mm;
   }
 #if FT_WITH_TANGENTIAL
-  app_use_pad(&app, settings->pad);
+  if (settings->pad) {
+    app_use_pad(&app, settings->pad);
+  }
   return true;
 #else
   return !settings->pad;

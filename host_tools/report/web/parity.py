@@ -16,10 +16,9 @@ GOALS = (("wasm_packets", ">=", 100000), ("wasm_scenes", ">=", len(KINDS)), ("wa
 
 
 def compared(line, other):
-    """(packets, those that differ or that one lacks) of two captures of a line."""
-    frames, others = (bytes_.split(b"\0") for bytes_ in (line, other))
-    pairs = list(itertools.zip_longest(frames, others))
-    return sum(1 for frame in frames if frame), sum(frame != other for frame, other in pairs)
+    """(packets of the first, those that differ or that one lacks) of two captures of a line."""
+    frames, others = ([frame for frame in capture.split(b"\0") if frame] for capture in (line, other))
+    return len(frames), sum(frame != other for frame, other in itertools.zip_longest(frames, others))
 
 
 def play(build, scenario, folder, *options, pad=False):

@@ -48,7 +48,6 @@ export class RealTime {
       firmware.send(firmware.padCommand());
       this.runFor(firmware, STORE_us);
       firmware.close();
-      firmware.receive();
     }
     this.firmware = firmware;
     this.begin_ms = this.clock() - 1e-3 * this.t_us;
@@ -67,6 +66,8 @@ export class RealTime {
     if (!this.firmware) {
       await this.plugIn();
     }
+    // What it was told before it noticed that its line had closed would be lost.
+    this.runFor(this.firmware, SLICE_us);
     this.firmware.open();
     this.isOpen = true;
   }
