@@ -43,7 +43,7 @@ static double logarithm(double u) {
 
 /* cos(2 pi v), v in [0, 1) */
 static double cosine_of_turns(double v) {
-  const double half = v > 0.5 ? 1.0 - v : v;           /* even about half a turn */
+  const double half = v > 0.5 ? 1.0 - v : v;              /* even about half a turn */
   const double quarter = half > 0.25 ? 0.5 - half : half; /* odd about a quarter */
   const double x = TWO_PI * quarter, x2 = x * x;
   double sum = 1.0;

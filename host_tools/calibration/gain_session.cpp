@@ -120,15 +120,14 @@ std::string GainSession::advice() const {
   }
   std::string text = "set the weight down on its round foot";
   if (wanted_) {
-    text +=
-        ", best near x " + fixed(wanted_->x_mm, 0) + " y " + fixed(wanted_->y_mm, 0) + " mm";
+    text += ", best near x " + fixed(wanted_->x_mm, 0) + " y " + fixed(wanted_->y_mm, 0) + " mm";
   }
   return text;
 }
 
 std::string GainSession::progress() const {
-  std::string text = std::to_string(placements_.size()) +
-                     (placements_.size() == 1 ? " placement" : " placements");
+  std::string text =
+      std::to_string(placements_.size()) + (placements_.size() == 1 ? " placement" : " placements");
   const Solution &solution = judgement_.solution;
   if (solution.solved) {
     const Fitted &last = solution.placements.back();

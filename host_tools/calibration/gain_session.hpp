@@ -41,7 +41,7 @@ public:
   const Array &array() const { return array_; }
   const PlacementFinder &finder() const { return finder_; }
   const std::vector<Placement> &placements() const { return placements_; }
-  const Judgement &judgement() const { return judgement_; }        /* of the placements so far */
+  const Judgement &judgement() const { return judgement_; }       /* of the placements so far */
   const std::optional<Wanted> &wanted() const { return wanted_; } /* the best next place */
 
 private:

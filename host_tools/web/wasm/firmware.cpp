@@ -143,8 +143,9 @@ EXPORT(world_friction) void world_friction(double friction) {
 }
 EXPORT(world_truth) const double *world_truth() {
   const Truth &now = world->truth();
-  const double values[] = {now.t_s,  now.contact ? 1.0 : 0.0, now.x_mm, now.y_mm, now.force_N,
-                           now.qx_N, now.qy_N,                now.slips ? 1.0 : 0.0};
+  const double values[] = {
+      now.t_s,  now.contact ? 1.0 : 0.0, now.x_mm, now.y_mm, now.force_N, now.qx_N,
+      now.qy_N, now.slips ? 1.0 : 0.0};
   std::copy(std::begin(values), std::end(values), truth);
   return truth;
 }

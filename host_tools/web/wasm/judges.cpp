@@ -171,9 +171,9 @@ void gains_result(const GainSession *session, double force_N, double date_s) {
   if (session->judgement().state != calibrating::Judgement::State::good) {
     throw Error("not calibrated: " + session->judgement().text);
   }
-  const calibration made = session->made(std::isnan(force_N) ? std::nullopt
-                                                             : std::optional<double>(force_N),
-                                         static_cast<std::uint32_t>(date_s));
+  const calibration made =
+      session->made(std::isnan(force_N) ? std::nullopt : std::optional<double>(force_N),
+                    static_cast<std::uint32_t>(date_s));
   std::vector<float> gain, gain_sd;
   for (std::size_t k = 0; k < session->array().sensors(); k++) {
     gain.push_back(made.sensors[k].gain);

@@ -21,7 +21,8 @@ constexpr int STEPS_WITHIN = 20; // cell::Bundle's longest step while all slides
 constexpr double LEAST_N = twin::ForcePlanes::FORCE_MIN_N;
 
 bool all_finite(std::initializer_list<double> values) {
-  return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+  return std::all_of(values.begin(), values.end(),
+                     [](double value) { return std::isfinite(value); });
 }
 
 bool on_pad(double x_mm, double y_mm) {
@@ -135,10 +136,10 @@ void World::move(double seconds) {
     vx_mm_s_ = (wanted_x_mm_ - x_mm_) / FOLLOWS_s;
     vy_mm_s_ = (wanted_y_mm_ - y_mm_) / FOLLOWS_s;
   }
-  const double radius_mm = force_N_ > 0.0
-                               ? twin::ForcePlanes::between_forces(
-                                     object_->radius_mm, std::max(force_N_, LEAST_N))
-                               : 0.0;
+  const double radius_mm =
+      force_N_ > 0.0
+          ? twin::ForcePlanes::between_forces(object_->radius_mm, std::max(force_N_, LEAST_N))
+          : 0.0;
   const double touching_mm = std::max(radius_mm, 0.05);
   const cell::Wrench rubber = bundle_.step(seconds, force_N_, SHEAR_N_mm2 * touching_mm,
                                            touching_mm, {vx_mm_s_, vy_mm_s_, 0.0});

@@ -5,16 +5,18 @@
 // sensors' errors are its too (twin/effects.hpp). An object touches where its middle is within the
 // pad, 30 by 50 mm; beyond, it has fallen off.
 //
-// Friction is that of the simulated cell (cell/bundle.hpp): Coulomb's, static then kinetic, with the
-// rubber's give before all slides, which is 1 N/mm for each millimetre of contact radius. The middle
-// of the contact goes along with the object. Objects do not turn, roll or tilt.
+// Friction is that of the simulated cell (cell/bundle.hpp): Coulomb's, static then kinetic, with
+// the rubber's give before all slides, which is 1 N/mm for each millimetre of contact radius. The
+// middle of the contact goes along with the object. Objects do not turn, roll or tilt.
 //
 //   press   the hand holds the object rigidly. Its place and force follow what is asked within
 //           FOLLOWS_s, so that a pointer's events make no jumps. What the hand does first is a new
 //           contact: nothing pulls.
 //   drop    from DROP_mm: m z'' = F - m g, F that of the table at its depth, times 1 + LOSS_s_mm z'
-//           while it goes deeper (Hunt and Crossley, J. Appl. Mech. 42, 1975). It bounces, and lies.
-//   hold    as press, but along the pad the object is free: m x'' = load - Q, where the load follows
+//           while it goes deeper (Hunt and Crossley, J. Appl. Mech. 42, 1975). It bounces, and
+//           lies.
+//   hold    as press, but along the pad the object is free: m x'' = load - Q, where the load
+//   follows
 //           what is asked within LOAD_FOLLOWS_s. One that slid off stays lost until it is lifted,
 //           pressed or dropped
 //

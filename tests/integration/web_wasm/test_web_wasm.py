@@ -74,7 +74,7 @@ class Parity(WebWasm):
 
     def same(self, scenario, *options, pad=False, least_Hz=100):
         packets, different, told = parity.play(self.build, scenario, self.folder, *options, pad=pad)
-        self.assertEqual(different, 0)
+        self.assertEqual(different, 0, "build web_wasm and fingertip_player anew first: their info packets name their commit")
         self.assertGreater(packets, least_Hz * told["seconds"])
 
     def test_taps_with_all_errors(self):

@@ -236,8 +236,8 @@ TEST(World, PadsHaveTheTwinsErrors) {
   const twin::Pad pad({{"gain", 10.0}}, geometry.sensor_count, PAD_mm, AMBIENT_Pa, 3);
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     const double felt_Pa = plain.pressure_Pa(k, 1000000) - AMBIENT_Pa;
-    EXPECT_NEAR(cast.pressure_Pa(k, 1000000) - AMBIENT_Pa,
-                felt_Pa * (1.0 + pad.gain_errors()[k]), 1e-6 * std::abs(felt_Pa) + 1e-6);
+    EXPECT_NEAR(cast.pressure_Pa(k, 1000000) - AMBIENT_Pa, felt_Pa * (1.0 + pad.gain_errors()[k]),
+                1e-6 * std::abs(felt_Pa) + 1e-6);
   }
 }
 
