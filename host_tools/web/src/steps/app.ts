@@ -21,6 +21,10 @@ export const PAGE_VERSION = version;
 /** Linux gives a port its group and rights a moment after it is there. */
 const RIGHTS_ms = 300;
 
+const NONE_CHOSEN =
+  'No fingertip was chosen. None in the list: plug one in, with a cable that carries data. No list: allow this site ' +
+  'to use serial ports in the settings of the browser.';
+
 export class App {
   readonly bench = new Bench();
   readonly recorders = new Map<Fingertip, Recorder>();
@@ -57,8 +61,16 @@ export class App {
         throw new Error(whyNoWebSerial());
       }
       const waiting = (await rememberedPorts()).filter((port) => !this.isOpen(port));
-      const port = waiting.length > 0 ? null : await requestPort();
-      await (port ? this.find(port) : this.find());
+      if (waiting.length > 0) {
+        await this.find();
+        return;
+      }
+      const port = await requestPort();
+      if (port) {
+        await this.find(port);
+      } else {
+        this.notice(NONE_CHOSEN, 'plain');
+      }
     } catch (error) {
       this.notice(wordsOf(error), 'bad');
     }
