@@ -123,6 +123,7 @@ export class App {
       void this.stopRecording(fingertip);
     });
     this.recorders.set(fingertip, recorder);
+    await fingertip.askInfo();
     this.changed();
     return true;
   }
