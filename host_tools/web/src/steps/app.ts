@@ -123,8 +123,13 @@ export class App {
       void this.stopRecording(fingertip);
     });
     this.recorders.set(fingertip, recorder);
-    await fingertip.askInfo();
     this.changed();
+    try {
+      await fingertip.askInfo();
+    } catch (error) {
+      await this.stopRecording(fingertip);
+      throw error;
+    }
     return true;
   }
 
