@@ -73,6 +73,7 @@ export class History {
   private oldest = 0;
   private next = 0;
   private offset_s = 0;
+  private newest_us = 0;
   private readonly fields: { field: ContactField; flag: number; column: Float32Array }[];
 
   constructor(sensor_count: number, capacity = HISTORY_ROWS) {
@@ -170,7 +171,7 @@ export class History {
     if (this.next > this.oldest) {
       const newest = (this.next - 1) % this.capacity;
       const newest_s = this.t_s[newest];
-      if (this.frame[newest] === frame && newest_s === t_s) {
+      if (this.frame[newest] === frame && this.newest_us === t_us) {
         return newest;
       }
       if (t_s < newest_s) {
@@ -181,6 +182,7 @@ export class History {
       }
     }
     this.gap_s = 0;
+    this.newest_us = t_us;
     const slot = this.next % this.capacity;
     this.next++;
     this.oldest = Math.max(this.oldest, this.next - this.capacity);

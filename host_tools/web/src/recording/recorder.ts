@@ -26,13 +26,13 @@ export class Recorder {
   /** Why it ended before it was told to; empty: it did not. */
   failure = '';
   private readonly sink: CsvSink | McapSink;
-  private readonly lines: PacketLines;
-  private readonly before: LineCounts;
+  private lines: PacketLines | null = null;
+  private before = noCounts();
   private readonly end_tap: () => void;
   private readonly end_listen: () => void;
   private was_live = true;
 
-  /** The fingertip's info must be known. onFailure: recording ended by itself. */
+  /** Begins with the next info packet: ask for one. onFailure: recording ended by itself. */
   constructor(
     readonly fingertip: Fingertip,
     readonly kind: RecordingKind,
@@ -40,41 +40,29 @@ export class Recorder {
     version: string,
     private readonly onFailure: (why: string) => void,
   ) {
-    const { info } = fingertip;
-    if (!info) {
-      throw new Error('the fingertip has not told yet who it is: wait a moment');
-    }
     this.sink = kind === 'csv' ? new CsvSink(output) : new McapSink(output);
-    const extra: Pairs = [
-      ['recorded_by', `fingertip page ${version}`],
-      ['started_utc', utcText(Date.now())],
-      ['port', fingertip.line.label],
-    ];
-    const estimate = fingertip.clock.estimate;
-    if (estimate) {
-      const now_us = performance.now() * 1000;
-      const device_us =
-        estimate.device_us + (now_us - estimate.host_us) * (1 + estimate.drift_ppm * 1e-6);
-      extra.push(['started_device_us', String(Math.max(0, Math.round(device_us)))]);
-    }
-    this.before = { ...fingertip.counts };
-    this.lines = new PacketLines(this.sink, info, extra);
     this.end_tap = fingertip.tap((packet) => {
-      if (packet.type !== PacketType.CRASH) {
-        this.guard(() => this.lines.packet(packet));
+      if (this.lines) {
+        const { lines } = this;
+        this.guard(() => lines.packet(packet));
+      } else if (packet.type === PacketType.INFO) {
+        this.before = { ...fingertip.counts, packets: fingertip.counts.packets - 1 };
+        this.guard(() => {
+          this.lines = new PacketLines(this.sink, packet, this.head(version, packet.t_us));
+        });
       }
     });
     this.end_listen = fingertip.listen(() => {
       const live = fingertip.state !== 'closed';
       if (live !== this.was_live) {
         this.was_live = live;
-        this.guard(() => this.lines.event(`${live ? 'back' : 'gone'} ${utcText(Date.now())}`));
+        this.guard(() => this.lines?.event(`${live ? 'back' : 'gone'} ${utcText(Date.now())}`));
       }
     });
   }
 
   get frames(): number {
-    return this.lines.frames;
+    return this.lines?.frames ?? 0;
   }
 
   /** Rejects with an Error whose message says what was not written. */
@@ -85,9 +73,18 @@ export class Recorder {
     for (const key of Object.keys(counts) as (keyof LineCounts)[]) {
       counts[key] = this.fingertip.counts[key] - this.before[key];
     }
-    this.lines.finish(counts, reason);
+    this.lines?.finish(counts, reason);
     await this.sink.finish();
     await this.output.finish();
+  }
+
+  private head(version: string, device_us: number): Pairs {
+    return [
+      ['recorded_by', `fingertip page ${version}`],
+      ['started_utc', utcText(Date.now())],
+      ['port', this.fingertip.line.label],
+      ['started_device_us', String(device_us)],
+    ];
   }
 
   private guard(write: () => void): void {

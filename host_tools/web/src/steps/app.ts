@@ -136,6 +136,12 @@ export class App {
     });
     this.recorders.set(fingertip, recorder);
     this.changed();
+    try {
+      await fingertip.askInfo();
+    } catch (error) {
+      await this.stopRecording(fingertip);
+      throw error;
+    }
     return true;
   }
 
