@@ -41,6 +41,9 @@ export class CommandError extends Error {
   }
 }
 
+/** Another fingertip answered than the one that was expected back. */
+export class OtherFingertip extends Error {}
+
 /** Takes every packet as it comes; frame(): a copy of its COBS bytes without the delimiter. Contact
  * and raw packets are overwritten by the next. */
 export type PacketTap = (packet: DevicePacket, frame: () => Uint8Array<ArrayBuffer>) => void;
@@ -92,6 +95,7 @@ export class Fingertip {
   private readonly waiting: Waiting[] = [];
   private readonly awaited = new Map<number, ((packet: DevicePacket) => void)[]>();
   private sequence = 0;
+  private other_serial = '';
   private timer: ReturnType<typeof setInterval> | null = null;
   private clock_asked_ms = 0;
 
@@ -164,7 +168,12 @@ export class Fingertip {
       await this.identify();
       await this.stream(Stream.CONTACT | Stream.RAW | Stream.HEALTH);
     } catch (error) {
-      const why = error instanceof Error ? error.message : String(error);
+      const why =
+        error instanceof OtherFingertip
+          ? 'it is not there: plug it in again'
+          : error instanceof Error
+            ? error.message
+            : String(error);
       if ((this.state as FingertipState) !== 'closed') {
         await line.close().catch(() => undefined);
         this.gone(why);
@@ -274,10 +283,14 @@ export class Fingertip {
   }
 
   private async identify(): Promise<void> {
+    this.other_serial = '';
     try {
       await this.askInfo();
+      if (this.other_serial) {
+        throw new OtherFingertip(`${this.other_serial} answers instead of ${this.name}`);
+      }
     } catch (error) {
-      if (error instanceof CommandError && error.result !== null) {
+      if (error instanceof OtherFingertip || (error instanceof CommandError && error.result !== null)) {
         throw error;
       }
       const version = await this.otherVersion();
@@ -361,7 +374,7 @@ export class Fingertip {
 
   private receive(bytes: Uint8Array, at_ms: number): void {
     this.heard_ms = at_ms;
-    if (this.state === 'silent') {
+    if (this.state === 'silent' || (this.is_replay && this.state === 'opening')) {
       this.state = 'live';
       this.changed();
     }
@@ -378,13 +391,18 @@ export class Fingertip {
         break;
       case PacketType.RAW:
         this.raws++;
-        this.history?.addRaw(packet);
+        this.history ??= new History(packet.sensor_count);
+        this.history.addRaw(packet);
         break;
       case PacketType.ACK:
         this.acknowledge(packet);
         break;
       case PacketType.INFO:
-        if (this.history?.sensor_count !== packet.sensor_count || this.info?.serial !== packet.serial) {
+        if (this.info && this.info.serial !== packet.serial) {
+          this.other_serial = packet.serial;
+          break;
+        }
+        if (this.history?.sensor_count !== packet.sensor_count) {
           this.history = new History(packet.sensor_count);
         }
         this.info = packet;

@@ -16,7 +16,7 @@ export function shortest(value: number): string {
   } else {
     digits = readsBack(value, 8) ? 8 : 9;
   }
-  const [mantissa, exponent] = value.toExponential(digits - 1).split('e') as [string, string];
+  const [mantissa, exponent] = evenly(value, digits).split('e') as [string, string];
   const sign = mantissa.startsWith('-') ? '-' : '';
   const plain = mantissa.replace(/^-/, '').replace('.', '').replace(/0+$/, '') || '0';
   // Of the last digit; scientific where that is shorter.
@@ -34,6 +34,22 @@ export function shortest(value: number): string {
   const power = Number(exponent);
   const text = plain.length > 1 ? `${plain[0]}.${plain.slice(1)}` : plain;
   return `${sign}${text}e${power < 0 ? '-' : '+'}${String(Math.abs(power)).padStart(2, '0')}`;
+}
+
+/** As toExponential, but half to even, as C++ has it. */
+function evenly(value: number, digits: number): string {
+  const rounded = value.toExponential(digits - 1);
+  const more = value.toExponential(digits);
+  const [mantissa, exponent] = more.split('e') as [string, string];
+  const is_half =
+    mantissa.endsWith('5') &&
+    Number(more) === value &&
+    /^0*$/.test(value.toExponential(100).split('e')[0].slice(mantissa.length));
+  if (!is_half) {
+    return rounded;
+  }
+  const down = mantissa.slice(0, -1);
+  return Number(down.at(-1)) % 2 === 0 ? `${down}e${exponent}` : rounded;
 }
 
 function readsBack(value: number, digits: number): boolean {

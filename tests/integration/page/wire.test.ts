@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { Decoder } from '../src/line/decoder';
-import { cobsDecode, cobsEncode, crc32 } from '../src/line/framing';
+import { Decoder } from '../../../host_tools/web/src/line/decoder';
+import { cobsDecode, cobsEncode, crc32 } from '../../../host_tools/web/src/line/framing';
 import {
   Flag,
   PacketType,
@@ -10,7 +10,7 @@ import {
   encodePacket,
   type Contact,
   type DevicePacket,
-} from '../src/line/packets';
+} from '../../../host_tools/web/src/line/packets';
 import { readVectors, vector } from './vectors';
 
 test('CRC-32/ISO-HDLC has its check value', () => {
