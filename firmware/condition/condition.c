@@ -69,6 +69,7 @@
 /* A sensor that has lost its state, or a wrong temperature, is found out within so long; a zero
  * taken meanwhile is not its own. */
 #define FOUND_OUT_ms ((uint32_t)SECONDS(5))
+#define TARE_WAITS_ms ((uint32_t)SECONDS(8))
 
 #define CALM_AFTER_TARE_ms ((uint32_t)SECONDS(3))
 #define CALM_AFTER_RELEASE_ms ((uint32_t)SECONDS(60)) /* what rubber keeps goes slowly */
@@ -94,7 +95,9 @@ static void begin_tare(struct condition *condition, uint8_t k) {
   condition->tare_min[k] = INT32_MAX;
   condition->tare_max[k] = INT32_MIN;
   condition->tare_left[k] = CONDITION_TARE_FRAMES;
+  condition->tare_begun_ms[k] = condition->now_ms;
   condition->taring |= UINT32_C(1) << k;
+  condition->guessed &= ~(UINT32_C(1) << k);
   condition->memory_Pa_q10[k] = 0;
   condition->reached_Pa_q10[k] = 0;
   condition->margin_Pa_q10[k] = 0;
@@ -484,21 +487,25 @@ static void track_sensor(struct condition *condition, const struct frame *frame,
 }
 
 /* Takes the readings of sensors that are tared now, and leaves the bitmap of those that were. In a
- * contact that others feel it waits. */
+ * contact that others feel it waits, but not for ever, for wrong zeros may make it: what is taken
+ * then is a guess until the contact ends. */
 static uint32_t tare_sensors(struct condition *condition, const struct frame *frame,
                              uint32_t readable) {
   uint32_t ready = readable;
+  uint32_t guesses = condition->pressed ? 0 : condition->guessed;
   bool is_felt = condition->pressed && !condition->unsure && (readable & ~condition->taring) != 0;
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
     uint32_t bit = UINT32_C(1) << k;
     bool tared_lately = condition->now_ms - condition->tare_begun_ms[k] < FOUND_OUT_ms;
-    if (frame->renewed & bit || (frame->restored & bit && tared_lately)) {
+    if ((frame->renewed | guesses) & bit || (frame->restored & bit && tared_lately)) {
       begin_tare(condition, k);
     }
     if (condition->taring & readable & bit) {
       ready &= ~bit;
       if (!is_felt) {
         tare_step(condition, k, frame->pressure_Pa_q10[k]);
+      } else if (condition->now_ms - condition->tare_begun_ms[k] >= TARE_WAITS_ms) {
+        condition->guessed |= bit;
       }
     }
   }
@@ -583,7 +590,7 @@ void condition_frame(struct condition *condition, const struct frame *frame,
   int32_t close = Pa_q10(CONDITION_CLOSE_Pa) + CONDITION_CLOSE_SIGMA * frame->noise_Pa_q10;
   uint32_t readable = frame->valid & ~frame->saturated;
   conditioned->usable = readable;
-  if (condition->taring & readable || frame->renewed || frame->restored) {
+  if (condition->taring & readable || frame->renewed || frame->restored || condition->guessed) {
     conditioned->usable = tare_sensors(condition, frame, readable);
   }
   uint8_t strongest = read_sensors(condition, frame, gains, conditioned);
@@ -593,7 +600,7 @@ void condition_frame(struct condition *condition, const struct frame *frame,
     sum_up(condition, frame, conditioned->usable);
   }
   condition->unsure = condition->pressed && frame->saturated == 0 &&
-                      ((condition->firm & conditioned->usable) == 0 ||
+                      (condition->guessed != 0 || (condition->firm & conditioned->usable) == 0 ||
                        conditioned->peak_Pa_q10 < drift_in_contact(condition));
   int32_t most = frame->sensor_count * TRACK_ms;
   int32_t due = condition->due_ms + step_ms * frame->sensor_count;

@@ -11,7 +11,8 @@
  * the calm before it, which goes on for an hour. That of a sensor whose temperature is unsettled
  * stands too. One that was taken in the five seconds before its sensor was reset, as it had lost
  * its state, or before its temperature turned out to be another, is taken anew. No single sensor is
- * tared in a contact that others feel: it waits.
+ * tared in a contact that others feel: it waits for eight seconds at most, since wrong zeros may be
+ * what makes it. A zero taken then is in doubt until the contact ends, and taken anew.
  *
  * Release. Rubber does not let go at once: a sensor stands off by 0.4 to 13 % of its last pressure,
  * or below its zero by 1 to 15 %, returns within 0.5 to 20 s, and keeps some of it (strips of
@@ -83,6 +84,7 @@ struct condition {
   int32_t taken_before_Pa_q10; /* into zeros, when the contact came, in doubt or not */
   int32_t strong_Pa_q10;       /* of this contact: so far above what its zeros may be off by */
   uint32_t taring;             /* bitmap: tare_left is not 0 */
+  uint32_t guessed;            /* bitmap: tared in a contact that others feel */
   uint32_t restless;           /* bitmap: the level does not keep up, no calm */
   uint32_t firm;               /* bitmap: stronger than what the zero has wandered */
   uint32_t sudden;             /* bitmap: stronger than what may have crept up */

@@ -8,10 +8,13 @@
 #define AHEAD_MIN_us 20000
 #define AHEAD_MAX_us 80000
 
-/* A slide raises the grip at once by so much, and again each time the gripper has had the time to
- * answer and it goes on. */
-#define REFLEX_PERMILLE 1200
-#define GOES_ON_PERMILLE 1400
+/* A slide raises the grip at once, and by more again each time the gripper has had the time to
+ * answer and it goes on: the more the later the gripper answers, for a slide gains speed. */
+#define REFLEX_PERMILLE 1100
+#define REFLEX_PERMILLE_ms 16 /* of latency */
+#define REFLEX_MIN_PERMILLE 1200
+#define REFLEX_MAX_PERMILLE 1500
+#define GOES_ON_PERMILLE 200
 #define REFLEX_AGAIN_us 35000
 /* This much of the grip that ended a slide is not given up where no load tells what is needed. */
 #define FLOOR_PERMILLE 850
@@ -84,6 +87,11 @@ static void learn_friction(struct grip *grip, const struct grip_view *view, bool
   hold->friction_permille = seen < hold->friction_permille ? seen : hold->friction_permille;
 }
 
+static int32_t reflex_permille(const struct grip *grip) {
+  int32_t later = grip_scale(grip->traits.latency_us, REFLEX_PERMILLE_ms, 1000);
+  return grip_clamp(REFLEX_PERMILLE + later, REFLEX_MIN_PERMILLE, REFLEX_MAX_PERMILLE);
+}
+
 static void answer_slide(struct grip *grip, const struct grip_view *view) {
   struct grip_hold *hold = &grip->hold;
   bool begins = view->slides && !hold->sliding;
@@ -92,7 +100,8 @@ static void answer_slide(struct grip *grip, const struct grip_view *view) {
     uint64_t again_us = (uint64_t)grip->traits.latency_us + REFLEX_AGAIN_us;
     if (begins || grip->now_us - hold->raised_us > again_us) {
       int32_t from_mN = !begins && grip->wanted_mN > view->low_mN ? grip->wanted_mN : view->low_mN;
-      int32_t raised_mN = grip_scale(from_mN, begins ? REFLEX_PERMILLE : GOES_ON_PERMILLE, 1000);
+      int32_t raise_permille = reflex_permille(grip) + (begins ? 0 : GOES_ON_PERMILLE);
+      int32_t raised_mN = grip_scale(from_mN, raise_permille, 1000);
       raised_mN = grip_clamp(raised_mN, 0, grip->settings.force_cap_mN);
       hold->floor_mN = raised_mN > hold->floor_mN ? raised_mN : hold->floor_mN;
       hold->raised_us = grip->now_us;

@@ -25,13 +25,16 @@ static int32_t difference(int32_t a, int32_t b) {
   return (int32_t)((uint32_t)a - (uint32_t)b);
 }
 
-/* The sensor whose reading has stepped while all others stood still, as a bitmap. */
-static uint32_t find_alone(const struct readings *readings, const struct frame *frame,
+/* The sensor whose reading has stepped while all others of these stood still, as a bitmap. */
+static uint32_t find_alone(const struct frame *frame, uint32_t sensors,
                            const int32_t last_Pa_q10[]) {
   uint32_t stepped = 0;
   uint32_t largest = 0;
   uint32_t second = 0;
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
+    if (!(sensors >> k & 1u)) {
+      continue;
+    }
     uint32_t size = size_of(difference(frame->pressure_Pa_q10[k], last_Pa_q10[k]));
     if (size > largest) {
       second = largest;
@@ -43,7 +46,7 @@ static uint32_t find_alone(const struct readings *readings, const struct frame *
   }
   const uint32_t noises = READINGS_STILL_NOISES * (uint32_t)frame->noise_Pa_q10;
   const bool others_rest = second < noises || second < largest / READINGS_ALONE;
-  return largest > READINGS_STEP_Pa_q10 && others_rest ? stepped & readings->has_last : 0;
+  return largest > READINGS_STEP_Pa_q10 && others_rest ? stepped : 0;
 }
 
 /* alone: the sensor whose reading has just stepped alone, or 0. */
@@ -81,8 +84,11 @@ static __attribute__((noinline, cold)) uint32_t look_closer(struct readings *rea
                                                             const int32_t last_Pa_q10[],
                                                             int32_t kept_Pa_q10[]) {
   const bool all = usable == all_sensors(frame->sensor_count);
-  const uint32_t alone =
-      all && readings->presses_are_shared ? find_alone(readings, frame, last_Pa_q10) : 0;
+  const uint32_t seen = usable & (readings->has_last | readings->awaited);
+  const uint32_t stepped = readings->presses_are_shared ? find_alone(frame, seen, last_Pa_q10) : 0;
+  const uint32_t alone = all ? stepped & readings->has_last : 0;
+  readings->restored |= alone | (stepped & readings->awaited);
+  readings->awaited &= ~usable;
   judge_alone(readings, alone, frame, last_Pa_q10);
   uint32_t low = 0;
   uint32_t bit = 1;

@@ -8,7 +8,8 @@
  * taken anew then, for the last one may have been wrong (condition.h). Two that agree with each
  * other and are near nobody's come from a sensor that has lost its state as its supply failed: it
  * becomes a suspect. The first temperature of a sensor must be near the others', too; one that says
- * the same twice before and after a reset is believed, and the sensor stays doubtful.
+ * the same twice before a reset and after each of two is believed, and the sensor stays doubtful.
+ * (After one it may have lost its state again: supplies that dip once do so twice.)
  *
  * Pressures. One below zero is left out, and a second in a row makes the sensor a suspect. A large
  * step of one sensor alone is left out as well, for rubber lets its neighbours feel any press; when
@@ -18,7 +19,8 @@
  *
  * A suspect is left out until it has been reset and its PROM read again. Then its temperature and
  * its pressure count as its first; its zero still holds, since it is the same sensor, but for one
- * taken shortly before (condition.h).
+ * taken shortly before (condition.h). The same goes for one whose pressure has stepped alone, as
+ * when it was reset for another's sake, or that has when it returns.
  *
  * A sensor whose PROM has a wrong CRC is used, for a genuine part is known that has one, and is
  * doubtful. It must have read like the others at two temperatures in a row before.
@@ -69,12 +71,14 @@ struct readings {
   uint32_t doubtful;    /* bitmap: used, and to be flagged */
   uint32_t has_last;    /* bitmap: last_Pa_q10 holds a reading */
   uint32_t counted;     /* bitmap: and was in the last frame */
+  uint32_t awaited;     /* bitmap: last_Pa_q10 is of before a reset */
   uint32_t last_sum;    /* of the pressures of the last frame, modulo 2^32 */
   uint32_t was_low;     /* bitmap: the last pressure was below zero */
   uint32_t alone;       /* bitmap of one sensor: its last pressure stepped alone, ... */
   int32_t alone_to_Pa_q10; /* ... from last_Pa_q10 to here */
   uint32_t suspects;       /* bitmap: want a reset */
-  uint32_t pardoned;       /* bitmap: had one for that reason */
+  uint32_t reset_once;     /* bitmap: had one for that reason */
+  uint32_t pardoned;       /* bitmap: and another one */
   uint32_t left_out;       /* since start: pressures below zero or that stepped alone */
 };
 

@@ -99,12 +99,15 @@ static bool settle(struct readings *readings, uint8_t k, int16_t now_cC,
 }
 
 static void forget(struct readings *readings, uint32_t sensors) {
-  readings->restored |= readings->suspects & sensors;
-  readings->pardoned = (readings->pardoned & ~sensors) | (readings->suspects & sensors);
+  const uint32_t reset = readings->suspects & sensors;
+  readings->restored |= reset;
+  readings->pardoned = (readings->pardoned & ~sensors) | (readings->reset_once & reset);
+  readings->reset_once = (readings->reset_once & ~sensors) | reset;
   readings->has_thermal &= ~sensors;
   readings->doubted &= ~sensors;
   readings->strange &= ~sensors;
   readings->was_near &= ~sensors;
+  readings->awaited |= readings->has_last & sensors;
   readings->has_last &= ~sensors;
   readings->counted &= ~sensors;
   readings->was_low &= ~sensors;

@@ -184,7 +184,7 @@ void Storm::add_fault(const Target &target, std::uint64_t from_us) {
   }
   if (takes_power(fault.kind)) {
     loses_power_ = true;
-    world_.keep_off(fault.from_us, fault.to_us + STARTS_WITHIN_us);
+    power_lost_us_ = fault.from_us;
   }
 }
 
@@ -220,6 +220,9 @@ void Storm::begin_bout() {
     }
     kind_ = target.kind;
     add_fault(target, later_us);
+  }
+  if (loses_power_) { // a start may be held up by whatever else goes wrong, as by a suspend
+    world_.keep_off(power_lost_us_, ends_us_ + STARTS_WITHIN_us);
   }
   kind_ = several ? "several" : kind_;
   judge_.set_scene(scene_);

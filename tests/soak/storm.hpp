@@ -64,7 +64,7 @@ private:
   std::string kind_, scene_;
   bool in_bout_ = false, recovers_ = true;
   bool loses_power_ = false;
-  std::uint64_t begins_us_ = 0, ends_us_ = 0, next_us_ = 2000000;
+  std::uint64_t begins_us_ = 0, power_lost_us_ = 0, ends_us_ = 0, next_us_ = 2000000;
   std::uint64_t commands_until_us_ = 0, garbage_until_us_ = 0, store_until_us_ = 0;
   std::uint64_t unasked_starts_ = 0;
 };

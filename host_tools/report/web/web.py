@@ -13,12 +13,13 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+import cost  # noqa: E402
 import in_browser  # noqa: E402
 import parity  # noqa: E402
 from fingertip.files import run_tool  # noqa: E402
 from reporting import report_of_parts  # noqa: E402
 
-PARTS = (in_browser, parity)
+PARTS = (in_browser, parity, cost)
 
 
 def main(argv):

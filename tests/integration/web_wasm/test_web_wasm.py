@@ -182,6 +182,18 @@ class Simulated(WebWasm):
 
 
 class Judges(WebWasm):
+    def test_a_simulated_pad_is_calibrated(self):
+        found = json.loads(must(OPTIONS.node, HERE / "calibrate.mjs", self.web / "simulated.wasm", self.web / "objects.bin",
+                                self.web / "judges.wasm", self.commands("raw", "stream raw", "info"), 300))
+        self.assertIn("good", found["text"])
+        # The twin draws the same pad.
+        head = self.scenario("taps", "--seconds", "6", "--effects", "gain=10").read_text()
+        errors = re.search("# gain_errors_percent: (.*)", head).group(1).split()
+        true = [1 + float(error) / 100 for error in errors]
+        mean = sum(true) / len(true)
+        for gain, truth in zip(found["gain"], true, strict=True):
+            self.assertAlmostEqual(gain, truth / mean, delta=0.04)
+
     def test_gains_are_the_tools(self):
         capture = self.captured(self.scenario("placements", "--effects", "gain", "--seconds", "100"))
         found = self.judged("gains", capture, "3")

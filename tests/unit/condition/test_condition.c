@@ -857,6 +857,29 @@ static void test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew(void) {
   }
 }
 
+/* Wrong zeros may make a contact, so the wait has an end. */
+static void test_a_zero_taken_in_a_long_contact_is_in_doubt_until_it_ends(void) {
+  begin_calm(4854);
+  press(20000 * Pa);
+  run_s(0.5f);
+  frame.renewed = 1u << 8;
+  run(1);
+  frame.renewed = 0;
+  run_s(9.5f);
+  TEST_ASSERT_EQUAL_HEX32(ALL, conditioned.usable);
+  TEST_ASSERT_TRUE(conditioned.contact);
+  watch_s(5, 0, 0);
+  TEST_ASSERT_TRUE(conditioned.contact);
+  TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
+  press(0);
+  run(2 + CONDITION_TARE_FRAMES);
+  TEST_ASSERT_EQUAL_INT32(AMBIENT, condition.zero_Pa_q10[8]);
+  press(20000 * Pa);
+  run_s(0.5f);
+  TEST_ASSERT_TRUE(conditioned.tared);
+  TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+}
+
 /* A zero taken under a press would be off by it. */
 static void test_one_sensor_is_not_tared_in_a_contact(void) {
   begin_calm(4854);
@@ -915,5 +938,6 @@ int main(void) {
   RUN_TEST(test_another_sensor_is_tared_anew);
   RUN_TEST(test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew);
   RUN_TEST(test_one_sensor_is_not_tared_in_a_contact);
+  RUN_TEST(test_a_zero_taken_in_a_long_contact_is_in_doubt_until_it_ends);
   return UNITY_END();
 }

@@ -109,8 +109,8 @@ static uint32_t course(void) {
 }
 
 static void test_frames_are_conditioned_the_same_to_the_bit(void) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0xEDF30B2B, 0x432BF0AF, 0x6E6FF247, 0xBFEBE52E,
-                                                 0xE8C3DB34, 0x01BEAFE0, 0x964E4899, 0x85405075};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x7C571AB6, 0x50145F26, 0xCAD42740, 0xC33BC3B5,
+                                                 0xDEEEFC84, 0x91DA9051, 0x964E4899, 0x8716D3E7};
   uint32_t found[GOLDEN_BLOCKS] = {0};
   draw_from(UINT64_C(0x7A65726F));
   for (int i = 0; i < COURSES; i++) {
