@@ -322,7 +322,7 @@ class Page:
     def give(self, selector, *paths):
         """Files to an <input type=file>."""
         found = self.call("Runtime.evaluate", expression=f"document.querySelector({json.dumps(selector)})")["result"]
-        self.call("DOM.setFileInputFiles", files=[str(path) for path in paths], objectId=found["objectId"])
+        self.call("DOM.setFileInputFiles", files=[str(pathlib.Path(path).resolve()) for path in paths], objectId=found["objectId"])
 
     def faint(self):
         """(text, contrast) of what is shown with less contrast to the colours that lie behind it than WCAG 2.1 asks for (1.4.3, level AA)."""

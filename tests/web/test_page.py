@@ -179,6 +179,26 @@ class Use(PageTest):
         self.assertEqual(page.run("fingertip.fingertips.map(each => each.lost)"), [0, 0])
 
 
+    def test_flash(self):
+        image = OPTIONS.build.parent / "pico_mux/fingertip-pico_mux.uf2"
+        device = self.bench.fake(self.browser, SERIALS[0], "rate=100", "board=pico_mux", "loader=1")
+        page = self.open()
+        driven.connected(page, 1)
+        page.click("button", "Flash")
+        torn = self.folder / "torn.uf2"
+        torn.write_bytes(image.read_bytes()[:-100])
+        for wrong, pattern in ((torn, "/torn.uf2/"), (OPTIONS.image.with_suffix(".uf2"), "/is for board pico_parallel, but this fingertip is a pico_mux/")):
+            page.give("dialog input[type=file]", wrong)
+            self.alert(page, pattern)
+        page.give("dialog input[type=file]", image)
+        page.click("button", "Reboot to the loader")
+        self.assertEqual(device.wait(PATIENCE_s), 0)
+        page.click("button", "Save onto the drive")
+        self.assertEqual(self.downloaded(".uf2").read_bytes(), image.read_bytes())
+        self.bench.fake(self.browser, SERIALS[0], "rate=100", "board=pico_mux")
+        driven.connected(page, 1)
+
+
 class Calibrate(PageTest):
     """As the tool's own test of the emulated image does, in the browser: host time does not matter, the image runs as fast as it can."""
 
@@ -206,6 +226,22 @@ class Calibrate(PageTest):
         self.assertEqual(len(found), len(true))
         self.assertLess(np.std(found / true), 0.015)
         self.assertGreater(np.std(true), 0.1)
+        self.bench.end(process)
+
+    def test_the_doctor_examines(self):
+        rest = self.folder / "rest.csv"
+        row = ",".join("0" for _ in files.TRUTH_COLUMNS) + ",0" * 15
+        rest.write_text("\n".join(["# fingertip-scenario 1", ",".join(["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(15))]),
+                                   f"0,{row}", f"3600,{row}"]) + "\n")
+        process = self.bench.emulated(self.browser, SERIALS[0], rest, "--pace", "fast")
+        page = self.open()
+        driven.connected(page, 1)
+        page.click("button", "Doctor")
+        page.click("button", "Examine")
+        page.until("/found something|All is well/.test(document.querySelector('dialog [role=status]').textContent)")
+        said = page.run("[...document.querySelectorAll('dialog .findings li')].map(each => each.textContent)")
+        self.assertGreater(len(said), 4)
+        self.assertEqual([each for each in said if each.startswith("wrong")], [], said)
         self.bench.end(process)
 
 
@@ -322,8 +358,8 @@ class Everyone(PageTest):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", required=True, type=pathlib.Path)
-    parser.add_argument("--image", required=True, type=pathlib.Path)
+    for name in ("build", "image"):
+        parser.add_argument(f"--{name}", required=True, type=lambda path: pathlib.Path(path).resolve())
     parser.add_argument("--node", required=True)
     _, rest = parser.parse_known_args(namespace=OPTIONS)
     OPTIONS.ports = OPTIONS.build / "tests/web/libweb_test_ports.so"
