@@ -9,8 +9,8 @@
  */
 import type { Fingertip } from './model/fingertip';
 import { App } from './steps/app';
-import { make } from './steps/dialog';
 import { fingertipControls, pageControls } from './steps/toolbar';
+import { mountView } from './view/view';
 
 interface Console {
   readonly fingertips: readonly Fingertip[];
@@ -23,18 +23,22 @@ declare global {
 }
 
 const app = new App();
-const place = make('main');
-const notices = make('div', { role: 'alert' });
-document.body.append(pageControls(app), notices, place);
-app.notice = (text) => notices.append(make('p', {}, text));
-const controls = new Map<Fingertip, HTMLElement>();
-app.bench.listen(() => {
-  for (const each of app.bench.fingertips) {
-    if (!controls.has(each)) {
-      controls.set(each, fingertipControls(app, each));
-    }
-  }
-  place.replaceChildren(...app.bench.fingertips.map((each) => controls.get(each) as HTMLElement));
+const view = mountView(document.body, app.bench, {
+  page: pageControls(app),
+  of: (fingertip) => fingertipControls(app, fingertip),
+  connect: () => void app.connect(),
+  simulate: () => app.simulate(),
 });
-globalThis.fingertip = { fingertips: app.bench.fingertips, pictures: 0, ready_ms: performance.now() };
+app.notice = (text, kind) => view.notice(text, kind);
+let ready_ms = 0;
+globalThis.fingertip = {
+  fingertips: app.bench.fingertips,
+  get pictures() {
+    return view.pictures;
+  },
+  get ready_ms() {
+    return ready_ms;
+  },
+};
+requestAnimationFrame(() => (ready_ms = performance.now()));
 app.start();

@@ -99,6 +99,18 @@ export class History {
     return this.oldest;
   }
 
+  get begin(): number {
+    return this.oldest;
+  }
+
+  slot(row: number): number {
+    return row % this.capacity;
+  }
+
+  get columns(): ContactColumns {
+    return this;
+  }
+
   /** One after the newest row. */
   get end(): number {
     return this.next;

@@ -34,7 +34,7 @@ export function resultText(result: number): string {
     case Result.OUT_OF_RANGE:
       return 'the value is out of range for this firmware';
     case Result.NOT_NOW:
-      return 'not possible now';
+      return 'not possible now; try again in a moment';
     default:
       return `result ${result}`;
   }

@@ -1,8 +1,9 @@
 /** The last minutes in as many intervals as a plot has room for: of each the lowest and the highest
  * value, so that no peak is lost. Only new frames are read from one drawing to the next; moving back
  * or another interval reads the span anew. */
-import { FLAG, WARNING_BITS } from './flags';
-import type { ShownHistory } from './shown';
+import { Flag } from '../line/packets';
+import { WARNING_FLAGS } from '../model/flags';
+import type { History } from '../model/history';
 
 export type ColumnName = 'force_N' | 'x_mm' | 'y_mm' | 'slip_mm' | 'qx_N' | 'qy_N';
 
@@ -16,12 +17,12 @@ interface Column {
 }
 
 export const COLUMNS: readonly Column[] = [
-  { name: 'force_N', sd: 'force_sd_N', valid: FLAG.FIT_VALID, sdValid: FLAG.UNCERTAINTY_VALID },
-  { name: 'x_mm', sd: 'location_sd_mm', valid: FLAG.FIT_VALID, sdValid: FLAG.UNCERTAINTY_VALID },
-  { name: 'y_mm', sd: 'location_sd_mm', valid: FLAG.FIT_VALID, sdValid: FLAG.UNCERTAINTY_VALID },
-  { name: 'slip_mm', sd: null, valid: FLAG.SLIP_VALID, sdValid: 0 },
-  { name: 'qx_N', sd: 'q_sd_N', valid: FLAG.TANGENTIAL_VALID, sdValid: FLAG.TANGENTIAL_VALID },
-  { name: 'qy_N', sd: 'q_sd_N', valid: FLAG.TANGENTIAL_VALID, sdValid: FLAG.TANGENTIAL_VALID },
+  { name: 'force_N', sd: 'force_sd_N', valid: Flag.FIT_VALID, sdValid: Flag.UNCERTAINTY_VALID },
+  { name: 'x_mm', sd: 'location_sd_mm', valid: Flag.FIT_VALID, sdValid: Flag.UNCERTAINTY_VALID },
+  { name: 'y_mm', sd: 'location_sd_mm', valid: Flag.FIT_VALID, sdValid: Flag.UNCERTAINTY_VALID },
+  { name: 'slip_mm', sd: null, valid: Flag.SLIP_VALID, sdValid: 0 },
+  { name: 'qx_N', sd: 'q_sd_N', valid: Flag.TANGENTIAL_VALID, sdValid: Flag.TANGENTIAL_VALID },
+  { name: 'qy_N', sd: 'q_sd_N', valid: Flag.TANGENTIAL_VALID, sdValid: Flag.TANGENTIAL_VALID },
 ];
 
 export enum Trust {
@@ -80,25 +81,25 @@ export class Buckets {
   /** Reads what is new of from_s..to_s; returns the intervals that cover it: first to last. At most
    * size of them. */
   read(
-    history: ShownHistory,
+    history: History,
     width_s: number,
     from_s: number,
     to_s: number,
   ): { first: number; last: number } {
     const last = Math.floor(to_s / width_s);
     const first = Math.max(Math.floor(from_s / width_s), last - this.size + 1);
-    const moved = width_s !== this.width_s || first < this.from || this.next < history.first;
+    const moved = width_s !== this.width_s || first < this.from || this.next < history.begin;
     if (moved) {
       this.number.fill(NOTHING);
       this.width_s = width_s;
       this.from = first;
       this.newest = NOTHING;
-      this.next = rowAt(history, first * width_s);
+      this.next = history.rowAt(first * width_s);
     }
     /* Rows beyond `last` stay unread, else they would push out what is shown. */
-    const end = rowAt(history, (last + 1) * width_s);
+    const end = history.rowAt((last + 1) * width_s);
     for (; this.next < end; this.next++) {
-      this.take(history, this.next % history.capacity);
+      this.take(history, this.next);
     }
     this.from = Math.max(this.from, this.newest - this.size + 1);
     return { first, last };
@@ -110,7 +111,8 @@ export class Buckets {
     return b >= 0 && this.number[slot] === b ? slot : NOTHING;
   }
 
-  private take(history: ShownHistory, row: number): void {
+  private take(history: History, number: number): void {
+    const row = history.slot(number);
     const b = Math.floor((history.t_s[row] ?? 0) / this.width_s);
     const slot = b % this.size;
     const flags = history.flags[row] ?? 0;
@@ -124,16 +126,16 @@ export class Buckets {
     }
     this.flags[slot] = (this.flags[slot] ?? 0) | flags;
     this.frames[slot] = (this.frames[slot] ?? 0) + 1;
-    this.lost[slot] = (this.lost[slot] ?? 0) + (history.lost[row] ?? 0);
-    const trust = flags & WARNING_BITS ? Trust.doubtful : Trust.good;
+    this.lost[slot] = (this.lost[slot] ?? 0) + lostBefore(history, number);
+    const trust = flags & WARNING_FLAGS ? Trust.doubtful : Trust.good;
     for (const column of COLUMNS) {
       const track = this.tracks.get(column.name);
       if (!track || (flags & column.valid) !== column.valid || trust < (track.trust[slot] ?? 0)) {
         continue;
       }
-      const value = history[column.name][row] ?? 0;
+      const value = history.columns[column.name][row] ?? 0;
       const hasSd = column.sd !== null && (flags & column.sdValid) !== 0;
-      const sd = hasSd && column.sd ? (history[column.sd][row] ?? NaN) : NaN;
+      const sd = hasSd && column.sd ? (history.columns[column.sd][row] ?? NaN) : NaN;
       if (trust > (track.trust[slot] ?? 0)) {
         track.trust[slot] = trust;
         track.low[slot] = track.high[slot] = value;
@@ -155,19 +157,18 @@ export class Buckets {
   }
 }
 
-/** The first row at or after a time. */
-export function rowAt(history: ShownHistory, t_s: number): number {
-  let low = history.first;
-  let high = history.end;
-  while (low < high) {
-    const middle = Math.floor((low + high) / 2);
-    if ((history.t_s[middle % history.capacity] ?? 0) < t_s) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
+/** A jump of more is a fingertip that started anew. */
+const MOST_LOST = 1 << 24;
+
+/** Frames that are missing right before a row. */
+export function lostBefore(history: History, row: number): number {
+  if (row <= history.begin) {
+    return 0;
   }
-  return low;
+  const frame = history.frame[history.slot(row)] ?? 0;
+  const before = history.frame[history.slot(row - 1)] ?? 0;
+  const lost = (frame - before - 1) >>> 0;
+  return lost < MOST_LOST ? lost : 0;
 }
 
 /** An interval of 1, 2 or 5 times a power of ten for a span on so many pixels, so that it seldom

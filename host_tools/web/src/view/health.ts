@@ -1,6 +1,6 @@
 /** Line, bus, sensors, temperatures, losses, firmware: what is behind the numbers. */
 import { element, write } from './elements';
-import type { FactGroup } from './shown';
+import type { FactGroup } from './health_facts';
 
 export class HealthPanel {
   readonly element: HTMLElement;

@@ -1,6 +1,7 @@
 /** The newest contact in numbers, with units and how far they may be off. */
+import { Flag } from '../line/packets';
+import { WARNING_FLAGS, warningsOf } from '../model/flags';
 import { element, write } from './elements';
-import { FLAG, WARNING_BITS, warningsOf, wordsOf } from './flags';
 import type { ShownContact } from './shown';
 
 interface Number_ {
@@ -15,23 +16,23 @@ interface Number_ {
 }
 
 const sdOf = (of: (contact: ShownContact) => number, digits: number) => (contact: ShownContact) =>
-  contact.flags & FLAG.UNCERTAINTY_VALID ? `± ${fixed(of(contact), digits)}` : '';
+  contact.flags & Flag.UNCERTAINTY_VALID ? `± ${fixed(of(contact), digits)}` : '';
 
 const NUMBERS: readonly Number_[] = [
   {
     name: 'force',
     title: 'Force',
     unit: 'N',
-    valid: FLAG.FIT_VALID,
+    valid: Flag.FIT_VALID,
     value: (contact) =>
-      `${contact.flags & FLAG.FORCE_LOWER_BOUND ? '≥ ' : ''}${fixed(contact.force_N, 2)}`,
+      `${contact.flags & Flag.FORCE_LOWER_BOUND ? '≥ ' : ''}${fixed(contact.force_N, 2)}`,
     sd: sdOf((contact) => contact.force_sd_N, 2),
   },
   {
     name: 'place',
     title: 'Place x, y',
     unit: 'mm',
-    valid: FLAG.FIT_VALID,
+    valid: Flag.FIT_VALID,
     value: (contact) => `${fixed(contact.x_mm, 1)}, ${fixed(contact.y_mm, 1)}`,
     sd: sdOf((contact) => contact.location_sd_mm, 2),
   },
@@ -39,21 +40,21 @@ const NUMBERS: readonly Number_[] = [
     name: 'slip',
     title: 'Slip',
     unit: 'mm',
-    valid: FLAG.SLIP_VALID,
+    valid: Flag.SLIP_VALID,
     value: (contact) => fixed(contact.slip_mm, 3),
   },
   {
     name: 'peak',
     title: 'Peak, width σ',
     unit: 'kPa, mm',
-    valid: FLAG.FIT_VALID,
+    valid: Flag.FIT_VALID,
     value: (contact) => `${fixed(contact.p0_Pa / 1000, 1)}, ${fixed(contact.sigma_mm, 1)}`,
   },
   {
     name: 'pull',
     title: 'Pull x, y',
     unit: 'N',
-    valid: FLAG.TANGENTIAL_VALID,
+    valid: Flag.TANGENTIAL_VALID,
     value: (contact) => `${fixed(contact.qx_N, 2)}, ${fixed(contact.qy_N, 2)}`,
     sd: (contact) => `± ${fixed(contact.q_sd_N, 2)}`,
     tangential: true,
@@ -96,10 +97,10 @@ export class Numbers {
     }
     const lamps = element('ul', { class: 'lamps', 'aria-label': 'State' });
     for (const [name, bit, level] of [
-      ['contact', FLAG.CONTACT, 'accent'],
-      ['slip', FLAG.SLIP, 'bad'],
-      ['sliding', FLAG.SLIDING, 'bad'],
-      ['moving', FLAG.MOVING, 'warning'],
+      ['contact', Flag.CONTACT, 'accent'],
+      ['slip', Flag.SLIP, 'bad'],
+      ['sliding', Flag.SLIDING, 'bad'],
+      ['moving', Flag.MOVING, 'warning'],
     ] as const) {
       const lamp = element('li', { class: `lamp ${level}` }, name);
       this.lamps.push({ bit, name, lamp });
@@ -111,7 +112,7 @@ export class Numbers {
   /** contact: null where nothing is known. */
   show(contact: ShownContact | null, tangential: boolean, limit_mm: number): void {
     const flags = contact?.flags ?? 0;
-    const doubtful = (flags & WARNING_BITS) !== 0;
+    const doubtful = (flags & WARNING_FLAGS) !== 0;
     for (const number of NUMBERS) {
       const row = this.rows.get(number.name);
       if (!row) {
@@ -127,16 +128,20 @@ export class Numbers {
     for (const { bit, name, lamp } of this.lamps) {
       const on = (flags & bit) !== 0;
       lamp.classList.toggle('on', on);
-      lamp.hidden = !tangential && (bit === FLAG.SLIDING || bit === FLAG.MOVING);
+      lamp.hidden = !tangential && (bit === Flag.SLIDING || bit === Flag.MOVING);
       const label = on ? name : `no ${name}`;
       if (lamp.getAttribute('aria-label') !== label) {
         lamp.setAttribute('aria-label', label);
       }
     }
     const words =
-      contact && !(flags & FLAG.TARED)
+      contact && !(flags & Flag.TARED)
         ? ['no zero yet: taring']
-        : warningsOf(flags).map((warning) => wordsOf(warning, limit_mm));
+        : warningsOf(flags).map(({ bit, meaning }) =>
+            bit === Flag.UNCERTAIN && limit_mm > 0
+              ? `the place may be off by more than ${limit_mm.toFixed(2)} mm`
+              : meaning,
+          );
     if (words.join() !== this.warned) {
       this.warned = words.join();
       this.warnings.replaceChildren(...words.map((text) => element('li', {}, text)));

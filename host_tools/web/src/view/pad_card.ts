@@ -1,14 +1,14 @@
 /** One fingertip's pad with its name, its state and its force; several stand side by side. */
+import { Flag } from '../line/packets';
+import { WARNING_FLAGS } from '../model/flags';
 import { button, element, write } from './elements';
-import { FLAG, WARNING_BITS } from './flags';
 import { HandPanel } from './hand_panel';
-import { rowAt } from './buckets';
 import { contactAt, trailAt } from './moment';
 import { fixed } from './numbers';
 import { sceneOf } from './pad_scene';
 import { PadView } from './pad_view';
 import type { Palette } from './palette';
-import type { ShownContact, ShownFingertip } from './shown';
+import type { Shown, ShownContact } from './shown';
 
 export class PadCard {
   readonly element: HTMLElement;
@@ -27,7 +27,7 @@ export class PadCard {
   private readonly empty = element('p', { class: 'empty' }, 'No answer yet.');
 
   constructor(
-    private shown: ShownFingertip,
+    private readonly shown: Shown,
     select: () => void,
   ) {
     const dot = element('span', { class: 'dot', 'aria-hidden': 'true' });
@@ -54,34 +54,41 @@ export class PadCard {
     this.nameButton.setAttribute('aria-pressed', String(selected));
   }
 
+  dispose(): void {
+    this.view?.dispose();
+    this.element.remove();
+  }
+
   repaint(): void {
     this.view?.repaint();
   }
 
   /** behind_s: before end_s, of a pause; null: live. True if something was drawn. */
   draw(
-    shown: ShownFingertip,
     end_s: number,
     behind_s: number | null,
     now_ms: number,
     palette: Palette,
   ): boolean {
-    this.shown = shown;
+    const { shown } = this;
     this.prepare();
     this.hand?.apply(now_ms);
     const { history, hand } = shown;
+    if (!history) {
+      return false;
+    }
     const truth = hand?.truth;
-    const seen = `${history.end} ${behind_s} ${shown.current} ${truth?.contact} ${truth?.x_mm} ${truth?.y_mm}`;
+    const current = behind_s !== null || shown.isCurrent(performance.now());
+    const seen = `${history.end} ${behind_s} ${current} ${truth?.contact} ${truth?.x_mm} ${truth?.y_mm}`;
     if (seen !== this.seen && shown.layout && this.view) {
       this.seen = seen;
       const live = behind_s === null;
       const row = live
         ? history.end - 1
-        : Math.min(rowAt(history, end_s - behind_s), history.end - 1);
-      const kept = row >= history.first;
+        : Math.min(history.rowAt(end_s - behind_s), history.end - 1);
+      const kept = row >= history.begin;
       this.contact = live ? shown.contact : kept ? contactAt(history, row) : null;
-      const readings = live ? shown.readings : kept ? (history.readingsAt?.(row) ?? null) : null;
-      const current = !live || shown.current;
+      const readings = live ? shown.readings : kept ? shown.readingsAt(row) : null;
       if (!current) {
         this.contact = null;
       }
@@ -100,13 +107,13 @@ export class PadCard {
   tell(): void {
     const { shown, contact } = this;
     write(this.name, shown.name);
-    write(this.state, shown.recording ? `${shown.state.words}, records` : shown.state.words);
-    this.state.className = `state ${shown.state.level}`;
-    const fitted = contact !== null && (contact.flags & FLAG.FIT_VALID) !== 0;
-    const doubt = fitted && contact.flags & WARNING_BITS ? ' ?' : '';
+    const { words, level } = shown.state(performance.now());
+    write(this.state, words);
+    this.state.className = `state ${level}`;
+    const fitted = contact !== null && (contact.flags & Flag.FIT_VALID) !== 0;
+    const doubt = fitted && contact.flags & WARNING_FLAGS ? ' ?' : '';
     write(this.force, fitted ? `${fixed(contact.force_N, 2)} N${doubt}` : '');
     this.force.classList.toggle('doubtful', doubt !== '');
-    this.element.classList.toggle('stale', !shown.current);
   }
 
   private prepare(): void {
@@ -115,7 +122,7 @@ export class PadCard {
       return;
     }
     this.layoutSeen = layout;
-    this.view?.element.remove();
+    this.view?.dispose();
     const keys = hand ? 'Arrow keys turn it, Home looks from above. Press on it with the pointer.' : 'Arrow keys turn it, Home looks from above.';
     const view = new PadView(layout, `Pad of ${this.shown.name}. ${keys}`);
     this.view = view;

@@ -225,6 +225,10 @@ export class PadGl {
     return this.gl.isContextLost();
   }
 
+  dispose(): void {
+    this.gl.getExtension('WEBGL_lose_context')?.loseContext();
+  }
+
   draw(scene: Scene, camera: Camera, palette: Palette): void {
     const gl = this.gl;
     const rubber = palette.of('rubber');

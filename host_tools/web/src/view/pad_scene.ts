@@ -1,5 +1,6 @@
 /** What of a fingertip the pictures of its pad show, in mm and N, apart from how they draw it. */
-import { FLAG, WARNING_BITS } from './flags';
+import { Flag } from '../line/packets';
+import { WARNING_FLAGS } from '../model/flags';
 import type { ShownContact, ShownLayout, ShownReadings } from './shown';
 
 /** Rim of the pad beyond the outermost sensors. */
@@ -68,7 +69,7 @@ export function sceneOf(
   const count = layout.x_mm.length;
   const has = (bits: number | undefined, k: number) => ((bits ?? 0) >>> k) % 2 === 1;
   const known = current ? readings : null;
-  const tared = contact === null || (contact.flags & FLAG.TARED) !== 0;
+  const tared = contact === null || (contact.flags & Flag.TARED) !== 0;
   const sensors = Array.from({ length: count }, (_, k) => k);
   const flags = current && contact ? contact.flags : 0;
   return {
@@ -80,25 +81,25 @@ export function sceneOf(
     broken: sensors.map((k) => known !== null && !has(known.valid, k) && !has(known.saturated, k)),
     saturated: sensors.map((k) => has(known?.saturated, k)),
     doubtful: sensors.map((k) => has(known?.doubtful, k)),
-    fit: contact && flags & FLAG.FIT_VALID ? fitOf(contact) : null,
+    fit: contact && flags & Flag.FIT_VALID ? fitOf(contact) : null,
     trail,
     truth,
     alarm:
-      flags & FLAG.SLIDING ? 'slides' : flags & FLAG.SLIP ? 'slips' : flags & FLAG.MOVING ? 'moves' : null,
+      flags & Flag.SLIDING ? 'slides' : flags & Flag.SLIP ? 'slips' : flags & Flag.MOVING ? 'moves' : null,
   };
 }
 
 function fitOf(contact: ShownContact): Scene['fit'] {
-  const sure = (contact.flags & FLAG.UNCERTAINTY_VALID) !== 0;
+  const sure = (contact.flags & Flag.UNCERTAINTY_VALID) !== 0;
   const sd_N = sure ? contact.force_sd_N : 0;
   return {
     contact,
-    doubtful: (contact.flags & WARNING_BITS) !== 0,
+    doubtful: (contact.flags & WARNING_FLAGS) !== 0,
     sd_mm: sure ? contact.location_sd_mm : 0,
     force_mm: forceLength(contact.force_N),
     force_low_mm: forceLength(contact.force_N - sd_N),
     force_high_mm: forceLength(contact.force_N + sd_N),
-    arrow: contact.flags & FLAG.TANGENTIAL_VALID && contact.force_N > 0 ? arrowOf(contact) : null,
+    arrow: contact.flags & Flag.TANGENTIAL_VALID && contact.force_N > 0 ? arrowOf(contact) : null,
   };
 }
 
@@ -110,7 +111,7 @@ function arrowOf(contact: ShownContact): Arrow {
     along_y: directed ? contact.qy_N / size_N : 0,
     length_mm: directed ? ARROW_mm * Math.min(contact.tangential_ratio, 1.5) : 0,
     sd_mm: Math.min((ARROW_mm * contact.q_sd_N) / contact.force_N, ARROW_mm),
-    slides: (contact.flags & FLAG.SLIDING) !== 0,
+    slides: (contact.flags & Flag.SLIDING) !== 0,
   };
 }
 

@@ -100,6 +100,12 @@ export class PadView {
     }
   }
 
+  /** Gives back what the graphics processor keeps: a browser grants few pictures at a time. */
+  dispose(): void {
+    this.gl?.dispose();
+    this.element.remove();
+  }
+
   show(scene: Scene): void {
     this.scene = scene;
     this.changed = true;

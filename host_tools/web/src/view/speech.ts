@@ -1,5 +1,6 @@
 /** What a reader of the screen is told, at a rate that one can listen to. */
-import { FLAG, WARNING_BITS, warningsOf } from './flags';
+import { Flag } from '../line/packets';
+import { WARNING_FLAGS, warningsOf } from '../model/flags';
 import type { ShownContact } from './shown';
 
 /** Between two sentences. */
@@ -26,10 +27,10 @@ export class Speech {
     }
     const flags = contact?.flags ?? 0;
     const is: Told = {
-      contact: (flags & FLAG.CONTACT) !== 0,
-      slips: (flags & (FLAG.SLIP | FLAG.SLIDING)) !== 0,
-      warnings: flags & WARNING_BITS,
-      force_N: flags & FLAG.FIT_VALID ? (contact?.force_N ?? 0) : 0,
+      contact: (flags & Flag.CONTACT) !== 0,
+      slips: (flags & (Flag.SLIP | Flag.SLIDING)) !== 0,
+      warnings: flags & WARNING_FLAGS,
+      force_N: flags & Flag.FIT_VALID ? (contact?.force_N ?? 0) : 0,
       state,
     };
     const was = this.told;
@@ -39,7 +40,7 @@ export class Speech {
     }
     const forceNoted =
       Math.abs(is.force_N - was.force_N) > NOTED_PART * Math.max(is.force_N, was.force_N, 0.2);
-    if (is.contact && (!was.contact || forceNoted) && contact && flags & FLAG.FIT_VALID) {
+    if (is.contact && (!was.contact || forceNoted) && contact && flags & Flag.FIT_VALID) {
       parts.push(
         `${was.contact ? '' : 'contact, '}${is.force_N.toFixed(1)} newtons at ` +
           `${contact.x_mm.toFixed(0)}, ${contact.y_mm.toFixed(0)} millimetres`,
@@ -52,7 +53,7 @@ export class Speech {
     }
     const fresh = warningsOf(is.warnings & ~was.warnings);
     if (fresh.length > 0) {
-      parts.push(`doubtful: ${fresh.map((warning) => warning.words).join(', ')}`);
+      parts.push(`doubtful: ${fresh.map((warning) => warning.meaning).join(', ')}`);
     } else if (was.warnings && !is.warnings && is.contact) {
       parts.push('no warnings');
     }

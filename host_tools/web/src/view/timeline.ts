@@ -1,7 +1,7 @@
 /** Pause, and a walk through the last minutes. */
 import { button, element, write } from './elements';
 
-const WINDOWS_s = [5, 20, 60, 300];
+const WINDOWS_s = [5, 20, 60, 180];
 const STEP_s = 0.1;
 const FAR_s = 5;
 

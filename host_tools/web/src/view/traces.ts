@@ -1,10 +1,12 @@
 /** Force, place, load and slip over time, and which flags were set: one axis of time for all. */
+import { Flag } from '../line/packets';
+import { FLAGS } from '../model/flags';
 import uPlot from 'uplot';
 import { Buckets, intervalOf, type ColumnName } from './buckets';
 import { chartOf, roundAbove, spansOf, type Chart } from './curves';
-import { FLAG, WARNINGS } from './flags';
 import { cssOf, type Palette } from './palette';
-import type { ShownFingertip } from './shown';
+import type { History } from '../model/history';
+import type { Shown } from './shown';
 
 /** Room for the names of values; the flags keep it too, so that times stand below one another. */
 const AXIS_px = 52;
@@ -84,7 +86,7 @@ export class Traces {
   }
 
   /** zero_s: the time that the axis calls 0, as "now" or the end of the recording. */
-  draw(fingertip: ShownFingertip, span: Span_s): void {
+  draw(fingertip: Shown, history: History, span: Span_s): void {
     if (fingertip.tangential !== this.tangential) {
       this.tangential = fingertip.tangential;
       this.build();
@@ -93,7 +95,6 @@ export class Traces {
     if (!this.palette || inner < 40 || this.drawn.length === 0) {
       return;
     }
-    const { history } = fingertip;
     const least_s = fingertip.frames_per_s > 0 ? 1.5 / fingertip.frames_per_s : 0;
     const width_s = Math.max(
       intervalOf(span.to_s - span.from_s, Math.min(inner / 1.5, MOST_INTERVALS)),
@@ -119,7 +120,7 @@ export class Traces {
   }
 
   /** Axes that seldom jump: round limits, which shrink only when far too wide. */
-  private scale(drawn: Drawn, chart: Chart, fingertip: ShownFingertip): void {
+  private scale(drawn: Drawn, chart: Chart, fingertip: Shown): void {
     const { plot } = drawn;
     const reaches = plot.columns.map((name) => chart.reach.get(name) ?? null);
     const most = Math.max(
@@ -295,11 +296,11 @@ export class Traces {
     }
     const join_s = Math.max(2 * this.buckets.width_s, break_s / 8);
     const rows = [
-      { name: 'contact', bit: FLAG.CONTACT as number | 'lost', colour: 'accent', always: true },
-      { name: 'slip', bit: FLAG.SLIP, colour: 'bad', always: true },
-      { name: 'sliding', bit: FLAG.SLIDING, colour: 'bad', always: false },
-      { name: 'moving', bit: FLAG.MOVING, colour: 'good', always: false },
-      ...WARNINGS.map(({ bit, words }) => ({ name: words, bit, colour: 'warning', always: false })),
+      { name: 'contact', bit: Flag.CONTACT as number | 'lost', colour: 'accent', always: true },
+      { name: 'slip', bit: Flag.SLIP, colour: 'bad', always: true },
+      { name: 'sliding', bit: Flag.SLIDING, colour: 'bad', always: false },
+      { name: 'moving', bit: Flag.MOVING, colour: 'good', always: false },
+      ...FLAGS.filter(({ warning }) => warning).map(({ bit, meaning }) => ({ name: meaning, bit, colour: 'warning', always: false })),
       { name: 'lost frames', bit: 'lost' as const, colour: 'bad', always: false },
     ]
       .map((row) => ({ ...row, spans: spansOf(this.buckets, row.bit, first, last, join_s) }))

@@ -1,44 +1,49 @@
-/** The page: who is there, their pads, numbers, traces and health; what can be done; the time that is
- * looked at. It reads the fingertips when it draws, and changes nothing of them by itself. */
+/** The page: who is there, their pads, numbers, traces and health, and the time that is looked at. It
+ * reads the fingertips when it draws, and changes nothing of them by itself. */
 import 'uplot/dist/uPlot.min.css';
 import '../styles/tokens.css';
 import '../styles/page.css';
 import '../styles/steps.css';
+import type { Bench } from '../model/bench';
+import type { Fingertip } from '../model/fingertip';
+import type { History } from '../model/history';
 import { button, element, write } from './elements';
 import { HealthPanel } from './health';
+import { factsOf } from './health_facts';
 import { Numbers } from './numbers';
 import { PadCard } from './pad_card';
-import type { ShownFingertip } from './shown';
+import { Shown } from './shown';
 import { Speech } from './speech';
 import { onPalette, palette, restoreTheme, setTheme, theme, type Theme } from './theme';
 import { Timeline } from './timeline';
 import { Traces } from './traces';
 
-/** What people ask for; the page leaves it to others. key: that of a fingertip. */
-export interface Actions {
+/** What others make and the view places. */
+export interface Controls {
+  /** Connect, replay and what else concerns no single fingertip. */
+  readonly page: HTMLElement;
+  /** Tare, record and so on; asked for once for each. */
+  of(fingertip: Fingertip): HTMLElement;
   connect(): void;
   simulate(): void;
-  replay(): void;
-  tare(key: string): void;
-  set(key: string): void;
-  calibrate(key: string): void;
-  record(key: string): void;
-  stopRecording(key: string): void;
-  doctor(key: string): void;
-  flash(key: string): void;
-  disconnect(key: string): void;
+}
+
+export function mountView(root: HTMLElement, bench: Bench, controls: Controls): View {
+  return new View(root, bench, controls);
 }
 
 const TRACES_INTERVAL_ms = 33;
 const TEXT_INTERVAL_ms = 125;
 const HEALTH_INTERVAL_ms = 500;
 
-export class Page {
+export class View {
   /** Pictures drawn so far. */
   pictures = 0;
-  private fingertips: readonly ShownFingertip[] = [];
-  private selected: string | null = null;
-  private readonly cards = new Map<string, PadCard>();
+  private readonly shown = new Map<Fingertip, Shown>();
+  private readonly cards = new Map<Fingertip, PadCard>();
+  private readonly doings = new Map<Fingertip, HTMLElement>();
+  private selected: Fingertip | null = null;
+  private made = 0;
   private readonly numbers = new Numbers();
   private readonly traces = new Traces();
   private readonly health = new HealthPanel();
@@ -47,8 +52,7 @@ export class Page {
   private readonly pads = element('div', { class: 'pads' });
   private readonly handPlace = element('div', { class: 'hand-place' });
   private readonly heading = element('h2');
-  private readonly doings = element('div', { class: 'doings', role: 'group' });
-  private readonly recordButton: HTMLButtonElement;
+  private readonly doingsPlace = element('div', { class: 'doings', role: 'group' });
   private readonly live = element('p', { class: 'spoken', role: 'status', 'aria-live': 'polite' });
   private readonly notices = element('div', { class: 'notices', role: 'alert' });
   private readonly welcome: HTMLElement;
@@ -59,25 +63,14 @@ export class Page {
   private tracesDue = true;
   private tracedEnd = -1;
   /** Of each fingertip when the pause began. */
-  private readonly ends = new Map<string, number>();
+  private readonly ends = new Map<Fingertip, number>();
 
   constructor(
     private readonly root: HTMLElement,
-    private readonly actions: Actions,
+    private readonly bench: Bench,
+    private readonly controls: Controls,
   ) {
     restoreTheme();
-    this.recordButton = this.doing('Record', (key) =>
-      this.shownOf(key)?.recording ? this.actions.stopRecording(key) : this.actions.record(key),
-    );
-    this.doings.append(
-      this.doing('Tare', (key) => this.actions.tare(key)),
-      this.recordButton,
-      this.doing('Set', (key) => this.actions.set(key)),
-      this.doing('Calibrate', (key) => this.actions.calibrate(key)),
-      this.doing('Doctor', (key) => this.actions.doctor(key)),
-      this.doing('Flash', (key) => this.actions.flash(key)),
-      this.doing('Disconnect', (key) => this.actions.disconnect(key)),
-    );
     this.welcome = this.welcomeOf();
     this.work = element(
       'div',
@@ -86,7 +79,7 @@ export class Page {
       element(
         'section',
         { class: 'side', 'aria-label': 'Numbers' },
-        element('div', { class: 'who' }, this.heading, this.doings),
+        element('div', { class: 'who' }, this.heading, this.doingsPlace),
         this.numbers.element,
         this.handPlace,
       ),
@@ -110,46 +103,25 @@ export class Page {
     });
     this.timeline.onChange = () => this.timeChanged();
     this.root.addEventListener('keydown', (event) => this.key(event));
+    bench.listen(() => this.gather());
+    this.gather();
     requestAnimationFrame((now_ms) => this.draw(now_ms));
   }
 
-  get selectedKey(): string | null {
+  get chosen(): Fingertip | null {
     return this.selected;
   }
 
-  /** All that are there, in their order; called when one came or went, or became another object. */
-  show(fingertips: readonly ShownFingertip[]): void {
-    this.fingertips = fingertips;
-    for (const [key, card] of this.cards) {
-      if (!fingertips.some((shown) => shown.key === key)) {
-        card.element.remove();
-        this.cards.delete(key);
-        this.ends.delete(key);
-      }
-    }
-    for (const shown of fingertips) {
-      if (!this.cards.has(shown.key)) {
-        const card = new PadCard(shown, () => this.select(shown.key));
-        this.cards.set(shown.key, card);
-        this.pads.append(card.element);
-      }
-    }
-    this.pads.dataset['count'] = String(fingertips.length);
-    this.welcome.hidden = fingertips.length > 0;
-    this.work.hidden = fingertips.length === 0;
-    if (!fingertips.some((shown) => shown.key === this.selected)) {
-      this.select(fingertips[0]?.key ?? null);
-    }
-  }
-
-  select(key: string | null): void {
-    this.selected = key;
+  choose(fingertip: Fingertip | null): void {
+    this.selected = fingertip;
     for (const [of, card] of this.cards) {
-      card.selected = of === key;
+      card.selected = of === fingertip;
     }
-    this.tracesDue = true;
-    this.textAt_ms = this.healthAt_ms = 0;
+    const doings = fingertip && this.doings.get(fingertip);
+    this.doingsPlace.replaceChildren(...(doings ? [doings] : []));
     this.handPlace.replaceChildren();
+    this.tracesDue = true;
+    this.textAt_ms = this.healthAt_ms = -Infinity;
   }
 
   /** A sentence that stays until it is closed. */
@@ -159,12 +131,35 @@ export class Page {
     this.notices.append(told);
   }
 
-  private doing(label: string, act: (key: string) => void): HTMLButtonElement {
-    return button(label, () => this.selected !== null && act(this.selected));
-  }
-
-  private shownOf(key: string | null): ShownFingertip | null {
-    return this.fingertips.find((shown) => shown.key === key) ?? null;
+  private gather(): void {
+    const { fingertips } = this.bench;
+    for (const [fingertip, card] of this.cards) {
+      if (!fingertips.includes(fingertip)) {
+        card.dispose();
+        for (const map of [this.cards, this.shown, this.doings, this.ends]) {
+          map.delete(fingertip);
+        }
+      }
+    }
+    let came: Fingertip | null = null;
+    for (const fingertip of fingertips) {
+      if (!this.cards.has(fingertip)) {
+        const shown = new Shown(fingertip, this.made++);
+        const card = new PadCard(shown, () => this.choose(fingertip));
+        this.shown.set(fingertip, shown);
+        this.cards.set(fingertip, card);
+        this.doings.set(fingertip, this.controls.of(fingertip));
+        this.pads.append(card.element);
+        came = fingertip;
+      }
+    }
+    this.pads.dataset['count'] = String(fingertips.length);
+    this.welcome.hidden = fingertips.length > 0;
+    this.work.hidden = fingertips.length === 0;
+    const gone = this.selected === null || !fingertips.includes(this.selected);
+    if (came || gone) {
+      this.choose(came ?? fingertips[0] ?? null);
+    }
   }
 
   private header(): HTMLElement {
@@ -183,9 +178,7 @@ export class Page {
       element(
         'div',
         { class: 'top-actions' },
-        button('Connect', () => this.actions.connect()),
-        button('Simulate', () => this.actions.simulate()),
-        button('Replay a file', () => this.actions.replay()),
+        this.controls.page,
         themes,
       ),
     );
@@ -205,8 +198,8 @@ export class Page {
       element(
         'div',
         { class: 'begin' },
-        button('Connect a fingertip', () => this.actions.connect(), { class: 'main' }),
-        button('Try the simulated one', () => this.actions.simulate()),
+        button('Connect a fingertip', () => this.controls.connect(), { class: 'main' }),
+        button('Try the simulated one', () => this.controls.simulate()),
       ),
       element('p', { class: 'hint' }, 'Or drop a recording here. Nothing leaves this computer.'),
     );
@@ -218,9 +211,9 @@ export class Page {
       this.ends.clear();
       return;
     }
-    for (const shown of this.fingertips) {
-      if (!this.ends.has(shown.key)) {
-        this.ends.set(shown.key, newest_s(shown));
+    for (const [fingertip, { history }] of this.shown) {
+      if (!this.ends.has(fingertip)) {
+        this.ends.set(fingertip, newest_s(history));
       }
     }
   }
@@ -230,7 +223,7 @@ export class Page {
     const busy =
       target.closest('input, select, textarea, button, summary, dialog, a') !== null ||
       event.ctrlKey || event.metaKey || event.altKey;
-    if (busy || this.fingertips.length === 0) {
+    if (busy || this.shown.size === 0) {
       return;
     }
     if (event.key === ' ') {
@@ -250,30 +243,37 @@ export class Page {
     const { behind_s } = this.timeline;
     const colours = palette();
     let drawn = false;
-    for (const shown of this.fingertips) {
-      const end_s = this.ends.get(shown.key) ?? newest_s(shown);
-      drawn = (this.cards.get(shown.key)?.draw(shown, end_s, behind_s, now_ms, colours) ?? false) || drawn;
+    for (const [fingertip, card] of this.cards) {
+      const end_s = this.ends.get(fingertip) ?? newest_s(fingertip.history);
+      drawn = card.draw(end_s, behind_s, now_ms, colours) || drawn;
     }
-    const shown = this.shownOf(this.selected);
-    if (shown) {
-      drawn = this.drawSelected(shown, behind_s, now_ms) || drawn;
+    const chosen = this.selected;
+    const shown = chosen && this.shown.get(chosen);
+    const card = chosen && this.cards.get(chosen);
+    if (shown && card) {
+      drawn = this.drawChosen(shown, card, behind_s, now_ms) || drawn;
     }
     if (drawn) {
       this.pictures++;
     }
   }
 
-  private drawSelected(shown: ShownFingertip, behind_s: number | null, now_ms: number): boolean {
-    const card = this.cards.get(shown.key);
-    const end_s = this.ends.get(shown.key) ?? newest_s(shown);
-    const fresh = behind_s === null && shown.history.end !== this.tracedEnd;
+  private drawChosen(
+    shown: Shown,
+    card: PadCard,
+    behind_s: number | null,
+    now_ms: number,
+  ): boolean {
+    const { fingertip, history } = shown;
+    const end_s = this.ends.get(fingertip) ?? newest_s(history);
+    const fresh = behind_s === null && history !== null && history.end !== this.tracedEnd;
     let drawn = false;
-    if ((this.tracesDue || fresh) && now_ms - this.tracesAt_ms >= TRACES_INTERVAL_ms) {
+    if (history && (this.tracesDue || fresh) && now_ms - this.tracesAt_ms >= TRACES_INTERVAL_ms) {
       this.tracesAt_ms = now_ms;
       this.tracesDue = false;
-      this.tracedEnd = shown.history.end;
+      this.tracedEnd = history.end;
       const to_s = end_s - (behind_s ?? 0);
-      this.traces.draw(shown, { from_s: to_s - this.timeline.window_s, to_s });
+      this.traces.draw(shown, history, { from_s: to_s - this.timeline.window_s, to_s });
       drawn = true;
     }
     if (now_ms - this.textAt_ms >= TEXT_INTERVAL_ms) {
@@ -282,35 +282,29 @@ export class Page {
     }
     if (now_ms - this.healthAt_ms >= HEALTH_INTERVAL_ms) {
       this.healthAt_ms = now_ms;
-      this.health.show(shown.health);
-      const { history } = shown;
-      const oldest_s = history.end > history.first ? (history.t_s[history.first % history.capacity] ?? 0) : 0;
+      this.health.show(factsOf(shown));
+      const kept = history !== null && history.end > history.begin;
+      const oldest_s = kept ? (history.t_s[history.slot(history.begin)] ?? 0) : end_s;
       this.timeline.length_s = end_s - oldest_s;
     }
     return drawn;
   }
 
-  private tell(shown: ShownFingertip, card: PadCard | undefined, now_ms: number): void {
+  private tell(shown: Shown, card: PadCard, now_ms: number): void {
     for (const each of this.cards.values()) {
       each.tell();
     }
-    const contact = card?.contact ?? null;
+    const { contact, hand } = card;
     write(this.heading, shown.name);
-    this.doings.setAttribute('aria-label', `What to do with ${shown.name}`);
-    write(this.recordButton, shown.recording ? 'Stop' : 'Record');
-    this.recordButton.classList.toggle('recording', shown.recording);
-    for (const doing of this.doings.querySelectorAll('button')) {
-      const closes = doing.textContent === 'Disconnect';
-      doing.disabled = shown.source === 'recording' && !closes;
-    }
+    this.doingsPlace.setAttribute('aria-label', `What to do with ${shown.name}`);
     this.numbers.show(contact, shown.tangential, shown.location_limit_mm);
-    const hand = card?.hand?.element;
-    if (hand && hand.parentElement !== this.handPlace) {
-      this.handPlace.replaceChildren(hand);
+    if (hand && hand.element.parentElement !== this.handPlace) {
+      this.handPlace.replaceChildren(hand.element);
     }
     if (this.timeline.behind_s === null) {
-      const several = this.fingertips.length > 1 ? `${shown.name}: ` : '';
-      const sentence = this.speech.say(contact, shown.state.words, now_ms);
+      const several = this.shown.size > 1 ? `${shown.name}: ` : '';
+      const state = shown.state(performance.now()).words.replace(/ for \d+ s$/, '');
+      const sentence = this.speech.say(contact, state, now_ms);
       if (sentence) {
         write(this.live, several + sentence);
       }
@@ -318,6 +312,8 @@ export class Page {
   }
 }
 
-function newest_s({ history }: ShownFingertip): number {
-  return history.end > history.first ? (history.t_s[(history.end - 1) % history.capacity] ?? 0) : 0;
+function newest_s(history: History | null): number {
+  return history && history.end > history.begin
+    ? (history.t_s[history.slot(history.end - 1)] ?? 0)
+    : 0;
 }
