@@ -152,8 +152,8 @@ test('it opens: info, streams, then live; frames reach model, history and taps',
   const { history } = fingertip;
   assert.ok(history);
   assert.equal(history.end, 3);
-  assert.equal(history.force_N[0], 1.5);
-  assert.ok(Number.isNaN(history.force_N[1]));
+  assert.equal(history.columns.force_N[0], 1.5);
+  assert.ok(Number.isNaN(history.columns.force_N[1]));
   assert.deepEqual([...history.readingsAt(0)!.pressure_Pa], [1000, 1000]); // over the gains 0.875 and 1.125
   assert.equal(history.readingsAt(1), null);
   await fingertip.close();
@@ -221,10 +221,10 @@ test('history: a ring with absolute numbers, times that never fall, frames that 
     history.addContact(contactOf(frame, 1000 * frame, { flags: Flag.FIT_VALID, x_mm: i }));
     history.addRaw(rawOf(frame, 1000 * frame, [i, -i], i % 2 ? { flags: Flag.HELD, valid: 0 } : {}));
   }
-  assert.deepEqual([history.first, history.end], [12, 20]);
+  assert.deepEqual([history.begin, history.end], [12, 20]);
   assert.equal(history.lost[12 % 8], 3);
   assert.equal(history.lost[13 % 8], 0);
-  assert.equal(history.x_mm[19 % 8], 19);
+  assert.equal(history.columns.x_mm[19 % 8], 19);
   assert.deepEqual([...history.readingsAt(19)!.pressure_Pa], [19, -19]); // held: those of the frame before
   assert.equal(history.readingsAt(3), null);
   assert.equal(history.rowAt(0.018), 15);
@@ -244,7 +244,7 @@ test('history: a raw packet without its contact packet has a row of its own', ()
   history.addContact(contactOf(6, 200));
   assert.equal(history.end, 2);
   assert.equal(history.flags[0], Flag.TARED);
-  assert.ok(Number.isNaN(history.force_N[0]));
+  assert.ok(Number.isNaN(history.columns.force_N[0]));
 });
 
 test('clocks: right within what it says, whatever the delays', () => {

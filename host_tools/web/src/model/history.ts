@@ -1,8 +1,8 @@
 /**
  * The last minutes of one fingertip: columns of typed arrays, a ring, a row for each frame.
  *
- * Rows are numbered from the first one on, for good: row i, first <= i < end, is at i % capacity of
- * every column. What was not told is NaN: no fit, no x; a packet that did not come. A row takes what
+ * Rows are numbered from the first one on, for good: row i, begin <= i < end, is at slot(i) of every
+ * column. What was not told is NaN: no fit, no x; a packet that did not come. A row takes what
  * the contact and the raw packet of one frame say; nothing is allocated for it.
  */
 import { CONTACT_FIELDS, Flag, type Contact, type ContactField, type Raw } from '../line/packets';
@@ -44,10 +44,6 @@ export interface Readings {
   pressure_Pa: Float32Array;
 }
 
-/** The columns that are one for each quantity of a contact, NaN without its flag. */
-type ContactColumns = Record<ContactField, Float32Array>;
-export interface History extends ContactColumns {}
-
 export class History {
   readonly capacity: number;
   readonly sensor_count: number;
@@ -63,6 +59,8 @@ export class History {
   readonly valid: Uint32Array;
   readonly saturated: Uint32Array;
   readonly doubtful: Uint32Array;
+  /** Each quantity of a contact, NaN without its flag. */
+  readonly columns: Readonly<Record<ContactField, Float32Array>>;
   /** [slot * sensor_count + sensor], as Readings has it; NaN where no raw packet came. */
   readonly pressure_Pa: Float32Array;
   /** [sensor], of the calibration that acts; empty: none. */
@@ -88,32 +86,28 @@ export class History {
     this.saturated = new Uint32Array(capacity);
     this.doubtful = new Uint32Array(capacity);
     this.pressure_Pa = new Float32Array(capacity * sensor_count);
-    this.fields = CONTACT_FIELDS.map((field) => {
-      const column = (this[field] = new Float32Array(capacity));
-      return { field, flag: flagOf(field), column };
-    });
+    this.fields = CONTACT_FIELDS.map((field) => ({
+      field,
+      flag: flagOf(field),
+      column: new Float32Array(capacity),
+    }));
+    this.columns = Object.fromEntries(
+      this.fields.map(({ field, column }) => [field, column]),
+    ) as Record<ContactField, Float32Array>;
   }
 
   /** The oldest row that is kept. */
-  get first(): number {
-    return this.oldest;
-  }
-
   get begin(): number {
     return this.oldest;
-  }
-
-  slot(row: number): number {
-    return row % this.capacity;
-  }
-
-  get columns(): ContactColumns {
-    return this;
   }
 
   /** One after the newest row. */
   get end(): number {
     return this.next;
+  }
+
+  slot(row: number): number {
+    return row % this.capacity;
   }
 
   /** The first kept row not before this time; end if there is none. */
