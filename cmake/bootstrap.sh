@@ -1,13 +1,14 @@
 #!/bin/sh
 # Sets up a Debian 12 or Ubuntu 24.04 machine and does one of the project's main jobs.
-# usage: sh cmake/bootstrap.sh demo|test|report|report all|fuzz HOURS|soak HOURS
+# usage: sh cmake/bootstrap.sh demo|web|test|report|report all|fuzz HOURS|soak HOURS
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
 
 usage() {
-  echo "usage: sh cmake/bootstrap.sh demo|test|report|report all|fuzz HOURS|soak HOURS" >&2
+  echo "usage: sh cmake/bootstrap.sh demo|web|test|report|report all|fuzz HOURS|soak HOURS" >&2
   echo "  demo    build what it needs, let a lime slip on two emulated fingertips, catch what slips in a simulated gripper, say and draw both" >&2
+  echo "  web     build the page and the tool, serve the page to this machine's browsers" >&2
   echo "  test    build everything and run the whole test suite" >&2
   echo "  report  build everything, measure fit, rate, cost, truth, tangential load and grasps, repeat the published experiments in simulation, write build/report; within an hour" >&2
   echo "  report all    the same with every pad and grasp, and what fuzzers, storms of faults and mutation find; some hours" >&2
@@ -16,7 +17,7 @@ usage() {
   exit 2
 }
 case $# in
-  1) case $1 in demo | test | report) ;; *) usage ;; esac ;;
+  1) case $1 in demo | web | test | report) ;; *) usage ;; esac ;;
   2) case "$1 $2" in "report all" | fuzz\ * | soak\ *) ;; *) usage ;; esac ;;
   *) usage ;;
 esac
@@ -41,6 +42,7 @@ arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/include/libusb-1.0/libusb.h libusb-1.0-0-dev
 /usr/include/modbus/modbus.h libmodbus-dev
 /usr/include/zstd.h libzstd-dev
+/usr/include/httplib.h libcpp-httplib-dev
 /usr/include/CLI/CLI.hpp libcli11-dev
 /usr/include/eigen3/Eigen/Dense libeigen3-dev
 /usr/include/nlohmann/json.hpp nlohmann-json3-dev
@@ -48,7 +50,7 @@ arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/lib/python3/dist-packages/matplotlib/__init__.py python3-matplotlib
 /usr/lib/python3/dist-packages/serial/__init__.py python3-serial
 LIST
-  [ "$1" = demo ] || cat << 'LIST'
+  case $1 in test | report | fuzz | soak) cat << 'LIST' ;; esac
 xz xz-utils
 qemu-system-arm qemu-system-arm
 qemu-system-x86_64 qemu-system-x86
@@ -63,11 +65,20 @@ sigrok-cli sigrok-cli
 /usr/lib/python3/dist-packages/markdown/__init__.py python3-markdown
 /usr/lib/python3/dist-packages/pyte/__init__.py python3-pyte
 LIST
-  [ "$1" = demo ] || [ "$1" = soak ] || cat << 'LIST'
+  case $1 in test | report | fuzz) cat << 'LIST' ;; esac
 clang-14 clang-14
 /usr/share/doc/libclang-rt-14-dev libclang-rt-14-dev
 lintian lintian
 /usr/sbin/piuparts piuparts
+LIST
+  case $1 in web | test | report) cat << 'LIST' ;; esac
+clang-14 clang-14
+wasm-ld-14 lld-14
+llvm-ar-14 llvm-14
+/usr/include/wasm32-wasi/stdio.h wasi-libc
+/usr/share/doc/libclang-rt-14-dev-wasm32 libclang-rt-14-dev-wasm32
+/usr/lib/wasm32-wasi/libc++.a libc++-14-dev-wasm32
+/usr/lib/wasm32-wasi/libc++abi.a libc++abi-14-dev-wasm32
 LIST
   case $1 in test | report) cat << 'LIST' ;; esac
 clang-tidy-14 clang-tidy-14
@@ -76,6 +87,8 @@ openssl openssl
 /bin/ip iproute2
 /usr/include/fastdds/dds/topic/TopicDataType.hpp libfastrtps-dev
 LIST
+  # Ubuntu has no package of it; without it the page's tests say why they do not run.
+  case $1.$(sed -n 's/^ID=//p' /etc/os-release) in test.debian | report.debian) echo chromium chromium ;; esac
 }
 
 is_there() {
@@ -85,7 +98,7 @@ is_there() {
   esac
 }
 
-missing=$(needed "$1" | while read -r probe package; do is_there "$probe" || echo "$package"; done)
+missing=$(needed "$1" | sort -u | while read -r probe package; do is_there "$probe" || echo "$package"; done)
 if [ -n "$missing" ]; then
   say "missing packages:" $missing
   command -v apt-get > /dev/null 2>&1 || {
@@ -145,12 +158,16 @@ case $1 in
     configure host -DBUILD_TESTING=OFF
     cmake --build --preset host --target fingertip twin fingertip_cell_program image_pico_parallel
     ;;
+  web)
+    configure host -DBUILD_TESTING=OFF -DFINGERTIP_WEB=ON
+    cmake --build --preset host --target fingertip web
+    ;;
   soak)
     configure host -DBUILD_TESTING=ON
     cmake --build --preset host
     ;;
   *)
-    configure host -DBUILD_TESTING=ON -DFINGERTIP_FUZZ=ON
+    configure host -DBUILD_TESTING=ON -DFINGERTIP_FUZZ=ON -DFINGERTIP_WEB=ON
     cmake --build --preset host
     ;;
 esac
@@ -161,6 +178,7 @@ case $1 in
     [ -t 0 ] && [ -t 1 ] && stay=--stay
     exec sh host_tools/demo/demo.sh $stay
     ;;
+  web) exec build/host/host_tools/cli/fingertip web ;;
   # One more than there are processors: many tests wait most of the time.
   test) exec ctest --preset host -j "$(($(nproc) + 1))" ;;
   soak) exec /usr/bin/python3 tests/soak/soak.py --build build/host --boards build --hours "$2" ;;
@@ -196,6 +214,8 @@ case $1 in
       say "what the fuzzers, the analysers and mutation find, and how faults and power cuts are overcome"
       /usr/bin/python3 host_tools/report/reliability/reliability.py --build build/host -o build/report
     fi
+    say "the page, in a browser"
+    /usr/bin/python3 host_tools/report/web/web.py --build build/host -o build/report
     say "in programs of others"
     /usr/bin/python3 host_tools/report/ecosystem/ecosystem.py --build build/host -o build/report
     say "every table and picture: $root/build/report/index.html"

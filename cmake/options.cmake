@@ -94,4 +94,5 @@ option(BUILD_TESTING "On the host: build the tests, the reference fit and the re
 option(FINGERTIP_SANITIZE "Build for the host with the address and undefined-behaviour sanitizers" OFF)
 
 option(FINGERTIP_FUZZ "Build the fuzz targets by clang into build/fuzz, and run them as tests" OFF)
+option(FINGERTIP_WEB "Build the page that `fingertip web` serves: fetches with npm what it is made of, needs clang for WebAssembly" OFF)
 option(FINGERTIP_LIBFUZZER "Build for libFuzzer: clang only, cmake --preset fuzz" OFF)

@@ -15,9 +15,11 @@ if(FINGERTIP_SANITIZE)
   add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
   add_link_options(-fsanitize=address,undefined)
 endif()
-# By clang, whose warnings are others: gcc has judged the same sources.
 if(FINGERTIP_LIBFUZZER)
   add_compile_options(-fsanitize=fuzzer-no-link)
   add_compile_definitions(_GLIBCXX_ASSERTIONS _GLIBCXX_SANITIZE_VECTOR) # libstdc++ looks at its bounds
+endif()
+# By clang, whose warnings are others: gcc has judged the same sources.
+if(FINGERTIP_LIBFUZZER OR CMAKE_SYSTEM_PROCESSOR STREQUAL "wasm32")
   target_compile_options(ft_warnings INTERFACE -w)
 endif()

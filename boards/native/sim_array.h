@@ -17,6 +17,10 @@
 /* Three selections and a write, as behind three multiplexers; a selection and a read of 3 bytes. */
 #define SIM_ARRAY_BROADCAST_us 200u
 #define SIM_ARRAY_READ_us 193u
+/* With a data line for each sensor, which are then read all at once; the sum is that of board
+ * pico_parallel in emulation. */
+#define SIM_ARRAY_PARALLEL_BROADCAST_us 46u
+#define SIM_ARRAY_PARALLEL_READ_us 130u
 /* From the end that a transfer should have had to FT_ERR_TIMEOUT. */
 #define SIM_ARRAY_TIMEOUT_us 300u
 #define SIM_ARRAY_RECOVERY_us 150u
@@ -54,6 +58,7 @@ struct sim_array {
   /* The test's, at any time */
   struct sim_fault fault;
   struct sim_world world;
+  bool parallel;               /* a data line for each sensor, no multiplexers */
   double noise;                /* times the datasheet's; 0 = none */
   uint32_t d1[FT_MAX_SENSORS]; /* [sensor] code instead of the world's pressure; 0 = none */
   uint32_t d2[FT_MAX_SENSORS]; /* [sensor] code instead of the world's temperature; 0 = none */

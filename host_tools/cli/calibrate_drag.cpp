@@ -1,129 +1,24 @@
 #include "cli/calibrate_drag.hpp"
 
-#include "calibration/pulls.hpp"
+#include "calibration/pull_session.hpp"
 #include "cli/calibrate_device.hpp"
-#include "cli/doubt.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/recording.hpp"
 #include "libfingertip/text.hpp"
 
-#include <cmath>
 #include <cstdio>
 
 namespace fingertip {
 
 namespace {
 
-using calibrating::Pull;
+using calibrating::check_pad;
 using calibrating::PullFinder;
 using calibrating::PullJudgement;
+using calibrating::PullSession;
 
-/* Warnings that say nothing against a load: its standard deviation has what they are about. */
-constexpr std::uint32_t HARMLESS =
-    CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_SENSOR_MASKED;
-
-void check_pad(const wire_info &info, const std::string &what) {
-  if (!(info.capabilities & WIRE_CAPABILITY_TANGENTIAL)) {
-    throw Error(what + ": its firmware (scene " + text_field(info.scene) +
-                ") tells no tangential load; flash one of scene grasp");
-  }
-  if (!(info.stored & WIRE_STORED_PAD)) {
-    throw Error(what + ": no pad profile; fingertip pad --thickness MM first");
-  }
-  if (info.rate_mHz != 0 && info.rate_mHz < 1000.0 * calibrating::PULL_RATE_MIN_Hz) {
-    throw Error(what + ": " + fixed(info.rate_mHz / 1000.0, 1) +
-                " frames a second are too few to see a pull hold still; fingertip set rate=max");
-  }
-}
-
-/* Without its scale's own uncertainty, which is what is sought. */
-double sd_without_scale_N(const wire_contact &contact, const pad_profile &pad) {
-  const double size_N =
-      std::hypot(static_cast<double>(contact.qx_N), static_cast<double>(contact.qy_N));
-  const double of_scale_N =
-      size_N * static_cast<double>(pad.tangential_scale_sd / pad.tangential_scale);
-  const auto sd_N = static_cast<double>(contact.q_sd_N);
-  return std::sqrt(std::max(0.0, sd_N * sd_N - of_scale_N * of_scale_N));
-}
-
-class PullWork {
-public:
-  PullWork(const wire_info &info, double known_N)
-      : pad_(info.pad), known_N_(known_N), finder_(known_N) {
-    judge(false);
-  }
-
-  /* True if it completed a pull. */
-  bool take(const wire_packet &packet) {
-    const wire_contact &contact = packet.body.contact;
-    if (packet.type != WIRE_CONTACT || (contact.flags & CONTACT_FLAG_HELD)) {
-      return false;
-    }
-    calibrating::PullFrame frame;
-    frame.t_s = 1e-6 * static_cast<double>(packet.t_us);
-    frame.contact = contact.flags & CONTACT_FLAG_CONTACT;
-    frame.good = (contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) &&
-                 !(contact.flags & (CONTACT_FLAG_MOVING | CONTACT_FLAG_SLIDING)) &&
-                 !(warnings_of(contact.flags) & ~HARMLESS);
-    frame.qx_N = static_cast<double>(contact.qx_N);
-    frame.qy_N = static_cast<double>(contact.qy_N);
-    frame.q_sd_N = frame.good ? sd_without_scale_N(contact, pad_) : 0.0;
-    frame.force_N = static_cast<double>(contact.force_N);
-    frame.x_mm = static_cast<double>(contact.x_mm);
-    frame.y_mm = static_cast<double>(contact.y_mm);
-    const auto found = finder_.take(frame);
-    if (found) {
-      pulls_.push_back(*found);
-    }
-    return found.has_value();
-  }
-  void judge(bool last) { judgement_ = calibrating::judge_pulls(pulls_, known_N_, last); }
-
-  std::string last_pull_text() const {
-    const Pull &pull = pulls_.back();
-    const double degrees = std::atan2(pull.qy_N, pull.qx_N) * 180.0 / M_PI;
-    return "pull " + std::to_string(pulls_.size()) + " at x " + fixed(pull.x_mm, 1) + " y " +
-           fixed(pull.y_mm, 1) + " mm: reads " + fixed(std::hypot(pull.qx_N, pull.qy_N), 2) +
-           " N towards " + fixed(degrees, 0) + " degrees, under " + fixed(pull.force_N, 2) + " N";
-  }
-  std::string advice() const {
-    switch (finder_.state()) {
-    case PullFinder::State::settling:
-      return "let go of it, and leave it alone";
-    case PullFinder::State::resting:
-      return "pull: hang the weight on its string";
-    case PullFinder::State::pulled:
-      return "hold on";
-    case PullFinder::State::taken:
-      return "taken: take it off the pad";
-    case PullFinder::State::refused:
-      return finder_.refusal() == PullFinder::Refusal::slid ? "it slid: take it off, and press it "
-                                                              "down harder"
-                                                            : weak_text() + "; take it off";
-    case PullFinder::State::free:
-      break;
-    }
-    return "set the object down, its string slack";
-  }
-  std::string weak_text() const {
-    return fixed(known_N_, 2) + " N is little beside what the fingertip may be off by there, " +
-           fixed(finder_.sd_N(), 2) + " N: pull harder, or calibrate the gains first";
-  }
-
-  PullFinder::Refusal refusal() const { return finder_.refusal(); }
-  const PullJudgement &judgement() const { return judgement_; }
-  const std::vector<Pull> &pulls() const { return pulls_; }
-
-private:
-  pad_profile pad_;
-  double known_N_;
-  PullFinder finder_;
-  std::vector<Pull> pulls_;
-  PullJudgement judgement_;
-};
-
-void pull_live(CalibratedDevice &device, PullWork &work) {
+void pull_live(CalibratedDevice &device, PullSession &work) {
   std::string said;
   const auto say = [&] {
     if (work.advice() != said) {
@@ -144,9 +39,9 @@ void pull_live(CalibratedDevice &device, PullWork &work) {
                 [&] { return work.judgement().state == PullJudgement::State::more; });
 }
 
-PullWork pull_work_from(const CalibrateOptions &options, wire_info &info) {
+PullSession pull_session_from(const CalibrateOptions &options, wire_info &info) {
   RecordingReader reader(options.from, false, options.choice.device);
-  std::optional<PullWork> work;
+  std::optional<PullSession> work;
   std::string weak;
   while (auto item = reader.next()) {
     if (item->kind != RecordingReader::Item::Kind::packet) {
@@ -160,7 +55,7 @@ PullWork pull_work_from(const CalibrateOptions &options, wire_info &info) {
       if (work->take(item->packet)) {
         std::printf("%s\n", work->last_pull_text().c_str());
       }
-      weak = work->refusal() == PullFinder::Refusal::weak ? work->weak_text() : weak;
+      weak = work->finder().refusal() == PullFinder::Refusal::weak ? work->weak_text() : weak;
     }
   }
   if (!work) {
@@ -185,20 +80,7 @@ void check_same_pad(const pad_profile &recorded, const pad_profile &stored,
   }
 }
 
-/* pad with the scale with which the known force would have been read as what it was. */
-pad_profile scaled(pad_profile pad, float present_scale, const PullJudgement &judgement,
-                   double known_N) {
-  const double scale = static_cast<double>(present_scale) / judgement.reading;
-  pad.tangential_scale = static_cast<float>(scale);
-  pad.tangential_scale_sd = static_cast<float>(scale * judgement.reading_sd);
-  if (!pad_profile_is_valid(&pad)) {
-    throw Error("the readings are not those of " + fixed(known_N, 2) + " N: they make " +
-                fixed(known_N * judgement.reading, 2) + " N; give what pulled");
-  }
-  return pad;
-}
-
-void print_result(const PullWork &work, const pad_profile &before, const pad_profile &after,
+void print_result(const PullSession &work, const pad_profile &before, const pad_profile &after,
                   bool has_force_scale) {
   std::printf("%s, from %zu of %zu pulls\n", work.judgement().text.c_str(), work.judgement().kept,
               work.pulls().size());
@@ -218,7 +100,7 @@ void print_result(const PullWork &work, const pad_profile &before, const pad_pro
 
 int calibrate_drag(const CalibrateOptions &options) {
   std::optional<CalibratedDevice> device;
-  std::optional<PullWork> work;
+  std::optional<PullSession> work;
   wire_info info{};
   if (options.from.empty()) {
     device.emplace(options);
@@ -228,7 +110,7 @@ int calibrate_drag(const CalibrateOptions &options) {
     work.emplace(info, *options.force_N);
     pull_live(*device, *work);
   } else {
-    work.emplace(pull_work_from(options, info));
+    work.emplace(pull_session_from(options, info));
   }
   if (work->judgement().state != PullJudgement::State::good) {
     throw Error("not calibrated: " + work->judgement().text);
@@ -239,8 +121,7 @@ int calibrate_drag(const CalibrateOptions &options) {
     check_pad(device->info(), device->name());
     check_same_pad(info.pad, device->info().pad, options.from);
   }
-  const pad_profile made = scaled(device ? device->info().pad : info.pad, info.pad.tangential_scale,
-                                  work->judgement(), *options.force_N);
+  const pad_profile made = work->scaled(device ? device->info().pad : info.pad);
   print_result(*work, info.pad, made, info.stored & WIRE_STORED_CALIBRATION);
   if (!device) {
     return 0;

@@ -1,7 +1,5 @@
 #include "cli/calibrate_view.hpp"
 
-#include "libfingertip/text.hpp"
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -12,8 +10,8 @@ namespace fingertip {
 
 namespace {
 
+using calibrating::GainSession;
 using calibrating::Judgement;
-using calibrating::PlacementFinder;
 using Clock = std::chrono::steady_clock;
 
 constexpr Colour INK = {222, 222, 228}, FAINT = {128, 130, 145}, RULE = {66, 68, 84};
@@ -25,10 +23,6 @@ constexpr double RIM_mm = 6.0;      /* beyond the outer sensors */
 constexpr double CELL_ASPECT = 2.0; /* height of a character over its width */
 constexpr int TEXT_COLUMNS = 44;
 constexpr std::chrono::milliseconds REDRAW{40};
-
-std::string percent(double share) {
-  return fixed(100.0 * share, 1) + " %";
-}
 
 /* Where a place of the pad is on the screen. */
 class Pad {
@@ -73,10 +67,10 @@ std::vector<std::string> wrapped(const std::string &text, std::size_t columns) {
   return lines;
 }
 
-Canvas draw(const CalibrateStatus &status, int columns, int rows) {
+Canvas draw(const GainSession &session, int columns, int rows) {
   Canvas canvas(columns, rows);
-  const calibrating::Array &array = *status.array;
-  const Judgement *judgement = status.judgement;
+  const calibrating::Array &array = session.array();
+  const Judgement *judgement = session.placements().empty() ? nullptr : &session.judgement();
   canvas.text(1, 0, "fingertip calibrate", {WHITE, std::nullopt, true});
   const Pad pad(array, columns - TEXT_COLUMNS - 4, rows - 4);
   const int left = 1, top = 2;
@@ -96,12 +90,12 @@ Canvas draw(const CalibrateStatus &status, int columns, int rows) {
   for (std::size_t k = 0; k < array.sensors(); k++) {
     const bool unsure =
         !judgement || std::count(judgement->unsure.begin(), judgement->unsure.end(), k) > 0;
-    const double felt = std::clamp(status.finder->above_Pa()[k] / FULL_Pa, 0.0, 1.0);
+    const double felt = std::clamp(session.finder().above_Pa()[k] / FULL_Pa, 0.0, 1.0);
     at(array.x_mm[k], array.y_mm[k], std::to_string(k),
        {unsure ? WARNING : GOOD, mix({0, 0, 0}, FELT, static_cast<float>(std::sqrt(felt))), true});
   }
-  if (status.wanted) {
-    at(status.wanted->x_mm, status.wanted->y_mm, "○", {WHITE, std::nullopt, true});
+  if (session.wanted()) {
+    at(session.wanted()->x_mm, session.wanted()->y_mm, "○", {WHITE, std::nullopt, true});
   }
 
   const int text_left = left + pad.columns() + 3;
@@ -111,15 +105,15 @@ Canvas draw(const CalibrateStatus &status, int columns, int rows) {
       canvas.text(text_left, row++, line, {colour, std::nullopt, bold});
     }
   };
-  say(advice_text(status), WHITE, true);
+  say(session.advice(), WHITE, true);
   row++;
-  say(progress_text(status), INK);
-  if (judgement && status.placements >= calibrating::PLACEMENTS_MIN) {
+  say(session.progress(), INK);
+  if (judgement && session.placements().size() >= calibrating::PLACEMENTS_MIN) {
     row++;
     say(judgement->text, judgement->state == Judgement::State::more ? FAINT : GOOD);
   }
   row++;
-  if (status.wanted) {
+  if (session.wanted()) {
     say("○ where the next one helps most", FAINT);
   }
   say("● placements, green numbers: sensors that are done", FAINT);
@@ -131,11 +125,11 @@ Canvas draw(const CalibrateStatus &status, int columns, int rows) {
 class ScreenCalibrateView : public CalibrateView {
 public:
   explicit ScreenCalibrateView(ColourDepth depth) : screen_(depth) {}
-  void update(const CalibrateStatus &status, bool news) override {
+  void update(const GainSession &session, bool news) override {
     const auto now = Clock::now();
     if (news || now >= next_) {
       next_ = now + REDRAW;
-      screen_.draw(draw(status, screen_.columns(), screen_.rows()));
+      screen_.draw(draw(session, screen_.columns(), screen_.rows()));
     }
   }
   std::optional<Key> key() override { return screen_.key(); }
@@ -147,10 +141,10 @@ private:
 
 class LineCalibrateView : public CalibrateView {
 public:
-  void update(const CalibrateStatus &status, bool news) override {
-    const std::string advice = advice_text(status);
+  void update(const GainSession &session, bool news) override {
+    const std::string advice = session.advice();
     if (news) {
-      std::printf("%s\n", progress_text(status).c_str());
+      std::printf("%s\n", session.progress().c_str());
     }
     if (advice != advice_) {
       std::printf("%s\n", advice.c_str());
@@ -164,42 +158,6 @@ private:
 };
 
 } // namespace
-
-std::string advice_text(const CalibrateStatus &status) {
-  switch (status.finder->state()) {
-  case PlacementFinder::State::settling:
-    return "hold on";
-  case PlacementFinder::State::taken:
-    return "taken: lift it";
-  case PlacementFinder::State::refused:
-    return "it did not stand still: lift it, and let it stand by itself";
-  case PlacementFinder::State::resting:
-    break;
-  }
-  if (status.finder->refusal() == PlacementFinder::Refusal::light) {
-    return "too light to tell: use a weight that makes at least " +
-           fixed(calibrating::LIGHT_Pa / 1000.0, 1) + " kPa, about 1 N";
-  }
-  std::string text = "set the weight down on its round foot";
-  if (status.wanted) {
-    text += ", best near x " + fixed(status.wanted->x_mm, 0) + " y " +
-            fixed(status.wanted->y_mm, 0) + " mm";
-  }
-  return text;
-}
-
-std::string progress_text(const CalibrateStatus &status) {
-  std::string text =
-      std::to_string(status.placements) + (status.placements == 1 ? " placement" : " placements");
-  if (status.judgement && status.judgement->solution.solved) {
-    const calibrating::Solution &solution = status.judgement->solution;
-    const calibrating::Fitted &last = solution.placements.back();
-    text += ", the last at x " + fixed(last.x_mm, 1) + " y " + fixed(last.y_mm, 1) + " mm" +
-            (last.kept ? "" : " (fits no other)") + "; gains known to " +
-            percent(solution.worst_shape_sd()) + ", wanted " + percent(calibrating::SHAPE_SD_MAX);
-  }
-  return text;
-}
 
 std::unique_ptr<CalibrateView> make_calibrate_view(ColourMode mode) {
   if (auto depth = screen_depth(mode)) {

@@ -121,15 +121,6 @@ std::string event_text(unsigned code, unsigned detail) {
 
 } // namespace
 
-Crash with_places(const crash_record &record, const std::optional<Symbols> &symbols) {
-  Crash crash{record, "", "", ""};
-  if (symbols) {
-    crash.place = symbols->place(record.pc).value_or("");
-    crash.caller = symbols->place(record.lr & ~1u).value_or("");
-  }
-  return crash;
-}
-
 std::string crash_text(const Crash &crash) {
   const crash_record &record = crash.record;
   std::string since =

@@ -85,7 +85,9 @@ public:
   }
 
   std::vector<Finding> findings() {
-    rule();
+    if (facts_.knows_computer) {
+      rule();
+    }
     port();
     if (facts_.info) {
       firmware();
@@ -157,7 +159,8 @@ private:
         add(Verdict::ok, "port",
             facts_.port + (holders.empty() ? ", shared" : ", shared by " + holders));
       } else if (holders.empty()) {
-        add(Verdict::ok, "port", facts_.port + ", nobody else has it open");
+        add(Verdict::ok, "port",
+            facts_.port + (facts_.knows_computer ? ", nobody else has it open" : ""));
       } else {
         add(Verdict::warn, "port", facts_.port + ": also open in " + holders,
             "end it: it takes bytes away");

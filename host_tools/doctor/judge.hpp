@@ -22,9 +22,10 @@ struct Failure {
 
 struct Facts {
   std::array<unsigned, 3> tool_version{};
-  std::string rule;       /* path of a file; empty: none */
-  std::string port;       /* as it is opened; empty: none was found */
-  bool is_shared = false; /* the one that has it open serves it to others */
+  bool knows_computer = true; /* false: a web page asks, so nothing is known of rule and holders */
+  std::string rule;           /* path of a file; empty: none */
+  std::string port;           /* as it is opened; empty: none was found */
+  bool is_shared = false;     /* the one that has it open serves it to others */
   Holders holders{{}, true};
   std::optional<Failure> failure; /* what ended the examination */
   std::optional<wire_info> info;

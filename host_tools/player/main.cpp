@@ -30,7 +30,7 @@ constexpr std::uint64_t SLICE_us = 5000;
 constexpr double SECONDS_MAX = 24 * 3600;
 
 struct PlayOptions {
-  std::string scenario, recording;
+  std::string scenario, recording, raw_bytes, commands;
   std::string osr = "1024", rate = "max", slip_threshold, slip_window;
   double noise = 1.0, prom_spread = 3.0, seconds = 0.0;
   std::uint64_t seed = 1;
@@ -49,14 +49,23 @@ double temperature_degC(void *context, unsigned, std::uint64_t t_us) {
   return static_cast<Scenario *>(context)->temperature_degC(t_us);
 }
 
-void send(wire_packet packet) {
-  static std::uint16_t sequence = 0;
-  packet.sequence = sequence++;
-  const std::vector<std::uint8_t> bytes = frame_bytes(packet);
-  if (native_cdc_send(bytes.data(), bytes.size()) != FT_OK) {
-    throw Error("the firmware does not take its commands");
+/* The commands, each with a number of its own. */
+class Commands {
+public:
+  void send(wire_packet packet) {
+    packet.sequence = sequence_++;
+    const std::vector<std::uint8_t> frame = frame_bytes(packet);
+    if (native_cdc_send(frame.data(), frame.size()) != FT_OK) {
+      throw Error("the firmware does not take its commands");
+    }
+    bytes_.insert(bytes_.end(), frame.begin(), frame.end());
   }
-}
+  const std::vector<std::uint8_t> &bytes() const { return bytes_; }
+
+private:
+  std::uint16_t sequence_ = 0;
+  std::vector<std::uint8_t> bytes_;
+};
 
 int play(const PlayOptions &options) {
   // Everything that can be wrong is, before anything takes time.
@@ -81,7 +90,11 @@ int play(const PlayOptions &options) {
       pad->edges = pad::edges_of(*pad, pad::own_sensors(), twin::default_cache_directory());
     }
   }
-  check_output(options.recording, options.replace);
+  for (const std::string *path : {&options.recording, &options.raw_bytes, &options.commands}) {
+    if (!path->empty()) {
+      check_output(*path, options.replace);
+    }
+  }
   Scenario scenario(options.scenario);
   const double seconds = options.seconds > 0.0 ? options.seconds : scenario.end_s();
 
@@ -98,15 +111,25 @@ int play(const PlayOptions &options) {
                 "-DFINGERTIP_SCENE=grasp");
   }
   native_cdc_open();
-  send(osr);
-  send(rate);
+  Commands commands;
+  commands.send(osr);
+  commands.send(rate);
   if (slip) {
-    send(*slip);
+    commands.send(*slip);
   }
   std::uint8_t streams = WIRE_STREAM_CONTACT | WIRE_STREAM_HEALTH;
   streams |= options.raw ? WIRE_STREAM_RAW : 0;
-  send(command_stream(streams));
-  send(command_info());
+  commands.send(command_stream(streams));
+  commands.send(command_info());
+  if (!options.commands.empty()) {
+    OutputFile sent(options.commands, options.replace, OutputFile::Appears::when_finished);
+    sent.append(commands.bytes().data(), commands.bytes().size());
+    sent.finish();
+  }
+  std::optional<OutputFile> raw_bytes;
+  if (!options.raw_bytes.empty()) {
+    raw_bytes.emplace(options.raw_bytes, options.replace, OutputFile::Appears::when_finished);
+  }
 
   Decoder decoder;
   std::optional<RecordingWriter> writer;
@@ -144,6 +167,9 @@ int play(const PlayOptions &options) {
     std::uint8_t bytes[NATIVE_CDC_TRANSMIT_BYTES];
     for (std::size_t count; (count = native_cdc_receive(bytes, sizeof bytes)) > 0;) {
       decoder.feed(bytes, count, on_packet);
+      if (raw_bytes) {
+        raw_bytes->append(bytes, count);
+      }
     }
     if (!refused.empty()) {
       throw Error(refused);
@@ -160,6 +186,9 @@ int play(const PlayOptions &options) {
                 ": ends before the fingertip answers; make it longer than 0.1 s");
   }
   writer->finish(decoder.statistics(), "seconds");
+  if (raw_bytes) {
+    raw_bytes->finish();
+  }
   return 0;
 }
 
@@ -340,6 +369,12 @@ int run(int argc, char **argv) {
       ->check(CLI::Range(0.1, SECONDS_MAX))
       ->type_name("S");
   player->add_flag("--raw", play_options.raw, "Record the pressures too");
+  player
+      ->add_option("--raw-bytes", play_options.raw_bytes,
+                   "Keep the bytes of the line too, as of fingertip record")
+      ->type_name("FILE.ftr");
+  player->add_option("--commands", play_options.commands, "And those that it was sent, before 0 s")
+      ->type_name("FILE");
   player->add_flag("--quiet", play_options.quiet, "No progress");
 
   RepeatOptions repeat_options;

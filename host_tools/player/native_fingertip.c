@@ -7,6 +7,8 @@
 #include "native/native_port.h"
 #include "port/port.h"
 
+#include <string.h>
+
 static struct app app;
 static struct sim_array array;
 
@@ -26,10 +28,14 @@ bool native_fingertip_start(const struct native_fingertip_settings *settings) {
   native_start(false);
   native_cdc_reset();
   native_flash_reset(settings->seed);
+  if (settings->flash) {
+    memcpy(native_flash.bytes, settings->flash, sizeof native_flash.bytes);
+  }
   sim_array_init(&array, geometry.sensor_count, settings->seed);
   sim_array_vary_parts(&array, settings->prom_spread);
   array.noise = settings->noise;
   array.world = settings->world;
+  array.parallel = settings->parallel_bus;
   native_set_event_source(bus_next_us, &array);
   port_set_event_handler(on_event, &app);
   app_start(&app, sim_array_bus(&array));
@@ -38,7 +44,9 @@ bool native_fingertip_start(const struct native_fingertip_settings *settings) {
     app.fit_settings.prior_width_mm = settings->prior_width_mm;
   }
 #if FT_WITH_TANGENTIAL
-  app_use_pad(&app, settings->pad);
+  if (settings->pad) {
+    app_use_pad(&app, settings->pad);
+  }
   return true;
 #else
   return !settings->pad;

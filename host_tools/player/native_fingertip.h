@@ -19,8 +19,10 @@ struct native_fingertip_settings {
                            this share; the firmware reads it and calculates with it */
   float prior_sigma_mm; /* prior on the width; prior_width_mm 0: the build's own */
   float prior_width_mm;
-  const struct pad_profile *pad; /* that acts, and outlives the fingertip; NULL: none */
+  const struct pad_profile *pad; /* that acts, and outlives the fingertip; NULL: the one kept */
   struct sim_world world;
+  bool parallel_bus;    /* a data line for each sensor (sim_array.h): faster than multiplexers */
+  const uint8_t *flash; /* [NATIVE_FLASH_BYTES] what it had kept (native_flash.h); NULL: nothing */
 };
 
 #ifdef __cplusplus

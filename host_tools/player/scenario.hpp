@@ -12,37 +12,21 @@
  */
 #pragma once
 
-#include <cstdint>
-#include <map>
+#include "player/samples.hpp"
+
 #include <string>
-#include <vector>
 
 namespace fingertip {
 
-class Scenario {
+class Scenario : public Samples {
 public:
   /* Throws Error with file and line. */
   explicit Scenario(const std::string &path);
 
-  unsigned sensors() const { return sensors_; }
-  double end_s() const { return times_s_.back(); }
   const std::string &name() const { return name_; }
 
-  /* Absolute. Times that mostly go on are found at once. */
-  double pressure_Pa(unsigned sensor, std::uint64_t t_us);
-  double temperature_degC(std::uint64_t t_us);
-
 private:
-  void seek(double t_s);
-
   std::string name_;
-  unsigned sensors_ = 15;
-  double ambient_Pa_ = 101325.0;
-  std::vector<double> times_s_;
-  std::vector<float> pressures_Pa_;      /* [row * sensors + sensor], above ambient */
-  std::vector<float> temperatures_degC_; /* [row] */
-  std::size_t row_ = 0;                  /* last one not after the time sought */
-  double share_ = 0.0;                   /* of the next row */
 };
 
 } // namespace fingertip

@@ -38,12 +38,12 @@ double ForcePlanes::force_at(int n) {
 }
 
 double ForcePlanes::node(int force, int i, int j) const {
-  return static_cast<double>(values_[std::size_t(force) * PLANE + std::size_t(i * NODES + j)]);
+  return static_cast<double>(values_[std::size_t((force * nodes_ + i) * nodes_ + j)]);
 }
 
 double ForcePlanes::at(double force_N, double dx_mm, double dy_mm) const {
-  const double x = std::abs(dx_mm) / STEP_mm, y = std::abs(dy_mm) / STEP_mm;
-  if (force_N <= 0.0 || x >= NODES - 2 || y >= NODES - 2) {
+  const double x = std::abs(dx_mm) / step_mm_, y = std::abs(dy_mm) / step_mm_;
+  if (force_N <= 0.0 || x >= nodes_ - 2 || y >= nodes_ - 2) {
     return 0.0;
   }
   const int i = static_cast<int>(x), j = static_cast<int>(y);
@@ -54,10 +54,10 @@ double ForcePlanes::at(double force_N, double dx_mm, double dy_mm) const {
   const Between force = between(force_N);
   double sum = 0.0;
   for (int f = 0; f < 4; f++) {
-    const float *plane = values_.data() + std::size_t(force.first + f) * PLANE;
+    const float *plane = values_.data() + std::size_t((force.first + f) * nodes_ * nodes_);
     double over_x = 0.0;
     for (int a = 0; a < 4; a++) {
-      const float *line = plane + std::abs(i + a - 1) * NODES;
+      const float *line = plane + std::abs(i + a - 1) * nodes_;
       double over_y = 0.0;
       for (int b = 0; b < 4; b++) {
         over_y += of_y[std::size_t(b)] * static_cast<double>(line[std::abs(j + b - 1)]);

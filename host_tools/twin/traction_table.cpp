@@ -37,10 +37,6 @@ std::vector<std::complex<double>> response(const Transform &transform, const Lay
 
 } // namespace
 
-double stuck_force_N(double force_N, double tangential_N, double friction) {
-  return std::max(0.0, force_N - tangential_N / friction);
-}
-
 TractionTable::TractionTable(const ContactTable &table, const Layer &layer) {
   using Symmetry = ForcePlanes::Symmetry;
   Transform transform(SIDE);
@@ -67,21 +63,6 @@ TractionTable::TractionTable(const ContactTable &table, const Layer &layer) {
   };
   along_x_ = {of_axis(Axis::x), Symmetry::odd, Symmetry::even};
   along_y_ = {of_axis(Axis::y), Symmetry::even, Symmetry::odd};
-}
-
-double TractionTable::base_pressure_Pa(const Load &load, double dx_mm, double dy_mm) const {
-  const double carried_N = load.force_N - load.stuck_N;
-  if (!(carried_N > 0.0)) {
-    return 0.0;
-  }
-  double sum = 0.0;
-  for (const auto &[share_N, planes] : {std::pair{load.x_N, &along_x_}, {load.y_N, &along_y_}}) {
-    if (share_N != 0.0) {
-      sum += share_N / carried_N *
-             (planes->at(load.force_N, dx_mm, dy_mm) - planes->at(load.stuck_N, dx_mm, dy_mm));
-    }
-  }
-  return sum;
 }
 
 } // namespace fingertip::twin

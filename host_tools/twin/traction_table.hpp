@@ -30,23 +30,21 @@
 #pragma once
 
 #include "twin/contact_table.hpp"
+#include "twin/traction.hpp"
 
 namespace fingertip::twin {
-
-// What stays without sliding when the tangential force has risen to this at a constant normal one;
-// 0 if all slides.
-double stuck_force_N(double force_N, double tangential_N, double friction);
 
 class TractionTable {
 public:
   TractionTable(const ContactTable &table, const Layer &layer);
 
-  struct Load {
-    double force_N, stuck_N; // F, S
-    double x_N, y_N;         // Q, along the indenter's own axes
-  };
+  using Load = TractionLoad;
   // By dx, dy from the middle of the contact, along the same axes.
-  double base_pressure_Pa(const Load &load, double dx_mm, double dy_mm) const;
+  double base_pressure_Pa(const Load &load, double dx_mm, double dy_mm) const {
+    return traction_pressure_Pa(along_x_, along_y_, load, dx_mm, dy_mm);
+  }
+  const ForcePlanes &along_x() const { return along_x_; }
+  const ForcePlanes &along_y() const { return along_y_; }
 
 private:
   ForcePlanes along_x_, along_y_; // under a traction p, Pa

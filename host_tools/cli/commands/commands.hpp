@@ -14,6 +14,7 @@ void add_replay(CommandLine &line);
 void add_convert(CommandLine &line);
 void add_grasp(CommandLine &line);
 void add_serve(CommandLine &line);
+void add_web(CommandLine &line);
 void add_tare(CommandLine &line);
 void add_calibrate(CommandLine &line);
 void add_pad(CommandLine &line);

@@ -78,6 +78,10 @@ PARTS = (
           ("worst_recovery_s", SIMULATED))),
     Part("ecosystem", "Ecosystem", "The fingertip in programs of others.", f"{REPORT}/ecosystem/ecosystem.py --build build/host -o build/report", SIMULATED,
          (("*_percent", CLOCK), ("*_us*", CLOCK), ("*_fps", CLOCK), ("*_seconds", SAID), ("python_vectors*", RUN))),
+    Part("web", "The page", "What the page costs and keeps up with in a headless Chromium that renders in software, and each of its steps, driven there.",
+         f"{REPORT}/web/web.py --build build/host -o build/report", CLOCK,
+         (("bundle_*", RUN), ("wasm_cpu_percent", CLOCK), ("wasm_*", SIMULATED), ("web_lost", RUN), ("web_foreign_requests", RUN), ("web_steps*", EMULATED),
+          ("*_seconds", SAID))),
     Part("usb", "USB and clocks", "The image's USB device before a Debian kernel in a virtual machine, and two fingertips on one clock.",
          "sh cmake/bootstrap.sh test", EMULATED, (("alignment_fake_*", SIMULATED), ("*_test_s", CLOCK), ("*_seconds", SAID))),
 )

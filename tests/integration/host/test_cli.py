@@ -131,7 +131,7 @@ class Usage(CliTest):
         self.assertRegex(self.run_cli("--version")[0], r"^fingertip \d+\.\d+\.\d+\n$")
         commands = re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
         self.assertEqual(sorted(commands), sorted(
-            ["list", "info", "doctor", "monitor", "record", "replay", "convert", "grasp", "gripper", "tare", "calibrate", "pad", "set", "serve", "flash", "rule", "loader",
+            ["list", "info", "doctor", "monitor", "record", "replay", "convert", "grasp", "gripper", "tare", "calibrate", "pad", "set", "serve", "web", "flash", "rule", "loader",
              "encode"]))
         for command in commands:
             self.assertIn(f"Usage: fingertip {command}", self.run_cli(command, "--help")[0])

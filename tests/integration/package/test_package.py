@@ -56,6 +56,8 @@ class Package(unittest.TestCase):
         for path in ("bin/fingertip", "lib/udev/rules.d/60-fingertip.rules", "lib/systemd/user/fingertip.service", "share/man/man1/fingertip.1.gz",
                      "share/bash-completion/completions/fingertip"):
             self.assertIn(f"./usr/{path}\n", held)
+        for path in (pathlib.Path(TOOLS.build) / "host_tools/web/page").rglob("*.*"):  # where it was built
+            self.assertIn(f"./usr/share/fingertip/web/{path.relative_to(pathlib.Path(TOOLS.build) / 'host_tools/web/page')}\n", held)
 
     def test_lintian_is_content(self):
         if not shutil.which("lintian"):

@@ -1,0 +1,49 @@
+/* Serves the built page to browsers of this machine, and nothing else: its files are read once, a
+ * name is looked up among them and never becomes a path. The page may load nothing from elsewhere
+ * (Content-Security-Policy), no other site may embed or read it, and it is given only to who asks
+ * for it by an address or as localhost: a name of the asker's own that leads here (DNS rebinding)
+ * is refused with 421.
+ *
+ * Memory: the page's, some megabytes. Errors: Error, of a folder that cannot be read and an address
+ * that cannot be had. */
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+
+namespace httplib {
+class Server;
+}
+
+namespace fingertip {
+
+class PageServer {
+public:
+  /* port 0: any that is free. Listens when this returns; answers in serve. */
+  PageServer(const std::filesystem::path &folder, const std::string &address, unsigned port);
+  ~PageServer();
+
+  /* For the browser: http://127.0.0.1:8109/ */
+  const std::string &url() const { return url_; }
+
+  /* Until is_over is true, which is asked every 50 ms. */
+  void serve(const std::function<bool()> &is_over);
+
+private:
+  struct File {
+    std::string type;
+    std::string bytes;
+  };
+
+  std::map<std::string, File> files_; /* by the path of the request: /index.html */
+  std::string url_;
+  std::unique_ptr<httplib::Server> server_;
+};
+
+/* Whether only this machine reaches it: 127.0.0.0/8, ::1, localhost. */
+bool is_loopback(const std::string &address);
+
+} // namespace fingertip

@@ -1,0 +1,44 @@
+/**
+ * Puts the page together: what finds fingertips, what shows them, what can be done with them.
+ *
+ * Programs in the console, and tests, may read `fingertip`:
+ *   fingertips  those of the page (src/model/fingertip.ts): state, why, info, health, contacts, raws,
+ *               lost, contact, raw, history, ...
+ *   pictures    drawn since the page was loaded
+ *   ready_ms    performance.now() when the first was drawn; 0 before
+ */
+import type { Fingertip } from './model/fingertip';
+import { App } from './steps/app';
+import { fingertipControls, pageControls } from './steps/toolbar';
+import { mountView } from './view/view';
+
+interface Console {
+  readonly fingertips: readonly Fingertip[];
+  readonly pictures: number;
+  readonly ready_ms: number;
+}
+
+declare global {
+  var fingertip: Console;
+}
+
+const app = new App();
+const view = mountView(document.body, app.bench, {
+  page: pageControls(app),
+  of: (fingertip) => fingertipControls(app, fingertip),
+  connect: () => void app.connect(),
+  simulate: () => app.simulate(),
+});
+app.notice = (text, kind) => view.notice(text, kind);
+let ready_ms = 0;
+globalThis.fingertip = {
+  fingertips: app.bench.fingertips,
+  get pictures() {
+    return view.pictures;
+  },
+  get ready_ms() {
+    return ready_ms;
+  },
+};
+requestAnimationFrame(() => (ready_ms = performance.now()));
+app.start();

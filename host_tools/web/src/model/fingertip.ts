@@ -1,0 +1,477 @@
+/**
+ * One fingertip: its line, what it said last, what it said over the last minutes, and the commands
+ * that it takes. The view reads; listeners are told of rare changes alone (state, info, health), not
+ * of packets: draw on requestAnimationFrame from `contact`, `raw` and `history`.
+ */
+import { ClockFit } from '../line/clock_fit';
+import { Decoder } from '../line/decoder';
+import { WIRE_VERSION, type LineCounts } from '../line/framing';
+import type { Line } from '../line/line';
+import {
+  Capability,
+  PacketType,
+  Result,
+  Stored,
+  Stream,
+  encodePacket,
+  infoFrameOfVersion,
+  type Ack,
+  type Command,
+  type Contact,
+  type Crash,
+  type DevicePacket,
+  type Health,
+  type Info,
+  type Raw,
+} from '../line/packets';
+import { commandName, resultText } from './names';
+import { History } from './history';
+
+/** opening: until its info came. live: it streams. silent: nothing for a while, though the line is
+ * open. closed: by the page, or it left; `why` says so. */
+export type FingertipState = 'opening' | 'live' | 'silent' | 'closed';
+
+/** Why a command failed, a sentence; result: Result of the acknowledgement, null where none came. */
+export class CommandError extends Error {
+  constructor(
+    message: string,
+    readonly result: number | null,
+  ) {
+    super(message);
+  }
+}
+
+/** Another fingertip answered than the one that was expected back. */
+export class OtherFingertip extends Error {}
+
+/** Takes every packet as it comes; frame(): a copy of its COBS bytes without the delimiter. Contact
+ * and raw packets are overwritten by the next. */
+export type PacketTap = (packet: DevicePacket, frame: () => Uint8Array<ArrayBuffer>) => void;
+
+const ANSWER_ms = 1000;
+/** Of what is written to the flash first: within half a second, and a margin. */
+const STORED_ms = 3000;
+const TRIES = 3;
+const SILENT_ms = 1500;
+const CLOCK_EVERY_ms = 1000;
+/** Versions of the protocol that ever were. */
+const OLDEST_VERSION = 1;
+
+interface Waiting {
+  command: number;
+  sequence: number;
+  sent_us: number;
+  done: (ack: Ack) => void;
+  failed: (error: Error) => void;
+  timer: ReturnType<typeof setTimeout>;
+}
+
+let fingertips_made = 0;
+
+export class Fingertip {
+  /** Of this page, from 1 on. */
+  readonly id = ++fingertips_made;
+  state: FingertipState = 'opening';
+  /** Of a closed one: why, and what to do. */
+  why = '';
+  info: Info | null = null;
+  health: Health | null = null;
+  /** How its firmware last ended; null until asked for (askCrash). */
+  crash: Crash | null = null;
+  readonly clock = new ClockFit();
+  /** null until its info came. */
+  history: History | null = null;
+  /** Packets of either kind since it was opened. */
+  contacts = 0;
+  raws = 0;
+  /** performance.now() of the last bytes. */
+  heard_ms = 0;
+  /** A replay: it takes no commands. */
+  readonly is_replay: boolean;
+
+  private readonly decoder = new Decoder();
+  private readonly listeners = new Set<() => void>();
+  private readonly taps = new Set<PacketTap>();
+  private readonly waiting: Waiting[] = [];
+  private readonly awaited = new Map<number, ((packet: DevicePacket) => void)[]>();
+  private sequence = 0;
+  private other_serial = '';
+  private timer: ReturnType<typeof setInterval> | null = null;
+  private clock_asked_ms = 0;
+
+  constructor(
+    public line: Line,
+    { is_replay = false } = {},
+  ) {
+    this.is_replay = is_replay;
+  }
+
+  /** The serial number, or what the line is called until it is known. */
+  get name(): string {
+    return this.info?.serial || this.line.label;
+  }
+
+  /** The newest contact and raw packet, overwritten in place; meaningless until contacts or raws is
+   * above 0. */
+  get contact(): Contact {
+    return this.decoder.contact;
+  }
+
+  get raw(): Raw {
+    return this.decoder.raw;
+  }
+
+  get counts(): LineCounts {
+    return this.decoder.counts;
+  }
+
+  /** Packets that did not arrive whole. */
+  get lost(): number {
+    return this.counts.dropped_packets;
+  }
+
+  /** Called after state, info, health or crash changed. Returns what ends it. */
+  listen(listener: () => void): () => void {
+    this.listeners.add(listener);
+    return () => this.listeners.delete(listener);
+  }
+
+  tap(tap: PacketTap): () => void {
+    this.taps.add(tap);
+    return () => this.taps.delete(tap);
+  }
+
+  /** Opens its line, or another after it was gone, asks who it is, and lets it stream all it can.
+   * Rejects with an Error whose message says what to do; it is closed then. */
+  async open(line: Line = this.line): Promise<void> {
+    this.line = line;
+    this.state = 'opening';
+    this.why = '';
+    this.decoder.restart();
+    this.clock.restart();
+    if (this.history && this.heard_ms > 0) {
+      this.history.gap_s = (performance.now() - this.heard_ms) / 1000;
+    }
+    this.changed();
+    try {
+      await line.open(
+        (bytes, at_ms) => this.receive(bytes, at_ms),
+        (why) => {
+          if (this.line === line) {
+            this.gone(why);
+          }
+        },
+      );
+      if (this.is_replay) {
+        return;
+      }
+      await this.identify();
+      await this.stream(Stream.CONTACT | Stream.RAW | Stream.HEALTH);
+    } catch (error) {
+      const why =
+        error instanceof OtherFingertip
+          ? 'it is not there: plug it in again'
+          : error instanceof Error
+            ? error.message
+            : String(error);
+      if ((this.state as FingertipState) !== 'closed') {
+        await line.close().catch(() => undefined);
+        this.gone(why);
+      }
+      throw error;
+    }
+    this.state = 'live';
+    this.timer = setInterval(() => this.tick(), 250);
+    this.changed();
+  }
+
+  async close(): Promise<void> {
+    if (this.state === 'closed') {
+      return;
+    }
+    const { line } = this;
+    if (!this.is_replay && this.state !== 'opening') {
+      await this.stream(0).catch(() => undefined);
+    }
+    this.gone('disconnected by you; press "Connect" to have it back');
+    await line.close();
+  }
+
+  /** Sends a command and waits for its acknowledgement; asks again where an answer is missing.
+   * Rejects with CommandError. */
+  async command(command: Command, tries = TRIES): Promise<Ack> {
+    if (this.is_replay) {
+      throw new CommandError('this is a replay: it takes no commands', null);
+    }
+    for (;;) {
+      tries--;
+      try {
+        const ack = await this.exchange(command);
+        if (ack.result !== Result.DONE) {
+          throw new CommandError(
+            `${commandName(command.type)}: ${resultText(ack.result)}`,
+            ack.result,
+          );
+        }
+        return ack;
+      } catch (error) {
+        if (error instanceof CommandError || tries <= 0) {
+          throw error;
+        }
+      }
+    }
+  }
+
+  /** Streams, of those that this firmware has. */
+  async stream(streams: number): Promise<void> {
+    const capabilities = this.info?.capabilities ?? 0;
+    const possible =
+      (capabilities & Capability.FIT ? Stream.CONTACT : 0) |
+      (capabilities & Capability.RAW_STREAM ? Stream.RAW : 0) |
+      Stream.HEALTH;
+    await this.command({ type: PacketType.CMD_STREAM, streams: streams & possible });
+  }
+
+  /** Measures the zero anew. Refused with Result.NOT_NOW in contact unless forced. */
+  async tare(force = false): Promise<void> {
+    await this.command({ type: PacketType.CMD_TARE, force: force ? 1 : 0 });
+  }
+
+  async askInfo(): Promise<Info> {
+    return (await this.ask(PacketType.CMD_INFO, PacketType.INFO)) as Info;
+  }
+
+  async askHealth(): Promise<Health> {
+    return (await this.ask(PacketType.CMD_HEALTH, PacketType.HEALTH)) as Health;
+  }
+
+  /** null: the first firmware of this version does not know the command. */
+  async askCrash(): Promise<Crash | null> {
+    try {
+      return (await this.ask(PacketType.CMD_CRASH, PacketType.CRASH)) as Crash;
+    } catch (error) {
+      if (error instanceof CommandError && error.result === Result.UNKNOWN_COMMAND) {
+        return null;
+      }
+      throw error;
+    }
+  }
+
+  /** The command, then the packet that follows its acknowledgement. */
+  private async ask(command: 0x85 | 0x86 | 0x8f, answer: number): Promise<DevicePacket> {
+    let take: (packet: DevicePacket) => void = () => undefined;
+    const came = new Promise<DevicePacket>((done) => (take = done));
+    const queue = this.awaited.get(answer) ?? [];
+    this.awaited.set(answer, [...queue, take]);
+    try {
+      await this.command({ type: command });
+      return await Promise.race([
+        came,
+        new Promise<never>((_, failed) =>
+          setTimeout(
+            () => failed(new CommandError(`${commandName(command)}: no answer came`, null)),
+            ANSWER_ms,
+          ),
+        ),
+      ]);
+    } finally {
+      this.awaited.set(
+        answer,
+        (this.awaited.get(answer) ?? []).filter((each) => each !== take),
+      );
+    }
+  }
+
+  private async identify(): Promise<void> {
+    this.other_serial = '';
+    try {
+      await this.askInfo();
+      if (this.other_serial) {
+        throw new OtherFingertip(`${this.other_serial} answers instead of ${this.name}`);
+      }
+    } catch (error) {
+      if (error instanceof OtherFingertip || (error instanceof CommandError && error.result !== null)) {
+        throw error;
+      }
+      const version = await this.otherVersion();
+      if (version !== 0) {
+        throw new Error(
+          `it speaks version ${version} of the protocol, this page version ${WIRE_VERSION}: ` +
+            (version < WIRE_VERSION
+              ? 'press "Flash" and install the firmware that belongs to this page'
+              : 'use the page that belongs to its firmware'),
+        );
+      }
+      throw new Error(
+        this.counts.bytes === 0
+          ? 'nothing answers on this port: it may be something else than a fingertip; choose another, ' +
+            'or unplug the fingertip and plug it in again'
+          : 'what answers on this port is no fingertip: choose another port',
+      );
+    }
+  }
+
+  /** 0: whatever is there does not speak any version of the protocol. */
+  private async otherVersion(): Promise<number> {
+    for (let version = OLDEST_VERSION; version < WIRE_VERSION + 3; version++) {
+      if (this.decoder.other_version !== 0 || this.state === 'closed') {
+        break;
+      }
+      if (version !== WIRE_VERSION) {
+        await this.line.send(infoFrameOfVersion(version));
+        await new Promise((done) => setTimeout(done, 100));
+      }
+    }
+    return this.decoder.other_version;
+  }
+
+  private exchange(command: Command): Promise<Ack> {
+    if (this.state === 'closed') {
+      return Promise.reject(new CommandError('the fingertip is not connected', null));
+    }
+    const sequence = this.sequence++ & 0xffff;
+    const sent_us = Math.round(performance.now() * 1000);
+    const bytes = encodePacket({ ...command, sequence, t_us: sent_us });
+    const is_stored =
+      (command.type >= PacketType.CMD_CALIBRATE && command.type <= PacketType.CMD_KEEP) ||
+      command.type === PacketType.CMD_PAD ||
+      command.type === PacketType.CMD_ERASE_PAD;
+    return new Promise((done, failed) => {
+      const name = commandName(command.type);
+      const waiting: Waiting = {
+        command: command.type,
+        sequence,
+        sent_us,
+        done,
+        failed,
+        timer: setTimeout(
+          () => {
+            this.forget(waiting);
+            failed(
+              new Error(
+                `${name}: the fingertip does not answer; unplug it and plug it in again`,
+              ),
+            );
+          },
+          is_stored ? STORED_ms : ANSWER_ms,
+        ),
+      };
+      this.waiting.push(waiting);
+      this.line.send(bytes).catch((error: unknown) => {
+        this.forget(waiting);
+        failed(error instanceof Error ? error : new Error(String(error)));
+      });
+    });
+  }
+
+  private forget(waiting: Waiting): void {
+    clearTimeout(waiting.timer);
+    const at = this.waiting.indexOf(waiting);
+    if (at >= 0) {
+      this.waiting.splice(at, 1);
+    }
+  }
+
+  private receive(bytes: Uint8Array, at_ms: number): void {
+    this.heard_ms = at_ms;
+    if (this.state === 'silent' || (this.is_replay && this.state === 'opening')) {
+      this.state = 'live';
+      this.changed();
+    }
+    this.decoder.feed(bytes, this.take);
+  }
+
+  private readonly frameOfPacket = (): Uint8Array<ArrayBuffer> => this.decoder.frameBytes();
+
+  private readonly take = (packet: DevicePacket): void => {
+    switch (packet.type) {
+      case PacketType.CONTACT:
+        this.contacts++;
+        this.history?.addContact(packet);
+        break;
+      case PacketType.RAW:
+        this.raws++;
+        this.history ??= new History(packet.sensor_count);
+        this.history.addRaw(packet);
+        break;
+      case PacketType.ACK:
+        this.acknowledge(packet);
+        break;
+      case PacketType.INFO:
+        if (this.info && this.info.serial !== packet.serial) {
+          this.other_serial = packet.serial;
+          break;
+        }
+        if (this.history?.sensor_count !== packet.sensor_count) {
+          this.history = new History(packet.sensor_count);
+        }
+        this.info = packet;
+        this.history.gain =
+          packet.stored & Stored.CALIBRATION ? packet.gain : new Float32Array(0);
+        break;
+      case PacketType.HEALTH:
+        this.health = packet;
+        break;
+      case PacketType.CRASH:
+        this.crash = packet;
+        break;
+    }
+    for (const tap of this.taps) {
+      tap(packet, this.frameOfPacket);
+    }
+    if (packet.type > PacketType.RAW) {
+      const awaited = this.awaited.get(packet.type)?.shift();
+      awaited?.(packet);
+      if (packet.type !== PacketType.ACK) {
+        this.changed();
+      }
+    }
+  };
+
+  private acknowledge(ack: Ack): void {
+    const waiting = this.waiting.find(
+      (each) => each.command === ack.command && each.sequence === ack.command_sequence,
+    );
+    if (waiting && BigInt(waiting.sent_us) === ack.host_time_us) {
+      this.forget(waiting);
+      this.clock.add({
+        sent_us: waiting.sent_us,
+        received_us: this.heard_ms * 1000,
+        device_us: ack.t_us,
+      });
+      waiting.done(ack);
+    }
+  }
+
+  private tick(): void {
+    const now_ms = performance.now();
+    if (this.state === 'live' && now_ms - this.heard_ms > SILENT_ms) {
+      this.state = 'silent';
+      this.changed();
+    }
+    if (now_ms - this.clock_asked_ms > CLOCK_EVERY_ms) {
+      this.clock_asked_ms = now_ms;
+      this.command({ type: PacketType.CMD_HEALTH }, 1).catch(() => undefined);
+    }
+  }
+
+  private gone(why: string): void {
+    if (this.timer !== null) {
+      clearInterval(this.timer);
+      this.timer = null;
+    }
+    this.state = 'closed';
+    this.why = why;
+    for (const waiting of [...this.waiting]) {
+      this.forget(waiting);
+      waiting.failed(new CommandError(why, null));
+    }
+    this.changed();
+  }
+
+  private changed(): void {
+    for (const listener of this.listeners) {
+      listener();
+    }
+  }
+}

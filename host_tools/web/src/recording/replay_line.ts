@@ -1,0 +1,162 @@
+/**
+ * A file as the lines of its fingertips, at the pace at which it was recorded. Each fingertip in it
+ * has a line; all share the reading and the clock.
+ */
+import type { Line } from '../line/line';
+import { PacketType, encodePacket } from '../line/packets';
+import { ReadError, readItems, type Item } from './reader';
+
+/** A page that was asleep goes on where it was. */
+const STEP_MOST_ms = 250;
+const TICK_ms = 10;
+const ENDED = 'the replay has ended';
+
+class ReplayLine implements Line {
+  private receive: ((bytes: Uint8Array, at_ms: number) => void) | null = null;
+  private closed: ((why: string) => void) | null = null;
+
+  constructor(
+    readonly label: string,
+    private readonly replay: Replay,
+  ) {}
+
+  open(
+    receive: (bytes: Uint8Array, at_ms: number) => void,
+    closed: (why: string) => void,
+  ): Promise<void> {
+    this.receive = receive;
+    this.closed = closed;
+    return Promise.resolve();
+  }
+
+  send(): Promise<void> {
+    return Promise.reject(new Error('this is a replay: it takes no commands'));
+  }
+
+  close(): Promise<void> {
+    this.receive = this.closed = null;
+    this.replay.left(this);
+    return Promise.resolve();
+  }
+
+  take(bytes: Uint8Array): void {
+    this.receive?.(bytes, performance.now());
+  }
+
+  end(why: string): void {
+    const { closed } = this;
+    this.receive = this.closed = null;
+    closed?.(why);
+  }
+}
+
+export class Replay {
+  /** Called with the line of each fingertip in the file as it is first met; open it at once. */
+  onLine: (line: Line) => void = () => undefined;
+  /** Called once: empty at the end, else what is wrong with the file, a sentence. */
+  onEnd: (problem: string) => void = () => undefined;
+  paused = false;
+  /** Times the pace of the recording. */
+  speed = 1;
+  /** Of the recording. */
+  seconds = 0;
+
+  private readonly lines: ReplayLine[] = [];
+  private readonly items: AsyncGenerator<Item, void, undefined>;
+  private next: Item | null = null;
+  private first_us = NaN;
+  private now_us = NaN;
+  private shown_ms = 0;
+  private stopped = false;
+
+  constructor(readonly file: File) {
+    this.items = readItems(file);
+  }
+
+  /** Resolves once the first frames are there, or the file turned out to have none. */
+  async start(): Promise<void> {
+    this.shown_ms = performance.now();
+    await this.advance();
+    void this.run();
+  }
+
+  stop(): void {
+    this.stopped = true;
+  }
+
+  left(line: Line): void {
+    const at = this.lines.findIndex((each) => each === line);
+    if (at >= 0) {
+      delete this.lines[at];
+    }
+    if (this.lines.every((each) => !each)) {
+      this.stop();
+    }
+  }
+
+  private async run(): Promise<void> {
+    while (!this.stopped) {
+      await new Promise((done) => setTimeout(done, TICK_ms));
+      await this.advance();
+    }
+  }
+
+  /** All that is due. */
+  private async advance(): Promise<void> {
+    const now_ms = performance.now();
+    if (!this.paused) {
+      this.now_us += Math.min(STEP_MOST_ms, now_ms - this.shown_ms) * 1000 * this.speed;
+    }
+    this.shown_ms = now_ms;
+    try {
+      while (!this.stopped) {
+        if (!this.next) {
+          const { value, done } = await this.items.next();
+          if (done) {
+            this.end('');
+            return;
+          }
+          this.next = value;
+        }
+        const { time_us } = this.next;
+        if (!Number.isNaN(time_us)) {
+          // The first, or a fingertip that started anew while it was recorded.
+          if (Number.isNaN(this.now_us) || time_us < this.now_us - 1e6) {
+            this.first_us = time_us - this.seconds * 1e6;
+            this.now_us = time_us;
+          }
+          if (time_us > this.now_us) {
+            return;
+          }
+          this.seconds = (time_us - this.first_us) / 1e6;
+        }
+        this.hand(this.next);
+        this.next = null;
+      }
+    } catch (error) {
+      this.end(
+        error instanceof ReadError ? error.message : `${this.file.name} cannot be read (${String(error)})`,
+      );
+    }
+  }
+
+  private hand({ device, packet }: Item): void {
+    if (!(device in this.lines)) {
+      if (packet.type !== PacketType.INFO && packet.type !== PacketType.RAW && packet.type !== PacketType.CONTACT) {
+        return;
+      }
+      const line = new ReplayLine(this.file.name, this);
+      this.lines[device] = line;
+      this.onLine(line);
+    }
+    this.lines[device]?.take(encodePacket(packet));
+  }
+
+  private end(problem: string): void {
+    this.stopped = true;
+    for (const line of this.lines) {
+      line?.end(problem || ENDED);
+    }
+    this.onEnd(problem);
+  }
+}

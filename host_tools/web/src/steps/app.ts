@@ -1,0 +1,217 @@
+/** What the page does with fingertips: finds them, has them come back, records, replays. */
+import type { Line } from '../line/line';
+import {
+  SerialLine,
+  hasWebSerial,
+  rememberedPorts,
+  requestPort,
+  whyNoWebSerial,
+} from '../line/serial_line';
+import { Bench } from '../model/bench';
+import { Fingertip, OtherFingertip } from '../model/fingertip';
+import { chooseOutput } from '../recording/output';
+import { MEDIA_TYPES, Recorder, recordingName, type RecordingKind } from '../recording/recorder';
+import { Replay } from '../recording/replay_line';
+import { SimulatedFingertip } from '../simulated/simulated_fingertip';
+import { version } from '../../package.json';
+import { wordsOf } from './dialog';
+
+export const PAGE_VERSION = version;
+
+/** Linux gives a port its group and rights a moment after it is there. */
+const RIGHTS_ms = 300;
+
+const NONE_CHOSEN =
+  'No fingertip was chosen. None in the list: plug one in, with a cable that carries data. No list: allow this site ' +
+  'to use serial ports in the settings of the browser.';
+
+export class App {
+  readonly bench = new Bench();
+  readonly recorders = new Map<Fingertip, Recorder>();
+  readonly replays = new Map<Fingertip, Replay>();
+  /** Tells the user, until it is closed; set by main. */
+  notice: (text: string, kind: 'plain' | 'bad') => void = () => undefined;
+
+  private readonly listeners = new Set<() => void>();
+  private readonly ports = new Map<SerialPort, Fingertip>();
+  private finding: Promise<void> = Promise.resolve();
+  private simulated = 0;
+
+  /** Called after a recording or a replay began, ended or paused. Returns what ends it. */
+  listen(listener: () => void): () => void {
+    this.listeners.add(listener);
+    return () => this.listeners.delete(listener);
+  }
+
+  /** Takes up the ports that the page may use, now and as they come. */
+  start(): void {
+    if (hasWebSerial()) {
+      void this.find();
+      navigator.serial.addEventListener('connect', (event) => {
+        const port = event.target as SerialPort;
+        setTimeout(() => void this.find(port), RIGHTS_ms);
+      });
+    }
+  }
+
+  /** Asks for a port; ports that the page may use already and that are not open come first. */
+  async connect(): Promise<void> {
+    try {
+      if (!hasWebSerial()) {
+        throw new Error(whyNoWebSerial());
+      }
+      const waiting = (await rememberedPorts()).filter((port) => !this.isOpen(port));
+      if (waiting.length > 0) {
+        await this.find();
+        return;
+      }
+      const port = await requestPort();
+      if (port) {
+        await this.find(port);
+      } else {
+        this.notice(NONE_CHOSEN, 'plain');
+      }
+    } catch (error) {
+      this.notice(wordsOf(error), 'bad');
+    }
+  }
+
+  simulate(): void {
+    const serial = `51${String(++this.simulated).padStart(14, '0')}`;
+    const fingertip = new Fingertip(new SimulatedFingertip({ serial, seed: this.simulated }));
+    this.bench.add(fingertip);
+    fingertip.open().catch((error: unknown) => this.notice(wordsOf(error), 'bad'));
+  }
+
+  async replay(file: File): Promise<void> {
+    const replay = new Replay(file);
+    replay.onLine = (line: Line) => {
+      const fingertip = new Fingertip(line, { is_replay: true });
+      this.replays.set(fingertip, replay);
+      this.bench.add(fingertip);
+      void fingertip.open();
+    };
+    replay.onEnd = (problem) => {
+      if (problem) {
+        this.notice(problem, 'bad');
+      }
+      this.changed();
+    };
+    await replay.start();
+    this.changed();
+  }
+
+  pauseReplay(replay: Replay, paused: boolean): void {
+    replay.paused = paused;
+    this.changed();
+  }
+
+  /** Closes it and takes it off the page. */
+  async disconnect(fingertip: Fingertip): Promise<void> {
+    if (this.recorders.has(fingertip)) {
+      await this.stopRecording(fingertip);
+    }
+    await fingertip.close().catch(() => undefined);
+    for (const [port, each] of this.ports) {
+      if (each === fingertip) {
+        this.ports.delete(port);
+      }
+    }
+    if (fingertip.line instanceof SimulatedFingertip) {
+      fingertip.line.dispose();
+    }
+    this.replays.delete(fingertip);
+    this.bench.remove(fingertip);
+  }
+
+  /** False: nothing was chosen. Throws Error, a sentence. */
+  async record(fingertip: Fingertip, kind: RecordingKind): Promise<boolean> {
+    const output = await chooseOutput(recordingName(fingertip, kind), MEDIA_TYPES[kind]);
+    if (!output) {
+      return false;
+    }
+    const recorder = new Recorder(fingertip, kind, output, PAGE_VERSION, (why) => {
+      this.notice(why, 'bad');
+      void this.stopRecording(fingertip);
+    });
+    this.recorders.set(fingertip, recorder);
+    this.changed();
+    try {
+      await fingertip.askInfo();
+    } catch (error) {
+      await this.stopRecording(fingertip);
+      throw error;
+    }
+    return true;
+  }
+
+  async stopRecording(fingertip: Fingertip): Promise<void> {
+    const recorder = this.recorders.get(fingertip);
+    this.recorders.delete(fingertip);
+    this.changed();
+    try {
+      await recorder?.finish();
+      if (recorder) {
+        this.notice(`${recorder.output.name}: ${recorder.frames} frames recorded`, 'plain');
+      }
+    } catch (error) {
+      if (!recorder?.failure) {
+        this.notice(wordsOf(error), 'bad');
+      }
+    }
+  }
+
+  /** The port of one that does not answer, for the loader at 1200 baud. */
+  portOf(fingertip: Fingertip): SerialPort | null {
+    return fingertip.line instanceof SerialLine ? fingertip.line.port : null;
+  }
+
+  private isOpen(port: SerialPort): boolean {
+    const state = this.ports.get(port)?.state;
+    return state !== undefined && state !== 'closed';
+  }
+
+  /** One port after the other: two attempts at one would disturb each other. */
+  private find(only?: SerialPort): Promise<void> {
+    this.finding = this.finding.then(async () => {
+      const ports = only ? [only] : await rememberedPorts();
+      for (const port of ports) {
+        if (!this.isOpen(port)) {
+          await this.take(port);
+        }
+      }
+    });
+    return this.finding;
+  }
+
+  /** As the fingertip that it was before, if it was; else as a new one. */
+  private async take(port: SerialPort): Promise<void> {
+    const known = this.ports.get(port);
+    const others = this.bench.fingertips.filter(
+      (each) => each.state === 'closed' && each !== known && each.line instanceof SerialLine,
+    );
+    for (const fingertip of [...(known ? [known] : []), ...others]) {
+      try {
+        await fingertip.open(new SerialLine(port));
+        this.ports.set(port, fingertip);
+        return;
+      } catch (error) {
+        if (!(error instanceof OtherFingertip)) {
+          this.ports.set(port, fingertip);
+          this.notice(`${fingertip.name}: ${wordsOf(error)}`, 'bad');
+          return;
+        }
+      }
+    }
+    const fingertip = new Fingertip(new SerialLine(port));
+    this.ports.set(port, fingertip);
+    this.bench.add(fingertip);
+    await fingertip
+      .open()
+      .catch((error: unknown) => this.notice(`${fingertip.name}: ${wordsOf(error)}`, 'bad'));
+  }
+
+  private changed(): void {
+    this.listeners.forEach((listener) => listener());
+  }
+}

@@ -1,0 +1,129 @@
+/** Flash: reboots the fingertip to the boot ROM's loader, and writes the image through the file
+ * picker onto the drive that appears. */
+import { LOADER_MAGIC, PacketType } from '../line/packets';
+import type { Fingertip } from '../model/fingertip';
+import { download } from '../recording/output';
+import type { App } from './app';
+import { Dialog, field, make, makeButton } from './dialog';
+import { readImage, type Image } from './uf2';
+
+const BACK_ms = 30_000;
+const LOADER_BAUD = 1200;
+
+const STEPS = [
+  'Choose the image: fingertip-BOARD.uf2 of the build.',
+  'Reboot to the loader: the fingertip vanishes, and a drive RPI-RP2 appears.',
+  'Save the image onto the drive RPI-RP2: choose that drive in the window that opens.',
+  'It starts with the new firmware by itself.',
+];
+
+export function flash(app: App, fingertip: Fingertip): void {
+  const dialog = new Dialog(`Flash ${fingertip.name}`);
+  const items = STEPS.map((text) => make('li', {}, text));
+  const input = make('input', { type: 'file', accept: '.uf2' });
+  dialog.content.append(make('ol', { class: 'steps' }, ...items), field('Image', input));
+  let image: Image | null = null;
+  const at = (step: number): void =>
+    items.forEach((item, i) =>
+      i === step ? item.setAttribute('aria-current', 'step') : item.removeAttribute('aria-current'),
+    );
+  const reboot = makeButton('Reboot to the loader', () => void dialog.run(toLoader), true);
+  const save = makeButton('Save onto the drive', () => void dialog.run(toDrive), true);
+  const show = (step: number): void => {
+    at(step);
+    dialog.choose(step === 1 ? [reboot] : step === 2 ? [save] : [], step === 3 ? 'Close' : 'Cancel');
+  };
+  show(0);
+
+  input.addEventListener(
+    'change',
+    () =>
+      void dialog.run(async () => {
+        const file = input.files?.[0];
+        if (!file) {
+          return;
+        }
+        image = readImage(file.name, new Uint8Array(await file.arrayBuffer()));
+        const board = fingertip.info?.board;
+        if (board && board !== image.board) {
+          throw new Error(
+            `${file.name} is for board ${image.board}, but this fingertip is a ${board}: choose fingertip-${board}.uf2`,
+          );
+        }
+        dialog.say(`Firmware ${image.version} ${image.git_hash}, board ${image.board}.`);
+        show(1);
+      }),
+  );
+
+  async function toLoader(): Promise<void> {
+    const port = app.portOf(fingertip);
+    if (fingertip.state === 'live' || fingertip.state === 'silent') {
+      await fingertip.command({ type: PacketType.CMD_LOADER, magic: LOADER_MAGIC });
+    } else if (port) {
+      // What speaks another version understands this.
+      await port.open({ baudRate: LOADER_BAUD }).catch((error: unknown) => {
+        throw new Error(
+          `its port cannot be opened (${String(error)}): hold BOOTSEL while plugging it in, then go on`,
+        );
+      });
+      await port.close().catch(() => undefined);
+    }
+    dialog.say('If no drive RPI-RP2 appears, hold BOOTSEL while plugging it in.');
+    show(2);
+  }
+
+  async function toDrive(): Promise<void> {
+    if (!image) {
+      return;
+    }
+    const { name, bytes } = image;
+    if ('showSaveFilePicker' in window) {
+      let handle: FileSystemFileHandle;
+      try {
+        handle = await window.showSaveFilePicker({ suggestedName: name });
+      } catch (error) {
+        if (error instanceof DOMException && error.name === 'AbortError') {
+          return;
+        }
+        throw new Error(
+          `the browser does not let this page write there (${String(error)}): copy ${name} onto the drive by hand`,
+        );
+      }
+      const file = await handle.createWritable();
+      await file.write(bytes);
+      // The loader restarts as soon as it has all of it, and its drive is gone before the file ends.
+      await file.close().catch(() => undefined);
+      dialog.say('Written. Waiting for it to come back …');
+    } else {
+      download(new Blob([bytes]), name);
+      dialog.say(`This browser cannot write onto drives: move ${name} from your downloads onto RPI-RP2.`);
+    }
+    show(3);
+    await comesBack(image);
+  }
+
+  async function comesBack(wanted: Image): Promise<void> {
+    const until_ms = performance.now() + BACK_ms;
+    while (performance.now() < until_ms && !dialog.is_closed) {
+      await new Promise((done) => setTimeout(done, 200));
+      const { info, state } = fingertip;
+      if (state === 'live' && info) {
+        const version = `${info.major}.${info.minor}.${info.patch}`;
+        if (version !== wanted.version || info.git_hash !== wanted.git_hash) {
+          throw new Error(
+            `it came back with firmware ${version} ${info.git_hash}, not with ${wanted.version} ${wanted.git_hash}: ` +
+              'hold BOOTSEL while plugging it in, and save the image onto the drive',
+          );
+        }
+        dialog.say(`It is back with firmware ${version} ${info.git_hash}.`);
+        return;
+      }
+    }
+    if (!dialog.is_closed) {
+      throw new Error(
+        'it did not come back: plug it in again; if it then is not there, hold BOOTSEL while plugging it in and ' +
+          'save the image onto the drive RPI-RP2',
+      );
+    }
+  }
+}

@@ -1,0 +1,142 @@
+/** The eye that looks at the pad. Millimetres; x across the pad, y along it, z out of the rubber,
+ * its surface at 0. Matrices by columns, as WebGL takes them. */
+
+export type Matrix = Float32Array;
+export type Point = readonly [number, number, number];
+
+/** turn_deg about z, tilt_deg from the horizon: 90 looks from above, with y up. */
+export interface Look {
+  turn_deg: number;
+  tilt_deg: number;
+}
+
+/** What must stay in the picture. */
+export interface Box {
+  readonly x_mm: number; // half of its size
+  readonly y_mm: number;
+  readonly low_mm: number;
+  readonly high_mm: number;
+}
+
+/** Half the angle from the lower to the upper edge: narrow, so that lengths compare. */
+const HALF_VIEW_rad = 0.21;
+const RIM = 0.94;
+
+const radians = (degrees: number) => (degrees * Math.PI) / 180;
+
+export interface Camera {
+  readonly matrix: Matrix;
+  readonly eye: Point;
+  readonly right: Point;
+  readonly up: Point;
+  readonly back: Point;
+  readonly aspect: number;
+}
+
+/** aspect: width over height. The nearest distance from which the box is seen whole. */
+export function cameraOf(look: Look, aspect: number, box: Box): Camera {
+  const turn = radians(look.turn_deg);
+  const tilt = radians(look.tilt_deg);
+  const right: Point = [Math.cos(turn), Math.sin(turn), 0];
+  const up: Point = [
+    -Math.sin(turn) * Math.sin(tilt),
+    Math.cos(turn) * Math.sin(tilt),
+    Math.cos(tilt),
+  ];
+  const back: Point = [
+    Math.sin(turn) * Math.cos(tilt),
+    -Math.cos(turn) * Math.cos(tilt),
+    Math.sin(tilt),
+  ];
+  const high = Math.tan(HALF_VIEW_rad) * RIM;
+  const wide = high * aspect;
+  const middle_mm = (box.low_mm + box.high_mm) / 2;
+  let distance_mm = 0;
+  for (const x of [-box.x_mm, box.x_mm]) {
+    for (const y of [-box.y_mm, box.y_mm]) {
+      for (const z of [box.low_mm - middle_mm, box.high_mm - middle_mm]) {
+        const corner: Point = [x, y, z];
+        const ahead = dot(corner, back);
+        distance_mm = Math.max(
+          distance_mm,
+          ahead + Math.abs(dot(corner, right)) / wide,
+          ahead + Math.abs(dot(corner, up)) / high,
+        );
+      }
+    }
+  }
+  const eye: Point = [
+    back[0] * distance_mm,
+    back[1] * distance_mm,
+    back[2] * distance_mm + middle_mm,
+  ];
+  const near = 0.2 * distance_mm;
+  const far = 3 * distance_mm;
+  const scale = 1 / Math.tan(HALF_VIEW_rad);
+  const project = new Float32Array(16);
+  project[0] = scale / aspect;
+  project[5] = scale;
+  project[10] = (far + near) / (near - far);
+  project[11] = -1;
+  project[14] = (2 * far * near) / (near - far);
+  const view = new Float32Array([
+    right[0], up[0], back[0], 0,
+    right[1], up[1], back[1], 0,
+    right[2], up[2], back[2], 0,
+    -dot(right, eye), -dot(up, eye), -dot(back, eye), 1,
+  ]);
+  return { matrix: product(project, view), eye, right, up, back, aspect };
+}
+
+/** Where a point is seen: -1 to 1, to the right and up. */
+export function seen(camera: Camera, point: Point): { right: number; up: number } {
+  const m = camera.matrix;
+  const row = (i: number) =>
+    (m[i] ?? 0) * point[0] +
+    (m[i + 4] ?? 0) * point[1] +
+    (m[i + 8] ?? 0) * point[2] +
+    (m[i + 12] ?? 0);
+  const w = row(3);
+  return { right: row(0) / w, up: row(1) / w };
+}
+
+/** The point of the rubber's surface, or of a plane at another height, that is seen there; null
+ * where none is: at the horizon and above. */
+export function picked(
+  camera: Camera,
+  right: number,
+  up: number,
+  height_mm = 0,
+): { x_mm: number; y_mm: number } | null {
+  const high = Math.tan(HALF_VIEW_rad);
+  const ray = [0, 1, 2].map(
+    (i) =>
+      (camera.right[i] ?? 0) * right * high * camera.aspect +
+      (camera.up[i] ?? 0) * up * high -
+      (camera.back[i] ?? 0),
+  );
+  const [dx = 0, dy = 0, dz = 0] = ray;
+  const along = (height_mm - camera.eye[2]) / dz;
+  if (!(dz < -1e-6) || !(along > 0)) {
+    return null;
+  }
+  return { x_mm: camera.eye[0] + along * dx, y_mm: camera.eye[1] + along * dy };
+}
+
+function dot(a: Point, b: Point): number {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+function product(a: Matrix, b: Matrix): Matrix {
+  const c = new Float32Array(16);
+  for (let column = 0; column < 4; column++) {
+    for (let row = 0; row < 4; row++) {
+      let sum = 0;
+      for (let i = 0; i < 4; i++) {
+        sum += (a[4 * i + row] ?? 0) * (b[4 * column + i] ?? 0);
+      }
+      c[4 * column + row] = sum;
+    }
+  }
+  return c;
+}

@@ -1,0 +1,152 @@
+/** The points of a trace out of its intervals, for uPlot: lists of the same length, null where a line
+ * is broken. */
+import { Trust, type Buckets, type ColumnName } from './buckets';
+
+/** good: a solid line; doubtful: a dashed one, which meets it; sdLow, sdHigh: the band. */
+export interface Curves {
+  readonly good: (number | null)[];
+  readonly doubtful: (number | null)[];
+  readonly sdLow: (number | null)[];
+  readonly sdHigh: (number | null)[];
+}
+
+export interface Chart {
+  t_s: number[];
+  curves: Map<ColumnName, Curves>;
+  /** Of the values that carry no warning, with their band; of those that do where there are no
+   * others. */
+  reach: Map<ColumnName, { low: number; high: number } | null>;
+}
+
+/** Broken where frames were lost and where for longer than break_s no frame came. */
+export function chartOf(
+  buckets: Buckets,
+  columns: readonly ColumnName[],
+  first: number,
+  last: number,
+  break_s: number,
+): Chart {
+  const width_s = buckets.width_s;
+  const slots: number[] = [];
+  const breaks: boolean[] = [];
+  const t_s: number[] = [];
+  let before = -1;
+  for (let b = first; b <= last; b++) {
+    const slot = buckets.slot(b);
+    if (slot < 0) {
+      continue;
+    }
+    const broken =
+      before >= 0 && ((buckets.lost[slot] ?? 0) > 0 || (b - before) * width_s > break_s + width_s);
+    if (broken) {
+      t_s.push(b * width_s);
+      slots.push(-1);
+      breaks.push(true);
+    }
+    t_s.push((b + 0.25) * width_s, (b + 0.75) * width_s);
+    slots.push(slot, slot);
+    breaks.push(false, false);
+    before = b;
+  }
+  const chart: Chart = { t_s, curves: new Map(), reach: new Map() };
+  for (const name of columns) {
+    const track = buckets.tracks.get(name);
+    if (!track) {
+      continue;
+    }
+    const length = t_s.length;
+    const good: (number | null)[] = new Array<number | null>(length).fill(null);
+    const doubtful: (number | null)[] = new Array<number | null>(length).fill(null);
+    const sdLow: (number | null)[] = new Array<number | null>(length).fill(null);
+    const sdHigh: (number | null)[] = new Array<number | null>(length).fill(null);
+    const sure = { low: Infinity, high: -Infinity };
+    const unsure = { low: Infinity, high: -Infinity };
+    let second = false;
+    let trustBefore = Trust.none;
+    for (let i = 0; i < length; i++) {
+      const slot = slots[i] ?? -1;
+      if (slot < 0) {
+        trustBefore = Trust.none;
+        second = false;
+        continue;
+      }
+      const trust: Trust = track.trust[slot] ?? Trust.none;
+      const low = track.low[slot] ?? 0;
+      const high = track.high[slot] ?? 0;
+      const value = second === (track.rises[slot] === 1) ? high : low;
+      if (trust !== Trust.none) {
+        (trust === Trust.good ? good : doubtful)[i] = value;
+        /* Where one ends and the other begins the dashes reach over. */
+        if (trustBefore === Trust.good && trust === Trust.doubtful) {
+          doubtful[i - 1] = good[i - 1] ?? null;
+        } else if (trustBefore === Trust.doubtful && trust === Trust.good) {
+          doubtful[i] = value;
+        }
+        const reach = trust === Trust.good ? sure : unsure;
+        const from = track.sdLow[slot] ?? NaN;
+        const to = track.sdHigh[slot] ?? NaN;
+        reach.low = Math.min(reach.low, low);
+        reach.high = Math.max(reach.high, high);
+        if (!Number.isNaN(from)) {
+          sdLow[i] = from;
+          sdHigh[i] = to;
+        }
+      }
+      trustBefore = trust;
+      second = !second;
+    }
+    chart.curves.set(name, { good, doubtful, sdLow, sdHigh });
+    chart.reach.set(name, sure.high >= sure.low ? sure : unsure.high >= unsure.low ? unsure : null);
+  }
+  return chart;
+}
+
+/** A run of intervals in which a flag was set. */
+export interface Span {
+  from_s: number;
+  to_s: number;
+}
+
+/** lost: 'lost' instead of a flag's bit gives where frames are missing. */
+export function spansOf(
+  buckets: Buckets,
+  bit: number | 'lost',
+  first: number,
+  last: number,
+  break_s: number,
+): Span[] {
+  const spans: Span[] = [];
+  const width_s = buckets.width_s;
+  for (let b = first; b <= last; b++) {
+    const slot = buckets.slot(b);
+    if (slot < 0) {
+      continue;
+    }
+    const is = bit === 'lost' ? (buckets.lost[slot] ?? 0) > 0 : ((buckets.flags[slot] ?? 0) & bit) !== 0;
+    if (!is) {
+      continue;
+    }
+    const from_s = b * width_s;
+    const before = spans[spans.length - 1];
+    if (before && from_s - before.to_s <= break_s) {
+      before.to_s = from_s + width_s;
+    } else {
+      spans.push({ from_s, to_s: from_s + width_s });
+    }
+  }
+  return spans;
+}
+
+/** 1, 2 or 5 times a power of ten, not below value. */
+export function roundAbove(value: number): number {
+  if (!(value > 0)) {
+    return 1;
+  }
+  const decade = 10 ** Math.floor(Math.log10(value) + 1e-9);
+  for (const step of [1, 2, 5]) {
+    if (step * decade >= value * (1 - 1e-6)) {
+      return step * decade;
+    }
+  }
+  return 10 * decade;
+}

@@ -1,0 +1,160 @@
+/** The hand on a simulated fingertip: with the pointer on its pad, or by what stands here. */
+import { button, element, slider } from './elements';
+import type { Touch } from './pad_view';
+import type { Hand } from './shown';
+
+const MOST_N = 20;
+/** Held down, a hand presses harder: from so much to what is set, most of it within so long. */
+const FIRST_N = 0.2;
+const RISE_s = 0.45;
+const WHEEL_PART = 1.15;
+
+type Doing = 'nothing' | 'pointer' | 'press' | 'hold';
+
+export class HandPanel implements Touch {
+  readonly element: HTMLElement;
+  private readonly force: { value: number; element: HTMLElement };
+  private readonly load: { value: number; element: HTMLElement };
+  private readonly angle: { value: number; element: HTMLElement };
+  private readonly x: { value: number; element: HTMLElement };
+  private readonly y: { value: number; element: HTMLElement };
+  private readonly pressButton: HTMLButtonElement;
+  private readonly holdButton: HTMLButtonElement;
+  private doing: Doing = 'nothing';
+  private since_ms = 0;
+  private sent = '';
+
+  constructor(private readonly hand: Hand) {
+    const object = element(
+      'select',
+      { id: 'object' },
+      ...hand.objects.map(({ name, title }) => element('option', { value: name }, title)),
+    );
+    object.addEventListener('change', () => {
+      this.end();
+      hand.choose(object.value);
+    });
+    const again = () => this.apply(performance.now());
+    this.force = slider('Force', 'N', { least: 0.5, most: MOST_N, step: 0.5, value: 4 }, again);
+    this.x = slider('Across', 'mm', { least: -13, most: 13, step: 0.5, value: 0 }, again);
+    this.y = slider('Along', 'mm', { least: -22, most: 22, step: 0.5, value: 0 }, again);
+    this.load = slider('Load', 'N', { least: 0, most: MOST_N, step: 0.1, value: 1 }, again);
+    this.angle = slider('Direction', '°', { least: -180, most: 180, step: 5, value: -90 }, again);
+    const friction = slider(
+      'Friction',
+      '',
+      { least: 0.1, most: 1.5, step: 0.05, value: 0.5 },
+      (value) => hand.setFriction(value),
+    );
+    this.pressButton = button('Press', () => this.toggle('press'), { 'aria-pressed': 'false' });
+    this.holdButton = button('Hold in a grip', () => this.toggle('hold'), { 'aria-pressed': 'false' });
+    const drop = button('Drop it', () => {
+      this.end();
+      hand.drop(this.x.value, this.y.value);
+    });
+    const lift = button('Lift', () => {
+      this.end();
+      hand.press(null);
+    });
+    this.element = element(
+      'section',
+      { class: 'hand', 'aria-label': 'Simulated hand' },
+      element('h3', {}, 'Your hand'),
+      element(
+        'p',
+        { class: 'hint' },
+        'Press on the pad and drag: longer presses harder, the wheel too. All of it is simulated.',
+      ),
+      element('div', { class: 'field' }, element('label', { for: 'object' }, 'Object'), object),
+      this.force.element,
+      element('div', { class: 'choices' }, this.pressButton, drop, lift),
+      element(
+        'details',
+        {},
+        element('summary', {}, 'Where, and slip'),
+        this.x.element,
+        this.y.element,
+        friction.element,
+        element('p', { class: 'hint' }, 'A grip presses while a load pulls; more than friction holds slips.'),
+        this.load.element,
+        this.angle.element,
+        element('div', { class: 'choices' }, this.holdButton),
+      ),
+    );
+  }
+
+  down(x_mm: number, y_mm: number): void {
+    this.end();
+    this.doing = 'pointer';
+    this.since_ms = performance.now();
+    this.move(x_mm, y_mm);
+  }
+
+  move(x_mm: number, y_mm: number): void {
+    this.x.value = x_mm;
+    this.y.value = y_mm;
+  }
+
+  up(): void {
+    if (this.doing === 'pointer') {
+      this.doing = 'nothing';
+      this.sent = '';
+      this.hand.press(null);
+    }
+  }
+
+  wheel(turns: number): void {
+    this.force.value = Math.max(0.5, this.force.value * WHEEL_PART ** turns + (turns > 0 ? 0.5 : 0));
+  }
+
+  /** Once a picture: the hand tells where it is. */
+  apply(now_ms: number): void {
+    if (this.doing === 'nothing') {
+      return;
+    }
+    const x_mm = this.x.value;
+    const y_mm = this.y.value;
+    const most_N = this.force.value;
+    const held_s = (now_ms - this.since_ms) / 1000;
+    const force_N =
+      this.doing === 'pointer'
+        ? most_N + (FIRST_N - most_N) * Math.exp(-held_s / RISE_s)
+        : most_N;
+    const rounded_N = Math.round(100 * force_N) / 100;
+    const grip = { load_N: this.load.value, angle_deg: this.angle.value };
+    const doing = JSON.stringify([this.doing, x_mm, y_mm, rounded_N, grip]);
+    if (doing === this.sent) {
+      return;
+    }
+    this.sent = doing;
+    if (this.doing === 'hold') {
+      this.hand.hold({ x_mm, y_mm, force_N: rounded_N, ...grip });
+    } else {
+      this.hand.press({ x_mm, y_mm, force_N: rounded_N });
+    }
+  }
+
+  private toggle(doing: 'press' | 'hold'): void {
+    const off = this.doing === doing;
+    this.end();
+    if (off) {
+      this.hand.press(null);
+    } else {
+      this.doing = doing;
+      this.since_ms = performance.now();
+      this.apply(this.since_ms);
+    }
+    this.tell();
+  }
+
+  private end(): void {
+    this.doing = 'nothing';
+    this.sent = '';
+    this.tell();
+  }
+
+  private tell(): void {
+    this.pressButton.setAttribute('aria-pressed', String(this.doing === 'press'));
+    this.holdButton.setAttribute('aria-pressed', String(this.doing === 'hold'));
+  }
+}

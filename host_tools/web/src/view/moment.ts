@@ -1,0 +1,42 @@
+/** A moment out of the last minutes, as the pad's picture shows it. */
+import { CONTACT_FIELDS, Flag } from '../line/packets';
+import { WARNING_FLAGS } from '../model/flags';
+import type { History } from '../model/history';
+import type { Place } from './pad_scene';
+import type { ShownContact } from './shown';
+
+const TRAIL_s = 1;
+const TRAIL_POINTS = 24;
+
+/** row: one that is kept. */
+export function contactAt(history: History, row: number): ShownContact {
+  const slot = history.slot(row);
+  const contact = { flags: history.flags[slot] ?? 0 } as ShownContact;
+  for (const field of CONTACT_FIELDS) {
+    contact[field] = history.columns[field][slot] || 0;
+  }
+  return contact;
+}
+
+/** Places without a warning in the second before a row, oldest first; none from before its contact
+ * began. */
+export function trailAt(history: History, row: number): Place[] {
+  const trail: Place[] = [];
+  const newest_s = history.t_s[history.slot(row)] ?? 0;
+  const step_s = TRAIL_s / TRAIL_POINTS;
+  for (let i = 0; i < TRAIL_POINTS; i++) {
+    const at = history.rowAt(newest_s - i * step_s);
+    if (at > row || at < history.begin) {
+      continue;
+    }
+    const slot = history.slot(at);
+    const flags = history.flags[slot] ?? 0;
+    if (!(flags & Flag.CONTACT)) {
+      break;
+    }
+    if (flags & Flag.FIT_VALID && !(flags & WARNING_FLAGS)) {
+      trail.unshift({ x_mm: history.columns.x_mm[slot] ?? 0, y_mm: history.columns.y_mm[slot] ?? 0 });
+    }
+  }
+  return trail;
+}

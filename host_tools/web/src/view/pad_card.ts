@@ -1,0 +1,140 @@
+/** One fingertip's pad with its name, its state and its force; several stand side by side. */
+import { Flag } from '../line/packets';
+import { WARNING_FLAGS } from '../model/flags';
+import { button, element, write } from './elements';
+import { HandPanel } from './hand_panel';
+import { contactAt, trailAt } from './moment';
+import { fixed } from './numbers';
+import { sceneOf } from './pad_scene';
+import { PadView } from './pad_view';
+import type { Palette } from './palette';
+import type { Shown, ShownContact } from './shown';
+
+export class PadCard {
+  readonly element: HTMLElement;
+  hand: HandPanel | null = null;
+  contact: ShownContact | null = null;
+  private view: PadView | null = null;
+  private layoutSeen: unknown = null;
+  private seen = '';
+  private readonly nameButton: HTMLButtonElement;
+  private readonly name = element('span', { class: 'name' });
+  private readonly state = element('span', { class: 'state' });
+  private readonly force = element('span', { class: 'force' });
+  private readonly alarm = element('span', { class: 'alarm', 'aria-hidden': 'true' });
+  private readonly frame = element('div', { class: 'pad-frame' });
+  private readonly above: HTMLButtonElement;
+  private readonly empty = element('p', { class: 'empty' }, 'No answer yet.');
+
+  constructor(
+    private readonly shown: Shown,
+    select: () => void,
+  ) {
+    const dot = element('span', { class: 'dot', 'aria-hidden': 'true' });
+    this.nameButton = element(
+      'button',
+      { type: 'button', class: 'pad-name' },
+      dot,
+      this.name,
+      this.state,
+      this.force,
+    );
+    this.nameButton.addEventListener('click', select);
+    this.above = button('From above', () => this.view?.setFromAbove(!this.view.fromAbove), {
+      class: 'above small',
+      'aria-pressed': 'false',
+    });
+    this.frame.append(this.empty, this.alarm);
+    this.element = element('figure', { class: 'pad-card' }, element('figcaption', {}, this.nameButton, this.above), this.frame);
+    this.element.dataset['finger'] = String(shown.finger);
+  }
+
+  set selected(selected: boolean) {
+    this.element.classList.toggle('selected', selected);
+    this.nameButton.setAttribute('aria-pressed', String(selected));
+  }
+
+  dispose(): void {
+    this.view?.dispose();
+    this.element.remove();
+  }
+
+  repaint(): void {
+    this.view?.repaint();
+  }
+
+  /** behind_s: before end_s, of a pause; null: live. True if something was drawn. */
+  draw(
+    end_s: number,
+    behind_s: number | null,
+    now_ms: number,
+    palette: Palette,
+  ): boolean {
+    const { shown } = this;
+    this.prepare();
+    this.hand?.apply(now_ms);
+    const { history, hand } = shown;
+    if (!history) {
+      return false;
+    }
+    const truth = hand?.truth;
+    const current = behind_s !== null || shown.isCurrent(performance.now());
+    const seen = `${history.end} ${behind_s} ${current} ${truth?.contact} ${truth?.x_mm} ${truth?.y_mm}`;
+    if (seen !== this.seen && shown.layout && this.view) {
+      this.seen = seen;
+      const live = behind_s === null;
+      const row = live
+        ? history.end - 1
+        : Math.min(history.rowAt(end_s - behind_s), history.end - 1);
+      const kept = row >= history.begin;
+      this.contact = live ? shown.contact : kept ? contactAt(history, row) : null;
+      const readings = live ? shown.readings : kept ? shown.readingsAt(row) : null;
+      if (!current) {
+        this.contact = null;
+      }
+      const place = live && truth?.contact ? { x_mm: truth.x_mm, y_mm: truth.y_mm } : null;
+      const trail = kept && current ? trailAt(history, row) : [];
+      const scene = sceneOf(shown.layout, this.contact, readings, trail, place, current);
+      this.view.show(scene);
+      const alarm = { slips: 'SLIPS', slides: 'SLIDES', moves: 'MOVES', none: '' }[scene.alarm ?? 'none'];
+      write(this.alarm, alarm);
+      this.frame.dataset['alarm'] = scene.alarm ?? '';
+    }
+    return this.view?.draw(now_ms, palette) ?? false;
+  }
+
+  /** Texts, which nobody reads at the rate of pictures. */
+  tell(): void {
+    const { shown, contact } = this;
+    write(this.name, shown.name);
+    const { words, level } = shown.state(performance.now());
+    write(this.state, words);
+    this.state.className = `state ${level}`;
+    const fitted = contact !== null && (contact.flags & Flag.FIT_VALID) !== 0;
+    const doubt = fitted && contact.flags & WARNING_FLAGS ? ' ?' : '';
+    write(this.force, fitted ? `${fixed(contact.force_N, 2)} N${doubt}` : '');
+    this.force.classList.toggle('doubtful', doubt !== '');
+  }
+
+  private prepare(): void {
+    const { layout, hand } = this.shown;
+    if (!layout || layout === this.layoutSeen) {
+      return;
+    }
+    this.layoutSeen = layout;
+    this.view?.dispose();
+    const keys = hand ? 'Arrow keys turn it, Home looks from above. Press on it with the pointer.' : 'Arrow keys turn it, Home looks from above.';
+    const view = new PadView(layout, `Pad of ${this.shown.name}. ${keys}`);
+    this.view = view;
+    this.hand = hand ? new HandPanel(hand) : null;
+    view.touch = this.hand;
+    view.element.classList.toggle('touchable', hand !== null);
+    view.onLook = () => this.above.setAttribute('aria-pressed', String(view.fromAbove));
+    this.above.hidden = !view.solid;
+    this.empty.remove();
+    this.frame.prepend(view.element);
+    if (!view.solid) {
+      this.frame.append(element('p', { class: 'plain' }, 'No WebGL here: drawn flat.'));
+    }
+  }
+}

@@ -1,0 +1,110 @@
+/** Pause, and a walk through the last minutes. */
+import { button, element, write } from './elements';
+
+const WINDOWS_s = [5, 20, 60, 180];
+const STEP_s = 0.1;
+const FAR_s = 5;
+
+export class Timeline {
+  readonly element: HTMLElement;
+  /** What the traces span. */
+  window_s = 20;
+  /** How far before the newest frame, of the pause, is looked at; null: live. */
+  behind_s: number | null = null;
+  onChange: (() => void) | null = null;
+  private kept_s = 0;
+  private readonly pauseButton: HTMLButtonElement;
+  private readonly slider: HTMLInputElement;
+  private readonly told: HTMLOutputElement;
+
+  constructor() {
+    this.pauseButton = button('Pause', () => this.toggle(), {
+      class: 'pause',
+      'aria-keyshortcuts': 'Space',
+    });
+    this.slider = element('input', {
+      type: 'range',
+      min: -60,
+      max: 0,
+      step: 'any',
+      value: 0,
+      'aria-label': 'Moment shown, seconds before now',
+    });
+    this.told = element('output', { class: 'moment' });
+    this.slider.addEventListener('input', () => this.seek(-Number(this.slider.value)));
+    this.slider.addEventListener('keydown', (event) => {
+      const steps: Record<string, number> = {
+        ArrowLeft: STEP_s,
+        ArrowDown: STEP_s,
+        ArrowRight: -STEP_s,
+        ArrowUp: -STEP_s,
+        PageDown: FAR_s,
+        PageUp: -FAR_s,
+      };
+      const step = steps[event.key];
+      if (step !== undefined) {
+        event.preventDefault();
+        this.seek((this.behind_s ?? 0) + (event.shiftKey ? 10 : 1) * step);
+      }
+    });
+    const choice = element(
+      'select',
+      { 'aria-label': 'Time shown', class: 'window' },
+      ...WINDOWS_s.map((seconds) =>
+        element(
+          'option',
+          { value: seconds, selected: seconds === this.window_s },
+          seconds < 60 ? `${seconds} s` : `${seconds / 60} min`,
+        ),
+      ),
+    );
+    choice.addEventListener('change', () => {
+      this.window_s = Number(choice.value);
+      this.onChange?.();
+    });
+    this.element = element(
+      'div',
+      { class: 'timeline', role: 'group', 'aria-label': 'Time' },
+      this.pauseButton,
+      this.slider,
+      this.told,
+      choice,
+    );
+    this.show();
+  }
+
+  /** How much is kept, so how far back one can go. */
+  set length_s(length_s: number) {
+    const kept_s = Math.max(1, length_s);
+    if (Math.abs(kept_s - this.kept_s) > 0.5) {
+      this.kept_s = kept_s;
+      this.slider.min = String(-kept_s);
+    }
+  }
+
+  toggle(): void {
+    this.behind_s = this.behind_s === null ? 0 : null;
+    this.show();
+    this.onChange?.();
+  }
+
+  seek(behind_s: number): void {
+    this.behind_s = Math.min(Math.max(behind_s, 0), this.kept_s);
+    this.show();
+    this.onChange?.();
+  }
+
+  step(by_s: number): void {
+    this.seek((this.behind_s ?? 0) + by_s);
+  }
+
+  private show(): void {
+    const live = this.behind_s === null;
+    write(this.pauseButton, live ? 'Pause' : 'Go live');
+    this.element.classList.toggle('paused', !live);
+    this.slider.value = String(-(this.behind_s ?? 0));
+    const text = live ? 'live' : `${(this.behind_s ?? 0).toFixed(1)} s before the pause`;
+    write(this.told, live ? 'live' : `−${(this.behind_s ?? 0).toFixed(1)} s`);
+    this.slider.setAttribute('aria-valuetext', text);
+  }
+}

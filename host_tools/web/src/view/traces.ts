@@ -1,0 +1,364 @@
+/** Force, place, load and slip over time, and which flags were set: one axis of time for all. */
+import { Flag } from '../line/packets';
+import { FLAGS } from '../model/flags';
+import uPlot from 'uplot';
+import { Buckets, intervalOf, type ColumnName } from './buckets';
+import { chartOf, roundAbove, spansOf, type Chart } from './curves';
+import { cssOf, type Palette } from './palette';
+import type { History } from '../model/history';
+import type { Shown } from './shown';
+
+/** Room for the names of values; the flags keep it too, so that times stand below one another. */
+const AXIS_px = 52;
+const RIGHT_px = 12;
+const MOST_INTERVALS = 1400;
+/** A doubtful force above this is none: the pads are made for less. */
+const MOST_N = 50;
+/** A load below this is hardly more than its standard deviation: no axis is made for it. */
+const LEAST_PULL_N = 0.5;
+const ROW_px = 15;
+/** Longer between frames than this, and a line is broken. */
+const BREAK_s = 0.25;
+
+interface Plot {
+  readonly title: string;
+  readonly unit: string;
+  readonly columns: readonly ColumnName[];
+  readonly height: number;
+  readonly digits: number;
+  readonly tangential?: boolean;
+}
+
+const PLOTS: readonly Plot[] = [
+  { title: 'Force', unit: 'N', columns: ['force_N'], height: 1.5, digits: 2 },
+  { title: 'Pull', unit: 'N', columns: ['qx_N', 'qy_N'], height: 1, digits: 2, tangential: true },
+  { title: 'Place', unit: 'mm', columns: ['x_mm', 'y_mm'], height: 1.2, digits: 2 },
+  { title: 'Slip', unit: 'mm', columns: ['slip_mm'], height: 1, digits: 3 },
+];
+
+/** First and second curve of a plot. */
+const COLOURS = ['finger-0', 'finger-1'];
+
+interface Drawn {
+  readonly plot: Plot;
+  readonly box: HTMLElement;
+  readonly chart: uPlot;
+  low: number;
+  high: number;
+  threshold: number | null;
+}
+
+export interface Span_s {
+  from_s: number;
+  to_s: number;
+}
+
+export class Traces {
+  readonly element = document.createElement('div');
+  private readonly buckets = new Buckets(2 * MOST_INTERVALS);
+  private readonly strip = document.createElement('canvas');
+  private drawn: Drawn[] = [];
+  private palette: Palette | null = null;
+  private tangential = false;
+  private width = 0;
+  private height = 0;
+  private names: string[] = [];
+  /** A place in time was pointed at; null: no longer. */
+  onPoint: ((t_s: number | null) => void) | null = null;
+
+  constructor() {
+    this.element.className = 'traces';
+    this.strip.className = 'flags';
+    this.strip.setAttribute('role', 'img');
+    new ResizeObserver(() => {
+      const { clientWidth, clientHeight } = this.element;
+      if (clientWidth !== this.width || clientHeight !== this.height) {
+        this.width = clientWidth;
+        this.height = clientHeight;
+        this.resize();
+      }
+    }).observe(this.element);
+  }
+
+  setPalette(palette: Palette): void {
+    this.palette = palette;
+    this.build();
+  }
+
+  /** zero_s: the time that the axis calls 0, as "now" or the end of the recording. */
+  draw(fingertip: Shown, history: History, span: Span_s): void {
+    if (fingertip.tangential !== this.tangential) {
+      this.tangential = fingertip.tangential;
+      this.build();
+    }
+    const inner = this.width - AXIS_px - RIGHT_px;
+    if (!this.palette || inner < 40 || this.drawn.length === 0) {
+      return;
+    }
+    const least_s = fingertip.frames_per_s > 0 ? 1.5 / fingertip.frames_per_s : 0;
+    const width_s = Math.max(
+      intervalOf(span.to_s - span.from_s, Math.min(inner / 1.5, MOST_INTERVALS)),
+      intervalOf(least_s, 1),
+    );
+    const { first, last } = this.buckets.read(history, width_s, span.from_s, span.to_s);
+    const break_s = Math.max(BREAK_s, 3 * width_s);
+    const columns = this.drawn.flatMap(({ plot }) => plot.columns);
+    const chart = chartOf(this.buckets, columns, first, last, break_s);
+    for (const drawn of this.drawn) {
+      this.scale(drawn, chart, fingertip);
+      const lists = drawn.plot.columns.flatMap((name) => {
+        const curves = chart.curves.get(name);
+        return curves ? [curves.sdHigh, curves.sdLow, curves.doubtful, curves.good] : [];
+      });
+      drawn.chart.batch(() => {
+        drawn.chart.setData([chart.t_s, ...lists] as uPlot.AlignedData, false);
+        drawn.chart.setScale('x', { min: span.from_s, max: span.to_s });
+        drawn.chart.setScale('y', { min: drawn.low, max: drawn.high });
+      });
+    }
+    this.drawStrip(first, last, span, break_s);
+  }
+
+  /** Axes that seldom jump: round limits, which shrink only when far too wide. */
+  private scale(drawn: Drawn, chart: Chart, fingertip: Shown): void {
+    const { plot } = drawn;
+    const reaches = plot.columns.map((name) => chart.reach.get(name) ?? null);
+    const most = Math.max(
+      0,
+      ...reaches.map((reach) => (reach ? Math.max(Math.abs(reach.low), Math.abs(reach.high)) : 0)),
+    );
+    drawn.threshold = null;
+    if (plot.columns[0] === 'x_mm') {
+      const layout = fingertip.layout;
+      const reach =
+        6 +
+        Math.max(
+          0,
+          ...Array.from(layout?.x_mm ?? [], Math.abs),
+          ...Array.from(layout?.y_mm ?? [], Math.abs),
+        );
+      drawn.low = -reach;
+      drawn.high = reach;
+      return;
+    }
+    if (plot.tangential) {
+      drawn.high = steady(drawn.high, Math.max(most, LEAST_PULL_N));
+      drawn.low = -drawn.high;
+      return;
+    }
+    if (plot.columns[0] === 'slip_mm') {
+      drawn.threshold = fingertip.slip_threshold_mm || null;
+      drawn.high = steady(drawn.high, Math.max(most, 0.1, 1.2 * fingertip.slip_threshold_mm));
+    } else {
+      drawn.high = steady(drawn.high, Math.min(Math.max(most * 1.05, 1), MOST_N));
+    }
+    drawn.low = 0;
+  }
+
+  private build(): void {
+    const palette = this.palette;
+    for (const { chart } of this.drawn) {
+      chart.destroy();
+    }
+    this.drawn = [];
+    this.element.replaceChildren();
+    if (!palette) {
+      return;
+    }
+    const plots = PLOTS.filter((plot) => !plot.tangential || this.tangential);
+    for (const plot of plots) {
+      const box = document.createElement('div');
+      box.className = 'trace';
+      const title = document.createElement('div');
+      title.className = 'trace-title';
+      title.textContent = `${plot.title}, ${plot.unit}`;
+      if (plot.columns.length > 1) {
+        plot.columns.forEach((name, i) => {
+          const key = document.createElement('span');
+          key.className = 'key';
+          key.dataset['curve'] = String(i);
+          key.textContent = name.replace(/_.*/, '');
+          title.append(key);
+        });
+      }
+      box.append(title);
+      this.element.append(box);
+      const drawn: Drawn = {
+        plot,
+        box,
+        low: 0,
+        high: 1,
+        threshold: null,
+        chart: new uPlot(this.options(plot, palette, () => drawn), [[]], box),
+      };
+      this.drawn.push(drawn);
+    }
+    this.element.append(this.strip);
+    this.resize();
+  }
+
+  private options(plot: Plot, palette: Palette, drawn: () => Drawn): uPlot.Options {
+    const line = { stroke: palette.css('line'), width: 1 };
+    const axis = {
+      stroke: palette.css('faint'),
+      grid: line,
+      ticks: { show: false },
+      font: '11px system-ui, sans-serif',
+    };
+    const last = plot === PLOTS[PLOTS.length - 1];
+    const colours = plot.columns.map((_, i) => palette.css(COLOURS[i] ?? 'finger-0'));
+    const see = (css: string, part: number) =>
+      `${css}${Math.round(255 * part).toString(16).padStart(2, '0')}`;
+    return {
+      width: 300,
+      height: 100,
+      padding: [6, RIGHT_px, last ? 0 : 4, 0],
+      cursor: {
+        sync: { key: 'fingertip' },
+        drag: { x: false, y: false },
+        points: { show: false },
+        y: false,
+      },
+      legend: { show: false },
+      scales: { x: { time: false, auto: false }, y: { auto: false } },
+      axes: [
+        {
+          ...axis,
+          show: last,
+          size: 22,
+          gap: 2,
+          space: 70,
+          values: (_chart, times) => times.map((t_s) => clock(t_s)),
+        },
+        { ...axis, size: AXIS_px, gap: 4, space: 26 },
+      ],
+      series: [
+        {},
+        ...colours.flatMap((colour): uPlot.Series[] => [
+          { stroke: 'transparent', width: 0, points: { show: false } },
+          { stroke: 'transparent', width: 0, points: { show: false } },
+          { stroke: see(colour, 0.75), width: 1, dash: [3, 3], points: { show: false } },
+          { stroke: colour, width: 1.4, points: { show: false } },
+        ]),
+      ],
+      bands: colours.map((colour, i) => ({
+        series: [1 + 4 * i, 2 + 4 * i] as [number, number],
+        fill: see(colour, 0.22),
+      })),
+      hooks: {
+        drawAxes: [
+          (chart) => {
+            const threshold = drawn()?.threshold;
+            if (threshold) {
+              const y = chart.valToPos(threshold, 'y', true);
+              const pen = chart.ctx;
+              pen.save();
+              pen.strokeStyle = palette.css('bad');
+              pen.setLineDash([6, 4]);
+              pen.beginPath();
+              pen.moveTo(chart.bbox.left, y);
+              pen.lineTo(chart.bbox.left + chart.bbox.width, y);
+              pen.stroke();
+              pen.restore();
+            }
+          },
+        ],
+        setCursor: [
+          (chart) => {
+            const left = chart.cursor.left ?? -1;
+            this.onPoint?.(left >= 0 ? chart.posToVal(left, 'x') : null);
+          },
+        ],
+      },
+    };
+  }
+
+  private resize(): void {
+    if (this.width < 60 || this.drawn.length === 0) {
+      return;
+    }
+    const titles = 20 * this.drawn.length;
+    const room = Math.max(this.height - titles - 6 * ROW_px - 40, 74 * this.drawn.length);
+    const total = this.drawn.reduce((sum, { plot }) => sum + plot.height, 0);
+    for (const { chart, plot } of this.drawn) {
+      const last = plot === PLOTS[PLOTS.length - 1];
+      const height = Math.min(Math.floor((room * plot.height) / total), 240) + (last ? 22 : 0);
+      chart.setSize({ width: this.width, height });
+    }
+  }
+
+  /** Contact, slip, each warning that occurs, and what was lost, as spans with their names. */
+  private drawStrip(first: number, last: number, span: Span_s, break_s: number): void {
+    const palette = this.palette;
+    const pen = this.strip.getContext('2d');
+    if (!palette || !pen) {
+      return;
+    }
+    const join_s = Math.max(2 * this.buckets.width_s, break_s / 8);
+    const rows = [
+      { name: 'contact', bit: Flag.CONTACT as number | 'lost', colour: 'accent', always: true },
+      { name: 'slip', bit: Flag.SLIP, colour: 'bad', always: true },
+      { name: 'sliding', bit: Flag.SLIDING, colour: 'bad', always: false },
+      { name: 'moving', bit: Flag.MOVING, colour: 'good', always: false },
+      ...FLAGS.filter(({ warning }) => warning).map(({ bit, meaning }) => ({ name: meaning, bit, colour: 'warning', always: false })),
+      { name: 'lost frames', bit: 'lost' as const, colour: 'bad', always: false },
+    ]
+      .map((row) => ({ ...row, spans: spansOf(this.buckets, row.bit, first, last, join_s) }))
+      .filter((row) => row.always || row.spans.length > 0);
+    const dense = Math.min(devicePixelRatio, 2);
+    const height = rows.length * ROW_px + 4;
+    if (this.strip.width !== Math.round(this.width * dense) || this.strip.height !== Math.round(height * dense)) {
+      this.strip.width = Math.round(this.width * dense);
+      this.strip.height = Math.round(height * dense);
+      this.strip.style.height = `${height}px`;
+    }
+    const names = rows.filter((row) => row.spans.length > 0).map((row) => row.name);
+    if (names.join() !== this.names.join()) {
+      this.names = names;
+      this.strip.setAttribute('aria-label', `Flags in this time: ${names.join(', ') || 'none'}`);
+    }
+    pen.setTransform(dense, 0, 0, dense, 0, 0);
+    pen.clearRect(0, 0, this.width, height);
+    const inner = this.width - AXIS_px - RIGHT_px;
+    const x = (t_s: number) =>
+      AXIS_px +
+      (inner * Math.min(Math.max(t_s - span.from_s, 0), span.to_s - span.from_s)) /
+        (span.to_s - span.from_s);
+    pen.font = '11px system-ui, sans-serif';
+    pen.textBaseline = 'middle';
+    rows.forEach((row, i) => {
+      const y = i * ROW_px + 2;
+      pen.fillStyle = palette.css('raised');
+      pen.fillRect(AXIS_px, y, inner, ROW_px - 3);
+      pen.fillStyle = palette.css(row.colour);
+      pen.globalAlpha = row.colour === 'accent' ? 0.45 : 0.6;
+      for (const { from_s, to_s } of row.spans) {
+        const left = x(from_s);
+        pen.fillRect(left, y, Math.max(x(to_s) - left, 1.5), ROW_px - 3);
+      }
+      pen.globalAlpha = 1;
+      pen.strokeStyle = cssOf(palette.of('surface'));
+      pen.lineWidth = 3;
+      pen.lineJoin = 'round';
+      pen.strokeText(row.name, AXIS_px + 5, y + (ROW_px - 3) / 2 + 0.5);
+      pen.fillStyle = palette.css('text');
+      pen.fillText(row.name, AXIS_px + 5, y + (ROW_px - 3) / 2 + 0.5);
+    });
+  }
+}
+
+function steady(limit: number, wanted: number): number {
+  const round = roundAbove(wanted);
+  return round > limit || wanted < limit / 4 ? round : limit;
+}
+
+/** 1:05.2 of the time since the first frame. */
+export function clock(t_s: number): string {
+  const minutes = Math.floor(t_s / 60);
+  const rest = t_s - 60 * minutes;
+  const text = (Math.abs(rest - Math.round(rest)) < 0.005 ? rest.toFixed(0) : rest.toFixed(1)).padStart(
+    minutes > 0 ? 2 : 1,
+    '0',
+  );
+  return minutes > 0 ? `${minutes}:${text}` : `${text} s`;
+}

@@ -1,0 +1,319 @@
+/** The page: who is there, their pads, numbers, traces and health, and the time that is looked at. It
+ * reads the fingertips when it draws, and changes nothing of them by itself. */
+import 'uplot/dist/uPlot.min.css';
+import '../styles/tokens.css';
+import '../styles/page.css';
+import '../styles/steps.css';
+import type { Bench } from '../model/bench';
+import type { Fingertip } from '../model/fingertip';
+import type { History } from '../model/history';
+import { button, element, write } from './elements';
+import { HealthPanel } from './health';
+import { factsOf } from './health_facts';
+import { Numbers } from './numbers';
+import { PadCard } from './pad_card';
+import { Shown } from './shown';
+import { Speech } from './speech';
+import { onPalette, palette, restoreTheme, setTheme, theme, type Theme } from './theme';
+import { Timeline } from './timeline';
+import { Traces } from './traces';
+
+/** What others make and the view places. */
+export interface Controls {
+  /** Connect, replay and what else concerns no single fingertip. */
+  readonly page: HTMLElement;
+  /** Tare, record and so on; asked for once for each. */
+  of(fingertip: Fingertip): HTMLElement;
+  connect(): void;
+  simulate(): void;
+}
+
+export function mountView(root: HTMLElement, bench: Bench, controls: Controls): View {
+  return new View(root, bench, controls);
+}
+
+const TRACES_INTERVAL_ms = 33;
+const TEXT_INTERVAL_ms = 125;
+const HEALTH_INTERVAL_ms = 500;
+
+export class View {
+  /** Pictures drawn so far. */
+  pictures = 0;
+  private readonly shown = new Map<Fingertip, Shown>();
+  private readonly cards = new Map<Fingertip, PadCard>();
+  private readonly doings = new Map<Fingertip, HTMLElement>();
+  private selected: Fingertip | null = null;
+  private made = 0;
+  private readonly numbers = new Numbers();
+  private readonly traces = new Traces();
+  private readonly health = new HealthPanel();
+  private readonly timeline = new Timeline();
+  private readonly speech = new Speech();
+  private readonly pads = element('div', { class: 'pads' });
+  private readonly handPlace = element('div', { class: 'hand-place' });
+  private readonly heading = element('h2');
+  private readonly doingsPlace = element('div', { class: 'doings', role: 'group' });
+  private readonly live = element('p', { class: 'spoken', role: 'status', 'aria-live': 'polite' });
+  private readonly notices = element('div', { class: 'notices', role: 'alert' });
+  private readonly welcome: HTMLElement;
+  private readonly work: HTMLElement;
+  private tracesAt_ms = 0;
+  private textAt_ms = 0;
+  private healthAt_ms = 0;
+  private tracesDue = true;
+  private tracedEnd = -1;
+  /** Of each fingertip when the pause began. */
+  private readonly ends = new Map<Fingertip, number>();
+
+  constructor(
+    private readonly root: HTMLElement,
+    private readonly bench: Bench,
+    private readonly controls: Controls,
+  ) {
+    restoreTheme();
+    this.welcome = this.welcomeOf();
+    this.work = element(
+      'div',
+      { class: 'work', hidden: true },
+      element('section', { class: 'pads-place', 'aria-label': 'Pads' }, this.pads),
+      element(
+        'section',
+        { class: 'side', 'aria-label': 'Numbers' },
+        element('div', { class: 'who' }, this.heading, this.doingsPlace),
+        this.numbers.element,
+        this.handPlace,
+      ),
+      element('section', { class: 'over-time', 'aria-label': 'Over time' }, this.traces.element, this.timeline.element),
+      element('section', { class: 'behind', 'aria-label': 'Health' }, this.health.element),
+    );
+    this.root.append(
+      element('a', { class: 'skip', href: '#main' }, 'To the fingertip'),
+      this.header(),
+      this.notices,
+      element('main', { id: 'main', tabindex: -1 }, this.welcome, this.work),
+      this.live,
+    );
+    this.traces.setPalette(palette());
+    onPalette((changed) => {
+      this.traces.setPalette(changed);
+      this.tracesDue = true;
+      for (const card of this.cards.values()) {
+        card.repaint();
+      }
+    });
+    this.timeline.onChange = () => this.timeChanged();
+    this.root.addEventListener('keydown', (event) => this.key(event));
+    bench.listen(() => this.gather());
+    this.gather();
+    requestAnimationFrame((now_ms) => this.draw(now_ms));
+  }
+
+  get chosen(): Fingertip | null {
+    return this.selected;
+  }
+
+  choose(fingertip: Fingertip | null): void {
+    this.selected = fingertip;
+    for (const [of, card] of this.cards) {
+      card.selected = of === fingertip;
+    }
+    const doings = fingertip && this.doings.get(fingertip);
+    this.doingsPlace.replaceChildren(...(doings ? [doings] : []));
+    this.handPlace.replaceChildren();
+    this.tracesDue = true;
+    this.textAt_ms = this.healthAt_ms = -Infinity;
+  }
+
+  /** A sentence that stays until it is closed. */
+  notice(text: string, level: 'plain' | 'bad' = 'plain'): void {
+    const told = element('div', { class: `notice ${level}` }, element('p', {}, text));
+    told.append(button('Close', () => told.remove(), { class: 'small' }));
+    this.notices.append(told);
+  }
+
+  private gather(): void {
+    const { fingertips } = this.bench;
+    for (const [fingertip, card] of this.cards) {
+      if (!fingertips.includes(fingertip)) {
+        card.dispose();
+        for (const map of [this.cards, this.shown, this.doings, this.ends]) {
+          map.delete(fingertip);
+        }
+      }
+    }
+    let came: Fingertip | null = null;
+    for (const fingertip of fingertips) {
+      if (!this.cards.has(fingertip)) {
+        const shown = new Shown(fingertip, this.made++);
+        const card = new PadCard(shown, () => this.choose(fingertip));
+        this.shown.set(fingertip, shown);
+        this.cards.set(fingertip, card);
+        this.doings.set(fingertip, this.controls.of(fingertip));
+        this.pads.append(card.element);
+        came = fingertip;
+      }
+    }
+    this.pads.dataset['count'] = String(fingertips.length);
+    this.welcome.hidden = fingertips.length > 0;
+    this.work.hidden = fingertips.length === 0;
+    const gone = this.selected === null || !fingertips.includes(this.selected);
+    if (came || gone) {
+      this.choose(came ?? fingertips[0] ?? null);
+    }
+  }
+
+  private header(): HTMLElement {
+    const themes = element(
+      'select',
+      { 'aria-label': 'Colours' },
+      ...(['system', 'light', 'dark'] as const).map((name) =>
+        element('option', { value: name, selected: name === theme() }, { system: 'Auto', light: 'Light', dark: 'Dark' }[name]),
+      ),
+    );
+    themes.addEventListener('change', () => setTheme(themes.value as Theme));
+    return element(
+      'header',
+      { class: 'top' },
+      element('h1', {}, 'Fingertip'),
+      element(
+        'div',
+        { class: 'top-actions' },
+        this.controls.page,
+        themes,
+      ),
+    );
+  }
+
+  private welcomeOf(): HTMLElement {
+    return element(
+      'section',
+      { class: 'welcome', 'aria-label': 'Begin' },
+      element('h2', {}, 'Touch, in numbers'),
+      element(
+        'p',
+        {},
+        'This page shows where a soft fingertip with fifteen pressure sensors is touched, how hard, and whether ' +
+          'the thing slips. Plug one in, or try it without: a simulated one runs the same firmware in this page.',
+      ),
+      element(
+        'div',
+        { class: 'begin' },
+        button('Connect a fingertip', () => this.controls.connect(), { class: 'main' }),
+        button('Try the simulated one', () => this.controls.simulate()),
+      ),
+      element('p', { class: 'hint' }, 'Or drop a recording here. Nothing leaves this computer.'),
+    );
+  }
+
+  private timeChanged(): void {
+    this.tracesDue = true;
+    if (this.timeline.behind_s === null) {
+      this.ends.clear();
+      return;
+    }
+    for (const [fingertip, { history }] of this.shown) {
+      if (!this.ends.has(fingertip)) {
+        this.ends.set(fingertip, newest_s(history));
+      }
+    }
+  }
+
+  private key(event: KeyboardEvent): void {
+    const target = event.target as HTMLElement;
+    const busy =
+      target.closest('input, select, textarea, button, summary, dialog, a') !== null ||
+      event.ctrlKey || event.metaKey || event.altKey;
+    if (busy || this.shown.size === 0) {
+      return;
+    }
+    if (event.key === ' ') {
+      this.timeline.toggle();
+    } else if (event.key === 'ArrowLeft') {
+      this.timeline.step(event.shiftKey ? 5 : 0.5);
+    } else if (event.key === 'ArrowRight') {
+      this.timeline.step(event.shiftKey ? -5 : -0.5);
+    } else {
+      return;
+    }
+    event.preventDefault();
+  }
+
+  private draw(now_ms: number): void {
+    requestAnimationFrame((next_ms) => this.draw(next_ms));
+    const { behind_s } = this.timeline;
+    const colours = palette();
+    let drawn = false;
+    for (const [fingertip, card] of this.cards) {
+      const end_s = this.ends.get(fingertip) ?? newest_s(fingertip.history);
+      drawn = card.draw(end_s, behind_s, now_ms, colours) || drawn;
+    }
+    const chosen = this.selected;
+    const shown = chosen && this.shown.get(chosen);
+    const card = chosen && this.cards.get(chosen);
+    if (shown && card) {
+      drawn = this.drawChosen(shown, card, behind_s, now_ms) || drawn;
+    }
+    if (drawn) {
+      this.pictures++;
+    }
+  }
+
+  private drawChosen(
+    shown: Shown,
+    card: PadCard,
+    behind_s: number | null,
+    now_ms: number,
+  ): boolean {
+    const { fingertip, history } = shown;
+    const end_s = this.ends.get(fingertip) ?? newest_s(history);
+    const fresh = behind_s === null && history !== null && history.end !== this.tracedEnd;
+    let drawn = false;
+    if (history && (this.tracesDue || fresh) && now_ms - this.tracesAt_ms >= TRACES_INTERVAL_ms) {
+      this.tracesAt_ms = now_ms;
+      this.tracesDue = false;
+      this.tracedEnd = history.end;
+      const to_s = end_s - (behind_s ?? 0);
+      this.traces.draw(shown, history, { from_s: to_s - this.timeline.window_s, to_s });
+      drawn = true;
+    }
+    if (now_ms - this.textAt_ms >= TEXT_INTERVAL_ms) {
+      this.textAt_ms = now_ms;
+      this.tell(shown, card, now_ms);
+    }
+    if (now_ms - this.healthAt_ms >= HEALTH_INTERVAL_ms) {
+      this.healthAt_ms = now_ms;
+      this.health.show(factsOf(shown));
+      const kept = history !== null && history.end > history.begin;
+      const oldest_s = kept ? (history.t_s[history.slot(history.begin)] ?? 0) : end_s;
+      this.timeline.length_s = end_s - oldest_s;
+    }
+    return drawn;
+  }
+
+  private tell(shown: Shown, card: PadCard, now_ms: number): void {
+    for (const each of this.cards.values()) {
+      each.tell();
+    }
+    const { contact, hand } = card;
+    write(this.heading, shown.name);
+    this.doingsPlace.setAttribute('aria-label', `What to do with ${shown.name}`);
+    this.numbers.show(contact, shown.tangential, shown.location_limit_mm);
+    if (hand && hand.element.parentElement !== this.handPlace) {
+      this.handPlace.replaceChildren(hand.element);
+    }
+    if (this.timeline.behind_s === null) {
+      const several = this.shown.size > 1 ? `${shown.name}: ` : '';
+      const state = shown.state(performance.now()).words.replace(/ for \d+ s$/, '');
+      const sentence = this.speech.say(contact, state, now_ms);
+      if (sentence) {
+        write(this.live, several + sentence);
+      }
+    }
+  }
+}
+
+function newest_s(history: History | null): number {
+  return history && history.end > history.begin
+    ? (history.t_s[history.slot(history.end - 1)] ?? 0)
+    : 0;
+}

@@ -1,0 +1,71 @@
+// The page's WebAssembly modules, in the browser and in node: what they import, and errors.
+
+/** What C++ threw, or what a library wrote before it gave up. The message is for people. */
+export class WasmError extends Error {}
+
+/** The firmware ended itself, for its loader or in a panic; the module cannot be run again. */
+export class FirmwareLeft extends Error {
+  constructor(how) {
+    super(how === FirmwareLeft.LOADER ? 'left for its loader' : 'ended itself');
+    this.how = how;
+  }
+}
+FirmwareLeft.LOADER = 1; // enum native_end
+
+/** An instance of a compiled module: its exports, ready to be called. */
+export async function start(module) {
+  let exports;
+  let written = '';
+  const memory = () => new DataView(exports.memory.buffer);
+  const text = (at, length) =>
+    new TextDecoder().decode(new Uint8Array(exports.memory.buffer, at, length));
+  const imports = {
+    fingertip: {
+      leave(how) {
+        throw new FirmwareLeft(how);
+      },
+      thrown(at, length) {
+        throw new WasmError(text(at, length));
+      },
+    },
+    wasi_snapshot_preview1: {
+      // Standard error alone is written to: the last words before a trap.
+      fd_write(_file, vectors, count, total) {
+        let bytes = 0;
+        for (let i = 0; i < count; i++) {
+          const length = memory().getUint32(vectors + 8 * i + 4, true);
+          written = (written + text(memory().getUint32(vectors + 8 * i, true), length)).slice(-400);
+          bytes += length;
+        }
+        memory().setUint32(total, bytes, true);
+        return 0;
+      },
+      fd_close: () => 8, // no such file
+      fd_seek: () => 8,
+      proc_exit(code) {
+        throw new WasmError(written || `ended with ${code}`);
+      },
+    },
+  };
+  const instance = await WebAssembly.instantiate(module, imports);
+  exports = instance.exports;
+  exports._initialize();
+  /** Calls name; after an error the stack is as it was. */
+  const call = (name, ...values) => {
+    const stack = exports.__stack_pointer.value;
+    try {
+      return exports[name](...values);
+    } catch (error) {
+      exports.__stack_pointer.value = stack;
+      throw error instanceof WebAssembly.RuntimeError && written ? new WasmError(written) : error;
+    }
+  };
+  return {
+    exports,
+    call,
+    /** Views of the memory; a call may move it, so they are good until the next one. */
+    bytes: (at, length) => new Uint8Array(exports.memory.buffer, at, length),
+    floats: (at, length) => new Float32Array(exports.memory.buffer, at, length),
+    doubles: (at, length) => new Float64Array(exports.memory.buffer, at, length),
+  };
+}

@@ -1,0 +1,312 @@
+/** A fingertip's model over a line that the test speaks on: answers, refusals, losses, going and coming back; history; clocks. */
+import assert from 'node:assert/strict';
+import test from 'node:test';
+import { ClockFit } from '../../../host_tools/web/src/line/clock_fit';
+import type { Line } from '../../../host_tools/web/src/line/line';
+import { cobsDecode, cobsEncode, crc32 } from '../../../host_tools/web/src/line/framing';
+import {
+  Flag,
+  PacketType,
+  Result,
+  Stream,
+  blank,
+  encodePacket,
+  type Contact,
+  type DevicePacket,
+  type Info,
+  type Raw,
+} from '../../../host_tools/web/src/line/packets';
+import { Bench } from '../../../host_tools/web/src/model/bench';
+import { CommandError, Fingertip, OtherFingertip } from '../../../host_tools/web/src/model/fingertip';
+import { FLAGS, WARNING_FLAGS, flagsText } from '../../../host_tools/web/src/model/flags';
+import { History } from '../../../host_tools/web/src/model/history';
+import { commandsFor } from '../../../host_tools/web/src/steps/settings';
+import { Decoder } from '../../../host_tools/web/src/line/decoder';
+import { vector } from './vectors';
+
+function contactOf(frame: number, t_us: number, more: Partial<Contact> = {}): Contact {
+  return { ...(blank(PacketType.CONTACT) as unknown as Contact), frame, t_us, ...more };
+}
+
+function rawOf(frame: number, t_us: number, above_Pa: number[], more: Partial<Raw> = {}): Raw {
+  const raw = { ...(blank(PacketType.RAW) as unknown as Raw), frame, t_us, valid: 2 ** above_Pa.length - 1, ...more };
+  raw.sensor_count = above_Pa.length;
+  above_Pa.forEach((value, k) => {
+    raw.pressure_Pa_q10[k] = (100_000 + value) * 1024;
+    raw.baseline_Pa_q10[k] = 100_000 * 1024;
+  });
+  return raw;
+}
+
+/** A fingertip as its line shows it. */
+class SpokenLine implements Line {
+  readonly label = 'a test';
+  result: number = Result.DONE;
+  streams = 0;
+  commands: number[] = [];
+  /** Version of the protocol that it speaks. */
+  version = 5;
+  silent = false;
+  device_us = 5_000_000;
+  sequence = 0;
+  receive: (bytes: Uint8Array, at_ms: number) => void = () => undefined;
+  closed: (why: string) => void = () => undefined;
+
+  constructor(private readonly serial = '') {}
+
+  open(receive: SpokenLine['receive'], closed: SpokenLine['closed']): Promise<void> {
+    this.receive = receive;
+    this.closed = closed;
+    receive(Uint8Array.of(7, 7, 0), performance.now()); // the end of a frame that was under way
+    return Promise.resolve();
+  }
+
+  close(): Promise<void> {
+    return Promise.resolve();
+  }
+
+  say(packet: object & { type: number }): void {
+    this.device_us += 100;
+    this.receive(
+      encodePacket({ t_us: this.device_us, ...packet, sequence: this.sequence++ & 0xffff }),
+      performance.now(),
+    );
+  }
+
+  send(frame: Uint8Array): Promise<void> {
+    const packet = new Uint8Array(1024);
+    const length = cobsDecode(frame, 0, frame.length - 1, packet);
+    const view = new DataView(packet.buffer);
+    assert.equal(crc32(packet, length - 4), view.getUint32(length - 4, true));
+    if (packet[0] !== this.version) {
+      return Promise.resolve();
+    }
+    if (this.version !== 5) {
+      const answer = vector('health').packet.slice();
+      answer[0] = this.version;
+      new DataView(answer.buffer).setUint32(answer.length - 4, crc32(answer, answer.length - 4), true);
+      this.receive(cobsEncode(answer), performance.now());
+      return Promise.resolve();
+    }
+    const command = packet[1]!;
+    this.commands.push(command);
+    if (this.silent) {
+      return Promise.resolve();
+    }
+    if (command === PacketType.CMD_STREAM) {
+      this.streams = packet[12]!;
+    }
+    const asks: Record<number, string> = {
+      [PacketType.CMD_INFO]: 'info_grasp',
+      [PacketType.CMD_HEALTH]: 'health',
+      [PacketType.CMD_CRASH]: 'crash',
+    };
+    const name = asks[command];
+    const result = name ? Result.DONE : this.result;
+    queueMicrotask(() => {
+      this.say({
+        type: PacketType.ACK,
+        command,
+        result,
+        command_sequence: view.getUint16(2, true),
+        host_time_us: view.getBigUint64(4, true),
+      });
+      if (name) {
+        const decoder = new Decoder();
+        decoder.feed(Uint8Array.of(0), () => undefined);
+        decoder.feed(vector(name).frame, (answer: DevicePacket) =>
+          this.say({ ...answer, t_us: this.device_us, ...(this.serial && { serial: this.serial }) }),
+        );
+      }
+    });
+    return Promise.resolve();
+  }
+}
+
+async function opened(): Promise<[Fingertip, SpokenLine]> {
+  const line = new SpokenLine();
+  const fingertip = new Fingertip(line);
+  await fingertip.open();
+  return [fingertip, line];
+}
+
+test('it opens: info, streams, then live; frames reach model, history and taps', async () => {
+  const [fingertip, line] = await opened();
+  assert.equal(fingertip.state, 'live');
+  assert.equal(fingertip.name, 'E66058388347A12C');
+  assert.equal(line.streams, Stream.CONTACT | Stream.RAW | Stream.HEALTH);
+  assert.ok(fingertip.clock.estimate);
+  const seen: [number, number][] = [];
+  const end = fingertip.tap((packet, frame) => seen.push([packet.type, frame().length]));
+  const flags = Flag.CONTACT | Flag.FIT_VALID;
+  line.say(contactOf(1, 6_000_000, { flags, force_N: 1.5 }));
+  line.say(rawOf(1, 6_000_000, [875, 1125]));
+  line.sequence += 4;
+  line.say(contactOf(2, 6_001_000, { flags: 0 }));
+  end();
+  line.say(contactOf(3, 6_002_000));
+  assert.deepEqual(seen.map(([type]) => type), [1, 2, 1]);
+  assert.ok(seen.every(([, length]) => length > 30));
+  assert.equal(fingertip.lost, 4);
+  assert.deepEqual([fingertip.contacts, fingertip.raws], [3, 1]);
+  const { history } = fingertip;
+  assert.ok(history);
+  assert.equal(history.end, 3);
+  assert.equal(history.columns.force_N[0], 1.5);
+  assert.ok(Number.isNaN(history.columns.force_N[1]));
+  assert.deepEqual([...history.readingsAt(0)!.pressure_Pa], [1000, 1000]); // over the gains 0.875 and 1.125
+  assert.equal(history.readingsAt(1), null);
+  await fingertip.close();
+  assert.equal(line.streams, 0);
+  assert.equal(fingertip.state, 'closed');
+});
+
+test('refusals and questions: what a command is answered', async () => {
+  const [fingertip, line] = await opened();
+  line.result = Result.NOT_NOW;
+  await assert.rejects(fingertip.tare(), (error) => error instanceof CommandError && error.result === Result.NOT_NOW);
+  assert.equal(line.commands.filter((each) => each === PacketType.CMD_TARE).length, 1);
+  line.result = Result.UNKNOWN_COMMAND;
+  await assert.rejects(fingertip.tare(true), /does not know this command/);
+  line.result = Result.DONE;
+  await fingertip.tare();
+  assert.equal((await fingertip.askCrash())?.kind, 3);
+  assert.equal((await fingertip.askHealth()).type, PacketType.HEALTH);
+  assert.equal(fingertip.crash?.stuck, 5);
+  await fingertip.close();
+  await assert.rejects(fingertip.tare(), /not connected/);
+});
+
+test('the cable is pulled amid a command: it fails at once, with words; another line has it back', async () => {
+  const [fingertip, line] = await opened();
+  line.say(contactOf(7, 9_000_000));
+  line.silent = true;
+  const waiting = fingertip.tare();
+  const failed = assert.rejects(waiting, /plug it in/);
+  line.closed('unplugged: plug it in again');
+  await failed;
+  assert.equal(fingertip.state, 'closed');
+  assert.equal(fingertip.why, 'unplugged: plug it in again');
+
+  await assert.rejects(fingertip.open(new SpokenLine('OTHER')), OtherFingertip);
+  assert.equal(fingertip.state, 'closed');
+  assert.equal(fingertip.name, 'E66058388347A12C');
+
+  const back = new SpokenLine();
+  await fingertip.open(back);
+  back.say(contactOf(1, 1_000)); // it started anew
+  back.say(rawOf(1, 1_000, [0, 0]));
+  const { history } = fingertip;
+  assert.equal(history?.end, 2);
+  assert.ok(history.t_s[1]! > history.t_s[0]!);
+  assert.equal(fingertip.lost, 0);
+  await fingertip.close();
+});
+
+test('another version of the protocol, and what is no fingertip, are told apart', async () => {
+  const line = new SpokenLine();
+  line.version = 4;
+  const old = new Fingertip(line);
+  await assert.rejects(old.open(), /version 4 of the protocol.*Flash/);
+  assert.equal(old.state, 'closed');
+  const mute = new SpokenLine();
+  mute.silent = true;
+  await assert.rejects(new Fingertip(mute).open(), /no fingertip/);
+});
+
+test('history: a ring with absolute numbers, times that never fall, frames that are missing', () => {
+  const history = new History(2, 8);
+  for (let i = 0; i < 20; i++) {
+    const frame = i < 12 ? i : i + 3;
+    history.addContact(contactOf(frame, 1000 * frame, { flags: Flag.FIT_VALID, x_mm: i }));
+    history.addRaw(rawOf(frame, 1000 * frame, [i, -i], i % 2 ? { flags: Flag.HELD, valid: 0 } : {}));
+  }
+  assert.deepEqual([history.begin, history.end], [12, 20]);
+  assert.equal(history.lost[12 % 8], 3);
+  assert.equal(history.lost[13 % 8], 0);
+  assert.equal(history.columns.x_mm[19 % 8], 19);
+  assert.deepEqual([...history.readingsAt(19)!.pressure_Pa], [19, -19]); // held: those of the frame before
+  assert.equal(history.readingsAt(3), null);
+  assert.equal(history.rowAt(0.018), 15);
+  assert.equal(history.rowAt(9), 20);
+  history.gap_s = 2;
+  history.addContact(contactOf(0, 10));
+  history.addRaw(rawOf(0, 10, [1, 1]));
+  history.addContact(contactOf(1, 1010));
+  assert.equal(history.end, 22);
+  assert.ok(Math.abs(history.t_s[20 % 8]! - 2.022) < 1e-9);
+  assert.ok(Math.abs(history.t_s[21 % 8]! - 2.023) < 1e-9);
+});
+
+test('history: a raw packet without its contact packet has a row of its own', () => {
+  const history = new History(1, 8);
+  history.addRaw(rawOf(5, 100, [3], { flags: Flag.TARED }));
+  history.addContact(contactOf(6, 200));
+  assert.equal(history.end, 2);
+  assert.equal(history.flags[0], Flag.TARED);
+  assert.ok(Number.isNaN(history.columns.force_N[0]));
+});
+
+test('clocks: right within what it says, whatever the delays', () => {
+  const fit = new ClockFit();
+  const drift = 60e-6;
+  let state = 7;
+  const random = (): number => (state = (state * 48271) % 2147483647) / 2147483647;
+  for (let i = 0; i < 60; i++) {
+    const host_us = 1e6 * i;
+    const there_us = 200 + (random() < 0.2 ? 90_000 * random() : 300 * random());
+    const back_us = 200 + (random() < 0.2 ? 90_000 * random() : 300 * random());
+    fit.add({
+      sent_us: host_us,
+      received_us: host_us + there_us + back_us,
+      device_us: (host_us + there_us) * (1 + drift) + 5e6,
+    });
+  }
+  const estimate = fit.estimate!;
+  const truth_us = (estimate.device_us - 5e6) / (1 + drift);
+  assert.ok(Math.abs(estimate.host_us - truth_us) <= estimate.uncertainty_us);
+  assert.ok(estimate.uncertainty_us < 500, `${estimate.uncertainty_us}`);
+  assert.ok(Math.abs(estimate.drift_ppm - 60) < 20, `${estimate.drift_ppm}`);
+  assert.equal(fit.jumps, 0);
+  fit.add({ sent_us: 61e6, received_us: 61e6 + 500, device_us: 61e6 + 9e6 });
+  assert.equal(fit.jumps, 1);
+});
+
+test('flags: every one has words; warnings are those of the tool', () => {
+  assert.equal(FLAGS.length, Object.keys(Flag).length);
+  assert.equal(WARNING_FLAGS, 524032);
+  assert.equal(flagsText(Flag.CONTACT | Flag.UNCERTAIN | (1 << 30)), 'CONTACT UNCERTAIN bit30');
+});
+
+test('the bench tells who comes and goes', () => {
+  const bench = new Bench();
+  let told = 0;
+  const end = bench.listen(() => told++);
+  const fingertip = new Fingertip(new SpokenLine());
+  bench.add(fingertip);
+  bench.remove(fingertip);
+  bench.remove(fingertip);
+  end();
+  bench.add(fingertip);
+  assert.equal(told, 2);
+});
+
+test('settings: commands for what differs, refusals with the range', () => {
+  let info: Info | null = null;
+  const decoder = new Decoder();
+  decoder.feed(Uint8Array.of(0), () => undefined);
+  decoder.feed(vector('info_grasp').frame, (packet) => (info = packet as Info));
+  const now = { rate: '20', osr: '1024', slip_threshold: '0.75', slip_window: '100', prior: '3.125:0.5', limit: '0.625' };
+  assert.deepEqual(commandsFor(info!, now), []);
+  assert.deepEqual(commandsFor(info!, { rate: 'max', osr: '256', slip_window: '50', prior: '3.1', limit: '0.5' }), [
+    { type: PacketType.CMD_RATE, rate_mHz: 0 },
+    { type: PacketType.CMD_OSR, osr: 256 },
+    { type: PacketType.CMD_SLIP, threshold_mm: 0.75, window_ms: 50 },
+    { type: PacketType.CMD_PRIOR, sigma_mm: 3.1, width_mm: 0.5 },
+    { type: PacketType.CMD_LOCATION_LIMIT, limit_mm: 0.5 },
+  ]);
+  assert.deepEqual(commandsFor(info!, { prior: 'none' }), [{ type: PacketType.CMD_PRIOR, sigma_mm: 0, width_mm: 0 }]);
+  for (const wrong of [{ rate: '0' }, { rate: 'fast' }, { slip_threshold: '51' }, { prior: '3:' }, { limit: '' }]) {
+    assert.throws(() => commandsFor(info!, wrong), /is not a number from/, JSON.stringify(wrong));
+  }
+});

@@ -1,0 +1,314 @@
+/** Recordings of the page and of the tool hold the same; torn ones are told by a sentence. */
+import { McapStreamReader } from '@mcap/core';
+import { decompress } from 'fzstd';
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import test from 'node:test';
+import { Decoder } from '../../../host_tools/web/src/line/decoder';
+import {
+  CONTACT_FIELDS,
+  Flag,
+  PacketType,
+  STAGES,
+  blank,
+  encodePacket,
+  type Contact,
+  type DevicePacket,
+  type Info,
+  type Raw,
+} from '../../../host_tools/web/src/line/packets';
+import { CsvSink } from '../../../host_tools/web/src/recording/csv_sink';
+import type { Pairs } from '../../../host_tools/web/src/recording/fields';
+import { PacketLines } from '../../../host_tools/web/src/recording/lines';
+import { McapSink } from '../../../host_tools/web/src/recording/mcap_sink';
+import { ReadError, readItems } from '../../../host_tools/web/src/recording/reader';
+import { shortest } from '../../../host_tools/web/src/recording/text';
+import { vector } from './vectors';
+
+const tool = process.env['FINGERTIP_TOOL'] ?? '';
+const folder = mkdtempSync(join(tmpdir(), 'fingertip-page-'));
+test.after(() => rmSync(folder, { recursive: true }));
+const path = (name: string): string => join(folder, name);
+
+let state = 12345;
+function random(): number {
+  state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+  return state / 2 ** 32;
+}
+const integer = (below: number): number => Math.floor(random() * below);
+
+const bits = new DataView(new ArrayBuffer(4));
+/** Any finite float, now and then one that people would type. */
+function anyFloat(): number {
+  if (random() < 0.4) {
+    return Math.fround((integer(20001) - 10000) / 10 ** integer(5));
+  }
+  do {
+    bits.setUint32(0, integer(2 ** 32));
+  } while (!Number.isFinite(bits.getFloat32(0)));
+  return bits.getFloat32(0);
+}
+
+function infoOf(name: string): Info {
+  let info: Info | null = null;
+  const decoder = new Decoder();
+  decoder.feed(Uint8Array.of(0), () => undefined);
+  decoder.feed(vector(name).frame, (packet) => (info = packet as Info));
+  return info!;
+}
+
+/** What a fingertip may say, in the order in which it says it. */
+function session(): DevicePacket[] {
+  const info = infoOf('info_grasp');
+  const packets: DevicePacket[] = [{ ...info, sequence: 0 }];
+  let sequence = 1;
+  const VALID =
+    Flag.FIT_VALID | Flag.UNCERTAINTY_VALID | Flag.SLIP_VALID | Flag.WIDTHS_VALID | Flag.TANGENTIAL_VALID | Flag.VELOCITY_VALID;
+  for (let frame = 1; frame < 600; frame++) {
+    const t_us = 1_000_000 + 765 * frame + (frame > 400 ? -300_000 : 0);
+    const flags = (integer(2 ** 25) & (random() < 0.5 ? ~0 : ~VALID)) | (random() < 0.3 ? VALID : 0);
+    if (random() < 0.95) {
+      const contact = blank(PacketType.CONTACT) as unknown as Contact;
+      Object.assign(contact, { t_us, frame, flags: flags >>> 0, sequence: sequence++ & 0xffff });
+      STAGES.forEach((stage) => (contact[stage] = integer(65536)));
+      if (flags & Flag.FIT_VALID) {
+        contact.sensors_used = integer(2 ** 32);
+      }
+      const decoder = new Decoder(); // leaves out what has no flag
+      CONTACT_FIELDS.forEach((field) => (contact[field] = anyFloat()));
+      decoder.feed(Uint8Array.of(0), () => undefined);
+      decoder.feed(encodePacket(contact), (packet) => packets.push({ ...packet } as Contact));
+    }
+    if (random() < 0.95) {
+      const raw = blank(PacketType.RAW) as unknown as Raw;
+      Object.assign(raw, {
+        t_us,
+        frame,
+        flags: flags >>> 0,
+        sequence: sequence++ & 0xffff,
+        sensor_count: 2,
+        valid: integer(4),
+        saturated: integer(4),
+        doubtful: integer(4),
+        temperature_cC: integer(65536) - 32768,
+      });
+      for (let k = 0; k < 2; k++) {
+        raw.pressure_Pa_q10[k] = integer(2 ** 32) - 2 ** 31;
+        raw.baseline_Pa_q10[k] = integer(2 ** 20) - 2 ** 19;
+      }
+      packets.push(raw);
+    }
+    if (frame % 100 === 0) {
+      const health = blank(PacketType.HEALTH) as unknown as DevicePacket & Record<string, number>;
+      Object.assign(health, { capabilities: 15, uptime_s: frame, sensors_present: 1, sensors_prom_bad: 2 });
+      packets.push({ ...health, t_us, sequence: sequence++ & 0xffff } as DevicePacket);
+    }
+    if (frame === 300) {
+      packets.push({ ...info, osr: 256, t_us, sequence: sequence++ & 0xffff });
+    }
+  }
+  return packets;
+}
+
+const packets = session();
+const EXTRA: Pairs = [
+  ['recorded_by', 'a test'],
+  ['started_utc', '2026-08-05T12:00:00.125Z'],
+];
+
+async function recorded(kind: 'csv' | 'mcap'): Promise<Uint8Array> {
+  const parts: Uint8Array[] = [];
+  const sink = new (kind === 'csv' ? CsvSink : McapSink)({ write: (bytes) => parts.push(bytes) });
+  const [first, ...others] = packets;
+  const lines = new PacketLines(sink, first as Info, EXTRA);
+  others.forEach((packet, i) => {
+    lines.packet(packet);
+    if (i === 700) {
+      lines.event('gone 2026-08-05T12:00:01.000Z');
+    }
+  });
+  lines.finish({ packets: packets.length } as never, 'stopped');
+  await sink.finish();
+  return Buffer.concat(parts);
+}
+
+async function itemsOf(name: string, bytes: Uint8Array): Promise<DevicePacket[]> {
+  const all: DevicePacket[] = [];
+  for await (const { packet } of readItems(new File([new Uint8Array(bytes)], name))) {
+    all.push(packet);
+  }
+  return all;
+}
+
+async function problemOf(name: string, bytes: Uint8Array): Promise<[string, number]> {
+  let count = 0;
+  try {
+    for await (const _ of readItems(new File([new Uint8Array(bytes)], name))) {
+      count++;
+    }
+  } catch (error) {
+    assert.ok(error instanceof ReadError, String(error));
+    return [error.message, count];
+  }
+  return ['', count];
+}
+
+const frames = (all: DevicePacket[]): Buffer => Buffer.concat(all.map((packet) => encodePacket(packet)));
+
+function convert(from: string, to: string): void {
+  execFileSync(tool, ['convert', path(from), path(to), '--overwrite'], { stdio: 'pipe' });
+}
+
+test('floats are written as C++ writes them', () => {
+  for (const [value, text] of [
+    [0, '0'],
+    [-0, '-0'],
+    [1, '1'],
+    [-4.5, '-4.5'],
+    [0.1, '0.1'],
+    [100000, '1e+05'],
+    [150000, '150000'],
+    [455066.125, '455066.12'],
+    [0.5, '0.5'],
+    [1e6, '1e+06'],
+    [1e-5, '1e-05'],
+    [0.0001, '1e-04'],
+    [0.001, '0.001'],
+    [123456789, '123456792'],
+    [1.17549435e-38, '1.1754944e-38'],
+    [3.4028234663852886e38, '3.4028235e+38'],
+  ] as const) {
+    assert.equal(shortest(Math.fround(value)), text);
+  }
+});
+
+test("CSV: rows and comments are the tool's, byte by byte", async () => {
+  writeFileSync(path('a.ftr'), frames(packets));
+  convert('a.ftr', 'tool.csv');
+  const own = Buffer.from(await recorded('csv')).toString().split('\n');
+  // The tool says who converted; events are not in a capture; its end line counts its own reading.
+  const plain = (lines: string[]): string[] =>
+    lines.filter((line) => !/^# (recorded_by|started_utc|source|event|end):/.test(line));
+  assert.deepEqual(plain(own), plain(readFileSync(path('tool.csv'), 'utf8').split('\n')));
+});
+
+test('CSV: the tool reads back every packet', async () => {
+  writeFileSync(path('own.csv'), await recorded('csv'));
+  convert('own.csv', 'own.ftr');
+  assert.deepEqual(readFileSync(path('own.ftr')), frames(packets));
+});
+
+test('MCAP: the tool makes the same CSV of it, and every message is that of the tool', async () => {
+  const csv = await recorded('csv');
+  writeFileSync(path('own.mcap'), await recorded('mcap'));
+  convert('own.mcap', 'back.csv');
+  assert.deepEqual(readFileSync(path('back.csv')), Buffer.from(csv));
+
+  writeFileSync(path('own.csv'), csv);
+  convert('own.csv', 'tool.mcap');
+  const contents = (bytes: Uint8Array): Record<string, string[]> => {
+    const reader = new McapStreamReader({
+      decompressHandlers: { zstd: (packed, size) => decompress(packed, new Uint8Array(Number(size))) },
+    });
+    const told: Record<string, string[]> = {};
+    const topics = new Map<number, string>();
+    const schemas = new Map<number, string>();
+    reader.append(bytes);
+    for (let record; (record = reader.nextRecord()); ) {
+      if (record.type === 'Schema') {
+        schemas.set(record.id, `${record.name} ${record.encoding} ${Buffer.from(record.data).toString()}`);
+      } else if (record.type === 'Channel') {
+        topics.set(record.id, record.topic);
+        told[`channel ${record.topic}`] = [
+          schemas.get(record.schemaId) ?? '',
+          record.messageEncoding,
+          JSON.stringify([...record.metadata]),
+        ];
+      } else if (record.type === 'Message') {
+        (told[`messages of ${topics.get(record.channelId)}`] ??= []).push(
+          `${record.sequence} ${record.logTime} ${record.publishTime} ${Buffer.from(record.data).toString('hex')}`,
+        );
+      } else if (record.type === 'Metadata') {
+        told[`metadata ${record.name}`] = [...record.metadata].map(String).sort();
+      } else if (record.type === 'Attachment') {
+        told[`attachment ${record.name}`] = [record.mediaType, String(record.logTime), Buffer.from(record.data).toString()];
+      } else if (record.type === 'Header') {
+        told['header'] = [record.profile];
+      }
+    }
+    return told;
+  };
+  const own = contents(readFileSync(path('own.mcap')));
+  const tools = contents(readFileSync(path('tool.mcap')));
+  assert.deepEqual(Object.keys(own).sort(), Object.keys(tools).sort());
+  for (const key of Object.keys(tools)) {
+    assert.deepEqual(own[key], tools[key], key);
+  }
+});
+
+test('what the page and the tool recorded is read back, packet by packet', async () => {
+  const wanted = frames(packets);
+  const csv = await recorded('csv');
+  writeFileSync(path('own.csv'), csv);
+  convert('own.csv', 'tool.mcap');
+  assert.deepEqual(frames(await itemsOf('own.csv', csv)), wanted);
+  assert.deepEqual(frames(await itemsOf('own.mcap', await recorded('mcap'))), wanted);
+  assert.deepEqual(frames(await itemsOf('tool.mcap', readFileSync(path('tool.mcap')))), wanted);
+  assert.deepEqual(frames(await itemsOf('a.ftr', wanted)), wanted);
+});
+
+test('recordings of several fingertips are read, each with its number', async () => {
+  const csv = Buffer.from(await recorded('csv')).toString().split('\n');
+  const joint = ['# fingertip-recording 2', '# devices: A B'];
+  for (const line of csv.slice(1)) {
+    if (line.startsWith('# ')) {
+      joint.push(...[0, 1].map((device) => line.replace('# ', `# ${device}/`)));
+    } else if (line.startsWith('t_us')) {
+      joint.push(`device,time_us,${line}`);
+    } else if (line) {
+      joint.push(`1,${line.split(',')[0]}.5,${line}`);
+    }
+  }
+  joint.push('# end: reason=stopped', '');
+  const devices = new Map<number, number>();
+  for await (const item of readItems(new File([joint.join('\n')], 'two.csv'))) {
+    devices.set(item.device, (devices.get(item.device) ?? 0) + 1);
+    if (item.packet.type === PacketType.RAW) {
+      assert.equal(item.time_us, item.packet.t_us + 0.5);
+    }
+  }
+  assert.equal(devices.get(1), packets.length);
+  assert.equal(devices.get(0), packets.filter((packet) => packet.type > PacketType.RAW).length);
+});
+
+test('torn and foreign files: a sentence, and what came before', async () => {
+  const csv = Buffer.from(await recorded('csv'));
+  const mcap = Buffer.from(await recorded('mcap'));
+  const lines = csv.toString().split('\n');
+  const text = (all: string[]): Buffer => Buffer.from(all.join('\n'));
+  const row = lines.findIndex((line) => line.startsWith('t_us')) + 20;
+  for (const [name, bytes, words, some] of [
+    ['empty.csv', Buffer.alloc(0), /is empty/, false],
+    ['x.txt', Buffer.from('hello\n'), /neither a recording/, false],
+    ['torn.csv', csv.subarray(0, csv.length / 2), /line \d+: the last line is torn/, true],
+    ['cut.csv', text([...lines.slice(0, row), '']), /no end line/, true],
+    ['head.csv', text([...lines.slice(0, 5), '']), /no header line/, false],
+    ['cell.csv', text(lines.map((line, i) => (i === row ? line.replace(/^\d+/, 'x') : line))), /t_us is "x"/, true],
+    ['columns.csv', text(lines.map((line, i) => (i === row ? `${line},1` : line))), /columns where the header has/, true],
+    ['range.csv', text(lines.map((line, i) => (i === row ? line.replace(/,\d+/, ',5000000000') : line))), /frame is out of range/, true],
+    ['later.csv', text(['# fingertip-recording 3', ...lines.slice(1)]), /later version/, false],
+    ['torn.mcap', mcap.subarray(0, mcap.length - 40), /breaks off/, true],
+    ['begin.mcap', mcap.subarray(0, 1000), /breaks off before/, false],
+    ['chunk.mcap', Buffer.from(mcap.map((byte, i) => (i === Math.floor(mcap.length / 2) ? byte ^ 1 : byte))), /chunk\.mcap: /, false],
+    ['noise.ftr', Buffer.alloc(500), /holds no packet/, false],
+    ['damaged.ftr', Buffer.from(frames(packets).map((byte, i) => (i === 5000 ? byte ^ 2 || 3 : byte))), /damaged and left out/, true],
+  ] as const) {
+    const [problem, count] = await problemOf(name, bytes);
+    assert.match(problem, words, name);
+    assert.ok(problem.startsWith(name), problem);
+    assert.equal(count > 0, some, `${name}: ${count}`);
+  }
+});

@@ -1,0 +1,120 @@
+// The page's judges on a capture of the line.
+// usage: node judge.mjs judges.wasm gains CAPTURE.ftr [FORCE_N]
+//        node judge.mjs judges.wasm pulls CAPTURE.ftr KNOWN_N
+//        node judge.mjs judges.wasm doctor CAPTURE.ftr [CODE TEXT]
+// Prints JSON. Packets before an info packet are left out. used: bytes of the capture that a session
+// took until it was done.
+import fs from 'node:fs';
+import { load } from '../../../host_tools/web/wasm/judges.mjs';
+
+const [RAW, INFO, HEALTH, CONTACT] = [0x02, 0x03, 0x04, 0x01];
+const [wasm, what, capture, ...more] = process.argv.slice(2);
+
+function* frames() {
+  const bytes = fs.readFileSync(capture);
+  for (let begin = 0, end; (end = bytes.indexOf(0, begin)) >= 0; begin = end + 1) {
+    const frame = bytes.subarray(begin, end);
+    // COBS: the type is the third byte, where none of the three is 0.
+    if (frame.length > 16) {
+      yield { type: unstuffed(frame)[1], frame, end: end + 1 };
+    }
+  }
+}
+
+function unstuffed(frame) {
+  const out = [];
+  for (let at = 0; at < frame.length; ) {
+    const code = frame[at++];
+    for (let i = 1; i < code && at < frame.length; i++) {
+      out.push(frame[at++]);
+    }
+    if (code < 255) {
+      out.push(0);
+    }
+  }
+  return out;
+}
+
+function gains(judges) {
+  let session = null;
+  let used = 0;
+  const advice = [];
+  for (const { type, frame, end } of frames()) {
+    if (type === INFO && !session) {
+      session = judges.gains(frame);
+    } else if (type === RAW && session) {
+      used = session.take(frame) ? end : used;
+      const said = session.status().advice;
+      if (advice.at(-1) !== said) {
+        advice.push(said);
+      }
+    }
+  }
+  const status = session.status();
+  let result = null;
+  let error = null;
+  try {
+    result = session.result(more[0] ? Number(more[0]) : null, 1700000000);
+  } catch (thrown) {
+    error = thrown.message;
+  }
+  session.takeBack();
+  const left = session.status().placements.length;
+  session.free();
+  return { status, advice, result, error, left, used };
+}
+
+function pulls(judges) {
+  let session = null;
+  let info = null;
+  let used = 0;
+  for (const { type, frame, end } of frames()) {
+    if (type === INFO && !session) {
+      info = frame;
+      session = judges.pulls(frame, Number(more[0]));
+    } else if (type === CONTACT && session) {
+      used = session.take(frame) ? end : used;
+    }
+  }
+  const status = session.status();
+  return { status, used, result: status.state === 'good' ? session.result(info) : null };
+}
+
+function doctor(judges) {
+  const examination = judges.examination({ port: 'a simulated fingertip', tool_version: [0, 1, 0] });
+  let health = null;
+  for (const { type, frame } of frames()) {
+    if (type === INFO) {
+      examination.info(frame);
+    } else if (type === HEALTH) {
+      if (!health) {
+        examination.before(frame);
+      }
+      health = frame;
+    } else if (type === RAW || type === CONTACT) {
+      examination.take(frame);
+    }
+  }
+  if (health) {
+    examination.after(health);
+  }
+  if (more.length > 0) {
+    examination.failure(...more);
+  }
+  examination.line({
+    bytes: fs.statSync(capture).size,
+    packets: 1000,
+    dropped_packets: 0,
+    out_of_order: 0,
+    crc_errors: 0,
+    format_errors: 0,
+  });
+  return { findings: examination.findings(), seconds: examination.seconds() };
+}
+
+const judges = await load(fs.readFileSync(wasm));
+try {
+  console.log(JSON.stringify({ gains, pulls, doctor }[what](judges)));
+} catch (error) {
+  console.log(JSON.stringify({ thrown: error.message }));
+}

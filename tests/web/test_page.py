@@ -1,0 +1,372 @@
+"""The page in a browser: what its user does, against emulated release images on the browser's serial ports.
+
+usage: test_page.py --build BUILD --image FILE.bin --node NODE [--pictures FOLDER] [unittest arguments]
+
+--pictures: only writes the reference pictures anew. Exit status 77: there is no such browser here, or nobody may give it ports.
+"""
+import argparse
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/web")]
+import driven  # noqa: E402
+import pictures  # noqa: E402
+from browser import Browser, CannotRun  # noqa: E402
+from fingertip import files  # noqa: E402
+from fingertips import Bench  # noqa: E402
+
+OPTIONS = argparse.Namespace()
+SKIPPED = 77
+PATIENCE_s = 120
+SERIALS = ("E660583883265A01", "E660583883265A02")
+FORCE_N = 3.0
+COUNT_MESSAGES = """
+import collections, json, sys
+from mcap.reader import make_reader
+with open(sys.argv[1], "rb") as file:
+    print(json.dumps(collections.Counter(channel.topic for _, channel, _ in make_reader(file, validate_crcs=True).iter_messages())))
+"""
+NO_SAVE_DIALOG = "delete window.showSaveFilePicker; delete window.showOpenFilePicker;"
+
+
+def run(*call):
+    done = subprocess.run([str(part) for part in call], capture_output=True, text=True, timeout=PATIENCE_s)
+    if done.returncode:
+        raise AssertionError(f"{call}: {done.stdout}{done.stderr}")
+    return done.stdout
+
+
+class PageTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="fingertip-")))
+        cls.tool = OPTIONS.build / "host_tools/cli/fingertip"
+        cls.url = cls.enterClassContext(Bench(OPTIONS)).served()
+        cls.browser = cls.enterClassContext(Browser(cls.folder, OPTIONS.ports, cls.policy()))
+
+    @classmethod
+    def policy(cls):
+        return {"SerialAllowAllPortsForUrls": [cls.url]}
+
+    def setUp(self):
+        self.bench = self.enterContext(Bench(OPTIONS))
+
+    def open(self, before="", **options):
+        page = self.browser.page(self.url + "/", before=NO_SAVE_DIALOG + before, **options)
+        self.addCleanup(page.close)
+        self.addCleanup(self.nothing_else_happened, page)
+        driven.ready_s(page)
+        return page
+
+    def nothing_else_happened(self, page):
+        """Whatever was done: no request to elsewhere, nothing that its policy refused, no error that nobody caught."""
+        self.assertEqual(page.foreign(), [])
+        self.assertEqual([each["exceptionDetails"].get("exception", {}).get("description") for each in page.of("Runtime.exceptionThrown")], [])
+
+    def alert(self, page, pattern):
+        """What the page says and leaves standing."""
+        return page.until(f"[...document.querySelectorAll('[role=alert]')].map(each => each.textContent).find(text => {pattern}.test(text))")
+
+    def scenario(self, kind, *options):
+        path = self.folder / f"{kind}.csv"
+        if not path.exists():
+            run(OPTIONS.build / "host_tools/twin/twin", "scenario", kind, "-o", path, "--cache", OPTIONS.build / "contact_tables", *options)
+        return path
+
+    def downloaded(self, suffix):
+        """The newest file, once it is whole."""
+        end_s = time.monotonic() + PATIENCE_s
+        while time.monotonic() < end_s:
+            self.browser.pump(0.1)
+            there = list(self.browser.downloads.glob(f"*{suffix}"))
+            if there and not list(self.browser.downloads.glob("*.crdownload")):
+                return max(there, key=lambda path: path.stat().st_mtime)
+        self.fail(f"no file {suffix} was saved")
+
+
+class Use(PageTest):
+    """One after the other as a user would, on one page."""
+
+    def test_set_tare_record_and_replay(self):
+        self.bench.emulated(self.browser, SERIALS[0], self.scenario("taps", "--seconds", 120), "--pace", "real")
+        page = self.open()
+        driven.connected(page, 1)
+        self.assertEqual(page.run("fingertip.fingertips[0].info.serial"), SERIALS[0])
+
+        page.click("button", "Set")
+        page.type("textbox", "Frame rate, Hz", "5000")
+        page.click("button", "Apply")
+        self.alert(page, '/"5000" is not a number from 0.1 to 2000/')
+        page.type("textbox", "Frame rate, Hz", "100")
+        page.click("button", "Apply")
+        page.until("fingertip.fingertips[0].info.rate_mHz === 100000")
+        page.click("button", "Close")
+
+        done = page.run("fingertip.fingertips[0].health?.commands_done ?? 0")
+        page.click("button", "Tare")
+        page.until(f"(fingertip.fingertips[0].health?.commands_done ?? 0) > {done}")
+        page.until("[...document.querySelectorAll('[role=alert], h2')].some(each => /: tared|Not tared/.test(each.textContent))")
+        if page.has("button", "Try again"):  # a tap was there
+            page.click("button", "Tare anyway")
+            self.alert(page, "/: tared/")
+
+        recorded = {}
+        for kind in ("CSV", "MCAP"):
+            page.click("button", "Record")
+            page.click("radio", kind)
+            page.click("button", "Start recording")
+            page.until("!document.querySelector('dialog')")
+            begun = page.run("fingertip.fingertips[0].contacts")
+            page.until(f"fingertip.fingertips[0].contacts > {begun + 150}")
+            page.click("button", "Stop")
+            recorded[kind] = self.downloaded(f".{kind.lower()}")
+        self.assertEqual(page.run("fingertip.fingertips[0].lost"), 0)
+        self.judge(recorded)
+
+        page.give("input[type=file]", recorded["CSV"])
+        page.until("fingertip.fingertips.length === 2")
+        frames = len(files.read_recording(recorded["CSV"])["frame"])
+        page.until(f"fingertip.fingertips[1].contacts === {frames}")
+        self.assertEqual(page.run("fingertip.fingertips[1].info.serial"), SERIALS[0])
+
+    def judge(self, recorded):
+        """By the tool and the Python package, which read each, and by the library of MCAP's makers."""
+        for kind, path in recorded.items():
+            through = self.folder / f"through_{kind}.csv"
+            run(self.tool, "convert", path, through, "--overwrite")
+            recording = files.read_recording(through)
+            self.assertGreater(len(recording["frame"]), 150, kind)
+            self.assertTrue((np.diff(recording["frame"]) == 1).all(), kind)
+            self.assertEqual(recording.end["dropped_packets"], "0", kind)
+            self.assertEqual(recording.metadata["serial"], SERIALS[0])
+            self.assertTrue(np.isfinite(recording.sensors_Pa).all())
+            if kind == "CSV":
+                self.assertEqual(path.read_text(), through.read_text())
+        read = run(ROOT / "build/venv/bin/python", "-c", COUNT_MESSAGES, recorded["MCAP"])
+        counts = json.loads(read)
+        self.assertGreater(min(counts.values()), 0, counts)
+        frames = len(files.read_recording(self.folder / "through_MCAP.csv")["frame"])
+        self.assertEqual(next(count for topic, count in counts.items() if topic.endswith("/contact")), frames)
+
+    def test_gone_and_back_and_two_at_once(self):
+        scenario = self.scenario("taps", "--seconds", 120)
+        first = self.bench.fake(self.browser, SERIALS[0], "rate=200")
+        page = self.open()
+        driven.connected(page, 1)
+        self.bench.end(first)
+        page.until("fingertip.fingertips[0].state === 'closed'")
+        self.assertIn("plug it in again", page.run("fingertip.fingertips[0].why"))
+        before = page.run("fingertip.fingertips[0].contacts")
+        self.bench.fake(self.browser, SERIALS[0], "rate=200")
+        page.until(f"fingertip.fingertips[0].state === 'live' && fingertip.fingertips[0].contacts > {before}")
+        self.assertEqual(page.run("fingertip.fingertips.length"), 1)
+
+        self.bench.emulated(self.browser, SERIALS[1], scenario, "--pace", "real")
+        driven.connected(page, 2)
+        before = page.run("fingertip.fingertips.map(each => each.contacts)")
+        for k, count in enumerate(before):
+            page.until(f"fingertip.fingertips[{k}].contacts > {count + 100}")
+        self.assertEqual(sorted(page.run("fingertip.fingertips.map(each => each.info.serial)")), sorted(SERIALS))
+        self.assertEqual(page.run("fingertip.fingertips.map(each => each.lost)"), [0, 0])
+
+
+    def test_flash(self):
+        image = OPTIONS.build.parent / "pico_mux/fingertip-pico_mux.uf2"
+        device = self.bench.fake(self.browser, SERIALS[0], "rate=100", "board=pico_mux", "loader=1")
+        page = self.open()
+        driven.connected(page, 1)
+        page.click("button", "Flash")
+        torn = self.folder / "torn.uf2"
+        torn.write_bytes(image.read_bytes()[:-100])
+        for wrong, pattern in ((torn, "/torn.uf2/"), (OPTIONS.image.with_suffix(".uf2"), "/is for board pico_parallel, but this fingertip is a pico_mux/")):
+            page.give("dialog input[type=file]", wrong)
+            self.alert(page, pattern)
+        page.give("dialog input[type=file]", image)
+        page.click("button", "Reboot to the loader")
+        self.assertEqual(device.wait(PATIENCE_s), 0)
+        page.click("button", "Save onto the drive")
+        self.assertEqual(self.downloaded(".uf2").read_bytes(), image.read_bytes())
+        self.bench.fake(self.browser, SERIALS[0], "rate=100", "board=pico_mux")
+        driven.connected(page, 1)
+
+
+class Calibrate(PageTest):
+    """As the tool's own test of the emulated image does, in the browser: host time does not matter, the image runs as fast as it can."""
+
+    def start(self, *options):
+        return self.bench.emulated(self.browser, SERIALS[0], self.scenario("placements", "--gain", 10, "--seed", 41, "--pad", 7), "--pace", "fast",
+                                   "--flash", self.folder / "flash.bin", *options)
+
+    def test_a_weight_finds_the_gains(self):
+        process = self.start("--seconds", 3)
+        run(self.tool, "set", "rate=50", "--keep", "--port", self.browser.ports / f"1209:0001:{SERIALS[0]}")
+        self.assertEqual(process.wait(PATIENCE_s), 0)
+        page = self.open()
+        process = self.start()
+        driven.connected(page, 1)
+        page.click("button", "Calibrate")
+        page.type("textbox", "Weight, g", f"{1000 * FORCE_N / 9.80665:.6g}")
+        page.click("button", "Begin")
+        page.find("button", "Store", patience_s=PATIENCE_s)
+        after_mm = page.run("Number(document.querySelector('dialog table').textContent.match(/location off by[ 0-9.]*? mm *([0-9.]+) mm/)?.[1] ?? NaN)")
+        page.click("button", "Store")
+        page.until("document.querySelector('dialog [role=status]').textContent.startsWith('Stored')")
+        self.assertLess(after_mm, 0.15)
+        found = np.array(page.run("Array.from(fingertip.fingertips[0].info.gain)"))
+        true = 1 + np.array([float(each) for each in re.search("(?m)^# gain_errors_percent: (.*)$", self.scenario("placements").read_text())[1].split()]) / 100
+        self.assertEqual(len(found), len(true))
+        self.assertLess(np.std(found / true), 0.015)
+        self.assertGreater(np.std(true), 0.1)
+        self.bench.end(process)
+
+    def test_the_doctor_examines(self):
+        rest = self.folder / "rest.csv"
+        row = ",".join("0" for _ in files.TRUTH_COLUMNS) + ",0" * 15
+        rest.write_text("\n".join(["# fingertip-scenario 1", ",".join(["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(15))]),
+                                   f"0,{row}", f"3600,{row}"]) + "\n")
+        process = self.bench.emulated(self.browser, SERIALS[0], rest, "--pace", "fast")
+        page = self.open()
+        driven.connected(page, 1)
+        page.click("button", "Doctor")
+        page.click("button", "Examine")
+        page.until("/found something|All is well/.test(document.querySelector('dialog [role=status]').textContent)")
+        said = page.run("[...document.querySelectorAll('dialog .findings li')].map(each => each.textContent)")
+        self.assertGreater(len(said), 4)
+        self.assertEqual([each for each in said if each.startswith("wrong")], [], said)
+        self.bench.end(process)
+
+
+class BadInput(PageTest):
+    """Each is a sentence that says what to do."""
+
+    def test_an_older_protocol(self):
+        self.bench.fake(self.browser, SERIALS[0], "version=4")
+        self.assertRegex(self.alert(self.open(), "/version 4/"), "install the firmware that belongs to this page")
+
+    def test_something_else_with_our_test_id(self):
+        self.bench.fake(self.browser, SERIALS[0], "mute=1")
+        self.assertRegex(self.alert(self.open(), "/nothing answers/"), "choose another")
+
+    def test_something_else_with_its_own_id_is_left_alone(self):
+        self.bench.fake(self.browser, "5", "mute=1", usb_id="10c4:ea60")
+        page = self.open()
+        self.bench.fake(self.browser, SERIALS[0], "rate=100")
+        driven.connected(page, 1)
+        self.assertEqual(page.run("fingertip.fingertips.length"), 1)
+
+    def test_files_that_are_none(self):
+        page = self.open()
+        for name, content, pattern in (("letter.txt", b"Dear reader,\n", "/letter.txt.*recording/"), ("empty.csv", b"", "/empty.csv/"),
+                                       ("noise.mcap", bytes(range(256)) * 8, "/noise.mcap/")):
+            (self.folder / name).write_bytes(content)
+            page.give("input[type=file]", self.folder / name)
+            self.alert(page, pattern)
+        self.assertEqual(page.run("fingertip.fingertips.length"), 0)
+
+    def test_a_torn_recording_is_shown_to_its_tear(self):
+        whole = self.folder / "whole.csv"
+        with Bench(OPTIONS) as bench:
+            bench.fake(self.browser, SERIALS[1], "rate=200")
+            run(self.tool, "record", whole, "--overwrite", "--seconds", 1, "--port", self.browser.ports / f"1209:0001:{SERIALS[1]}")
+        lines = whole.read_text().splitlines(keepends=True)
+        (self.folder / "torn.csv").write_text("".join(lines[:-20]) + lines[-20][:40])
+        page = self.open()
+        page.give("input[type=file]", self.folder / "torn.csv")
+        self.alert(page, "/torn.csv/")
+        self.assertGreater(page.run("fingertip.fingertips[0].contacts"), 100)
+
+    def test_a_browser_without_web_serial(self):
+        page = self.open(before="delete Navigator.prototype.serial;")
+        page.click("button", "Connect")
+        self.assertRegex(self.alert(page, "/cannot reach serial ports/"), "open this page in Chrome")
+
+
+class Refused(PageTest):
+    @classmethod
+    def policy(cls):
+        return {"DefaultSerialGuardSetting": 2}  # no page may ask
+
+    def test_ports_that_the_user_does_not_give(self):
+        self.bench.fake(self.browser, SERIALS[0], "rate=100")
+        page = self.open()
+        page.click("button", "Connect")
+        self.alert(page, "/allow|choose|chosen/")
+        self.assertEqual(page.run("fingertip.fingertips.length"), 0)
+
+
+class Everyone(PageTest):
+    """Who does not see it, who sees little, who holds it in one hand."""
+
+    NAMED = {"button", "link", "textbox", "checkbox", "radio", "combobox", "listbox", "slider", "spinbutton", "tab", "menuitem", "searchbox", "switch", "dialog"}
+
+    def everything(self):
+        """A page with a simulated fingertip on it."""
+        page = self.open()
+        page.click("button", "Simulate")
+        driven.connected(page, 1)
+        return page
+
+    def check(self, page, where):
+        nameless = [role for role, name, _ in page.accessible() if role in self.NAMED and not name]
+        self.assertEqual(nameless, [], where)
+        self.assertEqual(page.faint(), [], where)
+
+    def test_all_controls_have_names_and_all_text_contrast(self):
+        page = self.open()
+        for scheme in ("light", "dark"):
+            page.media(prefers_color_scheme=scheme)
+            self.check(page, f"empty page, {scheme}")
+        page.click("button", "Simulate")
+        driven.connected(page, 1)
+        for scheme in ("light", "dark"):
+            page.media(prefers_color_scheme=scheme)
+            self.check(page, f"a fingertip, {scheme}")
+            for step, close in (("Set", "Close"), ("Calibrate", "Cancel"), ("Record", "Cancel"), ("Doctor", "Close")):
+                page.click("button", step)
+                self.check(page, f"{step}, {scheme}")
+                page.click("button", close)
+                page.until("!document.querySelector('dialog')")
+
+    def test_from_a_phone_to_a_wall(self):
+        page = self.everything()
+        for width, height in ((360, 740), (800, 600), (1280, 800), (3840, 2160)):
+            page.size(width, height)
+            self.browser.pump(0.3)
+            self.assertLessEqual(page.run("document.documentElement.scrollWidth"), width)
+            for role, name in (("button", "Connect"), ("button", "Tare"), ("button", "Record")):
+                self.assertTrue(page.has(role, name), (width, name))
+
+    def test_by_keys_alone(self):
+        """Every control is reached, and none holds the focus."""
+        page = self.everything()
+        wanted = {"Connect", "Simulate", "Replay a file", "Tare", "Set", "Calibrate", "Record", "Doctor", "Disconnect"}
+        reached = set()
+        for _ in range(60):
+            page.key("Tab")
+            reached.add(page.run("document.activeElement.textContent.trim()"))
+        self.assertLessEqual(wanted, reached)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name in ("build", "image"):
+        parser.add_argument(f"--{name}", required=True, type=lambda path: pathlib.Path(path).resolve())
+    parser.add_argument("--node", required=True)
+    _, rest = parser.parse_known_args(namespace=OPTIONS)
+    OPTIONS.ports = OPTIONS.build / "tests/web/libweb_test_ports.so"
+    try:
+        with tempfile.TemporaryDirectory(prefix="fingertip-") as folder, Browser(folder, OPTIONS.ports):
+            pass
+    except CannotRun as why:
+        print(f"skipped: {why}")
+        sys.exit(SKIPPED)
+    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
