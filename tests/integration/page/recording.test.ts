@@ -2,6 +2,7 @@
 import { McapStreamReader } from '@mcap/core';
 import { decompress } from 'fzstd';
 import assert from 'node:assert/strict';
+import { File } from 'node:buffer'; // node 18 has it there alone
 import { execFileSync } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
