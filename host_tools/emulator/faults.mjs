@@ -26,7 +26,7 @@
  *     crystal_weak                  it swings, but what it drives before to_s stops the chip until a reset
  *     pll_late                      no PLL locks before to_s
  *     usb_busy_hub                  other devices talk on the bus: after a reset of it it is never idle for 800 us
- *     usb_deaf                      erratum E15 strikes at from_s: the USB controller answers nothing until its block is reset
+ *     usb_deaf                      erratum E15 strikes in the first IN transfer from from_s on: the USB controller answers nothing until its block is reset
  *     usb_dead                      the same, and it does not hear the bus either
  *     usb_late_resume               the controller says 45 ms after a resume that it is not suspended any more
  *     power_cut                     chip, flash and sensors are without power until to_s; what the flash was doing is cut short

@@ -108,9 +108,9 @@ export class Machine {
     this.onPowerUp?.(this.chip);
   }
 
-  /** Erratum E15 of the USB controller: only a reset of the block ends it. */
+  /** Erratum E15 of the USB controller, in its next IN transfer: only a reset of the block ends it. */
   #hang(how, active) {
-    if (active && this.hasPower) this.chip.usbCtrl.hung = how;
+    if (active && this.hasPower) this.chip.usbCtrl.hangsAtIn = how;
   }
 
   #stopChip() {

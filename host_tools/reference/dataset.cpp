@@ -1,6 +1,6 @@
 #include "reference/dataset.hpp"
 
-#include "reference/parallel.hpp"
+#include "twin/in_parallel.hpp"
 
 extern "C" {
 #include "config/geometry.h"
@@ -150,7 +150,7 @@ std::vector<Case> load_cases(PressSet set, Mask mask, std::uint64_t seed, std::s
   constexpr std::uint64_t MASK_STREAM = 1000;
   const Array array = firmware_array();
   std::vector<Case> cases(count);
-  in_parallel(count, [&](std::size_t i) {
+  twin::in_parallel(count, [&](std::size_t i) {
     Case &c = cases[i];
     c.press = make_press(set, array, seed, i);
     c.pressure_Pa_q10 = quantise(c.press.pressure_Pa);
@@ -170,7 +170,7 @@ std::vector<Case> load_cases(PressSet set, Mask mask, std::uint64_t seed, std::s
   }
   if (!missing.empty()) {
     std::atomic<std::size_t> done{0};
-    in_parallel(missing.size(), [&](std::size_t m) {
+    twin::in_parallel(missing.size(), [&](std::size_t m) {
       records[missing[m]] = solve(array, cases[missing[m]]);
       const std::size_t now = ++done;
       if (now % 2000 == 0 || now == missing.size()) {

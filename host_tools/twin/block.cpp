@@ -1,13 +1,12 @@
 #include "twin/block.hpp"
 
+#include "twin/in_parallel.hpp"
 #include "twin/point_lift.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
-#include <exception>
 #include <mutex>
 #include <stdexcept>
 #include <thread>
@@ -429,55 +428,36 @@ std::vector<BlockAnswer> solve_block(const Block &block, const std::vector<Place
   const int nodes_y = block_nodes(block.half_y_mm, step_mm);
   std::vector<BlockAnswer> answers(places.size());
   std::mutex telling;
-  std::exception_ptr failure;
-  std::atomic<std::size_t> next{0};
   std::size_t done = 0;
-  const auto work = [&] {
-    for (std::size_t n; (n = next++) < places.size();) {
-      try {
-        const Place &place = places[n];
-        std::array<Matrix, 3> moved;
-        moved.fill(Matrix::Zero(nodes_x, nodes_y));
-        for (bool odd_x : {false, true}) {
-          for (bool odd_y : {false, true}) {
-            // Nothing of a place in the middle is odd.
-            if ((!odd_x || place.x_mm != 0.0) && (!odd_y || place.y_mm != 0.0)) {
-              solver.add(place, odd_x, odd_y, nodes_x, nodes_y, moved);
-            }
-          }
+  const auto solve = [&](std::size_t n) {
+    const Place &place = places[n];
+    std::array<Matrix, 3> moved;
+    moved.fill(Matrix::Zero(nodes_x, nodes_y));
+    for (bool odd_x : {false, true}) {
+      for (bool odd_y : {false, true}) {
+        // Nothing of a place in the middle is odd.
+        if ((!odd_x || place.x_mm != 0.0) && (!odd_y || place.y_mm != 0.0)) {
+          solver.add(place, odd_x, odd_y, nodes_x, nodes_y, moved);
         }
-        BlockAnswer &answer = answers[n];
-        answer = {nodes_x, nodes_y, {}, {}, {}};
-        // Pressure is what a lift by one cubic millimetre lets the load do, in MPa per N.
-        for (int i = 0; i < nodes_x; i++) {
-          for (int j = 0; j < nodes_y; j++) {
-            answer.down.push_back(static_cast<float>(1e6 * moved[2](i, j)));
-            answer.along_x.push_back(static_cast<float>(-1e6 * moved[0](i, j)));
-            answer.along_y.push_back(static_cast<float>(-1e6 * moved[1](i, j)));
-          }
-        }
-        const std::lock_guard<std::mutex> lock(telling);
-        done++;
-        if (on_progress) {
-          on_progress(static_cast<double>(done) / static_cast<double>(places.size()));
-        }
-      } catch (...) {
-        const std::lock_guard<std::mutex> lock(telling);
-        failure = std::current_exception();
-        next = places.size();
       }
     }
+    BlockAnswer &answer = answers[n];
+    answer = {nodes_x, nodes_y, {}, {}, {}};
+    // Pressure is what a lift by one cubic millimetre lets the load do, in MPa per N.
+    for (int i = 0; i < nodes_x; i++) {
+      for (int j = 0; j < nodes_y; j++) {
+        answer.down.push_back(static_cast<float>(1e6 * moved[2](i, j)));
+        answer.along_x.push_back(static_cast<float>(-1e6 * moved[0](i, j)));
+        answer.along_y.push_back(static_cast<float>(-1e6 * moved[1](i, j)));
+      }
+    }
+    const std::lock_guard<std::mutex> lock(telling);
+    done++;
+    if (on_progress) {
+      on_progress(static_cast<double>(done) / static_cast<double>(places.size()));
+    }
   };
-  std::vector<std::thread> threads(std::max(1u, std::thread::hardware_concurrency()));
-  for (std::thread &thread : threads) {
-    thread = std::thread(work);
-  }
-  for (std::thread &thread : threads) {
-    thread.join();
-  }
-  if (failure) {
-    std::rethrow_exception(failure);
-  }
+  in_parallel(places.size(), solve, std::max(1u, std::thread::hardware_concurrency()));
   return answers;
 }
 

@@ -6,6 +6,7 @@
 #include "libfingertip/text.hpp"
 #include "tool/advice.hpp"
 #include "twin/best_gaussian.hpp"
+#include "twin/in_parallel.hpp"
 #include "twin/scenario_file.hpp"
 
 #include <CLI/CLI.hpp>
@@ -123,40 +124,21 @@ int tables(const Options &options) {
   const std::filesystem::path cache = cache_of(options);
   ProgressBar bar("contact tables", ProgressBar::Lines::tenths);
   std::mutex telling;
-  std::exception_ptr failure;
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t i; (i = next++) < jobs.size();) {
-      const auto tell = [&](double share) {
-        const std::lock_guard<std::mutex> lock(telling);
-        jobs[i].share = share;
-        double sum = 0.0;
-        for (const Job &job : jobs) {
-          sum += job.share;
-        }
-        show(bar, sum / static_cast<double>(jobs.size()));
-      };
-      try {
-        ContactTable::load_or_build(*jobs[i].indenter, jobs[i].layer, cache, tell);
-        const std::lock_guard<std::mutex> lock(telling);
-        jobs[i].share = 1.0; // without a word: it may have been there
-      } catch (...) {
-        const std::lock_guard<std::mutex> lock(telling);
-        failure = std::current_exception();
-        next = jobs.size();
+  const auto make = [&](std::size_t i) {
+    const auto tell = [&](double share) {
+      const std::lock_guard<std::mutex> lock(telling);
+      jobs[i].share = share;
+      double sum = 0.0;
+      for (const Job &job : jobs) {
+        sum += job.share;
       }
-    }
+      show(bar, sum / static_cast<double>(jobs.size()));
+    };
+    ContactTable::load_or_build(*jobs[i].indenter, jobs[i].layer, cache, tell);
+    const std::lock_guard<std::mutex> lock(telling);
+    jobs[i].share = 1.0; // without a word: it may have been there
   };
-  std::vector<std::thread> threads(std::max(1u, std::thread::hardware_concurrency()));
-  for (std::thread &thread : threads) {
-    thread = std::thread(work);
-  }
-  for (std::thread &thread : threads) {
-    thread.join();
-  }
-  if (failure) {
-    std::rethrow_exception(failure);
-  }
+  in_parallel(jobs.size(), make, std::max(1u, std::thread::hardware_concurrency()));
   std::printf("%zu contact tables in %s\n", jobs.size(), cache.string().c_str());
   return 0;
 }

@@ -70,8 +70,9 @@ export class UsbBlock extends BasePeripheral {
     this.idleAlarm.cancel();
     this.connected = !this.isOld;
     this.inReset = false;
-    /** By a fault: 'deaf' answers no token any more, 'dead' does not hear the bus at all. */
+    /** By a fault: 'deaf' answers no token any more, 'dead' does not hear the bus at all. Erratum E15 strikes amid an IN transfer: `hangsAtIn` says how. */
     this.hung = null;
+    this.hangsAtIn = null;
     this.buffStatus = 0;
     this.epAbort = 0;
     this.epAbortDone = 0;
@@ -445,6 +446,10 @@ export class UsbBlock extends BasePeripheral {
   /** @returns { answer: 'none' | 'nak' | 'stall' } or { answer: 'data', pid, data, acknowledged() } */
   inToken(address, endpoint) {
     if (!this.#hears(address)) return { answer: 'none' };
+    if (this.hangsAtIn) {
+      this.hung = this.hangsAtIn;
+      return { answer: 'none' };
+    }
     const buffer = this.#buffer(endpoint, true);
     if (!buffer) return { answer: 'none' };
     if (this.#stalls(buffer, endpoint, true)) return { answer: 'stall' };

@@ -102,8 +102,10 @@ export class UsbHost {
   /** The device controller has no power. */
   disconnect() {
     this.#gone();
+    if (!this.block) return;
     this.block.onPortChange = () => {};
     this.block.onArmed = () => {};
+    this.block = null;
   }
 
   unplug() {
@@ -218,7 +220,7 @@ export class UsbHost {
 
   #checkPullup() {
     const { block } = this;
-    if (block.sieCtrl & (1 << 16) && !block.attached) this.#fail(`the firmware enabled the pull-up but ${block.attachProblem ?? 'holds USBCTRL in reset'}`);
+    if (block && block.sieCtrl & (1 << 16) && !block.attached) this.#fail(`the firmware enabled the pull-up but ${block.attachProblem ?? 'holds USBCTRL in reset'}`);
   }
 
   #enumeration = null;

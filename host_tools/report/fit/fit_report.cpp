@@ -2,9 +2,9 @@
 #include "common/contact_flags.h"
 #include "reference/dataset.hpp"
 #include "reference/options.hpp"
-#include "reference/parallel.hpp"
 #include "report/fit/json_file.hpp"
 #include "report/fit/kernels.hpp"
+#include "twin/in_parallel.hpp"
 
 extern "C" {
 #include "config/defaults.h"
@@ -242,7 +242,7 @@ private:
 std::vector<Outcome> run(const fitting::Kernel &kernel, const fit_array &array,
                          const Variant &variant, const std::vector<Case> &cases) {
   std::vector<Outcome> outcomes(cases.size());
-  reference::in_parallel(cases.size(), [&](std::size_t i) {
+  fingertip::twin::in_parallel(cases.size(), [&](std::size_t i) {
     const Case &c = cases[i];
     const auto readings = reference::quantise(c.press.pressure_Pa, variant.lsb_Pa);
     const auto result = kernel.fit(array, readings.data(), c.usable,

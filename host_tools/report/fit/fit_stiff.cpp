@@ -12,9 +12,9 @@
 #include "common/contact_flags.h"
 #include "reference/dataset.hpp"
 #include "reference/options.hpp"
-#include "reference/parallel.hpp"
 #include "report/fit/json_file.hpp"
 #include "report/fit/kernels.hpp"
+#include "twin/in_parallel.hpp"
 
 extern "C" {
 #include "condition/condition.h"
@@ -600,7 +600,7 @@ int run(const Options &options) {
       stream = stream * 131 + static_cast<unsigned char>(*letter);
     }
     std::vector<Result> results(options.limit);
-    reference::in_parallel(options.limit, [&](std::size_t i) {
+    fingertip::twin::in_parallel(options.limit, [&](std::size_t i) {
       Random random(options.seed, stream, i);
       results[i] = c.duplicates ? twice_chain(c.draw(twice, random)) : chain(c.draw(plain, random));
     });

@@ -5,16 +5,14 @@
 #include "grasp/fault_trials.hpp"
 #include "grasp/words.hpp"
 #include "reference/options.hpp"
+#include "twin/in_parallel.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cstdio>
 #include <exception>
 #include <iostream>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
-#include <thread>
 
 namespace {
 
@@ -54,29 +52,8 @@ ordered_json row_of(const FaultTrial &one, const FaultOutcome &done) {
 std::vector<FaultOutcome> run_all(const FaultRunner &runner, const std::vector<FaultTrial> &trials,
                                   std::uint64_t jobs) {
   std::vector<FaultOutcome> done(trials.size());
-  std::atomic<std::size_t> next{0};
-  std::mutex failing;
-  std::exception_ptr failure;
-  std::vector<std::thread> threads;
-  for (std::uint64_t job = 0; job < jobs; job++) {
-    threads.emplace_back([&] {
-      for (std::size_t i; (i = next++) < trials.size();) {
-        try {
-          done[i] = runner.run(trials[i]);
-        } catch (...) {
-          const std::lock_guard<std::mutex> lock(failing);
-          failure = std::current_exception();
-          next = trials.size();
-        }
-      }
-    });
-  }
-  for (std::thread &thread : threads) {
-    thread.join();
-  }
-  if (failure) {
-    std::rethrow_exception(failure);
-  }
+  const auto one = [&](std::size_t i) { done[i] = runner.run(trials[i]); };
+  twin::in_parallel(trials.size(), one, jobs);
   return done;
 }
 

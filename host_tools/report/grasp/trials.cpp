@@ -2,16 +2,13 @@
 
 #include "grasp/convert.hpp"
 #include "libfingertip/text.hpp"
+#include "twin/in_parallel.hpp"
 #include "twin/table_file.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <exception>
-#include <mutex>
 #include <optional>
 #include <stdexcept>
-#include <thread>
 
 namespace fingertip::grasp {
 
@@ -178,30 +175,10 @@ Outcome Set::run(std::uint64_t n, const std::function<void(const Moment &)> &tra
 std::vector<Done> run_all(const Set &set, std::uint64_t first, std::uint64_t count,
                           std::uint64_t jobs) {
   std::vector<Done> done(count);
-  std::atomic<std::uint64_t> next{0};
-  std::mutex failing;
-  std::exception_ptr failure;
-  std::vector<std::thread> threads;
-  for (std::uint64_t job = 0; job < jobs; job++) {
-    threads.emplace_back([&] {
-      for (std::uint64_t i; (i = next++) < count;) {
-        try {
-          const std::uint64_t n = first + i;
-          done[i] = {set.trial(n).scene, set.run(n)};
-        } catch (...) {
-          const std::lock_guard<std::mutex> lock(failing);
-          failure = std::current_exception();
-          next = count;
-        }
-      }
-    });
-  }
-  for (std::thread &thread : threads) {
-    thread.join();
-  }
-  if (failure) {
-    std::rethrow_exception(failure);
-  }
+  const auto one = [&](std::size_t i) {
+    done[i] = {set.trial(first + i).scene, set.run(first + i)};
+  };
+  twin::in_parallel(count, one, jobs);
   return done;
 }
 

@@ -7,17 +7,15 @@
 // motion.c were chosen with seeds 201 to 224 of the twin on pads of 12 mm.
 #include "reference/options.hpp"
 #include "shear/motion/watch.hpp"
+#include "twin/in_parallel.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <exception>
 #include <iostream>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
-#include <thread>
 
 namespace {
 
@@ -94,30 +92,6 @@ ordered_json rounded(double value) {
   return std::isnan(value) ? ordered_json(nullptr) : ordered_json(std::round(10.0 * value) / 10.0);
 }
 
-// work(0) .. work(count - 1) on two threads, one after the other: each takes long.
-template <typename Work> void in_parallel(std::size_t count, const Work &work) {
-  std::atomic<std::size_t> next{0};
-  std::mutex failing;
-  std::exception_ptr failure;
-  const auto run = [&] {
-    for (std::size_t i; (i = next++) < count;) {
-      try {
-        work(i);
-      } catch (...) {
-        const std::lock_guard<std::mutex> lock(failing);
-        failure = std::current_exception();
-        next = count;
-      }
-    }
-  };
-  std::thread other(run);
-  run();
-  other.join();
-  if (failure) {
-    std::rethrow_exception(failure);
-  }
-}
-
 twin::Scenario scenario_of(const Case &c, const std::string &kind, const Object &object,
                            std::uint64_t seed, std::size_t acts) {
   constexpr double LONGEST_LIFT_s = 6.5, LONGEST_SLIDE_s = 14.0;
@@ -157,7 +131,7 @@ std::vector<Judged> play(const Case &c, const std::string &kind, const Pads &pad
     const std::uint64_t seed = options.seed + 100 * o;
     const twin::Scenario scenario = scenario_of(c, kind, object, seed, share);
     std::vector<Judged> judged(share);
-    in_parallel(share, [&](std::size_t i) {
+    twin::in_parallel(share, [&](std::size_t i) {
       Player player(object, pads.pad(c.pad, share * o + i), c.sensing, seed);
       judged[i] = judge(player, scenario.acts[i], i);
     });

@@ -9,10 +9,10 @@
 #include "pad/edges.hpp"
 #include "pad/profile.hpp"
 #include "reference/options.hpp"
-#include "reference/parallel.hpp"
 #include "shear/static/bounds.hpp"
 #include "shear/static/results.hpp"
 #include "twin/effects.hpp"
+#include "twin/in_parallel.hpp"
 #include "twin/scenarios.hpp"
 
 extern "C" {
@@ -173,7 +173,7 @@ twin::Touch Judge::draw(const Case &c, const fit_array &array, Random &random) c
 Results Judge::run(const std::string &table, const Case &c, const pad_profile *profile) const {
   std::vector<Judged> judged(units(c) * TOUCHES);
   const std::uint64_t stream = truth::stream_of(table);
-  reference::in_parallel(units(c), [&](std::size_t unit) {
+  twin::in_parallel(units(c), [&](std::size_t unit) {
     Random random(options_.seed, stream, unit), errors(options_.seed, stream + 1, unit);
     Fingertip fingertip(profile ? *profile : profile_);
     const KnownPad pad = c.pad(unit / UNITS_PER_PAD);
@@ -456,7 +456,7 @@ void Judge::judge_bounds() {
   const std::size_t touches = std::min(TOUCHES_MAX, units(c) * TOUCHES);
   for (const Limit &limit : limits) {
     std::vector<Judged> judged(touches);
-    reference::in_parallel(touches, [&](std::size_t i) {
+    twin::in_parallel(touches, [&](std::size_t i) {
       Random random(options_.seed, truth::stream_of("bounds"), i);
       const KnownPad pad = c.pad(i);
       Judged &j = judged[i];
@@ -517,7 +517,7 @@ void Judge::judge_rubber() {
         Rubber{"relaxation,hysteresis,aftereffect", true}}) {
     const twin::EffectValues values = twin::parse_effects(kind.effects);
     std::vector<std::array<Judged, std::size(moments)>> judged(touches);
-    reference::in_parallel(touches, [&](std::size_t i) {
+    twin::in_parallel(touches, [&](std::size_t i) {
       Random random(options_.seed, truth::stream_of("rubber"), i);
       Fingertip fingertip(profile_);
       KnownPad pad{truth::perfect_pad(), {}};
@@ -761,7 +761,7 @@ void Judge::judge_overhang() {
 Judge::Ended Judge::touch_twice(const Case &c, const pad_profile &profile) const {
   constexpr double FIRST_MIN_N = 0.5, FIRST_MAX_N = 2.0;
   std::vector<Judged> zero(units(c) * TOUCHES), loaded(zero.size()), increment(zero.size());
-  reference::in_parallel(units(c), [&](std::size_t unit) {
+  twin::in_parallel(units(c), [&](std::size_t unit) {
     Random random(options_.seed, truth::stream_of("overhang"), unit);
     Fingertip fingertip(profile);
     const KnownPad pad = c.pad(unit / UNITS_PER_PAD);

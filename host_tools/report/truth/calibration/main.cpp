@@ -5,6 +5,7 @@
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/text.hpp"
 #include "truth/calibration/sessions.hpp"
+#include "twin/in_parallel.hpp"
 
 extern "C" {
 #include "config/defaults.h"
@@ -13,7 +14,6 @@ extern "C" {
 }
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -21,7 +21,6 @@ extern "C" {
 #include <functional>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 namespace {
 
@@ -122,33 +121,17 @@ private:
   std::vector<Tap> taps_;
 };
 
-// work(i) for i below count, on two threads.
-void in_parallel(const std::string &what, std::size_t count,
-                 const std::function<void(std::size_t)> &work) {
+// work(i) for i below count; a bar tells how far it is.
+void with_bar(const std::string &what, std::size_t count,
+              const std::function<void(std::size_t)> &work) {
   ProgressBar bar(what, ProgressBar::Lines::tenths);
-  std::atomic<std::size_t> next{0}, done{0};
   std::mutex telling;
-  std::exception_ptr failure;
-  const auto run = [&] {
-    for (std::size_t i; (i = next++) < count;) {
-      try {
-        work(i);
-      } catch (...) {
-        const std::lock_guard<std::mutex> lock(telling);
-        failure = std::current_exception();
-        next = count;
-      }
-      const std::size_t now = ++done;
-      const std::lock_guard<std::mutex> lock(telling);
-      bar.show(double(now) / double(count));
-    }
-  };
-  std::thread other(run);
-  run();
-  other.join();
-  if (failure) {
-    std::rethrow_exception(failure);
-  }
+  std::size_t done = 0;
+  twin::in_parallel(count, [&](std::size_t i) {
+    work(i);
+    const std::lock_guard<std::mutex> lock(telling);
+    bar.show(double(++done) / double(count));
+  });
 }
 
 std::vector<double> ones() {
@@ -251,7 +234,7 @@ PadCase try_pads(const std::string &what, const Options &options, std::size_t pa
   std::mutex adding;
   const double layer_mm = objects.feet.layer_mm;
   all.pads = pads;
-  in_parallel(what, pads, [&](std::size_t i) {
+  with_bar(what, pads, [&](std::size_t i) {
     const std::uint64_t seed = options.seed + i;
     SessionPad pad(pad_options, layer_mm, seed);
     Session session(objects.feet, SessionKind::good, seed, calibrating::PLACEMENTS_MAX);
@@ -365,7 +348,7 @@ struct BadCase {
 BadCase try_bad(SessionKind kind, const Options &options, const Objects &objects) {
   BadCase all;
   std::mutex adding;
-  in_parallel(name_of(kind), options.pads, [&](std::size_t i) {
+  with_bar(name_of(kind), options.pads, [&](std::size_t i) {
     const std::uint64_t seed = options.seed + i;
     SessionPad pad(PadOptions{}, objects.feet.layer_mm, seed);
     Session session(objects.feet, kind, seed, PLACEMENTS);

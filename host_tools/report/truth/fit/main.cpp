@@ -5,9 +5,9 @@
 // that are judged, and under "cases", "elongated", "iterations" and "few_sensors" the tables behind
 // them. The constants of fit_limits.h and defaults.h were chosen with --seed 1.
 #include "reference/options.hpp"
-#include "reference/parallel.hpp"
 #include "truth/fit/statistics.hpp"
 #include "truth/fit/touches.hpp"
+#include "twin/in_parallel.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"
@@ -131,7 +131,7 @@ Results run(const Case &c, const Options &options) {
   std::vector<Judged> judged(options.pads * TOUCHES);
   // Cases that differ in what is done with a touch alone draw the same touches.
   const std::uint64_t stream = stream_of(c.name.substr(0, c.name.find(',')));
-  reference::in_parallel(options.pads, [&](std::size_t p) {
+  twin::in_parallel(options.pads, [&](std::size_t p) {
     Random random(options.seed, stream, p);
     const Pad pad = c.pad(random, p);
     for (int t = 0; t < TOUCHES;) {

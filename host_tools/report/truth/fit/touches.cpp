@@ -1,6 +1,6 @@
 #include "truth/fit/touches.hpp"
 
-#include "reference/parallel.hpp"
+#include "twin/in_parallel.hpp"
 
 extern "C" {
 #include "config/defaults.h"
@@ -92,7 +92,7 @@ CalibratedPads calibrated_pads(std::size_t judged, std::uint64_t seed,
   const Feet feet(CALIBRATED_LAYER_mm, cache_directory);
   CalibratedPads pads(std::clamp<std::size_t>(judged / PADS_PER_SESSION, 1, SESSIONS_MAX));
   const std::uint64_t stream = stream_of("calibrated sessions");
-  reference::in_parallel(pads.size(), [&](std::size_t i) {
+  twin::in_parallel(pads.size(), [&](std::size_t i) {
     const PadOptions &kind = SESSION_PADS[i % std::size(SESSION_PADS)];
     pads[i] = calibrated_pad(calibrated_session(feet, kind, Random(seed, stream, i).next()));
   });
