@@ -84,8 +84,11 @@ test('what has left the intervals is read anew when somebody goes back to it', (
     buckets.read(history, 0.02, end_s - 0.5, end_s);
   }
   const { first, last } = buckets.read(history, 0.02, 0.2, 0.6);
+  const fresh = new Buckets(60);
+  fresh.read(history, 0.02, 0.2, 0.6);
   for (let b = first; b <= last; b++) {
-    assert.equal(forceOf(buckets).low[buckets.slot(b)], 20 * b);
+    assert.ok(fresh.slot(b) >= 0);
+    assert.equal(forceOf(buckets).low[buckets.slot(b)], forceOf(fresh).low[fresh.slot(b)], `interval ${b}`);
   }
 });
 
