@@ -18,11 +18,11 @@ import time
 PATIENCE_s = 60
 BINARIES = ("/usr/lib/chromium/chromium",)
 POLICY_FOLDER = "/etc/chromium"
-# software rendering, and nothing of the browser's own on the network
+# nothing of the browser's own on the network; WebGL in software, as where there is no graphics processor
 FLAGS = ("--headless", "--no-sandbox", "--remote-debugging-pipe", "--no-first-run", "--no-default-browser-check", "--disable-extensions",
          "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-default-apps", "--disable-breakpad",
          "--disable-dev-shm-usage", "--mute-audio", "--hide-scrollbars", "--force-color-profile=srgb", "--force-device-scale-factor=1",
-         "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+         "--enable-unsafe-swiftshader")
 FAINT = """(() => {
   const paint = new OffscreenCanvas(1, 1).getContext('2d', {willReadFrequently: true});
   const parts = colour => {

@@ -1,8 +1,8 @@
 """The page in a browser: what its user does, against emulated release images on the browser's serial ports.
 
-usage: test_page.py --build BUILD --image FILE.bin --node NODE [--pictures FOLDER] [unittest arguments]
+usage: test_page.py --build BUILD --image FILE.bin --node NODE [--pictures] [unittest arguments]
 
---pictures: only writes the reference pictures anew. Exit status 77: there is no such browser here, or nobody may give it ports.
+With --pictures Looks writes the reference pictures anew: look at them. Exit status 77: there is no such browser here, or nobody may give it ports.
 """
 import argparse
 import json
@@ -29,6 +29,8 @@ SKIPPED = 77
 PATIENCE_s = 120
 SERIALS = ("E660583883265A01", "E660583883265A02")
 FORCE_N = 3.0
+REFERENCES = pathlib.Path(__file__).parent / "pictures"
+MOMENT_STEPS = 7  # of half a second before the end of the recording: the lime slips
 COUNT_MESSAGES = """
 import collections, json, sys
 from mcap.reader import make_reader
@@ -303,6 +305,58 @@ class Refused(PageTest):
         self.assertEqual(page.run("fingertip.fingertips.length"), 0)
 
 
+class Looks(PageTest):
+    """Against pictures that somebody has looked at, of the same moment of a recording."""
+
+    LIMIT = 11  # of what one place in a hundred exceeds: other fonts 4 (with serifs) to 10.5 (of one width), no traces 16, no colours 34, no pad 39
+    SIZES = {"light": (1120, 760), "dark": (1120, 760), "phone": (390, 780)}
+
+    def paused(self):
+        """A page that shows the same moment of the same recording of a lime that slips: simulated."""
+        recording = self.folder / "lime.csv"
+        if not recording.exists():
+            scenario = self.scenario("slip", "--indenter", "lime", "--gain", 10, "--seconds", 12)
+            run(OPTIONS.build / "host_tools/player/fingertip_player", "play", scenario, "-o", recording, "--quiet")
+        page = self.open(width=1120, height=760)
+        page.give("input[type=file]", recording)
+        page.until("fingertip.fingertips[0]?.state === 'closed'")
+        page.call("DOM.focus", nodeId=page.call("DOM.querySelector", nodeId=page.call("DOM.getDocument")["root"]["nodeId"], selector="main")["nodeId"])
+        page.key(" ", "Space")
+        for _ in range(MOMENT_STEPS):
+            page.key("ArrowLeft")
+        return page
+
+    def shown(self, page, name):
+        page.size(*self.SIZES[name])
+        page.media(prefers_color_scheme="dark" if name == "dark" else "light")
+        before = None
+        for _ in range(40):  # until it stands still
+            self.browser.pump(0.25)
+            now = page.picture()
+            if now == before:
+                break
+            before = now
+        return pictures.half(pictures.read(now))
+
+    def test_it_looks_as_it_did(self):
+        page = self.paused()
+        for name in self.SIZES:
+            found = self.shown(page, name)
+            reference = REFERENCES / f"{name}.png"
+            if OPTIONS.pictures:
+                pictures.write(reference, found)
+                continue
+            self.assertLess(pictures.difference(found, pictures.read(str(reference))), self.LIMIT, name)
+        if OPTIONS.pictures:
+            return
+        # and what is missing is noticed
+        for what, hide in (("the pad", "document.querySelector('.pad-picture').style.opacity = 0"), ("the traces", "document.querySelector('.traces').style.opacity = 0"),
+                           ("the colours", "document.documentElement.style.filter = 'grayscale(1)'")):
+            page.run(hide)
+            self.assertGreater(pictures.difference(self.shown(page, "light"), pictures.read(str(REFERENCES / "light.png"))), self.LIMIT, what)
+            page.run("document.querySelectorAll('[style*=opacity]').forEach(each => each.style.opacity = '')")
+
+
 class Everyone(PageTest):
     """Who does not see it, who sees little, who holds it in one hand."""
 
@@ -361,6 +415,7 @@ if __name__ == "__main__":
     for name in ("build", "image"):
         parser.add_argument(f"--{name}", required=True, type=lambda path: pathlib.Path(path).resolve())
     parser.add_argument("--node", required=True)
+    parser.add_argument("--pictures", action="store_true", help="write the reference pictures anew")
     _, rest = parser.parse_known_args(namespace=OPTIONS)
     OPTIONS.ports = OPTIONS.build / "tests/web/libweb_test_ports.so"
     try:

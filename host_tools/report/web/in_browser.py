@@ -16,9 +16,11 @@ import driven  # noqa: E402
 from browser import Browser, CannotRun  # noqa: E402
 from fingertip.files import InputError  # noqa: E402
 from fingertips import Bench  # noqa: E402
+from tables import table_md  # noqa: E402
 
 GOALS = (("page_ready_s", "<=", 1), ("bundle_kB", "<=", 600), ("draws_per_s", ">=", 30), ("web_fps", ">=", 1308), ("web_lost", "<=", 0),
          ("web_memory_kB_per_minute", "<=", 100), ("web_foreign_requests", "<=", 0), ("web_steps_failed", "<=", 0))
+STEP_OUTCOMES = {"ok": "as it should", "FAIL": "WRONG", "ERROR": "WRONG", "skipped": "not run"}
 LOADS = 5
 RATE_Hz = 1310  # as in the tools' report
 WATCHED_s = 60
@@ -98,7 +100,7 @@ def measure(build, steps):
                 driven.connected(page, 1)
                 found = watched(page, WATCHED_s)
                 steps.say(f"{WATCHED_s} s watched at {found['web_fps']:.0f} frames a second")
-                begun_s, looked = steps.start_s, []
+                looked = []
                 for _ in range(0, REMEMBERED_s + 1, LOOK_s):
                     looked.append((len(looked) * LOOK_s, held_kB(page)))
                     browser.pump(LOOK_s)
@@ -106,7 +108,19 @@ def measure(build, steps):
                 foreign = page.foreign()
     except CannotRun as why:
         raise InputError(f"no browser here: {why}") from None
-    outcome = driven.run_all(build, steps)
+    outcome = driven.run_all(build, build.parent / "pico_parallel/fingertip-pico_parallel.bin")
+    steps.say(f"{outcome['web_steps_driven']} steps driven")
     return {"page_ready_s": statistics.median(ready_s), "page_ready_worst_s": max(ready_s), "bundle_kB": bundle_kB, "bundle_simulated_kB": simulated_kB,
             **found, "web_seconds": WATCHED_s, "web_memory_seconds": REMEMBERED_s, "web_memory_kB": looked[-1][1],
             "web_memory_kB_per_minute": slope_kB_per_minute(looked), "web_foreign_requests": len(foreign), **outcome}
+
+
+def text(found):
+    return ["## In a browser", "", f"Chromium, headless, without a graphics processor. A page was ready {found['page_ready_s']:.2f} s after its address was given "
+            f"({found['page_ready_worst_s']:.2f} s at worst, {LOADS} times, each in a new browser). It weighs {found['bundle_kB']:.0f} kB compressed, its simulated "
+            f"fingertip {found['bundle_simulated_kB']:.0f} kB more, fetched when it is asked for. While a program that says what a fingertip says sent "
+            f"{found['web_fps']:.0f} frames a second for {found['web_seconds']} s, it drew {found['draws_per_s']:.0f} pictures a second, lost "
+            f"{found['web_lost']} packets and took {found['web_cpu_percent']:.0f} % of a core, the browser's processes together. Then memory was looked at for "
+            f"{found['web_memory_seconds']} s after collections: {found['web_memory_kB'] / 1000:.0f} MB at the end, {found['web_memory_kB_per_minute']:.0f} kB a minute "
+            f"once it had settled. Requests to elsewhere: {found['web_foreign_requests']}.", "", "Driven against emulated release images:", "",
+            *table_md(("step", "outcome"), [(each["step"], STEP_OUTCOMES[each["outcome"]]) for each in found["web_steps"]]), ""]

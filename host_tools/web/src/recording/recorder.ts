@@ -9,6 +9,8 @@ import { McapSink } from './mcap_sink';
 import type { Output } from './output';
 import { utcText } from './text';
 
+export { chooseOutput } from './output';
+
 export type RecordingKind = 'csv' | 'mcap';
 
 export const MEDIA_TYPES: Record<RecordingKind, string> = {

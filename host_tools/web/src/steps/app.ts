@@ -9,14 +9,17 @@ import {
 } from '../line/serial_line';
 import { Bench } from '../model/bench';
 import { Fingertip, OtherFingertip } from '../model/fingertip';
-import { chooseOutput } from '../recording/output';
-import { MEDIA_TYPES, Recorder, recordingName, type RecordingKind } from '../recording/recorder';
-import { Replay } from '../recording/replay_line';
+import type { Recorder, RecordingKind } from '../recording/recorder';
+import type { Replay } from '../recording/replay_line';
 import { SimulatedFingertip } from '../simulated/simulated_fingertip';
 import { version } from '../../package.json';
 import { wordsOf } from './dialog';
 
 export const PAGE_VERSION = version;
+
+// Fetched when they are first needed: the page is there sooner.
+const recording = () => import('../recording/recorder');
+const replaying = () => import('../recording/replay_line');
 
 /** Linux gives a port its group and rights a moment after it is there. */
 const RIGHTS_ms = 300;
@@ -84,7 +87,7 @@ export class App {
   }
 
   async replay(file: File): Promise<void> {
-    const replay = new Replay(file);
+    const replay = new (await replaying()).Replay(file);
     replay.onLine = (line: Line) => {
       const fingertip = new Fingertip(line, { is_replay: true });
       this.replays.set(fingertip, replay);
@@ -126,6 +129,7 @@ export class App {
 
   /** False: nothing was chosen. Throws Error, a sentence. */
   async record(fingertip: Fingertip, kind: RecordingKind): Promise<boolean> {
+    const { MEDIA_TYPES, Recorder, chooseOutput, recordingName } = await recording();
     const output = await chooseOutput(recordingName(fingertip, kind), MEDIA_TYPES[kind]);
     if (!output) {
       return false;
