@@ -352,8 +352,11 @@ function steady(limit: number, wanted: number): number {
   return round > limit || wanted < limit / 4 ? round : limit;
 }
 
-/** 1:05.2 of the time since the first frame. */
+/** 1:05.2 of the time since the first frame; nothing before it. */
 export function clock(t_s: number): string {
+  if (t_s < 0) {
+    return '';
+  }
   const minutes = Math.floor(t_s / 60);
   const rest = t_s - 60 * minutes;
   const text = (Math.abs(rest - Math.round(rest)) < 0.005 ? rest.toFixed(0) : rest.toFixed(1)).padStart(
