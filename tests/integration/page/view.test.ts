@@ -8,7 +8,7 @@ import { Flag, PacketType, blank, type Contact } from '../../../host_tools/web/s
 import { History } from '../../../host_tools/web/src/model/history';
 import { Buckets, Trust, intervalOf } from '../../../host_tools/web/src/view/buckets';
 import { cameraOf, picked, seen, type Box } from '../../../host_tools/web/src/view/camera';
-import { chartOf, roundAbove, spansOf } from '../../../host_tools/web/src/view/curves';
+import { chartOf, clock, roundAbove, spansOf } from '../../../host_tools/web/src/view/curves';
 import { contactAt, trailAt } from '../../../host_tools/web/src/view/moment';
 import { sceneOf } from '../../../host_tools/web/src/view/pad_scene';
 import { HEAT_STOPS, contrast, paletteOf, parsed } from '../../../host_tools/web/src/view/palette';
@@ -195,6 +195,10 @@ test('limits of axes and intervals are round', () => {
     const width_s = intervalOf(span_s, pixels);
     assert.ok(width_s >= span_s / pixels - 1e-12 && width_s <= Math.max(2.5 * (span_s / pixels), 0.001));
   }
+});
+
+test('times go on beyond a minute', () => {
+  assert.deepEqual([0, 2.5, 59.96, 60, 62.5, 605.04].map(clock), ['0 s', '2.5 s', '1:00', '1:00', '1:02.5', '10:05']);
 });
 
 const BOX: Box = { x_mm: 15, y_mm: 24, low_mm: -6, high_mm: 16 };
