@@ -254,7 +254,8 @@ class Page:
             if value:
                 return value
             if time.monotonic() > end_s:
-                raise PageError(f"never became true: {expression}")
+                said = self.run("(document.querySelector('dialog') ?? document.body).innerText")
+                raise PageError(f"never became true: {expression}; the page says: {said[-1000:]}")
             self.browser.pump(0.05)
 
     # What a reader of the screen is told.

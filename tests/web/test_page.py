@@ -30,7 +30,7 @@ PATIENCE_s = 120
 SERIALS = ("E660583883265A01", "E660583883265A02")
 FORCE_N = 3.0
 REFERENCES = pathlib.Path(__file__).parent / "pictures"
-MOMENT_STEPS = 7  # of half a second before the end of the recording: the lime slips
+MOMENT_STEPS = 8  # of half a second before the end of the recording: the lime slips
 COUNT_MESSAGES = """
 import collections, json, sys
 from mcap.reader import make_reader

@@ -123,9 +123,14 @@ class SpokenLine implements Line {
   }
 }
 
+const open: Fingertip[] = [];
+// Or the timers of one whose test failed would keep the process.
+test.afterEach(() => Promise.all(open.splice(0).map((each) => each.close())));
+
 async function opened(): Promise<[Fingertip, SpokenLine]> {
   const line = new SpokenLine();
   const fingertip = new Fingertip(line);
+  open.push(fingertip);
   await fingertip.open();
   return [fingertip, line];
 }

@@ -33,6 +33,7 @@ await build({
 });
 const tests = names.map((name) => join(folder, name.replace(/ts$/, 'mjs')));
 const { status } = spawnSync(process.execPath, ['--test', ...tests], {
+  timeout: 240_000,
   stdio: 'inherit',
   env: { ...process.env, FINGERTIP_SOURCE: source, FINGERTIP_TOOL: tool },
 });

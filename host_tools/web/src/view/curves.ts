@@ -150,3 +150,13 @@ export function roundAbove(value: number): number {
   }
   return 10 * decade;
 }
+
+/** "5.5 s", from a minute on "1:05.5": of a time that is not negative. */
+export function clock(t_s: number): string {
+  const tenths = Math.round(10 * t_s);
+  const minutes = Math.floor(tenths / 600);
+  const rest = tenths % 600;
+  const seconds = String(Math.floor(rest / 10)).padStart(minutes > 0 ? 2 : 1, '0');
+  const text = rest % 10 ? `${seconds}.${rest % 10}` : seconds;
+  return minutes > 0 ? `${minutes}:${text}` : `${text} s`;
+}

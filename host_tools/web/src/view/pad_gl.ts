@@ -329,7 +329,8 @@ export class PadGl {
     }
     const { x_mm, y_mm, p0_Pa } = fit.contact;
     const top = heatPart(p0_Pa) * HEIGHT_mm + 0.2;
-    const at = [x_mm, y_mm, top] as const;
+    /* On the rubber, as all places are, for aslant what is higher stands elsewhere. */
+    const at = [x_mm, y_mm, 0.1] as const;
     const colour = fit.doubtful ? warning : text;
     const part = fit.doubtful ? 0.6 : 1;
     if (fit.sd_mm > 0) {
@@ -343,6 +344,7 @@ export class PadGl {
       flat(this.over, at, 2.2, 1, 0.36, 0, text, 1);
     }
     /* Presses from above: solid as far as it is for sure, paler where it may end. */
+    put(this.shafts, [x_mm, y_mm, 0.1, 0, 0, top - 0.1, 0.12, 0, ...colour, part], true);
     const force = palette.of('accent');
     const head_mm = Math.min(3.2, 0.7 * fit.force_mm);
     const shade = (share: number) => [...(fit.doubtful ? mix(force, rubber, 0.35) : force), share];
@@ -363,8 +365,8 @@ export class PadGl {
       const { along_x, along_y, length_mm, sd_mm } = arrow;
       const tip = Math.min(3, 0.6 * length_mm);
       const body = length_mm - tip;
-      put(this.shafts, [x_mm, y_mm, top, along_x * body, along_y * body, 0, 0.5, 0, ...pull, part], true);
-      put(this.heads, [x_mm + along_x * body, y_mm + along_y * body, top, along_x * tip, along_y * tip, 0, 1.35, 0, ...pull, part], true);
+      put(this.shafts, [x_mm, y_mm, 0.6, along_x * body, along_y * body, 0, 0.5, 0, ...pull, part], true);
+      put(this.heads, [x_mm + along_x * body, y_mm + along_y * body, 0.6, along_x * tip, along_y * tip, 0, 1.35, 0, ...pull, part], true);
       if (sd_mm > 0.2) {
         const angle = Math.atan2(along_y, along_x);
         flat(this.over, at, length_mm, 4, sd_mm, 0, pull, UNSURE * part, angle);
@@ -372,7 +374,7 @@ export class PadGl {
     }
     flat(
       this.over,
-      [x_mm + arrow.along_x * arrow.length_mm, y_mm + arrow.along_y * arrow.length_mm, top],
+      [x_mm + arrow.along_x * arrow.length_mm, y_mm + arrow.along_y * arrow.length_mm, 0.1],
       Math.max(arrow.sd_mm, 0.5), 0, 0.2, 0.5, pull, UNSURE * part,
     );
   }

@@ -9,6 +9,9 @@ import type { ShownLayout } from './shown';
 
 const FROM_ABOVE: Look = { turn_deg: 0, tilt_deg: 90 };
 const ASLANT: Look = { turn_deg: -32, tilt_deg: 40 };
+/** In a frame that is much wider than high. */
+const ASLANT_WIDE: Look = { turn_deg: -62, tilt_deg: 42 };
+const WIDE = 1.5;
 const TURN_STEP_deg = 5;
 /** Labels are read, not watched. */
 const LABEL_INTERVAL_ms = 125;
@@ -16,9 +19,16 @@ const LABEL_INTERVAL_ms = 125;
 const NOTED_Pa = 500;
 const MOST_PIXELS = 2_000_000;
 const MOST_SOFTWARE_PIXELS = 500_000;
-/** Drawing that takes longer than this is given fewer pixels, and more again below half of it. */
-const SLOW_ms = 22;
-const LEAST_SHARPNESS = 0.5;
+/** Between pictures, in the mean: longer than this they get fewer pixels, below the other more. */
+const SLOW_ms = 36;
+const QUICK_ms = 25;
+const LOWER_AFTER_ms = 2000;
+const RAISE_AFTER_ms = 10_000;
+/** After so long without a picture nothing is told about how fast they come. */
+const PAUSE_ms = 400;
+/** What has not changed for so long is drawn once more, as sharp as can be. */
+const STILL_ms = 500;
+const LEAST_SHARPNESS = 0.6;
 
 /** What a pointer or keys on the rubber do; places in mm on its surface. */
 export interface Touch {
@@ -37,6 +47,8 @@ export class PadView {
   private plan: PadPlan | null = null;
   private look: Look = { ...ASLANT };
   private camera: Camera | null = null;
+  /** By somebody. */
+  private turned = false;
   private readonly size: { x_mm: number; y_mm: number };
   private readonly box: Box;
   private scene: Scene | null = null;
@@ -44,7 +56,10 @@ export class PadView {
   private labelsDue = true;
   private labelled_ms = -Infinity;
   private sharpness = 1;
-  private slow_ms = 0;
+  private slow_ms = QUICK_ms;
+  private called_ms = -Infinity;
+  private drawn_ms = -Infinity;
+  private sharpened_ms = 0;
   private touching: number | null = null;
   private turning: { id: number; x: number; y: number } | null = null;
   /** Set for a fingertip on which a hand may press. */
@@ -57,7 +72,7 @@ export class PadView {
       x_mm: this.size.x_mm,
       y_mm: this.size.y_mm,
       low_mm: -THICKNESS_mm,
-      high_mm: HEIGHT_mm * 0.9,
+      high_mm: HEIGHT_mm * 0.6,
     };
     this.element = document.createElement('div');
     this.element.className = 'pad';
@@ -96,8 +111,13 @@ export class PadView {
 
   setFromAbove(above: boolean): void {
     if (this.solid) {
-      this.turnTo(above ? FROM_ABOVE : ASLANT);
+      this.turnTo(above ? FROM_ABOVE : this.aslant);
     }
+  }
+
+  private get aslant(): Look {
+    const { clientWidth, clientHeight } = this.element;
+    return clientWidth > WIDE * clientHeight ? ASLANT_WIDE : ASLANT;
   }
 
   /** Gives back what the graphics processor keeps: a browser grants few pictures at a time. */
@@ -118,8 +138,14 @@ export class PadView {
 
   /** Once a picture; true if there was something to draw. */
   draw(now_ms: number, palette: Palette): boolean {
+    const took_ms = now_ms - this.called_ms;
+    this.called_ms = now_ms;
     if (!this.scene || this.canvas.width === 0) {
       return false;
+    }
+    if (!this.changed && this.sharpness < 1 && now_ms - this.drawn_ms > STILL_ms) {
+      this.sharpness = 1;
+      this.fit();
     }
     this.camera ??= cameraOf(this.look, this.canvas.width / this.canvas.height, this.box);
     if (this.labelsDue && now_ms - this.labelled_ms >= LABEL_INTERVAL_ms) {
@@ -132,27 +158,33 @@ export class PadView {
     }
     this.changed = false;
     this.labelsDue = true;
-    const started_ms = performance.now();
+    this.drawn_ms = now_ms;
     if (this.gl && !this.gl.lost) {
       this.gl.draw(this.scene, this.camera, palette);
     }
     this.plan?.draw(this.scene, this.camera, palette);
-    this.heed(performance.now() - started_ms);
+    this.heed(now_ms, took_ms);
     return true;
   }
 
-  /** Fewer pixels under load. */
-  private heed(took_ms: number): void {
+  /** Fewer pixels where pictures come slowly, whoever is slow: drawing is over before it is done. */
+  private heed(now_ms: number, took_ms: number): void {
+    if (took_ms > PAUSE_ms) {
+      this.slow_ms = QUICK_ms;
+      this.sharpened_ms = now_ms;
+      return;
+    }
     this.slow_ms += 0.05 * (took_ms - this.slow_ms);
+    const since_ms = now_ms - this.sharpened_ms;
     const wanted =
-      this.slow_ms > SLOW_ms
+      this.slow_ms > SLOW_ms && since_ms > LOWER_AFTER_ms
         ? Math.max(LEAST_SHARPNESS, this.sharpness * 0.8)
-        : this.slow_ms < SLOW_ms / 4
+        : this.slow_ms < QUICK_ms && since_ms > RAISE_AFTER_ms
           ? Math.min(1, this.sharpness * 1.25)
           : this.sharpness;
     if (wanted !== this.sharpness) {
       this.sharpness = wanted;
-      this.slow_ms = SLOW_ms / 2;
+      this.sharpened_ms = now_ms;
       this.fit();
     }
   }
@@ -170,10 +202,14 @@ export class PadView {
     this.labels.width = Math.round(width * dense);
     this.labels.height = Math.round(height * dense);
     this.camera = null;
+    if (!this.turned && this.solid) {
+      this.look = { ...this.aslant };
+    }
     this.repaint();
   }
 
   private turnTo(look: Look): void {
+    this.turned = true;
     this.look = {
       turn_deg: ((look.turn_deg + 540) % 360) - 180,
       tilt_deg: Math.min(90, Math.max(12, look.tilt_deg)),
@@ -256,7 +292,7 @@ export class PadView {
         ArrowRight: { turn_deg: turn_deg + step, tilt_deg },
         ArrowUp: { turn_deg, tilt_deg: tilt_deg + step },
         ArrowDown: { turn_deg, tilt_deg: tilt_deg - step },
-        Home: this.fromAbove ? ASLANT : FROM_ABOVE,
+        Home: this.fromAbove ? this.aslant : FROM_ABOVE,
       };
       const look = looks[event.key];
       if (look && this.solid && !event.ctrlKey && !event.metaKey && !event.altKey) {

@@ -3,7 +3,7 @@ import { Flag } from '../line/packets';
 import { FLAGS } from '../model/flags';
 import uPlot from 'uplot';
 import { Buckets, intervalOf, type ColumnName } from './buckets';
-import { chartOf, roundAbove, spansOf, type Chart } from './curves';
+import { chartOf, clock, roundAbove, spansOf, type Chart } from './curves';
 import { cssOf, type Palette } from './palette';
 import type { History } from '../model/history';
 import type { Shown } from './shown';
@@ -228,7 +228,7 @@ export class Traces {
           size: 22,
           gap: 2,
           space: 70,
-          values: (_chart, times) => times.map((t_s) => clock(t_s)),
+          values: (_chart, times) => times.map((t_s) => (t_s < 0 ? '' : clock(t_s))),
         },
         { ...axis, size: AXIS_px, gap: 4, space: 26 },
       ],
@@ -350,15 +350,4 @@ export class Traces {
 function steady(limit: number, wanted: number): number {
   const round = roundAbove(wanted);
   return round > limit || wanted < limit / 4 ? round : limit;
-}
-
-/** 1:05.2 of the time since the first frame. */
-export function clock(t_s: number): string {
-  const minutes = Math.floor(t_s / 60);
-  const rest = t_s - 60 * minutes;
-  const text = (Math.abs(rest - Math.round(rest)) < 0.005 ? rest.toFixed(0) : rest.toFixed(1)).padStart(
-    minutes > 0 ? 2 : 1,
-    '0',
-  );
-  return minutes > 0 ? `${minutes}:${text}` : `${text} s`;
 }

@@ -1,0 +1,338 @@
+/** What the page's pictures are made of: the traces' intervals, the eye and what the pointer picks, contrast, what readers of the
+ * screen are told, doubt. */
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import test from 'node:test';
+import { Flag, PacketType, blank, type Contact } from '../../../host_tools/web/src/line/packets';
+import { History } from '../../../host_tools/web/src/model/history';
+import { Buckets, Trust, intervalOf } from '../../../host_tools/web/src/view/buckets';
+import { cameraOf, picked, seen, type Box } from '../../../host_tools/web/src/view/camera';
+import { chartOf, clock, roundAbove, spansOf } from '../../../host_tools/web/src/view/curves';
+import { contactAt, trailAt } from '../../../host_tools/web/src/view/moment';
+import { sceneOf } from '../../../host_tools/web/src/view/pad_scene';
+import { HEAT_STOPS, contrast, paletteOf, parsed } from '../../../host_tools/web/src/view/palette';
+import { Speech } from '../../../host_tools/web/src/view/speech';
+
+const FITTED = Flag.CONTACT | Flag.FIT_VALID | Flag.UNCERTAINTY_VALID | Flag.TARED;
+
+function contactOf(more: Partial<Contact>): Contact {
+  return { ...(blank(PacketType.CONTACT) as unknown as Contact), flags: FITTED, ...more };
+}
+
+/** A frame each millisecond, from frame 0 at 0 s on. */
+function historyOf(count: number, contact: (i: number) => Partial<Contact> | null, capacity = 1 << 15): History {
+  const history = new History(15, capacity);
+  for (let i = 0; i < count; i++) {
+    const more = contact(i);
+    if (more) {
+      history.addContact(contactOf({ frame: i, t_us: i * 1000, ...more }));
+    }
+  }
+  return history;
+}
+
+function forceOf(buckets: Buckets) {
+  const track = buckets.tracks.get('force_N');
+  assert.ok(track);
+  return track;
+}
+
+test('an interval keeps the lowest and the highest value, and which came first', () => {
+  const history = historyOf(1000, (i) => ({ force_N: i === 503 ? 9 : i === 507 ? -1 : 2, force_sd_N: 0.5 }));
+  const buckets = new Buckets(500);
+  const { first, last } = buckets.read(history, 0.01, 0, 0.999);
+  assert.deepEqual([first, last], [0, 99]);
+  const force = forceOf(buckets);
+  assert.equal(force.high[buckets.slot(50)], 9);
+  assert.equal(force.low[buckets.slot(50)], -1);
+  assert.equal(force.rises[buckets.slot(50)], 0);
+  assert.equal(force.sdHigh[buckets.slot(50)], 9.5);
+  assert.equal(force.sdLow[buckets.slot(50)], -1.5);
+  assert.equal(force.high[buckets.slot(51)], 2);
+  assert.equal(buckets.frames[buckets.slot(50)], 10);
+});
+
+test('read in many small steps, or back and forth, intervals are those of one reading', () => {
+  const value = (i: number) => ({ force_N: Math.sin(i * 0.37) * 3, force_sd_N: 0.1, flags: i % 7 ? FITTED : FITTED | Flag.MODEL });
+  const whole = new Buckets(400);
+  whole.read(historyOf(3000, value), 0.02, 0, 2.999);
+  const history = new History(15, 1 << 15);
+  const steps = new Buckets(400);
+  for (let i = 0; i < 3000; i++) {
+    history.addContact(contactOf({ frame: i, t_us: i * 1000, ...value(i) }));
+    if (i % 17 === 0) {
+      steps.read(history, 0.02, Math.max(0, i / 1000 - 1), i / 1000);
+    }
+  }
+  steps.read(history, 0.02, 0.3, 0.9);
+  steps.read(history, 0.02, 0, 2.999);
+  for (let b = 0; b < 150; b++) {
+    for (const [name, track] of whole.tracks) {
+      const other = steps.tracks.get(name);
+      for (const part of ['trust', 'low', 'high', 'rises', 'sdLow', 'sdHigh'] as const) {
+        assert.equal(other?.[part][steps.slot(b)], track[part][whole.slot(b)], `${name} ${part} of interval ${b}`);
+      }
+    }
+  }
+});
+
+test('what has left the intervals is read anew when somebody goes back to it', () => {
+  const history = historyOf(3000, (i) => ({ force_N: i }));
+  const buckets = new Buckets(60);
+  for (let end_s = 0.5; end_s < 3; end_s += 0.1) {
+    buckets.read(history, 0.02, end_s - 0.5, end_s);
+  }
+  const { first, last } = buckets.read(history, 0.02, 0.2, 0.6);
+  const fresh = new Buckets(60);
+  fresh.read(history, 0.02, 0.2, 0.6);
+  for (let b = first; b <= last; b++) {
+    assert.ok(fresh.slot(b) >= 0);
+    assert.equal(forceOf(buckets).low[buckets.slot(b)], forceOf(fresh).low[fresh.slot(b)], `interval ${b}`);
+  }
+});
+
+test('a ring that is full gives the newest intervals alone', () => {
+  const history = historyOf(5000, (i) => ({ force_N: i }), 1000);
+  const buckets = new Buckets(4000);
+  const { first, last } = buckets.read(history, 0.01, 0, 4.999);
+  const there = [];
+  for (let b = first; b <= last; b++) {
+    if (buckets.slot(b) >= 0) {
+      there.push(b);
+    }
+  }
+  assert.equal(there[0], 400);
+  assert.equal(there.length, 100);
+  assert.equal(forceOf(buckets).low[buckets.slot(400)], 4000);
+});
+
+test('no more intervals than there is room for: the newest', () => {
+  const history = historyOf(5000, () => ({ force_N: 1 }));
+  const { first, last } = new Buckets(100).read(history, 0.01, 0, 4.999);
+  assert.deepEqual([first, last], [400, 499]);
+});
+
+test('a fingertip that starts anew goes on in time, and its frame numbers are no loss', () => {
+  const history = historyOf(3000, () => ({ force_N: 5 }));
+  const buckets = new Buckets(500);
+  buckets.read(history, 0.01, 0, 2.999);
+  for (let i = 0; i < 100; i++) {
+    history.addContact(contactOf({ frame: i, t_us: i * 1000, force_N: 1 }));
+  }
+  const { last } = buckets.read(history, 0.01, 1, history.t_s[history.slot(history.end - 1)] ?? 0);
+  assert.equal(forceOf(buckets).high[buckets.slot(last)], 1);
+  assert.equal(forceOf(buckets).high[buckets.slot(200)], 5);
+  assert.deepEqual(spansOf(buckets, 'lost', 100, last, 0.02), []);
+});
+
+test('doubtful frames count only where there is no other', () => {
+  const history = historyOf(40, (i) => ({
+    force_N: i % 2 ? 50 : 2,
+    flags: i < 20 && i % 2 === 0 ? FITTED : FITTED | Flag.UNCERTAIN,
+  }));
+  const buckets = new Buckets(10);
+  buckets.read(history, 0.02, 0, 0.039);
+  const force = forceOf(buckets);
+  assert.equal(force.trust[buckets.slot(0)], Trust.good);
+  assert.equal(force.high[buckets.slot(0)], 2);
+  assert.equal(force.trust[buckets.slot(1)], Trust.doubtful);
+  assert.equal(force.high[buckets.slot(1)], 50);
+});
+
+test('a value without its flag is none', () => {
+  const history = historyOf(10, () => ({ force_N: 7, flags: Flag.TARED }));
+  const buckets = new Buckets(10);
+  buckets.read(history, 0.01, 0, 0.009);
+  assert.equal(forceOf(buckets).trust[buckets.slot(0)], Trust.none);
+  assert.equal(buckets.tracks.get('slip_mm')?.trust[buckets.slot(0)], Trust.none);
+});
+
+test('a line is broken where frames were lost, and where none came, and nowhere else', () => {
+  const history = historyOf(3000, (i) => (i === 1005 || (i >= 1500 && i < 2400) ? null : { force_N: 1, force_sd_N: 0.1 }));
+  const buckets = new Buckets(500);
+  const { first, last } = buckets.read(history, 0.01, 0, 2.999);
+  const chart = chartOf(buckets, ['force_N'], first, last, 0.25);
+  const good = chart.curves.get('force_N')?.good ?? [];
+  const broken = chart.t_s.filter((_, i) => good[i] === null);
+  assert.equal(chart.t_s.length, good.length);
+  assert.deepEqual(broken.map((t_s) => Math.round(t_s * 100)), [100, 240]);
+  assert.deepEqual(
+    spansOf(buckets, 'lost', first, last, 0.02).map(({ from_s }) => Math.round(from_s * 100)),
+    [100, 240],
+  );
+  assert.equal(buckets.lost[buckets.slot(240)], 900);
+});
+
+test('a frame number that wraps is no loss', () => {
+  const history = historyOf(10, (i) => ({ force_N: 1, frame: (0xfffffffb + i) >>> 0 }));
+  const buckets = new Buckets(10);
+  buckets.read(history, 0.02, 0, 0.009);
+  assert.equal(buckets.frames[buckets.slot(0)], 10);
+  assert.equal(buckets.lost[buckets.slot(0)], 0);
+});
+
+test('solid where it can be trusted, dashed where not, and the two meet', () => {
+  const history = historyOf(60, (i) => ({ force_N: i, flags: i >= 20 && i < 40 ? FITTED | Flag.FLAT : FITTED }));
+  const buckets = new Buckets(10);
+  const { first, last } = buckets.read(history, 0.01, 0, 0.059);
+  const { good, doubtful } = chartOf(buckets, ['force_N'], first, last, 0.25).curves.get('force_N') ?? {
+    good: [],
+    doubtful: [],
+  };
+  const both = good.flatMap((value, i) => (value !== null && doubtful[i] !== null ? [i] : []));
+  assert.deepEqual(both, [3, 8]);
+  good.forEach((value, i) => assert.ok(value !== null || doubtful[i] !== null, `point ${i}`));
+  assert.equal(good[5], null);
+});
+
+test('limits of axes and intervals are round', () => {
+  assert.equal(roundAbove(0.11), 0.2);
+  assert.equal(roundAbove(1), 1);
+  assert.equal(roundAbove(5.01), 10);
+  assert.equal(roundAbove(NaN), 1);
+  for (const [span_s, pixels] of [[20, 900], [180, 333], [5, 5000]] as const) {
+    const width_s = intervalOf(span_s, pixels);
+    assert.ok(width_s >= span_s / pixels - 1e-12 && width_s <= Math.max(2.5 * (span_s / pixels), 0.001));
+  }
+});
+
+test('times go on beyond a minute', () => {
+  assert.deepEqual([0, 2.5, 59.96, 60, 62.5, 605.04].map(clock), ['0 s', '2.5 s', '1:00', '1:00', '1:02.5', '10:05']);
+});
+
+const BOX: Box = { x_mm: 15, y_mm: 24, low_mm: -6, high_mm: 16 };
+
+test('what is picked is what is seen there, from every side', () => {
+  for (const turn_deg of [-170, -32, 0, 45, 120]) {
+    for (const tilt_deg of [12, 40, 75, 90]) {
+      for (const aspect of [0.4, 1, 2.6]) {
+        const camera = cameraOf({ turn_deg, tilt_deg }, aspect, BOX);
+        for (const [x_mm, y_mm, z_mm] of [[0, 0, 0], [9, -18, 0], [-14.5, 23, 0], [4, 2, 10]] as const) {
+          const { right, up } = seen(camera, [x_mm, y_mm, z_mm]);
+          const at = picked(camera, right, up, z_mm);
+          assert.ok(at);
+          assert.ok(Math.hypot(at.x_mm - x_mm, at.y_mm - y_mm) < 0.01, `${turn_deg} ${tilt_deg} ${aspect}: ${at.x_mm} ${at.y_mm}`);
+        }
+      }
+    }
+  }
+});
+
+test('the whole pad is in the picture, and fills it', () => {
+  for (const turn_deg of [-90, -32, 0, 200]) {
+    for (const tilt_deg of [12, 40, 90]) {
+      for (const aspect of [0.4, 1, 2.6]) {
+        const camera = cameraOf({ turn_deg, tilt_deg }, aspect, BOX);
+        let reach = 0;
+        for (const x of [-1, 1]) {
+          for (const y of [-1, 1]) {
+            for (const z of [BOX.low_mm, BOX.high_mm]) {
+              const { right, up } = seen(camera, [x * BOX.x_mm, y * BOX.y_mm, z]);
+              reach = Math.max(reach, Math.abs(right), Math.abs(up));
+            }
+          }
+        }
+        assert.ok(reach < 1 && reach > 0.85, `${turn_deg} ${tilt_deg} ${aspect}: ${reach}`);
+      }
+    }
+  }
+});
+
+test('from above x is to the right and y up; the sky is no place on the pad', () => {
+  const above = cameraOf({ turn_deg: 0, tilt_deg: 90 }, 1, BOX);
+  assert.ok(seen(above, [9, 0, 0]).right > 0.1 && Math.abs(seen(above, [9, 0, 0]).up) < 1e-5);
+  assert.ok(seen(above, [0, 9, 0]).up > 0.1 && Math.abs(seen(above, [0, 9, 0]).right) < 1e-5);
+  assert.equal(picked(cameraOf({ turn_deg: 0, tilt_deg: 2 }, 1, BOX), 0, 0.99), null);
+});
+
+const tokens = readFileSync(join(process.env['FINGERTIP_SOURCE'] ?? '', 'host_tools/web/src/styles/tokens.css'), 'utf8');
+
+for (const dark of [false, true]) {
+  test(`contrast of ${dark ? 'dark' : 'light'} colours is WCAG AA's`, () => {
+    const palette = paletteOf((name) => new RegExp(`--${name}:([^;]*);`).exec(tokens)?.[1] ?? '', dark);
+    const atLeast = (front: string, behind: string, least: number) => {
+      const is = contrast(palette.of(front), palette.of(behind));
+      assert.ok(is >= least, `${front} on ${behind}: ${is.toFixed(2)}, at least ${least}`);
+    };
+    for (const behind of ['ground', 'surface', 'raised']) {
+      for (const text of ['text', 'faint', 'accent', 'good', 'warning', 'bad']) {
+        atLeast(text, behind, 4.5);
+      }
+      atLeast('edge', behind, 3);
+    }
+    atLeast('on-accent', 'accent', 4.5);
+    atLeast('text', 'rubber', 4.5);
+    atLeast('faint', 'rubber', 4.5);
+    for (let finger = 0; finger < 8; finger++) {
+      atLeast(`finger-${finger}`, 'surface', 3);
+    }
+    /* The scale's order can be told without its hue. */
+    const steps = Array.from({ length: HEAT_STOPS }, (_, i) => contrast(palette.of(`heat-${i}`), [0, 0, 0]));
+    steps.forEach((step, i) => {
+      const before = steps[i - 1];
+      assert.ok(before === undefined || (dark ? step > before : i === 1 || step < before), `heat ${i}`);
+    });
+  });
+}
+
+test('contrast is that of WCAG', () => {
+  assert.equal(contrast([0, 0, 0], [1, 1, 1]).toFixed(2), '21.00');
+  assert.equal(contrast(parsed('#777777'), [1, 1, 1]).toFixed(2), '4.48');
+});
+
+test('readers of the screen are told what begins, ends and changes, no faster than one can listen', () => {
+  const speech = new Speech();
+  assert.equal(speech.say(null, 'live', 0), 'Live.');
+  const pressed = contactOf({ force_N: 3.24, x_mm: 2, y_mm: -4 });
+  assert.equal(speech.say(pressed, 'live', 1000), null);
+  assert.equal(speech.say(pressed, 'live', 3000), 'Contact, 3.2 newtons at 2, -4 millimetres.');
+  assert.equal(speech.say({ ...pressed, force_N: 3.4 }, 'live', 60_000), null);
+  assert.match(speech.say({ ...pressed, force_N: 8 }, 'live', 70_000) ?? '', /8\.0 newtons/);
+  const slips = { ...pressed, force_N: 8, flags: FITTED | Flag.SLIP | Flag.ELONGATED };
+  assert.match(speech.say(slips, 'live', 80_000) ?? '', /^Slips; .*round/);
+  assert.equal(speech.say(slips, 'live', 90_000), null);
+  assert.equal(speech.say(contactOf({ flags: Flag.TARED }), 'live', 100_000), 'No contact.');
+});
+
+const LAYOUT = { x_mm: [-9, 0, 9], y_mm: [0, 0, 0] };
+const READINGS = { valid: 0b011, saturated: 0, doubtful: 0b010, pressure_Pa: new Float32Array([1000, 2000, NaN]) };
+
+test('a picture shows doubt, broken sensors, and nothing that is old', () => {
+  const contact = contactOf({ force_N: 2, p0_Pa: 9000, sigma_mm: 3, location_sd_mm: 0.3, flags: FITTED | Flag.MODEL });
+  const scene = sceneOf(LAYOUT, contact, READINGS, [], null, true);
+  assert.deepEqual(scene.broken, [false, false, true]);
+  assert.deepEqual(scene.doubtful, [false, true, false]);
+  assert.equal(scene.fit?.doubtful, true);
+  assert.ok(Math.abs((scene.fit?.sd_mm ?? 0) - 0.3) < 1e-6);
+  const old = sceneOf(LAYOUT, contact, READINGS, [], null, false);
+  assert.equal(old.fit, null);
+  assert.deepEqual(old.pressure_Pa, [null, null, null]);
+  assert.equal(sceneOf(LAYOUT, contactOf({ flags: Flag.TARED }), READINGS, [], null, true).fit, null);
+});
+
+test('an arrow has a direction only where the load is no noise', () => {
+  const flags = FITTED | Flag.TANGENTIAL_VALID;
+  const pull = { flags, force_N: 4, qx_N: 0, qy_N: 2, tangential_ratio: 0.5 };
+  const sure = sceneOf(LAYOUT, contactOf({ ...pull, q_sd_N: 0.1 }), READINGS, [], null, true).fit?.arrow;
+  assert.deepEqual([sure?.along_x, sure?.along_y, sure?.length_mm], [0, 1, 15]);
+  const unsure = sceneOf(LAYOUT, contactOf({ ...pull, q_sd_N: 1.5 }), READINGS, [], null, true).fit?.arrow;
+  assert.equal(unsure?.length_mm, 0);
+  assert.ok((unsure?.sd_mm ?? 0) > 10);
+  assert.equal(sceneOf(LAYOUT, contactOf({ ...pull, flags: FITTED }), READINGS, [], null, true).fit?.arrow, null);
+});
+
+test('a moment of the past is the contact of then, its trail that of the second before', () => {
+  const history = historyOf(3000, (i) => ({
+    force_N: i / 1000,
+    x_mm: i / 100,
+    qx_N: 1,
+    flags: i < 1400 || (i >= 1450 && i < 1500) ? Flag.TARED : FITTED,
+  }));
+  const past = contactAt(history, 2000);
+  assert.ok(Math.abs(past.force_N - 2) < 1e-5);
+  assert.equal(past.qx_N, 0, 'without its flag');
+  const trail = trailAt(history, 2000);
+  assert.ok(trail.length > 5);
+  trail.forEach(({ x_mm }, i) => assert.ok(x_mm >= 15 && x_mm <= 20.001 && (i === 0 || x_mm > (trail[i - 1]?.x_mm ?? 0))));
+});
