@@ -683,7 +683,7 @@ class Firmware(DeviceTest):
                 grip = [FINGERTIP, "gripper", "move", "30", "--force", "30", "--activate", "--model", "2f85", "--port", os.path.join(cell, "gripper")]
                 # on a busy computer an answer may come too late
                 self.wait_for(lambda: subprocess.run(grip, capture_output=True, timeout=PATIENCE_s).returncode == 0)
-                self.wait_for(lambda: all(frame.force_N > 25 for frame in both.latest().values()))
+                self.wait_for(lambda: all(frame.force_N > 25 and Flag.SATURATED in frame.warnings for frame in both.latest().values()))
                 for tip, frame in zip(both.by_serial.values(), both.latest().values()):
                     self.assertLess(math.hypot(frame.x_mm, frame.y_mm), 3)
                     self.assertAlmostEqual(frame.force_N, 30, delta=5)
