@@ -52,6 +52,7 @@ export class PadView {
   private readonly size: { x_mm: number; y_mm: number };
   private readonly box: Box;
   private scene: Scene | null = null;
+  private fitDue = false;
   private changed = true;
   private labelsDue = true;
   private labelled_ms = -Infinity;
@@ -140,12 +141,15 @@ export class PadView {
   draw(now_ms: number, palette: Palette): boolean {
     const took_ms = now_ms - this.called_ms;
     this.called_ms = now_ms;
-    if (!this.scene || this.canvas.width === 0) {
+    if (!this.scene) {
       return false;
     }
     if (!this.changed && this.sharpness < 1 && now_ms - this.drawn_ms > STILL_ms) {
       this.sharpness = 1;
       this.fit();
+    }
+    if (this.fitDue) {
+      this.resize();
     }
     this.camera ??= cameraOf(this.look, this.canvas.width / this.canvas.height, this.box);
     if (this.labelsDue && now_ms - this.labelled_ms >= LABEL_INTERVAL_ms) {
@@ -189,7 +193,14 @@ export class PadView {
     }
   }
 
+  /** With the next picture: whatever sets a canvas' size empties it. */
   private fit(): void {
+    this.fitDue = true;
+    this.repaint();
+  }
+
+  private resize(): void {
+    this.fitDue = false;
     const { clientWidth: width, clientHeight: height } = this.element;
     if (width < 1 || height < 1) {
       return;
@@ -205,7 +216,6 @@ export class PadView {
     if (!this.turned && this.solid) {
       this.look = { ...this.aslant };
     }
-    this.repaint();
   }
 
   private turnTo(look: Look): void {
