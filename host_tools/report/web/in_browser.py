@@ -122,5 +122,7 @@ def text(found):
             f"{found['web_fps']:.0f} frames a second for {found['web_seconds']} s, it drew {found['draws_per_s']:.0f} pictures a second, lost "
             f"{found['web_lost']} packets and took {found['web_cpu_percent']:.0f} % of a core, the browser's processes together. Then memory was looked at for "
             f"{found['web_memory_seconds']} s after collections: {found['web_memory_kB'] / 1000:.0f} MB at the end, {found['web_memory_kB_per_minute']:.0f} kB a minute "
-            f"once it had settled. Requests to elsewhere: {found['web_foreign_requests']}.", "", "Driven against emulated release images:", "",
+            f"once it had settled. Requests to elsewhere: {found['web_foreign_requests']}.", "",
+            "Driven against emulated release images, and, where the device must misbehave or come and go, against a program that answers "
+            "as one (tests/web/test_page.py says which):", "",
             *table_md(("step", "outcome"), [(each["step"], STEP_OUTCOMES[each["outcome"]]) for each in found["web_steps"]]), ""]

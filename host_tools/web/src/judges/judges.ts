@@ -7,6 +7,7 @@
  */
 import { load } from '../../wasm/judges.mjs';
 import { WasmError } from '../../wasm/module.mjs';
+import type { LineCounts } from '../line/framing';
 
 /** What the judges know; one for the page. */
 export interface Judges {
@@ -128,14 +129,10 @@ export type FailureCode =
   | 'other';
 
 /** What the line counted during the measurement. */
-export interface LineCounts {
-  bytes: number;
-  packets: number;
-  dropped_packets: number;
-  out_of_order: number;
-  crc_errors: number;
-  format_errors: number;
-}
+export type MeasuredCounts = Pick<
+  LineCounts,
+  'bytes' | 'packets' | 'dropped_packets' | 'out_of_order' | 'crc_errors' | 'format_errors'
+>;
 
 /**
  * As `fingertip doctor` does it: info, health, crash, then contact and raw packets for ten seconds
@@ -150,7 +147,7 @@ export interface Examination {
   /** Of the packets taken, device time. */
   seconds(): number;
   after(health_frame: Uint8Array): void;
-  line(counts: LineCounts): void;
+  line(counts: MeasuredCounts): void;
   /** What ended it early. */
   failure(code: FailureCode, text: string): void;
   findings(): Finding[];
