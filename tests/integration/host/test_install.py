@@ -1,0 +1,199 @@
+"""`fingertip flash` against a fake loader, and what gets installed: usage test_install.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import unittest
+
+from cli_case import CliTest, FINGERTIP, PATIENCE_s
+
+
+class Flash(CliTest):
+    """Images as the build makes them, a fake loader's drive, and a fake device that comes back."""
+
+    def setUp(self):
+        super().setUp()
+        self.environment["FINGERTIP_PORT"] = self.port
+        self.volume = os.path.join(self.folder, "RPI-RP2")
+        self.image = self.uf2()
+
+    def uf2(self, board="pico_mux", git="abcdef012345", name="new.uf2"):
+        """An image with a second boot stage, an identity and some code, by the build's own scripts."""
+        cmake = pathlib.Path(__file__).resolve().parents[3] / "cmake"
+        path = os.path.join(self.folder, name)
+        pathlib.Path(path + ".code").write_bytes(bytes(range(200)))
+        subprocess.run([sys.executable, cmake / "boot2_checksum.py", path + ".code", path + ".boot2"], check=True)
+        identity = f"fingertip-version=9.8.7 fingertip-git={git}\0fingertip-board={board}\0".encode()
+        flash = pathlib.Path(path + ".boot2").read_bytes() + bytes(1000) + identity + bytes(range(256)) * 8
+        pathlib.Path(path + ".bin").write_bytes(flash)
+        subprocess.run([sys.executable, cmake / "bin2uf2.py", path + ".bin", path], check=True)
+        return path
+
+    def make_volume(self, board="RPI-RP2"):
+        os.mkdir(self.volume)
+        with open(os.path.join(self.volume, "INFO_UF2.TXT"), "w", encoding="ascii") as file:
+            file.write(f"UF2 Bootloader v3.0\nModel: Raspberry Pi RP2\nBoard-ID: {board}\n")
+
+    def flash(self, *first, after=("board=pico_mux", "git=abcdef012345", "firmware=9.8.7"), status=0):
+        """Runs flash against a device with these options, that ends in its loader, and comes back with those."""
+        with self.device("loader=1", *first) as device:
+            process = self.start("flash", self.image, "--volume", self.volume)
+            self.wait_for(lambda: device.poll() is not None or process.poll() is not None)
+            if process.poll() is None:
+                self.make_volume()
+                written = os.path.join(self.volume, "fingertip.uf2")
+                size = os.path.getsize(self.image)
+                self.wait_for(lambda: os.path.exists(written) and os.path.getsize(written) == size)
+                with open(written, "rb") as new, open(self.image, "rb") as image:
+                    self.assertEqual(new.read(), image.read())
+                os.unlink(os.path.join(self.volume, "INFO_UF2.TXT"))
+                with self.device(*after):
+                    out, err = process.communicate(timeout=PATIENCE_s)
+            else:
+                out, err = process.communicate(timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, status, err)
+        return out, err
+
+    def test_by_the_command(self):
+        out, err = self.flash()
+        self.assertEqual(out, "fingertip E660583883265A2C: firmware 9.8.7 abcdef012345, board pico_mux\n")
+        self.assertEqual(err, "writing 9.8.7 abcdef012345 for pico_mux\n")
+
+    def test_one_of_an_older_protocol_is_asked_by_its_baud_rate(self):
+        self.assertIn("firmware 9.8.7", self.flash("version=1")[0])
+
+    def test_in_the_loader_already(self):
+        self.make_volume()
+        with self.device("board=pico_mux", "git=abcdef012345", "firmware=9.8.7"):
+            self.assertIn("firmware 9.8.7", self.run_cli("flash", self.image, "--volume", self.volume)[0])
+
+    def test_back_before_the_rule_is_installed(self):
+        self.make_volume()
+        os.chmod(self.volume, 0o777)
+        with self.device():
+            err = self.without_permission("flash", self.image, "--volume", self.volume, status=0)
+        self.assertEqual(err, "writing 9.8.7 abcdef012345 for pico_mux\n"
+                              f"written, and it came back; its version was not read: {self.port}: {self.RULE}\n")
+        with open(os.path.join(self.volume, "fingertip.uf2"), "rb") as written, open(self.image, "rb") as image:
+            self.assertEqual(written.read(), image.read())
+
+    def test_another_version_came_back(self):
+        self.assertIn("came back with firmware 1.20.3 0123456789ab+ instead of 9.8.7 abcdef012345; unplug the Pico, hold its BOOTSEL",
+                      self.flash(after=(), status=1)[1])
+
+    def test_another_board_is_refused_before_anything_happens(self):
+        self.assertIn("for board pico_mux, but fingertip E660583883265A2C is a pico_parallel; give fingertip-pico_parallel.uf2",
+                      self.flash("board=pico_parallel", status=1)[1])
+        self.assertFalse(os.path.exists(self.volume))
+
+    def test_nothing_there_says_what_to_press(self):
+        del self.environment["FINGERTIP_PORT"]
+        self.assertIn("unplug the Pico, hold its BOOTSEL button while plugging it in", self.error("flash", self.image))
+        self.make_volume(board="RP2350")
+        self.assertIn("the loader of another chip (RP2350)", self.error("flash", self.image, "--volume", self.volume))
+
+    def test_a_folder_that_is_no_boot_volume_is_refused_before_anything_happens(self):
+        with self.device("loader=1") as device:
+            self.assertEqual(self.error("flash", self.image, "--volume", self.folder),
+                             f"fingertip: {self.folder}: no RP2040 boot volume (no INFO_UF2.TXT); "
+                             "leave out --volume, or give that of the drive RPI-RP2\n")
+            self.assertIsNone(device.poll())
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "fingertip.uf2")))
+
+    def test_damaged_and_foreign_images_are_refused(self):
+        with open(self.image, "rb") as file:
+            good = file.read()
+
+        def refused(message, content):
+            path = os.path.join(self.folder, "bad.uf2")
+            with open(path, "wb") as file:
+                file.write(content)
+            self.assertIn(message, self.error("flash", path))
+
+        def with_word(block, word, value):
+            at = 512 * block + 4 * word
+            return good[:at] + value.to_bytes(4, "little") + good[at + 4:]
+
+        refused("no UF2 file", b"")
+        refused("no UF2 file", b"\x7fELF" + good)
+        refused("cut off", good[:-1])
+        refused("numbered", good[:-512])
+        refused("block 1: numbered 2", good[:512] + good[1024:1536] + good[512:1024] + good[1536:])
+        refused("block 1: no UF2 block", with_word(1, 1, 0))
+        refused("block 2: no UF2 block", with_word(2, 127, 0))
+        refused("for another chip (UF2 family 0xe48bff59)", with_word(0, 7, 0xE48BFF59))
+        refused("for another chip", with_word(0, 2, 0))
+        refused("not the next page", with_word(1, 3, 0x10000000))
+        refused("not the next page", with_word(0, 4, 476))
+        refused("the boot ROM would refuse", with_word(0, 10, 1))
+        refused("the CRC of the image differs", with_word(3, 30, 0x12345678))
+        refused("no Fingertip firmware", good.replace(b"fingertip-board", b"fingertip-bored"))
+        self.assertIn("No such file", self.error("flash", self.folder + "/none.uf2"))
+
+
+class Install(CliTest):
+    """What users get: rule, manual, completion."""
+
+    INSTALL = pathlib.Path(__file__).resolve().parents[3] / "host_tools" / "install"
+
+    def commands(self):
+        return re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
+
+    def test_the_build_installs_all_of_the_tool(self):
+        build = pathlib.Path(FINGERTIP).parents[2]
+        subprocess.run(["cmake", "--install", build, "--component", "tool", "--prefix", self.folder], check=True, capture_output=True)
+        installed = {os.path.relpath(os.path.join(folder, name), self.folder)
+                     for folder, _, names in os.walk(self.folder) for name in names}
+        page = {path for path in installed if path.startswith("share/fingertip/web/")}
+        if page:  # only where it was built
+            self.assertIn("share/fingertip/web/index.html", page)
+        self.assertEqual(installed - page, {
+            "bin/fingertip", "lib/udev/rules.d/60-fingertip.rules", "share/man/man1/fingertip.1",
+            "share/bash-completion/completions/fingertip", "share/zsh/site-functions/_fingertip",
+            "share/fish/vendor_completions.d/fingertip.fish", "lib/systemd/user/fingertip.service"})
+        self.assertEqual(subprocess.run([os.path.join(self.folder, "bin/fingertip"), "--version"], capture_output=True, text=True,
+                                        check=True).stdout, self.run_cli("--version")[0])
+        with open(os.path.join(self.folder, "lib/udev/rules.d/60-fingertip.rules"), encoding="utf-8") as file:
+            self.assertEqual(file.read(), self.run_cli("rule")[0])
+
+    def test_the_rule_is_for_our_ids(self):
+        rule = self.run_cli("rule")[0]
+        self.assertIn('ATTR{idVendor}=="1209", ATTR{idProduct}=="0001"', rule)
+        for line in rule.splitlines():
+            self.assertRegex(line, r'^#|^SUBSYSTEM=="(usb|tty|block)", .*TAG\+="uaccess"')
+
+    def test_the_manual_names_every_command_and_option(self):
+        manual = (self.INSTALL / "fingertip.1").read_text(encoding="utf-8").replace("\\-", "-")
+        for command in self.commands():
+            self.assertRegex(manual, rf"(?m)^\.BI? {command}\b")
+            for option in re.findall(r"--[a-z][a-z-]*", self.run_cli(command, "--help")[0]):
+                self.assertIn(option, manual)
+
+    @unittest.skipUnless(shutil.which("groff"), "groff is not here")
+    def test_the_manual_is_well_formed(self):
+        done = subprocess.run(["groff", "-man", "-ww", "-Tutf8", self.INSTALL / "fingertip.1"], capture_output=True, text=True, check=True)
+        self.assertEqual(done.stderr, "")
+        self.assertIn("FINGERTIP_PORT", re.sub(".\b", "", done.stdout))
+
+    def test_bash_completes(self):
+        def complete(*words):
+            script = f'. {self.INSTALL}/fingertip.bash; COMP_WORDS=({" ".join(words)} ""); COMP_CWORD={len(words)}; ' \
+                     'COMP_WORDS[COMP_CWORD]=$1; _fingertip; echo ${COMPREPLY[@]}'
+            environment = {**self.environment, "PATH": os.path.dirname(FINGERTIP) + ":" + self.environment["PATH"]}
+            return lambda start: subprocess.run(["bash", "-c", script, "bash", start], env=environment, capture_output=True, text=True,
+                                                check=True).stdout.split()
+
+        self.assertEqual(sorted(complete("fingertip")("")), sorted(self.commands()))
+        self.assertEqual(complete("fingertip")("mon"), ["monitor"])
+        self.assertIn("--transport", complete("fingertip", "info")("--"))
+        self.assertEqual(complete("fingertip", "info", "--transport")("s"), ["socket", "serial"])
+        models = re.search(r"--gripper MODEL REQUIRED +(.*)", self.run_cli("grasp", "--help")[0])[1].split(", ")
+        self.assertEqual(complete("fingertip", "grasp", "--gripper")(""), models)
+        self.environment["FINGERTIP_PORT"] = self.port
+        with self.device("serial=AAAA"):
+            self.assertEqual(complete("fingertip", "info", "--device")(""), ["AAAA"])
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])

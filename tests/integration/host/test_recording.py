@@ -1,0 +1,364 @@
+"""`fingertip record`, `stream` and `replay` against a fake device: usage test_recording.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
+import os
+import pathlib
+import resource
+import signal
+import subprocess
+import sys
+import time
+import unittest
+
+import numpy as np
+
+from cli_case import CliTest, FINGERTIP, PATIENCE_s
+from fingertip import files
+
+
+class Recording(CliTest):
+    def test_seconds(self):
+        def recorded_s():
+            with self.device():
+                self.run_cli("record", self.csv, "--port", self.port, "--seconds", "1", "--raw-bytes", self.ftr, "--overwrite")
+            rows, _ = self.rows()
+            span_s = (int(rows[-1]["t_us"]) - int(rows[0]["t_us"])) / 1e6
+            self.assertGreaterEqual(span_s, 1)
+            return span_s
+
+        self.once_in_three(recorded_s, 1.1)
+        rows, comments = self.rows()
+        self.assertIn("# serial: E660583883265A2C", comments)
+        self.assertRegex(comments[-1], r"^# end: reason=seconds frames=\d+ .* dropped_packets=0 .*crc_errors=0")
+        self.assertEqual([int(row["frame"]) for row in rows], list(range(1, len(rows) + 1)))
+        self.assertTrue(all(row["x_mm"] and row["s14_Pa"] and row["tare0_Pa"] for row in rows[:-1]))
+        # the captured bytes hold the same frames
+        converted = os.path.join(self.folder, "c.csv")
+        self.run_cli("replay", self.ftr, "--to-csv", converted)
+        again, _ = self.rows(converted)
+        self.assertEqual(again[:len(rows) - 1], rows[:-1])
+
+    def test_interrupt_ends_cleanly(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            with self.device():
+                process = self.start("record", self.csv, "--port", self.port)
+                self.wait_for(lambda: os.path.exists(self.csv) and len(self.rows()[0]) > 20)
+                process.send_signal(number)
+                _, err = process.communicate(timeout=PATIENCE_s)
+            self.assertEqual(process.returncode, 0)
+            self.assertRegex(err, r"r\.csv: \d+ frames in .* 0 packets dropped")
+            _, comments = self.rows()
+            os.unlink(self.csv)
+            self.assertIn("reason=interrupted", comments[-1])
+            # the stop was acknowledged: command 128 is stream
+            self.assertTrue(any(c.startswith("# packet: ack") and "command=128" in c for c in comments[-2:]), comments[-2:])
+
+    def test_kill_loses_nothing_written(self):
+        with self.device():
+            process = self.start("record", self.csv, "--port", self.port)
+            self.wait_for(lambda: os.path.exists(self.csv) and len(self.rows()[0]) > 50)
+            process.kill()
+            process.communicate(timeout=PATIENCE_s)
+        self.assertRegex(self.run_cli("replay", self.csv, "--speed", "max")[0], r"\d\d frames in")
+
+    def test_losses_and_damage_are_counted(self):
+        with self.device("drop=20", "flip=25", "frames=100"):
+            self.run_cli("record", self.csv, "--port", self.port, "--until-gone")
+        rows, comments = self.rows()
+        # Frames 20, 40, 60 and 80 lose two packets each, and 25, 50 and 75 a damaged one; 100 has no successor to tell.
+        self.assertRegex(comments[-1], "reason=gone frames=95 .*dropped_packets=11 .*crc_errors=3 format_errors=0")
+        self.assertEqual(sum(row["x_mm"] == "" for row in rows), 3)
+
+    def test_a_vanished_device_is_waited_for(self):
+        with self.device("vanish=100,700", "frames=150"):
+            self.wait_for(lambda: os.path.lexists(self.port))
+            process = self.start("record", self.csv, "--port", self.port)
+            self.wait_for(lambda: os.path.exists(self.csv) and any("back" in c for c in self.rows()[1]))
+            self.wait_for(lambda: len(self.rows()[0]) >= 220)
+            process.send_signal(signal.SIGINT)
+            _, err = process.communicate(timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, 0, err)
+        rows, comments = self.rows()
+        self.assertTrue(any(c.startswith("# event: gone") for c in comments))
+        self.assertIn("dropped_packets=0", comments[-1])
+        frames = [int(row["frame"]) for row in rows]
+        restart = frames.index(1, 1)
+        self.assertEqual(frames[:restart], list(range(1, 101)))
+        self.assertEqual(frames[restart:], list(range(1, len(frames) - restart + 1)))
+        t_us = [int(row["t_us"]) for row in rows]
+        seconds = (t_us[restart - 1] - t_us[0] + t_us[-1] - t_us[restart]) / 1e6
+        self.assertIn(f" seconds={seconds:.6f} ", comments[-1])
+        self.assertRegex(self.run_cli("replay", self.csv, "--speed", "max")[0], " 0 packets dropped")
+
+    def test_until_gone(self):
+        with self.device("frames=60"):
+            out, _ = self.run_cli("monitor", "--port", self.port, "--until-gone", "--record", self.csv)
+        self.assertRegex(out, r"r\.csv: 60 frames in")
+
+    def test_existing_files_are_kept(self):
+        with open(self.csv, "w", encoding="utf-8") as file:
+            file.write("precious")
+        self.assertIn("exists already", self.error("record", self.csv))
+        self.assertIn("exists already", self.error("monitor", "--record", self.csv))
+        self.assertIn("exists already", self.error("record", self.ftr, "--raw-bytes", self.csv))
+        # nor does --overwrite touch them while nothing answers
+        self.assertIn("no such port", self.error("record", self.csv, "--port", self.port, "--overwrite"))
+        heard = os.path.join(self.folder, "heard")
+        with self.device("mute=1", f"heard={heard}"):
+            process = self.start("record", self.ftr, "--raw-bytes", self.csv, "--port", self.port, "--overwrite")
+            self.wait_for(lambda: os.path.exists(heard))
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=PATIENCE_s)
+        with open(self.csv, encoding="utf-8") as file:
+            self.assertEqual(file.read(), "precious")
+
+    def test_one_file_cannot_be_two(self):
+        for other in (self.csv, self.folder + "/./r.csv"):
+            for overwrite in ([], ["--overwrite"]):
+                self.assertIn("give --raw-bytes another name", self.error("record", self.csv, "--raw-bytes", other, *overwrite))
+        self.assertFalse(os.path.exists(self.csv))
+
+    def test_a_full_disk_is_an_error_and_leaves_a_readable_file(self):
+        def limit():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+
+        with self.device():
+            _, err = self.run_cli("record", self.csv, "--port", self.port, status=1, preexec_fn=limit)
+        self.assertIn("what was written until now stays readable", err)
+        self.assertRegex(self.run_cli("replay", self.csv, "--speed", "max")[0], r"\d\d frames in")
+
+    def test_a_wrong_place_is_found_before_a_port_is_opened(self):
+        for option in ([], ["--overwrite"]):
+            self.assertIn("No such file or directory; choose another place", self.error("record", self.folder + "/no/r.csv", *option))
+            self.assertIn("is a folder; give the name of a file in it", self.error("record", self.folder, *option))
+            self.assertIn("is a folder", self.error("record", self.csv, "--raw-bytes", self.folder + "/", *option))
+
+
+class LiveData(CliTest):
+    """record -: the recording for another program, as it happens."""
+
+    def read_row(self, process):
+        while (line := process.stdout.readline()) and not line[0].isdigit():
+            pass
+        return line.split(",")
+
+    def test_the_last_row_does_not_wait_for_the_next(self):
+        with self.device("stall=50"):
+            process = self.start("record", "-", "--port", self.port, cwd=self.folder)
+            for frame in range(1, 51):
+                self.assertEqual(int(self.read_row(process)[1]), frame)
+            process.send_signal(signal.SIGINT)
+            rest, err = process.communicate(timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, 0, err)
+        self.assertIn("# end: reason=interrupted frames=50 ", rest)
+        self.assertRegex(err.splitlines()[-1], r"^50 frames in .* 0 packets dropped")
+        self.assertEqual(os.listdir(self.folder), [])
+
+    def test_what_comes_out_is_a_recording(self):
+        with self.device("frames=60"):
+            out, err = self.run_cli("record", "-", "--port", self.port, "--until-gone", "--raw-bytes", self.ftr)
+        pathlib.Path(self.csv).write_text(out, encoding="utf-8")
+        self.assertEqual(len(files.read_recording(self.csv)["frame"]), 60)
+        self.assertRegex(err, r"^60 frames in .*\n$")
+        self.assertIn(" 60 frames in", self.run_cli("replay", self.csv, "--speed", "max")[0])
+        self.assertIn(" 60 frames in", self.run_cli("replay", self.ftr, "--speed", "max")[0])
+
+    def test_a_reader_that_leaves_ends_it(self):
+        with self.device():
+            process = self.start("record", "-", "--port", self.port)
+            self.read_row(process)
+            process.stdout.close()
+            self.assertEqual(process.wait(PATIENCE_s), 0)
+            self.assertRegex(process.stderr.read(), r"^\d+ frames in")
+            process.stderr.close()
+            self.assertIn("E660583883265A2C", self.run_cli("info", "--port", self.port)[0])
+
+    def test_a_reader_that_does_not_read_keeps_nobody_from_ending_it(self):
+        with self.device("rate=2000") as device:
+            process = self.start("record", "-", "--port", self.port)
+            self.read_row(process)
+            time.sleep(1.5)  # a pipe holds 64 KiB, a hundred rows
+            process.send_signal(signal.SIGTERM)
+            try:
+                self.assertEqual(process.wait(PATIENCE_s), 0)
+            finally:
+                process.kill()
+                process.communicate()
+                device.kill()  # it waits for its own reader
+
+    def test_trouble_is_told_on_standard_error(self):
+        with self.device("vanish=50,2500"), open(self.csv, "wb") as out:
+            process = subprocess.Popen([FINGERTIP, "record", "-", "--port", self.port], env=self.environment, text=True,
+                                       stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.PIPE)
+            self.assertEqual(process.stderr.readline(), "gone, plug it in again\n")
+            while (line := process.stderr.readline()) != "streaming\n":
+                self.assertIn(line, ["waiting for an answer\n", "STALLED\n"])
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=PATIENCE_s)
+        self.assertRegex(pathlib.Path(self.csv).read_text(encoding="utf-8"), "(?m)^# event: gone .*\n(#.*\n)*# event: back ")
+
+    def test_what_cannot_go_there(self):
+        self.assertIn("for - run one `fingertip record - --device SERIAL` for each", self.error("record", "-", "--all", status=2))
+        self.assertIn("for each", self.error("record", "-", "--device", "A", "--device", "B", status=2))
+        self.assertIn("--raw-bytes needs a file", self.error("record", self.csv, "--raw-bytes", "-", status=2))
+        self.assertIn("use `fingertip record -`", self.error("monitor", "--record", "-", status=2))
+        with self.device(), open("/dev/full", "w", encoding="ascii") as full:
+            process = subprocess.run([FINGERTIP, "record", "-", "--port", self.port], env=self.environment, text=True,
+                                     stdin=subprocess.DEVNULL, stdout=full, stderr=subprocess.PIPE, timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, 1)
+        self.assertIn("fingertip: -: No space left on device", process.stderr)
+
+    def test_a_file_it_is_appended_to_keeps_what_it_had(self):
+        def limit():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+
+        pathlib.Path(self.csv).write_text("precious\n", encoding="utf-8")
+        with self.device(), open(self.csv, "a", encoding="utf-8") as file:
+            process = subprocess.run([FINGERTIP, "record", "-", "--port", self.port], env=self.environment, stdin=subprocess.DEVNULL,
+                                     stdout=file, stderr=subprocess.PIPE, preexec_fn=limit, timeout=PATIENCE_s)
+        self.assertEqual(process.returncode, 1)
+        self.assertIn("precious\n# fingertip-recording 1\n", pathlib.Path(self.csv).read_text(encoding="utf-8"))
+
+
+class Replay(CliTest):
+    def record(self):
+        with self.device("frames=100"):
+            self.run_cli("record", self.csv, "--port", self.port, "--until-gone", "--raw-bytes", self.ftr)
+
+    def test_recorded_speed(self):
+        def replay_s(*options):
+            begin = time.monotonic()
+            self.run_cli("replay", *options)
+            return time.monotonic() - begin
+
+        self.record()
+        times_us = [int(row["t_us"]) for row in self.rows()[0]]
+        span_us = times_us[-1] - times_us[0]
+        self.assertGreaterEqual(replay_s(self.csv), 1e-6 * span_us)
+        # the same, stretched to a minute
+        with open(self.csv, encoding="utf-8") as file:
+            lines = file.readlines()
+        stretched = os.path.join(self.folder, "stretched.csv")
+        with open(stretched, "w", encoding="utf-8") as file:
+            for line in lines:
+                if line[0].isdigit():
+                    t_us, others = line.split(",", 1)
+                    line = f"{times_us[0] + (int(t_us) - times_us[0]) * 60_000_000 // span_us},{others}"
+                file.write(line)
+        self.assertGreaterEqual(replay_s(stretched, "--speed", "100"), 0.59)
+        self.assertLess(replay_s(stretched, "--speed", "max"), 30)
+
+    def test_torn_lines(self):
+        self.record()
+        with open(self.csv, encoding="utf-8") as file:
+            text = file.read()
+        rows = [i for i, line in enumerate(text.split("\n")) if line and not line.startswith("#")]
+        lines = text.split("\n")
+        lines[rows[10]] = lines[rows[10]][:40]
+        with open(self.csv, "w", encoding="utf-8") as file:
+            file.write("\n".join(lines))
+        out, err = self.run_cli("replay", self.csv, "--speed", "max", status=1)
+        self.assertIn(f"{self.csv}:{rows[10] + 1}: ", err)
+        self.assertIn("use --salvage", err)
+        out, err = self.run_cli("replay", self.csv, "--speed", "max", "--salvage")
+        self.assertIn("1 damaged lines skipped", err)
+        self.assertIn("99 frames in", out)
+
+    def test_a_recording_that_was_cut_short(self):
+        self.record()
+        self.assertNotIn("cut short", self.run_cli("replay", self.csv, "--speed", "max")[1])
+        self.assertNotIn("cut short", self.run_cli("replay", self.ftr, "--speed", "max")[1])
+        with open(self.csv, encoding="utf-8") as file:
+            lines = file.readlines()
+        self.assertTrue(lines[-1].startswith("# end: "))
+        with open(self.csv, "w", encoding="utf-8") as file:
+            file.writelines(lines[:-1])
+        self.assertIn(f"{self.csv}: no end line: the recording was cut short", self.run_cli("replay", self.csv, "--speed", "max")[1])
+        self.assertIn("cut short", self.run_cli("replay", self.csv, "--to-csv", self.folder + "/c.csv")[1])
+
+    def test_a_conversion_never_harms_a_file(self):
+        self.record()
+        with open(self.csv, "rb") as file:
+            before = file.read()
+        os.link(self.csv, self.folder + "/hard.csv")
+        os.symlink("r.csv", self.folder + "/soft.csv")
+        for name in ("r.csv", "./r.csv", "hard.csv", "soft.csv"):
+            err = self.error("replay", self.csv, "--to-csv", os.path.join(self.folder, name), "--overwrite")
+            self.assertIn("is the file to read; give another name", err)
+        self.assertIn("is a folder", self.error("replay", self.ftr, "--to-csv", self.folder, "--overwrite"))
+        self.assertIn("exists already", self.error("replay", self.ftr, "--to-csv", self.csv))
+
+        # a disk that is full in the middle
+        def limit():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (10000, 10000))
+
+        _, err = self.run_cli("replay", self.ftr, "--to-csv", self.csv, "--overwrite", status=1, preexec_fn=limit)
+        self.assertIn("nothing was changed", err)
+        with open(self.csv, "rb") as file:
+            self.assertEqual(file.read(), before)
+        self.assertEqual(sorted(os.listdir(self.folder)), ["hard.csv", "r.csv", "r.ftr", "soft.csv"])
+        self.run_cli("replay", self.ftr, "--to-csv", self.csv, "--overwrite")
+        self.assertIn("reason=converted", self.rows()[1][-1])
+
+    def test_salvage_is_advised_only_where_it_helps(self):
+        self.record()
+        text = pathlib.Path(self.csv).read_text(encoding="utf-8")
+        bad = os.path.join(self.folder, "bad.csv")
+        for content, problem in ((text.replace("t_us,frame", "t_us,fame"), "unknown header"), (text.split("t_us,frame")[0], "no header line"),
+                                 (text.replace("recording 1", "recording 9"), 'recording format "9" is unknown'),
+                                 (text.replace("recording 1", "scenario 1"), "a scenario, not a recording")):
+            pathlib.Path(bad).write_text(content, encoding="utf-8")
+            for option in ([], ["--salvage"]):
+                err = self.run_cli("replay", bad, "--speed", "max", *option, status=1)[1]
+                self.assertIn(problem, err)
+                self.assertNotIn("--salvage", err)
+
+    def test_line_ends_of_another_system(self):
+        self.record()
+        windows = os.path.join(self.folder, "w.csv")
+        pathlib.Path(windows).write_bytes(pathlib.Path(self.csv).read_bytes().replace(b"\n", b"\r\n"))
+        self.assertIn(" 100 frames in", self.run_cli("replay", windows, "--speed", "max")[0])
+        self.assertEqual(len(files.read_recording(windows)["frame"]), 100)
+
+    def test_a_conversion_keeps_what_the_recorder_knew(self):
+        self.record()
+        converted = os.path.join(self.folder, "c.csv")
+        self.run_cli("replay", self.csv, "--to-csv", converted)
+        before, after = (files.read_recording(path) for path in (self.csv, converted))
+        for key in ("started_utc", "started_device_us", "started_uncertainty_us", "port", "serial"):
+            self.assertEqual(after.metadata[key], before.metadata[key])
+        self.assertEqual(after.metadata["source"], self.csv)
+        self.assertEqual({key: value for key, value in after.end.items() if key != "reason"},
+                         {key: value for key, value in before.end.items() if key != "reason"})
+        # once more, and still each key once
+        twice = os.path.join(self.folder, "d.csv")
+        self.run_cli("replay", converted, "--to-csv", twice)
+        text = pathlib.Path(twice).read_text(encoding="utf-8")
+        for key in ("recorded_by", "source", "port", "started_utc"):
+            self.assertEqual(text.count(f"\n# {key}: "), 1, key)
+
+    def test_without_a_fit_there_are_no_numbers(self):
+        with self.device("frames=40", "flags=33"):  # CONTACT and TARED
+            self.run_cli("record", self.csv, "--port", self.port, "--until-gone")
+        for name in ("x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N", "slip_mm", "location_sd_mm", "sigma_x_mm"):
+            self.assertEqual({row[name] for row in self.rows()[0]}, {""}, name)
+        self.assertTrue(np.isnan(files.read_recording(self.csv)["force_N"]).all())
+        self.assertIn(" 40 frames in", self.run_cli("replay", self.csv, "--speed", "max")[0])
+
+    def test_other_files(self):
+        noise = os.path.join(self.folder, "noise.ftr")
+        with open(noise, "wb") as file:
+            file.write(bytes(range(256)) * 20)
+        self.assertIn("no frames in it", self.run_cli("replay", noise, "--speed", "max", status=1)[1])
+        self.assertIn("no frames in it", self.error("replay", noise, "--to-csv", self.csv))
+        self.assertFalse(os.path.exists(self.csv))
+        text = os.path.join(self.folder, "text.csv")
+        for content in ("x\n", "a,b,c\n1,2,3\n" * 1000):
+            pathlib.Path(text).write_text(content, encoding="utf-8")
+            for option in ([], ["--to-csv", self.csv]):
+                self.assertIn("neither a recording nor bytes of a fingertip's line", self.error("replay", text, *option))
+        self.assertIn("No such file", self.run_cli("replay", self.folder + "/absent.csv", status=1)[1])
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
