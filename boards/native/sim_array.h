@@ -58,16 +58,16 @@ struct sim_array {
   /* The test's, at any time */
   struct sim_fault fault;
   struct sim_world world;
-  bool parallel;               /* a data line for each sensor, no multiplexers */
   double noise;                /* times the datasheet's; 0 = none */
   uint32_t d1[FT_MAX_SENSORS]; /* [sensor] code instead of the world's pressure; 0 = none */
   uint32_t d2[FT_MAX_SENSORS]; /* [sensor] code instead of the world's temperature; 0 = none */
-  bool absent[FT_MAX_SENSORS]; /* [sensor] not fitted */
   double nack_share; /* of the reads of one sensor: not acknowledged, at random. The bus does not
                         ask again */
   double
       wrong_temperature_share; /* of the temperatures of one sensor: one bit inverted, at random */
   struct sim_ms5840 sensor[FT_MAX_SENSORS];
+  bool absent[FT_MAX_SENSORS]; /* [sensor] not fitted */
+  bool parallel;               /* a data line for each sensor, no multiplexers */
 
   /* To look at */
   uint32_t transfers;
