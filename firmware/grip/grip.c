@@ -53,7 +53,8 @@ enum ft_status grip_init(struct grip *grip, const struct grip_settings *settings
       s->control_us <= 1000000 && in_range(s->first_mN, 200, s->force_cap_mN) &&
       in_range(s->blind_mN, s->first_mN, s->force_cap_mN) && in_range(s->shift_um, 0, 20000) &&
       in_range(s->friction_permille, 100, 1500) && in_range(s->margin_permille, 1000, 5000) &&
-      in_range(s->decay_permille_s, 0, 5000) && s->rest_us <= 60000000;
+      in_range(s->slid_permille, 1000, 3000) && in_range(s->decay_permille_s, 0, 5000) &&
+      s->rest_us <= 60000000;
   if (!good) {
     return FT_ERR_ARGUMENT;
   }
@@ -158,7 +159,7 @@ static void approach(struct grip *grip, const struct grip_view *view) {
   if (touches || pushes_hard) {
     grip->touch_width_um = grip_width_at(grip, view->t_us);
     grip->aimed_us = grip->now_us; /* the approach is still under way */
-    grip->is_blind = false;
+    grip->is_blind = grip->is_guessing = false;
     enter(grip, GRIP_SQUEEZE);
     return;
   }
@@ -170,26 +171,22 @@ static void approach(struct grip *grip, const struct grip_view *view) {
   }
 }
 
-/* Grip before anything pulls. */
-static int32_t first_force(const struct grip *grip) {
-  return grip->is_blind ? grip->settings.blind_mN : grip->settings.first_mN;
-}
-
 static uint32_t squeeze(struct grip *grip, const struct grip_view *view) {
   const struct grip_settings *settings = &grip->settings;
   bool fixed = settings->mode == GRIP_MODE_FIXED;
-  int32_t aimed_mN = fixed ? settings->set_mN : first_force(grip);
-  int32_t from_mN = grip->is_blind ? settings->first_mN : settings->touch_mN;
+  int32_t aimed_mN = fixed ? settings->set_mN : grip_first_force(grip);
+  bool goes_on = grip->is_blind || grip->is_guessing;
+  int32_t from_mN = goes_on ? settings->first_mN : settings->touch_mN;
   int32_t since_us = grip_clamp(passed_us(grip, grip->since_us), 0, RISES_us);
   int32_t risen_mN = from_mN + grip_scale(aimed_mN, since_us, RISES_us);
   uint32_t trouble = fixed ? grip_fixed_step(grip, view)
                            : grip_aim(grip, view, risen_mN < aimed_mN ? risen_mN : aimed_mN);
   bool there = view->low_mN >= grip_scale(aimed_mN, SQUEEZED_PERMILLE, 1000);
   if ((there && !grip->status.is_moving) || grip->now_us - grip->since_us > SQUEEZE_us) {
-    bool was_blind = grip->is_blind;
     grip->is_blind = !fixed && !view->may_tell;
-    if (grip->is_blind && !was_blind) {
-      grip->since_us = grip->now_us; /* on to what holds the blind */
+    grip->is_guessing = !fixed && (grip->is_guessing || !view->tells_load);
+    if (!fixed && grip_first_force(grip) > aimed_mN) {
+      grip->since_us = grip->now_us; /* on to what holds where less is told */
     } else {
       grip_zero_begin(grip);
       enter(grip, GRIP_READY);
@@ -215,7 +212,7 @@ static uint32_t hold(struct grip *grip, const struct grip_view *view) {
 static uint32_t make_ready(struct grip *grip, const struct grip_view *view) {
   uint32_t trouble = grip->settings.mode == GRIP_MODE_FIXED
                          ? grip_fixed_step(grip, view)
-                         : grip_aim(grip, view, first_force(grip));
+                         : grip_aim(grip, view, grip_first_force(grip));
   if (grip->now_us - grip->since_us >= READY_us && grip_zero_has(grip, READY_FRAMES)) {
     grip_zero_end(grip);
     enter(grip, GRIP_HOLDING);

@@ -150,12 +150,14 @@ struct grip_settings {
   struct grip_gains gains;
   uint32_t control_us; /* between two steps of eq. (6) */
   /* hold */
-  int32_t first_mN;          /* grip before anything pulls, and never less */
+  int32_t first_mN;          /* grip before anything pulls, and never less; half as much again of
+                                a contact whose load can only be guessed */
   int32_t blind_mN;          /* grip where no load can be told, squeezed to before anything pulls */
   int32_t shift_um;          /* by which a tangential load as large as the force moves a location
                                 that is not corrected for it; 0: loads are not guessed by that */
   int32_t friction_permille; /* until a slide, or a load that does not slide, tells better */
-  int32_t margin_permille;   /* grip over load / friction */
+  int32_t margin_permille;   /* grip over load / friction, */
+  int32_t slid_permille;     /* and so much of that since it has slid: it will again */
   int32_t decay_permille_s;  /* how fast what is too much goes, share of it a second */
   uint32_t rest_us;          /* no sooner after a slide */
 };
@@ -211,10 +213,11 @@ struct grip_hold {
   uint64_t load_us;     /* when it was told */
   uint64_t decayed_us;
   int32_t friction_permille;
-  int32_t share_permille; /* largest load over force of late */
-  int32_t floor_mN;       /* since the last slide */
-  uint64_t slid_us;       /* the last frame that told a slide */
-  uint64_t raised_us;     /* the last reflex */
+  int32_t share_permille;        /* largest load over force of late */
+  int32_t floor_mN;              /* since the last slide */
+  uint64_t slid_us;              /* the last frame that told a slide */
+  uint64_t raised_us;            /* the last reflex, */
+  int32_t raised_share_permille; /* and load over force then */
   bool has_told, has_slid, sliding, load_is_believed;
   uint32_t slides;
 };
@@ -250,7 +253,8 @@ struct grip {
   bool may_activate;
   bool is_entered;   /* the state is new */
   bool still_grasps; /* STILL with an object */
-  bool is_blind;     /* squeezed without a fingertip that could tell a load */
+  bool is_blind;     /* squeezed without a fingertip that could tell a load; */
+  bool is_guessing;  /* without one that told one */
   struct grip_hold hold;
   struct grip_pid pid;
 };

@@ -28,7 +28,8 @@ void grip_default_settings(struct grip_settings *settings, const struct grip_tra
       .blind_mN = 12000,
       .shift_um = 5500,
       .friction_permille = 550,
-      .margin_permille = 1260,
+      .margin_permille = grip_clamp(1185 + port_divide(traits->latency_us, 250), 1000, 1500),
+      .slid_permille = 1250,
       .decay_permille_s = 3000,
       .rest_us = 300000,
   };

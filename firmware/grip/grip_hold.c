@@ -16,9 +16,19 @@
 #define REFLEX_MAX_PERMILLE 1500
 #define GOES_ON_PERMILLE 200
 #define REFLEX_AGAIN_us 35000
+/* All raises of a slide together ask for no more than this of what is felt: a late gripper has not
+ * done yet what was asked before. */
+#define RAISED_MOST_PERMILLE 2000
+/* Q / F of what slides is its friction, however hard the grip. Of what does not, it falls as the
+ * grip grows, and rubber that is squeezed moves the contact as a slide does. So none begins at less
+ * than this of the largest Q / F of late, nor goes on at less than that of the last raise. */
+#define BEGINS_AT_PERMILLE 850
+#define GOES_ON_AT_PERMILLE 800
 /* This much of the grip that ended a slide is not given up where no load tells what is needed. */
 #define FLOOR_PERMILLE 850
 
+/* Where loads are guessed from the start, the first grip is so much of what it is elsewhere: */
+#define GUESSING_PERMILLE 1500
 /* A guess of a load may be so far off: what it needs goes no lower than this of it. */
 #define GUESSED_PERMILLE 1150
 
@@ -34,7 +44,7 @@
 
 /* Q / F of a slide is friction, as far as Q is known. */
 #define SEEN_PERMILLE 1000
-#define SHARE_us 60000
+#define SHARE_us 200000
 #define FRICTION_MIN_PERMILLE 150
 #define FRICTION_MAX_PERMILLE 1500
 
@@ -42,12 +52,16 @@ void grip_hold_begin(struct grip *grip) {
   grip->hold = (struct grip_hold){.friction_permille = grip->settings.friction_permille};
 }
 
+static int32_t share_of(const struct grip_view *view) {
+  return view->low_mN > 0 ? grip_scale(view->load_mN, 1000, view->low_mN) : 0;
+}
+
 /* By when a slide is told the grip may hold again: what counts is the largest share of late. */
 static void follow_share(struct grip *grip, const struct grip_view *view, int32_t step_us) {
   struct grip_hold *hold = &grip->hold;
   hold->share_permille -= grip_scale(hold->share_permille, step_us, SHARE_us);
   if (view->low_mN >= grip->settings.touch_mN * 2) {
-    int32_t share = grip_scale(view->load_mN, 1000, view->low_mN);
+    int32_t share = share_of(view);
     hold->share_permille = share > hold->share_permille ? share : hold->share_permille;
   }
 }
@@ -65,15 +79,15 @@ static void follow_load(struct grip *grip, const struct grip_view *view) {
   hold->slow_load_mN += step_us >= RATE_us ? lag_mN : grip_scale(lag_mN, step_us, RATE_us);
 }
 
-static void learn_friction(struct grip *grip, const struct grip_view *view, bool begins) {
+static void learn_friction(struct grip *grip, const struct grip_view *view, bool slides) {
   struct grip_hold *hold = &grip->hold;
   if (!view->has_load) {
     return;
   }
   int32_t seen = grip_clamp(grip_scale(hold->share_permille, SEEN_PERMILLE, 1000),
                             FRICTION_MIN_PERMILLE, FRICTION_MAX_PERMILLE);
-  if (!begins) {
-    if (!hold->sliding && !view->slides && seen > hold->friction_permille) {
+  if (!slides || hold->sliding) {
+    if (!slides && !hold->sliding && seen > hold->friction_permille) {
       hold->friction_permille = seen;
     }
     return;
@@ -92,20 +106,41 @@ static int32_t reflex_permille(const struct grip *grip) {
   return grip_clamp(REFLEX_PERMILLE + later, REFLEX_MIN_PERMILLE, REFLEX_MAX_PERMILLE);
 }
 
+static bool is_slide(const struct grip_hold *hold, const struct grip_view *view) {
+  int32_t least = grip_scale(hold->share_permille, BEGINS_AT_PERMILLE, 1000);
+  return view->slides && (hold->sliding || !view->tells_load || share_of(view) >= least);
+}
+
+static bool may_raise(const struct grip *grip, const struct grip_view *view) {
+  const struct grip_hold *hold = &grip->hold;
+  uint64_t again_us = (uint64_t)grip->traits.latency_us + REFLEX_AGAIN_us;
+  int32_t least = grip_scale(hold->raised_share_permille, GOES_ON_AT_PERMILLE, 1000);
+  return !hold->sliding || (grip->now_us - hold->raised_us > again_us &&
+                            (!view->has_load || share_of(view) >= least));
+}
+
+static void raise_grip(struct grip *grip, const struct grip_view *view) {
+  struct grip_hold *hold = &grip->hold;
+  bool begins = !hold->sliding;
+  int32_t from_mN = !begins && grip->wanted_mN > view->low_mN ? grip->wanted_mN : view->low_mN;
+  int32_t raise_permille = reflex_permille(grip) + (begins ? 0 : GOES_ON_PERMILLE);
+  int32_t raised_mN = grip_scale(from_mN, raise_permille, 1000);
+  int32_t most_mN = grip_scale(view->low_mN, RAISED_MOST_PERMILLE, 1000);
+  most_mN = grip_clamp(most_mN, 0, grip->settings.force_cap_mN);
+  raised_mN = raised_mN < most_mN ? raised_mN : most_mN;
+  hold->floor_mN = raised_mN > hold->floor_mN ? raised_mN : hold->floor_mN;
+  hold->raised_us = grip->now_us;
+  hold->raised_share_permille = view->has_load ? share_of(view) : 0;
+  hold->slides += begins;
+}
+
 static void answer_slide(struct grip *grip, const struct grip_view *view) {
   struct grip_hold *hold = &grip->hold;
-  bool begins = view->slides && !hold->sliding;
-  learn_friction(grip, view, begins);
-  if (view->slides) {
-    uint64_t again_us = (uint64_t)grip->traits.latency_us + REFLEX_AGAIN_us;
-    if (begins || grip->now_us - hold->raised_us > again_us) {
-      int32_t from_mN = !begins && grip->wanted_mN > view->low_mN ? grip->wanted_mN : view->low_mN;
-      int32_t raise_permille = reflex_permille(grip) + (begins ? 0 : GOES_ON_PERMILLE);
-      int32_t raised_mN = grip_scale(from_mN, raise_permille, 1000);
-      raised_mN = grip_clamp(raised_mN, 0, grip->settings.force_cap_mN);
-      hold->floor_mN = raised_mN > hold->floor_mN ? raised_mN : hold->floor_mN;
-      hold->raised_us = grip->now_us;
-      hold->slides += begins;
+  bool slides = is_slide(hold, view);
+  learn_friction(grip, view, slides);
+  if (slides) {
+    if (may_raise(grip, view)) {
+      raise_grip(grip, view);
     }
     hold->slid_us = grip->now_us;
     hold->has_slid = true;
@@ -113,13 +148,23 @@ static void answer_slide(struct grip *grip, const struct grip_view *view) {
     hold->floor_mN = hold->load_is_believed ? 0 : grip_scale(hold->floor_mN, FLOOR_PERMILLE, 1000);
     grip_guess_anew(grip);
   }
-  hold->sliding = view->slides;
+  hold->sliding = slides;
+}
+
+static int32_t least_felt(const struct grip *grip) {
+  int32_t permille = grip->is_guessing ? GUESSING_PERMILLE : 1000;
+  int32_t least_mN = grip_scale(grip->settings.first_mN, permille, 1000);
+  return grip_clamp(least_mN, 0, grip->settings.force_cap_mN);
+}
+
+int32_t grip_first_force(const struct grip *grip) {
+  return grip->is_blind ? grip->settings.blind_mN : least_felt(grip);
 }
 
 /* Without a load told since GRASP, the grip that is set for that. */
 static int32_t least_force(const struct grip *grip, bool told) {
   const struct grip_hold *hold = &grip->hold;
-  int32_t least_mN = told || hold->has_told ? grip->settings.first_mN : grip->settings.blind_mN;
+  int32_t least_mN = told || hold->has_told ? least_felt(grip) : grip->settings.blind_mN;
   return hold->floor_mN > least_mN ? hold->floor_mN : least_mN;
 }
 
@@ -128,7 +173,8 @@ static int32_t load_force(const struct grip *grip) {
   const struct grip_hold *hold = &grip->hold;
   int32_t ahead_us = grip_clamp(grip->traits.latency_us + AHEAD_us, AHEAD_MIN_us, AHEAD_MAX_us);
   int32_t load_mN = hold->load_mN + grip_scale(hold->rate_mN_s, ahead_us, 1000000);
-  return grip_scale(load_mN, grip->settings.margin_permille, hold->friction_permille);
+  int32_t force_mN = grip_scale(load_mN, grip->settings.margin_permille, hold->friction_permille);
+  return hold->has_slid ? grip_scale(force_mN, grip->settings.slid_permille, 1000) : force_mN;
 }
 
 int32_t grip_hold_wants(struct grip *grip, const struct grip_view *view) {

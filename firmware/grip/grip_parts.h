@@ -41,6 +41,8 @@ int32_t grip_allowed_width(const struct grip *grip, const struct grip_view *view
                            uint32_t *trouble);
 
 void grip_hold_begin(struct grip *grip);
+/* Grip before anything pulls. */
+int32_t grip_first_force(const struct grip *grip);
 /* The force that is wanted now. */
 int32_t grip_hold_wants(struct grip *grip, const struct grip_view *view);
 

@@ -190,9 +190,13 @@ void grip_zero_begin(struct grip *grip) {
 
 void grip_zero_end(struct grip *grip) {
   for (int i = 0; i < GRIP_FINGERS; i++) {
-    end_zero(&grip->finger[i].pull);
-    end_zero(&grip->finger[i].place);
-    grip->finger[i].has_place = grip->finger[i].place.sums > 0;
+    struct grip_finger *own = &grip->finger[i];
+    end_zero(&own->pull);
+    end_zero(&own->place);
+    own->has_place = own->place.sums > 0;
+    /* What was told against the zero before. */
+    own->load_mN = own->told_x_mN = own->told_y_mN = 0;
+    own->shifts = false;
   }
 }
 

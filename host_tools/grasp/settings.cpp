@@ -54,6 +54,9 @@ const std::vector<GraspSetting> &grasp_settings() {
           "margin", "", 1, 5, 1e3, [](S &s) -> std::int32_t & { return s.margin_permille; },
           "Force over load / friction"),
       number(
+          "slid", "", 1, 3, 1e3, [](S &s) -> std::int32_t & { return s.slid_permille; },
+          "So much of that once the object has slid"),
+      number(
           "decay", "%/s", 0, 500, 10, [](S &s) -> std::int32_t & { return s.decay_permille_s; },
           "How fast what is too much goes"),
       time(

@@ -48,6 +48,7 @@ static bool begin(struct fuzz_input *input) {
     settings.travel_cap_um = in_range(input, 500, 100000);
     settings.friction_permille = in_range(input, 100, 1500);
     settings.margin_permille = in_range(input, 1000, 5000);
+    settings.slid_permille = in_range(input, 1000, 3000);
     settings.decay_permille_s = in_range(input, 0, 5000);
     settings.shift_um = in_range(input, 0, 20000);
     settings.rest_us = (uint32_t)in_range(input, 0, 60000000);

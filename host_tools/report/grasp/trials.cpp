@@ -38,6 +38,7 @@ void change(grip_settings &settings, const std::string &changes) {
       {"shift_um", &settings.shift_um},
       {"friction_permille", &settings.friction_permille},
       {"margin_permille", &settings.margin_permille},
+      {"slid_permille", &settings.slid_permille},
       {"decay_permille_s", &settings.decay_permille_s}};
   const std::map<std::string, std::uint32_t *> times{{"control_us", &settings.control_us},
                                                      {"rest_us", &settings.rest_us}};

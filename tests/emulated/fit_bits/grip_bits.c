@@ -169,6 +169,7 @@ static void draw_settings(struct grip_settings *settings, struct grip_traits *tr
       settings->shift_um = draw_between(0, 20000);
       settings->friction_permille = draw_between(100, 1500);
       settings->margin_permille = draw_between(1000, 5000);
+      settings->slid_permille = draw_between(1000, 3000);
       settings->decay_permille_s = draw_between(0, 5000);
       settings->rest_us = (uint32_t)draw_between(0, 60000000);
     }

@@ -29,6 +29,16 @@ static void pull(int32_t load_mN, uint32_t ms) {
   }
 }
 
+/* The object slides at so much of Q / F for so many ms. */
+static void slide(int32_t share_permille, uint32_t ms) {
+  world.add_flags[1] |= CONTACT_FLAG_SLIDING;
+  for (uint32_t i = 0; i < ms; i++) {
+    world.load_mN = (int32_t)(1e-3 * share_permille * world.force_mN);
+    world_run(&world, 1);
+  }
+  world.add_flags[1] &= ~(uint32_t)CONTACT_FLAG_SLIDING;
+}
+
 static void assert_within(double share, double expected, double found) {
   TEST_ASSERT_DOUBLE_WITHIN(share * expected, expected, found);
 }
@@ -91,20 +101,73 @@ static void raises_the_grip_where_the_object_slides(void) {
   pull(1000, 300);
   world_run(&world, 300);
   double before_mN = world.force_mN;
-  world.add_flags[1] = CONTACT_FLAG_SLIDING;
-  world_run(&world, 15);
+  int32_t share_permille = (int32_t)(1e3 * world.load_mN / before_mN);
+  slide(share_permille, 15);
   TEST_ASSERT_EQUAL(GRIP_SLIPPING, world.report.state);
   TEST_ASSERT_GREATER_THAN(before_mN * 1.05, world.force_mN);
   TEST_ASSERT_EQUAL(1, world.report.slides);
-  world_run(&world, 200);
+  slide(share_permille, 200);
   TEST_ASSERT_GREATER_THAN(before_mN * 2.0, world.force_mN);
   TEST_ASSERT_LESS_OR_EQUAL(1.02 * settings.force_cap_mN, world.force_mN);
-  world.add_flags[1] = 0;
+  world.load_mN = 1000;
   world_run(&world, 20);
   TEST_ASSERT_EQUAL(GRIP_HOLDING, world.report.state);
   double caught_mN = world.report.wanted_mN;
   world_run(&world, settings.rest_us / 1000 - 100);
   TEST_ASSERT_EQUAL((int32_t)caught_mN, world.report.wanted_mN);
+}
+
+/* Q stays as the grip grows: what is squeezed moves, and does not slide. */
+static void a_squeeze_does_not_feed_itself(void) {
+  grasp();
+  pull(1000, 300);
+  world_run(&world, 300);
+  double needed_mN = 1000.0 * settings.margin_permille / world.report.friction_permille;
+  world.add_flags[0] = CONTACT_FLAG_SLIDING;
+  world_run(&world, 400);
+  TEST_ASSERT_EQUAL(1, world.report.slides);
+  double learned = world.report.friction_permille;
+  TEST_ASSERT_LESS_OR_EQUAL(2.1 * needed_mN, world.force_mN);
+  double slid_mN = 1e-3 * settings.slid_permille * 1000.0 * settings.margin_permille / learned;
+  TEST_ASSERT_LESS_OR_EQUAL(1.05 * slid_mN, world.force_mN);
+}
+
+static void what_held_more_a_moment_ago_does_not_slide(void) {
+  grasp();
+  pull(1500, 60);
+  int32_t friction = world.report.friction_permille;
+  world.load_mN = 700; /* as the grip grows for what pulled */
+  world_run(&world, 10);
+  world.add_flags[0] = CONTACT_FLAG_SLIDING;
+  world_run(&world, 30);
+  TEST_ASSERT_EQUAL(GRIP_HOLDING, world.report.state);
+  TEST_ASSERT_EQUAL(0, world.report.slides);
+  TEST_ASSERT_EQUAL(friction, world.report.friction_permille);
+  world_run(&world, 300); /* but what goes on to say so does */
+  TEST_ASSERT_EQUAL(1, world.report.slides);
+}
+
+static void holds_more_once_it_has_slid(void) {
+  grasp();
+  pull(1000, 300);
+  world_run(&world, 300);
+  slide((int32_t)(1e3 * world.load_mN / world.force_mN), 30);
+  world.load_mN = 1000;
+  world_run(&world, 6000);
+  double needed_mN = 1000.0 * settings.margin_permille / world.report.friction_permille;
+  assert_within(0.06, 1e-3 * settings.slid_permille * needed_mN, world.force_mN);
+}
+
+/* Half as much again as what tells its load; and a location off the middle is none. */
+static void a_load_that_can_only_be_guessed_is_gripped_harder(void) {
+  world.drop_flags[0] = world.drop_flags[1] = CONTACT_FLAG_TANGENTIAL_VALID;
+  world.place_um = 5000;
+  world.take_turns = true;
+  grasp();
+  world_run(&world, 1000);
+  assert_within(0.05, 1.5 * settings.first_mN, world.force_mN);
+  TEST_ASSERT_EQUAL(0, world.report.slides);
+  TEST_ASSERT_LESS_OR_EQUAL(20, world.report.load_mN);
 }
 
 static void learns_friction_from_a_slide(void) {
@@ -177,12 +240,13 @@ static void never_loosens_while_no_load_is_told(void) {
 static void a_guessed_load_keeps_more_than_it_needs(void) {
   grasp();
   pull(1000, 300);
-  world.add_flags[0] = CONTACT_FLAG_SLIDING;
-  world_run(&world, 250);
-  world.add_flags[0] = 0;
+  slide(300, 250);
+  world.load_mN = 1000;
+  world_run(&world, 20);
   world.drop_flags[0] = world.drop_flags[1] = CONTACT_FLAG_TANGENTIAL_VALID;
   world_run(&world, 8000);
-  double needed_mN = 1000.0 * settings.margin_permille / world.report.friction_permille;
+  double needed_mN = 1e-3 * settings.slid_permille * 1000.0 * settings.margin_permille /
+                     world.report.friction_permille;
   assert_within(0.05, 1.15 * needed_mN, world.force_mN);
 }
 
@@ -507,6 +571,10 @@ int main(void) {
   RUN_TEST(counts_what_pulls_before_as_none);
   RUN_TEST(takes_the_larger_of_loads_that_differ);
   RUN_TEST(raises_the_grip_where_the_object_slides);
+  RUN_TEST(a_squeeze_does_not_feed_itself);
+  RUN_TEST(what_held_more_a_moment_ago_does_not_slide);
+  RUN_TEST(holds_more_once_it_has_slid);
+  RUN_TEST(a_load_that_can_only_be_guessed_is_gripped_harder);
   RUN_TEST(learns_friction_from_a_slide);
   RUN_TEST(loosens_slowly);
   RUN_TEST(grips_for_the_blind_without_a_load_told);

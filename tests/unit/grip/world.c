@@ -53,7 +53,7 @@ static struct grip_touch feel(const struct world *world, int finger) {
   if (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) {
     touch.qy_mN = world->load_mN;
   } else {
-    touch.y_um = SHIFT_um * world->load_mN / force_mN;
+    touch.y_um = world->place_um + SHIFT_um * world->load_mN / force_mN;
   }
   return touch;
 }
@@ -81,7 +81,8 @@ void world_run(struct world *world, uint32_t ms) {
       world->frames++;
       for (int finger = 0; finger < GRIP_FINGERS; finger++) {
         struct grip_touch touch = feel(world, finger);
-        if (!world->is_mute[finger]) {
+        bool waits = world->take_turns && world->frames % GRIP_FINGERS != (uint32_t)finger;
+        if (!world->is_mute[finger] && !waits) {
           grip_take_touch(&world->grip, (unsigned)finger, &touch);
         }
       }

@@ -19,9 +19,11 @@ struct world {
   double force_mN;
   int32_t load_mN;  /* of each fingertip */
   int32_t sigma_um; /* of the contact, as fitted */
+  int32_t place_um; /* and its location, unless it is corrected for the load */
   uint32_t add_flags[GRIP_FINGERS], drop_flags[GRIP_FINGERS];
   double gain[GRIP_FINGERS];
   bool is_mute[GRIP_FINGERS], is_frozen[GRIP_FINGERS];
+  bool take_turns; /* a frame of one fingertip, then one of the other */
   bool gripper_is_mute, is_active, is_activated; /* the last: by a command */
   uint8_t fault;
   double sent_before_um[64]; /* ring of what was sent, a ms apart */
