@@ -132,6 +132,19 @@ static void a_squeeze_does_not_feed_itself(void) {
   TEST_ASSERT_LESS_OR_EQUAL(1.05 * slid_mN, world.force_mN);
 }
 
+static void a_late_gripper_is_asked_for_no_more_than_twice_what_is_felt(void) {
+  grasp();
+  pull(1000, 300);
+  world_run(&world, 300);
+  world.grip.traits.speed_max_um_s = world.grip.traits.speed_min_um_s;
+  int32_t share_permille = (int32_t)(1e3 * world.load_mN / world.force_mN);
+  for (int i = 0; i < 300; i++) {
+    slide(share_permille, 1);
+    TEST_ASSERT_LESS_OR_EQUAL(2.02 * world.force_mN, world.report.wanted_mN);
+  }
+  TEST_ASSERT_GREATER_THAN(1.5 * world.force_mN, world.report.wanted_mN);
+}
+
 static void what_held_more_a_moment_ago_does_not_slide(void) {
   grasp();
   pull(1500, 60);
@@ -572,6 +585,7 @@ int main(void) {
   RUN_TEST(takes_the_larger_of_loads_that_differ);
   RUN_TEST(raises_the_grip_where_the_object_slides);
   RUN_TEST(a_squeeze_does_not_feed_itself);
+  RUN_TEST(a_late_gripper_is_asked_for_no_more_than_twice_what_is_felt);
   RUN_TEST(what_held_more_a_moment_ago_does_not_slide);
   RUN_TEST(holds_more_once_it_has_slid);
   RUN_TEST(a_load_that_can_only_be_guessed_is_gripped_harder);
