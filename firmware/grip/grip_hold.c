@@ -23,6 +23,7 @@
  * grip grows, and rubber that is squeezed moves the contact as a slide does. So none begins at less
  * than this of the largest Q / F of late, nor goes on at less than that of the last raise. */
 #define BEGINS_AT_PERMILLE 850
+#define SHARE_NOISE_PERMILLE 50 /* of Q / F, of light objects */
 #define GOES_ON_AT_PERMILLE 800
 /* This much of the grip that ended a slide is not given up where no load tells what is needed. */
 #define FLOOR_PERMILLE 850
@@ -108,7 +109,8 @@ static int32_t reflex_permille(const struct grip *grip) {
 
 static bool is_slide(const struct grip_hold *hold, const struct grip_view *view) {
   int32_t least = grip_scale(hold->share_permille, BEGINS_AT_PERMILLE, 1000);
-  return view->slides && (hold->sliding || !view->tells_load || share_of(view) >= least);
+  int32_t share = share_of(view) + SHARE_NOISE_PERMILLE;
+  return view->slides && (hold->sliding || !view->tells_load || share >= least);
 }
 
 static bool may_raise(const struct grip *grip, const struct grip_view *view) {
@@ -116,7 +118,7 @@ static bool may_raise(const struct grip *grip, const struct grip_view *view) {
   uint64_t again_us = (uint64_t)grip->traits.latency_us + REFLEX_AGAIN_us;
   int32_t least = grip_scale(hold->raised_share_permille, GOES_ON_AT_PERMILLE, 1000);
   return !hold->sliding || (grip->now_us - hold->raised_us > again_us &&
-                            (!view->has_load || share_of(view) >= least));
+                            (!view->has_load || share_of(view) + SHARE_NOISE_PERMILLE >= least));
 }
 
 static void raise_grip(struct grip *grip, const struct grip_view *view) {
