@@ -18,7 +18,7 @@
  * are mN, lengths um, of one fingertip: its normal force is the grip force. Values beyond what
  * there can be are taken to its ends. Main context only: it divides with port/divide.h.
  *
- * Cost on a Cortex-M0+: grip_step 8000 cycles in the median, at most 24 000 (test
+ * Cost on a Cortex-M0+: grip_step 3500 cycles in the median, at most 15 000 (test
  * emulated.fit_bits), 400 bytes of stack (checks.stack_grip).
  */
 #ifndef GRIP_GRIP_H

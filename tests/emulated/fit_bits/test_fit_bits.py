@@ -21,7 +21,7 @@ import unittest
 KERNELS = ["grid", "masked", "general", "tangential", "grip"]  # the order of enum fit_bits_kernel
 PRESSES = {"grid": 10000, "masked": 10000, "general": 10000, "tangential": 10000, "grip": 1000}  # fit_bits_presses
 # Of grip_step, as grip.h says: the dearest of all grasps, the median of those that are plausible.
-GRIP_STEP_CYCLES_MAX, GRIP_STEP_CYCLES_USUAL = 24000, 8000
+GRIP_STEP_CYCLES_MAX, GRIP_STEP_CYCLES_USUAL = 15000, 3500
 GRIP_STEPS = 200
 FOLDER = pathlib.Path(__file__).resolve().parent
 TOOLS = argparse.Namespace()
