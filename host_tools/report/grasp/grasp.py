@@ -89,10 +89,11 @@ def quantiles(values):
 
 
 def caught(each):
-    """Number of the grasp whose slip of 1 mm or more went furthest but was answered within 0.1 s, and when that slip began."""
-    slips = [(slip["way_mm"], grasp["n"], slip["begin_s"]) for grasp in each if not grasp["dropped"]
-             for slip in grasp["slips"] if slip["way_mm"] >= 1 and slip["reaction_ms"] is not None and slip["reaction_ms"] < 100]
-    _, number, begin_s = max(slips, default=(0, None, None))
+    """Number of a grasp and when its slip began: of all slips by disturbances of 1 mm or more that were answered within 0.1 s, the one of the
+    median way."""
+    slips = sorted((slip["way_mm"], grasp["n"], slip["begin_s"]) for grasp in each if not grasp["dropped"] for slip in grasp["slips"]
+                   if slip["way_mm"] >= 1 and slip["begin_s"] > grasp["lift_s"] and slip["reaction_ms"] is not None and slip["reaction_ms"] < 100)
+    _, number, begin_s = slips[len(slips) // 2] if slips else (0, None, None)
     return number, begin_s
 
 
