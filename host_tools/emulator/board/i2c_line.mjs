@@ -157,9 +157,10 @@ export class I2cLine {
     this.sdaHigh = false;
     this.sdaChanged_ns = t_ns;
     if (!this.sclHigh) return;
-    if (this.phase === 'idle' && controllerPulls && !this.faults) this.check.excused = false;
-    if (this.phase === 'idle') this.check.atLeast('tBUF', t_ns - this.stopped_ns);
-    else {
+    if (this.phase === 'idle') {
+      this.check.atLeast('tBUF', t_ns - this.stopped_ns); // still excused where a fault's end made the STOP
+      if (controllerPulls && !this.faults) this.check.excused = false;
+    } else {
       this.#mustBeBetweenBytes('START');
       this.check.atLeast('tSU_STA', t_ns - this.sclRose_ns);
     }

@@ -84,9 +84,10 @@ export class PicoParallel {
   /** Actions for `Faults`. */
   get faultActions() {
     const onLine = (action) => (k, active) => {
-      this.lines[k].fault(active);
+      if (active) this.lines[k].fault(true);
       action(1 << k, active, k);
       this.#resolve();
+      if (!active) this.lines[k].fault(false); // where the line falls only now, that is no START of the controller's
     };
     const onScl = (action) => (_, active) => {
       this.sclFaults += active ? 1 : -1;

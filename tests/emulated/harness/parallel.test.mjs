@@ -186,6 +186,45 @@ test('faults of single lines cost those sensors only', () => {
   assert.deepEqual(c.warnings, []);
 });
 
+/** The times of the controller are judged on line k again. */
+function isJudged(c, k) {
+  assert.deepEqual(c.warnings, []);
+  assert.equal(c.command(0x1e) >> k & 1, 1, 'it answers');
+  c.slack_ns = -200;
+  c.command(0x44);
+  assert.ok(c.warnings.some((w) => w.startsWith(`SDA${k}: tHD_STA is 400 ns`)), c.warnings.join('\n'));
+}
+
+test('a line that is no longer tied to VDD and falls in a bit of the controller is no START of its: excused up to the next', () => {
+  const c = ready();
+  c.fault('line_stuck_high', 12);
+  c.start();
+  c.byte(0xec);
+  c.drive(SCL | ALL, 900);
+  c.drive(ALL, 440);
+  c.fault('line_stuck_high', 12, false);
+  assert.equal(c.levels & (SCL | 1 << 12), SCL);
+  c.wait_ns(260);
+  c.drive(SCL | ALL, 350);
+  for (let i = 0; i < 8; i++) c.bit(0);
+  c.start();
+  c.byte(0xed);
+  c.receive(true);
+  c.stop();
+  isJudged(c, 12);
+});
+
+test('a line that is no longer tied to ground and rises just before a START: the controller did not see it, excused', () => {
+  const c = ready();
+  c.fault('line_stuck_low', 3);
+  c.command(0x44);
+  c.fault('line_stuck_low', 3, false);
+  c.wait_ns(400);
+  assert.equal(c.levels & ALL, ALL);
+  c.command(0x44);
+  isJudged(c, 3);
+});
+
 test('a sensor that comes back has no PROM before its reset', () => {
   const c = ready();
   c.fault('sensor_missing', 4);
