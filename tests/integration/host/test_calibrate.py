@@ -13,7 +13,7 @@ import time
 import unittest
 
 TWIN, PLAYER, TABLES = sys.argv[3:6]
-import test_cli  # noqa: E402
+import cli_case  # noqa: E402
 
 GAIN_TOLERANCE = 0.02
 
@@ -44,7 +44,7 @@ def table(text):
     return [float(row[1]) for row in rows], [float(row[2]) / 100 for row in rows]
 
 
-class CalibrateTest(test_cli.CliTest):
+class CalibrateTest(cli_case.CliTest):
     def calibrate(self, *arguments, **options):
         return self.run_cli("calibrate", *arguments, **options)
 
@@ -157,7 +157,7 @@ class Live(CalibrateTest):
             process = self.start("calibrate", "--port", self.port, "--yes")
             self.assertIn("set the weight down", process.stdout.readline())
             process.send_signal(signal.SIGINT)
-            _, err = process.communicate(timeout=test_cli.PATIENCE_s)
+            _, err = process.communicate(timeout=cli_case.PATIENCE_s)
             self.assertEqual((process.returncode, err), (1, "fingertip: interrupted; the fingertip is as it was\n"))
             self.assertIn("from 30 placements", self.calibrate("--show", "--port", self.port)[0])
 
@@ -167,11 +167,11 @@ class Live(CalibrateTest):
                 pid, terminal = pty.fork()
                 if pid == 0:
                     try:
-                        os.execve(test_cli.FINGERTIP, ["fingertip", "calibrate", "--port", self.port],
+                        os.execve(cli_case.FINGERTIP, ["fingertip", "calibrate", "--port", self.port],
                                   {**self.environment, "TERM": "xterm-256color"})
                     finally:
                         os._exit(127)
-                shown, end = b"", time.monotonic() + test_cli.PATIENCE_s
+                shown, end = b"", time.monotonic() + cli_case.PATIENCE_s
                 answered = False
                 while time.monotonic() < end:
                     if select.select([terminal], [], [], 0.1)[0]:

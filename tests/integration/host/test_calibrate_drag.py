@@ -12,7 +12,7 @@ import unittest
 import numpy as np
 
 TWIN, PLAYER, TABLES = sys.argv[3:6]
-import test_cli  # noqa: E402
+import cli_case  # noqa: E402
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"))
 from fingertip import files  # noqa: E402
@@ -56,7 +56,7 @@ def scale_of_truth(recording, scenario):
     return 1 / np.mean(ratios)
 
 
-class DragTest(test_cli.CliTest):
+class DragTest(cli_case.CliTest):
     def calibrate(self, *arguments, pull=("--force", str(PULL_N)), **options):
         return self.run_cli("calibrate", "--drag", *pull, *arguments, **options)
 
@@ -191,7 +191,7 @@ class Live(DragTest):
             process = self.start("calibrate", "--drag", "--force", "1", "--port", self.port, "--yes")
             self.assertIn("set the object down", process.stdout.readline())
             process.send_signal(signal.SIGINT)
-            _, err = process.communicate(timeout=test_cli.PATIENCE_s)
+            _, err = process.communicate(timeout=cli_case.PATIENCE_s)
             self.assertEqual((process.returncode, err), (1, "fingertip: interrupted; the fingertip is as it was\n"))
             self.assertRegex(self.run_cli("info", "--port", self.port)[0], r"(?m)^pad_tangential_scale +1$")
 

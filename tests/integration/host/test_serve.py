@@ -13,8 +13,9 @@ import threading
 import time
 import unittest
 
-import test_cli
-from test_cli import FINGERTIP, PATIENCE_s, CliTest, files
+import test_install
+from cli_case import FINGERTIP, PATIENCE_s, CliTest
+from fingertip import files
 
 SERIAL = "E660583883265A2C"  # of the fake device where none is said
 
@@ -200,7 +201,7 @@ class Sharing(ServeTest):
 
 
 class Flash(ServeTest):
-    uf2, make_volume = test_cli.Flash.uf2, test_cli.Flash.make_volume
+    uf2, make_volume = test_install.Flash.uf2, test_install.Flash.make_volume
 
     def test_new_firmware_while_others_wait(self):
         image, self.volume = self.uf2(), self.path("RPI-RP2")
