@@ -193,11 +193,15 @@ struct grip_finger {
   struct grip_zero pull;   /* mN */
   struct grip_zero place;  /* um, of a location that is not corrected */
   uint64_t pulled_us;      /* the newest frame that told a tangential load */
+  uint64_t still_us;       /* the newest that told no slide */
   bool is_heard, is_new, has_pulled, has_place;
   bool tells_load, guesses_load; /* itself; from how the location has moved, */
   bool shifts;                   /* by more than a load moves it */
   int32_t load_mN;
-  int32_t told_x_mN, told_y_mN; /* the load that was told last */
+  int32_t told_x_mN, told_y_mN;    /* the load that was told last, */
+  bool has_told;                   /* and none has been guessed since */
+  int32_t guess_x, guess_y;        /* the load that is guessed: times settings.shift_um / 64, */
+  int32_t at_x_um, at_y_um, at_mN; /* as of this location and force */
 };
 
 #define GRIP_WIDTHS 16

@@ -26,11 +26,11 @@ void grip_default_settings(struct grip_settings *settings, const struct grip_tra
       .control_us = 10000,
       .first_mN = 1500 + traits->step_um * 8 / 5, /* what a step may miss */
       .blind_mN = 12000,
-      .shift_um = 5500,
+      .shift_um = 4500,
       .friction_permille = 550,
-      .margin_permille = grip_clamp(1185 + port_divide(traits->latency_us, 250), 1000, 1500),
-      .slid_permille = 1250,
-      .decay_permille_s = 3000,
+      .margin_permille = grip_clamp(1175 + port_divide(traits->latency_us, 200), 1000, 1500),
+      .slid_permille = grip_clamp(1080 + port_divide(traits->latency_us, 50), 1080, 1250),
+      .decay_permille_s = 5000,
       .rest_us = 300000,
   };
   default_gains(&settings->gains, traits);

@@ -13,6 +13,7 @@ struct grip_view {
   bool fresh;                        /* there has been a frame since the last step */
   bool over;                         /* never tighten */
   bool has_load, tells_load, slides; /* tells_load: it is no guess */
+  bool creeps, runs;                 /* what slides does so slowly; fast */
   bool may_tell;                     /* a load, once there is a zero for it */
   int32_t load_mN;                   /* tangential load of one fingertip, since its zero */
 };

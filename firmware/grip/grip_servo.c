@@ -197,8 +197,7 @@ uint32_t grip_aim(struct grip *grip, const struct grip_view *view, int32_t wante
   } else if (-missing_mN > tolerance_mN &&
              view->t_us > grip->aimed_us + (uint64_t)grip->traits.latency_us + SETTLES_us) {
     int32_t least = least_steps(grip, false);
-    int32_t spare =
-        port_divide(-missing_mN - grip_scale(step_mN, LOOSEN_PERMILLE - 1000, 1000), step_mN);
+    int32_t spare = port_divide(-missing_mN + grip_scale(step_mN, LOOSEN_PERMILLE, 1000), step_mN);
     /* A step makes more than is known: for the same force it is not taken back. */
     bool for_less = wanted_mN < grip->tightened_mN - grip_scale(step_mN, FOR_LESS_PERMILLE, 1000);
     bool much = -missing_mN > grip_scale(step_mN, MUCH_PERMILLE, 1000) * least;

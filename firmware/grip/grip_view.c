@@ -19,6 +19,17 @@
 #define GUESSED_MOST_PERMILLE 600
 #define GUESSED_TOLD_PERMILLE 500
 #define GUESSED_AFTER_PERMILLE 300
+/* Of what a load moves it by, so much is pressure that is uneven by Q / F, and the rest rubber that
+ * has given way and stays there however the force grows. */
+#define UNEVEN_Q20 629146 /* 0.6 */
+#define GUESS_MAX (1 << 30)
+
+/* Told slides of less, of either fingertip, are a contact that settles, until they have lasted; of
+ * more they are slides however the load over force falls. */
+#define CREEPS_um_s 4000u
+#define CREEPS_us 150000u
+#define RUNS_um_s 40000u
+#define SPEED_MAX_um_s 46340 /* squares of two fit 32 bits */
 
 /* A force with a larger standard deviation is no measurement. */
 #define FORCE_SD_MAX_PERMILLE 1000
@@ -102,15 +113,55 @@ static void add_to_zero(struct grip_zero *zero, int32_t x, int32_t y) {
   }
 }
 
+/* No larger than this of the force. */
+static void limit_guess(const struct grip *grip, struct grip_finger *own, int32_t permille) {
+  int32_t ratio_um = grip_scale(grip->settings.shift_um, permille, 1000);
+  int32_t most = grip_scale(own->force_mN, ratio_um, 64);
+  int32_t size = length_of(own->guess_x, own->guess_y);
+  if (size > most) {
+    own->guess_x = grip_scale(own->guess_x, most, size);
+    own->guess_y = grip_scale(own->guess_y, most, size);
+  }
+}
+
+static void guess_at(struct grip_finger *own, int32_t x_um, int32_t y_um) {
+  own->at_x_um = x_um;
+  own->at_y_um = y_um;
+  own->at_mN = own->force_mN;
+  own->has_told = false;
+  own->has_place = true;
+}
+
 /* From now on the location tells changes of the load that was told last. */
 static void guess_from(const struct grip *grip, struct grip_finger *own) {
-  int32_t force_mN = own->force_mN < 1 ? 1 : own->force_mN;
-  int32_t most_um = grip_scale(grip->settings.shift_um, GUESSED_TOLD_PERMILLE, 1000);
-  int32_t x_um = grip_scale(grip->settings.shift_um, own->told_x_mN, force_mN);
-  int32_t y_um = grip_scale(grip->settings.shift_um, own->told_y_mN, force_mN);
-  own->place.x = own->touch.x_um - grip_clamp(x_um, -most_um, most_um);
-  own->place.y = own->touch.y_um - grip_clamp(y_um, -most_um, most_um);
-  own->has_place = true;
+  own->guess_x = grip_scale(own->told_x_mN, grip->settings.shift_um, 64);
+  own->guess_y = grip_scale(own->told_y_mN, grip->settings.shift_um, 64);
+  limit_guess(grip, own, GUESSED_TOLD_PERMILLE);
+  guess_at(own, own->touch.x_um, own->touch.y_um);
+}
+
+static int32_t guess_after(const struct grip_finger *own, int32_t guess, int32_t moved_um) {
+  int32_t more_q20 =
+      own->at_mN < 1 ? 0 : grip_scale(own->force_mN - own->at_mN, UNEVEN_Q20, own->at_mN);
+  int64_t grown = ((int64_t)guess * more_q20 + (1 << 19)) >> 20;
+  int64_t sum = guess + grown + grip_scale(own->force_mN, moved_um, 64);
+  return sum > GUESS_MAX ? GUESS_MAX : sum < -GUESS_MAX ? -GUESS_MAX : (int32_t)sum;
+}
+
+static void guess_load(const struct grip *grip, struct grip_finger *own) {
+  const struct grip_touch *touch = &own->touch;
+  if (own->has_told) {
+    guess_from(grip, own);
+  } else if (own->has_place) {
+    own->guess_x = guess_after(own, own->guess_x, touch->x_um - own->at_x_um);
+    own->guess_y = guess_after(own, own->guess_y, touch->y_um - own->at_y_um);
+    guess_at(own, touch->x_um, touch->y_um);
+  }
+  int32_t load_mN = grip_scale(length_of(own->guess_x, own->guess_y), 64, grip->settings.shift_um);
+  int32_t most_mN = grip_scale(own->force_mN, GUESSED_MOST_PERMILLE, 1000);
+  own->shifts = load_mN > most_mN;
+  own->load_mN = own->shifts ? most_mN : load_mN;
+  add_to_zero(&own->place, touch->x_um, touch->y_um);
 }
 
 static bool told_lately(const struct grip_finger *own) {
@@ -127,7 +178,12 @@ static void take_load(const struct grip *grip, struct grip_finger *own) {
   own->guesses_load = false;
   if (own->tells_load) {
     own->pulled_us = touch->t_us;
-    own->has_pulled = true;
+    own->has_pulled = own->has_told = true;
+    /* Of a contact that told none when the grasp stood, the zero is what the guess says. */
+    if (own->has_place && own->pull.sums == 0) {
+      own->pull.x = touch->qx_mN - grip_scale(own->guess_x, 64, grip->settings.shift_um);
+      own->pull.y = touch->qy_mN - grip_scale(own->guess_y, 64, grip->settings.shift_um);
+    }
     int32_t x_mN = touch->qx_mN - own->pull.x, y_mN = touch->qy_mN - own->pull.y;
     own->load_mN = length_of(x_mN, y_mN);
     own->told_x_mN = x_mN;
@@ -137,15 +193,7 @@ static void take_load(const struct grip *grip, struct grip_finger *own) {
              (touch->flags & (NO_PLACE | CONTACT_FLAG_TANGENTIAL_VALID)) == 0 &&
              !told_lately(own) && grip->settings.shift_um > 0) {
     own->guesses_load = true;
-    if (own->has_pulled && !own->has_place) {
-      guess_from(grip, own);
-    }
-    int32_t shift_um = length_of(touch->x_um - own->place.x, touch->y_um - own->place.y);
-    int32_t most_um = grip_scale(grip->settings.shift_um, GUESSED_MOST_PERMILLE, 1000);
-    own->shifts = shift_um > most_um;
-    shift_um = own->shifts ? most_um : shift_um;
-    own->load_mN = grip_scale(own->force_mN, shift_um, grip->settings.shift_um);
-    add_to_zero(&own->place, touch->x_um, touch->y_um);
+    guess_load(grip, own);
   }
 }
 
@@ -172,6 +220,9 @@ void grip_take_touch(struct grip *grip, unsigned finger, const struct grip_touch
   own->touch.qy_mN = grip_clamp(touch->qy_mN, -FORCE_MAX_mN, FORCE_MAX_mN);
   own->is_heard = true;
   own->is_new = true;
+  if (!(touch->flags & CONTACT_FLAG_SLIDING)) {
+    own->still_us = touch->t_us;
+  }
   if (tells_force(touch)) {
     own->told_us = touch->t_us;
     own->force_mN = touch->flags & CONTACT_FLAG_CONTACT ? own->touch.force_mN : 0;
@@ -197,7 +248,12 @@ void grip_zero_end(struct grip *grip) {
     struct grip_finger *own = &grip->finger[i];
     end_zero(&own->pull);
     end_zero(&own->place);
-    own->has_place = own->place.sums > 0;
+    own->has_place = false;
+    own->has_told = own->pull.sums > 0;
+    own->guess_x = own->guess_y = 0;
+    if (own->place.sums > 0) {
+      guess_at(own, own->place.x, own->place.y);
+    }
     /* What was told against the zero before. */
     own->load_mN = own->told_x_mN = own->told_y_mN = 0;
     own->shifts = false;
@@ -210,13 +266,7 @@ void grip_guess_anew(struct grip *grip) {
     if (own->guesses_load && own->has_pulled) {
       guess_from(grip, own);
     } else if (own->guesses_load) {
-      int32_t x_um = own->touch.x_um - own->place.x, y_um = own->touch.y_um - own->place.y;
-      int32_t shift_um = length_of(x_um, y_um);
-      int32_t most_um = grip_scale(grip->settings.shift_um, GUESSED_AFTER_PERMILLE, 1000);
-      if (shift_um > most_um) {
-        own->place.x = own->touch.x_um - grip_scale(x_um, most_um, shift_um);
-        own->place.y = own->touch.y_um - grip_scale(y_um, most_um, shift_um);
-      }
+      limit_guess(grip, own, GUESSED_AFTER_PERMILLE);
     }
   }
 }
@@ -246,10 +296,29 @@ static bool slides(const struct grip_finger *own) {
                                              : (own->touch.flags & CONTACT_FLAG_SLIP) != 0;
 }
 
+static uint32_t squared(int32_t value) {
+  value = grip_clamp(value, -SPEED_MAX_um_s, SPEED_MAX_um_s);
+  return (uint32_t)(value * value);
+}
+
+/* How fast what is told to slide does so. */
+static void look_at_speed(const struct grip_finger *own, struct grip_view *view, bool *lasts) {
+  const struct grip_touch *touch = &own->touch;
+  if (!own->tells_load) {
+    *lasts = *lasts || slides(own);
+  } else if (touch->flags & CONTACT_FLAG_VELOCITY_VALID) {
+    uint32_t speed2 = squared(touch->vx_um_s) + squared(touch->vy_um_s);
+    view->creeps = view->creeps || speed2 < CREEPS_um_s * CREEPS_um_s;
+    view->runs = view->runs || (slides(own) && speed2 >= RUNS_um_s * RUNS_um_s);
+  }
+  *lasts = *lasts || touch->t_us - own->still_us >= CREEPS_us;
+}
+
 void grip_look(struct grip *grip, struct grip_view *view) {
   *view = (struct grip_view){.low_mN = INT32_MAX, .t_us = UINT64_MAX};
   int32_t loads = 0, load_sum_mN = 0, load_most_mN = 0;
   int32_t force_sum_mN = 0;
+  bool lasts = false;
   for (int i = 0; i < GRIP_FINGERS; i++) {
     struct grip_finger *own = &grip->finger[i];
     bool stale = !own->is_heard || grip->now_us > own->touch.t_us + grip->settings.stale_us;
@@ -273,6 +342,7 @@ void grip_look(struct grip *grip, struct grip_view *view) {
     }
     if (contact) {
       view->slides = view->slides || slides(own);
+      look_at_speed(own, view, &lasts);
       view->may_tell = view->may_tell || own->guesses_load || told_lately(own);
       bool guesses = own->guesses_load && own->has_place;
       if (own->tells_load && !view->tells_load) {
@@ -294,6 +364,7 @@ void grip_look(struct grip *grip, struct grip_view *view) {
       view->t_us = own->told_us < view->t_us ? own->told_us : view->t_us;
     }
   }
+  view->creeps = view->creeps && view->slides && !lasts;
   if (view->fingers == 0) {
     view->low_mN = 0;
     view->t_us = grip->now_us;

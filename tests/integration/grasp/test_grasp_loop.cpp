@@ -38,8 +38,8 @@ protected:
     EXPECT_EQ(met[0].packet.body.info.serial[0], 'A');
     EXPECT_EQ(met[1].packet.body.info.serial[0], 'B');
     auto gripper = open()();
-    const grip_settings settings = settings_for(gripper->traits(), patient());
-    loop_->begin(std::move(gripper), open(), settings);
+    settings_ = settings_for(gripper->traits(), patient());
+    loop_->begin(std::move(gripper), open(), settings_);
   }
   /* Takes news until it is so. */
   bool until(const std::function<bool(const GraspNews &)> &is_so) {
@@ -95,6 +95,7 @@ protected:
   test::SoftFingertip left_{folder_ / "left", "AAAA", 200, [this] { return feel(); }};
   test::SoftFingertip right_{folder_ / "right", "BBBB", 200, [this] { return feel(); }};
   std::unique_ptr<GraspLoop> loop_;
+  grip_settings settings_{};
   GraspNews last_{Kind::step};
   float highest_N_ = 0;
   int steps_ = 0, frames_ = 0;
@@ -110,14 +111,18 @@ TEST_F(GraspLoopTest, NothingMovesBeforeItIsRequestedThenTheObjectIsHeldAsItsLoa
   ASSERT_TRUE(grasp());
   const auto force_N = [this] { return feel().force_N; };
   until([&](const GraspNews &) { return std::abs(force_N() - 1.5f) < 0.3f; });
-  load_N_ = 1.0f; /* margin 1.3 over friction 0.4: 3.25 N, or more where friction is not known */
-  until([&](const GraspNews &news) { return force_N() > 3.0f && news.report.load_mN > 900; });
-  EXPECT_LT(force_N(), 4.5f);
+  load_N_ = 1.0f;
+  const float needed_N = static_cast<float>(settings_.margin_permille) /
+                         static_cast<float>(settings_.friction_permille);
+  until([&](const GraspNews &news) {
+    return force_N() > 0.95f * needed_N && news.report.load_mN > 900;
+  });
+  EXPECT_LT(force_N(), 2.0f * needed_N);
   EXPECT_EQ(state_->activations, 0);
   end();
   EXPECT_EQ(last_.report.state, GRIP_STILL);
   EXPECT_EQ(last_.command.motion, GRIP_STAY);
-  EXPECT_GT(feel().force_N, 2.5f) << "opened at its end";
+  EXPECT_GT(feel().force_N, 0.9f * needed_N) << "opened at its end";
   EXPECT_LT(highest_N_, 10.0f);
 }
 

@@ -8,12 +8,10 @@ import re
 import shutil
 import subprocess
 import sys
-import tempfile
-import time
 import unittest
 
-FINGERTIP, FAKE_DEVICE = (os.path.abspath(path) for path in sys.argv[1:3])
-PATIENCE_s = 30
+from cli_case import FINGERTIP, PATIENCE_s, CliTest
+
 LINE = re.compile(r"(ok|warn|bad) +([a-z]+)  (.+)")
 
 
@@ -21,28 +19,21 @@ def tool_version():
     return subprocess.run([FINGERTIP, "--version"], capture_output=True, text=True, check=True).stdout.split()[1]
 
 
-class DoctorTest(unittest.TestCase):
+class DoctorTest(CliTest):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
-        self.addCleanup(folder.cleanup)
-        self.folder = folder.name
-        self.port = os.path.join(self.folder, "tty")
+        super().setUp()
         rules = pathlib.Path(self.folder, "etc/udev/rules.d")
         rules.mkdir(parents=True)
         self.rule = rules / "60-fingertip.rules"
         self.rule.write_text(subprocess.run([FINGERTIP, "rule"], capture_output=True, text=True, check=True).stdout)
         for shared in ("dev", "proc", "sys"):
             os.symlink(f"/{shared}", os.path.join(self.folder, shared))
-        self.environment = {k: v for k, v in os.environ.items() if k not in ("FINGERTIP_PORT", "NO_COLOR", "TERM")}
+        for name in ("NO_COLOR", "TERM"):
+            self.environment.pop(name, None)
 
     def plug_in(self, *options):
-        process = subprocess.Popen([FAKE_DEVICE, self.port, *options])
-        self.addCleanup(process.wait)
-        self.addCleanup(process.kill)
-        end_s = time.monotonic() + PATIENCE_s
-        while not os.path.lexists(self.port):
-            self.assertLess(time.monotonic(), end_s)
-            time.sleep(0.01)
+        """Until the test ends."""
+        self.enterContext(self.device(*options))
 
     def examine(self, *arguments, tool=FINGERTIP, **options):
         return subprocess.run([tool, "doctor", "--port", self.port, "--seconds", "1", "--root", self.folder, *arguments],

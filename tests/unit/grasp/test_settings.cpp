@@ -110,7 +110,7 @@ TEST(GraspSettings, DefaultsGiveWayButWishesDoNot) {
 
 TEST(GraspSettings, ARecordingTellsThemAll) {
   const Metadata head =
-      settings_metadata(settings_for(any(), {{"fixed", 4}, {"travel-cap", 7.5}, {"margin", 1.4}}));
+      settings_metadata(settings_for(any(), {{"fixed", 4}, {"travel-cap", 7.5}, {"margin", 1.4}, {"slid", 1.5}}));
   const auto has = [&](const std::string &key, const std::string &value) {
     return std::find(head.begin(), head.end(), std::pair(key, value)) != head.end();
   };
@@ -118,5 +118,6 @@ TEST(GraspSettings, ARecordingTellsThemAll) {
   EXPECT_TRUE(has("grasp_fixed", "4 N"));
   EXPECT_TRUE(has("grasp_travel_cap", "7.5 mm"));
   EXPECT_TRUE(has("grasp_margin", "1.4"));
+  EXPECT_TRUE(has("grasp_slid", "1.5"));
   EXPECT_EQ(head.size(), grasp_settings().size() + 1);
 }

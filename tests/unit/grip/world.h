@@ -20,6 +20,9 @@ struct world {
   int32_t load_mN;  /* of each fingertip */
   int32_t sigma_um; /* of the contact, as fitted */
   int32_t place_um; /* and its location, unless it is corrected for the load */
+  double gave_um;   /* by which the rubber has given way, which stays as the force grows */
+  int32_t gave_mN;  /* under this load */
+  int32_t speed_um_s[GRIP_FINGERS]; /* of the contact, with VELOCITY_VALID */
   uint32_t add_flags[GRIP_FINGERS], drop_flags[GRIP_FINGERS];
   double gain[GRIP_FINGERS];
   bool is_mute[GRIP_FINGERS], is_frozen[GRIP_FINGERS];
