@@ -28,7 +28,7 @@
  * more they are slides however the load over force falls. */
 #define CREEPS_um_s 4000u
 #define CREEPS_us 150000u
-#define RUNS_um_s 40000u
+#define RUNS_um_s 20000u
 #define SPEED_MAX_um_s 46340 /* squares of two fit 32 bits */
 
 /* A force with a larger standard deviation is no measurement. */

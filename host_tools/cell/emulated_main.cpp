@@ -27,7 +27,7 @@ enum Stream : std::uint64_t { PAD = 842 };
 struct Options {
   std::string gripper = "2f85", cache;
   std::uint64_t seed = 1;
-  double slice_us = 500.0, friction = 0.6, friction_falls = 0.5;
+  double slice_us = 500.0, friction = 0.65, friction_falls = 0.4;
 };
 
 // Lifted, and then friction falls so far, within 30 ms, that the grip does not hold it.

@@ -25,7 +25,7 @@ from fingertip.files import InputError, run_tool  # noqa: E402
 from goals import judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
 
-SEED = 4001  # seen by no choice of a constant
+SEED = 5001  # seen by no choice of a constant
 GRIPPERS = {"2f85": "2f85", "sts3215": "servo", "ideal": "ideal"}  # and what the figures call it
 # Of three grippers: 0.374 mm and 25 ms, 0.153 mm and 8 ms, 0.01 mm and 3 ms.
 LIMITS = {

@@ -168,7 +168,7 @@ static void told_to_slide_at(int32_t one_um_s, int32_t other_um_s, uint32_t ms) 
 }
 
 static void what_settles_is_held_a_little_harder_and_teaches_nothing(void) {
-  static const int32_t others_um_s[] = {3000, 20000};
+  static const int32_t others_um_s[] = {3000, 10000};
   for (size_t i = 0; i < sizeof others_um_s / sizeof *others_um_s; i++) {
     setUp();
     grasp();
@@ -199,9 +199,9 @@ static void what_runs_slides_whatever_its_load_over_force(void) {
   world_run(&world, 100);
   world.load_mN = 1200;
   world_run(&world, 10);
-  told_to_slide_at(20000, 20000, 10);
+  told_to_slide_at(10000, 10000, 10);
   TEST_ASSERT_EQUAL(0, world.report.slides);
-  told_to_slide_at(20000, 60000, 10); /* of the one that is told to slide */
+  told_to_slide_at(10000, 60000, 10); /* of the one that is told to slide */
   TEST_ASSERT_EQUAL(0, world.report.slides);
   double before_mN = world.force_mN;
   told_to_slide_at(60000, 60000, 10);
@@ -228,9 +228,9 @@ static void does_not_loosen_what_is_told_to_slide(void) {
   world_run(&world, 100);
   world.load_mN = 500;
   world_run(&world, 5);
-  told_to_slide_at(20000, 20000, 5);
+  told_to_slide_at(10000, 10000, 5);
   double before_mN = world.force_mN;
-  told_to_slide_at(20000, 20000, 40);
+  told_to_slide_at(10000, 10000, 40);
   TEST_ASSERT_EQUAL(0, world.report.slides);
   assert_within(0.02, before_mN, world.force_mN);
 }
