@@ -92,6 +92,11 @@ static void touch(struct fuzz_input *input) {
     touch.sigma_um = some_value(input);
     touch.q_sd_mN = some_value(input);
   }
+  if (how & 16) {
+    touch.vx_um_s = some_value(input);
+    touch.vy_um_s = some_value(input);
+    touch.flags |= CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_SLIDING;
+  }
   if (how & 8) { /* late, or by another clock */
     touch.t_us += (uint64_t)(int64_t)(int32_t)fuzz_u32(input);
   }

@@ -68,6 +68,9 @@ static struct grip_touch feel(uint64_t t_us, int32_t force_mN, int32_t load_mN, 
   touch.y_um = draw_between(-100, 100);
   touch.qx_mN = load_mN + draw_between(-30, 30);
   touch.qy_mN = draw_between(-30, 30);
+  touch.flags |= ONE_IN(4) ? 0 : CONTACT_FLAG_VELOCITY_VALID;
+  touch.vx_um_s = draw_between(-2000, 2000) * draw_between(1, slides ? 20 : 3);
+  touch.vy_um_s = draw_between(-2000, 2000);
   return touch;
 }
 
