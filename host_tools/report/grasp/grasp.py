@@ -118,6 +118,8 @@ def measure(options):
                 found[f"{figure}_{called}"] = row[key]
             if name == "minute":
                 found["limit_cycles"] = found.get("limit_cycles", 0) + row["limit_cycles"]
+            if name == "still":
+                found.setdefault("by_set", []).extend({"gripper": gripper, "set_force": key, **value} for key, value in all_of_it["by_set"].items())
             if name == "hold":
                 each = all_of_it["each"]
                 for group in ("by_object", "by_friction", "by_mass", "by_disturbance"):

@@ -15,7 +15,7 @@ COLUMNS = {"gripper": "gripper", "about": "what", "object": "object", "friction"
            "force_told_p50": "force told over true", "force_taken_p50": "taken for over true", "slips": "slips", "unanswered": "never answered", "reaction_p50_ms": "slip to 5 % more grip, ms: p50", "reaction_p95_ms": "p95 ",
            "reaction_after_lift_p50_ms": "after the lift: p50", "slid_p95_mm": "slid, mm: p95", "disturbance_slip_p95_mm": "by disturbances: p95",
            "peak_p95_N": "largest grip, N: p95"}
-STILL = {"gripper": "gripper", "about": "what", "grasps": "grasps", "settle_p50_s": "settles within, s: p50", "settle_p95_s": "p95",
+STILL = {"gripper": "gripper", "about": "what", "set_force": "set force", "grasps": "grasps", "settle_p50_s": "settles within, s: p50", "settle_p95_s": "p95",
          "never_settled_percent": "never, %", "rms_p50_percent": "rms error, %: p50",
          "rms_of_steps_p50_percent": "of it by rounding to the gripper's steps", "limit_cycles": "limit cycles"}
 ABOUT = """Written by `sh cmake/bootstrap.sh report`. Simulated rubber, objects, sensors and grippers; the controller and the fingertips' code are the
@@ -41,6 +41,8 @@ def write(found, path):
     still = [row for row in found["rows"] if "settle_p50_s" in row]
     lines = ["# Grasps", "", *ABOUT.split("\n"), "", "![Drops, grip, reaction, a slip that is caught](grasp.png)", "", *goal_table_md(found), "",
              "## By gripper, mode and rate", "", *rows_md(moving, COLUMNS), "", "## Set forces", "", *rows_md(still, STILL), ""]
+    if "by_set" in found:
+        lines += ["Of those held for 12 s, by the set force:", "", *rows_md(found["by_set"], STILL), ""]
     for name, title in PARTS.items():
         if name in found:
             lines += [f"## {title}", "", "Round objects, 410 frames a second.", "", *rows_md(found[name], COLUMNS), ""]

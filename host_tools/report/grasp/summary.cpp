@@ -33,8 +33,8 @@ ordered_json percent(std::size_t part, std::size_t whole) {
 
 ordered_json summary(const std::vector<const Done *> &all, bool still) {
   std::size_t drops = 0, never = 0, unanswered = 0, cycles = 0, unsettled = 0;
-  std::vector<double> margin, told, taken, reaction_ms, later_ms, slid_mm, disturbed_mm, peak_N, holding_s,
-      settle_s, rms, rms_of_steps;
+  std::vector<double> margin, told, taken, reaction_ms, later_ms, slid_mm, disturbed_mm, peak_N,
+      holding_s, settle_s, rms, rms_of_steps;
   for (const Done *one : all) {
     const Outcome &o = one->outcome;
     drops += o.dropped ? 1 : 0;
@@ -113,6 +113,10 @@ std::string mass_band(double mass_kg) {
   return mass_kg < 0.2 ? "0.1 to 0.2 kg" : mass_kg < 0.45 ? "0.2 to 0.45 kg" : "0.45 to 1 kg";
 }
 
+std::string set_band(double set_N) {
+  return set_N < 4.0 ? "below 4 N" : set_N < 8.0 ? "4 to 8 N" : "8 N and more";
+}
+
 ordered_json by(const std::vector<Done> &done, bool still,
                 const std::function<std::vector<std::string>(const Done &)> &names) {
   std::map<std::string, std::vector<const Done *>> groups;
@@ -138,7 +142,10 @@ ordered_json summary_of(const std::vector<Done> &done, bool still) {
   ordered_json out = summary(all, still);
   out["by_object"] =
       by(done, still, [](const Done &one) { return std::vector<std::string>{one.scene.face}; });
-  if (!still) {
+  if (still) {
+    out["by_set"] = by(
+        done, still, [](const Done &one) { return std::vector<std::string>{set_band(one.set_N)}; });
+  } else {
     out["by_friction"] = by(done, still, [](const Done &one) {
       return std::vector<std::string>{friction_band(one.scene.object.friction)};
     });
@@ -217,7 +224,8 @@ ordered_json trace_of(const Set &set, std::uint64_t n) {
     add("state", m.state);
     add("trouble", m.trouble);
   });
-  ordered_json out = line_of(n, {set.trial(n).scene, outcome});
+  const Trial trial = set.trial(n);
+  ordered_json out = line_of(n, {trial.scene, trial.set_N, outcome});
   out["series"] = series;
   return out;
 }

@@ -7,8 +7,8 @@
 
 namespace fingertip::grasp {
 
-// Of all, then by object and, unless they were still, by friction, mass and disturbance. null:
-// nothing to take a quantile of, or it is never.
+// Of all, then by object; if they were still, by the set force, else by friction, mass and
+// disturbance. null: nothing to take a quantile of, or it is never.
 nlohmann::ordered_json summary_of(const std::vector<Done> &done, bool still);
 nlohmann::ordered_json line_of(std::uint64_t n, const Done &one);
 // With all that is known of it over time.

@@ -177,7 +177,8 @@ std::vector<Done> run_all(const Set &set, std::uint64_t first, std::uint64_t cou
                           std::uint64_t jobs) {
   std::vector<Done> done(count);
   const auto one = [&](std::size_t i) {
-    done[i] = {set.trial(first + i).scene, set.run(first + i)};
+    const Trial trial = set.trial(first + i);
+    done[i] = {trial.scene, trial.set_N, set.run(first + i)};
   };
   twin::in_parallel(count, one, jobs);
   return done;

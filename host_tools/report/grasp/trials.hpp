@@ -49,6 +49,7 @@ private:
 
 struct Done {
   cell::Scene scene;
+  double set_N = 0.0; // of a still grasp
   cell::Outcome outcome;
 };
 

@@ -26,7 +26,7 @@ if "--trace" in options:
     times = [i * 0.002 for i in range(1000)]
     row = {**grasp, "series": {"t_s": times, "lift_s": [t - 0.3 for t in times], **{name: [1.0] * 1000 for name in names}}}
 else:
-    row |= {"by_object": group, "by_friction": group, "by_mass": group, "by_disturbance": group, "prepared_s": 1.0, "ran_s": 1.0}
+    row |= {"by_object": group, "by_friction": group, "by_mass": group, "by_disturbance": group, "by_set": {"4 to 8 N": dict(row)}, "prepared_s": 1.0, "ran_s": 1.0}
     if "--each" in sys.argv:
         row["each"] = [grasp, {**grasp, "n": 8, "dropped": True, "slips": [{"begin_s": 1.0, "way_mm": 21.0, "reaction_ms": None}]}]
 print(json.dumps(row))
@@ -74,6 +74,8 @@ class Grasp(unittest.TestCase):
         self.assertTrue(found["simulated"])
         grasps = {(row["set"], row["gripper"]): row["grasps"] for row in found["rows"]}
         self.assertEqual((len(grasps), grasps["hold", "2f85"], grasps["hold_20", "ideal"]), (39, 150, 40))
+        self.assertEqual([(row["gripper"], row["set_force"]) for row in found["by_set"]], [(name, "4 to 8 N") for name in ("2f85", "sts3215", "ideal")])
+        self.assertIn("by the set force", (self.out / "grasp.md").read_text())
         self.assertEqual(found["caught"]["n"], 7)
         self.assertIsNone(met["emulated_reaction_ms"])
         self.assertEqual((found["cups_crushed"], met["cups_crushed"], met["faults_beyond_cap"]), (1, False, True))

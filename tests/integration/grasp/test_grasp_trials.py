@@ -45,6 +45,7 @@ class GraspTrials(unittest.TestCase):
         found = trials("--mode", "still", "--still", "6", "--count", "4", "--gripper", "ideal")
         self.assertEqual(found["grasps"], 4)
         self.assertIn("settle_p50_s", found)
+        self.assertEqual(sum(row["grasps"] for row in found["by_set"].values()), 4)
         self.assertNotIn("drops_percent", found)
 
     def test_a_trace_has_a_value_for_each_moment(self):
