@@ -5,8 +5,22 @@
 #define ERROR_MAX_mN 100000
 #define INTEGRAL_MAX_mN_us INT64_C(400000000000000)
 
+/* An error that no move mends is neither added up nor answered: it would make the gripper go to and
+ * fro. Rubber that has settled yields more force to opening than to closing. */
+#define CLOSES_PERMILLE 625 /* of what the least move makes */
+#define OPENS_PERMILLE 1000
+
 void grip_fixed_begin(struct grip *grip) {
   grip->pid = (struct grip_pid){0};
+}
+
+static bool is_mended(const struct grip *grip, const struct grip_view *view, int32_t error_mN) {
+  int32_t step_um = grip->traits.step_um, deadband_um = grip->traits.deadband_um;
+  int32_t steps = deadband_um > step_um ? port_divide(deadband_um + step_um - 1, step_um) : 1;
+  int32_t stiffness = grip_stiffness(grip, view->mean_mN, grip->target_um);
+  int32_t move_mN = grip_scale(stiffness, steps * step_um, 1000);
+  return error_mN > grip_scale(move_mN, CLOSES_PERMILLE, 1000) ||
+         error_mN < -grip_scale(move_mN, OPENS_PERMILLE, 1000);
 }
 
 uint32_t grip_fixed_step(struct grip *grip, const struct grip_view *view) {
@@ -20,17 +34,13 @@ uint32_t grip_fixed_step(struct grip *grip, const struct grip_view *view) {
   /* Eq. (5); of one fingertip where the other says nothing. */
   int32_t error_mN = grip_clamp(settings->set_mN - view->mean_mN, -ERROR_MAX_mN, ERROR_MAX_mN);
   int64_t proportional = (int64_t)settings->gains.kp_um_per_N * error_mN;
+  bool mends = is_mended(grip, view, error_mN);
   int64_t derivative = 0, integral_mN_us = pid->integral_mN_us;
   if (pid->runs) {
     int64_t step_us = (int64_t)(grip->now_us - pid->t_us);
     derivative =
         (int64_t)settings->gains.kd_um_s_per_N * (error_mN - pid->error_mN) * 1000000 / step_us;
-    /* An error that no step mends is not added up: it would make the gripper go to and fro. */
-    int32_t stiffness = grip_stiffness(grip, view->mean_mN, grip->target_um);
-    int32_t step_mN = grip_scale(stiffness, grip->traits.step_um, 1000);
-    if (error_mN > step_mN * 5 / 8 || error_mN < -step_mN * 5 / 8) {
-      integral_mN_us += error_mN * step_us;
-    }
+    integral_mN_us += mends ? error_mN * step_us : 0;
   }
   integral_mN_us = integral_mN_us > INTEGRAL_MAX_mN_us    ? INTEGRAL_MAX_mN_us
                    : integral_mN_us < -INTEGRAL_MAX_mN_us ? -INTEGRAL_MAX_mN_us
@@ -44,7 +54,7 @@ uint32_t grip_fixed_step(struct grip *grip, const struct grip_view *view) {
   int32_t off_um = aimed_um - grip->target_um;
   int32_t steps =
       port_divide(off_um + (off_um < 0 ? -1 : 1) * grip->traits.step_um / 2, grip->traits.step_um);
-  int32_t next_um = grip->target_um + steps * grip->traits.step_um;
+  int32_t next_um = grip->target_um + (mends ? steps * grip->traits.step_um : 0);
   if (steps < 0 && view->high_mN >= settings->force_cap_mN) {
     trouble |= GRIP_AT_CAP;
     next_um = grip->target_um;

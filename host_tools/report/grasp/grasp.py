@@ -116,7 +116,7 @@ def measure(options):
             steps.say(f"{gripper}, {about}: {row['grasps']} grasps")
             for figure, key in FROM.get(name, ()):
                 found[f"{figure}_{called}"] = row[key]
-            if name == "minute":
+            if name in ("minute", "still_fixed"):
                 found["limit_cycles"] = found.get("limit_cycles", 0) + row["limit_cycles"]
             if name == "still":
                 found.setdefault("by_set", []).extend({"gripper": gripper, "set_force": key, **value} for key, value in all_of_it["by_set"].items())

@@ -70,7 +70,7 @@ class Grasp(unittest.TestCase):
             self.assertIs(met[name], True, name)
         for name in ("drops_percent_ideal", "margin_median_ideal", "reaction_ms_servo", "settle_s_servo", "drops_without_load_percent_servo", "limit_cycles"):
             self.assertIs(met[name], False, name)
-        self.assertEqual(found["limit_cycles"], 3)
+        self.assertEqual(found["limit_cycles"], 6)
         self.assertTrue(found["simulated"])
         grasps = {(row["set"], row["gripper"]): row["grasps"] for row in found["rows"]}
         self.assertEqual((len(grasps), grasps["hold", "2f85"], grasps["hold_20", "ideal"]), (39, 150, 40))

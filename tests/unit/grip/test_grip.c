@@ -613,6 +613,32 @@ static void fixed_does_not_hunt_on_coarse_steps(void) {
   }
 }
 
+/* Nor where the force is noisy, on rubber that has settled: opening makes more than closing. */
+static void fixed_does_not_hunt_on_noise(void) {
+  static const int32_t steps_um[] = {374, 153};
+  for (size_t i = 0; i < sizeof steps_um / sizeof *steps_um; i++) {
+    struct random random = {20221015};
+    setUp();
+    settings.mode = GRIP_MODE_FIXED;
+    world.traits.step_um = steps_um[i];
+    world.traits.deadband_um = steps_um[i] + 20;
+    world.traits.latency_us = 25000;
+    world_set(&world, &settings);
+    grasp();
+    int turns = 0, way = 0;
+    double before_um = world.sent_um;
+    for (int ms = 0; ms < 20000; ms++) {
+      world.gain[0] = 0.97 + 1e-5 * random_below(&random, 6000);
+      world_run(&world, 1);
+      int moved = (world.sent_um > before_um) - (world.sent_um < before_um);
+      turns += moved != 0 && moved == -way;
+      way = moved != 0 ? moved : way;
+      before_um = world.sent_um;
+    }
+    TEST_ASSERT_LESS_OR_EQUAL(1, turns);
+  }
+}
+
 static void hold_moves_by_what_a_gripper_moves(void) {
   world.traits.step_um = 374;
   world.traits.deadband_um = 400;
@@ -749,6 +775,7 @@ int main(void) {
   RUN_TEST(fixed_is_a_pid_of_the_mean_force);
   RUN_TEST(fixed_holds_its_force);
   RUN_TEST(fixed_does_not_hunt_on_coarse_steps);
+  RUN_TEST(fixed_does_not_hunt_on_noise);
   RUN_TEST(hold_moves_by_what_a_gripper_moves);
   RUN_TEST(a_coarse_gripper_only_opens_while_the_load_falls);
   RUN_TEST(refuses_what_is_out_of_range);
