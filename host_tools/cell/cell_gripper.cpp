@@ -1,15 +1,13 @@
-// fingertip_cell_gripper: serves a simulated gripper on a pseudo-terminal, in real time.
+// fingertip_cell_gripper: serves a simulated gripper on a port of its own, in real time.
 #include "cell/gripper_server.hpp"
 #include "tool/advice.hpp"
 
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdio>
-#include <filesystem>
 #include <string>
 
 using namespace fingertip;
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -21,7 +19,6 @@ struct Options {
   double late_ms = 0, latency_timer_ms = 0;
   double object_mm = 0, stiffness_N_mm = 10;
   int fault = 0;
-  std::string link;
 };
 
 int serve(const Options &options) {
@@ -35,22 +32,10 @@ int serve(const Options &options) {
   GripperServer server(motion, options.server);
   server.trouble(options.trouble);
   server.fail(static_cast<std::uint8_t>(options.fault));
-  if (!options.link.empty()) {
-    std::error_code error;
-    fs::remove(options.link, error);
-    fs::create_symlink(server.port(), options.link, error);
-    if (error) {
-      throw Error(ErrorCode::cannot_write, options.link + ": " + error.message());
-    }
-  }
   std::printf("%s\n", server.port().c_str());
   std::fflush(stdout);
   while (!interrupted) {
     server.step(std::chrono::milliseconds(100));
-  }
-  if (!options.link.empty()) {
-    std::error_code none;
-    fs::remove(options.link, none);
   }
   return 0;
 }
@@ -76,7 +61,7 @@ int main(int argc, char **argv) {
       ->check(CLI::IsMember(models));
   app.add_option("--slave", options.server.slave, "Its address on the line; else the usual")
       ->check(CLI::Range(1, 253));
-  app.add_option("--link", options.link, "A name for the port, as long as it is served")
+  app.add_option("--link", options.server.link, "A name for the port, as long as it is served")
       ->type_name("PATH");
   app.add_option("--object", options.object_mm, "An object of this width lies between its fingers")
       ->type_name("MM")

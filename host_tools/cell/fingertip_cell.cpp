@@ -7,6 +7,7 @@
 #include "cell/fingertip_cell_finger.hpp"
 #include "cell/fingertip_cell_world.hpp"
 #include "cell/gripper_server.hpp"
+#include "libfingertip/clock.hpp"
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/random.hpp"
 #include "libfingertip/session.hpp"
@@ -27,7 +28,6 @@
 #include <sstream>
 #include <sys/mman.h>
 #include <sys/wait.h>
-#include <thread>
 #include <unistd.h>
 
 using namespace fingertip;
@@ -99,11 +99,8 @@ public:
   }
   std::int64_t reached_us(std::size_t finger) const { return shared_[finger].reached_us; }
   bool is_there(std::size_t finger) const { return process_[finger] > 0; }
-  bool is_frozen(std::size_t finger) const { return frozen_[finger]; }
-  void freeze(std::size_t finger, bool frozen) {
-    frozen_[finger] = frozen;
-    kill(process_[finger], frozen ? SIGSTOP : SIGCONT);
-  }
+  bool is_frozen(std::size_t finger) const { return shared_[finger].frozen; }
+  void freeze(std::size_t finger, bool frozen) { shared_[finger].frozen = frozen; }
   void end(std::size_t finger) {
     if (is_there(finger)) {
       kill(process_[finger], SIGKILL);
@@ -131,31 +128,7 @@ private:
 
   std::array<std::string, FINGERS> links_;
   std::array<pid_t, FINGERS> process_{};
-  std::array<bool, FINGERS> frozen_{};
   SharedPressures *shared_ = nullptr;
-};
-
-class Link {
-public:
-  Link(std::string path, const std::string &port) : path_(std::move(path)) {
-    std::error_code error;
-    if (fs::is_symlink(path_, error)) {
-      fs::remove(path_, error);
-    }
-    fs::create_symlink(port, path_, error);
-    if (error) {
-      throw Error(ErrorCode::cannot_write, path_ + ": " + error.message());
-    }
-  }
-  ~Link() {
-    std::error_code none;
-    fs::remove(path_, none);
-  }
-  Link(const Link &) = delete;
-  Link &operator=(const Link &) = delete;
-
-private:
-  std::string path_;
 };
 
 // The truth as a CSV file with comments.
@@ -213,7 +186,7 @@ public:
   std::vector<std::string> take() {
     pollfd input = {STDIN_FILENO, POLLIN, 0};
     const bool is_ours = !isatty(STDIN_FILENO) || tcgetpgrp(STDIN_FILENO) == getpgrp();
-    if (ended_ || !is_ours || poll(&input, 1, 0) <= 0) {
+    if (ended_ || !is_ours || wait_for(&input, 1, HostTime()) <= 0) {
       return {};
     }
     char bytes[1024];
@@ -243,7 +216,7 @@ void stand_open(GripperServer &server, GripperMotion &motion, const std::string 
   constexpr double HURRY_s = 0.02; // in a round: nobody waits for it
   std::atomic<bool> is_done{false}, is_open{false};
   std::string why;
-  std::thread client([&] {
+  Thread client([&] {
     for (int i = 0; i < TRIES && !is_open; i++) {
       try {
         GripperWay way;
@@ -284,7 +257,6 @@ public:
         motion_(GripperServer::mechanics(options.model)), server_(motion_, server_options()) {
     wait_for_fingers();
     stand_open(server_, motion_, options.model, options.world.object.width_mm + options.opens_mm);
-    link_.emplace(options.folder + "/gripper", server_.port());
     world_.emplace(options.world, face_, motion_);
     truth_.emplace(options, head());
   }
@@ -313,6 +285,7 @@ private:
     GripperServer::Options server;
     server.model = options_.model;
     server.real_time = false;
+    server.link = options_.folder + "/gripper";
     return server;
   }
 
@@ -336,7 +309,7 @@ private:
       if (interrupted) {
         throw Error("interrupted");
       }
-      poll(nullptr, 0, 10);
+      wait_until(host_now() + std::chrono::milliseconds(10));
     }
   }
 
@@ -481,7 +454,6 @@ private:
   Fingers fingers_; // processes, before there are threads
   GripperMotion motion_;
   GripperServer server_;
-  std::optional<Link> link_;
   std::optional<World> world_;
   std::optional<Truth> truth_;
   Lines lines_;

@@ -1,8 +1,10 @@
 #include "cell/fingertip_cell_finger.hpp"
 
+#include "libfingertip/clock.hpp"
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/random.hpp"
+#include "libfingertip/served_port.hpp"
 #include "libfingertip/session.hpp"
 #include "pad/profile.hpp"
 #include "player/native_fingertip.h"
@@ -19,12 +21,8 @@ extern "C" {
 #include <cstdlib>
 #include <cstring>
 #include <deque>
-#include <fcntl.h>
-#include <filesystem>
 #include <optional>
-#include <poll.h>
 #include <sys/prctl.h>
-#include <termios.h>
 #include <unistd.h>
 #include <vector>
 
@@ -36,20 +34,23 @@ enum Stream : std::uint64_t { CALIBRATION = 841 };
 constexpr double AIR_Pa = 101325.0;
 constexpr float FORCE_SCALE_SD = 0.02F; // told with a calibration by a weight
 constexpr std::uint64_t COMMAND_us = 100'000, SETTLED_us = 1'500'000;
-constexpr int ROUND_ms = 1;
+constexpr std::chrono::milliseconds ROUND{1};
 
 class Fingertip {
 public:
   Fingertip(const FingerProcess &finger, SharedPressures &pressures)
       : finger_(finger), pressures_(pressures),
-        pad_(pad::profile_over_own_sensors({finger.layer_mm, 0.0, false})) {
-    open_port();
+        pad_(pad::profile_over_own_sensors({finger.layer_mm, 0.0, false})), port_(finger.link) {
     power_up();
   }
 
   // Until this process ends, or the firmware does.
   void run() {
     for (;;) {
+      if (pressures_.frozen) {
+        wait_until(host_now() + ROUND);
+        continue;
+      }
       look_at_port();
       const std::int64_t known_us = pressures_.newest_us();
       while (!asked_.empty() && asked_.front().host_us <= known_us) {
@@ -71,40 +72,6 @@ private:
     std::int64_t host_us;
     std::vector<std::uint8_t> bytes;
   };
-
-  [[noreturn]] static void fail(const std::string &what) {
-    throw Error(ErrorCode::cannot_open, what + " (" + std::strerror(errno) + ")");
-  }
-
-  void open_port() {
-    char name[64];
-    master_ = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (master_ < 0 || grantpt(master_) != 0 || unlockpt(master_) != 0 ||
-        ptsname_r(master_, name, sizeof name) != 0) {
-      fail("no pseudo-terminal to be had");
-    }
-    port_ = name;
-    make_raw();
-    std::error_code error;
-    if (std::filesystem::is_symlink(finger_.link, error)) {
-      std::filesystem::remove(finger_.link, error);
-    }
-    if (symlink(name, finger_.link.c_str()) != 0) {
-      fail(finger_.link + ": cannot be made a link");
-    }
-  }
-
-  // And hangs up, which only a port that was open once tells.
-  void make_raw() {
-    const int slave = open(port_.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);
-    termios settings;
-    if (slave < 0 || tcgetattr(slave, &settings) != 0) {
-      fail(port_ + ": cannot be opened");
-    }
-    cfmakeraw(&settings);
-    tcsetattr(slave, TCSANOW, &settings);
-    close(slave);
-  }
 
   // With zero, calibration and pad, before anybody asks.
   void power_up() {
@@ -186,27 +153,20 @@ private:
   }
 
   void look_at_port() {
-    pollfd port = {master_, POLLIN, 0};
-    poll(&port, 1, ROUND_ms);
-    if (port.revents & POLLHUP) {
+    port_.wait(host_now() + ROUND);
+    if (port_.is_open() != is_open_) {
+      is_open_ = port_.is_open();
       if (is_open_) {
-        is_open_ = false;
+        native_cdc_open();
+      } else {
         native_cdc_stall(false);
         native_cdc_close();
         asked_.clear();
         left_.clear();
-        make_raw();
       }
-      poll(nullptr, 0, ROUND_ms);
-      return;
-    }
-    if (!is_open_) {
-      is_open_ = true;
-      native_cdc_open();
     }
     std::uint8_t bytes[NATIVE_CDC_RECEIVE_BYTES];
-    const ssize_t count = port.revents & POLLIN ? read(master_, bytes, sizeof bytes) : 0;
-    if (count > 0) {
+    if (const std::size_t count = port_.read(bytes, sizeof bytes)) {
       asked_.push_back({steady_now_us(), {bytes, bytes + count}});
     }
   }
@@ -223,8 +183,8 @@ private:
       if (left_.empty() || !is_open_) {
         return;
       }
-      const ssize_t taken = write(master_, left_.data(), left_.size());
-      left_.erase(left_.begin(), left_.begin() + std::max<ssize_t>(taken, 0));
+      const std::size_t taken = port_.write(left_.data(), left_.size());
+      left_.erase(left_.begin(), left_.begin() + static_cast<std::ptrdiff_t>(taken));
       if (!left_.empty()) {
         native_cdc_stall(true);
         return;
@@ -235,8 +195,7 @@ private:
   const FingerProcess &finger_;
   SharedPressures &pressures_;
   const pad_profile pad_;
-  int master_ = -1;
-  std::string port_;
+  ServedPort port_;
   bool is_open_ = false;
   std::deque<Asked> asked_;
   std::vector<std::uint8_t> left_; // of what the firmware has sent
@@ -293,6 +252,7 @@ pid_t start_finger(const FingerProcess &finger, SharedPressures &pressures) {
     throw Error(std::string("no process to be had for a fingertip (") + std::strerror(errno) + ")");
   }
   if (child > 0) {
+    clock_expects(child);
     return child;
   }
   prctl(PR_SET_PDEATHSIG, SIGKILL);

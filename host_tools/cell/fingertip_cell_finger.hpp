@@ -1,5 +1,5 @@
 // A fingertip of the cell in a process of its own: the whole firmware on simulated sensors
-// (player/native_fingertip.h), on a pseudo-terminal that opens and hangs up as a USB port does.
+// (player/native_fingertip.h), on a port that opens and hangs up as one on USB does.
 //
 // Its clock goes with the host's: it runs to where the world is known, so that frames come 1 to 2
 // ms later than they would, never too early. A reading is of the newest that is known, at most half
@@ -28,6 +28,8 @@ public:
 
   // The other way: up to where its fingertip has got; 0: it has not begun.
   std::atomic<std::int64_t> reached_us{0};
+  // It stands, as a process that is stopped.
+  std::atomic<bool> frozen{false};
 
 private:
   static constexpr std::uint64_t KEPT = 1024;

@@ -5,15 +5,9 @@
 #include "gripper/common.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <fcntl.h>
 #include <modbus.h>
-#include <poll.h>
 #include <sys/socket.h>
-#include <termios.h>
 #include <unistd.h>
 
 namespace fingertip {
@@ -231,36 +225,16 @@ GripperMechanics GripperServer::mechanics(const std::string &model) {
 }
 
 GripperServer::GripperServer(GripperMotion &motion, const Options &options)
-    : motion_(motion), real_time_(options.real_time), stepped_at_(Clock::now()) {
+    : motion_(motion), real_time_(options.real_time), port_(options.link),
+      stepped_at_(host_now()) {
   if (gripper_traits(options.model).model == "sts3215") {
     slave_ = std::make_unique<FeetechBus>(motion, options);
   } else {
     slave_ = std::make_unique<ModbusSlave>(motion, options);
   }
-  master_ = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-  char name[64];
-  termios settings;
-  if (master_ < 0 || grantpt(master_) != 0 || unlockpt(master_) != 0 ||
-      ptsname_r(master_, name, sizeof name) != 0 ||
-      // Open as long as the server is, so that a client that goes does not end it.
-      (held_open_ = open(name, O_RDWR | O_NOCTTY | O_CLOEXEC)) < 0 ||
-      tcgetattr(held_open_, &settings) != 0) {
-    const int error = errno;
-    if (master_ >= 0) {
-      close(master_);
-    }
-    throw Error(ErrorCode::cannot_open,
-                std::string("no pseudo-terminal to be had (") + std::strerror(error) + ")");
-  }
-  cfmakeraw(&settings);
-  tcsetattr(held_open_, TCSANOW, &settings);
-  port_ = name;
 }
 
-GripperServer::~GripperServer() {
-  close(held_open_);
-  close(master_);
-}
+GripperServer::~GripperServer() = default;
 
 void GripperServer::trouble(const LineTrouble &trouble) {
   trouble_ = trouble;
@@ -308,17 +282,17 @@ void GripperServer::take() {
       break;
     }
     const auto seconds = [](double time_s) {
-      return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(time_s));
+      return std::chrono::duration_cast<HostTime::duration>(std::chrono::duration<double>(time_s));
     };
     const std::size_t crossing = frame.size() + bytes.size();
-    Clock::time_point due =
+    HostTime due =
         came_at_ + seconds(static_cast<double>(crossing) * BITS_PER_BYTE / slave_->baud());
     if (has_fault) {
       due += seconds(trouble_.late_s);
     }
     if (trouble_.latency_timer_s > 0) {
-      const Clock::duration tick = seconds(trouble_.latency_timer_s);
-      due = Clock::time_point((due.time_since_epoch() / tick + 1) * tick);
+      const HostTime::duration tick = seconds(trouble_.latency_timer_s);
+      due = HostTime((due.time_since_epoch() / tick + 1) * tick);
     }
     if (has_fault && trouble_.answers > 0) {
       trouble_.answers--;
@@ -330,24 +304,21 @@ void GripperServer::take() {
 }
 
 void GripperServer::send_due() {
-  while (!answers_.empty() && answers_.front().due <= Clock::now()) {
+  while (!answers_.empty() && answers_.front().due <= host_now()) {
     const Bytes bytes = answers_.front().bytes;
     answers_.pop_front();
-    // A terminal that nobody reads fills up; what does not fit is lost, as on any line.
-    (void)!::write(master_, bytes.data(), bytes.size());
+    // A port that nobody reads fills up; what does not fit is lost, as on any line.
+    port_.write(bytes.data(), bytes.size());
   }
 }
 
 void GripperServer::step(std::chrono::microseconds longest_wait) {
-  Clock::time_point until = Clock::now() + longest_wait;
+  HostTime until = host_now() + longest_wait;
   if (!answers_.empty()) {
     until = std::min(until, answers_.front().due);
   }
-  const auto wait_ns = std::max(Clock::duration::zero(), until - Clock::now()).count();
-  const timespec wait = {wait_ns / 1'000'000'000, wait_ns % 1'000'000'000};
-  pollfd waiting = {master_, POLLIN, 0};
-  const bool something = ppoll(&waiting, 1, &wait, nullptr) > 0;
-  const Clock::time_point now = Clock::now();
+  port_.wait(until);
+  const HostTime now = host_now();
   if (real_time_) {
     const double late_s = std::chrono::duration<double>(now - stepped_at_).count();
     double passed_s =
@@ -360,14 +331,11 @@ void GripperServer::step(std::chrono::microseconds longest_wait) {
   if (!came_.empty() && now - came_at_ > FRAME_GAP) {
     came_.clear();
   }
-  if (something) {
-    std::uint8_t bytes[512];
-    const ssize_t count = ::read(master_, bytes, sizeof bytes);
-    if (count > 0) {
-      came_.insert(came_.end(), bytes, bytes + count);
-      came_at_ = now;
-      take();
-    }
+  std::uint8_t bytes[512];
+  if (const std::size_t count = port_.read(bytes, sizeof bytes)) {
+    came_.insert(came_.end(), bytes, bytes + count);
+    came_at_ = now;
+    take();
   }
   send_due();
 }

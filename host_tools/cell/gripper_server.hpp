@@ -1,4 +1,4 @@
-// A simulated gripper on a pseudo-terminal, with its own protocol: libmodbus as a slave for
+// A simulated gripper on a port of its own, with its own protocol: libmodbus as a slave for
 // Robotiq's, packets for Feetech's. What its line can suffer is part of it.
 //
 //   GripperMotion motion(GripperServer::mechanics("2f85"));
@@ -14,6 +14,7 @@
 
 #include "cell/gripper_motion.hpp"
 #include "gripper/gripper.hpp"
+#include "libfingertip/served_port.hpp"
 
 #include <chrono>
 #include <cstdint>
@@ -45,6 +46,7 @@ public:
   struct Options {
     std::string model = {};
     int slave = 0; // 0: the model's usual
+    std::string link = {}; // made to its port; "": none
     // Whether step moves the fingers on as real time passes; else whoever drives the motion does.
     bool real_time = true;
     std::vector<int> functions = {3, 4, 16, 23}; // of Modbus, that it answers
@@ -53,14 +55,14 @@ public:
   // gripper_mechanics for a motion behind registers, which are its steps.
   static GripperMechanics mechanics(const std::string &model);
 
-  // motion outlives it. Throws Error: an unknown model; no pseudo-terminal to be had.
+  // motion outlives it. Throws Error: an unknown model; no port to be had.
   GripperServer(GripperMotion &motion, const Options &options);
   // The port goes.
   ~GripperServer();
   GripperServer(const GripperServer &) = delete;
   GripperServer &operator=(const GripperServer &) = delete;
 
-  const std::string &port() const { return port_; }
+  const std::string &port() const { return port_.path(); }
 
   // Waits at most this long for something to do, and does it.
   void step(std::chrono::microseconds longest_wait);
@@ -69,7 +71,7 @@ public:
   // Without power it does not answer, and afterwards it is not active.
   void power(bool on);
   // When bytes last came.
-  std::chrono::steady_clock::time_point heard_at() const { return came_at_; }
+  HostTime heard_at() const { return came_at_; }
   // The gripper's own fault, by the maker's code.
   void fail(std::uint8_t fault);
 
@@ -77,9 +79,8 @@ public:
   class Slave;
 
 private:
-  using Clock = std::chrono::steady_clock;
   struct Answer {
-    Clock::time_point due;
+    HostTime due;
     std::vector<std::uint8_t> bytes;
   };
 
@@ -89,12 +90,11 @@ private:
   GripperMotion &motion_;
   bool real_time_;
   std::unique_ptr<Slave> slave_;
-  int master_ = -1, held_open_ = -1;
-  std::string port_;
+  ServedPort port_;
   LineTrouble trouble_;
   bool power_ = true;
   std::vector<std::uint8_t> came_;
-  Clock::time_point came_at_, stepped_at_;
+  HostTime came_at_{}, stepped_at_;
   std::deque<Answer> answers_;
 };
 

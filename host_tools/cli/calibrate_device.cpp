@@ -1,6 +1,7 @@
 #include "cli/calibrate_device.hpp"
 
 #include "cli/names_of_values.hpp"
+#include "libfingertip/clock.hpp"
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/packet_fields.hpp"
@@ -17,6 +18,7 @@ namespace {
 
 constexpr std::chrono::milliseconds DEVICE_POLL{20};
 constexpr std::int64_t PATIENCE_us = 5000000; /* without a frame */
+constexpr std::chrono::milliseconds ASKED_STOP{100}; /* until a stop is looked for */
 
 } // namespace
 
@@ -32,7 +34,7 @@ void ask(const CalibrateOptions &options, const std::string &question,
   std::fflush(stdout);
   char line[64] = "";
   pollfd waiting = {STDIN_FILENO, POLLIN, 0};
-  while (poll(&waiting, 1, 100) <= 0) {
+  while (wait_for(&waiting, 1, host_now() + ASKED_STOP) <= 0) {
     if (stop_requested()) {
       throw Interrupted();
     }

@@ -1,5 +1,7 @@
 #include "cli/calibrate_view.hpp"
 
+#include "libfingertip/clock.hpp"
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -12,7 +14,6 @@ namespace {
 
 using calibrating::GainSession;
 using calibrating::Judgement;
-using Clock = std::chrono::steady_clock;
 
 constexpr Colour INK = {222, 222, 228}, FAINT = {128, 130, 145}, RULE = {66, 68, 84};
 constexpr Colour GOOD = {92, 214, 140}, WARNING = {250, 190, 60}, ACCENT = {96, 190, 255};
@@ -126,7 +127,7 @@ class ScreenCalibrateView : public CalibrateView {
 public:
   explicit ScreenCalibrateView(ColourDepth depth) : screen_(depth) {}
   void update(const GainSession &session, bool news) override {
-    const auto now = Clock::now();
+    const auto now = host_now();
     if (news || now >= next_) {
       next_ = now + REDRAW;
       screen_.draw(draw(session, screen_.columns(), screen_.rows()));
@@ -136,7 +137,7 @@ public:
 
 private:
   Screen screen_;
-  Clock::time_point next_{};
+  HostTime next_{};
 };
 
 class LineCalibrateView : public CalibrateView {

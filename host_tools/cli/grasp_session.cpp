@@ -9,6 +9,7 @@
 #include "grasp/grip_row.hpp"
 #include "grasp/settings.hpp"
 #include "grasp/words.hpp"
+#include "libfingertip/clock.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/packet_fields.hpp"
@@ -337,7 +338,7 @@ private:
     for (std::size_t i = 0; i < FINGERS; i++) {
       models_[i].set_statistics(loop_.statistics(i));
     }
-    auto now = std::chrono::steady_clock::now();
+    auto now = host_now();
     if (now > said_until_) {
       said_.clear();
     }
@@ -377,7 +378,7 @@ private:
 
   void say(const std::string &text) {
     said_ = text;
-    said_until_ = std::chrono::steady_clock::now() + SAID_FOR;
+    said_until_ = host_now() + SAID_FOR;
   }
 
   int status_of_end() const {

@@ -1,5 +1,6 @@
 #include "cli/joint_progress.hpp"
 
+#include "libfingertip/clock.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/text.hpp"
 #include "tool/advice.hpp"
@@ -30,7 +31,7 @@ JointProgress::~JointProgress() {
 }
 
 void JointProgress::update(const std::vector<Model> &models, double seconds, double alignment_us) {
-  auto now = std::chrono::steady_clock::now();
+  auto now = host_now();
   if (now < next_) {
     return;
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "cli/model.hpp"
+#include "libfingertip/clock.hpp"
 
 #include <chrono>
 #include <vector>
@@ -16,7 +17,7 @@ public:
   void update(const std::vector<Model> &models, double seconds, double alignment_us);
 
 private:
-  std::chrono::steady_clock::time_point next_{};
+  HostTime next_{};
   bool shown_ = false;
 };
 

@@ -1,5 +1,6 @@
 #include "cli/keeper.hpp"
 
+#include "libfingertip/clock.hpp"
 #include "libfingertip/recording.hpp"
 
 #include <chrono>
@@ -120,7 +121,7 @@ private:
 } // namespace
 
 std::string utc_now() {
-  auto now = std::chrono::system_clock::now();
+  auto now = wall_now();
   std::time_t seconds = std::chrono::system_clock::to_time_t(now);
   auto ms =
       std::chrono::duration_cast<std::chrono::milliseconds>(now.time_since_epoch()).count() % 1000;

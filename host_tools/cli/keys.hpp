@@ -1,6 +1,8 @@
 /* What a person types, told from what else comes in from a terminal. */
 #pragma once
 
+#include "libfingertip/clock.hpp"
+
 #include <chrono>
 #include <cstddef>
 #include <deque>
@@ -9,7 +11,7 @@
 
 namespace fingertip {
 
-using KeyTime = std::chrono::steady_clock::time_point;
+using KeyTime = HostTime;
 
 /* A character, or one of these. */
 using Key = int;

@@ -5,6 +5,7 @@
 #include "cli/keys.hpp"
 #include "cli/names_of_values.hpp"
 #include "cli/view.hpp"
+#include "libfingertip/clock.hpp"
 #include "libfingertip/command.hpp"
 #include "libfingertip/device_loop.hpp"
 #include "libfingertip/names.hpp"
@@ -234,7 +235,7 @@ private:
       return;
     }
     view_->update(models_, caption());
-    auto now = std::chrono::steady_clock::now();
+    auto now = host_now();
     while (auto key = view_->key()) {
       take_key(*key, now);
       view_->hurry();
@@ -267,7 +268,7 @@ private:
 
   void say(const std::string &text) {
     said_ = text;
-    said_until_ = std::chrono::steady_clock::now() + SAID_FOR;
+    said_until_ = host_now() + SAID_FOR;
   }
 
   /* What the fingertips answered to a key: done is a tare once frames of all say so. */

@@ -2,6 +2,7 @@
 
 #include "cli/doubt.hpp"
 #include "cli/names_of_values.hpp"
+#include "libfingertip/clock.hpp"
 
 #include <algorithm>
 
@@ -39,7 +40,7 @@ void Model::take(const wire_packet &packet) {
 }
 
 void Model::take_frame(std::uint64_t t_us) {
-  last_arrival_ = std::chrono::steady_clock::now();
+  last_arrival_ = host_now();
   if (first_us_ && t_us == last_us_) {
     return; /* the other packet of the same frame */
   }
@@ -178,7 +179,7 @@ std::optional<double> Model::seconds_since_frame() const {
   if (!last_arrival_) {
     return std::nullopt;
   }
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - *last_arrival_).count();
+  return std::chrono::duration<double>(host_now() - *last_arrival_).count();
 }
 
 } // namespace fingertip

@@ -1,6 +1,7 @@
 /* What is known of a fingertip at this moment, gathered from its packets, for views to show. */
 #pragma once
 
+#include "libfingertip/clock.hpp"
 #include "libfingertip/decoder.hpp"
 
 #include <chrono>
@@ -99,7 +100,7 @@ private:
   std::optional<std::uint64_t> first_us_;
   std::uint64_t last_us_ = 0;
   std::optional<std::uint64_t> last_slip_us_, last_sliding_us_, last_moving_us_;
-  std::optional<std::chrono::steady_clock::time_point> last_arrival_;
+  std::optional<HostTime> last_arrival_;
   std::deque<std::uint64_t> recent_us_;
   std::deque<Location> trail_;
   std::deque<Sample> samples_;

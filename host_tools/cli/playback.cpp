@@ -1,5 +1,6 @@
 #include "cli/playback.hpp"
 
+#include "libfingertip/clock.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/recording_reader.hpp"
 #include "libfingertip/text.hpp"
@@ -136,7 +137,7 @@ Playback::Playback(const std::string &path, bool salvage, const std::string &dev
   }
 }
 
-void Playback::step(Clock::time_point now) {
+void Playback::step(HostTime now) {
   double passed_us = last_ ? std::chrono::duration<double, std::micro>(now - *last_).count() : 0;
   last_ = now;
   if (!paused_ && is_there_) {
@@ -157,7 +158,7 @@ void Playback::step(Clock::time_point now) {
   }
 }
 
-Playback::Clock::time_point Playback::next_step(Clock::time_point now) const {
+HostTime Playback::next_step(HostTime now) const {
   constexpr std::chrono::milliseconds patience{20};
   double due_us = END;
   for (const Track &track : tracks_) {
@@ -174,7 +175,7 @@ Playback::Clock::time_point Playback::next_step(Clock::time_point now) const {
   }
   auto due = std::chrono::duration<double, std::micro>((due_us - time_us_) / speed_);
   return now +
-         std::min<Clock::duration>(patience, std::chrono::duration_cast<Clock::duration>(due));
+         std::min<HostTime::duration>(patience, std::chrono::duration_cast<HostTime::duration>(due));
 }
 
 bool Playback::is_over() const {

@@ -6,6 +6,7 @@
 #include "cli/keys.hpp"
 #include "cli/model.hpp"
 #include "cli/monitor.hpp"
+#include "libfingertip/clock.hpp"
 #include "libfingertip/packet_file.hpp"
 
 #include <chrono>
@@ -91,16 +92,15 @@ private:
 
 class Playback {
 public:
-  using Clock = std::chrono::steady_clock;
 
   /* speed: times the recorded one; 0: as fast as it can be read. Of a joint recording without a
    * device all of its fingertips. */
   Playback(const std::string &path, bool salvage, const std::string &device, double speed);
 
   /* Goes on to where it should be now, or as far as it gets in a moment. */
-  void step(Clock::time_point now);
+  void step(HostTime now);
   /* When there is something to do. */
-  Clock::time_point next_step(Clock::time_point now) const;
+  HostTime next_step(HostTime now) const;
   /* Played to its end, or quit. */
   bool is_over() const;
   void key(Key key);
@@ -121,7 +121,7 @@ private:
   double speed_;
   double time_us_ = 0; /* shown, or to be shown as soon as it is read; infinite: the end */
   bool paused_ = false, quit_ = false, is_there_ = false;
-  std::optional<Clock::time_point> last_;
+  std::optional<HostTime> last_;
 };
 
 } // namespace fingertip

@@ -1,5 +1,7 @@
 #include "cli/terminal.hpp"
 
+#include "libfingertip/clock.hpp"
+
 #include <algorithm>
 #include <atomic>
 #include <cctype>
@@ -16,6 +18,8 @@
 namespace fingertip {
 
 namespace {
+
+constexpr std::chrono::milliseconds OUTPUT_WAIT{100}; /* until a stop is looked for */
 
 volatile std::sig_atomic_t stop_signal = 0;
 std::atomic<unsigned> interrupt_count{0}; /* the handler may run in several threads */
@@ -46,7 +50,7 @@ void write_all(const std::string &text) {
     ssize_t count = write(STDOUT_FILENO, text.data() + at, text.size() - at);
     if (count < 0 && errno == EAGAIN) {
       pollfd waiting = {STDOUT_FILENO, POLLOUT, 0};
-      poll(&waiting, 1, 100);
+      wait_for(&waiting, 1, host_now() + OUTPUT_WAIT);
     } else if (count < 0 && errno != EINTR) {
       return;
     } else if (count > 0) {
@@ -80,7 +84,7 @@ bool is_standard_output_read() {
 
 bool wait_for_standard_output() {
   pollfd waiting = {STDOUT_FILENO, POLLOUT, 0};
-  while (poll(&waiting, 1, 100) <= 0) {
+  while (wait_for(&waiting, 1, host_now() + OUTPUT_WAIT) <= 0) {
     if (stop_requested()) {
       return false;
     }
@@ -197,7 +201,7 @@ std::optional<Key> Screen::key() {
   char bytes[256];
   ssize_t count = has_input_ ? read(STDIN_FILENO, bytes, sizeof bytes) : 0;
   if (count > 0) {
-    keys_.feed(bytes, static_cast<std::size_t>(count), std::chrono::steady_clock::now());
+    keys_.feed(bytes, static_cast<std::size_t>(count), host_now());
   }
   return keys_.next();
 }

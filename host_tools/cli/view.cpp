@@ -3,6 +3,7 @@
 #include "cli/doubt.hpp"
 #include "cli/grasp_screen.hpp"
 #include "grasp/words.hpp"
+#include "libfingertip/clock.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/text.hpp"
@@ -17,14 +18,13 @@ namespace fingertip {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
 
 class Interval {
 public:
   explicit Interval(std::chrono::milliseconds length) : length_(length) {}
   /* at_once: something changed that cannot wait. */
   bool is_due(bool at_once = false) {
-    auto now = Clock::now();
+    auto now = host_now();
     if (now < next_ && !at_once) {
       return false;
     }
@@ -34,7 +34,7 @@ public:
 
 private:
   std::chrono::milliseconds length_;
-  Clock::time_point next_{};
+  HostTime next_{};
 };
 
 /* Tells when a text is another than before. */

@@ -82,7 +82,7 @@ void GraspLoop::begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen,
   for (const auto &loop : loops_) {
     loop->start();
   }
-  thread_ = std::thread([this] { run(); });
+  thread_ = Thread([this] { run(); });
 }
 
 bool GraspLoop::request(enum grip_request wanted) {
@@ -92,7 +92,11 @@ bool GraspLoop::request(enum grip_request wanted) {
 
 std::vector<GraspNews> GraspLoop::take(milliseconds timeout) {
   std::unique_lock lock(news_mutex_);
-  filled_.wait_for(lock, timeout, [this] { return !news_.empty(); });
+  for (const HostTime limit = host_now() + timeout; news_.empty() && host_now() < limit;) {
+    lock.unlock();
+    filled_.wait(limit);
+    lock.lock();
+  }
   std::vector<GraspNews> taken = std::exchange(news_, {});
   if (const std::uint64_t count = std::exchange(dropped_, 0)) {
     GraspNews dropped{Kind::dropped, steady_now_us()};
@@ -109,7 +113,7 @@ void GraspLoop::put(GraspNews news) {
     return;
   }
   news_.push_back(std::move(news));
-  filled_.notify_one();
+  filled_.set();
 }
 
 void GraspLoop::end() {

@@ -22,12 +22,12 @@
 
 #include "grasp/core.hpp"
 #include "grasp/gripper_thread.hpp"
+#include "libfingertip/clock.hpp"
 #include "libfingertip/device_loop.hpp"
 
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <exception>
 #include <functional>
@@ -35,7 +35,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 namespace fingertip {
@@ -124,11 +123,11 @@ private:
   std::atomic<bool> end_{false}, abandoned_{false};
 
   std::mutex news_mutex_;
-  std::condition_variable filled_;
+  Wake filled_;
   std::vector<GraspNews> news_;
   std::uint64_t dropped_ = 0;
 
-  std::thread thread_;
+  Thread thread_;
 };
 
 } // namespace fingertip

@@ -36,7 +36,7 @@ GripperThread::~GripperThread() {
     std::lock_guard lock(mutex_);
     end_ = true;
   }
-  ended_.notify_all();
+  ended_.set();
   thread_.join();
 }
 
@@ -109,9 +109,8 @@ void GripperThread::run() {
         next_us = steady_now_us() + REOPEN_us;
       }
     }
-    std::unique_lock lock(mutex_);
-    ended_.wait_for(lock, std::chrono::microseconds(next_us - steady_now_us()),
-                    [this] { return end_; });
+    ended_.wait(HostTime(std::chrono::microseconds(next_us)));
+    std::lock_guard lock(mutex_);
     end = end_;
   }
 }

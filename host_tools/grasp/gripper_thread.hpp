@@ -6,9 +6,9 @@
 
 #include "grasp/core.hpp"
 #include "gripper/gripper.hpp"
+#include "libfingertip/clock.hpp"
 
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -16,7 +16,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 
 namespace fingertip {
 
@@ -52,13 +51,13 @@ private:
   std::int64_t poll_us_;
 
   mutable std::mutex mutex_;
-  std::condition_variable ended_;
+  Wake ended_;
   bool end_ = false;
   grip_command command_{};
   std::uint64_t number_ = 0, sent_ = 0; // of commands that differ
   std::deque<News> news_;
   std::string told_;
-  std::thread thread_;
+  Thread thread_;
 };
 
 } // namespace fingertip

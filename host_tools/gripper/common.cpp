@@ -2,7 +2,6 @@
 
 #include "gripper/serial_line.hpp"
 
-#include <chrono>
 #include <cmath>
 
 namespace fingertip {
@@ -50,12 +49,6 @@ std::string limited_by(const std::string &port, int exchanges) {
   }
   return "; the USB adapter's latency timer of " + std::to_string(*timer_ms) + " ms allows " +
          std::to_string(1000 / (*timer_ms * exchanges)) + " commands a second";
-}
-
-std::int64_t steady_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
 }
 
 } // namespace fingertip

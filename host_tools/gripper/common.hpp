@@ -23,6 +23,4 @@ Error silent(const GripperWay &complete);
 // many exchanges; "" where it does not.
 std::string limited_by(const std::string &port, int exchanges);
 
-std::int64_t steady_us();
-
 } // namespace fingertip

@@ -2,6 +2,7 @@
 
 #include "gripper/common.hpp"
 #include "gripper/feetech_table.hpp"
+#include "libfingertip/clock.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -111,14 +112,13 @@ Bytes FeetechGripper::exchange(Packet question, std::size_t answer_length) {
     throw Error(ErrorCode::gone, way_.port + ": gone");
   }
   doubtful_ = true;
-  const auto end = std::chrono::steady_clock::now() +
-                   std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6));
+  const auto end = host_now() + std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6));
   Bytes came;
   std::size_t noise = 0;
   bool other_slave = false, other_answer = false, echo_gone = false;
   for (;;) {
     const auto left =
-        std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+        std::chrono::ceil<std::chrono::milliseconds>(end - host_now());
     std::uint8_t bytes[256];
     std::size_t length = 0;
     if (left.count() <= 0) {
@@ -180,14 +180,14 @@ void FeetechGripper::write(std::uint8_t address, const Bytes &values) {
 }
 
 GripperStatus FeetechGripper::poll() {
-  const std::int64_t began_us = steady_us();
+  const std::int64_t began_us = steady_now_us();
   const Bytes table = read(STATUS_FROM, TABLE_END - STATUS_FROM);
   const auto at = [&](Address address) { return std::size_t{address} - STATUS_FROM; };
   const auto magnitude = [&](Address address) { return word(table, at(address)) & (SIGN - 1); };
   const int position = word(table, at(PRESENT_POSITION));
   const double count = (position & SIGN) ? -magnitude(PRESENT_POSITION) : position;
   GripperStatus status;
-  status.host_us = (began_us + steady_us()) / 2;
+  status.host_us = (began_us + steady_now_us()) / 2;
   active_ = table[at(TORQUE_ENABLE)] != 0;
   status.active = active_;
   const double off = std::abs(count - magnitude(GOAL_POSITION));
@@ -211,7 +211,7 @@ void FeetechGripper::command(double count, int speed, int torque) {
   write(ACCELERATION, values);
   if (count != goal_count_) {
     goal_count_ = count;
-    commanded_us_ = steady_us();
+    commanded_us_ = steady_now_us();
   }
 }
 

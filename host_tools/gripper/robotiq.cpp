@@ -2,13 +2,13 @@
 
 #include "gripper/common.hpp"
 #include "gripper/robotiq_registers.hpp"
+#include "libfingertip/clock.hpp"
 
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <modbus.h>
-#include <thread>
 
 namespace fingertip {
 
@@ -19,6 +19,7 @@ namespace {
 constexpr std::uint32_t GAP_us = 20'000; // within an answer: more than a latency timer of 16 ms
 // The manuals ask for 5 ms between commands.
 constexpr std::chrono::milliseconds PAUSE{5};
+constexpr std::uint8_t WRITE = 16, WRITE_AND_READ = 23; // functions
 constexpr int RESET_READS = 10;
 constexpr int BOTH_TRIES = 2;
 
@@ -56,6 +57,38 @@ Error gripper_error(const GripperWay &way, int error) {
     }
     return Error(ErrorCode::gone, port + ": " + modbus_strerror(error));
   }
+}
+
+using Bytes = std::vector<std::uint8_t>;
+
+void put_word(Bytes *to, int value) {
+  to->push_back(static_cast<std::uint8_t>(value >> 8));
+  to->push_back(static_cast<std::uint8_t>(value & 0xFF));
+}
+
+void put_range(Bytes *to, int address, int count) {
+  put_word(to, address);
+  put_word(to, count);
+}
+
+void put_values(Bytes *to, int count, const std::uint16_t *values) {
+  to->push_back(static_cast<std::uint8_t>(2 * count));
+  for (int i = 0; i < count; i++) {
+    put_word(to, values[i]);
+  }
+}
+
+// Of registers read: their bytes' count, and they.
+std::size_t answer_length(int count) {
+  return 1 + 2 * static_cast<std::size_t>(count);
+}
+
+std::array<std::uint16_t, 3> registers_of(const Bytes &answer, int count) {
+  std::array<std::uint16_t, 3> registers{};
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); i++) {
+    registers[i] = static_cast<std::uint16_t>(answer[1 + 2 * i] << 8 | answer[2 + 2 * i]);
+  }
+  return registers;
 }
 
 std::uint16_t share(double value, double least, double most) {
@@ -105,28 +138,52 @@ RobotiqGripper::~RobotiqGripper() {
   modbus_free(modbus_); // the descriptor is the line's
 }
 
-void RobotiqGripper::exchange(const std::function<int()> &ask) {
+// libmodbus makes and checks the frames. The wait for an answer is not its own: it would be one of
+// real time.
+RobotiqGripper::Bytes RobotiqGripper::exchange(const Bytes &request, std::size_t length) {
   if (line_.descriptor() < 0) {
     throw gripper_error(way_, EIO);
   }
   line_.drop_input();
-  began_us_ = steady_us();
-  if (ask() < 0) {
-    const int error = errno;
-    // Whoever answers late answers the next question.
-    doubtful_ = true;
-    throw gripper_error(way_, error);
+  began_us_ = steady_now_us();
+  Bytes asked = {static_cast<std::uint8_t>(way_.slave)}, answer(MODBUS_RTU_MAX_ADU_LENGTH);
+  asked.insert(asked.end(), request.begin(), request.end());
+  doubtful_ = true; // until it is answered: who answers late answers the next question
+  if (modbus_send_raw_request(modbus_, asked.data(), static_cast<int>(asked.size())) < 0) {
+    throw gripper_error(way_, errno);
   }
+  pollfd coming = {line_.descriptor(), POLLIN, 0};
+  const HostTime limit = HostTime(std::chrono::microseconds(began_us_)) +
+                         std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6));
+  while (wait_for(&coming, 1, limit) == 0) {
+    if (host_now() >= limit) {
+      throw gripper_error(way_, ETIMEDOUT);
+    }
+  }
+  const int size = modbus_receive_confirmation(modbus_, answer.data());
+  if (size < 0) {
+    throw gripper_error(way_, errno);
+  }
+  constexpr int EXCEPTION = 0x80, HEAD = 2, CRC = 2;
+  if (size == 0 || answer[0] != asked[0]) {
+    throw gripper_error(way_, EMBBADSLAVE);
+  }
+  if (answer[1] == (asked[1] | EXCEPTION) && size == HEAD + 1 + CRC) {
+    throw gripper_error(way_, MODBUS_ENOBASE + answer[2]);
+  }
+  if (answer[1] != asked[1] || static_cast<std::size_t>(size) != HEAD + length + CRC) {
+    throw gripper_error(way_, EMBBADDATA);
+  }
+  doubtful_ = false;
+  return {answer.begin() + HEAD, answer.begin() + size - CRC};
 }
 
 // Answers have no number: a late one to a read of three registers would pass for that to the next.
 // One register is asked for until its answer comes, which no late one looks like.
 void RobotiqGripper::make_sure() {
   for (int left = 2; doubtful_; left--) {
-    std::uint16_t one;
     try {
-      exchange([&] { return read(1, &one); });
-      doubtful_ = false;
+      read(1);
     } catch (const Error &error) {
       if (left == 0 || error.code() != ErrorCode::gripper_garbled) {
         throw;
@@ -135,16 +192,15 @@ void RobotiqGripper::make_sure() {
   }
 }
 
-int RobotiqGripper::read(int count, std::uint16_t *to) {
-  return read_function_ == 4 ? modbus_read_input_registers(modbus_, STATUS_REGISTER, count, to)
-                             : modbus_read_registers(modbus_, STATUS_REGISTER, count, to);
+RobotiqGripper::Registers RobotiqGripper::read(int count) {
+  Bytes request = {static_cast<std::uint8_t>(read_function_)};
+  put_range(&request, STATUS_REGISTER, count);
+  return registers_of(exchange(request, answer_length(count)), count);
 }
 
 GripperStatus RobotiqGripper::read_status() {
   make_sure();
-  Registers registers;
-  exchange([&] { return read(REGISTERS, registers.data()); });
-  return told(registers);
+  return told(read(REGISTERS));
 }
 
 GripperStatus RobotiqGripper::told(const Registers &registers) {
@@ -152,7 +208,7 @@ GripperStatus RobotiqGripper::told(const Registers &registers) {
   goes_ = (registers[0] & gGTO) != 0;
   active_ = (registers[0] & gACT) != 0 && gsta == ACTIVATED;
   GripperStatus status;
-  status.host_us = (began_us_ + steady_us()) / 2;
+  status.host_us = (began_us_ + steady_now_us()) / 2;
   status.active = active_;
   status.moving = gsta == ACTIVATING || (active_ && goes_ && gobj == IN_MOTION);
   if (active_ && goes_ && gobj != IN_MOTION) {
@@ -167,7 +223,10 @@ GripperStatus RobotiqGripper::told(const Registers &registers) {
 }
 
 void RobotiqGripper::write(int address, int count, const std::uint16_t *values) {
-  exchange([&] { return modbus_write_registers(modbus_, address, count, values); });
+  Bytes request = {WRITE};
+  put_range(&request, address, count);
+  put_values(&request, count, values);
+  exchange(request, 4); // the range again
 }
 
 void RobotiqGripper::activate() {
@@ -177,8 +236,8 @@ void RobotiqGripper::activate() {
   // Only a rise of rACT activates: it must have seen the reset.
   std::uint16_t status = gACT;
   for (int i = 0; i < RESET_READS && (status & gACT); i++) {
-    std::this_thread::sleep_for(PAUSE);
-    exchange([&] { return read(1, &status); });
+    wait_until(host_now() + PAUSE);
+    status = read(1)[0];
   }
   if (status & gACT) {
     throw Error(ErrorCode::gripper_refused, line_.path() + ": does not reset");
@@ -216,13 +275,13 @@ GripperStatus RobotiqGripper::move(const GripperMove &move) {
     }
   }
   if (both_at_once_) {
-    Registers registers;
     try {
-      exchange([&] {
-        return modbus_write_and_read_registers(modbus_, COMMAND_REGISTER + 1, REGISTERS - 1,
-                                               command.data() + 1, STATUS_REGISTER, REGISTERS,
-                                               registers.data());
-      });
+      Bytes request = {WRITE_AND_READ};
+      put_range(&request, STATUS_REGISTER, REGISTERS);
+      put_range(&request, COMMAND_REGISTER + 1, REGISTERS - 1);
+      put_values(&request, REGISTERS - 1, command.data() + 1);
+      const Registers registers =
+          registers_of(exchange(request, answer_length(REGISTERS)), REGISTERS);
       both_worked_ = true;
       return told(registers);
     } catch (const Error &error) {

@@ -12,7 +12,8 @@
 #include "gripper/serial_line.hpp"
 
 #include <array>
-#include <functional>
+#include <cstdint>
+#include <vector>
 
 using modbus_t = struct _modbus;
 
@@ -33,10 +34,13 @@ public:
 private:
   using Registers = std::array<std::uint16_t, 3>;
 
-  // ask: of libmodbus, -1 and errno where it fails.
-  void exchange(const std::function<int()> &ask);
+  using Bytes = std::vector<std::uint8_t>;
+
+  // request: the function and what belongs to it. Returns what follows the function in the answer,
+  // which has so many bytes.
+  Bytes exchange(const Bytes &request, std::size_t length);
   void make_sure();
-  int read(int count, std::uint16_t *to);
+  Registers read(int count);
   GripperStatus read_status();
   GripperStatus told(const Registers &registers);
   void write(int address, int count, const std::uint16_t *values);

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <sys/socket.h>
+#include <sys/stat.h>
 #include <termios.h>
 
 namespace fingertip {
@@ -40,7 +42,11 @@ std::string line_of(const fs::path &path) {
 SerialLine::SerialLine(const std::string &path, unsigned baud) : path_(path), transport_(path) {
   const int fd = descriptor();
   termios settings;
-  if (tcgetattr(fd, &settings) != 0 || cfsetspeed(&settings, speed_of(baud)) != 0 ||
+  struct stat status;
+  const bool is_simulated = fstat(fd, &status) == 0 && S_ISSOCK(status.st_mode);
+  if (is_simulated) {
+    speed_of(baud); // which a socket does not have
+  } else if (tcgetattr(fd, &settings) != 0 || cfsetspeed(&settings, speed_of(baud)) != 0 ||
       tcsetattr(fd, TCSANOW, &settings) != 0) {
     throw Error(ErrorCode::cannot_open, path + ": cannot go at " + std::to_string(baud) + " baud");
   }
@@ -53,7 +59,11 @@ int SerialLine::descriptor() const {
 }
 
 void SerialLine::drop_input() {
-  tcflush(descriptor(), TCIFLUSH);
+  std::uint8_t bytes[256];
+  if (tcflush(descriptor(), TCIFLUSH) != 0) {
+    while (recv(descriptor(), bytes, sizeof bytes, MSG_DONTWAIT) > 0) { // of a simulated port
+    }
+  }
 }
 
 std::optional<int> latency_timer_ms(const std::string &port, const std::string &root) {

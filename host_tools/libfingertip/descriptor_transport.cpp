@@ -1,14 +1,15 @@
 #include "libfingertip/descriptor_transport.hpp"
 
+#include "libfingertip/clock.hpp"
+
 #include <cerrno>
-#include <poll.h>
 #include <unistd.h>
 
 namespace fingertip {
 
 namespace {
 
-constexpr int WRITE_TIMEOUT_ms = 1000;
+constexpr std::chrono::milliseconds WRITE_TIMEOUT{1000};
 
 } // namespace
 
@@ -31,7 +32,7 @@ Transport::Result DescriptorTransport::read(std::uint8_t *bytes, std::size_t cap
     return Result::gone;
   }
   pollfd waiting = {fd_, POLLIN, 0};
-  int ready = poll(&waiting, 1, static_cast<int>(timeout.count()));
+  int ready = wait_for(&waiting, 1, host_now() + timeout);
   if (ready <= 0) {
     return Result::timeout;
   }
@@ -60,7 +61,7 @@ bool DescriptorTransport::write(const std::uint8_t *bytes, std::size_t length) {
       length -= static_cast<std::size_t>(count);
     } else if (errno == EAGAIN) {
       pollfd waiting = {fd_, POLLOUT, 0};
-      if (poll(&waiting, 1, WRITE_TIMEOUT_ms) <= 0) {
+      if (wait_for(&waiting, 1, host_now() + WRITE_TIMEOUT) <= 0) {
         return false;
       }
     } else if (errno != EINTR) {

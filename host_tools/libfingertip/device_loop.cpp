@@ -13,7 +13,6 @@ namespace fingertip {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 using Kind = DeviceNews::Kind;
 
@@ -35,26 +34,33 @@ constexpr Session::Policy LAST_WORD = {milliseconds(500), 2};
 
 std::vector<DeviceNews> DeviceFeed::take(milliseconds timeout) {
   std::unique_lock<std::mutex> lock(mutex_);
-  filled_.wait_for(lock, timeout, [this] { return !news_.empty(); });
+  for (const HostTime limit = host_now() + timeout; news_.empty() && host_now() < limit;) {
+    lock.unlock();
+    filled_.wait(limit);
+    lock.lock();
+  }
   std::vector<DeviceNews> taken(std::make_move_iterator(news_.begin()),
                                 std::make_move_iterator(news_.end()));
   news_.clear();
-  drained_.notify_all();
+  drained_.set();
   return taken;
 }
 
 void DeviceFeed::put(DeviceNews news, const std::atomic<bool> &abandoned) {
   std::unique_lock<std::mutex> lock(mutex_);
-  drained_.wait(lock, [&] { return news_.size() < FEED_CAPACITY || abandoned; });
+  while (news_.size() >= FEED_CAPACITY && !abandoned) {
+    lock.unlock();
+    drained_.wait(HostTime::max());
+    lock.lock();
+  }
   if (!abandoned) {
     news_.push_back(std::move(news));
-    filled_.notify_one();
+    filled_.set();
   }
 }
 
 void DeviceFeed::wake() {
-  std::lock_guard<std::mutex> lock(mutex_);
-  drained_.notify_all();
+  drained_.set();
 }
 
 DeviceLoop::DeviceLoop(std::size_t number, const Way &way, const Options &options, DeviceFeed &feed)
@@ -80,7 +86,7 @@ DeviceLoop::DeviceLoop(std::size_t number, const Way &way, const Options &option
     });
   }
   session_.on_packet([this](const wire_packet &packet) { take(packet); });
-  thread_ = std::thread([this] { run(); });
+  thread_ = Thread([this] { run(); });
 }
 
 DeviceLoop::~DeviceLoop() {
@@ -181,10 +187,10 @@ void DeviceLoop::greet(bool again) {
     if (stop_) {
       throw Interrupted();
     }
-    std::this_thread::sleep_for(milliseconds(2));
+    wait_until(host_now() + milliseconds(2));
   }
   session_.command(command_stream(streams_));
-  asked_ = last_frame_ = Clock::now();
+  asked_ = last_frame_ = host_now();
 }
 
 void DeviceLoop::follow() {
@@ -200,7 +206,7 @@ void DeviceLoop::follow() {
     }
     send_wanted();
     /* Repeating the wish is an exchange, and wakes a device that restarted unnoticed. */
-    auto now = Clock::now();
+    auto now = host_now();
     if (options_.follow_clock ? now - asked_ >= EXCHANGE_INTERVAL
                               : now - std::max(asked_, last_frame_) > REVIVE_AFTER) {
       session_.send(command_stream(streams_));
@@ -223,7 +229,7 @@ void DeviceLoop::wait_for_port() {
     if (stop_) {
       throw Interrupted();
     }
-    std::this_thread::sleep_for(REOPEN_INTERVAL);
+    wait_until(host_now() + REOPEN_INTERVAL);
   }
   publish();
 }
@@ -246,7 +252,7 @@ void DeviceLoop::take(const wire_packet &packet) {
   news.host_us =
       fit_.estimate() ? fit_.estimate()->host_at(packet.t_us) : static_cast<double>(now_us);
   if (packet.type == WIRE_CONTACT || packet.type == WIRE_RAW) {
-    last_frame_ = Clock::now();
+    last_frame_ = host_now();
   }
   auto until_us =
       std::clamp(static_cast<std::int64_t>(news.host_us), now_us - LONGEST_BACKLOG_us, now_us);

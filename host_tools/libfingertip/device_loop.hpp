@@ -17,13 +17,13 @@
  */
 #pragma once
 
+#include "libfingertip/clock.hpp"
 #include "libfingertip/clock_fit.hpp"
 #include "libfingertip/connection.hpp"
 #include "libfingertip/session.hpp"
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <exception>
@@ -31,7 +31,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #pragma GCC visibility push(default)
@@ -78,7 +77,7 @@ private:
   void wake();
 
   std::mutex mutex_;
-  std::condition_variable filled_, drained_;
+  Wake filled_, drained_;
   std::deque<DeviceNews> news_;
 };
 
@@ -135,7 +134,7 @@ private:
   std::uint8_t streams_ = 0; /* those wanted that its firmware has */
   std::optional<wire_info> info_;
   wire_health health_{};
-  std::chrono::steady_clock::time_point asked_{}, last_frame_{};
+  HostTime asked_{}, last_frame_{};
   bool gone_ = false;            /* and not back yet */
   std::vector<DeviceNews> held_; /* until it is back */
   bool ending_ = false;          /* its last command is not interrupted */
@@ -149,7 +148,7 @@ private:
   std::deque<wire_packet> wanted_; /* commands */
 
   std::exception_ptr failure_;
-  std::thread thread_;
+  Thread thread_;
 };
 
 } // namespace fingertip

@@ -5,10 +5,13 @@
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
+#include <filesystem>
 #include <sys/file.h>
 #include <sys/ioctl.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
+#include <sys/un.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -41,7 +44,33 @@ bool is_pseudo_terminal(int fd) {
   return fstat(fd, &status) == 0 && major(status.st_rdev) >= 136 && major(status.st_rdev) <= 143;
 }
 
+/* A simulated port. Its name in the abstract namespace is this end's: that keeps out others. */
+int open_socket(const std::string &path, int *error) {
+  std::error_code none;
+  std::string real = std::filesystem::canonical(path, none).string();
+  sockaddr_un port = {}, own = {};
+  port.sun_family = own.sun_family = AF_UNIX;
+  if (real.size() + 1 >= sizeof port.sun_path) {
+    *error = ENAMETOOLONG;
+    return -1;
+  }
+  std::memcpy(port.sun_path, real.data(), real.size());
+  std::memcpy(own.sun_path + 1, real.data(), real.size());
+  int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (fd < 0 || bind(fd, reinterpret_cast<const sockaddr *>(&own), sizeof own) != 0 ||
+      connect(fd, reinterpret_cast<const sockaddr *>(&port), sizeof port) != 0) {
+    *error = errno == EADDRINUSE ? EBUSY : errno == ECONNREFUSED ? ENXIO : errno;
+    ::close(fd);
+    return -1;
+  }
+  return fd;
+}
+
 int open_port(const std::string &path, int *error) {
+  struct stat status;
+  if (stat(path.c_str(), &status) == 0 && S_ISSOCK(status.st_mode)) {
+    return open_socket(path, error);
+  }
   int fd = open(path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) {
     *error = errno;
@@ -78,7 +107,9 @@ SerialTransport::SerialTransport(const std::string &path, std::function<std::str
 }
 
 ssize_t SerialTransport::put(const std::uint8_t *bytes, std::size_t length) {
-  return ::write(fd_, bytes, length);
+  /* Not of a socket whose other end has gone, which would raise a signal. */
+  ssize_t count = send(fd_, bytes, length, MSG_NOSIGNAL);
+  return count < 0 && errno == ENOTSOCK ? ::write(fd_, bytes, length) : count;
 }
 
 bool SerialTransport::reopen() {

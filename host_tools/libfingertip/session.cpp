@@ -9,7 +9,6 @@ namespace fingertip {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds POLL_INTERVAL{50};
 /* A fingertip does not answer a version that it does not speak: it is asked in these too. */
 constexpr int NEWER_VERSIONS = 2;
@@ -28,11 +27,6 @@ ErrorCode refusal_code(std::uint8_t result) {
 }
 
 } // namespace
-
-std::int64_t steady_now_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(Clock::now().time_since_epoch())
-      .count();
-}
 
 Session::Session(Transport &transport, std::function<bool()> stop)
     : transport_(transport), stop_(std::move(stop)) {}
@@ -110,8 +104,8 @@ wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_ty
     if (attempt > 0) {
       look_for_other_versions();
     }
-    auto deadline = Clock::now() + policy.answer_timeout;
-    for (auto now = Clock::now(); now < deadline; now = Clock::now()) {
+    auto deadline = host_now() + policy.answer_timeout;
+    for (auto now = host_now(); now < deadline; now = host_now()) {
       if (stop_()) {
         throw Interrupted();
       }

@@ -5,6 +5,7 @@
  */
 #pragma once
 
+#include "libfingertip/clock.hpp"
 #include "libfingertip/clock_fit.hpp"
 #include "libfingertip/decoder.hpp"
 #include "libfingertip/error.hpp"
@@ -32,8 +33,6 @@ struct ClockRelation {
   std::int64_t device_minus_host_us;
   std::int64_t uncertainty_us;
 };
-
-std::int64_t steady_now_us();
 
 class Session {
 public:

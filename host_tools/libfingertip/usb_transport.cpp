@@ -1,5 +1,6 @@
 #include "libfingertip/usb_transport.hpp"
 
+#include "libfingertip/clock.hpp"
 #include "libfingertip/discovery.hpp"
 #include "libfingertip/error.hpp"
 
@@ -15,7 +16,6 @@ namespace fingertip {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 /* 64 packets are the most that full speed brings in about 4 ms, a fingertip in 50. */
@@ -343,8 +343,8 @@ private:
   void stop() {
     stopping_ = true;
     cancel();
-    auto deadline = Clock::now() + CANCEL_TIMEOUT;
-    while (waiting_ > 0 && Clock::now() < deadline) {
+    auto deadline = host_now() + CANCEL_TIMEOUT;
+    while (waiting_ > 0 && host_now() < deadline) {
       timeval left = {0, 50000};
       libusb_handle_events_timeout_completed(context_, &left, nullptr);
     }
@@ -395,9 +395,9 @@ UsbTransport::~UsbTransport() = default;
 Transport::Result UsbTransport::read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
                                      milliseconds timeout) {
   *length = 0;
-  auto deadline = Clock::now() + timeout;
+  auto deadline = host_now() + timeout;
   while (link_) {
-    auto left = std::chrono::duration_cast<std::chrono::microseconds>(deadline - Clock::now());
+    auto left = std::chrono::duration_cast<std::chrono::microseconds>(deadline - host_now());
     bool more = true;
     if (!link_->has_data() && !link_->is_gone()) {
       more = link_->serve(std::max(left, std::chrono::microseconds(0)));
@@ -408,7 +408,7 @@ Transport::Result UsbTransport::read(std::uint8_t *bytes, std::size_t capacity, 
     }
     if (link_->is_gone()) {
       link_.reset();
-    } else if (!more || Clock::now() >= deadline) {
+    } else if (!more || host_now() >= deadline) {
       return Result::timeout;
     }
   }

@@ -11,6 +11,7 @@
  */
 #pragma once
 
+#include "libfingertip/clock.hpp"
 #include "libfingertip/framing.hpp"
 
 #include <chrono>
@@ -25,7 +26,7 @@ namespace fingertip {
 class Hub {
 public:
   using Client = std::uint64_t; /* never the same twice */
-  using Time = std::chrono::steady_clock::time_point;
+  using Time = HostTime;
 
   /* What waits for a client at most: three seconds of both streams of fifteen sensors at 1308
    * frames/s, 336 kB/s. */

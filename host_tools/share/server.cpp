@@ -22,7 +22,6 @@ namespace fingertip {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr mode_t FOLDER_MODE = 0750, SOCKET_MODE = 0660;
@@ -167,7 +166,7 @@ public:
 
   /* What to wait for. Returns whether there is more to do at once. */
   bool add_descriptors(std::vector<pollfd> &all) {
-    Hub::Time now = Clock::now();
+    Hub::Time now = host_now();
     if (hub_) {
       auto line = transport_->poll_descriptors();
       all.insert(all.end(), line.begin(), line.end());
@@ -191,7 +190,7 @@ public:
 
   /* all: as add_descriptors made it, after the wait. */
   void step(const std::vector<pollfd> &all) {
-    Hub::Time now = Clock::now();
+    Hub::Time now = host_now();
     more_ = false;
     say_farewell(now);
     if (!hub_) {
@@ -232,7 +231,7 @@ private:
   void begin() {
     hub_.emplace();
     serial_ = way_.found_by_usb ? way_.serial : "";
-    hub_->tick(Clock::now());
+    hub_->tick(host_now());
     flush_line();
     open_for_clients();
   }
@@ -347,12 +346,12 @@ private:
       std::size_t length = 0;
       const std::uint8_t *bytes = hub_->waiting(each.client, &length);
       leaving_.push_back(
-          {std::move(each.fd), Bytes(bytes, bytes + length), Clock::now() + LAST_PACKETS});
+          {std::move(each.fd), Bytes(bytes, bytes + length), host_now() + LAST_PACKETS});
     }
     connections_.clear();
     listener_.reset();
     hub_.reset();
-    say_farewell(Clock::now());
+    say_farewell(host_now());
   }
 
   void say_farewell(Hub::Time now) {
@@ -453,7 +452,7 @@ void Server::step(milliseconds longest_wait) {
   }
   milliseconds wait =
       more ? milliseconds(0) : std::min(longest_wait, any_gone ? REOPEN_INTERVAL : TICK);
-  poll(waiting.data(), waiting.size(), static_cast<int>(wait.count()));
+  wait_for(waiting.data(), waiting.size(), host_now() + wait);
   for (const auto &station : stations_) {
     station->step(waiting);
   }

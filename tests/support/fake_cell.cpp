@@ -1,4 +1,4 @@
-// Two fingertips and a gripper on pseudo-terminals with an object between, for tests of the grasp:
+// On simulated time: two fingertips and a gripper on ports with an object between, for tests of the grasp:
 //
 //   fake_cell FOLDER [key=value]...       makes FOLDER/left, FOLDER/right, FOLDER/gripper
 //     model=2f85 object=40 stiffness=2 rate=200 active=1
@@ -12,10 +12,8 @@
 #include "cell/gripper_server.hpp"
 #include "support/soft_fingertip.hpp"
 
-#include <filesystem>
-#include <iostream>
+#include <unistd.h>
 #include <map>
-#include <mutex>
 #include <sstream>
 
 using namespace fingertip;
@@ -48,21 +46,13 @@ public:
     };
     plug_in();
     if (active) {
-      hurry_ = 50; // nobody waits seconds for it
       GripperWay way;
       way.model = model;
       way.port = link_;
-      for (bool done = false; !done;) {
-        try {
-          const auto gripper = open_gripper(way);
-          gripper->activate();
-          while (!gripper->poll().active) {
-          }
-          done = true;
-        } catch (const Error &) { // this machine is slow
-        }
+      const auto gripper = open_gripper(way);
+      gripper->activate();
+      while (!gripper->poll().active) {
       }
-      hurry_ = 1;
     }
   }
   ~CellGripper() { unplug(); }
@@ -74,25 +64,17 @@ public:
     GripperServer::Options options;
     options.model = model_;
     options.real_time = false;
+    options.link = link_;
     server_ = std::make_unique<GripperServer>(motion_, options);
-    std::filesystem::remove(link_);
-    std::filesystem::create_symlink(server_->port(), link_);
     ended_ = false;
-    thread_ = std::thread([this] {
+    thread_ = Thread([this] {
       std::int64_t stepped_us = steady_now_us();
       while (!ended_) {
-        {
-          std::lock_guard lock(mutex_);
-          server_->step(std::chrono::milliseconds(1));
-          const std::int64_t now_us = steady_now_us();
-          // On a machine that gives this thread no time, time stands still for the fingers too.
-          for (stepped_us = std::max(stepped_us, now_us - 10000); stepped_us < now_us;
-               stepped_us += 500) {
-            motion_.step(500e-6 * hurry_);
-          }
-          object_.opening_mm = motion_.width_mm();
+        server_->step(std::chrono::milliseconds(1));
+        for (const std::int64_t now_us = steady_now_us(); stepped_us < now_us; stepped_us += STEP_us) {
+          motion_.step(1e-6 * STEP_us);
         }
-        std::this_thread::sleep_for(std::chrono::microseconds(100)); // for whoever wants the lock
+        object_.opening_mm = motion_.width_mm();
       }
     });
   }
@@ -100,12 +82,10 @@ public:
     if (thread_.joinable()) {
       ended_ = true;
       thread_.join();
-      std::filesystem::remove(link_);
       server_.reset();
     }
   }
   void line(const std::string &fault) {
-    std::lock_guard lock(mutex_);
     LineTrouble trouble;
     trouble.fault = fault == "silent"    ? LineFault::silent
                     : fault == "garbage" ? LineFault::garbage
@@ -113,20 +93,42 @@ public:
     server_->trouble(trouble);
   }
   void fail(int fault) {
-    std::lock_guard lock(mutex_);
     server_->fail(static_cast<std::uint8_t>(fault));
   }
 
 private:
+  static constexpr std::int64_t STEP_us = 500;
+
   std::string link_, model_;
   Object &object_;
   GripperMotion motion_;
   std::unique_ptr<GripperServer> server_;
-  std::mutex mutex_; // of the server, and the motion
   std::atomic<bool> ended_{false};
-  std::atomic<int> hurry_{1}; // times the time that passes
-  std::thread thread_;
+  Thread thread_;
 };
+
+// Of standard input, which is waited for as for everything else in this world.
+bool next_line(std::string *line) {
+  static std::string came;
+  for (;;) {
+    const std::size_t end = came.find('\n');
+    if (end != std::string::npos) {
+      *line = came.substr(0, end);
+      came.erase(0, end + 1);
+      return true;
+    }
+    pollfd input = {STDIN_FILENO, POLLIN, 0};
+    char bytes[1024];
+    ssize_t count = 1;
+    if (wait_for(&input, 1, HostTime::max()) > 0) {
+      count = read(STDIN_FILENO, bytes, sizeof bytes);
+      came.append(bytes, static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
+    }
+    if (count <= 0) {
+      return false;
+    }
+  }
+}
 
 } // namespace
 
@@ -152,7 +154,7 @@ int main(int argc, char **argv) {
   test::SoftFingertip right(folder + "/right", "BBBB", rate_Hz, feel);
   std::puts("ready");
   std::fflush(stdout);
-  for (std::string text; std::getline(std::cin, text);) {
+  for (std::string text; next_line(&text);) {
     std::istringstream words(text);
     std::string verb, name;
     words >> verb;

@@ -1,4 +1,4 @@
-/* A fingertip without firmware, for tests of the host tools: serves a pseudo-terminal with the
+/* A fingertip without firmware, for tests of the host tools: serves a port with the
  * wire protocol's own codec.
  *
  *   fake_device LINK [key=value]...
@@ -33,6 +33,7 @@
  * Ends by SIGTERM too. */
 #include "libfingertip/command.hpp"
 #include "libfingertip/recording.hpp"
+#include "libfingertip/served_port.hpp"
 #include "libfingertip/text.hpp"
 #include "support/host_packets.hpp"
 #include "support/pad.h"
@@ -45,14 +46,14 @@
 #include <cstdlib>
 #include <fcntl.h>
 #include <map>
-#include <poll.h>
-#include <sys/ioctl.h>
+#include <optional>
 #include <termios.h>
-#include <thread>
+#include <unistd.h>
+#include <vector>
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using Time = fingertip::HostTime;
 using std::chrono::milliseconds;
 
 volatile std::sig_atomic_t ended = 0;
@@ -89,28 +90,20 @@ public:
     }
     power_on();
     if (!options_["mirror"].empty()) {
-      mirror_ = open_terminal(options_["mirror"]);
-    }
-  }
-  ~FakeDevice() {
-    power_off();
-    if (mirror_ >= 0) {
-      unlink(options_["mirror"].c_str());
-      close(mirror_);
+      mirror_.emplace(options_["mirror"]);
     }
   }
 
   void run() {
-    auto end = Clock::now() + std::chrono::seconds(number("life", 60));
-    auto next_frame = Clock::now();
+    auto end = fingertip::host_now() + std::chrono::seconds(number("life", 60));
+    auto next_frame = fingertip::host_now();
     auto interval = std::chrono::microseconds(1000000 / number("rate", 200));
-    while (!ended && Clock::now() < end) {
-      if (serve(std::max(milliseconds(0),
-                         std::chrono::duration_cast<milliseconds>(next_frame - Clock::now())))) {
-        next_frame = Clock::now();
+    while (!ended && fingertip::host_now() < end) {
+      if (serve(next_frame)) {
+        next_frame = fingertip::host_now();
       }
       if (streams_ == 0) {
-        next_frame = Clock::now() + milliseconds(5);
+        next_frame = fingertip::host_now() + milliseconds(5);
         continue;
       }
       if (!options_["play"].empty()) {
@@ -120,10 +113,10 @@ public:
             send(packet);
           }
         }
-        next_frame = Clock::now();
+        next_frame = fingertip::host_now();
         continue;
       }
-      for (; next_frame <= Clock::now() && streams_ != 0; next_frame += interval) {
+      for (; next_frame <= fingertip::host_now() && streams_ != 0; next_frame += interval) {
         send_frame(next_frame);
         long vanish = number("vanish", 0);
         if (vanish && frame_ == vanish && !vanished_) {
@@ -131,7 +124,8 @@ public:
           std::string text = options_["vanish"];
           wait_for_reader();
           power_off();
-          std::this_thread::sleep_for(milliseconds(std::atol(text.c_str() + text.find(',') + 1)));
+          fingertip::wait_until(fingertip::host_now() +
+                                milliseconds(std::atol(text.c_str() + text.find(',') + 1)));
           power_on();
         }
         if (frame_ == number("frames", -1)) {
@@ -185,28 +179,10 @@ private:
     send(packet);
   }
 
-  static int open_terminal(const std::string &link) {
-    int master = posix_openpt(O_RDWR | O_NOCTTY);
-    if (master < 0 || grantpt(master) != 0 || unlockpt(master) != 0) {
-      perror("posix_openpt");
-      std::exit(1);
-    }
-    termios settings;
-    tcgetattr(master, &settings);
-    cfmakeraw(&settings);
-    tcsetattr(master, TCSANOW, &settings);
-    unlink(link.c_str());
-    if (symlink(ptsname(master), link.c_str()) != 0) {
-      perror(link.c_str());
-      std::exit(1);
-    }
-    return master;
-  }
-
   void power_on() {
-    master_ = open_terminal(link_);
+    port_.emplace(link_);
     wire_receiver_init(&receiver_, wire_commands);
-    started_ = Clock::now();
+    started_ = fingertip::host_now();
     if (!options_["zero_log"].empty()) {
       double ago_us = static_cast<double>(number("started", 0)) * 1e6 / clock_rate();
       std::FILE *log = std::fopen(options_["zero_log"].c_str(), "w");
@@ -220,30 +196,23 @@ private:
     frame_ = 0;
   }
 
-  /* A terminal that goes takes along what nobody has read yet. */
+  /* A port that goes takes along what nobody has read yet. */
   void wait_for_reader() {
     constexpr milliseconds step{10}, settled{200}, limit{20000};
-    int terminal = open(ptsname(master_), O_RDWR | O_NOCTTY | O_NONBLOCK);
     milliseconds empty{0};
     for (milliseconds waited{0}; empty < settled && waited < limit && !ended; waited += step) {
-      int unread = 0;
-      ioctl(terminal, FIONREAD, &unread);
-      empty = unread > 0 ? milliseconds(0) : empty + step;
-      std::this_thread::sleep_for(step);
+      empty = port_->unread() > 0 ? milliseconds(0) : empty + step;
+      fingertip::wait_until(fingertip::host_now() + step);
     }
-    close(terminal);
   }
 
-  void power_off() {
-    unlink(link_.c_str());
-    close(master_);
-  }
+  void power_off() { port_.reset(); }
 
   double clock_rate() const { return 1 + static_cast<double>(number("clock_ppm", 0)) / 1e6; }
 
-  std::uint64_t now_us() const { return device_us(Clock::now()); }
+  std::uint64_t now_us() const { return device_us(fingertip::host_now()); }
 
-  std::uint64_t device_us(Clock::time_point at) const {
+  std::uint64_t device_us(Time at) const {
     double us = std::chrono::duration<double, std::micro>(at - started_).count();
     return static_cast<std::uint64_t>(us * clock_rate() +
                                       static_cast<double>(number("started", 0)) * 1e6);
@@ -256,16 +225,27 @@ private:
       std::uint8_t &byte = bytes[bytes.size() / 2];
       byte = static_cast<std::uint8_t>(byte ^ (byte == 0x80 ? 0x40 : 0x80)); /* no delimiter */
     }
-    if (mirror_ >= 0 && write(mirror_, bytes.data(), bytes.size()) < 0) {
-      return;
+    if (mirror_) {
+      write_all(*mirror_, bytes);
     }
-    if (number("mute", 0) || write(master_, bytes.data(), bytes.size()) < 0) {
-      return;
+    if (!number("mute", 0)) {
+      write_all(*port_, bytes);
+    }
+  }
+
+  /* Waits for who does not read. */
+  static void write_all(fingertip::ServedPort &port, const std::vector<std::uint8_t> &bytes) {
+    for (std::size_t done = 0; !ended;) {
+      done += port.write(bytes.data() + done, bytes.size() - done);
+      if (done == bytes.size()) {
+        return;
+      }
+      port.wait(fingertip::host_now() + milliseconds(1));
     }
   }
 
   /* measured: when, however late it is sent. */
-  void send_frame(Clock::time_point measured) {
+  void send_frame(Time measured) {
     frame_++;
     long stall = number("stall", 0), drop = number("drop", 0), flip = number("flip", 0);
     if (stall && frame_ > stall) {
@@ -300,21 +280,17 @@ private:
   }
 
   /* True if the streams changed. */
-  bool serve(milliseconds timeout) {
-    termios settings;
-    if (number("loader", 0) && tcgetattr(master_, &settings) == 0 &&
-        cfgetospeed(&settings) == B1200) {
+  bool serve(Time until) {
+    port_->wait(until);
+    if (number("loader", 0) && port_->speed() == B1200) {
       ended = 1;
     }
-    pollfd waiting = {master_, POLLIN, 0};
-    if (poll(&waiting, 1, static_cast<int>(timeout.count())) <= 0) {
-      return false;
+    if (!port_->is_open()) {
+      streams_ = 0;
     }
     std::uint8_t bytes[256];
-    ssize_t count = waiting.revents & POLLIN ? read(master_, bytes, sizeof bytes) : -1;
-    if (count <= 0) {
-      streams_ = 0; /* nobody has it open */
-      std::this_thread::sleep_for(milliseconds(2));
+    const std::size_t count = port_->read(bytes, sizeof bytes);
+    if (count == 0) {
       return false;
     }
     if (!options_["heard"].empty()) {
@@ -328,12 +304,11 @@ private:
     if (long version = number("version", 0)) {
       auto known = fingertip::info_frame_of_version(static_cast<std::uint8_t>(version));
       if (std::search(bytes, bytes + count, known.begin(), known.end()) != bytes + count) {
-        /* an empty packet will do: the version is judged first */
-        count = write(master_, known.data(), known.size());
+        write_all(*port_, known); /* an empty packet will do: the version is judged first */
       }
       return false;
     }
-    for (ssize_t i = 0; i < count; i++) {
+    for (std::size_t i = 0; i < count; i++) {
       wire_packet command;
       if (wire_receive(&receiver_, bytes[i], &command) == FT_OK) {
         changed = obey(command) || changed;
@@ -400,7 +375,8 @@ private:
       return false;
     case WIRE_CMD_LOADER:
       ended = number("loader", 0) != 0;
-      std::this_thread::sleep_for(milliseconds(50)); /* the answer is read before the port goes */
+      /* the answer is read before the port goes */
+      fingertip::wait_until(fingertip::host_now() + milliseconds(50));
       return false;
     case WIRE_CMD_HEALTH:
       send_health();
@@ -420,10 +396,10 @@ private:
 
   std::string link_;
   std::map<std::string, std::string> options_;
-  int master_ = -1, mirror_ = -1;
+  std::optional<fingertip::ServedPort> port_, mirror_;
   wire_receiver receiver_;
   wire_packet info_ = test::make_info(0, 0);
-  Clock::time_point started_;
+  Time started_;
   std::uint8_t streams_ = 0;
   std::uint16_t sequence_ = 0;
   long frame_ = 0;

@@ -97,7 +97,7 @@ public:
 private:
   void check() const {
     state_->exchanges++;
-    std::this_thread::sleep_for(std::chrono::milliseconds(state_->delay_ms));
+    fingertip::wait_until(fingertip::host_now() + std::chrono::milliseconds(state_->delay_ms));
     if (state_->unplugged) {
       throw fingertip::Error(fingertip::ErrorCode::gone, "fake: vanished");
     }

@@ -1,24 +1,20 @@
-// A fingertip on a pseudo-terminal that feels what a test says, frame by frame: answers commands,
+// A fingertip on a port that feels what a test says, frame by frame: answers commands,
 // streams, can be unplugged and plugged in again. A thread of its own serves it.
 #pragma once
 
+#include "libfingertip/clock.hpp"
 #include "libfingertip/command.hpp"
 #include "libfingertip/framing.hpp"
-#include "libfingertip/session.hpp"
+#include "libfingertip/served_port.hpp"
 #include "support/host_packets.hpp"
 #include "support/pad.h"
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cstdlib>
-#include <fcntl.h>
 #include <functional>
-#include <poll.h>
+#include <optional>
 #include <string>
-#include <termios.h>
-#include <thread>
-#include <unistd.h>
 
 namespace test {
 
@@ -58,37 +54,20 @@ public:
     if (thread_.joinable()) {
       ended_ = true;
       thread_.join();
-      unlink(link_.c_str());
-      close(slave_);
-      close(master_);
+      port_.reset();
     }
   }
   void plug_in() {
     if (thread_.joinable()) {
       return;
     }
-    master_ = posix_openpt(O_RDWR | O_NOCTTY);
-    if (master_ < 0 || grantpt(master_) != 0 || unlockpt(master_) != 0) {
-      std::perror("posix_openpt");
-      std::abort();
-    }
-    termios settings;
-    tcgetattr(master_, &settings);
-    cfmakeraw(&settings);
-    tcsetattr(master_, TCSANOW, &settings);
-    slave_ = open(ptsname(master_), O_RDWR | O_NOCTTY); // so that the master does not hang up
-    fcntl(master_, F_SETFL, O_NONBLOCK);
-    unlink(link_.c_str());
-    if (symlink(ptsname(master_), link_.c_str()) != 0) {
-      std::perror(link_.c_str());
-      std::abort();
-    }
+    port_.emplace(link_);
     streams_ = 0;
     sequence_ = 0;
     frame_ = 0;
     started_us_ = fingertip::steady_now_us();
     ended_ = false;
-    thread_ = std::thread([this] { run(); });
+    thread_ = fingertip::Thread([this] { run(); });
   }
 
 private:
@@ -101,19 +80,16 @@ private:
     wire_receiver_init(&receiver, wire_commands);
     std::uint64_t next_us = 0;
     while (!ended_) {
-      const std::uint64_t now = now_us();
-      const int wait_ms = streams_ == 0   ? 5
-                          : next_us > now ? static_cast<int>((next_us - now) / 1000)
-                                          : 0;
-      pollfd waiting = {master_, POLLIN, 0};
-      if (poll(&waiting, 1, wait_ms) > 0) {
-        std::uint8_t bytes[256];
-        const ssize_t count = read(master_, bytes, sizeof bytes);
-        for (ssize_t i = 0; i < count; i++) {
-          wire_packet command;
-          if (wire_receive(&receiver, bytes[i], &command) == FT_OK) {
-            obey(command);
-          }
+      const std::uint64_t look_us = now_us() + LOOK_us;
+      const std::uint64_t until_us = streams_ == 0 ? look_us : std::min(look_us, next_us);
+      port_->wait(fingertip::HostTime(
+          std::chrono::microseconds(started_us_ + static_cast<std::int64_t>(until_us))));
+      std::uint8_t bytes[256];
+      const std::size_t count = port_->read(bytes, sizeof bytes);
+      for (std::size_t i = 0; i < count; i++) {
+        wire_packet command;
+        if (wire_receive(&receiver, bytes[i], &command) == FT_OK) {
+          obey(command);
         }
       }
       if (streams_ != 0 && now_us() >= next_us) {
@@ -171,25 +147,26 @@ private:
     packet.sequence = sequence_++;
     const auto bytes = fingertip::frame_bytes(packet);
     for (std::size_t done = 0; done < bytes.size() && !ended_;) {
-      const ssize_t count = write(master_, bytes.data() + done, bytes.size() - done);
-      done += static_cast<std::size_t>(std::max<ssize_t>(count, 0));
-      if (count < 0) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      done += port_->write(bytes.data() + done, bytes.size() - done);
+      if (done < bytes.size()) {
+        fingertip::wait_until(fingertip::host_now() + std::chrono::milliseconds(1));
       }
     }
   }
+
+  static constexpr std::uint64_t LOOK_us = 5000; // for an end
 
   std::string link_;
   int rate_Hz_;
   std::function<Feel()> feel_;
   wire_packet info_ = make_info(0, 0);
-  int master_ = -1, slave_ = -1;
+  std::optional<fingertip::ServedPort> port_;
   std::int64_t started_us_ = 0;
   std::atomic<bool> ended_{false};
   std::uint8_t streams_ = 0;
   std::uint16_t sequence_ = 0;
   std::uint32_t frame_ = 0;
-  std::thread thread_;
+  fingertip::Thread thread_;
 };
 
 } // namespace test

@@ -56,7 +56,7 @@ class Bench(contextlib.ExitStack):
         """tests/support/fake_device.cpp, with its options."""
         port = browser.ports / f"{usb_id}:{serial}"
         return self._until_there(self._start(
-            self._tools.build / "tests/integration/host/fake_device", port, f"serial={serial}", *options, stdout=subprocess.DEVNULL), port)
+            self._tools.build / "tests/support/fake_device", port, f"serial={serial}", *options, stdout=subprocess.DEVNULL), port)
 
     def served(self):
         """The page, by `fingertip web`: its address without the last slash."""

@@ -1,5 +1,6 @@
 #include "cli/commands/commands.hpp"
 #include "cli/terminal.hpp"
+#include "libfingertip/clock.hpp"
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/packet_fields.hpp"
@@ -21,7 +22,6 @@
 #include <string_view>
 #include <sys/mount.h>
 #include <sys/wait.h>
-#include <thread>
 #include <unistd.h>
 
 namespace fingertip {
@@ -35,7 +35,6 @@ struct FlashOptions {
 };
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr milliseconds LOOK_INTERVAL{100};
@@ -56,7 +55,7 @@ void sleep_or_stop() {
   if (stop_requested()) {
     throw Interrupted();
   }
-  std::this_thread::sleep_for(LOOK_INTERVAL);
+  wait_until(host_now() + LOOK_INTERVAL);
 }
 
 /* The loader's board, from its INFO_UF2.TXT; nothing where there is none. */
@@ -216,9 +215,9 @@ std::string ask_into_loader(const FlashOptions &options, const FirmwareImage &im
 }
 
 std::unique_ptr<Volume> wait_for_volume(const std::string &given) {
-  auto begin = Clock::now();
+  auto begin = host_now();
   for (;;) {
-    auto waited = Clock::now() - begin;
+    auto waited = host_now() - begin;
     if (auto volume = Volume::find(given, waited > MOUNTED_BY_OTHERS)) {
       return volume;
     }
@@ -232,9 +231,9 @@ std::unique_ptr<Volume> wait_for_volume(const std::string &given) {
 /* The fingertip as it came back; nothing if it did and may not be opened. */
 std::optional<wire_info> wait_for_return(const Choice &choice) {
   Error last("nothing answered");
-  auto begin = Clock::now();
+  auto begin = host_now();
   auto not_refused = begin;
-  while (Clock::now() - begin < RETURN_TIMEOUT) {
+  while (host_now() - begin < RETURN_TIMEOUT) {
     sleep_or_stop();
     try {
       return ask(choose_way(choice), stop_requested);
@@ -242,8 +241,8 @@ std::optional<wire_info> wait_for_return(const Choice &choice) {
       last = error;
     }
     if (last.code() != ErrorCode::permission_denied) {
-      not_refused = Clock::now();
-    } else if (Clock::now() - not_refused > PERMITTED_WITHIN) {
+      not_refused = host_now();
+    } else if (host_now() - not_refused > PERMITTED_WITHIN) {
       std::fprintf(stderr, "written, and it came back; its version was not read: %s\n",
                    told(last).c_str());
       return std::nullopt;

@@ -4,6 +4,7 @@
 #include "cli/gripper_options.hpp"
 #include "cli/usage.hpp"
 #include "gripper/serial_line.hpp"
+#include "libfingertip/clock.hpp"
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
@@ -16,7 +17,6 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <thread>
 
 namespace fingertip {
 
@@ -107,11 +107,11 @@ std::string fault_of(const Gripper &gripper, const GripperStatus &status) {
 }
 
 // Until it is done; what lasts too long, or faults, ends in an Error.
-GripperStatus wait_for(Gripper &gripper, const char *what, double longest_s,
+GripperStatus wait_for_end(Gripper &gripper, const char *what, double longest_s,
                        const std::function<bool(const GripperStatus &)> &done,
                        const std::function<double(const GripperStatus &)> &share) {
   ProgressBar bar(what, ProgressBar::Lines::none);
-  const auto end = std::chrono::steady_clock::now() +
+  const auto end = host_now() +
                    std::chrono::milliseconds(static_cast<long>(longest_s * 1000));
   for (;;) {
     const GripperStatus status = polled(gripper);
@@ -124,22 +124,22 @@ GripperStatus wait_for(Gripper &gripper, const char *what, double longest_s,
       }
       throw Interrupted();
     }
-    if (std::chrono::steady_clock::now() > end) {
+    if (host_now() > end) {
       throw Error(std::string(what) + " did not end within " + fixed(longest_s, 0) + " s" +
                   (status.fault ? ", fault " + fault_of(gripper, status) : ""));
     }
     bar.show(std::clamp(share(status), 0.0, 1.0));
-    std::this_thread::sleep_for(POLLS);
+    wait_until(host_now() + POLLS);
   }
 }
 
 void activate(Gripper &gripper) {
   gripper.activate();
-  const auto begin = std::chrono::steady_clock::now();
-  const GripperStatus status = wait_for(
+  const auto begin = host_now();
+  const GripperStatus status = wait_for_end(
       gripper, "activating", ACTIVATION_MOST_s, [](const GripperStatus &now) { return now.active; },
       [&](const GripperStatus &) {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() /
+        return std::chrono::duration<double>(host_now() - begin).count() /
                ACTIVATION_MOST_s;
       });
   std::printf("activated at %s\n", mm(status.width_mm).c_str());
@@ -198,7 +198,7 @@ int move(Gripper &gripper, const GripperOptions &options) {
   }
   const double way_mm = std::abs(width_mm - begin.width_mm);
   gripper.move({width_mm, speed_mm_s, options.force_N});
-  const GripperStatus end = wait_for(
+  const GripperStatus end = wait_for_end(
       gripper, width_mm < begin.width_mm ? "closing" : "opening", way_mm / speed_mm_s + REST_MOST_s,
       [](const GripperStatus &now) { return !now.moving; },
       [&](const GripperStatus &now) {

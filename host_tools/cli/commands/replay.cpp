@@ -2,6 +2,7 @@
 #include "cli/converter.hpp"
 #include "cli/playback.hpp"
 #include "cli/view.hpp"
+#include "libfingertip/clock.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/packet_file.hpp"
@@ -9,13 +10,11 @@
 
 #include <cstdio>
 #include <memory>
-#include <thread>
 
 namespace fingertip {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
 
 struct ReplayOptions {
   std::string file;
@@ -44,13 +43,13 @@ int show(const ReplayOptions &options) {
   std::unique_ptr<View> view = playback.grip() ? make_grasp_view(options.colour, *playback.grip())
                                                : make_monitor_view(options.colour);
   while (!playback.is_over() && !stop_requested()) {
-    playback.step(Clock::now());
+    playback.step(host_now());
     view->update(playback.models(), playback.caption(name));
     while (auto key = view->key()) {
       playback.key(*key);
       view->hurry();
     }
-    std::this_thread::sleep_until(playback.next_step(Clock::now()));
+    wait_until(playback.next_step(host_now()));
   }
   view.reset();
   for (std::size_t i = 0; i < playback.tracks().size(); i++) {

@@ -1,4 +1,5 @@
 #include "cli/commands/commands.hpp"
+#include "libfingertip/clock.hpp"
 #include "libfingertip/share_socket.hpp"
 #include "libfingertip/text.hpp"
 #include "share/server.hpp"
@@ -22,7 +23,6 @@ struct ServeOptions {
   bool common = false;
 };
 
-using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds DEVICE_LOOK_INTERVAL{1000};
 
 void say(const std::string &line) {
@@ -84,11 +84,11 @@ int serve(const ServeOptions &options) {
   if (server.is_empty()) {
     say("no fingertip here yet; each that is plugged in will be shared");
   }
-  Clock::time_point looked = Clock::now();
+  HostTime looked = host_now();
   while (!stop_requested()) {
     server.step(DEVICE_LOOK_INTERVAL);
-    if (all && Clock::now() - looked > DEVICE_LOOK_INTERVAL) {
-      looked = Clock::now();
+    if (all && host_now() - looked > DEVICE_LOOK_INTERVAL) {
+      looked = host_now();
       watch.look();
     }
   }

@@ -28,7 +28,7 @@ def why_not():
 
 
 def measure(build, steps):
-    fake_device, python = build / "tests/integration/host/fake_device", ROOT / "build/venv/bin/python"
+    fake_device, python = build / "tests/support/fake_device", ROOT / "build/venv/bin/python"
     for path, how in ((fake_device, "cmake --build --preset host"), (python, "sh cmake/bootstrap.sh test")):
         if not path.exists():
             raise InputError(f"{path} is not there; {how}")

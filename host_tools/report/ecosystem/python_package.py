@@ -43,7 +43,7 @@ def wait_for(port):
 
 
 def reading(build):
-    fake = build / "tests/integration/host/fake_device"
+    fake = build / "tests/support/fake_device"
     if not fake.exists():
         raise InputError(f"{fake} is not there; build it: cmake --build --preset host")
     with tempfile.TemporaryDirectory(prefix="fingertip-") as folder:

@@ -14,7 +14,7 @@ FIGURES = ("frames", "fps", "core_percent", "lost", "refused", "sent", "heard", 
 
 
 def measure(build, steps):
-    fake, listener = build / "tests/integration/host/fake_device", build / "tests/integration/ros2/fast_dds_listener"
+    fake, listener = build / "tests/support/fake_device", build / "tests/integration/ros2/fast_dds_listener"
     if not listener.exists() or not PYTHON.exists():
         steps.say("no ROS 2 topics: Fast DDS (libfastrtps-dev) or build/venv is not there")
         return {f"ros2_{name}": None for name in (*FIGURES, "unheard")}

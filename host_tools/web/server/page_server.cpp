@@ -1,5 +1,6 @@
 #include "web/server/page_server.hpp"
 
+#include "libfingertip/clock.hpp"
 #include "libfingertip/error.hpp"
 
 #include <arpa/inet.h>
@@ -162,7 +163,7 @@ void PageServer::serve(const std::function<bool()> &is_over) {
   std::thread answering([this] { server_->listen_after_bind(); });
   /* Before it runs, it does not heed a stop. */
   while (!is_over() || !server_->is_running()) {
-    std::this_thread::sleep_for(LOOK_INTERVAL);
+    wait_until(host_now() + LOOK_INTERVAL);
   }
   server_->stop();
   answering.join();

@@ -1,41 +1,30 @@
-"""fingertip grasp against simulated fingertips and a simulated gripper: usage test_grasp.py FINGERTIP FAKE_CELL [unittest arguments]."""
+"""fingertip grasp against simulated fingertips and a simulated gripper, on simulated time.
+
+usage: test_grasp.py FINGERTIP FAKE_CELL TIME_KEEPER [unittest arguments]
+"""
 import contextlib
-import fcntl
 import os
 import pathlib
-import pty
-import re
 import resource
-import select
 import signal
-import struct
 import subprocess
 import sys
 import tempfile
-import termios
-import time
 import unittest
 
 import numpy as np
-import pyte
 
-FINGERTIP, FAKE_CELL = (os.path.abspath(path) for path in sys.argv[1:3])
-PATIENCE_s = 60
+FINGERTIP, FAKE_CELL, TIME_KEEPER = (os.path.abspath(path) for path in sys.argv[1:4])
+PLOT_PATIENCE_s = 60
 PYTHON_TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"
-sys.path.insert(0, str(PYTHON_TOOLS))
+sys.path[:0] = [str(PYTHON_TOOLS), str(pathlib.Path(__file__).resolve().parents[2] / "support")]
 from fingertip import files  # noqa: E402
+from simulated_terminal import Terminal  # noqa: E402
+from simulated_time import SimulatedTime  # noqa: E402
 
 MISSED, DROPPED, FAULT = 3, 4, 5
-# A limit that no slow machine meets.
-PATIENT = ("--silent", "2000")
 # A load of 2 N on both pads at the friction that is taken before any slide.
 HOLDS_2_N = 1 / 0.55
-
-
-def end(process):
-    process.kill()
-    with process:
-        pass
 
 
 class GraspTest(unittest.TestCase):
@@ -47,28 +36,23 @@ class GraspTest(unittest.TestCase):
         self.environment = {k: v for k, v in os.environ.items() if k != "FINGERTIP_PORT" and not k.startswith("LC_")}
         self.environment |= {"LC_ALL": "C.UTF-8", "XDG_RUNTIME_DIR": self.folder, "PYTHONDONTWRITEBYTECODE": "1"}
         self.environment["FINGERTIP_PORT"] = f"{self.folder}/left:{self.folder}/right"
+        self.world = SimulatedTime(TIME_KEEPER, self.folder)
+        self.addCleanup(self.world.close)
 
     @contextlib.contextmanager
     def cell(self, *options):
-        process = subprocess.Popen([FAKE_CELL, self.folder, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        self.process = process
+        self.simulated = self.world.start([FAKE_CELL, self.folder, *options], stdin=subprocess.PIPE)
         try:
-            self.assertEqual(process.stdout.readline(), "ready\n")
+            self.assertEqual(self.simulated.readline(), "ready\n")
             yield
         finally:
-            end(process)
+            self.simulated.kill()
+            self.simulated.wait()
 
     def tell(self, command="truth"):
         """Opening in mm and force on either pad in N, as they are."""
-        self.process.stdin.write(command + "\n")
-        self.process.stdin.flush()
-        return tuple(float(word) for word in self.process.stdout.readline().split())
-
-    def wait_for(self, condition):
-        limit = time.monotonic() + PATIENCE_s
-        while not condition():
-            self.assertLess(time.monotonic(), limit, "waited too long")
-            time.sleep(0.02)
+        self.simulated.stdin.write(command.encode() + b"\n")
+        return tuple(float(word) for word in self.simulated.readline().split())
 
     def steady(self):
         """What tell() tells once the gripper has come to rest."""
@@ -76,42 +60,36 @@ class GraspTest(unittest.TestCase):
 
         def rests():
             before, told[0] = told[0], self.tell()
-            time.sleep(0.5)
             return before == told[0]
 
-        self.wait_for(rests)
+        self.world.until(rests, step_s=0.5)
         return told[0]
 
     ARGUMENTS = ("grasp", "--gripper", "2f85", "--gripper-port")
 
     def start(self, *arguments, **options):
-        process = subprocess.Popen([FINGERTIP, *self.ARGUMENTS, f"{self.folder}/gripper", *PATIENT, *arguments], env=self.environment, text=True,
-                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options)
-        self.addCleanup(end, process)
-        return process
+        return self.world.start([FINGERTIP, *self.ARGUMENTS, f"{self.folder}/gripper", *arguments], env=self.environment, **options)
 
     def run_grasp(self, *arguments, status=0, **options):
-        process = self.start(*arguments, **options)
-        out, err = process.communicate(timeout=PATIENCE_s)
-        self.assertEqual(process.returncode, status, (out, err))
-        return out, err
+        return self.run_cli(*self.ARGUMENTS, f"{self.folder}/gripper", *arguments, status=status, **options)
 
-    def run_cli(self, *arguments, status=0):
-        done = subprocess.run([FINGERTIP, *arguments], env=self.environment, capture_output=True, text=True, timeout=PATIENCE_s)
-        self.assertEqual(done.returncode, status, (done.stdout, done.stderr))
-        return done.stdout, done.stderr
+    def run_cli(self, *arguments, status=0, **options):
+        ended, out, err = self.world.run([FINGERTIP, *arguments], env=self.environment, **options)
+        self.assertEqual(ended, status, (out, err))
+        return out, err
 
     def until_state(self, process, state):
         """Lines of standard output up to the one that tells this state."""
+        return self.told(process, f" s  {state} ")
+
+    def told(self, process, words):
+        """Likewise, up to the line with these words."""
         lines = []
-        limit = time.monotonic() + PATIENCE_s
-        while time.monotonic() < limit:
-            line = process.stdout.readline()
+        while line := process.readline():
             lines.append(line)
-            self.assertTrue(line, (lines, process.stderr.read() if process.poll() is not None else ""))
-            if f" s  {state} " in line:
+            if words in line:
                 return lines
-        self.fail(lines)
+        self.fail((words, lines, process.communicate()))
 
     def rows(self):
         return files.read_grip(self.csv)
@@ -135,7 +113,7 @@ class Usage(GraspTest):
         with self.cell():
             left = f"{self.folder}/left"
             self.assertIn("name the same fingertip", self.run_grasp("--left", left, "--right", left, status=2)[1])
-            os.symlink(os.readlink(left), f"{self.folder}/again")
+            os.symlink(left, f"{self.folder}/again")
             self.run_grasp("--left", left, "--right", f"{self.folder}/again", status=1)
             self.environment["FINGERTIP_PORT"] = f"{self.folder}/left:{self.folder}/right"
             _, err = self.run_grasp("--left", "BBBB", "--seconds", "0.2", "-o", self.csv)
@@ -152,12 +130,12 @@ class Usage(GraspTest):
             self.tell("object 40")
             self.until_state(process, "holding")
             process.terminate()
-            self.assertEqual(process.wait(PATIENCE_s), 0)
+            self.assertEqual(process.wait(), 0)
 
     def test_what_is_not_there_is_said(self):
         with self.cell():
             process = self.start("--seconds", "0.1")
-            process.communicate(timeout=PATIENCE_s)
+            process.communicate()
             os.unlink(f"{self.folder}/gripper")
             self.assertIn("no such port", self.run_grasp(status=1)[1])
         with self.cell():
@@ -174,9 +152,9 @@ class Course(GraspTest):
             process = self.start()
             self.until_state(process, "holding")
             self.tell("load 2")
-            self.wait_for(lambda: self.tell()[1] > HOLDS_2_N)
+            self.world.until(lambda: self.tell()[1] > HOLDS_2_N)
             process.terminate()
-            out, err = process.communicate(timeout=PATIENCE_s)
+            out, err = process.communicate()
             self.assertEqual(process.returncode, 0, err)
             self.assertRegex(err, r"holding; the gripper keeps its position, 3\d\.\d mm")
             self.assertGreater(self.steady()[1], HOLDS_2_N)
@@ -185,17 +163,17 @@ class Course(GraspTest):
             lines = self.until_state(process, "holding")
             self.assertNotIn("approach", "".join(lines))
             process.terminate()
-            process.wait(PATIENCE_s)
+            process.wait()
             self.assertGreater(self.tell()[1], 1)
 
     def test_a_set_force(self):
         with self.cell():
             process = self.start("--fixed", "4", "-o", self.csv, "--quiet")
-            while " s  holding " not in process.stderr.readline():
+            while " s  holding " not in process.readline("stderr"):
                 self.assertIsNone(process.poll())
-            self.wait_for(lambda: abs(self.tell()[1] - 4) < 0.5)
+            self.world.until(lambda: abs(self.tell()[1] - 4) < 0.5)
             process.terminate()
-            out, err = process.communicate(timeout=PATIENCE_s)
+            out, err = process.communicate()
             self.assertEqual((process.returncode, out), (0, ""), err)
             self.assertIn("frames of 2 fingertips", err)
 
@@ -215,7 +193,7 @@ class Course(GraspTest):
             self.assertEqual(self.steady()[0], width)
             self.assertIsNone(process.poll())
             process.send_signal(signal.SIGINT)
-            out, err = process.communicate(timeout=PATIENCE_s)
+            out, err = process.communicate()
             self.assertEqual(process.returncode, 0, err)
             self.assertGreater(self.tell()[0], 43)
         rows = self.rows()
@@ -239,11 +217,11 @@ class Course(GraspTest):
         with self.cell("object=0"):
             process = self.start()
             self.until_state(process, "approach")
-            self.wait_for(lambda: self.tell()[0] < 75)
+            self.world.until(lambda: self.tell()[0] < 75)
             process.kill()
             process.wait()
             width = self.tell()[0]
-            time.sleep(1)
+            self.world.sleep(1)
             self.assertGreater(self.tell()[0], width - 3)
 
 
@@ -259,23 +237,14 @@ class Trouble(GraspTest):
 
     def finish(self, process, status=0):
         process.terminate()
-        out, err = process.communicate(timeout=PATIENCE_s)
+        out, err = process.communicate()
         self.assertEqual(process.returncode, status, err)
         return out, err
 
     def assert_stays(self, seconds=0.7):
         width = self.tell()[0]
-        time.sleep(seconds)
+        self.world.sleep(seconds)
         self.assertAlmostEqual(self.tell()[0], width, delta=0.8)
-
-    def told(self, process, words):
-        limit = time.monotonic() + PATIENCE_s
-        while time.monotonic() < limit:
-            line = process.stdout.readline()
-            self.assertTrue(line, process.poll())
-            if words in line:
-                return
-        self.fail(words)
 
     def test_a_fingertip_is_unplugged_while_it_holds_and_comes_back(self):
         with self.cell():
@@ -285,17 +254,16 @@ class Trouble(GraspTest):
             self.assert_stays()
             self.tell("unplug right")
             self.told(process, "right: no frames")
-            time.sleep(0.5)
+            self.world.sleep(0.5)
             self.tell("load 9")
             self.assert_stays()
             self.tell("load 1")
             self.tell("plug left")
             self.tell("plug right")
-            limit = time.monotonic() + PATIENCE_s
-            while "no frames" in process.stdout.readline():
-                self.assertLess(time.monotonic(), limit)
+            while "no frames" in process.readline():
+                pass
             self.assertGreater(self.tell()[1], 0.8)
-            self.wait_for(lambda: len(files.read_recording(self.csv, device="AAAA").events) == 2)  # went, came back
+            self.world.until(lambda: len(files.read_recording(self.csv, device="AAAA").events) == 2)  # went, came back
             self.finish(process)
 
     def test_a_fingertip_is_unplugged_while_it_closes(self):
@@ -317,7 +285,7 @@ class Trouble(GraspTest):
             self.tell("unplug left")
             self.tell("unplug right")
             process.send_signal(signal.SIGINT)
-            process.communicate(timeout=PATIENCE_s)
+            process.communicate()
             self.assertGreater(self.tell()[0], 83)
 
     def test_a_frozen_fingertip_is_told(self):
@@ -332,9 +300,9 @@ class Trouble(GraspTest):
             process = self.hold()
             self.tell("over 1")
             self.told(process, "beyond its range")
-            time.sleep(0.5)  # what is under way
+            self.world.sleep(0.5)  # what is under way
             before = self.tell("load 6")[1]
-            time.sleep(0.5)
+            self.world.sleep(0.5)
             self.assertLessEqual(self.tell()[1], before + 0.4)
             self.finish(process)
 
@@ -351,7 +319,7 @@ class Trouble(GraspTest):
         with self.cell():
             process = self.hold()
             self.tell("object 1")
-            out, err = process.communicate(timeout=PATIENCE_s)
+            out, err = process.communicate()
             self.assertEqual(process.returncode, DROPPED, err)
             self.assertIn("nothing is between the fingertips any more", err)
 
@@ -360,7 +328,7 @@ class Trouble(GraspTest):
             process = self.hold()
             before = self.tell()[1]
             self.tell("slide 1")
-            self.wait_for(lambda: self.tell()[1] > 1.1 * before)
+            self.world.until(lambda: self.tell()[1] > 1.1 * before)
             self.tell("slide 0")
             self.finish(process)
         rows = self.rows()
@@ -377,9 +345,8 @@ class Trouble(GraspTest):
                 self.assert_stays()
                 self.tell("load 1")
                 self.tell("line none")
-                limit = time.monotonic() + PATIENCE_s
-                while "the gripper does not answer" in process.stdout.readline():
-                    self.assertLess(time.monotonic(), limit)
+                while "the gripper does not answer" in process.readline():
+                    pass
             self.finish(process)
 
     def test_a_gripper_unplugged_to_the_end_is_a_fault(self):
@@ -394,7 +361,7 @@ class Trouble(GraspTest):
         with self.cell():
             process = self.hold()
             self.tell("fault 8")
-            out, err = process.communicate(timeout=PATIENCE_s)
+            out, err = process.communicate()
             self.assertEqual(process.returncode, FAULT, err)
             self.assertIn("fault; the width stays", err)
             self.assertIn("too hot", err)  # what 8 means
@@ -410,7 +377,7 @@ class Trouble(GraspTest):
             self.until_state(process, "holding")
             self.told(process, "not recorded any more")
             self.tell("load 2")
-            self.wait_for(lambda: self.tell()[1] > HOLDS_2_N)
+            self.world.until(lambda: self.tell()[1] > HOLDS_2_N)
             _, err = self.finish(process, 1)
             self.assertIn("make room", err)
             self.assertGreater(self.tell()[1], HOLDS_2_N)
@@ -430,12 +397,12 @@ class Recorded(GraspTest):
             self.until_state(process, "slipping")
             self.tell("slide 0")
             self.until_state(process, "holding")
-            time.sleep(0.5)
+            self.world.sleep(0.5)
             self.truth = self.tell()
             process.send_signal(signal.SIGINT)
             self.until_state(process, "still")
             process.terminate()
-            self.assertEqual(process.wait(PATIENCE_s), 0)
+            self.assertEqual(process.wait(), 0)
 
     def test_everything_reads_it(self):
         self.record()
@@ -445,7 +412,7 @@ class Recorded(GraspTest):
         for earlier, later in (("idle", "approach"), ("approach", "squeeze"), ("squeeze", "ready"), ("ready", "holding"), ("holding", "slipping"),
                                ("slipping", "still")):
             self.assertLess(states.index(earlier), len(states) - 1 - states[::-1].index(later), states)
-        self.assertTrue((np.diff(rows["time_us"]) > 0).all())
+        self.assertTrue((np.diff(rows["time_us"]) >= 0).all())
         self.assertLess(np.median(np.diff(rows["time_us"])), 10500)
         self.assertAlmostEqual(rows["width_mm"][-1], self.truth[0], delta=0.6)
         self.assertGreater(rows["load_N"].max(), 0.8)
@@ -476,13 +443,13 @@ class Recorded(GraspTest):
 
         picture = os.path.join(self.folder, "grasp.png")
         done = subprocess.run([sys.executable, PYTHON_TOOLS, "plot", self.csv, "-o", picture], capture_output=True, text=True,
-                              env=self.environment, timeout=PATIENCE_s)
+                              env=self.environment, timeout=PLOT_PATIENCE_s)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertRegex(done.stdout, r"grasp\.png: 1 slide, held by at most \d+\.\d N, at last still")
         with open(picture, "rb") as file:
             self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
         done = subprocess.run([sys.executable, PYTHON_TOOLS, "plot", self.csv, "--device", "AAAA", "-o", picture], capture_output=True, text=True,
-                              env=self.environment, timeout=PATIENCE_s)
+                              env=self.environment, timeout=PLOT_PATIENCE_s)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("frames in", done.stdout)
 
@@ -501,50 +468,18 @@ class Recorded(GraspTest):
 class Live(GraspTest):
     def on_terminal(self, *arguments, steps, size=(80, 24)):
         """Each step: what the screen shows before the keys are typed. Exit status; self.shown is the last screen."""
-        pid, terminal = pty.fork()
-        if pid == 0:
-            time.sleep(0.05)
-            os.execve(FINGERTIP, [FINGERTIP, *arguments], {**self.environment, "COLORTERM": "truecolor", "TERM": "xterm"})
-        fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", size[1], size[0], 0, 0))
-        screen, self.shown, self.output = pyte.Screen(*size), "", b""
-        stream = pyte.ByteStream(screen)
-        steps = list(steps)
-        try:
-            limit = time.monotonic() + PATIENCE_s
-            while True:
-                self.assertLess(time.monotonic(), limit, (steps, self.shown, self.output[-500:]))
-                if select.select([terminal], [], [], 0.1)[0]:
-                    try:
-                        chunk = os.read(terminal, 65536)
-                    except OSError:
-                        break
-                    if not chunk:
-                        break
-                    self.output += chunk
-                    for part in re.split(rb"(?<=\x1b\[\?2026l)", chunk):
-                        stream.feed(part)
-                        if part.endswith(b"\x1b[?2026l"):
-                            self.shown = "\n".join(screen.display)
-                if steps and re.search(steps[0][0], self.shown, re.S):
-                    step = steps.pop(0)[1]
-                    if callable(step):
-                        step()
-                    else:
-                        os.write(terminal, step)
-            _, status = os.waitpid(pid, 0)
-            pid = 0
-        finally:
-            if pid:
-                os.kill(pid, signal.SIGKILL)
-                os.waitpid(pid, 0)
-            os.close(terminal)
-        self.assertEqual(steps, [])
-        return os.waitstatus_to_exitcode(status)
+        with Terminal(self.world, [FINGERTIP, *arguments], {**self.environment, "COLORTERM": "truecolor", "TERM": "xterm"}, size) as terminal:
+            for pattern, action in steps:
+                terminal.until(pattern)
+                action() if callable(action) else terminal.type(action)
+            status = terminal.wait()
+            self.shown, self.output = terminal.shown, terminal.output
+        return status
 
     def test_shows_both_pads_and_the_gripper_and_obeys_keys(self):
         for size in ((80, 24), (160, 50)):
             with self.cell():
-                status = self.on_terminal(*self.ARGUMENTS, f"{self.folder}/gripper", *PATIENT, "-o", self.csv, "--overwrite", size=size, steps=[
+                status = self.on_terminal(*self.ARGUMENTS, f"{self.folder}/gripper", "-o", self.csv, "--overwrite", size=size, steps=[
                     (r"HOLDING.*wanted +\d\.\d\d N", lambda: self.tell("load 2")),
                     (r"load +1\.0\d N .*margin +\d\.\d\d", lambda: None),
                     (r"q end, holding  o open  h hold  g grasp", b"h"),
@@ -562,17 +497,17 @@ class Live(GraspTest):
 
     def test_pasted_text_and_a_terminals_answers_are_no_keys(self):
         with self.cell():
-            status = self.on_terminal(*self.ARGUMENTS, f"{self.folder}/gripper", *PATIENT, steps=[
-                ("HOLDING", b"\x1b[200~ohoq\x1b[201~\x1b[8;24;80t"), ("HOLDING", lambda: time.sleep(0.5)), ("HOLDING", b"q")])
+            status = self.on_terminal(*self.ARGUMENTS, f"{self.folder}/gripper", steps=[
+                ("HOLDING", b"\x1b[200~ohoq\x1b[201~\x1b[8;24;80t"), ("HOLDING", lambda: self.world.sleep(0.5)), ("HOLDING", b"q")])
             self.assertEqual(status, 0)
             self.assertGreater(self.tell()[1], 0.8)
 
     def test_ctrl_c_on_a_terminal_and_a_window_that_is_too_small(self):
         with self.cell():
-            status = self.on_terminal(*self.ARGUMENTS, f"{self.folder}/gripper", *PATIENT, "--open-width", "45", size=(79, 24), steps=[
+            status = self.on_terminal(*self.ARGUMENTS, f"{self.folder}/gripper", "--open-width", "45", size=(79, 24), steps=[
                 (r"needs 80x24.*holding", b"\x03"), (r"Ctrl-C: the width stays", b"\x03")])
         self.assertEqual(status, 0)
 
 
 if __name__ == "__main__":
-    unittest.main(argv=[sys.argv[0], *sys.argv[3:]], verbosity=2)
+    unittest.main(argv=[sys.argv[0], *sys.argv[4:]], verbosity=2)

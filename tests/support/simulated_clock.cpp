@@ -1,0 +1,211 @@
+// libfingertip's clock, simulated: programs that are linked with this one instead live on the time
+// of a time keeper (time_keeper.cpp), whose socket the environment names. One thread of all those
+// programs runs at a time; time passes only while all of them wait.
+#include "libfingertip/clock.hpp"
+#include "support/time_keeper.hpp"
+
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <thread>
+#include <unistd.h>
+
+namespace fingertip {
+
+namespace {
+
+using std::chrono::microseconds;
+using test::Order;
+
+// The wall clock of a simulated world begins on 1 January 2026.
+constexpr std::int64_t WALL_ZERO_s = 1767225600;
+// So often without a wait means that somebody counts on time to pass by itself.
+constexpr int MOST_LOOKS = 1'000'000;
+
+std::atomic<std::int64_t> now_us{0};
+std::atomic<int> looks{0};
+
+[[noreturn]] void fail(const char *what) {
+  std::fprintf(stderr, "simulated clock: %s (%s)\n", what, std::strerror(errno));
+  std::_Exit(125);
+}
+
+int connected() {
+  const char *path = std::getenv(test::KEEPER_VARIABLE);
+  sockaddr_un address = {};
+  address.sun_family = AF_UNIX;
+  if (path == nullptr || std::strlen(path) >= sizeof address.sun_path) {
+    fail(test::KEEPER_VARIABLE);
+  }
+  std::strcpy(address.sun_path, path);
+  const int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
+  if (fd < 0 || connect(fd, reinterpret_cast<const sockaddr *>(&address), sizeof address) != 0) {
+    fail(path);
+  }
+  return fd;
+}
+
+// A thread's connection.
+class Line {
+public:
+  Line() = default;
+  // Without a goodbye its process ends, which a main thread's end means.
+  ~Line() {
+    if (fd_ >= 0 && pid_ == getpid()) {
+      if (gettid() != pid_) {
+        say({Order::BYE, 0, 0, 0, {}});
+      }
+      close(fd_);
+    }
+  }
+
+  void adopt(int fd) {
+    fd_ = fd;
+    pid_ = getpid();
+  }
+  void say(const Order &order, const pollfd *descriptors = nullptr) {
+    alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int) * test::MOST_DESCRIPTORS)] = {};
+    iovec part = {const_cast<Order *>(&order), sizeof order};
+    msghdr message = {};
+    message.msg_iov = &part;
+    message.msg_iovlen = 1;
+    if (order.count > 0) {
+      message.msg_control = control;
+      message.msg_controllen = CMSG_SPACE(sizeof(int) * order.count);
+      cmsghdr *rights = CMSG_FIRSTHDR(&message);
+      rights->cmsg_level = SOL_SOCKET;
+      rights->cmsg_type = SCM_RIGHTS;
+      rights->cmsg_len = CMSG_LEN(sizeof(int) * order.count);
+      int *to = reinterpret_cast<int *>(CMSG_DATA(rights));
+      for (std::uint32_t i = 0; i < order.count; i++) {
+        to[i] = descriptors[i].fd;
+      }
+    }
+    while (sendmsg(fd_, &message, MSG_NOSIGNAL) < 0) {
+      if (errno != EINTR) {
+        std::_Exit(125); // the test is over
+      }
+    }
+  }
+  // Until it is this thread's turn; false: after a signal.
+  bool turn() {
+    bool is_whole = true;
+    std::int64_t told_us = 0;
+    for (;;) {
+      const ssize_t size = recv(fd_, &told_us, sizeof told_us, 0);
+      if (size == sizeof told_us) {
+        now_us = told_us;
+        looks = 0;
+        return is_whole;
+      }
+      if (size == 0 || errno != EINTR) {
+        std::_Exit(125);
+      }
+      is_whole = false;
+      say({Order::INTERRUPTED, 0, 0, 0, {}});
+    }
+  }
+  void be_there() {
+    if (fd_ < 0 || pid_ != getpid()) { // the first time, or after a fork
+      if (fd_ >= 0) {
+        close(fd_); // the parent's
+      }
+      adopt(connected());
+      say({Order::HELLO, 0, 0, 0, {}});
+      turn();
+    }
+  }
+
+private:
+  int fd_ = -1;
+  pid_t pid_ = 0;
+};
+
+thread_local Line line;
+
+} // namespace
+
+HostTime host_now() {
+  line.be_there();
+  return HostTime(microseconds(now_us));
+}
+
+std::chrono::system_clock::time_point wall_now() {
+  return std::chrono::system_clock::time_point(std::chrono::seconds(WALL_ZERO_s)) +
+         std::chrono::duration_cast<std::chrono::system_clock::duration>(
+             host_now().time_since_epoch());
+}
+
+int wait_for(pollfd *descriptors, std::size_t count, HostTime until) {
+  const HostTime now = host_now();
+  if (until <= now) {
+    if (++looks > MOST_LOOKS) {
+      errno = 0;
+      fail("somebody looks for ever without waiting");
+    }
+    return std::max(0, ::poll(descriptors, count, 0));
+  }
+  Order order = {Order::WAIT, 0, INT64_MAX, 0, {}};
+  if (until != HostTime::max()) {
+    order.until_us = std::chrono::ceil<microseconds>(until.time_since_epoch()).count();
+  }
+  pollfd asked[test::MOST_DESCRIPTORS];
+  for (std::size_t i = 0; i < count; i++) {
+    if (descriptors[i].fd >= 0) {
+      if (order.count == test::MOST_DESCRIPTORS) {
+        fail("too many descriptors");
+      }
+      asked[order.count] = descriptors[i];
+      order.events[order.count++] = descriptors[i].events;
+    }
+  }
+  line.say(order, asked);
+  if (!line.turn()) {
+    return 0;
+  }
+  return std::max(0, ::poll(descriptors, count, 0));
+}
+
+struct Thread::State {
+  std::thread thread;
+  Wake ended;
+};
+
+Thread::Thread(std::function<void()> run) : state_(std::make_unique<State>()) {
+  line.be_there();
+  const int fd = connected();
+  Line early; // says hello in its name: it is there from now on
+  early.adopt(fd);
+  early.say({Order::HELLO, 0, 0, 0, {}});
+  early.adopt(-1);
+  Wake &ended = state_->ended;
+  state_->thread = std::thread([fd, run = std::move(run), &ended] {
+    line.adopt(fd);
+    line.turn();
+    run();
+    ended.set();
+  });
+}
+
+void Thread::join() {
+  while (!state_->ended.wait(HostTime::max())) {
+  }
+  state_->thread.join();
+  state_.reset();
+}
+
+void clock_expects(pid_t child) {
+  line.be_there();
+  line.say({Order::SPAWNED, child, 0, 0, {}});
+}
+
+Thread::Thread() = default;
+Thread::Thread(Thread &&) noexcept = default;
+Thread &Thread::operator=(Thread &&) noexcept = default;
+Thread::~Thread() = default;
+
+} // namespace fingertip

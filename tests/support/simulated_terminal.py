@@ -1,0 +1,107 @@
+"""A program in a simulated world on a terminal: its screen, and keys for it."""
+import contextlib
+import fcntl
+import os
+import pty
+import re
+import select
+import struct
+import termios
+import threading
+import time
+
+import pyte
+
+from simulated_time import PATIENCE_s
+
+# What a program on a terminal writes reaches the other side by a thread of the kernel. Behind this mark, written last, nothing is missing.
+MARK = b"\x1b_all\x1b\\"
+END_OF_UPDATE = b"\x1b[?2026l"
+ARRIVAL_s = 60  # of real time, for what is on its way through the kernel
+
+
+class Terminal:
+    """As Process, whose outputs and input are one terminal. Close it."""
+
+    def __init__(self, world, arguments, env=None, size=(80, 24)):
+        self._master, self._slave = pty.openpty()
+        fcntl.ioctl(self._slave, termios.TIOCSWINSZ, struct.pack("HHHH", size[1], size[0], 0, 0))
+        self._screen = pyte.Screen(*size)
+        self._stream = pyte.ByteStream(self._screen)
+        self._world = world
+        self.shown = ""  # the last whole picture
+        self.output = b""
+        self._came, self._more = b"", threading.Condition()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        self.process = world.start(arguments, env=env, stdin=self._slave, stdout=self._slave, stderr=self._slave, start_new_session=True,
+                                   preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0))
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.end()
+        os.close(self._slave)
+        self._reader.join()
+        os.close(self._master)
+
+    def _read(self):
+        """A terminal holds four kilobytes: who writes more waits, and all the world with it."""
+        with contextlib.suppress(OSError):  # nobody has it open any more
+            while came := os.read(self._master, 1 << 16):
+                with self._more:
+                    self._came += came
+                    self._more.notify()
+
+    def look(self):
+        """The last whole picture, with all that was written until now."""
+        os.write(self._slave, MARK)
+        with self._more:
+            assert self._more.wait_for(lambda: self._came.endswith(MARK), ARRIVAL_s), "what was written does not arrive"
+            came, self._came = self._came[:-len(MARK)], b""
+        self.output += came
+        for part in re.split(rb"(?<=\x1b\[\?2026l)", came):
+            self._stream.feed(part)
+            if part.endswith(END_OF_UPDATE):
+                self.shown = "\n".join(self._screen.display)
+        return self.shown
+
+    @property
+    def screen(self):
+        """pyte's, with colours."""
+        return self._screen
+
+    def resize(self, columns, rows):
+        fcntl.ioctl(self._slave, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+        self._screen.resize(rows, columns)
+
+    def type(self, keys):
+        os.write(self._master, keys)
+        if b"\x03" in keys:
+            self._world.signalled(self.process.pid)
+            return
+        limit_s = time.monotonic() + ARRIVAL_s
+        while not select.select([self._slave], [], [], 0.1)[0]:
+            assert time.monotonic() < limit_s, "the keys do not arrive"
+
+    def until(self, pattern, limit_s=PATIENCE_s):
+        """Until the picture shows this."""
+        def is_shown():
+            return re.search(pattern, self.look(), re.S)
+
+        try:
+            return self._world.until(is_shown, limit_s)
+        except AssertionError as error:
+            raise AssertionError(f"{error}: {pattern!r} is not shown; status {self.process.poll()}\n{self.shown}\n{self.output[-500:]}") from None
+
+    def wait(self, limit_s=PATIENCE_s):
+        """Its status. A terminal that nobody reads stops it."""
+        def has_ended():
+            self.look()
+            return self.process.poll() is not None
+
+        with contextlib.suppress(ChildProcessError):
+            self._world.until(has_ended, limit_s)
+        self.look()
+        return self.process.returncode
