@@ -47,7 +47,7 @@ protected:
   }
 
   std::string path_;
-  Playback::Clock::time_point now_{};
+  HostTime now_{};
 };
 
 } // namespace
