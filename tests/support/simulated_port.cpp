@@ -93,6 +93,7 @@ std::size_t ServedPort::read(std::uint8_t *bytes, std::size_t capacity) {
 }
 
 std::size_t ServedPort::write(const std::uint8_t *bytes, std::size_t length) {
+  look();
   if (!is_open_) {
     return length;
   }
