@@ -1,26 +1,37 @@
 #!/bin/sh
 # Sets up a Debian 12 or Ubuntu 24.04 machine and does one of the project's main jobs.
-# usage: sh cmake/bootstrap.sh demo|web|test|report|report all|fuzz HOURS|soak HOURS
+# usage: see below, or run it without an argument
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
 
 usage() {
-  echo "usage: sh cmake/bootstrap.sh demo|web|test|report|report all|fuzz HOURS|soak HOURS" >&2
+  echo "usage: sh cmake/bootstrap.sh demo|web|test [LABEL]|report [all|suite]|fuzz HOURS|soak HOURS" >&2
   echo "  demo    build what it needs, let a lime slip on two emulated fingertips, catch what slips in a simulated gripper, say and draw both" >&2
   echo "  web     build the page and the tool, serve the page to this machine's browsers" >&2
   echo "  test    build everything and run the whole test suite" >&2
+  echo "  test quick    build what the quick tests need and run them: about a minute once built" >&2
+  echo "  test LABEL    build everything and run one part: host, emulated, accuracy, realtime, browser or linux" >&2
   echo "  report  build everything, measure fit, rate, cost, truth, tangential load and grasps, repeat the published experiments in simulation, write build/report; within an hour" >&2
   echo "  report all    the same with every pad and grasp, and what fuzzers, storms of faults and mutation find; some hours" >&2
+  echo "  report suite  build everything and run the test suite over and over, half of the runs on a busy machine; some hours" >&2
   echo "  fuzz    build the fuzz targets and run them for so many hours; what they find is kept in build/fuzz/findings" >&2
   echo "  soak    build everything and let faults storm on the firmware for so many hours, natively and emulated; findings in build/soak/findings" >&2
   exit 2
 }
 case $# in
   1) case $1 in demo | web | test | report) ;; *) usage ;; esac ;;
-  2) case "$1 $2" in "report all" | fuzz\ * | soak\ *) ;; *) usage ;; esac ;;
+  2) case "$1 $2" in
+       "test quick" | "test host" | "test emulated" | "test accuracy" | "test realtime" | "test browser" | "test linux") ;;
+       "report all" | "report suite" | fuzz\ * | soak\ *) ;;
+       *) usage ;;
+     esac ;;
   *) usage ;;
 esac
+
+# What is built and installed for it.
+job=$1
+[ "$1 ${2:-}" = "test quick" ] && job=quick
 
 say() { printf '%s\n' "== $*"; }
 
@@ -50,7 +61,7 @@ arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/lib/python3/dist-packages/matplotlib/__init__.py python3-matplotlib
 /usr/lib/python3/dist-packages/serial/__init__.py python3-serial
 LIST
-  case $1 in test | report | fuzz | soak) cat << 'LIST' ;; esac
+  case $1 in quick | test | report | fuzz | soak) cat << 'LIST' ;; esac
 xz xz-utils
 qemu-system-arm qemu-system-arm
 qemu-system-x86_64 qemu-system-x86
@@ -80,12 +91,14 @@ llvm-ar-14 llvm-14
 /usr/lib/wasm32-wasi/libc++.a libc++-14-dev-wasm32
 /usr/lib/wasm32-wasi/libc++abi.a libc++abi-14-dev-wasm32
 LIST
+  case $1 in quick | test | report) cat << 'LIST' ;; esac
+/usr/include/fastdds/dds/topic/TopicDataType.hpp libfastrtps-dev
+LIST
   case $1 in test | report) cat << 'LIST' ;; esac
 clang-tidy-14 clang-tidy-14
 cppcheck cppcheck
 openssl openssl
 /bin/ip iproute2
-/usr/include/fastdds/dds/topic/TopicDataType.hpp libfastrtps-dev
 LIST
   # Ubuntu has no package of it; without it the page's tests say why they do not run.
   case $1.$(sed -n 's/^ID=//p' /etc/os-release) in test.debian | report.debian) echo chromium chromium ;; esac
@@ -98,7 +111,7 @@ is_there() {
   esac
 }
 
-missing=$(needed "$1" | sort -u | while read -r probe package; do is_there "$probe" || echo "$package"; done)
+missing=$(needed "$job" | sort -u | while read -r probe package; do is_there "$probe" || echo "$package"; done)
 if [ -n "$missing" ]; then
   say "missing packages:" $missing
   command -v apt-get > /dev/null 2>&1 || {
@@ -135,7 +148,7 @@ if ! cmp -s $emulator/package-lock.json $emulator/node_modules/.installed-lock; 
   cp $emulator/package-lock.json $emulator/node_modules/.installed-lock
 fi
 
-if { [ "$1" = test ] || [ "$1" = report ]; } && ! cmp -s tests/requirements.txt build/venv/.installed-requirements; then
+if { [ "$job" = test ] || [ "$job" = report ]; } && ! cmp -s tests/requirements.txt build/venv/.installed-requirements; then
   say "fetching the judges with pip"
   /usr/bin/python3 -m venv --clear build/venv
   build/venv/bin/pip --quiet --disable-pip-version-check install -r tests/requirements.txt
@@ -153,7 +166,7 @@ if [ "$1" = fuzz ]; then
   exec /usr/bin/python3 tests/fuzz/fuzz.py --build build/fuzz --hours "$2"
 fi
 say "building firmware and host tools into build/"
-case $1 in
+case $job in
   demo)
     configure host -DBUILD_TESTING=OFF
     cmake --build --preset host --target fingertip twin fingertip_cell_program image_pico_parallel
@@ -161,6 +174,10 @@ case $1 in
   web)
     configure host -DBUILD_TESTING=OFF -DFINGERTIP_WEB=ON
     cmake --build --preset host --target fingertip web
+    ;;
+  quick)
+    configure host -DBUILD_TESTING=ON
+    cmake --build --preset host --target quick_tests
     ;;
   soak)
     configure host -DBUILD_TESTING=ON
@@ -179,10 +196,13 @@ case $1 in
     exec sh host_tools/demo/demo.sh $stay
     ;;
   web) exec build/host/host_tools/cli/fingertip web ;;
-  # One more than there are processors: many tests wait most of the time.
-  test) exec ctest --preset host -j "$(($(nproc) + 1))" ;;
+  test) exec ctest --preset host -j "$(nproc)" ${2:+-L "^$2\$"} ;;
   soak) exec /usr/bin/python3 tests/soak/soak.py --build build/host --boards build --hours "$2" ;;
   report)
+    if [ "${2:-}" = suite ]; then
+      say "the test suite, over and over"
+      exec /usr/bin/python3 host_tools/report/suite/suite.py --build build/host -o build/report
+    fi
     say "the fit: error against run time"
     /usr/bin/python3 host_tools/report/fit/fit.py --build build/host \
       --image build/pico_mux/fit_cycles.bin -o build/report --picture host_tools/report/fit/fit_report.png

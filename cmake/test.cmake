@@ -1,0 +1,31 @@
+# ft_test(LABEL NAME name COMMAND ...): as add_test, with one of the labels that tests/README.md explains.
+set(FT_TEST_LABELS quick host emulated accuracy realtime browser linux)
+
+function(ft_test label)
+  if(NOT label IN_LIST FT_TEST_LABELS)
+    message(FATAL_ERROR "ft_test: \"${label}\" is no label of a test; choose one of: ${FT_TEST_LABELS}")
+  endif()
+  cmake_parse_arguments(arg "" "NAME" "COMMAND" ${ARGN})
+  add_test(${ARGN})
+  set_tests_properties(${arg_NAME} PROPERTIES LABELS ${label} ENVIRONMENT_MODIFICATION PYTHONDONTWRITEBYTECODE=set:1)
+  # What measures real time has the machine for itself.
+  if(label STREQUAL "realtime")
+    set_tests_properties(${arg_NAME} PROPERTIES RUN_SERIAL ON)
+  endif()
+  # What the quick tests need built: the programs that they name.
+  if(label STREQUAL "quick")
+    foreach(word IN LISTS arg_COMMAND)
+      string(REGEX REPLACE "^\\$<TARGET_FILE:(.*)>$" "\\1" program "${word}")
+      if(TARGET ${program})
+        set_property(GLOBAL APPEND PROPERTY FT_QUICK_PROGRAMS ${program})
+      endif()
+    endforeach()
+  endif()
+endfunction()
+
+# After all tests: `cmake --build build/host --target quick_tests` builds what the quick ones run.
+function(ft_quick_target)
+  get_property(programs GLOBAL PROPERTY FT_QUICK_PROGRAMS)
+  list(REMOVE_DUPLICATES programs)
+  add_custom_target(quick_tests DEPENDS ${programs})
+endfunction()
