@@ -233,6 +233,8 @@ case $1 in
     if [ "${2:-}" = all ]; then
       say "what the fuzzers, the analysers and mutation find, and how faults and power cuts are overcome"
       /usr/bin/python3 host_tools/report/reliability/reliability.py --build build/host -o build/report
+      say "the test suite, over and over"
+      /usr/bin/python3 host_tools/report/suite/suite.py --build build/host -o build/report
     fi
     say "the page, in a browser"
     /usr/bin/python3 host_tools/report/web/web.py --build build/host -o build/report

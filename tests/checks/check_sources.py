@@ -42,6 +42,28 @@ def rules_for(path):
     return [(re.compile(pattern), message) for pattern, message in rules]
 
 
+# What a test waits with, by the system's clock. A file whose subject is real time says so in a comment, "real time: ", and why.
+WAITS = (("sleep", re.compile(r"\b(?:usleep|nanosleep|setTimeout|waitForTimeout)\s*\(|\b(?:time|asyncio)\.sleep\s*\(|this_thread::sleep"
+                              r"|(?<!def )(?<![\w.])sleep\s*\(|(?<![\w.'-])u?sleep [0-9.]")),
+         ("retry", re.compile(r"once_in_three|\b(?:flaky|retries|retry_until|rerun_failures|ctest --repeat)\b")))
+TESTS = SOURCE | {".py", ".mjs", ".js", ".ts", ".sh"}
+REAL_TIME = re.compile(r"(?:#|//|\*) real time: ")
+
+
+def waits(root):
+    """(path, line number, "sleep" or "retry") of each such call in the tests."""
+    found = []
+    for path in sorted((root / "tests").rglob("*")):
+        if path.suffix not in TESTS or "node_modules" in path.parts or path.parent.name == "checks":
+            continue
+        lines = path.read_text(encoding="utf-8").split("\n")
+        if any(REAL_TIME.search(line) for line in lines):
+            continue
+        found += [(path.relative_to(root), number, what) for number, line in enumerate(lines, 1) for what, pattern in WAITS
+                  if pattern.search(re.sub(r"\s*(?:#|//).*", "", line))]
+    return found
+
+
 def violations(root):
     for folder in ("firmware", "boards", "host_tools", "tests"):
         for path in sorted((root / folder).rglob("*")):

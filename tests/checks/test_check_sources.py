@@ -5,6 +5,8 @@ import sys
 import tempfile
 import unittest
 
+from check_sources import waits
+
 CHECK = pathlib.Path(__file__).with_name("check_sources.py")
 
 
@@ -42,6 +44,28 @@ class CheckSources(unittest.TestCase):
         code, output = self.check("boards/x/main.c", "\n" * 120)
         self.assertEqual(code, 1)
         self.assertIn("under 100 lines", output)
+
+
+class Waits(unittest.TestCase):
+    def found(self, name, text):
+        with tempfile.TemporaryDirectory() as root:
+            path = pathlib.Path(root) / "tests" / name
+            path.parent.mkdir()
+            path.write_text(text)
+            return [(str(where), number, what) for where, number, what in waits(pathlib.Path(root))]
+
+    def test_each_way_to_wait_is_found(self):
+        for name, line in (("a.py", "    time.sleep(1)"), ("a.py", "    await asyncio.sleep(1)"), ("a.py", '    self.sh("sleep 4")'),
+                           ("a.cpp", "  std::this_thread::sleep_for(milliseconds(1));"), ("a.c", "  usleep(100);"),
+                           ("a.mjs", "await new Promise((r) => setTimeout(r, 25));"), ("a.sh", "while :; do sleep 0.1; done")):
+            self.assertEqual(self.found(name, f"one\n{line}\n"), [(f"tests/{name}", 2, "sleep")], line)
+        self.assertEqual(self.found("a.py", "def once_in_three():\n"), [("tests/a.py", 1, "retry")])
+
+    def test_simulated_time_and_comments_are_free(self):
+        self.assertEqual(self.found("a.py", "world.sleep(1)\ndef sleep(self):\n# time.sleep(1)\nasleep(3)\n"), [])
+
+    def test_a_file_about_real_time_says_so(self):
+        self.assertEqual(self.found("a.py", "# real time: a kernel's pseudo-terminal\ntime.sleep(1)\n"), [])
 
 
 if __name__ == "__main__":

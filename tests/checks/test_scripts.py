@@ -120,7 +120,7 @@ class Bootstrap(Folder):
 
     def test_only_who_fuzzes_or_builds_the_page_needs_clang(self):
         path = self.path_without("clang-14")
-        for job, needs in ((("demo",), False), (("web",), True), (("test",), True), (("report",), True), (("fuzz", "1"), True), (("soak", "1"), False)):
+        for job, needs in ((("demo",), False), (("web",), True), (("test",), True), (("test", "quick"), False), (("report",), True), (("fuzz", "1"), True), (("soak", "1"), False)):
             with self.subTest(job):
                 done = self.up_to_npm(job=job, path=path)
                 self.assertEqual(done.returncode, 33)
@@ -154,13 +154,13 @@ class BootstrapReport(Folder):
             program = self.folder / "bin" / name
             program.write_text(f"#!/bin/sh\n{body}\n")
             program.chmod(0o755)
-        for report in ("fit/fit", "rate/rate", "validation/validation", "truth/truth", "shear/shear", "grasp/grasp", "tools/tools", "reliability/reliability", "bringup/traces",
+        for report in ("fit/fit", "rate/rate", "validation/validation", "truth/truth", "shear/shear", "grasp/grasp", "tools/tools", "reliability/reliability", "suite/suite", "bringup/traces",
                        "ecosystem/ecosystem", "web/web"):
             self.assertTrue((ROOT / f"host_tools/report/{report}.py").is_file())
             script = self.folder / f"host_tools/report/{report}.py"
             script.parent.mkdir(parents=True)
             script.write_text("import sys\nprint('ran', sys.argv[0], *(sys.argv[sys.argv.index(o) + 1] for o in ('-o', '--picture') if o in sys.argv))\n")
-        for job, after_traces in (("report",), 7), (("report", "all"), 8):
+        for job, after_traces in (("report",), 7), (("report", "all"), 9):
             done = subprocess.run(["sh", self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=60,
                                   env={**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
             self.assertEqual(done.returncode, 0, done.stderr)

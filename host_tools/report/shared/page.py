@@ -76,6 +76,8 @@ PARTS = (
     Part("reliability", "Reliability", "What the firmware, its protocol and the tools do with whatever they are fed, and what faults and power cuts do to it.",
          f"{REPORT}/reliability/reliability.py --build build/host -o build/report", RUN, (("fuzz_seconds", SAID), ("fuzz_seed", SAID), ("soak_hours_emulated", EMULATED), ("power_cut*", EMULATED), ("soak*", SIMULATED), ("recovery", SIMULATED),
           ("worst_recovery_s", SIMULATED))),
+    Part("suite", "The test suite", "The test suite run over and over, half of the runs on a busy machine: whether it is green, and what it takes.",
+         "sh cmake/bootstrap.sh report suite", CLOCK, (("*_runs", RUN), ("*_failures", RUN), ("sleeps", RUN), ("retries", RUN), ("mutants_*", RUN))),
     Part("ecosystem", "Ecosystem", "The fingertip in programs of others.", f"{REPORT}/ecosystem/ecosystem.py --build build/host -o build/report", SIMULATED,
          (("*_percent", CLOCK), ("*_us*", CLOCK), ("*_fps", CLOCK), ("*_seconds", SAID), ("python_vectors*", RUN))),
     Part("web", "The page", "What the page costs and keeps up with in a headless Chromium that renders in software, and each of its steps, driven there.",

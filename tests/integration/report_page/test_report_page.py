@@ -10,20 +10,21 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 REPORT = ROOT / "host_tools/report"
-for folder in ("reliability", "tools", "grasp", "shear", "truth", "validation", "rate", "fit", "shared"):
+for folder in ("reliability", "suite", "tools", "grasp", "shear", "truth", "validation", "rate", "fit", "shared"):
     sys.path.insert(0, str(REPORT / folder))
 import page  # noqa: E402
 import fit  # noqa: E402
 import rate  # noqa: E402
 import reliability  # noqa: E402
 import shear  # noqa: E402
+import suite  # noqa: E402
 import grasp  # noqa: E402
 import tools  # noqa: E402
 import truth  # noqa: E402
 import validation  # noqa: E402
 from goals import goal_table_md, judge  # noqa: E402
 
-GOALS = {"fit": fit.GOALS, "rate": rate.GOALS, "validation": validation.GOALS, "truth": truth.GOALS, "shear": shear.GOALS, "grasp": grasp.GOALS, "tools": tools.GOALS,
+GOALS = {"fit": fit.GOALS, "rate": rate.GOALS, "validation": validation.GOALS, "truth": truth.GOALS, "shear": shear.GOALS, "grasp": grasp.GOALS, "tools": tools.GOALS, "suite": suite.GOALS,
          "reliability": tuple(goal for part in reliability.PARTS for goal in part.GOALS)}
 VOID = {"meta", "img", "br", "hr"}
 PARTS = {part.name: part for part in page.PARTS}
