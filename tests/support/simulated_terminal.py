@@ -12,7 +12,7 @@ import time
 
 import pyte
 
-from simulated_time import PATIENCE_s
+from simulated_time import PATIENCE_s, TimedOut
 
 # What a program on a terminal writes reaches the other side by a thread of the kernel. Behind this mark, written last, nothing is missing.
 MARK = b"\x1b_all\x1b\\"
@@ -20,16 +20,22 @@ END_OF_UPDATE = b"\x1b[?2026l"
 ARRIVAL_s = 60  # of real time, for what is on its way through the kernel
 
 
+class Ended(AssertionError):
+    """Before what was waited for was shown."""
+
+
 class Terminal:
     """As Process, whose outputs and input are one terminal. Close it."""
 
     def __init__(self, world, arguments, env=None, size=(80, 24)):
         self._master, self._slave = pty.openpty()
+        self.settings_before = termios.tcgetattr(self._slave)
         fcntl.ioctl(self._slave, termios.TIOCSWINSZ, struct.pack("HHHH", size[1], size[0], 0, 0))
         self._screen = pyte.Screen(*size)
         self._stream = pyte.ByteStream(self._screen)
         self._world = world
         self.shown = ""  # the last whole picture
+        self.seen = []  # every line that was ever in one
         self.output = b""
         self._came, self._more = b"", threading.Condition()
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -65,6 +71,7 @@ class Terminal:
             self._stream.feed(part)
             if part.endswith(END_OF_UPDATE):
                 self.shown = "\n".join(self._screen.display)
+                self.seen += [line.rstrip() for line in self._screen.display if line.rstrip() not in self.seen]
         return self.shown
 
     @property
@@ -72,15 +79,19 @@ class Terminal:
         """pyte's, with colours."""
         return self._screen
 
+    def settings(self):
+        return termios.tcgetattr(self._slave)
+
     def resize(self, columns, rows):
         fcntl.ioctl(self._slave, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
         self._screen.resize(rows, columns)
 
     def type(self, keys):
-        os.write(self._master, keys)
         if b"\x03" in keys:
-            self._world.signalled(self.process.pid)
+            self._world.will_signal(self.process.pid)
+            os.write(self._master, keys)
             return
+        os.write(self._master, keys)
         limit_s = time.monotonic() + ARRIVAL_s
         while not select.select([self._slave], [], [], 0.1)[0]:
             assert time.monotonic() < limit_s, "the keys do not arrive"
@@ -88,11 +99,15 @@ class Terminal:
     def until(self, pattern, limit_s=PATIENCE_s):
         """Until the picture shows this."""
         def is_shown():
-            return re.search(pattern, self.look(), re.S)
+            has_ended = self.process.poll() is not None
+            shown = re.search(pattern, self.look() or self.output.decode(errors="replace"), re.S)
+            if has_ended and not shown:
+                raise Ended(f"{pattern!r} was never shown; status {self.process.returncode}\n{self.shown}\n{self.output[-500:]}")
+            return shown
 
         try:
             return self._world.until(is_shown, limit_s)
-        except AssertionError as error:
+        except TimedOut as error:
             raise AssertionError(f"{error}: {pattern!r} is not shown; status {self.process.poll()}\n{self.shown}\n{self.output[-500:]}") from None
 
     def wait(self, limit_s=PATIENCE_s):

@@ -38,6 +38,8 @@ class SimulatedTime:
         assert self._keeper.stdout.readline() == "ready\n"
         self._line = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._line.connect(path)
+        os.chmod(folder, 0o755)  # for programs of other users
+        os.chmod(path, 0o777)
         self.environment = {VARIABLE: path}
         self._processes = []
         self._us = 0
@@ -106,13 +108,32 @@ class SimulatedTime:
         out, err = process.communicate(limit_s)
         return process.returncode, out, err
 
-    def signalled(self, pid):
-        """A signal has been sent there: time stands until it has arrived."""
+    def will_signal(self, pid):
+        """A signal comes there next: time stands until it has arrived."""
         self._say(SIGNALLED, pid)
 
 
+class Output:
+    """One of a process's two."""
+
+    def __init__(self, process, name):
+        self._process, self._name = process, name
+
+    def readline(self):
+        return self._process.readline(self._name)
+
+    def read(self):
+        """All that is left, once the process has ended."""
+        self._process.wait()
+        return self._process.read(self._name)
+
+    def close(self):
+        self._process.close_output(self._name)
+
+
 class Process:
-    """A program in this world; what it writes is text, unless text=False."""
+    """A program in this world, as subprocess.Popen has it; what it writes is text, unless text=False. Waits are of the world's
+    time."""
 
     def __init__(self, world, arguments, env=None, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                  text=True, **options):
@@ -124,6 +145,7 @@ class Process:
         self._text = text
         self._ended = os.pidfd_open(self.pid)
         self._came = {}
+        self.stdout, self.stderr = (None if getattr(self._popen, name) is None else Output(self, name) for name in ("stdout", "stderr"))
         for name in ("stdout", "stderr"):
             pipe = getattr(self._popen, name)
             if pipe is not None:
@@ -150,6 +172,10 @@ class Process:
                 pipe.close()
             self._came[name] += some
         return False
+
+    def close_output(self, name):
+        """Nobody reads it any more."""
+        getattr(self._popen, name).close()
 
     def _open_pipes(self):
         return [name for name in self._came if self._read(name)]
@@ -195,9 +221,9 @@ class Process:
 
     def send_signal(self, number):
         if self.poll() is None:
-            os.kill(self.pid, number)
             if number not in (signal.SIGSTOP, signal.SIGCONT):
-                self._world.signalled(self.pid)
+                self._world.will_signal(self.pid)
+            os.kill(self.pid, number)
 
     def terminate(self):
         self.send_signal(signal.SIGTERM)

@@ -1,5 +1,5 @@
 """Calibrating, from the twin's scenario to what the fingertip keeps: usage
-test_calibrate.py FINGERTIP FAKE_DEVICE TWIN PLAYER TABLES [unittest arguments]."""
+test_calibrate.py FINGERTIP FAKE_DEVICE TIME_KEEPER TWIN PLAYER TABLES [unittest arguments]."""
 import os
 import pathlib
 import pty
@@ -12,7 +12,7 @@ import tempfile
 import time
 import unittest
 
-TWIN, PLAYER, TABLES = sys.argv[3:6]
+TWIN, PLAYER, TABLES = sys.argv[4:7]
 import cli_case  # noqa: E402
 
 GAIN_TOLERANCE = 0.02
@@ -171,9 +171,9 @@ class Live(CalibrateTest):
                                   {**self.environment, "TERM": "xterm-256color"})
                     finally:
                         os._exit(127)
-                shown, end = b"", time.monotonic() + cli_case.PATIENCE_s
+                shown, end = b"", self.world.now_s + cli_case.PATIENCE_s
                 answered = False
-                while time.monotonic() < end:
+                while self.world.now_s < end:
                     if select.select([terminal], [], [], 0.1)[0]:
                         try:
                             some = os.read(terminal, 65536)
@@ -207,4 +207,4 @@ class Usage(CalibrateTest):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=[sys.argv[0], *sys.argv[6:]])
+    unittest.main(argv=[sys.argv[0], *sys.argv[7:]])

@@ -1,5 +1,5 @@
 """The tangential force's scale, from the twin's drags to what the fingertip keeps: usage
-test_calibrate_drag.py FINGERTIP FAKE_DEVICE TWIN PLAYER TABLES [unittest arguments]."""
+test_calibrate_drag.py FINGERTIP FAKE_DEVICE TIME_KEEPER TWIN PLAYER TABLES [unittest arguments]."""
 import os
 import pathlib
 import re
@@ -11,7 +11,7 @@ import unittest
 
 import numpy as np
 
-TWIN, PLAYER, TABLES = sys.argv[3:6]
+TWIN, PLAYER, TABLES = sys.argv[4:7]
 import cli_case  # noqa: E402
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"))
@@ -203,4 +203,4 @@ class Usage(DragTest):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=[sys.argv[0], *sys.argv[6:]])
+    unittest.main(argv=[sys.argv[0], *sys.argv[7:]])

@@ -1,22 +1,15 @@
-"""`fingertip doctor` against a fake device: usage test_doctor.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
-import contextlib
+"""`fingertip doctor` against a fake device: usage test_doctor.py FINGERTIP FAKE_DEVICE TIME_KEEPER [unittest arguments]."""
 import json
 import os
 import pathlib
-import pty
 import re
-import shutil
-import subprocess
 import sys
 import unittest
 
-from cli_case import FINGERTIP, PATIENCE_s, CliTest
+from cli_case import FINGERTIP, CliTest
+from simulated_terminal import Terminal
 
 LINE = re.compile(r"(ok|warn|bad) +([a-z]+)  (.+)")
-
-
-def tool_version():
-    return subprocess.run([FINGERTIP, "--version"], capture_output=True, text=True, check=True).stdout.split()[1]
 
 
 class DoctorTest(CliTest):
@@ -25,26 +18,28 @@ class DoctorTest(CliTest):
         rules = pathlib.Path(self.folder, "etc/udev/rules.d")
         rules.mkdir(parents=True)
         self.rule = rules / "60-fingertip.rules"
-        self.rule.write_text(subprocess.run([FINGERTIP, "rule"], capture_output=True, text=True, check=True).stdout)
+        self.rule.write_text(self.run_cli("rule")[0])
         for shared in ("dev", "proc", "sys"):
             os.symlink(f"/{shared}", os.path.join(self.folder, shared))
         for name in ("NO_COLOR", "TERM"):
             self.environment.pop(name, None)
+
+    ARGUMENTS = ("doctor", "--seconds", "1")
 
     def plug_in(self, *options):
         """Until the test ends."""
         self.enterContext(self.device(*options))
 
     def examine(self, *arguments, tool=FINGERTIP, **options):
-        return subprocess.run([tool, "doctor", "--port", self.port, "--seconds", "1", "--root", self.folder, *arguments],
-                              capture_output=True, text=True, env=self.environment, timeout=PATIENCE_s, **options)
+        """Exit status, output and errors."""
+        return self.world.run([tool, *self.ARGUMENTS, "--port", self.port, "--root", self.folder, *arguments], env=self.environment, **options)
 
     def findings(self, *arguments, **options):
         """[(verdict, check, text)] of the lines."""
-        done = self.examine(*arguments, **options)
-        self.assertEqual(done.stderr, "")
-        found = [LINE.fullmatch(line).groups() for line in done.stdout.splitlines()]
-        self.assertEqual(done.returncode, 1 if any(verdict == "bad" for verdict, _, _ in found) else 0)
+        status, out, err = self.examine(*arguments, **options)
+        self.assertEqual(err, "")
+        found = [LINE.fullmatch(line).groups() for line in out.splitlines()]
+        self.assertEqual(status, 1 if any(verdict == "bad" for verdict, _, _ in found) else 0)
         return found
 
     def finding(self, check, *arguments, **options):
@@ -62,10 +57,12 @@ class DoctorTest(CliTest):
         self.plug_in("firmware=0.0.9")
         verdict, text = self.finding("firmware")
         self.assertEqual(verdict, "warn")
-        self.assertIn(f"0.0.9 (0123456789ab+), board pico_mux, scene slip; this tool is of version {tool_version()}", text)
+        version = self.run_cli("--version")[0].split()[1]
+        self.assertIn(f"0.0.9 (0123456789ab+), board pico_mux, scene slip; this tool is of version {version}", text)
 
     def test_the_same_firmware_version(self):
-        self.plug_in(f"firmware={tool_version()}")
+        version = self.run_cli("--version")[0].split()[1]
+        self.plug_in(f"firmware={version}")
         self.assertEqual(self.finding("firmware")[0], "ok")
 
     def test_no_answer(self):
@@ -83,11 +80,7 @@ class DoctorTest(CliTest):
     def test_permission_denied(self):
         self.plug_in()
         os.chmod(os.path.realpath(self.port), 0)
-        os.chmod(self.folder, 0o777)
-        tool, user = FINGERTIP, {}
-        if os.geteuid() == 0:
-            tool, user = os.path.join(self.folder, "fingertip"), {"user": 65534, "group": 65534, "extra_groups": []}
-            shutil.copy(FINGERTIP, tool)  # where everybody may run it
+        tool, user = self.other_user()
         self.assertEqual([line[:2] for line in self.findings(tool=tool, **user)], [("ok", "rule"), ("bad", "port")])
         self.rule.unlink()
         self.assertEqual([line[:2] for line in self.findings(tool=tool, **user)], [("bad", "rule"), ("bad", "port")])
@@ -111,16 +104,16 @@ class DoctorTest(CliTest):
 
     def test_an_elf_file_that_is_none_is_an_error(self):
         self.plug_in()
-        done = self.examine("--elf", __file__)
-        self.assertEqual((done.returncode, done.stdout), (1, ""))
-        self.assertRegex(done.stderr, "no ELF file of a fingertip; give fingertip-BOARD.elf")
+        status, out, err = self.examine("--elf", __file__)
+        self.assertEqual((status, out), (1, ""))
+        self.assertRegex(err, "no ELF file of a fingertip; give fingertip-BOARD.elf")
 
     def test_json_has_all_of_it(self):
         self.plug_in("absent=3")
-        done = self.examine("--json")
-        told = json.loads(done.stdout)
+        status, out, _ = self.examine("--json")
+        told = json.loads(out)
         self.assertEqual((told["verdict"], told["board"], told["serial"]), ("bad", "pico_mux", "E660583883265A2C"))
-        self.assertEqual(done.returncode, 1)
+        self.assertEqual(status, 1)
         missing = [finding for finding in told["findings"] if finding["check"] == "sensors" and finding["verdict"] == "bad"]
         self.assertEqual([finding["sensors"] for finding in missing],
                          [[{"sensor": 3, "strip": 0, "channel": 3, "multiplexer": 0x70}]])
@@ -130,21 +123,14 @@ class DoctorTest(CliTest):
 
     def on_terminal(self, **environment):
         """What a terminal is shown."""
-        master, slave = pty.openpty()
-        process = subprocess.Popen([FINGERTIP, "doctor", "--port", self.port, "--seconds", "1", "--root", self.folder], stdin=slave,
-                                   stdout=slave, stderr=slave, env={**self.environment, "TERM": "xterm", **environment})
-        os.close(slave)
-        shown = b""
-        with contextlib.suppress(OSError):
-            while chunk := os.read(master, 4096):
-                shown += chunk
-        process.wait(PATIENCE_s)
-        os.close(master)
-        return shown.decode()
+        arguments = [FINGERTIP, *self.ARGUMENTS, "--port", self.port, "--root", self.folder]
+        with Terminal(self.world, arguments, {**self.environment, "TERM": "xterm", **environment}) as terminal:
+            terminal.wait()
+            return terminal.output.decode()
 
     def test_colour_only_on_a_terminal_that_wants_it(self):
         self.plug_in()
-        self.assertNotIn("\x1b[3", self.examine().stdout)
+        self.assertNotIn("\x1b[3", self.examine()[1])
         shown = self.on_terminal()
         self.assertIn("\x1b[32mok  \x1b[0m  rule", shown)
         self.assertIn("measuring, touch nothing", shown)
@@ -152,10 +138,8 @@ class DoctorTest(CliTest):
 
     def test_seconds_are_checked(self):
         for seconds in ("0", "601", "x", ""):
-            done = subprocess.run([FINGERTIP, "doctor", "--seconds", seconds], capture_output=True, text=True, env=self.environment)
-            self.assertEqual((done.returncode, done.stdout), (2, ""))
-            self.assertIn("give 1 to 600", done.stderr)
+            self.assertIn("give 1 to 600", self.run_cli("doctor", "--seconds", seconds, status=2)[1])
 
 
 if __name__ == "__main__":
-    unittest.main(argv=[sys.argv[0], *sys.argv[3:]], verbosity=2)
+    unittest.main(argv=[sys.argv[0], *sys.argv[4:]], verbosity=2)

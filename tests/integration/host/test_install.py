@@ -1,4 +1,4 @@
-"""`fingertip flash` against a fake loader, and what gets installed: usage test_install.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
+"""`fingertip flash` against a fake loader, and what gets installed: usage test_install.py FINGERTIP FAKE_DEVICE TIME_KEEPER [unittest arguments]."""
 import os
 import pathlib
 import re
@@ -40,19 +40,19 @@ class Flash(CliTest):
         """Runs flash against a device with these options, that ends in its loader, and comes back with those."""
         with self.device("loader=1", *first) as device:
             process = self.start("flash", self.image, "--volume", self.volume)
-            self.wait_for(lambda: device.poll() is not None or process.poll() is not None)
+            self.world.until(lambda: device.poll() is not None or process.poll() is not None)
             if process.poll() is None:
                 self.make_volume()
                 written = os.path.join(self.volume, "fingertip.uf2")
                 size = os.path.getsize(self.image)
-                self.wait_for(lambda: os.path.exists(written) and os.path.getsize(written) == size)
+                self.world.until(lambda: os.path.exists(written) and os.path.getsize(written) == size)
                 with open(written, "rb") as new, open(self.image, "rb") as image:
                     self.assertEqual(new.read(), image.read())
                 os.unlink(os.path.join(self.volume, "INFO_UF2.TXT"))
                 with self.device(*after):
-                    out, err = process.communicate(timeout=PATIENCE_s)
+                    out, err = process.communicate()
             else:
-                out, err = process.communicate(timeout=PATIENCE_s)
+                out, err = process.communicate()
         self.assertEqual(process.returncode, status, err)
         return out, err
 
@@ -196,4 +196,4 @@ class Install(CliTest):
             self.assertEqual(complete("fingertip", "info", "--device")(""), ["AAAA"])
 
 if __name__ == "__main__":
-    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
+    unittest.main(argv=[sys.argv[0], *sys.argv[4:]])

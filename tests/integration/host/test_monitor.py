@@ -1,22 +1,15 @@
-"""The live view on pseudo-terminals: usage test_monitor.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
+"""The live view on pseudo-terminals: usage test_monitor.py FINGERTIP FAKE_DEVICE TIME_KEEPER [unittest arguments]."""
 import contextlib
-import fcntl
 import os
 import pathlib
-import pty
 import re
-import select
 import signal
-import struct
 import sys
-import termios
-import time
 import unittest
 
-import pyte
-
-from cli_case import CliTest, FINGERTIP, PATIENCE_s
+from cli_case import CliTest, FINGERTIP
 from fingertip import files
+from simulated_terminal import Ended, Terminal
 
 
 class Monitor(CliTest):
@@ -28,58 +21,24 @@ class Monitor(CliTest):
     def on_terminal(self, *arguments, until, then, finally_="", environment=COLOURS, size=(80, 24)):
         """Output up to the end; once the screen showed `until`, `then` (a signal, or keys) is sent. A list of keys is typed,
         and q a moment after them, but not before `finally_` was seen. self.shown is the last screen before the end, self.seen every line that was ever on it."""
-        pid, terminal = pty.fork()
-        if pid == 0:
-            time.sleep(0.05)  # until the terminal has its size
-            os.execve(FINGERTIP, [FINGERTIP, *arguments], {**self.environment, **dict(environment)})
-        fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", size[1], size[0], 0, 0))
-        screen = pyte.Screen(*size)
-        stream = pyte.ByteStream(screen)
-        self.shown, self.seen, self.screen = "", [], screen
-        try:
-            before = termios.tcgetattr(terminal)
-            output, sent, pending, typed_at, limit = b"", False, [], 0.0, time.monotonic() + PATIENCE_s
-            while True:
-                self.assertLess(time.monotonic(), limit, self.shown + repr(output[-2000:]))
-                if pending and time.monotonic() - typed_at > self.BETWEEN_KEYS_s and (
-                        len(pending) > 1 or not finally_ or re.search(finally_, self.shown)):
-                    typed_at = time.monotonic()
-                    os.write(terminal, pending.pop(0))
-                if not select.select([terminal], [], [], 0.1)[0]:
-                    continue
-                try:
-                    chunk = os.read(terminal, 65536)
-                except OSError:
-                    break
-                if not chunk:
-                    break
-                output += chunk
-                for part in re.split(rb"(?<=\x1b\[\?2026l)", chunk):
-                    stream.feed(part)
-                    if part.endswith(b"\x1b[?2026l"):
-                        self.shown = "\n".join(screen.display)
-                        self.seen += [line.rstrip() for line in screen.display if line.rstrip() not in self.seen]
-                if not sent and re.search(until, self.shown or output.decode(errors="replace"), re.S):
-                    sent = True
-                    if isinstance(then, list):
-                        pending = [*then, b"q"]
-                        typed_at = time.monotonic()
-                        os.write(terminal, pending.pop(0))
-                    elif isinstance(then, bytes):
-                        os.write(terminal, then)
-                    else:
-                        os.kill(pid, then)
-            _, status = os.waitpid(pid, 0)
-            pid = 0
-            after = None
-            with contextlib.suppress(termios.error):
-                after = termios.tcgetattr(terminal)
-        finally:
-            if pid:
-                os.kill(pid, signal.SIGKILL)
-                os.waitpid(pid, 0)
-            os.close(terminal)
-        return output.decode(), os.waitstatus_to_exitcode(status), before, after
+        with Terminal(self.world, [FINGERTIP, *arguments], {**self.environment, **dict(environment)}, size) as terminal:
+            before = terminal.settings_before
+            with contextlib.suppress(Ended):
+                terminal.until(until)
+                if isinstance(then, list):
+                    for keys in then:
+                        terminal.type(keys)
+                        self.world.sleep(self.BETWEEN_KEYS_s)
+                    if finally_:
+                        terminal.until(finally_)
+                    terminal.type(b"q")
+                elif isinstance(then, bytes):
+                    terminal.type(then)
+                else:
+                    terminal.process.send_signal(then)
+            status = terminal.wait()
+            self.shown, self.seen = terminal.shown, terminal.seen
+            return terminal.output.decode(), status, before, terminal.settings()
 
     def assert_restored(self, output):
         last_enter, last_leave = output.rfind("\x1b[?1049h"), output.rfind("\x1b[?1049l")
@@ -251,23 +210,18 @@ class Monitor(CliTest):
         self.assert_restored(output)
 
     def test_a_stall_shows_within_a_second_without_a_terminal(self):
-        def shown_after_s():
-            """From the line that the first frame brought."""
-            with self.device("stall=50"):
-                process = self.start("monitor", "--port", self.port)
-                first_s, line = None, ""
-                while "STALLED" not in line:
-                    line = process.stdout.readline()
-                    self.assertIn("frames", line)
-                    if first_s is None and re.search(" [1-9][0-9]* frames ", line):
-                        first_s = time.monotonic()
-                shown_s = time.monotonic() - first_s
-                process.send_signal(signal.SIGINT)
-                process.communicate(timeout=PATIENCE_s)
-            return shown_s
-
-        # fifty frames take a quarter of a second
-        self.once_in_three(shown_after_s, 0.25 + 1.0)
+        with self.device("stall=50"):
+            process = self.start("monitor", "--port", self.port)
+            first_s, line = None, ""
+            while "STALLED" not in line:
+                line = process.stdout.readline()
+                self.assertIn("frames", line)
+                if first_s is None and re.search(" [1-9][0-9]* frames ", line):
+                    first_s = self.world.now_s
+            shown_s = self.world.now_s - first_s
+            process.send_signal(signal.SIGINT)
+            process.communicate()
+        self.assertLess(shown_s, 0.25 + 1.0)  # fifty frames take a quarter of a second
 
     def test_an_error_restores_the_terminal(self):
         with self.device("frames=30"):
@@ -324,4 +278,4 @@ class Monitor(CliTest):
                          r"TANGENTIAL_VALID VELOCITY_VALID$")
 
 if __name__ == "__main__":
-    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
+    unittest.main(argv=[sys.argv[0], *sys.argv[4:]])

@@ -1,4 +1,4 @@
-"""Several programs on one fingertip, through fingertip serve: usage test_serve.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
+"""Several programs on one fingertip, through fingertip serve: usage test_serve.py FINGERTIP FAKE_DEVICE TIME_KEEPER [unittest arguments]."""
 import contextlib
 import grp
 import os
@@ -55,14 +55,14 @@ class ServeTest(CliTest):
             process = subprocess.Popen([FINGERTIP, "serve", *arguments], env=self.environment, stdin=subprocess.DEVNULL, stderr=log)
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)
-        self.wait_for(lambda: all(f"{serial}: shared as" in self.said() for serial in serials))
+        self.world.until(lambda: all(f"{serial}: shared as" in self.said() for serial in serials))
         yield process
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
-        self.assertEqual(process.wait(PATIENCE_s), 0, self.said())
+        self.assertEqual(process.wait(), 0, self.said())
 
     def finished(self, process, status=0):
-        _, err = process.communicate(timeout=PATIENCE_s)
+        _, err = process.communicate()
         self.assertEqual(process.returncode, status, err)
         return err
 
@@ -77,7 +77,7 @@ class ServeTest(CliTest):
         """A recorder that has rows, and its file."""
         path = self.path(name)
         process = self.start("record", path, "--until-gone", *arguments)
-        self.wait_for(lambda: os.path.exists(path) and len(self.rows(path)[0]) > 5)
+        self.world.until(lambda: os.path.exists(path) and len(self.rows(path)[0]) > 5)
         return process, path
 
 
@@ -167,9 +167,9 @@ class Sharing(ServeTest):
     def test_a_fingertip_that_goes_and_comes_back(self):
         with self.device("vanish=100,700"), self.served():
             waiting = self.start("record", self.csv)
-            self.wait_for(lambda: os.path.exists(self.csv) and any("event: back" in c for c in self.rows()[1]))
+            self.world.until(lambda: os.path.exists(self.csv) and any("event: back" in c for c in self.rows()[1]))
             self.assertRegex(self.said(), rf"(?s){SERIAL}: gone.*{SERIAL}: shared as")
-            self.wait_for(lambda: len(self.rows()[0]) >= 220)
+            self.world.until(lambda: len(self.rows()[0]) >= 220)
             self.assertRegex(self.run_cli("info")[0], f"(?m)^port +{self.socket_of()}$")
             waiting.send_signal(signal.SIGINT)
             self.finished(waiting)
@@ -182,21 +182,21 @@ class Sharing(ServeTest):
 
     def test_without_it_there_is_no_socket(self):
         with self.served(serials=()) as server:
-            self.wait_for(lambda: self.said())
+            self.world.until(lambda: self.said())
             self.assertIn("no such port", self.said())
-            self.assertEqual(server.wait(PATIENCE_s), 1)
+            self.assertEqual(server.wait(), 1)
             server.returncode = 0  # as it should
         self.environment.pop("FINGERTIP_PORT")
         with self.served(serials=()):
-            self.wait_for(lambda: "no fingertip here yet; each that is plugged in will be shared" in self.said())
+            self.world.until(lambda: "no fingertip here yet; each that is plugged in will be shared" in self.said())
 
     def test_into_the_loader(self):
         with self.device("loader=1") as device, self.served():
             recorder, path = self.recording("r.csv")
             self.assertIn("RPI-RP2", self.run_cli("loader")[0])
-            self.assertEqual(device.wait(PATIENCE_s), 0)
+            self.assertEqual(device.wait(), 0)
             self.finished(recorder)
-            self.wait_for(lambda: not os.path.exists(self.socket_of()))
+            self.world.until(lambda: not os.path.exists(self.socket_of()))
         self.assertIn("reason=gone", self.rows(path)[1][-1])
 
 
@@ -207,17 +207,17 @@ class Flash(ServeTest):
         image, self.volume = self.uf2(), self.path("RPI-RP2")
         with self.device("loader=1") as device, self.served():
             recorder = self.start("record", self.csv)
-            self.wait_for(lambda: os.path.exists(self.csv))
+            self.world.until(lambda: os.path.exists(self.csv))
             flash = self.start("flash", image, "--volume", self.volume)
-            self.assertEqual(device.wait(PATIENCE_s), 0)
+            self.assertEqual(device.wait(), 0)
             self.make_volume()
             written = os.path.join(self.volume, "fingertip.uf2")
-            self.wait_for(lambda: os.path.exists(written) and os.path.getsize(written) == os.path.getsize(image))
+            self.world.until(lambda: os.path.exists(written) and os.path.getsize(written) == os.path.getsize(image))
             os.unlink(os.path.join(self.volume, "INFO_UF2.TXT"))
             with self.device("board=pico_mux", "git=abcdef012345", "firmware=9.8.7"):
-                out, err = flash.communicate(timeout=PATIENCE_s)
+                out, err = flash.communicate()
                 self.assertEqual(out, f"fingertip {SERIAL}: firmware 9.8.7 abcdef012345, board pico_mux\n", err)
-                self.wait_for(lambda: any("event: back" in comment for comment in self.rows()[1]))
+                self.world.until(lambda: any("event: back" in comment for comment in self.rows()[1]))
                 recorder.send_signal(signal.SIGINT)
                 self.finished(recorder)
 
@@ -227,16 +227,16 @@ class Clients(ServeTest):
         with self.device("rate=1500"), self.served():
             (stopped, stopped_csv), (other, other_csv) = self.recording("stopped.csv"), self.recording("other.csv")
             stopped.send_signal(signal.SIGSTOP)
-            self.wait_for(lambda: "does not read in time and loses packets" in self.said())
+            self.world.until(lambda: "does not read in time and loses packets" in self.said())
             self.assertEqual(self.run_cli("tare")[0], "tared\n")
-            time.sleep(0.5)
+            self.world.sleep(0.5)
             stopped.send_signal(signal.SIGCONT)
             last = self.rows(other_csv)[0][-1]["frame"]
-            self.wait_for(lambda: int(self.rows(stopped_csv)[0][-1]["frame"]) > int(last) + 200)
+            self.world.until(lambda: int(self.rows(stopped_csv)[0][-1]["frame"]) > int(last) + 200)
             for process in (stopped, other):
                 process.send_signal(signal.SIGINT)
                 self.finished(process)
-            self.wait_for(lambda: " lost " in self.said())
+            self.world.until(lambda: " lost " in self.said())
         lost = int(re.search(rf"{SERIAL}: pid {stopped.pid}, fingertip lost (\d+) packets", self.said())[1])
         self.assertGreater(lost, 500)
         self.assertEqual(self.said().count(" lost "), 1)
@@ -258,9 +258,9 @@ class Clients(ServeTest):
             killed, _ = self.recording("killed.csv")
             killed.kill()
             killed.communicate()
-            self.wait_for(lambda: re.search(r"(?m)^streams +none$", self.run_cli("info")[0]))
+            self.world.until(lambda: re.search(r"(?m)^streams +none$", self.run_cli("info")[0]))
             ticks = self.cpu_ticks(server)
-            time.sleep(1)
+            self.world.sleep(1)
             self.assertLess(self.cpu_ticks(server) - ticks, 0.1 * os.sysconf("SC_CLK_TCK"), "idle is idle")
 
     @staticmethod
@@ -300,7 +300,7 @@ class Server(ServeTest):
             with self.device(), self.served() as server:
                 recorder, path = self.recording(f"{number}.csv")
                 server.send_signal(number)
-                self.assertEqual(server.wait(PATIENCE_s), 0)
+                self.assertEqual(server.wait(), 0)
                 self.assertEqual(os.listdir(self.sockets), [])
                 self.finished(recorder)
                 self.assertRegex(self.run_cli("info")[0], f"(?m)^port +{self.port}$")
@@ -369,4 +369,4 @@ class Server(ServeTest):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
+    unittest.main(argv=[sys.argv[0], *sys.argv[4:]])
