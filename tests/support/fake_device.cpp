@@ -329,9 +329,11 @@ private:
       close(open(options_["tared"].c_str(), O_WRONLY | O_CREAT, 0644));
     }
     switch (command.type) {
-    case WIRE_CMD_STREAM:
+    case WIRE_CMD_STREAM: {
+      const bool changed = streams_ != command.body.cmd_stream.streams;
       streams_ = command.body.cmd_stream.streams;
-      return true;
+      return changed;
+    }
     case WIRE_CMD_RATE:
       info_.body.info.rate_mHz = command.body.cmd_rate.rate_mHz;
       return false;

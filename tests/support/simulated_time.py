@@ -20,7 +20,8 @@ import subprocess
 
 VARIABLE = "FINGERTIP_TIME_KEEPER"
 PATIENCE_s = 60
-HELLO, WAIT, INTERRUPTED, BYE, SPAWNED, SIGNALLED = range(6)
+HELLO, WAIT, INTERRUPTED, BYE, SPAWNED, HELD, SIGNALLED = range(7)
+FOR_EVER_us = (1 << 63) - 1
 MOST_DESCRIPTORS = 128
 ORDER = struct.Struct(f"=IiqI{MOST_DESCRIPTORS}hxxxx")
 POLLIN = 1
@@ -107,6 +108,9 @@ class SimulatedTime:
         process = self.start(arguments, **options)
         out, err = process.communicate(limit_s)
         return process.returncode, out, err
+
+    def hold(self, pid, seconds):
+        self._say(HELD, pid, FOR_EVER_us if seconds is None else self._us + round(seconds * 1e6))
 
     def will_signal(self, pid):
         """A signal comes there next: time stands until it has arrived."""
@@ -224,6 +228,13 @@ class Process:
             if number not in (signal.SIGSTOP, signal.SIGCONT):
                 self._world.will_signal(self.pid)
             os.kill(self.pid, number)
+
+    def hold_up(self, seconds=None):
+        """As on a machine that is busy with others, or stopped: it gets no turn for so long, or until go_on."""
+        self._world.hold(self.pid, seconds)
+
+    def go_on(self):
+        self._world.hold(self.pid, 0)
 
     def terminate(self):
         self.send_signal(signal.SIGTERM)

@@ -71,6 +71,7 @@ struct Process {
   Descriptor handle;    // pidfd
   bool is_awaited;      // its hello, or its end
   bool is_dying = false;
+  std::int64_t held_us = 0; // no turn before
 };
 
 struct Awaited {
@@ -285,6 +286,11 @@ private:
     case Order::SPAWNED:
       expect(order.pid);
       break;
+    case Order::HELD:
+      for (Process &each : processes_) {
+        each.held_us = each.pid == order.pid ? order.until_us : each.held_us;
+      }
+      break;
     case Order::SIGNALLED:
       for (Client &each : clients_) {
         each.expects_signal = each.expects_signal || (each.pid == order.pid && each.is_first);
@@ -308,9 +314,15 @@ private:
     std::int64_t first_us = INT64_MAX;
     std::size_t at = 0;
     for (Client &each : clients_) {
+      const Process *its = process(each.pid);
+      const std::int64_t held_us = its != nullptr ? its->held_us : 0;
       bool may = each.is_interrupted || each.until_us <= now_us_;
       for (std::size_t i = 0; i < each.awaited.size(); i++) {
         may = asked[at++].revents != 0 || may;
+      }
+      if (held_us > now_us_) {
+        first_us = std::min(first_us, held_us);
+        continue;
       }
       if (may && (best == nullptr || each.ran < best->ran)) {
         best = &each;

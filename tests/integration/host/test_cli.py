@@ -144,21 +144,22 @@ class Several(CliTest):
 
     ALIGNMENT_SECONDS = int(os.environ.get("FINGERTIP_ALIGNMENT_SECONDS", "3"))
 
+    # What clocks that go 50 ppm apart do between two exchanges, 100 ms.
+    DRIFT_us = 5
+
     def assert_in_order(self):
-        """Rows are in order of the common clock."""
+        """Rows are in order of the common clock, as well as it is known."""
         with open(self.csv, encoding="utf-8") as file:
             times = [float(line.split(",")[1]) for line in file if line[0].isdigit()]
-        self.assertEqual(times, sorted(times))
+        self.assertGreaterEqual(np.diff(times).min(), -self.DRIFT_us)
 
     def test_rows_stay_in_order_when_the_tool_was_held_up(self):
         with self.device("serial=AAAA"), self.device("serial=BBBB", port=self.other):
             process = self.start("record", self.csv, "--all")
             self.world.until(lambda: os.path.exists(self.csv) and len(self.rows()[0]) > 20)
             for _ in range(4):
-                process.send_signal(signal.SIGSTOP)
-                self.world.sleep(0.6)
-                process.send_signal(signal.SIGCONT)
-                self.world.sleep(0.1)
+                process.hold_up(0.6)
+                self.world.sleep(0.7)
             process.send_signal(signal.SIGINT)
             _, err = process.communicate()
         self.assertEqual(process.returncode, 0, err)
@@ -192,7 +193,8 @@ class Several(CliTest):
             if None not in latest:
                 alignment_us = max(alignment_us, abs(latest[0] - latest[1]))
         self.assertLess(alignment_us, 1000)
-        self.assertLessEqual(alignment_us, float(one.end["alignment_us"]) + 2)
+        # on a line without delay what is left is what the clocks drift apart between two exchanges, and the rounding to 0.1 us
+        self.assertLessEqual(alignment_us, float(one.end["alignment_us"]) + self.DRIFT_us + 0.2)
         self.assertEqual(one.end["dropped_packets"], "0")
         span_us = one["t_us"][-1] - one["t_us"][0]
         self.assertGreater(span_us, 1e6)
