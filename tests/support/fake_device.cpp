@@ -28,7 +28,8 @@
  * clock_ppm=P its clock is fast by so much, over the whole of its life zero_log=FILE    writes
  * there when its clock was zero, us of CLOCK_MONOTONIC started=S        its clock was started S
  * seconds before mirror=LINK      the same bytes, a moment before, on a second terminal that hears
- * nothing and has to be read life=S           ends after this time, default 60
+ * nothing and has to be read tap=FILE         keeps there what it says life=S           ends after
+ * this time, default 60
  *
  * Ends by SIGTERM too. */
 #include "libfingertip/command.hpp"
@@ -46,6 +47,7 @@
 #include <cstdlib>
 #include <fcntl.h>
 #include <map>
+#include <memory>
 #include <optional>
 #include <termios.h>
 #include <unistd.h>
@@ -92,6 +94,9 @@ public:
     if (!options_["mirror"].empty()) {
       mirror_.emplace(options_["mirror"]);
     }
+    if (!options_["tap"].empty()) {
+      tap_.reset(std::fopen(options_["tap"].c_str(), "wb"));
+    }
   }
 
   void run() {
@@ -112,8 +117,10 @@ public:
           if (streams_ & (packet.type == WIRE_RAW ? WIRE_STREAM_RAW : WIRE_STREAM_CONTACT)) {
             send(packet);
           }
+          next_frame = fingertip::host_now();
+        } else {
+          next_frame = fingertip::host_now() + milliseconds(5);
         }
-        next_frame = fingertip::host_now();
         continue;
       }
       for (; next_frame <= fingertip::host_now() && streams_ != 0; next_frame += interval) {
@@ -227,6 +234,9 @@ private:
     }
     if (mirror_) {
       write_all(*mirror_, bytes);
+    }
+    if (tap_) {
+      std::fwrite(bytes.data(), 1, bytes.size(), tap_.get());
     }
     if (!number("mute", 0)) {
       write_all(*port_, bytes);
@@ -399,6 +409,7 @@ private:
   std::string link_;
   std::map<std::string, std::string> options_;
   std::optional<fingertip::ServedPort> port_, mirror_;
+  std::unique_ptr<std::FILE, int (*)(std::FILE *)> tap_{nullptr, std::fclose};
   wire_receiver receiver_;
   wire_packet info_ = test::make_info(0, 0);
   Time started_;

@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -91,23 +92,40 @@ public:
       }
     }
   }
-  // Until it is this thread's turn; false: after a signal.
-  bool turn() {
+  // Says so and waits until it is this thread's turn; false: after a signal. Signals come in the
+  // wait alone, so that none falls between the two.
+  bool wait(const Order &order, const pollfd *descriptors = nullptr) {
+    sigset_t all, before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    say(order, descriptors);
+    const bool is_whole = take_turn(before);
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+    return is_whole;
+  }
+  bool take_turn(const sigset_t &signals) {
     bool is_whole = true;
-    std::int64_t told_us = 0;
-    for (;;) {
-      const ssize_t size = recv(fd_, &told_us, sizeof told_us, 0);
-      if (size == sizeof told_us) {
-        now_us = told_us;
-        looks = 0;
-        return is_whole;
-      }
-      if (size == 0 || errno != EINTR) {
+    pollfd turn = {fd_, POLLIN, 0};
+    while (ppoll(&turn, 1, nullptr, &signals) < 0) {
+      if (errno != EINTR) {
         std::_Exit(125);
       }
       is_whole = false;
       say({Order::INTERRUPTED, 0, 0, 0, {}});
     }
+    std::int64_t told_us = 0;
+    if (recv(fd_, &told_us, sizeof told_us, 0) != sizeof told_us) {
+      std::_Exit(125); // the test is over
+    }
+    now_us = told_us;
+    looks = 0;
+    return is_whole;
+  }
+  // Of a thread that has been announced.
+  void take_first_turn() {
+    sigset_t signals;
+    pthread_sigmask(SIG_SETMASK, nullptr, &signals);
+    take_turn(signals);
   }
   void be_there() {
     if (fd_ < 0 || pid_ != getpid()) { // the first time, or after a fork
@@ -115,8 +133,7 @@ public:
         close(fd_); // the parent's
       }
       adopt(connected());
-      say({Order::HELLO, 0, 0, 0, {}});
-      turn();
+      wait({Order::HELLO, 0, 0, 0, {}});
     }
   }
 
@@ -163,8 +180,7 @@ int wait_for(pollfd *descriptors, std::size_t count, HostTime until) {
       order.events[order.count++] = descriptors[i].events;
     }
   }
-  line.say(order, asked);
-  if (!line.turn()) {
+  if (!line.wait(order, asked)) {
     return 0;
   }
   return std::max(0, ::poll(descriptors, count, 0));
@@ -185,7 +201,7 @@ Thread::Thread(std::function<void()> run) : state_(std::make_unique<State>()) {
   Wake &ended = state_->ended;
   state_->thread = std::thread([fd, run = std::move(run), &ended] {
     line.adopt(fd);
-    line.turn();
+    line.take_first_turn();
     run();
     ended.set();
   });

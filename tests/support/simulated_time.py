@@ -20,7 +20,7 @@ import subprocess
 
 VARIABLE = "FINGERTIP_TIME_KEEPER"
 PATIENCE_s = 60
-HELLO, WAIT, INTERRUPTED, BYE, SPAWNED, HELD, SIGNALLED = range(7)
+HELLO, WAIT, INTERRUPTED, BYE, SPAWNED, HELD, TURNS, SIGNALLED = range(8)
 FOR_EVER_us = (1 << 63) - 1
 MOST_DESCRIPTORS = 128
 ORDER = struct.Struct(f"=IiqI{MOST_DESCRIPTORS}hxxxx")
@@ -108,6 +108,10 @@ class SimulatedTime:
         process = self.start(arguments, **options)
         out, err = process.communicate(limit_s)
         return process.returncode, out, err
+
+    def turns(self, pid):
+        self._say(TURNS, pid)
+        return struct.unpack("=q", self._line.recv(8))[0]
 
     def hold(self, pid, seconds):
         self._say(HELD, pid, FOR_EVER_us if seconds is None else self._us + round(seconds * 1e6))
@@ -232,6 +236,10 @@ class Process:
     def hold_up(self, seconds=None):
         """As on a machine that is busy with others, or stopped: it gets no turn for so long, or until go_on."""
         self._world.hold(self.pid, seconds)
+
+    def turns(self):
+        """How often it ran until now: what it does with its time, whatever the machine's speed."""
+        return self._world.turns(self.pid)
 
     def go_on(self):
         self._world.hold(self.pid, 0)

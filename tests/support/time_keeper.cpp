@@ -71,7 +71,9 @@ struct Process {
   Descriptor handle;    // pidfd
   bool is_awaited;      // its hello, or its end
   bool is_dying = false;
+  bool expects_signal = false;
   std::int64_t held_us = 0; // no turn before
+  std::int64_t turns = 0;
 };
 
 struct Awaited {
@@ -83,9 +85,7 @@ struct Client {
   Descriptor line;
   pid_t pid;
   bool runs = true;
-  bool is_first = false; // of its process
   bool is_interrupted = false;
-  bool expects_signal = false;
   std::int64_t until_us = 0;
   std::vector<Awaited> awaited = {};
   long ran = 0; // turn
@@ -128,9 +128,10 @@ public:
 private:
   bool is_somebody_running() const {
     return std::any_of(clients_.begin(), clients_.end(),
-                       [](const Client &each) { return each.runs || each.expects_signal; }) ||
-           std::any_of(processes_.begin(), processes_.end(),
-                       [](const Process &each) { return each.is_awaited || each.is_dying; });
+                       [](const Client &each) { return each.runs; }) ||
+           std::any_of(processes_.begin(), processes_.end(), [](const Process &each) {
+             return each.is_awaited || each.is_dying || each.expects_signal;
+           });
   }
 
   Process *process(pid_t pid) {
@@ -172,12 +173,13 @@ private:
       ears.push_back({each.handle.get(), POLLIN, 0});
       pids.push_back(each.pid);
     }
-    const bool is_signal_expected = std::any_of(
-        clients_.begin(), clients_.end(), [](const Client &each) { return each.expects_signal; });
+    const bool is_signal_expected =
+        std::any_of(processes_.begin(), processes_.end(),
+                    [](const Process &each) { return each.expects_signal; });
     const int patience_ms = is_signal_expected ? std::min(timeout_ms, SIGNAL_ms) : timeout_ms;
     if (poll(ears.data(), ears.size(), patience_ms) == 0 && timeout_ms != 0) {
       if (is_signal_expected) { // it was ignored
-        for (Client &each : clients_) {
+        for (Process &each : processes_) {
           each.expects_signal = false;
         }
         return;
@@ -226,8 +228,6 @@ private:
     }
     expect(peer.pid);
     Client client{std::move(line), peer.pid};
-    client.is_first = std::none_of(clients_.begin(), clients_.end(),
-                                   [&](const Client &each) { return each.pid == peer.pid; });
     clients_.push_back(std::move(client));
     // Until it has said hello it runs; its process need not be waited for any more.
     if (Process *its = process(peer.pid)) {
@@ -248,7 +248,6 @@ private:
     if (size != sizeof order) { // the process ends
       client.awaited.clear();
       client.runs = false;
-      client.expects_signal = false;
       client.line = Descriptor();
       Process *its = process(client.pid);
       if (&client == &clients_.front()) {
@@ -277,7 +276,9 @@ private:
     }
     case Order::INTERRUPTED:
       client.is_interrupted = true;
-      client.expects_signal = false;
+      if (Process *its = process(client.pid)) {
+        its->expects_signal = false;
+      }
       break;
     case Order::BYE:
       client.runs = false;
@@ -291,9 +292,15 @@ private:
         each.held_us = each.pid == order.pid ? order.until_us : each.held_us;
       }
       break;
+    case Order::TURNS: {
+      const Process *its = process(order.pid);
+      const std::int64_t turns = its != nullptr ? its->turns : 0;
+      (void)send(client.line.get(), &turns, sizeof turns, MSG_NOSIGNAL);
+      break;
+    }
     case Order::SIGNALLED:
-      for (Client &each : clients_) {
-        each.expects_signal = each.expects_signal || (each.pid == order.pid && each.is_first);
+      if (Process *its = process(order.pid)) {
+        its->expects_signal = true;
       }
       break;
     default:
@@ -340,6 +347,9 @@ private:
     if (++turns_ > MOST_TURNS) {
       std::fprintf(stderr, "time_keeper: process %d\n", best->pid);
       fail("time stands still");
+    }
+    if (Process *its = process(best->pid)) {
+      its->turns++;
     }
     best->runs = true;
     best->is_interrupted = false;

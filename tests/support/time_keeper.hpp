@@ -19,6 +19,7 @@ struct Order {
     BYE,         // a thread has ended, its process goes on
     SPAWNED,     // a process, pid, which will say hello or end
     HELD,        // a process, pid, which gets no turn before until_us: a machine that is busy
+    TURNS,       // how many turns had a process, pid? Answered at once
     SIGNALLED,   // a process, pid, which will be interrupted or end: said before the signal is sent
   };
   std::uint32_t kind;

@@ -2,18 +2,16 @@
 test_calibrate.py FINGERTIP FAKE_DEVICE TIME_KEEPER TWIN PLAYER TABLES [unittest arguments]."""
 import os
 import pathlib
-import pty
 import re
-import select
 import signal
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 
 TWIN, PLAYER, TABLES = sys.argv[4:7]
 import cli_case  # noqa: E402
+from simulated_terminal import Terminal  # noqa: E402
 
 GAIN_TOLERANCE = 0.02
 
@@ -157,37 +155,17 @@ class Live(CalibrateTest):
             process = self.start("calibrate", "--port", self.port, "--yes")
             self.assertIn("set the weight down", process.stdout.readline())
             process.send_signal(signal.SIGINT)
-            _, err = process.communicate(timeout=cli_case.PATIENCE_s)
+            _, err = process.communicate()
             self.assertEqual((process.returncode, err), (1, "fingertip: interrupted; the fingertip is as it was\n"))
             self.assertIn("from 30 placements", self.calibrate("--show", "--port", self.port)[0])
 
     def test_on_a_terminal_draws_the_pad_and_asks(self):
         for answer, written in ((b"n\n", False), (b"y\n", True)):
             with self.subTest(answer), self.device(f"play={recording}"):
-                pid, terminal = pty.fork()
-                if pid == 0:
-                    try:
-                        os.execve(cli_case.FINGERTIP, ["fingertip", "calibrate", "--port", self.port],
-                                  {**self.environment, "TERM": "xterm-256color"})
-                    finally:
-                        os._exit(127)
-                shown, end = b"", self.world.now_s + cli_case.PATIENCE_s
-                answered = False
-                while self.world.now_s < end:
-                    if select.select([terminal], [], [], 0.1)[0]:
-                        try:
-                            some = os.read(terminal, 65536)
-                        except OSError:
-                            break
-                        if not some:
-                            break
-                        shown += some
-                        if not answered and b"[y/N]" in shown:
-                            answered = True
-                            os.write(terminal, answer)
-                os.close(terminal)  # which ends it, if it has not ended
-                status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-                self.assertTrue(answered, shown[-2000:])
+                with Terminal(self.world, [cli_case.FINGERTIP, "calibrate", "--port", self.port], {**self.environment, "TERM": "xterm-256color"}) as terminal:
+                    self.world.until(lambda: (terminal.look(), b"[y/N]" in terminal.output)[1])
+                    terminal.type(answer)
+                    status, shown = terminal.wait(), terminal.output
                 text = shown.decode(errors="replace")
                 self.assertIn("●", text)
                 self.assertIn("○", text)

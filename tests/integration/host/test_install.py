@@ -7,7 +7,7 @@ import subprocess
 import sys
 import unittest
 
-from cli_case import CliTest, FINGERTIP, PATIENCE_s
+from cli_case import CliTest, FINGERTIP, ROOT
 
 
 class Flash(CliTest):
