@@ -118,21 +118,31 @@ public:
     return length;
   }
 
-  /* Until something happened or this time is over. False: a signal came. */
-  bool serve(std::chrono::microseconds timeout) {
+  /* Until something happened or this moment has come. False: a signal came. */
+  bool serve(HostTime until) {
     if (halted_ && waiting_ == 0) {
       restart_after_halt();
     } else if (halted_) {
       cancel();
     }
-    timeval left = {};
-    left.tv_sec = static_cast<time_t>(timeout.count() / 1000000);
-    left.tv_usec = static_cast<suseconds_t>(timeout.count() % 1000000);
-    int result = libusb_handle_events_timeout_completed(context_, &left, nullptr);
+    handle_events();
+    if (has_data() || is_gone()) {
+      return true;
+    }
+    std::vector<pollfd> descriptors = poll_descriptors();
+    const bool is_whole = wait_for(descriptors.data(), descriptors.size(), until) > 0 ||
+                          host_now() >= until;
+    handle_events();
+    return is_whole;
+  }
+
+  /* Those that are there, without waiting. */
+  void handle_events() {
+    timeval at_once = {};
+    const int result = libusb_handle_events_timeout_completed(context_, &at_once, nullptr);
     if (result != 0 && result != LIBUSB_ERROR_INTERRUPTED && result != LIBUSB_ERROR_TIMEOUT) {
       gone_ = true;
     }
-    return result != LIBUSB_ERROR_INTERRUPTED;
   }
 
   bool write(const std::uint8_t *bytes, std::size_t length) {
@@ -397,10 +407,9 @@ Transport::Result UsbTransport::read(std::uint8_t *bytes, std::size_t capacity, 
   *length = 0;
   auto deadline = host_now() + timeout;
   while (link_) {
-    auto left = std::chrono::duration_cast<std::chrono::microseconds>(deadline - host_now());
     bool more = true;
     if (!link_->has_data() && !link_->is_gone()) {
-      more = link_->serve(std::max(left, std::chrono::microseconds(0)));
+      more = link_->serve(deadline);
     }
     if (link_->has_data()) {
       *length = link_->take(bytes, capacity);

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <libusb.h>
 #include <poll.h>
+#include <sys/eventfd.h>
 
 namespace fake_libusb {
 
@@ -31,6 +32,11 @@ int leaks() {
 const std::string &misuse() {
   return misused;
 }
+int events_descriptor() {
+  static const int fd = eventfd(0, EFD_CLOEXEC);
+  return fd;
+}
+
 void reset() {
   devices.clear();
   balance = 0;
@@ -327,7 +333,7 @@ int LIBUSB_CALL libusb_handle_events_timeout_completed(libusb_context *context, 
 }
 
 const libusb_pollfd **LIBUSB_CALL libusb_get_pollfds(libusb_context *) {
-  static libusb_pollfd events = {fake_libusb::EVENTS_FD, POLLIN};
+  static libusb_pollfd events = {fake_libusb::events_descriptor(), POLLIN};
   fake_libusb::balance++;
   return new const libusb_pollfd *[2] { &events, nullptr };
 }

@@ -1,6 +1,5 @@
 /* A bus of fingertips behind the functions of libusb that the transport uses, in place of the
- * library: the linker takes those of the program first. Bulk IN packets are what a test queued;
- * an event loop that finds nothing returns at its timeout, without waiting. */
+ * library: the linker takes those of the program first. Bulk IN packets are what a test queued. */
 #pragma once
 
 #include <cstdint>
@@ -30,8 +29,8 @@ struct Device {
   int most_waiting = 0; /* bulk IN transfers at once */
 };
 
-/* What is waited for; nothing is behind it. */
-inline constexpr int EVENTS_FD = 4711;
+/* What is waited for; nothing ever comes there. */
+int events_descriptor();
 
 /* The bus; a context sees what was plugged in when it was made. */
 std::vector<std::shared_ptr<Device>> &bus();

@@ -25,8 +25,11 @@ class CliTest(unittest.TestCase):
         self.environment = {k: v for k, v in os.environ.items() if k != "FINGERTIP_PORT" and not k.startswith("LC_")}
         self.environment["LC_ALL"] = "C.UTF-8"
         self.environment["XDG_RUNTIME_DIR"] = self.folder  # where nobody shares a fingertip
-        self.world = SimulatedTime(TIME_KEEPER, self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-time-")))
+        self.world = self.make_world()
         self.addCleanup(self.world.close)
+
+    def make_world(self):
+        return SimulatedTime(TIME_KEEPER, self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-time-")))
 
     @contextlib.contextmanager
     def device(self, *options, port=None):

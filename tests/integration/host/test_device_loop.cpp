@@ -1,16 +1,12 @@
 #include "libfingertip/command.hpp"
 #include "libfingertip/device_loop.hpp"
+#include "libfingertip/served_port.hpp"
 #include "support/host_packets.hpp"
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cstdlib>
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <poll.h>
-#include <thread>
-#include <unistd.h>
 
 using namespace fingertip;
 using std::chrono::milliseconds;
@@ -18,42 +14,29 @@ using Kind = DeviceNews::Kind;
 
 namespace {
 
-/* Answers every command on a pseudo-terminal; while it streams, frames as fast as they are read. */
+/* Answers every command on a port; while it streams, ten frames a millisecond. */
 class Answering {
 public:
-  explicit Answering(bool refuses = false) : refuses_(refuses) {
-    master_ = posix_openpt(O_RDWR | O_NOCTTY);
-    grantpt(master_);
-    unlockpt(master_);
-    path_ = ptsname(master_);
-    slave_ = open(path_.c_str(), O_RDWR | O_NOCTTY); /* so that the master does not hang up */
-    fcntl(master_, F_SETFL, O_NONBLOCK);
-    thread_ = std::thread([this] { run(); });
-  }
+  explicit Answering(bool refuses = false)
+      : refuses_(refuses), port_(""), thread_([this] { run(); }) {}
   ~Answering() {
     ended_ = true;
     thread_.join();
-    close(slave_);
-    if (master_ >= 0) {
-      close(master_);
-    }
   }
-  const std::string &path() const { return path_; }
+  const std::string &path() const { return port_.path(); }
 
 private:
   void run() {
     wire_receiver receiver;
     wire_receiver_init(&receiver, wire_commands);
     while (!ended_) {
-      pollfd waiting = {master_, POLLIN, 0};
-      if (poll(&waiting, 1, streams_ ? 0 : 10) > 0) {
-        std::uint8_t bytes[256];
-        ssize_t count = read(master_, bytes, sizeof bytes);
-        for (ssize_t i = 0; i < count; i++) {
-          wire_packet command;
-          if (wire_receive(&receiver, bytes[i], &command) == FT_OK) {
-            obey(command);
-          }
+      port_.wait(host_now() + std::chrono::microseconds(streams_ ? 100 : 10000));
+      std::uint8_t bytes[256];
+      const std::size_t count = port_.read(bytes, sizeof bytes);
+      for (std::size_t i = 0; i < count; i++) {
+        wire_packet command;
+        if (wire_receive(&receiver, bytes[i], &command) == FT_OK) {
+          obey(command);
         }
       }
       if (streams_) {
@@ -78,22 +61,20 @@ private:
     packet.sequence = sequence_++;
     auto bytes = frame_bytes(packet);
     for (std::size_t done = 0; done < bytes.size() && !ended_;) {
-      ssize_t count = write(master_, bytes.data() + done, bytes.size() - done);
-      done += static_cast<std::size_t>(std::max<ssize_t>(count, 0));
-      if (count < 0) {
-        std::this_thread::sleep_for(milliseconds(1));
+      done += port_.write(bytes.data() + done, bytes.size() - done);
+      if (done < bytes.size()) {
+        wait_until(host_now() + milliseconds(1));
       }
     }
   }
 
   bool refuses_; /* to stream */
-  int master_, slave_;
-  std::string path_;
+  ServedPort port_;
   std::atomic<bool> ended_{false};
   std::uint8_t streams_ = 0;
   std::uint16_t sequence_ = 0;
   std::uint32_t frame_ = 0;
-  std::thread thread_;
+  Thread thread_;
 };
 
 DeviceLoop::Options streaming() {
@@ -110,8 +91,8 @@ TEST(DeviceLoop, FromTheFirstAnswerToTheEndNoPacketIsMissing) {
   DeviceLoop loop(3, {"", fingertip.path(), false}, streaming(), feed);
   std::vector<std::uint16_t> sequences;
   bool ready = false, ended = false;
-  auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  while (!ended && std::chrono::steady_clock::now() < patience) {
+  auto patience = host_now() + std::chrono::seconds(20);
+  while (!ended && host_now() < patience) {
     for (const DeviceNews &news : feed.take(milliseconds(20))) {
       EXPECT_EQ(news.device, 3u);
       EXPECT_FALSE(ended) << "news after the last";
@@ -143,18 +124,18 @@ TEST(DeviceLoop, AFullFeedHoldsItBackAndDoesNotKeepItFromEnding) {
   Answering fingertip;
   DeviceFeed feed;
   std::uint64_t before = 0, after = 0;
-  auto begun = std::chrono::steady_clock::now();
+  auto begun = host_now();
   {
     DeviceLoop loop(0, {"", fingertip.path(), false}, streaming(), feed);
     loop.start();
-    std::this_thread::sleep_for(milliseconds(1500)); /* nobody takes */
+    wait_until(host_now() + milliseconds(1500)); /* nobody takes */
     before = loop.statistics().packets;
-    std::this_thread::sleep_for(milliseconds(300));
+    wait_until(host_now() + milliseconds(300));
     after = loop.statistics().packets;
-    begun = std::chrono::steady_clock::now();
+    begun = host_now();
   }
   EXPECT_EQ(before, after);
-  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(5));
+  EXPECT_LT(host_now() - begun, std::chrono::seconds(5));
   auto held = feed.take(milliseconds(0));
   EXPECT_GT(held.size(), 1000u);
   EXPECT_LT(held.size(), 10000u);
@@ -165,9 +146,9 @@ TEST(DeviceLoop, AnErrorEndsItAndIsThrownToWhoAsks) {
   DeviceFeed feed;
   DeviceLoop loop(0, {"", fingertip.path(), false}, streaming(), feed);
   std::vector<Kind> kinds;
-  auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  auto patience = host_now() + std::chrono::seconds(20);
   while ((kinds.empty() || kinds.back() != Kind::ended) &&
-         std::chrono::steady_clock::now() < patience) {
+         host_now() < patience) {
     for (const DeviceNews &news : feed.take(milliseconds(100))) {
       kinds.push_back(news.kind);
       if (news.kind == Kind::ready) {

@@ -10,7 +10,7 @@ import stat
 import sys
 import unittest
 
-import test_install
+import test_flash
 from cli_case import FINGERTIP, CliTest
 from fingertip import files
 
@@ -177,7 +177,7 @@ class Sharing(ServeTest):
 
 
 class Flash(ServeTest):
-    uf2, make_volume = test_install.Flash.uf2, test_install.Flash.make_volume
+    uf2, make_volume = test_flash.Flash.uf2, test_flash.Flash.make_volume
 
     def test_new_firmware_while_others_wait(self):
         image, self.volume = self.uf2(), self.path("RPI-RP2")

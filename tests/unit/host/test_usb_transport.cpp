@@ -1,3 +1,4 @@
+#include "libfingertip/clock.hpp"
 #include "libfingertip/command.hpp"
 #include "libfingertip/decoder.hpp"
 #include "libfingertip/error.hpp"
@@ -10,7 +11,6 @@
 #include <functional>
 #include <gtest/gtest.h>
 #include <numeric>
-#include <thread>
 
 using namespace fingertip;
 using std::chrono::milliseconds;
@@ -191,7 +191,7 @@ TEST_F(Usb, SaysWhatToWaitFor) {
   UsbTransport transport("A");
   auto all = transport.poll_descriptors();
   ASSERT_EQ(all.size(), 1u);
-  EXPECT_EQ(all[0].fd, fake_libusb::EVENTS_FD);
+  EXPECT_EQ(all[0].fd, fake_libusb::events_descriptor());
   EXPECT_EQ(all[0].events, POLLIN);
   device.is_plugged_in = false;
   read_all(transport, Result::gone);
@@ -240,7 +240,7 @@ TEST_F(Usb, IsSharedAndSeenToGoAndComeBack) {
     EXPECT_FALSE(client.reopen());
     device.is_plugged_in = true;
     for (int i = 0; i < 100 && !client.reopen(); i++) {
-      std::this_thread::sleep_for(milliseconds(20));
+      wait_until(host_now() + milliseconds(20));
       server.step(milliseconds(0));
     }
     EXPECT_TRUE(SocketTransport::is_served(socket));

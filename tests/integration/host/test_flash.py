@@ -1,13 +1,11 @@
-"""`fingertip flash` against a fake loader, and what gets installed: usage test_install.py FINGERTIP FAKE_DEVICE TIME_KEEPER [unittest arguments]."""
+"""`fingertip flash` against a fake loader: usage test_flash.py FINGERTIP FAKE_DEVICE TIME_KEEPER [unittest arguments]."""
 import os
 import pathlib
-import re
-import shutil
 import subprocess
 import sys
 import unittest
 
-from cli_case import CliTest, FINGERTIP, ROOT
+from cli_case import CliTest, ROOT
 
 
 class Flash(CliTest):
@@ -21,7 +19,7 @@ class Flash(CliTest):
 
     def uf2(self, board="pico_mux", git="abcdef012345", name="new.uf2"):
         """An image with a second boot stage, an identity and some code, by the build's own scripts."""
-        cmake = pathlib.Path(__file__).resolve().parents[3] / "cmake"
+        cmake = ROOT / "cmake"
         path = os.path.join(self.folder, name)
         pathlib.Path(path + ".code").write_bytes(bytes(range(200)))
         subprocess.run([sys.executable, cmake / "boot2_checksum.py", path + ".code", path + ".boot2"], check=True)
@@ -60,9 +58,6 @@ class Flash(CliTest):
         out, err = self.flash()
         self.assertEqual(out, "fingertip E660583883265A2C: firmware 9.8.7 abcdef012345, board pico_mux\n")
         self.assertEqual(err, "writing 9.8.7 abcdef012345 for pico_mux\n")
-
-    def test_one_of_an_older_protocol_is_asked_by_its_baud_rate(self):
-        self.assertIn("firmware 9.8.7", self.flash("version=1")[0])
 
     def test_in_the_loader_already(self):
         self.make_volume()
@@ -132,68 +127,6 @@ class Flash(CliTest):
         refused("no Fingertip firmware", good.replace(b"fingertip-board", b"fingertip-bored"))
         self.assertIn("No such file", self.error("flash", self.folder + "/none.uf2"))
 
-
-class Install(CliTest):
-    """What users get: rule, manual, completion."""
-
-    INSTALL = pathlib.Path(__file__).resolve().parents[3] / "host_tools" / "install"
-
-    def commands(self):
-        return re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
-
-    def test_the_build_installs_all_of_the_tool(self):
-        build = pathlib.Path(FINGERTIP).parents[2]
-        subprocess.run(["cmake", "--install", build, "--component", "tool", "--prefix", self.folder], check=True, capture_output=True)
-        installed = {os.path.relpath(os.path.join(folder, name), self.folder)
-                     for folder, _, names in os.walk(self.folder) for name in names}
-        page = {path for path in installed if path.startswith("share/fingertip/web/")}
-        if page:  # only where it was built
-            self.assertIn("share/fingertip/web/index.html", page)
-        self.assertEqual(installed - page, {
-            "bin/fingertip", "lib/udev/rules.d/60-fingertip.rules", "share/man/man1/fingertip.1",
-            "share/bash-completion/completions/fingertip", "share/zsh/site-functions/_fingertip",
-            "share/fish/vendor_completions.d/fingertip.fish", "lib/systemd/user/fingertip.service"})
-        self.assertEqual(subprocess.run([os.path.join(self.folder, "bin/fingertip"), "--version"], capture_output=True, text=True,
-                                        check=True).stdout, self.run_cli("--version")[0])
-        with open(os.path.join(self.folder, "lib/udev/rules.d/60-fingertip.rules"), encoding="utf-8") as file:
-            self.assertEqual(file.read(), self.run_cli("rule")[0])
-
-    def test_the_rule_is_for_our_ids(self):
-        rule = self.run_cli("rule")[0]
-        self.assertIn('ATTR{idVendor}=="1209", ATTR{idProduct}=="0001"', rule)
-        for line in rule.splitlines():
-            self.assertRegex(line, r'^#|^SUBSYSTEM=="(usb|tty|block)", .*TAG\+="uaccess"')
-
-    def test_the_manual_names_every_command_and_option(self):
-        manual = (self.INSTALL / "fingertip.1").read_text(encoding="utf-8").replace("\\-", "-")
-        for command in self.commands():
-            self.assertRegex(manual, rf"(?m)^\.BI? {command}\b")
-            for option in re.findall(r"--[a-z][a-z-]*", self.run_cli(command, "--help")[0]):
-                self.assertIn(option, manual)
-
-    @unittest.skipUnless(shutil.which("groff"), "groff is not here")
-    def test_the_manual_is_well_formed(self):
-        done = subprocess.run(["groff", "-man", "-ww", "-Tutf8", self.INSTALL / "fingertip.1"], capture_output=True, text=True, check=True)
-        self.assertEqual(done.stderr, "")
-        self.assertIn("FINGERTIP_PORT", re.sub(".\b", "", done.stdout))
-
-    def test_bash_completes(self):
-        def complete(*words):
-            script = f'. {self.INSTALL}/fingertip.bash; COMP_WORDS=({" ".join(words)} ""); COMP_CWORD={len(words)}; ' \
-                     'COMP_WORDS[COMP_CWORD]=$1; _fingertip; echo ${COMPREPLY[@]}'
-            environment = {**self.environment, "PATH": os.path.dirname(FINGERTIP) + ":" + self.environment["PATH"]}
-            return lambda start: subprocess.run(["bash", "-c", script, "bash", start], env=environment, capture_output=True, text=True,
-                                                check=True).stdout.split()
-
-        self.assertEqual(sorted(complete("fingertip")("")), sorted(self.commands()))
-        self.assertEqual(complete("fingertip")("mon"), ["monitor"])
-        self.assertIn("--transport", complete("fingertip", "info")("--"))
-        self.assertEqual(complete("fingertip", "info", "--transport")("s"), ["socket", "serial"])
-        models = re.search(r"--gripper MODEL REQUIRED +(.*)", self.run_cli("grasp", "--help")[0])[1].split(", ")
-        self.assertEqual(complete("fingertip", "grasp", "--gripper")(""), models)
-        self.environment["FINGERTIP_PORT"] = self.port
-        with self.device("serial=AAAA"):
-            self.assertEqual(complete("fingertip", "info", "--device")(""), ["AAAA"])
 
 if __name__ == "__main__":
     unittest.main(argv=[sys.argv[0], *sys.argv[4:]])
