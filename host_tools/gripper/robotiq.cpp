@@ -219,6 +219,11 @@ GripperStatus RobotiqGripper::told(const Registers &registers) {
       std::clamp((*way_.closed_count - count) * traits_.step_mm, 0.0, traits_.stroke_mm);
   status.current_A = (registers[2] & 0xFF) * AMPERE_PER_COUNT;
   status.fault = static_cast<std::uint8_t>(registers[1] >> 8 & 0xF);
+  // Whose answer it is proves that it is over.
+  if (status.fault == NO_COMMUNICATION) {
+    status.fault = NO_FAULT;
+    status.was_left_alone = true;
+  }
   return status;
 }
 

@@ -20,7 +20,7 @@ import subprocess
 
 VARIABLE = "FINGERTIP_TIME_KEEPER"
 PATIENCE_s = 60
-HELLO, WAIT, INTERRUPTED, BYE, SPAWNED, SIGNALLED = range(6)
+HELLO, WAIT, INTERRUPTED, BYE, SPAWNED, SIGNALLED, STOPPED = range(7)
 MOST_DESCRIPTORS = 128
 ORDER = struct.Struct(f"=IiqI{MOST_DESCRIPTORS}hxxxx")
 POLLIN = 1
@@ -109,6 +109,10 @@ class SimulatedTime:
     def signalled(self, pid):
         """A signal has been sent there: time stands until it has arrived."""
         self._say(SIGNALLED, pid)
+
+    def stop(self, process, seconds):
+        """As SIGSTOP and, so much later, SIGCONT: the process gets no time meanwhile, the others do."""
+        self._say(STOPPED, process.pid, until_us=self._us + round(seconds * 1e6))
 
 
 class Process:

@@ -71,6 +71,7 @@ struct Process {
   Descriptor handle;    // pidfd
   bool is_awaited;      // its hello, or its end
   bool is_dying = false;
+  std::int64_t stopped_until_us = 0;
 };
 
 struct Awaited {
@@ -290,6 +291,11 @@ private:
         each.expects_signal = each.expects_signal || (each.pid == order.pid && each.is_first);
       }
       break;
+    case Order::STOPPED:
+      if (Process *its = process(order.pid)) {
+        its->stopped_until_us = order.until_us;
+      }
+      break;
     default:
       fail("an order that is none");
     }
@@ -311,6 +317,12 @@ private:
       bool may = each.is_interrupted || each.until_us <= now_us_;
       for (std::size_t i = 0; i < each.awaited.size(); i++) {
         may = asked[at++].revents != 0 || may;
+      }
+      const Process *its = process(each.pid);
+      const std::int64_t stopped_until_us = its == nullptr ? 0 : its->stopped_until_us;
+      if (stopped_until_us > now_us_) {
+        first_us = std::min(first_us, stopped_until_us);
+        continue;
       }
       if (may && (best == nullptr || each.ran < best->ran)) {
         best = &each;

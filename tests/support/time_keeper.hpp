@@ -19,6 +19,7 @@ struct Order {
     BYE,         // a thread has ended, its process goes on
     SPAWNED,     // a process, pid, which will say hello or end
     SIGNALLED,   // a process, pid, which will be interrupted or end
+    STOPPED,     // a process, pid: none of its threads goes on before until_us
   };
   std::uint32_t kind;
   std::int32_t pid;
