@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <modbus.h>
+#include <optional>
 
 namespace fingertip {
 
@@ -206,13 +207,17 @@ void RobotiqGripper::make_sure() {
     sure_until_ = host_now() + SURE_TIMEOUTS * timeout();
     ask(read_request(sure_count_));
   }
+  std::optional<Error> garbled;
   for (const HostTime until = host_now() + timeout(); doubtful_;) {
     try {
       hear(read_request(sure_count_), answer_length(sure_count_), until);
       doubtful_ = false;
     } catch (const Error &error) {
-      if (error.code() != ErrorCode::gripper_garbled) {
-        throw;
+      if (error.code() == ErrorCode::gripper_garbled) {
+        garbled = error;
+      }
+      if (error.code() != ErrorCode::gripper_garbled || host_now() >= until) {
+        throw error.code() == ErrorCode::gripper_silent && garbled ? *garbled : error;
       }
     }
   }

@@ -96,7 +96,9 @@ public:
     bool is_whole = true;
     std::int64_t told_us = 0;
     for (;;) {
-      const ssize_t size = recv(fd_, &told_us, sizeof told_us, 0);
+      pollfd answer = {fd_, POLLIN, 0}; // which no signal restarts, as it would recv
+      const ssize_t size =
+          ::poll(&answer, 1, -1) < 0 ? -1 : recv(fd_, &told_us, sizeof told_us, 0);
       if (size == sizeof told_us) {
         now_us = told_us;
         looks = 0;
