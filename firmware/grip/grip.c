@@ -304,10 +304,11 @@ static void tell_command(const struct grip *grip, struct grip_command *command) 
 static void tell_report(const struct grip *grip, const struct grip_view *view,
                         struct grip_report *report) {
   const struct grip_hold *hold = &grip->hold;
+  bool is_over = grip->state == GRIP_FAULT && grip->status.fault == 0;
   *report = (struct grip_report){
       .state = grip->state,
       .trouble = grip->trouble,
-      .gripper_fault = grip->status.fault,
+      .gripper_fault = is_over ? grip->fault_code : grip->status.fault,
       .wanted_mN = grip->wanted_mN,
       .force_mN = view->low_mN,
       .friction_permille = hold->friction_permille,
@@ -336,6 +337,7 @@ void grip_step(struct grip *grip, uint64_t now_us, struct grip_command *command,
   bool grasps = is_grasping(grip);
   if (before != GRIP_IDLE && before != GRIP_FAULT && (grip->trouble & GRIP_GRIPPER_FAULTS) != 0) {
     grip->fault_trouble = grip->trouble;
+    grip->fault_code = grip->status.fault;
     enter(grip, GRIP_FAULT);
   } else if (grasps && is_gone(grip, &view)) {
     enter(grip, GRIP_DROPPED);

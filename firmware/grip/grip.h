@@ -168,7 +168,7 @@ void grip_default_settings(struct grip_settings *settings, const struct grip_tra
 struct grip_report {
   uint8_t state;    /* enum grip_state */
   uint32_t trouble; /* enum grip_trouble */
-  uint8_t gripper_fault;
+  uint8_t gripper_fault; /* its own code; that of FAULT stays, until there is another */
   int32_t wanted_mN; /* grip force that is aimed at */
   int32_t force_mN;  /* as told: the smaller of both fingertips' */
   int32_t load_mN;   /* tangential load of one fingertip since READY; 0 where it cannot be told */
@@ -253,7 +253,8 @@ struct grip {
   uint64_t stood_us;      /* since when the gripper stands where an approach ends */
   uint64_t ramped_us;     /* the last step of an approach or a release */
   uint32_t trouble;       /* as of the last step */
-  uint32_t fault_trouble; /* that of FAULT */
+  uint32_t fault_trouble; /* that of FAULT, */
+  uint8_t fault_code;     /* and the gripper's own */
   bool may_activate;
   bool is_entered;   /* the state is new */
   bool still_grasps; /* STILL with an object */

@@ -159,7 +159,6 @@ private:
   }
 
   void check(Gripper &gripper, const std::string &port) const {
-    gripper.poll(); /* a Robotiq tells once that nobody spoke to it before */
     const GripperStatus status = gripper.poll();
     if (status.fault != 0 && !options_.activate) {
       throw Error(port + ": fault " + std::to_string(status.fault) + " of the gripper, " +
@@ -206,6 +205,10 @@ private:
       case GraspNews::Kind::gripper:
         trouble_ = news.text;
         event("gripper: " + (news.text.empty() ? "answers, without a fault" : news.text));
+        break;
+      case GraspNews::Kind::fault:
+        fault_ = "the gripper failed: " + news.text;
+        event(fault_);
         break;
       case GraspNews::Kind::dropped:
         lost_ = std::to_string(news.count) + " lines not recorded: this program was held up";
@@ -289,6 +292,7 @@ private:
     row.status = news.status;
     if (row.status) {
       row.status->host_us -= zero_us_;
+      row.status->fault = report.gripper_fault;
     }
     grip_.take(row);
     keep([&] {
@@ -344,7 +348,7 @@ private:
     }
     Caption caption;
     caption.keys = "q end, holding  o open  h hold  g grasp";
-    for (const std::string &text : {said_, trouble_, lost_}) {
+    for (const std::string &text : {said_, fault_.empty() ? trouble_ : fault_, lost_}) {
       caption.note += (caption.note.empty() || text.empty() ? "" : "  ") + text;
     }
     if (caption.note.empty() && keeper_) {
@@ -395,6 +399,22 @@ private:
     }
   }
 
+  /* Why the status is GRASP_FAULT; "": it is not. */
+  std::string cause_of_fault() const {
+    if (status_of_end() != GRASP_FAULT) {
+      return "";
+    }
+    if (state_at_end_ == GRIP_FAULT) {
+      return fault_;
+    }
+    if (state_at_end_ == GRIP_ACTIVATING) {
+      return last_->command.motion == GRIP_ACTIVATE
+                 ? "the gripper does not become active"
+                 : "the gripper is not active, and what it holds would fall if it were activated";
+    }
+    return "the gripper does not answer" + (trouble_.empty() ? "" : ": " + trouble_);
+  }
+
   int finish() {
     std::vector<LineStatistics> statistics = {loop_.statistics(0), loop_.statistics(1)};
     std::uint64_t frames = 0;
@@ -407,7 +427,8 @@ private:
                    printable(options_.recording).c_str(), static_cast<unsigned long long>(frames),
                    fixed(keeper_->alignment_us(), 0).c_str());
     }
-    for (const std::string &text : {trouble_, lost_}) {
+    const std::string cause = cause_of_fault();
+    for (const std::string &text : {cause.empty() ? trouble_ : cause, lost_}) {
       if (!text.empty()) {
         std::fprintf(stderr, "%s\n", printable(text).c_str());
       }
@@ -439,7 +460,7 @@ private:
   bool silent_at_end_ = false;
   unsigned told_interrupts_ = 0;
   std::uint8_t state_at_end_ = GRIP_IDLE;
-  std::string said_, trouble_, lost_, failure_;
+  std::string said_, trouble_, fault_, lost_, failure_;
   KeyTime said_until_{};
 };
 

@@ -169,6 +169,7 @@ void GraspLoop::take_gripper() {
   for (GripperThread::News &news : gripper_->take()) {
     if (news.status) {
       status_ = news.status;
+      fault_text_ = status_->fault != 0 ? news.trouble : fault_text_;
       const grip_status status = core_status(*status_);
       std::lock_guard lock(core_mutex_);
       grip_take_status(&core_, &status);
@@ -200,10 +201,26 @@ void GraspLoop::step() {
   if (is_activating_ || news.command.motion == GRIP_ACTIVATE) {
     news.command.motion = is_activating_ ? GRIP_ACTIVATE : GRIP_STAY;
   }
+  const bool has_failed = news.report.state == GRIP_FAULT && report_.state != GRIP_FAULT;
   report_ = news.report;
   gripper_->command(news.command);
   news.status = status_;
   put(std::move(news));
+  if (has_failed) {
+    tell_fault(report_.trouble);
+  }
+}
+
+void GraspLoop::tell_fault(std::uint32_t trouble) {
+  GraspNews told{Kind::fault, steady_now_us()};
+  if ((trouble & GRIP_GRIPPER_FAULT) != 0) {
+    told.text = fault_text_;
+  }
+  if ((trouble & GRIP_GRIPPER_INACTIVE) != 0) {
+    told.text += (told.text.empty() ? "" : "; ") +
+                 std::string("it is not active any more: it lost its power, or was reset");
+  }
+  put(std::move(told));
 }
 
 } // namespace fingertip

@@ -44,6 +44,7 @@ struct GraspNews {
     device,  // of a fingertip: device holds it
     step,    // of the core: what it was told and what it told
     gripper, // text: what is wrong with it, its fault or why it does not answer; "": nothing now
+    fault,   // text: why the core's state has become fault
     dropped, // count: so many news of other kinds were not taken in time
     ended,   // the last
   };
@@ -102,6 +103,7 @@ private:
   void take_devices();
   void take_gripper();
   void step();
+  void tell_fault(std::uint32_t trouble);
   void obey_interrupts();
   void put(GraspNews news);
 
@@ -117,6 +119,7 @@ private:
   std::unique_ptr<GripperThread> gripper_;
   std::optional<GripperStatus> status_;
   std::string gripper_trouble_;
+  std::string fault_text_; // of the newest answer with a fault
   grip_report report_{}; // of the last step
   bool is_activating_ = false;
   unsigned interrupts_ = 0;

@@ -10,9 +10,9 @@
 // trouble, command or answer, and else for every 10 ms.
 //
 // state and trouble: names (words.hpp). width_mm, moving, object (-1: unknown), active, fault and
-// current_A: as the gripper answered status_us; before its first answer status_us is empty. motion:
-// 0 stay, 1 activate, 2 move; command_*: of move. Forces are of one fingertip; margin: 0 without a
-// load; slides: counted since the grasp began.
+// current_A: as the gripper answered status_us; before its first answer status_us is empty. The
+// fault that led to state fault stays. motion: 0 stay, 1 activate, 2 move; command_*: of move.
+// Forces are of one fingertip; margin: 0 without a load; slides: counted since the grasp began.
 #pragma once
 
 #include "grasp/core.hpp"

@@ -24,6 +24,13 @@ bool is_same(const grip_command &a, const grip_command &b) {
           (a.width_um == b.width_um && a.speed_um_s == b.speed_um_s && a.force_mN == b.force_mN));
 }
 
+std::string trouble_of(const Gripper &gripper, const GripperStatus &status) {
+  if (status.fault != 0) {
+    return "fault " + std::to_string(status.fault) + ", " + gripper.fault_text(status.fault);
+  }
+  return status.was_left_alone ? "nobody spoke to it for a second" : "";
+}
+
 } // namespace
 
 GripperThread::GripperThread(std::unique_ptr<Gripper> gripper, OpenGripper reopen)
@@ -95,7 +102,7 @@ void GripperThread::run() {
         gripper_ = reopen_();
       }
       const GripperStatus status = exchange();
-      put({status, status.fault != 0 ? gripper_->fault_text(status.fault) : ""});
+      put({status, trouble_of(*gripper_, status)});
       told_.clear();
     } catch (const Error &error) {
       if (told_ != error.what()) {

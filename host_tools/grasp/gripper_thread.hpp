@@ -26,7 +26,8 @@ public:
   struct News {
     std::optional<GripperStatus> status; // an answer
     std::string trouble;                 // or why there is none: told once, until the next answer;
-                                         // with an answer what its fault code means
+                                         // with an answer what its fault code means, or that
+                                         // nobody spoke to it
   };
 
   // gripper: open; reopen: as it was opened.

@@ -17,6 +17,11 @@ struct GripperUsual {
 };
 GripperWay complete(GripperWay way, const GripperUsual &usual);
 
+// A question that is asked to be sure that no older answer is on its way is waited for so much
+// longer than any other, then asked in another form. An answer that is late by less than that is
+// never taken for another's.
+constexpr int SURE_TIMEOUTS = 5;
+
 Error silent(const GripperWay &complete);
 
 // "; the USB adapter's latency timer ..." where that limits the rate of a command, which takes so

@@ -104,21 +104,32 @@ FeetechGripper::FeetechGripper(const GripperWay &given)
   poll();
 }
 
-Bytes FeetechGripper::exchange(Packet question, std::size_t answer_length) {
-  question.id = static_cast<std::uint8_t>(way_.slave);
+Bytes FeetechGripper::exchange(const Packet &question, std::size_t answer_length) {
+  const HostTime until = send(question);
+  doubtful_ = true;
+  sure_length_ = 0;
+  Bytes answer = hear(question, answer_length, until);
+  doubtful_ = false;
+  return answer;
+}
+
+HostTime FeetechGripper::send(const Packet &question) {
   const Bytes sent = encoded(question);
   line_.drop_input();
   if (!line_.transport().write(sent.data(), sent.size())) {
     throw Error(ErrorCode::gone, way_.port + ": gone");
   }
-  doubtful_ = true;
-  const auto end = host_now() + std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6));
+  return host_now() + timeout();
+}
+
+Bytes FeetechGripper::hear(const Packet &question, std::size_t answer_length, HostTime until) {
+  const Bytes sent = encoded(question);
   Bytes came;
   std::size_t noise = 0;
   bool other_slave = false, other_answer = false, echo_gone = false;
   for (;;) {
     const auto left =
-        std::chrono::ceil<std::chrono::milliseconds>(end - host_now());
+        std::chrono::ceil<std::chrono::milliseconds>(until - host_now());
     std::uint8_t bytes[256];
     std::size_t length = 0;
     if (left.count() <= 0) {
@@ -144,7 +155,6 @@ Bytes FeetechGripper::exchange(Packet question, std::size_t answer_length) {
       } else if (answer->parameters.size() != answer_length) {
         other_answer = true;
       } else {
-        doubtful_ = false;
         return answer->parameters;
       }
     }
@@ -160,13 +170,39 @@ Bytes FeetechGripper::exchange(Packet question, std::size_t answer_length) {
   throw silent(way_);
 }
 
-Bytes FeetechGripper::ask(Packet question, std::size_t answer_length) {
-  if (doubtful_) {
-    // Answers have no number: a late one would pass for that to the next question. No other is as
-    // long as this one's, which never changes.
-    exchange({.code = READ, .parameters = {MODEL, 2}}, 2);
+std::chrono::microseconds FeetechGripper::timeout() const {
+  return std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6));
+}
+
+// Answers have no number: a late one would pass for that to the next question. But they come in the
+// order of the questions. So two or three bytes are asked for, once, which no other answer has, and
+// what comes before them is what nobody waits for. Where they are lost the other number is asked
+// for, lest the first come after all.
+void FeetechGripper::make_sure() {
+  if (!doubtful_) {
+    return;
   }
-  return exchange(std::move(question), answer_length);
+  const auto question = [this] {
+    return ours(
+        {.code = READ, .parameters = {MODEL, static_cast<std::uint8_t>(sure_length_)}});
+  };
+  if (sure_length_ == 0 || host_now() >= sure_until_) {
+    sure_length_ = sure_length_ == 2 ? 3 : 2;
+    sure_until_ = host_now() + SURE_TIMEOUTS * timeout();
+    send(question());
+  }
+  hear(question(), static_cast<std::size_t>(sure_length_), host_now() + timeout());
+  doubtful_ = false;
+}
+
+Packet FeetechGripper::ours(Packet question) const {
+  question.id = static_cast<std::uint8_t>(way_.slave);
+  return question;
+}
+
+Bytes FeetechGripper::ask(Packet question, std::size_t answer_length) {
+  make_sure();
+  return exchange(ours(std::move(question)), answer_length);
 }
 
 Bytes FeetechGripper::read(std::uint8_t address, std::uint8_t length) {

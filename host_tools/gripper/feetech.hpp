@@ -12,6 +12,7 @@
 #include "gripper/feetech_packet.hpp"
 #include "gripper/gripper.hpp"
 #include "gripper/serial_line.hpp"
+#include "libfingertip/clock.hpp"
 
 namespace fingertip {
 
@@ -56,7 +57,12 @@ public:
   std::string fault_text(std::uint8_t fault) const override;
 
 private:
-  feetech::Bytes exchange(feetech::Packet question, std::size_t answer_length);
+  feetech::Bytes exchange(const feetech::Packet &question, std::size_t answer_length);
+  HostTime send(const feetech::Packet &question); // until when to wait
+  feetech::Bytes hear(const feetech::Packet &question, std::size_t answer_length, HostTime until);
+  void make_sure();
+  feetech::Packet ours(feetech::Packet question) const;
+  std::chrono::microseconds timeout() const;
   feetech::Bytes ask(feetech::Packet question, std::size_t answer_length);
   feetech::Bytes read(std::uint8_t address, std::uint8_t length);
   void write(std::uint8_t address, const feetech::Bytes &values);
@@ -68,6 +74,8 @@ private:
   SerialLine line_;
   int servo_model_ = 0;
   bool doubtful_ = false; // an answer may still come that nobody waits for
+  int sure_length_ = 0;   // of the answer that make_sure has asked for, 0: none yet,
+  HostTime sure_until_{}; // and still waits for
   bool active_ = false;   // by the last status
   std::int64_t commanded_us_ = 0;
   double goal_count_ = -1;

@@ -7,8 +7,7 @@
 //   GripperStatus now = gripper->poll();
 //
 // Nothing here waits longer than one exchange on the line, whose timeout is GripperWay's, but where
-// its comment says so; whoever wants the end of a motion polls for it, at least once a second, for
-// a Robotiq reports a fault after a second of silence. Not for two threads at once.
+// its comment says so; whoever wants the end of a motion polls for it. Not for two threads at once.
 //
 // Where the comment of a function has no list of its own it throws Error:
 //   gripper_silent    no answer in time; the next call may have one
@@ -46,6 +45,9 @@ struct GripperStatus {
   double width_mm = 0.0;
   double current_A = 0.0; // of its motor, as a number without sign
   std::uint8_t fault = 0; // the maker's code; 0: none
+  // Before this exchange it was asked nothing for a second or more. No fault: a gripper that says so
+  // hears again, and goes on.
+  bool was_left_alone = false;
 };
 
 struct GripperMove {

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <modbus.h>
+#include <optional>
 
 namespace fingertip {
 
@@ -138,64 +139,98 @@ RobotiqGripper::~RobotiqGripper() {
   modbus_free(modbus_); // the descriptor is the line's
 }
 
+RobotiqGripper::Bytes RobotiqGripper::exchange(const Bytes &request, std::size_t length) {
+  const HostTime until = ask(request);
+  doubtful_ = true; // until it is answered: who answers late answers the next question
+  sure_count_ = 0;
+  Bytes answer = hear(request, length, until);
+  doubtful_ = false;
+  return answer;
+}
+
 // libmodbus makes and checks the frames. The wait for an answer is not its own: it would be one of
 // real time.
-RobotiqGripper::Bytes RobotiqGripper::exchange(const Bytes &request, std::size_t length) {
+HostTime RobotiqGripper::ask(const Bytes &request) {
   if (line_.descriptor() < 0) {
     throw gripper_error(way_, EIO);
   }
   line_.drop_input();
   began_us_ = steady_now_us();
-  Bytes asked = {static_cast<std::uint8_t>(way_.slave)}, answer(MODBUS_RTU_MAX_ADU_LENGTH);
+  Bytes asked = {static_cast<std::uint8_t>(way_.slave)};
   asked.insert(asked.end(), request.begin(), request.end());
-  doubtful_ = true; // until it is answered: who answers late answers the next question
   if (modbus_send_raw_request(modbus_, asked.data(), static_cast<int>(asked.size())) < 0) {
     throw gripper_error(way_, errno);
   }
+  return HostTime(std::chrono::microseconds(began_us_)) + timeout();
+}
+
+RobotiqGripper::Bytes RobotiqGripper::hear(const Bytes &request, std::size_t length,
+                                           HostTime until) {
   pollfd coming = {line_.descriptor(), POLLIN, 0};
-  const HostTime limit = HostTime(std::chrono::microseconds(began_us_)) +
-                         std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6));
-  while (wait_for(&coming, 1, limit) == 0) {
-    if (host_now() >= limit) {
+  while (wait_for(&coming, 1, until) == 0) {
+    if (host_now() >= until) {
       throw gripper_error(way_, ETIMEDOUT);
     }
   }
+  Bytes answer(MODBUS_RTU_MAX_ADU_LENGTH);
   const int size = modbus_receive_confirmation(modbus_, answer.data());
   if (size < 0) {
     throw gripper_error(way_, errno);
   }
   constexpr int EXCEPTION = 0x80, HEAD = 2, CRC = 2;
-  if (size == 0 || answer[0] != asked[0]) {
+  if (size == 0 || answer[0] != way_.slave) {
     throw gripper_error(way_, EMBBADSLAVE);
   }
-  if (answer[1] == (asked[1] | EXCEPTION) && size == HEAD + 1 + CRC) {
+  if (answer[1] == (request[0] | EXCEPTION) && size == HEAD + 1 + CRC) {
     throw gripper_error(way_, MODBUS_ENOBASE + answer[2]);
   }
-  if (answer[1] != asked[1] || static_cast<std::size_t>(size) != HEAD + length + CRC) {
+  if (answer[1] != request[0] || static_cast<std::size_t>(size) != HEAD + length + CRC) {
     throw gripper_error(way_, EMBBADDATA);
   }
-  doubtful_ = false;
   return {answer.begin() + HEAD, answer.begin() + size - CRC};
 }
 
+std::chrono::microseconds RobotiqGripper::timeout() const {
+  return std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6));
+}
+
 // Answers have no number: a late one to a read of three registers would pass for that to the next.
-// One register is asked for until its answer comes, which no late one looks like.
+// But they come in the order of the questions. So one or two registers are asked for, once, and
+// what comes before that answer is what nobody waits for. Where it is lost the other number is
+// asked for, lest the first come after all.
 void RobotiqGripper::make_sure() {
-  for (int left = 2; doubtful_; left--) {
+  if (!doubtful_) {
+    return;
+  }
+  if (sure_count_ == 0 || host_now() >= sure_until_) {
+    sure_count_ = sure_count_ == 1 ? 2 : 1;
+    sure_until_ = host_now() + SURE_TIMEOUTS * timeout();
+    ask(read_request(sure_count_));
+  }
+  std::optional<Error> garbled;
+  for (const HostTime until = host_now() + timeout(); doubtful_;) {
     try {
-      read(1);
+      hear(read_request(sure_count_), answer_length(sure_count_), until);
+      doubtful_ = false;
     } catch (const Error &error) {
-      if (left == 0 || error.code() != ErrorCode::gripper_garbled) {
-        throw;
+      if (error.code() == ErrorCode::gripper_garbled) {
+        garbled = error;
+      }
+      if (error.code() != ErrorCode::gripper_garbled || host_now() >= until) {
+        throw error.code() == ErrorCode::gripper_silent && garbled ? *garbled : error;
       }
     }
   }
 }
 
-RobotiqGripper::Registers RobotiqGripper::read(int count) {
+RobotiqGripper::Bytes RobotiqGripper::read_request(int count) const {
   Bytes request = {static_cast<std::uint8_t>(read_function_)};
   put_range(&request, STATUS_REGISTER, count);
-  return registers_of(exchange(request, answer_length(count)), count);
+  return request;
+}
+
+RobotiqGripper::Registers RobotiqGripper::read(int count) {
+  return registers_of(exchange(read_request(count), answer_length(count)), count);
 }
 
 GripperStatus RobotiqGripper::read_status() {
@@ -219,14 +254,23 @@ GripperStatus RobotiqGripper::told(const Registers &registers) {
       std::clamp((*way_.closed_count - count) * traits_.step_mm, 0.0, traits_.stroke_mm);
   status.current_A = (registers[2] & 0xFF) * AMPERE_PER_COUNT;
   status.fault = static_cast<std::uint8_t>(registers[1] >> 8 & 0xF);
+  // Whose answer it is proves that it is over.
+  if (status.fault == NO_COMMUNICATION) {
+    status.fault = NO_FAULT;
+    status.was_left_alone = true;
+  }
   return status;
 }
 
 void RobotiqGripper::write(int address, int count, const std::uint16_t *values) {
   Bytes request = {WRITE};
   put_range(&request, address, count);
+  const Bytes range(request.begin() + 1, request.end());
   put_values(&request, count, values);
-  exchange(request, 4); // the range again
+  if (exchange(request, range.size()) != range) {
+    doubtful_ = true;
+    throw gripper_error(way_, EMBBADDATA);
+  }
 }
 
 void RobotiqGripper::activate() {

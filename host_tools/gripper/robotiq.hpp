@@ -10,6 +10,7 @@
 
 #include "gripper/gripper.hpp"
 #include "gripper/serial_line.hpp"
+#include "libfingertip/clock.hpp"
 
 #include <array>
 #include <cstdint>
@@ -39,6 +40,10 @@ private:
   // request: the function and what belongs to it. Returns what follows the function in the answer,
   // which has so many bytes.
   Bytes exchange(const Bytes &request, std::size_t length);
+  HostTime ask(const Bytes &request); // until when to wait
+  Bytes hear(const Bytes &request, std::size_t length, HostTime until);
+  Bytes read_request(int count) const;
+  std::chrono::microseconds timeout() const;
   void make_sure();
   Registers read(int count);
   GripperStatus read_status();
@@ -54,6 +59,8 @@ private:
   int both_failed_ = 0;      // so many times in a row, without ever having worked
   bool both_worked_ = false;
   bool doubtful_ = false;              // an answer may still come that nobody waits for
+  int sure_count_ = 0;                 // registers that make_sure has asked for, 0: none yet,
+  HostTime sure_until_{};              // and still waits for
   bool goes_ = false, active_ = false; // by the last status
   std::int64_t began_us_ = 0;
 };

@@ -43,7 +43,7 @@ enum Fault : std::uint8_t {
   ACTION_DELAYED = 5,
   NOT_ACTIVATED = 7,
   OVERHEATED = 8,
-  NO_COMMUNICATION = 9,
+  NO_COMMUNICATION = 9, // for a second
   UNDERVOLTAGE = 10,
   RELEASING = 11,
   INTERNAL_FAULT = 12,

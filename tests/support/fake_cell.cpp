@@ -8,13 +8,14 @@
 // "WIDTH FORCE": the width in mm and the force on either pad in N.
 //
 //   object MM | load N | slide 0|1 | over 0|1 | stall SIDE 0|1 | freeze SIDE 0|1
-//   unplug SIDE|gripper | plug SIDE|gripper | line none|silent|garbage | fault CODE | truth
+//   unplug SIDE|gripper | plug SIDE|gripper | line none|silent|garbage | fault CODE | power 0|1 |
+//   truth
 #include "cell/gripper_server.hpp"
 #include "support/soft_fingertip.hpp"
 
-#include <unistd.h>
 #include <map>
 #include <sstream>
+#include <unistd.h>
 
 using namespace fingertip;
 
@@ -92,6 +93,7 @@ public:
                                          : LineFault::none;
     server_->trouble(trouble);
   }
+  void power(bool on) { server_->power(on); }
   void fail(int fault) {
     server_->fail(static_cast<std::uint8_t>(fault));
   }
@@ -174,6 +176,8 @@ int main(int argc, char **argv) {
       object.over = number() != 0;
     } else if (verb == "fault") {
       gripper.fail(static_cast<int>(number()));
+    } else if (verb == "power") {
+      gripper.power(number() != 0);
     } else if (verb != "truth") {
       words >> name;
       if (verb == "stall") {

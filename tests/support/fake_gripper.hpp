@@ -3,7 +3,7 @@
 #pragma once
 
 #include "gripper/gripper.hpp"
-#include "libfingertip/session.hpp"
+#include "libfingertip/clock.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -11,7 +11,6 @@
 #include <memory>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
 namespace test {
@@ -19,7 +18,8 @@ namespace test {
 // What outlives a gripper that is closed and opened again.
 class FakeGripperState {
 public:
-  std::atomic<bool> silent{false}, active{true}, unplugged{false};
+  std::atomic<bool> silent{false}, active{true}, unplugged{false},
+      was_left_alone{false};
   std::atomic<int> fault{0}, activations{0}, opened{0}, exchanges{0}, delay_ms{0};
 
   double width_mm() {
@@ -83,6 +83,7 @@ public:
     status.width_mm = state_->width_mm();
     status.moving = state_->moving();
     status.fault = static_cast<std::uint8_t>(state_->fault.load());
+    status.was_left_alone = state_->was_left_alone;
     return status;
   }
   fingertip::GripperStatus move(const fingertip::GripperMove &move) override {
@@ -91,7 +92,7 @@ public:
     return poll();
   }
   std::string fault_text(std::uint8_t fault) const override {
-    return "fault " + std::to_string(fault);
+    return "text of " + std::to_string(fault);
   }
 
 private:

@@ -4,14 +4,12 @@
 #include "gripper/serial_line.hpp"
 
 #include <algorithm>
-#include <cctype>
+#include <cmath>
+#include <csignal>
 #include <cstdio>
-#include <cstdlib>
-#include <fcntl.h>
 #include <modbus.h>
-#include <poll.h>
 #include <stdexcept>
-#include <termios.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 namespace fingertip {
@@ -38,97 +36,67 @@ Bytes bytes_of(const std::string &text) {
   return bytes;
 }
 
-/* Raw, and open as long as its master is. */
-std::string open_pair(int *master, int *held_open) {
-  char name[64];
-  termios settings;
-  *master = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
-  if (*master < 0 || grantpt(*master) != 0 || unlockpt(*master) != 0 ||
-      ptsname_r(*master, name, sizeof name) != 0 ||
-      (*held_open = open(name, O_RDWR | O_NOCTTY | O_CLOEXEC)) < 0 ||
-      tcgetattr(*held_open, &settings) != 0) {
-    throw std::runtime_error("no pseudo-terminal");
-  }
-  cfmakeraw(&settings);
-  tcsetattr(*held_open, TCSANOW, &settings);
-  return name;
-}
-
-bool comes(int fd, int milliseconds) {
-  pollfd waiting = {fd, POLLIN, 0};
-  return poll(&waiting, 1, milliseconds) > 0;
-}
+constexpr std::chrono::milliseconds ROUND{10};
 
 } // namespace
 
-Served::Served(const GripperServer::Options &options)
-    : motion_(GripperServer::mechanics(options.model)), server_(motion_, options), thread_([this] {
-        while (!stop_) {
-          { std::lock_guard<std::mutex> turn(turn_); }
-          std::lock_guard<std::mutex> lock(mutex_);
-          server_.step(std::chrono::microseconds(200));
+Repeated::Repeated(std::function<void()> act)
+    : thread_([this, act = std::move(act)] {
+        while (!ended_) {
+          act();
         }
       }) {}
 
-Served::~Served() {
-  stop_ = true;
-  thread_.join();
+void Repeated::end() {
+  ended_ = true;
+  if (thread_.joinable()) {
+    thread_.join();
+  }
+}
+
+Served::Served(const GripperServer::Options &options)
+    : motion_(GripperServer::mechanics(options.model)), server_(motion_, options),
+      steps_([this] { server_.step(ROUND); }) {
+  std::signal(SIGPIPE, SIG_IGN); // of a port that is gone, which is a socket here
 }
 
 void Served::pass(double seconds) {
-  with([&](GripperServer &, GripperMotion &motion) {
-    const double end_s = motion.time_s() + seconds;
-    while (motion.time_s() < end_s) {
-      motion.step(0.001);
-    }
-  });
+  wait_until(host_now() + std::chrono::microseconds(std::llround(1e6 * seconds)));
 }
 
 Tape::Tape(std::vector<std::pair<std::string, std::string>> exchanges)
-    : exchanges_(std::move(exchanges)), port_(open_pair(&master_, &held_open_)),
-      thread_([this] { play(); }) {}
-
-Tape::~Tape() {
-  stop_ = true;
-  thread_.join();
-  close(held_open_);
-  close(master_);
-}
+    : exchanges_(std::move(exchanges)), port_(""), plays_([this] { play(); }) {}
 
 void Tape::play() {
-  for (const auto &[question, answer] : exchanges_) {
-    const std::size_t length = bytes_of(question).size();
-    Bytes came;
-    while (came.size() < length) {
-      if (stop_) {
-        return;
-      }
-      if (comes(master_, 10)) {
-        Bytes some(length - came.size());
-        const ssize_t count = read(master_, some.data(), some.size());
-        came.insert(came.end(), some.begin(), some.begin() + std::max<ssize_t>(count, 0));
-      }
-    }
-    if (digits(came) != question) {
-      complaint_ = "instead of " + question + " came " + digits(came);
-      return;
-    }
-    const Bytes bytes = bytes_of(answer);
-    if (!bytes.empty() && write(master_, bytes.data(), bytes.size()) < 0) {
-      return;
-    }
-    played_++;
+  port_.wait(host_now() + ROUND);
+  std::uint8_t bytes[256];
+  const std::size_t count = port_.read(bytes, sizeof bytes);
+  came_.insert(came_.end(), bytes, bytes + count);
+  if (count == 0 || !complaint_.empty() || played_ == exchanges_.size()) {
+    return;
   }
+  const auto &[question, answer] = exchanges_[played_];
+  const std::size_t length = bytes_of(question).size();
+  if (came_.size() < length) {
+    return;
+  }
+  const Bytes asked(came_.begin(), came_.begin() + static_cast<std::ptrdiff_t>(length));
+  came_.erase(came_.begin(), came_.begin() + static_cast<std::ptrdiff_t>(length));
+  if (digits(asked) != question) {
+    complaint_ = "instead of " + question + " came " + digits(asked);
+    return;
+  }
+  const Bytes reply = bytes_of(answer);
+  port_.write(reply.data(), reply.size());
+  played_++;
 }
 
 std::string Tape::complaint() {
-  stop_ = true;
-  thread_.join();
-  thread_ = std::thread([] {});
+  plays_.end();
   if (complaint_.empty() && played_ != exchanges_.size()) {
     complaint_ = "never came " + exchanges_[played_].first;
   }
-  if (complaint_.empty() && comes(master_, 0)) {
+  if (complaint_.empty() && !came_.empty()) {
     complaint_ = "more came";
   }
   return complaint_;
@@ -171,9 +139,20 @@ struct PlainSlave::Mapped {
   modbus_t *modbus = modbus_new_rtu("/dev/null", 115200, 'N', 8, 1);
   modbus_mapping_t *mapping = modbus_mapping_new_start_address(
       0, 0, 0, 0, robotiq::COMMAND_REGISTER, 1003, robotiq::STATUS_REGISTER, 3);
+  int ends[2]; /* libmodbus at the first, the port's bytes at the second */
+  Mapped() {
+    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, ends) != 0) {
+      throw std::runtime_error("no pair of sockets");
+    }
+    modbus_set_slave(modbus, 9);
+    modbus_set_socket(modbus, ends[0]);
+    put(0xF900);
+  }
   ~Mapped() {
     modbus_mapping_free(mapping);
     modbus_free(modbus);
+    close(ends[0]);
+    close(ends[1]);
   }
   void put(std::uint16_t status) {
     for (std::uint16_t *registers : {mapping->tab_input_registers, mapping->tab_registers + 1000}) {
@@ -184,37 +163,36 @@ struct PlainSlave::Mapped {
 };
 
 PlainSlave::PlainSlave()
-    : port_(open_pair(&master_, &held_open_)), mapped_(std::make_unique<Mapped>()) {
-  modbus_set_slave(mapped_->modbus, 9);
-  modbus_set_socket(mapped_->modbus, master_);
-  mapped_->put(0xF900);
-  thread_ = std::thread([this] {
-    while (!stop_) {
-      if (!comes(master_, 10)) {
-        continue;
-      }
-      std::uint8_t query[MODBUS_RTU_MAX_ADU_LENGTH];
-      const int length = modbus_receive(mapped_->modbus, query);
-      std::lock_guard<std::mutex> lock(mutex_);
-      if (length > 0) {
-        modbus_reply(mapped_->modbus, query, length, mapped_->mapping);
-        if (query[1] == 16) {
-          mapped_->put((mapped_->mapping->tab_registers[0] & 0x100) ? 0x1100 : 0);
-        }
-      }
-    }
-  });
-}
+    : port_(""), mapped_(std::make_unique<Mapped>()), serves_([this] { serve(); }) {}
 
 PlainSlave::~PlainSlave() {
-  stop_ = true;
-  thread_.join();
-  close(held_open_);
-  close(master_);
+  serves_.end();
 }
 
-std::array<int, 3> PlainSlave::command() {
-  std::lock_guard<std::mutex> lock(mutex_);
+void PlainSlave::serve() {
+  port_.wait(host_now() + ROUND);
+  std::uint8_t bytes[MODBUS_RTU_MAX_ADU_LENGTH];
+  const std::size_t count = port_.read(bytes, sizeof bytes);
+  if (count == 0) {
+    return;
+  }
+  std::uint8_t query[MODBUS_RTU_MAX_ADU_LENGTH];
+  if (write(mapped_->ends[1], bytes, count) != static_cast<ssize_t>(count)) {
+    return;
+  }
+  const int length = modbus_receive(mapped_->modbus, query);
+  if (length <= 0) {
+    return;
+  }
+  modbus_reply(mapped_->modbus, query, length, mapped_->mapping);
+  if (query[1] == 16) {
+    mapped_->put((mapped_->mapping->tab_registers[0] & 0x100) ? 0x1100 : 0);
+  }
+  const ssize_t size = read(mapped_->ends[1], bytes, sizeof bytes);
+  port_.write(bytes, static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+}
+
+std::array<int, 3> PlainSlave::command() const {
   const std::uint16_t *registers = mapped_->mapping->tab_registers;
   return {registers[0], registers[1], registers[2]};
 }

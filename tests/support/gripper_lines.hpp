@@ -1,41 +1,47 @@
-/* Other ends of a gripper's line for tests. */
+/* Other ends of a gripper's line for tests, on simulated time. */
 #pragma once
 
 #include "cell/gripper_server.hpp"
+#include "libfingertip/clock.hpp"
+#include "libfingertip/served_port.hpp"
 
 #include <array>
-#include <atomic>
 #include <cstdint>
-#include <mutex>
+#include <functional>
+#include <memory>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
 namespace fingertip {
 
+/* A thread that does this over and over, as long as it is there. act waits a little each time. */
+class Repeated {
+public:
+  explicit Repeated(std::function<void()> act);
+  ~Repeated() { end(); }
+  void end();
+
+private:
+  bool ended_ = false;
+  Thread thread_;
+};
+
 /* A simulated gripper served by a thread, as long as this is there. */
 class Served {
 public:
   explicit Served(const GripperServer::Options &options);
-  ~Served();
 
   std::string port() const { return server_.port(); }
-  /* What act(server, motion) returns, between two steps. */
-  template <typename Act> auto with(Act act) {
-    std::lock_guard<std::mutex> turn(turn_), lock(mutex_);
-    return act(server_, motion_);
-  }
+  /* What act(server, motion) returns, between two steps: one thread runs at a time. */
+  template <typename Act> auto with(Act act) { return act(server_, motion_); }
 
-  /* Lets simulated time pass, at once. */
   void pass(double seconds);
 
 private:
-  std::mutex turn_, mutex_; // whoever waits has its turn before the thread
   GripperMotion motion_;
   GripperServer server_;
-  std::atomic<bool> stop_{false};
-  std::thread thread_;
+  Repeated steps_;
 };
 
 /* A line on which exactly these questions come and get these answers, in hexadecimal digits with
@@ -43,8 +49,7 @@ private:
 class Tape {
 public:
   explicit Tape(std::vector<std::pair<std::string, std::string>> exchanges);
-  ~Tape();
-  const std::string &port() const { return port_; }
+  const std::string &port() const { return port_.path(); }
   /* What went otherwise; also where not all of it came. */
   std::string complaint();
 
@@ -52,11 +57,11 @@ private:
   void play();
 
   std::vector<std::pair<std::string, std::string>> exchanges_;
-  int master_, held_open_;
-  std::string port_, complaint_;
+  ServedPort port_;
+  std::vector<std::uint8_t> came_;
+  std::string complaint_;
   std::size_t played_ = 0;
-  std::atomic<bool> stop_{false};
-  std::thread thread_;
+  Repeated plays_;
 };
 
 /* Bytes in hexadecimal digits, with Modbus' checksum after them. */
@@ -70,18 +75,17 @@ class PlainSlave {
 public:
   PlainSlave();
   ~PlainSlave();
-  const std::string &port() const { return port_; }
+  const std::string &port() const { return port_.path(); }
   /* What is in the command registers. Activation shows in the status, as far as gACT goes. */
-  std::array<int, 3> command();
+  std::array<int, 3> command() const;
 
 private:
+  void serve();
+
   struct Mapped;
-  int master_, held_open_;
-  std::string port_;
+  ServedPort port_;
   std::unique_ptr<Mapped> mapped_;
-  std::mutex mutex_;
-  std::atomic<bool> stop_{false};
-  std::thread thread_;
+  Repeated serves_;
 };
 
 } // namespace fingertip

@@ -387,6 +387,10 @@ private:
     waitpid(test, &status, 0);
     unlink(path.c_str());
     rmdir(folder.c_str());
+    if (WIFSIGNALED(status)) {
+      std::fprintf(stderr, "time_keeper: the test was ended by signal %d (%s)\n", WTERMSIG(status),
+                   strsignal(WTERMSIG(status)));
+    }
     std::exit(WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status));
   });
   keeper.run();

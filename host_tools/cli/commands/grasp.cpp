@@ -78,6 +78,13 @@ void add_grasp(CommandLine &line) {
   with_colour(command, options->colour);
   with_gripper_line(command, options->gripper);
   with_limits(command, options->limits);
+  command->footer("Exit status:\n"
+                  "  0  as asked, the gripper holding or open\n"
+                  "  1  an error, which is named\n"
+                  "  2  wrong usage\n"
+                  "  3  it closed, and nothing was there\n"
+                  "  4  the object fell\n"
+                  "  5  the gripper failed, was not active, or did not answer at the end");
 }
 
 } // namespace fingertip

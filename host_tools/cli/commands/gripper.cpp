@@ -161,12 +161,6 @@ int info(Gripper &gripper, const std::string &port) {
   return 0;
 }
 
-// A Robotiq tells once that nobody spoke to it before.
-GripperStatus first_status(Gripper &gripper) {
-  polled(gripper);
-  return polled(gripper);
-}
-
 void check_range(const char *name, double value, double least, double most, const char *unit) {
   if (!(value >= least && value <= most)) {
     throw WrongUsage(std::string(name) + " goes from " + fixed(least, 0) + " to " + fixed(most, 0) +
@@ -189,7 +183,7 @@ int move(Gripper &gripper, const GripperOptions &options) {
   if (options.activate) {
     activate(gripper);
   }
-  const GripperStatus begin = first_status(gripper);
+  const GripperStatus begin = polled(gripper);
   if (!begin.active) {
     throw Error("the gripper is not active" +
                 (begin.fault ? ", fault " + fault_of(gripper, begin) : std::string()) +

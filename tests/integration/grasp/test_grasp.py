@@ -107,6 +107,12 @@ class Usage(GraspTest):
         err = self.run_cli("grasp", "--gripper", "claw", "--gripper-port", "x", status=2)[1]
         self.assertIn("no gripper model claw; there are 2f85, ", err)
 
+    def test_help_has_the_exit_statuses(self):
+        out, _ = self.run_cli("grasp", "--help")
+        for status, words in ((0, "as asked"), (1, "an error"), (2, "wrong usage"), (MISSED, "it closed, and nothing was there"), (DROPPED, "the object fell"),
+                              (FAULT, "the gripper failed, was not active, or did not answer at the end")):
+            self.assertRegex(out, rf"(?m)^ +{status}  {words}")
+
     def test_two_fingertips_are_needed_and_two_different_ones(self):
         self.environment["FINGERTIP_PORT"] = ""
         self.assertIn("two fingertips", self.run_grasp(status=1)[1])
@@ -142,7 +148,7 @@ class Usage(GraspTest):
             self.tell("line silent")
             self.assertIn("no answer", self.run_grasp(status=1)[1])
             self.tell("line none")
-            self.tell("fault 9")
+            self.tell("fault 8")
             self.assertIn("fault", self.run_grasp(status=1)[1])
 
 
@@ -355,7 +361,7 @@ class Trouble(GraspTest):
             self.tell("unplug gripper")
             self.told(process, "the gripper does not answer")
             _, err = self.finish(process, FAULT)
-            self.assertIn("gripper", err)
+            self.assertRegex(err, "the gripper does not answer: .*gripper: (gone|no such port)")
 
     def test_a_fault_of_the_gripper_ends_it(self):
         with self.cell():
@@ -364,8 +370,46 @@ class Trouble(GraspTest):
             out, err = process.communicate()
             self.assertEqual(process.returncode, FAULT, err)
             self.assertIn("fault; the width stays", err)
-            self.assertIn("too hot", err)  # what 8 means
+            self.assertRegex(err, "(?m)^the gripper failed: fault 8, too hot, it must cool down; it is not active any more.*$")
             self.assertGreater(self.tell()[1], 0.8)
+
+    def test_a_fault_that_is_over_is_named_at_the_end_and_in_the_recording(self):
+        with self.cell():
+            process = self.hold()
+            self.tell("fault 14")
+            self.until_state(process, "fault")
+            self.tell("fault 0")
+            out, err = process.communicate()
+            self.assertEqual(process.returncode, FAULT, err)
+            self.assertRegex(err, "(?m)^the gripper failed: fault 14, too much current; needs activation; ")
+        self.assertTrue(any("the gripper failed: fault 14, too much current" in text for _, text in files.read_grip_events(self.csv)))
+        rows = self.rows()
+        self.assertEqual(set(rows["fault"][rows["state"] == "fault"]), {14})
+        self.assertEqual(rows["active"][-1], 1)
+
+    def test_a_gripper_that_lost_its_power_is_named(self):
+        with self.cell():
+            process = self.hold()
+            self.tell("power 0")
+            self.tell("power 1")
+            out, err = process.communicate()
+            self.assertEqual(process.returncode, FAULT, err)
+            self.assertRegex(err, "(?m)^the gripper failed: it is not active any more: it lost its power, or was reset$")
+
+    def test_a_program_that_stands_for_two_seconds_goes_on(self):
+        """A machine that stops one of them: the gripper says that nobody spoke to it, and takes commands as before."""
+        with self.cell():
+            process = self.hold()
+            for stopped in (process, self.simulated):
+                stopped.hold_up(2)
+                self.world.sleep(3)
+                self.assertIsNone(process.poll(), process.communicate() if process.poll() is not None else "")
+                self.tell("load 2")
+                self.world.until(lambda: self.tell()[1] > HOLDS_2_N)
+                self.tell("load 1")
+            self.finish(process)
+        self.assertIn("gripper: nobody spoke to it for a second", [text.split(",", 1)[-1] for _, text in files.read_grip_events(self.csv)])
+        self.assertNotIn("fault", set(self.rows()["state"]))
 
     def test_a_full_disk_ends_the_recording_and_not_the_grasp(self):
         def limit():

@@ -1,5 +1,6 @@
 #include "grasp/grasp_loop.hpp"
 #include "grasp/settings.hpp"
+#include "libfingertip/clock.hpp"
 #include "libfingertip/names.hpp"
 #include "support/fake_gripper.hpp"
 #include "support/soft_fingertip.hpp"
@@ -27,10 +28,6 @@ protected:
   OpenGripper open() {
     return [state = state_] { return std::make_unique<test::FakeGripper>(state); };
   }
-  /* Limits that no slow machine meets. */
-  static std::map<std::string, double> patient() {
-    return {{"stale", 1000}, {"silent", 2000}, {"cap", 10}, {"travel-cap", 20}};
-  }
   void begin(GraspLoop::Options options = {}) {
     loop_ = std::make_unique<GraspLoop>(
         std::array<Way, 2>{Way{"", left_.link(), false}, Way{"", right_.link(), false}}, options);
@@ -38,13 +35,13 @@ protected:
     EXPECT_EQ(met[0].packet.body.info.serial[0], 'A');
     EXPECT_EQ(met[1].packet.body.info.serial[0], 'B');
     auto gripper = open()();
-    settings_ = settings_for(gripper->traits(), patient());
+    settings_ = settings_for(gripper->traits(), {{"cap", 10}, {"travel-cap", 20}});
     loop_->begin(std::move(gripper), open(), settings_);
   }
   /* Takes news until it is so. */
   bool until(const std::function<bool(const GraspNews &)> &is_so) {
-    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-    while (std::chrono::steady_clock::now() < patience) {
+    const HostTime patience = host_now() + std::chrono::seconds(60);
+    while (host_now() < patience) {
       for (GraspNews &news : loop_->take(milliseconds(20))) {
         if (news.kind == Kind::step) {
           highest_N_ = std::max(highest_N_, feel().force_N);
@@ -139,7 +136,7 @@ TEST_F(GraspLoopTest, InterruptsHoldAndThenOpenWithoutAnybodyTakingNews) {
   until_frames(100);
   EXPECT_EQ(state_->moves().size(), moves) << "moves while it is to be still";
   interrupts = 2;
-  std::this_thread::sleep_for(milliseconds(300)); /* nobody takes */
+  wait_until(host_now() + milliseconds(300)); /* nobody takes */
   ASSERT_TRUE(until_state(GRIP_OPEN));
   EXPECT_GT(state_->width_mm(), 45.0);
   end();
@@ -206,10 +203,14 @@ TEST_F(GraspLoopTest, AFaultEndsItWhereItIsAndIsNotActivatedAway) {
   const double width_mm = state_->width_mm();
   state_->fault = 9;
   state_->active = false;
-  ASSERT_TRUE(until_state(GRIP_FAULT));
+  ASSERT_TRUE(until([](const GraspNews &news) { return news.kind == Kind::fault; }));
+  EXPECT_EQ(last_.report.state, GRIP_FAULT);
+  EXPECT_EQ(last_.report.gripper_fault, 9);
   EXPECT_FALSE(loop_->request(GRIP_REQUEST_RELEASE));
   EXPECT_FALSE(loop_->request(GRIP_REQUEST_GRASP));
+  state_->fault = 0;
   until_frames(50);
+  EXPECT_EQ(last_.report.gripper_fault, 9) << "what led there";
   EXPECT_NEAR(state_->width_mm(), width_mm, 0.5);
   EXPECT_EQ(state_->activations, 0);
   end();

@@ -1,175 +1,86 @@
-#!/usr/bin/env python3
-"""The grippers' lines against software that nobody here wrote: pyrobotiqgripper and Feetech's SDK drive the simulated
-grippers, pymodbus is their client and our tool's server; and the tool itself, by hand.
+"""fingertip gripper by hand, with simulated grippers on simulated time.
 
-usage: test_gripper.py FINGERTIP CELL_GRIPPER [unittest's]
+usage: test_gripper.py FINGERTIP GRIPPER TIME_KEEPER [unittest's]
 """
-import asyncio
 import contextlib
 import os
-import pty
+import pathlib
 import re
-import select
 import signal
-import subprocess
 import sys
-import threading
-import tty
+import tempfile
 import unittest
 
-import pyrobotiqgripper
-import scservo_sdk
-from pymodbus import FramerType
-from pymodbus.client import ModbusSerialClient
-from pymodbus.simulator import DataType, SimData, SimDevice
-from pymodbus.server import ModbusSerialServer
-
-FINGERTIP, CELL_GRIPPER = sys.argv[1:3]
-PATIENT = ("--timeout", "5000")  # no machine is too slow for that
-
-
-@contextlib.contextmanager
-def simulated(*options):
-    """A simulated gripper's port."""
-    with subprocess.Popen([CELL_GRIPPER, *options], stdout=subprocess.PIPE, text=True) as gripper:
-        try:
-            yield gripper.stdout.readline().strip()
-        finally:
-            gripper.terminate()
-    assert gripper.returncode == 0, gripper.returncode
-
-
-def tool(*arguments, expect=0):
-    done = subprocess.run([FINGERTIP, "gripper", *arguments], capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode == expect, (arguments, done)
-    return done.stdout if expect == 0 else done.stderr
-
-
-class Robotiq(unittest.TestCase):
-    def test_pyrobotiqgripper_activates_and_moves_it(self):
-        with simulated("--model", "2f85", "--object", "40") as port:
-            gripper = pyrobotiqgripper.RobotiqGripper(com_port=port)
-            gripper.readStatus(raiseOnFault=False)
-            self.assertFalse(gripper.isActivated())
-            gripper.activate()
-            self.assertTrue(gripper.isActivated())
-            gripper.open()
-            self.assertEqual(gripper.position(), 3)
-            gripper.move(100)
-            self.assertEqual(gripper.position(), 100)
-            self.assertEqual(gripper.status()["gOBJ"], 3)
-            # 235 N at 10 N/mm are 23.5 mm into an object of 40 mm.
-            gripper.close()
-            self.assertAlmostEqual((230 - gripper.position()) * 85 / 227, 16.5, delta=0.2)
-            self.assertEqual(gripper.status()["gOBJ"], 2)
-            self.assertEqual(gripper.status()["gFLT"], 0)
-            gripper.disconnect()
-
-    def test_pymodbus_reads_it_by_every_function(self):
-        with simulated("--model", "2f85") as port:
-            client = ModbusSerialClient(port, baudrate=115200, timeout=5)
-            client.connect()
-            silence = client.read_input_registers(2000, count=3, device_id=9).registers
-            self.assertIn(silence[1] >> 8, (0, 9))
-            expected = [0, 0, 3 << 8]
-            self.assertEqual(client.read_input_registers(2000, count=3, device_id=9).registers, expected)
-            self.assertEqual(client.read_holding_registers(2000, count=3, device_id=9).registers, expected)
-            self.assertFalse(client.write_registers(1001, [0x55, 0], device_id=9).isError())
-            self.assertEqual(client.readwrite_registers(read_address=2000, read_count=3, write_address=1001, values=[0x66, 0],
-                                                        device_id=9).registers, [0, 0x66, 3 << 8])
-            client.close()
-
-    def test_pymodbus_serves_our_tool(self):
-        """Two pseudo-terminals back to back; its registers say active, going, at 100 of 255."""
-        status = [0xF900, 0, 100 << 8]
-        with Bridge() as bridge, PymodbusServer(bridge.ends[0], status) as server:
-            out = tool("info", "--model", "2f85", "--port", bridge.ends[1], *PATIENT)
-            self.assertRegex(out, r"(?m)^active +yes$")
-            self.assertRegex(out, r"(?m)^object +no$")
-            self.assertRegex(out, rf"(?m)^width_mm +{130 * 85 / 227:.2f} of 85.0$")
-            tool("move", "20", "--model", "2f85", "--port", bridge.ends[1], "--speed", "150", "--force", "20", *PATIENT)
-            self.assertEqual(server.registers(1001, 2), [round(230 - 20 * 227 / 85), 0xFF00])
-            self.assertEqual(server.registers(1000, 1), [0])  # nothing activated
-
-
-class Feetech(unittest.TestCase):
-    def test_the_makers_sdk_moves_it(self):
-        with simulated("--model", "sts3215") as path:
-            port = scservo_sdk.PortHandler(path)
-            self.assertTrue(port.openPort())
-            servo = scservo_sdk.sms_sts(port)
-
-            def patiently(call, *arguments):
-                """What the SDK waits for is 34 ms; a slow machine has more tries."""
-                for _ in range(50):
-                    *values, result, error = call(*arguments)
-                    if result == scservo_sdk.COMM_SUCCESS:
-                        self.assertEqual(error, 0)
-                        return values[0] if len(values) == 1 else values
-                self.fail(f"no answer to {call.__name__}{arguments}")
-
-            def rest():
-                for _ in range(10000):
-                    if not patiently(servo.ReadMoving, 6):
-                        return patiently(servo.ReadPos, 6)
-                self.fail("it does not rest")
-
-            self.assertEqual(patiently(servo.ping, 6), 777)
-            self.assertEqual(rest(), 2700)
-            # Without torque it stays.
-            patiently(servo.WritePosEx, 6, 2100, 2000, 50)
-            self.assertEqual(rest(), 2700)
-            patiently(servo.write1ByteTxRx, 6, scservo_sdk.SMS_STS_TORQUE_ENABLE, 1)
-            self.assertEqual(rest(), 2100)
-            patiently(servo.RegWritePosEx, 6, 2400, 2000, 50)
-            self.assertEqual(rest(), 2100)
-            servo.RegAction()
-            self.assertEqual(rest(), 2400)
-            self.assertTrue(servo.SyncWritePosEx(6, 2500, 2000, 50))
-            servo.groupSyncWrite.txPacket()
-            self.assertEqual(rest(), 2500)
-            group = scservo_sdk.GroupSyncRead(servo, scservo_sdk.SMS_STS_PRESENT_POSITION_L, 4)
-            self.assertTrue(group.addParam(6))
-            self.assertTrue(any(group.txRxPacket() == scservo_sdk.COMM_SUCCESS for _ in range(50)))
-            self.assertEqual(group.getData(6, scservo_sdk.SMS_STS_PRESENT_POSITION_L, 2), 2500)
-            port.closePort()
+FINGERTIP, GRIPPER, TIME_KEEPER = (os.path.abspath(path) for path in sys.argv[1:4])
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+from simulated_time import SimulatedTime  # noqa: E402
 
 
 class Tool(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        self.world = SimulatedTime(TIME_KEEPER, self.folder)
+        self.addCleanup(self.world.close)
+
+    @contextlib.contextmanager
+    def simulated(self, *options):
+        """A simulated gripper's port."""
+        port = f"{self.folder}/gripper"
+        gripper = self.world.start([GRIPPER, "--link", port, *options])
+        try:
+            self.assertEqual(gripper.readline(), f"{port}\n")
+            yield port
+        finally:
+            gripper.terminate()
+            self.assertEqual(gripper.wait(), 0)
+
+    def tool(self, *arguments, expect=0):
+        status, out, err = self.world.run([FINGERTIP, "gripper", *arguments])
+        self.assertEqual(status, expect, (arguments, out, err))
+        return out if expect == 0 else err
+
     def test_by_hand(self):
         for model in ("2f85", "2f140", "hande", "sts3215"):
-            with self.subTest(model), simulated("--model", model, "--object", "30", "--stiffness", "5") as port:
-                options = ("--model", model, "--port", port, *PATIENT)
-                self.assertRegex(tool("info", *options), r"(?m)^active +no$")
-                self.assertIn("is not active", tool("open", *options, expect=1))
-                self.assertRegex(tool("open", "--activate", *options), r"^activated at [\d.]+ mm\nstands at [\d.]+ mm, without an object\n$")
-                said = re.fullmatch(r"holds an object at ([\d.]+) mm, asked for 0.0 mm\n", tool("close", *options))
+            with self.subTest(model), self.simulated("--model", model, "--object", "30", "--stiffness", "5") as port:
+                options = ("--model", model, "--port", port)
+                self.assertRegex(self.tool("info", *options), r"(?m)^active +no$")
+                self.assertIn("is not active", self.tool("open", *options, expect=1))
+                self.assertRegex(self.tool("open", "--activate", *options), r"^activated at [\d.]+ mm\nstands at [\d.]+ mm, without an object\n$")
+                said = re.fullmatch(r"holds an object at ([\d.]+) mm, asked for 0.0 mm\n", self.tool("close", *options))
                 self.assertTrue(said)
                 self.assertLess(float(said[1]), 30)
-                self.assertRegex(tool("info", *options), r"(?m)^object +yes$")
-                self.assertRegex(tool("move", "40", *options), r"^stands at (39|40)\.\d mm, without an object\n$")
+                self.assertRegex(self.tool("info", *options), r"(?m)^object +yes$")
+                self.assertRegex(self.tool("move", "40", *options), r"^stands at (39|40)\.\d mm, without an object\n$")
 
     def test_an_interrupt_stops_it(self):
-        """Of a gripper that would never end: it stays at 100 of 255."""
-        with Bridge() as bridge, PymodbusServer(bridge.ends[0], [0x3900, 0, 100 << 8]) as server, \
-                subprocess.Popen([FINGERTIP, "gripper", "close", "--speed", "20", "--model", "2f85", "--port", bridge.ends[1], *PATIENT],
-                                 stderr=subprocess.PIPE, text=True) as closing:
-            self.assertTrue(server.written.wait(60))
-            self.assertEqual(server.registers(1001, 1), [255])
+        with self.simulated("--model", "2f85") as port:
+            options = ("--model", "2f85", "--port", port)
+            self.tool("open", "--activate", *options)
+            closing = self.world.start([FINGERTIP, "gripper", "close", "--speed", "20", *options])
+            self.world.sleep(1)
+            self.assertIsNone(closing.poll())
             closing.send_signal(signal.SIGINT)
-            self.assertEqual(closing.stderr.read(), "fingertip: interrupted\n")
-            self.assertEqual(closing.wait(60), 1)
-            self.assertEqual(server.registers(1001, 1), [100])
+            _, err = closing.communicate()
+            self.assertEqual((closing.returncode, err), (1, "fingertip: interrupted\n"))
+            self.world.sleep(0.1)  # until its motor has heard it
+            stands = self.tool("info", *options)
+            self.assertRegex(stands, r"(?m)^moving +no$")
+            width_mm = float(re.search(r"(?m)^width_mm +([\d.]+) of 85.0$", stands)[1])
+            self.assertAlmostEqual(width_mm, 85 - 20, delta=2)
+            self.world.sleep(1)
+            self.assertEqual(self.tool("info", *options), stands)
 
     def test_what_is_wrong_is_said(self):
-        usual = ("--model", "2f85", "--timeout", "1500")
-        for fault, said in (("silent", "no answer from slave 9 within 1500 ms; is it powered"), ("garbage", "look for a second program"),
+        usual = ("--model", "2f85")
+        for fault, said in (("silent", "no answer from slave 9 within 50 ms; is it powered"), ("garbage", "look for a second program"),
                             ("damaged", "an answer is damaged \\(CRC\\)"), ("other_slave", "another slave answers"),
                             ("refused", "refused with Modbus exception 1")):
-            with self.subTest(fault), simulated("--model", "2f85", "--line", fault) as port:
-                self.assertRegex(tool("info", *usual, "--port", port, expect=1), said)
-        with simulated("--model", "2f85", "--fault", "14") as port:
-            self.assertIn("fault 14 (too much current; needs activation)", tool("open", *usual[:2], "--port", port, *PATIENT, expect=1))
+            with self.subTest(fault), self.simulated("--model", "2f85", "--line", fault) as port:
+                self.assertRegex(self.tool("info", *usual, "--port", port, expect=1), said)
+        with self.simulated("--model", "2f85", "--fault", "14") as port:
+            self.assertIn("fault 14 (too much current; needs activation)", self.tool("open", *usual, "--port", port, expect=1))
 
     def test_usage(self):
         for arguments, said in (
@@ -180,81 +91,13 @@ class Tool(unittest.TestCase):
                 (("open", "--model", "3f"), "there are 2f85, 2f140, hande, sts3215"),
                 (("open", "--model", "2f85", "--port", "x", "--slave", "300"), "a slave is a number from 1 to 247"),
                 (("open", "--model", "2f85", "--port", "x", "--closed", "2"), "grows while it closes")):
-            self.assertIn(said, tool(*arguments, expect=2))
-        self.assertIn("no such port; plug its adapter in", tool("open", "--model", "2f85", "--port", "/dev/none", expect=1))
-        with simulated("--model", "2f85") as port:
+            self.assertIn(said, self.tool(*arguments, expect=2))
+        self.assertIn("no such port; plug its adapter in", self.tool("open", "--model", "2f85", "--port", "/dev/none", expect=1))
+        with self.simulated("--model", "2f85") as port:
             for arguments, said in ((("move", "90"), "WIDTH goes from 0 to 85 mm"), (("open", "--speed", "1"), "--speed goes from 20 to 150 mm/s"),
                                     (("open", "--force", "300"), "--force goes from 20 to 235 N")):
-                self.assertIn(said, tool(*arguments, "--model", "2f85", "--port", port, *PATIENT, expect=2))
-
-
-class Bridge:
-    """Two ports, each the other's far end."""
-
-    def __enter__(self):
-        self.masters, self.slaves = zip(*(pty.openpty() for _ in range(2)))
-        for slave in self.slaves:
-            tty.setraw(slave)
-        self.ends = [os.ttyname(slave) for slave in self.slaves]
-        self.ended, self.end = os.pipe()
-        self.thread = threading.Thread(target=self.carry)
-        self.thread.start()
-        return self
-
-    def carry(self):
-        while True:
-            for ready in select.select([*self.masters, self.ended], [], [])[0]:
-                if ready == self.ended:
-                    return
-                os.write(self.masters[1 - self.masters.index(ready)], os.read(ready, 512))
-
-    def __exit__(self, *_):
-        os.write(self.end, b".")
-        self.thread.join()
-        for descriptor in (*self.masters, *self.slaves, self.ended, self.end):
-            os.close(descriptor)
-
-
-class PymodbusServer:
-    """A slave 9 with these status registers, whatever it is told."""
-
-    def __init__(self, port, status):
-        self.port, self.status = port, status
-        self.told = {}
-        self.written = threading.Event()
-
-    def trace(self, sending, pdu):
-        if not sending:
-            address, values = {16: lambda: (pdu.address, pdu.registers), 23: lambda: (pdu.write_address, pdu.write_registers)}.get(
-                pdu.function_code, lambda: (0, []))()
-            self.told.update(enumerate(values, address))
-            if values:
-                self.written.set()
-        return pdu
-
-    def registers(self, address, count):
-        return [self.told.get(at, 0) for at in range(address, address + count)]
-
-    async def serve(self, ready):
-        device = SimDevice(9, [SimData(1000, values=[0, 0, 0], datatype=DataType.REGISTERS),
-                               SimData(2000, values=self.status, datatype=DataType.REGISTERS)])
-        self.server = ModbusSerialServer(device, framer=FramerType.RTU, port=self.port, baudrate=115200, trace_pdu=self.trace)
-        self.loop = asyncio.get_running_loop()
-        await self.server.serve_forever(background=True)
-        ready.set()
-        await self.server.serving
-
-    def __enter__(self):
-        ready = threading.Event()
-        self.thread = threading.Thread(target=lambda: asyncio.run(self.serve(ready)))
-        self.thread.start()
-        assert ready.wait(60)
-        return self
-
-    def __exit__(self, *_):
-        asyncio.run_coroutine_threadsafe(self.server.shutdown(), self.loop).result(60)
-        self.thread.join()
+                self.assertIn(said, self.tool(*arguments, "--model", "2f85", "--port", port, expect=2))
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1] + sys.argv[3:])
+    unittest.main(argv=sys.argv[:1] + sys.argv[4:])

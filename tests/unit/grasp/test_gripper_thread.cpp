@@ -1,4 +1,5 @@
 #include "grasp/gripper_thread.hpp"
+#include "libfingertip/clock.hpp"
 #include "support/fake_gripper.hpp"
 
 #include <functional>
@@ -11,23 +12,24 @@ namespace {
 
 class GripperThreadTest : public ::testing::Test {
 protected:
+  static constexpr std::chrono::seconds PATIENCE{20};
+
   OpenGripper open() {
     return [state = state_] { return std::make_unique<test::FakeGripper>(state); };
   }
   /* Takes news until one of them is so. */
   bool comes(GripperThread &thread, const std::function<bool(const GripperThread::News &)> &is_so) {
-    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-    while (std::chrono::steady_clock::now() < patience) {
+    for (const HostTime patience = host_now() + PATIENCE; host_now() < patience; pass()) {
       for (const GripperThread::News &news : thread.take()) {
         all_.push_back(news);
         if (is_so(news)) {
           return true;
         }
       }
-      std::this_thread::sleep_for(milliseconds(1));
     }
     return false;
   }
+  static void pass(milliseconds time = milliseconds(1)) { wait_until(host_now() + time); }
   static bool is_answer(const GripperThread::News &news) { return news.status.has_value(); }
   static bool is_trouble(const GripperThread::News &news) { return !news.status; }
 
@@ -44,9 +46,8 @@ TEST_F(GripperThreadTest, TheNewestCommandGoesOutOnceAndAnswersComeBack) {
   for (int um : {40000, 39000, 38000}) {
     thread.command({GRIP_MOVE, um, 50000, 0});
   }
-  const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  while (!thread.is_done() && std::chrono::steady_clock::now() < patience) {
-    std::this_thread::sleep_for(milliseconds(1));
+  for (const HostTime patience = host_now() + PATIENCE; !thread.is_done() && host_now() < patience;) {
+    pass();
   }
   EXPECT_TRUE(thread.is_done());
   EXPECT_TRUE(
@@ -85,7 +86,7 @@ TEST_F(GripperThreadTest, SilenceIsToldOnceAndTheNewestCommandWaitsForTheEndOfIt
   thread.command({GRIP_MOVE, 20000, 50000, 0});
   const int before = state_->exchanges;
   while (state_->exchanges < before + 20) {
-    std::this_thread::sleep_for(milliseconds(1));
+    pass();
   }
   EXPECT_FALSE(thread.is_done());
   EXPECT_EQ(thread.take().size(), 0u) << "told again";
@@ -104,7 +105,7 @@ TEST_F(GripperThreadTest, APortThatVanishedIsOpenedAgainWhereItIsBack) {
   EXPECT_TRUE(comes(thread, is_trouble));
   const int before = state_->exchanges;
   while (state_->exchanges < before + 3) {
-    std::this_thread::sleep_for(milliseconds(1)); /* attempts to open it */
+    pass(); /* attempts to open it */
   }
   state_->unplugged = false;
   EXPECT_TRUE(comes(thread, is_answer));
@@ -116,8 +117,19 @@ TEST_F(GripperThreadTest, AFaultIsExplained) {
   state_->fault = 9;
   GripperThread thread(open()(), open());
   EXPECT_TRUE(comes(thread, [](const auto &news) {
-    return news.status && news.status->fault == 9 && news.trouble == "fault 9";
+    return news.status && news.status->fault == 9 && news.trouble == "fault 9, text of 9";
   }));
+}
+
+TEST_F(GripperThreadTest, ThatNobodySpokeToItIsToldAndNoFault) {
+  state_->was_left_alone = true;
+  GripperThread thread(open()(), open());
+  EXPECT_TRUE(comes(thread, [](const auto &news) {
+    return news.status && news.status->fault == 0 &&
+           news.trouble == "nobody spoke to it for a second";
+  }));
+  state_->was_left_alone = false;
+  EXPECT_TRUE(comes(thread, [](const auto &news) { return news.status && news.trouble.empty(); }));
 }
 
 TEST_F(GripperThreadTest, EndsWhileTheLineIsSlow) {
@@ -127,6 +139,6 @@ TEST_F(GripperThreadTest, EndsWhileTheLineIsSlow) {
     thread.command({GRIP_MOVE, 30000, 50000, 0});
   }
   const int after = state_->exchanges;
-  std::this_thread::sleep_for(milliseconds(100));
+  pass(milliseconds(100));
   EXPECT_EQ(state_->exchanges, after) << "goes on after its end";
 }

@@ -505,6 +505,7 @@ static void a_gripper_fault_ends_it(void) {
   world_run(&world, 3000);
   TEST_ASSERT_EQUAL(GRIP_FAULT, world.report.state);
   TEST_ASSERT_BITS_HIGH(GRIP_GRIPPER_FAULT, world.report.trouble);
+  TEST_ASSERT_EQUAL_MESSAGE(9, world.report.gripper_fault, "what led there is not told any more");
   TEST_ASSERT_EQUAL((int32_t)before_um, (int32_t)world.sent_um);
   TEST_ASSERT_FALSE(world.is_activated);
 }

@@ -1,5 +1,6 @@
 #include "gripper/robotiq.hpp"
 #include "gripper/robotiq_registers.hpp"
+#include "libfingertip/random.hpp"
 #include "support/gripper_lines.hpp"
 
 #include <cmath>
@@ -17,11 +18,8 @@ GripperServer::Options served(const char *model, std::vector<int> functions = {3
   return options;
 }
 
-/* Long enough for any machine; where no answer is to come, it is waited for. */
-constexpr double TIMEOUT_s = 1.5;
-
 std::unique_ptr<Gripper> opened(const std::string &model, const std::string &port) {
-  return open_gripper({.model = model, .port = port, .timeout_s = TIMEOUT_s});
+  return open_gripper({.model = model, .port = port});
 }
 
 /* Less than a second passes from one poll to the next: it would be a fault. */
@@ -241,8 +239,7 @@ TEST(RobotiqFrames, NoLateAnswerIsTakenForThatToTheNextQuestion) {
                     one = with_crc("09 04 07 D0 00 01");
   Tape tape({{"09 04 07 D0 00 03 B1 CE", stale},
              {"09 04 07 D0 00 03 B1 CE", ""},
-             {one, stale},
-             {one, with_crc("09 04 02 F9 00")},
+             {one, stale + " " + with_crc("09 04 02 F9 00")},
              {"09 04 07 D0 00 03 B1 CE", fresh}});
   {
     std::unique_ptr<Gripper> gripper = opened("2f85", tape.port());
@@ -252,15 +249,18 @@ TEST(RobotiqFrames, NoLateAnswerIsTakenForThatToTheNextQuestion) {
   EXPECT_EQ(tape.complaint(), "");
 }
 
+/* It is no fault: who answers hears again. */
 TEST(Robotiq, TellsASecondOfSilenceOnce) {
   Served simulated(served("2f85"));
   std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
   simulated.pass(1.1);
-  const GripperStatus status = gripper->poll();
-  EXPECT_EQ(status.fault, robotiq::NO_COMMUNICATION);
-  EXPECT_EQ(gripper->fault_text(status.fault), "nobody spoke to it for a second");
+  GripperStatus status = gripper->poll();
+  EXPECT_TRUE(status.was_left_alone);
+  EXPECT_EQ(status.fault, 0);
   EXPECT_TRUE(status.active);
-  EXPECT_EQ(gripper->poll().fault, 0);
+  status = gripper->poll();
+  EXPECT_FALSE(status.was_left_alone);
+  EXPECT_EQ(status.fault, 0);
 }
 
 TEST(Robotiq, IsNotActivatedByAMoveAfterItsPowerWasLost) {
@@ -328,6 +328,41 @@ TEST(Robotiq, TheSimulatedOneFaultsAsDocumented) {
   EXPECT_FALSE(gripper->poll().active);
 }
 
+/* An exchange waits for 50 ms; half of the answers are up to 150 ms late while it closes and opens.
+ * Where the question to be sure was asked again before its own answer had come, one status in thirty
+ * was an older one. */
+TEST(Robotiq, NoStatusIsOlderThanItsQuestionHoweverLateAnswersCome) {
+  constexpr double NEAR_mm = 0.4; // a step, and how far it moves within a poll's own time
+  Served simulated(served("2f85"));
+  std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
+  const auto width_mm = [&] {
+    return simulated.with(
+        [](GripperServer &, GripperMotion &motion) { return motion.told_width_mm(); });
+  };
+  Random random(7, 0, 0);
+  int answers = 0;
+  for (int i = 0; i < 2000; i++) {
+    simulated.with([&](GripperServer &server, GripperMotion &) {
+      LineTrouble trouble;
+      trouble.late_s = std::max(0.0, random.uniform(-0.15, 0.15));
+      server.trouble(trouble);
+    });
+    const double before_mm = width_mm();
+    try {
+      if (i % 100 == 0) {
+        gripper->move({.width_mm = i % 200 == 0 ? 0.0 : 85.0, .speed_mm_s = 20});
+      } else {
+        const double told_mm = gripper->poll().width_mm, now_mm = width_mm();
+        EXPECT_LE(told_mm, std::max(before_mm, now_mm) + NEAR_mm) << i;
+        EXPECT_GE(told_mm, std::min(before_mm, now_mm) - NEAR_mm) << i;
+        answers++;
+      }
+    } catch (const Error &) { // none in time
+    }
+  }
+  EXPECT_GT(answers, 500);
+}
+
 TEST(Robotiq, SaysWhenItsPortIsGone) {
   auto simulated = std::make_unique<Served>(served("2f85"));
   std::unique_ptr<Gripper> gripper = opened("2f85", simulated->port());
@@ -350,7 +385,7 @@ TEST(Robotiq, RefusesWhatCannotBe) {
   gripper.reset();
   EXPECT_EQ(code_of([&] {
               open_gripper(
-                  {.model = "2f85", .port = simulated.port(), .slave = 10, .timeout_s = 0.1});
+                  {.model = "2f85", .port = simulated.port(), .slave = 10});
             }),
             ErrorCode::gripper_silent);
   EXPECT_EQ(
@@ -370,11 +405,11 @@ TEST(Robotiq, WorksThroughASlowLine) {
   std::unique_ptr<Gripper> gripper = activated("2f85", simulated);
   const auto ten_moves = [&](const LineTrouble &trouble) {
     simulated.with([&](GripperServer &server, GripperMotion &) { server.trouble(trouble); });
-    const auto begin = std::chrono::steady_clock::now();
+    const auto begin = host_now();
     for (int i = 0; i < 10; i++) {
       EXPECT_TRUE(gripper->move({.width_mm = 85.0 - i, .speed_mm_s = 150}).active);
     }
-    return std::chrono::steady_clock::now() - begin;
+    return host_now() - begin;
   };
   LineTrouble timer, late;
   timer.latency_timer_s = 0.016;
