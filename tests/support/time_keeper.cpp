@@ -33,6 +33,7 @@
 
 using fingertip::test::MOST_DESCRIPTORS;
 using fingertip::test::Order;
+using fingertip::test::Turn;
 
 namespace {
 
@@ -287,7 +288,9 @@ private:
       break;
     case Order::SIGNALLED:
       for (Client &each : clients_) {
-        each.expects_signal = each.expects_signal || (each.pid == order.pid && each.is_first);
+        if (each.pid == order.pid && each.is_first && !each.is_interrupted) { // else it has come
+          each.expects_signal = true;
+        }
       }
       break;
     default:
@@ -305,17 +308,21 @@ private:
     }
     poll(asked.data(), asked.size(), 0);
     Client *best = nullptr;
-    std::int64_t first_us = INT64_MAX;
+    std::int64_t first_us = INT64_MAX, others_us = INT64_MAX; // others: all but the best
     std::size_t at = 0;
     for (Client &each : clients_) {
       bool may = each.is_interrupted || each.until_us <= now_us_;
       for (std::size_t i = 0; i < each.awaited.size(); i++) {
         may = asked[at++].revents != 0 || may;
       }
+      const std::int64_t each_us = may ? now_us_ : each.until_us;
       if (may && (best == nullptr || each.ran < best->ran)) {
+        others_us = first_us; // of those before; those behind follow
         best = &each;
+      } else {
+        others_us = std::min(others_us, each_us);
       }
-      first_us = std::min(first_us, each.until_us);
+      first_us = std::min(first_us, each_us);
     }
     if (best == nullptr) {
       if (first_us == INT64_MAX) {
@@ -333,7 +340,8 @@ private:
     best->is_interrupted = false;
     best->awaited.clear();
     best->ran = ++turn_;
-    if (send(best->line.get(), &now_us_, sizeof now_us_, MSG_NOSIGNAL) < 0) {
+    const Turn turn = {now_us_, others_us};
+    if (send(best->line.get(), &turn, sizeof turn, MSG_NOSIGNAL) < 0) {
       // It has ended, which its line will tell.
     }
   }
