@@ -10,6 +10,7 @@ import { readFaults } from './faults.mjs';
 import { readImage } from './image.mjs';
 import { readHostScript, scheduleHostScript } from './port/host_script.mjs';
 import { PtyPort } from './port/pty_port.mjs';
+import { SteppedPort } from './port/stepped_port.mjs';
 import { DEFAULT_SERIAL, Machine } from './machine.mjs';
 import { OutputFile } from './output_file.mjs';
 import { readScenario } from './scenario.mjs';
@@ -42,6 +43,9 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
                        a client writes arrives at the time of its writing, answers never come early, a lag is caught
                        up and delays them, and the report has the largest of each second on the wall (wall_lag_s);
                        fast: as fast as possible
+  --stepped            serve the CDC port on stdin and stdout to a program that has a clock of its own: emulated time
+                       passes only as far as that program asks (frames: port/stepped_port.mjs). So a test and its
+                       emulators share one time, however slow the machine is: tests/support/emulated_fingertip.cpp
   --usbredir WHERE     give the USB device to a virtual machine instead of the built-in host; WHERE is the path of a
                        Unix socket or a TCP port on the loopback. QEMU: -chardev socket,id=r,path=WHERE,reconnect=1
                        -device qemu-xhci -device usb-redir,chardev=r. Lines on stdin: "unplug", "plug". While a packet
@@ -59,7 +63,7 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --report FILE.json   what happened, in numbers
   --progress           a line on stderr each second
 
-Runs without --pty and --usbredir are the same bit for bit each time. SIGINT ends a run cleanly.
+Runs without --pty and --usbredir are the same bit for bit each time; with --stepped, if what the program asks is. SIGINT ends a run cleanly.
 Exit: 0 clean; 1 a warning or failure of firmware or emulation, or an output that could not be written whole,
 each printed as a line; 2 wrong usage or input.`;
 
@@ -68,7 +72,7 @@ const OPTIONS = {
   seed: { type: 'string', default: '1' }, 'clock-ppm': { type: 'string', default: '0' }, serial: { type: 'string', default: DEFAULT_SERIAL }, faults: { type: 'string' },
   revision: { type: 'string', default: '2' }, flash: { type: 'string' }, 'slow-flash': { type: 'boolean', default: false },
   'fast-enumeration': { type: 'boolean', default: false }, 'allow-watchdog': { type: 'boolean', default: false },
-  pty: { type: 'string' }, usbredir: { type: 'string' }, 'wait-open': { type: 'boolean', default: false }, pace: { type: 'string' },
+  pty: { type: 'string' }, stepped: { type: 'boolean' }, usbredir: { type: 'string' }, 'wait-open': { type: 'boolean', default: false }, pace: { type: 'string' },
   'host-script': { type: 'string' }, capture: { type: 'string' }, 'bus-log': { type: 'string' }, 'usb-log': { type: 'string' },
   vcd: { type: 'string' }, 'vcd-from': { type: 'string', default: '0' }, 'vcd-to': { type: 'string' }, 'rise-ns': { type: 'string' },
   report: { type: 'string' }, progress: { type: 'boolean', default: false }, help: { type: 'boolean', short: 'h', default: false },
@@ -120,8 +124,9 @@ function parseOptions(argv) {
   if (!/^[0-9a-fA-F]{16}$/.test(values.serial)) throw new InputError(`--serial "${values.serial}" is not 16 hexadecimal digits`);
   values.pace ??= values.pty || values.usbredir ? 'real' : 'fast';
   if (!['real', 'wall', 'fast'].includes(values.pace)) throw new InputError(`--pace "${values.pace}" is neither real, wall nor fast`);
-  const drivers = ['pty', 'usbredir', 'host-script'].filter((name) => values[name] !== undefined);
+  const drivers = ['pty', 'stepped', 'usbredir', 'host-script'].filter((name) => values[name] !== undefined);
   if (drivers.length > 1) throw new InputError(`--${drivers[0]} and --${drivers[1]} exclude each other`);
+  if (values.stepped && values.pace !== 'fast') throw new InputError('--stepped has no --pace: time passes as its program asks');
   if (values.pace === 'wall' && values.usbredir) throw new InputError('--pace wall and --usbredir exclude each other');
   if (values['wait-open'] && !values.pty) throw new InputError('--wait-open needs --pty');
   return values;
@@ -158,6 +163,23 @@ function inOrder(scope, wall_ns) {
   };
 }
 
+/** As far as the program on stdin asks, to the end of the run or of that program's interest in it. */
+function runStepped(machine, port, end_ns) {
+  for (;;) {
+    const step = port.next();
+    if (!step) {
+      machine.endReason = 'interrupted';
+      return;
+    }
+    const until_ns = Math.min(step.until_ns, end_ns);
+    let goesOn = true;
+    while (goesOn && machine.time.nanos < until_ns && !port.hasSent) goesOn = machine.run(Math.min(until_ns, machine.time.nanos + step.margin_ns));
+    const hasEnded = !goesOn || machine.time.nanos >= end_ns;
+    port.answer(machine.time.nanos, hasEnded);
+    if (hasEnded) return;
+  }
+}
+
 async function run(options) {
   const Board = findBoard(options.board);
   const image = readImage(options.image);
@@ -187,6 +209,7 @@ async function run(options) {
   // Before the outputs: a link that another emulator serves must not cost that one its files.
   const pty = options.pty ? await PtyPort.start(options.pty) : null;
   const usbredir = options.usbredir ? await UsbRedirServer.start(options.usbredir) : null;
+  const stepped = options.stepped ? new SteppedPort() : null;
   const cable = usbredir && createInterface({ input: process.stdin });
   let clean;
   try {
@@ -212,7 +235,10 @@ async function run(options) {
         if (options['usb-log']) usbLog.write(Buffer.from(`${p.t_ns.toFixed(0)},${p.endpoint},${p.setup ? 'setup' : p.isIn ? 'in' : 'out'},${p.data.length},${hex(p.data)},${p.offered_ns?.toFixed(0) ?? ''}\n`));
         if (p.isIn && machine.host.isBulkIn(p.endpoint)) capture.write(p.data);
       },
-      onData: (bytes) => pty?.send(bytes),
+      onData: (bytes) => {
+        pty?.send(bytes);
+        stepped?.send(bytes, machine.time.nanos);
+      },
       ...(usbredir ? { makeClient: (parts) => usbredir.attachTo(parts) } : {}),
     });
     cable?.on('line', (line) => {
@@ -224,6 +250,7 @@ async function run(options) {
     const wall_zero_ns = process.hrtime.bigint();
     const wall_ns = () => Number(process.hrtime.bigint() - wall_zero_ns);
     if (pty) pty.connect(machine.client, options.pace === 'wall' ? inOrder(machine.scope, wall_ns) : undefined);
+    else if (stepped) stepped.connect(machine.scope, machine.client);
     else if (!usbredir) scheduleHostScript(script, machine.scope, machine.client);
 
     let paced_ms = started_ms;
@@ -231,7 +258,8 @@ async function run(options) {
     let shown_ms = started_ms;
     const wall_lag_s = [];
     const slice_ns = usbredir ? USBREDIR_SLICE_NS : options.pace === 'wall' ? WALL_SLICE_NS : pty || options.pace === 'real' ? SLICE_NS : SLICE_BATCH_NS;
-    for (;;) {
+    if (stepped) runStepped(machine, stepped, end_ns);
+    else for (;;) {
       while (usbredir?.waitsForReader(performance.now()) && !interrupted) await sleep(1);
       let target = Math.min(end_ns, machine.time.nanos + slice_ns);
       if (options.pace === 'wall') {

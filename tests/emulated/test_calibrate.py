@@ -1,4 +1,5 @@
-"""A fingertip calibrated by its user: the tool on the port of the release image, a weight set down on the twin's pad, and what is measured after.
+"""A fingertip calibrated by its user: the tool on the port of the release image, a weight set down on the twin's pad, and what is measured after;
+on simulated time.
 
 The image keeps 50 frames/s in its flash first, so that three minutes of placements take seconds.
 
@@ -10,7 +11,6 @@ import re
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 
 import numpy as np
@@ -18,18 +18,12 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
 from fingertip import files  # noqa: E402
+from world import World  # noqa: E402
 
 OPTIONS = argparse.Namespace()
-PATIENCE_s = 240
+PATIENCE_s = 600  # of the world's time
 CALIBRATED = 1 << 19
 FORCE_N = 3.0
-
-
-def run(*call):
-    done = subprocess.run([str(part) for part in call], capture_output=True, text=True, timeout=PATIENCE_s)
-    if done.returncode != 0:
-        raise AssertionError(f"{call}: {done.stdout}{done.stderr}")
-    return done.stdout
 
 
 class Calibrate(unittest.TestCase):
@@ -38,49 +32,43 @@ class Calibrate(unittest.TestCase):
         temporary = tempfile.TemporaryDirectory()
         cls.addClassCleanup(temporary.cleanup)
         cls.folder = pathlib.Path(temporary.name)
-        cls.tool = OPTIONS.build / "host_tools/cli/fingertip"
         cls.scenario = cls.folder / "placements.csv"
-        run(OPTIONS.build / "host_tools/twin/twin", "scenario", "placements", "-o", cls.scenario, "--gain", 10, "--seed", 41, "--pad", 7,
-            "--cache", OPTIONS.build / "contact_tables")
+        subprocess.run([OPTIONS.build / "host_tools/twin/twin", "scenario", "placements", "-o", cls.scenario, "--gain", "10", "--seed", "41", "--pad", "7",
+                        "--cache", OPTIONS.build / "contact_tables"], check=True, stdout=subprocess.DEVNULL)
 
-    def start(self, name, *options):
-        """The image, powered on when its port is opened; the port."""
-        port = self.folder / name
-        process = subprocess.Popen(
-            [str(part) for part in (OPTIONS.node, ROOT / "host_tools/emulator/main.mjs", "--board", "pico_parallel", "--image", OPTIONS.image,
-                                    "--scenario", self.scenario, "--flash", self.folder / "flash.bin", "--pace", "fast", "--pty", port,
-                                    "--wait-open", *options)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        self.addCleanup(process.stderr.close)
-        self.addCleanup(process.wait)
-        self.addCleanup(process.kill)
-        end_s = time.monotonic() + PATIENCE_s
-        while not port.exists():
-            self.assertIsNone(process.poll(), "the emulator ended")
-            self.assertLess(time.monotonic(), end_s)
-            time.sleep(0.05)
-        return process, port
+    def start(self, *options):
+        """The image, powered on when its port is opened."""
+        return self.world.emulator(self.port, "--board", "pico_parallel", "--image", OPTIONS.image, "--scenario", self.scenario,
+                                   "--flash", self.folder / "flash.bin", *options)
 
     def end(self, process):
         """What the flash holds is written when the run ends."""
-        self.assertEqual(process.wait(PATIENCE_s), 0, process.stderr.read())
+        process.terminate()
+        process.wait(PATIENCE_s)
+        self.assertEqual(process.returncode, 0, process.read("stderr"))
+
+    def tool(self, *arguments):
+        return self.world.tool(*arguments, "--port", self.port, limit_s=PATIENCE_s)
 
     def test_a_weight_finds_the_gains_and_they_act(self):
-        process, port = self.start("first", "--seconds", 3)
-        self.assertIn("kept", run(self.tool, "set", "rate=50", "--keep", "--port", port))
+        self.world = self.enterContext(World(OPTIONS.build / "tests/support", OPTIONS.node, self.folder))
+        self.port = self.folder / "port"
+        process = self.start()
+        self.assertIn("kept", self.tool("set", "rate=50", "--keep"))
         self.end(process)
 
-        process, port = self.start("second")
-        said = run(self.tool, "calibrate", "--force", FORCE_N, "--yes", "--colour", "plain", "--port", port)
+        process = self.start()
+        said = self.tool("calibrate", "--force", FORCE_N, "--yes", "--colour", "plain")
         self.assertIn("calibrated: it acts from now on", said)
         before_mm, after_mm = map(float, re.search(r"location off by +([\d.]+) mm +([\d.]+) mm", said).groups())
         self.assertGreater(before_mm, 0.3)
         self.assertLess(after_mm, 0.15)
         self.end(process)
 
-        process, port = self.start("third", "--seconds", 20)
-        shown = run(self.tool, "calibrate", "--show", "--port", port)
+        process = self.start()
+        shown = self.tool("calibrate", "--show")
         recording_path = self.folder / "after.csv"
-        run(self.tool, "record", recording_path, "--seconds", 10, "--port", port)
+        self.tool("record", recording_path, "--seconds", 10)
         self.end(process)
 
         found = np.array([float(gain) for gain in re.findall(r"(?m)^ +\d+ +(\d\.\d+) ", shown)])

@@ -1,24 +1,24 @@
-"""What `fingertip doctor` says of emulated fingertips, each with one thing wrong, and of good ones.
+"""What `fingertip doctor` says of emulated fingertips, each with one thing wrong, and of good ones; on simulated time.
 
-usage: test_doctor.py --boards FOLDER --fingertip TOOL --node NODE
+usage: test_doctor.py --boards FOLDER --support FOLDER --node NODE
 """
 import argparse
+import fcntl
 import json
 import os
 import pathlib
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
 from fingertip import files  # noqa: E402
+from world import World  # noqa: E402
 
 TOOLS = argparse.Namespace()
 BOARDS = ("pico_mux", "pico_parallel")
-PATIENCE_s = 120
 SENSORS = 15
 
 
@@ -43,41 +43,29 @@ class Doctor(unittest.TestCase):
             for shared in ("dev", "proc", "sys"):
                 (cls.folder / name / shared).symlink_to(f"/{shared}")
         (cls.folder / "with_rule/etc/udev/rules.d/60-fingertip.rules").write_text(
-            subprocess.run([TOOLS.fingertip, "rule"], capture_output=True, text=True, check=True).stdout)
+            subprocess.run([TOOLS.support / "simulated_fingertip", "rule"], capture_output=True, text=True, check=True).stdout)
+
+    def setUp(self):
+        self.plugged_in = 0
+        self.world = self.enterContext(World(TOOLS.support, TOOLS.node, self.folder))
 
     def plug_in(self, board, faults=(), scenario=None):
         """An emulated fingertip; returns its port."""
-        port, plan = self.folder / f"{self.id()}-{board}", self.folder / f"{self.id()}-{board}.json"
+        self.plugged_in += 1
+        port, plan = self.folder / f"port-{self.plugged_in}", self.folder / "faults.json"
         plan.write_text(json.dumps([{"from_s": 0, **fault} for fault in faults]))
-        emulator = subprocess.Popen(
-            [TOOLS.node, ROOT / "host_tools/emulator/main.mjs", "--board", board,
-             "--image", pathlib.Path(TOOLS.boards) / board / f"fingertip-{board}.bin", "--scenario", scenario or self.at_rest,
-             "--faults", plan, "--seconds", "3600", "--pty", port, "--wait-open", "--fast-enumeration"],
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        self.addCleanup(emulator.communicate)
-        self.addCleanup(emulator.kill)
-        end_s = time.monotonic() + PATIENCE_s
-        while not os.path.lexists(port):
-            self.assertIsNone(emulator.poll(), "the emulator did not start")
-            self.assertLess(time.monotonic(), end_s, "the emulator did not start")
-            time.sleep(0.02)
+        self.world.emulator(port, "--board", board, "--image", pathlib.Path(TOOLS.boards) / board / f"fingertip-{board}.bin",
+                            "--scenario", scenario or self.at_rest, "--faults", plan, "--seconds", "3600", "--fast-enumeration")
         return port
 
     def examine(self, port, *arguments, system="with_rule", seconds=2):
         """The findings that are not well."""
-        for _ in range(3):  # a busy computer may lose packets, but hardly thrice in a row
-            wrong = self.examined(port, arguments, system, seconds)
-            if all(finding["check"] != "packets" for finding in wrong):
-                break
-        return wrong
-
-    def examined(self, port, arguments, system, seconds):
-        done = subprocess.run([TOOLS.fingertip, "doctor", "--port", port, "--json", "--seconds", str(seconds), "--root",
-                               self.folder / system, *arguments], capture_output=True, text=True, timeout=PATIENCE_s)
-        self.assertEqual(done.stderr, "")
-        self.result = json.loads(done.stdout)
+        doctor = self.world.start_tool("doctor", "--port", port, "--json", "--seconds", seconds, "--root", self.folder / system, *arguments)
+        out, err = doctor.communicate()
+        self.assertEqual(err, "")
+        self.result = json.loads(out)
         wrong = [finding for finding in self.result["findings"] if finding["verdict"] != "ok"]
-        self.assertEqual(done.returncode, 1 if any(finding["verdict"] == "bad" for finding in wrong) else 0)
+        self.assertEqual(doctor.returncode, 1 if any(finding["verdict"] == "bad" for finding in wrong) else 0)
         return wrong
 
     def only(self, findings, check, verdict):
@@ -89,9 +77,9 @@ class Doctor(unittest.TestCase):
     def test_nothing_is_wrong_with_good_ones(self):
         for board in BOARDS:
             port = self.plug_in(board)
-            self.assertEqual(self.examine(port, seconds=10), [], board)
+            self.assertEqual(self.examine(port, seconds=5), [], board)
             self.assertEqual(self.result["board"], board)
-            self.assertGreaterEqual(self.result["measured"]["seconds"], 10)
+            self.assertGreaterEqual(self.result["measured"]["seconds"], 5)
             for sensor in self.result["measured"]["sensors"]:
                 self.assertLess(abs(sensor["noise_Pa"] / self.result["measured"]["expected_noise_Pa"] - 1), 0.1)
 
@@ -99,11 +87,8 @@ class Doctor(unittest.TestCase):
         for board in BOARDS:
             port = self.plug_in(board)
             for osr in (256, 8192):
-                subprocess.run([TOOLS.fingertip, "set", "--port", port, f"osr={osr}"], check=True, capture_output=True)
-                findings = self.examine(port)
-                if osr == 256:  # what a busy computer does not take in time is lost
-                    findings = [finding for finding in findings if finding["check"] != "packets"]
-                self.assertEqual(findings, [], (board, osr))
+                self.world.tool("set", "--port", port, f"osr={osr}")
+                self.assertEqual(self.examine(port), [], (board, osr))
 
     def function(self, board, name):
         """Its address."""
@@ -114,20 +99,16 @@ class Doctor(unittest.TestCase):
     def elf(board):
         return pathlib.Path(TOOLS.boards) / board / f"fingertip-{board}.elf"
 
-    def crashed(self, function, code, *arguments):
-        """What is told once the first bytes of this function have been overwritten."""
-        board = "pico_parallel"
-        fault = {"type": "sram_upset", "address": self.function(board, function), "bytes": code, "from_s": 0.5}
-        return self.only(self.examine(self.plug_in(board, [fault]), *arguments), "crash", "bad")["text"]
-
     def test_a_main_loop_that_stood_still_is_told_with_its_place(self):
-        text = self.crashed("scan_take", "fee7", "--elf", self.elf("pico_parallel"))
+        """Once the first bytes of a function have been overwritten."""
+        board = "pico_parallel"
+        port = self.plug_in(board, [{"type": "sram_upset", "address": self.function(board, "scan_take"), "bytes": "fee7", "from_s": 0.5}])
+        text = self.only(self.examine(port, "--elf", self.elf(board)), "crash", "bad")["text"]
         self.assertRegex(text, r"^the watchdog struck: the main loop stood still; the processor was at scan_take\+0x0 \(0x2000[0-9a-f]{4}\), called "
                                r"from app_run\+0x[0-9a-f]+ \(.*\), in the main loop, taking readings, [01]\.[0-9]. s after its start; before that: ")
         self.assertEqual(self.result["crash"]["place"], "scan_take+0x0")
-
-    def test_names_of_another_image_are_not_told(self):
-        text = self.crashed("scan_take", "fee7", "--elf", self.elf("pico_mux"))
+        # and without names that are of another image
+        text = self.only(self.examine(port, "--elf", self.elf("pico_mux"), seconds=1), "crash", "bad")["text"]
         self.assertIn("is of other firmware: no names", text)
         self.assertEqual(self.result["crash"]["place"], "")
 
@@ -208,20 +189,21 @@ class Doctor(unittest.TestCase):
         self.assertIn("fingertip rule | sudo tee", findings[0]["advice"])
 
     def test_a_port_in_use(self):
-        port = self.plug_in("pico_mux")
-        recorder = subprocess.Popen([TOOLS.fingertip, "record", "-", "--port", port], stdout=subprocess.PIPE,
-                                    stderr=subprocess.DEVNULL)
-        self.addCleanup(recorder.communicate)
-        self.addCleanup(recorder.kill)
-        recorder.stdout.readline()
-        findings = self.examine(port)
+        """A terminal that this process holds."""
+        master, slave = os.openpty()
+        self.addCleanup(os.close, master)
+        self.addCleanup(os.close, slave)
+        fcntl.flock(slave, fcntl.LOCK_EX)
+        findings = self.examine(os.ttyname(slave))
         self.assertEqual([(finding["check"], finding["verdict"]) for finding in findings], [("port", "bad")])
-        self.assertIn(f"in use by another program: fingertip (process {recorder.pid})", findings[0]["text"])
+        name = pathlib.Path("/proc/self/comm").read_text().strip()
+        self.assertIn(f"in use by another program: {name} (process {os.getpid()})", findings[0]["text"])
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    for name in ("boards", "fingertip", "node"):
-        parser.add_argument(f"--{name}", required=True)
+    parser.add_argument("--boards", required=True)
+    parser.add_argument("--support", required=True, type=pathlib.Path)
+    parser.add_argument("--node", required=True)
     _, rest = parser.parse_known_args(namespace=TOOLS)
     unittest.main(argv=[sys.argv[0], *rest], verbosity=2)

@@ -71,17 +71,20 @@ void ServedPort::look() {
     const ssize_t count = recv(fd_, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
     if (count == 0 || (count < 0 && errno != EAGAIN)) {
       ::close(std::exchange(fd_, -1));
-      is_open_ = false;
+      is_open_ = false; // the next client shows at the next look: who serves sees either change
     }
-  }
-  if (!is_open_) {
+  } else {
     fd_ = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
     is_open_ = fd_ >= 0;
   }
 }
 
 void ServedPort::wait(HostTime until) {
+  const bool was_open = is_open_;
   look();
+  if (is_open_ != was_open) {
+    return;
+  }
   pollfd asked = {is_open_ ? fd_ : listener_, POLLIN, 0};
   wait_for(&asked, 1, until);
   look();

@@ -24,6 +24,7 @@ HELLO, WAIT, INTERRUPTED, BYE, SPAWNED, HELD, TURNS, SIGNALLED = range(8)
 FOR_EVER_us = (1 << 63) - 1
 MOST_DESCRIPTORS = 128
 ORDER = struct.Struct(f"=IiqI{MOST_DESCRIPTORS}hxxxx")
+TURN = struct.Struct("=qq")
 POLLIN = 1
 PIPE_BYTES = 1 << 20
 
@@ -58,6 +59,7 @@ class SimulatedTime:
         self._line.close()
         with self._keeper:
             pass
+        os.unlink(self.environment[VARIABLE])
         for process in self._processes:
             process.end()
 
@@ -71,10 +73,10 @@ class SimulatedTime:
         self._line.sendmsg([ORDER.pack(kind, pid, until_us, len(descriptors), *events)], rights)
 
     def _take_turn(self):
-        told = self._line.recv(8)
-        if len(told) != 8:
+        told = self._line.recv(TURN.size)
+        if len(told) != TURN.size:
             raise AssertionError(f"the time keeper ended with {self._keeper.wait()}; its words are on standard error")
-        self._us, = struct.unpack("=q", told)
+        self._us, _ = TURN.unpack(told)
 
     def wait(self, descriptors=(), seconds=PATIENCE_s):
         """Until one of them can be read, not longer than this."""

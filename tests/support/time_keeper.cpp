@@ -33,6 +33,7 @@
 
 using fingertip::test::MOST_DESCRIPTORS;
 using fingertip::test::Order;
+using fingertip::test::Turn;
 
 namespace {
 
@@ -318,7 +319,7 @@ private:
     }
     poll(asked.data(), asked.size(), 0);
     Client *best = nullptr;
-    std::int64_t first_us = INT64_MAX;
+    std::int64_t first_us = INT64_MAX, others_us = INT64_MAX; // others: all but the best
     std::size_t at = 0;
     for (Client &each : clients_) {
       const Process *its = process(each.pid);
@@ -329,12 +330,17 @@ private:
       }
       if (held_us > now_us_) {
         first_us = std::min(first_us, held_us);
+        others_us = std::min(others_us, held_us);
         continue;
       }
+      const std::int64_t each_us = may ? now_us_ : each.until_us;
       if (may && (best == nullptr || each.ran < best->ran)) {
+        others_us = first_us; // of those before; those behind follow
         best = &each;
+      } else {
+        others_us = std::min(others_us, each_us);
       }
-      first_us = std::min(first_us, each.until_us);
+      first_us = std::min(first_us, each_us);
     }
     if (best == nullptr) {
       if (first_us == INT64_MAX) {
@@ -355,7 +361,8 @@ private:
     best->is_interrupted = false;
     best->awaited.clear();
     best->ran = ++turn_;
-    if (send(best->line.get(), &now_us_, sizeof now_us_, MSG_NOSIGNAL) < 0) {
+    const Turn turn = {now_us_, others_us};
+    if (send(best->line.get(), &turn, sizeof turn, MSG_NOSIGNAL) < 0) {
       // It has ended, which its line will tell.
     }
   }

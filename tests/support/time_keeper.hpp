@@ -1,7 +1,7 @@
 // What a thread on simulated time and the keeper of that time tell one another: one of these a
 // message, over a connection of its own to the keeper's socket (AF_UNIX, SOCK_SEQPACKET). With a
 // wait come the descriptors that may end it, as SCM_RIGHTS. Each wait and each hello is answered,
-// once this thread is to go on, by the time: 64 bits, us.
+// once this thread is to go on, by a Turn.
 #pragma once
 
 #include <cstdint>
@@ -27,6 +27,11 @@ struct Order {
   std::int64_t until_us;
   std::uint32_t count; // of descriptors
   std::int16_t events[MOST_DESCRIPTORS];
+};
+
+struct Turn {
+  std::int64_t now_us;
+  std::int64_t others_us; // the first moment that another thread goes on by itself, INT64_MAX: none
 };
 
 } // namespace fingertip::test

@@ -1,7 +1,11 @@
-/** The command line as a process: exit codes, one-line errors, files, pseudo-terminal, clean end by signal. */
+/**
+ * The command line as a process: exit codes, one-line errors, files, pseudo-terminal, clean end by signal.
+ *
+ * real time: pseudo-terminals, and the pace of the wall. Nothing is judged by how long it took; LIMIT_s only ends what hangs.
+ */
 import assert from 'node:assert/strict';
 import { spawn, spawnSync } from 'node:child_process';
-import { existsSync, lstatSync, mkdtempSync, readFileSync, readlinkSync, rmSync, symlinkSync, writeFileSync } from 'node:fs';
+import { existsSync, lstatSync, mkdtempSync, readFileSync, readlinkSync, rmSync, symlinkSync, watch, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, test } from 'node:test';
@@ -88,6 +92,9 @@ for (const [name, args, message] of [
   ['option without its value', ['--image', image, ...base, '--seconds', '--progress'], /^error: .*--seconds/],
   ['bad clock', ['--image', image, ...base, '--clock-ppm', '1001'], /^error: --clock-ppm "1001" is not a number from -1000 to 1000\n$/],
   ['bad pace', ['--image', image, ...base, '--pace', 'slow'], /^error: --pace "slow" is neither real, wall nor fast\n$/],
+  ['a pace beside steps', ['--image', image, ...base, '--stepped', '--pace', 'real'], /^error: --stepped has no --pace/],
+  ['two ports', ['--image', image, ...base, '--stepped', '--pty', 'x'], /^error: --pty and --stepped exclude each other\n$/],
+  ['steps that nobody asks for', ['--image', image, ...base, '--stepped'], /^error: the program on standard input is gone\n$/],
   ['report nowhere', ['--image', image, ...base, '--seconds', '1e6', '--report', '/nowhere/r'], /^error: \/nowhere\/r: cannot write \(no such file or directory\); check the folder\n$/],
   ['bad scenario', ['--image', image, '--board', 'pico_mux', '--scenario', image], /^error: .*:1: not a scenario/],
 ]) {
@@ -99,32 +106,42 @@ for (const [name, args, message] of [
   });
 }
 
-const CLIENT = `
-import os, select, sys, termios, time, tty
+const LIMIT_s = 300;
+/** Of a client: its terminal, raw. A client that hangs is ended. */
+const OPEN = `
+import os, signal, sys, tty
+signal.alarm(${LIMIT_s})
 fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
-tty.setraw(fd, termios.TCSANOW)
-time.sleep(0.5)
+tty.setraw(fd)
+`;
+/** And told on stdin that the board is there. */
+const OPEN_EARLY = `${OPEN}sys.stdin.readline()
+`;
+const ENUMERATED_s = 0.3;
+
+const CLIENT = `${OPEN_EARLY}
 data = bytes(range(256)) * 8
 got = b""
-end = time.monotonic() + 20
 sent = 0
-while len(got) < len(data) and time.monotonic() < end:
-    if sent < len(data) and sent - len(got) < 64:
+while len(got) < len(data):
+    if sent == len(got):  # short packets only, each of which ends a read
         sent += os.write(fd, data[sent:sent + 32])
-    if select.select([fd], [], [], 0.02)[0]:
-        got += os.read(fd, 4096)
+    got += os.read(fd, 4096)
 sys.exit(0 if got == data else 1)
 `;
 
 /** An emulator that serves `link`: waits for the link; `end()` interrupts it and gives its exit code. */
 async function serve(link, ...args) {
-  const emulator = spawn(process.execPath, [MAIN, ...base, '--seconds', '60', '--pty', link, '--wait-open', ...args], { stdio: ['ignore', 'ignore', 'pipe'] });
+  const watcher = watch(folder);
+  const emulator = spawn(process.execPath, [MAIN, ...base, '--seconds', '3600', '--pty', link, '--wait-open', ...args], { stdio: ['ignore', 'ignore', 'pipe'] });
   serving.add(emulator);
   let stderr = '';
   emulator.stderr.on('data', (d) => (stderr += d));
   const ended = new Promise((resolve) => emulator.on('close', resolve)).finally(() => serving.delete(emulator));
-  for (let i = 0; i < 2400 && !existsSync(link) && emulator.exitCode === null; i++) await new Promise((r) => setTimeout(r, 25));
-  assert.ok(existsSync(link), stderr);
+  const hasEnded = ended.then(() => assert.fail(stderr));
+  while (!existsSync(link)) await Promise.race([hasEnded, new Promise((resolve) => watcher.once('change', resolve))]);
+  watcher.close();
+  hasEnded.catch(() => {});
   const end = async () => {
     emulator.kill('SIGINT');
     return { code: await ended, stderr };
@@ -132,7 +149,7 @@ async function serve(link, ...args) {
   /** With --progress: wait for that much emulated time. */
   const reach = async (wanted_s) => {
     const reached_s = () => Number(stderr.trim().split('\n').at(-1).split(' ')[0]);
-    while (!(reached_s() >= wanted_s) && emulator.exitCode === null) await new Promise((r) => setTimeout(r, 50));
+    while (!(reached_s() >= wanted_s)) await Promise.race([hasEnded, new Promise((resolve) => emulator.stderr.once('data', resolve))]);
   };
   return { end, reach, signal: (name) => emulator.kill(name) };
 }
@@ -148,8 +165,8 @@ async function runClient(program, link, go = Promise.resolve()) {
 
 test('pseudo-terminal: bytes go both ways, SIGINT ends cleanly and removes the link', async () => {
   const link = join(folder, 'tty');
-  const emulator = await serve(link, '--image', image);
-  const { code } = await runClient(CLIENT, link);
+  const emulator = await serve(link, '--image', image, '--progress');
+  const { code } = await runClient(CLIENT, link, emulator.reach(ENUMERATED_s));
   const ended = await emulator.end();
   assert.equal(ended.code, 0, ended.stderr);
   assert.equal(code, 0, ended.stderr);
@@ -157,27 +174,22 @@ test('pseudo-terminal: bytes go both ways, SIGINT ends cleanly and removes the l
 });
 
 /** Each answer must come after the moment of its question on the emulator's own time line, which is the wall's. */
-const ASKING = `
-import os, select, sys, termios, time, tty
-fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
-tty.setraw(fd, termios.TCSANOW)
-time.sleep(1)
+const ASKING = `${OPEN_EARLY}
+import time
 for i in range(50):
     asked = time.monotonic_ns()
     os.write(fd, bytes([i]))
-    select.select([fd], [], [], 5)
     assert os.read(fd, 1) == bytes([i])
     print(asked, time.monotonic_ns())
-    time.sleep(0.01)
 `;
 
 test('pseudo-terminal at the pace of the wall: no question is heard before it was asked, no answer early', async () => {
   const link = join(folder, 'wall');
   const out = (name) => join(folder, name);
-  const emulator = await serve(link, '--image', sleeper, '--pace', 'wall', '--usb-log', out('wall.csv'), '--report', out('wall.json'));
-  const { code, stdout } = await runClient(ASKING, link);
+  const emulator = await serve(link, '--image', sleeper, '--pace', 'wall', '--usb-log', out('wall.csv'), '--report', out('wall.json'), '--progress');
+  const { code, stdout } = await runClient(ASKING, link, emulator.reach(ENUMERATED_s));
   emulator.signal('SIGSTOP');
-  await new Promise((r) => setTimeout(r, 1100));
+  await new Promise((r) => setTimeout(r, 1100)); // the lag, of which the report must speak
   emulator.signal('SIGCONT');
   const ended = await emulator.end();
   assert.equal(ended.code, 0, ended.stderr);
@@ -211,16 +223,8 @@ test('pseudo-terminal: a link in use is refused before any file is opened; a sta
 });
 
 /** Opens, does not read before it is told to on stdin, then takes 100 000 bytes and tells the first that breaks the count. */
-const LATE_READER = `
-import os, select, sys, termios, time, tty
-fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
-tty.setraw(fd, termios.TCSANOW)
-sys.stdin.readline()
-got = 0
-end = time.monotonic() + 60
-while got < 100000 and time.monotonic() < end:
-    if not select.select([fd], [], [], 1)[0]:
-        continue
+const LATE_READER = `${OPEN_EARLY}got = 0
+while got < 100000:
     for byte in os.read(fd, 4096):
         if byte != got & 255:
             sys.exit(f"byte {got} is {byte}")
@@ -232,7 +236,7 @@ test('pseudo-terminal: a client that does not read stops the stream, loses nothi
   const link = join(folder, 'late');
   const log = join(folder, 'late.csv');
   const emulator = await serve(link, '--image', stream, '--usb-log', log, '--progress');
-  const { code, stdout } = await runClient(LATE_READER, link, emulator.reach(0.3));
+  const { code, stdout } = await runClient(LATE_READER, link, emulator.reach(ENUMERATED_s));
   const ended = await emulator.end();
   assert.equal(ended.code, 0, ended.stderr);
   assert.equal(code, 0);
@@ -247,26 +251,26 @@ test('pseudo-terminal: a client that does not read stops the stream, loses nothi
   assert.ok(before >= 16384 && before <= 16384 + 16 * 128 + 65536, `${before} bytes were taken for a client that did not read`);
 });
 
-/** Gives the helper bytes while nobody has the terminal open; a client then must find nothing. */
 test('pseudo-terminal: bytes for a client that left do not reach the next one', async () => {
   const link = join(folder, 'helper');
   const helper = spawn('/usr/bin/python3', [HELPER, link], { stdio: ['pipe', 'pipe', 'inherit'] });
   serving.add(helper);
   const ended = new Promise((resolve) => helper.on('close', resolve)).finally(() => serving.delete(helper));
   let said = Buffer.alloc(0);
-  const hear = async (length) => {
-    while (said.length < length) said = Buffer.concat([said, await new Promise((resolve) => helper.stdout.once('data', resolve))]);
+  const hear = async (...frames) => {
+    const expected = Buffer.from(frames.flat());
+    while (said.length < expected.length) said = Buffer.concat([said, await new Promise((resolve) => helper.stdout.once('data', resolve))]);
+    assert.deepEqual([...said.subarray(0, expected.length)], [...expected]);
+    said = said.subarray(expected.length);
   };
-  await hear(5);
+  const [ready, opened, taken] = [[0x52, 0, 0, 0, 0], [0x4f, 0, 0, 0, 0], (count) => [0x41, 4, 0, 0, 0, count, 0, 0, 0]];
+  await hear(ready);
   helper.stdin.write(Buffer.from([0x44, 3, 0, 0, 0, 1, 2, 3]));
-  await hear(14);
-  assert.deepEqual([...said], [0x52, 0, 0, 0, 0, 0x41, 4, 0, 0, 0, 3, 0, 0, 0]);
-  const { stdout } = await runClient(`
-import os, select, sys, tty
-fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
-tty.setraw(fd)
-print(len(os.read(fd, 100)) if select.select([fd], [], [], 0.5)[0] else 0)`, link);
+  await hear(taken(3));
+  const client = runClient(`${OPEN}print(list(os.read(fd, 100)))`, link);
+  await hear(opened);
+  helper.stdin.write(Buffer.from([0x44, 1, 0, 0, 0, 4])); // for this one
+  assert.equal((await client).stdout.trim(), '[4]');
   helper.stdin.end();
   assert.equal(await ended, 0);
-  assert.equal(stdout.trim(), '0');
 });
