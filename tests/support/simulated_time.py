@@ -33,6 +33,13 @@ class TimedOut(AssertionError):
     pass
 
 
+def encoded(kind, pid, until_us, descriptors):
+    """An order for the keeper: its bytes, and what goes with them."""
+    events = [POLLIN] * len(descriptors) + [0] * (MOST_DESCRIPTORS - len(descriptors))
+    rights = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", descriptors))] if descriptors else []
+    return ORDER.pack(kind, pid, until_us, len(descriptors), *events), rights
+
+
 class SimulatedTime:
     def __init__(self, keeper, folder):
         path = os.path.join(folder, "time")
@@ -68,9 +75,8 @@ class SimulatedTime:
         return self._us / 1e6
 
     def _say(self, kind, pid=0, until_us=0, descriptors=()):
-        events = [POLLIN] * len(descriptors) + [0] * (MOST_DESCRIPTORS - len(descriptors))
-        rights = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", descriptors))] if descriptors else []
-        self._line.sendmsg([ORDER.pack(kind, pid, until_us, len(descriptors), *events)], rights)
+        data, rights = encoded(kind, pid, until_us, descriptors)
+        self._line.sendmsg([data], rights)
 
     def _take_turn(self):
         told = self._line.recv(TURN.size)

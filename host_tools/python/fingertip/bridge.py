@@ -14,10 +14,8 @@ import pathlib
 import platform
 import signal
 import sys
-import threading
-import time
 
-from . import discovery, wire
+from . import discovery, host_time, wire
 from .device import Fingertip
 from .errors import FingertipError, InputError
 from .files import printable, run_tool
@@ -33,7 +31,7 @@ NAMES = {wire.Contact: "contact", wire.Raw: "raw", wire.Health: "health", wire.I
 
 def _offset_ns():
     """What the clock of Fingertip.clock is behind the time of day."""
-    return time.time_ns() - time.perf_counter_ns()
+    return host_time.wall_ns() - host_time.now_ns()
 
 
 def _boot():
@@ -60,7 +58,7 @@ class _Published:
         self._expected = None
         self._early = []
         self._queue = collections.deque()
-        self._news = threading.Event()
+        self._news = host_time.event()
         self._closing = False
         self.skipped = 0
         self._token = None
@@ -71,7 +69,7 @@ class _Published:
         self._queryables = [session.declare_queryable(f"{self._root}/{name}", self._when_asked(answer)) for name, answer in (
             ("tare", self._tare), ("set", self._set), ("info", self._info), ("status", self._tell_status), ("again", self._again))]
         self._begin_line()
-        self._thread = threading.Thread(target=self._publish, name="publish", daemon=True)
+        self._thread = host_time.thread(self._publish, name="publish", daemon=True)
         self._thread.start()
         tip.on_packets(self._hear)
         with contextlib.suppress(FingertipError):
@@ -80,7 +78,7 @@ class _Published:
     # The reading thread
 
     def _begin_line(self):
-        self._line, self._number, self._expected = max(time.time_ns(), self._line + 1), 0, None
+        self._line, self._number, self._expected = max(host_time.wall_ns(), self._line + 1), 0, None
         self._lines.append([self._line, 0, 0])
 
     def _note(self, column, line, number):
@@ -96,7 +94,7 @@ class _Published:
             ahead = 0
         self._expected = packet.sequence + 1 & 0xFFFF
         self._number += ahead + 1
-        self._early.append((NAMES.get(type(packet.body), "other"), packet.t_us, bytes(frame), self._line, self._number, time.time_ns()))
+        self._early.append((NAMES.get(type(packet.body), "other"), packet.t_us, bytes(frame), self._line, self._number, host_time.wall_ns()))
         clock = self.tip.clock
         if clock.host_us != clock.host_us:
             return  # until the clocks were compared
@@ -104,7 +102,7 @@ class _Published:
         for name, t_us, data, line, number, taken_ns in self._early:
             stamp = Stamp(line, number, taken_ns, round(clock.host_at(t_us) * 1000) + offset_ns, clock.uncertainty_us, clock.drift_ppm, shared).packed()
             self._kept[line, number] = (name, data, stamp)
-            self._queue.append((name, data, stamp, line, number, time.monotonic()))
+            self._queue.append((name, data, stamp, line, number, host_time.now_s()))
             self._note(1, line, number)
         self._early.clear()
         while len(self._kept) > self._keep:
@@ -120,13 +118,13 @@ class _Published:
             self._news.clear()
             while self._queue:
                 name, data, stamp, line, number, kept_s = self._queue.popleft()
-                if time.monotonic() - kept_s < LIVE_s:
+                if host_time.now_s() - kept_s < LIVE_s:
                     self._publishers[name].put(data, attachment=stamp)
                 else:
                     self.skipped += 1
                 self._note(2, line, number)
-            if time.monotonic() >= next_status_s:
-                next_status_s = time.monotonic() + STATUS_s
+            if host_time.now_s() >= next_status_s:
+                next_status_s = host_time.now_s() + STATUS_s
                 self._watch()
                 self._publishers["status"].put(self._status(2))
 
@@ -142,7 +140,7 @@ class _Published:
         """column: 1, packets that were read; 2, those that were published."""
         clock, line = self._clock_of_host(), self.tip.statistics
         return json.dumps({
-            "host": platform.node(), "boot": _boot(), "port": self.tip.description, "there": not self.tip.is_returning, "now_ns": time.time_ns(),
+            "host": platform.node(), "boot": _boot(), "port": self.tip.description, "there": not self.tip.is_returning, "now_ns": host_time.wall_ns(),
             "clock": {"disciplined": clock.disciplined, "bound_us": clock.bound_us if clock.disciplined else None, "text": clock.text},
             "lines": [(each[0], each[column]) for each in list(self._lines)], "unpublished": self.skipped,
             "line": {name: getattr(line, name) for name in line.COUNTS}})
@@ -217,12 +215,12 @@ class Bridge:
         self._published = {}
         self._complaints = {}
         self.clock = host_clock()
-        self._next_clock_s = time.monotonic() + CHRONY_s
+        self._next_clock_s = host_time.now_s() + CHRONY_s
 
     def look(self):
         """For fingertips that came, and how this computer's clock is kept."""
-        if time.monotonic() >= self._next_clock_s:
-            self._next_clock_s = time.monotonic() + CHRONY_s
+        if host_time.now_s() >= self._next_clock_s:
+            self._next_clock_s = host_time.now_s() + CHRONY_s
             self.clock = host_clock()
         for way, one in list(self._published.items()):
             try:
@@ -272,7 +270,7 @@ def main(argv):
         raise InputError(f"--keep {options.keep} is out of range; give 1 to 10000000")
     if not 0 <= options.latency_ms <= 1000:
         raise InputError(f"--latency-ms {options.latency_ms:g} is out of range; give 0 to 1000")
-    ended = threading.Event()
+    ended = host_time.event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())
 

@@ -9,9 +9,10 @@ The host's clock is time.perf_counter(), in microseconds: on Linux CLOCK_MONOTON
 """
 import collections
 import math
-import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
+
+from . import host_time
 
 WINDOW_us = 30e6
 EXCHANGES = 512
@@ -24,7 +25,7 @@ STEPS = 40
 
 
 def host_now_us() -> int:
-    return time.perf_counter_ns() // 1000
+    return host_time.now_us()
 
 
 class ClockExchange(NamedTuple):

@@ -4,9 +4,9 @@ Needs the package cyclonedds, which `pip install "fingertip-tactile[ros2]"` brin
 """
 import contextlib
 import os
-import time
 from typing import Any
 
+from . import host_time
 from .errors import InputError
 from .ros_messages import fields_of
 
@@ -64,9 +64,9 @@ class Participant:
 
     def close(self) -> None:
         """It and its topics vanish, once all is acknowledged, or a second later."""
-        end_s = time.monotonic() + CLOSING_s
+        end_s = host_time.now_s() + CLOSING_s
         for topic in self._topics:
-            topic.close(max(0.0, end_s - time.monotonic()))
+            topic.close(max(0.0, end_s - host_time.now_s()))
         self._participant = self._domain = None  # which cyclonedds deletes with its last reference
 
     def topic(self, name: str, kind: str) -> "Topic":

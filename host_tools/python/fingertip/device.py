@@ -4,11 +4,10 @@ import contextlib
 import math
 import os
 import threading
-import time
 from collections.abc import Callable, Iterator
 from types import TracebackType
 
-from . import discovery, wire
+from . import discovery, host_time, wire
 from .clock import NO_CLOCK, ClockEstimate, ClockExchange, ClockFit, host_now_us
 from .errors import (
     BadValueError, FingertipError, GoneError, InputError, NoAnswerError, NoFingertipError, NoFrameError, NotNowError, OtherFingertipError, OtherVersionError,
@@ -91,7 +90,7 @@ class Fingertip:
         self._next_exchange_us = 0
         self._error: FingertipError | None = None
         self._closing = False
-        self._changed = threading.Condition()
+        self._changed = host_time.condition()
         self._sending = threading.Lock()
         self._one_command = threading.Lock()
         self._ack: Acknowledgement | None = None
@@ -120,7 +119,7 @@ class Fingertip:
             self._error = None
             try:
                 self._transport = open_way(way.port, way.share_socket)
-                self._thread = threading.Thread(target=self._read_on, name="fingertip", daemon=True)
+                self._thread = host_time.thread(self._read_on, name="fingertip", daemon=True)
                 self._thread.start()
                 info = self._ask_info()
             except FingertipError as error:
@@ -272,13 +271,13 @@ class Fingertip:
         """Until it holds or this is closed."""
         patience_s = self.patience_s if timeout_s is None else timeout_s
         with self._changed:
-            end_s = time.monotonic() + patience_s
+            end_s = host_time.now_s() + patience_s
             while not condition() and not self._closing:
                 if self._error:
                     raise self._error
                 if self._is_returning:
-                    end_s = time.monotonic() + patience_s
-                left_s = end_s - time.monotonic()
+                    end_s = host_time.now_s() + patience_s
+                left_s = end_s - host_time.now_s()
                 if left_s <= 0:
                     raise NoFrameError(f"{self.description}: no frame in {patience_s:g} s")
                 self._changed.wait(min(left_s, 0.2))
@@ -288,7 +287,7 @@ class Fingertip:
         if self._error:
             raise self._error
         patience_s = self.patience_s if timeout_s is None else timeout_s
-        self._wait(lambda: self._latest is not None and time.monotonic() - self._latest_s <= patience_s, timeout_s)
+        self._wait(lambda: self._latest is not None and host_time.now_s() - self._latest_s <= patience_s, timeout_s)
         latest = self._latest
         if latest is None or self._closing:
             raise GoneError(f"{self.description}: closed")
@@ -520,13 +519,13 @@ class Fingertip:
             raise GoneError(f"{self.description}: vanished, and is not back yet")
 
     def _await_answer(self, answer_type: type[Body] | None) -> bool:
-        end_s = time.monotonic() + ANSWER_TIMEOUT_s
+        end_s = host_time.now_s() + ANSWER_TIMEOUT_s
         with self._changed:
             while True:
                 if self._ack and (self._ack.result != Result.DONE or answer_type is None or isinstance(self._answer, answer_type)):
                     return True
                 self._check_open()
-                left_s = end_s - time.monotonic()
+                left_s = end_s - host_time.now_s()
                 if left_s <= 0:
                     return False
                 self._changed.wait(left_s)
@@ -577,7 +576,7 @@ class Fingertip:
         self._tell()
         self._transport.close()
         while not self._closing:
-            time.sleep(RETURN_INTERVAL_s)
+            host_time.sleep(RETURN_INTERVAL_s)
             with contextlib.suppress(FingertipError):
                 self._transport = self._reopened()
                 break
@@ -602,8 +601,8 @@ class Fingertip:
         """Who is back? Streams only once that is known."""
         next_s, found = 0.0, None
         while found is None and not self._closing:
-            if time.monotonic() >= next_s:
-                next_s = time.monotonic() + ANSWER_TIMEOUT_s
+            if host_time.now_s() >= next_s:
+                next_s = host_time.now_s() + ANSWER_TIMEOUT_s
                 self._send(wire.AskInfo())
             for packet in self._decoder.feed(self._transport.read(POLL_s, 0.0)):
                 self._record(packet)
@@ -686,7 +685,7 @@ class Fingertip:
 
     def _keep(self, frames: list[Frame]) -> None:
         if frames:
-            self._latest, self._latest_s = frames[-1], time.monotonic()
+            self._latest, self._latest_s = frames[-1], host_time.now_s()
             self._queue.extend(frames)
             with contextlib.suppress(IndexError):
                 while len(self._queue) > self._buffer_frames:

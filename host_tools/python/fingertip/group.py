@@ -1,13 +1,11 @@
 """Several fingertips on one clock."""
 import contextlib
 import os
-import threading
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType, TracebackType
 from typing import Any
 
-from . import discovery
+from . import discovery, host_time
 from .clock import host_now_us
 from .device import Fingertip
 from .errors import BadValueError, InputError, NoFingertipError, NoFrameError
@@ -55,7 +53,7 @@ class Fingertips:
     def __init__(self, ports: "Sequence[str | os.PathLike[str]] | None" = None, *, serials: Sequence[str] | None = None, **options: Any) -> None:
         if ports is not None and serials is not None:
             raise BadValueError("give ports or serials")
-        self._news = threading.Event()
+        self._news = host_time.event()
         self._opened: dict[str, Fingertip] = {}
         self._stack = contextlib.ExitStack()
         wanted: list[dict[str, Any]]
@@ -121,15 +119,15 @@ class Fingertips:
         """Every frame of all. Ends when they are closed; raises GoneError and NoFrameError of any of them."""
         fingertips = list(self._opened.values())
         heads: list[Frame | None] = [None] * len(fingertips)
-        heard_s = [time.monotonic()] * len(fingertips)
+        heard_s = [host_time.now_s()] * len(fingertips)
         while True:
             self._news.clear()
             for i, fingertip in enumerate(fingertips):
                 if heads[i] is None:
                     heads[i] = fingertip.take_one()
                     if heads[i] or fingertip.is_returning:
-                        heard_s[i] = time.monotonic()
-                    elif time.monotonic() - heard_s[i] > fingertip.patience_s:
+                        heard_s[i] = host_time.now_s()
+                    elif host_time.now_s() - heard_s[i] > fingertip.patience_s:
                         raise NoFrameError(f"{fingertip.description}: no frame in {fingertip.patience_s:g} s")
             there = [(frame.host_us, i) for i, frame in enumerate(heads) if frame]
             if there:

@@ -11,11 +11,9 @@ import math
 import queue
 import signal
 import sys
-import threading
-import time
 from typing import NamedTuple
 
-from . import wire
+from . import host_time, wire
 from .clock import ClockEstimate
 from .errors import InputError, PacketError
 from .files import check_output, printable, run_tool
@@ -216,7 +214,7 @@ class _Source:
         self.clock = None
         self.clock_line = 0
         self.wanted = None  # (line, first, last) to be asked for
-        self.status_s = time.monotonic()
+        self.status_s = host_time.now_s()
         self.must_answer = False
         self.asked = 0
         self.unread_frames = 0
@@ -230,11 +228,11 @@ class Recording:
         self._zenoh = zenoh_module()
         self._session = session
         self._say = say
-        self._zero_us = (time.time_ns() - time.perf_counter_ns()) / 1000
+        self._zero_us = (host_time.wall_ns() - host_time.now_ns()) / 1000
         self.sources = {info.serial: _Source(info.serial, number, info) for number, info in enumerate(infos)}
         self._arrived = queue.SimpleQueue()
         self._ending = False
-        self._ended = threading.Event()
+        self._ended = host_time.event()
         self.damaged = 0
         self.behind = self._said_behind = False  # too much for this computer
         self.unrecorded = set()  # came later
@@ -242,7 +240,7 @@ class Recording:
         self._writer = JointRecordingWriter(path, infos, replace=replace, extra=extra, count=self._counts,
                                             raw_expected=all(info.capabilities & Capability.RAW_STREAM for info in infos))
         self._subscriber = session.declare_subscriber(f"{ROOT}/*/*", self._hear)
-        self._threads = [threading.Thread(target=self._ask_on, args=(source,), daemon=True) for source in self.sources.values()]
+        self._threads = [host_time.thread(self._ask_on, args=(source,), daemon=True) for source in self.sources.values()]
         for thread in self._threads:
             thread.start()
 
@@ -273,7 +271,7 @@ class Recording:
                     self._ask(source, f"{ROOT}/{source.serial}/again?line={line};first={first};last={last}", "again")
                     source.asked += 1
                     source.wanted = None  # judged anew by what has come
-                elif source.must_answer or not self._ending and time.monotonic() - source.status_s > STATUS_AGE_s:
+                elif source.must_answer or not self._ending and host_time.now_s() - source.status_s > STATUS_AGE_s:
                     self._ask(source, f"{ROOT}/{source.serial}/status", "answer")
             except self._zenoh.ZError:
                 pass  # not now; asked once more
@@ -290,15 +288,15 @@ class Recording:
 
     def run(self, seconds, ended, patience_s):
         """Until it is told to end, or for so long, and then until everything that was sent is there or patience is over."""
-        end_s = time.monotonic() + seconds
-        while not ended.is_set() and time.monotonic() < end_s:
+        end_s = host_time.now_s() + seconds
+        while not ended.is_set() and host_time.now_s() < end_s:
             self._work(0.1)
         self._subscriber.undeclare()
         for source in self.sources.values():  # what has it sent until now? That, and no more, is waited for
             source.must_answer = True
         self._ending = True
-        asked_s = time.monotonic()
-        while time.monotonic() - asked_s < patience_s:
+        asked_s = host_time.now_s()
+        while host_time.now_s() - asked_s < patience_s:
             self._work(0.1)
             if not any(source.must_answer or not source.account.is_complete for source in self.sources.values()):
                 break
@@ -313,8 +311,8 @@ class Recording:
     def _work(self, wait_s):
         """What has come, and what to ask for."""
         touched = set()
-        end_s = time.monotonic() + wait_s
-        while (left_s := end_s - time.monotonic()) > 0:
+        end_s = host_time.now_s() + wait_s
+        while (left_s := end_s - host_time.now_s()) > 0:
             try:
                 serial, name, data, attachment = self._arrived.get(timeout=left_s)
             except queue.Empty:
@@ -333,7 +331,7 @@ class Recording:
         if self.behind and not self._said_behind:
             self._said_behind = True
             self._say("more comes than this computer writes: what does not fit is asked for again, and lost once no bridge keeps it; record fewer, or slower")
-        now_s = time.monotonic()
+        now_s = host_time.now_s()
         for source in self.sources.values():
             if source in touched or source.account.lines:
                 self._write(source)
@@ -345,9 +343,9 @@ class Recording:
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
             self.damaged += 1
             return
-        source.status_s = time.monotonic()
+        source.status_s = host_time.now_s()
         source.must_answer &= not is_answer
-        source.account.heard(lines, time.monotonic())
+        source.account.heard(lines, host_time.now_s())
 
     def _take(self, source, name, data, attachment):
         try:
@@ -361,14 +359,14 @@ class Recording:
             self.damaged += 1
             return
         before = source.account.duplicates
-        source.account.offer(stamp, packet, time.monotonic())
+        source.account.offer(stamp, packet, host_time.now_s())
         source.recovered += name == "again" and source.account.duplicates == before
 
     def _event(self, source, text):
         self._writer.event(source.number, text)
 
     def _write(self, source):
-        for stamp, packet, lost, restarted in source.account.take(time.monotonic()):
+        for stamp, packet, lost, restarted in source.account.take(host_time.now_s()):
             if restarted:
                 self._event(source, "restarted: what it said in between is not known")
             if lost:
@@ -402,12 +400,12 @@ class Recording:
 def ask(session, key, timeout_s=ASK_TIMEOUT_s):
     """Serial number -> the answer's bytes, and when it was asked and answered, ns since 1970."""
     zenoh = zenoh_module()
-    sent_ns = time.time_ns()
+    sent_ns = host_time.wall_ns()
     answers = {}
     try:
         for reply in session.get(key, timeout=timeout_s, consolidation=zenoh.ConsolidationMode.NONE):
             if reply.ok:
-                answers.setdefault(parts_of(str(reply.ok.key_expr))[0], (reply.ok.payload.to_bytes(), sent_ns, time.time_ns()))
+                answers.setdefault(parts_of(str(reply.ok.key_expr))[0], (reply.ok.payload.to_bytes(), sent_ns, host_time.wall_ns()))
     except zenoh.ZError:
         pass
     return answers
@@ -415,7 +413,7 @@ def ask(session, key, timeout_s=ASK_TIMEOUT_s):
 
 def find(session, serials, expect, wait_s):
     """Serial number -> info, of those that are wanted, or of all that are there. Raises InputError where some are missing."""
-    end_s = time.monotonic() + wait_s
+    end_s = host_time.now_s() + wait_s
     infos = {}
     while True:
         for serial, (data, _, _) in ask(session, f"{ROOT}/*/info", 2.0).items():
@@ -427,11 +425,11 @@ def find(session, serials, expect, wait_s):
         missing = [serial for serial in serials if serial not in infos]
         if infos and not missing and len(infos) >= expect:
             return dict(sorted(infos.items()))
-        if time.monotonic() >= end_s:
+        if host_time.now_s() >= end_s:
             there = ", ".join(sorted(infos)) or "none"
             wanted = f"{', '.join(missing)} not among them" if missing else f"{max(expect, 1)} expected"
             raise InputError(f"fingertips on the network: {there}; {wanted}. Is fingertip-bridge running, and --connect right?")
-        time.sleep(0.2)
+        host_time.sleep(0.2)
 
 
 class _HostClock(NamedTuple):
@@ -507,7 +505,7 @@ def main(argv):
         if not low <= getattr(options, name) <= high:
             raise InputError(f"--{name.replace('_', '-')} {getattr(options, name):g} is out of range; give {low} to {high:g}")
     check_output(options.file)
-    ended = threading.Event()
+    ended = host_time.event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())
 

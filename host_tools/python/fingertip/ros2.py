@@ -20,11 +20,11 @@ import os
 import signal
 import sys
 import threading
-import time
 from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from . import host_time
 from .device import Fingertip
 from .errors import BadValueError, FingertipError, InputError
 from .files import run_tool
@@ -68,7 +68,7 @@ def _system_minus_host_ns() -> int:
     """Of three looks at both clocks the one in which least time passed: in between another program may have had its turn."""
     looks = []
     for _ in range(3):
-        before_ns, now_ns, after_ns = time.perf_counter_ns(), time.time_ns(), time.perf_counter_ns()
+        before_ns, now_ns, after_ns = host_time.now_ns(), host_time.wall_ns(), host_time.now_ns()
         looks.append((after_ns - before_ns, now_ns - before_ns))
     return min(looks)[1]
 
@@ -76,7 +76,7 @@ def _system_minus_host_ns() -> int:
 def utc_ns(frame: Frame) -> int:
     """When it was measured, ns since 1970; now, if the clocks were not compared yet."""
     host_us = frame.host_us
-    return time.time_ns() if math.isnan(host_us) else _system_minus_host_ns() + round(host_us * 1000)
+    return host_time.wall_ns() if math.isnan(host_us) else _system_minus_host_ns() + round(host_us * 1000)
 
 
 class _Device:
@@ -151,12 +151,12 @@ class Publisher:
                 device.is_gone = tip.is_returning
                 said = "gone; it is waited for" if device.is_gone else "there again"
                 self._diagnose({"level": 2 if device.is_gone else 0, "name": f"fingertip {serial} line", "message": said, "hardware_id": serial,
-                                "values": []}, time.time_ns())
+                                "values": []}, host_time.wall_ns())
             health = tip.health
             if health is not None and health is not device.health:
                 device.health = health
                 fields = {name: str(0 if value is None else value) for name, value in health._asdict().items()}
-                self._diagnose(health_status(serial, tip.info.sensors, fields), time.time_ns())
+                self._diagnose(health_status(serial, tip.info.sensors, fields), host_time.wall_ns())
 
     def _diagnose(self, status: dict[str, Any], time_ns: int) -> None:
         with self._lock:
@@ -200,13 +200,13 @@ def publish(publisher: Publisher, fingertips: Fingertips, is_over: Callable[[], 
     tips = list(fingertips.by_serial.values())
     for tip in tips:
         publisher.add(tip)
-    threads = [threading.Thread(target=_follow, args=(publisher, tip, failures)) for tip in tips]
+    threads = [host_time.thread(_follow, args=(publisher, tip, failures)) for tip in tips]
     for thread in threads:
         thread.start()
     try:
         while not is_over() and not failures:
             publisher.state()
-            time.sleep(POLL_s)
+            host_time.sleep(POLL_s)
     finally:
         fingertips.close()
         for thread in threads:
@@ -223,15 +223,15 @@ def main(argv: list[str]) -> int:
     parser.add_argument("--domain", type=int, metavar="N", help="0 to 232; as ROS_DOMAIN_ID has it, if not given")
     parser.add_argument("--seconds", type=float, default=math.inf, metavar="S", help="how long; until Ctrl-C, if not given")
     options = parser.parse_args(argv)
-    stop = threading.Event()
+    stop = host_time.event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     try:
         with Publisher(options.domain) as publisher:
             fingertips = Fingertips(options.port, serials=options.device, reconnect=True)
-            end_s = time.monotonic() + options.seconds
+            end_s = host_time.now_s() + options.seconds
             print(f"domain {publisher.domain}: " + " ".join(f"/fingertip/{name_in_ros(serial)}" for serial in fingertips.by_serial), flush=True)
-            publish(publisher, fingertips, lambda: stop.is_set() or time.monotonic() >= end_s)
+            publish(publisher, fingertips, lambda: stop.is_set() or host_time.now_s() >= end_s)
             for serial, tip in fingertips.by_serial.items():
                 print(f"{serial}: {publisher.frames[serial]} frames, lost {tip.statistics.dropped_packets + tip.overrun_frames}")
             print("".join(f"{name}: {count} messages\n" for name, count in publisher.sent.items()) + f"refused: {publisher.refused}")

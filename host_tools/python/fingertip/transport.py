@@ -2,17 +2,18 @@
 import contextlib
 import errno
 import os
-import select
 import socket
+import stat
 import sys
-import time
 from typing import Protocol
 
+from . import host_time
 from .errors import GoneError, NoSuchPortError, NotAPortError, NotSharedError, PermissionDeniedError, PortError, PortInUseError
 
 BAUD = 115200  # USB does not care
 WRITE_TIMEOUT_s = 1.0
 READ_BYTES = 65536
+ADDRESS_BYTES = 108  # of a Unix socket on Linux: sun_path of fingertip's tools, whole
 
 
 class Transport(Protocol):
@@ -31,10 +32,10 @@ class Transport(Protocol):
 
 def _read_descriptor(fd: int, wait_s: float, settle_s: float) -> bytes:
     """Raises OSError at its end."""
-    if not select.select([fd], [], [], wait_s)[0]:
+    if not host_time.readable(fd, wait_s):
         return b""
     if settle_s > 0:
-        time.sleep(settle_s)
+        host_time.sleep(settle_s)
     data = os.read(fd, READ_BYTES)
     if not data:
         raise OSError(errno.EIO, "end")
@@ -75,7 +76,7 @@ class SerialTransport:
                 self._port.timeout = wait_s
             data = self._port.read(1)
             if data:
-                time.sleep(settle_s)
+                host_time.sleep(settle_s)
                 data += self._port.read(self._port.in_waiting)
             return bytes(data)
         except OSError:
@@ -128,6 +129,36 @@ class SocketTransport:
         self._socket.close()
 
 
+class SimulatedTransport(SocketTransport):
+    """A simulated port, which is a socket: its name in the abstract namespace is this end's, and keeps out others."""
+
+    def __init__(self, path: str) -> None:
+        self.description = path
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            self._socket.bind(b"\0" + os.fsencode(os.path.realpath(path)).ljust(ADDRESS_BYTES - 1, b"\0"))
+            self._socket.connect(path)
+        except OSError as error:
+            self._socket.close()
+            raise _port_error(path, OSError(errno.EBUSY, "") if error.errno == errno.EADDRINUSE else error) from None
+        self._socket.settimeout(WRITE_TIMEOUT_s)
+
+    def read(self, wait_s: float, settle_s: float) -> bytes:
+        try:
+            return _read_descriptor(self._socket.fileno(), wait_s, settle_s)
+        except OSError:
+            raise GoneError(f"{self.description}: vanished") from None
+
+
+def _is_socket(path: str) -> bool:
+    try:
+        return stat.S_ISSOCK(os.stat(path).st_mode)
+    except OSError:
+        return False
+
+
 def open_way(port: str, share_socket: str) -> Transport:
     """The socket, if it is there."""
-    return SocketTransport(share_socket) if share_socket else SerialTransport(os.fspath(port))
+    if share_socket:
+        return SocketTransport(share_socket)
+    return SimulatedTransport(os.fspath(port)) if _is_socket(port) else SerialTransport(os.fspath(port))

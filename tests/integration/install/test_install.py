@@ -2,6 +2,7 @@
 
 usage: test_install.py --cmake CMAKE --build FOLDER --fake-device PROGRAM [--node NODE --image pico_mux.bin]
 """
+# real time: installed programs on pseudo-terminals
 import argparse
 import os
 import pathlib

@@ -3,6 +3,7 @@
 usage: test_lerobot.py FAKE_DEVICE [unittest arguments]. Where LeRobot is installed it is that which is plugged into, else a stand-in beside
 this file.
 """
+# real time: the plugin as a robot program calls it, on pseudo-terminals
 import contextlib
 import dataclasses
 import importlib

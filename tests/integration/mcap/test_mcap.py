@@ -1,4 +1,5 @@
 """MCAP recordings of the tool and of the Python package, by readers of others: usage test_mcap.py FINGERTIP FAKE_DEVICE [unittest arguments]."""
+# real time: a recorder that is killed while it writes
 import contextlib
 import os
 import pathlib

@@ -2,6 +2,7 @@
 
 usage: test_package.py --cpack CPACK --build FOLDER --fingertip PROGRAM --fake-device PROGRAM
 """
+# real time: an installed package records from a pseudo-terminal
 import argparse
 import os
 import pathlib

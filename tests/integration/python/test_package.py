@@ -1,6 +1,7 @@
-"""The Python package against the C codec, fake devices and the firmware in the simulated cell: usage
-test_package.py FINGERTIP FAKE_DEVICE FINGERTIP_CELL [unittest arguments]."""
-import asyncio
+"""The Python package against the C codec, and against fake devices on simulated time.
+
+usage: test_package.py FINGERTIP SIMULATED_FINGERTIP SIMULATED_DEVICE TIME_KEEPER [unittest arguments]
+"""
 import contextlib
 import importlib
 import math
@@ -14,19 +15,20 @@ import sys
 import tempfile
 import threading
 import time
-import tty
 import unittest
 import zlib
 from unittest import mock
 
 import numpy as np
 
-FINGERTIP, FAKE_DEVICE, FINGERTIP_CELL = (os.path.abspath(path) for path in sys.argv[1:4])
+FINGERTIP, SIMULATED_FINGERTIP, SIMULATED_DEVICE, TIME_KEEPER = (os.path.abspath(path) for path in sys.argv[1:5])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PACKAGE = ROOT / "host_tools/python"
-sys.path.insert(0, str(PACKAGE))
+sys.path[:0] = [str(PACKAGE), str(ROOT / "tests/support")]
 import fingertip  # noqa: E402
-from fingertip import Fingertip, Fingertips, Flag, Streams, clock, device, errors, transport, wire  # noqa: E402
+from fingertip import Fingertip, Fingertips, Flag, Streams, clock, device, errors, host_time, transport, wire  # noqa: E402
+from simulated_host_time import SimulatedHostTime  # noqa: E402
+from simulated_time import SimulatedTime  # noqa: E402
 
 PATIENCE_s = 60
 SERIAL = "E660583883265A2C"  # of the fake device where none is said
@@ -292,25 +294,22 @@ class DeviceTest(Folder):
     def setUp(self):
         super().setUp()
         self.port = self.path("tty")
+        self.world = SimulatedTime(TIME_KEEPER, self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-time-")))
+        self.addCleanup(self.world.close)
+        self.host = SimulatedHostTime(self.world)
+        host_time.use(self.host)
+        self.addCleanup(host_time.use, host_time.HostTime())
 
     @contextlib.contextmanager
     def device(self, *options, port=None):
-        port = port or self.port
-        process = subprocess.Popen([FAKE_DEVICE, port, *options])
+        process = self.world.start([SIMULATED_DEVICE, port or self.port, *options], stdout=None, stderr=None)
         try:
-            self.wait_for(lambda: os.path.lexists(port))
             yield process
         finally:
             process.kill()
             process.wait()
             with contextlib.suppress(FileNotFoundError):
-                os.unlink(port)
-
-    def wait_for(self, condition):
-        end_s = time.monotonic() + PATIENCE_s
-        while not condition():
-            self.assertLess(time.monotonic(), end_s, "waited too long")
-            time.sleep(0.01)
+                os.unlink(port or self.port)
 
     def until_gone(self, fingertip_):
         frames = []
@@ -381,7 +380,7 @@ class Streaming(DeviceTest):
 
     def test_a_late_program_loses_the_oldest_and_is_told(self):
         with self.device("frames=200"), Fingertip(self.port, buffer_frames=20, timeout_s=PATIENCE_s) as tip:
-            self.wait_for(lambda: tip.statistics.packets > 400 and tip.is_closed is False and tip._error is not None)
+            self.world.until(lambda: tip.statistics.packets > 400 and tip.is_closed is False and tip._error is not None)
             self.assertEqual([frame.frame for frame in self.until_gone(tip)], list(range(181, 201)))
             self.assertEqual(tip.overrun_frames, 180)
 
@@ -403,22 +402,13 @@ class Streaming(DeviceTest):
         for name in ("r.csv", "other2.csv"):
             self.assertGreater(len(fingertip.read_recording(self.path(name)).has_contact), 10)
 
-    def test_one_that_streams_already(self):
-        with self.device("rate=1000"):
-            other = os.open(self.port, os.O_RDWR | os.O_NOCTTY)
-            self.addCleanup(os.close, other)
-            tty.setraw(other)
-            os.write(other, wire.encode(wire.Packet(0, 0, wire.SetStreams(7))))
-            self.assertTrue(os.read(other, 10))
-            with Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
-                np.testing.assert_array_equal(np.diff(tip.read_block(50).frame), 1)
-
     def test_silence_is_told(self):
         with self.device("stall=20"), Fingertip(self.port, timeout_s=0.3) as tip:
-            self.wait_for(lambda: tip.statistics.packets > 40)
+            self.world.until(lambda: tip.statistics.packets > 40)
             with self.assertRaises(fingertip.NoFrameError):
                 while True:  # what is old is not the latest
                     tip.latest()
+                    self.world.sleep(0.05)
             with self.assertRaisesRegex(fingertip.NoFrameError, "no frame in 0.3 s"):
                 for _ in tip:
                     pass
@@ -426,9 +416,9 @@ class Streaming(DeviceTest):
     def test_closing_ends_iteration_in_another_thread(self):
         with self.device(), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
             taken = []
-            thread = threading.Thread(target=lambda: taken.extend(tip))
+            thread = self.host.thread(lambda: taken.extend(tip))
             thread.start()
-            self.wait_for(lambda: taken)
+            self.world.until(lambda: taken)
             tip.close()
             thread.join(PATIENCE_s)
             self.assertFalse(thread.is_alive())
@@ -453,7 +443,7 @@ class Streaming(DeviceTest):
         with self.device("serial=AAAA", "frames=40"), Fingertip(self.port, reconnect=True, timeout_s=PATIENCE_s) as tip:
             iterator = iter(tip)
             next(iterator)
-            self.wait_for(lambda: tip.is_returning)
+            self.world.until(lambda: tip.is_returning)
             with self.device("serial=BBBB"):
                 with self.assertRaisesRegex(fingertip.OtherFingertipError, "is fingertip BBBB, not AAAA"):
                     for _ in iterator:
@@ -481,7 +471,7 @@ class Commands(DeviceTest):
     def test_set_tare_and_health(self):
         with self.device(f"tared={self.path('tared')}"), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
             tip.tare()
-            self.wait_for(lambda: os.path.exists(self.path("tared")))  # the device answers before it tares
+            self.world.until(lambda: os.path.exists(self.path("tared")))  # the device answers before it tares
             info = tip.set(rate_Hz=400, osr=256, slip_threshold_mm=0.25, prior_sigma_mm=3, location_limit_mm=0.5, keep=True)
             self.assertEqual((info.rate_mHz, info.osr, info.slip_threshold_mm, info.prior_sigma_mm, info.prior_width_mm, info.location_limit_mm),
                              (400000, 256, 0.25, 3.0, 0.5, 0.5))
@@ -551,21 +541,18 @@ class Choosing(DeviceTest):
     def test_the_share_socket(self):
         os.environ["FINGERTIP_PORT"] = self.port
         with self.device(), open(self.path("log"), "w", encoding="utf-8") as log:
-            server = subprocess.Popen([FINGERTIP, "serve"], stdin=subprocess.DEVNULL, stderr=log)
-            try:
-                self.wait_for(lambda: os.path.exists(self.path(f"fingertip/{SERIAL}.sock")))
-                with Fingertip(timeout_s=PATIENCE_s) as one, Fingertip(serial=SERIAL, share=True, timeout_s=PATIENCE_s) as two:
-                    for tip in (one, two):
-                        self.assertTrue(tip.description.endswith(f"{SERIAL}.sock"), tip.description)
-                        np.testing.assert_array_equal(np.diff(tip.read_block(50).frame), 1)
-                    one.set(osr=512)
-                    self.assertEqual(two.read_info().osr, 512)
-                    self.assertRaises(fingertip.PortInUseError, Fingertip, self.port, share=False)
-                    server.send_signal(signal.SIGINT)
-                    self.until_gone(two)
-            finally:
-                server.kill()
-                server.wait()
+            server = self.world.start([SIMULATED_FINGERTIP, "serve"], stderr=log)
+            self.world.until(lambda: os.path.exists(self.path(f"fingertip/{SERIAL}.sock")))
+            with Fingertip(timeout_s=PATIENCE_s) as one, Fingertip(serial=SERIAL, share=True, timeout_s=PATIENCE_s) as two:
+                for tip in (one, two):
+                    self.assertTrue(tip.description.endswith(f"{SERIAL}.sock"), tip.description)
+                    np.testing.assert_array_equal(np.diff(tip.read_block(50).frame), 1)
+                one.set(osr=512)
+                self.assertEqual(two.read_info().osr, 512)
+                self.assertRaises(fingertip.PortInUseError, Fingertip, self.port, share=False)
+                server.send_signal(signal.SIGINT)
+                self.until_gone(two)
+            server.wait()
 
 
 class Order(unittest.TestCase):
@@ -639,110 +626,6 @@ class Together(DeviceTest):
             zero_us = int(re.search(r"# host_zero_us: (\d+)", text).group(1))
             np.testing.assert_allclose(recording.time_us[rows] + zero_us, [taken[recording["frame"][i]].host_us for i in rows], atol=2e6)
 
-    def test_asyncio(self):
-        async def talk():
-            async with fingertip.AsyncFingertip(self.port, timeout_s=PATIENCE_s) as tip:
-                await tip.set(osr=512)
-                await tip.tare()
-                self.assertEqual((await tip.read_info()).osr, 512)
-                self.assertEqual((await tip.read_health()).capabilities & 1, 1)
-                numbers = []
-                async for frame in tip:
-                    numbers.append(frame.frame)
-                    if len(numbers) == 60:
-                        break
-                self.assertEqual(numbers, list(range(numbers[0], numbers[0] + 60)))
-                self.assertEqual(len(await tip.read_block(10)), 10)
-
-        async def gone():
-            async with fingertip.AsyncFingertip(self.port, timeout_s=PATIENCE_s) as tip:
-                async for _ in tip:
-                    pass
-
-        with self.device():
-            asyncio.run(talk())
-        with self.device("frames=30"), self.assertRaises(fingertip.GoneError):
-            asyncio.run(gone())
-
-
-class Firmware(DeviceTest):
-    """The firmware's own code on two ports, an object and a gripper between them."""
-
-    def test_a_grip_is_felt_and_no_zero(self):
-        cell = self.path("cell")
-        process = subprocess.Popen([FINGERTIP_CELL, cell, "--lift-after", "1000", "--seconds", str(PATIENCE_s)], stdin=subprocess.PIPE,
-                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        try:
-            self.wait_for(lambda: os.path.lexists(os.path.join(cell, "gripper")))
-            with Fingertips([os.path.join(cell, side) for side in ("left", "right")], timeout_s=PATIENCE_s) as both:
-                for tip in both.by_serial.values():
-                    tip.tare()
-                    self.wait_for(lambda tip=tip: Flag.TARED in tip.latest().flags)
-                    block = tip.read_block(60)
-                    self.assertTrue(np.isnan(block.force_N).all() and not block.flag(Flag.CONTACT).any())
-                grip = [FINGERTIP, "gripper", "move", "30", "--force", "30", "--activate", "--model", "2f85", "--port", os.path.join(cell, "gripper")]
-                # on a busy computer an answer may come too late
-                self.wait_for(lambda: subprocess.run(grip, capture_output=True, timeout=PATIENCE_s).returncode == 0)
-                self.wait_for(lambda: all(frame.force_N > 25 and Flag.SATURATED in frame.warnings for frame in both.latest().values()))
-                for tip, frame in zip(both.by_serial.values(), both.latest().values()):
-                    self.assertLess(math.hypot(frame.x_mm, frame.y_mm), 3)
-                    self.assertAlmostEqual(frame.force_N, 30, delta=5)
-                    self.assertEqual((frame.trusted, Flag.SATURATED in frame.warnings), (False, True))
-                    self.assertRaises(fingertip.NotNowError, tip.tare)
-                    tip.tare(force=True)
-                    self.assertGreaterEqual(tip.read_health().commands_rejected, 1)
-                    self.assertEqual(tip.set(osr=256, slip_window_ms=50).slip_window_ms, 50)
-                    self.assertEqual(tip.statistics.crc_errors + tip.statistics.format_errors, 0)
-        finally:
-            process.kill()
-            process.communicate()
-
-
-class Examples(DeviceTest):
-    """The code in the manuals runs."""
-
-    def setUp(self):
-        super().setUp()
-        for patch in (mock.patch.dict(Fingertip.__init__.__kwdefaults__, {"timeout_s": PATIENCE_s}),
-                      mock.patch.dict(os.environ, {"ROS_LOCALHOST_ONLY": "1"})):
-            patch.start()
-            self.addCleanup(patch.stop)
-
-    def blocks(self, path, language="python"):
-        return re.findall(rf"```{language}\n(.*?)```", (ROOT / path).read_text(encoding="utf-8"), re.S)
-
-    def test_package_readme(self):
-        os.environ["FINGERTIP_PORT"] = self.port
-        examples = [code for code in self.blocks("host_tools/python/README.md") if "import zenoh" not in code]  # test_zenoh.py runs that
-        self.assertGreater(len(examples), 3)
-        for code in examples:
-            with self.subTest(code), self.device("frames=120"):
-                shown = []
-                os.chdir(self.folder)
-                self.addCleanup(os.chdir, ROOT)
-                with contextlib.suppress(fingertip.GoneError):
-                    exec(compile(code, "README.md", "exec"), {"print": lambda *values: shown.append(values), "__name__": "__main__"})
-                self.assertTrue(shown, code)
-
-
-    def test_readme(self):
-        """Frames with a warning are not shown, whichever it is."""
-        os.environ["FINGERTIP_PORT"] = self.port
-        text = (ROOT / "README.md").read_text(encoding="utf-8")
-        code = re.search(r"(?m)^    import matplotlib.*\n(?:    .*\n|\n)+", text).group().replace("\n    ", "\n")[4:]
-        self.assertIn("seconds=10", code)
-        plots = mock.MagicMock()
-        with mock.patch.dict(sys.modules, {"matplotlib": plots, "matplotlib.pyplot": plots.pyplot}):
-            for bit in (None, *range(8, 19)):
-                shown = []
-                flags = int(Flag.CONTACT | Flag.FIT_VALID) | (0 if bit is None else 1 << bit)
-                with self.device("rate=1000", "frames=300", f"flags={flags}"), self.assertRaises(fingertip.GoneError):
-                    exec(compile(code.replace("seconds=10", "seconds=0.1"), "README.md", "exec"), {"print": lambda *values: shown.append(values)})
-                self.assertEqual(bool(shown), bit is None, bit)
-        t_s, force_N = plots.pyplot.plot.call_args.args
-        self.assertEqual(len(t_s), len(force_N))
-        self.assertEqual(plots.pyplot.show.call_count, 12)
-
 
 class WithoutPandas(unittest.TestCase):
     def test_said_what_to_install(self):
@@ -756,4 +639,4 @@ class WithoutPandas(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1] + sys.argv[4:])
+    unittest.main(argv=sys.argv[:1] + sys.argv[5:])

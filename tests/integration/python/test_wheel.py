@@ -1,4 +1,5 @@
 """Wheel and source distribution of the Python package, and its types: usage test_wheel.py FAKE_DEVICE [unittest arguments]."""
+# real time: an installed wheel reads a pseudo-terminal
 import os
 import pathlib
 import re

@@ -1,4 +1,5 @@
 """The bridge and the recorder on Zenoh, with fake devices: usage test_zenoh.py FAKE_DEVICE [unittest arguments]."""
+# real time: routers, bridges and recorders are processes on a network
 import contextlib
 import json
 import math

@@ -2,6 +2,7 @@
 
 usage: test_ros2.py FAKE_DEVICE FAST_DDS_LISTENER [unittest arguments]. DDS stays on the loopback interface.
 """
+# real time: discovery and delivery by DDS on a network
 import csv
 import math
 import os

@@ -8,14 +8,14 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 
 TWIN, TABLES, PLAYER = (os.path.abspath(path) for path in sys.argv[1:4])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PATIENCE_s = 60
-sys.path.insert(0, str(ROOT / "host_tools/python"))
+sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
 from fingertip import files  # noqa: E402
+from real_time import RealTime  # noqa: E402
 
 READ_AS_THE_EMULATOR_DOES = """
 import { readScenario } from '%s';
@@ -218,10 +218,7 @@ class Files(TwinTest):
     def test_an_interrupt_leaves_nothing(self):
         twin = subprocess.Popen([TWIN, "scenario", "slip", "--seconds", "7200", "--effects", "all", "-o", self.csv, "--cache", TABLES],
                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        end = time.monotonic() + PATIENCE_s
-        while not any(path.stat().st_size for path in self.folder.iterdir()):
-            self.assertLess(time.monotonic(), end)
-            time.sleep(0.01)
+        RealTime().until(lambda: any(path.stat().st_size for path in self.folder.iterdir()))
         twin.send_signal(signal.SIGINT)
         out, err = twin.communicate(timeout=PATIENCE_s)
         self.assertEqual((twin.returncode, out, err), (1, "", "twin: interrupted; what was not finished was not written\n"))

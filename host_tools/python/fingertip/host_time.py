@@ -1,0 +1,80 @@
+"""The host's clock: the one place where the package reads the time, waits, and starts threads that wait.
+
+use() puts another in its place, before anything is opened: tests run the package on simulated time. time.perf_counter(), and on Linux
+CLOCK_MONOTONIC, in which joint recordings are, too.
+"""
+import select
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+
+class HostTime:
+    def now_ns(self) -> int:
+        return time.perf_counter_ns()
+
+    def wall_ns(self) -> int:
+        """Since 1970, for people and other hosts; it may jump."""
+        return time.time_ns()
+
+    def sleep(self, seconds: float) -> None:
+        time.sleep(seconds)
+
+    def readable(self, descriptor: int, seconds: float) -> bool:
+        """Whether there is something to read, waiting for it so long."""
+        return bool(select.select([descriptor], [], [], seconds)[0])
+
+    def condition(self) -> threading.Condition:
+        return threading.Condition()
+
+    def event(self) -> threading.Event:
+        return threading.Event()
+
+    def thread(self, target: Callable[..., None], **options: Any) -> threading.Thread:
+        """Not started. options: as threading.Thread has them."""
+        return threading.Thread(target=target, **options)
+
+
+_host = HostTime()
+
+
+def use(host: HostTime) -> None:
+    global _host
+    _host = host
+
+
+def now_ns() -> int:
+    return _host.now_ns()
+
+
+def now_us() -> int:
+    return _host.now_ns() // 1000
+
+
+def now_s() -> float:
+    return _host.now_ns() / 1e9
+
+
+def wall_ns() -> int:
+    return _host.wall_ns()
+
+
+def sleep(seconds: float) -> None:
+    _host.sleep(seconds)
+
+
+def readable(descriptor: int, seconds: float) -> bool:
+    return _host.readable(descriptor, seconds)
+
+
+def condition() -> threading.Condition:
+    return _host.condition()
+
+
+def event() -> threading.Event:
+    return _host.event()
+
+
+def thread(target: Callable[..., None], **options: Any) -> threading.Thread:
+    return _host.thread(target, **options)
