@@ -77,10 +77,12 @@ class Terminal:
         self._screen.resize(rows, columns)
 
     def type(self, keys):
-        os.write(self._master, keys)
         if b"\x03" in keys:
-            self._world.signalled(self.process.pid)
+            self._world.will_signal(self.process.pid)
+            os.write(self._master, keys)
+            self._world.wait(seconds=1e-6)  # until then the terminal throws away what is written to it
             return
+        os.write(self._master, keys)
         limit_s = time.monotonic() + ARRIVAL_s
         while not select.select([self._slave], [], [], 0.1)[0]:
             assert time.monotonic() < limit_s, "the keys do not arrive"

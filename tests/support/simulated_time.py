@@ -106,8 +106,8 @@ class SimulatedTime:
         out, err = process.communicate(limit_s)
         return process.returncode, out, err
 
-    def signalled(self, pid):
-        """A signal has been sent there: time stands until it has arrived."""
+    def will_signal(self, pid):
+        """A signal is sent there next: time stands until it has arrived."""
         self._say(SIGNALLED, pid)
 
     def stop(self, process, seconds):
@@ -199,9 +199,9 @@ class Process:
 
     def send_signal(self, number):
         if self.poll() is None:
-            os.kill(self.pid, number)
             if number not in (signal.SIGSTOP, signal.SIGCONT):
-                self._world.signalled(self.pid)
+                self._world.will_signal(self.pid)
+            os.kill(self.pid, number)
 
     def terminate(self):
         self.send_signal(signal.SIGTERM)
