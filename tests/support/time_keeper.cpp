@@ -69,6 +69,7 @@ private:
 struct Process {
   pid_t pid;
   Descriptor handle;    // pidfd
+  long born;            // which of all that began
   bool is_awaited;      // its hello, or its end
   bool is_dying = false;
   std::int64_t stopped_until_us = 0;
@@ -82,6 +83,7 @@ struct Awaited {
 struct Client {
   Descriptor line;
   pid_t pid;
+  long born; // its process; several that begin at once say hello in any order
   bool runs = true;
   bool is_first = false; // of its process
   bool is_interrupted = false;
@@ -146,7 +148,7 @@ private:
     if (process(pid) == nullptr) {
       Descriptor handle(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
       if (handle.get() >= 0) { // else it has ended already
-        processes_.push_back({pid, std::move(handle), true});
+        processes_.push_back({pid, std::move(handle), ++born_, true});
       }
     }
   }
@@ -225,7 +227,8 @@ private:
       return;
     }
     expect(peer.pid);
-    Client client{std::move(line), peer.pid};
+    const Process *its_process = process(peer.pid);
+    Client client{std::move(line), peer.pid, its_process == nullptr ? 0 : its_process->born};
     client.is_first = std::none_of(clients_.begin(), clients_.end(),
                                    [&](const Client &each) { return each.pid == peer.pid; });
     clients_.push_back(std::move(client));
@@ -324,7 +327,8 @@ private:
         first_us = std::min(first_us, stopped_until_us);
         continue;
       }
-      if (may && (best == nullptr || each.ran < best->ran)) {
+      if (may && (best == nullptr ||
+                  std::pair(each.ran, each.born) < std::pair(best->ran, best->born))) {
         best = &each;
       }
       first_us = std::min(first_us, each.until_us);
@@ -355,7 +359,7 @@ private:
   std::list<Client> clients_; // the first is the test's
   std::list<Process> processes_;
   std::int64_t now_us_ = BEGIN_us;
-  long turn_ = 0, turns_ = 0;
+  long turn_ = 0, turns_ = 0, born_ = 0;
 };
 
 [[noreturn]] int run_test(char **arguments) {
