@@ -17,6 +17,8 @@ FINGERTIP, FINGERTIP_CELL, TABLES = (os.path.abspath(path) for path in sys.argv[
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"))
 from fingertip import files  # noqa: E402
 
+# A machine that is held up for less than that changes nothing of what is asked here.
+HELD_UP = ("--timeout", "10000", "--silent", "5000", "--stale", "1000")
 STOPPED_s = 2  # a Robotiq reports a second in which nobody spoke to it
 PATIENCE_s = 120  # then it ends and says where it waited
 
@@ -45,24 +47,23 @@ class Stopped(unittest.TestCase):
         lines = []
         while words not in (lines[-1] if lines else ""):
             lines.append(process.stdout.readline())
-            self.assertTrue(lines[-1], f"ended without {words!r}: {lines}")
+            if not lines[-1]:
+                self.fail((f"ended without {words!r}", lines, process.communicate()[1], process.returncode))
         return lines[-1]
 
     def test_the_tool_and_then_the_cell(self):
         cell = self.start(FINGERTIP_CELL, self.folder, "--gripper", "2f85", "--by-command", "--cache", TABLES)  # which stands on the table
         self.until(cell, "ready: ")
-        tool = self.start(FINGERTIP, "grasp", "--gripper", "2f85", "--gripper-port", f"{self.folder}/gripper", "-o", self.csv)
+        tool = self.start(FINGERTIP, "grasp", "--gripper", "2f85", "--gripper-port", f"{self.folder}/gripper", "-o", self.csv, *HELD_UP)
         self.until(tool, " s  holding ")
         for stopped in (tool, cell):
             os.kill(stopped.pid, signal.SIGSTOP)
-            threading.Timer(STOPPED_s, os.kill, (stopped.pid, signal.SIGCONT)).start()
-            if stopped is cell:
-                self.until(tool, "the gripper does not answer")
-            while "the gripper does not answer" in self.until(tool, " s  "):
-                pass
+            go_on = threading.Timer(STOPPED_s, os.kill, (stopped.pid, signal.SIGCONT))
+            go_on.start()
+            go_on.join()
             cell.stdin.write("truth\n")
             cell.stdin.flush()
-            self.assertTrue(cell.stdout.readline())  # the cell has gone on
+            self.until(cell, ",")
             self.until(tool, " s  holding ")
         tool.terminate()
         _, err = tool.communicate()
