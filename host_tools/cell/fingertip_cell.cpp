@@ -212,31 +212,27 @@ private:
 // A gripper on its own line, activated and as far open as it is to begin with.
 void stand_open(GripperServer &server, GripperMotion &motion, const std::string &model,
                 double width_mm) {
-  constexpr int TRIES = 20;
   constexpr double HURRY_s = 0.02; // in a round: nobody waits for it
-  std::atomic<bool> is_done{false}, is_open{false};
+  std::atomic<bool> is_done{false};
   std::string why;
   Thread client([&] {
-    for (int i = 0; i < TRIES && !is_open; i++) {
-      try {
-        GripperWay way;
-        way.model = model;
-        way.port = server.port();
-        way.timeout_s = 1.0;
-        const auto gripper = open_gripper(way);
-        gripper->activate();
-        while (!gripper->poll().active) {
-        }
-        GripperMove move;
-        move.width_mm = width_mm;
-        move.speed_mm_s = gripper->traits().speed_max_mm_s;
-        gripper->move(move);
-        while (gripper->poll().moving) {
-        }
-        is_open = true;
-      } catch (const Error &error) { // this machine is busy
-        why = error.what();
+    try {
+      GripperWay way;
+      way.model = model;
+      way.port = server.port();
+      way.timeout_s = 10.0; // however busy this machine is
+      const auto gripper = open_gripper(way);
+      gripper->activate();
+      while (!gripper->poll().active) {
       }
+      GripperMove move;
+      move.width_mm = width_mm;
+      move.speed_mm_s = gripper->traits().speed_max_mm_s;
+      gripper->move(move);
+      while (gripper->poll().moving) {
+      }
+    } catch (const Error &error) {
+      why = error.what();
     }
     is_done = true;
   });
@@ -245,7 +241,7 @@ void stand_open(GripperServer &server, GripperMotion &motion, const std::string 
     motion.step(HURRY_s);
   }
   client.join();
-  if (!is_open) {
+  if (!why.empty()) {
     throw Error("the gripper does not open (" + why + ")");
   }
 }

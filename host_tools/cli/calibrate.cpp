@@ -5,12 +5,14 @@
 #include "cli/calibrate_drag.hpp"
 #include "cli/calibrate_view.hpp"
 #include "cli/gains.hpp"
+#include "libfingertip/clock.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/recording.hpp"
 #include "libfingertip/text.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <ctime>
 
@@ -152,8 +154,8 @@ int calibrate(const CalibrateOptions &options) {
     }
   }
   refuse_unless_good(work->judgement());
-  const calibration made =
-      work->made(options.force_N, static_cast<std::uint32_t>(std::time(nullptr)));
+  const std::time_t now_s = std::chrono::system_clock::to_time_t(wall_now());
+  const calibration made = work->made(options.force_N, static_cast<std::uint32_t>(now_s));
   print_result(*work, made, options.force_N);
   if (!device) {
     return 0;

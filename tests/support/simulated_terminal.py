@@ -90,6 +90,7 @@ class Terminal:
         if b"\x03" in keys:
             self._world.will_signal(self.process.pid)
             os.write(self._master, keys)
+            self._world.wait(seconds=1e-6)  # until then the terminal throws away what is written to it
             return
         os.write(self._master, keys)
         limit_s = time.monotonic() + ARRIVAL_s

@@ -70,6 +70,7 @@ private:
 struct Process {
   pid_t pid;
   Descriptor handle;    // pidfd
+  long born;            // which of all that began
   bool is_awaited;      // its hello, or its end
   bool is_dying = false;
   bool expects_signal = false;
@@ -85,6 +86,7 @@ struct Awaited {
 struct Client {
   Descriptor line;
   pid_t pid;
+  long born; // its process; several that begin at once say hello in any order
   bool runs = true;
   bool is_interrupted = false;
   std::int64_t until_us = 0;
@@ -148,7 +150,7 @@ private:
     if (process(pid) == nullptr) {
       Descriptor handle(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
       if (handle.get() >= 0) { // else it has ended already
-        processes_.push_back({pid, std::move(handle), true});
+        processes_.push_back({pid, std::move(handle), ++born_, true});
       }
     }
   }
@@ -228,10 +230,10 @@ private:
       return;
     }
     expect(peer.pid);
-    Client client{std::move(line), peer.pid};
-    clients_.push_back(std::move(client));
+    Process *its = process(peer.pid);
+    clients_.push_back({std::move(line), peer.pid, its == nullptr ? 0 : its->born});
     // Until it has said hello it runs; its process need not be waited for any more.
-    if (Process *its = process(peer.pid)) {
+    if (its != nullptr) {
       its->is_awaited = false;
     }
   }
@@ -334,7 +336,8 @@ private:
         continue;
       }
       const std::int64_t each_us = may ? now_us_ : each.until_us;
-      if (may && (best == nullptr || each.ran < best->ran)) {
+      if (may && (best == nullptr ||
+                  std::pair(each.ran, each.born) < std::pair(best->ran, best->born))) {
         others_us = first_us; // of those before; those behind follow
         best = &each;
       } else {
@@ -372,7 +375,7 @@ private:
   std::list<Client> clients_; // the first is the test's
   std::list<Process> processes_;
   std::int64_t now_us_ = BEGIN_us;
-  long turn_ = 0, turns_ = 0;
+  long turn_ = 0, turns_ = 0, born_ = 0;
 };
 
 [[noreturn]] int run_test(char **arguments) {

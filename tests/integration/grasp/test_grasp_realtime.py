@@ -1,0 +1,79 @@
+"""A grasp in the simulated cell on the machine's own clock and pseudo-terminals, of which one program is stopped for two seconds.
+
+usage: test_grasp_realtime.py FINGERTIP FINGERTIP_CELL TABLES [unittest arguments]
+"""
+# real time: the tool as people run it, its clock, threads and serial ports, and a process that the kernel stops.
+import faulthandler
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+
+FINGERTIP, FINGERTIP_CELL, TABLES = (os.path.abspath(path) for path in sys.argv[1:4])
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"))
+from fingertip import files  # noqa: E402
+
+# A machine that is held up for less than that changes nothing of what is asked here.
+HELD_UP = ("--timeout", "10000", "--silent", "5000", "--stale", "1000")
+STOPPED_s = 2  # a Robotiq reports a second in which nobody spoke to it
+PATIENCE_s = 120  # then it ends and says where it waited
+
+
+class Stopped(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        self.csv = f"{self.folder}/grasp.csv"
+        self.environment = {k: v for k, v in os.environ.items() if not k.startswith("LC_")}
+        self.environment |= {"LC_ALL": "C.UTF-8", "XDG_RUNTIME_DIR": self.folder, "FINGERTIP_PORT": f"{self.folder}/left:{self.folder}/right"}
+        faulthandler.dump_traceback_later(PATIENCE_s, exit=True)
+        self.addCleanup(faulthandler.cancel_dump_traceback_later)
+
+    def start(self, *arguments):
+        process = subprocess.Popen(arguments, env=self.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+        def end():
+            process.kill()
+            process.communicate()
+        self.addCleanup(end)
+        return process
+
+    def until(self, process, words):
+        lines = []
+        while words not in (lines[-1] if lines else ""):
+            lines.append(process.stdout.readline())
+            if not lines[-1]:
+                self.fail((f"ended without {words!r}", lines, process.communicate()[1], process.returncode))
+        return lines[-1]
+
+    def test_the_tool_and_then_the_cell(self):
+        cell = self.start(FINGERTIP_CELL, self.folder, "--gripper", "2f85", "--by-command", "--cache", TABLES)  # which stands on the table
+        self.until(cell, "ready: ")
+        tool = self.start(FINGERTIP, "grasp", "--gripper", "2f85", "--gripper-port", f"{self.folder}/gripper", "-o", self.csv, *HELD_UP)
+        self.until(tool, " s  holding ")
+        for stopped in (tool, cell):
+            os.kill(stopped.pid, signal.SIGSTOP)
+            go_on = threading.Timer(STOPPED_s, os.kill, (stopped.pid, signal.SIGCONT))
+            go_on.start()
+            go_on.join()
+            cell.stdin.write("truth\n")
+            cell.stdin.flush()
+            self.until(cell, ",")
+            self.until(tool, " s  holding ")
+        tool.terminate()
+        _, err = tool.communicate()
+        self.assertEqual(tool.returncode, 0, err)
+        self.assertIn("the gripper keeps its position", err)
+        rows = files.read_grip(self.csv)
+        self.assertNotIn("fault", set(rows["state"]))
+        lasted_s = (rows["time_us"][1:] - rows["time_us"][:-1]).max() / 1e6
+        self.assertGreater(lasted_s, 0.9 * STOPPED_s, "the tool was not stopped")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[4:]], verbosity=2)
