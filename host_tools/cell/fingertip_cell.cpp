@@ -253,6 +253,7 @@ public:
         motion_(GripperServer::mechanics(options.model)), server_(motion_, server_options()) {
     wait_for_fingers();
     stand_open(server_, motion_, options.model, options.world.object.width_mm + options.opens_mm);
+    server_.rename(options.folder + "/gripper");
     world_.emplace(options.world, face_, motion_);
     truth_.emplace(options, head());
   }
@@ -281,7 +282,7 @@ private:
     GripperServer::Options server;
     server.model = options_.model;
     server.real_time = false;
-    server.link = options_.folder + "/gripper";
+    server.link = options_.folder + "/.gripper"; // until all is ready
     return server;
   }
 

@@ -63,6 +63,8 @@ public:
   GripperServer &operator=(const GripperServer &) = delete;
 
   const std::string &port() const { return port_.path(); }
+  // Its link gets another name.
+  void rename(const std::string &link) { port_.rename(link); }
 
   // Waits at most this long for something to do, and does it.
   void step(std::chrono::microseconds longest_wait);

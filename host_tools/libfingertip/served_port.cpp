@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
@@ -64,6 +65,13 @@ void ServedPort::make_raw() {
   cfmakeraw(&settings);
   tcsetattr(slave, TCSANOW, &settings);
   ::close(slave);
+}
+
+void ServedPort::rename(const std::string &link) {
+  if (std::rename(link_.c_str(), link.c_str()) != 0) {
+    throw failure(link);
+  }
+  path_ = link_ = link;
 }
 
 void ServedPort::look() {

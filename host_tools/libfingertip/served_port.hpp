@@ -24,6 +24,8 @@ public:
   ServedPort(const ServedPort &) = delete;
   ServedPort &operator=(const ServedPort &) = delete;
 
+  /* Its link gets another name. */
+  void rename(const std::string &link);
   /* What to open: the link, or the port itself where there is none. */
   const std::string &path() const { return path_; }
   /* Waits until there are bytes or somebody opens or closes it; perhaps less long. */

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
@@ -63,6 +64,13 @@ void ServedPort::make_raw() {
       listen(listener_, 8) != 0) {
     throw failure(path_);
   }
+}
+
+void ServedPort::rename(const std::string &link) {
+  if (std::rename(link_.c_str(), link.c_str()) != 0) {
+    throw failure(link);
+  }
+  path_ = link_ = link;
 }
 
 void ServedPort::look() {

@@ -66,7 +66,8 @@ class SimulatedTime:
         self._line.close()
         with self._keeper:
             pass
-        os.unlink(self.environment[VARIABLE])
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(self.environment[VARIABLE])
         for process in self._processes:
             process.end()
 

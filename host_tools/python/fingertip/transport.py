@@ -134,6 +134,8 @@ class SimulatedTransport(SocketTransport):
 
     def __init__(self, path: str) -> None:
         self.description = path
+        if sys.platform == "win32":
+            raise NotAPortError(f"{path}: no serial port")
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             self._socket.bind(b"\0" + os.fsencode(os.path.realpath(path)).ljust(ADDRESS_BYTES - 1, b"\0"))

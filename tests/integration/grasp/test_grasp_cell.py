@@ -222,7 +222,6 @@ class Again(CellTest):
             meanwhile(process)
             self.assertEqual(process.wait(), DONE, self.said())
         self.world.close()
-        os.unlink(f"{self.folder}/time")
         self.begin_world()
         self.assertIn("slipping", set(files.read_grip(self.csv)["state"]))
         return [*(pathlib.Path(path).read_bytes() for path in (self.csv, self.truth_csv)), self.said()]
