@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -91,14 +92,25 @@ public:
       }
     }
   }
-  // Until it is this thread's turn; false: after a signal.
-  bool turn() {
+  // Says this and waits for its turn; false: after a signal. A signal that comes before the wait
+  // has begun is kept for it.
+  bool take_turn(const Order &order, const pollfd *descriptors = nullptr) {
+    sigset_t all, usual;
+    sigfillset(&all);
+    pthread_sigmask(SIG_BLOCK, &all, &usual);
+    say(order, descriptors);
+    const bool is_whole = turn(&usual);
+    pthread_sigmask(SIG_SETMASK, &usual, nullptr);
+    return is_whole;
+  }
+  // signals: blocked meanwhile; nullptr: those that are.
+  bool turn(const sigset_t *signals = nullptr) {
     bool is_whole = true;
     std::int64_t told_us = 0;
     for (;;) {
       pollfd answer = {fd_, POLLIN, 0}; // which no signal restarts, as it would recv
       const ssize_t size =
-          ::poll(&answer, 1, -1) < 0 ? -1 : recv(fd_, &told_us, sizeof told_us, 0);
+          ppoll(&answer, 1, nullptr, signals) < 0 ? -1 : recv(fd_, &told_us, sizeof told_us, 0);
       if (size == sizeof told_us) {
         now_us = told_us;
         looks = 0;
@@ -117,8 +129,7 @@ public:
         close(fd_); // the parent's
       }
       adopt(connected());
-      say({Order::HELLO, 0, 0, 0, {}});
-      turn();
+      take_turn({Order::HELLO, 0, 0, 0, {}});
     }
   }
 
@@ -165,8 +176,7 @@ int wait_for(pollfd *descriptors, std::size_t count, HostTime until) {
       order.events[order.count++] = descriptors[i].events;
     }
   }
-  line.say(order, asked);
-  if (!line.turn()) {
+  if (!line.take_turn(order, asked)) {
     return 0;
   }
   return std::max(0, ::poll(descriptors, count, 0));
@@ -186,6 +196,9 @@ Thread::Thread(std::function<void()> run) : state_(std::make_unique<State>()) {
   early.adopt(-1);
   Wake &ended = state_->ended;
   state_->thread = std::thread([fd, run = std::move(run), &ended] {
+    sigset_t all; // signals are the main thread's, which waits for them in the keeper's sight
+    sigfillset(&all);
+    pthread_sigmask(SIG_BLOCK, &all, nullptr);
     line.adopt(fd);
     line.turn();
     run();
