@@ -45,8 +45,8 @@ struct GripperStatus {
   double width_mm = 0.0;
   double current_A = 0.0; // of its motor, as a number without sign
   std::uint8_t fault = 0; // the maker's code; 0: none
-  // Before this exchange it was asked nothing for a second or more. No fault: a gripper that says so
-  // hears again, and goes on.
+  // Before this exchange it was asked nothing for a second or more. No fault: a gripper that says
+  // so hears again, and goes on.
   bool was_left_alone = false;
 };
 

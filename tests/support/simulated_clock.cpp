@@ -210,6 +210,9 @@ Thread::Thread(std::function<void()> run) : state_(std::make_unique<State>()) {
   early.adopt(-1);
   Wake &ended = state_->ended;
   state_->thread = std::thread([fd, run = std::move(run), &ended] {
+    sigset_t all; // signals are the main thread's, which waits for them in the keeper's sight
+    sigfillset(&all);
+    pthread_sigmask(SIG_BLOCK, &all, nullptr);
     line.adopt(fd);
     line.take_first_turn();
     run();

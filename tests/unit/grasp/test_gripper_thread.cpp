@@ -46,7 +46,8 @@ TEST_F(GripperThreadTest, TheNewestCommandGoesOutOnceAndAnswersComeBack) {
   for (int um : {40000, 39000, 38000}) {
     thread.command({GRIP_MOVE, um, 50000, 0});
   }
-  for (const HostTime patience = host_now() + PATIENCE; !thread.is_done() && host_now() < patience;) {
+  const HostTime patience = host_now() + PATIENCE;
+  while (!thread.is_done() && host_now() < patience) {
     pass();
   }
   EXPECT_TRUE(thread.is_done());
