@@ -18,6 +18,7 @@ ROOT = HERE.parents[1]
 sys.path.insert(0, str(HERE))
 import check_image  # noqa: E402
 
+PATIENCE_s = 300  # ends what hangs
 CHECKSUM = ROOT / "cmake" / "boot2_checksum.py"
 
 
@@ -115,7 +116,7 @@ class Bootstrap(Folder):
             program = self.folder / "bin" / name
             program.write_text(f"#!/bin/sh\n{body}\n")
             program.chmod(0o755)
-        return subprocess.run([shutil.which("sh"), self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=60,
+        return subprocess.run([shutil.which("sh"), self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=PATIENCE_s,
                               env={**os.environ, "PATH": f"{self.folder}/bin:{path}"})
 
     def test_only_who_fuzzes_or_builds_the_page_needs_clang(self):
@@ -161,7 +162,7 @@ class BootstrapReport(Folder):
             script.parent.mkdir(parents=True)
             script.write_text("import sys\nprint('ran', sys.argv[0], *(sys.argv[sys.argv.index(o) + 1] for o in ('-o', '--picture') if o in sys.argv))\n")
         for job, after_traces in (("report",), 7), (("report", "all"), 9):
-            done = subprocess.run(["sh", self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=60,
+            done = subprocess.run(["sh", self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=PATIENCE_s,
                                   env={**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
             self.assertEqual(done.returncode, 0, done.stderr)
             lines = done.stdout.splitlines()
@@ -183,6 +184,9 @@ class BootstrapReport(Folder):
 class Demo(Folder):
     """demo.sh alone, with a stand-in for each program that it calls."""
 
+    # Stays until it is ended: nobody writes there.
+    CELL = 'mkdir "$1"; mkfifo "$1/end"; trap "exit 0" TERM; touch "$1/gripper"; read -r end <> "$1/end"'
+
     def setUp(self):
         super().setUp()
         shutil.copytree(ROOT / "host_tools/demo", self.folder / "host_tools/demo")
@@ -193,7 +197,7 @@ class Demo(Folder):
                 """)
         self.write("host_tools/demo/errors.py", "print('errors')\n")
         self.write("build/host/host_tools/twin/twin", "#!/bin/sh\n").chmod(0o755)
-        self.cell('mkdir "$1"; touch "$1/gripper"; trap exit TERM; while :; do sleep 0.05; done')
+        self.cell(self.CELL)
         self.monitor('case $1 in set) test -e "$3" ;; esac')
 
     def write(self, path, text):
@@ -218,7 +222,7 @@ class Demo(Folder):
         self.write("build/host/host_tools/cell/fingertip_cell", f"#!/bin/sh\n{body}\n").chmod(0o755)
 
     def play(self, *options, **how):
-        return subprocess.run(["sh", self.folder / "host_tools/demo/demo.sh", *options], capture_output=True, text=True, timeout=60, **how)
+        return subprocess.run(["sh", self.folder / "host_tools/demo/demo.sh", *options], capture_output=True, text=True, timeout=PATIENCE_s, **how)
 
     def assert_fails(self, message, log):
         done = self.play()
@@ -229,7 +233,7 @@ class Demo(Folder):
         self.assertLessEqual(len(lines), 21)
 
     def test_a_slow_start_is_waited_for(self):
-        self.emulator("later(6000, () => { writeFileSync(link, ''); later(500, () => {}); });")
+        self.emulator("later(1500, () => { writeFileSync(link, ''); later(500, () => {}); });")
         done = self.play()
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("picture: build/demo/demo.png", done.stdout)
@@ -277,7 +281,7 @@ class Demo(Folder):
 
     def test_a_grasp_that_fails(self):
         self.emulator("writeFileSync(link, ''); later(500, () => {});")
-        self.cell('echo dropped; mkdir "$1"; touch "$1/gripper"; trap exit TERM; while :; do sleep 0.05; done')
+        self.cell(f"echo dropped; {self.CELL}")
         self.monitor('test $1 != grasp || exit 4')
         self.assert_fails("the grasp ended with an error", "dropped")
 

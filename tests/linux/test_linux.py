@@ -7,6 +7,9 @@ boot loader request, a second one over libusb and ends with a 1200-baud touch, t
 another fingertip is plugged in beside it. The sensors feel the same steady press each time: what frame N holds is the
 same in the first two boots, so that the two transports can be compared frame by frame. Exit: 77 if this machine cannot
 run it.
+
+real time: a kernel in a virtual machine. Its busybox has nothing that waits for a file to change, so the machine's shell looks
+for one every tenth of a second. Limits are for what hangs; the one time that is judged is judged beside the machine's own delays.
 """
 import argparse
 import csv
@@ -19,6 +22,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 import zlib
@@ -45,13 +49,15 @@ PAIR_s, PAIR_RATE_Hz = 4, 50
 STALL_LIMIT_s = 1.0
 # Kernel and device hold 70 KiB for a reader, less than 2 s of the stream.
 UNREAD_s, READ_AFTERWARDS_bytes = 5, 100_000
+ECHOED_s = 4
+BEAT_s = 0.02
 SERIAL_CYCLES = 12
 LIBUSB_CYCLES = 8
-# Seconds on the wall, for a machine that emulates at a tenth of real time
-PATIENCE_s = 60
-STREAM_LIMIT_s = 20 * STREAM_s
+# Seconds on the wall until something hangs.
+PATIENCE_s = 300
+STREAM_LIMIT_s = 600
 # What the emulator says of its time each second.
-PROGRESS = re.compile(r"^([\d.]+) / \d+ s, [\d.]+ x real time$", re.M)
+PROGRESS = re.compile(r"^([\d.]+) / \d+ s, [\d.]+ x real time$")
 KERNEL_WARNING = 4
 # What the driver says when QEMU's controller, having taken transfers back amid data, reports one that is not next on its
 # ring. The first and the last were seen, each once in some twenty runs; the last sums up the transfers in between, of 64
@@ -123,12 +129,20 @@ class Emulator:
 
     def __init__(self, folder, name, image, board, scenario, socket, serial=SERIAL):
         self.base = folder / name
-        self.errors = open(self.path("err"), "w")
         self.process = subprocess.Popen(
             [TOOLS.node, ROOT / "host_tools/emulator/main.mjs", "--image", image, "--board", board,
              "--scenario", scenario, "--seconds", "3600", "--serial", serial, "--usbredir", socket, "--fast-enumeration",
              "--progress", "--usb-log", self.path("usb"), "--capture", self.path("ftr"), "--report", self.path("json")],
-            stdin=subprocess.PIPE, stderr=self.errors, text=True)
+            stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.lines, self.more = [], threading.Condition()
+        self.listener = threading.Thread(target=self._listen)
+        self.listener.start()
+
+    def _listen(self):
+        for line in self.process.stderr:
+            with self.more:
+                self.lines.append(line.rstrip("\n"))
+                self.more.notify_all()
 
     def path(self, suffix):
         return self.base.with_suffix("." + suffix)
@@ -142,14 +156,19 @@ class Emulator:
         self.process.wait(limit_s)
         return json.loads(self.path("json").read_text())
 
-    def emulated_s(self):
-        """As it said last, once a second."""
-        said = PROGRESS.findall(self.path("err").read_text())
-        return float(said[-1]) if said else 0.0
+    def pass_time(self, seconds):
+        """Of the device's time, to the second, of which it tells each on the wall."""
+        def now_s():
+            told = [PROGRESS.match(line) for line in self.lines]
+            return max((float(each[1]) for each in told if each), default=0.0)
+
+        with self.more:
+            end_s = now_s() + seconds
+            if not self.more.wait_for(lambda: now_s() >= end_s, STREAM_LIMIT_s):
+                raise AssertionError("the device stands still")
 
     def complaints(self):
-        lines = self.path("err").read_text().splitlines()
-        return [line for line in lines if not PROGRESS.match(line) and "entered the USB boot loader" not in line]
+        return [line for line in self.lines if not PROGRESS.match(line) and "entered the USB boot loader" not in line]
 
     def requests(self):
         """Control requests: (setup in hexadecimal, the data stage's packets of either direction)."""
@@ -169,8 +188,14 @@ class Emulator:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
+        self.listener.join()
         self.process.stdin.close()
-        self.errors.close()
+        self.process.stderr.close()
+
+
+def until(condition, limit_s=PATIENCE_s):
+    """For the machine's shell."""
+    return f"n=0; until {condition}; do n=$((n+1)); [ $n -lt {limit_s * 10} ] || exit 1; usleep 100000; done"
 
 
 def write_press(path):
@@ -233,7 +258,7 @@ class Linux(unittest.TestCase):
         return output
 
     def wait_for(self, condition, limit_s=PATIENCE_s):
-        self.sh(f"n=0; until {condition}; do n=$((n+1)); [ $n -lt {limit_s * 10} ] || exit 1; usleep 100000; done", limit_s + 30)
+        self.sh(until(condition, limit_s), 2 * limit_s)
 
     def wait_for_port(self):
         self.wait_for("[ -c /dev/ttyACM0 ]")
@@ -366,14 +391,17 @@ class Linux(unittest.TestCase):
         self.assertGreater(len({body[4:] for body in bodies[0].values()}), 0.95 * len(shared), "readings that never change")
 
     def stall(self, transport):
-        """Seconds in the machine from a silent device to the monitor's word, at least and at most; the device is silent
-        while it is stopped."""
+        """Seconds in the machine from a silent device to the monitor's word, at least and at most, and the longest that the machine
+        kept another program waiting meanwhile; the device is silent while it is stopped."""
         def uptime_s():
             return float(self.sh("cut -d' ' -f1 /proc/uptime"))
         self.sh(f"(fingertip monitor --colour plain --transport {transport} | while read -r line; do "
                 "echo \"$(cut -d' ' -f1 /proc/uptime) $line\"; done) > /tmp/monitor.log 2>&1 & "
-                "n=0; until pidof fingertip > /tmp/monitor.pid; do n=$((n+1)); [ $n -lt 100 ] || exit 1; usleep 50000; done")
+                f"{until('pidof fingertip > /tmp/monitor.pid')}")
         self.wait_for("grep -q 'CONTACT FIT_VALID' /tmp/monitor.log")
+        # Another program, which wants to run every BEAT_s.
+        self.sh(f"(while [ ! -e /tmp/over ]; do read -r now rest < /proc/uptime; echo $now; usleep {BEAT_s * 1e6:.0f}; done) "
+                "> /tmp/beats 2>&1 & true")
         sounding_s = uptime_s()
         self.device.process.send_signal(signal.SIGSTOP)
         try:
@@ -381,24 +409,24 @@ class Linux(unittest.TestCase):
             self.wait_for("grep -q STALLED /tmp/monitor.log")
         finally:
             self.device.process.send_signal(signal.SIGCONT)
+        beats_s = [float(line) for line in self.sh("touch /tmp/over; cat /tmp/beats").split()]
         self.wait_for("sed '1,/STALLED/d' /tmp/monitor.log | grep -q 'CONTACT FIT_VALID'")
-        self.sh("kill -INT $(cat /tmp/monitor.pid); n=0; while pidof fingertip; do n=$((n+1)); [ $n -lt 100 ] || exit 1; "
-                "usleep 50000; done")
-        lines = self.sh("cat /tmp/monitor.log; rm /tmp/monitor.*").splitlines()
+        self.sh(f"kill -INT $(cat /tmp/monitor.pid); {until('! pidof fingertip')}")
+        lines = self.sh("cat /tmp/monitor.log; rm /tmp/monitor.* /tmp/over /tmp/beats").splitlines()
         stalled_s = next(float(line.split()[0]) for line in lines if "STALLED" in line)
-        return stalled_s - silent_s, stalled_s - sounding_s
+        late_s = max((b - a - BEAT_s for a, b in zip(beats_s, beats_s[1:])), default=math.inf)
+        return stalled_s - silent_s, stalled_s - sounding_s, late_s
 
     def test_11_standing_still_shows_within_a_second(self):
         shown_s = []
         for transport in ("serial", "usb"):
-            least_s, most_s = self.stall(transport)
-            if least_s >= STALL_LIMIT_s:  # a busy computer may make it late, but hardly twice
-                least_s, most_s = self.stall(transport)
+            least_s, most_s, late_s = self.stall(transport)
+            print(f"{transport}: {least_s:.2f} to {most_s:.2f} s, another program waited {late_s:.2f} s")
             self.assertGreater(most_s, 0)
-            shown_s.append(least_s)
+            self.assertLess(least_s - late_s, STALL_LIMIT_s)
+            shown_s.append(max(0, least_s - late_s))
         self.wait_for_port()
         REPORT["stalled_shown_s"] = round(max(shown_s), 2)
-        self.assertLess(max(shown_s), STALL_LIMIT_s)
 
     def start_recording(self, name, transport):
         self.sh(f"fingertip record /tmp/{name}.csv --raw-bytes /tmp/{name}.ftr --transport {transport} "
@@ -413,8 +441,8 @@ class Linux(unittest.TestCase):
     def end_recording(self, name):
         """Its events, and the packets of its bytes."""
         self.sh(f"kill -0 $(cat /tmp/{name}.pid)")
-        self.sh(f"kill -INT $(cat /tmp/{name}.pid); n=0; while kill -0 $(cat /tmp/{name}.pid) 2>/dev/null; do n=$((n+1)); "
-                "[ $n -lt 300 ] || exit 1; usleep 100000; done", 90)
+        self.sh(f"kill -INT $(cat /tmp/{name}.pid)")
+        self.wait_for(f"! kill -0 $(cat /tmp/{name}.pid) 2>/dev/null")
         recording = self.guest.read_file(f"/tmp/{name}.csv").decode()
         stream = self.guest.read_file(f"/tmp/{name}.ftr")
         self.sh(f"rm /tmp/{name}.*")
@@ -456,7 +484,10 @@ class Linux(unittest.TestCase):
     def test_15_echo_of_a_terminal_not_yet_raw(self):
         before = self.pairs(self.tool("info"))
         command = self.encoded("stream", "contact,raw")
-        self.sh(f"exec 3<>/dev/ttyACM0; stty -F /dev/ttyACM0 sane echo; printf '{command}' >&3; sleep 4")
+        self.sh("mkfifo /tmp/echoed; (exec 3<>/dev/ttyACM0; stty -F /dev/ttyACM0 sane echo; "
+                f"printf '{command}' >&3; read -r enough < /tmp/echoed) > /dev/null 2>&1 &")
+        self.device.pass_time(ECHOED_s)
+        self.sh("echo enough > /tmp/echoed; wait; rm /tmp/echoed")
         after = self.pairs(self.tool("info"))
         self.assertGreater(int(after["frames"]), int(before["frames"]))
         self.assertEqual(after["watchdog_resets"], "0")
@@ -464,15 +495,11 @@ class Linux(unittest.TestCase):
     def test_16_host_that_opens_and_does_not_read(self):
         before = self.pairs(self.tool("info"))
         command = self.encoded("stream", "contact,raw")
-        self.sh("(exec 3<>/dev/ttyACM0; stty -F /dev/ttyACM0 raw -echo; "
-                f"printf '{command}' >&3; until [ -e /tmp/late.go ]; do usleep 100000; done; exec cat <&3) "
+        self.sh("mkfifo /tmp/late.go; (exec 3<>/dev/ttyACM0; stty -F /dev/ttyACM0 raw -echo; "
+                f"printf '{command}' >&3; read -r go < /tmp/late.go; exec cat <&3) "
                 "> /tmp/late.ftr 2>&1 & echo $! > /tmp/late.pid")
-        unread_until_s = self.device.emulated_s() + UNREAD_s
-        limit_s = time.monotonic() + STREAM_LIMIT_s
-        while self.device.emulated_s() < unread_until_s:
-            self.assertLess(time.monotonic(), limit_s, "the device stands still")
-            time.sleep(0.2)
-        self.sh("touch /tmp/late.go")
+        self.device.pass_time(UNREAD_s)
+        self.sh("echo go > /tmp/late.go")
         self.wait_for(f"[ $(stat -c %s /tmp/late.ftr) -gt {READ_AFTERWARDS_bytes} ]", STREAM_LIMIT_s)
         self.sh("kill $(cat /tmp/late.pid); rm /tmp/late.go")
         packets, damaged = packets_of(self.guest.read_file("/tmp/late.ftr"))

@@ -3,6 +3,8 @@
 The browser gets a profile, a policy and serial ports of its own: every page of ALLOWED may use every port without a
 click, and the ports are the links of a folder (ports.c). Its policy folder is in /etc, so it is started in a mount
 namespace where another one lies there.
+
+real time: a browser. Waits are for what it says or shows; PATIENCE_s only ends what hangs.
 """
 import base64
 import contextlib
@@ -117,6 +119,8 @@ class Browser:
         self._awaited = set()
         self._number = 0
         self._pages = {}
+        self._saved = 0  # files, and those of them that were asked for
+        self._taken = 0
         self.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(self.downloads), eventsEnabled=True)
 
     def __enter__(self):
@@ -155,6 +159,8 @@ class Browser:
             if "id" in message:
                 if message["id"] in self._awaited:
                     self._answers[message["id"]] = message
+            elif message["method"] == "Browser.downloadProgress":
+                self._saved += message["params"]["state"] == "completed"
             elif page is not None:
                 page.events.append((message["method"], message["params"]))
                 if message["method"] == "Target.attachedToTarget":  # a worker of the page waits
@@ -177,13 +183,23 @@ class Browser:
         end_s = time.monotonic() + PATIENCE_s
         while number not in self._answers:
             if time.monotonic() > end_s:
-                raise PageError(f"no answer to {method}")
+                raise TimeoutError(f"no answer to {method}")
             self._take(1)
         self._awaited.remove(number)
         answer = self._answers.pop(number)
         if "error" in answer:
             raise PageError(f"{method}: {answer['error']['message']}")
         return answer["result"]
+
+    def saved(self, suffix):
+        """The next file that a page saves, once it is whole."""
+        end_s = time.monotonic() + PATIENCE_s
+        while self._saved == self._taken:
+            if time.monotonic() > end_s:
+                raise PageError(f"no file {suffix} was saved")
+            self._take(1)
+        self._taken += 1
+        return max(self.downloads.glob(f"*{suffix}"), key=lambda path: path.stat().st_mtime)
 
     def pump(self, seconds=0.0):
         """Hear events for so long."""
@@ -246,17 +262,19 @@ class Page:
             raise PageError(f"{expression}: {details.get('exception', {}).get('description') or details['text']}")
         return answer["result"].get("value")
 
-    def until(self, expression, patience_s=PATIENCE_s):
-        """Its value once that is true."""
-        end_s = time.monotonic() + patience_s
-        while True:
-            value = self.run(expression)
-            if value:
-                return value
-            if time.monotonic() > end_s:
-                said = self.run("(document.querySelector('dialog') ?? document.body).innerText")
-                raise PageError(f"never became true: {expression}; the page says: {said[-1000:]}")
-            self.browser.pump(0.05)
+    def until(self, expression):
+        """Its value once that is true: the page looks before each picture of it."""
+        look = (f"new Promise((resolve, reject) => {{ const look = () => {{ try {{ const value = ({expression}); if (value) resolve(value); "
+                "else requestAnimationFrame(look); } catch (error) { reject(error); } }; look(); })")
+        try:
+            return self.run(look)
+        except TimeoutError:
+            said = self.run("(document.querySelector('dialog') ?? document.body).innerText")
+            raise PageError(f"never became true: {expression}; the page says: {said[-1000:]}") from None
+
+    def shown(self):
+        """Until all that was done until now is in the picture."""
+        self.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
     # What a reader of the screen is told.
 
@@ -272,13 +290,13 @@ class Page:
         pattern = re.compile(name)
         return next((node for its_role, its_name, node in self.accessible() if its_role == role and pattern.fullmatch(its_name)), None)
 
-    def find(self, role, name, patience_s=PATIENCE_s):
+    def find(self, role, name):
         """The backend node, once it is there; name: a regular expression of the whole name."""
-        end_s = time.monotonic() + patience_s
+        end_s = time.monotonic() + PATIENCE_s
         while (node := self._find(role, name)) is None:
             if time.monotonic() > end_s:
                 raise PageError(f"no {role} named {name} among {sorted(set(each[:2] for each in self.accessible() if each[1]))}")
-            self.browser.pump(0.1)
+            self.shown()
         return node
 
     def click(self, role, name):

@@ -8,7 +8,7 @@ import subprocess
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PATIENCE_s = 120
+PATIENCE_s = 300  # ends what hangs
 USB_ID = "1209:0001"  # as in cmake/options.cmake
 
 
@@ -29,7 +29,7 @@ class Bench(contextlib.ExitStack):
         if process.poll() is None:
             process.send_signal(number)
         try:
-            process.wait(10)
+            process.wait(PATIENCE_s)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
