@@ -64,7 +64,13 @@ def waits(root):
     return found
 
 
+WAIT_MESSAGES = {"sleep": "a test that sleeps: let it live on simulated time (tests/README.md), or say in a comment why its subject is real time",
+                 "retry": "a test that tries again until it passes"}
+
+
 def violations(root):
+    for path, number, what in waits(root):
+        yield f"{path}:{number}: {WAIT_MESSAGES[what]}"
     for folder in ("firmware", "boards", "host_tools", "tests"):
         for path in sorted((root / folder).rglob("*")):
             if path.suffix not in SOURCE or "node_modules" in path.parts:

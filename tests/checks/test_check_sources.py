@@ -47,6 +47,11 @@ class CheckSources(unittest.TestCase):
 
 
 class Waits(unittest.TestCase):
+    def test_it_is_a_violation(self):
+        CheckSources.assert_caught(self, "tests/a.py", "time.sleep(1)\n", "sleeps")
+
+    check = CheckSources.check
+
     def found(self, name, text):
         with tempfile.TemporaryDirectory() as root:
             path = pathlib.Path(root) / "tests" / name

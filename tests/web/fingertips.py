@@ -1,4 +1,5 @@
 """Fingertips for a browser under test: emulated release images, and programs that say what a fingertip says, on its ports."""
+# real time: a browser and emulated boards on ports that it opens
 import contextlib
 import os
 import pathlib
