@@ -47,7 +47,7 @@ WAITS = (("sleep", re.compile(r"\b(?:usleep|nanosleep|setTimeout|waitForTimeout)
                               r"|(?<!def )(?<![\w.])sleep\s*\(|(?<![\w.'-])u?sleep [0-9.]")),
          ("retry", re.compile(r"once_in_three|\b(?:flaky|retries|retry_until|rerun_failures|ctest --repeat)\b")))
 TESTS = SOURCE | {".py", ".mjs", ".js", ".ts", ".sh"}
-REAL_TIME = re.compile(r"(?:#|//|\*) real time: ")
+REAL_TIME = re.compile(r"^\s*(?:#|//|\*)?\s*real time: ")
 
 
 def waits(root):

@@ -11,7 +11,6 @@ run it.
 real time: a kernel in a virtual machine. Its busybox has nothing that waits for a file to change, so the machine's shell looks
 for one every tenth of a second. Limits are for what hangs; the one time that is judged is judged beside the machine's own delays.
 """
-# real time: a kernel in a virtual machine goes by its own clock
 import argparse
 import csv
 import json
