@@ -50,7 +50,7 @@ void DeviceFeed::put(DeviceNews news, const std::atomic<bool> &abandoned) {
   std::unique_lock<std::mutex> lock(mutex_);
   while (news_.size() >= FEED_CAPACITY && !abandoned) {
     lock.unlock();
-    drained_.wait(HostTime::max());
+    drained_.wait(host_now() + POLL); /* another loop may take what was meant for this one */
     lock.lock();
   }
   if (!abandoned) {
