@@ -26,6 +26,10 @@ def strip_comments(text):
     return lines
 
 
+# Rooms of host_tools that measure or make data, and have no part in a test's world.
+MEASURING = {"report", "reference"}
+
+
 def rules_for(path):
     """(pattern, what is wrong) that apply to this path, relative to the root."""
     top = path.parts[0]
@@ -39,6 +43,9 @@ def rules_for(path):
             (r"\b0x(400|501|d00)[0-9A-Fa-f]{5}\b", "register addresses belong under boards/"),
             (r'#include\s+"(native|rp2040|pico_mux|pico_parallel|reference|libfingertip)/', "the firmware does not reach into boards or host tools"),
         ]
+    if top == "host_tools" and path.parts[1] not in MEASURING and path.name != "clock.cpp":
+        rules.append((r"\b(steady|system|high_resolution)_clock::now\s*\(|this_thread::sleep|\bu?sleep\s*\(|\bpoll\([^)]*, -?[1-9]\d*\)",
+                      "time and waits of the host programs come from libfingertip/clock.hpp, so that tests can simulate them"))
     return [(re.compile(pattern), message) for pattern, message in rules]
 
 

@@ -9,10 +9,9 @@ import select
 import socket
 import threading
 
-from simulated_time import BYE, HELLO, TURN, VARIABLE, WAIT, encoded
+from simulated_time import BYE, FOR_EVER_us, HELLO, TURN, VARIABLE, WAIT, encoded
 
 WALL_ZERO_ns = 1767225600 * 10**9  # as simulated_clock.cpp has it
-FOR_EVER_us = (1 << 63) - 1
 
 
 class Line:

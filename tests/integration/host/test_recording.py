@@ -29,6 +29,21 @@ class Recording(CliTest):
         again, _ = self.rows(converted)
         self.assertEqual(again[:len(rows) - 1], rows[:-1])
 
+    def test_the_same_twice_is_the_same_to_the_byte(self):
+        def recorded():
+            with self.device("drop=20", "vanish=60,700"):
+                process = self.start("record", self.csv, "--port", self.port, "--overwrite")
+                self.world.sleep(3)
+                process.send_signal(signal.SIGINT)
+                process.communicate()
+            self.world.close()
+            self.world = self.make_world()
+            return pathlib.Path(self.csv).read_bytes()
+
+        first = recorded()
+        self.assertIn(b"# event: back", first)
+        self.assertTrue(first == recorded())
+
     def test_interrupt_ends_cleanly(self):
         for number in (signal.SIGINT, signal.SIGTERM):
             with self.device():

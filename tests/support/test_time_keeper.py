@@ -1,0 +1,71 @@
+"""The keeper of simulated time: usage test_time_keeper.py SIMULATED_DEVICE TIME_KEEPER [unittest arguments]."""
+import os
+import signal
+import sys
+import tempfile
+import unittest
+
+from simulated_time import FOR_EVER_us, WAIT, SimulatedTime, TimedOut
+
+SIMULATED_DEVICE, TIME_KEEPER = (os.path.abspath(path) for path in sys.argv[1:3])
+
+
+class TimeKeeper(unittest.TestCase):
+    def setUp(self):
+        self.folder = self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-test-"))
+        self.world = SimulatedTime(TIME_KEEPER, self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-time-")))
+        self.addCleanup(self.world.close)
+        self.port = os.path.join(self.folder, "tty")
+
+    def device(self, *options):
+        return self.world.start([SIMULATED_DEVICE, self.port, *options])
+
+    def test_a_day_of_silence_passes_at_once_and_exactly(self):
+        begun_s = self.world.now_s
+        self.world.sleep(86400)
+        self.assertAlmostEqual(self.world.now_s - begun_s, 86400, places=5)
+
+    def test_a_program_ends_when_its_time_has_come(self):
+        device, begun_s = self.device("life=30"), self.world.now_s
+        self.assertEqual(device.wait(), 0)
+        self.assertAlmostEqual(self.world.now_s - begun_s, 30, delta=0.1)
+
+    def test_patience_is_of_the_worlds_time(self):
+        self.device()
+        begun_s = self.world.now_s
+        with self.assertRaises(TimedOut):
+            self.world.until(lambda: False, limit_s=50)
+        self.assertAlmostEqual(self.world.now_s - begun_s, 50, delta=0.1)
+
+    def test_one_that_is_killed_is_not_waited_for(self):
+        device = self.device()
+        device.kill()
+        self.assertEqual(device.wait(), -signal.SIGKILL)
+        self.world.sleep(10)
+
+    def test_a_signal_ends_a_wait_before_time_goes_on(self):
+        device = self.device()
+        self.world.sleep(1)
+        begun_s = self.world.now_s
+        device.terminate()
+        self.assertEqual(device.wait(), 0)
+        self.assertAlmostEqual(self.world.now_s, begun_s, delta=0.001)
+
+    def test_one_that_is_held_up_gets_no_turn_until_it_goes_on(self):
+        device = self.device()
+        self.world.sleep(1)
+        device.hold_up(2)
+        turns = device.turns()
+        self.world.sleep(1.9)
+        self.assertEqual(device.turns(), turns)
+        self.world.sleep(0.2)
+        self.assertGreater(device.turns(), turns)
+
+    def test_a_world_that_waits_for_ever_is_an_error(self):
+        self.world._say(WAIT, until_us=FOR_EVER_us)
+        with self.assertRaisesRegex(AssertionError, "ended with 1"):
+            self.world._take_turn()
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
