@@ -35,9 +35,9 @@ std::int64_t steady_now_us();
 /* The time of day, for people: it may jump. */
 std::chrono::system_clock::time_point wall_now();
 
-/* As poll(2), but to a moment instead of for a while, to the microsecond: the number of descriptors
- * with something to tell, 0 once `until` has come or after a signal. A moment that has passed only
- * asks. HostTime::max() waits without end. */
+/* Like poll(2), but until a moment instead of for a duration, exact to the microsecond. Returns the
+ * number of descriptors that are ready; 0 once `until` has come or after a signal. A moment that has
+ * passed only asks. HostTime::max() waits without end. */
 int wait_for(pollfd *descriptors, std::size_t count, HostTime until);
 /* A signal ends the wait early. */
 void wait_until(HostTime until);
@@ -60,7 +60,7 @@ private:
   int fd_;
 };
 
-/* A thread that may wait by this clock. The one who joins it waits by this clock too. */
+/* A thread that may wait by this clock. join waits by this clock, too. */
 class Thread {
 public:
   Thread();
@@ -77,7 +77,7 @@ private:
   std::unique_ptr<State> state_;
 };
 
-/* After fork, in the parent: another process is there that waits by this clock. */
+/* Call it after fork, in the parent: there is another process that waits by this clock. */
 void clock_expects(pid_t child);
 
 } // namespace fingertip

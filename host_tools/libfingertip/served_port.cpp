@@ -16,7 +16,7 @@ namespace fingertip {
 
 namespace {
 
-/* A terminal that nobody has open only tells that when asked. */
+/* Nothing can be waited for on a terminal that no program has open: it has to be asked. */
 constexpr std::chrono::milliseconds LOOK_INTERVAL{2};
 
 Error failure(const std::string &what) {

@@ -1,9 +1,10 @@
-/* The other end of a port: what simulated fingertips and grippers speak through. A pseudo-terminal,
- * raw from the first moment, that SerialTransport opens as it opens a serial port. (Where time is
- * simulated too a socket takes its place: a pseudo-terminal passes bytes on by a thread of the
- * kernel, in real time.)
+/* The serving end of a port: simulated fingertips and grippers speak through it. It is a
+ * pseudo-terminal, raw from the first moment, which SerialTransport opens like a serial port. Under
+ * simulated time a Unix socket takes its place, because a thread of the kernel passes on the bytes
+ * of a pseudo-terminal, in real time.
  *
- * One program at a time has it open; who opens it next finds nothing of what the last one left.
+ * One program at a time can open it. The next program finds none of the bytes that the last one
+ * left unread.
  */
 #pragma once
 
@@ -17,27 +18,29 @@ namespace fingertip {
 
 class ServedPort {
 public:
-  /* link: made to it, in place of a link that is there; "": none. Throws Error. */
+  /* link: a symbolic link to the port, which replaces one of that name; "": none. Throws Error. */
   explicit ServedPort(const std::string &link);
-  /* The port goes, and with it what was not read yet. */
+  /* The port vanishes, with all bytes that were not read yet. */
   ~ServedPort();
   ServedPort(const ServedPort &) = delete;
   ServedPort &operator=(const ServedPort &) = delete;
 
-  /* Its link gets another name. */
+  /* Gives the link another name. Throws Error. */
   void rename(const std::string &link);
   /* What to open: the link, or the port itself where there is none. */
   const std::string &path() const { return path_; }
-  /* Waits until there are bytes or somebody opens or closes it; perhaps less long. */
+  /* Waits until bytes come, or a program opens or closes the port. May return early. */
   void wait(HostTime until);
   bool is_open() const { return is_open_; }
-  /* Those that have come; 0: none now. */
+  /* The number of bytes that were there to read; 0: none now. Never waits. */
   std::size_t read(std::uint8_t *bytes, std::size_t capacity);
-  /* As many as it takes now; all where nobody has it open, who get lost. */
+  /* The number of bytes that were taken, perhaps not all. While no program has the port open, all
+   * are taken and lost. Never waits. */
   std::size_t write(const std::uint8_t *bytes, std::size_t length);
-  /* Those that were written and not read yet. */
+  /* How many written bytes the other program has not read yet; 0 or more: a socket counts its own
+   * overhead too. */
   std::size_t unread() const;
-  /* Speed that the one who has it open has set, as termios has it; 0 where there is none. */
+  /* The speed that the other program has set, a constant of termios; 0 for a socket. */
   unsigned speed() const;
 
 private:

@@ -22,14 +22,16 @@
  *     pad=1            a pad's profile is stored
  *     capabilities=BITS  of its firmware
  *     play=FILE        its raw and contact packets, and its sensors, are those of this recording,
- * as fast as they are read; then nothing more serial=HEX       its serial number; board=NAME,
- * git=HASH, firmware=A.B.C likewise loader=1         ends when it is asked into the loader, by the
- * command or by 1200 baud version=V        speaks this protocol version, answers nothing else
- * clock_ppm=P its clock is fast by so much, over the whole of its life zero_log=FILE    writes
- * there when its clock was zero, us of CLOCK_MONOTONIC started=S        its clock was started S
- * seconds before mirror=LINK      the same bytes, a moment before, on a second terminal that hears
- * nothing and has to be read tap=FILE         keeps there what it says life=S           ends after
- * this time, default 60
+ *                      as fast as they are read; then nothing more
+ *     serial=HEX       its serial number; board=NAME, git=HASH, firmware=A.B.C likewise
+ *     loader=1         ends when it is asked into the loader, by the command or by 1200 baud
+ *     version=V        speaks this protocol version, answers nothing else
+ *     clock_ppm=P      its clock is fast by so much, over the whole of its life
+ *     zero_log=FILE    writes there when its clock was zero, us of CLOCK_MONOTONIC
+ *     started=S        its clock was started S seconds before
+ *     mirror=LINK      the same bytes, a moment before, on a second port that hears nothing
+ *     tap=FILE         keeps there what it says
+ *     life=S           ends after this time, default 60
  *
  * Ends by SIGTERM too. */
 #include "libfingertip/command.hpp"
