@@ -17,7 +17,7 @@ OPTIONS = argparse.Namespace()
 def validate(folder, *more):
     return subprocess.run(
         [sys.executable, str(ROOT / "host_tools/report/validation/validation.py"), "--build", OPTIONS.build, "--image", OPTIONS.image, "-o", str(folder),
-         "--tables", str(pathlib.Path(OPTIONS.build) / "tests/contact_tables"), "--indenters", "sphere6,cube6,sphere12", "--scale", "0.05", "--pads", "2",
+         "--tables", str(pathlib.Path(OPTIONS.build) / "contact_tables"), "--indenters", "sphere6,cube6,sphere12", "--scale", "0.05", "--pads", "2",
          "--emulated-seconds", "4", *more], capture_output=True, text=True)
 
 
