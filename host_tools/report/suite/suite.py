@@ -7,8 +7,8 @@
     suite.md        the same to read
     suite_failed    what the tests that failed said, a file for each
 
-The whole suite and the quick tests run over and over, quiet and busy in turn: busy is beside four processes that compute and one
-that writes to the disk all the time. Nothing is run again because it failed. A test that cannot be run has failed; skipped is only
+The whole suite and the quick tests run over and over, first quiet, then busy: beside four processes that compute and one that writes to
+the disk all the time. After each run the files are written anew, so what ran before an interruption is not lost. Nothing is run again because it failed. A test that cannot be run has failed; skipped is only
 what says so itself. Seconds are of quiet runs: ctest's times added up for the tests, minutes and seconds on the wall for a run, on as
 many jobs as there are processors. Mutants are those of the last report of reliability in the output folder.
 """
@@ -121,21 +121,27 @@ def run_suite(build, only, machine):
         return seconds, read_junit(result)
 
 
-def run_often(build, only, count, steps, kept):
-    """Of each run: is it quiet, its seconds, its tests. kept: folder for what failed tests say."""
-    runs = []
-    for i in range(count):
-        is_quiet = i % 2 == 0
+def plan(whole, quick):
+    """(label or None, is it quiet) of each run: quiet ones first, so that the machine must be left alone for the first part only."""
+    return [(only, is_quiet) for is_quiet in (True, False) for only, count in (("quick", quick), (None, whole))
+            for _ in range((count + 1) // 2 if is_quiet else count // 2)]
+
+
+def run_all(build, planned, steps, kept):
+    """Yields, after each run, all runs so far: whole and quick, each a list of (is it quiet, its seconds, its tests).
+    kept: folder for what failed tests say."""
+    runs = {None: [], "quick": []}
+    for i, (only, is_quiet) in enumerate(planned):
         machine = "quiet" if is_quiet else "busy"
         seconds, tests = run_suite(build, only, quiet_machine if is_quiet else busy_machine)
-        runs.append((is_quiet, seconds, tests))
+        runs[only].append((is_quiet, seconds, tests))
         failed = [name for name, test in tests.items() if test.status == "fail"]
         for name in failed:
             kept.mkdir(exist_ok=True)
-            write_text(kept / f"{only or 'whole'}-{i + 1}-{machine}-{name}.txt", tests[name].output)
-        steps.say(f"{only or 'whole'} run {i + 1} of {count}, {machine}: {seconds / 60:.1f} min, {len(tests)} tests"
+            write_text(kept / f"{only or 'whole'}-{len(runs[only])}-{machine}-{name}.txt", tests[name].output)
+        steps.say(f"run {i + 1} of {len(planned)}, {only or 'whole'}, {machine}: {seconds / 60:.1f} min, {len(tests)} tests"
                   + (f", failed: {', '.join(failed)}" if failed else ""))
-    return runs
+        yield runs[None], runs["quick"]
 
 
 def named_with(status, runs):
@@ -208,12 +214,12 @@ def main(argv):
     shutil.rmtree(kept, ignore_errors=True)  # of the last report
     steps = Steps()
     found = waits(ROOT)
-    figures = summary(run_often(options.build, None, options.whole, steps, kept), run_often(options.build, "quick", options.quick, steps, kept), named)
-    figures |= {"sleeps": sum(what == "sleep" for _, _, what in found), "retries": sum(what == "retry" for _, _, what in found),
-                "mutants_survive_percent": surviving_mutants(out)}
-    figures = judge(figures, GOALS)
-    write_json(out / "suite.json", figures)
-    write_text(out / "suite.md", text(figures))
+    counted = {"sleeps": sum(what == "sleep" for _, _, what in found), "retries": sum(what == "retry" for _, _, what in found),
+               "mutants_survive_percent": surviving_mutants(out)}
+    for whole, quick in run_all(options.build, plan(options.whole, options.quick), steps, kept):
+        figures = judge(summary(whole, quick, named) | counted, GOALS)
+        write_json(out / "suite.json", figures)
+        write_text(out / "suite.md", text(figures))
     return finish(figures, options, ("suite.json", "suite.md"))
 
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import unittest.mock
 from contextlib import redirect_stdout
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -38,8 +39,8 @@ class Suite(unittest.TestCase):
     def figures(self, build, whole=2, quick=1):
         with redirect_stdout(io.StringIO()) as said:
             steps = suite.Steps()
-            named, kept = suite.labels(build), build / "failed"
-            figures = suite.summary(suite.run_often(build, None, whole, steps, kept), suite.run_often(build, "quick", quick, steps, kept), named)
+            *_, runs = suite.run_all(build, suite.plan(whole, quick), steps, build / "failed")
+            figures = suite.summary(*runs, suite.labels(build))
         return figures, said.getvalue()
 
     def test_what_fails_is_counted_and_named_and_what_is_skipped_is_named(self):
@@ -47,7 +48,7 @@ class Suite(unittest.TestCase):
         self.assertEqual((figures["whole_runs"], figures["whole_failures"], figures["whole_failed"]), (2, 2, ["bad"]))
         self.assertEqual((figures["quick_runs"], figures["quick_failures"], figures["skipped"]), (1, 0, ["absent"]))
         self.assertEqual(set(figures["seconds_by_label"]), {"quick", "host", "browser"})
-        self.assertIn("whole run 2 of 2, busy: ", said)
+        self.assertIn("run 3 of 3, whole, busy: ", said)
         self.assertIn("failed: bad", said)
 
     def test_what_cannot_be_run_has_failed(self):
@@ -92,6 +93,17 @@ class Suite(unittest.TestCase):
         figures = suite.summary([(True, 120.0, quiet), (False, 600.0, busy)], [(True, 30.0, quiet), (False, 90.0, quiet)], {"a": "quick", "b": "host"})
         self.assertEqual((figures["whole_test_seconds"], figures["whole_minutes"], figures["quick_seconds"]), (3.0, 2.0, 30.0))
         self.assertEqual((figures["whole_failures"], figures["whole_minutes_busy"], figures["longest"]), (1, 10.0, {"b": 2.0, "a": 1.0}))
+
+    def test_quiet_runs_come_first_and_half_are_busy(self):
+        self.assertEqual(suite.plan(3, 2), [("quick", True), (None, True), (None, True), ("quick", False), (None, False)])
+
+    def test_what_ran_before_an_interruption_is_written(self):
+        build = self.small("true")
+        reports = []
+        with tempfile.TemporaryDirectory() as folder, redirect_stdout(io.StringIO()), unittest.mock.patch.object(
+                suite, "write_json", lambda path, figures: reports.append(figures)):
+            suite.main(["--build", str(build), "-o", folder, "--whole", "2", "--quick", "1"])
+        self.assertEqual([(report["quick_runs"], report["whole_runs"]) for report in reports], [(1, 0), (1, 1), (1, 2)])
 
     def test_no_test_at_all_is_an_error(self):
         with tempfile.NamedTemporaryFile("w", suffix=".xml") as file:
