@@ -110,6 +110,7 @@ def labels(build):
 
 def run_suite(build, only, machine):
     """All tests, or those of a label, once. Seconds on the wall, and what read_junit returns."""
+    build = os.path.abspath(build)  # ctest takes paths as of its folder
     with tempfile.TemporaryDirectory(prefix="suite-", dir=build) as folder, machine(folder):  # on the disk that the tests are on
         result = os.path.join(folder, "result.xml")
         begun_s = time.monotonic()

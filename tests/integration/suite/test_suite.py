@@ -102,8 +102,8 @@ class Suite(unittest.TestCase):
         reports = []
         with tempfile.TemporaryDirectory() as folder, redirect_stdout(io.StringIO()), unittest.mock.patch.object(
                 suite, "write_json", lambda path, figures: reports.append(figures)):
-            suite.main(["--build", str(build), "-o", folder, "--whole", "2", "--quick", "1"])
-        self.assertEqual([(report["quick_runs"], report["whole_runs"]) for report in reports], [(1, 0), (1, 1), (1, 2)])
+            suite.main(["--build", os.path.relpath(build), "-o", folder, "--whole", "2", "--quick", "1"])
+        self.assertEqual([(report["quick_runs"], report["whole_runs"], report["whole_failures"]) for report in reports], [(1, 0, 0), (1, 1, 0), (1, 2, 0)])
 
     def test_no_test_at_all_is_an_error(self):
         with tempfile.NamedTemporaryFile("w", suffix=".xml") as file:
