@@ -153,6 +153,15 @@ class TestMcap(unittest.TestCase):
         most, unread = bags.truncations(FINGERTIP, bag, self.csv, self.folder, 24, 3)
         self.assertEqual((most, unread), (1, 0))
 
+    def test_the_judge_reads_up_to_where_a_file_breaks_off(self):
+        whole = self.convert(self.csv, "whole.mcap").read_bytes()
+        cut, counts = self.folder / "cut.mcap", []
+        for bytes_left in range(0, len(whole), max(1, len(whole) // 200)):
+            cut.write_bytes(whole[:bytes_left])
+            counts.append(len(bags.by_mcap_stream(cut)))
+        self.assertEqual(counts, sorted(counts))
+        self.assertGreater(counts[-1], 0)
+
     def test_of_a_killed_recorder_every_written_chunk_is_read(self):
         port, bag = self.folder / "killed_port", self.folder / "killed.mcap"
         device = subprocess.Popen([FAKE_DEVICE, port, f"rate={bags.RATE_Hz}", f"life={bags.PATIENCE_s}"])
