@@ -1,7 +1,6 @@
 #include "wire/packet.h"
 
 #include "common/bytes.h"
-#include "common/contact_flags.h"
 #include "common/crc32.h"
 
 #include <stdbool.h>
@@ -48,142 +47,15 @@ _Static_assert(offsetof(struct wire_packet, body.raw.baseline_Pa_q10) ==
                        offsetof(struct wire_packet, body.info.x_mm) + 4 * FT_MAX_SENSORS,
                "PAIRS");
 
-static const struct run wire_contact_runs[] = {
-    RUN(U32, 2, contact.frame),   RUN(U16, 7, contact.stages),
-    RUN(WHEN, 1, contact.flags),  RUN(U32, 1, contact.sensors_used),
-    RUN(WHEN, 1, contact.flags),  RUN(F32, 6, contact.x_mm),
-    RUN(WHEN, 2, contact.flags),  RUN(F32, 2, contact.location_sd_mm),
-    RUN(WHEN, 3, contact.flags),  RUN(F32, 1, contact.slip_mm),
-    RUN(WHEN, 7, contact.flags),  RUN(F32, 3, contact.sigma_x_mm),
-    RUN(WHEN, 20, contact.flags), RUN(F32, 4, contact.qx_N),
-    RUN(WHEN, 22, contact.flags), RUN(F32, 2, contact.vx_mm_s),
-};
-_Static_assert(CONTACT_FLAG_FIT_VALID == 1 << 1 && CONTACT_FLAG_UNCERTAINTY_VALID == 1 << 2 &&
-                   CONTACT_FLAG_SLIP_VALID == 1 << 3 && CONTACT_FLAG_WIDTHS_VALID == 1 << 7 &&
-                   CONTACT_FLAG_TANGENTIAL_VALID == 1 << 20 &&
-                   CONTACT_FLAG_VELOCITY_VALID == 1 << 22,
-               "bits in wire_contact_runs");
-LAYOUT(wire_contact, WIRE_CONTACT);
-
-static const struct run wire_raw_runs[] = {
-    RUN(U32, 5, raw.frame),
-    RUN(U16, 1, raw.temperature_cC),
-    RUN(SENSOR_COUNT, 1, raw.sensor_count),
-    RUN(PAIRS, 1, raw.pressure_Pa_q10),
-};
-LAYOUT(wire_raw, WIRE_RAW);
-
-static const struct run wire_info_runs[] = {
-    RUN(BYTES, 3, info.firmware_version),
-    RUN(SENSOR_COUNT, 1, info.sensor_count),
-    RUN(U32, 1, info.capabilities),
-    RUN(TEXTS, 4, info.git_hash),
-    RUN(U32, 2, info.rate_mHz),
-    RUN(U16, 2, info.osr),
-    RUN(BYTES, 1, info.streams),
-    RUN(WHEN, 0, info.capabilities),
-    RUN(BYTES, 1, info.fit_iterations),
-    RUN(WHEN, 1, info.capabilities),
-    RUN(U16, 1, info.slip_window_ms),
-    RUN(WHEN, 1, info.capabilities),
-    RUN(F32, 1, info.slip_threshold_mm),
-    RUN(F32, 1, info.pitch_mm),
-    RUN(F32_PAIRS, 1, info.x_mm),
-    RUN(WHEN, 0, info.capabilities),
-    RUN(F32, 3, info.prior_sigma_mm),
-    RUN(U32, 1, info.stored),
-    RUN(WHEN, 0, info.stored),
-    RUN(U32, 1, info.calibration.date_s),
-    RUN(WHEN, 0, info.stored),
-    RUN(U16, 1, info.calibration.placements),
-    RUN(WHEN, 0, info.stored),
-    RUN(F32, 2, info.calibration.force_scale),
-    RUN(WHEN, 0, info.stored),
-    RUN(F32_TWOS, 1, info.calibration.sensors),
-    RUN(WHEN, 4, info.stored),
-    RUN(F32, PAD_PROFILE_FLOATS, info.pad.thickness_mm),
-    RUN(WHEN, 4, info.stored),
-    RUN(BYTES, 1, info.pad.from_touch),
-};
-_Static_assert(WIRE_CAPABILITY_FIT == 1 << 0 && WIRE_CAPABILITY_SLIP == 1 << 1 &&
-                   WIRE_STORED_CALIBRATION == 1 << 0 && WIRE_STORED_PAD == 1 << 4,
-               "bits in wire_info_runs and wire_health_runs");
-LAYOUT(wire_info, WIRE_INFO);
-
-static const struct run wire_health_runs[] = {
-    RUN(U32, 17, health.capabilities),
-    RUN(U16, 2, health.cpu_busy_permille),
-    RUN(WHEN, 0, health.capabilities),
-    RUN(U32, 1, health.fit_failures),
-};
-LAYOUT(wire_health, WIRE_HEALTH);
-
-static const struct run wire_ack_runs[] = {
-    RUN(BYTES, 2, ack.command),
-    RUN(U16, 1, ack.sequence),
-    RUN(U64, 1, ack.host_time_us),
-};
-LAYOUT(wire_ack, WIRE_ACK);
-
 _Static_assert(offsetof(struct crash_record, r0) % 4 == 0 &&
                    offsetof(struct crash_record, event_ages_1024us) ==
                        offsetof(struct crash_record, r0) + 9 * 4,
-               "wire_crash_runs");
-static const struct run wire_crash_runs[] = {
-    RUN(BYTES, 5 + 2 * CRASH_EVENTS, crash.kind),
-    RUN(U32, 9 + CRASH_EVENTS, crash.r0),
-    RUN(U64, 1, crash.t_us),
-};
-LAYOUT(wire_crash, WIRE_CRASH);
+               "U32 of crash");
 
-static const struct run cmd_stream_runs[] = {RUN(BYTES, 1, cmd_stream.streams)};
-LAYOUT(cmd_stream, WIRE_CMD_STREAM);
-static const struct run cmd_tare_runs[] = {RUN(BYTES, 1, cmd_tare.force)};
-LAYOUT(cmd_tare, WIRE_CMD_TARE);
-static const struct run cmd_rate_runs[] = {RUN(U32, 1, cmd_rate.rate_mHz)};
-LAYOUT(cmd_rate, WIRE_CMD_RATE);
-static const struct run cmd_osr_runs[] = {RUN(U16, 1, cmd_osr.osr)};
-LAYOUT(cmd_osr, WIRE_CMD_OSR);
-static const struct run cmd_slip_runs[] = {
-    RUN(F32, 1, cmd_slip.threshold_mm),
-    RUN(U16, 1, cmd_slip.window_ms),
-};
-LAYOUT(cmd_slip, WIRE_CMD_SLIP);
-EMPTY_LAYOUT(cmd_info, WIRE_CMD_INFO);
-EMPTY_LAYOUT(cmd_health, WIRE_CMD_HEALTH);
-EMPTY_LAYOUT(cmd_crash, WIRE_CMD_CRASH);
-static const struct run cmd_loader_runs[] = {RUN(U32, 1, cmd_loader.magic)};
-LAYOUT(cmd_loader, WIRE_CMD_LOADER);
+#include "wire/layouts.inc"
 
-static const struct run cmd_calibrate_runs[] = {
-    RUN(SENSOR_COUNT, 1, cmd_calibrate.sensor_count),
-    RUN(U32, 1, cmd_calibrate.calibration.date_s),
-    RUN(U16, 1, cmd_calibrate.calibration.placements),
-    RUN(F32, 2, cmd_calibrate.calibration.force_scale),
-    RUN(F32_TWOS, 1, cmd_calibrate.calibration.sensors),
-};
-LAYOUT(cmd_calibrate, WIRE_CMD_CALIBRATE);
-EMPTY_LAYOUT(cmd_erase_calibration, WIRE_CMD_ERASE_CALIBRATION);
-static const struct run cmd_keep_runs[] = {RUN(BYTES, 1, cmd_keep.keep)};
-LAYOUT(cmd_keep, WIRE_CMD_KEEP);
-static const struct run cmd_prior_runs[] = {RUN(F32, 2, cmd_prior.sigma_mm)};
-LAYOUT(cmd_prior, WIRE_CMD_PRIOR);
-static const struct run cmd_location_limit_runs[] = {RUN(F32, 1, cmd_location_limit.limit_mm)};
-LAYOUT(cmd_location_limit, WIRE_CMD_LOCATION_LIMIT);
-
-static const struct run cmd_pad_runs[] = {
-    RUN(F32, PAD_PROFILE_FLOATS, cmd_pad.profile.thickness_mm),
-    RUN(BYTES, 1, cmd_pad.profile.from_touch),
-};
-LAYOUT(cmd_pad, WIRE_CMD_PAD);
-EMPTY_LAYOUT(cmd_erase_pad, WIRE_CMD_ERASE_PAD);
-
-#define ALL_COMMANDS                                                                               \
-  WIRE_COMMANDS, WIRE_COMMANDS_OF_FIT, WIRE_COMMANDS_OF_SLIP, WIRE_COMMANDS_OF_TANGENTIAL
 const struct wire_layout *const wire_commands[] = {ALL_COMMANDS, NULL};
-const struct wire_layout *const wire_all_layouts[] = {
-    &wire_contact_layout, &wire_raw_layout,   &wire_info_layout, &wire_health_layout,
-    &wire_ack_layout,     &wire_crash_layout, ALL_COMMANDS,      NULL};
+const struct wire_layout *const wire_all_layouts[] = {ALL_PACKETS, ALL_COMMANDS, NULL};
 
 const struct wire_layout *wire_find_layout(const struct wire_layout *const *set, uint8_t type) {
   while (*set && (*set)->type != type) {

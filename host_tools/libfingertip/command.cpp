@@ -30,7 +30,11 @@ std::string rate_range() {
 }
 
 std::string osr_range() {
-  return "256, 512, 1024, 2048, 4096 or 8192";
+  std::string text = std::to_string(WIRE_OSR_MIN);
+  for (unsigned osr = 2 * WIRE_OSR_MIN; osr < WIRE_OSR_MAX; osr *= 2) {
+    text += ", " + std::to_string(osr);
+  }
+  return text + " or " + std::to_string(WIRE_OSR_MAX);
 }
 
 std::string threshold_range() {
@@ -50,7 +54,7 @@ void check_rate(std::uint32_t rate_mHz, const std::string &text) {
 }
 
 void check_osr(std::uint64_t osr) {
-  if (osr < 256 || osr > 8192 || (osr & (osr - 1)) != 0) {
+  if (osr < WIRE_OSR_MIN || osr > WIRE_OSR_MAX || (osr & (osr - 1)) != 0) {
     out_of_range("osr", std::to_string(osr), osr_range());
   }
 }
@@ -66,8 +70,6 @@ void check_window(std::uint64_t window_ms) {
     out_of_range("slip window", std::to_string(window_ms), window_range());
   }
 }
-
-constexpr float PRIOR_WIDTH_mm = 0.5F; /* where none is typed: the build's own default */
 
 std::string prior_range() {
   return "SIGMA or SIGMA:WIDTH, " + shortest(WIRE_PRIOR_SIGMA_MIN_mm) + " to " +
@@ -253,7 +255,7 @@ Prior prior_from_text(const std::string &text) {
   }
   std::size_t colon = text.find(':');
   auto sigma_mm = to_float(text.substr(0, colon));
-  auto width_mm = colon == std::string::npos ? PRIOR_WIDTH_mm : to_float(text.substr(colon + 1));
+  auto width_mm = colon == std::string::npos ? WIRE_PRIOR_WIDTH_DEFAULT_mm : to_float(text.substr(colon + 1));
   if (!sigma_mm || !width_mm) {
     throw Error(ErrorCode::bad_value, "prior \"" + text + "\" is no number; give " + prior_range());
   }

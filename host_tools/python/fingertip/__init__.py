@@ -17,7 +17,7 @@ from .errors import (
 from .files import Recording, read_recording
 from .frames import Block, Frame
 from .group import Fingertips
-from .names import WARNINGS, Capability, Flag, Result, Stored, Streams
+from .line import WARNINGS, Capability, Flag, Result, Stored, Streams
 from .recording import JointRecordingWriter, RecordingWriter
 from .version import __version__
 from .wire import Calibration, Crash, Health, Info, LineStatistics, PadProfile

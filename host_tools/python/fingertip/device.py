@@ -7,13 +7,13 @@ import threading
 from collections.abc import Callable, Iterator
 from types import TracebackType
 
-from . import discovery, host_time, wire
+from . import discovery, host_time, line, wire
 from .clock import NO_CLOCK, ClockEstimate, ClockExchange, ClockFit, host_now_us
 from .errors import (
     BadValueError, FingertipError, GoneError, InputError, NoAnswerError, NoFingertipError, NoFrameError, NotNowError, OtherFingertipError, OtherVersionError,
     RefusedError, RefusedValueError, UnknownCommandError)
 from .frames import Block, Frame
-from .names import Capability, Result, Streams
+from .line import Capability, Result, Streams
 from .recording import Recorder, RecordingWriter
 from .transport import Transport, open_way
 from .wire import Acknowledgement, Body, Contact, Crash, Health, Info, LineStatistics, Raw
@@ -25,7 +25,6 @@ FIRST_EXCHANGES = 8
 POLL_s = 0.05
 RETURN_INTERVAL_s = 0.25  # a port that has gone is looked for so often
 NEWER_VERSIONS = 2  # a fingertip does not answer a version that it does not speak: it is asked in these too
-OSRS = (256, 512, 1024, 2048, 4096, 8192)
 FRAMES_MAX = 1 << 20
 
 REFUSALS: dict[int, tuple[type[RefusedError], str]] = {
@@ -35,9 +34,9 @@ REFUSALS: dict[int, tuple[type[RefusedError], str]] = {
 }
 
 
-def _in_range(name: str, value: float, low: float, high: float, unit: str) -> None:
-    if not low <= value <= high:  # false for NaN
-        raise BadValueError(f"{name} {value:g} is out of range; give {low:g} to {high:g} {unit}")
+def _in_range(name: str, value: float, span: tuple[float, float], unit: str) -> None:
+    if not span[0] <= value <= span[1]:  # false for NaN
+        raise BadValueError(f"{name} {value:g} is out of range; give {span[0]:g} to {span[1]:g} {unit}")
 
 
 class Fingertip:
@@ -64,8 +63,8 @@ class Fingertip:
                  streams: Streams | None = None, reconnect: bool = False, buffer_frames: int = 16384, latency_ms: float = 8.0,
                  timeout_s: float = 3.0) -> None:
         _in_range("buffer_frames", buffer_frames, 1, FRAMES_MAX, "frames")
-        _in_range("latency_ms", latency_ms, 0, 1000, "ms")
-        _in_range("timeout_s", timeout_s, 0.01, 3600, "s")
+        _in_range("latency_ms", latency_ms, (0, 1000), "ms")
+        _in_range("timeout_s", timeout_s, (0.01, 3600), "s")
         self._settle_s = latency_ms / 1000
         self._reconnect = reconnect
         self._timeout_s = timeout_s
@@ -300,7 +299,7 @@ class Fingertip:
         if frames is not None:
             _in_range("frames", frames, 1, FRAMES_MAX, "frames")
         elif seconds is not None:
-            _in_range("seconds", seconds, 1e-6, 86400, "s")
+            _in_range("seconds", seconds, (1e-6, 86400), "s")
         taken: list[Frame] = []
         while frames is None or len(taken) < frames:
             frame = self._take_frame()
@@ -352,30 +351,30 @@ class Fingertip:
         commands: list[Body] = []
         if rate_Hz is not None:
             if rate_Hz != 0:
-                _in_range("rate_Hz", rate_Hz, 0.1, 2000, "Hz, or 0 for as fast as possible")
+                _in_range("rate_Hz", rate_Hz, (line.RATE_mHz.least / 1000, line.RATE_mHz.most / 1000), "Hz, or 0 for as fast as possible")
             commands.append(wire.SetRate(round(rate_Hz * 1000)))
         if osr is not None:
-            if osr not in OSRS:
-                raise BadValueError(f"osr {osr} is out of range; give one of {', '.join(map(str, OSRS))}")
+            if osr not in line.OSR:
+                raise BadValueError(f"osr {osr} is out of range; give one of {', '.join(map(str, line.OSR))}")
             commands.append(wire.SetOsr(osr))
         if slip_threshold_mm is not None or slip_window_ms is not None:
             threshold_mm = self._info.slip_threshold_mm if slip_threshold_mm is None else slip_threshold_mm
             window_ms = self._info.slip_window_ms if slip_window_ms is None else slip_window_ms
             if window_ms is None or math.isnan(threshold_mm) and slip_threshold_mm is None:
                 raise BadValueError(f"firmware of scene {self._info.scene} knows no slip")
-            _in_range("slip_threshold_mm", threshold_mm, 0.01, 50, "mm")
-            _in_range("slip_window_ms", window_ms, 5, 1000, "ms")
+            _in_range("slip_threshold_mm", threshold_mm, line.SLIP_THRESHOLD_mm, "mm")
+            _in_range("slip_window_ms", window_ms, line.SLIP_WINDOW_ms, "ms")
             commands.append(wire.SetSlip(threshold_mm, int(window_ms)))
         if prior_sigma_mm is not None:
-            width_mm = (0.0 if prior_sigma_mm == 0 else 0.5) if prior_width_mm is None else prior_width_mm
+            width_mm = (0.0 if prior_sigma_mm == 0 else line.PRIOR_WIDTH_DEFAULT_mm) if prior_width_mm is None else prior_width_mm
             if prior_sigma_mm != 0 or width_mm != 0:
-                _in_range("prior_sigma_mm", prior_sigma_mm, 0.5, 100, "mm, or 0 for none")
-                _in_range("prior_width_mm", width_mm, 0.01, 100, "mm")
+                _in_range("prior_sigma_mm", prior_sigma_mm, line.PRIOR_SIGMA_mm, "mm, or 0 for none")
+                _in_range("prior_width_mm", width_mm, line.PRIOR_WIDTH_mm, "mm")
             commands.append(wire.SetPrior(prior_sigma_mm, width_mm))
         elif prior_width_mm is not None:
             raise BadValueError("prior_width_mm needs prior_sigma_mm")
         if location_limit_mm is not None:
-            _in_range("location_limit_mm", location_limit_mm, 0.01, 100, "mm")
+            _in_range("location_limit_mm", location_limit_mm, line.LOCATION_LIMIT_mm, "mm")
             commands.append(wire.SetLocationLimit(location_limit_mm))
         if keep is not None:
             commands.append(wire.Keep(int(keep)))

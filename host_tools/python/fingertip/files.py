@@ -36,10 +36,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import names
+from . import line
 from .errors import InputError
 from .frames import frame_of
-from .names import Flag
+from .line import CONTACT_COLUMNS, RAW_COLUMNS, STAGES, TANGENTIAL_COLUMNS, Flag
 
 if TYPE_CHECKING:
     import pandas
@@ -55,17 +55,11 @@ SLIP_SPEED_mm_s = 10.0
 
 TRUTH_COLUMNS = ("contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip")
 OPTIONAL_COLUMNS = ("Qx_N", "Qy_N", "temperature_degC")  # after the sensors, in any order
-STAGES = ("convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us")
-CONTACT_COLUMNS = (
-    "sequence", "flags", "sensors_used", "x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N", "slip_mm", "residual_rms_Pa",
-    "location_sd_mm", "force_sd_N", "sigma_x_mm", "sigma_y_mm", "width_correlation", *STAGES, "total_us")
-TANGENTIAL_COLUMNS = ("qx_N", "qy_N", "q_sd_N", "tangential_ratio", "vx_mm_s", "vy_mm_s")  # NaN in recordings of before there were any
-RAW_COLUMNS = ("raw_sequence", "raw_flags", "valid", "saturated", "doubtful", "temperature_degC")
 RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *TANGENTIAL_COLUMNS, *RAW_COLUMNS)
 
 CONTACT, FIT_VALID, SLIP_VALID, SLIP, TANGENTIAL_VALID, TANGENTIAL_FROM_TOUCH, VELOCITY_VALID, MOVING, SLIDING, WARNINGS = map(int, (
     Flag.CONTACT, Flag.FIT_VALID, Flag.SLIP_VALID, Flag.SLIP, Flag.TANGENTIAL_VALID, Flag.TANGENTIAL_FROM_TOUCH, Flag.VELOCITY_VALID, Flag.MOVING,
-    Flag.SLIDING, names.WARNINGS))
+    Flag.SLIDING, line.WARNINGS))
 
 
 def run_tool(name: str, main: Callable[[list[str]], int]) -> int:

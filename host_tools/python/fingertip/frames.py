@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from .clock import ClockEstimate
-from .names import WARNINGS, Flag
-from .wire import Contact, Raw, layout_of
+from .line import WARNINGS, Contact, ContactQuantities, Flag, Raw
+from .wire import layout_of
 
 if TYPE_CHECKING:
     import pandas
@@ -25,7 +25,7 @@ NO_CONTACT = Contact._make(math.nan if wire.code == "f" else 0 for _, wire in la
 NO_RAW = Raw(0, 0, 0, 0, 0, 0, 0, ())
 
 
-class Frame:
+class Frame(ContactQuantities):
     """What a fingertip said of one moment: a contact packet, a raw packet, or both.
 
     A quantity whose flag is off, or whose packet did not come, is NaN, never 0. Lengths are mm from the centre of the pad, x across the
@@ -68,97 +68,6 @@ class Frame:
     def trusted(self) -> bool:
         """There is a fit, and no warning."""
         return self.contact.flags & _JUDGED == _FIT_VALID
-
-    @property
-    def sensors_used(self) -> int:
-        """Bitmap of the sensors in the fit; 0 without one."""
-        return self.contact.sensors_used
-
-    @property
-    def x_mm(self) -> float:
-        return self.contact.x_mm
-
-    @property
-    def y_mm(self) -> float:
-        return self.contact.y_mm
-
-    @property
-    def force_N(self) -> float:
-        return self.contact.force_N
-
-    @property
-    def p0_Pa(self) -> float:
-        """Peak of the fitted Gaussian."""
-        return self.contact.p0_Pa
-
-    @property
-    def sigma_mm(self) -> float:
-        """Standard deviation of the fitted Gaussian."""
-        return self.contact.sigma_mm
-
-    @property
-    def residual_rms_Pa(self) -> float:
-        return self.contact.residual_rms_Pa
-
-    @property
-    def location_sd_mm(self) -> float:
-        """Predicted radial standard deviation of the location."""
-        return self.contact.location_sd_mm
-
-    @property
-    def force_sd_N(self) -> float:
-        """Predicted standard deviation of the force."""
-        return self.contact.force_sd_N
-
-    @property
-    def slip_mm(self) -> float:
-        """Distance of the location from its mean over the slip window."""
-        return self.contact.slip_mm
-
-    @property
-    def sigma_x_mm(self) -> float:
-        """Of an elliptic Gaussian, along x."""
-        return self.contact.sigma_x_mm
-
-    @property
-    def sigma_y_mm(self) -> float:
-        """Of an elliptic Gaussian, along y."""
-        return self.contact.sigma_y_mm
-
-    @property
-    def width_correlation(self) -> float:
-        """Of an elliptic Gaussian, -1 to 1; 0 unless it lies aslant."""
-        return self.contact.width_correlation
-
-    @property
-    def qx_N(self) -> float:
-        """Tangential load on the rubber along x."""
-        return self.contact.qx_N
-
-    @property
-    def qy_N(self) -> float:
-        """Tangential load on the rubber along y."""
-        return self.contact.qy_N
-
-    @property
-    def q_sd_N(self) -> float:
-        """Predicted standard deviation of either."""
-        return self.contact.q_sd_N
-
-    @property
-    def tangential_ratio(self) -> float:
-        """Size of the load over force_N."""
-        return self.contact.tangential_ratio
-
-    @property
-    def vx_mm_s(self) -> float:
-        """Velocity of the contact along x."""
-        return self.contact.vx_mm_s
-
-    @property
-    def vy_mm_s(self) -> float:
-        """Velocity of the contact along y."""
-        return self.contact.vy_mm_s
 
     @property
     def temperature_degC(self) -> float:

@@ -10,7 +10,7 @@ from .clock import host_now_us
 from .device import Fingertip
 from .errors import BadValueError, InputError, NoFingertipError, NoFrameError
 from .frames import Frame
-from .names import Capability
+from .line import Capability
 from .recording import JointRecordingWriter
 from .wire import LineStatistics, Packet
 

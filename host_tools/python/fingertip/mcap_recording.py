@@ -24,7 +24,7 @@ from .errors import InputError
 from .files import CONTACT_COLUMNS, RAW_COLUMNS, TANGENTIAL_COLUMNS
 from .frames import Q10
 from .mcap_file import McapReader, McapWriter, Message
-from .names import WARNINGS, Flag
+from .line import WARNINGS, Flag
 from .recording import LineFile, shortest
 from .ros_messages import decode, encode, schema_of
 

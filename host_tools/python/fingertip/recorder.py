@@ -18,7 +18,7 @@ from .clock import ClockEstimate
 from .errors import InputError, PacketError
 from .files import check_output, printable, run_tool
 from .network import AGAIN_MOST, ROOT, Stamp, add_session_options, open_session, parts_of, zenoh_module
-from .names import Capability
+from .line import Capability
 from .recording import JointRecordingWriter
 
 GAP_s = 0.2  # a packet that is missing so long is asked for

@@ -33,7 +33,7 @@ from .group import Fingertips
 from .mcap_recording import (
     CONTACT_TYPE, DIAGNOSTICS_TYPE, PLACE_TYPE, PRESSURES_TYPE, WRENCH_TYPE, health_status, name_in_ros, place, pressure_cloud, stamp, warning_status,
     wrench)
-from .names import WARNINGS
+from .line import WARNINGS
 from .ros_messages import encode
 from .wire import Contact, Health
 

@@ -1,8 +1,4 @@
-"""The wire protocol's packets as bytes and back (firmware/wire/PROTOCOL.md, version 5), in pure Python.
-
-Each body is a NamedTuple whose annotations are the layout on the line, for both directions: adding a field to a class adds it to
-the codec. A quantity that is there only under a bit of another field is NaN (a float) or None without it.
-"""
+"""The wire protocol's packets as bytes and back (firmware/wire/PROTOCOL.md), in pure Python; line.py has the packets."""
 import functools
 import math
 import operator
@@ -10,324 +6,24 @@ import struct
 import typing
 import zlib
 from collections.abc import Callable
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from .errors import CrcError, FormatError, PacketError, PacketVersionError, UnknownTypeError
-from .names import Capability, Flag, Stored
+from .line import (CONTACT, LOADER_MAGIC, MAX_FRAME_BYTES, NESTED, RAW, SENSORS_MAX, TYPES, VERSION, Acknowledgement, AskCrash, AskHealth, AskInfo,
+                   Body, Calibration, Contact, Crash, EraseCalibration, ErasePad, Health, Info, Keep, Loader, PadProfile, Raw, SetLocationLimit,
+                   SetOsr, SetPrior, SetRate, SetSlip, SetStreams, StoreCalibration, StorePad, Tare, Wire)
 
-VERSION = 5
-MAX_FRAME_BYTES = 836  # longer is damage
-SENSORS_MAX = 32
-LOADER_MAGIC = 0x746F6F42
+__all__ = ["CONTACT", "LOADER_MAGIC", "MAX_FRAME_BYTES", "RAW", "SENSORS_MAX", "TYPES", "VERSION", "Acknowledgement", "AskCrash", "AskHealth",
+           "AskInfo", "Body", "Calibration", "Contact", "Crash", "Decoder", "EraseCalibration", "ErasePad", "Health", "Info", "Keep", "LineStatistics",
+           "Loader", "Packet", "PadProfile", "Raw", "SetLocationLimit", "SetOsr", "SetPrior", "SetRate", "SetSlip", "SetStreams", "StoreCalibration",
+           "StorePad", "Tare", "cobs_decode", "cobs_encode", "decode", "decode_stream_packet", "encode", "layout_of"]
+
 _HEADER = struct.Struct("<BBHQ")
 _CRC = _FLAGS = struct.Struct("<I")
 # CRC-32/ISO-HDLC over anything and its own CRC.
 _CRC_RESIDUE = 0x2144DF1C
 _LONGEST_RUN = 255
-
-
-class Wire(NamedTuple):
-    """How a field travels: struct's code, how many of it, whether once for each sensor, and under which bit of which field."""
-
-    code: str
-    times: int = 1
-    each_sensor: bool = False
-    when: tuple[str, int] | None = None
-    absent: Any = None
-
-
-def _quantity(flag: Flag) -> Wire:
-    return Wire("f", when=("flags", flag), absent=math.nan)
-
-
-_STORED_CALIBRATION = ("stored", int(Stored.CALIBRATION))
-_STORED_PAD = ("stored", int(Stored.PAD))
-_WITH_FIT = ("capabilities", int(Capability.FIT))
-_WITH_SLIP = ("capabilities", int(Capability.SLIP))
-
-U8 = Annotated[int, Wire("B")]
-U16 = Annotated[int, Wire("H")]
-U32 = Annotated[int, Wire("I")]
-U64 = Annotated[int, Wire("Q")]
-I16 = Annotated[int, Wire("h")]
-F32 = Annotated[float, Wire("f")]
-Three = Annotated[tuple[float, ...], Wire("f", 3)]
-Text = Annotated[str, Wire("16s")]
-SensorCount = Annotated[int, Wire("n")]
-Fit = Annotated[float, _quantity(Flag.FIT_VALID)]
-Uncertainty = Annotated[float, _quantity(Flag.UNCERTAINTY_VALID)]
-Widths = Annotated[float, _quantity(Flag.WIDTHS_VALID)]
-Tangential = Annotated[float, _quantity(Flag.TANGENTIAL_VALID)]
-Velocity = Annotated[float, _quantity(Flag.VELOCITY_VALID)]
-IfFit = Annotated[float, Wire("f", when=_WITH_FIT, absent=math.nan)]
-
-
-class Contact(NamedTuple):
-    """One judged frame."""
-
-    frame: U32
-    flags: U32
-    convert_us: U16
-    read_us: U16
-    queue_us: U16
-    condition_us: U16
-    fit_us: U16
-    contact_us: U16
-    total_us: U16
-    sensors_used: Annotated[int, Wire("I", when=("flags", Flag.FIT_VALID), absent=0)]
-    x_mm: Fit
-    y_mm: Fit
-    p0_Pa: Fit
-    sigma_mm: Fit
-    force_N: Fit
-    residual_rms_Pa: Fit
-    location_sd_mm: Uncertainty
-    force_sd_N: Uncertainty
-    slip_mm: Annotated[float, _quantity(Flag.SLIP_VALID)]
-    sigma_x_mm: Widths
-    sigma_y_mm: Widths
-    width_correlation: Widths
-    qx_N: Tangential
-    qy_N: Tangential
-    q_sd_N: Tangential
-    tangential_ratio: Tangential
-    vx_mm_s: Velocity
-    vy_mm_s: Velocity
-
-
-class Raw(NamedTuple):
-    """The readings of one frame. readings: for each sensor absolute pressure and tare, both in 1/1024 Pa."""
-
-    frame: U32
-    flags: U32
-    valid: U32
-    saturated: U32
-    doubtful: U32
-    temperature_cC: I16
-    sensors: SensorCount
-    readings: Annotated[tuple[int, ...], Wire("i", 2, each_sensor=True)]
-
-
-class Calibration(NamedTuple):
-    """Gains (pressure = reading / gain) and force scale. date_s: Unix time; gains_and_sds: of each sensor in turn."""
-
-    date_s: U32
-    placements: U16
-    force_scale: F32
-    force_scale_sd: F32
-    gains_and_sds: Annotated[tuple[float, ...], Wire("f", 2, each_sensor=True)]
-
-    @property
-    def gains(self) -> tuple[float, ...]:
-        return self.gains_and_sds[0::2]
-
-    @property
-    def gain_sds(self) -> tuple[float, ...]:
-        """Relative standard deviations of the gains."""
-        return self.gains_and_sds[1::2]
-
-
-class PadProfile(NamedTuple):
-    """How the rubber of a pad spreads what presses and what pulls (firmware/common/pad_profile.h has meaning and ranges)."""
-
-    thickness_mm: F32
-    overhang_mm: F32
-    normal: Annotated[tuple[float, ...], Wire("f", 4)]  # share and sd_mm of each of two terms
-    tangential: Annotated[tuple[float, ...], Wire("f", 6)]  # moment_mm and sd_mm of each of three terms
-    spread_mm2: F32
-    spread_sd_mm2: F32
-    force_ratio: F32
-    tangential_scale: F32
-    tangential_scale_sd: F32
-    edge_ratio_x: Three
-    edge_ratio_y: Three
-    edge_gain_x: Three
-    edge_gain_y: Three
-    edge_place_x_mm: Three
-    edge_place_y_mm: Three
-    edge_pull_x_mm: Three
-    edge_pull_y_mm: Three
-    edge_force: Three
-    from_touch: U8
-
-
-class Info(NamedTuple):
-    """Who a fingertip is, how it is set, and what it keeps.
-
-    rate_mHz: requested, 0 is as fast as the sensors allow; measured_rate_mHz: over the last second. xy_mm: x and y of each sensor in
-    turn. prior_sigma_mm and prior_width_mm: 0 and 0 is no prior. What the firmware cannot do is None or NaN.
-    """
-
-    firmware: Annotated[tuple[int, ...], Wire("B", 3)]
-    sensors: SensorCount
-    capabilities: Annotated[int, Wire("I")]
-    git: Text
-    board: Text
-    scene: Text
-    serial: Text
-    rate_mHz: U32
-    measured_rate_mHz: U32
-    osr: U16
-    temperature_interval_ms: U16
-    streams: U8
-    fit_iterations: Annotated[int | None, Wire("B", when=_WITH_FIT)]
-    slip_window_ms: Annotated[int | None, Wire("H", when=_WITH_SLIP)]
-    slip_threshold_mm: Annotated[float, Wire("f", when=_WITH_SLIP, absent=math.nan)]
-    pitch_mm: F32
-    xy_mm: Annotated[tuple[float, ...], Wire("f", 2, each_sensor=True)]
-    prior_sigma_mm: IfFit
-    prior_width_mm: IfFit
-    location_limit_mm: IfFit
-    stored: U32
-    calibration: Annotated[Calibration | None, Wire("Calibration", when=_STORED_CALIBRATION)]
-    pad: Annotated[PadProfile | None, Wire("PadProfile", when=_STORED_PAD)]
-
-    @property
-    def x_mm(self) -> tuple[float, ...]:
-        """Of each sensor, across the strips, from the centre of the pad."""
-        return self.xy_mm[0::2]
-
-    @property
-    def y_mm(self) -> tuple[float, ...]:
-        """Of each sensor, along the strips, from the centre of the pad."""
-        return self.xy_mm[1::2]
-
-
-class Health(NamedTuple):
-    """Counters since start, which wrap at 2^32, and present state. sensors_present, sensors_prom_bad: bitmaps."""
-
-    capabilities: U32
-    uptime_s: U32
-    frames: U32
-    frames_incomplete: U32
-    frames_skipped: U32
-    packets_sent: U32
-    packets_dropped: U32
-    commands_done: U32
-    commands_rejected: U32
-    bus_nacks: U32
-    bus_timeouts: U32
-    bus_recoveries: U32
-    zero_readings: U32
-    implausible_readings: U32
-    sensors_present: U32
-    sensors_prom_bad: U32
-    watchdog_resets: U32
-    cpu_busy_permille: U16
-    stack_free_bytes: U16
-    fit_failures: Annotated[int | None, Wire("I", when=_WITH_FIT)]
-
-
-class Acknowledgement(NamedTuple):
-    """command: its type; command_sequence, host_time_us: those of its header."""
-
-    command: U8
-    result: U8
-    command_sequence: U16
-    host_time_us: U64
-
-
-class Crash(NamedTuple):
-    """How the firmware last came to an end since power-on; kind 0: it did not. event_ages: in 1024 us; end_us: since the start before it."""
-
-    kind: U8
-    exception: U8
-    vector: U8
-    activity: U8
-    stuck: U8
-    events: Annotated[tuple[int, ...], Wire("B", 8)]
-    event_details: Annotated[tuple[int, ...], Wire("B", 8)]
-    r0: U32
-    r1: U32
-    r2: U32
-    r3: U32
-    r12: U32
-    lr: U32
-    pc: U32
-    xpsr: U32
-    sp: U32
-    event_ages: Annotated[tuple[int, ...], Wire("I", 8)]
-    end_us: U64
-
-
-class SetStreams(NamedTuple):
-    streams: U8
-
-
-class Tare(NamedTuple):
-    force: U8
-
-
-class SetRate(NamedTuple):
-    rate_mHz: U32
-
-
-class SetOsr(NamedTuple):
-    osr: U16
-
-
-class SetSlip(NamedTuple):
-    threshold_mm: F32
-    window_ms: U16
-
-
-class AskInfo(NamedTuple):
-    pass
-
-
-class AskHealth(NamedTuple):
-    pass
-
-
-class Loader(NamedTuple):
-    magic: U32
-
-
-class StoreCalibration(NamedTuple):
-    sensors: SensorCount
-    calibration: Annotated[Calibration, Wire("Calibration")]
-
-
-class EraseCalibration(NamedTuple):
-    pass
-
-
-class Keep(NamedTuple):
-    keep: U8
-
-
-class SetPrior(NamedTuple):
-    sigma_mm: F32
-    width_mm: F32
-
-
-class SetLocationLimit(NamedTuple):
-    limit_mm: F32
-
-
-class StorePad(NamedTuple):
-    profile: Annotated[PadProfile, Wire("PadProfile")]
-
-
-class ErasePad(NamedTuple):
-    pass
-
-
-class AskCrash(NamedTuple):
-    pass
-
-
-Body = (Contact | Raw | Info | Health | Acknowledgement | Crash | SetStreams | Tare | SetRate | SetOsr | SetSlip | AskInfo | AskHealth | Loader
-        | StoreCalibration | EraseCalibration | Keep | SetPrior | SetLocationLimit | StorePad | ErasePad | AskCrash)
-CONTACT, RAW = 0x01, 0x02
-TYPES: dict[int, type[Body]] = {
-    CONTACT: Contact, RAW: Raw, 0x03: Info, 0x04: Health, 0x05: Acknowledgement, 0x06: Crash,
-    0x80: SetStreams, 0x81: Tare, 0x82: SetRate, 0x83: SetOsr, 0x84: SetSlip, 0x85: AskInfo, 0x86: AskHealth, 0x87: Loader,
-    0x88: StoreCalibration, 0x89: EraseCalibration, 0x8A: Keep, 0x8B: SetPrior, 0x8C: SetLocationLimit, 0x8D: StorePad, 0x8E: ErasePad,
-    0x8F: AskCrash,
-}
 _TYPE_OF: dict[type[Body], int] = {body: number for number, body in TYPES.items()}
-_NESTED: dict[str, Any] = {"Calibration": Calibration, "PadProfile": PadProfile}
 
 
 class Packet(NamedTuple):
@@ -372,8 +68,8 @@ def _get(body: type[Any], data: bytes, at: int, sensors: int) -> tuple[Any, int]
     for name, wire in layout_of(body):
         if _is_left_out(wire, values):
             values[name] = wire.absent
-        elif wire.code in _NESTED:
-            values[name], at = _get(_NESTED[wire.code], data, at, sensors)
+        elif wire.code in NESTED:
+            values[name], at = _get(NESTED[wire.code], data, at, sensors)
         elif wire.code == "n":
             sensors = values[name] = data[at] if at < len(data) else 0
             if not 1 <= sensors <= SENSORS_MAX:
@@ -399,7 +95,7 @@ def _put(body: Any, sensors: int) -> bytes:
         value = values[name]
         if _is_left_out(wire, values):
             continue
-        if wire.code in _NESTED:
+        if wire.code in NESTED:
             data += _put(value, sensors)
             continue
         if wire.code == "n":

@@ -238,16 +238,6 @@ class Codec(Folder):
                 self.assertLessEqual(len(coded), length + 1 + length // 254)
                 self.assertEqual(wire.cobs_decode(coded), packet)
 
-    def test_flags_and_constants_are_those_of_the_firmware(self):
-        header = (ROOT / "firmware/common/contact_flags.h").read_text(encoding="utf-8")
-        self.assertEqual({name: 1 << int(bit) for name, bit in re.findall(r"CONTACT_FLAG_(\w+)\s*=\s*1\s*<<\s*(\d+)", header)},
-                         {flag.name: flag.value for flag in Flag})
-        packet_h = (ROOT / "firmware/wire/packet.h").read_text(encoding="utf-8")
-        for prefix, names in (("STREAM", fingertip.Streams), ("CAPABILITY", fingertip.Capability), ("STORED", fingertip.Stored)):
-            self.assertEqual({name: 1 << int(bit) for name, bit in re.findall(rf"WIRE_{prefix}_(\w+) = 1 << (\d+)", packet_h)},
-                             {each.name: each.value for each in names if each.value and each.value & each.value - 1 == 0})
-        self.assertIn(f"#define WIRE_VERSION {wire.VERSION}\n", packet_h)
-
 
 class Clock(unittest.TestCase):
     def exchanges(self, prng, count, drift_ppm, offset_us=0):

@@ -1,8 +1,6 @@
 /** Frames of the line (firmware/wire/PROTOCOL.md): COBS, CRC-32/ISO-HDLC, resynchronisation. */
 
-export const WIRE_VERSION = 5;
-/** Without the delimiter, and with it. */
-export const MAX_FRAME_BYTES = 836;
+export { MAX_FRAME_BYTES, WIRE_VERSION } from './line_facts';
 export const HEADER_BYTES = 12;
 export const CRC_BYTES = 4;
 

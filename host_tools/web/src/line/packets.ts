@@ -1,104 +1,22 @@
 /** The packets of the wire protocol, both ways (firmware/wire/PROTOCOL.md, packet.h). */
-import { CRC_BYTES, HEADER_BYTES, WIRE_VERSION, cobsEncode, crc32 } from './framing';
+import { CRC_BYTES, HEADER_BYTES, cobsEncode, crc32 } from './framing';
+import {
+  CONTACT_FLAG,
+  Capability,
+  Flag,
+  HEALTH_WORDS,
+  MAX_SENSORS,
+  PacketType,
+  STAGES,
+  Stored,
+  WIRE_VERSION,
+} from './line_facts';
 
-export const MAX_SENSORS = 32;
-
-export const PacketType = {
-  CONTACT: 0x01,
-  RAW: 0x02,
-  INFO: 0x03,
-  HEALTH: 0x04,
-  ACK: 0x05,
-  CRASH: 0x06,
-  CMD_STREAM: 0x80,
-  CMD_TARE: 0x81,
-  CMD_RATE: 0x82,
-  CMD_OSR: 0x83,
-  CMD_SLIP: 0x84,
-  CMD_INFO: 0x85,
-  CMD_HEALTH: 0x86,
-  CMD_LOADER: 0x87,
-  CMD_CALIBRATE: 0x88,
-  CMD_ERASE_CALIBRATION: 0x89,
-  CMD_KEEP: 0x8a,
-  CMD_PRIOR: 0x8b,
-  CMD_LOCATION_LIMIT: 0x8c,
-  CMD_PAD: 0x8d,
-  CMD_ERASE_PAD: 0x8e,
-  CMD_CRASH: 0x8f,
-} as const;
-
-/** Bits of the stream mask. */
-export const Stream = { CONTACT: 1, RAW: 2, HEALTH: 4 } as const;
-/** What a firmware can do. */
-export const Capability = { FIT: 1, SLIP: 2, RAW_STREAM: 4, TANGENTIAL: 8 } as const;
-/** What a fingertip keeps without power. */
-export const Stored = { CALIBRATION: 1, SETTINGS: 2, WRITING: 4, DAMAGED: 8, PAD: 16 } as const;
-/** The result of an acknowledgement. */
-export const Result = { DONE: 0, UNKNOWN_COMMAND: 1, OUT_OF_RANGE: 2, NOT_NOW: 3 } as const;
-export const LOADER_MAGIC = 0x746f6f42;
-
-/** contact_flags.h; what they mean in words: src/model/flags.ts. */
-export const Flag = {
-  CONTACT: 1 << 0,
-  FIT_VALID: 1 << 1,
-  UNCERTAINTY_VALID: 1 << 2,
-  SLIP_VALID: 1 << 3,
-  SLIP: 1 << 4,
-  TARED: 1 << 5,
-  HELD: 1 << 6,
-  WIDTHS_VALID: 1 << 7,
-  LOW_SIGNAL: 1 << 8,
-  FLAT: 1 << 9,
-  UNCERTAIN: 1 << 10,
-  MODEL: 1 << 11,
-  SATURATED: 1 << 12,
-  FORCE_LOWER_BOUND: 1 << 13,
-  SENSOR_MASKED: 1 << 14,
-  AT_BOUND: 1 << 15,
-  ELONGATED: 1 << 16,
-  ZERO_DOUBTFUL: 1 << 17,
-  SENSOR_DOUBTFUL: 1 << 18,
-  CALIBRATED: 1 << 19,
-  TANGENTIAL_VALID: 1 << 20,
-  TANGENTIAL_FROM_TOUCH: 1 << 21,
-  VELOCITY_VALID: 1 << 22,
-  MOVING: 1 << 23,
-  SLIDING: 1 << 24,
-} as const;
+export * from './line_facts';
 
 /** The quantities of a contact that hold under a flag, in the order of a recording's columns. */
-export const CONTACT_FIELDS = [
-  'x_mm',
-  'y_mm',
-  'p0_Pa',
-  'sigma_mm',
-  'force_N',
-  'slip_mm',
-  'residual_rms_Pa',
-  'location_sd_mm',
-  'force_sd_N',
-  'sigma_x_mm',
-  'sigma_y_mm',
-  'width_correlation',
-  'qx_N',
-  'qy_N',
-  'q_sd_N',
-  'tangential_ratio',
-  'vx_mm_s',
-  'vy_mm_s',
-] as const;
-export type ContactField = (typeof CONTACT_FIELDS)[number];
-
-export const STAGES = [
-  'convert_us',
-  'read_us',
-  'queue_us',
-  'condition_us',
-  'fit_us',
-  'contact_us',
-  'total_us',
-] as const;
+export const CONTACT_FIELDS = Object.keys(CONTACT_FLAG) as ContactField[];
+export type ContactField = keyof typeof CONTACT_FLAG;
 
 interface Header {
   sequence: number;
@@ -173,26 +91,7 @@ export interface Info extends Header {
   pad_from_touch: number;
 }
 
-/** Counters since start, modulo 2^32, and present state (packet.h). */
-export const HEALTH_WORDS = [
-  'capabilities',
-  'uptime_s',
-  'frames',
-  'frames_incomplete',
-  'frames_skipped',
-  'packets_sent',
-  'packets_dropped',
-  'commands_done',
-  'commands_rejected',
-  'bus_nacks',
-  'bus_timeouts',
-  'bus_recoveries',
-  'zero_readings',
-  'implausible_readings',
-  'sensors_present',
-  'sensors_prom_bad',
-  'watchdog_resets',
-] as const;
+/** Counters since start, modulo 2^32, and present state. */
 export type Health = Header & { type: 0x04 } & Record<
     | (typeof HEALTH_WORDS)[number]
     | 'cpu_busy_permille'

@@ -5,34 +5,14 @@
  * column. What was not told is NaN: no fit, no x; a packet that did not come. A row takes what
  * the contact and the raw packet of one frame say; nothing is allocated for it.
  */
-import { CONTACT_FIELDS, Flag, type Contact, type ContactField, type Raw } from '../line/packets';
+import { CONTACT_FIELDS, CONTACT_FLAG, Flag, type Contact, type ContactField, type Raw } from '../line/packets';
 
 /** Rows: 3.3 minutes at 1308 frames a second, some 45 MB with 15 sensors. */
 export const HISTORY_ROWS = 1 << 18;
 
 /** Which flag a quantity needs. */
 export function flagOf(field: ContactField): number {
-  switch (field) {
-    case 'location_sd_mm':
-    case 'force_sd_N':
-      return Flag.UNCERTAINTY_VALID;
-    case 'slip_mm':
-      return Flag.SLIP_VALID;
-    case 'sigma_x_mm':
-    case 'sigma_y_mm':
-    case 'width_correlation':
-      return Flag.WIDTHS_VALID;
-    case 'qx_N':
-    case 'qy_N':
-    case 'q_sd_N':
-    case 'tangential_ratio':
-      return Flag.TANGENTIAL_VALID;
-    case 'vx_mm_s':
-    case 'vy_mm_s':
-      return Flag.VELOCITY_VALID;
-    default:
-      return Flag.FIT_VALID;
-  }
+  return CONTACT_FLAG[field];
 }
 
 /** Of one frame; bitmaps by sensor. pressure_Pa [sensor]: above the tare, over the gain, as the fit

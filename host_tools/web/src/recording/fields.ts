@@ -1,6 +1,8 @@
 /** The columns, cells and comments of recordings: libfingertip/recording_fields.hpp. */
 import {
   CONTACT_FIELDS,
+  FIRST_FIELDS_COUNT,
+  HEALTH_KEYS,
   MAX_SENSORS,
   STAGES,
   Stored,
@@ -17,8 +19,8 @@ export const FIRST_WORDS = '# fingertip-recording ';
 export const JOINT_COLUMNS = 'device,time_us,';
 
 /** Quantities before and after the stages; the latter are not in older recordings. */
-export const FIRST_FIELDS = CONTACT_FIELDS.slice(0, 12);
-export const LATER_FIELDS = CONTACT_FIELDS.slice(12);
+export const FIRST_FIELDS = CONTACT_FIELDS.slice(0, FIRST_FIELDS_COUNT);
+export const LATER_FIELDS = CONTACT_FIELDS.slice(FIRST_FIELDS_COUNT);
 const CONTACT_COLUMNS = ['sequence', 'flags', 'sensors_used', ...FIRST_FIELDS, ...STAGES];
 const RAW_COLUMNS = ['raw_sequence', 'raw_flags', 'valid', 'saturated', 'doubtful', 'temperature_degC'];
 
@@ -88,29 +90,6 @@ export function rowText(contact: Contact | null, raw: Raw | null, columns: Colum
   return text;
 }
 
-const HEALTH_FIELDS = [
-  'capabilities',
-  'uptime_s',
-  'frames',
-  'frames_incomplete',
-  'frames_skipped',
-  'packets_sent',
-  'packets_dropped',
-  'commands_done',
-  'commands_rejected',
-  'bus_nacks',
-  'bus_timeouts',
-  'bus_recoveries',
-  'zero_readings',
-  'implausible_readings',
-  'fit_failures',
-  'sensors_present',
-  'sensors_prom_bad',
-  'watchdog_resets',
-  'cpu_busy_permille',
-  'stack_free_bytes',
-] as const;
-
 /** A key of the file, the field of the packet behind it; floats are floats. */
 export interface Key {
   key: string;
@@ -121,7 +100,7 @@ const whole = (key: string, field = key): Key => ({ key, field, float: false });
 const float = (key: string, field = key): Key => ({ key, field, float: true });
 
 export const PACKET_KEYS: Record<'health' | 'ack' | 'info', Key[]> = {
-  health: HEALTH_FIELDS.map((field) => whole(field)),
+  health: HEALTH_KEYS.map((field) => whole(field)),
   ack: [whole('command'), whole('result'), whole('command_sequence'), whole('host_time_us')],
   info: [],
 };

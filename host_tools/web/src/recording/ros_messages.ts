@@ -284,8 +284,11 @@ export function decodeContact(bytes: Uint8Array): Row {
     flags: reader.u32(),
     sensors_used: reader.u32(),
   };
-  const quantity = (field: string): void => {
+  const quantity = (field: (typeof FIRST_FIELDS)[number]): void => {
     const value = reader.f32();
+    if (Number.isNaN(value) && has_contact && contact['flags'] & flagOf(field)) {
+      throw new RangeError(`${field} is no number although its flag is set`);
+    }
     contact[field] = Number.isNaN(value) ? 0 : value;
   };
   FIRST_FIELDS.forEach(quantity);
@@ -301,7 +304,7 @@ export function decodeContact(bytes: Uint8Array): Row {
     valid: reader.u32(),
     saturated: reader.u32(),
     doubtful: reader.u32(),
-    temperature_cC: Math.round(reader.f64() * 100),
+    temperature_cC: scaled(reader.f64(), 100, 2 ** 15, has_raw),
     sensor_count: 0,
     pressure_Pa_q10: new Int32Array(0),
     baseline_Pa_q10: new Int32Array(0),
@@ -312,10 +315,13 @@ export function decodeContact(bytes: Uint8Array): Row {
       throw new RangeError('too many sensors');
     }
     raw.sensor_count = count;
-    raw[field] = Int32Array.from({ length: count }, () => Math.round(reader.f64() * 1024));
+    raw[field] = Int32Array.from({ length: count }, () => scaled(reader.f64(), 1024, 2 ** 31, true));
   }
   if (!has_contact && !has_raw) {
     throw new RangeError('a row without a packet');
+  }
+  if (Math.abs(time_us) === Infinity) {
+    throw new RangeError('a time without end');
   }
   return {
     number,
@@ -324,6 +330,18 @@ export function decodeContact(bytes: Uint8Array): Row {
     contact: has_contact ? (contact as unknown as Contact) : null,
     raw: has_raw ? raw : null,
   };
+}
+
+/** A whole number of -bound to bound - 1; 0 of a packet that did not come. */
+function scaled(value: number, scale: number, bound: number, is_there: boolean): number {
+  const raw = Math.sign(value) * Math.round(Math.abs(value * scale)); // half away from 0
+  if (!is_there) {
+    return 0;
+  }
+  if (!(raw >= -bound && raw < bound)) {
+    throw new RangeError(`${value} is out of range`);
+  }
+  return raw;
 }
 
 function afterHeader(bytes: Uint8Array): CdrReader {

@@ -1,5 +1,5 @@
-/** Settings: until power-off, or kept for good; ranges of firmware/wire/packet.h. */
-import { Capability, PacketType, Stored, type Command, type Info } from '../line/packets';
+/** Settings: until power-off, or kept for good. */
+import { Capability, PacketType, RANGES, Stored, type Command, type Info } from '../line/packets';
 import type { Fingertip } from '../model/fingertip';
 import { shortest } from '../recording/text';
 import { Dialog, field, make, makeButton } from './dialog';
@@ -14,10 +14,13 @@ interface Setting {
   choices?: string[];
 }
 
+const RATE_Hz = RANGES.RATE_mHz.map((rate_mHz) => rate_mHz / 1000) as [number, number];
+const span = ([least, most]: readonly [number, number]): string => `${least} to ${most}`;
+
 const SETTINGS = {
   rate: {
     label: 'Frame rate, Hz',
-    hint: '0.1 to 2000, or max: as fast as the sensors allow',
+    hint: `${span(RATE_Hz)}, or max: as fast as the sensors allow`,
     now: (info) => (info.rate_mHz === 0 ? 'max' : String(info.rate_mHz / 1000)),
     capability: 0,
   },
@@ -26,23 +29,23 @@ const SETTINGS = {
     hint: 'more is quieter and slower',
     now: (info) => String(info.osr),
     capability: 0,
-    choices: ['256', '512', '1024', '2048', '4096', '8192'],
+    choices: RANGES.OSR.map(String),
   },
   slip_threshold: {
     label: 'Slip threshold, mm',
-    hint: '0.01 to 50',
+    hint: span(RANGES.SLIP_THRESHOLD_mm),
     now: (info) => shortest(info.slip_threshold_mm),
     capability: Capability.SLIP,
   },
   slip_window: {
     label: 'Slip window, ms',
-    hint: '5 to 1000, and 160 frames at most',
+    hint: `${span(RANGES.SLIP_WINDOW_ms)}, and 160 frames at most`,
     now: (info) => String(info.slip_window_ms),
     capability: Capability.SLIP,
   },
   prior: {
     label: 'Prior on the width, mm',
-    hint: 'SIGMA, SIGMA:WIDTH or none; 0.5 to 100, width 0.01 to 100, 0.5 unless given; for thin pads',
+    hint: `SIGMA, SIGMA:WIDTH or none; ${span(RANGES.PRIOR_SIGMA_mm)}, width ${span(RANGES.PRIOR_WIDTH_mm)}, ${RANGES.PRIOR_WIDTH_DEFAULT_mm} unless given; for thin pads`,
     now: (info) =>
       info.prior_width_mm === 0
         ? 'none'
@@ -51,7 +54,7 @@ const SETTINGS = {
   },
   limit: {
     label: 'Location limit, mm',
-    hint: '0.01 to 100; UNCERTAIN where location_sd_mm is above it',
+    hint: `${span(RANGES.LOCATION_LIMIT_mm)}; UNCERTAIN where location_sd_mm is above it`,
     now: (info) => shortest(info.location_limit_mm),
     capability: Capability.FIT,
   },
@@ -59,9 +62,7 @@ const SETTINGS = {
 type Name = keyof typeof SETTINGS;
 const NAMES = Object.keys(SETTINGS) as Name[];
 
-const PRIOR_WIDTH_mm = 0.5;
-
-function numberIn(name: string, text: string, least: number, most: number): number {
+function numberIn(name: string, text: string, [least, most]: readonly [number, number]): number {
   const value = text.trim() === '' ? NaN : Number(text);
   if (!(value >= least && value <= most)) {
     throw new Error(`${name}: "${text}" is not a number from ${least} to ${most}`);
@@ -78,12 +79,16 @@ export function commandsFor(info: Info, typed: Partial<Record<Name, string>>): C
   };
   const rate = changed('rate');
   if (rate !== null) {
-    const rate_mHz = rate === 'max' ? 0 : Math.round(1000 * numberIn('Frame rate', rate, 0.1, 2000));
+    const rate_mHz = rate === 'max' ? 0 : Math.round(1000 * numberIn('Frame rate', rate, RATE_Hz));
     commands.push({ type: PacketType.CMD_RATE, rate_mHz });
   }
   const osr = changed('osr');
   if (osr !== null) {
-    commands.push({ type: PacketType.CMD_OSR, osr: numberIn('Oversampling', osr, 256, 8192) });
+    const known = RANGES.OSR.find((each) => String(each) === osr);
+    if (known === undefined) {
+      throw new Error(`Oversampling: "${osr}" is none of ${RANGES.OSR.join(', ')}`);
+    }
+    commands.push({ type: PacketType.CMD_OSR, osr: known });
   }
   const threshold = changed('slip_threshold');
   const window_text = changed('slip_window');
@@ -91,11 +96,11 @@ export function commandsFor(info: Info, typed: Partial<Record<Name, string>>): C
     commands.push({
       type: PacketType.CMD_SLIP,
       threshold_mm:
-        threshold === null ? info.slip_threshold_mm : numberIn('Slip threshold', threshold, 0.01, 50),
+        threshold === null ? info.slip_threshold_mm : numberIn('Slip threshold', threshold, RANGES.SLIP_THRESHOLD_mm),
       window_ms:
         window_text === null
           ? info.slip_window_ms
-          : Math.round(numberIn('Slip window', window_text, 5, 1000)),
+          : Math.round(numberIn('Slip window', window_text, RANGES.SLIP_WINDOW_ms)),
     });
   }
   const prior = changed('prior');
@@ -106,9 +111,11 @@ export function commandsFor(info: Info, typed: Partial<Record<Name, string>>): C
         ? { type: PacketType.CMD_PRIOR, sigma_mm: 0, width_mm: 0 }
         : {
             type: PacketType.CMD_PRIOR,
-            sigma_mm: numberIn('Prior', sigma, 0.5, 100),
+            sigma_mm: numberIn('Prior', sigma, RANGES.PRIOR_SIGMA_mm),
             width_mm:
-              width === undefined ? PRIOR_WIDTH_mm : numberIn("The prior's width", width, 0.01, 100),
+              width === undefined
+                ? RANGES.PRIOR_WIDTH_DEFAULT_mm
+                : numberIn("The prior's width", width, RANGES.PRIOR_WIDTH_mm),
           },
     );
   }
@@ -116,7 +123,7 @@ export function commandsFor(info: Info, typed: Partial<Record<Name, string>>): C
   if (limit !== null) {
     commands.push({
       type: PacketType.CMD_LOCATION_LIMIT,
-      limit_mm: numberIn('Location limit', limit, 0.01, 100),
+      limit_mm: numberIn('Location limit', limit, RANGES.LOCATION_LIMIT_mm),
     });
   }
   return commands;

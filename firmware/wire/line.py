@@ -1,0 +1,619 @@
+#!/usr/bin/env python3
+"""Writes, from line.toml, what each language needs to know of the line between fingertip and host.
+
+    line.py            write the files anew
+    line.py --check    say which of them differ, and exit with 1
+
+Needs nothing but Python 3.11.
+"""
+import argparse
+import pathlib
+import sys
+import textwrap
+import tomllib
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+SAYS = "written by firmware/wire/line.py from line.toml; change it there"
+BYTES = {"u8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "f32": 4, "n": 1}
+C_TYPES = {"u8": "uint8_t", "u16": "uint16_t", "i16": "int16_t", "u32": "uint32_t", "i32": "int32_t", "u64": "uint64_t", "f32": "float", "n": "uint8_t"}
+STRUCT_CODES = {"u8": "B", "u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "f32": "f", "n": "n", "text": "16s"}
+SETS = {"flags": "Flag", "streams": "Streams", "capabilities": "Capability", "stored": "Stored"}
+
+
+class Field:
+    """One line of the description."""
+
+    def __init__(self, line, wanted):
+        self.name = line["name"]
+        kind, _, times = line["type"].partition(" ")
+        self.kind, self.times = kind, int(times or 1)
+        self.pair = line.get("of")
+        self.twos = line.get("twos")
+        self.each_sensor = bool(self.pair or self.twos)
+        self.when = tuple(line["when"].split(".")) if "when" in line else None
+        self.group = line.get("group")
+        self.text = line.get("text", "")
+        self.member = (f"{self.group}." if self.group else "") + line.get("c", self.name)
+        self.python = line.get("python", self.name)
+        self.key = line.get("key", self.name)
+        self.range = line.get("range")
+        self.is_struct = kind in wanted
+
+    @property
+    def type_text(self):
+        """As PROTOCOL.md has it."""
+        if self.is_struct:
+            return self.kind.replace("_", " ")
+        if self.each_sensor:
+            return f"n x ({self.kind} {self.kind})"
+        return {"text": "text 16", "n": "u8"}.get(self.kind, self.kind) + (f" x {self.times}" if self.times > 1 else "")
+
+    @property
+    def names_text(self):
+        return ", ".join(self.pair or self.twos or [self.name])
+
+
+class Body:
+    """A packet, a command, or a part of some."""
+
+    def __init__(self, name, table, wanted):
+        self.name = name
+        self.type = table.get("type")
+        self.python = table["python"]
+        self.text = table["text"]
+        self.word = table.get("word")
+        self.capability = table.get("of")
+        self.c_struct = table.get("c_struct")
+        self.fields = [Field(line, wanted) for line in table["fields"]]
+        self.keys = table.get("keys")
+        self.columns = table.get("columns")
+        self.lists = table.get("lists", [])
+
+    def field(self, name):
+        return next(field for field in self.fields if field.name == name)
+
+
+class Line:
+    def __init__(self, path):
+        with open(path, "rb") as file:
+            said = tomllib.load(file)
+        self.version, self.sensors_max, self.text_bytes, self.loader_magic = (said[key] for key in ("version", "sensors_max", "text_bytes", "loader_magic"))
+        self.flags, self.streams, self.capabilities, self.stored, self.results = (said[key] for key in ("flags", "streams", "capabilities", "stored", "results"))
+        self.ranges = said["ranges"]
+        wanted = said["struct"].keys()
+        self.structs = {name: Body(name, table, wanted) for name, table in said["struct"].items()}
+        self.packets = {name: Body(name, table, wanted) for name, table in said["packet"].items()}
+        self.commands = {name: Body(name, table, wanted) for name, table in said["command"].items()}
+        numbers = [body.type for body in (*self.packets.values(), *self.commands.values())]
+        for what, values in (("type", numbers), *((key, [each["bit"] for each in getattr(self, key)]) for key in SETS)):
+            twice = {value for value in values if values.count(value) > 1}
+            if twice:
+                raise SystemExit(f"line.py: {what} {sorted(twice)} is there twice")
+
+    def bit(self, when):
+        """Of the word that a field names, "flags.FIT_VALID"."""
+        return next(each["bit"] for each in getattr(self, when[0]) if each["name"] == when[1])
+
+    def warnings(self):
+        return sum(1 << flag["bit"] for flag in self.flags if flag.get("warning"))
+
+    def longest_frame(self):
+        """Bytes, delimiter included: all that an info packet can hold, COBS's byte for each 254, header and CRC."""
+        def size(fields):
+            return sum(size(self.structs[field.kind].fields) if field.is_struct else self.text_bytes if field.kind == "text"
+                       else BYTES[field.kind] * field.times * (2 * self.sensors_max if field.each_sensor else 1) for field in fields)
+
+        packet = 12 + max(size(body.fields) for body in (*self.packets.values(), *self.commands.values())) + 4
+        return packet + packet // 254 + 2
+
+    def quantities(self):
+        """Fields of contact that hold under a flag and are floats, in the order of the columns; how many of them are in recordings of before."""
+        contact = self.packets["contact"]
+        first = [contact.field(name) for name in contact.columns if name != "sequence" and contact.field(name).kind == "f32"]
+        return first + [field for field in contact.fields if field.kind == "f32" and field not in first], len(first)
+
+    def stages(self):
+        return [field.name for field in self.packets["contact"].fields if field.group == "stages"]
+
+    def later(self):
+        """Columns that are not in recordings of before."""
+        contact = self.packets["contact"]
+        return [field for field in contact.fields if field.name not in contact.columns and field.name != "frame"]
+
+
+# ---- C
+
+def c_comment(text, indent="  ", width=100):
+    if not text:
+        return []
+    lines = textwrap.wrap(text, width - len(indent) - 6)
+    return [f"{indent}/* {lines[0]}" + (" */" if len(lines) == 1 else ""), *(f"{indent} * {line}" for line in lines[1:-1]),
+            *([f"{indent} * {lines[-1]} */"] if len(lines) > 1 else [])]
+
+
+def c_described(code, text, indent="  "):
+    """A declaration with its comment, behind it or above."""
+    line = f"{indent}{code} /* {text} */"
+    return [line] if text and len(line) <= 100 else [*c_comment(text, indent), indent + code]
+
+
+def c_bits(title, prefix, entries):
+    lines = [*c_comment(title, ""), f"enum wire_{title_word(prefix)} {{"]
+    for each in entries:
+        value = f"1 << {each['bit']}" if "bit" in each else str(each["number"])
+        lines += c_described(f"WIRE_{prefix}_{each['name']} = {value},", each["text"])
+    return lines
+
+
+def title_word(prefix):
+    return prefix.lower()
+
+
+def contact_flags_h(line):
+    lines = [f"/* {SAYS}.", " *", " * What a contact result says about itself. The bits travel unchanged in the contact packet.", " *",
+             " * A quantity may be used only under its VALID flag; where the flag is off its field is zero.",
+             " * The warnings leave the numbers in place and say why they deserve less trust.", " */",
+             "#ifndef COMMON_CONTACT_FLAGS_H", "#define COMMON_CONTACT_FLAGS_H", "", "enum contact_flag {"]
+    for flag in line.flags:
+        lines += c_described(f"CONTACT_FLAG_{flag['name']} = 1 << {flag['bit']},", "warning: " * bool(flag.get("warning")) + flag["text"])
+    return [*lines, "};", "", "#endif"]
+
+
+def c_number(value, unit):
+    return f"{value}u" if isinstance(value, int) else f"{value}f"
+
+
+def c_member(field):
+    if field.is_struct:
+        return [f"struct {field.kind} {field.name};"]
+    if field.pair:
+        return [f"{C_TYPES[field.kind]} {name}[FT_MAX_SENSORS];" for name in field.pair]
+    if field.kind == "text":
+        return [f"char {field.name}[WIRE_TEXT_BYTES];"]
+    return [f"{C_TYPES[field.kind]} {field.name}{f'[{field.times}]' if field.times > 1 else ''};"]
+
+
+def c_struct(name, body, line):
+    lines, group, when = [*c_comment(body.text, ""), f"struct {name} {{"], None, None
+    groups = {}
+    for field in body.fields:
+        if field.group:
+            if field.group not in groups:
+                lines.append(f"  struct wire_{field.group} {field.group};")
+            groups.setdefault(field.group, []).append(field)
+            continue
+        if field.when != when and field.when:
+            lines.append(f"  /* {field.when[1]} */" if field.when[0] == "flags" else f"  /* with WIRE_{one(field.when[0])}_{field.when[1]}, else 0 */")
+        elif field.when != when:
+            lines.append("  /* always */")
+        when = field.when
+        first, *others = c_member(field)
+        lines += c_described(first, field.text) + ["  " + other for other in others]
+    before = []
+    for group, fields in groups.items():
+        before += [*c_comment("Where the time of one frame went, us. The stages follow one another without a gap. Values above 65535 saturate.", ""),
+                   f"struct wire_{group} {{"]
+        for field in fields:
+            before += c_described(c_member(field)[0], field.text)
+        before += ["};", ""]
+    return [*before, *lines, "};"]
+
+
+def one(key):
+    return {"capabilities": "CAPABILITY", "stored": "STORED", "streams": "STREAM"}[key]
+
+
+def bodies_h(line):
+    lines = [f"/* {SAYS}.", " *", " * The bodies of packets and commands; PROTOCOL.md is the specification. Included by packet.h alone.", " */",
+             "#ifndef WIRE_BODIES_H", "#define WIRE_BODIES_H", "",
+             '#include "common/calibration.h"', '#include "common/crash.h"', '#include "common/limits.h"', '#include "common/pad_profile.h"', "",
+             "#include <stdint.h>", "", f"#define WIRE_VERSION {line.version}", "", f"enum {{ WIRE_TEXT_BYTES = {line.text_bytes} }};", "",
+             "enum wire_type {", "  /* device to host */"]
+    lines += [f"  WIRE_{body.name.upper()} = 0x{body.type:02X}," for body in line.packets.values()]
+    lines += ["  /* host to device */"] + [f"  WIRE_CMD_{body.name.upper()} = 0x{body.type:02X}," for body in line.commands.values()] + ["};", ""]
+    for title, prefix, entries in (("Bits of the stream mask.", "STREAM", line.streams),
+                                   ("What a build can do: cmake/options.cmake.", "CAPABILITY", line.capabilities),
+                                   ("The result code of an acknowledgement.", "RESULT", line.results),
+                                   ("Bits of the word that says what the fingertip keeps without power.", "STORED", line.stored)):
+        lines += c_bits(title, prefix, entries)
+        if prefix == "STREAM":
+            lines.append(f"  WIRE_STREAM_ALL = {' | '.join('WIRE_STREAM_' + each['name'] for each in entries)},")
+        lines += ["};", ""]
+    lines += ["/* Ranges of the settings that commands carry; the device answers OUT_OF_RANGE beyond them. */"]
+    for name, each in line.ranges.items():
+        unit = f"_{each['unit']}" if each["unit"] else ""
+        lines += c_comment(each["text"], "")
+        if "choices" in each:
+            lines += [f"#define WIRE_{name}_MIN {each['choices'][0]}u /* and its doubles */", f"#define WIRE_{name}_MAX {each['choices'][-1]}u"]
+            continue
+        lines += [f"#define WIRE_{name}_{end.upper()}{unit} {c_number(each[end], unit)}" for end in ("min", "max", "default") if end in each]
+    lines += [f"#define WIRE_LOADER_MAGIC 0x{line.loader_magic:08X}u /* \"Boot\" */", ""]
+    for body in line.packets.values():
+        if not body.c_struct:
+            lines += [*c_struct(f"wire_{body.name}", body, line), ""]
+    for body in line.commands.values():
+        if body.fields:
+            lines += [*c_struct(f"wire_cmd_{body.name}", body, line), ""]
+    lines += ["union wire_body {"]
+    lines += [f"  struct {body.c_struct or 'wire_' + body.name} {body.name};" for body in line.packets.values()]
+    lines += [f"  struct wire_cmd_{body.name} cmd_{body.name};" for body in line.commands.values() if body.fields]
+    lines += ["};", "", "/* The layout of one body. */", "struct wire_layout;"]
+    names = [f"wire_{body.name}_layout" for body in line.packets.values()] + [f"cmd_{body.name}_layout" for body in line.commands.values()]
+    lines += [f"extern const struct wire_layout {name};" for name in names]
+    lines += ["", "/* The commands that every fingertip knows, and those of its capabilities, for its set. */"]
+    for capability in dict.fromkeys(body.capability for body in line.commands.values()):
+        macro = "WIRE_COMMANDS" + (f"_OF_{capability}" if capability else "")
+        entries = [f"&cmd_{body.name}_layout" for body in line.commands.values() if body.capability == capability]
+        lines += [f"#define {macro} \\", *(f"  {entry}, \\" for entry in entries[:-1]), f"  {entries[-1]}"]
+    return [*lines, "", "#endif"]
+
+
+KINDS = {"u8": "BYTES", "text": "TEXTS", "n": "SENSOR_COUNT", "u16": "U16", "i16": "U16", "u32": "U32", "u64": "U64", "f32": "F32"}
+
+
+def runs_of(body, line, when=None, prefix=""):
+    """(kind, count, member, when), consecutive fields of one kind together."""
+    runs = []
+    for field in body.fields:
+        condition = field.when or when
+        member = prefix + field.member
+        if field.is_struct:
+            runs += runs_of(line.structs[field.kind], line, condition, member + ".")
+            continue
+        if field.pair:
+            run = ("F32_PAIRS" if field.kind == "f32" else "PAIRS", 1, prefix + field.pair[0], condition)
+        elif field.twos:
+            run = ("F32_TWOS", 1, member, condition)
+        else:
+            run = (KINDS[field.kind], field.times, member, condition)
+        if runs and runs[-1][0] == run[0] and runs[-1][3] == condition and run[0] in ("BYTES", "TEXTS", "U16", "U32", "F32"):
+            runs[-1] = (run[0], runs[-1][1] + run[1], *runs[-1][2:])
+        else:
+            runs.append(run)
+    return runs
+
+
+def layouts_inc(line):
+    lines = [f"/* {SAYS}.", " *", " * The layouts of all bodies, for packet.c alone. */", ""]
+    used = {}
+    for prefix, bodies in (("wire_", line.packets), ("cmd_", line.commands)):
+        for body in bodies.values():
+            where = body.name if prefix == "wire_" else "cmd_" + body.name
+            name = prefix + body.name
+            number = f"WIRE_{'CMD_' if prefix == 'cmd_' else ''}{body.name.upper()}"
+            if not body.fields:
+                lines.append(f"EMPTY_LAYOUT({name}, {number});")
+                continue
+            lines.append(f"static const struct run {name}_runs[] = {{")
+            for kind, count, member, when in runs_of(body, line):
+                if when:
+                    lines.append(f"    RUN(WHEN, {line.bit(when)}, {where}.{when[0]}),")
+                    used[when] = line.bit(when)
+                lines.append(f"    RUN({kind}, {count}, {where}.{member}),")
+            lines += ["};", f"LAYOUT({name}, {number});"]
+    return [*lines, "", "#define ALL_PACKETS \\",
+            *(f"  &wire_{body.name}_layout, \\" for body in list(line.packets.values())[:-1]), f"  &wire_{list(line.packets)[-1]}_layout",
+            "#define ALL_COMMANDS \\", "  WIRE_COMMANDS, WIRE_COMMANDS_OF_FIT, WIRE_COMMANDS_OF_SLIP, WIRE_COMMANDS_OF_TANGENTIAL"]
+
+
+# ---- C++
+
+def line_fields_hpp(line):
+    contact, raw, info, health, ack = (line.packets[name] for name in ("contact", "raw", "info", "health", "ack"))
+    lines = [f"/* {SAYS}.", " *", " * Walks over the fields of packets in the order of columns and comments of recordings, and the words",
+             " * for what packets number; no interface of the library. */", "#pragma once", "", '#include "libfingertip/wire.hpp"', "",
+             "#include <cstddef>", "#include <cstdint>", "#include <string>", "", "namespace fingertip::recording {", "",
+             "/* A value of the packet that the file shows in another unit: shown = raw / scale. */",
+             "template <typename Integer> struct Scaled {", "  Integer &raw;", "  double scale;", "  int digits;", "};", "",
+             "/* A float that holds under a flag. */", "struct Quantity {", "  float &value;", "  bool valid;", "};", "",
+             f"inline constexpr std::size_t RAW_COLUMNS = {len(raw.fields) - 2}; /* without those of the sensors */", ""]
+
+    def visit_contact(field):
+        if field.kind == "f32":
+            return f'  visit("{field.name}", Quantity{{contact.{field.member}, (contact.flags & CONTACT_FLAG_{field.when[1]}) != 0}});'
+        return f'  visit("{field.name}", contact.{field.member});'
+
+    lines += ["/* Recordings of before have no columns for what comes after has_tangential. */", "template <typename Visitor>",
+              "void visit_contact(Visitor &visit, wire_packet &packet, bool has_tangential = true) {", "  wire_contact &contact = packet.body.contact;"]
+    for name in contact.columns:
+        lines.append('  visit("sequence", packet.sequence);' if name == "sequence" else visit_contact(contact.field(name)))
+    lines += ["  if (!has_tangential) {", "    return;", "  }", *map(visit_contact, line.later()), "}", ""]
+    lines += ["template <typename Visitor>", "void visit_raw(Visitor &visit, wire_packet &packet, std::uint8_t sensor_count) {",
+              "  wire_raw &raw = packet.body.raw;", '  visit("raw_sequence", packet.sequence);']
+    for field in raw.fields:
+        if field.kind == "u32" and field.name != "frame":
+            lines.append(f'  visit("{field.key}", raw.{field.name});')
+        elif field.name == "temperature_cC":
+            lines.append('  visit("temperature_degC", Scaled<std::int16_t>{raw.temperature_cC, 100.0, 2});')
+        elif field.pair:
+            for column, name in zip(("s", "tare"), field.pair, strict=True):
+                lines += ["  for (int k = 0; k < sensor_count; k++) {",
+                          f'    visit("{column}" + std::to_string(k) + "_Pa", Scaled<std::int32_t>{{raw.{name}[k], 1024.0, 4}});', "  }"]
+    lines += ["}", ""]
+
+    def visitor(name, body, fields, kind):
+        return [f"template <typename Visitor> void visit_{name}(Visitor &visit, {kind} &{name}) {{",
+                *(f'  visit("{field.key}", {name}.{field.member});' for field in fields), "}", ""]
+
+    lines += visitor("health", health, map(health.field, health.keys), "wire_health") + visitor("ack", ack, ack.fields, "wire_ack")
+    lines += visitor("info", info, map(info.field, info.keys), "wire_info")
+    calibration, pad = line.structs["calibration"], line.structs["pad_profile"]
+    lines += ["/* What there is only of a calibrated fingertip: numbers, and lists with one for each sensor. */"]
+    lines += visitor("calibration", calibration, [field for field in calibration.fields if not field.twos], "struct calibration")
+    lines += ["struct SensorList {", "  const char *name;", "  float sensor_calibration::*value;", "};", "inline constexpr SensorList sensor_lists[] = {",
+              *(f'    {{"{name}s", &sensor_calibration::{name}}},' for name in next(field.twos for field in calibration.fields if field.twos)), "};", "",
+              "/* What there is only where a pad's profile is stored: numbers, and lists with one for each term. */"]
+    lines += visitor("pad", pad, [field for field in pad.fields if field.key.startswith("pad_")], "pad_profile")
+    lines += ["struct PadList {", "  const char *name;", "  std::size_t terms;", "  float &(*value)(pad_profile &pad, std::size_t term);", "};",
+              "inline constexpr PadList pad_lists[] = {"]
+    for each in pad.lists:
+        lines.append(f'    {{"{each["key"]}", {each["count"]}, [](pad_profile &pad, std::size_t j) -> float & {{ return pad.{each["member"]}; }}}},')
+    lines += ["};", "", "} // namespace fingertip::recording", "", "namespace fingertip::words {", "",
+              "struct Word {", "  std::uint32_t value; /* a bit, or a number */", "  const char *word;", "};"]
+    for name, prefix, entries, word in (("streams", "WIRE_STREAM_", line.streams, "word"), ("capabilities", "WIRE_CAPABILITY_", line.capabilities, "word"),
+                                        ("stored", "WIRE_STORED_", line.stored, "word"), ("results", "WIRE_RESULT_", line.results, "word")):
+        lines += [f"inline constexpr Word {name}[] = {{", *(f'    {{{prefix}{each["name"]}, "{each[word]}"}},' for each in entries), "};"]
+    lines += ["inline constexpr Word commands[] = {", *(f'    {{WIRE_CMD_{body.name.upper()}, "{body.word}"}},' for body in line.commands.values()), "};",
+              "", "struct Flag {", "  std::uint32_t bit;", "  const char *name;", "  bool warning;", "};", "/* Those of state, then the warnings. */",
+              "inline constexpr Flag flags[] = {"]
+    for flag in sorted(line.flags, key=lambda flag: bool(flag.get("warning"))):
+        lines.append(f'    {{CONTACT_FLAG_{flag["name"]}, "{flag["name"]}", {"true" if flag.get("warning") else "false"}}},')
+    return [*lines, "};", "", "} // namespace fingertip::words"]
+
+
+# ---- Python
+
+def py_wire(field, line):
+    if field.is_struct:
+        kind = line.structs[field.kind].python
+        when = f", when={py_when(field)}" if field.when else ""
+        return f'Annotated[{kind}{" | None" if field.when else ""}, Wire("{kind}"{when})]'
+    code = STRUCT_CODES[field.kind]
+    base = {"f32": "float", "text": "str"}.get(field.kind, "int")
+    if field.times > 1 or field.each_sensor:
+        base = f"tuple[{base}, ...]"
+    said = f'"{code}"' + (f", {field.times}" if field.times > 1 else "") + (", 2, each_sensor=True" if field.each_sensor else "")
+    if field.when:
+        absent = "math.nan" if field.kind == "f32" else "0" if field.when[0] == "flags" else None
+        base += "" if absent else " | None"
+        said += f", when={py_when(field)}" + (f", absent={absent}" if absent else "")
+    return f"Annotated[{base}, Wire({said})]"
+
+
+def py_when(field):
+    return f'("{field.when[0]}", {SETS[field.when[0]]}.{field.when[1]})'
+
+
+def py_doc(text, indent="    ", width=140):
+    if len(text) <= width - len(indent) - 6:
+        return [f'{indent}"""{text}"""']
+    return [f'{indent}"""' + f"\n{indent}".join(textwrap.wrap(text, width - len(indent) - 3)), f'{indent}"""']
+
+
+def py_class(body, line):
+    lines = [f"class {body.python}(NamedTuple):", *py_doc(body.text), ""]
+    for field in body.fields:
+        lines += [f"    {field.python}: {py_wire(field, line)}", *(py_doc(field.text) if field.text else [])]
+    if not body.fields:
+        lines.pop()
+    for field in body.fields:
+        names = field.pair or field.twos
+        if names and field.kind == "f32":
+            plural = "s" if field.twos else ""
+            for i, name in enumerate(names):
+                lines += ["", "    @property", f"    def {name}{plural}(self) -> tuple[float, ...]:", f'        """Of each sensor."""',
+                          f"        return self.{field.python}[{i}::2]"]
+    return [*lines, "", ""]
+
+
+def line_py(line):
+    lines = [f'"""{SAYS}.', "", "The packets of the line between a fingertip and its host (firmware/wire/PROTOCOL.md), and the names of what they number. The annotations of a",
+             "body are its layout, for both directions. A quantity that is there only under a bit of another field is NaN (a float) or None without it.", '"""',
+             "import enum", "import math", "from typing import Annotated, Any, NamedTuple", "", f"VERSION = {line.version}", f"SENSORS_MAX = {line.sensors_max}",
+             f"MAX_FRAME_BYTES = {line.longest_frame()}  # longer is damage", f"LOADER_MAGIC = 0x{line.loader_magic:08X}", "", "",
+             "class Wire(NamedTuple):", '    """How a field travels: struct\'s code, how many of it, whether once for each sensor, and under which bit of which field."""', "",
+             "    code: str", "    times: int = 1", "    each_sensor: bool = False", "    when: tuple[str, int] | None = None", "    absent: Any = None", "", ""]
+
+    def bits(name, doc, entries, before=(), after=()):
+        text = [f"class {name}(enum.IntFlag):", f'    """{doc}"""', "", *before]
+        for each in entries:
+            warning = "warning: " if each.get("warning") else ""
+            text.append(f"    {each['name']} = 1 << {each['bit']}  #: {warning}{each['text']}")
+        return [*text, *after, "", ""]
+
+    lines += bits("Flag", "What a frame says about itself. A quantity may be used only under its VALID flag; without it, it is NaN here.", line.flags)
+    lines += [f"WARNINGS = Flag(0x{line.warnings():X})", '"""The numbers are there, but deserve less trust. Whoever uses them heeds these."""', "", ""]
+    lines += bits("Streams", "What a fingertip sends unasked.", line.streams, ["    NONE = 0"], [f"    ALL = {' | '.join(each['name'] for each in line.streams)}"])
+    lines += bits("Capability", "What a firmware can do.", line.capabilities) + bits("Stored", "What a fingertip keeps without power.", line.stored)
+    lines += ["class Result(enum.IntEnum):", '    """What an acknowledgement says."""', "",
+              *(f"    {each['name']} = {each['number']}  #: {each['text']}" for each in line.results), "", ""]
+    lines += ["class Range(NamedTuple):", '    """Of a setting, in its unit."""', "", "    least: float", "    most: float", "", ""]
+    for name, each in line.ranges.items():
+        unit = f"_{each['unit']}" if each["unit"] else ""
+        lines.append(f"{name}{unit} = {tuple(each['choices'])}" if "choices" in each else f"{name}{unit} = Range({each['min']}, {each['max']})")
+        if "default" in each:
+            lines.append(f"{name}_DEFAULT{unit} = {each['default']}")
+    lines += ["", ""]
+    for body in (*line.structs.values(), *line.packets.values(), *line.commands.values()):
+        lines += py_class(body, line)
+    bodies = [*line.packets.values(), *line.commands.values()]
+    lines += [f"Body = {bodies[0].python} | " + " | ".join(body.python for body in bodies[1:]), f"CONTACT, RAW = 0x{line.packets['contact'].type:02x}, 0x{line.packets['raw'].type:02x}",
+              "TYPES: dict[int, type[Body]] = {", *(f"    0x{body.type:02X}: {body.python}," for body in bodies), "}",
+              "NESTED: dict[str, Any] = {" + ", ".join(f'"{body.python}": {body.python}' for body in line.structs.values()) + "}", "", ""]
+    contact, raw = line.packets["contact"], line.packets["raw"]
+    lines += ["# Columns of recordings.", py_tuple("STAGES", line.stages()[:-1]), py_tuple("CONTACT_COLUMNS", contact.columns),
+              py_tuple("TANGENTIAL_COLUMNS", [field.name for field in line.later()], "NaN in recordings of before there were any"),
+              py_tuple("RAW_COLUMNS", ["raw_sequence", *(field.key for field in raw.fields if field.kind == "u32" and field.name != "frame"), "temperature_degC"]),
+              "", ""]
+    lines += ["class ContactQuantities:", '    """The quantities of a contact packet by their names; NaN without their flag, or without a packet."""', "", "    __slots__ = ()", "    contact: Contact"]
+    for field in contact.fields:
+        if field.when:
+            lines += ["", "    @property", f"    def {field.name}(self) -> {'float' if field.kind == 'f32' else 'int'}:",
+                      *py_doc(field.text[0].upper() + field.text[1:] + ".", "        "), f"        return self.contact.{field.name}"]
+    return lines
+
+
+def py_tuple(name, words, comment=""):
+    body = textwrap.wrap(", ".join(f'"{word}"' for word in words), 140)
+    return f"{name} = ({' # ' + comment if comment else ''}\n    " + "\n    ".join(body) + ")"
+
+
+# ---- ROS 2
+
+ROS_TYPES = {"u16": "uint16", "u32": "uint32", "f32": "float32"}
+
+
+def contact_msg(line):
+    contact, raw = line.packets["contact"], line.packets["raw"]
+
+    def said(code, text):
+        return f"{code:<27} # {text}" if text else code
+
+    def of(field):
+        return said(f"{ROS_TYPES[field.kind]} {field.key.lower()}", field.text)
+
+    lines = [f"# {SAYS}.", "#", "# A frame of a fingertip: its contact packet, its raw packet, or both, unchanged. NaN is what there is not: a quantity whose flag is off.",
+             "# Use a number only if its flag is on, and no warning: flags & (FIT_VALID | WARNINGS) == FIT_VALID.", "",
+             said("std_msgs/Header header", "as log time: begin of the recording, and what the clocks tell since then"),
+             said("uint64 line", "of the recording, from 1, 0 outside of one; counts those of fingertip_msgs/Line and of other fingertips too"),
+             said("uint32 device", "number of the fingertip in a recording of several"),
+             said("float64 time_us", "on the recorder's clock, since the recording's host_zero_us; NaN in a recording of one"),
+             said("uint64 t_us", "on the fingertip's clock: the middle of the sensors' conversion"),
+             said("uint32 frame", "number, from the fingertip's start"), "",
+             said("bool has_contact", "without: all below, until raw_sequence, is 0 and NaN"), said("uint16 sequence", "of the packet"), "uint32 flags"]
+    for flag in line.flags:
+        lines.append(said(f"uint32 {flag['name']}={1 << flag['bit']}", "warning: " * bool(flag.get("warning")) + flag["text"]))
+    lines.append(said(f"uint32 WARNINGS={line.warnings()}", "all of them"))
+    lines += [of(contact.field(name)) for name in contact.columns if name not in ("sequence", "flags")] + [of(field) for field in line.later()]
+    lines += ["", said("bool has_raw", "without: all below is 0, NaN and empty"), "uint16 raw_sequence"]
+    lines += [of(field) for field in raw.fields if field.kind == "u32" and field.name != "frame"]
+    return [*lines, said("float64 temperature_degc", "mean of the sensors; 0 until measured"),
+            said("float64[] pressure_pa", "absolute, as measured; exact multiples of 1/1024"), said("float64[] tare_pa", "the zero of each sensor")]
+
+
+# ---- the page
+
+def line_facts_ts(line):
+    lines = [f"/** {SAYS}. */", "", f"export const WIRE_VERSION = {line.version};", f"export const MAX_SENSORS = {line.sensors_max};",
+             f"export const MAX_FRAME_BYTES = {line.longest_frame()};", f"export const LOADER_MAGIC = 0x{line.loader_magic:08x};", "", "export const PacketType = {"]
+    lines += [f"  {body.name.upper()}: 0x{body.type:02x}," for body in line.packets.values()]
+    lines += [f"  CMD_{body.name.upper()}: 0x{body.type:02x}," for body in line.commands.values()] + ["} as const;", ""]
+    for doc, name, entries in (("Bits of the stream mask.", "Stream", line.streams), ("What a firmware can do.", "Capability", line.capabilities),
+                               ("What a fingertip keeps without power.", "Stored", line.stored), ("What a frame says about itself.", "Flag", line.flags)):
+        lines += [f"/** {doc} */", f"export const {name} = {{", *(f"  {each['name']}: 1 << {each['bit']}," for each in entries), "} as const;"]
+    lines += ["/** What an acknowledgement says. */", "export const Result = {", *(f"  {each['name']}: {each['number']}," for each in line.results), "} as const;", ""]
+    words = "export const {}: readonly (readonly [number, string])[] = ["
+    for name, kind, entries in (("STREAM_WORDS", "Stream", line.streams), ("CAPABILITY_WORDS", "Capability", line.capabilities),
+                                ("STORED_WORDS", "Stored", line.stored), ("RESULT_WORDS", "Result", line.results)):
+        lines += [words.format(name), *(f"  [{kind}.{each['name']}, '{each['word']}']," for each in entries), "];"]
+    lines += [words.format("COMMAND_WORDS"), *(f"  [PacketType.CMD_{body.name.upper()}, '{body.word}']," for body in line.commands.values()), "];", ""]
+    lines += ["/** Those of state, then the warnings. warning: the numbers deserve less trust. */",
+              "export const FLAGS: readonly { bit: number; name: keyof typeof Flag; warning: boolean; meaning: string }[] = ["]
+    for flag in sorted(line.flags, key=lambda flag: bool(flag.get("warning"))):
+        lines.append(f"  {{ bit: Flag.{flag['name']}, name: '{flag['name']}', warning: {'true' if flag.get('warning') else 'false'}, meaning: {ts_text(flag['text'])} }},")
+    quantities, first = line.quantities()
+    lines += ["];", "", "/** The quantities of a contact that hold under a flag, in the order of a recording's columns, and that flag. */", "export const CONTACT_FLAG = {",
+              *(f"  {field.name}: Flag.{field.when[1]}," for field in quantities), "} as const;",
+              "/** So many of them come before the stages; the others are not in recordings of before. */", f"export const FIRST_FIELDS_COUNT = {first};", ""]
+    health = line.packets["health"]
+    for name, entries in (("STAGES", line.stages()), ("HEALTH_WORDS", [field.name for field in health.fields if field.kind == "u32" and not field.when]),
+                          ("HEALTH_KEYS", health.keys)):
+        lines += [f"export const {name} = [", *(f"  '{entry}'," for entry in entries), "] as const;"]
+    lines += ["", "/** Of settings. */", "export const RANGES = {"]
+    for name, each in line.ranges.items():
+        unit = f"_{each['unit']}" if each["unit"] else ""
+        lines.append(f"  {name}{unit}: {each['choices']} as const," if "choices" in each else f"  {name}{unit}: [{each['min']:g}, {each['max']:.12g}] as const,")
+        if "default" in each:
+            lines.append(f"  {name}_DEFAULT{unit}: {each['default']},")
+    return [*lines, "} as const;"]
+
+
+def ts_text(text):
+    return f'"{text}"' if "'" in text else f"'{text}'"
+
+
+# ---- PROTOCOL.md
+
+def protocol_parts(line):
+    """name -> lines, for between its marks."""
+    def table(fields, always=True):
+        conditions = any(field.when for field in fields)
+        rows = ["| type | field | what |" + (" there if |" if conditions else ""), "|---|---|---|" + ("---|" if conditions else "")]
+        for field in fields:
+            when = f" {field.when[1] if field.when[0] != 'stored' else 'stored ' + field.when[1]} |" if field.when else " always |"
+            rows.append(f"| {field.type_text} | {field.names_text} | {field.text} |" + (when if conditions else ""))
+        return rows
+
+    parts = {name: table(body.fields) for name, body in (*line.packets.items(), *line.structs.items())}
+    parts["flags"] = ["| bit | name | meaning |", "|---|---|---|"] + [
+        f"| {flag['bit']} | {flag['name']} | {flag['text']}{'; ' + flag['more'] if 'more' in flag else ''} |" for flag in line.flags]
+    for name in ("streams", "capabilities", "stored"):
+        parts[name] = ["| bit | name | meaning |", "|---|---|---|"] + [f"| {each['bit']} | {each['word']} | {each['text']} |" for each in getattr(line, name)]
+    parts["results"] = ["| number | meaning |", "|---|---|"] + [f"| {each['number']} | {each['text']} |" for each in line.results]
+
+    def range_text(field):
+        if not field.range:
+            return ""
+        each = line.ranges[field.range]
+        return f" ({', '.join(map(str, each['choices']))})" if "choices" in each else f" ({each['min']:.12g} to {each['max']:.12g} {each['unit']})"
+
+    parts["commands"] = ["| type | command | body | known with | what it does |", "|---|---|---|---|---|"]
+    for body in line.commands.values():
+        fields = ", ".join(f"{field.type_text} {field.names_text}{range_text(field)}{': ' + field.text if field.text and not field.range else ''}" for field in body.fields)
+        known = next((each["word"] for each in line.capabilities if each["name"] == body.capability), "always")
+        parts["commands"].append(f"| 0x{body.type:02X} | {body.word} | {fields or '-'} | {known} | {body.text} |")
+    return parts
+
+
+def protocol_md(line, text):
+    """The page with its tables anew. Each stands behind a mark "<!-- line.toml: NAME -->" and ends with an empty line."""
+    for name, rows in protocol_parts(line).items():
+        mark = f"<!-- line.toml: {name} -->\n"
+        if text.count(mark) != 1:
+            raise SystemExit(f"line.py: PROTOCOL.md has {text.count(mark)} marks of {name}, it needs one")
+        before, _, after = text.partition(mark)
+        text = before + mark + "\n".join(rows) + "\n\n" + after.partition("\n\n")[2]
+    return text
+
+
+FILES = {
+    "firmware/common/contact_flags.h": contact_flags_h,
+    "firmware/wire/bodies.h": bodies_h,
+    "firmware/wire/layouts.inc": layouts_inc,
+    "host_tools/libfingertip/line_fields.hpp": line_fields_hpp,
+    "host_tools/python/fingertip/line.py": line_py,
+    "host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg": contact_msg,
+    "host_tools/web/src/line/line_facts.ts": line_facts_ts,
+}
+
+
+def written(root):
+    """path -> text of each file."""
+    line = Line(root / "firmware/wire/line.toml")
+    texts = {name: "\n".join(write(line)).rstrip("\n") + "\n" for name, write in FILES.items()}
+    page = "firmware/wire/PROTOCOL.md"
+    texts[page] = protocol_md(line, (root / page).read_text(encoding="utf-8"))
+    return texts
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a file differs")
+    parser.add_argument("--root", type=pathlib.Path, default=ROOT, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    different = 0
+    for name, text in written(options.root).items():
+        path = options.root / name
+        if path.is_file() and path.read_text(encoding="utf-8") == text:
+            continue
+        different += 1
+        if options.check:
+            print(f"{name}: is not what line.toml says; python3 firmware/wire/line.py writes it")
+        else:
+            path.write_text(text, encoding="utf-8")
+            print(f"{name}: written")
+    return 1 if options.check and different else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,679 @@
+"""written by firmware/wire/line.py from line.toml; change it there.
+
+The packets of the line between a fingertip and its host (firmware/wire/PROTOCOL.md), and the names of what they number. The annotations of a
+body are its layout, for both directions. A quantity that is there only under a bit of another field is NaN (a float) or None without it.
+"""
+import enum
+import math
+from typing import Annotated, Any, NamedTuple
+
+VERSION = 5
+SENSORS_MAX = 32
+MAX_FRAME_BYTES = 836  # longer is damage
+LOADER_MAGIC = 0x746F6F42
+
+
+class Wire(NamedTuple):
+    """How a field travels: struct's code, how many of it, whether once for each sensor, and under which bit of which field."""
+
+    code: str
+    times: int = 1
+    each_sensor: bool = False
+    when: tuple[str, int] | None = None
+    absent: Any = None
+
+
+class Flag(enum.IntFlag):
+    """What a frame says about itself. A quantity may be used only under its VALID flag; without it, it is NaN here."""
+
+    CONTACT = 1 << 0  #: a sensor is pressed
+    FIT_VALID = 1 << 1  #: x, y, p0, sigma, force and residual hold a fit
+    UNCERTAINTY_VALID = 1 << 2  #: the standard deviations of location and force have values
+    SLIP_VALID = 1 << 3  #: the slip distance spans its whole window
+    SLIP = 1 << 4  #: the slip distance is above the threshold
+    TARED = 1 << 5  #: readings are relative to a measured zero
+    HELD = 1 << 6  #: all values are those of the frame before: the sensors measured their temperature
+    WIDTHS_VALID = 1 << 7  #: the widths along the axes and their correlation have values
+    LOW_SIGNAL = 1 << 8  #: warning: the peak is below 20 standard deviations of the noise
+    FLAT = 1 << 9  #: warning: there is pressure without a peak: no location
+    UNCERTAIN = 1 << 10  #: warning: location_sd_mm is above the limit that is set
+    MODEL = 1 << 11  #: warning: the residual is too large for one Gaussian
+    SATURATED = 1 << 12  #: warning: a sensor is beyond its range and was left out
+    FORCE_LOWER_BOUND = 1 << 13  #: warning: too few sensors are in their range: the force is at least this
+    SENSOR_MASKED = 1 << 14  #: warning: a sensor is missing or was left out
+    AT_BOUND = 1 << 15  #: warning: the fit stopped at a limit
+    ELONGATED = 1 << 16  #: warning: the contact is not round
+    ZERO_DOUBTFUL = 1 << 17  #: warning: a force and a zero that has moved cannot be told apart
+    SENSOR_DOUBTFUL = 1 << 18  #: warning: a sensor in use gives reason to doubt it
+    CALIBRATED = 1 << 19  #: gains and force scale of a calibration act
+    TANGENTIAL_VALID = 1 << 20  #: the tangential load has values; location and force are corrected for it
+    TANGENTIAL_FROM_TOUCH = 1 << 21  #: the tangential load is what changed since the first touch
+    VELOCITY_VALID = 1 << 22  #: the velocity of the contact has values
+    MOVING = 1 << 23  #: the speed of the contact is above the threshold
+    SLIDING = 1 << 24  #: the contact moves beyond what the load explains, however slowly
+
+
+WARNINGS = Flag(0x7FF00)
+"""The numbers are there, but deserve less trust. Whoever uses them heeds these."""
+
+
+class Streams(enum.IntFlag):
+    """What a fingertip sends unasked."""
+
+    NONE = 0
+    CONTACT = 1 << 0  #: contact packets
+    RAW = 1 << 1  #: raw packets
+    HEALTH = 1 << 2  #: health packets, once a second
+    ALL = CONTACT | RAW | HEALTH
+
+
+class Capability(enum.IntFlag):
+    """What a firmware can do."""
+
+    FIT = 1 << 0  #: contact packets: location and force; and calibrations
+    SLIP = 1 << 1  #: slip, and the command that sets it
+    RAW_STREAM = 1 << 2  #: raw packets
+    TANGENTIAL = 1 << 3  #: tangential load, where the pad's profile is stored
+
+
+class Stored(enum.IntFlag):
+    """What a fingertip keeps without power."""
+
+    CALIBRATION = 1 << 0  #: a calibration, and it acts; never without capability fit
+    SETTINGS = 1 << 1  #: settings; it started with them
+    WRITING = 1 << 2  #: a change is on its way into the flash
+    DAMAGED = 1 << 3  #: what is there is damaged, or of a later firmware, and not used; writing anew mends it
+    PAD = 1 << 4  #: a pad's profile, and it acts; never without capability tangential
+
+
+class Result(enum.IntEnum):
+    """What an acknowledgement says."""
+
+    DONE = 0  #: the command was carried out
+    UNKNOWN_COMMAND = 1  #: the firmware does not know this command
+    OUT_OF_RANGE = 2  #: a value is out of range for this firmware
+    NOT_NOW = 3  #: not now: a tare while no sensor answers, or in contact and not forced; a change of what is stored while one is being written, or where the flash fails
+
+
+class Range(NamedTuple):
+    """Of a setting, in its unit."""
+
+    least: float
+    most: float
+
+
+RATE_mHz = Range(100, 2000000)
+OSR = (256, 512, 1024, 2048, 4096, 8192)
+SLIP_THRESHOLD_mm = Range(0.01, 50.0)
+SLIP_WINDOW_ms = Range(5, 1000)
+PRIOR_SIGMA_mm = Range(0.5, 100.0)
+PRIOR_WIDTH_mm = Range(0.01, 100.0)
+PRIOR_WIDTH_DEFAULT_mm = 0.5
+LOCATION_LIMIT_mm = Range(0.01, 100.0)
+
+
+class Calibration(NamedTuple):
+    """Gains (pressure = reading / gain) and force scale of one pad."""
+
+    date_s: Annotated[int, Wire("I")]
+    """date of the calibration, Unix time"""
+    placements: Annotated[int, Wire("H")]
+    """placements that entered it"""
+    force_scale: Annotated[float, Wire("f")]
+    """force is this times 2 pi p0 sigma^2"""
+    force_scale_sd: Annotated[float, Wire("f")]
+    """its standard deviation"""
+    gains_and_sds: Annotated[tuple[float, ...], Wire("f", 2, each_sensor=True)]
+    """of each sensor: gain, and its relative standard deviation"""
+
+    @property
+    def gains(self) -> tuple[float, ...]:
+        """Of each sensor."""
+        return self.gains_and_sds[0::2]
+
+    @property
+    def gain_sds(self) -> tuple[float, ...]:
+        """Of each sensor."""
+        return self.gains_and_sds[1::2]
+
+
+class PadProfile(NamedTuple):
+    """How the rubber of a pad spreads what presses and what pulls (firmware/common/pad_profile.h has meaning and ranges)."""
+
+    thickness_mm: Annotated[float, Wire("f")]
+    """of the rubber"""
+    overhang_mm: Annotated[float, Wire("f")]
+    """of the rubber beyond the outer sensors; 0: not told"""
+    normal: Annotated[tuple[float, ...], Wire("f", 4)]
+    """two normal terms: share and sd_mm of each"""
+    tangential: Annotated[tuple[float, ...], Wire("f", 6)]
+    """three tangential terms: moment_mm and sd_mm of each"""
+    spread_mm2: Annotated[float, Wire("f")]
+    """what to expect of a contact's own spread"""
+    spread_sd_mm2: Annotated[float, Wire("f")]
+    """its standard deviation"""
+    force_ratio: Annotated[float, Wire("f")]
+    """2 pi p0 sigma^2 of a usual contact over its force"""
+    tangential_scale: Annotated[float, Wire("f")]
+    """tangential force is this times what the profile says"""
+    tangential_scale_sd: Annotated[float, Wire("f")]
+    """its standard deviation"""
+    edge_ratio_x: Annotated[tuple[float, ...], Wire("f", 3)]
+    """what the ends of the pad do, three coefficients each: to the ratio along x"""
+    edge_ratio_y: Annotated[tuple[float, ...], Wire("f", 3)]
+    """to the ratio along y"""
+    edge_gain_x: Annotated[tuple[float, ...], Wire("f", 3)]
+    """to the gain along x"""
+    edge_gain_y: Annotated[tuple[float, ...], Wire("f", 3)]
+    """to the gain along y"""
+    edge_place_x_mm: Annotated[tuple[float, ...], Wire("f", 3)]
+    """to the place, x"""
+    edge_place_y_mm: Annotated[tuple[float, ...], Wire("f", 3)]
+    """to the place, y"""
+    edge_pull_x_mm: Annotated[tuple[float, ...], Wire("f", 3)]
+    """to the place by a load along x"""
+    edge_pull_y_mm: Annotated[tuple[float, ...], Wire("f", 3)]
+    """to the place by a load along y"""
+    edge_force: Annotated[tuple[float, ...], Wire("f", 3)]
+    """to the force"""
+    from_touch: Annotated[int, Wire("B")]
+    """1: the load is to be told from the first touch on; 0"""
+
+
+class Contact(NamedTuple):
+    """One judged frame. The header's time is the middle of the sensors' conversion. A quantity travels only under its VALID flag; without
+    it the encoder leaves it out and the decoder gives 0 (NaN in Python and in messages).
+    """
+
+    frame: Annotated[int, Wire("I")]
+    """counts every frame since start, fitted or not"""
+    flags: Annotated[int, Wire("I")]
+    """what the frame says about itself"""
+    convert_us: Annotated[int, Wire("H")]
+    """broadcast of the conversion command, and the sensors' conversion"""
+    read_us: Annotated[int, Wire("H")]
+    """reading every sensor"""
+    queue_us: Annotated[int, Wire("H")]
+    """the complete frame waits for the processor"""
+    condition_us: Annotated[int, Wire("H")]
+    """compensation, tare, gate"""
+    fit_us: Annotated[int, Wire("H")]
+    """the fit"""
+    contact_us: Annotated[int, Wire("H")]
+    """slip, and the judgement of the result"""
+    total_us: Annotated[int, Wire("H")]
+    """the sum of the six stages: from the first bus activity of the frame to the encoding of this packet"""
+    sensors_used: Annotated[int, Wire("I", when=("flags", Flag.FIT_VALID), absent=0)]
+    """bitmap of the sensors that entered the fit"""
+    x_mm: Annotated[float, Wire("f", when=("flags", Flag.FIT_VALID), absent=math.nan)]
+    """location across the strips, from the centre of the pad"""
+    y_mm: Annotated[float, Wire("f", when=("flags", Flag.FIT_VALID), absent=math.nan)]
+    """location along the strips"""
+    p0_Pa: Annotated[float, Wire("f", when=("flags", Flag.FIT_VALID), absent=math.nan)]
+    """peak of the fitted Gaussian"""
+    sigma_mm: Annotated[float, Wire("f", when=("flags", Flag.FIT_VALID), absent=math.nan)]
+    """standard deviation of the fitted Gaussian"""
+    force_N: Annotated[float, Wire("f", when=("flags", Flag.FIT_VALID), absent=math.nan)]
+    """force scale times 2 pi p0 sigma^2, paper eq. (4); positive: pressing"""
+    residual_rms_Pa: Annotated[float, Wire("f", when=("flags", Flag.FIT_VALID), absent=math.nan)]
+    """root mean square of the residuals of the fit"""
+    location_sd_mm: Annotated[float, Wire("f", when=("flags", Flag.UNCERTAINTY_VALID), absent=math.nan)]
+    """predicted radial standard deviation of the location"""
+    force_sd_N: Annotated[float, Wire("f", when=("flags", Flag.UNCERTAINTY_VALID), absent=math.nan)]
+    """predicted standard deviation of the force, that of the force scale in it"""
+    slip_mm: Annotated[float, Wire("f", when=("flags", Flag.SLIP_VALID), absent=math.nan)]
+    """slip distance, paper eq. (7): of the location from its mean over the slip window"""
+    sigma_x_mm: Annotated[float, Wire("f", when=("flags", Flag.WIDTHS_VALID), absent=math.nan)]
+    """standard deviation of an elliptic Gaussian along x"""
+    sigma_y_mm: Annotated[float, Wire("f", when=("flags", Flag.WIDTHS_VALID), absent=math.nan)]
+    """standard deviation of that along y"""
+    width_correlation: Annotated[float, Wire("f", when=("flags", Flag.WIDTHS_VALID), absent=math.nan)]
+    """of that Gaussian, -1 to 1; 0 unless it lies aslant"""
+    qx_N: Annotated[float, Wire("f", when=("flags", Flag.TANGENTIAL_VALID), absent=math.nan)]
+    """tangential load of the object on the rubber, along x"""
+    qy_N: Annotated[float, Wire("f", when=("flags", Flag.TANGENTIAL_VALID), absent=math.nan)]
+    """tangential load along y"""
+    q_sd_N: Annotated[float, Wire("f", when=("flags", Flag.TANGENTIAL_VALID), absent=math.nan)]
+    """predicted standard deviation of either, those of the scales in it"""
+    tangential_ratio: Annotated[float, Wire("f", when=("flags", Flag.TANGENTIAL_VALID), absent=math.nan)]
+    """size of the tangential load over force_N"""
+    vx_mm_s: Annotated[float, Wire("f", when=("flags", Flag.VELOCITY_VALID), absent=math.nan)]
+    """velocity of the contact along x"""
+    vy_mm_s: Annotated[float, Wire("f", when=("flags", Flag.VELOCITY_VALID), absent=math.nan)]
+    """velocity of the contact along y"""
+
+
+class Raw(NamedTuple):
+    """The readings of one frame. The header's time as in the contact packet of the same frame number. No gain of a calibration is in them.
+    """
+
+    frame: Annotated[int, Wire("I")]
+    """the same number as in the contact packet of this frame"""
+    flags: Annotated[int, Wire("I")]
+    """as in the contact packet; firmware without capability fit sets only CONTACT, TARED, HELD, SATURATED, SENSOR_MASKED, ZERO_DOUBTFUL and
+    SENSOR_DOUBTFUL
+    """
+    valid: Annotated[int, Wire("I")]
+    """bitmap: the reading is a measurement; 0 in a held frame, whose readings are those of the frame before"""
+    saturated: Annotated[int, Wire("I")]
+    """bitmap: the reading is above 1980 mbar, where the sensor's range ends, and does not enter the fit"""
+    doubtful: Annotated[int, Wire("I")]
+    """bitmap: a measurement that there is reason to doubt; 0 in a held frame"""
+    temperature_cC: Annotated[int, Wire("h")]
+    """mean of the sensors, 0.01 degC; 0 until measured"""
+    sensors: Annotated[int, Wire("n")]
+    """number of sensors, 1 to 32"""
+    readings: Annotated[tuple[int, ...], Wire("i", 2, each_sensor=True)]
+    """of each sensor: absolute pressure, and the tare that is subtracted before the fit; both in 1/1024 Pa"""
+
+
+class Info(NamedTuple):
+    """Who a fingertip is, how it is set, and what it keeps. Without its capability a field is 0 (None or NaN in Python)."""
+
+    firmware: Annotated[tuple[int, ...], Wire("B", 3)]
+    """major, minor, patch"""
+    sensors: Annotated[int, Wire("n")]
+    """number of sensors, 1 to 32"""
+    capabilities: Annotated[int, Wire("I")]
+    """what the firmware can do, see below"""
+    git: Annotated[str, Wire("16s")]
+    """commit of the firmware; a final + means uncommitted changes"""
+    board: Annotated[str, Wire("16s")]
+    """name of the board"""
+    scene: Annotated[str, Wire("16s")]
+    """name of the scene"""
+    serial: Annotated[str, Wire("16s")]
+    """16 hexadecimal digits, the flash chip's unique id"""
+    rate_mHz: Annotated[int, Wire("I")]
+    """requested frame rate; 0: as fast as the sensors allow"""
+    measured_rate_mHz: Annotated[int, Wire("I")]
+    """frame rate over the last second; 0 before"""
+    osr: Annotated[int, Wire("H")]
+    """oversampling ratio, 256 to 8192"""
+    temperature_interval_ms: Annotated[int, Wire("H")]
+    """time between temperature conversions while the temperature changes; up to four times as long while it stands still"""
+    streams: Annotated[int, Wire("B")]
+    """streams that are on"""
+    fit_iterations: Annotated[int | None, Wire("B", when=("capabilities", Capability.FIT))]
+    """iterations of the fit"""
+    slip_window_ms: Annotated[int | None, Wire("H", when=("capabilities", Capability.SLIP))]
+    """slip window"""
+    slip_threshold_mm: Annotated[float, Wire("f", when=("capabilities", Capability.SLIP), absent=math.nan)]
+    """slip threshold"""
+    pitch_mm: Annotated[float, Wire("f")]
+    """of a rectangular layout; 0 for a free one"""
+    xy_mm: Annotated[tuple[float, ...], Wire("f", 2, each_sensor=True)]
+    """of each sensor: x and y, from the centre of the pad"""
+    prior_sigma_mm: Annotated[float, Wire("f", when=("capabilities", Capability.FIT), absent=math.nan)]
+    """prior on sigma"""
+    prior_width_mm: Annotated[float, Wire("f", when=("capabilities", Capability.FIT), absent=math.nan)]
+    """its standard deviation; 0: there is no prior"""
+    location_limit_mm: Annotated[float, Wire("f", when=("capabilities", Capability.FIT), absent=math.nan)]
+    """UNCERTAIN is set where location_sd_mm is above it"""
+    stored: Annotated[int, Wire("I")]
+    """what the fingertip keeps without power, see below"""
+    calibration: Annotated[Calibration | None, Wire("Calibration", when=("stored", Stored.CALIBRATION))]
+    """the calibration, below"""
+    pad: Annotated[PadProfile | None, Wire("PadProfile", when=("stored", Stored.PAD))]
+    """the pad's profile, below"""
+
+    @property
+    def x_mm(self) -> tuple[float, ...]:
+        """Of each sensor."""
+        return self.xy_mm[0::2]
+
+    @property
+    def y_mm(self) -> tuple[float, ...]:
+        """Of each sensor."""
+        return self.xy_mm[1::2]
+
+
+class Health(NamedTuple):
+    """Counters since start, modulo 2^32, and present state."""
+
+    capabilities: Annotated[int, Wire("I")]
+    """as in info"""
+    uptime_s: Annotated[int, Wire("I")]
+    """since start"""
+    frames: Annotated[int, Wire("I")]
+    """frames that were read from the array"""
+    frames_incomplete: Annotated[int, Wire("I")]
+    """of these, with at least one sensor missing"""
+    frames_skipped: Annotated[int, Wire("I")]
+    """of these, never fitted: the processor was behind"""
+    packets_sent: Annotated[int, Wire("I")]
+    """handed to the USB queue"""
+    packets_dropped: Annotated[int, Wire("I")]
+    """the queue was full: whole packets, and each leaves a gap in the sequence"""
+    commands_done: Annotated[int, Wire("I")]
+    """commands carried out"""
+    commands_rejected: Annotated[int, Wire("I")]
+    """commands that were unknown, out of range or damaged"""
+    bus_nacks: Annotated[int, Wire("I")]
+    """reads that a sensor did not acknowledge, or that broke off"""
+    bus_timeouts: Annotated[int, Wire("I")]
+    """operations on the bus that did not end in time"""
+    bus_recoveries: Annotated[int, Wire("I")]
+    """nine clocks, and resets of multiplexers"""
+    zero_readings: Annotated[int, Wire("I")]
+    """conversions that had not finished, and those that are void since one did not or was not read"""
+    implausible_readings: Annotated[int, Wire("I")]
+    """readings left out: below zero, or a step that no other sensor shared"""
+    sensors_present: Annotated[int, Wire("I")]
+    """bitmap: the sensor answered at the last attempt"""
+    sensors_prom_bad: Annotated[int, Wire("I")]
+    """bitmap: the PROM's CRC is wrong, and the sensor streams all the same; or the PROM is blank, and it does not"""
+    watchdog_resets: Annotated[int, Wire("I")]
+    """since power-on; faults and panics end in one too, and the command crash asks for the last"""
+    cpu_busy_permille: Annotated[int, Wire("H")]
+    """main loop without interrupts, over the last second"""
+    stack_free_bytes: Annotated[int, Wire("H")]
+    """never touched since start"""
+    fit_failures: Annotated[int | None, Wire("I", when=("capabilities", Capability.FIT))]
+    """frames in contact whose fit could not be solved"""
+
+
+class Acknowledgement(NamedTuple):
+    """The answer to a command."""
+
+    command: Annotated[int, Wire("B")]
+    """type of the command"""
+    result: Annotated[int, Wire("B")]
+    """what came of it, see below"""
+    command_sequence: Annotated[int, Wire("H")]
+    """the command's own"""
+    host_time_us: Annotated[int, Wire("Q")]
+    """time in the command's header, so that the host can relate the clocks"""
+
+
+class Crash(NamedTuple):
+    """How the firmware last came to an end since power-on; kind 0, and all else 0: it did not (firmware/common/crash.h says what the codes
+    mean).
+    """
+
+    kind: Annotated[int, Wire("B")]
+    """0 none, 1 hard fault, 2 panic, 3 watchdog, 4 an exception that nobody handles, 5 stack overflow, 6 start-up gave up"""
+    exception: Annotated[int, Wire("B")]
+    """exception in which the code at pc ran: 0 main loop, 16 + n interrupt n"""
+    vector: Annotated[int, Wire("B")]
+    """exception that took note; 0 for a panic"""
+    activity: Annotated[int, Wire("B")]
+    """what the main loop was at: 0 start, 1 rest, 2 commands, 3 readings, 4 condition, 5 fit, 6 contact, 7 packet, 8 health, 9 store"""
+    stuck: Annotated[int, Wire("B")]
+    """what had made no progress, for kind 3: bit 0 main loop, 1 scan, 2 USB, 3 interrupts"""
+    events: Annotated[tuple[int, ...], Wire("B", 8)]
+    """the last events, newest first: 0 none, 1 start, 2 command, 3 port closed, 4 bus asleep, 5 awake, 6 stored, 7 other sensors answer, 8
+    timeouts on the sensor bus, 9 frames skipped
+    """
+    event_details: Annotated[tuple[int, ...], Wire("B", 8)]
+    """of these: type of the command; 1 if storing failed; how many timeouts or frames in a second"""
+    r0: Annotated[int, Wire("I")]
+    """registers; all 0 where nothing could take note"""
+    r1: Annotated[int, Wire("I")]
+    r2: Annotated[int, Wire("I")]
+    r3: Annotated[int, Wire("I")]
+    r12: Annotated[int, Wire("I")]
+    lr: Annotated[int, Wire("I")]
+    pc: Annotated[int, Wire("I")]
+    xpsr: Annotated[int, Wire("I")]
+    sp: Annotated[int, Wire("I")]
+    event_ages: Annotated[tuple[int, ...], Wire("I", 8)]
+    """ages of the events at the end, in 1024 us; they saturate"""
+    end_us: Annotated[int, Wire("Q")]
+    """time of the end, since the start before it"""
+
+
+class SetStreams(NamedTuple):
+    """Streams to send; 0 stops. One that the firmware's capabilities lack is out of range. Nothing streams until this command: a terminal
+    that echoes cannot start it by accident.
+    """
+
+    streams: Annotated[int, Wire("B")]
+    """bits of the streams"""
+
+
+class Tare(NamedTuple):
+    """Measure the zero anew over the next 16 frames (at rates below 16 Hz those of a second, three at least), during which no contact is
+    reported. While one is reported, and while no sensor answers, it is refused with "not now": what presses would become the zero. The
+    zero follows slow drift only while nothing touches the pad: send this between grasps, as the paper does.
+    """
+
+    force: Annotated[int, Wire("B")]
+    """1: tare whatever touches, where the contact is known to be none; 0"""
+
+
+class SetRate(NamedTuple):
+    """Set the frame rate."""
+
+    rate_mHz: Annotated[int, Wire("I")]
+    """frame rate, or 0"""
+
+
+class SetOsr(NamedTuple):
+    """Set the oversampling."""
+
+    osr: Annotated[int, Wire("H")]
+    """oversampling ratio"""
+
+
+class SetSlip(NamedTuple):
+    """Set the slip metric. Of the window the device keeps 160 frames: 122 ms at 1307 frames/s, 390 ms at 410."""
+
+    threshold_mm: Annotated[float, Wire("f")]
+    """slip threshold"""
+    window_ms: Annotated[int, Wire("H")]
+    """slip window"""
+
+
+class AskInfo(NamedTuple):
+    """Send info, after the acknowledgement."""
+
+
+class AskHealth(NamedTuple):
+    """Send health, after the acknowledgement."""
+
+
+class AskCrash(NamedTuple):
+    """Send crash, after the acknowledgement. The first firmware of this version does not know it."""
+
+
+class Loader(NamedTuple):
+    """Acknowledge, then reboot to the boot ROM's USB loader. Opening the port at 1200 baud does the same."""
+
+    magic: Annotated[int, Wire("I")]
+    """0x746F6F42, so that a stray byte never reboots a fingertip"""
+
+
+class StoreCalibration(NamedTuple):
+    """Store a calibration. Gains 0.25 to 4, their standard deviations 0 to 0.5, scale 0.1 to 10, its standard deviation 0 to 1. Acts from
+    the frame on that follows the acknowledgement.
+    """
+
+    sensors: Annotated[int, Wire("n")]
+    """that of the fingertip"""
+    calibration: Annotated[Calibration, Wire("Calibration")]
+    """as in info"""
+
+
+class EraseCalibration(NamedTuple):
+    """Gains and scale are 1 again."""
+
+
+class Keep(NamedTuple):
+    """Keep settings without power."""
+
+    keep: Annotated[int, Wire("B")]
+    """1: from now on start with the present rate, OSR, slip settings, prior and limit; 0: with the firmware's own again"""
+
+
+class SetPrior(NamedTuple):
+    """Set the width to expect of a contact, and its standard deviation; 0 and 0: none."""
+
+    sigma_mm: Annotated[float, Wire("f")]
+    """width"""
+    width_mm: Annotated[float, Wire("f")]
+    """its standard deviation"""
+
+
+class SetLocationLimit(NamedTuple):
+    """Set the limit of location_sd_mm above which UNCERTAIN is set."""
+
+    limit_mm: Annotated[float, Wire("f")]
+    """limit"""
+
+
+class StorePad(NamedTuple):
+    """Store a pad's profile, each value in its range and the terms in order of width. Acts from the frame on that follows the
+    acknowledgement.
+    """
+
+    profile: Annotated[PadProfile, Wire("PadProfile")]
+    """as in info"""
+
+
+class ErasePad(NamedTuple):
+    """There is no tangential load from now on."""
+
+
+Body = Contact | Raw | Info | Health | Acknowledgement | Crash | SetStreams | Tare | SetRate | SetOsr | SetSlip | AskInfo | AskHealth | AskCrash | Loader | StoreCalibration | EraseCalibration | Keep | SetPrior | SetLocationLimit | StorePad | ErasePad
+CONTACT, RAW = 0x01, 0x02
+TYPES: dict[int, type[Body]] = {
+    0x01: Contact,
+    0x02: Raw,
+    0x03: Info,
+    0x04: Health,
+    0x05: Acknowledgement,
+    0x06: Crash,
+    0x80: SetStreams,
+    0x81: Tare,
+    0x82: SetRate,
+    0x83: SetOsr,
+    0x84: SetSlip,
+    0x85: AskInfo,
+    0x86: AskHealth,
+    0x8F: AskCrash,
+    0x87: Loader,
+    0x88: StoreCalibration,
+    0x89: EraseCalibration,
+    0x8A: Keep,
+    0x8B: SetPrior,
+    0x8C: SetLocationLimit,
+    0x8D: StorePad,
+    0x8E: ErasePad,
+}
+NESTED: dict[str, Any] = {"Calibration": Calibration, "PadProfile": PadProfile}
+
+
+# Columns of recordings.
+STAGES = (
+    "convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us")
+CONTACT_COLUMNS = (
+    "sequence", "flags", "sensors_used", "x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N", "slip_mm", "residual_rms_Pa", "location_sd_mm",
+    "force_sd_N", "sigma_x_mm", "sigma_y_mm", "width_correlation", "convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us",
+    "total_us")
+TANGENTIAL_COLUMNS = ( # NaN in recordings of before there were any
+    "qx_N", "qy_N", "q_sd_N", "tangential_ratio", "vx_mm_s", "vy_mm_s")
+RAW_COLUMNS = (
+    "raw_sequence", "raw_flags", "valid", "saturated", "doubtful", "temperature_degC")
+
+
+class ContactQuantities:
+    """The quantities of a contact packet by their names; NaN without their flag, or without a packet."""
+
+    __slots__ = ()
+    contact: Contact
+
+    @property
+    def sensors_used(self) -> int:
+        """Bitmap of the sensors that entered the fit."""
+        return self.contact.sensors_used
+
+    @property
+    def x_mm(self) -> float:
+        """Location across the strips, from the centre of the pad."""
+        return self.contact.x_mm
+
+    @property
+    def y_mm(self) -> float:
+        """Location along the strips."""
+        return self.contact.y_mm
+
+    @property
+    def p0_Pa(self) -> float:
+        """Peak of the fitted Gaussian."""
+        return self.contact.p0_Pa
+
+    @property
+    def sigma_mm(self) -> float:
+        """Standard deviation of the fitted Gaussian."""
+        return self.contact.sigma_mm
+
+    @property
+    def force_N(self) -> float:
+        """Force scale times 2 pi p0 sigma^2, paper eq. (4); positive: pressing."""
+        return self.contact.force_N
+
+    @property
+    def residual_rms_Pa(self) -> float:
+        """Root mean square of the residuals of the fit."""
+        return self.contact.residual_rms_Pa
+
+    @property
+    def location_sd_mm(self) -> float:
+        """Predicted radial standard deviation of the location."""
+        return self.contact.location_sd_mm
+
+    @property
+    def force_sd_N(self) -> float:
+        """Predicted standard deviation of the force, that of the force scale in it."""
+        return self.contact.force_sd_N
+
+    @property
+    def slip_mm(self) -> float:
+        """Slip distance, paper eq. (7): of the location from its mean over the slip window."""
+        return self.contact.slip_mm
+
+    @property
+    def sigma_x_mm(self) -> float:
+        """Standard deviation of an elliptic Gaussian along x."""
+        return self.contact.sigma_x_mm
+
+    @property
+    def sigma_y_mm(self) -> float:
+        """Standard deviation of that along y."""
+        return self.contact.sigma_y_mm
+
+    @property
+    def width_correlation(self) -> float:
+        """Of that Gaussian, -1 to 1; 0 unless it lies aslant."""
+        return self.contact.width_correlation
+
+    @property
+    def qx_N(self) -> float:
+        """Tangential load of the object on the rubber, along x."""
+        return self.contact.qx_N
+
+    @property
+    def qy_N(self) -> float:
+        """Tangential load along y."""
+        return self.contact.qy_N
+
+    @property
+    def q_sd_N(self) -> float:
+        """Predicted standard deviation of either, those of the scales in it."""
+        return self.contact.q_sd_N
+
+    @property
+    def tangential_ratio(self) -> float:
+        """Size of the tangential load over force_N."""
+        return self.contact.tangential_ratio
+
+    @property
+    def vx_mm_s(self) -> float:
+        """Velocity of the contact along x."""
+        return self.contact.vx_mm_s
+
+    @property
+    def vy_mm_s(self) -> float:
+        """Velocity of the contact along y."""
+        return self.contact.vy_mm_s
