@@ -373,9 +373,9 @@ extern const struct wire_layout cmd_erase_pad_layout;
   &cmd_osr_layout, \
   &cmd_info_layout, \
   &cmd_health_layout, \
-  &cmd_crash_layout, \
   &cmd_loader_layout, \
-  &cmd_keep_layout
+  &cmd_keep_layout, \
+  &cmd_crash_layout
 #define WIRE_COMMANDS_OF_SLIP \
   &cmd_slip_layout
 #define WIRE_COMMANDS_OF_FIT \

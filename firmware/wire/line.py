@@ -243,7 +243,7 @@ def bodies_h(line):
     lines += ["", "/* The commands that every fingertip knows, and those of its capabilities, for its set. */"]
     for capability in dict.fromkeys(body.capability for body in line.commands.values()):
         macro = "WIRE_COMMANDS" + (f"_OF_{capability}" if capability else "")
-        entries = [f"&cmd_{body.name}_layout" for body in line.commands.values() if body.capability == capability]
+        entries = [f"&cmd_{body.name}_layout" for body in sorted(line.commands.values(), key=lambda body: body.type) if body.capability == capability]
         lines += [f"#define {macro} \\", *(f"  {entry}, \\" for entry in entries[:-1]), f"  {entries[-1]}"]
     return [*lines, "", "#endif"]
 
