@@ -1,26 +1,4 @@
-/* Recordings as MCAP files of ROS 2 messages (profile ros2, schemas ros2msg, CDR), line by line:
- *
- *   /fingertip/SERIAL/contact    fingertip_msgs/msg/Contact           each row
- *   /fingertip/SERIAL/wrench     geometry_msgs/msg/WrenchStamped      for programs that know no
- *   /fingertip/SERIAL/place      geometry_msgs/msg/PointStamped       fingertip: what may be
- * trusted, /fingertip/SERIAL/pressures  sensor_msgs/msg/PointCloud2          or NaN /diagnostics
- * diagnostic_msgs/msg/DiagnosticArray  each health packet; and warnings, where they change
- *   /fingertip/lines             fingertip_msgs/msg/Line              every other line
- *
- * What the numbers mean is in the definitions (host_tools/python/fingertip/msg), which the file
- * holds too. The coordinate frames are fingertip_SERIAL: x across the strips, y along them, z out
- * of the rubber. A serial number that begins with a digit has an "s" before it there and in the
- * topics.
- *
- * Contact and Line are all that is read back: they are the CSV file, byte by byte, whatever is in
- * it, for a row that is not written as this library writes it becomes a Line. The others repeat
- * what is in them. The head of the recording is also metadata (fingertip_recording); gains, force
- * scale and the pad's profile of each fingertip are also an attachment (calibration_SERIAL.json).
- *
- * Log times are the computer's: when the recording began, and device time since then, or in a
- * recording of several the recorder's clock. Chunks last a second, or a megabyte: what a killed
- * recorder loses. The head has a chunk of its own.
- */
+/* Recordings as MCAP files of ROS 2 messages, line by line; RECORDING.md has the format. */
 #pragma once
 
 #include "libfingertip/line_sink.hpp"

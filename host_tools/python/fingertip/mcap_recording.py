@@ -1,17 +1,4 @@
-"""Recordings as MCAP files of ROS 2 messages (profile ros2, schemas ros2msg, CDR), written and read line by line.
-
-    /fingertip/SERIAL/contact     fingertip_msgs/msg/Contact            each frame: all that its packets carry
-    /fingertip/SERIAL/wrench      geometry_msgs/msg/WrenchStamped       for programs that know no fingertip: what may be trusted, or NaN
-    /fingertip/SERIAL/place       geometry_msgs/msg/PointStamped
-    /fingertip/SERIAL/pressures   sensor_msgs/msg/PointCloud2
-    /diagnostics                  diagnostic_msgs/msg/DiagnosticArray   each health packet; and warnings, where they change
-    /fingertip/lines              fingertip_msgs/msg/Line               every other line of the CSV file
-
-with what the numbers mean in the definitions (the folder msg beside this module). The frames of a fingertip are in the coordinate frame
-fingertip_SERIAL: x across the strips, y along them, z out of the rubber. A serial number that begins with a digit has an "s" before it
-there and in the topics, for ROS. Contact and Line together are the CSV file, byte by byte; the others repeat what is in them. The head of
-the recording is also metadata (fingertip_recording), a calibration and a pad's profile also an attachment. Chunks last a second.
-"""
+"""Recordings as MCAP files of ROS 2 messages, written and read line by line (host_tools/libfingertip/RECORDING.md has the format)."""
 import calendar
 import math
 import os

@@ -1,5 +1,6 @@
 #include "truth/gate/bench.hpp"
 
+#include "doctor/wiring.hpp"
 #include "libfingertip/random.hpp"
 
 extern "C" {
@@ -26,11 +27,7 @@ constexpr double BRANCH_degC = 10.0, BRANCH_STEP_Pa = -60.0;
 constexpr std::array<std::uint16_t, 6> COEFFICIENTS{46372, 43981, 29059, 27842, 31553, 28165};
 constexpr double PROM_SPREAD = 0.03;
 
-// What a frame of fifteen sensors takes besides its conversion, from the emulated boards' rates.
-constexpr struct {
-  const char *name;
-  double bus_us;
-} BOARDS[] = {{"pico_mux", 2577.0}, {"pico_parallel", 177.0}};
+constexpr const char *BOARDS[] = {"pico_mux", "pico_parallel"};
 
 enum Stream : std::uint64_t { OFFSET = 301, DRIFT, PROM, NOISE };
 
@@ -51,10 +48,11 @@ const std::vector<float> &normals() {
 
 std::vector<Mode> modes() {
   std::vector<Mode> all;
-  for (const auto &board : BOARDS) {
+  for (const char *board : BOARDS) {
+    const double overhead_us = Wiring::of_board(board)->overhead_us();
     for (unsigned osr = 256; osr <= 8192; osr *= 2) {
       const ms5840_osr *row = ms5840_find_osr(static_cast<std::uint16_t>(osr));
-      all.push_back({board.name, osr, 1e6 / (board.bus_us + row->conversion_us),
+      all.push_back({board, osr, 1e6 / (overhead_us + row->conversion_us),
                      row->noise_Pa_q10 / 1024.0, row->noise_Pa_q10});
     }
   }
