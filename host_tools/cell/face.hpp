@@ -8,7 +8,7 @@
 // the peak of the twin's own on layers of 9 mm and more. Some 2 us per touch, all sensors.
 #pragma once
 
-#include "twin/layer.hpp"
+#include "pad/layer.hpp"
 #include "twin/trajectory.hpp"
 
 #include <array>

@@ -13,7 +13,7 @@
 #include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
 #include "tool/advice.hpp"
-#include "twin/table_file.hpp"
+#include "pad/table_file.hpp"
 
 #include <CLI/CLI.hpp>
 #include <atomic>

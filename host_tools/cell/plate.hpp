@@ -14,7 +14,7 @@
 // thin blocks. Left out: tilting, a flat that is not, friction that does not hold the rubber.
 #pragma once
 
-#include "twin/layer.hpp"
+#include "pad/layer.hpp"
 
 namespace fingertip::cell {
 

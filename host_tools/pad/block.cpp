@@ -1,7 +1,7 @@
-#include "twin/block.hpp"
+#include "pad/block.hpp"
 
-#include "twin/in_parallel.hpp"
-#include "twin/point_lift.hpp"
+#include "libfingertip/in_parallel.hpp"
+#include "pad/point_lift.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>

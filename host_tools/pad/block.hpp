@@ -25,7 +25,7 @@
 // bends, rounded or cast edges.
 #pragma once
 
-#include "twin/layer.hpp"
+#include "pad/layer.hpp"
 
 #include <functional>
 #include <vector>

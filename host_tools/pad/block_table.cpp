@@ -1,6 +1,6 @@
-#include "twin/block_table.hpp"
+#include "pad/block_table.hpp"
 
-#include "twin/table_file.hpp"
+#include "pad/table_file.hpp"
 
 #include <algorithm>
 #include <array>

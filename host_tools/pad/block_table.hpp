@@ -14,7 +14,7 @@
 // found.
 #pragma once
 
-#include "twin/block.hpp"
+#include "pad/block.hpp"
 
 #include <filesystem>
 

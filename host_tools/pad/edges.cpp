@@ -2,7 +2,7 @@
 
 #include "libfingertip/error.hpp"
 #include "libfingertip/text.hpp"
-#include "twin/block_table.hpp"
+#include "pad/block_table.hpp"
 
 extern "C" {
 #include "fit/fit_tangential.h"

@@ -1,7 +1,7 @@
 // What the ends of a pad's rubber make of the fingertip's estimate of tangential load, and how to
 // take it back: coefficients of pad_edges (firmware/common/pad_profile.h).
 //
-// The estimate knows a layer without end. Contacts on the pad's own block (twin/block.hpp) go
+// The estimate knows a layer without end. Contacts on the pad's own block (pad/block.hpp) go
 // through the firmware's estimate at places all over the array, with no load and with one along
 // each axis; the polynomials are fitted to what it says. They take back the mean response of a
 // usual contact, spread_mm2 wide: what is left of the zero on 12 mm of rubber is 0.02 to 0.03 of

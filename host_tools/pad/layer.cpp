@@ -1,4 +1,4 @@
-#include "twin/layer.hpp"
+#include "pad/layer.hpp"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "twin/point_lift.hpp"
+#include "pad/point_lift.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>

@@ -12,7 +12,7 @@
 // The rest falls as exp(-k h), so its integrals over k are short.
 #pragma once
 
-#include "twin/layer.hpp"
+#include "pad/layer.hpp"
 
 #include <vector>
 

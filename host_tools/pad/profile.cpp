@@ -2,7 +2,7 @@
 
 #include "libfingertip/error.hpp"
 #include "libfingertip/text.hpp"
-#include "twin/layer.hpp"
+#include "pad/layer.hpp"
 
 extern "C" {
 #include "config/geometry.h"
@@ -18,7 +18,7 @@ namespace fingertip::pad {
 
 namespace {
 
-constexpr double POISSON = 0.49; // of silicone, as twin/layer.hpp has it
+constexpr double POISSON = 0.49; // of silicone, as pad/layer.hpp has it
 
 // Waves over which the sums are fitted: T falls as H exp(-H), so nothing is left at the end. Half
 // the step changes no value by 1e-6.

@@ -2,7 +2,7 @@
 // fingertip estimates tangential load with (firmware/common/pad_profile.h), from the pad's
 // thickness.
 //
-// The base pressure under one bonded layer is known wave by wave (twin/layer.hpp): T(H) of what
+// The base pressure under one bonded layer is known wave by wave (pad/layer.hpp): T(H) of what
 // presses, Q(H) of what pulls, H = wave number times thickness. The profile has a sum of Gaussians
 // for each, which are Gaussians on the base too:
 //   T(H) = sum share_j exp(-(H sd_j)^2 / 2),    Q(H) / H = sum moment_j exp(-(H sd_j)^2 / 2)

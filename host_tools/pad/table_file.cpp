@@ -1,4 +1,4 @@
-#include "twin/table_file.hpp"
+#include "pad/table_file.hpp"
 
 #include <algorithm>
 #include <cstdint>

@@ -11,7 +11,7 @@
 #include "player/repeat.h"
 #include "player/scenario.hpp"
 #include "tool/advice.hpp"
-#include "twin/table_file.hpp"
+#include "pad/table_file.hpp"
 
 extern "C" {
 #include "native/native_cdc.h"

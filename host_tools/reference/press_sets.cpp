@@ -1,6 +1,6 @@
 #include "reference/press_sets.hpp"
 
-#include "twin/layer.hpp"
+#include "pad/layer.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -52,7 +52,7 @@ Press make_press(PressSet set, const Array &array, std::uint64_t seed, std::size
 std::vector<std::int32_t> quantise(const std::vector<double> &pressure_Pa,
                                    double lsb_Pa = 1.0 / 1024.0);
 
-// Pressure on the base of a bonded elastic layer of Poisson's ratio 0.49 (twin/layer.hpp).
+// Pressure on the base of a bonded elastic layer of Poisson's ratio 0.49 (pad/layer.hpp).
 class Layer {
 public:
   explicit Layer(double thickness_mm) : thickness_mm_(thickness_mm) {}

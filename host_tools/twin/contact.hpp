@@ -10,7 +10,7 @@
 #pragma once
 
 #include "twin/indenter.hpp"
-#include "twin/layer.hpp"
+#include "pad/layer.hpp"
 
 #include <memory>
 #include <vector>

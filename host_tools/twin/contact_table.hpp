@@ -8,7 +8,7 @@
 
 #include "twin/contact.hpp"
 #include "twin/force_planes.hpp"
-#include "twin/table_file.hpp"
+#include "pad/table_file.hpp"
 
 #include <filesystem>
 #include <functional>

@@ -6,7 +6,7 @@
 #include "libfingertip/text.hpp"
 #include "tool/advice.hpp"
 #include "twin/best_gaussian.hpp"
-#include "twin/in_parallel.hpp"
+#include "libfingertip/in_parallel.hpp"
 #include "twin/scenario_file.hpp"
 
 #include <CLI/CLI.hpp>

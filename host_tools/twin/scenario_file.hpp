@@ -40,7 +40,7 @@
 // The indenter is in the metadata of both.
 #pragma once
 
-#include "twin/block_table.hpp"
+#include "pad/block_table.hpp"
 #include "twin/scenarios.hpp"
 
 #include <functional>

@@ -27,7 +27,7 @@
 // influence of two contacts on each other's shape.
 #pragma once
 
-#include "twin/block.hpp"
+#include "pad/block.hpp"
 #include "twin/contact_table.hpp"
 #include "twin/effects.hpp"
 #include "twin/trajectory.hpp"

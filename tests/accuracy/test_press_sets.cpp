@@ -2,7 +2,7 @@
 // conservation of force, width and height of the best Gaussian.
 #include "reference/dataset.hpp"
 #include "reference/press_sets.hpp"
-#include "twin/layer.hpp"
+#include "pad/layer.hpp"
 
 #include <algorithm>
 #include <array>

@@ -7,7 +7,7 @@
 #include "libfingertip/text.hpp"
 #include "pad/edges.hpp"
 #include "pad/profile.hpp"
-#include "twin/table_file.hpp"
+#include "pad/table_file.hpp"
 
 #include <cstdio>
 #include <memory>

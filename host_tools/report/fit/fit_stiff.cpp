@@ -14,7 +14,7 @@
 #include "reference/options.hpp"
 #include "report/fit/json_file.hpp"
 #include "report/fit/kernels.hpp"
-#include "twin/in_parallel.hpp"
+#include "libfingertip/in_parallel.hpp"
 
 extern "C" {
 #include "condition/condition.h"

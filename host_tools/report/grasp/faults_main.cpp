@@ -5,7 +5,7 @@
 #include "grasp/fault_trials.hpp"
 #include "grasp/words.hpp"
 #include "reference/options.hpp"
-#include "twin/in_parallel.hpp"
+#include "libfingertip/in_parallel.hpp"
 
 #include <algorithm>
 #include <cstdio>

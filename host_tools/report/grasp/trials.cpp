@@ -2,8 +2,8 @@
 
 #include "grasp/convert.hpp"
 #include "libfingertip/text.hpp"
-#include "twin/in_parallel.hpp"
-#include "twin/table_file.hpp"
+#include "libfingertip/in_parallel.hpp"
+#include "pad/table_file.hpp"
 
 #include <algorithm>
 #include <cmath>

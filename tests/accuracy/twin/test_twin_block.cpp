@@ -1,5 +1,5 @@
 #include "block_fem.hpp"
-#include "twin/block_table.hpp"
+#include "pad/block_table.hpp"
 #include "twin/contact_table.hpp"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 #include "libfingertip/error.hpp"
 #include "pad/edges.hpp"
 #include "pad/profile.hpp"
-#include "twin/block_table.hpp"
+#include "pad/block_table.hpp"
 
 extern "C" {
 #include "contact/tangential.h"

@@ -7,7 +7,7 @@
 // motion.c were chosen with seeds 201 to 224 of the twin on pads of 12 mm.
 #include "reference/options.hpp"
 #include "shear/motion/watch.hpp"
-#include "twin/in_parallel.hpp"
+#include "libfingertip/in_parallel.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -12,7 +12,7 @@
 #include "shear/static/bounds.hpp"
 #include "shear/static/results.hpp"
 #include "twin/effects.hpp"
-#include "twin/in_parallel.hpp"
+#include "libfingertip/in_parallel.hpp"
 #include "twin/scenarios.hpp"
 
 extern "C" {

@@ -6,7 +6,7 @@
 #pragma once
 
 #include "truth/fit/touches.hpp"
-#include "twin/block_table.hpp"
+#include "pad/block_table.hpp"
 #include "twin/traction_table.hpp"
 #include "twin/trajectory.hpp"
 

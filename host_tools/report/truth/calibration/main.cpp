@@ -5,7 +5,7 @@
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/text.hpp"
 #include "truth/calibration/sessions.hpp"
-#include "twin/in_parallel.hpp"
+#include "libfingertip/in_parallel.hpp"
 
 extern "C" {
 #include "config/defaults.h"

@@ -7,7 +7,7 @@
 #include "reference/options.hpp"
 #include "truth/fit/statistics.hpp"
 #include "truth/fit/touches.hpp"
-#include "twin/in_parallel.hpp"
+#include "libfingertip/in_parallel.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"

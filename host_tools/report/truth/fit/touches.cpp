@@ -1,6 +1,6 @@
 #include "truth/fit/touches.hpp"
 
-#include "twin/in_parallel.hpp"
+#include "libfingertip/in_parallel.hpp"
 
 extern "C" {
 #include "config/defaults.h"
