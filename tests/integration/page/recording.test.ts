@@ -26,6 +26,7 @@ import type { Pairs } from '../../../host_tools/web/src/recording/fields';
 import { PacketLines } from '../../../host_tools/web/src/recording/lines';
 import { McapSink } from '../../../host_tools/web/src/recording/mcap_sink';
 import { ReadError, readItems } from '../../../host_tools/web/src/recording/reader';
+import { contactMessage, decodeContact } from '../../../host_tools/web/src/recording/ros_messages';
 import { shortest } from '../../../host_tools/web/src/recording/text';
 import { vector } from './vectors';
 
@@ -312,4 +313,22 @@ test('torn and foreign files: a sentence, and what came before', async () => {
     assert.ok(problem.startsWith(name), problem);
     assert.equal(count > 0, some, `${name}: ${count}`);
   }
+});
+
+test('a message that says what its flags deny is refused, as the library refuses it', () => {
+  const blankOf = <T>(type: number): T => ({ ...blank(type), sequence: 1, t_us: 5, frame: 7 }) as unknown as T;
+  const contact = { ...blankOf<Contact>(PacketType.CONTACT), flags: Flag.FIT_VALID, x_mm: 1.5 };
+  const raw = { ...blankOf<Raw>(PacketType.RAW), sensor_count: 2 };
+  const header = { time_ns: 0n, frame_id: '' };
+  const message = (changes: object, of_raw: object = {}): Uint8Array =>
+    contactMessage(header, 1, { ...contact, ...changes }, { ...raw, ...of_raw });
+  assert.equal(decodeContact(message({})).contact?.x_mm, 1.5);
+  assert.equal(decodeContact(message({ flags: 0, x_mm: 0 })).contact?.x_mm, 0);
+  for (const field of CONTACT_FIELDS) {
+    assert.throws(() => decodeContact(message({ flags: 0x1ffffff, [field]: NaN })), RangeError, field);
+  }
+  assert.throws(() => decodeContact(message({}, { temperature_cC: NaN })), RangeError);
+  assert.throws(() => decodeContact(message({}, { temperature_cC: 40000 })), RangeError);
+  assert.throws(() => decodeContact(message({}, { pressure_Pa_q10: [2 ** 31, 0] })), RangeError);
+  assert.throws(() => decodeContact(message({}, { baseline_Pa_q10: [0, NaN] })), RangeError);
 });

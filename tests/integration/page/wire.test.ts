@@ -45,6 +45,22 @@ for (const each of readVectors()) {
   });
 }
 
+test('every field of every packet has the value that its vector names', () => {
+  let compared = 0;
+  for (const each of readVectors()) {
+    const fields = blank(each.packet[1]!);
+    const body = new DataView(each.packet.slice().buffer);
+    assert.ok(decodeBody(body, each.packet.length - 4, fields), each.name);
+    for (const [name, value] of each.values) {
+      if (typeof fields[name] === 'number' && name !== 'sequence') {
+        assert.equal(fields[name], value, `${each.name}: ${name}`);
+        compared++;
+      }
+    }
+  }
+  assert.ok(compared >= 80, `${compared} values`);
+});
+
 test('fields have the values that the vectors name', () => {
   const decoder = new Decoder();
   const seen: DevicePacket[] = [];

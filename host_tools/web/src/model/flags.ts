@@ -1,6 +1,8 @@
 /** Flags of a contact, as people read them. */
 import { FLAGS } from '../line/line_facts';
 
+export { FLAGS };
+
 export type FlagMeaning = (typeof FLAGS)[number];
 
 /** The bits of all warnings: whoever trusts a contact heeds them. */
