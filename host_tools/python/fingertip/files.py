@@ -40,6 +40,8 @@ from . import line
 from .errors import InputError
 from .frames import frame_of
 from .line import CONTACT_COLUMNS, RAW_COLUMNS, STAGES, TANGENTIAL_COLUMNS, Flag
+from .mcap_file import MAGIC
+from .mcap_recording import McapLineReader
 
 if TYPE_CHECKING:
     import pandas
@@ -287,7 +289,6 @@ def _packet(path: Path, number: int, text: str) -> tuple[str, dict[str, str]]:
     return words[0], fields
 
 
-MCAP_MAGIC = b"\x89MCAP0\r\n"
 # Some 20 MB are read in a second: below this nobody waits.
 WORTH_WAITING_bytes = 10_000_000
 
@@ -303,8 +304,7 @@ class _RecordingLines:
     def __iter__(self) -> Iterator[tuple[int, str, bool]]:
         try:
             with open(self.path, "rb") as file:
-                if file.read(len(MCAP_MAGIC)) == MCAP_MAGIC:
-                    from .mcap_recording import McapLineReader
+                if file.read(len(MAGIC)) == MAGIC:
                     yield from McapLineReader(self.path, self.salvage, self.progress)
                     return
                 file.seek(0)

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 from .errors import InputError
-from .files import MCAP_MAGIC as MAGIC
 
+MAGIC = b"\x89MCAP0\r\n"
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX, ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, \
     SUMMARY_OFFSET, DATA_END = range(1, 16)
 CHUNK_bytes, CHUNK_ns = 1 << 20, 1_000_000_000  # a chunk ends once it is that large or that long

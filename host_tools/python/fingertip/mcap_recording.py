@@ -8,11 +8,10 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from .errors import InputError
-from .files import CONTACT_COLUMNS, RAW_COLUMNS, TANGENTIAL_COLUMNS
 from .frames import Q10
+from .line import CONTACT_COLUMNS, RAW_COLUMNS, TANGENTIAL_COLUMNS, WARNINGS, Flag
+from .lines import LineFile, shortest
 from .mcap_file import McapReader, McapWriter, Message
-from .line import WARNINGS, Flag
-from .recording import LineFile, shortest
 from .ros_messages import decode, encode, schema_of
 
 CONTACT_TYPE, LINE_TYPE, WRENCH_TYPE, PLACE_TYPE, PRESSURES_TYPE, DIAGNOSTICS_TYPE = (

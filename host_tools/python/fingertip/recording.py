@@ -7,29 +7,19 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol
-
-import numpy as np
+from typing import Any, Protocol
 
 from .clock import ClockEstimate, host_now_us
 from .errors import InputError
-from .files import CONTACT_COLUMNS, RAW_COLUMNS, TANGENTIAL_COLUMNS
 from .frames import Q10
+from .line import CONTACT_COLUMNS, RAW_COLUMNS, TANGENTIAL_COLUMNS
+from .lines import LineFile, shortest
+from .mcap_recording import McapLines
 from .wire import Acknowledgement, Calibration, Contact, Health, Info, LineStatistics, Packet, PadProfile, Raw
-
-if TYPE_CHECKING:
-    from . import mcap_recording
 
 LATE_us = 250_000  # rows wait so long for those of others
 CLOCK_LINES_us = 1e6
 _QUANTITIES = [name for name in (*CONTACT_COLUMNS, *TANGENTIAL_COLUMNS) if name not in ("sequence", "flags")]
-
-
-def shortest(value: float) -> str:
-    """The shortest text that reads back the same binary32; nothing for NaN."""
-    if math.isnan(value):
-        return ""
-    return str(np.float32(value)).removesuffix(".0")
 
 
 def _cell(value: Any) -> str:
@@ -71,40 +61,10 @@ def info_metadata(info: Info) -> dict[str, str]:
             **(_calibration_metadata(info.calibration) if info.calibration else {}), **(_pad_metadata(info.pad) if info.pad else {})}
 
 
-class LineFile:
-    """Whole lines, one at a time. Raises InputError."""
-
-    def __init__(self, path: "str | os.PathLike[str]", replace: bool) -> None:
-        self.path = os.fspath(path)
-        try:
-            self._file = open(self.path, "wb" if replace else "xb", buffering=0)
-        except FileExistsError:
-            raise InputError(f"{self.path}: exists; give replace=True or another name") from None
-        except OSError as error:
-            raise InputError(f"{self.path}: {error.strerror}; choose another place") from None
-
-    def line(self, text: str) -> None:
-        self.append(text.encode("utf-8") + b"\n")
-
-    def append(self, data: bytes) -> None:
-        try:
-            while data:
-                data = data[self._file.write(data):]
-        except OSError as error:
-            raise InputError(f"{self.path}: {error.strerror}; the file ends early") from None
-
-    def close(self) -> None:
-        try:
-            self._file.close()
-        except OSError as error:
-            raise InputError(f"{self.path}: {error.strerror}; the file ends early") from None
-
-
-def _open_lines(path: "str | os.PathLike[str]", replace: bool) -> "LineFile | mcap_recording.McapLines":
+def _open_lines(path: "str | os.PathLike[str]", replace: bool) -> LineFile | McapLines:
     """What becomes of the lines of a recording; the name says it. Raises InputError."""
     if os.fspath(path).lower().endswith(".mcap"):
-        from . import mcap_recording
-        return mcap_recording.McapLines(path, replace)
+        return McapLines(path, replace)
     return LineFile(path, replace)
 
 
