@@ -62,7 +62,7 @@ class Fingertip:
     def __init__(self, port: "str | os.PathLike[str] | None" = None, *, serial: str | None = None, share: bool | None = None,
                  streams: Streams | None = None, reconnect: bool = False, buffer_frames: int = 16384, latency_ms: float = 8.0,
                  timeout_s: float = 3.0) -> None:
-        _in_range("buffer_frames", buffer_frames, 1, FRAMES_MAX, "frames")
+        _in_range("buffer_frames", buffer_frames, (1, FRAMES_MAX), "frames")
         _in_range("latency_ms", latency_ms, (0, 1000), "ms")
         _in_range("timeout_s", timeout_s, (0.01, 3600), "s")
         self._settle_s = latency_ms / 1000
@@ -297,7 +297,7 @@ class Fingertip:
         if (frames is None) == (seconds is None):
             raise BadValueError("give frames or seconds")
         if frames is not None:
-            _in_range("frames", frames, 1, FRAMES_MAX, "frames")
+            _in_range("frames", frames, (1, FRAMES_MAX), "frames")
         elif seconds is not None:
             _in_range("seconds", seconds, (1e-6, 86400), "s")
         taken: list[Frame] = []
