@@ -12,11 +12,15 @@ for module in usb-common usbcore xhci-hcd xhci-pci cdc-acm; do
 done
 exec < /dev/ttyS1 > /dev/ttyS1 2> /dev/console
 stty raw -echo
-echo ready
-while read -r id script; do
-  echo "$script" | base64 -d > /tmp/script
-  sh /tmp/script < /dev/null > /tmp/output 2>&1
-  status=$?
-  echo "$id $status $(wc -c < /tmp/output)"
-  cat /tmp/output
-done
+# This first process inherits what scripts leave behind, and the end of such a child would cut short what its shell is reading. So another reads.
+(
+  echo ready
+  while read -r id script; do
+    echo "$script" | base64 -d > /tmp/script
+    sh /tmp/script < /dev/null > /tmp/output 2>&1
+    status=$?
+    echo "$id $status $(wc -c < /tmp/output)"
+    cat /tmp/output
+  done
+) < /dev/ttyS1 &
+wait

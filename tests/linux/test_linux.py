@@ -298,6 +298,11 @@ class Linux(unittest.TestCase):
 
     # The first boot
 
+    def test_00_requests_stay_whole_while_what_ran_before_ends(self):
+        self.sh("n=0; while [ $n -lt 300 ]; do n=$((n+1)); usleep $((n * 10000)) & done")
+        for n in range(30):
+            self.assertEqual(self.sh(f": {'x' * 4000}; echo {n}"), f"{n}\n")
+
     def test_01_enumeration(self):
         self.wait_for_port()
         texts = [text for _, text in self.kernel_log()]
