@@ -43,6 +43,7 @@ OTHER_SERIAL = "E660583883265A2D"
 VENDOR_PRODUCT = "1209:0001"
 SKIPPED = 77
 PACKETS = 4000
+SHARED_PACKETS = 1000  # of the two streams
 STREAM_s = 12  # 2 packets for each of 207 frames a second, and what the two streams do not share
 PARALLEL_STREAM_s = 2
 PAIR_s, PAIR_RATE_Hz = 4, 50
@@ -298,11 +299,6 @@ class Linux(unittest.TestCase):
 
     # The first boot
 
-    def test_00_requests_stay_whole_while_what_ran_before_ends(self):
-        self.sh("n=0; while [ $n -lt 300 ]; do n=$((n+1)); usleep $((n * 10000)) & done")
-        for n in range(30):
-            self.assertEqual(self.sh(f": {'x' * 4000}; echo {n}"), f"{n}\n")
-
     def test_01_enumeration(self):
         self.wait_for_port()
         texts = [text for _, text in self.kernel_log()]
@@ -339,6 +335,11 @@ class Linux(unittest.TestCase):
     def test_05_line_coding(self):
         self.sh("stty -F /dev/ttyACM0 raw -echo 230400 cs7 parenb -parodd cstopb")
         self.assertIn("speed 230400 baud", self.sh("stty -F /dev/ttyACM0"))
+
+    def test_05_requests_stay_whole_while_what_ran_before_ends(self):
+        self.sh("n=0; while [ $n -lt 300 ]; do n=$((n+1)); usleep $((n * 10000)) & done")
+        for n in range(30):
+            self.assertEqual(self.sh(f": {'x' * 4000}; echo {n}"), f"{n}\n")
 
     def test_06_boot_loader_request(self):
         self.tool("loader")
@@ -392,7 +393,11 @@ class Linux(unittest.TestCase):
         different = [key for key in sorted(shared) if not alike(key[0], bodies[0][key], bodies[1][key])]
         REPORT.update(packets_compared=len(shared), different=len(different))
         self.assertEqual(different, [])
-        self.assertGreaterEqual(len(shared), PACKETS)
+        # All that both can have seen: on a busy machine one recording begins later than the other.
+        frames = [[frame for _, frame in each] for each in bodies]
+        least, most = max(map(min, frames)), min(map(max, frames))
+        self.assertEqual(shared, {key for each in bodies for key in each if least < key[1] < most} | {key for key in shared if key[1] in (least, most)})
+        self.assertGreaterEqual(len(shared), SHARED_PACKETS)
         self.assertGreater(len({body[4:] for body in bodies[0].values()}), 0.95 * len(shared), "readings that never change")
 
     def stall(self, transport):

@@ -20,7 +20,7 @@ PATIENCE_s = 60
 PUBLIC = {"clock.hpp", "clock_fit.hpp", "command.hpp", "connection.hpp", "decoder.hpp", "device_loop.hpp", "discovery.hpp", "error.hpp", "line_source.hpp", "names.hpp",
           "packet_fields.hpp", "packet_file.hpp", "recording_reader.hpp", "session.hpp", "transport.hpp", "wire.hpp",
           "common/calibration.h", "common/contact_flags.h", "common/crash.h", "common/limits.h", "common/pad_profile.h", "common/status.h",
-          "wire/packet.h"}
+          "wire/bodies.h", "wire/packet.h"}
 FLAG_CONTACT, FLAG_FIT_VALID, FLAG_UNCERTAIN = 1 << 0, 1 << 1, 1 << 10
 
 

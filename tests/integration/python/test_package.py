@@ -120,7 +120,7 @@ class Codec(Folder):
     def test_vectors(self):
         found = vectors()
         protocol = (ROOT / "firmware/wire/PROTOCOL.md").read_text(encoding="utf-8")
-        specified = {int(number, 16) for number in re.findall(r"(?m)^(?:### |\| )0x([0-9A-F]{2}) \w", protocol)}
+        specified = {int(number, 16) for number in re.findall(r"(?m)^(?:### |\| )0x([0-9A-F]{2}) [\w|]", protocol)}
         self.assertEqual({each["packet"][1] for each in found.values()}, specified)
         self.assertGreaterEqual(len(specified), 20)
         for name, vector in found.items():
