@@ -144,7 +144,8 @@ class Use(PageTest):
             self.assertTrue((np.diff(recording["frame"]) == 1).all(), kind)
             self.assertEqual(recording.end["dropped_packets"], "0", kind)
             self.assertEqual(recording.metadata["serial"], SERIALS[0])
-            self.assertTrue(np.isfinite(recording.sensors_Pa).all())
+            # It may begin and end between the two packets of a frame.
+            self.assertTrue(np.isfinite(recording.sensors_Pa[1:-1]).all())
             if kind == "CSV":
                 self.assertEqual(path.read_text(), through.read_text())
         read = run(ROOT / "build/venv/bin/python", "-c", COUNT_MESSAGES, recorded["MCAP"])
