@@ -266,7 +266,7 @@ struct wire_cmd_tare {
   uint8_t force; /* 1: tare whatever touches, where the contact is known to be none; 0 */
 };
 
-/* Set the frame rate. */
+/* Set the frame rate; 0: as fast as the sensors allow. */
 struct wire_cmd_rate {
   uint32_t rate_mHz; /* frame rate, or 0 */
 };

@@ -534,13 +534,16 @@ def ts_text(text):
 
 # ---- PROTOCOL.md
 
+WHEN_TEXTS = {"flags": "", "capabilities": "capability ", "stored": "stored "}
+
+
 def protocol_parts(line):
     """name -> lines, for between its marks."""
     def table(fields, always=True):
         conditions = any(field.when for field in fields)
         rows = ["| type | field | what |" + (" there if |" if conditions else ""), "|---|---|---|" + ("---|" if conditions else "")]
         for field in fields:
-            when = f" {field.when[1] if field.when[0] != 'stored' else 'stored ' + field.when[1]} |" if field.when else " always |"
+            when = f" {WHEN_TEXTS[field.when[0]]}{field.when[1]} |" if field.when else " always |"
             rows.append(f"| {field.type_text} | {field.names_text} | {field.text} |" + (when if conditions else ""))
         return rows
 
@@ -558,7 +561,7 @@ def protocol_parts(line):
         return f" ({', '.join(map(str, each['choices']))})" if "choices" in each else f" ({each['min']:.12g} to {each['max']:.12g} {each['unit']})"
 
     parts["commands"] = ["| type | command | body | known with | what it does |", "|---|---|---|---|---|"]
-    for body in line.commands.values():
+    for body in sorted(line.commands.values(), key=lambda body: body.type):
         fields = ", ".join(f"{field.type_text} {field.names_text}{range_text(field)}{': ' + field.text if field.text and not field.range else ''}" for field in body.fields)
         known = next((each["word"] for each in line.capabilities if each["name"] == body.capability), "always")
         parts["commands"].append(f"| 0x{body.type:02X} | {body.word} | {fields or '-'} | {known} | {body.text} |")

@@ -443,7 +443,7 @@ class Tare(NamedTuple):
 
 
 class SetRate(NamedTuple):
-    """Set the frame rate."""
+    """Set the frame rate; 0: as fast as the sensors allow."""
 
     rate_mHz: Annotated[int, Wire("I")]
     """frame rate, or 0"""
