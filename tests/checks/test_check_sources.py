@@ -36,6 +36,8 @@ class CheckSources(unittest.TestCase):
         self.assert_caught("firmware/a/a.c", "int *p = (int *)0x40044000;\n", "register")
         self.assert_caught("firmware/a/a.c", '#include "rp2040/i2c.h"\n', "boards")
 
+        self.assert_caught("host_tools/pad/a.cpp", '#include "twin/contact.hpp"\n', "simulation")
+
         for line in ("auto t = std::chrono::steady_clock::now();", "std::this_thread::sleep_for(PAUSE);", "poll(&waiting, 1, 100);"):
             self.assert_caught("host_tools/cli/a.cpp", line + "\n", "libfingertip/clock.hpp")
 
