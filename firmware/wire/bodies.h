@@ -14,7 +14,7 @@
 
 #define WIRE_VERSION 5
 
-enum { WIRE_TEXT_BYTES = 16 };
+enum { WIRE_TEXT_BYTES = 16, WIRE_MAX_BODY_BYTES = 815 };
 
 enum wire_type {
   /* device to host */
@@ -74,7 +74,7 @@ enum wire_stored {
   WIRE_STORED_CALIBRATION = 1 << 0, /* a calibration, and it acts; never without capability fit */
   WIRE_STORED_SETTINGS = 1 << 1, /* settings; it started with them */
   WIRE_STORED_WRITING = 1 << 2, /* a change is on its way into the flash */
-  /* what is there is damaged, or of a later firmware, and not used; writing anew mends it */
+  /* what is there is damaged, or of a later firmware, and not used; storing again mends it */
   WIRE_STORED_DAMAGED = 1 << 3,
   WIRE_STORED_PAD = 1 << 4, /* a pad's profile, and it acts; never without capability tangential */
 };
@@ -258,7 +258,7 @@ struct wire_cmd_stream {
   uint8_t streams; /* bits of the streams */
 };
 
-/* Measure the zero anew over the next 16 frames (at rates below 16 Hz those of a second, three
+/* Measure the zero again over the next 16 frames (at rates below 16 Hz those of a second, three
  * at least), during which no contact is reported. While one is reported, and while no sensor
  * answers, it is refused with "not now": what presses would become the zero. The zero follows
  * slow drift only while nothing touches the pad: send this between grasps, as the paper does. */

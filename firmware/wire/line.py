@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes, from line.toml, what each language needs to know of the line between fingertip and host.
 
-    line.py            write the files anew
+    line.py            write the files
     line.py --check    say which of them differ, and exit with 1
 
 Needs nothing but Python 3.11.
@@ -97,13 +97,17 @@ class Line:
     def warnings(self):
         return sum(1 << flag["bit"] for flag in self.flags if flag.get("warning"))
 
-    def longest_frame(self):
-        """Bytes, delimiter included: all that an info packet can hold, COBS's byte for each 254, header and CRC."""
+    def longest_body(self):
+        """Bytes, with all that a body can hold."""
         def size(fields):
             return sum(size(self.structs[field.kind].fields) if field.is_struct else self.text_bytes if field.kind == "text"
                        else BYTES[field.kind] * field.times * (2 * self.sensors_max if field.each_sensor else 1) for field in fields)
 
-        packet = 12 + max(size(body.fields) for body in (*self.packets.values(), *self.commands.values())) + 4
+        return max(size(body.fields) for body in (*self.packets.values(), *self.commands.values()))
+
+    def longest_frame(self):
+        """Bytes, delimiter included: with header, CRC, and COBS's byte for each 254."""
+        packet = 12 + self.longest_body() + 4
         return packet + packet // 254 + 2
 
     def quantities(self):
@@ -138,15 +142,11 @@ def c_described(code, text, indent="  "):
 
 
 def c_bits(title, prefix, entries):
-    lines = [*c_comment(title, ""), f"enum wire_{title_word(prefix)} {{"]
+    lines = [*c_comment(title, ""), f"enum wire_{prefix.lower()} {{"]
     for each in entries:
         value = f"1 << {each['bit']}" if "bit" in each else str(each["number"])
         lines += c_described(f"WIRE_{prefix}_{each['name']} = {value},", each["text"])
     return lines
-
-
-def title_word(prefix):
-    return prefix.lower()
 
 
 def contact_flags_h(line):
@@ -159,7 +159,7 @@ def contact_flags_h(line):
     return [*lines, "};", "", "#endif"]
 
 
-def c_number(value, unit):
+def c_number(value):
     return f"{value}u" if isinstance(value, int) else f"{value}f"
 
 
@@ -207,7 +207,7 @@ def bodies_h(line):
     lines = [f"/* {SAYS}.", " *", " * The bodies of packets and commands; PROTOCOL.md is the specification. Included by packet.h alone.", " */",
              "#ifndef WIRE_BODIES_H", "#define WIRE_BODIES_H", "",
              '#include "common/calibration.h"', '#include "common/crash.h"', '#include "common/limits.h"', '#include "common/pad_profile.h"', "",
-             "#include <stdint.h>", "", f"#define WIRE_VERSION {line.version}", "", f"enum {{ WIRE_TEXT_BYTES = {line.text_bytes} }};", "",
+             "#include <stdint.h>", "", f"#define WIRE_VERSION {line.version}", "", f"enum {{ WIRE_TEXT_BYTES = {line.text_bytes}, WIRE_MAX_BODY_BYTES = {line.longest_body()} }};", "",
              "enum wire_type {", "  /* device to host */"]
     lines += [f"  WIRE_{body.name.upper()} = 0x{body.type:02X}," for body in line.packets.values()]
     lines += ["  /* host to device */"] + [f"  WIRE_CMD_{body.name.upper()} = 0x{body.type:02X}," for body in line.commands.values()] + ["};", ""]
@@ -226,7 +226,7 @@ def bodies_h(line):
         if "choices" in each:
             lines += [f"#define WIRE_{name}_MIN {each['choices'][0]}u /* and its doubles */", f"#define WIRE_{name}_MAX {each['choices'][-1]}u"]
             continue
-        lines += [f"#define WIRE_{name}_{end.upper()}{unit} {c_number(each[end], unit)}" for end in ("min", "max", "default") if end in each]
+        lines += [f"#define WIRE_{name}_{end.upper()}{unit} {c_number(each[end])}" for end in ("min", "max", "default") if end in each]
     lines += [f"#define WIRE_LOADER_MAGIC 0x{line.loader_magic:08X}u /* \"Boot\" */", ""]
     for body in line.packets.values():
         if not body.c_struct:
@@ -274,8 +274,8 @@ def runs_of(body, line, when=None, prefix=""):
 
 
 def layouts_inc(line):
-    lines = [f"/* {SAYS}.", " *", " * The layouts of all bodies, for packet.c alone. */", ""]
-    used = {}
+    lines = [f"/* {SAYS}.", " *", " * The layouts of all bodies, for packet.c alone. */", "",
+             f'_Static_assert(FT_MAX_SENSORS == {line.sensors_max}, "sensors_max of line.toml, of which WIRE_MAX_BODY_BYTES is made");', ""]
     for prefix, bodies in (("wire_", line.packets), ("cmd_", line.commands)):
         for body in bodies.values():
             where = body.name if prefix == "wire_" else "cmd_" + body.name
@@ -288,7 +288,6 @@ def layouts_inc(line):
             for kind, count, member, when in runs_of(body, line):
                 if when:
                     lines.append(f"    RUN(WHEN, {line.bit(when)}, {where}.{when[0]}),")
-                    used[when] = line.bit(when)
                 lines.append(f"    RUN({kind}, {count}, {where}.{member}),")
             lines += ["};", f"LAYOUT({name}, {number});"]
     return [*lines, "", "#define ALL_PACKETS \\",
@@ -401,7 +400,7 @@ def py_class(body, line):
         if names and field.kind == "f32":
             plural = "s" if field.twos else ""
             for i, name in enumerate(names):
-                lines += ["", "    @property", f"    def {name}{plural}(self) -> tuple[float, ...]:", f'        """Of each sensor."""',
+                lines += ["", "    @property", f"    def {name}{plural}(self) -> tuple[float, ...]:", '        """Of each sensor."""',
                           f"        return self.{field.python}[{i}::2]"]
     return [*lines, "", ""]
 
@@ -422,7 +421,7 @@ def line_py(line):
         return [*text, *after, "", ""]
 
     lines += bits("Flag", "What a frame says about itself. A quantity may be used only under its VALID flag; without it, it is NaN here.", line.flags)
-    lines += [f"WARNINGS = Flag(0x{line.warnings():X})", '"""The numbers are there, but deserve less trust. Whoever uses them heeds these."""', "", ""]
+    lines += [f"WARNINGS = Flag(0x{line.warnings():X})", '"""The numbers are there, but deserve less trust: look at these before you use them."""', "", ""]
     lines += bits("Streams", "What a fingertip sends unasked.", line.streams, ["    NONE = 0"], [f"    ALL = {' | '.join(each['name'] for each in line.streams)}"])
     lines += bits("Capability", "What a firmware can do.", line.capabilities) + bits("Stored", "What a fingertip keeps without power.", line.stored)
     lines += ["class Result(enum.IntEnum):", '    """What an acknowledgement says."""', "",
@@ -503,14 +502,14 @@ def line_facts_ts(line):
         lines += [f"/** {doc} */", f"export const {name} = {{", *(f"  {each['name']}: 1 << {each['bit']}," for each in entries), "} as const;"]
     lines += ["/** What an acknowledgement says. */", "export const Result = {", *(f"  {each['name']}: {each['number']}," for each in line.results), "} as const;", ""]
     words = "export const {}: readonly (readonly [number, string])[] = ["
-    for name, kind, entries in (("STREAM_WORDS", "Stream", line.streams), ("CAPABILITY_WORDS", "Capability", line.capabilities),
-                                ("STORED_WORDS", "Stored", line.stored), ("RESULT_WORDS", "Result", line.results)):
+    for name, kind, entries in (("CAPABILITY_WORDS", "Capability", line.capabilities), ("STORED_WORDS", "Stored", line.stored),
+                                ("RESULT_WORDS", "Result", line.results)):
         lines += [words.format(name), *(f"  [{kind}.{each['name']}, '{each['word']}']," for each in entries), "];"]
     lines += [words.format("COMMAND_WORDS"), *(f"  [PacketType.CMD_{body.name.upper()}, '{body.word}']," for body in line.commands.values()), "];", ""]
     lines += ["/** Those of state, then the warnings. warning: the numbers deserve less trust. */",
               "export const FLAGS: readonly { bit: number; name: keyof typeof Flag; warning: boolean; meaning: string }[] = ["]
     for flag in sorted(line.flags, key=lambda flag: bool(flag.get("warning"))):
-        lines.append(f"  {{ bit: Flag.{flag['name']}, name: '{flag['name']}', warning: {'true' if flag.get('warning') else 'false'}, meaning: {ts_text(flag['text'])} }},")
+        lines.append(f"  {{ bit: Flag.{flag['name']}, name: '{flag['name']}', warning: {'true' if flag.get('warning') else 'false'}, meaning: {ts_text(flag.get('plain', flag['text']))} }},")
     quantities, first = line.quantities()
     lines += ["];", "", "/** The quantities of a contact that hold under a flag, in the order of a recording's columns, and that flag. */", "export const CONTACT_FLAG = {",
               *(f"  {field.name}: Flag.{field.when[1]}," for field in quantities), "} as const;",
@@ -569,7 +568,7 @@ def protocol_parts(line):
 
 
 def protocol_md(line, text):
-    """The page with its tables anew. Each stands behind a mark "<!-- line.toml: NAME -->" and ends with an empty line."""
+    """The page with its tables replaced. Each stands behind a mark "<!-- line.toml: NAME -->" and ends with an empty line."""
     for name, rows in protocol_parts(line).items():
         mark = f"<!-- line.toml: {name} -->\n"
         if text.count(mark) != 1:

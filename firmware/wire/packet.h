@@ -7,7 +7,7 @@
  * decoder rejects them.
  *
  * line.toml describes the bodies; bodies.h has them as structs, with their units and ranges. Each has
- * one constant, its layout, for both directions. Whoever encodes or decodes names the layouts, so an
+ * one constant, its layout, for both directions. Code that encodes or decodes names its layouts, so an
  * image holds those of its own packets and commands only.
  */
 #ifndef WIRE_PACKET_H
@@ -22,9 +22,6 @@
 enum {
   WIRE_HEADER_BYTES = 12,
   WIRE_CRC_BYTES = 4,
-  WIRE_PAD_BYTES = 4 * PAD_PROFILE_FLOATS + 1,
-  /* Info of a calibrated fingertip that knows its pad. */
-  WIRE_MAX_BODY_BYTES = 126 + 16 * FT_MAX_SENSORS + WIRE_PAD_BYTES,
   WIRE_MAX_PACKET_BYTES = WIRE_HEADER_BYTES + WIRE_MAX_BODY_BYTES + WIRE_CRC_BYTES,
   /* COBS adds one byte, and one more for each full 254 bytes; then the delimiter. */
   WIRE_MAX_FRAME_BYTES = WIRE_MAX_PACKET_BYTES + WIRE_MAX_PACKET_BYTES / 254 + 2,

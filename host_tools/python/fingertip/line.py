@@ -54,7 +54,7 @@ class Flag(enum.IntFlag):
 
 
 WARNINGS = Flag(0x7FF00)
-"""The numbers are there, but deserve less trust. Whoever uses them heeds these."""
+"""The numbers are there, but deserve less trust: look at these before you use them."""
 
 
 class Streams(enum.IntFlag):
@@ -82,7 +82,7 @@ class Stored(enum.IntFlag):
     CALIBRATION = 1 << 0  #: a calibration, and it acts; never without capability fit
     SETTINGS = 1 << 1  #: settings; it started with them
     WRITING = 1 << 2  #: a change is on its way into the flash
-    DAMAGED = 1 << 3  #: what is there is damaged, or of a later firmware, and not used; writing anew mends it
+    DAMAGED = 1 << 3  #: what is there is damaged, or of a later firmware, and not used; storing again mends it
     PAD = 1 << 4  #: a pad's profile, and it acts; never without capability tangential
 
 
@@ -392,7 +392,7 @@ class Crash(NamedTuple):
     """
 
     kind: Annotated[int, Wire("B")]
-    """0 none, 1 hard fault, 2 panic, 3 watchdog, 4 an exception that nobody handles, 5 stack overflow, 6 start-up gave up"""
+    """0 none, 1 hard fault, 2 panic, 3 watchdog, 4 an unhandled exception, 5 stack overflow, 6 start-up gave up"""
     exception: Annotated[int, Wire("B")]
     """exception in which the code at pc ran: 0 main loop, 16 + n interrupt n"""
     vector: Annotated[int, Wire("B")]
@@ -433,7 +433,7 @@ class SetStreams(NamedTuple):
 
 
 class Tare(NamedTuple):
-    """Measure the zero anew over the next 16 frames (at rates below 16 Hz those of a second, three at least), during which no contact is
+    """Measure the zero again over the next 16 frames (at rates below 16 Hz those of a second, three at least), during which no contact is
     reported. While one is reported, and while no sensor answers, it is refused with "not now": what presses would become the zero. The
     zero follows slow drift only while nothing touches the pad: send this between grasps, as the paper does.
     """

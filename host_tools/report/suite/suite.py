@@ -8,9 +8,9 @@
     suite_failed    what the tests that failed said, a file for each
 
 The whole suite and the quick tests run over and over, first quiet, then busy: beside four processes that compute and one that writes to
-the disk all the time. After each run the files are written anew, so what ran before an interruption is not lost. Nothing is run again because it failed. A test that cannot be run has failed; skipped is only
-what says so itself. Seconds are of quiet runs: ctest's times added up for the tests, minutes and seconds on the wall for a run, on as
-many jobs as there are processors. Mutants are those of the last report of reliability in the output folder.
+the disk all the time. The files are written after each run, so an interruption loses one run. Nothing is run again because it failed. A
+test that cannot be run has failed; skipped is only what says so itself. Seconds are of quiet runs: ctest's times added up for the tests,
+minutes and seconds on the wall for a run, on as many jobs as there are processors. Mutants are those of the last report of reliability in the output folder.
 """
 import collections
 import contextlib

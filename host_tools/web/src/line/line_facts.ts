@@ -87,11 +87,6 @@ export const Result = {
   NOT_NOW: 3,
 } as const;
 
-export const STREAM_WORDS: readonly (readonly [number, string])[] = [
-  [Stream.CONTACT, 'contact'],
-  [Stream.RAW, 'raw'],
-  [Stream.HEALTH, 'health'],
-];
 export const CAPABILITY_WORDS: readonly (readonly [number, string])[] = [
   [Capability.FIT, 'fit'],
   [Capability.SLIP, 'slip'],
@@ -132,30 +127,30 @@ export const COMMAND_WORDS: readonly (readonly [number, string])[] = [
 
 /** Those of state, then the warnings. warning: the numbers deserve less trust. */
 export const FLAGS: readonly { bit: number; name: keyof typeof Flag; warning: boolean; meaning: string }[] = [
-  { bit: Flag.CONTACT, name: 'CONTACT', warning: false, meaning: 'a sensor is pressed' },
-  { bit: Flag.FIT_VALID, name: 'FIT_VALID', warning: false, meaning: 'x, y, p0, sigma, force and residual hold a fit' },
-  { bit: Flag.UNCERTAINTY_VALID, name: 'UNCERTAINTY_VALID', warning: false, meaning: 'the standard deviations of location and force have values' },
+  { bit: Flag.CONTACT, name: 'CONTACT', warning: false, meaning: 'something presses' },
+  { bit: Flag.FIT_VALID, name: 'FIT_VALID', warning: false, meaning: 'place and force are told' },
+  { bit: Flag.UNCERTAINTY_VALID, name: 'UNCERTAINTY_VALID', warning: false, meaning: 'how far they may be off is told' },
   { bit: Flag.SLIP_VALID, name: 'SLIP_VALID', warning: false, meaning: 'the slip distance spans its whole window' },
-  { bit: Flag.SLIP, name: 'SLIP', warning: false, meaning: 'the slip distance is above the threshold' },
+  { bit: Flag.SLIP, name: 'SLIP', warning: false, meaning: 'it slips: the slip distance is above the threshold' },
   { bit: Flag.TARED, name: 'TARED', warning: false, meaning: 'readings are relative to a measured zero' },
   { bit: Flag.HELD, name: 'HELD', warning: false, meaning: 'all values are those of the frame before: the sensors measured their temperature' },
-  { bit: Flag.WIDTHS_VALID, name: 'WIDTHS_VALID', warning: false, meaning: 'the widths along the axes and their correlation have values' },
+  { bit: Flag.WIDTHS_VALID, name: 'WIDTHS_VALID', warning: false, meaning: 'the widths along the axes are told' },
   { bit: Flag.CALIBRATED, name: 'CALIBRATED', warning: false, meaning: 'gains and force scale of a calibration act' },
-  { bit: Flag.TANGENTIAL_VALID, name: 'TANGENTIAL_VALID', warning: false, meaning: 'the tangential load has values; location and force are corrected for it' },
+  { bit: Flag.TANGENTIAL_VALID, name: 'TANGENTIAL_VALID', warning: false, meaning: 'what pulls along the rubber is told' },
   { bit: Flag.TANGENTIAL_FROM_TOUCH, name: 'TANGENTIAL_FROM_TOUCH', warning: false, meaning: 'the tangential load is what changed since the first touch' },
-  { bit: Flag.VELOCITY_VALID, name: 'VELOCITY_VALID', warning: false, meaning: 'the velocity of the contact has values' },
-  { bit: Flag.MOVING, name: 'MOVING', warning: false, meaning: 'the speed of the contact is above the threshold' },
-  { bit: Flag.SLIDING, name: 'SLIDING', warning: false, meaning: 'the contact moves beyond what the load explains, however slowly' },
-  { bit: Flag.LOW_SIGNAL, name: 'LOW_SIGNAL', warning: true, meaning: 'the peak is below 20 standard deviations of the noise' },
-  { bit: Flag.FLAT, name: 'FLAT', warning: true, meaning: 'there is pressure without a peak: no location' },
-  { bit: Flag.UNCERTAIN, name: 'UNCERTAIN', warning: true, meaning: 'location_sd_mm is above the limit that is set' },
-  { bit: Flag.MODEL, name: 'MODEL', warning: true, meaning: 'the residual is too large for one Gaussian' },
+  { bit: Flag.VELOCITY_VALID, name: 'VELOCITY_VALID', warning: false, meaning: 'the velocity of the contact is told' },
+  { bit: Flag.MOVING, name: 'MOVING', warning: false, meaning: 'the contact moves' },
+  { bit: Flag.SLIDING, name: 'SLIDING', warning: false, meaning: 'the contact slides, however slowly' },
+  { bit: Flag.LOW_SIGNAL, name: 'LOW_SIGNAL', warning: true, meaning: 'it presses so lightly that noise matters' },
+  { bit: Flag.FLAT, name: 'FLAT', warning: true, meaning: 'pressure without a peak: there is no place' },
+  { bit: Flag.UNCERTAIN, name: 'UNCERTAIN', warning: true, meaning: 'the place may be further off than the limit that is set' },
+  { bit: Flag.MODEL, name: 'MODEL', warning: true, meaning: 'the pressures are not those of one contact' },
   { bit: Flag.SATURATED, name: 'SATURATED', warning: true, meaning: 'a sensor is beyond its range and was left out' },
   { bit: Flag.FORCE_LOWER_BOUND, name: 'FORCE_LOWER_BOUND', warning: true, meaning: 'too few sensors are in their range: the force is at least this' },
   { bit: Flag.SENSOR_MASKED, name: 'SENSOR_MASKED', warning: true, meaning: 'a sensor is missing or was left out' },
   { bit: Flag.AT_BOUND, name: 'AT_BOUND', warning: true, meaning: 'the fit stopped at a limit' },
   { bit: Flag.ELONGATED, name: 'ELONGATED', warning: true, meaning: 'the contact is not round' },
-  { bit: Flag.ZERO_DOUBTFUL, name: 'ZERO_DOUBTFUL', warning: true, meaning: 'a force and a zero that has moved cannot be told apart' },
+  { bit: Flag.ZERO_DOUBTFUL, name: 'ZERO_DOUBTFUL', warning: true, meaning: 'what is felt may be a zero that has moved, or rubber that has not let go yet' },
   { bit: Flag.SENSOR_DOUBTFUL, name: 'SENSOR_DOUBTFUL', warning: true, meaning: 'a sensor in use gives reason to doubt it' },
 ];
 
