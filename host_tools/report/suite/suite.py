@@ -7,8 +7,8 @@
     suite.md        the same to read
     suite_failed    what the tests that failed said, a file for each
 
-The whole suite and the quick tests run over and over, first quiet, then busy: beside four processes that compute and one that writes to
-the disk all the time. The files are written after each run, so an interruption loses one run. Nothing is run again because it failed. A
+The whole suite and the quick tests run over and over, first quiet, then busy: beside as many processes that compute as there are
+processors, and one that writes to the disk all the time. The files are written after each run, so an interruption loses one run. Nothing is run again because it failed. A
 test that cannot be run has failed; skipped is only what says so itself. Seconds are of quiet runs: ctest's times added up for the tests,
 minutes and seconds on the wall for a run, on as many jobs as there are processors. Mutants are those of the last report of reliability in the output folder.
 """
@@ -36,7 +36,6 @@ from tables import table_md  # noqa: E402
 GOALS = (("whole_runs", ">=", 6), ("whole_failures", "<=", 0), ("quick_runs", ">=", 20), ("quick_failures", "<=", 0), ("quick_seconds", "<=", 60),
          ("whole_test_seconds", "<=", 1400), ("whole_minutes", "<=", 12), ("sleeps", "<=", 0), ("retries", "<=", 0),
          ("mutants_survive_percent", "<=", 4))
-BUSY_PROCESSES = 4
 LONGEST = 15  # tests that are listed
 # Both end with the report, however that ends: its process is the first argument.
 BURN = """
@@ -61,7 +60,7 @@ with open(sys.argv[2], "wb", buffering=0) as file:
 @contextlib.contextmanager
 def busy_machine(folder):
     own = str(os.getpid())
-    calls = [(BURN, own)] * BUSY_PROCESSES + [(WRITE, own, os.path.join(folder, "busy"))]
+    calls = [(BURN, own)] * os.cpu_count() + [(WRITE, own, os.path.join(folder, "busy"))]
     processes = [subprocess.Popen([sys.executable, "-c", *call]) for call in calls]
     try:
         yield
