@@ -141,7 +141,7 @@ at_least() {
 at_least cmake "$(cmake --version | sed -n 's/^cmake version //p')" 3.25
 at_least node "$(node --version | sed 's/^v//')" 18
 
-emulator=host_tools/emulator
+emulator=host_tools/simulation/emulator
 if ! cmp -s $emulator/package-lock.json $emulator/node_modules/.installed-lock; then
   say "fetching the emulator's one dependency with npm"
   (cd $emulator && npm ci --no-audit --no-fund --loglevel=error)
@@ -195,7 +195,7 @@ case $1 in
     [ -t 0 ] && [ -t 1 ] && stay=--stay
     exec sh host_tools/demo/demo.sh $stay
     ;;
-  web) exec build/host/host_tools/cli/fingertip web ;;
+  web) exec build/host/host_tools/tool/cli/fingertip web ;;
   test) exec ctest --preset host -j "$(nproc)" ${2:+-L "^$2\$"} ;;
   soak) exec /usr/bin/python3 tests/soak/soak.py --build build/host --boards build --hours "$2" ;;
   report)

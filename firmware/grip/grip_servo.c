@@ -2,7 +2,7 @@
 #include "port/divide.h"
 
 /* Rubber's force grows as its indentation to the 1.6: layers of 12 mm under spheres of 6 to 30 mm,
- * 1 to 10 N (host_tools/twin). */
+ * 1 to 10 N (host_tools/simulation/twin). */
 #define EXPONENT_PERMILLE 1600
 #define INDENTATION_MIN_um 300
 #define FORCE_MIN_mN 50

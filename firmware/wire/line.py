@@ -582,7 +582,7 @@ FILES = {
     "firmware/common/contact_flags.h": contact_flags_h,
     "firmware/wire/bodies.h": bodies_h,
     "firmware/wire/layouts.inc": layouts_inc,
-    "host_tools/libfingertip/line_fields.hpp": line_fields_hpp,
+    "host_tools/library/libfingertip/line_fields.hpp": line_fields_hpp,
     "host_tools/python/fingertip/line.py": line_py,
     "host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg": contact_msg,
     "host_tools/web/src/line/line_facts.ts": line_facts_ts,

@@ -9,7 +9,7 @@ root=$(cd "$(dirname "$0")/../.." && pwd)
 cd "$root"
 out=build/demo
 python=/usr/bin/python3
-tool=build/host/host_tools/cli/fingertip
+tool=build/host/host_tools/tool/cli/fingertip
 seconds=14 # three slips: at 20, 50 and 100 mm/s
 rubber=000000000000B0BB
 ideal=000000000001DEA1
@@ -28,7 +28,7 @@ fail() {
 emulate() {
   name=$1 serial=$2 scenario=$3 length=$4
   shift 4
-  node host_tools/emulator/main.mjs --board pico_parallel --image build/pico_parallel/fingertip-pico_parallel.bin \
+  node host_tools/simulation/emulator/main.mjs --board pico_parallel --image build/pico_parallel/fingertip-pico_parallel.bin \
     --serial "$serial" --scenario "$scenario" --seconds "$length" --pty $out/$name.tty --wait-open "$@" > $out/$name.log 2>&1 &
 }
 
@@ -42,7 +42,7 @@ wait_for_port() {
 
 # SECONDS FILE
 play_lime() {
-  build/host/host_tools/twin/twin scenario slip --indenter lime --layer 12 --effects gain=5,relaxation --seconds $1 --seed 3 \
+  build/host/host_tools/simulation/twin/twin scenario slip --indenter lime --layer 12 --effects gain=5,relaxation --seconds $1 --seed 3 \
     --cache build/host/contact_tables -o $2 > $out/twin.log 2>&1 || { cat $out/twin.log >&2; fail "the pad could not be computed"; }
 }
 play_lime $seconds $out/lime.csv
@@ -80,7 +80,7 @@ echo "The rubber's sensors differ by 5 %, it relaxes, and a lime's pressure is n
 echo "picture: $out/demo.png"
 
 echo "== two fingertips on a gripper lift an object that becomes slick; the firmware on the host, all else simulated"
-build/host/host_tools/cell/fingertip_cell $out/cell --gripper 2f85 --mass 0.25 --friction 0.5 --kinetic 0.9 --then slick:0.65@1 --seconds 60 --patience 1 \
+build/host/host_tools/simulation/cell/fingertip_cell $out/cell --gripper 2f85 --mass 0.25 --friction 0.5 --kinetic 0.9 --then slick:0.65@1 --seconds 60 --patience 1 \
   --cache build/host/contact_tables --truth $out/truth.csv < /dev/null > $out/cell.log 2>&1 &
 processes=$!
 while [ ! -e $out/cell/gripper ]; do

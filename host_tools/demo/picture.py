@@ -11,8 +11,8 @@ The picture in the project's README is that of the end of the second slip on the
 That of a lift in host_tools/README.md is of the firmware on the host:
 
     cd build/host/host_tools
-    twin/twin scenario lift --seconds 20 --force 6 --tangential 0.35,-40 --gain 2 --seed 5 -o lift_scenario.csv
-    player/fingertip_player play lift_scenario.csv -o lift.csv --raw --pad 12 --rate 200
+    simulation/twin/twin scenario lift --seconds 20 --force 6 --tangential 0.35,-40 --gain 2 --seed 5 -o lift_scenario.csv
+    simulation/player/fingertip_player play lift_scenario.csv -o lift.csv --raw --pad 12 --rate 200
     /usr/bin/python3 ../../../host_tools/demo/picture.py lift.csv --at 17.2 -o ../../../host_tools/demo/lift.svg
 """
 import argparse
@@ -131,7 +131,7 @@ def main(argv):
     parser.add_argument("--device", metavar="SERIAL", help="one of several fingertips in the recording")
     parser.add_argument("--at", type=float, default=0.0, metavar="S", help="time in the recording")
     parser.add_argument("--size", default="110x32", metavar="COLUMNSxROWS")
-    parser.add_argument("--tool", default=str(ROOT / "build/host/host_tools/cli/fingertip"), metavar="PATH")
+    parser.add_argument("--tool", default=str(ROOT / "build/host/host_tools/tool/cli/fingertip"), metavar="PATH")
     options = parser.parse_args(argv)
     size = re.fullmatch(r"(\d+)x(\d+)", options.size)
     if not size:

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "grasp/core.hpp"
-#include "gripper/gripper.hpp"
+#include "grasp/gripper/gripper.hpp"
 #include "libfingertip/wire.hpp"
 
 namespace fingertip {

@@ -16,7 +16,7 @@
 #pragma once
 
 #include "grasp/core.hpp"
-#include "gripper/gripper.hpp"
+#include "grasp/gripper/gripper.hpp"
 #include "libfingertip/line_source.hpp"
 
 #include <cstdint>

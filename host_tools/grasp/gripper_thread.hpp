@@ -5,7 +5,7 @@
 #pragma once
 
 #include "grasp/core.hpp"
-#include "gripper/gripper.hpp"
+#include "grasp/gripper/gripper.hpp"
 #include "libfingertip/clock.hpp"
 
 #include <atomic>

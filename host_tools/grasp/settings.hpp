@@ -2,7 +2,7 @@
 #pragma once
 
 #include "grasp/core.hpp"
-#include "gripper/gripper.hpp"
+#include "grasp/gripper/gripper.hpp"
 #include "libfingertip/packet_fields.hpp"
 
 #include <cstdint>

@@ -8,7 +8,7 @@ extern "C" {
 #include "fit/fit.h"
 }
 #include "common/contact_flags.h"
-#include "reference/reference.hpp"
+#include "report/reference/reference.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // The kernels of the report against the reference.
 #include "common/contact_flags.h"
-#include "reference/dataset.hpp"
 #include "report/fit/kernels.hpp"
+#include "report/reference/dataset.hpp"
 
 #include <cmath>
 #include <cstring>

@@ -1,8 +1,8 @@
 // The simulated presses against what is known of the bonded layer without simulating:
 // conservation of force, width and height of the best Gaussian.
-#include "reference/dataset.hpp"
-#include "reference/press_sets.hpp"
-#include "pad/layer.hpp"
+#include "library/pad/layer.hpp"
+#include "report/reference/dataset.hpp"
+#include "report/reference/press_sets.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 // The reference itself: rationed starts against Ceres from every start, and the cache against
 // solving again.
-#include "reference/dataset.hpp"
+#include "report/reference/dataset.hpp"
 
 #include <cmath>
 #include <filesystem>

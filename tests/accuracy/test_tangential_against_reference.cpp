@@ -9,7 +9,7 @@ extern "C" {
 #include "fit/fit_tangential.h"
 }
 #pragma GCC diagnostic pop
-#include "reference/tangential.hpp"
+#include "report/reference/tangential.hpp"
 #include "support/pad.h"
 
 #include <algorithm>

@@ -36,14 +36,14 @@ class CheckSources(unittest.TestCase):
         self.assert_caught("firmware/a/a.c", "int *p = (int *)0x40044000;\n", "register")
         self.assert_caught("firmware/a/a.c", '#include "rp2040/i2c.h"\n', "boards")
 
-        self.assert_caught("host_tools/pad/a.cpp", '#include "twin/contact.hpp"\n', "simulation")
+        self.assert_caught("host_tools/library/pad/a.cpp", '#include "simulation/twin/contact.hpp"\n', "simulation")
 
         for line in ("auto t = std::chrono::steady_clock::now();", "std::this_thread::sleep_for(PAUSE);", "poll(&waiting, 1, 100);"):
-            self.assert_caught("host_tools/cli/a.cpp", line + "\n", "libfingertip/clock.hpp")
+            self.assert_caught("host_tools/tool/cli/a.cpp", line + "\n", "libfingertip/clock.hpp")
 
     def test_who_measures_may_look_at_the_clock_and_all_may_ask_at_once(self):
-        for path, line in (("host_tools/report/a.cpp", "steady_clock::now();"), ("host_tools/libfingertip/clock.cpp", "steady_clock::now();"),
-                           ("host_tools/cli/a.cpp", "poll(&asked, 1, 0);")):
+        for path, line in (("host_tools/report/a.cpp", "steady_clock::now();"), ("host_tools/library/libfingertip/clock.cpp", "steady_clock::now();"),
+                           ("host_tools/tool/cli/a.cpp", "poll(&asked, 1, 0);")):
             self.assertEqual(self.check(path, line + "\n")[0], 0, path)
 
     def test_comments_and_strings_are_free(self):

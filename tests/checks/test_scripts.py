@@ -108,7 +108,7 @@ class Bootstrap(Folder):
     """bootstrap.sh alone, up to its call of npm, with a stand-in for each program that it must not call."""
 
     def up_to_npm(self, cmake="3.25.1", node="18.20.4", job=("demo",), path=os.environ["PATH"]):
-        for folder in ("cmake", "host_tools/emulator", "bin"):
+        for folder in ("cmake", "host_tools/simulation/emulator", "bin"):
             (self.folder / folder).mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / "cmake/bootstrap.sh", self.folder / "cmake")
         for name, body in (("apt-get", "exit 0"), ("sudo", "exit 0"), ("npm", "exit 33"),
@@ -144,10 +144,10 @@ class BootstrapReport(Folder):
     """bootstrap.sh report with a stand-in for each program that it calls."""
 
     def test_it_ends_with_the_place_of_the_page(self):
-        for folder in ("cmake", "host_tools/emulator/node_modules", "bin"):
+        for folder in ("cmake", "host_tools/simulation/emulator/node_modules", "bin"):
             (self.folder / folder).mkdir(parents=True)
         shutil.copy(ROOT / "cmake/bootstrap.sh", self.folder / "cmake")
-        (self.folder / "host_tools/emulator/package-lock.json").write_text("{}")
+        (self.folder / "host_tools/simulation/emulator/package-lock.json").write_text("{}")
         for path in ("tests/requirements.txt", "build/venv/.installed-requirements"):
             (self.folder / path).parent.mkdir(parents=True)
             (self.folder / path).write_text("")
@@ -196,7 +196,7 @@ class Demo(Folder):
                 open(sys.argv[sys.argv.index("-o") + 1], "w").write("{}")
                 """)
         self.write("host_tools/demo/errors.py", "print('errors')\n")
-        self.write("build/host/host_tools/twin/twin", "#!/bin/sh\n").chmod(0o755)
+        self.write("build/host/host_tools/simulation/twin/twin", "#!/bin/sh\n").chmod(0o755)
         self.cell(self.CELL)
         self.monitor('case $1 in set) test -e "$3" ;; esac')
 
@@ -207,7 +207,7 @@ class Demo(Folder):
         return file
 
     def emulator(self, body):
-        self.write("host_tools/emulator/main.mjs", f"""
+        self.write("host_tools/simulation/emulator/main.mjs", f"""
             import {{ writeFileSync }} from 'node:fs';
             const link = process.argv[process.argv.indexOf('--pty') + 1];
             process.on('SIGINT', () => process.exit());
@@ -216,10 +216,10 @@ class Demo(Folder):
             """)
 
     def monitor(self, body):
-        self.write("build/host/host_tools/cli/fingertip", f"#!/bin/sh\n{body}\n").chmod(0o755)
+        self.write("build/host/host_tools/tool/cli/fingertip", f"#!/bin/sh\n{body}\n").chmod(0o755)
 
     def cell(self, body):
-        self.write("build/host/host_tools/cell/fingertip_cell", f"#!/bin/sh\n{body}\n").chmod(0o755)
+        self.write("build/host/host_tools/simulation/cell/fingertip_cell", f"#!/bin/sh\n{body}\n").chmod(0o755)
 
     def play(self, *options, **how):
         return subprocess.run(["sh", self.folder / "host_tools/demo/demo.sh", *options], capture_output=True, text=True, timeout=PATIENCE_s, **how)

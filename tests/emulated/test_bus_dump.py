@@ -35,7 +35,7 @@ def run(folder, rise_ns):
     scenario = folder / "scenario.csv"
     subprocess.run([sys.executable, str(ROOT / "host_tools/python"), "scenario", "ideal", "-o", str(scenario), "--seconds", "1"],
                    check=True)
-    call = [TOOLS.node, str(ROOT / "host_tools/emulator/main.mjs"), "--board", TOOLS.board, "--image", TOOLS.image, "--scenario",
+    call = [TOOLS.node, str(ROOT / "host_tools/simulation/emulator/main.mjs"), "--board", TOOLS.board, "--image", TOOLS.image, "--scenario",
             str(scenario), "--fast-enumeration", "--seconds", str(TO_S + 0.01), "--vcd", str(folder / "bus.vcd"), "--vcd-from",
             str(FROM_S), "--vcd-to", str(TO_S), "--bus-log", str(folder / "bus.csv"), "--report", str(folder / "run.json")]
     if rise_ns is not None:

@@ -33,7 +33,7 @@ class Calibrate(unittest.TestCase):
         cls.addClassCleanup(temporary.cleanup)
         cls.folder = pathlib.Path(temporary.name)
         cls.scenario = cls.folder / "placements.csv"
-        subprocess.run([OPTIONS.build / "host_tools/twin/twin", "scenario", "placements", "-o", cls.scenario, "--gain", "10", "--seed", "41", "--pad", "7",
+        subprocess.run([OPTIONS.build / "host_tools/simulation/twin/twin", "scenario", "placements", "-o", cls.scenario, "--gain", "10", "--seed", "41", "--pad", "7",
                         "--cache", OPTIONS.build / "contact_tables"], check=True, stdout=subprocess.DEVNULL)
 
     def start(self, *options):

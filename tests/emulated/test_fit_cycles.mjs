@@ -8,7 +8,7 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
-import { Prng } from '../../host_tools/emulator/prng.mjs';
+import { Prng } from '../../host_tools/simulation/emulator/prng.mjs';
 import { Bench } from '../../host_tools/report/fit/on_chip/fit_on_chip.mjs';
 
 /** The build's iterations from cold, with everything: readings, guess, amplitude, force, errors, shape, flags. */

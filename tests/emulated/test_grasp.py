@@ -76,7 +76,7 @@ class Grasp(unittest.TestCase):
 
 class LockStep(unittest.TestCase):
     def refused(self, words, *program, options=()):
-        done = subprocess.run([OPTIONS.node, ROOT / "host_tools/emulator/lockstep.mjs", "--image", OPTIONS.image, "--board", emulated_grasp.BOARD, *options, "--", *program],
+        done = subprocess.run([OPTIONS.node, ROOT / "host_tools/simulation/emulator/lockstep.mjs", "--image", OPTIONS.image, "--board", emulated_grasp.BOARD, *options, "--", *program],
                               capture_output=True, text=True)
         self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
         self.assertIn(words, done.stderr)

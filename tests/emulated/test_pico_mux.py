@@ -39,7 +39,7 @@ class Run:
         self.base = pathlib.Path(folder) / name
         script = [(0.45, "dtr 1"), (0.46, encoded("stream", "contact,raw,health")), *commands]
         self.path("script").write_text("".join(f"{t} {what}\n" for t, what in script))
-        call = [TOOLS.node, str(ROOT / "host_tools/emulator/main.mjs"), "--board", "pico_mux", "--image", TOOLS.image,
+        call = [TOOLS.node, str(ROOT / "host_tools/simulation/emulator/main.mjs"), "--board", "pico_mux", "--image", TOOLS.image,
                 "--scenario", str(scenario), "--host-script", str(self.path("script")), "--capture", str(self.path("ftr")),
                 "--report", str(self.path("run.json"))]
         if seconds:

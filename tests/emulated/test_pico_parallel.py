@@ -42,7 +42,7 @@ class Run:
         path("script").write_text("".join(f"{t} {what}\n" for t, what in script))
         path("faults.json").write_text(json.dumps(list(faults)))
         done = subprocess.run(
-            [TOOLS.node, str(ROOT / "host_tools/emulator/main.mjs"), "--board", "pico_parallel", "--image", TOOLS.image, "--scenario",
+            [TOOLS.node, str(ROOT / "host_tools/simulation/emulator/main.mjs"), "--board", "pico_parallel", "--image", TOOLS.image, "--scenario",
              str(truth.path), "--host-script", str(path("script")), "--capture", str(path("ftr")), "--report", str(path("run.json")),
              "--seconds", str(seconds), "--faults", str(path("faults.json"))], capture_output=True, text=True)
         if done.returncode != 0:

@@ -43,7 +43,7 @@ class Run:
         pathlib.Path(path("script")).write_text("".join(f"{t_s} {what}\n" for t_s, what in script))
         image = pathlib.Path(TOOLS.scenes) / scene / f"fingertip-{BOARD}.bin"
         done = subprocess.run(
-            [TOOLS.node, str(ROOT / "host_tools/emulator/main.mjs"), "--board", BOARD, "--image", str(image), "--scenario", path("scenario"),
+            [TOOLS.node, str(ROOT / "host_tools/simulation/emulator/main.mjs"), "--board", BOARD, "--image", str(image), "--scenario", path("scenario"),
              "--host-script", path("script"), "--capture", path("ftr"), "--seconds", "1.8"], capture_output=True, text=True)
         if done.returncode != 0:
             raise AssertionError(f"the emulator found something wrong:\n{done.stderr}")

@@ -8,9 +8,9 @@
  */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { MemoryFault } from '../../host_tools/emulator/chip/mpu.mjs';
-import { parseScenario } from '../../host_tools/emulator/scenario.mjs';
-import { setupPacket } from '../../host_tools/emulator/usb/host.mjs';
+import { MemoryFault } from '../../host_tools/simulation/emulator/chip/mpu.mjs';
+import { parseScenario } from '../../host_tools/simulation/emulator/scenario.mjs';
+import { setupPacket } from '../../host_tools/simulation/emulator/usb/host.mjs';
 import { HEADER } from './harness/bench.mjs';
 import { ImageBench } from './harness/image_bench.mjs';
 

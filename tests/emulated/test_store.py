@@ -47,7 +47,7 @@ class Store(unittest.TestCase):
         lines = ["0.45 dtr 1", *(f"{t} {run(self.tool, 'encode', *words.split()).strip()}" for t, words in commands)]
         script.write_text("\n".join(lines) + "\n")
         faulty.write_text(json.dumps(list(faults)))
-        run(OPTIONS.node, ROOT / "host_tools/emulator/main.mjs", "--board", "pico_mux", "--image", f"{OPTIONS.boards}/pico_mux/fingertip-pico_mux.bin",
+        run(OPTIONS.node, ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_mux", "--image", f"{OPTIONS.boards}/pico_mux/fingertip-pico_mux.bin",
             "--scenario", self.scenario, "--host-script", script, "--capture", capture, "--faults", faulty, "--seconds", seconds,
             "--flash", self.flash, "--fast-enumeration", *options)
         run(self.tool, "replay", capture, "--to-csv", table, "--overwrite")
@@ -62,7 +62,7 @@ class Store(unittest.TestCase):
 
     @property
     def tool(self):
-        return f"{OPTIONS.build}/host_tools/cli/fingertip"
+        return f"{OPTIONS.build}/host_tools/tool/cli/fingertip"
 
     LOOK = ((0.9, "info"), (0.91, "stream contact"))
 

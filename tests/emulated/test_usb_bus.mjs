@@ -8,9 +8,9 @@ import { execFileSync } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { findBoard } from '../../host_tools/emulator/board/boards.mjs';
-import { Machine } from '../../host_tools/emulator/machine.mjs';
-import { setupPacket } from '../../host_tools/emulator/usb/host.mjs';
+import { findBoard } from '../../host_tools/simulation/emulator/board/boards.mjs';
+import { Machine } from '../../host_tools/simulation/emulator/machine.mjs';
+import { setupPacket } from '../../host_tools/simulation/emulator/usb/host.mjs';
 import { steady } from './harness/bench.mjs';
 
 const [image, fingertip] = process.argv.slice(2);

@@ -1,9 +1,9 @@
 // The gripper clients, and whatever answers on their line: a Robotiq by Modbus, a Feetech servo.
 #include "fuzz.h"
-#include "gripper/feetech.hpp"
-#include "gripper/feetech_packet.hpp"
-#include "gripper/feetech_table.hpp"
-#include "gripper/gripper.hpp"
+#include "grasp/gripper/feetech.hpp"
+#include "grasp/gripper/feetech_packet.hpp"
+#include "grasp/gripper/feetech_table.hpp"
+#include "grasp/gripper/gripper.hpp"
 
 #include <atomic>
 #include <cmath>

@@ -2,7 +2,7 @@
 #include "fuzz.h"
 #include "libfingertip/error.hpp"
 #include "memory_file.hpp"
-#include "player/scenario.hpp"
+#include "simulation/player/scenario.hpp"
 
 #include <cmath>
 

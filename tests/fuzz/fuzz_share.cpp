@@ -2,8 +2,8 @@
 #include "fuzz.h"
 #include "libfingertip/command.hpp"
 #include "libfingertip/decoder.hpp"
+#include "library/share/hub.hpp"
 #include "line.hpp"
-#include "share/hub.hpp"
 
 #include <map>
 #include <set>

@@ -131,7 +131,7 @@ class Emulator:
     def __init__(self, folder, name, image, board, scenario, socket, serial=SERIAL):
         self.base = folder / name
         self.process = subprocess.Popen(
-            [TOOLS.node, ROOT / "host_tools/emulator/main.mjs", "--image", image, "--board", board,
+            [TOOLS.node, ROOT / "host_tools/simulation/emulator/main.mjs", "--image", image, "--board", board,
              "--scenario", scenario, "--seconds", "3600", "--serial", serial, "--usbredir", socket, "--fast-enumeration",
              "--progress", "--usb-log", self.path("usb"), "--capture", self.path("ftr"), "--report", self.path("json")],
             stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

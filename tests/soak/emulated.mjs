@@ -4,10 +4,10 @@ import { spawn } from 'node:child_process';
 import { readFileSync } from 'node:fs';
 import { createInterface } from 'node:readline';
 import { parseArgs } from 'node:util';
-import { findBoard } from '../../host_tools/emulator/board/boards.mjs';
-import { InputError } from '../../host_tools/emulator/errors.mjs';
-import { parseFaults } from '../../host_tools/emulator/faults.mjs';
-import { Machine } from '../../host_tools/emulator/machine.mjs';
+import { findBoard } from '../../host_tools/simulation/emulator/board/boards.mjs';
+import { InputError } from '../../host_tools/simulation/emulator/errors.mjs';
+import { parseFaults } from '../../host_tools/simulation/emulator/faults.mjs';
+import { Machine } from '../../host_tools/simulation/emulator/machine.mjs';
 
 const USAGE = `usage: emulated.mjs --image FILE.bin --board NAME --soak PROGRAM [--seed N] [--seconds S] [--show FROM_s TO_s]
 

@@ -7,7 +7,7 @@
 //   {"events": [["start" | "open" | "close", t_us] | ["zero", t_us, us] | ["bytes", t_us, hex]],
 //    "unasked", "ended"}         zero: when the device's clock was 0
 //
-// Faults are those of host_tools/emulator/faults.mjs, and port_closed and suspend; start_* is a
+// Faults are those of host_tools/simulation/emulator/faults.mjs, and port_closed and suspend; start_* is a
 // power_cut after which the crystal or the PLLs come late.
 #pragma once
 

@@ -54,7 +54,7 @@ struct Sent {
   Bytes bytes;
 };
 
-// The emulator as a process; its frames: host_tools/emulator/port/stepped_port.mjs.
+// The emulator as a process; its frames: host_tools/simulation/emulator/port/stepped_port.mjs.
 class Emulator {
 public:
   explicit Emulator(std::vector<char *> arguments) {

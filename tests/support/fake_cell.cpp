@@ -10,7 +10,7 @@
 //   object MM | load N | slide 0|1 | over 0|1 | stall SIDE 0|1 | freeze SIDE 0|1
 //   unplug SIDE|gripper | plug SIDE|gripper | line none|silent|garbage | fault CODE | power 0|1 |
 //   truth
-#include "cell/gripper_server.hpp"
+#include "simulation/cell/gripper_server.hpp"
 #include "support/soft_fingertip.hpp"
 
 #include <map>

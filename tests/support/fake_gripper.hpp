@@ -2,7 +2,7 @@
 // told, in the time that passes, and fails where the test says so.
 #pragma once
 
-#include "gripper/gripper.hpp"
+#include "grasp/gripper/gripper.hpp"
 #include "libfingertip/clock.hpp"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 #include "support/gripper_lines.hpp"
 
-#include "gripper/robotiq_registers.hpp"
-#include "gripper/serial_line.hpp"
+#include "grasp/gripper/robotiq_registers.hpp"
+#include "grasp/gripper/serial_line.hpp"
 
 #include <algorithm>
 #include <cmath>

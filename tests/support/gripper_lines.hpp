@@ -1,9 +1,9 @@
 /* Other ends of a gripper's line for tests, on simulated time. */
 #pragma once
 
-#include "cell/gripper_server.hpp"
 #include "libfingertip/clock.hpp"
 #include "libfingertip/served_port.hpp"
+#include "simulation/cell/gripper_server.hpp"
 
 #include <array>
 #include <cstdint>

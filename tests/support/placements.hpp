@@ -1,8 +1,8 @@
 /* Placements on a pad whose everything is known, for tests of the calibration. */
 #pragma once
 
-#include "calibration/solver.hpp"
 #include "libfingertip/random.hpp"
+#include "tool/calibration/solver.hpp"
 
 extern "C" {
 #include "config/geometry.h"

@@ -49,7 +49,7 @@ class Bench(contextlib.ExitStack):
         """The release image of pico_parallel, powered on when its port is first opened."""
         port = browser.ports / f"{USB_ID}:{serial}"
         return self._until_there(self._start(
-            self._tools.node, ROOT / "host_tools/emulator/main.mjs", "--board", "pico_parallel", "--image", image or self._tools.image,
+            self._tools.node, ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_parallel", "--image", image or self._tools.image,
             "--scenario", scenario, "--serial", serial, "--pty", port, "--wait-open", "--fast-enumeration", *options,
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL), port)
 
@@ -61,7 +61,7 @@ class Bench(contextlib.ExitStack):
 
     def served(self):
         """The page, by `fingertip web`: its address without the last slash."""
-        process = self._start(self._tools.build / "host_tools/cli/fingertip", "web", "--port", "0", "--no-browser", stdout=subprocess.PIPE,
+        process = self._start(self._tools.build / "host_tools/tool/cli/fingertip", "web", "--port", "0", "--no-browser", stdout=subprocess.PIPE,
                               stderr=subprocess.DEVNULL, text=True)
         url = process.stdout.readline().strip()
         if not re.fullmatch(r"http://127\.0\.0\.1:\d+/", url):

@@ -55,7 +55,7 @@ class PageTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="fingertip-")))
-        cls.tool = OPTIONS.build / "host_tools/cli/fingertip"
+        cls.tool = OPTIONS.build / "host_tools/tool/cli/fingertip"
         cls.url = cls.enterClassContext(Bench(OPTIONS)).served()
         cls.browser = cls.enterClassContext(Browser(cls.folder, OPTIONS.ports, cls.policy()))
 
@@ -85,7 +85,7 @@ class PageTest(unittest.TestCase):
     def scenario(self, kind, *options):
         path = self.folder / f"{kind}.csv"
         if not path.exists():
-            run(OPTIONS.build / "host_tools/twin/twin", "scenario", kind, "-o", path, "--cache", OPTIONS.build / "contact_tables", *options)
+            run(OPTIONS.build / "host_tools/simulation/twin/twin", "scenario", kind, "-o", path, "--cache", OPTIONS.build / "contact_tables", *options)
         return path
 
 
@@ -319,7 +319,7 @@ class Looks(PageTest):
         recording = self.folder / "lime.csv"
         if not recording.exists():
             scenario = self.scenario("slip", "--indenter", "lime", "--gain", 10, "--seconds", 12)
-            run(OPTIONS.build / "host_tools/player/fingertip_player", "play", scenario, "-o", recording, "--quiet")
+            run(OPTIONS.build / "host_tools/simulation/player/fingertip_player", "play", scenario, "-o", recording, "--quiet")
         page = self.open(before=TEN_TIMES, width=1120, height=760)
         page.give("input[type=file]", recording)
         page.until("fingertip.fingertips[0]?.state === 'closed'")

@@ -3,7 +3,7 @@
 An exchange tells that the host's clock stood between sent and received when the fingertip's stood at device_us. A straight line,
 offset and drift, must pass between all of these of the last half minute; how far the lines that do are apart at one time bounds the
 error, whatever the delays were. The line in the middle, as far from the nearest limits on both sides as it can be, is the estimate.
-If no line passes, the clock has jumped, and the older half of the exchanges goes. The same as host_tools/libfingertip/clock_fit.hpp.
+If no line passes, the clock has jumped, and the older half of the exchanges goes. The same as host_tools/library/libfingertip/clock_fit.hpp.
 
 The host's clock is time.perf_counter(), in microseconds: on Linux CLOCK_MONOTONIC, which joint recordings are in, too.
 """

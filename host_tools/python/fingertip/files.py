@@ -17,7 +17,7 @@ Recording (CSV, UTF-8): what a fingertip said, written by `fingertip record`; on
 Cells of a packet that did not come are empty, and those of a quantity whose flag is off (no fit, no x); NaN here.
 
 Of several fingertips on one clock, format 2, written by `fingertip record --device A --device B`: see
-host_tools/libfingertip/RECORDING.md. Read as the recording of one of them, with time_us, the recorder's clock.
+host_tools/library/libfingertip/RECORDING.md. Read as the recording of one of them, with time_us, the recorder's clock.
 
 Of a grasp also the gripper's and the controller's rows, "# grip: ..." between the others: see host_tools/grasp/grip_row.hpp, read_grip.
 

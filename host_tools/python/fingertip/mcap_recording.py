@@ -1,4 +1,4 @@
-"""Recordings as MCAP files of ROS 2 messages, written and read line by line (host_tools/libfingertip/RECORDING.md has the format)."""
+"""Recordings as MCAP files of ROS 2 messages, written and read line by line (host_tools/library/libfingertip/RECORDING.md has the format)."""
 import calendar
 import math
 import os

@@ -1,4 +1,4 @@
-"""Writes recordings as `fingertip record` does (host_tools/libfingertip/RECORDING.md has the format); read_recording reads them."""
+"""Writes recordings as `fingertip record` does (host_tools/library/libfingertip/RECORDING.md has the format); read_recording reads them."""
 import contextlib
 import datetime
 import heapq

@@ -37,7 +37,7 @@ class Trace:
         image, base = pathlib.Path(boards) / board / f"fingertip-{board}.bin", pathlib.Path(folder) / board
         if not image.is_file():
             raise InputError(f"{image}: is not there; build it: cmake --workflow --preset {board}")
-        run("node", ROOT / "host_tools/emulator/main.mjs", "--board", board, "--image", image, "--scenario", scenario(folder, "rest", 1, board),
+        run("node", ROOT / "host_tools/simulation/emulator/main.mjs", "--board", board, "--image", image, "--scenario", scenario(folder, "rest", 1, board),
             "--fast-enumeration", "--seconds", SECONDS + 0.001, "--vcd", f"{base}.vcd", "--vcd-to", SECONDS, "--bus-log", f"{base}.csv",
             "--report", f"{base}.json")
         self.board = board

@@ -14,7 +14,7 @@ GOALS = (("mcap_messages_differ", "<=", 0), ("mcap_bags_differ", "<=", 0), ("mca
 
 
 def measure(build, steps):
-    tool, fake_device, python = (build / "host_tools/cli/fingertip", build / "tests/support/fake_device", ROOT / "build/venv/bin/python")
+    tool, fake_device, python = (build / "host_tools/tool/cli/fingertip", build / "tests/support/fake_device", ROOT / "build/venv/bin/python")
     for path, how in ((fake_device, "cmake --build --preset host"), (python, "sh cmake/bootstrap.sh test")):
         if not path.exists():
             raise InputError(f"{path} is not there; {how}")

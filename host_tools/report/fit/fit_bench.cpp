@@ -1,9 +1,9 @@
 // fit_bench: time and error of one fit, our kernels and host libraries on the same presses.
-#include "reference/dataset.hpp"
-#include "reference/options.hpp"
 #include "report/fit/json_file.hpp"
 #include "report/fit/kernels.hpp"
 #include "report/fit/libraries.hpp"
+#include "report/reference/dataset.hpp"
+#include "report/reference/options.hpp"
 
 #include <algorithm>
 #include <cmath>

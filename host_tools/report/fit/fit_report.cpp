@@ -1,10 +1,10 @@
 // fit_report: how far the on-chip fit lies from the reference optimum, and how well its flags tell.
 #include "common/contact_flags.h"
-#include "reference/dataset.hpp"
-#include "reference/options.hpp"
+#include "libfingertip/in_parallel.hpp"
 #include "report/fit/json_file.hpp"
 #include "report/fit/kernels.hpp"
-#include "libfingertip/in_parallel.hpp"
+#include "report/reference/dataset.hpp"
+#include "report/reference/options.hpp"
 
 extern "C" {
 #include "config/defaults.h"

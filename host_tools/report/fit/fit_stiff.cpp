@@ -10,11 +10,11 @@
 // means more than 1 mm from the truth, and any location where there is none to find; of two
 // contacts the truth is the centroid of force.
 #include "common/contact_flags.h"
-#include "reference/dataset.hpp"
-#include "reference/options.hpp"
+#include "libfingertip/in_parallel.hpp"
 #include "report/fit/json_file.hpp"
 #include "report/fit/kernels.hpp"
-#include "libfingertip/in_parallel.hpp"
+#include "report/reference/dataset.hpp"
+#include "report/reference/options.hpp"
 
 extern "C" {
 #include "condition/condition.h"

@@ -19,15 +19,15 @@ COURSE = {
 
 
 def program(build):
-    path = pathlib.Path(build) / "host_tools/cell/fingertip_cell_emulated"
+    path = pathlib.Path(build) / "host_tools/simulation/cell/fingertip_cell_emulated"
     if not path.is_file():
         raise InputError(f"{path} is not there; build it: cmake --build --preset host")
     return path
 
 
 def grasp(node, image, world, tables, *options):
-    """What host_tools/cell/emulated_grasp.hpp tells, and of the boards."""
-    return json.loads(run(node, ROOT / "host_tools/emulator/lockstep.mjs", "--image", image, "--board", BOARD, "--clock-ppm", CLOCKS_ppm, "--seconds", "5", "--",
+    """What host_tools/simulation/cell/emulated_grasp.hpp tells, and of the boards."""
+    return json.loads(run(node, ROOT / "host_tools/simulation/emulator/lockstep.mjs", "--image", image, "--board", BOARD, "--clock-ppm", CLOCKS_ppm, "--seconds", "5", "--",
                           world, "--cache", tables, *options))
 
 

@@ -1,7 +1,7 @@
 // Every fault in every state of a grasp, on every gripper and object: what came of it.
 #pragma once
 
-#include "cell/trial.hpp"
+#include "simulation/cell/trial.hpp"
 
 #include <cstdint>
 #include <map>

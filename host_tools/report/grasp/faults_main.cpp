@@ -4,8 +4,8 @@
 // the largest true force, whether the object was crushed; and how many of them broke a rule.
 #include "grasp/fault_trials.hpp"
 #include "grasp/words.hpp"
-#include "reference/options.hpp"
 #include "libfingertip/in_parallel.hpp"
+#include "report/reference/options.hpp"
 
 #include <algorithm>
 #include <cstdio>

@@ -7,7 +7,7 @@
     grasp.md      the same to read
     grasp.png     the same to look at, and a slip that is caught
 
-The controller and the fingertips' code are the firmware's own; rubber, objects, sensors and grippers are simulated (host_tools/cell,
+The controller and the fingertips' code are the firmware's own; rubber, objects, sensors and grippers are simulated (host_tools/simulation/cell,
 whose headers say what is assumed). The controller's constants were chosen with seeds below 1000; those here are others, and so are the
 pads. In one grasp more the fingertips are emulated boards with their release image. Nothing has been checked on hardware.
 """

@@ -1,10 +1,10 @@
-// fingertip_grasp_trials: many grasps in the simulated cell (host_tools/cell), one set of them.
+// fingertip_grasp_trials: many grasps in the simulated cell (host_tools/simulation/cell), one set of them.
 //
 // One JSON object on the standard output: what was asked for, then how the grasps went, all of it
 // and by object, friction and disturbance. All simulated.
 #include "grasp/summary.hpp"
 #include "libfingertip/text.hpp"
-#include "reference/options.hpp"
+#include "report/reference/options.hpp"
 
 #include <chrono>
 #include <cstdio>

@@ -1,9 +1,9 @@
 #include "grasp/trials.hpp"
 
 #include "grasp/convert.hpp"
-#include "libfingertip/text.hpp"
 #include "libfingertip/in_parallel.hpp"
-#include "pad/table_file.hpp"
+#include "libfingertip/text.hpp"
+#include "library/pad/table_file.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // A set of grasps: what was asked for, and how each went.
 #pragma once
 
-#include "cell/trial.hpp"
+#include "simulation/cell/trial.hpp"
 #include "truth/fit/touches.hpp"
 
 #include <cstdint>

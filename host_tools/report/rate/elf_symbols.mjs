@@ -1,6 +1,6 @@
 /** The functions of a 32-bit little-endian ELF file: [{name, start, end}], by address, aliases joined with "=". */
 import { readFileSync } from 'node:fs';
-import { InputError, inWords } from '../../emulator/errors.mjs';
+import { InputError, inWords } from '../../simulation/emulator/errors.mjs';
 
 const [SYMBOL_TABLE, FUNCTION] = [2, 2];
 

@@ -133,7 +133,7 @@ def main(argv):
     parser.add_argument("--scenes", required=True, metavar="DIR", help="where to build the scenes")
     parser.add_argument("-o", "--output", required=True, metavar="DIR")
     options = parser.parse_args(argv)
-    fingertip, out = pathlib.Path(options.build) / "host_tools/cli/fingertip", pathlib.Path(options.output)
+    fingertip, out = pathlib.Path(options.build) / "host_tools/tool/cli/fingertip", pathlib.Path(options.output)
     if not fingertip.is_file():
         raise InputError(f"{fingertip}: is not there; build it: cmake --preset host && cmake --build --preset host")
     out.mkdir(parents=True, exist_ok=True)

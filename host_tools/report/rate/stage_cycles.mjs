@@ -2,11 +2,11 @@
 /** Counts where the cycles of an image go, by stage of the frame and by function: see USAGE. */
 import { readFileSync, writeFileSync } from 'node:fs';
 import { parseArgs } from 'node:util';
-import { findBoard } from '../../emulator/board/boards.mjs';
-import { InputError, inWords } from '../../emulator/errors.mjs';
-import { Machine } from '../../emulator/machine.mjs';
-import { readHostScript, scheduleHostScript } from '../../emulator/port/host_script.mjs';
-import { readScenario } from '../../emulator/scenario.mjs';
+import { findBoard } from '../../simulation/emulator/board/boards.mjs';
+import { InputError, inWords } from '../../simulation/emulator/errors.mjs';
+import { Machine } from '../../simulation/emulator/machine.mjs';
+import { readHostScript, scheduleHostScript } from '../../simulation/emulator/port/host_script.mjs';
+import { readScenario } from '../../simulation/emulator/scenario.mjs';
 import { readFunctions } from './elf_symbols.mjs';
 
 const USAGE = `usage: stage_cycles.mjs --image BASE --board NAME --scenario FILE --host-script FILE --window NAME:FROM_S:TO_S...

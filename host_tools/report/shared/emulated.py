@@ -27,7 +27,7 @@ MARGIN = 1.05
 
 class Tools:
     def __init__(self, build, boards):
-        self.fingertip = pathlib.Path(build) / "host_tools/cli/fingertip"
+        self.fingertip = pathlib.Path(build) / "host_tools/tool/cli/fingertip"
         self.boards = pathlib.Path(boards)
         for path in (self.fingertip, *(self.image(board) for board in BOARDS)):
             if not path.is_file():
@@ -105,7 +105,7 @@ class Measurement:
 
         def emulate(name, until_s):
             to = f"{base}.{name}"
-            run("node", ROOT / "host_tools/emulator/main.mjs", "--board", board, "--image", tools.image(board), "--scenario", path,
+            run("node", ROOT / "host_tools/simulation/emulator/main.mjs", "--board", board, "--image", tools.image(board), "--scenario", path,
                 "--seconds", until_s, "--host-script", script, "--capture", f"{to}.ftr", "--report", f"{to}.json", "--usb-log", f"{to}.usb")
             return to, json.loads(pathlib.Path(f"{to}.json").read_text())
 

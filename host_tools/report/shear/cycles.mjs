@@ -1,7 +1,7 @@
 #!/usr/bin/env node
 /** usage: cycles.mjs fit_cycles.bin: cycles of the fit, and of the estimate of tangential load after it: median, median and most of 100 presses. */
 import { readFileSync } from 'node:fs';
-import { Prng } from '../../emulator/prng.mjs';
+import { Prng } from '../../simulation/emulator/prng.mjs';
 import { Bench } from '../fit/on_chip/fit_on_chip.mjs';
 
 const PRESSES = 100;

@@ -82,7 +82,7 @@ def cpu_s(pid):
 
 def measure(build, seconds, steps):
     fingertip, client, fake = (build / name for name in (
-        "host_tools/cli/fingertip", "host_tools/report/tools/serve_client", "tests/support/fake_device"))
+        "host_tools/tool/cli/fingertip", "host_tools/report/tools/serve_client", "tests/support/fake_device"))
     for tool in (fingertip, client, fake):
         if not tool.exists():
             raise InputError(f"{tool} is not there; build it: cmake --build --preset host")

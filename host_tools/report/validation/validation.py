@@ -133,7 +133,7 @@ class Workshop:
 
     def __init__(self, options, out):
         tools = pathlib.Path(options.build) / "host_tools"
-        self.twin, self.player, self.fingertip = tools / "twin/twin", tools / "player/fingertip_player", tools / "cli/fingertip"
+        self.twin, self.player, self.fingertip = tools / "simulation/twin/twin", tools / "simulation/player/fingertip_player", tools / "tool/cli/fingertip"
         for tool in (self.twin, self.player, self.fingertip):
             if not tool.exists():
                 raise InputError(f"{tool} is not there; build it: cmake --build --preset host")
@@ -209,7 +209,7 @@ class Workshop:
             self.seed, "--cache", self.tables, "-o", scenario, "--overwrite")
         commands = [run(self.fingertip, "encode", *words).strip() for words in (("stream", "contact,raw"), ("info",), ("tare",))]
         script.write_text("0.7 dtr 1\n" + "".join(f"{0.72 + 0.01 * i:.2f} {word}\n" for i, word in enumerate(commands)))
-        run("node", ROOT / "host_tools/emulator/main.mjs", "--board", "pico_mux", "--image", self.image, "--scenario", scenario,
+        run("node", ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_mux", "--image", self.image, "--scenario", scenario,
             "--host-script", script, "--capture", capture, "--fast-enumeration")
         return json.loads(run(self.player, "repeat", capture))
 

@@ -25,7 +25,7 @@ def play(build, scenario, folder, *options, pad=False):
     """Both: packets, differences, and {"seconds", "cpu_s", "bytes"} of WebAssembly."""
     native, wasm, commands = folder / "native.ftr", folder / "wasm.ftr", folder / "commands"
     web = build / "host_tools/web/wasm"
-    run(build / "host_tools/player/fingertip_player", "play", scenario, "-o", folder / "native.csv", "--raw-bytes", native, "--commands",
+    run(build / "host_tools/simulation/player/fingertip_player", "play", scenario, "-o", folder / "native.csv", "--raw-bytes", native, "--commands",
         commands, "--overwrite", "--quiet", *options, *(("--pad", "12") if pad else ()))
     told = run("node", PLAY, web / "simulated.wasm", scenario, commands, wasm, *((web / "objects.bin",) if pad else ()))
     return (*compared(native.read_bytes(), wasm.read_bytes()), json.loads(told))
@@ -39,7 +39,7 @@ def measure(build, steps):
         for kind in KINDS:
             for way, (options, effects, pad) in WAYS.items():
                 scenario = folder / "scene.csv"
-                run(build / "host_tools/twin/twin", "scenario", kind, "--cache", build / "contact_tables", "-o", scenario, "--overwrite", *effects)
+                run(build / "host_tools/simulation/twin/twin", "scenario", kind, "--cache", build / "contact_tables", "-o", scenario, "--overwrite", *effects)
                 made, wrong, told = play(build, scenario, folder, *options, pad=pad)
                 steps.say(f"{kind}{way}: {made} packets, {wrong} differ")
                 packets, different, scenes = packets + made, different + wrong, scenes + 1

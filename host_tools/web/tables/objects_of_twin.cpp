@@ -2,8 +2,8 @@
 
 #include "libfingertip/command.hpp"
 #include "libfingertip/framing.hpp"
-#include "pad/profile.hpp"
-#include "twin/traction_table.hpp"
+#include "library/pad/profile.hpp"
+#include "simulation/twin/traction_table.hpp"
 
 namespace fingertip::web {
 namespace {

@@ -1,7 +1,7 @@
-// The simulated fingertip's firmware for the page: player/native_fingertip.h, one a module. Times
+// The simulated fingertip's firmware for the page: simulation/player/native_fingertip.h, one a module. Times
 // are in microseconds since power-up; what feels them is the scenario or the pad of the page.
-#include "player/native_fingertip.h"
-#include "player/samples.hpp"
+#include "simulation/player/native_fingertip.h"
+#include "simulation/player/samples.hpp"
 #include "web/wasm/world.hpp"
 
 extern "C" {

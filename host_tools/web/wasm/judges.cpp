@@ -1,10 +1,10 @@
 // The tool's calibrations and its doctor for the page (src/judges/judges.ts says what each is).
 // Packets and texts come in by room(), what is told goes out as JSON by told(). Sessions are the
 // page's to free. What is wrong is thrown (thrown.cpp).
-#include "calibration/gain_session.hpp"
-#include "calibration/pull_session.hpp"
-#include "doctor/judge.hpp"
 #include "libfingertip/error.hpp"
+#include "tool/calibration/gain_session.hpp"
+#include "tool/calibration/pull_session.hpp"
+#include "tool/doctor/judge.hpp"
 #include "web/wasm/json.hpp"
 
 #include <map>

@@ -1,20 +1,20 @@
 // What may press on the simulated pad, as a file: what the base of the rubber feels of each object
-// per force, from the twin's tables (twin/contact_table.hpp, twin/traction_table.hpp), at places
+// per force, from the twin's tables (twin/contact_table.hpp, simulation/twin/traction_table.hpp), at places
 // farther apart and in 16 bits.
 //
 // All values are little-endian. The file begins with 8 bytes "FTPAD 1\n" and the number of objects
 // as a uint32; each object has
-//   name       16 bytes, zero-padded: of twin/indenter.hpp
+//   name       16 bytes, zero-padded: of simulation/twin/indenter.hpp
 //   radius     [force] floats, mm, of the contact
 //   indented   [force] floats, mm
 //   fields     3 times: under a force down, along x, along y: [force] of a float, the largest
 //   value,
 //              Pa / N, and [x][y] int16, parts of 32767 of it
-// with forces and symmetries as in twin/force_planes.hpp. The rest are the bytes of a command that
+// with forces and symmetries as in simulation/twin/force_planes.hpp. The rest are the bytes of a command that
 // tells the fingertip its pad.
 #pragma once
 
-#include "twin/force_planes.hpp"
+#include "simulation/twin/force_planes.hpp"
 
 #include <array>
 #include <cstddef>

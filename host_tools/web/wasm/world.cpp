@@ -1,6 +1,6 @@
 #include "web/wasm/world.hpp"
 
-#include "twin/traction.hpp"
+#include "simulation/twin/traction.hpp"
 
 extern "C" {
 #include "config/geometry.h"

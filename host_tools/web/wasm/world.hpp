@@ -24,8 +24,8 @@
 // at the same times give the same bits. Some 25 us a millisecond while something touches.
 #pragma once
 
-#include "cell/bundle.hpp"
-#include "twin/effects.hpp"
+#include "simulation/cell/bundle.hpp"
+#include "simulation/twin/effects.hpp"
 #include "web/wasm/objects.hpp"
 
 #include <cstdint>

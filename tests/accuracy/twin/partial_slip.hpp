@@ -8,8 +8,8 @@
 // answer along and across each wave. Normal displacements are left alone.
 #pragma once
 
-#include "twin/contact.hpp"
-#include "twin/transform.hpp"
+#include "simulation/twin/contact.hpp"
+#include "simulation/twin/transform.hpp"
 
 #include <algorithm>
 #include <cmath>

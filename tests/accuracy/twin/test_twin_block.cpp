@@ -1,6 +1,6 @@
 #include "block_fem.hpp"
-#include "pad/block_table.hpp"
-#include "twin/contact_table.hpp"
+#include "library/pad/block_table.hpp"
+#include "simulation/twin/contact_table.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 #include "axisymmetric_fem.hpp"
 #include "layer_collocation.hpp"
-#include "twin/best_gaussian.hpp"
+#include "simulation/twin/best_gaussian.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 #include "layer_collocation.hpp"
 #include "partial_slip.hpp"
-#include "twin/best_gaussian.hpp"
-#include "twin/traction_table.hpp"
+#include "simulation/twin/best_gaussian.hpp"
+#include "simulation/twin/traction_table.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>

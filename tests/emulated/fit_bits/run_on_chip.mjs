@@ -4,9 +4,9 @@
  * fit_bits_rp2040 computes it on the emulated chip; of grasps, after a colon each, the cycles of each step.
  */
 import { readFileSync } from 'node:fs';
-import { Chip, Stopped } from '../../../host_tools/emulator/chip/chip.mjs';
-import { SimulatedTime } from '../../../host_tools/emulator/clock.mjs';
-import { Report } from '../../../host_tools/emulator/report.mjs';
+import { Chip, Stopped } from '../../../host_tools/simulation/emulator/chip/chip.mjs';
+import { SimulatedTime } from '../../../host_tools/simulation/emulator/clock.mjs';
+import { Report } from '../../../host_tools/simulation/emulator/report.mjs';
 
 const [NEXT_PRESS, START, STOP] = [1, 2, 3];
 const A_MINUTE_ns = 60e9;

@@ -4,11 +4,11 @@ import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { findBoard } from '../../../host_tools/emulator/board/boards.mjs';
-import { boot2Crc } from '../../../host_tools/emulator/chip/chip.mjs';
-import { parseFaults } from '../../../host_tools/emulator/faults.mjs';
-import { Machine } from '../../../host_tools/emulator/machine.mjs';
-import { parseScenario } from '../../../host_tools/emulator/scenario.mjs';
+import { findBoard } from '../../../host_tools/simulation/emulator/board/boards.mjs';
+import { boot2Crc } from '../../../host_tools/simulation/emulator/chip/chip.mjs';
+import { parseFaults } from '../../../host_tools/simulation/emulator/faults.mjs';
+import { Machine } from '../../../host_tools/simulation/emulator/machine.mjs';
+import { parseScenario } from '../../../host_tools/simulation/emulator/scenario.mjs';
 
 const RIG = fileURLToPath(new URL('./rig', import.meta.url));
 const CPU = ['-mcpu=cortex-m0plus', '-mthumb'];

@@ -1,11 +1,11 @@
 /** The chip: small images that behave, and small images with one mistake each, which must fail the run. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { Chip } from '../../../host_tools/emulator/chip/chip.mjs';
-import { RP2040 } from '../../../host_tools/emulator/chip/core.mjs';
-import { SimulatedTime } from '../../../host_tools/emulator/clock.mjs';
-import { Prng } from '../../../host_tools/emulator/prng.mjs';
-import { Report } from '../../../host_tools/emulator/report.mjs';
+import { Chip } from '../../../host_tools/simulation/emulator/chip/chip.mjs';
+import { RP2040 } from '../../../host_tools/simulation/emulator/chip/core.mjs';
+import { SimulatedTime } from '../../../host_tools/simulation/emulator/clock.mjs';
+import { Prng } from '../../../host_tools/simulation/emulator/prng.mjs';
+import { Report } from '../../../host_tools/simulation/emulator/report.mjs';
 import { makeMachine, run } from './bench.mjs';
 
 const main = (body) => `void main(void) { ${body} done(); }`;

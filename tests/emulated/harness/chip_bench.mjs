@@ -1,7 +1,7 @@
 /** A chip whose processor never runs: its blocks are used from the test, in cycles of a 125 MHz clk_sys. */
-import { Chip } from '../../../host_tools/emulator/chip/chip.mjs';
-import { SimulatedTime } from '../../../host_tools/emulator/clock.mjs';
-import { Report } from '../../../host_tools/emulator/report.mjs';
+import { Chip } from '../../../host_tools/simulation/emulator/chip/chip.mjs';
+import { SimulatedTime } from '../../../host_tools/simulation/emulator/clock.mjs';
+import { Report } from '../../../host_tools/simulation/emulator/report.mjs';
 
 export const CYCLE_NS = 8;
 

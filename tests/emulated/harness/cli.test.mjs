@@ -10,11 +10,11 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
-import { OutputFile } from '../../../host_tools/emulator/output_file.mjs';
+import { OutputFile } from '../../../host_tools/simulation/emulator/output_file.mjs';
 import { build, HEADER } from './bench.mjs';
 
-const MAIN = fileURLToPath(new URL('../../../host_tools/emulator/main.mjs', import.meta.url));
-const HELPER = fileURLToPath(new URL('../../../host_tools/emulator/port/pty_port.py', import.meta.url));
+const MAIN = fileURLToPath(new URL('../../../host_tools/simulation/emulator/main.mjs', import.meta.url));
+const HELPER = fileURLToPath(new URL('../../../host_tools/simulation/emulator/port/pty_port.py', import.meta.url));
 const folder = mkdtempSync(join(tmpdir(), 'emulator-cli-'));
 const serving = new Set();
 after(() => {

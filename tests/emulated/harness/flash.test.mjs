@@ -1,8 +1,8 @@
 /** The flash chip: what it takes, how long, what it refuses, and what is left when its power goes. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { BUSY_NS, FLASH_BYTES, FlashMemory } from '../../../host_tools/emulator/chip/flash_memory.mjs';
-import { SimulatedTime } from '../../../host_tools/emulator/clock.mjs';
+import { BUSY_NS, FLASH_BYTES, FlashMemory } from '../../../host_tools/simulation/emulator/chip/flash_memory.mjs';
+import { SimulatedTime } from '../../../host_tools/simulation/emulator/clock.mjs';
 import { makeMachine } from './bench.mjs';
 import { ChipBench, CYCLE_NS } from './chip_bench.mjs';
 

@@ -4,9 +4,9 @@ import { execFileSync } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { findBoard } from '../../../host_tools/emulator/board/boards.mjs';
-import { parseFaults } from '../../../host_tools/emulator/faults.mjs';
-import { Machine } from '../../../host_tools/emulator/machine.mjs';
+import { findBoard } from '../../../host_tools/simulation/emulator/board/boards.mjs';
+import { parseFaults } from '../../../host_tools/simulation/emulator/faults.mjs';
+import { Machine } from '../../../host_tools/simulation/emulator/machine.mjs';
 import { steady } from './bench.mjs';
 
 const commands = new Map();

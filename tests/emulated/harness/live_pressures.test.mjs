@@ -1,7 +1,7 @@
 /** What a program tells the sensors of a board while it runs. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { LivePressures } from '../../../host_tools/emulator/live_pressures.mjs';
+import { LivePressures } from '../../../host_tools/simulation/emulator/live_pressures.mjs';
 
 const above = (live, sensor, t_ns) => live.at_ns(sensor, t_ns).pressure_Pa - 101325;
 

@@ -1,16 +1,16 @@
 /** The world models on their own: sensor, multiplexer, bus, scenario, faults, host script, random numbers. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { I2cBus } from '../../../host_tools/emulator/board/i2c_bus.mjs';
-import { codesFor, compensate, crc4, makeProm, Ms5840, OSR } from '../../../host_tools/emulator/board/ms5840.mjs';
-import { Tca9548a } from '../../../host_tools/emulator/board/tca9548a.mjs';
-import { findBoard } from '../../../host_tools/emulator/board/boards.mjs';
-import { InputError } from '../../../host_tools/emulator/errors.mjs';
-import { parseFaults } from '../../../host_tools/emulator/faults.mjs';
-import { parseHostScript } from '../../../host_tools/emulator/port/host_script.mjs';
-import { Prng } from '../../../host_tools/emulator/prng.mjs';
-import { Report } from '../../../host_tools/emulator/report.mjs';
-import { parseScenario } from '../../../host_tools/emulator/scenario.mjs';
+import { I2cBus } from '../../../host_tools/simulation/emulator/board/i2c_bus.mjs';
+import { codesFor, compensate, crc4, makeProm, Ms5840, OSR } from '../../../host_tools/simulation/emulator/board/ms5840.mjs';
+import { Tca9548a } from '../../../host_tools/simulation/emulator/board/tca9548a.mjs';
+import { findBoard } from '../../../host_tools/simulation/emulator/board/boards.mjs';
+import { InputError } from '../../../host_tools/simulation/emulator/errors.mjs';
+import { parseFaults } from '../../../host_tools/simulation/emulator/faults.mjs';
+import { parseHostScript } from '../../../host_tools/simulation/emulator/port/host_script.mjs';
+import { Prng } from '../../../host_tools/simulation/emulator/prng.mjs';
+import { Report } from '../../../host_tools/simulation/emulator/report.mjs';
+import { parseScenario } from '../../../host_tools/simulation/emulator/scenario.mjs';
 import { HEADER } from './bench.mjs';
 
 const QUIET = { normal: () => 0, range: (low, high) => (low + high) / 2, uniform: () => 0.5 };

@@ -1,10 +1,10 @@
 /** Board pico_parallel: fifteen lines bit by bit, driven by hand through SIO; wired-AND, faults, times. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { PicoParallel } from '../../../host_tools/emulator/board/pico_parallel.mjs';
-import { parseFaults } from '../../../host_tools/emulator/faults.mjs';
-import { findBoard } from '../../../host_tools/emulator/board/boards.mjs';
-import { VcdDump } from '../../../host_tools/emulator/vcd.mjs';
+import { PicoParallel } from '../../../host_tools/simulation/emulator/board/pico_parallel.mjs';
+import { parseFaults } from '../../../host_tools/simulation/emulator/faults.mjs';
+import { findBoard } from '../../../host_tools/simulation/emulator/board/boards.mjs';
+import { VcdDump } from '../../../host_tools/simulation/emulator/vcd.mjs';
 import { ChipBench } from './chip_bench.mjs';
 
 const SCL = 1 << 15;

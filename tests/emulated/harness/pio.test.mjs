@@ -1,7 +1,7 @@
 /** PIO against the RP2040 datasheet, chapter 3: in every cycle like a plain model of it, and case by case. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { Prng } from '../../../host_tools/emulator/prng.mjs';
+import { Prng } from '../../../host_tools/simulation/emulator/prng.mjs';
 import { ChipBench } from './chip_bench.mjs';
 import { ReferencePio } from './pio_reference.mjs';
 

@@ -1,7 +1,7 @@
 /** The USB host against a small CDC device, and the device mistakes it must catch. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { scheduleHostScript } from '../../../host_tools/emulator/port/host_script.mjs';
+import { scheduleHostScript } from '../../../host_tools/simulation/emulator/port/host_script.mjs';
 import { makeMachine } from './bench.mjs';
 
 const device = (defines = '', body = '') => `${defines}\n#include "cdc.h"\nvoid main(void) { start_clocks(); usb_start(); ${body} for (;;) usb_poll(); }`;

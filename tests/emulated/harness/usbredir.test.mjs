@@ -6,7 +6,7 @@ import { connect, createServer } from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, test } from 'node:test';
-import { encodeDeviceConnect, encodeEndpointInfo, encodeHello, encodeInterfaceInfo, encodeMessage, MessageReader, UsbRedirServer } from '../../../host_tools/emulator/usb/usbredir.mjs';
+import { encodeDeviceConnect, encodeEndpointInfo, encodeHello, encodeInterfaceInfo, encodeMessage, MessageReader, UsbRedirServer } from '../../../host_tools/simulation/emulator/usb/usbredir.mjs';
 import { makeMachine } from './bench.mjs';
 
 const folder = mkdtempSync(join(tmpdir(), 'usbredir-'));

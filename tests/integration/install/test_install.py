@@ -14,7 +14,7 @@ import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-EXAMPLE = ROOT / "host_tools/libfingertip/example"
+EXAMPLE = ROOT / "host_tools/library/libfingertip/example"
 TOOLS = argparse.Namespace()
 PATIENCE_s = 60
 PUBLIC = {"clock.hpp", "clock_fit.hpp", "command.hpp", "connection.hpp", "decoder.hpp", "device_loop.hpp", "discovery.hpp", "error.hpp", "line_source.hpp", "names.hpp",
@@ -169,7 +169,7 @@ class Install(unittest.TestCase):
         scenario.write_text("\n".join(["# fingertip-scenario 1", f"t_s,{truth}," + ",".join(f"s{k}_Pa" for k in range(15)),
                                        *(",".join(map(str, row)) for row in rows)]) + "\n")
         port = self.folder / "tty-emulated"
-        emulator = self.start(TOOLS.node, ROOT / "host_tools/emulator/main.mjs", "--board", "pico_mux", "--image", TOOLS.image,
+        emulator = self.start(TOOLS.node, ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_mux", "--image", TOOLS.image,
                               "--scenario", scenario, "--seconds", "3", "--pty", port, "--wait-open", "--fast-enumeration")
         self.wait_for(port, emulator)
         lines = self.follow(self.by_cmake, port)

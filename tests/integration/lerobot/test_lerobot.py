@@ -76,7 +76,7 @@ class Plugin(unittest.TestCase):
         cls.folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="fingertip-test-")))
         stack.enter_context(mock.patch.dict(os.environ, {"XDG_RUNTIME_DIR": str(cls.folder), "HF_HOME": str(cls.folder)}))
         source, site = cls.folder / "source", cls.folder / "site"
-        shutil.copytree(ROOT / "host_tools/lerobot", source, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / "host_tools/python/lerobot", source, ignore=shutil.ignore_patterns("__pycache__"))
         backend = f"from setuptools import build_meta as b; b.build_wheel({str(cls.folder)!r})"
         done = subprocess.run([sys.executable, "-c", backend], cwd=source, capture_output=True, text=True, timeout=PATIENCE_s)
         assert done.returncode == 0, done.stderr

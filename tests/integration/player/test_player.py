@@ -168,7 +168,7 @@ class Player(unittest.TestCase):
         words = [must(OPTIONS.fingertip, "encode", *command.split()).strip() for command in commands]
         script.write_text("0.5 dtr 1\n" + "".join(f"{0.52 + 0.01 * i:.2f} {word}\n" for i, word in enumerate(words)))
         path = self.folder / name
-        must(OPTIONS.node, ROOT / "host_tools/emulator/main.mjs", "--board", "pico_mux", "--image", OPTIONS.image,
+        must(OPTIONS.node, ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_mux", "--image", OPTIONS.image,
              "--scenario", self.scenario, "--host-script", script, "--capture", path, "--seconds", "1.6", "--fast-enumeration")
         return path
 

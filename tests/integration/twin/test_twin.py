@@ -23,7 +23,7 @@ const s = readScenario(process.argv[1]);
 const at = (t) => Array.from({ length: s.sensors }, (_, k) => s.at_ns(k, t * 1e9));
 console.log(JSON.stringify({ metadata: s.metadata, rows: s.times_s.length, end_s: s.end_s,
   at: process.argv.slice(2).map(Number).map(at) }));
-""" % (ROOT / "host_tools/emulator/scenario.mjs").as_uri()
+""" % (ROOT / "host_tools/simulation/emulator/scenario.mjs").as_uri()
 
 
 class TwinTest(unittest.TestCase):

@@ -41,15 +41,15 @@ class WebWasm(unittest.TestCase):
 
     def scenario(self, kind, *more):
         path = self.folder / f"{kind}.csv"
-        must(self.build / "host_tools/twin/twin", "scenario", kind, "--cache", self.build / "contact_tables", "-o", path, "--overwrite", *more)
+        must(self.build / "host_tools/simulation/twin/twin", "scenario", kind, "--cache", self.build / "contact_tables", "-o", path, "--overwrite", *more)
         return path
 
     def fingertip(self, *arguments):
-        return must(self.build / "host_tools/cli/fingertip", *arguments)
+        return must(self.build / "host_tools/tool/cli/fingertip", *arguments)
 
     def captured(self, scenario, *options):
         capture, recording = self.folder / "felt.ftr", self.folder / "felt.csv"
-        must(self.build / "host_tools/player/fingertip_player", "play", scenario, "-o", recording, "--raw-bytes", capture, "--overwrite",
+        must(self.build / "host_tools/simulation/player/fingertip_player", "play", scenario, "-o", recording, "--raw-bytes", capture, "--overwrite",
              "--quiet", "--raw", *options)
         return capture
 
@@ -104,7 +104,7 @@ class Simulated(WebWasm):
         cls.capture = cls.folder / "scene.ftr"
         cls.seen = json.loads(must(OPTIONS.node, HERE / "scene.mjs", cls.web / "simulated.wasm", cls.web / "objects.bin", commands, cls.capture))
         cls.truth = {truth["name"]: truth for truth in cls.seen["truths"]}
-        cls.told = must(cls.build / "host_tools/cli/fingertip", "convert", cls.capture, cls.folder / "scene.csv")
+        cls.told = must(cls.build / "host_tools/tool/cli/fingertip", "convert", cls.capture, cls.folder / "scene.csv")
         cls.rows, cls.head = cls.recording(cls.folder / "scene.csv")
 
     @staticmethod

@@ -1,4 +1,4 @@
-#include "calibration/judge.hpp"
+#include "tool/calibration/judge.hpp"
 #include "support/placements.hpp"
 
 #include <functional>

@@ -1,4 +1,4 @@
-#include "calibration/placements.hpp"
+#include "tool/calibration/placements.hpp"
 #include "support/placements.hpp"
 
 #include <cmath>

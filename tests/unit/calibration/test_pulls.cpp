@@ -1,5 +1,5 @@
 /* Pulls out of frames whose loads are known, and what is made of them. */
-#include "calibration/pulls.hpp"
+#include "tool/calibration/pulls.hpp"
 
 #include <cmath>
 #include <gtest/gtest.h>

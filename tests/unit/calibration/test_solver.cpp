@@ -1,4 +1,4 @@
-#include "calibration/solver.hpp"
+#include "tool/calibration/solver.hpp"
 #include "support/placements.hpp"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-#include "cell/bundle.hpp"
 #include "libfingertip/random.hpp"
+#include "simulation/cell/bundle.hpp"
 
 #include <cmath>
 #include <gtest/gtest.h>

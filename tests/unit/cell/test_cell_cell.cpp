@@ -1,4 +1,4 @@
-#include "cell/cell.hpp"
+#include "simulation/cell/cell.hpp"
 
 #include <cmath>
 #include <functional>

@@ -1,7 +1,7 @@
-#include "cell/face.hpp"
-#include "cell/plate.hpp"
 #include "libfingertip/random.hpp"
-#include "twin/traction_table.hpp"
+#include "simulation/cell/face.hpp"
+#include "simulation/cell/plate.hpp"
+#include "simulation/twin/traction_table.hpp"
 
 extern "C" {
 #include "config/geometry.h"

@@ -1,4 +1,4 @@
-#include "cell/scene.hpp"
+#include "simulation/cell/scene.hpp"
 
 #include <algorithm>
 #include <cmath>

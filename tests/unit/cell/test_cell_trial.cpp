@@ -1,6 +1,6 @@
-#include "cell/felt_finger.hpp"
-#include "cell/trial.hpp"
 #include "grasp/convert.hpp"
+#include "simulation/cell/felt_finger.hpp"
+#include "simulation/cell/trial.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"

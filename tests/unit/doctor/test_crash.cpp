@@ -1,4 +1,4 @@
-#include "doctor/crash.hpp"
+#include "tool/doctor/crash.hpp"
 #include "libfingertip/error.hpp"
 #include "support/host_packets.hpp"
 

@@ -1,4 +1,4 @@
-#include "doctor/judge.hpp"
+#include "tool/doctor/judge.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "support/host_packets.hpp"
 

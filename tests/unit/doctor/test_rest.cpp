@@ -1,4 +1,4 @@
-#include "doctor/rest.hpp"
+#include "tool/doctor/rest.hpp"
 #include "support/host_packets.hpp"
 
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "doctor/system.hpp"
+#include "tool/doctor/system.hpp"
 #include "support/host_packets.hpp"
 
 #include <algorithm>

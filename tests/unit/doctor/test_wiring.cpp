@@ -1,4 +1,4 @@
-#include "doctor/wiring.hpp"
+#include "tool/doctor/wiring.hpp"
 
 #include <gtest/gtest.h>
 

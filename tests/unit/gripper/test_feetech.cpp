@@ -1,6 +1,6 @@
-#include "gripper/feetech.hpp"
-#include "gripper/feetech_packet.hpp"
-#include "gripper/feetech_table.hpp"
+#include "grasp/gripper/feetech.hpp"
+#include "grasp/gripper/feetech_packet.hpp"
+#include "grasp/gripper/feetech_table.hpp"
 #include "libfingertip/random.hpp"
 #include "support/gripper_lines.hpp"
 

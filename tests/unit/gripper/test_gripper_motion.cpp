@@ -1,4 +1,4 @@
-#include "cell/gripper_motion.hpp"
+#include "simulation/cell/gripper_motion.hpp"
 
 #include <cmath>
 #include <gtest/gtest.h>

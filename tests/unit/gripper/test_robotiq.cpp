@@ -1,5 +1,5 @@
-#include "gripper/robotiq.hpp"
-#include "gripper/robotiq_registers.hpp"
+#include "grasp/gripper/robotiq.hpp"
+#include "grasp/gripper/robotiq_registers.hpp"
 #include "libfingertip/random.hpp"
 #include "support/gripper_lines.hpp"
 

@@ -1,4 +1,4 @@
-#include "gripper/serial_line.hpp"
+#include "grasp/gripper/serial_line.hpp"
 
 #include <cstdlib>
 #include <filesystem>

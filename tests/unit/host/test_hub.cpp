@@ -1,6 +1,6 @@
 #include "libfingertip/command.hpp"
 #include "libfingertip/decoder.hpp"
-#include "share/hub.hpp"
+#include "library/share/hub.hpp"
 #include "support/host_packets.hpp"
 
 #include <gtest/gtest.h>

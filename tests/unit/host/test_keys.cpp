@@ -1,4 +1,4 @@
-#include "cli/keys.hpp"
+#include "tool/cli/keys.hpp"
 
 #include <gtest/gtest.h>
 

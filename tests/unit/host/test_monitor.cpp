@@ -1,8 +1,8 @@
 /* What the monitor draws, and how much of it goes to the terminal. */
-#include "cli/monitor.hpp"
-#include "cli/painter.hpp"
+#include "tool/cli/monitor.hpp"
 #include "support/host_packets.hpp"
 #include "support/pad.h"
+#include "tool/cli/painter.hpp"
 
 #include <cmath>
 #include <cstdlib>

@@ -1,4 +1,4 @@
-#include "cli/playback.hpp"
+#include "tool/cli/playback.hpp"
 #include "libfingertip/recording.hpp"
 #include "support/host_packets.hpp"
 

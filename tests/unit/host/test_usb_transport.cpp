@@ -4,7 +4,7 @@
 #include "libfingertip/error.hpp"
 #include "libfingertip/share_socket.hpp"
 #include "libfingertip/usb_transport.hpp"
-#include "share/server.hpp"
+#include "library/share/server.hpp"
 #include "support/fake_libusb.hpp"
 #include "support/host_packets.hpp"
 

@@ -1,7 +1,7 @@
 #include "libfingertip/error.hpp"
-#include "pad/edges.hpp"
-#include "pad/profile.hpp"
-#include "pad/block_table.hpp"
+#include "library/pad/block_table.hpp"
+#include "library/pad/edges.hpp"
+#include "library/pad/profile.hpp"
 
 extern "C" {
 #include "contact/tangential.h"

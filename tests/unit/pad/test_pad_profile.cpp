@@ -1,7 +1,7 @@
 #include "libfingertip/error.hpp"
-#include "pad/profile.hpp"
+#include "library/pad/layer.hpp"
+#include "library/pad/profile.hpp"
 #include "support/host_packets.hpp"
-#include "pad/layer.hpp"
 
 #include <cmath>
 #include <functional>

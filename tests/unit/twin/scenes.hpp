@@ -1,7 +1,7 @@
 // Scenarios on the layer that the tests have tables of.
 #pragma once
 
-#include "twin/scenarios.hpp"
+#include "simulation/twin/scenarios.hpp"
 
 #include <functional>
 #include <map>

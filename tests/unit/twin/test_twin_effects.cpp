@@ -1,5 +1,5 @@
 #include "libfingertip/error.hpp"
-#include "twin/effects.hpp"
+#include "simulation/twin/effects.hpp"
 
 #include <algorithm>
 #include <array>

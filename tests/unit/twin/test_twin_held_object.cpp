@@ -1,4 +1,4 @@
-#include "twin/held_object.hpp"
+#include "simulation/twin/held_object.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 #include "scenes.hpp"
-#include "twin/traction_table.hpp"
+#include "simulation/twin/traction_table.hpp"
 
 extern "C" {
 #include "config/geometry.h"

@@ -2,8 +2,8 @@
 #include "libfingertip/random.hpp"
 #include "libfingertip/text.hpp"
 #include "scenes.hpp"
-#include "twin/scenario_file.hpp"
-#include "twin/traction_table.hpp"
+#include "simulation/twin/scenario_file.hpp"
+#include "simulation/twin/traction_table.hpp"
 
 extern "C" {
 #include "config/geometry.h"

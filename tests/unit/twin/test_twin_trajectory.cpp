@@ -1,4 +1,4 @@
-#include "twin/trajectory.hpp"
+#include "simulation/twin/trajectory.hpp"
 
 #include <cmath>
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // The page's simulated pad: what its file of objects keeps of the twin's tables, and what hand,
 // weight and load do.
-#include "twin/held_object.hpp"
-#include "twin/traction_table.hpp"
+#include "simulation/twin/held_object.hpp"
+#include "simulation/twin/traction_table.hpp"
 #include "web/tables/objects_of_twin.hpp"
 #include "web/wasm/world.hpp"
 

@@ -2,7 +2,7 @@
 /** Counts the cycles of fits on the emulated chip: see USAGE. */
 import { readFileSync, writeFileSync } from 'node:fs';
 import { parseArgs } from 'node:util';
-import { InputError } from '../../../emulator/errors.mjs';
+import { InputError } from '../../../simulation/emulator/errors.mjs';
 import { Bench, KERNELS } from './fit_on_chip.mjs';
 
 const USAGE = `usage: bench.mjs --image fit_cycles.bin --jobs fit_jobs.json --out fit_cycles.csv [options]

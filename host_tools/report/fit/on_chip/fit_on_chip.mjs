@@ -1,7 +1,7 @@
 /** Runs fits on the emulated chip one at a time and counts their cycles: the other half of main.c. */
-import { Chip, Stopped } from '../../../emulator/chip/chip.mjs';
-import { SimulatedTime } from '../../../emulator/clock.mjs';
-import { Report } from '../../../emulator/report.mjs';
+import { Chip, Stopped } from '../../../simulation/emulator/chip/chip.mjs';
+import { SimulatedTime } from '../../../simulation/emulator/clock.mjs';
+import { Report } from '../../../simulation/emulator/report.mjs';
 
 /** In the order of `kernels` in main.c. */
 export const KERNELS = ['nothing', 'fit', 'grid', 'masked', 'general', 'naive_float', 'naive_double', 'lm_float', 'lm_double', 'tangential'];

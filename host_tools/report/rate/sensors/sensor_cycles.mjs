@@ -1,10 +1,10 @@
 #!/usr/bin/env node
 /** Counts the cycles of a frame against the number of sensors: see USAGE. */
 import { readFileSync } from 'node:fs';
-import { Chip, Stopped } from '../../../emulator/chip/chip.mjs';
-import { SimulatedTime } from '../../../emulator/clock.mjs';
-import { InputError, inWords } from '../../../emulator/errors.mjs';
-import { Report } from '../../../emulator/report.mjs';
+import { Chip, Stopped } from '../../../simulation/emulator/chip/chip.mjs';
+import { SimulatedTime } from '../../../simulation/emulator/clock.mjs';
+import { InputError, inWords } from '../../../simulation/emulator/errors.mjs';
+import { Report } from '../../../simulation/emulator/report.mjs';
 
 const USAGE = `usage: sensor_cycles.mjs FOLDER
 

@@ -5,9 +5,9 @@
 // standard output: the keys that are judged, of the usual case; under "motion_cases" the same for
 // other pads, rates and rubber; under "motion_series" one lift and one slide. The constants of
 // motion.c were chosen with seeds 201 to 224 of the twin on pads of 12 mm.
-#include "reference/options.hpp"
-#include "shear/motion/watch.hpp"
 #include "libfingertip/in_parallel.hpp"
+#include "report/reference/options.hpp"
+#include "shear/motion/watch.hpp"
 
 #include <algorithm>
 #include <cmath>

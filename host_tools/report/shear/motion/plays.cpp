@@ -1,7 +1,7 @@
 #include "shear/motion/plays.hpp"
 
 #include "libfingertip/wire.hpp"
-#include "pad/profile.hpp"
+#include "library/pad/profile.hpp"
 
 extern "C" {
 #include "config/defaults.h"

@@ -3,9 +3,9 @@
 // load. What condition does is left out: readings are relative to the true zero.
 #pragma once
 
+#include "simulation/twin/scenarios.hpp"
+#include "simulation/twin/traction_table.hpp"
 #include "truth/fit/touches.hpp"
-#include "twin/scenarios.hpp"
-#include "twin/traction_table.hpp"
 
 extern "C" {
 #include "fit/fit_tangential.h"

@@ -6,14 +6,14 @@
 // rubber without end, the noise of OSR 1024, 1 to 10 N, seven objects at any angle, anywhere on the
 // array (|x| <= 9 mm, |y| <= 18 mm), the load risen under a constant normal force at a friction of
 // 0.5, in any direction.
-#include "pad/edges.hpp"
-#include "pad/profile.hpp"
-#include "reference/options.hpp"
+#include "libfingertip/in_parallel.hpp"
+#include "library/pad/edges.hpp"
+#include "library/pad/profile.hpp"
+#include "report/reference/options.hpp"
 #include "shear/static/bounds.hpp"
 #include "shear/static/results.hpp"
-#include "twin/effects.hpp"
-#include "libfingertip/in_parallel.hpp"
-#include "twin/scenarios.hpp"
+#include "simulation/twin/effects.hpp"
+#include "simulation/twin/scenarios.hpp"
 
 extern "C" {
 #include "config/defaults.h"

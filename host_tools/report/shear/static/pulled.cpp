@@ -1,8 +1,8 @@
 #include "shear/static/pulled.hpp"
 
-#include "pad/profile.hpp"
+#include "library/pad/profile.hpp"
+#include "simulation/twin/scenarios.hpp"
 #include "truth/fit/statistics.hpp"
-#include "twin/scenarios.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"

@@ -5,10 +5,10 @@
 // the sensor's range is left out of the fit, as scan has it.
 #pragma once
 
+#include "library/pad/block_table.hpp"
+#include "simulation/twin/traction_table.hpp"
+#include "simulation/twin/trajectory.hpp"
 #include "truth/fit/touches.hpp"
-#include "pad/block_table.hpp"
-#include "twin/traction_table.hpp"
-#include "twin/trajectory.hpp"
 
 extern "C" {
 #include "common/pad_profile.h"

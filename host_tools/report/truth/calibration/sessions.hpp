@@ -2,10 +2,10 @@
 // be done and as it should not.
 #pragma once
 
-#include "calibration/judge.hpp"
 #include "libfingertip/random.hpp"
-#include "twin/contact_table.hpp"
-#include "twin/effects.hpp"
+#include "simulation/twin/contact_table.hpp"
+#include "simulation/twin/effects.hpp"
+#include "tool/calibration/judge.hpp"
 
 #include <array>
 #include <filesystem>

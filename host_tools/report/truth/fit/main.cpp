@@ -4,10 +4,10 @@
 // with the settings that the firmware starts with. One JSON object on the standard output: the keys
 // that are judged, and under "cases", "elongated", "iterations" and "few_sensors" the tables behind
 // them. The constants of fit_limits.h and defaults.h were chosen with --seed 1.
-#include "reference/options.hpp"
+#include "libfingertip/in_parallel.hpp"
+#include "report/reference/options.hpp"
 #include "truth/fit/statistics.hpp"
 #include "truth/fit/touches.hpp"
-#include "libfingertip/in_parallel.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"

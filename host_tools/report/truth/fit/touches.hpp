@@ -6,8 +6,8 @@
 #pragma once
 
 #include "libfingertip/random.hpp"
+#include "simulation/twin/contact_table.hpp"
 #include "truth/calibration/sessions.hpp"
-#include "twin/contact_table.hpp"
 
 extern "C" {
 #include "fit/fit.h"

@@ -64,7 +64,7 @@ class Run:
         stores = [calibrate_frame(1 + i) if i % 3 else tools.encoded("keep") for i in range(commands)]
         lines += [f"{FROM_s + INTERVAL_s * i:.3f} {frame}" for i, frame in enumerate(stores)]
         base.with_suffix(".script").write_text("\n".join(lines) + "\n")
-        run("node", ROOT / "host_tools/emulator/main.mjs", "--board", BOARD, "--image", tools.image(BOARD), "--scenario", path,
+        run("node", ROOT / "host_tools/simulation/emulator/main.mjs", "--board", BOARD, "--image", tools.image(BOARD), "--scenario", path,
             "--host-script", base.with_suffix(".script"), "--capture", f"{base}.ftr", "--usb-log", f"{base}.usb", "--report", f"{base}.json",
             *options)
         run(tools.fingertip, "replay", f"{base}.ftr", "--to-csv", f"{base}.csv")

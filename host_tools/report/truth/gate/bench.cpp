@@ -1,7 +1,7 @@
 #include "truth/gate/bench.hpp"
 
-#include "doctor/wiring.hpp"
 #include "libfingertip/random.hpp"
+#include "tool/doctor/wiring.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"

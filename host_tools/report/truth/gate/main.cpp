@@ -5,7 +5,7 @@
 // they are at hand, through the firmware's condition and fit. One JSON object on the standard
 // output: the keys that are judged, and the tables behind them.
 #include "libfingertip/random.hpp"
-#include "reference/options.hpp"
+#include "report/reference/options.hpp"
 #include "truth/gate/bench.hpp"
 #include "truth/gate/strip.hpp"
 

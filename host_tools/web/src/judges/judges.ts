@@ -1,5 +1,5 @@
 /**
- * The tool's own judgement, compiled from host_tools/calibration and host_tools/doctor: the same
+ * The tool's own judgement, compiled from host_tools/tool/calibration and host_tools/tool/doctor: the same
  * numbers, bounds and sentences as `fingertip calibrate` and `fingertip doctor`.
  *
  * A fingertip's packets go in as frames: the bytes of one frame of the line, COBS encoded, without

@@ -2,7 +2,7 @@
  * A fingertip without hardware: the firmware's own code on simulated sensors under simulated
  * rubber, in a worker, in real time. Simulated figures, all of them.
  *
- * The pad: 12 mm of silicone without ends (host_tools/twin), 30 by 50 mm, x across, y along, origin
+ * The pad: 12 mm of silicone without ends (host_tools/simulation/twin), 30 by 50 mm, x across, y along, origin
  * in the middle, sensors within 9 and 18 mm. An object is chosen, then a hand presses and drags it,
  * it is dropped as a weight, or a grip holds it while a load pulls. Friction is Coulomb's with the
  * rubber's give before it: what is dragged sticks, gives, then slips

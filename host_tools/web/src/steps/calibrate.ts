@@ -1,5 +1,5 @@
 /**
- * Calibrate: the tool's sessions, judgement and sentences (host_tools/calibration), for the sensors'
+ * Calibrate: the tool's sessions, judgement and sentences (host_tools/tool/calibration), for the sensors'
  * gains from placements of one weight, and for the scale of the tangential load from pulls.
  */
 import { Capability, PAD, PacketType, Stored, type Info } from '../line/packets';

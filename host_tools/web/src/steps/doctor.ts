@@ -1,4 +1,4 @@
-/** Doctor: the tool's own checks and sentences (host_tools/doctor), over ten seconds at rest. */
+/** Doctor: the tool's own checks and sentences (host_tools/tool/doctor), over ten seconds at rest. */
 import { PacketType } from '../line/packets';
 import type { Fingertip } from '../model/fingertip';
 import { loadJudges, type Finding } from '../judges/judges';

@@ -1,0 +1,31 @@
+// What all grippers check and tell alike.
+#pragma once
+
+#include "grasp/gripper/gripper.hpp"
+
+#include <cstdint>
+#include <string>
+
+namespace fingertip {
+
+// Throws Error: bad_value.
+void check_move(const GripperMove &move);
+
+// way with all that it left to the model. Throws Error: bad_value; counts go from 0 to most_count.
+struct GripperUsual {
+  int slave, most_slave, closed_count, open_count, most_count;
+};
+GripperWay complete(GripperWay way, const GripperUsual &usual);
+
+// A question that is asked to be sure that no older answer is on its way is waited for so much
+// longer than any other, then asked in another form. An answer that is late by less than that is
+// never taken for another's.
+constexpr int SURE_TIMEOUTS = 5;
+
+Error silent(const GripperWay &complete);
+
+// "; the USB adapter's latency timer ..." where that limits the rate of a command, which takes so
+// many exchanges; "" where it does not.
+std::string limited_by(const std::string &port, int exchanges);
+
+} // namespace fingertip

@@ -1,0 +1,303 @@
+#include "grasp/gripper/feetech.hpp"
+
+#include "grasp/gripper/common.hpp"
+#include "grasp/gripper/feetech_table.hpp"
+#include "libfingertip/clock.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+
+namespace fingertip {
+
+using namespace feetech;
+
+namespace {
+
+constexpr double COUNT_rad = 2 * std::numbers::pi / COUNTS_PER_TURN;
+constexpr double STALL_Nm = 1.9, FULL_SPEED_rad_s = 4.7; // 45 revolutions a minute, at 7.4 V
+constexpr double LEAST_TORQUE = 0.05;                    // of the stall's, below it does not turn
+constexpr double USUAL_OPEN = 652;                       // counts: a radian
+
+// So far from its goal it stopped for something in its way; half of that is its play.
+constexpr double OFF_GOAL = 22;
+// Until a command shows in its flag.
+constexpr std::int64_t STARTING_us = 50'000;
+
+constexpr GripperUsual USUAL = {.slave = SLAVE,
+                                .most_slave = MOST_SLAVE,
+                                .closed_count = 2048,
+                                .open_count = 2048 + static_cast<int>(USUAL_OPEN),
+                                .most_count = 4095};
+
+constexpr std::uint8_t STATUS_FROM = TORQUE_ENABLE;
+
+int word(const Bytes &bytes, std::size_t at) {
+  return bytes[at] | bytes[at + 1] << 8;
+}
+
+void put_word(Bytes *bytes, int value) {
+  bytes->push_back(static_cast<std::uint8_t>(value & 0xFF));
+  bytes->push_back(static_cast<std::uint8_t>(value >> 8));
+}
+
+} // namespace
+
+Jaw::Jaw(int closed_count, int open_count, double jaw_mm)
+    : closed_(closed_count), open_(open_count), jaw_mm_(jaw_mm) {}
+
+Jaw::Jaw(const GripperWay &complete)
+    : Jaw(*complete.closed_count, *complete.open_count, complete.jaw_mm) {}
+
+double Jaw::step_mm() const {
+  return jaw_mm_ * COUNT_rad;
+}
+
+double Jaw::width_mm(double count) const {
+  const double turned = open_ > closed_ ? count - closed_ : closed_ - count;
+  return 2 * jaw_mm_ *
+         std::sin(std::clamp(turned * COUNT_rad, -std::numbers::pi, std::numbers::pi) / 2);
+}
+
+double Jaw::count(double width_mm) const {
+  const double turned = 2 * std::asin(std::clamp(width_mm / (2 * jaw_mm_), 0.0, 1.0)) / COUNT_rad;
+  return open_ > closed_ ? closed_ + turned : closed_ - turned;
+}
+
+double Jaw::slope_mm(double width_mm) const {
+  const double sine = std::clamp(width_mm / (2 * jaw_mm_), 0.0, 1.0);
+  return step_mm() * std::sqrt(1 - sine * sine);
+}
+
+GripperTraits feetech_traits(const std::string &model, const Jaw &jaw, double jaw_mm) {
+  return {.model = model,
+          .stroke_mm = jaw.stroke_mm(),
+          .step_mm = jaw.step_mm(),
+          .speed_min_mm_s = 1.0,
+          .speed_max_mm_s = FULL_SPEED_rad_s * jaw_mm,
+          .force_min_N = LEAST_TORQUE * STALL_Nm * 1000 / jaw_mm,
+          .force_max_N = STALL_Nm * 1000 / jaw_mm,
+          .latency_s = 0.008,
+          .poll_s = 0.001};
+}
+
+GripperWay feetech_way(const GripperWay &way) {
+  GripperWay all = complete(way, USUAL);
+  if (std::abs(*all.open_count - *all.closed_count) > COUNTS_PER_TURN / 2) {
+    throw Error(ErrorCode::bad_value, "a jaw opens by half a turn at the most, 2048 counts");
+  }
+  return all;
+}
+
+FeetechGripper::FeetechGripper(const GripperWay &given)
+    : way_(feetech_way(given)), jaw_(way_), traits_(feetech_traits(way_.model, jaw_, way_.jaw_mm)),
+      line_(way_.port, BAUD) {
+  const Bytes table = read(MODEL, OPERATING_MODE + 1 - MODEL);
+  servo_model_ = word(table, 0);
+  const int mode = table[OPERATING_MODE - MODEL];
+  if (mode != 0) {
+    throw Error(ErrorCode::gripper_refused, way_.port + ": the servo is in mode " +
+                                                std::to_string(mode) +
+                                                ", a gripper needs 0 (position)");
+  }
+  poll();
+}
+
+Bytes FeetechGripper::exchange(const Packet &question, std::size_t answer_length) {
+  const HostTime until = send(question);
+  doubtful_ = true;
+  sure_length_ = 0;
+  Bytes answer = hear(question, answer_length, until);
+  doubtful_ = false;
+  return answer;
+}
+
+HostTime FeetechGripper::send(const Packet &question) {
+  const Bytes sent = encoded(question);
+  line_.drop_input();
+  if (!line_.transport().write(sent.data(), sent.size())) {
+    throw Error(ErrorCode::gone, way_.port + ": gone");
+  }
+  return host_now() + timeout();
+}
+
+Bytes FeetechGripper::hear(const Packet &question, std::size_t answer_length, HostTime until) {
+  const Bytes sent = encoded(question);
+  Bytes came;
+  std::size_t noise = 0;
+  bool other_slave = false, other_answer = false, echo_gone = false;
+  for (;;) {
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(until - host_now());
+    std::uint8_t bytes[256];
+    std::size_t length = 0;
+    if (left.count() <= 0) {
+      break;
+    }
+    const Transport::Result result = line_.transport().read(bytes, sizeof bytes, &length, left);
+    if (result == Transport::Result::gone) {
+      throw Error(ErrorCode::gone, way_.port + ": gone");
+    }
+    came.insert(came.end(), bytes, bytes + length);
+    // Some adapters hear themselves on the one wire.
+    if (!echo_gone && came.size() >= sent.size()) {
+      echo_gone = true;
+      if (std::equal(sent.begin(), sent.end(), came.begin())) {
+        came.erase(came.begin(), came.begin() + static_cast<std::ptrdiff_t>(sent.size()));
+      }
+    } else if (!echo_gone && std::equal(came.begin(), came.end(), sent.begin())) {
+      continue;
+    }
+    while (std::optional<Packet> answer = take_packet(&came, &noise)) {
+      if (answer->id != question.id) {
+        other_slave = true;
+      } else if (answer->parameters.size() != answer_length) {
+        other_answer = true;
+      } else {
+        return answer->parameters;
+      }
+    }
+  }
+  if (other_slave || other_answer) {
+    throw Error(ErrorCode::gripper_garbled,
+                way_.port + (other_slave ? ": another slave answers"
+                                         : ": an answer is not one to the question"));
+  }
+  if (noise + came.size() > 0) {
+    throw Error(ErrorCode::gripper_garbled, way_.port + ": an answer is damaged (checksum)");
+  }
+  throw silent(way_);
+}
+
+std::chrono::microseconds FeetechGripper::timeout() const {
+  return std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6));
+}
+
+// Answers have no number: a late one would pass for that to the next question. But they come in the
+// order of the questions. So two or three bytes are asked for, once, which no other answer has, and
+// what comes before them is what nobody waits for. Where they are lost the other number is asked
+// for, lest the first come after all.
+void FeetechGripper::make_sure() {
+  if (!doubtful_) {
+    return;
+  }
+  const auto question = [this] {
+    return ours(
+        {.code = READ, .parameters = {MODEL, static_cast<std::uint8_t>(sure_length_)}});
+  };
+  if (sure_length_ == 0 || host_now() >= sure_until_) {
+    sure_length_ = sure_length_ == 2 ? 3 : 2;
+    sure_until_ = host_now() + SURE_TIMEOUTS * timeout();
+    send(question());
+  }
+  hear(question(), static_cast<std::size_t>(sure_length_), host_now() + timeout());
+  doubtful_ = false;
+}
+
+Packet FeetechGripper::ours(Packet question) const {
+  question.id = static_cast<std::uint8_t>(way_.slave);
+  return question;
+}
+
+Bytes FeetechGripper::ask(Packet question, std::size_t answer_length) {
+  make_sure();
+  return exchange(ours(std::move(question)), answer_length);
+}
+
+Bytes FeetechGripper::read(std::uint8_t address, std::uint8_t length) {
+  return ask({.code = READ, .parameters = {address, length}}, length);
+}
+
+void FeetechGripper::write(std::uint8_t address, const Bytes &values) {
+  Packet packet = {.code = WRITE, .parameters = {address}};
+  packet.parameters.insert(packet.parameters.end(), values.begin(), values.end());
+  ask(std::move(packet), 0);
+}
+
+GripperStatus FeetechGripper::poll() {
+  const std::int64_t began_us = steady_now_us();
+  const Bytes table = read(STATUS_FROM, TABLE_END - STATUS_FROM);
+  const auto at = [&](Address address) { return std::size_t{address} - STATUS_FROM; };
+  const auto magnitude = [&](Address address) { return word(table, at(address)) & (SIGN - 1); };
+  const int position = word(table, at(PRESENT_POSITION));
+  const double count = (position & SIGN) ? -magnitude(PRESENT_POSITION) : position;
+  GripperStatus status;
+  status.host_us = (began_us + steady_now_us()) / 2;
+  active_ = table[at(TORQUE_ENABLE)] != 0;
+  status.active = active_;
+  const double off = std::abs(count - magnitude(GOAL_POSITION));
+  status.moving = active_ && (table[at(MOVING)] != 0 ||
+                              (off > OFF_GOAL && status.host_us - commanded_us_ < STARTING_us));
+  if (active_ && !status.moving) {
+    status.object = off > OFF_GOAL;
+  }
+  status.width_mm = std::clamp(jaw_.width_mm(count), 0.0, traits_.stroke_mm);
+  status.current_A = magnitude(PRESENT_CURRENT) * AMPERE_PER_COUNT;
+  status.fault = table[at(STATUS)];
+  return status;
+}
+
+void FeetechGripper::command(double count, int speed, int torque) {
+  Bytes values = {0}; // no limit of acceleration but its own
+  put_word(&values, static_cast<int>(std::lround(count)));
+  put_word(&values, 0);
+  put_word(&values, speed);
+  put_word(&values, torque);
+  write(ACCELERATION, values);
+  if (count != goal_count_) {
+    goal_count_ = count;
+    commanded_us_ = steady_now_us();
+  }
+}
+
+void FeetechGripper::activate() {
+  Bytes position;
+  put_word(&position, static_cast<int>(std::lround(jaw_.count(poll().width_mm))));
+  write(GOAL_POSITION, position);
+  write(TORQUE_ENABLE, {1});
+}
+
+GripperStatus FeetechGripper::move(const GripperMove &move) {
+  check_move(move);
+  if (!active_) {
+    poll();
+    if (!active_) {
+      return poll();
+    }
+  }
+  const double width_mm = std::clamp(move.width_mm, 0.0, traits_.stroke_mm);
+  const double speed_mm_s =
+      std::clamp(move.speed_mm_s, traits_.speed_min_mm_s, traits_.speed_max_mm_s);
+  const double force_N = std::clamp(move.force_N, traits_.force_min_N, traits_.force_max_N);
+  command(jaw_.count(width_mm),
+          std::max(1, static_cast<int>(std::lround(speed_mm_s / jaw_.slope_mm(width_mm)))),
+          static_cast<int>(std::lround(force_N / traits_.force_max_N * 1000)));
+  return poll();
+}
+
+std::string FeetechGripper::line() const {
+  return "Feetech bus at " + std::to_string(BAUD) + " baud, slave " + std::to_string(way_.slave) +
+         ", servo model " + std::to_string(servo_model_) + limited_by(way_.port, 2);
+}
+
+std::string FeetechGripper::fault_text(std::uint8_t fault) const {
+  static const struct {
+    Trouble bit;
+    const char *text;
+  } TEXTS[] = {{VOLTAGE, "voltage out of its range"},
+               {SENSOR, "position sensor fails"},
+               {TEMPERATURE, "too hot"},
+               {CURRENT, "too much current"},
+               {ANGLE, "angle out of its range"},
+               {OVERLOAD, "overloaded"}};
+  std::string text;
+  for (const auto &entry : TEXTS) {
+    if (fault & entry.bit) {
+      text += (text.empty() ? "" : ", ") + std::string(entry.text);
+    }
+  }
+  return text.empty() && fault != 0 ? "a fault that its memory table does not have" : text;
+}
+
+} // namespace fingertip

@@ -1,0 +1,84 @@
+// A gripper of one Feetech STS3215 that turns one jaw against a fixed one, as an SO-101's.
+//
+// The width between the pads is that of a chord: 2 jaw sin(angle / 2), the angle counted from where
+// the pads touch. Counts of the ends and the jaw's length are options (GripperWay); the usual ones
+// are a jaw of 100 mm that touches at 2048 and opens by a radian, 652 counts, to 96 mm. The pads
+// are parallel only where they touch.
+//
+// Its force limit is a share of the stall torque, 1.9 Nm at 7.4 V by the maker's figures, over the
+// jaw: no newtons but a guess of them, for friction in the gears is of the same size at the least.
+#pragma once
+
+#include "grasp/gripper/feetech_packet.hpp"
+#include "grasp/gripper/gripper.hpp"
+#include "grasp/gripper/serial_line.hpp"
+#include "libfingertip/clock.hpp"
+
+namespace fingertip {
+
+class Jaw {
+public:
+  Jaw(int closed_count, int open_count, double jaw_mm);
+  // Of a way's, or the usual.
+  explicit Jaw(const GripperWay &complete);
+
+  double stroke_mm() const { return width_mm(open_); }
+  double step_mm() const; // of one count, closed, where it is the largest
+  // Below 0 beyond where the pads touch.
+  double width_mm(double count) const;
+  // Of widths from 0 to the stroke.
+  double count(double width_mm) const;
+  // Of the width for one count, there.
+  double slope_mm(double width_mm) const;
+  int closed_count() const { return closed_; }
+  int open_count() const { return open_; }
+
+private:
+  int closed_, open_;
+  double jaw_mm_;
+};
+
+// The usual jaw's, and what the servo can do on it.
+GripperTraits feetech_traits(const std::string &model, const Jaw &jaw, double jaw_mm);
+// GripperWay with the usual for what it leaves open. Throws Error: bad_value.
+GripperWay feetech_way(const GripperWay &way);
+
+class FeetechGripper : public Gripper {
+public:
+  explicit FeetechGripper(const GripperWay &given);
+
+  const GripperTraits &traits() const override { return traits_; }
+  std::string line() const override;
+  // Torque on, at the position where it is.
+  void activate() override;
+  GripperStatus poll() override;
+  GripperStatus move(const GripperMove &move) override;
+  // Several bits may be set.
+  std::string fault_text(std::uint8_t fault) const override;
+
+private:
+  feetech::Bytes exchange(const feetech::Packet &question, std::size_t answer_length);
+  HostTime send(const feetech::Packet &question); // until when to wait
+  feetech::Bytes hear(const feetech::Packet &question, std::size_t answer_length, HostTime until);
+  void make_sure();
+  feetech::Packet ours(feetech::Packet question) const;
+  std::chrono::microseconds timeout() const;
+  feetech::Bytes ask(feetech::Packet question, std::size_t answer_length);
+  feetech::Bytes read(std::uint8_t address, std::uint8_t length);
+  void write(std::uint8_t address, const feetech::Bytes &values);
+  void command(double count, int speed, int torque);
+
+  GripperWay way_; // complete
+  Jaw jaw_;
+  GripperTraits traits_;
+  SerialLine line_;
+  int servo_model_ = 0;
+  bool doubtful_ = false; // an answer may still come that nobody waits for
+  int sure_length_ = 0;   // of the answer that make_sure has asked for, 0: none yet,
+  HostTime sure_until_{}; // and still waits for
+  bool active_ = false;   // by the last status
+  std::int64_t commanded_us_ = 0;
+  double goal_count_ = -1;
+};
+
+} // namespace fingertip

@@ -1,0 +1,68 @@
+// Robotiq 2F-85, 2F-140 and Hand-E by Modbus RTU (robotiq_registers.hpp), through libmodbus.
+//
+// Which functions a gripper answers is found out: 4, else 3, to read, when it is opened; 23, else
+// 16 and a read, to write and read, at the first moves, for only a command can tell.
+//
+// A move writes rPR, rSP and rFR alone: a gripper that lost its power since the last answer stays
+// inactive, where writing rACT again would activate it and drop what it holds. Only where a status
+// just said active without gGTO is rGTO written with them.
+#pragma once
+
+#include "grasp/gripper/gripper.hpp"
+#include "grasp/gripper/serial_line.hpp"
+#include "libfingertip/clock.hpp"
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+using modbus_t = struct _modbus;
+
+namespace fingertip {
+
+class RobotiqGripper : public Gripper {
+public:
+  explicit RobotiqGripper(const GripperWay &given);
+  ~RobotiqGripper() override;
+
+  const GripperTraits &traits() const override { return traits_; }
+  std::string line() const override;
+  void activate() override;
+  GripperStatus poll() override;
+  GripperStatus move(const GripperMove &move) override;
+  std::string fault_text(std::uint8_t fault) const override;
+
+private:
+  using Registers = std::array<std::uint16_t, 3>;
+
+  using Bytes = std::vector<std::uint8_t>;
+
+  // request: the function and what belongs to it. Returns what follows the function in the answer,
+  // which has so many bytes.
+  Bytes exchange(const Bytes &request, std::size_t length);
+  HostTime ask(const Bytes &request); // until when to wait
+  Bytes hear(const Bytes &request, std::size_t length, HostTime until);
+  Bytes read_request(int count) const;
+  std::chrono::microseconds timeout() const;
+  void make_sure();
+  Registers read(int count);
+  GripperStatus read_status();
+  GripperStatus told(const Registers &registers);
+  void write(int address, int count, const std::uint16_t *values);
+
+  GripperTraits traits_;
+  GripperWay way_; // complete
+  SerialLine line_;
+  modbus_t *modbus_;
+  int read_function_ = 4;
+  bool both_at_once_ = true; // function 23
+  int both_failed_ = 0;      // so many times in a row, without ever having worked
+  bool both_worked_ = false;
+  bool doubtful_ = false;              // an answer may still come that nobody waits for
+  int sure_count_ = 0;                 // registers that make_sure has asked for, 0: none yet,
+  HostTime sure_until_{};              // and still waits for
+  bool goes_ = false, active_ = false; // by the last status
+  std::int64_t began_us_ = 0;
+};
+
+} // namespace fingertip

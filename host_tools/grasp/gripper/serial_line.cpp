@@ -1,0 +1,116 @@
+#include "grasp/gripper/serial_line.hpp"
+
+#include "libfingertip/discovery.hpp"
+#include "libfingertip/error.hpp"
+#include "libfingertip/text.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <termios.h>
+
+namespace fingertip {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+speed_t speed_of(unsigned baud) {
+  switch (baud) {
+  case 115200:
+    return B115200;
+  case 500000:
+    return B500000;
+  case 1000000:
+    return B1000000;
+  default:
+    throw std::logic_error("no such speed");
+  }
+}
+
+std::string line_of(const fs::path &path) {
+  std::ifstream file(path);
+  std::string text;
+  std::getline(file, text);
+  return std::string(trim(text));
+}
+
+} // namespace
+
+SerialLine::SerialLine(const std::string &path, unsigned baud) : path_(path), transport_(path) {
+  const int fd = descriptor();
+  termios settings;
+  struct stat status;
+  const bool is_simulated = fstat(fd, &status) == 0 && S_ISSOCK(status.st_mode);
+  if (is_simulated) {
+    speed_of(baud); // which a socket does not have
+  } else if (tcgetattr(fd, &settings) != 0 || cfsetspeed(&settings, speed_of(baud)) != 0 ||
+      tcsetattr(fd, TCSANOW, &settings) != 0) {
+    throw Error(ErrorCode::cannot_open, path + ": cannot go at " + std::to_string(baud) + " baud");
+  }
+  drop_input();
+}
+
+int SerialLine::descriptor() const {
+  const std::vector<pollfd> descriptors = transport_.poll_descriptors();
+  return descriptors.empty() ? -1 : descriptors.front().fd;
+}
+
+void SerialLine::drop_input() {
+  std::uint8_t bytes[256];
+  if (tcflush(descriptor(), TCIFLUSH) != 0) {
+    while (recv(descriptor(), bytes, sizeof bytes, MSG_DONTWAIT) > 0) { // of a simulated port
+    }
+  }
+}
+
+std::optional<int> latency_timer_ms(const std::string &port, const std::string &root) {
+  std::error_code none;
+  const fs::path device = fs::canonical(port, none);
+  const std::optional<std::int64_t> milliseconds = to_i64(
+      line_of(fs::path(root) / "sys/bus/usb-serial/devices" / device.filename() / "latency_timer"));
+  if (none || !milliseconds) {
+    return {};
+  }
+  return static_cast<int>(*milliseconds);
+}
+
+std::vector<GripperPort> find_gripper_ports(const std::string &root) {
+  std::vector<std::string> fingertips;
+  for (const Found &found : find_usb(root)) {
+    fingertips.push_back(found.port);
+  }
+  std::vector<GripperPort> ports;
+  std::error_code none;
+  for (const auto &entry : fs::directory_iterator(fs::path(root) / "sys/class/tty", none)) {
+    const std::string name = entry.path().filename().string();
+    const fs::path interface = fs::canonical(entry.path() / "device", none);
+    if (none || (name.rfind("ttyUSB", 0) != 0 && name.rfind("ttyACM", 0) != 0)) {
+      none.clear();
+      continue;
+    }
+    const std::string device = (fs::path(root) / "dev" / name).string();
+    GripperPort port;
+    port.path = stable_port(device, root);
+    if (std::find(fingertips.begin(), fingertips.end(), port.path) != fingertips.end()) {
+      continue;
+    }
+    // Up from the tty to the USB device, which has the names.
+    for (fs::path usb = interface; usb.has_relative_path(); usb = usb.parent_path()) {
+      if (fs::exists(usb / "idVendor", none)) {
+        port.adapter =
+            std::string(trim(line_of(usb / "manufacturer") + " " + line_of(usb / "product")));
+        break;
+      }
+    }
+    port.latency_timer_ms = latency_timer_ms(device, root);
+    ports.push_back(port);
+  }
+  std::sort(ports.begin(), ports.end(),
+            [](const GripperPort &a, const GripperPort &b) { return a.path < b.path; });
+  return ports;
+}
+
+} // namespace fingertip

@@ -1,0 +1,56 @@
+// What sensors under a block (block.hpp) feel more than under a layer without end: the difference
+// that the pad's edges make, for any load and place. Solved once, kept in a file, interpolated; to
+// be added to what contact_table.hpp and traction_table.hpp say.
+//
+// The load counts by its force, its place and its breadth: the field's mean over a disc, from four
+// points. Against all of the contact's own pressure that costs, in parts of the layer's peak, above
+// the corner's sensor at 8 N on 12 mm: with 9 mm of rubber beyond 0.1 % under a sphere of 6 mm and
+// 0.3 % under one of 15 mm, with 6 mm 0.4 and 1.2 %, 1 % under a cube; the middle alone, three to
+// five times that. Nodes 0.5 mm apart add less than 0.05 %.
+//
+// Taken over from the layer without end is how a contact's pressure is spread about its middle.
+// Near an edge rubber yields more, so an object presses less on that side than it would on the
+// layer: its axis is not where its pressure's middle, the place here, is. How far off has not been
+// found.
+#pragma once
+
+#include "library/pad/block.hpp"
+
+#include <filesystem>
+
+namespace fingertip::twin {
+
+class BlockTable {
+public:
+  // From the cache if it holds this very table, else solved (block.hpp: seconds, half a minute at
+  // most) and kept there; a damaged file is solved anew. on_progress gets the share done, 0..1.
+  // Throws std::filesystem::filesystem_error or std::runtime_error if the cache cannot be written.
+  static BlockTable load_or_build(const Block &block, const std::vector<Place> &sensors,
+                                  const std::filesystem::path &cache_directory,
+                                  const std::function<void(double)> &on_progress = {});
+
+  struct Load {
+    double force_N = 0.0, x_N = 0.0, y_N = 0.0; // down, along x, along y
+    double radius_mm = 0.0;                     // of the contact
+  };
+  // On the base at a sensor, in the order given, by a load at this place. Beyond the sides, as at
+  // them. Some 0.2 us.
+  double added_Pa(std::size_t sensor, const Load &load, double x_mm, double y_mm) const;
+
+  const Block &block() const { return block_; }
+
+private:
+  BlockTable(const Block &block, const std::vector<Place> &sensors);
+
+  struct Sensor {
+    std::size_t place;     // of those solved for, whose coordinates are not negative
+    double sign_x, sign_y; // which way its mirror is
+  };
+  Block block_;
+  std::vector<Place> places_;
+  std::vector<Sensor> sensors_;
+  int nodes_x_, nodes_y_;
+  std::vector<float> values_; // [place][x][y][down, along x, along y], Pa / N
+};
+
+} // namespace fingertip::twin

@@ -1,0 +1,245 @@
+#include "library/pad/edges.hpp"
+
+#include "libfingertip/error.hpp"
+#include "libfingertip/text.hpp"
+#include "library/pad/block_table.hpp"
+
+extern "C" {
+#include "fit/fit_tangential.h"
+}
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace fingertip::pad {
+
+namespace {
+
+constexpr double FORCE_N = 5.0, RATIO = 0.3; // the estimate is linear in the former, nearly in both
+constexpr double STEP_mm = 1.5;
+constexpr double GAIN_SD = 0.015; // of a calibrated pad: what the readings are weighed by
+constexpr double LEAST_SHARE = 0.5;
+
+struct Contact {
+  double x_mm, y_mm;                                         // its place
+  double qx, qy;                                             // its load, Q / F
+  double told_x_mm, told_y_mm, told_qx, told_qy, told_force; // the estimate; the last over F
+};
+
+double of(float value) {
+  return static_cast<double>(value);
+}
+
+// Of a layer without end, per newton, with the contact dx, dy away.
+double layer_Pa(const pad_profile &profile, double qx, double qy, double dx_mm, double dy_mm) {
+  const double r2 = dx_mm * dx_mm + dy_mm * dy_mm;
+  double sum = 0.0;
+  for (const auto &term : profile.normal) {
+    const double v = of(term.sd_mm) * of(term.sd_mm) + of(profile.spread_mm2);
+    sum += of(term.share) / (2 * M_PI * v) * std::exp(-r2 / (2 * v));
+  }
+  for (const auto &term : profile.tangential) {
+    const double v = of(term.sd_mm) * of(term.sd_mm) + 1.3 * of(profile.spread_mm2);
+    sum += (qx * dx_mm + qy * dy_mm) * of(term.moment_mm) / (2 * M_PI * v * v) *
+           std::exp(-r2 / (2 * v));
+  }
+  return 1e6 * sum;
+}
+
+struct Prepared {
+  fit_array array;
+  struct fit_pad pad;
+};
+
+Prepared prepare(const pad_profile &profile, const wire_info &info) {
+  Prepared made{};
+  if (fit_array_init(&made.array, info.sensor_count, info.x_mm, info.y_mm, info.pitch_mm) !=
+          FT_OK ||
+      fit_pad_init(&made.pad, &made.array, &profile) != FT_OK) {
+    throw Error(ErrorCode::bad_value,
+                "the fingertip's sensors are no rectangle that tangential load is estimated on");
+  }
+  return made;
+}
+
+class Estimate {
+public:
+  Estimate(const Prepared &prepared, const pad_profile &profile, const wire_info &info,
+           const twin::BlockTable &block)
+      : profile_(profile), info_(info), block_(block), prepared_(prepared) {
+    settings_.iterations = 4;
+    settings_.noise_Pa_q10 = 1024;
+    std::fill_n(settings_.gain_sd_q16, FT_MAX_SENSORS,
+                static_cast<std::uint16_t>(65536.0 * GAIN_SD));
+  }
+
+  // False: there is no estimate.
+  bool of_contact(Contact &contact) {
+    std::array<std::int32_t, FT_MAX_SENSORS> readings{};
+    const double radius_mm = std::sqrt(5.0 * of(profile_.spread_mm2)); // under Hertz's pressure
+    for (std::size_t k = 0; k < info_.sensor_count; k++) {
+      const double layer =
+          FORCE_N * layer_Pa(profile_, contact.qx, contact.qy, of(info_.x_mm[k]) - contact.x_mm,
+                             of(info_.y_mm[k]) - contact.y_mm);
+      const twin::BlockTable::Load load{FORCE_N, contact.qx * FORCE_N, contact.qy * FORCE_N,
+                                        radius_mm};
+      const double added = block_.added_Pa(k, load, contact.x_mm, contact.y_mm);
+      readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * (layer + added)));
+    }
+    fit_result fit;
+    struct fit_tangential found;
+    fit_tangential_state state{};
+    fit_gaussian_grid(&prepared_.array, readings.data(),
+                      UINT32_MAX >> (FT_MAX_SENSORS - info_.sensor_count), &settings_, &fit);
+    for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
+      fit_tangential_load(&prepared_.array, &prepared_.pad, readings.data(), &settings_, &fit,
+                          &state, &found);
+    }
+    if (!found.valid) {
+      return false;
+    }
+    contact.told_x_mm = of(found.x_mm);
+    contact.told_y_mm = of(found.y_mm);
+    contact.told_qx = of(found.qx_N / found.force_N);
+    contact.told_qy = of(found.qy_N / found.force_N);
+    contact.told_force = of(found.force_N) / FORCE_N;
+    return true;
+  }
+
+private:
+  const pad_profile &profile_;
+  const wire_info &info_;
+  const twin::BlockTable &block_;
+  Prepared prepared_;
+  fit_settings settings_{};
+};
+
+using Terms = Eigen::Vector3d;
+
+// Least squares of value_i = factor_i even(c) over contacts, by the place that the estimate tells.
+template <typename Factor, typename Value>
+Terms fitted(const std::vector<Contact> &contacts, const Factor &factor, const Value &value) {
+  Eigen::MatrixXd rows(contacts.size(), PAD_EDGE_TERMS);
+  Eigen::VectorXd right(contacts.size());
+  for (std::size_t i = 0; i < contacts.size(); i++) {
+    const double u = contacts[i].told_x_mm / of(PAD_EDGE_UNIT_mm);
+    const double v = contacts[i].told_y_mm / of(PAD_EDGE_UNIT_mm);
+    const auto row = static_cast<Eigen::Index>(i);
+    rows.row(row) = factor(contacts[i]) * Eigen::RowVector3d(1.0, u * u, v * v);
+    right[row] = value(contacts[i]);
+  }
+  return rows.colPivHouseholderQr().solve(right);
+}
+
+double even(const Terms &c, const Contact &contact) {
+  const double u = contact.told_x_mm / of(PAD_EDGE_UNIT_mm);
+  const double v = contact.told_y_mm / of(PAD_EDGE_UNIT_mm);
+  return c[0] + c[1] * u * u + c[2] * v * v;
+}
+
+// The members of a contact along one axis.
+struct Axis {
+  double Contact::*place, Contact::*told_place, Contact::*load, Contact::*told_load;
+};
+constexpr Axis ALONG_X{&Contact::x_mm, &Contact::told_x_mm, &Contact::qx, &Contact::told_qx};
+constexpr Axis ALONG_Y{&Contact::y_mm, &Contact::told_y_mm, &Contact::qy, &Contact::told_qy};
+
+struct AxisTerms {
+  Terms ratio, gain, place, pull;
+};
+
+AxisTerms terms_along(const Axis &axis, const std::vector<Contact> &free,
+                      const std::vector<Contact> &pulled) {
+  const auto lever = [&](const Contact &c) { return c.*axis.told_place / of(PAD_EDGE_UNIT_mm); };
+  const auto off = [&](const Contact &c) { return c.*axis.told_place - c.*axis.place; };
+  AxisTerms terms;
+  terms.ratio = fitted(free, lever, [&](const Contact &c) { return c.*axis.told_load; });
+  terms.place = fitted(free, lever, off);
+  const auto load = [&](const Contact &c) {
+    return c.*axis.told_load - lever(c) * even(terms.ratio, c);
+  };
+  terms.gain = fitted(
+      pulled, [](const Contact &) { return RATIO; },
+      [&](const Contact &c) { return load(c) - RATIO; });
+  terms.pull = fitted(
+      pulled, [&](const Contact &c) { return load(c) / (1.0 + even(terms.gain, c)); },
+      [&](const Contact &c) { return off(c) - lever(c) * even(terms.place, c); });
+  return terms;
+}
+
+void put(const Terms &terms, float (&to)[PAD_EDGE_TERMS]) {
+  for (int i = 0; i < PAD_EDGE_TERMS; i++) {
+    to[i] = static_cast<float>(terms[i]);
+  }
+}
+
+double outermost(const float *places, int count) {
+  return of(*std::max_element(places, places + count));
+}
+
+} // namespace
+
+pad_edges edges_of(const pad_profile &profile, const wire_info &info,
+                   const std::filesystem::path &cache_directory,
+                   const std::function<void(double)> &on_progress) {
+  const double overhang_mm = of(profile.overhang_mm);
+  if (!(overhang_mm >= EDGE_OVERHANG_MIN_mm && overhang_mm <= EDGE_OVERHANG_MAX_mm)) {
+    throw Error(ErrorCode::bad_value, "what a pad's ends do is known for 3 to 20 mm of rubber "
+                                      "beyond the outer sensors, not for " +
+                                          shortest(profile.overhang_mm));
+  }
+  const Prepared prepared = prepare(profile, info);
+  const int count = info.sensor_count;
+  const double half_x = outermost(info.x_mm, count), half_y = outermost(info.y_mm, count);
+  std::vector<twin::Place> sensors;
+  for (int k = 0; k < count; k++) {
+    sensors.push_back({of(info.x_mm[k]), of(info.y_mm[k])});
+  }
+  const twin::Block rubber{twin::silicone(of(profile.thickness_mm)), half_x + overhang_mm,
+                           half_y + overhang_mm};
+  const twin::BlockTable block =
+      twin::BlockTable::load_or_build(rubber, sensors, cache_directory, on_progress);
+  Estimate estimate(prepared, profile, info, block);
+  std::vector<Contact> contacts[3]; // without load, pulled along x, along y
+  std::size_t places = 0;
+  for (double x_mm = -half_x; x_mm <= half_x + 1e-9; x_mm += STEP_mm) {
+    for (double y_mm = -half_y; y_mm <= half_y + 1e-9; y_mm += STEP_mm) {
+      places++;
+      for (int load = 0; load < 3; load++) {
+        Contact contact{x_mm, y_mm, load == 1 ? RATIO : 0.0, load == 2 ? RATIO : 0.0, 0.0, 0.0, 0.0,
+                        0.0,  0.0};
+        if (estimate.of_contact(contact)) {
+          contacts[load].push_back(contact);
+        }
+      }
+    }
+  }
+  for (const auto &some : contacts) {
+    if (static_cast<double>(some.size()) < LEAST_SHARE * static_cast<double>(places)) {
+      throw Error(ErrorCode::bad_value,
+                  "the rubber ends " + shortest(profile.overhang_mm) +
+                      " mm beyond the outer sensors, too near to tell tangential load by");
+    }
+  }
+  const AxisTerms x = terms_along(ALONG_X, contacts[0], contacts[1]);
+  const AxisTerms y = terms_along(ALONG_Y, contacts[0], contacts[2]);
+  const Terms force = fitted(
+      contacts[0], [](const Contact &) { return 1.0; },
+      [](const Contact &c) { return c.told_force - 1.0; });
+  pad_edges edges{};
+  put(x.ratio, edges.ratio_x);
+  put(y.ratio, edges.ratio_y);
+  put(x.gain, edges.gain_x);
+  put(y.gain, edges.gain_y);
+  put(x.place, edges.place_x_mm);
+  put(y.place, edges.place_y_mm);
+  put(x.pull, edges.pull_x_mm);
+  put(y.pull, edges.pull_y_mm);
+  put(force, edges.force);
+  return edges;
+}
+
+} // namespace fingertip::pad

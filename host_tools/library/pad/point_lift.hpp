@@ -1,0 +1,45 @@
+// A layer (layer.hpp) one point of whose base is lifted: the base moves by a unit of volume (1
+// mm^3) upwards at r = 0 and nowhere else, the surface is free.
+//
+// By Betti's theorem the surface's displacement there is what that point of the base feels of a
+// load on the surface (block.hpp). Here it gives the stress inside, with which an infinite layer
+// holds what a block with free sides must do without.
+//
+// Waves of a lift exp(i k . x) have the displacement of a half-space above the base,
+//   u_z = (1 + k z / b) exp(-k z),  u_r = -k z / b exp(-k z),  b = 3 - 4 nu
+// in closed form, and a rest, without displacement at the base, that takes the stress from the
+// surface: (1, -+1) exp(-+k z) and what Papkovich and Neuber add, with four constants for each k.
+// The rest falls as exp(-k h), so its integrals over k are short.
+#pragma once
+
+#include "library/pad/layer.hpp"
+
+#include <vector>
+
+namespace fingertip::twin {
+
+class PointLift {
+public:
+  // At these heights above the base (0..thickness), for distances from r_min_mm to r_max_mm.
+  PointLift(const Layer &layer, std::vector<double> heights_mm, double r_max_mm);
+
+  // Per shear modulus and per unit of volume lifted, 1 / mm^3.
+  struct Stress {
+    double rr, tt, rz; // along r, around the axis, shear
+  };
+  // r_mm > 0.
+  Stress stress(double r_mm, std::size_t height) const;
+
+private:
+  struct Parts { // of the displacement's derivatives
+    double volume, plane, stretch, shear;
+  };
+  Parts half_space(double r_mm, double z_mm) const;
+
+  double poisson_;
+  std::vector<double> heights_mm_;
+  std::vector<Parts> rest_; // [height][distance]
+  std::size_t distances_;
+};
+
+} // namespace fingertip::twin

@@ -1,0 +1,101 @@
+// fingertip_cell_gripper: serves a simulated gripper on a port of its own, in real time.
+#include "simulation/cell/gripper_server.hpp"
+#include "tool/advice.hpp"
+
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <cstdio>
+#include <string>
+
+using namespace fingertip;
+
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+struct Options {
+  GripperServer::Options server;
+  LineTrouble trouble;
+  double late_ms = 0, latency_timer_ms = 0;
+  double object_mm = 0, stiffness_N_mm = 10;
+  int fault = 0;
+};
+
+int serve(const Options &options) {
+  GripperMotion motion(GripperServer::mechanics(options.server.model));
+  if (options.object_mm > 0) {
+    motion.blocked_at = [&](double width_mm, double force_N) {
+      return force_N > 0 && width_mm < options.object_mm &&
+             (options.object_mm - width_mm) * options.stiffness_N_mm >= force_N;
+    };
+  }
+  GripperServer server(motion, options.server);
+  server.trouble(options.trouble);
+  server.fail(static_cast<std::uint8_t>(options.fault));
+  std::printf("%s\n", server.port().c_str());
+  std::fflush(stdout);
+  while (!interrupted) {
+    server.step(std::chrono::milliseconds(100));
+  }
+  return 0;
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+  CLI::App app("Serves a simulated gripper with its own protocol; prints its port. Ctrl-C ends it.",
+               "fingertip_cell_gripper");
+  const std::vector<std::pair<std::string, LineFault>> faults = {
+      {"silent", LineFault::silent},
+      {"garbage", LineFault::garbage},
+      {"damaged", LineFault::damaged},
+      {"other_slave", LineFault::other_slave},
+      {"refused", LineFault::refused}};
+  Options options;
+  std::vector<std::string> models;
+  for (const GripperTraits &traits : gripper_models()) {
+    models.push_back(traits.model);
+  }
+  app.add_option("--model", options.server.model, "Which one")
+      ->required()
+      ->check(CLI::IsMember(models));
+  app.add_option("--slave", options.server.slave, "Its address on the line; else the usual")
+      ->check(CLI::Range(1, 253));
+  app.add_option("--link", options.server.link, "A name for the port, as long as it is served")
+      ->type_name("PATH");
+  app.add_option("--object", options.object_mm, "An object of this width lies between its fingers")
+      ->type_name("MM")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--stiffness", options.stiffness_N_mm, "How it pushes back, in N/mm")
+      ->type_name("NUMBER")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--functions", options.server.functions,
+                 "Modbus functions that it answers, else 3 4 16 23")
+      ->type_name("N")
+      ->check(CLI::IsMember(std::vector<int>{3, 4, 16, 23}));
+  app.add_option("--line", options.trouble.fault, "What befalls each answer")
+      ->type_name("FAULT")
+      ->transform(CLI::CheckedTransformer(faults));
+  app.add_option("--late", options.late_ms, "Answers come so much later")
+      ->type_name("MS")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--latency-timer", options.latency_timer_ms, "Of its USB adapter: 16 is usual")
+      ->type_name("MS")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--fault", options.fault, "The gripper's own, by the maker's code")
+      ->type_name("CODE")
+      ->check(CLI::Range(0, 255));
+  CLI11_PARSE(app, argc, argv);
+  options.trouble.late_s = options.late_ms / 1000;
+  options.trouble.latency_timer_s = options.latency_timer_ms / 1000;
+  for (int signal : {SIGINT, SIGTERM}) {
+    std::signal(signal, [](int) { interrupted = 1; });
+  }
+  try {
+    return serve(options);
+  } catch (const Error &error) {
+    tell("fingertip_cell_gripper", error);
+    return 1;
+  }
+}

@@ -1,0 +1,240 @@
+#include "simulation/cell/emulated_grasp.hpp"
+
+#include "grasp/convert.hpp"
+
+extern "C" {
+#include "common/contact_flags.h"
+}
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace fingertip::cell {
+namespace {
+
+using nlohmann::ordered_json;
+
+enum Stream : std::uint64_t { LINE = 841 };
+
+constexpr double NEVER_s = std::numeric_limits<double>::infinity();
+constexpr double MOVES_s = 2.5e-4; // between two looks at the gripper
+constexpr double LOST_N = 0.01, TOUCHED_N = 0.05;
+constexpr double PAD_SD = 0.08, CALIBRATION_SD = 0.012, FORCE_SCALE_SD = 0.05;
+constexpr double MORE_LOAD = 1.1, MORE_LOAD_N = 0.1;
+
+ordered_json in_ms(double s) {
+  return std::isfinite(s) ? ordered_json(std::round(1e6 * s) / 1e3) : ordered_json(nullptr);
+}
+
+ordered_json to_us(double s) {
+  return std::isfinite(s) ? ordered_json(std::round(1e6 * s) / 1e6) : ordered_json(nullptr);
+}
+
+} // namespace
+
+CalibratedRubber draw_rubber(const pad_profile &profile, Random &random) {
+  CalibratedRubber rubber{};
+  rubber.told.placements = 20;
+  rubber.told.force_scale = 1.0F / profile.force_ratio;
+  rubber.told.force_scale_sd = static_cast<float>(FORCE_SCALE_SD);
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    const double gain = 1.0 + PAD_SD * std::clamp(random.normal(), -3.0, 3.0);
+    rubber.gain[k] = gain;
+    rubber.told.sensors[k].gain =
+        static_cast<float>(gain * (1.0 + CALIBRATION_SD * random.normal()));
+    rubber.told.sensors[k].gain_sd = static_cast<float>(CALIBRATION_SD);
+  }
+  return rubber;
+}
+
+Rubber rubber_after(const CalibratedRubber &rubber) {
+  Rubber left;
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    left.gain[k] = rubber.gain[k] / static_cast<double>(rubber.told.sensors[k].gain);
+    left.gain_sd[k] = static_cast<double>(rubber.told.sensors[k].gain_sd);
+  }
+  return left;
+}
+
+EmulatedGrasp::EmulatedGrasp(const EmulatedTrial &trial, const Face &face,
+                             const pad_profile &profile)
+    : trial_(trial), face_(face), cell_(face, trial.scene.object, trial.scene.grasp),
+      gripper_(trial.gripper, trial.scene.object.width_mm + trial.scene.opens_mm,
+               Random(trial.seed, LINE, 0)),
+      fingers_{EmulatedFingertip(profile, trial.rubber[0].told),
+               EmulatedFingertip(profile, trial.rubber[1].told)},
+      holds_s_(NEVER_s), lift_s_(NEVER_s), touched_s_(NEVER_s) {
+  gripper_.press(cell_);
+}
+
+void EmulatedGrasp::take(std::size_t finger, const std::uint8_t *bytes, std::size_t length,
+                         double arrived_s) {
+  fingers_[finger].take(bytes, length, 1e6 * arrived_s, std::llround(1e6 * t_s_),
+                        [&](const EmulatedFingertip::Frame &frame) {
+                          if (!controller_) {
+                            return;
+                          }
+                          const grip_touch &touch = frame.touch;
+                          controller_->take_touch(static_cast<unsigned>(finger), touch);
+                          told_.push_back({1e-6 * frame.arrived_us, 1e-6 * frame.measured_us,
+                                           finger, (touch.flags & CONTACT_FLAG_SLIDING) != 0,
+                                           1e-3 * std::hypot(touch.qx_mN, touch.qy_mN)});
+                          frames_[finger]++;
+                          loads_[finger] += (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
+                          step_controller();
+                        });
+}
+
+void EmulatedGrasp::step_controller() {
+  const std::int32_t width_um = command_.width_um;
+  report_ = controller_->step(static_cast<std::uint64_t>(std::llround(1e6 * t_s_)), command_);
+  if (command_.width_um != width_um) {
+    commanded_.push_back({t_s_, 1e-3 * command_.width_um});
+  }
+  if (report_.state == GRIP_HOLDING || report_.state == GRIP_SLIPPING) {
+    trouble_ |= report_.trouble;
+    holds_s_ = std::min(holds_s_, t_s_);
+  }
+}
+
+void EmulatedGrasp::run(double until_s) {
+  if (!controller_ && fingers_[0].is_ready() && fingers_[1].is_ready()) {
+    grip_settings settings;
+    const grip_traits traits = core_traits(trial_.gripper.traits);
+    grip_default_settings(&settings, &traits);
+    controller_ = std::make_unique<CoreController>(settings, traits);
+    asked_s_ = t_s_;
+  }
+  while (t_s_ < until_s && !over_) {
+    double next_s = std::min({until_s, gripper_.next_s(), t_s_ + MOVES_s});
+    if (!line_.empty()) {
+      next_s = std::min(next_s, line_.front().known_s);
+    }
+    advance(next_s);
+    if (!line_.empty() && line_.front().known_s <= t_s_) {
+      if (controller_) {
+        controller_->take_status(line_.front().status);
+        step_controller();
+      }
+      line_.pop_front();
+    }
+    if (gripper_.next_s() <= t_s_) {
+      const std::int32_t width_um = gripper_.sent().width_um;
+      line_.push_back(gripper_.exchange(command_));
+      if (gripper_.sent().width_um != width_um) {
+        asked_.push_back({t_s_, 1e-3 * gripper_.sent().width_um});
+      }
+    }
+  }
+}
+
+void EmulatedGrasp::advance(double to_s) {
+  const double seconds = to_s - t_s_;
+  if (seconds <= 0.0) {
+    return;
+  }
+  if (lift_s_ == NEVER_s && t_s_ >= holds_s_ + trial_.scene.waits_s) {
+    lift_s_ = t_s_;
+  }
+  const bool lifts = lift_s_ < NEVER_s;
+  const double width_mm = gripper_.motion().width_mm();
+  gripper_.motion().step(seconds);
+  Drive drive = trial_.scene.drive(lifts ? t_s_ + 0.5 * seconds - lift_s_ : -1.0);
+  drive.width_mm = gripper_.motion().width_mm();
+  cell_.run(seconds, drive);
+  t_s_ = to_s;
+  if (drive.width_mm != width_mm) {
+    moved_.push_back({t_s_, drive.width_mm});
+  }
+  const double force_N = cell_.force_N();
+  peak_N_ = std::max(peak_N_, force_N);
+  if (force_N > TOUCHED_N) {
+    touched_s_ = std::min(touched_s_, t_s_);
+  }
+  if (lifts) {
+    slips_.look(t_s_, cell_);
+  }
+  const Vector way = cell_.way_mm();
+  dropped_ = std::hypot(way.x, way.y) >= DROP_mm || (lifts && !drive.table && force_N < LOST_N);
+  over_ = dropped_ || (lifts && t_s_ - lift_s_ >= trial_.scene.ends_s);
+  if (over_) {
+    slips_.end();
+  }
+}
+
+std::vector<std::uint8_t> EmulatedGrasp::to_send(std::size_t finger) {
+  return fingers_[finger].to_send(std::llround(1e6 * t_s_));
+}
+
+Pressures EmulatedGrasp::felt_Pa(std::size_t finger) const {
+  Pressures felt_Pa = face_.base_Pa(cell_.touch(finger), trial_.tangential);
+  for (std::size_t k = 0; k < SENSORS; k++) {
+    felt_Pa[k] *= trial_.rubber[finger].gain[k];
+  }
+  return felt_Pa;
+}
+
+ordered_json EmulatedGrasp::answer_to(const Slip &slip) const {
+  std::array<double, 2> load_N{};
+  const Told *first = nullptr;
+  for (const Told &told : told_) {
+    if (told.arrived_s < slip.begin_s) {
+      load_N[told.finger] = told.load_N;
+    } else if (told.slides || told.load_N > MORE_LOAD * load_N[told.finger] + MORE_LOAD_N) {
+      first = &told;
+      break;
+    }
+  }
+  // The first step that closes further than what stood before.
+  const auto closed = [&](const std::vector<Change> &changes) {
+    double width_mm = NEVER_s;
+    for (const Change &change : changes) {
+      if (change.at_s >= slip.begin_s && change.width_mm < width_mm) {
+        return change.at_s - slip.begin_s;
+      }
+      width_mm = change.width_mm;
+    }
+    return NEVER_s;
+  };
+  ordered_json out;
+  out["begin_s"] = to_us(slip.begin_s);
+  out["way_mm"] = slip.way_mm;
+  out["told_by"] = !first ? ordered_json(nullptr) : first->slides ? "SLIDING" : "load";
+  out["measured_ms"] = in_ms(first ? first->measured_s - slip.begin_s : NEVER_s);
+  out["sent_ms"] = in_ms(first ? first->arrived_s - slip.begin_s : NEVER_s);
+  out["answered_ms"] = in_ms(closed(commanded_));
+  out["asked_ms"] = in_ms(closed(asked_));
+  out["moved_ms"] = in_ms(closed(moved_));
+  out["reaction_ms"] = in_ms(slip.reaction_s.value_or(NEVER_s));
+  return out;
+}
+
+ordered_json EmulatedGrasp::tell() const {
+  ordered_json out;
+  out["held"] = !dropped_;
+  out["dropped"] = dropped_;
+  out["slid_mm"] = cell_.slid_mm();
+  out["force_N"] = cell_.force_N();
+  out["peak_N"] = peak_N_;
+  out["asked_s"] = to_us(asked_s_);
+  out["touched_s"] = to_us(touched_s_);
+  out["holding_s"] = to_us(holds_s_);
+  out["lift_s"] = to_us(lift_s_);
+  out["end_s"] = to_us(t_s_);
+  out["trouble"] = trouble_;
+  out["slips"] = slips_.slips.size();
+  out["slip"] = slips_.slips.empty() ? ordered_json(nullptr) : answer_to(slips_.slips.front());
+  for (std::size_t f = 0; f < fingers_.size(); f++) {
+    ordered_json one;
+    one["frames"] = frames_[f];
+    one["loads"] = loads_[f]; // frames that tell one
+    one["lost_packets"] = fingers_[f].line().dropped_packets;
+    one["damaged_packets"] = fingers_[f].line().crc_errors + fingers_[f].line().format_errors;
+    one["clock_uncertainty_us"] = fingers_[f].clock_uncertainty_us();
+    out["fingers"].push_back(one);
+  }
+  return out;
+}
+
+} // namespace fingertip::cell

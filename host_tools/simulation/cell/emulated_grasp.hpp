@@ -1,0 +1,92 @@
+// One grasp, closed loop, whose fingertips are emulated boards with their release image: the cell,
+// the gripper and the controller go on by slices of emulated time, after each of which the boards'
+// bytes are handed over (host_tools/simulation/emulator/lockstep.mjs).
+//
+// The controller takes what came in a slice at its end, so up to a slice late; all else is at its
+// own time. The object is held as trial.hpp has it, and slips count as there.
+#pragma once
+
+#include "simulation/cell/emulated_fingertip.hpp"
+#include "simulation/cell/trial.hpp"
+
+#include <deque>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+namespace fingertip::cell {
+
+// A pad's sensors as they are and as its calibration has them.
+struct CalibratedRubber {
+  Pressures gain;
+  calibration told;
+};
+// Cast pads differ by 8 %, a calibration finds that to 1.2 %: the report's part truth.
+CalibratedRubber draw_rubber(const pad_profile &profile, Random &random);
+// What is left of it, for felt fingers.
+Rubber rubber_after(const CalibratedRubber &rubber);
+
+struct EmulatedTrial {
+  Scene scene;
+  GripperMechanics gripper;
+  double tangential = 1.0; // share of a pull's field that acts on the readings
+  std::array<CalibratedRubber, 2> rubber;
+  std::uint64_t seed = 0; // of the gripper's first exchange
+};
+
+class EmulatedGrasp {
+public:
+  // All must outlive it.
+  EmulatedGrasp(const EmulatedTrial &trial, const Face &face, const pad_profile &profile);
+
+  // What a board sent at this time, since the last run().
+  void take(std::size_t finger, const std::uint8_t *bytes, std::size_t length, double arrived_s);
+  // To the end of the next slice.
+  void run(double until_s);
+  std::vector<std::uint8_t> to_send(std::size_t finger);
+  // Now.
+  Pressures felt_Pa(std::size_t finger) const;
+  bool over() const { return over_; }
+
+  // What happened, and when, of the first slip after the lift:
+  //   begin_s  emulated time
+  //   by ms after it: measured_ms the frame that first told it, sent_ms the packet that left its
+  //   chip whole, answered_ms the controller's command, asked_ms on the gripper's line, moved_ms
+  //   the fingers, reaction_ms 5 % more force; null: never
+  // told_by: "SLIDING", or "load", that of a fingertip a tenth and 0.1 N above what it was.
+  nlohmann::ordered_json tell() const;
+
+private:
+  struct Told {
+    double arrived_s, measured_s;
+    std::size_t finger;
+    bool slides;
+    double load_N;
+  };
+  struct Change {
+    double at_s, width_mm;
+  };
+  void step_controller();
+  void advance(double to_s);
+  nlohmann::ordered_json answer_to(const Slip &slip) const;
+
+  const EmulatedTrial &trial_;
+  const Face &face_;
+  Cell cell_;
+  GripperLine gripper_;
+  std::array<EmulatedFingertip, 2> fingers_;
+  std::unique_ptr<CoreController> controller_; // none before both are ready
+  std::deque<GripperLine::Said> line_;
+  grip_command command_{};
+  grip_report report_{};
+  Slips slips_;
+  double t_s_ = 0.0, holds_s_, lift_s_, touched_s_, asked_s_ = 0.0;
+  double peak_N_ = 0.0;
+  std::uint32_t trouble_ = 0;
+  bool over_ = false, dropped_ = false;
+  std::array<std::size_t, 2> frames_{}, loads_{}; // since both are ready
+  std::vector<Told> told_;
+  std::vector<Change> commanded_, asked_, moved_;
+};
+
+} // namespace fingertip::cell

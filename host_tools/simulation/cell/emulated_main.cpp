@@ -1,0 +1,197 @@
+// fingertip_cell_emulated: the world of a grasp for host_tools/simulation/emulator/lockstep.mjs, whose
+// protocol it speaks on its standard input and output.
+#include "grasp/convert.hpp"
+#include "grasp/gripper/gripper.hpp"
+#include "library/pad/profile.hpp"
+#include "simulation/cell/emulated_grasp.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace fingertip;
+using namespace fingertip::cell;
+using nlohmann::ordered_json;
+
+constexpr double LAYER_mm = 12.0;
+constexpr std::uint64_t CHUNK_LIMIT = 1 << 20;
+constexpr int FELT_TRIALS = 21;
+enum Stream : std::uint64_t { PAD = 842 };
+
+struct Options {
+  std::string gripper = "2f85", cache;
+  std::uint64_t seed = 1;
+  double slice_us = 500.0, friction = 0.65, friction_falls = 0.4;
+};
+
+// Lifted, and then friction falls so far, within 30 ms, that the grip does not hold it.
+Scene scene_of(const Options &options) {
+  Scene scene;
+  scene.face = "sphere15";
+  scene.object.width_mm = 40.0;
+  scene.object.mass_kg = 0.3;
+  scene.object.friction = options.friction;
+  scene.object.uneven_friction = 0.03;
+  scene.object.com_mm = {3.0, 1.0};
+  scene.grasp.place_mm = {0.8, -1.5};
+  scene.grasp.angle_rad = 0.3;
+  scene.grasp.down_rad = 0.4;
+  scene.opens_mm = 1.0;
+  scene.waits_s = 0.05;
+  scene.lift_mm = 4.0;
+  scene.lift_s = 0.5;
+  scene.disturbances = {
+      {Disturbance::Kind::slick, scene.lift_s + 0.1, 0.03, options.friction_falls, 0.0}};
+  scene.ends_s = scene.lift_s + 0.4;
+  return scene;
+}
+
+// Of the standard input; false: it has ended.
+bool read_whole(void *to, std::size_t length) {
+  return std::fread(to, 1, length, stdin) == length;
+}
+
+template <typename Value> Value next() {
+  Value value;
+  if (!read_whole(&value, sizeof value)) {
+    throw std::runtime_error("the boards have ended");
+  }
+  return value;
+}
+
+void put(const void *bytes, std::size_t length) {
+  if (std::fwrite(bytes, 1, length, stdout) != length) {
+    throw std::runtime_error("the boards do not listen");
+  }
+}
+
+void put_u32(std::size_t value) {
+  const auto word = static_cast<std::uint32_t>(value);
+  put(&word, sizeof word);
+}
+
+// The same with the cell's own model of fingertips, at other moments of sensors and line.
+ordered_json felt(const EmulatedTrial &emulated, const Face &face) {
+  std::vector<double> reactions_ms, slid_mm;
+  grip_settings settings;
+  const grip_traits traits = core_traits(emulated.gripper.traits);
+  grip_default_settings(&settings, &traits);
+  int drops = 0;
+  for (int n = 0; n < FELT_TRIALS; n++) {
+    Trial trial;
+    trial.scene = emulated.scene;
+    trial.gripper = emulated.gripper;
+    trial.sensing.tangential = emulated.tangential;
+    trial.seed = emulated.seed + static_cast<std::uint64_t>(n);
+    for (std::size_t f = 0; f < trial.rubber.size(); f++) {
+      trial.rubber[f] = rubber_after(emulated.rubber[f]);
+    }
+    CoreController controller(settings, traits);
+    const Outcome outcome = run_trial(trial, face, controller);
+    drops += !outcome.held;
+    slid_mm.push_back(outcome.slid_mm);
+    if (!outcome.slips.empty() && outcome.slips.front().reaction_s) {
+      reactions_ms.push_back(1e3 * *outcome.slips.front().reaction_s);
+    }
+  }
+  const auto spread = [](std::vector<double> &values) {
+    std::sort(values.begin(), values.end());
+    return values.empty() ? ordered_json(nullptr)
+                          : ordered_json{values.front(), values[values.size() / 2], values.back()};
+  };
+  ordered_json out;
+  out["grasps"] = FELT_TRIALS;
+  out["dropped"] = drops;
+  out["reaction_least_median_most_ms"] = spread(reactions_ms);
+  out["slid_least_median_most_mm"] = spread(slid_mm);
+  return out;
+}
+
+int serve(const Options &options) {
+  const Face face(scene_of(options).face, LAYER_mm, options.cache);
+  const pad_profile profile = pad::profile_over_own_sensors({LAYER_mm, 0.0, false});
+  EmulatedTrial trial;
+  trial.scene = scene_of(options);
+  trial.gripper = gripper_mechanics(options.gripper);
+  trial.seed = options.seed;
+  for (std::size_t f = 0; f < trial.rubber.size(); f++) {
+    Random random(options.seed, PAD, f);
+    trial.rubber[f] = draw_rubber(profile, random);
+  }
+  EmulatedGrasp grasp(trial, face, profile);
+  std::vector<std::uint8_t> bytes;
+  while (!grasp.over()) {
+    const double t_s = 1e-9 * static_cast<double>(next<std::uint64_t>());
+    for (std::uint32_t chunks = next<std::uint32_t>(); chunks > 0; chunks--) {
+      const auto board = next<std::uint32_t>();
+      const double at_s = 1e-9 * static_cast<double>(next<std::uint64_t>());
+      const auto length = next<std::uint32_t>();
+      if (board >= trial.rubber.size() || length > CHUNK_LIMIT) {
+        throw std::runtime_error("two boards are needed");
+      }
+      bytes.resize(length);
+      if (!read_whole(bytes.data(), length)) {
+        throw std::runtime_error("the boards have ended");
+      }
+      grasp.take(board, bytes.data(), length, at_s);
+    }
+    std::array<std::vector<std::uint8_t>, 2> sent{grasp.to_send(0), grasp.to_send(1)};
+    grasp.run(t_s + 1e-6 * options.slice_us);
+    put_u32(grasp.over());
+    for (std::size_t f = 0; !grasp.over() && f < sent.size(); f++) {
+      const Pressures felt_Pa = grasp.felt_Pa(f);
+      put(felt_Pa.data(), sizeof felt_Pa);
+      put_u32(sent[f].size());
+      put(sent[f].data(), sent[f].size());
+    }
+    std::fflush(stdout);
+  }
+  ordered_json out;
+  out["gripper"] = options.gripper;
+  out["face"] = trial.scene.face;
+  out["mass_kg"] = trial.scene.object.mass_kg;
+  out["friction"] = trial.scene.object.friction;
+  out["friction_falls"] = options.friction_falls;
+  out.update(grasp.tell());
+  out["felt"] = felt(trial, face);
+  const std::string text = out.dump();
+  put(text.data(), text.size());
+  return std::fflush(stdout) == 0 ? 0 : 1;
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+  CLI::App app("The world of a grasp for simulation/emulator/lockstep.mjs: an object, two fingertips' rubber, "
+               "a gripper and the controller. It is lifted, and its friction falls.",
+               "fingertip_cell_emulated");
+  Options options;
+  app.add_option("--gripper", options.gripper, "2f85, 2f140, hande, sts3215 or ideal")
+      ->capture_default_str();
+  app.add_option("--friction", options.friction, "Static, before it falls")
+      ->check(CLI::Range(0.1, 1.5))
+      ->capture_default_str();
+  app.add_option("--friction-falls", options.friction_falls, "By this share")
+      ->check(CLI::Range(0.0, 0.9))
+      ->capture_default_str();
+  app.add_option("--seed", options.seed, "Of pads and of the gripper's line")
+      ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{1} << 32))
+      ->capture_default_str();
+  app.add_option("--slice-us", options.slice_us, "As the boards have it")
+      ->check(CLI::Range(100.0, 10000.0))
+      ->capture_default_str();
+  app.add_option("--cache", options.cache, "Folder of the contact tables")->required();
+  CLI11_PARSE(app, argc, argv);
+  try {
+    return serve(options);
+  } catch (const std::exception &error) {
+    std::fprintf(stderr, "fingertip_cell_emulated: %s\n", error.what());
+    return 1;
+  }
+}

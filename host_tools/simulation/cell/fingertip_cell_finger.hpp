@@ -1,0 +1,58 @@
+// A fingertip of the cell in a process of its own: the whole firmware on simulated sensors
+// (player/native_fingertip.h), on a port that opens and hangs up as one on USB does.
+//
+// Its clock goes with the host's: it runs to where the world is known, so that frames come 1 to 2
+// ms later than they would, never too early. A reading is of the newest that is known, at most half
+// a conversion before its time.
+#pragma once
+
+#include "simulation/cell/face.hpp"
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <string>
+#include <sys/types.h>
+
+namespace fingertip::cell {
+
+// What the rubber's base has to bear, for one other process to read.
+class SharedPressures {
+public:
+  // At this time, later than all before; Pa above what the air presses.
+  void put(std::int64_t host_us, const Pressures &pressures);
+  // Of the newest; 0: none yet.
+  std::int64_t newest_us() const;
+  // In between straight; before the oldest that is kept, 0.5 s, as then, after the newest likewise.
+  double at(std::int64_t host_us, std::size_t sensor) const;
+
+  // The other way: up to where its fingertip has got; 0: it has not begun.
+  std::atomic<std::int64_t> reached_us{0};
+  // It stands, as a process that is stopped.
+  std::atomic<bool> frozen{false};
+
+private:
+  static constexpr std::uint64_t KEPT = 1024;
+  struct Moment {
+    std::atomic<std::int64_t> host_us;
+    std::array<std::atomic<float>, SENSORS> pressure_Pa;
+  };
+  const Moment &moment(std::uint64_t number) const { return moments_[number % KEPT]; }
+
+  std::array<Moment, KEPT> moments_{};
+  std::atomic<std::uint64_t> count_{0};
+};
+
+struct FingerProcess {
+  std::string serial, link; // of its port; what is in the link's way and no link is an error
+  std::uint64_t seed = 1;
+  double layer_mm = 12.0;
+  Pressures gain{};     // of its sensors, as they are; its calibration is off by
+  double gain_sd = 0.0; // so much of each
+};
+
+// Starts it; it dies with this process, SIGINT is not for it. pressures: in memory that both share.
+// To be called before there are threads. Throws Error.
+pid_t start_finger(const FingerProcess &finger, SharedPressures &pressures);
+
+} // namespace fingertip::cell

@@ -1,0 +1,203 @@
+#include "simulation/cell/fingertip_cell_world.hpp"
+
+#include "libfingertip/error.hpp"
+#include "libfingertip/text.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace fingertip::cell {
+namespace {
+
+using Kind = Disturbance::Kind;
+
+constexpr double STEP_s = 2.5e-4;                    // between two looks at the gripper
+constexpr double STANDS = 0.1, STANDS_LEAST_N = 0.2; // a force that changes by no more, stands
+constexpr double LOST_N = 0.01;
+constexpr double JOINED_s = 0.03; // what goes on after less rest is one slip
+
+struct Known {
+  Kind kind;
+  double low, high, seconds;
+};
+// Ranges keep the physics within its steps; lengths are of scene.hpp's.
+constexpr Known KNOWN[] = {{Kind::pour, 0.0, 5.0, 1.0},
+                           {Kind::jerk, 0.0, 20.0, 0.3},
+                           {Kind::knock, 0.0, 0.5, 0.02},
+                           {Kind::slick, 0.0, 0.95, 0.5}};
+
+const Known &known(Kind kind) {
+  return *std::find_if(std::begin(KNOWN), std::end(KNOWN),
+                       [&](const Known &one) { return one.kind == kind; });
+}
+
+Scene scene_of(const World::Options &options) {
+  Scene scene;
+  scene.object = options.object;
+  scene.grasp = options.grasp;
+  scene.lift_mm = options.lift_mm;
+  scene.lift_s = options.lift_s;
+  for (const Planned &one : options.planned) {
+    scene.disturbances.push_back(
+        {one.kind, scene.lift_s + one.after_s, known(one.kind).seconds, one.amount, 0.0});
+  }
+  return scene;
+}
+
+} // namespace
+
+Planned planned(const std::string &text) {
+  const std::size_t colon = text.find(':'), at = text.find('@');
+  if (colon != std::string::npos) {
+    const std::string name = text.substr(0, colon);
+    const auto amount = to_double(
+        std::string_view(text).substr(colon + 1, at == std::string::npos ? at : at - colon - 1));
+    const auto after_s =
+        at == std::string::npos ? 0.0 : to_double(std::string_view(text).substr(at + 1));
+    for (const Known &one : KNOWN) {
+      if (name == name_of(one.kind) && amount && *amount >= one.low && *amount <= one.high &&
+          after_s && *after_s >= 0.0 && *after_s <= 1e6) {
+        return {one.kind, *amount, *after_s};
+      }
+    }
+  }
+  throw Error(ErrorCode::bad_value,
+              "\"" + text +
+                  "\" is no disturbance; give pour:0..5 (masses), jerk:0..20 (m/s2), knock:0..0.5 "
+                  "(m/s) or slick:0..0.95 (share of friction), and @SECONDS after the lift");
+}
+
+bool is_disturbance(const std::string &name) {
+  return std::any_of(std::begin(KNOWN), std::end(KNOWN),
+                     [&](const Known &one) { return name == name_of(one.kind); });
+}
+
+World::World(const Options &options, const Face &face, GripperMotion &motion)
+    : scene_(scene_of(options)), options_(options), face_(face), motion_(motion),
+      cell_(face, options.object, options.grasp) {
+  motion.blocked_at = [this](double width_mm, double force_N) {
+    return is_there_ && force_N > 0.0 && cell_.force_at_N(width_mm) >= force_N;
+  };
+}
+
+bool World::lift() {
+  if (lift_s_) {
+    return false;
+  }
+  lift_s_ = time_s_;
+  events_.push_back("lift");
+  return true;
+}
+
+bool World::disturb(Kind kind, double amount) {
+  if (since_lift_s() < scene_.lift_s || !is_there_) {
+    return false;
+  }
+  scene_.disturbances.push_back({kind, since_lift_s(), known(kind).seconds, amount, 0.0});
+  return true;
+}
+
+void World::advance(double seconds) {
+  for (double left_s = seconds; left_s > 0.0; left_s -= STEP_s) {
+    const double step_s = std::min(STEP_s, left_s);
+    motion_.step(step_s);
+    Drive drive = scene_.drive(lift_s_ ? since_lift_s() + 0.5 * step_s : -1.0);
+    drive.width_mm = motion_.width_mm();
+    if (is_there_) {
+      cell_.run(step_s, drive);
+    }
+    time_s_ += step_s;
+    look_at_force();
+    look_at_object();
+  }
+}
+
+void World::look_at_force() {
+  const double force_N = is_there_ ? cell_.force_N() : 0.0;
+  peak_N_ = std::max(peak_N_, force_N);
+  if (force_N > scene_.object.crushes_N && !is_crushed_) {
+    is_crushed_ = true;
+    events_.push_back("crushed");
+  }
+  if (lift_s_ || !options_.lift_after_s) {
+    return;
+  }
+  if (!stands_ || force_N < STANDS_LEAST_N ||
+      std::abs(force_N - stands_->force_N) > STANDS * stands_->force_N) {
+    stands_ = {time_s_, force_N};
+  } else if (time_s_ - stands_->since_s >= *options_.lift_after_s) {
+    lift();
+  }
+}
+
+void World::look_at_object() {
+  const double since_s = since_lift_s();
+  if (!is_there_) {
+    return;
+  }
+  told_.resize(scene_.disturbances.size());
+  for (std::size_t i = 0; i < told_.size(); i++) {
+    if (!told_[i] && since_s >= scene_.disturbances[i].begin_s) {
+      told_[i] = true;
+      events_.push_back(name_of(scene_.disturbances[i].kind));
+    }
+  }
+  const double slid_mm = cell_.slid_mm() - slid_before_mm_;
+  if (cell_.slips()) {
+    slipped_s_ = time_s_;
+    if (!slips_ && slid_mm >= SLIP_mm) {
+      slips_ = true;
+      events_.push_back("slip");
+    }
+  } else if (time_s_ - slipped_s_ > JOINED_s) {
+    if (slips_) {
+      slips_ = false;
+      events_.push_back("caught after " + fixed(slid_mm, 2) + " mm");
+    }
+    slid_before_mm_ = cell_.slid_mm();
+  }
+  const Vector way = cell_.way_mm();
+  const bool in_the_air = lift_s_ && since_s >= scene_.lift_s;
+  if (std::hypot(way.x, way.y) >= DROP_mm || (in_the_air && cell_.force_N() < LOST_N)) {
+    is_dropped_ = true;
+    is_there_ = false;
+    events_.push_back("dropped");
+  }
+}
+
+Pressures World::pressures_Pa(std::size_t finger) const {
+  return is_there_ ? face_.base_Pa(cell_.touch(finger), 1.0) : Pressures{};
+}
+
+const char *World::columns() {
+  return "world_s,width_mm,force_N,peak_N,load_N,least_N,slid_mm,way_mm,friction,lifted_mm,slips,"
+         "is_there,dropped,crushed";
+}
+
+std::string World::cells() const {
+  double load_N = 0.0;
+  for (const std::size_t finger : {0U, 1U}) {
+    const twin::Touch touch = cell_.touch(finger);
+    load_N += is_there_ ? 0.5 * std::hypot(touch.pull_x_N, touch.pull_y_N) : 0.0;
+  }
+  const double since_s = since_lift_s();
+  const double least_N = is_there_ && since_s >= scene_.lift_s ? scene_.least_N(since_s) : 0.0;
+  const double friction = 0.5 * (cell_.friction(0) + cell_.friction(1));
+  std::string text = fixed(time_s_, 5);
+  for (const double value : {motion_.width_mm(), is_there_ ? cell_.force_N() : 0.0, peak_N_, load_N,
+                             least_N, cell_.slid_mm(), cell_.way_mm().dot(cell_.down()), friction,
+                             scene_.drive(since_s).lifted_mm}) {
+    text += "," + fixed(value, 4);
+  }
+  for (const bool value : {is_there_ && cell_.slips(), is_there_, is_dropped_, is_crushed_}) {
+    text += value ? ",1" : ",0";
+  }
+  return text;
+}
+
+std::vector<std::string> World::take_events() {
+  return std::exchange(events_, {});
+}
+
+} // namespace fingertip::cell

@@ -1,0 +1,83 @@
+// The cell's world as time passes, its truth, and what can be done to it by name.
+//
+// The object stands on the table between the fingers. Once the grip's force has stood for a while,
+// or when it is told to, the hand lifts it; disturbances (scene.hpp) come then, planned or when
+// they are told. What slides by less than SLIP_mm at a time has not slipped. An object that slid
+// DROP_mm, or that nothing presses any more, is gone.
+#pragma once
+
+#include "simulation/cell/gripper_motion.hpp"
+#include "simulation/cell/scene.hpp"
+#include "simulation/cell/trial.hpp"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace fingertip::cell {
+
+// "slick:0.35" or "slick:0.35@1.5": of what size, how long after the lift's end. Throws Error,
+// bad_value.
+struct Planned {
+  Disturbance::Kind kind;
+  double amount, after_s;
+};
+Planned planned(const std::string &text);
+bool is_disturbance(const std::string &name);
+
+class World {
+public:
+  struct Options {
+    Object object;
+    Grasp grasp;
+    double lift_mm = 10.0, lift_s = 0.5;
+    std::optional<double> lift_after_s = 1.0; // none: only when told
+    std::vector<Planned> planned;
+  };
+
+  // Both outlive it. From now on the object is between the fingers of motion.
+  World(const Options &options, const Face &face, GripperMotion &motion);
+
+  // Goes on by so much, fingers and all.
+  void advance(double seconds);
+
+  // False: it has been.
+  bool lift();
+  // Now; false: before the lift, or the object is gone.
+  bool disturb(Disturbance::Kind kind, double amount);
+  void take_away() { is_there_ = false; }
+
+  Pressures pressures_Pa(std::size_t finger) const;
+
+  double time_s() const { return time_s_; }
+  bool touched() const { return peak_N_ > TOUCHED_N; }
+  // Of what truth tells, in its order.
+  static const char *columns();
+  std::string cells() const;
+  // What has happened since it was last asked: "lift", "slick", "slip", "dropped", ...
+  std::vector<std::string> take_events();
+
+private:
+  static constexpr double TOUCHED_N = 0.05;
+
+  double since_lift_s() const { return lift_s_ ? time_s_ - *lift_s_ : -1.0; }
+  void look_at_force();
+  void look_at_object();
+
+  Scene scene_;
+  Options options_;
+  const Face &face_;
+  GripperMotion &motion_;
+  Cell cell_;
+  std::vector<std::string> events_;
+  struct Standing {
+    double since_s, force_N;
+  };
+  std::optional<Standing> stands_; // the force
+  std::vector<bool> told_;         // of the scene's disturbances, that it has begun
+  bool is_there_ = true, is_dropped_ = false, is_crushed_ = false, slips_ = false;
+  double time_s_ = 0.0, peak_N_ = 0.0, slid_before_mm_ = 0.0, slipped_s_ = 0.0;
+  std::optional<double> lift_s_;
+};
+
+} // namespace fingertip::cell

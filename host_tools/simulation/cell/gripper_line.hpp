@@ -1,0 +1,39 @@
+// A simulated gripper at its line: once every poll_s a command goes out, if it is new, and what
+// the gripper says of that moment comes half of that time later.
+#pragma once
+
+#include "grasp/core.hpp"
+#include "libfingertip/random.hpp"
+#include "simulation/cell/cell.hpp"
+#include "simulation/cell/gripper_motion.hpp"
+
+namespace fingertip::cell {
+
+class GripperLine {
+public:
+  // Before the time begins it is activated and stands at this width. random: when the first
+  // exchange is.
+  GripperLine(const GripperMechanics &mechanics, double width_mm, Random random);
+
+  // What is between the fingers; must outlive it.
+  void press(const Cell &cell);
+
+  GripperMotion &motion() { return motion_; }
+  const GripperMotion &motion() const { return motion_; }
+  double next_s() const { return next_s_; } // of the exchange
+  struct Said {
+    double known_s;
+    grip_status status;
+  };
+  // At next_s, to where motion() has been brought.
+  Said exchange(const grip_command &command);
+  // The last move that went out.
+  const grip_command &sent() const { return sent_; }
+
+private:
+  GripperMotion motion_;
+  grip_command sent_{};
+  double next_s_;
+};
+
+} // namespace fingertip::cell

@@ -1,0 +1,216 @@
+#include "simulation/cell/gripper_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fingertip {
+
+namespace {
+
+constexpr double LEAST_FORCE_N = 1e-3; // that takes up the backlash
+
+// The servo's: one degree on a jaw of 100 mm, as users of such arms report.
+constexpr double SERVO_BACKLASH_mm = 1.75;
+// From the reset to gSTA 3 with both ends searched for; no figure is public.
+constexpr double ROBOTIQ_ACTIVATION_s = 2.0;
+
+} // namespace
+
+GripperMechanics gripper_mechanics(const std::string &model) {
+  GripperMechanics mechanics;
+  if (model == "ideal") {
+    mechanics.traits = {.model = model,
+                        .stroke_mm = 85.0,
+                        .step_mm = 0.01,
+                        .speed_min_mm_s = 0.1,
+                        .speed_max_mm_s = 250.0,
+                        .force_max_N = 200.0,
+                        .latency_s = 0.003,
+                        .poll_s = 0.001};
+    return mechanics;
+  }
+  mechanics.traits = gripper_traits(model);
+  if (model == "sts3215") {
+    mechanics.backlash_mm = SERVO_BACKLASH_mm;
+  } else {
+    mechanics.activation_s = ROBOTIQ_ACTIVATION_s;
+  }
+  return mechanics;
+}
+
+GripperMotion::GripperMotion(const GripperMechanics &mechanics)
+    : mechanics_(mechanics), phase_(Phase::off), drive_mm_(mechanics.traits.stroke_mm),
+      fingers_mm_(drive_mm_), target_mm_(drive_mm_), speed_mm_s_(mechanics.traits.speed_max_mm_s),
+      force_N_(mechanics.traits.force_max_N) {}
+
+bool GripperMotion::blocks(double width_mm, double force_N) const {
+  return blocked_at && blocked_at(width_mm, force_N);
+}
+
+double GripperMotion::nearest_step_mm(double width_mm) const {
+  const GripperTraits &traits = mechanics_.traits;
+  width_mm = std::clamp(width_mm, 0.0, traits.stroke_mm);
+  if (traits.step_mm <= 0) {
+    return width_mm;
+  }
+  /* Steps are counted from closed. */
+  return std::clamp(std::round(width_mm / traits.step_mm) * traits.step_mm, 0.0, traits.stroke_mm);
+}
+
+double GripperMotion::told_width_mm() const {
+  return nearest_step_mm(drive_mm_);
+}
+
+void GripperMotion::activate() {
+  commands_.clear();
+  asked_.reset();
+  phase_ = mechanics_.activation_s > 0 ? Phase::opening : Phase::active;
+  phase_began_s_ = time_s_;
+  blocked_ = 0;
+  moving_ = false;
+  target_mm_ = drive_mm_;
+}
+
+void GripperMotion::power_off() {
+  commands_.clear();
+  asked_.reset();
+  phase_ = Phase::off;
+  moving_ = false;
+  blocked_ = 0;
+}
+
+void GripperMotion::move(const GripperMove &move) {
+  const bool same = asked_ && asked_->width_mm == move.width_mm &&
+                    asked_->speed_mm_s == move.speed_mm_s && asked_->force_N == move.force_N;
+  if (active() && !same) {
+    asked_ = move;
+    commands_.push_back({time_s_ + mechanics_.traits.latency_s, false, move});
+  }
+}
+
+void GripperMotion::stop() {
+  if (active()) {
+    asked_.reset();
+    commands_.push_back({time_s_ + mechanics_.traits.latency_s, true, {}});
+  }
+}
+
+void GripperMotion::take(const Command &command) {
+  const GripperTraits &traits = mechanics_.traits;
+  if (command.stop) {
+    moving_ = false;
+    target_mm_ = drive_mm_;
+    return;
+  }
+  speed_mm_s_ = std::clamp(command.move.speed_mm_s, traits.speed_min_mm_s, traits.speed_max_mm_s);
+  force_N_ = std::clamp(command.move.force_N, traits.force_min_N, traits.force_max_N);
+  const double target_mm = nearest_step_mm(command.move.width_mm);
+  if (std::abs(target_mm - drive_mm_) < traits.deadband_mm) {
+    moving_ = false;
+    target_mm_ = drive_mm_;
+    return;
+  }
+  target_mm_ = target_mm;
+  moving_ = true;
+}
+
+void GripperMotion::follow() {
+  const double half_mm = mechanics_.backlash_mm / 2;
+  fingers_mm_ = std::clamp(fingers_mm_, drive_mm_ - half_mm, drive_mm_ + half_mm);
+  if (half_mm > 0 && blocks(fingers_mm_, LEAST_FORCE_N)) {
+    fingers_mm_ = drive_mm_ + half_mm;
+  }
+  fingers_mm_ = std::clamp(fingers_mm_, 0.0, mechanics_.traits.stroke_mm);
+}
+
+void GripperMotion::drive_to(double target_mm, double speed_mm_s, double force_N, double seconds) {
+  const double way_mm = std::min(speed_mm_s * seconds, std::abs(target_mm - drive_mm_));
+  const int direction = target_mm > drive_mm_ ? 1 : -1;
+  const double from_mm = drive_mm_;
+  /* Where the fingers will be, the drive having gone so far: an object pushes them apart. */
+  const double play_mm = direction < 0 ? mechanics_.backlash_mm / 2 : -mechanics_.backlash_mm / 2;
+  const auto is_blocked = [&](double gone_mm) {
+    return blocks(from_mm + direction * gone_mm + play_mm, -direction * force_N);
+  };
+  blocked_ = 0;
+  if (way_mm == 0.0) {
+    return;
+  }
+  if (!is_blocked(way_mm)) {
+    drive_mm_ = way_mm < std::abs(target_mm - from_mm) ? from_mm + direction * way_mm : target_mm;
+    return;
+  }
+  double free_mm = 0.0, stuck_mm = way_mm;
+  while (stuck_mm - free_mm > 1e-3) {
+    const double middle_mm = (free_mm + stuck_mm) / 2;
+    (is_blocked(middle_mm) ? stuck_mm : free_mm) = middle_mm;
+  }
+  drive_mm_ = from_mm + direction * free_mm;
+  blocked_ = direction;
+}
+
+void GripperMotion::run(double seconds) {
+  const GripperTraits &traits = mechanics_.traits;
+  if (phase_ == Phase::opening || phase_ == Phase::closing || phase_ == Phase::reopening) {
+    /* Each search takes its share of the time, however far it has to go. */
+    const double share_s = mechanics_.activation_s / 3;
+    const double target_mm = phase_ == Phase::closing ? 0.0 : traits.stroke_mm;
+    drive_to(target_mm, 1.5 * traits.stroke_mm / share_s, traits.force_max_N, seconds);
+    follow();
+    if (time_s_ - phase_began_s_ >= share_s - 1e-9) {
+      phase_ = static_cast<Phase>(static_cast<int>(phase_) + 1);
+      phase_began_s_ = time_s_;
+      blocked_ = 0;
+      target_mm_ = drive_mm_;
+    }
+    return;
+  }
+  if (moving_ || blocked_ != 0) {
+    drive_to(target_mm_, speed_mm_s_, force_N_, seconds);
+    moving_ = blocked_ == 0 && drive_mm_ != target_mm_;
+  }
+  follow();
+}
+
+void GripperMotion::step(double seconds) {
+  const double end_s = time_s_ + seconds;
+  while (!commands_.empty() && commands_.front().due_s <= end_s) {
+    const Command command = commands_.front();
+    commands_.pop_front();
+    const double until_s = std::max(time_s_, command.due_s);
+    const double before_s = until_s - time_s_;
+    time_s_ = until_s;
+    run(before_s);
+    blocked_ = 0;
+    take(command);
+  }
+  const double rest_s = end_s - time_s_;
+  time_s_ = end_s;
+  run(rest_s);
+}
+
+double GripperMotion::effort() const {
+  if (blocked_ != 0) {
+    return blocked_ * force_N_ / std::max(mechanics_.traits.force_max_N, 1e-9);
+  }
+  const double full = 0.3; // of the largest, while nothing is in the way
+  if (activating()) {
+    return phase_ == Phase::closing ? -full : full;
+  }
+  return moving_ ? (target_mm_ > drive_mm_ ? full : -full) * speed_mm_s_ /
+                       mechanics_.traits.speed_max_mm_s
+                 : 0.0;
+}
+
+GripperStatus GripperMotion::status() const {
+  GripperStatus status;
+  status.active = active();
+  status.moving = moving();
+  if (!status.moving) {
+    status.object = blocked_ != 0;
+  }
+  status.width_mm = told_width_mm();
+  return status;
+}
+
+} // namespace fingertip

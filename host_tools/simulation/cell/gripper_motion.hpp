@@ -1,0 +1,106 @@
+// How a simulated gripper's fingers move, in simulated time: no line, no clock, no chance.
+//
+//   GripperMotion motion(gripper_mechanics("2f85"));
+//   motion.blocked_at = [&](double width_mm, double force_N) { return ...; };
+//   motion.activate();
+//   motion.move({.width_mm = 20, .speed_mm_s = 50, .force_N = 20});
+//   for (...) {
+//     motion.step(0.0005);
+//     squeeze(motion.width_mm());
+//   }
+//
+// A command counts after the latency, and one that came later replaces it only after its own.
+// Fingers run at constant speed to the nearest step and stop at once; what accelerates is not
+// modelled, and nothing but backlash lets an object push them apart: a 2F-85's screw holds, a
+// servo would yield. Latencies and the servo's backlash are assumptions, no measurements.
+#pragma once
+
+#include "grasp/gripper/gripper.hpp"
+
+#include <deque>
+#include <functional>
+#include <optional>
+#include <string>
+
+namespace fingertip {
+
+struct GripperMechanics {
+  GripperTraits traits;      // its step, deadband, speeds, latency, stroke
+  double backlash_mm = 0.0;  // of the width: what the drive turns before the fingers follow
+  double activation_s = 0.0; // of searching its ends: open, closed, open; 0: active at once
+};
+
+// Of gripper_models(), and "ideal": steps of 0.01 mm, 3 ms. Throws Error: an unknown model.
+GripperMechanics gripper_mechanics(const std::string &model);
+
+class GripperMotion {
+public:
+  // Not active yet; the fingers are open.
+  explicit GripperMotion(const GripperMechanics &mechanics);
+
+  // Whether what is between the fingers pushes back with at least force_N at this width; below 0:
+  // what is around them, while they open. Asked with widths that the fingers are about to take, and
+  // for backlash with the least force; must be true for all narrower widths if it is for one.
+  // Empty: nothing is there.
+  std::function<bool(double width_mm, double force_N)> blocked_at;
+
+  // Where its ends are searched, opens and closes fully, at whatever force, so that what is held
+  // falls; then it takes moves.
+  void activate();
+  // Power is lost: the fingers stay, commands do nothing until activate.
+  void power_off();
+  // Ignored unless active, and where it says what the last one said; values beyond the traits'
+  // limits are taken to their ends.
+  void move(const GripperMove &move);
+  // Stops after the latency where the fingers are then.
+  void stop();
+
+  // Goes on by so much; any length, but contacts are found to 1 um only where no step is longer
+  // than it takes an object to be passed through. O(1) apart from blocked_at: at most 20 calls.
+  void step(double seconds);
+
+  // Of the fingers, as it is.
+  double width_mm() const { return fingers_mm_; }
+  // As the gripper knows it: its drive's position, in its steps.
+  double told_width_mm() const;
+  // Between -1 (closing at full speed) and 1, for the currents that a line tells.
+  double effort() const;
+  bool active() const { return phase_ == Phase::active; }
+  bool activating() const { return phase_ != Phase::off && phase_ != Phase::active; }
+  // Or a command has yet to count.
+  bool moving() const { return moving_ || activating() || !commands_.empty(); }
+  // Stopped by what blocked_at tells: 1 while opening, -1 while closing; 0: not.
+  int blocked() const { return blocked_; }
+  double time_s() const { return time_s_; }
+  const GripperMechanics &mechanics() const { return mechanics_; }
+  // All of it but host_us and fault.
+  GripperStatus status() const;
+
+private:
+  enum class Phase { off, opening, closing, reopening, active };
+  struct Command {
+    double due_s;
+    bool stop;
+    GripperMove move;
+  };
+
+  bool blocks(double width_mm, double force_N) const;
+  double nearest_step_mm(double width_mm) const;
+  void take(const Command &command);
+  void run(double seconds);
+  void drive_to(double target_mm, double speed_mm_s, double force_N, double seconds);
+  void follow();
+
+  GripperMechanics mechanics_;
+  Phase phase_;
+  std::deque<Command> commands_;     // not yet counting, in order
+  std::optional<GripperMove> asked_; // last
+  double time_s_ = 0.0;
+  double phase_began_s_ = 0.0;
+  double drive_mm_, fingers_mm_;
+  double target_mm_, speed_mm_s_, force_N_;
+  bool moving_ = false;
+  int blocked_ = 0;
+};
+
+} // namespace fingertip

@@ -1,0 +1,103 @@
+// A simulated gripper on a port of its own, with its own protocol: libmodbus as a slave for
+// Robotiq's, packets for Feetech's. What its line can suffer is part of it.
+//
+//   GripperMotion motion(GripperServer::mechanics("2f85"));
+//   GripperServer server(motion, {.model = "2f85"});
+//   puts(server.port().c_str());
+//   while (!stop) {
+//     server.step(1ms);
+//   }
+//
+// Answers come when the bytes of question and answer would have crossed the line, no sooner. One
+// thread at a time.
+#pragma once
+
+#include "grasp/gripper/gripper.hpp"
+#include "libfingertip/served_port.hpp"
+#include "simulation/cell/gripper_motion.hpp"
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace fingertip {
+
+enum class LineFault {
+  none,
+  silent,      // no answer
+  garbage,     // bytes that are none
+  damaged,     // a checksum is wrong
+  other_slave, // another's answer
+  refused,     // Modbus: exception 1; Feetech: bits of trouble
+};
+
+struct LineTrouble {
+  LineFault fault = LineFault::none;
+  int answers = -1;           // so many have the fault; -1: all
+  double late_s = 0.0;        // each of those comes so much later
+  double latency_timer_s = 0; // of a USB adapter: answers go on only at its ticks
+};
+
+class GripperServer {
+public:
+  struct Options {
+    std::string model = {};
+    int slave = 0; // 0: the model's usual
+    std::string link = {}; // made to its port; "": none
+    // Whether step moves the fingers on as real time passes; else whoever drives the motion does.
+    bool real_time = true;
+    std::vector<int> functions = {3, 4, 16, 23}; // of Modbus, that it answers
+  };
+
+  // gripper_mechanics for a motion behind registers, which are its steps.
+  static GripperMechanics mechanics(const std::string &model);
+
+  // motion outlives it. Throws Error: an unknown model; no port to be had.
+  GripperServer(GripperMotion &motion, const Options &options);
+  // The port goes.
+  ~GripperServer();
+  GripperServer(const GripperServer &) = delete;
+  GripperServer &operator=(const GripperServer &) = delete;
+
+  const std::string &port() const { return port_.path(); }
+  // Its link gets another name.
+  void rename(const std::string &link) { port_.rename(link); }
+
+  // Waits at most this long for something to do, and does it.
+  void step(std::chrono::microseconds longest_wait);
+
+  void trouble(const LineTrouble &trouble);
+  // Without power it does not answer, and afterwards it is not active.
+  void power(bool on);
+  // When bytes last came.
+  HostTime heard_at() const { return came_at_; }
+  // The gripper's own fault, by the maker's code.
+  void fail(std::uint8_t fault);
+
+  // The protocol behind the line.
+  class Slave;
+
+private:
+  struct Answer {
+    HostTime due;
+    std::vector<std::uint8_t> bytes;
+  };
+
+  void take();
+  void send_due();
+
+  GripperMotion &motion_;
+  bool real_time_;
+  std::unique_ptr<Slave> slave_;
+  ServedPort port_;
+  LineTrouble trouble_;
+  bool power_ = true;
+  std::vector<std::uint8_t> came_;
+  HostTime came_at_{}, stepped_at_;
+  std::deque<Answer> answers_;
+};
+
+} // namespace fingertip

@@ -1,0 +1,409 @@
+// The fingertip without a chip: the firmware's own code, compiled for this machine.
+#include "libfingertip/command.hpp"
+#include "libfingertip/error.hpp"
+#include "libfingertip/output_file.hpp"
+#include "libfingertip/progress_bar.hpp"
+#include "libfingertip/recording.hpp"
+#include "libfingertip/text.hpp"
+#include "library/pad/edges.hpp"
+#include "library/pad/profile.hpp"
+#include "library/pad/table_file.hpp"
+#include "simulation/player/native_fingertip.h"
+#include "simulation/player/repeat.h"
+#include "simulation/player/scenario.hpp"
+#include "tool/advice.hpp"
+
+extern "C" {
+#include "native/native_cdc.h"
+}
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <optional>
+namespace fingertip {
+namespace {
+
+// Small enough that the queue of the line, 4096 bytes, does not fill up at any rate.
+constexpr std::uint64_t SLICE_us = 5000;
+constexpr double SECONDS_MAX = 24 * 3600;
+
+struct PlayOptions {
+  std::string scenario, recording, raw_bytes, commands;
+  std::string osr = "1024", rate = "max", slip_threshold, slip_window;
+  double noise = 1.0, prom_spread = 3.0, seconds = 0.0;
+  std::uint64_t seed = 1;
+  float prior_sigma_mm = 0.0F, prior_width_mm = 0.0F;
+  std::optional<double> pad_mm;
+  double overhang_mm = 0.0;
+  bool from_touch = false;
+  bool raw = false, replace = false, quiet = false;
+};
+
+double pressure_Pa(void *context, unsigned sensor, std::uint64_t t_us) {
+  return static_cast<Scenario *>(context)->pressure_Pa(sensor, t_us);
+}
+
+double temperature_degC(void *context, unsigned, std::uint64_t t_us) {
+  return static_cast<Scenario *>(context)->temperature_degC(t_us);
+}
+
+/* The commands, each with a number of its own. */
+class Commands {
+public:
+  void send(wire_packet packet) {
+    packet.sequence = sequence_++;
+    const std::vector<std::uint8_t> frame = frame_bytes(packet);
+    if (native_cdc_send(frame.data(), frame.size()) != FT_OK) {
+      throw Error("the firmware does not take its commands");
+    }
+    bytes_.insert(bytes_.end(), frame.begin(), frame.end());
+  }
+  const std::vector<std::uint8_t> &bytes() const { return bytes_; }
+
+private:
+  std::uint16_t sequence_ = 0;
+  std::vector<std::uint8_t> bytes_;
+};
+
+int play(const PlayOptions &options) {
+  // Everything that can be wrong is, before anything takes time.
+  const wire_packet osr = command_osr(osr_from_text(options.osr));
+  const wire_packet rate = command_rate_mHz(rate_mHz_from_text(options.rate));
+  std::optional<wire_packet> slip;
+  if (!options.slip_threshold.empty() || !options.slip_window.empty()) {
+    if (options.slip_threshold.empty() || options.slip_window.empty()) {
+      throw Error("--slip-threshold and --slip-window belong together; give both");
+    }
+    slip = command_slip(slip_threshold_mm_from_text(options.slip_threshold),
+                        slip_window_ms_from_text(options.slip_window));
+  }
+  if ((options.prior_sigma_mm > 0.0F) != (options.prior_width_mm > 0.0F)) {
+    throw Error("--prior-sigma and --prior-width belong together; give both");
+  }
+  std::optional<pad_profile> pad;
+  if (options.pad_mm) {
+    pad = pad::profile_over_own_sensors({*options.pad_mm, options.overhang_mm, options.from_touch});
+    if (options.overhang_mm >= pad::EDGE_OVERHANG_MIN_mm &&
+        options.overhang_mm <= pad::EDGE_OVERHANG_MAX_mm) {
+      pad->edges = pad::edges_of(*pad, pad::own_sensors(), twin::default_cache_directory());
+    }
+  }
+  for (const std::string *path : {&options.recording, &options.raw_bytes, &options.commands}) {
+    if (!path->empty()) {
+      check_output(*path, options.replace);
+    }
+  }
+  Scenario scenario(options.scenario);
+  const double seconds = options.seconds > 0.0 ? options.seconds : scenario.end_s();
+
+  native_fingertip_settings settings{};
+  settings.seed = options.seed;
+  settings.noise = options.noise;
+  settings.prom_spread = 0.01 * options.prom_spread;
+  settings.prior_sigma_mm = options.prior_sigma_mm;
+  settings.prior_width_mm = options.prior_width_mm;
+  settings.world = {&scenario, pressure_Pa, temperature_degC};
+  settings.pad = pad ? &*pad : nullptr;
+  if (!native_fingertip_start(&settings)) {
+    throw Error("--pad: this player tells no tangential load; build it with "
+                "-DFINGERTIP_SCENE=grasp");
+  }
+  native_cdc_open();
+  Commands commands;
+  commands.send(osr);
+  commands.send(rate);
+  if (slip) {
+    commands.send(*slip);
+  }
+  std::uint8_t streams = WIRE_STREAM_CONTACT | WIRE_STREAM_HEALTH;
+  streams |= options.raw ? WIRE_STREAM_RAW : 0;
+  commands.send(command_stream(streams));
+  commands.send(command_info());
+  if (!options.commands.empty()) {
+    OutputFile sent(options.commands, options.replace, OutputFile::Appears::when_finished);
+    sent.append(commands.bytes().data(), commands.bytes().size());
+    sent.finish();
+  }
+  std::optional<OutputFile> raw_bytes;
+  if (!options.raw_bytes.empty()) {
+    raw_bytes.emplace(options.raw_bytes, options.replace, OutputFile::Appears::when_finished);
+  }
+
+  Decoder decoder;
+  std::optional<RecordingWriter> writer;
+  std::string refused;
+  const auto on_packet = [&](const wire_packet &packet) {
+    if (packet.type == WIRE_ACK && packet.body.ack.result != WIRE_RESULT_DONE) {
+      refused = "the firmware refused command " + std::to_string(packet.body.ack.command);
+    }
+    if (!writer && packet.type == WIRE_INFO) {
+      const wire_info &info = packet.body.info;
+      if (scenario.sensors() != info.sensor_count) {
+        throw Error(options.scenario + ": has " + std::to_string(scenario.sensors()) +
+                    " sensors; this firmware has " + std::to_string(info.sensor_count));
+      }
+      writer.emplace(options.recording, options.replace, &info, info.sensor_count,
+                     Metadata{{"recorded_by", "fingertip_player"},
+                              {"simulated", "the firmware's code on simulated sensors"},
+                              {"scenario", scenario.name()},
+                              {"seed", std::to_string(options.seed)}},
+                     options.raw, OutputFile::Appears::when_finished);
+    }
+    if (writer) {
+      writer->packet(packet);
+    }
+  };
+  std::optional<ProgressBar> progress;
+  if (!options.quiet) {
+    progress.emplace("playing " + scenario.name(), ProgressBar::Lines::tenths);
+  }
+  const auto end_us = static_cast<std::uint64_t>(1e6 * seconds);
+  for (std::uint64_t t_us = SLICE_us;; t_us += SLICE_us) {
+    if (!native_fingertip_run_until(t_us < end_us ? t_us : end_us)) {
+      throw Error("the firmware ended itself at " + std::to_string(t_us) + " us");
+    }
+    std::uint8_t bytes[NATIVE_CDC_TRANSMIT_BYTES];
+    for (std::size_t count; (count = native_cdc_receive(bytes, sizeof bytes)) > 0;) {
+      decoder.feed(bytes, count, on_packet);
+      if (raw_bytes) {
+        raw_bytes->append(bytes, count);
+      }
+    }
+    if (!refused.empty()) {
+      throw Error(refused);
+    }
+    if (progress) {
+      progress->show(static_cast<double>(t_us) / static_cast<double>(end_us));
+    }
+    if (t_us >= end_us) {
+      break;
+    }
+  }
+  if (!writer) {
+    throw Error(options.scenario +
+                ": ends before the fingertip answers; make it longer than 0.1 s");
+  }
+  writer->finish(decoder.statistics(), "seconds");
+  if (raw_bytes) {
+    raw_bytes->finish();
+  }
+  return 0;
+}
+
+struct RepeatOptions {
+  std::string capture;
+};
+
+// What a capture has, and how much of it this code gives again.
+struct Repeated {
+  std::uint64_t frames = 0, in_contact = 0, held = 0, equal = 0;
+  std::string first_difference;
+};
+
+class Repeater {
+public:
+  void packet(const wire_packet &packet) {
+    switch (packet.type) {
+    case WIRE_INFO:
+      if (!begun_) {
+        begun_ = repeat_begin(&packet.body.info);
+        if (!begun_) {
+          throw Error("the capture's info packet describes no array that this code can fit");
+        }
+      }
+      break;
+    case WIRE_ACK:
+      if (packet.body.ack.result == WIRE_RESULT_DONE) {
+        if (packet.body.ack.command == WIRE_CMD_TARE) {
+          repeat_tare();
+          tared_ = true;
+        } else if (packet.body.ack.command == WIRE_CMD_SLIP ||
+                   packet.body.ack.command == WIRE_CMD_OSR) {
+          throw Error("settings change within the capture; make one without \"set\"");
+        }
+      }
+      break;
+    case WIRE_CONTACT:
+      contact_ = packet;
+      break;
+    case WIRE_RAW:
+      frame(packet);
+      break;
+    default:
+      break;
+    }
+  }
+  const Repeated &result() const { return result_; }
+  bool tared() const { return tared_; }
+  // The first frame that has a raw packet only.
+  std::optional<std::uint32_t> lonely_frame() const { return lonely_frame_; }
+
+private:
+  void frame(const wire_packet &raw) {
+    if (!begun_ || !tared_) {
+      return; // what came before decides about the zero, and is not known
+    }
+    if (!contact_ || contact_->body.contact.frame != raw.body.raw.frame) {
+      lonely_frame_ = lonely_frame_.value_or(raw.body.raw.frame);
+      return;
+    }
+    const bool held = contact_->body.contact.flags & CONTACT_FLAG_HELD;
+    if (held && result_.frames == 0) {
+      return; // it shows what was found before the tare
+    }
+    wire_packet ours = *contact_;
+    repeat_frame(&raw, held, &ours.body.contact);
+    result_.frames++;
+    result_.held += held;
+    result_.in_contact += (contact_->body.contact.flags & CONTACT_FLAG_CONTACT) != 0;
+    if (frame_bytes(ours) == frame_bytes(*contact_)) {
+      result_.equal++;
+    } else if (result_.first_difference.empty()) {
+      const wire_contact &a = contact_->body.contact, &b = ours.body.contact;
+      char text[240];
+      std::snprintf(text, sizeof text,
+                    "frame %u: flags %08x %08x, x %.9g %.9g mm, y %.9g %.9g mm, force %.9g %.9g N, "
+                    "slip %.9g %.9g mm",
+                    static_cast<unsigned>(a.frame), static_cast<unsigned>(a.flags),
+                    static_cast<unsigned>(b.flags), static_cast<double>(a.x_mm),
+                    static_cast<double>(b.x_mm), static_cast<double>(a.y_mm),
+                    static_cast<double>(b.y_mm), static_cast<double>(a.force_N),
+                    static_cast<double>(b.force_N), static_cast<double>(a.slip_mm),
+                    static_cast<double>(b.slip_mm));
+      result_.first_difference = text;
+    }
+  }
+
+  bool begun_ = false, tared_ = false;
+  std::optional<std::uint32_t> lonely_frame_;
+  std::optional<wire_packet> contact_;
+  Repeated result_;
+};
+
+int repeat_capture(const RepeatOptions &options) {
+  std::ifstream file(options.capture, std::ios::binary);
+  if (!file) {
+    throw Error(options.capture + ": cannot read (" + std::strerror(errno) + ")");
+  }
+  Decoder decoder;
+  Repeater repeater;
+  char bytes[4096];
+  while (file.read(bytes, sizeof bytes) || file.gcount() > 0) {
+    decoder.feed(reinterpret_cast<const std::uint8_t *>(bytes),
+                 static_cast<std::size_t>(file.gcount()),
+                 [&](const wire_packet &packet) { repeater.packet(packet); });
+  }
+  const Repeated &r = repeater.result();
+  if (decoder.statistics().dropped_packets > 0 || decoder.statistics().crc_errors > 0) {
+    throw Error(options.capture + ": packets are missing (" + decoder.statistics().text() +
+                "); what follows them cannot be repeated");
+  }
+  if (repeater.lonely_frame()) {
+    throw Error("frame " + std::to_string(*repeater.lonely_frame()) +
+                " has no contact packet; stream both contact and raw");
+  }
+  if (r.frames == 0) {
+    throw Error(options.capture + (repeater.tared() ? ": no frame after the tare"
+                                                    : ": no tare; have one within the capture, "
+                                                      "before anything touches the pad"));
+  }
+  std::printf("{\"frames\": %llu, \"in_contact\": %llu, \"held\": %llu, \"equal\": %llu}\n",
+              static_cast<unsigned long long>(r.frames),
+              static_cast<unsigned long long>(r.in_contact),
+              static_cast<unsigned long long>(r.held), static_cast<unsigned long long>(r.equal));
+  if (r.equal != r.frames) {
+    throw Error(options.capture + ": " + std::to_string(r.frames - r.equal) +
+                " contact packets differ, the first " + r.first_difference);
+  }
+  return 0;
+}
+
+int run(int argc, char **argv) {
+  CLI::App app("The fingertip without a chip: the firmware's own code, compiled for this machine");
+  app.require_subcommand(1);
+  app.get_formatter()->column_width(28);
+  PlayOptions play_options;
+  CLI::App *player = app.add_subcommand(
+      "play", "Play a scenario to simulated sensors and record what the firmware says");
+  player->add_option("scenario", play_options.scenario, "CSV file, from twin or fingertip-scenario")
+      ->required()
+      ->type_name("FILE.csv");
+  player->add_option("-o,--output", play_options.recording, "Recording, as of fingertip record")
+      ->required()
+      ->type_name("FILE.csv");
+  player->add_flag("--overwrite", play_options.replace, "Replace a recording that exists");
+  player->add_option("--osr", play_options.osr, "Oversampling, 256 to 8192; default 1024")
+      ->type_name("N");
+  player->add_option("--rate", play_options.rate, "Frames a second, or max (default)")
+      ->type_name("HZ");
+  player->add_option("--slip-threshold", play_options.slip_threshold, "Slip distance")
+      ->type_name("MM");
+  player->add_option("--slip-window", play_options.slip_window, "Its window")->type_name("MS");
+  player->add_option("--prior-sigma", play_options.prior_sigma_mm, "Prior on sigma")
+      ->check(CLI::Range(0.1, 100.0))
+      ->type_name("MM");
+  player->add_option("--prior-width", play_options.prior_width_mm, "Its standard deviation")
+      ->check(CLI::Range(0.001, 100.0))
+      ->type_name("MM");
+  CLI::Option *pad = player
+                         ->add_option("--pad", play_options.pad_mm,
+                                      "Thickness of the pad: the firmware tells tangential load")
+                         ->type_name("MM");
+  player->add_option("--overhang", play_options.overhang_mm, "Of the pad")
+      ->type_name("MM")
+      ->needs(pad);
+  player->add_flag("--from-touch", play_options.from_touch, "As of fingertip pad")->needs(pad);
+  player->add_option("--noise", play_options.noise, "Times the datasheet's; default 1")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->type_name("FACTOR");
+  player
+      ->add_option("--prom-spread", play_options.prom_spread,
+                   "Calibration words differ from part to part by up to this; default 3")
+      ->check(CLI::Range(0.0, 10.0))
+      ->type_name("PERCENT");
+  player->add_option("--seed", play_options.seed, "Of noise and calibration; default 1")
+      ->type_name("N");
+  player->add_option("--seconds", play_options.seconds, "Default: to the scenario's end")
+      ->check(CLI::Range(0.1, SECONDS_MAX))
+      ->type_name("S");
+  player->add_flag("--raw", play_options.raw, "Record the pressures too");
+  player
+      ->add_option("--raw-bytes", play_options.raw_bytes,
+                   "Keep the bytes of the line too, as of fingertip record")
+      ->type_name("FILE.ftr");
+  player->add_option("--commands", play_options.commands, "And those that it was sent, before 0 s")
+      ->type_name("FILE");
+  player->add_flag("--quiet", play_options.quiet, "No progress");
+
+  RepeatOptions repeat_options;
+  CLI::App *repeater = app.add_subcommand(
+      "repeat",
+      "Compute the contact packets of a capture once more from its pressures, and compare "
+      "them byte by byte, stage times apart");
+  repeater
+      ->add_option("capture", repeat_options.capture,
+                   "Bytes of the line (fingertip record --raw-bytes, or the emulator's --capture) "
+                   "with contact and raw packets, an info packet and a tare")
+      ->required()
+      ->type_name("FILE");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError &error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  return *player ? play(play_options) : repeat_capture(repeat_options);
+}
+
+} // namespace
+} // namespace fingertip
+
+int main(int argc, char **argv) {
+  try {
+    return fingertip::run(argc, argv);
+  } catch (const fingertip::Error &error) {
+    fingertip::tell("fingertip_player", error);
+  }
+  return 1;
+}

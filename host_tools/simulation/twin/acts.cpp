@@ -1,0 +1,45 @@
+#include "simulation/twin/acts.hpp"
+
+#include <utility>
+
+namespace fingertip::twin {
+
+Stage::Stage(const ScenarioOptions &scenario_options, const ContactTable &contact_table)
+    : options(scenario_options), table(contact_table), forces(options.forces),
+      tangential(options.tangential), friction("--friction", options.friction),
+      mass_kg("--mass", options.mass_kg.empty() ? "0" : options.mass_kg) {}
+
+bool Stage::play(Act act) {
+  const double length_s = act.phases.back().end_s;
+  if (t_s_ + length_s + options.quiet_s > *options.seconds + 1e-9) {
+    return false;
+  }
+  act.begin_s = t_s_;
+  act.end_s = t_s_ + length_s;
+  for (Phase &phase : act.phases) {
+    phase.begin_s += t_s_;
+    phase.end_s += t_s_;
+  }
+  t_s_ = milliseconds(act.end_s + options.quiet_s);
+  acts.push_back(std::move(act));
+  return true;
+}
+
+Place Stage::random_place(Random &random) const {
+  const double at_x = random.uniform(-half_x_mm(), half_x_mm());
+  return {at_x, random.uniform(-half_y_mm(), half_y_mm())};
+}
+
+void phase(Act &act, const std::string &name, double end_s, bool slip) {
+  const double begin_s = act.phases.empty() ? 0.0 : act.phases.back().end_s;
+  act.phases.push_back({name, begin_s, milliseconds(end_s), slip});
+}
+
+Track track_at(Place place) {
+  Track track;
+  track.x_mm = place.x_mm;
+  track.y_mm = place.y_mm;
+  return track;
+}
+
+} // namespace fingertip::twin

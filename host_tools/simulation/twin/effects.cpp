@@ -1,0 +1,329 @@
+#include "simulation/twin/effects.hpp"
+
+#include "libfingertip/error.hpp"
+#include "libfingertip/random.hpp"
+#include "libfingertip/text.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace fingertip::twin {
+namespace {
+
+// Proportions of the Prony series and the protocol that its amount refers to: least squares over
+// the holds of 8 s that begin with a ramp of 1.3 s in the recordings named below.
+constexpr std::array<double, Pad::TIMES_s.size()> PRONY{0.206, 0.153};
+constexpr double RAMP_s = 1.3, HOLD_s = 8.0;
+// 9..26 % is 17.5 % and so much to either side; 130..210 Pa is 170 Pa and so much.
+constexpr double RELAXATION_SPREAD = 8.5 / 17.5;
+constexpr double DRIFT_SPREAD = 40.0 / 170.0;
+constexpr double DRIFT_SPAN_s = 16.0 * 60.0;
+constexpr double GAIN_SIGMAS_MAX = 3.0;
+constexpr double SPECIFIED_Pa = 120000.0, RANGE_END_Pa = 200000.0;
+// Silicone rubber: 0.2 W/(m K), 1100 kg/m3, 1500 J/(kg K).
+constexpr double DIFFUSIVITY_mm2_s = 0.12;
+
+// About the usual 4 %: what stood off was 0.4..8 % of the peak, what dipped 1..9 %.
+constexpr double STANDS_OFF_LEAST = 0.4 / 4.0, STANDS_OFF_MOST = 8.0 / 4.0;
+constexpr double DIPS_LEAST = 1.0 / 4.0, DIPS_MOST = 9.0 / 4.0;
+constexpr double DIPS_SHARE = 1.0 / 3.0; // of the sensors; assumed
+constexpr double BACK_LEAST_s = 0.5, BACK_MOST_s = 10.0;
+// Coefficients C1 to C4 and C6 of the data sheet's example (MS5837-02BA, page 7) and their spread,
+// assumed as the players assume it.
+constexpr std::array<double, 5> PROM{46372.0, 43981.0, 29059.0, 27842.0, 28165.0};
+constexpr double PROM_SPREAD = 0.03;
+
+const char STRIP[] = "recordings of a real strip of four MPL3115A2 under rubber: "
+                     "JiannnH/MTL-BaroTactileSensor, Imperial College London, 2023";
+
+enum Stream : std::uint64_t { GAIN = 101, DRIFT, RELAXATION, AFTEREFFECT, BRANCH };
+
+const Effect &effect(const std::string &name) {
+  std::string names;
+  for (const Effect &one : effects()) {
+    if (one.name == name) {
+      return one;
+    }
+    names += (names.empty() ? "" : ", ") + one.name;
+  }
+  throw Error("there is no effect \"" + printable(name) + "\"; give some of: " + names +
+              "; or all or none");
+}
+
+// What the series has followed of a ramp of RAMP_s to 1, after a hold of `hold_s`.
+double followed(std::size_t i, double hold_s) {
+  const double tau = Pad::TIMES_s[i];
+  const double at_ramp_end = 1.0 - tau / RAMP_s * (1.0 - std::exp(-RAMP_s / tau));
+  return 1.0 - (1.0 - at_ramp_end) * std::exp(-hold_s / tau);
+}
+
+// Factor of PRONY that makes a hold lose this share of its peak.
+double prony_factor(double share) {
+  double during_hold = 0.0, in_ramp = 0.0;
+  for (std::size_t i = 0; i < PRONY.size(); i++) {
+    in_ramp += PRONY[i] * followed(i, 0.0);
+    during_hold += PRONY[i] * (followed(i, HOLD_s) - followed(i, 0.0));
+  }
+  return share / (during_hold + share * in_ramp);
+}
+
+// What the step of the compensation at 10.00 degC does to a part with these coefficients.
+Pad::Branch branch_of(const std::array<double, PROM.size()> &c, double ambient_Pa) {
+  constexpr double BELOW = -1000.0; // 10.00 degC less 20.00 degC
+  constexpr double SQUARE = BELOW * BELOW;
+  const double dT = BELOW * 0x1p23 / c[4];
+  // From 10 degC on 30 / 2^8 of the square is taken off the offset and nothing off the sensitivity;
+  // below 35 / 2^3 and 63 / 2^5.
+  const double offset = c[1] * 0x1p17 + c[3] * dT * 0x1p-6 - 30.0 * SQUARE * 0x1p-8;
+  const double sensitivity = c[0] * 0x1p16 + c[2] * dT * 0x1p-7;
+  const double offset_step = (35.0 * 0x1p-3 - 30.0 * 0x1p-8) * SQUARE;
+  const double slope = 63.0 * 0x1p-5 * SQUARE / sensitivity;
+  // The temperature itself loses 14 / 2^35 of dT^2 below and 12 / 2^35 above: the middle.
+  return {0.01 * (1000.0 - 13.0 * dT * dT * 0x1p-35),
+          slope * (ambient_Pa + offset * 0x1p-15) - offset_step * 0x1p-15, slope};
+}
+
+} // namespace
+
+std::array<double, Pad::TIMES_s.size()> relaxation_strengths(double share) {
+  const double factor = prony_factor(share);
+  return {factor * PRONY[0], factor * PRONY[1]};
+}
+
+const std::vector<Effect> &effects() {
+  static const std::vector<Effect> all{
+      {"gain", "%", 10.0, 0.0, 30.0, "gain of each sensor off by a normal share of this sd",
+       std::string(STRIP) + ": gains differ by +-10 %"},
+      {"drift", "Pa in 16 min", 170.0, 0.0, 5000.0,
+       "zero of each sensor wanders by this, 24 % to either side, up or down",
+       std::string(STRIP) + ": 130 to 210 Pa in 16 min"},
+      {"relaxation", "%", 17.5, 0.0, 40.0,
+       "a press held for 8 s loses this share, each sensor up to 49 % more or less of it",
+       std::string(STRIP) + ": 9 to 26 % in a hold; times 1 and 10 s fitted to its holds"},
+      {"hysteresis", "%", 3.0, 0.0, 20.0,
+       "loop of loading and unloading at any speed, as a share of the work of loading",
+       "2.7 to 4.2 % at 0.1 Hz in silicone pads: Romano et al., Soft Science 4:31, 2024, table 2"},
+      {"aftereffect", "%", 4.0, 0.0, 20.0,
+       "after a release each sensor stands off by 0.1 to 2 times this share of its peak, one in "
+       "three undershoots by 0.25 to 2.25 times, back with a time constant of 0.5 to 10 s",
+       std::string(STRIP) + ": 0.4 to 8 % above or 1 to 9 % below, back in 0.5 to 10 s; how many "
+                            "undershoot is assumed"},
+      {"temperature", "K", 6.0, -40.0, 40.0,
+       "the sensors warm up slowly by this, as in a hand; pressures are compensated",
+       "assumed: room at 25 degC, skin at 31; time from the diffusivity of silicone rubber, "
+       "0.12 mm2/s"},
+      {"branch", "degC", 5.0, -20.0, 25.0,
+       "the sensors begin at this and warm up by 0.1 K/s to 25 degC: at 10 degC their compensation "
+       "steps by some 51 Pa, 66 Pa/bar more under pressure, each sensor by its own amount",
+       "second-order compensation (TE MS5840-02BA data sheet) with the coefficients of the "
+       "MS5837-02BA's example +-3 %; the rate is assumed: a cold finger in a hand"},
+      {"bias", "%", 1.0, 0.0, 10.0, "readings above 1.2 bar come out low, at 2 bar by this",
+       "1.2 bar ends the specified accuracy (TE MS5840-02BA data sheet); the amount is assumed"},
+      {"clip", "bar", 2.02, 1.2, 10.0, "readings end here",
+       "2 bar ends the extended range (TE MS5840-02BA data sheet), that a part goes on for 1 % is "
+       "assumed; the 24-bit code ends near 5 bar"},
+  };
+  return all;
+}
+
+EffectValues parse_effects(const std::string &text) {
+  EffectValues values;
+  if (text.empty() || text == "none") {
+    return values;
+  }
+  for (std::string_view part : split(text, ',')) {
+    const std::size_t equals = part.find('=');
+    const std::string name(trim(part.substr(0, equals)));
+    if (name == "all" && equals == std::string_view::npos) {
+      for (const Effect &one : effects()) {
+        values.emplace(one.name, one.usual);
+      }
+      continue;
+    }
+    const Effect &chosen = effect(name);
+    double value = chosen.usual;
+    if (equals != std::string_view::npos) {
+      const auto given = to_double(trim(part.substr(equals + 1)));
+      if (!given || *given < chosen.lowest || *given > chosen.highest) {
+        throw Error("effect " + name + " is \"" + printable(part.substr(equals + 1)) + "\"; give " +
+                    shortest(static_cast<float>(chosen.lowest)) + " to " +
+                    shortest(static_cast<float>(chosen.highest)) + " (" + chosen.unit + ")");
+      }
+      value = *given;
+    }
+    values[name] = value;
+  }
+  return values;
+}
+
+Pad::Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, double ambient_Pa,
+         std::uint64_t seed)
+    : ambient_Pa_(ambient_Pa), clip_Pa_(std::numeric_limits<double>::infinity()), rubber_(sensors) {
+  for (const auto &[name, value] : effects) {
+    if (name == "gain") {
+      for (std::size_t k = 0; k < sensors; k++) {
+        Random random(seed, GAIN, k);
+        double sigmas = random.normal();
+        while (std::abs(sigmas) > GAIN_SIGMAS_MAX) {
+          sigmas = random.normal();
+        }
+        gain_errors_.push_back(0.01 * value * sigmas);
+      }
+    } else if (name == "drift") {
+      for (std::size_t k = 0; k < sensors; k++) {
+        Random random(seed, DRIFT, k);
+        const double sign = random.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
+        drifts_Pa_s_.push_back(sign * value * (1.0 + random.uniform(-DRIFT_SPREAD, DRIFT_SPREAD)) /
+                               DRIFT_SPAN_s);
+      }
+    } else if (name == "relaxation") {
+      relaxes_ = true;
+      for (std::size_t k = 0; k < sensors; k++) {
+        Random random(seed, RELAXATION, k);
+        const double share =
+            0.01 * value * (1.0 + random.uniform(-RELAXATION_SPREAD, RELAXATION_SPREAD));
+        relaxations_.push_back(share);
+        const auto strengths = relaxation_strengths(share);
+        for (std::size_t i = 0; i < PRONY.size(); i++) {
+          rubber_[k].strength[i] = strengths[i];
+        }
+      }
+    } else if (name == "hysteresis") {
+      hysteresis_ = 0.01 * value;
+    } else if (name == "aftereffect") {
+      for (std::size_t k = 0; k < sensors; k++) {
+        Random random(seed, AFTEREFFECT, k);
+        const bool dips = random.uniform(0.0, 1.0) < DIPS_SHARE;
+        const double times = dips ? -random.uniform(DIPS_LEAST, DIPS_MOST)
+                                  : random.uniform(STANDS_OFF_LEAST, STANDS_OFF_MOST);
+        aftereffects_.push_back(
+            {0.01 * value * times, random.log_uniform(BACK_LEAST_s, BACK_MOST_s)});
+      }
+    } else if (name == "branch") {
+      start_degC_ = value;
+      for (std::size_t k = 0; k < sensors; k++) {
+        Random random(seed, BRANCH, k);
+        std::array<double, PROM.size()> drawn = PROM;
+        for (double &coefficient : drawn) {
+          coefficient *= random.uniform(1.0 - PROM_SPREAD, 1.0 + PROM_SPREAD);
+        }
+        branches_.push_back(branch_of(drawn, ambient_Pa));
+      }
+    } else if (name == "temperature") {
+      warming_K_ = value;
+      warming_s_ = 4.0 * layer_mm * layer_mm / (M_PI * M_PI * DIFFUSIVITY_mm2_s);
+    } else if (name == "bias") {
+      bias_ = 0.01 * value;
+    } else if (name == "clip") {
+      clip_Pa_ = 1e5 * value;
+    }
+  }
+}
+
+double Pad::with_hysteresis(Rubber &r, double pressure_Pa) const {
+  if (pressure_Pa <= 0.0) {
+    r.pressure_Pa = r.lacks_Pa = r.turn_Pa = r.turn_lacks_Pa = r.largest_Pa = 0.0;
+    r.falls = false;
+    return pressure_Pa;
+  }
+  const bool falls = pressure_Pa < r.pressure_Pa || (pressure_Pa == r.pressure_Pa && r.falls);
+  if (falls != r.falls) {
+    r.falls = falls;
+    r.turn_Pa = r.pressure_Pa;
+    r.turn_lacks_Pa = r.lacks_Pa;
+  }
+  if (falls) {
+    const double left = pressure_Pa / r.turn_Pa;
+    r.lacks_Pa = left * r.turn_lacks_Pa + 3.0 * hysteresis_ * pressure_Pa * (1.0 - left);
+  } else if (pressure_Pa < r.largest_Pa) {
+    r.lacks_Pa = r.turn_lacks_Pa * (r.largest_Pa - pressure_Pa) / (r.largest_Pa - r.turn_Pa);
+  } else {
+    r.lacks_Pa = 0.0;
+    r.largest_Pa = pressure_Pa;
+  }
+  r.pressure_Pa = pressure_Pa;
+  return pressure_Pa - r.lacks_Pa;
+}
+
+double Pad::relaxed(Rubber &r, double pressure_Pa) {
+  double loss_Pa = 0.0;
+  const double rate = step_s_ > 0.0 ? (pressure_Pa - r.elastic_Pa) / step_s_ : 0.0;
+  for (std::size_t i = 0; i < TIMES_s.size(); i++) {
+    // Exact for a pressure that is linear over the step.
+    const double lag = rate * TIMES_s[i];
+    r.follows_Pa[i] = pressure_Pa - lag + (r.follows_Pa[i] - r.elastic_Pa + lag) * decay_[i];
+    loss_Pa += r.strength[i] * r.follows_Pa[i];
+  }
+  r.elastic_Pa = pressure_Pa;
+  return std::clamp(pressure_Pa - loss_Pa, std::min(pressure_Pa, 0.0), std::max(pressure_Pa, 0.0));
+}
+
+double Pad::left_behind(Rubber &r, const Aftereffect &effect, double base_Pa) const {
+  const double felt_Pa = std::max(base_Pa, 0.0);
+  const double rate = step_s_ > 0.0 ? (felt_Pa - r.felt_Pa) / step_s_ : 0.0;
+  const double lag = rate * effect.time_s;
+  // Exact as above, and where the pressure overtakes what is remembered.
+  r.remembered_Pa =
+      std::max(felt_Pa, felt_Pa - lag + (r.remembered_Pa - r.felt_Pa + lag) * r.forgetting);
+  r.felt_Pa = felt_Pa;
+  return effect.share * (r.remembered_Pa - felt_Pa);
+}
+
+void Pad::report(double t_s, const std::vector<double> &base_Pa, std::vector<double> &reported_Pa) {
+  if (!begun_) {
+    begun_ = true;
+    begin_s_ = t_s_ = t_s;
+  }
+  const double step_s = t_s - t_s_;
+  if (step_s != step_s_ || step_s == 0.0) {
+    step_s_ = step_s;
+    for (std::size_t i = 0; i < TIMES_s.size(); i++) {
+      decay_[i] = std::exp(-step_s / TIMES_s[i]);
+    }
+    for (std::size_t k = 0; k < aftereffects_.size(); k++) {
+      rubber_[k].forgetting = std::exp(-step_s / aftereffects_[k].time_s);
+    }
+  }
+  t_s_ = t_s;
+  const double sensors_degC = temperature_degC(t_s);
+  for (std::size_t k = 0; k < rubber_.size(); k++) {
+    double pressure_Pa = base_Pa[k];
+    if (hysteresis_ > 0.0) {
+      pressure_Pa = with_hysteresis(rubber_[k], pressure_Pa);
+    }
+    if (relaxes_) {
+      pressure_Pa = relaxed(rubber_[k], pressure_Pa);
+    }
+    if (!aftereffects_.empty()) {
+      pressure_Pa += left_behind(rubber_[k], aftereffects_[k], base_Pa[k]);
+    }
+    if (!gain_errors_.empty()) {
+      pressure_Pa *= 1.0 + gain_errors_[k];
+    }
+    if (!drifts_Pa_s_.empty()) {
+      pressure_Pa += drifts_Pa_s_[k] * (t_s - begin_s_);
+    }
+    if (!branches_.empty()) {
+      const Branch &branch = branches_[k];
+      // What begins above the edge has no step before it.
+      if (start_degC_ < branch.edge_degC && sensors_degC >= branch.edge_degC) {
+        pressure_Pa += branch.step_Pa + branch.slope * pressure_Pa;
+      }
+    }
+    const double excess =
+        (ambient_Pa_ + pressure_Pa - SPECIFIED_Pa) / (RANGE_END_Pa - SPECIFIED_Pa);
+    if (excess > 0.0) {
+      pressure_Pa -= bias_ * RANGE_END_Pa * excess * excess;
+    }
+    reported_Pa[k] = std::min(pressure_Pa, clip_Pa_ - ambient_Pa_);
+  }
+}
+
+double Pad::temperature_degC(double t_s) const {
+  // What begins at ROOM_degC stays there.
+  const double degC = std::min(start_degC_ + WARMING_K_s * t_s, ROOM_degC);
+  return warming_K_ == 0.0 ? degC : degC + warming_K_ * (1.0 - std::exp(-t_s / warming_s_));
+}
+
+} // namespace fingertip::twin

@@ -1,0 +1,364 @@
+// twin: writes scenarios that emulator and native pipeline play. Exit status: 0 done; 1 something
+// went wrong, said in one line; 2 wrong usage.
+#include "libfingertip/error.hpp"
+#include "libfingertip/in_parallel.hpp"
+#include "libfingertip/output_file.hpp"
+#include "libfingertip/progress_bar.hpp"
+#include "libfingertip/text.hpp"
+#include "simulation/twin/best_gaussian.hpp"
+#include "simulation/twin/scenario_file.hpp"
+#include "tool/advice.hpp"
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <thread>
+
+namespace {
+
+using namespace fingertip;
+using namespace fingertip::twin;
+
+constexpr double LAYER_MIN_mm = 3.0, LAYER_MAX_mm = 20.0;
+constexpr double WIDTH_FORCE_N = 2.0;
+
+struct Options {
+  ScenarioOptions scenario;
+  std::string effects;
+  std::string gain;
+  std::string output;
+  bool overwrite = false;
+  std::string cache;
+  std::vector<std::string> indenters;
+  std::vector<double> layers_mm;
+};
+
+std::atomic<bool> interrupted{false};
+
+void catch_signals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { interrupted = true; };
+  action.sa_flags = static_cast<int>(SA_RESETHAND); // a second one ends it at once
+  for (int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    sigaction(signal, &action, nullptr);
+  }
+}
+
+std::string number(double value) {
+  return shortest(static_cast<float>(value));
+}
+
+// Throws Error once a signal asked for the end.
+void show(ProgressBar &bar, double share) {
+  if (interrupted) {
+    throw Error("interrupted; what was not finished was not written");
+  }
+  bar.show(share);
+}
+
+Layer layer_of(double thickness_mm) {
+  if (!(thickness_mm >= LAYER_MIN_mm && thickness_mm <= LAYER_MAX_mm)) {
+    throw Error("--layer " + number(thickness_mm) + " is out of range; give " +
+                number(LAYER_MIN_mm) + " to " + number(LAYER_MAX_mm) + " mm");
+  }
+  return silicone(thickness_mm);
+}
+
+// There and open to new tables, which take long to solve.
+std::filesystem::path cache_of(const Options &options) {
+  const std::filesystem::path cache =
+      options.cache.empty() ? default_cache_directory() : std::filesystem::path(options.cache);
+  std::error_code error;
+  std::filesystem::create_directories(cache, error);
+  if (error || !std::filesystem::is_directory(cache) || access(cache.c_str(), W_OK | X_OK) != 0) {
+    throw Error(cache.string() + ": cannot keep contact tables here; give another --cache");
+  }
+  return cache;
+}
+
+int list() {
+  std::printf("Scenarios (twin scenario KIND), usual length and force:\n");
+  for (const ScenarioKind &kind : scenario_kinds()) {
+    std::printf("  %-14s%s; %s s, %s N\n", kind.name.c_str(), kind.description.c_str(),
+                number(kind.usual_seconds).c_str(), kind.usual_forces.c_str());
+  }
+  std::printf("\nIndenters (--indenter):\n");
+  for (const Indenter &one : indenters()) {
+    std::printf("  %-14s%s\n", one.name.c_str(), one.description.c_str());
+  }
+  std::printf("\nLayers (--layer):\n"
+              "  %-14sof silicone rubber, Shore 15 A; %s to %s mm, the report uses 12 and 6\n",
+              "MM", number(LAYER_MIN_mm).c_str(), number(LAYER_MAX_mm).c_str());
+  std::printf("\nEffects (--effects NAME[=VALUE],...; none and all), usual value:\n");
+  for (const Effect &effect : effects()) {
+    std::printf("  %-14s%s; %s %s. %s\n", effect.name.c_str(), effect.description.c_str(),
+                number(effect.usual).c_str(), effect.unit.c_str(), effect.source.c_str());
+  }
+  return 0;
+}
+
+// All pairs, on as many threads as there are processors.
+int tables(const Options &options) {
+  struct Job {
+    const Indenter *indenter;
+    Layer layer;
+    double share = 0.0;
+  };
+  std::vector<Job> jobs;
+  for (double thickness_mm : options.layers_mm) {
+    const Layer layer = layer_of(thickness_mm);
+    if (options.indenters.empty()) {
+      for (const Indenter &one : indenters()) {
+        jobs.push_back({&one, layer});
+      }
+    }
+    for (const std::string &name : options.indenters) {
+      jobs.push_back({&indenter(name), layer});
+    }
+  }
+  const std::filesystem::path cache = cache_of(options);
+  ProgressBar bar("contact tables", ProgressBar::Lines::tenths);
+  std::mutex telling;
+  const auto make = [&](std::size_t i) {
+    const auto tell = [&](double share) {
+      const std::lock_guard<std::mutex> lock(telling);
+      jobs[i].share = share;
+      double sum = 0.0;
+      for (const Job &job : jobs) {
+        sum += job.share;
+      }
+      show(bar, sum / static_cast<double>(jobs.size()));
+    };
+    ContactTable::load_or_build(*jobs[i].indenter, jobs[i].layer, cache, tell);
+    const std::lock_guard<std::mutex> lock(telling);
+    jobs[i].share = 1.0; // without a word: it may have been there
+  };
+  in_parallel(jobs.size(), make, std::max(1u, std::thread::hardware_concurrency()));
+  std::printf("%zu contact tables in %s\n", jobs.size(), cache.string().c_str());
+  return 0;
+}
+
+ContactTable table_of(const std::string &name, const Layer &layer, const Options &options) {
+  ProgressBar bar("contact table of " + name + ", once", ProgressBar::Lines::none);
+  return ContactTable::load_or_build(indenter(name), layer, cache_of(options),
+                                     [&](double share) { show(bar, share); });
+}
+
+int width(const Options &options) {
+  const Layer layer = layer_of(options.scenario.layer_mm);
+  const std::string name = complete(options.scenario).indenter;
+  const BestGaussian gaussian(table_of(name, layer, options), layer.thickness_mm);
+  const BestGaussian::Fit fit = gaussian.at(WIDTH_FORCE_N);
+  const double force_N = 2e-6 * M_PI * fit.p0_Pa * fit.sigma_mm * fit.sigma_mm;
+  std::printf("sigma_mm=%s force_share=%s\n", fixed(fit.sigma_mm, 3).c_str(),
+              fixed(force_N / WIDTH_FORCE_N, 3).c_str());
+  return 0;
+}
+
+int scenario(Options &options) {
+  ScenarioOptions &chosen = options.scenario;
+  chosen.effects = parse_effects(options.effects);
+  if (!options.gain.empty()) {
+    const double percent = parse_effects("gain=" + options.gain).at("gain");
+    if (percent > 0.0) {
+      chosen.effects["gain"] = percent;
+    } else {
+      chosen.effects.erase("gain");
+    }
+  }
+  const Layer layer = layer_of(chosen.layer_mm);
+  chosen = complete(chosen);
+  check_output(options.output, options.overwrite);
+  check_output(truth_path(options.output), options.overwrite);
+  const ContactTable table = table_of(chosen.indenter, layer, options);
+  const bool other = !chosen.second_indenter.empty() && chosen.second_indenter != chosen.indenter;
+  const ContactTable second = other ? table_of(chosen.second_indenter, layer, options) : table;
+  const Scenario made = make_scenario(chosen, table);
+  std::optional<BlockTable> block;
+  if (chosen.overhang_mm) {
+    ProgressBar bar("table of the pad's edges, once", ProgressBar::Lines::none);
+    block = BlockTable::load_or_build(block_around(layer, *chosen.overhang_mm), sensor_places(),
+                                      cache_of(options), [&](double share) { show(bar, share); });
+  }
+  Written written;
+  {
+    ProgressBar bar(made.name, ProgressBar::Lines::none);
+    written = write_scenario(made, layer, table, second, block ? &*block : nullptr, options.output,
+                             options.overwrite, [&](double share) { show(bar, share); });
+  }
+  std::printf("%s: %s, %zu contacts in %s s, %zu rows, %s MB, at most %s kPa\n",
+              printable(options.output).c_str(), made.name.c_str(), made.acts.size(),
+              number(*made.options.seconds).c_str(), written.rows,
+              fixed(1e-6 * static_cast<double>(written.bytes), 1).c_str(),
+              fixed(1e-3 * written.peak_Pa, 1).c_str());
+  return 0;
+}
+
+// CLI11 would take -1 for a large seed.
+std::uint64_t seed_from_text(const std::string &option, const std::string &text) {
+  const auto seed = to_u64(text);
+  if (!seed) {
+    throw CLI::ValidationError(option + " \"" + text +
+                               "\" is not possible; give a whole number from 0");
+  }
+  return *seed;
+}
+
+int run(int argc, char **argv) {
+  Options options;
+  std::function<int()> action;
+  CLI::App app("Writes what the sensors of a simulated pad feel, for emulator and native pipeline.",
+               "twin");
+  app.set_version_flag("--version", "twin " FINGERTIP_VERSION);
+  app.require_subcommand(1);
+  app.failure_message([](const CLI::App *failed, const CLI::Error &error) {
+    std::string command = "twin";
+    for (const CLI::App *chosen : failed->get_subcommands()) {
+      command += " " + chosen->get_name();
+    }
+    return printable("twin: " + std::string(error.what()) + "; see " + command + " --help") + "\n";
+  });
+  const auto with_cache = [&](CLI::App *command) {
+    command
+        ->add_option("--cache", options.cache,
+                     "Folder of the contact tables; default: ~/.cache/fingertip/contact-tables")
+        ->type_name("DIR");
+  };
+
+  app.add_subcommand("list", "Explain scenarios, indenters, layers and effects")->callback([&] {
+    action = list;
+  });
+
+  CLI::App *build = app.add_subcommand("tables", "Compute the contact tables that are not cached");
+  build->add_option("--indenter", options.indenters, "Only of these; default: all")
+      ->delimiter(',')
+      ->type_name("NAME,...");
+  build->add_option("--layer", options.layers_mm, "On layers of these thicknesses; default: 12,6")
+      ->delimiter(',')
+      ->default_val(std::vector<double>{12.0, 6.0})
+      ->default_str("")
+      ->type_name("MM,...");
+  with_cache(build);
+  build->callback([&] { action = [&] { return tables(options); }; });
+
+  const auto with_contact = [&](CLI::App *command) {
+    command
+        ->add_option("--indenter", options.scenario.indenter,
+                     "What presses; default sphere6, for placements and drags sphere15")
+        ->type_name("NAME");
+    command->add_option("--layer", options.scenario.layer_mm, "Thickness of the rubber; default 12")
+        ->type_name("MM");
+  };
+
+  CLI::App *fit = app.add_subcommand(
+      "width",
+      "Width of the Gaussian that fits the pressure under 2 N best, and its share of them");
+  with_contact(fit);
+  with_cache(fit);
+  fit->callback([&] { action = [&] { return width(options); }; });
+
+  CLI::App *write =
+      app.add_subcommand("scenario", "Write a scenario, and its events beside it: FILE.truth.csv");
+  ScenarioOptions &s = options.scenario;
+  write->add_option("kind", s.kind, "What happens: see twin list")->required()->type_name("KIND");
+  write->add_option("-o,--output", options.output, "The scenario to write")
+      ->required()
+      ->type_name("FILE.csv");
+  with_contact(write);
+  write
+      ->add_option("--overhang", s.overhang_mm,
+                   "The pad ends so far beyond its outer sensors; default: never")
+      ->type_name("MM");
+  write
+      ->add_option("--second", s.second_indenter,
+                   "What presses too, in scenarios of two contacts; "
+                   "default: the same")
+      ->type_name("NAME");
+  write->add_option("--gain", options.gain, "Short for the effect gain; 0: none")
+      ->type_name("PERCENT");
+  write
+      ->add_option("--effects", options.effects,
+                   "Errors of the pad, as in \"drift,relaxation=20\"; none (default), all")
+      ->type_name("NAME[=VALUE],...");
+  write
+      ->add_option_function<std::string>(
+          "--seed", [&](const std::string &text) { s.seed = seed_from_text("--seed", text); },
+          "Of places, forces and times; default 1")
+      ->type_name("N");
+  write
+      ->add_option_function<std::string>(
+          "--pad", [&](const std::string &text) { s.pad_seed = seed_from_text("--pad", text); },
+          "Seed of the pad's errors; default: --seed")
+      ->type_name("N");
+  write->add_option("--seconds", s.seconds, "Length; default: see twin list")->type_name("S");
+  write
+      ->add_option("--force", s.forces,
+                   "\"5\", in turn \"1,2,5\", any of \"1..15\"; default: see "
+                   "twin list")
+      ->type_name("N");
+  write
+      ->add_option("--tangential", s.tangential,
+                   "Pulled along the rubber by this share of the force, as 0.3 or any of 0.1..0.4; "
+                   "without an angle in any direction. In lifts the weight, in drags what hangs on "
+                   "the string, default 0.3; else 0")
+      ->type_name("SHARE[,DEG]");
+  write
+      ->add_option("--friction", s.friction,
+                   "Holds what is pulled, as 0.5 or any of 0.3..0.8; default 0.5, in slides "
+                   "0.3..0.8")
+      ->type_name("MU");
+  write->add_option("--kinetic", s.kinetic_share, "Kinetic friction per static, in slides; 0.8")
+      ->type_name("SHARE");
+  write->add_option("--mass", s.mass_kg, "Of the object, in slides; default 0.1..0.5")
+      ->type_name("KG");
+  write->add_option("--speed", s.speeds_mm_s, "In turn, of slip, rolloff, drag, the hand in slides")
+      ->delimiter(',')
+      ->type_name("MM_PER_S,...");
+  write
+      ->add_option("--dead-travel", s.dead_travel_mm,
+                   "Way of the pusher, or of the pulled object, before it slips; default 1")
+      ->type_name("MM");
+  write
+      ->add_option("--creep", s.creep_share,
+                   "Share of the dead travel by which the contact moves along; default 0.5")
+      ->type_name("SHARE");
+  write
+      ->add_option("--stick-slip", s.stick_slip_mm, "Slip in jumps of this size; default 0: steady")
+      ->type_name("MM");
+  write
+      ->add_option(
+          "--margin", s.margin_mm,
+          "Random places reach so far beyond the paper's grid; default 2.25, for placements 4.5")
+      ->type_name("MM");
+  write->add_option("--quiet", s.quiet_s, "Time between contacts; default 1.2")->type_name("S");
+  write->add_flag("--overwrite", options.overwrite, "Replace files that exist");
+  with_cache(write);
+  write->callback([&] { action = [&] { return scenario(options); }; });
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError &error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  catch_signals();
+  return action();
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+  try {
+    return run(argc, argv);
+  } catch (const Error &error) {
+    tell("twin", error);
+    return 1;
+  } catch (const std::exception &error) {
+    std::fprintf(stderr, "twin: %s\n", printable(error.what()).c_str());
+    return 1;
+  }
+}

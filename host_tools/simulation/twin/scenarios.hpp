@@ -1,0 +1,145 @@
+// Scenarios: what happens to a pad over time, each composed from a kind, an indenter, a layer and
+// the errors of a pad. kinds() lists the kinds; De Clercq et al., RA-L 2022 ("the paper"), section
+// IV, is what they follow. scenario_file.hpp writes them down.
+//
+// Nothing touches the pad for the first START_QUIET_s, nor for quiet_s after each contact: time for
+// the 16 frames of the firmware's tare at 20 frames a second; the paper, too, sets its readings to
+// zero between contacts.
+//
+// Where things are: random places are uniform over the paper's grid, |x| <= 4.5 mm and |y| <=
+// 13.5 mm, and margin_mm around it, by default half a step of the grid, for placements a whole one,
+// to the outer sensors. Slips go along y through the middle of the pad, with x anywhere on the
+// grid.
+//
+// What the truth calls slip in the kind "slip" is what the paper calls it (section IV.D): the
+// pusher is in contact and moves. So the dead travel, in which nothing slides yet, counts as slip;
+// the events tell it apart. In "drag" and "slide" it is gross slip: all of the contact slides. A
+// twist, a screw and a contact that rolls are no slip.
+//
+// Objects pull along the rubber if `tangential` says so: then in each contact, in one direction,
+// with that share of the normal force, rising and falling with it; in a lift with an object's
+// weight, which is that share of the force of the grip, in a drag with a known load, in a screw
+// with a constant one. In a slide what pulls follows from motion and friction (held_object.hpp).
+//
+// Left out: edges of the rubber, unless `overhang_mm` says where they are, friction where a
+// kinematic slip slides, which moves the middle of the pressure on the base by up to friction times
+// thickness ("drag" and "slide" have it),
+// influence of two contacts on each other's shape.
+#pragma once
+
+#include "library/pad/block.hpp"
+#include "simulation/twin/contact_table.hpp"
+#include "simulation/twin/effects.hpp"
+#include "simulation/twin/trajectory.hpp"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace fingertip::twin {
+
+constexpr double START_QUIET_s = 1.5;
+constexpr double AMBIENT_Pa = 101325.0;
+// In x, if overhang_mm does not say; the paper's box is 30 mm by 50 mm.
+constexpr double PAD_HALF_WIDTH_mm = 15.0;
+
+struct ScenarioKind {
+  std::string name;
+  double usual_seconds;
+  std::string usual_forces;
+  std::string description;
+};
+const std::vector<ScenarioKind> &scenario_kinds();
+
+// "5": always that; "1,2,5": one after the other; "1..15": anywhere between, uniform. In N.
+class Forces {
+public:
+  // Throws Error unless all are from 0.02 N to the tables' end.
+  explicit Forces(const std::string &text);
+  double pick(std::size_t turn, double random_share) const;
+  double largest() const;
+
+private:
+  std::vector<double> values_;
+  bool range_ = false;
+};
+
+// "0.3": always that; "0.1..0.4": anywhere between, uniform.
+struct Range {
+  // Throws Error, which names the option, unless it is one of these.
+  Range(const std::string &option, const std::string &text);
+  double at(double random_share) const { return lowest + random_share * (highest - lowest); }
+  double lowest, highest;
+};
+
+// "0.3" or "0.1..0.4": such a share of the normal force, in a direction drawn for each contact;
+// "0.3,90": in that one, degrees from x towards y.
+struct Tangential {
+  // Throws Error unless these are numbers.
+  explicit Tangential(const std::string &text);
+  Range share;
+  std::optional<double> angle_deg;
+};
+
+struct ScenarioOptions {
+  std::string kind = "taps";
+  std::string indenter;        // empty: the kind's usual one
+  std::string second_indenter; // kind "two"; empty: as the first
+  double layer_mm = 12.0;
+  std::optional<double> overhang_mm; // rubber beyond the outer sensors; else no end
+  EffectValues effects;
+  std::uint64_t seed = 1;
+  std::optional<std::uint64_t> pad_seed;         // of the pad's errors; else seed
+  std::optional<double> seconds;                 // else usual_seconds
+  std::string forces;                            // empty: usual_forces
+  std::string tangential, friction;              // Range; empty: the kind's usual ones
+  std::string mass_kg;                           // Range, kind "slide"; empty: usual
+  double kinetic_share = 0.8;                    // kind "slide": kinetic friction per static one
+  std::vector<double> speeds_mm_s;               // of what moves by a speed; empty: usual ones
+  double dead_travel_mm = 1.0;                   // Grip; Pull; of a slide at 6 N, friction 0.5
+  double creep_share = 0.5, stick_slip_mm = 0.0; // Grip, kind "slip"
+  std::optional<double> margin_mm;               // else the kind's usual one
+  double quiet_s = 1.2;
+};
+
+// A stretch of one act in which one thing goes on.
+struct Phase {
+  std::string name;
+  double begin_s, end_s; // in the scenario
+  bool slip = false;
+};
+
+// From touch to loss.
+struct Act {
+  std::string press;
+  double begin_s = 0.0, end_s = 0.0;
+  std::vector<Track> tracks; // one or two; their time 0 is begin_s
+  std::vector<Phase> phases;
+  int sensors_near = 0; // grid: as many sensors are nearest to the place, 1, 2 or 4; else 0
+  double speed_mm_s = 0.0;
+  double friction = 0.0, mass_kg = 0.0; // static, of what is pulled; of the object; 0: none
+
+  bool slips(double t_s) const;
+};
+
+struct Scenario {
+  ScenarioOptions options; // complete
+  std::string name;
+  bool pulls = false;    // something tangential may be in it
+  std::vector<Act> acts; // in order of time, none overlap
+};
+
+// The block that reaches so far beyond the outer sensors, and these.
+Block block_around(const Layer &layer, double overhang_mm);
+std::vector<Place> sensor_places();
+
+// With all that was left open filled in. Throws Error for an unknown kind or what is out of
+// range.
+ScenarioOptions complete(const ScenarioOptions &options);
+
+// The tables are those of the indenters on the layer: creep and rolling need the contact's size.
+// Throws Error as complete does, and if the scenario is too short for one contact.
+Scenario make_scenario(const ScenarioOptions &options, const ContactTable &table);
+
+} // namespace fingertip::twin

@@ -1,0 +1,56 @@
+/* One session of finding the gains: a fingertip's packets in, placements, what to do next, and the
+ * calibration in the end. For every program that calibrates.
+ */
+#pragma once
+
+#include "libfingertip/wire.hpp"
+#include "tool/calibration/judge.hpp"
+#include "tool/calibration/placements.hpp"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace fingertip::calibrating {
+
+/* What a fingertip must be able to do. what: it, for the message. Throws Error. */
+void check_firmware(const wire_info &info, const std::string &what);
+
+class GainSession {
+public:
+  explicit GainSession(const wire_info &info);
+
+  /* True if it completed a placement; judge then. Packets but raw ones are nothing to it. */
+  bool take(const wire_packet &packet);
+  void take_back();
+  /* Some 50 ms. */
+  void judge(bool last);
+
+  /* "hold on": what to do now. */
+  std::string advice() const;
+  /* "12 placements, gains known to 3.1 % of 1.5 %" */
+  std::string progress() const;
+
+  /* What the fingertip is to be told; date_s: Unix time. Of a good judgement. Throws Error where
+   * the readings are not those of force_N, or a gain is none. */
+  calibration made(std::optional<double> force_N, std::uint32_t date_s) const;
+  /* Of the firmware's own fit to the placements, without and with the gains. */
+  Scatter scatter(bool with_gains) const;
+
+  const Array &array() const { return array_; }
+  const PlacementFinder &finder() const { return finder_; }
+  const std::vector<Placement> &placements() const { return placements_; }
+  const Judgement &judgement() const { return judgement_; }       /* of the placements so far */
+  const std::optional<Wanted> &wanted() const { return wanted_; } /* the best next place */
+
+private:
+  Array array_;
+  Prior prior_;
+  PlacementFinder finder_;
+  std::vector<Placement> placements_;
+  Judgement judgement_;
+  std::optional<Wanted> wanted_;
+};
+
+} // namespace fingertip::calibrating

@@ -1,0 +1,381 @@
+#include "tool/calibration/judge.hpp"
+
+extern "C" {
+#include "common/contact_flags.h"
+#include "fit/fit.h"
+}
+
+#include <algorithm>
+#include <cmath>
+
+namespace fingertip::calibrating {
+namespace {
+
+/* Placements within this of their middle, in pitches (rms), are a cluster. */
+constexpr double CLUSTER_PITCHES = 0.6;
+/* An array none of whose placements lie in an end third of it lacks that end. */
+constexpr double END_SHARE = 1.0 / 3.0;
+/* What one scale leaves between round and flat objects, 1 to 15 N, and of the firmware's fit
+ * (truth_calibration, table "force"). */
+constexpr double FORCE_MODEL_SD = 0.01;
+/* How far the force of a tap is off, over what the readings lose from 0.5 to 1 s, on the twin's
+ * pads that relax by 9 to 26 % in 8 s (truth_calibration --seed 500, "relaxing"). */
+constexpr double FADED_BEFORE = 2.7;
+/* Evidence against a session speaks for itself from so many placements, or when it is so many times
+ * the bound from fewer; until then it only keeps a session from being good. */
+constexpr std::size_t EVIDENCE_SURE = 24, EVIDENCE_MIN = 8;
+constexpr double EVIDENCE_CLEAR = 3.0;
+/* Of the halves' difference at a sensor: how sure it must be, and how many of its sds are chance.
+ */
+constexpr double HALVES_SD_MAX = 0.025, HALVES_SDS = 2.0;
+/* Halves that disagree are given so many placements to agree. */
+constexpr std::size_t HALVES_SURE = 40;
+
+double rms(const std::vector<double> &values) {
+  double sum = 0.0;
+  for (double value : values) {
+    sum += value * value;
+  }
+  return values.empty() ? 0.0 : std::sqrt(sum / double(values.size()));
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/* Beyond what their uncertainty makes. */
+double rms_beyond(const std::vector<double> &values, const std::vector<double> &sds) {
+  const double all = rms(values), chance = rms(sds);
+  return std::sqrt(std::max(all * all - chance * chance, 0.0));
+}
+
+std::string percent(double share) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f %%", 100.0 * share);
+  return text;
+}
+
+std::string list_of(const std::vector<std::size_t> &sensors) {
+  std::string text;
+  for (std::size_t k : sensors) {
+    text += (text.empty() ? "" : " ") + std::to_string(k);
+  }
+  return text;
+}
+
+/* Differences of the gains of odd and even placements beyond what either can not tell. */
+void compare_halves(const Array &array, std::vector<Placement> placements, const Solution &solution,
+                    Judgement &judgement) {
+  remember(placements);
+  std::vector<Placement> halves[2];
+  Solution from[2] = {solution, solution};
+  from[0].placements.clear();
+  from[1].placements.clear();
+  std::size_t turn = 0;
+  for (std::size_t i = 0; i < placements.size(); i++) {
+    if (solution.placements[i].kept) {
+      halves[turn % 2].push_back(placements[i]);
+      from[turn % 2].placements.push_back(solution.placements[i]);
+      turn++;
+    }
+  }
+  const Solution odd = solve_from(array, halves[0], from[0]);
+  const Solution even = solve_from(array, halves[1], from[1]);
+  if (!odd.solved || !even.solved) {
+    return;
+  }
+  std::vector<double> ratio;
+  for (std::size_t k = 0; k < array.sensors(); k++) {
+    ratio.push_back(odd.gain[k] / even.gain[k]);
+  }
+  const std::vector<double> shape = outside_gauge(array, ratio);
+  double squares = 0.0;
+  for (std::size_t k = 0; k < array.sensors(); k++) {
+    const double within = std::log(ratio[k]) - shape[k];
+    squares += within * within / double(array.sensors());
+    const double sd = std::hypot(odd.shape_sd[k], even.shape_sd[k]);
+    if (sd <= HALVES_SD_MAX) {
+      judgement.halves_shape =
+          std::max(judgement.halves_shape, std::abs(shape[k]) - HALVES_SDS * sd);
+    }
+  }
+  const double gauge_sd = std::hypot(odd.gauge_sd, even.gauge_sd);
+  judgement.halves_gauge = std::max(std::sqrt(squares) - HALVES_SDS * gauge_sd, 0.0);
+}
+
+/* Why the gains are not known: by where the placements are. */
+Reason lacking(const Array &array, const std::vector<Placement> &placements,
+               const Solution &solution) {
+  if (placements.size() < PLACEMENTS_WANTED || !solution.solved) {
+    return Reason::too_few;
+  }
+  double mean_x = 0.0, mean_y = 0.0, count = 0.0;
+  for (const Fitted &fitted : solution.placements) {
+    if (fitted.kept) {
+      mean_x += fitted.x_mm;
+      mean_y += fitted.y_mm;
+      count += 1.0;
+    }
+  }
+  mean_x /= count;
+  mean_y /= count;
+  double squares = 0.0;
+  const auto [left, right] = std::minmax_element(array.x_mm.begin(), array.x_mm.end());
+  const auto [bottom, top] = std::minmax_element(array.y_mm.begin(), array.y_mm.end());
+  double lowest_x = *right, highest_x = *left, lowest_y = *top, highest_y = *bottom;
+  for (const Fitted &fitted : solution.placements) {
+    if (fitted.kept) {
+      squares += std::pow(fitted.x_mm - mean_x, 2) + std::pow(fitted.y_mm - mean_y, 2);
+      lowest_x = std::min(lowest_x, fitted.x_mm);
+      highest_x = std::max(highest_x, fitted.x_mm);
+      lowest_y = std::min(lowest_y, fitted.y_mm);
+      highest_y = std::max(highest_y, fitted.y_mm);
+    }
+  }
+  if (std::sqrt(squares / count) < CLUSTER_PITCHES * array.pitch_mm) {
+    return Reason::cluster;
+  }
+  const double end_x = END_SHARE * (*right - *left), end_y = END_SHARE * (*top - *bottom);
+  if (lowest_x > *left + end_x || highest_x < *right - end_x || lowest_y > *bottom + end_y ||
+      highest_y < *top - end_y) {
+    return Reason::one_end;
+  }
+  return placements.size() < 2 * PLACEMENTS_WANTED ? Reason::too_few : Reason::unsure;
+}
+
+std::string text_of(const Judgement &j, std::size_t placements) {
+  const Solution &s = j.solution;
+  switch (j.reason) {
+  case Reason::none:
+    return "good: every gain is known to " + percent(s.worst_shape_sd());
+  case Reason::too_few:
+    if (placements == 0) {
+      return "no placement was found: set a weight of about 3 N on a round foot down, let it stand "
+             "by "
+             "itself for a second, and lift it";
+    }
+    return "too few placements (" + std::to_string(placements) +
+           "): place the weight at more places all over the pad";
+  case Reason::cluster:
+    return "all placements are near one place, so sensors " + list_of(j.unsure) +
+           " felt too little: place the weight all over the pad";
+  case Reason::one_end:
+    return "part of the pad has no placements, so sensors " + list_of(j.unsure) +
+           " felt too little: place the weight there too";
+  case Reason::unsure:
+    return "the gains of sensors " + list_of(j.unsure) + " are only known to " +
+           percent(s.worst_shape_sd()) +
+           ": place the weight near them; on thin rubber too few sensors feel a placement";
+  case Reason::weights:
+    return "the force differed by " + percent(s.spread.force) +
+           " between placements: use one and the same weight, standing freely";
+  case Reason::elongated:
+    return "the contact is not round (its axes differ by " + percent(2.0 * j.ellipse) +
+           "): use a weight with a round foot, as a ball";
+  case Reason::offsets:
+    return "the zeros of the sensors were off by " + percent(j.offset_share) +
+           " of the peak: see that nothing touches the pad, tare, and begin anew";
+  case Reason::drift:
+    return "the zeros of the sensors moved by " + percent(j.drift_share) +
+           " of the peak meanwhile: let the fingertip warm up, and begin anew";
+  case Reason::stray:
+    return "only " + percent(j.kept_share) +
+           " of the placements fit each other: let the same weight stand freely each time";
+  case Reason::residual:
+    return "the readings are " + percent(s.residual_share) +
+           " of the peak off what one round foot makes: use one, and see that the pad is whole";
+  case Reason::halves:
+    return "every other placement says other gains, by " +
+           percent(std::max(j.halves_shape, j.halves_gauge)) +
+           ": something changed meanwhile; begin anew";
+  case Reason::layout:
+    return "the sensors seem to sit " + std::to_string(s.spread.position_mm).substr(0, 4) +
+           " mm from where the firmware has them: see geometry.c";
+  case Reason::silent:
+    return "sensors " + list_of(j.silent) +
+           " gave no reading to rely on: fingertip info says whether they answer and their PROM is "
+           "good";
+  }
+  return "";
+}
+
+/* What speaks most against the session, and how many times its bound it is. */
+struct Evidence {
+  Reason reason = Reason::none;
+  double times = 0.0;
+};
+Evidence against(const Judgement &j) {
+  const Solution &s = j.solution;
+  const Evidence all[] = {{Reason::elongated, j.ellipse / ELLIPSE_MAX},
+                          {Reason::weights, s.spread.force / FORCE_SPREAD_MAX},
+                          {Reason::offsets, j.offset_share / OFFSET_MAX},
+                          {Reason::drift, j.drift_share / DRIFT_MAX},
+                          {Reason::stray, (1.0 - j.kept_share) / (1.0 - KEPT_MIN)},
+                          {Reason::layout, s.spread.position_mm / POSITION_MAX_mm},
+                          {Reason::residual, s.residual_share / RESIDUAL_MAX}};
+  return *std::max_element(std::begin(all), std::end(all),
+                           [](const Evidence &a, const Evidence &b) { return a.times < b.times; });
+}
+
+/* The firmware's fit to a placement. */
+struct FirmwareFit {
+  FirmwareFit(const Array &array, const Prior &prior) {
+    std::vector<float> x, y;
+    for (std::size_t k = 0; k < array.sensors(); k++) {
+      x.push_back(static_cast<float>(array.x_mm[k]));
+      y.push_back(static_cast<float>(array.y_mm[k]));
+    }
+    usable_array = fit_array_init(&of, static_cast<std::uint8_t>(array.sensors()), x.data(),
+                                  y.data(), static_cast<float>(array.pitch_mm)) == FT_OK;
+    settings.iterations = ITERATIONS;
+    settings.noise_Pa_q10 = NOISE_Pa_Q10;
+    settings.prior_sigma_mm = static_cast<float>(prior.sigma_mm);
+    settings.prior_width_mm = static_cast<float>(prior.width_mm);
+  }
+  std::optional<fit_result> operator()(const Placement &placement,
+                                       const std::vector<double> &gain) {
+    std::int32_t pressure[FT_MAX_SENSORS] = {};
+    for (std::size_t k = 0; k < placement.reading_Pa.size(); k++) {
+      pressure[k] = static_cast<std::int32_t>(
+          std::lround(std::clamp(placement.reading_Pa[k] / gain[k], -1e6, 1e6) * 1024.0));
+    }
+    fit_result result{};
+    if (usable_array) {
+      fit_gaussian(&of, pressure, placement.usable, &settings, &result);
+    }
+    if (!(result.flags & CONTACT_FLAG_FIT_VALID)) {
+      return std::nullopt;
+    }
+    return result;
+  }
+  /* As many as any setting of the firmware needs; a mean of many frames has hardly any noise. */
+  static constexpr std::uint8_t ITERATIONS = 10;
+  static constexpr std::int32_t NOISE_Pa_Q10 = 1024;
+  fit_array of{};
+  fit_settings settings{};
+  bool usable_array = false;
+};
+
+} // namespace
+
+const char *name_of(Reason reason) {
+  static const char *const names[] = {"none",     "too_few",   "cluster", "one_end", "unsure",
+                                      "weights",  "elongated", "offsets", "drift",   "stray",
+                                      "residual", "halves",    "layout",  "silent"};
+  return names[static_cast<int>(reason)];
+}
+
+Judgement judge(const Array &array, const std::vector<Placement> &placements, bool last) {
+  Judgement j;
+  j.solution = solve(array, placements);
+  const Solution &s = j.solution;
+  std::uint32_t seen = 0;
+  for (const Placement &placement : placements) {
+    seen |= placement.usable;
+  }
+  for (std::size_t k = 0; k < array.sensors(); k++) {
+    if (!s.solved || s.shape_sd[k] > SHAPE_SD_MAX) {
+      j.unsure.push_back(k);
+    }
+    if (!(seen >> k & 1u)) {
+      j.silent.push_back(k);
+    }
+  }
+  if (s.solved) {
+    j.ellipse = std::sqrt(0.5 * (s.ellipse_of_all[0] * s.ellipse_of_all[0] +
+                                 s.ellipse_of_all[1] * s.ellipse_of_all[1]) +
+                          s.spread.ellipse * s.spread.ellipse);
+    j.kept_share = double(s.kept) / double(placements.size());
+    j.offset_share = rms_beyond(s.offset_Pa, s.offset_sd_Pa) / s.peak_Pa;
+    j.drift_share = rms_beyond(s.drift_Pa, s.drift_sd_Pa) / s.peak_Pa;
+  }
+  if (placements.size() >= EVIDENCE_MIN && !j.silent.empty()) {
+    j.state = Judgement::State::refused;
+    j.reason = Reason::silent;
+    j.text = text_of(j, placements.size());
+    return j;
+  }
+  last = last || placements.size() >= PLACEMENTS_MAX;
+  const Evidence evidence = s.solved ? against(j) : Evidence{};
+  if (placements.size() >= EVIDENCE_MIN && evidence.times > 1.0 &&
+      (last || placements.size() >= EVIDENCE_SURE || evidence.times > EVIDENCE_CLEAR)) {
+    j.state = Judgement::State::refused;
+    j.reason = evidence.reason;
+    j.text = text_of(j, placements.size());
+    return j;
+  }
+  const bool known = placements.size() >= PLACEMENTS_WANTED && s.solved && j.unsure.empty() &&
+                     s.gauge_sd <= GAUGE_SD_MAX;
+  if (!known || evidence.times > 1.0) {
+    j.reason = known ? evidence.reason : lacking(array, placements, s);
+    j.state = last ? Judgement::State::refused : Judgement::State::more;
+    j.text = text_of(j, placements.size());
+    return j;
+  }
+  compare_halves(array, placements, s, j);
+  const bool agree = j.halves_shape <= HALVES_SHAPE_MAX && j.halves_gauge <= HALVES_GAUGE_MAX;
+  j.reason = agree ? Reason::none : Reason::halves;
+  j.state = agree                                      ? Judgement::State::good
+            : last || placements.size() >= HALVES_SURE ? Judgement::State::refused
+                                                       : Judgement::State::more;
+  j.text = text_of(j, placements.size());
+  return j;
+}
+
+std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements,
+                                      const Solution &solution, double force_N,
+                                      const Prior &prior) {
+  FirmwareFit fit(array, prior);
+  std::vector<double> forces, fadings;
+  for (std::size_t i = 0; i < placements.size(); i++) {
+    const auto fitted =
+        solution.placements[i].kept ? fit(placements[i], solution.gain) : std::nullopt;
+    if (fitted) {
+      forces.push_back(static_cast<double>(fitted->force_N));
+      fadings.push_back(placements[i].fading);
+    }
+  }
+  if (forces.size() < PLACEMENTS_MIN) {
+    return std::nullopt;
+  }
+  const double middle = median(forces);
+  std::vector<double> off;
+  for (double force : forces) {
+    off.push_back(std::abs(force / middle - 1.0));
+  }
+  /* Of a median: 1.2533 of a mean's; of a normal spread: 1.4826 of the median deviation. */
+  const double by_chance = 1.2533 * 1.4826 * median(off) / std::sqrt(double(off.size()));
+  const double faded = FADED_BEFORE * median(fadings);
+  return ForceScale{force_N / middle,
+                    force_N / middle * std::hypot(by_chance, FORCE_MODEL_SD, faded)};
+}
+
+Scatter scatter(const Array &array, const std::vector<Placement> &placements,
+                const Solution &solution, bool with_gains, const Prior &prior) {
+  FirmwareFit fit(array, prior);
+  const std::vector<double> ones(array.sensors(), 1.0);
+  std::vector<double> distances, forces;
+  for (std::size_t i = 0; i < placements.size(); i++) {
+    const auto fitted = solution.placements[i].kept
+                            ? fit(placements[i], with_gains ? solution.gain : ones)
+                            : std::nullopt;
+    if (fitted) {
+      distances.push_back(
+          std::hypot(static_cast<double>(fitted->x_mm) - solution.placements[i].x_mm,
+                     static_cast<double>(fitted->y_mm) - solution.placements[i].y_mm));
+      forces.push_back(static_cast<double>(fitted->force_N));
+    }
+  }
+  if (forces.empty()) {
+    return {};
+  }
+  const double force = median(forces);
+  for (double &each : forces) {
+    each = std::abs(each / force - 1.0);
+  }
+  return {median(distances), median(forces)};
+}
+
+} // namespace fingertip::calibrating

@@ -1,0 +1,182 @@
+#include "tool/cli/calibrate.hpp"
+
+#include "libfingertip/clock.hpp"
+#include "libfingertip/error.hpp"
+#include "libfingertip/packet_fields.hpp"
+#include "libfingertip/recording.hpp"
+#include "libfingertip/text.hpp"
+#include "tool/calibration/gain_session.hpp"
+#include "tool/cli/calibrate_device.hpp"
+#include "tool/cli/calibrate_drag.hpp"
+#include "tool/cli/calibrate_view.hpp"
+#include "tool/cli/gains.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+
+namespace fingertip {
+
+namespace {
+
+using calibrating::GainSession;
+using calibrating::Judgement;
+using calibrating::Placement;
+
+void print_result(const GainSession &work, const calibration &made, std::optional<double> force_N) {
+  const Judgement &judgement = work.judgement();
+  const calibrating::Scatter before = work.scatter(false), after = work.scatter(true);
+  std::printf("%s, from %zu of %zu placements\n", judgement.text.c_str(), judgement.solution.kept,
+              work.placements().size());
+  print_gains(made, static_cast<std::uint8_t>(work.array().sensors()));
+  std::printf("\nof the placements      before     after\n");
+  std::printf("location off by     %6.2f mm %6.2f mm   median\n", before.location_mm,
+              after.location_mm);
+  std::printf("force differs by    %6.1f %%  %6.1f %%    median\n", 100.0 * before.force,
+              100.0 * after.force);
+  if (force_N) {
+    std::printf("force scale         %9s %9s    sd %s\n", "1.000",
+                fixed(static_cast<double>(made.force_scale), 3).c_str(),
+                fixed(static_cast<double>(made.force_scale_sd), 3).c_str());
+  } else {
+    std::printf("force scale         unknown: give the weight, to calibrate forces too\n");
+  }
+  std::fflush(stdout);
+}
+
+void work_live(CalibratedDevice &device, GainSession &work, ColourMode colour) {
+  std::unique_ptr<CalibrateView> view = make_calibrate_view(colour);
+  bool news = false;
+  const auto take = [&](const wire_packet &packet) {
+    if (work.judgement().state == Judgement::State::more && work.take(packet)) {
+      work.judge(false);
+      news = true;
+    }
+    if (news) {
+      view->update(work, true);
+      news = false;
+    }
+  };
+  device.follow(WIRE_STREAM_RAW, WIRE_RAW, take, [&] {
+    view->update(work, false);
+    while (auto key = view->key()) {
+      if (*key == 'q') {
+        throw Interrupted();
+      } else if (*key == 'u') {
+        work.take_back();
+      }
+    }
+    return work.judgement().state == Judgement::State::more;
+  });
+}
+
+/* Of the fingertip that the recording is of. */
+GainSession work_from(const CalibrateOptions &options, wire_info &info) {
+  RecordingReader reader(options.from, false, options.choice.device);
+  std::optional<GainSession> work;
+  bool pressures = false;
+  while (auto item = reader.next()) {
+    if (item->kind != RecordingReader::Item::Kind::packet) {
+      continue;
+    }
+    if (item->packet.type == WIRE_INFO && !work) {
+      info = item->packet.body.info;
+      work.emplace(info);
+    } else if (work) {
+      pressures = pressures || item->packet.type == WIRE_RAW;
+      if (work->take(item->packet)) {
+        const Placement &found = work->placements().back();
+        std::printf("placement %zu, %.1f s: strongest reading %.1f kPa\n",
+                    work->placements().size(), found.t_s,
+                    1e-3 * *std::max_element(found.reading_Pa.begin(), found.reading_Pa.end()));
+      }
+    }
+  }
+  if (!work || !pressures) {
+    throw Error(printable(options.from) + ": has no pressures to calibrate from; record with a "
+                                          "firmware that sends them (fingertip info: raw)");
+  }
+  work->judge(true);
+  return std::move(*work);
+}
+
+void refuse_unless_good(const Judgement &judgement) {
+  if (judgement.state != Judgement::State::good) {
+    throw Error("not calibrated: " + judgement.text);
+  }
+}
+
+int show(const CalibrateOptions &options) {
+  CalibratedDevice device(options);
+  const wire_info &info = device.info();
+  if (!(info.stored & WIRE_STORED_CALIBRATION)) {
+    std::printf("not calibrated%s\n",
+                info.stored & WIRE_STORED_DAMAGED ? "; what was stored cannot be read" : "");
+    return 0;
+  }
+  std::printf("calibrated %s from %u placements, force scale %s sd %s\n",
+              date_text(info.calibration.date_s).c_str(), info.calibration.placements,
+              fixed(static_cast<double>(info.calibration.force_scale), 3).c_str(),
+              fixed(static_cast<double>(info.calibration.force_scale_sd), 3).c_str());
+  print_gains(info.calibration, info.sensor_count);
+  return 0;
+}
+
+int erase(const CalibrateOptions &options) {
+  CalibratedDevice device(options);
+  if (!(device.info().stored & (WIRE_STORED_CALIBRATION | WIRE_STORED_DAMAGED))) {
+    std::printf("not calibrated\n");
+    return 0;
+  }
+  ask(options, "Forget the calibration of " + text_field(device.info().serial) + "?", "not erased");
+  device.erase();
+  std::printf("erased: it is as if never calibrated\n");
+  return 0;
+}
+
+int calibrate(const CalibrateOptions &options) {
+  std::optional<CalibratedDevice> device;
+  std::optional<GainSession> work;
+  if (options.from.empty()) {
+    device.emplace(options);
+    calibrating::check_firmware(device->info(), device->name());
+    device->check_sensors();
+    work.emplace(device->info());
+    work_live(*device, *work, options.colour);
+  } else {
+    wire_info info{};
+    work.emplace(work_from(options, info));
+    refuse_unless_good(work->judgement());
+    if (!options.dry_run) {
+      device.emplace(options);
+      device->check_is(info, options.from);
+    }
+  }
+  refuse_unless_good(work->judgement());
+  const std::time_t now_s = std::chrono::system_clock::to_time_t(wall_now());
+  const calibration made = work->made(options.force_N, static_cast<std::uint32_t>(now_s));
+  print_result(*work, made, options.force_N);
+  if (!device) {
+    return 0;
+  }
+  ask(options, "Write this into " + text_field(device->info().serial) + "?", "not written");
+  device->write(made);
+  std::printf("calibrated: it acts from now on\n");
+  return 0;
+}
+
+} // namespace
+
+int run_calibrate(const CalibrateOptions &options) {
+  try {
+    return options.show    ? show(options)
+           : options.erase ? erase(options)
+           : options.drag  ? calibrate_drag(options)
+                           : calibrate(options);
+  } catch (const Interrupted &) {
+    throw Error("interrupted; the fingertip is as it was");
+  }
+}
+
+} // namespace fingertip

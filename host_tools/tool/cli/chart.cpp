@@ -1,0 +1,229 @@
+#include "tool/cli/chart.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace fingertip {
+
+namespace {
+
+/* "force  10 N" and the axis. */
+constexpr int GUTTER = 11;
+/* Shown at the least; more where there is room for it. */
+constexpr double SPAN_s = 10;
+constexpr int FEWEST_ROWS = 5, FEWEST_COLUMNS = 4;
+
+/* Times of an area's columns, two dots each. */
+class Times {
+public:
+  Times(double interval_s, int columns) : interval_s_(interval_s), dots_(2 * columns) {
+    step_ = std::max<std::int64_t>(1, std::llround(std::ceil(SPAN_s / (interval_s * dots_))));
+  }
+  double span_s() const { return static_cast<double>(step_) * dots_ * interval_s_; }
+  int dots() const { return dots_; }
+  /* The intervals of one dot, where this is the newest of all. */
+  template <typename F> void each(std::int64_t newest, int dot, F &&visit) const {
+    /* Whole cells move, so that what has passed stays as it was drawn. */
+    std::int64_t last = newest / step_ | 1;
+    std::int64_t first = (last - dots_ + 1 + dot) * step_;
+    for (std::int64_t i = first; i < first + step_; i++) {
+      if (i >= 0 && i <= newest) {
+        visit(i);
+      }
+    }
+  }
+
+private:
+  double interval_s_;
+  int dots_;
+  std::int64_t step_;
+};
+
+std::string braille(unsigned dots) {
+  return {'\xE2', static_cast<char>(0xA0 | dots >> 6), static_cast<char>(0x80 | (dots & 0x3F))};
+}
+
+/* The bit of a dot: column 0 or 1, row 0 to 3 from above. */
+unsigned braille_bit(int column, int row) {
+  constexpr unsigned bits[2][4] = {{0x01, 0x02, 0x04, 0x40}, {0x08, 0x10, 0x20, 0x80}};
+  return bits[column][row];
+}
+
+std::string tick_text(float value) {
+  bool whole = value == std::round(value);
+  return number(value, whole ? 0 : std::abs(value) < 1 ? 2 : 1);
+}
+
+void draw_axis(Canvas &canvas, const Area &area, const Chart &chart) {
+  Style faint = text_style(FAINT);
+  canvas.text(area.left, area.top, chart.name, text_style(INK));
+  auto tick = [&](int row, const std::string &value) {
+    canvas.text(area.left + GUTTER - 1 - columns_of(value), area.top + row, value, faint);
+    canvas.text(area.left + GUTTER - 1, area.top + row, "┤", text_style(RULE));
+  };
+  for (int row = 0; row < area.height; row++) {
+    canvas.text(area.left + GUTTER - 1, area.top + row, "│", text_style(RULE));
+  }
+  bool symmetric = chart.low < 0;
+  std::string unit = std::string(" ") + chart.unit;
+  if (area.height == 1) {
+    tick(0, (symmetric ? "±" : "") + tick_text(chart.high) + unit);
+    return;
+  }
+  tick(0, tick_text(chart.high) + unit);
+  tick(area.height - 1, tick_text(chart.low));
+  if (area.height >= 5 && area.height % 2) {
+    tick(area.height / 2, tick_text((chart.low + chart.high) / 2));
+  }
+}
+
+/* The dots of one cell. */
+struct Dots {
+  unsigned bits = 0;
+  bool doubtful = false, alarm = false;
+  Colour colour = ACCENT;
+};
+
+class Field {
+public:
+  explicit Field(const Area &area)
+      : width_(area.width), height_(area.height),
+        cells_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_)) {}
+
+  int rows() const { return 4 * height_; }
+  Dots &cell(int column, int row) {
+    return cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) +
+                  static_cast<std::size_t>(column)];
+  }
+  void set(int dot, int row, const ChartPoint &point, Colour colour) {
+    Dots &dots = cell(dot / 2, row / 4);
+    dots.bits |= braille_bit(dot % 2, row % 4);
+    dots.doubtful = dots.doubtful || point.doubtful;
+    dots.alarm = dots.alarm || point.alarm;
+    dots.colour = colour;
+  }
+
+private:
+  int width_, height_;
+  std::vector<Dots> cells_;
+};
+
+ChartPoint point_of(const Curve &curve, const Times &times, int dot) {
+  ChartPoint point;
+  times.each(curve.last, dot, [&](std::int64_t interval) {
+    const ChartPoint here = curve.at(interval);
+    bool better =
+        here.value &&
+        (!point.value || (point.doubtful && !here.doubtful) ||
+         (point.doubtful == here.doubtful && (curve.goes_both_ways || *here.value > *point.value)));
+    if (better) {
+      point.value = here.value;
+      point.doubtful = here.doubtful;
+    }
+    point.alarm = point.alarm || here.alarm;
+  });
+  return point;
+}
+
+void draw_curves(Canvas &canvas, const Area &area, const Chart &chart, const Times &times) {
+  Field field(area);
+  auto row_of = [&](float value) {
+    float part = (chart.high - value) / (chart.high - chart.low);
+    return static_cast<int>(std::lround(part * static_cast<float>(field.rows() - 1)));
+  };
+  for (const Curve &curve : chart.curves) {
+    int before = -1; /* row of the dot before; none */
+    for (int dot = 0; dot < times.dots(); dot++) {
+      const ChartPoint point = point_of(curve, times, dot);
+      if (!point.value || *point.value < chart.low || *point.value > chart.high) {
+        before = -1;
+        continue;
+      }
+      int row = row_of(*point.value);
+      if (point.doubtful) {
+        before = -1;
+        if (dot % 2 == 0) {
+          field.set(dot, row, point, curve.colour);
+        }
+        continue;
+      }
+      field.set(dot, row, point, curve.colour);
+      for (int between = before < 0 ? row : before; between != row;
+           between += between < row ? 1 : -1) {
+        field.set(dot, between, point, curve.colour);
+      }
+      before = row;
+    }
+  }
+  int line_row = chart.line ? row_of(*chart.line) / 4 : -1;
+  for (int row = 0; row < area.height; row++) {
+    for (int column = 0; column < area.width; column++) {
+      const Dots &dots = field.cell(column, row);
+      if (dots.bits) {
+        Colour colour = dots.doubtful ? WARNING : dots.alarm ? BAD : dots.colour;
+        canvas.text(area.left + column, area.top + row, braille(dots.bits), text_style(colour));
+      } else if (row == line_row) {
+        canvas.text(area.left + column, area.top + row, "╌", text_style(RULE));
+      }
+    }
+  }
+}
+
+void draw_time(Canvas &canvas, const Area &area, double span_s) {
+  double step_s = span_s > 60 ? 20 : span_s > 25 ? 10 : span_s > 12 ? 5 : 2;
+  int free_until = area.left + area.width;
+  for (double ago_s = 0; ago_s <= span_s; ago_s += step_s) {
+    std::string text = ago_s > 0 ? "-" + fixed(ago_s, 0) : "0 s";
+    int at = area.left + area.width - 1 -
+             static_cast<int>(std::lround(ago_s / span_s * (area.width - 1)));
+    at = std::min(at - (ago_s > 0 ? 1 : 0), area.left + area.width - columns_of(text));
+    if (at < area.left || at + columns_of(text) > free_until) {
+      continue;
+    }
+    canvas.text(at, area.top, text, text_style(FAINT));
+    free_until = at - 1;
+  }
+}
+
+} // namespace
+
+float round_above(float value) {
+  float power = std::pow(10.0f, std::floor(std::log10(value)));
+  for (float step : {1.0f, 2.0f, 5.0f}) {
+    if (value <= step * power * 1.0001f) {
+      return step * power;
+    }
+  }
+  return 10 * power;
+}
+
+bool has_room_for_charts(const Area &area) {
+  return area.width - GUTTER >= FEWEST_COLUMNS && area.height >= FEWEST_ROWS;
+}
+
+void each_shown(const Area &area, double interval_s, std::int64_t last,
+                const std::function<void(std::int64_t interval)> &visit) {
+  const Times times(interval_s, area.width - GUTTER);
+  for (int dot = 0; dot < times.dots(); dot++) {
+    times.each(last, dot, visit);
+  }
+}
+
+void draw_charts(Canvas &canvas, const Area &area, double interval_s,
+                 const std::vector<Chart> &charts) {
+  int columns = area.width - GUTTER;
+  const Times times(interval_s, columns);
+  int rows = area.height - 1, count = static_cast<int>(charts.size());
+  int top = area.top;
+  for (int i = 0; i < count; i++) {
+    const Chart &chart = charts[static_cast<std::size_t>(i)];
+    int height = rows / count + (i < rows % count ? 1 : 0);
+    draw_axis(canvas, {area.left, top, area.width, height}, chart);
+    draw_curves(canvas, {area.left + GUTTER, top, columns, height}, chart, times);
+    top += height;
+  }
+  draw_time(canvas, {area.left + GUTTER, top, columns, 1}, times.span_s());
+}
+
+} // namespace fingertip

@@ -1,0 +1,174 @@
+#include "tool/cli/command_line.hpp"
+
+#include "libfingertip/text.hpp"
+#include "tool/cli/usage.hpp"
+
+#include <map>
+
+namespace fingertip {
+
+namespace {
+
+constexpr std::size_t HELP_COLUMNS = 80;
+
+/* Lines of at most this many characters, broken at blanks; all but the first begin with so many. */
+std::string wrapped(const std::string &line, std::size_t columns, std::size_t indent) {
+  std::string text = line;
+  std::string lines;
+  while (text.size() > columns) {
+    std::size_t at = text.rfind(' ', columns);
+    if (at == std::string::npos || at <= text.find_first_not_of(' ')) {
+      break;
+    }
+    if (at <= indent) {
+      break;
+    }
+    lines += text.substr(0, at) + "\n";
+    text = std::string(indent, ' ') + text.substr(at + 1);
+  }
+  return lines + text;
+}
+
+/* No word is cut by a terminal of 80 columns. */
+class HelpFormatter : public CLI::Formatter {
+public:
+  std::string make_help(const CLI::App *app, std::string name,
+                        CLI::AppFormatMode mode) const override {
+    std::string help = CLI::Formatter::make_help(app, name, mode);
+    std::string all;
+    for (std::string_view line : split(help, '\n')) {
+      std::size_t indent = line.substr(0, 2) == "  " ? column_width_ : 0;
+      all += wrapped(std::string(line), HELP_COLUMNS, indent) + "\n";
+    }
+    all.pop_back();
+    return all;
+  }
+};
+
+/* What CLI11 says, as people say it. */
+std::string problem_of(const CLI::App *failed, const CLI::Error &error) {
+  std::string text = error.what();
+  std::string kind = error.get_name();
+  if (kind == "ArgumentMismatch" && text.find("At Most") != std::string::npos) {
+    return text.substr(0, text.find(':')) + " is given twice; give it once";
+  }
+  if (kind == "RequiredError") {
+    for (const CLI::App *command : failed->get_subcommands()) {
+      for (const CLI::Option *option : command->get_options()) {
+        if (option->get_required() && text.rfind(option->get_name(), 0) == 0) {
+          return option->get_type_name() + " is missing";
+        }
+      }
+    }
+  }
+  return text;
+}
+
+Reach reach_from_text(const std::string &text) {
+  static const std::map<std::string, Reach> kinds = {{"auto", Reach::automatic},
+                                                     {"socket", Reach::socket},
+                                                     {"serial", Reach::serial},
+                                                     {"usb", Reach::usb}};
+  auto kind = kinds.find(text);
+  if (kind == kinds.end()) {
+    wrong_value("--transport", text, "auto, socket, serial or usb");
+  }
+  return kind->second;
+}
+
+ColourMode colour_from_text(const std::string &text) {
+  static const std::map<std::string, ColourMode> colours = {{"auto", ColourMode::automatic},
+                                                            {"truecolour", ColourMode::truecolour},
+                                                            {"256", ColourMode::palette_256},
+                                                            {"plain", ColourMode::plain}};
+  auto mode = colours.find(text);
+  if (mode == colours.end()) {
+    wrong_value("--colour", text, "auto, truecolour, 256 or plain");
+  }
+  return mode->second;
+}
+
+} // namespace
+
+CommandLine::CommandLine(const std::string &description, const std::string &version)
+    : app_(description, "fingertip") {
+  app_.set_version_flag("--version", "fingertip " + version);
+  app_.require_subcommand(1);
+  app_.formatter(std::make_shared<HelpFormatter>());
+  app_.failure_message([](const CLI::App *failed, const CLI::Error &error) {
+    std::string command = "fingertip";
+    for (const CLI::App *chosen : failed->get_subcommands()) {
+      command += " " + chosen->get_name();
+    }
+    return printable("fingertip: " + problem_of(failed, error) + "; see " + command + " --help") +
+           "\n";
+  });
+}
+
+CLI::App *CommandLine::add(const std::string &name, const std::string &text,
+                           std::function<int()> run) {
+  CLI::App *command = app_.add_subcommand(name, text);
+  command->callback([this, run = std::move(run)] { chosen_ = run; });
+  return command;
+}
+
+int CommandLine::run(int argc, char **argv) {
+  std::string commands;
+  bool is_known = false;
+  for (const CLI::App *command : app_.get_subcommands([](const CLI::App *) { return true; })) {
+    commands += (commands.empty() ? "" : ", ") + command->get_name();
+    is_known = is_known || (argc > 1 && command->get_name() == argv[1]);
+  }
+  if (argc < 2 || (argv[1][0] != '-' && !is_known)) {
+    throw WrongUsage(
+        (argc < 2 ? "a command is missing" : "\"" + std::string(argv[1]) + "\" is no command") +
+        "; give one of " + commands + "; see fingertip --help");
+  }
+  try {
+    app_.parse(argc, argv);
+  } catch (const CLI::ParseError &error) {
+    return app_.exit(error) == 0 ? 0 : 2;
+  }
+  catch_signals();
+  return chosen_();
+}
+
+void with_transport(CLI::App *command, Reach &reach) {
+  command
+      ->add_option_function<std::string>(
+          "--transport", [&reach](const std::string &text) { reach = reach_from_text(text); },
+          "socket (of fingertip serve), serial, usb (libusb, past the system's driver), or auto: "
+          "the first of these that there is")
+      ->type_name("KIND");
+}
+
+void with_port_only(CLI::App *command, Choice &choice) {
+  command
+      ->add_option("--port", choice.port,
+                   "Serial port or pseudo-terminal; default: $FINGERTIP_PORT, or a fingertip "
+                   "plugged in")
+      ->type_name("PATH");
+  with_transport(command, choice.reach);
+}
+
+void with_port(CLI::App *command, Choice &choice) {
+  command
+      ->add_option("--device", choice.device,
+                   "Serial number of the fingertip; default: the only one there is")
+      ->type_name("SERIAL");
+  with_port_only(command, choice);
+}
+
+void with_colour(CLI::App *command, ColourMode &mode) {
+  command
+      ->add_option_function<std::string>(
+          "--colour", [&mode](const std::string &text) { mode = colour_from_text(text); },
+          "auto, truecolour, 256, or plain: a line a second")
+      ->type_name("MODE");
+}
+
+void wrong_value(const std::string &option, const std::string &text, const std::string &allowed) {
+  throw CLI::ValidationError(option + " \"" + text + "\" is not possible; give " + allowed);
+}
+
+} // namespace fingertip

@@ -1,0 +1,39 @@
+/* The command line: its commands, and the options that several of them have. */
+#pragma once
+
+#include "libfingertip/connection.hpp"
+#include "tool/cli/terminal.hpp"
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace fingertip {
+
+class CommandLine {
+public:
+  CommandLine(const std::string &description, const std::string &version);
+
+  /* run: the exit status; called once everything was parsed. */
+  CLI::App *add(const std::string &name, const std::string &text, std::function<int()> run);
+
+  /* Exit status. Throws Error, WrongUsage, and whatever the command throws. */
+  int run(int argc, char **argv);
+
+private:
+  CLI::App app_;
+  std::function<int()> chosen_;
+};
+
+/* --transport; --port too; --device too. */
+void with_transport(CLI::App *command, Reach &reach);
+void with_port_only(CLI::App *command, Choice &choice);
+void with_port(CLI::App *command, Choice &choice);
+void with_colour(CLI::App *command, ColourMode &mode);
+
+/* Where an option's text is no value of it. */
+[[noreturn]] void wrong_value(const std::string &option, const std::string &text,
+                              const std::string &allowed);
+
+} // namespace fingertip

@@ -1,0 +1,79 @@
+#include "tool/cli/calibrate.hpp"
+
+#include "libfingertip/text.hpp"
+#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/usage.hpp"
+
+#include <memory>
+
+namespace fingertip {
+
+namespace {
+
+constexpr double GRAVITY_N_PER_g = 9.80665e-3;
+
+double weight_N_from_text(const std::string &option, const std::string &text, double unit_N) {
+  constexpr double LIGHTEST_N = 0.1, HEAVIEST_N = 50;
+  auto weight = to_double(text);
+  if (!weight || *weight * unit_N < LIGHTEST_N || *weight * unit_N > HEAVIEST_N) {
+    wrong_value(option, text,
+                fixed(LIGHTEST_N / unit_N, 1) + " to " + fixed(HEAVIEST_N / unit_N, 0));
+  }
+  return *weight * unit_N;
+}
+
+} // namespace
+
+void add_calibrate(CommandLine &line) {
+  auto options = std::make_shared<CalibrateOptions>();
+  CLI::App *command = line.add(
+      "calibrate", "Find the sensors' gains by setting down one weight at some twenty places",
+      [options] {
+        if (options->dry_run && options->from.empty()) {
+          throw WrongUsage("--dry-run goes with --from; without, it asks before it writes");
+        }
+        if (options->drag && !options->force_N) {
+          throw WrongUsage("--drag needs to know what pulls: --weight GRAMS on the string, or "
+                           "--force N");
+        }
+        return run_calibrate(*options);
+      });
+  with_port(command, options->choice);
+  CLI::Option *weight = command
+                            ->add_option_function<std::string>(
+                                "--weight",
+                                [options](const std::string &text) {
+                                  options->force_N =
+                                      weight_N_from_text("--weight", text, GRAVITY_N_PER_g);
+                                },
+                                "The weight's, where it is known: then forces are calibrated too")
+                            ->type_name("GRAMS");
+  CLI::Option *force = command
+                           ->add_option_function<std::string>(
+                               "--force",
+                               [options](const std::string &text) {
+                                 options->force_N = weight_N_from_text("--force", text, 1.0);
+                               },
+                               "The same in newtons")
+                           ->excludes(weight)
+                           ->type_name("N");
+  CLI::Option *drag =
+      command->add_flag("--drag", options->drag,
+                        "The tangential force's scale instead: the weight hangs on a string that "
+                        "pulls an object level along the pad, several times in each direction");
+  CLI::Option *from =
+      command
+          ->add_option("--from", options->from,
+                       "From a recording of it, placements with pressures, instead of live")
+          ->type_name("FILE.csv");
+  CLI::Option *dry_run = command->add_flag("--dry-run", options->dry_run, "With --from: only show");
+  CLI::Option *yes = command->add_flag("--yes", options->yes, "Write, or erase, without asking");
+  CLI::Option *show =
+      command->add_flag("--show", options->show, "Show what the fingertip is calibrated by")
+          ->excludes(weight, force, drag, from, dry_run, yes);
+  command->add_flag("--erase", options->erase, "Have it forget its calibration; it asks")
+      ->excludes(weight, force, drag, from, dry_run, show);
+  with_colour(command, options->colour);
+}
+
+} // namespace fingertip

@@ -1,0 +1,63 @@
+#include "libfingertip/line_sink.hpp"
+#include "libfingertip/line_source.hpp"
+#include "libfingertip/text.hpp"
+#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/converter.hpp"
+#include "tool/cli/usage.hpp"
+
+#include <fstream>
+#include <memory>
+
+namespace fingertip {
+
+namespace {
+
+bool ends_with(const std::string &text, const std::string &end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+/* By its content; what is neither, the reader says. */
+bool is_recording(const std::string &path) {
+  std::string begin(12, '\0');
+  std::ifstream(path, std::ios::binary).read(begin.data(), 12);
+  return begin == "# fingertip-" || is_mcap(path);
+}
+
+int convert(const Conversion &conversion) {
+  bool to_capture = ends_with(conversion.to, ".ftr");
+  if (!to_capture && !ends_with(conversion.to, ".csv") && !is_mcap_name(conversion.to)) {
+    throw WrongUsage("\"" + printable(conversion.to) +
+                     "\" must end with .csv, .mcap or .ftr, which says what to make");
+  }
+  if (to_capture) {
+    convert_to_capture(conversion);
+  } else if (conversion.device.empty() && is_recording(conversion.from)) {
+    convert_lines(conversion);
+  } else {
+    convert_packets(conversion);
+  }
+  return 0;
+}
+
+} // namespace
+
+void add_convert(CommandLine &line) {
+  auto options = std::make_shared<Conversion>();
+  CLI::App *command = line.add("convert", "Turn a recording or a capture into another kind",
+                               [options] { return convert(*options); });
+  command->add_option("from", options->from, "Recording (.csv, .mcap) or bytes of the line (.ftr)")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("to", options->to, "What to write; its name says which kind")
+      ->required()
+      ->type_name("OUT.csv|OUT.mcap|OUT.ftr");
+  command
+      ->add_option("--device", options->device,
+                   "Serial number of one of several fingertips in the recording; only this one")
+      ->type_name("SERIAL");
+  command->add_flag("--salvage", options->salvage,
+                    "Take what can be read of a damaged file, and say what cannot");
+  command->add_flag("--overwrite", options->overwrite, "Replace OUT if it exists");
+}
+
+} // namespace fingertip

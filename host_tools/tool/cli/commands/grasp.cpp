@@ -1,0 +1,90 @@
+#include "grasp/settings.hpp"
+#include "libfingertip/text.hpp"
+#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/grasp_session.hpp"
+#include "tool/cli/gripper_options.hpp"
+#include "tool/cli/recording_options.hpp"
+
+#include <memory>
+
+namespace fingertip {
+
+namespace {
+
+/* "N, 0.5 to 100": what an option takes. */
+std::string range_of(const GraspSetting &setting) {
+  auto text = [](double value) { return shortest(static_cast<float>(value)); };
+  return std::string(setting.unit) + (*setting.unit ? ", " : "") + text(setting.low) + " to " +
+         text(setting.high);
+}
+
+/* Of the usual gripper; those that depend on it are not told. */
+std::string default_of(const GraspSetting &setting, const grip_settings &usual,
+                       const grip_settings &other) {
+  double value = value_of(setting, usual);
+  return value == value_of(setting, other) && setting.name != std::string("fixed")
+             ? "; default " + shortest(static_cast<float>(value))
+             : "";
+}
+
+void with_limits(CLI::App *command, std::map<std::string, double> &limits) {
+  const auto models = gripper_models();
+  const grip_settings usual = settings_for(models.front(), {});
+  const grip_settings other = settings_for(models.back(), {});
+  for (const GraspSetting &setting : grasp_settings()) {
+    std::string option = std::string("--") + setting.name;
+    command
+        ->add_option_function<std::string>(
+            option,
+            [&limits, &setting, option](const std::string &text) {
+              auto value = to_double(text);
+              if (!value || *value < setting.low || *value > setting.high) {
+                wrong_value(option, text, range_of(setting));
+              }
+              limits[setting.name] = *value;
+            },
+            setting.help + default_of(setting, usual, other))
+        ->type_name(*setting.unit ? setting.unit : "X")
+        ->group("Limits");
+  }
+}
+
+} // namespace
+
+void add_grasp(CommandLine &line) {
+  auto options = std::make_shared<GraspOptions>();
+  CLI::App *command = line.add("grasp", "Hold an object between two fingertips on a gripper",
+                               [options] { return run_grasp(*options); });
+  std::string models;
+  for (const GripperTraits &traits : gripper_models()) {
+    models += (models.empty() ? "" : ", ") + traits.model;
+  }
+  command->add_option("--gripper", options->gripper.model, models)->required()->type_name("MODEL");
+  command
+      ->add_option("--gripper-port", options->gripper.port,
+                   "Its serial line; default: the only one on USB that is no fingertip")
+      ->type_name("PATH");
+  command->add_option("--left", options->left, "Fingertip; default: the first of two")
+      ->type_name("SERIAL|PORT");
+  command->add_option("--right", options->right, "Fingertip; default: the other")
+      ->type_name("SERIAL|PORT");
+  command->add_flag("--activate", options->activate,
+                    "Activate a gripper that is not: it moves, and drops what it holds");
+  with_seconds(command, options->seconds, "End after this long, the gripper holding");
+  command->add_option("-o,--record", options->recording, "Record all of it")->type_name("FILE.csv|FILE.mcap");
+  command->add_flag("--overwrite", options->overwrite, "Replace the recording if it exists");
+  command->add_flag("--quiet", options->quiet, "Only what changes, on standard error");
+  with_transport(command, options->reach);
+  with_colour(command, options->colour);
+  with_gripper_line(command, options->gripper);
+  with_limits(command, options->limits);
+  command->footer("Exit status:\n"
+                  "  0  as asked, the gripper holding or open\n"
+                  "  1  an error, which is named\n"
+                  "  2  wrong usage\n"
+                  "  3  it closed, and nothing was there\n"
+                  "  4  the object fell\n"
+                  "  5  the gripper failed, was not active, or did not answer at the end");
+}
+
+} // namespace fingertip

@@ -1,0 +1,67 @@
+#include "libfingertip/packet_fields.hpp"
+#include "libfingertip/text.hpp"
+#include "tool/advice.hpp"
+#include "tool/cli/commands/commands.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+
+namespace fingertip {
+
+namespace {
+
+/* "socket /run/fingertip/E66..2C.sock, serial /dev/ttyACM0, usb 001/005" */
+std::string reached_text(const Found &found) {
+  std::string text = found.socket.empty() ? "" : "socket " + found.socket;
+  if (!found.port.empty()) {
+    text += (text.empty() ? "" : ", ") + std::string(found.usb ? "serial " : "port ") + found.port;
+  }
+  if (found.usb) {
+    char place[32];
+    std::snprintf(place, sizeof place, "usb %03u/%03u", found.usb->bus, found.usb->address);
+    text += (text.empty() ? "" : ", ") + std::string(place);
+  }
+  return text;
+}
+
+int list(Reach reach) {
+  Finds finds = find_fingertips();
+  std::vector<Found> all = finds.here;
+  all.insert(all.end(), finds.in_environment.begin(), finds.in_environment.end());
+  if (all.empty()) {
+    throw Error(ErrorCode::no_fingertip, "no fingertip found");
+  }
+  for (const Found &found : all) {
+    Metadata info = {{"serial", found.serial}, {"board", ""}, {"scene", ""}, {"firmware", ""}};
+    std::string reached = reached_text(found);
+    try {
+      auto way = way_to(found, reach);
+      if (way) {
+        info = info_metadata(ask(*way, stop_requested));
+      }
+    } catch (const Error &error) {
+      reached += " (" + told(error) + ")";
+    }
+    for (const char *key : {"serial", "board", "firmware"}) {
+      auto pair = std::find_if(info.begin(), info.end(), [&](auto &p) { return p.first == key; });
+      std::printf("%s\t", pair->second.empty() ? "-" : printable(pair->second).c_str());
+    }
+    std::printf("%s\n", printable(reached).c_str());
+  }
+  return 0;
+}
+
+} // namespace
+
+void add_list(CommandLine &line) {
+  auto choice = std::make_shared<Choice>();
+  with_transport(
+      line.add("list",
+               "List the fingertips plugged in, and the paths in $FINGERTIP_PORT: serial "
+               "number, board, firmware, how it is reached",
+               [choice] { return list(choice->reach); }),
+      choice->reach);
+}
+
+} // namespace fingertip

@@ -1,0 +1,16 @@
+#include "tool/cli/rule.hpp"
+
+#include "tool/cli/commands/commands.hpp"
+
+#include <cstdio>
+
+namespace fingertip {
+
+void add_rule(CommandLine &line) {
+  line.add("rule", "Print the udev rule that lets users without privileges open fingertips", [] {
+    std::fputs(UDEV_RULE, stdout);
+    return 0;
+  });
+}
+
+} // namespace fingertip

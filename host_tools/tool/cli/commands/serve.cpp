@@ -1,0 +1,123 @@
+#include "libfingertip/clock.hpp"
+#include "libfingertip/share_socket.hpp"
+#include "libfingertip/text.hpp"
+#include "library/share/server.hpp"
+#include "tool/advice.hpp"
+#include "tool/cli/commands/commands.hpp"
+
+#include <chrono>
+#include <cstdio>
+#include <grp.h>
+#include <map>
+#include <memory>
+#include <optional>
+
+namespace fingertip {
+
+namespace {
+
+struct ServeOptions {
+  Choice choice; /* without the device */
+  std::vector<std::string> devices;
+  std::optional<gid_t> group;
+  bool common = false;
+};
+
+constexpr std::chrono::milliseconds DEVICE_LOOK_INTERVAL{1000};
+
+void say(const std::string &line) {
+  std::fprintf(stderr, "%s\n", printable(line).c_str());
+}
+
+gid_t group_of(const std::string &name) {
+  const group *found = getgrnam(name.c_str());
+  if (!found) {
+    wrong_value("--group", name, "the name of a group (getent group)");
+  }
+  return found->gr_gid;
+}
+
+/* Those plugged in that are not served yet; what keeps one from being served is said once. */
+class Watch {
+public:
+  Watch(Server &server, Reach reach) : server_(server), reach_(reach) {}
+
+  void look() {
+    for (const Found &found : find_usb()) {
+      auto way = way_to(found, reach_);
+      if (!way || server_.has(*way)) {
+        continue;
+      }
+      try {
+        server_.add(*way);
+        said_.erase(found.serial);
+      } catch (const Error &error) {
+        if (said_[found.serial] != error.what()) {
+          said_[found.serial] = error.what();
+          say(told(error));
+        }
+      }
+    }
+  }
+
+private:
+  Server &server_;
+  Reach reach_;
+  std::map<std::string, std::string> said_;
+};
+
+int serve(const ServeOptions &options) {
+  Server server({options.common ? COMMON_SHARE_FOLDER : own_share_folder(), options.group}, say);
+  bool all = options.devices.empty() && options.choice.port.empty();
+  Watch watch(server, options.choice.reach);
+  if (all) {
+    for (const Way &way : all_ways(options.choice.reach)) {
+      server.add(way);
+    }
+  }
+  for (const std::string &device : options.devices) {
+    server.add(choose_way({options.choice.port, device, options.choice.reach}));
+  }
+  if (!all && options.devices.empty()) {
+    server.add(choose_way(options.choice));
+  }
+  if (server.is_empty()) {
+    say("no fingertip here yet; each that is plugged in will be shared");
+  }
+  HostTime looked = host_now();
+  while (!stop_requested()) {
+    server.step(DEVICE_LOOK_INTERVAL);
+    if (all && host_now() - looked > DEVICE_LOOK_INTERVAL) {
+      looked = host_now();
+      watch.look();
+    }
+  }
+  return 0;
+}
+
+} // namespace
+
+void add_serve(CommandLine &line) {
+  auto options = std::make_shared<ServeOptions>();
+  CLI::App *command =
+      line.add("serve", "Share fingertips with every program that uses them, until Ctrl-C",
+               [options] { return serve(*options); });
+  command
+      ->add_option("--device", options->devices,
+                   "Serial number of a fingertip to share; default: all, also those plugged in "
+                   "later")
+      ->take_all()
+      ->expected(1)
+      ->type_name("SERIAL");
+  with_port_only(command, options->choice);
+  command
+      ->add_option_function<std::string>(
+          "--group", [options](const std::string &name) { options->group = group_of(name); },
+          "Who may use them beside this user; default: this user's group")
+      ->type_name("NAME");
+  command->add_flag("--common", options->common,
+                    "Share in /run/fingertip, where all users look, instead of in this user's "
+                    "folder");
+}
+
+} // namespace fingertip

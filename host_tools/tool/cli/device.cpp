@@ -1,0 +1,31 @@
+#include "tool/cli/device.hpp"
+
+#include "libfingertip/text.hpp"
+
+#include <cstdio>
+
+namespace fingertip {
+
+namespace {
+
+/* A fingertip answers within milliseconds, one that starts within a second. */
+constexpr std::int64_t SILENCE_us = 1500000;
+
+/* For as long as the command lasts: whether to stop; tells once that nothing was heard. */
+std::function<bool()> patience(const Transport &transport, const Session &session) {
+  return [&transport, &session, begun_us = steady_now_us(), told = false]() mutable {
+    if (!told && session.statistics().bytes == 0 && steady_now_us() - begun_us > SILENCE_us) {
+      told = true;
+      std::fprintf(stderr, "%s: waiting for an answer\n",
+                   printable(transport.description()).c_str());
+    }
+    return stop_requested();
+  };
+}
+
+} // namespace
+
+Device::Device(const Choice &choice)
+    : transport(open_way(choose_way(choice))), session(*transport, patience(*transport, session)) {}
+
+} // namespace fingertip

@@ -1,0 +1,36 @@
+#include "tool/cli/gains.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+
+namespace fingertip {
+
+std::string date_text(std::uint32_t date_s) {
+  std::time_t time = date_s;
+  std::tm utc{};
+  gmtime_r(&time, &utc);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M UTC", &utc);
+  return text;
+}
+
+void print_gains(const calibration &calibration, std::uint8_t sensor_count) {
+  constexpr int HALF = 10;
+  constexpr double PER_MARK = 0.02;
+  std::printf("\nsensor    gain    sd %%%*s-20 %%      mean      +20 %%\n", 3, "");
+  for (int k = 0; k < sensor_count; k++) {
+    const sensor_calibration &sensor = calibration.sensors[k];
+    int marks =
+        std::clamp(static_cast<int>(std::lround((static_cast<double>(sensor.gain) - 1) / PER_MARK)),
+                   -HALF, HALF);
+    std::string below(static_cast<std::size_t>(std::max(-marks, 0)), '#');
+    std::string above(static_cast<std::size_t>(std::max(marks, 0)), '#');
+    std::printf("%6d  %6.3f  %6.1f   %*s%s|%s\n", k, static_cast<double>(sensor.gain),
+                100.0 * static_cast<double>(sensor.gain_sd),
+                HALF + 2 - static_cast<int>(below.size()), "", below.c_str(), above.c_str());
+  }
+}
+
+} // namespace fingertip

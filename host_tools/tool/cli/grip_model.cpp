@@ -1,0 +1,90 @@
+#include "tool/cli/grip_model.hpp"
+
+#include "grasp/words.hpp"
+#include "libfingertip/text.hpp"
+
+#include <algorithm>
+
+namespace fingertip {
+
+namespace {
+
+/* The head's keys for what a view shows. */
+constexpr const char *CAP_KEY = "grasp_cap", *GRIPPER_KEY = "grasp_gripper";
+
+bool is_controlled(std::uint8_t state) {
+  return state == GRIP_SQUEEZE || state == GRIP_READY || state == GRIP_HOLDING ||
+         state == GRIP_SLIPPING;
+}
+
+} // namespace
+
+void GripModel::take(const GripRow &row) {
+  if (!row_ || row_->report.state != row.report.state) {
+    state_since_us_ = row.time_us;
+  }
+  row_ = row;
+  auto interval =
+      static_cast<std::int64_t>(std::max(row.time_us, 0.0) / static_cast<double>(INTERVAL_us));
+  if (samples_.empty() || interval < last_interval_) {
+    samples_.assign(1, {});
+  } else {
+    auto passed = std::min<std::int64_t>(interval - last_interval_, SAMPLES);
+    for (std::int64_t i = 0; i < passed; i++) {
+      samples_.emplace_back();
+    }
+  }
+  last_interval_ = interval;
+  while (samples_.size() > SAMPLES) {
+    samples_.pop_front();
+  }
+  const grip_report &report = row.report;
+  Sample &last = samples_.back();
+  last.controlled = is_controlled(report.state);
+  last.wanted_N = static_cast<float>(report.wanted_mN) / 1000;
+  last.loaded = last.controlled && (report.load_mN > 0 || report.margin_permille > 0);
+  last.load_N = static_cast<float>(report.load_mN) / 1000;
+  last.slipping = last.slipping || report.state == GRIP_SLIPPING;
+  last.answered = row.status.has_value();
+  last.width_mm = row.status ? static_cast<float>(row.status->width_mm) : 0;
+}
+
+void GripModel::take(const Metadata &head) {
+  for (const auto &[key, value] : head) {
+    if (key == CAP_KEY) {
+      cap_N_ = to_float(split(value, ' ')[0]).value_or(0);
+    } else if (key == GRIPPER_KEY) {
+      gripper_ = value;
+    }
+  }
+}
+
+const GripModel::Sample &GripModel::sample(std::int64_t interval) const {
+  static const Sample none{};
+  std::int64_t oldest = last_interval_ - static_cast<std::int64_t>(samples_.size()) + 1;
+  bool there = interval >= oldest && interval <= last_interval_;
+  return there ? samples_[static_cast<std::size_t>(interval - oldest)] : none;
+}
+
+std::string grip_line(const GripModel &grip) {
+  if (!grip.row()) {
+    return "nothing known of the gripper";
+  }
+  const GripRow &row = *grip.row();
+  const grip_report &report = row.report;
+  std::string text = fixed(grip.seconds(), 1) + " s  " + state_name(report.state) + "  width " +
+                     (row.status ? fixed(row.status->width_mm, 1) : "-") + " mm  force " +
+                     fixed(report.force_mN / 1e3, 2) + " N  wanted " +
+                     fixed(report.wanted_mN / 1e3, 2) + " N  load " +
+                     fixed(report.load_mN / 1e3, 2) + " N";
+  if (report.margin_permille > 0) {
+    text += "  margin " + fixed(report.margin_permille / 1e3, 2);
+  }
+  text += "  slides " + std::to_string(report.slides);
+  for (const std::string &trouble : trouble_texts(report.trouble)) {
+    text += "  " + trouble;
+  }
+  return text;
+}
+
+} // namespace fingertip

@@ -1,0 +1,67 @@
+#include "tool/cli/gripper_options.hpp"
+
+#include "grasp/gripper/serial_line.hpp"
+#include "tool/advice.hpp"
+#include "tool/cli/usage.hpp"
+
+namespace fingertip {
+
+namespace {
+
+std::string only_port() {
+  const std::vector<GripperPort> ports = find_gripper_ports();
+  if (ports.size() == 1) {
+    return ports.front().path;
+  }
+  std::string names;
+  for (const GripperPort &port : ports) {
+    names += " " + port.path;
+  }
+  throw WrongUsage(ports.empty() ? "no serial port on USB is here; name the gripper's with --port"
+                                 : "choose one with --port:" + names);
+}
+
+} // namespace
+
+void with_gripper_line(CLI::App *command, GripperWay &way) {
+  command->add_option("--slave", way.slave, "Its address on the line; default: 9, of a servo 6")
+      ->type_name("N");
+  command
+      ->add_option("--closed", way.closed_count,
+                   "Position that it tells when its pads touch; default: 230, of a servo 2048")
+      ->type_name("COUNT");
+  command
+      ->add_option("--open", way.open_count,
+                   "Position that it tells when it is open; default: 3, of a servo 2700")
+      ->type_name("COUNT");
+  command
+      ->add_option("--jaw", way.jaw_mm,
+                   "Of a servo: from its axis to the middle of the pad; default: 100 mm")
+      ->type_name("MM");
+  command
+      ->add_option_function<double>(
+          "--timeout", [&way](double timeout_ms) { way.timeout_s = timeout_ms / 1000; },
+          "Of one answer; default: 50 ms")
+      ->type_name("MS");
+}
+
+Error with_gripper_advice(const Error &error) {
+  const std::string what_to_do = gripper_advice(error.code());
+  return Error(error.what() + (what_to_do.empty() ? "" : "; " + what_to_do));
+}
+
+std::unique_ptr<Gripper> reach_gripper(GripperWay &way) {
+  if (way.port.empty()) {
+    way.port = only_port();
+  }
+  try {
+    return open_gripper(way);
+  } catch (const Error &error) {
+    if (error.code() == ErrorCode::bad_value) {
+      throw WrongUsage(error.what());
+    }
+    throw with_gripper_advice(error);
+  }
+}
+
+} // namespace fingertip

@@ -1,0 +1,425 @@
+#include "tool/cli/live.hpp"
+
+#include "libfingertip/clock.hpp"
+#include "libfingertip/command.hpp"
+#include "libfingertip/device_loop.hpp"
+#include "libfingertip/names.hpp"
+#include "libfingertip/output_file.hpp"
+#include "libfingertip/packet_fields.hpp"
+#include "libfingertip/packet_file.hpp"
+#include "libfingertip/text.hpp"
+#include "tool/cli/joint_progress.hpp"
+#include "tool/cli/keeper.hpp"
+#include "tool/cli/keys.hpp"
+#include "tool/cli/names_of_values.hpp"
+#include "tool/cli/view.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <unistd.h>
+
+namespace fingertip {
+
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds POLL{20};
+
+class Live {
+public:
+  Live(const LiveOptions &options, const std::vector<Way> &ways)
+      : options_(options), models_(ways.size()), ready_(ways.size()), early_(ways.size()),
+        taring_(ways.size()), accepted_(ways.size()), told_missing_(ways.size()) {
+    DeviceLoop::Options wanted;
+    wanted.streams = WIRE_STREAM_ALL;
+    wanted.follow_clock = several();
+    wanted.bytes = !options.raw_bytes.empty();
+    wanted.wait_for_back = !options.until_gone;
+    for (std::size_t i = 0; i < models_.size(); i++) {
+      loops_.push_back(std::make_unique<DeviceLoop>(i, ways[i], wanted, feed_));
+      models_[i].set_source(loops_[i]->name());
+    }
+    running_ = loops_.size();
+    if (!options.recording.empty() && !to_standard_output_) {
+      note_ = "recording to " + printable(options.recording);
+    }
+    if (options.monitor || !several()) {
+      view_ = options.monitor       ? make_monitor_view(options.colour)
+              : to_standard_output_ ? make_state_view()
+                                    : make_progress_view();
+    }
+  }
+
+  int run() {
+    while (running_ > 0) {
+      take_news();
+      show();
+      if (reason_.empty()) {
+        reason_ = reason_to_end();
+        if (!reason_.empty()) {
+          stop();
+        }
+      }
+    }
+    update_statistics();
+    view_.reset();
+    progress_.reset();
+    for (const auto &loop : loops_) {
+      loop->rethrow();
+    }
+    if (!begun_ && stop_requested()) {
+      throw Interrupted();
+    }
+    finish();
+    if (!several() && models_[0].frames() == 0 && reason_ == "gone") {
+      throw Gone(loops_[0]->name() + ": vanished before the first frame");
+    }
+    for (std::size_t i = 0; i < models_.size(); i++) {
+      if (models_[i].is_without_sensors()) {
+        throw Error(loops_[i]->name() + ": none of its sensors answers; see their wiring and "
+                                        "supply (fingertip info)");
+      }
+    }
+    return 0;
+  }
+
+private:
+  bool several() const { return models_.size() > 1; }
+
+  void take_news() {
+    /* Asked first: what was read until then is in the feed. A row waits for those of a fingertip
+     * whose thread got no time to read them. */
+    double settled_us = static_cast<double>(steady_now_us());
+    for (const auto &loop : loops_) {
+      settled_us = std::min(settled_us, loop->read_until_us());
+    }
+    for (DeviceNews &news : feed_.take(POLL)) {
+      take(news);
+    }
+    if (keeper_) {
+      keeper_->settle(settled_us - SETTLE_us);
+    }
+  }
+
+  void take(DeviceNews &news) {
+    using Kind = DeviceNews::Kind;
+    Model &model = models_[news.device];
+    switch (news.kind) {
+    case Kind::packet:
+      model.take(news.packet);
+      if (news.packet.type == WIRE_HEALTH) {
+        tell_missing(news.device);
+      }
+      take_answer(news.device, news.packet);
+      if (keeper_) {
+        keeper_->packet(news);
+      } else if (ready_[news.device]) {
+        early_[news.device].push_back(std::move(news));
+      }
+      break;
+    case Kind::ready:
+      ready_[news.device] = std::move(news);
+      if (std::all_of(ready_.begin(), ready_.end(), [](const auto &each) { return each; })) {
+        begin();
+      }
+      break;
+    case Kind::back:
+      model.set_state(Model::State::live);
+      event(news.device, EVENT_BACK);
+      break;
+    case Kind::gone:
+      model.set_state(Model::State::gone);
+      any_gone_ = true;
+      event(news.device, EVENT_GONE);
+      break;
+    case Kind::mute:
+      event(news.device, "no answer to the end of the streams");
+      break;
+    case Kind::bytes:
+      if (!raw_bytes_) {
+        raw_bytes_ = std::make_unique<OutputFile>(options_.raw_bytes, options_.overwrite,
+                                                  OutputFile::Appears::at_once);
+      }
+      raw_bytes_->append(news.bytes.data(), news.bytes.size());
+      break;
+    case Kind::clock:
+      if (keeper_) {
+        keeper_->clock(news);
+      }
+      break;
+    case Kind::ended:
+      running_--;
+      stop(); /* the others end too; what was written stays */
+      break;
+    }
+  }
+
+  /* Every one of them has answered. */
+  void begin() {
+    std::vector<DeviceNews> ready;
+    std::vector<std::string> ports;
+    for (std::size_t i = 0; i < loops_.size(); i++) {
+      const char *serial = ready_[i]->packet.body.info.serial;
+      for (const DeviceNews &other : ready) {
+        if (std::memcmp(other.packet.body.info.serial, serial, WIRE_TEXT_BYTES) == 0) {
+          throw Error(loops_[i]->name() + ": is the same fingertip as another; name each once");
+        }
+      }
+      ready.push_back(*ready_[i]);
+      ports.push_back(loops_[i]->name());
+    }
+    zero_us_ = steady_now_us();
+    if (!options_.recording.empty()) {
+      keeper_ = make_keeper(options_, ready, ports, zero_us_);
+      for (const auto &early : early_) {
+        for (const DeviceNews &news : early) {
+          keeper_->packet(news);
+        }
+      }
+    }
+    begun_ = true;
+    for (std::size_t i = 0; i < loops_.size(); i++) {
+      models_[i].set_state(Model::State::live);
+      loops_[i]->start();
+    }
+    if (several() && keeper_ && !view_) {
+      progress_ = std::make_unique<JointProgress>();
+    }
+  }
+
+  void event(std::size_t device, const std::string &text) {
+    if (keeper_) {
+      keeper_->event(device, text);
+    }
+  }
+
+  void stop() {
+    for (const auto &loop : loops_) {
+      loop->stop();
+    }
+  }
+
+  double seconds() const {
+    return several() ? static_cast<double>(steady_now_us() - zero_us_) / 1e6 : models_[0].seconds();
+  }
+
+  /* "" to go on. */
+  std::string reason_to_end() const {
+    if (options_.until_gone && any_gone_) {
+      return "gone";
+    }
+    if (stop_requested() || quit_ || (to_standard_output_ && !is_standard_output_read())) {
+      return "interrupted";
+    }
+    if (begun_ && options_.seconds && models_[0].frames() > 0 && seconds() >= *options_.seconds) {
+      return "seconds";
+    }
+    return "";
+  }
+
+  void update_statistics() {
+    for (std::size_t i = 0; i < loops_.size(); i++) {
+      models_[i].set_statistics(loops_[i]->statistics());
+    }
+  }
+
+  void show() {
+    update_statistics();
+    if (progress_) {
+      progress_->update(models_, seconds(), keeper_->alignment_us());
+    }
+    if (!view_) {
+      return;
+    }
+    view_->update(models_, caption());
+    auto now = host_now();
+    while (auto key = view_->key()) {
+      take_key(*key, now);
+      view_->hurry();
+    }
+    tare_.expire(now);
+    if (now > said_until_) {
+      said_.clear();
+    }
+  }
+
+  void take_key(Key key, KeyTime now) {
+    if (tare_.is_asked()) {
+      if (tare_.answer(key, now)) {
+        taring_.assign(loops_.size(), true);
+        for (const auto &loop : loops_) {
+          loop->send(command_tare());
+        }
+        say("taring");
+      } else {
+        say("not tared");
+      }
+    } else if (key == 'q') {
+      quit_ = true;
+    } else if (key == 't' && std::all_of(models_.begin(), models_.end(), [](const Model &model) {
+                 return model.state() == Model::State::live;
+               })) {
+      tare_.ask(now);
+    }
+  }
+
+  void say(const std::string &text) {
+    said_ = text;
+    said_until_ = host_now() + SAID_FOR;
+  }
+
+  /* What the fingertips answered to a key: done is a tare once frames of all say so. */
+  void take_answer(std::size_t device, const wire_packet &packet) {
+    if (packet.type == WIRE_ACK && packet.body.ack.command == WIRE_CMD_TARE) {
+      accepted_[device] = packet.body.ack.result == WIRE_RESULT_DONE;
+      if (!accepted_[device]) {
+        taring_[device] = false;
+        say((is_refused() ? said_ + "; " : "") + name_of(device) +
+            "not tared: " + refusal(device, packet.body.ack.result));
+      }
+    } else if (accepted_[device] && (packet.type == WIRE_RAW || packet.type == WIRE_CONTACT)) {
+      std::uint32_t flags =
+          packet.type == WIRE_RAW ? packet.body.raw.flags : packet.body.contact.flags;
+      if (flags & CONTACT_FLAG_TARED) {
+        accepted_[device] = taring_[device] = false;
+        if (!is_refused() &&
+            std::none_of(taring_.begin(), taring_.end(), [](bool each) { return each; })) {
+          say("tared");
+        }
+      }
+    }
+  }
+
+  std::string refusal(std::size_t device, std::uint8_t result) const {
+    const auto &contact = models_[device].contact();
+    return result == WIRE_RESULT_NOT_NOW && contact && (contact->flags & CONTACT_FLAG_CONTACT)
+               ? "it reports a contact, let go of the pad"
+               : result_text(result);
+  }
+
+  bool is_refused() const { return said_.find("not tared: ") != std::string::npos; }
+
+  /* Which of several. */
+  std::string name_of(std::size_t device) const {
+    const Model &model = models_[device];
+    return !several() || !model.info() ? "" : text_field(model.info()->serial) + ": ";
+  }
+
+  Caption caption() const {
+    Caption caption;
+    caption.keys = "q quit  t tare";
+    if (tare_.is_asked()) {
+      caption.question = several() ? "tare all, pads free? y/n" : "tare, pad free? y/n";
+    }
+    auto add = [&](const std::string &text) {
+      caption.note += (caption.note.empty() || text.empty() ? "" : "  ") + text;
+    };
+    add(said_);
+    for (std::size_t i = 0; i < models_.size(); i++) {
+      std::uint32_t missing = models_[i].missing_sensors();
+      add(missing ? name_of(i) + "sensors missing: " + sensors_text(missing) : "");
+    }
+    add(note_);
+    return caption;
+  }
+
+  /* For programs and log files: once, and when it changes. */
+  void tell_missing(std::size_t device) {
+    std::uint32_t missing = models_[device].missing_sensors();
+    if (options_.monitor || missing == told_missing_[device]) {
+      return;
+    }
+    told_missing_[device] = missing;
+    std::fprintf(stderr, "%s%s: %s\n", isatty(STDERR_FILENO) ? "\r\x1b[K" : "",
+                 printable(loops_[device]->name()).c_str(),
+                 missing ? ("sensors missing: " + sensors_text(missing) +
+                            "; see their wiring (fingertip info)")
+                               .c_str()
+                         : "all sensors answer");
+  }
+
+  void finish() {
+    std::vector<LineStatistics> statistics;
+    LineStatistics sum;
+    for (const Model &model : models_) {
+      statistics.push_back(model.statistics());
+      sum += model.statistics();
+    }
+    if (keeper_) {
+      keeper_->finish(statistics, reason_);
+    }
+    std::string name = keeper_ && !to_standard_output_ ? printable(options_.recording) + ": " : "";
+    if (!several()) {
+      std::fprintf(options_.monitor ? stdout : stderr, "%s%s\n", name.c_str(),
+                   summary_text(models_[0]).c_str());
+      return;
+    }
+    if (!keeper_) {
+      for (std::size_t i = 0; i < models_.size(); i++) {
+        std::printf("%s%s\n", name_of(i).c_str(), summary_text(models_[i]).c_str());
+      }
+      return;
+    }
+    std::uint64_t frames = 0;
+    for (std::size_t i = 0; i < models_.size(); i++) {
+      frames += keeper_->frames(i);
+    }
+    std::fprintf(stderr,
+                 "%s%llu frames of %zu fingertips, aligned to %s us or better, %llu packets "
+                 "dropped, %llu CRC errors\n",
+                 name.c_str(), static_cast<unsigned long long>(frames), models_.size(),
+                 fixed(keeper_->alignment_us(), 0).c_str(),
+                 static_cast<unsigned long long>(sum.dropped_packets),
+                 static_cast<unsigned long long>(sum.crc_errors));
+  }
+
+  const LiveOptions &options_;
+  const bool to_standard_output_ = options_.recording == STANDARD_OUTPUT;
+  DeviceFeed feed_;
+  std::vector<Model> models_;
+  std::vector<std::optional<DeviceNews>> ready_;
+  std::vector<std::vector<DeviceNews>> early_; /* packets before all were ready */
+  std::unique_ptr<OutputFile> raw_bytes_;
+  std::unique_ptr<Keeper> keeper_;
+  std::unique_ptr<View> view_;
+  std::unique_ptr<JointProgress> progress_;
+  std::string note_;
+  std::string said_;
+  KeyTime said_until_{};
+  Confirmation tare_;
+  std::vector<bool> taring_, accepted_; /* asked for, and not refused; under way */
+  std::vector<std::uint32_t> told_missing_;
+  std::string reason_;
+  std::int64_t zero_us_ = 0;
+  std::size_t running_ = 0;
+  bool begun_ = false;
+  bool any_gone_ = false;
+  bool quit_ = false;
+  std::vector<std::unique_ptr<DeviceLoop>> loops_; /* end first: their threads use the feed */
+};
+
+} // namespace
+
+void check_outputs(const LiveOptions &options) {
+  for (const std::string &path : {options.recording, options.raw_bytes}) {
+    if (!path.empty() && path != STANDARD_OUTPUT) {
+      check_output(path, options.overwrite);
+    }
+  }
+  if (!options.recording.empty() && !options.raw_bytes.empty() &&
+      is_same_file(options.recording, options.raw_bytes)) {
+    throw Error(options.raw_bytes + ": is the recording too; give --raw-bytes another name");
+  }
+}
+
+int run_live(const LiveOptions &options, const std::vector<Way> &ways) {
+  if (ways.size() > 1 && !options.raw_bytes.empty()) {
+    throw Error("--raw-bytes keeps one fingertip's line; leave it out, or choose one fingertip");
+  }
+  return Live(options, ways).run();
+}
+
+} // namespace fingertip

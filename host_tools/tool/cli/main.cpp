@@ -1,0 +1,34 @@
+/* fingertip: the command line tool. Exit status: 0 done; 1 something went wrong, said in one line;
+ * 2 wrong usage; of grasp also those of GraspEnd. */
+#include "libfingertip/session.hpp"
+#include "tool/advice.hpp"
+#include "tool/cli/commands/commands.hpp"
+#include "tool/cli/usage.hpp"
+
+#include <cstdio>
+
+int main(int argc, char **argv) {
+  using namespace fingertip;
+  try {
+    CommandLine line(
+        "Talks to Fingertip tactile sensors: shows, records and replays what they feel.",
+        FINGERTIP_VERSION);
+    for (auto add : {add_list, add_info, add_doctor, add_monitor, add_record, add_replay,
+                     add_convert, add_tare, add_calibrate, add_pad, add_set, add_serve, add_web,
+                     add_gripper, add_grasp, add_loader, add_flash, add_rule, add_encode}) {
+      add(line);
+    }
+    return line.run(argc, argv);
+  } catch (const WrongUsage &error) {
+    tell("fingertip", error);
+    return 2;
+  } catch (const Error &error) {
+    tell("fingertip", error);
+  } catch (const Interrupted &) {
+    std::fprintf(stderr, "fingertip: interrupted\n");
+  } catch (const std::exception &error) {
+    /* caught so that a screen is given back */
+    std::fprintf(stderr, "fingertip: a bug of this tool (%s); please report it\n", error.what());
+  }
+  return 1;
+}

@@ -1,0 +1,45 @@
+/* The pieces that screens are made of: bars, numbers with their units, lamps, and what stands below
+ * all of it. */
+#pragma once
+
+#include "tool/cli/canvas.hpp"
+#include "tool/cli/caption.hpp"
+#include "tool/cli/ink.hpp"
+#include "tool/cli/model.hpp"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace fingertip {
+
+struct Told {
+  std::string text;
+  Colour colour;
+};
+
+/* How a fingertip is. */
+Told state_of(const Model &model);
+
+/* A number with its label and unit. */
+struct Quantity {
+  const char *label;
+  std::optional<std::string> value;
+  int width;
+  const char *unit;
+  bool doubtful = false;
+};
+
+/* The column after it. */
+int draw_quantity(Canvas &canvas, int column, int row, const Quantity &quantity);
+int draw_lamp(Canvas &canvas, int column, int row, bool on, const std::string &name, Colour colour);
+void draw_bar(Canvas &canvas, const Area &area);
+/* In the last row. */
+void draw_caption(Canvas &canvas, const Caption &caption);
+
+/* Lines of at most this many columns out of parts that stay whole. */
+std::vector<std::string> flowed(const std::vector<std::string> &parts, const std::string &separator,
+                                int columns);
+std::string right_aligned(const std::string &text, int width);
+
+} // namespace fingertip
