@@ -29,7 +29,7 @@ struct WebOptions {
 fs::path page_folder() {
   std::error_code none;
   fs::path bin = fs::read_symlink("/proc/self/exe", none).parent_path();
-  for (const char *place : {"../share/fingertip/web", "../web/page"}) {
+  for (const char *place : {"../share/fingertip/web", "../../web/page"}) {
     fs::path folder = (bin / place).lexically_normal();
     if (fs::exists(folder / "index.html", none)) {
       return folder;
