@@ -7,9 +7,8 @@ _fingertip() {
     case $before in
       --device|--left|--right) words=$(fingertip list 2> /dev/null | cut -f 1) ;;
       --transport) words='auto socket serial usb' ;;
-      --gripper) words='2f85 2f140 hande sts3215' ;;
+      --gripper|--model) words=$(fingertip gripper list 2> /dev/null | sed -n '2,/^$/p' | cut -f 1) ;;
       --colour) words='auto truecolour 256 plain' ;;
-      --model) words='2f85 2f140 hande sts3215' ;;
       gripper) [ "$COMP_CWORD" -eq 2 ] && words='list info move open close' ;;
     esac
     if [ -z "$words" ] && [ "${current#-}" != "$current" ]; then

@@ -79,7 +79,8 @@ GripperTraits feetech_traits(const std::string &model, const Jaw &jaw, double ja
           .force_min_N = LEAST_TORQUE * STALL_Nm * 1000 / jaw_mm,
           .force_max_N = STALL_Nm * 1000 / jaw_mm,
           .latency_s = 0.008,
-          .poll_s = 0.001};
+          .poll_s = 0.001,
+          .driver = GripperDriver::feetech};
 }
 
 GripperWay feetech_way(const GripperWay &way) {

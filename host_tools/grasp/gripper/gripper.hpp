@@ -26,6 +26,10 @@
 
 namespace fingertip {
 
+/* What speaks to a gripper, and so of which kind it is: a drive by a screw behind Modbus registers,
+ * or a servo that turns a jaw. */
+enum class GripperDriver { robotiq, feetech };
+
 struct GripperTraits {
   std::string model;        // "2f85"
   double stroke_mm = 0.0;   // width between the pads when open
@@ -35,6 +39,7 @@ struct GripperTraits {
   double force_min_N = 0.0, force_max_N = 0.0;       // of its own limit of force; 0: it has none
   double latency_s = 0.0;                            // from a command to motion
   double poll_s = 0.0;                               // of one exchange, at the least
+  GripperDriver driver = GripperDriver::robotiq;
 };
 
 struct GripperStatus {
@@ -85,8 +90,10 @@ struct GripperWay {
   double timeout_s = 0.05; // of one exchange, from 5 ms to 10 s
 };
 
-// Each with its usual counts and jaw.
+// Each with its usual counts and jaw. The first is what programs take unless they are told another.
 std::vector<GripperTraits> gripper_models();
+// "2f85, 2f140, ...", for people.
+std::string gripper_model_names();
 // Throws Error: bad_value, an unknown model.
 const GripperTraits &gripper_traits(const std::string &model);
 

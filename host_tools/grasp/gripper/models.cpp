@@ -62,15 +62,13 @@ const std::vector<Model> &models() {
 }
 
 const Model &model_of(const std::string &name) {
-  std::string names;
   for (const Model &model : models()) {
     if (model.traits.model == name) {
       return model;
     }
-    names += (names.empty() ? "" : ", ") + model.traits.model;
   }
   throw Error(ErrorCode::bad_value,
-              "no gripper model " + printable(name) + "; there are " + names);
+              "no gripper model " + printable(name) + "; there are " + gripper_model_names());
 }
 
 } // namespace
@@ -81,6 +79,14 @@ std::vector<GripperTraits> gripper_models() {
     all.push_back(model.traits);
   }
   return all;
+}
+
+std::string gripper_model_names() {
+  std::string names;
+  for (const Model &model : models()) {
+    names += (names.empty() ? "" : ", ") + model.traits.model;
+  }
+  return names;
 }
 
 const GripperTraits &gripper_traits(const std::string &model) {

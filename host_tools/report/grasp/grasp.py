@@ -21,17 +21,17 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 import emulated_grasp  # noqa: E402
 import faults  # noqa: E402
 import grasp_report  # noqa: E402
+from grasp_report import GRIPPERS  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from goals import judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
 
 SEED = 5001  # seen by no choice of a constant
-GRIPPERS = {"2f85": "2f85", "sts3215": "servo", "ideal": "ideal"}  # and what the figures call it
 # Of three grippers: 0.374 mm and 25 ms, 0.153 mm and 8 ms, 0.01 mm and 3 ms.
 LIMITS = {
     "drops_percent": (1, 0.5, 0.2), "margin_median": (2.6, 2.2, 1.8), "reaction_ms": (41, 25, 16), "disturbance_slip_p95_mm": (3, 3, 3),
     "settle_s": (1.2, 0.3, None), "hold_rms_percent": (5, 1.5, None), "drops_without_load_percent": (5, 2.2, 1), "drops_flats_percent": (5, 5, 5)}
-GOALS = tuple((f"{name}_{called}", "<=", limit) for name, limits in LIMITS.items() for called, limit in zip(GRIPPERS.values(), limits)
+GOALS = tuple((f"{name}_{called}", "<=", limit) for name, limits in LIMITS.items() for (called, _), limit in zip(GRIPPERS.values(), limits)
               if limit is not None) + (("limit_cycles", "<=", 0), ("emulated_reaction_ms", "<=", 60)) + faults.GOALS
 # set: what it is, its options, whether it is judged; all are of each gripper
 SETS = {
@@ -110,7 +110,7 @@ def measure(options):
     steps = Steps()
     found = {"simulated": True, "grasp_seed": options.seed, "rows": []}
     for name, (about, *_) in SETS.items():
-        for gripper, called in GRIPPERS.items():
+        for gripper, (called, _) in GRIPPERS.items():
             row, all_of_it = row_of(name, gripper, options)
             found["rows"].append(row)
             steps.say(f"{gripper}, {about}: {row['grasps']} grasps")

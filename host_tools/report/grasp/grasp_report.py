@@ -8,7 +8,8 @@ from fingertip.files import write_text
 from goals import goal_table_md
 from tables import table_md, text_of
 
-COLOURS = {"2f85": ORANGE, "sts3215": BLUE, "ideal": GOAL}
+# model: what the figures call it, its colour
+GRIPPERS = {"2f85": ("2f85", ORANGE), "sts3215": ("servo", BLUE), "ideal": ("ideal", GOAL)}
 # key: what its column is called
 COLUMNS = {"gripper": "gripper", "about": "what", "object": "object", "friction": "friction", "mass": "mass", "disturbance": "disturbance", "grasps": "grasps",
            "drops_percent": "dropped, %", "margin_p50": "grip over least grip: p50", "margin_p5": "p5", "margin_p95": "p95",
@@ -63,7 +64,7 @@ def draw_distribution(axes, found, key, title, label, most):
     for one in found["distributions"]:
         values = one[key]
         shares = [100 * i / (len(values) - 1) for i in range(len(values))] if len(values) > 1 else []
-        axes.plot([most * 2 if value is None else value for value in values], shares, color=COLOURS[one["gripper"]], label=one["gripper"])
+        axes.plot([most * 2 if value is None else value for value in values], shares, color=GRIPPERS[one["gripper"]][1], label=one["gripper"])
     axes.set_xlim(0, most)
     axes.set_ylim(0, 100)
     axes.legend(fontsize=8, loc="lower right")
@@ -74,7 +75,7 @@ def draw_distribution(axes, found, key, title, label, most):
 def draw_drops(axes, found):
     rows = [row for row in found["rows"] if "drops_percent" in row]
     sets = list(dict.fromkeys(row["set"] for row in rows))
-    for i, (gripper, colour) in enumerate(COLOURS.items()):
+    for i, (gripper, (_, colour)) in enumerate(GRIPPERS.items()):
         values = {row["set"]: row["drops_percent"] for row in rows if row["gripper"] == gripper}
         places = [place + 0.26 * (i - 1) for place in range(len(sets))]
         bars = axes.barh(places, [values.get(name) or 0 for name in sets], 0.25, color=colour, label=gripper)

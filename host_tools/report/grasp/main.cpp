@@ -21,7 +21,7 @@ using nlohmann::ordered_json;
 
 constexpr char HELP[] =
     "usage: fingertip_grasp_trials [options]\n"
-    "  --gripper NAME    2f85 (usual), 2f140, hande, sts3215 or ideal\n"
+    "  --gripper NAME    a model that `fingertip gripper list` names (usual: the first), or ideal\n"
     "  --mode NAME       hold (usual), fixed; still, still-fixed: on the table, no lift\n"
     "  --objects NAME    round (usual: balls and cylinders), balls, cylinders, faces, flats; or\n"
     "                    faces of the twin, split by commas\n"

@@ -15,7 +15,7 @@ namespace fingertip::grasp {
 constexpr std::uint64_t JUDGING_SEEDS = 1000;
 
 struct SetOptions {
-  std::string gripper = "2f85";  // of gripper_mechanics()
+  std::string gripper = gripper_models().front().model; // of gripper_mechanics()
   std::string mode = "hold";     // hold, fixed, or still, still-fixed: on the table, no lift
   std::string objects = "round"; // of cell::faces_of(), or faces split by commas
   std::string settings;          // of the controller: name=value, split by commas

@@ -25,7 +25,7 @@ constexpr int FELT_TRIALS = 21;
 enum Stream : std::uint64_t { PAD = 842 };
 
 struct Options {
-  std::string gripper = "2f85", cache;
+  std::string gripper = gripper_models().front().model, cache;
   std::uint64_t seed = 1;
   double slice_us = 500.0, friction = 0.65, friction_falls = 0.4;
 };
@@ -172,7 +172,7 @@ int main(int argc, char **argv) {
                "a gripper and the controller. It is lifted, and its friction falls.",
                "fingertip_cell_emulated");
   Options options;
-  app.add_option("--gripper", options.gripper, "2f85, 2f140, hande, sts3215 or ideal")
+  app.add_option("--gripper", options.gripper, gripper_model_names() + " or ideal")
       ->capture_default_str();
   app.add_option("--friction", options.friction, "Static, before it falls")
       ->check(CLI::Range(0.1, 1.5))

@@ -51,7 +51,7 @@ constexpr std::int64_t ROW_us = 2'000;
 constexpr std::size_t ROWS_BYTES = 4096;
 
 struct Options {
-  std::string folder, model = "2f85", face = "sphere18", truth, cache;
+  std::string folder, model = gripper_models().front().model, face = "sphere18", truth, cache;
   World::Options world;
   std::vector<std::string> planned;
   double opens_mm = 4.0, gain_spread = 0.05, gain_sd = 0.01, patience_s = 0.0;

@@ -30,7 +30,7 @@ GripperMechanics gripper_mechanics(const std::string &model) {
     return mechanics;
   }
   mechanics.traits = gripper_traits(model);
-  if (model == "sts3215") {
+  if (mechanics.traits.driver == GripperDriver::feetech) {
     mechanics.backlash_mm = SERVO_BACKLASH_mm;
   } else {
     mechanics.activation_s = ROBOTIQ_ACTIVATION_s;

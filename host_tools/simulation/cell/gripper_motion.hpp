@@ -1,6 +1,6 @@
 // How a simulated gripper's fingers move, in simulated time: no line, no clock, no chance.
 //
-//   GripperMotion motion(gripper_mechanics("2f85"));
+//   GripperMotion motion(gripper_mechanics("ideal"));
 //   motion.blocked_at = [&](double width_mm, double force_N) { return ...; };
 //   motion.activate();
 //   motion.move({.width_mm = 20, .speed_mm_s = 50, .force_N = 20});

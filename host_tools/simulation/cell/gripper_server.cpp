@@ -220,17 +220,22 @@ private:
 
 GripperMechanics GripperServer::mechanics(const std::string &model) {
   GripperMechanics mechanics = gripper_mechanics(gripper_traits(model).model);
-  mechanics.traits.step_mm = model == "sts3215" ? 0.0 : mechanics.traits.step_mm;
+  if (mechanics.traits.driver == GripperDriver::feetech) {
+    mechanics.traits.step_mm = 0.0;
+  }
   return mechanics;
 }
 
 GripperServer::GripperServer(GripperMotion &motion, const Options &options)
     : motion_(motion), real_time_(options.real_time), port_(options.link),
       stepped_at_(host_now()) {
-  if (gripper_traits(options.model).model == "sts3215") {
-    slave_ = std::make_unique<FeetechBus>(motion, options);
-  } else {
+  switch (gripper_traits(options.model).driver) {
+  case GripperDriver::robotiq:
     slave_ = std::make_unique<ModbusSlave>(motion, options);
+    break;
+  case GripperDriver::feetech:
+    slave_ = std::make_unique<FeetechBus>(motion, options);
+    break;
   }
 }
 

@@ -1,8 +1,8 @@
 // A simulated gripper on a port of its own, with its own protocol: libmodbus as a slave for
 // Robotiq's, packets for Feetech's. What its line can suffer is part of it.
 //
-//   GripperMotion motion(GripperServer::mechanics("2f85"));
-//   GripperServer server(motion, {.model = "2f85"});
+//   GripperMotion motion(GripperServer::mechanics(model));
+//   GripperServer server(motion, {.model = model});
 //   puts(server.port().c_str());
 //   while (!stop) {
 //     server.step(1ms);

@@ -245,8 +245,8 @@ ordered_json series_of(const Case &c, const std::string &kind, std::size_t act, 
     add("force_N", static_cast<double>(felt.tangential.force_N));
     add("qx_N", static_cast<double>(felt.tangential.qx_N));
     add("qy_N", static_cast<double>(felt.tangential.qy_N));
-    add("vx_mm_s", static_cast<double>(said.vx_mm_s));
-    add("vy_mm_s", static_cast<double>(said.vy_mm_s));
+    add("velocity_x_mm_s", static_cast<double>(said.velocity_x_mm_s));
+    add("velocity_y_mm_s", static_cast<double>(said.velocity_y_mm_s));
     for (std::size_t d = 0; d < DETECTORS; d++) {
       series[DETECTOR_NAMES[d]].push_back(said.flags[d] ? 1 : 0);
     }

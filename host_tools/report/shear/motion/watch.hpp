@@ -19,7 +19,7 @@ constexpr std::array<const char *, DETECTORS> DETECTOR_NAMES{"eq7", "moving", "s
 struct Said {
   std::array<bool, DETECTORS> flags;
   bool velocity_valid;
-  float vx_mm_s, vy_mm_s;
+  float velocity_x_mm_s, velocity_y_mm_s;
 };
 
 // What an image keeps from frame to frame.

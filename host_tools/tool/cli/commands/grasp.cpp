@@ -55,11 +55,7 @@ void add_grasp(CommandLine &line) {
   auto options = std::make_shared<GraspOptions>();
   CLI::App *command = line.add("grasp", "Hold an object between two fingertips on a gripper",
                                [options] { return run_grasp(*options); });
-  std::string models;
-  for (const GripperTraits &traits : gripper_models()) {
-    models += (models.empty() ? "" : ", ") + traits.model;
-  }
-  command->add_option("--gripper", options->gripper.model, models)->required()->type_name("MODEL");
+  command->add_option("--gripper", options->gripper.model, gripper_model_names())->required()->type_name("MODEL");
   command
       ->add_option("--gripper-port", options->gripper.port,
                    "Its serial line; default: the only one on USB that is no fingertip")

@@ -264,7 +264,7 @@ void add_gripper(CommandLine &line) {
       ->type_name("MM");
   command
       ->add_option("--model", options->way.model,
-                   "2f85, 2f140 or hande (Robotiq), or sts3215 (a jaw on a Feetech servo)")
+                   "Of the gripper: " + gripper_model_names())
       ->type_name("MODEL");
   command
       ->add_option("--port", options->way.port,

@@ -1,0 +1,158 @@
+#!/usr/bin/env python3
+"""Counts how often the house says a thing, and fails where it is said more often than agreed.
+
+usage: house.py [ROOT] [--json FILE]
+
+Counted are the files of the product that people write: not the tests, not what a program wrote (its first line says so), no pictures, no
+lock files. A figure is the worst of its kind:
+
+files_per_board     files outside the board's folder that name it
+files_per_gripper   files outside host_tools/grasp/gripper that name the model
+files_per_field     files that name the probe of a packet's field, or files that list a packet: that name half and more of those of its
+                    fields whose names are no plain words (they have an underscore)
+files_per_setting   files that list the settings: that name half and more of the fields by which an info packet tells them
+rooms               folders of host_tools
+circles             modules that need themselves, by way of others: of the Python package, and sources of firmware/app
+page_codec_lines    lines of the page that decode packets, or read and write recordings
+longest_file        lines of the longest source; firmware/fit, condition and grip apart
+product_lines       lines of sources and texts, firmware and boards too; no limit, for people
+"""
+import argparse
+import ast
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tomllib
+
+# figure: what it shall be, and what it may be until then. The second only ever falls.
+LIMITS = {"files_per_board": (8, 29), "files_per_gripper": (5, 5), "files_per_field": (6, 9), "files_per_setting": (6, 14), "rooms": (9, 9), "circles": (0, 2),
+          "page_codec_lines": (0, 2778), "longest_file": (700, 878)}
+APART = ("firmware/fit/", "firmware/condition/", "firmware/grip/")  # from longest_file
+SOURCES = {".c", ".h", ".cpp", ".hpp", ".S", ".py", ".mjs", ".ts", ".mts", ".sh", ".cmake", ".inc", ".css", ".toml"}
+TEXTS = SOURCES | {".md", ".txt", ".json", ".html", ".in", ".1", ".bash", ".fish", ".cfg", ".msg", ""}
+WRITTEN = re.compile(r"[Ww]ritten by |[Gg]enerated by ")
+# A field that is told and computed by few, so that each file that names it is one more to change.
+PROBE = "vy_mm_s"
+SETTINGS = ("rate_mHz", "osr", "slip_window_ms", "slip_threshold_mm", "prior_sigma_mm", "prior_width_mm", "location_limit_mm")
+CODEC = ("host_tools/web/src/line/", "host_tools/web/src/recording/")
+NO_CODEC = {"line.ts", "serial_line.ts", "line_facts.ts", "output.ts", "recorder.ts", "replay_line.ts"}  # they ask, and show
+
+
+def product(root):
+    """{path: text} of what people write, tests apart."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=root, capture_output=True, check=True).stdout.decode().split("\0")
+    found = {}
+    for name in filter(None, listed):
+        path = root / name
+        if name.startswith("tests/") or path.suffix not in TEXTS or path.name.endswith("-lock.json") or not path.is_file():
+            continue
+        text = path.read_text(encoding="utf-8")
+        if not WRITTEN.search(text[:text.find("\n")]):
+            found[name] = text
+    return found
+
+
+def naming(files, word, own=()):
+    """The files that name a word, those apart that begin with own."""
+    pattern = re.compile(rf"(?<![A-Za-z0-9_]){re.escape(word)}(?![A-Za-z0-9_])")
+    return [name for name, text in files.items() if not name.startswith(tuple(own)) and pattern.search(text)]
+
+
+def listing(files, words, own=()):
+    """The files that name half of the words and more."""
+    named = [name for word in words for name in naming(files, word, own)]
+    return sorted(name for name in set(named) if 2 * named.count(name) >= len(words))
+
+
+def worst(named):
+    """(key, files) of {key: files} with the most."""
+    return max(named.items(), key=lambda one: len(one[1]), default=("", []))
+
+
+def circle(needs):
+    """What needs itself, by way of others, in {one: what it needs}."""
+    def reached(one):
+        seen, left = set(), list(needs[one])
+        while left:
+            each = left.pop()
+            if each not in seen:
+                seen.add(each)
+                left += needs.get(each, ())
+        return seen
+
+    return sorted(one for one in needs if one in reached(one))
+
+
+def python_needs(folder):
+    needs = {}
+    for path in sorted(folder.glob("*.py")):
+        imports = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.ImportFrom) and node.level == 1]
+        needs[path.stem] = {name for node in imports for name in ([node.module] if node.module else [each.name for each in node.names])}
+    return needs
+
+
+def call_needs(folder):
+    """{source: sources whose functions it calls}, of a folder of C."""
+    texts = {path.stem: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.c"))}
+    made = {stem: set(re.findall(r"^(?!static\b)[a-z][\w *]*?\b(\w+)\([^;{]*\)\s*\{", text, re.M)) for stem, text in texts.items()}
+    return {stem: {other for other in texts if other != stem and any(re.search(rf"\b{name}\(", text) for name in made[other])}
+            for stem, text in texts.items()}
+
+
+def measure(root):
+    files = product(root)
+    line = tomllib.loads((root / "firmware/wire/line.toml").read_text(encoding="utf-8"))
+    own_line = ("firmware/wire/",)
+    boards = [path.parent.name for path in sorted(root.glob("boards/*/main.c")) if path.parent.name != "native"]
+    models = re.findall(r'(?:\.model = |feetech_traits\()"(\w+)"', (root / "host_tools/grasp/gripper/models.cpp").read_text(encoding="utf-8"))
+    if not boards or not models:
+        raise SystemExit("house.py: found no board or no gripper; does it still look in the right place?")
+    listed = {kind: [field["name"] for field in packet.get("fields", ()) if "_" in field["name"]] for kind, packet in line["packet"].items()}
+    fields = {kind: listing(files, names, own_line) for kind, names in listed.items() if len(names) >= 5}
+    found = {
+        "files_per_board": worst({board: naming(files, board, (f"boards/{board}/",)) for board in boards}),
+        "files_per_gripper": worst({model: naming(files, model, ("host_tools/grasp/gripper/",)) for model in models}),
+        "files_per_field": worst({PROBE: naming(files, PROBE, own_line), **fields}),
+        "files_per_setting": ("all", listing(files, SETTINGS, own_line)),
+        "rooms": ("all", sorted({name.split("/")[1] for name in files if name.startswith("host_tools/") and name.count("/") > 1})),
+        "circles": ("all", circle(python_needs(root / "host_tools/python/fingertip")) + circle(call_needs(root / "firmware/app"))),
+    }
+    figures = {name: len(where) for name, (_, where) in found.items()}
+    codec = [name for name in files if name.startswith(CODEC) and pathlib.PurePath(name).name not in NO_CODEC]
+    figures["page_codec_lines"] = sum(files[name].count("\n") for name in codec)
+    lengths = {name: text.count("\n") for name, text in files.items() if pathlib.PurePath(name).suffix in SOURCES and not name.startswith(APART)}
+    longest = max(lengths, key=lengths.get)
+    figures["longest_file"] = lengths[longest]
+    figures["product_lines"] = sum(text.count("\n") for text in files.values())
+    found |= {"page_codec_lines": ("all", codec), "longest_file": (longest, [longest])}
+    return figures, {name: {"of": key, "files": where} for name, (key, where) in found.items()}
+
+
+def judged(figures):
+    """[(figure, found, what it shall be, what it may be)] of those that are above what they may be."""
+    return [(name, figures[name], goal, may) for name, (goal, may) in LIMITS.items() if figures[name] > may]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("root", nargs="?", default=".")
+    parser.add_argument("--json")
+    options = parser.parse_args()
+    root = pathlib.Path(options.root).resolve()
+    figures, where = measure(root)
+    for name, value in figures.items():
+        goal, may = LIMITS.get(name, (None, None))
+        print(f"{name:18s} {value:7d}" + ("" if goal is None else f"   goal {goal}" + ("" if value <= goal else f", may be {may} until then")))
+    if options.json:
+        path = pathlib.Path(options.json)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps({**figures, "goals": {name: goal for name, (goal, _) in LIMITS.items()}, "where": where}, indent=1) + "\n", encoding="utf-8")
+    for name, value, goal, may in judged(figures):
+        print(f"house.py: {name} is {value}, more than {may} (goal {goal}): {where[name]['of']} in " + ", ".join(where[name]["files"]), file=sys.stderr)
+    return 1 if judged(figures) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,42 @@
+"""The counts of the house see what they are for."""
+import pathlib
+import tempfile
+import unittest
+
+import house
+
+
+class House(unittest.TestCase):
+    def test_names_are_whole_words_outside_the_own_folder(self):
+        files = {"a/own.c": "vy_mm_s", "b/one.c": "x = c.vy_mm_s;", "b/longer.c": "vy_mm_s_", "b/none.c": "vx_mm_s"}
+        self.assertEqual(house.naming(files, "vy_mm_s", ("a/",)), ["b/one.c"])
+
+    def test_who_names_half_of_a_packet_lists_it(self):
+        files = {"list.py": "a b", "one.py": "a", "all.ts": "a b c d"}
+        self.assertEqual(house.listing(files, ("a", "b", "c", "d")), ["all.ts", "list.py"])
+
+    def test_a_circle_by_way_of_a_third_is_found(self):
+        self.assertEqual(house.circle({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}), ["a", "b", "c"])
+
+    def test_calls_between_sources_are_needs(self):
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder)
+            (root / "a.c").write_text("int a_do(int x) {\n  return b_do(x);\n}\nstatic int hidden(void) {\n  return 1;\n}\n")
+            (root / "b.c").write_text("int b_do(int x) {\n  return x + hidden();\n}\n")
+            self.assertEqual(house.call_needs(root), {"a": {"b"}, "b": set()})
+            (root / "b.c").write_text("int b_do(int x) {\n  return a_do(x);\n}\n")
+            self.assertEqual(house.circle(house.call_needs(root)), ["a", "b"])
+
+    def test_more_than_may_be_fails(self):
+        figures = {name: may for name, (_, may) in house.LIMITS.items()}
+        self.assertEqual(house.judged(figures), [])
+        figures["rooms"] += 1
+        self.assertEqual([name for name, *_ in house.judged(figures)], ["rooms"])
+
+    def test_what_may_be_is_never_below_the_goal(self):
+        for name, (goal, may) in house.LIMITS.items():
+            self.assertGreaterEqual(may, goal, name)
+
+
+if __name__ == "__main__":
+    unittest.main()
