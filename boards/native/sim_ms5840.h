@@ -1,5 +1,5 @@
 /* One simulated MS5840-02BA, as seen from its two wires: what it acknowledges, answers and forgets,
- * and when. Written from the datasheet, apart from the driver in firmware/ms5840, so that the two
+ * and when. Written from the datasheet, apart from the driver in firmware/ms58xx, so that the two
  * can be tested against each other.
  *
  * Behaviour: after power-up nothing but the reset command works; it takes 2.8 ms, during which the

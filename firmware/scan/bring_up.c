@@ -52,15 +52,15 @@ static void judge_pass(struct bring_up *bring_up) {
     if (!(bring_up->answered & bit) || (bring_up->good & bit)) {
       continue;
     }
-    switch (ms5840_check_prom(&bring_up->read[k])) {
-    case MS5840_PROM_GOOD:
+    switch (ms58xx_check_prom(&bring_up->read[k])) {
+    case MS58XX_PROM_GOOD:
       bring_up->good |= bit;
       use_prom(bring_up, k);
       break;
-    case MS5840_PROM_CRC_DIFFERS:
+    case MS58XX_PROM_CRC_DIFFERS:
       bring_up->differs |= bit;
       break;
-    case MS5840_PROM_BLANK:
+    case MS58XX_PROM_BLANK:
       bring_up->blank |= bit;
       break;
     }
@@ -74,7 +74,7 @@ bool bring_up_take_word(struct bring_up *bring_up, const struct array_bus_result
   }
   bring_up->answered &= result->acknowledged;
   bring_up->word++;
-  if (bring_up->word < MS5840_PROM_WORDS) {
+  if (bring_up->word < MS58XX_PROM_WORDS) {
     return true;
   }
   judge_pass(bring_up);

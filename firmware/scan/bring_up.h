@@ -15,7 +15,7 @@
 
 #include "array_bus/array_bus.h"
 #include "common/limits.h"
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -36,8 +36,8 @@ struct bring_up {
   uint64_t began_us;
   uint64_t interval_us;
   uint64_t next_us;                        /* the next one not before */
-  struct ms5840_prom read[FT_MAX_SENSORS]; /* in this pass */
-  struct ms5840_prom prom[FT_MAX_SENSORS]; /* [sensor] in use */
+  struct ms58xx_prom read[FT_MAX_SENSORS]; /* in this pass */
+  struct ms58xx_prom prom[FT_MAX_SENSORS]; /* [sensor] in use */
 };
 
 struct bring_up_result {

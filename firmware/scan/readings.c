@@ -1,6 +1,6 @@
 #include "scan/readings.h"
 
-#define MAX_Pa_q10 (MS5840_MAX_PRESSURE_Pa * 1024)
+#define MAX_Pa_q10 (MS58XX_MAX_PRESSURE_Pa * 1024)
 
 static uint32_t all_sensors(uint8_t sensor_count) {
   /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): at least one sensor */
@@ -119,11 +119,11 @@ struct glance {
 static struct glance compensate(const struct readings *readings, const uint32_t code[],
                                 uint32_t usable, struct frame *frame, int32_t kept_Pa_q10[]) {
   struct glance glance = {0, 0};
-  const struct ms5840_thermal *thermal = readings->thermal;
+  const struct ms58xx_thermal *thermal = readings->thermal;
   int32_t *pressure_Pa_q10 = frame->pressure_Pa_q10;
   const int32_t *end = pressure_Pa_q10 + frame->sensor_count;
   for (; pressure_Pa_q10 != end; usable >>= 1, code++, thermal++) {
-    const int32_t value = usable & 1u ? ms5840_compensate_pressure(thermal, *code) : 0;
+    const int32_t value = usable & 1u ? ms58xx_compensate_pressure(thermal, *code) : 0;
     *pressure_Pa_q10++ = value;
     *kept_Pa_q10++ = value;
     glance.sum += (uint32_t)value;

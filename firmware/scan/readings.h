@@ -30,7 +30,7 @@
 
 #include "common/limits.h"
 #include "frame/frame.h"
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -55,7 +55,7 @@
 
 struct readings {
   bool presses_are_shared; /* see scan_settings */
-  struct ms5840_thermal thermal[FT_MAX_SENSORS];
+  struct ms58xx_thermal thermal[FT_MAX_SENSORS];
   int16_t doubted_cC[FT_MAX_SENSORS];     /* [sensor] the temperature that was not used */
   int32_t last_Pa_q10[2][FT_MAX_SENSORS]; /* [newest][sensor] the last that counted */
   uint8_t newest;
@@ -84,7 +84,7 @@ struct readings {
 
 /* What a conversion of the temperature brought. */
 struct readings_temperature {
-  const struct ms5840_prom *prom; /* [sensor] */
+  const struct ms58xx_prom *prom; /* [sensor] */
   const uint32_t *code;           /* [sensor] */
   uint32_t good;                  /* bitmap: the code is a measurement */
   uint32_t prom_changed;          /* bitmap: another sensor than before */

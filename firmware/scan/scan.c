@@ -48,7 +48,7 @@ static void hand_over(_Atomic uint32_t *state, enum scan_slot_state to) {
   set(state, to);
 }
 
-static const struct ms5840_osr *get_osr(const struct scan *scan) {
+static const struct ms58xx_osr *get_osr(const struct scan *scan) {
   return atomic_load_explicit(&scan->osr, memory_order_relaxed);
 }
 
@@ -68,7 +68,7 @@ static uint32_t count_bits(uint32_t bitmap) {
 enum ft_status scan_init(struct scan *scan, const struct array_bus *bus,
                          const struct scan_settings *settings) {
   if (settings->sensor_count < 1 || settings->sensor_count > FT_MAX_SENSORS ||
-      !ms5840_find_osr(settings->osr)) {
+      !ms58xx_find_osr(settings->osr)) {
     return FT_ERR_ARGUMENT;
   }
   memset(scan, 0, sizeof *scan);
@@ -88,7 +88,7 @@ enum ft_status scan_init(struct scan *scan, const struct array_bus *bus,
 }
 
 enum ft_status scan_set_osr(struct scan *scan, uint16_t osr) {
-  const struct ms5840_osr *found = ms5840_find_osr(osr);
+  const struct ms58xx_osr *found = ms58xx_find_osr(osr);
   if (!found) {
     return FT_ERR_ARGUMENT;
   }
@@ -333,9 +333,9 @@ static enum ft_status start_operation(struct scan *scan, uint64_t now_us) {
   struct scan_conversion *conversion = scan->conversion;
   switch (scan->state) {
   case SCAN_RESET:
-    return bus->start_command(bus->context, MS5840_CMD_RESET, now_us);
+    return bus->start_command(bus->context, MS58XX_CMD_RESET, now_us);
   case SCAN_READ_PROM:
-    return bus->start_read(bus->context, (uint8_t)(MS5840_CMD_READ_PROM + 2 * scan->bring_up.word),
+    return bus->start_read(bus->context, (uint8_t)(MS58XX_CMD_READ_PROM + 2 * scan->bring_up.word),
                            2, now_us);
   case SCAN_CONVERT:
     conversion->osr = get_osr(scan);
@@ -349,7 +349,7 @@ static enum ft_status start_operation(struct scan *scan, uint64_t now_us) {
                               now_us);
   case SCAN_READ_ADC:
     conversion->t_converted_us = now_us;
-    return bus->start_read(bus->context, MS5840_CMD_READ_ADC, 3, now_us);
+    return bus->start_read(bus->context, MS58XX_CMD_READ_ADC, 3, now_us);
   default:
     return bus->start_recovery(bus->context, now_us);
   }
@@ -420,7 +420,7 @@ static void end_reading(struct scan *scan, uint64_t now_us) {
 /* From the end of the command to the start of the read. The conversion has its longest time until
  * the sensors see the read's command, and its maximum until the START. */
 static uint32_t read_after_us(const struct scan *scan) {
-  const struct ms5840_osr *osr = scan->conversion->osr;
+  const struct ms58xx_osr *osr = scan->conversion->osr;
   uint32_t after_us = osr->conversion_us - scan->bus->read_lead_us;
   return after_us > osr->maximum_us ? after_us : osr->maximum_us;
 }
@@ -429,7 +429,7 @@ static void end_operation(struct scan *scan, uint64_t now_us) {
   switch (scan->state) {
   case SCAN_RESET:
     bring_up_take_reset(&scan->bring_up, scan->result.acknowledged);
-    wait_in(scan, SCAN_WAIT_RESET, now_us + MS5840_RESET_us);
+    wait_in(scan, SCAN_WAIT_RESET, now_us + MS58XX_RESET_us);
     break;
   case SCAN_READ_PROM:
     if (bring_up_take_word(&scan->bring_up, &scan->result)) {

@@ -33,7 +33,7 @@
 
 #include "array_bus/array_bus.h"
 #include "frame/frame.h"
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 #include "scan/bring_up.h"
 #include "scan/readings.h"
 
@@ -43,7 +43,7 @@
 
 struct scan_settings {
   uint8_t sensor_count;    /* 1..FT_MAX_SENSORS */
-  uint16_t osr;            /* see ms5840_find_osr */
+  uint16_t osr;            /* see ms58xx_find_osr */
   uint32_t rate_mHz;       /* 0 = as fast as the sensors allow */
   bool presses_are_shared; /* sensors stand so close that no press moves one alone */
 };
@@ -81,7 +81,7 @@ enum scan_state {
 
 /* A conversion of the whole array: when, and of what. */
 struct scan_conversion {
-  const struct ms5840_osr *osr;
+  const struct ms58xx_osr *osr;
   bool is_temperature;
   bool is_frame; /* pressure, or a temperature in the place of one */
   uint32_t number;
@@ -109,7 +109,7 @@ struct scan {
   uint8_t sensor_count;
 
   /* Requests of the main context. */
-  const struct ms5840_osr *_Atomic osr;
+  const struct ms58xx_osr *_Atomic osr;
   _Atomic uint32_t period_us;               /* of frames; 0: as fast as the sensors allow */
   _Atomic uint32_t temperature_interval_us; /* set by the main context */
   _Atomic uint32_t temperature_within_us;   /* if not 0, the next so soon. Set while the slot of

@@ -178,7 +178,7 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
 
   int16_t now_cC[FT_MAX_SENSORS];
   for (uint8_t k = 0; k < sensor_count; k++) {
-    now_cC[k] = clamped_i16(ms5840_first_order_cC(&taken->prom[k], taken->code[k]));
+    now_cC[k] = clamped_i16(ms58xx_first_order_cC(&taken->prom[k], taken->code[k]));
   }
   const bool unusual = is_unusual(readings, sensor_count, taken->good, now_cC);
   struct company company;
@@ -195,13 +195,13 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
       news |= READINGS_ASK_AGAIN;
       continue;
     }
-    struct ms5840_thermal *thermal = &readings->thermal[k];
+    struct ms58xx_thermal *thermal = &readings->thermal[k];
     const bool had = readings->has_thermal & bit;
     if (!had || !within(now_cC[k] - thermal->first_order_cC, TEMPERATURE_STILL_cC)) {
       news |= READINGS_MOVED;
     }
-    ms5840_compensate_temperature(&taken->prom[k], taken->code[k],
-                                  had ? thermal->branch : MS5840_BRANCH_UNKNOWN, thermal);
+    ms58xx_compensate_temperature(&taken->prom[k], taken->code[k],
+                                  had ? thermal->branch : MS58XX_BRANCH_UNKNOWN, thermal);
     readings->doubted &= ~bit;
     readings->has_thermal |= bit;
   }

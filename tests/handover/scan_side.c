@@ -35,7 +35,7 @@ static int32_t *pressure_of;
 static enum ft_status start_command(void *context, uint8_t command, uint64_t t_us) {
   (void)context;
   sensors.command = command;
-  if (command != MS5840_CMD_RESET) {
+  if (command != MS58XX_CMD_RESET) {
     sensors.begun_us[++sensors.conversions] = t_us;
   }
   return FT_OK;
@@ -45,7 +45,7 @@ static enum ft_status start_read(void *context, uint8_t command, uint8_t count, 
   (void)context;
   (void)count;
   (void)t_us;
-  if (command != MS5840_CMD_READ_ADC) {
+  if (command != MS58XX_CMD_READ_ADC) {
     sensors.command = command;
   }
   return FT_OK;
@@ -58,15 +58,15 @@ static enum ft_status start_recovery(void *context, uint64_t t_us) {
 }
 
 static uint32_t answer(void) {
-  struct ms5840_prom prom = {{0x0040, 46372, 43981, 29059, 27842, 31553, 28165}};
-  prom.word[0] |= (uint16_t)(ms5840_prom_crc4(&prom) << 12);
+  struct ms58xx_prom prom = {{0x0040, 46372, 43981, 29059, 27842, 31553, 28165}};
+  prom.word[0] |= (uint16_t)(ms58xx_prom_crc4(&prom) << 12);
   if ((sensors.command & 0xF0) == 0x40) {
     return 6465444u + 256u * sensors.conversions;
   }
   if ((sensors.command & 0xF0) == 0x50) {
     return 8227636u;
   }
-  return (uint32_t)prom.word[(sensors.command - MS5840_CMD_READ_PROM) / 2 % MS5840_PROM_WORDS] << 8;
+  return (uint32_t)prom.word[(sensors.command - MS58XX_CMD_READ_PROM) / 2 % MS58XX_PROM_WORDS] << 8;
 }
 
 static enum ft_status poll(void *context, uint64_t t_us, struct array_bus_result *result,

@@ -3,7 +3,7 @@
 // Each case draws presses, turns them into frames of absolute readings and runs them through the
 // firmware's own chain: tare and gate (condition), fit (fit_gaussian, with the build's number of
 // iterations), flags (contact). Only what the scan adds to a frame is restated here: the mark of a
-// reading beyond MS5840_MAX_PRESSURE_Pa, and saturation to int32.
+// reading beyond MS58XX_MAX_PRESSURE_Pa, and saturation to int32.
 //
 // A warning is UNCERTAIN, MODEL, FLAT, AT_BOUND, LOW_SIGNAL, FORCE_LOWER_BOUND, no contact or no
 // fit. The firmware is told what is so: gains are exact where the case does not spread them. Bad
@@ -21,7 +21,7 @@ extern "C" {
 #include "config/defaults.h"
 #include "contact/contact.h"
 #include "fit/fit.h"
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 }
 
 #include <algorithm>
@@ -441,7 +441,7 @@ struct Chain {
       }
       made.valid |= bit;
       made.pressure_Pa_q10[k] = saturated_q10(ATMOSPHERE_Pa + press.pressure_Pa[k]);
-      if (press.limited_range && made.pressure_Pa_q10[k] > MS5840_MAX_PRESSURE_Pa * 1024) {
+      if (press.limited_range && made.pressure_Pa_q10[k] > MS58XX_MAX_PRESSURE_Pa * 1024) {
         made.saturated |= bit;
       }
     }

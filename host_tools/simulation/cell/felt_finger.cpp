@@ -9,7 +9,7 @@ extern "C" {
 #include "contact/motion.h"
 #include "contact/tangential.h"
 #include "fit/fit_tangential.h"
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 }
 
 #include <algorithm>
@@ -135,7 +135,7 @@ grip_touch FeltFinger::Firmware::frame(std::uint64_t t_us, bool pressed,
 FeltFinger::FeltFinger(const Face &face, const Rubber &rubber, const Sensing &sensing,
                        Random random)
     : face_(&face), rubber_(rubber), sensing_(sensing), random_(random) {
-  const ms5840_osr *osr = ms5840_find_osr(sensing.osr);
+  const ms58xx_osr *osr = ms58xx_find_osr(sensing.osr);
   if (!osr) {
     throw std::runtime_error("no sensor converts at this oversampling");
   }

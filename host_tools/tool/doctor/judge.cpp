@@ -6,7 +6,7 @@
 #include "tool/doctor/wiring.hpp"
 
 extern "C" {
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 }
 
 #include <algorithm>
@@ -622,7 +622,7 @@ std::string verdict_text(Verdict verdict) {
 std::optional<double> expected_rate_Hz(const wire_info &info) {
   double asked_Hz = info.rate_mHz / 1000.0;
   auto wiring = Wiring::of_board(text_field(info.board));
-  const ms5840_osr *osr = ms5840_find_osr(info.osr);
+  const ms58xx_osr *osr = ms58xx_find_osr(info.osr);
   if (!wiring || !osr || wiring->sensor_count() != info.sensor_count) {
     return std::nullopt;
   }
@@ -631,7 +631,7 @@ std::optional<double> expected_rate_Hz(const wire_info &info) {
 }
 
 std::optional<double> expected_noise_Pa(unsigned osr) {
-  const ms5840_osr *row = ms5840_find_osr(static_cast<std::uint16_t>(osr));
+  const ms58xx_osr *row = ms58xx_find_osr(static_cast<std::uint16_t>(osr));
   return row ? std::optional(row->noise_Pa_q10 / 1024.0) : std::nullopt;
 }
 

@@ -57,8 +57,8 @@ static enum ft_status start_recovery(void *context, uint64_t now_us) {
 }
 
 static void answer_prom(struct fake_bus *fake, uint8_t command, struct array_bus_result *result) {
-  int word = (command - MS5840_CMD_READ_PROM) / 2;
-  if (word >= MS5840_PROM_WORDS || command % 2) {
+  int word = (command - MS58XX_CMD_READ_PROM) / 2;
+  if (word >= MS58XX_PROM_WORDS || command % 2) {
     misused(fake, "a PROM word that does not exist");
     return;
   }
@@ -117,9 +117,9 @@ static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_resu
     result->nacks += !(fake->answering >> k & 1u);
   }
   if (entry->operation == FAKE_READ) {
-    if (entry->command == MS5840_CMD_READ_ADC && entry->byte_count == 3) {
+    if (entry->command == MS58XX_CMD_READ_ADC && entry->byte_count == 3) {
       answer_adc(fake, result);
-    } else if (entry->command >= MS5840_CMD_READ_PROM && entry->byte_count == 2) {
+    } else if (entry->command >= MS58XX_CMD_READ_PROM && entry->byte_count == 2) {
       answer_prom(fake, entry->command, result);
     } else {
       misused(fake, "a reading that no sensor knows");
@@ -129,7 +129,7 @@ static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_resu
         memset(result->bytes[k], 0xFF, sizeof result->bytes[k]);
       }
     }
-  } else if (entry->command == MS5840_CMD_RESET) {
+  } else if (entry->command == MS58XX_CMD_RESET) {
     fake->powered_us = now_us + RELOAD_us;
     fake->converted = 0;
   } else {
@@ -151,9 +151,9 @@ void fake_bus_init(struct fake_bus *fake, struct array_bus *bus, uint8_t sensor_
   fake->fail_with = FT_ERR_TIMEOUT;
   fake->recovery_is = FT_OK;
   for (uint8_t k = 0; k < sensor_count; k++) {
-    fake->prom[k] = (struct ms5840_prom){{(uint16_t)(0x0040 + k), (uint16_t)(46372 + 31 * k), 43981,
+    fake->prom[k] = (struct ms58xx_prom){{(uint16_t)(0x0040 + k), (uint16_t)(46372 + 31 * k), 43981,
                                           29059, 27842, (uint16_t)(31553 + k), 28165}};
-    fake->prom[k].word[0] |= (uint16_t)(ms5840_prom_crc4(&fake->prom[k]) << 12);
+    fake->prom[k].word[0] |= (uint16_t)(ms58xx_prom_crc4(&fake->prom[k]) << 12);
     fake->d1[k] = 6465444u + 1000u * k;
     fake->d2[k] = 8077636u + 150000u;
   }

@@ -4,7 +4,7 @@
 #define FAKE_BUS_H
 
 #include "array_bus/array_bus.h"
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 
 #include <stdbool.h>
 
@@ -23,7 +23,7 @@ struct fake_bus {
   /* Set by the test. */
   uint8_t sensor_count;
   uint32_t answering; /* bitmap */
-  struct ms5840_prom prom[FT_MAX_SENSORS];
+  struct ms58xx_prom prom[FT_MAX_SENSORS];
   uint32_t d1[FT_MAX_SENSORS], d2[FT_MAX_SENSORS];
   uint32_t misread_prom;      /* bitmap: one bit of word 3 is flipped ... */
   int misread_passes;         /* ... in this many passes to come */

@@ -10,12 +10,12 @@ enum { SENSORS = 15, ONE = 7 };
 #define ONE_BIT (1u << ONE)
 
 /* A public dump of a part at 22.75 degC and 1002.41 mbar. */
-static const struct ms5840_prom PROM = {{0, 41335, 41466, 26840, 27317, 31225, 28780}};
+static const struct ms58xx_prom PROM = {{0, 41335, 41466, 26840, 27317, 31225, 28780}};
 static const uint32_t D1 = 6735203, D2 = 8073757;
 /* Of that part. */
 static const double CODES_PER_Pa = 25.2, CODES_PER_degC = 29150;
 
-static struct ms5840_prom prom[FT_MAX_SENSORS];
+static struct ms58xx_prom prom[FT_MAX_SENSORS];
 static uint32_t d1[FT_MAX_SENSORS], d2[FT_MAX_SENSORS];
 static struct readings readings;
 static struct readings_temperature temperature;
@@ -75,9 +75,9 @@ static void warm_by(int k, double degC) {
 }
 
 static double true_Pa(int k, uint32_t true_d2) {
-  struct ms5840_thermal thermal;
-  ms5840_compensate_temperature(&prom[k], true_d2, MS5840_BRANCH_UNKNOWN, &thermal);
-  return ms5840_compensate_pressure(&thermal, d1[k]) / 1024.0;
+  struct ms58xx_thermal thermal;
+  ms58xx_compensate_temperature(&prom[k], true_d2, MS58XX_BRANCH_UNKNOWN, &thermal);
+  return ms58xx_compensate_pressure(&thermal, d1[k]) / 1024.0;
 }
 
 static void expect(uint32_t valid, uint32_t left_out) {
@@ -252,7 +252,7 @@ static void test_steps_alone_amid_the_noise(void) {
   struct random random = {77};
   for (int i = 0; i < 6; i++) {
     next_case();
-    frame.noise_Pa_q10 = ms5840_find_osr(osrs[i])->noise_Pa_q10;
+    frame.noise_Pa_q10 = ms58xx_find_osr(osrs[i])->noise_Pa_q10;
     const double noise_Pa = frame.noise_Pa_q10 / 1024.0;
     uint32_t rest[FT_MAX_SENSORS];
     memcpy(rest, d1, sizeof rest);

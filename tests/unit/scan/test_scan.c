@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unity.h>
 
-enum { SENSORS = 15, PROM_READS = MS5840_PROM_WORDS };
+enum { SENSORS = 15, PROM_READS = MS58XX_PROM_WORDS };
 #define ALL 0x7FFFu
 #define LONGEST_INTERVAL_us (SCAN_TEMPERATURE_INTERVAL_MAX_ms * 1000u)
 #define DISTURBED 3
@@ -118,9 +118,9 @@ static int find_entry(int from, uint8_t command, enum fake_operation operation) 
 }
 
 static int32_t expected_Pa_q10(uint8_t k) {
-  struct ms5840_thermal thermal;
-  ms5840_compensate_temperature(&fake.prom[k], fake.d2[k], MS5840_BRANCH_UNKNOWN, &thermal);
-  return ms5840_compensate_pressure(&thermal, fake.d1[k]);
+  struct ms58xx_thermal thermal;
+  ms58xx_compensate_temperature(&fake.prom[k], fake.d2[k], MS58XX_BRANCH_UNKNOWN, &thermal);
+  return ms58xx_compensate_pressure(&thermal, fake.d1[k]);
 }
 
 static void assert_good_frame(uint32_t valid) {
@@ -178,11 +178,11 @@ static void test_frame_contents(void) {
   TEST_ASSERT_EQUAL_UINT64(read->start_us, frame.t_converted_us);
   TEST_ASSERT_EQUAL_UINT64(read->end_us, frame.t_read_us);
   TEST_ASSERT_EQUAL_UINT64(convert->end_us + 2278 / 2, frame.t_us); /* 2170 and 5 % */
-  TEST_ASSERT_EQUAL_INT32(ms5840_find_osr(1024)->noise_Pa_q10, frame.noise_Pa_q10);
+  TEST_ASSERT_EQUAL_INT32(ms58xx_find_osr(1024)->noise_Pa_q10, frame.noise_Pa_q10);
   int32_t sum_cC = 0;
   for (uint8_t k = 0; k < SENSORS; k++) {
-    struct ms5840_thermal thermal;
-    ms5840_compensate_temperature(&fake.prom[k], fake.d2[k], MS5840_BRANCH_UNKNOWN, &thermal);
+    struct ms58xx_thermal thermal;
+    ms58xx_compensate_temperature(&fake.prom[k], fake.d2[k], MS58XX_BRANCH_UNKNOWN, &thermal);
     sum_cC += thermal.temperature_cC;
   }
   TEST_ASSERT_EQUAL_INT16(sum_cC / SENSORS, frame.temperature_cC);
@@ -203,7 +203,7 @@ static void test_saturation_is_reported_at_the_end_of_the_range(void) {
   uint32_t high = 0xFFFFFF;
   while (high - low > 1) { /* the greatest code that passes */
     fake.d1[DISTURBED] = (low + high) / 2;
-    *(expected_Pa_q10(DISTURBED) > MS5840_MAX_PRESSURE_Pa * 1024 ? &high : &low) =
+    *(expected_Pa_q10(DISTURBED) > MS58XX_MAX_PRESSURE_Pa * 1024 ? &high : &low) =
         fake.d1[DISTURBED];
   }
   fake.d1[DISTURBED] = low;
@@ -564,7 +564,7 @@ static void test_temperature_takes_the_place_of_a_frame(void) {
       }
       TEST_ASSERT_EQUAL_UINT64(period_us, frame.t_us - last.t_us);
       TEST_ASSERT_EQUAL_UINT64(period_us, frame.t_begin_us - last.t_begin_us);
-      TEST_ASSERT_EQUAL_INT32(ms5840_find_osr(osrs[i])->noise_Pa_q10, frame.noise_Pa_q10);
+      TEST_ASSERT_EQUAL_INT32(ms58xx_find_osr(osrs[i])->noise_Pa_q10, frame.noise_Pa_q10);
       if (frame.held) {
         held++;
         TEST_ASSERT_EQUAL_HEX32(last.valid, frame.valid);
@@ -662,7 +662,7 @@ static void test_sensor_stops_and_comes_back(void) {
   /* Another part takes its place: its PROM is read before its readings count. */
   fake.prom[DISTURBED].word[1] = 40000;
   fake.prom[DISTURBED].word[0] &= 0x0FFF;
-  fake.prom[DISTURBED].word[0] |= (uint16_t)(ms5840_prom_crc4(&fake.prom[DISTURBED]) << 12);
+  fake.prom[DISTURBED].word[0] |= (uint16_t)(ms58xx_prom_crc4(&fake.prom[DISTURBED]) << 12);
   fake.answering = ALL;
   for (int i = 0; i < 50; i++) {
     next_frame();
@@ -970,12 +970,12 @@ static void test_osr_changes_between_frames(void) {
   /* During a conversion: it ends as it began, and the frame says so. */
   TEST_ASSERT_EQUAL_INT(FT_OK, scan_set_osr(&scan, 8192));
   next_frame();
-  TEST_ASSERT_EQUAL_INT32(ms5840_find_osr(1024)->noise_Pa_q10, frame.noise_Pa_q10);
+  TEST_ASSERT_EQUAL_INT32(ms58xx_find_osr(1024)->noise_Pa_q10, frame.noise_Pa_q10);
   next_frame();
-  TEST_ASSERT_EQUAL_INT32(ms5840_find_osr(8192)->noise_Pa_q10, frame.noise_Pa_q10);
+  TEST_ASSERT_EQUAL_INT32(ms58xx_find_osr(8192)->noise_Pa_q10, frame.noise_Pa_q10);
   TEST_ASSERT_EQUAL_INT(FT_OK, scan_set_osr(&scan, 256));
   skip_frames(2);
-  TEST_ASSERT_EQUAL_INT32(ms5840_find_osr(256)->noise_Pa_q10, frame.noise_Pa_q10);
+  TEST_ASSERT_EQUAL_INT32(ms58xx_find_osr(256)->noise_Pa_q10, frame.noise_Pa_q10);
   assert_good_frame(ALL);
 }
 

@@ -4,7 +4,7 @@
  */
 #include "condition/condition.h"
 #include "fit/fit.h"
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 #include "port/port.h"
 
 #include <string.h>
@@ -34,11 +34,11 @@ static struct conditioned conditioned;
 static struct fit_array array;
 static struct fit_result result;
 static struct frame frame;
-static struct ms5840_thermal thermal;
+static struct ms58xx_thermal thermal;
 
 static void take(void) {
   for (uint32_t k = 0; k < job.sensor_count; k++) {
-    frame.pressure_Pa_q10[k] = ms5840_compensate_pressure(&thermal, 6465444u + k);
+    frame.pressure_Pa_q10[k] = ms58xx_compensate_pressure(&thermal, 6465444u + k);
   }
 }
 
@@ -78,8 +78,8 @@ static void prepare(void) {
 }
 
 int main(void) {
-  static const struct ms5840_prom prom = {{0, 46372, 43981, 29059, 27842, 31553, 28165}};
-  ms5840_compensate_temperature(&prom, 8077636, MS5840_BRANCH_UNKNOWN, &thermal);
+  static const struct ms58xx_prom prom = {{0, 46372, 43981, 29059, 27842, 31553, 28165}};
+  ms58xx_compensate_temperature(&prom, 8077636, MS58XX_BRANCH_UNKNOWN, &thermal);
   for (;;) {
     CALL_DEBUGGER(CALL_NEXT_JOB);
     port_watchdog_feed();

@@ -7,7 +7,7 @@ extern "C" {
 #include "config/defaults.h"
 #include "config/geometry.h"
 #include "contact/tangential.h"
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 }
 
 #include <algorithm>
@@ -97,7 +97,7 @@ truth::Pad Pads::pad(const std::string &kind, std::uint64_t n) const {
 Player::Player(const Object &object, const truth::Pad &pad, const Sensing &sensing,
                std::uint64_t seed)
     : object_(object), pad_(pad), sensing_(sensing), seed_(seed), array_(truth::firmware_array()) {
-  const ms5840_osr *osr = ms5840_find_osr(sensing.osr);
+  const ms58xx_osr *osr = ms58xx_find_osr(sensing.osr);
   if (!osr) {
     throw std::runtime_error("no sensor converts at this oversampling");
   }

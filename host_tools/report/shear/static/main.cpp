@@ -17,7 +17,7 @@
 
 extern "C" {
 #include "config/defaults.h"
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 }
 
 #include <cmath>
@@ -73,7 +73,7 @@ struct Case {
 };
 
 double noise_Pa(std::uint16_t osr) {
-  return ms5840_find_osr(osr)->noise_Pa_q10 / 1024.0;
+  return ms58xx_find_osr(osr)->noise_Pa_q10 / 1024.0;
 }
 
 bool is_on_array(double x_mm, double y_mm) {

@@ -7,7 +7,7 @@
 extern "C" {
 #include "common/contact_flags.h"
 #include "contact/tangential.h"
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 }
 
 #include <algorithm>
@@ -17,7 +17,7 @@ extern "C" {
 namespace fingertip::shear {
 namespace {
 
-constexpr double RANGE_Pa = MS5840_MAX_PRESSURE_Pa - twin::AMBIENT_Pa;
+constexpr double RANGE_Pa = MS58XX_MAX_PRESSURE_Pa - twin::AMBIENT_Pa;
 
 } // namespace
 

@@ -2,7 +2,7 @@
 
 extern "C" {
 #include "config/geometry.h"
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 }
 
 #include <algorithm>
@@ -38,7 +38,7 @@ twin::EffectValues effects_of(const PadOptions &options) {
 }
 
 double noise_of_one_Pa() {
-  return ms5840_find_osr(OSR)->noise_Pa_q10 / 1024.0;
+  return ms58xx_find_osr(OSR)->noise_Pa_q10 / 1024.0;
 }
 
 const twin::Indenter &lying_cylinder() {

@@ -5,7 +5,7 @@
 extern "C" {
 #include "config/defaults.h"
 #include "config/geometry.h"
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 }
 
 #include <algorithm>
@@ -131,7 +131,7 @@ Touch draw_touch(const fit_array &array, Random &random) {
 
 double draw_noise_Pa(Random &random) {
   const auto osr = static_cast<std::uint16_t>(256 << random.next() % 6);
-  return ms5840_find_osr(osr)->noise_Pa_q10 / 1024.0;
+  return ms58xx_find_osr(osr)->noise_Pa_q10 / 1024.0;
 }
 
 std::array<std::int32_t, SENSORS> readings_of(const fit_array &array, const Contact &contact,

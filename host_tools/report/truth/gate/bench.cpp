@@ -51,7 +51,7 @@ std::vector<Mode> modes() {
   for (const char *board : BOARDS) {
     const double overhead_us = Wiring::of_board(board)->overhead_us();
     for (unsigned osr = 256; osr <= 8192; osr *= 2) {
-      const ms5840_osr *row = ms5840_find_osr(static_cast<std::uint16_t>(osr));
+      const ms58xx_osr *row = ms58xx_find_osr(static_cast<std::uint16_t>(osr));
       all.push_back({board, osr, 1e6 / (overhead_us + row->conversion_us),
                      row->noise_Pa_q10 / 1024.0, row->noise_Pa_q10});
     }
@@ -116,7 +116,7 @@ std::int32_t Bench::converted(std::size_t k, double pressure_Pa) {
   const double degC = temperature_degC_(t_s_ - warm_since_s_);
   const std::uint32_t d2 = sim_ms5840_d2(proms_[k].word, degC);
   const double read_Pa = pressure_Pa + (degC > BRANCH_degC ? BRANCH_STEP_Pa : 0.0);
-  return ms5840_compensate_pressure(&thermal_[k], sim_ms5840_d1(proms_[k].word, read_Pa, d2));
+  return ms58xx_compensate_pressure(&thermal_[k], sim_ms5840_d1(proms_[k].word, read_Pa, d2));
 }
 
 void Bench::run(double seconds, const Feels &feels, const Sees &sees) {
@@ -127,7 +127,7 @@ void Bench::run(double seconds, const Feels &feels, const Sees &sees) {
       thermal_at_s_ = t_s_;
       for (std::size_t k = 0; k < SENSORS; k++) {
         const double degC = temperature_degC_(t_s_ - warm_since_s_);
-        ms5840_compensate_temperature(&proms_[k], sim_ms5840_d2(proms_[k].word, degC),
+        ms58xx_compensate_temperature(&proms_[k], sim_ms5840_d2(proms_[k].word, degC),
                                       thermal_[k].branch, &thermal_[k]);
       }
     }

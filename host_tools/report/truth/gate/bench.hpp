@@ -8,7 +8,7 @@
 extern "C" {
 #include "condition/condition.h"
 #include "fit/fit.h"
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 }
 
 #include <array>
@@ -74,8 +74,8 @@ private:
   frame frame_{};
   std::function<double(double)> temperature_degC_;
   double warm_since_s_ = 0.0, thermal_at_s_ = 0.0;
-  std::array<ms5840_prom, SENSORS> proms_{};
-  std::array<ms5840_thermal, SENSORS> thermal_{};
+  std::array<ms58xx_prom, SENSORS> proms_{};
+  std::array<ms58xx_thermal, SENSORS> thermal_{};
 };
 
 } // namespace fingertip::truth

@@ -1,4 +1,4 @@
-#include "ms5840/ms5840.h"
+#include "ms58xx/ms58xx.h"
 
 #include <stddef.h>
 
@@ -9,12 +9,12 @@
     .conversion_us = (max_us)*105u / 100u, .maximum_us = (max_us),                                 \
     .noise_Pa_q10 = (int32_t)((noise_Pa)*1024.0f)                                                  \
   }
-static const struct ms5840_osr osr_table[] = {
+static const struct ms58xx_osr osr_table[] = {
     ROW(256, 0x0, 560, 11.0f),  ROW(512, 0x2, 1100, 6.2f),  ROW(1024, 0x4, 2170, 3.9f),
     ROW(2048, 0x6, 4320, 2.8f), ROW(4096, 0x8, 8610, 2.1f), ROW(8192, 0xA, 17200, 1.6f),
 };
 
-const struct ms5840_osr *ms5840_find_osr(uint16_t osr) {
+const struct ms58xx_osr *ms58xx_find_osr(uint16_t osr) {
   for (size_t i = 0; i < sizeof osr_table / sizeof osr_table[0]; i++) {
     if (osr_table[i].osr == osr) {
       return &osr_table[i];
@@ -23,7 +23,7 @@ const struct ms5840_osr *ms5840_find_osr(uint16_t osr) {
   return NULL;
 }
 
-uint8_t ms5840_crc4_bytes(const uint8_t bytes[16]) {
+uint8_t ms58xx_crc4_bytes(const uint8_t bytes[16]) {
   uint16_t remainder = 0;
   for (int i = 0; i < 16; i++) {
     remainder ^= bytes[i];
@@ -35,69 +35,69 @@ uint8_t ms5840_crc4_bytes(const uint8_t bytes[16]) {
   return (uint8_t)(remainder >> 12);
 }
 
-uint8_t ms5840_prom_crc4(const struct ms5840_prom *prom) {
+uint8_t ms58xx_prom_crc4(const struct ms58xx_prom *prom) {
   uint8_t bytes[16] = {0};
-  for (int i = 0; i < MS5840_PROM_WORDS; i++) {
+  for (int i = 0; i < MS58XX_PROM_WORDS; i++) {
     bytes[2 * i] = (uint8_t)(prom->word[i] >> 8);
     bytes[2 * i + 1] = (uint8_t)prom->word[i];
   }
   bytes[0] &= 0x0F;
-  return ms5840_crc4_bytes(bytes);
+  return ms58xx_crc4_bytes(bytes);
 }
 
-enum ms5840_prom_state ms5840_check_prom(const struct ms5840_prom *prom) {
-  for (int i = 1; i < MS5840_PROM_WORDS; i++) {
+enum ms58xx_prom_state ms58xx_check_prom(const struct ms58xx_prom *prom) {
+  for (int i = 1; i < MS58XX_PROM_WORDS; i++) {
     if (prom->word[i] == 0 || prom->word[i] == 0xFFFF) {
-      return MS5840_PROM_BLANK;
+      return MS58XX_PROM_BLANK;
     }
   }
-  return ms5840_prom_crc4(prom) == prom->word[0] >> 12 ? MS5840_PROM_GOOD : MS5840_PROM_CRC_DIFFERS;
+  return ms58xx_prom_crc4(prom) == prom->word[0] >> 12 ? MS58XX_PROM_GOOD : MS58XX_PROM_CRC_DIFFERS;
 }
 
-enum ms5840_branch ms5840_branch_of(enum ms5840_branch previous, int32_t temperature_cC) {
+enum ms58xx_branch ms58xx_branch_of(enum ms58xx_branch previous, int32_t temperature_cC) {
   int32_t warm_edge_cC = 2000;
   int32_t very_cold_edge_cC = 1000;
   switch (previous) {
-  case MS5840_BRANCH_WARM:
-    warm_edge_cC -= MS5840_BRANCH_HYSTERESIS_cC;
+  case MS58XX_BRANCH_WARM:
+    warm_edge_cC -= MS58XX_BRANCH_HYSTERESIS_cC;
     break;
-  case MS5840_BRANCH_COLD:
-    warm_edge_cC += MS5840_BRANCH_HYSTERESIS_cC;
-    very_cold_edge_cC -= MS5840_BRANCH_HYSTERESIS_cC;
+  case MS58XX_BRANCH_COLD:
+    warm_edge_cC += MS58XX_BRANCH_HYSTERESIS_cC;
+    very_cold_edge_cC -= MS58XX_BRANCH_HYSTERESIS_cC;
     break;
-  case MS5840_BRANCH_VERY_COLD:
-    very_cold_edge_cC += MS5840_BRANCH_HYSTERESIS_cC;
+  case MS58XX_BRANCH_VERY_COLD:
+    very_cold_edge_cC += MS58XX_BRANCH_HYSTERESIS_cC;
     break;
-  case MS5840_BRANCH_UNKNOWN:
+  case MS58XX_BRANCH_UNKNOWN:
     break;
   }
   if (temperature_cC >= warm_edge_cC) {
-    return MS5840_BRANCH_WARM;
+    return MS58XX_BRANCH_WARM;
   }
-  return temperature_cC >= very_cold_edge_cC ? MS5840_BRANCH_COLD : MS5840_BRANCH_VERY_COLD;
+  return temperature_cC >= very_cold_edge_cC ? MS58XX_BRANCH_COLD : MS58XX_BRANCH_VERY_COLD;
 }
 
 static int32_t first_order_cC(int32_t dT, uint16_t c6) {
   return 2000 + (int32_t)(((int64_t)dT * c6) >> 23);
 }
 
-static int32_t difference_from(const struct ms5840_prom *prom, uint32_t d2) {
+static int32_t difference_from(const struct ms58xx_prom *prom, uint32_t d2) {
   return (int32_t)d2 - ((int32_t)prom->word[5] << 8);
 }
 
-int32_t ms5840_first_order_cC(const struct ms5840_prom *prom, uint32_t d2) {
+int32_t ms58xx_first_order_cC(const struct ms58xx_prom *prom, uint32_t d2) {
   return first_order_cC(difference_from(prom, d2), prom->word[6]);
 }
 
-void ms5840_compensate_temperature(const struct ms5840_prom *prom, uint32_t d2,
-                                   enum ms5840_branch previous, struct ms5840_thermal *thermal) {
+void ms58xx_compensate_temperature(const struct ms58xx_prom *prom, uint32_t d2,
+                                   enum ms58xx_branch previous, struct ms58xx_thermal *thermal) {
   const uint16_t *c = prom->word;
   int32_t dT = difference_from(prom, d2);
   int32_t temperature_cC = first_order_cC(dT, c[6]);
   int64_t offset = ((int64_t)c[2] << 17) + (((int64_t)c[4] * dT) >> 6);
   int64_t sensitivity = ((int64_t)c[1] << 16) + (((int64_t)c[3] * dT) >> 7);
 
-  thermal->branch = ms5840_branch_of(previous, temperature_cC);
+  thermal->branch = ms58xx_branch_of(previous, temperature_cC);
   thermal->dT = dT;
   thermal->first_order_cC = temperature_cC;
 
@@ -105,17 +105,17 @@ void ms5840_compensate_temperature(const struct ms5840_prom *prom, uint32_t d2,
   int64_t below = temperature_cC - 2000;
   int64_t below_squared = below * below;
   switch (thermal->branch) {
-  case MS5840_BRANCH_COLD:
+  case MS58XX_BRANCH_COLD:
     temperature_cC -= (int32_t)((12 * dT_squared) >> 35);
     offset -= (30 * below_squared) >> 8;
     break;
-  case MS5840_BRANCH_VERY_COLD:
+  case MS58XX_BRANCH_VERY_COLD:
     temperature_cC -= (int32_t)((14 * dT_squared) >> 35);
     offset -= (35 * below_squared) >> 3;
     sensitivity -= (63 * below_squared) >> 5;
     break;
-  case MS5840_BRANCH_WARM:
-  case MS5840_BRANCH_UNKNOWN:
+  case MS58XX_BRANCH_WARM:
+  case MS58XX_BRANCH_UNKNOWN:
     break;
   }
   thermal->temperature_cC = temperature_cC;
@@ -137,7 +137,7 @@ static int64_t multiply(uint32_t code, int64_t sensitivity) {
   return upper * (1 << 16) + ((int64_t)(code_high * low) << 12) + code_low * low;
 }
 
-int32_t ms5840_compensate_pressure(const struct ms5840_thermal *thermal, uint32_t d1) {
+int32_t ms58xx_compensate_pressure(const struct ms58xx_thermal *thermal, uint32_t d1) {
   int64_t pressure_Pa_q15 = (multiply(d1, thermal->sensitivity) >> 21) - thermal->offset;
   int64_t pressure_Pa_q10 = pressure_Pa_q15 >> 5;
   if (pressure_Pa_q10 > INT32_MAX) {
