@@ -10,6 +10,14 @@ if(NOT FINGERTIP_BOARD STREQUAL "native" AND NOT CMAKE_CROSSCOMPILING)
   message(FATAL_ERROR "Board ${FINGERTIP_BOARD} needs the cross compiler: use cmake --preset ${FINGERTIP_BOARD}")
 endif()
 
+# The sensors of the array, all of one kind: a section of firmware/ms58xx/sensors.h.
+set(FINGERTIP_SENSORS ms5840 ms5837_30ba)
+set(FINGERTIP_SENSOR ms5840 CACHE STRING "Sensor: one of ${FINGERTIP_SENSORS}")
+set_property(CACHE FINGERTIP_SENSOR PROPERTY STRINGS ${FINGERTIP_SENSORS})
+if(NOT FINGERTIP_SENSOR IN_LIST FINGERTIP_SENSORS)
+  message(FATAL_ERROR "FINGERTIP_SENSOR=${FINGERTIP_SENSOR} is unknown; choose one of: ${FINGERTIP_SENSORS}")
+endif()
+
 # A scene is a named set of capabilities and defaults for one use of the fingertip.
 #   raw    every frame the sensors can give; pressures and tare only
 #   press  every frame; location and force, no slip and no raw packets

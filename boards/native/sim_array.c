@@ -99,18 +99,18 @@ void sim_array_init(struct sim_array *array, uint8_t sensor_count, uint64_t seed
   memset(array, 0, sizeof *array);
   array->sensor_count = sensor_count;
   array->prng = seed;
+  static const uint16_t EXAMPLE[6] = SIM_MS5840_EXAMPLE;
   for (unsigned k = 0; k < sensor_count; k++) {
     /* The datasheet's example, and its neighbours. */
-    const uint16_t c[6] = {(uint16_t)(46372 - 37 * k), (uint16_t)(43981 + 53 * k),
-                           (uint16_t)(29059 + 17 * k), (uint16_t)(27842 - 29 * k),
-                           (uint16_t)(31553 + 41 * k), (uint16_t)(28165 - 13 * k)};
+    const uint16_t c[6] = {(uint16_t)(EXAMPLE[0] - 37 * k), (uint16_t)(EXAMPLE[1] + 53 * k),
+                           (uint16_t)(EXAMPLE[2] + 17 * k), (uint16_t)(EXAMPLE[3] - 29 * k),
+                           (uint16_t)(EXAMPLE[4] + 41 * k), (uint16_t)(EXAMPLE[5] - 13 * k)};
     sim_ms5840_init(&array->sensor[k], c);
   }
 }
 
 void sim_array_vary_parts(struct sim_array *array, double share) {
-  /* C1..C6 of a public dump of an MS5840. */
-  static const uint16_t TYPICAL[6] = {41335, 41466, 26840, 27317, 31225, 28780};
+  static const uint16_t TYPICAL[6] = SIM_MS5840_TYPICAL;
   for (unsigned k = 0; k < array->sensor_count; k++) {
     uint16_t c[6];
     for (int i = 0; i < 6; i++) {

@@ -12,8 +12,13 @@ static const struct {
   uint32_t conversion_us;
   double noise_Pa, noise_degC;
 } rows[] = {
+#if SIM_SENSOR_MS5837_30BA
+    {256, 600, 157.0, 0.012}, {512, 1170, 84.0, 0.009}, {1024, 2280, 54.0, 0.006},
+    {2048, 4540, 38.0, 0.004}, {4096, 9040, 28.0, 0.003}, {8192, 18080, 20.0, 0.002},
+#else
     {256, 560, 11.0, 0.012},  {512, 1100, 6.2, 0.009},  {1024, 2170, 3.9, 0.006},
     {2048, 4320, 2.8, 0.004}, {4096, 8610, 2.1, 0.003}, {8192, 17200, 1.6, 0.002},
+#endif
 };
 enum { ROWS = sizeof rows / sizeof rows[0] };
 
@@ -154,6 +159,13 @@ struct compensation {
   double offset, sensitivity;
 };
 
+/* One count of the datasheet's P, and its divisor. */
+#if SIM_SENSOR_MS5837_30BA
+static const double PRESSURE_COUNT_Pa = 10.0, PRESSURE_DIVISOR = 8192.0;
+#else
+static const double PRESSURE_COUNT_Pa = 1.0, PRESSURE_DIVISOR = 32768.0;
+#endif
+
 /* The datasheet's integers, each quotient rounded down. */
 static struct compensation compensate(const uint16_t *prom, uint32_t d2) {
   const double c1 = prom[1], c2 = prom[2], c3 = prom[3], c4 = prom[4], c5 = prom[5], c6 = prom[6];
@@ -161,10 +173,30 @@ static struct compensation compensate(const uint16_t *prom, uint32_t d2) {
   const double first = 2000.0 + floor(dt * c6 / 8388608.0);
   struct compensation c = {
       .temperature = first,
+#if SIM_SENSOR_MS5837_30BA
+      .offset = c2 * 65536.0 + floor(c4 * dt / 128.0),
+      .sensitivity = c1 * 32768.0 + floor(c3 * dt / 256.0),
+#else
       .offset = c2 * 131072.0 + floor(c4 * dt / 64.0),
       .sensitivity = c1 * 65536.0 + floor(c3 * dt / 128.0),
+#endif
   };
   const double below = first - 2000.0;
+#if SIM_SENSOR_MS5837_30BA
+  if (first >= 2000.0) {
+    c.temperature -= floor(dt * dt / 68719476736.0);
+    c.offset -= floor(below * below / 16.0);
+    return c;
+  }
+  c.temperature -= floor(3.0 * dt * dt / 8589934592.0);
+  c.offset -= floor(1.5 * below * below);
+  c.sensitivity -= floor(0.625 * below * below);
+  if (first < -1500.0) {
+    const double beyond = first + 1500.0;
+    c.offset -= 7.0 * beyond * beyond;
+    c.sensitivity -= 4.0 * beyond * beyond;
+  }
+#else
   if (first < 1000.0) {
     c.temperature -= floor(14.0 * dt * dt / 34359738368.0);
     c.offset -= floor(35.0 * below * below / 8.0);
@@ -173,6 +205,7 @@ static struct compensation compensate(const uint16_t *prom, uint32_t d2) {
     c.temperature -= floor(12.0 * dt * dt / 34359738368.0);
     c.offset -= floor(30.0 * below * below / 256.0);
   }
+#endif
   return c;
 }
 
@@ -182,7 +215,8 @@ double sim_ms5840_temperature_degC(const uint16_t *prom, uint32_t d2) {
 
 double sim_ms5840_pressure_Pa(const uint16_t *prom, uint32_t d1, uint32_t d2) {
   const struct compensation c = compensate(prom, d2);
-  return floor((floor(d1 * c.sensitivity / 2097152.0) - c.offset) / 32768.0);
+  return PRESSURE_COUNT_Pa *
+         floor((floor(d1 * c.sensitivity / 2097152.0) - c.offset) / PRESSURE_DIVISOR);
 }
 
 uint32_t sim_ms5840_d2(const uint16_t *prom, double temperature_degC) {
@@ -200,6 +234,7 @@ uint32_t sim_ms5840_d2(const uint16_t *prom, double temperature_degC) {
 
 uint32_t sim_ms5840_d1(const uint16_t *prom, double pressure_Pa, uint32_t d2) {
   const struct compensation c = compensate(prom, d2);
-  const double d1 = (pressure_Pa * 32768.0 + c.offset) * 2097152.0 / c.sensitivity;
+  const double count = pressure_Pa / PRESSURE_COUNT_Pa;
+  const double d1 = (count * PRESSURE_DIVISOR + c.offset) * 2097152.0 / c.sensitivity;
   return (uint32_t)fmin(fmax(round(d1), 1.0), CODE_MAX);
 }

@@ -1,4 +1,4 @@
-/* One simulated MS5840-02BA, as seen from its two wires: what it acknowledges, answers and forgets,
+/* One simulated MS5840-02BA, or MS5837-30BA where FINGERTIP_SENSOR says so, as seen from its two wires: what it acknowledges, answers and forgets,
  * and when. Written from the datasheet, apart from the driver in firmware/ms58xx, so that the two
  * can be tested against each other.
  *
@@ -17,6 +17,16 @@
 enum { SIM_MS5840_PROM_WORDS = 7, SIM_MS5840_MAX_READ_BYTES = 3 };
 
 #define SIM_MS5840_RESET_us 2800u
+
+/* C1..C6 of a part: of a public dump of an MS5840, of the example of the MS5837-30BA's datasheet. */
+#if SIM_SENSOR_MS5837_30BA
+#define SIM_MS5840_TYPICAL {34982, 36352, 20328, 22354, 26646, 26146}
+#define SIM_MS5840_EXAMPLE SIM_MS5840_TYPICAL
+#else
+#define SIM_MS5840_TYPICAL {41335, 41466, 26840, 27317, 31225, 28780}
+/* Of the datasheet of the MS5837-02BA. */
+#define SIM_MS5840_EXAMPLE {46372, 43981, 29059, 27842, 31553, 28165}
+#endif
 
 struct sim_ms5840 {
   uint16_t prom[SIM_MS5840_PROM_WORDS]; /* W0 with its CRC, C1..C6 */

@@ -2,17 +2,13 @@
 
 #include <stddef.h>
 
-/* Conversion times and noise: MS5840-02BA datasheet; 1 mbar = 100 Pa. */
 #define ROW(ratio, bits, max_us, noise_Pa)                                                         \
   {                                                                                                \
     .osr = (ratio), .convert_pressure = 0x40 | (bits), .convert_temperature = 0x50 | (bits),       \
     .conversion_us = (max_us)*105u / 100u, .maximum_us = (max_us),                                 \
     .noise_Pa_q10 = (int32_t)((noise_Pa)*1024.0f)                                                  \
   }
-static const struct ms58xx_osr osr_table[] = {
-    ROW(256, 0x0, 560, 11.0f),  ROW(512, 0x2, 1100, 6.2f),  ROW(1024, 0x4, 2170, 3.9f),
-    ROW(2048, 0x6, 4320, 2.8f), ROW(4096, 0x8, 8610, 2.1f), ROW(8192, 0xA, 17200, 1.6f),
-};
+static const struct ms58xx_osr osr_table[] = {MS58XX_OSR_TABLE(ROW)};
 
 const struct ms58xx_osr *ms58xx_find_osr(uint16_t osr) {
   for (size_t i = 0; i < sizeof osr_table / sizeof osr_table[0]; i++) {
@@ -56,7 +52,7 @@ enum ms58xx_prom_state ms58xx_check_prom(const struct ms58xx_prom *prom) {
 
 enum ms58xx_branch ms58xx_branch_of(enum ms58xx_branch previous, int32_t temperature_cC) {
   int32_t warm_edge_cC = 2000;
-  int32_t very_cold_edge_cC = 1000;
+  int32_t very_cold_edge_cC = MS58XX_VERY_COLD_cC;
   switch (previous) {
   case MS58XX_BRANCH_WARM:
     warm_edge_cC -= MS58XX_BRANCH_HYSTERESIS_cC;
@@ -89,13 +85,23 @@ int32_t ms58xx_first_order_cC(const struct ms58xx_prom *prom, uint32_t d2) {
   return first_order_cC(difference_from(prom, d2), prom->word[6]);
 }
 
+/* The terms of a branch (sensors.h), as statements. */
+#define SQUARE_DT dT_squared
+#define SQUARE_X below_squared
+#define BEYOND (below + (2000 - MS58XX_VERY_COLD_cC))
+#define SQUARE_Y (BEYOND * BEYOND)
+#define SUBTRACT_T(term) temperature_cC -= (int32_t)(term)
+#define SUBTRACT_OFF(term) offset -= (term)
+#define SUBTRACT_SENS(term) sensitivity -= (term)
+#define TERM(from, times, square, shift) SUBTRACT_##from(((times)*SQUARE_##square) >> (shift));
+
 void ms58xx_compensate_temperature(const struct ms58xx_prom *prom, uint32_t d2,
                                    enum ms58xx_branch previous, struct ms58xx_thermal *thermal) {
   const uint16_t *c = prom->word;
   int32_t dT = difference_from(prom, d2);
   int32_t temperature_cC = first_order_cC(dT, c[6]);
-  int64_t offset = ((int64_t)c[2] << 17) + (((int64_t)c[4] * dT) >> 6);
-  int64_t sensitivity = ((int64_t)c[1] << 16) + (((int64_t)c[3] * dT) >> 7);
+  int64_t offset = ((int64_t)c[2] << MS58XX_OFF_T1) + (((int64_t)c[4] * dT) >> MS58XX_TCO);
+  int64_t sensitivity = ((int64_t)c[1] << MS58XX_SENS_T1) + (((int64_t)c[3] * dT) >> MS58XX_TCS);
 
   thermal->branch = ms58xx_branch_of(previous, temperature_cC);
   thermal->dT = dT;
@@ -106,16 +112,14 @@ void ms58xx_compensate_temperature(const struct ms58xx_prom *prom, uint32_t d2,
   int64_t below_squared = below * below;
   switch (thermal->branch) {
   case MS58XX_BRANCH_COLD:
-    temperature_cC -= (int32_t)((12 * dT_squared) >> 35);
-    offset -= (30 * below_squared) >> 8;
+    MS58XX_COLD(TERM)
     break;
   case MS58XX_BRANCH_VERY_COLD:
-    temperature_cC -= (int32_t)((14 * dT_squared) >> 35);
-    offset -= (35 * below_squared) >> 3;
-    sensitivity -= (63 * below_squared) >> 5;
+    MS58XX_VERY_COLD(TERM)
     break;
   case MS58XX_BRANCH_WARM:
-  case MS58XX_BRANCH_UNKNOWN:
+  case MS58XX_BRANCH_UNKNOWN: /* which no temperature is */
+    MS58XX_WARM(TERM)
     break;
   }
   thermal->temperature_cC = temperature_cC;
@@ -138,8 +142,8 @@ static int64_t multiply(uint32_t code, int64_t sensitivity) {
 }
 
 int32_t ms58xx_compensate_pressure(const struct ms58xx_thermal *thermal, uint32_t d1) {
-  int64_t pressure_Pa_q15 = (multiply(d1, thermal->sensitivity) >> 21) - thermal->offset;
-  int64_t pressure_Pa_q10 = pressure_Pa_q15 >> 5;
+  int64_t pressure = (multiply(d1, thermal->sensitivity) >> 21) - thermal->offset;
+  int64_t pressure_Pa_q10 = (pressure * MS58XX_Q10_TIMES) >> MS58XX_Q10_SHIFT;
   if (pressure_Pa_q10 > INT32_MAX) {
     return INT32_MAX;
   }

@@ -1,14 +1,13 @@
-/* TE Connectivity MS5840-02BA: commands, calibration PROM and compensation. Pure functions: no bus,
- * no time, no state but what the caller owns.
+/* TE Connectivity's MS58xx family, of which the build chooses one (sensors.h): commands, calibration
+ * PROM and compensation. Pure functions: no bus, no time, no state but what the caller owns.
  *
- * Sources: MS5840-02BA datasheet (commands, conversion times, compensation), its command set and
- * first-order arithmetic cross-checked with the MS5837-02BA datasheet; Application Note AN520 for
- * the CRC-4.
+ * Sources: the data sheets that sensors.h names; Application Note AN520 for the CRC-4.
  */
 #ifndef MS58XX_MS58XX_H
 #define MS58XX_MS58XX_H
 
 #include "common/status.h"
+#include "ms58xx/sensors.h"
 
 #include <stdint.h>
 
@@ -55,14 +54,14 @@ enum ms58xx_prom_state {
 };
 enum ms58xx_prom_state ms58xx_check_prom(const struct ms58xx_prom *prom);
 
-/* The second-order corrections come in three branches of the first-order temperature. Where they
- * meet at 10 degC the pressure steps by some 60 Pa at 1 bar, so a branch is left only when the
- * temperature is MS58XX_BRANCH_HYSTERESIS_cC beyond its edge. */
+/* The second-order corrections come in three branches of the first-order temperature. Where those
+ * of the MS5840 meet at 10 degC the pressure steps by some 60 Pa at 1 bar, so a branch is left only
+ * when the temperature is MS58XX_BRANCH_HYSTERESIS_cC beyond its edge. */
 enum ms58xx_branch {
   MS58XX_BRANCH_UNKNOWN = 0,
-  MS58XX_BRANCH_WARM,      /* >= 20 degC: none */
-  MS58XX_BRANCH_COLD,      /* 10..20 degC */
-  MS58XX_BRANCH_VERY_COLD, /* < 10 degC */
+  MS58XX_BRANCH_WARM,      /* >= 20 degC */
+  MS58XX_BRANCH_COLD,      /* MS58XX_VERY_COLD_cC..20 degC */
+  MS58XX_BRANCH_VERY_COLD, /* below */
 };
 #define MS58XX_BRANCH_HYSTERESIS_cC 30
 enum ms58xx_branch ms58xx_branch_of(enum ms58xx_branch previous, int32_t temperature_cC);
@@ -86,11 +85,7 @@ void ms58xx_compensate_temperature(const struct ms58xx_prom *prom, uint32_t d2,
                                    enum ms58xx_branch previous, struct ms58xx_thermal *thermal);
 
 /* d1: 24-bit code of a pressure conversion. Absolute pressure in 1/1024 Pa, saturated to int32;
- * shifted right by 10 it is the datasheet's P in Pa. About 130 Cortex-M0+ cycles. */
+ * shifted right by 10 it is the pressure in Pa. About 130 Cortex-M0+ cycles. */
 int32_t ms58xx_compensate_pressure(const struct ms58xx_thermal *thermal, uint32_t d1);
-
-/* The extended range ends at 2 bar, beyond which a reading is biased low. Readings count as beyond
- * it from 1 % before: a part whose readings end right there must not pass by its noise. */
-#define MS58XX_MAX_PRESSURE_Pa 198000
 
 #endif

@@ -39,8 +39,8 @@
 /* Sensors of one pad at rest: two parts of +-2 degC, and a warm object at one end. Further off,
  * a temperature must agree with a second one, no more. */
 #define READINGS_TEMPERATURE_NEAR_cC 500
-/* Of one sensor, from one reading to the next: 8 kPa; a code with bit 18 wrong is 11 kPa off. */
-#define READINGS_STEP_Pa_q10 (8192 * 1024)
+/* Of one sensor, from one reading to the next. */
+#define READINGS_STEP_Pa_q10 (MS58XX_STEP_Pa * 1024)
 /* All others have moved by less: so many times the noise of a reading (two of them differ by 1.4 of
  * it rms), or such a part of the step. Of 785 steps beyond 8 kPa that taps of a sphere of 6 mm make
  * from one frame to the next at 20 and 57 frames/s in a simulated pad of 6 mm with a pitch of 9 mm,

@@ -25,12 +25,12 @@ export class Machine {
    * @param options image: Uint8Array; Board; scenario; seed; faults: parsed list; flash: 2 MiB of content, beside the
    *   image, from an earlier life; flashSpeed: see BUSY_NS; serial: 16 hex digits; clock_ppm: by how
    *   much the chip's clocks are fast; revision, uptime_us: of the chip, see Chip; fastEnumeration; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes);
-   *   rise_ns, onLevels: see the boards; makeClient({ host, report, onData }): what uses the USB device, CdcClient by
+   *   sensor, rise_ns, onLevels: see the boards; makeClient({ host, report, onData }): what uses the USB device, CdcClient by
    *   default
    */
   constructor({
     image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, clock_ppm = 0, fastEnumeration = false, allowWatchdog = false, revision, uptime_us,
-    flash = null, flashSpeed, rise_ns, onLevels, onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {}, makeClient = (parts) => new CdcClient(parts),
+    flash = null, flashSpeed, sensor, rise_ns, onLevels, onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {}, makeClient = (parts) => new CdcClient(parts),
   }) {
     this.image = image;
     this.Board = Board;
@@ -53,7 +53,7 @@ export class Machine {
     this.memory = new FlashMemory({ time: this.time, serial: this.serial, seed, speed: flashSpeed });
     if (flash) this.memory.bytes.set(flash);
     this.makeBoard = () => new Board({
-      scope: this.boardScope, report: this.report, seed, rise_ns, onLevels, onTransfer: onBusTransfer,
+      scope: this.boardScope, report: this.report, seed, sensor, rise_ns, onLevels, onTransfer: onBusTransfer,
       stimulus: (index, t_ns) => scenario.at_ns(index, t_ns), faults: () => this.faults,
     });
     this.trouble = new Trouble();

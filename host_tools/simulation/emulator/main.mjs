@@ -4,6 +4,7 @@ import { readFileSync } from 'node:fs';
 import { createInterface } from 'node:readline';
 import { parseArgs } from 'node:util';
 import { findBoard } from './board/boards.mjs';
+import { findSensor } from './board/ms5840.mjs';
 import { FLASH_BYTES } from './chip/flash_memory.mjs';
 import { InputError, inWords } from './errors.mjs';
 import { readFaults } from './faults.mjs';
@@ -24,6 +25,7 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --image FILE         raw flash image (.bin), loaded at flash offset 0
   --board NAME         pico_mux or pico_parallel
   --scenario FILE      what the sensors feel (format: scenario.mjs)
+  --sensor NAME        what the board carries: ms5840 or ms5837_30ba; default ms5840
   --seconds N          emulated seconds to run; default: the scenario's last row
   --seed N             noise, sensor tolerances, SRAM content at power-on; default 1
   --serial HEX16       unique id of the flash chip; default ${DEFAULT_SERIAL}
@@ -68,7 +70,7 @@ Exit: 0 clean; 1 a warning or failure of firmware or emulation, or an output tha
 each printed as a line; 2 wrong usage or input.`;
 
 const OPTIONS = {
-  image: { type: 'string' }, board: { type: 'string' }, scenario: { type: 'string' }, seconds: { type: 'string' },
+  image: { type: 'string' }, board: { type: 'string' }, scenario: { type: 'string' }, sensor: { type: 'string', default: 'ms5840' }, seconds: { type: 'string' },
   seed: { type: 'string', default: '1' }, 'clock-ppm': { type: 'string', default: '0' }, serial: { type: 'string', default: DEFAULT_SERIAL }, faults: { type: 'string' },
   revision: { type: 'string', default: '2' }, flash: { type: 'string' }, 'slow-flash': { type: 'boolean', default: false },
   'fast-enumeration': { type: 'boolean', default: false }, 'allow-watchdog': { type: 'boolean', default: false },
@@ -182,6 +184,7 @@ function runStepped(machine, port, end_ns) {
 
 async function run(options) {
   const Board = findBoard(options.board);
+  findSensor(options.sensor);
   const image = readImage(options.image);
   const scenario = readScenario(options.scenario);
   if (scenario.sensors !== Board.sensors) throw new InputError(`${options.scenario}: ${scenario.sensors} sensors, but board ${options.board} has ${Board.sensors}`);
@@ -225,7 +228,7 @@ async function run(options) {
     while (options['wait-open'] && !pty.isOpen && !interrupted && !pty.failure) await sleep(5);
 
     const machine = new Machine({
-      image, Board, scenario, faults, flash, flashSpeed: options['slow-flash'] ? 'slowest' : 'typical', seed: options.seed, serial: options.serial, clock_ppm: options['clock-ppm'], revision: options.revision,
+      image, Board, scenario, sensor: options.sensor, faults, flash, flashSpeed: options['slow-flash'] ? 'slowest' : 'typical', seed: options.seed, serial: options.serial, clock_ppm: options['clock-ppm'], revision: options.revision,
       fastEnumeration: options['fast-enumeration'], allowWatchdog: options['allow-watchdog'],
       rise_ns: options['rise-ns'], onLevels: vcd ? (levels, t_ns) => vcd.change(levels, t_ns) : undefined,
       onBusTransfer: options['bus-log']

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { I2cBus } from '../../../host_tools/simulation/emulator/board/i2c_bus.mjs';
-import { codesFor, compensate, crc4, makeProm, Ms5840, OSR } from '../../../host_tools/simulation/emulator/board/ms5840.mjs';
+import { codesFor, compensate, crc4, findSensor, makeProm, Ms5840, OSR } from '../../../host_tools/simulation/emulator/board/ms5840.mjs';
 import { Tca9548a } from '../../../host_tools/simulation/emulator/board/tca9548a.mjs';
 import { findBoard } from '../../../host_tools/simulation/emulator/board/boards.mjs';
 import { InputError } from '../../../host_tools/simulation/emulator/errors.mjs';
@@ -48,6 +48,22 @@ test('compensation matches the worked example of the MS5837-02BA datasheet, page
   const { pressure_Pa, temperature_cdegC } = compensate(words, 6465444, 8077636);
   assert.equal(Math.floor(temperature_cdegC), 2000);
   assert.equal(Math.floor(pressure_Pa), 110002);
+});
+
+test('the MS5837-30BA: compensation matches the worked example of its datasheet, page 7, and codes invert it in all branches', () => {
+  const kind = findSensor('ms5837_30ba');
+  const words = [0, 34982, 36352, 20328, 22354, 26646, 26146];
+  const { pressure_Pa, temperature_cdegC } = compensate(words, 4958179, 6815414, kind);
+  assert.equal(Math.floor(temperature_cdegC), 1981);
+  assert.equal(Math.floor(pressure_Pa / 10), 39998);
+  for (const degC of [-35, -15.01, -14.99, 5, 19.99, 20.01, 60]) {
+    for (const Pa of [0, 1e5, 3e6]) {
+      const { d1, d2 } = codesFor(words, Pa, degC, kind);
+      const back = compensate(words, d1, d2, kind);
+      assert.ok(Math.abs(back.pressure_Pa - Pa) < 1e-3 && Math.abs(back.temperature_cdegC - 100 * degC) < 1e-3, `${Pa} Pa, ${degC} degC`);
+    }
+  }
+  assert.throws(() => findSensor('bmp280'), /unknown sensor "bmp280"; known: ms5840, ms5837_30ba/);
 });
 
 test('compensation matches a public reading of a real MS5840', () => {

@@ -1,5 +1,5 @@
 /**
- * TE MS5840-02BA pressure sensor, written from its family's datasheets and independent of the firmware.
+ * TE MS5840-02BA and MS5837-30BA pressure sensors, written from its family's datasheets and independent of the firmware.
  *
  * Commands: reset 1Eh (no acknowledge for 2.8 ms), PROM A0h..ACh, convert 40h/50h | osr, ADC read 00h. The
  * early-read trap is modelled: an ADC read during a conversion returns 0 and spoils that conversion, so does a
@@ -8,6 +8,7 @@
  * The 24-bit codes are found by inverting the datasheet's compensation, second order included, for the absolute
  * pressure and temperature in the middle of the conversion, plus Gaussian noise of the datasheet's rms.
  */
+import { InputError } from '../errors.mjs';
 import { I2cTarget } from './i2c_bus.mjs';
 
 export const ADDRESS = 0x76;
@@ -19,7 +20,7 @@ const CODE_MAX = 0xffffff;
 /** Of a noisy sensor, times the datasheet's noise. */
 const NOISY = 10;
 
-/** By osr field / 2: maximum conversion time, pressure noise rms, temperature noise rms. */
+/** By osr field / 2: maximum conversion time, pressure noise rms, temperature noise rms. Of the MS5840. */
 export const OSR = [
   { name: 256, max_ns: 0.56e6, noise_Pa: 11, noise_degC: 0.012 },
   { name: 512, max_ns: 1.1e6, noise_Pa: 6.2, noise_degC: 0.009 },
@@ -29,11 +30,50 @@ export const OSR = [
   { name: 8192, max_ns: 17.2e6, noise_Pa: 1.6, noise_degC: 0.002 },
 ];
 
-/** A public dump of a part (C1..C6), around which the simulated parts spread. */
-const TYPICAL = [41335, 41466, 26840, 27317, 31225, 28780];
+/** First-order temperature and the second-order terms for it, in the datasheet's units, not rounded. */
+function secondOrderOfMs5840(dT, temperature) {
+  const below = temperature - 2000;
+  if (temperature >= 2000) return { t: 0, off: 0, sens: 0 };
+  if (temperature >= 1000) return { t: (12 * dT * dT) / 2 ** 35, off: (30 * below * below) / 2 ** 8, sens: 0 };
+  return { t: (14 * dT * dT) / 2 ** 35, off: (35 * below * below) / 2 ** 3, sens: (63 * below * below) / 2 ** 5 };
+}
+
+function secondOrderOfMs5837(dT, temperature) {
+  const below = temperature - 2000;
+  if (temperature >= 2000) return { t: (2 * dT * dT) / 2 ** 37, off: below ** 2 / 2 ** 4, sens: 0 };
+  const beyond = Math.min(0, temperature + 1500);
+  return { t: (3 * dT * dT) / 2 ** 33, off: (3 * below ** 2) / 2 + 7 * beyond ** 2, sens: (5 * below ** 2) / 2 ** 3 + 4 * beyond ** 2 };
+}
+
+const MS5840 = {
+  osr: OSR,
+  /** A public dump of a part (C1..C6), around which the simulated parts spread. */
+  typical: [41335, 41466, 26840, 27317, 31225, 28780],
+  /** Product type and factory bits of the same dump. */
+  word0: 0x8a1,
+  /** Powers of 2 with C1..C4 and in the pressure; what one count of that is. */
+  sens: [16, 7], off: [17, 6], divisor: 15, count_Pa: 1,
+  secondOrder: secondOrderOfMs5840,
+};
+
+/** The datasheet's pages 7 and 9 of 10/2015; noise below OSR 8192 recalled; times as of the MS5611, the same converter. */
+const MS5837_30BA = {
+  osr: [[256, 0.6, 157, 0.012], [512, 1.17, 84, 0.009], [1024, 2.28, 54, 0.006], [2048, 4.54, 38, 0.004], [4096, 9.04, 28, 0.003], [8192, 18.08, 20, 0.002]]
+    .map(([name, max_ms, noise_Pa, noise_degC]) => ({ name, max_ns: max_ms * 1e6, noise_Pa, noise_degC })),
+  typical: [34982, 36352, 20328, 22354, 26646, 26146],
+  word0: 0x1a << 5,
+  sens: [15, 8], off: [16, 7], divisor: 13, count_Pa: 10,
+  secondOrder: secondOrderOfMs5837,
+};
+
+const SENSORS = { ms5840: MS5840, ms5837_30ba: MS5837_30BA };
+
+export function findSensor(name) {
+  if (!Object.hasOwn(SENSORS, name)) throw new InputError(`unknown sensor "${name}"; known: ${Object.keys(SENSORS).join(', ')}`);
+  return SENSORS[name];
+}
+
 const SPREAD = 0.03;
-/** Product type and factory bits of the same dump. */
-const WORD0 = 0x8a1;
 
 /** CRC-4 over seven PROM words, the first one's top nibble and the eighth word taken as 0. */
 export function crc4(words) {
@@ -48,66 +88,64 @@ export function crc4(words) {
   return remainder >> 12;
 }
 
-export function makeProm(prng) {
-  const words = [WORD0, ...TYPICAL.map((c) => Math.min(65535, Math.round(c * prng.range(1 - SPREAD, 1 + SPREAD))))];
+export function makeProm(prng, kind = MS5840) {
+  const words = [kind.word0, ...kind.typical.map((c) => Math.min(65535, Math.round(c * prng.range(1 - SPREAD, 1 + SPREAD))))];
   words[0] |= crc4(words) << 12;
   return words;
 }
 
-/** First-order temperature and the second-order terms for it, in the datasheet's units, not rounded. */
-function secondOrder(dT, temperature) {
-  const below = temperature - 2000;
-  if (temperature >= 2000) return { t: 0, off: 0, sens: 0 };
-  if (temperature >= 1000) return { t: (12 * dT * dT) / 2 ** 35, off: (30 * below * below) / 2 ** 8, sens: 0 };
-  return { t: (14 * dT * dT) / 2 ** 35, off: (35 * below * below) / 2 ** 3, sens: (63 * below * below) / 2 ** 5 };
+/** OFF and SENS at a difference from the reference temperature. */
+function lineOf(words, dT, { sens, off, secondOrder }) {
+  const second = secondOrder(dT, 2000 + (dT * words[6]) / 2 ** 23);
+  return {
+    off: words[2] * 2 ** off[0] + (words[4] * dT) / 2 ** off[1] - second.off,
+    sens: words[1] * 2 ** sens[0] + (words[3] * dT) / 2 ** sens[1] - second.sens,
+  };
+}
+
+function temperatureOf(words, dT, { secondOrder }) {
+  const first = 2000 + (dT * words[6]) / 2 ** 23;
+  return first - secondOrder(dT, first).t;
 }
 
 /** Pressure (Pa) and temperature (0.01 degC) of a pair of codes: the datasheet's formula in real numbers. */
-export function compensate(words, d1, d2) {
+export function compensate(words, d1, d2, kind = MS5840) {
   const dT = d2 - words[5] * 2 ** 8;
-  const first = 2000 + (dT * words[6]) / 2 ** 23;
-  const second = secondOrder(dT, first);
-  const off = words[2] * 2 ** 17 + (words[4] * dT) / 2 ** 6 - second.off;
-  const sens = words[1] * 2 ** 16 + (words[3] * dT) / 2 ** 7 - second.sens;
-  return { pressure_Pa: ((d1 * sens) / 2 ** 21 - off) / 2 ** 15, temperature_cdegC: first - second.t };
+  const { off, sens } = lineOf(words, dT, kind);
+  return { pressure_Pa: (((d1 * sens) / 2 ** 21 - off) / 2 ** kind.divisor) * kind.count_Pa, temperature_cdegC: temperatureOf(words, dT, kind) };
 }
 
 /** Codes (real numbers) that a part with this PROM gives for a pressure and temperature. */
-export function codesFor(words, pressure_Pa, temperature_degC) {
+export function codesFor(words, pressure_Pa, temperature_degC, kind = MS5840) {
   const wanted = temperature_degC * 100;
   let low = -(2 ** 24);
   let high = 2 ** 24;
-  const temperatureOf = (dT) => {
-    const first = 2000 + (dT * words[6]) / 2 ** 23;
-    return first - secondOrder(dT, first).t;
-  };
   for (let i = 0; i < 60; i++) {
     const middle = (low + high) / 2;
-    if (temperatureOf(middle) < wanted) low = middle;
+    if (temperatureOf(words, middle, kind) < wanted) low = middle;
     else high = middle;
   }
   const dT = (low + high) / 2;
-  const second = secondOrder(dT, 2000 + (dT * words[6]) / 2 ** 23);
-  const off = words[2] * 2 ** 17 + (words[4] * dT) / 2 ** 6 - second.off;
-  const sens = words[1] * 2 ** 16 + (words[3] * dT) / 2 ** 7 - second.sens;
-  return { d1: ((pressure_Pa * 2 ** 15 + off) * 2 ** 21) / sens, d2: dT + words[5] * 2 ** 8 };
+  const { off, sens } = lineOf(words, dT, kind);
+  return { d1: (((pressure_Pa / kind.count_Pa) * 2 ** kind.divisor + off) * 2 ** 21) / sens, d2: dT + words[5] * 2 ** 8 };
 }
 
 export class Ms5840 extends I2cTarget {
   /**
    * @param options index; prng: this sensor's own; now_ns: () => time; report: Report;
    *   stimulus: (index, t_ns) => { pressure_Pa, temperature_degC }, absolute;
-   *   faults: (index) => { dead, promCorrupt, promBit, adcZero, d2Corrupt, noisy, fast } of this moment, { nacks, brownOuts } so far
+   *   sensor: see findSensor; faults: (index) => { dead, promCorrupt, promBit, adcZero, d2Corrupt, noisy, fast } of this moment, { nacks, brownOuts } so far
    */
-  constructor({ index, prng, now_ns, report, stimulus, faults = () => ({}) }) {
+  constructor({ index, prng, now_ns, report, stimulus, sensor = 'ms5840', faults = () => ({}) }) {
     super(ADDRESS);
+    this.kind = findSensor(sensor);
     this.index = index;
     this.prng = prng;
     this.now_ns = now_ns;
     this.report = report;
     this.stimulus = stimulus;
     this.faults = faults;
-    this.prom = makeProm(prng);
+    this.prom = makeProm(prng, this.kind);
     this.timeFactor = CONVERSION_FRACTION * (1 + prng.range(-OSCILLATOR_TOLERANCE, OSCILLATOR_TOLERANCE));
     this.heldClocks = 0;
     this.holding = false;
@@ -197,7 +235,7 @@ export class Ms5840 extends I2cTarget {
     const osr = command & 0x0f;
     if ((command & 0xf0) === 0x40 || (command & 0xf0) === 0x50) {
       if (osr & 1 || osr > 10) return false;
-      this.#convert(now, (command & 0xf0) === 0x40, OSR[osr >> 1]);
+      this.#convert(now, (command & 0xf0) === 0x40, this.kind.osr[osr >> 1]);
       return true;
     }
     if (command >= 0xa0 && command <= 0xac && !(command & 1)) {
@@ -246,8 +284,8 @@ export class Ms5840 extends I2cTarget {
     const { pressure_Pa, temperature_degC } = this.stimulus(this.index, (start_ns + end_ns) / 2);
     const noise = this.prng.normal() * (this.faults(this.index).noisy ? NOISY : 1);
     const codes = isPressure
-      ? codesFor(this.prom, pressure_Pa + noise * osr.noise_Pa, temperature_degC).d1
-      : codesFor(this.prom, pressure_Pa, temperature_degC + noise * osr.noise_degC).d2;
+      ? codesFor(this.prom, pressure_Pa + noise * osr.noise_Pa, temperature_degC, this.kind).d1
+      : codesFor(this.prom, pressure_Pa, temperature_degC + noise * osr.noise_degC, this.kind).d2;
     const spoil = spoiled ? this.prng.range(-0.5, 0.5) * 2 ** 22 : 0;
     const gain = this.untrimmed ? 15 / 16 : 1;
     return Math.max(0, Math.min(CODE_MAX, Math.round(codes * gain + spoil))) ^ wrong;

@@ -28,10 +28,10 @@ export class PicoMux {
   static probes = [['SDA', WAVEFORM_SDA], ['SCL', WAVEFORM_SCL]];
 
   /**
-   * @param options scope, report, seed, stimulus(index, t_ns), faults() -> Faults, onTransfer; rise_ns: of SCL;
+   * @param options scope, report, seed, stimulus(index, t_ns), faults() -> Faults, onTransfer; sensor: see findSensor; rise_ns: of SCL;
    *   onLevels(levels, t_ns): the lines changed, bits as in `probes`
    */
-  constructor({ scope, report, seed, stimulus, faults, onTransfer, onLevels, rise_ns = RISE_NS }) {
+  constructor({ scope, report, seed, stimulus, faults, onTransfer, onLevels, sensor, rise_ns = RISE_NS }) {
     const now_ns = () => scope.nanos;
     this.report = report;
     this.bus = new I2cBus({ now_ns, rise_ns, report, onTransfer });
@@ -42,12 +42,12 @@ export class PicoMux {
       for (let channel = 0; channel < SENSORS_PER_MUX; channel++) {
         const index = m * SENSORS_PER_MUX + channel;
         const prng = new Prng(Math.imul(seed, 1000003) + index);
-        const sensor = new Ms5840({ index, prng, now_ns, report, stimulus, faults: (i) => faults().sensor(i) });
-        sensor.onFast = () => {
+        const part = new Ms5840({ index, prng, now_ns, report, stimulus, sensor, faults: (i) => faults().sensor(i) });
+        part.onFast = () => {
           this.bus.wasFast = true;
         };
-        this.sensors.push(sensor);
-        mux.connect(channel, sensor);
+        this.sensors.push(part);
+        mux.connect(channel, part);
       }
       mux.onReset = () => {
         mux.stuck = false;

@@ -40,14 +40,14 @@ export class PicoParallel {
    * @param options scope, report, seed, stimulus(index, t_ns), faults() -> Faults, onTransfer; rise_ns: of every line;
    *   onLevels(levels, t_ns): lines changed, bits as in `probes`
    */
-  constructor({ scope, report, seed, stimulus, faults, onTransfer, onLevels = () => {}, rise_ns: rise }) {
+  constructor({ scope, report, seed, stimulus, faults, onTransfer, onLevels = () => {}, sensor, rise_ns: rise }) {
     const rise_ns = rise === undefined ? RISE_NS : { sda: rise, scl: rise };
     this.scope = scope;
     this.onLevels = onLevels;
     this.statistics = { transactions: 0, nacks: 0 };
     this.sclCheck = new TimingCheck(report, 'SCL');
     this.sensors = Array.from({ length: SENSORS }, (_, index) => new Ms5840({
-      index, prng: new Prng(Math.imul(seed, 1000003) + index), now_ns: () => scope.nanos, report, stimulus,
+      index, prng: new Prng(Math.imul(seed, 1000003) + index), now_ns: () => scope.nanos, report, stimulus, sensor,
       faults: (i) => faults().sensor(i),
     }));
     this.lines = this.sensors.map((target, k) => new I2cLine({ name: `SDA${k}`, target, rise_ns, report, statistics: this.statistics, onTransfer }));
