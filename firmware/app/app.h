@@ -112,18 +112,6 @@ void app_on_event(struct app *app);
  * host that has frames of its own. */
 void app_process_frame(struct app *app, uint64_t taken_us);
 
-#if FT_WITH_FIT
-/* Has this calibration, which is valid and outlives the app, act from the next frame on; NULL:
- * none.
- */
-void app_use_calibration(struct app *app, const struct calibration *calibration);
-#endif
-
-#if FT_WITH_TANGENTIAL
-/* The same of a pad's profile. */
-void app_use_pad(struct app *app, const struct pad_profile *pad);
-#endif
-
 /* One round of the main loop: does what is due, or sleeps until something happens. */
 void app_run(struct app *app);
 

@@ -1,5 +1,6 @@
 #include "app/commands.h"
 
+#include "app/acting.h"
 #include "app/packets.h"
 #include "common/contact_flags.h"
 #include "config/geometry.h"

@@ -1,5 +1,6 @@
 #include "simulation/player/native_fingertip.h"
 
+#include "app/acting.h"
 #include "app/app.h"
 #include "config/geometry.h"
 #include "native/native_cdc.h"

@@ -1,5 +1,6 @@
 #include "simulation/player/repeat.h"
 
+#include "app/acting.h"
 #include "app/app.h"
 #include "config/defaults.h"
 
