@@ -691,6 +691,21 @@ static void what_happens_is_noted_for_the_record_of_a_crash(void) {
   TEST_ASSERT_EQUAL(0, detail);
 }
 
+static void more_failures_in_a_second_than_a_byte_holds_are_noted_as_255(void) {
+  uint8_t detail;
+  run_for(1500);
+  static const struct {
+    uint32_t failures;
+    uint8_t noted;
+  } cases[] = {{5, 5}, {254, 254}, {255, 255}, {256, 255}, {300, 255}};
+  for (unsigned i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    atomic_fetch_add(&app.scan.counters.bus_timeouts, cases[i].failures);
+    run_for(1200);
+    TEST_ASSERT_EQUAL(CRASH_EVENT_BUS, native_last_event(&detail));
+    TEST_ASSERT_EQUAL_UINT8(cases[i].noted, detail);
+  }
+}
+
 static void at_the_slowest_rate_the_watchdog_is_fed(void) {
   native_cdc_open();
   run_for(300);
@@ -847,6 +862,7 @@ int main(void) {
   RUN_TEST(the_loader_is_reached_by_command_and_by_touch);
   RUN_TEST(the_last_crash_is_told_when_asked_for);
   RUN_TEST(what_happens_is_noted_for_the_record_of_a_crash);
+  RUN_TEST(more_failures_in_a_second_than_a_byte_holds_are_noted_as_255);
   RUN_TEST(at_the_slowest_rate_the_watchdog_is_fed);
   RUN_TEST(test_sensors_that_lost_their_state_are_reset_before_their_zeros_give_in);
   RUN_TEST(test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful);

@@ -170,6 +170,17 @@ static void what_rings_after_a_slide_is_none(void) {
   }
 }
 
+/* At five times what least squares over three frames leave of 0.4 mm, a speed needs 140 mm/s. */
+static void a_fast_slide_is_seen_through_much_noise(void) {
+  interval_us = 10100;
+  found.location_noise_mm = 0.001f * MOTION_NOISE_MAX_um;
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_MOVING, go(0.1f, 200.0f, 0, 0));
+  setUp();
+  interval_us = 10100;
+  found.location_noise_mm = 0.001f * MOTION_NOISE_MAX_um;
+  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_MOVING, go(0.1f, 120.0f, 0, 0));
+}
+
 static void hours_leave_no_trace(void) {
   interval_us = 1000;
   go(0.5f, 0.02f, 0, 0);
@@ -269,6 +280,7 @@ int main(void) {
   RUN_TEST(a_slow_slide_is_found_by_and_by);
   RUN_TEST(a_slide_ends_soon_and_once);
   RUN_TEST(what_rings_after_a_slide_is_none);
+  RUN_TEST(a_fast_slide_is_seen_through_much_noise);
   RUN_TEST(hours_leave_no_trace);
   RUN_TEST(what_interrupts_a_contact_starts_anew);
   RUN_TEST(frames_without_an_estimate_say_nothing_and_are_passed_over);

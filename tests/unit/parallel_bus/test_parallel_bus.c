@@ -157,7 +157,13 @@ static void test_a_chip_that_does_not_start(void) {
   fake.opens = true;
   TEST_ASSERT_EQUAL_INT(FT_OK, parallel_bus_init(&parallel_bus, &bus));
   fake.opens = false;
+  const unsigned before = fake.waves;
+  const uint64_t at_us = fake.now_us;
   TEST_ASSERT_EQUAL_INT(FT_ERR_STUCK, recover());
+  TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, command(CONVERT));
+  TEST_ASSERT_EQUAL_INT(FT_ERR_TIMEOUT, read_back(READ_ADC, 3));
+  TEST_ASSERT_EQUAL_UINT(before, fake.waves); /* nothing is played on blocks in reset ... */
+  TEST_ASSERT_EQUAL_UINT64(at_us, fake.now_us); /* ... or waited for */
   fake.opens = true;
   TEST_ASSERT_EQUAL_INT(FT_OK, recover());
   expect_good_frame();

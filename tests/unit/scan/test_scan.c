@@ -410,6 +410,31 @@ static void test_two_zeros_in_a_row_lead_to_a_reset(void) {
   assert_good_frame(ALL);
 }
 
+/* A sensor that missed two reads before all were reset starts anew: one more does not cost its
+ * admission, as the third in a row would. */
+static void test_what_was_missed_before_a_reset_does_not_count_after_it(void) {
+  const uint32_t other = 1u << (SENSORS - 1);
+  run_until(3000000);
+  fake.zero_next = other;
+  next_frame();
+  fake.answering = ALL & ~DISTURBED_BIT;
+  fake.zero_next = other;
+  next_frame();
+  next_frame(); /* the last one before the reset */
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~other, value_of(&scan.admitted));
+  fake.answering = ALL;
+  while (count_entries(0x1E, FAKE_COMMAND) < 2 || scan.state != SCAN_WAIT_CONVERSION) {
+    step();
+  }
+  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
+  fake.answering = ALL & ~DISTURBED_BIT;
+  next_frame();
+  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
+  fake.answering = ALL;
+  skip_frames(5);
+  TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
+}
+
 static void test_temperature_of_all_ones_is_no_reading(void) {
   next_frame();
   skip_to_temperature();
@@ -1217,6 +1242,7 @@ int main(void) {
   RUN_TEST(test_zero_reading_voids_the_next_one_too);
   RUN_TEST(test_zeros_for_ever_do_not_wedge);
   RUN_TEST(test_two_zeros_in_a_row_lead_to_a_reset);
+  RUN_TEST(test_what_was_missed_before_a_reset_does_not_count_after_it);
   RUN_TEST(test_temperature_of_all_ones_is_no_reading);
   RUN_TEST(test_zero_temperature_keeps_the_last_and_is_repeated_soon);
   RUN_TEST(test_jump_of_the_temperature_must_be_confirmed);
