@@ -8,9 +8,6 @@
 #include "report/reference/options.hpp"
 
 #include <algorithm>
-#include <cstdio>
-#include <exception>
-#include <iostream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -57,37 +54,40 @@ std::vector<FaultOutcome> run_all(const FaultRunner &runner, const std::vector<F
   return done;
 }
 
+struct Options {
+  std::string cache = FINGERTIP_TABLES_DIR, fault, state;
+  std::uint64_t jobs = 2;
+};
+
+ordered_json measure(const Options &options) {
+  if (options.jobs == 0 || options.jobs > 64) {
+    throw std::runtime_error("--jobs needs 1 to 64");
+  }
+  std::vector<FaultTrial> trials = fault_trials();
+  const auto is_other = [&](const FaultTrial &one) {
+    return (!options.fault.empty() && one.fault != options.fault) ||
+           (!options.state.empty() && one.state != options.state);
+  };
+  trials.erase(std::remove_if(trials.begin(), trials.end(), is_other), trials.end());
+  if (trials.empty()) {
+    throw std::runtime_error("there is no such fault in such a state");
+  }
+  const std::vector<FaultOutcome> done = run_all(FaultRunner(options.cache), trials, options.jobs);
+  ordered_json out;
+  for (std::size_t i = 0; i < trials.size(); i++) {
+    out["rows"].push_back(row_of(trials[i], done[i]));
+  }
+  return out;
+}
+
 } // namespace
 
 int main(int argc, char **argv) {
-  try {
-    std::string cache = FINGERTIP_TABLES_DIR, fault, state;
-    std::uint64_t jobs = 2;
-    reference::parse_options(
-        argc, argv,
-        {{"--cache", &cache}, {"--fault", &fault}, {"--state", &state}, {"--jobs", nullptr, &jobs}},
-        HELP);
-    if (jobs == 0 || jobs > 64) {
-      throw std::runtime_error("--jobs needs 1 to 64");
-    }
-    std::vector<FaultTrial> trials = fault_trials();
-    const auto is_other = [&](const FaultTrial &one) {
-      return (!fault.empty() && one.fault != fault) || (!state.empty() && one.state != state);
-    };
-    trials.erase(std::remove_if(trials.begin(), trials.end(), is_other), trials.end());
-    if (trials.empty()) {
-      throw std::runtime_error("there is no such fault in such a state");
-    }
-    const FaultRunner runner(cache);
-    const std::vector<FaultOutcome> done = run_all(runner, trials, jobs);
-    ordered_json out;
-    for (std::size_t i = 0; i < trials.size(); i++) {
-      out["rows"].push_back(row_of(trials[i], done[i]));
-    }
-    std::cout << out.dump(1) << '\n';
-    return std::cout.flush() ? 0 : 1;
-  } catch (const std::exception &error) {
-    std::fprintf(stderr, "fingertip_grasp_faults: %s\n", error.what());
-    return 1;
-  }
+  Options options;
+  return reference::print_found("fingertip_grasp_faults", argc, argv,
+                                {{"--cache", &options.cache},
+                                 {"--fault", &options.fault},
+                                 {"--state", &options.state},
+                                 {"--jobs", nullptr, &options.jobs}},
+                                HELP, [&] { return measure(options); });
 }

@@ -1,11 +1,15 @@
-// Command line of the form --name value, and --help, for the programs that measure.
+// Command line of the form --name value, and --help, for the programs that measure, and how they
+// end.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
+#include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -53,6 +57,23 @@ inline void parse_options(int argc, char **argv, const std::vector<Option> &opti
     std::exit(0);
   } catch (const CLI::ParseError &error) {
     throw std::runtime_error(std::string(error.what()) + "; see --help");
+  }
+}
+
+// A main that prints what it found as one JSON object on the standard output, or in one line on
+// stderr what went wrong. Exit status.
+template <typename Measure>
+int print_found(const char *program, int argc, char **argv, const std::vector<Option> &options,
+                const std::string &usage, const Measure &measure) {
+  try {
+    parse_options(argc, argv, options, usage);
+    const nlohmann::ordered_json found = measure();
+    std::cout << found.dump(1) << '\n';
+    std::cout.flush();
+    return std::cout ? 0 : 1;
+  } catch (const std::exception &error) {
+    std::fprintf(stderr, "%s: %s\n", program, error.what());
+    return 1;
   }
 }
 

@@ -11,9 +11,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <exception>
-#include <iostream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -254,7 +251,7 @@ ordered_json series_of(const Case &c, const std::string &kind, std::size_t act, 
   return series;
 }
 
-int measure(const Options &options) {
+ordered_json measure(const Options &options) {
   constexpr std::size_t CALIBRATIONS = 40;
   constexpr std::size_t SERIES_ACT = 1; // of lifts one of 0.3 s, of slides one too heavy
   if (options.pads == 0) {
@@ -287,25 +284,17 @@ int measure(const Options &options) {
   }
   out["motion_series"]["lift"] = series_of(all.front(), "lift", SERIES_ACT, pads, options);
   out["motion_series"]["slide"] = series_of(all.front(), "slide", SERIES_ACT, pads, options);
-  std::cout << out.dump(1) << '\n';
-  std::cout.flush();
-  return std::cout ? 0 : 1;
+  return out;
 }
 
 } // namespace
 
 int main(int argc, char **argv) {
-  try {
-    Options options;
-    reference::parse_options(argc, argv,
-                             {{"--cache", &options.cache},
-                              {"--seed", nullptr, &options.seed},
-                              {"--pads", nullptr, &options.pads},
-                              {"--usual", nullptr, nullptr, &options.usual}},
-                             HELP);
-    return measure(options);
-  } catch (const std::exception &error) {
-    std::fprintf(stderr, "shear_motion: %s\n", error.what());
-    return 1;
-  }
+  Options options;
+  return reference::print_found("shear_motion", argc, argv,
+                                {{"--cache", &options.cache},
+                                 {"--seed", nullptr, &options.seed},
+                                 {"--pads", nullptr, &options.pads},
+                                 {"--usual", nullptr, nullptr, &options.usual}},
+                                HELP, [&] { return measure(options); });
 }

@@ -1,11 +1,10 @@
 // truth_calibration: what a calibration by placements is worth, on pads of the twin. Progress on
-// stderr, one JSON object on stdout; the keys are explained where they are set. Exit status: 0
-// done; 1 something went wrong, said in one line; 2 wrong usage.
+// stderr, one JSON object on stdout; the keys are explained where they are set.
 #include "libfingertip/error.hpp"
-#include "libfingertip/progress_bar.hpp"
-#include "libfingertip/text.hpp"
-#include "truth/calibration/sessions.hpp"
 #include "libfingertip/in_parallel.hpp"
+#include "libfingertip/progress_bar.hpp"
+#include "report/reference/options.hpp"
+#include "truth/calibration/sessions.hpp"
 
 extern "C" {
 #include "config/defaults.h"
@@ -16,11 +15,10 @@ extern "C" {
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
-#include <exception>
 #include <functional>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 namespace {
 
@@ -44,7 +42,7 @@ enum Stream : std::uint64_t { TAP_PLACES = 401 };
 struct Options {
   std::uint64_t seed = 20000;
   std::size_t pads = 200;
-  std::filesystem::path cache = twin::default_cache_directory();
+  std::string cache = twin::default_cache_directory();
 };
 
 double median(std::vector<double> values) {
@@ -376,6 +374,9 @@ Objects objects_on(const Feet &feet, const Options &options) {
 }
 
 json measure(const Options &options) {
+  if (options.pads == 0) {
+    throw std::runtime_error("--pads needs at least one pad");
+  }
   const Feet feet(12.0, options.cache), thin_feet(6.0, options.cache);
   const Objects objects = objects_on(feet, options), thin_objects = objects_on(thin_feet, options);
   const double pads = double(options.pads);
@@ -437,39 +438,15 @@ json measure(const Options &options) {
   };
 }
 
-const char USAGE[] = "usage: truth_calibration [--seed N] [--pads N] [--cache DIR]\n";
-
-// False: wrong usage.
-bool parse(int argc, char **argv, Options &options) {
-  for (int i = 1; i < argc; i += 2) {
-    const std::string option = argv[i], value = i + 1 < argc ? argv[i + 1] : "";
-    const auto number = to_u64(value);
-    if (option == "--seed" && number) {
-      options.seed = *number;
-    } else if (option == "--pads" && number && *number > 0 && *number <= 100000) {
-      options.pads = *number;
-    } else if (option == "--cache" && !value.empty()) {
-      options.cache = value;
-    } else {
-      return false;
-    }
-  }
-  return true;
-}
+constexpr char HELP[] = "usage: truth_calibration [--seed N] [--pads N] [--cache DIR]\n";
 
 } // namespace
 
 int main(int argc, char **argv) {
   Options options;
-  if (!parse(argc, argv, options)) {
-    std::fputs(USAGE, stderr);
-    return 2;
-  }
-  try {
-    std::printf("%s\n", measure(options).dump(2).c_str());
-  } catch (const std::exception &error) {
-    std::fprintf(stderr, "truth_calibration: %s\n", printable(error.what()).c_str());
-    return 1;
-  }
-  return 0;
+  return reference::print_found("truth_calibration", argc, argv,
+                                {{"--cache", &options.cache},
+                                 {"--seed", nullptr, &options.seed},
+                                 {"--pads", nullptr, &options.pads}},
+                                HELP, [&] { return measure(options); });
 }

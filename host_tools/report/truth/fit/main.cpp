@@ -17,8 +17,6 @@ extern "C" {
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <exception>
-#include <iostream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
@@ -307,7 +305,7 @@ void judge_few_sensors(const Options &options, const std::vector<Contact> &thick
   }
 }
 
-int judge(const Options &options) {
+ordered_json judge(const Options &options) {
   if (options.pads == 0) {
     throw std::runtime_error("--pads needs at least one pad");
   }
@@ -321,24 +319,16 @@ int judge(const Options &options) {
   judge_elongated(options, calibrated, out);
   judge_iterations(options, thick, thin, out);
   judge_few_sensors(options, thick, thin, calibrated, out);
-  std::cout << out.dump(1) << '\n';
-  std::cout.flush();
-  return std::cout ? 0 : 1;
+  return out;
 }
 
 } // namespace
 
 int main(int argc, char **argv) {
-  try {
-    Options options;
-    reference::parse_options(argc, argv,
-                             {{"--cache", &options.cache},
-                              {"--seed", nullptr, &options.seed},
-                              {"--pads", nullptr, &options.pads}},
-                             HELP);
-    return judge(options);
-  } catch (const std::exception &error) {
-    std::fprintf(stderr, "truth_fit: %s\n", error.what());
-    return 1;
-  }
+  Options options;
+  return reference::print_found("truth_fit", argc, argv,
+                                {{"--cache", &options.cache},
+                                 {"--seed", nullptr, &options.seed},
+                                 {"--pads", nullptr, &options.pads}},
+                                HELP, [&] { return judge(options); });
 }

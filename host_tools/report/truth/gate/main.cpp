@@ -16,7 +16,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
-#include <iostream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
@@ -399,7 +398,7 @@ struct Judge {
     }
   }
 
-  int operator()() {
+  ordered_json operator()() {
     if (options.pads > 0) {
       judge_slow_forces();
       judge_rest();
@@ -408,39 +407,35 @@ struct Judge {
       judge_left_forces();
     }
     judge_strips();
-    std::cout << out.dump(1) << '\n';
-    std::cout.flush();
-    return std::cout ? 0 : 1;
+    return out;
   }
 };
+
+ordered_json measure(const Options &options) {
+  if (!options.recordings.empty() && !std::filesystem::is_directory(options.recordings)) {
+    throw std::runtime_error(options.recordings + " is no folder");
+  }
+  Judge judge{options, modes(), {}};
+  if (options.pads == 1) { // a quick look
+    const auto is_left_out = [](const Mode &mode) { return mode.osr != 8192; };
+    judge.all.erase(std::remove_if(judge.all.begin(), judge.all.end(), is_left_out),
+                    judge.all.end());
+  }
+  judge.out["seed"] = options.seed;
+  judge.out["pads"] = options.pads;
+  return judge();
+}
 
 } // namespace
 
 int main(int argc, char **argv) {
-  try {
-    Options options;
-    if (const char *folder = std::getenv("FINGERTIP_RECORDINGS")) {
-      options.recordings = folder;
-    }
-    reference::parse_options(argc, argv,
-                             {{"--recordings", &options.recordings},
-                              {"--seed", nullptr, &options.seed},
-                              {"--pads", nullptr, &options.pads}},
-                             HELP);
-    if (!options.recordings.empty() && !std::filesystem::is_directory(options.recordings)) {
-      throw std::runtime_error(options.recordings + " is no folder");
-    }
-    Judge judge{options, modes(), {}};
-    if (options.pads == 1) { // a quick look
-      const auto is_left_out = [](const Mode &mode) { return mode.osr != 8192; };
-      judge.all.erase(std::remove_if(judge.all.begin(), judge.all.end(), is_left_out),
-                      judge.all.end());
-    }
-    judge.out["seed"] = options.seed;
-    judge.out["pads"] = options.pads;
-    return judge();
-  } catch (const std::exception &error) {
-    std::fprintf(stderr, "truth_gate: %s\n", error.what());
-    return 1;
+  Options options;
+  if (const char *folder = std::getenv("FINGERTIP_RECORDINGS")) {
+    options.recordings = folder;
   }
+  return reference::print_found("truth_gate", argc, argv,
+                                {{"--recordings", &options.recordings},
+                                 {"--seed", nullptr, &options.seed},
+                                 {"--pads", nullptr, &options.pads}},
+                                HELP, [&] { return measure(options); });
 }

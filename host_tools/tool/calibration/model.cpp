@@ -1,0 +1,184 @@
+#include "tool/calibration/model.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace fingertip::calibrating {
+
+using Eigen::VectorXd;
+
+double huber(double square) {
+  return square <= HUBER * HUBER ? square : 2.0 * HUBER * std::sqrt(square) - HUBER * HUBER;
+}
+double huber_weight(double square) {
+  return square <= HUBER * HUBER ? 1.0 : HUBER / std::sqrt(square);
+}
+
+Model::Model(const Array &array, const std::vector<Placement> &placements,
+             const Assumptions &assumptions)
+    : layout{static_cast<int>(array.sensors())}, array_(array), placements_(placements),
+      assumed_(assumptions) {
+  double first_s = std::numeric_limits<double>::infinity(), last_s = -first_s;
+  std::vector<double> peaks;
+  for (const Placement &placement : placements) {
+    first_s = std::min(first_s, placement.t_s);
+    last_s = std::max(last_s, placement.t_s);
+    double peak = 0.0;
+    for (int k = 0; k < layout.sensors; k++) {
+      if (placement.usable >> k & 1u) {
+        peak = std::max(peak, placement.reading_Pa[std::size_t(k)]);
+      }
+    }
+    peaks.push_back(peak);
+  }
+  std::nth_element(peaks.begin(), peaks.begin() + std::ptrdiff_t(peaks.size() / 2), peaks.end());
+  peak_Pa_ = std::max(peaks[peaks.size() / 2], 1.0);
+  middle_s_ = 0.5 * (first_s + last_s);
+  half_s_ = std::max(0.5 * (last_s - first_s), 1e-9);
+}
+
+void Model::assume(const Spread &spread, double excess) {
+  assumed_.position_mm = spread.position_mm;
+  assumed_.force = spread.force;
+  assumed_.width = spread.width;
+  assumed_.ellipse = spread.ellipse;
+  assumed_.memory = spread.memory;
+  excess_ = excess;
+}
+
+Unknowns Model::first_guess() const {
+  Unknowns first;
+  first.global = VectorXd::Zero(layout.size());
+  std::vector<double> peaks, widths;
+  for (const Placement &placement : placements_) {
+    double largest = 0.0;
+    for (int k = 0; k < layout.sensors; k++) {
+      if (placement.usable >> k & 1u) {
+        largest = std::max(largest, placement.reading_Pa[std::size_t(k)]);
+      }
+    }
+    Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+    Eigen::Vector4d right = Eigen::Vector4d::Zero();
+    double sum = 0.0, at_x = 0.0, at_y = 0.0;
+    for (int k = 0; k < layout.sensors; k++) {
+      const double p = placement.reading_Pa[std::size_t(k)] / std::max(largest, 1e-9);
+      if (!(placement.usable >> k & 1u) || p < 0.02) {
+        continue;
+      }
+      const double x = array_.x_mm[std::size_t(k)] / array_.pitch_mm;
+      const double y = array_.y_mm[std::size_t(k)] / array_.pitch_mm;
+      const Eigen::Vector4d row(1.0, x, y, x * x + y * y);
+      normal += p * p * row * row.transpose();
+      right += p * p * std::log(p) * row;
+      sum += p * p;
+      at_x += p * p * x;
+      at_y += p * p * y;
+    }
+    /* A ridge towards a width of half a pitch, where few readings are large. */
+    constexpr double RIDGE = 0.003, WIDTH = 0.5;
+    normal(3, 3) += RIDGE;
+    right[3] += RIDGE * -0.5 / (WIDTH * WIDTH);
+    normal += 1e-9 * Eigen::Matrix4d::Identity();
+    const Eigen::Vector4d paraboloid = normal.ldlt().solve(right);
+    const double bend = std::min(paraboloid[3], -0.5 / 9.0);
+    double x = -0.5 * paraboloid[1] / bend, y = -0.5 * paraboloid[2] / bend;
+    if (sum > 0.0 && std::hypot(x - at_x / sum, y - at_y / sum) > 1.0) {
+      x = at_x / sum;
+      y = at_y / sum;
+    }
+    Local local = Local::Zero();
+    local[0] = x * array_.pitch_mm;
+    local[1] = y * array_.pitch_mm;
+    first.locals.push_back(local);
+    peaks.push_back(largest * std::exp(paraboloid[0] - bend * (x * x + y * y)));
+    widths.push_back(array_.pitch_mm * std::sqrt(-0.5 / bend));
+  }
+  const auto median = [](std::vector<double> values) {
+    std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2),
+                     values.end());
+    return values[values.size() / 2];
+  };
+  first.global[layout.log_peak()] =
+      std::log(std::clamp(median(peaks), 0.5 * peak_Pa_, 3.0 * peak_Pa_));
+  first.global[layout.log_width()] = std::log(median(widths));
+  first.global[layout.mixing()] = assumed_.mixing;
+  return first;
+}
+
+Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau,
+                       double earlier_Pa) const {
+  const double u = array_.x_mm[std::size_t(k)] + g[layout.dx(k)] - l[0];
+  const double v = array_.y_mm[std::size_t(k)] + g[layout.dy(k)] - l[1];
+  const double q1 = l[4] + g[layout.ellipse(0)], q2 = l[5] + g[layout.ellipse(1)];
+  const double square =
+      std::max(u * u + v * v - 2.0 * q1 * (u * u - v * v) - 4.0 * q2 * u * v, 0.0);
+  const double width = std::exp(g[layout.log_width()] + l[3]), m = g[layout.mixing()];
+  const double per = 0.5 / (width * width), narrow_per = per / (NARROW * NARROW);
+  const double wide = std::exp(-per * square), narrow = std::exp(-narrow_per * square);
+  const double strength = std::exp(g[k] + g[layout.log_peak()] + l[2] - 2.0 * l[3]);
+  const double value = strength * ((1.0 - m) * wide + m * narrow);
+  const double by_square = -strength * ((1.0 - m) * wide * per + m * narrow * narrow_per);
+  const double by_log_width = -2.0 * square * by_square;
+  const double by_u = by_square * (2.0 * u - 4.0 * q1 * u - 4.0 * q2 * v);
+  const double by_v = by_square * (2.0 * v + 4.0 * q1 * v - 4.0 * q2 * u);
+  Reading r;
+  r.model =
+      value + g[layout.offset(k)] + g[layout.drift(k)] * tau - g[layout.memory(k)] * earlier_Pa;
+  const double by_q1 = -2.0 * by_square * (u * u - v * v), by_q2 = -4.0 * by_square * u * v;
+  const int at[TOUCHED] = {k,
+                           layout.log_peak(),
+                           layout.log_width(),
+                           layout.mixing(),
+                           layout.dx(k),
+                           layout.dy(k),
+                           layout.offset(k),
+                           layout.drift(k),
+                           layout.memory(k),
+                           layout.ellipse(0),
+                           layout.ellipse(1)};
+  const double by[TOUCHED] = {value,       value, by_log_width, strength * (narrow - wide),
+                              by_u,        by_v,  1.0,          tau,
+                              -earlier_Pa, by_q1, by_q2};
+  std::copy(at, at + TOUCHED, r.at);
+  std::copy(by, by + TOUCHED, r.by);
+  r.by_local << -by_u, -by_v, value, by_log_width - 2.0 * value, by_q1, by_q2;
+  return r;
+}
+
+double Model::earlier(std::size_t i, int k) const {
+  const double now_Pa = std::max(placements_[i].reading_Pa[std::size_t(k)], 0.0);
+  return placements_[i].earlier_Pa[std::size_t(k)] * now_Pa / (now_Pa + REMEMBERS_FROM * peak_Pa_);
+}
+
+double Model::expected_sd(const Placement &placement, double reading_Pa) const {
+  return std::sqrt(placement.noise_Pa * placement.noise_Pa +
+                   excess_ * excess_ *
+                       (assumed_.model_share * peak_Pa_ * assumed_.model_share * peak_Pa_ +
+                        assumed_.reading_share * reading_Pa * assumed_.reading_share * reading_Pa));
+}
+
+std::pair<double, double> Model::prior(int at) const {
+  const int n = layout.sensors;
+  if (at < n) {
+    return {0.0, assumed_.gain};
+  }
+  if (at == layout.mixing()) {
+    return {assumed_.mixing, assumed_.mixing_sd};
+  }
+  if (at < layout.dx(0)) {
+    return {0.0, at < layout.ellipse(0) ? 0.0 : assumed_.ellipse_of_all};
+  }
+  if (at < layout.offset(0)) {
+    return {0.0, assumed_.position_mm};
+  }
+  return {0.0, at < layout.memory(0) ? assumed_.offset_share * peak_Pa_ : assumed_.memory};
+}
+
+Local Model::local_sd() const {
+  Local sd;
+  sd << 0.0, 0.0, assumed_.force, assumed_.width, assumed_.ellipse, assumed_.ellipse;
+  return sd;
+}
+
+} // namespace fingertip::calibrating
