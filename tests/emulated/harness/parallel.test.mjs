@@ -1,7 +1,7 @@
 /** Board pico_parallel: fifteen lines bit by bit, driven by hand through SIO; wired-AND, faults, times. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { PicoParallel } from '../../../host_tools/simulation/emulator/board/pico_parallel.mjs';
+import { PicoParallel } from '../../../host_tools/simulation/emulator/board/parallel_board.mjs';
 import { parseFaults } from '../../../host_tools/simulation/emulator/faults.mjs';
 import { findBoard } from '../../../host_tools/simulation/emulator/board/boards.mjs';
 import { VcdDump } from '../../../host_tools/simulation/emulator/vcd.mjs';

@@ -1,7 +1,7 @@
-/** The boards by name. A board class has static sensors, muxes, lines, probes, clkSys_Hz; see pico_mux.mjs for its instances. */
+/** The boards by name. A board class has static sensors, muxes, lines, probes, clkSys_Hz; see multiplexed_board.mjs for its instances. */
 import { InputError } from '../errors.mjs';
-import { PicoMux } from './pico_mux.mjs';
-import { PicoParallel } from './pico_parallel.mjs';
+import { PicoMux } from './multiplexed_board.mjs';
+import { PicoParallel } from './parallel_board.mjs';
 
 const BOARDS = { pico_mux: PicoMux, pico_parallel: PicoParallel };
 
