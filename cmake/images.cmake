@@ -1,8 +1,10 @@
 # The firmware images that the host tests and the demo run, built from here with the cross
-# compiler into build/BOARD, exactly as `cmake --preset BOARD` does.
+# compiler into build/BOARD.
 include(ExternalProject)
 
-set(FINGERTIP_IMAGES pico_mux pico_parallel CACHE STRING "Boards whose image the tests run in the emulator; empty for none")
+set(boards ${FINGERTIP_BOARDS})
+list(REMOVE_ITEM boards native)
+set(FINGERTIP_IMAGES ${boards} CACHE STRING "Boards whose image the tests run in the emulator; empty for none")
 
 foreach(board IN LISTS FINGERTIP_IMAGES)
   set(image_dir ${CMAKE_SOURCE_DIR}/build/${board})
@@ -10,7 +12,8 @@ foreach(board IN LISTS FINGERTIP_IMAGES)
     SOURCE_DIR ${CMAKE_SOURCE_DIR}
     BINARY_DIR ${image_dir}
     PREFIX ${CMAKE_BINARY_DIR}/image_${board}
-    CONFIGURE_COMMAND ${CMAKE_COMMAND} --preset ${board} -S ${CMAKE_SOURCE_DIR}
+    CONFIGURE_COMMAND ${CMAKE_COMMAND} -G Ninja -S ${CMAKE_SOURCE_DIR} -B ${image_dir} -DCMAKE_BUILD_TYPE=Release
+      -DCMAKE_TOOLCHAIN_FILE=${CMAKE_SOURCE_DIR}/cmake/toolchain-arm-none-eabi.cmake -DFINGERTIP_BOARD=${board}
     BUILD_COMMAND ${CMAKE_COMMAND} --build ${image_dir}
     INSTALL_COMMAND ""
     BUILD_ALWAYS ON

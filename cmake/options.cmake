@@ -1,13 +1,13 @@
 # What is built: a board, a scene, and the identity that the image carries.
 
-set(FINGERTIP_BOARDS native pico_mux pico_parallel)
+include(boards)
 set(FINGERTIP_BOARD native CACHE STRING "Board: one of ${FINGERTIP_BOARDS}")
 set_property(CACHE FINGERTIP_BOARD PROPERTY STRINGS ${FINGERTIP_BOARDS})
 if(NOT FINGERTIP_BOARD IN_LIST FINGERTIP_BOARDS)
   message(FATAL_ERROR "FINGERTIP_BOARD=${FINGERTIP_BOARD} is unknown; choose one of: ${FINGERTIP_BOARDS}")
 endif()
 if(NOT FINGERTIP_BOARD STREQUAL "native" AND NOT CMAKE_CROSSCOMPILING)
-  message(FATAL_ERROR "Board ${FINGERTIP_BOARD} needs the cross compiler: use cmake --preset ${FINGERTIP_BOARD}")
+  message(FATAL_ERROR "Board ${FINGERTIP_BOARD} needs the cross compiler: use -DCMAKE_TOOLCHAIN_FILE=cmake/toolchain-arm-none-eabi.cmake")
 endif()
 
 # The sensors of the array, all of one kind: a section of firmware/ms58xx/sensors.h.
@@ -89,9 +89,6 @@ foreach(option FINGERTIP_PRIOR_SIGMA_UM FINGERTIP_PRIOR_WIDTH_UM)
     message(FATAL_ERROR "${option}=${${option}} must be a whole number of micrometres, at most 1000000")
   endif()
 endforeach()
-
-# The data sheet of the sibling MS5837-02BA shows it so; drivers of the family do without and work.
-option(FINGERTIP_READ_STOPS "pico_parallel: STOP and START before an answer, not a repeated START" OFF)
 
 # 1209:0001 is the pid.codes id for tests: a product needs its own.
 set(FINGERTIP_USB_VID 0x1209 CACHE STRING "USB vendor id")

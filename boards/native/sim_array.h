@@ -17,8 +17,7 @@
 /* Three selections and a write, as behind three multiplexers; a selection and a read of 3 bytes. */
 #define SIM_ARRAY_BROADCAST_us 200u
 #define SIM_ARRAY_READ_us 193u
-/* With a data line for each sensor, which are then read all at once; the sum is that of board
- * pico_parallel in emulation. */
+/* With a data line for each sensor, which are then read all at once. */
 #define SIM_ARRAY_PARALLEL_BROADCAST_us 46u
 #define SIM_ARRAY_PARALLEL_READ_us 130u
 /* From the end that a transfer should have had to FT_ERR_TIMEOUT. */

@@ -6,7 +6,7 @@
 #include <string.h>
 
 enum {
-  ALL_CHANNELS = (1 << BOARD_CHANNELS_PER_MUX) - 1,
+  ALL_CHANNELS = (1 << BOARD_SENSORS_OF_STRIP) - 1,
   ALL_MUXES = (1 << BOARD_MUX_COUNT) - 1,
   NO_MUX = BOARD_MUX_COUNT,
   /* UM10204 3.1.16: a device that holds SDA lets go within nine; one of them is the clock of an
@@ -47,7 +47,7 @@ static uint32_t sensors_of(uint8_t muxes) {
   uint32_t sensors = 0;
   for (unsigned mux = 0; mux < BOARD_MUX_COUNT; mux++) {
     if ((muxes >> mux & 1) != 0) {
-      sensors |= (uint32_t)ALL_CHANNELS << mux * BOARD_CHANNELS_PER_MUX;
+      sensors |= (uint32_t)ALL_CHANNELS << mux * BOARD_SENSORS_OF_STRIP;
     }
   }
   return sensors;
@@ -106,9 +106,9 @@ static bool start_next(struct mux_bus *bus) {
     return false;
   }
   while (bus->sensor < BOARD_SENSOR_COUNT) {
-    const unsigned mux = bus->sensor / BOARD_CHANNELS_PER_MUX;
+    const unsigned mux = bus->sensor / BOARD_SENSORS_OF_STRIP;
     shut_all_but(bus, mux);
-    if (select(bus, mux, (uint8_t)(1u << bus->sensor % BOARD_CHANNELS_PER_MUX))) {
+    if (select(bus, mux, (uint8_t)(1u << bus->sensor % BOARD_SENSORS_OF_STRIP))) {
       return true;
     }
     if ((bus->absent >> mux & 1) == 0) {

@@ -28,6 +28,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+enum { BOARD_MUX_COUNT = BOARD_SENSOR_COUNT / BOARD_SENSORS_OF_STRIP }; /* one for each strip */
+
 /* Private, but caller-owned. */
 struct mux_bus {
   enum mux_bus_operation {

@@ -1,7 +1,5 @@
 #include "pico_parallel/i2c_wave.h"
 
-#include "pico_parallel/board.h"
-
 #define SDA ((uint16_t)BOARD_SDA_LINES)
 #define SCL ((uint16_t)BOARD_SCL_LINE)
 #define NONE 0u

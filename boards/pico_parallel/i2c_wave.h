@@ -12,10 +12,15 @@
 #define PICO_PARALLEL_I2C_WAVE_H
 
 #include "array_bus/array_bus.h"
+#include "pico_parallel/board.h"
 #include "rp2040/wave_player.h"
 
 #include <stdbool.h>
 #include <stdint.h>
+
+/* Bitmaps of lines: the SDA of sensor k is GPIO k. */
+#define BOARD_SDA_LINES ((1u << BOARD_SENSOR_COUNT) - 1u)
+#define BOARD_SCL_LINE (1u << BOARD_PIN_SCL)
 
 enum {
   I2C_WAVE_BYTE_CELLS = 9,

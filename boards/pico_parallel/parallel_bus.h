@@ -13,7 +13,6 @@
 #define PICO_PARALLEL_PARALLEL_BUS_H
 
 #include "array_bus/array_bus.h"
-#include "pico_parallel/board.h"
 #include "pico_parallel/i2c_wave.h"
 
 #include <stdbool.h>

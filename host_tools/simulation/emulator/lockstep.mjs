@@ -2,7 +2,7 @@
 /** Emulated boards in lock step with a program that plays the world around them: see USAGE. */
 import { spawn } from 'node:child_process';
 import { parseArgs } from 'node:util';
-import { findBoard } from './board/boards.mjs';
+import { BOARDS, findBoard } from './board/boards.mjs';
 import { InputError } from './errors.mjs';
 import { readImage } from './image.mjs';
 import { LivePressures } from './live_pressures.mjs';
@@ -14,7 +14,7 @@ Runs emulated boards with the same firmware image and a program in slices of emu
 the same bit for bit each time, whatever the clock on the wall says. The ports of the boards are open from the start.
 
   --image FILE       raw flash image (.bin), loaded at flash offset 0
-  --board NAME       pico_mux or pico_parallel
+  --board NAME       ${BOARDS.join(' or ')}
   --boards N         so many, 1 to 8; default 2
   --clock-ppm LIST   how fast the clock of each is, split by commas; default 0
   --slice-us N       length of a slice, 100 to 10000; default 500

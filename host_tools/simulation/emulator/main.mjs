@@ -3,7 +3,7 @@
 import { readFileSync } from 'node:fs';
 import { createInterface } from 'node:readline';
 import { parseArgs } from 'node:util';
-import { findBoard } from './board/boards.mjs';
+import { BOARDS, findBoard } from './board/boards.mjs';
 import { findSensor } from './board/ms5840.mjs';
 import { FLASH_BYTES } from './chip/flash_memory.mjs';
 import { InputError, inWords } from './errors.mjs';
@@ -23,7 +23,7 @@ const USAGE = `usage: main.mjs --image FILE.bin --board NAME --scenario FILE.csv
 Runs an unmodified firmware image on an emulated board with simulated sensors and a USB host.
 
   --image FILE         raw flash image (.bin), loaded at flash offset 0
-  --board NAME         pico_mux or pico_parallel
+  --board NAME         ${BOARDS.join(' or ')}
   --scenario FILE      what the sensors feel (format: scenario.mjs)
   --sensor NAME        what the board carries: ms5840 or ms5837_30ba; default ms5840
   --seconds N          emulated seconds to run; default: the scenario's last row

@@ -120,13 +120,13 @@ private:
   /* "sensor 7 (strip 1, ...)" */
   std::string named(unsigned sensor) const {
     std::string text = list({sensor});
-    return wiring_ && sensor < wiring_->sensor_count()
+    return wiring_ && sensor < wiring_->sensor_count
                ? text + " (" + wiring_->place_text(sensor) + ")"
                : text;
   }
 
   std::string check_of(unsigned sensor) const {
-    return wiring_ && sensor < wiring_->sensor_count() ? wiring_->check_sensor(sensor)
+    return wiring_ && sensor < wiring_->sensor_count ? wiring_->check_sensor(sensor)
                                                        : "check its supply, data line and clock";
   }
 
@@ -211,7 +211,7 @@ private:
           text + "; this tool is of version " + version(facts_.tool_version),
           "install this tool's with `fingertip flash`, or use the other's tool");
     }
-    if (!wiring_ || wiring_->sensor_count() != info.sensor_count) {
+    if (!wiring_ || wiring_->sensor_count != info.sensor_count) {
       add(Verdict::warn, "board",
           text_field(info.board) + " with " + count(info.sensor_count, "sensor") +
               " is unknown to this tool",
@@ -241,7 +241,7 @@ private:
     }
     std::uint32_t left = missing_;
     if (wiring_ && wiring_->has_multiplexers()) {
-      for (unsigned strip = 0; strip * wiring_->sensors_of_strip() < wiring_->sensor_count();
+      for (unsigned strip = 0; strip * wiring_->sensors_of_strip < wiring_->sensor_count;
            strip++) {
         std::uint32_t of_strip = wiring_->sensors_of(strip);
         if ((left & of_strip) == of_strip) {
@@ -260,7 +260,7 @@ private:
   void missing_strip(unsigned strip, std::uint32_t sensors) {
     char address[8];
     std::snprintf(address, sizeof address, "0x%02x",
-                  *wiring_->place(strip * wiring_->sensors_of_strip()).multiplexer);
+                  *wiring_->place(strip * wiring_->sensors_of_strip).multiplexer);
     std::string who = "strip " + std::to_string(strip) + ", " + list(sensors_in(sensors)) + ": ";
     if (facts_.after->bus_timeouts > 0) {
       add(Verdict::bad, "sensors",
@@ -623,10 +623,10 @@ std::optional<double> expected_rate_Hz(const wire_info &info) {
   double asked_Hz = info.rate_mHz / 1000.0;
   auto wiring = Wiring::of_board(text_field(info.board));
   const ms58xx_osr *osr = ms58xx_find_osr(info.osr);
-  if (!wiring || !osr || wiring->sensor_count() != info.sensor_count) {
+  if (!wiring || !osr || wiring->sensor_count != info.sensor_count) {
     return std::nullopt;
   }
-  double most_Hz = 1e6 / (osr->conversion_us + wiring->overhead_us());
+  double most_Hz = 1e6 / (osr->conversion_us + wiring->overhead_us);
   return info.rate_mHz == 0 ? most_Hz : std::min(asked_Hz, most_Hz);
 }
 

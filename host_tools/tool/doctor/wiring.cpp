@@ -2,25 +2,9 @@
 
 #include <cstdio>
 
-/* Each names its pins alike. */
-namespace pico_mux {
-#include "pico_mux/board.h"
-}
-namespace pico_parallel {
-#include "pico_parallel/board.h"
-}
-
 namespace fingertip {
 
 namespace {
-
-/* Five sensors along each strip: boards/pico_parallel/board.h says so in words. */
-constexpr unsigned PARALLEL_SENSORS_OF_STRIP = 5;
-
-/* The release images in the emulator, 3 s at each OSR: 2571 to 2589 and 156 to 176 us, the longest
- * at OSR 256. */
-constexpr double MUX_OVERHEAD_us = 2589;
-constexpr double PARALLEL_OVERHEAD_us = 176;
 
 std::string address_text(unsigned address) {
   char text[8];
@@ -35,32 +19,26 @@ std::string pin_text(unsigned gpio) {
   return "GP" + std::to_string(gpio) + " (pin " + std::to_string(gpio + 1 + (gpio + 2) / 4) + ")";
 }
 
+const std::vector<Wiring> &Wiring::all() {
+  static const std::vector<Wiring> boards = {
+#include "boards.inc"
+  };
+  return boards;
+}
+
 std::optional<Wiring> Wiring::of_board(const std::string &board) {
-  Wiring wiring;
-  if (board == "pico_mux") {
-    wiring.sensor_count_ = pico_mux::BOARD_SENSOR_COUNT;
-    wiring.sensors_of_strip_ = pico_mux::BOARD_CHANNELS_PER_MUX;
-    wiring.scl_gpio_ = pico_mux::BOARD_PIN_SCL;
-    wiring.sda_gpio_ = pico_mux::BOARD_PIN_SDA;
-    wiring.first_multiplexer_ = pico_mux::BOARD_MUX_ADDRESS_0;
-    wiring.first_reset_gpio_ = pico_mux::BOARD_PIN_MUX_RESET_0;
-    wiring.overhead_us_ = MUX_OVERHEAD_us;
-    return wiring;
-  }
-  if (board == "pico_parallel") {
-    wiring.sensor_count_ = pico_parallel::BOARD_SENSOR_COUNT;
-    wiring.sensors_of_strip_ = PARALLEL_SENSORS_OF_STRIP;
-    wiring.scl_gpio_ = pico_parallel::BOARD_PIN_SCL;
-    wiring.overhead_us_ = PARALLEL_OVERHEAD_us;
-    return wiring;
+  for (const Wiring &wiring : all()) {
+    if (wiring.board == board) {
+      return wiring;
+    }
   }
   return std::nullopt;
 }
 
 Place Wiring::place(unsigned sensor) const {
-  Place place = {sensor / sensors_of_strip_, sensor % sensors_of_strip_, {}, {}};
-  if (first_multiplexer_) {
-    place.multiplexer = *first_multiplexer_ + place.strip;
+  Place place = {sensor / sensors_of_strip, sensor % sensors_of_strip, {}, {}};
+  if (mux_address_0) {
+    place.multiplexer = *mux_address_0 + place.strip;
   } else {
     place.gpio = sensor;
   }
@@ -68,7 +46,7 @@ Place Wiring::place(unsigned sensor) const {
 }
 
 std::uint32_t Wiring::sensors_of(unsigned strip) const {
-  return ((1u << sensors_of_strip_) - 1u) << (strip * sensors_of_strip_);
+  return ((1u << sensors_of_strip) - 1u) << (strip * sensors_of_strip);
 }
 
 std::string Wiring::place_text(unsigned sensor) const {
@@ -93,12 +71,12 @@ std::string Wiring::check_sensor(unsigned sensor) const {
 
 std::string Wiring::check_multiplexer(unsigned strip) const {
   return "check the supply and address pins of that multiplexer, its RESET on " +
-         pin_text(first_reset_gpio_ + strip) + ", and its SDA and SCL";
+         pin_text(*pin_mux_reset_0 + strip) + ", and its SDA and SCL";
 }
 
 std::string Wiring::check_all() const {
-  return "check 3V3 and GND of the sensors" + std::string(sda_gpio_ ? " and multiplexers" : "") +
-         (sda_gpio_ ? ", SDA on " + pin_text(*sda_gpio_) : "") + ", SCL on " + pin_text(scl_gpio_) +
+  return "check 3V3 and GND of the sensors" + std::string(pin_sda ? " and multiplexers" : "") +
+         (pin_sda ? ", SDA on " + pin_text(*pin_sda) : "") + ", SCL on " + pin_text(pin_scl) +
          ", and the pull-ups: 3.3 V at rest";
 }
 

@@ -1,7 +1,6 @@
 /** Board pico_parallel: fifteen lines bit by bit, driven by hand through SIO; wired-AND, faults, times. */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { PicoParallel } from '../../../host_tools/simulation/emulator/board/pico_parallel.mjs';
 import { parseFaults } from '../../../host_tools/simulation/emulator/faults.mjs';
 import { findBoard } from '../../../host_tools/simulation/emulator/board/boards.mjs';
 import { VcdDump } from '../../../host_tools/simulation/emulator/vcd.mjs';
@@ -18,7 +17,7 @@ class Controller extends ChipBench {
     this.slack_ns = slack_ns;
     this.transfers = [];
     this.faulty = new Map();
-    this.board = new PicoParallel({
+    this.board = new (findBoard('pico_parallel'))({
       scope: this.time.scope(), report: this.report, seed: 5, rise_ns, onLevels,
       stimulus: () => ({ pressure_Pa: 101325, temperature_degC: 25 }),
       faults: () => ({ sensor: (i) => this.faulty.get(i) ?? {} }),

@@ -21,7 +21,7 @@ TEST(Wiring, PinsAreThoseOfTheBoardsReadme) {
 TEST(Wiring, SensorsOfPicoMuxAreBehindMultiplexers) {
   auto wiring = Wiring::of_board("pico_mux");
   ASSERT_TRUE(wiring);
-  EXPECT_EQ(wiring->sensor_count(), 15u);
+  EXPECT_EQ(wiring->sensor_count, 15u);
   auto place = wiring->place(13);
   EXPECT_EQ(place.strip, 2u);
   EXPECT_EQ(place.position, 3u);
@@ -35,7 +35,7 @@ TEST(Wiring, SensorsOfPicoMuxAreBehindMultiplexers) {
 TEST(Wiring, SensorsOfPicoParallelHaveLinesOfTheirOwn) {
   auto wiring = Wiring::of_board("pico_parallel");
   ASSERT_TRUE(wiring);
-  EXPECT_EQ(wiring->sensor_count(), 15u);
+  EXPECT_EQ(wiring->sensor_count, 15u);
   EXPECT_EQ(wiring->place(13).gpio, 13u);
   EXPECT_FALSE(wiring->place(13).multiplexer);
   EXPECT_EQ(wiring->place_text(13), "strip 2, position 3, SDA on GP13 (pin 17)");

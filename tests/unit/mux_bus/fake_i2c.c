@@ -49,7 +49,7 @@ uint8_t fake_byte(unsigned sensor, uint8_t command, unsigned index) {
 static uint32_t open_channels(void) {
   uint32_t sensors = 0;
   for (unsigned m = 0; m < BOARD_MUX_COUNT; m++) {
-    sensors |= (uint32_t)mux.open[m] << m * BOARD_CHANNELS_PER_MUX;
+    sensors |= (uint32_t)mux.open[m] << m * BOARD_SENSORS_OF_STRIP;
   }
   return sensors;
 }
@@ -106,8 +106,8 @@ enum ft_status i2c_start_read(uint8_t address, uint8_t byte_count) {
 static uint32_t reachable(void) {
   uint32_t sensors = 0;
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
-    const unsigned m = k / BOARD_CHANNELS_PER_MUX;
-    if ((mux.open[m] >> k % BOARD_CHANNELS_PER_MUX & 1) != 0 && !fake.mux_missing[m] &&
+    const unsigned m = k / BOARD_SENSORS_OF_STRIP;
+    if ((mux.open[m] >> k % BOARD_SENSORS_OF_STRIP & 1) != 0 && !fake.mux_missing[m] &&
         !fake.sensor_missing[k]) {
       sensors |= UINT32_C(1) << k;
     }

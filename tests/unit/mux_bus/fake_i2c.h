@@ -8,7 +8,7 @@
 #ifndef FAKE_I2C_H
 #define FAKE_I2C_H
 
-#include "pico_mux/board.h"
+#include "pico_mux/mux_bus.h"
 
 #include <stdbool.h>
 #include <stdint.h>

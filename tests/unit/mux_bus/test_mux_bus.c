@@ -372,7 +372,7 @@ static int run_for(uint64_t duration_us, uint32_t *sensors) {
 static void test_a_line_tied_low_costs_its_multiplexer_only(void) {
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
     next_case();
-    const uint32_t rest = ALL_SENSORS & ~STRIP(k / BOARD_CHANNELS_PER_MUX);
+    const uint32_t rest = ALL_SENSORS & ~STRIP(k / BOARD_SENSORS_OF_STRIP);
     uint32_t sensors = 0;
     expect_good_frame();
     fake.tied_low = 1u << k;

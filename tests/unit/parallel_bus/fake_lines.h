@@ -7,7 +7,7 @@
 #ifndef FAKE_LINES_H
 #define FAKE_LINES_H
 
-#include "pico_parallel/board.h"
+#include "pico_parallel/i2c_wave.h"
 
 #include <stdbool.h>
 #include <stdint.h>

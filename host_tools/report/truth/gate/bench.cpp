@@ -27,8 +27,6 @@ constexpr double BRANCH_degC = 10.0, BRANCH_STEP_Pa = -60.0;
 constexpr std::array<std::uint16_t, 6> COEFFICIENTS{46372, 43981, 29059, 27842, 31553, 28165};
 constexpr double PROM_SPREAD = 0.03;
 
-constexpr const char *BOARDS[] = {"pico_mux", "pico_parallel"};
-
 enum Stream : std::uint64_t { OFFSET = 301, DRIFT, PROM, NOISE };
 
 // Normal numbers are drawn once: hours of frames take billions.
@@ -48,11 +46,10 @@ const std::vector<float> &normals() {
 
 std::vector<Mode> modes() {
   std::vector<Mode> all;
-  for (const char *board : BOARDS) {
-    const double overhead_us = Wiring::of_board(board)->overhead_us();
+  for (const Wiring &wiring : Wiring::all()) {
     for (unsigned osr = 256; osr <= 8192; osr *= 2) {
       const ms58xx_osr *row = ms58xx_find_osr(static_cast<std::uint16_t>(osr));
-      all.push_back({board, osr, 1e6 / (overhead_us + row->conversion_us),
+      all.push_back({wiring.board, osr, 1e6 / (wiring.overhead_us + row->conversion_us),
                      row->noise_Pa_q10 / 1024.0, row->noise_Pa_q10});
     }
   }

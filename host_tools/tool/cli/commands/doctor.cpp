@@ -54,7 +54,7 @@ template <typename Value> Json or_null(const std::optional<Value> &value) {
 
 Json place_json(const std::optional<Wiring> &wiring, unsigned sensor) {
   Json json = {{"sensor", sensor}};
-  if (wiring && sensor < wiring->sensor_count()) {
+  if (wiring && sensor < wiring->sensor_count) {
     Place place = wiring->place(sensor);
     json["strip"] = place.strip;
     json[place.multiplexer ? "channel" : "position"] = place.position;

@@ -1,6 +1,6 @@
 /**
- * Board pico_parallel: fifteen MS5840, sensor k with its SDA on GPIO k, all with their SCL on GPIO15; a pull-up on
- * every line. Lines are wired-AND; in bitmaps bit k is SDA k and bit 15 is SCL.
+ * A board with a data line for each sensor: the SDA of sensor k is GPIO k, SCL is common; a pull-up on every line.
+ * Lines are wired-AND; in bitmaps bit k is GPIO k.
  *
  * A line falls at once, and is high when it has risen to 0.7 VDD, which takes 1.42 times its rise time from 0.3 to
  * 0.7 VDD. A sensor changes SDA a while after the fall of SCL. Every line is checked against the times of UM10204's
@@ -11,13 +11,6 @@ import { I2cTarget } from './i2c_bus.mjs';
 import { I2cLine, TimingCheck } from './i2c_line.mjs';
 import { Ms5840 } from './ms5840.mjs';
 
-const SENSORS = 15;
-const SCL = 1 << SENSORS;
-const SDA = SCL - 1;
-const LINES = SCL | SDA;
-
-/** With the board's pull-ups: 3.3 kOhm and 75 pF, 1 kOhm and 300 pF. */
-const RISE_NS = { sda: 210, scl: 254 };
 /** Time from release to 0.7 VDD over the time from 0.3 to 0.7 VDD, of a line that charges through a resistor. */
 const RELEASE_TO_HIGH = Math.log(0.3) / Math.log(0.3 / 0.7);
 /** From the fall of SCL to a sensor's change of SDA: assumed; UM10204 asks for 300 ns internal hold, 900 ns to valid. */
@@ -27,26 +20,30 @@ const QUIET_NS = 3000;
 /** Where in a clock's high time a glitch falls. */
 const GLITCH_AT_NS = 200;
 
-export class PicoParallel {
-  static sensors = SENSORS;
-  static muxes = 0;
-  /** A data line for each sensor: there are faults of single lines. */
-  static lines = true;
-  static clkSys_Hz = 125e6;
-
-  static probes = [...Array.from({ length: SENSORS }, (_, k) => [`SDA${k}`, 1 << k]), ['SCL', SCL]];
+export class ParallelBoard {
+  static facts({ wiring }) {
+    return {
+      sensors: wiring.sensor_count, muxes: 0, lines: true,
+      probes: [...Array.from({ length: wiring.sensor_count }, (_, k) => [`SDA${k}`, 1 << k]), ['SCL', 1 << wiring.pin_scl]],
+    };
+  }
 
   /**
+   * @param descriptor board.json
    * @param options scope, report, seed, stimulus(index, t_ns), faults() -> Faults, onTransfer; rise_ns: of every line;
    *   onLevels(levels, t_ns): lines changed, bits as in `probes`
    */
-  constructor({ scope, report, seed, stimulus, faults, onTransfer, onLevels = () => {}, sensor, rise_ns: rise }) {
-    const rise_ns = rise === undefined ? RISE_NS : { sda: rise, scl: rise };
+  constructor({ wiring, rise_ns: usual }, { scope, report, seed, stimulus, faults, onTransfer, onLevels = () => {}, sensor, rise_ns: rise }) {
+    const rise_ns = rise === undefined ? usual : { sda: rise, scl: rise };
+    /** Bitmaps of lines. */
+    this.scl = 1 << wiring.pin_scl;
+    this.sda = (1 << wiring.sensor_count) - 1;
+    this.all = this.scl | this.sda;
     this.scope = scope;
     this.onLevels = onLevels;
     this.statistics = { transactions: 0, nacks: 0 };
     this.sclCheck = new TimingCheck(report, 'SCL');
-    this.sensors = Array.from({ length: SENSORS }, (_, index) => new Ms5840({
+    this.sensors = Array.from({ length: wiring.sensor_count }, (_, index) => new Ms5840({
       index, prng: new Prng(Math.imul(seed, 1000003) + index), now_ns: () => scope.nanos, report, stimulus, sensor,
       faults: (i) => faults().sensor(i),
     }));
@@ -56,11 +53,11 @@ export class PicoParallel {
     /** Who pulls down; what a fault ties to VDD wins. */
     this.low = { chip: 0, sensors: 0, fault: 0 };
     this.tied = 0;
-    this.levels = LINES;
+    this.levels = this.all;
     /** Released lines that are not high yet, and since when. */
     this.rising = 0;
-    this.released_ns = new Float64Array(SENSORS + 1);
-    this.riseAlarms = [[SDA, rise_ns.sda], [SCL, rise_ns.scl]].map(([mask, rise]) => this.#riser(mask, rise * RELEASE_TO_HIGH));
+    this.released_ns = new Float64Array(32);
+    this.riseAlarms = [[this.sda, rise_ns.sda], [this.scl, rise_ns.scl]].map(([mask, rise]) => this.#riser(mask, rise * RELEASE_TO_HIGH));
     this.sensorsAlarm = scope.createAlarm(() => this.#sensorsPull());
     this.glitches = 0;
     this.glitchAlarm = scope.createAlarm(() => this.#glitch());
@@ -94,7 +91,7 @@ export class PicoParallel {
       if (active) this.sclCheck.excused = true;
       else this.sclRose_ns = this.scope.nanos; // it may end within a clock: only a pause from here on is one
       for (const line of this.lines) line.fault(active);
-      action(SCL, active);
+      action(this.scl, active);
       this.#resolve();
     };
     const tieLow = (mask, active) => {
@@ -126,15 +123,15 @@ export class PicoParallel {
 
   attachChip(chip) {
     const drive = (low, high) => {
-      const pins = high & LINES;
+      const pins = high & this.all;
       if (pins) chip.fail('i2c', `GPIO${31 - Math.clz32(pins & -pins)} drives a bus line high; a bus line may only be pulled low or released`);
-      this.low.chip = low & LINES;
+      this.low.chip = low & this.all;
       this.#resolve();
     };
     if (this.chip) this.#letGo();
     this.chip = chip;
     chip.pins.onDriven = drive;
-    chip.pins.setLevels(LINES, this.levels);
+    chip.pins.setLevels(this.all, this.levels);
     drive(chip.pins.low, chip.pins.high);
   }
 
@@ -168,7 +165,7 @@ export class PicoParallel {
   /** Somebody pulls, or lets go. */
   #resolve() {
     const low = (this.low.chip | this.low.sensors | this.low.fault) & ~this.tied;
-    const released = ~low & ~this.levels & ~this.rising & LINES;
+    const released = ~low & ~this.levels & ~this.rising & this.all;
     this.rising = (this.rising & ~low) | released;
     if (released) {
       const now = this.scope.nanos;
@@ -182,19 +179,19 @@ export class PicoParallel {
     const now = this.scope.nanos;
     const was = this.levels;
     this.levels = levels;
-    this.chip?.pins.setLevels(LINES, levels);
+    this.chip?.pins.setLevels(this.all, levels);
     this.onLevels(levels, now);
-    const sclFalls = (was & ~levels & SCL) !== 0;
-    const sclRises = (~was & levels & SCL) !== 0;
+    const sclFalls = (was & ~levels & this.scl) !== 0;
+    const sclRises = (~was & levels & this.scl) !== 0;
     if (sclFalls) this.#sclFell(now);
-    for (let rest = (was ^ levels) & SDA; rest; rest &= rest - 1) {
+    for (let rest = (was ^ levels) & this.sda; rest; rest &= rest - 1) {
       const bit = rest & -rest;
       const line = this.lines[31 - Math.clz32(bit)];
       if (levels & bit) line.sdaRose(now);
       else line.sdaFell(now, (this.low.chip & bit) !== 0);
     }
     if (sclRises) this.#sclRose(now);
-    else if (levels & SCL && (was ^ levels) & SDA) this.#sensorsWill(now);
+    else if (levels & this.scl && (was ^ levels) & this.sda) this.#sensorsWill(now);
   }
 
   #sclFell(now) {
@@ -210,13 +207,13 @@ export class PicoParallel {
     this.sclCheck.atLeast('tLOW', now - this.rise_ns.scl - this.sclFell_ns);
     this.sclRose_ns = now;
     const { chip } = this.low;
-    for (let k = 0; k < SENSORS; k++) this.lines[k].sclRose(now, ((chip >>> k) & 1) === 1);
+    for (let k = 0; k < this.lines.length; k++) this.lines[k].sclRose(now, ((chip >>> k) & 1) === 1);
     if (this.glitches) this.glitchAlarm.scheduleAt(now + GLITCH_AT_NS);
   }
 
   get #wanted() {
     let pulled = 0;
-    for (let k = 0; k < SENSORS; k++) if (this.lines[k].pulls || this.lines[k].target.holdsSda) pulled |= 1 << k;
+    for (let k = 0; k < this.lines.length; k++) if (this.lines[k].pulls || this.lines[k].target.holdsSda) pulled |= 1 << k;
     return pulled;
   }
 
@@ -231,9 +228,9 @@ export class PicoParallel {
 
   /** Sensors that are being talked to see one clock more than there is. */
   #glitch() {
-    if (!(this.levels & SCL)) return;
+    if (!(this.levels & this.scl)) return;
     const now = this.scope.nanos;
-    for (let k = 0; k < SENSORS; k++) {
+    for (let k = 0; k < this.lines.length; k++) {
       const line = this.lines[k];
       if (!((this.glitches >>> k) & 1) || line.phase === 'idle') continue;
       this.glitches &= ~(1 << k);

@@ -1,7 +1,6 @@
 /**
- * Board pico_mux: I2C0 on GPIO4 (SDA) and GPIO5 (SCL); TCA9548A at 0x70, 0x71, 0x72 with active-low RESET on
- * GPIO6, 7, 8 (pulled up on the board); five MS5840 on channels 0..4 of each. Sensor k sits on channel k % 5 of
- * multiplexer floor(k / 5).
+ * A board of multiplexers: SDA and SCL of I2C0; for each strip of sensors a TCA9548A with active-low RESET (pulled up
+ * on the board), its sensors on channels from 0 on.
  */
 import { GPIOPinState } from 'rp2040js';
 import { Prng } from '../prng.mjs';
@@ -10,37 +9,33 @@ import { I2cWaveform, WAVEFORM_SCL, WAVEFORM_SDA } from './i2c_waveform.mjs';
 import { Ms5840 } from './ms5840.mjs';
 import { Tca9548a } from './tca9548a.mjs';
 
-const SDA = 4;
-const SCL = 5;
-const RESETS = [6, 7, 8];
-const FIRST_ADDRESS = 0x70;
-const SENSORS_PER_MUX = 5;
 const FUNCTION_I2C = 3;
-/** SCL rise time assumed for 400 kHz with the board's pull-ups; not a measurement. */
-const RISE_NS = 100;
 
-export class PicoMux {
-  static sensors = 15;
-  static muxes = 3;
-  static lines = false;
-  static clkSys_Hz = 125e6;
-
-  static probes = [['SDA', WAVEFORM_SDA], ['SCL', WAVEFORM_SCL]];
+export class MultiplexedBoard {
+  static facts({ wiring }) {
+    return {
+      sensors: wiring.sensor_count, muxes: wiring.sensor_count / wiring.sensors_of_strip, lines: false,
+      probes: [['SDA', WAVEFORM_SDA], ['SCL', WAVEFORM_SCL]],
+    };
+  }
 
   /**
+   * @param descriptor board.json
    * @param options scope, report, seed, stimulus(index, t_ns), faults() -> Faults, onTransfer; sensor: see findSensor; rise_ns: of SCL;
    *   onLevels(levels, t_ns): the lines changed, bits as in `probes`
    */
-  constructor({ scope, report, seed, stimulus, faults, onTransfer, onLevels, sensor, rise_ns = RISE_NS }) {
+  constructor(descriptor, { scope, report, seed, stimulus, faults, onTransfer, onLevels, sensor, rise_ns = descriptor.rise_ns.scl }) {
+    this.wiring = descriptor.wiring;
+    const { sensor_count, sensors_of_strip, mux_address_0 } = this.wiring;
     const now_ns = () => scope.nanos;
     this.report = report;
     this.bus = new I2cBus({ now_ns, rise_ns, report, onTransfer });
     if (onLevels) this.bus.waveform = new I2cWaveform(onLevels);
     this.sensors = [];
-    this.muxes = RESETS.map((_, m) => {
-      const mux = new Tca9548a(FIRST_ADDRESS + m, m);
-      for (let channel = 0; channel < SENSORS_PER_MUX; channel++) {
-        const index = m * SENSORS_PER_MUX + channel;
+    this.muxes = Array.from({ length: sensor_count / sensors_of_strip }, (_, m) => {
+      const mux = new Tca9548a(Number(mux_address_0) + m, m);
+      for (let channel = 0; channel < sensors_of_strip; channel++) {
+        const index = m * sensors_of_strip + channel;
         const prng = new Prng(Math.imul(seed, 1000003) + index);
         const part = new Ms5840({ index, prng, now_ns, report, stimulus, sensor, faults: (i) => faults().sensor(i) });
         part.onFast = () => {
@@ -87,13 +82,13 @@ export class PicoMux {
   }
 
   attachChip(chip) {
-    const { bus } = this;
+    const { bus, wiring: { pin_sda, pin_scl, pin_mux_reset_0 } } = this;
     chip.i2c[0].bus = bus;
-    const [sda, scl] = [chip.gpio[SDA], chip.gpio[SCL]];
+    const [sda, scl] = [chip.gpio[pin_sda], chip.gpio[pin_scl]];
     bus.gpio = { sda: false, scl: false };
     bus.onReleased = null;
     bus.problem = () => {
-      for (const [pin, name] of [[sda, `GPIO${SDA} (SDA)`], [scl, `GPIO${SCL} (SCL)`]]) {
+      for (const [pin, name] of [[sda, `GPIO${pin_sda} (SDA)`], [scl, `GPIO${pin_scl} (SCL)`]]) {
         if (pin.functionSelect !== FUNCTION_I2C) return `${name} has function ${pin.functionSelect}, not I2C (3)`;
         if (!pin.inputEnable) return `${name} has its input disabled`;
         if (pin.outputDisable) return `${name} has its output disabled`;
@@ -114,11 +109,11 @@ export class PicoMux {
     };
     sda.addListener(onPin);
     scl.addListener(onPin);
-    RESETS.forEach((gpio, m) => {
-      const pin = chip.gpio[gpio];
+    this.muxes.forEach((mux, m) => {
+      const pin = chip.gpio[pin_mux_reset_0 + m];
       const apply = () => {
         const low = pin.value === GPIOPinState.Low;
-        this.muxes[m].setReset(low);
+        mux.setReset(low);
         pin.setInputValue(!low);
       };
       pin.addListener(apply);
