@@ -40,8 +40,7 @@ from . import line
 from .errors import InputError
 from .frames import frame_of
 from .line import CONTACT_COLUMNS, RAW_COLUMNS, STAGES, TANGENTIAL_COLUMNS, Flag
-from .mcap_file import MAGIC
-from .mcap_recording import McapLineReader
+from .mcap_recording import MAGIC, McapLineReader
 
 if TYPE_CHECKING:
     import pandas

@@ -25,16 +25,25 @@ class LineFile:
             raise InputError(f"{self.path}: exists; give replace=True or another name") from None
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; choose another place") from None
+        self._length = 0
 
     def line(self, text: str) -> None:
-        self.append(text.encode("utf-8") + b"\n")
+        self.write(text.encode("utf-8") + b"\n")
 
-    def append(self, data: bytes) -> None:
+    def write(self, data: bytes) -> None:
         try:
             while data:
-                data = data[self._file.write(data):]
+                written = self._file.write(data)
+                self._length += written
+                data = data[written:]
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; the file ends early") from None
+
+    def tell(self) -> int:
+        return self._length
+
+    def flush(self) -> None:
+        """Nothing waits to be written."""
 
     def close(self) -> None:
         try:

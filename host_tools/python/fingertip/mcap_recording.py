@@ -1,9 +1,15 @@
-"""Recordings as MCAP files of ROS 2 messages, written and read line by line (host_tools/library/libfingertip/RECORDING.md has the format)."""
+"""Recordings as MCAP files of ROS 2 messages, written and read line by line (host_tools/library/libfingertip/RECORDING.md has the format).
+
+Needs the package mcap, which `pip install "fingertip-tactile[mcap]"` brings.
+"""
 import calendar
+import collections
+import io
 import math
 import os
 import re
 import struct
+import types
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -11,7 +17,6 @@ from .errors import InputError
 from .frames import Q10
 from .line import CONTACT_COLUMNS, RAW_COLUMNS, TANGENTIAL_COLUMNS, WARNINGS, Flag
 from .lines import LineFile, shortest
-from .mcap_file import McapReader, McapWriter, Message
 from .ros_messages import decode, encode, schema_of
 
 CONTACT_TYPE, LINE_TYPE, WRENCH_TYPE, PLACE_TYPE, PRESSURES_TYPE, DIAGNOSTICS_TYPE = (
@@ -19,6 +24,9 @@ CONTACT_TYPE, LINE_TYPE, WRENCH_TYPE, PLACE_TYPE, PRESSURES_TYPE, DIAGNOSTICS_TY
     "diagnostic_msgs/DiagnosticArray")
 TYPES = (CONTACT_TYPE, LINE_TYPE, WRENCH_TYPE, PLACE_TYPE, PRESSURES_TYPE, DIAGNOSTICS_TYPE)
 LATEST_ns = (2**31 - 1) * 10**9  # that a ROS message can say
+MAGIC = b"\x89MCAP0\r\n"
+CHUNK_ns = 1_000_000_000  # a chunk ends once it is that long, or has a megabyte
+CHUNK_MOST_bytes = 1 << 26  # of one that is read
 
 _JUDGED = int(Flag.FIT_VALID | WARNINGS)
 _TANGENTIAL = int(Flag.TANGENTIAL_VALID | Flag.TANGENTIAL_FROM_TOUCH)
@@ -28,6 +36,19 @@ _QUANTITIES = [name for name in (*CONTACT_COLUMNS, *TANGENTIAL_COLUMNS) if name 
 _FIRST_RAW = 2 + len(CONTACT_COLUMNS) + len(TANGENTIAL_COLUMNS)
 _FIRST_SENSOR = _FIRST_RAW + len(RAW_COLUMNS)
 _UTC = re.compile(r"(\d{4})-(\d\d)-(\d\d)T(\d\d):(\d\d):(\d\d)(?:\.(\d{3}))?Z")
+
+
+def _mcap() -> types.ModuleType:
+    """The package mcap and what it needs."""
+    try:
+        import mcap.data_stream
+        import mcap.exceptions
+        import mcap.stream_reader
+        import mcap.writer
+        import zstandard  # noqa: F401
+    except ImportError:
+        raise InputError('MCAP files need the package mcap; pip install "fingertip-tactile[mcap]"') from None
+    return mcap
 
 
 def name_in_ros(serial: str) -> str:
@@ -191,12 +212,16 @@ class McapLines:
     """The lines of a recording as an MCAP file. Raises InputError."""
 
     def __init__(self, path: "str | os.PathLike[str]", replace: bool) -> None:
+        writer = _mcap().writer.Writer
         self._file = LineFile(path, replace)
+        self._writer = writer(self._file)
         try:
-            self._writer = McapWriter(self._file.append, "ros2", "fingertip")
+            self._writer.start("ros2", "fingertip")
         except InputError:
             self._file.close()
             raise
+        self._sequences: collections.Counter[int] = collections.Counter()  # by channel
+        self._chunk_ns = 0  # when the chunk under way began
         self._number = 0
         self._head: list[str] | None = []  # until the row of columns
         self._joint = False
@@ -239,13 +264,13 @@ class McapLines:
                 device.key(own, value)
         self._clock = _LogClock(keys)
         now_ns = self._clock.last_ns
-        self._writer.metadata("fingertip_recording", keys)
+        self._writer.add_metadata("fingertip_recording", keys)
         for device in self._devices:
             calibration = device.calibration()
             if calibration:
-                self._writer.attachment(now_ns, f"calibration_{device.serial}.json", "application/json", calibration.encode("utf-8"))
+                self._writer.add_attachment(now_ns, now_ns, f"calibration_{device.serial}.json", "application/json", calibration.encode("utf-8"))
         for name in TYPES:
-            self._schemas[name] = self._writer.schema(name.replace("/", "/msg/"), "ros2msg", schema_of(name).encode("utf-8"))
+            self._schemas[name] = self._writer.register_schema(name.replace("/", "/msg/"), "ros2msg", schema_of(name).encode("utf-8"))
         self._channels = {name: self._channel(topic, name) for name, topic in ((LINE_TYPE, "/fingertip/lines"), (DIAGNOSTICS_TYPE, "/diagnostics"))}
         for device in self._devices:
             root = f"/fingertip/{name_in_ros(device.serial)}/"
@@ -253,10 +278,11 @@ class McapLines:
                 (CONTACT_TYPE, "contact"), (WRENCH_TYPE, "wrench"), (PLACE_TYPE, "place"), (PRESSURES_TYPE, "pressures"))}
         for text in head:
             self._put_line(text)
-        self._writer.end_chunk()
+        self._writer.flush()
 
     def _channel(self, topic: str, name: str) -> int:
-        return self._writer.channel(topic, self._schemas[name], "cdr", {"offered_qos_profiles": ""})
+        number: int = self._writer.register_channel(topic, "cdr", self._schemas[name], {"offered_qos_profiles": ""})
+        return number
 
     def _device_of(self, key: str) -> tuple[_Device | None, str]:
         """The fingertip that a comment is about, and the key without its number."""
@@ -283,8 +309,15 @@ class McapLines:
             device.key(own, value)
 
     def _message(self, channel: int, name: str, frame_id: str, message: dict[str, Any]) -> None:
+        self._add(channel, encode(name, {"header": {"stamp": stamp(self._clock.last_ns), "frame_id": frame_id}, **message}))
+
+    def _add(self, channel: int, data: bytes) -> None:
         now_ns = self._clock.last_ns
-        self._writer.message(channel, now_ns, encode(name, {"header": {"stamp": stamp(now_ns), "frame_id": frame_id}, **message}))
+        if abs(now_ns - self._chunk_ns) >= CHUNK_ns:
+            self._writer.flush()  # outlives the writer
+            self._chunk_ns = now_ns
+        self._writer.add_message(channel, now_ns, data, now_ns, self._sequences[channel])
+        self._sequences[channel] += 1
 
     def _put_line(self, text: str) -> None:
         self._number += 1
@@ -314,8 +347,7 @@ class McapLines:
             put(PLACE_TYPE, {"point": place(flags, x_mm, y_mm)})
         cloud = device.cloud(len(row["pressure_pa"])) if row["has_raw"] else None
         if cloud:
-            now_ns = self._clock.last_ns
-            self._writer.message(device.channels[PRESSURES_TYPE], now_ns, cloud.message(now_ns, row["valid"], row["pressure_pa"], row["tare_pa"]))
+            self._add(device.channels[PRESSURES_TYPE], cloud.message(self._clock.last_ns, row["valid"], row["pressure_pa"], row["tare_pa"]))
         if row["has_contact"] and device.warnings != row["flags"] & WARNINGS:
             device.warnings = row["flags"] & WARNINGS
             self._diagnose(warning_status(device.serial, device.warnings))
@@ -354,33 +386,110 @@ def _cells_of(row: dict[str, Any], names: list[str]) -> str:
 
 
 class McapLineReader:
-    """The lines of a recording in an MCAP file, with their number, and whether they are torn. Raises InputError."""
+    """The lines of a recording in an MCAP file, in the order in which they were written: number, text, whether it is torn.
+
+    It reads from the begin and without the index, so that a file whose writer was killed reads as far as it goes. Raises InputError where
+    the file cannot be read, is none of a recording, or is damaged; salvage skips what is damaged.
+    """
 
     def __init__(self, path: "str | os.PathLike[str]", salvage: bool = False, progress: Callable[[float], None] | None = None) -> None:
-        self._reader = McapReader(path, salvage, progress)
+        self.path = os.fspath(path)
         self._salvage = salvage
+        self._progress = progress
+        self._mcap = _mcap()
+        self._schemas: dict[int, str] = {}  # names
+        self._channels: dict[int, tuple[str, str]] = {}  # topic, name of the schema
         self._names: list[str] = []
 
     def __iter__(self) -> Iterator[tuple[int, str, bool]]:
         last = 0
-        for message in self._reader:
-            name = message.channel.schema.name.replace("/msg/", "/") if message.channel.schema else ""
+        for topic, name, data in self._messages():
             if name in (LINE_TYPE, CONTACT_TYPE):
-                line = self._line(name, message)
+                line = self._line(topic, name, data)
                 if line[0] > last + 1 and not self._salvage:
-                    raise InputError(f"{self._reader.path}: {line[0] - last - 1} lines are missing before line {line[0]}; use --salvage to go on")
+                    raise InputError(f"{self.path}: {line[0] - last - 1} lines are missing before line {line[0]}; use --salvage to go on")
                 last = line[0]
                 yield line
         if not last:
-            raise InputError(f"{self._reader.path}: no recording of a fingertip; give one that fingertip has written")
-        if self._reader.torn and not self._salvage:
-            raise InputError(f"{self._reader.path}: the last chunk is torn; use --salvage to do without")
+            raise InputError(f"{self.path}: no recording of a fingertip; give one that fingertip has written")
 
-    def _line(self, name: str, message: Message) -> tuple[int, str, bool]:
+    def _messages(self) -> Iterator[tuple[str, str, bytes]]:
+        """(topic, name of the schema, data)"""
+        damage = (ValueError, MemoryError, struct.error, self._mcap.exceptions.McapError, self._mcap.stream_reader.zstandard.ZstdError)
         try:
-            row = decode(name, message.data)
+            with open(self.path, "rb") as file:
+                size = os.fstat(file.fileno()).st_size
+                stream = self._mcap.data_stream.ReadDataStream(file)
+                if size < len(MAGIC) or stream.read(len(MAGIC)) != MAGIC:
+                    raise InputError(f"{self.path}: no MCAP file; give one that fingertip has written")
+                for at, opcode, content in self._records(stream, size):
+                    if self._progress:
+                        self._progress(at / size)
+                    try:
+                        yield from self._judge(opcode, content)
+                    except damage as error:
+                        if not self._salvage:
+                            raise InputError(f"{self.path}: damaged at byte {at} ({error}); use --salvage to skip the chunk") from None
+        except EOFError:
+            if not self._salvage:
+                raise InputError(f"{self.path}: the last chunk is torn; use --salvage to do without") from None
+        except OSError as error:
+            raise InputError(f"{self.path}: {error.strerror}; check the path") from None
+
+    def _records(self, stream: Any, size: int) -> Iterator[tuple[int, int, bytes]]:
+        """(place, opcode, content). Each ends where its length says, whatever is in it. Raises EOFError where the last one is torn."""
+        while stream.count < size:  # a killed writer leaves whole chunks
+            at = stream.count
+            if size - at < 9:
+                raise EOFError
+            opcode, length = stream.read1(), stream.read8()
+            if length > size - stream.count:
+                raise EOFError
+            if opcode == self._mcap.opcode.Opcode.DATA_END:
+                return
+            yield at, opcode, stream.read(length)
+
+    def _judge(self, opcode: int, content: bytes) -> list[tuple[str, str, bytes]]:
+        """The messages in a record. Raises what mcap raises, or ValueError."""
+        known, records = self._mcap.opcode.Opcode, self._mcap.records
+        stream = self._mcap.data_stream.ReadDataStream(io.BytesIO(content))
+        if opcode == known.SCHEMA:
+            schema = records.Schema.read(stream)
+            self._schemas[schema.id] = schema.name.replace("/msg/", "/")
+        elif opcode == known.CHANNEL:
+            channel = records.Channel.read(stream)
+            self._channels[channel.id] = channel.topic, self._schemas.get(channel.schema_id, "")
+        elif opcode == known.MESSAGE:
+            message = records.Message.read(stream, len(content))
+            if message.channel_id not in self._channels:
+                raise ValueError(f"channel {message.channel_id} is unknown")
+            return [(*self._channels[message.channel_id], message.data)]
+        elif opcode == known.CHUNK:
+            return self._chunk(records.Chunk.read(stream))
+        return []
+
+    def _chunk(self, chunk: Any) -> list[tuple[str, str, bytes]]:
+        size = chunk.uncompressed_size
+        if chunk.compression not in ("", "zstd"):
+            raise ValueError(f'compression "{chunk.compression}" is unknown')
+        if size > CHUNK_MOST_bytes:
+            raise ValueError(f"a chunk of {size} bytes")
+        if chunk.compression and self._mcap.stream_reader.zstandard.frame_content_size(chunk.data) not in (-1, size):
+            raise ValueError("its length is wrong")
+        stream, length = self._mcap.stream_reader.get_chunk_data_stream(chunk, validate_crc=True)
+        if length != size:
+            raise ValueError("its length is wrong")
+        try:
+            return [message for _, opcode, content in self._records(stream, size) if opcode != self._mcap.opcode.Opcode.CHUNK
+                    for message in self._judge(opcode, content)]
+        except EOFError:
+            raise ValueError("a record in it is torn") from None
+
+    def _line(self, topic: str, name: str, data: bytes) -> tuple[int, str, bool]:
+        try:
+            row = decode(name, data)
         except ValueError as error:
-            raise InputError(f"{self._reader.path}: a damaged message on {message.channel.topic} ({error})") from None
+            raise InputError(f"{self.path}: a damaged message on {topic} ({error})") from None
         if name == CONTACT_TYPE:
             return row["line"], _cells_of(row, self._names), False
         text: str = row["text"]

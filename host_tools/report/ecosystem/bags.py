@@ -6,6 +6,7 @@ What a bag must say is worked out here from the cells of its CSV file alone.
 """
 import collections
 import csv
+import dataclasses
 import json
 import math
 import os
@@ -238,13 +239,14 @@ def differences(csv_path, bag):
 
 
 def contents(bag):
-    """All that a bag holds but its chunks."""
+    """All that a bag holds but how its messages are shared out among chunks, in the order of the file. Tool and package may differ there only:
+    the package writes by PyPI's mcap, which puts schemas and channels into the first chunk and ends chunks by other sizes."""
     with open(bag, "rb") as file:
         reader = make_reader(file, validate_crcs=True)
-        return ([(schema.name, schema.data, channel.topic, message.log_time, message.sequence, message.data)
-                 for schema, channel, message in reader.iter_messages(log_time_order=False)],
-                [(each.name, each.data, each.log_time) for each in reader.iter_attachments()],
-                [(each.name, each.metadata) for each in reader.iter_metadata()])
+        header, statistics = reader.get_header(), reader.get_summary().statistics
+        return (header, dataclasses.replace(statistics, chunk_count=0),
+                [(schema, channel, message) for schema, channel, message in reader.iter_messages(log_time_order=False)],
+                list(reader.iter_attachments()), [(each.name, list(each.metadata.items())) for each in reader.iter_metadata()])
 
 
 def of_python(csv_path, bag):

@@ -20,9 +20,10 @@ FINGERTIP, FAKE_DEVICE = (os.path.abspath(path) for path in sys.argv[1:3])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "host_tools/report/ecosystem"))
 import bags  # noqa: E402  finds the package too
-from fingertip import InputError, JointRecordingWriter, RecordingWriter, files, mcap_file, read_recording  # noqa: E402
+from fingertip import InputError, JointRecordingWriter, RecordingWriter, files, read_recording  # noqa: E402
+from mcap.opcode import Opcode  # noqa: E402
 from mcap.reader import make_reader  # noqa: E402
-from mcap.writer import Writer  # noqa: E402
+from mcap.writer import MCAP0_MAGIC, Writer  # noqa: E402
 
 TWO = ROOT / "tests/fuzz/corpus/recording/two"
 
@@ -53,11 +54,11 @@ class TestMcap(unittest.TestCase):
         self.assertEqual(len(lines), 1, done.stderr)
         return lines[0]
 
-    def damaged(self, name):
+    def damaged(self, bag, name):
         """A copy with a flipped byte in the middle of the second chunk, and the numbers of the lines in it."""
-        with open(self.bag, "rb") as file:
+        with open(bag, "rb") as file:
             chunk = make_reader(file).get_summary().chunk_indexes[1]
-        data = bytearray(self.bag.read_bytes())
+        data = bytearray(bag.read_bytes())
         data[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 1
         path = self.folder / name
         path.write_bytes(data)
@@ -149,9 +150,10 @@ class TestMcap(unittest.TestCase):
         self.assertEqual(list(counts.values()), [rows.count("0"), rows.count("1")])
 
     def test_cut_anywhere_a_chunk_is_lost(self):
-        bag = self.convert(self.csv, "cut_from.mcap")
-        most, unread = bags.truncations(FINGERTIP, bag, self.csv, self.folder, 24, 3)
-        self.assertEqual((most, unread), (1, 0))
+        bags.of_python(self.csv, self.folder / "cut_from_python.mcap")
+        for bag in (self.convert(self.csv, "cut_from.mcap"), self.folder / "cut_from_python.mcap"):
+            most, unread = bags.truncations(FINGERTIP, bag, self.csv, self.folder, 24, 3)
+            self.assertEqual((most, unread), (1, 0), bag.name)
 
     def test_the_judge_reads_up_to_where_a_file_breaks_off(self):
         whole = self.convert(self.csv, "whole.mcap").read_bytes()
@@ -184,7 +186,12 @@ class TestMcap(unittest.TestCase):
         self.assertEqual(sum(topic.endswith("/contact") for topic, _, _ in bags.by_mcap_stream(bag)), len(rows))
 
     def test_a_damaged_chunk_is_named_and_the_others_are_read(self):
-        path = self.damaged("damaged.mcap")
+        bags.of_python(self.csv, self.folder / "python.mcap")
+        for bag in (self.bag, self.folder / "python.mcap"):
+            with self.subTest(bag.name):
+                self.judge_damaged(self.damaged(bag, "damaged.mcap"))
+
+    def judge_damaged(self, path):
         self.assertRegex(self.refused("convert", path, self.folder / "no.csv"), r"damaged.mcap: byte \d+: .*; use --salvage")
         self.assertFalse((self.folder / "no.csv").exists())
         out = self.folder / "saved.csv"
@@ -216,7 +223,7 @@ class TestMcap(unittest.TestCase):
         with self.assertRaisesRegex(InputError, "no recording of a fingertip"):
             read_recording(other)
         huge = self.folder / "huge.mcap"  # a chunk that says it is 2^62 bytes
-        huge.write_bytes(mcap_file.MAGIC + struct.pack("<BQ", mcap_file.CHUNK, 48) + struct.pack("<QQQI", 0, 0, 1 << 62, 0) + struct.pack("<I", 4) +
+        huge.write_bytes(MCAP0_MAGIC + struct.pack("<BQ", Opcode.CHUNK, 48) + struct.pack("<QQQI", 0, 0, 1 << 62, 0) + struct.pack("<I", 4) +
                          b"zstd" + struct.pack("<Q", 4) + bytes(4))
         self.assertIn("a chunk of 4611686018427387904 bytes", self.refused("convert", huge, self.folder / "out.csv"))
         self.assertFalse((self.folder / "out.csv").exists())
@@ -249,9 +256,17 @@ class TestMcap(unittest.TestCase):
         told = [bags.call(FINGERTIP, "replay", path, "--speed", "max").stdout.replace(path.name, "") for path in (self.csv, self.bag)]
         self.assertEqual(told[0].splitlines()[-1].replace(str(self.folder), ""), told[1].splitlines()[-1].replace(str(self.folder), ""))
 
-    def test_without_zstandard_it_says_what_to_install(self):
-        with mock.patch.dict(sys.modules, {"zstandard": None}), self.assertRaisesRegex(InputError, r"fingertip-tactile\[mcap\]"):
-            RecordingWriter(self.folder / "without.mcap", next(bags.some_packets(1, 0)).body)
+    def test_without_mcap_it_says_what_to_install_and_csv_files_are_read(self):
+        said = r"MCAP files need the package mcap; pip install \"fingertip-tactile\[mcap\]\""
+        with mock.patch.dict(sys.modules, {"mcap": None, "mcap.writer": None}):
+            with self.assertRaisesRegex(InputError, said):
+                RecordingWriter(self.folder / "without.mcap", next(bags.some_packets(1, 0)).body)
+            with self.assertRaisesRegex(InputError, said):
+                read_recording(self.bag)
+        self.assertFalse((self.folder / "without.mcap").exists())
+        system = "/usr/bin/python3", "-c", "import fingertip.files as f, sys; print(len(f.read_recording(sys.argv[1])['t_us']))"
+        done = subprocess.run([*system, self.csv], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT / "host_tools/python")})
+        self.assertGreater(int(done.stdout), 100, done.stderr)
 
 
 if __name__ == "__main__":

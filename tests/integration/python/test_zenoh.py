@@ -23,7 +23,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 PACKAGE = ROOT / "host_tools/python"
 sys.path.insert(0, str(PACKAGE))
 from fingertip import errors, network, read_recording, recorder, wire  # noqa: E402
-from fingertip.mcap_file import McapReader  # noqa: E402
+from fingertip.mcap_recording import McapLineReader  # noqa: E402
 
 PATIENCE_s = 60
 
@@ -272,10 +272,10 @@ class OnZenoh(unittest.TestCase):
             time.sleep(0.02)
 
     @staticmethod
-    def messages(path):
+    def lines(path):
         """In a recording that is being written."""
         with contextlib.suppress(errors.InputError):
-            return len(list(McapReader(path)))
+            return len(list(McapLineReader(path)))
         return 0
 
     @contextlib.contextmanager
@@ -301,7 +301,7 @@ class OnZenoh(unittest.TestCase):
             for serial, options in (("AAAA", ()), ("BBBB", ("drop=50",))):
                 self.bridge("--connect", self.endpoint, "--port", self.device(serial, "rate=100", *options))
             recording = self.recorder(path, "--connect", self.endpoint, "--expect", "2", "--wait", PATIENCE_s, "--patience", PATIENCE_s, "--json")
-            self.wait_for(lambda: self.messages(path) > 200 or recording.poll() is not None)
+            self.wait_for(lambda: self.lines(path) > 60 or recording.poll() is not None)
             router.close()
             time.sleep(1)
             stack.enter_context(self.session("router"))
@@ -347,12 +347,12 @@ class OnZenoh(unittest.TestCase):
             self.wait_for((self.folder / "AAAA").is_symlink)
             self.bridge("--connect", self.endpoint, "--port", self.folder / "AAAA")
             recording = self.recorder(path, "--connect", self.endpoint, "--wait", PATIENCE_s, "--patience", PATIENCE_s, "--json", "--undisciplined")
-            self.wait_for(lambda: self.messages(path) > 100 or recording.poll() is not None)
+            self.wait_for(lambda: self.lines(path) > 30 or recording.poll() is not None)
             device.terminate()
             self.wait_for(lambda: not is_alive())
-            before = self.messages(path)
+            before = self.lines(path)
             self.device("AAAA", "rate=100")
-            self.wait_for(lambda: self.messages(path) > before + 300 and is_alive())
+            self.wait_for(lambda: self.lines(path) > before + 100 and is_alive())
             recording.send_signal(signal.SIGINT)
             stdout, stderr = recording.communicate(timeout=2 * PATIENCE_s)
         told = json.loads(stdout)["fingertips"]["AAAA"]
