@@ -8,9 +8,12 @@ Needs nothing but Python 3.11.
 """
 import argparse
 import pathlib
+import re
 import sys
 import textwrap
 import tomllib
+
+import line_settings
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SAYS = "written by firmware/wire/line.py from line.toml; change it there"
@@ -84,6 +87,7 @@ class Line:
         self.structs = {name: Body(name, table, wanted) for name, table in said["struct"].items()}
         self.packets = {name: Body(name, table, wanted) for name, table in said["packet"].items()}
         self.commands = {name: Body(name, table, wanted) for name, table in said["command"].items()}
+        self.settings = [line_settings.Setting(each, self) for each in said["settings"]]
         numbers = [body.type for body in (*self.packets.values(), *self.commands.values())]
         for what, values in (("type", numbers), *((key, [each["bit"] for each in getattr(self, key)]) for key in SETS)):
             twice = {value for value in values if values.count(value) > 1}
@@ -408,7 +412,8 @@ def py_class(body, line):
 def line_py(line):
     lines = [f'"""{SAYS}.', "", "The packets of the line between a fingertip and its host (firmware/wire/PROTOCOL.md), and the names of what they number. The annotations of a",
              "body are its layout, for both directions. A quantity that is there only under a bit of another field is NaN (a float) or None without it.", '"""',
-             "import enum", "import math", "from typing import Annotated, Any, NamedTuple", "", f"VERSION = {line.version}", f"SENSORS_MAX = {line.sensors_max}",
+             "import enum", "import math", "from typing import TYPE_CHECKING, Annotated, Any, NamedTuple", "", "if TYPE_CHECKING:", "    import numpy as np",
+             "    import numpy.typing as npt", "", f"VERSION = {line.version}", f"SENSORS_MAX = {line.sensors_max}",
              f"MAX_FRAME_BYTES = {line.longest_frame()}  # longer is damage", f"LOADER_MAGIC = 0x{line.loader_magic:08X}", "", "",
              "class Wire(NamedTuple):", '    """How a field travels: struct\'s code, how many of it, whether once for each sensor, and under which bit of which field."""', "",
              "    code: str", "    times: int = 1", "    each_sensor: bool = False", "    when: tuple[str, int] | None = None", "    absent: Any = None", "", ""]
@@ -426,29 +431,33 @@ def line_py(line):
     lines += bits("Capability", "What a firmware can do.", line.capabilities) + bits("Stored", "What a fingertip keeps without power.", line.stored)
     lines += ["class Result(enum.IntEnum):", '    """What an acknowledgement says."""', "",
               *(f"    {each['name']} = {each['number']}  #: {each['text']}" for each in line.results), "", ""]
-    lines += ["class Range(NamedTuple):", '    """Of a setting, in its unit."""', "", "    least: float", "    most: float", "", ""]
-    for name, each in line.ranges.items():
-        unit = f"_{each['unit']}" if each["unit"] else ""
-        lines.append(f"{name}{unit} = {tuple(each['choices'])}" if "choices" in each else f"{name}{unit} = Range({each['min']}, {each['max']})")
-        if "default" in each:
-            lines.append(f"{name}_DEFAULT{unit} = {each['default']}")
-    lines += ["", ""]
     for body in (*line.structs.values(), *line.packets.values(), *line.commands.values()):
         lines += py_class(body, line)
     bodies = [*line.packets.values(), *line.commands.values()]
     lines += [f"Body = {bodies[0].python} | " + " | ".join(body.python for body in bodies[1:]), f"CONTACT, RAW = 0x{line.packets['contact'].type:02x}, 0x{line.packets['raw'].type:02x}",
               "TYPES: dict[int, type[Body]] = {", *(f"    0x{body.type:02X}: {body.python}," for body in bodies), "}",
               "NESTED: dict[str, Any] = {" + ", ".join(f'"{body.python}": {body.python}' for body in line.structs.values()) + "}", "", ""]
+    lines += line_settings.python_settings(line)
     contact, raw = line.packets["contact"], line.packets["raw"]
-    lines += ["# Columns of recordings.", py_tuple("STAGES", line.stages()[:-1]), py_tuple("CONTACT_COLUMNS", contact.columns),
+    lines += ["# Columns of recordings, and what their comments have of an info packet.", py_tuple("STAGES", line.stages()[:-1]), py_tuple("CONTACT_COLUMNS", contact.columns),
               py_tuple("TANGENTIAL_COLUMNS", [field.name for field in line.later()], "NaN in recordings of before there were any"),
               py_tuple("RAW_COLUMNS", ["raw_sequence", *(field.key for field in raw.fields if field.kind == "u32" and field.name != "frame"), "temperature_degC"]),
-              "", ""]
+              py_tuple("INFO_KEYS", [line.packets["info"].field(name).python for name in line.packets["info"].keys]), "", ""]
     lines += ["class ContactQuantities:", '    """The quantities of a contact packet by their names; NaN without their flag, or without a packet."""', "", "    __slots__ = ()", "    contact: Contact"]
     for field in contact.fields:
         if field.when:
             lines += ["", "    @property", f"    def {field.name}(self) -> {'float' if field.kind == 'f32' else 'int'}:",
                       *py_doc(field.text[0].upper() + field.text[1:] + ".", "        "), f"        return self.contact.{field.name}"]
+    return [*lines, "", "", *py_arrays(line)]
+
+
+def py_arrays(line):
+    """The class of a block's arrays."""
+    contact, raw = line.packets["contact"], line.packets["raw"]
+    lines = ["class BlockQuantities:", '    """The quantities of both packets by their names, an array each."""', ""]
+    for field in (*contact.fields, *raw.fields):
+        if (field.kind == "f32" or field.kind.startswith("u")) and field.name not in ("frame", "flags"):
+            lines.append(f'    {field.name}: "npt.NDArray[np.{"float64" if field.kind == "f32" else "int64"}]"')
     return lines
 
 
@@ -518,13 +527,7 @@ def line_facts_ts(line):
     for name, entries in (("STAGES", line.stages()), ("HEALTH_WORDS", [field.name for field in health.fields if field.kind == "u32" and not field.when]),
                           ("HEALTH_KEYS", health.keys)):
         lines += [f"export const {name} = [", *(f"  '{entry}'," for entry in entries), "] as const;"]
-    lines += ["", "/** Of settings. */", "export const RANGES = {"]
-    for name, each in line.ranges.items():
-        unit = f"_{each['unit']}" if each["unit"] else ""
-        lines.append(f"  {name}{unit}: {each['choices']} as const," if "choices" in each else f"  {name}{unit}: [{each['min']:g}, {each['max']:.12g}] as const,")
-        if "default" in each:
-            lines.append(f"  {name}_DEFAULT{unit}: {each['default']},")
-    return [*lines, "} as const;"]
+    return [*lines, *line_settings.page_settings(line, ts_text)]
 
 
 def ts_text(text):
@@ -575,7 +578,7 @@ def protocol_md(line, text):
             raise SystemExit(f"line.py: PROTOCOL.md has {text.count(mark)} marks of {name}, it needs one")
         before, _, after = text.partition(mark)
         text = before + mark + "\n".join(rows) + "\n\n" + after.partition("\n\n")[2]
-    return text
+    return re.sub(r"longer than \d+ bytes is damage", f"longer than {line.longest_frame()} bytes is damage", text)
 
 
 FILES = {
@@ -583,6 +586,7 @@ FILES = {
     "firmware/wire/bodies.h": bodies_h,
     "firmware/wire/layouts.inc": layouts_inc,
     "host_tools/library/libfingertip/line_fields.hpp": line_fields_hpp,
+    "host_tools/library/libfingertip/line_settings.hpp": lambda line: line_settings.line_settings_hpp(line, SAYS),
     "host_tools/python/fingertip/line.py": line_py,
     "host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg": contact_msg,
     "host_tools/web/src/line/line_facts.ts": line_facts_ts,

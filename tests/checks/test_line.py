@@ -14,6 +14,27 @@ sys.path.insert(0, str(ROOT / "firmware/wire"))
 import line  # noqa: E402
 
 PAGE = "firmware/wire/PROTOCOL.md"
+FIRST_SETTING = '[[settings]]\nname = "rate"\n'
+NEW_SETTING = """[[settings]]
+name = "hold"
+command = "hold"
+typed = "MS"
+help = "{0}"
+give = "{0} ms"
+label = "Hold, ms"
+hint = "{0}"
+values = [{ field = "hold_ms", info = "hold_ms", say = "Hold", give = "{0} ms", text = "{0}" }]
+
+"""
+FIRST_COMMAND = "[command.stream]\n"
+NEW_COMMAND = """[command.hold]
+type = 0x90
+python = "SetHold"
+word = "hold"
+text = "Hold a value."
+fields = [{ name = "hold_ms", type = "u16", range = "HOLD", text = "time" }]
+
+"""
 LAST_FIELD = '  { name = "vy_mm_s", '
 NEW_FIELD = '  { name = "torque_N_mm", type = "f32", when = "flags.TANGENTIAL_VALID", text = "about the normal of the pad" },\n'
 
@@ -65,6 +86,28 @@ class Generator(unittest.TestCase):
         self.assertIn("float32 torque_n_mm         # about the normal of the pad\n", texts["host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg"])
         self.assertIn("  torque_N_mm: Flag.TANGENTIAL_VALID,", texts["host_tools/web/src/line/line_facts.ts"])
         self.assertIn("| f32 | torque_N_mm | about the normal of the pad | TANGENTIAL_VALID |", texts[PAGE])
+
+    def test_a_setting_is_its_lines(self):
+        toml = "firmware/wire/line.toml"
+        self.change(toml, FIRST_SETTING, NEW_SETTING + FIRST_SETTING)
+        self.change(toml, FIRST_COMMAND, NEW_COMMAND + FIRST_COMMAND)
+        self.change(toml, "SLIP_WINDOW = {", 'HOLD = { unit = "ms", min = 7, max = 70, text = "hold" }\nSLIP_WINDOW = {')
+        self.change(toml, '"osr", "temperature_interval_ms"', '"osr", "hold_ms", "temperature_interval_ms"')
+        self.change(toml, '  { name = "osr", type = "u16", text', '  { name = "hold_ms", type = "u16", text = "hold" },\n  { name = "osr", type = "u16", text')
+        self.assertEqual(self.run_it()[0], 0)
+        texts = {name: (self.root / name).read_text(encoding="utf-8") for name in line.FILES}
+        tool = texts["host_tools/library/libfingertip/line_settings.hpp"]
+        self.assertIn('{"hold", "MS", "hold=MS (7 to 70)", "7 to 70 ms", nullptr, WIRE_CMD_HOLD, 0, 1,', tool)
+        self.assertIn("WIRE_HOLD_MIN_ms, WIRE_HOLD_MAX_ms", tool)
+        self.assertIn("command.body.cmd_hold.hold_ms = static_cast<std::uint16_t>(value);", tool)
+        said = {}
+        exec(texts["host_tools/python/fingertip/line.py"], said)
+        setting = said["SETTINGS"][0]
+        self.assertEqual((setting.argument, setting.command, setting.least, setting.most, setting.whole), ("hold_ms", said["SetHold"], 7, 70, True))
+        self.assertIn("hold_ms: int | None", texts["host_tools/python/fingertip/line.py"])
+        self.assertIn("hold_ms", said["INFO_KEYS"])
+        self.assertIn("        hold_ms: 7 to 70.\n", said["Settable"].set.__doc__)
+        self.assertIn("field: 'hold_ms', info: 'hold_ms', say: 'Hold', per: 1, whole: true, span: [7, 70]", texts["host_tools/web/src/line/line_facts.ts"])
 
     def test_the_longest_frame_is_that_of_the_longest_body(self):
         described = line.Line(ROOT / "firmware/wire/line.toml")

@@ -8,33 +8,33 @@
 #include "libfingertip/text.hpp"
 
 #include <cmath>
-#include <functional>
 
 using namespace fingertip;
 
 namespace {
 
-// Refused, or a value that the codec and the fingertip take.
-void check_command(const std::function<wire_packet()> &typed) {
+// Refused, or values that the codec and the fingertip take.
+void check_setting(const std::string &text) {
+  const wire_info now = []() {
+    wire_info info{};
+    info.slip_threshold_mm = 1;
+    info.slip_window_ms = WIRE_SLIP_WINDOW_MIN_ms;
+    return info;
+  }();
   try {
-    FUZZ_CHECK(!frame_bytes(typed()).empty());
+    for (const wire_packet &command : setting_commands({setting_from_text(text)}, now)) {
+      FUZZ_CHECK(!frame_bytes(command).empty());
+    }
   } catch (const Error &error) {
     FUZZ_CHECK(error.code() == ErrorCode::bad_value);
   }
 }
 
 void check_text(const std::string &text) {
-  check_command([&] { return command_rate_mHz(rate_mHz_from_text(text)); });
-  check_command([&] { return command_osr(osr_from_text(text)); });
-  check_command(
-      [&] { return command_slip(slip_threshold_mm_from_text(text), WIRE_SLIP_WINDOW_MIN_ms); });
-  check_command([&] { return command_slip(1, slip_window_ms_from_text(text)); });
-  check_command([&] { return command_location_limit(location_limit_mm_from_text(text)); });
-  check_command([&] {
-    const Prior prior = prior_from_text(text), again = prior_from_text(prior_text(prior));
-    FUZZ_CHECK(again.sigma_mm == prior.sigma_mm && again.width_mm == prior.width_mm);
-    return command_prior(prior.sigma_mm, prior.width_mm);
-  });
+  for (const char *name :
+       {"rate=", "osr=", "slip_threshold=", "slip_window=", "prior=", "limit="}) {
+    check_setting(name + text);
+  }
   if (const auto number = to_float(text)) {
     FUZZ_CHECK(std::isfinite(*number) && to_float(shortest(*number)) == number);
   }

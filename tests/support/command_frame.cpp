@@ -29,6 +29,15 @@ wire_packet pad_of(const std::string &thickness, const std::string &overhang, bo
   return command_pad(pad::profile_over_own_sensors({*thickness_mm, *overhang_mm, from_touch}));
 }
 
+/* Of settings that travel in one command. */
+wire_packet command_of(std::initializer_list<std::string> texts) {
+  std::vector<WantedSetting> wanted;
+  for (const std::string &text : texts) {
+    wanted.push_back(setting_from_text(text));
+  }
+  return setting_commands(wanted, {})[0];
+}
+
 wire_packet packet_from_words(const std::vector<std::string> &words) {
   struct Form {
     std::size_t arguments;
@@ -42,27 +51,19 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
         [&] { return command_stream(streams_from_text(word(1))); }}},
       {"tare", {0, "tare", [] { return command_tare(); }}},
       {"tare-force", {0, "tare-force", [] { return command_tare(true); }}},
-      {"rate", {1, "rate HZ|max", [&] { return command_rate_mHz(rate_mHz_from_text(word(1))); }}},
-      {"osr", {1, "osr N", [&] { return command_osr(osr_from_text(word(1))); }}},
+      {"rate", {1, "rate HZ|max", [&] { return command_of({"rate=" + word(1)}); }}},
+      {"osr", {1, "osr N", [&] { return command_of({"osr=" + word(1)}); }}},
       {"slip",
        {2, "slip THRESHOLD_MM WINDOW_MS",
         [&] {
-          return command_slip(slip_threshold_mm_from_text(word(1)),
-                              slip_window_ms_from_text(word(2)));
+          return command_of({"slip_threshold=" + word(1), "slip_window=" + word(2)});
         }}},
       {"info", {0, "info", command_info}},
       {"health", {0, "health", command_health}},
       {"crash", {0, "crash", command_crash}},
       {"loader", {0, "loader", command_loader}},
-      {"prior",
-       {1, "prior SIGMA[:WIDTH]|none",
-        [&] {
-          Prior prior = prior_from_text(word(1));
-          return command_prior(prior.sigma_mm, prior.width_mm);
-        }}},
-      {"limit",
-       {1, "limit MM",
-        [&] { return command_location_limit(location_limit_mm_from_text(word(1))); }}},
+      {"prior", {1, "prior SIGMA[:WIDTH]|none", [&] { return command_of({"prior=" + word(1)}); }}},
+      {"limit", {1, "limit MM", [&] { return command_of({"limit=" + word(1)}); }}},
       {"keep", {0, "keep", [] { return command_keep(true); }}},
       {"forget", {0, "forget", [] { return command_keep(false); }}},
       {"erase", {0, "erase", command_erase_calibration}},

@@ -2,10 +2,14 @@
 
 #include "libfingertip/error.hpp"
 #include "libfingertip/framing.hpp"
+#include "libfingertip/line_settings.hpp"
 #include "libfingertip/text.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <iterator>
+#include <optional>
 
 namespace fingertip {
 
@@ -18,83 +22,108 @@ wire_packet packet_of(wire_type type) {
   return packet;
 }
 
-[[noreturn]] void out_of_range(const char *what, const std::string &value,
-                               const std::string &range) {
-  throw Error(ErrorCode::bad_value,
-              std::string(what) + " " + value + " is out of range; give " + range);
+std::string spoken(const Setting &setting) {
+  std::string name = setting.name;
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
 }
 
-std::string rate_range() {
-  return fixed(WIRE_RATE_MIN_mHz / 1000.0, 1) + " to " + fixed(WIRE_RATE_MAX_mHz / 1000.0, 0) +
-         " Hz, or max";
+std::string value_text(const SettingValue &value, double number) {
+  return value.per > 1 ? fixed(number / value.per, 3)
+         : value.whole ? fixed(number, 0)
+                       : shortest(static_cast<float>(number));
 }
 
-std::string osr_range() {
-  std::string text = std::to_string(WIRE_OSR_MIN);
-  for (unsigned osr = 2 * WIRE_OSR_MIN; osr < WIRE_OSR_MAX; osr *= 2) {
-    text += ", " + std::to_string(osr);
+bool is_possible(const SettingValue &value, double number) {
+  if (!(number >= value.least && number <= value.most)) {
+    return false;
   }
-  return text + " or " + std::to_string(WIRE_OSR_MAX);
+  const unsigned *choice = value.choices;
+  while (choice && *choice && *choice != number) {
+    choice++;
+  }
+  return !choice || *choice;
 }
 
-std::string threshold_range() {
-  return shortest(WIRE_SLIP_THRESHOLD_MIN_mm) + " to " + shortest(WIRE_SLIP_THRESHOLD_MAX_mm) +
-         " mm";
-}
-
-std::string window_range() {
-  return std::to_string(WIRE_SLIP_WINDOW_MIN_ms) + " to " +
-         std::to_string(WIRE_SLIP_WINDOW_MAX_ms) + " ms";
-}
-
-void check_rate(std::uint32_t rate_mHz, const std::string &text) {
-  if (rate_mHz != 0 && (rate_mHz < WIRE_RATE_MIN_mHz || rate_mHz > WIRE_RATE_MAX_mHz)) {
-    out_of_range("rate", text, rate_range());
+void check(const Setting &setting, const SettingValues &values, const std::string &shown) {
+  for (std::size_t i = 0; i < setting.count; i++) {
+    if (!is_possible(setting.values[i], values[i])) {
+      throw Error(ErrorCode::bad_value,
+                  spoken(setting) + " " + shown + " is out of range; give " + setting.give);
+    }
   }
 }
 
-void check_osr(std::uint64_t osr) {
-  if (osr < WIRE_OSR_MIN || osr > WIRE_OSR_MAX || (osr & (osr - 1)) != 0) {
-    out_of_range("osr", std::to_string(osr), osr_range());
+void put(wire_packet &command, const Setting &setting, const SettingValues &values) {
+  const bool zeros =
+      std::all_of(values.begin(), values.end(), [](double each) { return each == 0; });
+  std::string shown;
+  for (std::size_t i = 0; i < setting.count; i++) {
+    setting.values[i].put(command, values[i]);
+    shown += (i > 0 ? ":" : "") + value_text(setting.values[i], values[i]);
+  }
+  if (!zeros || !setting.zeros) {
+    check(setting, values, shown);
   }
 }
 
-void check_threshold(float threshold_mm) {
-  if (!(threshold_mm >= WIRE_SLIP_THRESHOLD_MIN_mm && threshold_mm <= WIRE_SLIP_THRESHOLD_MAX_mm)) {
-    out_of_range("slip threshold", shortest(threshold_mm), threshold_range());
+const Setting *find_setting(const std::string &name) {
+  for (const Setting &setting : all_settings) {
+    if (name == setting.name) {
+      return &setting;
+    }
   }
+  return nullptr;
 }
 
-void check_window(std::uint64_t window_ms) {
-  if (window_ms < WIRE_SLIP_WINDOW_MIN_ms || window_ms > WIRE_SLIP_WINDOW_MAX_ms) {
-    out_of_range("slip window", std::to_string(window_ms), window_range());
+wire_packet command_with(const char *name, const SettingValues &values) {
+  const Setting &setting = *find_setting(name);
+  wire_packet packet = packet_of(setting.command);
+  put(packet, setting, values);
+  return packet;
+}
+
+/* In units of the packet, not yet rounded. */
+std::optional<double> number_of(const SettingValue &value, const std::string &text) {
+  if (value.per > 1) {
+    auto number = to_double(text);
+    return number ? std::optional(*number * value.per) : std::nullopt;
   }
-}
-
-std::string prior_range() {
-  return "SIGMA or SIGMA:WIDTH, " + shortest(WIRE_PRIOR_SIGMA_MIN_mm) + " to " +
-         shortest(WIRE_PRIOR_SIGMA_MAX_mm) + " and " + shortest(WIRE_PRIOR_WIDTH_MIN_mm) + " to " +
-         shortest(WIRE_PRIOR_WIDTH_MAX_mm) + " mm, or none";
-}
-
-std::string limit_range() {
-  return shortest(WIRE_LOCATION_LIMIT_MIN_mm) + " to " + shortest(WIRE_LOCATION_LIMIT_MAX_mm) +
-         " mm";
-}
-
-void check_prior(const Prior &prior) {
-  bool none = prior.sigma_mm == 0 && prior.width_mm == 0;
-  if (!none &&
-      !(prior.sigma_mm >= WIRE_PRIOR_SIGMA_MIN_mm && prior.sigma_mm <= WIRE_PRIOR_SIGMA_MAX_mm &&
-        prior.width_mm >= WIRE_PRIOR_WIDTH_MIN_mm && prior.width_mm <= WIRE_PRIOR_WIDTH_MAX_mm)) {
-    out_of_range("prior", shortest(prior.sigma_mm) + ":" + shortest(prior.width_mm), prior_range());
+  if (value.whole) {
+    auto number = to_u64(text);
+    return number ? std::optional(static_cast<double>(*number)) : std::nullopt;
   }
+  return to_float(text);
 }
 
-void check_limit(float limit_mm) {
-  if (!(limit_mm >= WIRE_LOCATION_LIMIT_MIN_mm && limit_mm <= WIRE_LOCATION_LIMIT_MAX_mm)) {
-    out_of_range("limit", shortest(limit_mm), limit_range());
+SettingValues values_from_text(const Setting &setting, const std::string &text) {
+  SettingValues values{};
+  if (setting.zeros && text == setting.zeros) {
+    return values;
   }
+  std::string rest = text;
+  for (std::size_t i = 0; i < setting.count; i++) {
+    const SettingValue &value = setting.values[i];
+    const bool is_last = i + 1 == setting.count;
+    const std::size_t end = is_last ? std::string::npos : rest.find(':');
+    auto number = number_of(value, rest.substr(0, end));
+    if (!number) {
+      throw Error(ErrorCode::bad_value, spoken(setting) + " \"" + text + "\" is no " +
+                                            (value.whole && value.per == 1 ? "whole " : "") +
+                                            "number; give " + setting.give);
+    }
+    values[i] = *number;
+    if (!is_last && end == std::string::npos) {
+      values[i + 1] = setting.values[i + 1].unless_given;
+      break;
+    }
+    rest.erase(0, is_last ? end : end + 1);
+  }
+  check(setting, values, text);
+  for (std::size_t i = 0; i < setting.count; i++) {
+    values[i] = setting.values[i].whole ? std::round(values[i]) : values[i];
+  }
+  return values;
 }
 
 } // namespace
@@ -118,25 +147,16 @@ wire_packet command_tare(bool force) {
 }
 
 wire_packet command_rate_mHz(std::uint32_t rate_mHz) {
-  check_rate(rate_mHz, fixed(rate_mHz / 1000.0, 3));
-  wire_packet packet = packet_of(WIRE_CMD_RATE);
-  packet.body.cmd_rate.rate_mHz = rate_mHz;
-  return packet;
+  return command_with("rate", {static_cast<double>(rate_mHz)});
 }
 
 wire_packet command_osr(std::uint32_t osr) {
-  check_osr(osr);
-  wire_packet packet = packet_of(WIRE_CMD_OSR);
-  packet.body.cmd_osr.osr = static_cast<std::uint16_t>(osr);
-  return packet;
+  return command_with("osr", {static_cast<double>(osr)});
 }
 
 wire_packet command_slip(float threshold_mm, std::uint32_t window_ms) {
-  check_threshold(threshold_mm);
-  check_window(window_ms);
-  wire_packet packet = packet_of(WIRE_CMD_SLIP);
-  packet.body.cmd_slip.threshold_mm = threshold_mm;
-  packet.body.cmd_slip.window_ms = static_cast<std::uint16_t>(window_ms);
+  wire_packet packet = command_with("slip_threshold", {threshold_mm});
+  put(packet, *find_setting("slip_window"), {static_cast<double>(window_ms)});
   return packet;
 }
 
@@ -178,18 +198,11 @@ wire_packet command_keep(bool keep) {
 }
 
 wire_packet command_prior(float sigma_mm, float width_mm) {
-  check_prior({sigma_mm, width_mm});
-  wire_packet packet = packet_of(WIRE_CMD_PRIOR);
-  packet.body.cmd_prior.sigma_mm = sigma_mm;
-  packet.body.cmd_prior.width_mm = width_mm;
-  return packet;
+  return command_with("prior", {sigma_mm, width_mm});
 }
 
 wire_packet command_location_limit(float limit_mm) {
-  check_limit(limit_mm);
-  wire_packet packet = packet_of(WIRE_CMD_LOCATION_LIMIT);
-  packet.body.cmd_location_limit.limit_mm = limit_mm;
-  return packet;
+  return command_with("limit", {limit_mm});
 }
 
 wire_packet command_pad(const pad_profile &profile) {
@@ -205,78 +218,73 @@ wire_packet command_erase_pad() {
   return packet_of(WIRE_CMD_ERASE_PAD);
 }
 
-std::uint32_t rate_mHz_from_text(const std::string &text) {
-  if (text == "max") {
-    return 0;
+WantedSetting setting_from_text(const std::string &text) {
+  const std::size_t equals = text.find('=');
+  const Setting *setting = find_setting(text.substr(0, equals));
+  if (!setting) {
+    std::string known;
+    for (const Setting &each : all_settings) {
+      known += (known.empty()                         ? ""
+                : &each == std::end(all_settings) - 1 ? " or "
+                                                      : ", ") +
+               std::string(each.name) + "=" + each.typed;
+    }
+    throw Error("setting \"" + text + "\" is unknown; give " + known);
   }
-  auto rate_Hz = to_double(text);
-  if (!rate_Hz) {
-    throw Error(ErrorCode::bad_value, "rate \"" + text + "\" is no number; give " + rate_range());
-  }
-  if (*rate_Hz * 1000 < WIRE_RATE_MIN_mHz || *rate_Hz * 1000 > WIRE_RATE_MAX_mHz) {
-    out_of_range("rate", text, rate_range());
-  }
-  return static_cast<std::uint32_t>(std::lround(*rate_Hz * 1000));
+  return {setting,
+          values_from_text(*setting, equals == std::string::npos ? "" : text.substr(equals + 1))};
 }
 
-std::uint32_t osr_from_text(const std::string &text) {
-  auto osr = to_u64(text);
-  if (!osr) {
-    throw Error(ErrorCode::bad_value,
-                "osr \"" + text + "\" is no whole number; give " + osr_range());
+std::vector<wire_packet> setting_commands(const std::vector<WantedSetting> &wanted,
+                                          const wire_info &now) {
+  std::vector<wire_packet> commands;
+  for (const Setting &setting : all_settings) {
+    bool is_wanted = false; /* it, or what travels with it */
+    SettingValues values{};
+    for (std::size_t i = 0; i < setting.count; i++) {
+      values[i] = setting.values[i].now(now);
+    }
+    for (const WantedSetting &each : wanted) {
+      is_wanted = is_wanted || each.setting->command == setting.command;
+      values = each.setting == &setting ? each.values : values;
+    }
+    if (!is_wanted) {
+      continue;
+    }
+    if (commands.empty() || commands.back().type != setting.command) {
+      commands.push_back(packet_of(setting.command));
+    }
+    put(commands.back(), setting, values);
   }
-  check_osr(*osr);
-  return static_cast<std::uint32_t>(*osr);
+  return commands;
 }
 
-float slip_threshold_mm_from_text(const std::string &text) {
-  auto threshold_mm = to_float(text);
-  if (!threshold_mm) {
-    throw Error(ErrorCode::bad_value,
-                "slip threshold \"" + text + "\" is no number; give " + threshold_range());
+std::string settings_text(const wire_info &info) {
+  std::string text;
+  for (const Setting &setting : all_settings) {
+    if ((info.capabilities & setting.capability) != setting.capability) {
+      continue;
+    }
+    std::string shown;
+    for (std::size_t i = 0; i < setting.count; i++) {
+      const SettingValue &value = setting.values[i];
+      const double number = value.now(info);
+      shown += (i > 0 ? ":" : "") + value_text(value, number);
+      if (setting.zeros && i + 1 == setting.count && number == 0) {
+        shown = setting.zeros;
+      }
+    }
+    text += (text.empty() ? "" : " ") + std::string(setting.name) + "=" + shown;
   }
-  check_threshold(*threshold_mm);
-  return *threshold_mm;
+  return text;
 }
 
-std::uint32_t slip_window_ms_from_text(const std::string &text) {
-  auto window_ms = to_u64(text);
-  if (!window_ms) {
-    throw Error(ErrorCode::bad_value,
-                "slip window \"" + text + "\" is no whole number; give " + window_range());
+std::string settings_help() {
+  std::string text;
+  for (const Setting &setting : all_settings) {
+    text += (text.empty() ? "" : ", ") + std::string(setting.help);
   }
-  check_window(*window_ms);
-  return static_cast<std::uint32_t>(*window_ms);
-}
-
-Prior prior_from_text(const std::string &text) {
-  if (text == "none") {
-    return {0, 0};
-  }
-  std::size_t colon = text.find(':');
-  auto sigma_mm = to_float(text.substr(0, colon));
-  auto width_mm = colon == std::string::npos ? WIRE_PRIOR_WIDTH_DEFAULT_mm : to_float(text.substr(colon + 1));
-  if (!sigma_mm || !width_mm) {
-    throw Error(ErrorCode::bad_value, "prior \"" + text + "\" is no number; give " + prior_range());
-  }
-  if (*sigma_mm == 0) {
-    out_of_range("prior", text, prior_range());
-  }
-  check_prior({*sigma_mm, *width_mm});
-  return {*sigma_mm, *width_mm};
-}
-
-float location_limit_mm_from_text(const std::string &text) {
-  auto limit_mm = to_float(text);
-  if (!limit_mm) {
-    throw Error(ErrorCode::bad_value, "limit \"" + text + "\" is no number; give " + limit_range());
-  }
-  check_limit(*limit_mm);
-  return *limit_mm;
-}
-
-std::string prior_text(const Prior &prior) {
-  return prior.width_mm > 0 ? shortest(prior.sigma_mm) + ":" + shortest(prior.width_mm) : "none";
+  return text;
 }
 
 std::vector<std::uint8_t> frame_bytes(const wire_packet &packet) {

@@ -4,6 +4,7 @@
 
 #include "libfingertip/wire.hpp"
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -32,19 +33,24 @@ wire_packet command_location_limit(float limit_mm);
 wire_packet command_pad(const pad_profile &profile);
 wire_packet command_erase_pad();
 
-/* Values as people type them. Each throws Error if the text is no number or out of range. */
-std::uint32_t rate_mHz_from_text(const std::string &text); /* Hz, or "max" */
-std::uint32_t osr_from_text(const std::string &text);
-float slip_threshold_mm_from_text(const std::string &text);
-std::uint32_t slip_window_ms_from_text(const std::string &text);
-struct Prior {
-  float sigma_mm, width_mm;
+/* Settings as people type them, "rate=20" or "prior=3.1:0.5". firmware/wire/line.toml lists them
+ * with their ranges. */
+struct Setting;
+using SettingValues = std::array<double, 2>; /* in the units of the packet */
+struct WantedSetting {
+  const Setting *setting;
+  SettingValues values;
 };
-Prior prior_from_text(const std::string &text); /* "3.1", "3.1:0.5", or "none" */
-float location_limit_mm_from_text(const std::string &text);
-
-/* "3.1:0.5", or "none". */
-std::string prior_text(const Prior &prior);
+/* Throws Error if it is no setting, no number or out of range. */
+WantedSetting setting_from_text(const std::string &text);
+/* The commands that bring them about. What travels with a wanted value and is not wanted stays as
+ * it is now. */
+std::vector<wire_packet> setting_commands(const std::vector<WantedSetting> &wanted,
+                                          const wire_info &now);
+/* "rate=20.000 osr=1024 ...": the settings that this firmware has. */
+std::string settings_text(const wire_info &info);
+/* "rate=HZ|max (0.1 to 2000), ..." */
+std::string settings_help();
 
 /* The bytes of a packet on the line, delimiter included. */
 std::vector<std::uint8_t> frame_bytes(const wire_packet &packet);

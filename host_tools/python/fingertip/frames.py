@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .clock import ClockEstimate
-from .line import WARNINGS, Contact, ContactQuantities, Flag, Raw
+from .line import WARNINGS, BlockQuantities, Contact, ContactQuantities, Flag, Raw
 from .wire import layout_of
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def _bits(bitmap: int, count: int) -> BoolArray:
     return np.array([bitmap >> k & 1 for k in range(count)], dtype=np.bool_)
 
 
-class Block:
+class Block(BlockQuantities):
     """Frames as arrays, one value for each of the n frames.
 
     Every quantity of a Frame by the same name, and block["x_mm"] as well; sensors_Pa and tare_Pa are [n][sensor]. A value that is not
@@ -107,35 +107,6 @@ class Block:
     flags: IntArray
     has_contact: BoolArray
     has_raw: BoolArray
-    sensors_used: IntArray
-    x_mm: FloatArray
-    y_mm: FloatArray
-    force_N: FloatArray
-    p0_Pa: FloatArray
-    sigma_mm: FloatArray
-    residual_rms_Pa: FloatArray
-    location_sd_mm: FloatArray
-    force_sd_N: FloatArray
-    slip_mm: FloatArray
-    sigma_x_mm: FloatArray
-    sigma_y_mm: FloatArray
-    width_correlation: FloatArray
-    qx_N: FloatArray
-    qy_N: FloatArray
-    q_sd_N: FloatArray
-    tangential_ratio: FloatArray
-    vx_mm_s: FloatArray
-    vy_mm_s: FloatArray
-    convert_us: IntArray
-    read_us: IntArray
-    queue_us: IntArray
-    condition_us: IntArray
-    fit_us: IntArray
-    contact_us: IntArray
-    total_us: IntArray
-    valid: IntArray
-    saturated: IntArray
-    doubtful: IntArray
     temperature_degC: FloatArray
     sensors_Pa: FloatArray
     tare_Pa: FloatArray

@@ -5,7 +5,11 @@ body are its layout, for both directions. A quantity that is there only under a 
 """
 import enum
 import math
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
 VERSION = 5
 SENSORS_MAX = 32
@@ -93,23 +97,6 @@ class Result(enum.IntEnum):
     UNKNOWN_COMMAND = 1  #: the firmware does not know this command
     OUT_OF_RANGE = 2  #: a value is out of range for this firmware
     NOT_NOW = 3  #: not now: a tare while no sensor answers, or in contact and not forced; a change of what is stored while one is being written, or where the flash fails
-
-
-class Range(NamedTuple):
-    """Of a setting, in its unit."""
-
-    least: float
-    most: float
-
-
-RATE_mHz = Range(100, 2000000)
-OSR = (256, 512, 1024, 2048, 4096, 8192)
-SLIP_THRESHOLD_mm = Range(0.01, 50.0)
-SLIP_WINDOW_ms = Range(5, 1000)
-PRIOR_SIGMA_mm = Range(0.5, 100.0)
-PRIOR_WIDTH_mm = Range(0.01, 100.0)
-PRIOR_WIDTH_DEFAULT_mm = 0.5
-LOCATION_LIMIT_mm = Range(0.01, 100.0)
 
 
 class Calibration(NamedTuple):
@@ -564,7 +551,64 @@ TYPES: dict[int, type[Body]] = {
 NESTED: dict[str, Any] = {"Calibration": Calibration, "PadProfile": PadProfile}
 
 
-# Columns of recordings.
+class Setting(NamedTuple):
+    """An argument of Fingertip.set: a field of a command. In a packet it is `per` times as much."""
+
+    argument: str
+    command: type[Any]
+    field: str
+    info: str
+    least: float
+    most: float
+    choices: tuple[int, ...]
+    per: int
+    whole: bool
+    give: str
+    default: float | None
+    of: str
+    """The capability whose firmware has it; none: every one."""
+    needs: str
+    """Another argument, without which this one means nothing."""
+    zero: bool
+    """It may be 0, and so may what needs it."""
+
+
+SETTINGS = (
+    Setting("rate_Hz", SetRate, "rate_mHz", "rate_mHz", 0.1, 2000, (), 1000, True, "0.1 to 2000 Hz, or 0 for as fast as possible", None, "", "", True),
+    Setting("osr", SetOsr, "osr", "osr", 256, 8192, (256, 512, 1024, 2048, 4096, 8192), 1, True, "one of 256, 512, 1024, 2048, 4096, 8192", None, "", "", False),
+    Setting("slip_threshold_mm", SetSlip, "threshold_mm", "slip_threshold_mm", 0.01, 50, (), 1, False, "0.01 to 50 mm", None, "slip", "", False),
+    Setting("slip_window_ms", SetSlip, "window_ms", "slip_window_ms", 5, 1000, (), 1, True, "5 to 1000 ms", None, "slip", "", False),
+    Setting("prior_sigma_mm", SetPrior, "sigma_mm", "prior_sigma_mm", 0.5, 100, (), 1, False, "0.5 to 100 mm, or 0 for none", None, "fit", "", True),
+    Setting("prior_width_mm", SetPrior, "width_mm", "prior_width_mm", 0.01, 100, (), 1, False, "0.01 to 100 mm", 0.5, "fit", "prior_sigma_mm", True),
+    Setting("location_limit_mm", SetLocationLimit, "limit_mm", "location_limit_mm", 0.01, 100, (), 1, False, "0.01 to 100 mm", None, "fit", "", False),
+)
+
+
+class Settable:
+    """What takes settings."""
+
+    def set(self, *, rate_Hz: float | None = None, osr: int | None = None, slip_threshold_mm: float | None = None,
+            slip_window_ms: int | None = None, prior_sigma_mm: float | None = None, prior_width_mm: float | None = None,
+            location_limit_mm: float | None = None, keep: bool | None = None) -> Info:
+        """Changes what is given, until power-off; keep True: from now on start with all present settings, False: with the firmware's own.
+
+        rate_Hz: 0.1 to 2000, 0 is as fast as the sensors allow.
+        osr: the sensors' oversampling, one of 256, 512, 1024, 2048, 4096, 8192.
+        slip_threshold_mm: 0.01 to 50.
+        slip_window_ms: 5 to 1000.
+        prior_sigma_mm: the width to expect of a contact, 0.5 to 100, 0 is none.
+        prior_width_mm: its standard deviation, 0.01 to 100, 0.5 if not given.
+        location_limit_mm: UNCERTAIN above it, 0.01 to 100.
+        Raises BadValueError before anything is sent. Returns how it is set now.
+        """
+        return self._set({"rate_Hz": rate_Hz, "osr": osr, "slip_threshold_mm": slip_threshold_mm, "slip_window_ms": slip_window_ms,
+                          "prior_sigma_mm": prior_sigma_mm, "prior_width_mm": prior_width_mm, "location_limit_mm": location_limit_mm}, keep)
+
+    def _set(self, given: dict[str, float | None], keep: bool | None) -> Info:
+        raise NotImplementedError
+
+
+# Columns of recordings, and what their comments have of an info packet.
 STAGES = (
     "convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us")
 CONTACT_COLUMNS = (
@@ -575,6 +619,9 @@ TANGENTIAL_COLUMNS = ( # NaN in recordings of before there were any
     "qx_N", "qy_N", "q_sd_N", "tangential_ratio", "vx_mm_s", "vy_mm_s")
 RAW_COLUMNS = (
     "raw_sequence", "raw_flags", "valid", "saturated", "doubtful", "temperature_degC")
+INFO_KEYS = (
+    "sensors", "capabilities", "rate_mHz", "measured_rate_mHz", "osr", "temperature_interval_ms", "slip_threshold_mm", "slip_window_ms",
+    "fit_iterations", "streams", "pitch_mm", "prior_sigma_mm", "prior_width_mm", "location_limit_mm", "stored")
 
 
 class ContactQuantities:
@@ -677,3 +724,37 @@ class ContactQuantities:
     def vy_mm_s(self) -> float:
         """Velocity of the contact along y."""
         return self.contact.vy_mm_s
+
+
+class BlockQuantities:
+    """The quantities of both packets by their names, an array each."""
+
+    convert_us: "npt.NDArray[np.int64]"
+    read_us: "npt.NDArray[np.int64]"
+    queue_us: "npt.NDArray[np.int64]"
+    condition_us: "npt.NDArray[np.int64]"
+    fit_us: "npt.NDArray[np.int64]"
+    contact_us: "npt.NDArray[np.int64]"
+    total_us: "npt.NDArray[np.int64]"
+    sensors_used: "npt.NDArray[np.int64]"
+    x_mm: "npt.NDArray[np.float64]"
+    y_mm: "npt.NDArray[np.float64]"
+    p0_Pa: "npt.NDArray[np.float64]"
+    sigma_mm: "npt.NDArray[np.float64]"
+    force_N: "npt.NDArray[np.float64]"
+    residual_rms_Pa: "npt.NDArray[np.float64]"
+    location_sd_mm: "npt.NDArray[np.float64]"
+    force_sd_N: "npt.NDArray[np.float64]"
+    slip_mm: "npt.NDArray[np.float64]"
+    sigma_x_mm: "npt.NDArray[np.float64]"
+    sigma_y_mm: "npt.NDArray[np.float64]"
+    width_correlation: "npt.NDArray[np.float64]"
+    qx_N: "npt.NDArray[np.float64]"
+    qy_N: "npt.NDArray[np.float64]"
+    q_sd_N: "npt.NDArray[np.float64]"
+    tangential_ratio: "npt.NDArray[np.float64]"
+    vx_mm_s: "npt.NDArray[np.float64]"
+    vy_mm_s: "npt.NDArray[np.float64]"
+    valid: "npt.NDArray[np.int64]"
+    saturated: "npt.NDArray[np.int64]"
+    doubtful: "npt.NDArray[np.int64]"

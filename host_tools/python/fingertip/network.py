@@ -28,6 +28,7 @@ import types
 from typing import Any, NamedTuple
 
 from .errors import BadValueError, InputError
+from .line import SETTINGS
 
 ROOT = "fingertip"
 AGAIN_MOST = 4000  # packets that one question asks for
@@ -145,14 +146,14 @@ def parts_of(key: str) -> tuple[str, str]:
 
 def settings_of(parameters: dict[str, str]) -> dict[str, Any]:
     """The arguments of Fingertip.set. Raises BadValueError."""
-    kinds: dict[str, Any] = {"osr": int, "slip_window_ms": int, "keep": lambda text: bool(int(text))}
-    known = ("rate_Hz", "osr", "slip_threshold_mm", "slip_window_ms", "prior_sigma_mm", "prior_width_mm", "location_limit_mm", "keep")
+    kinds: dict[str, Any] = {setting.argument: int if setting.whole and setting.per == 1 else float for setting in SETTINGS}
+    kinds["keep"] = lambda text: bool(int(text))
     settings: dict[str, Any] = {}
     for name, text in parameters.items():
-        if name not in known:
-            raise BadValueError(f"{name} is no setting; there are: {', '.join(known)}")
+        if name not in kinds:
+            raise BadValueError(f"{name} is no setting; there are: {', '.join(kinds)}")
         try:
-            settings[name] = kinds.get(name, float)(text)
+            settings[name] = kinds[name](text)
         except ValueError:
             raise BadValueError(f"{name}={text} is no number") from None
     return settings

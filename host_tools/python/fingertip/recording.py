@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from .clock import ClockEstimate, host_now_us
 from .errors import InputError
 from .frames import Q10
-from .line import CONTACT_COLUMNS, RAW_COLUMNS, TANGENTIAL_COLUMNS
+from .line import CONTACT_COLUMNS, INFO_KEYS, RAW_COLUMNS, TANGENTIAL_COLUMNS
 from .lines import LineFile, shortest
 from .mcap_recording import McapLines
 from .wire import Acknowledgement, Calibration, Contact, Health, Info, LineStatistics, Packet, PadProfile, Raw
@@ -54,10 +54,8 @@ def _pad_metadata(pad: PadProfile) -> dict[str, str]:
 
 def info_metadata(info: Info) -> dict[str, str]:
     """An info packet as the comments of a recording."""
-    scalars = ("sensors", "capabilities", "rate_mHz", "measured_rate_mHz", "osr", "temperature_interval_ms", "slip_threshold_mm", "slip_window_ms",
-               "fit_iterations", "streams", "pitch_mm", "prior_sigma_mm", "prior_width_mm", "location_limit_mm", "stored")
     return {"serial": info.serial, "board": info.board, "scene": info.scene, "firmware": ".".join(map(str, info.firmware)), "git": info.git,
-            **{name: _number(getattr(info, name)) for name in scalars}, "x_mm": _list(info.x_mm), "y_mm": _list(info.y_mm),
+            **{name: _number(getattr(info, name)) for name in INFO_KEYS}, "x_mm": _list(info.x_mm), "y_mm": _list(info.y_mm),
             **(_calibration_metadata(info.calibration) if info.calibration else {}), **(_pad_metadata(info.pad) if info.pad else {})}
 
 

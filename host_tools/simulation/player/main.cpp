@@ -69,15 +69,18 @@ private:
 
 int play(const PlayOptions &options) {
   // Everything that can be wrong is, before anything takes time.
-  const wire_packet osr = command_osr(osr_from_text(options.osr));
-  const wire_packet rate = command_rate_mHz(rate_mHz_from_text(options.rate));
-  std::optional<wire_packet> slip;
+  std::vector<wire_packet> wanted;
+  const auto want = [&wanted](const std::vector<WantedSetting> &settings) {
+    wanted.push_back(setting_commands(settings, {}).front());
+  };
+  want({setting_from_text("osr=" + options.osr)});
+  want({setting_from_text("rate=" + options.rate)});
   if (!options.slip_threshold.empty() || !options.slip_window.empty()) {
     if (options.slip_threshold.empty() || options.slip_window.empty()) {
       throw Error("--slip-threshold and --slip-window belong together; give both");
     }
-    slip = command_slip(slip_threshold_mm_from_text(options.slip_threshold),
-                        slip_window_ms_from_text(options.slip_window));
+    want({setting_from_text("slip_threshold=" + options.slip_threshold),
+          setting_from_text("slip_window=" + options.slip_window)});
   }
   if ((options.prior_sigma_mm > 0.0F) != (options.prior_width_mm > 0.0F)) {
     throw Error("--prior-sigma and --prior-width belong together; give both");
@@ -112,10 +115,8 @@ int play(const PlayOptions &options) {
   }
   native_cdc_open();
   Commands commands;
-  commands.send(osr);
-  commands.send(rate);
-  if (slip) {
-    commands.send(*slip);
+  for (const wire_packet &command : wanted) {
+    commands.send(command);
   }
   std::uint8_t streams = WIRE_STREAM_CONTACT | WIRE_STREAM_HEALTH;
   streams |= options.raw ? WIRE_STREAM_RAW : 0;

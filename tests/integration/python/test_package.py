@@ -370,7 +370,7 @@ class Streaming(DeviceTest):
 
     def test_a_late_program_loses_the_oldest_and_is_told(self):
         with self.device("frames=200"), Fingertip(self.port, buffer_frames=20, timeout_s=PATIENCE_s) as tip:
-            self.world.until(lambda: tip.statistics.packets > 400 and tip.is_closed is False and tip._error is not None)
+            self.world.until(lambda: tip.statistics.packets > 400 and tip.is_closed is False and tip._line.error is not None)
             self.assertEqual([frame.frame for frame in self.until_gone(tip)], list(range(181, 201)))
             self.assertEqual(tip.overrun_frames, 180)
 

@@ -5,7 +5,10 @@
 #include "support/host_packets.hpp"
 #include "support/pad.h"
 
+#include <cmath>
 #include <gtest/gtest.h>
+#include <map>
+#include <sstream>
 
 using namespace fingertip;
 
@@ -16,6 +19,41 @@ wire_packet decoded(const wire_packet &command) {
   wire_packet packet{};
   EXPECT_EQ(wire_decode(wire_commands, bytes.data(), bytes.size() - 1, &packet), FT_OK);
   return packet;
+}
+
+/* How it is shown once it is set: one setting of "rate=... osr=...". */
+std::string as_shown(const std::string &text) {
+  wire_info info{};
+  info.capabilities = WIRE_CAPABILITY_FIT | WIRE_CAPABILITY_SLIP;
+  info.slip_threshold_mm = 1;
+  info.slip_window_ms = 100;
+  const wire_packet command = setting_commands({setting_from_text(text)}, info).front();
+  switch (command.type) {
+  case WIRE_CMD_RATE:
+    info.rate_mHz = command.body.cmd_rate.rate_mHz;
+    break;
+  case WIRE_CMD_OSR:
+    info.osr = command.body.cmd_osr.osr;
+    break;
+  case WIRE_CMD_SLIP:
+    info.slip_threshold_mm = command.body.cmd_slip.threshold_mm;
+    info.slip_window_ms = command.body.cmd_slip.window_ms;
+    break;
+  case WIRE_CMD_PRIOR:
+    info.prior_sigma_mm = command.body.cmd_prior.sigma_mm;
+    info.prior_width_mm = command.body.cmd_prior.width_mm;
+    break;
+  default:
+    info.location_limit_mm = command.body.cmd_location_limit.limit_mm;
+  }
+  const std::string name = text.substr(0, text.find('=') + 1);
+  std::istringstream words(settings_text(info));
+  for (std::string word; words >> word;) {
+    if (word.compare(0, name.size(), name) == 0) {
+      return word;
+    }
+  }
+  return "";
 }
 
 } // namespace
@@ -55,52 +93,105 @@ TEST(Command, ACalibrationOutOfRangeIsNotSent) {
   EXPECT_THROW(command_calibrate(test::make_calibration(), 33), Error);
 }
 
-TEST(Command, PriorsAndLimitsAsTyped) {
-  EXPECT_EQ(prior_text(prior_from_text("none")), "none");
-  EXPECT_EQ(prior_text(prior_from_text("3.1")), "3.1:0.5");
-  EXPECT_EQ(prior_text(prior_from_text("100:0.01")), "100:0.01");
-  for (const char *text : {"", "x", "3.1:", ":0.5", "0", "0:0", "0.4", "101", "3:0", "3:101",
-                           "3:nan", "inf", "3:0.5:1", "-3"}) {
-    EXPECT_THROW(prior_from_text(text), Error) << text;
+TEST(Command, SettingsAsTyped) {
+  for (const char *text :
+       {"rate=20.000", "rate=0.100", "rate=2000.000", "rate=max", "osr=256", "osr=512", "osr=1024",
+        "osr=2048", "osr=4096", "osr=8192", "slip_threshold=0.01", "slip_threshold=50",
+        "slip_window=5", "slip_window=1000", "prior=3.1:0.5", "prior=100:0.01", "prior=none",
+        "limit=0.6", "limit=100"}) {
+    EXPECT_EQ(as_shown(text), text);
   }
-  EXPECT_EQ(location_limit_mm_from_text("0.6"), 0.6f);
-  for (const char *text : {"", "0", "0.009", "101", "nan", "none"}) {
-    EXPECT_THROW(location_limit_mm_from_text(text), Error) << text;
+  EXPECT_EQ(as_shown("prior=3.1"), "prior=3.1:0.5");
+  EXPECT_EQ(as_shown("rate=20"), "rate=20.000");
+  EXPECT_EQ(as_shown("rate=1.005"), "rate=1.005") << "rounded, not cut";
+}
+
+TEST(Command, SettingsOutOfRangeAreRefused) {
+  const std::map<std::string, std::vector<std::string>> wrong = {
+      {"rate", {"0", "0.099", "2000.001", "-1", "nan", "inf", "", "1e99", "20Hz", "none"}},
+      {"osr", {"0", "128", "257", "1000", "16384", "65792", "-256", "1024.0", ""}},
+      {"slip_threshold", {"0", "0.009", "50.1", "-1", "nan", "x", ""}},
+      {"slip_window", {"0", "4", "1001", "65541", "-5", "99999999999999999999", "5.5"}},
+      {"prior",
+       {"", "x", "3.1:", ":0.5", "0", "0:0", "0.4", "101", "3:0", "3:101", "3:nan", "inf",
+        "3:0.5:1", "-3"}},
+      {"limit", {"", "0", "0.009", "101", "nan", "none"}},
+  };
+  for (const auto &[name, texts] : wrong) {
+    for (const std::string &text : texts) {
+      EXPECT_THROW(setting_from_text(name + "=" + text), Error) << name << "=" << text;
+    }
+    EXPECT_THROW(setting_from_text(name), Error);
   }
 }
 
-TEST(Command, RangesEndWhereThePacketSays) {
-  EXPECT_EQ(rate_mHz_from_text("max"), 0u);
-  EXPECT_EQ(rate_mHz_from_text("0.1"), 100u);
-  EXPECT_EQ(rate_mHz_from_text("2000"), 2000000u);
-  for (const char *text : {"0", "0.099", "2000.001", "-1", "nan", "inf", "", "1e99", "20Hz"}) {
-    EXPECT_THROW(rate_mHz_from_text(text), Error) << text;
-  }
-  for (const char *text : {"256", "512", "1024", "2048", "4096", "8192"}) {
-    EXPECT_EQ(std::to_string(osr_from_text(text)), text);
-  }
-  for (const char *text : {"0", "128", "257", "1000", "16384", "65792", "-256", "1024.0"}) {
-    EXPECT_THROW(osr_from_text(text), Error) << text;
-  }
-  EXPECT_EQ(slip_threshold_mm_from_text("0.01"), 0.01f);
-  EXPECT_EQ(slip_threshold_mm_from_text("50"), 50.0f);
-  for (const char *text : {"0.009", "50.1", "-1", "nan", "x"}) {
-    EXPECT_THROW(slip_threshold_mm_from_text(text), Error) << text;
-  }
-  EXPECT_EQ(slip_window_ms_from_text("5"), 5u);
-  EXPECT_EQ(slip_window_ms_from_text("1000"), 1000u);
-  for (const char *text : {"4", "1001", "65541", "-5", "99999999999999999999"}) {
-    EXPECT_THROW(slip_window_ms_from_text(text), Error) << text;
-  }
+TEST(Command, NumbersOutOfRangeAreRefused) {
+  EXPECT_THROW(command_rate_mHz(99), Error);
+  EXPECT_NO_THROW(command_rate_mHz(0));
+  EXPECT_THROW(command_osr(300), Error);
+  EXPECT_THROW(command_osr(0), Error);
+  EXPECT_THROW(command_slip(0, 100), Error);
+  EXPECT_THROW(command_slip(0.5f, 65541), Error);
+  EXPECT_NO_THROW(command_prior(0, 0));
+  EXPECT_THROW(command_prior(3, 0), Error);
+  EXPECT_THROW(command_prior(NAN, 1), Error);
+  EXPECT_THROW(command_location_limit(0), Error);
+}
+
+TEST(Command, WhatTravelsWithASettingStaysAsItIs) {
+  wire_info now{};
+  now.slip_threshold_mm = 0.75f;
+  now.slip_window_ms = 100;
+  auto commands = setting_commands({setting_from_text("slip_window=250"),
+                                    setting_from_text("limit=1"), setting_from_text("limit=2")},
+                                   now);
+  ASSERT_EQ(commands.size(), 2u);
+  EXPECT_EQ(decoded(commands[0]).body.cmd_slip.threshold_mm, 0.75f);
+  EXPECT_EQ(decoded(commands[0]).body.cmd_slip.window_ms, 250);
+  EXPECT_EQ(decoded(commands[1]).body.cmd_location_limit.limit_mm, 2.0f) << "the last one counts";
+  commands = setting_commands(
+      {setting_from_text("slip_threshold=1"), setting_from_text("slip_window=9")}, now);
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(decoded(commands[0]).body.cmd_slip.threshold_mm, 1.0f);
+  EXPECT_EQ(decoded(commands[0]).body.cmd_slip.window_ms, 9);
+  EXPECT_TRUE(setting_commands({}, now).empty());
+}
+
+TEST(Command, OnlyWhatTheFirmwareHasIsShown) {
+  wire_info info{};
+  info.osr = 1024;
+  EXPECT_EQ(settings_text(info), "rate=max osr=1024");
+  info.capabilities = WIRE_CAPABILITY_FIT;
+  info.location_limit_mm = 0.5f;
+  EXPECT_EQ(settings_text(info), "rate=max osr=1024 prior=none limit=0.5");
 }
 
 TEST(Command, TheErrorNamesTheAllowedRange) {
-  try {
-    rate_mHz_from_text("3000");
-    FAIL();
-  } catch (const Error &error) {
-    EXPECT_STREQ(error.what(), "rate 3000 is out of range; give 0.1 to 2000 Hz, or max");
+  const std::map<std::string, std::string> said = {
+      {"rate=3000", "rate 3000 is out of range; give 0.1 to 2000 Hz, or max"},
+      {"rate=x", "rate \"x\" is no number; give 0.1 to 2000 Hz, or max"},
+      {"osr=x", "osr \"x\" is no whole number; give 256, 512, 1024, 2048, 4096 or 8192"},
+      {"slip_threshold=0", "slip threshold 0 is out of range; give 0.01 to 50 mm"},
+      {"slip_window=1001", "slip window 1001 is out of range; give 5 to 1000 ms"},
+      {"prior=3:0", "prior 3:0 is out of range; give SIGMA or SIGMA:WIDTH, 0.5 to 100 and 0.01 to "
+                    "100 mm, or none"},
+      {"limit=x", "limit \"x\" is no number; give 0.01 to 100 mm"},
+      {"gain=1", "setting \"gain=1\" is unknown; give rate=HZ|max, osr=N, slip_threshold=MM, "
+                 "slip_window=MS, prior=SIGMA[:WIDTH]|none or limit=MM"},
+  };
+  for (const auto &[text, what] : said) {
+    try {
+      setting_from_text(text);
+      ADD_FAILURE() << text;
+    } catch (const Error &error) {
+      EXPECT_EQ(error.what(), what);
+    }
   }
+  EXPECT_EQ(settings_help(), "rate=HZ|max (0.1 to 2000), osr=256|512|1024|2048|4096|8192, "
+                             "slip_threshold=MM (0.01 to 50), slip_window=MS (5 to "
+                             "1000, and 160 frames at most), prior=SIGMA[:WIDTH]|none (mm, 0.5 to "
+                             "100, 0.01 to 100; width 0.5), limit=MM (of "
+                             "location_sd_mm, 0.01 to 100)");
 }
 
 TEST(Names, StreamsBothWays) {

@@ -229,14 +229,73 @@ export const HEALTH_KEYS = [
   'stack_free_bytes',
 ] as const;
 
-/** Of settings. */
-export const RANGES = {
-  RATE_mHz: [100, 2000000] as const,
-  OSR: [256, 512, 1024, 2048, 4096, 8192] as const,
-  SLIP_THRESHOLD_mm: [0.01, 50] as const,
-  SLIP_WINDOW_ms: [5, 1000] as const,
-  PRIOR_SIGMA_mm: [0.5, 100] as const,
-  PRIOR_WIDTH_mm: [0.01, 100] as const,
-  PRIOR_WIDTH_DEFAULT_mm: 0.5,
-  LOCATION_LIMIT_mm: [0.01, 100] as const,
-} as const;
+/** What people set, as they type it; in a packet a value is `per` times as much. */
+export const SETTINGS = [
+  {
+    name: 'rate',
+    label: 'Frame rate, Hz',
+    hint: '0.1 to 2000, or max: as fast as the sensors allow',
+    zeros: 'max',
+    command: PacketType.CMD_RATE,
+    capability: 0,
+    values: [
+      { field: 'rate_mHz', info: 'rate_mHz', say: 'Frame rate', per: 1000, whole: true, span: [0.1, 2000], choices: null, unlessGiven: null },
+    ],
+  },
+  {
+    name: 'osr',
+    label: 'Oversampling (osr)',
+    hint: 'more is quieter and slower',
+    zeros: null,
+    command: PacketType.CMD_OSR,
+    capability: 0,
+    values: [
+      { field: 'osr', info: 'osr', say: 'Oversampling', per: 1, whole: true, span: null, choices: [256, 512, 1024, 2048, 4096, 8192], unlessGiven: null },
+    ],
+  },
+  {
+    name: 'slip_threshold',
+    label: 'Slip threshold, mm',
+    hint: '0.01 to 50',
+    zeros: null,
+    command: PacketType.CMD_SLIP,
+    capability: Capability.SLIP,
+    values: [
+      { field: 'threshold_mm', info: 'slip_threshold_mm', say: 'Slip threshold', per: 1, whole: false, span: [0.01, 50], choices: null, unlessGiven: null },
+    ],
+  },
+  {
+    name: 'slip_window',
+    label: 'Slip window, ms',
+    hint: '5 to 1000, and 160 frames at most',
+    zeros: null,
+    command: PacketType.CMD_SLIP,
+    capability: Capability.SLIP,
+    values: [
+      { field: 'window_ms', info: 'slip_window_ms', say: 'Slip window', per: 1, whole: true, span: [5, 1000], choices: null, unlessGiven: null },
+    ],
+  },
+  {
+    name: 'prior',
+    label: 'Prior on the width, mm',
+    hint: 'SIGMA, SIGMA:WIDTH or none; 0.5 to 100, width 0.01 to 100, 0.5 unless given; for thin pads',
+    zeros: 'none',
+    command: PacketType.CMD_PRIOR,
+    capability: Capability.FIT,
+    values: [
+      { field: 'sigma_mm', info: 'prior_sigma_mm', say: 'Prior', per: 1, whole: false, span: [0.5, 100], choices: null, unlessGiven: null },
+      { field: 'width_mm', info: 'prior_width_mm', say: "The prior's width", per: 1, whole: false, span: [0.01, 100], choices: null, unlessGiven: 0.5 },
+    ],
+  },
+  {
+    name: 'limit',
+    label: 'Location limit, mm',
+    hint: '0.01 to 100; UNCERTAIN where location_sd_mm is above it',
+    zeros: null,
+    command: PacketType.CMD_LOCATION_LIMIT,
+    capability: Capability.FIT,
+    values: [
+      { field: 'limit_mm', info: 'location_limit_mm', say: 'Location limit', per: 1, whole: false, span: [0.01, 100], choices: null, unlessGiven: null },
+    ],
+  },
+] as const;

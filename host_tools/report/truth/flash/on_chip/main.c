@@ -7,6 +7,7 @@
 #include "port/port.h"
 #include "store/store.h"
 
+#include <stddef.h>
 #include <string.h>
 
 /* Few, so that ten thousand updates take a minute: a record of 110 bytes. */
@@ -40,16 +41,16 @@ static struct calibration calibration_of(uint32_t number) {
   return calibration;
 }
 
+_Static_assert(offsetof(struct store_settings, rate_mHz) == 0, "the number comes first");
+
 static struct store_settings settings_of(uint32_t number) {
   struct store_settings settings;
-  memset(&settings, 0, sizeof settings);
-  settings.rate_mHz = number;
-  settings.osr = (uint16_t)(256u << number % 6);
-  settings.slip_window_ms = (uint16_t)(number % 1000);
-  settings.slip_threshold_mm = (float)(number % 89) * 0.1f;
-  settings.prior_sigma_mm = (float)(number % 31) * 0.2f;
-  settings.prior_width_mm = (float)(number % 23) * 0.1f;
-  settings.location_limit_mm = (float)(number % 19) * 0.3f;
+  uint8_t bytes[sizeof settings];
+  for (size_t i = 0; i < sizeof bytes; i++) {
+    bytes[i] = (uint8_t)(number % (83 + i) + 7 * i);
+  }
+  memcpy(bytes, &number, sizeof number);
+  memcpy(&settings, bytes, sizeof settings);
   return settings;
 }
 

@@ -1,0 +1,47 @@
+"""What Fingertip.set is given, as commands; line.py lists the settings with their ranges."""
+import itertools
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from .errors import BadValueError
+from .line import SETTINGS, Setting
+from .wire import Body, Info
+
+
+def _wanted(setting: Setting, given: Mapping[str, float | None], now: Info) -> float:
+    """What is given, else its default, else as it is now."""
+    value = given[setting.argument]
+    if value is not None and setting.needs and given[setting.needs] is None:
+        raise BadValueError(f"{setting.argument} needs {setting.needs}")
+    if value is None and setting.default is not None:
+        return 0.0 if given[setting.needs] == 0 else setting.default
+    if value is None:
+        value = getattr(now, setting.info)
+        if value is None or math.isnan(value):
+            raise BadValueError(f"firmware of scene {now.scene} knows no {setting.of}")
+        value /= setting.per
+    return value
+
+
+def _check(setting: Setting, value: float) -> None:
+    if not setting.least <= value <= setting.most or setting.choices and value not in setting.choices:  # NaN is in no range
+        raise BadValueError(f"{setting.argument} {value:g} is out of range; give {setting.give}")
+
+
+def setting_commands(given: Mapping[str, float | None], now: Info) -> list[Body]:
+    """Of the arguments of Fingertip.set; None: not given. Raises BadValueError."""
+    commands: list[Body] = []
+    for command, group in itertools.groupby(SETTINGS, lambda setting: setting.command):
+        settings = list(group)
+        if all(given[setting.argument] is None for setting in settings):
+            continue
+        values = [_wanted(setting, given, now) for setting in settings]
+        zeros = not any(values)
+        for setting, value in zip(settings, values, strict=True):
+            if not (zeros and setting.zero):
+                _check(setting, value)
+        fields: dict[str, Any] = {setting.field: round(value * setting.per) if setting.whole else value
+                                  for setting, value in zip(settings, values, strict=True)}
+        commands.append(command(**fields))
+    return commands
