@@ -49,14 +49,14 @@
 #define FIT_FORCE_SHAPE 0.4f
 #define FIT_BOUND_SD 1.2f /* pitches: such presses of a thin pad are off by up to 2.4 */
 
-/* A contact is elongated if log(longer width / shorter) exceeds both FIT_STRETCH_LEAST and
- * FIT_STRETCH_SURE standard deviations of the part from noise and gains, in quadrature. The cubes
- * and spheres of a layer stay below FIT_STRETCH_LEAST. The fit reports the widths up to a standard
- * deviation of FIT_STRETCH_SD_MAX and a ratio of exp(FIT_STRETCH_MAX). Below FIT_SHAPE_LEAST
- * pitches of sigma the layer's own profile looks elongated between the sensors. If the contact is
- * elongated, the location's standard deviation contains the shift by separate widths. Beyond a
- * stretch of FIT_STRETCH_LINEAR that shift is many times the error, so only its share counts that
- * falls with the square of the stretch. */
+/* A contact is elongated if log(longer width / shorter) exceeds a limit: FIT_STRETCH_LEAST and
+ * FIT_STRETCH_SURE standard deviations of the part from noise and gains, added in quadrature. The
+ * cubes and spheres of a layer stay below FIT_STRETCH_LEAST. The fit reports the widths up to a
+ * standard deviation of FIT_STRETCH_SD_MAX and a ratio of exp(FIT_STRETCH_MAX). Below
+ * FIT_SHAPE_LEAST pitches of sigma the layer's own profile looks elongated between the sensors. If
+ * the contact is elongated, the location's standard deviation contains the shift by separate
+ * widths. Beyond a stretch of FIT_STRETCH_LINEAR that shift is many times the error, so only its
+ * share counts that falls with the square of the stretch. */
 #define FIT_STRETCH_LEAST 0.1f
 #define FIT_STRETCH_SURE 2.5f
 #define FIT_STRETCH_SD_MAX 0.25f
