@@ -8,7 +8,7 @@ function(ft_test label)
   cmake_parse_arguments(arg "" "NAME" "COMMAND" ${ARGN})
   add_test(${ARGN})
   set_tests_properties(${arg_NAME} PROPERTIES LABELS ${label} ENVIRONMENT_MODIFICATION PYTHONDONTWRITEBYTECODE=set:1)
-  # What lives in real time does so one at a time; whoever judges it measures how late the machine was.
+  # Tests in real time run one at a time. Each measures how late the machine was.
   if(label STREQUAL "realtime")
     set_tests_properties(${arg_NAME} PROPERTIES RESOURCE_LOCK real_time)
   endif()

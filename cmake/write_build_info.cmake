@@ -17,7 +17,7 @@ string(REPLACE "." ", " version_bytes ${VERSION})
 file(CONFIGURE OUTPUT ${OUTPUT} CONTENT [[
 #include "config/build_info.h"
 
-/* With marks that tell an image file's identity to whoever installs it. */
+/* With marks that show an image file's identity to the installer. */
 #define MARKED(name, mark, text) \
   static const char name[] = mark text; \
   enum { name##_at = sizeof mark - 1 }

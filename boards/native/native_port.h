@@ -20,13 +20,13 @@ void native_start(bool by_watchdog);
 /* Right after a start: the clock shows this. */
 void native_set_time(uint64_t now_us);
 
-/* Sixteen characters, for whoever has several; kept over starts. */
+/* Sixteen characters, to distinguish several; kept over starts. */
 void native_set_serial_number(const char *text);
 
 /* How the firmware ended before; kept over starts. */
 void native_set_last_crash(const struct crash_record *crash);
 
-/* What port_event() was last told. */
+/* The last argument of port_event(). */
 enum crash_event native_last_event(uint8_t *detail);
 
 /* next_us tells when the source has its next event, UINT64_MAX for never. */

@@ -26,10 +26,10 @@
 
 enum sim_fault_kind {
   SIM_FAULT_NONE,
-  SIM_FAULT_NACK,        /* nobody acknowledges the transfer; a command is not heard */
+  SIM_FAULT_NACK,        /* no acknowledgement; a command is not heard */
   SIM_FAULT_DEAD,        /* the sensor hears and answers nothing for count transfers to it */
   SIM_FAULT_TIMEOUT,     /* the transfer never ends; one recovery helps */
-  SIM_FAULT_STUCK,       /* likewise, and count recoveries fail before one helps */
+  SIM_FAULT_STUCK,       /* the same, and count recoveries fail before one helps */
   SIM_FAULT_FLIP,        /* bits of mask are inverted in the bytes read, MSB first in 24 bits */
   SIM_FAULT_ZERO,        /* the bytes read are 0 */
   SIM_FAULT_ONES,        /* the bytes read are 0xFF */
@@ -97,11 +97,11 @@ struct sim_array {
  * seed: of the noise. */
 void sim_array_init(struct sim_array *array, uint8_t sensor_count, uint64_t seed);
 
-/* Draws every sensor's calibration anew, each word up to `share` (below 1) off the typical part's.
- * The sensors are as after power-up. */
+/* Draws new calibrations for every sensor, each word up to `share` (below 1) off the typical
+ * part's. The sensors are as after power-up. */
 void sim_array_vary_parts(struct sim_array *array, double share);
 
-/* Who drives the bus starts anew, and its time at 0, so long after its last start: what was under
+/* The bus driver starts again, and its time at 0, so long after its last start: what was under
  * way on the bus is no more, what the sensors do goes on. */
 void sim_array_restart_bus(struct sim_array *array, uint64_t elapsed_us);
 

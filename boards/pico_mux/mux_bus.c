@@ -18,7 +18,7 @@ enum {
 #define COMMAND_us 44u
 #define RECOVERY_HALF_PERIOD_us 5u /* 100 kHz, for whatever is on the bus */
 
-/* Interrupts lead from one transaction to the next; whoever polls only looks whether they move on.
+/* Interrupts lead from one transaction to the next; a poll only looks whether they move on.
  * A transaction takes 110 us. */
 #define STANDSTILL_us 1000u
 #define SHUT_MIN_us 1000000u
@@ -233,7 +233,7 @@ static enum ft_status look(struct mux_bus *bus, uint64_t now_us, uint64_t *wake_
 }
 
 /* Twice in a row the bus stood still as soon as this multiplexer had opened: a line behind it is
- * held, and whoever opens it loses the others too. */
+ * held, and opening it loses the others too. */
 static void judge_failure(struct mux_bus *bus, uint64_t now_us) {
   if (bus->just_opened == NO_MUX) {
     return;

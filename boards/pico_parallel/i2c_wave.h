@@ -65,7 +65,7 @@ uint16_t i2c_wave_byte(const uint16_t *samples, unsigned index,
 struct i2c_reply {
   uint16_t
       acknowledged; /* bitmap: acknowledged every byte, and let go of the line where it should */
-  uint16_t held;    /* bitmap of lines that were low while nobody had a reason to pull them */
+  uint16_t held;    /* bitmap of lines that were low without a reason */
   bool scl_follows; /* SCL was high in every sample that was looked at */
 };
 

@@ -3,7 +3,7 @@
  * A command takes 49 us and a read of three bytes 146 us on the bus at 397 kHz, for all sensors at
  * once: they sample at the same moment, and the skew between them is that of their own oscillators.
  *
- * A line that is low while nobody should pull it is taken for stuck: its sensor does not
+ * A line that is low while all should be high is stuck: its sensor does not
  * acknowledge, and the others go on. Before the next command the stuck lines, and only they, get
  * the nine clocks and the STOP that free a sensor which has lost its place, and, while that does
  * not help, ever more rarely. Clocks that do not follow are a failure of the whole bus: the

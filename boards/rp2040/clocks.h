@@ -8,7 +8,7 @@
 #define RP2040_CLOCKS_H
 
 /* Brings every block but the flash interface into reset and starts watchdog and clocks. Each wait
- * is bounded; without a crystal there is no USB and nobody to tell, so a failure starts over. */
+ * is bounded; without a crystal there is no USB to report it, so a failure starts over. */
 void clocks_start(void);
 
 /* Resets the whole chip but its oscillators, through the watchdog. */

@@ -5,7 +5,7 @@
  * that what power-on leaves there is none. Every end but one leaves a record: a fault and a panic
  * take it and reset the chip; where the main loop does not feed the watchdog, an interrupt of the
  * first priority takes it 20 ms before the reset, with the registers of what it interrupted. Where
- * that interrupt cannot run either, the next start makes a record of what the parts told on their
+ * that interrupt cannot run either, the next start makes a record of what the parts noted on their
  * way; of registers it knows nothing.
  */
 #ifndef RP2040_CRASH_H

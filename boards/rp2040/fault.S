@@ -45,7 +45,7 @@ port_panic:
   .thumb_func
   .type rp2040_fault, %function
 rp2040_fault:
-  /* Nobody fed the watchdog: its last warning */
+  /* The watchdog was not fed: its last warning */
   .global timer2_irq_handler
   .thumb_func
   .type timer2_irq_handler, %function

@@ -1,7 +1,7 @@
 /* The flash chip behind the SSI, by its own commands (W25Q16JV and its kin; RP2040 datasheet 4.10).
  *
  * Everything runs from SRAM once it is copied there, so the SSI leaves execution in place for good,
- * and what port/flash.h asks for needs no interrupt disabled and nobody to wait: commands go out in
+ * and what port/flash.h asks for needs no interrupt disabled and no wait: commands go out in
  * slices that fit into the FIFOs, and the chip is busy by itself.
  */
 #ifndef RP2040_FLASH_H

@@ -1,7 +1,7 @@
 /* I2C0 as the bus master of single short transactions at 400 kHz, and its two lines as plain pins
  * for the recovery of a stuck bus.
  *
- * A transaction fits into the FIFO whole, so it is loaded at once and needs nobody until its STOP,
+ * A transaction fits into the FIFO whole, so it is loaded at once and needs no code until its STOP,
  * whose interrupt calls the owner, who may start the next one from there. Nothing here waits, but
  * for a block to leave reset (a few cycles) and for the bus-free time after a STOP (2 us), both
  * bounded. One context: the event handler's.

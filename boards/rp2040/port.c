@@ -20,7 +20,7 @@ static struct {
 static struct {
   uint64_t due_us;
   bool set;
-  bool is_far; /* due beyond the horizon: what fires is to arm it anew */
+  bool is_far; /* due beyond the horizon: when it fires, arm it again */
 } alarm;
 
 static char serial_number[2 * FLASH_ID_BYTES + 1];

@@ -19,7 +19,7 @@ static void wait_for(uint32_t address, uint32_t bits) {
 #define SCB_SCR_SLEEPDEEP (1u << 2)
 
 /* clk_usb and its PLL stay: the controller needs them to see the bus wake up, and may hang when the
- * PLL is started anew below it (pico-sdk issue 1746). Else as MicroPython's machine.lightsleep():
+ * PLL is started again below it (pico-sdk issue 1746). Else as MicroPython's machine.lightsleep():
  * the crystal drives clk_sys, and asleep nothing has a clock but what can end the sleep. The other
  * core sleeps in the boot ROM, deeply. */
 static void begin_saving(void) {

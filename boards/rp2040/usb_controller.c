@@ -9,7 +9,7 @@
  * (some bus errors in an IN transfer hang the device) stands in all revisions: no bulk IN packet is
  * offered in the last 200 us of a frame, where such errors come from. It can still strike (TinyUSB
  * pull request 1779, embassy issue 2880), and then nothing but a reset of the block helps, not even
- * a bus reset. So the block is reset, and the device attached anew, when the bus is silent and not
+ * a bus reset. So the block is reset, and the device attached again, when the bus is silent and not
  * suspended, or when resets of the bus are followed by no request. A hung controller that goes on
  * seeing frames, under a host that resets nothing, is not noticed.
  */

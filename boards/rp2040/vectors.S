@@ -1,5 +1,5 @@
 /* The vector table in SRAM (ARMv6-M B1.5.3; interrupts: RP2040 datasheet 2.3.2), and the priority of
- * each interrupt as NVIC_IPR wants it. What nobody handles is a fault (fault.S). A handler
+ * each interrupt as NVIC_IPR wants it. An exception without a handler is a fault (fault.S). A handler
  * that the image links replaces its weak name here.
  *
  * The USB controller comes first, for the time of a frame's start counts (TinyUSB reads it before

@@ -1,5 +1,5 @@
-/* What is known of the pad, as it acts on the frames: its calibration and its profile. Both the
- * commands and hosts that have frames of their own set it. */
+/* The pad's calibration and profile, as they act on the frames. The commands set them, and so do
+ * hosts that have frames of their own. */
 #ifndef APP_ACTING_H
 #define APP_ACTING_H
 

@@ -13,7 +13,7 @@
 
 /* So long the end of a second waits for a frame to follow, rather than keep one waiting. */
 #define FRAME_WAIT_us 100000u
-/* A zero that nobody follows may be off by 30 Pa after so long: condition.h. */
+/* A zero that is not followed may be off by 30 Pa after so long: condition.h. */
 #define ZERO_LASTS_us 60000000u
 /* Up to this pitch the neighbours feel what one sensor feels: see READINGS_STILL_NOISES. */
 #define SHARED_PITCH_mm 9.0f

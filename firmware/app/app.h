@@ -46,7 +46,7 @@ struct app {
 #endif
   struct wire_receiver receiver;
   struct store store;
-  struct wire_ack owed; /* for what is being stored; .command 0: to nobody */
+  struct wire_ack owed; /* for what is being stored; .command 0: none */
 
   /* The frame under way. */
   struct frame frame;
@@ -67,7 +67,7 @@ struct app {
   uint8_t streams; /* enum wire_stream */
   uint16_t sequence;
   uint32_t news;        /* of the port, when last looked at */
-  uint32_t close_count; /* likewise */
+  uint32_t close_count; /* the same */
   bool active;          /* the last round had something to do, so there may be more */
   bool reads_below;     /* in the last frame a sensor was below its zero */
   bool saves_power;

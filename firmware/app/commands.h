@@ -14,10 +14,10 @@ void commands_start(struct app *app);
  * the frames. Returns whether anything had. Its bytes must not lie on the stack below a fit. */
 bool commands_receive(struct app *app);
 
-/* Each round: takes what is being stored a step further and answers who asked for it. */
+/* Each round: takes a write to the store a step further, and answers its command at the end. */
 void commands_follow_store(struct app *app, uint64_t now_us);
 
-/* Whoever sent commands is gone. */
+/* The host that sent commands is gone. */
 void commands_end_session(struct app *app);
 
 #endif

@@ -1,13 +1,12 @@
 /* The bus of a sensor array: the unit of work is the array, not the sensor.
  *
- * All sensors share one address, so every operation goes to all of them: behind multiplexers one
- * after the other, on parallel data lines at the same moment. An implementation fills this struct;
- * everything above works with any of them.
+ * All sensors share one address, so every operation goes to all of them. Behind multiplexers they
+ * get it one after the other, on parallel data lines at the same moment. An implementation fills
+ * this struct. Everything above works with any of them.
  *
- * One operation runs at a time. start_* begins one and returns at once; poll advances it and tells
- * its end. Nothing here ever waits. All calls come from the same context (the board's event
- * interrupt, or a test), never two at once.
- */
+ * One operation runs at a time. start_* begins one and returns at once. poll advances it and
+ * reports its end. No call ever waits. All calls come from the same context (the board's event
+ * interrupt, or a test), never two at once. */
 #ifndef ARRAY_BUS_ARRAY_BUS_H
 #define ARRAY_BUS_ARRAY_BUS_H
 
@@ -22,7 +21,7 @@ enum { ARRAY_BUS_MAX_READ_BYTES = 3 };
 struct array_bus_result {
   uint32_t acknowledged; /* bitmap of the sensors that acknowledged every byte; after a command sent
                             as a broadcast, all sensors of a branch that acknowledged as one */
-  uint32_t nacks;        /* transfers that nobody acknowledged, multiplexers included */
+  uint32_t nacks;        /* transfers without an acknowledgement, multiplexers included */
   uint8_t bytes[FT_MAX_SENSORS][ARRAY_BUS_MAX_READ_BYTES]; /* [sensor][byte as received]; after
                             start_read, for acknowledged sensors only */
 };
@@ -34,7 +33,7 @@ struct array_bus {
    * read may start that much before what it asks for is ready. */
   uint8_t read_lead_us;
 
-  /* Each sensor answers a command for itself, so that acknowledged tells who heard it. */
+  /* Each sensor answers a command for itself, so that acknowledged shows who heard it. */
   bool answers_are_single;
 
   /* Sends a one-byte command to every sensor.

@@ -1,6 +1,5 @@
-/* What is known of how the firmware last came to an end: where it was, why, and what had happened
- * before. The board keeps it over the reset (port/port.h), the packets carry it to the host.
- */
+/* How the firmware last ended: where it was, why, and what had happened before. The board keeps it
+ * over the reset (port/port.h). The packets carry it to the host. */
 #ifndef COMMON_CRASH_H
 #define COMMON_CRASH_H
 
@@ -11,7 +10,7 @@ enum crash_kind {
   CRASH_FAULT,     /* a hard fault: pc is the instruction */
   CRASH_PANIC,     /* port_panic(): pc is the call */
   CRASH_WATCHDOG,  /* a part of the firmware stood still; see stuck. pc is what was interrupted */
-  CRASH_EXCEPTION, /* one that nobody handles; see vector */
+  CRASH_EXCEPTION, /* one without a handler; see vector */
   CRASH_OVERFLOW,  /* a hard fault whose registers were to be stacked below the stack: all 0 where
                       they could not be */
   CRASH_START,     /* the start gave up: clocks that do not come, a fault in the start-up code */
@@ -50,7 +49,7 @@ enum crash_event {
   CRASH_EVENT_STORED,  /* detail: 1 if the flash failed */
   CRASH_EVENT_SENSORS, /* others answer than before */
   CRASH_EVENT_BUS,     /* timeouts of the sensor bus; detail: so many in a second */
-  CRASH_EVENT_SKIPPED, /* frames that nobody took; detail: likewise */
+  CRASH_EVENT_SKIPPED, /* frames that were not taken; detail: so many in a second */
 };
 
 enum { CRASH_EVENTS = 8 };

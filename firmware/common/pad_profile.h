@@ -1,13 +1,13 @@
-/* How the rubber of one pad spreads what presses on it and what pulls along it: as the host
- * computes it from the pad's thickness and overhang (`fingertip pad`), as the packets carry it and
- * the fingertip keeps it, and as the estimate of tangential load uses it (fit_tangential.h).
+/* How the rubber of one pad spreads a press and a pull. The host computes it from the pad's
+ * thickness and overhang (`fingertip pad`). The packets carry it, the fingertip keeps it, and the
+ * estimate of tangential load uses it (fit_tangential.h).
  *
- * Lengths are those of one bonded layer, so all of them grow with its thickness. A contact of its
- * own spread t2 (variance of its pressure along one axis, mm^2) presses on the base with
+ * Lengths are those of one bonded layer, so all of them grow with its thickness. Let t2 be the
+ * contact's own spread (variance of its pressure along one axis, mm^2). A contact that presses by F
+ * gives on the base
  *   F sum_j share_j / (2 pi v_j) exp(-r^2 / 2 v_j),                   v_j = sd_j^2 + t2
- * and one that pulls by Q along x besides with
- *   Q sum_j moment_j x / (2 pi v_j^2) exp(-r^2 / 2 v_j),              v_j = sd_j^2 + 1.3 t2
- */
+ * A contact that pulls by Q along x adds
+ *   Q sum_j moment_j x / (2 pi v_j^2) exp(-r^2 / 2 v_j),              v_j = sd_j^2 + 1.3 t2 */
 #ifndef COMMON_PAD_PROFILE_H
 #define COMMON_PAD_PROFILE_H
 
@@ -16,10 +16,10 @@
 
 enum { PAD_NORMAL_TERMS = 2, PAD_TANGENTIAL_TERMS = 3, PAD_EDGE_TERMS = 3 };
 
-/* What the ends of a pad make of the estimate, which knows none, by the place (x, y) that it tells:
- * with u = x / PAD_EDGE_UNIT_mm and v = y / PAD_EDGE_UNIT_mm
+/* The effect of the pad's ends on the estimate, which assumes none. It depends on the estimated
+ * place (x, y). With u = x / PAD_EDGE_UNIT_mm and v = y / PAD_EDGE_UNIT_mm
  *   even(c) = c[0] + c[1] u^2 + c[2] v^2
- *   odd(c)  = u even(c) of what is along x, v even(c) of what is along y
+ *   odd(c)  = u even(c) for values along x, v even(c) for values along y
  * An estimate of ratios q = Q / F, place and F then stands for
  *   q' = (q - odd(ratio)) / (1 + even(gain))
  *   place' = place - odd(place) - q' even(pull)
@@ -37,7 +37,7 @@ enum { PAD_EDGE_KINDS = sizeof(struct pad_edges) / sizeof(float[PAD_EDGE_TERMS])
 
 struct pad_profile {
   float thickness_mm;
-  float overhang_mm; /* of the rubber beyond the outer sensors; 0: not told */
+  float overhang_mm; /* of the rubber beyond the outer sensors; 0: not set */
   struct {
     float share, sd_mm;
   } normal[PAD_NORMAL_TERMS];
@@ -47,11 +47,11 @@ struct pad_profile {
   float spread_mm2, spread_sd_mm2; /* what to expect of t2 */
   float force_ratio;      /* 2 pi p0 sigma^2 of a usual contact over its force: what a calibration's
                              force scale holds of it */
-  float tangential_scale; /* tangential force is this times what the profile says */
+  float tangential_scale; /* tangential force is this times the profile's */
   float tangential_scale_sd; /* standard deviation of tangential_scale */
   struct pad_edges edges;
-  uint8_t from_touch; /* 1: the pad's edges spoil the zero, so tell what changed since the
-                         first touch; 0 */
+  uint8_t from_touch; /* 1: the pad's edges spoil the zero, so report the change since the first
+                       * touch; 0 */
 };
 
 /* The values before from_touch, behind one another. */
@@ -63,7 +63,7 @@ struct pad_profile {
 #define PAD_THICKNESS_MIN_mm 5.0f
 #define PAD_THICKNESS_MAX_mm 20.0f
 #define PAD_OVERHANG_MAX_mm 100.0f /* from 0 */
-/* Of a profile's own: a term that holds nothing, or twice all there is, is none of a layer. */
+/* Limits of one term: a term that holds nothing, or twice all there is, belongs to no layer. */
 #define PAD_SHARE_MIN 0.001f
 #define PAD_SHARE_MAX 2.0f
 #define PAD_MOMENT_MIN_mm 0.01f

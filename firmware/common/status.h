@@ -13,7 +13,7 @@ enum ft_status {
   FT_ERR_FORMAT = -4,   /* bytes that do not follow the format */
   FT_ERR_CRC = -5,      /* a check sum differs */
   FT_ERR_VERSION = -6,  /* a format version that this build does not speak */
-  FT_ERR_NACK = -7,     /* nobody on the bus acknowledged */
+  FT_ERR_NACK = -7,     /* no part on the bus acknowledged */
   FT_ERR_TIMEOUT = -8,  /* the hardware did not finish in its documented time */
   FT_ERR_STUCK = -9,    /* the bus is held low and recovery did not free it */
   FT_ERR_TYPE = -10,    /* an undamaged packet of a type that this build does not know */

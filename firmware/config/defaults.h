@@ -15,11 +15,12 @@
 #define DEFAULT_SLIP_THRESHOLD_mm 0.75f
 
 #define DEFAULT_FIT_ITERATIONS FINGERTIP_FIT_ITERATIONS
-#define DEFAULT_FIT_N_LARGEST 0u /* all: the others only add accuracy */
+#define DEFAULT_FIT_N_LARGEST 0u /* all: each adds accuracy */
 
-/* Force over 2 pi p0 sigma^2 of a pad never calibrated. Contacts' tails are no Gaussian's, and the
- * force that the product misses depends on the layer: 0.90 to 0.97 is held on 6 to 12 mm of rubber
- * (the twin's validation), to which the pad's mean gain adds as much as rubbers differ. */
+/* Force over 2 pi p0 sigma^2 of a pad that was never calibrated. A contact's tails are not
+ * Gaussian, and the missing force depends on the layer: the product holds 0.90 to 0.97 of it on 6
+ * to 12 mm of rubber (the twin's validation). The pad's mean gain adds as much as rubbers differ.
+ */
 #define DEFAULT_FORCE_SCALE 1.0f
 #define DEFAULT_FORCE_SCALE_SD 0.10f
 
@@ -31,15 +32,14 @@
 #define DEFAULT_PRIOR_WIDTH_mm                                                                     \
   (FINGERTIP_PRIOR_SIGMA_UM > 0 ? 0.001f * FINGERTIP_PRIOR_WIDTH_UM : 0.0f)
 
-/* Of a pad that was never calibrated: relative standard deviation of a sensor's gain. The gains of
+/* Relative standard deviation of a sensor's gain, on a pad that was never calibrated. The gains of
  * a real strip of four barometers under rubber differ by +-10 % (JiannnH/MTL-BaroTactileSensor,
- * Imperial College London, 2023); that this is one standard deviation is the stricter reading, and
- * a twentieth more, as four sensors hardly tell, takes bad locations without a warning from 1.4
- * to 1.2 % of the touches (truth_fit). */
+ * Imperial College London, 2023). To take that as one standard deviation is the stricter reading.
+ * Four sensors hardly determine it, so this is a twentieth more. The twentieth takes bad locations
+ * without a warning from 1.4 to 1.2 % of the touches (truth_fit). */
 #define DEFAULT_GAIN_SD 0.105f
-/* Of a layer of rubber against the Gaussian, as a share of the largest reading: with it one
- * standard deviation covers 57 to 74 % of the errors on pads of 6 and 12 mm (truth_fit).
- */
+/* Error of the Gaussian for a layer of rubber, as a share of the largest reading. With it one
+ * standard deviation covers 57 to 74 % of the errors on pads of 6 and 12 mm (truth_fit). */
 #define DEFAULT_MODEL_SD 0.0065f
 
 #endif

@@ -1,6 +1,5 @@
-/* What the fingertip says about one frame: the flags of the fit and every other that applies, and
- * the slip.
- */
+/* What the fingertip reports about one frame: the flags of the fit, every other flag that applies,
+ * and the slip. */
 #ifndef CONTACT_CONTACT_H
 #define CONTACT_CONTACT_H
 
@@ -54,10 +53,10 @@ struct contact_force contact_weigh(const struct contact_settings *settings,
 /* Without slip. */
 void contact_judge(const struct contact_input *input, struct contact_result *result);
 
-/* With slip. Locations flagged FLAT, AT_BOUND or ZERO_DOUBTFUL do not enter the slip history, nor
- * do those whose noise alone has a standard deviation above CONTACT_JITTER_MAX_mm: it starts anew
- * after them, as after a loss of contact. At that limit noise alone exceeds the usual threshold of
- * 0.75 mm once in a million frames. */
+/* With slip. Locations flagged FLAT, AT_BOUND or ZERO_DOUBTFUL do not enter the slip history.
+ * Neither do those whose noise alone has a standard deviation above CONTACT_JITTER_MAX_mm. The
+ * history starts again after them, as after a loss of contact. At that limit noise alone exceeds
+ * the usual threshold of 0.75 mm once in a million frames. */
 #define CONTACT_JITTER_MAX_mm 0.2f
 
 void contact_update(struct slip_history *history, const struct contact_settings *settings,

@@ -1,29 +1,27 @@
-/* How the contact moves, and whether it slides: from the location that is corrected for the
- * tangential load, and from that load.
+/* How the contact moves, and whether it slides. Both come from the location that is corrected for
+ * the tangential load, and from that load.
  *
- * Motion alone does not tell a slide. Rubber that takes over a load gives way, and the contact
+ * Motion alone does not show a slide. Rubber that takes over a load gives way, and the contact
  * creeps along: by 1 to 5 mm for each unit of Q / F, tangential over normal force, as Mindlin's
- * contact does ("Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949), and always
- * with the load, never against it. Where all of the contact slides it goes on while Q / F stays or,
- * as friction falls once it has given way, comes down. So what counts is how far the contact has
- * moved beyond what the change of its load explains:
+ * contact does ("Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949). It always
+ * creeps with the load, never against it. If all of the contact slides, it goes on while Q / F
+ * stays or comes down, as friction falls once it has given way. So the measure is how far the
+ * contact has moved beyond what the change of its load explains:
  *   |d| - MOTION_PER_LOAD_mm dq . d / |d|,    d: displacement, dq: change of Q / F, both vectors
  * from an earlier span of time to the latest. Location and load are means over the same frames, so
  * that no course of a load makes an elastic contact slide.
  *
- * Two pairs of spans: a brief one, which shows a slide some 10 ms after 0.1 mm of it, and a slow
- * one for what creeps at 1 mm/s or more. The latter is believed only as long as the contact still
- * goes.
+ * There are two pairs of spans. The brief one shows a slide some 10 ms after 0.1 mm of it. The slow
+ * one is for a creep of 1 mm/s or more. It counts only as long as the contact still moves.
  *
- * What cannot be told: a contact that rolls, or that is carried along by an object that is held
- * elsewhere too, moves without a load as a sliding one does. Friction that rises with a slide by
- * more than 1 / MOTION_PER_LOAD_mm for each mm hides it. A location that jumps because another set
- * of sensors is in use is no motion: then all starts anew.
+ * Limits: a contact that rolls moves without a load as a sliding one does. So does one carried
+ * along by an object that is held elsewhere too. Friction that rises with a slide by more than 1 /
+ * MOTION_PER_LOAD_mm for each mm hides it. A location that jumps because another set of sensors is
+ * in use is no motion: then the history is dropped.
  *
- * Sums of integers modulo 2^32: what they differ by over a span is exact however long they have
- * run. The cost does not grow with the number of frames in a span. Main context only: it divides
- * with port/divide.h.
- */
+ * Sums are integers modulo 2^32. Their difference over a span is exact however long they have run.
+ * The cost does not grow with the number of frames in a span. Main context only: it divides with
+ * port/divide.h. */
 #ifndef CONTACT_MOTION_H
 #define CONTACT_MOTION_H
 
@@ -33,23 +31,25 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Least squares over so long, and so many frames at least: at 410 frames a second 0.3 mm/s of noise
+/* Least squares over at least so long and so many frames: at 410 frames a second, 0.3 mm/s of noise
  * where one location has 0.01 mm. */
 #define MOTION_VELOCITY_us 30000u
 #define MOTION_VELOCITY_FRAMES 3u
 /* MOVING begins and ends. */
 #define MOTION_MOVING_mm_s 8
 #define MOTION_STANDS_mm_s 6
-/* So many standard deviations count as motion: one frame of a weak contact in a million would do so
- * by noise, all of which may lie along one line; of others the fixed limits keep more away. */
+/* So many standard deviations count as motion. One frame of a weak contact in a million exceeds
+ * them by noise, all of which may lie along one line. The fixed limits protect other contacts
+ * better. */
 #define MOTION_NOISE_SDS 5
-#define MOTION_NOISE_MAX_um 400 /* of one location; noisier ones are passed over */
+#define MOTION_NOISE_MAX_um 400 /* of one location; noisier ones are ignored */
 
-/* A contact that sticks moves by 2/3 of its dead travel per friction for each unit of Q / F, 1.3 mm
- * at 1 mm and 0.5, and by twice that at nine tenths of what friction holds. In lifts and slides of
- * the twin, seeds 201 to 213, dead travel 0.2, 1 and 2 mm, values of 6, 8 and 10 did alike. */
+/* A contact that sticks moves by 2/3 of its dead travel per friction for each unit of Q / F: 1.3 mm
+ * at 1 mm and 0.5. At nine tenths of what friction holds it moves twice that. In lifts and slides
+ * of the twin, seeds 201 to 213, dead travel 0.2, 1 and 2 mm, values of 6, 8 and 10 gave the same.
+ */
 #define MOTION_PER_LOAD_mm 8
-/* SLIDING ends when none has shown for so long: a caught object rings. */
+/* SLIDING ends after so long without a slide: a caught object rings. */
 #define MOTION_SLIDING_ENDS_us 15000u
 
 /* 64 frames span the brief pair at 1280 frames a second; with more the spans get shorter. */
@@ -58,7 +58,7 @@
 /* Frames nearer to the last that was judged enter, and say what it did: most of the cost is the
  * judging's. */
 #define MOTION_JUDGED_us 2000u
-/* After a longer interval between two locations all starts anew. */
+/* After a longer interval between two locations the history is dropped. */
 #define MOTION_PAUSE_us 125000u
 
 /* What all frames before one add up to. */
@@ -71,7 +71,7 @@ struct motion_sums {
 };
 
 /* Integral of dQ / F along one axis: Q / F as long as F stays. A grip that tightens while the load
- * grows leaves Q / F as it is, and the rubber gives way all the same. */
+ * grows leaves Q / F as it is, though the rubber gives way. */
 struct motion_load {
   uint32_t ratio_q12; /* modulo 2^32 */
   int32_t newest_q24, remainder; /* Q as last entered; what is below the integral's last bit */
@@ -95,7 +95,7 @@ struct motion {
 /* Of all zeros: nothing yet. */
 struct motion_history {
   struct motion_sums now;                               /* with the newest frame in them */
-  struct motion_moments moments;                        /* likewise */
+  struct motion_moments moments;                        /* the same */
   struct motion_load load_x, load_y;
   struct motion_ring brief, slow;                       /* every frame; MOTION_SLOW_STEP_us apart */
   struct motion_moments moments_before[MOTION_ENTRIES]; /* beside brief.sums */
@@ -103,7 +103,7 @@ struct motion_history {
   uint64_t judged_us, slid_us; /* when last; when a slide showed last */
   struct motion motion;        /* as judged */
   int32_t scale_q8;            /* of the load, newest frame */
-  int32_t crosstalk_q8;        /* likewise: see motion.c */
+  int32_t crosstalk_q8;        /* the same: see motion.c */
   uint32_t used;               /* bitmap: sensors in use */
   bool velocity_valid, moving, sliding;
   bool stepped;     /* slow has an entry that is not judged yet */

@@ -1,24 +1,23 @@
-/* Slip distance: how far the contact has moved away from where it was (De Clercq et al., RA-L 2022,
- * eq. (7)):
+/* Slip distance: how far the contact has moved away from its recent mean (De Clercq et al., RA-L
+ * 2022, eq. (7)):
  *   eps_i = | r_i - (r_{i-1} + ... + r_{i-n}) / n |
- * slip if eps_i exceeds a threshold.
+ * It is a slip if eps_i exceeds a threshold.
  *
- * The paper counts n steps; here the history is a span of time, so that the metric means the same
- * at any frame rate: n is the number of frames that lie at most the window back, half a frame
- * interval granted for jitter. At 20 Hz a window of 100 ms gives n = 2, the paper's setting. At
- * constant speed v the distance is v (window + one interval) / 2.
+ * The paper counts n steps. Here the history is a span of time, so that the metric means the same
+ * at any frame rate. n is the number of frames within the window, with half a frame interval
+ * granted for jitter. At 20 Hz a window of 100 ms gives n = 2, the paper's setting. At constant
+ * speed v the distance is v (window + one interval) / 2.
  *
- * Positions are kept in integers of 1/16 um, so the running sums are exact however long they run,
- * and the cost does not grow with n.
- */
+ * Positions are integers of 1/16 um, so the running sums are exact however long they run. The cost
+ * does not grow with n. */
 #ifndef CONTACT_SLIP_H
 #define CONTACT_SLIP_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* 160 frames span 100 ms at 1600 frames a second. A window that holds more is shortened to them;
- * one shorter than the frame interval compares with the frame before. */
+/* 160 frames span 100 ms at 1600 frames a second. A window that holds more is shortened to them. A
+ * window shorter than the frame interval compares with the frame before. */
 #define SLIP_CAPACITY 160
 
 struct slip_history {
@@ -29,7 +28,7 @@ struct slip_history {
   int32_t x_sum, y_sum;   /* over the ring */
 };
 
-/* Forgets the past: call when contact is lost or the location is not to be trusted. */
+/* Forgets the past: call when contact is lost or the location cannot be trusted. */
 void slip_reset(struct slip_history *history);
 
 /* Enters a location and gives its distance from the mean of those in the window before it.

@@ -1,7 +1,6 @@
-/* What the fingertip says about the tangential load of one frame: the estimate of fit_tangential.h
- * in the scales of the pad, and, where the pad's edges spoil the zero, only what changed since the
- * first touch.
- */
+/* What the fingertip reports about the tangential load of one frame: the estimate of
+ * fit_tangential.h in the scales of the pad. Where the pad's edges spoil the zero, it reports only
+ * the change since the first touch. */
 #ifndef CONTACT_TANGENTIAL_H
 #define CONTACT_TANGENTIAL_H
 
@@ -26,8 +25,8 @@ struct tangential_settings {
 void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile,
                     const struct contact_settings *settings, bool calibrated);
 
-/* The load of a contact that begins counts as none: the mean of Q / F over so long after its first
- * estimate. Long enough for the mean of a hundred frames, short before any lift. */
+/* The load at the beginning of a contact counts as zero: the mean of Q / F over so long after its
+ * first estimate. Long enough for the mean of a hundred frames, short before any lift. */
 #define TANGENTIAL_ZERO_us 100000u
 
 /* Of the contact under way. */
@@ -58,12 +57,12 @@ struct tangential_course {
   struct fit_tangential_state state;
 };
 
-/* A frame so long after the last has time for more than one step, and what moves has gone further:
- * until the estimate is told, at most FIT_TANGENTIAL_FRAMES. */
+/* A frame so long after the last has time for more than one step, and the contact has moved
+ * further. So it takes up to FIT_TANGENTIAL_FRAMES steps until an estimate can be reported. */
 #define TANGENTIAL_SLOW_us 4500u
 
-/* Of one frame, whose fit is of the same readings. Where it is not worthwhile, nothing, and the
- * course begins anew. */
+/* The estimate of one frame, whose fit is of the same readings. Where the fit is not worthwhile
+ * there is none, and the course starts again. */
 void tangential_estimate(struct tangential_course *course, const struct fit_array *array,
                          struct fit_pad *pad, const int32_t *pressure_Pa_q10,
                          const struct fit_settings *settings, const struct fit_result *fit,
@@ -72,9 +71,9 @@ void tangential_estimate(struct tangential_course *course, const struct fit_arra
 /* Forgets the contact. */
 void tangential_reset(struct tangential_history *history);
 
-/* After contact_judge or contact_update, of the same input: adds TANGENTIAL_VALID and
- * TANGENTIAL_FROM_TOUCH to result->flags, and with the former has UNCERTAIN speak of the corrected
- * location and ELONGATED of the estimate, which a load does not make look long. Where the pad's
+/* Call after contact_judge or contact_update, with the same input. Adds TANGENTIAL_VALID and
+ * TANGENTIAL_FROM_TOUCH to result->flags. With the former, UNCERTAIN is about the corrected
+ * location, and ELONGATED about the estimate, which a load does not make look long. Where the pad's
  * edges hide so much of a load that it shows less than TANGENTIAL_GAIN_MIN of itself, there is
  * none. */
 #define TANGENTIAL_GAIN_MIN 0.25f

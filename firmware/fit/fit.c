@@ -9,7 +9,7 @@
 
 #define POSITION_MAX_mm 10000.0f
 #define MARGIN 1.5f   /* pitches around the array in which a contact may lie */
-#define ON_NODE 1e-4f /* pitches; and off a line, likewise */
+#define ON_NODE 1e-4f /* pitches; the same off a line */
 /* Of a location, with a pitch of 2^23 to 2^24: the array and its margin beside it fit into 2^30. */
 #define ORIGIN_MAX 1073741824.0f
 

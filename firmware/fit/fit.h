@@ -1,17 +1,16 @@
 /* Fits p0 exp(-((x - xc)^2 + (y - yc)^2) / (2 sigma^2)) to the readings of the array by least
- * squares: location, peak, width, force, and how far they can be trusted.
+ * squares. The result is location, peak, width and force, and how far they can be trusted.
  *
  * De Clercq et al., RA-L 2022, eq. (2) to (4). Gauss-Newton with a fixed number of iterations from
- * a first guess made anew for every frame: no state between frames, no early exit, so the cost
- * depends on the array alone. Any positions, any subset of sensors.
+ * a new first guess for every frame. There is no state between frames and no early exit, so the
+ * cost depends on the array alone. Any positions, any subset of sensors.
  *
- * Fixed point does it for a rectangular grid, with every sensor or without some, float32 for
- * everything else. Both use integer exponentials and logarithms, so that a Cortex-M0+, a Cortex-M4F
- * and a PC compute the same bits. Main context only: they divide with port/divide.h.
+ * A rectangular grid, with every sensor or without some, takes fixed point. Everything else takes
+ * float32. Both use integer exponentials and logarithms, so that a Cortex-M0+, a Cortex-M4F and a
+ * PC compute the same bits. Main context only: they divide with port/divide.h.
  *
- * Sensors on a line do not tell where a contact lies across it: the location is held to the line,
- * and p0 and force are those of a contact whose centre is there.
- */
+ * Sensors on a line do not show where a contact lies across it. The fit holds the location to the
+ * line. p0 and force are those of a contact whose centre is there. */
 #ifndef FIT_FIT_H
 #define FIT_FIT_H
 
@@ -40,11 +39,11 @@ struct fit_settings {
   uint8_t n_largest;    /* fit the n largest readings only, of equal ones those of lower number, as
                            the paper does; 0: all, which is more accurate. Fewer than a fit
                            needs give none. Takes the general kernel. */
-  /* Weak prior on sigma, for rubber so stiff that the array can hardly tell it: one more row
+  /* Weak prior on sigma, for rubber so stiff that the array can hardly determine it: one more row
    * FIT_PRIOR_WEIGHT largest (sigma - prior_sigma) / prior_width. None unless the width is
    * 0.001..10000 mm and sigma 0..10000 mm. */
   float prior_sigma_mm, prior_width_mm;
-  /* What an honest standard deviation needs besides the noise. */
+  /* Other errors that the standard deviations contain. */
   uint16_t gain_sd_q16[FT_MAX_SENSORS]; /* [sensor] relative sd of its gain; 0: exact */
   uint16_t
       model_sd_q16; /* sd of the model's own error, as a share of the largest reading; 0: none */
@@ -54,7 +53,7 @@ struct fit_settings {
 #define FIT_PRIOR_WEIGHT 0.01f
 #define FIT_MAX_ITERATIONS 20
 
-/* Widths that the fit can tell, in pitches: narrower ones fall between the sensors, wider ones
+/* Widths that the fit can estimate, in pitches: narrower ones fall between the sensors, wider ones
  * have no location on the array. */
 #define FIT_SIGMA_MIN 0.158f
 #define FIT_SIGMA_MAX 5.0f
@@ -62,7 +61,7 @@ struct fit_settings {
 /* The same gain_sd for every sensor, and model_sd: shares of 1, below 1. */
 void fit_set_errors(struct fit_settings *settings, float gain_sd, float model_sd);
 
-/* Every member is finite, whatever the input. Where FIT_VALID is off all are zero but the flags. */
+/* Every member is finite, whatever the input. Where FIT_VALID is off all but the flags are zero. */
 struct fit_result {
   float x_mm, y_mm;
   float p0_Pa;
@@ -85,15 +84,15 @@ struct fit_result {
 enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
                               const float *y_mm, float pitch_mm);
 
-/* The same for an image that knows its layout: only the rectangle of FIT_GRID_COLUMNS x
- * FIT_GRID_ROWS nodes that the fixed-point kernels are compiled for is taken, another is
- * FT_ERR_ARGUMENT too; goes with fit_gaussian_grid. */
+/* The same for an image that knows its layout. It takes only the rectangle of FIT_GRID_COLUMNS x
+ * FIT_GRID_ROWS nodes that the fixed-point kernels are compiled for. Any other is FT_ERR_ARGUMENT
+ * too. Use it with fit_gaussian_grid. */
 enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count, const float *x_mm,
                                    const float *y_mm, float pitch_mm);
 
-/* A sensor whose reading does not belong to the others' (fit_limits.h) is left out of a second fit;
- * SENSOR_MASKED and `used` tell. Only residuals that are rough, and more than noise, gains and
- * model explain, make it look for one.
+/* A second fit leaves out a sensor whose reading does not belong to the others' (fit_limits.h).
+ * SENSOR_MASKED and `used` show it. The fit looks for one only where residuals are rough, and more
+ * than noise, gains and model explain.
  *
  * Widths and ELONGATED need every sensor of the grid.
  *
@@ -103,7 +102,7 @@ enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count
 void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                   const struct fit_settings *settings, struct fit_result *result);
 
-/* The same without the general kernel, which it keeps out of an image: n_largest must be 0. */
+/* The same without the general kernel, so that an image does not hold it: n_largest must be 0. */
 void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
                        uint32_t usable, const struct fit_settings *settings,
                        struct fit_result *result);
@@ -118,8 +117,8 @@ float fit_quadrature(float a, float b, float c, float d);
  * build, 2 to 6 each way) with every sensor usable; sigma from 0.216 pitch.
  * fit_grid_masked: the same with any sensors missing, at twice the cost.
  * fit_general: float32, any positions, any sensors missing; leaves an outlier out by itself.
- * The former two return whether they have settled with residuals that are rough and more than
- * noise, gains and model explain, as with an outlier. */
+ * The former two return whether they have settled with residuals that look like an outlier: rough,
+ * and more than noise, gains and model explain. */
 bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
               const struct fit_settings *settings, struct fit_result *result);
 bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,

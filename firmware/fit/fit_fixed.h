@@ -19,7 +19,7 @@ FIXED_INLINE int32_t fixed_mul_q32(int32_t a, int32_t b) {
   return a_high * b_high + ((a_high * b_low + a_low * b_high) >> 16);
 }
 
-/* a * b / 2^30, likewise, error below 3 units. |result| < 2^31. */
+/* a * b / 2^30 in the same way, error below 3 units. |result| < 2^31. */
 FIXED_INLINE int32_t fixed_mul_q30(int32_t a, int32_t b) {
   int32_t a_high = a >> 16, a_low = (uint16_t)a;
   int32_t b_high = b >> 16, b_low = (uint16_t)b;

@@ -81,21 +81,22 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
 #define JUMP_Q26 (ONE_Q26 / 2)
 /* The Gaussian's place jitters more than the estimate's in the corners. */
 #define MOVED_NOISES 4
-/* Of all readings, the largest of which is 0.5 to 1: less is no contact's. */
+/* Sum of the readings, scaled so that the largest is 0.5 to 1. A smaller sum cannot come from a
+ * contact. */
 #define SUM_LEAST_Q20 (1 << 18)
-/* After so many frames in a row that are not told it begins anew: one more than a contact at rest
+/* After so many frames in a row without a report it starts again: one more than a contact at rest
  * takes. Where another contact has come and gone it is found again within ten frames, without this
  * after hundreds. */
 #define UNTOLD_MOST 6
 
-#define PIVOT_LEAST (1 << 18) /* 2^-12: what is told less is left where it is */
+#define PIVOT_LEAST (1 << 18) /* 2^-12: an unknown with less stays where it is */
 
 /* What of the readings is kept from step to step. */
 struct problem {
   const struct fit_pad *pad;
   struct readings readings;
   int32_t base_q22;  /* standard deviation of a reading of weight 1, of the unit of readings */
-  int32_t noise_q22; /* likewise */
+  int32_t noise_q22; /* the same */
   /* Rows of the priors of t and of e1 and e2, whose scale is the amplitude at the beginning. */
   int32_t spread_prior_q26, long_prior_q26;
 };

@@ -1,26 +1,25 @@
-/* Tangential load from the normal pressures: what pulls along the rubber presses the base ahead of
- * it and relieves it behind, broader than a shift of the contact does.
+/* Tangential load from the normal pressures. A pull along the rubber presses the base ahead of it
+ * and relieves it behind. This pattern is broader than that of a shifted contact.
  *
  * Eight unknowns: normal force, location, the contact's own spread and its two elongations, and the
- * tangential force along x and y. One Gauss-Newton step a frame: of a contact's first frame from
- * the Gaussian fit, then from where the last frame's ended, moved as the Gaussian has moved and in
- * proportion to its force. The optimum is that of each frame's own readings: what lingers of
- * earlier ones is the square of a step, and what a long step leads to is not told. It begins anew
- * where it says nothing for some frames, so that it cannot stay where another beginning finds
- * better.
+ * tangential force along x and y. Each frame takes one Gauss-Newton step. In a contact's first
+ * frame it starts from the Gaussian fit. Later it starts where the previous frame ended, moved as
+ * the Gaussian has moved and scaled by its force. The optimum is that of each frame's own readings.
+ * Earlier frames enter by the square of a step only, and an estimate after a long step is not
+ * reported. After some frames without a report the estimate starts from the Gaussian again, so that
+ * it cannot stay where another start finds better.
  *
- * The pad's profile (common/pad_profile.h) says how its rubber spreads what presses and what
- * pulls. Elongation is in the model because a long contact looks like a pulled one to a fit that
- * knows no other explanation: a prior holds it near round, and what is clearly long, or leaves a
- * residual that the model does not explain, is not told. Readings count by their noise, gain error
- * and model error. Fixed point, the same bits on every machine, any sensors missing. NUMERICS.md
- * has the derivation, the conditioning and the limits.
+ * The pad's profile (common/pad_profile.h) says how its rubber spreads a press and a pull.
+ * Elongation is in the model because a long contact looks like a pulled one to a fit without it. A
+ * prior holds it near round. An estimate that is clearly long, or leaves a residual that the model
+ * does not explain, is not reported. Readings count by their noise, gain error and model error.
+ * Fixed point, the same bits on every machine, any sensors missing. NUMERICS.md has the derivation,
+ * the conditioning and the limits.
  *
  * At most 40 000 cycles a frame on a Cortex-M0+ (test emulated.fit_cycles).
  *
- * On infinite and exactly known layers; what a pad that ends makes of it is taken back after it
- * (pad_profile.h, pad_edges). No measurement on a real pad confirms it yet.
- */
+ * The layers are infinite and exactly known. The effect of a pad that ends is subtracted afterwards
+ * (pad_profile.h, pad_edges). No measurement on a real pad confirms it yet. */
 #ifndef FIT_FIT_TANGENTIAL_H
 #define FIT_FIT_TANGENTIAL_H
 
@@ -53,24 +52,24 @@ struct fit_tangential_room {
 
 /* A profile as the estimate needs it, and its working memory. Fill with fit_pad_init. */
 struct fit_pad {
-  /* Length that all below is in: about twice the widest normal term's sd. */
+  /* Unit of length of all below: about twice the widest normal term's sd. */
   int32_t unit_q25_mm, per_unit_q30;
   int32_t origin_x_q24_mm, origin_y_q24_mm;   /* the grid's origin node */
   int32_t variance_q26[FIT_TANGENTIAL_TERMS]; /* of each term without the contact's own */
   int32_t strength_q26[FIT_TANGENTIAL_TERMS]; /* share, or moment */
   int32_t pitch_q26, pitch_square_q26;
-  int32_t spread_q26, spread_sd_q26; /* what to expect of the contact's own variance */
+  int32_t spread_q26, spread_sd_q26; /* prior of the contact's own variance */
   int32_t long_sd_q26;               /* and of its elongations */
   struct scaled force_unit;          /* N, normal force of amplitude 1 at 1 Pa: all of its bits */
   struct scaled per_force;           /* amplitude of the Gaussian's 1 N at 1 Pa */
-  int32_t chi_square_max, long_most_q15; /* beyond which nothing is told */
+  int32_t chi_square_max, long_most_q15; /* no report beyond these */
   struct scaled thin; /* by which variances grow on a pad thinner than the pitch */
   struct fit_tangential_room room;
 };
 
 /* FT_ERR_ARGUMENT: the array is no full rectangle of the grid that this build knows, or the profile
- * is not valid (pad_profile.h) or is no layer's: narrower, stronger or wider terms than layers of
- * PAD_THICKNESS_MIN_mm to PAD_THICKNESS_MAX_mm have on this pitch. */
+ * is not valid (pad_profile.h), or it is no layer's: its terms are narrower, stronger or wider than
+ * those of layers of PAD_THICKNESS_MIN_mm to PAD_THICKNESS_MAX_mm on this pitch. */
 enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array,
                             const struct pad_profile *profile);
 
@@ -81,14 +80,14 @@ struct fit_tangential_unknowns {
   int32_t pull_x_q24, pull_y_q24;
 };
 
-/* Of one contact, from frame to frame. All zeros: the next frame is its first; so it is to be made
- * when a contact has ended, and by frames without an estimate. */
+/* State of one contact, from frame to frame. All zeros: the next frame is its first. Set it to
+ * zeros when a contact has ended, and at frames without an estimate. */
 struct fit_tangential_state {
   struct fit_tangential_unknowns at; /* where the last step ended */
   int32_t fit_x_q26, fit_y_q26;      /* where the Gaussian was */
   int32_t sum_q20;                   /* of the readings, in the unit of amplitude */
   uint8_t steps;                     /* since the beginning, 2 stands for more */
-  uint8_t untold;                    /* frames in a row */
+  uint8_t untold;                    /* frames in a row without a report */
 };
 
 /* Every member is finite. Where `valid` is off all are zero. */
@@ -106,10 +105,10 @@ struct fit_tangential {
 #define FIT_TANGENTIAL_FRAMES 5
 
 /* fit: of the same readings. `valid` stays off without FIT_VALID, with fewer than
- * FIT_TANGENTIAL_SENSORS in use, at the first step and after a long one, where a parameter ends at
- * its limit, where the contact is clearly longer than wide or the readings are not those of one
- * contact on this pad (NUMERICS.md has the limits, and how they widen where the pad ends near), and
- * where q_sd_N exceeds FIT_TANGENTIAL_SD_MAX of the force. */
+ * FIT_TANGENTIAL_SENSORS in use, at the first step and after a long one, and where a parameter ends
+ * at its limit. It also stays off where the contact is clearly longer than wide, or the readings
+ * are not those of one contact on this pad (NUMERICS.md has the limits, and how they widen where
+ * the pad ends near), and where q_sd_N exceeds FIT_TANGENTIAL_SD_MAX of the force. */
 #define FIT_TANGENTIAL_SENSORS 8
 #define FIT_TANGENTIAL_SD_MAX 0.2f
 void fit_tangential_load(const struct fit_array *array, struct fit_pad *pad,

@@ -10,17 +10,17 @@
  *   }
  *
  * Two modes. `fixed` holds a set force: De Clercq et al., RA-L 2022, eq. (5) and (6). `hold` holds
- * an object of unknown weight with what its load needs: grip force = margin x tangential load /
- * friction, more at once where it slides, less slowly while it rests.
+ * an object of unknown weight by its load: grip force = margin x tangential load / friction. The
+ * grip rises at once where the object slides, and falls slowly while it rests. CONTROL.md has the
+ * reasons.
  *
- * Integers throughout, so that every machine gives the same bits; no clock, no allocation, no
- * floats. Times are the caller's, in us, on one clock for all inputs, and never go back. Forces
- * are mN, lengths um, of one fingertip: its normal force is the grip force. Values beyond what
- * there can be are taken to its ends. Main context only: it divides with port/divide.h.
+ * Integers throughout, so that every machine gives the same bits. No clock, no allocation, no
+ * floats. Times are the caller's, in us, on one clock for all inputs, and never go back. Forces are
+ * mN, lengths um, of one fingertip: its normal force is the grip force. The controller clamps
+ * values beyond their range. Main context only: it divides with port/divide.h.
  *
  * Cost on a Cortex-M0+: grip_step 3500 cycles in the median, at most 15 000 (test
- * emulated.fit_bits), 400 bytes of stack (checks.stack_grip).
- */
+ * emulated.fit_bits), 400 bytes of stack (checks.stack_grip). */
 #ifndef GRIP_GRIP_H
 #define GRIP_GRIP_H
 
@@ -32,8 +32,7 @@
 
 #define GRIP_FINGERS 2
 
-/* One frame of a fingertip: a contact packet in integers. What its VALID flag does not stand for is
- * 0. */
+/* One frame of a fingertip: a contact packet in integers. A value whose VALID flag is off is 0. */
 struct grip_touch {
   uint64_t t_us;  /* when it was measured */
   uint32_t flags; /* enum contact_flag */
@@ -84,15 +83,15 @@ enum grip_mode { GRIP_MODE_FIXED, GRIP_MODE_HOLD };
 /* Romano et al., "Human-inspired robotic grasp control with tactile sensing", IEEE Trans. Robotics
  * 27, 2011, has the course of it. */
 enum grip_state {
-  GRIP_IDLE, /* nothing is asked */
+  GRIP_IDLE, /* no request yet */
   GRIP_ACTIVATING,
   GRIP_APPROACH, /* closing until both fingertips feel the object */
   GRIP_SQUEEZE,  /* up to the first force */
-  GRIP_READY,    /* that force stands; what pulls now is counted as no load */
+  GRIP_READY,    /* that force stands; the present load counts as zero */
   GRIP_HOLDING,
   GRIP_SLIPPING, /* as HOLDING, and an object that slides is being caught */
   GRIP_STILL,    /* the width stays, because it was asked for */
-  GRIP_RELEASE,  /* opening, likewise */
+  GRIP_RELEASE,  /* opening, because it was asked for */
   GRIP_OPEN,     /* done */
   GRIP_DROPPED,  /* nothing is between the fingertips any more; the width stays */
   GRIP_MISSED,   /* closed, and nothing was there */
@@ -100,7 +99,7 @@ enum grip_state {
   GRIP_STATES,
 };
 
-/* Why it is not all well; bits. Each is on while it lasts, those of GRIP_FAULT stay. */
+/* Troubles; bits. Each is on while it lasts, those of GRIP_FAULT stay. */
 enum grip_trouble {
   GRIP_FINGER_0_STALE = 1 << 0, /* no frame for settings.stale_us */
   GRIP_FINGER_1_STALE = 1 << 1,
@@ -117,8 +116,8 @@ enum grip_trouble {
   GRIP_GRIPPER_SILENT = 1 << 11, /* no status for settings.silent_us */
   GRIP_GRIPPER_FAULT = 1 << 12,  /* its own code in the report */
   GRIP_GRIPPER_INACTIVE = 1 << 13, /* it was activated and is no longer */
-  GRIP_NO_LOAD = 1 << 14, /* mode hold: neither fingertip tells a load; the grip is not loosened */
-  GRIP_FINGER_0_UNTOLD = 1 << 15, /* frames, but none whose force is a measurement */
+  GRIP_NO_LOAD = 1 << 14, /* mode hold: no fingertip reports a load; the grip does not loosen */
+  GRIP_FINGER_0_UNTOLD = 1 << 15, /* frames, but none with a measured force */
   GRIP_FINGER_1_UNTOLD = 1 << 16,
 };
 
@@ -142,43 +141,44 @@ struct grip_settings {
   int32_t force_cap_mN;  /* never aimed above. Beyond it a fingertip's force is never added to */
   int32_t travel_cap_um; /* never closed further since the touch */
   int32_t release_um_s, release_width_um; /* opening: how fast, until where */
-  uint32_t stale_us;       /* a fingertip without a frame for so long is not believed */
-  uint32_t silent_us;      /* likewise the gripper */
-  int32_t differ_permille; /* of the larger force: fingertips that differ by more say so */
+  uint32_t stale_us;       /* a fingertip without a frame for so long is ignored */
+  uint32_t silent_us;      /* the same for the gripper */
+  int32_t differ_permille; /* of the larger force: GRIP_FINGERS_DIFFER above it */
   /* fixed */
   int32_t set_mN; /* F_des */
   struct grip_gains gains;
   uint32_t control_us; /* between two steps of eq. (6) */
   /* hold */
-  int32_t first_mN;          /* grip before anything pulls, and never less; half as much again of
-                                a contact whose load can only be guessed */
-  int32_t blind_mN;          /* grip where no load can be told, squeezed to before anything pulls */
+  int32_t first_mN;          /* grip before anything pulls, and never less; half as much again of a
+                              * contact whose load can only be guessed */
+  int32_t blind_mN;          /* grip where no load can be estimated, reached before anything pulls
+                              */
   int32_t shift_um;          /* by which a tangential load as large as the force moves a location
-                                that is not corrected for it; 0: loads are not guessed by that */
-  int32_t friction_permille; /* until a slide, or a load that does not slide, tells better */
+                              * that is not corrected for it; 0: no guesses from that */
+  int32_t friction_permille; /* until a slide, or a load that does not slide, shows better */
   int32_t margin_permille;   /* grip over load / friction, */
   int32_t slid_permille;     /* and so much of that since it has slid: it will again */
-  int32_t decay_permille_s;  /* how fast what is too much goes, share of it a second */
+  int32_t decay_permille_s;  /* decay of a grip that is too large, share of it a second */
   uint32_t rest_us;          /* no sooner after a slide */
 };
 
-/* What grip_defaults.c says, for these traits. */
+/* The defaults of grip_defaults.c for these traits. */
 void grip_default_settings(struct grip_settings *settings, const struct grip_traits *traits);
 
 struct grip_report {
   uint8_t state;    /* enum grip_state */
   uint32_t trouble; /* enum grip_trouble */
   uint8_t gripper_fault; /* its own code; that of FAULT stays, until there is another */
-  int32_t wanted_mN; /* grip force that is aimed at */
-  int32_t force_mN;  /* as told: the smaller of both fingertips' */
-  int32_t load_mN;   /* tangential load of one fingertip since READY; 0 where it cannot be told */
+  int32_t wanted_mN; /* the grip force that it aims at */
+  int32_t force_mN;  /* as reported: the smaller of both fingertips' */
+  int32_t load_mN;   /* tangential load of one fingertip since READY; 0 if unknown */
   int32_t margin_permille; /* force x friction / load, at most 100 000; 0: no load */
   int32_t friction_permille;
   int32_t width_um;
   uint32_t slides; /* so many since GRASP */
 };
 
-/* What the fields hold is for the files of this folder. */
+/* The fields are for the files of this folder only. */
 struct grip_zero {
   int32_t x, y;         /* before any load */
   int32_t x_sum, y_sum; /* while it is measured */
@@ -187,18 +187,18 @@ struct grip_zero {
 struct grip_finger {
   struct grip_touch touch; /* the newest */
   uint64_t changed_us;     /* when its values last changed */
-  uint64_t told_us;        /* of the newest frame that tells a force, */
+  uint64_t told_us;        /* of the newest frame that reports a force, */
   int32_t force_mN;        /* and that force */
   uint32_t unchanged;      /* frames whose values are those of the one before */
   struct grip_zero pull;   /* mN */
   struct grip_zero place;  /* um, of a location that is not corrected */
-  uint64_t pulled_us;      /* the newest frame that told a tangential load */
-  uint64_t still_us;       /* the newest that told no slide */
+  uint64_t pulled_us;      /* the newest frame that reported a tangential load */
+  uint64_t still_us;       /* the newest that reported no slide */
   bool is_heard, is_new, has_pulled, has_place;
   bool tells_load, guesses_load; /* itself; from how the location has moved, */
   bool shifts;                   /* by more than a load moves it */
   int32_t load_mN;
-  int32_t told_x_mN, told_y_mN;    /* the load that was told last, */
+  int32_t told_x_mN, told_y_mN;    /* the last reported load, */
   bool has_told;                   /* and none has been guessed since */
   int32_t guess_x, guess_y;        /* the load that is guessed: times settings.shift_um / 64, */
   int32_t at_x_um, at_y_um, at_mN; /* as of this location and force */
@@ -211,15 +211,15 @@ struct grip_width {
 };
 
 struct grip_hold {
-  int32_t load_mN;      /* as last told */
+  int32_t load_mN;      /* as last reported */
   int32_t slow_load_mN; /* behind it */
   int32_t rate_mN_s;    /* of the load, upwards */
-  uint64_t load_us;     /* when it was told */
+  uint64_t load_us;     /* when it was reported */
   uint64_t decayed_us;
   int32_t friction_permille;
-  int32_t share_permille;        /* largest load over force of late */
+  int32_t share_permille;        /* recent largest load over force */
   int32_t floor_mN;              /* since the last slide */
-  uint64_t slid_us;              /* the last frame that told a slide */
+  uint64_t slid_us;              /* the last frame that reported a slide */
   uint64_t raised_us;            /* the last reflex, */
   int32_t raised_share_permille; /* and load over force then */
   bool has_told, has_slid, sliding, load_is_believed;
@@ -258,8 +258,8 @@ struct grip {
   bool may_activate;
   bool is_entered;   /* the state is new */
   bool still_grasps; /* STILL with an object */
-  bool is_blind;     /* squeezed without a fingertip that could tell a load; */
-  bool is_guessing;  /* without one that told one */
+  bool is_blind;     /* squeezed without a fingertip that could estimate a load; */
+  bool is_guessing;  /* without one that reported one */
   struct grip_hold hold;
   struct grip_pid pid;
 };
@@ -268,7 +268,7 @@ struct grip {
 enum ft_status grip_init(struct grip *grip, const struct grip_settings *settings,
                          const struct grip_traits *traits);
 
-/* A frame older than the last of this finger is passed over. */
+/* Ignores a frame older than the last of this finger. */
 void grip_take_touch(struct grip *grip, unsigned finger, const struct grip_touch *touch);
 
 void grip_take_status(struct grip *grip, const struct grip_status *status);
@@ -277,7 +277,7 @@ void grip_take_status(struct grip *grip, const struct grip_status *status);
  * from every state but FAULT of the gripper itself. False: not from this state. */
 bool grip_request(struct grip *grip, enum grip_request request);
 
-/* What to do now: to be called after every input, and every 10 ms without one. */
+/* Decides what to do now. Call it after every input, and every 10 ms without one. */
 void grip_step(struct grip *grip, uint64_t now_us, struct grip_command *command,
                struct grip_report *report);
 

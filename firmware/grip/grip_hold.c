@@ -21,13 +21,14 @@
 /* All raises of a slide together ask for no more than this of what is felt: a late gripper has not
  * done yet what was asked before. */
 #define RAISED_MOST_PERMILLE 2000
-/* Q / F of what slides is its friction, however hard the grip. Of what does not, it falls as the
- * grip grows, and rubber that is squeezed moves the contact as a slide does. So none begins at less
- * than this of the largest Q / F of late, nor goes on at less than that of the last raise. */
+/* The Q / F of a sliding object is its friction, however hard the grip. The Q / F of an object that
+ * rests falls as the grip grows, and squeezed rubber moves the contact as a slide does. So no slide
+ * begins below this share of the recent largest Q / F, and none goes on below that share of the
+ * last raise's. */
 #define BEGINS_AT_PERMILLE 850
 #define LOAD_NOISE_mN 60
 #define GOES_ON_AT_PERMILLE 800
-/* What creeps is answered by so much of what is felt, and teaches nothing. */
+/* A creep raises the grip by so much of the measured force, and teaches nothing. */
 #define CREEP_PERMILLE 1080
 /* This much of the grip that ended a slide is not given up where no load tells what is needed. */
 #define FLOOR_PERMILLE 850
@@ -50,7 +51,7 @@
 /* What has just been caught swings on the rubber. */
 #define CAUGHT_us 300000u
 
-/* In which the largest Q / F of late fades. */
+/* Time constant of the recent largest Q / F. */
 #define SHARE_us 200000
 #define FRICTION_MIN_PERMILLE 150
 #define FRICTION_MAX_PERMILLE 1500
@@ -63,7 +64,7 @@ static int32_t share_of(const struct grip_view *view, int32_t more_mN) {
   return view->low_mN > 0 ? grip_scale(view->load_mN + more_mN, 1000, view->low_mN) : 0;
 }
 
-/* By when a slide is told the grip may hold again: what counts is the largest share of late. */
+/* A slide is reported late, when the grip may hold again. So the recent largest share counts. */
 static void follow_share(struct grip *grip, const struct grip_view *view, int32_t step_us) {
   struct grip_hold *hold = &grip->hold;
   hold->share_permille -= grip_scale(hold->share_permille, step_us, SHARE_us);

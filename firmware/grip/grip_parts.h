@@ -4,10 +4,10 @@
 
 #include "grip/grip.h"
 
-/* What both fingertips say, as far as they are to be believed. */
+/* The reports of both fingertips, as far as they are believed. */
 struct grip_view {
   uint32_t trouble;                  /* those of the fingertips */
-  uint8_t fingers, touches;          /* so many tell a force; feel a contact */
+  uint8_t fingers, touches;          /* so many report a force; feel a contact */
   int32_t low_mN, high_mN, mean_mN;  /* of those; 0 without any */
   uint64_t t_us;                     /* of the older of them */
   bool fresh;                        /* there has been a frame since the last step */
@@ -23,12 +23,12 @@ int32_t grip_clamp(int32_t value, int32_t low, int32_t high);
 int32_t grip_scale(int32_t value, int32_t numerator, int32_t denominator);
 
 void grip_look(struct grip *grip, struct grip_view *view);
-/* What pulls is counted as none: begins, adds the newest frames, ends. */
+/* The present load counts as zero: begins, adds the newest frames, ends. */
 void grip_zero_begin(struct grip *grip);
 void grip_zero_end(struct grip *grip);
 bool grip_zero_has(const struct grip *grip, uint32_t frames);
 
-/* After a slide: what a location has moved by since its zero is no load any more. */
+/* After a slide: the motion of a location since its zero is no load any more. */
 void grip_guess_anew(struct grip *grip);
 
 /* The width that the gripper had then. */

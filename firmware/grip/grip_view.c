@@ -6,9 +6,9 @@
 #define FROZEN_us 50000u
 #define FROZEN_FRAMES 5u
 
-/* A hundred kilograms: more no fingertip means. */
+/* A hundred kilograms: no fingertip measures more. */
 #define FORCE_MAX_mN 1000000
-/* A metre, likewise. */
+/* A metre, at most. */
 #define PLACE_MAX_um 1000000
 #define SIGMA_MAX_um 100000
 #define ZERO_FRAMES_MAX 2000u

@@ -1,8 +1,9 @@
 /* The sensors of the MS58xx family: one section each. The build chooses one (FINGERTIP_SENSOR in
  * cmake/options.cmake), so that an image holds nothing of the others.
  *
- * All of them have the same commands, the same PROM (W0: CRC-4 in its top four bits, then the
- * product type; W1..W6: C1..C6) and the same temperature, 2000 + dT * C6 / 2^23. They differ in:
+ * All of them have the same commands and the same PROM (W0: CRC-4 in its top four bits, then the
+ * product type; W1..W6: C1..C6). All have the same temperature, 2000 + dT * C6 / 2^23. They differ
+ * in:
  *
  *   MAX_PRESSURE_Pa   readings above are flagged: beyond the range, or near it
  *   STEP_Pa           no press moves one sensor alone by so much (scan/readings.h)
@@ -11,16 +12,15 @@
  *   Q10_TIMES, _SHIFT pressure in 1/1024 Pa = (D1 * SENS / 2^21 - OFF) * Q10_TIMES / 2^Q10_SHIFT
  *   VERY_COLD_cC      edge of the third branch of the second order
  *   WARM, COLD, VERY_COLD   second order in each branch: a TERM(T, 12, DT, 35) subtracts
- *                     12 * dT^2 / 2^35 from TEMP; OFF and SENS likewise; of the first-order TEMP,
- *                     X is TEMP - 2000 and Y is TEMP - VERY_COLD_cC
+ *                     12 * dT^2 / 2^35 from TEMP; the others from OFF and SENS. X is TEMP - 2000 of
+ *                     the first-order TEMP, and Y is TEMP - VERY_COLD_cC
  *   NOISE_MAX_Pa      the largest noise of the table
  *   OSR_TABLE         ratio, its bits in the convert commands, longest conversion in us, noise of a
  *                     pressure in Pa rms
  *
- * Another sensor is another section here, its name in cmake/options.cmake, its data in
- * boards/native/sim_ms5840.c and in the emulator's board/ms5840.mjs. One with the CRC elsewhere
- * (MS5611: in an eighth word) also needs ms58xx_prom_crc4 to know it.
- */
+ * To add a sensor, add a section here, its name in cmake/options.cmake, and its data in
+ * boards/native/sim_ms5840.c and in the emulator's board/ms5840.mjs. If its CRC is elsewhere
+ * (MS5611: in an eighth word), change ms58xx_prom_crc4 too. */
 #ifndef MS58XX_SENSORS_H
 #define MS58XX_SENSORS_H
 
@@ -28,10 +28,11 @@
 #define MS58XX_MS5837_30BA 2
 
 #if MS58XX_SENSOR == MS58XX_MS5840
-/* MS5840-02BA data sheet: conversion times, noise, compensation. First order checked with the
- * worked example of the MS5837-02BA data sheet, page 7. The extended range ends at 2 bar, beyond
- * which a reading is biased low. Readings count as beyond it from 1 % before: a part whose readings
- * end right there must not pass by its noise. 8 kPa: a code with bit 18 wrong is 11 kPa off. */
+/* MS5840-02BA data sheet: conversion times, noise, compensation. The first order was checked with
+ * the worked example of the MS5837-02BA data sheet, page 7. The extended range ends at 2 bar.
+ * Beyond it a reading is biased low. Readings count as beyond it from 1 % before, so that a part
+ * whose readings end right there does not pass by its noise. 8 kPa: a code with bit 18 wrong is 11
+ * kPa off. */
 #define MS58XX_MAX_PRESSURE_Pa 198000
 #define MS58XX_STEP_Pa 8192
 #define MS58XX_SENS_T1 16

@@ -1,15 +1,14 @@
-/* To admit sensors: all are reset, and their calibration PROMs are read and judged. Event context;
+/* Admits sensors: all are reset, and their calibration PROMs are read and judged. Event context;
  * scan.c moves the bytes.
  *
  * A sensor is admitted when it has acknowledged the reset and its whole PROM. PROMs are read up to
- * three times, until all of them are good; one whose CRC still differs is used and reported, a
- * blank one is not.
+ * three times, until all of them are good. One whose CRC still differs is used and reported. A
+ * blank one is not used.
  *
- * That costs 5 ms of frames with a data line for each sensor and some 25 ms behind multiplexers, so
- * it takes at most 5 % of the time; while it leaves a sensor out, or is for a suspect, the next one
- * comes after 1, 2, 4 and then 8 s. A sensor that does not answer at all costs no admission. One
- * whose CRC differs costs BRING_UP_RECHECKS: the bus may have been disturbed.
- */
+ * That costs 5 ms of frames with a data line for each sensor, and some 25 ms behind multiplexers.
+ * So it takes at most 5 % of the time. While it leaves a sensor out, or is for a suspect, the next
+ * one comes after 1, 2, 4 and then 8 s. A sensor that does not answer at all costs no admission.
+ * One whose CRC differs costs BRING_UP_RECHECKS, since the bus may have been disturbed. */
 #ifndef SCAN_BRING_UP_H
 #define SCAN_BRING_UP_H
 
@@ -30,9 +29,9 @@ struct bring_up {
   uint32_t answered;  /* bitmap: every word of this pass */
   uint32_t good;      /* bitmap: in some pass of this one */
   uint32_t differs;   /* bitmap: the CRC does, in the last pass */
-  uint32_t blank;     /* bitmap: likewise */
+  uint32_t blank;     /* bitmap: the PROM is blank, in the last pass */
   uint8_t rechecks;   /* admissions in a row after which a CRC differed */
-  uint32_t changed;   /* bitmap: another PROM than before; who has told others of it clears it */
+  uint32_t changed;   /* bitmap: another PROM than before; cleared once reported */
   uint64_t began_us;
   uint64_t interval_us;
   uint64_t next_us;                        /* the next one not before */
@@ -50,11 +49,12 @@ void bring_up_init(struct bring_up *bring_up, uint8_t sensor_count);
 /* After it a reset of all sensors, then word 0 of their PROMs. */
 void bring_up_begin(struct bring_up *bring_up, bool of_suspects, uint64_t now_us);
 
-/* Who acknowledged the reset: bitmap. One that did not may still be what it was to be cured of. */
+/* Bitmap of the sensors that acknowledged the reset. One that did not may still be in its bad
+ * state. */
 void bring_up_take_reset(struct bring_up *bring_up, uint32_t acknowledged);
 
-/* What came of the last word. True: read .word next. False: that was the last; see bring_up_end.
- * The last word of a pass costs some 20 000 Cortex-M0+ cycles. */
+/* Takes the result of the last word. True: read .word next. False: that was the last; see
+ * bring_up_end. The last word of a pass costs some 20 000 Cortex-M0+ cycles. */
 bool bring_up_take_word(struct bring_up *bring_up, const struct array_bus_result *result);
 
 /* Whether a PROM should be read again though all sensors are admitted. */

@@ -1,30 +1,30 @@
 /* From codes to readings, and which of them to believe. Main context; no bus, and no time but the
  * frame's.
  *
- * Temperatures. One that differs by more than READINGS_TEMPERATURE_STEP_MAX_cC from the sensor's
- * last, while the others' have not stepped along, is no change of temperature. It is used when the
- * next one agrees with it and both are near the other sensors'. Until then the last one stays in
- * use, and the sensor is doubtful: each degree is worth some 240 Pa. A zero taken shortly before is
- * taken anew then, for the last one may have been wrong (condition.h). Two that agree with each
- * other and are near nobody's come from a sensor that has lost its state as its supply failed: it
- * becomes a suspect. The first temperature of a sensor must be near the others', too; one that says
- * the same twice before a reset and after each of two is believed, and the sensor stays doubtful.
- * (After one it may have lost its state again: supplies that dip once do so twice.)
+ * Temperatures. A temperature may differ by more than READINGS_TEMPERATURE_STEP_MAX_cC from the
+ * sensor's last, while the others' have not stepped along. That is no change of temperature. It is
+ * used when the next one agrees with it and both are near the other sensors'. Until then the last
+ * one stays in use, and the sensor is doubtful: each degree is worth some 240 Pa. A zero measured
+ * shortly before is then measured again, for the last temperature may have been wrong
+ * (condition.h). Two temperatures that agree with each other, but are near no other sensor's, come
+ * from a sensor that has lost its state as its supply failed. It becomes a suspect. The first
+ * temperature of a sensor must be near the others', too. If the sensor reports the same twice
+ * before a reset and after each of two, it is believed and stays doubtful. (After one reset it may
+ * have lost its state again: supplies that dip once do so twice.)
  *
- * Pressures. One below zero is left out, and a second in a row makes the sensor a suspect. A large
- * step of one sensor alone is left out as well, for rubber lets its neighbours feel any press; when
- * the next reading is back, that was all, and when it stays, still alone, the sensor is a suspect.
- * Steps beside which others move count at once, and so does every step while a sensor is missing,
- * since it may be the one that feels it.
+ * Pressures. A pressure below zero is left out. A second in a row makes the sensor a suspect. A
+ * large step of one sensor alone is left out as well, since rubber lets its neighbours feel any
+ * press. If the next reading is back, that was all. If it stays, still alone, the sensor is a
+ * suspect. Steps beside which others move count at once. So does every step while a sensor is
+ * missing, since that one may feel it.
  *
  * A suspect is left out until it has been reset and its PROM read again. Then its temperature and
- * its pressure count as its first; its zero still holds, since it is the same sensor, but for one
- * taken shortly before (condition.h). The same goes for one whose pressure has stepped alone, as
- * when it was reset for another's sake, or that has when it returns.
+ * its pressure count as its first. Its zero still holds, since it is the same sensor, unless it was
+ * measured shortly before (condition.h). The same holds for a sensor whose pressure has stepped
+ * alone, for example when it was reset for another's sake, or when it returns.
  *
- * A sensor whose PROM has a wrong CRC is used, for a genuine part is known that has one, and is
- * doubtful. It must have read like the others at two temperatures in a row before.
- */
+ * A sensor whose PROM has a wrong CRC is used, since one genuine part is known to have one. It is
+ * doubtful. It must first have read like the others at two temperatures in a row. */
 #ifndef SCAN_READINGS_H
 #define SCAN_READINGS_H
 

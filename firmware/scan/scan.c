@@ -8,7 +8,7 @@
 #define TEMPERATURE_INTERVAL_MAX_us (SCAN_TEMPERATURE_INTERVAL_MAX_ms * 1000u)
 /* After a temperature reading that a sensor missed, or one in doubt. */
 #define TEMPERATURE_RETRY_us 100000u
-/* How soon a temperature that nobody has taken is looked at again. */
+/* How soon a temperature that was not taken is looked at again. */
 #define SLOT_POLL_us 1000u
 /* How soon a new rate is noticed while waiting for the next frame of the old one. */
 #define RATE_POLL_us 10000u

@@ -1,33 +1,33 @@
-/* Drives the array: brings the sensors up, decides when to convert, wait and read, notices what
- * fails, and hands over frames.
+/* Drives the array: brings the sensors up, decides when to convert, wait and read, notices
+ * failures, and hands over frames.
  *
- * Two contexts meet here. scan_step runs in the event context (interrupt) and only moves bytes: the
- * next conversion begins as soon as the last one was read, before anybody looks at its codes, so
- * sensors, bus and processor work at the same time and the frame clock depends on none of the
+ * Two contexts meet here. scan_step runs in the event context (interrupt) and only moves bytes. The
+ * next conversion begins as soon as the last one was read, before its codes are looked at. So
+ * sensors, bus and processor work at the same time, and the frame clock depends on none of the
  * others. scan_take runs in the main context and does the arithmetic. Between them stands one slot
- * that holds the newest frame: a processor that falls behind takes the frames it can, and those
- * that were overwritten are counted.
+ * that holds the newest frame. A processor that falls behind takes the frames it can. Overwritten
+ * frames are counted.
  *
  * Only admitted sensors yield valid readings: see bring_up.h. Where a sensor does not acknowledge,
- * that reading is missing, and the next one too where nobody can tell whether it heard its command:
- * else it might be an old one. The third in a row costs the admission. So does a reading of 0 (no
- * conversion had finished) from a sensor that had acknowledged the command; where a branch
- * acknowledges as one, the reading after a 0 is void too, and two in a row cost the admission. A
- * reading whose last sixteen bits are ones, far from the sensor's last one, comes from a sensor
- * that lost count of the clocks and stopped sending: see scan.c. What else makes a reading or a
- * sensor implausible is in readings.h.
+ * that reading is missing. The next one is missing too unless it is certain that the sensor heard
+ * its command, since it might be an old one. The third in a row costs the admission. So does a
+ * reading of 0 (no conversion had finished) from a sensor that had acknowledged the command. Where
+ * a branch acknowledges as one, the reading after a 0 is void too, and two in a row cost the
+ * admission. A reading whose last sixteen bits are ones, far from the sensor's last one, comes from
+ * a sensor that lost count of the clocks and stopped sending: see scan.c. readings.h has the other
+ * reasons that make a reading or a sensor implausible.
  *
- * So scattered NACKs of single reads leave 0.4, 1.0, 2.8, 10 and 28 % of 186 frames a second
- * incomplete at 0.3, 1, 3, 10 and 30 of them a second on a simulated bus that acknowledges commands
- * as one, half as much where each sensor answers for itself, and none where the bus asks again.
+ * Scattered NACKs of single reads leave 0.4, 1.0, 2.8, 10 and 28 % of 186 frames a second
+ * incomplete at 0.3, 1, 3, 10 and 30 of them a second. That is on a simulated bus that acknowledges
+ * commands as one. It is half as much where each sensor answers for itself, and none where the bus
+ * asks again.
  *
- * Temperatures are converted twice a second, less often while they stand still. Where the
- * requested rate leaves a pause, that is done in the pause before a frame; else it takes the place
- * of a frame, at most one in 600 at OSR 256 and one in 25 at OSR 8192. That frame goes out at its
- * time too, with the pressures of the one before and marked as held. All ones are no reading. What
- * a sensor told before it was away is forgotten when it is admitted again; its next temperature is
- * the next conversion.
- */
+ * Temperatures are converted twice a second, less often while they stand still. Where the requested
+ * rate leaves a pause, that is done in the pause before a frame. Otherwise it takes the place of a
+ * frame, at most one in 600 at OSR 256 and one in 25 at OSR 8192. That frame goes out at its time
+ * too, with the pressures of the one before, and marked as held. All ones are no reading. A
+ * sensor's last temperature is forgotten when it is admitted again. Its next temperature is the
+ * next conversion. */
 #ifndef SCAN_SCAN_H
 #define SCAN_SCAN_H
 
@@ -48,9 +48,9 @@ struct scan_settings {
   bool presses_are_shared; /* sensors stand so close that no press moves one alone */
 };
 
-/* While the temperature changes; while it stands still the interval doubles up to the maximum. At
- * 0.1 degC/s, as in a hand, the pressures stay within some 24 Pa, and within 48 Pa until such a
- * change is noticed; it is much the same for all sensors. */
+/* The interval while the temperature changes. While it stands still the interval doubles up to the
+ * maximum. At 0.1 degC/s, as in a hand, the pressures stay within some 24 Pa, and within 48 Pa
+ * until such a change is noticed. The error is much the same for all sensors. */
 #define SCAN_TEMPERATURE_INTERVAL_ms 500u
 #define SCAN_TEMPERATURE_INTERVAL_MAX_ms 2000u
 
@@ -94,7 +94,7 @@ struct scan_slot {
   struct scan_conversion conversion;
   uint32_t good;                 /* bitmap: the code is a measurement */
   uint32_t prom_changed;         /* bitmap: another sensor than before. Of a temperature */
-  uint32_t returned;             /* bitmap: admitted anew, perhaps after long. Of a temperature */
+  uint32_t returned;             /* bitmap: admitted again, perhaps after long. Of a temperature */
   uint32_t code[FT_MAX_SENSORS]; /* [sensor] 24-bit */
 };
 
@@ -129,7 +129,7 @@ struct scan {
   uint64_t wait_until_us;
   uint64_t next_frame_us;
   uint64_t next_temperature_us;
-  bool wants_admission; /* somebody is there who is not admitted, or a suspect */
+  bool wants_admission; /* a sensor is there that is not admitted, or a suspect */
   uint64_t recovery_delay_us;
   uint32_t frame_number;
   uint32_t void_next;    /* bitmap: the next reading does not count */
@@ -175,8 +175,8 @@ static inline bool scan_has_news(const struct scan *scan) {
  * nothing new (a temperature may have been used up). */
 bool scan_take(struct scan *scan, struct frame *frame);
 
-/* Main context. There is reason to look at the temperatures: the next conversion of them comes
- * within 0.1 s. One that tells that a sensor has lost its state asks for another by itself. */
+/* Main context. There is reason to look at the temperatures: their next conversion comes within 0.1
+ * s. If it shows that a sensor has lost its state, it asks for another by itself. */
 void scan_ask_temperature(struct scan *scan);
 
 /* Main context. Resting: what is under way ends, then there is no conversion and nothing on the bus

@@ -1,10 +1,10 @@
 /* What a fingertip keeps without power: a calibration, the pad's profile, and settings to start
- * with. Power lost at any moment leaves what was there before or what was being written, never a
- * mixture and never nothing.
+ * with. If the power fails at any moment, the old or the new content remains, never a mixture and
+ * never nothing.
  *
- * The flash is a log. A sector holds eight slots; a record, which is all that is kept, goes into
- * the next free one, and into the first of the other sector once that is erased. The newest
- * undamaged record counts. In a slot, in this order, each by a write of its own:
+ * The flash is a log. A sector holds eight slots. A record is all that is kept. It goes into the
+ * next free slot, or into the first of the other sector once that is erased. The newest undamaged
+ * record counts. A slot holds, in this order, each by a write of its own:
  *
  *     0    u32  begun: 0. From now on the slot is used, whatever it holds
  *     4    u32  magic 0x74665346
@@ -17,22 +17,20 @@
  *     504  u32  sealed: 0. The record was read back and is right
  *     508  u32  final: 0. The seal is whole
  *
- * Payload of version 1: u8 parts (bit 0 calibration, bit 1 settings), u8 n sensors, u16 0; the
- * calibration as in the command that brings it, without its n: 14 + 8 n bytes, zeros where there
- * is none; the settings: u32 rate mHz, u16 OSR, u16 slip window ms, f32 slip threshold mm, f32 f32
- * prior mm, f32 location limit mm. Version 2 has a part more, bit 2 the pad's profile, behind the
- * settings: as in the command that brings it, 177 bytes. Later versions keep the slot as it is and
- * change the payload.
+ * Payload of version 1: u8 parts (bit 0 calibration, bit 1 settings), u8 n sensors, u16 0. Then the
+ * calibration as in its command, without its n: 14 + 8 n bytes, zeros where there is none. Then the
+ * settings: u32 rate mHz, u16 OSR, u16 slip window ms, f32 slip threshold mm, f32 f32 prior mm, f32
+ * location limit mm. Version 2 has one more part, bit 2, the pad's profile, behind the settings: as
+ * in its command, 177 bytes. Later versions keep the slot as it is and change the payload.
  *
- * Bits whose change was cut short may read as they like, differently each time. So a record that is
- * not final may be there today and gone tomorrow, or the other way round: where start-up meets one,
- * it writes what it has decided for once more, behind it. A mark is all zeros, so that one cut
- * short is made good by writing it again; before `begun` is whole no other bit of the slot is
- * touched, and a slot without it is free. A sector is erased only while the other one holds a
- * record whose seal is whole, or if all its own records were cut short.
+ * Bits whose change was cut short may read differently each time. So a record that is not final may
+ * be there today and gone tomorrow, or the other way round. When start-up meets one, it writes the
+ * content that it chose once more, behind it. A mark is all zeros, so writing it again repairs one
+ * that was cut short. Before `begun` is whole no other bit of the slot is touched, and a slot
+ * without it is free. A sector is erased only while the other one holds a record whose seal is
+ * whole, or if all its own records were cut short.
  *
- * Main context only. Nothing waits: store_poll() takes a write one short step further.
- */
+ * Main context only. Nothing waits: store_poll() takes a write one short step further. */
 #ifndef STORE_STORE_H
 #define STORE_STORE_H
 
@@ -109,16 +107,15 @@ struct store {
  * another array is damage. */
 void store_init(struct store *store, uint8_t sensor_count);
 
-/* Begin to keep this instead of what is there; NULL: keep none. The value may go as soon as they
- * return. FT_OK: nothing had to be written. FT_PENDING. FT_ERR_BUSY: a write is under way. */
+/* Begin to keep this instead of the present content; NULL: keep none. The value may go as soon as
+ * they return. FT_OK: nothing had to be written. FT_PENDING. FT_ERR_BUSY: a write is under way. */
 enum ft_status store_put_calibration(struct store *store, const struct calibration *calibration);
 enum ft_status store_put_settings(struct store *store, const struct store_settings *settings);
 enum ft_status store_put_profile(struct store *store, const struct pad_profile *profile);
 
-/* To be called at least each millisecond or so while a write is under way; a call takes less than
- * 10 us on the RP2040. FT_PENDING: a write is under way. FT_OK: none is, and .content is what was
- * put. After FT_PENDING, once: FT_ERR_TIMEOUT, FT_ERR_CRC: the flash has failed; .content is as
- * before. */
+/* Call at least each millisecond or so while a write is under way. A call takes less than 10 us on
+ * the RP2040. FT_PENDING: a write is under way. FT_OK: none is, and .content is what was put. After
+ * FT_PENDING, once: FT_ERR_TIMEOUT, FT_ERR_CRC: the flash has failed, and .content is as before. */
 enum ft_status store_poll(struct store *store, uint64_t now_us);
 
 static inline bool store_is_writing(const struct store *store) {

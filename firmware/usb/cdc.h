@@ -35,7 +35,7 @@ bool cdc_is_open(void);
 bool cdc_is_suspended(void);
 
 /* Changes when there is something to read, the port was closed, the bus falls asleep or wakes up,
- * or the loader was asked for: a main loop that has seen to all that need not look before. */
+ * or the host asked for the loader. A main loop that has handled all that need not look before. */
 uint32_t cdc_news(void);
 
 /* Counts the times the port was closed (DTR dropped, suspended, bus reset, unplugged): streams end

@@ -1,4 +1,4 @@
-/* The two halves of the USB device: device.c is what every device owes (USB 2.0 chapter 9: the
+/* The two halves of the USB device: device.c has what every device must do (USB 2.0 chapter 9: the
  * control endpoint, addresses, configurations, halted endpoints), cdc.c is the function.
  *
  * All of it runs in the interrupt context of the controller, but for device_start().
@@ -37,10 +37,10 @@ bool device_endpoint_is_halted(uint8_t endpoint);
 enum control_answer cdc_on_request(const struct usb_setup *setup, uint8_t *data, size_t *length);
 void cdc_on_request_data(const struct usb_setup *setup, const uint8_t *data);
 
-/* cdc.c: the endpoints have been opened anew and are empty, or (false) are closed. */
+/* cdc.c: the endpoints have been opened again and are empty, or (false) are closed. */
 void cdc_on_configured(bool configured);
 
-/* cdc.c: the data endpoints have been opened anew, without a new configuration. */
+/* cdc.c: the data endpoints have been opened again, without a new configuration. */
 void cdc_on_interface_set(void);
 
 /* cdc.c: before the endpoint is halted or its halt is cleared, and after that. */

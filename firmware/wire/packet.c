@@ -16,7 +16,7 @@ enum kind {
   U64,
   F32,
   PAIRS,     /* of 32 bits: for each sensor an element of each of two arrays behind one another */
-  F32_PAIRS, /* likewise */
+  F32_PAIRS, /* the same */
   F32_TWOS,  /* for each sensor two behind one another */
   WHEN,      /* no field: the next run is there if bit `count` of this word is set */
 };
