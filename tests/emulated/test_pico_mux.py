@@ -28,7 +28,7 @@ UNWARNED_mm = 1.2
 
 
 def encoded(*command):
-    done = subprocess.run([TOOLS.fingertip, "encode", *command], capture_output=True, text=True, check=True)
+    done = subprocess.run([TOOLS.command_frame, *command], capture_output=True, text=True, check=True)
     return done.stdout.strip()
 
 

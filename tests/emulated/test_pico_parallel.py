@@ -27,7 +27,7 @@ SENSOR_DOUBTFUL = 1 << 18
 
 
 def encoded(*command):
-    done = subprocess.run([TOOLS.fingertip, "encode", *command], capture_output=True, text=True, check=True)
+    done = subprocess.run([TOOLS.command_frame, *command], capture_output=True, text=True, check=True)
     return done.stdout.strip()
 
 

@@ -25,7 +25,7 @@ UNKNOWN_COMMAND, OUT_OF_RANGE = "1", "2"
 
 
 def encoded(*command):
-    return subprocess.run([TOOLS.fingertip, "encode", *command], capture_output=True, text=True, check=True).stdout.strip()
+    return subprocess.run([TOOLS.command_frame, *command], capture_output=True, text=True, check=True).stdout.strip()
 
 
 class Run:

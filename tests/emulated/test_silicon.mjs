@@ -14,14 +14,14 @@ import { setupPacket } from '../../host_tools/simulation/emulator/usb/host.mjs';
 import { HEADER } from './harness/bench.mjs';
 import { ImageBench } from './harness/image_bench.mjs';
 
-const [images, fingertip, step_us = '4000'] = process.argv.slice(2);
+const [images, command_frame, step_us = '4000'] = process.argv.slice(2);
 const BOARDS = ['pico_mux', 'pico_parallel'];
 // Flags of a contact (contact_flags.h)
 const [CONTACT, TARED] = [1 << 0, 1 << 5];
 
 class Bench extends ImageBench {
   constructor(name, options) {
-    super(images, fingertip, name, options);
+    super(images, command_frame, name, options);
   }
 }
 

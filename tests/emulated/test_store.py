@@ -44,7 +44,7 @@ class Store(unittest.TestCase):
         """One run of the image with its flash; its last info packet, and its acknowledgements of keep."""
         script, capture, table = (self.folder / name for name in ("host.txt", "capture.ftr", "capture.csv"))
         faulty = self.folder / "faults.json"
-        lines = ["0.45 dtr 1", *(f"{t} {run(self.tool, 'encode', *words.split()).strip()}" for t, words in commands)]
+        lines = ["0.45 dtr 1", *(f"{t} {run(f'{OPTIONS.build}/tests/support/command_frame', *words.split()).strip()}" for t, words in commands)]
         script.write_text("\n".join(lines) + "\n")
         faulty.write_text(json.dumps(list(faults)))
         run(OPTIONS.node, ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_mux", "--image", f"{OPTIONS.boards}/pico_mux/fingertip-pico_mux.bin",

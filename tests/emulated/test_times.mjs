@@ -8,13 +8,13 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { ImageBench } from './harness/image_bench.mjs';
 
-const [images, fingertip] = process.argv.slice(2);
+const [images, command_frame] = process.argv.slice(2);
 const DAY_us = 86400e6;
 const CROSSINGS = [['2^32 us', 2 ** 32], ['2^32 ms', 2 ** 32 * 1000], ['60 days', 60 * DAY_us]];
 const BEFORE_us = 400e3;
 
 function bench(name, crossing_us) {
-  const made = new ImageBench(images, fingertip, name, { uptime_us: crossing_us - BEFORE_us });
+  const made = new ImageBench(images, command_frame, name, { uptime_us: crossing_us - BEFORE_us });
   made.stream();
   return made;
 }

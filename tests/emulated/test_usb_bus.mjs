@@ -13,8 +13,8 @@ import { Machine } from '../../host_tools/simulation/emulator/machine.mjs';
 import { setupPacket } from '../../host_tools/simulation/emulator/usb/host.mjs';
 import { steady } from './harness/bench.mjs';
 
-const [image, fingertip] = process.argv.slice(2);
-const streams = Buffer.from(execFileSync(fingertip, ['encode', 'stream', 'contact,raw'], { encoding: 'utf8' }).trim(), 'hex');
+const [image, fingertip, command_frame] = process.argv.slice(2);
+const streams = Buffer.from(execFileSync(command_frame, ['stream', 'contact,raw'], { encoding: 'utf8' }).trim(), 'hex');
 const LINE_CODING_115200 = '00c20100000008';
 
 const received = [];

@@ -9,6 +9,7 @@ import os
 import pathlib
 import signal
 import socket
+import subprocess
 import sys
 import tempfile
 import threading
@@ -82,7 +83,7 @@ class Emulated(unittest.TestCase):
                 port.connect(str(self.folder / "port"))
                 port.setblocking(False)
                 world.sleep(0.5)
-                port.send(bytes.fromhex(world.tool("encode", "stream", "contact,raw")))
+                port.send(bytes.fromhex(subprocess.check_output([f"{OPTIONS.support}/command_frame", "stream", "contact,raw"], text=True)))
                 world.sleep(3)  # which is more than fits
                 for _ in range(100):
                     with contextlib.suppress(BlockingIOError):

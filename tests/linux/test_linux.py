@@ -488,7 +488,7 @@ class Linux(unittest.TestCase):
         self.wait_for_port()
 
     def encoded(self, *command):
-        done = subprocess.run([self.fingertip, "encode", *command], capture_output=True, text=True, check=True)
+        done = subprocess.run([f"{TOOLS.build}/tests/support/command_frame", *command], capture_output=True, text=True, check=True)
         return re.sub("(..)", r"\\x\1", done.stdout.strip())
 
     def test_15_echo_of_a_terminal_not_yet_raw(self):

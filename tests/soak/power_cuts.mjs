@@ -8,7 +8,7 @@ import { InputError } from '../../host_tools/simulation/emulator/errors.mjs';
 import { parseFaults } from '../../host_tools/simulation/emulator/faults.mjs';
 import { Machine } from '../../host_tools/simulation/emulator/machine.mjs';
 
-const USAGE = `usage: power_cuts.mjs --image FILE.bin --board NAME --soak PROGRAM --fingertip TOOL [--step-us N] [--kinds LIST]
+const USAGE = `usage: power_cuts.mjs --image FILE.bin --board NAME --soak PROGRAM --command-frame PROGRAM [--step-us N] [--kinds LIST]
 
 Cuts the power every N microseconds (100), every two milliseconds while what was written is read back, of
   write   an update of what is kept, into a free slot
@@ -43,7 +43,7 @@ class Cutter {
     this.options = options;
     this.Board = findBoard(options.board);
     this.image = readFileSync(options.image);
-    this.encoded = (...command) => Buffer.from(execFileSync(options.fingertip, ['encode', ...command], { encoding: 'utf8' }).trim(), 'hex');
+    this.encoded = (...command) => Buffer.from(execFileSync(options['command-frame'], command, { encoding: 'utf8' }).trim(), 'hex');
     this.ask = Buffer.concat([this.encoded('stream', 'raw'), this.encoded('info')]);
     this.again = Buffer.concat([this.encoded('info'), this.encoded('health')]);
     this.update = Object.fromEntries([OLD, NEW].map((osr) => [osr, Buffer.concat([this.encoded('osr', `${osr}`), this.encoded('rate', '20'), this.encoded('keep')])]));
@@ -219,7 +219,7 @@ function main(argv) {
     ({ values } = parseArgs({
       args: argv, strict: true,
       options: {
-        image: { type: 'string' }, board: { type: 'string' }, soak: { type: 'string' }, fingertip: { type: 'string' },
+        image: { type: 'string' }, board: { type: 'string' }, soak: { type: 'string' }, 'command-frame': { type: 'string' },
         'step-us': { type: 'string', default: '100' }, kinds: { type: 'string', default: KINDS.join(',') }, help: { type: 'boolean' },
       },
     }));
@@ -227,7 +227,7 @@ function main(argv) {
     throw new InputError(`${error.message.split('\n')[0]}; see --help`);
   }
   if (values.help) return void process.stdout.write(`${USAGE}\n`);
-  for (const name of ['image', 'board', 'soak', 'fingertip']) if (!values[name]) throw new InputError(`--${name} is missing; see --help`);
+  for (const name of ['image', 'board', 'soak', 'command-frame']) if (!values[name]) throw new InputError(`--${name} is missing; see --help`);
   const step_us = Number(values['step-us']);
   if (!(step_us >= 1 && step_us <= 1e6)) throw new InputError(`--step-us "${values['step-us']}" is not a number from 1 to 1000000`);
   const kinds = values.kinds.split(',');

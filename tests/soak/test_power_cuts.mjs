@@ -1,7 +1,7 @@
 /**
  * Power cuts in short, and that a value that is wrong, one that does not stay and a start that fails are found.
  *
- * usage: test_power_cuts.mjs IMAGE.bin SOAK FINGERTIP
+ * usage: test_power_cuts.mjs IMAGE.bin SOAK COMMAND_FRAME
  */
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
@@ -11,10 +11,10 @@ import { join } from 'node:path';
 import { test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 
-const [image, soak, fingertip] = process.argv.slice(2);
+const [image, soak, command_frame] = process.argv.slice(2);
 const PROGRAM = fileURLToPath(new URL('power_cuts.mjs', import.meta.url));
 const cuts = (program, kinds, step_us) =>
-  JSON.parse(execFileSync('node', [PROGRAM, '--image', image, '--board', 'pico_mux', '--soak', program, '--fingertip', fingertip, '--kinds', kinds, '--step-us', `${step_us}`], { encoding: 'utf8' }));
+  JSON.parse(execFileSync('node', [PROGRAM, '--image', image, '--board', 'pico_mux', '--soak', program, '--command-frame', command_frame, '--kinds', kinds, '--step-us', `${step_us}`], { encoding: 'utf8' }));
 
 test('whatever is cut it starts again and holds the old or the new', (t) => {
   const found = cuts(soak, 'write,erase,mend,reset', 9700);

@@ -1,24 +1,27 @@
+// command_frame: prints the frame of a command as hexadecimal digits, for tests that write to a
+// fingertip's line themselves.
+//
+// usage: command_frame [--sequence N] COMMAND [ARGS]
+//
+// COMMAND: stream none|contact,raw,health; tare; tare-force; rate HZ|max; osr N; slip THRESHOLD_MM
+// WINDOW_MS; prior SIGMA[:WIDTH]|none; limit MM; keep; forget; erase (the calibration); pad
+// THICKNESS_MM OVERHANG_MM; pad-from-touch, with the same; erase-pad; info; health; crash; loader
 #include "libfingertip/command.hpp"
+#include "libfingertip/error.hpp"
 #include "libfingertip/names.hpp"
 #include "libfingertip/text.hpp"
 #include "library/pad/profile.hpp"
-#include "tool/cli/commands/commands.hpp"
-#include "tool/cli/usage.hpp"
 
 #include <cstdio>
+#include <exception>
 #include <functional>
 #include <map>
-#include <memory>
-
-namespace fingertip {
+#include <string>
+#include <vector>
 
 namespace {
 
-struct EncodeOptions {
-  std::vector<std::string> words;
-  unsigned sequence = 0;
-  std::uint64_t time_us = 0;
-};
+using namespace fingertip;
 
 wire_packet pad_of(const std::string &thickness, const std::string &overhang, bool from_touch) {
   auto thickness_mm = to_double(thickness), overhang_mm = to_double(overhang);
@@ -73,45 +76,36 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
         [&] { return pad_of(word(1), word(2), true); }}},
       {"erase-pad", {0, "erase-pad", command_erase_pad}},
   };
-  auto form = forms.find(words[0]);
+  const auto form = forms.find(words.empty() ? "" : words[0]);
   if (form == forms.end()) {
-    throw Error(
-        "command \"" + words[0] +
-        "\" is unknown; give stream, tare, tare-force, rate, osr, slip, prior, limit, "
-        "keep, forget, erase, pad, pad-from-touch, erase-pad, info, health, crash or loader");
+    throw Error("such a command is unknown; the source lists them");
   }
   if (words.size() != 1 + form->second.arguments) {
-    throw Error("wrong arguments; give: fingertip encode " + form->second.usage);
+    throw Error("wrong arguments; give: " + form->second.usage);
   }
   return form->second.make();
 }
 
-int encode(const EncodeOptions &options) {
-  wire_packet packet = typed([&] { return packet_from_words(options.words); });
-  packet.sequence = static_cast<std::uint16_t>(options.sequence);
-  packet.t_us = options.time_us;
-  std::printf("%s\n", hex(frame_bytes(packet)).c_str());
-  return 0;
-}
-
 } // namespace
 
-void add_encode(CommandLine &line) {
-  auto options = std::make_shared<EncodeOptions>();
-  CLI::App *command = line.add("encode", "Print the frame of a command as hexadecimal digits",
-                               [options] { return encode(*options); });
-  command
-      ->add_option("command", options->words,
-                   "stream none|contact,raw,health; tare; rate HZ|max; osr N; slip THRESHOLD_MM "
-                   "WINDOW_MS; prior SIGMA[:WIDTH]|none; limit MM; keep; forget; erase (the "
-                   "calibration); pad THICKNESS_MM OVERHANG_MM, pad-from-touch likewise; "
-                   "erase-pad; info; health; crash; loader")
-      ->required()
-      ->type_name("COMMAND [ARGS]");
-  command->add_option("--sequence", options->sequence, "Sequence number; default 0")
-      ->check(CLI::Range(0, 65535))
-      ->type_name("N");
-  command->add_option("--time", options->time_us, "Time of the header; default 0")->type_name("US");
+int main(int argc, char **argv) {
+  try {
+    std::vector<std::string> words(argv + 1, argv + argc);
+    std::uint64_t sequence = 0;
+    if (words.size() > 1 && words[0] == "--sequence") {
+      const auto number = to_u64(words[1]);
+      if (!number || *number > 65535) {
+        throw Error("--sequence needs a number from 0 to 65535");
+      }
+      sequence = *number;
+      words.erase(words.begin(), words.begin() + 2);
+    }
+    wire_packet packet = packet_from_words(words);
+    packet.sequence = static_cast<std::uint16_t>(sequence);
+    std::printf("%s\n", hex(frame_bytes(packet)).c_str());
+    return 0;
+  } catch (const std::exception &error) {
+    std::fprintf(stderr, "command_frame: %s\n", error.what());
+    return 1;
+  }
 }
-
-} // namespace fingertip

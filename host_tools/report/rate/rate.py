@@ -123,7 +123,7 @@ def main(argv):
         raise InputError(f"--seconds {options.seconds:g} is out of range; give 1 to 600")
     tools, out, steps = Tools(options.build, options.boards), output_folder(options), Steps()
     few = {"scenes": ("raw", "slip"), "boards": BOARDS[:1], "osrs": QUICK_OSRS} if options.quick else {}
-    rows = scenes.measure(tools.fingertip, tools.boards / "scenes", steps, **few)
+    rows = scenes.measure(tools.command_frame, tools.boards / "scenes", steps, **few)
     runs, resting = measure(tools, options, steps)
     found = judge(figures(runs, resting, rows), GOALS)
     found |= {"by_osr": by_osr(runs), "by_sensors": by_sensors(tools, runs), "scenes": rows}

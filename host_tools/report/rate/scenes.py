@@ -66,10 +66,10 @@ def guard_sizes(place):
     return found
 
 
-def cycles(fingertip, place, scene, board, osrs, folder):
+def cycles(command_frame, place, scene, board, osrs, folder):
     """Cycles of a frame by stage without and in contact, at the first OSR, and frames a second at each."""
     def encoded(*command):
-        return run(fingertip, "encode", *command).strip()
+        return run(command_frame, *command).strip()
 
     script, windows, t_s = [(0.45, "dtr 1"), (0.46, encoded("stream", STREAM[scene]))], [("rest", *REST_s)], CONTACT_FROM_s
     for osr in osrs:
@@ -93,11 +93,11 @@ def cycles(fingertip, place, scene, board, osrs, folder):
     }
 
 
-def measure(fingertip, scenes_folder, steps, scenes=SCENES, boards=BOARDS, osrs=tuple(CONVERSION_us)):
+def measure(command_frame, scenes_folder, steps, scenes=SCENES, boards=BOARDS, osrs=tuple(CONVERSION_us)):
     """Rows of the table."""
     def one(scene, board, folder):
         place = build(scene, board, scenes_folder)
-        return {"scene": scene, "board": board, **sizes(place, board), **cycles(fingertip, place, scene, board, osrs, folder)}
+        return {"scene": scene, "board": board, **sizes(place, board), **cycles(command_frame, place, scene, board, osrs, folder)}
 
     with tempfile.TemporaryDirectory() as folder:
         jobs = {(scene, board): (f"scene {scene} on {board}", lambda s=scene, b=board: one(s, b, folder)) for board in boards for scene in scenes}
@@ -133,11 +133,11 @@ def main(argv):
     parser.add_argument("--scenes", required=True, metavar="DIR", help="where to build the scenes")
     parser.add_argument("-o", "--output", required=True, metavar="DIR")
     options = parser.parse_args(argv)
-    fingertip, out = pathlib.Path(options.build) / "host_tools/tool/cli/fingertip", pathlib.Path(options.output)
-    if not fingertip.is_file():
-        raise InputError(f"{fingertip}: is not there; build it: cmake --preset host && cmake --build --preset host")
+    command_frame, out = pathlib.Path(options.build) / "tests/support/command_frame", pathlib.Path(options.output)
+    if not command_frame.is_file():
+        raise InputError(f"{command_frame}: is not there; build it: cmake --preset host && cmake --build --preset host")
     out.mkdir(parents=True, exist_ok=True)
-    rows = measure(fingertip, options.scenes, Steps())
+    rows = measure(command_frame, options.scenes, Steps())
     write_json(out / "scenes.json", rows)
     write_text(out / "scenes.md", "\n".join(["# Scenes", "", *text(rows)]) + "\n")
     print(f"report: {out / 'scenes.json'}, {out / 'scenes.md'}")

@@ -25,8 +25,8 @@ def power_cuts(build, steps):
 
     def one(board, kind):
         image = build.parent / f"{board}/fingertip-{board}.bin"
-        return json.loads(run("node", SOAK / "power_cuts.mjs", "--image", image, "--board", board, "--soak", program, "--fingertip",
-                              build / "host_tools/tool/cli/fingertip", "--step-us", STEP_us, "--kinds", kind))[kind]
+        return json.loads(run("node", SOAK / "power_cuts.mjs", "--image", image, "--board", board, "--soak", program, "--command-frame",
+                              build / "tests/support/command_frame", "--step-us", STEP_us, "--kinds", kind))[kind]
 
     found = steps.run_all({(board, kind): (f"power cuts of {board}: {kind}", lambda b=board, k=kind: one(b, k)) for board in BOARDS for kind in CUTS},
                           os.cpu_count() or 1)

@@ -28,8 +28,9 @@ MARGIN = 1.05
 class Tools:
     def __init__(self, build, boards):
         self.fingertip = pathlib.Path(build) / "host_tools/tool/cli/fingertip"
+        self.command_frame = pathlib.Path(build) / "tests/support/command_frame"
         self.boards = pathlib.Path(boards)
-        for path in (self.fingertip, *(self.image(board) for board in BOARDS)):
+        for path in (self.fingertip, self.command_frame, *(self.image(board) for board in BOARDS)):
             if not path.is_file():
                 raise InputError(f"{path}: is not there; build it: cmake --preset host && cmake --build --preset host")
 
@@ -37,7 +38,7 @@ class Tools:
         return self.boards / board / f"fingertip-{board}.{suffix}"
 
     def encoded(self, *command):
-        return run(self.fingertip, "encode", *command).strip()
+        return run(self.command_frame, *command).strip()
 
 
 def scenario(folder, name, seconds, stem=None):

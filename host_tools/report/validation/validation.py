@@ -134,7 +134,8 @@ class Workshop:
     def __init__(self, options, out):
         tools = pathlib.Path(options.build) / "host_tools"
         self.twin, self.player, self.fingertip = tools / "simulation/twin/twin", tools / "simulation/player/fingertip_player", tools / "tool/cli/fingertip"
-        for tool in (self.twin, self.player, self.fingertip):
+        self.command_frame = pathlib.Path(options.build) / "tests/support/command_frame"
+        for tool in (self.twin, self.player, self.fingertip, self.command_frame):
             if not tool.exists():
                 raise InputError(f"{tool} is not there; build it: cmake --build --preset host")
         self.image, self.seed, self.scale = pathlib.Path(options.image), options.seed, options.scale
@@ -207,7 +208,7 @@ class Workshop:
         scenario, script, capture = self.work / "emulated.csv", self.work / "emulated.txt", self.work / "emulated.bin"
         run(self.twin, "scenario", "taps", "--indenter", "sphere6", "--layer", 12, "--effects", ALL, "--seconds", seconds, "--seed",
             self.seed, "--cache", self.tables, "-o", scenario, "--overwrite")
-        commands = [run(self.fingertip, "encode", *words).strip() for words in (("stream", "contact,raw"), ("info",), ("tare",))]
+        commands = [run(self.command_frame, *words).strip() for words in (("stream", "contact,raw"), ("info",), ("tare",))]
         script.write_text("0.7 dtr 1\n" + "".join(f"{0.72 + 0.01 * i:.2f} {word}\n" for i, word in enumerate(commands)))
         run("node", ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_mux", "--image", self.image, "--scenario", scenario,
             "--host-script", script, "--capture", capture, "--fast-enumeration")

@@ -19,7 +19,7 @@ def measure(build, steps):
     with tempfile.TemporaryDirectory() as folder:
         commands = pathlib.Path(folder) / "commands"
         words = (("osr", "256"), ("rate", "max"), ("stream", "contact"))
-        commands.write_bytes(b"".join(bytes.fromhex(run(build / "host_tools/tool/cli/fingertip", "encode", *command)) for command in words))
+        commands.write_bytes(b"".join(bytes.fromhex(run(build / "tests/support/command_frame", *command)) for command in words))
         told = json.loads(run("node", COST, web / "simulated.wasm", web / "objects.bin", commands, SECONDS))
     steps.say(f"simulated fingertip: {told['cpu_percent']:.1f} % of a core at {told['frames_per_s']:.0f} frames/s")
     return {**found, **{f"simulated_{name}": value for name, value in told.items()}}

@@ -11,11 +11,11 @@ import { steady } from './bench.mjs';
 
 const commands = new Map();
 
-/** images: the folder with those of all boards; fingertip: the tool. */
+/** images: the folder with those of all boards; command_frame: the program of tests/support. */
 export class ImageBench {
-  constructor(images, fingertip, name, { faults = [], ...options } = {}) {
+  constructor(images, command_frame, name, { faults = [], ...options } = {}) {
     const Board = findBoard(name);
-    this.fingertip = fingertip;
+    this.command_frame = command_frame;
     this.elf = join(images, name, `fingertip-${name}.elf`);
     this.received = [];
     this.bytes = 0;
@@ -34,7 +34,7 @@ export class ImageBench {
   /** The bytes of a command. */
   encoded(...command) {
     const words = command.join(' ');
-    if (!commands.has(words)) commands.set(words, Buffer.from(execFileSync(this.fingertip, ['encode', ...command], { encoding: 'utf8' }).trim(), 'hex'));
+    if (!commands.has(words)) commands.set(words, Buffer.from(execFileSync(this.command_frame, command, { encoding: 'utf8' }).trim(), 'hex'));
     return commands.get(words);
   }
 

@@ -29,8 +29,7 @@ class Usage(CliTest):
         self.assertRegex(self.run_cli("--version")[0], r"^fingertip \d+\.\d+\.\d+\n$")
         commands = re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
         self.assertEqual(sorted(commands), sorted(
-            ["list", "info", "doctor", "monitor", "record", "replay", "convert", "grasp", "gripper", "tare", "calibrate", "pad", "set", "serve", "web", "flash", "rule", "loader",
-             "encode"]))
+            ["list", "info", "doctor", "monitor", "record", "replay", "convert", "grasp", "gripper", "tare", "calibrate", "pad", "set", "serve", "web", "flash", "rule", "loader"]))
         for command in commands:
             self.assertIn(f"Usage: fingertip {command}", self.run_cli(command, "--help")[0])
 
@@ -55,7 +54,6 @@ class Usage(CliTest):
         self.assertEqual(self.error("info", "--port", "a", "--port", "b", status=2),
                          "fingertip: --port is given twice; give it once; see fingertip info --help\n")
         self.assertEqual(self.error("record", status=2), "fingertip: FILE.csv|FILE.mcap|- is missing; see fingertip record --help\n")
-        self.assertEqual(self.error("encode", status=2), "fingertip: COMMAND [ARGS] is missing; see fingertip encode --help\n")
 
     def test_help_fits_into_80_columns(self):
         pages = {(): self.run_cli("--help")[0]}
@@ -93,21 +91,6 @@ class Usage(CliTest):
                                  ("slip_threshold=0", "0.01 to 50 mm"), ("slip_window=1001", "5 to 1000 ms"),
                                  ("colour=red", "rate=HZ|max"), ("rate", "0.1 to 2000 Hz")]:
             self.assertIn(allowed, self.error("set", "--port", self.port, setting, status=2))
-
-    def test_encode(self):
-        # COBS of version, type, sequence, time, body and CRC, worked out by zlib.crc32 and hand
-        self.assertEqual(self.run_cli("encode", "tare")[0], "03058101010101010101010101051ed639e900\n")
-        timed = self.run_cli("encode", "--sequence", "258", "--time", "1", "osr", "8192")[0].strip()
-        self.assertTrue(timed.startswith("0605830201"), timed)
-        self.assertIn("slip THRESHOLD_MM WINDOW_MS", self.error("encode", "slip", "0.75", status=2))
-        self.assertIn("0.1 to 2000", self.error("encode", "rate", "3000", status=2))
-        self.assertIn("unknown", self.error("encode", "bogus", status=2))
-        self.assertEqual(self.run_cli("encode", "erase-pad")[0], "03058e01010101010101010105e6afe1c600\n")
-        from_zero, from_touch = (self.run_cli("encode", command, "12", "9")[0] for command in ("pad", "pad-from-touch"))
-        self.assertIn("4041" + "012b" + "1041", from_zero)  # 12 and 9 mm; COBS has a code for each zero
-        self.assertNotEqual(from_zero, from_touch)
-        self.assertIn("5 to 20 mm", self.error("encode", "pad", "3", "9", status=2))
-        self.assertIn("must be numbers", self.error("encode", "pad", "thick", "9", status=2))
 
 
 class Several(CliTest):

@@ -165,7 +165,7 @@ class Player(unittest.TestCase):
         if not OPTIONS.image:
             self.skipTest("no firmware image in this build")
         script = self.folder / "host.txt"
-        words = [must(OPTIONS.fingertip, "encode", *command.split()).strip() for command in commands]
+        words = [must(OPTIONS.command_frame, *command.split()).strip() for command in commands]
         script.write_text("0.5 dtr 1\n" + "".join(f"{0.52 + 0.01 * i:.2f} {word}\n" for i, word in enumerate(words)))
         path = self.folder / name
         must(OPTIONS.node, ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_mux", "--image", OPTIONS.image,
@@ -192,6 +192,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--player", required=True)
     parser.add_argument("--fingertip", required=True)
+    parser.add_argument("--command-frame", required=True)
     parser.add_argument("--node")
     parser.add_argument("--image")
     OPTIONS, rest = parser.parse_known_args()

@@ -58,7 +58,7 @@ class WebWasm(unittest.TestCase):
 
     def commands(self, name, *texts):
         path = self.folder / name
-        path.write_bytes(b"".join(bytes.fromhex(self.fingertip("encode", "--sequence", n, *text.split())) for n, text in enumerate(texts)))
+        path.write_bytes(b"".join(bytes.fromhex(must(self.build / "tests/support/command_frame", "--sequence", n, *text.split())) for n, text in enumerate(texts)))
         return path
 
     def recording_of(self, capture, used):

@@ -23,6 +23,5 @@ void add_loader(CommandLine &line);
 void add_gripper(CommandLine &line);
 void add_flash(CommandLine &line);
 void add_rule(CommandLine &line);
-void add_encode(CommandLine &line);
 
 } // namespace fingertip
