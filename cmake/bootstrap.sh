@@ -169,7 +169,7 @@ say "building firmware and host tools into build/"
 case $job in
   demo)
     configure host -DBUILD_TESTING=OFF
-    cmake --build --preset host --target fingertip twin fingertip_cell_program image_pico_parallel
+    cmake --build --preset host --target fingertip twin fingertip_cell_program "image_$(/usr/bin/python3 host_tools/report/shared/boards.py | head -n 1)"
     ;;
   web)
     configure host -DBUILD_TESTING=OFF -DFINGERTIP_WEB=ON
@@ -204,16 +204,15 @@ case $1 in
       exec /usr/bin/python3 host_tools/report/suite/suite.py --build build/host -o build/report
     fi
     say "the fit: error against run time"
-    /usr/bin/python3 host_tools/report/fit/fit.py --build build/host \
-      --image build/pico_mux/fit_cycles.bin -o build/report --picture host_tools/report/fit/fit_report.png
+    /usr/bin/python3 host_tools/report/fit/fit.py --build build/host --boards build -o build/report \
+      --picture host_tools/report/fit/fit_report.png
     say "rate, latency and cost, in emulated time"
     /usr/bin/python3 host_tools/report/rate/rate.py --build build/host --boards build -o build/report \
       --picture host_tools/report/rate/rate.png
     say "what a logic analyser shows"
     /usr/bin/python3 host_tools/report/bringup/traces.py --boards build -o boards
     say "the published experiments on the simulated fingertip"
-    /usr/bin/python3 host_tools/report/validation/validation.py --build build/host \
-      --image build/pico_mux/fingertip-pico_mux.bin -o build/report \
+    /usr/bin/python3 host_tools/report/validation/validation.py --build build/host --boards build -o build/report \
       --picture host_tools/report/validation/validation_force.png
     say "many programs on one fingertip"
     /usr/bin/python3 host_tools/report/tools/tools.py --build build/host -o build/report

@@ -10,6 +10,7 @@ cd "$root"
 out=build/demo
 python=/usr/bin/python3
 tool=build/host/host_tools/tool/cli/fingertip
+board=$($python host_tools/report/shared/boards.py | head -n 1) # the fastest
 seconds=14 # three slips: at 20, 50 and 100 mm/s
 rubber=000000000000B0BB
 ideal=000000000001DEA1
@@ -28,7 +29,7 @@ fail() {
 emulate() {
   name=$1 serial=$2 scenario=$3 length=$4
   shift 4
-  node host_tools/simulation/emulator/main.mjs --board pico_parallel --image build/pico_parallel/fingertip-pico_parallel.bin \
+  node host_tools/simulation/emulator/main.mjs --board "$board" --image "build/$board/fingertip-$board.bin" \
     --serial "$serial" --scenario "$scenario" --seconds "$length" --pty $out/$name.tty --wait-open "$@" > $out/$name.log 2>&1 &
 }
 

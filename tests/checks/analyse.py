@@ -36,7 +36,7 @@ import tempfile
 from check_sources import strip_comments
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-BUILDS = ("host", "pico_mux", "pico_parallel")
+BUILDS = ("host", *sorted(path.parent.name for path in ROOT.glob("boards/*/board.json")))
 TOOLS = {"clang-tidy-14": "clang-tidy-14", "cppcheck": "cppcheck", "gcc": "gcc", "arm-none-eabi-gcc": "gcc-arm-none-eabi"}
 ON_CHIP = ["--target=thumbv6m-none-eabi", "-isystem", "/usr/lib/arm-none-eabi/include"]
 SLOW = "-clang-analyzer-*"
@@ -163,7 +163,7 @@ def findings(build, files, everything):
 
 def main(argv):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build", metavar="DIR", help="with host, pico_mux and pico_parallel in it")
+    parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build", metavar="DIR", help="with host and the boards in it")
     parser.add_argument("--all", action="store_true", help="the slow ones too")
     parser.add_argument("--json", type=pathlib.Path, metavar="FILE", help="how many were found")
     parser.add_argument("files", nargs="*", metavar="FILE", help="default: all")

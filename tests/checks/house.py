@@ -27,7 +27,7 @@ import sys
 import tomllib
 
 # figure: what it shall be, and what it may be until then. The second only ever falls.
-LIMITS = {"files_per_board": (8, 29), "files_per_gripper": (5, 5), "files_per_field": (6, 7), "files_per_setting": (6, 8), "rooms": (9, 9), "circles": (0, 0),
+LIMITS = {"files_per_board": (8, 8), "files_per_gripper": (5, 5), "files_per_field": (6, 7), "files_per_setting": (6, 8), "rooms": (9, 9), "circles": (0, 0),
           "page_codec_lines": (0, 2778), "longest_file": (700, 711)}
 APART = ("firmware/fit/", "firmware/condition/", "firmware/grip/")  # from longest_file
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".S", ".py", ".mjs", ".ts", ".mts", ".sh", ".cmake", ".inc", ".css", ".toml"}

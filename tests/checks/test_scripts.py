@@ -196,6 +196,7 @@ class Demo(Folder):
                 open(sys.argv[sys.argv.index("-o") + 1], "w").write("{}")
                 """)
         self.write("host_tools/demo/errors.py", "print('errors')\n")
+        self.write("host_tools/report/shared/boards.py", "print('board')\n")
         self.write("build/host/host_tools/simulation/twin/twin", "#!/bin/sh\n").chmod(0o755)
         self.cell(self.CELL)
         self.monitor('case $1 in set) test -e "$3" ;; esac')

@@ -16,15 +16,15 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+from boards import BOARDS, DESCRIPTORS, TO_BUILD, image_of  # noqa: E402
 from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save  # noqa: E402
-from emulated import BOARDS, scenario  # noqa: E402
+from emulated import scenario  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from reporting import run  # noqa: E402
 from vcd import read_vcd  # noqa: E402
 
 SECONDS = 0.08
 SENSOR = "0x76"
-LINES = {"pico_mux": ("SCL", "SDA"), "pico_parallel": ("SCL", "SDA0", "SDA7", "SDA14")}
 # First byte of a write to a sensor (MS5840-02BA datasheet, commands)
 RESET, PROM, READ = "1e", "a", "00"
 KINDS = (("multiplexers", FAINT), ("reset", GOAL), ("calibration (PROM)", ORANGE), ("convert", INK), ("read the result", BLUE))
@@ -34,17 +34,20 @@ BYTE_TIMES = (("low", 1300), ("high", 600), ("period", 2500))
 
 class Trace:
     def __init__(self, boards, board, folder):
-        image, base = pathlib.Path(boards) / board / f"fingertip-{board}.bin", pathlib.Path(folder) / board
+        image, base = image_of(boards, board), pathlib.Path(folder) / board
         if not image.is_file():
-            raise InputError(f"{image}: is not there; build it: cmake --workflow --preset {board}")
+            raise InputError(f"{image}: is not there; {TO_BUILD}")
         run("node", ROOT / "host_tools/simulation/emulator/main.mjs", "--board", board, "--image", image, "--scenario", scenario(folder, "rest", 1, board),
             "--fast-enumeration", "--seconds", SECONDS + 0.001, "--vcd", f"{base}.vcd", "--vcd-to", SECONDS, "--bus-log", f"{base}.csv",
             "--report", f"{base}.json")
         self.board = board
+        last = DESCRIPTORS[board]["wiring"]["sensor_count"] - 1
+        data = [f"SDA{k}" for k in (0, last // 2, last)] if DESCRIPTORS[board]["bus"] == "parallel" else ["SDA"]
+        self.lines = ["SCL", *data]  # that are drawn
         self.levels = read_vcd(base.with_suffix(".vcd"))
         self.transactions = []
         with open(f"{base}.csv", newline="") as file:
-            rows = [row for row in csv.DictReader(file) if board == "pico_mux" or row["muxes"] == "SDA0"]
+            rows = [row for row in csv.DictReader(file) if data[0] in ("SDA", row["muxes"])]
         kind = None
         for row in rows:
             if row["address"] != SENSOR:
@@ -72,7 +75,7 @@ def label(row):
 
 
 def draw_lines(axes, trace, from_ns, to_ns, unit_ns, unit):
-    names = LINES[trace.board]
+    names = trace.lines
     for i, name in enumerate(reversed(names)):
         x, y, level = [from_ns], [], None
         for t_ns, value in trace.levels[name]:

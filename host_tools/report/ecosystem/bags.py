@@ -70,7 +70,7 @@ def some_packets(seed, frames):
 
     xy_mm = tuple(float(value) for k in range(15) for value in (9 * (k // 5 - 1), 9 * (k % 5 - 2)))
     calibration = wire.Calibration(1700000000, 20, 1.5, 0.01, tuple(1 + k / 100 for k in range(30)))
-    info = wire.Info((1, 2, 3), 15, 15, "abc", "pico_mux", "grasp", f"{seed:04d}ABCD", 400000, 399000, 256, 500, 3, 7, 100, 0.75, 9.0, xy_mm, 3.1, 0.5,
+    info = wire.Info((1, 2, 3), 15, 15, "abc", "board", "grasp", f"{seed:04d}ABCD", 400000, 399000, 256, 500, 3, 7, 100, 0.75, 9.0, xy_mm, 3.1, 0.5,
                      0.6, 1, calibration, None)
     yield wire.Packet(0, 1000, info)
     t_us = 2**33

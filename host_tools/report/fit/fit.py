@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Error of the fit against its run time, beside every alternative: build/report.
 
-    fit.py --build build/host --image build/pico_mux/fit_cycles.bin -o build/report
+    fit.py --build build/host --boards build -o build/report
 
 Runs fit_report (error against the reference), on_chip/bench.mjs (cycles on the emulated chip), fit_bench (time on this
 host, paired), and fit_stiff, and merges what they find:
@@ -22,6 +22,7 @@ import sys
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+from boards import TO_BUILD, fit_cycles_of  # noqa: E402
 from drawing import BLUE, FAINT, GOAL, INK, plt, save  # noqa: E402
 from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from goals import goal_table_md, judge  # noqa: E402
@@ -53,13 +54,14 @@ def measure(options, out):
     for tool in ("fit_report", "fit_bench", "fit_stiff"):
         if not (tools / tool).exists():
             raise InputError(f"{tools / tool} is not there; build it: cmake --build --preset host")
-    if not pathlib.Path(options.image).exists():
-        raise InputError(f"{options.image} is not there; build it: cmake --preset pico_mux && cmake --build --preset pico_mux")
+    image = fit_cycles_of(options.boards)
+    if not image.exists():
+        raise InputError(f"{image} is not there; {TO_BUILD}")
     common = ("--limit", options.limit, "--seed", options.seed, "--out", out, "--cache", out / "cache")
     logged("fit_error", "error against the reference (the first run solves the reference, about eight minutes on two cores)", tools / "fit_report", *common)
     jobs = out / "fit_jobs.json"
     logged("fit_jobs", "presses for the chip", tools / "fit_report", *common, "--jobs", jobs)
-    logged("fit_cycles", "cycles on the emulated chip", "node", HERE / "on_chip/bench.mjs", "--image", options.image, "--jobs", jobs,
+    logged("fit_cycles", "cycles on the emulated chip", "node", HERE / "on_chip/bench.mjs", "--image", image, "--jobs", jobs,
               "--out", out / "fit_cycles.csv", "--budget", options.budget)
     logged("fit_bench", "time on this host", tools / "fit_bench", "--limit", max(1200, options.limit // 10), "--passes", options.passes,
               "--seed", options.seed, "--out", out, "--cache", out / "cache")
@@ -314,7 +316,7 @@ def whole(text):
 
 def main(argv):
     parser = option_parser(__doc__)
-    parser.add_argument("--image", required=True, metavar="fit_cycles.bin", help="built with the board's firmware")
+    parser.add_argument("--boards", required=True, metavar="DIR", help="folder of the boards' builds")
     parser.add_argument("--limit", type=whole, default=120000, help="presses, in all (default: %(default)s)")
     parser.add_argument("--seed", type=whole, default=20221015)
     parser.add_argument("--budget", type=float, default=15.0, help="million emulated cycles for each variant (default: %(default)s)")

@@ -6,11 +6,11 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/report/rate"), str(ROOT / "host_tools/python")]
 import scenes  # noqa: E402
+from boards import PARALLEL as BOARD  # noqa: E402
 from fingertip.files import InputError  # noqa: E402
 from reporting import run  # noqa: E402
 from tables import table_md, text_of  # noqa: E402
 
-BOARD = "pico_parallel"
 CLOCKS_ppm = "25,-25"
 # Of the slip: what is called how.
 COURSE = {

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""How fast the fingertip is and what it takes, in emulated time: the release images of both boards in the emulator.
+"""How fast the fingertip is and what it takes, in emulated time: the release images of all boards in the emulator.
 
     rate.py --build build/host --boards build -o build/report
 
@@ -23,7 +23,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 import rate_report  # noqa: E402
 import scenes  # noqa: E402
-from emulated import BOARDS, CLOCK_Hz, CONVERSION_us, FROM_s, Measurement, Tools, distribution, scenario  # noqa: E402
+from boards import BOARDS, DESCRIPTORS, PARALLEL, short  # noqa: E402
+from emulated import CLOCK_Hz, CONVERSION_us, FROM_s, Measurement, Tools, distribution, scenario  # noqa: E402
 from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from goals import judge  # noqa: E402
 from reporting import Steps, finish, option_parser, output_folder, run, write_json  # noqa: E402
@@ -48,9 +49,9 @@ def measure(tools, options, steps):
             return (f"{board} at OSR {osr}, {seconds:g} s {'in contact' if path is wander else 'at rest'}",
                     lambda: Measurement(tools, folder, board, osr, path, seconds))
 
-        jobs = {(board, osr): job(board, osr, wander, options.seconds if board == BOARDS[0] and osr in QUICK_OSRS else short_s)
+        jobs = {(board, osr): job(board, osr, wander, options.seconds if board == PARALLEL and osr in QUICK_OSRS else short_s)
                 for board in BOARDS for osr in osrs}
-        jobs["rest"] = job(BOARDS[0], 256, rest, short_s)
+        jobs["rest"] = job(PARALLEL, 256, rest, short_s)
         runs = steps.run_all(jobs)
     for key, found in runs.items():
         if found.scene != "slip":
@@ -68,7 +69,7 @@ def by_osr(runs):
 
 def by_sensors(tools, runs):
     """Cycles counted on the chip for each number of sensors, and the rates and latencies at OSR 256 that follow from them."""
-    rows = json.loads(run("node", ROOT / "host_tools/report/rate/sensors/sensor_cycles.mjs", tools.boards / BOARDS[0]))
+    rows = json.loads(run("node", ROOT / "host_tools/report/rate/sensors/sensor_cycles.mjs", tools.boards / PARALLEL))
 
     def cycles(row):
         return row["take"] + row["condition"] + row["fit"]
@@ -81,8 +82,8 @@ def by_sensors(tools, runs):
             extra = cycles(row) - fifteen
             busy = (1 - measured.sleep_percent / 100) * CLOCK_Hz / measured.frames_per_s
             # A line for each sensor costs no time; behind multiplexers each sensor is read in turn.
-            bus_us = (row["sensors"] - 15) * measured.stages_us["read_us"] / 15 if board == "pico_mux" else 0
-            name = board.removeprefix("pico_")
+            bus_us = (row["sensors"] - 15) * measured.stages_us["read_us"] / 15 if DESCRIPTORS[board]["bus"] == "multiplexed" else 0
+            name = short(board)
             new[f"{name}_fps"] = min(1e6 / (1e6 / measured.frames_per_s + bus_us), CLOCK_Hz / (busy + extra))
             new[f"{name}_latency_us"] = float(np.median(measured.offered_us)) + extra / CLOCK_Hz * 1e6 + bus_us
         found.append(new)
@@ -90,12 +91,12 @@ def by_sensors(tools, runs):
 
 
 def figures(runs, resting, rows):
-    parallel = runs["pico_parallel", 256]
+    parallel = runs[PARALLEL, 256]
 
     def worst(name, scene="slip"):
         return max(row[name] for row in rows if row["scene"] == scene)
 
-    found = {f"{board.removeprefix('pico_')}_fps_osr{osr}": runs[board, osr].fitted_per_s for board in BOARDS for osr in QUICK_OSRS}
+    found = {f"{short(board)}_fps_osr{osr}": runs[board, osr].fitted_per_s for board in BOARDS for osr in QUICK_OSRS}
     latency_us, delivery_us = distribution(parallel.offered_us), distribution(parallel.delivered_us)
     return {
         **found,
@@ -129,7 +130,7 @@ def main(argv):
     found |= {"by_osr": by_osr(runs), "by_sensors": by_sensors(tools, runs), "scenes": rows}
     write_json(out / "rate.json", found)
     write_text(out / "rate.md", rate_report.text(found, __doc__.split("\n\n")[-1]))
-    rate_report.draw(out / "rate.png", found, runs["pico_parallel", 256])
+    rate_report.draw(out / "rate.png", found, runs[PARALLEL, 256])
     return finish(found, options, ("rate.json", "rate.md", "rate.png"))
 
 

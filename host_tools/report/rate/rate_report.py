@@ -1,14 +1,17 @@
 """rate.json as text and as a picture."""
+import itertools
+
 import matplotlib
 import scenes
+from boards import BOARDS, DESCRIPTORS, PARALLEL, short
 from drawing import BLUE, FAINT, GOAL, ORANGE, plt, save
-from emulated import BOARDS, CONVERSION_us
+from emulated import CONVERSION_us
 from goals import goal_table_md
 from tables import table_md
 
 # Twenty-six pins on a Pico's edge, one for SCL.
 DATA_PINS = 25
-COLOURS = {"pico_parallel": BLUE, "pico_mux": ORANGE}
+COLOURS = dict(zip(BOARDS, itertools.cycle((BLUE, ORANGE, GOAL, FAINT))))
 
 
 def number(value):
@@ -26,15 +29,15 @@ def text(found, how):
     field = lambda *names: lambda row: row[names[0]] if len(names) == 1 else row[names[0]][names[1]]
     lines = ["# Rate, latency and cost", "", "Written by `sh cmake/bootstrap.sh report`.", "", "![Rates, latency, cycles](rate.png)", "",
              *goal_table_md(found), "", how.strip(), "",
-             f"On pico_parallel at OSR 256, over {found['seconds']:.0f} s at {found['contact_frames_per_s']:.0f} frames/s:", "",
+             f"On {PARALLEL} at OSR 256, over {found['seconds']:.0f} s at {found['contact_frames_per_s']:.0f} frames/s:", "",
              *table([{"what": what, **{name: found[f"{key}_parallel_{name}_us"] for name in ("median", "p99", "p99_9", "max")}}
                      for what, key in (("offered", "latency"), ("delivered", "delivery"))],
                     {"us after the conversion": field("what"), "median": field("median"), "p99": field("p99"), "p99.9": field("p99_9"), "max": field("max")}), "",
              f"- Lost: {found['sequence_gaps']} gaps in the sequence, {found['packets_dropped']} packets dropped and {found['frames_skipped']} frames",
              f"  skipped by the device's own count, {found['frames_missing']} frame numbers that never came, {found['unfitted']} frames without a fit.",
              f"- Steps of the frame clock differ by {found['clock_jitter_us']:.0f} us at most.",
-             "- Skew between taxels: 0 on pico_parallel, one command on all lines at once. On pico_mux too one command reaches all",
-             "  sensors, through all multiplexers; only the reading takes its turn. Their own oscillators remain.", "", "## By OSR", ""]
+             "- Skew between taxels: 0 with a data line for each sensor, one command on all lines at once. With multiplexers one command",
+             "  reaches all sensors too, through all channels; only the reading takes its turn. Their own oscillators remain.", "", "## By OSR", ""]
     lines += table(found["by_osr"], {
         "board": field("board"), "OSR": field("osr"), "frames/s": field("frames_per_s"), "fitted/s": field("fitted_per_s"),
         "held/s": field("held_per_s"), "asleep, %": field("sleep_percent"), "convert, us": field("convert_us"), "read": field("read_us"),
@@ -49,8 +52,8 @@ def text(found, how):
     lines += table(found["by_sensors"], {
         "kernel": field("kernel"), "sensors": field("sensors"), "layout": field("layout"), "compensate, cycles": field("take"),
         "condition": field("condition"), "fit": field("fit"), "worst location, um": lambda row: f"{row['error_um']:.3f}",
-        "pico_parallel frames/s": field("parallel_fps"), "latency, us": field("parallel_latency_us"), "pico_mux frames/s": field("mux_fps"),
-        "latency, us ": field("mux_latency_us")})
+        **{heading: field(f"{short(board)}_{name}") for i, board in enumerate(BOARDS)
+           for heading, name in ((f"{board} frames/s", "fps"), ("latency, us" + i * " ", "latency_us"))}})
     return "\n".join([*lines, "", "## By scene", "", *scenes.text(found["scenes"])]) + "\n"
 
 
@@ -89,7 +92,7 @@ def draw_latency(axes, found, parallel):
         axes.hist(values, bins=120, histtype="stepfilled", alpha=0.6, color=colour, label=name, log=True)
     goal_us = float(found["goals"]["latency_parallel_us"]["goal"].split()[1])
     axes.axvline(goal_us, color=GOAL, lw=2, label=f"goal of the first: {goal_us:.0f} us")
-    axes.set(xlabel="us after the end of conversion", ylabel="packets", title="Latency on pico_parallel, OSR 256")
+    axes.set(xlabel="us after the end of conversion", ylabel="packets", title=f"Latency on {PARALLEL}, OSR 256")
 
 
 def draw_stages(axes, found):
@@ -107,7 +110,7 @@ def draw_stages(axes, found):
 def draw_sensors(axes, found):
     for kernel, style in (("fixed point", "o-"), ("float", "s--")):
         for board in BOARDS:
-            rows = [row for row in found["by_sensors"] if row["kernel"] == kernel and (board != "pico_parallel" or row["sensors"] <= DATA_PINS)]
-            axes.plot([row["sensors"] for row in rows], [row[f"{board.removeprefix('pico_')}_fps"] for row in rows], style, color=COLOURS[board],
+            rows = [row for row in found["by_sensors"] if row["kernel"] == kernel and (DESCRIPTORS[board]["bus"] != "parallel" or row["sensors"] <= DATA_PINS)]
+            axes.plot([row["sensors"] for row in rows], [row[f"{short(board)}_fps"] for row in rows], style, color=COLOURS[board],
                       label=f"{board}, {kernel}")
     axes.set(xlabel="sensors", ylabel="frames a second, OSR 256", yscale="log", title="More or fewer sensors: cycles measured, rates computed")

@@ -15,7 +15,8 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
-from emulated import BOARDS, CLOCK_Hz, CONVERSION_us, scenario  # noqa: E402
+from boards import BOARDS  # noqa: E402
+from emulated import CLOCK_Hz, CONVERSION_us, scenario  # noqa: E402
 from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from reporting import Steps, run, write_json  # noqa: E402
 from tables import table_md  # noqa: E402

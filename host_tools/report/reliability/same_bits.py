@@ -3,6 +3,7 @@ import pathlib
 import re
 import subprocess
 
+from boards import BOARDS
 from fingertip.files import InputError
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -13,7 +14,7 @@ GOALS = (("same_bits_presses", ">=", 10000), ("same_bits_different", "<=", 0), (
 def measure(build, steps):
     """A difference does not end it: it is a figure, and told."""
     steps.say("the same bits on Cortex-M0+, M4F and host")
-    boards = build.parent / "pico_mux"
+    boards = build.parent / BOARDS[0]
     done = subprocess.run(["/usr/bin/python3", TEST, "--host", build / "tests/emulated/fit_bits/fit_bits", "--m4f",
                            build / "tests/emulated/fit_bits/fit_bits_m4f.elf", "--m0", boards / "fit_bits_m0.elf", "--rp2040",
                            boards / "fit_bits_rp2040.bin", "--qemu", "qemu-system-arm", "--node", "node", "SameBits"],

@@ -5,6 +5,7 @@ import pathlib
 import subprocess
 import tempfile
 
+from boards import BOARDS, image_of
 from fingertip.files import InputError
 from reporting import run
 from tables import table_of_dicts_md, text_of
@@ -13,7 +14,6 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 SOAK = ROOT / "tests/soak"
 EMULATED_h, NATIVE_h = 1, 24
 STEP_us = 100
-BOARDS = ("pico_mux", "pico_parallel")
 CUTS = ("write", "erase", "mend", "start", "reset")
 GOALS = (("soak_hours_emulated", ">=", EMULATED_h), ("soak_hours_native", ">=", NATIVE_h), ("hangs", "<=", 0), ("wrong_unflagged", "<=", 0),
          ("uncounted_losses", "<=", 0), ("disorder", "<=", 0), ("power_cuts", ">=", 1000), ("power_cuts_not_started", "<=", 0),
@@ -24,7 +24,7 @@ def power_cuts(build, steps):
     program = build / "tests/soak/fingertip_soak"
 
     def one(board, kind):
-        image = build.parent / f"{board}/fingertip-{board}.bin"
+        image = image_of(build.parent, board)
         return json.loads(run("node", SOAK / "power_cuts.mjs", "--image", image, "--board", board, "--soak", program, "--command-frame",
                               build / "tests/support/command_frame", "--step-us", STEP_us, "--kinds", kind))[kind]
 
@@ -60,7 +60,7 @@ def text(found):
             "frame without a warning that is more than 1.2 mm or 0.1 N and 15 % off is wrong, a packet that is missing must be counted; times, numbers, "
             "packets and answers that are out of order are disorder. "
             f"Native: the firmware's code on simulated sensors, {rate(found, 'native')} times faster than real time. Emulated: the release images, "
-            f"{rate(found, 'pico_mux')} and {rate(found, 'pico_parallel')} seconds in a second of one processor's time on the wall. Episodes of earlier runs of the same images, by the report "
+            f"{' and '.join(rate(found, board) for board in BOARDS)} seconds in a second of one processor's time on the wall. Episodes of earlier runs of the same images, by the report "
             f"or by `sh cmake/bootstrap.sh soak`, count (build/soak/results.jsonl); {found['soak_episodes_now']} were run now. Excused are wrong frames "
             "and readings after inverted bits of a conversion, which have no check, and readings after a sensor's supply dipped beneath a moving "
             "press.", "",

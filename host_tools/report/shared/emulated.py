@@ -5,6 +5,7 @@ import pathlib
 import sys
 
 import numpy as np
+from boards import BOARDS, TO_BUILD, image_of
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "host_tools" / "python"))
@@ -16,7 +17,6 @@ HELD = 1 << 6
 WIRE_CONTACT = 0x01
 HEADER_BYTES, CRC_BYTES = 12, 4
 CLOCK_Hz = 125e6
-BOARDS = ("pico_parallel", "pico_mux")
 # Longest conversion by OSR, us: MS5840-02BA datasheet.
 CONVERSION_us = {256: 560, 512: 1100, 1024: 2170, 2048: 4320, 4096: 8610, 8192: 17200}
 # By then the contact stands, the tare is over, and the settings have been obeyed.
@@ -32,10 +32,10 @@ class Tools:
         self.boards = pathlib.Path(boards)
         for path in (self.fingertip, self.command_frame, *(self.image(board) for board in BOARDS)):
             if not path.is_file():
-                raise InputError(f"{path}: is not there; build it: cmake --preset host && cmake --build --preset host")
+                raise InputError(f"{path}: is not there; {TO_BUILD}")
 
     def image(self, board, suffix="bin"):
-        return self.boards / board / f"fingertip-{board}.{suffix}"
+        return image_of(self.boards, board, suffix)
 
     def encoded(self, *command):
         return run(self.command_frame, *command).strip()

@@ -47,15 +47,15 @@ class Part:
 REPORT = "/usr/bin/python3 host_tools/report"
 PARTS = (
     Part("fit", "The fit", "How far the fit on the chip is from the least-squares optimum, what it costs there, and what one would use instead.",
-         f"{REPORT}/fit/fit.py --build build/host --image build/pico_mux/fit_cycles.bin -o build/report", SIMULATED,
+         f"{REPORT}/fit/fit.py --build build/host --boards build -o build/report", SIMULATED,
          (("*_cycles", EMULATED), ("speed_vs_*", CLOCK), ("processor", CLOCK), ("seed", SAID)), "fit_table.md",
          (("fit_report.png", "Error of the fit against its run time: presses simulated, cycles emulated, times of this computer"),),
          (("fit_table.csv", "Every kernel and variant"), ("stiff.json", "Presses that are hard, extreme, or none: shares of each flag"))),
-    Part("rate", "Rate, latency and cost", "The release images of both boards in the emulator, in contact on every frame.",
+    Part("rate", "Rate, latency and cost", "The release images of all boards in the emulator, in contact on every frame.",
          f"{REPORT}/rate/rate.py --build build/host --boards build -o build/report", EMULATED, (("*_bytes", IMAGE), ("fit_iterations", SAID)),
          pictures=(("rate.png", "Rate by oversampling, latency, cycles by stage, rate by number of sensors: emulated"),)),
     Part("validation", "The published experiments", "The experiments of De Clercq et al., RA-L 2022, on the simulated pad with the firmware's own code.",
-         f"{REPORT}/validation/validation.py --build build/host --image build/pico_mux/fingertip-pico_mux.bin -o build/report", SIMULATED,
+         f"{REPORT}/validation/validation.py --build build/host --boards build -o build/report", SIMULATED,
          (("emulated_*", EMULATED), ("seconds", CLOCK), ("pads", SAID), ("rate_Hz", SAID), ("prior_*_mm", SAID)),
          pictures=(("validation_force.png", "Estimated and true force: simulated"), ("validation_signals.png", "The fifteen sensors during taps: simulated"),
                    ("validation_slip.png", "Reconstructed pressure during a slip: simulated"))),

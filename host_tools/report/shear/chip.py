@@ -8,11 +8,11 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/report/rate"), str(ROOT / "host_tools/python")]
 import numpy as np  # noqa: E402
 import scenes  # noqa: E402
+from boards import PARALLEL as BOARD, fit_cycles_of  # noqa: E402
 from emulated import FROM_s, Measurement, Tools, scenario  # noqa: E402
 from fingertip.files import read_recording  # noqa: E402
 from reporting import run  # noqa: E402
 
-BOARD = "pico_parallel"
 OSRS = (256, 1024)
 SECONDS = 6.0
 PAD = ("12", "0")  # thickness and overhang, mm; 0: no ends, which cost as much
@@ -47,5 +47,5 @@ def measure(build, boards, say):
                 f"chip_fit_us_osr{osr}": measured.stages_us["fit_us"],
                 f"chip_told_percent_osr{osr}": 100 * float(((flags & TANGENTIAL_VALID) != 0).mean()), f"chip_sleep_percent_osr{osr}": measured.sleep_percent}
             say(f"grasp on {BOARD}, OSR {osr}: {measured.fitted_per_s:.0f} frames/s")
-    cycles = run("node", pathlib.Path(__file__).with_name("cycles.mjs"), pathlib.Path(boards) / "pico_mux/fit_cycles.bin").split()
+    cycles = run("node", pathlib.Path(__file__).with_name("cycles.mjs"), fit_cycles_of(boards)).split()
     return {**found, "fit_cycles_median": int(cycles[0]), "shear_cycles_median": int(cycles[1]), "shear_cycles": int(cycles[2])}

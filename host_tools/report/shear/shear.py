@@ -21,6 +21,7 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 
 import chip  # noqa: E402
 import shear_report  # noqa: E402
+from boards import fit_cycles_of  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from goals import judge  # noqa: E402
 from reporting import finish, option_parser, output_folder, write_json  # noqa: E402
@@ -47,7 +48,7 @@ OPTIMUM_FILE, OPTIMUM = "shear_optimum.json", ("optimum_p99_um", "optimum_p99_ra
 def program_of(part, options):
     """Or, of the chip, an image without which there are no others."""
     if part == "chip":
-        return pathlib.Path(options.boards) / "pico_mux/fit_cycles.bin"
+        return fit_cycles_of(options.boards)
     return pathlib.Path(options.build) / "host_tools/report/shear" / part / f"shear_{part}"
 
 

@@ -28,7 +28,7 @@ OVER = (
     ("lift_*, slide_*", "lifts and slides of the twin; their own tables say which"),
     ("optimum_*", "the estimate on the chip against an independent one in double precision, on readings of the model itself"),
     ("shear_cycles", "of the estimate alone on the emulated chip, most of 100 presses"),
-    ("chip_*", "an image of scene grasp on the emulated pico_parallel; `fps`: frames that tell the load"))
+    ("chip_*", "an image of scene grasp on the emulated board with a data line for each sensor; `fps`: frames that tell the load"))
 COLUMNS = {
     "case": "case", "touches": "touches", "valid_percent": "valid %", "ratio_error_p50": "ratio p50", "ratio_error_p95": "p95",
     "vector_error_p50": "vector p50", "vector_error_p95": "p95 ", "direction_p90_deg": "direction p90, deg", "elongated_percent": "flagged elongated %", "claimed_percent": "claims a load %",

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """The published experiments repeated on the simulated fingertip: build/report/validation.*
 
-    validation.py --build build/host --image build/pico_mux/fingertip-pico_mux.bin -o build/report
+    validation.py --build build/host --boards build -o build/report
 
 Writes scenarios with twin, plays them with fingertip_player through the firmware's own code, and compares what it says with
 the truth, beside the figures of De Clercq et al., RA-L 2022 ("the paper"). Theirs are of hardware, these are of a
@@ -27,6 +27,7 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+from boards import MULTIPLEXED, TO_BUILD, image_of  # noqa: E402
 from fingertip.files import FIT_VALID, SLIP, InputError, read_recording, run_tool  # noqa: E402
 from goals import judge  # noqa: E402
 from reporting import finish, option_parser, output_folder, run, write_json  # noqa: E402
@@ -138,7 +139,7 @@ class Workshop:
         for tool in (self.twin, self.player, self.fingertip, self.command_frame):
             if not tool.exists():
                 raise InputError(f"{tool} is not there; build it: cmake --build --preset host")
-        self.image, self.seed, self.scale = pathlib.Path(options.image), options.seed, options.scale
+        self.image, self.seed, self.scale = image_of(options.boards, MULTIPLEXED), options.seed, options.scale
         self.tables = pathlib.Path(options.tables or out / "contact_tables")
         self.work = out / "validation_work"
         self.work.mkdir(parents=True, exist_ok=True)
@@ -204,13 +205,13 @@ class Workshop:
     def emulate(self, seconds):
         """The image on the emulated chip plays a scenario; its contact packets computed here from its pressures."""
         if not self.image.exists():
-            raise InputError(f"{self.image} is not there; build it: cmake --preset pico_mux && cmake --build --preset pico_mux")
+            raise InputError(f"{self.image} is not there; {TO_BUILD}")
         scenario, script, capture = self.work / "emulated.csv", self.work / "emulated.txt", self.work / "emulated.bin"
         run(self.twin, "scenario", "taps", "--indenter", "sphere6", "--layer", 12, "--effects", ALL, "--seconds", seconds, "--seed",
             self.seed, "--cache", self.tables, "-o", scenario, "--overwrite")
         commands = [run(self.command_frame, *words).strip() for words in (("stream", "contact,raw"), ("info",), ("tare",))]
         script.write_text("0.7 dtr 1\n" + "".join(f"{0.72 + 0.01 * i:.2f} {word}\n" for i, word in enumerate(commands)))
-        run("node", ROOT / "host_tools/simulation/emulator/main.mjs", "--board", "pico_mux", "--image", self.image, "--scenario", scenario,
+        run("node", ROOT / "host_tools/simulation/emulator/main.mjs", "--board", MULTIPLEXED, "--image", self.image, "--scenario", scenario,
             "--host-script", script, "--capture", capture, "--fast-enumeration")
         return json.loads(run(self.player, "repeat", capture))
 
@@ -463,7 +464,7 @@ def curves(shop):
 
 def main(argv):
     parser = option_parser(__doc__)
-    parser.add_argument("--image", required=True, metavar="FILE.bin", help="firmware for pico_mux")
+    parser.add_argument("--boards", required=True, metavar="DIR", help="folder of the boards' builds")
     parser.add_argument("--tables", metavar="DIR", help="cache of the contact tables; default: contact_tables in the output")
     parser.add_argument("--seed", type=int, default=1, metavar="N")
     parser.add_argument("--scale", type=float, default=1, metavar="FACTOR", help="of the scenarios' lengths; default 1")

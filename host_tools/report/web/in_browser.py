@@ -13,6 +13,7 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "tests/web"))
 import driven  # noqa: E402
+from boards import PARALLEL, image_of  # noqa: E402
 from browser import Browser, CannotRun  # noqa: E402
 from fingertip.files import InputError  # noqa: E402
 from fingertips import Bench  # noqa: E402
@@ -108,7 +109,7 @@ def measure(build, steps):
                 foreign = page.foreign()
     except CannotRun as why:
         raise InputError(f"no browser here: {why}") from None
-    outcome = driven.run_all(build, build.parent / "pico_parallel/fingertip-pico_parallel.bin")
+    outcome = driven.run_all(build, image_of(build.parent, PARALLEL))
     steps.say(f"{outcome['web_steps_driven']} steps driven")
     return {"page_ready_s": statistics.median(ready_s), "page_ready_worst_s": max(ready_s), "bundle_kB": bundle_kB, "bundle_simulated_kB": simulated_kB,
             **found, "web_seconds": WATCHED_s, "web_memory_seconds": REMEMBERED_s, "web_memory_kB": looked[-1][1],

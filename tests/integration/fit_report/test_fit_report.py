@@ -1,6 +1,6 @@
 """The report on few presses: every tool runs, the figures are there and make sense.
 
-usage: test_fit_report.py --build BUILD --image fit_cycles.bin
+usage: test_fit_report.py --build BUILD --boards BOARDS
 """
 import argparse
 import csv
@@ -12,6 +12,9 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "host_tools/report/shared"))
+from boards import fit_cycles_of  # noqa: E402
+
 OPTIONS = argparse.Namespace()
 FIGURES = (
     "observable_presses", "p99_9_um", "above_100um", "masked_p99_9_um", "masked_p99_um_d", "masked_peak_p99_um",
@@ -24,7 +27,7 @@ MASKED_CYCLES_MAX = 62000
 
 def report(folder, *more):
     return subprocess.run(
-        [sys.executable, str(ROOT / "host_tools/report/fit/fit.py"), "--build", OPTIONS.build, "--image", OPTIONS.image,
+        [sys.executable, str(ROOT / "host_tools/report/fit/fit.py"), "--build", OPTIONS.build, "--boards", OPTIONS.boards,
          "-o", str(folder), "--limit", "600", "--budget", "0.25", "--passes", "1", *more], capture_output=True, text=True)
 
 
@@ -71,7 +74,7 @@ class Report(unittest.TestCase):
 
     def test_cycles_are_deterministic(self):
         again = self.folder / "again.csv"
-        subprocess.run(["node", str(ROOT / "host_tools/report/fit/on_chip/bench.mjs"), "--image", OPTIONS.image, "--jobs",
+        subprocess.run(["node", str(ROOT / "host_tools/report/fit/on_chip/bench.mjs"), "--image", str(fit_cycles_of(OPTIONS.boards)), "--jobs",
                         str(self.folder / "fit_jobs.json"), "--out", str(again), "--budget", "0.25", "--kernel", "fit"],
                        check=True, capture_output=True)
         with open(again, newline="") as file:
@@ -103,16 +106,16 @@ class Report(unittest.TestCase):
 
     def test_a_missing_image_is_one_line(self):
         done = subprocess.run(
-            [sys.executable, str(ROOT / "host_tools/report/fit/fit.py"), "--build", OPTIONS.build, "--image",
-             str(self.folder / "none.bin"), "-o", str(self.folder / "other")], capture_output=True, text=True)
+            [sys.executable, str(ROOT / "host_tools/report/fit/fit.py"), "--build", OPTIONS.build, "--boards",
+             str(self.folder), "-o", str(self.folder / "other")], capture_output=True, text=True)
         self.assertEqual(done.returncode, 1)
         self.assertEqual(len(done.stderr.strip().split("\n")), 1)
-        self.assertIn("none.bin is not there; build it", done.stderr)
+        self.assertIn("fit_cycles.bin is not there; build it", done.stderr)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    for option in ("build", "image"):
+    for option in ("build", "boards"):
         parser.add_argument(f"--{option}", required=True)
     _, rest = parser.parse_known_args(namespace=OPTIONS)
     unittest.main(argv=[sys.argv[0], *rest], verbosity=2)

@@ -1,6 +1,6 @@
 """The published experiments in short: the chain runs, and what it finds is what physics and the method give.
 
-usage: test_validation.py --build BUILD --image fingertip-pico_mux.bin
+usage: test_validation.py --build BUILD --boards BOARDS
 """
 import argparse
 import json
@@ -16,7 +16,7 @@ OPTIONS = argparse.Namespace()
 
 def validate(folder, *more):
     return subprocess.run(
-        [sys.executable, str(ROOT / "host_tools/report/validation/validation.py"), "--build", OPTIONS.build, "--image", OPTIONS.image, "-o", str(folder),
+        [sys.executable, str(ROOT / "host_tools/report/validation/validation.py"), "--build", OPTIONS.build, "--boards", OPTIONS.boards, "-o", str(folder),
          "--tables", str(pathlib.Path(OPTIONS.build) / "contact_tables"), "--indenters", "sphere6,cube6,sphere12", "--scale", "0.05", "--pads", "2",
          "--emulated-seconds", "4", *more], capture_output=True, text=True)
 
@@ -92,7 +92,7 @@ class Validation(unittest.TestCase):
         self.assertFalse((self.folder / "validation_work").exists())
 
     def test_a_missing_build_is_said(self):
-        done = subprocess.run([sys.executable, str(ROOT / "host_tools/report/validation/validation.py"), "--build", str(self.folder), "--image", "no.bin", "-o",
+        done = subprocess.run([sys.executable, str(ROOT / "host_tools/report/validation/validation.py"), "--build", str(self.folder), "--boards", "none", "-o",
                                str(self.folder / "none")], capture_output=True, text=True)
         self.assertEqual(done.returncode, 1)
         self.assertIn("cmake --build", done.stderr)
@@ -101,6 +101,6 @@ class Validation(unittest.TestCase):
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--build", required=True)
-    parser.add_argument("--image", required=True)
+    parser.add_argument("--boards", required=True)
     OPTIONS, rest = parser.parse_known_args()
     unittest.main(argv=[sys.argv[0], *rest])

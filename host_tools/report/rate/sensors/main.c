@@ -19,7 +19,7 @@ static struct {
 } job;
 
 enum { CALL_NEXT_JOB = 1, CALL_START = 2, CALL_STOP = 3 };
-/* So that each frame tracks a sensor's zero, as at about the rate of pico_mux. */
+/* So that each frame tracks a sensor's zero, as at about the rate behind multiplexers. */
 enum { FRAME_us = 4854 };
 enum { AMBIENT_Pa_q10 = 101325 * 1024, NOISE_Pa_q10 = 11 * 1024 };
 

@@ -25,11 +25,12 @@ import zlib
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "shared"))
 import numpy as np  # noqa: E402
 
+from boards import PARALLEL as BOARD  # noqa: E402
 from emulated import CONVERSION_us, MARGIN, ROOT, Tools, contact_times_us, distribution, scenario  # noqa: E402
 from fingertip.files import InputError, read_recording, run_tool  # noqa: E402
 from reporting import run  # noqa: E402
 
-BOARD, OSR = "pico_parallel", 256
+OSR = 256
 WIRE_VERSION, CALIBRATE, SENSORS = 5, 0x88, 15
 # From one command to the next: an erase of the slowest flash and all that follows.
 INTERVAL_s = 0.6

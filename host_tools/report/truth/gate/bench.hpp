@@ -29,7 +29,7 @@ struct Mode {
   std::int32_t noise_Pa_q10;
 };
 
-// Both boards at every oversampling.
+// Every board at every oversampling.
 std::vector<Mode> modes();
 
 // Adds a press of this force.

@@ -47,8 +47,6 @@ export interface SimulatedOptions {
   /** Of pad and sensors, as `twin scenario --effects` takes them: "gain=10,drift"; gains as cast,
    * "gain=10", by default; "none": a perfect pad. */
   errors?: string;
-  /** The bus of board pico_mux: at most some 250 frames a second instead of 1308. */
-  slowBus?: boolean;
   /** Where simulated.wasm and objects.bin are; the page's folder wasm/. */
   files?: string;
 }
@@ -78,7 +76,7 @@ export class SimulatedFingertip implements Line {
   private opening: { done: () => void; failed: (error: Error) => void } | null = null;
 
   constructor(options: SimulatedOptions = {}) {
-    const { files = 'wasm/', slowBus = false, errors = 'gain=10', ...others } = options;
+    const { files = 'wasm/', errors = 'gain=10', ...others } = options;
     const folder = new URL(files, document.baseURI);
     this.worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' });
     this.worker.addEventListener('message', (event: MessageEvent<FromWorker>) =>
@@ -91,7 +89,7 @@ export class SimulatedFingertip implements Line {
       kind: 'start',
       wasm: new URL('simulated.wasm', folder).href,
       objects: new URL('objects.bin', folder).href,
-      options: { ...others, errors, parallelBus: !slowBus },
+      options: { ...others, errors, parallelBus: true },
     });
   }
 

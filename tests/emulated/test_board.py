@@ -1,0 +1,109 @@
+"""A third board is a folder: beside nothing else that is new, it is built, emulated, examined and measured by its descriptor.
+
+usage: test_board.py --fingertip TOOL --command_frame PROGRAM --node NODE
+"""
+import argparse
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "host_tools/report/shared"))
+from emulated import scenario  # noqa: E402
+from fingertip import files  # noqa: E402
+
+TOOLS = argparse.Namespace()
+PATTERN, THIRD = "pico_mux", "pico_third"
+# Nothing of it is as on the board that it is a copy of.
+WIRING = {"pin_sda": 12, "pin_scl": 13, "mux_address_0": "0x71", "pin_mux_reset_0": 18}
+EXAMINER = """
+#include "tool/doctor/wiring.hpp"
+#include <iostream>
+int main() {
+  const auto wiring = fingertip::Wiring::of_board("pico_third");
+  std::cout << wiring->place_text(13) << '\\n' << wiring->check_multiplexer(2) << '\\n' << wiring->check_all() << '\\n' << wiring->overhead_us << '\\n';
+}
+"""
+
+
+def run(*command, check=True):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    if check and done.returncode != 0:
+        raise AssertionError(f"{command[0]} ended with {done.returncode}:\n{done.stdout[-3000:]}{done.stderr[-3000:]}")
+    return done
+
+
+class ThirdBoard(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        holder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(holder.cleanup)
+        cls.tree = pathlib.Path(holder.name) / "tree"
+        shutil.copytree(ROOT, cls.tree, symlinks=True, ignore=shutil.ignore_patterns("build", "node_modules", ".git"))
+        emulator = "host_tools/simulation/emulator"
+        (cls.tree / emulator / "node_modules").symlink_to(ROOT / emulator / "node_modules")
+        board = cls.tree / "boards" / THIRD
+        shutil.copytree(cls.tree / "boards" / PATTERN, board)
+        for path in [*board.glob("*.[ch]"), board / "CMakeLists.txt"]:
+            path.write_text(path.read_text().replace(PATTERN, THIRD))
+        descriptor = json.loads((board / "board.json").read_text())
+        descriptor["wiring"] |= WIRING
+        descriptor["overhead_us"] = 1000
+        (board / "board.json").write_text(json.dumps(descriptor))
+        cls.build = cls.tree / "build" / THIRD
+        cls.configured = run("cmake", "-G", "Ninja", "-S", cls.tree, "-B", cls.build, "-DCMAKE_BUILD_TYPE=Release",
+                             f"-DCMAKE_TOOLCHAIN_FILE={cls.tree}/cmake/toolchain-arm-none-eabi.cmake", f"-DFINGERTIP_BOARD={THIRD}")
+
+    def emulated(self, board, seconds=0.8):
+        """The image on this board: how it ended, and its capture."""
+        base = self.tree / "build" / board
+        script, capture = base.with_suffix(".script"), base.with_suffix(".ftr")
+        script.write_text("0.45 dtr 1\n" + "".join(f"{0.46 + 0.01 * i:.2f} {run(TOOLS.command_frame, *words).stdout}"
+                                                   for i, words in enumerate((("info",), ("stream", "contact,raw,health")))))
+        return run(TOOLS.node, self.tree / "host_tools/simulation/emulator/main.mjs", "--board", board, "--image", self.build / f"fingertip-{THIRD}.bin",
+                   "--scenario", scenario(self.tree / "build", "rest", 1), "--seconds", seconds, "--host-script", script, "--capture", capture,
+                   check=False), capture
+
+    def test_it_is_built_and_runs_on_its_own_pins(self):
+        run("cmake", "--build", self.build, "--target", f"fingertip-{THIRD}")
+        done, capture = self.emulated(THIRD)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        run(TOOLS.fingertip, "replay", capture, "--to-csv", capture.with_suffix(".csv"))
+        told = files.read_recording(capture.with_suffix(".csv"))
+        self.assertEqual(told.metadata["board"], THIRD)
+        self.assertIn((1 << 15) - 1, told["valid"])
+        _, capture = self.emulated(PATTERN)  # whose pins are others, so that no sensor answers
+        self.assertIn("no frames in it", run(TOOLS.fingertip, "replay", capture, check=False).stderr)
+
+    def test_the_host_builds_its_image_and_knows_its_pins(self):
+        host = self.tree / "build/host"
+        run("cmake", "-G", "Ninja", "-S", self.tree, "-B", host, "-DBUILD_TESTING=OFF")
+        self.assertIn(f"image_{THIRD}:", run("cmake", "--build", host, "--target", "help").stdout)
+        source, program = host / "examiner.cpp", host / "examiner"
+        source.write_text(EXAMINER)
+        run("g++", "-std=c++17", f"-I{self.tree}/host_tools", f"-I{host}/boards", source, self.tree / "host_tools/tool/doctor/wiring.cpp", "-o", program)
+        place, multiplexer, everything, overhead_us = run(program).stdout.splitlines()
+        self.assertEqual(place, "strip 2, channel 3 of multiplexer 0x73")
+        self.assertIn("RESET on GP20 (pin 26)", multiplexer)
+        self.assertIn("SDA on GP12 (pin 16), SCL on GP13 (pin 17)", everything)
+        self.assertEqual(overhead_us, "1000")
+
+    def test_whoever_lists_boards_lists_it(self):
+        boards = ["pico_mux", "pico_parallel", THIRD]
+        self.assertEqual(run(sys.executable, self.tree / "host_tools/report/shared/boards.py").stdout.split(), ["pico_parallel", THIRD, "pico_mux"])
+        for program in ("main.mjs", "lockstep.mjs"):
+            self.assertIn(" or ".join(boards), run(TOOLS.node, self.tree / "host_tools/simulation/emulator" / program, "--help").stdout)
+        refused = run("cmake", "-G", "Ninja", "-S", self.tree, "-B", self.tree / "build/toaster", "-DFINGERTIP_BOARD=toaster", check=False).stderr
+        self.assertIn(";".join(["native", *boards]), "".join(refused.split()))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    for option in ("fingertip", "command_frame", "node"):
+        parser.add_argument(f"--{option}", required=True)
+    _, rest = parser.parse_known_args(namespace=TOOLS)
+    unittest.main(argv=[sys.argv[0], *rest], verbosity=2)
