@@ -211,6 +211,10 @@ inline RowPackets parse_row(std::string_view text, std::uint8_t sensor_count, bo
     RowReader reader{cells, 2};
     visit_contact(reader, packet, has_tangential);
     packet.body.contact.frame = frame;
+    constexpr std::uint32_t later = CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID;
+    if (!has_tangential && packet.body.contact.flags & later) {
+      throw Damage{"its flags tell of columns that are not there"};
+    }
   }
   if (!is_empty(2 + contact_count, raw_count)) {
     if (sensor_count == 0) {

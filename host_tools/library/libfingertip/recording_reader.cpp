@@ -251,6 +251,9 @@ void RecordingReader::read_info_field(const std::string &key, const std::string 
     if (numbers.size() > most) {
       throw Damage{key + " has too many values"};
     }
+    for (std::size_t k = 0; k < most; k++) {
+      value_of(k) = 0;
+    }
     for (std::size_t k = 0; k < numbers.size() && !value.empty(); k++) {
       parse_cell(key, numbers[k], value_of(k));
     }

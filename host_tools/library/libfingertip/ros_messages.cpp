@@ -310,8 +310,9 @@ std::optional<Row> decode_row(std::string_view bytes) {
     reader.get(has_raw);
     CdrGet get_raw{reader, has_raw};
     visit_raw(get_raw, raw, WITHOUT_SENSORS);
-    std::uint32_t count = 0;
+    std::uint32_t count = 0, pressures = 0;
     for (std::int32_t *readings : {raw.body.raw.pressure_Pa_q10, raw.body.raw.baseline_Pa_q10}) {
+      pressures = count;
       reader.get(count);
       if (!reader.is_good() || count > FT_MAX_SENSORS) {
         return std::nullopt;
@@ -321,6 +322,9 @@ std::optional<Row> decode_row(std::string_view bytes) {
         reader.get(pressure_Pa);
         readings[k] = scaled<std::int32_t>(pressure_Pa, Q10);
       }
+    }
+    if (has_raw && pressures != count) {
+      return std::nullopt;
     }
     raw.body.raw.sensor_count = static_cast<std::uint8_t>(count);
   } catch (const NoPacket &) {

@@ -36,11 +36,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from . import line
+from . import line, recorded
 from .errors import InputError
 from .frames import frame_of
-from .line import CONTACT_COLUMNS, RAW_COLUMNS, STAGES, TANGENTIAL_COLUMNS, Flag
-from .mcap_recording import MAGIC, McapLineReader
+from .line import CONTACT_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, TANGENTIAL_COLUMNS, Flag
+from .mcap_recording import MAGIC, Damaged, Line, McapLineReader
+from .recorded import Rows, counts_of, judge_key, packet_of
 
 if TYPE_CHECKING:
     import pandas
@@ -127,12 +128,12 @@ def _number(path: Path, line: int, column: str, cell: str, empty_allowed: bool) 
 
 def _check_kind(path: Path, lines: Sequence[str], kind: str, formats: Collection[str] = ("1",)) -> str:
     """The format's number."""
-    first = lines[0].strip().split()
-    if first[:2] != ["#", f"fingertip-{kind}"] or len(first) != 3:
+    begin, _, number = lines[0].strip(" \t\r").partition(f"# fingertip-{kind} ")
+    if begin or not number:
         raise InputError(f'{path}:1: no {kind}; its first line must be "# fingertip-{kind} 1"')
-    if first[2] not in formats:
-        raise InputError(f"{path}:1: {kind} format {first[2]} is unknown; this tool reads format {' and '.join(formats)}")
-    return first[2]
+    if number not in formats:
+        raise InputError(f"{path}:1: {kind} format {number} is unknown; this tool reads format {' and '.join(formats)}")
+    return number
 
 
 def _metadata(line: str) -> tuple[str, str]:
@@ -268,43 +269,26 @@ class Recording:
         return found
 
 
-def _end_counts(path: Path, number: int, text: str) -> dict[str, str]:
-    counts = {}
-    for pair in text.split():
-        key, separator, value = pair.partition("=")
-        if not separator:
-            raise InputError(f'{path}:{number}: "{pair}" is not key=value; use --salvage to skip the line')
-        counts[key] = value
-    return counts
-
-
-def _packet(path: Path, number: int, text: str) -> tuple[str, dict[str, str]]:
-    """Its kind, and {field: whole number as it is written}."""
-    words = text.split() or [""]
-    fields = dict(field.partition("=")[::2] for field in words[1:])
-    for name, value in fields.items():
-        if not (value.isascii() and value.isdigit()):
-            raise InputError(f'{path}:{number}: {name} is "{value}"; use --salvage to skip the line')
-    return words[0], fields
-
-
 # Some 20 MB are read in a second: below this nobody waits.
 WORTH_WAITING_bytes = 10_000_000
+JOINT_COLUMNS = "device,time_us,"
 
 
 class _RecordingLines:
-    """The lines of a recording, CSV or MCAP, one after the other: number, text without its end, whether it is torn."""
+    """The lines of a recording, CSV or MCAP, one after the other: number, text without its end, whether it is torn; or Damaged."""
 
-    def __init__(self, path: Path, progress: Callable[[float], None] | None = None, salvage: bool = False) -> None:
-        self.path, self.progress, self.salvage = path, progress, salvage
-        first = next(iter(self), (1, "", True))[1]
-        self.format = _check_kind(path, [first], "recording", ("1", "2"))
+    def __init__(self, path: Path, progress: Callable[[float], None] | None = None) -> None:
+        self.path, self.progress = path, progress
+        first = next(iter(self), (1, "", True))
+        if isinstance(first, Damaged):
+            raise first
+        self.format = _check_kind(path, [first[1]], "recording", ("1", "2"))
 
-    def __iter__(self) -> Iterator[tuple[int, str, bool]]:
+    def __iter__(self) -> Iterator[Line | Damaged]:
         try:
             with open(self.path, "rb") as file:
                 if file.read(len(MAGIC)) == MAGIC:
-                    yield from McapLineReader(self.path, self.salvage, self.progress)
+                    yield from McapLineReader(self.path, self.progress).lines()
                     return
                 file.seek(0)
                 size, read, told = os.fstat(file.fileno()).st_size, 0, 0
@@ -313,11 +297,9 @@ class _RecordingLines:
                     if self.progress and size > WORTH_WAITING_bytes and read - told > size // 100:
                         told = read
                         self.progress(read / size)
-                    yield number, line.rstrip(b"\r\n").decode("utf-8"), not line.endswith(b"\n")
+                    yield number, line.removesuffix(b"\n").removesuffix(b"\r").decode("utf-8", "surrogateescape"), not line.endswith(b"\n")
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; check the path") from None
-        except UnicodeDecodeError:
-            raise InputError(f"{self.path}: no text file; give a CSV file") from None
 
 
 def recorded_devices(path: Path) -> list[str]:
@@ -325,9 +307,9 @@ def recorded_devices(path: Path) -> list[str]:
     lines = _RecordingLines(path)
     if lines.format == "1":
         return []
-    for _, line, _ in lines:
-        if line.startswith("# devices:"):
-            return line.split(":", 1)[1].split()
+    for each in lines:
+        if not isinstance(each, Damaged) and each[1].startswith("# devices:"):
+            return each[1].split(":", 1)[1].split()
     raise InputError(f'{path}: no line "# devices: ..."; record anew')
 
 
@@ -340,114 +322,133 @@ def _choose_device(path: Path, devices: list[str], wanted: str | None) -> int:
     raise InputError(f"{path}: {problem}; choose one with --device: {' '.join(devices)}")
 
 
-OWN_END = "end of this one"  # of several
+class _Reading:
+    """A recording while it is read, line by line."""
 
+    def __init__(self, path: Path, is_joint: bool, device: str | None, columns: Collection[str] | None) -> None:
+        self.path, self.is_joint, self.device, self.columns = path, is_joint, device, columns
+        self.number: int | None = None  # of the wanted fingertip among several
+        self.rows: Rows | None = None  # once there is a header
+        self.metadata: dict[str, str] = {}
+        self.events: list[str] = []
+        self.packets: list[tuple[str, dict[str, str]]] = []
+        self.end: dict[str, str] = {}
+        self.own_end: dict[str, str] = {}
+        self.wanted: tuple[int, ...] = ()
+        self.table, self.line_numbers, self.times_us = array.array("d"), array.array("q"), array.array("d")
+        self.sensors = self.info_sensors = 0
 
-def _of_one_device(line: str, number: int | None, advice: str) -> tuple[str | None, float | None]:
-    """A line of format 2 as format 1 has it, and its time; nothing for another fingertip's line."""
-    if line.startswith("#"):
-        key, separator, rest = line[1:].partition("/")
-        if separator and key.strip().isdigit():
-            mine = int(key) == number
-            return ("# " + rest.replace("end:", f"{OWN_END}:", 1) if mine else None), None
-        return line, None
-    cells = line.split(",", 2)
-    if cells[:2] == ["device", "time_us"]:
-        return cells[2], None
-    if len(cells) < 3:
-        raise InputError(f"is no row; {advice}")
-    if cells[0] != str(number):
-        return None, None
-    return cells[2], _number("", 0, "time_us", cells[1], False)
+    def line(self, number: int, text: str) -> None:
+        """Raises ValueError where it is damaged."""
+        if not text.strip(" \t\r"):
+            return
+        if text.startswith("#"):
+            self._comment(text)
+        elif self.rows is None:
+            self._header(text)
+        elif not self.is_joint:
+            self._row(number, text)
+        else:
+            cells = text.split(",", 2)
+            if len(cells) < 3:
+                raise ValueError("neither a comment nor a row of this recording")
+            if cells[0] == str(self.number):
+                time_us = recorded.number("time_us", cells[1])
+                self._row(number, cells[2])
+                self.times_us.append(time_us)
 
+    def _header(self, text: str) -> None:
+        if self.is_joint:
+            if not text.startswith(JOINT_COLUMNS) or self.number is None:
+                raise ValueError("wrong header; record anew with this version of fingertip")
+            text = text.removeprefix(JOINT_COLUMNS)
+        try:
+            self.rows = Rows(text)
+        except ValueError:
+            raise ValueError("wrong header; record anew with this version of fingertip") from None
+        names = self.rows.names
+        self.wanted = tuple(range(len(names))) if self.columns is None else tuple(sorted(names.index(name) for name in self.columns if name in names))
+        self.sensors = self.rows.sensors if self.columns is None else 0
 
-def _row(path: Path, number: int, header: list[str], wanted: tuple[int, ...], cells: list[str]) -> list[float]:
-    """The wanted cells as numbers, NaN where they are empty."""
-    try:
-        row = [float(cells[i]) if cells[i] else math.nan for i in wanted]
-        # what float() takes and no recording holds
-        plain = math.inf not in row and -math.inf not in row and all(cells[i] for i in wanted if i < 2) and not any(
-            value != value and cells[i] for i, value in zip(wanted, row))
-    except ValueError:
-        plain = False
-    if not plain:
-        row = [_number(path, number, header[i], cells[i], i >= 2) for i in wanted]
-    return row
+    def _row(self, number: int, text: str) -> None:
+        assert self.rows is not None
+        values = self.rows.values(text)
+        self.table.extend(values if self.columns is None else [values[i] for i in self.wanted])
+        self.line_numbers.append(number)
+
+    def _comment(self, text: str) -> None:
+        key, separator, value = text[1:].partition(": ")
+        if not separator:
+            raise ValueError('neither a comment "# key: value" nor a row')
+        key = key.strip(" \t\r")
+        if self.is_joint and "/" in key:
+            number, _, key = key.partition("/")
+            if number != str(self.number):
+                return
+            if key == "end":
+                self.own_end = counts_of(value)
+                return
+        elif self.is_joint and key == "devices":
+            self.number = _choose_device(self.path, value.split(), self.device)
+        if key == "end":
+            counts = dict(pair.split("=", 1) for pair in value.split(" ") if "=" in pair) if self.is_joint else counts_of(value)
+            self.end = {**counts, **self.own_end}
+        elif key == "event":
+            self.events.append(value)
+        elif key == "packet":
+            self._packet(value)
+        else:
+            judge_key(key, value)
+            if self.rows is None:
+                self.metadata[key] = value
+            if key == "sensors":
+                self.info_sensors = int(value)
+
+    def _packet(self, text: str) -> None:
+        kind, fields = packet_of(text)
+        if kind == "info" and not 1 <= self.info_sensors <= SENSORS_MAX:
+            raise ValueError('an info packet without "# sensors:" before it')
+        self.packets.append((kind, fields))
 
 
 def read_recording(path: Path, salvage: bool = False, device: str | None = None, columns: Collection[str] | None = None,
                    progress: Callable[[float], None] | None = None) -> Recording:
     """device: the serial number of one of several fingertips. columns: only these (t_us and frame among them), for recordings
     that are too large to hold whole; then there are no sensors. progress: called now and then with the share that was read."""
-    lines = _RecordingLines(path, progress, salvage)
-    devices = recorded_devices(path)
-    number_in_file = _choose_device(path, devices, device) if devices else None
-    metadata: dict[str, str] = {}
-    header: list[str] | None = None
-    events: list[str] = []
-    packets: list[tuple[str, dict[str, str]]] = []
-    end: dict[str, str] = {}
-    own_end: dict[str, str] = {}
-    wanted: tuple[int, ...] = ()
-    table, line_numbers, times_us, sensors, skipped = array.array("d"), array.array("q"), array.array("d"), 0, 0
-    advice = "use --salvage to skip damaged lines"
-    for number, line, torn in lines:
-        if number == 1 or not line.strip():
+    lines = _RecordingLines(path, progress)
+    reading = _Reading(path, lines.format == "2", device, columns)
+    skipped = 0
+    last: int | None = None  # line's number
+
+    def damaged(error: InputError, lost: int) -> None:
+        nonlocal skipped
+        if not salvage or reading.rows is None:
+            raise error
+        skipped += lost
+
+    for each in lines:
+        if isinstance(each, Damaged):
+            damaged(each, 0)  # the next one's number tells how many lines are lost
             continue
+        number, text, torn = each
+        if last is None:
+            last = 1
+            continue
+        if number > last + 1:
+            damaged(InputError(f"{path}:{number}: {number - last - 1} lines are missing before it; use --salvage to go on"), number - last - 1)
+        last = number
         try:
-            if torn:
-                raise InputError(f"{path}:{number}: the last line is torn; {advice}")
-            time_us: float | None = None
-            if devices:
-                try:
-                    own_line, time_us = _of_one_device(line, number_in_file, advice)
-                except InputError:
-                    raise InputError(f"{path}:{number}: is no row of this recording; {advice}") from None
-                if own_line is None:
-                    continue
-                line = own_line
-            if line.startswith("#"):
-                key, value = _metadata(line)
-                if key == "end":
-                    end = {**_end_counts(path, number, value), **own_end}
-                elif key == OWN_END:
-                    own_end = _end_counts(path, number, value)
-                elif key == "event":
-                    events.append(value)
-                elif key == "packet":
-                    packets.append(_packet(path, number, value))
-                elif key and header is None:
-                    metadata[key] = value
-                continue
-            cells = line.split(",")
-            if header is None:
-                has = [name for name in RECORDING_COLUMNS if name in cells or name not in TANGENTIAL_COLUMNS]
-                sensors = (len(cells) - len(has)) // 2
-                expected = [*has, *(f"s{k}_Pa" for k in range(sensors)), *(f"tare{k}_Pa" for k in range(sensors))]
-                if cells != expected or len(has) not in (len(RECORDING_COLUMNS), len(RECORDING_COLUMNS) - len(TANGENTIAL_COLUMNS)):
-                    raise InputError(f"{path}:{number}: wrong header; record anew with this version of fingertip")
-                header = cells
-                wanted = tuple(range(len(header))) if columns is None else tuple(sorted(header.index(name) for name in columns if name in has))
-                continue
-            if len(cells) != len(header):
-                raise InputError(f"{path}:{number}: {len(cells)} columns where the header has {len(header)}; {advice}")
-            row = _row(path, number, header, wanted, cells)
-            if row[0] < 0:
-                raise InputError(f"{path}:{number}: t_us is {cells[0]}; device time starts at 0; {advice}")
-            table.extend(row)
-            line_numbers.append(number)
-            if time_us is not None:
-                times_us.append(time_us)
-        except InputError:
-            if not salvage or header is None:
-                raise
-            skipped += 1
-    if header is None:
+            if torn and text:
+                raise ValueError("the last line is torn")
+            reading.line(number, text)
+        except ValueError as error:
+            damaged(InputError(f"{path}:{number}: {error}" + ("; use --salvage to skip damaged lines" if reading.rows else "")), 1)
+    if reading.rows is None:
         raise InputError(f"{path}: no header line; record anew")
-    if not table:
-        raise InputError(f"{path}: no frames; record again while the fingertip streams")
-    return Recording(path, metadata, [header[i] for i in wanted], np.frombuffer(table).reshape(-1, len(wanted)), line_numbers,
-                     sensors if columns is None else 0, events, packets, end, skipped, np.array(times_us) if devices else None)
+    names = [reading.rows.names[i] for i in reading.wanted]
+    table = np.frombuffer(reading.table) if reading.table else np.empty(0)
+    return Recording(path, reading.metadata, names, table.reshape(-1, len(names)), reading.line_numbers, reading.sensors,
+                     reading.events, reading.packets, reading.end, skipped, np.array(reading.times_us) if reading.is_joint else None)
 
 
 GRIP_WORDS = ("state", "trouble")  # its columns that are names
@@ -470,11 +471,19 @@ def _grip_values(path: Path, number: int, columns: list[str], cells: list[str]) 
     return [cell if name in GRIP_WORDS else _number(path, number, name, cell, name != "time_us") for name, cell in zip(columns, cells)]
 
 
+def _undamaged(path: Path, salvage: bool) -> Iterator[Line]:
+    for each in _RecordingLines(path):
+        if not isinstance(each, Damaged):
+            yield each
+        elif not salvage:
+            raise each
+
+
 def read_grip(path: Path, salvage: bool = False) -> dict[str, Any]:
     """The gripper's rows in the recording of a grasp: {column: array}, NaN where empty; of any other recording an empty dictionary."""
     columns: list[str] | None = None
     rows: list[list[Any]] = []
-    for number, line, torn in _RecordingLines(path, salvage=salvage):
+    for number, line, torn in _undamaged(path, salvage):
         if not line.startswith(GRIP_ROW):
             continue
         cells = line[len(GRIP_ROW):].split(",")
@@ -498,7 +507,7 @@ def read_grip(path: Path, salvage: bool = False) -> dict[str, Any]:
 def read_grip_events(path: Path) -> list[tuple[float, str]]:
     """What was asked of the gripper and what went wrong: [(time_us, text)]."""
     events = []
-    for number, line, torn in _RecordingLines(path):
+    for number, line, torn in _undamaged(path, False):
         if line.startswith(GRIP_EVENT) and not torn:
             time_us, _, text = line[len(GRIP_EVENT):].partition(",")
             events.append((_number(path, number, "time_us", time_us, False), text))

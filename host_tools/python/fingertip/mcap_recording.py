@@ -385,37 +385,61 @@ def _cells_of(row: dict[str, Any], names: list[str]) -> str:
     return ",".join(cells)
 
 
+class Damaged(InputError):
+    """A part of a file that cannot be read; reading goes on behind it."""
+
+
+class _Content(io.BytesIO):
+    """A record's, whose fields end within it."""
+
+    def read(self, length: int | None = -1, /) -> bytes:
+        data = super().read(length)
+        if length is not None and len(data) < length:
+            raise ValueError("it ends within a field")
+        return data
+
+
+Line = tuple[int, str, bool]  # number, text, whether it is torn
+
+
 class McapLineReader:
-    """The lines of a recording in an MCAP file, in the order in which they were written: number, text, whether it is torn.
+    """The lines of a recording in an MCAP file, in the order in which they were written.
 
     It reads from the begin and without the index, so that a file whose writer was killed reads as far as it goes. Raises InputError where
-    the file cannot be read, is none of a recording, or is damaged; salvage skips what is damaged.
+    the file cannot be read, or is none of a recording.
     """
 
-    def __init__(self, path: "str | os.PathLike[str]", salvage: bool = False, progress: Callable[[float], None] | None = None) -> None:
+    def __init__(self, path: "str | os.PathLike[str]", progress: Callable[[float], None] | None = None) -> None:
         self.path = os.fspath(path)
-        self._salvage = salvage
         self._progress = progress
         self._mcap = _mcap()
         self._schemas: dict[int, str] = {}  # names
         self._channels: dict[int, tuple[str, str]] = {}  # topic, name of the schema
+        self._is_joint: bool | None = None
         self._names: list[str] = []
 
-    def __iter__(self) -> Iterator[tuple[int, str, bool]]:
-        last = 0
-        for topic, name, data in self._messages():
-            if name in (LINE_TYPE, CONTACT_TYPE):
-                line = self._line(topic, name, data)
-                if line[0] > last + 1 and not self._salvage:
-                    raise InputError(f"{self.path}: {line[0] - last - 1} lines are missing before line {line[0]}; use --salvage to go on")
-                last = line[0]
-                yield line
-        if not last:
-            raise InputError(f"{self.path}: no recording of a fingertip; give one that fingertip has written")
+    def __iter__(self) -> Iterator[Line]:
+        """Those that can be read."""
+        return (each for each in self.lines() if not isinstance(each, Damaged))
 
-    def _messages(self) -> Iterator[tuple[str, str, bytes]]:
+    def lines(self) -> Iterator[Line | Damaged]:
+        """What is damaged is among them, where it stands."""
+        has_line = False
+        for each in self._messages():
+            if isinstance(each, Damaged):
+                yield each
+            elif each[1] in (LINE_TYPE, CONTACT_TYPE):
+                has_line = True
+                yield self._line(*each)
+        if not has_line:
+            raise InputError(f"{self.path}: no recording of a fingertip; give one that fingertip has written")
+        if self._is_torn:
+            yield Damaged(f"{self.path}: the last chunk is torn; use --salvage to do without")
+
+    def _messages(self) -> Iterator[tuple[str, str, bytes] | Damaged]:
         """(topic, name of the schema, data)"""
         damage = (ValueError, MemoryError, struct.error, self._mcap.exceptions.McapError, self._mcap.stream_reader.zstandard.ZstdError)
+        self._is_torn = False
         try:
             with open(self.path, "rb") as file:
                 size = os.fstat(file.fileno()).st_size
@@ -428,11 +452,9 @@ class McapLineReader:
                     try:
                         yield from self._judge(opcode, content)
                     except damage as error:
-                        if not self._salvage:
-                            raise InputError(f"{self.path}: damaged at byte {at} ({error}); use --salvage to skip the chunk") from None
+                        yield Damaged(f"{self.path}: damaged at byte {at} ({error}); use --salvage to skip the chunk")
         except EOFError:
-            if not self._salvage:
-                raise InputError(f"{self.path}: the last chunk is torn; use --salvage to do without") from None
+            self._is_torn = True
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; check the path") from None
 
@@ -450,15 +472,17 @@ class McapLineReader:
             yield at, opcode, stream.read(length)
 
     def _judge(self, opcode: int, content: bytes) -> list[tuple[str, str, bytes]]:
-        """The messages in a record. Raises what mcap raises, or ValueError."""
+        """The messages in a record. Of schemas and channels only what they need is read: damage elsewhere costs none. Raises what mcap raises,
+        or ValueError."""
         known, records = self._mcap.opcode.Opcode, self._mcap.records
-        stream = self._mcap.data_stream.ReadDataStream(io.BytesIO(content))
+        stream = self._mcap.data_stream.ReadDataStream(_Content(content))
         if opcode == known.SCHEMA:
-            schema = records.Schema.read(stream)
-            self._schemas[schema.id] = schema.name.replace("/msg/", "/")
+            number, name = stream.read2(), stream.read(stream.read4())
+            self._schemas[number] = name.decode("utf-8", "replace").replace("/msg/", "/")
         elif opcode == known.CHANNEL:
-            channel = records.Channel.read(stream)
-            self._channels[channel.id] = channel.topic, self._schemas.get(channel.schema_id, "")
+            number, schema, topic = stream.read2(), stream.read2(), stream.read(stream.read4())
+            stream.read(stream.read4())  # the encoding
+            self._channels[number] = topic.decode("utf-8", "replace"), self._schemas.get(schema, "")
         elif opcode == known.MESSAGE:
             message = records.Message.read(stream, len(content))
             if message.channel_id not in self._channels:
@@ -485,14 +509,27 @@ class McapLineReader:
         except EOFError:
             raise ValueError("a record in it is torn") from None
 
-    def _line(self, topic: str, name: str, data: bytes) -> tuple[int, str, bool]:
+    def _line(self, topic: str, name: str, data: bytes) -> Line | Damaged:
         try:
             row = decode(name, data)
+            return self._of_row(row) if name == CONTACT_TYPE else self._of_line(row)
         except ValueError as error:
-            raise InputError(f"{self.path}: a damaged message on {topic} ({error})") from None
-        if name == CONTACT_TYPE:
-            return row["line"], _cells_of(row, self._names), False
+            return Damaged(f"{self.path}: a damaged message on {topic} ({error}); use --salvage to skip it")
+
+    def _of_line(self, row: dict[str, Any]) -> Line:
         text: str = row["text"]
-        if not self._names and not text.startswith("#"):
+        if "\n" in text:
+            raise ValueError("a line that ends within")
+        if self._is_joint is None:
+            self._is_joint = text == "# fingertip-recording 2"
+        if not self._names and text and not text.startswith("#"):
             self._names = text.split(",")
         return row["line"], text, row["torn"]
+
+    def _of_row(self, row: dict[str, Any]) -> Line:
+        if not row["has_raw"]:
+            row["pressure_pa"] = row["tare_pa"] = ()
+        sensors = sum(name.startswith("tare") for name in self._names) if row["has_raw"] else 0
+        if math.isnan(row["time_us"]) == bool(self._is_joint) or {len(row["pressure_pa"]), len(row["tare_pa"])} != {sensors}:
+            raise ValueError("a row of another recording")
+        return row["line"], _cells_of(row, self._names), False

@@ -96,7 +96,9 @@ class _Reader:
     def value(self, kind: str) -> Any:
         if kind == "string":
             text: bytes = self.take("s", self.take("I")[0])[0]
-            return text.removesuffix(b"\0").decode("utf-8")
+            if not text:
+                raise ValueError("a text without its end")
+            return text[:-1].decode("utf-8", "surrogateescape")
         if kind in _PRIMITIVES:
             return self.take(_PRIMITIVES[kind])[0]
         return self.message(kind)

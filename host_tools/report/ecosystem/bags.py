@@ -285,7 +285,7 @@ def truncations(tool, bag, csv_path, folder, count, seed):
         done = subprocess.run([tool, "convert", cut, out, "--salvage", "--overwrite"], capture_output=True, text=True, timeout=PATIENCE_s)
         read = out.read_bytes().split(b"\n")[:-1] if done.returncode == 0 else []
         try:
-            by_package = [text.encode("utf-8") for _, text, _ in McapLineReader(cut, salvage=True)]
+            by_package = [text.encode("utf-8") for _, text, _ in McapLineReader(cut)]
         except InputError:
             by_package = []
         by_other = by_mcap_stream(cut)

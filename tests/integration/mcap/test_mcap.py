@@ -201,7 +201,7 @@ class TestMcap(unittest.TestCase):
         self.assertTrue(set(saved) < set(whole) and len(saved) >= 30)
         with self.assertRaisesRegex(InputError, "use --salvage"):
             read_recording(path)
-        self.assertEqual([line.encode() for _, line, _ in files._RecordingLines(path, salvage=True)], saved)
+        self.assertEqual([line.encode() for _, line, _ in files._undamaged(path, True)], saved)
 
     def test_what_is_no_recording_is_said(self):
         other = self.folder / "other.mcap"

@@ -20,9 +20,10 @@ function textOf(setting: Setting, info: Info): string {
 
 /** In the packet's unit. */
 function numberIn(value: Value, text: string): number {
-  const number = text.trim() === '' ? NaN : Number(text);
+  const isNumber = value.whole && value.per === 1 ? /^\d+$/.test(text) : text.trim() !== '';
+  const number = isNumber ? Number(text) : NaN;
   if (value.choices) {
-    if (!value.choices.some((each) => String(each) === text)) {
+    if (!value.choices.some((each) => each === number)) {
       throw new Error(`${value.say}: "${text}" is none of ${value.choices.join(', ')}`);
     }
   } else if (!(number >= value.span[0] && number <= value.span[1])) {

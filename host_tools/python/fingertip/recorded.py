@@ -1,0 +1,176 @@
+"""What may stand in a line of a recording. What libfingertip refuses is refused here too (recording_reader.cpp; the test formats)."""
+import math
+import operator
+import re
+from collections.abc import Callable
+
+from .frames import Q10
+from .line import (
+    CONTACT_COLUMNS, RAW_COLUMNS, SENSORS_MAX, TANGENTIAL_COLUMNS, Acknowledgement, Calibration, Contact, Health, Info, PadProfile, Wire)
+from .wire import layout_of
+
+_LARGEST = {"B": 2**8 - 1, "n": 2**8 - 1, "H": 2**16 - 1, "I": 2**32 - 1, "Q": 2**64 - 1}
+_WHOLE = re.compile("-?[0-9]+")
+_NUMBER = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_BINARY32 = 2.0**-150, 2.0**128 - 2.0**103  # not above the first it becomes 0, from the second on infinite
+_BINARY64 = 0.0, math.inf
+_PAD_LISTS = {"pad_shares": 2, "pad_sds_mm": 2, "pad_moments_mm": 3, "pad_moment_sds_mm": 3,
+              **{f"pad_{name}": 3 for name in PadProfile._fields if name.startswith("edge_")}}
+_LISTS = {**dict.fromkeys(("x_mm", "y_mm", "gains", "gain_sds"), SENSORS_MAX), **_PAD_LISTS}
+_SCALARS = {prefix + name: wire.code for body, prefix in ((Info, ""), (Calibration, ""), (PadProfile, "pad_")) for name, wire in layout_of(body)
+            if wire.code in "BnHIf" and wire.times == 1}
+_SCALARS |= {f"calibration_{name}": _SCALARS.pop(name) for name in ("date_s", "placements")}
+_PACKETS = {kind: {"sequence": "H", "t_us": "Q", **{name: wire.code for name, wire in layout_of(body)}}
+            for kind, body in (("health", Health), ("ack", Acknowledgement))}
+_PACKETS["info"] = {"sequence": "H", "t_us": "Q"}
+
+
+def whole(name: str, cell: str, code: str) -> int:
+    """A whole number of struct's code. Raises ValueError."""
+    if not _WHOLE.fullmatch(cell) or (code == "Q" and cell[0] == "-"):
+        raise ValueError(f'{name} is "{cell}"')
+    if not 0 <= int(cell) <= _LARGEST[code]:
+        raise ValueError(f"{name} is out of range")
+    return int(cell)
+
+
+def number(name: str, cell: str, limits: tuple[float, float] = _BINARY64) -> float:
+    """A finite number, which is 0 only where it is written so. Raises ValueError."""
+    value = float(cell) if _NUMBER.fullmatch(cell) else math.nan
+    if not abs(value) < limits[1] or (abs(value) <= limits[0] and re.search("[1-9]", re.split("[eE]", cell)[0])):
+        raise ValueError(f'{name} is "{cell}"; a finite number is needed')
+    return value
+
+
+def _scaled(name: str, cell: str, scale: float, bits: int) -> float:
+    value = number(name, cell)
+    if abs(value) > 1e12:
+        raise ValueError(f'{name} is "{cell}"')
+    if not -2**(bits - 1) <= math.copysign(math.floor(abs(value) * scale + 0.5), value) < 2**(bits - 1):
+        raise ValueError(f"{name} is out of range")
+    return value
+
+
+def judge_key(key: str, value: str) -> None:
+    """A comment "# key: value" of an info packet; any other key is fine. Raises ValueError."""
+    if key in ("serial", "board", "scene", "git"):
+        if not (value.isascii() and (value.isprintable() or not value)):
+            raise ValueError(f"{key} is no printable ASCII")
+    elif key == "firmware":
+        if value.count(".") != 2:
+            raise ValueError(f'firmware is "{value}"')
+        for part in value.split("."):
+            whole(key, part, "B")
+    elif key in _LISTS:
+        words = value.split(" ") if value else []
+        if len(words) > _LISTS[key]:
+            raise ValueError(f"{key} has too many values")
+        for word in words:
+            number(key, word, _BINARY32)
+    elif key in _SCALARS:
+        if _SCALARS[key] == "f":
+            number(key, value, _BINARY32)
+        else:
+            whole(key, value, _SCALARS[key])
+
+
+def counts_of(text: str) -> dict[str, str]:
+    """Of "key=value key=value". Raises ValueError."""
+    counts: dict[str, str] = {}
+    for pair in text.split(" "):
+        key, separator, value = pair.partition("=")
+        if not separator:
+            raise ValueError(f'"{pair}" is not key=value')
+        counts.setdefault(key, value)
+    return counts
+
+
+def packet_of(text: str) -> tuple[str, dict[str, str]]:
+    """A comment of a packet: its kind, and {field: whole number as it is written}. Raises ValueError."""
+    kind, _, rest = text.partition(" ")
+    fields = counts_of(rest) if rest else {}
+    if kind not in _PACKETS:
+        raise ValueError(f'packet "{kind}" is unknown')
+    for name, code in _PACKETS[kind].items():
+        if name not in fields:
+            raise ValueError(f"{name} is missing")
+        whole(name, fields[name], code)
+    return kind, fields
+
+
+class Rows:
+    """The rows under a header, from t_us on. Raises ValueError where it is none."""
+
+    def __init__(self, header: str) -> None:
+        self.has_tangential = ",qx_N," in header
+        self._first_raw = 2 + len(CONTACT_COLUMNS) + len(TANGENTIAL_COLUMNS) * self.has_tangential
+        first_sensor = self._first_raw + len(RAW_COLUMNS)
+        self.sensors = max(0, (header.count(",") + 1 - first_sensor) // 2)
+        self.names = ["t_us", "frame", *CONTACT_COLUMNS, *(TANGENTIAL_COLUMNS if self.has_tangential else ()), *RAW_COLUMNS,
+                      *(f"s{k}_Pa" for k in range(self.sensors)), *(f"tare{k}_Pa" for k in range(self.sensors))]
+        if header != ",".join(self.names) or self.sensors > SENSORS_MAX:
+            raise ValueError("wrong header")
+        wires = {"sequence": Wire("H"), **dict(layout_of(Contact))}
+        contact = [wires[name] for name in self.names[2:self._first_raw]]
+        self._codes = ["Q", "I", *(wire.code for wire in contact), "H", "I", "I", "I", "I", "h", *"i" * 2 * self.sensors]
+        self._flags = {at: int(wire.when[1]) for at, wire in enumerate(contact, 2) if wire.code == "f" and wire.when}
+        most = {"f": 3.4e38, "h": 327.67, "i": 2097151.999}  # what is beyond is judged cell by cell
+        self._high = [most.get(code, _LARGEST.get(code, 0.0)) for code in self._codes]
+        self._low = [-most.get(code, 0.0) for code in self._codes]
+        self._plain = re.compile(self._plain_rows())
+        self._untold = 0  # flags of columns that are not there
+        for name in () if self.has_tangential else TANGENTIAL_COLUMNS:
+            when = wires[name].when
+            self._untold |= int(when[1]) if when else 0
+        self._needed: dict[int, Callable[[list[str]], tuple[str, ...]]] = {}
+        self._mask = 0
+        for bit in self._flags.values():
+            self._mask |= bit
+
+    def _plain_rows(self) -> str:
+        """Of rows as writers write most of them."""
+        number = r"-?[0-9]+(?:\.[0-9]{1,20})?"
+        cells = [f"(?:{number})?" if code == "f" else number if code in "hi" else "[0-9]+" for code in self._codes]
+        groups = [cells[2:self._first_raw], cells[self._first_raw:]]
+        parts = [f"(?:{','.join(group)}|,{{{len(group) - 1}}})" for group in groups]
+        return ",".join(["[0-9]+", "[0-9]+", *parts])
+
+    def values(self, text: str) -> list[float]:
+        """A row's cells as numbers, NaN where they are empty. Raises ValueError where libfingertip finds no row in it."""
+        cells = text.split(",")
+        if not self._plain.fullmatch(text) or not (cells[2] or cells[self._first_raw]) or not self.sensors:
+            return self._judged(cells)
+        values = [float(cell) if cell else math.nan for cell in cells]
+        if any(map(operator.gt, values, self._high)) or any(map(operator.lt, values, self._low)) or (
+                cells[2] and (int(cells[3]) & self._untold or "" in self._needed_under(int(cells[3]))(cells))):
+            return self._judged(cells)
+        return values
+
+    def _needed_under(self, flags: int) -> Callable[[list[str]], tuple[str, ...]]:
+        """The cells that may not be empty."""
+        flags &= self._mask
+        if flags not in self._needed:
+            self._needed[flags] = operator.itemgetter(0, 1, *(at for at, bit in self._flags.items() if bit & flags))
+        return self._needed[flags]
+
+    def _judged(self, cells: list[str]) -> list[float]:
+        if len(cells) != len(self.names):
+            raise ValueError(f"{len(cells)} columns where the header has {len(self.names)}")
+        first_raw = self._first_raw
+        has_contact, has_raw = any(cells[2:first_raw]), any(cells[first_raw:])
+        if not has_contact and not has_raw:
+            raise ValueError("a row without a packet")
+        if has_raw and not self.sensors:
+            raise ValueError("pressures in a recording without sensors")
+        if has_contact and whole("flags", cells[3], "I") & self._untold:
+            raise ValueError("its flags tell of columns that are not there")
+        there = [True, True, *(first_raw - 2) * [has_contact], *(len(cells) - first_raw) * [has_raw]]
+        return [self._cell(at, cell, cells) if there[at] else math.nan for at, cell in enumerate(cells)]
+
+    def _cell(self, at: int, cell: str, cells: list[str]) -> float:
+        name, code = self.names[at], self._codes[at]
+        if code == "f":
+            return number(name, cell, _BINARY32) if cell or int(cells[3]) & self._flags[at] else math.nan
+        if code in "hi":
+            return _scaled(name, cell, 100 if code == "h" else Q10, 16 if code == "h" else 32)
+        return whole(name, cell, code)

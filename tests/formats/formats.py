@@ -1,0 +1,85 @@
+"""One corpus of recordings, lines and settings, good and damaged, through the library, the Python package and the page: the same answer, or the
+same refusal. usage: formats.py FINGERTIP BY_LIBRARY [--page FOLDER] [--json FILE] [--keep FOLDER]
+"""
+import argparse
+import collections
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parent / "checks")]
+import corpus  # noqa: E402
+import house  # noqa: E402
+
+PATIENCE_s = 600
+SHOWN = 20
+
+
+def answers(*command):
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=PATIENCE_s, check=False)
+    if done.returncode != 0:
+        raise SystemExit(f"formats.py: {command[0]}: {done.stderr.strip()[-2000:]}")
+    return json.loads(done.stdout)
+
+
+def judged(answer):
+    """An answer; of a refusal not the words, which are each language's own, but the line in a CSV file."""
+    if not isinstance(answer, dict) or "refused" not in answer:
+        return answer
+    line = re.findall(r"\.csv(?::|, line )(\d+):", answer["text"])[:1] if answer["refused"] == "damaged" else []
+    return {"refused": answer["refused"], "line": line}
+
+
+def agree(one, other):
+    """The page tells of no events."""
+    return one == other or isinstance(one, dict) and isinstance(other, dict) and {**one, **other} == one and one.keys() - other.keys() <= {"events"}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("fingertip")
+    parser.add_argument("by_library")
+    parser.add_argument("--page", nargs="+", metavar="WORD", help="the command that answers as the page does")
+    parser.add_argument("--json")
+    parser.add_argument("--keep", help="leave the corpus there")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="fingertip-") as name:
+        folder = pathlib.Path(options.keep or name)
+        folder.mkdir(exist_ok=True)
+
+        def convert(start, end):
+            subprocess.run([options.fingertip, "convert", start, end, "--overwrite"], check=True, capture_output=True, timeout=PATIENCE_s)
+
+        jobs = corpus.make(folder, convert)
+        job_file = folder / "jobs.json"
+        job_file.write_text(json.dumps(jobs), encoding="utf-8")
+        found = {"library": answers(options.by_library, job_file), "Python": answers(sys.executable, HERE / "by_python.py", job_file)}
+        if options.page:
+            found["page"] = answers(*options.page, job_file)
+    disagreements = []
+    for name in found["library"]:
+        told = {who: judged(answer[name]) for who, answer in found.items() if name in answer}
+        others = [who for who, answer in told.items() if not agree(told["library"], answer)]
+        if others:
+            disagreements.append({"input": name, "of": others, **{who: found[who][name] for who in told}})
+    refusals = collections.Counter(answer.get("refused", "taken") for answer in found["library"].values() if isinstance(answer, dict))
+    said = {"inputs": len(jobs), "refused": dict(refusals), "through": {who: len(each) for who, each in found.items()},
+            "format_disagreements": len(disagreements), "disagreements": disagreements}
+    if options.json:
+        path = pathlib.Path(options.json)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
+    for each in disagreements[:SHOWN]:
+        print(f"{each['input']}: " + ", ".join(f"{who}: {json.dumps(each[who])[:300]}" for who in found if who in each), file=sys.stderr)
+    ours = sum(each["of"] != ["page"] for each in disagreements)
+    goal, may = house.LIMITS["format_disagreements"]
+    print(f"{len(jobs)} inputs, {dict(refusals)}; {len(disagreements)} disagreements (goal {goal}, may be {may} until then), {ours} of them between library and Python")
+    return 1 if ours or len(disagreements) > may else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
