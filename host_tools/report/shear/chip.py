@@ -10,13 +10,12 @@ import numpy as np  # noqa: E402
 import scenes  # noqa: E402
 from boards import PARALLEL as BOARD, fit_cycles_of  # noqa: E402
 from emulated import FROM_s, Measurement, Tools, scenario  # noqa: E402
-from fingertip.files import read_recording  # noqa: E402
+from fingertip.files import TANGENTIAL_VALID, read_recording  # noqa: E402
 from reporting import run  # noqa: E402
 
 OSRS = (256, 1024)
 SECONDS = 6.0
 PAD = ("12", "0")  # thickness and overhang, mm; 0: no ends, which cost as much
-TANGENTIAL_VALID = 1 << 20
 
 
 class GraspTools(Tools):

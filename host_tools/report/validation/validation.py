@@ -29,13 +29,13 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 from boards import MULTIPLEXED, TO_BUILD, image_of  # noqa: E402
 from fingertip.files import FIT_VALID, SLIP, InputError, read_recording, run_tool  # noqa: E402
+from fingertip.line import Flag  # noqa: E402
 from goals import judge  # noqa: E402
 from reporting import finish, option_parser, output_folder, run, write_json  # noqa: E402
 from validation_report import draw, write_report  # noqa: E402
 
-SATURATED = 1 << 12
-# LOW_SIGNAL, FLAT, UNCERTAIN, MODEL, AT_BOUND. A saturated or missing sensor is left out: that alone makes no location worse.
-LOCATION_WARNINGS = sum(1 << bit for bit in (8, 9, 10, 11, 15))
+# A saturated or missing sensor is left out: that alone makes no location worse.
+LOCATION_WARNINGS = int(Flag.LOW_SIGNAL | Flag.FLAT | Flag.UNCERTAIN | Flag.MODEL | Flag.AT_BOUND)
 
 PAPER_RATE_Hz = 20
 FORCE_MIN_N = 1.0
@@ -424,7 +424,7 @@ def measure(shop, seconds, emulated):
         found[f"{name}_bad_unflagged_percent"] = stiff.trust()["bad_unflagged_percent"]
     for name, what in (("saturated", "high"), ("saturated_biased", "high biased")):
         high = Samples(shop.select(what, case=0))
-        saturated = (high.flags & SATURATED) != 0
+        saturated = (high.flags & int(Flag.SATURATED)) != 0
         found[f"{name}_median_mm"] = float(np.median(high.error_mm[saturated])) if saturated.any() else None
         found[f"{name}_samples"] = int(saturated.sum())
     found |= measure_location(shop) | measure_force(shop, found["force_scale_gain0"]) | measure_stiff(shop) | measure_slip(shop)

@@ -310,6 +310,7 @@ test('settings: commands for what differs, refusals with the range', () => {
     { type: PacketType.CMD_PRIOR, sigma_mm: 3.1, width_mm: 0.5 },
     { type: PacketType.CMD_LOCATION_LIMIT, limit_mm: 0.5 },
   ]);
+  assert.deepEqual(commandsFor(info!, { rate: '30.5' }), [{ type: PacketType.CMD_RATE, rate_mHz: 30500 }]);
   assert.deepEqual(commandsFor(info!, { prior: 'none' }), [{ type: PacketType.CMD_PRIOR, sigma_mm: 0, width_mm: 0 }]);
   assert.throws(() => commandsFor(info!, { osr: '300' }), /none of 256, 512/);
   for (const wrong of [{ rate: '0' }, { rate: 'fast' }, { slip_threshold: '51' }, { prior: '3:' }, { limit: '' }]) {

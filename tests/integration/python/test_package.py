@@ -465,6 +465,7 @@ class Commands(DeviceTest):
             info = tip.set(rate_Hz=400, osr=256, slip_threshold_mm=0.25, prior_sigma_mm=3, location_limit_mm=0.5, keep=True)
             self.assertEqual((info.rate_mHz, info.osr, info.slip_threshold_mm, info.prior_sigma_mm, info.prior_width_mm, info.location_limit_mm),
                              (400000, 256, 0.25, 3.0, 0.5, 0.5))
+            self.assertEqual(info.slip_window_ms, 100)  # it travels with the threshold
             self.assertTrue(info.stored & fingertip.Stored.SETTINGS)
             self.assertEqual(tip.set(prior_sigma_mm=0).prior_sigma_mm, 0)
             self.assertEqual(tip.read_health().stack_free_bytes, tip.health.stack_free_bytes)
