@@ -31,13 +31,13 @@ enum contact_flag {
   CONTACT_FLAG_SENSOR_MASKED = 1 << 14, /* warning: a sensor is missing or was left out */
   CONTACT_FLAG_AT_BOUND = 1 << 15, /* warning: the fit stopped at a limit */
   CONTACT_FLAG_ELONGATED = 1 << 16, /* warning: the contact is not round */
-  /* warning: a force and a zero that has moved cannot be told apart */
+  /* warning: the pressure may be a force or a zero that has moved */
   CONTACT_FLAG_ZERO_DOUBTFUL = 1 << 17,
   CONTACT_FLAG_SENSOR_DOUBTFUL = 1 << 18, /* warning: a sensor in use gives reason to doubt it */
   CONTACT_FLAG_CALIBRATED = 1 << 19, /* gains and force scale of a calibration act */
   /* the tangential load has values; location and force are corrected for it */
   CONTACT_FLAG_TANGENTIAL_VALID = 1 << 20,
-  /* the tangential load is what changed since the first touch */
+  /* the tangential load is the change since the first touch */
   CONTACT_FLAG_TANGENTIAL_FROM_TOUCH = 1 << 21,
   CONTACT_FLAG_VELOCITY_VALID = 1 << 22, /* the velocity of the contact has values */
   CONTACT_FLAG_MOVING = 1 << 23, /* the speed of the contact is above the threshold */

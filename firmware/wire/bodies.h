@@ -64,8 +64,8 @@ enum wire_result {
   WIRE_RESULT_DONE = 0, /* the command was carried out */
   WIRE_RESULT_UNKNOWN_COMMAND = 1, /* the firmware does not know this command */
   WIRE_RESULT_OUT_OF_RANGE = 2, /* a value is out of range for this firmware */
-  /* not now: a tare while no sensor answers, or in contact and not forced; a change of what is
-   * stored while one is being written, or where the flash fails */
+  /* not now: a tare while no sensor answers, or in contact and not forced; a command that stores
+   * while another is being written, or if the flash fails */
   WIRE_RESULT_NOT_NOW = 3,
 };
 
@@ -74,7 +74,7 @@ enum wire_stored {
   WIRE_STORED_CALIBRATION = 1 << 0, /* a calibration, and it acts; never without capability fit */
   WIRE_STORED_SETTINGS = 1 << 1, /* settings; it started with them */
   WIRE_STORED_WRITING = 1 << 2, /* a change is on its way into the flash */
-  /* what is there is damaged, or of a later firmware, and not used; storing again mends it */
+  /* the content is damaged, or of a later firmware, and not used; storing again repairs it */
   WIRE_STORED_DAMAGED = 1 << 3,
   WIRE_STORED_PAD = 1 << 4, /* a pad's profile, and it acts; never without capability tangential */
 };
@@ -112,18 +112,18 @@ struct wire_stages {
   uint16_t queue_us; /* the complete frame waits for the processor */
   uint16_t condition_us; /* compensation, tare, gate */
   uint16_t fit_us; /* the fit */
-  uint16_t contact_us; /* slip, and the judgement of the result */
+  uint16_t contact_us; /* slip, and the flags of the result */
   /* the sum of the six stages: from the first bus activity of the frame to the encoding of this
    * packet */
   uint16_t total_us;
 };
 
 /* One judged frame. The header's time is the middle of the sensors' conversion. A quantity
- * travels only under its VALID flag; without it the encoder leaves it out and the decoder gives
+ * travels only under its VALID flag. Without it the encoder leaves it out and the decoder gives
  * 0 (NaN in Python and in messages). */
 struct wire_contact {
   uint32_t frame; /* counts every frame since start, fitted or not */
-  uint32_t flags; /* what the frame says about itself */
+  uint32_t flags; /* flags of the frame, see below */
   struct wire_stages stages;
   /* FIT_VALID */
   uint32_t sensors_used; /* bitmap of the sensors that entered the fit */
@@ -135,10 +135,9 @@ struct wire_contact {
   float residual_rms_Pa; /* root mean square of the residuals of the fit */
   /* UNCERTAINTY_VALID */
   float location_sd_mm; /* predicted radial standard deviation of the location */
-  float force_sd_N; /* predicted standard deviation of the force, that of the force scale in it */
+  float force_sd_N; /* predicted standard deviation of the force, with that of the force scale */
   /* SLIP_VALID */
-  /* slip distance, paper eq. (7): of the location from its mean over the slip window */
-  float slip_mm;
+  float slip_mm; /* slip distance, paper eq. (7): from the mean location over the slip window */
   /* WIDTHS_VALID */
   float sigma_x_mm; /* standard deviation of an elliptic Gaussian along x */
   float sigma_y_mm; /* standard deviation of that along y */
@@ -146,15 +145,15 @@ struct wire_contact {
   /* TANGENTIAL_VALID */
   float qx_N; /* tangential load of the object on the rubber, along x */
   float qy_N; /* tangential load along y */
-  float q_sd_N; /* predicted standard deviation of either, those of the scales in it */
+  float q_sd_N; /* predicted standard deviation of either, with those of the scales */
   float tangential_ratio; /* size of the tangential load over force_N */
   /* VELOCITY_VALID */
   float vx_mm_s; /* velocity of the contact along x */
   float vy_mm_s; /* velocity of the contact along y */
 };
 
-/* The readings of one frame. The header's time as in the contact packet of the same frame
- * number. No gain of a calibration is in them. */
+/* The readings of one frame, without the gains of a calibration. The header's time is that of
+ * the contact packet of the same frame number. */
 struct wire_raw {
   uint32_t frame; /* the same number as in the contact packet of this frame */
   /* as in the contact packet; firmware without capability fit sets only CONTACT, TARED, HELD,
@@ -166,7 +165,7 @@ struct wire_raw {
   /* bitmap: the reading is above 1980 mbar, where the sensor's range ends, and does not enter
    * the fit */
   uint32_t saturated;
-  uint32_t doubtful; /* bitmap: a measurement that there is reason to doubt; 0 in a held frame */
+  uint32_t doubtful; /* bitmap: a measurement with a reason to doubt it; 0 in a held frame */
   int16_t temperature_cC; /* mean of the sensors, 0.01 degC; 0 until measured */
   uint8_t sensor_count; /* number of sensors, 1 to 32 */
   /* of each sensor: absolute pressure, and the tare that is subtracted before the fit; both in
@@ -175,8 +174,8 @@ struct wire_raw {
   int32_t baseline_Pa_q10[FT_MAX_SENSORS];
 };
 
-/* Who a fingertip is, how it is set, and what it keeps. Without its capability a field is 0
- * (None or NaN in Python). */
+/* Identity, settings and stored data of a fingertip. Without its capability a field is 0 (None
+ * or NaN in Python). */
 struct wire_info {
   uint8_t firmware_version[3]; /* major, minor, patch */
   uint8_t sensor_count; /* number of sensors, 1 to 32 */
@@ -189,7 +188,7 @@ struct wire_info {
   uint32_t measured_rate_mHz; /* frame rate over the last second; 0 before */
   uint16_t osr; /* oversampling ratio, 256 to 8192 */
   /* time between temperature conversions while the temperature changes; up to four times as long
-   * while it stands still */
+   * while it is constant */
   uint16_t temperature_interval_ms;
   uint8_t streams; /* streams that are on */
   /* with WIRE_CAPABILITY_FIT, else 0 */
@@ -228,15 +227,16 @@ struct wire_health {
   uint32_t bus_nacks; /* reads that a sensor did not acknowledge, or that broke off */
   uint32_t bus_timeouts; /* operations on the bus that did not end in time */
   uint32_t bus_recoveries; /* nine clocks, and resets of multiplexers */
-  /* conversions that had not finished, and those that are void since one did not or was not read */
+  /* conversions that had not finished, and those that are void after one of these or after a
+   * missed reading */
   uint32_t zero_readings;
   /* readings left out: below zero, or a step that no other sensor shared */
   uint32_t implausible_readings;
   uint32_t sensors_present; /* bitmap: the sensor answered at the last attempt */
-  /* bitmap: the PROM's CRC is wrong, and the sensor streams all the same; or the PROM is blank,
-   * and it does not */
+  /* bitmap: the PROM's CRC is wrong, and the sensor still streams; or the PROM is blank, and it
+   * does not */
   uint32_t sensors_prom_bad;
-  /* since power-on; faults and panics end in one too, and the command crash asks for the last */
+  /* since power-on. Faults and panics end in one too. The command crash asks for the last */
   uint32_t watchdog_resets;
   uint16_t cpu_busy_permille; /* main loop without interrupts, over the last second */
   uint16_t stack_free_bytes; /* never touched since start */
@@ -247,23 +247,24 @@ struct wire_health {
 /* The answer to a command. */
 struct wire_ack {
   uint8_t command; /* type of the command */
-  uint8_t result; /* what came of it, see below */
+  uint8_t result; /* result, see below */
   uint16_t sequence; /* the command's own */
   uint64_t host_time_us; /* time in the command's header, so that the host can relate the clocks */
 };
 
-/* Streams to send; 0 stops. One that the firmware's capabilities lack is out of range. Nothing
- * streams until this command: a terminal that echoes cannot start it by accident. */
+/* Set the streams to send; 0 stops. A stream that the firmware's capabilities lack is out of
+ * range. Nothing streams until this command, so that a terminal that echoes cannot start it by
+ * accident. */
 struct wire_cmd_stream {
   uint8_t streams; /* bits of the streams */
 };
 
-/* Measure the zero again over the next 16 frames (at rates below 16 Hz those of a second, three
- * at least), during which no contact is reported. While one is reported, and while no sensor
- * answers, it is refused with "not now": what presses would become the zero. The zero follows
- * slow drift only while nothing touches the pad: send this between grasps, as the paper does. */
+/* Measure the zero over the next 16 frames (at rates below 16 Hz those of a second, three at
+ * least). The device reports no contact meanwhile. In contact, and while no sensor answers, it
+ * refuses with "not now", since the press would become the zero. The zero follows slow drift
+ * only while nothing touches the pad. So send this between grasps, as the paper does. */
 struct wire_cmd_tare {
-  uint8_t force; /* 1: tare whatever touches, where the contact is known to be none; 0 */
+  uint8_t force; /* 1: tare even in contact, if that contact is known to be none; 0 */
 };
 
 /* Set the frame rate; 0: as fast as the sensors allow. */
@@ -276,7 +277,7 @@ struct wire_cmd_osr {
   uint16_t osr; /* oversampling ratio */
 };
 
-/* Set the slip metric. Of the window the device keeps 160 frames: 122 ms at 1307 frames/s, 390
+/* Set the slip metric. The device keeps 160 frames of the window: 122 ms at 1307 frames/s, 390
  * ms at 410. */
 struct wire_cmd_slip {
   float threshold_mm; /* slip threshold */
@@ -290,7 +291,7 @@ struct wire_cmd_loader {
 };
 
 /* Store a calibration. Gains 0.25 to 4, their standard deviations 0 to 0.5, scale 0.1 to 10, its
- * standard deviation 0 to 1. Acts from the frame on that follows the acknowledgement. */
+ * standard deviation 0 to 1. It acts from the first frame after the acknowledgement. */
 struct wire_cmd_calibrate {
   uint8_t sensor_count; /* that of the fingertip */
   struct calibration calibration; /* as in info */
@@ -314,8 +315,8 @@ struct wire_cmd_location_limit {
   float limit_mm; /* limit */
 };
 
-/* Store a pad's profile, each value in its range and the terms in order of width. Acts from the
- * frame on that follows the acknowledgement. */
+/* Store a pad's profile, each value in its range and the terms in order of width. It acts from
+ * the first frame after the acknowledgement. */
 struct wire_cmd_pad {
   struct pad_profile profile; /* as in info */
 };

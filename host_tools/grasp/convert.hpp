@@ -1,5 +1,5 @@
-// What fingertips and grippers say, as the controller's core takes it: integers, on the host's
-// steady clock in us. Numbers beyond a field's range end at its limits.
+// The reports of fingertips and grippers as the controller's core takes them: integers, on the
+// host's steady clock in us. Numbers beyond a field's range end at its limits.
 #pragma once
 
 #include "grasp/core.hpp"

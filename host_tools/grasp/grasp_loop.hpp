@@ -1,5 +1,5 @@
-// A grasp from its first step to its last: frames of two fingertips and a gripper's answers into
-// the controller's core, commands out of it.
+// A grasp from its first step to its last: frames of two fingertips and a gripper's answers go into
+// the controller's core, and commands come out of it.
 //
 //   GraspLoop loop({left, right}, {});
 //   auto met = loop.meet([] { return stop_requested(); });      who they are
@@ -11,13 +11,13 @@
 //   loop.end();                                                 the width stays
 //
 // Threads: one for each fingertip (DeviceLoop), one for the gripper (GripperThread), and one that
-// steps the core at each frame and answer, and every 5 ms without any. None waits for whoever takes
-// the news, which are dropped and counted when nobody takes them for long. All times are of the
-// host's steady clock; the core has no other.
+// steps the core at each frame and answer, and every 5 ms without any. None waits for the reader of
+// the news. News that are not read for long are dropped and counted. All times are of the host's
+// steady clock. The core has no other clock.
 //
-// What goes wrong is a trouble in the report and never opens the gripper: a fingertip or a gripper
-// that is gone is waited for, and goes on where it is back. Where this process dies the gripper
-// goes where it was last told to, some tenths of a millimetre away, and stays.
+// A failure is a trouble in the report and never opens the gripper. The loop waits for a fingertip
+// or a gripper that is gone, and goes on when it is back. If this process dies, the gripper goes to
+// the last commanded width, some tenths of a millimetre away, and stays.
 #pragma once
 
 #include "grasp/core.hpp"
@@ -42,7 +42,7 @@ namespace fingertip {
 struct GraspNews {
   enum class Kind {
     device,  // of a fingertip: device holds it
-    step,    // of the core: what it was told and what it told
+    step,    // of the core: its input and its output
     gripper, // text: what is wrong with it, its fault or why it does not answer; "": nothing now
     fault,   // text: why the core's state has become fault
     dropped, // count: so many news of other kinds were not taken in time
@@ -65,14 +65,15 @@ public:
   struct Options {
     std::uint8_t streams = WIRE_STREAM_ALL;
     bool activate = false; // where the core asks for it; else it is never passed on
-    // How often somebody wants it still, for callers whose own thread may be held up by a terminal:
-    // asked with every step. The first time the width stays, the second time it opens.
+    // How often the user wants the width to stay, for callers whose own thread may be held up by a
+    // terminal. The loop asks with every step. The first time the width stays, the second time the
+    // gripper opens.
     std::function<unsigned()> interrupts = [] { return 0u; };
   };
 
   // Opens both ports; the left is 0. Throws Error.
   GraspLoop(const std::array<Way, FINGERS> &ways, Options options);
-  // As end, but waits for nobody.
+  // As end, but does not wait.
   ~GraspLoop();
   GraspLoop(const GraspLoop &) = delete;
   GraspLoop &operator=(const GraspLoop &) = delete;

@@ -1,18 +1,19 @@
-// The gripper's and the controller's rows in a recording of a grasp, which is a joint recording of
-// its two fingertips (libfingertip/recording.hpp), 0 the left and 1 the right, with these lines
-// between:
+// The gripper's and the controller's rows in a recording of a grasp. Such a recording is a joint
+// recording of its two fingertips (libfingertip/RECORDING.md), 0 the left and 1 the right, with
+// these lines between:
 //
-//   # grip: time_us,state,trouble,width_mm,...        once, before the first
-//   # grip: 1530022.0,holding,,34.217,...             the time is the rows', on the recorder's
-//   clock # grip_event: text                                what was asked for and what went wrong
+//   # grip: time_us,state,trouble,width_mm,...    once, before the first
+//   # grip: 1530022.0,holding,,34.217,...         the time is the rows', by the recorder's clock
+//   # grip_event: text                            a request, or a failure
 //
-// so that `sed -n 's/^# grip: //p' grasp.csv` is a CSV file. A row stands for each change of state,
-// trouble, command or answer, and else for every 10 ms.
+// So `sed -n 's/^# grip: //p' grasp.csv` is a CSV file. There is a row for each change of state,
+// trouble, command or answer, and otherwise for every 10 ms.
 //
-// state and trouble: names (words.hpp). width_mm, moving, object (-1: unknown), active, fault and
-// current_A: as the gripper answered status_us; before its first answer status_us is empty. The
-// fault that led to state fault stays. motion: 0 stay, 1 activate, 2 move; command_*: of move.
-// Forces are of one fingertip; margin: 0 without a load; slides: counted since the grasp began.
+// - state and trouble: names (words.hpp).
+// - width_mm, moving, object (-1: unknown), active, fault and current_A: the gripper's answer at
+//   status_us. Before its first answer status_us is empty. The fault that led to state fault stays.
+// - motion: 0 stay, 1 activate, 2 move. command_*: of move.
+// - Forces are of one fingertip. margin: 0 without a load. slides: counted since the grasp began.
 #pragma once
 
 #include "grasp/core.hpp"

@@ -1,7 +1,7 @@
-// A gripper in a thread of its own, so that a slow or silent line delays nobody: the newest command
-// goes out with the next exchange, and every answer comes back. An exchange that fails is tried
-// again, with the newest command; a port that vanished is opened again. Nothing is activated that
-// was not commanded, and nothing is sent that the core did not command.
+// A gripper in a thread of its own, so that a slow or silent line delays nothing else. The newest
+// command goes out with the next exchange, and every answer comes back. The thread repeats an
+// exchange that fails, with the newest command. It opens a port that vanished again. It activates
+// nothing without a command, and sends nothing that the core did not command.
 #pragma once
 
 #include "grasp/core.hpp"
@@ -25,14 +25,14 @@ class GripperThread {
 public:
   struct News {
     std::optional<GripperStatus> status; // an answer
-    std::string trouble;                 // or why there is none: told once, until the next answer;
+    std::string trouble;                 // or why there is none: once, until the next answer;
                                          // with an answer what its fault code means, or that
-                                         // nobody spoke to it
+                                         // no command reached it
   };
 
   // gripper: open; reopen: as it was opened.
   GripperThread(std::unique_ptr<Gripper> gripper, OpenGripper reopen);
-  // Ends after the exchange under way; the gripper goes where it was last told to.
+  // Ends after the exchange under way; the gripper goes to the last commanded width.
   ~GripperThread();
   GripperThread(const GripperThread &) = delete;
   GripperThread &operator=(const GripperThread &) = delete;

@@ -27,7 +27,7 @@ const std::vector<GraspSetting> &grasp_settings();
 
 double value_of(const GraspSetting &setting, grip_settings settings);
 
-// Defaults of this gripper, and over them what is wanted, by name; "fixed" chooses that mode.
+// Defaults of this gripper, overridden by the wanted values, by name. "fixed" chooses that mode.
 // Throws Error, code bad_value: a value out of range, or one that contradicts another.
 grip_settings settings_for(const GripperTraits &traits,
                            const std::map<std::string, double> &wanted);

@@ -16,7 +16,7 @@ std::string state_name(std::uint8_t state);
 std::optional<std::uint8_t> state_of_name(std::string_view name);
 // "holding, the object slides"
 std::string state_text(std::uint8_t state);
-// Nothing goes on any more by itself: open, dropped, missed, fault.
+// Final states, in which nothing goes on by itself: open, dropped, missed, fault.
 bool is_end_state(std::uint8_t state);
 
 // "finger_0_stale at_cap"; "" for none

@@ -10,7 +10,7 @@ namespace fingertip {
 /* For the end of a sentence, of an error of this kind; "" where its text says all. */
 std::string advice(ErrorCode code);
 
-/* Likewise, of a gripper's line. */
+/* The same for a gripper's line. */
 std::string gripper_advice(ErrorCode code);
 
 /* One line, harmless to a terminal: what is wrong; what to do. */

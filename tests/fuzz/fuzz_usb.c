@@ -174,7 +174,7 @@ static struct setup some_setup(struct fuzz_input *input) {
   return setup;
 }
 
-/* SET_INTERFACE of the data interface, obeyed, begins anew what the host gets. */
+/* SET_INTERFACE of the data interface, obeyed, begins again what the host gets. */
 static void begin_transfer(const struct setup *setup) {
   host_setup(setup->type, setup->request, setup->value, setup->index, setup->length);
   bool obeyed = fake_accepts(CONTROL_IN);

@@ -10,7 +10,7 @@ using namespace fingertip;
 namespace {
 
 struct Heard {
-  std::vector<Bytes> packets; // encoded anew
+  std::vector<Bytes> packets; // encoded again
   LineStatistics statistics;
 };
 

@@ -76,7 +76,7 @@ public:
   // (readings.h): wrong readings, not frames, are counted apart.
   void excuse_readings_until(std::uint64_t t_us) { readings_excused_until_us_ = t_us; }
 
-  // Counts good frames anew.
+  // Counts good frames again.
   void expect_recovery() { good_in_a_row_ = 0; }
   bool has_recovered() const { return good_in_a_row_ >= GOOD_FRAMES; }
   std::uint64_t good_since_us() const { return good_since_us_; }

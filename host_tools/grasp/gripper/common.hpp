@@ -1,4 +1,4 @@
-// What all grippers check and tell alike.
+// What all grippers check and report alike.
 #pragma once
 
 #include "grasp/gripper/gripper.hpp"
@@ -11,14 +11,14 @@ namespace fingertip {
 // Throws Error: bad_value.
 void check_move(const GripperMove &move);
 
-// way with all that it left to the model. Throws Error: bad_value; counts go from 0 to most_count.
+// way, completed by the model's defaults. Throws Error: bad_value; counts go from 0 to most_count.
 struct GripperUsual {
   int slave, most_slave, closed_count, open_count, most_count;
 };
 GripperWay complete(GripperWay way, const GripperUsual &usual);
 
-// A question that is asked to be sure that no older answer is on its way is waited for so much
-// longer than any other, then asked in another form. An answer that is late by less than that is
+// An extra question makes sure that no older answer is on its way. It waits so much longer than any
+// other question, and is then asked in another form. An answer that is late by less than that is
 // never taken for another's.
 constexpr int SURE_TIMEOUTS = 5;
 

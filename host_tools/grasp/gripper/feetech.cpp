@@ -177,7 +177,7 @@ std::chrono::microseconds FeetechGripper::timeout() const {
 
 // Answers have no number: a late one would pass for that to the next question. But they come in the
 // order of the questions. So two or three bytes are asked for, once, which no other answer has, and
-// what comes before them is what nobody waits for. Where they are lost the other number is asked
+// answers before them are not expected. Where they are lost the other number is asked
 // for, lest the first come after all.
 void FeetechGripper::make_sure() {
   if (!doubtful_) {

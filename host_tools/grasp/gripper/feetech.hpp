@@ -1,12 +1,12 @@
 // A gripper of one Feetech STS3215 that turns one jaw against a fixed one, as an SO-101's.
 //
-// The width between the pads is that of a chord: 2 jaw sin(angle / 2), the angle counted from where
-// the pads touch. Counts of the ends and the jaw's length are options (GripperWay); the usual ones
+// The width between the pads is that of a chord: 2 jaw sin(angle / 2). The angle counts from where
+// the pads touch. Counts of the ends and the jaw's length are options (GripperWay). The defaults
 // are a jaw of 100 mm that touches at 2048 and opens by a radian, 652 counts, to 96 mm. The pads
 // are parallel only where they touch.
 //
 // Its force limit is a share of the stall torque, 1.9 Nm at 7.4 V by the maker's figures, over the
-// jaw: no newtons but a guess of them, for friction in the gears is of the same size at the least.
+// jaw. This is only a guess of the force in newtons: friction in the gears is at least as large.
 #pragma once
 
 #include "grasp/gripper/feetech_packet.hpp"
@@ -40,7 +40,7 @@ private:
 
 // The usual jaw's, and what the servo can do on it.
 GripperTraits feetech_traits(const std::string &model, const Jaw &jaw, double jaw_mm);
-// GripperWay with the usual for what it leaves open. Throws Error: bad_value.
+// GripperWay, completed by the defaults. Throws Error: bad_value.
 GripperWay feetech_way(const GripperWay &way);
 
 class FeetechGripper : public Gripper {
@@ -73,7 +73,7 @@ private:
   GripperTraits traits_;
   SerialLine line_;
   int servo_model_ = 0;
-  bool doubtful_ = false; // an answer may still come that nobody waits for
+  bool doubtful_ = false; // an answer may still come that is not expected
   int sure_length_ = 0;   // of the answer that make_sure has asked for, 0: none yet,
   HostTime sure_until_{}; // and still waits for
   bool active_ = false;   // by the last status

@@ -6,14 +6,15 @@
 //   gripper->move({.width_mm = 20, .speed_mm_s = 50, .force_N = 20});
 //   GripperStatus now = gripper->poll();
 //
-// Nothing here waits longer than one exchange on the line, whose timeout is GripperWay's, but where
-// its comment says so; whoever wants the end of a motion polls for it. Not for two threads at once.
+// No function waits longer than one exchange on the line, unless its comment says so. GripperWay
+// has the timeout of an exchange. To wait for the end of a motion, poll for it. Not for two threads
+// at once.
 //
-// Where the comment of a function has no list of its own it throws Error:
+// A function throws Error for these reasons, unless its comment has its own list:
 //   gripper_silent    no answer in time; the next call may have one
 //   gripper_garbled   an answer that is none: damaged, of another slave, or to another question
-//   gripper_refused   it says no; the text has its code
-//   gone              the port vanished; nothing brings it back but open_gripper
+//   gripper_refused   the gripper refuses; the text has its code
+//   gone              the port vanished; only open_gripper brings it back
 #pragma once
 
 #include "libfingertip/error.hpp"
@@ -26,8 +27,8 @@
 
 namespace fingertip {
 
-/* What speaks to a gripper, and so of which kind it is: a drive by a screw behind Modbus registers,
- * or a servo that turns a jaw. */
+/* The driver of a gripper, and so its kind: a screw drive behind Modbus registers, or a servo that
+ * turns a jaw. */
 enum class GripperDriver { robotiq, feetech };
 
 struct GripperTraits {
@@ -50,15 +51,15 @@ struct GripperStatus {
   double width_mm = 0.0;
   double current_A = 0.0; // of its motor, as a number without sign
   std::uint8_t fault = 0; // the maker's code; 0: none
-  // Before this exchange it was asked nothing for a second or more. No fault: a gripper that says
-  // so hears again, and goes on.
+  // The gripper got no question for a second or more before this exchange. No fault: a gripper that
+  // reports this goes on.
   bool was_left_alone = false;
 };
 
 struct GripperMove {
   double width_mm = 0.0;   // beyond its ends: to that end
   double speed_mm_s = 0.0; // beyond its limits: the nearest it can
-  double force_N = 0.0;    // its own limit, likewise; 0: its least
+  double force_N = 0.0;    // its own limit; 0: its least
 };
 
 class Gripper {
@@ -67,13 +68,13 @@ public:
   virtual const GripperTraits &traits() const = 0;
   // What the line is and what limits it, for people: "Modbus RTU at 115200 baud, slave 9, ...".
   virtual std::string line() const = 0;
-  // Begins what the gripper needs before it moves, dropping what it holds and clearing its faults;
-  // poll tells when it is done. Nothing else ever activates it, or clears a fault. Takes some
-  // exchanges, 0.1 s.
+  // Begins the activation that the gripper needs before it moves. It drops what it holds and clears
+  // its faults. poll reports when it is done. Nothing else ever activates it, or clears a fault.
+  // Takes some exchanges, 0.1 s.
   virtual void activate() = 0;
   virtual GripperStatus poll() = 0;
   // Sends and polls in one exchange where the line can do that, else in two. A gripper that is not
-  // active ignores it, as the status tells. Throws Error besides: bad_value, of what is no number.
+  // active ignores it, as the status shows. Also throws Error: bad_value, of what is no number.
   virtual GripperStatus move(const GripperMove &move) = 0;
   // What a fault code of poll means; "" for 0.
   virtual std::string fault_text(std::uint8_t fault) const = 0;
@@ -83,23 +84,23 @@ struct GripperWay {
   std::string model = {}; // one of gripper_models()
   std::string port = {};  // of a serial line
   int slave = 0;          // 0: the model's usual
-  // Positions that the gripper tells when its pads touch and when it is open; empty: the model's
-  // usual. Of a Robotiq 0 to 255, of a servo 0 to 4095, which may turn either way.
+  // Positions that the gripper reports when its pads touch and when it is open; empty: the model's
+  // defaults. Of a Robotiq 0 to 255, of a servo 0 to 4095, which may turn either way.
   std::optional<int> closed_count = {}, open_count = {};
   double jaw_mm = 100.0;   // of a servo: from its axis to the middle of the pad
   double timeout_s = 0.05; // of one exchange, from 5 ms to 10 s
 };
 
-// Each with its usual counts and jaw. The first is what programs take unless they are told another.
+// Each with its usual counts and jaw. The first is the default of programs.
 std::vector<GripperTraits> gripper_models();
 // "2f85, 2f140, ...", for people.
 std::string gripper_model_names();
 // Throws Error: bad_value, an unknown model.
 const GripperTraits &gripper_traits(const std::string &model);
 
-// Asks it for its status, commands nothing. Throws Error besides: bad_value, an unknown model or
-// counts that cannot be; no_port, not_a_port, port_in_use, permission_denied, cannot_open. Takes up
-// to five exchanges.
+// Asks it for its status, commands nothing. Also throws Error: bad_value, an unknown model or
+// impossible counts; no_port, not_a_port, port_in_use, permission_denied, cannot_open. Takes up to
+// five exchanges.
 std::unique_ptr<Gripper> open_gripper(const GripperWay &way);
 
 } // namespace fingertip

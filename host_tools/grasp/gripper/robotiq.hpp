@@ -1,11 +1,12 @@
 // Robotiq 2F-85, 2F-140 and Hand-E by Modbus RTU (robotiq_registers.hpp), through libmodbus.
 //
-// Which functions a gripper answers is found out: 4, else 3, to read, when it is opened; 23, else
-// 16 and a read, to write and read, at the first moves, for only a command can tell.
+// The driver finds out which functions a gripper answers. To read it tries 4, then 3, when it
+// opens. To write and read it tries 23, then 16 and a read, at the first moves, since only a
+// command can show it.
 //
-// A move writes rPR, rSP and rFR alone: a gripper that lost its power since the last answer stays
-// inactive, where writing rACT again would activate it and drop what it holds. Only where a status
-// just said active without gGTO is rGTO written with them.
+// A move writes rPR, rSP and rFR alone. So a gripper that lost its power since the last answer
+// stays inactive. Writing rACT again would activate it and drop what it holds. rGTO is written with
+// them only if a status has just shown active without gGTO.
 #pragma once
 
 #include "grasp/gripper/gripper.hpp"
@@ -58,7 +59,7 @@ private:
   bool both_at_once_ = true; // function 23
   int both_failed_ = 0;      // so many times in a row, without ever having worked
   bool both_worked_ = false;
-  bool doubtful_ = false;              // an answer may still come that nobody waits for
+  bool doubtful_ = false;              // an answer may still come that is not expected
   int sure_count_ = 0;                 // registers that make_sure has asked for, 0: none yet,
   HostTime sure_until_{};              // and still waits for
   bool goes_ = false, active_ = false; // by the last status

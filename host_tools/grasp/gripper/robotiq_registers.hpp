@@ -3,8 +3,8 @@
 // Control (register mapping) and Modbus RTU communication.
 //
 // Modbus RTU, 115200 baud, 8N1, slave 9. Functions: 16 and 23 write; 23 and 4 read, in older
-// manuals 3 instead of 4. There are no exception answers: what the gripper does not know it does
-// not answer. A register is two of the maker's bytes, the first in the high half.
+// manuals 3 instead of 4. There are no exception answers: the gripper does not answer what it does
+// not know. A register is two of the maker's bytes, the first in the high half.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The serial line of a gripper, and what the adapter in between does to its rate.
+// The serial line of a gripper, and how its adapter limits its rate.
 #pragma once
 
 #include "libfingertip/serial_transport.hpp"
@@ -28,8 +28,8 @@ private:
 };
 
 // Milliseconds that a USB adapter holds back an answer that does not fill a packet; empty where its
-// driver tells none. 16 is the usual: an exchange then takes as long, and 62 are made a second.
-// root: where to look for sys/, "/" but in tests.
+// driver does not report it. 16 is usual: an exchange then takes as long, which allows 62 a second.
+// root: where to look for sys/, "/" except in tests.
 std::optional<int> latency_timer_ms(const std::string &port, const std::string &root = "/");
 
 struct GripperPort {

@@ -1,13 +1,12 @@
 /* A fingertip's clock in terms of the host's, from commands and their acknowledgements.
  *
- * An exchange tells that the host's clock stood between sent and received when the fingertip's
+ * An exchange shows that the host's clock stood between sent and received when the fingertip's
  * stood at device_us. A straight line, offset and drift, must pass between all of these of the last
- * half minute; how far the lines that do are apart at one time bounds the error, whatever the
- * delays were. The line in the middle, as far from the nearest limits on both sides as it can be,
- * is the estimate: slow exchanges do not touch it, and where the fastest command and the fastest
- * answer took equally long it is exact. If no line passes, the clock has jumped, and the older half
- * of the exchanges goes.
- */
+ * half minute. The distance between the possible lines at one time bounds the error, whatever the
+ * delays were. The estimate is the line in the middle, as far from the nearest limits on both sides
+ * as it can be. Slow exchanges do not touch it. It is exact where the fastest command and the
+ * fastest answer took equally long. If no line passes, the clock has jumped, and the older half of
+ * the exchanges is dropped. */
 #pragma once
 
 #include <cstdint>

@@ -15,7 +15,7 @@ namespace fingertip {
 /* Those of the streams that this firmware has. */
 std::uint8_t possible_streams(const wire_info &info, std::uint8_t streams);
 
-/* Sequence and time are filled in by whoever sends. */
+/* The sender fills in sequence and time. */
 wire_packet command_stream(std::uint8_t streams);
 wire_packet command_tare(bool force = false); /* refused in contact unless forced */
 wire_packet command_rate_mHz(std::uint32_t rate_mHz);
@@ -43,8 +43,8 @@ struct WantedSetting {
 };
 /* Throws Error if it is no setting, no number or out of range. */
 WantedSetting setting_from_text(const std::string &text);
-/* The commands that bring them about. What travels with a wanted value and is not wanted stays as
- * it is now. */
+/* The commands for these settings. A value that travels with a wanted one, and is not wanted, stays
+ * as it is now. */
 std::vector<wire_packet> setting_commands(const std::vector<WantedSetting> &wanted,
                                           const wire_info &now);
 /* "rate=20.000 osr=1024 ...": the settings that this firmware has. */
@@ -55,8 +55,8 @@ std::string settings_help();
 /* The bytes of a packet on the line, delimiter included. */
 std::vector<std::uint8_t> frame_bytes(const wire_packet &packet);
 
-/* The info command as another version of the protocol has it, delimiter included: who speaks that
- * version answers. */
+/* The info command in another version of the protocol, delimiter included: a fingertip that speaks
+ * that version answers. */
 std::vector<std::uint8_t> info_frame_of_version(std::uint8_t version);
 
 } // namespace fingertip

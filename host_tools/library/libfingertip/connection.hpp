@@ -1,4 +1,4 @@
-/* From what the user said to an open line: which fingertip, and how it is reached. */
+/* From the user's options to an open line: which fingertip, and how it is reached. */
 #pragma once
 
 #include "libfingertip/discovery.hpp"
@@ -14,8 +14,8 @@
 namespace fingertip {
 
 enum class Reach {
-  automatic, /* by the socket of whoever shares it, else by its serial port if it has one, else by
-                libusb */
+  automatic, /* by the socket of the server that shares it, else by its serial port if it has one,
+              * else by libusb */
   socket,
   serial,
   usb,
@@ -32,19 +32,19 @@ struct Way {
   std::string serial;      /* by USB, or as it answered; empty: unknown */
   std::string port;        /* empty: by libusb */
   bool found_by_usb;       /* and found so again when it was gone */
-  std::string socket = ""; /* of whoever shares it; then the rest only tells about it */
+  std::string socket = ""; /* of the program that shares it; then the rest only describes it */
 };
 
 /* All there are. */
 struct Finds {
-  std::vector<Found> here;           /* by USB, or shared by somebody who has them otherwise */
+  std::vector<Found> here;           /* by USB, or shared by a server that reaches them otherwise */
   std::vector<Found> in_environment; /* the paths there */
 };
 Finds find_fingertips(const std::string &root = "/");
 
-/* Throws Error if there is none, several to choose from, or another one than was wanted. A port
- * whose fingertip USB does not tell is asked for its serial number where one is wanted. Without
- * wishes the environment goes before USB. */
+/* Throws Error if there is none, several to choose from, or another one than was wanted. If a
+ * serial number is wanted and USB does not report that of a port, the fingertip there is asked for
+ * it. Without options the environment goes before USB. */
 Way choose_way(const Choice &choice, const std::string &root = "/");
 
 /* All there are, for programs that take several; the environment's too, each asked who it is. */

@@ -1,8 +1,7 @@
-/* Bytes of the line to packets, with an account of everything that went wrong on the way.
+/* Bytes of the line to packets, with counters of everything that went wrong on the way.
  *
- * After any damage decoding goes on after the next 0x00 (PROTOCOL.md, resynchronisation). The frame
- * that is under way when a receiver joins is torn by nature: its failure counts as nothing.
- */
+ * After any damage the decoder goes on after the next 0x00 (PROTOCOL.md, resynchronisation). A
+ * receiver that joins gets only the end of the first frame. Its failure counts as nothing. */
 #pragma once
 
 #include "libfingertip/wire.hpp"
@@ -35,7 +34,7 @@ struct LineStatistics {
   LineStatistics &operator+=(const LineStatistics &other);
 };
 
-/* What the sequence numbers tell. */
+/* Packet loss, by the sequence numbers. */
 class SequenceFollower {
 public:
   void follow(std::uint16_t sequence, LineStatistics &statistics);
@@ -55,7 +54,7 @@ public:
   /* Calls the handler for each packet that these bytes complete. */
   void feed(const std::uint8_t *bytes, std::size_t length, const Handler &handler);
 
-  /* The line was interrupted: join anew, and expect no particular sequence number. */
+  /* The line was interrupted: join again, and expect no particular sequence number. */
   void restart();
 
   const LineStatistics &statistics() const { return statistics_; }

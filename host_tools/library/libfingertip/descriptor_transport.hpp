@@ -1,5 +1,4 @@
-/* What serial port and socket have in common: a descriptor that neither reads nor writes wait for.
- */
+/* What serial port and socket have in common: a descriptor whose reads and writes never wait. */
 #pragma once
 
 #include "libfingertip/transport.hpp"

@@ -1,7 +1,7 @@
-/* A fingertip from its first answer to the end of its streams: greeted, streaming, waited for when
- * its port vanishes, greeted again. Each has a thread of its own, so that none waits for another
- * and arrivals are timed as they happen; what happens to all of them comes out of one feed. One
- * fingertip and many are followed alike.
+/* A fingertip from its first answer to the end of its streams. The loop greets it, streams, waits
+ * for it when its port vanishes, and greets it again. Each has a thread of its own, so that none
+ * waits for another and arrivals are timed as they happen. The news of all of them come out of one
+ * feed. One fingertip and many work alike.
  *
  *   DeviceFeed feed;
  *   DeviceLoop loop(0, way, options, feed);
@@ -13,8 +13,7 @@
  *     }
  *     if (enough) loop.stop();
  *   }
- *   loop.rethrow();
- */
+ *   loop.rethrow(); */
 #pragma once
 
 #include "libfingertip/clock.hpp"
@@ -62,9 +61,9 @@ struct DeviceNews {
   unsigned jumps = 0;       /* clock */
 };
 
-/* From the loops' threads to the one that takes. Holds some seconds of news at the highest rate;
- * when it is full the loops stop reading, and the fingertips drop and count what they cannot
- * send. */
+/* From the loops' threads to the one that takes. Holds some seconds of news at the highest rate.
+ * When it is full the loops stop reading, and the fingertips drop and count what they cannot send.
+ */
 class DeviceFeed {
 public:
   /* All there is, waiting at most this long for the first. */
@@ -101,12 +100,12 @@ public:
   void start() { started_ = true; }
   /* End the streams, and then itself; packets come until it has ended. */
   void stop() { stop_ = true; }
-  /* A command that nobody waits for; its acknowledgement is among the packets. */
+  /* A command without a wait; its acknowledgement is among the packets. */
   void send(const wire_packet &command);
 
   std::string name() const;
   LineStatistics statistics() const;
-  /* Until when everything that came was read, on the host's steady clock; endless while nothing is
+  /* The time until which everything was read, on the host's steady clock; endless while nothing is
    * expected: gone, or ended. */
   double read_until_us() const;
   /* After news of kind ended: throws what ended it, if it was an error. */

@@ -1,5 +1,5 @@
-/* Finds fingertips in what Linux shows of its USB devices, and in the environment. Nothing is
- * opened. */
+/* Finds fingertips in the list of USB devices of Linux, and in the environment. Nothing is opened.
+ */
 #pragma once
 
 #include <optional>
@@ -19,11 +19,11 @@ struct Found {
   std::string port;    /* the stable name under /dev/serial/by-id where there is one, else under
                           /dev; empty: no driver serves it as a serial port */
   std::optional<UsbPlace> usb;
-  std::string socket = ""; /* of whoever shares it; find_usb and find_in_environment do not ask */
+  std::string socket = ""; /* of its server; find_usb and find_in_environment do not ask */
 };
 
-/* Devices with our USB ids, sorted by serial number. root: where to look for sys/ and dev/, "/" but
- * in tests. */
+/* Devices with our USB ids, sorted by serial number. root: where to look for sys/ and dev/, "/"
+ * except in tests. */
 std::vector<Found> find_usb(const std::string &root = "/");
 
 /* The paths in the environment variable FINGERTIP_PORT, separated by colons. */

@@ -1,6 +1,6 @@
-/* What a user can mend, as facts: a code for programs, and a line for people that says what is
- * wrong and of what. What to do about it says the program, which knows its own options and how much
- * its user may do. Anything else that is thrown is a bug of ours. */
+/* Errors that a user can mend, as facts: a code for programs, and a line for people that says what
+ * is wrong. The program adds what to do about it, since it knows its own options and its user's
+ * rights. Anything else that is thrown is a bug of ours. */
 #pragma once
 
 #include <stdexcept>
@@ -10,7 +10,7 @@
 namespace fingertip {
 
 enum class ErrorCode {
-  other, /* only the text tells */
+  other, /* only the text says */
 
   /* Ways to a fingertip. */
   no_port,            /* nothing has this name, or not any more */
@@ -25,9 +25,9 @@ enum class ErrorCode {
   no_driver,          /* on USB, but without a serial port */
   not_a_fingertip,    /* our USB ids, but not our interfaces */
   usb_failed,         /* libusb cannot go on */
-  wrong_choice,       /* of fingertip and way, that exclude each other */
-  not_shared,         /* nobody serves it to others */
-  share_denied,       /* somebody does, but not to this user */
+  wrong_choice,       /* of fingertip and way, which exclude each other */
+  not_shared,         /* no program serves it to others */
+  share_denied,       /* a program does, but not to this user */
   shared_already,     /* another program serves it */
   cannot_share,       /* for the system's reason in the text */
 
@@ -43,14 +43,14 @@ enum class ErrorCode {
   /* Grippers. */
   gripper_silent,  /* no answer in time */
   gripper_garbled, /* an answer that is none: damaged, of another slave, to another question */
-  gripper_refused, /* it says no */
+  gripper_refused, /* the gripper refuses */
 
   /* Values. */
   bad_value, /* the text says which are good */
 
   /* Files. */
   cannot_read,        /* for the system's reason in the text */
-  cannot_write,       /* likewise, and nothing was written */
+  cannot_write,       /* the same, and nothing was written */
   file_exists,        /* and was not to be replaced */
   is_folder,          /* where a file is to be */
   write_undone,       /* a write failed, the file is as it was before */

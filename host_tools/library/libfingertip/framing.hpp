@@ -1,5 +1,5 @@
-/* Packets as bytes, for programs that pass them on whatever is in them: also those of types that
- * this library does not know (PROTOCOL.md, frame and header). */
+/* Packets as bytes, for programs that pass them on without a look at their content, also those of
+ * types that this library does not know (PROTOCOL.md, frame and header). */
 #pragma once
 
 #include "libfingertip/wire.hpp"
@@ -39,8 +39,8 @@ private:
 /* Cuts a line at its delimiters. */
 class FrameCutter {
 public:
-  /* frame: without its delimiter, never empty; of one that is longer than any valid one its
-   * beginning, which is too long as well. joining: it may have begun before the first byte. */
+  /* frame: without its delimiter, never empty. Of a frame that is longer than any valid one it is
+   * the beginning, which is too long as well. joining: it may have begun before the first byte. */
   using Handler = std::function<void(const Bytes &frame, bool joining)>;
 
   void feed(const std::uint8_t *bytes, std::size_t length, const Handler &handler);

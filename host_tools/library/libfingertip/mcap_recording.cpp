@@ -141,7 +141,7 @@ void McapLineSink::LogClock::row(std::uint64_t t_us, std::optional<double> time_
   }
   if (!anchor_) {
     anchor_ = {begin_ns_, t_us};
-  } else if (t_us < last_us_) { /* it started anew */
+  } else if (t_us < last_us_) { /* it restarted */
     anchor_ = {std::max(event_ns_, now_ns_), t_us};
   }
   last_us_ = t_us;

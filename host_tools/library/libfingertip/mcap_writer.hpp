@@ -1,5 +1,5 @@
-/* Writes MCAP files (mcap.dev/spec): chunks compressed by zstd, each with its index, all of it
- * appended at once, so that a writer that is killed leaves every chunk but the one under way. */
+/* Writes MCAP files (mcap.dev/spec): chunks compressed by zstd, each with its index. A chunk is
+ * appended at once, so that a killed writer leaves every chunk except the one under way. */
 #pragma once
 
 #include <cstdint>
@@ -33,7 +33,7 @@ public:
                   const std::string &data);
   /* Ends the chunk before it once that is a second long or a megabyte large. */
   void message(std::uint16_t channel, std::uint64_t time_ns, std::string_view data);
-  /* What was written until now outlives the writer. */
+  /* Content until now outlives the writer. */
   void end_chunk();
   /* Last of all. */
   void finish();

@@ -17,7 +17,7 @@ struct FlagName {
 /* Every flag of the contact packet, lowest bit first. */
 const std::vector<FlagName> &flag_names();
 
-/* The bits of all warnings: whoever trusts a contact heeds them. */
+/* The bits of all warnings: trust a contact only without them. */
 std::uint32_t warning_flags();
 
 /* "CONTACT FIT_VALID", an unknown bit as "bit9". */

@@ -1,6 +1,5 @@
-/* Files that the tools write: never one that is there already, unless it may be replaced, and never
- * over what is being read. Errors are thrown as Error.
- */
+/* Files that the tools write. They replace a file only if that is allowed, and never one that is
+ * being read. Errors are thrown as Error. */
 #pragma once
 
 #include <cstddef>
@@ -30,8 +29,8 @@ public:
   OutputFile(const OutputFile &) = delete;
   OutputFile &operator=(const OutputFile &) = delete;
 
-  /* On an error a file is cut back to what it held before. What nobody reads any more from standard
-   * output is dropped without a word. */
+  /* On an error a file is cut back to its previous content. Output that is no longer read from
+   * standard output is dropped without a message. */
   void append(const void *bytes, std::size_t length);
   void finish();
   const std::string &path() const { return path_; }

@@ -1,4 +1,4 @@
-/* What packets hold, by the names that recordings and people use. */
+/* Fields of packets, by the names that recordings and people use. */
 #pragma once
 
 #include "libfingertip/wire.hpp"

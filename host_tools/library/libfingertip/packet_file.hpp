@@ -1,5 +1,5 @@
 /* The packets in a file: a recording (CSV, recording.hpp), or the bytes of the line as they came
- * (.ftr, also what the emulator captures). A recording is told by its first line. */
+ * (.ftr, also what the emulator captures). The first line shows that it is a recording. */
 #pragma once
 
 #include "libfingertip/decoder.hpp"
@@ -43,8 +43,8 @@ public:
   Place place();
   void go_to(const Place &place);
 
-  /* What the packets until now tell of the line. At the end of a recording what its recorder
-   * counted, which saw the line itself. */
+  /* The line's counters by the packets until now. At the end of a recording they are those of its
+   * recorder, which saw the line itself. */
   const LineStatistics &statistics() const { return statistics_; }
   /* At the end of the file: a recording without its end line. */
   bool is_cut_short() const { return ended_ && reader_ && !reader_->has_end(); }

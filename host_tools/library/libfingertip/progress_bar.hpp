@@ -1,4 +1,4 @@
-/* How far a long job is, on stderr: a bar that is redrawn on a terminal; elsewhere a line each
+/* The progress of a long job, on stderr: a bar that is redrawn on a terminal; elsewhere a line each
  * tenth, or nothing. */
 #pragma once
 
@@ -11,7 +11,7 @@ public:
   enum class Lines { tenths, none }; /* where there is no terminal */
 
   ProgressBar(const std::string &what, Lines lines);
-  ~ProgressBar(); /* the bar goes, so that what is said next has the line for itself */
+  ~ProgressBar(); /* the bar goes, so that the next message has the line for itself */
   ProgressBar(const ProgressBar &) = delete;
   ProgressBar &operator=(const ProgressBar &) = delete;
 

@@ -1,6 +1,6 @@
-/* ROS 2 messages of what a fingertip says, without ROS: their definitions, with what the numbers
- * mean (host_tools/python/fingertip/msg), and their CDR bytes. Without a header: "frame_id" and
- * time. */
+/* ROS 2 messages of a fingertip's reports, without ROS: their definitions, with the meaning of the
+ * numbers (host_tools/python/fingertip/msg), and their CDR bytes. They have no header: "frame_id"
+ * and time are apart. */
 #pragma once
 
 #include "libfingertip/packet_fields.hpp"

@@ -1,8 +1,7 @@
 /* A conversation with one fingertip: commands and their acknowledgements, while packets stream.
  *
- * Commands are repeated if no acknowledgement comes in time; each may arrive twice without harm.
- * No packet is lost to waiting: the handler sees every one, in order.
- */
+ * A command is repeated if no acknowledgement comes in time. Each may arrive twice without harm. No
+ * packet is lost while a command waits: the handler gets every one, in order. */
 #pragma once
 
 #include "libfingertip/clock.hpp"
@@ -24,7 +23,7 @@ public:
   explicit Gone(const std::string &facts) : Error(ErrorCode::gone, facts) {}
 };
 
-/* The stop function of the session said so, in the middle of a command. */
+/* The stop function of the session returned true in the middle of a command. */
 class Interrupted : public std::exception {};
 
 /* device time = host time + offset, good to the uncertainty (half the best round trip). Host time
@@ -54,7 +53,7 @@ public:
   /* Each acknowledgement as a relation of the two clocks. */
   void on_exchange(ExchangeHandler handler) { exchange_handler_ = std::move(handler); }
 
-  /* Takes what comes, waiting at most this long for it to begin. */
+  /* Takes packets, and waits at most this long for the first. */
   Transport::Result poll(std::chrono::milliseconds timeout);
 
   /* Returns once the fingertip has done it. Throws Error if it refuses or does not answer, Gone,
@@ -71,7 +70,7 @@ public:
   wire_packet health();
   wire_packet crash();
 
-  /* After gone; the line begins anew. */
+  /* After gone; the line begins again. */
   bool reopen();
 
   const LineStatistics &statistics() const { return decoder_.statistics(); }

@@ -1,9 +1,9 @@
-/* Fingertips that `fingertip serve` shares: each is a Unix socket SERIAL.sock, and beside it the
- * link SERIAL.port to its serial port, if it has one. A connection to the socket is a line to the
- * fingertip (PROTOCOL.md), which others have at the same time. The socket is there as long as the
- * fingertip is. Who may connect is the socket's owner and group.
+/* Fingertips that `fingertip serve` shares. Each is a Unix socket SERIAL.sock, with the link
+ * SERIAL.port beside it to its serial port, if it has one. A connection to the socket is a line to
+ * the fingertip (PROTOCOL.md), which others share at the same time. The socket exists as long as
+ * the fingertip is there. The socket's owner and group may connect.
  *
- * They are in the folder of whoever serves: $XDG_RUNTIME_DIR/fingertip; without that variable
+ * They are in the folder of the server: $XDG_RUNTIME_DIR/fingertip; without that variable
  * /run/fingertip for root and /tmp/fingertip-UID for others. All look into /run/fingertip too. */
 #pragma once
 
@@ -20,7 +20,7 @@ struct Shared {
   std::string port; /* as realpath has it; empty: by libusb */
 };
 
-/* Those that somebody serves now, also if this user may not connect to them. */
+/* Fingertips that are served now, also if this user may not connect to them. */
 std::vector<Shared> find_shared();
 
 /* Where this user's fingertips are shared, and where everybody's are. */
@@ -35,7 +35,7 @@ public:
   /* Throws Error: not shared, not allowed. */
   explicit SocketTransport(const std::string &path);
   bool reopen() override;
-  /* Who serves it does so for a fingertip that does not speak this version of the protocol. */
+  /* The server serves a fingertip that does not speak this version of the protocol. */
   bool ask_loader() override;
 
   /* Whether somebody serves there now. */

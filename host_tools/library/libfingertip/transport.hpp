@@ -1,5 +1,5 @@
 /* Where the bytes of a fingertip come from: a serial port or pseudo-terminal
- * (serial_transport.hpp), libusb (usb_transport.hpp), or whoever shares it (share_socket.hpp).
+ * (serial_transport.hpp), libusb (usb_transport.hpp), or its server (share_socket.hpp).
  */
 #pragma once
 
@@ -28,7 +28,7 @@ public:
   virtual Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
                       std::chrono::milliseconds timeout) = 0;
 
-  /* All of the bytes, or false: the other end is gone or takes nothing. */
+  /* Writes all of the bytes, or returns false: the other end is gone or takes nothing. */
   virtual bool write(const std::uint8_t *bytes, std::size_t length) = 0;
 
   /* After gone: true if it is there again. Never blocks; ask again later. */
@@ -38,8 +38,8 @@ public:
    * protocol version: 1200 baud, then DTR down. False: not possible here. */
   virtual bool ask_loader() { return false; }
 
-  /* For who waits for several: once poll(2) reports one of these, read may have something. To be
-   * asked for anew before each wait, after reading all there was. None while it is gone. */
+  /* To wait for several: once poll(2) reports one of these, read may have something. Ask for them
+   * again before each wait, after reading everything. None while it is gone. */
   virtual std::vector<pollfd> poll_descriptors() const { return {}; }
 
   /* For people: what this is. */

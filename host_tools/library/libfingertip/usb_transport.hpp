@@ -1,10 +1,9 @@
 /* A fingertip reached by libusb, past the system's serial driver.
  *
- * Found by our vendor and product id and its serial number, at whatever bus and address. The
- * driver cdc_acm is detached while this is open and given back at the end. Bulk transfers of one
- * USB packet each wait in the system's queue, so that nothing is lost between two reads and no
- * short packet waits for a longer one; they are served by the thread that calls read and write.
- */
+ * It is found by our vendor and product id and its serial number, at any bus and address. The
+ * driver cdc_acm is detached while this is open, and given back at the end. Bulk transfers of one
+ * USB packet each wait in the system's queue. So nothing is lost between two reads, and no short
+ * packet waits for a longer one. The thread that calls read and write serves them. */
 #pragma once
 
 #include "libfingertip/transport.hpp"

@@ -1,28 +1,30 @@
-// A rubber block bonded to a rigid base, its sides and its top free: what the base feels at one
-// point of a load on the surface. Linear elasticity at small strain, as layer.hpp, but it ends.
+// A rubber block bonded to a rigid base, its sides and its top free. The result is the pressure at
+// one point of the base under a load on the surface. Linear elasticity at small strain, as
+// layer.hpp, but the block ends.
 //
-// By Betti's theorem a point of the base feels of a force at (x, y) on the surface the surface's
-// own displacement at (x, y) along that force, when that point of the base alone is displaced. So
-// one solution for each point answers every load. Only the difference from the infinite layer is
-// solved for: the stress that point_lift.hpp has where the block's sides are is taken from them.
-// The point itself, where all is singular, is not in the equations; what is left is smooth but at
-// the edges along the base, where rubber held and rubber free meet (displacement there goes with
-// the distance to the power of 0.6).
+// Betti's theorem: displace one point of the base alone. The surface's displacement at (x, y) along
+// a force is then what that point feels of the force at (x, y). So one solution for each point
+// answers every load. The solver computes only the difference from the infinite layer: it takes the
+// stress of point_lift.hpp from the block's sides. The point itself, where all is singular, is not
+// in the equations. The remainder is smooth except at the edges along the base, where held rubber
+// and free rubber meet (displacement there goes with the distance to the power of 0.6).
 //
-// Elements of high degree on a grid of lines that is dense at the sides and the base; at degree 6
-// rubber of nu = 0.49 does not lock. Each displacement is written in products of the three lines'
-// own modes, in which all but the coupling of the three displacements is diagonal; conjugate
+// Elements have a high degree, on a grid of lines that is dense at the sides and the base. At
+// degree 6 rubber of nu = 0.49 does not lock. Each displacement is written in products of the three
+// lines' own modes. In these all but the coupling of the three displacements is diagonal. Conjugate
 // gradients do the rest. Symmetry leaves a quarter of the block, four times.
 //
-// Cost of six points on two processors: 2 s for 12 mm and 9 mm beyond the outer sensors, 31 s for
-// 4 mm and 20 mm. Error against smaller elements of a higher degree, in parts of the layer's peak
-// under that load, anywhere on the surface: 1e-4 there; 4e-4 with 4.5 mm, where the difference
-// itself reaches three peaks at the corner; 4e-3 of eleven for 20 mm and 3 mm. Elements of twenty
-// nodes under loads on the surface agree to 0.1 % of the peak, 0.5 % near a corner. The base
-// carries the load's force and moment to 1 %.
+// Cost of six points on two processors: 2 s for 12 mm and 9 mm beyond the outer sensors, 31 s for 4
+// mm and 20 mm. Error against smaller elements of a higher degree, anywhere on the surface, in
+// parts of the layer's peak under that load:
+//   12 mm and 9 mm   1e-4
+//   with 4.5 mm      4e-4, where the difference itself reaches three peaks at the corner
+//   20 mm and 3 mm   4e-3 of eleven
+// Elements of twenty nodes under loads on the surface agree to 0.1 % of the peak, 0.5 % near a
+// corner. The base carries the load's force and moment to 1 %.
 //
-// What it leaves out: large strain, the sensors' own stiffness in the base, a base that ends or
-// bends, rounded or cast edges.
+// Left out: large strain, the sensors' own stiffness in the base, a base that ends or bends,
+// rounded or cast edges.
 #pragma once
 
 #include "library/pad/layer.hpp"

@@ -1,17 +1,18 @@
-// What sensors under a block (block.hpp) feel more than under a layer without end: the difference
-// that the pad's edges make, for any load and place. Solved once, kept in a file, interpolated; to
-// be added to what contact_table.hpp and traction_table.hpp say.
+// The difference between a block (block.hpp) and a layer without end at each sensor: the effect of
+// the pad's edges, for any load and place. It is solved once, kept in a file, and interpolated. Add
+// it to the results of contact_table.hpp and traction_table.hpp.
 //
 // The load counts by its force, its place and its breadth: the field's mean over a disc, from four
-// points. Against all of the contact's own pressure that costs, in parts of the layer's peak, above
-// the corner's sensor at 8 N on 12 mm: with 9 mm of rubber beyond 0.1 % under a sphere of 6 mm and
-// 0.3 % under one of 15 mm, with 6 mm 0.4 and 1.2 %, 1 % under a cube; the middle alone, three to
-// five times that. Nodes 0.5 mm apart add less than 0.05 %.
+// points. Compared with all of the contact's own pressure, this costs the following, in parts of
+// the layer's peak, above the corner's sensor at 8 N on 12 mm:
+//   9 mm of rubber beyond   0.1 % under a sphere of 6 mm, 0.3 % under one of 15 mm
+//   6 mm                    0.4 and 1.2 %, 1 % under a cube
+// The middle alone costs three to five times that. Nodes 0.5 mm apart add less than 0.05 %.
 //
-// Taken over from the layer without end is how a contact's pressure is spread about its middle.
-// Near an edge rubber yields more, so an object presses less on that side than it would on the
-// layer: its axis is not where its pressure's middle, the place here, is. How far off has not been
-// found.
+// The spread of a contact's pressure about its middle is that of the layer without end. Near an
+// edge rubber yields more, so an object presses less on that side than on the layer. Its axis is
+// then not at its pressure's middle, which is the place here. The distance between the two is
+// unknown.
 #pragma once
 
 #include "library/pad/block.hpp"
@@ -23,7 +24,7 @@ namespace fingertip::twin {
 class BlockTable {
 public:
   // From the cache if it holds this very table, else solved (block.hpp: seconds, half a minute at
-  // most) and kept there; a damaged file is solved anew. on_progress gets the share done, 0..1.
+  // most) and kept there; a damaged file is solved again. on_progress gets the share done, 0..1.
   // Throws std::filesystem::filesystem_error or std::runtime_error if the cache cannot be written.
   static BlockTable load_or_build(const Block &block, const std::vector<Place> &sensors,
                                   const std::filesystem::path &cache_directory,

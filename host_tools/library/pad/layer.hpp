@@ -1,22 +1,23 @@
 // A rubber layer bonded to a rigid base, loaded on its surface: linear elasticity at small strain,
 // laterally without end.
 //
-// In wave numbers the layer answers each wave of the surface's load by itself. With H = k h:
+// In wave numbers the layer answers each wave of the surface's load by itself. With H = k h and
+//   D = (3-4nu) cosh^2 H + H^2 + (1-2nu)^2:
 //   base pressure / surface pressure  T(H) = 2 (1-nu) [2 (1-nu) cosh H + H sinh H] / D
-//   surface displacement              2 (1-nu^2) / (E k) W(H), W(H) = [(3-4nu) sinh H cosh H - H] /
-//   D D = (3-4nu) cosh^2 H + H^2 + (1-2nu)^2
+//   surface displacement              2 (1-nu^2) / (E k) W(H)
+//                                     W(H) = [(3-4nu) sinh H cosh H - H] / D
 // T(0) = 1: the base carries the whole force. W tends to 1, a half-space, for short waves. For long
-// ones W / k tends to (1-2nu) h / (2 (1-nu)^2): a bonded layer yields by volume change alone.
+// waves W / k tends to (1-2nu) h / (2 (1-nu)^2): a bonded layer yields by volume change alone.
 //
 // A tangential traction t on the rubber, waves exp(i k . x), makes the base pressure
 //   -i (k . t / |k|) Q(H),  Q(H) = 2 (1-nu) [H cosh H + (1-2nu) sinh H] / D
-// Only the part of t along k does: the other shears the layer and presses nowhere, so torsion is
-// not felt. Q(H) tends to H for long waves: the base carries the moment of t about itself, with
-// more pressure ahead of it, as much less behind, and no force.
-// (Plane or axisymmetric Navier equations with u = 0 at z = 0; the tests solve them numerically.)
+// Only the part of t along k makes pressure. The other part shears the layer and presses nowhere,
+// so the base does not feel torsion. Q(H) tends to H for long waves: the base carries the moment of
+// t about itself, with more pressure ahead of it, as much less behind, and no force. (Plane or
+// axisymmetric Navier equations with u = 0 at z = 0; the tests solve them numerically.)
 //
-// What it leaves out: the pad's edges (block.hpp), large strain, the sensors' own stiffness in the
-// base, and time (effects.hpp).
+// Left out: the pad's edges (block.hpp), large strain, the sensors' own stiffness in the base, and
+// time (effects.hpp).
 #pragma once
 
 namespace fingertip::twin {

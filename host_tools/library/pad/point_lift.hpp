@@ -1,15 +1,16 @@
-// A layer (layer.hpp) one point of whose base is lifted: the base moves by a unit of volume (1
-// mm^3) upwards at r = 0 and nowhere else, the surface is free.
+// A layer (layer.hpp) with one point of its base lifted. The base moves by a unit of volume (1
+// mm^3) upwards at r = 0 and nowhere else. The surface is free.
 //
 // By Betti's theorem the surface's displacement there is what that point of the base feels of a
-// load on the surface (block.hpp). Here it gives the stress inside, with which an infinite layer
-// holds what a block with free sides must do without.
+// load on the surface (block.hpp). This header gives the stress inside. An infinite layer holds
+// itself with that stress. A block with free sides lacks it.
 //
-// Waves of a lift exp(i k . x) have the displacement of a half-space above the base,
+// Waves of a lift exp(i k . x) have two parts. The first is the displacement of a half-space above
+// the base, in closed form,
 //   u_z = (1 + k z / b) exp(-k z),  u_r = -k z / b exp(-k z),  b = 3 - 4 nu
-// in closed form, and a rest, without displacement at the base, that takes the stress from the
-// surface: (1, -+1) exp(-+k z) and what Papkovich and Neuber add, with four constants for each k.
-// The rest falls as exp(-k h), so its integrals over k are short.
+// The rest has no displacement at the base, and takes the stress from the surface: (1, -+1) exp(-+k
+// z) and the terms of Papkovich and Neuber, with four constants for each k. The rest falls as
+// exp(-k h), so its integrals over k are short.
 #pragma once
 
 #include "library/pad/layer.hpp"

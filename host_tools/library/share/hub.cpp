@@ -198,7 +198,7 @@ void Hub::take_acknowledgement(Envelope packet) {
     return command.line_sequence == line_sequence && command.type == ack[ACK_COMMAND_AT];
   });
   if (at == commands_.end()) {
-    return; /* nobody's, or too late */
+    return; /* of no client, or too late */
   }
   Command command = *at;
   commands_.erase(at);

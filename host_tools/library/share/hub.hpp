@@ -1,13 +1,13 @@
-/* One fingertip for many programs: what its line says goes to whom it concerns, what they say to
- * it goes to its line. Each client is spoken to as by a fingertip of its own (PROTOCOL.md); nothing
- * is read, written or waited for here.
+/* One fingertip for many programs. The hub passes what its line says to the clients that it
+ * concerns, and the clients' commands to its line. To each client the hub is a fingertip of its own
+ * (PROTOCOL.md). Nothing is read, written or waited for here.
  *
- * - Frames and health go to those that asked for them; the fingertip is asked for what any of them
- *   wants. Whoever leaves wants nothing.
- * - A command goes on as it came, but for the streams it asks for. Its acknowledgement, and the
- *   info or health after it, go to its client alone, under the command's own number.
- * - Packets are numbered for each client. What is missing from the line is missing to everybody;
- *   what a client does not take in time, to that client alone. Damaged frames go to everybody.
+ * - Frames and health go to the clients that asked for them. The hub asks the fingertip for what
+ *   any of them wants. A client that leaves wants nothing.
+ * - A command goes on as it came, except for the streams that it asks for. Its acknowledgement, and
+ *   the info or health after it, go to its client alone, under the command's own number.
+ * - Packets are numbered for each client. Packet loss on the line shows to all clients. Packets
+ *   that one client does not take in time are lost to that client alone. Damaged frames go to all.
  */
 #pragma once
 
@@ -34,7 +34,7 @@ public:
   /* Commands that the line has not answered in the last second, at most: a few writes of what the
    * system's serial driver takes sixteen of without waiting. */
   static constexpr std::size_t MOST_UNANSWERED = 12;
-  /* Losses in a row beyond which sequence numbers, of 16 bits, tell too few. */
+  /* Losses in a row beyond which sequence numbers, of 16 bits, show too few. */
   static constexpr std::uint64_t MOST_LOST_IN_A_ROW = 30000;
 
   explicit Hub(std::size_t queue_bytes = QUEUE_BYTES) : queue_bytes_(queue_bytes) {}
@@ -60,12 +60,12 @@ public:
   void took(Client client, std::size_t length);
   /* Packets that it did not take in time. */
   std::uint64_t lost(Client client) const { return clients_.at(client).lost; }
-  /* It lost so many that it has to begin anew. */
+  /* It lost so many that it has to begin again. */
   bool is_lost_for_good(Client client) const {
     return clients_.at(client).lost_in_a_row > MOST_LOST_IN_A_ROW;
   }
 
-  /* As the fingertip last told. */
+  /* As last reported by the fingertip. */
   const std::optional<wire_info> &info() const { return info_; }
 
 private:

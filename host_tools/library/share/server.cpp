@@ -106,7 +106,7 @@ public:
     }
     sockaddr_un address = {};
     address.sun_family = AF_UNIX;
-    std::string early = path_ + ".new"; /* until it is for nobody else */
+    std::string early = path_ + ".new"; /* until no other user can open it */
     if (early.size() >= sizeof address.sun_path) {
       errno = ENAMETOOLONG;
       throw cannot_share(path_);
@@ -176,7 +176,7 @@ public:
         std::size_t length = 0;
         hub_->waiting(each.client, &length);
         auto events = static_cast<short>((takes ? POLLIN : 0) | (length > 0 ? POLLOUT : 0));
-        all.push_back({events ? each.fd.get() : -1, events, 0}); /* else its end would be told */
+        all.push_back({events ? each.fd.get() : -1, events, 0}); /* else its end would show */
       }
     }
     if (listener_) {

@@ -1,4 +1,4 @@
-/* Owns fingertips and shares each over a Unix socket (share_socket.hpp) with whoever connects.
+/* Owns fingertips and shares each over a Unix socket (share_socket.hpp) with its clients.
  *
  *   Server server(Server::Options(), [](const std::string &line) { ... });
  *   server.add(way);
@@ -6,9 +6,10 @@
  *     server.step(500ms);
  *   }
  *
- * One thread, which sleeps in poll(2) until somebody has something to say; a signal wakes it. A
- * socket is there while its fingertip is: when that goes, its clients get what came until then and
- * the end of their connections, as if their own port had vanished. */
+ * It has one thread, which sleeps in poll(2) until a line or a client has something to say. A
+ * signal wakes it. A socket exists while its fingertip is there. When the fingertip goes, its
+ * clients get all packets until then and the end of their connections, as if their own port had
+ * vanished. */
 #pragma once
 
 #include "libfingertip/connection.hpp"
@@ -43,7 +44,7 @@ public:
   bool is_empty() const { return stations_.empty(); }
   /* Whether this fingertip is served here, there or waited for. */
   bool has(const Way &way) const;
-  /* From now on, whatever comes and goes. Its socket is there once its serial number is known.
+  /* Serves it from now on, through unplugging. Its socket is there once its serial number is known.
    * Throws Error: absent, in use, not allowed, shared by another program. */
   void add(const Way &way);
 

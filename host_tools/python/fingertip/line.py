@@ -47,11 +47,11 @@ class Flag(enum.IntFlag):
     SENSOR_MASKED = 1 << 14  #: warning: a sensor is missing or was left out
     AT_BOUND = 1 << 15  #: warning: the fit stopped at a limit
     ELONGATED = 1 << 16  #: warning: the contact is not round
-    ZERO_DOUBTFUL = 1 << 17  #: warning: a force and a zero that has moved cannot be told apart
+    ZERO_DOUBTFUL = 1 << 17  #: warning: the pressure may be a force or a zero that has moved
     SENSOR_DOUBTFUL = 1 << 18  #: warning: a sensor in use gives reason to doubt it
     CALIBRATED = 1 << 19  #: gains and force scale of a calibration act
     TANGENTIAL_VALID = 1 << 20  #: the tangential load has values; location and force are corrected for it
-    TANGENTIAL_FROM_TOUCH = 1 << 21  #: the tangential load is what changed since the first touch
+    TANGENTIAL_FROM_TOUCH = 1 << 21  #: the tangential load is the change since the first touch
     VELOCITY_VALID = 1 << 22  #: the velocity of the contact has values
     MOVING = 1 << 23  #: the speed of the contact is above the threshold
     SLIDING = 1 << 24  #: the contact moves beyond what the load explains, however slowly
@@ -86,7 +86,7 @@ class Stored(enum.IntFlag):
     CALIBRATION = 1 << 0  #: a calibration, and it acts; never without capability fit
     SETTINGS = 1 << 1  #: settings; it started with them
     WRITING = 1 << 2  #: a change is on its way into the flash
-    DAMAGED = 1 << 3  #: what is there is damaged, or of a later firmware, and not used; storing again mends it
+    DAMAGED = 1 << 3  #: the content is damaged, or of a later firmware, and not used; storing again repairs it
     PAD = 1 << 4  #: a pad's profile, and it acts; never without capability tangential
 
 
@@ -96,7 +96,7 @@ class Result(enum.IntEnum):
     DONE = 0  #: the command was carried out
     UNKNOWN_COMMAND = 1  #: the firmware does not know this command
     OUT_OF_RANGE = 2  #: a value is out of range for this firmware
-    NOT_NOW = 3  #: not now: a tare while no sensor answers, or in contact and not forced; a change of what is stored while one is being written, or where the flash fails
+    NOT_NOW = 3  #: not now: a tare while no sensor answers, or in contact and not forced; a command that stores while another is being written, or if the flash fails
 
 
 class Calibration(NamedTuple):
@@ -125,57 +125,57 @@ class Calibration(NamedTuple):
 
 
 class PadProfile(NamedTuple):
-    """How the rubber of a pad spreads what presses and what pulls (firmware/common/pad_profile.h has meaning and ranges)."""
+    """How the rubber of a pad spreads a press and a pull (firmware/common/pad_profile.h has meaning and ranges)."""
 
     thickness_mm: Annotated[float, Wire("f")]
     """of the rubber"""
     overhang_mm: Annotated[float, Wire("f")]
-    """of the rubber beyond the outer sensors; 0: not told"""
+    """of the rubber beyond the outer sensors; 0: not set"""
     normal: Annotated[tuple[float, ...], Wire("f", 4)]
     """two normal terms: share and sd_mm of each"""
     tangential: Annotated[tuple[float, ...], Wire("f", 6)]
     """three tangential terms: moment_mm and sd_mm of each"""
     spread_mm2: Annotated[float, Wire("f")]
-    """what to expect of a contact's own spread"""
+    """expected value of a contact's own spread"""
     spread_sd_mm2: Annotated[float, Wire("f")]
     """its standard deviation"""
     force_ratio: Annotated[float, Wire("f")]
     """2 pi p0 sigma^2 of a usual contact over its force"""
     tangential_scale: Annotated[float, Wire("f")]
-    """tangential force is this times what the profile says"""
+    """tangential force is this times the profile's"""
     tangential_scale_sd: Annotated[float, Wire("f")]
     """its standard deviation"""
     edge_ratio_x: Annotated[tuple[float, ...], Wire("f", 3)]
-    """what the ends of the pad do, three coefficients each: to the ratio along x"""
+    """effect of the pad's ends, three coefficients each: on the ratio along x"""
     edge_ratio_y: Annotated[tuple[float, ...], Wire("f", 3)]
-    """to the ratio along y"""
+    """on the ratio along y"""
     edge_gain_x: Annotated[tuple[float, ...], Wire("f", 3)]
-    """to the gain along x"""
+    """on the gain along x"""
     edge_gain_y: Annotated[tuple[float, ...], Wire("f", 3)]
-    """to the gain along y"""
+    """on the gain along y"""
     edge_place_x_mm: Annotated[tuple[float, ...], Wire("f", 3)]
-    """to the place, x"""
+    """on the place, x"""
     edge_place_y_mm: Annotated[tuple[float, ...], Wire("f", 3)]
-    """to the place, y"""
+    """on the place, y"""
     edge_pull_x_mm: Annotated[tuple[float, ...], Wire("f", 3)]
-    """to the place by a load along x"""
+    """on the place by a load along x"""
     edge_pull_y_mm: Annotated[tuple[float, ...], Wire("f", 3)]
-    """to the place by a load along y"""
+    """on the place by a load along y"""
     edge_force: Annotated[tuple[float, ...], Wire("f", 3)]
-    """to the force"""
+    """on the force"""
     from_touch: Annotated[int, Wire("B")]
-    """1: the load is to be told from the first touch on; 0"""
+    """1: the fingertip reports the load from the first touch on; 0: from zero"""
 
 
 class Contact(NamedTuple):
-    """One judged frame. The header's time is the middle of the sensors' conversion. A quantity travels only under its VALID flag; without
+    """One judged frame. The header's time is the middle of the sensors' conversion. A quantity travels only under its VALID flag. Without
     it the encoder leaves it out and the decoder gives 0 (NaN in Python and in messages).
     """
 
     frame: Annotated[int, Wire("I")]
     """counts every frame since start, fitted or not"""
     flags: Annotated[int, Wire("I")]
-    """what the frame says about itself"""
+    """flags of the frame, see below"""
     convert_us: Annotated[int, Wire("H")]
     """broadcast of the conversion command, and the sensors' conversion"""
     read_us: Annotated[int, Wire("H")]
@@ -187,7 +187,7 @@ class Contact(NamedTuple):
     fit_us: Annotated[int, Wire("H")]
     """the fit"""
     contact_us: Annotated[int, Wire("H")]
-    """slip, and the judgement of the result"""
+    """slip, and the flags of the result"""
     total_us: Annotated[int, Wire("H")]
     """the sum of the six stages: from the first bus activity of the frame to the encoding of this packet"""
     sensors_used: Annotated[int, Wire("I", when=("flags", Flag.FIT_VALID), absent=0)]
@@ -207,9 +207,9 @@ class Contact(NamedTuple):
     location_sd_mm: Annotated[float, Wire("f", when=("flags", Flag.UNCERTAINTY_VALID), absent=math.nan)]
     """predicted radial standard deviation of the location"""
     force_sd_N: Annotated[float, Wire("f", when=("flags", Flag.UNCERTAINTY_VALID), absent=math.nan)]
-    """predicted standard deviation of the force, that of the force scale in it"""
+    """predicted standard deviation of the force, with that of the force scale"""
     slip_mm: Annotated[float, Wire("f", when=("flags", Flag.SLIP_VALID), absent=math.nan)]
-    """slip distance, paper eq. (7): of the location from its mean over the slip window"""
+    """slip distance, paper eq. (7): from the mean location over the slip window"""
     sigma_x_mm: Annotated[float, Wire("f", when=("flags", Flag.WIDTHS_VALID), absent=math.nan)]
     """standard deviation of an elliptic Gaussian along x"""
     sigma_y_mm: Annotated[float, Wire("f", when=("flags", Flag.WIDTHS_VALID), absent=math.nan)]
@@ -221,7 +221,7 @@ class Contact(NamedTuple):
     qy_N: Annotated[float, Wire("f", when=("flags", Flag.TANGENTIAL_VALID), absent=math.nan)]
     """tangential load along y"""
     q_sd_N: Annotated[float, Wire("f", when=("flags", Flag.TANGENTIAL_VALID), absent=math.nan)]
-    """predicted standard deviation of either, those of the scales in it"""
+    """predicted standard deviation of either, with those of the scales"""
     tangential_ratio: Annotated[float, Wire("f", when=("flags", Flag.TANGENTIAL_VALID), absent=math.nan)]
     """size of the tangential load over force_N"""
     vx_mm_s: Annotated[float, Wire("f", when=("flags", Flag.VELOCITY_VALID), absent=math.nan)]
@@ -231,7 +231,8 @@ class Contact(NamedTuple):
 
 
 class Raw(NamedTuple):
-    """The readings of one frame. The header's time as in the contact packet of the same frame number. No gain of a calibration is in them.
+    """The readings of one frame, without the gains of a calibration. The header's time is that of the contact packet of the same frame
+    number.
     """
 
     frame: Annotated[int, Wire("I")]
@@ -245,7 +246,7 @@ class Raw(NamedTuple):
     saturated: Annotated[int, Wire("I")]
     """bitmap: the reading is above 1980 mbar, where the sensor's range ends, and does not enter the fit"""
     doubtful: Annotated[int, Wire("I")]
-    """bitmap: a measurement that there is reason to doubt; 0 in a held frame"""
+    """bitmap: a measurement with a reason to doubt it; 0 in a held frame"""
     temperature_cC: Annotated[int, Wire("h")]
     """mean of the sensors, 0.01 degC; 0 until measured"""
     sensors: Annotated[int, Wire("n")]
@@ -255,7 +256,7 @@ class Raw(NamedTuple):
 
 
 class Info(NamedTuple):
-    """Who a fingertip is, how it is set, and what it keeps. Without its capability a field is 0 (None or NaN in Python)."""
+    """Identity, settings and stored data of a fingertip. Without its capability a field is 0 (None or NaN in Python)."""
 
     firmware: Annotated[tuple[int, ...], Wire("B", 3)]
     """major, minor, patch"""
@@ -278,7 +279,7 @@ class Info(NamedTuple):
     osr: Annotated[int, Wire("H")]
     """oversampling ratio, 256 to 8192"""
     temperature_interval_ms: Annotated[int, Wire("H")]
-    """time between temperature conversions while the temperature changes; up to four times as long while it stands still"""
+    """time between temperature conversions while the temperature changes; up to four times as long while it is constant"""
     streams: Annotated[int, Wire("B")]
     """streams that are on"""
     fit_iterations: Annotated[int | None, Wire("B", when=("capabilities", Capability.FIT))]
@@ -343,15 +344,15 @@ class Health(NamedTuple):
     bus_recoveries: Annotated[int, Wire("I")]
     """nine clocks, and resets of multiplexers"""
     zero_readings: Annotated[int, Wire("I")]
-    """conversions that had not finished, and those that are void since one did not or was not read"""
+    """conversions that had not finished, and those that are void after one of these or after a missed reading"""
     implausible_readings: Annotated[int, Wire("I")]
     """readings left out: below zero, or a step that no other sensor shared"""
     sensors_present: Annotated[int, Wire("I")]
     """bitmap: the sensor answered at the last attempt"""
     sensors_prom_bad: Annotated[int, Wire("I")]
-    """bitmap: the PROM's CRC is wrong, and the sensor streams all the same; or the PROM is blank, and it does not"""
+    """bitmap: the PROM's CRC is wrong, and the sensor still streams; or the PROM is blank, and it does not"""
     watchdog_resets: Annotated[int, Wire("I")]
-    """since power-on; faults and panics end in one too, and the command crash asks for the last"""
+    """since power-on. Faults and panics end in one too. The command crash asks for the last"""
     cpu_busy_permille: Annotated[int, Wire("H")]
     """main loop without interrupts, over the last second"""
     stack_free_bytes: Annotated[int, Wire("H")]
@@ -366,7 +367,7 @@ class Acknowledgement(NamedTuple):
     command: Annotated[int, Wire("B")]
     """type of the command"""
     result: Annotated[int, Wire("B")]
-    """what came of it, see below"""
+    """result, see below"""
     command_sequence: Annotated[int, Wire("H")]
     """the command's own"""
     host_time_us: Annotated[int, Wire("Q")]
@@ -374,28 +375,26 @@ class Acknowledgement(NamedTuple):
 
 
 class Crash(NamedTuple):
-    """How the firmware last came to an end since power-on; kind 0, and all else 0: it did not (firmware/common/crash.h says what the codes
-    mean).
-    """
+    """How the firmware last ended since power-on. If kind and all else is 0, it did not (firmware/common/crash.h explains the codes)."""
 
     kind: Annotated[int, Wire("B")]
     """0 none, 1 hard fault, 2 panic, 3 watchdog, 4 an unhandled exception, 5 stack overflow, 6 start-up gave up"""
     exception: Annotated[int, Wire("B")]
     """exception in which the code at pc ran: 0 main loop, 16 + n interrupt n"""
     vector: Annotated[int, Wire("B")]
-    """exception that took note; 0 for a panic"""
+    """exception that made the record; 0 for a panic"""
     activity: Annotated[int, Wire("B")]
-    """what the main loop was at: 0 start, 1 rest, 2 commands, 3 readings, 4 condition, 5 fit, 6 contact, 7 packet, 8 health, 9 store"""
+    """activity of the main loop: 0 start, 1 rest, 2 commands, 3 readings, 4 condition, 5 fit, 6 contact, 7 packet, 8 health, 9 store"""
     stuck: Annotated[int, Wire("B")]
-    """what had made no progress, for kind 3: bit 0 main loop, 1 scan, 2 USB, 3 interrupts"""
+    """parts without progress, for kind 3: bit 0 main loop, 1 scan, 2 USB, 3 interrupts"""
     events: Annotated[tuple[int, ...], Wire("B", 8)]
     """the last events, newest first: 0 none, 1 start, 2 command, 3 port closed, 4 bus asleep, 5 awake, 6 stored, 7 other sensors answer, 8
     timeouts on the sensor bus, 9 frames skipped
     """
     event_details: Annotated[tuple[int, ...], Wire("B", 8)]
-    """of these: type of the command; 1 if storing failed; how many timeouts or frames in a second"""
+    """of these: type of the command; 1 if storing failed; number of timeouts or frames in a second"""
     r0: Annotated[int, Wire("I")]
-    """registers; all 0 where nothing could take note"""
+    """registers; all 0 if they could not be recorded"""
     r1: Annotated[int, Wire("I")]
     r2: Annotated[int, Wire("I")]
     r3: Annotated[int, Wire("I")]
@@ -411,8 +410,8 @@ class Crash(NamedTuple):
 
 
 class SetStreams(NamedTuple):
-    """Streams to send; 0 stops. One that the firmware's capabilities lack is out of range. Nothing streams until this command: a terminal
-    that echoes cannot start it by accident.
+    """Set the streams to send; 0 stops. A stream that the firmware's capabilities lack is out of range. Nothing streams until this command,
+    so that a terminal that echoes cannot start it by accident.
     """
 
     streams: Annotated[int, Wire("B")]
@@ -420,13 +419,13 @@ class SetStreams(NamedTuple):
 
 
 class Tare(NamedTuple):
-    """Measure the zero again over the next 16 frames (at rates below 16 Hz those of a second, three at least), during which no contact is
-    reported. While one is reported, and while no sensor answers, it is refused with "not now": what presses would become the zero. The
-    zero follows slow drift only while nothing touches the pad: send this between grasps, as the paper does.
+    """Measure the zero over the next 16 frames (at rates below 16 Hz those of a second, three at least). The device reports no contact
+    meanwhile. In contact, and while no sensor answers, it refuses with "not now", since the press would become the zero. The zero
+    follows slow drift only while nothing touches the pad. So send this between grasps, as the paper does.
     """
 
     force: Annotated[int, Wire("B")]
-    """1: tare whatever touches, where the contact is known to be none; 0"""
+    """1: tare even in contact, if that contact is known to be none; 0"""
 
 
 class SetRate(NamedTuple):
@@ -444,7 +443,7 @@ class SetOsr(NamedTuple):
 
 
 class SetSlip(NamedTuple):
-    """Set the slip metric. Of the window the device keeps 160 frames: 122 ms at 1307 frames/s, 390 ms at 410."""
+    """Set the slip metric. The device keeps 160 frames of the window: 122 ms at 1307 frames/s, 390 ms at 410."""
 
     threshold_mm: Annotated[float, Wire("f")]
     """slip threshold"""
@@ -472,8 +471,8 @@ class Loader(NamedTuple):
 
 
 class StoreCalibration(NamedTuple):
-    """Store a calibration. Gains 0.25 to 4, their standard deviations 0 to 0.5, scale 0.1 to 10, its standard deviation 0 to 1. Acts from
-    the frame on that follows the acknowledgement.
+    """Store a calibration. Gains 0.25 to 4, their standard deviations 0 to 0.5, scale 0.1 to 10, its standard deviation 0 to 1. It acts
+    from the first frame after the acknowledgement.
     """
 
     sensors: Annotated[int, Wire("n")]
@@ -483,7 +482,7 @@ class StoreCalibration(NamedTuple):
 
 
 class EraseCalibration(NamedTuple):
-    """Gains and scale are 1 again."""
+    """Erase the calibration: gains and scale are 1 again."""
 
 
 class Keep(NamedTuple):
@@ -510,7 +509,7 @@ class SetLocationLimit(NamedTuple):
 
 
 class StorePad(NamedTuple):
-    """Store a pad's profile, each value in its range and the terms in order of width. Acts from the frame on that follows the
+    """Store a pad's profile, each value in its range and the terms in order of width. It acts from the first frame after the
     acknowledgement.
     """
 
@@ -519,7 +518,7 @@ class StorePad(NamedTuple):
 
 
 class ErasePad(NamedTuple):
-    """There is no tangential load from now on."""
+    """Erase the pad profile: there is no tangential load from now on."""
 
 
 Body = Contact | Raw | Info | Health | Acknowledgement | Crash | SetStreams | Tare | SetRate | SetOsr | SetSlip | AskInfo | AskHealth | AskCrash | Loader | StoreCalibration | EraseCalibration | Keep | SetPrior | SetLocationLimit | StorePad | ErasePad
@@ -672,12 +671,12 @@ class ContactQuantities:
 
     @property
     def force_sd_N(self) -> float:
-        """Predicted standard deviation of the force, that of the force scale in it."""
+        """Predicted standard deviation of the force, with that of the force scale."""
         return self.contact.force_sd_N
 
     @property
     def slip_mm(self) -> float:
-        """Slip distance, paper eq. (7): of the location from its mean over the slip window."""
+        """Slip distance, paper eq. (7): from the mean location over the slip window."""
         return self.contact.slip_mm
 
     @property
@@ -707,7 +706,7 @@ class ContactQuantities:
 
     @property
     def q_sd_N(self) -> float:
-        """Predicted standard deviation of either, those of the scales in it."""
+        """Predicted standard deviation of either, with those of the scales."""
         return self.contact.q_sd_N
 
     @property

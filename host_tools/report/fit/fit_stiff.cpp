@@ -6,7 +6,7 @@
 // reading beyond MS58XX_MAX_PRESSURE_Pa, and saturation to int32.
 //
 // A warning is UNCERTAIN, MODEL, FLAT, AT_BOUND, LOW_SIGNAL, FORCE_LOWER_BOUND, no contact or no
-// fit. The firmware is told what is so: gains are exact where the case does not spread them. Bad
+// fit. The firmware has the true settings: gains are exact where the case does not spread them. Bad
 // means more than 1 mm from the truth, and any location where there is none to find; of two
 // contacts the truth is the centroid of force.
 #include "common/contact_flags.h"

@@ -7,7 +7,7 @@
 //
 // Noise 2..20 Pa rms, every range log-uniform, location uniform over the array (18 x 36 mm, De
 // Clercq et al., RA-L 2022). Presses whose largest reading is below 20 noise sigmas would not pass
-// the firmware's gate and are drawn anew.
+// the firmware's gate and are drawn again.
 //
 // C and D: pressure on the bonded base of a linear elastic layer under a contact pressure without
 // friction. The contact pressure is assumed, not solved: Hertz for the spheres (radius from the

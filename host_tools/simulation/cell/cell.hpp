@@ -51,7 +51,7 @@ struct Object {
 
 struct Grasp {
   Vector place_mm;           // where it touches, fingertip 0
-  double angle_rad = 0.0;    // its face is turned by, likewise
+  double angle_rad = 0.0;    // fingertip 0: its face is turned by
   double down_rad = 0.0;     // direction of gravity from x towards y
   double relaxation = 0.175; // share of the force lost in 8 s: simulation/twin/effects.hpp
   // The rubber's tangential stiffness per radius of contact: 8 G / (2 - nu), as on a half-space of

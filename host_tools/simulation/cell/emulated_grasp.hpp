@@ -50,7 +50,7 @@ public:
 
   // What happened, and when, of the first slip after the lift:
   //   begin_s  emulated time
-  //   by ms after it: measured_ms the frame that first told it, sent_ms the packet that left its
+  //   by ms after it: measured_ms the first frame that reported it, sent_ms the packet that left its
   //   chip whole, answered_ms the controller's command, asked_ms on the gripper's line, moved_ms
   //   the fingers, reaction_ms 5 % more force; null: never
   // told_by: "SLIDING", or "load", that of a fingertip a tenth and 0.1 N above what it was.

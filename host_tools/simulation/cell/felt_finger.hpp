@@ -18,9 +18,9 @@ extern "C" {
 
 namespace fingertip::cell {
 
-// What sets one pad apart, and what its firmware has been told of it.
+// What sets one pad apart, and its firmware's calibration.
 struct Rubber {
-  Pressures gain, gain_sd; // share that a reading has of what it should; told sd
+  Pressures gain, gain_sd; // share that a reading has of the true one; sd of the calibration
 };
 
 struct Sensing {

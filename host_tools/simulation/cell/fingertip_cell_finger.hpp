@@ -23,7 +23,7 @@ public:
   void put(std::int64_t host_us, const Pressures &pressures);
   // Of the newest; 0: none yet.
   std::int64_t newest_us() const;
-  // In between straight; before the oldest that is kept, 0.5 s, as then, after the newest likewise.
+  // In between straight; before the oldest that is kept, 0.5 s, as then; the same after the newest.
   double at(std::int64_t host_us, std::size_t sensor) const;
 
   // The other way: up to where its fingertip has got; 0: it has not begun.

@@ -1,8 +1,8 @@
 // The cell's world as time passes, its truth, and what can be done to it by name.
 //
 // The object stands on the table between the fingers. Once the grip's force has stood for a while,
-// or when it is told to, the hand lifts it; disturbances (scene.hpp) come then, planned or when
-// they are told. What slides by less than SLIP_mm at a time has not slipped. An object that slid
+// or by a command, the hand lifts it; disturbances (scene.hpp) come then, planned or by
+// a command. What slides by less than SLIP_mm at a time has not slipped. An object that slid
 // DROP_mm, or that nothing presses any more, is gone.
 #pragma once
 
@@ -31,7 +31,7 @@ public:
     Object object;
     Grasp grasp;
     double lift_mm = 10.0, lift_s = 0.5;
-    std::optional<double> lift_after_s = 1.0; // none: only when told
+    std::optional<double> lift_after_s = 1.0; // none: only by a command
     std::vector<Planned> planned;
   };
 

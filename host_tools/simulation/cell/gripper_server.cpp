@@ -18,7 +18,7 @@ using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::chrono::milliseconds FRAME_GAP{20}; // what is no whole frame by then is none
 constexpr double BITS_PER_BYTE = 10;
-// While a machine stalls for longer, the gripper's time stands: nobody could have spoken to it.
+// While a machine stalls for longer, the gripper's time stands: no command could have reached it.
 constexpr double STALL_s = 0.1;
 constexpr double LONGEST_STEP_s = 0.01; // of the motion
 
@@ -312,7 +312,7 @@ void GripperServer::send_due() {
   while (!answers_.empty() && answers_.front().due <= host_now()) {
     const Bytes bytes = answers_.front().bytes;
     answers_.pop_front();
-    // A port that nobody reads fills up; what does not fit is lost, as on any line.
+    // A port that is not read fills up; what does not fit is lost, as on any line.
     port_.write(bytes.data(), bytes.size());
   }
 }

@@ -47,7 +47,7 @@ public:
     std::string model = {};
     int slave = 0; // 0: the model's usual
     std::string link = {}; // made to its port; "": none
-    // Whether step moves the fingers on as real time passes; else whoever drives the motion does.
+    // Whether step moves the fingers on as real time passes; else the driver of the motion does.
     bool real_time = true;
     std::vector<int> functions = {3, 4, 16, 23}; // of Modbus, that it answers
   };

@@ -2,7 +2,7 @@
 //
 // After the manuals: activation begins where rACT rises and takes its time; a move before gives
 // gFLT 7, one while it goes on gFLT 5 and is done afterwards; rATR opens or closes slowly (gFLT 11)
-// and then needs a reset (gFLT 15). Assumed, for nothing is public: gFLT 9 is told once, by the
+// and then needs a reset (gFLT 15). Assumed, for nothing is public: gFLT 9 is reported once, by the
 // first answer after a second of silence, and what moves goes on; a move begins where a register of
 // it changes or rGTO rises.
 #pragma once
@@ -43,7 +43,7 @@ private:
   GripperMotion &motion_;
   std::array<std::uint16_t, robotiq::REGISTERS> command_{}, done_{};
   double heard_s_ = 0.0;
-  bool silence_ = false; // a second of it, not told yet
+  bool silence_ = false; // a second of it, not reported yet
   bool released_ = false;
   std::uint8_t failed_ = robotiq::NO_FAULT;
 };

@@ -29,7 +29,7 @@ struct native_fingertip_settings {
 extern "C" {
 #endif
 
-/* Powers up at time 0. False: there is a pad, and this build tells no tangential load. */
+/* Powers up at time 0. False: there is a pad, and this build reports no tangential load. */
 bool native_fingertip_start(const struct native_fingertip_settings *settings);
 
 /* Runs to t_us. False: the firmware left for the loader or panicked. */

@@ -19,7 +19,7 @@ bool repeat_begin(const struct wire_info *info) {
                              info->pitch_mm) != FT_OK) {
     return false;
   }
-  app.streams = WIRE_STREAM_CONTACT; /* nobody reads it, but the packet is made */
+  app.streams = WIRE_STREAM_CONTACT; /* it is not read, but the packet is made */
   app.frame.noise_Pa_q10 = osr->noise_Pa_q10;
   app.fit_settings.iterations = info->fit_iterations;
   app.fit_settings.n_largest = DEFAULT_FIT_N_LARGEST;

@@ -103,7 +103,7 @@ Act drag(const Stage &stage, std::size_t n) {
   act.mass_kg = force_N / GRAVITY_m_s2;
   act.speed_mm_s = stage.speed_mm_s(n, DRAG_SPEEDS_mm_s);
   Track track;
-  // x, y and back, if not told otherwise.
+  // x, y and back, by default.
   aim(track, stage.tangential.angle_deg.value_or(90.0 * static_cast<double>(n % 4)) * DEGREE);
   track.pull.friction = Profile(chosen.friction);
   track.pull.travel_mm = stage.options.dead_travel_mm;

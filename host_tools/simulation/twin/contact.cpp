@@ -38,7 +38,7 @@ struct ContactSolver::Work {
   Transform transform;
   std::vector<double> height_mm;  // of the indenter, infinite where it has no surface
   std::vector<double> compliance; // mm per Pa of each wave, the transforms' norm in it
-  std::vector<double> transfer;   // to the base, likewise
+  std::vector<double> transfer;   // to the base
   std::vector<double> pressure_Pa;
   double yield_mm_Pa; // of one node under its own pressure
 

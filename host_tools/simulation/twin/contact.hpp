@@ -32,7 +32,7 @@ struct Contact {
   double contact_area_mm2;
   int iterations;
   std::vector<double> pressure_Pa; // [i * nodes + j], on the surface
-  std::vector<double> base_Pa;     // likewise, on the base
+  std::vector<double> base_Pa;     // the same, on the base
 };
 
 // One indenter on one layer, for forces one after the other. Each solution starts from the last.

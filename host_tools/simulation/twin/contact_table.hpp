@@ -22,7 +22,7 @@ public:
   static constexpr double FORCE_MAX_N = ForcePlanes::FORCE_MAX_N;
 
   // From the cache if it holds this very table, else solved (half a minute at most) and kept there;
-  // a damaged file is solved anew. on_progress gets the share done, 0..1. Throws
+  // a damaged file is solved again. on_progress gets the share done, 0..1. Throws
   // std::filesystem::filesystem_error or std::runtime_error if the cache cannot be written.
   static ContactTable load_or_build(const Indenter &indenter, const Layer &layer,
                                     const std::filesystem::path &cache_directory,

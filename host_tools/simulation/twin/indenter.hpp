@@ -15,7 +15,7 @@ struct Indenter {
   enum class Shape {
     sphere,        // sizes: diameter. A hemisphere on a shaft: nothing beyond its radius touches
     flat_cylinder, // sizes: diameter. A flat end, its edge rounded by edge_mm
-    flat_square,   // sizes: side. Likewise
+    flat_square,   // sizes: side. A flat end, its edge rounded too
     ellipsoid,     // sizes: the two diameters along x and y, and the height. A hemisphere's like
     roller,        // sizes: diameter, length along y. A cylinder on its side
   };

@@ -25,7 +25,7 @@ std::vector<std::complex<double>> response(const Transform &transform, const Lay
     for (int j = 0; j <= SIDE / 2; j++) {
       const int i = transform.i_of(row), along = axis == Axis::x ? i : j;
       const double k = std::hypot(i, j);
-      // The shortest waves cannot be told from their mirrors: they have no direction.
+      // The shortest waves look like their mirrors: they have no direction.
       const bool directed = along != 0 && along != SIDE / 2;
       const double share = tangential_share(unit * k * layer.thickness_mm, layer.poisson);
       made[std::size_t(row * (SIDE / 2 + 1) + j)] = {

@@ -32,7 +32,7 @@ public:
   /* "12 placements, gains known to 3.1 % of 1.5 %" */
   std::string progress() const;
 
-  /* What the fingertip is to be told; date_s: Unix time. Of a good judgement. Throws Error where
+  /* The calibration for the fingertip; date_s: Unix time. Of a good judgement. Throws Error where
    * the readings are not those of force_N, or a gain is none. */
   calibration made(std::optional<double> force_N, std::uint32_t date_s) const;
   /* Of the firmware's own fit to the placements, without and with the gains. */

@@ -1,7 +1,7 @@
 /* Finds placements in a stream of frames: a weight was set down, stands, and was lifted again.
  *
  * Frames of any rate from 12 a second and any oversampling; all times are the frames' own. What
- * touches the pad is told from absolute pressures alone, by what they were just before, so neither
+ * touches the pad is decided by absolute pressures alone, against those just before, so neither
  * the firmware's gate nor its zero matters; only whether something lies on the pad at the very
  * beginning is asked of the zero.
  *
@@ -54,7 +54,7 @@ public:
   explicit PlacementFinder(std::size_t sensors);
 
   /* The placement that this frame completes. Frames whose time does not rise, or after a gap of
-   * half a second, begin anew; the times of placements go on when a fingertip restarted. */
+   * half a second, begin again; the times of placements go on when a fingertip restarted. */
   std::optional<Placement> take(const Frame &frame);
 
   State state() const { return state_; }

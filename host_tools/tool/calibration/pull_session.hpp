@@ -23,7 +23,7 @@ public:
   bool take(const wire_packet &packet);
   void judge(bool last) { judgement_ = judge_pulls(pulls_, known_N_, last); }
 
-  /* "let go of it, and leave it alone": what to do now. */
+  /* "release it, and leave it alone": what to do now. */
   std::string advice() const;
   /* "pull 3 at x ... reads ..."; not before the first. */
   std::string last_pull_text() const;

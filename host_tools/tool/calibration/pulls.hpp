@@ -59,7 +59,7 @@ public:
   /* known_N: what pulls. */
   explicit PullFinder(double known_N) : known_N_(known_N) {}
 
-  /* The pull that this frame completes. Frames whose time does not rise begin anew. */
+  /* The pull that this frame completes. Frames whose time does not rise begin again. */
   std::optional<Pull> take(const PullFrame &frame);
 
   State state() const { return state_; }

@@ -1,6 +1,6 @@
 /* Gains of the sensors from placements of one weight.
  *
- * The same weight on the same rounded foot is set down at places that nobody measures. Then every
+ * The same weight on the same rounded foot is set down at places that are not measured. Then every
  * placement presses with the same force and, on a pad of one thickness, with the same profile; what
  * differs between a reading and that profile at its distance is the sensor's. With placement i at
  * (x, y), its squared distance R from sensor k and c = NARROW,

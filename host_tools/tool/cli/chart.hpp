@@ -15,7 +15,7 @@ namespace fingertip {
 struct ChartPoint {
   std::optional<float> value;
   bool doubtful = false; /* shown only where there is no other, and dashed */
-  bool alarm = false;    /* told red */
+  bool alarm = false;    /* shown red */
 };
 
 struct Curve {

@@ -1,4 +1,4 @@
-/* A grasp from a terminal: two fingertips and a gripper, shown, recorded and told what to do. */
+/* A grasp from a terminal: two fingertips and a gripper, shown, recorded and controlled. */
 #pragma once
 
 #include "grasp/gripper/gripper.hpp"

@@ -8,7 +8,7 @@ constexpr char ESCAPE = '\x1b';
 /* The bytes of a sequence come together, over a slow serial line too: 50 ms at 300 baud are more
  * than one character. What comes later than that after an escape is a key. */
 constexpr std::chrono::milliseconds SEQUENCE_GAP{50};
-/* People read before they answer; whoever types faster is no person. */
+/* People read before they answer; faster input does not come from a person. */
 constexpr std::chrono::milliseconds READING{300};
 constexpr std::chrono::milliseconds PATIENCE{10000};
 /* ECMA-48: parameter and intermediate bytes are below these, finals from it on. */

@@ -1,4 +1,4 @@
-/* What a person types, told from what else comes in from a terminal. */
+/* What a person types, separated from the other input of a terminal. */
 #pragma once
 
 #include "libfingertip/clock.hpp"
@@ -44,7 +44,7 @@ public:
   bool is_asked() const { return asked_; }
   /* Every key while it is asked: true for y. Any other, or y too early, withdraws the question. */
   bool answer(Key key, KeyTime now);
-  /* Withdraws it where nobody answers. */
+  /* Withdraws it where no answer comes. */
   void expire(KeyTime now);
 
 private:

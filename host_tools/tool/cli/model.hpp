@@ -70,7 +70,7 @@ public:
   bool has_pad() const;
   /* Since the last frame, by the host's clock; nothing before the first. */
   std::optional<double> seconds_since_frame() const;
-  /* Whether what the last frame told is still so: false where none came for STALLED_s, and where
+  /* Whether the last frame's report still holds: false where none came for STALLED_s, and where
    * the fingertip is gone. */
   bool is_current() const;
   /* The numbers of the last frame are differences from a measured zero. */

@@ -61,7 +61,7 @@ private:
   std::vector<Mark> marks_;
 };
 
-/* The gripper of a file, likewise. */
+/* The same for the gripper of a file. */
 class GripTrack {
 public:
   /* Nothing for a file without one. */

@@ -30,7 +30,7 @@ const Sample &sample_of(const Model &model, std::int64_t interval) {
   return there ? model.samples()[static_cast<std::size_t>(interval - oldest)] : none;
 }
 
-/* there: whether an interval has the value; alarm: where it is told red; null: never. */
+/* there: whether an interval has the value; alarm: where it is shown red; null: never. */
 Curve curve_of(const Model &model, bool Sample::*there, float Sample::*value, bool goes_both_ways,
                bool Sample::*alarm) {
   return {[&model, there, value, alarm](std::int64_t interval) {

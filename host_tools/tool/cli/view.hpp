@@ -28,7 +28,7 @@ public:
 
 /* The monitor on a terminal, or one line a second for each fingertip elsewhere. */
 std::unique_ptr<View> make_monitor_view(ColourMode mode);
-/* Likewise a grasp, whose lines come when its state or trouble changes too; quiet: only then, and
+/* For a grasp, whose lines come when its state or trouble changes too; quiet: only then, and
  * only on standard error. The model must outlive the view. */
 std::unique_ptr<View> make_grasp_view(ColourMode mode, const GripModel &grip);
 std::unique_ptr<View> make_quiet_grasp_view(const GripModel &grip);

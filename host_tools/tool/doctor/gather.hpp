@@ -17,7 +17,7 @@ struct Examination {
 };
 
 /* Whatever ends it early is one of the facts, but for an ELF file that was named and is none:
- * Error. stop: asked while waiting; true throws Interrupted. progress: told the share of the
+ * Error. stop: asked while waiting; true throws Interrupted. progress: called with the share of the
  * measurement that is over, 0..1. Leaves the streams off. */
 Facts gather(const Examination &examination, const std::function<bool()> &stop,
              const std::function<void(double)> &progress);

@@ -22,8 +22,8 @@ struct Slope {
 struct SensorAtRest {
   std::size_t readings = 0;
   double valid_share = 0;     /* of the frames that measured pressures */
-  double doubtful_share = 0;  /* likewise */
-  double saturated_share = 0; /* likewise */
+  double doubtful_share = 0;  /* the same */
+  double saturated_share = 0; /* the same */
   double mean_Pa = 0;         /* absolute; of no readings 0 */
   std::optional<double> noise_Pa;
   std::optional<Slope> drift;

@@ -1,5 +1,5 @@
 // The tool's calibrations and its doctor for the page (src/judges/judges.ts says what each is).
-// Packets and texts come in by room(), what is told goes out as JSON by told(). Sessions are the
+// Packets and texts come in by room(), answers go out as JSON by told(). Sessions are the
 // page's to free. What is wrong is thrown (thrown.cpp).
 #include "libfingertip/error.hpp"
 #include "tool/calibration/gain_session.hpp"

@@ -355,7 +355,7 @@ TEST(TwinBlock, TheTableIsTheSolution) {
   EXPECT_NEAR(table.added_Pa(0, load, 3.0, 7.0), table.added_Pa(2, mirror_both, -3.0, -7.0), 1e-9);
   EXPECT_EQ(table.added_Pa(0, {1, 0, 0, 0}, 99.0, 7.0),
             table.added_Pa(0, {1, 0, 0, 0}, block.half_x_mm, 7.0));
-  // From the cache, and anew where it is damaged.
+  // From the cache, and again where it is damaged.
   const auto again = [&] {
     told = 0;
     const BlockTable read =

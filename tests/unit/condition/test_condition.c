@@ -657,7 +657,7 @@ static void test_saturated_sensor_means_contact_and_is_left_out(void) {
   TEST_ASSERT_EQUAL_INT32(AMBIENT, condition.zero_Pa_q10[3]);
 }
 
-/* The press becomes the zero; after it the pad reads negative, says so, and is tared anew. */
+/* The press becomes the zero; after it the pad reads negative, says so, and is tared again. */
 static void test_tare_during_contact(void) {
   begin_calm(4854);
   frame.pressure_Pa_q10[7] += 20000 * Pa;

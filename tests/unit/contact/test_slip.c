@@ -129,7 +129,7 @@ static void test_reset_forgets(void) {
   TEST_ASSERT_FLOAT_WITHIN(ROUNDING_mm, 1.0f, distance_mm);
 }
 
-/* After a pause without a reset the frame before is all there is; then the window fills anew. */
+/* After a pause without a reset the frame before is all there is; then the window fills again. */
 static void test_pause(void) {
   float distance_mm = -1.0f;
   for (uint64_t i = 0; i < 100; i++) {

@@ -44,7 +44,7 @@ struct fake_i2c {
 
 extern struct fake_i2c fake;
 
-/* Powers everything up anew: no faults, time 0, all channels closed. */
+/* Powers everything up again: no faults, time 0, all channels closed. */
 void fake_i2c_power_up(void);
 
 uint8_t fake_byte(unsigned sensor, uint8_t command, unsigned index);

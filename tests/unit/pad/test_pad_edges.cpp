@@ -36,7 +36,7 @@ struct Told {
 };
 
 /* What the firmware says of a contact 3 mm wide on the pad that ends. The layer's part is written
- * anew here, from the formulas of pad_profile.h. */
+ * again here, from the formulas of pad_profile.h. */
 Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_mm, double y_mm, double qx,
           double qy) {
   const wire_info info = pad::own_sensors();

@@ -19,7 +19,7 @@ struct fake_lines {
   bool hangs;          /* the wave under way never ends */
   uint16_t missing;    /* bitmap of sensors */
   uint16_t held_low;   /* bitmap of lines, SCL included */
-  uint16_t held_high;  /* likewise */
+  uint16_t held_high;  /* the same */
   uint16_t deaf;       /* bitmap: sensors that acknowledge their address but not the command */
   uint16_t slips;      /* bitmap: sensors whose clock is disturbed, once ... */
   unsigned slip_clock; /* ... at this clock of the next wave, from 1 ... */
@@ -37,7 +37,7 @@ struct fake_lines {
 
 extern struct fake_lines fake;
 
-/* Powers everything up anew: no faults, time 0. */
+/* Powers everything up again: no faults, time 0. */
 void fake_lines_power_up(void);
 
 uint8_t fake_byte(unsigned sensor, uint8_t command, unsigned index);

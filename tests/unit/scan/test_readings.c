@@ -182,7 +182,7 @@ static void test_with_a_sensor_missing_every_step_counts(void) {
   expect(ALL & ~1u, 0);
 }
 
-/* Admitted anew between two frames, of which it is missing in none: from its first reading on its
+/* Admitted again between two frames, of which it is missing in none: from its first reading on its
  * steps are seen. */
 static void test_a_step_after_an_admission_between_frames_is_left_out(void) {
   start();

@@ -410,7 +410,7 @@ static void test_two_zeros_in_a_row_lead_to_a_reset(void) {
   assert_good_frame(ALL);
 }
 
-/* A sensor that missed two reads before all were reset starts anew: one more does not cost its
+/* A sensor that missed two reads before all were reset restarts: one more does not cost its
  * admission, as the third in a row would. */
 static void test_what_was_missed_before_a_reset_does_not_count_after_it(void) {
   const uint32_t other = 1u << (SENSORS - 1);

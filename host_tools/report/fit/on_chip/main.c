@@ -1,4 +1,4 @@
-/* An image that fits what it is told to, for counting cycles in the emulator: fit_on_chip.mjs
+/* An image that fits the given readings, for counting cycles in the emulator: fit_on_chip.mjs
  * beside this file is its other half and plays the debugger that the breakpoints call.
  */
 #include "alternatives/alternatives.h"

@@ -36,8 +36,8 @@ private:
   twin::TractionTable traction_;
 };
 
-// Gains of a pad and what the firmware is told of them:
-//   equal   all 1, as it is told
+// Gains of a pad and the firmware's calibration of them:
+//   equal   all 1, as calibrated
 //   cal     10 % spread, after a calibration by placements
 //   raw5    5 % spread, never calibrated; raw10
 class Pads {

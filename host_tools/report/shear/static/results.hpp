@@ -47,7 +47,7 @@ public:
   // Claims a load: valid, |Q| / F above 0.05 and above two of its standard deviations.
   double claimed_percent() const;
   double claimed_unflagged_percent() const; // and is not flagged as elongated
-  // Likewise, but outside the circle that holds 98 % of a normal distribution in the plane.
+  // The same, but outside the circle that holds 98 % of a normal distribution in the plane.
   double claimed_surely_percent() const;
 
   nlohmann::ordered_json row(const std::string &name) const;

@@ -39,7 +39,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds LOOK_INTERVAL{100};
 constexpr milliseconds VOLUME_TIMEOUT{10000};
-/* A desktop mounts the drive itself within this time, or nobody does. */
+/* A desktop mounts the drive itself within this time, or not at all. */
 constexpr milliseconds MOUNTED_BY_OTHERS{3000};
 constexpr milliseconds RETURN_TIMEOUT{15000};
 /* udev gives a new port its owner within this time, or has no rule for it. */
@@ -187,7 +187,7 @@ private:
   bool mounted_here_;
 };
 
-/* Asks the fingertip into its loader; its serial number if it told. */
+/* Asks the fingertip into its loader; its serial number if it reported one. */
 std::string ask_into_loader(const FlashOptions &options, const FirmwareImage &image,
                             const Way &way) {
   auto transport = open_way(way);
