@@ -1,7 +1,7 @@
 /** Settings: until power-off, or kept for good. */
-import { Capability, PacketType, RANGES, Stored, type Command, type Info } from '../line/packets';
+import { core } from '../core';
+import { Capability, PacketType, RANGES, Stored, type Command, type Info } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
-import { shortest } from '../recording/text';
 import { Dialog, field, make, makeButton } from './dialog';
 
 interface Setting {
@@ -34,7 +34,7 @@ const SETTINGS = {
   slip_threshold: {
     label: 'Slip threshold, mm',
     hint: span(RANGES.SLIP_THRESHOLD_mm),
-    now: (info) => shortest(info.slip_threshold_mm),
+    now: (info) => core.shortest(info.slip_threshold_mm),
     capability: Capability.SLIP,
   },
   slip_window: {
@@ -49,13 +49,13 @@ const SETTINGS = {
     now: (info) =>
       info.prior_width_mm === 0
         ? 'none'
-        : `${shortest(info.prior_sigma_mm)}:${shortest(info.prior_width_mm)}`,
+        : `${core.shortest(info.prior_sigma_mm)}:${core.shortest(info.prior_width_mm)}`,
     capability: Capability.FIT,
   },
   limit: {
     label: 'Location limit, mm',
     hint: `${span(RANGES.LOCATION_LIMIT_mm)}; UNCERTAIN where location_sd_mm is above it`,
-    now: (info) => shortest(info.location_limit_mm),
+    now: (info) => core.shortest(info.location_limit_mm),
     capability: Capability.FIT,
   },
 } satisfies Record<string, Setting>;
