@@ -63,7 +63,7 @@ class Generator(unittest.TestCase):
 
     def test_a_change_by_hand_is_told_and_undone(self):
         for name, before, after in ((PAGE, "| 8 | LOW_SIGNAL |", "| 9 | LOW_SIGNAL |"), ("firmware/common/contact_flags.h", "1 << 8", "1 << 9"),
-                                    ("host_tools/web/src/line/line_facts.ts", "'bus_nacks'", "'bus_timeouts'")):
+                                    ("host_tools/web/src/line/line_facts.ts", "  bus_nacks: number;", "  bus_timeouts: number;")):
             self.change(name, before, after)
             status, said = self.run_it("--check")
             self.assertEqual((status, said.split(":")[0]), (1, name))
@@ -75,7 +75,7 @@ class Generator(unittest.TestCase):
         status, said = self.run_it()
         self.assertEqual(status, 0)
         changed = {each.split(":")[0] for each in said.splitlines()}
-        self.assertEqual(changed, {"firmware/wire/bodies.h", "firmware/wire/layouts.inc", "host_tools/library/libfingertip/line_fields.hpp",
+        self.assertEqual(changed, {"firmware/wire/bodies.h", "firmware/wire/layouts.inc", "host_tools/library/libfingertip/line_fields.hpp", "host_tools/library/libfingertip/line_values.hpp",
                                    "host_tools/python/fingertip/line.py", "host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg",
                                    "host_tools/web/src/line/line_facts.ts", PAGE})
         texts = {name: (self.root / name).read_text(encoding="utf-8") for name in changed}
