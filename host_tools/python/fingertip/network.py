@@ -13,8 +13,10 @@
 
 A live subscriber may miss packets: they are sent with congestion control "drop", and what the network does not take in time is left out.
 All packets of a fingertip, of whatever key, are numbered in one row, so that a recorder sees what it misses; it asks for that again, which
-is reliable and blocks. Zenoh's own AdvancedSubscriber numbers each key by itself, so that a contact cannot be told to belong before a raw
-packet that came again.
+is reliable and blocks. Zenoh's own AdvancedSubscriber does not do, under one key either: it asks once, and where the network is cut again
+during the answer it takes for lost what the bridge still keeps; and it knows neither what the line lost, nor what was sent between two bridges,
+nor when a recording is complete. The sequence numbers of the line do not do: they wrap after 25 s at the highest rate, and `fingertip serve`
+has its own.
 
 Needs the package eclipse-zenoh, which `pip install "fingertip-tactile[zenoh]"` brings.
 """

@@ -29,7 +29,6 @@ AHEAD_MOST = 200_000  # packets that wait for one that is missing; then it is lo
 WAITING_MOST = 200_000  # live packets that wait to be written; more are asked for again later
 CLOCK_s = 0.5
 STATUS_AGE_s = 1.5
-END_GAP_s = 1.0
 RECORDED = ("contact", "raw", "health", "info", "other")
 
 

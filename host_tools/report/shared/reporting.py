@@ -97,6 +97,52 @@ def finish(found, options, files):
     return 1 if options.check and missed(found) else 0
 
 
+def figures_printed(name, command):
+    """The JSON that a program prints; its progress goes to stderr as it comes."""
+    done = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, text=True)
+    if done.returncode != 0:
+        raise InputError(f"{name} ended with status {done.returncode}; its own words are above")
+    try:
+        return json.loads(done.stdout)
+    except ValueError as error:
+        raise InputError(f"{name} wrote no JSON ({error})") from None
+
+
+def figures_kept(path, names):
+    """These figures of a file, None where it is not there."""
+    try:
+        found = json.loads(path.read_text())
+    except OSError:
+        found = {}
+    return {name: found.get(name) for name in names}
+
+
+def chosen_parts(options, parts, usual):
+    """Those of --parts, or the usual ones."""
+    chosen = options.parts.split(",") if options.parts else list(usual)
+    if unknown := [part for part in chosen if part not in parts]:
+        raise InputError(f"--parts: {unknown[0]} is none of {','.join(parts)}")
+    return chosen
+
+
+def report_of_programs(options, name, parts, chosen, goals, measure, derive, pages):
+    """A report of programs that run one after the other. parts: what each does; measure(part) -> figures; derive(found, out) -> figures
+    that follow from others; pages: the module that writes name.md and draws name.png. Exit status."""
+    out = output_folder(options)
+    path = out / f"{name}.json"
+    found = {figure: None for figure, _, _ in goals}
+    if options.parts and path.is_file():
+        found |= json.loads(path.read_text())
+    for part in chosen:
+        print(f"        {parts[part]}", flush=True)
+        found |= measure(part)
+        found = judge({**found, **derive(found, out)}, goals)
+        write_json(path, found)  # what is found is kept though a later part fails
+    pages.write(found, out / f"{name}.md")
+    pages.draw(found, out / f"{name}.png")
+    return finish(found, options, tuple(f"{name}.{kind}" for kind in ("json", "md", "png")))
+
+
 def report_of_parts(argv, description, name, parts):
     """A report of parts, each a module: GOALS, measure(build, steps) -> figures by name, text(figures) -> lines of Markdown. Writes
     name.json and name.md. Exit status."""

@@ -11,7 +11,6 @@ Pads, touches and sensors are the twin's, the code that judges them is the firmw
 real pad confirms the size or the accuracy of what is read; that the centroid of the pressure under an infinite layer moves by one
 thickness for each unit of Q / F follows from the balance of moments alone.
 """
-import json
 import pathlib
 import subprocess
 import sys
@@ -23,8 +22,7 @@ import chip  # noqa: E402
 import shear_report  # noqa: E402
 from boards import fit_cycles_of  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
-from goals import judge  # noqa: E402
-from reporting import finish, option_parser, output_folder, write_json  # noqa: E402
+from reporting import chosen_parts, figures_kept, figures_printed, option_parser, output_folder, report_of_programs  # noqa: E402
 
 # part: what it does, its program below the build folder
 PARTS = {
@@ -52,33 +50,17 @@ def program_of(part, options):
     return pathlib.Path(options.build) / "host_tools/report/shear" / part / f"shear_{part}"
 
 
-def run_part(part, options):
-    """What it found; its progress goes to stderr as it comes."""
+def measure(part, options):
     program = program_of(part, options)
     if not program.is_file():
         raise InputError(f"{program} is not there; build it: cmake --build --preset host")
-    print(f"        {PARTS[part]}", flush=True)
     if part == "chip":
         return chip.measure(options.build, options.boards, lambda what: print(f"        {what}", flush=True))
-    command = [str(program), "--cache", str(pathlib.Path(options.output) / "contact_tables")]
+    command = [program, "--cache", pathlib.Path(options.output) / "contact_tables"]
     for name in ("seed", "pads") if part == "static" else ("seed",):
         if (value := getattr(options, name)) is not None:
-            command += [f"--{name}", str(value)]
-    done = subprocess.run(command, stdout=subprocess.PIPE, text=True)
-    if done.returncode != 0:
-        raise InputError(f"shear_{part} ended with status {done.returncode}; its own words are above")
-    try:
-        return json.loads(done.stdout)
-    except ValueError as error:
-        raise InputError(f"shear_{part} wrote no JSON ({error})") from None
-
-
-def optimum(out):
-    try:
-        found = json.loads((out / OPTIMUM_FILE).read_text())
-    except OSError:
-        found = {}
-    return {name: found.get(name) for name in OPTIMUM}
+            command += [f"--{name}", value]
+    return figures_printed(f"shear_{part}", command)
 
 
 def lifts(found):
@@ -95,25 +77,13 @@ def main(argv):
     parser.add_argument("--parts", metavar="NAME,...", help=f"only these of {','.join(PARTS)}; the others from the folder's shear.json")
     options = parser.parse_args(argv)
     built = [part for part in PARTS if program_of(part, options).is_file()]
-    parts = options.parts.split(",") if options.parts else built or list(PARTS)
-    if unknown := [part for part in parts if part not in PARTS]:
-        raise InputError(f"--parts: {unknown[0]} is none of {','.join(PARTS)}")
-    out = output_folder(options)
-    path = out / "shear.json"
-    found = {name: None for name, _, _ in GOALS}
-    if options.parts and path.is_file():
-        found |= json.loads(path.read_text())
+    parts = chosen_parts(options, PARTS, built or PARTS)
     if not options.parts and len(parts) < len(PARTS):
         print(f"        not built, so not measured: {', '.join(part for part in PARTS if part not in parts)}", flush=True)
     if not options.parts and (test := pathlib.Path(options.build) / OPTIMUM_TEST).is_file():
-        subprocess.run([str(test), str(out / OPTIMUM_FILE)], stdout=subprocess.DEVNULL)
-    for part in parts:
-        found |= run_part(part, options)
-        found = judge({**found, **lifts(found), **optimum(out)}, GOALS)
-        write_json(path, found)  # what is found is kept though a later part fails
-    shear_report.write(found, out / "shear.md")
-    shear_report.draw(found, out / "shear.png")
-    return finish(found, options, ("shear.json", "shear.md", "shear.png"))
+        subprocess.run([str(test), str(output_folder(options) / OPTIMUM_FILE)], stdout=subprocess.DEVNULL)
+    return report_of_programs(options, "shear", PARTS, parts, GOALS, lambda part: measure(part, options),
+                              lambda found, out: {**lifts(found), **figures_kept(out / OPTIMUM_FILE, OPTIMUM)}, shear_report)
 
 
 if __name__ == "__main__":

@@ -12,10 +12,8 @@ real strips are used where they are at hand (--recordings, or the environment's 
 elsewhere. Constants were chosen with other seeds and other pads than those that judge here. Cycles are those of the fit report in
 the same folder.
 """
-import json
 import os
 import pathlib
-import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -23,8 +21,7 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 
 import truth_report  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
-from goals import judge  # noqa: E402
-from reporting import finish, option_parser, output_folder, write_json  # noqa: E402
+from reporting import chosen_parts, figures_kept, figures_printed, option_parser, report_of_programs  # noqa: E402
 
 # part: what it does, its program below the build folder
 PARTS = {
@@ -42,7 +39,7 @@ GOALS = (
     ("real_phantom_longest_s", "<=", 5), ("real_held_missed", "<=", 0), ("phantom_force_longest_s", "<=", 10), ("real_median_mm_worst_test", "<=", 0.15),
     ("real_median_mm_worst_other", "<=", 0.30), ("flash_lost", "<=", 0), ("flash_frames_skipped", "<=", 0), ("cold_cycles", "<=", 31000),
     ("masked_cycles", "<=", 62000))
-OF_FIT_REPORT = ("cold_cycles", "masked_cycles")
+OF_FIT_REPORT = ("cold_cycles", "masked_cycles")  # of another report in the same folder
 
 
 def command_of(part, options):
@@ -65,27 +62,6 @@ def command_of(part, options):
     return command
 
 
-def run_part(part, options):
-    """What it found; its progress goes to stderr as it comes."""
-    print(f"        {PARTS[part]}", flush=True)
-    done = subprocess.run(command_of(part, options), stdout=subprocess.PIPE, text=True)
-    if done.returncode != 0:
-        raise InputError(f"truth_{part} ended with status {done.returncode}; its own words are above")
-    try:
-        return json.loads(done.stdout)
-    except ValueError as error:
-        raise InputError(f"truth_{part} wrote no JSON ({error})") from None
-
-
-def cycles(out):
-    """Of the fit report, None where it is not there."""
-    try:
-        found = json.loads((out / "fit.json").read_text())
-    except OSError:
-        found = {}
-    return {name: found.get(name) for name in OF_FIT_REPORT}
-
-
 def main(argv):
     parser = option_parser(__doc__)
     parser.add_argument("--boards", default="build", metavar="DIR", help="folder of the boards' builds; default build")
@@ -94,21 +70,9 @@ def main(argv):
     parser.add_argument("--pads", type=int, metavar="N", help="where pads differ; default 200 or more")
     parser.add_argument("--parts", metavar="NAME,...", help=f"only these of {','.join(PARTS)}; the others from the folder's truth.json")
     options = parser.parse_args(argv)
-    parts = options.parts.split(",") if options.parts else list(PARTS)
-    if unknown := [part for part in parts if part not in PARTS]:
-        raise InputError(f"--parts: {unknown[0]} is none of {','.join(PARTS)}")
-    out = output_folder(options)
-    path = out / "truth.json"
-    found = {name: None for name, _, _ in GOALS}
-    if options.parts and path.is_file():
-        found |= json.loads(path.read_text())
-    for part in parts:
-        found |= run_part(part, options)
-        found = judge({**found, **cycles(out)}, GOALS)
-        write_json(path, found)  # what is found is kept though a later part fails
-    truth_report.write(found, out / "truth.md")
-    truth_report.draw(found, out / "truth.png")
-    return finish(found, options, ("truth.json", "truth.md", "truth.png"))
+    parts = chosen_parts(options, PARTS, PARTS)
+    return report_of_programs(options, "truth", PARTS, parts, GOALS, lambda part: figures_printed(f"truth_{part}", command_of(part, options)),
+                              lambda _, out: figures_kept(out / "fit.json", OF_FIT_REPORT), truth_report)
 
 
 if __name__ == "__main__":
