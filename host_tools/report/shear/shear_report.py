@@ -198,7 +198,7 @@ def draw_overhang(axes, rows):
     rows = sorted((row for row in rows if row["place"] == "anywhere"), key=lambda row: row["overhang_mm"])
     overhangs = sorted({row["overhang_mm"] for row in rows})
     bars = (("thickness", "zero_error_p50", "#f0c891", "zero, thickness set"), ("thickness", "increment_error_p50", "#9cc1f0", "increment since first touch"),
-            ("thickness and ends", "zero_error_p50", ORANGE, "zero, told its ends"), ("thickness and ends", "increment_error_p50", BLUE, "increment"))
+            ("thickness and ends", "zero_error_p50", ORANGE, "zero, ends set"), ("thickness and ends", "increment_error_p50", BLUE, "increment"))
     for place, (told, key, colour, label) in enumerate(bars):
         heights = [next(row[key] for row in rows if (row["told"], row["overhang_mm"]) == (told, overhang)) for overhang in overhangs]
         axes.bar([x + 0.2 * (place - 1.5) for x in range(len(overhangs))], heights, 0.19, color=colour, label=label)
