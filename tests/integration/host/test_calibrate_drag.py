@@ -140,7 +140,7 @@ class FromRecording(DragTest):
 
     def test_refuses_with_the_reason(self):
         weak, _ = make_recording("weak", "--gain", "10", "--seed", "2", "--tangential", "0.05")
-        self.assertRegex(self.refused(weak, pull=("--force", "0.15")), r"0\.15 N is little beside what .* may be off by there, 0\.\d\d N: pull harder")
+        self.assertRegex(self.refused(weak, pull=("--force", "0.15")), r"0\.15 N is small beside .* possible error there, 0\.\d\d N: pull harder")
         one_way, _ = make_recording("one way", "--gain", "0", "--tangential", f"{SHARE},0")
         self.assertIn("0 of 3 pulls along y; pull more", self.refused(one_way))
         weights, _ = make_recording("weights", "--gain", "0", "--tangential", "0.15..0.45")
@@ -198,7 +198,7 @@ class Live(DragTest):
 
 class Usage(DragTest):
     def test_wrong_words(self):
-        self.assertIn("--drag needs to know what pulls", self.error("calibrate", "--drag", status=2))
+        self.assertIn("--drag needs the pull", self.error("calibrate", "--drag", status=2))
         self.assertIn("excludes", self.error("calibrate", "--drag", "--show", status=2))
 
 

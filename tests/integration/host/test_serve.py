@@ -297,7 +297,7 @@ class Server(ServeTest):
 
     def test_past_it_and_only_by_it(self):
         with self.device():
-            self.assertIn("nobody shares it; share it with `fingertip serve`", self.error("info", "--transport", "socket"))
+            self.assertIn("no program shares it; share it with `fingertip serve`", self.error("info", "--transport", "socket"))
             with self.served():
                 self.assertIn("in use by another program", self.error("info", "--transport", "serial"))
                 self.run_cli("info", "--transport", "socket")

@@ -111,7 +111,7 @@ class Web(unittest.TestCase):
             self.assertRegex(listening, rf"0100007F:{port:04X} 00000000:0000 0A")
         with self.served("--address", "0.0.0.0"):
             pass
-        self.assertIn("anyone who reaches 0.0.0.0", self.said)
+        self.assertIn("everyone who reaches 0.0.0.0", self.said)
         with self.served("--address", "127.0.0.2") as (host, port, _):
             self.assertEqual(self.ask(host, port)[0], 200)
         self.assertNotIn("anyone", self.said)
