@@ -44,7 +44,7 @@ enum { PIN_DP = 15, FEIGNED_MAX_ms = 5 };
 #define WATCH_us 250000u
 #define SILENCE_us 1000000u
 /* A host that enumerates follows a reset by a request. A reset lasts 10 ms or more (USB 2.0,
- * TDRST), so what is told of it within 3 ms is told of one. */
+ * TDRST), so reports of it within 3 ms are of the same one. */
 #define UNASKED_RESETS 2u
 #define RESET_APART_us 3000u
 /* Where no host is the limits above rise by this factor. */

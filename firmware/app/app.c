@@ -11,7 +11,8 @@
 
 #include <string.h>
 
-/* So long the end of a second waits for a frame to follow, rather than keep one waiting. */
+/* Delay the once-a-second work until a frame has just been sent, at most by this, so that it never
+ * delays one. */
 #define FRAME_WAIT_us 100000u
 /* A zero that is not followed may be off by 30 Pa after so long: condition.h. */
 #define ZERO_LASTS_us 60000000u

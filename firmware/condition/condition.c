@@ -263,7 +263,7 @@ struct look {
   bool moves;       /* as a press or a release does, since it was looked at last */
 };
 
-/* While nothing touches for certain, or what does cannot be told from a drift (unsure). */
+/* While nothing touches for certain, or a touch looks like a drift (unsure). */
 static void track_free(struct condition *condition, uint8_t k, const struct look *look) {
   bool unsure = condition->unsure;
   int32_t memory = in_all(condition->memory_Pa_q10[k], condition->pad_memory_Pa_q10);

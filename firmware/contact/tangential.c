@@ -84,7 +84,7 @@ static int32_t even(const struct tangential_settings *settings, enum edge edge,
   return terms[0] + fixed_mul_q26(terms[1], at->uu_q26) + fixed_mul_q26(terms[2], at->vv_q26);
 }
 
-/* 1 + even, what would not show enough of itself being told by the result. */
+/* 1 + even. The result shows a load that hides too much of itself. */
 static int32_t factor(const struct tangential_settings *settings, enum edge edge,
                       const struct from_middle *at) {
   return fixed_clamp((1 << 20) + even(settings, edge, at), 0, FACTOR_MAX_Q20);

@@ -13,9 +13,9 @@
  *   E = e1 (dx^2 - dy^2) / 2 + e2 dx dy
  * with v and V the terms' variances and t, or KAPPA t, of the contact's own, and V0 the widest
  * normal term's, so that the forces are 2 pi V0 A and 2 pi V0 B. E is what a contact's longer and
- * shorter axis make of its pressure, to first order. Unknowns in this order: the ones that the
- * others tell least about come last, and what is left of their columns is what the tangential force
- * is told by.
+ * shorter axis make of its pressure, to first order. The order of the
+ * unknowns: those that the others determine least come last. The tangential force follows from the
+ * remainder of their columns.
  */
 enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKNOWNS };
 
@@ -597,7 +597,7 @@ static void form(struct fit_tangential_room *room, const int32_t *scale) {
 /* One step's normal equations, solved. L D L^T in place, with a power of two for each pivot between
  * the factors, 2^half about 1 / sqrt(pivot), so that both have all of their 16 bits: below the
  * diagonal L / 2^half, Q14; above it D L 2^half, Q15. A direction whose pivot is below PIVOT_LEAST
- * is not told: it takes no step. */
+ * takes no step. */
 struct solution {
   int32_t step_q20[UNKNOWNS]; /* of the normalised columns */
   int32_t half[UNKNOWNS];

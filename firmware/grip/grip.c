@@ -186,7 +186,7 @@ static uint32_t squeeze(struct grip *grip, const struct grip_view *view) {
     grip->is_blind = !fixed && !view->may_tell;
     grip->is_guessing = !fixed && (grip->is_guessing || !view->tells_load);
     if (!fixed && grip_first_force(grip) > aimed_mN) {
-      grip->since_us = grip->now_us; /* on to what holds where less is told */
+      grip->since_us = grip->now_us; /* on to the grip that holds with fewer reports */
     } else {
       grip_zero_begin(grip);
       enter(grip, GRIP_READY);

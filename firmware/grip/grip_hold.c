@@ -41,9 +41,9 @@
 /* Grip comes down in steps of so long. */
 #define DECAY_us 50000u
 
-/* An object that slides at less than this of Q / F pulls more than is told: then the grip that
- * stopped it is all that is known, and it grows by more at once. Otherwise its load and friction
- * are. */
+/* An object that slides at less than this of Q / F pulls more than the fingertips report. Then only
+ * the grip that stopped it is known, and the grip grows by more at once. Otherwise its load and
+ * friction are known. */
 #define BELIEVED_PERMILLE 150
 #define BELIEVED_OF_PERMILLE 400
 #define UNTOLD_REFLEX_PERMILLE 1500
@@ -173,7 +173,7 @@ int32_t grip_first_force(const struct grip *grip) {
   return grip->is_blind ? grip->settings.blind_mN : least_felt(grip);
 }
 
-/* Without a load told since GRASP, the grip that is set for that. */
+/* Without a reported load since GRASP: the grip that is set for that. */
 static int32_t least_force(const struct grip *grip, bool told) {
   const struct grip_hold *hold = &grip->hold;
   int32_t least_mN = told || hold->has_told ? least_felt(grip) : grip->settings.blind_mN;

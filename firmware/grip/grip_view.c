@@ -13,8 +13,8 @@
 #define SIGMA_MAX_um 100000
 #define ZERO_FRAMES_MAX 2000u
 
-/* A location is taken for a load's only where none has been told for so long; and for no more of
- * one than this of the force: what is beyond is a slide. */
+/* A location counts as a load only if none was reported for so long, and for no more than this
+ * share of the force. What is beyond is a slide. */
 #define PULLED_us 300000u
 #define GUESSED_MOST_PERMILLE 600
 #define GUESSED_TOLD_PERMILLE 500
@@ -24,8 +24,8 @@
 #define UNEVEN_Q20 629146 /* 0.6 */
 #define GUESS_MAX (1 << 30)
 
-/* Told slides of less, of either fingertip, are a contact that settles, until they have lasted; of
- * more they are slides however the load over force falls. */
+/* Reported slides below this, of either fingertip, are a contact that settles, until they have
+ * lasted. Above the last limit they are slides however the load over force falls. */
 #define CREEPS_um_s 4000u
 #define CREEPS_us 150000u
 #define RUNS_um_s 20000u
@@ -132,7 +132,7 @@ static void guess_at(struct grip_finger *own, int32_t x_um, int32_t y_um) {
   own->has_place = true;
 }
 
-/* From now on the location tells changes of the load that was told last. */
+/* From now on the location gives changes of the last reported load. */
 static void guess_from(const struct grip *grip, struct grip_finger *own) {
   own->guess_x = grip_scale(own->told_x_mN, grip->settings.shift_um, 64);
   own->guess_y = grip_scale(own->told_y_mN, grip->settings.shift_um, 64);
@@ -168,8 +168,8 @@ static bool told_lately(const struct grip_finger *own) {
   return own->has_pulled && own->touch.t_us - own->pulled_us < PULLED_us;
 }
 
-/* What pulls: as it is told, or, of contacts too long to tell it, from how far the location has
- * moved since the zero. */
+/* The load: as reported, or, for contacts too long to report it, from the motion of the location
+ * since the zero. */
 static void take_load(const struct grip *grip, struct grip_finger *own) {
   const struct grip_touch *touch = &own->touch;
   bool contact = (touch->flags & CONTACT_FLAG_CONTACT) != 0;
@@ -179,7 +179,7 @@ static void take_load(const struct grip *grip, struct grip_finger *own) {
   if (own->tells_load) {
     own->pulled_us = touch->t_us;
     own->has_pulled = own->has_told = true;
-    /* Of a contact that told none when the grasp stood, the zero is what the guess says. */
+    /* For a contact that reported none when the grasp stood, the zero is the guess. */
     if (own->has_place && own->pull.sums == 0) {
       own->pull.x = touch->qx_mN - grip_scale(own->guess_x, 64, grip->settings.shift_um);
       own->pull.y = touch->qy_mN - grip_scale(own->guess_y, 64, grip->settings.shift_um);
@@ -254,7 +254,7 @@ void grip_zero_end(struct grip *grip) {
     if (own->place.sums > 0) {
       guess_at(own, own->place.x, own->place.y);
     }
-    /* What was told against the zero before. */
+    /* The report against the zero before. */
     own->load_mN = own->told_x_mN = own->told_y_mN = 0;
     own->shifts = false;
   }
@@ -301,7 +301,7 @@ static uint32_t squared(int32_t value) {
   return (uint32_t)(value * value);
 }
 
-/* How fast what is told to slide does so. */
+/* The speed of a reported slide. */
 static void look_at_speed(const struct grip_finger *own, struct grip_view *view, bool *lasts) {
   const struct grip_touch *touch = &own->touch;
   if (!own->tells_load) {
@@ -346,7 +346,7 @@ void grip_look(struct grip *grip, struct grip_view *view) {
       view->may_tell = view->may_tell || own->guesses_load || told_lately(own);
       bool guesses = own->guesses_load && own->has_place;
       if (own->tells_load && !view->tells_load) {
-        loads = load_sum_mN = load_most_mN = 0; /* what is told counts, not what is guessed */
+        loads = load_sum_mN = load_most_mN = 0; /* a reported load counts, not a guess */
         view->tells_load = true;
       }
       if (own->tells_load || (guesses && !view->tells_load)) {

@@ -3,7 +3,7 @@
 # errors, one with an ideal pad. Says how far each was off, and draws what the one of rubber felt. Then a gripper with two
 # fingertips lifts an object in the simulated cell, which becomes slick and slips. Says how far, and draws it.
 # Everything goes to build/demo; run by `sh cmake/bootstrap.sh demo`.
-# usage: demo.sh [--stay]; --stay: goes on with the lime until Enter, for whoever wants to look
+# usage: demo.sh [--stay]; --stay: goes on with the lime until Enter, to look at it
 set -eu
 root=$(cd "$(dirname "$0")/../.." && pwd)
 cd "$root"

@@ -68,7 +68,7 @@ def draw(grip, t_s, truth, truth_s, slips):
     force.plot(t_s, grip["force_N"], color=MEASURED, lw=1.1, label="felt", zorder=2)
     force.plot(t_s, np.where(controlled, grip["wanted_N"], np.nan), color=INK, lw=1.3, drawstyle="steps-post", label="wanted", zorder=3)
     load.plot(t_s, np.where(controlled & (grip["margin"] > 0), grip["load_N"], np.nan), color=MEASURED, lw=1.1)
-    width.plot(t_s, grip["width_mm"], color=MEASURED, lw=1.1, label="told")
+    width.plot(t_s, grip["width_mm"], color=MEASURED, lw=1.1, label="reported")
     force.legend(loc="upper left", fontsize=8, frameon=False)
     width.legend(loc="upper right", fontsize=8, frameon=False)
     width.set_xlabel("time, s   (red: the object slips; dotted: the grip is 5 % stronger)")

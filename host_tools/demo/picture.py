@@ -35,7 +35,7 @@ sys.path.insert(0, str(ROOT / "host_tools/python"))
 from fingertip.files import InputError, check_output, run_tool, write_text  # noqa: E402
 
 PATIENCE_s = 60
-SPEED = "8"  # times the recorded one, so that nobody waits
+SPEED = "8"  # times the recorded one, to save time
 WIDTH, HEIGHT = 8, 16  # of a cell
 BACKGROUND, FOREGROUND = "#0c0d16", "#dededf"
 

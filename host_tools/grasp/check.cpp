@@ -16,7 +16,7 @@ constexpr std::uint32_t RATE_mHz = 100000;
 void check_for_grasp(const std::string &name, const wire_info &info, const wire_health &health) {
   if ((info.capabilities & WIRE_CAPABILITY_FIT) == 0) {
     throw Error(name + ": firmware of scene " + text_field(info.scene) +
-                " tells no force; flash scene grasp");
+                " reports no force; flash scene grasp");
   }
   const std::uint32_t all = info.sensor_count < 32 ? (1u << info.sensor_count) - 1 : ~0u;
   if ((health.sensors_present & all) == 0) {
@@ -28,9 +28,9 @@ void check_for_grasp(const std::string &name, const wire_info &info, const wire_
 std::vector<std::string> lacks_for_grasp(const wire_info &info, bool needs_load) {
   std::vector<std::string> lacks;
   if (needs_load && (info.capabilities & WIRE_CAPABILITY_TANGENTIAL) == 0) {
-    lacks.push_back("tells no load, --blind holds: flash scene grasp");
+    lacks.push_back("reports no load, --blind holds: flash scene grasp");
   } else if (needs_load && (info.stored & WIRE_STORED_PAD) == 0) {
-    lacks.push_back("tells no load, --blind holds: fingertip pad");
+    lacks.push_back("reports no load, --blind holds: fingertip pad");
   }
   if ((info.stored & WIRE_STORED_CALIBRATION) == 0) {
     lacks.push_back("forces may be off by some 10 %: fingertip calibrate");

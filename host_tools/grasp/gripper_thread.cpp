@@ -15,7 +15,7 @@ namespace {
 constexpr std::int64_t SHORTEST_us = 1000;
 // A port that is gone is tried so often.
 constexpr std::int64_t REOPEN_us = 200000;
-// Answers that nobody takes: some seconds of them.
+// Answers that are not taken: some seconds of them.
 constexpr std::size_t MOST_NEWS = 2000;
 
 bool is_same(const grip_command &a, const grip_command &b) {
@@ -28,7 +28,7 @@ std::string trouble_of(const Gripper &gripper, const GripperStatus &status) {
   if (status.fault != 0) {
     return "fault " + std::to_string(status.fault) + ", " + gripper.fault_text(status.fault);
   }
-  return status.was_left_alone ? "nobody spoke to it for a second" : "";
+  return status.was_left_alone ? "no command for a second" : "";
 }
 
 } // namespace

@@ -40,31 +40,31 @@ const std::vector<GraspSetting> &grasp_settings() {
           "Never close further since the touch"),
       number(
           "first", "N", 0.2, 100, 1e3, [](S &s) -> std::int32_t & { return s.first_mN; },
-          "Force before anything pulls, and the least"),
+          "Force before anything pulls, and the least force"),
       number(
           "blind", "N", 0.2, 100, 1e3, [](S &s) -> std::int32_t & { return s.blind_mN; },
-          "Force where no load can be told"),
+          "Force where no load can be estimated"),
       number(
           "shift", "mm", 0, 20, 1e3, [](S &s) -> std::int32_t & { return s.shift_um; },
           "How far a load as large as the force moves a long contact's location"),
       number(
           "friction", "", 0.1, 1.5, 1e3, [](S &s) -> std::int32_t & { return s.friction_permille; },
-          "Friction to begin with"),
+          "Friction coefficient to begin with"),
       number(
           "margin", "", 1, 5, 1e3, [](S &s) -> std::int32_t & { return s.margin_permille; },
-          "Force over load / friction"),
+          "Force divided by load / friction"),
       number(
           "slid", "", 1, 3, 1e3, [](S &s) -> std::int32_t & { return s.slid_permille; },
-          "So much of that once the object has slid"),
+          "Factor on that once the object has slid"),
       number(
           "decay", "%/s", 0, 500, 10, [](S &s) -> std::int32_t & { return s.decay_permille_s; },
-          "How fast what is too much goes"),
+          "How fast an excess of force decays"),
       time(
           "rest", "s", 0, 60, 1e6, [](S &s) -> std::uint32_t & { return s.rest_us; },
-          "No sooner after a slide"),
+          "No decay for so long after a slide"),
       number(
           "touch", "N", 0.02, 2, 1e3, [](S &s) -> std::int32_t & { return s.touch_mN; },
-          "What a fingertip feels of a touch"),
+          "Force at which a touch begins"),
       number(
           "approach", "mm/s", 0.5, 8, 1e3, [](S &s) -> std::int32_t & { return s.approach_um_s; },
           "Speed until the touch"),
@@ -76,25 +76,25 @@ const std::vector<GraspSetting> &grasp_settings() {
           [](S &s) -> std::int32_t & { return s.release_width_um; }, "How far to open"),
       time(
           "stale", "ms", 5, 1000, 1e3, [](S &s) -> std::uint32_t & { return s.stale_us; },
-          "A fingertip silent for so long is not believed"),
+          "Ignore a fingertip that is silent for so long"),
       time(
           "silent", "ms", 20, 5000, 1e3, [](S &s) -> std::uint32_t & { return s.silent_us; },
-          "A gripper silent for so long is not either"),
+          "Timeout of the gripper"),
       number(
           "differ", "%", 5, 100, 10, [](S &s) -> std::int32_t & { return s.differ_permille; },
-          "Fingertips that differ by more say so"),
+          "Warn if the fingertips' forces differ by more"),
       number(
           "kp", "um/N", 0, 10000, 1, [](S &s) -> std::int32_t & { return s.gains.kp_um_per_N; },
-          "With --fixed: the published controller's gains"),
+          "With --fixed: the published controller's proportional gain"),
       number(
           "ki", "um/(N s)", 0, 100000, 1,
-          [](S &s) -> std::int32_t & { return s.gains.ki_um_per_Ns; }, "Likewise"),
+          [](S &s) -> std::int32_t & { return s.gains.ki_um_per_Ns; }, "Its gain of the integral"),
       number(
           "kd", "um s/N", 0, 10000, 1, [](S &s) -> std::int32_t & { return s.gains.kd_um_s_per_N; },
-          "Likewise"),
+          "Its gain of the derivative"),
       time(
           "control", "ms", 0.5, 1000, 1e3, [](S &s) -> std::uint32_t & { return s.control_us; },
-          "Likewise: between two of its steps"),
+          "Time between two of its steps"),
   };
   return all;
 }

@@ -14,7 +14,7 @@ constexpr State STATES[GRIP_STATES] = {
     {"activating", "the gripper is being activated"},
     {"approach", "closing until both fingertips feel the object"},
     {"squeeze", "squeezing up to the first force"},
-    {"ready", "squeezed; what pulls now counts as no load"},
+    {"ready", "squeezed; the present load counts as zero"},
     {"holding", "holding"},
     {"slipping", "holding, the object slides"},
     {"still", "the width stays, nothing is controlled"},
@@ -34,8 +34,8 @@ constexpr Trouble TROUBLES[] = {
     {GRIP_FINGER_1_STALE, "finger_1_stale", "right: no frames"},
     {GRIP_FINGER_0_FROZEN, "finger_0_frozen", "left: its values never change"},
     {GRIP_FINGER_1_FROZEN, "finger_1_frozen", "right: its values never change"},
-    {GRIP_FINGER_0_FORCE_ONLY, "finger_0_force_only", "left: tells force alone"},
-    {GRIP_FINGER_1_FORCE_ONLY, "finger_1_force_only", "right: tells force alone"},
+    {GRIP_FINGER_0_FORCE_ONLY, "finger_0_force_only", "left: reports force only"},
+    {GRIP_FINGER_1_FORCE_ONLY, "finger_1_force_only", "right: reports force only"},
     {GRIP_FINGER_0_OVER, "finger_0_over", "left: beyond its range, not tightened further"},
     {GRIP_FINGER_1_OVER, "finger_1_over", "right: beyond its range, not tightened further"},
     {GRIP_FINGERS_DIFFER, "fingers_differ", "the fingertips' forces differ"},
@@ -44,9 +44,9 @@ constexpr Trouble TROUBLES[] = {
     {GRIP_GRIPPER_SILENT, "gripper_silent", "the gripper does not answer"},
     {GRIP_GRIPPER_FAULT, "gripper_fault", "the gripper reports a fault"},
     {GRIP_GRIPPER_INACTIVE, "gripper_inactive", "the gripper is not active"},
-    {GRIP_NO_LOAD, "no_load", "no load can be told"},
-    {GRIP_FINGER_0_UNTOLD, "finger_0_untold", "left: no force can be told"},
-    {GRIP_FINGER_1_UNTOLD, "finger_1_untold", "right: no force can be told"},
+    {GRIP_NO_LOAD, "no_load", "no load can be estimated"},
+    {GRIP_FINGER_0_UNTOLD, "finger_0_untold", "left: no force can be estimated"},
+    {GRIP_FINGER_1_UNTOLD, "finger_1_untold", "right: no force can be estimated"},
 };
 
 } // namespace

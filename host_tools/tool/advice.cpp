@@ -43,7 +43,7 @@ std::string advice(ErrorCode code) {
   case ErrorCode::not_shared:
     return "share it with `fingertip serve`, or leave out --transport socket";
   case ErrorCode::share_denied:
-    return "join the group, or have it shared with serve --group";
+    return "join the group, or share it with serve --group";
   case ErrorCode::shared_already:
     return "use it as if it were your own, or end that one first";
   case ErrorCode::cannot_share:
@@ -87,7 +87,7 @@ std::string advice(ErrorCode code) {
   case ErrorCode::damaged_line:
     return "use --salvage to skip damaged lines";
   case ErrorCode::damaged_head:
-    return "nothing can be read without it, record anew";
+    return "nothing can be read without it, record again";
   case ErrorCode::other_sensor_count:
     return "record each into a file of its own";
   case ErrorCode::not_firmware:
@@ -95,7 +95,7 @@ std::string advice(ErrorCode code) {
   case ErrorCode::other_chip:
     return "give an image for the RP2040";
   case ErrorCode::damaged_firmware:
-    return "build or download it anew";
+    return "build or download it again";
   case ErrorCode::other:
   case ErrorCode::refused_value:
   case ErrorCode::bad_value:

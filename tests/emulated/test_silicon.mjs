@@ -69,7 +69,7 @@ for (const name of BOARDS) {
   }
 }
 
-test('a bus that is asleep for long is no reason to attach anew', () => {
+test('a bus that is asleep for long is no reason to attach again', () => {
   const bench = new Bench('pico_mux');
   bench.stream();
   bench.machine.host.suspend();
@@ -115,7 +115,7 @@ test('what a debugger left in the clock generators does not stay', () => {
   assert.equal(bench.end().reboots, 0);
 });
 
-test('a stack that grows out of its bank, and a null pointer, are faults; the image starts anew', (t) => {
+test('a stack that grows out of its bank, and a null pointer, are faults; the image restarts', (t) => {
   const bench = new Bench('pico_mux');
   bench.stream();
   const { chip } = bench.machine;

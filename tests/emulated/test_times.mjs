@@ -57,7 +57,7 @@ test('a bus that sleeps across 2^32 us, and wakes up', () => {
   assert.deepEqual([reboots, usb.enumerations], [0, 1]);
 });
 
-test('at the slowest rate the alarm is set anew across 2^32 us', () => {
+test('at the slowest rate the alarm is set again across 2^32 us', () => {
   const device = bench('pico_parallel', 2 ** 32);
   device.machine.client.write(device.encoded('rate', '0.1'));
   device.run(3000);

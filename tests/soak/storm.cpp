@@ -58,7 +58,7 @@ void Storm::write(wire_packet packet) {
   plant_.write(fingertip::frame_bytes(packet));
 }
 
-// Ends with a delimiter, so that the next command begins anew.
+// Ends with a delimiter, so that the next command begins again.
 void Storm::write_garbage() {
   std::vector<std::uint8_t> bytes;
   if (random_below(&random_, 3) == 0) { // a packet with a few bits wrong
@@ -269,7 +269,7 @@ bool Storm::over() {
   }
   if (plant_.unasked_starts() > unasked_starts_) {
     unasked_starts_ = plant_.unasked_starts();
-    hang("it started anew by itself, in or after " + kind_);
+    hang("it restarted by itself, in or after " + kind_);
   }
   return false;
 }

@@ -2,7 +2,7 @@
 
 usage: test_page.py --build BUILD --image FILE.bin --node NODE [--pictures] [unittest arguments]
 
-With --pictures Looks writes the reference pictures anew: look at them. Exit status 77: there is no such browser here, or nobody may give it ports.
+With --pictures Looks writes the reference pictures again: look at them. Exit status 77: there is no such browser here, or nobody may give it ports.
 
 real time: a browser, whose fingertips are on pseudo-terminals.
 """
@@ -425,7 +425,7 @@ if __name__ == "__main__":
     for name in ("build", "image"):
         parser.add_argument(f"--{name}", required=True, type=lambda path: pathlib.Path(path).resolve())
     parser.add_argument("--node", required=True)
-    parser.add_argument("--pictures", action="store_true", help="write the reference pictures anew")
+    parser.add_argument("--pictures", action="store_true", help="write the reference pictures again")
     _, rest = parser.parse_known_args(namespace=OPTIONS)
     OPTIONS.ports = OPTIONS.build / "tests/web/libweb_test_ports.so"
     try:

@@ -196,7 +196,7 @@ std::chrono::microseconds RobotiqGripper::timeout() const {
 
 // Answers have no number: a late one to a read of three registers would pass for that to the next.
 // But they come in the order of the questions. So one or two registers are asked for, once, and
-// what comes before that answer is what nobody waits for. Where it is lost the other number is
+// answers before that one are not expected. Where it is lost the other number is
 // asked for, lest the first come after all.
 void RobotiqGripper::make_sure() {
   if (!doubtful_) {
@@ -360,7 +360,7 @@ std::string RobotiqGripper::fault_text(std::uint8_t fault) const {
   case OVERHEATED:
     return "too hot, it must cool down";
   case NO_COMMUNICATION:
-    return "nobody spoke to it for a second";
+    return "no command for a second";
   case UNDERVOLTAGE:
     return "its supply is too low; needs activation";
   case RELEASING:

@@ -33,7 +33,7 @@ bool never() {
 [[noreturn]] void no_way(const Found &found, Reach reach) {
   if (reach == Reach::socket) {
     throw Error(ErrorCode::not_shared,
-                (found.serial.empty() ? found.port : found.serial) + ": nobody shares it");
+                (found.serial.empty() ? found.port : found.serial) + ": no program shares it");
   }
   throw Error(ErrorCode::no_driver, found.serial +
                                         ": has no serial port: its driver cdc_acm is not "
@@ -229,7 +229,7 @@ std::unique_ptr<Transport> open_way(const Way &way, const std::string &root) {
     return std::make_unique<SerialTransport>(
         way.port, way.found_by_usb ? find_again : std::function<std::string()>());
   }
-  /* libusb would take the port away from whoever has it open. */
+  /* libusb would take the port away from the program that has it open. */
   std::string port = find_again();
   if (!port.empty()) {
     SerialTransport::check_unused(port);

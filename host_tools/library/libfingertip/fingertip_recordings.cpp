@@ -34,7 +34,7 @@ public:
 
   void feed(const std::uint8_t *bytes, std::size_t length) {
     bytes_.erase(0, std::exchange(done_, 0));
-    if (skip_ > 0) { /* nobody wants what lies before */
+    if (skip_ > 0) { /* what lies before is not wanted */
       const auto skipped = static_cast<std::size_t>(std::min<std::uint64_t>(skip_, length));
       skip_ -= skipped;
       begin_ += skipped;
@@ -111,7 +111,7 @@ public:
     return true;
   }
   Place place() override { return {0, 0, number_}; }
-  void go_to(const Place &) override {} /* nobody goes back in what was fed */
+  void go_to(const Place &) override {} /* what was fed is not read again */
 
 private:
   Window &window_;
@@ -119,7 +119,7 @@ private:
   std::uint64_t number_ = 0;
 };
 
-/* The bytes of a file that nobody took yet. */
+/* The bytes of a file that were not taken yet. */
 class MemorySink : public ByteSink {
 public:
   explicit MemorySink(std::string &bytes) : bytes_(bytes) {}

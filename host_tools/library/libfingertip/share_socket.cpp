@@ -125,7 +125,7 @@ SocketTransport::SocketTransport(const std::string &path) : DescriptorTransport(
                 path + ": permission denied: it is its owner's and group's");
   }
   if (error == ENOENT || error == ECONNREFUSED) {
-    throw Error(ErrorCode::not_shared, path + ": nobody shares a fingertip there");
+    throw Error(ErrorCode::not_shared, path + ": no program shares a fingertip there");
   }
   throw Error(ErrorCode::cannot_open, path + ": cannot open (" + std::strerror(error) + ")");
 }

@@ -187,7 +187,7 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info,
                    const std::function<void(double)> &on_progress) {
   const double overhang_mm = of(profile.overhang_mm);
   if (!(overhang_mm >= EDGE_OVERHANG_MIN_mm && overhang_mm <= EDGE_OVERHANG_MAX_mm)) {
-    throw Error(ErrorCode::bad_value, "what a pad's ends do is known for 3 to 20 mm of rubber "
+    throw Error(ErrorCode::bad_value, "the ends of a pad are computed for 3 to 20 mm of rubber "
                                       "beyond the outer sensors, not for " +
                                           shortest(profile.overhang_mm));
   }
@@ -221,7 +221,7 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info,
     if (static_cast<double>(some.size()) < LEAST_SHARE * static_cast<double>(places)) {
       throw Error(ErrorCode::bad_value,
                   "the rubber ends " + shortest(profile.overhang_mm) +
-                      " mm beyond the outer sensors, too near to tell tangential load by");
+                      " mm beyond the outer sensors, too near to estimate a tangential load");
     }
   }
   const AxisTerms x = terms_along(ALONG_X, contacts[0], contacts[1]);

@@ -89,7 +89,7 @@ class _Published:
             self._begin_line()
             return
         ahead = 0 if self._expected is None else packet.sequence - self._expected & 0xFFFF
-        if ahead >= 0x8000:  # repeated, or anew
+        if ahead >= 0x8000:  # repeated, or again
             self._begin_line()
             ahead = 0
         self._expected = packet.sequence + 1 & 0xFFFF
@@ -160,7 +160,7 @@ class _Published:
             except (FingertipError, InputError, ValueError) as error:
                 query.reply_err(printable(str(error)))
             except self._zenoh.ZError:
-                pass  # whoever asked is gone
+                pass  # the asker is gone
 
     @staticmethod
     def _parameters(query):

@@ -61,7 +61,7 @@ class Conversation:
         return self._clock_fit.jumps
 
     def go_on(self, transport: Transport) -> None:
-        """With a fingertip that came back: packets and clock begin anew."""
+        """With a fingertip that came back: packets and clock begin again."""
         self.transport = transport
         self.decoder.restart()
         self._clock_fit = ClockFit()

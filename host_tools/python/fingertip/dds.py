@@ -76,7 +76,7 @@ class Participant:
 
 
 class Topic:
-    """sent: messages that went out; refused: those that a late reader had no room for, which nobody got."""
+    """sent: messages that went out; refused: those that a late reader had no room for."""
 
     def __init__(self, participant: Any, name: str, kind: Any) -> None:
         self.name = name

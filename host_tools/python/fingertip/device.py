@@ -140,7 +140,7 @@ class Fingertip(Settable):
         self.close()
 
     def close(self) -> None:
-        """Ends the streams and gives the port free. Whoever waits for a frame is told that there are no more."""
+        """Ends the streams and gives the port free. A waiting reader learns that there are no more frames."""
         if self._line.is_closed:
             return
         with contextlib.suppress(FingertipError):
@@ -199,7 +199,7 @@ class Fingertip(Settable):
     # Frames
 
     def __iter__(self) -> Iterator[Frame]:
-        """Every frame, in order, beginning with the oldest that nobody took. Ends when it is closed; raises GoneError, NoFrameError."""
+        """Every frame, in order, beginning with the oldest that was not taken. Ends when it is closed; raises GoneError, NoFrameError."""
         while True:
             frame = self._take_frame()
             if frame is None:
@@ -221,7 +221,7 @@ class Fingertip(Settable):
         return self._line.is_interrupted
 
     def take_one(self) -> Frame | None:
-        """The oldest frame that nobody took, if there is one, without waiting. Raises GoneError once there are none any more."""
+        """The oldest frame that was not taken, if there is one, without waiting. Raises GoneError once there are none any more."""
         with contextlib.suppress(IndexError):
             return self._queue.popleft()
         if self._line.error:
@@ -295,15 +295,15 @@ class Fingertip(Settable):
         self._listeners.append(listener)
 
     def on_packets(self, listener: Callable[[wire.Packet | None, bytes], None]) -> None:
-        """Told by the reading thread each packet from now on, with its frame on the line without the delimiter; must be quick. Nothing
-        instead of a packet: the line was interrupted, and sequence numbers begin anew."""
+        """Called by the reading thread with each packet from now on, with its frame on the line without the delimiter; must be quick. Nothing
+        instead of a packet: the line was interrupted, and sequence numbers begin again."""
         self._line.decoder.listener = listener
 
     # Commands. Each returns once the fingertip has done it, and raises RefusedError (NotNowError, RefusedValueError, UnknownCommandError),
     # NoAnswerError or GoneError.
 
     def tare(self, force: bool = False) -> None:
-        """Measures the zero anew over the next 16 frames, in which no contact is reported; nothing may touch the pad.
+        """Measures the zero again over the next 16 frames, in which no contact is reported; nothing may touch the pad.
 
         While a contact is reported it is refused (NotNowError): what presses would become the zero. force: tares all the same.
         """
@@ -366,7 +366,7 @@ class Fingertip(Settable):
         return writer
 
     def attach(self, recorder: Recorder) -> LineStatistics:
-        """It is told every packet from now on, by the reading thread; what the line has counted until now. Raises BadValueError."""
+        """It gets every packet from now on, by the reading thread; what the line has counted until now. Raises BadValueError."""
         with self._line.changed:
             if self._recorder:
                 raise BadValueError("it is being recorded already")
@@ -374,7 +374,7 @@ class Fingertip(Settable):
             return self.statistics
 
     def detach(self, recorder: Recorder) -> LineStatistics:
-        """It is told no more; what the line has counted until now."""
+        """It gets no more packets; what the line has counted until now."""
         with self._line.changed:
             if self._recorder is recorder:
                 self._recorder = None

@@ -16,7 +16,7 @@ COMMON_SHARE_FOLDER = pathlib.Path("/run/fingertip")
 
 
 class Found(NamedTuple):
-    """serial: as far as it is known before asking; port: "" where only a socket is known; share_socket: "" where nobody shares it."""
+    """serial: as far as it is known before asking; port: "" where only a socket is known; share_socket: "" where no program shares it."""
 
     serial: str
     port: str
@@ -97,7 +97,7 @@ def _with_share(found: Found, share: bool | None) -> Found:
             raise NotSharedError(f"{found.serial}: only its socket is known, {found.share_socket}")
         return found._replace(share_socket="")
     if share and not found.share_socket:
-        raise NotSharedError(f"{found.serial or found.port}: nobody shares it")
+        raise NotSharedError(f"{found.serial or found.port}: no program shares it")
     return found
 
 

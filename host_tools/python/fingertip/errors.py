@@ -49,7 +49,7 @@ class PermissionDeniedError(PortError):
 
 
 class NotSharedError(PortError):
-    """Nobody serves this fingertip to others."""
+    """No program serves this fingertip to others."""
 
 
 class GoneError(FingertipError):

@@ -156,7 +156,7 @@ def check_time(recording):
     restarts = restart_rows(t_us, frame)
     contact = np.flatnonzero(recording.has_contact)
     repeated = contact[1:][np.diff(t_us[contact]) == 0]
-    for rows, what in ((restarts, "the fingertip restarted here; record anew, or cut the file before this line"),
+    for rows, what in ((restarts, "the fingertip restarted here; record again, or cut the file before this line"),
                        (repeated, "a second frame of the same time; remove the line")):
         if len(rows):
             raise InputError(f"{recording.path}:{recording.line_numbers[rows[0]]}: {what}")

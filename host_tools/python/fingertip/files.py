@@ -198,7 +198,7 @@ def read_scenario(path: Path) -> Scenario:
                                  f"and after the sensors, once each, any of {', '.join(OPTIONAL_COLUMNS)}")
             continue
         if len(cells) != len(header):
-            raise InputError(f"{path}:{number}: {len(cells)} columns where the header has {len(header)}; write the scenario anew")
+            raise InputError(f"{path}:{number}: {len(cells)} columns where the header has {len(header)}; write the scenario again")
         row = [_number(path, number, name, cell, False) for name, cell in zip(header, cells)]
         if row[0] < 0:
             raise InputError(f"{path}:{number}: t_s is {cells[0]}; time starts at 0")
@@ -206,7 +206,7 @@ def read_scenario(path: Path) -> Scenario:
             raise InputError(f"{path}:{number}: t_s {cells[0]} does not increase; sort the rows by time")
         rows.append(row)
     if header is None or not rows:
-        raise InputError(f"{path}: no rows; write the scenario anew")
+        raise InputError(f"{path}: no rows; write the scenario again")
     return Scenario(metadata, header, np.array(rows), sensors)
 
 
@@ -269,7 +269,7 @@ class Recording:
         return found
 
 
-# Some 20 MB are read in a second: below this nobody waits.
+# Some 20 MB are read in a second: below this the wait is short.
 WORTH_WAITING_bytes = 10_000_000
 JOINT_COLUMNS = "device,time_us,"
 
@@ -310,7 +310,7 @@ def recorded_devices(path: Path) -> list[str]:
     for each in lines:
         if not isinstance(each, Damaged) and each[1].startswith("# devices:"):
             return each[1].split(":", 1)[1].split()
-    raise InputError(f'{path}: no line "# devices: ..."; record anew')
+    raise InputError(f'{path}: no line "# devices: ..."; record again')
 
 
 def _choose_device(path: Path, devices: list[str], wanted: str | None) -> int:
@@ -360,12 +360,12 @@ class _Reading:
     def _header(self, text: str) -> None:
         if self.is_joint:
             if not text.startswith(JOINT_COLUMNS) or self.number is None:
-                raise ValueError("wrong header; record anew with this version of fingertip")
+                raise ValueError("wrong header; record again with this version of fingertip")
             text = text.removeprefix(JOINT_COLUMNS)
         try:
             self.rows = Rows(text)
         except ValueError:
-            raise ValueError("wrong header; record anew with this version of fingertip") from None
+            raise ValueError("wrong header; record again with this version of fingertip") from None
         names = self.rows.names
         self.wanted = tuple(range(len(names))) if self.columns is None else tuple(sorted(names.index(name) for name in self.columns if name in names))
         self.sensors = self.rows.sensors if self.columns is None else 0
@@ -444,7 +444,7 @@ def read_recording(path: Path, salvage: bool = False, device: str | None = None,
         except ValueError as error:
             damaged(InputError(f"{path}:{number}: {error}" + ("; use --salvage to skip damaged lines" if reading.rows else "")), 1)
     if reading.rows is None:
-        raise InputError(f"{path}: no header line; record anew")
+        raise InputError(f"{path}: no header line; record again")
     names = [reading.rows.names[i] for i in reading.wanted]
     table = np.frombuffer(reading.table) if reading.table else np.empty(0)
     return Recording(path, reading.metadata, names, table.reshape(-1, len(names)), reading.line_numbers, reading.sensors,
@@ -489,7 +489,7 @@ def read_grip(path: Path, salvage: bool = False) -> dict[str, Any]:
         cells = line[len(GRIP_ROW):].split(",")
         if columns is None:
             if cells[0] != "time_us" or "state" not in cells:
-                raise InputError(f"{path}:{number}: a row of the gripper before its header; record anew")
+                raise InputError(f"{path}:{number}: a row of the gripper before its header; record again")
             columns = cells
             continue
         try:
@@ -521,7 +521,7 @@ def read_run(path: Path | None) -> dict[str, Any]:
     try:
         run = json.loads("\n".join(read_lines(path)))
     except json.JSONDecodeError as error:
-        raise InputError(f"{path}:{error.lineno}: no JSON ({error.msg}); run the emulator anew") from None
+        raise InputError(f"{path}:{error.lineno}: no JSON ({error.msg}); run the emulator again") from None
     if not isinstance(run, dict):
         raise InputError(f"{path}: no run report; give the emulator's --report file")
     return run

@@ -159,7 +159,7 @@ class _LogClock:
         if math.isnan(time_us):
             if self._anchor is None:
                 self._anchor = (self._utc_ns, t_us)
-            elif t_us < self._last_us:  # it started anew
+            elif t_us < self._last_us:  # it restarted
                 self._anchor = (max(self._event_ns, self.last_ns), t_us)
             self._last_us = t_us
             self.last_ns = _clamp_ns(self._anchor[0] + (t_us - self._anchor[1]) * 1000)

@@ -58,7 +58,7 @@ def show_progress(share):
 
 def continuous_time_s(recording, rows):
     """One axis for all runs of a fingertip that restarted, and where each but the first begins. The recorder's clock
-    where there is one; else the runs follow one another, for nobody knows the time between."""
+    where there is one; else the runs follow one another, for the time between is unknown."""
     t_s, frame = recording["t_us"][rows] / 1e6, recording["frame"][rows]
     restarts = restart_rows(t_s, frame)
     if recording.time_us is not None:
@@ -221,7 +221,7 @@ def draw_grasp(path, grip, fingertips):
         force.set_ylim(low, high)
     force.plot(t_s, np.where(controlled, grip["wanted_N"], np.nan), color=INK, lw=1.4, drawstyle="steps-post", label="wanted", zorder=3)
     load.plot(t_s, np.where(controlled & (grip["margin"] > 0), grip["load_N"], np.nan), color=MEASURED, lw=1.1)
-    width.plot(t_s, grip["width_mm"], color=MEASURED, lw=1.1, label="told")
+    width.plot(t_s, grip["width_mm"], color=MEASURED, lw=1.1, label="reported")
     width.plot(t_s, np.where(grip["motion"] == 2, grip["command_mm"], np.nan), color=INK, lw=0.9, ls=":", label="commanded")
     slipping = spans(t_s, grip["state"] == "slipping")
     for panel in panels[:3]:

@@ -1,5 +1,5 @@
 """Records fingertips of many computers, which fingertip-bridge publishes on Zenoh, into one file, MCAP or CSV, as `fingertip record --all`
-would: one clock, rows in order of time. What the network loses is asked for again; what nobody has any more is counted, in the
+would: one clock, rows in order of time. What the network loses is asked for again; what no bridge has any more is counted, in the
 file too. It ends by Ctrl-C or --seconds.
 
 Exit status: 0 nothing was lost, 3 something was, and is counted, 1 an error.
@@ -41,7 +41,7 @@ class Line:
         self.high = first - 1  # known to have been sent
         self.early = {}  # number -> item
         self.stuck_s = None
-        self.given_up = 0  # up to here nobody will answer
+        self.given_up = 0  # up to here no answer will come
         self.is_over = False  # and high is final
 
 
@@ -172,7 +172,7 @@ class Account:
         self.sent += recorded + lost
 
     def _between(self, stamp, packet):
-        """Packets that were lost between two lines, while the fingertip went on, and whether it did not: then nobody knows."""
+        """Packets that were lost between two lines, while the fingertip went on, and whether it did not: then it is unknown."""
         frame = packet.body.frame if isinstance(packet.body, (wire.Contact, wire.Raw)) else None
         lost, restarted = 0, False
         if self._last and stamp.line != self._last[0].line:
@@ -269,7 +269,7 @@ class Recording:
                     line, first, last = wanted
                     self._ask(source, f"{ROOT}/{source.serial}/again?line={line};first={first};last={last}", "again")
                     source.asked += 1
-                    source.wanted = None  # judged anew by what has come
+                    source.wanted = None  # judged again by what has come
                 elif source.must_answer or not self._ending and host_time.now_s() - source.status_s > STATUS_AGE_s:
                     self._ask(source, f"{ROOT}/{source.serial}/status", "answer")
             except self._zenoh.ZError:
@@ -286,7 +286,7 @@ class Recording:
     # The main thread
 
     def run(self, seconds, ended, patience_s):
-        """Until it is told to end, or for so long, and then until everything that was sent is there or patience is over."""
+        """Until it is to end, or for so long, and then until everything that was sent is there or patience is over."""
         end_s = host_time.now_s() + seconds
         while not ended.is_set() and host_time.now_s() < end_s:
             self._work(0.1)

@@ -179,7 +179,7 @@ class Publisher:
 
     @property
     def refused(self) -> int:
-        """Messages that a late reader had no room for, and nobody got."""
+        """Messages that a late reader had no room for."""
         return sum(topic.refused for topic in self._topics())
 
     def _topics(self) -> "list[Topic]":

@@ -58,7 +58,7 @@ def _port_error(path: str, error: OSError) -> PortError:
 
 
 class SerialTransport:
-    """pyserial's port. On Linux and macOS it is locked as fingertip's tools lock it: whoever comes second is told so."""
+    """pyserial's port. On Linux and macOS it is locked as fingertip's tools lock it: the second program gets an error."""
 
     def __init__(self, path: str) -> None:
         import serial
@@ -101,7 +101,7 @@ class SocketTransport:
     def __init__(self, path: str) -> None:
         self.description = path
         if sys.platform == "win32":
-            raise NotSharedError(f"{path}: nobody shares a fingertip on Windows")
+            raise NotSharedError(f"{path}: no program shares a fingertip on Windows")
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             self._socket.connect(path)
@@ -110,7 +110,7 @@ class SocketTransport:
             raise PermissionDeniedError(f"{path}: permission denied: it is its owner's and group's") from None
         except OSError:
             self._socket.close()
-            raise NotSharedError(f"{path}: nobody shares a fingertip there") from None
+            raise NotSharedError(f"{path}: no program shares a fingertip there") from None
         self._socket.settimeout(WRITE_TIMEOUT_s)
 
     def read(self, wait_s: float, settle_s: float) -> bytes:

@@ -316,13 +316,13 @@ class Decoder:
         self.statistics = LineStatistics()
         self.other_version = 0
         self.listener: Callable[[Packet | None, bytes], None] | None = None
-        """Told each packet with its frame, without the delimiter; nothing: the line was interrupted, and begins anew."""
+        """Called with each packet and its frame, without the delimiter; nothing: the line was interrupted, and begins again."""
         self._rest = b""
         self._joining = True
         self._expected = -1
 
     def restart(self) -> None:
-        """The line was interrupted: join anew, and expect no particular sequence number."""
+        """The line was interrupted: join again, and expect no particular sequence number."""
         if self.listener:
             self.listener(None, b"")
         self._rest = b""

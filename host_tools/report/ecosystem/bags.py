@@ -75,7 +75,7 @@ def some_packets(seed, frames):
     yield wire.Packet(0, 1000, info)
     t_us = 2**33
     for frame in range(frames):
-        t_us = 500 if frame == frames // 2 else t_us + prng.randrange(100, 40000)  # it starts anew
+        t_us = 500 if frame == frames // 2 else t_us + prng.randrange(100, 40000)  # it restarts
         flags = prng.choice((TARED, 0, CONTACT | TARED, prng.getrandbits(25), prng.getrandbits(25) & ~WARNINGS | TRUSTED,
                              TRUSTED | CONTACT | TARED | TANGENTIAL))
         values = {}

@@ -14,7 +14,7 @@ from tables import table_md, text_of  # noqa: E402
 CLOCKS_ppm = "25,-25"
 # Of the slip: what is called how.
 COURSE = {
-    "measured_ms": "the first frame that told it was measured", "sent_ms": "its packet had left the chip", "answered_ms": "the controller's command changed",
+    "measured_ms": "the first frame that reported it was measured", "sent_ms": "its packet had left the chip", "answered_ms": "the controller's command changed",
     "asked_ms": "it went out on the gripper's line", "moved_ms": "the fingers moved", "reaction_ms": "the grip was 5 % stronger"}
 
 

@@ -14,7 +14,7 @@ GOALS = (("mutants", ">=", 500), ("mutants_survived_percent", "<=", 5), ("analyz
 
 
 def figures_of(*command):
-    """Findings do not end it: they are figures, and told."""
+    """Findings do not end it: they are figures, and reported."""
     with tempfile.TemporaryDirectory(prefix="fingertip-") as folder:
         result = pathlib.Path(folder) / "found.json"
         done = subprocess.run(["/usr/bin/python3", *map(str, command), "--json", result], check=False)
@@ -38,7 +38,7 @@ def text(found):
              "## Mutation", "",
              f"Of the {found['mutants_possible']} small changes that can be made to the firmware and the two buses, a sample spread evenly "
              f"over the modules (seed {found['mutation_seed']}): an operator, a number, a condition, a statement. Killed: a unit test fails, "
-             "or does under the sanitizer of undefined behaviour. Set apart: changes that nobody can see, each with its reason in "
+             "or does under the sanitizer of undefined behaviour. Set apart: changes that cannot be seen, each with its reason in "
              "tests/mutation/equivalent.txt; changes that make the same code are not counted. The tests were bettered with survivors of "
              "this sample in view, so of other samples more survive (`mutation.py --seed`).", "",
              *table_of_dicts_md(found["mutation_modules"]), ""]

@@ -14,7 +14,7 @@ GOALS = (("fuzz_bytes", ">=", 1e9), ("crashes", "<=", 0), ("sanitizer_findings",
 
 
 def measure(build, steps):
-    """Findings do not end it: they are figures, and told."""
+    """Findings do not end it: they are figures, and reported."""
     with tempfile.TemporaryDirectory(prefix="fingertip-") as folder:
         result = pathlib.Path(folder) / "fuzz.json"
         done = subprocess.run(["/usr/bin/python3", ROOT / "tests/fuzz/fuzz.py", "--build", build.parent / "fuzz", "--seconds", str(SECONDS),

@@ -12,7 +12,7 @@ GOALS = (("same_bits_presses", ">=", 10000), ("same_bits_different", "<=", 0), (
 
 
 def measure(build, steps):
-    """A difference does not end it: it is a figure, and told."""
+    """A difference does not end it: it is a figure, and reported."""
     steps.say("the same bits on Cortex-M0+, M4F and host")
     boards = build.parent / BOARDS[0]
     done = subprocess.run(["/usr/bin/python3", TEST, "--host", build / "tests/emulated/fit_bits/fit_bits", "--m4f",

@@ -37,7 +37,7 @@ def power_cuts(build, steps):
 
 
 def measure(build, steps):
-    """Findings do not end it: they are figures, and told."""
+    """Findings do not end it: they are figures, and reported."""
     with tempfile.TemporaryDirectory(prefix="fingertip-") as folder:
         result = pathlib.Path(folder) / "soak.json"
         done = subprocess.run(["/usr/bin/python3", SOAK / "soak.py", "--build", build, "--boards", build.parent, "--least", str(EMULATED_h),

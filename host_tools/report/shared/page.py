@@ -5,7 +5,7 @@
 
     index.html    of what lies in the folder; whatever was not measured is named as such
 
-Each report makes the page anew when it ends. Pictures are inside, nothing is loaded from elsewhere: the file can be sent.
+Each report makes the page again when it ends. Pictures are inside, nothing is loaded from elsewhere: the file can be sent.
 """
 import argparse
 import base64

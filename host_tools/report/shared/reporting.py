@@ -86,7 +86,7 @@ def write_json(path, found):
 
 
 def finish(found, options, files):
-    """Says what came out and makes the page anew. files: in the output folder, all that was written; the first picture goes to
+    """Says what came out and makes the page again. files: in the output folder, all that was written; the first picture goes to
     --picture, too. Exit status."""
     out = pathlib.Path(options.output)
     if options.picture:

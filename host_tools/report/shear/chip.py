@@ -1,4 +1,4 @@
-"""What the tangential load costs on the chip: the images of scene grasp in the emulator, a pad of 12 mm told to them, and the cycles of
+"""What the tangential load costs on the chip: the images of scene grasp in the emulator, a pad of 12 mm in their profile, and the cycles of
 the estimate alone."""
 import pathlib
 import sys

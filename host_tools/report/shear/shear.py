@@ -27,7 +27,7 @@ from reporting import chosen_parts, figures_kept, figures_printed, option_parser
 # part: what it does, its program below the build folder
 PARTS = {
     "static": "one touch: size, direction, place and force by pad, load, object and place; bounds; pads that end",
-    "motion": "objects that are lifted, carried and slip: sliding told from loading",
+    "motion": "objects that are lifted, carried and slip: sliding distinguished from loading",
     "chip": "cycles, frames a second and latency of the images of scene grasp in the emulator",
 }
 # The ratio is |Q| / F, which is what is published; the vector's error has its direction in it and is held to the same.

@@ -14,16 +14,16 @@ OVER = (
     ("direction_p90_deg", "Q/F = 0.3"), ("no_lime_no_corner_*", "the same without the lime, and without places within half a pitch of both outer rows"),
     ("location_loaded_*", "Q/F = 0.3, all touches: where the estimate is not valid, the Gaussian's; `without`: the Gaussian's"),
     ("location_price_mm, location_unloaded_*", "Q = 0: median with the estimate less the median without"),
-    ("equal_*", "the same on pads of equal gains"), ("force_*", "Q/F = 0.3; a known weight has told each calibrated pad its scale"),
+    ("equal_*", "the same on pads of equal gains"), ("force_*", "Q/F = 0.3; a known weight has calibrated each pad's scale"),
     ("q_cover_*, location_cover_*", "Q/F = 0.3: share of true values within 1 and 2 of the standard deviations that the estimate gives; ideal 63 and 98 %"),
     ("elongated_false_percent", "Q = 0 at every angle: five lying cylinders (6 by 12, 12 by 12, 18 by 18, 24 by 24, 22 by 7 mm) and an edge of 20 mm, equally; "
      "valid and claiming more than 0.05 and more than two standard deviations"),
     ("elongated_false_surely_percent", "those that claim more than 2.8 standard deviations, which 98 % of a normal distribution in the plane stay below"),
     ("elongated_false_unflagged_percent", "those of `elongated_false_percent` that the Gaussian fit does not flag as elongated"),
     ("screw_ratio, screw_change_p95", "the twin's screws of a sphere of 15 mm, 6 N: what is read while it spins (median), and by how much that differs from before"),
-    ("zero_error_p50_*mm, increment_error_p50_*mm", "a block with so much rubber beyond the outer sensors, the fingertip told its thickness alone: what is read at "
+    ("zero_error_p50_*mm, increment_error_p50_*mm", "a block with so much rubber beyond the outer sensors, the profile with its thickness alone: what is read at "
      "Q = 0; at Q/F = 0.3 less what the same touch read at its beginning, at 0.5 to 2 N. As vectors"),
-    ("*_own_tables_*mm", "the same, the fingertip told what the pad's ends do to the estimate as well"),
+    ("*_own_tables_*mm", "the same, the profile with the effect of the pad's ends as well"),
     ("zero_error_p50_own_tables", "the worse of 9 and 13 mm"),
     ("lift_*, slide_*", "lifts and slides of the twin; their own tables say which"),
     ("optimum_*", "the estimate on the chip against an independent one in double precision, on readings of the model itself"),
@@ -45,12 +45,12 @@ TABLES = {
     "by_object": ("By object", ""), "elongated": ("Elongated objects without a load", ""), "by_force": ("By force", "Q/F = 0.3."),
     "light_touches": ("Light touches", ""), "by_osr": ("By oversampling", "Q/F = 0.3."),
     "by_sensors": ("Sensors missing", "Q/F = 0.3; which are missing is drawn for each touch."),
-    "by_thickness": ("By thickness", "Spheres of 6 and 15 mm, flat cylinder of 6 mm; the thickness that is true and the one that the fingertip was told. Sensors "
+    "by_thickness": ("By thickness", "Spheres of 6 and 15 mm, flat cylinder of 6 mm; the true thickness and the set one. Sensors "
                      "beyond their range are left out, as the firmware does."),
     "by_rubber": ("Creep and relaxation", "Gains are equal, or calibrated to what placements read 0.75 s after. Press of 0.3 s; the load comes after 1 s, within "
                   "0.3 s, and goes after 11.3 s."),
     "screws": ("Screws", "Objects on which a torque acts and no load."),
-    "by_overhang": ("Pads that end", "Finite block, edges free; by what the fingertip is told: the thickness alone, or what the ends do to the estimate as well."),
+    "by_overhang": ("Pads that end", "Finite block, edges free; by the profile: the thickness alone, or the effect of the ends as well."),
 }
 
 
@@ -99,7 +99,7 @@ def write(found, path):
     if "bounds" in found:
         lines += ["## What is physics and what is ours", "", "Cramer-Rao bounds of the eight unknowns (force, place, spread, two elongations, Q): what errors of the "
                   "readings alone cost any unbiased estimate. A model floor is an error of each reading of its own, as a share of the peak. Gains are "
-                  "those after a calibration. Priors: spread and elongation as the firmware expects them; told round: no elongation.", "", *bounds_md(found), ""]
+                  "those after a calibration. Priors: spread and elongation as the firmware expects them; assumed round: no elongation.", "", *bounds_md(found), ""]
     if "taps" in found:
         lines += ["## What tangential load does to every figure published so far", "", "The taps of the paper's table II (|x| <= 4.5 mm, |y| <= 13.5 mm, 1 to 15 N, "
                   "four indenters, readings at 20 Hz of 1 N or more, relative to the true zero), each pulling along the rubber by the same share of its force. Before: "
@@ -197,8 +197,8 @@ def draw_objects(axes, rows):
 def draw_overhang(axes, rows):
     rows = sorted((row for row in rows if row["place"] == "anywhere"), key=lambda row: row["overhang_mm"])
     overhangs = sorted({row["overhang_mm"] for row in rows})
-    bars = (("thickness", "zero_error_p50", "#f0c891", "zero, told the thickness"), ("thickness", "increment_error_p50", "#9cc1f0", "increment since first touch"),
-            ("thickness and ends", "zero_error_p50", ORANGE, "zero, told its ends"), ("thickness and ends", "increment_error_p50", BLUE, "increment"))
+    bars = (("thickness", "zero_error_p50", "#f0c891", "zero, thickness set"), ("thickness", "increment_error_p50", "#9cc1f0", "increment since first touch"),
+            ("thickness and ends", "zero_error_p50", ORANGE, "zero, ends set"), ("thickness and ends", "increment_error_p50", BLUE, "increment"))
     for place, (told, key, colour, label) in enumerate(bars):
         heights = [next(row[key] for row in rows if (row["told"], row["overhang_mm"]) == (told, overhang)) for overhang in overhangs]
         axes.bar([x + 0.2 * (place - 1.5) for x in range(len(overhangs))], heights, 0.19, color=colour, label=label)

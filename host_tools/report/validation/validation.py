@@ -153,7 +153,7 @@ class Workshop:
             self.scenarios.append(Scenario(what, kind, indenter, **more))
 
     def add_on_pads(self, what, kind, indenter, seconds, gain, **more):
-        """Unequal sensors are drawn anew for each pad, the presses too: one pad's luck is not what the spread costs."""
+        """Unequal sensors are drawn again for each pad, the presses too: one pad's luck is not what the spread costs."""
         pads = self.pads if gain else 1
         for pad in range(1, pads + 1):
             self.add(what, kind, indenter, seconds=seconds / pads, pad=pad, **{"case": gain, "effects": f"gain={gain}" if gain else "", **more})

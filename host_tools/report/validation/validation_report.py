@@ -59,7 +59,7 @@ def write_report(found, path):
     r.text("# The published experiments on the simulated fingertip",
            "Columns headed *paper* are measured on hardware (De Clercq et al., RA-L 2022). Columns headed *simulated* come from the twin: an "
            "elastic layer under the paper's indenters, the firmware's own code on simulated sensors. The two do not compare as better and worse: "
-           "a simulated pad is as straight, as bonded and as quiet as it is told to be.",
+           "a simulated pad is as straight, as bonded and as quiet as its settings say.",
            f"{found['samples']} samples (frames in contact with a fit) out of {found['frames']} frames, at {found['rate_Hz']} Hz where nothing else is "
            f"said, OSR 1024, in {found['seconds']:.0f} s. The image on the emulated chip played {found['emulated_frames']} frames of such taps: "
            f"{found['emulated_frames'] - found['emulated_frames_different']} of its contact packets are what the same code gives here, byte for "

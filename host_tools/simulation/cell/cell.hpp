@@ -8,7 +8,7 @@
 // Grip. Both pads and whatever else gives are springs in a row, so both carry the same force F:
 //   2 indentation(F) + F / compliance = object's width - gripper's width
 // less what the rubber relaxes: the Prony series of simulation/twin/effects.hpp acts on the force, since a
-// gripper holds its position. The rubber's width is told between its faces when nothing presses.
+// gripper holds its position. The rubber's width is that between its faces when nothing presses.
 //
 // Object. A rigid body in the plane, gravity and what the hand's acceleration adds at its centre of
 // mass, which need not lie on the grasp's axis: then it turns there against both contacts

@@ -1,5 +1,5 @@
-// A fingertip that is an emulated board, from the host's end of its USB line: it is told its pad
-// first, then it streams what it feels.
+// A fingertip that is an emulated board, from the host's end of its USB line: it gets its pad's
+// profile first, then it streams its readings.
 //
 // Its clock is fitted from commands and their acknowledgements, as the tool does it, on the
 // emulated time.

@@ -46,7 +46,7 @@ constexpr const char *SIDES[FINGERS] = {"left", "right"};
 constexpr const char *SERIALS[FINGERS] = {"00000000000CE110", "00000000000CE111"};
 constexpr std::chrono::microseconds ROUND{1000};
 constexpr std::int64_t LONGEST_ROUND_us = 10'000; // of the world's time
-constexpr std::int64_t LATE_us = 30'000;          // whoever is later than that is waited for
+constexpr std::int64_t LATE_us = 30'000;          // the world waits for what is later than that
 constexpr std::int64_t ROW_us = 2'000;
 constexpr std::size_t ROWS_BYTES = 4096;
 
@@ -212,7 +212,7 @@ private:
 // A gripper on its own line, activated and as far open as it is to begin with.
 void stand_open(GripperServer &server, GripperMotion &motion, const std::string &model,
                 double width_mm) {
-  constexpr double HURRY_s = 0.02; // in a round: nobody waits for it
+  constexpr double HURRY_s = 0.02; // in a round: too short to notice
   std::atomic<bool> is_done{false};
   std::string why;
   Thread client([&] {
@@ -515,10 +515,10 @@ int main(int argc, char **argv) {
   app.add_option("--face", options.face, "What of the object is touched: an indenter, or plate")
       ->capture_default_str();
   number("--width", object.width_mm, "MM", 1.0, 500.0, "Of the object");
-  number("--mass", object.mass_kg, "KG", 0.001, 10.0, "Likewise");
-  number("--friction", object.friction, "NUMBER", 0.05, 3.0, "Likewise");
+  number("--mass", object.mass_kg, "KG", 0.001, 10.0, "Its mass");
+  number("--friction", object.friction, "NUMBER", 0.05, 3.0, "Its friction coefficient");
   number("--kinetic", object.kinetic_share, "SHARE", 0.3, 1.0, "Of the friction, while it slides");
-  app.add_option("--stiffness", object.stiffness_N_mm, "Likewise; default: it does not yield")
+  app.add_option("--stiffness", object.stiffness_N_mm, "Its stiffness; default: it does not yield")
       ->type_name("N/MM")
       ->check(CLI::Range(0.1, 1e6));
   app.add_option("--crushes", object.crushes_N, "More force breaks it; default: none does")
@@ -530,7 +530,7 @@ int main(int argc, char **argv) {
   number("--lift-time", options.world.lift_s, "S", 0.05, 60.0, "And how long");
   CLI::Option *after =
       number("--lift-after", lift_after_s, "S", 0.1, 1e6, "Once the force has stood for so long");
-  app.add_flag("--by-command", options.by_command, "Lift only when told to")->excludes(after);
+  app.add_flag("--by-command", options.by_command, "Lift only on the command")->excludes(after);
   app.add_option("--then", planned_texts,
                  "A disturbance: pour:MASSES, jerk:M/S2, knock:M/S or slick:SHARE, @SECONDS after "
                  "the lift")
@@ -542,7 +542,7 @@ int main(int argc, char **argv) {
   app.add_option("--truth", options.truth, "Keeps what is true")->type_name("FILE.csv");
   app.add_flag("--overwrite", options.overwrite, "Replace FILE.csv if it exists");
   number("--patience", options.patience_s, "S", 0.0, 3600.0,
-         "The world stands still at most so long while fingertips or whoever asks the gripper are "
+         "The world stands still at most so long while fingertips or the gripper's client are "
          "held up");
   app.add_option("--cache", options.cache, "Of contact tables")->type_name("FOLDER");
   CLI11_PARSE(app, argc, argv);

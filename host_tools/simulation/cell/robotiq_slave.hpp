@@ -26,7 +26,7 @@ public:
   void write(int address, std::uint16_t value);
   // After the writes of a frame; carries out what they say.
   void update();
-  // What the status registers hold. told: an answer has them.
+  // The content of the status registers. told: an answer has them.
   std::array<std::uint16_t, robotiq::REGISTERS> status() const;
   void told();
 

@@ -1,4 +1,4 @@
-/** What the sensors of a board feel, told while it runs: one row for the end of each slice of emulated time. */
+/** What the sensors of a board feel, set while it runs: one row for the end of each slice of emulated time. */
 const AMBIENT_Pa = 101325;
 const TEMPERATURE_degC = 25;
 
@@ -9,7 +9,7 @@ export class LivePressures {
     this.rows = [new Float64Array(sensors)];
   }
 
-  /** Above ambient, Pa, at the end of the slice after the last that was told. */
+  /** Above ambient, Pa, at the end of the slice after the last that was set. */
   add(pressures_Pa) {
     this.rows.push(Float64Array.from(pressures_Pa));
   }

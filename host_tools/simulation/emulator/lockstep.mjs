@@ -35,7 +35,7 @@ const OPTIONS = {
   help: { type: 'boolean', short: 'h', default: false },
 };
 const PRESSURE_LIMIT_Pa = 1e7;
-/** Nobody sends more within a slice. */
+/** No client sends more within a slice. */
 const SENT_LIMIT = 65536;
 
 function parseOptions(argv) {

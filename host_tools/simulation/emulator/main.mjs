@@ -32,7 +32,7 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --clock-ppm P        the chip's clocks are fast by P parts per million of emulated time, -1000 to 1000; default 0
   --revision N         of the chip: 0, 1 or 2 for B0, B1, B2; default 2
   --faults FILE.json   faults of sensors, multiplexers, clocks, USB, power (format: faults.mjs)
-  --flash FILE         what the flash holds beside the image, 2 MiB, from an earlier run; written anew at the end of this one
+  --flash FILE         what the flash holds beside the image, 2 MiB, from an earlier run; written again at the end of this one
   --slow-flash         the flash takes the longest times of its datasheet instead of the typical ones
   --fast-enumeration   shorten the host's debounce and reset waits
   --allow-watchdog     a watchdog reboot is no warning

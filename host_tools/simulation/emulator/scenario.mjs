@@ -9,7 +9,7 @@
  * Rows have strictly increasing t_s >= 0; s<k>_Pa is the pressure on sensor k above ambient, at most 1e7 Pa to
  * either side. The last line ends with a newline: a file without it was cut off and is refused. Between rows
  * everything is linear, before the first and after the last it holds. contact .. slip and Qx_N, Qy_N are the
- * truth for whoever judges the answer and are not used here. Time 0 is power-on.
+ * truth to judge the answer by, and are not used here. Time 0 is power-on.
  */
 import { readFileSync } from 'node:fs';
 import { InputError, inWords } from './errors.mjs';

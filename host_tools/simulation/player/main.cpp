@@ -110,7 +110,7 @@ int play(const PlayOptions &options) {
   settings.world = {&scenario, pressure_Pa, temperature_degC};
   settings.pad = pad ? &*pad : nullptr;
   if (!native_fingertip_start(&settings)) {
-    throw Error("--pad: this player tells no tangential load; build it with "
+    throw Error("--pad: this player reports no tangential load; build it with "
                 "-DFINGERTIP_SCENE=grasp");
   }
   native_cdc_open();

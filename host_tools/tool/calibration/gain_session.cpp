@@ -115,7 +115,7 @@ std::string GainSession::advice() const {
     break;
   }
   if (finder_.refusal() == PlacementFinder::Refusal::light) {
-    return "too light to tell: use a weight that makes at least " + fixed(LIGHT_Pa / 1000.0, 1) +
+    return "too light: use a weight that makes at least " + fixed(LIGHT_Pa / 1000.0, 1) +
            " kPa, about 1 N";
   }
   std::string text = "set the weight down on its round foot";

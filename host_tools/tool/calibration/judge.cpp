@@ -176,20 +176,20 @@ std::string text_of(const Judgement &j, std::size_t placements) {
            "): use a weight with a round foot, as a ball";
   case Reason::offsets:
     return "the zeros of the sensors were off by " + percent(j.offset_share) +
-           " of the peak: see that nothing touches the pad, tare, and begin anew";
+           " of the peak: see that nothing touches the pad, tare, and begin again";
   case Reason::drift:
     return "the zeros of the sensors moved by " + percent(j.drift_share) +
-           " of the peak meanwhile: let the fingertip warm up, and begin anew";
+           " of the peak meanwhile: let the fingertip warm up, and begin again";
   case Reason::stray:
     return "only " + percent(j.kept_share) +
            " of the placements fit each other: let the same weight stand freely each time";
   case Reason::residual:
     return "the readings are " + percent(s.residual_share) +
-           " of the peak off what one round foot makes: use one, and see that the pad is whole";
+           " of the peak off that of one round foot: use one, and see that the pad is whole";
   case Reason::halves:
     return "every other placement says other gains, by " +
            percent(std::max(j.halves_shape, j.halves_gauge)) +
-           ": something changed meanwhile; begin anew";
+           ": something changed meanwhile; begin again";
   case Reason::layout:
     return "the sensors seem to sit " + std::to_string(s.spread.position_mm).substr(0, 4) +
            " mm from where the firmware has them: see geometry.c";

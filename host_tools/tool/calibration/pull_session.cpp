@@ -30,7 +30,7 @@ double sd_without_scale_N(const wire_contact &contact, const pad_profile &pad) {
 void check_pad(const wire_info &info, const std::string &what) {
   if (!(info.capabilities & WIRE_CAPABILITY_TANGENTIAL)) {
     throw Error(what + ": its firmware (scene " + text_field(info.scene) +
-                ") tells no tangential load; flash one of scene grasp");
+                ") reports no tangential load; flash one of scene grasp");
   }
   if (!(info.stored & WIRE_STORED_PAD)) {
     throw Error(what + ": no pad profile; fingertip pad --thickness MM first");
@@ -73,7 +73,7 @@ bool PullSession::take(const wire_packet &packet) {
 std::string PullSession::advice() const {
   switch (finder_.state()) {
   case PullFinder::State::settling:
-    return "let go of it, and leave it alone";
+    return "release it, and leave it alone";
   case PullFinder::State::resting:
     return "pull: hang the weight on its string";
   case PullFinder::State::pulled:
@@ -99,7 +99,7 @@ std::string PullSession::last_pull_text() const {
 }
 
 std::string PullSession::weak_text() const {
-  return fixed(known_N_, 2) + " N is little beside what the fingertip may be off by there, " +
+  return fixed(known_N_, 2) + " N is small beside the fingertip's possible error there, " +
          fixed(finder_.sd_N(), 2) + " N: pull harder, or calibrate the gains first";
 }
 
@@ -109,7 +109,7 @@ pad_profile PullSession::scaled(pad_profile pad) const {
   pad.tangential_scale_sd = static_cast<float>(scale * judgement_.reading_sd);
   if (!pad_profile_is_valid(&pad)) {
     throw Error("the readings are not those of " + fixed(known_N_, 2) + " N: they make " +
-                fixed(known_N_ * judgement_.reading, 2) + " N; give what pulled");
+                fixed(known_N_ * judgement_.reading, 2) + " N; give the force that pulled");
   }
   return pad;
 }

@@ -28,7 +28,7 @@ void ask(const CalibrateOptions &options, const std::string &question,
     return;
   }
   if (!isatty(STDIN_FILENO)) {
-    throw Error(otherwise + "; give --yes where nobody can be asked");
+    throw Error(otherwise + "; give --yes without a terminal");
   }
   std::printf("\n%s [y/N] ", question.c_str());
   std::fflush(stdout);

@@ -76,7 +76,7 @@ void check_same_pad(const pad_profile &recorded, const pad_profile &stored,
   if (stored.thickness_mm != recorded.thickness_mm || stored.overhang_mm != recorded.overhang_mm ||
       stored.from_touch != recorded.from_touch) {
     throw Error(printable(recording) + ": is of a pad of " + shortest(recorded.thickness_mm) +
-                " mm, and this fingertip has been told of another since; record anew");
+                " mm, and this fingertip's profile has changed since; record again");
   }
 }
 

@@ -173,7 +173,7 @@ void convert_to_capture(const Conversion &conversion) {
   }
   capture.finish();
   report_losses(conversion.from, file);
-  std::printf("%s: %llu packets; what the recorder wrote of its own is not among them\n",
+  std::printf("%s: %llu packets, without the recorder's own lines\n",
               printable(conversion.to).c_str(), static_cast<Count>(packets));
 }
 

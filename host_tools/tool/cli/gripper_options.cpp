@@ -28,11 +28,11 @@ void with_gripper_line(CLI::App *command, GripperWay &way) {
       ->type_name("N");
   command
       ->add_option("--closed", way.closed_count,
-                   "Position that it tells when its pads touch; default: 230, of a servo 2048")
+                   "Position that it reports when its pads touch; default: 230, of a servo 2048")
       ->type_name("COUNT");
   command
       ->add_option("--open", way.open_count,
-                   "Position that it tells when it is open; default: 3, of a servo 2700")
+                   "Position that it reports when it is open; default: 3, of a servo 2700")
       ->type_name("COUNT");
   command
       ->add_option("--jaw", way.jaw_mm,

@@ -133,7 +133,7 @@ std::string crash_text(const Crash &crash) {
   case CRASH_PANIC:
     return "a panic" + at_text(crash) + where_text(record) + since;
   case CRASH_EXCEPTION:
-    return exception_text(record.vector) + " came, which nobody handles," + at_text(crash) +
+    return exception_text(record.vector) + " came, which has no handler," + at_text(crash) +
            where_text(record) + since;
   case CRASH_WATCHDOG:
     if (record.stuck & CRASH_STUCK_INTERRUPTS) {

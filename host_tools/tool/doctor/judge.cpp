@@ -160,7 +160,7 @@ private:
             facts_.port + (holders.empty() ? ", shared" : ", shared by " + holders));
       } else if (holders.empty()) {
         add(Verdict::ok, "port",
-            facts_.port + (facts_.knows_computer ? ", nobody else has it open" : ""));
+            facts_.port + (facts_.knows_computer ? ", no other program has it open" : ""));
       } else {
         add(Verdict::warn, "port", facts_.port + ": also open in " + holders,
             "end it: it takes bytes away");
@@ -224,7 +224,7 @@ private:
     std::uint32_t stored = facts_.info->stored;
     if (stored & WIRE_STORED_DAMAGED) {
       add(Verdict::bad, "stored", "what it had stored cannot be read and is not used",
-          "calibrate anew, or set --keep");
+          "calibrate again, or set --keep");
     } else {
       add(Verdict::ok, "stored",
           std::string(stored & WIRE_STORED_CALIBRATION ? "a calibration" : "no calibration") +
@@ -298,7 +298,7 @@ private:
     }
     if (sensor.saturated_share > 0) {
       add(Verdict::warn, "sensors", named(k) + " reads beyond its range, 1980 mbar",
-          "let go of it; if it stays, replace it", {k});
+          "release the pad; if it stays, replace it", {k});
     } else if (sensor.doubtful_share > DOUBTFUL_SHARE_MAX && !memory_bad) {
       add(Verdict::warn, "sensors",
           named(k) + " has a temperature that fits neither its own before nor the others'",
@@ -308,7 +308,7 @@ private:
     if (sensor.readings > 0 && std::abs(apart_Pa) > APART_MAX_Pa) {
       add(Verdict::warn, "sensors",
           named(k) + " reads " + fixed(apart_Pa / 1000, 0) + " kPa apart from the others",
-          "let go of it; if it stays, rubber presses on it or it is damaged", {k});
+          "release the pad; if it stays, rubber presses on it or it is damaged", {k});
     }
   }
 
@@ -367,7 +367,7 @@ private:
     const wire_health &now = *facts_.after;
     std::string up = "up for " + std::to_string(now.uptime_s) + " s";
     if (facts_.before && now.uptime_s < facts_.before->uptime_s) {
-      add(Verdict::bad, "restarts", "it started anew while it was examined", "check its supply");
+      add(Verdict::bad, "restarts", "it restarted while it was examined", "check its supply");
     } else if (now.watchdog_resets) {
       add(Verdict::warn, "restarts",
           up + ", " + count(now.watchdog_resets, "reset") + " by the watchdog since power-on",
@@ -534,7 +534,7 @@ private:
       add(Verdict::warn, "zero", "not every sensor has one",
           "let go of the pad, then `fingertip tare`");
     } else if (rest.last_flags & CONTACT_FLAG_ZERO_DOUBTFUL) {
-      add(Verdict::warn, "zero", "what is felt may be a zero that has moved",
+      add(Verdict::warn, "zero", "the pressure may be a zero that has moved",
           "`fingertip tare` where nothing touches the pad");
     } else {
       add(Verdict::ok, "zero", "tared, and nothing touches the pad");

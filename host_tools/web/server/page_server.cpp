@@ -85,7 +85,7 @@ std::string why_not(const std::string &address, unsigned port) {
   case EADDRINUSE:
     return place +
            " is taken by another program; end that one, or choose another --port (a browser asks "
-           "for fingertips anew there)";
+           "for fingertips again there)";
   case EACCES:
     return place + " needs privileges; choose another --port, from 1024 on";
   default:

@@ -112,7 +112,7 @@ export interface Core {
 
 export let core: Core;
 
-/** Of zstd, in MCAP files of other programs; whoever reads files sets it. */
+/** Of zstd, in MCAP files of other programs; a reader of files sets it. */
 let unpack: ((packed: Uint8Array, size: number) => Uint8Array) | null = null;
 export function setUnpack(of_zstd: (packed: Uint8Array, size: number) => Uint8Array): void {
   unpack = of_zstd;

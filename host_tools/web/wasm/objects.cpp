@@ -47,7 +47,7 @@ public:
 
   void take(void *value, std::size_t length) {
     if (length > left_) {
-      throw std::runtime_error("the objects' file ends too early; load the page anew");
+      throw std::runtime_error("the objects' file ends too early; load the page again");
     }
     std::memcpy(value, at_, length);
     at_ += length;
@@ -106,7 +106,7 @@ ObjectsFile read_objects(const std::uint8_t *bytes, std::size_t length) {
   std::uint32_t count = 0;
   reader.take(&count, sizeof count);
   if (std::memcmp(mark.data(), MARK, MARK_BYTES) != 0 || count > OBJECTS_MAX) {
-    throw std::runtime_error("no file of objects; load the page anew");
+    throw std::runtime_error("no file of objects; load the page again");
   }
   ObjectsFile file;
   for (std::uint32_t i = 0; i < count; i++) {

@@ -66,7 +66,7 @@ export class RealTime {
     if (!this.firmware) {
       await this.plugIn();
     }
-    // What it was told before it noticed that its line had closed would be lost.
+    // Commands that came before it noticed that its line had closed would be lost.
     this.runFor(this.firmware, SLICE_us);
     this.firmware.open();
     this.isOpen = true;
@@ -138,8 +138,8 @@ export class RealTime {
       this.pass(parts);
       this.gone(
         error.how === FirmwareLeft.LOADER
-          ? 'it went to its loader; connect again, and it starts anew'
-          : 'its firmware ended itself; connect again, and it starts anew',
+          ? 'it went to its loader; connect again, and it restarts'
+          : 'its firmware ended itself; connect again, and it restarts',
       );
       return;
     }

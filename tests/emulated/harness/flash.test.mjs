@@ -82,7 +82,7 @@ test('bytes take bus time', () => {
   assert.ok(driver.time.nanos - began_ns >= 16 * 8 * 4 * CYCLE_NS);
 });
 
-test('write enable shows in the status and is needed anew each time', () => {
+test('write enable shows in the status and is needed again each time', () => {
   const driver = new Driver();
   driver.command([0x06]);
   assert.equal(driver.status, 2);
@@ -196,7 +196,7 @@ test('a reset does not reach the flash: the boot ROM waits for it, half a second
   }
 });
 
-test('a power cut starts everything anew but the flash', () => {
+test('a power cut starts everything again but the flash', () => {
   const source = `void main(void) { start_clocks(); RESULT(0) = RESULT(0) == 0x12345678 ? 1 : 0x12345678; for (;;) { } }`;
   const machine = makeMachine(source, { faults: [{ type: 'power_cut', from_s: 0.1, to_s: 0.15 }] });
   machine.run(0.09e9);

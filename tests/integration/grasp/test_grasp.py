@@ -408,7 +408,7 @@ class Trouble(GraspTest):
                 self.world.until(lambda: self.tell()[1] > HOLDS_2_N)
                 self.tell("load 1")
             self.finish(process)
-        self.assertIn("gripper: nobody spoke to it for a second", [text.split(",", 1)[-1] for _, text in files.read_grip_events(self.csv)])
+        self.assertIn("gripper: no command for a second", [text.split(",", 1)[-1] for _, text in files.read_grip_events(self.csv)])
         self.assertNotIn("fault", set(self.rows()["state"]))
 
     def test_a_full_disk_ends_the_recording_and_not_the_grasp(self):

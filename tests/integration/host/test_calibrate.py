@@ -89,11 +89,11 @@ class FromRecording(CalibrateTest):
         serial = re.search(r"^# serial: (\S+)$", pathlib.Path(recording).read_text(encoding="utf-8"), re.M)[1]
         with self.device(f"serial={serial}"):
             _, err = self.calibrate("--from", recording, "--port", self.port, status=1)
-            self.assertEqual(err, "fingertip: not written; give --yes where nobody can be asked\n")
+            self.assertEqual(err, "fingertip: not written; give --yes without a terminal\n")
             self.assertEqual(self.calibrate("--show", "--port", self.port)[0], "not calibrated\n")
         with self.device("calibrated=1"):
             _, err = self.calibrate("--erase", "--port", self.port, status=1)
-            self.assertEqual(err, "fingertip: not erased; give --yes where nobody can be asked\n")
+            self.assertEqual(err, "fingertip: not erased; give --yes without a terminal\n")
             self.assertIn("from 30 placements", self.calibrate("--show", "--port", self.port)[0])
 
     def test_refuses_with_the_reason(self):

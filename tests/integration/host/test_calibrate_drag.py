@@ -108,7 +108,7 @@ class FromRecording(DragTest):
     def test_only_into_the_fingertip_and_the_pad_that_it_is_of(self):
         for options, thickness, reason in (((f"serial={serial}", GRASP), "15", "is of a pad of 12 mm"), ((GRASP,), "12", "is of fingertip"),
                                            ((f"serial={serial}", GRASP), None, "no pad profile; fingertip pad --thickness MM first"),
-                                           ((f"serial={serial}", SLIP), None, "tells no tangential load; flash one of scene grasp")):
+                                           ((f"serial={serial}", SLIP), None, "reports no tangential load; flash one of scene grasp")):
             with self.subTest(reason), self.device(*options):
                 if thickness:
                     self.run_cli("pad", "--thickness", thickness, "--port", self.port)
@@ -120,7 +120,7 @@ class FromRecording(DragTest):
         with self.device(f"serial={serial}", GRASP):
             self.run_cli("pad", "--thickness", "12", "--port", self.port)
             _, err = self.calibrate("--from", recording, "--port", self.port, status=1)
-            self.assertEqual(err, "fingertip: not written; give --yes where nobody can be asked\n")
+            self.assertEqual(err, "fingertip: not written; give --yes without a terminal\n")
             self.assertRegex(self.run_cli("info", "--port", self.port)[0], r"(?m)^pad_tangential_scale +1$")
 
     def of_two_loads(self):
@@ -140,7 +140,7 @@ class FromRecording(DragTest):
 
     def test_refuses_with_the_reason(self):
         weak, _ = make_recording("weak", "--gain", "10", "--seed", "2", "--tangential", "0.05")
-        self.assertRegex(self.refused(weak, pull=("--force", "0.15")), r"0\.15 N is little beside what .* may be off by there, 0\.\d\d N: pull harder")
+        self.assertRegex(self.refused(weak, pull=("--force", "0.15")), r"0\.15 N is small beside .* possible error there, 0\.\d\d N: pull harder")
         one_way, _ = make_recording("one way", "--gain", "0", "--tangential", f"{SHARE},0")
         self.assertIn("0 of 3 pulls along y; pull more", self.refused(one_way))
         weights, _ = make_recording("weights", "--gain", "0", "--tangential", "0.15..0.45")
@@ -157,7 +157,7 @@ class Live(DragTest):
         with self.device(f"play={recording}", GRASP, "pad=1"):
             out, err = self.calibrate("--port", self.port, "--yes")
             self.assertEqual(err, "")
-            for advice in ("set the object down, its string slack\n", "let go of it, and leave it alone\n", "pull: hang the weight on its string\n",
+            for advice in ("set the object down, its string slack\n", "release it, and leave it alone\n", "pull: hang the weight on its string\n",
                            "hold on\n", "taken: take it off the pad\n", "; 7 of 8 pulls\n"):
                 self.assertIn(advice, out)
             self.assertNotIn("\x1b", out)
@@ -174,7 +174,7 @@ class Live(DragTest):
             self.assertNotIn("do this again", out)
 
     def test_what_cannot_be_calibrated_is_told(self):
-        for options, reason in (((SLIP,), "tells no tangential load"), ((GRASP,), "no pad profile"), ((GRASP, "pad=1", "absent=3"), "sensors do not answer: 3")):
+        for options, reason in (((SLIP,), "reports no tangential load"), ((GRASP,), "no pad profile"), ((GRASP, "pad=1", "absent=3"), "sensors do not answer: 3")):
             with self.subTest(reason), self.device(*options):
                 _, err = self.calibrate("--port", self.port, "--yes", status=1)
                 self.assertIn(reason, err)
@@ -198,7 +198,7 @@ class Live(DragTest):
 
 class Usage(DragTest):
     def test_wrong_words(self):
-        self.assertIn("--drag needs to know what pulls", self.error("calibrate", "--drag", status=2))
+        self.assertIn("--drag needs the pull", self.error("calibrate", "--drag", status=2))
         self.assertIn("excludes", self.error("calibrate", "--drag", "--show", status=2))
 
 

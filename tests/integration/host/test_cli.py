@@ -408,7 +408,7 @@ class Commands(CliTest):
         self.assertIn("--thickness", self.error("pad", "--from-touch", status=2))
         self.assertIn("give --thickness MM", self.error("pad", status=2))
         with self.device():
-            self.assertIn("of scene slip, tells no tangential load; install one of scene grasp", self.error("pad", "--thickness", "12"))
+            self.assertIn("of scene slip, reports no tangential load; install one of scene grasp", self.error("pad", "--thickness", "12"))
         with self.device("capabilities=15", "refuse=1"):
             self.assertIn('refused "pad": not possible now', self.error("pad", "--thickness", "12"))
 

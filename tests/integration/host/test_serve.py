@@ -297,7 +297,7 @@ class Server(ServeTest):
 
     def test_past_it_and_only_by_it(self):
         with self.device():
-            self.assertIn("nobody shares it; share it with `fingertip serve`", self.error("info", "--transport", "socket"))
+            self.assertIn("no program shares it; share it with `fingertip serve`", self.error("info", "--transport", "socket"))
             with self.served():
                 self.assertIn("in use by another program", self.error("info", "--transport", "serial"))
                 self.run_cli("info", "--transport", "socket")
@@ -326,7 +326,7 @@ class Server(ServeTest):
             os.chmod(self.sockets, 0o755)
             denied = self.as_nobody("info", group=65534)
             self.assertEqual(denied[2], f"fingertip: {self.socket_of()}: permission denied: it is its owner's and group's; "
-                                            "join the group, or have it shared with serve --group\n")
+                                            "join the group, or share it with serve --group\n")
 
     def test_wrong_places_and_names(self):
         self.assertIn('--group "no such" is not possible; give the name of a group', self.error("serve", "--group", "no such", status=2))

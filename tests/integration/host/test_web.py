@@ -111,7 +111,7 @@ class Web(unittest.TestCase):
             self.assertRegex(listening, rf"0100007F:{port:04X} 00000000:0000 0A")
         with self.served("--address", "0.0.0.0"):
             pass
-        self.assertIn("anyone who reaches 0.0.0.0", self.said)
+        self.assertIn("everyone who reaches 0.0.0.0", self.said)
         with self.served("--address", "127.0.0.2") as (host, port, _):
             self.assertEqual(self.ask(host, port)[0], 200)
         self.assertNotIn("anyone", self.said)
@@ -134,7 +134,7 @@ class Web(unittest.TestCase):
         with self.served() as (_, port, _):
             self.assertEqual(self.refused("--port", str(port)),
                              (1, f"fingertip: port {port} of 127.0.0.1 is taken by another program; end that one, or choose another --port "
-                                 "(a browser asks for fingertips anew there)\n"))
+                                 "(a browser asks for fingertips again there)\n"))
         for address in ("192.0.2.1", "no.such.name.invalid", "1.2.3"):
             status, said = self.refused("--address", address, "--port", "0")
             self.assertEqual(status, 1, address)

@@ -194,7 +194,7 @@ test('the cable is pulled amid a command: it fails at once, with words; another 
 
   const back = new SpokenLine();
   await fingertip.open(back);
-  back.say(contactOf(1, 1_000)); // it started anew
+  back.say(contactOf(1, 1_000)); // it restarted
   back.say(rawOf(1, 1_000, [0, 0]));
   const { history } = fingertip;
   assert.equal(history?.end, 2);

@@ -78,7 +78,7 @@ test('read in many small steps, or back and forth, intervals are those of one re
   }
 });
 
-test('what has left the intervals is read anew when somebody goes back to it', () => {
+test('what has left the intervals is read again when somebody goes back to it', () => {
   const history = historyOf(3000, (i) => ({ force_N: i }));
   const buckets = new Buckets(60);
   for (let end_s = 0.5; end_s < 3; end_s += 0.1) {
@@ -114,7 +114,7 @@ test('no more intervals than there is room for: the newest', () => {
   assert.deepEqual([first, last], [400, 499]);
 });
 
-test('a fingertip that starts anew goes on in time, and its frame numbers are no loss', () => {
+test('a fingertip that restarts goes on in time, and its frame numbers are no loss', () => {
   const history = historyOf(3000, () => ({ force_N: 5 }));
   const buckets = new Buckets(500);
   buckets.read(history, 0.01, 0, 2.999);

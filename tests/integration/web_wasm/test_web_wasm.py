@@ -74,7 +74,7 @@ class Parity(WebWasm):
 
     def same(self, scenario, *options, pad=False, least_Hz=100):
         packets, different, told = parity.play(self.build, scenario, self.folder, *options, pad=pad)
-        self.assertEqual(different, 0, "build web_wasm and fingertip_player anew first: their info packets name their commit")
+        self.assertEqual(different, 0, "build web_wasm and fingertip_player again first: their info packets name their commit")
         self.assertGreater(packets, least_Hz * told["seconds"])
 
     def test_taps_with_all_errors(self):
@@ -178,7 +178,7 @@ class Simulated(WebWasm):
         effect, value, torn = self.seen["errors"]
         self.assertIn('there is no effect "rust"', effect)
         self.assertIn('effect gain is "1e9"; give', value)
-        self.assertIn("load the page anew", torn)
+        self.assertIn("load the page again", torn)
 
 
 class Judges(WebWasm):

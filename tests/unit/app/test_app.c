@@ -296,7 +296,7 @@ static void settings_are_kept_when_asked_for_and_forgotten_likewise(void) {
   TEST_ASSERT_UINT32_WITHIN(1000, 50000, (run_for(2000), get_info().measured_rate_mHz));
 
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, keep(0));
-  TEST_ASSERT_EQUAL_UINT32_MESSAGE(50000, get_info().rate_mHz, "it goes on until it starts anew");
+  TEST_ASSERT_EQUAL_UINT32_MESSAGE(50000, get_info().rate_mHz, "it goes on until it restarts");
   info = info_after_restart();
   TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_CALIBRATION, info.stored);
   TEST_ASSERT_EQUAL_UINT32(built.rate_mHz, info.rate_mHz);

@@ -125,7 +125,7 @@ TEST(Crash, InWords) {
   record = record_of(CRASH_EXCEPTION);
   record.vector = 16 + 20;
   EXPECT_EQ(crash_text(with_places(record, std::nullopt)).substr(0, 50),
-            "interrupt 20 came, which nobody handles, at 0x2000");
+            "interrupt 20 came, which has no handler, at 0x2000");
   EXPECT_EQ(crash_text(with_places(record_of(CRASH_START), std::nullopt)),
             "a start that gave up: clocks that did not come, or a fault in the start-up code");
 }

@@ -127,7 +127,7 @@ TEST_F(GripperThreadTest, ThatNobodySpokeToItIsToldAndNoFault) {
   GripperThread thread(open()(), open());
   EXPECT_TRUE(comes(thread, [](const auto &news) {
     return news.status && news.status->fault == 0 &&
-           news.trouble == "nobody spoke to it for a second";
+           news.trouble == "no command for a second";
   }));
   state_->was_left_alone = false;
   EXPECT_TRUE(comes(thread, [](const auto &news) { return news.status && news.trouble.empty(); }));

@@ -115,8 +115,8 @@ Sent sent_in_ten_seconds(int columns, int rows, std::uint32_t flags) {
     if (frame % per_picture == 0) {
       Canvas canvas = one(model, columns, rows);
       sent.changes += painter.paint(canvas).size();
-      Painter anew(ColourDepth::truecolour, Characters::utf_8);
-      sent.all += anew.paint(canvas).size();
+      Painter again(ColourDepth::truecolour, Characters::utf_8);
+      sent.all += again.paint(canvas).size();
     }
   }
   return sent;

@@ -327,13 +327,13 @@ static void damage_is_told_and_nothing_is_used(void) {
     TEST_ASSERT_EQUAL(FT_OK, finish());
     TEST_ASSERT_EQUAL_MEMORY(&damaged, &native_flash, sizeof damaged);
   }
-  struct store_content anew = {.has_calibration = true, .calibration = some_calibration()};
-  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &anew.calibration));
+  struct store_content again = {.has_calibration = true, .calibration = some_calibration()};
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &again.calibration));
   TEST_ASSERT_EQUAL(FT_OK, finish());
   TEST_ASSERT_FALSE(store.damaged);
   restart();
   TEST_ASSERT_FALSE(store.damaged);
-  TEST_ASSERT_TRUE(is(&anew));
+  TEST_ASSERT_TRUE(is(&again));
 }
 
 static void forgetting_mends_damage(void) {

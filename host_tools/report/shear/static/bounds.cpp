@@ -69,7 +69,7 @@ Bound bound_of(const fit_array &array, const pad_profile &profile, const twin::T
   }
   if (told != Told::nothing) {
     const double spread_sd = static_cast<double>(profile.spread_sd_mm2);
-    // Roundness told for certain: so narrow that it leaves nothing open.
+    // Roundness known for certain: so narrow that it leaves nothing open.
     constexpr double CERTAIN_mm2 = 1e-4;
     const double long_sd = told == Told::round ? CERTAIN_mm2 : ELONGATION_SD_mm2;
     information(SPREAD, SPREAD) += 1.0 / (spread_sd * spread_sd);

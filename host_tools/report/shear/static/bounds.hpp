@@ -13,7 +13,7 @@
 
 namespace fingertip::shear {
 
-// What is told of the touch beforehand.
+// What is known of the touch beforehand.
 enum class Told {
   nothing,
   priors, // the firmware's: spread, and elongations near none

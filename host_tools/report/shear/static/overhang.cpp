@@ -54,7 +54,7 @@ Ended touch_twice(const Bench &bench, const Case &c, const pad_profile &profile)
 
 } // namespace
 
-// Pads that end, by what the fingertip is told: the thickness alone, or what the ends do to the
+// Pads that end, by the fingertip's profile: the thickness alone, or the effect of the ends on the
 // estimate as well (pad/edges.hpp). The zero is what is read without a load; the increment what is
 // read with it, less what the same touch reads at its beginning.
 void judge_overhang(Bench &bench, ordered_json &out) {

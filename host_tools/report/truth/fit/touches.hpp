@@ -2,7 +2,7 @@
 // report them.
 //
 // A contact is an object of the twin on a layer of rubber, or an elliptic Gaussian; a pad is a draw
-// of its sensors' gains with what the firmware is told of them.
+// of its sensors' gains with the firmware's calibration of them.
 #pragma once
 
 #include "libfingertip/random.hpp"
@@ -47,7 +47,7 @@ struct Pad {
 };
 
 Pad perfect_pad();
-// Gains as cast, normal about 1 as the twin draws them, and no calibration: the firmware is told
+// Gains as cast, normal about 1 as the twin draws them, and no calibration: the firmware has
 // this standard deviation.
 Pad raw_pad(double spread, double told, Random &random);
 // What a calibration left of the gains, which is all that acts on a touch here: it does not relax,
@@ -85,7 +85,7 @@ std::array<std::int32_t, SENSORS> readings_of(const fit_array &array, const Cont
 
 // The firmware's array. Throws std::runtime_error if its geometry is refused.
 fit_array firmware_array();
-// The settings that it fits with: its defaults, told of this pad and noise.
+// The settings that it fits with: its defaults, with this pad and noise.
 fit_settings settings_for(const Pad &pad, double noise_Pa);
 
 } // namespace fingertip::truth

@@ -3,7 +3,7 @@
 // MTL-BaroTactileSensor, Data_collection. They are not part of this project.
 //
 // A row is the sensors' absolute pressures, the stage's place along the strip and its depth in
-// steps, and the time; about 17 a second. There is no force: what touches is told by the depth.
+// steps, and the time; about 17 a second. There is no force: a touch shows by the depth.
 #pragma once
 
 extern "C" {

@@ -65,7 +65,7 @@ export class I2cWaveform {
     this.#set(WAVEFORM_SCL, true, t_ns - high_ns);
   }
 
-  /** The block gave up: nobody drives. */
+  /** The block gave up: no one drives. */
   abandon() {
     this.inTransfer = false;
   }

@@ -15,7 +15,7 @@ import { Ms5840 } from './ms5840.mjs';
 const RELEASE_TO_HIGH = Math.log(0.3) / Math.log(0.3 / 0.7);
 /** From the fall of SCL to a sensor's change of SDA: assumed; UM10204 asks for 300 ns internal hold, 900 ns to valid. */
 const SENSOR_SDA_NS = 350;
-/** A clock that was high for so long begins anew after a fault of SCL. */
+/** A clock that was high for so long begins again after a fault of SCL. */
 const QUIET_NS = 3000;
 /** Where in a clock's high time a glitch falls. */
 const GLITCH_AT_NS = 200;
@@ -48,7 +48,7 @@ export class ParallelBoard {
       faults: (i) => faults().sensor(i),
     }));
     this.lines = this.sensors.map((target, k) => new I2cLine({ name: `SDA${k}`, target, rise_ns, report, statistics: this.statistics, onTransfer }));
-    this.nobody = new I2cTarget(-1);
+    this.absent = new I2cTarget(-1);
     this.rise_ns = rise_ns;
     /** Who pulls down; what a fault ties to VDD wins. */
     this.low = { chip: 0, sensors: 0, fault: 0 };
@@ -112,7 +112,7 @@ export class ParallelBoard {
       scl_stuck_high: onScl(tieHigh),
       sensor_missing: onLine((_, active, k) => {
         if (!active) this.sensors[k].powerUp();
-        this.lines[k].connect(active ? this.nobody : this.sensors[k]);
+        this.lines[k].connect(active ? this.absent : this.sensors[k]);
         this.#sensorsPull();
       }),
       clock_glitch: (k, active) => {

@@ -9,7 +9,7 @@
  *
  * A reset of the RP2040 does not reach it. When its power goes, what was under way is cut short: of the bits that were
  * to change some have changed, some have not, and some read differently from now on, at each reading or at each
- * power-up, until they are programmed or erased anew.
+ * power-up, until they are programmed or erased again.
  */
 import { Prng } from '../prng.mjs';
 

@@ -128,7 +128,7 @@ export class Pins {
     this.#become((this.levels & ~mask) | (levels & mask));
   }
 
-  /** What the pins that nobody else sets read. */
+  /** What the pins read that no other part sets. */
   #resolve() {
     const { low, high } = this;
     const keeper = this.pullUp & this.pullDown & this.levels;

@@ -37,7 +37,7 @@ const ST_RESUME = 1 << 11;
 const ST_LINE_J = 1 << 2;
 const ST_SUSPENDED = 1 << 4;
 const ST_WRITE_CLEAR = 0xff0e0800;
-/** From a change of the bus to that of SUSPENDED, in which a RESUME is told apart from noise. */
+/** From a change of the bus to that of SUSPENDED, in which a RESUME is distinguished from noise. */
 const AWAKE_NS = 3e3;
 /** The same in the fault usb_late_resume. */
 const AWAKE_LATE_NS = 45e6;
@@ -399,7 +399,7 @@ export class UsbBlock extends BasePeripheral {
     if (!this.connected) this.idleAlarm.schedule(IDLE_NS);
   }
 
-  /** SUSPENDED is a level that nobody writes; DEV_SUSPEND says that it changed, and is cleared through the same bit. */
+  /** SUSPENDED is a level that is never written; DEV_SUSPEND says that it changed, and is cleared through the same bit. */
   #setSuspended(is) {
     this.awakeAlarm.cancel();
     if (this.hung === 'dead') return;

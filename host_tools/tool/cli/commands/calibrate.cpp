@@ -33,7 +33,7 @@ void add_calibrate(CommandLine &line) {
           throw WrongUsage("--dry-run goes with --from; without, it asks before it writes");
         }
         if (options->drag && !options->force_N) {
-          throw WrongUsage("--drag needs to know what pulls: --weight GRAMS on the string, or "
+          throw WrongUsage("--drag needs the pull: --weight GRAMS on the string, or "
                            "--force N");
         }
         return run_calibrate(*options);
@@ -46,7 +46,7 @@ void add_calibrate(CommandLine &line) {
                                   options->force_N =
                                       weight_N_from_text("--weight", text, GRAVITY_N_PER_g);
                                 },
-                                "The weight's, where it is known: then forces are calibrated too")
+                                "Mass of the weight: then forces are calibrated too")
                             ->type_name("GRAMS");
   CLI::Option *force = command
                            ->add_option_function<std::string>(
@@ -59,19 +59,19 @@ void add_calibrate(CommandLine &line) {
                            ->type_name("N");
   CLI::Option *drag =
       command->add_flag("--drag", options->drag,
-                        "The tangential force's scale instead: the weight hangs on a string that "
+                        "Find the tangential force's scale: the weight hangs on a string that "
                         "pulls an object level along the pad, several times in each direction");
   CLI::Option *from =
       command
           ->add_option("--from", options->from,
-                       "From a recording of it, placements with pressures, instead of live")
+                       "Use the placements of a recording with pressures, not live ones")
           ->type_name("FILE.csv");
   CLI::Option *dry_run = command->add_flag("--dry-run", options->dry_run, "With --from: only show");
   CLI::Option *yes = command->add_flag("--yes", options->yes, "Write, or erase, without asking");
   CLI::Option *show =
-      command->add_flag("--show", options->show, "Show what the fingertip is calibrated by")
+      command->add_flag("--show", options->show, "Show the fingertip's calibration")
           ->excludes(weight, force, drag, from, dry_run, yes);
-  command->add_flag("--erase", options->erase, "Have it forget its calibration; it asks")
+  command->add_flag("--erase", options->erase, "Erase its calibration, after a question")
       ->excludes(weight, force, drag, from, dry_run, show);
   with_colour(command, options->colour);
 }

@@ -48,7 +48,7 @@ void add_convert(CommandLine &line) {
   command->add_option("from", options->from, "Recording (.csv, .mcap) or bytes of the line (.ftr)")
       ->required()
       ->type_name("FILE");
-  command->add_option("to", options->to, "What to write; its name says which kind")
+  command->add_option("to", options->to, "File to write; its name says which kind")
       ->required()
       ->type_name("OUT.csv|OUT.mcap|OUT.ftr");
   command
@@ -56,7 +56,7 @@ void add_convert(CommandLine &line) {
                    "Serial number of one of several fingertips in the recording; only this one")
       ->type_name("SERIAL");
   command->add_flag("--salvage", options->salvage,
-                    "Take what can be read of a damaged file, and say what cannot");
+                    "Read what is readable of a damaged file, and report the rest");
   command->add_flag("--overwrite", options->overwrite, "Replace OUT if it exists");
 }
 

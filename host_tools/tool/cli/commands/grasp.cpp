@@ -18,7 +18,7 @@ std::string range_of(const GraspSetting &setting) {
          text(setting.high);
 }
 
-/* Of the usual gripper; those that depend on it are not told. */
+/* Of the usual gripper; those that depend on it are not shown. */
 std::string default_of(const GraspSetting &setting, const grip_settings &usual,
                        const grip_settings &other) {
   double value = value_of(setting, usual);
@@ -69,7 +69,7 @@ void add_grasp(CommandLine &line) {
   with_seconds(command, options->seconds, "End after this long, the gripper holding");
   command->add_option("-o,--record", options->recording, "Record all of it")->type_name("FILE.csv|FILE.mcap");
   command->add_flag("--overwrite", options->overwrite, "Replace the recording if it exists");
-  command->add_flag("--quiet", options->quiet, "Only what changes, on standard error");
+  command->add_flag("--quiet", options->quiet, "Print only changes, on standard error");
   with_transport(command, options->reach);
   with_colour(command, options->colour);
   with_gripper_line(command, options->gripper);

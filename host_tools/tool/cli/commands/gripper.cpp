@@ -87,7 +87,7 @@ int list_grippers() {
   return 0;
 }
 
-// An answer may get lost; several in a row are told.
+// An answer may get lost; several in a row are reported.
 GripperStatus polled(Gripper &gripper) {
   for (int missed = 0;; missed++) {
     try {
@@ -246,8 +246,8 @@ void add_gripper(CommandLine &line) {
   auto options = std::make_shared<GripperOptions>();
   CLI::App *command =
       line.add("gripper",
-               "Try a gripper by hand: list what there is, tell its state, open it, close it, move "
-               "it to a width; waits and says how it ended",
+               "Try a gripper by hand: list models, show its state, open it, close it, move "
+               "it to a width; waits and prints how it ended",
                [options] { return gripper_command(*options); });
   command->add_option("ACTION", options->action, "list, info, move WIDTH, open or close")
       ->required()
@@ -260,24 +260,24 @@ void add_gripper(CommandLine &line) {
         return "there is no \"" + text + "\"; give list, info, move WIDTH, open or close";
       })
       ->type_name("ACTION");
-  command->add_option("WIDTH", options->width_mm, "Of move: between the pads, in mm")
+  command->add_option("WIDTH", options->width_mm, "For move: width between the pads, in mm")
       ->type_name("MM");
   command
       ->add_option("--model", options->way.model,
-                   "Of the gripper: " + gripper_model_names())
+                   "Model of the gripper: " + gripper_model_names())
       ->type_name("MODEL");
   command
       ->add_option("--port", options->way.port,
-                   "Of its serial line; default: the only one on USB that is no fingertip")
+                   "Its serial line; default: the only one on USB that is no fingertip")
       ->type_name("PATH");
   command
       ->add_option("--speed", options->speed_mm_s,
-                   "Of the width; default: 50 mm/s, or the nearest that it can")
+                   "Speed of the width; default: 50 mm/s, or the nearest that it can")
       ->type_name("MM/S");
   command
       ->add_option(
           "--force", options->force_N,
-          "At which it stops, by its maker's scale, which is none of newtons; default: its "
+          "Force at which it stops, by its maker's scale, which is not newtons; default: its "
           "least")
       ->type_name("N");
   command->add_flag("--activate", options->activate,

@@ -75,7 +75,7 @@ int info(const Choice &choice) {
   }
   if (info.stored & WIRE_STORED_DAMAGED) {
     std::printf(
-        "\nwhat it had stored cannot be read and is not used; calibrate anew, or set --keep\n");
+        "\nwhat it had stored cannot be read and is not used; calibrate again, or set --keep\n");
   }
   return 0;
 }

@@ -44,13 +44,13 @@ int pad_command(const PadOptions &options) {
   wire_info info = session.info().body.info;
   if (!(info.capabilities & WIRE_CAPABILITY_TANGENTIAL)) {
     throw Error("its firmware, of scene " + text_field(info.scene) +
-                ", tells no tangential load; install one of scene grasp");
+                ", reports no tangential load; install one of scene grasp");
   }
   if (options.erase) {
     return erase_pad(session);
   }
   if (*options.thickness_mm < THINNEST_mm) {
-    throw WrongUsage("on less than 9 mm of rubber tangential load is not told well enough; "
+    throw WrongUsage("on less than 9 mm of rubber the tangential load is not accurate enough; "
                      "--thickness goes from 9 to 20 mm");
   }
   const pad::Shape shape{*options.thickness_mm, options.overhang_mm, options.from_touch};
@@ -72,14 +72,14 @@ int pad_command(const PadOptions &options) {
               fixed(static_cast<double>(profile.force_ratio), 3).c_str());
   if (shape.overhang_mm == 0) {
     std::fprintf(stderr,
-                 "fingertip: a pad without end, as no --overhang was told: where the rubber "
+                 "fingertip: a pad without end, as there is no --overhang: where the rubber "
                  "ends, location and tangential load are off\n");
   }
   if (pad::edges_spoil_the_zero(shape) && !options.from_touch) {
     std::fprintf(stderr,
                  "fingertip: the rubber ends %s mm beyond the outer sensors, less than "
                  "half its thickness, which spoils the zero of the tangential load; --from-touch "
-                 "tells what changed instead\n",
+                 "reports the change instead\n",
                  shortest(profile.overhang_mm).c_str());
   }
   return 0;
@@ -91,28 +91,28 @@ void add_pad(CommandLine &line) {
   auto options = std::make_shared<PadOptions>();
   CLI::App *command = line.add(
       "pad",
-      "Tell the fingertip its pad, so that it tells the tangential load (kept without power)",
+      "Set the pad's profile, for the tangential load (the fingertip keeps it without power)",
       [options] { return pad_command(*options); });
   with_port(command, options->choice);
   CLI::Option *thickness = command
                                ->add_option("--thickness", options->thickness_mm,
-                                            "Of the rubber above the sensors, 9 to 20 mm")
+                                            "Thickness of the rubber above the sensors, 9 to 20 mm")
                                ->type_name("MM");
   CLI::Option *overhang =
       command
           ->add_option("--overhang", options->overhang_mm,
-                       "Of the rubber beyond the outer sensors, up to 100 mm; from 3 to 20 mm what "
-                       "the ends do "
-                       "is found and taken back. Not told by default: a pad without end")
+                       "How far the rubber extends beyond the outer sensors, up to 100 mm; from 3 "
+                       "to 20 mm the effect of the ends is computed and subtracted. Default: a pad "
+                       "without end")
           ->type_name("MM")
           ->needs(thickness);
   CLI::Option *from_touch =
       command
           ->add_flag("--from-touch", options->from_touch,
-                     "Tell what changed since the first 100 ms of each contact: for pads whose "
+                     "Report the change since the first 100 ms of each contact: for pads whose "
                      "rubber ends within half its thickness of the outer sensors")
           ->needs(thickness);
-  command->add_flag("--erase", options->erase, "Forget the pad: no tangential load")
+  command->add_flag("--erase", options->erase, "Erase the pad's profile: no tangential load")
       ->excludes(thickness)
       ->excludes(overhang)
       ->excludes(from_touch);

@@ -57,7 +57,7 @@ void add_set(CommandLine &line) {
                         "Keep all present settings: the fingertip starts with them from now on");
   command
       ->add_flag("--forget", options->forget,
-                 "Keep none: from its next start on it has the firmware's own")
+                 "Keep none: from its next start on it has the firmware's defaults")
       ->excludes(keep);
 }
 

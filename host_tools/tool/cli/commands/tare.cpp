@@ -97,11 +97,11 @@ int tare(const TareOptions &options) {
 void add_tare(CommandLine &line) {
   auto options = std::make_shared<TareOptions>();
   CLI::App *tare_command =
-      line.add("tare", "Measure the zero of every sensor anew; nothing may touch the pad",
+      line.add("tare", "Measure the zero of every sensor; nothing may touch the pad",
                [options] { return tare(*options); });
   with_port(tare_command, options->choice);
   tare_command->add_flag("--force", options->force,
-                         "Tare though contact is reported, where nothing touches the pad");
+                         "Tare even if a contact is reported, though nothing touches the pad");
 }
 
 } // namespace fingertip

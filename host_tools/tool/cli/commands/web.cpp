@@ -62,7 +62,7 @@ int web(const WebOptions &options) {
   std::fflush(stdout);
   if (!is_loopback(options.address)) {
     std::fprintf(stderr,
-                 "anyone who reaches %s may read the page; browsers of other machines give it no "
+                 "everyone who reaches %s may read the page; browsers of other machines give it no "
                  "fingertips, only its simulated one\n",
                  printable(options.address).c_str());
   }
@@ -88,7 +88,7 @@ void add_web(CommandLine &line) {
       ->add_option("--address", options->address,
                    "Address to listen on; default 127.0.0.1: this machine only")
       ->type_name("ADDRESS");
-  command->add_flag("--no-browser", options->no_browser, "Only say the address, do not open it");
+  command->add_flag("--no-browser", options->no_browser, "Only print the address, do not open it");
 }
 
 } // namespace fingertip

@@ -25,7 +25,7 @@ export async function loadJudges(files = 'wasm/'): Promise<Judges> {
   const url = new URL(`${files}judges.wasm`, document.baseURI);
   const response = await fetch(url);
   if (!response.ok) {
-    throw new WasmError(`${url.href}: ${response.status}; load the page anew`);
+    throw new WasmError(`${url.href}: ${response.status}; load the page again`);
   }
   return load(await response.arrayBuffer());
 }

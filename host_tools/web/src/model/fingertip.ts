@@ -1,6 +1,6 @@
 /**
  * One fingertip: its line, what it said last, what it said over the last minutes, and the commands
- * that it takes. The view reads; listeners are told of rare changes alone (state, info, health), not
+ * that it takes. The view reads; listeners hear of rare changes alone (state, info, health), not
  * of packets: draw on requestAnimationFrame from `contact`, `raw` and `history`.
  */
 import { core, type LineCounts } from '../core';
@@ -228,7 +228,7 @@ export class Fingertip {
     await this.command({ type: PacketType.CMD_STREAM, streams: streams & possible });
   }
 
-  /** Measures the zero anew. Refused with Result.NOT_NOW in contact unless forced. */
+  /** Measures the zero again. Refused with Result.NOT_NOW in contact unless forced. */
   async tare(force = false): Promise<void> {
     await this.command({ type: PacketType.CMD_TARE, force: force ? 1 : 0 });
   }

@@ -5,7 +5,7 @@ export { FLAGS };
 
 export type FlagMeaning = (typeof FLAGS)[number];
 
-/** The bits of all warnings: whoever trusts a contact heeds them. */
+/** The bits of all warnings: trust a contact only without them. */
 export const WARNING_FLAGS = FLAGS.reduce((bits, flag) => bits | (flag.warning ? flag.bit : 0), 0);
 
 /** The warnings that are set. */

@@ -2,7 +2,7 @@
  * The last minutes of one fingertip: columns of typed arrays, a ring, a row for each frame.
  *
  * Rows are numbered from the first one on, for good: row i, begin <= i < end, is at slot(i) of every
- * column. What was not told is NaN: no fit, no x; a packet that did not come. A row takes what
+ * column. What was not reported is NaN: no fit, no x; a packet that did not come. A row takes what
  * the contact and the raw packet of one frame say; nothing is allocated for it.
  */
 import { CONTACT_FIELDS, CONTACT_FLAG, Flag, type Contact, type ContactField, type Raw } from '../line/line_facts';
@@ -27,7 +27,7 @@ export interface Readings {
 export class History {
   readonly capacity: number;
   readonly sensor_count: number;
-  /** Device time, s; where the fingertip started anew it goes on from before. Never falls. */
+  /** Device time, s; where the fingertip restarted it goes on from before. Never falls. */
   readonly t_s: Float64Array;
   readonly frame: Uint32Array;
   /** contact_flags.h; of the raw packet where no contact packet came. */
@@ -45,7 +45,7 @@ export class History {
   readonly pressure_Pa: Float32Array;
   /** [sensor], of the calibration that acts; empty: none. */
   gain: ArrayLike<number> = [];
-  /** How long nothing was heard before what comes next; counts where its clock starts anew. */
+  /** How long nothing was heard before what comes next; counts where its clock restarts. */
   gap_s = 0;
 
   private oldest = 0;
@@ -161,7 +161,7 @@ export class History {
         return newest;
       }
       if (t_s < newest_s) {
-        this.offset_s += newest_s - t_s + this.gap_s; // it started anew
+        this.offset_s += newest_s - t_s + this.gap_s; // it restarted
         t_s = newest_s + this.gap_s;
       } else {
         lost = Math.max(0, ((frame - this.frame[newest]) | 0) - 1);

@@ -3,7 +3,7 @@
 
 export interface Output {
   readonly name: string;
-  /** Writes are done in order; the first that failed is told by finish and by failure. */
+  /** Writes are done in order; finish and failure report the first that failed. */
   write(bytes: Uint8Array<ArrayBuffer>): void;
   finish(): Promise<void>;
   /** Empty: none yet. */

@@ -25,7 +25,7 @@ export function recordingName(fingertip: Fingertip, kind: RecordingKind): string
 }
 
 export class Recorder {
-  /** Why it ended before it was told to; empty: it did not. */
+  /** Why it ended before its command; empty: it did not. */
   failure = '';
   private writer: Writer | null = null;
   private packets = 0;

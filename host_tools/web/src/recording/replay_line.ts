@@ -192,7 +192,7 @@ export class Replay {
         }
         const { time_us } = this.next;
         if (!Number.isNaN(time_us)) {
-          // The first, or a fingertip that started anew while it was recorded.
+          // The first, or a fingertip that restarted while it was recorded.
           if (Number.isNaN(this.now_us) || time_us < this.now_us - 1e6) {
             this.first_us = time_us - this.seconds * 1e6;
             this.now_us = time_us;

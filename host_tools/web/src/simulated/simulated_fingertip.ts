@@ -159,7 +159,7 @@ export class SimulatedFingertip implements Line {
     this.act('setFriction', friction);
   }
 
-  /** Pulls the plug; with the next open it starts anew, with what it had kept. */
+  /** Pulls the plug; with the next open it restarts, with what it had kept. */
   unplug(): void {
     this.post({ kind: 'unplug' });
   }
@@ -189,7 +189,7 @@ export class SimulatedFingertip implements Line {
         break;
       case 'failed':
         this.opening?.failed(
-          new Error(`the simulated fingertip cannot start (${message.why}); load the page anew`),
+          new Error(`the simulated fingertip cannot start (${message.why}); load the page again`),
         );
         this.opening = null;
         break;

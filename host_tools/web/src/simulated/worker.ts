@@ -57,7 +57,7 @@ async function start(message: ToWorker & { kind: 'start' }): Promise<RealTime> {
 async function take(message: ToWorker): Promise<void> {
   if (message.kind === 'start') {
     fingertip = start(message);
-    // Told to whoever opens it.
+    // Sent to the page that opens it.
     fingertip.catch(() => {});
     return;
   }

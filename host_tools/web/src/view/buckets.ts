@@ -1,6 +1,6 @@
 /** The last minutes in as many intervals as a plot has room for: of each the lowest and the highest
  * value, so that no peak is lost. Only new frames are read from one drawing to the next; moving back
- * or another interval reads the span anew. */
+ * or another interval reads the span again. */
 import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
 import type { History } from '../model/history';
@@ -157,7 +157,7 @@ export class Buckets {
   }
 }
 
-/** A jump of more is a fingertip that started anew. */
+/** A jump of more is a fingertip that restarted. */
 const MOST_LOST = 1 << 24;
 
 /** Frames that are missing right before a row. */

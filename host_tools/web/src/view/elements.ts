@@ -30,7 +30,7 @@ export function button(
   return made;
 }
 
-/** Writes only what differs: a text that is set anew is laid out and read anew. */
+/** Writes only what differs: a text that is set again is laid out and read again. */
 export function write(node: Node, text: string): void {
   if (node.textContent !== text) {
     node.textContent = text;

@@ -19,7 +19,7 @@ const ENDS = [
   'hard fault',
   'panic',
   'watchdog',
-  'an exception that nobody handles',
+  'an exception without a handler',
   'stack overflow',
   'start-up gave up',
 ];

@@ -103,7 +103,7 @@ export class PadCard {
     return this.view?.draw(now_ms, palette) ?? false;
   }
 
-  /** Texts, which nobody reads at the rate of pictures. */
+  /** Texts, which cannot be read at the rate of pictures. */
   tell(): void {
     const { shown, contact } = this;
     write(this.name, shown.name);

@@ -272,7 +272,7 @@ export class PadGl {
       gl.drawElements(gl.TRIANGLES, this.grid.count, gl.UNSIGNED_SHORT, 0);
     }
 
-    /* What is told of the contact lies over all of it. */
+    /* The report of the contact lies over all of it. */
     gl.clear(gl.DEPTH_BUFFER_BIT);
     gl.disable(gl.DEPTH_TEST);
     this.drawMarks(this.over, camera);

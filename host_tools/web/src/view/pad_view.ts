@@ -24,7 +24,7 @@ const SLOW_ms = 36;
 const QUICK_ms = 25;
 const LOWER_AFTER_ms = 2000;
 const RAISE_AFTER_ms = 10_000;
-/** After so long without a picture nothing is told about how fast they come. */
+/** After so long without a picture their rate is not shown. */
 const PAUSE_ms = 400;
 /** What has not changed for so long is drawn once more, as sharp as can be. */
 const STILL_ms = 500;
@@ -171,7 +171,7 @@ export class PadView {
     return true;
   }
 
-  /** Fewer pixels where pictures come slowly, whoever is slow: drawing is over before it is done. */
+  /** Fewer pixels where pictures come slowly, whatever the reason: drawing is over before it is done. */
   private heed(now_ms: number, took_ms: number): void {
     if (took_ms > PAUSE_ms) {
       this.slow_ms = QUICK_ms;

@@ -111,7 +111,7 @@ export class Shown {
     return span_s > 0 ? (history.end - 1 - row) / span_s : 0;
   }
 
-  /** Whether what the newest frame told is still so. now_ms: performance.now(). */
+  /** Whether the newest frame's report still holds. now_ms: performance.now(). */
   isCurrent(now_ms: number): boolean {
     const { is_replay, state, heard_ms, contacts, raws } = this.fingertip;
     const told = contacts + raws > 0;

@@ -1,11 +1,11 @@
-/** What a reader of the screen is told, at a rate that one can listen to. */
+/** What a screen reader says, at a rate that one can listen to. */
 import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS, warningsOf } from '../model/flags';
 import type { ShownContact } from './shown';
 
 /** Between two sentences. */
 const PACE_ms = 2500;
-/** While nothing begins or ends a change of force below this share of it is not told. */
+/** While nothing begins or ends a change of force below this share of it is not said. */
 const NOTED_PART = 0.25;
 
 interface Told {
