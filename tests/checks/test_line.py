@@ -75,7 +75,7 @@ class Generator(unittest.TestCase):
         status, said = self.run_it()
         self.assertEqual(status, 0)
         changed = {each.split(":")[0] for each in said.splitlines()}
-        self.assertEqual(changed, {"firmware/wire/bodies.h", "firmware/wire/layouts.inc", "host_tools/library/libfingertip/line_fields.hpp",
+        self.assertEqual(changed, {"firmware/wire/bodies.h", "firmware/wire/layouts.inc", "host_tools/library/libfingertip/line_fields.hpp", "host_tools/library/libfingertip/line_values.hpp",
                                    "host_tools/python/fingertip/line.py", "host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg",
                                    "host_tools/web/src/line/line_facts.ts", PAGE})
         texts = {name: (self.root / name).read_text(encoding="utf-8") for name in changed}

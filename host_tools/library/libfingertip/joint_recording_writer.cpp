@@ -15,7 +15,14 @@ JointRecordingWriter::JointRecordingWriter(const std::string &path, bool replace
                                            const std::vector<wire_info> &infos,
                                            const Metadata &extra, std::int64_t host_zero_us,
                                            bool raw_expected, OutputFile::Appears appears)
-    : file_(make_lines(path, replace, appears)), host_zero_us_(host_zero_us) {
+    : JointRecordingWriter(make_lines(path, replace, appears), infos, extra, host_zero_us,
+                           raw_expected) {}
+
+JointRecordingWriter::JointRecordingWriter(std::unique_ptr<LineSink> file,
+                                           const std::vector<wire_info> &infos,
+                                           const Metadata &extra, std::int64_t host_zero_us,
+                                           bool raw_expected)
+    : file_(std::move(file)), host_zero_us_(host_zero_us) {
   std::string serials;
   for (std::size_t i = 0; i < infos.size(); i++) {
     if (infos[i].sensor_count != infos[0].sensor_count) {
@@ -26,7 +33,7 @@ JointRecordingWriter::JointRecordingWriter(const std::string &path, bool replace
     serials += " " + text_field(infos[i].serial);
     auto number = std::to_string(i);
     devices_.emplace_back(PacketLines(
-        path, infos[i].sensor_count, raw_expected,
+        file_->path(), infos[i].sensor_count, raw_expected,
         [this, number, i](const std::string &key, const std::string &value) {
           std::string text = "# " + number + "/" + key + ": " + value;
           if (head_written_) {

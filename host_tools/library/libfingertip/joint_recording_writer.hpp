@@ -22,6 +22,10 @@ public:
                        const Metadata &extra, std::int64_t host_zero_us, bool raw_expected,
                        OutputFile::Appears appears);
 
+  /* To other lines than those of a file. */
+  JointRecordingWriter(std::unique_ptr<LineSink> file, const std::vector<wire_info> &infos,
+                       const Metadata &extra, std::int64_t host_zero_us, bool raw_expected);
+
   /* host_us: its time on the recorder's clock. */
   void packet(std::size_t device, const wire_packet &packet, double host_us);
   void event(std::size_t device, const std::string &text);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <utility>
 
 namespace fingertip {
 
@@ -11,19 +12,25 @@ namespace {
 
 class TextLineSink : public LineSink {
 public:
-  TextLineSink(const std::string &path, bool replace, OutputFile::Appears appears)
-      : file_(path, replace, appears) {}
+  explicit TextLineSink(std::unique_ptr<ByteSink> file) : file_(std::move(file)) {}
 
   void line(const std::string &text) override { torn_line(text + "\n"); }
-  void torn_line(const std::string &text) override { file_.append(text.data(), text.size()); }
-  void finish() override { file_.finish(); }
-  const std::string &path() const override { return file_.path(); }
+  void torn_line(const std::string &text) override { file_->append(text.data(), text.size()); }
+  void finish() override { file_->finish(); }
+  const std::string &path() const override { return file_->path(); }
 
 private:
-  OutputFile file_;
+  std::unique_ptr<ByteSink> file_;
 };
 
 } // namespace
+
+std::unique_ptr<LineSink> make_lines(std::unique_ptr<ByteSink> bytes, bool as_mcap) {
+  if (as_mcap) {
+    return std::make_unique<McapLineSink>(std::move(bytes));
+  }
+  return std::make_unique<TextLineSink>(std::move(bytes));
+}
 
 bool is_mcap_name(const std::string &path) {
   std::string end = path.substr(path.size() - std::min<std::size_t>(path.size(), 5));
@@ -34,10 +41,7 @@ bool is_mcap_name(const std::string &path) {
 
 std::unique_ptr<LineSink> make_lines(const std::string &path, bool replace,
                                      OutputFile::Appears appears) {
-  if (is_mcap_name(path)) {
-    return std::make_unique<McapLineSink>(path, replace, appears);
-  }
-  return std::make_unique<TextLineSink>(path, replace, appears);
+  return make_lines(std::make_unique<OutputFile>(path, replace, appears), is_mcap_name(path));
 }
 
 } // namespace fingertip

@@ -22,6 +22,9 @@ public:
   virtual const std::string &path() const = 0;
 };
 
+/* What the bytes of a CSV or an MCAP file go to. */
+std::unique_ptr<LineSink> make_lines(std::unique_ptr<ByteSink> bytes, bool as_mcap);
+
 bool is_mcap_name(const std::string &path);
 
 /* Throws Error as OutputFile does. */

@@ -1,19 +1,17 @@
 #include "libfingertip/mcap_reader.hpp"
 
-#include "libfingertip/error.hpp"
 #include "libfingertip/little_endian.hpp"
+#include "libfingertip/mcap_compression.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <zstd.h>
+#include <utility>
 
 namespace fingertip::mcap {
 
 namespace {
 
-/* Of a chunk, as little memory for a lie; others write up to some MB. */
-constexpr std::uint64_t CHUNK_MOST_bytes = 1 << 26;
+/* As little memory for a lie; others write chunks of up to some MB. */
+constexpr std::uint64_t RECORD_MOST_bytes = (1 << 26) + (1 << 16);
 
 /* The fields of a record's content. */
 class Fields {
@@ -42,31 +40,9 @@ private:
   std::string_view bytes_;
 };
 
-std::string unpacked(std::string_view packed, std::uint64_t size) {
-  if (size > CHUNK_MOST_bytes) {
-    throw Damage("a chunk of " + std::to_string(size) + " bytes");
-  }
-  unsigned long long told = ZSTD_getFrameContentSize(packed.data(), packed.size());
-  if (told != size && told != ZSTD_CONTENTSIZE_UNKNOWN) {
-    throw Damage("a chunk's length is wrong");
-  }
-  std::string bytes(size, '\0');
-  std::size_t length = ZSTD_decompress(bytes.data(), bytes.size(), packed.data(), packed.size());
-  if (ZSTD_isError(length) || length != size) {
-    throw Damage("a chunk cannot be unpacked");
-  }
-  return bytes;
-}
-
 } // namespace
 
-Reader::Reader(const std::string &path) : file_(path, std::ios::binary) {
-  file_.seekg(0, std::ios::end);
-  size_ = file_.tellg();
-  if (!file_) {
-    throw Error(ErrorCode::cannot_read, path + ": " + std::strerror(errno));
-  }
-}
+Reader::Reader(std::unique_ptr<ByteSource> bytes) : bytes_(std::move(bytes)) {}
 
 bool Reader::next(Message &message) {
   while (at_message_ == messages_.size()) {
@@ -78,7 +54,7 @@ bool Reader::next(Message &message) {
   return true;
 }
 
-/* False at the end. */
+/* False at the end. Changes nothing where the source throws. */
 bool Reader::read_record() {
   messages_.clear();
   at_message_ = 0;
@@ -86,11 +62,10 @@ bool Reader::read_record() {
   if (ended_) {
     return false;
   }
+  const auto at = static_cast<std::uint64_t>(record_);
+  const std::uint64_t size = bytes_->size(), left = size > at ? size - at : 0;
   char head[RECORD_HEAD_BYTES];
-  file_.clear();
-  file_.seekg(record_);
-  auto left = static_cast<std::uint64_t>(size_ - record_);
-  if (left < sizeof head || !file_.read(head, sizeof head)) {
+  if (left < sizeof head || bytes_->read(at, head, sizeof head) < sizeof head) {
     torn_ = left > 0; /* a killed writer leaves whole chunks */
     ended_ = true;
     return false;
@@ -101,24 +76,34 @@ bool Reader::read_record() {
     torn_ = ended_ = true;
     return false;
   }
-  next_ = record_ + static_cast<std::streamoff>(sizeof head + length);
+  const auto next = record_ + static_cast<std::streamoff>(sizeof head + length);
   if (opcode == DATA_END) {
+    next_ = next;
     ended_ = true;
     return false;
   }
-  if (opcode == SCHEMA || opcode == CHANNEL || opcode == MESSAGE || opcode == CHUNK) {
-    std::string content(length, '\0');
-    if (!file_.read(content.data(), static_cast<std::streamsize>(length))) {
-      throw Damage("byte " + std::to_string(record_) + ": it cannot be read");
+  if (opcode != SCHEMA && opcode != CHANNEL && opcode != MESSAGE && opcode != CHUNK) {
+    next_ = next;
+    return true;
+  }
+  if (length > RECORD_MOST_bytes) {
+    next_ = next;
+    record_ = next;
+    throw Damage("byte " + std::to_string(at) + ": a record of " + std::to_string(length) +
+                 " bytes");
+  }
+  std::string content(length, '\0');
+  const bool whole = bytes_->read(at + sizeof head, content.data(), content.size()) == length;
+  next_ = next;
+  try {
+    if (!whole) {
+      throw Damage("it cannot be read");
     }
-    try {
-      judge(opcode, content, 0);
-    } catch (const Damage &damage) {
-      messages_.clear();
-      const std::streamoff at = record_;
-      record_ = next_;
-      throw Damage("byte " + std::to_string(at) + ": " + damage.what());
-    }
+    judge(opcode, content, 0);
+  } catch (const Damage &damage) {
+    messages_.clear();
+    record_ = next_;
+    throw Damage("byte " + std::to_string(at) + ": " + damage.what());
   }
   return true;
 }
@@ -159,10 +144,7 @@ void Reader::read_chunk(std::string_view content) {
   auto crc = fields.get<std::uint32_t>();
   std::string_view compression = fields.text();
   std::string_view packed = fields.text<std::uint64_t>();
-  if (!compression.empty() && compression != "zstd") {
-    throw Damage("compression \"" + std::string(compression.substr(0, 20)) + "\" is unknown");
-  }
-  const std::string records = compression.empty() ? std::string(packed) : unpacked(packed, size);
+  const std::string records = unpacked(compression, packed, size);
   if (records.size() != size || (crc != 0 && crc_of(records) != crc)) {
     throw Damage("a chunk's CRC is wrong");
   }

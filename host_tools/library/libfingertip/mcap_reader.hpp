@@ -3,11 +3,13 @@
  */
 #pragma once
 
+#include "libfingertip/bytes.hpp"
 #include "libfingertip/mcap_records.hpp"
 
 #include <cstdint>
-#include <fstream>
+#include <ios>
 #include <map>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -33,8 +35,7 @@ public:
     std::size_t message = 0; /* that so many messages come before, of what begins there */
   };
 
-  /* Throws Error if it cannot be read. */
-  explicit Reader(const std::string &path);
+  explicit Reader(std::unique_ptr<ByteSource> bytes);
 
   /* False at the end. Throws Damage. */
   bool next(Message &message);
@@ -54,8 +55,7 @@ private:
   void read_chunk(std::string_view content);
   bool read_record();
 
-  std::ifstream file_;
-  std::streamoff size_ = 0;
+  std::unique_ptr<ByteSource> bytes_;
   std::streamoff record_ = sizeof MAGIC; /* the one whose messages wait */
   std::streamoff next_ = sizeof MAGIC;
   std::vector<Message> messages_;

@@ -150,9 +150,9 @@ void McapLineSink::LogClock::row(std::uint64_t t_us, std::optional<double> time_
                                             : -static_cast<double>(anchor_->device_us - t_us));
 }
 
-McapLineSink::McapLineSink(const std::string &path, bool replace, OutputFile::Appears appears)
-    : file_(path, replace, appears),
-      writer_([this](const std::string &bytes) { file_.append(bytes.data(), bytes.size()); },
+McapLineSink::McapLineSink(std::unique_ptr<ByteSink> file)
+    : file_(std::move(file)),
+      writer_([this](const std::string &bytes) { file_->append(bytes.data(), bytes.size()); },
               "ros2", "fingertip") {}
 
 void McapLineSink::line(const std::string &text) {
@@ -179,7 +179,7 @@ void McapLineSink::finish() {
     begin();
   }
   writer_.finish();
-  file_.finish();
+  file_->finish();
 }
 
 McapLineSink::Device *McapLineSink::device_of(std::string &key) {
@@ -384,7 +384,8 @@ bool McapLineSink::put_row(const std::string &text) {
   return true;
 }
 
-McapLineSource::McapLineSource(const std::string &path) : path_(path), reader_(path) {}
+McapLineSource::McapLineSource(std::string path, std::unique_ptr<ByteSource> bytes)
+    : path_(std::move(path)), reader_(std::move(bytes)) {}
 
 bool McapLineSource::next(Line &line) {
   mcap::Reader::Message message;

@@ -10,6 +10,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -19,13 +20,13 @@ namespace fingertip {
 
 class McapLineSink : public LineSink {
 public:
-  McapLineSink(const std::string &path, bool replace, OutputFile::Appears appears);
+  explicit McapLineSink(std::unique_ptr<ByteSink> file);
 
   /* Throws Error also for a line that is no text, which no message can hold. */
   void line(const std::string &text) override;
   void torn_line(const std::string &text) override;
   void finish() override;
-  const std::string &path() const override { return file_.path(); }
+  const std::string &path() const override { return file_->path(); }
 
 private:
   /* When a row was measured. */
@@ -65,7 +66,7 @@ private:
   /* The fingertip that a comment's key is about, whose number is taken off. */
   Device *device_of(std::string &key);
 
-  OutputFile file_;
+  std::unique_ptr<ByteSink> file_;
   mcap::Writer writer_;
   bool in_head_ = true; /* until the header line */
   std::vector<std::pair<std::string, bool>> head_;
@@ -81,8 +82,8 @@ private:
 
 class McapLineSource : public LineSource {
 public:
-  /* Throws Error if it cannot be read. */
-  explicit McapLineSource(const std::string &path);
+  /* path: for messages. */
+  McapLineSource(std::string path, std::unique_ptr<ByteSource> bytes);
 
   /* Throws Error also for another MCAP file. */
   bool next(Line &line) override;

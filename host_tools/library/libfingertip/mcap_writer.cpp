@@ -1,11 +1,10 @@
 #include "libfingertip/mcap_writer.hpp"
 
 #include "libfingertip/little_endian.hpp"
+#include "libfingertip/mcap_compression.hpp"
 #include "libfingertip/mcap_records.hpp"
 
 #include <algorithm>
-#include <stdexcept>
-#include <zstd.h>
 
 extern "C" {
 #include "common/crc32.h"
@@ -17,8 +16,6 @@ namespace {
 
 constexpr std::size_t CHUNK_bytes = 1 << 20;
 constexpr std::uint64_t CHUNK_ns = 1'000'000'000;
-constexpr int ZSTD_LEVEL = 3;
-constexpr const char *COMPRESSION = "zstd";
 
 void put_text(std::string &bytes, std::string_view text) {
   put_number(bytes, static_cast<std::uint32_t>(text.size()));
@@ -39,17 +36,6 @@ std::string record(Opcode opcode, std::string_view content) {
   put_number(bytes, std::uint64_t{content.size()});
   bytes += content;
   return bytes;
-}
-
-std::string compressed(const std::string &bytes) {
-  std::string packed(ZSTD_compressBound(bytes.size()), '\0');
-  std::size_t length =
-      ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), ZSTD_LEVEL);
-  if (ZSTD_isError(length)) {
-    throw std::runtime_error(std::string("zstd: ") + ZSTD_getErrorName(length));
-  }
-  packed.resize(length);
-  return packed;
 }
 
 std::string joined(const std::vector<std::string> &parts) {

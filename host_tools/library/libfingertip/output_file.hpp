@@ -2,6 +2,8 @@
  * being read. Errors are thrown as Error. */
 #pragma once
 
+#include "libfingertip/bytes.hpp"
+
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -15,7 +17,7 @@ void check_output(const std::string &path, bool replace);
 bool is_same_file(const std::string &a, const std::string &b);
 
 /* A file that holds nothing but complete appends, even when the disk is full. */
-class OutputFile {
+class OutputFile : public ByteSink {
 public:
   enum class Appears {
     at_once,           /* and grows: what was appended outlives a killed program */
@@ -25,15 +27,15 @@ public:
 
   /* replace: whether an existing file may go. Devices and pipes are written to at once. */
   OutputFile(const std::string &path, bool replace, Appears appears);
-  ~OutputFile();
+  ~OutputFile() override;
   OutputFile(const OutputFile &) = delete;
   OutputFile &operator=(const OutputFile &) = delete;
 
   /* On an error a file is cut back to its previous content. Output that is no longer read from
    * standard output is dropped without a message. */
-  void append(const void *bytes, std::size_t length);
-  void finish();
-  const std::string &path() const { return path_; }
+  void append(const void *bytes, std::size_t length) override;
+  void finish() override;
+  const std::string &path() const override { return path_; }
 
 private:
   std::string path_;

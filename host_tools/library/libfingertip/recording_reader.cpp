@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstring>
 #include <map>
+#include <utility>
 
 namespace fingertip {
 
@@ -41,7 +42,14 @@ std::string format_of(const std::string &path, const std::string &line) {
 
 RecordingReader::RecordingReader(const std::string &path, bool salvage, const std::string &device)
     : path_(path), salvage_(salvage), source_(open_lines(path)), wanted_(device) {
-  std::memset(&info_, 0, sizeof info_);
+  begin();
+}
+
+RecordingReader::RecordingReader(std::string path, bool salvage, std::unique_ptr<LineSource> lines)
+    : path_(std::move(path)), salvage_(salvage), source_(std::move(lines)), all_(true) {}
+
+/* Reads the first line. */
+void RecordingReader::begin() {
   LineSource::Line first;
   try {
     if (!source_->next(first)) {
@@ -52,7 +60,8 @@ RecordingReader::RecordingReader(const std::string &path, bool salvage, const st
     throw Error(damaged ? ErrorCode::damaged_head : error.code(), error.what());
   }
   line_number_ = 1;
-  joint_ = format_of(path, first.text) == FORMAT_OF_SEVERAL;
+  joint_ = format_of(path_, first.text) == FORMAT_OF_SEVERAL;
+  begun_ = true;
 }
 
 RecordingReader::~RecordingReader() = default;
@@ -60,6 +69,9 @@ RecordingReader::RecordingReader(RecordingReader &&) noexcept = default;
 RecordingReader &RecordingReader::operator=(RecordingReader &&) noexcept = default;
 
 std::optional<RecordingReader::Item> RecordingReader::next() {
+  if (!begun_) {
+    begin();
+  }
   while (items_.empty() && read_next()) {
   }
   if (items_.empty()) {
@@ -120,25 +132,24 @@ void RecordingReader::read_line(const std::string &text) {
   if (text[0] == '#') {
     read_comment(text);
   } else if (header_seen_ && joint_) {
-    auto mine = number_ + ",";
     std::size_t time = text.find(',');
     std::size_t rest = time == std::string::npos ? time : text.find(',', time + 1);
     if (rest == std::string::npos) {
       throw Damage{"neither a comment nor a row"};
     }
-    if (text.compare(0, mine.size(), mine) == 0) {
-      auto time_us = to_double(std::string_view(text).substr(mine.size(), rest - mine.size()));
+    if (auto device = device_of(std::string_view(text).substr(0, time))) {
+      auto time_us = to_double(std::string_view(text).substr(time + 1, rest - time - 1));
       if (!time_us) {
         throw Damage{"time_us is no number"};
       }
-      read_row(std::string_view(text).substr(rest + 1), time_us);
+      read_row(std::string_view(text).substr(rest + 1), *device, time_us);
     }
   } else if (header_seen_) {
-    read_row(text);
+    read_row(text, 0);
   } else {
     std::string text_of_one = text;
     if (joint_) {
-      if (text.rfind(JOINT_COLUMNS, 0) != 0 || number_.empty()) {
+      if (text.rfind(JOINT_COLUMNS, 0) != 0 || devices_ == 0) {
         throw Damage{"unknown header"};
       }
       text_of_one = text.substr(std::string(JOINT_COLUMNS).size());
@@ -153,16 +164,32 @@ void RecordingReader::read_line(const std::string &text) {
   }
 }
 
+/* Nothing for one that is not wanted. Throws Damage for one that is not in the file. */
+std::optional<std::uint32_t> RecordingReader::device_of(std::string_view number) const {
+  auto device = to_u64(number);
+  if (!device || *device >= devices_) {
+    if (all_) {
+      throw Damage{"there is no fingertip \"" + std::string(number) + "\""};
+    }
+    return std::nullopt;
+  }
+  const auto found = static_cast<std::uint32_t>(*device);
+  return all_ || found == number_ ? std::optional(found) : std::nullopt;
+}
+
 void RecordingReader::read_comment(const std::string &text) {
   std::size_t colon = text.find(": ");
   if (colon == std::string::npos) {
     throw Damage{"neither a comment \"# key: value\" nor a row"};
   }
   std::string key(trim(std::string_view(text).substr(1, colon - 1)));
+  std::uint32_t device = number_.value_or(0);
   if (std::size_t slash = key.find('/'); joint_ && slash != std::string::npos) {
-    if (key.compare(0, slash, number_) != 0) {
+    auto mine = device_of(std::string_view(key).substr(0, slash));
+    if (!mine) {
       return;
     }
+    device = *mine;
     key = key.substr(slash + 1);
     if (key == "end") {
       read_end(std::string_view(text).substr(colon + 2));
@@ -174,6 +201,8 @@ void RecordingReader::read_comment(const std::string &text) {
   }
   std::string value(text.substr(colon + 2));
   Item item{};
+  item.device = device;
+  wire_info &info = infos_[device];
   if (key == "packet") {
     std::map<std::string, std::string, std::less<>> pairs;
     auto words = split(value, ' ');
@@ -195,15 +224,15 @@ void RecordingReader::read_comment(const std::string &text) {
       item.packet.type = WIRE_ACK;
       visit_ack(reader, item.packet.body.ack);
     } else if (words[0] == PACKET_INFO) {
-      if (info_.sensor_count < 1 || info_.sensor_count > FT_MAX_SENSORS) {
+      if (info.sensor_count < 1 || info.sensor_count > FT_MAX_SENSORS) {
         throw Damage{"an info packet without \"# sensors:\" before it"};
       }
       item.packet.type = WIRE_INFO;
-      item.packet.body.info = info_;
-      if (!(info_.stored & WIRE_STORED_CALIBRATION)) {
+      item.packet.body.info = info;
+      if (!(info.stored & WIRE_STORED_CALIBRATION)) {
         item.packet.body.info.calibration = {};
       }
-      if (!(info_.stored & WIRE_STORED_PAD)) {
+      if (!(info.stored & WIRE_STORED_PAD)) {
         item.packet.body.info.pad = {};
       }
     } else {
@@ -220,7 +249,7 @@ void RecordingReader::read_comment(const std::string &text) {
       read_end(value);
     }
   } else {
-    read_info_field(key, value);
+    read_info_field(info, key, value);
   }
 }
 
@@ -238,7 +267,7 @@ void RecordingReader::read_end(std::string_view text) {
   end_statistics_ = statistics;
 }
 
-void RecordingReader::read_info_field(const std::string &key, const std::string &value) {
+void RecordingReader::read_info_field(wire_info &info, const std::string &key, const std::string &value) {
   auto copy_text = [&](char *field) {
     if (!std::all_of(value.begin(), value.end(), [](char c) { return c >= 0x20 && c <= 0x7E; })) {
       throw Damage{key + " is no printable ASCII"};
@@ -259,38 +288,38 @@ void RecordingReader::read_info_field(const std::string &key, const std::string 
     }
   };
   if (key == "serial") {
-    copy_text(info_.serial);
+    copy_text(info.serial);
   } else if (key == "board") {
-    copy_text(info_.board);
+    copy_text(info.board);
   } else if (key == "scene") {
-    copy_text(info_.scene);
+    copy_text(info.scene);
   } else if (key == "git") {
-    copy_text(info_.git_hash);
+    copy_text(info.git_hash);
   } else if (key == "firmware") {
     auto parts = split(value, '.');
     if (parts.size() != 3) {
       throw Damage{"firmware is \"" + value + "\""};
     }
     for (std::size_t i = 0; i < 3; i++) {
-      parse_cell(key, parts[i], info_.firmware_version[i]);
+      parse_cell(key, parts[i], info.firmware_version[i]);
     }
   } else if (key == "x_mm") {
-    read_list([&](std::size_t k) -> float & { return info_.x_mm[k]; });
+    read_list([&](std::size_t k) -> float & { return info.x_mm[k]; });
   } else if (key == "y_mm") {
-    read_list([&](std::size_t k) -> float & { return info_.y_mm[k]; });
+    read_list([&](std::size_t k) -> float & { return info.y_mm[k]; });
   } else {
     bool known = false;
     for (const SensorList &each : sensor_lists) {
       if (key == each.name) {
         known = true;
         read_list(
-            [&](std::size_t k) -> float & { return info_.calibration.sensors[k].*each.value; });
+            [&](std::size_t k) -> float & { return info.calibration.sensors[k].*each.value; });
       }
     }
     for (const PadList &each : pad_lists) {
       if (key == each.name) {
         known = true;
-        read_list([&](std::size_t j) -> float & { return each.value(info_.pad, j); }, each.terms);
+        read_list([&](std::size_t j) -> float & { return each.value(info.pad, j); }, each.terms);
       }
     }
     auto visit = [&](const std::string &name, auto &field) {
@@ -299,9 +328,9 @@ void RecordingReader::read_info_field(const std::string &key, const std::string 
         parse_cell(name, value, field);
       }
     };
-    visit_info(visit, info_);
-    visit_calibration(visit, info_.calibration);
-    visit_pad(visit, info_.pad);
+    visit_info(visit, info);
+    visit_calibration(visit, info.calibration);
+    visit_pad(visit, info.pad);
     if (!known && !header_seen_) {
       recorder_metadata_.emplace_back(key, value);
     }
@@ -309,11 +338,16 @@ void RecordingReader::read_info_field(const std::string &key, const std::string 
 }
 
 void RecordingReader::choose_device(const std::string &serials) {
-  auto all = split(serials, ' ');
+  auto all = split(trim(serials), ' ');
+  devices_ = all.size();
+  infos_.assign(devices_, wire_info{});
+  if (all_) {
+    return;
+  }
   for (std::size_t i = 0; i < all.size(); i++) {
     std::string serial(trim(all[i]));
     if (wanted_.empty() ? all.size() == 1 : is_same_serial(serial, wanted_)) {
-      number_ = std::to_string(i);
+      number_ = static_cast<std::uint32_t>(i);
       return;
     }
   }
@@ -325,17 +359,18 @@ void RecordingReader::choose_device(const std::string &serials) {
               path_ + ": no fingertip " + wanted_ + " in it, there are: " + names);
 }
 
-void RecordingReader::read_row(std::string_view text, std::optional<double> time_us) {
+void RecordingReader::read_row(std::string_view text, std::uint32_t device,
+                               std::optional<double> time_us) {
   RowPackets row = parse_row(text, sensor_count_, has_tangential_);
   for (const auto &packet : {row.contact, row.raw}) {
     if (packet) {
-      items_.push_back({Item::Kind::packet, *packet, "", time_us});
+      items_.push_back({Item::Kind::packet, *packet, "", time_us, device});
     }
   }
 }
 
 RecordingReader::Place RecordingReader::place() {
-  return {source_->place(), line_number_, skipped_lines_, header_seen_, has_end_, info_, items_};
+  return {source_->place(), line_number_, skipped_lines_, header_seen_, has_end_, infos_, items_};
 }
 
 void RecordingReader::go_to(const Place &place) {
@@ -344,7 +379,7 @@ void RecordingReader::go_to(const Place &place) {
   skipped_lines_ = place.skipped_lines;
   header_seen_ = place.header_seen;
   has_end_ = place.has_end;
-  info_ = place.info;
+  infos_ = place.infos;
   items_ = place.items;
 }
 

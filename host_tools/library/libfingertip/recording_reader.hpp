@@ -27,11 +27,15 @@ public:
     wire_packet packet;
     std::string event;
     std::optional<double> time_us = {}; /* of a joint recording's rows, on the recorder's clock */
+    std::uint32_t device = 0;           /* in a joint recording */
   };
 
   /* salvage: skip damaged lines and count them, instead of throwing Error with file and line.
    * device: the serial number of one of several fingertips; empty: the only one. */
   RecordingReader(const std::string &path, bool salvage, const std::string &device = "");
+  /* Of all fingertips, from other lines than those of a file. Nothing is read before next, and what
+   * the lines throw beside Error passes: next may then be called again. path: for messages. */
+  RecordingReader(std::string path, bool salvage, std::unique_ptr<LineSource> lines);
 
   ~RecordingReader();
   RecordingReader(RecordingReader &&) noexcept;
@@ -45,7 +49,7 @@ public:
     LineSource::Place in_file;
     std::uint64_t line_number = 0, skipped_lines = 0;
     bool header_seen = false, has_end = false;
-    wire_info info{};
+    std::vector<wire_info> infos;
     std::deque<Item> items;
   };
   Place place();
@@ -60,13 +64,16 @@ public:
   const Metadata &recorder_metadata() const { return recorder_metadata_; }
 
 private:
+  void begin();
   bool read_next();
   void read_line(const std::string &text);
   void read_comment(const std::string &text);
-  void read_row(std::string_view text, std::optional<double> time_us = {});
+  void read_row(std::string_view text, std::uint32_t device,
+                std::optional<double> time_us = {});
   void choose_device(const std::string &serials);
   void read_end(std::string_view text);
-  void read_info_field(const std::string &key, const std::string &value);
+  void read_info_field(wire_info &info, const std::string &key, const std::string &value);
+  std::optional<std::uint32_t> device_of(std::string_view number) const;
 
   std::string path_;
   bool salvage_;
@@ -80,9 +87,12 @@ private:
   std::uint8_t sensor_count_ = 0;
   bool has_tangential_ = true; /* its columns */
   bool joint_ = false;         /* of several fingertips */
-  std::string wanted_;         /* serial number */
-  std::string number_;         /* of the wanted one in a joint recording */
-  wire_info info_;
+  bool all_ = false;           /* of them are read */
+  bool begun_ = false;
+  std::string wanted_;                        /* serial number */
+  std::optional<std::uint32_t> number_;       /* of the wanted one in a joint recording */
+  std::size_t devices_ = 0;                   /* in a joint recording */
+  std::vector<wire_info> infos_{wire_info{}}; /* of each fingertip */
   std::deque<Item> items_;
 };
 

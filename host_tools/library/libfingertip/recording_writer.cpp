@@ -2,6 +2,8 @@
 
 #include "libfingertip/recording_fields.hpp"
 
+#include <utility>
+
 namespace fingertip {
 
 using namespace recording;
@@ -9,9 +11,15 @@ using namespace recording;
 RecordingWriter::RecordingWriter(const std::string &path, bool replace, const wire_info *info,
                                  std::uint8_t sensor_count, const Metadata &extra,
                                  bool raw_expected, OutputFile::Appears appears)
-    : file_(make_lines(path, replace, appears)),
+    : RecordingWriter(make_lines(path, replace, appears), info, sensor_count, extra, raw_expected) {
+}
+
+RecordingWriter::RecordingWriter(std::unique_ptr<LineSink> file, const wire_info *info,
+                                 std::uint8_t sensor_count, const Metadata &extra,
+                                 bool raw_expected)
+    : file_(std::move(file)),
       lines_(
-          path, sensor_count, raw_expected,
+          file_->path(), sensor_count, raw_expected,
           [this](const std::string &key, const std::string &value) {
             line("# " + key + ": " + value);
           },

@@ -19,6 +19,10 @@ public:
                   std::uint8_t sensor_count, const Metadata &extra, bool raw_expected,
                   OutputFile::Appears appears);
 
+  /* To other lines than those of a file. */
+  RecordingWriter(std::unique_ptr<LineSink> file, const wire_info *info, std::uint8_t sensor_count,
+                  const Metadata &extra, bool raw_expected);
+
   /* Throws Error if the disk is full, or a raw packet has another number of sensors. */
   void packet(const wire_packet &packet);
   void event(const std::string &text);

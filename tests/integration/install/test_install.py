@@ -17,7 +17,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 EXAMPLE = ROOT / "host_tools/library/libfingertip/example"
 TOOLS = argparse.Namespace()
 PATIENCE_s = 60
-PUBLIC = {"clock.hpp", "clock_fit.hpp", "command.hpp", "connection.hpp", "decoder.hpp", "device_loop.hpp", "discovery.hpp", "error.hpp", "line_source.hpp", "names.hpp",
+PUBLIC = {"clock.hpp", "clock_fit.hpp", "command.hpp", "connection.hpp", "decoder.hpp", "device_loop.hpp", "discovery.hpp", "error.hpp", "fingertip.h", "line_source.hpp", "names.hpp",
           "packet_fields.hpp", "packet_file.hpp", "recording_reader.hpp", "session.hpp", "transport.hpp", "wire.hpp",
           "common/calibration.h", "common/contact_flags.h", "common/crash.h", "common/limits.h", "common/pad_profile.h", "common/status.h",
           "wire/bodies.h", "wire/packet.h"}
@@ -110,13 +110,13 @@ class Install(unittest.TestCase):
         symbols = run("nm", "-DC", "--defined-only", self.library)
         ours = {part for name in re.findall(r"^\S+ [TDR] ((?:\w+::)*\w+)", symbols, re.M) for part in name.split("::")}
         for name in ("Session", "Decoder", "DeviceLoop", "PacketFile", "RecordingReader", "choose_way", "open_way", "find_usb",
-                     "command_stream", "osr_from_text", "flags_text", "warning_flags", "info_metadata", "wire_encode", "wire_decode"):
+                     "command_stream", "osr_from_text", "flags_text", "warning_flags", "info_metadata", "wire_encode", "wire_decode", "fingertip_decoder_feed", "fingertip_reader_next", "fingertip_writer_new"):
             self.assertIn(name, ours)
         for name in ("SerialTransport", "UsbTransport", "RecordingWriter", "ProgressBar", "OutputFile", "read_firmware", "printable"):
             self.assertNotIn(name, ours)
         # nothing that is declared to the public is missing
         declared = set()
-        for header in (self.prefix / "include/fingertip").glob("*.hpp"):
+        for header in (self.prefix / "include/fingertip").glob("*.h*"):
             text = re.sub(r"/\*.*?\*/", "", header.read_text(), flags=re.S)
             declared |= set(re.findall(r"^[\w:<>, &*]+?[ &*](\w+)\([^;{]*\)(?: const)?;", text, re.M))
         self.assertGreater(len(declared), 30)

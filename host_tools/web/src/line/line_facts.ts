@@ -229,6 +229,301 @@ export const HEALTH_KEYS = [
   'stack_free_bytes',
 ] as const;
 
+interface Header {
+  sequence: number;
+  /** Device time since start; in commands the host's own clock. */
+  t_us: number;
+}
+/** One judged frame. The header's time is the middle of the sensors' conversion. A quantity travels only under its VALID flag. Without it the encoder leaves it out and the decoder gives 0 (NaN in Python and in messages). */
+export interface Contact extends Header {
+  type: 0x01;
+  /** counts every frame since start, fitted or not */
+  frame: number;
+  /** flags of the frame, see below */
+  flags: number;
+  /** broadcast of the conversion command, and the sensors' conversion */
+  convert_us: number;
+  /** reading every sensor */
+  read_us: number;
+  /** the complete frame waits for the processor */
+  queue_us: number;
+  /** compensation, tare, gate */
+  condition_us: number;
+  /** the fit */
+  fit_us: number;
+  /** slip, and the flags of the result */
+  contact_us: number;
+  /** the sum of the six stages: from the first bus activity of the frame to the encoding of this packet */
+  total_us: number;
+  /** bitmap of the sensors that entered the fit */
+  sensors_used: number;
+  /** location across the strips, from the centre of the pad */
+  x_mm: number;
+  /** location along the strips */
+  y_mm: number;
+  /** peak of the fitted Gaussian */
+  p0_Pa: number;
+  /** standard deviation of the fitted Gaussian */
+  sigma_mm: number;
+  /** force scale times 2 pi p0 sigma^2, paper eq. (4); positive: pressing */
+  force_N: number;
+  /** root mean square of the residuals of the fit */
+  residual_rms_Pa: number;
+  /** predicted radial standard deviation of the location */
+  location_sd_mm: number;
+  /** predicted standard deviation of the force, with that of the force scale */
+  force_sd_N: number;
+  /** slip distance, paper eq. (7): from the mean location over the slip window */
+  slip_mm: number;
+  /** standard deviation of an elliptic Gaussian along x */
+  sigma_x_mm: number;
+  /** standard deviation of that along y */
+  sigma_y_mm: number;
+  /** of that Gaussian, -1 to 1; 0 unless it lies aslant */
+  width_correlation: number;
+  /** tangential load of the object on the rubber, along x */
+  qx_N: number;
+  /** tangential load along y */
+  qy_N: number;
+  /** predicted standard deviation of either, with those of the scales */
+  q_sd_N: number;
+  /** size of the tangential load over force_N */
+  tangential_ratio: number;
+  /** velocity of the contact along x */
+  vx_mm_s: number;
+  /** velocity of the contact along y */
+  vy_mm_s: number;
+}
+/** The readings of one frame, without the gains of a calibration. The header's time is that of the contact packet of the same frame number. */
+export interface Raw extends Header {
+  type: 0x02;
+  /** the same number as in the contact packet of this frame */
+  frame: number;
+  /** as in the contact packet; firmware without capability fit sets only CONTACT, TARED, HELD, SATURATED, SENSOR_MASKED, ZERO_DOUBTFUL and SENSOR_DOUBTFUL */
+  flags: number;
+  /** bitmap: the reading is a measurement; 0 in a held frame, whose readings are those of the frame before */
+  valid: number;
+  /** bitmap: the reading is above 1980 mbar, where the sensor's range ends, and does not enter the fit */
+  saturated: number;
+  /** bitmap: a measurement with a reason to doubt it; 0 in a held frame */
+  doubtful: number;
+  /** mean of the sensors, 0.01 degC; 0 until measured */
+  temperature_cC: number;
+  /** number of sensors, 1 to 32 */
+  sensor_count: number;
+  /** of each sensor: absolute pressure, and the tare that is subtracted before the fit; both in 1/1024 Pa */
+  pressure_Pa_q10: Float64Array;
+  /** of each sensor: absolute pressure, and the tare that is subtracted before the fit; both in 1/1024 Pa */
+  baseline_Pa_q10: Float64Array;
+}
+/** Identity, settings and stored data of a fingertip. Without its capability a field is 0 (None or NaN in Python). */
+export interface Info extends Header {
+  type: 0x03;
+  /** major, minor, patch */
+  firmware_version: Float64Array;
+  /** number of sensors, 1 to 32 */
+  sensor_count: number;
+  /** what the firmware can do, see below */
+  capabilities: number;
+  /** commit of the firmware; a final + means uncommitted changes */
+  git_hash: string;
+  /** name of the board */
+  board: string;
+  /** name of the scene */
+  scene: string;
+  /** 16 hexadecimal digits, the flash chip's unique id */
+  serial: string;
+  /** requested frame rate; 0: as fast as the sensors allow */
+  rate_mHz: number;
+  /** frame rate over the last second; 0 before */
+  measured_rate_mHz: number;
+  /** oversampling ratio, 256 to 8192 */
+  osr: number;
+  /** time between temperature conversions while the temperature changes; up to four times as long while it is constant */
+  temperature_interval_ms: number;
+  /** streams that are on */
+  streams: number;
+  /** iterations of the fit */
+  fit_iterations: number;
+  /** slip window */
+  slip_window_ms: number;
+  /** slip threshold */
+  slip_threshold_mm: number;
+  /** of a rectangular layout; 0 for a free one */
+  pitch_mm: number;
+  /** of each sensor: x and y, from the centre of the pad */
+  x_mm: Float64Array;
+  /** of each sensor: x and y, from the centre of the pad */
+  y_mm: Float64Array;
+  /** prior on sigma */
+  prior_sigma_mm: number;
+  /** its standard deviation; 0: there is no prior */
+  prior_width_mm: number;
+  /** UNCERTAIN is set where location_sd_mm is above it */
+  location_limit_mm: number;
+  /** what the fingertip keeps without power, see below */
+  stored: number;
+  /** date of the calibration, Unix time */
+  calibration_date_s: number;
+  /** placements that entered it */
+  calibration_placements: number;
+  /** force is this times 2 pi p0 sigma^2 */
+  force_scale: number;
+  /** its standard deviation */
+  force_scale_sd: number;
+  /** of each sensor: gain, and its relative standard deviation */
+  gain: Float64Array;
+  /** of each sensor: gain, and its relative standard deviation */
+  gain_sd: Float64Array;
+  /** of the rubber */
+  pad_thickness_mm: number;
+  /** of the rubber beyond the outer sensors; 0: not set */
+  pad_overhang_mm: number;
+  /** two normal terms: share and sd_mm of each */
+  pad_normal: Float64Array;
+  /** three tangential terms: moment_mm and sd_mm of each */
+  pad_tangential: Float64Array;
+  /** expected value of a contact's own spread */
+  pad_spread_mm2: number;
+  /** its standard deviation */
+  pad_spread_sd_mm2: number;
+  /** 2 pi p0 sigma^2 of a usual contact over its force */
+  pad_force_ratio: number;
+  /** tangential force is this times the profile's */
+  pad_tangential_scale: number;
+  /** its standard deviation */
+  pad_tangential_scale_sd: number;
+  /** effect of the pad's ends, three coefficients each: on the ratio along x */
+  pad_edge_ratio_x: Float64Array;
+  /** on the ratio along y */
+  pad_edge_ratio_y: Float64Array;
+  /** on the gain along x */
+  pad_edge_gain_x: Float64Array;
+  /** on the gain along y */
+  pad_edge_gain_y: Float64Array;
+  /** on the place, x */
+  pad_edge_place_x_mm: Float64Array;
+  /** on the place, y */
+  pad_edge_place_y_mm: Float64Array;
+  /** on the place by a load along x */
+  pad_edge_pull_x_mm: Float64Array;
+  /** on the place by a load along y */
+  pad_edge_pull_y_mm: Float64Array;
+  /** on the force */
+  pad_edge_force: Float64Array;
+  /** 1: the fingertip reports the load from the first touch on; 0: from zero */
+  pad_from_touch: number;
+}
+/** Counters since start, modulo 2^32, and present state. */
+export interface Health extends Header {
+  type: 0x04;
+  /** as in info */
+  capabilities: number;
+  /** since start */
+  uptime_s: number;
+  /** frames that were read from the array */
+  frames: number;
+  /** of these, with at least one sensor missing */
+  frames_incomplete: number;
+  /** of these, never fitted: the processor was behind */
+  frames_skipped: number;
+  /** handed to the USB queue */
+  packets_sent: number;
+  /** the queue was full: whole packets, and each leaves a gap in the sequence */
+  packets_dropped: number;
+  /** commands carried out */
+  commands_done: number;
+  /** commands that were unknown, out of range or damaged */
+  commands_rejected: number;
+  /** reads that a sensor did not acknowledge, or that broke off */
+  bus_nacks: number;
+  /** operations on the bus that did not end in time */
+  bus_timeouts: number;
+  /** nine clocks, and resets of multiplexers */
+  bus_recoveries: number;
+  /** conversions that had not finished, and those that are void after one of these or after a missed reading */
+  zero_readings: number;
+  /** readings left out: below zero, or a step that no other sensor shared */
+  implausible_readings: number;
+  /** bitmap: the sensor answered at the last attempt */
+  sensors_present: number;
+  /** bitmap: the PROM's CRC is wrong, and the sensor still streams; or the PROM is blank, and it does not */
+  sensors_prom_bad: number;
+  /** since power-on. Faults and panics end in one too. The command crash asks for the last */
+  watchdog_resets: number;
+  /** main loop without interrupts, over the last second */
+  cpu_busy_permille: number;
+  /** never touched since start */
+  stack_free_bytes: number;
+  /** frames in contact whose fit could not be solved */
+  fit_failures: number;
+}
+/** The answer to a command. */
+export interface Ack extends Header {
+  type: 0x05;
+  /** type of the command */
+  command: number;
+  /** result, see below */
+  result: number;
+  /** the command's own */
+  command_sequence: number;
+  /** time in the command's header, so that the host can relate the clocks */
+  host_time_us: number;
+}
+/** How the firmware last ended since power-on. If kind and all else is 0, it did not (firmware/common/crash.h explains the codes). */
+export interface Crash extends Header {
+  type: 0x06;
+  /** 0 none, 1 hard fault, 2 panic, 3 watchdog, 4 an unhandled exception, 5 stack overflow, 6 start-up gave up */
+  kind: number;
+  /** exception in which the code at pc ran: 0 main loop, 16 + n interrupt n */
+  exception: number;
+  /** exception that made the record; 0 for a panic */
+  vector: number;
+  /** activity of the main loop: 0 start, 1 rest, 2 commands, 3 readings, 4 condition, 5 fit, 6 contact, 7 packet, 8 health, 9 store */
+  activity: number;
+  /** parts without progress, for kind 3: bit 0 main loop, 1 scan, 2 USB, 3 interrupts */
+  stuck: number;
+  /** the last events, newest first: 0 none, 1 start, 2 command, 3 port closed, 4 bus asleep, 5 awake, 6 stored, 7 other sensors answer, 8 timeouts on the sensor bus, 9 frames skipped */
+  event_codes: Float64Array;
+  /** of these: type of the command; 1 if storing failed; number of timeouts or frames in a second */
+  event_details: Float64Array;
+  /** registers; all 0 if they could not be recorded */
+  r0: number;
+  r1: number;
+  r2: number;
+  r3: number;
+  r12: number;
+  lr: number;
+  pc: number;
+  xpsr: number;
+  sp: number;
+  /** ages of the events at the end, in 1024 us; they saturate */
+  event_ages_1024us: Float64Array;
+  /** time of the end, since the start before it */
+  end_us: number;
+}
+export type DevicePacket = Contact | Raw | Info | Health | Ack | Crash;
+/** What a command carries. */
+export type Command =
+  | { type: 0x80; streams: number; }
+  | { type: 0x81; force: number; }
+  | { type: 0x82; rate_mHz: number; }
+  | { type: 0x83; osr: number; }
+  | { type: 0x84; threshold_mm: number; window_ms: number; }
+  | { type: 0x85; }
+  | { type: 0x86; }
+  | { type: 0x8f; }
+  | { type: 0x87; magic: number; }
+  | { type: 0x88; sensor_count: number; calibration_date_s: number; calibration_placements: number; force_scale: number; force_scale_sd: number; gain: ArrayLike<number>; gain_sd: ArrayLike<number>; }
+  | { type: 0x89; }
+  | { type: 0x8a; keep: number; }
+  | { type: 0x8b; sigma_mm: number; width_mm: number; }
+  | { type: 0x8c; limit_mm: number; }
+  | { type: 0x8d; pad_thickness_mm: number; pad_overhang_mm: number; pad_normal: ArrayLike<number>; pad_tangential: ArrayLike<number>; pad_spread_mm2: number; pad_spread_sd_mm2: number; pad_force_ratio: number; pad_tangential_scale: number; pad_tangential_scale_sd: number; pad_edge_ratio_x: ArrayLike<number>; pad_edge_ratio_y: ArrayLike<number>; pad_edge_gain_x: ArrayLike<number>; pad_edge_gain_y: ArrayLike<number>; pad_edge_place_x_mm: ArrayLike<number>; pad_edge_place_y_mm: ArrayLike<number>; pad_edge_pull_x_mm: ArrayLike<number>; pad_edge_pull_y_mm: ArrayLike<number>; pad_edge_force: ArrayLike<number>; pad_from_touch: number; }
+  | { type: 0x8e; };
+/** The quantities of a contact that hold under a flag. */
+export type ContactField = keyof typeof CONTACT_FLAG;
+
 /** What people set, as they type it; in a packet a value is `per` times as much. */
 export const SETTINGS = [
   {
