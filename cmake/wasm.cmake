@@ -11,7 +11,8 @@ endif()
 
 set(wasm_dir ${CMAKE_SOURCE_DIR}/build/wasm)
 set(FINGERTIP_WEB_WASM_DIR ${CMAKE_BINARY_DIR}/host_tools/web/wasm)
-set(wasm_modules ${wasm_dir}/host_tools/web/wasm/simulated.wasm ${wasm_dir}/host_tools/web/wasm/judges.wasm)
+set(wasm_modules core simulated judges)
+list(TRANSFORM wasm_modules REPLACE "(.+)" "${wasm_dir}/host_tools/web/wasm/\\1.wasm")
 ExternalProject_Add(web_wasm_modules
   SOURCE_DIR ${CMAKE_SOURCE_DIR}
   BINARY_DIR ${wasm_dir}

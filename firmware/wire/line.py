@@ -115,10 +115,10 @@ class Line:
         return packet + packet // 254 + 2
 
     def quantities(self):
-        """Fields of contact that hold under a flag and are floats, in the order of the columns; how many of them are in recordings of before."""
+        """Fields of contact that hold under a flag and are floats, in the order of the columns."""
         contact = self.packets["contact"]
         first = [contact.field(name) for name in contact.columns if name != "sequence" and contact.field(name).kind == "f32"]
-        return first + [field for field in contact.fields if field.kind == "f32" and field not in first], len(first)
+        return first + [field for field in contact.fields if field.kind == "f32" and field not in first]
 
     def stages(self):
         return [field.name for field in self.packets["contact"].fields if field.group == "stages"]
@@ -556,31 +556,21 @@ def contact_msg(line):
 # ---- the page
 
 def line_facts_ts(line):
-    lines = [f"/** {SAYS}. */", "", f"export const WIRE_VERSION = {line.version};", f"export const MAX_SENSORS = {line.sensors_max};",
-             f"export const MAX_FRAME_BYTES = {line.longest_frame()};", f"export const LOADER_MAGIC = 0x{line.loader_magic:08x};", "", "export const PacketType = {"]
+    lines = [f"/** {SAYS}. */", "", f"export const WIRE_VERSION = {line.version};",
+             f"export const LOADER_MAGIC = 0x{line.loader_magic:08x};", "", "export const PacketType = {"]
     lines += [f"  {body.name.upper()}: 0x{body.type:02x}," for body in line.packets.values()]
     lines += [f"  CMD_{body.name.upper()}: 0x{body.type:02x}," for body in line.commands.values()] + ["} as const;", ""]
     for doc, name, entries in (("Bits of the stream mask.", "Stream", line.streams), ("What a firmware can do.", "Capability", line.capabilities),
                                ("What a fingertip keeps without power.", "Stored", line.stored), ("What a frame says about itself.", "Flag", line.flags)):
         lines += [f"/** {doc} */", f"export const {name} = {{", *(f"  {each['name']}: 1 << {each['bit']}," for each in entries), "} as const;"]
     lines += ["/** What an acknowledgement says. */", "export const Result = {", *(f"  {each['name']}: {each['number']}," for each in line.results), "} as const;", ""]
-    words = "export const {}: readonly (readonly [number, string])[] = ["
-    for name, kind, entries in (("CAPABILITY_WORDS", "Capability", line.capabilities), ("STORED_WORDS", "Stored", line.stored),
-                                ("RESULT_WORDS", "Result", line.results)):
-        lines += [words.format(name), *(f"  [{kind}.{each['name']}, '{each['word']}']," for each in entries), "];"]
-    lines += [words.format("COMMAND_WORDS"), *(f"  [PacketType.CMD_{body.name.upper()}, '{body.word}']," for body in line.commands.values()), "];", ""]
     lines += ["/** Those of state, then the warnings. warning: the numbers deserve less trust. */",
               "export const FLAGS: readonly { bit: number; name: keyof typeof Flag; warning: boolean; meaning: string }[] = ["]
     for flag in sorted(line.flags, key=lambda flag: bool(flag.get("warning"))):
         lines.append(f"  {{ bit: Flag.{flag['name']}, name: '{flag['name']}', warning: {'true' if flag.get('warning') else 'false'}, meaning: {ts_text(flag.get('plain', flag['text']))} }},")
-    quantities, first = line.quantities()
     lines += ["];", "", "/** The quantities of a contact that hold under a flag, in the order of a recording's columns, and that flag. */", "export const CONTACT_FLAG = {",
-              *(f"  {field.name}: Flag.{field.when[1]}," for field in quantities), "} as const;",
-              "/** So many of them come before the stages; the others are not in recordings of before. */", f"export const FIRST_FIELDS_COUNT = {first};", ""]
-    health = line.packets["health"]
-    for name, entries in (("STAGES", line.stages()), ("HEALTH_WORDS", [field.name for field in health.fields if field.kind == "u32" and not field.when]),
-                          ("HEALTH_KEYS", health.keys)):
-        lines += [f"export const {name} = [", *(f"  '{entry}'," for entry in entries), "] as const;"]
+              *(f"  {field.name}: Flag.{field.when[1]}," for field in line.quantities()), "} as const;",
+              "export type ContactField = keyof typeof CONTACT_FLAG;", "export const CONTACT_FIELDS = Object.keys(CONTACT_FLAG) as ContactField[];"]
     return [*lines, "", *ts_packets(line), *line_settings.page_settings(line, ts_text)]
 
 
@@ -600,8 +590,7 @@ def ts_packets(line):
             lines += [f"  /** {value.text} */"] * bool(value.text) + [f"  {value.name}: {type_of(value, 'Float64Array')};"]
         lines.append("}")
     return [*lines, f"export type DevicePacket = {' | '.join(body.name.capitalize() for body in line.packets.values())};",
-            "/** What a command carries. */", "export type Command =", *commands[:-1], commands[-1] + ";",
-            "/** The quantities of a contact that hold under a flag. */", "export type ContactField = keyof typeof CONTACT_FLAG;"]
+            "/** What a command carries. */", "export type Command =", *commands[:-1], commands[-1] + ";"]
 
 
 def ts_text(text):

@@ -1,6 +1,7 @@
 #include "libfingertip/connection.hpp"
 
 #include "libfingertip/error.hpp"
+#include "libfingertip/packet_fields.hpp"
 #include "libfingertip/serial_transport.hpp"
 #include "libfingertip/share_socket.hpp"
 #include "libfingertip/usb_transport.hpp"

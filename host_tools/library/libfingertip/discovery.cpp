@@ -7,7 +7,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <strings.h>
 
 namespace fingertip {
 
@@ -93,10 +92,6 @@ std::string stable_port(const std::string &path, const std::string &root) {
   return fs::exists(path, none) && fs::path(path).parent_path() == fs::path(root) / "dev"
              ? stable_path(path, root)
              : path;
-}
-
-bool is_same_serial(const std::string &a, const std::string &b) {
-  return strcasecmp(a.c_str(), b.c_str()) == 0;
 }
 
 } // namespace fingertip

@@ -32,8 +32,5 @@ std::vector<Found> find_in_environment();
 /* The stable name of a device below /dev, or the path itself. */
 std::string stable_port(const std::string &path, const std::string &root = "/");
 
-/* Serial numbers are hexadecimal digits; people type either case. */
-bool is_same_serial(const std::string &a, const std::string &b);
-
 } // namespace fingertip
 #pragma GCC visibility pop

@@ -139,8 +139,10 @@ enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader,
                                             size_t size, size_t *count);
 const char *fingertip_reader_event(const struct fingertip_reader *reader);
 
-/* Whether its last line was seen, without which its recorder was killed or its disk was full; 1 at
- * the end of a capture. */
+/* 1: a capture of the line, no recording. */
+int fingertip_reader_is_capture(const struct fingertip_reader *reader);
+/* Whether the last line of a recording was seen, without which its recorder was killed or its disk was
+ * full; 1 at the end of a capture. */
 int fingertip_reader_has_end(const struct fingertip_reader *reader);
 /* Lines that were skipped, and in a capture what its packets tell. */
 uint64_t fingertip_reader_skipped(const struct fingertip_reader *reader);

@@ -313,6 +313,10 @@ const char *fingertip_reader_event(const struct fingertip_reader *reader) {
   return reader->event.c_str();
 }
 
+int fingertip_reader_is_capture(const struct fingertip_reader *reader) {
+  return reader->known && !reader->recording;
+}
+
 int fingertip_reader_has_end(const struct fingertip_reader *reader) {
   return reader->recording ? reader->recording->has_end() : reader->ended;
 }

@@ -3,6 +3,7 @@
 #include "libfingertip/recording_fields.hpp"
 
 #include <cstring>
+#include <strings.h>
 
 namespace fingertip {
 
@@ -22,6 +23,10 @@ template <typename ValueOf> std::string list_text(ValueOf value_of, std::size_t 
 
 std::string text_field(const char *field) {
   return std::string(field, strnlen(field, WIRE_TEXT_BYTES));
+}
+
+bool is_same_serial(const std::string &a, const std::string &b) {
+  return strcasecmp(a.c_str(), b.c_str()) == 0;
 }
 
 Metadata info_metadata(const wire_info &info) {

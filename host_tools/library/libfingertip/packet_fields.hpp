@@ -16,6 +16,9 @@ using Metadata = std::vector<std::pair<std::string, std::string>>;
 /* Of a field that is padded with zeros, if there is room. */
 std::string text_field(const char *field);
 
+/* Serial numbers are hexadecimal digits; people type either case. */
+bool is_same_serial(const std::string &a, const std::string &b);
+
 /* The scalar fields of an info packet, the sensor positions, and the calibration and the pad's
  * profile where there are any. */
 Metadata info_metadata(const wire_info &info);

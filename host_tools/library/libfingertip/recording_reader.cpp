@@ -1,6 +1,5 @@
 #include "libfingertip/recording_reader.hpp"
 
-#include "libfingertip/discovery.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/recording_fields.hpp"
 #include "libfingertip/text.hpp"

@@ -3,6 +3,7 @@
 #include "libfingertip/clock.hpp"
 #include "libfingertip/discovery.hpp"
 #include "libfingertip/error.hpp"
+#include "libfingertip/packet_fields.hpp"
 
 #include <algorithm>
 #include <array>

@@ -7,6 +7,7 @@
  *   pictures    drawn since the page was loaded
  *   ready_ms    performance.now() when the first was drawn; 0 before
  */
+import { loadCore } from './core';
 import type { Fingertip } from './model/fingertip';
 import { App } from './steps/app';
 import { fingertipControls, pageControls } from './steps/toolbar';
@@ -22,6 +23,8 @@ declare global {
   var fingertip: Console;
 }
 
+const library = await fetch(new URL('wasm/core.wasm', document.baseURI));
+await loadCore(await library.arrayBuffer());
 const app = new App();
 const view = mountView(document.body, app.bench, {
   page: pageControls(app),

@@ -10,7 +10,8 @@ export interface WasmModule {
   call(name: string, ...values: number[]): number;
   bytes(at: number, length: number): Uint8Array;
   floats(at: number, length: number): Float32Array;
+  words(at: number, length: number): Uint32Array;
   doubles(at: number, length: number): Float64Array;
 }
 
-export function start(module: WebAssembly.Module): Promise<WasmModule>;
+export function start(module: WebAssembly.Module, unpack?: (packed: Uint8Array, size: number) => Uint8Array): Promise<WasmModule>;

@@ -1,6 +1,6 @@
 // The page's WebAssembly modules, in the browser and in node: what they import, and errors.
 
-/** What C++ threw, or what a library wrote before it gave up. The message is for people. */
+/** What C++ threw and nothing caught, or what a library wrote before it gave up. The message is for people. */
 export class WasmError extends Error {}
 
 /** The firmware ended itself, for its loader or in a panic; the module cannot be run again. */
@@ -12,20 +12,28 @@ export class FirmwareLeft extends Error {
 }
 FirmwareLeft.LOADER = 1; // enum native_end
 
-/** An instance of a compiled module: its exports, ready to be called. */
-export async function start(module) {
+/** An instance of a compiled module: its exports, ready to be called. unpack: what core.wasm wants. */
+export async function start(module, unpack = null) {
   let exports;
   let written = '';
   const memory = () => new DataView(exports.memory.buffer);
-  const text = (at, length) =>
-    new TextDecoder().decode(new Uint8Array(exports.memory.buffer, at, length));
+  const textAt = (at) => {
+    const bytes = new Uint8Array(exports.memory.buffer, at);
+    return new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0)));
+  };
   const imports = {
     fingertip: {
       leave(how) {
         throw new FirmwareLeft(how);
       },
-      thrown(at, length) {
-        throw new WasmError(text(at, length));
+      unpack(at, length, to, size) {
+        try {
+          const bytes = unpack(new Uint8Array(exports.memory.buffer, at, length), size);
+          new Uint8Array(exports.memory.buffer, to, size).set(bytes);
+          return bytes.length === size ? 1 : 0;
+        } catch {
+          return 0;
+        }
       },
     },
     wasi_snapshot_preview1: {
@@ -34,7 +42,8 @@ export async function start(module) {
         let bytes = 0;
         for (let i = 0; i < count; i++) {
           const length = memory().getUint32(vectors + 8 * i + 4, true);
-          written = (written + text(memory().getUint32(vectors + 8 * i, true), length)).slice(-400);
+          const words = new Uint8Array(exports.memory.buffer, memory().getUint32(vectors + 8 * i, true), length);
+          written = (written + new TextDecoder().decode(words)).slice(-400);
           bytes += length;
         }
         memory().setUint32(total, bytes, true);
@@ -57,6 +66,9 @@ export async function start(module) {
       return exports[name](...values);
     } catch (error) {
       exports.__stack_pointer.value = stack;
+      if (error instanceof WebAssembly.Exception) {
+        throw new WasmError(textAt(exports.thrown_text()));
+      }
       throw error instanceof WebAssembly.RuntimeError && written ? new WasmError(written) : error;
     }
   };
@@ -66,6 +78,7 @@ export async function start(module) {
     /** Views of the memory; a call may move it, so they are good until the next one. */
     bytes: (at, length) => new Uint8Array(exports.memory.buffer, at, length),
     floats: (at, length) => new Float32Array(exports.memory.buffer, at, length),
+    words: (at, length) => new Uint32Array(exports.memory.buffer, at, length),
     doubles: (at, length) => new Float64Array(exports.memory.buffer, at, length),
   };
 }

@@ -1,23 +1,43 @@
 // libfingertip/text.hpp's numbers for the page: libc++ 14 has no std::from_chars of floats, and its
-// std::to_chars of floats needs a hundred kilobytes of tables.
+// std::to_chars of so many digits needs a hundred kilobytes of tables.
 #include "libfingertip/text.hpp"
 
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 
 namespace fingertip {
 
-std::string shortest(float value) {
-  constexpr int DIGITS_MOST = 9;
-  char text[32];
-  for (int digits = 1; digits <= DIGITS_MOST; digits++) {
-    (void)std::snprintf(text, sizeof text, "%.*g", digits, static_cast<double>(value));
-    if (std::strtof(text, nullptr) == value) {
-      break;
-    }
+namespace {
+
+// strtod takes more than std::from_chars does: blanks, "+", hexadecimal.
+template <typename Number>
+std::optional<Number> parsed(std::string_view text, Number (*convert)(const char *, char **)) {
+  if (text.empty() || text.find_first_not_of("0123456789.eE+-") != std::string_view::npos ||
+      text[0] == '+') {
+    return std::nullopt;
   }
-  return text;
+  const std::string copy(text);
+  char *end = nullptr;
+  const Number value = convert(copy.c_str(), &end);
+  return end == copy.c_str() + copy.size() && std::isfinite(value) ? std::optional(value)
+                                                                   : std::nullopt;
+}
+
+template <typename Integer> std::optional<Integer> whole(std::string_view text) {
+  Integer value{};
+  const char *end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, value);
+  return !text.empty() && result.ec == std::errc() && result.ptr == end ? std::optional(value)
+                                                                        : std::nullopt;
+}
+
+} // namespace
+
+std::string shortest(float value) {
+  char text[32];
+  return std::string(text, std::to_chars(text, text + sizeof text, value).ptr);
 }
 
 std::string fixed(double value, int digits) {
@@ -27,16 +47,16 @@ std::string fixed(double value, int digits) {
 }
 
 std::optional<double> to_double(std::string_view text) {
-  // strtod takes more than std::from_chars does: blanks, "+", hexadecimal.
-  if (text.empty() || text.find_first_not_of("0123456789.eE+-") != std::string_view::npos ||
-      text[0] == '+') {
-    return std::nullopt;
-  }
-  const std::string copy(text);
-  char *end = nullptr;
-  const double value = std::strtod(copy.c_str(), &end);
-  return end == copy.c_str() + copy.size() && std::isfinite(value) ? std::optional(value)
-                                                                   : std::nullopt;
+  return parsed<double>(text, std::strtod);
+}
+std::optional<float> to_float(std::string_view text) {
+  return parsed<float>(text, std::strtof);
+}
+std::optional<std::uint64_t> to_u64(std::string_view text) {
+  return whole<std::uint64_t>(text);
+}
+std::optional<std::int64_t> to_i64(std::string_view text) {
+  return whole<std::int64_t>(text);
 }
 
 } // namespace fingertip

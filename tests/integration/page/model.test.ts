@@ -1,35 +1,31 @@
 /** A fingertip's model over a line that the test speaks on: answers, refusals, losses, going and coming back; history; clocks. */
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { ClockFit } from '../../../host_tools/web/src/line/clock_fit';
 import type { Line } from '../../../host_tools/web/src/line/line';
-import { cobsDecode, cobsEncode, crc32 } from '../../../host_tools/web/src/line/framing';
 import {
   Flag,
   PacketType,
   Result,
   Stream,
-  blank,
-  encodePacket,
   type Contact,
   type DevicePacket,
   type Info,
   type Raw,
-} from '../../../host_tools/web/src/line/packets';
+} from '../../../host_tools/web/src/line/line_facts';
 import { Bench } from '../../../host_tools/web/src/model/bench';
 import { CommandError, Fingertip, OtherFingertip } from '../../../host_tools/web/src/model/fingertip';
-import { FLAGS, WARNING_FLAGS, flagsText } from '../../../host_tools/web/src/model/flags';
+import { FLAGS, WARNING_FLAGS } from '../../../host_tools/web/src/model/flags';
 import { History } from '../../../host_tools/web/src/model/history';
 import { commandsFor } from '../../../host_tools/web/src/steps/settings';
-import { Decoder } from '../../../host_tools/web/src/line/decoder';
-import { vector } from './vectors';
+import { core } from './library';
+import { cobsDecode, cobsEncode, vector } from './vectors';
 
 function contactOf(frame: number, t_us: number, more: Partial<Contact> = {}): Contact {
-  return { ...(blank(PacketType.CONTACT) as unknown as Contact), frame, t_us, ...more };
+  return { ...(core.blank(PacketType.CONTACT) as unknown as Contact), frame, t_us, ...more };
 }
 
 function rawOf(frame: number, t_us: number, above_Pa: number[], more: Partial<Raw> = {}): Raw {
-  const raw = { ...(blank(PacketType.RAW) as unknown as Raw), frame, t_us, valid: 2 ** above_Pa.length - 1, ...more };
+  const raw = { ...(core.blank(PacketType.RAW) as unknown as Raw), frame, t_us, valid: 2 ** above_Pa.length - 1, ...more };
   raw.sensor_count = above_Pa.length;
   above_Pa.forEach((value, k) => {
     raw.pressure_Pa_q10[k] = (100_000 + value) * 1024;
@@ -68,23 +64,22 @@ class SpokenLine implements Line {
   say(packet: object & { type: number }): void {
     this.device_us += 100;
     this.receive(
-      encodePacket({ t_us: this.device_us, ...packet, sequence: this.sequence++ & 0xffff }),
+      core.encode({ t_us: this.device_us, ...packet, sequence: this.sequence++ & 0xffff }),
       performance.now(),
     );
   }
 
   send(frame: Uint8Array): Promise<void> {
-    const packet = new Uint8Array(1024);
-    const length = cobsDecode(frame, 0, frame.length - 1, packet);
+    const packet = cobsDecode(frame);
     const view = new DataView(packet.buffer);
-    assert.equal(crc32(packet, length - 4), view.getUint32(length - 4, true));
+    assert.equal(core.crc32(packet.subarray(0, -4)), view.getUint32(packet.length - 4, true));
     if (packet[0] !== this.version) {
       return Promise.resolve();
     }
     if (this.version !== 5) {
       const answer = vector('health').packet.slice();
       answer[0] = this.version;
-      new DataView(answer.buffer).setUint32(answer.length - 4, crc32(answer, answer.length - 4), true);
+      new DataView(answer.buffer).setUint32(answer.length - 4, core.crc32(answer.subarray(0, -4)), true);
       this.receive(cobsEncode(answer), performance.now());
       return Promise.resolve();
     }
@@ -109,10 +104,10 @@ class SpokenLine implements Line {
         command,
         result,
         command_sequence: view.getUint16(2, true),
-        host_time_us: view.getBigUint64(4, true),
+        host_time_us: Number(view.getBigUint64(4, true)),
       });
       if (name) {
-        const decoder = new Decoder();
+        const decoder = core.newDecoder();
         decoder.feed(Uint8Array.of(0), () => undefined);
         decoder.feed(vector(name).frame, (answer: DevicePacket) =>
           this.say({ ...answer, t_us: this.device_us, ...(this.serial && { serial: this.serial }) }),
@@ -253,7 +248,7 @@ test('history: a raw packet without its contact packet has a row of its own', ()
 });
 
 test('clocks: right within what it says, whatever the delays', () => {
-  const fit = new ClockFit();
+  const fit = core.newClockFit();
   const drift = 60e-6;
   let state = 7;
   const random = (): number => (state = (state * 48271) % 2147483647) / 2147483647;
@@ -280,7 +275,7 @@ test('clocks: right within what it says, whatever the delays', () => {
 test('flags: every one has words; warnings are those of the tool', () => {
   assert.equal(FLAGS.length, Object.keys(Flag).length);
   assert.equal(WARNING_FLAGS, 524032);
-  assert.equal(flagsText(Flag.CONTACT | Flag.UNCERTAIN | (1 << 30)), 'CONTACT UNCERTAIN bit30');
+  assert.equal(core.flagsText(Flag.CONTACT | Flag.UNCERTAIN | (1 << 30)), 'CONTACT UNCERTAIN bit30');
 });
 
 test('the bench tells who comes and goes', () => {
@@ -298,7 +293,7 @@ test('the bench tells who comes and goes', () => {
 
 test('settings: commands for what differs, refusals with the range', () => {
   let info: Info | null = null;
-  const decoder = new Decoder();
+  const decoder = core.newDecoder();
   decoder.feed(Uint8Array.of(0), () => undefined);
   decoder.feed(vector('info_grasp').frame, (packet) => (info = packet as Info));
   const now = { rate: '20', osr: '1024', slip_threshold: '0.75', slip_window: '100', prior: '3.125:0.5', limit: '0.625' };

@@ -8,27 +8,20 @@ import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import test from 'node:test';
-import { Decoder } from '../../../host_tools/web/src/line/decoder';
 import {
   CONTACT_FIELDS,
   Flag,
   PacketType,
-  STAGES,
-  blank,
-  encodePacket,
   type Contact,
   type DevicePacket,
   type Info,
   type Raw,
-} from '../../../host_tools/web/src/line/packets';
-import { CsvSink } from '../../../host_tools/web/src/recording/csv_sink';
-import type { Pairs } from '../../../host_tools/web/src/recording/fields';
-import { PacketLines } from '../../../host_tools/web/src/recording/lines';
-import { McapSink } from '../../../host_tools/web/src/recording/mcap_sink';
-import { ReadError, readItems } from '../../../host_tools/web/src/recording/reader';
-import { contactMessage, decodeContact } from '../../../host_tools/web/src/recording/ros_messages';
-import { shortest } from '../../../host_tools/web/src/recording/text';
+} from '../../../host_tools/web/src/line/line_facts';
+import { ReadError, readItems } from '../../../host_tools/web/src/recording/replay_line';
+import { core } from './library';
 import { vector } from './vectors';
+
+const STAGES = ['convert_us', 'read_us', 'queue_us', 'condition_us', 'fit_us', 'contact_us', 'total_us'] as const;
 
 const tool = process.env['FINGERTIP_TOOL'] ?? '';
 const folder = mkdtempSync(join(tmpdir(), 'fingertip-page-'));
@@ -56,7 +49,7 @@ function anyFloat(): number {
 
 function infoOf(name: string): Info {
   let info: Info | null = null;
-  const decoder = new Decoder();
+  const decoder = core.newDecoder();
   decoder.feed(Uint8Array.of(0), () => undefined);
   decoder.feed(vector(name).frame, (packet) => (info = packet as Info));
   return info!;
@@ -73,19 +66,19 @@ function session(): DevicePacket[] {
     const t_us = 1_000_000 + 765 * frame + (frame > 400 ? -300_000 : 0);
     const flags = (integer(2 ** 25) & (random() < 0.5 ? ~0 : ~VALID)) | (random() < 0.3 ? VALID : 0);
     if (random() < 0.95) {
-      const contact = blank(PacketType.CONTACT) as unknown as Contact;
+      const contact = core.blank(PacketType.CONTACT) as unknown as Contact;
       Object.assign(contact, { t_us, frame, flags: flags >>> 0, sequence: sequence++ & 0xffff });
       STAGES.forEach((stage) => (contact[stage] = integer(65536)));
       if (flags & Flag.FIT_VALID) {
         contact.sensors_used = integer(2 ** 32);
       }
-      const decoder = new Decoder(); // leaves out what has no flag
+      const decoder = core.newDecoder(); // leaves out what has no flag
       CONTACT_FIELDS.forEach((field) => (contact[field] = anyFloat()));
       decoder.feed(Uint8Array.of(0), () => undefined);
-      decoder.feed(encodePacket(contact), (packet) => packets.push({ ...packet } as Contact));
+      decoder.feed(core.encode(contact), (packet) => packets.push({ ...packet } as Contact));
     }
     if (random() < 0.95) {
-      const raw = blank(PacketType.RAW) as unknown as Raw;
+      const raw = core.blank(PacketType.RAW) as unknown as Raw;
       Object.assign(raw, {
         t_us,
         frame,
@@ -104,7 +97,7 @@ function session(): DevicePacket[] {
       packets.push(raw);
     }
     if (frame % 100 === 0) {
-      const health = blank(PacketType.HEALTH) as unknown as DevicePacket & Record<string, number>;
+      const health = core.blank(PacketType.HEALTH) as unknown as DevicePacket & Record<string, number>;
       Object.assign(health, { capabilities: 15, uptime_s: frame, sensors_present: 1, sensors_prom_bad: 2 });
       packets.push({ ...health, t_us, sequence: sequence++ & 0xffff } as DevicePacket);
     }
@@ -116,24 +109,25 @@ function session(): DevicePacket[] {
 }
 
 const packets = session();
-const EXTRA: Pairs = [
+const EXTRA: [string, string][] = [
   ['recorded_by', 'a test'],
   ['started_utc', '2026-08-05T12:00:00.125Z'],
 ];
 
-async function recorded(kind: 'csv' | 'mcap'): Promise<Uint8Array> {
+function recorded(kind: 'csv' | 'mcap'): Uint8Array {
   const parts: Uint8Array[] = [];
-  const sink = new (kind === 'csv' ? CsvSink : McapSink)({ write: (bytes) => parts.push(bytes) });
-  const [first, ...others] = packets;
-  const lines = new PacketLines(sink, first as Info, EXTRA);
-  others.forEach((packet, i) => {
-    lines.packet(packet);
-    if (i === 700) {
-      lines.event('gone 2026-08-05T12:00:01.000Z');
+  const writer = core.newWriter(kind, packets[0] as Info, EXTRA);
+  packets.forEach((packet, i) => {
+    writer.packet(packet);
+    if (i === 701) {
+      writer.event('gone 2026-08-05T12:00:01.000Z');
     }
   });
-  lines.finish({ packets: packets.length } as never, 'stopped');
-  await sink.finish();
+  writer.finish('stopped', { ...core.newDecoder().counts, packets: packets.length });
+  for (let bytes; (bytes = writer.take()); ) {
+    parts.push(bytes);
+  }
+  writer.free();
   return Buffer.concat(parts);
 }
 
@@ -158,7 +152,7 @@ async function problemOf(name: string, bytes: Uint8Array): Promise<[string, numb
   return ['', count];
 }
 
-const frames = (all: DevicePacket[]): Buffer => Buffer.concat(all.map((packet) => encodePacket(packet)));
+const frames = (all: DevicePacket[]): Buffer => Buffer.concat(all.map((packet) => core.encode(packet)));
 
 function convert(from: string, to: string): void {
   execFileSync(tool, ['convert', path(from), path(to), '--overwrite'], { stdio: 'pipe' });
@@ -183,14 +177,14 @@ test('floats are written as C++ writes them', () => {
     [1.17549435e-38, '1.1754944e-38'],
     [3.4028234663852886e38, '3.4028235e+38'],
   ] as const) {
-    assert.equal(shortest(Math.fround(value)), text);
+    assert.equal(core.shortest(Math.fround(value)), text);
   }
 });
 
 test("CSV: rows and comments are the tool's, byte by byte", async () => {
   writeFileSync(path('a.ftr'), frames(packets));
   convert('a.ftr', 'tool.csv');
-  const own = Buffer.from(await recorded('csv')).toString().split('\n');
+  const own = Buffer.from(recorded('csv')).toString().split('\n');
   // The tool says who converted; events are not in a capture; its end line counts its own reading.
   const plain = (lines: string[]): string[] =>
     lines.filter((line) => !/^# (recorded_by|started_utc|source|event|end):/.test(line));
@@ -198,14 +192,14 @@ test("CSV: rows and comments are the tool's, byte by byte", async () => {
 });
 
 test('CSV: the tool reads back every packet', async () => {
-  writeFileSync(path('own.csv'), await recorded('csv'));
+  writeFileSync(path('own.csv'), recorded('csv'));
   convert('own.csv', 'own.ftr');
   assert.deepEqual(readFileSync(path('own.ftr')), frames(packets));
 });
 
 test('MCAP: the tool makes the same CSV of it, and every message is that of the tool', async () => {
-  const csv = await recorded('csv');
-  writeFileSync(path('own.mcap'), await recorded('mcap'));
+  const csv = recorded('csv');
+  writeFileSync(path('own.mcap'), recorded('mcap'));
   convert('own.mcap', 'back.csv');
   assert.deepEqual(readFileSync(path('back.csv')), Buffer.from(csv));
 
@@ -253,17 +247,17 @@ test('MCAP: the tool makes the same CSV of it, and every message is that of the 
 
 test('what the page and the tool recorded is read back, packet by packet', async () => {
   const wanted = frames(packets);
-  const csv = await recorded('csv');
+  const csv = recorded('csv');
   writeFileSync(path('own.csv'), csv);
   convert('own.csv', 'tool.mcap');
   assert.deepEqual(frames(await itemsOf('own.csv', csv)), wanted);
-  assert.deepEqual(frames(await itemsOf('own.mcap', await recorded('mcap'))), wanted);
+  assert.deepEqual(frames(await itemsOf('own.mcap', recorded('mcap'))), wanted);
   assert.deepEqual(frames(await itemsOf('tool.mcap', readFileSync(path('tool.mcap')))), wanted);
   assert.deepEqual(frames(await itemsOf('a.ftr', wanted)), wanted);
 });
 
 test('recordings of several fingertips are read, each with its number', async () => {
-  const csv = Buffer.from(await recorded('csv')).toString().split('\n');
+  const csv = Buffer.from(recorded('csv')).toString().split('\n');
   const joint = ['# fingertip-recording 2', '# devices: A B'];
   for (const line of csv.slice(1)) {
     if (line.startsWith('# ')) {
@@ -287,26 +281,26 @@ test('recordings of several fingertips are read, each with its number', async ()
 });
 
 test('torn and foreign files: a sentence, and what came before', async () => {
-  const csv = Buffer.from(await recorded('csv'));
-  const mcap = Buffer.from(await recorded('mcap'));
+  const csv = Buffer.from(recorded('csv'));
+  const mcap = Buffer.from(recorded('mcap'));
   const lines = csv.toString().split('\n');
   const text = (all: string[]): Buffer => Buffer.from(all.join('\n'));
   const row = lines.findIndex((line) => line.startsWith('t_us')) + 20;
   for (const [name, bytes, words, some] of [
     ['empty.csv', Buffer.alloc(0), /is empty/, false],
     ['x.txt', Buffer.from('hello\n'), /neither a recording/, false],
-    ['torn.csv', csv.subarray(0, csv.length / 2), /line \d+: the last line is torn/, true],
+    ['torn.csv', csv.subarray(0, csv.length / 2), /:\d+: the last line is torn/, true],
     ['cut.csv', text([...lines.slice(0, row), '']), /no end line/, true],
     ['head.csv', text([...lines.slice(0, 5), '']), /no header line/, false],
     ['cell.csv', text(lines.map((line, i) => (i === row ? line.replace(/^\d+/, 'x') : line))), /t_us is "x"/, true],
     ['columns.csv', text(lines.map((line, i) => (i === row ? `${line},1` : line))), /columns where the header has/, true],
     ['range.csv', text(lines.map((line, i) => (i === row ? line.replace(/,\d+/, ',5000000000') : line))), /frame is out of range/, true],
-    ['later.csv', text(['# fingertip-recording 3', ...lines.slice(1)]), /later version/, false],
-    ['torn.mcap', mcap.subarray(0, mcap.length - 40), /breaks off/, true],
+    ['later.csv', text(['# fingertip-recording 3', ...lines.slice(1)]), /format "3" is unknown.*use the page of that version/, false],
+    ['torn.mcap', mcap.subarray(0, (2 * mcap.length) / 3), /the last chunk is torn/, true],
     ['begin.mcap', mcap.subarray(0, 1000), /breaks off before/, false],
     ['chunk.mcap', Buffer.from(mcap.map((byte, i) => (i === Math.floor(mcap.length / 2) ? byte ^ 1 : byte))), /chunk\.mcap: /, false],
     ['noise.ftr', Buffer.alloc(500), /holds no packet/, false],
-    ['damaged.ftr', Buffer.from(frames(packets).map((byte, i) => (i === 5000 ? byte ^ 2 || 3 : byte))), /damaged and left out/, true],
+    ['damaged.ftr', Buffer.from(frames(packets).map((byte, i) => (i === 5000 ? byte ^ 2 || 3 : byte))), /has 1 damaged packets, which are left out/, true],
   ] as const) {
     const [problem, count] = await problemOf(name, bytes);
     assert.match(problem, words, name);
@@ -315,20 +309,42 @@ test('torn and foreign files: a sentence, and what came before', async () => {
   }
 });
 
-test('a message that says what its flags deny is refused, as the library refuses it', () => {
-  const blankOf = <T>(type: number): T => ({ ...blank(type), sequence: 1, t_us: 5, frame: 7 }) as unknown as T;
-  const contact = { ...blankOf<Contact>(PacketType.CONTACT), flags: Flag.FIT_VALID, x_mm: 1.5 };
-  const raw = { ...blankOf<Raw>(PacketType.RAW), sensor_count: 2 };
-  const header = { time_ns: 0n, frame_id: '' };
-  const message = (changes: object, of_raw: object = {}): Uint8Array =>
-    contactMessage(header, 1, { ...contact, ...changes }, { ...raw, ...of_raw });
-  assert.equal(decodeContact(message({})).contact?.x_mm, 1.5);
-  assert.equal(decodeContact(message({ flags: 0, x_mm: 0 })).contact?.x_mm, 0);
-  for (const field of CONTACT_FIELDS) {
-    assert.throws(() => decodeContact(message({ flags: 0x1ffffff, [field]: NaN })), RangeError, field);
-  }
-  assert.throws(() => decodeContact(message({}, { temperature_cC: NaN })), RangeError);
-  assert.throws(() => decodeContact(message({}, { temperature_cC: 40000 })), RangeError);
-  assert.throws(() => decodeContact(message({}, { pressure_Pa_q10: [2 ** 31, 0] })), RangeError);
-  assert.throws(() => decodeContact(message({}, { baseline_Pa_q10: [0, NaN] })), RangeError);
+test('a message that says what its flags deny is refused, as the library refuses it', async () => {
+  const field = 3.0000001;
+  const of = (changes: Partial<Contact>): DevicePacket[] => [
+    packets[0]!,
+    { ...(core.blank(PacketType.CONTACT) as Contact), flags: Flag.FIT_VALID, x_mm: field, t_us: 5, ...changes },
+  ];
+  const bytes = (all: DevicePacket[]): Buffer => {
+    const writer = core.newWriter('mcap', all[0] as Info, EXTRA);
+    all.forEach((packet) => writer.packet(packet));
+    writer.finish('stopped', core.newDecoder().counts);
+    const parts: Uint8Array[] = [];
+    for (let part; (part = writer.take()); ) {
+      parts.push(part);
+    }
+    return Buffer.concat(parts);
+  };
+  const good = bytes(of({}));
+  assert.deepEqual(await problemOf('good.mcap', good), ['', 2]);
+  const number = Buffer.alloc(4);
+  number.writeFloatLE(field);
+  const at = good.indexOf(number);
+  assert.ok(at > 0 && good.indexOf(number, at + 1) < 0);
+  const bad = Buffer.from(good);
+  bad.writeFloatLE(NaN, at);
+  withoutChunkCrcs(bad);
+  const [problem, count] = await problemOf('bad.mcap', bad);
+  assert.match(problem, /bad\.mcap: a message on \/fingertip\/\S+\/contact is damaged/);
+  assert.equal(count, 1);
 });
+
+/** A CRC of 0 says that there is none. */
+function withoutChunkCrcs(bytes: Buffer): void {
+  const CHUNK = 6;
+  for (let at = 8; at + 9 <= bytes.length; at += 9 + Number(bytes.readBigUInt64LE(at + 1))) {
+    if (bytes[at] === CHUNK) {
+      bytes.writeUInt32LE(0, at + 9 + 24);
+    }
+  }
+}

@@ -1,5 +1,5 @@
 // Builds the page's tests as the page is built, and runs them by node's own runner: node 18 knows no TypeScript.
-//   node run.mjs FOLDER TOOL    where the built tests go; the tool, whose recordings are compared
+//   node run.mjs FOLDER TOOL CORE    where the built tests go; the tool, whose recordings are compared; core.wasm
 import { spawnSync } from 'node:child_process';
 import { readdirSync } from 'node:fs';
 import { createRequire } from 'node:module';
@@ -11,7 +11,7 @@ const source = resolve(here, '../../..');
 const page = join(source, 'host_tools/web');
 const vite = createRequire(join(page, 'package.json')).resolve('vite/package.json');
 const { build } = await import(pathToFileURL(join(dirname(vite), 'dist/node/index.js')));
-const [folder, tool] = process.argv.slice(2).map((path) => resolve(path));
+const [folder, tool, core] = process.argv.slice(2).map((path) => resolve(path));
 const names = readdirSync(here).filter((name) => name.endsWith('.test.ts'));
 await build({
   root: here,
@@ -35,6 +35,6 @@ const tests = names.map((name) => join(folder, name.replace(/ts$/, 'mjs')));
 const { status } = spawnSync(process.execPath, ['--test', ...tests], {
   timeout: 240_000,
   stdio: 'inherit',
-  env: { ...process.env, FINGERTIP_SOURCE: source, FINGERTIP_TOOL: tool },
+  env: { ...process.env, FINGERTIP_SOURCE: source, FINGERTIP_TOOL: tool, FINGERTIP_CORE: core },
 });
 process.exit(status ?? 1);

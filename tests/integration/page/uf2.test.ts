@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { crc32 } from '../../../host_tools/web/src/line/framing';
 import { readImage } from '../../../host_tools/web/src/steps/uf2';
+import { core } from './library';
 
 function image(marks: string, family = 0xe48bff56): Uint8Array<ArrayBuffer> {
   const COUNT = 4;
@@ -14,7 +14,7 @@ function image(marks: string, family = 0xe48bff56): Uint8Array<ArrayBuffer> {
     words.forEach((word, i) => view.setUint32(512 * k + 4 * i, word, true));
     bytes.set(flash.subarray(256 * k, 256 * k + 256), 512 * k + 32);
     bytes.set(new TextEncoder().encode('CRC '), 512 * k + 288);
-    view.setUint32(512 * k + 292, crc32(flash), true);
+    view.setUint32(512 * k + 292, core.crc32(flash), true);
     view.setUint32(512 * k + 508, 0x0ab16f30, true);
   }
   return bytes;

@@ -48,3 +48,39 @@ export function vector(name: string): Vector {
   }
   return found;
 }
+
+/** COBS of the tests' own, written from the paper; both frames have their delimiter. */
+export function cobsEncode(bytes: Uint8Array): Uint8Array<ArrayBuffer> {
+  const frame: number[] = [];
+  let run: number[] = [];
+  const end = (): void => {
+    frame.push(run.length + 1, ...run);
+    run = [];
+  };
+  bytes.forEach((byte, i) => {
+    if (byte === 0) {
+      end();
+    } else {
+      run.push(byte);
+    }
+    if (run.length === 254 && i < bytes.length - 1) {
+      frame.push(255, ...run);
+      run = [];
+    }
+  });
+  end();
+  return Uint8Array.of(...frame, 0);
+}
+
+export function cobsDecode(frame: Uint8Array): Uint8Array<ArrayBuffer> {
+  const bytes: number[] = [];
+  for (let at = 0; at < frame.length - 1; ) {
+    const code = frame[at] ?? 0;
+    bytes.push(...frame.subarray(at + 1, at + code));
+    at += code;
+    if (code < 255 && at < frame.length - 1) {
+      bytes.push(0);
+    }
+  }
+  return Uint8Array.from(bytes);
+}

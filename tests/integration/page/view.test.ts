@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import test from 'node:test';
-import { Flag, PacketType, blank, type Contact } from '../../../host_tools/web/src/line/packets';
+import { Flag, PacketType, type Contact } from '../../../host_tools/web/src/line/line_facts';
 import { History } from '../../../host_tools/web/src/model/history';
 import { Buckets, Trust, intervalOf } from '../../../host_tools/web/src/view/buckets';
 import { cameraOf, picked, seen, type Box } from '../../../host_tools/web/src/view/camera';
@@ -13,11 +13,12 @@ import { contactAt, trailAt } from '../../../host_tools/web/src/view/moment';
 import { sceneOf } from '../../../host_tools/web/src/view/pad_scene';
 import { HEAT_STOPS, contrast, paletteOf, parsed } from '../../../host_tools/web/src/view/palette';
 import { Speech } from '../../../host_tools/web/src/view/speech';
+import { core } from './library';
 
 const FITTED = Flag.CONTACT | Flag.FIT_VALID | Flag.UNCERTAINTY_VALID | Flag.TARED;
 
 function contactOf(more: Partial<Contact>): Contact {
-  return { ...(blank(PacketType.CONTACT) as unknown as Contact), flags: FITTED, ...more };
+  return { ...(core.blank(PacketType.CONTACT) as unknown as Contact), flags: FITTED, ...more };
 }
 
 /** A frame each millisecond, from frame 0 at 0 s on. */

@@ -7,7 +7,7 @@
  */
 import { load } from '../../wasm/judges.mjs';
 import { WasmError } from '../../wasm/module.mjs';
-import type { LineCounts } from '../line/framing';
+import type { LineCounts } from '../core';
 
 /** What the judges know; one for the page. */
 export interface Judges {

@@ -1,8 +1,6 @@
 /** written by firmware/wire/line.py from line.toml; change it there. */
 
 export const WIRE_VERSION = 5;
-export const MAX_SENSORS = 32;
-export const MAX_FRAME_BYTES = 836;
 export const LOADER_MAGIC = 0x746f6f42;
 
 export const PacketType = {
@@ -87,44 +85,6 @@ export const Result = {
   NOT_NOW: 3,
 } as const;
 
-export const CAPABILITY_WORDS: readonly (readonly [number, string])[] = [
-  [Capability.FIT, 'fit'],
-  [Capability.SLIP, 'slip'],
-  [Capability.RAW_STREAM, 'raw'],
-  [Capability.TANGENTIAL, 'tangential'],
-];
-export const STORED_WORDS: readonly (readonly [number, string])[] = [
-  [Stored.CALIBRATION, 'calibration'],
-  [Stored.SETTINGS, 'settings'],
-  [Stored.WRITING, 'writing'],
-  [Stored.DAMAGED, 'damaged'],
-  [Stored.PAD, 'pad'],
-];
-export const RESULT_WORDS: readonly (readonly [number, string])[] = [
-  [Result.DONE, 'done'],
-  [Result.UNKNOWN_COMMAND, 'its firmware does not know this command'],
-  [Result.OUT_OF_RANGE, 'the value is out of range for this firmware'],
-  [Result.NOT_NOW, 'not possible now'],
-];
-export const COMMAND_WORDS: readonly (readonly [number, string])[] = [
-  [PacketType.CMD_STREAM, 'stream'],
-  [PacketType.CMD_TARE, 'tare'],
-  [PacketType.CMD_RATE, 'rate'],
-  [PacketType.CMD_OSR, 'osr'],
-  [PacketType.CMD_SLIP, 'slip'],
-  [PacketType.CMD_INFO, 'info'],
-  [PacketType.CMD_HEALTH, 'health'],
-  [PacketType.CMD_CRASH, 'crash'],
-  [PacketType.CMD_LOADER, 'loader'],
-  [PacketType.CMD_CALIBRATE, 'calibrate'],
-  [PacketType.CMD_ERASE_CALIBRATION, 'erase calibration'],
-  [PacketType.CMD_KEEP, 'keep'],
-  [PacketType.CMD_PRIOR, 'prior'],
-  [PacketType.CMD_LOCATION_LIMIT, 'limit'],
-  [PacketType.CMD_PAD, 'pad'],
-  [PacketType.CMD_ERASE_PAD, 'erase pad'],
-];
-
 /** Those of state, then the warnings. warning: the numbers deserve less trust. */
 export const FLAGS: readonly { bit: number; name: keyof typeof Flag; warning: boolean; meaning: string }[] = [
   { bit: Flag.CONTACT, name: 'CONTACT', warning: false, meaning: 'something presses' },
@@ -175,59 +135,8 @@ export const CONTACT_FLAG = {
   vx_mm_s: Flag.VELOCITY_VALID,
   vy_mm_s: Flag.VELOCITY_VALID,
 } as const;
-/** So many of them come before the stages; the others are not in recordings of before. */
-export const FIRST_FIELDS_COUNT = 12;
-
-export const STAGES = [
-  'convert_us',
-  'read_us',
-  'queue_us',
-  'condition_us',
-  'fit_us',
-  'contact_us',
-  'total_us',
-] as const;
-export const HEALTH_WORDS = [
-  'capabilities',
-  'uptime_s',
-  'frames',
-  'frames_incomplete',
-  'frames_skipped',
-  'packets_sent',
-  'packets_dropped',
-  'commands_done',
-  'commands_rejected',
-  'bus_nacks',
-  'bus_timeouts',
-  'bus_recoveries',
-  'zero_readings',
-  'implausible_readings',
-  'sensors_present',
-  'sensors_prom_bad',
-  'watchdog_resets',
-] as const;
-export const HEALTH_KEYS = [
-  'capabilities',
-  'uptime_s',
-  'frames',
-  'frames_incomplete',
-  'frames_skipped',
-  'packets_sent',
-  'packets_dropped',
-  'commands_done',
-  'commands_rejected',
-  'bus_nacks',
-  'bus_timeouts',
-  'bus_recoveries',
-  'zero_readings',
-  'implausible_readings',
-  'fit_failures',
-  'sensors_present',
-  'sensors_prom_bad',
-  'watchdog_resets',
-  'cpu_busy_permille',
-  'stack_free_bytes',
-] as const;
+export type ContactField = keyof typeof CONTACT_FLAG;
+export const CONTACT_FIELDS = Object.keys(CONTACT_FLAG) as ContactField[];
 
 interface Header {
   sequence: number;
@@ -521,8 +430,6 @@ export type Command =
   | { type: 0x8c; limit_mm: number; }
   | { type: 0x8d; pad_thickness_mm: number; pad_overhang_mm: number; pad_normal: ArrayLike<number>; pad_tangential: ArrayLike<number>; pad_spread_mm2: number; pad_spread_sd_mm2: number; pad_force_ratio: number; pad_tangential_scale: number; pad_tangential_scale_sd: number; pad_edge_ratio_x: ArrayLike<number>; pad_edge_ratio_y: ArrayLike<number>; pad_edge_gain_x: ArrayLike<number>; pad_edge_gain_y: ArrayLike<number>; pad_edge_place_x_mm: ArrayLike<number>; pad_edge_place_y_mm: ArrayLike<number>; pad_edge_pull_x_mm: ArrayLike<number>; pad_edge_pull_y_mm: ArrayLike<number>; pad_edge_force: ArrayLike<number>; pad_from_touch: number; }
   | { type: 0x8e; };
-/** The quantities of a contact that hold under a flag. */
-export type ContactField = keyof typeof CONTACT_FLAG;
 
 /** What people set, as they type it; in a packet a value is `per` times as much. */
 export const SETTINGS = [

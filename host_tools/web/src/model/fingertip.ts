@@ -3,9 +3,7 @@
  * that it takes. The view reads; listeners are told of rare changes alone (state, info, health), not
  * of packets: draw on requestAnimationFrame from `contact`, `raw` and `history`.
  */
-import { ClockFit } from '../line/clock_fit';
-import { Decoder } from '../line/decoder';
-import { WIRE_VERSION, type LineCounts } from '../line/framing';
+import { core, type LineCounts } from '../core';
 import type { Line } from '../line/line';
 import {
   Capability,
@@ -13,8 +11,7 @@ import {
   Result,
   Stored,
   Stream,
-  encodePacket,
-  infoFrameOfVersion,
+  WIRE_VERSION,
   type Ack,
   type Command,
   type Contact,
@@ -23,8 +20,7 @@ import {
   type Health,
   type Info,
   type Raw,
-} from '../line/packets';
-import { commandName, resultText } from './names';
+} from '../line/line_facts';
 import { History } from './history';
 
 /** opening: until its info came. live: it streams. silent: nothing for a while, though the line is
@@ -44,7 +40,7 @@ export class CommandError extends Error {
 /** Another fingertip answered than the one that was expected back. */
 export class OtherFingertip extends Error {}
 
-/** Takes every packet as it comes; frame(): a copy of its COBS bytes without the delimiter. Contact
+/** Takes every packet as it comes; frame(): its COBS bytes without the delimiter. Contact
  * and raw packets are overwritten by the next. */
 export type PacketTap = (packet: DevicePacket, frame: () => Uint8Array<ArrayBuffer>) => void;
 
@@ -78,7 +74,7 @@ export class Fingertip {
   health: Health | null = null;
   /** How its firmware last ended; null until asked for (askCrash). */
   crash: Crash | null = null;
-  readonly clock = new ClockFit();
+  readonly clock = core.newClockFit();
   /** null until its info came. */
   history: History | null = null;
   /** Packets of either kind since it was opened. */
@@ -89,7 +85,7 @@ export class Fingertip {
   /** A replay: it takes no commands. */
   readonly is_replay: boolean;
 
-  private readonly decoder = new Decoder();
+  private readonly decoder = core.newDecoder();
   private readonly listeners = new Set<() => void>();
   private readonly taps = new Set<PacketTap>();
   private readonly waiting: Waiting[] = [];
@@ -209,7 +205,7 @@ export class Fingertip {
         const ack = await this.exchange(command);
         if (ack.result !== Result.DONE) {
           throw new CommandError(
-            `${commandName(command.type)}: ${resultText(ack.result)}`,
+            `${core.commandName(command.type)}: ${core.resultText(ack.result)}`,
             ack.result,
           );
         }
@@ -269,7 +265,7 @@ export class Fingertip {
         came,
         new Promise<never>((_, failed) =>
           setTimeout(
-            () => failed(new CommandError(`${commandName(command)}: no answer came`, null)),
+            () => failed(new CommandError(`${core.commandName(command)}: no answer came`, null)),
             ANSWER_ms,
           ),
         ),
@@ -318,7 +314,7 @@ export class Fingertip {
         break;
       }
       if (version !== WIRE_VERSION) {
-        await this.line.send(infoFrameOfVersion(version));
+        await this.line.send(core.infoFrameOfVersion(version));
         await new Promise((done) => setTimeout(done, 100));
       }
     }
@@ -331,13 +327,13 @@ export class Fingertip {
     }
     const sequence = this.sequence++ & 0xffff;
     const sent_us = Math.round(performance.now() * 1000);
-    const bytes = encodePacket({ ...command, sequence, t_us: sent_us });
+    const bytes = core.encode({ ...command, sequence, t_us: sent_us });
     const is_stored =
       (command.type >= PacketType.CMD_CALIBRATE && command.type <= PacketType.CMD_KEEP) ||
       command.type === PacketType.CMD_PAD ||
       command.type === PacketType.CMD_ERASE_PAD;
     return new Promise((done, failed) => {
-      const name = commandName(command.type);
+      const name = core.commandName(command.type);
       const waiting: Waiting = {
         command: command.type,
         sequence,
@@ -381,8 +377,6 @@ export class Fingertip {
     this.decoder.feed(bytes, this.take);
   }
 
-  private readonly frameOfPacket = (): Uint8Array<ArrayBuffer> => this.decoder.frameBytes();
-
   private readonly take = (packet: DevicePacket): void => {
     switch (packet.type) {
       case PacketType.CONTACT:
@@ -407,7 +401,7 @@ export class Fingertip {
         }
         this.info = packet;
         this.history.gain =
-          packet.stored & Stored.CALIBRATION ? packet.gain : new Float32Array(0);
+          packet.stored & Stored.CALIBRATION ? packet.gain : [];
         break;
       case PacketType.HEALTH:
         this.health = packet;
@@ -417,7 +411,7 @@ export class Fingertip {
         break;
     }
     for (const tap of this.taps) {
-      tap(packet, this.frameOfPacket);
+      tap(packet, () => core.encode(packet).slice(0, -1));
     }
     if (packet.type > PacketType.RAW) {
       const awaited = this.awaited.get(packet.type)?.shift();
@@ -432,7 +426,7 @@ export class Fingertip {
     const waiting = this.waiting.find(
       (each) => each.command === ack.command && each.sequence === ack.command_sequence,
     );
-    if (waiting && BigInt(waiting.sent_us) === ack.host_time_us) {
+    if (waiting && waiting.sent_us === ack.host_time_us) {
       this.forget(waiting);
       this.clock.add({
         sent_us: waiting.sent_us,

@@ -5,7 +5,7 @@
  * column. What was not told is NaN: no fit, no x; a packet that did not come. A row takes what
  * the contact and the raw packet of one frame say; nothing is allocated for it.
  */
-import { CONTACT_FIELDS, CONTACT_FLAG, Flag, type Contact, type ContactField, type Raw } from '../line/packets';
+import { CONTACT_FIELDS, CONTACT_FLAG, Flag, type Contact, type ContactField, type Raw } from '../line/line_facts';
 
 /** Rows: 3.3 minutes at 1308 frames a second, some 45 MB with 15 sensors. */
 export const HISTORY_ROWS = 1 << 18;
@@ -44,7 +44,7 @@ export class History {
   /** [slot * sensor_count + sensor], as Readings has it; NaN where no raw packet came. */
   readonly pressure_Pa: Float32Array;
   /** [sensor], of the calibration that acts; empty: none. */
-  gain: Float32Array = new Float32Array(0);
+  gain: ArrayLike<number> = [];
   /** How long nothing was heard before what comes next; counts where its clock starts anew. */
   gap_s = 0;
 

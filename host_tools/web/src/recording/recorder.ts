@@ -1,13 +1,8 @@
 /** Records one fingertip from now on, over its going and coming back. */
-import { noCounts, type LineCounts } from '../line/framing';
-import { PacketType } from '../line/packets';
+import { core, type LineCounts, type Writer } from '../core';
+import { PacketType } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
-import { CsvSink } from './csv_sink';
-import type { Pairs } from './fields';
-import { PacketLines } from './lines';
-import { McapSink } from './mcap_sink';
 import type { Output } from './output';
-import { utcText } from './text';
 
 export { chooseOutput } from './output';
 
@@ -18,18 +13,23 @@ export const MEDIA_TYPES: Record<RecordingKind, string> = {
   mcap: 'application/octet-stream',
 };
 
+/** Packets between two writes: some 70 kB. */
+const PART_packets = 256;
+
+const utcNow = (): string => new Date().toISOString();
+
 /** "E66058388347A12C_20260805T120000.csv" */
-export function recordingName(fingertip: Fingertip, kind: RecordingKind, now_ms = Date.now()): string {
-  const at = utcText(now_ms).replace(/[-:]/g, '').slice(0, 15);
+export function recordingName(fingertip: Fingertip, kind: RecordingKind): string {
+  const at = utcNow().replace(/[-:]/g, '').slice(0, 15);
   return `${fingertip.name.replace(/[^A-Za-z0-9]+/g, '_')}_${at}.${kind}`;
 }
 
 export class Recorder {
   /** Why it ended before it was told to; empty: it did not. */
   failure = '';
-  private readonly sink: CsvSink | McapSink;
-  private lines: PacketLines | null = null;
-  private before = noCounts();
+  private writer: Writer | null = null;
+  private packets = 0;
+  private before: LineCounts;
   private readonly end_tap: () => void;
   private readonly end_listen: () => void;
   private was_live = true;
@@ -42,51 +42,54 @@ export class Recorder {
     version: string,
     private readonly onFailure: (why: string) => void,
   ) {
-    this.sink = kind === 'csv' ? new CsvSink(output) : new McapSink(output);
-    this.end_tap = fingertip.tap((packet) => {
-      if (this.lines) {
-        const { lines } = this;
-        this.guard(() => lines.packet(packet));
-      } else if (packet.type === PacketType.INFO) {
-        this.before = { ...fingertip.counts, packets: fingertip.counts.packets - 1 };
-        this.guard(() => {
-          this.lines = new PacketLines(this.sink, packet, this.head(version, packet.t_us));
-        });
-      }
-    });
+    this.before = fingertip.counts;
+    this.end_tap = fingertip.tap((packet) =>
+      this.guard(() => {
+        if (!this.writer && packet.type === PacketType.INFO) {
+          this.before = { ...fingertip.counts, packets: fingertip.counts.packets - 1 };
+          this.writer = core.newWriter(kind, packet, [
+            ['recorded_by', `fingertip page ${version}`],
+            ['started_utc', utcNow()],
+            ['port', fingertip.line.label],
+            ['started_device_us', String(packet.t_us)],
+          ]);
+        }
+        this.writer?.packet(packet);
+        if (++this.packets % PART_packets === 0) {
+          this.write();
+        }
+      }),
+    );
     this.end_listen = fingertip.listen(() => {
       const live = fingertip.state !== 'closed';
       if (live !== this.was_live) {
         this.was_live = live;
-        this.guard(() => this.lines?.event(`${live ? 'back' : 'gone'} ${utcText(Date.now())}`));
+        this.guard(() => this.writer?.event(`${live ? 'back' : 'gone'} ${utcNow()}`));
       }
     });
   }
 
   get frames(): number {
-    return this.lines?.frames ?? 0;
+    return this.writer?.frames ?? 0;
   }
 
   /** Rejects with an Error whose message says what was not written. */
   async finish(reason = 'stopped'): Promise<void> {
     this.end_tap();
     this.end_listen();
-    const counts = noCounts();
+    const counts = { ...this.fingertip.counts };
     for (const key of Object.keys(counts) as (keyof LineCounts)[]) {
-      counts[key] = this.fingertip.counts[key] - this.before[key];
+      counts[key] -= this.before[key];
     }
-    this.lines?.finish(counts, reason);
-    await this.sink.finish();
+    this.writer?.finish(reason, counts);
+    this.write();
     await this.output.finish();
   }
 
-  private head(version: string, device_us: number): Pairs {
-    return [
-      ['recorded_by', `fingertip page ${version}`],
-      ['started_utc', utcText(Date.now())],
-      ['port', this.fingertip.line.label],
-      ['started_device_us', String(device_us)],
-    ];
+  private write(): void {
+    for (let bytes; (bytes = this.writer?.take()); ) {
+      this.output.write(bytes);
+    }
   }
 
   private guard(write: () => void): void {

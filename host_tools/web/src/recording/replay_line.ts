@@ -2,9 +2,81 @@
  * A file as the lines of its fingertips, at the pace at which it was recorded. Each fingertip in it
  * has a line; all share the reading and the clock.
  */
+import { decompress } from 'fzstd';
+import { CoreError, core, setUnpack, type Reader } from '../core';
 import type { Line } from '../line/line';
-import { PacketType, encodePacket } from '../line/packets';
-import { ReadError, readItems, type Item } from './reader';
+import { PacketType, type DevicePacket } from '../line/line_facts';
+
+setUnpack((packed, size) => decompress(packed, new Uint8Array(size)));
+
+/** What is wrong with a file: a sentence with the place; what came before it was handed out. */
+export class ReadError extends Error {}
+
+export interface Item {
+  /** Number of the fingertip in the file, from 0. */
+  device: number;
+  /** Of the recorder's clock in a recording of several, else of the fingertip's; NaN for what has no
+   * time of its own. */
+  time_us: number;
+  packet: DevicePacket;
+}
+
+/** What to do about an error, by enum fingertip_status. */
+const ADVICE: Record<number, string> = {
+  [-3]: 'choose another',
+  [-4]: 'use the page of that version',
+  [-5]: 'what came before is shown; "fingertip convert --salvage" takes what can be read of the rest',
+  [-6]: 'choose another',
+};
+
+/** All that is in a file: a recording (.csv, .mcap), or bytes of a line (.ftr). Throws ReadError. */
+export async function* readItems(file: File): AsyncGenerator<Item, void, undefined> {
+  const reader = core.newReader(file.name, file.size);
+  const chunks = file.stream().getReader();
+  let packets = 0;
+  try {
+    for (;;) {
+      const item = reader.next();
+      if (item === undefined) {
+        break;
+      }
+      if (item === null) {
+        reader.feed((await chunks.read()).value ?? new Uint8Array(0));
+      } else if (item.packet) {
+        packets++;
+        yield { device: item.device, time_us: item.time_us, packet: item.packet };
+      }
+    }
+    const problem = problemOf(reader, packets);
+    if (problem) {
+      throw new ReadError(`${file.name} ${problem}`);
+    }
+  } catch (error) {
+    throw error instanceof CoreError
+      ? new ReadError([error.message, ADVICE[error.status]].filter(Boolean).join(': '))
+      : error;
+  } finally {
+    reader.free();
+    await chunks.cancel();
+  }
+}
+
+/** Of a file that was read to its end; empty: none. */
+function problemOf(reader: Reader, packets: number): string {
+  if (!reader.is_capture) {
+    return reader.has_end
+      ? ''
+      : 'has no end line: it was cut short, its recorder killed or its disk full. What there is, is shown';
+  }
+  const { crc_errors, format_errors, version_errors } = reader.counts;
+  if (packets === 0) {
+    return version_errors > 0
+      ? `is of a firmware that speaks version ${reader.other_version} of the protocol: use the tool of that version`
+      : 'holds no packet of a fingertip: choose another';
+  }
+  const damaged = crc_errors + format_errors;
+  return damaged > 0 ? `has ${damaged} damaged packets, which are left out; the rest is shown` : '';
+}
 
 /** A page that was asleep goes on where it was. */
 const STEP_MOST_ms = 250;
@@ -149,7 +221,7 @@ export class Replay {
       this.lines[device] = line;
       this.onLine(line);
     }
-    this.lines[device]?.take(encodePacket(packet));
+    this.lines[device]?.take(core.encode(packet));
   }
 
   private end(problem: string): void {

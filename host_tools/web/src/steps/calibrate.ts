@@ -2,7 +2,7 @@
  * Calibrate: the tool's sessions, judgement and sentences (host_tools/tool/calibration), for the sensors'
  * gains from placements of one weight, and for the scale of the tangential load from pulls.
  */
-import { Capability, PAD, PacketType, Stored, type Info } from '../line/packets';
+import { Capability, PacketType, Stored, type Info } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
 import { loadJudges, type GainSession, type Judges, type PullSession } from '../judges/judges';
 import { Dialog, field, make, makeButton } from './dialog';
@@ -340,13 +340,11 @@ function confirmPulls(
   result: { tangential_scale: number; tangential_scale_sd: number },
 ): void {
   const info = fingertip.info as Info;
-  const [scale_at] = PAD.tangential_scale;
-  const [sd_at] = PAD.tangential_scale_sd;
   dialog.content.replaceChildren(
     make(
       'p',
       {},
-      `Tangential scale ${info.pad[scale_at].toFixed(3)} before, ${result.tangential_scale.toFixed(3)} now, ` +
+      `Tangential scale ${info.pad_tangential_scale.toFixed(3)} before, ${result.tangential_scale.toFixed(3)} now, ` +
         `standard deviation ${result.tangential_scale_sd.toFixed(3)}.`,
     ),
   );
@@ -356,12 +354,11 @@ function confirmPulls(
       'Store',
       () =>
         void dialog.run(async () => {
-          const pad = info.pad.slice();
-          pad[scale_at] = result.tangential_scale;
-          pad[sd_at] = result.tangential_scale_sd;
-          await fingertip.command({ type: PacketType.CMD_PAD, pad, pad_from_touch: info.pad_from_touch });
+          const pad_tangential_scale = Math.fround(result.tangential_scale);
+          const pad_tangential_scale_sd = result.tangential_scale_sd;
+          await fingertip.command({ ...info, type: PacketType.CMD_PAD, pad_tangential_scale, pad_tangential_scale_sd });
           const now = await fingertip.askInfo();
-          if (now.pad[scale_at] !== pad[scale_at]) {
+          if (now.pad_tangential_scale !== pad_tangential_scale) {
             throw new Error("it did not keep the pad's profile; see \"Doctor\"");
           }
           dialog.say('Stored: it acts from now on, and without power.');

@@ -1,5 +1,5 @@
 /** Doctor: the tool's own checks and sentences (host_tools/tool/doctor), over ten seconds at rest. */
-import { PacketType } from '../line/packets';
+import { PacketType } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
 import { loadJudges, type Finding } from '../judges/judges';
 import { PAGE_VERSION } from './app';

@@ -1,6 +1,6 @@
 /** Flash: reboots the fingertip to the boot ROM's loader, and writes the image through the file
  * picker onto the drive that appears. */
-import { LOADER_MAGIC, PacketType } from '../line/packets';
+import { LOADER_MAGIC, PacketType } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
 import { download } from '../recording/output';
 import type { App } from './app';
@@ -108,7 +108,7 @@ export function flash(app: App, fingertip: Fingertip): void {
       await new Promise((done) => setTimeout(done, 200));
       const { info, state } = fingertip;
       if (state === 'live' && info) {
-        const version = `${info.major}.${info.minor}.${info.patch}`;
+        const version = info.firmware_version.join('.');
         if (version !== wanted.version || info.git_hash !== wanted.git_hash) {
           throw new Error(
             `it came back with firmware ${version} ${info.git_hash}, not with ${wanted.version} ${wanted.git_hash}: ` +

@@ -1,7 +1,7 @@
 /** Settings: until power-off, or kept for good. */
-import { PacketType, SETTINGS, Stored, type Command, type Info } from '../line/packets';
+import { core } from '../core';
+import { PacketType, SETTINGS, Stored, type Command, type Info } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
-import { shortest } from '../recording/text';
 import { Dialog, field, make, makeButton } from './dialog';
 
 type Setting = (typeof SETTINGS)[number];
@@ -14,7 +14,7 @@ function textOf(setting: Setting, info: Info): string {
   return numbers.at(-1) === 0 && setting.zeros !== null
     ? setting.zeros
     : setting.values
-        .map(({ per, whole }, i) => (whole ? String(numbers[i]! / per) : shortest(numbers[i]!)))
+        .map(({ per, whole }, i) => (whole ? String(numbers[i]! / per) : core.shortest(numbers[i]!)))
         .join(':');
 }
 

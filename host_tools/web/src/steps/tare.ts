@@ -1,5 +1,5 @@
 /** Tare: measures the zero of every sensor. Refused in contact, and then explained. */
-import { Flag, Result, Stored } from '../line/packets';
+import { Flag, Result, Stored } from '../line/line_facts';
 import { CommandError, type Fingertip } from '../model/fingertip';
 import type { App } from './app';
 import { Dialog, make, makeButton, wordsOf } from './dialog';

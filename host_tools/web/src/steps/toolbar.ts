@@ -1,5 +1,5 @@
 /** The buttons of the page and of each fingertip. */
-import { Capability } from '../line/packets';
+import { Capability } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
 import type { App } from './app';
 import { calibrate } from './calibrate';

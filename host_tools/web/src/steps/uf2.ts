@@ -1,7 +1,7 @@
 /** Firmware images: UF2 (https://github.com/microsoft/uf2) for the RP2040's boot ROM, as
  * cmake/bin2uf2.py writes them. */
 
-import { crc32 } from '../line/framing';
+import { core } from '../core';
 
 export interface Image {
   name: string;
@@ -56,7 +56,7 @@ export function readImage(name: string, bytes: Uint8Array<ArrayBuffer>): Image {
   if (!board || !version || !git_hash) {
     throw new Error(`${name} is no firmware of a fingertip: choose fingertip-BOARD.uf2 of the build`);
   }
-  const crc = crc32(flash);
+  const crc = core.crc32(flash);
   for (let k = 0; k < count; k++) {
     const at = k * BLOCK_bytes + DATA_AT + PAGE_bytes;
     if (view.getUint32(at) !== CHECKSUM_MARK || view.getUint32(at + 4, true) !== crc) {

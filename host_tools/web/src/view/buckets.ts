@@ -1,7 +1,7 @@
 /** The last minutes in as many intervals as a plot has room for: of each the lowest and the highest
  * value, so that no peak is lost. Only new frames are read from one drawing to the next; moving back
  * or another interval reads the span anew. */
-import { Flag } from '../line/packets';
+import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
 import type { History } from '../model/history';
 

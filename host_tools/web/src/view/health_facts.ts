@@ -1,6 +1,6 @@
 /** Lines of the health panel out of what a fingertip and its line count. */
-import { Flag, Stored } from '../line/packets';
-import { capabilitiesText, storedText } from '../model/names';
+import { Flag, Stored } from '../line/line_facts';
+import { core } from '../core';
 import type { Level, Shown } from './shown';
 
 export interface Fact {
@@ -107,17 +107,16 @@ export function factsOf(shown: Shown): FactGroup[] {
     });
   }
   if (info) {
-    const { major, minor, patch } = info;
     const firmware: Fact[] = [
-      { name: 'version', value: `${major}.${minor}.${patch} ${info.git_hash}` },
+      { name: 'version', value: `${info.firmware_version.join('.')} ${info.git_hash}` },
       { name: 'board', value: info.board },
       { name: 'scene', value: info.scene },
       { name: 'serial', value: info.serial },
       { name: 'oversampling', value: String(info.osr) },
-      { name: 'can', value: capabilitiesText(info.capabilities).replaceAll(',', ', ') },
+      { name: 'can', value: core.capabilitiesText(info.capabilities).replaceAll(',', ', ') },
       {
         name: 'keeps',
-        value: storedText(info.stored).replaceAll(',', ', '),
+        value: core.storedText(info.stored).replaceAll(',', ', '),
         level: info.stored & Stored.DAMAGED ? 'bad' : 'plain',
       },
     ];

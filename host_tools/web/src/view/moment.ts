@@ -1,5 +1,5 @@
 /** A moment out of the last minutes, as the pad's picture shows it. */
-import { CONTACT_FIELDS, Flag } from '../line/packets';
+import { CONTACT_FIELDS, Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
 import type { History } from '../model/history';
 import type { Place } from './pad_scene';

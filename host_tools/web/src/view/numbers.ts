@@ -1,5 +1,5 @@
 /** The newest contact in numbers, with units and how far they may be off. */
-import { Flag } from '../line/packets';
+import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS, warningsOf } from '../model/flags';
 import { element, write } from './elements';
 import type { ShownContact } from './shown';

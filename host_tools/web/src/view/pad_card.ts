@@ -1,5 +1,5 @@
 /** One fingertip's pad with its name, its state and its force; several stand side by side. */
-import { Flag } from '../line/packets';
+import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
 import { button, element, write } from './elements';
 import { HandPanel } from './hand_panel';

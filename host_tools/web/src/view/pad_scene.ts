@@ -1,5 +1,5 @@
 /** What of a fingertip the pictures of its pad show, in mm and N, apart from how they draw it. */
-import { Flag } from '../line/packets';
+import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
 import type { ShownContact, ShownLayout, ShownReadings } from './shown';
 

@@ -1,6 +1,6 @@
 /** What the view shows of a fingertip: its model in short names, words and bitmaps. Read when a
  * picture is drawn; nothing happens here for a packet. */
-import { Flag, Stored, type Contact, type ContactField } from '../line/packets';
+import { Flag, Stored, type Contact, type ContactField } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
 import type { History } from '../model/history';
 import { FINGERS } from './palette';

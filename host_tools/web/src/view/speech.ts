@@ -1,5 +1,5 @@
 /** What a reader of the screen is told, at a rate that one can listen to. */
-import { Flag } from '../line/packets';
+import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS, warningsOf } from '../model/flags';
 import type { ShownContact } from './shown';
 

@@ -1,5 +1,5 @@
 /** Force, place, load and slip over time, and which flags were set: one axis of time for all. */
-import { Flag } from '../line/packets';
+import { Flag } from '../line/line_facts';
 import { FLAGS } from '../model/flags';
 import uPlot from 'uplot';
 import { Buckets, intervalOf, type ColumnName } from './buckets';

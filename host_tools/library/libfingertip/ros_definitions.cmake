@@ -1,0 +1,11 @@
+# The definitions of messages, as the Python package ships them, for what is written into MCAP files.
+set(msg_dir ${CMAKE_SOURCE_DIR}/host_tools/python/fingertip/msg)
+file(GLOB msg_files CONFIGURE_DEPENDS ${msg_dir}/*/msg/*.msg)
+set(DEFINITIONS "")
+foreach(msg IN LISTS msg_files)
+  file(READ ${msg} definition)
+  string(REGEX REPLACE "^.*/([a-z_]+)/msg/([A-Za-z0-9]+)[.]msg$" "\\1/\\2" name ${msg})
+  string(APPEND DEFINITIONS "    {\"${name}\", R\"msg(${definition})msg\"},\n")
+endforeach()
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${msg_files})
+configure_file(${CMAKE_CURRENT_LIST_DIR}/ros_definitions.cpp.in ${CMAKE_CURRENT_BINARY_DIR}/ros_definitions.cpp @ONLY)
