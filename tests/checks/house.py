@@ -13,8 +13,9 @@ files_per_field     files that name the probe of a packet's field, or files that
 files_per_setting   files that list the settings: that name half and more of the fields by which an info packet tells them
 rooms               folders of host_tools
 circles             modules that need themselves, by way of others: of the Python package, and sources of firmware/app
-page_codec_lines    lines of the page that decode packets, or read and write recordings
 format_disagreements inputs of tests/formats to which library, Python and page give other answers, by build/report/formats.json if it is there
+page_codec_lines    lines of the page in the folders of line and recordings, but for files that only ask and show; and elsewhere those that take
+                    numbers out of bytes
 longest_file        lines of the longest source; firmware/fit, condition and grip apart
 product_lines       lines of sources and texts, firmware and boards too; no limit, for people
 """
@@ -29,7 +30,7 @@ import tomllib
 
 # figure: what it shall be, and what it may be until then. The second only ever falls.
 LIMITS = {"files_per_board": (8, 8), "files_per_gripper": (5, 5), "files_per_field": (6, 7), "files_per_setting": (6, 8), "rooms": (9, 9), "circles": (0, 0),
-          "format_disagreements": (0, 202), "page_codec_lines": (0, 2778), "longest_file": (700, 700)}
+          "format_disagreements": (0, 202), "page_codec_lines": (0, 0), "longest_file": (700, 700)}
 APART = ("firmware/fit/", "firmware/condition/", "firmware/grip/")  # from longest_file
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".S", ".py", ".mjs", ".ts", ".mts", ".sh", ".cmake", ".inc", ".css", ".toml"}
 TEXTS = SOURCES | {".md", ".txt", ".json", ".html", ".in", ".1", ".bash", ".fish", ".cfg", ".msg", ""}
@@ -38,6 +39,8 @@ WRITTEN = re.compile(r"[Ww]ritten by |[Gg]enerated by ")
 PROBE = "vy_mm_s"
 SETTINGS = ("rate_mHz", "osr", "slip_window_ms", "slip_threshold_mm", "prior_sigma_mm", "prior_width_mm", "location_limit_mm")
 CODEC = ("host_tools/web/src/line/", "host_tools/web/src/recording/")
+PAGE = "host_tools/web/src/"
+OUT_OF_BYTES = re.compile(r"^.*\b(?:DataView|[gs]et(?:Big)?(?:Uint|Int|Float)\d+)\b.*$", re.M)
 NO_CODEC = {"line.ts", "serial_line.ts", "line_facts.ts", "output.ts", "recorder.ts", "replay_line.ts"}  # they ask, and show
 
 
@@ -123,6 +126,9 @@ def measure(root):
     figures = {name: len(where) for name, (_, where) in found.items()}
     codec = [name for name in files if name.startswith(CODEC) and pathlib.PurePath(name).name not in NO_CODEC]
     figures["page_codec_lines"] = sum(files[name].count("\n") for name in codec)
+    taking = {name: len(OUT_OF_BYTES.findall(text)) for name, text in files.items() if name.startswith(PAGE) and name not in codec}
+    figures["page_codec_lines"] += sum(taking.values())
+    codec += [name for name, lines in taking.items() if lines]
     lengths = {name: text.count("\n") for name, text in files.items() if pathlib.PurePath(name).suffix in SOURCES and not name.startswith(APART)}
     longest = max(lengths, key=lengths.get)
     figures["longest_file"] = lengths[longest]

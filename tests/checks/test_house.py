@@ -15,6 +15,10 @@ class House(unittest.TestCase):
         files = {"list.py": "a b", "one.py": "a", "all.ts": "a b c d"}
         self.assertEqual(house.listing(files, ("a", "b", "c", "d")), ["all.ts", "list.py"])
 
+    def test_a_line_that_takes_numbers_out_of_bytes_is_seen(self):
+        text = "const a = view.getFloat32(4, true);\nconst b = new DataView(bytes);\nconst c = getFloat(4);\nview.setBigUint64(0, n);\n"
+        self.assertEqual(len(house.OUT_OF_BYTES.findall(text)), 3)
+
     def test_a_circle_by_way_of_a_third_is_found(self):
         self.assertEqual(house.circle({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}), ["a", "b", "c"])
 

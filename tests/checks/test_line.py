@@ -63,7 +63,7 @@ class Generator(unittest.TestCase):
 
     def test_a_change_by_hand_is_told_and_undone(self):
         for name, before, after in ((PAGE, "| 8 | LOW_SIGNAL |", "| 9 | LOW_SIGNAL |"), ("firmware/common/contact_flags.h", "1 << 8", "1 << 9"),
-                                    ("host_tools/web/src/line/line_facts.ts", "'bus_nacks'", "'bus_timeouts'")):
+                                    ("host_tools/web/src/line/line_facts.ts", "  bus_nacks: number;", "  bus_timeouts: number;")):
             self.change(name, before, after)
             status, said = self.run_it("--check")
             self.assertEqual((status, said.split(":")[0]), (1, name))

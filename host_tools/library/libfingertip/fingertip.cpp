@@ -7,10 +7,7 @@
 #include "libfingertip/names.hpp"
 #include "libfingertip/recording_fields.hpp"
 #include "libfingertip/text.hpp"
-
-extern "C" {
-#include "common/crc32.h"
-}
+#include "libfingertip/uf2.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -207,6 +204,10 @@ fingertip_status failed(const Error &error) {
     return failed(FINGERTIP_ERR_DAMAGED_HEAD, error.what());
   case ErrorCode::other_sensor_count:
     return failed(FINGERTIP_ERR_SENSORS, error.what());
+  case ErrorCode::not_firmware:
+  case ErrorCode::other_chip:
+  case ErrorCode::damaged_firmware:
+    return failed(FINGERTIP_ERR_FIRMWARE, error.what());
   default:
     return failed(FINGERTIP_ERR_OTHER, error.what());
   }
@@ -418,6 +419,17 @@ size_t fingertip_number_text(float value, char *text, size_t size) {
   return put_text(shortest(value), text, size);
 }
 
-uint32_t fingertip_crc32(const uint8_t *bytes, size_t length) {
-  return crc32_iso_hdlc(bytes, length);
+enum fingertip_status fingertip_firmware(const char *name, const uint8_t *bytes, size_t length,
+                                         char *board, char *version, char *git_hash, size_t size) {
+  return guarded([&] {
+    if (!bytes && length > 0) {
+      return failed(FINGERTIP_ERR_ARGUMENT, "a pointer is NULL");
+    }
+    const FirmwareImage image =
+        firmware_of(name ? name : "", std::vector<std::uint8_t>(bytes, bytes + length));
+    put_text(image.board, board, size);
+    put_text(image.version, version, size);
+    put_text(image.git_hash, git_hash, size);
+    return FINGERTIP_OK;
+  });
 }

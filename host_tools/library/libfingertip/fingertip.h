@@ -45,7 +45,8 @@ enum fingertip_status {
   FINGERTIP_ERR_DAMAGED_LINE = -5,    /* of a recording; the next call goes on behind it */
   FINGERTIP_ERR_DAMAGED_HEAD = -6,    /* of a recording: no row of it can be read */
   FINGERTIP_ERR_SENSORS = -7,         /* all rows of a recording have equally many sensors */
-  FINGERTIP_ERR_OTHER = -8            /* out of memory, or a bug */
+  FINGERTIP_ERR_FIRMWARE = -8,        /* no firmware of a fingertip, or a damaged one */
+  FINGERTIP_ERR_OTHER = -9            /* out of memory, or a bug */
 };
 
 /* What went wrong in this thread's last call that failed: one line, in English. */
@@ -225,8 +226,12 @@ size_t fingertip_columns(uint8_t sensor_count, char *text, size_t size);
 /* The shortest text that reads back as the same float. */
 size_t fingertip_number_text(float value, char *text, size_t size);
 
-/* CRC-32/ISO-HDLC, as the line and firmware images have it. */
-uint32_t fingertip_crc32(const uint8_t *bytes, size_t length);
+/* ---- Firmware images */
+
+/* What a UF2 file is the firmware of: board, version and commit, each a text of up to size - 1
+ * characters. Fails unless it is whole, undamaged, and for the RP2040. name: of the file, for errors. */
+enum fingertip_status fingertip_firmware(const char *name, const uint8_t *bytes, size_t length,
+                                         char *board, char *version, char *git_hash, size_t size);
 
 #ifdef __cplusplus
 }

@@ -3,11 +3,9 @@
 #include "libfingertip/error.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
-#include <sstream>
+#include <utility>
 
 extern "C" {
 #include "common/bytes.h"
@@ -54,23 +52,16 @@ std::string after(const std::vector<std::uint8_t> &flash, const std::string &mar
 
 } // namespace
 
-FirmwareImage read_firmware(const std::string &path) {
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) {
-    throw Error(ErrorCode::cannot_read, path + ": " + std::strerror(errno));
-  }
+FirmwareImage firmware_of(const std::string &name, std::vector<std::uint8_t> file) {
   FirmwareImage image;
-  std::ostringstream content;
-  content << stream.rdbuf();
-  std::string bytes = content.str();
-  image.file.assign(bytes.begin(), bytes.end());
+  image.file = std::move(file);
   std::size_t count = image.file.size() / BLOCK_BYTES;
   auto damaged = [&](std::size_t block, const std::string &what) {
     return Error(ErrorCode::damaged_firmware,
-                 path + ": damaged (block " + std::to_string(block) + ": " + what + ")");
+                 name + ": damaged (block " + std::to_string(block) + ": " + what + ")");
   };
   if (image.file.size() < BLOCK_BYTES || bytes_get_u32(image.file.data()) != MAGIC_FIRST) {
-    throw Error(ErrorCode::not_firmware, path + ": no UF2 file");
+    throw Error(ErrorCode::not_firmware, name + ": no UF2 file");
   }
   if (image.file.size() % BLOCK_BYTES != 0) {
     throw damaged(count, "cut off");
@@ -85,7 +76,7 @@ FirmwareImage read_firmware(const std::string &path) {
     if (!(word(2) & FAMILY_PRESENT) || word(7) != FAMILY_RP2040) {
       char family[16];
       std::snprintf(family, sizeof family, "0x%08x", static_cast<unsigned>(word(7)));
-      throw Error(ErrorCode::other_chip, path + ": for another chip (UF2 family " + family + ")");
+      throw Error(ErrorCode::other_chip, name + ": for another chip (UF2 family " + family + ")");
     }
     if (word(5) != i || word(6) != count) {
       throw damaged(i, "numbered " + std::to_string(word(5)) + " of " + std::to_string(word(6)));
@@ -103,7 +94,7 @@ FirmwareImage read_firmware(const std::string &path) {
   image.version = after(flash, "fingertip-version=");
   image.git_hash = after(flash, "fingertip-git=");
   if (image.board.empty() || image.version.empty() || image.git_hash.empty()) {
-    throw Error(ErrorCode::not_firmware, path + ": no Fingertip firmware");
+    throw Error(ErrorCode::not_firmware, name + ": no Fingertip firmware");
   }
   std::uint32_t crc = crc32_iso_hdlc(flash.data(), flash.size());
   for (std::size_t i = 0; i < count; i++) {

@@ -16,7 +16,8 @@ struct FirmwareImage {
   std::string git_hash;
 };
 
-/* Throws Error unless the file is a whole, undamaged firmware of ours for the RP2040. */
+/* Throws Error unless the file is a whole, undamaged firmware of ours for the RP2040. name: for messages. */
 FirmwareImage read_firmware(const std::string &path);
+FirmwareImage firmware_of(const std::string &name, std::vector<std::uint8_t> file);
 
 } // namespace fingertip

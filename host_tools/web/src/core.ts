@@ -106,7 +106,8 @@ export interface Core {
   storedText(stored: number): string;
   /** The shortest decimal that reads back as the same float. */
   shortest(value: number): string;
-  crc32(bytes: Uint8Array): number;
+  /** What a UF2 file is the firmware of. Throws CoreError unless it is whole, undamaged, and for the RP2040. */
+  firmwareOf(name: string, bytes: Uint8Array): { board: string; version: string; git_hash: string };
 }
 
 export let core: Core;

@@ -372,12 +372,21 @@ class Core {
     return this.textOf('number_text', value);
   }
 
-  crc32(bytes) {
-    const at = this.wasm.call('malloc', bytes.length);
-    this.wasm.bytes(at, bytes.length).set(bytes);
-    const crc = this.wasm.call('fingertip_crc32', at, bytes.length) >>> 0;
-    this.wasm.call('free', at);
-    return crc;
+  firmwareOf(name, bytes) {
+    const { wasm, text } = this;
+    const SIZE = TEXT_BYTES / 4;
+    const at = wasm.call('malloc', bytes.length + 1);
+    wasm.bytes(at, bytes.length).set(bytes);
+    const told = [0, 1, 2].map((i) => text + SIZE * i);
+    try {
+      this.checked(
+        this.withText(name, (name_at) => wasm.call('fingertip_firmware', name_at, at, bytes.length, ...told, SIZE)),
+      );
+    } finally {
+      wasm.call('free', at);
+    }
+    const [board, version, git_hash] = told.map((each) => this.textAt(each));
+    return { board, version, git_hash };
   }
 
   // What the above is made of.

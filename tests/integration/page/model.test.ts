@@ -18,7 +18,7 @@ import { FLAGS, WARNING_FLAGS } from '../../../host_tools/web/src/model/flags';
 import { History } from '../../../host_tools/web/src/model/history';
 import { commandsFor } from '../../../host_tools/web/src/steps/settings';
 import { core } from './library';
-import { cobsDecode, cobsEncode, vector } from './vectors';
+import { cobsDecode, cobsEncode, crc32, vector } from './vectors';
 
 function contactOf(frame: number, t_us: number, more: Partial<Contact> = {}): Contact {
   return { ...(core.blank(PacketType.CONTACT) as unknown as Contact), frame, t_us, ...more };
@@ -72,14 +72,14 @@ class SpokenLine implements Line {
   send(frame: Uint8Array): Promise<void> {
     const packet = cobsDecode(frame);
     const view = new DataView(packet.buffer);
-    assert.equal(core.crc32(packet.subarray(0, -4)), view.getUint32(packet.length - 4, true));
+    assert.equal(crc32(packet.subarray(0, -4)), view.getUint32(packet.length - 4, true));
     if (packet[0] !== this.version) {
       return Promise.resolve();
     }
     if (this.version !== 5) {
       const answer = vector('health').packet.slice();
       answer[0] = this.version;
-      new DataView(answer.buffer).setUint32(answer.length - 4, core.crc32(answer.subarray(0, -4)), true);
+      new DataView(answer.buffer).setUint32(answer.length - 4, crc32(answer.subarray(0, -4)), true);
       this.receive(cobsEncode(answer), performance.now());
       return Promise.resolve();
     }

@@ -437,7 +437,9 @@ static void names_are_those_of_the_library(void) {
   TEST_ASSERT_EQUAL_STRING("0.1", text);
   fingertip_columns(2, text, sizeof text);
   TEST_ASSERT_EQUAL_STRING_LEN("t_us,frame,sequence,flags,", text, 26);
-  TEST_ASSERT_EQUAL_HEX32(0xCBF43926, fingertip_crc32((const uint8_t *)"123456789", 9));
+  TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_FIRMWARE,
+                        fingertip_firmware("x.uf2", (const uint8_t *)"UF2", 3, text, text, text, sizeof text));
+  TEST_ASSERT_EQUAL_STRING("x.uf2: no UF2 file", fingertip_error());
   uint8_t frame[FINGERTIP_FRAME_MOST];
   size_t length = 0;
   TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, fingertip_encode_info_of(4, frame, sizeof frame, &length));

@@ -1,11 +1,30 @@
 /** Flash: reboots the fingertip to the boot ROM's loader, and writes the image through the file
  * picker onto the drive that appears. */
+import { CoreError, core } from '../core';
 import { LOADER_MAGIC, PacketType } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
 import { download } from '../recording/output';
 import type { App } from './app';
 import { Dialog, field, make, makeButton } from './dialog';
-import { readImage, type Image } from './uf2';
+
+interface Image {
+  name: string;
+  bytes: Uint8Array<ArrayBuffer>;
+  board: string;
+  version: string;
+  git_hash: string;
+}
+
+async function imageOf(file: File): Promise<Image> {
+  const bytes = new Uint8Array(await file.arrayBuffer());
+  try {
+    return { name: file.name, bytes, ...core.firmwareOf(file.name, bytes) };
+  } catch (error) {
+    throw error instanceof CoreError
+      ? new Error(`${error.message}: choose fingertip-BOARD.uf2 of the build`)
+      : error;
+  }
+}
 
 const BACK_ms = 30_000;
 const LOADER_BAUD = 1200;
@@ -43,7 +62,7 @@ export function flash(app: App, fingertip: Fingertip): void {
         if (!file) {
           return;
         }
-        image = readImage(file.name, new Uint8Array(await file.arrayBuffer()));
+        image = await imageOf(file);
         const board = fingertip.info?.board;
         if (board && board !== image.board) {
           throw new Error(
