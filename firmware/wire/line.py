@@ -14,6 +14,7 @@ import textwrap
 import tomllib
 
 import line_settings
+import line_values
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SAYS = "written by firmware/wire/line.py from line.toml; change it there"
@@ -466,60 +467,6 @@ def py_tuple(name, words, comment=""):
     return f"{name} = ({' # ' + comment if comment else ''}\n    " + "\n    ".join(body) + ")"
 
 
-# ---- Packets as numbers
-
-class Value:
-    """A field as programs in other languages have it: its name, and where the C struct holds it."""
-
-    def __init__(self, name, kind, member, count=1, per_sensor=False, stride=0, text=""):
-        self.name, self.kind, self.member, self.count, self.per_sensor, self.stride, self.text = name, kind, member, count, per_sensor, stride, text
-
-
-def values_of(body, line, where, part=""):
-    values = []
-    for field in body.fields:
-        member = f"{where}.{field.member}"
-        if field.is_struct:
-            values += values_of(line.structs[field.kind], line, member, field.kind)
-        elif field.pair:
-            values += [Value(name, field.kind, f"{where}.{name}", per_sensor=True, text=field.text) for name in field.pair]
-        elif field.twos:
-            values += [Value(name, field.kind, f"{member}[0].{name}", per_sensor=True, stride=4 * len(field.twos), text=field.text) for name in field.twos]
-        else:
-            # Two names would be there twice: those of the header. A part's own are those that recordings have.
-            name = field.key if field.key != field.name else field.python if field.name in ("sequence", "t_us") else f"pad_{field.name}" if part == "pad_profile" else field.name
-            name = field.name if field.kind == "n" or body.name == "raw" else name
-            count = line.text_bytes if field.kind == "text" else field.times
-            values.append(Value(name, "u8" if field.kind == "n" else field.kind, member, count, text=field.text))
-    return values
-
-
-def all_values(line):
-    """(body, its values) of each packet and command; the header is not among them."""
-    return [*((body, values_of(body, line, f"body.{body.name}")) for body in line.packets.values()),
-            *((body, values_of(body, line, f"body.cmd_{body.name}")) for body in line.commands.values())]
-
-
-def line_values_hpp(line):
-    lines = [f"/* {SAYS}.", " *", " * Where wire_packet holds each field, for fingertip.cpp alone. */", "#pragma once", "", '#include "libfingertip/wire.hpp"', "",
-             "#include <cstddef>", "#include <cstdint>", "", "namespace fingertip::values {", "", "enum class Kind : std::uint8_t { u8, u16, i16, u32, i32, u64, f32, text };", "",
-             "/* count numbers, stride bytes apart; a text is one. */", "struct Field {", "  const char *name;", "  Kind kind;", "  std::uint16_t offset, count, stride;", "};", ""]
-    for body, values in all_values(line):
-        where = body.name if body in line.packets.values() else f"cmd_{body.name}"
-        lines.append(f"inline constexpr Field {where}_fields[] = {{")
-        lines += ['    {"sequence", Kind::u16, offsetof(wire_packet, sequence), 1, 2},', '    {"t_us", Kind::u64, offsetof(wire_packet, t_us), 1, 8},']
-        for value in values:
-            count = "FT_MAX_SENSORS" if value.per_sensor else value.count
-            stride = value.stride or {"text": 1}.get(value.kind) or BYTES[value.kind]
-            lines.append(f'    {{"{value.name}", Kind::{value.kind}, offsetof(wire_packet, {value.member}), {count}, {stride}}},')
-        lines += ["};"]
-    lines += ["", "struct Packet {", "  std::uint8_t type;", "  const Field *fields;", "  std::size_t count;", "};", "", "inline constexpr Packet packets[] = {"]
-    for body, _ in all_values(line):
-        where = body.name if body in line.packets.values() else f"cmd_{body.name}"
-        lines.append(f"    {{0x{body.type:02X}, {where}_fields, sizeof {where}_fields / sizeof *{where}_fields}},")
-    return [*lines, "};", "", "} // namespace fingertip::values"]
-
-
 # ---- ROS 2
 
 ROS_TYPES = {"u16": "uint16", "u32": "uint32", "f32": "float32"}
@@ -571,26 +518,7 @@ def line_facts_ts(line):
     lines += ["];", "", "/** The quantities of a contact that hold under a flag, in the order of a recording's columns, and that flag. */", "export const CONTACT_FLAG = {",
               *(f"  {field.name}: Flag.{field.when[1]}," for field in line.quantities()), "} as const;",
               "export type ContactField = keyof typeof CONTACT_FLAG;", "export const CONTACT_FIELDS = Object.keys(CONTACT_FLAG) as ContactField[];"]
-    return [*lines, "", *ts_packets(line), *line_settings.page_settings(line, ts_text)]
-
-
-def ts_packets(line):
-    """What a packet is in the page: src/core.ts fills it in by these names."""
-    def type_of(value, array):
-        return "string" if value.kind == "text" else array if value.per_sensor or value.count > 1 else "number"
-
-    lines = ["interface Header {", "  sequence: number;", "  /** Device time since start; in commands the host's own clock. */", "  t_us: number;", "}"]
-    commands = []
-    for body, values in all_values(line):
-        if body in line.commands.values():
-            commands.append(" ".join([f"  | {{ type: 0x{body.type:02x};", *(f"{value.name}: {type_of(value, 'ArrayLike<number>')};" for value in values), "}"]))
-            continue
-        lines += [f"/** {body.text} */", f"export interface {body.name.capitalize()} extends Header {{", f"  type: 0x{body.type:02x};"]
-        for value in values:
-            lines += [f"  /** {value.text} */"] * bool(value.text) + [f"  {value.name}: {type_of(value, 'Float64Array')};"]
-        lines.append("}")
-    return [*lines, f"export type DevicePacket = {' | '.join(body.name.capitalize() for body in line.packets.values())};",
-            "/** What a command carries. */", "export type Command =", *commands[:-1], commands[-1] + ";"]
+    return [*lines, "", *line_values.page_packets(line), *line_settings.page_settings(line, ts_text)]
 
 
 def ts_text(text):
@@ -650,7 +578,7 @@ FILES = {
     "firmware/wire/layouts.inc": layouts_inc,
     "host_tools/library/libfingertip/line_fields.hpp": line_fields_hpp,
     "host_tools/library/libfingertip/line_settings.hpp": lambda line: line_settings.line_settings_hpp(line, SAYS),
-    "host_tools/library/libfingertip/line_values.hpp": line_values_hpp,
+    "host_tools/library/libfingertip/line_values.hpp": lambda line: line_values.line_values_hpp(line, SAYS),
     "host_tools/python/fingertip/line.py": line_py,
     "host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg": contact_msg,
     "host_tools/web/src/line/line_facts.ts": line_facts_ts,

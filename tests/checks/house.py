@@ -13,9 +13,9 @@ files_per_field     files that name the probe of a packet's field, or files that
 files_per_setting   files that list the settings: that name half and more of the fields by which an info packet tells them
 rooms               folders of host_tools
 circles             modules that need themselves, by way of others: of the Python package, and sources of firmware/app
+format_disagreements inputs of tests/formats to which library, Python and page give other answers, by build/report/formats.json if it is there
 page_codec_lines    lines of the page in the folders of line and recordings, but for files that only ask and show; and elsewhere those that take
                     numbers out of bytes
-format_disagreements inputs of tests/formats to which library, Python and page give other answers, by build/report/formats.json if it is there
 longest_file        lines of the longest source; firmware/fit, condition and grip apart
 product_lines       lines of sources and texts, firmware and boards too; no limit, for people
 """
