@@ -3,10 +3,14 @@
 # usage: see below, or run it without an argument
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
+# A folder that the caller names is looked for where the caller is.
+if [ $# -eq 3 ]; then
+  folder=$(cd "$3" && pwd) || exit 2
+fi
 cd "$root"
 
 usage() {
-  echo "usage: sh cmake/bootstrap.sh demo|web|test [LABEL]|report [all|suite]|fuzz HOURS|soak HOURS" >&2
+  echo "usage: sh cmake/bootstrap.sh demo|web|test [LABEL]|report [all|suite|real FOLDER]|fuzz HOURS|soak HOURS" >&2
   echo "  demo    build what it needs, let a lime slip on two emulated fingertips, catch what slips in a simulated gripper, say and draw both" >&2
   echo "  web     build the page and the tool, serve the page to this machine's browsers" >&2
   echo "  test    build everything and run the whole test suite" >&2
@@ -15,6 +19,7 @@ usage() {
   echo "  report  build everything, measure fit, rate, cost, truth, tangential load and grasps, repeat the published experiments in simulation, write build/report; within an hour" >&2
   echo "  report all    the same with every pad and grasp, and what fuzzers, storms of faults and mutation find; some hours" >&2
   echo "  report suite  build everything and run the test suite over and over, half of the runs on a busy machine; some hours" >&2
+  echo "  report real FOLDER  build everything and judge the fit, the zero and the calibration on recordings of real pads in FOLDER; some minutes" >&2
   echo "  fuzz    build the fuzz targets and run them for so many hours; what they find is kept in build/fuzz/findings" >&2
   echo "  soak    build everything and let faults storm on the firmware for so many hours, natively and emulated; findings in build/soak/findings" >&2
   exit 2
@@ -26,6 +31,7 @@ case $# in
        "report all" | "report suite" | fuzz\ * | soak\ *) ;;
        *) usage ;;
      esac ;;
+  3) [ "$1 $2" = "report real" ] || usage ;;
   *) usage ;;
 esac
 
@@ -202,6 +208,10 @@ case $1 in
     if [ "${2:-}" = suite ]; then
       say "the test suite, over and over"
       exec /usr/bin/python3 host_tools/report/suite/suite.py --build build/host -o build/report
+    fi
+    if [ "${2:-}" = real ]; then
+      say "recordings of real pads"
+      exec /usr/bin/python3 host_tools/report/real/real.py --build build/host -o build/report "$folder"
     fi
     say "the fit: error against run time"
     /usr/bin/python3 host_tools/report/fit/fit.py --build build/host --boards build -o build/report \

@@ -63,6 +63,8 @@ PARTS = (
          f"{REPORT}/truth/truth.py --build build/host --boards build -o build/report", SIMULATED,
          (("real_*", RECORDED), ("strips", RECORDED), ("locations", RECORDED), ("flash*", EMULATED), ("*_cycles", EMULATED), ("seed", SAID), ("pads", SAID)),
          pictures=(("truth.png", "Coverage, warnings, placements, iterations: simulated"),)),
+    Part("real", "Real rubber", "The fit, the calibration and the zero on recordings of real pads that other people made.",
+         "sh cmake/bootstrap.sh report real FOLDER", RECORDED, pictures=(("real.png", "Response of the sensors, errors over the array, coverage: from recordings"),)),
     Part("shear", "Tangential load", "Size and direction of what pulls along the rubber, from the normal pressures alone: how far from the truth, and what it does "
          "to every other figure.", f"{REPORT}/shear/shear.py --build build/host -o build/report", SIMULATED,
          (("chip_*", EMULATED), ("*_cycles*", EMULATED), ("shear_seed", SAID), ("shear_pads", SAID)),

@@ -1,0 +1,172 @@
+#!/usr/bin/python3
+"""The firmware's own code on what others recorded: presses on real arrays, and the zero on real strips.
+
+    real.py --build build/host -o build/report FOLDER
+
+FOLDER holds the recordings of sources.json, in any folders below it. They are of others and not part of this project; each is known by its
+checksum, and what is missing is named and left out.
+
+    real.json    the figures by which it is judged, with their goals; all tables of real.md
+    real.md      the same to read
+    real.png     response of the sensors, errors over the array, coverage
+
+Recordings that chose a constant ("chooses") judge nothing. Presses lie in rows: every second row aligns the layout and gives the placements of
+calibrations, the others are judged.
+"""
+import hashlib
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+
+import grids  # noqa: E402
+import real_report  # noqa: E402
+from fingertip.files import InputError, run_tool  # noqa: E402
+from goals import judge  # noqa: E402
+from reporting import finish, option_parser, output_folder, write_json  # noqa: E402
+
+GOALS = (
+    ("raw_inside_p50_mm", "<=", 0.35), ("raw_over_2mm_percent", "<=", 3), ("cal_inside_p50_mm", "<=", 0.20), ("cal_inside_p95_mm", "<=", 0.60),
+    ("cal_over_1mm_percent", "<=", 1.5), ("cal_silent_percent", "<=", 0.1), ("cal_warned_percent", "<=", 15), ("cal_cover_1sd_percent", ">=", 55),
+    ("cal_cover_1sd_most_percent", "<=", 85), ("cal_outside_p50_mm", "<=", 0.65), ("cal_force_scatter_percent", "<=", 7),
+    ("sessions_accepted_percent", ">=", 90), ("worse_after_accept", "<=", 0), ("one_missing_over_1mm_percent", "<=", 15),
+    ("phantom_percent_1308", "<=", 2.5), ("phantom_percent_57", "<=", 5), ("doubted_percent", "<=", 20), ("holds_missed", "<=", 0))
+SEED = 20230101
+
+
+def found_below(folder, sources):
+    """{name: path} of the files whose checksum is right."""
+    wanted = {one["name"]: one["sha256"] for source in sources.values() for one in source["files"]}
+    here = {}
+    for path in sorted(pathlib.Path(folder).rglob("*.csv")):
+        if path.name in wanted and hashlib.sha256(path.read_bytes()).hexdigest() == wanted[path.name]:
+            here.setdefault(path.name, path)
+    if not here:
+        raise InputError(f"{folder}: none of the recordings of sources.json is there; host_tools/report/real/README.md says where they come from")
+    return here
+
+
+def one_missing(readings):
+    """Of each press eight, with one sensor missing each."""
+    copies = np.repeat(readings, readings.shape[1], axis=0)
+    copies[np.arange(len(copies)), np.tile(np.arange(readings.shape[1]), len(readings))] = np.nan
+    return copies
+
+
+def judge_grid(program, one, path):
+    """What the firmware says of one recording without a calibration, and after each of its sessions."""
+    grid = grids.Grid(path, one["pitch_mm"])
+    readings, xy = grid.reading_Pa[grid.judged], grid.xy[grid.judged]
+    inside, outside = grid.inside[grid.judged], grid.outside[grid.judged]
+    typed = (float(np.median(grid.width_mm)), grids.PRIOR_WIDTH_MM)
+    sessions = grid.sessions(SEED)
+    shipped, raw, *calibrations = grids.ask(program, grid, [
+        grids.fit_job(readings), grids.fit_job(readings, prior=typed), *(grids.calibration_job(grid.reading_Pa[these]) for these in sessions)])
+    accepted = [one for one in calibrations if one["state"] == "good"]
+    solved = [one for one in calibrations if one["solved"]]
+    torn, torn_xy = one_missing(readings[inside]), np.repeat(xy[inside], readings.shape[1], axis=0)
+    fits = grids.ask(program, grid, [
+        job for one in solved for job in (grids.stored_job(readings, one["stored"]), grids.stored_job(torn, one["stored"]))])
+    felt = [grids.Felt(answer, xy) for answer in fits[0::2]]
+    missing = [grids.Felt(answer, torn_xy) for answer in fits[1::2]]
+    raw_felt, shipped_felt = grids.Felt(raw, xy), grids.Felt(shipped, xy)
+    all_inside, all_outside = np.tile(inside, len(felt)), np.tile(outside, len(felt))
+    before = float(np.median(raw_felt.error_mm[inside]))
+    found = {
+        "recording": one["key"], "part": one["part"], "width_mm": typed[0], "gains_cv_percent": 100 * float(grid.peak_Pa.std() / grid.peak_Pa.mean()),
+        "places_off_mm": float(np.median(grid.places_off_mm)),
+        "centroid_p50_mm": grids.quantile(np.hypot(*(grids.centroid(readings, grid.layout) - xy)[inside].T), 0.5),
+        "shipped": shipped_felt.figures(inside, outside), "raw": raw_felt.figures(inside, outside),
+        "sessions": len(calibrations), "accepted": len(accepted), "reasons": sorted({one["reason"] for one in calibrations} - {"none"}),
+        "width_found_mm": grids.quantile([one["width_mm"] for one in solved], 0.5),
+        "worse_after_accept": sum(float(np.median(each.error_mm[inside])) > before for each, one in zip(felt, solved) if one["state"] == "good")}
+    if felt:
+        all_felt = grids.Felt.joined(felt)
+        found["calibrated"] = all_felt.figures(all_inside, all_outside)
+        found["calibrated"]["force_scatter_percent"] = float(np.mean([each.figures(inside, outside)["force_scatter_percent"] for each in felt]))
+        found["one_missing_over_1mm_percent"] = grids.percent(np.concatenate([each.error_mm for each in missing]) > 1.0)
+    shown = {"grid": grid, "inside": inside, "shipped": shipped_felt, "raw": raw_felt, "calibrated": felt[0] if felt else None}
+    return found, shown
+
+
+def mean_of(rows, *keys):
+    values = []
+    for row in rows:
+        for key in keys:
+            row = row.get(key) if row is not None else None
+        values.append(row)
+    return None if not values or None in values else float(np.mean(values))
+
+
+def judge_grids(program, source, here):
+    found, shown = [], {}
+    for one in source["files"]:
+        if one["name"] in here:
+            print(f"        {one['key']}", flush=True)
+            row, shown[one["key"]] = judge_grid(program, one, here[one["name"]])
+            found.append(row)
+    rows = [row for row in found if row["part"] == "judges"]
+    figures = {f"raw_{name}": mean_of(rows, "raw", name) for name in ("inside_p50_mm", "over_2mm_percent")}
+    for name in ("inside_p50_mm", "inside_p95_mm", "over_1mm_percent", "silent_percent", "warned_percent", "cover_1sd_percent", "outside_p50_mm",
+                 "force_scatter_percent"):
+        figures[f"cal_{name}"] = mean_of(rows, "calibrated", name)
+    figures["cal_cover_1sd_most_percent"] = figures["cal_cover_1sd_percent"]
+    figures["sessions_accepted_percent"] = 100 * sum(row["accepted"] for row in rows) / sum(row["sessions"] for row in rows) if rows else None
+    figures["worse_after_accept"] = sum(row["worse_after_accept"] for row in rows) if rows else None
+    figures["one_missing_over_1mm_percent"] = mean_of(rows, "one_missing_over_1mm_percent")
+    return {**figures, "grids": found}, shown
+
+
+def judge_strips(program, source, here):
+    wanted = [one for one in source["files"] if one["name"] in here]
+    names = ("phantom_percent_1308", "phantom_percent_57", "doubted_percent", "holds_missed")
+    if not wanted:
+        return {**dict.fromkeys(names), "strips": []}
+    print(f"        {len(wanted)} recordings of strips", flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        for one in wanted:
+            (pathlib.Path(folder) / one["name"]).symlink_to(here[one["name"]].resolve())
+        done = subprocess.run([str(program), folder], capture_output=True, text=True)
+    if done.returncode:
+        raise InputError(f"real_strips failed: {done.stderr.strip()}")
+    parts = {one["name"]: one["part"] for one in wanted}
+    strips = [{**said, "part": parts[said["name"]]} for said in json.loads(done.stdout)["strips"]]
+    rows = [strip for strip in strips if strip["part"] == "judges"]
+    by_rate = {rate["frames_per_s"]: [strip["rates"][k] for strip in rows] for k, rate in enumerate(rows[0]["rates"])} if rows else {}
+    fast, slow = by_rate.get(1308.0, []), by_rate.get(57.0, [])
+    return {
+        "phantom_percent_1308": mean_of(fast, "phantom_percent"), "phantom_percent_57": mean_of(slow, "phantom_percent"),
+        "doubted_percent": mean_of(fast, "doubted_percent"),
+        "holds_missed": sum(rate["holds_missed"] for rates in by_rate.values() for rate in rates) if rows else None, "strips": strips}
+
+
+def main(argv):
+    parser = option_parser(__doc__)
+    parser.add_argument("folder", metavar="FOLDER", help="with the recordings, in any folders below it")
+    parser.add_argument("--sources", default=pathlib.Path(__file__).with_name("sources.json"), metavar="FILE.json", help="which recordings there are")
+    options = parser.parse_args(argv)
+    out, programs = output_folder(options), pathlib.Path(options.build) / "host_tools/report/real"
+    for program in ("real_fit", "real_strips"):
+        if not (programs / program).is_file():
+            raise InputError(f"{programs / program} is not there; build it: cmake --build --preset host")
+    sources = json.loads(pathlib.Path(options.sources).read_text(encoding="utf-8"))
+    here = found_below(options.folder, sources)
+    found, shown = judge_grids(programs / "real_fit", sources["grids"], here)
+    found |= judge_strips(programs / "real_strips", sources["strips"], here)
+    found["missing"] = sorted(one["name"] for source in sources.values() for one in source["files"] if one["name"] not in here)
+    found["sources"] = {name: {key: source[key] for key in ("repository", "commit", "terms", "what")} for name, source in sources.items()}
+    found = judge(found, GOALS)
+    write_json(out / "real.json", found)
+    real_report.write(found, out / "real.md")
+    real_report.draw(found, shown, out / "real.png")
+    return finish(found, options, ("real.json", "real.md", "real.png"))
+
+
+if __name__ == "__main__":
+    sys.exit(run_tool("real.py", main))

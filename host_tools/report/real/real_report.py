@@ -1,0 +1,96 @@
+"""Tables and picture of real.py."""
+import numpy as np
+from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save
+from fingertip.files import write_text
+from goals import goal_table_md
+from tables import table_md, text_of
+
+COLUMNS = ("inside_p50_mm", "inside_p95_mm", "over_1mm_percent", "over_2mm_percent", "cover_1sd_percent", "cover_2sd_percent", "warned_percent",
+           "silent_percent", "force_scatter_percent", "outside_p50_mm")
+WAYS = (("shipped", "as shipped"), ("raw", "width typed"), ("calibrated", "calibrated"))
+PROFILE_TO = 6.0  # widths
+
+
+def grid_rows(found):
+    for row in found["grids"]:
+        for key, name in WAYS:
+            if key in row:
+                yield [row["recording"], row["part"], name, *(text_of(row[key][column], 3) for column in COLUMNS)]
+
+
+def write(found, path):
+    lines = ["# Real rubber", "", "Written by `sh cmake/bootstrap.sh report real FOLDER`. The code is the firmware's own, compiled for the host; the readings are of",
+             "others. No pad of this project was measured.", "", *goal_table_md(found), "", "## Where the recordings come from", ""]
+    lines += table_md(("repository", "commit", "terms", "what"), [[source[key] for key in ("repository", "commit", "terms", "what")] for source in found["sources"].values()])
+    if found["missing"]:
+        lines += ["", f"Not there, and so not judged: {', '.join(found['missing'])}."]
+    if found["grids"]:
+        lines += ["", "## Presses on arrays", "", "Inside the outer sensors, of rows that neither align nor calibrate. \"width typed\": a prior of the pad's own width, 0.5 mm.",
+                  "\"calibrated\": all sessions of twenty placements that have a solution, whether the tool accepts them or not. silent: beyond 1 mm and no warning.", ""]
+        lines += table_md(("recording", "part", "way", *COLUMNS), grid_rows(found))
+        lines += ["", *table_md(("recording", "width mm", "width found mm", "gains cv %", "places off mm", "centroid p50 mm", "sessions", "accepted", "refused for"), [
+            [row["recording"], *(text_of(row[key], 3) for key in ("width_mm", "width_found_mm", "gains_cv_percent", "places_off_mm", "centroid_p50_mm")),
+             row["sessions"], row["accepted"], ", ".join(row["reasons"])] for row in found["grids"]])]
+    if found["strips"]:
+        rates = [f"{rate['frames_per_s']:g}/s" for rate in found["strips"][0]["rates"]]
+        lines += ["", "## The zero on strips", "", "Share of the time in which nothing touches: contact without a doubt, and doubted zero, at each rate. Longest: of such contacts.", ""]
+        lines += table_md(("recording", "part", "holds", *(f"{what} {rate}" for rate in rates for what in ("contact %", "doubted %", "longest s", "missed"))), [
+            [strip["name"], strip["part"], strip["holds"], *(text_of(rate[key], 3) for rate in strip["rates"] for key in (
+                "phantom_percent", "doubted_percent", "longest_s", "holds_missed"))] for strip in found["strips"]])
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def draw_profile(axes, shown):
+    """Mean reading over the sensor's own peak, by distance in its own widths."""
+    edges = np.arange(0.0, PROFILE_TO + 0.25, 0.25)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    for key, each in shown.items():
+        grid = each["grid"]
+        apart = np.hypot(grid.xy[:, None, 0] - grid.layout[:, 0], grid.xy[:, None, 1] - grid.layout[:, 1]) / grid.width_mm
+        which = np.digitize(apart, edges) - 1
+        share = grid.reading_Pa / grid.peak_Pa
+        mean = [share[which == k].mean() if (which == k).any() else np.nan for k in range(len(middle))]
+        axes.plot(middle, 100 * np.array(mean), lw=1.1, label=key)
+    axes.plot(middle, 100 * np.exp(-middle**2 / 2), color=INK, lw=1, ls=":", label="Gaussian")
+    axes.axhline(0, color=FAINT, lw=0.6)
+    axes.set(title="Response: the dip three to five widths away", xlabel="distance / width", ylabel="% of the peak, symmetric log", yscale="symlog")
+    axes.set_yscale("symlog", linthresh=5)
+    axes.legend(fontsize=7)
+
+
+def draw_map(axes, each, way, title):
+    grid = each["grid"]
+    xy = grid.xy[grid.judged]
+    error = np.minimum(each[way].error_mm, 2.0)
+    points = axes.scatter(xy[:, 0], xy[:, 1], c=error, s=5, vmin=0, vmax=2, cmap="viridis_r", linewidths=0)
+    axes.plot(*grid.layout.T, "s", color=ORANGE, ms=5)
+    axes.set(title=title, aspect="equal", xlabel="x mm", ylabel="y mm")
+    return points
+
+
+def draw_coverage(axes, shown, part):
+    for way, name, colour in (("raw", "width typed", ORANGE), ("calibrated", "calibrated, one session", BLUE)):
+        ratios = [each[way].error_mm[each["inside"]] / np.maximum(each[way].sd_mm[each["inside"]], 1e-6) for key, each in shown.items()
+                  if each[way] is not None and key in part]
+        if ratios:
+            ratio = np.sort(np.concatenate(ratios))
+            axes.plot(ratio, 100 * np.arange(1, len(ratio) + 1) / len(ratio), color=colour, label=name)
+    sd = np.linspace(0, 3, 100)
+    axes.plot(sd, 100 * (1 - np.exp(-sd**2)), color=GOAL, ls=":", label="what the sd promises")
+    axes.set(title="Coverage, inside", xlabel="error / location_sd_mm", ylabel="% of presses", xlim=(0, 3), ylim=(0, 100))
+    axes.legend(fontsize=7)
+
+
+def draw(found, shown, path):
+    figure, axes = plt.subplots(1, 5, figsize=(17, 4.2), layout="constrained", width_ratios=(1.5, 1, 1, 1, 1.3))
+    judges = {row["recording"] for row in found["grids"] if row["part"] == "judges"}
+    if shown:
+        draw_profile(axes[0], shown)
+        each = next((shown[key] for key in shown if key in judges), next(iter(shown.values())))
+        points = None
+        for ax, (way, name) in zip(axes[1:4], WAYS):
+            if each[way] is not None:
+                points = draw_map(ax, each, way, f"Error, {name}")
+        figure.colorbar(points, ax=axes[3], label="mm, 2 and more: darkest", shrink=0.8)
+        draw_coverage(axes[4], shown, judges or set(shown))
+    save(figure, path)
