@@ -2,10 +2,9 @@
  * and shows all fingertips of a file: such jobs are left out, or one is picked. */
 import { readFileSync } from 'node:fs';
 import { basename } from 'node:path';
-import { Decoder } from '../../host_tools/web/src/line/decoder';
-import { PacketType, encodePacket, type Command, type DevicePacket, type Info } from '../../host_tools/web/src/line/packets';
-import { PACKET_KEYS, infoPairs, rowText } from '../../host_tools/web/src/recording/fields';
-import { readItems } from '../../host_tools/web/src/recording/reader';
+import { core, loadCore } from '../../host_tools/web/src/core';
+import { PacketType, type Command, type DevicePacket, type Info } from '../../host_tools/web/src/line/line_facts';
+import { ReadError, readItems } from '../../host_tools/web/src/recording/replay_line';
 import { commandsFor } from '../../host_tools/web/src/steps/settings';
 
 interface Job {
@@ -17,30 +16,52 @@ interface Job {
 }
 type Answer = Record<string, unknown> | string;
 
-const KINDS: [RegExp, string][] = [
-  [/later version/, 'other format'],
-  [/no recording of a fingertip|neither a recording|is empty|before a recording begins/, 'no recording'],
-  [/./, 'damaged'],
-];
+/** By enum fingertip_status. */
+const KINDS: Record<number, string> = { [-3]: 'no recording', [-4]: 'other format', 0: 'damaged', [-5]: 'damaged', [-6]: 'damaged' };
+
+/** The lines that a recording has of a packet, and the head before it: what the page would write. */
+function written(packet: DevicePacket, info: Info): [string[], string[]] {
+  const writer = core.newWriter('csv', info, []);
+  const text = (): string => {
+    let all = '';
+    for (let bytes; (bytes = writer.take()); ) {
+      all += Buffer.from(bytes).toString();
+    }
+    return all;
+  };
+  const head = text().trimEnd().split('\n');
+  writer.packet(packet);
+  const lines = text().trimEnd().split('\n');
+  writer.free();
+  return [head, lines];
+}
+
+function infoOf(sensor_count: number): Info {
+  return { ...(core.blank(PacketType.INFO) as Info), sensor_count };
+}
+
+/** Its keys and values. */
+function infoPairs(info: Info): [string, string][] {
+  return written(info, info)[0]
+    .slice(1, -1)
+    .map((line) => [line.slice(2, line.indexOf(': ')), line.slice(line.indexOf(': ') + 2)]);
+}
 
 function packetAnswer(packet: DevicePacket): Record<string, unknown> {
   const told: Record<string, unknown> = { sequence: packet.sequence, t_us: packet.t_us };
-  const fields = packet as unknown as Record<string, unknown>;
-  const named = (kind: 'health' | 'ack'): Record<string, unknown> => {
-    for (const { key, field } of PACKET_KEYS[kind]) {
-      told[key] = typeof fields[field] === 'bigint' ? String(fields[field]) : fields[field];
-    }
-    return { [kind]: told };
-  };
   switch (packet.type) {
     case PacketType.CONTACT:
-      return { contact: rowText(packet, null, { sensor_count: 0, has_tangential: true }) };
+      return { contact: written(packet, infoOf(1))[1][0]!.slice(0, -2) }; // without the columns of a sensor
     case PacketType.RAW:
-      return { raw: rowText(null, packet, { sensor_count: packet.sensor_count, has_tangential: true }) };
+      return { raw: written(packet, infoOf(packet.sensor_count))[1][0] };
     case PacketType.HEALTH:
-      return named('health');
-    case PacketType.ACK:
-      return named('ack');
+    case PacketType.ACK: {
+      const [kind, ...words] = written(packet, infoOf(1))[1][0]!.replace('# packet: ', '').split(' ');
+      for (const [key, value] of words.map((word) => word.split('=') as [string, string])) {
+        told[key] = key === 'host_time_us' ? value : Number(value);
+      }
+      return { [kind!]: told };
+    }
     case PacketType.INFO:
       return { info: told };
     default:
@@ -75,8 +96,8 @@ async function recording(job: Job): Promise<Answer> {
     }
   } catch (error) {
     const text = error instanceof Error ? error.message : String(error);
-    if (!/no end line|breaks off: its recorder/.test(text)) {
-      return { refused: KINDS.find(([pattern]) => pattern.test(text))?.[1], text };
+    if (!/no end line/.test(text)) {
+      return { refused: KINDS[error instanceof ReadError ? error.status : 1], text };
     }
     has_end = false;
   }
@@ -85,12 +106,11 @@ async function recording(job: Job): Promise<Answer> {
 
 function stream(job: Job): Answer {
   const packets: unknown[] = [];
-  const decoder = new Decoder();
+  const decoder = core.newDecoder();
   decoder.feed(readFileSync(job.input), (packet) => {
-    const sent = { ...packet, t_us: BigInt(packet.t_us) } as unknown as DevicePacket;
     packets.push({
       ...packetAnswer(packet),
-      frame: hex(encodePacket(sent)),
+      frame: hex(core.encode(packet)),
       ...(packet.type === PacketType.INFO ? { keys: infoPairs(packet) } : {}),
     });
   });
@@ -109,11 +129,13 @@ function setting(job: Job): Answer {
   const info = { slip_threshold_mm: 1, slip_window_ms: 100, rate_mHz: 1, osr: 1, prior_sigma_mm: 1.5, prior_width_mm: 1.5, location_limit_mm: 1.5 };
   try {
     const [command] = commandsFor(info as unknown as Info, { [key]: value });
-    return hex(encodePacket({ sequence: 0, t_us: 0n, ...command } as unknown as Command & DevicePacket));
+    return hex(core.encode({ sequence: 0, t_us: 0, ...(command as Command) }));
   } catch (error) {
     return { refused: 'bad value', text: String(error) };
   }
 }
+
+await loadCore(readFileSync(process.env['FINGERTIP_CORE'] ?? ''));
 
 /** What the page has no way to ask, and what is damaged in the rows of one of two: it shows neither. */
 const LEFT_OUT = /^fuzz|^two_(cell|comment|head|chance)_/;

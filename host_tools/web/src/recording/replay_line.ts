@@ -10,7 +10,15 @@ import { PacketType, type DevicePacket } from '../line/line_facts';
 setUnpack((packed, size) => decompress(packed, new Uint8Array(size)));
 
 /** What is wrong with a file: a sentence with the place; what came before it was handed out. */
-export class ReadError extends Error {}
+export class ReadError extends Error {
+  /** status: enum fingertip_status, 0 where the library found nothing wrong. */
+  constructor(
+    message: string,
+    readonly status = 0,
+  ) {
+    super(message);
+  }
+}
 
 export interface Item {
   /** Number of the fingertip in the file, from 0. */
@@ -53,7 +61,7 @@ export async function* readItems(file: File): AsyncGenerator<Item, void, undefin
     }
   } catch (error) {
     throw error instanceof CoreError
-      ? new ReadError([error.message, ADVICE[error.status]].filter(Boolean).join(': '))
+      ? new ReadError([error.message, ADVICE[error.status]].filter(Boolean).join(': '), error.status)
       : error;
   } finally {
     reader.free();
