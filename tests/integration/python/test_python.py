@@ -1,5 +1,6 @@
 """Scenarios, evaluation and plots on data whose answer is known."""
 import contextlib
+import importlib
 import io
 import json
 import math
@@ -10,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+from unittest import mock
 
 import numpy as np
 
@@ -23,11 +25,6 @@ from fingertip.wire import Health  # noqa: E402
 CONTACT, FIT_VALID, SLIP_VALID, SLIP, TARED = 1, 2, 8, 16, 32
 
 
-def setUpModule():
-    """matplotlib's first import on a computer speaks of the fonts that it looks for."""
-    subprocess.run([sys.executable, "-c", "import matplotlib.pyplot"], capture_output=True, check=True)
-
-
 class ToolTest(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
@@ -35,9 +32,14 @@ class ToolTest(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
 
     def tool(self, name, *arguments, status=0):
-        done = subprocess.run([sys.executable, TOOLS, name, *map(str, arguments)], capture_output=True, text=True, check=False)
-        self.assertEqual(done.returncode, status, done.stderr)
-        return done
+        """What the console command does and says, in this process: a Python with matplotlib takes half a second to start."""
+        stdout, stderr = io.StringIO(), io.StringIO()
+        command = importlib.import_module(f"fingertip.{name}").command
+        with mock.patch.object(sys, "argv", [name, *map(str, arguments)]), contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr):
+            found = command()
+        plot.plt.close("all")
+        self.assertEqual(found, status, stderr.getvalue())
+        return subprocess.CompletedProcess(name, found, stdout.getvalue(), stderr.getvalue())
 
     def error(self, name, *arguments):
         done = self.tool(name, *arguments, status=1)
@@ -310,6 +312,13 @@ class Evaluation(ToolTest):
         scenario = self.scenario()
         recording = self.recording(scenario, change=lambda row: {**row, "t_us": row["t_us"] - 5000 * (row["frame"] == 600)})
         self.assertRegex(self.error("evaluate", recording, scenario, "-o", self.folder / "s"), r"\.csv:\d+: a second frame of the same time")
+
+    def test_out_of_the_source_tree(self):
+        recording = self.recording(self.scenario("demo", "--seconds", "2"))
+        for words, status, said in (("plot", recording, "-o", self.folder / "p.png"), 0, ""), (("plot", recording, "-o", "p"), 1, "ends in .png"), (("fly",), 1, "plot|scenario"):
+            done = subprocess.run([sys.executable, TOOLS, *map(str, words)], capture_output=True, text=True, check=False)
+            self.assertEqual(done.returncode, status, done.stderr)
+            self.assertIn(said, done.stderr)
 
     def test_names_cannot_speak_to_the_terminal(self):
         err = self.error("evaluate", self.folder / "\x1b[31m\n", "x", "-o", self.folder / "s")
