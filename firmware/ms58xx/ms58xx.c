@@ -2,7 +2,7 @@
 
 #include <stddef.h>
 
-#define ROW(ratio, bits, max_us, noise_Pa)                                                         \
+#define ROW(ratio, bits, max_us, noise_Pa, noise_degC)                                             \
   {                                                                                                \
     .osr = (ratio), .convert_pressure = 0x40 | (bits), .convert_temperature = 0x50 | (bits),       \
     .conversion_us = (max_us)*105u / 100u, .maximum_us = (max_us),                                 \

@@ -7,6 +7,7 @@
 
 extern "C" {
 #include "ms58xx/ms58xx.h"
+#include "ms58xx/sensors.h"
 }
 
 #include <algorithm>
@@ -36,8 +37,10 @@ constexpr double DRIFT_SURE_sd = 3;
 /* Each temperature moves a sensor's pressures until the next one comes, 2 s later at most (scan.h),
  * by its noise: 240 Pa/degC (readings.h), and rms of the data sheet by OSR. */
 constexpr double TEMPERATURE_Pa_per_degC = 240, TEMPERATURE_INTERVAL_MAX_s = 2;
-constexpr std::pair<unsigned, double> TEMPERATURE_NOISE_degC[] = {
-    {256, 0.012}, {512, 0.009}, {1024, 0.006}, {2048, 0.004}, {4096, 0.003}, {8192, 0.002}};
+#define ROW(ratio, bits, max_us, noise_Pa, noise_degC)                                             \
+  { ratio, noise_degC }
+constexpr std::pair<unsigned, double> TEMPERATURE_NOISE_degC[] = {MS58XX_OSR_TABLE(ROW)};
+#undef ROW
 /* With fewer than four temperatures a slope says nothing. */
 constexpr double DRIFT_SECONDS_MIN = 8;
 /* Readings of sound sensors under cast rubber differ by less: readings.h. */
