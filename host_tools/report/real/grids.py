@@ -17,6 +17,9 @@ RESPONSE_MM = 6.0      # a sensor's response is fitted to presses so near it
 OUTSIDE_MM = 3.0       # presses so far beyond the outer sensors are judged apart
 RAW_GAIN_SD = 0.105    # of a pad that was never calibrated: DEFAULT_GAIN_SD
 PRIOR_WIDTH_MM = 0.5   # of the prior on sigma that a user types: PRIOR_WIDTH in line.toml
+DIP_WIDTHS = 3.2       # of the dip, in widths of the response: on the recording that chooses
+DIP_FROM_WIDTHS = 3.0
+KNOWN_WIDTH_MM = 0.1   # of the prior where a pad's width is known
 PLACEMENTS, SESSIONS, EVERY_S = 20, 30, 8.0
 PLACEMENT_PEAK_PA = 1500.0  # a calibration refuses lighter ones
 
@@ -112,6 +115,24 @@ def stored_job(readings, stored):
 
 def calibration_job(readings):
     return {"kind": "calibrate", "presses": readings.tolist(), "noise_Pa": NOISE_PA, "every_s": EVERY_S}
+
+
+def dip_share(grid):
+    """Depth of the dip, as a share of the contact's peak: least squares over the rows that align, where the Gaussian has ended."""
+    square = ((grid.xy[:, None, :] - grid.layout)**2).sum(axis=2) / grid.width_mm**2
+    far = (square > DIP_FROM_WIDTHS**2) & ~grid.judged[:, None]
+    below = (np.exp(-square / 2) - grid.reading_Pa / grid.peak_Pa)[far]
+    dip = np.exp(-square[far] / (2 * DIP_WIDTHS**2))
+    return float((below * dip).sum() / (dip**2).sum())
+
+
+def without_dip(readings, answer, grid, gain, share, width_mm):
+    """The readings without the dip of the contact that the answer holds."""
+    valid = np.array(answer["flags"]) & int(Flag.FIT_VALID) != 0
+    xy, sigma_mm = np.column_stack([answer["x_mm"], answer["y_mm"]]), np.where(valid, answer["sigma_mm"], 1.0)
+    peak_Pa = np.where(valid, np.array(answer["force_N"]) * 1e6 / (2 * np.pi * sigma_mm**2), 0.0)
+    square = ((xy[:, None, :] - grid.layout)**2).sum(axis=2)
+    return readings + share * peak_Pa[:, None] * np.array(gain) * np.exp(-square / (2 * (DIP_WIDTHS * width_mm)**2))
 
 
 class Felt:

@@ -73,26 +73,44 @@ def judge_grid(program, one, path):
     torn, torn_xy = one_missing(readings[inside]), np.repeat(xy[inside], readings.shape[1], axis=0)
     fits = grids.ask(program, grid, [
         job for one in solved for job in (grids.stored_job(readings, one["stored"]), grids.stored_job(torn, one["stored"]))])
+    profiled = with_profile(program, grid, readings, solved)
     felt = [grids.Felt(answer, xy) for answer in fits[0::2]]
     missing = [grids.Felt(answer, torn_xy) for answer in fits[1::2]]
     raw_felt, shipped_felt = grids.Felt(raw, xy), grids.Felt(shipped, xy)
     all_inside, all_outside = np.tile(inside, len(felt)), np.tile(outside, len(felt))
     before = float(np.median(raw_felt.error_mm[inside]))
     found = {
-        "recording": one["key"], "part": one["part"], "width_mm": typed[0], "gains_cv_percent": 100 * float(grid.peak_Pa.std() / grid.peak_Pa.mean()),
+        "recording": one["key"], "part": one["part"], "width_mm": typed[0], "dip_percent": 100 * grids.dip_share(grid), "gains_cv_percent": 100 * float(grid.peak_Pa.std() / grid.peak_Pa.mean()),
         "places_off_mm": float(np.median(grid.places_off_mm)),
         "centroid_p50_mm": grids.quantile(np.hypot(*(grids.centroid(readings, grid.layout) - xy)[inside].T), 0.5),
         "shipped": shipped_felt.figures(inside, outside), "raw": raw_felt.figures(inside, outside),
         "sessions": len(calibrations), "accepted": len(accepted), "reasons": sorted({one["reason"] for one in calibrations} - {"none"}),
         "width_found_mm": grids.quantile([one["width_mm"] for one in solved], 0.5),
         "worse_after_accept": sum(float(np.median(each.error_mm[inside])) > before for each, one in zip(felt, solved) if one["state"] == "good")}
+    known = [grids.Felt(answer, xy) for answer in profiled]
+    for way, each_felt in (("calibrated", felt), ("profile", known)):
+        if each_felt:
+            found[way] = grids.Felt.joined(each_felt).figures(all_inside, all_outside)
+            found[way]["force_scatter_percent"] = float(np.mean([each.figures(inside, outside)["force_scatter_percent"] for each in each_felt]))
     if felt:
-        all_felt = grids.Felt.joined(felt)
-        found["calibrated"] = all_felt.figures(all_inside, all_outside)
-        found["calibrated"]["force_scatter_percent"] = float(np.mean([each.figures(inside, outside)["force_scatter_percent"] for each in felt]))
         found["one_missing_over_1mm_percent"] = grids.percent(np.concatenate([each.error_mm for each in missing]) > 1.0)
-    shown = {"grid": grid, "inside": inside, "shipped": shipped_felt, "raw": raw_felt, "calibrated": felt[0] if felt else None}
+    shown = {"grid": grid, "inside": inside, "shipped": shipped_felt, "raw": raw_felt, "calibrated": felt[0] if felt else None,
+             "profile": known[0] if known else None}
     return found, shown
+
+
+def with_profile(program, grid, readings, solved):
+    """Answers to a fit that knows the pad's dip, and its width as each calibration finds it: the readings of sensors below zero count as zero, then
+    the dip about what was found is taken out, twice. The firmware has no such fit; this is what it could reach."""
+    share = grids.dip_share(grid)
+
+    def jobs(readings_of):
+        return [grids.fit_job(readings_of(k), one["stored"]["gain"], one["stored"]["gain_sd"], (one["width_mm"], grids.KNOWN_WIDTH_MM)) for k, one in enumerate(solved)]
+
+    answers = grids.ask(program, grid, jobs(lambda k: np.maximum(readings, 0.0)))
+    for _ in range(2):
+        answers = grids.ask(program, grid, jobs(lambda k: grids.without_dip(readings, answers[k], grid, solved[k]["stored"]["gain"], share, solved[k]["width_mm"])))
+    return answers
 
 
 def mean_of(rows, *keys):

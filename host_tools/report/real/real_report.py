@@ -7,7 +7,7 @@ from tables import table_md, text_of
 
 COLUMNS = ("inside_p50_mm", "inside_p95_mm", "over_1mm_percent", "over_2mm_percent", "cover_1sd_percent", "cover_2sd_percent", "warned_percent",
            "silent_percent", "force_scatter_percent", "outside_p50_mm")
-WAYS = (("shipped", "as shipped"), ("raw", "width typed"), ("calibrated", "calibrated"))
+WAYS = (("shipped", "as shipped"), ("raw", "width typed"), ("calibrated", "calibrated"), ("profile", "and dip and width known"))
 PROFILE_TO = 6.0  # widths
 
 
@@ -26,10 +26,11 @@ def write(found, path):
         lines += ["", f"Not there, and so not judged: {', '.join(found['missing'])}."]
     if found["grids"]:
         lines += ["", "## Presses on arrays", "", "Inside the outer sensors, of rows that neither align nor calibrate. \"width typed\": a prior of the pad's own width, 0.5 mm.",
-                  "\"calibrated\": all sessions of twenty placements that have a solution, whether the tool accepts them or not. silent: beyond 1 mm and no warning.", ""]
+                  "\"calibrated\": all sessions of twenty placements that have a solution, whether the tool accepts them or not. \"and dip and width known\": a fit outside the",
+                  "firmware, which shows what a pad's profile is worth. silent: beyond 1 mm and no warning.", ""]
         lines += table_md(("recording", "part", "way", *COLUMNS), grid_rows(found))
-        lines += ["", *table_md(("recording", "width mm", "width found mm", "gains cv %", "places off mm", "centroid p50 mm", "sessions", "accepted", "refused for"), [
-            [row["recording"], *(text_of(row[key], 3) for key in ("width_mm", "width_found_mm", "gains_cv_percent", "places_off_mm", "centroid_p50_mm")),
+        lines += ["", *table_md(("recording", "width mm", "width found mm", "dip %", "gains cv %", "places off mm", "centroid p50 mm", "sessions", "accepted", "refused for"), [
+            [row["recording"], *(text_of(row[key], 3) for key in ("width_mm", "width_found_mm", "dip_percent", "gains_cv_percent", "places_off_mm", "centroid_p50_mm")),
              row["sessions"], row["accepted"], ", ".join(row["reasons"])] for row in found["grids"]])]
     if found["strips"]:
         rates = [f"{rate['frames_per_s']:g}/s" for rate in found["strips"][0]["rates"]]
@@ -69,7 +70,7 @@ def draw_map(axes, each, way, title):
 
 
 def draw_coverage(axes, shown, part):
-    for way, name, colour in (("raw", "width typed", ORANGE), ("calibrated", "calibrated, one session", BLUE)):
+    for way, name, colour in (("raw", "width typed", ORANGE), ("calibrated", "calibrated, one session", BLUE), ("profile", "and dip and width known", INK)):
         ratios = [each[way].error_mm[each["inside"]] / np.maximum(each[way].sd_mm[each["inside"]], 1e-6) for key, each in shown.items()
                   if each[way] is not None and key in part]
         if ratios:
@@ -82,15 +83,15 @@ def draw_coverage(axes, shown, part):
 
 
 def draw(found, shown, path):
-    figure, axes = plt.subplots(1, 5, figsize=(17, 4.2), layout="constrained", width_ratios=(1.5, 1, 1, 1, 1.3))
+    figure, axes = plt.subplots(1, 6, figsize=(19, 4.2), layout="constrained", width_ratios=(1.6, 1, 1, 1, 1, 1.4))
     judges = {row["recording"] for row in found["grids"] if row["part"] == "judges"}
     if shown:
         draw_profile(axes[0], shown)
         each = next((shown[key] for key in shown if key in judges), next(iter(shown.values())))
         points = None
-        for ax, (way, name) in zip(axes[1:4], WAYS):
+        for ax, (way, name) in zip(axes[1:5], WAYS):
             if each[way] is not None:
-                points = draw_map(ax, each, way, f"Error, {name}")
-        figure.colorbar(points, ax=axes[3], label="mm, 2 and more: darkest", shrink=0.8)
-        draw_coverage(axes[4], shown, judges or set(shown))
+                points = draw_map(ax, each, way, name[:1].upper() + name[1:])
+        figure.colorbar(points, ax=axes[4], label="mm, 2 and more: darkest", shrink=0.8)
+        draw_coverage(axes[5], shown, judges or set(shown))
     save(figure, path)
