@@ -166,7 +166,7 @@ void RecordingReader::read_line(const std::string &text) {
 /* Nothing for one that is not wanted. Throws Damage for one that is not in the file. */
 std::optional<std::uint32_t> RecordingReader::device_of(std::string_view number) const {
   auto device = to_u64(number);
-  if (!device || *device >= devices_) {
+  if (!device || *device >= devices_ || std::to_string(*device) != number) {
     if (all_) {
       throw Damage{"there is no fingertip \"" + std::string(number) + "\""};
     }
