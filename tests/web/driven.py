@@ -14,7 +14,7 @@ COUNTS = """(() => {
 
 def ready_s(page):
     """From the address to a picture and buttons that work."""
-    return page.until("fingertip.ready_ms") / 1000
+    return page.until("globalThis.fingertip?.ready_ms") / 1000
 
 
 def connected(page, count):
