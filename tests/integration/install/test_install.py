@@ -110,7 +110,7 @@ class Install(unittest.TestCase):
         symbols = run("nm", "-DC", "--defined-only", self.library)
         ours = {part for name in re.findall(r"^\S+ [TDR] ((?:\w+::)*\w+)", symbols, re.M) for part in name.split("::")}
         for name in ("Session", "Decoder", "DeviceLoop", "PacketFile", "RecordingReader", "choose_way", "open_way", "find_usb",
-                     "command_stream", "osr_from_text", "flags_text", "warning_flags", "info_metadata", "wire_encode", "wire_decode", "fingertip_decoder_feed", "fingertip_reader_next", "fingertip_writer_new"):
+                     "command_stream", "setting_from_text", "flags_text", "warning_flags", "info_metadata", "wire_encode", "wire_decode", "fingertip_decoder_feed", "fingertip_reader_next", "fingertip_writer_new"):
             self.assertIn(name, ours)
         for name in ("SerialTransport", "UsbTransport", "RecordingWriter", "ProgressBar", "OutputFile", "read_firmware", "printable"):
             self.assertNotIn(name, ours)
