@@ -1,12 +1,11 @@
 """shear.py with programs in the place of its parts: what it merges, judges, writes and refuses."""
-import json
 import pathlib
-import subprocess
 import sys
-import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+from report_of_programs import ReportOfPrograms  # noqa: E402
+
 ROW = {"case": "10 %, calibrated, Q/F 0.3", "touches": 10, "valid_percent": 100.0, "ratio_error_p50": 0.011, "ratio_error_p95": 0.04, "vector_error_p50": 0.019,
        "vector_error_p95": 0.056, "direction_p90_deg": 5.9, "location_p50_mm": 0.08, "location_p95_mm": 0.25, "pad": "10 %, calibrated", "load": 0.3}
 TAP = {"pad": "equal gains", "load": 0.3, "location_without_p50_mm": 1.03, "location_without_p95_mm": 1.3, "location_p50_mm": 0.0612, "location_p95_mm": 0.1,
@@ -21,27 +20,8 @@ FOUND = {
                "slides": [{"speed_mm_s": 20, "found": "all of them"}]}}
 
 
-class Shear(unittest.TestCase):
-    def setUp(self):
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.folder = pathlib.Path(temporary.name)
-        self.out = self.folder / "out"
-        for part, found in FOUND.items():
-            self.program(part, f"print({json.dumps(found)!r})")
-
-    def program(self, part, body):
-        path = self.folder / "host_tools/report/shear" / part / f"shear_{part}"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(f"#!{sys.executable}\nimport sys\n{body}\n")
-        path.chmod(0o755)
-
-    def run_tool(self, *options):
-        return subprocess.run([sys.executable, str(ROOT / "host_tools/report/shear/shear.py"), "--build", str(self.folder), "--boards", str(self.folder),
-                               "-o", str(self.out), *options], capture_output=True, text=True)
-
-    def found(self):
-        return json.loads((self.out / "shear.json").read_text())
+class Shear(ReportOfPrograms):
+    NAME, FOUND = "shear", FOUND
 
     def test_parts_are_merged_and_judged(self):
         done = self.run_tool()
@@ -98,13 +78,7 @@ class Shear(unittest.TestCase):
     def test_what_goes_wrong_is_one_line(self):
         self.program("static", "sys.exit(3)")
         self.program("motion", "print('no figures')")
-        for part, words in (("static", "ended with status 3"), ("motion", "wrote no JSON"), ("thumb", "thumb is none of")):
-            with self.subTest(part):
-                done = self.run_tool("--parts", part)
-                self.assertEqual(done.returncode, 1)
-                self.assertIn(words, done.stderr)
-                self.assertEqual(done.stderr.count("\n"), 1)
-                self.assertFalse((self.out / "shear.json").exists())
+        self.fails_in_one_line((("static", "ended with status 3"), ("motion", "wrote no JSON"), ("thumb", "thumb is none of")))
 
     def test_a_part_that_was_not_built(self):
         program = self.folder / "host_tools/report/shear/motion/shear_motion"

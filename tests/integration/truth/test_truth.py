@@ -1,12 +1,11 @@
 """truth.py with programs in the place of its parts: what it merges, judges, writes and refuses."""
-import json
 import pathlib
-import subprocess
 import sys
-import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+from report_of_programs import ReportOfPrograms  # noqa: E402
+
 CASE = {"case": "12 mm, calibrated", "error_p50_mm": 0.14, "cover_1sd": 64.5, "cover_2sd": 97.6, "warned": 4.1, "bad": 0.2, "bad_unflagged": 0.01}
 FOUND = {
     "fit": {
@@ -17,27 +16,8 @@ FOUND = {
         "truth_calibration": {"by_placements": [{"placements": 20, "median_mm": 0.12}]}}}
 
 
-class Truth(unittest.TestCase):
-    def setUp(self):
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.folder = pathlib.Path(temporary.name)
-        self.out = self.folder / "out"
-        for part, found in FOUND.items():
-            self.program(part, f"print({json.dumps(found)!r})")
-
-    def program(self, part, body):
-        path = self.folder / "host_tools/report/truth" / part / f"truth_{part}"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(f"#!{sys.executable}\nimport sys\n{body}\n")
-        path.chmod(0o755)
-
-    def run_tool(self, *options):
-        return subprocess.run([sys.executable, str(ROOT / "host_tools/report/truth/truth.py"), "--build", str(self.folder), "-o", str(self.out),
-                               *options], capture_output=True, text=True)
-
-    def found(self):
-        return json.loads((self.out / "truth.json").read_text())
+class Truth(ReportOfPrograms):
+    NAME, FOUND = "truth", FOUND
 
     def test_parts_are_merged_and_judged(self):
         self.out.mkdir()
@@ -66,14 +46,8 @@ class Truth(unittest.TestCase):
     def test_what_goes_wrong_is_one_line(self):
         self.program("fit", "sys.exit(3)")
         self.program("calibration", "print('no figures')")
-        for part, words in (("fit", "ended with status 3"), ("calibration", "wrote no JSON"), ("gate", "is not there; build it"),
-                            ("thumb", "thumb is none of")):
-            with self.subTest(part):
-                done = self.run_tool("--parts", part)
-                self.assertEqual(done.returncode, 1)
-                self.assertIn(words, done.stderr)
-                self.assertEqual(done.stderr.count("\n"), 1)
-                self.assertFalse((self.out / "truth.json").exists())
+        self.fails_in_one_line((("fit", "ended with status 3"), ("calibration", "wrote no JSON"), ("gate", "is not there; build it"),
+                                ("thumb", "thumb is none of")))
 
 
 if __name__ == "__main__":
