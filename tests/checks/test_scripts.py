@@ -184,7 +184,7 @@ class BootstrapReport(Folder):
 class Demo(Folder):
     """demo.sh alone, with a stand-in for each program that it calls."""
 
-    # Stays until it is ended: nobody writes there.
+    # Stays until it is ended: no program writes there.
     CELL = 'mkdir "$1"; mkfifo "$1/end"; trap "exit 0" TERM; touch "$1/gripper"; read -r end <> "$1/end"'
 
     def setUp(self):

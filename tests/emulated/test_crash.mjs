@@ -193,7 +193,7 @@ test('a first start tells of no crash, whatever is in SRAM', () => {
     bench.end();
   });
 
-  test(`${name}: an interrupt that nobody handles`, () => {
+  test(`${name}: an interrupt without a handler`, () => {
     const bench = new Bench(name);
     bench.stream();
     bench.machine.chip.busWrite(0xe000e100, 1 << 20, 4); // UART0
@@ -220,7 +220,7 @@ test('a first start tells of no crash, whatever is in SRAM', () => {
     bench.end();
   });
 
-  /** While nothing hears it, or nobody comes, nothing is stuck. */
+  /** While no host hears it, or none comes, nothing is stuck. */
   test(`${name}: a bus that sleeps, a cable that is out, a host that is silent or does not read are no reason`, () => {
     const bench = new Bench(name, { faults: [{ type: 'usb_unplug', from_s: 2.5, to_s: 5 }, { type: 'host_stall', from_s: 5.5, to_s: 7 }] });
     bench.stream();

@@ -191,7 +191,7 @@ def main(argv):
     how = parser.add_mutually_exclusive_group(required=True)
     how.add_argument("--runs", type=int, metavar="N", help="of each target")
     how.add_argument("--seconds", type=float, metavar="S", help="of all targets together, by the wall")
-    how.add_argument("--hours", type=float, metavar="H", help="likewise; Ctrl-C ends it sooner")
+    how.add_argument("--hours", type=float, metavar="H", help="the same in hours; Ctrl-C ends it sooner")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="targets at a time (default: %(default)s)")
     parser.add_argument("--seed", type=int, metavar="N", help="of the first round (default: another one each time; of --runs 1)")
     parser.add_argument("--json", type=pathlib.Path, metavar="FILE", help="what was run and found")

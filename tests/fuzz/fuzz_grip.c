@@ -127,7 +127,7 @@ static bool is_grasping(uint8_t state) {
   return state >= GRIP_SQUEEZE && state <= GRIP_SLIPPING;
 }
 
-/* As told of late: a gripper that stands closer than it was sent is on its way to open. */
+/* As reported lately: a gripper that stands closer than it was sent is on its way to open. */
 static int32_t narrowest_width_um(void) {
   int32_t narrowest_um = INT32_MAX;
   for (uint32_t i = 0; i < grip.width_count; i++) {

@@ -201,7 +201,7 @@ void check_packets(const Bytes &bytes, std::size_t cut) {
 void fuzz_one(const uint8_t *bytes, size_t length) {
   fuzz_input input = {bytes, bytes + length};
   const std::uint8_t how = fuzz_u8(&input);
-  if (how < 0xC0) { // most of the time: nobody waits
+  if (how < 0xC0) { // most of the time: without a wait
     check_packets(Bytes(input.at, input.end), how);
     return;
   }

@@ -140,7 +140,7 @@ void fuzz_one(const uint8_t *bytes, size_t length) {
       ours = false;
       start();
       break;
-    case 2: /* bits that read as they like: nobody's, so all that is asked is that it ends */
+    case 2: /* bits that read as they like: of no record, so it must only end */
       native_flash.unstable[fuzz_u16(&input) % NATIVE_FLASH_BYTES] = fuzz_u8(&input);
       ours = false;
       start();

@@ -225,7 +225,7 @@ def sample(mutation, found, count, seed, tell):
 
 
 def summary(judged, known):
-    """Rows by module, and the survivors that nobody has explained."""
+    """Rows by module, and the survivors without an explanation."""
     rows, survivors = [], []
     for name in sorted({module_of(mutant.path) for mutant in judged}):
         own = {mutant: how for mutant, how in judged.items() if module_of(mutant.path) == name}

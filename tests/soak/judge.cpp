@@ -119,7 +119,7 @@ void Judge::sent(std::uint64_t t_us, const wire_packet &command) {
 
 void Judge::received(std::uint64_t t_us, const std::uint8_t *bytes, std::size_t count) {
   if (!open_) {
-    return; // what a host reads after it has closed is nobody's
+    return; // what a host reads after it has closed does not count
   }
   for (std::size_t i = 0; i < count; i++) {
     wire_packet heard;

@@ -247,7 +247,7 @@ private:
     }
   }
 
-  // As far as nobody can interfere.
+  // As far as no other can interfere.
   void advance() {
     const HostTime others = fingertip::test::others_wait_until();
     microseconds until = now() + LONGEST_RUN;

@@ -23,7 +23,7 @@
  *     capabilities=BITS  of its firmware
  *     play=FILE        its raw and contact packets, and its sensors, are those of this recording,
  *                      as fast as they are read; then nothing more
- *     serial=HEX       its serial number; board=NAME, git=HASH, firmware=A.B.C likewise
+ *     serial=HEX       its serial number; board=NAME, git=HASH, firmware=A.B.C: the same
  *     loader=1         ends when it is asked into the loader, by the command or by 1200 baud
  *     version=V        speaks this protocol version, answers nothing else
  *     clock_ppm=P      its clock is fast by so much, over the whole of its life
@@ -205,7 +205,7 @@ private:
     frame_ = 0;
   }
 
-  /* A port that goes takes along what nobody has read yet. */
+  /* A port that goes takes along what was not read yet. */
   void wait_for_reader() {
     constexpr milliseconds step{10}, settled{200}, limit{20000};
     milliseconds empty{0};
@@ -435,7 +435,7 @@ int main(int argc, char **argv) {
     std::string text = argv[i];
     options[text.substr(0, text.find('='))] = text.substr(text.find('=') + 1);
   }
-  struct sigaction action = {}; /* without SA_RESTART: a write that nobody takes ends too */
+  struct sigaction action = {}; /* without SA_RESTART: a write that is not taken ends too */
   action.sa_handler = [](int) { ended = 1; };
   sigaction(SIGTERM, &action, nullptr);
   FakeDevice(argv[1], options).run();

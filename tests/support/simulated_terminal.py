@@ -54,7 +54,7 @@ class Terminal:
 
     def _read(self):
         """A terminal holds four kilobytes: who writes more waits, and all the world with it."""
-        with contextlib.suppress(OSError):  # nobody has it open any more
+        with contextlib.suppress(OSError):  # no program has it open any more
             while came := os.read(self._master, 1 << 16):
                 with self._more:
                     self._came += came
@@ -112,7 +112,7 @@ class Terminal:
             raise AssertionError(f"{error}: {pattern!r} is not shown; status {self.process.poll()}\n{self.shown}\n{self.output[-500:]}") from None
 
     def wait(self, limit_s=PATIENCE_s):
-        """Its status. A terminal that nobody reads stops it."""
+        """Its status. A terminal that is not read stops it."""
         def has_ended():
             self.look()
             return self.process.poll() is not None

@@ -191,7 +191,7 @@ class Process:
         return False
 
     def close_output(self, name):
-        """Nobody reads it any more."""
+        """It is not read any more."""
         getattr(self._popen, name).close()
 
     def _open_pipes(self):

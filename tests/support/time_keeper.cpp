@@ -4,7 +4,7 @@
 //   time_keeper --run TEST [...]    starts a test that is such a process, ends with its status
 //
 // and ends with its first connection, the test's. Of all the threads that are connected (simulated_clock.cpp, simulated_time.py) one runs at a time. When it
-// waits, the next is whoever has something to go on with, longest not run first; where nobody has,
+// waits, the next is one that has something to go on with, longest not run first; where none has,
 // time jumps to the first moment that somebody waits for. So what happens, and when, is the same
 // however fast the machine is, and silence takes no time.
 //

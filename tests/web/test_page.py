@@ -2,7 +2,7 @@
 
 usage: test_page.py --build BUILD --image FILE.bin --node NODE [--pictures] [unittest arguments]
 
-With --pictures Looks writes the reference pictures again: look at them. Exit status 77: there is no such browser here, or nobody may give it ports.
+With --pictures Looks writes the reference pictures again: look at them. Exit status 77: there is no such browser here, or it may get no ports.
 
 real time: a browser, whose fingertips are on pseudo-terminals.
 """
@@ -74,7 +74,7 @@ class PageTest(unittest.TestCase):
         return page
 
     def nothing_else_happened(self, page):
-        """Whatever was done: no request to elsewhere, nothing that its policy refused, no error that nobody caught."""
+        """Whatever was done: no request to elsewhere, nothing that its policy refused, no error that was not caught."""
         self.assertEqual(page.foreign(), [])
         self.assertEqual([each["exceptionDetails"].get("exception", {}).get("description") for each in page.of("Runtime.exceptionThrown")], [])
 

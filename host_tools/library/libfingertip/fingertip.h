@@ -1,26 +1,26 @@
 /* libfingertip in C, for programs in other languages: bytes of a fingertip's line to numbers and
- * back, recordings, clocks, names. It opens no port and no file: the caller moves the bytes, on
- * whatever thread, in whatever loop.
+ * back, recordings, clocks, names. It opens no port and no file. The caller moves the bytes, on any
+ * thread, in any loop.
  *
- * Handles. What _new makes, _free ends; _free takes NULL. Two threads may use two handles at once, but
- * never one handle. Functions without a handle may run on any thread.
+ * Handles. A _new function makes a handle, and _free ends it. _free accepts NULL. Two threads may
+ * use two handles at once, but never one handle. Functions without a handle may run on any thread.
  *
- * Memory. Buffers belong to the caller, and nothing keeps a pointer to them. Strings that are returned
- * belong to the library: those of names for good, fingertip_error until the thread's next call.
- * Functions that write a text are as snprintf: the text is cut to size - 1 characters and ends with a
- * zero, what is returned is its whole length.
+ * Memory. Buffers belong to the caller. The library keeps no pointer to them. Returned strings
+ * belong to the library: names for good, fingertip_error until the thread's next call. Functions
+ * that write a text work as snprintf: they cut the text to size - 1 characters, end it with a zero,
+ * and return its whole length.
  *
  * Errors. No C++ exception leaves the library. A function that can fail returns a status, negative
- * for failure, and fingertip_error has one line about it. Outputs are written on success only.
+ * for failure. fingertip_error then has one line about it. Outputs are written on success only.
  *
- * Numbers. A packet is an array of doubles in the order of its fields, fingertip_field_of says which. The
- * first two are of every packet: sequence, which counts the packets of a sender modulo 65536, and
- * t_us, microseconds on its clock since its start. A double has every number of a packet exactly, a
- * count of microseconds up to 2^53, which is 285 years. Texts are 16 characters' codes, zeros behind.
- * Fields with an element for each sensor have FINGERTIP_SENSORS_MOST elements, of which the first
- * sensor_count are of sensors. A field whose flag is off is 0. PROTOCOL.md says what fields mean, and
- * their units end their names: mm, N, Pa, us; q10 are 1/1024, cC 1/100 of a degree Celsius.
- */
+ * Numbers. A packet is an array of doubles in the order of its fields. fingertip_field_of gives the
+ * order. The first two numbers are in every packet: sequence, which counts the packets of a sender
+ * modulo 65536, and t_us, microseconds on its clock since its start. A double holds every number of
+ * a packet exactly, a count of microseconds up to 2^53, which is 285 years. A text is the codes of
+ * 16 characters, zeros behind. Fields with an element for each sensor have FINGERTIP_SENSORS_MOST
+ * elements. The first sensor_count of them are of sensors. A field whose flag is off is 0.
+ * PROTOCOL.md explains the fields. Their names end with their units: mm, N, Pa, us; q10 are 1/1024,
+ * cC 1/100 of a degree Celsius. */
 #ifndef LIBFINGERTIP_FINGERTIP_H
 #define LIBFINGERTIP_FINGERTIP_H
 
@@ -80,7 +80,8 @@ size_t fingertip_value_count(uint8_t type);
  * fingertip_value_count. FINGERTIP_ERR_VALUE names the field. */
 enum fingertip_status fingertip_encode(uint8_t type, const double *values, size_t count,
                                        uint8_t *frame, size_t size, size_t *length);
-/* The command info as another version of the protocol has it: who speaks that version answers. */
+/* The command info in another version of the protocol: a fingertip that speaks that version
+ * answers. */
 enum fingertip_status fingertip_encode_info_of(uint8_t version, uint8_t *frame, size_t size,
                                                size_t *length);
 
@@ -102,11 +103,12 @@ struct fingertip_decoder;
 struct fingertip_decoder *fingertip_decoder_new(void); /* NULL: out of memory */
 void fingertip_decoder_free(struct fingertip_decoder *decoder);
 
-/* Takes bytes as they come, cut anywhere. For each packet that they complete it writes 1 + n numbers to
- * values, one packet behind the other: its type, then its n = fingertip_value_count(type). *filled: of
- * numbers in all. Returns how many bytes were taken; fewer than length where values is full: use what
- * is there, and call again with the rest. size: 1 + FINGERTIP_VALUES_MOST at least, else none is taken.
- * The frame that is under way when a receiver joins is torn by nature, and counts as nothing. */
+/* Takes bytes as they come, cut anywhere. For each packet that they complete it writes 1 + n
+ * numbers to values, one packet behind the other: its type, then its n =
+ * fingertip_value_count(type). *filled: count of all numbers. Returns how many bytes were taken;
+ * fewer than length where values is full: use what is there, and call again with the rest. size: 1
+ * + FINGERTIP_VALUES_MOST at least, else none is taken. A receiver that joins gets only the end of
+ * the first frame, which counts as nothing. */
 size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *bytes,
                               size_t length, double *values, size_t size, size_t *filled);
 /* The line was interrupted: join again, and expect no particular sequence number. */
@@ -116,7 +118,7 @@ void fingertip_decoder_counts(const struct fingertip_decoder *decoder,
 /* Of the last packet that counted as a version error; 0: there was none. */
 uint8_t fingertip_decoder_other_version(const struct fingertip_decoder *decoder);
 
-/* ---- Reading recordings: CSV, MCAP, and captures of the line, told apart by their first bytes */
+/* ---- Reading recordings: CSV, MCAP, and captures of the line, known by their first bytes */
 
 struct fingertip_reader;
 /* name: of the file, for errors. size: of all its bytes. salvage: 1 to skip what is damaged. */
@@ -145,7 +147,7 @@ int fingertip_reader_is_capture(const struct fingertip_reader *reader);
 /* Whether the last line of a recording was seen, without which its recorder was killed or its disk was
  * full; 1 at the end of a capture. */
 int fingertip_reader_has_end(const struct fingertip_reader *reader);
-/* Lines that were skipped, and in a capture what its packets tell. */
+/* Lines that were skipped, and in a capture the line's counters by its packets. */
 uint64_t fingertip_reader_skipped(const struct fingertip_reader *reader);
 void fingertip_reader_counts(const struct fingertip_reader *reader,
                              double counts[FINGERTIP_COUNTS]);

@@ -2,7 +2,7 @@
 
     fingertip/SERIAL/contact, raw, health, info   the packet's frame as it stood on the line, without its closing zero: wire.decode
                                                   reads it; firmware/wire/PROTOCOL.md is its format. The attachment is a Stamp.
-    fingertip/SERIAL/other                        likewise what else it says: acknowledgements, crashes
+    fingertip/SERIAL/other                        the other packets: acknowledgements, crashes
     fingertip/SERIAL/status                       JSON, twice a second, and asked: host, its clock by its own time daemon, lines with the number of
                                                   the last packet that was published, or asked, that was read, and what the line counts
     fingertip/SERIAL/tare, set, info              to be asked; tare?force=1 and set?osr=256;rate_Hz=0 take the arguments of Fingertip.tare
@@ -41,8 +41,8 @@ _STAMP = struct.Struct("<QQqqffI")
 class Stamp(NamedTuple):
     """The attachment of a packet: 44 bytes, little-endian, in this order.
 
-    line: u64, begins anew when the bridge or the fingertip does, and only grows. number: u64, counts from 1 the packets that the fingertip sent
-    on this line, with those that the line lost. taken_ns: i64, the host's clock, ns since 1970, when it was read. measured_ns: i64, likewise
+    line: u64, begins again when the bridge or the fingertip does, and only grows. number: u64, counts from 1 the packets that the fingertip sent
+    on this line, with those that the line lost. taken_ns: i64, the host's clock, ns since 1970, when it was read. measured_ns: i64, the same
     when the fingertip's clock stood at the packet's t_us, good to uncertainty_us, f32; drift_ppm: f32, of the fingertip's clock against the
     host's. shared: u32, 1 where it came through `fingertip serve`, whose sequence numbers are not the fingertip's.
     """

@@ -14,7 +14,7 @@
 /* CRC-32 of every command and report of a grasp. */
 uint32_t grip_bits_of(uint32_t grasp);
 
-/* The program's own: called on either side of grip_step, for whoever counts its cycles. */
+/* The program's own: called on either side of grip_step, to count its cycles. */
 void grip_bits_count(bool on);
 
 #endif

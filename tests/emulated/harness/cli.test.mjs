@@ -94,7 +94,7 @@ for (const [name, args, message] of [
   ['bad pace', ['--image', image, ...base, '--pace', 'slow'], /^error: --pace "slow" is neither real, wall nor fast\n$/],
   ['a pace beside steps', ['--image', image, ...base, '--stepped', '--pace', 'real'], /^error: --stepped has no --pace/],
   ['two ports', ['--image', image, ...base, '--stepped', '--pty', 'x'], /^error: --pty and --stepped exclude each other\n$/],
-  ['steps that nobody asks for', ['--image', image, ...base, '--stepped'], /^error: the program on standard input is gone\n$/],
+  ['steps that no program asks for', ['--image', image, ...base, '--stepped'], /^error: the program on standard input is gone\n$/],
   ['report nowhere', ['--image', image, ...base, '--seconds', '1e6', '--report', '/nowhere/r'], /^error: \/nowhere\/r: cannot write \(no such file or directory\); check the folder\n$/],
   ['bad scenario', ['--image', image, '--board', 'pico_mux', '--scenario', image], /^error: .*:1: not a scenario/],
 ]) {

@@ -34,7 +34,7 @@ test('select, reset, PROM and conversion through multiplexer 2, channel 3 reach 
   assert.ok(results[9] > 5e6 && results[9] < 8e6);
 });
 
-test('address not acknowledged: source, flush, STOP; data not acknowledged likewise', () => {
+test('address not acknowledged: source, flush, STOP; data not acknowledged: the same', () => {
   const { results } = run(main(`RESULT(0) = i2c_run(0x76, b, 3, 0, 0); b[0] = 1; i2c_run(0x70, b, 1, 0, 0);
     b[0] = 0xae; b[1] = 1; RESULT(1) = i2c_run(0x76, b, 2, 0, 0);`));
   assert.equal(results[0] & 0xffff, 1);

@@ -83,7 +83,7 @@ class GraspTest(unittest.TestCase):
         return self.told(process, f" s  {state} ")
 
     def told(self, process, words):
-        """Likewise, up to the line with these words."""
+        """The same, up to the line with these words."""
         lines = []
         while line := process.readline():
             lines.append(line)
@@ -397,7 +397,7 @@ class Trouble(GraspTest):
             self.assertRegex(err, "(?m)^the gripper failed: it is not active any more: it lost its power, or was reset$")
 
     def test_a_program_that_stands_for_two_seconds_goes_on(self):
-        """A machine that stops one of them: the gripper says that nobody spoke to it, and takes commands as before."""
+        """A machine that stops one of them: the gripper reports a second without a command, and takes commands as before."""
         with self.cell():
             process = self.hold()
             for stopped in (process, self.simulated):

@@ -25,7 +25,7 @@ from simulated_time import SimulatedTime  # noqa: E402
 PATIENCE_s = 60
 STOPS_s = 0.3  # of real time
 DONE, FAILED, MISSED, DROPPED, FAULT = 0, 1, 3, 4, 5
-UNABLE = (FAULT, DROPPED)  # with a gripper that nobody reaches: a cup that becomes heavy then falls
+UNABLE = (FAULT, DROPPED)  # with a gripper that cannot be reached: a cup that becomes heavy then falls
 
 # How much more than the cap a grip may be: forces are measured within some 10 %, and one count of a 2F-85 on a paper cup is up to 0.4 N.
 OVER_CAP = 1.25

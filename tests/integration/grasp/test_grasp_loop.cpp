@@ -136,7 +136,7 @@ TEST_F(GraspLoopTest, InterruptsHoldAndThenOpenWithoutAnybodyTakingNews) {
   until_frames(100);
   EXPECT_EQ(state_->moves().size(), moves) << "moves while it is to be still";
   interrupts = 2;
-  wait_until(host_now() + milliseconds(300)); /* nobody takes */
+  wait_until(host_now() + milliseconds(300)); /* no news are taken */
   ASSERT_TRUE(until_state(GRIP_OPEN));
   EXPECT_GT(state_->width_mm(), 45.0);
   end();

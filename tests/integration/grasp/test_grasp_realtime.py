@@ -19,7 +19,7 @@ from fingertip import files  # noqa: E402
 
 # A machine that is held up for less than that changes nothing of what is asked here.
 HELD_UP = ("--timeout", "10000", "--silent", "5000", "--stale", "1000")
-STOPPED_s = 2  # a Robotiq reports a second in which nobody spoke to it
+STOPPED_s = 2  # a Robotiq reports a second without a command
 PATIENCE_s = 120  # then it ends and says where it waited
 
 

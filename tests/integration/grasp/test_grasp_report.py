@@ -32,7 +32,7 @@ else:
 print(json.dumps(row))
 '''
 
-# A cup crushed, and once more where nobody could tell.
+# A cup crushed, and once more where no controller could notice.
 FAULTS = '''
 import json
 row = {"fault": "one fingertip gone", "state": "holding", "gripper": "2f85", "object": "paper cup", "begun": True, "untold": False, "said": "finger_0_stale",

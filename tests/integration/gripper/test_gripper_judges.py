@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The grippers' lines against software that nobody here wrote: pyrobotiqgripper and Feetech's SDK drive the simulated
+"""The grippers' lines against software of others: pyrobotiqgripper and Feetech's SDK drive the simulated
 grippers, pymodbus is their client and our tool's server.
 
 usage: test_gripper_judges.py FINGERTIP CELL_GRIPPER [unittest's]

@@ -24,7 +24,7 @@ class CliTest(unittest.TestCase):
         self.ftr = os.path.join(self.folder, "r.ftr")
         self.environment = {k: v for k, v in os.environ.items() if k != "FINGERTIP_PORT" and not k.startswith("LC_")}
         self.environment["LC_ALL"] = "C.UTF-8"
-        self.environment["XDG_RUNTIME_DIR"] = self.folder  # where nobody shares a fingertip
+        self.environment["XDG_RUNTIME_DIR"] = self.folder  # where no program shares a fingertip
         self.world = self.make_world()
         self.addCleanup(self.world.close)
 

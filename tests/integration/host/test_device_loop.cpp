@@ -128,7 +128,7 @@ TEST(DeviceLoop, AFullFeedHoldsItBackAndDoesNotKeepItFromEnding) {
   {
     DeviceLoop loop(0, {"", fingertip.path(), false}, streaming(), feed);
     loop.start();
-    wait_until(host_now() + milliseconds(1500)); /* nobody takes */
+    wait_until(host_now() + milliseconds(1500)); /* no news are taken */
     before = loop.statistics().packets;
     wait_until(host_now() + milliseconds(300));
     after = loop.statistics().packets;

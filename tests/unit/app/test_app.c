@@ -72,7 +72,7 @@ static void a_press_is_located_and_weighed(void) {
             ~(uint32_t)(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_HELD));
     TEST_ASSERT_EQUAL_HEX32(0x7FFF, contact.sensors_used);
     /* Noise, and the compensation's own rounding. The standard deviations are far larger: they are
-     * those of a pad that nobody has calibrated, and these sensors happen to be alike. */
+     * those of a pad that was never calibrated, and these sensors happen to be alike. */
     TEST_ASSERT_FLOAT_WITHIN(0.01f, 2.5f, contact.x_mm);
     TEST_ASSERT_FLOAT_WITHIN(0.01f, -7.0f, contact.y_mm);
     TEST_ASSERT_FLOAT_WITHIN(0.01f, 5.0f, contact.force_N);
@@ -203,7 +203,7 @@ static void a_calibration_acts_on_readings_and_force(void) {
   struct wire_contact before = last_contact();
   TEST_ASSERT_FALSE(before.flags & CONTACT_FLAG_CALIBRATED);
   TEST_ASSERT_TRUE(fabsf(before.force_N - 5.0f) > 0.1f);
-  TEST_ASSERT_TRUE(before.force_sd_N > 0.4f); /* nobody knows the scale of this pad */
+  TEST_ASSERT_TRUE(before.force_sd_N > 0.4f); /* the scale of this pad is unknown */
 
   struct wire_packet command = calibrate_command();
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(command));
@@ -274,7 +274,7 @@ static void settings_are_kept_when_asked_for_and_forgotten_likewise(void) {
   ask((struct wire_packet){.type = WIRE_CMD_SLIP, .body.cmd_slip = {0.5f, 200}});
   ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {3.1f, 0.4f}});
   ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {0.8f}});
-  TEST_ASSERT_EQUAL_UINT32_MESSAGE(built.rate_mHz, info_after_restart().rate_mHz, "nobody kept it");
+  TEST_ASSERT_EQUAL_UINT32_MESSAGE(built.rate_mHz, info_after_restart().rate_mHz, "it was not kept");
 
   ask((struct wire_packet){.type = WIRE_CMD_RATE, .body.cmd_rate = {50000}});
   ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {512}});

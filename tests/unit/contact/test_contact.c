@@ -147,7 +147,7 @@ static void test_a_location_that_noise_moves_ends_the_history(void) {
   TEST_ASSERT_EQUAL_UINT16(0, history.count);
   setUp();
   fill_history();
-  fit.flags = CONTACT_FLAG_FIT_VALID; /* and nobody knows how far */
+  fit.flags = CONTACT_FLAG_FIT_VALID; /* and it is unknown how far */
   TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID, update());
 }
 

@@ -444,7 +444,7 @@ static void stays_without_fingertips(void) {
   TEST_ASSERT_LESS_THAN(before_um, world.sent_um);
 }
 
-/* Nobody calls the controller, and nothing is heard, for so long. */
+/* No call of the controller, and no input, for so long. */
 static void pass_us(uint64_t us) {
   world.t_us += us;
   world.frames = (uint32_t)(world.t_us / world.frame_us);

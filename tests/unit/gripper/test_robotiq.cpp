@@ -77,7 +77,7 @@ template <typename Act> ErrorCode code_of(Act act) {
  * theirs. */
 TEST(RobotiqFrames, AreThoseOfTheManual) {
   Tape tape({
-      {"09 04 07 D0 00 03 B1 CE", ""}, // before function 4 nobody answers
+      {"09 04 07 D0 00 03 B1 CE", ""}, // before function 4 no answer comes
       {"09 03 07 D0 00 01 85 CF", "09 03 02 31 00 4C 15"},
       {"09 03 07 D0 00 03 04 0E", "09 03 06 F9 00 00 00 0D 00 56 4C"},
       // activate

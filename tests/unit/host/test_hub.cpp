@@ -124,7 +124,7 @@ TEST_F(HubTest, AsksWhoIsThereAndForNoStreams) {
   hub.tick(now + milliseconds(900));
   EXPECT_TRUE(commands().empty()) << "the answer may still come";
   hub.tick(now + seconds(2));
-  EXPECT_EQ(commands().size(), 2u) << "nobody answered";
+  EXPECT_EQ(commands().size(), 2u) << "no answer came";
   answer(asked[0]);
   ASSERT_TRUE(hub.info());
   EXPECT_EQ(std::string(hub.info()->serial, WIRE_TEXT_BYTES), "E660583883265A2C");
@@ -208,7 +208,7 @@ TEST_F(HubTest, WhoeverLeavesWantsNothing) {
   auto asked = commands();
   ASSERT_EQ(asked.size(), 2u);
   EXPECT_EQ(asked[1].body.cmd_stream.streams, WIRE_STREAM_CONTACT);
-  answer(asked[0]); /* to nobody */
+  answer(asked[0]); /* to no client */
   answer(asked[1]);
   hub.tick(now);
   EXPECT_TRUE(commands().empty());

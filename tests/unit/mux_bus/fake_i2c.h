@@ -19,9 +19,9 @@ struct fake_i2c {
   bool mux_missing[BOARD_MUX_COUNT];
   bool sensor_missing[BOARD_SENSOR_COUNT];
   unsigned hang_at;             /* the transaction with this number, from 1, never ends */
-  unsigned arbitration_lost_at; /* likewise, loses arbitration */
-  unsigned nack_select_at;      /* likewise, the addressed multiplexer misses its address */
-  unsigned nack_read_at;        /* likewise, the sensor that is read */
+  unsigned arbitration_lost_at; /* the same, loses arbitration */
+  unsigned nack_select_at;      /* the same, the addressed multiplexer misses its address */
+  unsigned nack_read_at;        /* the same, the sensor that is read */
   unsigned busy_polls; /* polls of each transaction that find the controller not yet idle */
   bool sda_held, scl_held;
   uint32_t

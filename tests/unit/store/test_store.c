@@ -383,7 +383,7 @@ static void what_another_firmware_wrote_is_left_alone(void) {
   }
 }
 
-/* Of the newest record, whoever wrote it. */
+/* Of the newest record, of any writer. */
 static void generations_go_round(void) {
   for (uint32_t generation = UINT32_MAX - 2; generation != 3; generation++) {
     native_flash_reset(7);
