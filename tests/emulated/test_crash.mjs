@@ -1,14 +1,14 @@
 /**
  * What the release images leave when they end in a fault, a panic or by the watchdog, and what the next life tells of it.
  *
- * usage: test_crash.mjs BUILD_OF_IMAGES FINGERTIP
+ * usage: test_crash.mjs BUILD_OF_IMAGES FINGERTIP COMMAND_FRAME
  */
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { test } from 'node:test';
 import { ImageBench } from './harness/image_bench.mjs';
 
-const [images, command_frame] = process.argv.slice(2);
+const [images, fingertip, command_frame] = process.argv.slice(2);
 // crash.h
 const [FAULT, PANIC, WATCHDOG, EXCEPTION, OVERFLOW, START] = [1, 2, 3, 4, 5, 6];
 const [MAIN, SCAN, USB, INTERRUPTS] = [1, 2, 4, 8];
@@ -23,7 +23,7 @@ const LIMIT_ms = 400;
 
 class Bench extends ImageBench {
   constructor(name, options) {
-    super(images, command_frame, name, options);
+    super(images, { fingertip, command_frame }, name, options);
     const lines = execFileSync('arm-none-eabi-nm', ['-S', this.elf], { encoding: 'utf8' }).trim().split('\n').map((l) => l.split(' '));
     this.symbols = new Map(lines.map((words) => [words.at(-1), parseInt(words[0], 16) & ~1]));
     this.functions = lines.filter((words) => /^[tT]$/.test(words.at(-2)) && !words.at(-1).startsWith('$')).map((words) => [parseInt(words[0], 16) & ~1, words.at(-1)]).sort((a, b) => a[0] - b[0]);

@@ -1,6 +1,6 @@
 """The release image of pico_mux in the emulator: accuracy, repeatability, timing, faults.
 
-usage: test_pico_mux.py --image F.bin --fingertip TOOL --node NODE
+usage: test_pico_mux.py --image F.bin --fingertip TOOL --command_frame PROGRAM --node NODE
 """
 import argparse
 import csv
@@ -245,7 +245,7 @@ class PicoMux(unittest.TestCase):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    for name in ("image", "fingertip", "node"):
+    for name in ("image", "fingertip", "command_frame", "node"):
         parser.add_argument(f"--{name}", required=True)
     _, rest = parser.parse_known_args(namespace=TOOLS)
     unittest.main(argv=[sys.argv[0], *rest], verbosity=2)

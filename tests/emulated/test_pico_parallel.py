@@ -1,6 +1,6 @@
 """The release image of pico_parallel in the emulator: rate, accuracy, faults of lines, sensors, clock and host.
 
-usage: test_pico_parallel.py --image F.bin --fingertip TOOL --node NODE
+usage: test_pico_parallel.py --image F.bin --fingertip TOOL --command_frame PROGRAM --node NODE
 """
 import argparse
 import json
@@ -208,7 +208,7 @@ class PicoParallel(unittest.TestCase):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    for argument in ("image", "fingertip", "node"):
+    for argument in ("image", "fingertip", "command_frame", "node"):
         parser.add_argument(f"--{argument}", required=True)
     _, rest = parser.parse_known_args(namespace=TOOLS)
     unittest.main(argv=[sys.argv[0], *rest], verbosity=2)

@@ -1,7 +1,7 @@
 """The images of the scenes raw and press in the emulator: a packet has no field of what is off, and no command brings it back; that of
 grasp tells the tangential load in every frame and keeps up.
 
-usage: test_scenes.py --scenes FOLDER --fingertip TOOL --node NODE
+usage: test_scenes.py --scenes FOLDER --fingertip TOOL --command_frame PROGRAM --node NODE
 """
 import argparse
 import pathlib
@@ -109,7 +109,7 @@ class Scenes(unittest.TestCase):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    for argument in ("scenes", "fingertip", "node"):
+    for argument in ("scenes", "fingertip", "command_frame", "node"):
         parser.add_argument(f"--{argument}", required=True)
     _, rest = parser.parse_known_args(namespace=TOOLS)
     unittest.main(argv=[sys.argv[0], *rest], verbosity=2)

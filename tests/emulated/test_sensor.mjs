@@ -2,7 +2,7 @@
  * An image for the MS5837-30BA: boots, reads the PROMs of such sensors and streams the figures of their datasheet's
  * worked example (10/2015, page 7; rev. C2 of 12/2019, page 11).
  *
- * usage: test_sensor.mjs FOLDER_WITH_IMAGE FINGERTIP
+ * usage: test_sensor.mjs FOLDER_WITH_IMAGE FINGERTIP COMMAND_FRAME
  */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -11,7 +11,7 @@ import { parseScenario } from '../../host_tools/simulation/emulator/scenario.mjs
 import { HEADER } from './harness/bench.mjs';
 import { ImageBench } from './harness/image_bench.mjs';
 
-const [images, command_frame] = process.argv.slice(2);
+const [images, fingertip, command_frame] = process.argv.slice(2);
 const SENSOR = 'ms5837_30ba';
 const EXAMPLE = [0x1a << 5, 34982, 36352, 20328, 22354, 26646, 26146];
 const [D1, D2] = [4958179, 6815414];
@@ -24,7 +24,7 @@ function bench() {
   const { pressure_Pa, temperature_cdegC } = compensate(WORDS, D1, D2, findSensor(SENSOR));
   const scenario = parseScenario(`# fingertip-scenario 1\n# ambient_Pa: ${pressure_Pa}\n# temperature_degC: ${temperature_cdegC / 100}\n${HEADER}\n0${',0'.repeat(22)}\n`, 'example.csv');
   const transfers = [];
-  const it = new ImageBench(images, command_frame, 'pico_parallel', { scenario, sensor: SENSOR, onBusTransfer: (transfer) => transfers.push(transfer) });
+  const it = new ImageBench(images, { fingertip, command_frame }, 'pico_parallel', { scenario, sensor: SENSOR, onBusTransfer: (transfer) => transfers.push(transfer) });
   for (const sensor of it.machine.board.sensors) {
     sensor.prom = WORDS;
     sensor.prng = { normal: () => 0, range: () => 0 };

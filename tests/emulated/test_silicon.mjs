@@ -2,7 +2,7 @@
  * The release images on a chip that behaves as silicon does at its worst: each fault is overcome without help, in a
  * time that is the same in every run.
  *
- * usage: test_silicon.mjs BUILD_OF_IMAGES FINGERTIP [STEP_us]
+ * usage: test_silicon.mjs BUILD_OF_IMAGES FINGERTIP COMMAND_FRAME [STEP_us]
  *
  * STEP_us: from one interrupted start to the next; 100 takes some minutes. Default: 4000.
  */
@@ -14,14 +14,14 @@ import { setupPacket } from '../../host_tools/simulation/emulator/usb/host.mjs';
 import { HEADER } from './harness/bench.mjs';
 import { ImageBench } from './harness/image_bench.mjs';
 
-const [images, command_frame, step_us = '4000'] = process.argv.slice(2);
+const [images, fingertip, command_frame, step_us = '4000'] = process.argv.slice(2);
 const BOARDS = ['pico_mux', 'pico_parallel'];
 // Flags of a contact (contact_flags.h)
 const [CONTACT, TARED] = [1 << 0, 1 << 5];
 
 class Bench extends ImageBench {
   constructor(name, options) {
-    super(images, command_frame, name, options);
+    super(images, { fingertip, command_frame }, name, options);
   }
 }
 

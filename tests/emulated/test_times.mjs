@@ -2,19 +2,19 @@
  * The release images after days: their timer begins shortly before it crosses 2^32 us, 2^32 ms and 60 days, and nothing steps back or
  * stands still, awake or asleep.
  *
- * usage: test_times.mjs BUILD_OF_IMAGES FINGERTIP
+ * usage: test_times.mjs BUILD_OF_IMAGES FINGERTIP COMMAND_FRAME
  */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { ImageBench } from './harness/image_bench.mjs';
 
-const [images, command_frame] = process.argv.slice(2);
+const [images, fingertip, command_frame] = process.argv.slice(2);
 const DAY_us = 86400e6;
 const CROSSINGS = [['2^32 us', 2 ** 32], ['2^32 ms', 2 ** 32 * 1000], ['60 days', 60 * DAY_us]];
 const BEFORE_us = 400e3;
 
 function bench(name, crossing_us) {
-  const made = new ImageBench(images, command_frame, name, { uptime_us: crossing_us - BEFORE_us });
+  const made = new ImageBench(images, { fingertip, command_frame }, name, { uptime_us: crossing_us - BEFORE_us });
   made.stream();
   return made;
 }

@@ -11,11 +11,11 @@ import { steady } from './bench.mjs';
 
 const commands = new Map();
 
-/** images: the folder with those of all boards; command_frame: the program of tests/support. */
+/** images: the folder with those of all boards; tools: { fingertip, command_frame }, the tool and the program of tests/support. */
 export class ImageBench {
-  constructor(images, command_frame, name, { faults = [], ...options } = {}) {
+  constructor(images, tools, name, { faults = [], ...options } = {}) {
     const Board = findBoard(name);
-    this.command_frame = command_frame;
+    this.tools = tools;
     this.elf = join(images, name, `fingertip-${name}.elf`);
     this.received = [];
     this.bytes = 0;
@@ -34,7 +34,7 @@ export class ImageBench {
   /** The bytes of a command. */
   encoded(...command) {
     const words = command.join(' ');
-    if (!commands.has(words)) commands.set(words, Buffer.from(execFileSync(this.command_frame, command, { encoding: 'utf8' }).trim(), 'hex'));
+    if (!commands.has(words)) commands.set(words, Buffer.from(execFileSync(this.tools.command_frame, command, { encoding: 'utf8' }).trim(), 'hex'));
     return commands.get(words);
   }
 
@@ -79,7 +79,7 @@ export class ImageBench {
     try {
       const [stream, table] = [join(folder, 'stream.ftr'), join(folder, 'stream.csv')];
       writeFileSync(stream, Buffer.concat(this.received));
-      execFileSync(this.fingertip, ['replay', stream, '--to-csv', table], { stdio: 'pipe' });
+      execFileSync(this.tools.fingertip, ['replay', stream, '--to-csv', table], { stdio: 'pipe' });
       return readFileSync(table, 'utf8').trim().split('\n');
     } finally {
       rmSync(folder, { recursive: true });
