@@ -30,7 +30,7 @@ import tomllib
 
 # figure: what it shall be, and what it may be until then. The second only ever falls.
 LIMITS = {"files_per_board": (8, 8), "files_per_gripper": (5, 5), "files_per_field": (6, 6), "files_per_setting": (6, 6), "rooms": (9, 9), "circles": (0, 0),
-          "format_disagreements": (0, 202), "page_codec_lines": (0, 0), "longest_file": (700, 700)}
+          "format_disagreements": (0, 0), "page_codec_lines": (0, 0), "longest_file": (700, 700)}
 APART = ("firmware/fit/", "firmware/condition/", "firmware/grip/")  # from longest_file
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".S", ".py", ".mjs", ".ts", ".mts", ".sh", ".cmake", ".inc", ".css", ".toml"}
 TEXTS = SOURCES | {".md", ".txt", ".json", ".html", ".in", ".1", ".bash", ".fish", ".cfg", ".msg", ""}

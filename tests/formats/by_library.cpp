@@ -117,16 +117,35 @@ const char *kind_of(ErrorCode code) {
   }
 }
 
-json answer_to(const json &job) {
+template <typename Work> json answered(const Work &work) {
   try {
-    const std::string kind = job["kind"], input = job["input"];
-    if (kind == "recording") {
-      return recording_json(input, job["salvage"], job["device"]);
-    }
-    return kind == "stream" ? stream_json(input) : setting_json(input);
+    return work();
   } catch (const Error &error) {
     return {{"refused", kind_of(error.code())}, {"text", error.what()}};
   }
+}
+
+/* Why all fingertips of a file together are refused, as a reader of all of them has it; null: they are not. */
+json refusal_of_all(const std::string &path) {
+  return answered([&]() -> json {
+    RecordingReader reader(path, false, open_lines(path));
+    while (reader.next()) {
+    }
+    return nullptr;
+  });
+}
+
+json answer_to(const json &job) {
+  const std::string kind = job["kind"], input = job["input"], device = job["device"];
+  json answer = answered([&] {
+    return kind == "recording" ? recording_json(input, job["salvage"], device) : kind == "stream" ? stream_json(input) : setting_json(input);
+  });
+  if (kind == "recording" && !device.empty() && !job["salvage"]) {
+    if (json refusal = refusal_of_all(input); !refusal.is_null()) {
+      answer["of_all"] = refusal;
+    }
+  }
+  return answer;
 }
 
 } // namespace

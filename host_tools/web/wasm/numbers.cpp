@@ -11,7 +11,8 @@ namespace fingertip {
 
 namespace {
 
-// strtod takes more than std::from_chars does: blanks, "+", hexadecimal.
+// strtod takes more than std::from_chars does: blanks, "+", hexadecimal, and what is too small to be
+// anything but 0.
 template <typename Number>
 std::optional<Number> parsed(std::string_view text, Number (*convert)(const char *, char **)) {
   if (text.empty() || text.find_first_not_of("0123456789.eE+-") != std::string_view::npos ||
@@ -21,8 +22,12 @@ std::optional<Number> parsed(std::string_view text, Number (*convert)(const char
   const std::string copy(text);
   char *end = nullptr;
   const Number value = convert(copy.c_str(), &end);
-  return end == copy.c_str() + copy.size() && std::isfinite(value) ? std::optional(value)
-                                                                   : std::nullopt;
+  const bool vanished =
+      value == Number(0) && text.substr(0, text.find_first_of("eE")).find_first_of("123456789") !=
+                                std::string_view::npos;
+  return end == copy.c_str() + copy.size() && std::isfinite(value) && !vanished
+             ? std::optional(value)
+             : std::nullopt;
 }
 
 template <typename Integer> std::optional<Integer> whole(std::string_view text) {

@@ -2,12 +2,21 @@
  * A file as the lines of its fingertips, at the pace at which it was recorded. Each fingertip in it
  * has a line; all share the reading and the clock.
  */
-import { decompress } from 'fzstd';
+import { Decompress } from 'fzstd';
 import { CoreError, core, setUnpack, type Reader } from '../core';
 import type { Line } from '../line/line';
 import { PacketType, type DevicePacket } from '../line/line_facts';
 
-setUnpack((packed, size) => decompress(packed, new Uint8Array(size)));
+/** No more than size bytes, whatever the file holds; fewer where it holds fewer. */
+setUnpack((packed, size) => {
+  const bytes = new Uint8Array(size);
+  let filled = 0;
+  new Decompress((part) => {
+    bytes.set(part, filled);
+    filled += part.length;
+  }).push(packed, true);
+  return bytes.subarray(0, filled);
+});
 
 /** What is wrong with a file: a sentence with the place; what came before it was handed out. */
 export class ReadError extends Error {
