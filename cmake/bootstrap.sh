@@ -9,8 +9,16 @@ if [ $# -eq 3 ]; then
 fi
 cd "$root"
 
+# The parts of the report that can run.
+parts() { grep -l '"run":' host_tools/report/*/part.json | sed 's:.*report/::; s:/.*::'; }
+# Whether this one does, with a folder or without.
+part_runs() {
+  parts | grep -qx -- "$1" || return
+  if grep -q '"folder":' "host_tools/report/$1/part.json"; then [ "$2" = with ]; else [ "$2" = without ]; fi
+}
+
 usage() {
-  echo "usage: sh cmake/bootstrap.sh demo|web|test [LABEL]|report [all|suite|real FOLDER]|fuzz HOURS|soak HOURS" >&2
+  echo "usage: sh cmake/bootstrap.sh demo|web|test [LABEL]|report [all|PART [FOLDER]]|fuzz HOURS|soak HOURS" >&2
   echo "  demo    build what it needs, let a lime slip on two emulated fingertips, catch what slips in a simulated gripper, say and draw both" >&2
   echo "  web     build the page and the tool, serve the page to this machine's browsers" >&2
   echo "  test    build everything and run the whole test suite" >&2
@@ -18,8 +26,7 @@ usage() {
   echo "  test LABEL    build everything and run one part: host, emulated, accuracy, realtime, browser or linux" >&2
   echo "  report  build everything, measure fit, rate, cost, truth, tangential load and grasps, repeat the published experiments in simulation, write build/report; within an hour" >&2
   echo "  report all    the same with every pad and grasp, and what fuzzers, storms of faults and mutation find; some hours" >&2
-  echo "  report suite  build everything and run the test suite over and over, half of the runs on a busy machine; some hours" >&2
-  echo "  report real FOLDER  build everything and judge the fit, the zero and the calibration on recordings of real pads in FOLDER; some minutes" >&2
+  echo "  report PART [FOLDER]  build everything and measure one part whole: $(echo $(parts)); real needs the FOLDER of its recordings" >&2
   echo "  fuzz    build the fuzz targets and run them for so many hours; what they find is kept in build/fuzz/findings" >&2
   echo "  soak    build everything and let faults storm on the firmware for so many hours, natively and emulated; findings in build/soak/findings" >&2
   exit 2
@@ -28,10 +35,11 @@ case $# in
   1) case $1 in demo | web | test | report) ;; *) usage ;; esac ;;
   2) case "$1 $2" in
        "test quick" | "test host" | "test emulated" | "test accuracy" | "test realtime" | "test browser" | "test linux") ;;
-       "report all" | "report suite" | fuzz\ * | soak\ *) ;;
+       "report all" | fuzz\ * | soak\ *) ;;
+       report\ *) part_runs "$2" without || usage ;;
        *) usage ;;
      esac ;;
-  3) [ "$1 $2" = "report real" ] || usage ;;
+  3) [ "$1" = report ] && part_runs "$2" with || usage ;;
   *) usage ;;
 esac
 
@@ -204,51 +212,5 @@ case $1 in
   web) exec build/host/host_tools/tool/cli/fingertip web ;;
   test) exec ctest --preset host -j "$(nproc)" ${2:+-L "^$2\$"} ;;
   soak) exec /usr/bin/python3 tests/soak/soak.py --build build/host --boards build --hours "$2" ;;
-  report)
-    if [ "${2:-}" = suite ]; then
-      say "the test suite, over and over"
-      exec /usr/bin/python3 host_tools/report/suite/suite.py --build build/host -o build/report
-    fi
-    if [ "${2:-}" = real ]; then
-      say "recordings of real pads"
-      exec /usr/bin/python3 host_tools/report/real/real.py --build build/host -o build/report "$folder"
-    fi
-    say "the fit: error against run time"
-    /usr/bin/python3 host_tools/report/fit/fit.py --build build/host --boards build -o build/report \
-      --picture host_tools/report/fit/fit_report.png
-    say "rate, latency and cost, in emulated time"
-    /usr/bin/python3 host_tools/report/rate/rate.py --build build/host --boards build -o build/report \
-      --picture host_tools/report/rate/rate.png
-    say "what a logic analyser shows"
-    /usr/bin/python3 host_tools/report/bringup/traces.py --boards build -o boards
-    say "the published experiments on the simulated fingertip"
-    /usr/bin/python3 host_tools/report/validation/validation.py --build build/host --boards build -o build/report \
-      --picture host_tools/report/validation/validation_force.png
-    say "many programs on one fingertip"
-    /usr/bin/python3 host_tools/report/tools/tools.py --build build/host -o build/report
-    say "how far from the truth: gains, shapes, time, and what is kept"
-    /usr/bin/python3 host_tools/report/truth/truth.py --build build/host --boards build -o build/report \
-      --picture host_tools/report/truth/truth.png
-    # The pictures that are kept are of every pad and grasp.
-    if [ "${2:-}" = all ]; then
-      shear="--picture host_tools/report/shear/shear.png" grasp="--picture host_tools/report/grasp/grasp.png"
-    else
-      shear="--pads 300" grasp=--usual
-    fi
-    say "tangential load: how far from the truth, on which pads"
-    /usr/bin/python3 host_tools/report/shear/shear.py --build build/host -o build/report $shear
-    say "grasps in the simulated cell"
-    /usr/bin/python3 host_tools/report/grasp/grasp.py --build build/host -o build/report $grasp
-    if [ "${2:-}" = all ]; then
-      say "what the fuzzers, the analysers and mutation find, and how faults and power cuts are overcome"
-      /usr/bin/python3 host_tools/report/reliability/reliability.py --build build/host -o build/report
-      say "the test suite, over and over"
-      /usr/bin/python3 host_tools/report/suite/suite.py --build build/host -o build/report
-    fi
-    say "the page, in a browser"
-    /usr/bin/python3 host_tools/report/web/web.py --build build/host -o build/report
-    say "in programs of others"
-    /usr/bin/python3 host_tools/report/ecosystem/ecosystem.py --build build/host -o build/report
-    say "every table and picture: $root/build/report/index.html"
-    ;;
+  report) exec /usr/bin/python3 host_tools/report/shared/parts.py "${2:-report}" ${folder:+"$folder"} ;;
 esac

@@ -3,6 +3,7 @@
 #include "common/bytes.h"
 #include "fit/fit_grid_solve.h"
 #include "fit/fit_limits.h"
+#include "fit/kernels.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -170,6 +171,11 @@ static void leave_outlier_out(const struct fit_array *array, const int32_t *pres
   }
 }
 
+#define TAKE_GRID_IF_IT_SUITS(name, suits, fits)                                                    \
+  if (suits) {                                                                                     \
+    rough = fits;                                                                                  \
+  } else
+
 void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
                        uint32_t usable, const struct fit_settings *settings,
                        struct fit_result *result) {
@@ -179,19 +185,26 @@ void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa
   }
   uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
   usable &= all;
-  bool rough = usable == all ? fit_grid(array, pressure_Pa_q10, settings, result)
-                             : fit_grid_masked(array, pressure_Pa_q10, usable, settings, result);
+  bool rough = false;
+  FIT_GRID_KERNELS(TAKE_GRID_IF_IT_SUITS) {}
   if (rough) {
     leave_outlier_out(array, pressure_Pa_q10, usable, settings, result);
   }
 }
+
+#define TAKE_IF_IT_SUITS(name, suits, fits)                                                         \
+  if (suits) {                                                                                     \
+    fits;                                                                                          \
+  } else
 
 void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                   const struct fit_settings *settings, struct fit_result *result) {
   bool some = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
   if ((is_grid(array) && !some) || settings->noise_Pa_q10 < 1) {
     fit_gaussian_grid(array, pressure_Pa_q10, usable, settings, result);
-  } else {
-    fit_general(array, pressure_Pa_q10, usable, settings, result);
+    return;
   }
+  uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
+  usable &= all;
+  FIT_OTHER_KERNELS(TAKE_IF_IT_SUITS) {}
 }

@@ -155,12 +155,17 @@ class BootstrapReport(Folder):
             program = self.folder / "bin" / name
             program.write_text(f"#!/bin/sh\n{body}\n")
             program.chmod(0o755)
-        for report in ("fit/fit", "rate/rate", "validation/validation", "truth/truth", "shear/shear", "grasp/grasp", "tools/tools", "reliability/reliability", "suite/suite", "bringup/traces",
-                       "ecosystem/ecosystem", "web/web"):
-            self.assertTrue((ROOT / f"host_tools/report/{report}.py").is_file())
-            script = self.folder / f"host_tools/report/{report}.py"
-            script.parent.mkdir(parents=True)
-            script.write_text("import sys\nprint('ran', sys.argv[0], *(sys.argv[sys.argv.index(o) + 1] for o in ('-o', '--picture') if o in sys.argv))\n")
+        parts = ROOT / "host_tools/report"
+        shutil.copytree(ROOT / "host_tools/python/fingertip", self.folder / "host_tools/python/fingertip")
+        for path in (parts / "shared/parts.py", *parts.glob("*/part.json")):
+            copy = self.folder / path.relative_to(ROOT)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(path, copy)
+        for path in parts.glob("*/part.json"):
+            run = json.loads(path.read_text(encoding="utf-8")).get("run")
+            if run:
+                (self.folder / path.relative_to(ROOT)).with_name(run["program"]).write_text(
+                    "import sys\nprint('ran', sys.argv[0], *(sys.argv[sys.argv.index(o) + 1] for o in ('-o', '--picture') if o in sys.argv))\n")
         for job, after_traces in (("report",), 7), (("report", "all"), 9):
             done = subprocess.run(["sh", self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=PATIENCE_s,
                                   env={**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
@@ -174,6 +179,10 @@ class BootstrapReport(Folder):
             self.assertTrue((ROOT / picture).is_file(), picture)
             place = os.path.relpath(picture, "host_tools/report")
             self.assertIn(f"({place})", (ROOT / "host_tools/report/README.md").read_text(encoding="utf-8"))
+        for job in ("report", "shared"), ("report", "usb"), ("report", "real"), ("report", "fit", "."), ("report", "real", ".", "."):
+            done = subprocess.run(["sh", self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=PATIENCE_s)
+            self.assertEqual((done.returncode, done.stdout), (2, ""), job)
+            self.assertTrue(done.stderr.startswith("usage: "), job)
 
     def test_the_manuals_links_lead_somewhere(self):
         for manual in ("README.md", *(str(path.relative_to(ROOT)) for path in ROOT.glob("*/*/README.md")), "host_tools/README.md"):

@@ -4,6 +4,7 @@
 #include "report/fit/separable.hpp"
 
 extern "C" {
+#include "fit/kernels.h"
 #include "alternatives/alternatives.h"
 #include "config/defaults.h"
 #include "config/geometry.h"
@@ -66,29 +67,23 @@ KernelResult fit(const fit_array &array, const std::int32_t *pressure_Pa_q10, st
   return widened(result);
 }
 
-KernelResult grid(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t,
-                  const KernelSettings &settings) {
-  const fit_settings chip = chip_settings(settings);
-  fit_result result;
-  fit_grid(&array, pressure_Pa_q10, &chip, &result);
-  return widened(result);
-}
+// Of a row of fit/kernels.h.
+#define SUITS(suits)                                                                               \
+  [](std::uint32_t usable, std::uint32_t all) { return static_cast<void>(usable), static_cast<void>(all), suits; }
+template <class SUITS> unsigned takes_a_subset(SUITS suits) { return suits(1, 3) ? unsigned{ANY_SUBSET} : 0u; }
 
-KernelResult masked(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                    std::uint32_t usable, const KernelSettings &settings) {
-  const fit_settings chip = chip_settings(settings);
-  fit_result result;
-  fit_grid_masked(&array, pressure_Pa_q10, usable, &chip, &result);
-  return widened(result);
-}
-
-KernelResult general(const fit_array &array, const std::int32_t *pressure_Pa_q10,
-                     std::uint32_t usable, const KernelSettings &settings) {
-  const fit_settings chip = chip_settings(settings);
-  fit_result result;
-  fit_general(&array, pressure_Pa_q10, usable, &chip, &result);
-  return widened(result);
-}
+// One for each row.
+#define OF_THE_FIRMWARE(name, suits, fits)                                                         \
+  KernelResult name(const fit_array &of, const std::int32_t *pressure_Pa_q10,                       \
+                    [[maybe_unused]] std::uint32_t usable, const KernelSettings &chosen) {          \
+    const fit_array *array = &of;                                                                   \
+    const fit_settings chip = chip_settings(chosen), *settings = &chip;                             \
+    fit_result found, *result = &found;                                                             \
+    fits;                                                                                           \
+    return widened(found);                                                                          \
+  }
+FIT_GRID_KERNELS(OF_THE_FIRMWARE)
+FIT_OTHER_KERNELS(OF_THE_FIRMWARE)
 
 KernelResult in_double(const fit_array &array, const std::int32_t *pressure_Pa_q10,
                        std::uint32_t usable, const KernelSettings &settings) {
@@ -126,9 +121,10 @@ const char *name_of(Guess guess) {
 const std::vector<Kernel> &all_kernels() {
   static const std::vector<Kernel> kernels{
       {"fit", ANY_SUBSET | PRIOR, fit},
-      {"grid", PRIOR, grid},
-      {"masked", ANY_SUBSET | PRIOR, masked},
-      {"general", ANY_SUBSET | N_LARGEST | PRIOR, general},
+#define GRID_ROW(name, suits, fits) {#name, takes_a_subset(SUITS(suits)) | PRIOR, name},
+      FIT_GRID_KERNELS(GRID_ROW)
+#define OTHER_ROW(name, suits, fits) {#name, ANY_SUBSET | N_LARGEST | PRIOR, name},
+      FIT_OTHER_KERNELS(OTHER_ROW)
       {"double", ANY_SUBSET | N_LARGEST | PRIOR | GUESSES | FIRMWARE_GUESS, in_double},
       {"separable", 0, separable},
       {"naive_float", ANY_SUBSET | GUESSES, alternative<alternative_naive_float>},

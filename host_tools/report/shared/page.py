@@ -10,7 +10,6 @@ Each report makes the page again when it ends. Pictures are inside, nothing is l
 import argparse
 import base64
 import csv
-import dataclasses
 import fnmatch
 import html
 import json
@@ -25,70 +24,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 from fingertip.files import InputError, run_tool, write_text  # noqa: E402
 from goals import HEADER, goal_rows  # noqa: E402
+from parts import PARTS  # noqa: E402
 from tables import text_of  # noqa: E402
-
-SIMULATED, EMULATED, RECORDED = "simulated", "emulated", "from recordings"
-IMAGE, CLOCK, RUN, SAID = "read from the image", "timed on this computer", "run on this computer", "setting"
-
-
-@dataclasses.dataclass(frozen=True)
-class Part:
-    name: str  # NAME.json has its figures, NAME.md its text unless it is said where
-    title: str
-    about: str
-    command: str
-    origin: str  # of its figures, but for those that match a pattern
-    origins: tuple = ()  # (pattern, origin), the first that matches
-    text: str = None
-    pictures: tuple = ()  # (file, what it shows)
-    tables: tuple = ()  # (file, what it holds) beside the JSON
-
-
-REPORT = "/usr/bin/python3 host_tools/report"
-PARTS = (
-    Part("fit", "The fit", "How far the fit on the chip is from the least-squares optimum, what it costs there, and what one would use instead.",
-         f"{REPORT}/fit/fit.py --build build/host --boards build -o build/report", SIMULATED,
-         (("*_cycles", EMULATED), ("speed_vs_*", CLOCK), ("processor", CLOCK), ("seed", SAID)), "fit_table.md",
-         (("fit_report.png", "Error of the fit against its run time: presses simulated, cycles emulated, times of this computer"),),
-         (("fit_table.csv", "Every kernel and variant"), ("stiff.json", "Presses that are hard, extreme, or none: shares of each flag"))),
-    Part("rate", "Rate, latency and cost", "The release images of all boards in the emulator, in contact on every frame.",
-         f"{REPORT}/rate/rate.py --build build/host --boards build -o build/report", EMULATED, (("*_bytes", IMAGE), ("fit_iterations", SAID)),
-         pictures=(("rate.png", "Rate by oversampling, latency, cycles by stage, rate by number of sensors: emulated"),)),
-    Part("validation", "The published experiments", "The experiments of De Clercq et al., RA-L 2022, on the simulated pad with the firmware's own code.",
-         f"{REPORT}/validation/validation.py --build build/host --boards build -o build/report", SIMULATED,
-         (("emulated_*", EMULATED), ("seconds", CLOCK), ("pads", SAID), ("rate_Hz", SAID), ("prior_*_mm", SAID)),
-         pictures=(("validation_force.png", "Estimated and true force: simulated"), ("validation_signals.png", "The fifteen sensors during taps: simulated"),
-                   ("validation_slip.png", "Reconstructed pressure during a slip: simulated"))),
-    Part("truth", "From the optimum to the truth", "What separates the number from the truth of the contact, on hundreds of pads.",
-         f"{REPORT}/truth/truth.py --build build/host --boards build -o build/report", SIMULATED,
-         (("real_*", RECORDED), ("strips", RECORDED), ("locations", RECORDED), ("flash*", EMULATED), ("*_cycles", EMULATED), ("seed", SAID), ("pads", SAID)),
-         pictures=(("truth.png", "Coverage, warnings, placements, iterations: simulated"),)),
-    Part("real", "Real rubber", "The fit, the calibration and the zero on recordings of real pads that other people made.",
-         "sh cmake/bootstrap.sh report real FOLDER", RECORDED, pictures=(("real.png", "Response of the sensors, errors over the array, coverage: from recordings"),)),
-    Part("shear", "Tangential load", "Size and direction of what pulls along the rubber, from the normal pressures alone: how far from the truth, and what it does "
-         "to every other figure.", f"{REPORT}/shear/shear.py --build build/host -o build/report", SIMULATED,
-         (("chip_*", EMULATED), ("*_cycles*", EMULATED), ("shear_seed", SAID), ("shear_pads", SAID)),
-         pictures=(("shear.png", "Errors by place, arrows, location before and after, bounds, objects, pads that end: simulated"),)),
-    Part("grasp", "Grasps", "Thousands of grasps in a simulated cell: two fingertips, an object, a gripper, and the firmware's own controller between them.",
-         f"{REPORT}/grasp/grasp.py --build build/host -o build/report", SIMULATED, (("grasp_seed", SAID), ("emulated_*", EMULATED)),
-         pictures=(("grasp.png", "Drops, grip, reaction, a slip that is caught: simulated"),)),
-    Part("tools", "The tools", "What the tools do to those who use them, with simulated fingertips on pseudo-terminals of this computer.",
-         f"{REPORT}/tools/tools.py --build build/host -o build/report", SIMULATED,
-         (("*_us", CLOCK), ("*_fps", CLOCK), ("*_percent", CLOCK), ("*_seconds", SAID), ("*_clients", SAID), ("*_fingertips", SAID))),
-    Part("reliability", "Reliability", "What the firmware, its protocol and the tools do with whatever they are fed, and what faults and power cuts do to it.",
-         f"{REPORT}/reliability/reliability.py --build build/host -o build/report", RUN, (("fuzz_seconds", SAID), ("fuzz_seed", SAID), ("soak_hours_emulated", EMULATED), ("power_cut*", EMULATED), ("soak*", SIMULATED), ("recovery", SIMULATED),
-          ("worst_recovery_s", SIMULATED))),
-    Part("suite", "The test suite", "The test suite run over and over, half of the runs on a busy machine: whether it is green, and what it takes.",
-         "sh cmake/bootstrap.sh report suite", CLOCK, (("*_runs", RUN), ("*_failures", RUN), ("sleeps", RUN), ("retries", RUN), ("mutants_*", RUN))),
-    Part("ecosystem", "Ecosystem", "The fingertip in programs of others.", f"{REPORT}/ecosystem/ecosystem.py --build build/host -o build/report", SIMULATED,
-         (("*_percent", CLOCK), ("*_us*", CLOCK), ("*_fps", CLOCK), ("*_seconds", SAID), ("python_vectors*", RUN))),
-    Part("web", "The page", "What the page costs and keeps up with in a headless Chromium that renders in software, and each of its steps, driven there.",
-         f"{REPORT}/web/web.py --build build/host -o build/report", CLOCK,
-         (("bundle_*", RUN), ("wasm_cpu_percent", CLOCK), ("wasm_*", SIMULATED), ("web_lost", RUN), ("web_foreign_requests", RUN), ("web_steps*", EMULATED),
-          ("*_seconds", SAID))),
-    Part("usb", "USB and clocks", "The image's USB device before a Debian kernel in a virtual machine, and two fingertips on one clock.",
-         "sh cmake/bootstrap.sh test", EMULATED, (("alignment_fake_*", SIMULATED), ("*_test_s", CLOCK), ("*_seconds", SAID))),
-)
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #22252e; --faint: #5c6270; --paper: #fff; --line: #d5d9e2; --band: #f4f6fa;
@@ -117,7 +54,7 @@ summary { cursor: pointer; padding: .5rem 0; }
 
 
 def origin_of(part, name):
-    return next((origin for pattern, origin in part.origins if fnmatch.fnmatchcase(name, pattern)), part.origin)
+    return next((origin for pattern, origin in part.page.origins if fnmatch.fnmatchcase(name, pattern)), part.page.origin)
 
 
 def table_html(header, rows):
@@ -213,18 +150,18 @@ def in_short(found):
 def section(part, folder):
     """(in short, HTML)"""
     path = folder / f"{part.name}.json"
-    head = (f'<h2 id="{part.name}">{html.escape(part.title)}</h2><p>{html.escape(part.about)} Regenerated by '
+    head = (f'<h2 id="{part.name}">{html.escape(part.page.title)}</h2><p>{html.escape(part.page.about)} Regenerated by '
             f"<code>{html.escape(part.command)}</code>.</p>")
     try:
         found = read_figures(path)
         if found is None:
             return "not run", f"{head}<p><strong>not run</strong>: there is no {path.name}.</p>"
         written = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
-        text = folder / (part.text or f"{part.name}.md")
+        text = folder / (part.page.text or f"{part.name}.md")
         inside = [head, f'<p class="faint">Written {written}.</p>', goals_html(part, found) if "goals" in found else "",
-                  *(picture_html(folder / name, caption) for name, caption in part.pictures),
+                  *(picture_html(folder / name, caption) for name, caption in part.page.pictures),
                   folded(f"Tables and what they say ({text.name})", text_html(text), "open") if text.is_file() else "",
-                  *(further_table_html(folder / name, caption) for name, caption in part.tables), figures_html(part, found)]
+                  *(further_table_html(folder / name, caption) for name, caption in part.page.tables), figures_html(part, found)]
         return in_short(found), "".join(inside)
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         return "damaged", f"{head}<p><strong>damaged</strong>: {html.escape(str(error))}; run it again.</p>"
@@ -233,8 +170,8 @@ def section(part, folder):
 def write(folder):
     """Path of the page."""
     folder = pathlib.Path(folder)
-    sections = [(part, *section(part, folder)) for part in PARTS]
-    contents = "".join(f'<li><a href="#{part.name}">{html.escape(part.title)}</a>: {short}</li>' for part, short, _ in sections)
+    sections = [(part, *section(part, folder)) for part in PARTS if part.page]
+    contents = "".join(f'<li><a href="#{part.name}">{html.escape(part.page.title)}</a>: {short}</li>' for part, short, _ in sections)
     path = folder / "index.html"
     write_text(path, "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
                f"content=\"width=device-width, initial-scale=1\"><title>Fingertip: what was measured</title><style>{STYLE}</style></head><body>"

@@ -12,7 +12,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 REPORT = ROOT / "host_tools/report"
 for folder in ("reliability", "suite", "tools", "grasp", "shear", "truth", "validation", "rate", "fit", "shared"):
     sys.path.insert(0, str(REPORT / folder))
-import page  # noqa: E402
+import parts  # noqa: E402
 import fit  # noqa: E402
 import rate  # noqa: E402
 import reliability  # noqa: E402
@@ -27,7 +27,37 @@ from goals import goal_table_md, judge  # noqa: E402
 GOALS = {"fit": fit.GOALS, "rate": rate.GOALS, "validation": validation.GOALS, "truth": truth.GOALS, "shear": shear.GOALS, "grasp": grasp.GOALS, "tools": tools.GOALS, "suite": suite.GOALS,
          "reliability": tuple(goal for part in reliability.PARTS for goal in part.GOALS)}
 VOID = {"meta", "img", "br", "hr"}
-PARTS = {part.name: part for part in page.PARTS}
+PARTS = {part.name: part for part in parts.PARTS if part.page}
+
+
+class TestParts(unittest.TestCase):
+    def test_every_program_is_there_and_a_report_is_a_part_of_all(self):
+        for part in parts.PARTS:
+            if part.run:
+                self.assertTrue((REPORT / part.name / part.run.program).is_file(), part.name)
+        short, whole = ([command[1] for _, command in parts.steps(what)] for what in ("report", "all"))
+        self.assertEqual([program for program in whole if program in short], short)
+        self.assertLess(len(short), len(whole))
+
+    def test_one_part_runs_whole(self):
+        [(_, alone)] = parts.steps("shear")
+        self.assertIn(alone, [command for _, command in parts.steps("all")])
+        [(_, judged)] = parts.steps("real", "/recordings")
+        self.assertEqual(judged[-1], "/recordings")
+
+    def test_what_cannot_run_is_said(self):
+        for arguments, said in ((("nothing",), "there is no part nothing"), (("usb",), "there is no part usb"), (("real",), "needs the folder"),
+                                (("fit", "/recordings"), "takes no folder"), (("all", "/recordings"), "takes no folder")):
+            with self.assertRaisesRegex(parts.InputError, said):
+                parts.steps(*arguments)
+
+    def test_a_damaged_part_is_named(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "part.json"
+            for text in ("{", "[]", '{"order": 1, "colour": 2}', '{"order": 1, "page": {"title": "no more"}}', '{"run": {}}'):
+                path.write_text(text)
+                with self.assertRaisesRegex(parts.InputError, "part.json"):
+                    parts.read(path)
 
 
 class Reader(html.parser.HTMLParser):
@@ -104,9 +134,9 @@ class Page(unittest.TestCase):
             judged = judge(found, [(figure, sign, 1000 if sign == "<=" else -1000) for figure, sign, _ in goals]) if goals else found
             self.write(name, judged)
             every[name] = judged
-            for picture, caption in part.pictures:
+            for picture, caption in part.page.pictures:
                 (self.folder / picture).write_bytes(f"picture {picture}".encode())
-            for table, _ in part.tables:
+            for table, _ in part.page.tables:
                 (self.folder / table).write_text('{"cases": [{"case_of_json": "hard"}]}' if table.endswith("json") else "csv_column,other\ncsv cell,5\n")
         return every
 
@@ -132,10 +162,10 @@ class Page(unittest.TestCase):
     def test_every_picture_and_table_is_in(self):
         self.write_all()
         shown = self.read()
-        for part in page.PARTS:
-            for picture, caption in part.pictures:
+        for part in PARTS.values():
+            for picture, caption in part.page.pictures:
                 self.assertEqual(shown.images[caption], f"picture {picture}".encode())
-        self.assertEqual(len(shown.images), sum(len(part.pictures) for part in page.PARTS))
+        self.assertEqual(len(shown.images), sum(len(part.page.pictures) for part in PARTS.values()))
         self.assertIsNotNone(shown.row("csv cell", "5"))
         self.assertIsNotNone(shown.row("hard"))
 
@@ -163,11 +193,9 @@ class Page(unittest.TestCase):
                           "emulated_frames_different": "emulated", "false_contacts": "simulated", "flash_lost": "emulated",
                           "seconds": "timed on this computer", "vector_error_p95": "simulated", "chip_fps_osr256": "emulated", "shear_cycles": "emulated"})
         words = "".join(shown.words)
-        for part in page.PARTS:
+        for part in PARTS.values():
             self.assertIn(part.command, words)
-            program = part.command.split()[1]
-            self.assertTrue((ROOT / program).is_file(), program)
-        self.assertEqual(len(every), len(page.PARTS))
+        self.assertEqual(len(every), len(PARTS))
 
     def test_a_missing_part_is_said(self):
         self.write_all()
@@ -183,7 +211,7 @@ class Page(unittest.TestCase):
 
     def test_of_nothing_all_is_missing(self):
         words = "".join(self.read().words)
-        self.assertEqual(words.count("not run: there is no"), len(page.PARTS))
+        self.assertEqual(words.count("not run: there is no"), len(PARTS))
 
     def test_a_damaged_part_is_said_and_harms_no_other(self):
         self.write_all()
@@ -193,7 +221,7 @@ class Page(unittest.TestCase):
         self.write("truth", {"goals": {"samples": 3}})
         self.write("usb", {"goals": [1]})
         for name in ("fit", "rate", "validation", "truth", "usb"):
-            self.assertIn(f"{PARTS[name].title}: damaged", "".join(self.read().words))
+            self.assertIn(f"{PARTS[name].page.title}: damaged", "".join(self.read().words))
         self.write_all()
         (self.folder / "fit.json").write_text("")
         shown = self.read()

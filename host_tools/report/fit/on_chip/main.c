@@ -5,6 +5,7 @@
 #include "config/geometry.h"
 #include "fit/fit.h"
 #include "fit/fit_tangential.h"
+#include "fit/kernels.h"
 #include "port/port.h"
 
 /* Words of 32 bits, in this order, as fit_on_chip.mjs writes and reads them. */
@@ -26,9 +27,9 @@ enum { CALL_NEXT_JOB = 1, CALL_START = 2, CALL_STOP = 3 };
     __asm volatile("bkpt %1" : : "r"(argument), "i"(number) : "memory");                           \
   } while (0)
 
-static struct fit_array array;
-static struct fit_settings settings;
-static struct fit_result result;
+static struct fit_array layout;
+static struct fit_settings chosen;
+static struct fit_result contact;
 static struct fit_pad pad;
 static struct fit_tangential_state tangential_state;
 static struct fit_tangential tangential_result;
@@ -36,28 +37,26 @@ static struct fit_tangential tangential_result;
 static void nothing(void) {}
 
 static void fit(void) {
-  fit_gaussian(&array, job.pressure_Pa_q10, job.usable, &settings, &result);
-  job.x_mm = result.x_mm;
-  job.y_mm = result.y_mm;
+  fit_gaussian(&layout, job.pressure_Pa_q10, job.usable, &chosen, &contact);
+  job.x_mm = contact.x_mm;
+  job.y_mm = contact.y_mm;
 }
 
-static void grid(void) {
-  fit_grid(&array, job.pressure_Pa_q10, &settings, &result);
-  job.x_mm = result.x_mm;
-  job.y_mm = result.y_mm;
-}
-
-static void masked(void) {
-  fit_grid_masked(&array, job.pressure_Pa_q10, job.usable, &settings, &result);
-  job.x_mm = result.x_mm;
-  job.y_mm = result.y_mm;
-}
-
-static void general(void) {
-  fit_general(&array, job.pressure_Pa_q10, job.usable, &settings, &result);
-  job.x_mm = result.x_mm;
-  job.y_mm = result.y_mm;
-}
+/* One for each row of fit/kernels.h. */
+#define OF_THE_FIRMWARE(name, suits, fits)                                                         \
+  static void name(void) {                                                                         \
+    const struct fit_array *array = &layout;                                                       \
+    const struct fit_settings *settings = &chosen;                                                 \
+    struct fit_result *result = &contact;                                                            \
+    const int32_t *pressure_Pa_q10 = job.pressure_Pa_q10;                                          \
+    uint32_t usable = job.usable;                                                                  \
+    (void)usable;                                                                                  \
+    fits;                                                                                          \
+    job.x_mm = contact.x_mm;                                                                       \
+    job.y_mm = contact.y_mm;                                                                       \
+  }
+FIT_GRID_KERNELS(OF_THE_FIRMWARE)
+FIT_OTHER_KERNELS(OF_THE_FIRMWARE)
 
 /* Of 12 mm of rubber. */
 static const struct pad_profile profile = {
@@ -72,7 +71,7 @@ static const struct pad_profile profile = {
 
 /* After `fit` of the same readings and the frames before, which are not counted. */
 static void tangential(void) {
-  fit_tangential_load(&array, &pad, job.pressure_Pa_q10, &settings, &result, &tangential_state,
+  fit_tangential_load(&layout, &pad, job.pressure_Pa_q10, &chosen, &contact, &tangential_state,
                       &tangential_result);
   job.x_mm = tangential_result.x_mm;
   job.y_mm = tangential_result.y_mm;
@@ -80,26 +79,29 @@ static void tangential(void) {
 
 #define ALTERNATIVE(name, solver, real)                                                            \
   static void name(void) {                                                                         \
-    const struct alternative_settings chosen = {(int)job.iterations,                               \
+    const struct alternative_settings options = {(int)job.iterations,                              \
                                                 (enum alternative_guess)job.guess};                \
-    struct alternative_fit_##real found =                                                          \
-        alternative_##solver##_##real(&array, job.pressure_Pa_q10, job.usable, &chosen);           \
-    job.x_mm = (float)found.x_mm;                                                                  \
-    job.y_mm = (float)found.y_mm;                                                                  \
+    struct alternative_fit_##real answer =                                                          \
+        alternative_##solver##_##real(&layout, job.pressure_Pa_q10, job.usable, &options);          \
+    job.x_mm = (float)answer.x_mm;                                                                  \
+    job.y_mm = (float)answer.y_mm;                                                                  \
   }
 ALTERNATIVE(naive_float, naive, float)
 ALTERNATIVE(naive_double, naive, double)
 ALTERNATIVE(lm_float, lm, float)
 ALTERNATIVE(lm_double, lm, double)
 
-/* The order is that of KERNELS in fit_on_chip.mjs. */
-static void (*const kernels[])(void) = {nothing,     fit,          grid,     masked,    general,
-                                        naive_float, naive_double, lm_float, lm_double, tangential};
+#define NAME(name, suits, fits) name,
+/* The order is that of KERNELS in fit_on_chip.mjs: the rows of fit/kernels.h are the last. */
+static void (*const kernels[])(void) = {
+    nothing,   fit,       naive_float,
+    naive_double, lm_float,  lm_double,
+    tangential, FIT_GRID_KERNELS(NAME) FIT_OTHER_KERNELS(NAME)};
 
 int main(void) {
-  if (fit_array_init(&array, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
+  if (fit_array_init(&layout, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
                      geometry.pitch_mm) != FT_OK ||
-      fit_pad_init(&pad, &array, &profile) != FT_OK) {
+      fit_pad_init(&pad, &layout, &profile) != FT_OK) {
     port_panic();
   }
   for (;;) {
@@ -108,11 +110,11 @@ int main(void) {
     if (job.kernel >= sizeof kernels / sizeof kernels[0]) {
       port_panic();
     }
-    settings.iterations = (uint8_t)job.iterations;
-    settings.n_largest = (uint8_t)job.n_largest;
-    settings.noise_Pa_q10 = job.noise_Pa_q10;
-    settings.prior_sigma_mm = job.prior_sigma_mm;
-    settings.prior_width_mm = job.prior_width_mm;
+    chosen.iterations = (uint8_t)job.iterations;
+    chosen.n_largest = (uint8_t)job.n_largest;
+    chosen.noise_Pa_q10 = job.noise_Pa_q10;
+    chosen.prior_sigma_mm = job.prior_sigma_mm;
+    chosen.prior_width_mm = job.prior_width_mm;
     void (*kernel)(void) = kernels[job.kernel];
     if (kernel == tangential) {
       fit();
