@@ -43,6 +43,14 @@ struct fit_settings {
    * FIT_PRIOR_WEIGHT largest (sigma - prior_sigma) / prior_width. None unless the width is
    * 0.001..10000 mm and sigma 0..10000 mm. */
   float prior_sigma_mm, prior_width_mm;
+  /* A reading so many noise_Pa below zero counts as zero, since a Gaussian is never negative. 0: no
+   * reading is changed, as a tangential load asks for. */
+  uint8_t cut_noises;
+  /* What the rubber takes from the readings around a contact, where that is known:
+   * dip_share p0 exp(-r^2 / (2 dip_sd^2)). Every iteration but the first adds it back to the
+   * readings, and these are not cut. None unless the share is above 0 and at most
+   * FIT_DIP_SHARE_MAX, and the sd is 0.001..10000 mm. */
+  float dip_share, dip_sd_mm;
   /* Other errors that the standard deviations contain. */
   uint16_t gain_sd_q16[FT_MAX_SENSORS]; /* [sensor] relative sd of its gain; 0: exact */
   uint16_t
@@ -51,6 +59,7 @@ struct fit_settings {
 };
 #define FIT_LOCATION_SD_LIMIT_mm 0.6f
 #define FIT_PRIOR_WEIGHT 0.01f
+#define FIT_DIP_SHARE_MAX 0.1f
 #define FIT_MAX_ITERATIONS 20
 
 /* Widths that the fit can estimate, in pitches: narrower ones fall between the sensors, wider ones

@@ -42,7 +42,8 @@ struct normal_equations {
 struct samples {
   int count;
   uint8_t sensor[FT_MAX_SENSORS];
-  float x[FT_MAX_SENSORS], y[FT_MAX_SENSORS], p[FT_MAX_SENSORS];
+  float x[FT_MAX_SENSORS], y[FT_MAX_SENSORS];
+  float raw[FT_MAX_SENSORS], p[FT_MAX_SENSORS]; /* p: without the dip */
   int32_t log2_q24[FT_MAX_SENSORS]; /* of a reading that enters the guess, else INT32_MIN */
 };
 
@@ -243,6 +244,20 @@ static float step(const struct fit_array *array, struct normal_equations *normal
   return sqrtf(dx * dx + dy * dy);
 }
 
+/* Adds to the readings what the rubber's dip around this contact takes from them. */
+static void take_dip_out(const struct fit_array *array, const struct fit_settings *settings,
+                         const struct parameters *theta, struct samples *samples) {
+  float sd = clamp(settings->dip_sd_mm / array->pitch_mm, FIT_DIP_SD_MIN, FIT_DIP_SD_MAX);
+  float depth = at_most(settings->dip_share * theta->p0, FIT_DIP_DEPTH_MAX);
+  float log2_scale = 0.5f * LOG2_E / (sd * sd);
+  for (int k = 0; k < samples->count; k++) {
+    float x = samples->x[k] - theta->x;
+    float y = samples->y[k] - theta->y;
+    float e = fit_exp2_negative((x * x + y * y) * log2_scale);
+    samples->p[k] = samples->raw[k] + depth * e;
+  }
+}
+
 static bool at_bound(const struct fit_array *array, const struct parameters *theta) {
   return theta->x <= array->x_min || theta->x >= array->x_max || theta->y <= array->y_min ||
          theta->y >= array->y_max || theta->sigma <= FIT_SIGMA_MIN ||
@@ -388,6 +403,9 @@ static void add_own_errors(const struct samples *samples, const struct fit_setti
   }
   float usual = FIT_SHAPE_SIGMA * FIT_SHAPE_SIGMA * inverse;
   float strength = FIT_SHAPE_PER_MODEL * (float)settings->model_sd_q16 * (1.0f / 65536.0f);
+  if (fit_has_dip(settings)) {
+    strength *= FIT_SHAPE_KNOWN;
+  }
   strength *= usual * at->p0;
   own->location += (shape_x * shape_x + shape_y * shape_y) * strength * strength;
   own->force += shape_force * shape_force * strength * strength;
@@ -424,13 +442,14 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
       continue;
     }
     int n = samples.count++;
-    int32_t reading = pressure_Pa_q10[k];
+    int32_t raw = pressure_Pa_q10[k], reading = fit_reading(settings, raw);
     if (reading == largest) {
       peak = n;
     }
     samples.sensor[n] = k;
     samples.x[n] = array->x[k];
     samples.y[n] = array->y[k];
+    samples.raw[n] = clamp((float)raw * scale, -1.0f, 1.0f);
     samples.p[n] = clamp((float)reading * scale, -1.0f, 1.0f);
     samples.log2_q24[n] = samples.p[n] >= guess_share ? fit_log2_q24((uint32_t)reading) : INT32_MIN;
     sum_squares += samples.p[n] * samples.p[n];
@@ -451,8 +470,12 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
   float squares;
   float moved;
   bool deficient;
+  const bool dip = fit_has_dip(settings);
   int left = settings->iterations;
   do {
+    if (dip && left < settings->iterations) {
+      take_dip_out(array, settings, &theta, &samples);
+    }
     squares = linearise(array, &samples, prior, &theta, &normal);
     before = theta;
     deficient = factorise(&normal);

@@ -550,6 +550,10 @@ bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
   guess(grid, &readings, settings, &columns, &system, &state);
   int left = settings->iterations;
   do {
+    if (readings.dip_share.mantissa != 0 && left < settings->iterations) {
+      fit_grid_take_dip_out(array, pressure_Pa_q10, usable, &state, system.amplitude_q28,
+                            system.rise_q22, &readings);
+    }
     bool coarse = left > FINE_ITERATIONS && settings->iterations - left < COARSE_ITERATIONS;
     system.at.x = state.x;
     system.at.y = state.y;
@@ -598,6 +602,11 @@ int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q
   struct columns c;
   c.cross = c.skew_x = c.skew_y = 0;
   evaluate(&readings, FINE, &c, &system);
+  if (readings.dip_share.mantissa != 0) {
+    fit_grid_take_dip_out(array, pressure_Pa_q10, usable, &system.at,
+                          system.amplitude_q28, system.rise_q22, &readings);
+    evaluate(&readings, FINE, &c, &system);
+  }
 
   uint32_t size = 1;
   for (int k = 0; k < NODES; k++) {

@@ -43,42 +43,89 @@ int32_t fit_grid_sigma(int32_t height) {
   return (sigma + other) >> 1;
 }
 
+static void set_reading(struct readings *readings, int k, int32_t value, int32_t more_q28) {
+  int32_t largest = readings->largest, shift = readings->shift;
+  int32_t up = shift >= 0 ? shift : 0, down = up - shift;
+  value = value < -largest ? -largest : value;
+  value = (value >> down) * (1 << up) + more_q28;
+  readings->q28[k] = value;
+  readings->q14[k] = (value + (1 << 13)) >> 14;
+}
+
 bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10,
                             uint32_t usable, const struct fit_settings *settings,
                             struct readings *readings) {
   const uint8_t *sensor = array->grid.sensor;
   int32_t largest = 0;
   for (int k = 0; k < NODES; k++) {
-    int32_t value = pressure_Pa_q10[sensor[k]];
-    if (usable != UINT32_MAX && !(usable >> sensor[k] & 1)) {
-      value = 0;
-    }
+    bool used = usable >> sensor[k] & 1;
+    int32_t value = used ? fit_reading(settings, pressure_Pa_q10[sensor[k]]) : 0;
     readings->q28[k] = value;
     largest = value > largest ? value : largest;
   }
   if (largest <= 0) {
     return false;
   }
-  int32_t shift = 28 - fixed_bits((uint32_t)largest);
+  bool dip = fit_has_dip(settings);
+  int32_t shift = (dip ? 27 : 28) - fixed_bits((uint32_t)largest);
   int32_t up = shift >= 0 ? shift : 0;
   int32_t down = up - shift;
   readings->largest = largest;
   readings->shift = shift;
+  readings->largest_q28 = (largest >> down) * (1 << up);
   for (int k = 0; k < NODES; k++) {
-    int32_t value = readings->q28[k];
-    value = value < -largest ? -largest : value;
-    value = (value >> down) * (1 << up);
-    readings->q28[k] = value;
-    readings->q14[k] = (value + (1 << 13)) >> 14;
+    set_reading(readings, k, readings->q28[k], 0);
+  }
+  readings->dip_share = (struct scaled){0, 0};
+  if (dip) {
+    float sd = settings->dip_sd_mm / array->pitch_mm;
+    sd = sd < FIT_DIP_SD_MIN ? FIT_DIP_SD_MIN : sd > FIT_DIP_SD_MAX ? FIT_DIP_SD_MAX : sd;
+    readings->dip_share = fit_grid_scaled(settings->dip_share);
+    readings->dip_height = (int32_t)(0.72134752f * 67108864.0f / (sd * sd));
   }
   readings->prior_sigma = readings->prior_weight = readings->prior_sd = (struct scaled){0, 0};
   if (fit_has_prior(settings)) {
     struct scaled width = fit_grid_scaled(settings->prior_width_mm / array->pitch_mm);
-    int32_t largest_q28 = (largest >> down) * (1 << up);
     readings->prior_sd =
-        scaled_mul(fit_grid_scaled(FIT_PRIOR_WEIGHT), scaled_from(largest_q28, -28));
+        scaled_mul(fit_grid_scaled(FIT_PRIOR_WEIGHT), scaled_from(readings->largest_q28, -28));
     readings->prior_sigma = fit_grid_scaled(settings->prior_sigma_mm / array->pitch_mm);
     readings->prior_weight = scaled_div(readings->prior_sd, width);
   }
   return true;
+}
+
+#define DIP_RISE_MAX_Q22 (20 << 22) /* the depth is at its limit long before */
+
+/* The dip's Gaussian at the nodes of an axis, Q30. */
+static void set_dip(int32_t *g, int nodes, int origin, int32_t centre, int32_t height) {
+  for (int i = 0; i < nodes; i++) {
+    int32_t off_q12 = ((i - origin) * ONE_Q26 - centre) >> 14;
+    g[i] = exp2_negative((uint32_t)fixed_mul_q32(height, off_q12 * off_q12) << 4);
+  }
+}
+
+void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                           uint32_t usable, const struct state *at, int32_t amplitude_q28,
+                           int32_t rise_q22, struct readings *readings) {
+  const uint8_t *sensor = array->grid.sensor;
+  int32_t x[COLUMNS], y[ROWS];
+  set_dip(x, COLUMNS, COLUMNS / 2, at->x, readings->dip_height);
+  set_dip(y, ROWS, ROWS / 2, at->y, readings->dip_height);
+  /* 2^rise is 2^-(1 - its fraction) and a power of two. */
+  rise_q22 = fixed_clamp(rise_q22, 0, DIP_RISE_MAX_Q22);
+  int32_t fraction = exp2_negative((uint32_t)((1 << 22) - (rise_q22 & 0x3FFFFF)));
+  struct scaled rise = fit_scaled_from(fraction, (rise_q22 >> 22) + 1 - 30);
+  struct scaled depth = scaled_mul(scaled_mul(rise, fit_scaled_from(amplitude_q28, -28)),
+                                   readings->dip_share);
+  const int32_t most = readings->largest_q28 >> 2; /* FIT_DIP_DEPTH_MAX */
+  int32_t depth_q28 = fixed_clamp(fit_scaled_to_fixed(depth, 28), 0, most);
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t column = fixed_mul_q30(depth_q28, x[i]);
+    for (int j = 0; j < ROWS; j++) {
+      int k = i * ROWS + j;
+      bool used = usable >> sensor[k] & 1;
+      set_reading(readings, k, used ? pressure_Pa_q10[sensor[k]] : 0,
+                  used ? fixed_mul_q30(column, y[j]) : 0);
+    }
+  }
 }

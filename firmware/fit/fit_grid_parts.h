@@ -25,14 +25,18 @@
 
 #define LOG2E_HALF ((struct scaled){23637, -15})
 
-/* The pressures of one frame in grid order [column][row], the largest from 0.5 to 1. */
+/* The pressures of one frame in grid order [column][row], the largest from 0.5 to 1; where there is
+ * a dip, half of that, so that what it takes finds room. */
 struct readings {
   int32_t q28[NODES], q14[NODES];
   int32_t residual[NODES];                 /* room for the kernel */
   int32_t shift;                           /* Q28 = 1/1024 Pa times 2^shift */
   int32_t largest;                         /* 1/1024 Pa */
+  int32_t largest_q28;
   struct scaled prior_sigma, prior_weight; /* pitches, per pitch; weight 0: none */
   struct scaled prior_sd;                  /* of its row, in units of q28 */
+  struct scaled dip_share;                 /* 0: none */
+  int32_t dip_height;                      /* Q26, of the dip's Gaussian */
 };
 
 struct state {
@@ -82,6 +86,12 @@ int32_t fit_scaled_to_fixed(struct scaled a, int32_t q);
 bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10,
                             uint32_t usable, const struct fit_settings *settings,
                             struct readings *readings);
+
+/* Adds to the readings what the rubber's dip takes from them about this contact, whose model is
+ * amplitude 2^rise at the centre. readings: as fit_grid_take_readings left them, with a dip. */
+void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                           uint32_t usable, const struct state *at, int32_t amplitude_q28,
+                           int32_t rise_q22, struct readings *readings);
 
 /* value >= 0 and finite. */
 uint64_t fit_packed_float(float value);

@@ -1,5 +1,7 @@
 #include "fit/fit_grid_spread.h"
 
+#include "fit/fit_limits.h"
+
 #define UNROLL _Pragma("GCC unroll 6") /* for loops over the nodes of an axis */
 
 /* Columns times these stay within 31 bits with four of them. */
@@ -14,6 +16,7 @@
 /* FIT_SHAPE_PER_MODEL in terms of z^2 and the height: sigma^2 = log2(e) / (2 height) and
  * r^2 / sigma^2 = 2 z / log2(e). */
 #define SHAPE_PER_MODEL ((struct scaled){19914, -14})
+#define SHAPE_KNOWN ((struct scaled){19661, -16})
 #define FORCE_SHARE ((struct scaled){20972, -17}) /* FIT_FORCE_SHAPE^2 */
 
 int32_t fit_grid_align(const struct scaled *values, int count, int32_t *aligned) {
@@ -162,6 +165,9 @@ NOINLINE void fit_grid_end_spread(const struct fit_settings *settings,
   uint32_t bend = (uint32_t)settings->model_sd_q16 * (uint32_t)(system->at.height >> 14);
   struct scaled strength = fit_scaled_from((int32_t)(bend >> 1), 1 - 16 - 12);
   strength = scaled_mul(strength, SHAPE_PER_MODEL);
+  if (fit_has_dip(settings)) {
+    strength = scaled_mul(strength, SHAPE_KNOWN);
+  }
   strength.exponent += 4 - 21 + spread->shape_shift;
   struct scaled x = scaled_mul(fit_scaled_from(spread->shape_x, 0), strength);
   struct scaled y = scaled_mul(fit_scaled_from(spread->shape_y, 0), strength);

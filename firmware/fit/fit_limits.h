@@ -39,7 +39,8 @@
  * contact. Residuals from FIT_MISFIT_BEGIN times the expected variance count more, up to
  * FIT_MISFIT_MOST times, as they must come from few readings or another model. For the force the
  * shape's part counts by FIT_FORCE_SHAPE. The rest of it is the same for every touch of a pad, and
- * belongs to the force scale. The last step counts as an error of the location. Where the fit
+ * belongs to the force scale. Where the pad's dip is known the shape's part counts by
+ * FIT_SHAPE_KNOWN. The last step counts as an error of the location. Where the fit
  * stopped at a limit, FIT_BOUND_SD replaces all, since a linear estimate there means nothing.
  * Values from truth_fit --seed 1; NUMERICS.md has their coverage on others. */
 #define FIT_MISFIT_BEGIN 8
@@ -47,6 +48,7 @@
 #define FIT_SHAPE_PER_MODEL 1.1f
 #define FIT_SHAPE_SIGMA 0.644f /* pitches: 12 mm of rubber on a pitch of 9 mm */
 #define FIT_FORCE_SHAPE 0.4f
+#define FIT_SHAPE_KNOWN 0.3f
 #define FIT_BOUND_SD 1.2f /* pitches: such presses of a thin pad are off by up to 2.4 */
 
 /* A contact is elongated if log(longer width / shorter) exceeds a limit: FIT_STRETCH_LEAST and
@@ -71,6 +73,12 @@ static inline float fit_location_sd_limit_mm(const struct fit_settings *settings
   return positive ? settings->location_sd_limit_mm : FIT_LOCATION_SD_LIMIT_mm;
 }
 
+/* The dip never takes more than this share of the largest reading, and is used with a sd of so many
+ * pitches. */
+#define FIT_DIP_DEPTH_MAX 0.25f
+#define FIT_DIP_SD_MIN 0.5f
+#define FIT_DIP_SD_MAX 5.0f
+
 #define FIT_PRIOR_WIDTH_MIN_mm 0.001f
 #define FIT_PRIOR_MAX_mm 10000.0f
 
@@ -79,6 +87,21 @@ static inline bool fit_has_prior(const struct fit_settings *settings) {
   uint32_t least = bytes_from_f32(FIT_PRIOR_WIDTH_MIN_mm), most = bytes_from_f32(FIT_PRIOR_MAX_mm);
   return bytes_from_f32(settings->prior_width_mm) - least <= most - least &&
          bytes_from_f32(settings->prior_sigma_mm) <= most;
+}
+
+static inline bool fit_has_dip(const struct fit_settings *settings) {
+  uint32_t least = bytes_from_f32(FIT_PRIOR_WIDTH_MIN_mm), most = bytes_from_f32(FIT_PRIOR_MAX_mm);
+  return bytes_from_f32(settings->dip_sd_mm) - least <= most - least &&
+         bytes_from_f32(settings->dip_share) - 1u < bytes_from_f32(FIT_DIP_SHARE_MAX);
+}
+
+/* What a reading below zero counts as. */
+static inline int32_t fit_reading(const struct fit_settings *settings, int32_t pressure_Pa_q10) {
+  if (settings->cut_noises == 0 || pressure_Pa_q10 >= 0) {
+    return pressure_Pa_q10;
+  }
+  int32_t noise = settings->noise_Pa_q10 < 1 << 22 ? settings->noise_Pa_q10 : 1 << 22;
+  return pressure_Pa_q10 < -noise * settings->cut_noises ? 0 : pressure_Pa_q10;
 }
 
 /* Whether the fit without an outlier is the better one. rough: its residuals still are. An outlier
