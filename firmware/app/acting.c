@@ -17,6 +17,7 @@ static void use_tangential_scales(struct app *app) {
 void app_use_pad(struct app *app, const struct pad_profile *pad) {
   bool acts = pad && fit_pad_init(&app->fit_pad, &app->fit_array, pad) == FT_OK;
   app->pad = acts ? pad : NULL;
+  app->fit_settings.cut_noises = acts ? 0 : DEFAULT_CUT_NOISES;
   use_tangential_scales(app);
   memset(&app->tangential_course, 0, sizeof app->tangential_course);
   tangential_reset(&app->tangential_history);

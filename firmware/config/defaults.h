@@ -17,6 +17,16 @@
 #define DEFAULT_FIT_ITERATIONS FINGERTIP_FIT_ITERATIONS
 #define DEFAULT_FIT_N_LARGEST 0u /* all: each adds accuracy */
 
+/* A Gaussian is never negative, but rubber is: it bulges beside a contact, and sensors three to five
+ * sigma away read -1 to -2 % of the peak (host_tools/report/real). Such a reading counts as zero
+ * from so many noise sd below it. A tangential load makes readings negative too, so where a pad's
+ * profile acts they stay as they are. The paper's scene keeps the paper's fit. */
+#ifdef FINGERTIP_SCENE_PAPER
+#define DEFAULT_CUT_NOISES 0u
+#else
+#define DEFAULT_CUT_NOISES 4u
+#endif
+
 /* Force over 2 pi p0 sigma^2 of a pad that was never calibrated. A contact's tails are not
  * Gaussian, and the missing force depends on the layer: the product holds 0.90 to 0.97 of it on 6
  * to 12 mm of rubber (the twin's validation). The pad's mean gain adds as much as rubbers differ.

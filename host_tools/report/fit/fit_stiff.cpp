@@ -457,6 +457,7 @@ struct Chain {
     condition_follow(&state, &taken, &readings);
     fit_settings settings{};
     settings.iterations = DEFAULT_FIT_ITERATIONS;
+    settings.cut_noises = DEFAULT_CUT_NOISES;
     settings.noise_Pa_q10 = taken.noise_Pa_q10;
     settings.prior_sigma_mm = static_cast<float>(press.prior_sigma_mm);
     settings.prior_width_mm = press.prior_sigma_mm > 0.0 ? 0.5f : 0.0f;

@@ -99,13 +99,13 @@ def ask(program, grid, jobs):
     return json.loads(done.stdout)["results"]
 
 
-def fit_job(readings, gain=None, gain_sd=None, prior=(0.0, 0.0)):
-    """prior: sigma, its standard deviation, mm; NaN in readings: that sensor is missing."""
+def fit_job(readings, gain=None, gain_sd=None, prior=(0.0, 0.0), dip=(0.0, 0.0)):
+    """prior: sigma, its standard deviation, mm; dip: its share, its sd, mm; NaN in readings: that sensor is missing."""
     sensors = readings.shape[1]
     return {
         "kind": "fit", "presses": [[None if np.isnan(one) else one for one in press] for press in readings.tolist()], "noise_Pa": NOISE_PA,
         "gain": [1.0] * sensors if gain is None else gain, "gain_sd": [RAW_GAIN_SD] * sensors if gain_sd is None else gain_sd,
-        "prior_sigma_mm": prior[0], "prior_width_mm": prior[1]}
+        "prior_sigma_mm": prior[0], "prior_width_mm": prior[1], "dip_share": dip[0], "dip_sd_mm": dip[1]}
 
 
 def stored_job(readings, stored):
@@ -124,15 +124,6 @@ def dip_share(grid):
     below = (np.exp(-square / 2) - grid.reading_Pa / grid.peak_Pa)[far]
     dip = np.exp(-square[far] / (2 * DIP_WIDTHS**2))
     return float((below * dip).sum() / (dip**2).sum())
-
-
-def without_dip(readings, answer, grid, gain, share, width_mm):
-    """The readings without the dip of the contact that the answer holds."""
-    valid = np.array(answer["flags"]) & int(Flag.FIT_VALID) != 0
-    xy, sigma_mm = np.column_stack([answer["x_mm"], answer["y_mm"]]), np.where(valid, answer["sigma_mm"], 1.0)
-    peak_Pa = np.where(valid, np.array(answer["force_N"]) * 1e6 / (2 * np.pi * sigma_mm**2), 0.0)
-    square = ((xy[:, None, :] - grid.layout)**2).sum(axis=2)
-    return readings + share * peak_Pa[:, None] * np.array(gain) * np.exp(-square / (2 * (DIP_WIDTHS * width_mm)**2))
 
 
 class Felt:

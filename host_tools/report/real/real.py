@@ -100,17 +100,11 @@ def judge_grid(program, one, path):
 
 
 def with_profile(program, grid, readings, solved):
-    """Answers to a fit that knows the pad's dip, and its width as each calibration finds it: the readings of sensors below zero count as zero, then
-    the dip about what was found is taken out, twice. The firmware has no such fit; this is what it could reach."""
+    """Answers of the firmware's kernel where it is told the pad's dip, of the rows that align, and the width that each calibration finds."""
     share = grids.dip_share(grid)
-
-    def jobs(readings_of):
-        return [grids.fit_job(readings_of(k), one["stored"]["gain"], one["stored"]["gain_sd"], (one["width_mm"], grids.KNOWN_WIDTH_MM)) for k, one in enumerate(solved)]
-
-    answers = grids.ask(program, grid, jobs(lambda k: np.maximum(readings, 0.0)))
-    for _ in range(2):
-        answers = grids.ask(program, grid, jobs(lambda k: grids.without_dip(readings, answers[k], grid, solved[k]["stored"]["gain"], share, solved[k]["width_mm"])))
-    return answers
+    return grids.ask(program, grid, [
+        grids.fit_job(readings, one["stored"]["gain"], one["stored"]["gain_sd"], (one["width_mm"], grids.KNOWN_WIDTH_MM),
+                      (share, grids.DIP_WIDTHS * one["width_mm"])) for one in solved])
 
 
 def mean_of(rows, *keys):

@@ -4,8 +4,8 @@
 //   {"x_mm": [sensor], "y_mm": [sensor], "pitch_mm": p, "jobs": [job]}  ->  {"results": [result]}
 //
 //   job {"kind": "fit", "presses": [[reading_Pa of each sensor, null: missing]], "noise_Pa",
-//        "gain": [sensor], "gain_sd": [sensor], "prior_sigma_mm", "prior_width_mm", "cut_noises",
-//        "dip_share", "dip_sd_mm"}
+//        "gain": [sensor], "gain_sd": [sensor], "prior_sigma_mm", "prior_width_mm", "dip_share",
+//        "dip_sd_mm"}
 //     -> {"x_mm", "y_mm", "sigma_mm", "force_N", "location_sd_mm", "flags": [press each]}, 0 without a fit
 //   job {"kind": "calibrate", "presses": as above, "noise_Pa", "every_s": from one to the next}
 //     -> {"state": "good" | "more" | "refused", "reason", "solved", "width_mm", "residual_share",
@@ -49,12 +49,12 @@ json fit(const Array &layout, const json &job) {
     throw std::runtime_error("the fit takes no such layout");
   }
   fit_settings settings{};
-  settings.iterations = job.contains("iterations") ? job.at("iterations").get<std::uint8_t>() : DEFAULT_FIT_ITERATIONS;
+  settings.iterations = DEFAULT_FIT_ITERATIONS;
   settings.noise_Pa_q10 = static_cast<std::int32_t>(1024.0 * job.at("noise_Pa").get<double>());
   fit_set_errors(&settings, 0.0f, DEFAULT_MODEL_SD);
   settings.prior_sigma_mm = static_cast<float>(job.at("prior_sigma_mm").get<double>());
   settings.prior_width_mm = static_cast<float>(job.at("prior_width_mm").get<double>());
-  settings.cut_noises = job.at("cut_noises").get<std::uint8_t>();
+  settings.cut_noises = DEFAULT_CUT_NOISES;
   settings.dip_share = static_cast<float>(job.at("dip_share").get<double>());
   settings.dip_sd_mm = static_cast<float>(job.at("dip_sd_mm").get<double>());
   const auto gain = job.at("gain").get<std::vector<double>>();

@@ -26,8 +26,8 @@ def write(found, path):
         lines += ["", f"Not there, and so not judged: {', '.join(found['missing'])}."]
     if found["grids"]:
         lines += ["", "## Presses on arrays", "", "Inside the outer sensors, of rows that neither align nor calibrate. \"width typed\": a prior of the pad's own width, 0.5 mm.",
-                  "\"calibrated\": all sessions of twenty placements that have a solution, whether the tool accepts them or not. \"and dip and width known\": a fit outside the",
-                  "firmware, which shows what a pad's profile is worth. silent: beyond 1 mm and no warning.", ""]
+                  "\"calibrated\": all sessions of twenty placements that have a solution, whether the tool accepts them or not. \"and dip and width known\": the same",
+                  "gains, and the kernel is told the width that the session found and the pad's dip, which no setting of the firmware does yet. silent: beyond 1 mm and no warning.", ""]
         lines += table_md(("recording", "part", "way", *COLUMNS), grid_rows(found))
         lines += ["", *table_md(("recording", "width mm", "width found mm", "dip %", "gains cv %", "places off mm", "centroid p50 mm", "sessions", "accepted", "refused for"), [
             [row["recording"], *(text_of(row[key], 3) for key in ("width_mm", "width_found_mm", "dip_percent", "gains_cv_percent", "places_off_mm", "centroid_p50_mm")),

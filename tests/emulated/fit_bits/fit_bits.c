@@ -134,6 +134,11 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     settings.prior_sigma_mm = (float)draw_between(1, 256) / 16.0f;
     settings.prior_width_mm = (float)draw_between(1, 64) / 32.0f;
   }
+  if (kernel != FIT_BITS_TANGENTIAL && press % 5 == 1) {
+    settings.cut_noises = 4;
+    settings.dip_share = (float)draw_between(1, 100) / 1024.0f;
+    settings.dip_sd_mm = (float)draw_between(4, 64);
+  }
 
   if (press % 2) {
     for (int k = 0; k < FT_MAX_SENSORS; k++) {

@@ -1,6 +1,7 @@
 /* Tangential load, from sensors to packets: on the pad that the profile describes. */
 #include "app_rig.h"
 #include "common/contact_flags.h"
+#include "config/defaults.h"
 #include "support/pad.h"
 
 /* What the object does to the rubber. */
@@ -121,15 +122,18 @@ static void a_profile_outlives_power_until_it_is_erased(void) {
     TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_PAD, info.stored);
     TEST_ASSERT_EQUAL_MEMORY(&command.body.cmd_pad.profile, &info.pad, 4 * PAD_PROFILE_FLOATS + 1);
     TEST_ASSERT_NOT_NULL(app.pad);
+    TEST_ASSERT_EQUAL_UINT8(0, app.fit_settings.cut_noises);
     rig_power_up();
     native_cdc_open();
     run_for(300);
   }
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_ERASE_PAD}));
   TEST_ASSERT_NULL(app.pad);
+  TEST_ASSERT_EQUAL_UINT8(DEFAULT_CUT_NOISES, app.fit_settings.cut_noises);
   TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
   rig_power_up();
   TEST_ASSERT_NULL(app.pad);
+  TEST_ASSERT_EQUAL_UINT8(DEFAULT_CUT_NOISES, app.fit_settings.cut_noises);
 }
 
 static void a_profile_out_of_range_is_refused(void) {

@@ -345,6 +345,87 @@ static void a_prior_leaves_what_is_uncertain_so(void) {
   TEST_ASSERT_GREATER_THAN_INT(500, compared);
 }
 
+static float off_mm(const struct fit_result *result, double x, double y) {
+  return (float)hypot((double)result->x_mm - x, (double)result->y_mm - y);
+}
+
+/* The readings of a pad with a dip, with and without the noise's sensor 0; each kernel. */
+static void a_known_dip_is_added_back_alike_in_all(void) {
+  struct random random = {77};
+  const double share = 0.03, sd_per_sigma = 3.2;
+  float worst = 0.0f, apart = 0.0f, unknown = 0.0f;
+  int counted = 0;
+  for (int i = 0; i < 400; i++) {
+    double half_x = 4.5 * (COLUMNS - 1), half_y = 4.5 * (ROWS - 1);
+    double x = 1.5 + random_between(&random, -half_x, half_x);
+    double y = -0.25 + random_between(&random, -half_y, half_y);
+    double sigma = random_between(&random, 3.4, 6.0), sd = sd_per_sigma * sigma;
+    for (int k = 0; k < SENSORS; k++) {
+      double dx = (double)x_mm[k] - x, dy = (double)y_mm[k] - y, square = dx * dx + dy * dy;
+      double p = exp(-square / (2 * sigma * sigma)) - share * exp(-square / (2 * sd * sd));
+      readings[k] = (int32_t)nearbyint(1024.0 * (3e4 * p + 2.0 * random_normal(&random)));
+    }
+    struct fit_settings settings = {.iterations = 8,
+                                    .noise_Pa_q10 = 2048,
+                                    .cut_noises = 4,
+                                    .prior_sigma_mm = (float)sigma,
+                                    .prior_width_mm = 0.1f};
+    struct fit_result plain, grid, masked, general;
+    fit_grid(&array, readings, &settings, &plain);
+    settings.dip_share = (float)share;
+    settings.dip_sd_mm = (float)sd;
+    fit_grid(&array, readings, &settings, &grid);
+    fit_grid_masked(&array, readings, ALL, &settings, &masked);
+    fit_general(&array, readings, ALL, &settings, &general);
+    unknown = fmaxf(unknown, off_mm(&plain, x, y));
+    worst = fmaxf(worst, fmaxf(off_mm(&grid, x, y), off_mm(&general, x, y)));
+    apart = fmaxf(apart, fmaxf(off_mm(&general, (double)grid.x_mm, (double)grid.y_mm),
+                               off_mm(&masked, (double)grid.x_mm, (double)grid.y_mm)));
+    counted++;
+    TEST_ASSERT_TRUE(grid.location_sd_mm <= plain.location_sd_mm);
+  }
+  char text[100];
+  snprintf(text, sizeof text, "%d: off %.3f mm, unknown %.3f, kernels apart %.3f", counted,
+           (double)worst, (double)unknown, (double)apart);
+  TEST_ASSERT_TRUE_MESSAGE(unknown > 0.3f, text);
+  TEST_ASSERT_TRUE_MESSAGE(worst < 0.08f, text);
+  TEST_ASSERT_TRUE_MESSAGE(apart < 0.02f, text);
+}
+
+static void readings_below_zero_count_as_zero(void) {
+  struct random random = {78};
+  const struct fit_settings cut = {.iterations = 4, .noise_Pa_q10 = 5120, .cut_noises = 4};
+  struct fit_settings whole = cut;
+  whole.cut_noises = 0;
+  for (int i = 0; i < 100; i++) {
+    random_press(&random, 3.2, 6.0);
+    int32_t below[SENSORS];
+    int changed = 0;
+    for (int k = 0; k < SENSORS; k++) {
+      if (readings[k] < 4 * 5120) { /* some as far below zero as is noise, some farther */
+        readings[k] = (int32_t)random_below(&random, 2) ? -4 * 5120 : -4 * 5120 - 1 - 40000 * k;
+      }
+      below[k] = readings[k];
+      if (readings[k] < -4 * 5120) {
+        readings[k] = 0;
+        changed++;
+      }
+    }
+    struct fit_result expected, found;
+    fit_gaussian(&array, readings, ALL, &whole, &expected);
+    fit_gaussian(&array, below, ALL, &cut, &found);
+    TEST_ASSERT_EQUAL_MEMORY(&expected, &found, sizeof found);
+    fit_grid_masked(&array, readings, ALL & ~2u, &whole, &expected);
+    fit_grid_masked(&array, below, ALL & ~2u, &cut, &found);
+    TEST_ASSERT_EQUAL_MEMORY(&expected, &found, sizeof found);
+    fit_general(&array, readings, ALL, &whole, &expected);
+    fit_general(&array, below, ALL, &cut, &found);
+    TEST_ASSERT_EQUAL_MEMORY(&expected, &found, sizeof found);
+    fit_general(&array, below, ALL, &whole, &found);
+    TEST_ASSERT_EQUAL(changed > 0, memcmp(&expected, &found, sizeof found) != 0);
+  }
+}
+
 static void warnings_are_given(void) {
   struct fit_result result;
   for (int k = 0; k < SENSORS; k++) {
@@ -398,6 +479,11 @@ static void any_bits_give_finite_results(void) {
       settings.prior_sigma_mm = 5.0f;
       settings.prior_width_mm = 0.01f + (float)random_below(&random, 100);
     }
+    if (random_below(&random, 2)) {
+      settings.cut_noises = (uint8_t)random_u32(&random);
+      settings.dip_share = FIT_DIP_SHARE_MAX / (float)(1 + random_below(&random, 9));
+      settings.dip_sd_mm = 0.01f + (float)random_below(&random, 100);
+    }
     struct fit_result result;
     bool masked = random_below(&random, 2);
     if (masked) {
@@ -432,6 +518,8 @@ int main(void) {
   RUN_TEST(a_fit_that_still_moves_says_how_far);
   RUN_TEST(a_prior_pulls_sigma_alike_in_both);
   RUN_TEST(a_prior_leaves_what_is_uncertain_so);
+  RUN_TEST(a_known_dip_is_added_back_alike_in_all);
+  RUN_TEST(readings_below_zero_count_as_zero);
   RUN_TEST(warnings_are_given);
   RUN_TEST(any_bits_give_finite_results);
   return UNITY_END();

@@ -181,6 +181,12 @@ static struct input draw(uint32_t number) {
   }
   settings->model_sd_q16 = (uint16_t)(random_u32(&random) >> random_below(&random, 32));
   settings->n_largest = random_below(&random, 4) ? 0 : (uint8_t)random_u32(&random);
+  settings->cut_noises = random_below(&random, 2) ? 0 : (uint8_t)random_u32(&random);
+  if (random_below(&random, 4) == 0) {
+    bool any = random_below(&random, 2);
+    settings->dip_share = any ? any_float(&random) : (float)random_between(&random, 0.0, 0.1);
+    settings->dip_sd_mm = any ? any_float(&random) : (float)random_between(&random, 1.0, 100.0);
+  }
   switch (random_below(&random, 4)) {
   case 0:
     settings->prior_sigma_mm = any_float(&random);

@@ -73,7 +73,8 @@ Fingertip::Fingertip(const pad_profile &profile)
 bool Fingertip::feel(const Readings &base_Pa, const KnownPad &known, double noise_Pa,
                      std::uint32_t usable, Random &random, Said &said) {
   const truth::Pad &pad = known.pad;
-  const fit_settings settings = truth::settings_for(pad, noise_Pa);
+  fit_settings settings = truth::settings_for(pad, noise_Pa);
+  settings.cut_noises = 0; // as where a profile acts
   fit_result fit;
   fit_tangential found{};
   fit_tangential_state state{};

@@ -92,6 +92,7 @@ public:
                         geometry.pitch_mm);
     fit_settings settings{};
     settings.iterations = DEFAULT_FIT_ITERATIONS;
+    settings.cut_noises = DEFAULT_CUT_NOISES;
     settings.noise_Pa_q10 = static_cast<std::int32_t>(NOISE_Pa * 1024.0);
     for (std::size_t k = 0; k < gain_sd.size(); k++) {
       settings.gain_sd_q16[k] = static_cast<std::uint16_t>(std::lround(65536.0 * gain_sd[k]));

@@ -163,6 +163,7 @@ fit_array firmware_array() {
 fit_settings settings_for(const Pad &pad, double noise_Pa) {
   fit_settings settings{};
   settings.iterations = DEFAULT_FIT_ITERATIONS;
+  settings.cut_noises = DEFAULT_CUT_NOISES;
   fit_set_errors(&settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
   settings.noise_Pa_q10 = static_cast<std::int32_t>(std::lround(1024.0 * noise_Pa));
   for (std::size_t k = 0; k < SENSORS; k++) {

@@ -150,6 +150,7 @@ void Bench::run(double seconds, const Feels &feels, const Sees &sees) {
 double Bench::force_N() const {
   fit_settings settings{};
   settings.iterations = DEFAULT_FIT_ITERATIONS;
+  settings.cut_noises = DEFAULT_CUT_NOISES;
   settings.noise_Pa_q10 = frame_.noise_Pa_q10;
   fit_result fit{};
   if (readings_.contact) {

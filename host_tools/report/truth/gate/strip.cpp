@@ -266,6 +266,7 @@ fit_result fit(const Press &press, double prior_sigma_mm, double prior_width_mm)
   static const fit_array array = line();
   fit_settings settings{};
   settings.iterations = DEFAULT_FIT_ITERATIONS;
+  settings.cut_noises = DEFAULT_CUT_NOISES;
   settings.noise_Pa_q10 = static_cast<std::int32_t>(1024.0 * NOISE_Pa);
   settings.prior_sigma_mm = static_cast<float>(prior_sigma_mm);
   settings.prior_width_mm = static_cast<float>(prior_width_mm);
