@@ -104,6 +104,7 @@ Player::Player(const Object &object, const truth::Pad &pad, const Sensing &sensi
   noise_Pa_ = osr->noise_Pa_q10 / 1024.0;
   conversion_s_ = 1e-6 * osr->maximum_us;
   settings_ = truth::settings_for(pad, noise_Pa_);
+  settings_.cut_noises = 0; // as where a profile acts
   fit_pad_ = std::make_unique<fit_pad>(pad_under(object.layer_mm, array_));
 }
 
