@@ -75,7 +75,7 @@ void app_start(struct app *app, const struct array_bus *bus) {
   app->contact_settings.slip_window_us = DEFAULT_SLIP_WINDOW_ms * 1000u;
 #endif
   store_init(&app->store, geometry.sensor_count);
-  condition_tare(&app->condition);
+  condition_start(&app->condition);
   app->active = true;
   app->second_began_us = port_now_us();
 
@@ -249,7 +249,7 @@ static void follow_suspend(struct app *app) {
     if (saves) {
       app->saving_since_us = now_us;
     } else if (now_us - app->saving_since_us >= ZERO_LASTS_us) {
-      condition_tare(&app->condition);
+      condition_start(&app->condition);
     }
     app->saves_power = saves;
   }

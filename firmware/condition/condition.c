@@ -1,488 +1,77 @@
 #include "condition/condition.h"
 
-#include "port/divide.h"
-
 #include <string.h>
 
-/* Units of 1.024 ms, which a shift makes of microseconds. */
-#define MS(ms) ((int32_t)((ms)*INT64_C(1000) / 1024))
-#define SECONDS(s) MS(INT64_C(1000) * (s))
-#define Pa_q10(Pa) (1024 * (Pa))
-
 #define STEP_MAX_ms 16383 /* a longer gap counts as this */
-#define TRACK_ms 64       /* each sensor is tracked so often; at lower rates with every frame */
-#define AGE_MAX_ms ((uint32_t)SECONDS(86400))
+#define LOOK_ms 64
 
-#define TARE_SLOW_ms SECONDS(1)
-#define TARE_FEWEST 3
+#define SLOW_ms SECONDS(1)
 
-/* Of real sensors at rest: 130 to 210 Pa in 16 min, 0.22 Pa/s at most (source as in condition.h).
- * The zero may follow at 0.5 Pa/s, 512 / 1024 in a second: at 0.31 it is too slow to know the drift
- * after a minute. What drifted in a contact is taken to be up to 0.24 Pa/s of it, 900 Pa at most.
- */
-#define DRIFT_SLEW_SHIFT 1
-#define DRIFT_IN_CONTACT_SHIFT 2
-#define DRIFT_IN_CONTACT_MAX_Pa 900
-#define DRIFT_FASTEST_q12 1280 /* 0.31 Pa/s */
-#define DRIFT_GOES_ON_ms ((uint32_t)SECONDS(3600))
-
-#define IDLE_ms SECONDS(2)     /* time constants of the level, */
-#define FOLLOW_ms MS(700)      /* of the remainder, */
-#define FOLLOW_DOWN_ms MS(100) /* when a force goes at last, */
-/* In TRACK_ms a remainder rises by less than so much noise, and falls by less than so much and a
- * quarter of it. */
+/* In a look a remainder rises by less than so much noise, and falls by less than so much and a quarter
+ * of it. */
 #define STILL_SIGMA 3
 #define FALL_SHIFT 2
-#define WANDER_ms SECONDS(120) /* and of what it counts as risen lately */
-/* What a reading rises by less than 16 Pa/s, 2^4, may be a drift: some real sensors crept by 2 kPa
- * in minutes. Seen through a low pass, or the noise would be clipped too. */
-#define CREEPING_SHIFT 4
-#define CREEPING_ms SECONDS(1)
-#define CREPT_MAX_Pa 2500
-/* A contact so many times what its zeros have taken lately is off by a fifth at most. What they
- * took of it itself counts twice, for where it then moves they are off as before. At 5 holds of the
- * real strips are in doubt. */
-#define TAKEN_FACTOR 4
-#define WARM_ms SECONDS(8)
-#define WARM_SHIFT 3 /* share of what may have moved that does in a second */
-#define MEMORY_ms SECONDS(CONDITION_MEMORY_s)
-#define FRESH_ms ((uint32_t)SECONDS(CONDITION_FRESH_s))
-#define WARM_FRESH_ms ((uint32_t)SECONDS(6)) /* sensors rise by 130 Pa in the first 5 s */
-
-#define BAND_SHIFT 3   /* of the memory: the remainder, and what closes the gate, */
-#define DIP_SHIFT 2    /* the remainder below zero, */
-#define REOPEN_SHIFT 4 /* and what a sudden press must exceed later */
-/* Share of the strongest sensor's memory that counts for all: far sensors stand off by 2 % of a
- * peak that they hardly felt. */
-#define CROSS_SHIFT 1
-#define KEEP_SHIFT 8 /* share of the memory that the level takes of the remainder in a second */
-#define KEEP_DOWN_SHIFT 2 /* less of it downward: what dipped comes back */
-#define CREEP_SHIFT 10    /* and of what the remainder does not follow */
-
-#define BELOW_ms SECONDS(CONDITION_BELOW_s) /* dips come back within it */
-#define FAR_BELOW_Pa 1000
-#define FAR_BELOW_ms MS(500)
-#define RETURN_MAX_Pa 600 /* a sensor tared after being below may come back by this, in doubt */
-
-#define SATURATED_Pa 100000
 
 /* A sensor that has lost its state, or a wrong temperature, is found out within so long; a zero
  * taken meanwhile is not its own. */
 #define FOUND_OUT_ms ((uint32_t)SECONDS(5))
 #define TARE_WAITS_ms ((uint32_t)SECONDS(8))
 
+#define FRESH_ms ((uint32_t)SECONDS(AFTER_EFFECT_FRESH_s))
+#define DRIFT_GOES_ON_ms ((uint32_t)SECONDS(3600))
 #define CALM_AFTER_TARE_ms ((uint32_t)SECONDS(3))
 #define CALM_AFTER_RELEASE_ms ((uint32_t)SECONDS(60)) /* what rubber keeps goes slowly */
 #define CALM_LAG_Pa 2 /* and half a sigma: three sigmas of a mean at the least rate */
-#define SNAPSHOT_ms ((uint32_t)SECONDS(4))
-#define SNAPSHOT_LONGEST_ms ((uint32_t)SECONDS(64))
-#define DRIFT_LEAST_s 8
-#define DRIFT_LONGEST_s 512
-#define DRIFT_CHANGE_MAX_Pa 300
-/* A drift seen for T s weighs T^2 / (T^2 + 16): its sd is 1 Pa / T, that of drifts 0.2 Pa/s. */
-#define DRIFT_HALF_s2 16
 
-#define SUM_RANGE (INT32_C(1) << 23)  /* of a reading in a mean: 8 kPa */
-#define ZERO_MAX (INT32_C(1) << 30)   /* 1 MPa; the part ends near 0.5 */
-#define GAINED_MAX (INT32_C(1) << 29) /* before the gain */
+#define SUM_RANGE (INT32_C(1) << 23) /* of a reading in a mean: 8 kPa */
 
-static int32_t clamp(int32_t value, int32_t lowest, int32_t highest) {
-  return value < lowest ? lowest : value > highest ? highest : value;
-}
-
-static void begin_tare(struct condition *condition, uint8_t k) {
-  condition->tare_sum[k] = 0;
-  condition->tare_min[k] = INT32_MAX;
-  condition->tare_max[k] = INT32_MIN;
-  condition->tare_left[k] = CONDITION_TARE_FRAMES;
-  condition->tare_begun_ms[k] = condition->now_ms;
-  condition->taring |= UINT32_C(1) << k;
-  condition->guessed &= ~(UINT32_C(1) << k);
-  condition->memory_Pa_q10[k] = 0;
-  condition->reached_Pa_q10[k] = 0;
+static void begin_tare(struct condition *condition, uint8_t k, int32_t spread_Pa_q10) {
+  struct condition_sensor *sensor = &condition->sensor[k];
+  zero_begin_tare(&sensor->zero, condition->now_ms, spread_Pa_q10);
+  memset(&sensor->after, 0, sizeof sensor->after);
+  doubt_forget(&sensor->doubt, &condition->doubt, k);
   condition->margin_Pa_q10[k] = 0;
-  condition->risen_Pa_q10[k] = 0;
-  condition->crept_Pa_q10[k] = 0;
   condition->sum_Pa_q10[k] = 0;
-  condition->drift_q16[k] = 0;
-  condition->below_ms[k] = 0;
   condition->summed[k] = 0;
+  condition->taring |= UINT32_C(1) << k;
   uint32_t others = ~(UINT32_C(1) << k);
+  condition->guessed &= others;
   condition->restless &= others;
-  condition->stands_off &= others;
   condition->below &= others;
 }
 
-void condition_tare(struct condition *condition) {
+void condition_start(struct condition *condition) {
   memset(condition, 0, sizeof *condition);
-  condition->released_ms = AGE_MAX_ms;
+  condition->gate.released_ms = AGE_MAX_ms;
   for (uint8_t k = 0; k < FT_MAX_SENSORS; k++) {
-    begin_tare(condition, k);
+    begin_tare(condition, k, Pa_q10(ZERO_COLD_Pa));
   }
 }
 
-/* By halves of 32 bits: |sum| < 2^47, and a remainder is less than the count. */
-static int32_t mean_of(int64_t sum, int32_t count) {
-  int32_t high = (int32_t)(sum >> 16);
-  int32_t quotient = port_divide(high, count);
-  int32_t rest = (high - quotient * count) * (1 << 16) + (int32_t)(sum & 0xFFFF);
-  return quotient * (1 << 16) + port_divide(rest, count);
-}
-
-static void tare_step(struct condition *condition, uint8_t k, int32_t pressure_Pa_q10) {
-  if (condition->tare_left[k] == CONDITION_TARE_FRAMES) {
-    condition->tare_begun_ms[k] = condition->now_ms;
+void condition_tare(struct condition *condition) {
+  uint32_t warm = 0;
+  for (uint8_t k = 0; k < FT_MAX_SENSORS; k++) {
+    const bool settled = condition->sensor[k].zero.spread_Pa_q10 <= Pa_q10(ZERO_WARM_Pa);
+    set_bit(&warm, k, settled && !(condition->taring >> k & 1u));
   }
-  condition->tare_sum[k] += pressure_Pa_q10;
-  if (pressure_Pa_q10 < condition->tare_min[k]) {
-    condition->tare_min[k] = pressure_Pa_q10;
-  }
-  if (pressure_Pa_q10 > condition->tare_max[k]) {
-    condition->tare_max[k] = pressure_Pa_q10;
-  }
-  condition->tare_left[k]--;
-  int32_t taken = CONDITION_TARE_FRAMES - condition->tare_left[k];
-  bool slow = condition->now_ms - condition->tare_begun_ms[k] >= (uint32_t)TARE_SLOW_ms;
-  if (condition->tare_left[k] > 0 && !(slow && taken >= TARE_FEWEST)) {
-    return;
-  }
-  condition->taring &= ~(UINT32_C(1) << k);
-  int64_t sum = condition->tare_sum[k] - condition->tare_min[k] - condition->tare_max[k];
-  condition->level_Pa_q10[k] = condition->zero_Pa_q10[k] =
-      clamp(mean_of(sum, taken - 2), -ZERO_MAX, ZERO_MAX);
-  condition->before_Pa_q10[k] = condition->slow_Pa_q10[k] = condition->zero_Pa_q10[k];
-  condition->tracked_ms[k] = condition->now_ms;
-  condition->tared_ms = 0;
-  condition->snapshots = 0;
-  condition->warm_Pa_q10 = Pa_q10(CONDITION_WARM_Pa);
-}
-
-static int32_t clamped_difference(int32_t a, int32_t b) {
-  int32_t difference = (int32_t)((uint32_t)a - (uint32_t)b);
-  bool overflows = ((a ^ b) & (a ^ difference)) < 0;
-  if (!overflows) {
-    return difference;
-  }
-  return a < 0 ? INT32_MIN : INT32_MAX;
-}
-
-/* value times a share below 1, to the nearest. */
-static int32_t part_of(int32_t value, int32_t share_q16) {
-  uint32_t low = ((uint32_t)value & 0xFFFF) * (uint32_t)share_q16;
-  return (value >> 16) * share_q16 + (int32_t)((low + 0x8000) >> 16);
-}
-
-/* What a low pass takes of a difference in this time. */
-static int32_t share_in(int32_t step_ms, int32_t time_constant_ms) {
-  return port_divide(step_ms << 16, time_constant_ms + step_ms);
-}
-
-static int32_t faded(int32_t value, int32_t step_ms, int32_t time_constant_ms) {
-  return value - part_of(value, share_in(step_ms, time_constant_ms));
-}
-
-/* value / gain, |value| <= 2^29 and 1 / gain <= 4, to 1/1024 Pa below. */
-static int32_t scaled_by(int32_t value, uint32_t inverse_q16) {
-  uint32_t low = (uint32_t)value & 0xFFFF;
-  return (value >> 16) * (int32_t)inverse_q16 + (int32_t)(low * (inverse_q16 >> 16)) +
-         (int32_t)(low * (inverse_q16 & 0xFFFF) >> 16);
-}
-
-/* So much a second makes so much in this time. */
-static int32_t in_step(int32_t each_second, int32_t step_ms) {
-  return (each_second >> 4) * step_ms >> 6;
-}
-
-static uint32_t older(uint32_t age_ms, int32_t step_ms) {
-  return age_ms < AGE_MAX_ms ? age_ms + (uint32_t)step_ms : age_ms;
-}
-
-static void set_bit(uint32_t *bitmap, uint8_t k, bool set) {
-  *bitmap = (*bitmap & ~(UINT32_C(1) << k)) | (uint32_t)set << k;
-}
-
-static int32_t drift_in_contact(const struct condition *condition) {
-  uint32_t drift = condition->pressed_ms >> DRIFT_IN_CONTACT_SHIFT;
-  return drift < Pa_q10(DRIFT_IN_CONTACT_MAX_Pa) ? (int32_t)drift : Pa_q10(DRIFT_IN_CONTACT_MAX_Pa);
-}
-
-/* Of the memory, or of that of the whole pad. */
-static int32_t in_all(int32_t memory, int32_t of_pad) {
-  int32_t crossed = of_pad >> CROSS_SHIFT;
-  return memory > crossed ? memory : crossed;
-}
-
-static void track_pressed(struct condition *condition, uint8_t k, int32_t step_ms, int32_t steady) {
-  int32_t reached = faded(condition->reached_Pa_q10[k], step_ms, MEMORY_ms);
-  reached = steady > reached ? steady : reached;
-  condition->reached_Pa_q10[k] = reached;
-  if (reached > condition->pad_reached_Pa_q10) {
-    condition->pad_reached_Pa_q10 = reached;
-  }
-  condition->margin_Pa_q10[k] = in_all(reached, condition->pad_reached_Pa_q10) >> BAND_SHIFT;
-  condition->risen_Pa_q10[k] = faded(condition->risen_Pa_q10[k], step_ms, WANDER_ms);
-  condition->below_ms[k] = 0;
-  condition->sum_Pa_q10[k] = 0;
-  condition->summed[k] = 0;
-  set_bit(&condition->below, k, false);
-  if (condition->pressed_ms < DRIFT_GOES_ON_ms) {
-    int32_t drift_q16 = condition->drift_rest_q16[k] + condition->drift_q16[k] * step_ms;
-    condition->drift_rest_q16[k] = (uint16_t)drift_q16;
-    condition->level_Pa_q10[k] += drift_q16 >> 16;
-    condition->zero_Pa_q10[k] += drift_q16 >> 16;
-  }
-}
-
-static void watch_below(struct condition *condition, uint8_t k, int32_t step_ms,
-                        int32_t above_level, int32_t lowest) {
-  int32_t under = lowest - above_level;
-  bool below = under > 0;
-  set_bit(&condition->below, k, below);
-  if (!below) {
-    condition->below_ms[k] = 0;
-    return;
-  }
-  condition->below_ms[k] = (uint16_t)(condition->below_ms[k] + step_ms);
-  bool far = under > Pa_q10(FAR_BELOW_Pa);
-  if (condition->below_ms[k] >= (far ? FAR_BELOW_ms : BELOW_ms)) {
-    /* It was tared under a press, and so were the others that are below now. */
-    uint32_t others = far ? condition->below : 0;
-    for (uint8_t j = 0; others != 0; j++, others >>= 1) {
-      condition->below_ms[j] = others & 1u ? BELOW_ms : condition->below_ms[j];
-    }
-    begin_tare(condition, k);
-    condition->memory_Pa_q10[k] = clamp(-above_level, 0, Pa_q10(RETURN_MAX_Pa)) << BAND_SHIFT;
-  }
-}
-
-/* Of one sensor, when it is tracked. */
-struct look {
-  int32_t step_ms;
-  int32_t above_zero;
-  int32_t calm_lag; /* so far the level may lag in a calm */
-  bool moves;       /* as a press or a release does, since it was looked at last */
-};
-
-/* While nothing touches for certain, or a touch looks like a drift (unsure). */
-static void track_free(struct condition *condition, uint8_t k, const struct look *look) {
-  bool unsure = condition->unsure;
-  int32_t memory = in_all(condition->memory_Pa_q10[k], condition->pad_memory_Pa_q10);
-  int32_t warm = condition->warm_Pa_q10;
-  bool fresh = condition->released_ms < FRESH_ms || condition->tared_ms < WARM_FRESH_ms;
-  int32_t step_ms = look->step_ms;
-  int32_t above_zero = look->above_zero;
-  if (condition->summed[k] > 0) {
-    above_zero = port_divide(condition->sum_Pa_q10[k], condition->summed[k]);
-  }
-  condition->sum_Pa_q10[k] = 0;
-  condition->summed[k] = 0;
-  int32_t remainder = condition->zero_Pa_q10[k] - condition->level_Pa_q10[k];
-  int32_t above_level = above_zero + remainder;
-  int32_t deepest = -((memory >> DIP_SHIFT) + warm);
-
-  int32_t slew = step_ms >> DRIFT_SLEW_SHIFT;
-  int32_t creep = slew, keep = 0;
-  if (!unsure) {
-    int32_t goal = clamp(above_level, deepest, (memory >> BAND_SHIFT) + warm);
-    int32_t highest = remainder > 0 ? remainder : 0;
-    if ((!fresh || look->moves) && goal > highest) {
-      goal = highest;
-    }
-    int32_t follow_ms = goal > remainder || remainder < 0 ? FOLLOW_ms : FOLLOW_DOWN_ms;
-    remainder += part_of(goal - remainder, share_in(step_ms, follow_ms));
-    int32_t warming = in_step(warm >> WARM_SHIFT, step_ms);
-    creep += in_step(memory >> CREEP_SHIFT, step_ms) + warming;
-    keep = slew + (fresh ? 0 : in_step(memory >> KEEP_SHIFT, step_ms)) + warming;
-  }
-  int32_t idle_share = share_in(step_ms, IDLE_ms);
-  int32_t crept = clamp(part_of(above_zero, idle_share), -creep, creep);
-  int32_t kept = clamp(part_of(remainder, idle_share), -(keep >> KEEP_DOWN_SHIFT), keep);
-  condition->level_Pa_q10[k] += crept + kept;
-  condition->zero_Pa_q10[k] = condition->level_Pa_q10[k] + remainder - kept;
-  int32_t risen = faded(condition->risen_Pa_q10[k], step_ms, WANDER_ms) + crept + kept;
-  condition->risen_Pa_q10[k] = risen;
-
-  condition->margin_Pa_q10[k] = unsure  ? 0
-                                : fresh ? (memory >> BAND_SHIFT) + warm
-                                        : (memory >> REOPEN_SHIFT) + (warm >> 2);
-  set_bit(&condition->restless, k, above_level > look->calm_lag || above_level < -look->calm_lag);
-  set_bit(&condition->stands_off, k, remainder + risen > Pa_q10(CONDITION_OPEN_Pa));
-  watch_below(condition, k, step_ms, above_level, deepest - condition->open_Pa_q10);
-}
-
-/* The drift of each sensor from the oldest to the latest level, while there is a calm to see it. */
-static void see_drift(struct condition *condition, uint8_t count) {
-  uint8_t latest = (uint8_t)(condition->snapshots - 1);
-  int32_t span_ms = (int32_t)(condition->snapshot_ms[latest] - condition->snapshot_ms[0]);
-  int32_t span_s = span_ms >> 10;
-  if (span_s < DRIFT_LEAST_s) {
-    return;
-  }
-  span_s = span_s < DRIFT_LONGEST_s ? span_s : DRIFT_LONGEST_s;
-  int32_t weight_q12 = port_divide((span_s * span_s) << 12, span_s * span_s + DRIFT_HALF_s2);
-  for (uint8_t k = 0; k < count; k++) {
-    int32_t change =
-        clamped_difference(condition->snapshot_Pa_q10[latest][k], condition->snapshot_Pa_q10[0][k]);
-    change = clamp(change, -Pa_q10(DRIFT_CHANGE_MAX_Pa), Pa_q10(DRIFT_CHANGE_MAX_Pa));
-    int32_t drift_q12 = port_divide(change * (1 << 12), span_ms);
-    bool is_drift = drift_q12 < DRIFT_FASTEST_q12 && drift_q12 > -DRIFT_FASTEST_q12;
-    condition->drift_q16[k] = is_drift ? (drift_q12 * weight_q12) >> 8 : 0;
-  }
-}
-
-/* When the room is full every other one goes, and the next come half as often; at last the oldest
- * goes. */
-static void take_snapshot(struct condition *condition, uint8_t count) {
-  if (condition->snapshots == CONDITION_SNAPSHOTS) {
-    bool oldest_goes = condition->snapshot_interval_ms >= SNAPSHOT_LONGEST_ms;
-    uint8_t left = oldest_goes ? CONDITION_SNAPSHOTS - 1 : CONDITION_SNAPSHOTS / 2;
-    for (uint8_t i = 0; i < left; i++) {
-      uint8_t from = oldest_goes ? (uint8_t)(i + 1) : (uint8_t)(2 * i);
-      memmove(condition->snapshot_Pa_q10[i], condition->snapshot_Pa_q10[from],
-              count * sizeof condition->level_Pa_q10[0]);
-      condition->snapshot_ms[i] = condition->snapshot_ms[from];
-    }
-    condition->snapshots = left;
-    condition->snapshot_interval_ms *= oldest_goes ? 1u : 2u;
-  }
-  memcpy(condition->snapshot_Pa_q10[condition->snapshots], condition->level_Pa_q10,
-         count * sizeof condition->level_Pa_q10[0]);
-  condition->snapshot_ms[condition->snapshots] = condition->now_ms;
-  condition->snapshots++;
-  see_drift(condition, count);
-}
-
-static void watch_calm(struct condition *condition, const struct conditioned *conditioned,
-                       uint8_t count) {
-  bool calm = !condition->pressed && conditioned->tared &&
-              (condition->restless & conditioned->usable) == 0 &&
-              condition->tared_ms >= CALM_AFTER_TARE_ms &&
-              condition->released_ms >= CALM_AFTER_RELEASE_ms;
-  if (!calm) {
-    return;
-  }
-  if (condition->snapshots == 0) {
-    condition->snapshot_interval_ms = SNAPSHOT_ms;
-  } else if (condition->now_ms - condition->snapshot_ms[condition->snapshots - 1] <
-             condition->snapshot_interval_ms) {
-    return;
-  }
-  take_snapshot(condition, count);
-}
-
-/* Adds up what it creeps, but for a sure press on it: that relaxes. */
-static void watch_creep(struct condition *condition, uint8_t k, int32_t step_ms, int32_t reading) {
-  int32_t change = clamped_difference(reading, condition->slow_Pa_q10[k]);
-  change = part_of(clamp(change, -GAINED_MAX, GAINED_MAX), share_in(step_ms, CREEPING_ms));
-  condition->slow_Pa_q10[k] += change;
-  int32_t crept = condition->crept_Pa_q10[k];
-  crept = condition->pressed ? crept : faded(crept, step_ms, WANDER_ms);
-  int32_t most = step_ms << CREEPING_SHIFT;
-  condition->crept_Pa_q10[k] = clamp(crept + clamp(change, -most, most), 0, Pa_q10(CREPT_MAX_Pa));
-}
-
-/* Whether it feels more than its zero has wandered, or it has crept. */
-static void look_how_firm(struct condition *condition, const struct conditioned *conditioned,
-                          uint8_t k) {
-  int32_t risen = condition->risen_Pa_q10[k];
-  int32_t wandered = risen < 0 ? -risen : risen;
-  set_bit(&condition->firm, k,
-          conditioned->pressure_Pa_q10[k] > condition->open_Pa_q10 + 3 * wandered / 2);
-  int32_t crept = condition->crept_Pa_q10[k];
-  set_bit(&condition->sudden, k,
-          conditioned->pressure_Pa_q10[k] > condition->open_Pa_q10 + 3 * crept / 2);
-}
-
-/* By so much a zero may be off: what it took of a touch that came on within the band, or was left
- * there. The zeros stand in a contact, and with them this. */
-static int32_t taken_into_zeros(const struct condition *condition, uint32_t usable, uint8_t count) {
-  int32_t most = 0;
-  for (uint8_t k = 0; k < count; k++, usable >>= 1) {
-    int32_t taken =
-        condition->zero_Pa_q10[k] - condition->level_Pa_q10[k] + condition->risen_Pa_q10[k];
-    taken = taken < 0 ? -taken : taken;
-    most = usable & 1u && taken > most ? taken : most;
-  }
-  return most;
-}
-
-static void press_or_release(struct condition *condition, const struct conditioned *conditioned,
-                             uint8_t count, bool over) {
-  if (over == condition->pressed) {
-    return;
-  }
-  condition->pressed = over;
-  if (over) {
-    condition->pressed_ms = 0;
-    for (uint8_t k = 0; k < count; k++) {
-      look_how_firm(condition, conditioned, k);
-    }
-    int32_t taken = taken_into_zeros(condition, conditioned->usable, count);
-    int32_t of_this = taken - condition->taken_before_Pa_q10;
-    condition->strong_Pa_q10 = TAKEN_FACTOR * (of_this > 0 ? taken + of_this : taken);
-    condition->snapshots = 0;
-    condition->pad_reached_Pa_q10 = 0;
-    memset(condition->reached_Pa_q10, 0, sizeof condition->reached_Pa_q10);
-    memset(condition->margin_Pa_q10, 0, sizeof condition->margin_Pa_q10);
-    return;
-  }
-  condition->released_ms = 0;
-  int32_t drift = drift_in_contact(condition);
-  if (drift > condition->warm_Pa_q10) {
-    condition->warm_Pa_q10 = drift;
-  }
-}
-
-static void track_sensor(struct condition *condition, const struct frame *frame,
-                         const struct conditioned *conditioned, uint8_t k) {
-  uint32_t bit = UINT32_C(1) << k;
-  uint32_t gap_ms = condition->now_ms - condition->tracked_ms[k];
-  int32_t step_ms = gap_ms < STEP_MAX_ms ? (int32_t)gap_ms : STEP_MAX_ms;
-  condition->tracked_ms[k] = condition->now_ms;
-  if (k == 0) {
-    condition->pad_memory_Pa_q10 = faded(condition->pad_memory_Pa_q10, step_ms, MEMORY_ms);
-    condition->pad_reached_Pa_q10 = faded(condition->pad_reached_Pa_q10, step_ms, MEMORY_ms);
-    if (!condition->pressed) {
-      condition->warm_Pa_q10 = faded(condition->warm_Pa_q10, step_ms, WARM_ms);
+  condition_start(condition);
+  for (uint8_t k = 0; k < FT_MAX_SENSORS; k++) {
+    if (warm >> k & 1u) {
+      begin_tare(condition, k, Pa_q10(ZERO_WARM_Pa));
     }
   }
-  if (frame->saturated & bit) {
-    condition->memory_Pa_q10[k] = condition->reached_Pa_q10[k] = Pa_q10(SATURATED_Pa);
-    condition->margin_Pa_q10[k] = Pa_q10(SATURATED_Pa) >> BAND_SHIFT;
-  }
-  if (!(conditioned->usable & bit) || frame->unsettled & bit) {
-    return;
-  }
-  /* One disturbed reading is no pressure to remember. */
-  int32_t reading = frame->pressure_Pa_q10[k];
-  int32_t before = condition->before_Pa_q10[k];
-  condition->before_Pa_q10[k] = reading;
-  int32_t steady =
-      clamped_difference(reading < before ? reading : before, condition->zero_Pa_q10[k]);
-  steady = steady < Pa_q10(SATURATED_Pa) ? steady : Pa_q10(SATURATED_Pa);
-  int32_t memory = faded(condition->memory_Pa_q10[k], step_ms, MEMORY_ms);
-  if (condition->pressed && steady > memory) {
-    memory = steady;
-  }
-  condition->memory_Pa_q10[k] = memory;
-  if (memory > condition->pad_memory_Pa_q10) {
-    condition->pad_memory_Pa_q10 = memory;
-  }
-  watch_creep(condition, k, step_ms, reading);
-  look_how_firm(condition, conditioned, k);
-  if (condition->pressed && !condition->unsure) {
-    track_pressed(condition, k, step_ms, steady);
-  } else {
-    int32_t above = clamped_difference(reading, condition->zero_Pa_q10[k]);
-    int32_t rise = clamp(clamped_difference(reading, before), -GAINED_MAX, GAINED_MAX);
-    int32_t still = STILL_SIGMA * frame->noise_Pa_q10;
-    const struct look look = {
-        .step_ms = step_ms,
-        .above_zero = clamp(above, -SUM_RANGE, SUM_RANGE),
-        .calm_lag = Pa_q10(CALM_LAG_Pa) + frame->noise_Pa_q10 / 2,
-        .moves = rise > still || rise < -still - (above > 0 ? above >> FALL_SHIFT : 0),
-    };
-    track_free(condition, k, &look);
+}
+
+static void take(struct condition *condition, uint8_t k, int32_t reading) {
+  struct condition_sensor *sensor = &condition->sensor[k];
+  if (zero_take(&sensor->zero, condition->now_ms, reading)) {
+    condition->taring &= ~(UINT32_C(1) << k);
+    condition->zero_Pa_q10[k] = sensor->zero.level_Pa_q10;
+    condition->margin_Pa_q10[k] = sensor->zero.spread_Pa_q10;
+    sensor->before_Pa_q10 = sensor->slow_Pa_q10 = sensor->zero.level_Pa_q10;
+    sensor->looked_ms = condition->now_ms;
+    condition->tared_ms = 0;
+    condition->calm.snapshots = 0;
   }
 }
 
@@ -492,24 +81,35 @@ static void track_sensor(struct condition *condition, const struct frame *frame,
 static uint32_t tare_sensors(struct condition *condition, const struct frame *frame,
                              uint32_t readable) {
   uint32_t ready = readable;
-  uint32_t guesses = condition->pressed ? 0 : condition->guessed;
-  bool is_felt = condition->pressed && !condition->unsure && (readable & ~condition->taring) != 0;
+  uint32_t guesses = condition->gate.pressed ? 0 : condition->guessed;
+  bool is_felt = condition->gate.pressed && !condition->doubt.unsure &&
+                 (readable & ~condition->taring) != 0;
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
     uint32_t bit = UINT32_C(1) << k;
-    bool tared_lately = condition->now_ms - condition->tare_begun_ms[k] < FOUND_OUT_ms;
-    if ((frame->renewed | guesses) & bit || (frame->restored & bit && tared_lately)) {
-      begin_tare(condition, k);
+    const struct zero *zero = &condition->sensor[k].zero;
+    bool tared_lately = condition->now_ms - zero->tare_begun_ms < FOUND_OUT_ms;
+    if (frame->renewed & bit || (frame->restored & bit && tared_lately)) {
+      begin_tare(condition, k, Pa_q10(ZERO_COLD_Pa));
+    } else if (guesses & bit) {
+      begin_tare(condition, k, Pa_q10(ZERO_WARM_Pa));
     }
     if (condition->taring & readable & bit) {
       ready &= ~bit;
       if (!is_felt) {
-        tare_step(condition, k, frame->pressure_Pa_q10[k]);
-      } else if (condition->now_ms - condition->tare_begun_ms[k] >= TARE_WAITS_ms) {
+        take(condition, k, frame->pressure_Pa_q10[k]);
+      } else if (condition->now_ms - zero->tare_begun_ms >= TARE_WAITS_ms) {
         condition->guessed |= bit;
       }
     }
   }
   return ready;
+}
+
+/* value / gain, |value| <= 2^29 and 1 / gain <= 4, to 1/1024 Pa below. */
+static int32_t scaled_by(int32_t value, uint32_t inverse_q16) {
+  uint32_t low = (uint32_t)value & 0xFFFF;
+  return (value >> 16) * (int32_t)inverse_q16 + (int32_t)(low * (inverse_q16 >> 16)) +
+         (int32_t)(low * (inverse_q16 & 0xFFFF) >> 16);
 }
 
 /* Fills in pressures and peak; the strongest sensor is the answer. */
@@ -525,7 +125,8 @@ static uint8_t read_sensors(const struct condition *condition, const struct fram
     }
     int32_t above = clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k]);
     if (gains) {
-      above = scaled_by(clamp(above, -GAINED_MAX, GAINED_MAX - 1), gains->inverse_q16[k]);
+      above = scaled_by(clamp(above, -STEP_PRESSURE_MAX, STEP_PRESSURE_MAX - 1),
+                        gains->inverse_q16[k]);
     }
     conditioned->pressure_Pa_q10[k] = above;
     if (above > peak) {
@@ -535,24 +136,6 @@ static uint8_t read_sensors(const struct condition *condition, const struct fram
   }
   conditioned->peak_Pa_q10 = peak;
   return strongest;
-}
-
-/* Whether a reading is over the gate and its margin: the strongest, mostly. */
-static bool is_over(const struct condition *condition, const struct frame *frame,
-                    const struct conditioned *conditioned, uint8_t strongest, int32_t limit) {
-  if (frame->saturated != 0 ||
-      conditioned->peak_Pa_q10 > limit + condition->margin_Pa_q10[strongest]) {
-    return true;
-  }
-  if (conditioned->peak_Pa_q10 <= limit) {
-    return false;
-  }
-  for (uint8_t k = 0; k < frame->sensor_count; k++) {
-    if (conditioned->pressure_Pa_q10[k] > limit + condition->margin_Pa_q10[k]) {
-      return true;
-    }
-  }
-  return false;
 }
 
 /* For the means that the zeros follow while nothing touches. */
@@ -566,12 +149,180 @@ static void sum_up(struct condition *condition, const struct frame *frame, uint3
   }
 }
 
+/* By so much a zero may be off: what it has taken without a proof, or has not settled yet. The zeros
+ * stand in a contact, and with them this. */
+static int32_t taken_into_zeros(const struct condition *condition, uint32_t usable, uint8_t count) {
+  int32_t most = 0;
+  for (uint8_t k = 0; k < count; k++, usable >>= 1) {
+    const struct condition_sensor *sensor = &condition->sensor[k];
+    int32_t taken = larger(size_of(sensor->doubt.taken_Pa_q10), sensor->zero.spread_Pa_q10);
+    most = usable & 1u ? larger(taken, most) : most;
+  }
+  return most;
+}
+
+static void press_or_release(struct condition *condition, const struct conditioned *conditioned,
+                             uint8_t count) {
+  if (!condition->gate.pressed) {
+    after_effect_release(&condition->after, condition->gate.pressed_ms);
+    return;
+  }
+  for (uint8_t k = 0; k < count; k++) {
+    doubt_compare(&condition->sensor[k].doubt, &condition->doubt, k,
+                  conditioned->pressure_Pa_q10[k], condition->gate.open_Pa_q10);
+    condition->sensor[k].after.reached_Pa_q10 = 0;
+    condition->margin_Pa_q10[k] = 0;
+  }
+  after_effect_press(&condition->after);
+  doubt_press(&condition->doubt, taken_into_zeros(condition, conditioned->usable, count));
+  condition->calm.snapshots = 0;
+}
+
+static void look_in_contact(struct condition *condition, uint8_t k, int32_t ms, int32_t steady) {
+  struct condition_sensor *sensor = &condition->sensor[k];
+  condition->margin_Pa_q10[k] = after_effect_hold(&sensor->after, &condition->after, ms, steady);
+  doubt_hold(&sensor->doubt, &condition->doubt, ms, steady);
+  sensor->zero.below_ms = 0;
+  set_bit(&condition->below, k, false);
+  if (condition->gate.pressed_ms < DRIFT_GOES_ON_ms) {
+    condition->zero_Pa_q10[k] += zero_drift_on(&sensor->zero, ms);
+  }
+}
+
+/* A sensor that has been below was tared under a press, and so were all others: those that are far
+ * below now give in with it, and those on its flanks settle. */
+static void watch_below(struct condition *condition, uint8_t k, int32_t ms, int32_t above_level,
+                        int32_t lowest) {
+  bool far;
+  bool gives_in = zero_is_below(&condition->sensor[k].zero, ms, lowest - above_level, &far);
+  set_bit(&condition->below, k, above_level < lowest);
+  if (!gives_in) {
+    return;
+  }
+  for (uint8_t j = 0; j < FT_MAX_SENSORS; j++) {
+    zero_unsettle(&condition->sensor[j].zero, far && condition->below >> j & 1u);
+  }
+  begin_tare(condition, k, condition->sensor[k].zero.spread_Pa_q10);
+  doubt_return(&condition->sensor[k].doubt, above_level);
+}
+
+/* While nothing touches for certain, or a touch looks like a drift. */
+static void look_free(struct condition *condition, uint8_t k, const struct step *step) {
+  struct condition_sensor *sensor = &condition->sensor[k];
+  struct zero *zero = &sensor->zero;
+  bool unsure = condition->doubt.unsure;
+  int32_t before = condition->zero_Pa_q10[k];
+  if (!unsure && zero_settle(zero, step)) {
+    condition->zero_Pa_q10[k] = zero->level_Pa_q10;
+    doubt_follow(&sensor->doubt, &condition->doubt, k, step->ms, 0, 0, zero->spread_Pa_q10);
+    condition->margin_Pa_q10[k] = zero->spread_Pa_q10;
+    set_bit(&condition->restless, k, true);
+    set_bit(&condition->below, k, false);
+    return;
+  }
+  struct after_effect_band band;
+  after_effect_look(&sensor->after, &condition->after, condition->gate.released_ms < FRESH_ms,
+                    &band);
+  int32_t remainder = before - zero->level_Pa_q10;
+  int32_t above_level = step->above_Pa_q10 + remainder;
+  if (unsure) {
+    band.pace = (struct zero_pace){0};
+    band.margin_Pa_q10 = 0;
+  } else {
+    remainder = after_effect_follow(&band, step, remainder);
+  }
+  int32_t moved = zero_follow(zero, step, &band.pace, &remainder);
+  condition->zero_Pa_q10[k] = zero->level_Pa_q10 + remainder;
+  doubt_follow(&sensor->doubt, &condition->doubt, k, step->ms, moved,
+               condition->zero_Pa_q10[k] - before, zero->spread_Pa_q10);
+  condition->margin_Pa_q10[k] = band.margin_Pa_q10 + zero->spread_Pa_q10;
+  set_bit(&condition->restless, k,
+          size_of(above_level) > Pa_q10(CALM_LAG_Pa) + step->noise_Pa_q10 / 2);
+  watch_below(condition, k, step->ms, above_level,
+              band.lowest_Pa_q10 - condition->gate.open_Pa_q10);
+}
+
+static int32_t mean_above(struct condition *condition, uint8_t k, int32_t reading) {
+  int32_t above = clamped_difference(reading, condition->zero_Pa_q10[k]);
+  above = clamp(above, -SUM_RANGE, SUM_RANGE);
+  if (condition->summed[k] > 0) {
+    above = port_divide(condition->sum_Pa_q10[k], condition->summed[k]);
+  }
+  condition->sum_Pa_q10[k] = 0;
+  condition->summed[k] = 0;
+  return above;
+}
+
+static void look_at(struct condition *condition, const struct frame *frame,
+                    const struct conditioned *conditioned, uint8_t k) {
+  struct condition_sensor *sensor = &condition->sensor[k];
+  uint32_t bit = UINT32_C(1) << k;
+  uint32_t gap_ms = condition->now_ms - sensor->looked_ms;
+  int32_t ms = gap_ms < STEP_MAX_ms ? (int32_t)gap_ms : STEP_MAX_ms;
+  bool pressed = condition->gate.pressed;
+  sensor->looked_ms = condition->now_ms;
+  if (k == 0) {
+    after_effect_fade(&condition->after, ms, pressed);
+  }
+  if (frame->saturated & bit) {
+    condition->margin_Pa_q10[k] = after_effect_saturate(&sensor->after);
+  }
+  if (!(conditioned->usable & bit) || frame->unsettled & bit) {
+    return;
+  }
+  int32_t reading = frame->pressure_Pa_q10[k];
+  int32_t before = sensor->before_Pa_q10;
+  int32_t slow = clamped_difference(reading, sensor->slow_Pa_q10);
+  slow = clamp(slow, -STEP_PRESSURE_MAX, STEP_PRESSURE_MAX);
+  struct step step = {
+      .ms = ms,
+      .now_ms = condition->now_ms,
+      .noise_Pa_q10 = frame->noise_Pa_q10,
+      .reading_Pa_q10 = reading,
+      .slow_Pa_q10 = slow,
+      .rise_Pa_q10 = part_of(slow, share_in(ms, SLOW_ms)),
+  };
+  sensor->before_Pa_q10 = reading;
+  sensor->slow_Pa_q10 += step.rise_Pa_q10;
+  /* One disturbed reading is no pressure to remember. */
+  int32_t steady =
+      clamped_difference(reading < before ? reading : before, condition->zero_Pa_q10[k]);
+  after_effect_remember(&sensor->after, &condition->after, ms, steady, pressed);
+  doubt_creep(&sensor->doubt, &step, pressed);
+  doubt_compare(&sensor->doubt, &condition->doubt, k, conditioned->pressure_Pa_q10[k],
+                condition->gate.open_Pa_q10);
+  step.above_Pa_q10 = mean_above(condition, k, reading);
+  if (pressed && !condition->doubt.unsure) {
+    look_in_contact(condition, k, ms, steady);
+    return;
+  }
+  int32_t rise = clamp(clamped_difference(reading, before), -STEP_PRESSURE_MAX, STEP_PRESSURE_MAX);
+  int32_t still = STILL_SIGMA * frame->noise_Pa_q10;
+  int32_t above = clamped_difference(reading, condition->zero_Pa_q10[k]);
+  step.moves = rise > still || rise < -still - (larger(above, 0) >> FALL_SHIFT);
+  look_free(condition, k, &step);
+}
+
+static void watch_calm(struct condition *condition, const struct conditioned *conditioned,
+                       uint8_t count) {
+  struct zero_snapshot snapshot;
+  bool calm = !condition->gate.pressed && conditioned->tared &&
+              (condition->restless & conditioned->usable) == 0 &&
+              condition->tared_ms >= CALM_AFTER_TARE_ms &&
+              condition->gate.released_ms >= CALM_AFTER_RELEASE_ms;
+  if (calm && zero_snapshot_due(&condition->calm, condition->now_ms, &snapshot)) {
+    for (uint8_t k = 0; k < count; k++) {
+      zero_take_snapshot(&condition->sensor[k].zero, &snapshot);
+    }
+  }
+}
+
 void condition_follow(struct condition *condition, const struct frame *frame,
                       const struct conditioned *conditioned) {
-  for (; condition->due_ms >= TRACK_ms; condition->due_ms -= TRACK_ms) {
+  for (; condition->due_ms >= LOOK_ms; condition->due_ms -= LOOK_ms) {
     uint8_t k = condition->next < frame->sensor_count ? condition->next : 0;
     condition->next = (uint8_t)(k + 1);
-    track_sensor(condition, frame, conditioned, k);
+    look_at(condition, frame, conditioned, k);
   }
 }
 
@@ -581,46 +332,55 @@ void condition_frame(struct condition *condition, const struct frame *frame,
   uint32_t gap_ms = now_ms - condition->now_ms;
   int32_t step_ms = gap_ms < STEP_MAX_ms ? (int32_t)gap_ms : STEP_MAX_ms;
   condition->now_ms = now_ms;
-  condition->pressed_ms = older(condition->pressed_ms, step_ms);
-  condition->released_ms = older(condition->released_ms, step_ms);
-  condition->tared_ms = older(condition->tared_ms, step_ms);
+  condition->tared_ms += condition->tared_ms < AGE_MAX_ms ? (uint32_t)step_ms : 0;
+  gate_age(&condition->gate, step_ms, frame->noise_Pa_q10);
 
-  int32_t open = Pa_q10(CONDITION_OPEN_Pa) + CONDITION_OPEN_SIGMA * frame->noise_Pa_q10;
-  condition->open_Pa_q10 = open;
-  int32_t close = Pa_q10(CONDITION_CLOSE_Pa) + CONDITION_CLOSE_SIGMA * frame->noise_Pa_q10;
   uint32_t readable = frame->valid & ~frame->saturated;
   conditioned->usable = readable;
   if (condition->taring & readable || frame->renewed || frame->restored || condition->guessed) {
     conditioned->usable = tare_sensors(condition, frame, readable);
   }
   uint8_t strongest = read_sensors(condition, frame, gains, conditioned);
-  bool over = is_over(condition, frame, conditioned, strongest, condition->pressed ? close : open);
-  press_or_release(condition, conditioned, frame->sensor_count, over);
-  if (!condition->pressed) {
+  const struct gate_view view = {
+      .strongest = strongest,
+      .peak_Pa_q10 = conditioned->peak_Pa_q10,
+      .pressure_Pa_q10 = conditioned->pressure_Pa_q10,
+      .margin_Pa_q10 = condition->margin_Pa_q10,
+      .count = frame->sensor_count,
+      .saturated = frame->saturated != 0,
+  };
+  if (gate_look(&condition->gate, &view)) {
+    press_or_release(condition, conditioned, frame->sensor_count);
+  }
+  bool pressed = condition->gate.pressed;
+  if (!pressed) {
     sum_up(condition, frame, conditioned->usable);
   }
-  condition->unsure = condition->pressed && frame->saturated == 0 &&
-                      (condition->guessed != 0 || (condition->firm & conditioned->usable) == 0 ||
-                       conditioned->peak_Pa_q10 < drift_in_contact(condition));
-  int32_t most = frame->sensor_count * TRACK_ms;
+  conditioned->contact =
+      pressed || conditioned->peak_Pa_q10 > condition->gate.open_Pa_q10;
+  const struct doubt_view doubt = {
+      .usable = conditioned->usable,
+      .peak_Pa_q10 = conditioned->peak_Pa_q10,
+      .drift_Pa_q10 = after_effect_drift(condition->gate.pressed_ms),
+      .pressed = pressed,
+      .contact = conditioned->contact,
+      .saturated = view.saturated,
+      .guessed = condition->guessed != 0,
+  };
+  bool unsure = doubt_is_unsure(&condition->doubt, &doubt);
+  int32_t most = frame->sensor_count * LOOK_ms;
   int32_t due = condition->due_ms + step_ms * frame->sensor_count;
   condition->due_ms = due < most ? due : most;
-  if (!condition->pressed || condition->unsure) { /* what is tracked is part of the answer */
+  if (!pressed || unsure) { /* what is looked at is part of the answer */
     condition_follow(condition, frame, conditioned);
   }
-
-  conditioned->contact = condition->pressed || conditioned->peak_Pa_q10 > open;
-  if (conditioned->contact && !condition->touched && !condition->pressed) {
-    condition->taken_before_Pa_q10 =
+  if (conditioned->contact && !condition->touched && !pressed) {
+    condition->doubt.before_Pa_q10 =
         taken_into_zeros(condition, conditioned->usable, frame->sensor_count);
   }
   condition->touched = conditioned->contact;
   conditioned->tared = readable != 0 && conditioned->usable == readable &&
                        (condition->below & conditioned->usable) == 0;
   watch_calm(condition, conditioned, frame->sensor_count);
-  bool stands_off = (condition->stands_off & conditioned->usable) != 0;
-  bool sure = frame->saturated != 0 ||
-              (!condition->unsure && (condition->sudden & conditioned->usable) != 0 &&
-               conditioned->peak_Pa_q10 >= condition->strong_Pa_q10);
-  conditioned->zero_doubtful = condition->pressed ? !sure : conditioned->contact || stands_off;
+  conditioned->zero_doubtful = doubt_is_due(&condition->doubt, &doubt);
 }

@@ -421,10 +421,10 @@ struct Chain {
                        static_cast<float>(geometry.pitch_mm)) != FT_OK) {
       throw std::runtime_error("fit_array_init refuses the geometry");
     }
-    condition_tare(&tared);
+    condition_start(&tared);
     frame quiet = frame_of({std::vector<double>(x_mm.size(), 0.0)});
     conditioned ignored;
-    for (int i = 0; i < CONDITION_TARE_FRAMES; i++) {
+    for (int i = 0; i < ZERO_TARE_FRAMES; i++) {
       condition_frame(&tared, &quiet, nullptr, &ignored);
       condition_follow(&tared, &quiet, &ignored);
     }

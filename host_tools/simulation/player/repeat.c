@@ -35,7 +35,7 @@ bool repeat_begin(const struct wire_info *info) {
 #endif
   app.contact_settings.slip_threshold_mm = info->slip_threshold_mm;
   app.contact_settings.slip_window_us = info->slip_window_ms * 1000u;
-  repeat_tare();
+  condition_start(&app.condition);
   return true;
 }
 

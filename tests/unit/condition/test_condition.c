@@ -9,8 +9,8 @@ enum { SENSORS = 15 };
 #define Pa 1024
 #define AMBIENT (100000 * Pa)
 #define NOISE (4 * Pa)
-#define OPEN (CONDITION_OPEN_Pa * Pa + CONDITION_OPEN_SIGMA * NOISE)
-#define CLOSE (CONDITION_CLOSE_Pa * Pa + CONDITION_CLOSE_SIGMA * NOISE)
+#define OPEN (GATE_OPEN_Pa * Pa + GATE_OPEN_SIGMA * NOISE)
+#define CLOSE (GATE_CLOSE_Pa * Pa + GATE_CLOSE_SIGMA * NOISE)
 
 static struct condition condition;
 static struct conditioned conditioned;
@@ -72,7 +72,7 @@ static void press(int32_t peak) {
 }
 
 static void begin(uint32_t frame_period_us) {
-  condition_tare(&condition);
+  condition_start(&condition);
   memset(&frame, 0, sizeof frame);
   period_us = frame_period_us;
   frame.t_us = 3000000;
@@ -101,9 +101,9 @@ void tearDown(void) {}
 static void test_tare_is_the_mean_without_the_extremes(void) {
   struct random random = {41};
   int64_t sum[SENSORS] = {0};
-  for (int i = 0; i < CONDITION_TARE_FRAMES; i++) {
+  for (int i = 0; i < ZERO_TARE_FRAMES; i++) {
     for (int k = 0; k < SENSORS; k++) {
-      bool extreme = i == k || i == (k + 5) % CONDITION_TARE_FRAMES;
+      bool extreme = i == k || i == (k + 5) % ZERO_TARE_FRAMES;
       int32_t reading = AMBIENT + 5000 * k + (int32_t)random_below(&random, 20000);
       frame.pressure_Pa_q10[k] = !extreme ? reading : i == k ? INT32_MAX : INT32_MIN;
       sum[k] += extreme ? 0 : reading;
@@ -749,11 +749,10 @@ static void test_what_the_answer_does_not_need_can_wait(void) {
     condition_frame(&condition, &frame, NULL, &conditioned);
     TEST_ASSERT_TRUE(conditioned.contact && !conditioned.zero_doubtful);
     TEST_ASSERT_EQUAL_INT32_ARRAY(before.zero_Pa_q10, condition.zero_Pa_q10, SENSORS);
-    TEST_ASSERT_EQUAL_INT32_ARRAY(before.memory_Pa_q10, condition.memory_Pa_q10, SENSORS);
-    TEST_ASSERT_EQUAL_UINT32_ARRAY(before.tracked_ms, condition.tracked_ms, SENSORS);
+    TEST_ASSERT_EQUAL_MEMORY(before.sensor, condition.sensor, sizeof condition.sensor);
     condition_follow(&condition, &frame, &conditioned);
-    if (condition.memory_Pa_q10[7] > reached) {
-      reached = condition.memory_Pa_q10[7];
+    if (condition.sensor[7].after.memory_Pa_q10 > reached) {
+      reached = condition.sensor[7].after.memory_Pa_q10;
     }
     memcpy(&before, &condition, sizeof before);
     condition_follow(&condition, &frame, &conditioned);
@@ -761,7 +760,7 @@ static void test_what_the_answer_does_not_need_can_wait(void) {
   }
   TEST_ASSERT_INT32_WITHIN(500 * Pa, 20000 * Pa, reached);
   for (int k = 0; k < SENSORS; k++) {
-    TEST_ASSERT_LESS_OR_EQUAL_UINT32(70, condition.now_ms - condition.tracked_ms[k]);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(70, condition.now_ms - condition.sensor[k].looked_ms);
   }
 }
 
@@ -833,7 +832,7 @@ static void test_another_sensor_is_tared_anew(void) {
   TEST_ASSERT_FALSE(conditioned.tared);
   TEST_ASSERT_FALSE(conditioned.contact);
   TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << 4), conditioned.usable);
-  run(CONDITION_TARE_FRAMES);
+  run(ZERO_TARE_FRAMES);
   TEST_ASSERT_TRUE(conditioned.tared);
   TEST_ASSERT_FALSE(conditioned.contact);
   TEST_ASSERT_EQUAL_INT32(0, conditioned.pressure_Pa_q10[4]);
@@ -851,7 +850,7 @@ static void test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew(void) {
     frame.restored = 1u << 4;
     run(1);
     frame.restored = 0;
-    run(CONDITION_TARE_FRAMES);
+    run(ZERO_TARE_FRAMES);
     TEST_ASSERT_TRUE(conditioned.tared);
     TEST_ASSERT_EQUAL_INT(late, conditioned.contact);
   }
@@ -872,7 +871,7 @@ static void test_a_zero_taken_in_a_long_contact_is_in_doubt_until_it_ends(void) 
   TEST_ASSERT_TRUE(conditioned.contact);
   TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
   press(0);
-  run(2 + CONDITION_TARE_FRAMES);
+  run(2 + ZERO_TARE_FRAMES);
   TEST_ASSERT_EQUAL_INT32(AMBIENT, condition.zero_Pa_q10[8]);
   press(20000 * Pa);
   run_s(0.5f);
@@ -893,7 +892,7 @@ static void test_one_sensor_is_not_tared_in_a_contact(void) {
   TEST_ASSERT_FALSE(conditioned.tared);
   TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << 8), conditioned.usable);
   press(0);
-  run(2 + CONDITION_TARE_FRAMES);
+  run(2 + ZERO_TARE_FRAMES);
   TEST_ASSERT_TRUE(conditioned.tared);
   TEST_ASSERT_EQUAL_HEX32(ALL, conditioned.usable);
   TEST_ASSERT_EQUAL_INT32(AMBIENT, condition.zero_Pa_q10[8]);

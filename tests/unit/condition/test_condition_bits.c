@@ -87,14 +87,13 @@ static uint32_t course(void) {
   }
   const bool has_gains = ONE_IN(2);
   const int32_t period_us = draw_between(700, 50000);
-  memset(&condition, 0, sizeof condition);
   memset(&frame, 0, sizeof frame);
   memset(&load, 0, sizeof load);
   load.calm = ONE_IN(2) ? 10 : 1;
   frame.sensor_count = SENSORS;
   frame.t_us = draw();
   frame.noise_Pa_q10 = draw_between(1, 11) * Pa;
-  condition_tare(&condition);
+  condition_start(&condition);
   uint32_t crc = 0;
   for (int i = 0; i < FRAMES; i++) {
     draw_frame(period_us);

@@ -70,9 +70,9 @@ static void prepare(void) {
   if (fit_array_init(&array, frame.sensor_count, job.x_mm, job.y_mm, job.pitch_mm) != FT_OK) {
     port_panic();
   }
-  condition_tare(&condition);
+  condition_start(&condition);
   set_pressures(false);
-  for (int i = 0; i < 2 * CONDITION_TARE_FRAMES; i++) {
+  for (int i = 0; i < 2 * ZERO_TARE_FRAMES; i++) {
     condition_one();
   }
 }

@@ -88,7 +88,7 @@ Bench::Bench(const Mode &mode, std::uint64_t seed)
   frame_.sensor_count = SENSORS;
   frame_.valid = (1u << SENSORS) - 1;
   frame_.noise_Pa_q10 = mode.noise_Pa_q10;
-  condition_tare(&condition_);
+  condition_start(&condition_);
 }
 
 void Bench::drift() {

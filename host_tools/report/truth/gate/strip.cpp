@@ -302,7 +302,7 @@ Presses presses_of(const Strip &strip) {
   const double deepest = deepest_of(strip.rows);
   Presses found;
   condition state;
-  condition_tare(&state);
+  condition_start(&state);
   for (const StripRow &row : strip.rows) {
     const frame taken = frame_of(row.pressure_Pa, row.t_s - strip.rows.front().t_s, NOISE_Pa);
     conditioned readings;
@@ -427,7 +427,7 @@ Touches gate_on(const Strip &strip, double frames_per_s, double noise_Pa) {
   const double begin_s = rows.front().t_s;
   Random random(1, static_cast<std::uint64_t>(frames_per_s), 0);
   condition state;
-  condition_tare(&state);
+  condition_start(&state);
   conditioned readings{};
   double t_s = begin_s, free_s = 0, phantom_s = 0, doubted_s = 0, run_s = 0;
   std::vector<double> in_hold_s(strip.holds.size()), certain_s(strip.holds.size());
