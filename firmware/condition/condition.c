@@ -1,5 +1,7 @@
 #include "condition/condition.h"
 
+#include "port/divide.h"
+
 #include <string.h>
 
 #define STEP_MAX_ms 16383 /* a longer gap counts as this */
@@ -40,26 +42,27 @@ static void begin_tare(struct condition *condition, uint8_t k, int32_t spread_Pa
   condition->below &= others;
 }
 
-void condition_start(struct condition *condition) {
+/* warm: bitmap of the sensors that were calm just now. */
+static void begin(struct condition *condition, uint32_t warm) {
   memset(condition, 0, sizeof *condition);
   condition->gate.released_ms = AGE_MAX_ms;
-  for (uint8_t k = 0; k < FT_MAX_SENSORS; k++) {
-    begin_tare(condition, k, Pa_q10(ZERO_COLD_Pa));
+  for (uint8_t k = 0; k < FT_MAX_SENSORS; k++, warm >>= 1) {
+    begin_tare(condition, k, warm & 1u ? Pa_q10(ZERO_WARM_Pa) : Pa_q10(ZERO_COLD_Pa));
   }
 }
 
+void condition_start(struct condition *condition) {
+  begin(condition, 0);
+}
+
 void condition_tare(struct condition *condition) {
-  uint32_t warm = 0;
+  uint32_t warm = ~condition->taring;
   for (uint8_t k = 0; k < FT_MAX_SENSORS; k++) {
-    const bool settled = condition->sensor[k].zero.spread_Pa_q10 <= Pa_q10(ZERO_WARM_Pa);
-    set_bit(&warm, k, settled && !(condition->taring >> k & 1u));
-  }
-  condition_start(condition);
-  for (uint8_t k = 0; k < FT_MAX_SENSORS; k++) {
-    if (warm >> k & 1u) {
-      begin_tare(condition, k, Pa_q10(ZERO_WARM_Pa));
+    if (condition->sensor[k].zero.spread_Pa_q10 > Pa_q10(ZERO_WARM_Pa)) {
+      warm &= ~(UINT32_C(1) << k);
     }
   }
+  begin(condition, warm);
 }
 
 static void take(struct condition *condition, uint8_t k, int32_t reading) {

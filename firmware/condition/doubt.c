@@ -35,10 +35,14 @@ void doubt_creep(struct doubt *doubt, const struct step *step, bool pressed) {
       clamp(crept + clamp(step->rise_Pa_q10, -most, most), 0, Pa_q10(CREPT_MAX_Pa));
 }
 
+static int32_t and_half(int32_t value) {
+  return value + (value >> 1);
+}
+
 void doubt_compare(const struct doubt *doubt, struct doubt_pad *pad, uint8_t k,
                    int32_t pressure_Pa_q10, int32_t open_Pa_q10) {
-  set_bit(&pad->firm, k, pressure_Pa_q10 > open_Pa_q10 + 3 * size_of(doubt->wander_Pa_q10) / 2);
-  set_bit(&pad->sudden, k, pressure_Pa_q10 > open_Pa_q10 + 3 * doubt->crept_Pa_q10 / 2);
+  set_bit(&pad->firm, k, pressure_Pa_q10 > open_Pa_q10 + and_half(size_of(doubt->wander_Pa_q10)));
+  set_bit(&pad->sudden, k, pressure_Pa_q10 > open_Pa_q10 + and_half(doubt->crept_Pa_q10));
 }
 
 void doubt_follow(struct doubt *doubt, struct doubt_pad *pad, uint8_t k, int32_t ms,

@@ -4,8 +4,6 @@
 #ifndef CONDITION_STEPS_H
 #define CONDITION_STEPS_H
 
-#include "port/divide.h"
-
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -42,34 +40,19 @@ static inline int32_t larger(int32_t a, int32_t b) {
   return a > b ? a : b;
 }
 
-static inline int32_t clamped_difference(int32_t a, int32_t b) {
-  int32_t difference = (int32_t)((uint32_t)a - (uint32_t)b);
-  bool overflows = ((a ^ b) & (a ^ difference)) < 0;
-  if (!overflows) {
-    return difference;
-  }
-  return a < 0 ? INT32_MIN : INT32_MAX;
-}
+/* a - b, or the end of the range. */
+int32_t clamped_difference(int32_t a, int32_t b);
 
 /* value times a share below 1, to the nearest. */
-static inline int32_t part_of(int32_t value, int32_t share_q16) {
-  uint32_t low = ((uint32_t)value & 0xFFFF) * (uint32_t)share_q16;
-  return (value >> 16) * share_q16 + (int32_t)((low + 0x8000) >> 16);
-}
+int32_t part_of(int32_t value, int32_t share_q16);
 
 /* What a low pass takes of a difference in this time. */
-static inline int32_t share_in(int32_t ms, int32_t time_constant_ms) {
-  return port_divide(ms << 16, time_constant_ms + ms);
-}
+int32_t share_in(int32_t ms, int32_t time_constant_ms);
 
-static inline int32_t faded(int32_t value, int32_t ms, int32_t time_constant_ms) {
-  return value - part_of(value, share_in(ms, time_constant_ms));
-}
+int32_t faded(int32_t value, int32_t ms, int32_t time_constant_ms);
 
 /* So much a second makes so much in this time. */
-static inline int32_t in_step(int32_t each_second, int32_t ms) {
-  return (each_second >> 4) * ms >> 6;
-}
+int32_t in_step(int32_t each_second, int32_t ms);
 
 static inline void set_bit(uint32_t *bitmap, uint8_t k, bool set) {
   *bitmap = (*bitmap & ~(UINT32_C(1) << k)) | (uint32_t)set << k;

@@ -1,5 +1,7 @@
 #include "condition/zero.h"
 
+#include "port/divide.h"
+
 #define ZERO_MAX (INT32_C(1) << 30) /* 1 MPa; the part ends near 0.5 */
 
 #define TARE_SLOW_ms SECONDS(1)
