@@ -143,8 +143,8 @@ static uint8_t read_sensors(const struct condition *condition, const struct fram
 
 /* For the means that the zeros follow while nothing touches. */
 static void sum_up(struct condition *condition, const struct frame *frame, uint32_t usable) {
-  for (uint8_t k = 0; k < frame->sensor_count; k++) {
-    if (usable >> k & 1u && condition->summed[k] < UINT8_MAX) {
+  for (uint8_t k = 0; usable != 0; k++, usable >>= 1) {
+    if (usable & 1u && condition->summed[k] < UINT8_MAX) {
       int32_t above = clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k]);
       condition->sum_Pa_q10[k] += clamp(above, -SUM_RANGE, SUM_RANGE);
       condition->summed[k]++;
@@ -177,7 +177,8 @@ static void press_or_release(struct condition *condition, const struct condition
     condition->margin_Pa_q10[k] = 0;
   }
   after_effect_press(&condition->after);
-  doubt_press(&condition->doubt, taken_into_zeros(condition, conditioned->usable, count));
+  doubt_press(&condition->doubt, !condition->touched,
+              taken_into_zeros(condition, conditioned->usable, count));
   condition->calm.snapshots = 0;
 }
 

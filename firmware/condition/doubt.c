@@ -60,8 +60,8 @@ void doubt_hold(struct doubt *doubt, struct doubt_pad *pad, int32_t ms, int32_t 
   pad->strongest_Pa_q10 = larger(pad->strongest_Pa_q10, steady_Pa_q10);
 }
 
-void doubt_press(struct doubt_pad *pad, int32_t taken_Pa_q10) {
-  int32_t of_this = taken_Pa_q10 - pad->before_Pa_q10;
+void doubt_press(struct doubt_pad *pad, bool at_once, int32_t taken_Pa_q10) {
+  int32_t of_this = at_once ? 0 : taken_Pa_q10 - pad->before_Pa_q10;
   pad->strong_Pa_q10 = TAKEN_FACTOR * (taken_Pa_q10 + larger(of_this, 0));
   pad->strongest_Pa_q10 = 0;
 }

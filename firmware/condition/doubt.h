@@ -69,8 +69,8 @@ void doubt_follow(struct doubt *doubt, struct doubt_pad *pad, uint8_t k, int32_t
 /* In a contact. */
 void doubt_hold(struct doubt *doubt, struct doubt_pad *pad, int32_t ms, int32_t steady_Pa_q10);
 
-/* A contact begins; its zeros may be off by so much, and that when it was first in doubt. */
-void doubt_press(struct doubt_pad *pad, int32_t taken_Pa_q10);
+/* A contact begins, at_once or after it was within the band; its zeros may be off by so much. */
+void doubt_press(struct doubt_pad *pad, bool at_once, int32_t taken_Pa_q10);
 
 /* Whether the zero goes on as if nothing touched. */
 bool doubt_is_unsure(struct doubt_pad *pad, const struct doubt_view *view);

@@ -27,7 +27,7 @@
 #include <stdint.h>
 
 #define ZERO_TARE_FRAMES 16
-#define ZERO_COLD_Pa 700
+#define ZERO_COLD_Pa 350
 #define ZERO_WARM_Pa 60
 #define ZERO_BELOW_s 10
 #define ZERO_SNAPSHOTS 8
