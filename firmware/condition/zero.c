@@ -10,7 +10,6 @@
 #define SETTLE_ms MS(500)
 #define SETTLE_LONGEST_ms ((uint32_t)SECONDS(15))
 #define SETTLED_Pa 8 /* and a sigma */
-#define SETTLE_OFF 2
 #define SETTLE_SLOW 3
 
 /* Of real sensors at rest: 130 to 210 Pa in 16 min, 0.22 Pa/s at most (strips of MPL3115A2). At
@@ -74,13 +73,12 @@ bool zero_take(struct zero *zero, uint32_t now_ms, int32_t reading_Pa_q10) {
 }
 
 bool zero_settle(struct zero *zero, const struct step *step) {
-  int32_t off = size_of(step->above_Pa_q10);
   int32_t left = zero->spread_Pa_q10;
-  if (left <= off) {
+  if (left <= size_of(step->above_Pa_q10)) {
     return false;
   }
   zero->level_Pa_q10 += step->above_Pa_q10;
-  int32_t goal = larger(SETTLE_OFF * off, SETTLE_SLOW * size_of(step->slow_Pa_q10));
+  int32_t goal = SETTLE_SLOW * size_of(step->slow_Pa_q10);
   if (goal > left) {
     goal = left;
   }

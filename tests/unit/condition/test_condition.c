@@ -166,6 +166,61 @@ static void test_warming_up_is_no_contact(void) {
   }
 }
 
+/* Most of it comes in the first second: as much as real sensors rise after power-up. */
+static void test_what_a_cold_sensor_rises_is_no_contact(void) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    begin(periods_us[i]);
+    float fast = 300, slow = 250, certain_s = 0;
+    for (int j = frames_in(20); j > 0; j--) {
+      fast -= fast * (float)period_us / 250000;
+      slow -= slow * (float)period_us / 1500000;
+      frame.pressure_Pa_q10[3] = AMBIENT - (int32_t)((fast + slow) * Pa);
+      run(1);
+      certain_s += conditioned.contact && !conditioned.zero_doubtful ? 1 : 0;
+    }
+    TEST_ASSERT_EQUAL_FLOAT(0, certain_s);
+    TEST_ASSERT_FALSE(conditioned.contact);
+    TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+    TEST_ASSERT_INT32_WITHIN(20 * Pa, AMBIENT, condition.zero_Pa_q10[3]);
+  }
+}
+
+static void assert_touch_of_is_seen(int32_t peak) {
+  press(peak);
+  run(2);
+  TEST_ASSERT_TRUE(conditioned.contact);
+  run_s(0.5f);
+  TEST_ASSERT_TRUE(conditioned.contact);
+  TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+  TEST_ASSERT_INT32_WITHIN(20 * Pa, peak, conditioned.peak_Pa_q10);
+}
+
+/* Of a pad that was off its zeros settle first; of one that was calm they are known at once. */
+static void test_a_light_touch_is_seen_once_zeros_have_settled(void) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    begin(periods_us[i]);
+    run_s(2.5f);
+    assert_touch_of_is_seen(300 * Pa);
+    press(0);
+    run_s(3);
+    condition_tare(&condition);
+    run(ZERO_TARE_FRAMES + 1);
+    TEST_ASSERT_TRUE(conditioned.tared);
+    assert_touch_of_is_seen(300 * Pa);
+  }
+}
+
+/* A force that rises with the start is followed for no longer than a sensor warms. */
+static void test_a_ramp_from_the_start_is_a_contact(void) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    begin(periods_us[i]);
+    run(ZERO_TARE_FRAMES);
+    watch_s(60, 24, 1u << 7);
+    TEST_ASSERT_TRUE(conditioned.contact);
+    TEST_ASSERT_GREATER_THAN_INT32(1000 * Pa, conditioned.pressure_Pa_q10[7]);
+  }
+}
+
 static void test_gate_has_a_hysteresis_in_pascals_and_sigmas(void) {
   static const int32_t noises[] = {0, 16 * Pa / 10, 4 * Pa, 11 * Pa};
   for (size_t n = 0; n < sizeof noises / sizeof noises[0]; n++) {
@@ -454,6 +509,60 @@ static void test_press_after_a_release_is_not_taken_for_a_remainder(void) {
   }
 }
 
+/* What the zero comes back to after a certain press is the zero: no force is left there twice. */
+static void test_a_press_proves_the_zero_that_it_leaves(void) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    for (int more = 0; more <= 1; more++) {
+      begin_calm(periods_us[i]);
+      press(20000 * Pa);
+      run_s(5);
+      press(600 * Pa);
+      run_s(10);
+      TEST_ASSERT_TRUE(conditioned.zero_doubtful);
+      TEST_ASSERT_FALSE(conditioned.contact);
+      press(20000 * Pa);
+      run_s(5);
+      TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+      press((more ? 1200 : 600) * Pa);
+      run_s(3);
+      TEST_ASSERT_FALSE(conditioned.contact);
+      TEST_ASSERT_EQUAL(more, conditioned.zero_doubtful);
+    }
+    begin_calm(periods_us[i]); /* A press that is in doubt itself proves nothing. */
+    press(20000 * Pa);
+    run_s(5);
+    press(600 * Pa);
+    run_s(10);
+    press(2000 * Pa);
+    watch_s(5, 0, 0);
+    TEST_ASSERT_TRUE(conditioned.contact);
+    TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
+    press(600 * Pa);
+    run_s(3);
+    TEST_ASSERT_TRUE(conditioned.zero_doubtful);
+  }
+}
+
+/* Where a strong press was meanwhile, it may be what remains of that. */
+static void test_a_weak_contact_that_outlasts_a_strong_one_is_in_doubt(void) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    begin_calm(periods_us[i]);
+    frame.pressure_Pa_q10[3] += 3000 * Pa;
+    watch_s(60, 0, 0);
+    TEST_ASSERT_EQUAL_FLOAT(contact_s, unflagged_s);
+    frame.pressure_Pa_q10[11] += 30000 * Pa;
+    watch_s(5, 0, 0);
+    TEST_ASSERT_EQUAL_FLOAT(contact_s, unflagged_s);
+    frame.pressure_Pa_q10[11] -= 30000 * Pa;
+    watch_s(120, 0, 0);
+    TEST_ASSERT_FLOAT_WITHIN(0.5f, 120, contact_s);
+    TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
+    frame.pressure_Pa_q10[3] += 3000 * Pa;
+    watch_s(5, 0, 0);
+    TEST_ASSERT_EQUAL_FLOAT(contact_s, unflagged_s);
+  }
+}
+
 static void press_in_steps(int32_t from, int32_t to, float seconds) {
   int count = frames_in(seconds);
   for (int i = 1; i <= count; i++) {
@@ -681,22 +790,25 @@ static void test_tare_during_contact(void) {
 
 /* A dip that rubber makes is waited for; one that stays is the zero, and may come back in doubt. */
 static void test_reading_below_zero_is_tared_anew_when_it_stays(void) {
+  static const int32_t depths_Pa[] = {400, 900};
   for (size_t i = 0; i < FAST_PERIODS; i++) {
-    begin_calm(periods_us[i]);
-    fill(AMBIENT - 400 * Pa);
-    run_s(8);
-    TEST_ASSERT_FALSE(conditioned.tared);
-    fill(AMBIENT);
-    run_s(0.2f);
-    TEST_ASSERT_TRUE(conditioned.tared);
-    TEST_ASSERT_INT32_WITHIN(10 * Pa, 0, conditioned.peak_Pa_q10);
-    fill(AMBIENT - 400 * Pa);
-    run_s(12);
-    TEST_ASSERT_TRUE(conditioned.tared);
-    TEST_ASSERT_INT32_WITHIN(2 * Pa, AMBIENT - 400 * Pa, condition.zero_Pa_q10[7]);
-    fill(AMBIENT);
-    watch_s(10, 0, 0);
-    TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
+    for (size_t j = 0; j < 2; j++) {
+      begin_calm(periods_us[i]);
+      fill(AMBIENT - depths_Pa[j] * Pa);
+      run_s(8);
+      TEST_ASSERT_FALSE(conditioned.tared);
+      fill(AMBIENT);
+      run_s(0.2f);
+      TEST_ASSERT_TRUE(conditioned.tared);
+      TEST_ASSERT_INT32_WITHIN(10 * Pa, 0, conditioned.peak_Pa_q10);
+      fill(AMBIENT - depths_Pa[j] * Pa);
+      run_s(12);
+      TEST_ASSERT_TRUE(conditioned.tared);
+      TEST_ASSERT_INT32_WITHIN(2 * Pa, AMBIENT - depths_Pa[j] * Pa, condition.zero_Pa_q10[7]);
+      fill(AMBIENT);
+      watch_s(10, 0, 0);
+      TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
+    }
   }
 }
 
@@ -904,6 +1016,9 @@ int main(void) {
   RUN_TEST(test_slow_frames_need_fewer_readings_for_a_tare);
   RUN_TEST(test_zero_improves_after_the_tare);
   RUN_TEST(test_warming_up_is_no_contact);
+  RUN_TEST(test_what_a_cold_sensor_rises_is_no_contact);
+  RUN_TEST(test_a_light_touch_is_seen_once_zeros_have_settled);
+  RUN_TEST(test_a_ramp_from_the_start_is_a_contact);
   RUN_TEST(test_gate_has_a_hysteresis_in_pascals_and_sigmas);
   RUN_TEST(test_one_disturbed_reading_moves_no_zero);
   RUN_TEST(test_zero_follows_any_drift_of_a_barometer);
@@ -919,6 +1034,8 @@ int main(void) {
   RUN_TEST(test_what_rubber_does_after_a_release_is_no_contact);
   RUN_TEST(test_a_force_left_after_a_release_is_flagged);
   RUN_TEST(test_press_after_a_release_is_not_taken_for_a_remainder);
+  RUN_TEST(test_a_press_proves_the_zero_that_it_leaves);
+  RUN_TEST(test_a_weak_contact_that_outlasts_a_strong_one_is_in_doubt);
   RUN_TEST(test_a_touch_that_a_zero_took_part_of_stays_in_doubt);
   RUN_TEST(test_presses_in_quick_succession_move_no_zero);
   RUN_TEST(test_far_sensors_stand_off_too);
