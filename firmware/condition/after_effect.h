@@ -1,16 +1,16 @@
-/* What rubber keeps of a press. It does not let go at once: a sensor stands off by 0.4 to 13 % of its
- * last pressure, or below its zero by 1 to 15 %. It returns within 0.5 to 20 s, and keeps some of it
- * (strips of MPL3115A2 under rubber, JiannnH/MTL-BaroTactileSensor, 2023). That cannot be
+/* What rubber keeps of a press. It does not let go at once: a sensor stands off by 0.4 to 13 % of
+ * its last pressure, or below its zero by 1 to 15 %. It returns within 0.5 to 20 s, and keeps some
+ * of it (strips of MPL3115A2 under rubber, JiannnH/MTL-BaroTactileSensor, 2023). That cannot be
  * distinguished from a remaining force.
  *
  * Each sensor remembers the strongest press that it felt lately; the memory fades in
- * AFTER_EFFECT_MEMORY_s. Sensors far from a press stand off by a share of what others felt, so half of
- * the pad's memory counts for all. An eighth of the memory is the band: so much may remain above the
- * level, and twice as much below. A contact closes within the band.
+ * AFTER_EFFECT_MEMORY_s. Sensors far from a press stand off by a share of what others felt, so half
+ * of the pad's memory counts for all. An eighth of the memory is the band: so much may remain above
+ * the level, and twice as much below. A contact closes within the band.
  *
- * After it the remainder follows the reading within the band. It rises only for AFTER_EFFECT_FRESH_s,
- * and never as fast as a press. Then a sudden press opens the gate above half of the band, and the
- * level takes over the remainder by 1/256 of the memory a second.
+ * After it the remainder follows the reading within the band. It rises only for
+ * AFTER_EFFECT_FRESH_s, and never as fast as a press. Then a sudden press opens the gate above half
+ * of the band, and the level takes over the remainder by 1/256 of the memory a second.
  *
  * A long contact leaves a drift too, as far as a barometer may have drifted in it. */
 #ifndef CONDITION_AFTER_EFFECT_H

@@ -9,8 +9,8 @@
 
 #define SLOW_ms SECONDS(1)
 
-/* In a look a remainder rises by less than so much noise, and falls by less than so much and a quarter
- * of it. */
+/* In a look a remainder rises by less than so much noise, and falls by less than so much and a
+ * quarter of it. */
 #define STILL_SIGMA 3
 #define FALL_SHIFT 2
 
@@ -152,8 +152,8 @@ static void sum_up(struct condition *condition, const struct frame *frame, uint3
   }
 }
 
-/* By so much a zero may be off: what it has taken without a proof, or has not settled yet. The zeros
- * stand in a contact, and with them this. */
+/* By so much a zero may be off: what it has taken without a proof, or has not settled yet. The
+ * zeros stand in a contact, and with them this. */
 static int32_t taken_into_zeros(const struct condition *condition, uint32_t usable, uint8_t count) {
   int32_t most = 0;
   for (uint8_t k = 0; k < count; k++, usable >>= 1) {

@@ -1,18 +1,18 @@
-/* From absolute readings to pressure on the pad. Everything here works in seconds and pascals, at any
- * rate from 0.1 Hz to 1400 Hz and at any oversampling. It has four parts, each with one state for
- * each sensor; ZERO.md has the picture:
+/* From absolute readings to pressure on the pad. Everything here works in seconds and pascals, at
+ * any rate from 0.1 Hz to 1400 Hz and at any oversampling. It has four parts, each with one state
+ * for each sensor; ZERO.md has the picture:
  *
  * - zero.h: what a sensor reads when nothing touches
  * - after_effect.h: what rubber keeps of a press
  * - gate.h: whether anything touches the pad
  * - doubt.h: whether a force and a zero that has moved look alike
  *
- * The zero of a sensor is the level of the first and the remainder of the second. It stands while the
- * gate is open, and while the temperature of its sensor is unsettled. It is taken again if it was
- * taken in the five seconds before its sensor was reset (the sensor had lost its state), or before the
- * temperature turned out to be another. No single sensor is tared in a contact that others feel. It
- * waits for eight seconds at most, since wrong zeros may make that contact. Such a zero is in doubt
- * until the contact ends. Then it is taken again. */
+ * The zero of a sensor is the level of the first and the remainder of the second. It stands while
+ * the gate is open, and while the temperature of its sensor is unsettled. It is taken again if it
+ * was taken in the five seconds before its sensor was reset (the sensor had lost its state), or
+ * before the temperature turned out to be another. No single sensor is tared in a contact that
+ * others feel. It waits for eight seconds at most, since wrong zeros may make that contact. Such a
+ * zero is in doubt until the contact ends. Then it is taken again. */
 #ifndef CONDITION_CONDITION_H
 #define CONDITION_CONDITION_H
 

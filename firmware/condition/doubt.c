@@ -11,9 +11,9 @@
 #define CREEPING_SHIFT 4
 #define CREPT_MAX_Pa 2500
 
-/* A contact so many times what its zeros have taken lately is off by a third at most. What they took
- * of it itself counts twice, for where it then moves they are off as before. At 4 holds of the real
- * strips are in doubt. */
+/* A contact so many times what its zeros have taken is off by a third at most. What they took of it
+ * itself counts twice, for where it then moves they are off as before. At 4 a hold of the real
+ * strips is in doubt. */
 #define TAKEN_FACTOR 3
 
 void doubt_forget(struct doubt *doubt, struct doubt_pad *pad, uint8_t k) {

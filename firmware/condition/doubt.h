@@ -1,18 +1,19 @@
 /* Whether a force and a zero that has moved look alike.
  *
- * A sensor's zero may be off by what it took: its wander is what the level moved, fading in minutes;
- * taken is what level and remainder moved since the zero was proven. A press without doubt proves it:
- * what the zero comes back to after that press is the zero. So doubt ends by evidence, and without
- * any it fades in minutes. crept is what the reading rose as slowly as some real sensors do.
+ * A sensor's zero may be off by what it took: its wander is what the level moved, fading in
+ * minutes; taken is what level and remainder moved since the zero was proven. A press without doubt
+ * proves it: what the zero comes back to after that press is the zero. So doubt ends by evidence,
+ * and without any it fades in minutes. crept is what the reading rose as slowly as some real
+ * sensors do.
  *
  * Doubtful is
  * - a contact of which no sensor feels more than its zero wandered, half as much again; or no more
- *   than barometers drift in so long a time; or while a zero is a guess. This one is unsure: the zero
- *   follows it slowly, as if nothing touched
- * - a contact whose sensors have crept up, by less than 16 Pa/s all the time, 0.003 N/s on 12 mm of
+ *   than barometers drift in so long a time; or while a zero is a guess. This one is unsure: the
+ *   zero follows it slowly, as if nothing touched
+ * - a contact whose sensors have crept up, by less than 24 Pa/s all the time, 0.005 N/s on 12 mm of
  *   rubber, and to less than 3.9 kPa
- * - a contact less than three times what its zeros had taken when it left the band, or six times what
- *   they had taken of it
+ * - a contact less than three times what its zeros had taken when it left the band, or six times
+ *   what they had taken of it
  * - a contact below an eighth of the strongest press in it: what may remain of that one
  * - no contact, but a zero that has taken more than opens the gate, or has not settled to that */
 #ifndef CONDITION_DOUBT_H
@@ -75,6 +76,7 @@ void doubt_press(struct doubt_pad *pad, bool at_once, int32_t taken_Pa_q10);
 /* Whether the zero goes on as if nothing touched. */
 bool doubt_is_unsure(struct doubt_pad *pad, const struct doubt_view *view);
 
+/* The answer, after all sensors that were due have been looked at. */
 bool doubt_is_due(struct doubt_pad *pad, const struct doubt_view *view);
 
 #endif

@@ -1,7 +1,7 @@
 /* Whether anything touches the pad. The gate opens above GATE_OPEN_Pa + GATE_OPEN_SIGMA standard
- * deviations of the noise, and closes below GATE_CLOSE_Pa + GATE_CLOSE_SIGMA. A sensor's margin comes
- * on top of both. The pascals are for zeros that move without a touch: the compensation steps by 60 Pa
- * at 10 degC, and a temperature half a second old costs 24 to 48 Pa in fast warming. */
+ * deviations of the noise, and closes below GATE_CLOSE_Pa + GATE_CLOSE_SIGMA. A sensor's margin
+ * comes on top of both. The pascals are for zeros that move without a touch: the compensation steps
+ * by 60 Pa at 10 degC, and a temperature half a second old costs 24 to 48 Pa in fast warming. */
 #ifndef CONDITION_GATE_H
 #define CONDITION_GATE_H
 

@@ -1,23 +1,24 @@
 /* The level that a sensor reads when nothing touches: taken once, settled, then followed. It is the
  * zero but for what a press has left there (after_effect.h).
  *
- * Taken. The level is the mean of ZERO_TARE_FRAMES readings without the smallest and the largest; of
- * three and more when they took a second, at rates below 16 Hz.
+ * Taken. The level is the mean of ZERO_TARE_FRAMES readings without the smallest and the largest;
+ * of three and more when they took a second, at rates below 16 Hz.
  *
- * Settled. Rubber and sensors warm up: after power-up some sensors rise by 0.6 kPa, most of it in the
- * first two seconds. So a level that was just taken comes with what it may be off by, its spread:
+ * Settled. Rubber and sensors warm up: after power-up some sensors rise by 0.6 kPa, most of it in
+ * the first second. So a level that was just taken comes with what it may be off by, its spread:
  * ZERO_COLD_Pa for a sensor that was off or is another, ZERO_WARM_Pa for one that was calm before.
- * While there is a spread the level takes over the whole reading, within the spread. The spread falls
- * by all that the level moves, and fades by evidence: it goes on at twice what the reading is off by
- * and three times what it moves in a second. A calm sensor has none after two seconds, a cold one
- * that creeps after fifteen. A touch weaker than the spread is not seen meanwhile.
+ * While there is a spread the level takes over all readings within it, and the gate is higher by
+ * it. The spread fades by evidence, to three times what the reading moves in a second. A calm
+ * sensor has none after two seconds, one that creeps after fifteen. A touch weaker than the spread
+ * is not seen.
  *
  * Followed. Then the level moves at 0.5 Pa/s: barometers drift by up to 0.22 Pa/s, and a force that
- * rises faster is no drift. In a contact it stands, except for the drift of the calm before it, which
- * goes on for an hour.
+ * rises faster is no drift. In a contact it stands, except for the drift of the calm before it,
+ * which goes on for an hour.
  *
- * Taken again. A reading below what a release explains means that the level was taken under a press.
- * The sensor is tared again after ZERO_BELOW_s, or after half a second if it is far below. */
+ * Taken again. A reading below what a release explains means that the level was taken under a
+ * press. The sensor is tared again after ZERO_BELOW_s, or after half a second if it is far below.
+ */
 #ifndef CONDITION_ZERO_H
 #define CONDITION_ZERO_H
 
@@ -55,10 +56,10 @@ struct zero_calm {
 };
 
 struct zero_snapshot {
-  uint8_t slot;     /* it goes there, */
-  uint8_t first;    /* after the older ones have moved up: of these the first, */
-  uint8_t every;    /* and every so many after it; 0: none has to move */
-  int32_t span_ms;  /* from the oldest that is left */
+  uint8_t slot;    /* it goes there, */
+  uint8_t first;   /* after the older ones have moved up: of these the first, */
+  uint8_t every;   /* and every so many after it; 0: none has to move */
+  int32_t span_ms; /* from the oldest that is left */
 };
 
 /* How much more than 0.5 Pa/s a level may take over, each second. */
@@ -73,8 +74,8 @@ void zero_begin_tare(struct zero *zero, uint32_t now_ms, int32_t spread_Pa_q10);
 /* Takes a reading. Returns whether the level is known now. */
 bool zero_take(struct zero *zero, uint32_t now_ms, int32_t reading_Pa_q10);
 
-/* Whether the level is settling: then it has taken over the reading, and nothing remains of a press.
- */
+/* Whether the level is settling: then it has taken over the reading, and nothing remains of a
+ * press. */
 bool zero_settle(struct zero *zero, const struct step *step);
 
 /* Moves a settled level, and takes what it takes of the remainder. Returns by how much it moved. */
@@ -88,8 +89,8 @@ int32_t zero_drift_on(struct zero *zero, int32_t ms);
  * is to be taken again. */
 bool zero_is_below(struct zero *zero, int32_t ms, int32_t under_Pa_q10, bool *far);
 
-/* It may have been taken under a press. gives_in: it is taken again when its sensor is looked at next,
- * if that is below. */
+/* It may have been taken under a press. gives_in: it is taken again when its sensor is looked at
+ * next, if that is below. */
 void zero_unsettle(struct zero *zero, bool gives_in);
 
 /* In a calm: whether a snapshot of all levels is due, and which. */

@@ -108,8 +108,8 @@ static uint32_t course(void) {
 }
 
 static void test_frames_are_conditioned_the_same_to_the_bit(void) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0x7C571AB6, 0x50145F26, 0xCAD42740, 0xC33BC3B5,
-                                                 0xDEEEFC84, 0x91DA9051, 0x964E4899, 0x8716D3E7};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0xA2413B9B, 0xC812874A, 0x3B834EFF, 0x0C615192,
+                                                 0x4F8F95F5, 0x939D7D5E, 0x78E3A139, 0x78FB3ECE};
   uint32_t found[GOLDEN_BLOCKS] = {0};
   draw_from(UINT64_C(0x7A65726F));
   for (int i = 0; i < COURSES; i++) {
