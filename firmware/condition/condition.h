@@ -80,8 +80,8 @@ void condition_start(struct condition *condition);
 void condition_tare(struct condition *condition);
 
 /* Processes one frame, later than the one before by frame->t_us. Do not pass held frames. gains:
- * NULL for sensors that are all alike. Call condition_follow() between two frames. Cost: about 85
- * Cortex-M0+ cycles a sensor in contact, 175 without. */
+ * NULL for sensors that are all alike. Call condition_follow() between two frames. Cost: about 105
+ * Cortex-M0+ cycles a sensor in contact, 190 without. */
 void condition_frame(struct condition *condition, const struct frame *frame,
                      const struct condition_gains *gains, struct conditioned *conditioned);
 
