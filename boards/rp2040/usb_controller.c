@@ -10,8 +10,13 @@
  * offered in the last 200 us of a frame, where such errors come from. It can still strike (TinyUSB
  * pull request 1779, embassy issue 2880), and then nothing but a reset of the block helps, not even
  * a bus reset. So the block is reset, and the device attached again, when the bus is silent and not
- * suspended, or when resets of the bus are followed by no request. A hung controller that goes on
+ * suspended, or when frames but no request follow a reset of the bus. A hung controller that goes on
  * seeing frames, under a host that resets nothing, is not noticed.
+ *
+ * How many resets come before the request says nothing. An EHCI controller sends no frame after its
+ * own reset of a full-speed device; its companion then resets the device again (Linux, ehci-hub.c
+ * check_reset_complete()). And the erratum strikes a controller that answers, so one that has not
+ * yet heard a request since its block was reset waits for as long as the host takes.
  */
 #include "rp2040/usb_controller.h"
 
@@ -43,11 +48,10 @@ enum { PIN_DP = 15, FEIGNED_MAX_ms = 5 };
  */
 #define WATCH_us 250000u
 #define SILENCE_us 1000000u
-/* A host that enumerates follows a reset by a request. A reset lasts 10 ms or more (USB 2.0,
- * TDRST), so reports of it within 3 ms are of the same one. */
-#define UNASKED_RESETS 2u
-#define RESET_APART_us 3000u
-/* Where no host is the limits above rise by this factor. */
+/* From the first frame after a reset to the request. Linux takes 60 ms (hub.c hub_port_reset()), and
+ * resets a device that is deaf several times before it gives up after about a second. */
+#define UNASKED_us 500000u
+/* Where no host is SILENCE_us rises by this factor. */
 #define PATIENCE_MAX 8u
 /* Ample for a hub to notice, which debounces for 100 ms (USB 2.0, TATTDB). */
 #define DETACHED_us 100000u
@@ -76,9 +80,11 @@ static bool is_old; /* before revision B2 */
 static enum { WATCH, ATTACH, AWAIT_END_OF_RESET, FEIGN_IDLE } next;
 static uint32_t feigned_ms;
 static uint32_t alive_us; /* when last the bus was not silent, or was asleep */
-static uint32_t reset_us; /* the last reset of the bus */
-static uint32_t unasked_resets;
 static uint32_t patience = 1;
+/* What the host still owes: a first request to a block just reset, nothing, a frame or a request
+ * after a reset of the bus. */
+static enum { OWES_FIRST_REQUEST, OWES_NOTHING, OWES_FRAME, OWES_REQUEST } host_owes;
+static uint32_t asking_us; /* the first frame after the reset: OWES_REQUEST */
 
 /* The controller reads the control word in its own clock domain, so AVAILABLE is written once the
  * other fields are certain to have arrived there: datasheet 4.1.2.5.1. */
@@ -102,6 +108,10 @@ static bool in_frame_tail(void) {
 static void start_frame(void) {
   frame_began = false;
   alive_us = frame_start_us;
+  if (host_owes == OWES_FRAME) {
+    host_owes = OWES_REQUEST;
+    asking_us = frame_start_us;
+  }
   for (uint8_t number = 1; deferred && number < ENDPOINT_NUMBERS; number++) {
     uint8_t endpoint = USB_ENDPOINT_IN | number;
     if (deferred & USB_BIT(endpoint))
@@ -283,7 +293,7 @@ static void start_over(void) {
   data1 = 0;
   suspended = false;
   frame_began = false;
-  unasked_resets = 0;
+  host_owes = OWES_FIRST_REQUEST;
   next = ATTACH;
   usb_device_on_bus_reset();
   look_in(DETACHED_us);
@@ -324,10 +334,8 @@ void timer1_irq_handler(void) {
   }
 }
 
-static bool is_unasked_for(uint32_t now_us) {
-  unasked_resets += now_us - reset_us >= RESET_APART_us;
-  reset_us = now_us;
-  return unasked_resets >= UNASKED_RESETS * patience;
+static bool is_deaf(void) {
+  return host_owes == OWES_REQUEST && TIMER_TIMERAWL - asking_us >= UNASKED_us;
 }
 
 static void on_bus_reset(void) {
@@ -337,6 +345,8 @@ static void on_bus_reset(void) {
   usb_controller_withdraw(USB_ENDPOINT_IN);
   usb_controller_withdraw(0);
   suspended = false;
+  if (host_owes == OWES_NOTHING)
+    host_owes = OWES_FRAME;
   usb_device_on_bus_reset();
   if (is_old && usb_controller_has_gpio15) {
     next = AWAIT_END_OF_RESET;
@@ -346,7 +356,7 @@ static void on_bus_reset(void) {
 
 static void on_setup(void) {
   REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_SETUP_REC;
-  unasked_resets = 0;
+  host_owes = OWES_NOTHING;
   patience = 1;
   uint8_t packet[USB_SETUP_BYTES];
   for (unsigned i = 0; i < sizeof packet; i++)
@@ -398,13 +408,8 @@ static void serve(void) {
     start_frame();
     interrupts |= USB_INT_DEV_SOF;
   }
-  if (interrupts & USB_INT_BUS_RESET) {
-    if (is_unasked_for(TIMER_TIMERAWL)) {
-      start_over();
-      return;
-    }
+  if (interrupts & USB_INT_BUS_RESET)
     on_bus_reset();
-  }
   if (interrupts & USB_INT_DEV_SUSPEND) {
     REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_SUSPENDED;
     set_suspended(REG32(USB_SIE_STATUS) & USB_SIE_STATUS_SUSPENDED);
@@ -424,7 +429,10 @@ static void serve(void) {
   }
   if (interrupts & USB_INT_SETUP_REQ)
     on_setup();
-  REG32_SET(USB_INTE) = SERVED;
+  if (is_deaf())
+    start_over();
+  else
+    REG32_SET(USB_INTE) = SERVED;
 }
 
 void usb_service_irq_handler(void) {

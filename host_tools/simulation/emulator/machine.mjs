@@ -24,12 +24,12 @@ export class Machine {
   /**
    * @param options image: Uint8Array; Board; scenario; seed; faults: parsed list; flash: 2 MiB of content, beside the
    *   image, from an earlier life; flashSpeed: see BUSY_NS; serial: 16 hex digits; clock_ppm: by how
-   *   much the chip's clocks are fast; revision, uptime_us: of the chip, see Chip; fastEnumeration; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes);
+   *   much the chip's clocks are fast; revision, uptime_us: of the chip, see Chip; fastEnumeration, companion: of the host, see UsbHost; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes);
    *   sensor, rise_ns, onLevels: see the boards; makeClient({ host, report, onData }): what uses the USB device, CdcClient by
    *   default
    */
   constructor({
-    image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, clock_ppm = 0, fastEnumeration = false, allowWatchdog = false, revision, uptime_us,
+    image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, clock_ppm = 0, fastEnumeration = false, companion = false, allowWatchdog = false, revision, uptime_us,
     flash = null, flashSpeed, sensor, rise_ns, onLevels, onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {}, makeClient = (parts) => new CdcClient(parts),
   }) {
     this.image = image;
@@ -59,7 +59,7 @@ export class Machine {
     this.trouble = new Trouble();
     this.boardScope = this.time.scope();
     this.board = this.makeBoard();
-    this.host = new UsbHost({ scope: this.scope, report: this.report, fast: fastEnumeration, onPacket: onUsbPacket });
+    this.host = new UsbHost({ scope: this.scope, report: this.report, fast: fastEnumeration, companion, onPacket: onUsbPacket });
     this.client = makeClient({ host: this.host, report: this.report, onData });
     const onBoard = (type) => [type, (target, active) => this.board.faultActions[type](target, active)];
     this.faults = new Faults(faults, this.scope, {

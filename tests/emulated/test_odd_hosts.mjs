@@ -1,0 +1,18 @@
+/**
+ * The release images before hosts that are seldom met, and on silicon at its corners.
+ *
+ * usage: test_odd_hosts.mjs BUILD_OF_IMAGES FINGERTIP COMMAND_FRAME
+ */
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { Storms } from './harness/storms.mjs';
+
+const [images, fingertip, command_frame] = process.argv.slice(2);
+const storms = new Storms(images, { fingertip, command_frame });
+const BOARDS = ['pico_mux', 'pico_parallel'];
+
+for (const board of BOARDS) {
+  test(`${board}: a host that resets twice before it asks for anything`, () => {
+    assert.equal(storms.ehciDetaches(board, 2), 0);
+  });
+}
