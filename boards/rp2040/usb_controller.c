@@ -299,17 +299,26 @@ static void start_over(void) {
   look_in(DETACHED_us);
 }
 
+/* It sleeps, or the host holds a reset for longer than it needs: low at two looks in a row. */
+static bool bus_may_be_silent(void) {
+  static bool was_low;
+  uint32_t status = REG32(USB_SIE_STATUS);
+  bool is_low = (status & USB_SIE_STATUS_LINES) == 0;
+  bool stays_low = is_low && was_low;
+  was_low = is_low;
+  return (status & USB_SIE_STATUS_SUSPENDED) || stays_low;
+}
+
 void timer1_irq_handler(void) {
   TIMER_INTR = TIMER_ALARM1_BIT;
   switch (next) {
   case WATCH:
-    if (REG32(USB_SIE_STATUS) & USB_SIE_STATUS_SUSPENDED)
+    if (bus_may_be_silent())
       alive_us = TIMER_TIMERAWL;
     if (TIMER_TIMERAWL - alive_us >= patience * SILENCE_us)
       start_over();
     else
       watch();
-    rp2040_irq_pend(RP2040_IRQ_USB_SERVICE);
     break;
   case ATTACH:
     attach();
@@ -332,6 +341,7 @@ void timer1_irq_handler(void) {
     }
     break;
   }
+  rp2040_irq_pend(RP2040_IRQ_USB_SERVICE);
 }
 
 static bool is_deaf(void) {

@@ -15,4 +15,10 @@ for (const board of BOARDS) {
   test(`${board}: a host that resets twice before it asks for anything`, () => {
     assert.equal(storms.ehciDetaches(board, 2), 0);
   });
+
+  for (const [revision, held_ms] of [[1, 920], [2, 920], [1, 3000], [2, 3000]]) {
+    test(`${board}: a reset of the bus that lasts ${held_ms} ms, on revision B${revision}`, () => {
+      assert.equal(storms.se0Bites(board, revision, held_ms), 0);
+    });
+  }
 }

@@ -33,4 +33,17 @@ export class Storms {
     bench.assertStreams(100);
     return bench.end().usb.detaches;
   }
+
+  /** How often the watchdog bites, or the device detaches itself, while the host holds the bus low for so long. */
+  se0Bites(board, revision, held_ms) {
+    const bench = this.bench(board, { revision });
+    bench.stream();
+    let addressed = false;
+    bench.machine.host.holdReset(held_ms * 1e6, () => {
+      addressed = true;
+    });
+    bench.run(held_ms + 200);
+    const { reboots, usb } = bench.end();
+    return reboots + usb.detaches + (addressed ? 0 : 1);
+  }
 }
