@@ -21,4 +21,9 @@ for (const board of BOARDS) {
       assert.equal(storms.se0Bites(board, revision, held_ms), 0);
     });
   }
+
+  test(`${board}: what writes to code, constants or vectors ends in a crash record`, () => {
+    const { tried, trapped } = storms.codeWrites(board);
+    assert.equal(trapped, tried);
+  });
 }

@@ -2,7 +2,13 @@
  * What silicon and odd hosts do to a release image, each as one figure: the tests hold it to what it must be, and
  * figures.mjs prints it for the report.
  */
+import { CrashBench } from './crash_bench.mjs';
 import { ImageBench } from './image_bench.mjs';
+
+const RAM_BASE = 0x20000000;
+const FAULT = 1; // crash.h
+// Instructions: str, strh and strb r0, [r1]; b .
+const [STR, STRH, STRB, STAND_STILL] = ['0860', '0880', '0870', 'fee7'];
 
 export class Storms {
   /** images: the folder with those of all boards; tools: see ImageBench. */
@@ -45,5 +51,34 @@ export class Storms {
     bench.run(held_ms + 200);
     const { reboots, usb } = bench.end();
     return reboots + usb.detaches + (addressed ? 0 : 1);
+  }
+
+  /** A word, a halfword and a byte written to the vectors, to code and to constants: how many were tried, and how many changed nothing and ended in a crash record. */
+  codeWrites(board) {
+    const found = { tried: 0, trapped: 0 };
+    for (const place of ['__vectors', 'scan_take', 'rp2040_irq_priorities']) {
+      for (const store of [STR, STRH, STRB]) {
+        const bench = new CrashBench(this.images, this.tools, board);
+        const { chip } = bench.machine;
+        bench.stream();
+        bench.until(() => chip.core.waiting && chip.core.IPSR === 0, 10, 'sleep');
+        const [target, code] = [bench.address(place), bench.address('kept')]; // the record of crashes is not in use yet
+        const at = target - RAM_BASE;
+        const before = Buffer.from(chip.sram.slice(at, at + 4));
+        bench.patch('kept', store + STAND_STILL);
+        chip.core.registers.set([~before.readInt32LE(0), target], 0);
+        chip.core.registers[15] = code;
+        chip.core.waiting = false;
+        let changed = true;
+        chip.onWatchdog = () => {
+          changed = !before.equals(chip.sram.slice(at, at + 4));
+        };
+        bench.untilReset();
+        const { kind, pc } = bench.crash();
+        found.tried += 1;
+        found.trapped += !changed && kind === FAULT && pc === code ? 1 : 0;
+      }
+    }
+    return found;
   }
 }

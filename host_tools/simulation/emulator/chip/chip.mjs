@@ -112,7 +112,7 @@ export class Chip extends RP2040 {
     this.trouble = trouble;
     this.logger = new StrictLogger(this);
     this.core = new StrictCore(this);
-    this.mpu = new Mpu(this, () => this.core.guard(this.mpu.denied));
+    this.mpu = new Mpu(this, () => this.core.guard(this.mpu.denied, this.mpu.readOnlyBytes));
     this.sio = new StrictSio(this);
     /** Frequencies are nominal here, as the firmware believes them; what passes in time is this many times as fast. */
     this.clockRate = 1 + clock_ppm * 1e-6;
