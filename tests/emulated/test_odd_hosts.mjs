@@ -26,4 +26,8 @@ for (const board of BOARDS) {
     const { tried, trapped } = storms.codeWrites(board);
     assert.equal(trapped, tried);
   });
+
+  test(`${board}: a suspend that cuts a frame does not cost the first answer after the resume`, () => {
+    assert.equal(storms.tornAfterResume(board, 40), 0);
+  });
 }

@@ -55,7 +55,7 @@ export class CrashBench extends ImageBench {
 }
 
 /** The packets on a line (PROTOCOL.md), header first; their CRC is not looked at here. */
-function split(bytes) {
+export function split(bytes) {
   const packets = [];
   for (let from = 0, at; (at = bytes.indexOf(0, from)) >= 0; from = at + 1) {
     const out = [];

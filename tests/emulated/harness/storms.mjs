@@ -2,11 +2,12 @@
  * What silicon and odd hosts do to a release image, each as one figure: the tests hold it to what it must be, and
  * figures.mjs prints it for the report.
  */
-import { CrashBench } from './crash_bench.mjs';
+import { CrashBench, split } from './crash_bench.mjs';
 import { ImageBench } from './image_bench.mjs';
 
 const RAM_BASE = 0x20000000;
 const FAULT = 1; // crash.h
+const [TYPE_HEALTH, TYPE_ACK] = [0x04, 0x05];
 // Instructions: str, strh and strb r0, [r1]; b .
 const [STR, STRH, STRB, STAND_STILL] = ['0860', '0880', '0870', 'fee7'];
 
@@ -80,5 +81,34 @@ export class Storms {
       }
     }
     return found;
+  }
+
+  /** The bus is suspended so many times between two packets of a frame: how often the first answer after the resume is lost. */
+  tornAfterResume(board, times) {
+    let cutting = false;
+    const onUsbPacket = ({ endpoint, isIn, data }) => {
+      if (!cutting || !endpoint || !isIn || data.length < 64 || data.at(-1) === 0) return;
+      cutting = false;
+      bench.machine.host.suspend();
+    };
+    const bench = this.bench(board, { onUsbPacket });
+    const { machine } = bench;
+    let torn = 0;
+    for (let i = 0; i < times; i++) {
+      bench.stream();
+      bench.run(20 + (i * 1.237) % 5);
+      cutting = true;
+      bench.until(() => !cutting, 100, 'frame of several packets');
+      bench.run(13);
+      machine.host.resume();
+      bench.run(40);
+      machine.client.write(bench.encoded('health'));
+      bench.run(20);
+      const [first, second] = split(Buffer.concat(bench.received)).slice(-2).map((packet) => packet[1]);
+      torn += first === TYPE_ACK && second === TYPE_HEALTH ? 0 : 1;
+      bench.received = [];
+    }
+    bench.end();
+    return torn;
   }
 }
