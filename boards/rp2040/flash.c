@@ -24,8 +24,7 @@ _Static_assert(HEAD_BYTES + PORT_FLASH_READ_BYTES <= FIFO_FRAMES, "a reading is 
 /* Of a page that is written: 3.1 us with the head, so that no frame waits long. */
 enum { SLICE_BYTES = 12 };
 
-/* An erase takes 400 ms at most (datasheet 9.6). */
-#define BUSY_MAX_us 500000u
+#define BUSY_MAX_us (FLASH_ERASE_MAX_us + 100000u)
 
 /* The last two sectors of the 2 MiB; the linker script leaves them to the store. */
 #define STORE_AT (2u * 1024 * 1024 - PORT_FLASH_SECTORS * PORT_FLASH_SECTOR_BYTES)
@@ -116,6 +115,10 @@ void port_flash_erase(unsigned sector) {
 
 void port_flash_program(uint32_t at, const uint8_t *bytes, size_t length) {
   begin(COMMAND_PAGE_PROGRAM, at, bytes, length);
+}
+
+bool flash_may_erase(void) {
+  return operation.phase != PHASE_IDLE && operation.head[0] == COMMAND_SECTOR_ERASE;
 }
 
 static void send_slice(void) {

@@ -30,4 +30,10 @@ for (const board of BOARDS) {
   test(`${board}: a suspend that cuts a frame does not cost the first answer after the resume`, () => {
     assert.equal(storms.tornAfterResume(board, 40), 0);
   });
+
+  for (const [rosc_MHz, after_ms, how] of [[6.5, 10, 'fault'], [12, 10, 'fault'], [12, 100, 'fault'], [12, 50, 'unfed']]) {
+    test(`${board}: the chip resets itself (${how}) ${after_ms} ms into a slow erase, with a ring oscillator of ${rosc_MHz} MHz`, () => {
+      assert.ok(storms.eraseResetRecovered(board, rosc_MHz * 1e6, after_ms, how));
+    });
+  }
 }

@@ -6,10 +6,14 @@ import { CrashBench, split } from './crash_bench.mjs';
 import { ImageBench } from './image_bench.mjs';
 
 const RAM_BASE = 0x20000000;
-const FAULT = 1; // crash.h
+const [FAULT, WATCHDOG] = [1, 3]; // crash.h
+const LAST_WORDS_ms = 20; // crash.c
+const STORE_SLOTS = 8; // store.h
+/** In the guard below the stack. */
+const NOWHERE = 0x20040000;
 const [TYPE_HEALTH, TYPE_ACK] = [0x04, 0x05];
-// Instructions: str, strh and strb r0, [r1]; b .
-const [STR, STRH, STRB, STAND_STILL] = ['0860', '0880', '0870', 'fee7'];
+// Instructions: str, strh and strb r0, [r1]; b . ; bx lr
+const [STR, STRH, STRB, STAND_STILL, RETURN] = ['0860', '0880', '0870', 'fee7', '7047'];
 
 export class Storms {
   /** images: the folder with those of all boards; tools: see ImageBench. */
@@ -81,6 +85,41 @@ export class Storms {
       }
     }
     return found;
+  }
+
+  /** The chip resets itself so long after a slow erase has begun, its ring oscillator being so fast: whether it starts again. `how` is 'fault', or 'unfed' for a watchdog whose last food was long before. */
+  eraseResetRecovered(board, rosc_hz, after_ms, how) {
+    const bench = new CrashBench(this.images, this.tools, board, { rosc_hz, flashSpeed: 'slowest' });
+    const { machine } = bench;
+    const { chip, memory } = machine;
+    bench.stream();
+    let erases = false;
+    memory.onStep = ({ kind }, step) => {
+      erases ||= kind === 'erase' && step === 'begins';
+    };
+    for (let i = 0; i < 2 * STORE_SLOTS && !erases; i++) {
+      machine.client.write(bench.encoded('osr', i % 2 ? '256' : '512'));
+      machine.client.write(bench.encoded('keep'));
+      for (let ms = 0; ms < 100 && !erases; ms++) bench.run(1);
+    }
+    if (how === 'unfed') chip.watchdog.writeUint32(0x04, 2 * 1000 * (after_ms + LAST_WORDS_ms));
+    if (how === 'unfed') chip.timer.writeUint32(0x18, (chip.timer.count_us + 1000 * after_ms) >>> 0);
+    bench.patch('port_watchdog_feed', RETURN);
+    bench.run(after_ms);
+    if (how === 'fault') {
+      bench.until(() => chip.core.waiting && chip.core.IPSR === 0, 10, 'sleep');
+      chip.core.registers[15] = NOWHERE;
+      chip.core.waiting = false;
+    }
+    const stillErases = machine.memory.isBusy;
+    try {
+      bench.untilReset();
+      const { kind } = bench.crash();
+      bench.stream();
+      return erases && stillErases && kind === (how === 'fault' ? FAULT : WATCHDOG);
+    } catch {
+      return false;
+    }
   }
 
   /** The bus is suspended so many times between two packets of a frame: how often the first answer after the resume is lost. */

@@ -8,7 +8,7 @@ import { BasePeripheral } from 'rp2040js';
 import { RegisterFile } from './registers.mjs';
 
 export const XOSC_HZ = 12e6;
-/** Nominal ring oscillator frequency; real parts range from 1.8 to 12 MHz. */
+/** Typical frequency of the ring oscillator; that of a part is from 1.8 to 12 MHz (pico-bootrom, bootrom_main.c). */
 export const ROSC_HZ = 6.5e6;
 /** Modelled time from PLL power-up to lock. */
 const PLL_LOCK_NS = 50e3;
@@ -226,7 +226,7 @@ export class Clocks extends BasePeripheral {
   get refHz() {
     const source = this.ref.ctrl & 3;
     const auxiliary = (this.ref.ctrl >>> 5) & 3;
-    const hz = source === 0 ? ROSC_HZ : source === 2 ? (this.rp2040.xosc.stable ? XOSC_HZ : 0) : source === 1 && auxiliary === 0 ? this.rp2040.pllUsb.outputHz : 0;
+    const hz = source === 0 ? this.rp2040.roscHz : source === 2 ? (this.rp2040.xosc.stable ? XOSC_HZ : 0) : source === 1 && auxiliary === 0 ? this.rp2040.pllUsb.outputHz : 0;
     return hz / (((this.ref.div >>> 8) & 3) || 4);
   }
 
@@ -242,7 +242,7 @@ export class Clocks extends BasePeripheral {
   get sysHz() {
     const { pllSys, pllUsb, xosc } = this.rp2040;
     const hz = this.sys.ctrl & 1
-      ? this.#auxiliaryHz(this.sys, [() => pllSys.outputHz, () => pllUsb.outputHz, () => ROSC_HZ, () => (xosc.stable ? XOSC_HZ : 0)])
+      ? this.#auxiliaryHz(this.sys, [() => pllSys.outputHz, () => pllUsb.outputHz, () => this.rp2040.roscHz, () => (xosc.stable ? XOSC_HZ : 0)])
       : this.refHz;
     return hz / (this.sys.div / 256 || 65536);
   }
@@ -250,14 +250,14 @@ export class Clocks extends BasePeripheral {
   get usbHz() {
     if (!(this.usb.ctrl & CTRL_ENABLE)) return 0;
     const { pllSys, pllUsb, xosc } = this.rp2040;
-    const hz = this.#auxiliaryHz(this.usb, [() => pllUsb.outputHz, () => pllSys.outputHz, () => ROSC_HZ, () => (xosc.stable ? XOSC_HZ : 0)]);
+    const hz = this.#auxiliaryHz(this.usb, [() => pllUsb.outputHz, () => pllSys.outputHz, () => this.rp2040.roscHz, () => (xosc.stable ? XOSC_HZ : 0)]);
     return hz / (((this.usb.div >>> 8) & 3) || 4);
   }
 
   get periHz() {
     if (!(this.peri.ctrl & CTRL_ENABLE)) return 0;
     const { pllSys, pllUsb, xosc } = this.rp2040;
-    return this.#auxiliaryHz(this.peri, [() => this.sysHz, () => pllSys.outputHz, () => pllUsb.outputHz, () => ROSC_HZ, () => (xosc.stable ? XOSC_HZ : 0)]);
+    return this.#auxiliaryHz(this.peri, [() => this.sysHz, () => pllSys.outputHz, () => pllUsb.outputHz, () => this.rp2040.roscHz, () => (xosc.stable ? XOSC_HZ : 0)]);
   }
 
   readUint32(offset) {
