@@ -9,6 +9,7 @@
 
 #include "array_bus/array_bus.h"
 #include "condition/condition.h"
+#include "condition/rest.h"
 #include "config/capabilities.h"
 #include "contact/contact.h"
 #include "contact/motion.h"
@@ -25,6 +26,7 @@
 struct app {
   struct scan scan; /* shared with the event context under scan's own rules; the rest is main's */
   struct condition condition;
+  struct rest rest;
 #if FT_WITH_FIT
   struct fit_array fit_array;
   struct fit_settings fit_settings;

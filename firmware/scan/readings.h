@@ -23,6 +23,9 @@
  * measured shortly before (condition.h). The same holds for a sensor whose pressure has stepped
  * alone, for example when it was reset for another's sake, or when it returns.
  *
+ * A sensor whose temperature stands apart from the others' (common/apart.h) since it came is doubtful
+ * until it has read like them twice in a row: its PROM may be wrong in spite of its CRC.
+ *
  * A sensor whose PROM has a wrong CRC is used, since one genuine part is known to have one. It is
  * doubtful. It must first have read like the others at two temperatures in a row. */
 #ifndef SCAN_READINGS_H
@@ -39,6 +42,7 @@
 /* Sensors of one pad at rest: two parts of +-2 degC, and a warm object at one end. Further off,
  * a temperature must agree with a second one, no more. */
 #define READINGS_TEMPERATURE_NEAR_cC 500
+#define READINGS_TEMPERATURE_APART_cC 50
 /* Of one sensor, from one reading to the next. */
 #define READINGS_STEP_Pa_q10 (MS58XX_STEP_Pa * 1024)
 /* All others have moved by less: so many times the noise of a reading (two of them differ by 1.4 of
@@ -68,6 +72,8 @@ struct readings {
   uint32_t strange;     /* bitmap: a temperature that is not near the others' is in use */
   uint32_t unproven;    /* bitmap: the PROM's CRC differs and the sensor has not read like others */
   uint32_t was_near;    /* bitmap: an unproven one did, at the last temperature */
+  uint32_t alike;       /* bitmap: has read the others' temperature since it came */
+  uint32_t was_alike;   /* bitmap: at the last temperature */
   uint32_t doubtful;    /* bitmap: used, and to be flagged */
   uint32_t has_last;    /* bitmap: last_Pa_q10 holds a reading */
   uint32_t counted;     /* bitmap: and was in the last frame */

@@ -37,3 +37,10 @@ for (const board of BOARDS) {
     });
   }
 }
+
+test('a PROM that is wrong in spite of its CRC is doubted from the start, and no other', (t) => {
+  const { planted, wrong, undoubted, innocent_doubted } = storms.promCollisions('pico_parallel', 15);
+  t.diagnostic(`${wrong} of ${planted} wrong`);
+  assert.ok(wrong >= 15, `${wrong}`);
+  assert.deepEqual([undoubted, innocent_doubted], [0, 0]);
+});

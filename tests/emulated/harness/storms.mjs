@@ -2,6 +2,7 @@
  * What silicon and odd hosts do to a release image, each as one figure: the tests hold it to what it must be, and
  * figures.mjs prints it for the report.
  */
+import { codesFor, compensate } from '../../../host_tools/simulation/emulator/board/ms5840.mjs';
 import { CrashBench, split } from './crash_bench.mjs';
 import { ImageBench } from './image_bench.mjs';
 
@@ -120,6 +121,39 @@ export class Storms {
     } catch {
       return false;
     }
+  }
+
+  /**
+   * PROMs whose CRC-4 is right by chance, three of each array (sensors k, k + 5 and k + 10): how many make a pressure or a
+   * temperature at rest that is further off than this, and how many of those are used without a doubt; and how many
+   * other sensors are doubted.
+   */
+  promCollisions(board, arrays, wrong_Pa = 1200, wrong_degC = 0.7) {
+    const found = { planted: 0, wrong: 0, undoubted: 0, innocent_doubted: 0 };
+    const [pressure_Pa, temperature_degC] = [100e3, 25];
+    for (let i = 0; i < arrays; i++) {
+      const planted = [0, 5, 10].map((first) => first + (i % 5));
+      const faults = planted.map((sensor) => ({ type: 'sensor_prom_collision', sensor, from_s: 0 }));
+      const bench = this.bench(board, { seed: 1 + i, faults });
+      bench.stream();
+      bench.run(500);
+      const column = bench.lastRow();
+      bench.machine.board.sensors.forEach(({ prom, collidingProm }, k) => {
+        const has = (name) => ((column[name] >>> k) & 1) === 1;
+        if (!planted.includes(k)) {
+          found.innocent_doubted += has('valid') && !has('doubtful') ? 0 : 1;
+          return;
+        }
+        const { d1, d2 } = codesFor(prom, pressure_Pa, temperature_degC);
+        const read = compensate(collidingProm, d1, d2);
+        const isWrong = Math.abs(read.pressure_Pa - pressure_Pa) > wrong_Pa || Math.abs(read.temperature_cdegC / 100 - temperature_degC) > wrong_degC;
+        found.planted += 1;
+        found.wrong += isWrong ? 1 : 0;
+        found.undoubted += isWrong && has('valid') && !has('saturated') && !has('doubtful') ? 1 : 0;
+      });
+      bench.end();
+    }
+    return found;
   }
 
   /** The bus is suspended so many times between two packets of a frame: how often the first answer after the resume is lost. */
