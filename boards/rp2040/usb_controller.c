@@ -42,6 +42,7 @@ enum { PIN_DP = 15, FEIGNED_MAX_ms = 5 };
 #define FRAME_TAIL_END_us 998u
 
 /* A full packet and its handshake take 50 us on the bus. */
+#define PACKET_us 60u
 #define ABORT_LIMIT_us 200u
 
 /* How often the bus is looked at, and how long it may be silent: each millisecond a frame begins.
@@ -120,13 +121,18 @@ static void start_frame(void) {
   deferred = 0;
 }
 
-/* Stops the controller from touching the buffer. */
-static void begin_abort(uint32_t bit) {
+/* Stops the controller from touching the buffer. Where an abort cannot be used the buffer is no
+ * longer available, and a packet that was under way then gets the time to end. */
+static void begin_abort(uint8_t endpoint) {
+  uint32_t bit = USB_BIT(endpoint);
   if (is_old)
-    return;
-  REG32_SET(USB_EP_ABORT) = bit;
+    USB_BUFFER_CONTROL(endpoint) &= ~USB_BUFFER_AVAILABLE;
+  else
+    REG32_SET(USB_EP_ABORT) = bit;
+  uint32_t limit_us = is_old ? PACKET_us : ABORT_LIMIT_us;
   uint32_t start_us = TIMER_TIMERAWL;
-  while ((REG32(USB_EP_ABORT_DONE) & bit) == 0 && TIMER_TIMERAWL - start_us < ABORT_LIMIT_us) {
+  while ((is_old || (REG32(USB_EP_ABORT_DONE) & bit) == 0) &&
+         TIMER_TIMERAWL - start_us < limit_us) {
   }
 }
 
@@ -141,7 +147,8 @@ static void end_abort(uint32_t bits) {
 }
 
 /* What a control transfer that the host has abandoned left must not answer for the one that
- * follows: until on_setup() has taken it back, endpoint 0 answers with NAK. */
+ * follows: until on_setup() has taken it back, endpoint 0 answers with NAK. TinyUSB too aborts
+ * endpoint 0 at a SETUP (dcd_rp2040.c reset_ep0()), and waits for the end of it there and then. */
 static void silence_control(void) {
   if (is_old) {
     USB_BUFFER_CONTROL(USB_ENDPOINT_IN) &= ~USB_BUFFER_AVAILABLE;
@@ -160,7 +167,7 @@ bool usb_controller_withdraw(uint8_t endpoint) {
     deferred &= ~bit;
     return true;
   }
-  begin_abort(bit);
+  begin_abort(endpoint);
   bool done = REG32(USB_BUFF_STATUS) & bit; /* just before, and not yet seen here */
   REG32_CLEAR(USB_BUFF_STATUS) = bit;
   USB_BUFFER_CONTROL(endpoint) = 0;
@@ -351,6 +358,11 @@ static bool is_deaf(void) {
 static void on_bus_reset(void) {
   REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_BUS_RESET;
   USB_ADDR_ENDP = 0;
+  if (is_old) { /* nothing is under way that had to be waited for */
+    REG32_CLEAR(USB_BUFF_STATUS) = held;
+    held = 0;
+    deferred = 0;
+  }
   usb_controller_close_all();
   usb_controller_withdraw(USB_ENDPOINT_IN);
   usb_controller_withdraw(0);

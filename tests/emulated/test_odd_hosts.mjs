@@ -36,7 +36,17 @@ for (const board of BOARDS) {
       assert.ok(storms.eraseResetRecovered(board, rosc_MHz * 1e6, after_ms, how));
     });
   }
+
+  for (const revision of [1, 2]) {
+    test(`${board}: what a host no longer wants is taken back, on revision B${revision}`, () => {
+      assert.equal(storms.wrongAfterWithdrawal(board, revision, 60), 0);
+    });
+  }
 }
+
+test('a flash interface that hangs for a moment leaves nothing behind that spoils what is stored later', () => {
+  assert.equal(storms.lostAfterStall('pico_mux', 16), 0);
+});
 
 test('a PROM that is wrong in spite of its CRC is doubted from the start, and no other', (t) => {
   const { planted, wrong, undoubted, innocent_doubted } = storms.promCollisions('pico_parallel', 15);

@@ -296,6 +296,12 @@ failsWith('peripheral held in reset', main('REG(0x40044000) = 0x65;'), /while I2
 failsWith('USB memory held in reset', main('REG(0x50100000) = 0;'), /while USBCTRL is held in reset/);
 failsWith('timer read without a tick', main('(void)now_us();'), /no tick runs/);
 failsWith('PLL before the crystal is stable', main('unreset(1 << 12); REG(0x40028008) = 125; CLR(0x40028004) = 33;'), /before the crystal oscillator was stable/);
+const restartPll = (reset) => main(`start_clocks(); REG(0x4000803c) = 0; SET(0x40028004) = 45; ${reset} REG(0x40028008) = 125; REG(0x4002800c) = 6 << 16 | 2 << 12;
+  CLR(0x40028004) = 33; while (!(REG(0x40028000) & 0x80000000)) { } CLR(0x40028004) = 8; done();`);
+failsWith('PLL started again that still says it is locked', restartPll(''), /before the PLL locked/);
+test('a reset of its block takes the lock of a PLL', () => {
+  assert.ok(run(restartPll('SET(0x4000c000) = 1 << 12; unreset(1 << 12);')).finished);
+});
 failsWith('clk_sys from a dead PLL', main('REG(0x4000803c) = 1;'), /clk_sys switched to a source that does not run/);
 failsWith('wrong tick divider', main('start_clocks(); REG(0x4005802c) = 0x200 | 10;'), /must be 1 MHz/);
 failsWith('WFI with no interrupt enabled', main('__asm volatile("wfi");'), /firmware hung/);

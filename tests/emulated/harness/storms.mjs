@@ -3,9 +3,12 @@
  * figures.mjs prints it for the report.
  */
 import { codesFor, compensate } from '../../../host_tools/simulation/emulator/board/ms5840.mjs';
+import { setupPacket } from '../../../host_tools/simulation/emulator/usb/host.mjs';
 import { CrashBench, split } from './crash_bench.mjs';
 import { ImageBench } from './image_bench.mjs';
 
+/** Longer than the firmware waits for the flash interface. */
+const SSI_STALL_ns = 400e3;
 const RAM_BASE = 0x20000000;
 const [FAULT, WATCHDOG] = [1, 3]; // crash.h
 const LAST_WORDS_ms = 20; // crash.c
@@ -57,6 +60,57 @@ export class Storms {
     bench.run(held_ms + 200);
     const { reboots, usb } = bench.end();
     return reboots + usb.detaches + (addressed ? 0 : 1);
+  }
+
+  /** A host that opens and closes the port at so many moments of the stream, and gives requests up: how often it gets a wrong answer, or the stream does not come again. */
+  wrongAfterWithdrawal(board, revision, times) {
+    const bench = this.bench(board, { revision });
+    const { client, host, time } = bench.machine;
+    let wrong = 0;
+    for (let i = 0; i < times; i++) {
+      const before = bench.bytes;
+      bench.stream();
+      bench.run(5 + i * 13e-3);
+      wrong += bench.bytes > before ? 0 : 1;
+      const abandoned = host.control(setupPacket(0x80, 6, 2 << 8, 0, 67), null, () => {});
+      if (!bench.machine.run(time.nanos + 20e3 + i * 1750)) throw new Error(bench.machine.result.warnings.join());
+      host.cancel(abandoned);
+      let answer = null;
+      host.control(setupPacket(0x80, 8, 0, 0, 1), null, (status, data) => {
+        answer = `${status} ${Buffer.from(data).toString('hex')}`;
+      });
+      bench.until(() => answer, 5, 'answer');
+      wrong += answer === 'ok 01' ? 0 : 1;
+      client.setDtr(false);
+      bench.run(5);
+      client.setDtr(true);
+      bench.run(5);
+    }
+    bench.end();
+    return wrong;
+  }
+
+  /** What is stored after the flash interface hung for a moment in the middle of a command: how many of `times` settings are not kept after all. */
+  lostAfterStall(board, times) {
+    const bench = this.bench(board);
+    const { client, chip, memory } = bench.machine;
+    bench.stream();
+    let lost = 0;
+    for (let i = 0; i < times; i++) {
+      bench.run(50);
+      client.write(bench.encoded('osr', i % 2 ? '256' : '512'));
+      client.write(bench.encoded('keep'));
+      bench.run(3 + i * 0.37);
+      chip.ssi.stall_ns = SSI_STALL_ns;
+      bench.run(300);
+      client.write(bench.encoded('osr', i % 2 ? '256' : '1024'));
+      const { programs } = memory;
+      client.write(bench.encoded('keep'));
+      bench.run(500);
+      lost += memory.programs > programs && chip.ssi.rx.length === 0 ? 0 : 1;
+    }
+    bench.end();
+    return lost;
   }
 
   /** A word, a halfword and a byte written to the vectors, to code and to constants: how many were tried, and how many changed nothing and ended in a crash record. */
