@@ -76,6 +76,7 @@ void app_start(struct app *app, const struct array_bus *bus) {
 #endif
   store_init(&app->store, geometry.sensor_count);
   condition_tare(&app->condition);
+  app->rest.apart_Pa = MS58XX_APART_Pa;
   app->active = true;
   app->second_began_us = port_now_us();
 

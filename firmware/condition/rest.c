@@ -22,7 +22,7 @@ void rest_follow(struct rest *rest, const struct frame *frame,
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
     pressure_Pa[k] = frame->pressure_Pa_q10[k] / 1024;
   }
-  rest->apart = apart_find(pressure_Pa, usable, frame->sensor_count, REST_APART_Pa);
+  rest->apart = apart_find(pressure_Pa, usable, frame->sensor_count, rest->apart_Pa);
   rest->compared = usable;
   rest->next_us = frame->t_us + INTERVAL_us;
 }

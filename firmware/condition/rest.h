@@ -11,10 +11,8 @@
 
 #include <stdint.h>
 
-/* The accuracy of a MS5840 and its kin is 0.4 kPa or better. */
-#define REST_APART_Pa 1000
-
 struct rest {
+  int32_t apart_Pa;  /* the floor, set by the caller */
   uint32_t apart;    /* bitmap: as of when nothing last touched the pad */
   uint32_t compared; /* bitmap */
   uint64_t next_us;  /* the next comparison not before */

@@ -22,7 +22,7 @@ static void next_frame(uint64_t later_us) {
 }
 
 void setUp(void) {
-  memset(&rest, 0, sizeof rest);
+  rest = (struct rest){.apart_Pa = 1000};
   memset(&conditioned, 0, sizeof conditioned);
   frame = (struct frame){.t_us = 1000, .sensor_count = SENSORS, .valid = ALL};
   conditioned.usable = ALL;
