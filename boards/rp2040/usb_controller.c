@@ -316,13 +316,17 @@ static bool bus_may_be_silent(void) {
   return (status & USB_SIE_STATUS_SUSPENDED) || stays_low;
 }
 
+static bool is_deaf(void) {
+  return host_owes == OWES_REQUEST && TIMER_TIMERAWL - asking_us >= UNASKED_us;
+}
+
 void timer1_irq_handler(void) {
   TIMER_INTR = TIMER_ALARM1_BIT;
   switch (next) {
   case WATCH:
     if (bus_may_be_silent())
       alive_us = TIMER_TIMERAWL;
-    if (TIMER_TIMERAWL - alive_us >= patience * SILENCE_us)
+    if (is_deaf() || TIMER_TIMERAWL - alive_us >= patience * SILENCE_us)
       start_over();
     else
       watch();
@@ -349,10 +353,6 @@ void timer1_irq_handler(void) {
     break;
   }
   rp2040_irq_pend(RP2040_IRQ_USB_SERVICE);
-}
-
-static bool is_deaf(void) {
-  return host_owes == OWES_REQUEST && TIMER_TIMERAWL - asking_us >= UNASKED_us;
 }
 
 static void on_bus_reset(void) {
@@ -451,10 +451,7 @@ static void serve(void) {
   }
   if (interrupts & USB_INT_SETUP_REQ)
     on_setup();
-  if (is_deaf())
-    start_over();
-  else
-    REG32_SET(USB_INTE) = SERVED;
+  REG32_SET(USB_INTE) = SERVED;
 }
 
 void usb_service_irq_handler(void) {

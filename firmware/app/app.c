@@ -190,7 +190,6 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
 #endif
     condition_frame(&app->condition, frame, gains, &app->conditioned);
   }
-  app->frame.doubtful |= app->rest.apart & frame->valid;
 #if FT_WITH_FIT
   port_at(CRASH_AT_FIT);
   uint64_t conditioned_us = port_now_us();
@@ -233,7 +232,9 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
   port_at(CRASH_AT_CONDITION);
   if (!frame->held) {
     condition_follow(&app->condition, frame, &app->conditioned);
-    rest_follow(&app->rest, frame, &app->conditioned);
+    if (rest_follow(&app->rest, frame, &app->conditioned)) {
+      readings_doubt(&app->scan.readings, app->rest.apart);
+    }
     watch_below(app);
   }
 }

@@ -26,7 +26,6 @@
 struct app {
   struct scan scan; /* shared with the event context under scan's own rules; the rest is main's */
   struct condition condition;
-  struct rest rest;
 #if FT_WITH_FIT
   struct fit_array fit_array;
   struct fit_settings fit_settings;
@@ -100,6 +99,8 @@ struct app {
   } noted;
 
   uint64_t loader_at_us; /* 0: no reboot is planned */
+
+  struct rest rest;
 };
 
 /* Starts the pipeline on this bus, which must outlive it. Attaches to USB. */

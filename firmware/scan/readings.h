@@ -72,8 +72,6 @@ struct readings {
   uint32_t strange;     /* bitmap: a temperature that is not near the others' is in use */
   uint32_t unproven;    /* bitmap: the PROM's CRC differs and the sensor has not read like others */
   uint32_t was_near;    /* bitmap: an unproven one did, at the last temperature */
-  uint32_t alike;       /* bitmap: has read the others' temperature since it came */
-  uint32_t was_alike;   /* bitmap: at the last temperature */
   uint32_t doubtful;    /* bitmap: used, and to be flagged */
   uint32_t has_last;    /* bitmap: last_Pa_q10 holds a reading */
   uint32_t counted;     /* bitmap: and was in the last frame */
@@ -86,6 +84,9 @@ struct readings {
   uint32_t reset_once;     /* bitmap: had one for that reason */
   uint32_t pardoned;       /* bitmap: and another one */
   uint32_t left_out;       /* since start: pressures below zero or that stepped alone */
+  uint32_t alike;          /* bitmap: has read the others' temperature since it came */
+  uint32_t was_alike;      /* bitmap: at the last temperature */
+  uint32_t apart;          /* bitmap: see readings_doubt() */
 };
 
 /* What a conversion of the temperature brought. */
@@ -107,6 +108,10 @@ enum readings_news {
 /* Returns a bitmap of readings_news. Cost: some 800 Cortex-M0+ cycles a sensor. */
 uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count,
                                    const struct readings_temperature *taken);
+
+/* These stand apart from the others at rest (condition/rest.h), and are doubtful until a call says
+ * otherwise. That takes effect with the next temperature; a new doubt does so at once. */
+void readings_doubt(struct readings *readings, uint32_t apart);
 
 /* Fills in pressures, valid, doubtful, unsettled, saturated, renewed and restored. code: [sensor];
  * good: bitmap. Returns whether it left any out: left_out and perhaps suspects have changed. Cost:

@@ -212,7 +212,7 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     readings->has_thermal |= bit;
   }
   readings->alike &= taken->admitted & ~taken->prom_changed;
-  readings->doubtful = taken->prom_bad | readings->doubted | readings->strange |
+  readings->doubtful = taken->prom_bad | readings->doubted | readings->strange | readings->apart |
                        compare(readings, sensor_count);
   average(readings, sensor_count, taken->admitted);
   if (!(news & READINGS_ASK_AGAIN)) {
@@ -223,4 +223,9 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     news = READINGS_MOVED;
   }
   return news;
+}
+
+void readings_doubt(struct readings *readings, uint32_t apart) {
+  readings->apart = apart;
+  readings->doubtful |= apart;
 }

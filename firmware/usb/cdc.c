@@ -53,6 +53,16 @@ static void add_news(void) {
   atomic_store_explicit(&news, count + 1, memory_order_release);
 }
 
+static __attribute__((noinline, cold)) size_t take_after_cut(void) {
+  const uint32_t length = ring_take(&transmit_ring, port.packet + CUT_MARK_BYTES,
+                                    USB_MAX_PACKET_BYTES - CUT_MARK_BYTES);
+  if (length == 0)
+    return 0;
+  memset(port.packet, 0, CUT_MARK_BYTES);
+  port.was_cut = false;
+  return length + CUT_MARK_BYTES;
+}
+
 /* The host gets what there is at once: it reads in transfers of several packets, which a packet
  * below the maximum ends, so when the ring runs dry after a full one an empty one follows. */
 static void transmit(void) {
@@ -60,15 +70,10 @@ static void transmit(void) {
       port.packet_state == PACKET_OFFERED || device_endpoint_is_halted(CDC_ENDPOINT_IN))
     return;
   if (port.packet_state == PACKET_NONE) {
-    const uint32_t mark = port.was_cut ? CUT_MARK_BYTES : 0;
-    size_t length = ring_take(&transmit_ring, port.packet + mark, USB_MAX_PACKET_BYTES - mark);
+    size_t length = port.was_cut ? take_after_cut()
+                                 : ring_take(&transmit_ring, port.packet, USB_MAX_PACKET_BYTES);
     if (length == 0 && !port.transfer_is_open)
       return;
-    if (length != 0 && port.was_cut) {
-      memset(port.packet, 0, mark);
-      length += mark;
-      port.was_cut = false;
-    }
     port.packet_bytes = length;
     port.transfer_is_open = length == USB_MAX_PACKET_BYTES;
   }

@@ -41,7 +41,7 @@ static void test_one_apart_is_known_from_the_first_frame_on(void) {
   next_frame(0);
   TEST_ASSERT_EQUAL_HEX32(1u << ODD, rest.apart);
   frame.pressure_Pa_q10[ODD] -= 2400 * 1024;
-  next_frame(250000);
+  next_frame(2000000);
   TEST_ASSERT_EQUAL_HEX32(1u << ODD, rest.apart);
 }
 
@@ -53,7 +53,7 @@ static void test_moulded_sensors_that_differ_by_kilopascals_are_not_apart(void) 
   next_frame(0);
   TEST_ASSERT_EQUAL_HEX32(0, rest.apart);
   frame.pressure_Pa_q10[ODD] += 10000 * 1024;
-  next_frame(250000);
+  next_frame(2000000);
   TEST_ASSERT_EQUAL_HEX32(1u << ODD, rest.apart);
 }
 
@@ -65,7 +65,7 @@ static void test_a_press_changes_nothing(void) {
   frame.pressure_Pa_q10[1] += 30000 * 1024;
   frame.saturated = 1;
   conditioned.usable = ALL & ~1;
-  next_frame(1000000);
+  next_frame(3000000);
   TEST_ASSERT_EQUAL_HEX32(1u << ODD, rest.apart);
 }
 
@@ -88,14 +88,6 @@ static void test_comparisons_are_rare_unless_others_are_used(void) {
   TEST_ASSERT_EQUAL_HEX32(1u << ODD, rest.apart);
 }
 
-static void test_a_sensor_that_went_is_forgotten(void) {
-  frame.pressure_Pa_q10[ODD] += 5000 * 1024;
-  next_frame(0);
-  frame.valid &= ~(1u << ODD);
-  next_frame(1000);
-  TEST_ASSERT_EQUAL_HEX32(0, rest.apart);
-}
-
 static void test_few_sensors_cannot_tell(void) {
   conditioned.usable = 7 << ODD;
   frame.pressure_Pa_q10[ODD] += 5000 * 1024;
@@ -111,7 +103,6 @@ int main(void) {
   RUN_TEST(test_a_press_changes_nothing);
   RUN_TEST(test_a_sensor_beyond_its_range_that_no_other_feels_is_no_press);
   RUN_TEST(test_comparisons_are_rare_unless_others_are_used);
-  RUN_TEST(test_a_sensor_that_went_is_forgotten);
   RUN_TEST(test_few_sensors_cannot_tell);
   return UNITY_END();
 }
