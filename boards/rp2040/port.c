@@ -25,8 +25,8 @@ static struct {
 
 static char serial_number[2 * FLASH_ID_BYTES + 1];
 
-/* From the start of SRAM up to __code_end: vectors, code and constants. Each region covers eighths of
- * its size, and the next one, of the size of an eighth, what is left. */
+/* From the start of SRAM up to __code_end: vectors, code and constants. Each region covers eighths
+ * of its size, and the next one, of the size of an eighth, what is left. */
 static void guard_code(void) {
   extern const uint32_t __image_start[], __code_end[];
   uint32_t at = (uint32_t)(uintptr_t)__image_start;
@@ -42,9 +42,9 @@ static void guard_code(void) {
   }
 }
 
-/* A stack that grows out of its bank, a null pointer, and a write to what does not change are faults
- * instead of silent damage. As pico-sdk's runtime_init_stack_guard.c, but for the whole bank. DMA
- * is not held back. */
+/* A stack that grows out of its bank, a null pointer, and a write to what does not change are
+ * faults instead of silent damage. As pico-sdk's runtime_init_stack_guard.c, but for the whole
+ * bank. DMA is not held back. */
 static void guard_memory(void) {
   extern const uint32_t __stack_guard[];
   MPU_RBAR = (uint32_t)(uintptr_t)__stack_guard | MPU_RBAR_REGION(0u);

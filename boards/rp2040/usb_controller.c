@@ -10,8 +10,8 @@
  * offered in the last 200 us of a frame, where such errors come from. It can still strike (TinyUSB
  * pull request 1779, embassy issue 2880), and then nothing but a reset of the block helps, not even
  * a bus reset. So the block is reset, and the device attached again, when the bus is silent and not
- * suspended, or when frames but no request follow a reset of the bus. A hung controller that goes on
- * seeing frames, under a host that resets nothing, is not noticed.
+ * suspended, or when frames but no request follow a reset of the bus. A hung controller that goes
+ * on seeing frames, under a host that resets nothing, is not noticed.
  *
  * How many resets come before the request says nothing. An EHCI controller sends no frame after its
  * own reset of a full-speed device; its companion then resets the device again (Linux, ehci-hub.c
@@ -49,8 +49,8 @@ enum { PIN_DP = 15, FEIGNED_MAX_ms = 5 };
  */
 #define WATCH_us 250000u
 #define SILENCE_us 1000000u
-/* From the first frame after a reset to the request. Linux takes 60 ms (hub.c hub_port_reset()), and
- * resets a device that is deaf several times before it gives up after about a second. */
+/* From the first frame after a reset to the request. Linux takes 60 ms (hub.c hub_port_reset()),
+ * and resets a device that is deaf several times before it gives up after about a second. */
 #define UNASKED_us 500000u
 /* Where no host is SILENCE_us rises by this factor. */
 #define PATIENCE_MAX 8u

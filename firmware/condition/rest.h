@@ -1,7 +1,7 @@
-/* A PROM whose CRC-4 is right by chance makes pressures that are wrong by up to 65 kPa, always by the
- * same. A tare hides that, but not the wrong sensitivity behind it. At rest all sensors of a pad
- * feel the same air: one that reads apart from the others (common/apart.h) is doubtful, from the
- * first frame after a tare on and for as long as it does so. So is one that was tared under a
+/* A PROM whose CRC-4 is right by chance makes pressures that are wrong by up to 65 kPa, always by
+ * the same. A tare hides that, but not the wrong sensitivity behind it. At rest all sensors of a
+ * pad feel the same air: one that reads apart from the others (common/apart.h) is doubtful, from
+ * the first frame after a tare on and for as long as it does so. So is one that was tared under a
  * press. */
 #ifndef CONDITION_REST_H
 #define CONDITION_REST_H

@@ -23,8 +23,8 @@
  * measured shortly before (condition.h). The same holds for a sensor whose pressure has stepped
  * alone, for example when it was reset for another's sake, or when it returns.
  *
- * A sensor whose temperature stands apart from the others' (common/apart.h) since it came is doubtful
- * until it has read like them twice in a row: its PROM may be wrong in spite of its CRC.
+ * A sensor whose temperature stands apart from the others' (common/apart.h) since it came is
+ * doubtful until it has read like them twice in a row: its PROM may be wrong in spite of its CRC.
  *
  * A sensor whose PROM has a wrong CRC is used, since one genuine part is known to have one. It is
  * doubtful. It must first have read like the others at two temperatures in a row. */

@@ -1,4 +1,5 @@
-/* A sensor that reads apart from the others at rest: from the first frame on, and never by a press. */
+/* A sensor that reads apart from the others at rest is known from the first frame on, and no press
+ * changes that. */
 #include "condition/rest.h"
 #include "unity.h"
 
