@@ -182,7 +182,7 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     prove(readings, sensor_count);
   }
 
-  int16_t now_cC[FT_MAX_SENSORS];
+  int16_t now_cC[FT_MAX_SENSORS] = {0};
   for (uint8_t k = 0; k < sensor_count; k++) {
     now_cC[k] = clamped_i16(ms58xx_first_order_cC(&taken->prom[k], taken->code[k]));
   }
