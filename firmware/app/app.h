@@ -100,7 +100,9 @@ struct app {
 
   uint64_t loader_at_us; /* 0: no reboot is planned */
 
+#if FT_WITH_FIT
   struct rest rest;
+#endif
 };
 
 /* Starts the pipeline on this bus, which must outlive it. Attaches to USB. */
