@@ -2,6 +2,7 @@
 
 #include "port/port.h"
 #include "rp2040/clocks_regs.h"
+#include "rp2040/pll.h"
 #include "rp2040/resets.h"
 #include "rp2040/watchdog_regs.h"
 
@@ -38,12 +39,9 @@ static void wait_for(uint32_t address, uint32_t bits) {
 }
 
 static void start_pll(uint32_t base, uint32_t feedback_divider, uint32_t post_dividers) {
-  REG32(base + PLL_CS) = 1; /* reference divider */
-  REG32(base + PLL_FBDIV_INT) = feedback_divider;
-  REG32_CLEAR(base + PLL_PWR) = PLL_PWR_PD | PLL_PWR_VCOPD;
+  pll_begin(base, feedback_divider);
   wait_for(base + PLL_CS, PLL_CS_LOCK);
-  REG32(base + PLL_PRIM) = post_dividers;
-  REG32_CLEAR(base + PLL_PWR) = PLL_PWR_POSTDIVPD;
+  pll_end(base, post_dividers);
 }
 
 void clocks_start(void) {
@@ -75,8 +73,8 @@ void clocks_start(void) {
 
   if (resets_release(RESETS_PLL_SYS | RESETS_PLL_USB) != FT_OK)
     clocks_reset_chip();
-  start_pll(PLL_SYS_BASE, 125, PLL_PRIM_POSTDIV1(6) | PLL_PRIM_POSTDIV2(2)); /* 1500 / 12 MHz */
-  start_pll(PLL_USB_BASE, 100, PLL_PRIM_POSTDIV1(5) | PLL_PRIM_POSTDIV2(5)); /* 1200 / 25 MHz */
+  start_pll(PLL_SYS_BASE, PLL_SYS_FEEDBACK, PLL_SYS_POST_DIVIDERS);
+  start_pll(PLL_USB_BASE, PLL_USB_FEEDBACK, PLL_USB_POST_DIVIDERS);
 
   REG32(CLK_REF_CTRL) = CLK_REF_SRC_XOSC;
   wait_for(CLK_REF_SELECTED, 1u << CLK_REF_SRC_XOSC);

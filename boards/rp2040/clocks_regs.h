@@ -51,5 +51,10 @@
 #define PLL_PRIM 0x0cu
 #define PLL_PRIM_POSTDIV1(n) ((uint32_t)(n) << 16)
 #define PLL_PRIM_POSTDIV2(n) ((uint32_t)(n) << 12)
+/* 1500 / 12 MHz and 1200 / 25 MHz, of a crystal of 12 MHz */
+#define PLL_SYS_FEEDBACK 125u
+#define PLL_SYS_POST_DIVIDERS (PLL_PRIM_POSTDIV1(6) | PLL_PRIM_POSTDIV2(2))
+#define PLL_USB_FEEDBACK 100u
+#define PLL_USB_POST_DIVIDERS (PLL_PRIM_POSTDIV1(5) | PLL_PRIM_POSTDIV2(5))
 
 #endif

@@ -3,6 +3,7 @@
 #include "common/crash.h"
 #include "common/crc32.h"
 #include "port/port.h"
+#include "rp2040/flash.h"
 #include "rp2040/nvic.h"
 #include "rp2040/resets.h"
 #include "rp2040/timer_regs.h"
@@ -121,7 +122,9 @@ _Noreturn void rp2040_take_crash(void) {
   kept.magic = RECORD_MAGIC;
   __asm volatile("dsb" ::: "memory");
 
-  if (record->kind != CRASH_WATCHDOG) {
+  if (flash_may_erase()) {
+    WATCHDOG_LOAD = 2 * (FLASH_ERASE_MAX_us + LAST_WORDS_us);
+  } else if (record->kind != CRASH_WATCHDOG) {
     PSM_WDSEL = PSM_WDSEL_ALL_BUT_OSCILLATORS;
     REG32_SET(WATCHDOG_CTRL) = WATCHDOG_CTRL_TRIGGER;
   }

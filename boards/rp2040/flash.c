@@ -24,8 +24,7 @@ _Static_assert(HEAD_BYTES + PORT_FLASH_READ_BYTES <= FIFO_FRAMES, "a reading is 
 /* Of a page that is written: 3.1 us with the head, so that no frame waits long. */
 enum { SLICE_BYTES = 12 };
 
-/* An erase takes 400 ms at most (datasheet 9.6). */
-#define BUSY_MAX_us 500000u
+#define BUSY_MAX_us (FLASH_ERASE_MAX_us + 100000u)
 
 /* The last two sectors of the 2 MiB; the linker script leaves them to the store. */
 #define STORE_AT (2u * 1024 * 1024 - PORT_FLASH_SECTORS * PORT_FLASH_SECTOR_BYTES)
@@ -50,6 +49,12 @@ static void deselect_chip(void) {
   REG32_CLEAR(IO_QSPI_SS_CTRL) = IO_QSPI_SS_CTRL_OUTOVER_MASK;
 }
 
+/* Ends what is under way, and empties the FIFOs (RP2040 datasheet 4.10.13, SSIENR). */
+static void restart_interface(void) {
+  SSI_SSIENR = 0;
+  SSI_SSIENR = 1;
+}
+
 /* At most FIFO_FRAMES bytes both ways. */
 static enum ft_status exchange(uint8_t *bytes, size_t count) {
   for (size_t i = 0; i < count; i++)
@@ -57,8 +62,10 @@ static enum ft_status exchange(uint8_t *bytes, size_t count) {
   int polls = 0;
   while ((SSI_RXFLR < count || (SSI_SR & SSI_SR_BUSY)) && polls < EXCHANGE_POLLS)
     polls++;
-  if (polls == EXCHANGE_POLLS)
+  if (polls == EXCHANGE_POLLS) {
+    restart_interface(); /* what comes late must not answer the next exchange */
     return FT_ERR_TIMEOUT;
+  }
   for (size_t i = 0; i < count; i++)
     bytes[i] = (uint8_t)SSI_DR0;
   return FT_OK;
@@ -118,13 +125,19 @@ void port_flash_program(uint32_t at, const uint8_t *bytes, size_t length) {
   begin(COMMAND_PAGE_PROGRAM, at, bytes, length);
 }
 
+bool flash_may_erase(void) {
+  return operation.phase != PHASE_IDLE && operation.head[0] == COMMAND_SECTOR_ERASE;
+}
+
+/* What goes wrong shows when it is read back: the rest of it is not sent. */
 static void send_slice(void) {
   uint8_t bytes[SLICE_BYTES];
   size_t count = 0;
   for (; count < sizeof bytes && operation.sent < operation.length; operation.sent++)
     bytes[count++] = operation.sent < HEAD_BYTES ? operation.head[operation.sent]
                                                  : operation.bytes[operation.sent - HEAD_BYTES];
-  exchange(bytes, count); /* what goes wrong shows when it is read back */
+  if (exchange(bytes, count) != FT_OK)
+    operation.sent = operation.length;
 }
 
 bool port_flash_poll(void) {

@@ -9,6 +9,7 @@
 
 #include "common/status.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 enum { FLASH_ID_BYTES = 8 };
@@ -20,5 +21,12 @@ enum ft_status flash_start(void);
 
 /* The unique id of the chip. Takes 4 us. FT_ERR_TIMEOUT. */
 enum ft_status flash_read_id(uint8_t id[FLASH_ID_BYTES]);
+
+/* An erase was begun and has not been seen to end: a reset of the RP2040, which does not reach the
+ * chip, had better wait for as long as one takes. The boot ROM tries to read the chip for 255 ms
+ * only if the ring oscillator is fast, and then stays in its USB loader (pico-bootrom,
+ * bootrom_main.c _flash_boot()). */
+#define FLASH_ERASE_MAX_us 400000u /* W25Q16JV datasheet 9.6 */
+bool flash_may_erase(void);
 
 #endif

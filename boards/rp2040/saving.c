@@ -1,6 +1,8 @@
 #include "port/port.h"
 #include "rp2040/clocks_regs.h"
 #include "rp2040/pico.h"
+#include "rp2040/pll.h"
+#include "rp2040/resets.h"
 
 /* At 12 MHz or more a poll takes 5 us at most; a PLL locks within 50 us. */
 enum { POLLS = 100000 };
@@ -21,11 +23,13 @@ static void wait_for(uint32_t address, uint32_t bits) {
 /* clk_usb and its PLL stay: the controller needs them to see the bus wake up, and may hang when the
  * PLL is started again below it (pico-sdk issue 1746). Else as MicroPython's machine.lightsleep():
  * the crystal drives clk_sys, and asleep nothing has a clock but what can end the sleep. The other
- * core sleeps in the boot ROM, deeply. */
+ * core sleeps in the boot ROM, deeply. Nobody has written down what the controller does with
+ * traffic while clk_sys is slower than its own 48 MHz. There is none: a host signals a resume for
+ * 20 ms and a reset for 10 (USB 2.0, 7.1.7), and clk_sys is fast again within 1. */
 static void begin_saving(void) {
   REG32_CLEAR(CLK_SYS_CTRL) = CLK_SYS_SRC_AUX;
   wait_for(CLK_SYS_SELECTED, 1u << CLK_SYS_SRC_REF);
-  REG32_SET(PLL_SYS_BASE + PLL_PWR) = PLL_PWR_PD | PLL_PWR_VCOPD | PLL_PWR_POSTDIVPD;
+  resets_assert(RESETS_PLL_SYS); /* which takes its power too, and its lock */
   CLOCKS_SLEEP_EN0 = SLEEP_EN0_PLL_USB;
   CLOCKS_SLEEP_EN1 = SLEEP_EN1_TIMER | SLEEP_EN1_USBCTRL | SLEEP_EN1_WATCHDOG;
   REG32(SCB_SCR) = SCB_SCR_SLEEPDEEP;
@@ -37,9 +41,11 @@ static void end_saving(void) {
   REG32(SCB_SCR) = 0;
   CLOCKS_SLEEP_EN0 = SLEEP_EN_ALL;
   CLOCKS_SLEEP_EN1 = SLEEP_EN_ALL;
-  REG32_CLEAR(PLL_SYS_BASE + PLL_PWR) = PLL_PWR_PD | PLL_PWR_VCOPD;
+  if (resets_release(RESETS_PLL_SYS) != FT_OK)
+    port_panic();
+  pll_begin(PLL_SYS_BASE, PLL_SYS_FEEDBACK);
   wait_for(PLL_SYS_BASE + PLL_CS, PLL_CS_LOCK);
-  REG32_CLEAR(PLL_SYS_BASE + PLL_PWR) = PLL_PWR_POSTDIVPD;
+  pll_end(PLL_SYS_BASE, PLL_SYS_POST_DIVIDERS);
   REG32_SET(CLK_SYS_CTRL) = CLK_SYS_SRC_AUX;
   wait_for(CLK_SYS_SELECTED, 1u << CLK_SYS_SRC_AUX);
 }

@@ -8,6 +8,7 @@
   .thumb
 
   .equ SCB_VTOR, 0xe000ed08
+  .equ MPU_CTRL, 0xe000ed94
   .equ STACK_PAINT, 0x5aa5c33c /* port.c counts it */
 
   .section .boot_vectors, "a"
@@ -23,6 +24,12 @@
   .type boot_reset, %function
 boot_reset:
   cpsid i
+
+  ldr r0, =MPU_CTRL /* a debugger may come here while code is read-only */
+  movs r1, #0
+  str r1, [r0]
+  dsb
+  isb
 
   ldr r0, =__stack_limit
   mov r1, sp

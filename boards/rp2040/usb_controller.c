@@ -10,8 +10,13 @@
  * offered in the last 200 us of a frame, where such errors come from. It can still strike (TinyUSB
  * pull request 1779, embassy issue 2880), and then nothing but a reset of the block helps, not even
  * a bus reset. So the block is reset, and the device attached again, when the bus is silent and not
- * suspended, or when resets of the bus are followed by no request. A hung controller that goes on
- * seeing frames, under a host that resets nothing, is not noticed.
+ * suspended, or when frames but no request follow a reset of the bus. A hung controller that goes
+ * on seeing frames, under a host that resets nothing, is not noticed.
+ *
+ * How many resets come before the request says nothing. An EHCI controller sends no frame after its
+ * own reset of a full-speed device; its companion then resets the device again (Linux, ehci-hub.c
+ * check_reset_complete()). And the erratum strikes a controller that answers, so one that has not
+ * yet heard a request since its block was reset waits for as long as the host takes.
  */
 #include "rp2040/usb_controller.h"
 
@@ -37,17 +42,17 @@ enum { PIN_DP = 15, FEIGNED_MAX_ms = 5 };
 #define FRAME_TAIL_END_us 998u
 
 /* A full packet and its handshake take 50 us on the bus. */
+#define PACKET_us 60u
 #define ABORT_LIMIT_us 200u
 
 /* How often the bus is looked at, and how long it may be silent: each millisecond a frame begins.
  */
 #define WATCH_us 250000u
 #define SILENCE_us 1000000u
-/* A host that enumerates follows a reset by a request. A reset lasts 10 ms or more (USB 2.0,
- * TDRST), so reports of it within 3 ms are of the same one. */
-#define UNASKED_RESETS 2u
-#define RESET_APART_us 3000u
-/* Where no host is the limits above rise by this factor. */
+/* From the first frame after a reset to the request. Linux takes 60 ms (hub.c hub_port_reset()),
+ * and resets a device that is deaf several times before it gives up after about a second. */
+#define UNASKED_us 500000u
+/* Where no host is SILENCE_us rises by this factor. */
 #define PATIENCE_MAX 8u
 /* Ample for a hub to notice, which debounces for 100 ms (USB 2.0, TATTDB). */
 #define DETACHED_us 100000u
@@ -76,9 +81,11 @@ static bool is_old; /* before revision B2 */
 static enum { WATCH, ATTACH, AWAIT_END_OF_RESET, FEIGN_IDLE } next;
 static uint32_t feigned_ms;
 static uint32_t alive_us; /* when last the bus was not silent, or was asleep */
-static uint32_t reset_us; /* the last reset of the bus */
-static uint32_t unasked_resets;
 static uint32_t patience = 1;
+/* What the host still owes: a first request to a block just reset, nothing, a frame or a request
+ * after a reset of the bus. */
+static enum { OWES_FIRST_REQUEST, OWES_NOTHING, OWES_FRAME, OWES_REQUEST } host_owes;
+static uint32_t asking_us; /* the first frame after the reset: OWES_REQUEST */
 
 /* The controller reads the control word in its own clock domain, so AVAILABLE is written once the
  * other fields are certain to have arrived there: datasheet 4.1.2.5.1. */
@@ -102,6 +109,10 @@ static bool in_frame_tail(void) {
 static void start_frame(void) {
   frame_began = false;
   alive_us = frame_start_us;
+  if (host_owes == OWES_FRAME) {
+    host_owes = OWES_REQUEST;
+    asking_us = frame_start_us;
+  }
   for (uint8_t number = 1; deferred && number < ENDPOINT_NUMBERS; number++) {
     uint8_t endpoint = USB_ENDPOINT_IN | number;
     if (deferred & USB_BIT(endpoint))
@@ -110,13 +121,18 @@ static void start_frame(void) {
   deferred = 0;
 }
 
-/* Stops the controller from touching the buffer. */
-static void begin_abort(uint32_t bit) {
+/* Stops the controller from touching the buffer. Where an abort cannot be used the buffer is no
+ * longer available, and a packet that was under way then gets the time to end. */
+static void begin_abort(uint8_t endpoint) {
+  uint32_t bit = USB_BIT(endpoint);
   if (is_old)
-    return;
-  REG32_SET(USB_EP_ABORT) = bit;
+    USB_BUFFER_CONTROL(endpoint) &= ~USB_BUFFER_AVAILABLE;
+  else
+    REG32_SET(USB_EP_ABORT) = bit;
+  uint32_t limit_us = is_old ? PACKET_us : ABORT_LIMIT_us;
   uint32_t start_us = TIMER_TIMERAWL;
-  while ((REG32(USB_EP_ABORT_DONE) & bit) == 0 && TIMER_TIMERAWL - start_us < ABORT_LIMIT_us) {
+  while ((is_old || (REG32(USB_EP_ABORT_DONE) & bit) == 0) &&
+         TIMER_TIMERAWL - start_us < limit_us) {
   }
 }
 
@@ -131,7 +147,8 @@ static void end_abort(uint32_t bits) {
 }
 
 /* What a control transfer that the host has abandoned left must not answer for the one that
- * follows: until on_setup() has taken it back, endpoint 0 answers with NAK. */
+ * follows: until on_setup() has taken it back, endpoint 0 answers with NAK. TinyUSB too aborts
+ * endpoint 0 at a SETUP (dcd_rp2040.c reset_ep0()), and waits for the end of it there and then. */
 static void silence_control(void) {
   if (is_old) {
     USB_BUFFER_CONTROL(USB_ENDPOINT_IN) &= ~USB_BUFFER_AVAILABLE;
@@ -150,7 +167,7 @@ bool usb_controller_withdraw(uint8_t endpoint) {
     deferred &= ~bit;
     return true;
   }
-  begin_abort(bit);
+  begin_abort(endpoint);
   bool done = REG32(USB_BUFF_STATUS) & bit; /* just before, and not yet seen here */
   REG32_CLEAR(USB_BUFF_STATUS) = bit;
   USB_BUFFER_CONTROL(endpoint) = 0;
@@ -283,23 +300,36 @@ static void start_over(void) {
   data1 = 0;
   suspended = false;
   frame_began = false;
-  unasked_resets = 0;
+  host_owes = OWES_FIRST_REQUEST;
   next = ATTACH;
   usb_device_on_bus_reset();
   look_in(DETACHED_us);
+}
+
+/* It sleeps, or the host holds a reset for longer than it needs: low at two looks in a row. */
+static bool bus_may_be_silent(void) {
+  static bool was_low;
+  uint32_t status = REG32(USB_SIE_STATUS);
+  bool is_low = (status & USB_SIE_STATUS_LINES) == 0;
+  bool stays_low = is_low && was_low;
+  was_low = is_low;
+  return (status & USB_SIE_STATUS_SUSPENDED) || stays_low;
+}
+
+static bool is_deaf(void) {
+  return host_owes == OWES_REQUEST && TIMER_TIMERAWL - asking_us >= UNASKED_us;
 }
 
 void timer1_irq_handler(void) {
   TIMER_INTR = TIMER_ALARM1_BIT;
   switch (next) {
   case WATCH:
-    if (REG32(USB_SIE_STATUS) & USB_SIE_STATUS_SUSPENDED)
+    if (bus_may_be_silent())
       alive_us = TIMER_TIMERAWL;
-    if (TIMER_TIMERAWL - alive_us >= patience * SILENCE_us)
+    if (is_deaf() || TIMER_TIMERAWL - alive_us >= patience * SILENCE_us)
       start_over();
     else
       watch();
-    rp2040_irq_pend(RP2040_IRQ_USB_SERVICE);
     break;
   case ATTACH:
     attach();
@@ -322,21 +352,23 @@ void timer1_irq_handler(void) {
     }
     break;
   }
-}
-
-static bool is_unasked_for(uint32_t now_us) {
-  unasked_resets += now_us - reset_us >= RESET_APART_us;
-  reset_us = now_us;
-  return unasked_resets >= UNASKED_RESETS * patience;
+  rp2040_irq_pend(RP2040_IRQ_USB_SERVICE);
 }
 
 static void on_bus_reset(void) {
   REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_BUS_RESET;
   USB_ADDR_ENDP = 0;
+  if (is_old) { /* nothing is under way that had to be waited for */
+    REG32_CLEAR(USB_BUFF_STATUS) = held;
+    held = 0;
+    deferred = 0;
+  }
   usb_controller_close_all();
   usb_controller_withdraw(USB_ENDPOINT_IN);
   usb_controller_withdraw(0);
   suspended = false;
+  if (host_owes == OWES_NOTHING)
+    host_owes = OWES_FRAME;
   usb_device_on_bus_reset();
   if (is_old && usb_controller_has_gpio15) {
     next = AWAIT_END_OF_RESET;
@@ -346,7 +378,7 @@ static void on_bus_reset(void) {
 
 static void on_setup(void) {
   REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_SETUP_REC;
-  unasked_resets = 0;
+  host_owes = OWES_NOTHING;
   patience = 1;
   uint8_t packet[USB_SETUP_BYTES];
   for (unsigned i = 0; i < sizeof packet; i++)
@@ -398,13 +430,8 @@ static void serve(void) {
     start_frame();
     interrupts |= USB_INT_DEV_SOF;
   }
-  if (interrupts & USB_INT_BUS_RESET) {
-    if (is_unasked_for(TIMER_TIMERAWL)) {
-      start_over();
-      return;
-    }
+  if (interrupts & USB_INT_BUS_RESET)
     on_bus_reset();
-  }
   if (interrupts & USB_INT_DEV_SUSPEND) {
     REG32_CLEAR(USB_SIE_STATUS) = USB_SIE_STATUS_SUSPENDED;
     set_suspended(REG32(USB_SIE_STATUS) & USB_SIE_STATUS_SUSPENDED);

@@ -69,6 +69,7 @@ void app_start(struct app *app, const struct array_bus *bus) {
   app->fit_settings.prior_width_mm = DEFAULT_PRIOR_WIDTH_mm;
   fit_set_errors(&app->fit_settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
   app->fit_settings.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
+  app->rest.apart_Pa = MS58XX_APART_Pa;
 #endif
 #if FT_WITH_SLIP
   app->contact_settings.slip_threshold_mm = DEFAULT_SLIP_THRESHOLD_mm;
@@ -231,6 +232,11 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
   port_at(CRASH_AT_CONDITION);
   if (!frame->held) {
     condition_follow(&app->condition, frame, &app->conditioned);
+#if FT_WITH_FIT
+    if (rest_follow(&app->rest, frame, &app->conditioned)) {
+      readings_doubt(&app->scan.readings, app->rest.apart);
+    }
+#endif
     watch_below(app);
   }
 }

@@ -9,6 +9,7 @@
 
 #include "array_bus/array_bus.h"
 #include "condition/condition.h"
+#include "condition/rest.h"
 #include "config/capabilities.h"
 #include "contact/contact.h"
 #include "contact/motion.h"
@@ -98,6 +99,10 @@ struct app {
   } noted;
 
   uint64_t loader_at_us; /* 0: no reboot is planned */
+
+#if FT_WITH_FIT
+  struct rest rest;
+#endif
 };
 
 /* Starts the pipeline on this bus, which must outlive it. Attaches to USB. */

@@ -6,6 +6,7 @@
  * in:
  *
  *   MAX_PRESSURE_Pa   readings above are flagged: beyond the range, or near it
+ *   APART_Pa          more than two sound parts differ by in the same air (condition/rest.h)
  *   STEP_Pa           no press moves one sensor alone by so much (scan/readings.h)
  *   SENS_T1, TCS      SENS = C1 * 2^SENS_T1 + C3 * dT / 2^TCS
  *   OFF_T1, TCO       OFF = C2 * 2^OFF_T1 + C4 * dT / 2^TCO
@@ -34,6 +35,7 @@
  * whose readings end right there does not pass by its noise. 8 kPa: a code with bit 18 wrong is 11
  * kPa off. */
 #define MS58XX_MAX_PRESSURE_Pa 198000
+#define MS58XX_APART_Pa 1000 /* recalled: a part is off by up to 4 mbar */
 #define MS58XX_STEP_Pa 8192
 #define MS58XX_SENS_T1 16
 #define MS58XX_TCS 7
@@ -58,6 +60,7 @@
  * that of OSR 8192 is twice the one before. Noise: 20 Pa at OSR 8192 by the data sheet, the others
  * are recalled. The sensor ends at 30 bar; a pressure in 1/1024 Pa ends at 20.97 bar in 32 bits. */
 #define MS58XX_MAX_PRESSURE_Pa 2000000
+#define MS58XX_APART_Pa 20000 /* recalled: up to 50 mbar below 6 bar */
 #define MS58XX_STEP_Pa 32768
 #define MS58XX_SENS_T1 15
 #define MS58XX_TCS 8

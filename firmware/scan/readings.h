@@ -23,6 +23,9 @@
  * measured shortly before (condition.h). The same holds for a sensor whose pressure has stepped
  * alone, for example when it was reset for another's sake, or when it returns.
  *
+ * A sensor whose temperature stands apart from the others' (common/apart.h) since it came is
+ * doubtful until it has read like them twice in a row: its PROM may be wrong in spite of its CRC.
+ *
  * A sensor whose PROM has a wrong CRC is used, since one genuine part is known to have one. It is
  * doubtful. It must first have read like the others at two temperatures in a row. */
 #ifndef SCAN_READINGS_H
@@ -39,6 +42,7 @@
 /* Sensors of one pad at rest: two parts of +-2 degC, and a warm object at one end. Further off,
  * a temperature must agree with a second one, no more. */
 #define READINGS_TEMPERATURE_NEAR_cC 500
+#define READINGS_TEMPERATURE_APART_cC 50
 /* Of one sensor, from one reading to the next. */
 #define READINGS_STEP_Pa_q10 (MS58XX_STEP_Pa * 1024)
 /* All others have moved by less: so many times the noise of a reading (two of them differ by 1.4 of
@@ -80,6 +84,9 @@ struct readings {
   uint32_t reset_once;     /* bitmap: had one for that reason */
   uint32_t pardoned;       /* bitmap: and another one */
   uint32_t left_out;       /* since start: pressures below zero or that stepped alone */
+  uint32_t alike;          /* bitmap: has read the others' temperature since it came */
+  uint32_t was_alike;      /* bitmap: at the last temperature */
+  uint32_t apart;          /* bitmap: see readings_doubt() */
 };
 
 /* What a conversion of the temperature brought. */
@@ -101,6 +108,10 @@ enum readings_news {
 /* Returns a bitmap of readings_news. Cost: some 800 Cortex-M0+ cycles a sensor. */
 uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count,
                                    const struct readings_temperature *taken);
+
+/* These stand apart from the others at rest (condition/rest.h), and are doubtful until a call says
+ * otherwise. That takes effect with the next temperature; a new doubt does so at once. */
+void readings_doubt(struct readings *readings, uint32_t apart);
 
 /* Fills in pressures, valid, doubtful, unsettled, saturated, renewed and restored. code: [sensor];
  * good: bitmap. Returns whether it left any out: left_out and perhaps suspects have changed. Cost:

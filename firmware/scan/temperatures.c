@@ -1,3 +1,4 @@
+#include "common/apart.h"
 #include "port/divide.h"
 #include "scan/readings.h"
 
@@ -19,19 +20,6 @@ static int16_t clamped_i16(int32_t value) {
   return (int16_t)(value > INT16_MAX ? INT16_MAX : value < INT16_MIN ? INT16_MIN : value);
 }
 
-/* Of count values, which are put in order. */
-static int32_t median_of(int32_t values[], int count) {
-  for (int i = 1; i < count; i++) {
-    int32_t value = values[i];
-    int at = i;
-    for (; at > 0 && values[at - 1] > value; at--) {
-      values[at] = values[at - 1];
-    }
-    values[at] = value;
-  }
-  return values[count / 2];
-}
-
 /* What the temperatures of the array say about one of them. */
 struct company {
   int32_t step_cC;   /* that the sensors made together */
@@ -50,7 +38,7 @@ static struct company keep_company(const struct readings *readings, uint8_t sens
     }
   }
   if (count >= VOTERS_MIN) {
-    company.step_cC = median_of(values, count);
+    company.step_cC = apart_median(values, count);
   }
   count = 0;
   for (uint8_t k = 0; k < sensor_count; k++) {
@@ -62,7 +50,7 @@ static struct company keep_company(const struct readings *readings, uint8_t sens
   }
   if (count >= VOTERS_MIN) {
     company.votes = true;
-    company.middle_cC = median_of(values, count);
+    company.middle_cC = apart_median(values, count);
   }
   return company;
 }
@@ -126,7 +114,7 @@ static void prove(struct readings *readings, uint8_t sensor_count) {
     }
   }
   uint32_t near = 0;
-  const int32_t middle = count > 0 ? median_of(values, count) : 0;
+  const int32_t middle = count > 0 ? apart_median(values, count) : 0;
   for (uint8_t k = 0; k < sensor_count; k++) {
     const uint32_t bit = readings->unproven & readings->has_last & (UINT32_C(1) << k);
     if (bit && within(last_Pa_q10[k] / 2 - middle, READINGS_APART_Pa_q10 / 2)) {
@@ -135,6 +123,24 @@ static void prove(struct readings *readings, uint8_t sensor_count) {
   }
   readings->unproven &= ~(near & readings->was_near);
   readings->was_near = near;
+}
+
+/* Returns the bitmap of those apart that have not read like the others yet. Later they may stand
+ * apart, as something warm may touch some. */
+static uint32_t compare(struct readings *readings, uint8_t sensor_count) {
+  if ((readings->has_thermal & ~readings->alike) == 0) {
+    return 0;
+  }
+  int32_t values[FT_MAX_SENSORS];
+  for (uint8_t k = 0; k < sensor_count; k++) {
+    values[k] = readings->thermal[k].first_order_cC;
+  }
+  const uint32_t apart =
+      apart_find(values, readings->has_thermal, sensor_count, READINGS_TEMPERATURE_APART_cC);
+  const uint32_t like = readings->has_thermal & ~apart;
+  readings->alike |= like & readings->was_alike;
+  readings->was_alike = like;
+  return apart & ~readings->alike;
 }
 
 static void average(struct readings *readings, uint8_t sensor_count, uint32_t admitted) {
@@ -176,7 +182,7 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     prove(readings, sensor_count);
   }
 
-  int16_t now_cC[FT_MAX_SENSORS];
+  int16_t now_cC[FT_MAX_SENSORS] = {0};
   for (uint8_t k = 0; k < sensor_count; k++) {
     now_cC[k] = clamped_i16(ms58xx_first_order_cC(&taken->prom[k], taken->code[k]));
   }
@@ -205,7 +211,9 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     readings->doubted &= ~bit;
     readings->has_thermal |= bit;
   }
-  readings->doubtful = taken->prom_bad | readings->doubted | readings->strange;
+  readings->alike &= taken->admitted & ~taken->prom_changed;
+  readings->doubtful = taken->prom_bad | readings->doubted | readings->strange | readings->apart |
+                       compare(readings, sensor_count);
   average(readings, sensor_count, taken->admitted);
   if (!(news & READINGS_ASK_AGAIN)) {
     readings->doubts_in_a_row = 0;
@@ -215,4 +223,9 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     news = READINGS_MOVED;
   }
   return news;
+}
+
+void readings_doubt(struct readings *readings, uint32_t apart) {
+  readings->apart = apart;
+  readings->doubtful |= apart;
 }

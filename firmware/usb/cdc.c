@@ -17,6 +17,7 @@ enum class_request {
 enum { LINE_CODING_BYTES = 7, CONTROL_LINE_DTR = 1, LOADER_BAUD = 1200 };
 
 enum { TRANSMIT_BYTES = 4096, RECEIVE_BYTES = 256 };
+enum { CUT_MARK_BYTES = 4 }; /* one would do, but whole words cost less */
 static _Alignas(4) uint8_t transmit_bytes[TRANSMIT_BYTES];
 static uint8_t receive_bytes[RECEIVE_BYTES];
 static struct ring transmit_ring = {.bytes = transmit_bytes, .size = TRANSMIT_BYTES};
@@ -42,6 +43,7 @@ static struct {
   size_t packet_bytes;
   enum packet_state packet_state;
   bool transfer_is_open; /* the last packet was full, so the host waits for more */
+  bool was_cut;          /* the host may have the beginning of what it will not get the end of */
 } port;
 
 static const uint8_t default_line_coding[LINE_CODING_BYTES] = {0x00, 0xc2, 0x01, 0x00, 0, 0, 8};
@@ -51,6 +53,16 @@ static void add_news(void) {
   atomic_store_explicit(&news, count + 1, memory_order_release);
 }
 
+static __attribute__((noinline, cold)) size_t take_after_cut(void) {
+  const uint32_t length = ring_take(&transmit_ring, port.packet + CUT_MARK_BYTES,
+                                    USB_MAX_PACKET_BYTES - CUT_MARK_BYTES);
+  if (length == 0)
+    return 0;
+  memset(port.packet, 0, CUT_MARK_BYTES);
+  port.was_cut = false;
+  return length + CUT_MARK_BYTES;
+}
+
 /* The host gets what there is at once: it reads in transfers of several packets, which a packet
  * below the maximum ends, so when the ring runs dry after a full one an empty one follows. */
 static void transmit(void) {
@@ -58,7 +70,8 @@ static void transmit(void) {
       port.packet_state == PACKET_OFFERED || device_endpoint_is_halted(CDC_ENDPOINT_IN))
     return;
   if (port.packet_state == PACKET_NONE) {
-    size_t length = ring_take(&transmit_ring, port.packet, USB_MAX_PACKET_BYTES);
+    size_t length = port.was_cut ? take_after_cut()
+                                 : ring_take(&transmit_ring, port.packet, USB_MAX_PACKET_BYTES);
     if (length == 0 && !port.transfer_is_open)
       return;
     port.packet_bytes = length;
@@ -78,6 +91,7 @@ static void accept_packet(void) {
 static void drop_stream(void) {
   port.packet_state = PACKET_NONE;
   port.transfer_is_open = false;
+  port.was_cut = true;
   ring_clear(&transmit_ring);
 }
 

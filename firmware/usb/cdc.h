@@ -47,6 +47,10 @@ uint32_t cdc_close_count(void);
  * closed are discarded at once. */
 enum ft_status cdc_write(const uint8_t *bytes, size_t length);
 
+/* The first bytes that are queued after an opening, or after the stream was cut in another way,
+ * follow zero bytes, four of them: whatever the host has got of the stream before ends there
+ * (PROTOCOL.md). Nothing is sent before, as a terminal that still echoes would send it back. */
+
 /* Takes what has arrived, at most capacity bytes; returns how many. */
 size_t cdc_read(uint8_t *bytes, size_t capacity);
 

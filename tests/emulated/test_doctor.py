@@ -49,13 +49,13 @@ class Doctor(unittest.TestCase):
         self.plugged_in = 0
         self.world = self.enterContext(World(TOOLS.support, TOOLS.node, self.folder))
 
-    def plug_in(self, board, faults=(), scenario=None):
+    def plug_in(self, board, faults=(), scenario=None, sensor="ms5840"):
         """An emulated fingertip; returns its port."""
         self.plugged_in += 1
         port, plan = self.folder / f"port-{self.plugged_in}", self.folder / "faults.json"
         plan.write_text(json.dumps([{"from_s": 0, **fault} for fault in faults]))
         self.world.emulator(port, "--board", board, "--image", pathlib.Path(TOOLS.boards) / board / f"fingertip-{board}.bin",
-                            "--scenario", scenario or self.at_rest, "--faults", plan, "--seconds", "3600", "--fast-enumeration")
+                            "--scenario", scenario or self.at_rest, "--sensor", sensor, "--faults", plan, "--seconds", "3600", "--fast-enumeration")
         return port
 
     def examine(self, port, *arguments, system="with_rule", seconds=2):
@@ -89,6 +89,11 @@ class Doctor(unittest.TestCase):
             for osr in (256, 8192):
                 self.world.tool("set", "--port", port, f"osr={osr}")
                 self.assertEqual(self.examine(port), [], (board, osr))
+
+    def test_sensors_that_are_not_those_of_the_image(self):
+        found = self.only(self.examine(self.plug_in(BOARDS[0], sensor="ms5837_30ba")), "sensors", "bad")
+        self.assertIn("5 kPa at rest", found["text"])
+        self.assertIn("not those of the firmware", found["text"])
 
     def function(self, board, name):
         """Its address."""

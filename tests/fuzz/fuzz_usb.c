@@ -23,6 +23,9 @@ struct queue {
   size_t length;
 };
 static struct queue to_host, to_device;
+/* What the host gets next begins with the mark of a cut: cdc.h. */
+static bool was_cut = true;
+enum { MARK_BYTES = 4 };
 /* Since the program began: where the device's rings stand. */
 static uint32_t ever_written, ever_received;
 static uint32_t close_count;
@@ -44,11 +47,16 @@ static void check_taken(struct queue *queue, const uint8_t *bytes, size_t length
   memmove(queue->bytes, queue->bytes + length, queue->length);
 }
 
+static void cut(void) {
+  to_host.length = 0;
+  was_cut = true;
+}
+
 /* What was on its way to the host ends with the port. */
 static void follow_closings(void) {
   uint32_t count = cdc_close_count();
   if (count != close_count) {
-    to_host.length = 0;
+    cut();
   }
   close_count = count;
 }
@@ -81,8 +89,11 @@ static size_t device_reads(size_t capacity) {
 static int host_reads(uint8_t endpoint) {
   uint8_t packet[64];
   int length = host_in(endpoint, packet);
-  if (endpoint == BULK_IN && length >= 0) {
-    check_taken(&to_host, packet, (size_t)length);
+  if (endpoint == BULK_IN && length > 0) {
+    const size_t mark = was_cut ? MARK_BYTES : 0;
+    FUZZ_CHECK((size_t)length > mark && memcmp(packet, "\0\0\0\0", mark) == 0);
+    check_taken(&to_host, packet + mark, (size_t)length - mark);
+    was_cut = false;
   }
   return length;
 }
@@ -133,7 +144,7 @@ static void check_is_alive(void) {
   while (device_reads(RECEIVE_BYTES) > 0) {
   }
   FUZZ_CHECK(device_writes(100) == FT_OK);
-  FUZZ_CHECK(host_reads(BULK_IN) == 64 && host_reads(BULK_IN) == 36 &&
+  FUZZ_CHECK(host_reads(BULK_IN) == 64 && host_reads(BULK_IN) == 36 + MARK_BYTES &&
              host_reads(BULK_IN) == HOST_NAK);
   for (int i = 0; i < 5; i++) {
     FUZZ_CHECK(host_writes(BULK_OUT, 64) == (i < 4 ? 0 : HOST_NAK));
@@ -179,7 +190,7 @@ static void begin_transfer(const struct setup *setup) {
   host_setup(setup->type, setup->request, setup->value, setup->index, setup->length);
   bool obeyed = fake_accepts(CONTROL_IN);
   if (obeyed && setup->type == 0x01 && setup->request == 11 && setup->index == 1) {
-    to_host.length = 0;
+    cut();
   }
 }
 

@@ -16,11 +16,12 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 import analysis  # noqa: E402
 import fuzzing  # noqa: E402
 import same_bits  # noqa: E402
+import silicon  # noqa: E402
 import soaking  # noqa: E402
 from fingertip.files import run_tool  # noqa: E402
 from reporting import report_of_parts  # noqa: E402
 
-PARTS = (same_bits, fuzzing, soaking, analysis)
+PARTS = (same_bits, silicon, fuzzing, soaking, analysis)
 
 
 def main(argv):

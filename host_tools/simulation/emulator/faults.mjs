@@ -5,6 +5,7 @@
  *
  *     sensor_dead (sensor)          acknowledges nothing
  *     sensor_prom_corrupt (sensor)  PROM words read back with flipped bits
+ *     sensor_prom_collision (sensor)  two to four bits of C1 to C6 read back inverted, always the same, such that the CRC-4 is right
  *     sensor_prom_bit (sensor)      bit 10 of C1 reads back inverted: some 7 kPa
  *     sensor_adc_zero (sensor)      every ADC read gives 0
  *     sensor_nack (sensor)          does not acknowledge its address, once, the first time from from_s on
@@ -43,6 +44,7 @@ import { InputError, inWords } from './errors.mjs';
 const TARGET = {
   sensor_dead: 'sensor',
   sensor_prom_corrupt: 'sensor',
+  sensor_prom_collision: 'sensor',
   sensor_prom_bit: 'sensor',
   sensor_adc_zero: 'sensor',
   sensor_nack: 'sensor',
@@ -141,7 +143,7 @@ export class Faults {
   add(fault) {
     const { scope, on } = this;
     const key = {
-      sensor_dead: 'dead', sensor_prom_corrupt: 'promCorrupt', sensor_prom_bit: 'promBit', sensor_adc_zero: 'adcZero',
+      sensor_dead: 'dead', sensor_prom_corrupt: 'promCorrupt', sensor_prom_collision: 'promCollision', sensor_prom_bit: 'promBit', sensor_adc_zero: 'adcZero',
       sensor_d2_corrupt: 'd2Corrupt', sensor_noisy: 'noisy', sensor_fast: 'fast',
     };
     /** How many have begun. */

@@ -24,12 +24,12 @@ export class Machine {
   /**
    * @param options image: Uint8Array; Board; scenario; seed; faults: parsed list; flash: 2 MiB of content, beside the
    *   image, from an earlier life; flashSpeed: see BUSY_NS; serial: 16 hex digits; clock_ppm: by how
-   *   much the chip's clocks are fast; revision, uptime_us: of the chip, see Chip; fastEnumeration; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes);
+   *   much the chip's clocks are fast; revision, uptime_us, rosc_hz: of the chip, see Chip; fastEnumeration, companion: of the host, see UsbHost; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes);
    *   sensor, rise_ns, onLevels: see the boards; makeClient({ host, report, onData }): what uses the USB device, CdcClient by
    *   default
    */
   constructor({
-    image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, clock_ppm = 0, fastEnumeration = false, allowWatchdog = false, revision, uptime_us,
+    image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, clock_ppm = 0, fastEnumeration = false, companion = false, allowWatchdog = false, revision, uptime_us, rosc_hz,
     flash = null, flashSpeed, sensor, rise_ns, onLevels, onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {}, makeClient = (parts) => new CdcClient(parts),
   }) {
     this.image = image;
@@ -39,6 +39,7 @@ export class Machine {
     this.allowWatchdog = allowWatchdog;
     this.revision = revision;
     this.uptime_us = uptime_us;
+    this.rosc_hz = rosc_hz;
     this.serial = Uint8Array.from(serial.match(/../g).map((h) => parseInt(h, 16)));
     this.time = new SimulatedTime();
     this.scope = this.time.scope();
@@ -59,7 +60,7 @@ export class Machine {
     this.trouble = new Trouble();
     this.boardScope = this.time.scope();
     this.board = this.makeBoard();
-    this.host = new UsbHost({ scope: this.scope, report: this.report, fast: fastEnumeration, onPacket: onUsbPacket });
+    this.host = new UsbHost({ scope: this.scope, report: this.report, fast: fastEnumeration, companion, onPacket: onUsbPacket });
     this.client = makeClient({ host: this.host, report: this.report, onData });
     const onBoard = (type) => [type, (target, active) => this.board.faultActions[type](target, active)];
     this.faults = new Faults(faults, this.scope, {
@@ -99,7 +100,7 @@ export class Machine {
   }
 
   #powerUp(kept) {
-    this.chip = new Chip(this.time, this.report, { serial: this.serial, seed: this.seed, clock_ppm: this.clock_ppm, revision: this.revision, uptime_us: this.uptime_us, memory: this.memory, trouble: this.trouble, kept });
+    this.chip = new Chip(this.time, this.report, { serial: this.serial, seed: this.seed, clock_ppm: this.clock_ppm, revision: this.revision, uptime_us: this.uptime_us, rosc_hz: this.rosc_hz, memory: this.memory, trouble: this.trouble, kept });
     this.chip.load(this.image);
     this.board.attachChip(this.chip);
     this.host.connect(this.chip.usbCtrl);

@@ -45,6 +45,11 @@ constexpr std::pair<unsigned, double> TEMPERATURE_NOISE_degC[] = {MS58XX_OSR_TAB
 constexpr double DRIFT_SECONDS_MIN = 8;
 /* Readings of sound sensors under cast rubber differ by less: readings.h. */
 constexpr double APART_MAX_Pa = 20000;
+/* Of air, from the highest mountain to the deepest mine. */
+constexpr double AIR_MIN_Pa = 30000, AIR_MAX_Pa = 115000;
+/* The formulas of the family differ by powers of two and by what a count is (sensors.h): those of
+ * one sensor make so many times the pressure from another's codes, or that part of it. */
+constexpr double OF_ANOTHER_TYPE = 20;
 /* The stack's bank has 4 KiB, and its worst case by the call graph is below 2 (tests/checks). */
 constexpr unsigned STACK_FREE_MIN_bytes = 2048;
 constexpr unsigned BUSY_MAX_permille = 950;
@@ -280,7 +285,13 @@ private:
   void sensors() {
     std::size_t before = findings_.size();
     missing_sensors();
-    if (facts_.rest) {
+    if (facts_.rest && are_of_another_type()) {
+      add(Verdict::bad, "sensors",
+          "they read " + fixed(middle_Pa() / 1000, 0) +
+              " kPa at rest, as sensors do that are not those of the firmware",
+          "install firmware that was built for them (cmake -DFINGERTIP_SENSOR=...), or the sensors "
+          "that this one is for");
+    } else if (facts_.rest) {
       for (unsigned k = 0; k < facts_.rest->sensors.size(); k++) {
         if (!(missing_ >> k & 1u)) {
           doubtful_sensor(k, facts_.rest->sensors[k]);
@@ -304,8 +315,9 @@ private:
           "release the pad; if it stays, replace it", {k});
     } else if (sensor.doubtful_share > DOUBTFUL_SHARE_MAX && !memory_bad) {
       add(Verdict::warn, "sensors",
-          named(k) + " has a temperature that fits neither its own before nor the others'",
-          check_of(k), {k});
+          named(k) + " stands apart from the others: its pressure at rest, or a temperature that "
+                     "fits neither its own before nor theirs",
+          check_of(k) + "; if it stays, replace it", {k});
     }
     double apart_Pa = sensor.mean_Pa - middle_Pa();
     if (sensor.readings > 0 && std::abs(apart_Pa) > APART_MAX_Pa) {
@@ -313,6 +325,14 @@ private:
           named(k) + " reads " + fixed(apart_Pa / 1000, 0) + " kPa apart from the others",
           "release the pad; if it stays, rubber presses on it or it is damaged", {k});
     }
+  }
+
+  bool are_of_another_type() const {
+    const double middle = middle_Pa();
+    auto is_air = [](double pressure_Pa) {
+      return pressure_Pa >= AIR_MIN_Pa && pressure_Pa <= AIR_MAX_Pa;
+    };
+    return is_air(middle * OF_ANOTHER_TYPE) || is_air(middle / OF_ANOTHER_TYPE);
   }
 
   double middle_Pa() const {

@@ -79,7 +79,22 @@ for (const [what, base, log2, at] of [['in SRAM', '0x20020000', 12, '0x20020101'
   });
 }
 
-failsWith('MPU with subregions', main('REG(0xe000ed9c) = 0x20020010; REG(0xe000eda0) = 1 << 28 | 0xff00 | 11 << 1 | 1;'), /only whole regions/);
+/** Of SRAM: 256 KiB but its last six eighths, and of the eighth that follows the first. */
+const READ_ONLY = `REG(0xe000ed9c) = 0x20000000 | 16 | 0; REG(0xe000eda0) = 6 << 24 | 1 << 17 | 0xfc00 | 17 << 1 | 1;
+  REG(0xe000ed9c) = 0x20010000 | 16 | 1; REG(0xe000eda0) = 6 << 24 | 1 << 17 | 0xfe00 | 14 << 1 | 1; REG(0xe000ed94) = 5;`;
+
+for (const [at, last] of [['0x20010ffc', 1], ['0x20008000', 1], ['0x20011000', 2]]) {
+  test(`a write to ${at}, where memory is read-only up to 0x20011000, ${last === 1 ? 'faults' : 'does not'}; reading does not`, () => {
+    const { results } = run(`void isr(void) { RESULT(1) = REG(${at}); done(); }
+      void main(void) { REG(${at}) = 7; RESULT(1) = 1; ${READ_ONLY} RESULT(0) = REG(${at}); REG(${at}) = 8; RESULT(1) = 2; done(); }`);
+    assert.deepEqual(results.slice(0, 2), [7, last === 1 ? 7 : 2]);
+  });
+}
+
+const region = (attributes) => main(`REG(0xe000ed9c) = 0x20020010; REG(0xe000eda0) = ${attributes} | 11 << 1 | 1; REG(0xe000ed94) = 5;`);
+failsWith('MPU with parts of a region without access', region('1 << 28 | 0xff00'), /whole without any access/);
+failsWith('MPU with read-only memory elsewhere', region('6 << 24 | 1 << 17'), /from the start of SRAM/);
+failsWith('MPU with code in strongly ordered memory', region('6 << 24'), /nothing executes/);
 
 test('before its clocks the watchdog counts ticks of the ring oscillator', () => {
   const { machine } = run(`void main(void) { SET(0x4000c000) = 1 << 21; REG(0x40010008) = 0x1fffc; REG(0x4005802c) = 0x200 | 12;
@@ -281,6 +296,12 @@ failsWith('peripheral held in reset', main('REG(0x40044000) = 0x65;'), /while I2
 failsWith('USB memory held in reset', main('REG(0x50100000) = 0;'), /while USBCTRL is held in reset/);
 failsWith('timer read without a tick', main('(void)now_us();'), /no tick runs/);
 failsWith('PLL before the crystal is stable', main('unreset(1 << 12); REG(0x40028008) = 125; CLR(0x40028004) = 33;'), /before the crystal oscillator was stable/);
+const restartPll = (reset) => main(`start_clocks(); REG(0x4000803c) = 0; SET(0x40028004) = 45; ${reset} REG(0x40028008) = 125; REG(0x4002800c) = 6 << 16 | 2 << 12;
+  CLR(0x40028004) = 33; while (!(REG(0x40028000) & 0x80000000)) { } CLR(0x40028004) = 8; done();`);
+failsWith('PLL started again that still says it is locked', restartPll(''), /before the PLL locked/);
+test('a reset of its block takes the lock of a PLL', () => {
+  assert.ok(run(restartPll('SET(0x4000c000) = 1 << 12; unreset(1 << 12);')).finished);
+});
 failsWith('clk_sys from a dead PLL', main('REG(0x4000803c) = 1;'), /clk_sys switched to a source that does not run/);
 failsWith('wrong tick divider', main('start_clocks(); REG(0x4005802c) = 0x200 | 10;'), /must be 1 MHz/);
 failsWith('WFI with no interrupt enabled', main('__asm volatile("wfi");'), /firmware hung/);

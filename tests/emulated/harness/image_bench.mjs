@@ -94,11 +94,16 @@ export class ImageBench {
     return Object.fromEntries(line.split(' ').slice(3).map((pair) => pair.split('=')).map(([key, value]) => [key, Number(value)]));
   }
 
+  /** The last frame of the recording, by column. */
+  lastRow() {
+    const rows = this.recording().filter((l) => !l.startsWith('#'));
+    const values = rows.at(-1).split(',');
+    return Object.fromEntries(rows[0].split(',').map((name, i) => [name, Number(values[i])]));
+  }
+
   /** Flags of the last frame. */
   flags() {
-    const lines = this.recording();
-    const column = lines.find((l) => !l.startsWith('#')).split(',').indexOf('flags');
-    return Number(lines.findLast((l) => !l.startsWith('#')).split(',')[column]);
+    return this.lastRow().flags;
   }
 
   end() {

@@ -215,6 +215,22 @@ TEST(Judge, DoubtfulSaturatedAndApart) {
   EXPECT_TRUE(contains(only(facts, Verdict::warn, "sensors").text, "-25 kPa apart"));
 }
 
+TEST(Judge, SensorsOfAnotherType) {
+  for (double factor : {0.05, 20.0}) {
+    Facts facts = good();
+    for (SensorAtRest &sensor : facts.rest->sensors) {
+      sensor.mean_Pa *= factor;
+      sensor.saturated_share = factor > 1 ? 1 : 0;
+    }
+    EXPECT_TRUE(contains(only(facts, Verdict::bad, "sensors").text, "not those of the firmware"));
+  }
+  Facts pressed = good();
+  for (SensorAtRest &sensor : pressed.rest->sensors) {
+    sensor.mean_Pa *= 5;
+  }
+  EXPECT_TRUE(wrong(pressed).empty());
+}
+
 TEST(Judge, BadCalibrationMemory) {
   Facts facts = good();
   facts.after->sensors_prom_bad = 1u << 3;

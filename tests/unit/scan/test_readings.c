@@ -411,6 +411,31 @@ static void test_a_first_temperature_far_from_the_others_is_believed_after_two_r
   TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
 }
 
+static void look_again(double warmer_degC, uint32_t doubtful) {
+  warm_by(ONE, warmer_degC);
+  take_temperature();
+  take_pressures(ALL);
+  expect(ALL, 0);
+  TEST_ASSERT_EQUAL_HEX32(doubtful, frame.doubtful);
+}
+
+/* Until it has been like the others twice in a row. */
+static void test_a_temperature_apart_from_the_start_is_doubtful(void) {
+  look_again(3.0, ONE_BIT);
+  look_again(-0.6, ONE_BIT);
+  look_again(0, ONE_BIT);
+  look_again(-0.7, ONE_BIT);
+  look_again(-0.9, 0);
+  look_again(0.95, ONE_BIT);
+  look_again(-0.9, 0);
+  look_again(0, 0);
+  look_again(0.9, 0); /* something warm touches it */
+  temperature.returned = ALL;
+  look_again(0, 0);
+  temperature.prom_changed = ONE_BIT;
+  look_again(0, ONE_BIT);
+}
+
 static void test_a_temperature_at_which_no_sensor_works_is_never_used(void) {
   warm_by(ONE, 90);
   for (int i = 0; i < 10; i++) {
@@ -519,6 +544,7 @@ int main(void) {
   RUN_TEST(test_a_step_of_all_temperatures_counts_at_once);
   RUN_TEST(test_doubt_for_ever_is_not_asked_about_for_ever);
   RUN_TEST(test_a_first_temperature_far_from_the_others_is_believed_after_two_resets);
+  RUN_TEST(test_a_temperature_apart_from_the_start_is_doubtful);
   RUN_TEST(test_a_temperature_at_which_no_sensor_works_is_never_used);
   RUN_TEST(test_one_and_two_sensors_have_nobody_to_ask);
   RUN_TEST(test_no_wrong_pressure_goes_out_as_good_while_temperatures_are_corrupted);

@@ -2,8 +2,10 @@
 
 #include "common/bytes.h"
 #include "fake_controller.h"
+#include "port/usb_controller.h"
 #include "unity.h"
 #include "usb/cdc.h"
+#include "usb/descriptors.h"
 
 static const struct cdc_identity IDENTITY = {
     .vendor_id = 0x1209,
@@ -33,6 +35,14 @@ void enumerate(void) {
 
 void set_dtr(int on) {
   TEST_ASSERT_EQUAL(0, host_control_out(0x21, 0x22, on ? 3 : 0, 0, NULL, 0));
+}
+
+void open_port(void) {
+  uint8_t packet[USB_MAX_PACKET_BYTES];
+  set_dtr(1);
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"open", 4));
+  TEST_ASSERT_EQUAL(8, host_in(CDC_ENDPOINT_IN, packet));
+  TEST_ASSERT_EQUAL_MEMORY("\0\0\0\0open", packet, 8);
 }
 
 void set_baud(uint32_t baud) {

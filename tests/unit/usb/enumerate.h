@@ -11,6 +11,10 @@ void plug_in(void);
 void enumerate(void);
 
 void set_dtr(int on);
+
+/* Raises DTR, and reads what comes first after that. */
+void open_port(void);
+
 void set_baud(uint32_t baud);
 
 #endif

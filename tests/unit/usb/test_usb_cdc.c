@@ -43,7 +43,7 @@ static int read_transfer(uint8_t *to, int *so_far) {
 
 /* Whatever is written arrives at once, whole, whatever its length. */
 static void test_every_length_arrives_without_waiting_for_more(void) {
-  set_dtr(1);
+  open_port();
   for (size_t length = 1; length <= 300; length++) {
     TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes + length, length));
     size_t total = 0;
@@ -57,7 +57,7 @@ static void test_every_length_arrives_without_waiting_for_more(void) {
 }
 
 static void test_packets_of_a_write(void) {
-  set_dtr(1);
+  open_port();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 80));
   TEST_ASSERT_EQUAL(64, host_in(0x82, packet));
   TEST_ASSERT_EQUAL(16, host_in(0x82, packet));
@@ -74,7 +74,7 @@ static void test_packets_of_a_write(void) {
 }
 
 static void test_write_takes_all_or_nothing(void) {
-  set_dtr(1);
+  open_port();
   TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, cdc_write(bytes, QUEUE_BYTES + 1));
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, QUEUE_BYTES - 100));
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes + QUEUE_BYTES - 100, 164)); /* 64 are on their way */
@@ -94,7 +94,7 @@ static void test_write_takes_all_or_nothing(void) {
 
 /* Random writes and reads: the stream that comes out is the stream that went in. */
 static void test_stream_keeps_order_and_loses_nothing(void) {
-  set_dtr(1);
+  open_port();
   uint32_t random = 1;
   uint32_t written = 0;
   uint32_t read = 0;
@@ -130,7 +130,7 @@ static void test_closed_port_swallows_writes(void) {
 }
 
 static void test_close_discards_what_waits(void) {
-  set_dtr(1);
+  open_port();
   uint32_t closes = cdc_close_count();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 64));
   set_dtr(0);
@@ -142,9 +142,27 @@ static void test_close_discards_what_waits(void) {
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 0));
   TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
   TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"new", 3));
-  TEST_ASSERT_EQUAL(3, host_in(0x82, packet));
-  TEST_ASSERT_EQUAL_MEMORY("new", packet, 3);
+  TEST_ASSERT_EQUAL(7, host_in(0x82, packet));
+  TEST_ASSERT_EQUAL_MEMORY("\0\0\0\0new", packet, 7);
   TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
+}
+
+/* Once, and before the first bytes only: a terminal that still echoes gets nothing to send back. */
+static void test_what_follows_a_cut_is_set_apart_from_what_came_before(void) {
+  set_dtr(1);
+  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
+  TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 100));
+  TEST_ASSERT_EQUAL(64, host_in(0x82, packet));
+  TEST_ASSERT_EQUAL_MEMORY("\0\0\0\0", packet, 4);
+  TEST_ASSERT_EQUAL_MEMORY(bytes, packet + 4, 60);
+  host_suspend();
+  host_resume();
+  TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
+  for (int i = 0; i < 2; i++) {
+    TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"more", 4));
+    TEST_ASSERT_EQUAL(i == 0 ? 8 : 4, host_in(0x82, packet));
+    TEST_ASSERT_EQUAL_MEMORY(i == 0 ? "\0\0\0\0more" : "more", packet, i == 0 ? 8 : 4);
+  }
 }
 
 /* The port closes between the look at it and the queueing: the bytes must not greet the next one.
@@ -183,7 +201,7 @@ static void test_suspended_port_is_closed(void) {
 }
 
 static void test_halt_keeps_the_packet_that_the_host_has_not_got(void) {
-  set_dtr(1);
+  open_port();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 80));
   TEST_ASSERT_EQUAL(0, host_control_out(0x02, 3, 0, 0x82, NULL, 0));
   TEST_ASSERT_EQUAL(HOST_STALL, host_in(0x82, packet));
@@ -197,7 +215,7 @@ static void test_halt_keeps_the_packet_that_the_host_has_not_got(void) {
 }
 
 static void test_halt_does_not_repeat_a_packet_that_the_host_has_got(void) {
-  set_dtr(1);
+  open_port();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write(bytes, 80));
   fake_take_at_next_withdrawal();
   TEST_ASSERT_EQUAL(0, host_control_out(0x02, 1, 0, 0x82, NULL, 0));
@@ -293,6 +311,7 @@ int main(void) {
   RUN_TEST(test_stream_keeps_order_and_loses_nothing);
   RUN_TEST(test_closed_port_swallows_writes);
   RUN_TEST(test_close_discards_what_waits);
+  RUN_TEST(test_what_follows_a_cut_is_set_apart_from_what_came_before);
   RUN_TEST(test_write_overtaken_by_close);
   RUN_TEST(test_suspended_port_is_closed);
   RUN_TEST(test_halt_keeps_the_packet_that_the_host_has_not_got);

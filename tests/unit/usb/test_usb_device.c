@@ -272,7 +272,7 @@ static void test_status_and_interface_questions(void) {
 static void test_halted_endpoint_stalls_until_cleared_and_starts_at_data0(void) {
   static const uint8_t all[] = {0x81, 0x82, 0x02};
   enumerate();
-  set_dtr(1);
+  open_port();
   TEST_ASSERT_EQUAL(0, host_out(0x02, "a", 1)); /* leaves DATA1 */
   TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"b", 1));
   TEST_ASSERT_EQUAL(1, host_in(0x82, answer));
@@ -302,7 +302,7 @@ static void test_configuration_ends_halts(void) {
   host_reset_toggles();
   TEST_ASSERT_EQUAL(2, host_control_in(0x82, GET_STATUS, 0, 0x82, 2, answer));
   TEST_ASSERT_EQUAL_HEX8_ARRAY("\0\0", answer, 2);
-  set_dtr(1);
+  open_port();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"x", 1));
   TEST_ASSERT_EQUAL(1, host_in(0x82, answer));
 }
@@ -328,14 +328,14 @@ static void test_configuration_may_be_set_again_and_again(void) {
 
 static void test_interface_set_empties_the_data_endpoints(void) {
   enumerate();
-  set_dtr(1);
+  open_port();
   TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"old", 3));
   TEST_ASSERT_EQUAL(0, host_control_out(0x01, SET_INTERFACE, 0, 1, NULL, 0));
   host_reset_toggles();
   TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, answer));
   TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"new", 3));
-  TEST_ASSERT_EQUAL(3, host_in(0x82, answer));
-  TEST_ASSERT_EQUAL_MEMORY("new", answer, 3);
+  TEST_ASSERT_EQUAL(7, host_in(0x82, answer));
+  TEST_ASSERT_EQUAL_MEMORY("\0\0\0\0new", answer, 7);
   TEST_ASSERT_EQUAL(0, host_out(0x02, "in", 2));
   TEST_ASSERT_EQUAL(FT_OK, cdc_write((const uint8_t *)"kept", 4));
   TEST_ASSERT_EQUAL(0, host_control_out(0x01, SET_INTERFACE, 0, 0, NULL, 0));

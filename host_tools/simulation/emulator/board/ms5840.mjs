@@ -9,6 +9,7 @@
  * pressure and temperature in the middle of the conversion, plus Gaussian noise of the datasheet's rms.
  */
 import { InputError } from '../errors.mjs';
+import { Prng } from '../prng.mjs';
 import { I2cTarget } from './i2c_bus.mjs';
 
 export const ADDRESS = 0x76;
@@ -94,6 +95,16 @@ export function makeProm(prng, kind = MS5840) {
   return words;
 }
 
+/** The same but for two to four bits of C1 to C6, with a CRC-4 that is right by chance. */
+export function collide(prng, words) {
+  for (;;) {
+    const others = [...words];
+    const flips = 2 + Math.floor(prng.range(0, 3));
+    for (let i = 0; i < flips; i++) others[1 + Math.floor(prng.range(0, 6))] ^= 1 << Math.floor(prng.range(0, 16));
+    if (others.some((word, i) => word !== words[i]) && crc4(others) === others[0] >> 12) return others;
+  }
+}
+
 /** OFF and SENS at a difference from the reference temperature. */
 function lineOf(words, dT, { sens, off, secondOrder }) {
   const second = secondOrder(dT, 2000 + (dT * words[6]) / 2 ** 23);
@@ -134,7 +145,7 @@ export class Ms5840 extends I2cTarget {
   /**
    * @param options index; prng: this sensor's own; now_ns: () => time; report: Report;
    *   stimulus: (index, t_ns) => { pressure_Pa, temperature_degC }, absolute;
-   *   sensor: see findSensor; faults: (index) => { dead, promCorrupt, promBit, adcZero, d2Corrupt, noisy, fast } of this moment, { nacks, brownOuts } so far
+   *   sensor: see findSensor; faults: (index) => { dead, promCorrupt, promCollision, promBit, adcZero, d2Corrupt, noisy, fast } of this moment, { nacks, brownOuts } so far
    */
   constructor({ index, prng, now_ns, report, stimulus, sensor = 'ms5840', faults = () => ({}) }) {
     super(ADDRESS);
@@ -146,6 +157,8 @@ export class Ms5840 extends I2cTarget {
     this.stimulus = stimulus;
     this.faults = faults;
     this.prom = makeProm(prng, this.kind);
+    /** As it reads under the fault sensor_prom_collision. */
+    this.collidingProm = collide(new Prng(this.prom.reduce((sum, word) => Math.imul(sum, 31) + word, 7)), this.prom);
     this.timeFactor = CONVERSION_FRACTION * (1 + prng.range(-OSCILLATOR_TOLERANCE, OSCILLATOR_TOLERANCE));
     this.heldClocks = 0;
     this.holding = false;
@@ -239,7 +252,8 @@ export class Ms5840 extends I2cTarget {
       return true;
     }
     if (command >= 0xa0 && command <= 0xac && !(command & 1)) {
-      let word = this.prom[(command - 0xa0) >> 1];
+      const prom = this.faults(this.index).promCollision ? this.collidingProm : this.prom;
+      let word = prom[(command - 0xa0) >> 1];
       if (this.returned && !this.wasReset) word = 0;
       if (this.faults(this.index).promBit && command === 0xa2) word ^= 0x0400;
       if (this.faults(this.index).promCorrupt) word ^= 0x0140 << ((command >> 1) & 3);

@@ -42,8 +42,8 @@ const SCR_SLEEPDEEP = 4;
 const WAKES = new Map([[0, [0, 1 << 5]], [1, [0, 1 << 5]], [2, [0, 1 << 5]], [3, [0, 1 << 5]], [5, [0, 3 << 10]], [11, [1 << 5, 0]], [12, [1 << 5, 0]], [23, [1 << 6, 0]], [24, [1 << 7, 0]]]);
 const BOOT2_RAM = 0x20041f00;
 const DPRAM_BASE = 0x50100000;
-/** So long the boot ROM tries to load the second stage (datasheet 2.8.1.1); a flash that is still erasing is waited for. */
-const BOOT_TRIES_NS = 0.5e9;
+/** So many cycles of the ring oscillator the boot ROM tries to load the second stage, 128 times (pico-bootrom, bootrom_main.c), which waits for a flash that is still erasing: 255 ms at 12 MHz. */
+const BOOT_TRIES_CYCLES = 3.06e6;
 /** Asleep for so long without one wake-up means the firmware hung. */
 const HUNG_AFTER_NS = 2e9;
 
@@ -95,11 +95,11 @@ export class Chip extends RP2040 {
    * @param time SimulatedTime
    * @param report Report
    * @param options serial: 8-byte flash unique id; seed: of the power-on noise in SRAM; clock_ppm: by how much all of
-   *   the chip's clocks are fast, in this time; revision: 0, 1 or 2 for B0, B1 or B2; uptime_us: what the timer begins with; memory: the FlashMemory, a new one by default; trouble: what goes wrong
+   *   the chip's clocks are fast, in this time; revision: 0, 1 or 2 for B0, B1 or B2; rosc_hz: of the ring oscillator; uptime_us: what the timer begins with; memory: the FlashMemory, a new one by default; trouble: what goes wrong
    *   in the chip; kept: { sram, usbDPRAM, watchdog }
    *   of the life before a watchdog reboot
    */
-  constructor(time, report, { serial, seed = 1, clock_ppm = 0, revision = 2, uptime_us = 0, memory = new FlashMemory({ time, serial, seed }), trouble = new Trouble(), kept = null }) {
+  constructor(time, report, { serial, seed = 1, clock_ppm = 0, revision = 2, rosc_hz = ROSC_HZ, uptime_us = 0, memory = new FlashMemory({ time, serial, seed }), trouble = new Trouble(), kept = null }) {
     super(time.scope());
     this.memory = memory;
     memory.fail = (source, message) => this.fail(source, message);
@@ -112,11 +112,12 @@ export class Chip extends RP2040 {
     this.trouble = trouble;
     this.logger = new StrictLogger(this);
     this.core = new StrictCore(this);
-    this.mpu = new Mpu(this, () => this.core.guard(this.mpu.denied));
+    this.mpu = new Mpu(this, () => this.core.guard(this.mpu.denied, this.mpu.readOnlyBytes));
     this.sio = new StrictSio(this);
     /** Frequencies are nominal here, as the firmware believes them; what passes in time is this many times as fast. */
     this.clockRate = 1 + clock_ppm * 1e-6;
-    this.clkSys = ROSC_HZ;
+    this.roscHz = rosc_hz;
+    this.clkSys = rosc_hz;
     this.clkUsbHz = 0;
     this.hooks = new Map();
     this.slept_since_ns = -1;
@@ -128,7 +129,7 @@ export class Chip extends RP2040 {
     this.wild = false;
     this.onWatchdog = null;
     this.onUsbBoot = null;
-    this.sysClock = new SysClock(time, this.trueHz(ROSC_HZ));
+    this.sysClock = new SysClock(time, this.trueHz(rosc_hz));
     this.pio = [];
 
     this.resets = new Resets(this);
@@ -242,8 +243,9 @@ export class Chip extends RP2040 {
     }
     this.sram.set(this.flash.subarray(0, BOOT2_BYTES), BOOT2_RAM - RAM_BASE);
     this.starts_ns = this.memory.isBusy ? this.memory.busyUntil_ns : 0;
-    if (this.starts_ns > this.time.nanos + BOOT_TRIES_NS) {
-      this.fail('boot ROM', 'the flash is busy for longer than 0.5 s: the chip would enter its USB boot loader');
+    const tries_ns = (BOOT_TRIES_CYCLES / this.trueHz(this.roscHz)) * 1e9;
+    if (this.starts_ns > this.time.nanos + tries_ns) {
+      this.fail('boot ROM', `the flash is busy for longer than ${Math.round(tries_ns / 1e6)} ms: the chip enters its USB boot loader`);
     }
   }
 

@@ -8,10 +8,12 @@ import { BasePeripheral } from 'rp2040js';
 import { RegisterFile } from './registers.mjs';
 
 export const XOSC_HZ = 12e6;
-/** Nominal ring oscillator frequency; real parts range from 1.8 to 12 MHz. */
+/** Typical frequency of the ring oscillator; that of a part is from 1.8 to 12 MHz (pico-bootrom, bootrom_main.c). */
 export const ROSC_HZ = 6.5e6;
 /** Modelled time from PLL power-up to lock. */
 const PLL_LOCK_NS = 50e3;
+/** So long after its power-up a PLL that was locked before still says that it is, unless its block was reset. */
+const PLL_STALE_NS = 5e3;
 
 const RESET_BITS = 0x1ffffff;
 const TIMER = 21;
@@ -121,11 +123,17 @@ export class Pll extends BasePeripheral {
     this.alarm = chip.clock.createAlarm(() => {
       this.locked = true;
     });
+    this.staleAlarm = chip.clock.createAlarm(() => {
+      this.saysLocked = false;
+    });
     this.reset();
   }
 
   reset() {
     this.alarm.cancel();
+    this.staleAlarm.cancel();
+    /** Of the lock before the power went. */
+    this.saysLocked = false;
     this.cs = 1;
     this.pwr = 0x2d;
     this.fbdiv = 0;
@@ -151,7 +159,7 @@ export class Pll extends BasePeripheral {
   }
 
   readUint32(offset) {
-    if (offset === 0x00) return ((this.locked ? 1 << 31 : 0) | this.cs) >>> 0;
+    if (offset === 0x00) return ((this.locked || this.saysLocked ? 1 << 31 : 0) | this.cs) >>> 0;
     if (offset === 0x04) return this.pwr;
     if (offset === 0x08) return this.fbdiv;
     if (offset === 0x0c) return this.prim;
@@ -185,8 +193,10 @@ export class Pll extends BasePeripheral {
       if (this.vcoHz < 750e6 || this.vcoHz > 1600e6) {
         chip.fail(this.name, `VCO at ${this.vcoHz / 1e6} MHz; it works from 750 to 1600 MHz`);
       }
+      this.staleAlarm.schedule(PLL_STALE_NS);
       this.lock();
     } else if (!running) {
+      this.saysLocked ||= this.locked;
       this.locked = false;
       this.alarm.cancel();
     }
@@ -226,7 +236,7 @@ export class Clocks extends BasePeripheral {
   get refHz() {
     const source = this.ref.ctrl & 3;
     const auxiliary = (this.ref.ctrl >>> 5) & 3;
-    const hz = source === 0 ? ROSC_HZ : source === 2 ? (this.rp2040.xosc.stable ? XOSC_HZ : 0) : source === 1 && auxiliary === 0 ? this.rp2040.pllUsb.outputHz : 0;
+    const hz = source === 0 ? this.rp2040.roscHz : source === 2 ? (this.rp2040.xosc.stable ? XOSC_HZ : 0) : source === 1 && auxiliary === 0 ? this.rp2040.pllUsb.outputHz : 0;
     return hz / (((this.ref.div >>> 8) & 3) || 4);
   }
 
@@ -242,7 +252,7 @@ export class Clocks extends BasePeripheral {
   get sysHz() {
     const { pllSys, pllUsb, xosc } = this.rp2040;
     const hz = this.sys.ctrl & 1
-      ? this.#auxiliaryHz(this.sys, [() => pllSys.outputHz, () => pllUsb.outputHz, () => ROSC_HZ, () => (xosc.stable ? XOSC_HZ : 0)])
+      ? this.#auxiliaryHz(this.sys, [() => pllSys.outputHz, () => pllUsb.outputHz, () => this.rp2040.roscHz, () => (xosc.stable ? XOSC_HZ : 0)])
       : this.refHz;
     return hz / (this.sys.div / 256 || 65536);
   }
@@ -250,14 +260,14 @@ export class Clocks extends BasePeripheral {
   get usbHz() {
     if (!(this.usb.ctrl & CTRL_ENABLE)) return 0;
     const { pllSys, pllUsb, xosc } = this.rp2040;
-    const hz = this.#auxiliaryHz(this.usb, [() => pllUsb.outputHz, () => pllSys.outputHz, () => ROSC_HZ, () => (xosc.stable ? XOSC_HZ : 0)]);
+    const hz = this.#auxiliaryHz(this.usb, [() => pllUsb.outputHz, () => pllSys.outputHz, () => this.rp2040.roscHz, () => (xosc.stable ? XOSC_HZ : 0)]);
     return hz / (((this.usb.div >>> 8) & 3) || 4);
   }
 
   get periHz() {
     if (!(this.peri.ctrl & CTRL_ENABLE)) return 0;
     const { pllSys, pllUsb, xosc } = this.rp2040;
-    return this.#auxiliaryHz(this.peri, [() => this.sysHz, () => pllSys.outputHz, () => pllUsb.outputHz, () => ROSC_HZ, () => (xosc.stable ? XOSC_HZ : 0)]);
+    return this.#auxiliaryHz(this.peri, [() => this.sysHz, () => pllSys.outputHz, () => pllUsb.outputHz, () => this.rp2040.roscHz, () => (xosc.stable ? XOSC_HZ : 0)]);
   }
 
   readUint32(offset) {

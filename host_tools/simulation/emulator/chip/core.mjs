@@ -33,11 +33,12 @@ export class StrictCore extends CortexM0Core {
     this.ram16 = new Uint16Array(chip.sram.buffer);
     this.ram32 = new Int32Array(chip.sram.buffer);
     this.signed = new Int32Array(this.registers.buffer);
-    this.guard([]);
+    this.guard([], 0);
   }
 
-  /** The ranges of addresses that fault, one of them in SRAM at most. */
-  guard(ranges) {
+  /** The ranges of addresses that fault, one of them in SRAM at most, and how many bytes of SRAM are not to be written. */
+  guard(ranges, readOnlyBytes) {
+    this.readOnlyBytes = readOnlyBytes;
     this.isGuarded = ranges.length > 0;
     const [[first, bytes] = [RAM_BASE, 0], more] = ranges.filter(([at]) => at >>> 28 === RAM_BASE >>> 28);
     if (more) this.chip.fail('MPU', 'more than one region in SRAM is not modelled');
@@ -49,7 +50,7 @@ export class StrictCore extends CortexM0Core {
 
   hardFault() {
     if (this.IPSR === HARD_FAULT) this.chip.fail('core', 'a fault in the fault handler: the core locks up');
-    this.guard([]);
+    this.guard([], 0);
     this.waiting = false;
     this.exceptionEntry(HARD_FAULT);
   }
@@ -79,21 +80,21 @@ export class StrictCore extends CortexM0Core {
 
   writeUint32(address, value) {
     const offset = (address - RAM_BASE) >>> 0;
-    if ((offset - this.guardFrom) >>> 0 < this.guardBytes) throw new MemoryFault();
+    if (offset < this.readOnlyBytes || (offset - this.guardFrom) >>> 0 < this.guardBytes) throw new MemoryFault();
     if (offset < RAM_BYTES && (offset & 3) === 0) this.ram32[offset >>> 2] = value;
     else this.chip.busWrite(address >>> 0, value >>> 0, 4);
   }
 
   writeUint16(address, value) {
     const offset = (address - RAM_BASE) >>> 0;
-    if ((offset - this.guardFrom) >>> 0 < this.guardBytes) throw new MemoryFault();
+    if (offset < this.readOnlyBytes || (offset - this.guardFrom) >>> 0 < this.guardBytes) throw new MemoryFault();
     if (offset < RAM_BYTES && (offset & 1) === 0) this.ram16[offset >>> 1] = value;
     else this.chip.busWrite(address >>> 0, value & 0xffff, 2);
   }
 
   writeUint8(address, value) {
     const offset = (address - RAM_BASE) >>> 0;
-    if ((offset - this.guardFrom) >>> 0 < this.guardBytes) throw new MemoryFault();
+    if (offset < this.readOnlyBytes || (offset - this.guardFrom) >>> 0 < this.guardBytes) throw new MemoryFault();
     if (offset < RAM_BYTES) this.ram8[offset] = value;
     else this.chip.busWrite(address >>> 0, value & 0xff, 1);
   }

@@ -1,13 +1,23 @@
 /**
- * The memory protection unit of the core (ARMv6-M Architecture Reference Manual B3.5): regions without access, which
- * fault for the processor and not for DMA. It is off in the fault handlers.
+ * The memory protection unit of the core (ARMv6-M Architecture Reference Manual B3.5): regions without access, and
+ * regions, or subregions of them, that are read-only, from the start of SRAM on without a gap. They fault for the
+ * processor and not for DMA. It is off in the fault handlers.
  */
 export class MemoryFault extends Error {}
+
+const RAM_BASE = 0x20000000;
 
 const CTRL_ENABLE = 1;
 const CTRL_HFNMIENA = 2;
 const CTRL_PRIVDEFENA = 4;
+const XN = 1 << 28;
 const ACCESS = 7 << 24;
+const READ_ONLY = 6 << 24;
+const CACHEABLE = 1 << 17;
+/** What is neither enable, size, subregions, nor the bits above. */
+const OTHERS = ~(XN | ACCESS | CACHEABLE | 0xff3f);
+
+const sizeOf = (attributes) => 2 ** (((attributes >>> 1) & 31) + 1);
 
 export class Mpu {
   /** @param chip fails on what is not modelled; onChange: the denied ranges are others */
@@ -19,10 +29,28 @@ export class Mpu {
     this.regions = Array.from({ length: 8 }, () => ({ base: 0, attributes: 0 }));
     /** [first address, bytes] of what the processor may not touch. */
     this.denied = [];
+    /** From the start of SRAM. */
+    this.readOnlyBytes = 0;
   }
 
   denies(address) {
     return this.denied.some(([first, bytes]) => address >= first && address - first < bytes);
+  }
+
+  /** The parts of a region that are in force. */
+  #parts({ base, attributes }) {
+    const size = sizeOf(attributes);
+    if (!(attributes & 0xff00)) return [[base, size]];
+    return Array.from({ length: 8 }, (_, i) => [base + (i * size) / 8, size / 8]).filter((_, i) => !((attributes >>> (8 + i)) & 1));
+  }
+
+  #readOnly(regions) {
+    let end = RAM_BASE;
+    for (const [first, bytes] of regions.flatMap((r) => this.#parts(r)).sort((a, b) => a[0] - b[0])) {
+      if (first !== end) this.chip.fail('MPU', `read-only memory at 0x${first.toString(16)}: only one range from the start of SRAM on is modelled`);
+      end += bytes;
+    }
+    return end - RAM_BASE;
   }
 
   read(offset) {
@@ -39,13 +67,17 @@ export class Mpu {
       if (value & 16) this.number = value & 7;
       this.regions[this.number].base = (value & ~0xff) >>> 0;
     } else if (offset === 0xda0) {
-      const size = 2 ** (((value >>> 1) & 31) + 1);
-      if (value & 1 && (value & (ACCESS | 0xff00) || size < 256)) this.chip.fail('MPU', `RASR 0x${value.toString(16)}: only whole regions of 256 bytes or more without any access are modelled`);
+      const size = sizeOf(value);
+      const isModelled = !(value & OTHERS) && size >= 256 && ((value & ACCESS) === READ_ONLY ? !(value & XN) : value & XN && !(value & (ACCESS | 0xff00)));
+      if (value & 1 && !isModelled) this.chip.fail('MPU', `RASR 0x${(value >>> 0).toString(16)}: only regions of 256 bytes or more are modelled, whole without any access, or read-only with execution`);
+      if (value & 1 && !(value & XN) && !(value & CACHEABLE)) this.chip.fail('MPU', `RASR 0x${(value >>> 0).toString(16)}: nothing executes from strongly ordered memory`);
       if (value & 1 && this.regions[this.number].base % size) this.chip.fail('MPU', 'the base of a region is not aligned to its size');
       this.regions[this.number].attributes = value >>> 0;
     }
-    this.denied = this.ctrl & CTRL_ENABLE
-      ? this.regions.filter((r) => r.attributes & 1).map((r) => [r.base, 2 ** (((r.attributes >>> 1) & 31) + 1)]) : [];
+    const regions = this.ctrl & CTRL_ENABLE ? this.regions.filter((r) => r.attributes & 1) : [];
+    const isReadOnly = (r) => (r.attributes & ACCESS) === READ_ONLY;
+    this.denied = regions.filter((r) => !isReadOnly(r)).map((r) => [r.base, sizeOf(r.attributes)]);
+    this.readOnlyBytes = this.#readOnly(regions.filter(isReadOnly));
     this.onChange();
   }
 }

@@ -21,6 +21,8 @@ export class Ssi extends BasePeripheral {
     this.forcedSelect = false;
     this.selected = false;
     this.alarm = chip.clock.createAlarm(() => this.#shifted());
+    /** The next byte takes so much longer, for a test. */
+    this.stall_ns = 0;
     // As the boot ROM leaves it: single-bit 03h reads.
     this.ctrlr0 = (31 << 16) | (TMOD_EEPROM_READ << 8);
     this.ctrlr1 = 0;
@@ -80,7 +82,12 @@ export class Ssi extends BasePeripheral {
     if (this.shifting !== null || !this.tx.length || !this.enabled || !this.ser) return;
     this.shifting = this.tx.shift();
     this.#updateSelect();
-    this.alarm.schedule((8 * this.baudr * 1e9) / this.rp2040.trueHz(this.rp2040.clkSys));
+    this.#scheduleShift();
+  }
+
+  #scheduleShift() {
+    this.alarm.schedule((8 * this.baudr * 1e9) / this.rp2040.trueHz(this.rp2040.clkSys) + this.stall_ns);
+    this.stall_ns = 0;
   }
 
   #shifted() {
@@ -89,7 +96,7 @@ export class Ssi extends BasePeripheral {
     this.rx.push(answer);
     if (this.tx.length) {
       this.shifting = this.tx.shift();
-      this.alarm.schedule((8 * this.baudr * 1e9) / this.rp2040.trueHz(this.rp2040.clkSys));
+      this.#scheduleShift();
     } else {
       this.shifting = null;
       this.#updateSelect();
@@ -155,7 +162,10 @@ export class Ssi extends BasePeripheral {
         return;
       case 0x08:
         if (!(value & 1)) {
-          if (this.shifting !== null) this.rp2040.fail('SSI', 'disabled in mid-transfer');
+          // As the datasheet of its maker has it, the transfer ends at once.
+          if (this.shifting !== null && !this.forcedSelect) this.rp2040.fail('SSI', 'disabled in mid-transfer');
+          this.shifting = null;
+          this.alarm.cancel();
           this.tx = [];
           this.rx = [];
           this.entering = [];

@@ -4,8 +4,9 @@
  *
  * Fails the run on what hardware would punish: AVAILABLE set in the same write as other fields of a buffer
  * control register or less than one 48 MHz cycle later, a buffer touched while the controller owns it (unless
- * aborted), buffers not 64-byte aligned, wrong data PID, pull-up without VBUS, PHY, clock or controller,
- * and an abort before revision B2 (erratum E2).
+ * aborted; before revision B2, where an abort blocks the controller (erratum E2), unless AVAILABLE was cleared alone and
+ * no packet is under way), buffers not 64-byte aligned, wrong data PID, pull-up without VBUS, PHY, clock or controller,
+ * and tokens or frames while clk_sys is slower than clk_usb.
  */
 import { BasePeripheral } from 'rp2040js';
 
@@ -293,13 +294,16 @@ export class UsbBlock extends BasePeripheral {
     const isOut = (word & 4) !== 0;
     const name = `EP${endpoint} ${isOut ? 'OUT' : 'IN'} buffer control`;
     const bit = 2 * endpoint + (isOut ? 1 : 0);
-    const ownerMayTake = endpoint === 0 || this.quiet || ((this.epAbortDone >>> bit) & 1) !== 0;
+    const underWay = ((this.inFlight >>> bit) & 1) !== 0;
+    const aborted = ((this.epAbortDone >>> bit) & 1) !== 0;
     for (const half of [0, 1]) {
       const was = (old >>> (16 * half)) & 0xffff;
       const is = (next >>> (16 * half)) & 0xffff;
       const fieldsChanged = ((was ^ is) & ~(BC_AVAILABLE | BC_STALL | (half ? BC_RESET_SELECT : 0))) !== 0;
       const time = 2 * bit + half;
-      if (was & BC_AVAILABLE && (fieldsChanged || !(is & BC_AVAILABLE)) && !ownerMayTake) {
+      const mayTake = this.quiet || aborted || (this.isOld && !fieldsChanged);
+      if (this.isOld && underWay && fieldsChanged) chip.fail('USB', `${name}: written while its packet is on the bus`);
+      if (was & BC_AVAILABLE && (fieldsChanged || !(is & BC_AVAILABLE)) && !mayTake) {
         chip.fail('USB', `${name}: written while the controller owns the buffer; abort the endpoint (EP_ABORT) first`);
       }
       if (is & BC_AVAILABLE && !(was & BC_AVAILABLE)) {
@@ -366,7 +370,13 @@ export class UsbBlock extends BasePeripheral {
     return true;
   }
 
+  /** The controller moves data on clk_sys too; what it does on a slower one than clk_usb nobody has written down. */
+  #checkClock() {
+    if (this.attached && this.rp2040.clkSys < CLK_USB_HZ) this.rp2040.fail('USB', `traffic while clk_sys is ${this.rp2040.clkSys / 1e6} MHz`);
+  }
+
   #hears(address) {
+    this.#checkClock();
     this.quiet = false;
     return this.attached && !this.hung && this.connected && !this.feigned && address === this.address;
   }
@@ -427,6 +437,7 @@ export class UsbBlock extends BasePeripheral {
 
   sof(frame) {
     if (this.hung === 'dead' || !this.connected || this.feigned) return;
+    this.#checkClock();
     this.frame = frame & 0x7ff;
     if (!this.sofPending) this.sof_ns = this.rp2040.clock.nanos;
     this.sofPending = true;

@@ -13,7 +13,12 @@
  *     host.cancel(transfer)      host.unplug()      host.plug()
  *     host.suspend()  /  host.resume()                          the bus idles; transfers wait
  *     host.resetDevice(() => ...)                               transfers are cancelled; the device has an address again
+ *     host.holdReset(for_ns)                                    the bus is low for so long; then as in resetDevice
  *     host.restartToggles(addresses)                            after SET_CONFIGURATION, SET_INTERFACE, CLEAR_FEATURE(HALT)
+ *
+ * With `companion` it is an EHCI controller, whose ports a companion serves at full speed: at each connection and each
+ * resetDevice it resets the port, finds no high-speed device, sends no frame and asks for nothing, and hands the port over.
+ * The companion debounces and resets it again (Linux, ehci-hub.c check_reset_complete()).
  *
  * Status is 'ok', 'stall', 'cancelled' or 'gone'. One transaction is on the bus at a time and takes its time:
  * (payload + 13 bytes) at 12 Mbit/s, so at most 19 packets of 64 bytes in a frame. A NAKed bulk or control
@@ -64,19 +69,20 @@ class Pipe {
 
 export class UsbHost {
   /**
-   * @param options scope: of SimulatedTime; report: Report; fast: shorten the waits of enumeration;
+   * @param options scope: of SimulatedTime; report: Report; fast: shorten the waits of enumeration; companion: see above;
    *   onPacket({ t_ns, endpoint, isIn, setup, data, offered_ns }): every acknowledged packet, and when the firmware gave
    *   it to the controller if it is an IN
    */
-  constructor({ scope, report, fast = false, onPacket = () => {} }) {
+  constructor({ scope, report, fast = false, companion = false, onPacket = () => {} }) {
     this.scope = scope;
+    this.companion = companion;
     this.report = report;
     this.wait = fast ? FAST : REALISTIC;
     this.onPacket = onPacket;
     this.offered_ns = new Map();
     this.onConfigured = () => {};
     this.onDisconnected = () => {};
-    this.statistics = { in_bytes: 0, out_bytes: 0, in_packets: 0, out_packets: 0, naks: 0, stalls: 0, resets: 0, enumerations: 0 };
+    this.statistics = { in_bytes: 0, out_bytes: 0, in_packets: 0, out_packets: 0, naks: 0, stalls: 0, resets: 0, enumerations: 0, detaches: 0 };
     this.block = null;
     this.plugged = true;
     this.frame = 0;
@@ -146,6 +152,19 @@ export class UsbHost {
   }
 
   resetDevice(done) {
+    this.#abandon();
+    this.#enumeration = this.#readdress(done);
+    this.portStep();
+  }
+
+  holdReset(for_ns, done = () => {}) {
+    this.#abandon();
+    this.#enumeration = this.#readdress(done, for_ns);
+    this.portStep();
+  }
+
+  /** All transfers are cancelled, and the toggles are as after a reset. */
+  #abandon() {
     for (const a of [this.portAlarm, this.sofAlarm, this.busAlarm, this.retryAlarm, this.controlAlarm, this.suspendAlarm]) a.cancel();
     const transfers = [this.controlPipe, ...this.pipes.values()].flatMap((p) => p.queue.splice(0));
     this.running = null;
@@ -156,12 +175,11 @@ export class UsbHost {
       pipe.retry_ns = 0;
     }
     for (const t of transfers) t.done('cancelled', concat(t.got ?? []));
-    this.#enumeration = this.#readdress(done);
-    this.portStep();
   }
 
-  *#readdress(done) {
-    yield* this.#resetBus();
+  *#readdress(done, reset_ns) {
+    if (this.companion) yield* this.#handOver();
+    yield* this.#resetBus(reset_ns);
     yield* this.#setAddress();
     done();
   }
@@ -214,7 +232,10 @@ export class UsbHost {
       this.#enumeration = this.#enumerate();
       this.portAlarm.schedule(this.wait.debounce_ns);
       this.suspendAlarm.schedule(IDLE_SUSPENDS_NS);
-    } else if (!attached && this.state !== 'detached') this.#gone();
+    } else if (!attached && this.state !== 'detached') {
+      if (this.plugged) this.statistics.detaches += 1;
+      this.#gone();
+    }
     if (this.block && this.block.sieCtrl & (1 << 16) && !this.block.attached) this.pullupAlarm.schedule(5e6);
   }
 
@@ -249,18 +270,28 @@ export class UsbHost {
     }
   }
 
-  *#resetBus() {
+  *#resetBus(reset_ns) {
+    yield* this.#resetPort(reset_ns);
+    this.state = 'active';
+    this.sofAlarm.schedule(0);
+    yield this.wait.recovery_ns;
+  }
+
+  *#resetPort(reset_ns = this.wait.reset_ns) {
     this.state = 'reset';
     this.address = 0;
     this.sofAlarm.cancel();
     this.suspendAlarm.cancel();
     this.block.busReset();
     this.statistics.resets += 1;
-    yield this.wait.reset_ns;
+    yield reset_ns;
     this.block.busResetEnded();
-    this.state = 'active';
-    this.sofAlarm.schedule(0);
-    yield this.wait.recovery_ns;
+  }
+
+  *#handOver() {
+    yield* this.#resetPort();
+    this.suspendAlarm.schedule(IDLE_SUSPENDS_NS);
+    yield this.wait.debounce_ns;
   }
 
   /** One control transfer from within the enumeration; `expectStall` makes anything but a stall a failure. */
@@ -279,6 +310,7 @@ export class UsbHost {
 
   *#enumerate() {
     const get = (type, index, length, language = 0) => setupPacket(0x80, 6, (type << 8) | index, language, length);
+    if (this.companion) yield* this.#handOver();
     yield* this.#resetBus();
     const first = yield* this.#request('DEVICE(64)', get(1, 0, 64));
     if (first.length < 8 || first[1] !== 1) this.#fail(`DEVICE(64) answered ${first.length} bytes that are no device descriptor`);
