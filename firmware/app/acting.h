@@ -8,6 +8,12 @@
 #if FT_WITH_FIT
 /* This calibration, which is valid and outlives the app, acts from the next frame on; NULL: none. */
 void app_use_calibration(struct app *app, const struct calibration *calibration);
+/* Tells the fit the prior that is set, or else the calibration's, and the calibration's dip; where
+ * a profile acts, no dip. */
+void app_use_shape(struct app *app);
+/* Doubts the calibration's force scale by how far the air is from that in which it was found. Now
+ * and then; some 20 us. */
+void app_use_air(struct app *app);
 #endif
 
 #if FT_WITH_TANGENTIAL

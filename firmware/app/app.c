@@ -1,5 +1,7 @@
 #include "app/app.h"
 
+#include "app/acting.h"
+
 #include "app/commands.h"
 #include "app/packets.h"
 #include "common/contact_flags.h"
@@ -65,8 +67,8 @@ void app_start(struct app *app, const struct array_bus *bus) {
   app->fit_settings.iterations = DEFAULT_FIT_ITERATIONS;
   app->fit_settings.n_largest = DEFAULT_FIT_N_LARGEST;
   app->fit_settings.cut_noises = DEFAULT_CUT_NOISES;
-  app->fit_settings.prior_sigma_mm = DEFAULT_PRIOR_SIGMA_mm;
-  app->fit_settings.prior_width_mm = DEFAULT_PRIOR_WIDTH_mm;
+  app->prior_sigma_mm = DEFAULT_PRIOR_SIGMA_mm;
+  app->prior_width_mm = DEFAULT_PRIOR_WIDTH_mm;
   fit_set_errors(&app->fit_settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
   app->fit_settings.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
   app->rest.apart_Pa = MS58XX_APART_Pa;
@@ -317,6 +319,9 @@ static void each_second(struct app *app, uint64_t now_us, bool after_frame) {
   app->frames_at_second = frames;
   app->asleep_us = 0;
   note_second(app);
+#if FT_WITH_FIT
+  app_use_air(app);
+#endif
   if (app->streams & WIRE_STREAM_HEALTH) {
     packets_send_health(app, now_us);
   }

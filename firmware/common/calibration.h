@@ -19,6 +19,13 @@ struct calibration {
   uint16_t placements;  /* of the weight that entered */
   float force_scale;    /* force is this times 2 pi p0 sigma^2 */
   float force_scale_sd; /* standard deviation of force_scale */
+  /* The pad's response to a usual contact, as the fit is told it (fit.h): a prior on sigma, and the
+   * dip around a contact. Zeros: not known, none. */
+  uint16_t sigma_um, sigma_sd_um;
+  uint16_t dip_share_q16, dip_sd_um;
+  /* Of the air in which force_scale was found; 0: not known. The sensors measure absolute pressure,
+   * and the scale of a cast pad changes with it. */
+  uint8_t ambient_kPa;
   struct sensor_calibration sensors[FT_MAX_SENSORS];
 };
 
@@ -29,6 +36,9 @@ struct calibration {
 #define CALIBRATION_FORCE_SCALE_MIN 0.1f
 #define CALIBRATION_FORCE_SCALE_MAX 10.0f
 #define CALIBRATION_FORCE_SCALE_SD_MAX 1.0f /* from 0 */
+#define CALIBRATION_SIGMA_MIN_um 500        /* or 0, and then its sd is 0 too */
+#define CALIBRATION_SIGMA_SD_MIN_um 10
+#define CALIBRATION_DIP_SHARE_MAX_Q16 6553 /* from 0: a tenth; with its sd, or neither */
 
 /* Every value of it, for the first sensor_count sensors, is finite and in its range. */
 bool calibration_is_valid(const struct calibration *calibration, unsigned sensor_count);

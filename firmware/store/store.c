@@ -11,7 +11,8 @@
 #define MARK UINT32_C(0)
 
 enum {
-  VERSION = 2,
+  VERSION = 3,
+  VERSION_WITHOUT_SHAPE = 2,
   VERSION_WITHOUT_PROFILE = 1,
   /* In a slot */
   BEGUN_AT = 0,
@@ -31,13 +32,15 @@ enum {
   CALIBRATION_AT = 4,
   SETTINGS_BYTES = 24,
   PROFILE_BYTES = 4 * PAD_PROFILE_FLOATS + 1,
+  SHAPE_BYTES = 9,
   /* A slot that does not hold what was written is given up; so often in a row is a flash that
      fails. */
   MAX_ATTEMPTS = 3,
 };
 _Static_assert((int)STORE_RECORD_BYTES == (int)SEALED_AT &&
                    MAX_PAYLOAD >=
-                       CALIBRATION_AT + 14 + 8 * FT_MAX_SENSORS + SETTINGS_BYTES + PROFILE_BYTES,
+                       CALIBRATION_AT + 14 + 8 * FT_MAX_SENSORS + SETTINGS_BYTES + PROFILE_BYTES +
+                       SHAPE_BYTES,
                "a record fits into its slot");
 
 /* The longest erase of a sector takes 400 ms (W25Q16JV), and the longest write of a page 3 ms. */
@@ -109,6 +112,22 @@ static void get_calibration(const uint8_t *at, struct calibration *calibration, 
   get_floats(at + 14, calibration->sensors, 0, FLOATS_OF_SENSOR * count);
 }
 
+static void put_shape(uint8_t *at, const struct calibration *calibration) {
+  at = put_u16(at, calibration->sigma_um);
+  at = put_u16(at, calibration->sigma_sd_um);
+  at = put_u16(at, calibration->dip_share_q16);
+  at = put_u16(at, calibration->dip_sd_um);
+  *at = calibration->ambient_kPa;
+}
+
+static void get_shape(const uint8_t *at, struct calibration *calibration) {
+  calibration->sigma_um = bytes_get_u16(at);
+  calibration->sigma_sd_um = bytes_get_u16(at + 2);
+  calibration->dip_share_q16 = bytes_get_u16(at + 4);
+  calibration->dip_sd_um = bytes_get_u16(at + 6);
+  calibration->ambient_kPa = at[8];
+}
+
 static void put_settings(uint8_t *at, const struct store_settings *settings) {
   at = put_u32(at, settings->rate_mHz);
   at = put_u16(at, settings->osr);
@@ -145,13 +164,15 @@ static void make_record(struct store *store, const struct parts *parts) {
   uint8_t *payload = store->record + PAYLOAD_AT;
   bytes_put_u32(store->record + BEGUN_AT, MARK);
   unsigned settings_at = CALIBRATION_AT + calibration_bytes(store->sensor_count);
-  unsigned length = settings_at + SETTINGS_BYTES + PROFILE_BYTES;
+  unsigned shape_at = settings_at + SETTINGS_BYTES + PROFILE_BYTES;
+  unsigned length = shape_at + SHAPE_BYTES;
   memset(payload, 0, length);
   payload[0] = (uint8_t)((parts->calibration ? HAS_CALIBRATION : 0) |
                          (parts->settings ? HAS_SETTINGS : 0) | (parts->profile ? HAS_PROFILE : 0));
   payload[1] = store->sensor_count;
   if (parts->calibration) {
     put_calibration(payload + CALIBRATION_AT, parts->calibration, store->sensor_count);
+    put_shape(payload + shape_at, parts->calibration);
   }
   if (parts->settings) {
     put_settings(payload + settings_at, parts->settings);
@@ -190,15 +211,21 @@ static bool take_record(struct store *store) {
   const unsigned version = bytes_get_u16(store->record + VERSION_AT);
   const unsigned settings_at = CALIBRATION_AT + calibration_bytes(store->sensor_count);
   const unsigned profile_at = settings_at + SETTINGS_BYTES;
+  const unsigned shape_at = profile_at + PROFILE_BYTES;
+  const unsigned expected = version == VERSION                   ? shape_at + SHAPE_BYTES
+                            : version == VERSION_WITHOUT_SHAPE   ? shape_at
+                            : version == VERSION_WITHOUT_PROFILE ? profile_at
+                                                                 : 0;
   memset(content, 0, sizeof *content);
-  if (length != (version == VERSION ? profile_at + PROFILE_BYTES : profile_at) ||
-      (version != VERSION && version != VERSION_WITHOUT_PROFILE) ||
-      payload[1] != store->sensor_count) {
+  if (length != expected || payload[1] != store->sensor_count) {
     return false;
   }
   if (payload[0] & HAS_CALIBRATION) {
     struct calibration *calibration = &content->calibration;
     get_calibration(payload + CALIBRATION_AT, calibration, store->sensor_count);
+    if (version == VERSION) {
+      get_shape(payload + shape_at, calibration);
+    }
     content->has_calibration = calibration_is_valid(calibration, store->sensor_count);
     if (!content->has_calibration) {
       memset(calibration, 0, sizeof *calibration);
@@ -209,7 +236,7 @@ static bool take_record(struct store *store) {
     get_settings(payload + settings_at, &content->settings);
     content->has_settings = true;
   }
-  if (version == VERSION && payload[0] & HAS_PROFILE) {
+  if (version != VERSION_WITHOUT_PROFILE && payload[0] & HAS_PROFILE) {
     get_profile(payload + profile_at, &content->profile);
     content->has_profile = true;
   }

@@ -12,9 +12,9 @@
 
 #include <stdint.h>
 
-#define WIRE_VERSION 5
+#define WIRE_VERSION 6
 
-enum { WIRE_TEXT_BYTES = 16, WIRE_MAX_BODY_BYTES = 815 };
+enum { WIRE_TEXT_BYTES = 16, WIRE_MAX_BODY_BYTES = 824 };
 
 enum wire_type {
   /* device to host */

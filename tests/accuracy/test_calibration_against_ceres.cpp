@@ -27,7 +27,8 @@ struct ReadingCost {
     const T wide = exp(-square / (2.0 * width * width));
     const T narrow = exp(-square / (2.0 * NARROW * NARROW * width * width));
     const T value = exp(sensor[0] + profile[0] + placement[2] - 2.0 * placement[3]) *
-                    ((1.0 - profile[2]) * wide + profile[2] * narrow);
+                    ((1.0 - profile[2]) * wide + profile[2] * narrow -
+                     profile[5] * exp(-square / (2.0 * DIP * DIP * width * width)));
     const T model = value + sensor[3] + sensor[4] * tau - sensor[5] * earlier_Pa;
     residual[0] = (reading_Pa - model) / sd_Pa;
     return true;
@@ -61,7 +62,7 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
                Random &start) {
   remember(placements);
   const Assumptions assumed;
-  double peak_Pa = 0.0;
+  double peak_Pa = 0.0, near_Pa = 0.0;
   {
     std::vector<double> peaks;
     for (const Placement &placement : placements) {
@@ -69,13 +70,14 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
     }
     std::sort(peaks.begin(), peaks.end());
     peak_Pa = peaks[peaks.size() / 2];
+    near_Pa = peaks[9 * peaks.size() / 10];
   }
   std::vector<std::array<double, SENSOR_UNKNOWNS>> sensors(SENSORS);
   for (auto &sensor : sensors) {
     sensor.fill(0.0);
     sensor[0] = 0.05 * start.normal();
   }
-  std::array<double, 5> profile{std::log(1.1 * peak_Pa), std::log(5.0), 0.1, 0.0, 0.0};
+  std::array<double, 6> profile{std::log(1.1 * peak_Pa), std::log(5.0), 0.1, 0.0, 0.0, 0.0};
   std::vector<std::array<double, 6>> own(placements.size());
   ceres::Problem problem;
   const double first_s = placements.front().t_s, last_s = placements.back().t_s;
@@ -97,7 +99,7 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
       const double earlier = placements[i].earlier_Pa[k] * now / (now + REMEMBERS_FROM * peak_Pa);
       const double tau = 2.0 * (placements[i].t_s - first_s) / (last_s - first_s) - 1.0;
       problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<ReadingCost, 1, SENSOR_UNKNOWNS, 5, 6>(
+          new ceres::AutoDiffCostFunction<ReadingCost, 1, SENSOR_UNKNOWNS, 6, 6>(
               new ReadingCost{array.x_mm[k], array.y_mm[k], reading, sd, tau, earlier}),
           huber, sensors[k].data(), profile.data(), own[i].data());
     }
@@ -115,9 +117,11 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
       add_prior<SENSOR_UNKNOWNS>(problem, sensor.data(), at, 0.0, sds[at]);
     }
   }
-  add_prior<5>(problem, profile.data(), 2, assumed.mixing, assumed.mixing_sd);
-  add_prior<5>(problem, profile.data(), 3, 0.0, assumed.ellipse_of_all);
-  add_prior<5>(problem, profile.data(), 4, 0.0, assumed.ellipse_of_all);
+  add_prior<6>(problem, profile.data(), 0, std::log(near_Pa), assumed.peak);
+  add_prior<6>(problem, profile.data(), 2, assumed.mixing, assumed.mixing_sd);
+  add_prior<6>(problem, profile.data(), 3, 0.0, assumed.ellipse_of_all);
+  add_prior<6>(problem, profile.data(), 4, 0.0, assumed.ellipse_of_all);
+  add_prior<6>(problem, profile.data(), 5, 0.0, assumed.dip);
 
   ceres::Solver::Options options;
   options.max_num_iterations = 500;

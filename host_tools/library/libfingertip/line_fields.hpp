@@ -135,6 +135,11 @@ template <typename Visitor> void visit_calibration(Visitor &visit, struct calibr
   visit("calibration_placements", calibration.placements);
   visit("force_scale", calibration.force_scale);
   visit("force_scale_sd", calibration.force_scale_sd);
+  visit("calibration_sigma_um", calibration.sigma_um);
+  visit("calibration_sigma_sd_um", calibration.sigma_sd_um);
+  visit("calibration_dip_share_q16", calibration.dip_share_q16);
+  visit("calibration_dip_sd_um", calibration.dip_sd_um);
+  visit("calibration_ambient_kPa", calibration.ambient_kPa);
 }
 
 struct SensorList {

@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-VERSION = 5
+VERSION = 6
 SENSORS_MAX = 32
-MAX_FRAME_BYTES = 836  # longer is damage
+MAX_FRAME_BYTES = 845  # longer is damage
 LOADER_MAGIC = 0x746F6F42
 
 
@@ -110,6 +110,16 @@ class Calibration(NamedTuple):
     """force is this times 2 pi p0 sigma^2"""
     force_scale_sd: Annotated[float, Wire("f")]
     """its standard deviation"""
+    sigma_um: Annotated[int, Wire("H")]
+    """sigma of a usual contact on this pad, um; 0: not known"""
+    sigma_sd_um: Annotated[int, Wire("H")]
+    """its standard deviation from contact to contact"""
+    dip_share_q16: Annotated[int, Wire("H")]
+    """depth of the dip around a contact, of its peak, 1/65536; 0: none"""
+    dip_sd_um: Annotated[int, Wire("H")]
+    """standard deviation of the dip's Gaussian"""
+    ambient_kPa: Annotated[int, Wire("B")]
+    """air in which the force scale was found; 0: not known"""
     gains_and_sds: Annotated[tuple[float, ...], Wire("f", 2, each_sensor=True)]
     """of each sensor: gain, and its relative standard deviation"""
 
@@ -460,7 +470,7 @@ class AskHealth(NamedTuple):
 
 
 class AskCrash(NamedTuple):
-    """Send crash, after the acknowledgement. The first firmware of this version does not know it."""
+    """Send crash, after the acknowledgement."""
 
 
 class Loader(NamedTuple):

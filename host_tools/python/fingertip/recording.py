@@ -40,6 +40,8 @@ def _list(values: Iterable[float]) -> str:
 def _calibration_metadata(calibration: Calibration) -> dict[str, str]:
     return {"calibration_date_s": str(calibration.date_s), "calibration_placements": str(calibration.placements),
             "force_scale": _number(calibration.force_scale), "force_scale_sd": _number(calibration.force_scale_sd),
+            **{f"calibration_{name}": str(getattr(calibration, name))
+               for name in ("sigma_um", "sigma_sd_um", "dip_share_q16", "dip_sd_um", "ambient_kPa")},
             "gains": _list(calibration.gains), "gain_sds": _list(calibration.gain_sds)}
 
 

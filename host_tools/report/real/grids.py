@@ -110,7 +110,8 @@ def fit_job(readings, gain=None, gain_sd=None, prior=(0.0, 0.0), dip=(0.0, 0.0))
 
 def stored_job(readings, stored):
     """With what a calibration leaves in the fingertip."""
-    return fit_job(readings, stored["gain"], stored["gain_sd"], (stored["prior_sigma_mm"], stored["prior_width_mm"]))
+    return fit_job(readings, stored["gain"], stored["gain_sd"], (stored["prior_sigma_mm"], stored["prior_width_mm"]),
+                   (stored["dip_share"], stored["dip_sd_mm"]))
 
 
 def calibration_job(readings):

@@ -30,6 +30,19 @@ std::string key_of(const Indenter &indenter, const Layer &layer, const Grid &gri
 
 } // namespace
 
+double ContactTable::base_pressure_Pa(double force_N, double dx_mm, double dy_mm,
+                                      double dip_share) const {
+  double pressure_Pa = base_pressure_Pa(force_N, dx_mm, dy_mm);
+  if (dip_share > 0.0 && force_N > 0.0) {
+    const double middle_Pa = base_pressure_Pa(force_N, 0.0, 0.0);
+    const double square_mm2 = 1e6 * force_N / (2.0 * M_PI * middle_Pa);
+    pressure_Pa -= dip_share * middle_Pa *
+                   std::exp(-(dx_mm * dx_mm + dy_mm * dy_mm) /
+                            (2.0 * DIP_WIDTHS * DIP_WIDTHS * square_mm2));
+  }
+  return pressure_Pa;
+}
+
 double ContactTable::indentation_mm(double force_N) const {
   return force_N > 0.0 ? ForcePlanes::between_forces(indentation_mm_, force_N) : 0.0;
 }

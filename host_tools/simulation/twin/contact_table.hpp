@@ -32,6 +32,10 @@ public:
   double base_pressure_Pa(double force_N, double dx_mm, double dy_mm) const {
     return pressure_.at(force_N, dx_mm, dy_mm);
   }
+  // Less the dip of cast rubber, effect "dip" of effects.hpp: this share of the pressure in the
+  // middle times exp(-r^2 / (2 (DIP_WIDTHS s)^2)). s: of the Gaussian of that pressure and force.
+  static constexpr double DIP_WIDTHS = 2.5;
+  double base_pressure_Pa(double force_N, double dx_mm, double dy_mm, double dip_share) const;
   const ForcePlanes &pressure() const { return pressure_; } // Pa
   double indentation_mm(double force_N) const;
   double contact_radius_mm(double force_N) const; // of a disc of the contact's area

@@ -1,6 +1,11 @@
 // What rubber and sensors do to the pressure on the base before a sensor reports it. Each effect is
 // switched on by its name and has one value; effects() is the list of them, with sources.
 //
+// Before there is a pressure p of one sensor; who computes the pressure on the base asks the pad:
+//   dip          of cast rubber around a contact: from p goes V of the pressure in its middle times
+//                exp(-r^2 / (2 (2.5 s)^2)), s the contact's width (ContactTable)
+//   widths       a contact is wider or narrower for each sensor, V (sd) of all distances
+//   places       each sensor sits V (sd) off its place, each way
 // In the order in which they act on the pressure p of one sensor:
 //   hysteresis   rate-independent. Loading to a new maximum m, p stays; unloading from m it is
 //                lower by 3 V p (1 - p / m): the loop is V of the area below the loading curve.
@@ -15,6 +20,8 @@
 //                reading stands off by a of the peak. a is 0.1 to 2 V for two sensors of three
 //                and -0.25 to -2.25 V, an undershoot, for the third; both drawn for each sensor.
 //                p is the pressure on the base: relaxation makes nothing to be remembered.
+//   creep        plus V of what follows p with a time constant of CREEP_s: a sensor rises in a hold
+//                beside the others' loss, and stands above its zero after a release
 //   gain         p times 1 + V normal, drawn for each sensor, at most three standard deviations
 //   drift        p plus a ramp in time, drawn for each sensor: slope and sign
 //   branch       the sensors begin at V degC and warm up by WARMING_K_s to ROOM_degC. Where they
@@ -45,6 +52,7 @@
 namespace fingertip::twin {
 
 constexpr double ROOM_degC = 25.0;
+constexpr double CREEP_s = 3.0;
 
 struct Effect {
   std::string name;
@@ -78,6 +86,14 @@ public:
   void report(double t_s, const std::vector<double> &base_Pa, std::vector<double> &reported_Pa);
   double temperature_degC(double t_s) const;
 
+  double dip_share() const { return dip_share_; }
+  // How a sensor sits: off its place, and its distances over those of a contact as wide as it
+  // feels it.
+  struct Seat {
+    double dx_mm = 0.0, dy_mm = 0.0, width = 1.0;
+  };
+  const std::vector<Seat> &seats() const { return seats_; } // [sensor], drawn
+
   // Drawn, [sensor]; empty where the effect is off.
   const std::vector<double> &gain_errors() const { return gain_errors_; }
   const std::vector<double> &drifts_Pa_s() const { return drifts_Pa_s_; }
@@ -101,14 +117,17 @@ private:
     double pressure_Pa = 0.0, lacks_Pa = 0.0;
     bool falls = false;
     double turn_Pa = 0.0, turn_lacks_Pa = 0.0, largest_Pa = 0.0;
+    double base_Pa = 0.0, crept_Pa = 0.0; // creep: the pressure at the last time, what follows it
     // After-effect: the pressure at the last time, what is remembered, its decay over a step.
     double felt_Pa = 0.0, remembered_Pa = 0.0, forgetting = 1.0;
   };
   double with_hysteresis(Rubber &rubber, double pressure_Pa) const;
   double relaxed(Rubber &rubber, double pressure_Pa);
   double left_behind(Rubber &rubber, const Aftereffect &effect, double base_Pa) const;
+  double crept(Rubber &rubber, double base_Pa) const;
 
   double ambient_Pa_;
+  double dip_share_ = 0.0, creep_ = 0.0, creep_decay_ = 1.0;
   double hysteresis_ = 0.0; // share of the loop
   double bias_ = 0.0, clip_Pa_ = 0.0, warming_K_ = 0.0, warming_s_ = 0.0;
   double start_degC_ = ROOM_degC;
@@ -116,6 +135,7 @@ private:
   std::vector<double> gain_errors_, drifts_Pa_s_, relaxations_;
   std::vector<Aftereffect> aftereffects_;
   std::vector<Branch> branches_;
+  std::vector<Seat> seats_;
   std::vector<Rubber> rubber_;
   double t_s_ = 0.0, step_s_ = 0.0, begin_s_ = 0.0;
   bool begun_ = false;

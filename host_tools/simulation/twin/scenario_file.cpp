@@ -275,6 +275,17 @@ void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pa
                number(chosen->second) + " " + effect.unit + "; " + effect.source);
     }
   }
+  if (options.effects.count("places") + options.effects.count("widths") > 0) {
+    std::vector<double> dx_mm, dy_mm, widths;
+    for (const Pad::Seat &seat : pad.seats()) {
+      dx_mm.push_back(seat.dx_mm);
+      dy_mm.push_back(seat.dy_mm);
+      widths.push_back(seat.width);
+    }
+    metadata(text, "places_dx_mm", list(dx_mm, 1.0, 3));
+    metadata(text, "places_dy_mm", list(dy_mm, 1.0, 3));
+    metadata(text, "widths", list(widths, 1.0, 4));
+  }
   if (!pad.gain_errors().empty()) {
     metadata(text, "gain_errors_percent", list(pad.gain_errors(), 100.0, 3));
   }
@@ -460,10 +471,13 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
           }
           const double cosine = std::cos(contact.angle_rad), sine = std::sin(contact.angle_rad);
           for (std::size_t k = 0; k < sensors; k++) {
-            const double dx = static_cast<double>(geometry.x_mm[k]) - contact.x_mm;
-            const double dy = static_cast<double>(geometry.y_mm[k]) - contact.y_mm;
+            const Pad::Seat &seat = pad.seats()[k];
+            const double dx =
+                (static_cast<double>(geometry.x_mm[k]) + seat.dx_mm - contact.x_mm) / seat.width;
+            const double dy =
+                (static_cast<double>(geometry.y_mm[k]) + seat.dy_mm - contact.y_mm) / seat.width;
             const double along_x = cosine * dx + sine * dy, along_y = cosine * dy - sine * dx;
-            base_Pa[k] += pressing.base_pressure_Pa(contact.force_N, along_x, along_y);
+            base_Pa[k] += pressing.base_pressure_Pa(contact.force_N, along_x, along_y, pad.dip_share());
             if (block) {
               base_Pa[k] += block->added_Pa(
                   k, {contact.force_N, contact.pull_x_N, contact.pull_y_N, radius_mm}, contact.x_mm,

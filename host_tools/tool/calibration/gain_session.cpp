@@ -54,6 +54,19 @@ Frame frame_of(const wire_packet &packet) {
   return frame;
 }
 
+double mean_zero_Pa(const Frame &frame) {
+  double sum_Pa = 0.0, count = 0.0;
+  for (std::size_t k = 0; k < frame.zero_Pa.size(); k++) {
+    sum_Pa += frame.valid >> k & 1u ? frame.zero_Pa[k] : 0.0;
+    count += frame.valid >> k & 1u;
+  }
+  return count > 0.0 ? sum_Pa / count : 0.0;
+}
+
+std::uint16_t micrometres(double length_mm) {
+  return static_cast<std::uint16_t>(std::lround(std::clamp(1000.0 * length_mm, 0.0, 65535.0)));
+}
+
 } // namespace
 
 void check_firmware(const wire_info &info, const std::string &what) {
@@ -84,8 +97,10 @@ bool GainSession::take(const wire_packet &packet) {
       (packet.body.raw.flags & CONTACT_FLAG_HELD)) {
     return false;
   }
-  auto found = finder_.take(frame_of(packet));
+  const Frame frame = frame_of(packet);
+  auto found = finder_.take(frame);
   if (found) {
+    ambient_Pa_ = mean_zero_Pa(frame);
     placements_.push_back(std::move(*found));
   }
   return found.has_value();
@@ -133,7 +148,7 @@ std::string GainSession::progress() const {
     const Fitted &last = solution.placements.back();
     text += ", the last at x " + fixed(last.x_mm, 1) + " y " + fixed(last.y_mm, 1) + " mm" +
             (last.kept ? "" : " (fits no other)") + "; gains known to " +
-            percent(solution.worst_shape_sd()) + ", wanted " + percent(SHAPE_SD_MAX);
+            percent(solution.worst_shape_sd()) + ", wanted " + percent(judgement_.wanted_sd);
   }
   return text;
 }
@@ -146,7 +161,7 @@ calibration GainSession::made(std::optional<double> force_N, std::uint32_t date_
   made.force_scale = DEFAULT_FORCE_SCALE;
   made.force_scale_sd = DEFAULT_FORCE_SCALE_SD;
   if (force_N) {
-    const auto scale = force_scale(array_, placements_, solution, *force_N, prior_);
+    const auto scale = force_scale(array_, placements_, solution, *force_N, shape());
     if (!scale || scale->scale < static_cast<double>(CALIBRATION_FORCE_SCALE_MIN) ||
         scale->scale > static_cast<double>(CALIBRATION_FORCE_SCALE_MAX)) {
       throw Error("the readings are not those of " + fixed(*force_N, 2) + " N: they make " +
@@ -156,6 +171,13 @@ calibration GainSession::made(std::optional<double> force_N, std::uint32_t date_
     made.force_scale = static_cast<float>(scale->scale);
     made.force_scale_sd = static_cast<float>(scale->sd);
   }
+  const Shape found = shape_of(solution);
+  made.sigma_um = micrometres(found.sigma_mm);
+  made.sigma_sd_um = micrometres(found.sigma_sd_mm);
+  made.dip_share_q16 = static_cast<std::uint16_t>(
+      std::lround(std::min(65536.0 * found.dip_share, double(CALIBRATION_DIP_SHARE_MAX_Q16))));
+  made.dip_sd_um = made.dip_share_q16 > 0 ? micrometres(found.dip_sd_mm) : std::uint16_t(0);
+  made.ambient_kPa = static_cast<std::uint8_t>(std::lround(std::min(1e-3 * ambient_Pa_, 255.0)));
   for (std::size_t k = 0; k < solution.gain.size(); k++) {
     made.sensors[k] = {static_cast<float>(solution.gain[k]),
                        static_cast<float>(solution.gain_sd[k])};
@@ -167,8 +189,20 @@ calibration GainSession::made(std::optional<double> force_N, std::uint32_t date_
   return made;
 }
 
-Scatter GainSession::scatter(bool with_gains) const {
-  return calibrating::scatter(array_, placements_, judgement_.solution, with_gains, prior_);
+Shape GainSession::shape() const {
+  Shape shape = shape_of(judgement_.solution);
+  if (prior_.sigma_sd_mm > 0.0) {
+    shape.sigma_mm = prior_.sigma_mm;
+    shape.sigma_sd_mm = prior_.sigma_sd_mm;
+  }
+  return shape;
+}
+
+Scatter GainSession::scatter(bool calibrated) const {
+  const Solution &solution = judgement_.solution;
+  return calibrated ? calibrating::scatter(array_, placements_, solution, solution.gain, shape())
+                    : calibrating::scatter(array_, placements_, solution,
+                                           std::vector<double>(array_.sensors(), 1.0), prior_);
 }
 
 } // namespace fingertip::calibrating

@@ -35,8 +35,8 @@ public:
   /* The calibration for the fingertip; date_s: Unix time. Of a good judgement. Throws Error where
    * the readings are not those of force_N, or a gain is none. */
   calibration made(std::optional<double> force_N, std::uint32_t date_s) const;
-  /* Of the firmware's own fit to the placements, without and with the gains. */
-  Scatter scatter(bool with_gains) const;
+  /* Of the firmware's own fit to the placements, without and with what was found. */
+  Scatter scatter(bool calibrated) const;
 
   const Array &array() const { return array_; }
   const PlacementFinder &finder() const { return finder_; }
@@ -45,8 +45,11 @@ public:
   const std::optional<Wanted> &wanted() const { return wanted_; } /* the best next place */
 
 private:
+  Shape shape() const; /* that will act: found, but for a prior that the user has set */
+
   Array array_;
-  Prior prior_;
+  Shape prior_; /* that the user has set */
+  double ambient_Pa_ = 0.0; /* the mean zero at the last placement */
   PlacementFinder finder_;
   std::vector<Placement> placements_;
   Judgement judgement_;

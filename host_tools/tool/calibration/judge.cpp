@@ -21,6 +21,8 @@ constexpr double FORCE_MODEL_SD = 0.01;
 /* How far the force of a tap is off, over what the readings lose from 0.5 to 1 s, on the twin's
  * pads that relax by 9 to 26 % in 8 s (truth_calibration --seed 500, "relaxing"). */
 constexpr double FADED_BEFORE = 2.7;
+/* Contacts add to sigma^2, each its own spread; sd of that, about the calibration's foot. */
+constexpr double CONTACTS_SD_mm2 = 0.6;
 /* Evidence against a session speaks for itself from so many placements, or when it is so many times
  * the bound from fewer; until then it only keeps a session from being good. */
 constexpr std::size_t EVIDENCE_SURE = 24, EVIDENCE_MIN = 8;
@@ -51,6 +53,15 @@ double rms_beyond(const std::vector<double> &values, const std::vector<double> &
   return std::sqrt(std::max(all * all - chance * chance, 0.0));
 }
 
+/* Rms of the log gains, beyond what their sds make. */
+double spread_of(const Solution &solution) {
+  std::vector<double> logs;
+  for (double gain : solution.gain) {
+    logs.push_back(std::log(gain));
+  }
+  return rms_beyond(logs, solution.gain_sd);
+}
+
 std::string percent(double share) {
   char text[32];
   std::snprintf(text, sizeof text, "%.1f %%", 100.0 * share);
@@ -65,7 +76,12 @@ std::string list_of(const std::vector<std::size_t> &sensors) {
   return text;
 }
 
-/* Differences of the gains of odd and even placements beyond what either can not tell. */
+std::string felt_too_little(const std::vector<std::size_t> &sensors) {
+  return sensors.empty() ? "" : ", so sensors " + list_of(sensors) + " felt too little";
+}
+
+/* Differences of the gains of odd and even placements beyond what either can not tell, and whether
+ * either's make the firmware's fit of the other better. */
 void compare_halves(const Array &array, std::vector<Placement> placements, const Solution &solution,
                     Judgement &judgement) {
   remember(placements);
@@ -103,9 +119,21 @@ void compare_halves(const Array &array, std::vector<Placement> placements, const
   }
   const double gauge_sd = std::hypot(odd.gauge_sd, even.gauge_sd);
   judgement.halves_gauge = std::max(std::sqrt(squares) - HALVES_SDS * gauge_sd, 0.0);
+  /* Location and force alike, either half by the other. */
+  const std::vector<double> ones(array.sensors(), 1.0);
+  double better = 1.0;
+  for (int half : {0, 1}) {
+    const Solution &other = half == 0 ? even : odd;
+    const Scatter raw = scatter(array, halves[half], from[half], ones, {});
+    const Scatter calibrated =
+        scatter(array, halves[half], from[half], other.gain, shape_of(other));
+    better *= calibrated.location_mm * calibrated.force / (raw.location_mm * raw.force);
+  }
+  judgement.helps = better < 1.0;
 }
 
-/* Why the gains are not known: by where the placements are. */
+/* What the placements lack where gains are not known: by where they are. Where they are not all
+ * over the pad the dip seems to tell gains. */
 Reason lacking(const Array &array, const std::vector<Placement> &placements,
                const Solution &solution) {
   if (placements.size() < PLACEMENTS_WANTED || !solution.solved) {
@@ -159,11 +187,11 @@ std::string text_of(const Judgement &j, std::size_t placements) {
     return "too few placements (" + std::to_string(placements) +
            "): place the weight at more places all over the pad";
   case Reason::cluster:
-    return "all placements are near one place, so sensors " + list_of(j.unsure) +
-           " felt too little: place the weight all over the pad";
+    return "all placements are near one place" + felt_too_little(j.unsure) +
+           ": place the weight all over the pad";
   case Reason::one_end:
-    return "part of the pad has no placements, so sensors " + list_of(j.unsure) +
-           " felt too little: place the weight there too";
+    return "part of the pad has no placements" + felt_too_little(j.unsure) +
+           ": place the weight there too";
   case Reason::unsure:
     return "the gains of sensors " + list_of(j.unsure) + " are only known to " +
            percent(s.worst_shape_sd()) +
@@ -190,6 +218,9 @@ std::string text_of(const Judgement &j, std::size_t placements) {
     return "every other placement says other gains, by " +
            percent(std::max(j.halves_shape, j.halves_gauge)) +
            ": something changed meanwhile; begin again";
+  case Reason::useless:
+    return "what half of the placements say does not make the other half better, so the gains "
+           "are as good without: the sensors are alike, or something changed meanwhile";
   case Reason::layout:
     return "the sensors seem to sit " + std::to_string(s.spread.position_mm).substr(0, 4) +
            " mm from where the firmware has them: see geometry.c";
@@ -221,7 +252,7 @@ Evidence against(const Judgement &j) {
 
 /* The firmware's fit to a placement. */
 struct FirmwareFit {
-  FirmwareFit(const Array &array, const Prior &prior) {
+  FirmwareFit(const Array &array, const Shape &shape) {
     std::vector<float> x, y;
     for (std::size_t k = 0; k < array.sensors(); k++) {
       x.push_back(static_cast<float>(array.x_mm[k]));
@@ -231,8 +262,10 @@ struct FirmwareFit {
                                   y.data(), static_cast<float>(array.pitch_mm)) == FT_OK;
     settings.iterations = ITERATIONS;
     settings.noise_Pa_q10 = NOISE_Pa_Q10;
-    settings.prior_sigma_mm = static_cast<float>(prior.sigma_mm);
-    settings.prior_width_mm = static_cast<float>(prior.width_mm);
+    settings.prior_sigma_mm = static_cast<float>(shape.sigma_mm);
+    settings.prior_width_mm = static_cast<float>(shape.sigma_sd_mm);
+    settings.dip_share = static_cast<float>(shape.dip_share);
+    settings.dip_sd_mm = static_cast<float>(shape.dip_sd_mm);
   }
   std::optional<fit_result> operator()(const Placement &placement,
                                        const std::vector<double> &gain) {
@@ -263,7 +296,7 @@ struct FirmwareFit {
 const char *name_of(Reason reason) {
   static const char *const names[] = {"none",     "too_few",   "cluster", "one_end", "unsure",
                                       "weights",  "elongated", "offsets", "drift",   "stray",
-                                      "residual", "halves",    "layout",  "silent"};
+                                      "residual", "halves",    "useless", "layout",  "silent"};
   return names[static_cast<int>(reason)];
 }
 
@@ -271,12 +304,17 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
   Judgement j;
   j.solution = solve(array, placements);
   const Solution &s = j.solution;
+
+  const double helps = s.solved ? HELPS_SHARE * spread_of(s) : 0.0;
+  const bool enough = placements.size() >= PLACEMENTS_ENOUGH;
+  j.wanted_sd = enough ? std::max(SHAPE_SD_WANTED, helps) : SHAPE_SD_WANTED;
+  const double wanted_gauge_sd = enough ? std::max(GAUGE_SD_WANTED, helps) : GAUGE_SD_WANTED;
   std::uint32_t seen = 0;
   for (const Placement &placement : placements) {
     seen |= placement.usable;
   }
   for (std::size_t k = 0; k < array.sensors(); k++) {
-    if (!s.solved || s.shape_sd[k] > SHAPE_SD_MAX) {
+    if (!s.solved || s.shape_sd[k] > j.wanted_sd) {
       j.unsure.push_back(k);
     }
     if (!(seen >> k & 1u)) {
@@ -284,9 +322,10 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
     }
   }
   if (s.solved) {
-    j.ellipse = std::sqrt(0.5 * (s.ellipse_of_all[0] * s.ellipse_of_all[0] +
-                                 s.ellipse_of_all[1] * s.ellipse_of_all[1]) +
-                          s.spread.ellipse * s.spread.ellipse);
+    const double of_all = rms_beyond({std::begin(s.ellipse_of_all), std::end(s.ellipse_of_all)},
+                                     {std::begin(s.ellipse_of_all_sd),
+                                      std::end(s.ellipse_of_all_sd)});
+    j.ellipse = std::hypot(of_all, s.spread.ellipse);
     j.kept_share = double(s.kept) / double(placements.size());
     j.offset_share = rms_beyond(s.offset_Pa, s.offset_sd_Pa) / s.peak_Pa;
     j.drift_share = rms_beyond(s.drift_Pa, s.drift_sd_Pa) / s.peak_Pa;
@@ -306,28 +345,36 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
     j.text = text_of(j, placements.size());
     return j;
   }
+  const Reason lacks = lacking(array, placements, s);
+  const bool all_over = lacks != Reason::cluster && lacks != Reason::one_end;
   const bool known = placements.size() >= PLACEMENTS_WANTED && s.solved && j.unsure.empty() &&
-                     s.gauge_sd <= GAUGE_SD_MAX;
+                     s.gauge_sd <= wanted_gauge_sd && all_over;
   if (!known || evidence.times > 1.0) {
-    j.reason = known ? evidence.reason : lacking(array, placements, s);
+    j.reason = known ? evidence.reason : lacks;
     j.state = last ? Judgement::State::refused : Judgement::State::more;
     j.text = text_of(j, placements.size());
     return j;
   }
   compare_halves(array, placements, s, j);
   const bool agree = j.halves_shape <= HALVES_SHAPE_MAX && j.halves_gauge <= HALVES_GAUGE_MAX;
-  j.reason = agree ? Reason::none : Reason::halves;
-  j.state = agree                                      ? Judgement::State::good
+  j.reason = !agree ? Reason::halves : j.helps ? Reason::none : Reason::useless;
+  j.state = agree && j.helps                           ? Judgement::State::good
             : last || placements.size() >= HALVES_SURE ? Judgement::State::refused
                                                        : Judgement::State::more;
   j.text = text_of(j, placements.size());
   return j;
 }
 
+Shape shape_of(const Solution &solution) {
+  return {solution.sigma_mm,
+          std::hypot(solution.sigma_sd_mm, CONTACTS_SD_mm2 / (2.0 * solution.sigma_mm)),
+          std::max(solution.dip, 0.0), DIP * solution.width_mm};
+}
+
 std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements,
                                       const Solution &solution, double force_N,
-                                      const Prior &prior) {
-  FirmwareFit fit(array, prior);
+                                      const Shape &shape) {
+  FirmwareFit fit(array, shape);
   std::vector<double> forces, fadings;
   for (std::size_t i = 0; i < placements.size(); i++) {
     const auto fitted =
@@ -353,14 +400,11 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
 }
 
 Scatter scatter(const Array &array, const std::vector<Placement> &placements,
-                const Solution &solution, bool with_gains, const Prior &prior) {
-  FirmwareFit fit(array, prior);
-  const std::vector<double> ones(array.sensors(), 1.0);
+                const Solution &solution, const std::vector<double> &gain, const Shape &shape) {
+  FirmwareFit fit(array, shape);
   std::vector<double> distances, forces;
   for (std::size_t i = 0; i < placements.size(); i++) {
-    const auto fitted = solution.placements[i].kept
-                            ? fit(placements[i], with_gains ? solution.gain : ones)
-                            : std::nullopt;
+    const auto fitted = solution.placements[i].kept ? fit(placements[i], gain) : std::nullopt;
     if (fitted) {
       distances.push_back(
           std::hypot(static_cast<double>(fitted->x_mm) - solution.placements[i].x_mm,

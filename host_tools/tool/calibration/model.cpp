@@ -34,6 +34,9 @@ Model::Model(const Array &array, const std::vector<Placement> &placements,
   }
   std::nth_element(peaks.begin(), peaks.begin() + std::ptrdiff_t(peaks.size() / 2), peaks.end());
   peak_Pa_ = std::max(peaks[peaks.size() / 2], 1.0);
+  const std::size_t strong = 9 * peaks.size() / 10;
+  std::nth_element(peaks.begin(), peaks.begin() + std::ptrdiff_t(strong), peaks.end());
+  near_Pa_ = std::max(peaks[strong], 1.0);
   middle_s_ = 0.5 * (first_s + last_s);
   half_s_ = std::max(0.5 * (last_s - first_s), 1e-9);
 }
@@ -117,8 +120,11 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau,
   const double per = 0.5 / (width * width), narrow_per = per / (NARROW * NARROW);
   const double wide = std::exp(-per * square), narrow = std::exp(-narrow_per * square);
   const double strength = std::exp(g[k] + g[layout.log_peak()] + l[2] - 2.0 * l[3]);
-  const double value = strength * ((1.0 - m) * wide + m * narrow);
-  const double by_square = -strength * ((1.0 - m) * wide * per + m * narrow * narrow_per);
+  const double dip_per = per / (DIP * DIP), h = g[layout.dip()];
+  const double dip = std::exp(-dip_per * square);
+  const double value = strength * ((1.0 - m) * wide + m * narrow - h * dip);
+  const double by_square =
+      -strength * ((1.0 - m) * wide * per + m * narrow * narrow_per - h * dip * dip_per);
   const double by_log_width = -2.0 * square * by_square;
   const double by_u = by_square * (2.0 * u - 4.0 * q1 * u - 4.0 * q2 * v);
   const double by_v = by_square * (2.0 * v + 4.0 * q1 * v - 4.0 * q2 * u);
@@ -136,10 +142,11 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau,
                            layout.drift(k),
                            layout.memory(k),
                            layout.ellipse(0),
-                           layout.ellipse(1)};
+                           layout.ellipse(1),
+                           layout.dip()};
   const double by[TOUCHED] = {value,       value, by_log_width, strength * (narrow - wide),
                               by_u,        by_v,  1.0,          tau,
-                              -earlier_Pa, by_q1, by_q2};
+                              -earlier_Pa, by_q1, by_q2, -strength * dip};
   std::copy(at, at + TOUCHED, r.at);
   std::copy(by, by + TOUCHED, r.by);
   r.by_local << -by_u, -by_v, value, by_log_width - 2.0 * value, by_q1, by_q2;
@@ -163,8 +170,14 @@ std::pair<double, double> Model::prior(int at) const {
   if (at < n) {
     return {0.0, assumed_.gain};
   }
+  if (at == layout.log_peak()) {
+    return {std::log(near_Pa_), assumed_.peak};
+  }
   if (at == layout.mixing()) {
     return {assumed_.mixing, assumed_.mixing_sd};
+  }
+  if (at == layout.dip()) {
+    return {0.0, assumed_.dip};
   }
   if (at < layout.dx(0)) {
     return {0.0, at < layout.ellipse(0) ? 0.0 : assumed_.ellipse_of_all};

@@ -13,7 +13,7 @@
 namespace fingertip::calibrating {
 
 constexpr int LOCAL = 6;  /* x, y, e, w, q1, q2 */
-constexpr int COMMON = 5; /* log A, log s, m, q1, q2 of all */
+constexpr int COMMON = 6; /* log A, log s, m, q1, q2 of all, h */
 using Local = Eigen::Matrix<double, LOCAL, 1>;
 using LocalSquare = Eigen::Matrix<double, LOCAL, LOCAL>;
 
@@ -29,9 +29,10 @@ struct Layout {
   int drift(int k) const { return 4 * sensors + COMMON + k; }
   int memory(int k) const { return 5 * sensors + COMMON + k; }
   int ellipse(int which) const { return sensors + 3 + which; }
+  int dip() const { return sensors + 5; }
   int size() const { return 6 * sensors + COMMON; }
 };
-constexpr int TOUCHED = 11; /* global unknowns that a reading depends on */
+constexpr int TOUCHED = 12; /* global unknowns that a reading depends on */
 
 struct Unknowns {
   Eigen::VectorXd global;
@@ -84,7 +85,7 @@ private:
   const std::vector<Placement> &placements_;
   Assumptions assumed_; /* prior spreads as they are estimated */
   double excess_ = 1.0; /* of the model's own error over what is assumed */
-  double peak_Pa_ = 0.0, middle_s_ = 0.0, half_s_ = 0.0;
+  double peak_Pa_ = 0.0, near_Pa_ = 0.0, middle_s_ = 0.0, half_s_ = 0.0;
 };
 
 } // namespace fingertip::calibrating

@@ -36,6 +36,22 @@ MatrixXd gauge(const Array &array) {
   return MatrixXd(qr.householderQ()).leftCols(qr.rank());
 }
 
+/* Width, over that of the wide part, of the Gaussian nearest to the two parts of the profile: by
+ * least squares over the plane, best amplitude each. Products of Gaussians have closed integrals. */
+double nearest_gaussian(double mixing) {
+  const auto overlap = [](double a, double b) { return a * a * b * b / (a * a + b * b); };
+  double best = 1.0, most = 0.0;
+  for (double width = NARROW; width <= 1.2; width += 0.002) {
+    const double with = (1.0 - mixing) * overlap(1.0, width) + mixing * overlap(NARROW, width);
+    const double explained = with * with / overlap(width, width);
+    if (explained > most) {
+      most = explained;
+      best = width;
+    }
+  }
+  return best;
+}
+
 /* Of the log gains less their mean, given that of all global unknowns. */
 MatrixXd gain_covariance(const MatrixXd &covariance, Eigen::Index n) {
   const MatrixXd centre = MatrixXd::Identity(n, n) - MatrixXd::Constant(n, n, 1.0 / double(n));
@@ -67,6 +83,7 @@ void resume(const Solution &solution, Model &model, Optimiser &optimiser) {
   global[layout.mixing()] = solution.mixing;
   global[layout.ellipse(0)] = solution.ellipse_of_all[0];
   global[layout.ellipse(1)] = solution.ellipse_of_all[1];
+  global[layout.dip()] = solution.dip;
   for (std::size_t i = 0; i < model.placements().size(); i++) {
     const Fitted &fitted = solution.placements[i];
     optimiser.kept[i] = fitted.kept;
@@ -235,8 +252,24 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
   solution.peak_Pa = peak_Pa * mean;
   solution.width_mm = std::exp(global[layout.log_width()]);
   solution.mixing = global[layout.mixing()];
-  solution.ellipse_of_all[0] = global[layout.ellipse(0)];
-  solution.ellipse_of_all[1] = global[layout.ellipse(1)];
+  for (int which : {0, 1}) {
+    const int at = layout.ellipse(which);
+    solution.ellipse_of_all[which] = global[at];
+    solution.ellipse_of_all_sd[which] = std::sqrt(std::max(covariance(at, at), 0.0));
+  }
+  solution.dip = global[layout.dip()];
+  solution.dip_sd = std::sqrt(std::max(covariance(layout.dip(), layout.dip()), 0.0));
+  solution.sigma_mm = solution.width_mm * nearest_gaussian(solution.mixing);
+  /* By the width and the mixing, which go against each other. */
+  constexpr double STEP = 0.05;
+  const double by_mixing = (nearest_gaussian(solution.mixing + STEP) -
+                            nearest_gaussian(solution.mixing - STEP)) /
+                           (2.0 * STEP * nearest_gaussian(solution.mixing));
+  const int at_width = layout.log_width(), at_mixing = layout.mixing();
+  const double variance = covariance(at_width, at_width) +
+                          2.0 * by_mixing * covariance(at_width, at_mixing) +
+                          by_mixing * by_mixing * covariance(at_mixing, at_mixing);
+  solution.sigma_sd_mm = solution.sigma_mm * std::sqrt(std::max(variance, 0.0));
   solution.solved = std::isfinite(solution.cost) && of_gains.allFinite();
   return solution;
 }

@@ -42,6 +42,7 @@ void print_result(const GainSession &work, const calibration &made, std::optiona
   } else {
     std::printf("force scale         unknown: give the weight, to calibrate forces too\n");
   }
+  std::printf("%s\n", shape_text(made).c_str());
   std::fflush(stdout);
 }
 
@@ -119,6 +120,7 @@ int show(const CalibrateOptions &options) {
               date_text(info.calibration.date_s).c_str(), info.calibration.placements,
               fixed(static_cast<double>(info.calibration.force_scale), 3).c_str(),
               fixed(static_cast<double>(info.calibration.force_scale_sd), 3).c_str());
+  std::printf("%s\n", shape_text(info.calibration).c_str());
   print_gains(info.calibration, info.sensor_count);
   return 0;
 }

@@ -1,5 +1,7 @@
 #include "tool/cli/gains.hpp"
 
+#include "libfingertip/text.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -14,6 +16,15 @@ std::string date_text(std::uint32_t date_s) {
   char text[32];
   std::strftime(text, sizeof text, "%Y-%m-%d %H:%M UTC", &utc);
   return text;
+}
+
+std::string shape_text(const calibration &calibration) {
+  if (calibration.sigma_um == 0) {
+    return "a usual contact: not known";
+  }
+  return "a usual contact: sigma " + fixed(1e-3 * calibration.sigma_um, 2) + " mm, sd " +
+         fixed(1e-3 * calibration.sigma_sd_um, 2) + " mm; dip around it " +
+         fixed(100.0 * calibration.dip_share_q16 / 65536.0, 1) + " % of its peak";
 }
 
 void print_gains(const calibration &calibration, std::uint8_t sensor_count) {

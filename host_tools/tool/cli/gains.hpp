@@ -12,6 +12,8 @@ namespace fingertip {
 std::string date_text(std::uint32_t date_s);
 
 /* On standard output a row for each sensor, with a bar from the mean to its gain. */
+/* "a usual contact: sigma 5.58 mm, sd 0.06 mm; dip around it 1.3 % of its peak" */
+std::string shape_text(const calibration &calibration);
 void print_gains(const calibration &calibration, std::uint8_t sensor_count);
 
 } // namespace fingertip

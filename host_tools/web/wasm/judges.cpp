@@ -185,6 +185,11 @@ void gains_result(const GainSession *session, double force_N, double date_s) {
   json.field("placements", static_cast<double>(made.placements));
   json.field("force_scale", static_cast<double>(made.force_scale));
   json.field("force_scale_sd", static_cast<double>(made.force_scale_sd));
+  json.field("sigma_um", static_cast<double>(made.sigma_um));
+  json.field("sigma_sd_um", static_cast<double>(made.sigma_sd_um));
+  json.field("dip_share_q16", static_cast<double>(made.dip_share_q16));
+  json.field("dip_sd_um", static_cast<double>(made.dip_sd_um));
+  json.field("ambient_kPa", static_cast<double>(made.ambient_kPa));
   json.name("gain").list(gain).name("gain_sd").list(gain_sd).end();
   tell_scatter(json, "before", session->scatter(false));
   tell_scatter(json, "after", session->scatter(true));

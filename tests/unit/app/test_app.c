@@ -243,6 +243,46 @@ static struct wire_info info_after_restart(void) {
   return get_info();
 }
 
+/* The pad's shape acts until the user sets a prior, and again when it is taken back. */
+static void a_calibration_tells_the_fit_the_pads_shape(void) {
+  native_cdc_open();
+  run_for(300);
+  struct wire_packet command = calibrate_command();
+  struct calibration *calibration = &command.body.cmd_calibrate.calibration;
+  calibration->sigma_um = 5552;
+  calibration->sigma_sd_um = 60;
+  calibration->dip_share_q16 = 3277;
+  calibration->dip_sd_um = 13954;
+  calibration->force_scale_sd = 0.01f;
+  calibration->ambient_kPa = 101;
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(command));
+  TEST_ASSERT_EQUAL_FLOAT(5.552f, app.fit_settings.prior_sigma_mm);
+  TEST_ASSERT_EQUAL_FLOAT(0.06f, app.fit_settings.prior_width_mm);
+  TEST_ASSERT_EQUAL_FLOAT(3277.0f / 65536.0f, app.fit_settings.dip_share);
+  TEST_ASSERT_EQUAL_FLOAT(13.954f, app.fit_settings.dip_sd_mm);
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, get_info().prior_width_mm);
+  run_for(1100);
+  TEST_ASSERT_FLOAT_WITHIN(0.003f, 0.01f, app.contact_settings.force_scale_sd);
+  ask((struct wire_packet){.type = WIRE_CMD_PRIOR, .body.cmd_prior = {3.1f, 0.4f}});
+  TEST_ASSERT_EQUAL_FLOAT(3.1f, app.fit_settings.prior_sigma_mm);
+  TEST_ASSERT_EQUAL_FLOAT(13.954f, app.fit_settings.dip_sd_mm);
+  ask((struct wire_packet){.type = WIRE_CMD_PRIOR});
+  TEST_ASSERT_EQUAL_FLOAT(5.552f, app.fit_settings.prior_sigma_mm);
+
+  /* A force scale that was found 20 kPa away is doubted by 11 %. */
+  calibration->ambient_kPa = 81;
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(command));
+  run_for(1100);
+  TEST_ASSERT_FLOAT_WITHIN(0.02f, 0.11f * calibration->force_scale,
+                           app.contact_settings.force_scale_sd);
+  calibration->dip_share_q16 = 6554;
+  TEST_ASSERT_EQUAL(WIRE_RESULT_OUT_OF_RANGE, ask(command));
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
+                    ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, app.fit_settings.prior_width_mm);
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, app.fit_settings.dip_share);
+}
+
 static void a_calibration_outlives_power(void) {
   native_cdc_open();
   run_for(300);
@@ -841,6 +881,7 @@ int main(void) {
   RUN_TEST(info_tells_what_this_is);
   RUN_TEST(settings_are_checked_and_kept);
   RUN_TEST(a_calibration_acts_on_readings_and_force);
+  RUN_TEST(a_calibration_tells_the_fit_the_pads_shape);
   RUN_TEST(a_calibration_outlives_power);
   RUN_TEST(settings_are_kept_when_asked_for_and_forgotten_likewise);
   RUN_TEST(storing_takes_its_time_and_keeps_nobody_waiting);

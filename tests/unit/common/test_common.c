@@ -153,6 +153,19 @@ static void test_calibrations_are_in_their_ranges(void) {
     }
     *ranges[i].value = was;
   }
+  static const struct {
+    uint16_t sigma_um, sigma_sd_um, dip_share_q16, dip_sd_um;
+    bool valid;
+  } shapes[] = {{500, 10, 0, 0, true},  {65535, 65535, 6553, 1, true}, {499, 10, 0, 0, false},
+                {500, 9, 0, 0, false},  {0, 10, 0, 0, false},          {0, 0, 6554, 9000, false},
+                {0, 0, 3000, 0, false}, {0, 0, 0, 9000, false},        {0, 0, 0, 0, true}};
+  for (size_t i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
+    calibration.sigma_um = shapes[i].sigma_um;
+    calibration.sigma_sd_um = shapes[i].sigma_sd_um;
+    calibration.dip_share_q16 = shapes[i].dip_share_q16;
+    calibration.dip_sd_um = shapes[i].dip_sd_um;
+    TEST_ASSERT_EQUAL(shapes[i].valid, calibration_is_valid(&calibration, 15));
+  }
   calibration.sensors[15].gain = NAN; /* of no sensor */
   TEST_ASSERT_TRUE(calibration_is_valid(&calibration, 15));
 }

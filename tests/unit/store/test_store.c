@@ -30,6 +30,11 @@ static struct calibration some_calibration(void) {
   calibration.placements = (uint16_t)random_below(&random, 100);
   calibration.force_scale = (float)random_between(&random, 0.5, 2.0);
   calibration.force_scale_sd = (float)random_between(&random, 0.0, 0.2);
+  calibration.sigma_um = (uint16_t)(500 + random_below(&random, 20000));
+  calibration.sigma_sd_um = (uint16_t)(10 + random_below(&random, 1000));
+  calibration.dip_share_q16 = (uint16_t)(1 + random_below(&random, 6000));
+  calibration.dip_sd_um = (uint16_t)(1 + random_below(&random, 60000));
+  calibration.ambient_kPa = (uint8_t)random_below(&random, 256);
   for (int k = 0; k < SENSORS; k++) {
     calibration.sensors[k] = (struct sensor_calibration){(float)random_between(&random, 0.7, 1.3),
                                                          (float)random_between(&random, 0.0, 0.1)};
@@ -364,13 +369,13 @@ static void what_another_firmware_wrote_is_left_alone(void) {
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &calibration));
   TEST_ASSERT_EQUAL(FT_OK, finish());
   const struct native_flash ours = native_flash;
-  alter_record(8, 2); /* as it was: the bytes are where the header says */
+  alter_record(8, 3); /* as it was: the bytes are where the header says */
   TEST_ASSERT_EQUAL_MEMORY(&ours, &native_flash, sizeof ours);
   static const struct {
     uint32_t at;
     uint16_t value;
-  } others[] = {{8, 1},   {8, 3},    {8, UINT16_MAX}, {20, 14 << 8 | 1},
-                {10, 60}, {10, 487}, {10, 162},       {32, 0x42C8}};
+  } others[] = {{8, 1},   {8, 2},    {8, 4},    {8, UINT16_MAX}, {20, 14 << 8 | 1},
+                {10, 60}, {10, 487}, {10, 162}, {32, 0x42C8}};
   for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
     native_flash = ours;
     alter_record(others[i].at, others[i].value);
@@ -407,10 +412,38 @@ static void generations_go_round(void) {
   }
 }
 
+/* As the firmware before the calibration's shape wrote it, without its bytes. */
+static void records_of_version_2_are_read(void) {
+  struct store_content kept = keep_something();
+  native_flash_reset(7);
+  store_init(&store, SENSORS);
+  TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &kept.calibration));
+  TEST_ASSERT_EQUAL(FT_OK, finish());
+  enum { LENGTH_2 = 4 + 14 + 8 * SENSORS + 24 + 177 };
+  memset(native_flash.bytes + 20 + LENGTH_2, 0xFF, 9);
+  alter_record(8, 2);
+  alter_record(10, LENGTH_2);
+  restart();
+  TEST_ASSERT_FALSE(store.damaged || store_is_writing(&store));
+  TEST_ASSERT_TRUE(store.content.has_calibration);
+  struct calibration read = store.content.calibration;
+  TEST_ASSERT_EQUAL_UINT16(0, read.sigma_um);
+  TEST_ASSERT_EQUAL_UINT8(0, read.ambient_kPa);
+  read.sigma_um = kept.calibration.sigma_um;
+  read.sigma_sd_um = kept.calibration.sigma_sd_um;
+  read.dip_share_q16 = kept.calibration.dip_share_q16;
+  read.dip_sd_um = kept.calibration.dip_sd_um;
+  read.ambient_kPa = kept.calibration.ambient_kPa;
+  TEST_ASSERT_EQUAL_MEMORY(&kept.calibration, &read, sizeof read);
+}
+
 /* As the firmware before pad profiles wrote it: without their bytes, whatever bit 2 of the parts
  * said. The next write brings it to this version. */
 static void records_of_version_1_are_read(void) {
   struct store_content kept = keep_something();
+  kept.calibration.sigma_um = kept.calibration.sigma_sd_um = 0;
+  kept.calibration.dip_share_q16 = kept.calibration.dip_sd_um = 0;
+  kept.calibration.ambient_kPa = 0;
   native_flash_reset(7);
   store_init(&store, SENSORS);
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_calibration(&store, &kept.calibration));
@@ -534,6 +567,7 @@ int main(void) {
   RUN_TEST(what_another_firmware_wrote_is_left_alone);
   RUN_TEST(generations_go_round);
   RUN_TEST(records_of_version_1_are_read);
+  RUN_TEST(records_of_version_2_are_read);
   RUN_TEST(rubbish_is_no_damage_and_in_nobodys_way);
   RUN_TEST(a_flash_that_has_worn_out_is_told_and_what_was_stays);
   RUN_TEST(slots_that_do_not_hold_what_is_written_are_given_up);

@@ -184,6 +184,11 @@ static struct calibration calibration_of_two(void) {
       .placements = 30,
       .force_scale = 1.0625f,
       .force_scale_sd = 0.03125f,
+      .sigma_um = 5552,
+      .sigma_sd_um = 60,
+      .dip_share_q16 = 3277,
+      .dip_sd_um = 13954,
+      .ambient_kPa = 101,
       .sensors = {{0.875f, 0.0078125f}, {1.125f, 0.015625f}},
   };
 }

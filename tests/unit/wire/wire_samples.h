@@ -160,6 +160,11 @@ static inline void sample_calibration(struct sampler *sampler, unsigned sensor_c
   calibration->placements = (uint16_t)sample_u32(sampler);
   calibration->force_scale = sample_f32(sampler);
   calibration->force_scale_sd = sample_f32(sampler);
+  calibration->sigma_um = (uint16_t)sample_u32(sampler);
+  calibration->sigma_sd_um = (uint16_t)sample_u32(sampler);
+  calibration->dip_share_q16 = (uint16_t)sample_u32(sampler);
+  calibration->dip_sd_um = (uint16_t)sample_u32(sampler);
+  calibration->ambient_kPa = (uint8_t)sample_u32(sampler);
   for (unsigned k = 0; k < sensor_count; k++) {
     calibration->sensors[k].gain = sample_f32(sampler);
     calibration->sensors[k].gain_sd = sample_f32(sampler);

@@ -86,7 +86,8 @@ public:
   struct Felt {
     std::vector<double> location_mm, force; // distance from the truth; estimate over truth
   };
-  Felt felt(const std::vector<double> &gain, const std::vector<double> &gain_sd) const {
+  Felt felt(const std::vector<double> &gain, const std::vector<double> &gain_sd,
+            const calibrating::Shape &shape = {}) const {
     fit_array array;
     fit_array_init_grid(&array, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
                         geometry.pitch_mm);
@@ -94,6 +95,10 @@ public:
     settings.iterations = DEFAULT_FIT_ITERATIONS;
     settings.cut_noises = DEFAULT_CUT_NOISES;
     settings.noise_Pa_q10 = static_cast<std::int32_t>(NOISE_Pa * 1024.0);
+    settings.prior_sigma_mm = static_cast<float>(shape.sigma_mm);
+    settings.prior_width_mm = static_cast<float>(shape.sigma_sd_mm);
+    settings.dip_share = static_cast<float>(shape.dip_share);
+    settings.dip_sd_mm = static_cast<float>(shape.dip_sd_mm);
     for (std::size_t k = 0; k < gain_sd.size(); k++) {
       settings.gain_sd_q16[k] = static_cast<std::uint16_t>(std::lround(65536.0 * gain_sd[k]));
     }
@@ -110,6 +115,10 @@ public:
       felt.force.push_back(static_cast<double>(result.force_N) / tap.force_N);
     }
     return felt;
+  }
+
+  Felt felt(const Solution &solution) const {
+    return felt(solution.gain, solution.gain_sd, calibrating::shape_of(solution));
   }
 
 private:
@@ -181,6 +190,10 @@ struct PadCase {
 };
 
 void note_evidence(json &evidence, const Judgement &j) {
+  evidence["dip"].push_back(j.solution.dip);
+  evidence["dip_sd"].push_back(j.solution.dip_sd);
+  evidence["sigma_mm"].push_back(j.solution.sigma_mm);
+  evidence["sigma_sd_mm"].push_back(j.solution.sigma_sd_mm);
   evidence["force"].push_back(j.solution.spread.force);
   evidence["ellipse"].push_back(j.ellipse);
   evidence["memory"].push_back(j.solution.spread.memory);
@@ -242,12 +255,13 @@ PadCase try_pads(const std::string &what, const Options &options, std::size_t pa
       placements.push_back(*session.next(pad));
     }
     const Solution solution = calibrating::solve(session_array(), placements);
-    const auto scale = calibrating::force_scale(session_array(), placements, solution, WEIGHT_N);
+    const auto scale = calibrating::force_scale(session_array(), placements, solution, WEIGHT_N,
+                                                 calibrating::shape_of(solution));
     SessionPad fresh(pad_options, layer_mm, seed);
     const std::vector<double> truth = fresh.settled_gains();
     const Taps taps(fresh, objects.all(), seed);
     const Taps::Felt before = taps.felt(ones(), all_sd(RAW_GAIN_SD));
-    const Taps::Felt after = taps.felt(solution.gain, solution.gain_sd);
+    const Taps::Felt after = taps.felt(solution);
     const Taps::Felt best = taps.felt(truth, all_sd(0.0));
 
     std::array<double, COUNTS.size()> at_count{}, sd_at_count{};
@@ -259,7 +273,7 @@ PadCase try_pads(const std::string &what, const Options &options, std::size_t pa
         first.push_back(*some.next(other));
       }
       const Solution partial = calibrating::solve(session_array(), first);
-      at_count[c] = median(taps.felt(partial.gain, partial.gain_sd).location_mm);
+      at_count[c] = median(taps.felt(partial).location_mm);
       sd_at_count[c] = partial.worst_shape_sd();
     }
 
@@ -267,9 +281,7 @@ PadCase try_pads(const std::string &what, const Options &options, std::size_t pa
     Session led(objects.feet, SessionKind::good, seed, calibrating::PLACEMENTS_MAX);
     const Outcome outcome = lead(led, led_pad);
     const bool accepted = outcome.judgement.state == Judgement::State::good;
-    const bool worse = accepted && median(taps.felt(outcome.judgement.solution.gain,
-                                                    outcome.judgement.solution.gain_sd)
-                                              .location_mm) > median(before.location_mm);
+    const bool worse = accepted && median(taps.felt(outcome.judgement.solution).location_mm) > median(before.location_mm);
 
     const std::lock_guard<std::mutex> lock(adding);
     all.before_mm.push_back(median(before.location_mm));
@@ -355,8 +367,7 @@ BadCase try_bad(SessionKind kind, const Options &options, const Objects &objects
     bool worse = false;
     if (outcome.judgement.state == Judgement::State::good) {
       const Taps taps(SessionPad(PadOptions{}, objects.feet.layer_mm, seed), objects.all(), seed);
-      worse = median(taps.felt(outcome.judgement.solution.gain, outcome.judgement.solution.gain_sd)
-                         .location_mm) > median(taps.felt(ones(), all_sd(RAW_GAIN_SD)).location_mm);
+      worse = median(taps.felt(outcome.judgement.solution).location_mm) > median(taps.felt(ones(), all_sd(RAW_GAIN_SD)).location_mm);
     }
     const std::lock_guard<std::mutex> lock(adding);
     all.refused += outcome.judgement.state == Judgement::State::refused;
@@ -383,14 +394,20 @@ json measure(const Options &options) {
   const double pads = double(options.pads);
 
   const PadCase usual =
-      try_pads("10 % gain spread", options, options.pads, objects, {10.0, 0.0, 0.0}, true);
+      try_pads("10 % gain spread", options, options.pads, objects, {10.0}, true);
   // Relaxation of 9 to 26 %, sensors soldered 0.1 mm (sd) off.
   const PadCase rough =
       try_pads("rough pads", options, options.pads, objects, {10.0, 17.5, 0.1}, false);
   const PadCase relaxing =
       try_pads("relaxing pads", options, (options.pads + 1) / 2, objects, {10.0, 17.5, 0.0}, false);
   const PadCase thin =
-      try_pads("6 mm", options, (options.pads + 9) / 10, thin_objects, {10.0, 0.0, 0.0}, false);
+      try_pads("6 mm", options, (options.pads + 9) / 10, thin_objects, {10.0}, false);
+  // As real arrays are.
+  const PadOptions real{20.0, 0.0, 0.1, 5.0, 3.5};
+  const PadCase cast =
+      try_pads("with a dip", options, (options.pads + 1) / 2, objects, real, false);
+  const PadCase thin_cast =
+      try_pads("6 mm, dip", options, (options.pads + 4) / 5, thin_objects, real, false);
 
   json bad = json::object();
   double refused_worst = 100.0;
@@ -434,6 +451,8 @@ json measure(const Options &options) {
         {"rough", table_of(rough)},
         {"relaxing", table_of(relaxing)},
         {"layer_6_mm", table_of(thin)},
+        {"dip", table_of(cast)},
+        {"layer_6_mm_dip", table_of(thin_cast)},
         {"bad_sessions", bad},
         {"by_placements", by_count}}},
   };

@@ -34,6 +34,8 @@ twin::EffectValues effects_of(const PadOptions &options) {
   if (options.relaxation_percent > 0.0) {
     values["relaxation"] = options.relaxation_percent;
   }
+  values["dip"] = options.dip_percent;
+  values["widths"] = options.widths_percent;
   return values;
 }
 
@@ -85,8 +87,10 @@ void SessionPad::aim(const twin::ContactTable &object, double force_N, double x_
                      double angle_rad) {
   const double c = std::cos(angle_rad), s = std::sin(angle_rad);
   for (std::size_t k = 0; k < x_mm_.size(); k++) {
-    const double dx = x_mm_[k] - x_mm, dy = y_mm_[k] - y_mm;
-    base_Pa_[k] = object.base_pressure_Pa(force_N, c * dx + s * dy, c * dy - s * dx);
+    const double width = pad_.seats()[k].width;
+    const double dx = (x_mm_[k] - x_mm) / width, dy = (y_mm_[k] - y_mm) / width;
+    base_Pa_[k] =
+        object.base_pressure_Pa(force_N, c * dx + s * dy, c * dy - s * dx, pad_.dip_share());
   }
 }
 
@@ -235,7 +239,8 @@ Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::
         break;
       }
       const auto scale =
-          calibrating::force_scale(session_array(), placements, judgement.solution, WEIGHT_N);
+          calibrating::force_scale(session_array(), placements, judgement.solution, WEIGHT_N,
+                               calibrating::shape_of(judgement.solution));
       if (judgement.state == calibrating::Judgement::State::good && scale) {
         const std::vector<double> truth = pad.settled_gains();
         Calibrated left{{}, judgement.solution.gain_sd, scale->scale, scale->sd};

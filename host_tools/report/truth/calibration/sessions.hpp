@@ -22,6 +22,7 @@ struct PadOptions {
   double gain_percent = 10.0;      // spread of the gains
   double relaxation_percent = 0.0; // mean of what a sensor loses in a hold; 17.5: 9 to 26 %
   double misplaced_mm = 0.0;       // sd of a sensor's place, each way
+  double dip_percent = 0.0, widths_percent = 0.0;
 };
 
 // Fifteen sensors under a layer, over time. What touches it is a table of the twin.

@@ -69,10 +69,15 @@ export interface GainResult {
     placements: number;
     force_scale: number;
     force_scale_sd: number;
+    sigma_um: number;
+    sigma_sd_um: number;
+    dip_share_q16: number;
+    dip_sd_um: number;
+    ambient_kPa: number;
     gain: number[];
     gain_sd: number[];
   };
-  /** How far the firmware's fit scatters over the placements without the gains, and with them. */
+  /** How far the firmware's fit scatters over the placements without the calibration, and with it. */
   before: Scatter;
   after: Scatter;
 }

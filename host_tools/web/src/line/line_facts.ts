@@ -1,6 +1,6 @@
 /** written by firmware/wire/line.py from line.toml; change it there. */
 
-export const WIRE_VERSION = 5;
+export const WIRE_VERSION = 6;
 export const LOADER_MAGIC = 0x746f6f42;
 
 export const PacketType = {
@@ -280,6 +280,16 @@ export interface Info extends Header {
   force_scale: number;
   /** its standard deviation */
   force_scale_sd: number;
+  /** sigma of a usual contact on this pad, um; 0: not known */
+  calibration_sigma_um: number;
+  /** its standard deviation from contact to contact */
+  calibration_sigma_sd_um: number;
+  /** depth of the dip around a contact, of its peak, 1/65536; 0: none */
+  calibration_dip_share_q16: number;
+  /** standard deviation of the dip's Gaussian */
+  calibration_dip_sd_um: number;
+  /** air in which the force scale was found; 0: not known */
+  calibration_ambient_kPa: number;
   /** of each sensor: gain, and its relative standard deviation */
   gain: Float64Array;
   /** of each sensor: gain, and its relative standard deviation */
@@ -423,7 +433,7 @@ export type Command =
   | { type: 0x86; }
   | { type: 0x8f; }
   | { type: 0x87; magic: number; }
-  | { type: 0x88; sensor_count: number; calibration_date_s: number; calibration_placements: number; force_scale: number; force_scale_sd: number; gain: ArrayLike<number>; gain_sd: ArrayLike<number>; }
+  | { type: 0x88; sensor_count: number; calibration_date_s: number; calibration_placements: number; force_scale: number; force_scale_sd: number; calibration_sigma_um: number; calibration_sigma_sd_um: number; calibration_dip_share_q16: number; calibration_dip_sd_um: number; calibration_ambient_kPa: number; gain: ArrayLike<number>; gain_sd: ArrayLike<number>; }
   | { type: 0x89; }
   | { type: 0x8a; keep: number; }
   | { type: 0x8b; sigma_mm: number; width_mm: number; }

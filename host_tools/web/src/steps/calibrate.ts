@@ -251,6 +251,12 @@ function confirmGains(
         ? 'Force scale unknown: give the weight, to calibrate forces too.'
         : `Force scale ${calibration.force_scale.toFixed(3)}, standard deviation ${calibration.force_scale_sd.toFixed(3)}.`,
     ),
+    make(
+      'p',
+      {},
+      `A usual contact: sigma ${(calibration.sigma_um / 1000).toFixed(2)} mm, sd ${(calibration.sigma_sd_um / 1000).toFixed(2)} mm; ` +
+        `dip around it ${((100 * calibration.dip_share_q16) / 65536).toFixed(1)} % of its peak.`,
+    ),
     make('p', {}, `Gains: ${calibration.gain.map((gain) => gain.toFixed(3)).join(' ')}`),
   );
   dialog.say('Store it in the fingertip?');
@@ -266,6 +272,11 @@ function confirmGains(
             calibration_placements: calibration.placements,
             force_scale: calibration.force_scale,
             force_scale_sd: calibration.force_scale_sd,
+            calibration_sigma_um: calibration.sigma_um,
+            calibration_sigma_sd_um: calibration.sigma_sd_um,
+            calibration_dip_share_q16: calibration.dip_share_q16,
+            calibration_dip_sd_um: calibration.dip_sd_um,
+            calibration_ambient_kPa: calibration.ambient_kPa,
             gain: calibration.gain,
             gain_sd: calibration.gain_sd,
           });
