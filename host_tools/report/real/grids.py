@@ -17,9 +17,8 @@ RESPONSE_MM = 6.0      # a sensor's response is fitted to presses so near it
 OUTSIDE_MM = 3.0       # presses so far beyond the outer sensors are judged apart
 RAW_GAIN_SD = 0.105    # of a pad that was never calibrated: DEFAULT_GAIN_SD
 PRIOR_WIDTH_MM = 0.5   # of the prior on sigma that a user types: PRIOR_WIDTH in line.toml
-DIP_WIDTHS = 3.2       # of the dip, in widths of the response: on the recording that chooses
+DIP_WIDTHS = 2.5       # of the dip, in widths of the response: DIP of calibration/solver.hpp
 DIP_FROM_WIDTHS = 3.0
-KNOWN_WIDTH_MM = 0.1   # of the prior where a pad's width is known
 PLACEMENTS, SESSIONS, EVERY_S = 20, 30, 8.0
 PLACEMENT_PEAK_PA = 1500.0  # a calibration refuses lighter ones
 

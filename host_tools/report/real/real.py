@@ -73,7 +73,6 @@ def judge_grid(program, one, path):
     torn, torn_xy = one_missing(readings[inside]), np.repeat(xy[inside], readings.shape[1], axis=0)
     fits = grids.ask(program, grid, [
         job for one in solved for job in (grids.stored_job(readings, one["stored"]), grids.stored_job(torn, one["stored"]))])
-    profiled = with_profile(program, grid, readings, solved)
     felt = [grids.Felt(answer, xy) for answer in fits[0::2]]
     missing = [grids.Felt(answer, torn_xy) for answer in fits[1::2]]
     raw_felt, shipped_felt = grids.Felt(raw, xy), grids.Felt(shipped, xy)
@@ -87,24 +86,12 @@ def judge_grid(program, one, path):
         "sessions": len(calibrations), "accepted": len(accepted), "reasons": sorted({one["reason"] for one in calibrations} - {"none"}),
         "width_found_mm": grids.quantile([one["width_mm"] for one in solved], 0.5),
         "worse_after_accept": sum(float(np.median(each.error_mm[inside])) > before for each, one in zip(felt, solved) if one["state"] == "good")}
-    known = [grids.Felt(answer, xy) for answer in profiled]
-    for way, each_felt in (("calibrated", felt), ("profile", known)):
-        if each_felt:
-            found[way] = grids.Felt.joined(each_felt).figures(all_inside, all_outside)
-            found[way]["force_scatter_percent"] = float(np.mean([each.figures(inside, outside)["force_scatter_percent"] for each in each_felt]))
     if felt:
+        found["calibrated"] = grids.Felt.joined(felt).figures(all_inside, all_outside)
+        found["calibrated"]["force_scatter_percent"] = float(np.mean([each.figures(inside, outside)["force_scatter_percent"] for each in felt]))
         found["one_missing_over_1mm_percent"] = grids.percent(np.concatenate([each.error_mm for each in missing]) > 1.0)
-    shown = {"grid": grid, "inside": inside, "shipped": shipped_felt, "raw": raw_felt, "calibrated": felt[0] if felt else None,
-             "profile": known[0] if known else None}
+    shown = {"grid": grid, "inside": inside, "shipped": shipped_felt, "raw": raw_felt, "calibrated": felt[0] if felt else None}
     return found, shown
-
-
-def with_profile(program, grid, readings, solved):
-    """Answers of the firmware's kernel where it is told the pad's dip, of the rows that align, and the width that each calibration finds."""
-    share = grids.dip_share(grid)
-    return grids.ask(program, grid, [
-        grids.fit_job(readings, one["stored"]["gain"], one["stored"]["gain_sd"], (one["width_mm"], grids.KNOWN_WIDTH_MM),
-                      (share, grids.DIP_WIDTHS * one["width_mm"])) for one in solved])
 
 
 def mean_of(rows, *keys):

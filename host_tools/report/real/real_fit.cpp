@@ -9,7 +9,8 @@
 //     -> {"x_mm", "y_mm", "sigma_mm", "force_N", "location_sd_mm", "flags": [press each]}, 0 without a fit
 //   job {"kind": "calibrate", "presses": as above, "noise_Pa", "every_s": from one to the next}
 //     -> {"state": "good" | "more" | "refused", "reason", "solved", "width_mm", "residual_share",
-//         "stored": {"gain", "gain_sd", "prior_sigma_mm", "prior_width_mm"}}; stored: what the tool
+//         "stored": {"gain", "gain_sd", "prior_sigma_mm", "prior_width_mm", "dip_share",
+//         "dip_sd_mm"}}; stored: what the tool
 //         would leave in the fingertip were it good
 //
 // Exit status: 0 done; 1 something went wrong, said in one line.

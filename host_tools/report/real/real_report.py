@@ -7,7 +7,7 @@ from tables import table_md, text_of
 
 COLUMNS = ("inside_p50_mm", "inside_p95_mm", "over_1mm_percent", "over_2mm_percent", "cover_1sd_percent", "cover_2sd_percent", "warned_percent",
            "silent_percent", "force_scatter_percent", "outside_p50_mm")
-WAYS = (("shipped", "as shipped"), ("raw", "width typed"), ("calibrated", "calibrated"), ("profile", "and dip and width known"))
+WAYS = (("shipped", "as shipped"), ("raw", "width typed"), ("calibrated", "calibrated"))
 PROFILE_TO = 6.0  # widths
 
 
@@ -26,8 +26,8 @@ def write(found, path):
         lines += ["", f"Not there, and so not judged: {', '.join(found['missing'])}."]
     if found["grids"]:
         lines += ["", "## Presses on arrays", "", "Inside the outer sensors, of rows that neither align nor calibrate. \"width typed\": a prior of the pad's own width, 0.5 mm.",
-                  "\"calibrated\": all sessions of twenty placements that have a solution, whether the tool accepts them or not. \"and dip and width known\": the same",
-                  "gains, and the kernel is told the width that the session found and the pad's dip, which no setting of the firmware does yet. silent: beyond 1 mm and no warning.", ""]
+                  "\"calibrated\": with the gains, width and dip of each session of twenty placements, whether the tool accepts it or not.",
+                  "silent: beyond 1 mm and no warning.", ""]
         lines += table_md(("recording", "part", "way", *COLUMNS), grid_rows(found))
         lines += ["", *table_md(("recording", "width mm", "width found mm", "dip %", "gains cv %", "places off mm", "centroid p50 mm", "sessions", "accepted", "refused for"), [
             [row["recording"], *(text_of(row[key], 3) for key in ("width_mm", "width_found_mm", "dip_percent", "gains_cv_percent", "places_off_mm", "centroid_p50_mm")),
@@ -70,7 +70,7 @@ def draw_map(axes, each, way, title):
 
 
 def draw_coverage(axes, shown, part):
-    for way, name, colour in (("raw", "width typed", ORANGE), ("calibrated", "calibrated, one session", BLUE), ("profile", "and dip and width known", INK)):
+    for way, name, colour in (("raw", "width typed", ORANGE), ("calibrated", "calibrated, one session", BLUE)):
         ratios = [each[way].error_mm[each["inside"]] / np.maximum(each[way].sd_mm[each["inside"]], 1e-6) for key, each in shown.items()
                   if each[way] is not None and key in part]
         if ratios:
@@ -83,15 +83,15 @@ def draw_coverage(axes, shown, part):
 
 
 def draw(found, shown, path):
-    figure, axes = plt.subplots(1, 6, figsize=(19, 4.2), layout="constrained", width_ratios=(1.6, 1, 1, 1, 1, 1.4))
+    figure, axes = plt.subplots(1, 5, figsize=(16, 4.2), layout="constrained", width_ratios=(1.6, 1, 1, 1, 1.4))
     judges = {row["recording"] for row in found["grids"] if row["part"] == "judges"}
     if shown:
         draw_profile(axes[0], shown)
         each = next((shown[key] for key in shown if key in judges), next(iter(shown.values())))
         points = None
-        for ax, (way, name) in zip(axes[1:5], WAYS):
+        for ax, (way, name) in zip(axes[1:4], WAYS):
             if each[way] is not None:
                 points = draw_map(ax, each, way, name[:1].upper() + name[1:])
-        figure.colorbar(points, ax=axes[4], label="mm, 2 and more: darkest", shrink=0.8)
-        draw_coverage(axes[5], shown, judges or set(shown))
+        figure.colorbar(points, ax=axes[3], label="mm, 2 and more: darkest", shrink=0.8)
+        draw_coverage(axes[4], shown, judges or set(shown))
     save(figure, path)
