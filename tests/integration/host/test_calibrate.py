@@ -62,7 +62,7 @@ class FromRecording(CalibrateTest):
         before, after = re.search(r"location off by +([\d.]+) mm +([\d.]+) mm", out).groups()
         self.assertLess(float(after), 0.5 * float(before))
         scale, sd = re.search(r"force scale +1\.000 +(\d\.\d+) +sd (\d\.\d+)", out).groups()
-        self.assertAlmostEqual(float(scale) * mean_gain, 1.09, delta=0.02)
+        self.assertAlmostEqual(float(scale) * mean_gain, 1.07, delta=0.02)
         self.assertLess(float(sd), 0.03)
         out, _ = self.calibrate("--from", recording, "--dry-run", "--weight", "306")
         self.assertAlmostEqual(float(re.search(r"force scale +1\.000 +(\d\.\d+)", out)[1]), float(scale), delta=0.005)
@@ -101,7 +101,7 @@ class FromRecording(CalibrateTest):
                 ("weights", ("placements", "--gain", "10", "--force", "2.5,3.5"), "use one and the same weight"),
                 ("cube", ("placements", "--indenter", "cube6", "--force", "12", "--layer", "12", "--seconds", "30"), "too few placements"),
                 ("hand", ("pokes", "--gain", "10"), "no placement was found"),
-                ("middle", ("placements", "--margin", "0", "--seconds", "100"), "place the weight near them")):
+                ("middle", ("placements", "--margin", "0", "--seconds", "100"), "the gains are as good without")):
             with self.subTest(name):
                 played, _ = make_recording(name, *options)
                 _, err = self.calibrate("--from", played, "--dry-run", status=1)
@@ -119,7 +119,7 @@ class Live(CalibrateTest):
         with self.device(f"play={recording}"):
             out, err = self.calibrate("--port", self.port, "--yes", "--force", "3")
             self.assertEqual(err, "")
-            self.assertIn("set the weight down on its round foot, best near x 0 y 0 mm\n", out)
+            self.assertRegex(out, r"set the weight down on its round foot, best near x -?\d+ y -?\d+ mm\n")
             self.assertIn("hold on\n", out)
             self.assertIn("taken: lift it\n", out)
             known = [float(text) for text in re.findall(r"gains known to ([\d.]+) %, wanted 1.5 %", out)]

@@ -41,7 +41,7 @@ class SpokenLine implements Line {
   streams = 0;
   commands: number[] = [];
   /** Version of the protocol that it speaks. */
-  version = 5;
+  version = 6;
   silent = false;
   device_us = 5_000_000;
   sequence = 0;
@@ -76,7 +76,7 @@ class SpokenLine implements Line {
     if (packet[0] !== this.version) {
       return Promise.resolve();
     }
-    if (this.version !== 5) {
+    if (this.version !== 6) {
       const answer = vector('health').packet.slice();
       answer[0] = this.version;
       new DataView(answer.buffer).setUint32(answer.length - 4, crc32(answer.subarray(0, -4)), true);

@@ -74,7 +74,7 @@ class Files(TwinTest):
                 self.assertEqual(emulator["rows"], len(scenario.t_s))
                 self.assertEqual(emulator["metadata"], scenario.metadata)
                 self.assertEqual(scenario.metadata["name"],
-                                 f"{kind}-{'sphere15' if kind in ('placements', 'drag') else 'sphere6'}-h12-gain10-drift-relaxation-hysteresis-aftereffect-temperature-branch-bias-clip{'-tangential0.3' if kind in ('lift', 'drag') else ''}")
+                                 f"{kind}-{'sphere15' if kind in ('placements', 'drag') else 'sphere6'}-h12-gain10-dip-widths-places-drift-relaxation-hysteresis-aftereffect-creep-temperature-branch-bias-clip{'-tangential0.3' if kind in ('lift', 'drag') else ''}")
                 for t_s, sensors in zip(times, emulator["at"]):
                     for k, sensor in enumerate(sensors):
                         self.assertAlmostEqual(
