@@ -135,7 +135,7 @@ test('damage, gaps, other versions and unknown types are counted, each as what i
   feed(cobsEncode(packet));
   assert.equal(decoder.counts.version_errors, 1);
   assert.equal(decoder.other_version, 4);
-  packet[0] = 5;
+  packet[0] = 6;
   packet[1] = 0x7f;
   new DataView(packet.buffer).setUint32(packet.length - 4, crc32(packet.subarray(0, -4)), true);
   feed(cobsEncode(packet));

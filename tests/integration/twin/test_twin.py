@@ -280,7 +280,7 @@ class Usage(TwinTest):
             ("two", "--second", "finger"): 'there is no indenter "finger"',
             ("taps", "--layer", "1"): "--layer 1 is out of range; give 3 to 20 mm",
             ("taps", "--layer", "nan"): "--layer nan is out of range",
-            ("taps", "--effects", "noise"): 'there is no effect "noise"; give some of: gain, drift',
+            ("taps", "--effects", "noise"): 'there is no effect "noise"; give some of: dip, widths',
             ("taps", "--gain", "ten"): 'effect gain is "ten"; give 0 to 30 (%)',
             ("taps", "--overhang", "2"): "--overhang 2 is out of range; give 3 to 20",
             ("taps", "--overhang", "9", "--layer", "3"): "--layer of a pad that ends 3 is out of range; give 4 to 20",
