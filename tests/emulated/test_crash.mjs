@@ -168,7 +168,7 @@ for (const name of ['pico_mux', 'pico_parallel']) {
   test(`${name}: a main loop that stands still`, (t) => {
     // The last words may come amid an interrupt of the bus, and tell that.
     let told = 0;
-    for (const from_ms of [100, 103, 107]) {
+    for (const from_ms of [100, 103, 107, 110, 113]) {
       const bench = new Bench(name);
       bench.stream();
       bench.run(from_ms);

@@ -243,10 +243,10 @@ void RecordingReader::read_comment(const std::string &text) {
     item.event = value;
     items_.push_back(item);
   } else if (key == "end") {
-    has_end_ = true;
     if (!joint_) {
       read_end(value);
     }
+    has_end_ = true;
   } else {
     read_info_field(info, key, value);
   }
