@@ -7,24 +7,29 @@
 #include <string.h>
 
 #if FT_WITH_FIT
-/* On one cast pad of three the response to one weight nearly doubled over 172 kPa, on the others it
- * stayed (host_tools/report/real). */
+/* On one of two cast pads the response to one weight doubled over 172 kPa, on the other it stayed
+ * (the arrays of host_tools/report/real). */
 #define FORCE_SHARE_PER_kPa 0.0054f
+
+static float millimetres(uint16_t length_um) {
+  return 1e-3f * (float)length_um;
+}
 
 void app_use_shape(struct app *app) {
   const struct calibration *found = DEFAULT_USES_SHAPE ? app->calibration : NULL;
   struct fit_settings *settings = &app->fit_settings;
-  bool is_set = app->prior_width_mm > 0.0f;
+  bool is_set = app->set_sigma_sd_mm > 0.0f;
   bool profile = false;
 #if FT_WITH_TANGENTIAL
   profile = app->pad != NULL;
 #endif
-  settings->prior_sigma_mm = is_set ? app->prior_sigma_mm : found ? 1e-3f * found->sigma_um : 0.0f;
+  settings->prior_sigma_mm =
+      is_set ? app->set_sigma_mm : found ? millimetres(found->sigma_um) : 0.0f;
   settings->prior_width_mm =
-      is_set ? app->prior_width_mm : found ? 1e-3f * found->sigma_sd_um : 0.0f;
+      is_set ? app->set_sigma_sd_mm : found ? millimetres(found->sigma_sd_um) : 0.0f;
   bool dip = found && !profile;
-  settings->dip_share = dip ? (1.0f / 65536.0f) * found->dip_share_q16 : 0.0f;
-  settings->dip_sd_mm = dip ? 1e-3f * found->dip_sd_um : 0.0f;
+  settings->dip_share = dip ? (1.0f / 65536.0f) * (float)found->dip_share_q16 : 0.0f;
+  settings->dip_sd_mm = dip ? millimetres(found->dip_sd_um) : 0.0f;
   settings->cut_noises = profile ? 0 : DEFAULT_CUT_NOISES;
 }
 
@@ -71,7 +76,7 @@ void app_use_air(struct app *app) {
       count += zero_Pa > 0;
     }
     if (count > 0) {
-      float off_kPa = 1e-3f * (float)(sum_Pa / count) - calibration->ambient_kPa;
+      float off_kPa = 1e-3f * (float)sum_Pa / (float)count - (float)calibration->ambient_kPa;
       float doubt = calibration->force_scale * FORCE_SHARE_PER_kPa * off_kPa;
       sd = sqrtf(sd * sd + doubt * doubt);
     }

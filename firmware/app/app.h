@@ -30,7 +30,7 @@ struct app {
   struct fit_array fit_array;
   struct fit_settings fit_settings;
   uint32_t fit_failures;
-  float prior_sigma_mm, prior_width_mm;  /* as set; width 0: none, so that of the calibration acts */
+  float set_sigma_mm, set_sigma_sd_mm;   /* to expect of a contact; sd 0: as the calibration says */
   const struct calibration *calibration; /* that acts; NULL: none */
   struct condition_gains gains;          /* of it */
   struct contact_settings contact_settings;

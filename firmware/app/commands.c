@@ -37,8 +37,8 @@ static enum wire_result set_prior(struct app *app, float sigma_mm, float width_m
   if (!none && !possible) {
     return WIRE_RESULT_OUT_OF_RANGE;
   }
-  app->prior_sigma_mm = sigma_mm;
-  app->prior_width_mm = width_mm;
+  app->set_sigma_mm = sigma_mm;
+  app->set_sigma_sd_mm = width_mm;
   app_use_shape(app);
   return WIRE_RESULT_DONE;
 }
@@ -174,8 +174,8 @@ static int keep_settings(struct app *app, uint8_t keep) {
   settings.slip_window_ms = (uint16_t)(app->contact_settings.slip_window_us / 1000u);
 #endif
 #if FT_WITH_FIT
-  settings.prior_sigma_mm = app->prior_sigma_mm;
-  settings.prior_width_mm = app->prior_width_mm;
+  settings.prior_sigma_mm = app->set_sigma_mm;
+  settings.prior_width_mm = app->set_sigma_sd_mm;
   settings.location_limit_mm = app->fit_settings.location_sd_limit_mm;
 #endif
   return result_of_put(app, store_put_settings(&app->store, keep ? &settings : NULL));

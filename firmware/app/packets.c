@@ -69,8 +69,8 @@ void packets_send_info(struct app *app, uint64_t now_us) {
   memcpy(info->x_mm, geometry.x_mm, sizeof info->x_mm);
   memcpy(info->y_mm, geometry.y_mm, sizeof info->y_mm);
 #if FT_WITH_FIT
-  info->prior_sigma_mm = app->prior_sigma_mm;
-  info->prior_width_mm = app->prior_width_mm;
+  info->prior_sigma_mm = app->set_sigma_mm;
+  info->prior_width_mm = app->set_sigma_sd_mm;
   info->location_limit_mm = app->fit_settings.location_sd_limit_mm;
   if (app->calibration) {
     info->stored |= WIRE_STORED_CALIBRATION;
