@@ -16,20 +16,19 @@ static float millimetres(uint16_t length_um) {
 }
 
 void app_use_shape(struct app *app) {
-  const struct calibration *found = DEFAULT_USES_SHAPE ? app->calibration : NULL;
   struct fit_settings *settings = &app->fit_settings;
   bool is_set = app->set_sigma_sd_mm > 0.0f;
   bool profile = false;
 #if FT_WITH_TANGENTIAL
   profile = app->pad != NULL;
 #endif
+  const struct calibration *found = DEFAULT_USES_SHAPE && !profile ? app->calibration : NULL;
   settings->prior_sigma_mm =
       is_set ? app->set_sigma_mm : found ? millimetres(found->sigma_um) : 0.0f;
   settings->prior_width_mm =
       is_set ? app->set_sigma_sd_mm : found ? millimetres(found->sigma_sd_um) : 0.0f;
-  bool dip = found && !profile;
-  settings->dip_share = dip ? (1.0f / 65536.0f) * (float)found->dip_share_q16 : 0.0f;
-  settings->dip_sd_mm = dip ? millimetres(found->dip_sd_um) : 0.0f;
+  settings->dip_share = found ? (1.0f / 65536.0f) * (float)found->dip_share_q16 : 0.0f;
+  settings->dip_sd_mm = found ? millimetres(found->dip_sd_um) : 0.0f;
   settings->cut_noises = profile ? 0 : DEFAULT_CUT_NOISES;
 }
 

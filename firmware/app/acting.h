@@ -8,8 +8,9 @@
 #if FT_WITH_FIT
 /* This calibration, which is valid and outlives the app, acts from the next frame on; NULL: none. */
 void app_use_calibration(struct app *app, const struct calibration *calibration);
-/* Tells the fit the prior that is set, or else the calibration's, and the calibration's dip; where
- * a profile acts, no dip. */
+/* Tells the fit the prior that is set, or else the calibration's, and the calibration's dip. Where
+ * a profile acts, those of the calibration are left out, for the tangential estimate was judged
+ * without them. */
 void app_use_shape(struct app *app);
 /* Doubts the calibration's force scale by how far the air is from that in which it was found. Now
  * and then; some 20 us. */

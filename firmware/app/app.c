@@ -66,7 +66,6 @@ void app_start(struct app *app, const struct array_bus *bus) {
   }
   app->fit_settings.iterations = DEFAULT_FIT_ITERATIONS;
   app->fit_settings.n_largest = DEFAULT_FIT_N_LARGEST;
-  app->fit_settings.cut_noises = DEFAULT_CUT_NOISES;
   app->set_sigma_mm = DEFAULT_PRIOR_SIGMA_mm;
   app->set_sigma_sd_mm = DEFAULT_PRIOR_WIDTH_mm;
   fit_set_errors(&app->fit_settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);

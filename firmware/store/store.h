@@ -21,9 +21,9 @@
  * calibration as in its command, without its n: 14 + 8 n bytes, zeros where there is none. Then the
  * settings: u32 rate mHz, u16 OSR, u16 slip window ms, f32 slip threshold mm, f32 f32 prior mm, f32
  * location limit mm. Version 2 has one more part, bit 2, the pad's profile, behind the settings: as
- * in its command, 177 bytes. Version 3 has the calibration's shape and air at the end: u16 sigma, its
- * sd, the dip's share and sd, u8 kPa; as in its command, which has them before the sensors. Later
- * versions keep the slot as it is and change the payload.
+ * in its command, 177 bytes. Version 3 has the calibration's shape and air at the end: u16 sigma,
+ * its sd, the dip's share and sd, u8 kPa; as in its command, which has them before the sensors.
+ * Later versions keep the slot as it is and change the payload.
  *
  * Bits whose change was cut short may read differently each time. So a record that is not final may
  * be there today and gone tomorrow, or the other way round. When start-up meets one, it writes the

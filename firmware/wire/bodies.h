@@ -95,7 +95,7 @@ enum wire_stored {
 /* width to expect of a contact */
 #define WIRE_PRIOR_SIGMA_MIN_mm 0.5f
 #define WIRE_PRIOR_SIGMA_MAX_mm 100.0f
-/* standard deviation of that; 0: there is no prior */
+/* standard deviation of that; 0: none is set */
 #define WIRE_PRIOR_WIDTH_MIN_mm 0.01f
 #define WIRE_PRIOR_WIDTH_MAX_mm 100.0f
 #define WIRE_PRIOR_WIDTH_DEFAULT_mm 0.5f
@@ -201,8 +201,9 @@ struct wire_info {
   float x_mm[FT_MAX_SENSORS]; /* of each sensor: x and y, from the centre of the pad */
   float y_mm[FT_MAX_SENSORS];
   /* with WIRE_CAPABILITY_FIT, else 0 */
-  float prior_sigma_mm; /* prior on sigma */
-  float prior_width_mm; /* its standard deviation; 0: there is no prior */
+  float prior_sigma_mm; /* prior on sigma that is set */
+  /* its standard deviation; 0: none is set, and the sigma of a calibration acts */
+  float prior_width_mm;
   float location_limit_mm; /* UNCERTAIN is set where location_sd_mm is above it */
   /* always */
   uint32_t stored; /* what the fingertip keeps without power, see below */
@@ -304,7 +305,8 @@ struct wire_cmd_keep {
   uint8_t keep;
 };
 
-/* Set the width to expect of a contact, and its standard deviation; 0 and 0: none. */
+/* Set the width to expect of a contact, and its standard deviation; 0 and 0: none, and the sigma
+ * of a calibration acts. */
 struct wire_cmd_prior {
   float sigma_mm; /* width */
   float width_mm; /* its standard deviation */

@@ -303,9 +303,9 @@ class Info(NamedTuple):
     xy_mm: Annotated[tuple[float, ...], Wire("f", 2, each_sensor=True)]
     """of each sensor: x and y, from the centre of the pad"""
     prior_sigma_mm: Annotated[float, Wire("f", when=("capabilities", Capability.FIT), absent=math.nan)]
-    """prior on sigma"""
+    """prior on sigma that is set"""
     prior_width_mm: Annotated[float, Wire("f", when=("capabilities", Capability.FIT), absent=math.nan)]
-    """its standard deviation; 0: there is no prior"""
+    """its standard deviation; 0: none is set, and the sigma of a calibration acts"""
     location_limit_mm: Annotated[float, Wire("f", when=("capabilities", Capability.FIT), absent=math.nan)]
     """UNCERTAIN is set where location_sd_mm is above it"""
     stored: Annotated[int, Wire("I")]
@@ -503,7 +503,7 @@ class Keep(NamedTuple):
 
 
 class SetPrior(NamedTuple):
-    """Set the width to expect of a contact, and its standard deviation; 0 and 0: none."""
+    """Set the width to expect of a contact, and its standard deviation; 0 and 0: none, and the sigma of a calibration acts."""
 
     sigma_mm: Annotated[float, Wire("f")]
     """width"""

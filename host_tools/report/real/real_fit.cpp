@@ -10,8 +10,7 @@
 //   job {"kind": "calibrate", "presses": as above, "noise_Pa", "every_s": from one to the next}
 //     -> {"state": "good" | "more" | "refused", "reason", "solved", "width_mm", "residual_share",
 //         "stored": {"gain", "gain_sd", "prior_sigma_mm", "prior_width_mm", "dip_share",
-//         "dip_sd_mm"}}; stored: what the tool
-//         would leave in the fingertip were it good
+//         "dip_sd_mm"}}; stored: what the tool would leave in the fingertip were it good
 //
 // Exit status: 0 done; 1 something went wrong, said in one line.
 #include "tool/calibration/judge.hpp"
@@ -114,9 +113,6 @@ json calibrate(const Array &layout, const json &job) {
   said["reason"] = name_of(judgement.reason);
   said["solved"] = solution.solved;
   said["width_mm"] = solution.sigma_mm;
-  said["dip"] = solution.dip;
-  said["dip_sd"] = solution.dip_sd;
-  said["dip_width_mm"] = DIP * solution.width_mm;
   said["residual_share"] = solution.residual_share;
   said["stored"] = stored;
   return said;

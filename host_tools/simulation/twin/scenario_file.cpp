@@ -477,7 +477,8 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
             const double dy =
                 (static_cast<double>(geometry.y_mm[k]) + seat.dy_mm - contact.y_mm) / seat.width;
             const double along_x = cosine * dx + sine * dy, along_y = cosine * dy - sine * dx;
-            base_Pa[k] += pressing.base_pressure_Pa(contact.force_N, along_x, along_y, pad.dip_share());
+            base_Pa[k] +=
+                pressing.base_pressure_Pa(contact.force_N, along_x, along_y, pad.dip_share());
             if (block) {
               base_Pa[k] += block->added_Pa(
                   k, {contact.force_N, contact.pull_x_N, contact.pull_y_N, radius_mm}, contact.x_mm,

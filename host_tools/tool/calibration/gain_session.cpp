@@ -90,7 +90,7 @@ void check_firmware(const wire_info &info, const std::string &what) {
 GainSession::GainSession(const wire_info &info)
     : array_(array_of(info)), prior_{static_cast<double>(info.prior_sigma_mm),
                                      static_cast<double>(info.prior_width_mm)},
-      finder_(array_.sensors()) {}
+      has_profile_((info.stored & WIRE_STORED_PAD) != 0), finder_(array_.sensors()) {}
 
 bool GainSession::take(const wire_packet &packet) {
   if (packet.type != WIRE_RAW || packet.body.raw.sensor_count != array_.sensors() ||
@@ -190,7 +190,7 @@ calibration GainSession::made(std::optional<double> force_N, std::uint32_t date_
 }
 
 Shape GainSession::shape() const {
-  Shape shape = shape_of(judgement_.solution);
+  Shape shape = has_profile_ ? Shape{} : shape_of(judgement_.solution);
   if (prior_.sigma_sd_mm > 0.0) {
     shape.sigma_mm = prior_.sigma_mm;
     shape.sigma_sd_mm = prior_.sigma_sd_mm;

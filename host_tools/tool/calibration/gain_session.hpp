@@ -48,7 +48,8 @@ private:
   Shape shape() const; /* that will act: found, but for a prior that the user has set */
 
   Array array_;
-  Shape prior_; /* that the user has set */
+  Shape prior_;      /* that the user has set */
+  bool has_profile_; /* a pad's profile acts: the fit is told no shape */
   double ambient_Pa_ = 0.0; /* the mean zero at the last placement */
   PlacementFinder finder_;
   std::vector<Placement> placements_;

@@ -136,6 +136,33 @@ static void a_profile_outlives_power_until_it_is_erased(void) {
   TEST_ASSERT_EQUAL_UINT8(DEFAULT_CUT_NOISES, app.fit_settings.cut_noises);
 }
 
+/* The tangential estimate was judged on fits that know neither. */
+static void a_profile_keeps_the_calibrations_shape_from_the_fit(void) {
+  native_cdc_open();
+  run_for(300);
+  struct wire_packet calibrate = {.type = WIRE_CMD_CALIBRATE};
+  calibrate.body.cmd_calibrate.sensor_count = geometry.sensor_count;
+  calibrate.body.cmd_calibrate.calibration = (struct calibration){
+      .force_scale = 1.0f,
+      .sigma_um = 5552,
+      .sigma_sd_um = 60,
+      .dip_share_q16 = 3277,
+      .dip_sd_um = 13954,
+  };
+  for (unsigned k = 0; k < geometry.sensor_count; k++) {
+    calibrate.body.cmd_calibrate.calibration.sensors[k].gain = 1.0f;
+  }
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask(calibrate));
+  TEST_ASSERT_EQUAL_FLOAT(0.06f, app.fit_settings.prior_width_mm);
+  TEST_ASSERT_EQUAL_FLOAT(13.954f, app.fit_settings.dip_sd_mm);
+  struct wire_packet command = pad_command();
+  store_pad(&command);
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, app.fit_settings.prior_width_mm);
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, app.fit_settings.dip_sd_mm);
+  TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_ERASE_PAD}));
+  TEST_ASSERT_EQUAL_FLOAT(0.06f, app.fit_settings.prior_width_mm);
+}
+
 static void a_profile_out_of_range_is_refused(void) {
   native_cdc_open();
   run_for(300);
@@ -235,6 +262,7 @@ int main(void) {
   RUN_TEST(a_profile_tells_the_load_and_corrects_the_location);
   RUN_TEST(without_a_profile_there_is_none_and_the_fit_stays_as_it_is);
   RUN_TEST(a_profile_outlives_power_until_it_is_erased);
+  RUN_TEST(a_profile_keeps_the_calibrations_shape_from_the_fit);
   RUN_TEST(a_profile_out_of_range_is_refused);
   RUN_TEST(a_stored_profile_out_of_range_does_not_act);
   RUN_TEST(a_calibration_and_the_scale_of_the_profile_act);

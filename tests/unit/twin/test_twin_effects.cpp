@@ -233,6 +233,33 @@ TEST(Effects, AftereffectOfAPressThatIsSmallerAddsNothing) {
   EXPECT_NE(a.back(), 0.0);
 }
 
+TEST(Effects, CreepRisesInAHoldAndStaysAsLongAfterIt) {
+  Pad pad = pad_with("creep=2");
+  const auto readings = along(pad, {{0, 0}, {0.1, 10000}, {30.1, 10000}, {30.2, 0}, {40.2, 0}}, 0.1);
+  EXPECT_NEAR(readings[1], 10000.0, 10.0);
+  EXPECT_NEAR(readings[31], 10000.0 + 200.0 * (1.0 - std::exp(-1.0)), 5.0);
+  EXPECT_NEAR(readings[301], 10200.0, 1.0);
+  EXPECT_NEAR(readings[332], 200.0 * std::exp(-1.0), 5.0);
+}
+
+TEST(Effects, SensorsSitOffTheirPlacesAndFeelWidthsOfTheirOwn) {
+  double squares = 0.0, widths = 0.0;
+  for (std::uint64_t seed = 1; seed <= 60; seed++) {
+    const Pad pad = pad_with("places=0.2,widths=4", seed), twice = pad_with("places=0.4", seed);
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      const Pad::Seat &seat = pad.seats()[k];
+      squares += seat.dx_mm * seat.dx_mm + seat.dy_mm * seat.dy_mm;
+      widths += std::log(seat.width) * std::log(seat.width);
+      EXPECT_NEAR(twice.seats()[k].dx_mm, 2.0 * seat.dx_mm, 1e-12);
+      EXPECT_EQ(twice.seats()[k].width, 1.0);
+    }
+  }
+  EXPECT_NEAR(std::sqrt(squares / (2.0 * 60 * SENSORS)), 0.2, 0.015);
+  EXPECT_NEAR(std::sqrt(widths / (60.0 * SENSORS)), 0.04, 0.003);
+  EXPECT_EQ(pad_with("dip=3").dip_share(), 0.03);
+  EXPECT_EQ(pad_with("none").dip_share(), 0.0);
+}
+
 TEST(Effects, GainsAreNormalAndTheSamePadAtAnySpread) {
   double sum = 0.0, squares = 0.0, largest = 0.0;
   int beyond_sd = 0;

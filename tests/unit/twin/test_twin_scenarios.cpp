@@ -377,9 +377,25 @@ TEST(Scenarios, WrongOptionsAreToldInOneLine) {
   }
 }
 
+TEST(ScenarioFile, ADipIsLowerAroundTheContactAndBelowNothingFarFromIt) {
+  const ContactTable &table = table_of("sphere6");
+  const double middle_Pa = table.base_pressure_Pa(5.0, 0.0, 0.0);
+  const double width_mm = std::sqrt(5e6 / (2.0 * M_PI * middle_Pa));
+  EXPECT_NEAR(table.base_pressure_Pa(5.0, 0.0, 0.0, 0.05), 0.95 * middle_Pa, 1e-6 * middle_Pa);
+  const double off_Pa = table.base_pressure_Pa(5.0, 2.5 * width_mm, 0.0) -
+                        table.base_pressure_Pa(5.0, 2.5 * width_mm, 0.0, 0.05);
+  EXPECT_NEAR(off_Pa, 0.05 * std::exp(-0.5) * middle_Pa, 1e-6 * middle_Pa);
+  EXPECT_LT(table.base_pressure_Pa(5.0, 0.0, 4.0 * width_mm, 0.05), -0.005 * middle_Pa);
+  EXPECT_EQ(table.base_pressure_Pa(0.0, 1.0, 1.0, 0.05), 0.0);
+}
+
 TEST(ScenarioFile, IsThePressureOnTheBaseWithinItsTolerance) {
   for (const char *kind : {"taps", "slip", "rolloff"}) {
-    const Scenario scenario = scenario_of(kind, [](ScenarioOptions &o) { o.seconds = 30; });
+    const double dip_share = kind == std::string("taps") ? 0.05 : 0.0;
+    const Scenario scenario = scenario_of(kind, [&](ScenarioOptions &o) {
+      o.seconds = 30;
+      o.effects = parse_effects(dip_share > 0.0 ? "dip=5" : "none");
+    });
     const File file = written(scenario);
     Random random(7, 7, 7);
     for (int i = 0; i < 3000; i++) {
@@ -393,7 +409,8 @@ TEST(ScenarioFile, IsThePressureOnTheBaseWithinItsTolerance) {
       for (int k = 0; k < 15; k++) {
         expected[k] = table_of("sphere6").base_pressure_Pa(touch.force_N,
                                                            double(geometry.x_mm[k]) - touch.x_mm,
-                                                           double(geometry.y_mm[k]) - touch.y_mm);
+                                                           double(geometry.y_mm[k]) - touch.y_mm,
+                                                           dip_share);
         peak_Pa = std::max(peak_Pa, std::abs(expected[k]));
       }
       for (int k = 0; k < 15; k++) {

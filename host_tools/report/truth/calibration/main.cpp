@@ -281,7 +281,8 @@ PadCase try_pads(const std::string &what, const Options &options, std::size_t pa
     Session led(objects.feet, SessionKind::good, seed, calibrating::PLACEMENTS_MAX);
     const Outcome outcome = lead(led, led_pad);
     const bool accepted = outcome.judgement.state == Judgement::State::good;
-    const bool worse = accepted && median(taps.felt(outcome.judgement.solution).location_mm) > median(before.location_mm);
+    const bool worse = accepted && median(taps.felt(outcome.judgement.solution).location_mm) >
+                                       median(before.location_mm);
 
     const std::lock_guard<std::mutex> lock(adding);
     all.before_mm.push_back(median(before.location_mm));
@@ -367,7 +368,8 @@ BadCase try_bad(SessionKind kind, const Options &options, const Objects &objects
     bool worse = false;
     if (outcome.judgement.state == Judgement::State::good) {
       const Taps taps(SessionPad(PadOptions{}, objects.feet.layer_mm, seed), objects.all(), seed);
-      worse = median(taps.felt(outcome.judgement.solution).location_mm) > median(taps.felt(ones(), all_sd(RAW_GAIN_SD)).location_mm);
+      worse = median(taps.felt(outcome.judgement.solution).location_mm) >
+              median(taps.felt(ones(), all_sd(RAW_GAIN_SD)).location_mm);
     }
     const std::lock_guard<std::mutex> lock(adding);
     all.refused += outcome.judgement.state == Judgement::State::refused;
@@ -411,7 +413,7 @@ json measure(const Options &options) {
 
   json bad = json::object();
   double refused_worst = 100.0;
-  std::size_t worse = usual.worse + rough.worse + relaxing.worse;
+  std::size_t worse = usual.worse + rough.worse + relaxing.worse + cast.worse;
   for (SessionKind kind : BAD_SESSIONS) {
     const BadCase found = try_bad(kind, options, objects);
     const double refused = 100.0 * double(found.refused) / pads;

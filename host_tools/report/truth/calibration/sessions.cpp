@@ -24,7 +24,7 @@ constexpr double CLUSTER_RADIUS_mm = 7.0;
 constexpr std::size_t TOO_FEW = 6;
 constexpr double AIM_SD_mm = 3.0;
 
-enum Stream : std::uint64_t { PLACES = 301, SESSION, NOISE, ERRORS };
+enum Stream : std::uint64_t { SESSION = 302, NOISE, ERRORS };
 
 twin::EffectValues effects_of(const PadOptions &options) {
   twin::EffectValues values;
@@ -34,6 +34,7 @@ twin::EffectValues effects_of(const PadOptions &options) {
   if (options.relaxation_percent > 0.0) {
     values["relaxation"] = options.relaxation_percent;
   }
+  values["places"] = options.misplaced_mm;
   values["dip"] = options.dip_percent;
   values["widths"] = options.widths_percent;
   return values;
@@ -66,10 +67,9 @@ SessionPad::SessionPad(const PadOptions &options, double layer_mm, std::uint64_t
       layer_mm_(layer_mm), seed_(seed),
       pad_(effects_of(options), geometry.sensor_count, layer_mm, AMBIENT_Pa, seed),
       noise_(seed, NOISE, 0) {
-  Random places(seed, PLACES, 0);
   for (std::size_t k = 0; k < geometry.sensor_count; k++) {
-    x_mm_.push_back(static_cast<double>(geometry.x_mm[k]) + options.misplaced_mm * places.normal());
-    y_mm_.push_back(static_cast<double>(geometry.y_mm[k]) + options.misplaced_mm * places.normal());
+    x_mm_.push_back(static_cast<double>(geometry.x_mm[k]) + pad_.seats()[k].dx_mm);
+    y_mm_.push_back(static_cast<double>(geometry.y_mm[k]) + pad_.seats()[k].dy_mm);
   }
   report(0.0, 0.0);
 }

@@ -264,9 +264,9 @@ export interface Info extends Header {
   x_mm: Float64Array;
   /** of each sensor: x and y, from the centre of the pad */
   y_mm: Float64Array;
-  /** prior on sigma */
+  /** prior on sigma that is set */
   prior_sigma_mm: number;
-  /** its standard deviation; 0: there is no prior */
+  /** its standard deviation; 0: none is set, and the sigma of a calibration acts */
   prior_width_mm: number;
   /** UNCERTAIN is set where location_sd_mm is above it */
   location_limit_mm: number;
