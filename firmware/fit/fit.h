@@ -47,8 +47,7 @@ struct fit_settings {
    * reading is changed, as a tangential load asks for. */
   uint8_t cut_noises;
   /* What the rubber takes from the readings around a contact, where that is known:
-   * dip_share p0 exp(-r^2 / (2 dip_sd^2)). Every iteration but the first adds it back to the
-   * readings, and these are not cut. None unless the share is above 0 and at most
+   * dip_share p0 exp(-r^2 / (2 dip_sd^2)). Readings are not cut then. None unless the share is above 0 and at most
    * FIT_DIP_SHARE_MAX, and the sd is 0.001..10000 mm. */
   float dip_share, dip_sd_mm;
   /* Other errors that the standard deviations contain. */
@@ -124,7 +123,8 @@ float fit_quadrature(float a, float b, float c, float d);
  *
  * fit_grid: fixed point, for a full rectangle of FIT_GRID_COLUMNS x FIT_GRID_ROWS nodes (of the
  * build, 2 to 6 each way) with every sensor usable; sigma from 0.216 pitch.
- * fit_grid_masked: the same with any sensors missing, at twice the cost.
+ * fit_grid_masked: the same with any sensors missing, at twice the cost. It also takes a full
+ * rectangle whose width, known by the prior, is below FIT_SHAPE_LEAST pitches and has a dip.
  * fit_general: float32, any positions, any sensors missing; leaves an outlier out by itself.
  * The former two return whether they have settled with residuals that look like an outlier: rough,
  * and more than noise, gains and model explain. */

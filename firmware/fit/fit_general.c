@@ -43,12 +43,18 @@ struct samples {
   int count;
   uint8_t sensor[FT_MAX_SENSORS];
   float x[FT_MAX_SENSORS], y[FT_MAX_SENSORS];
-  float raw[FT_MAX_SENSORS], p[FT_MAX_SENSORS]; /* p: without the dip */
+  float p[FT_MAX_SENSORS];
   int32_t log2_q24[FT_MAX_SENSORS]; /* of a reading that enters the guess, else INT32_MIN */
 };
 
 struct parameters {
   float p0, x, y, sigma;
+};
+
+/* What cast rubber takes from the Gaussian e: share exp(-(X^2 + Y^2) / (2 sd^2)), of the same
+ * amplitude. */
+struct dip {
+  float share, log2_scale, narrowness; /* log2(e) / (2 sd^2), 1 / sd^2 */
 };
 
 /* One more row weight (sigma - prior) of the least squares, pitches; weight 0: none. */
@@ -176,48 +182,56 @@ static struct parameters guess(const struct samples *samples, int peak) {
   return theta;
 }
 
+/* At X, Y from the centre: the model of amplitude 1 is e - d, with
+ * e = exp(-(X^2 + Y^2) / (2 sigma^2)) and d that of the dip. The row is what its derivatives span,
+ * e (1, X, Y, X^2 + Y^2) where there is no dip. Returns d. */
+static float model_row(const struct dip *dip, float sigma, float x, float y,
+                       float row[PARAMETERS]) {
+  float r2 = x * x + y * y, sigma2 = sigma * sigma;
+  float e = fit_exp2_negative(r2 * (0.5f * LOG2_E / sigma2));
+  float d = dip->share > 0.0f ? dip->share * fit_exp2_negative(r2 * dip->log2_scale) : 0.0f;
+  float slope = e - sigma2 * dip->narrowness * d;
+  row[0] = e - d;
+  row[1] = slope * x;
+  row[2] = slope * y;
+  row[3] = e * r2;
+  return d;
+}
+
 /* Gives theta the best amplitude for its shape, p0 entering linearly, and sets up the normal
- * equations of the model linearised there, in the basis e (1, X, Y, X^2 + Y^2) with
- * e = exp(-(X^2 + Y^2) / (2 sigma^2)) and X, Y about the centre. Returns the sum of squared
- * residuals. */
+ * equations of the model linearised there. Returns the sum of squared residuals. */
 static float linearise(const struct fit_array *array, const struct samples *samples,
-                       struct prior prior, struct parameters *theta,
+                       struct prior prior, const struct dip *dip, struct parameters *theta,
                        struct normal_equations *normal) {
   memset(normal, 0, sizeof *normal);
-  float e[FT_MAX_SENSORS];
+  float row[FT_MAX_SENSORS][PARAMETERS];
   float numerator = 0.0f;
   float denominator = 1e-30f;
-  float log2_scale = 0.5f * LOG2_E / (theta->sigma * theta->sigma);
   for (int k = 0; k < samples->count; k++) {
-    float x = samples->x[k] - theta->x;
-    float y = samples->y[k] - theta->y;
-    e[k] = fit_exp2_negative((x * x + y * y) * log2_scale);
-    numerator += e[k] * samples->p[k];
-    denominator += e[k] * e[k];
+    model_row(dip, theta->sigma, samples->x[k] - theta->x, samples->y[k] - theta->y, row[k]);
+    numerator += row[k][0] * samples->p[k];
+    denominator += row[k][0] * row[k][0];
   }
   theta->p0 = clamp(numerator / denominator, P0_MIN, P0_MAX);
   float sum = 0.0f;
   for (int k = 0; k < samples->count; k++) {
-    float x = samples->x[k] - theta->x;
-    float y = samples->y[k] - theta->y;
     // cppcheck-suppress uninitvar ; the loop above has set as many
-    float residual = samples->p[k] - theta->p0 * e[k];
+    float residual = samples->p[k] - theta->p0 * row[k][0];
     sum += residual * residual;
-    float row[PARAMETERS] = {e[k], e[k] * x, e[k] * y, e[k] * (x * x + y * y)};
-    add_row(normal, row, residual);
+    add_row(normal, row[k], residual);
   }
   if (prior.weight > 0.0f) {
     /* The fourth unknown alone changes sigma, by sigma^3 / p0. */
     float sensitivity = theta->sigma * theta->sigma * theta->sigma / theta->p0;
-    float row[PARAMETERS] = {0.0f, 0.0f, 0.0f, prior.weight * sensitivity};
-    add_row(normal, row, prior.weight * (prior.sigma - theta->sigma));
+    float of_prior[PARAMETERS] = {0.0f, 0.0f, 0.0f, prior.weight * sensitivity};
+    add_row(normal, of_prior, prior.weight * (prior.sigma - theta->sigma));
   }
   if (array->is_line) {
     /* Nothing else tells the coordinate across the line: this row alone brings it there. */
     float across = theta->x * array->line_x + theta->y * array->line_y;
-    float row[PARAMETERS] = {0.0f, array->line_x, array->line_y, 0.0f};
+    float of_line[PARAMETERS] = {0.0f, array->line_x, array->line_y, 0.0f};
     float gain = theta->sigma * theta->sigma / theta->p0;
-    add_row(normal, row, (array->line_offset - across) / gain);
+    add_row(normal, of_line, (array->line_offset - across) / gain);
   }
   return sum;
 }
@@ -242,20 +256,6 @@ static float step(const struct fit_array *array, struct normal_equations *normal
   theta->y = clamp(theta->y + dy, array->y_min - OVERSHOOT, array->y_max + OVERSHOOT);
   theta->sigma = clamp(theta->sigma * (1.0f + share * ratio), FIT_SIGMA_MIN, FIT_SIGMA_MAX);
   return sqrtf(dx * dx + dy * dy);
-}
-
-/* Adds to the readings what the rubber's dip around this contact takes from them. */
-static void take_dip_out(const struct fit_array *array, const struct fit_settings *settings,
-                         const struct parameters *theta, struct samples *samples) {
-  float sd = clamp(settings->dip_sd_mm / array->pitch_mm, FIT_DIP_SD_MIN, FIT_DIP_SD_MAX);
-  float depth = at_most(settings->dip_share * theta->p0, FIT_DIP_DEPTH_MAX);
-  float log2_scale = 0.5f * LOG2_E / (sd * sd);
-  for (int k = 0; k < samples->count; k++) {
-    float x = samples->x[k] - theta->x;
-    float y = samples->y[k] - theta->y;
-    float e = fit_exp2_negative((x * x + y * y) * log2_scale);
-    samples->p[k] = samples->raw[k] + depth * e;
-  }
 }
 
 static bool at_bound(const struct fit_array *array, const struct parameters *theta) {
@@ -297,18 +297,14 @@ static uint32_t n_largest_of(const struct fit_array *array, const int32_t *press
 
 /* The sensor whose reading does not belong to the others', or -1. theta and the factors are those
  * of the last linearisation, squares its sum of squared residuals. */
-static int outlier_of(const struct samples *samples, const struct parameters *theta,
-                      const struct normal_equations *normal, float squares, int unknowns) {
-  float log2_scale = 0.5f * LOG2_E / (theta->sigma * theta->sigma);
+static int outlier_of(const struct samples *samples, const struct dip *dip,
+                      const struct parameters *theta, const struct normal_equations *normal, float squares, int unknowns) {
   float worst = 0.0f, second = 0.0f;
   int outlier = -1;
   for (int k = 0; k < samples->count; k++) {
-    float x = samples->x[k] - theta->x;
-    float y = samples->y[k] - theta->y;
-    float r2 = x * x + y * y;
-    float e = fit_exp2_negative(r2 * log2_scale);
-    float residual = samples->p[k] - theta->p0 * e;
-    float row[PARAMETERS] = {e, e * x, e * y, e * r2};
+    float row[PARAMETERS];
+    model_row(dip, theta->sigma, samples->x[k] - theta->x, samples->y[k] - theta->y, row);
+    float residual = samples->p[k] - theta->p0 * row[0];
     float free = 1.0f - inverse_form(normal, row); /* of the leverage */
     float without = residual * residual / (free > LEAST_FREE ? free : LEAST_FREE);
     if (without > worst) {
@@ -379,20 +375,20 @@ struct own_errors {
 };
 
 static void add_own_errors(const struct samples *samples, const struct fit_settings *settings,
-                           const struct parameters *at, const struct influence *influence,
-                           struct own_errors *own) {
-  float inverse = 1.0f / (at->sigma * at->sigma), log2_scale = 0.5f * LOG2_E * inverse;
+                           const struct dip *dip, const struct parameters *at,
+                           const struct influence *influence, struct own_errors *own) {
+  float inverse = 1.0f / (at->sigma * at->sigma);
   float shape_x = 0.0f, shape_y = 0.0f, shape_force = 0.0f;
   own->gains = own->location = own->force = 0.0f;
   for (int k = 0; k < samples->count; k++) {
     float x = samples->x[k] - at->x, y = samples->y[k] - at->y;
     float r2 = x * x + y * y;
-    float e = fit_exp2_negative(r2 * log2_scale);
-    const float row[PARAMETERS] = {e, e * x, e * y, e * r2};
+    float row[PARAMETERS];
+    float d = model_row(dip, at->sigma, x, y, row), e = row[0] + d;
     float by_x = product(row, influence->x), by_y = product(row, influence->y);
     float by_force = product(row, influence->force);
     float gain_sd = (float)settings->gain_sd_q16[samples->sensor[k]] * (1.0f / 65536.0f);
-    float error = gain_sd * at->p0 * e;
+    float error = at->p0 * (gain_sd * e + FIT_DIP_ERROR * d);
     own->gains += error * error;
     own->location += (by_x * by_x + by_y * by_y) * error * error;
     own->force += by_force * by_force * error * error;
@@ -433,6 +429,7 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
   float scale = 1.0f / (float)largest;
   float guess_share = GUESS_NOISES * (float)settings->noise_Pa_q10 * scale;
   guess_share = clamp(guess_share, GUESS_SHARE, 0.99f); /* the largest reading enters */
+  const bool has_dip = fit_has_dip(settings);
   struct samples samples;
   samples.count = 0;
   int peak = 0;
@@ -449,8 +446,7 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
     samples.sensor[n] = k;
     samples.x[n] = array->x[k];
     samples.y[n] = array->y[k];
-    samples.raw[n] = clamp((float)raw * scale, -1.0f, 1.0f);
-    samples.p[n] = clamp((float)reading * scale, -1.0f, 1.0f);
+    samples.p[n] = clamp((float)(has_dip ? raw : reading) * scale, -1.0f, 1.0f);
     samples.log2_q24[n] = samples.p[n] >= guess_share ? fit_log2_q24((uint32_t)reading) : INT32_MIN;
     sum_squares += samples.p[n] * samples.p[n];
   }
@@ -470,13 +466,16 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
   float squares;
   float moved;
   bool deficient;
-  const bool dip = fit_has_dip(settings);
+  struct dip dip = {0.0f, 0.0f, 0.0f};
+  if (has_dip) {
+    float sd = clamp(settings->dip_sd_mm / array->pitch_mm, FIT_DIP_SD_MIN, FIT_DIP_SD_MAX);
+    dip.share = settings->dip_share;
+    dip.narrowness = 1.0f / (sd * sd);
+    dip.log2_scale = 0.5f * LOG2_E * dip.narrowness;
+  }
   int left = settings->iterations;
   do {
-    if (dip && left < settings->iterations) {
-      take_dip_out(array, settings, &theta, &samples);
-    }
-    squares = linearise(array, &samples, prior, &theta, &normal);
+    squares = linearise(array, &samples, prior, &dip, &theta, &normal);
     before = theta;
     deficient = factorise(&normal);
     moved = step(array, &normal, &theta);
@@ -519,7 +518,7 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
   struct influence influence;
   set_influence(array, &before, &normal, &influence);
   struct own_errors own;
-  add_own_errors(&samples, settings, &before, &influence, &own);
+  add_own_errors(&samples, settings, &dip, &before, &influence, &own);
   int freedom = samples.count > unknowns ? samples.count - unknowns : 1;
   float noise = (float)settings->noise_Pa_q10 * scale;
   float model = (float)settings->model_sd_q16 * (1.0f / 65536.0f);
@@ -558,7 +557,7 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
   }
   bool selected = settings->n_largest > 0 && settings->n_largest < array->sensor_count;
   if (samples.count > unknowns + 1 && !selected) {
-    *outlier = outlier_of(&samples, &before, &normal, squares, unknowns);
+    *outlier = outlier_of(&samples, &dip, &before, &normal, squares, unknowns);
   }
   return true;
 }

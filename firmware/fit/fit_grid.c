@@ -640,8 +640,7 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   int coarse = left - COARSE_ITERATIONS;
   do {
     if (readings.dip_share.mantissa != 0 && left < settings->iterations) {
-      fit_grid_take_dip_out(array, pressure_Pa_q10, UINT32_MAX, &state,
-                            system.amplitude_q28,
+      fit_grid_take_dip_out(array, pressure_Pa_q10, &state, system.amplitude_q28,
                             fit_grid_rise(system.at.height, m.x.offset, m.y.offset), &readings);
     }
     system.at = state;

@@ -55,6 +55,7 @@
 struct node {
   int32_t e;               /* Q30; then the residual, Q28 */
   int32_t mantissa, shift; /* e again, to 15 bits of its own: mantissa * 2^-(15 + shift) */
+  int32_t d;               /* the dip there, in units of e, Q30 */
   int32_t p1, p2, p3;      /* e times the polynomials of struct fit_system; |.| < 2^15 */
 };
 
@@ -63,13 +64,17 @@ struct node {
  * present one is small, and the factors below take it out of the right-hand side. */
 struct columns {
   struct node node[NODES];
+  bool dip;
+  int32_t narrowness_q12;     /* sigma^2 over that of the dip */
+  int32_t centre_x, centre_y; /* LINEAR_Q */
+  int32_t lift1, lift2, lift3; /* LINEAR_Q: what project_out took, in units of the polynomials */
   int32_t q1, q2, q3;     /* value = integer * 2^-q */
   int32_t mean_x, mean_y; /* LINEAR_Q, as the next */
   int32_t cross;          /* p2 = dy - cross dx */
   int32_t skew_x, skew_y; /* p3 = dx^2 + dy^2 - variance - skew_x dx - skew_y dy */
   int32_t variance;
-  int32_t mass;                /* sum of e^2, Q(30 - MASS_SHIFT) */
-  int32_t product_q26;         /* sum of e times the reading */
+  int32_t mass;                /* sum of (e - d)^2, Q(30 - MASS_SHIFT) */
+  int32_t product_q26;         /* sum of e - d times the reading */
   int32_t norm1, norm2, norm3; /* value = integer * 2^(NORM_SHIFT - 2 q) */
   int32_t f21, f31, f32;       /* L of L D L^T, Q12 in the units of the columns */
 };
@@ -89,11 +94,11 @@ static const struct ridge rounding_ridge = {24, 1 << 13};
 
 enum { STEP = sizeof(struct node) / sizeof(int32_t) };
 
-/* Brings a column in Qraw_q to 15 bits; returns its norm with the ridge. What is smaller stays as
- * it is, since there is nothing below its last bit. */
-FIXED_INLINE int32_t normalise(int32_t *column, uint32_t size, int32_t raw_q,
+/* Brings a column in Qraw_q to so many bits; returns its norm with the ridge. What is smaller stays
+ * as it is, since there is nothing below its last bit. */
+FIXED_INLINE int32_t normalise(int32_t *column, uint32_t size, int32_t bits, int32_t raw_q,
                                const struct ridge *ridge, int32_t *q) {
-  int32_t shift = fixed_bits(size) - 15;
+  int32_t shift = fixed_bits(size) - bits;
   int32_t least = raw_q - ridge->finest_q;
   shift = shift < least ? least : shift;
   shift = shift < 0 ? 0 : shift;
@@ -110,10 +115,30 @@ FIXED_INLINE int32_t normalise(int32_t *column, uint32_t size, int32_t raw_q,
   return norm;
 }
 
-/* Column of the model times (along_x[i] + along_y[j]). */
+/* A polynomial as it acts on the model or on the dip: a part along x plus one along y. */
+struct polynomial {
+  int32_t x[COLUMNS], y[ROWS];
+};
+
+/* The same of the dip, taken from a column. Returns the size with its own. */
+static NOINLINE uint32_t take_dip(int32_t *column, const struct node *node,
+                                  const struct polynomial *p, uint32_t size) {
+  for (int i = 0; i < COLUMNS; i++) {
+    for (int j = 0; j < ROWS; j++) {
+      int32_t value = *column - fixed_mul_16(p->x[i] + p->y[j], node->d >> 15);
+      *column = value;
+      size |= fixed_size(value);
+      column += STEP;
+      node++;
+    }
+  }
+  return size;
+}
+
+/* Column of the model times (along_x[i] + along_y[j]), less the dip times that of `dip`, if any. */
 static NOINLINE int32_t fill(int32_t *column, const struct node *node, const int32_t *along_x,
-                             const int32_t *along_y, int32_t q, const struct ridge *ridge,
-                             int32_t *column_q) {
+                             const int32_t *along_y, int32_t q, const struct polynomial *dip,
+                             const struct ridge *ridge, int32_t *column_q) {
   uint32_t size = 1;
   int32_t *to = column;
   for (int i = 0; i < COLUMNS; i++) {
@@ -127,12 +152,16 @@ static NOINLINE int32_t fill(int32_t *column, const struct node *node, const int
       node++;
     }
   }
-  return normalise(column, size, q - 1, ridge, column_q);
+  if (dip) {
+    size = take_dip(column, node - NODES, dip, size);
+  }
+  return normalise(column, size, dip ? 14 : 15, q - 1, ridge, column_q);
 }
 
 /* Column of the model times along_x[i]. */
 static NOINLINE int32_t fill_along_x(struct node *node, const int32_t *along_x,
-                                     const struct ridge *ridge, int32_t *column_q) {
+                                     const struct polynomial *dip, const struct ridge *ridge,
+                                     int32_t *column_q) {
   uint32_t size = 1;
   int32_t *column = &node->p1;
   for (int i = 0; i < COLUMNS; i++) {
@@ -145,7 +174,10 @@ static NOINLINE int32_t fill_along_x(struct node *node, const int32_t *along_x,
       node++;
     }
   }
-  return normalise(column, size, LINEAR_Q - 1, ridge, column_q);
+  if (dip) {
+    size = take_dip(column, node - NODES, dip, size);
+  }
+  return normalise(column, size, dip ? 14 : 15, LINEAR_Q - 1, ridge, column_q);
 }
 
 /* value * coefficient / 2^12, |coefficient| < 2^15. */
@@ -209,10 +241,85 @@ static NOINLINE void set_mean(const struct readings *readings, struct columns *c
   c->variance = (fixed_div_q26(second, mass >> 2) - squares) >> (26 - LINEAR_Q);
 }
 
+/* The model with its dip, Q15. */
+FIXED_INLINE int32_t model_q15(const struct node *node) {
+  return (node->mantissa >> node->shift) - (node->d >> 15);
+}
+
+/* Mass and product with the dip. */
+static NOINLINE void set_mass(const struct readings *readings, struct columns *c) {
+  int32_t mass = 1 << 10, product_q26 = 0;
+  for (int k = 0; k < NODES; k++) {
+    int32_t f = model_q15(&c->node[k]);
+    mass += (f * f) >> MASS_SHIFT;
+    product_q26 += (readings->q14[k] * f) >> 3;
+  }
+  c->mass = mass;
+  c->product_q26 = product_q26;
+}
+
+/* What one column moves, a change of centre and width, moves the dip with the centre alone, in the
+ * proportion sigma^2 / dip_sd^2. So where p is the polynomial of the column on the model, that on
+ * the dip is p at the centre + sigma^2 / dip_sd^2 (x - centre) times the slope of p there. */
+struct dips {
+  struct polynomial p1, p2, p3;
+};
+static NOINLINE void set_dips(const struct columns *c, struct dips *dips) {
+  const int32_t off_x = c->centre_x - c->mean_x, off_y = c->centre_y - c->mean_y;
+  const int32_t cross = c->cross >> COEFFICIENT_SHIFT;
+  /* p3 = x (x - skew_x) + y (y - skew_y) - variance of the offsets from the mean */
+  const int32_t rest_x = (off_x - c->skew_x) * LINEAR_TO_Q26;
+  const int32_t rest_y = (off_y - c->skew_y) * LINEAR_TO_Q26;
+  const int32_t slope_x = rest_x + off_x * LINEAR_TO_Q26, slope_y = rest_y + off_y * LINEAR_TO_Q26;
+  const int32_t constant_x = fixed_mul_q26(off_x >> 1, rest_x) - (c->variance >> 1);
+  const int32_t constant_y = fixed_mul_q26(off_y >> 1, rest_y);
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t away = times_q12((i - ORIGIN_X) * LINEAR_ONE - c->centre_x, c->narrowness_q12);
+    dips->p1.x[i] = off_x + away;
+    dips->p2.x[i] = -times_q12(off_x + away, cross);
+    dips->p3.x[i] = constant_x + fixed_mul_q26(away >> 1, slope_x);
+  }
+  for (int j = 0; j < ROWS; j++) {
+    int32_t away = times_q12((j - ORIGIN_Y) * LINEAR_ONE - c->centre_y, c->narrowness_q12);
+    dips->p1.y[j] = 0;
+    dips->p2.y[j] = off_y + away;
+    dips->p3.y[j] = constant_y + fixed_mul_q26(away >> 1, slope_y);
+  }
+}
+
+/* Makes the column orthogonal to the model, and mends its norm. Returns what that took from the
+ * polynomial, LINEAR_Q. */
+static NOINLINE int32_t project_out(const struct columns *c, int32_t *column, int32_t q,
+                                    int32_t *norm) {
+  int32_t sum = 0;
+  const int32_t *from = column;
+  for (int k = 0; k < NODES; k++) {
+    sum += (model_q15(&c->node[k]) * *from) >> MASS_SHIFT;
+    from += STEP;
+  }
+  const int32_t share_q12 = factor(sum, c->mass);
+  for (int k = 0; k < NODES; k++) {
+    *column -= times_q12(model_q15(&c->node[k]), share_q12);
+    column += STEP;
+  }
+  sum = MASS_SHIFT > NORM_SHIFT ? sum << (MASS_SHIFT - NORM_SHIFT) : sum;
+  *norm = remaining(*norm, times_factor(sum, share_q12));
+  return to_poly(share_q12, 15 - q, 8 << LINEAR_Q);
+}
+
 /* Columns, norms and factors from the model at the nodes. */
 static NOINLINE void orthogonalise(const struct readings *readings, const struct ridge *ridge,
                                    struct columns *c) {
   set_mean(readings, c);
+  struct dips dips;
+  const struct polynomial *dip1 = NULL, *dip2 = NULL, *dip3 = NULL;
+  if (c->dip) {
+    set_mass(readings, c);
+    set_dips(c, &dips);
+    dip1 = &dips.p1;
+    dip2 = &dips.p2;
+    dip3 = &dips.p3;
+  }
   int32_t dx[COLUMNS], dy[ROWS], square_x[COLUMNS], square_y[ROWS];
   int32_t mean_x = c->mean_x, mean_y = c->mean_y;
   int32_t cross = c->cross >> COEFFICIENT_SHIFT;
@@ -229,12 +336,18 @@ static NOINLINE void orthogonalise(const struct readings *readings, const struct
     dy[j] = k * LINEAR_ONE - mean_y;
     square_y[j] = k * k * SQUARE_ONE - k * mean_y + constant - (times_q12(dy[j], skew_y) >> 1);
   }
-  c->norm1 = fill_along_x(c->node, dx, ridge, &c->q1);
-  c->norm3 = fill(&c->node[0].p3, c->node, square_x, square_y, SQUARE_Q, ridge, &c->q3);
+  c->norm1 = fill_along_x(c->node, dx, dip1, ridge, &c->q1);
+  c->norm3 = fill(&c->node[0].p3, c->node, square_x, square_y, SQUARE_Q, dip3, ridge, &c->q3);
   for (int i = 0; i < COLUMNS; i++) {
     dx[i] = -times_q12(dx[i], cross);
   }
-  c->norm2 = fill(&c->node[0].p2, c->node, dx, dy, LINEAR_Q, ridge, &c->q2);
+  c->norm2 = fill(&c->node[0].p2, c->node, dx, dy, LINEAR_Q, dip2, ridge, &c->q2);
+  c->lift1 = c->lift2 = c->lift3 = 0;
+  if (c->dip) {
+    c->lift1 = project_out(c, &c->node[0].p1, c->q1, &c->norm1);
+    c->lift2 = project_out(c, &c->node[0].p2, c->q2, &c->norm2);
+    c->lift3 = project_out(c, &c->node[0].p3, c->q3, &c->norm3);
+  }
 
   int32_t g21 = 0, g31 = 0, g32 = 0;
   const struct node *node = c->node;
@@ -280,8 +393,9 @@ static NOINLINE void eliminate(const struct columns *c, int32_t sum1, int32_t su
   system->d1 = long_norm(c->norm1, c->q1);
   system->d2 = long_norm(c->norm2, c->q2);
   system->d3 = long_norm(c->norm3, c->q3);
-  system->mean_x = c->mean_x * LINEAR_TO_Q26;
-  system->mean_y = c->mean_y * LINEAR_TO_Q26;
+  system->mean_x = (c->mean_x + c->lift1) * LINEAR_TO_Q26;
+  system->mean_y =
+      (c->mean_y + c->lift2 + times_q12(c->lift1, c->cross >> COEFFICIENT_SHIFT)) * LINEAR_TO_Q26;
   system->cross = c->cross * LINEAR_TO_Q26;
   system->slope_x = (2 * c->mean_x + c->skew_x) * LINEAR_TO_Q26;
   system->slope_y = (2 * c->mean_y + c->skew_y) * LINEAR_TO_Q26;
@@ -308,6 +422,7 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
     weighted[k] = enters ? ((p >> 13) * (log2_q15(p >> 14) >> 3)) >> 13 : 0; /* Q14 */
   }
   c->cross = c->skew_x = c->skew_y = 0;
+  c->dip = false;
   orthogonalise(readings, &guess_ridge, c);
   int32_t sum1 = 0, sum2 = 0, sum3 = 0;
   const struct node *node = c->node;
@@ -395,6 +510,30 @@ static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused,
   return (power << 22) + fit_grid_rise(at->height, offset_x, offset_y);
 }
 
+#define DEPTH_MAX_Q28 (1 << 26) /* of the strongest node, which is from a quarter to one */
+#define NARROWNESS_MAX_Q12 (2 << 12)
+
+/* The dip at the sensors in use. */
+static NOINLINE void set_dip(const struct readings *readings, const struct fit_system *system,
+                             struct columns *c) {
+  const struct state *at = &system->at;
+  c->dip = readings->dip_share.mantissa != 0;
+  if (!c->dip) {
+    return;
+  }
+  c->centre_x = at->x / LINEAR_TO_Q26;
+  c->centre_y = at->y / LINEAR_TO_Q26;
+  int32_t narrowness = port_divide(readings->dip_height, at->height >> 12);
+  c->narrowness_q12 = narrowness < NARROWNESS_MAX_Q12 ? narrowness : NARROWNESS_MAX_Q12;
+  struct dip dip;
+  int32_t depth_q28 =
+      fit_grid_dip(readings, at, 1 << 28, system->rise_q22, DEPTH_MAX_Q28, &dip);
+  for (int k = 0; k < NODES; k++) {
+    int32_t along = fixed_mul_q30(depth_q28 * 4, dip.x[k / ROWS]);
+    c->node[k].d = readings->residual[k] == 0 ? fixed_mul_q30(along, dip.y[k % ROWS]) : 0;
+  }
+}
+
 /* The columns of one sensor as they are after the elimination; none where it is not used. */
 struct column {
   int32_t e, p1, p2, p3;
@@ -412,7 +551,8 @@ static NOINLINE void finish(const struct columns *c, int32_t finer, struct fit_s
   int32_t b0 = 0, squares = 0;
   for (int k = 0; k < NODES; k++) {
     int32_t r = shifted(c->node[k].e, finer);
-    b0 += fixed_mul_16(r, c->node[k].mantissa) >> c->node[k].shift;
+    b0 += c->dip ? fixed_mul_16(r, model_q15(&c->node[k]))
+                 : fixed_mul_16(r, c->node[k].mantissa) >> c->node[k].shift;
     r >>= SUM_BITS - 15;
     squares += (r * r) >> NORM_SHIFT;
   }
@@ -420,11 +560,27 @@ static NOINLINE void finish(const struct columns *c, int32_t finer, struct fit_s
   system->residual_shift = 11 - finer;
   system->square_sum = (struct scaled){squares, NORM_SHIFT - 2 * (28 + finer - (SUM_BITS - 15))};
   system->mass_q20 = c->mass >> (10 - MASS_SHIFT);
-  int32_t off_x = system->at.x - system->mean_x, off_y = system->at.y - system->mean_y;
+  int32_t off_x = system->at.x - c->mean_x * LINEAR_TO_Q26;
+  int32_t off_y = system->at.y - c->mean_y * LINEAR_TO_Q26;
   int32_t bend = fixed_mul_q28(off_x, off_x) + fixed_mul_q28(off_y, off_y);
   bend -= fixed_mul_q28(off_x, c->skew_x * LINEAR_TO_Q26) +
           fixed_mul_q28(off_y, c->skew_y * LINEAR_TO_Q26);
-  system->bend_q24 = fixed_clamp(bend - (c->variance >> (LINEAR_Q - 24)), -(1 << 29), 1 << 29);
+  bend -= (c->variance + c->lift3) >> (LINEAR_Q - 24);
+  system->bend_q24 = fixed_clamp(bend, -(1 << 29), 1 << 29);
+}
+
+/* Adds that of the dip to the error of each reading. */
+static NOINLINE void add_dip_errors(const struct columns *c, struct readings *room,
+                                    struct fit_spread *spread) {
+  uint32_t gains = 0;
+  for (int k = 0; k < NODES; k++) {
+    int32_t error = (c->node[k].d >> 15) * FIT_DIP_ERROR_Q16 >> 8;
+    error = room->q14[k] + ((error << (spread->gain_shift + 1)) >> 8);
+    error = error < INT16_MAX ? error : INT16_MAX;
+    room->q14[k] = error;
+    gains += (uint32_t)(error * error) >> SPREAD_SQUARE_SHIFT;
+  }
+  spread->gains = gains;
 }
 
 /* What errors of single sensors make of the result. The columns are made orthogonal for it. */
@@ -444,6 +600,9 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
     node->p3 = fixed_clamp(column.p3, -most, most);
   }
   fit_grid_set_errors(grid, settings, &system->at, room, spread);
+  if (c->dip) {
+    add_dip_errors(c, room, spread);
+  }
   const struct node *node = c->node;
   for (int k = 0; k < NODES; k++) {
     room->q28[k] =
@@ -468,6 +627,7 @@ enum accuracy { COARSE, FINE, LAST };
 static NOINLINE void evaluate(const struct readings *readings, enum accuracy accuracy,
                               struct columns *c, struct fit_system *system) {
   system->rise_q22 = set_model(&system->at, readings->residual, c);
+  set_dip(readings, system, c);
   orthogonalise(readings, &rounding_ridge, c);
   system->amplitude_q28 =
       fit_grid_amplitude(c->product_q26, c->mass >> (16 - MASS_SHIFT), accuracy != COARSE);
@@ -488,7 +648,8 @@ static NOINLINE void evaluate(const struct readings *readings, enum accuracy acc
     uint32_t size = 1;
     UNROLL
     for (int k = 0; k < NODES; k++) {
-      int32_t r = readings->q28[k] - fixed_mul_q30(system->amplitude_q28, node->e);
+      int32_t model = c->dip ? node->e - node->d : node->e;
+      int32_t r = readings->q28[k] - fixed_mul_q30(system->amplitude_q28, model);
       node->e = r;
       size |= fixed_size(r);
       node++;
@@ -548,12 +709,11 @@ bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
   struct fit_system system;
   struct state state;
   guess(grid, &readings, settings, &columns, &system, &state);
+  if (readings.dip_share.mantissa != 0) {
+    fit_grid_take_below_zero(array, pressure_Pa_q10, usable, &readings);
+  }
   int left = settings->iterations;
   do {
-    if (readings.dip_share.mantissa != 0 && left < settings->iterations) {
-      fit_grid_take_dip_out(array, pressure_Pa_q10, usable, &state, system.amplitude_q28,
-                            system.rise_q22, &readings);
-    }
     bool coarse = left > FINE_ITERATIONS && settings->iterations - left < COARSE_ITERATIONS;
     system.at.x = state.x;
     system.at.y = state.y;
@@ -601,12 +761,10 @@ int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q
       fixed_clamp(q26_of(0.72134752f / (sigma * sigma)), HEIGHT_MIN_Q26, HEIGHT_MAX_Q26);
   struct columns c;
   c.cross = c.skew_x = c.skew_y = 0;
-  evaluate(&readings, FINE, &c, &system);
   if (readings.dip_share.mantissa != 0) {
-    fit_grid_take_dip_out(array, pressure_Pa_q10, usable, &system.at,
-                          system.amplitude_q28, system.rise_q22, &readings);
-    evaluate(&readings, FINE, &c, &system);
+    fit_grid_take_below_zero(array, pressure_Pa_q10, usable, &readings);
   }
+  evaluate(&readings, FINE, &c, &system);
 
   uint32_t size = 1;
   for (int k = 0; k < NODES; k++) {

@@ -96,7 +96,6 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
 
 #define DIP_RISE_MAX_Q22 (20 << 22) /* the depth is at its limit long before */
 
-/* The dip's Gaussian at the nodes of an axis, Q30. */
 static void set_dip(int32_t *g, int nodes, int origin, int32_t centre, int32_t height) {
   for (int i = 0; i < nodes; i++) {
     int32_t off_q12 = ((i - origin) * ONE_Q26 - centre) >> 14;
@@ -104,28 +103,41 @@ static void set_dip(int32_t *g, int nodes, int origin, int32_t centre, int32_t h
   }
 }
 
-void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                           uint32_t usable, const struct state *at, int32_t amplitude_q28,
-                           int32_t rise_q22, struct readings *readings) {
-  const uint8_t *sensor = array->grid.sensor;
-  int32_t x[COLUMNS], y[ROWS];
-  set_dip(x, COLUMNS, COLUMNS / 2, at->x, readings->dip_height);
-  set_dip(y, ROWS, ROWS / 2, at->y, readings->dip_height);
+int32_t fit_grid_dip(const struct readings *readings, const struct state *at, int32_t amplitude_q28,
+                     int32_t rise_q22, int32_t most_q28, struct dip *dip) {
+  set_dip(dip->x, COLUMNS, COLUMNS / 2, at->x, readings->dip_height);
+  set_dip(dip->y, ROWS, ROWS / 2, at->y, readings->dip_height);
   /* 2^rise is 2^-(1 - its fraction) and a power of two. */
   rise_q22 = fixed_clamp(rise_q22, 0, DIP_RISE_MAX_Q22);
   int32_t fraction = exp2_negative((uint32_t)((1 << 22) - (rise_q22 & 0x3FFFFF)));
   struct scaled rise = fit_scaled_from(fraction, (rise_q22 >> 22) + 1 - 30);
   struct scaled depth = scaled_mul(scaled_mul(rise, fit_scaled_from(amplitude_q28, -28)),
                                    readings->dip_share);
+  return fixed_clamp(fit_scaled_to_fixed(depth, 28), 0, most_q28);
+}
+
+void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                           const struct state *at, int32_t amplitude_q28, int32_t rise_q22,
+                           struct readings *readings) {
+  const uint8_t *sensor = array->grid.sensor;
+  struct dip dip;
   const int32_t most = readings->largest_q28 >> 2; /* FIT_DIP_DEPTH_MAX */
-  int32_t depth_q28 = fixed_clamp(fit_scaled_to_fixed(depth, 28), 0, most);
+  int32_t depth_q28 = fit_grid_dip(readings, at, amplitude_q28, rise_q22, most, &dip);
   for (int i = 0; i < COLUMNS; i++) {
-    int32_t column = fixed_mul_q30(depth_q28, x[i]);
+    int32_t column = fixed_mul_q30(depth_q28, dip.x[i]);
     for (int j = 0; j < ROWS; j++) {
       int k = i * ROWS + j;
-      bool used = usable >> sensor[k] & 1;
-      set_reading(readings, k, used ? pressure_Pa_q10[sensor[k]] : 0,
-                  used ? fixed_mul_q30(column, y[j]) : 0);
+      set_reading(readings, k, pressure_Pa_q10[sensor[k]], fixed_mul_q30(column, dip.y[j]));
+    }
+  }
+}
+
+void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                              uint32_t usable, struct readings *readings) {
+  const uint8_t *sensor = array->grid.sensor;
+  for (int k = 0; k < NODES; k++) {
+    if (usable >> sensor[k] & 1) {
+      set_reading(readings, k, pressure_Pa_q10[sensor[k]], 0);
     }
   }
 }

@@ -87,11 +87,24 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
                             uint32_t usable, const struct fit_settings *settings,
                             struct readings *readings);
 
-/* Adds to the readings what the rubber's dip takes from them about this contact, whose model is
- * amplitude 2^rise at the centre. readings: as fit_grid_take_readings left them, with a dip. */
+/* The dip's Gaussian, a product as the contact's is: its factors at the nodes, Q30. */
+struct dip {
+  int32_t x[COLUMNS], y[ROWS];
+};
+/* Sets the factors about this contact, whose model is amplitude 2^rise at the centre, and returns
+ * the dip's depth there, at most most_q28. readings: as fit_grid_take_readings left them, with a
+ * dip. */
+int32_t fit_grid_dip(const struct readings *readings, const struct state *at, int32_t amplitude_q28,
+                     int32_t rise_q22, int32_t most_q28, struct dip *dip);
+
+/* Adds the dip to the readings of a full rectangle. */
 void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                           uint32_t usable, const struct state *at, int32_t amplitude_q28,
-                           int32_t rise_q22, struct readings *readings);
+                           const struct state *at, int32_t amplitude_q28, int32_t rise_q22,
+                           struct readings *readings);
+
+/* Readings below zero as they are, where fit_grid_take_readings took them as zero. */
+void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                              uint32_t usable, struct readings *readings);
 
 /* value >= 0 and finite. */
 uint64_t fit_packed_float(float value);

@@ -107,6 +107,9 @@ NOINLINE void fit_grid_begin_spread(const struct fit_settings *settings,
   for (int k = 0; k < NODES; k++) {
     gains |= settings->gain_sd_q16[k];
   }
+  if (fit_has_dip(settings)) {
+    gains |= FIT_DIP_ERROR_Q16 >> 2; /* the dip is at most a quarter */
+  }
   spread->gain_shift = 15 - fixed_bits(gains);
   spread->apart = (struct scaled){0, 0};
   spread->by_gains = spread->force_by_gains = 0;

@@ -76,6 +76,9 @@ static inline float fit_location_sd_limit_mm(const struct fit_settings *settings
 /* The dip never takes more than this share of the largest reading, and is used with a sd of so many
  * pitches. */
 #define FIT_DIP_DEPTH_MAX 0.25f
+/* What the dip may be off by at each sensor, of itself. It counts where the derivatives have the
+ * dip. Chosen on the recording that chooses of host_tools/report/real. */
+#define FIT_DIP_ERROR 0.25f
 #define FIT_DIP_SD_MIN 0.5f
 #define FIT_DIP_SD_MAX 5.0f
 
@@ -93,6 +96,14 @@ static inline bool fit_has_dip(const struct fit_settings *settings) {
   uint32_t least = bytes_from_f32(FIT_PRIOR_WIDTH_MIN_mm), most = bytes_from_f32(FIT_PRIOR_MAX_mm);
   return bytes_from_f32(settings->dip_sd_mm) - least <= most - least &&
          bytes_from_f32(settings->dip_share) - 1u < bytes_from_f32(FIT_DIP_SHARE_MAX);
+}
+
+/* Where sensors are far apart for the width, those beside the contact feel little but the dip. Then
+ * it belongs into the derivatives; elsewhere it is enough to add it to the readings. */
+static inline bool fit_steps_want_dip(const struct fit_array *array,
+                                      const struct fit_settings *settings) {
+  return fit_has_dip(settings) && fit_has_prior(settings) &&
+         settings->prior_sigma_mm < FIT_SHAPE_LEAST * array->pitch_mm;
 }
 
 /* What a reading below zero counts as. */

@@ -69,8 +69,13 @@ KernelResult fit(const fit_array &array, const std::int32_t *pressure_Pa_q10, st
 
 // Of a row of fit/kernels.h.
 #define SUITS(suits)                                                                               \
-  [](std::uint32_t usable, std::uint32_t all) { return static_cast<void>(usable), static_cast<void>(all), suits; }
-template <class SUITS> unsigned takes_a_subset(SUITS suits) { return suits(1, 3) ? unsigned{ANY_SUBSET} : 0u; }
+  []([[maybe_unused]] const fit_array *array, [[maybe_unused]] const fit_settings *settings,       \
+     [[maybe_unused]] std::uint32_t usable, [[maybe_unused]] std::uint32_t all) { return suits; }
+template <class SUITS> unsigned takes_a_subset(SUITS suits) {
+  const fit_array array{};
+  const fit_settings settings{};
+  return suits(&array, &settings, 1, 3) ? unsigned{ANY_SUBSET} : 0u;
+}
 
 // One for each row.
 #define OF_THE_FIRMWARE(name, suits, fits)                                                         \
