@@ -89,6 +89,11 @@ void PacketLines::packet(const wire_packet &packet) {
     visit_ack(writer, copy.body.ack);
     comment_("packet", PACKET_ACK + writer.text());
     return;
+  case WIRE_SYNC:
+    write_pending();
+    visit_sync(writer, copy.body.sync);
+    comment_("packet", PACKET_SYNC + writer.text());
+    return;
   case WIRE_INFO:
     write_pending();
     info(packet.body.info);
