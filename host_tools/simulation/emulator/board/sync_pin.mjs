@@ -24,7 +24,7 @@ export class SyncPin {
     chip.pins.onLevels = (levels, t_ns) => this.onLevel((levels & this.bit) !== 0, t_ns);
     if (!this.next) return;
     chip.pins.setLevels(this.bit, this.high ? -1 : 0);
-    if (!this.edge) this.#schedule(chip.time.nanos);
+    if (!this.edge) this.alarm.schedule(1); // the source may not know yet when the power came
   }
 
   #schedule(t_ns) {
@@ -33,6 +33,10 @@ export class SyncPin {
   }
 
   #edge() {
+    if (!this.edge) {
+      this.#schedule(this.chip.time.nanos);
+      return;
+    }
     const { at_ns, high } = this.edge;
     const { pins } = this.chip;
     if ((pins.low | pins.high) & this.bit) this.report.warn('sync', 'the chip drives a wire that another source drives too');
