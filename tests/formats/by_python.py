@@ -67,7 +67,7 @@ def info_of(metadata):
 def some_info():
     calibration = wire.Calibration(0, 0, 1, 0, 0, 0, 0, 0, 0, 30 * (1.0,))
     pad = wire.PadProfile(*(field.times * (0.0,) if field.times > 1 else 0 for _, field in wire.layout_of(wire.PadProfile)))
-    return wire.Info((0, 0, 0), 15, 15, "", "", "", "", 0, 0, 0, 0, 0, 0, 0, 0.0, 0.0, 30 * (0.0,), 0.0, 0.0, 0.0, 17, calibration, pad)
+    return wire.Info((0, 0, 0), 15, 31, "", "", "", "", 0, 0, 0, 0, 0, 0, 0, 0.0, 0.0, 30 * (0.0,), 0.0, 0.0, 0.0, 0, 17, calibration, pad)
 
 
 KNOWN_KEYS = list(info_metadata(some_info()))

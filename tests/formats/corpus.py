@@ -54,6 +54,7 @@ def seed_packets():
     packets = list(bags.some_packets(7, FRAMES))
     packets.insert(5, wire.Packet(3, 2**33, wire.Health(*range(1, 21))))
     packets.insert(9, wire.Packet(4, 2**33, wire.Acknowledgement(0x81, 0, 7, 2**40)))
+    packets.insert(10, wire.Packet(5, 2**33, wire.SyncEdge(2**32 - 1, 1)))
     return packets
 
 
