@@ -9,6 +9,7 @@
 #include "native/native_cdc.h"
 #include "native/native_flash.h"
 #include "native/native_port.h"
+#include "native/native_sync.h"
 #include "native/sim_array.h"
 #include "port/port.h"
 
@@ -41,6 +42,7 @@ static void power_up(void) {
   native_flash_power_up();
   native_start(false);
   native_cdc_reset();
+  native_sync_reset();
   sim_array_init(&array, geometry.sensor_count, 1);
   array.world = (struct sim_world){.pressure_Pa = pressure_Pa};
   array.noise = 1.0;
