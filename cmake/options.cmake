@@ -20,8 +20,8 @@ endif()
 
 # A scene is a named set of capabilities and defaults for one use of the fingertip.
 #   raw    every frame the sensors can give; pressures and tare only
-#   press  every frame; location and force, no slip and no raw packets
-#   slip   every frame; location, force, slip, raw packets
+#   press  every frame; location and force, no slip, no raw packets and no sync pin
+#   slip   every frame; location, force, slip, raw packets, sync pin
 #   grasp  every frame; all there is: tangential load besides
 #   paper  as slip, in the published setting: 20 Hz, slip by eq. (7) with n = 2
 set(FINGERTIP_SCENES raw press slip grasp paper)
@@ -32,12 +32,12 @@ if(NOT FINGERTIP_SCENE IN_LIST FINGERTIP_SCENES)
 endif()
 
 # Capabilities: what is off is not compiled (firmware/config/capabilities.h).
-set(FINGERTIP_CAPABILITIES FIT SLIP TANGENTIAL RAW_STREAM)
+set(FINGERTIP_CAPABILITIES FIT SLIP TANGENTIAL RAW_STREAM SYNC)
 set(capabilities_of_raw RAW_STREAM)
 set(capabilities_of_press FIT)
-set(capabilities_of_slip FIT SLIP RAW_STREAM)
-set(capabilities_of_grasp FIT SLIP TANGENTIAL RAW_STREAM)
-set(capabilities_of_paper FIT SLIP RAW_STREAM)
+set(capabilities_of_slip FIT SLIP RAW_STREAM SYNC)
+set(capabilities_of_grasp FIT SLIP TANGENTIAL RAW_STREAM SYNC)
+set(capabilities_of_paper FIT SLIP RAW_STREAM SYNC)
 foreach(capability IN LISTS FINGERTIP_CAPABILITIES)
   set(option FINGERTIP_${capability})
   set(${option} SCENE CACHE STRING "ON, OFF, or SCENE: as the scene has it")

@@ -1,10 +1,13 @@
 #include "app/app.h"
+#include "pico_mux/board.h"
 #include "pico_mux/mux_bus.h"
 #include "port/port.h"
 #include "rp2040/pico.h"
+#include "rp2040/sync.h"
 #include "rp2040/usb_controller.h"
 
 const bool usb_controller_has_gpio15 = true;
+const unsigned sync_pin = BOARD_PIN_SYNC;
 
 static struct mux_bus mux_bus;
 static struct array_bus array_bus;

@@ -1,10 +1,13 @@
 #include "app/app.h"
+#include "pico_parallel/board.h"
 #include "pico_parallel/parallel_bus.h"
 #include "port/port.h"
 #include "rp2040/pico.h"
+#include "rp2040/sync.h"
 #include "rp2040/usb_controller.h"
 
 const bool usb_controller_has_gpio15 = false;
+const unsigned sync_pin = BOARD_PIN_SYNC;
 
 static struct parallel_bus parallel_bus;
 static struct array_bus array_bus;

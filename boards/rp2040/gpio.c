@@ -11,6 +11,7 @@
 #define PAD_INPUT_ENABLE (1u << 6)
 #define PAD_DRIVE_4_MA (1u << 4)
 #define PAD_PULL_UP (1u << 3)
+#define PAD_PULL_DOWN (1u << 2)
 #define PAD_SCHMITT (1u << 1)
 
 #define SIO_GPIO_IN 0xd0000004u
@@ -21,7 +22,8 @@
 
 void gpio_set_pad(unsigned pin, enum gpio_pull pull) {
   REG32(PADS_BANK0_GPIO(pin)) =
-      PAD_INPUT_ENABLE | PAD_DRIVE_4_MA | PAD_SCHMITT | (pull == GPIO_PULL_UP ? PAD_PULL_UP : 0);
+      PAD_INPUT_ENABLE | PAD_DRIVE_4_MA | PAD_SCHMITT | (pull == GPIO_PULL_UP ? PAD_PULL_UP : 0) |
+      (pull == GPIO_PULL_DOWN ? PAD_PULL_DOWN : 0);
 }
 
 void gpio_set_function(unsigned pin, enum gpio_function function) {

@@ -16,7 +16,7 @@ enum gpio_function {
   GPIO_FUNCTION_NULL = 31,
 };
 
-enum gpio_pull { GPIO_PULL_NONE, GPIO_PULL_UP };
+enum gpio_pull { GPIO_PULL_NONE, GPIO_PULL_UP, GPIO_PULL_DOWN };
 
 /* Pad of a pin: input enabled with Schmitt trigger, output enabled with 4 mA and slow edges. */
 void gpio_set_pad(unsigned pin, enum gpio_pull pull);

@@ -3,6 +3,7 @@
 #include "rp2040/crash.h"
 #include "rp2040/event.h"
 #include "rp2040/flash.h"
+#include "rp2040/interrupts.h"
 #include "rp2040/mpu_regs.h"
 #include "rp2040/nvic.h"
 #include "rp2040/resets.h"
@@ -60,16 +61,6 @@ static void guard_memory(void) {
 static void open_memory(void) {
   MPU_CTRL = 0;
   __asm volatile("dsb\n isb" ::: "memory");
-}
-
-static uint32_t disable_interrupts(void) {
-  uint32_t primask;
-  __asm volatile("mrs %0, primask\n cpsid i" : "=r"(primask)::"memory");
-  return primask;
-}
-
-static void restore_interrupts(uint32_t primask) {
-  __asm volatile("msr primask, %0" ::"r"(primask) : "memory");
 }
 
 uint64_t port_now_us(void) {

@@ -17,6 +17,7 @@
 #define RESETS_PADS_BANK0 (UINT32_C(1) << 8)
 #define RESETS_PADS_QSPI (UINT32_C(1) << 9)
 #define RESETS_PIO0 (UINT32_C(1) << 10)
+#define RESETS_PIO1 (UINT32_C(1) << 11)
 #define RESETS_PLL_SYS (UINT32_C(1) << 12)
 #define RESETS_PLL_USB (UINT32_C(1) << 13)
 #define RESETS_SYSINFO (UINT32_C(1) << 19)

@@ -4,7 +4,8 @@
  *
  * The USB controller comes first, for the time of a frame's start counts (TinyUSB reads it before
  * anything else) and so does the time from a SETUP to what answers the next token; and the watchdog's
- * last warning, which must see whatever hangs. What else USB has to do comes before the sensors.
+ * last warning, which must see whatever hangs; and the pulse of the sync pin, some 40 cycles twice a
+ * second. What else USB has to do comes before the sensors.
  */
   .syntax unified
   .cpu cortex-m0plus
@@ -48,7 +49,8 @@ __vectors:
   interrupt timer0_irq_handler, THIRD /* 0 */
   interrupt timer1_irq_handler, SECOND
   interrupt timer2_irq_handler, FIRST
-  unexpected 2
+  interrupt timer3_irq_handler, FIRST
+  unexpected 1
   interrupt usbctrl_irq_handler, FIRST /* 5 */
   unexpected 1
   interrupt pio0_irq_handler, THIRD /* 7 */

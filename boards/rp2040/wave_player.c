@@ -42,19 +42,19 @@ enum ft_status wave_player_open(void) {
   }
 
   for (unsigned i = 0; i < PROGRAM_LENGTH; i++) {
-    PIO0_INSTR_MEM(i) = program[i];
+    PIO_INSTR_MEM(PIO0_BASE, i) = program[i];
   }
-  PIO0_SM0_CLKDIV = PIO_CLKDIV_INT(CLOCK_DIVIDER);
-  PIO0_SM0_EXECCTRL = PIO_EXECCTRL_WRAP(0, PROGRAM_LENGTH - 1);
-  PIO0_SM0_PINCTRL = PIO_PINCTRL_OUT(0, LINES) | PIO_PINCTRL_IN(0);
-  PIO0_SM0_INSTR = PIO_MOV_PINS_NULL; /* a driven line is low; after the reset none is driven */
-  PIO0_SM0_SHIFTCTRL = PIO_SHIFTCTRL_OUT_RIGHT | PIO_SHIFTCTRL_IN_RIGHT | PIO_SHIFTCTRL_AUTOPULL |
+  PIO_SM0_CLKDIV(PIO0_BASE) = PIO_CLKDIV_INT(CLOCK_DIVIDER);
+  PIO_SM0_EXECCTRL(PIO0_BASE) = PIO_EXECCTRL_WRAP(0, PROGRAM_LENGTH - 1);
+  PIO_SM0_PINCTRL(PIO0_BASE) = PIO_PINCTRL_OUT(0, LINES) | PIO_PINCTRL_IN(0);
+  PIO_SM0_INSTR(PIO0_BASE) = PIO_MOV_PINS_NULL; /* a driven line is low; after the reset none is driven */
+  PIO_SM0_SHIFTCTRL(PIO0_BASE) = PIO_SHIFTCTRL_OUT_RIGHT | PIO_SHIFTCTRL_IN_RIGHT | PIO_SHIFTCTRL_AUTOPULL |
                        PIO_SHIFTCTRL_AUTOPUSH;
   for (unsigned pin = 0; pin < LINES; pin++) {
     gpio_set_pad(pin, GPIO_PULL_UP);
     gpio_set_function(pin, GPIO_FUNCTION_PIO0);
   }
-  PIO0_CTRL = PIO_CTRL_SM0_ENABLE;
+  PIO_CTRL(PIO0_BASE) = PIO_CTRL_SM0_ENABLE;
 
   DMA_INTE0 = 1u << CHANNEL_SAMPLES;
   rp2040_irq_enable(RP2040_IRQ_DMA_0);
@@ -66,14 +66,14 @@ enum ft_status wave_player_open(void) {
 /* NOLINTNEXTLINE(readability-non-const-parameter): DMA writes the samples */
 void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_count) {
   cells = cell_count;
-  DMA_READ_ADDR(CHANNEL_SAMPLES) = PIO0_RXF0_ADDRESS;
+  DMA_READ_ADDR(CHANNEL_SAMPLES) = PIO_RXF0_ADDRESS(PIO0_BASE);
   DMA_WRITE_ADDR(CHANNEL_SAMPLES) = (uint32_t)(uintptr_t)samples;
   DMA_TRANS_COUNT(CHANNEL_SAMPLES) = cell_count / 2;
   DMA_CTRL_TRIG(CHANNEL_SAMPLES) = DMA_CTRL_EN | DMA_CTRL_WORDS | DMA_CTRL_INCR_WRITE |
                                    DMA_CTRL_CHAIN_TO(CHANNEL_SAMPLES) |
                                    DMA_CTRL_TREQ(DMA_DREQ_PIO0_RX0);
   DMA_READ_ADDR(CHANNEL_STEPS) = (uint32_t)(uintptr_t)steps;
-  DMA_WRITE_ADDR(CHANNEL_STEPS) = PIO0_TXF0_ADDRESS;
+  DMA_WRITE_ADDR(CHANNEL_STEPS) = PIO_TXF0_ADDRESS(PIO0_BASE);
   DMA_TRANS_COUNT(CHANNEL_STEPS) = WAVE_STEPS_PER_CELL * cell_count / 2;
   DMA_CTRL_TRIG(CHANNEL_STEPS) = DMA_CTRL_EN | DMA_CTRL_WORDS | DMA_CTRL_INCR_READ |
                                  DMA_CTRL_CHAIN_TO(CHANNEL_STEPS) |

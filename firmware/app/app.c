@@ -4,6 +4,7 @@
 
 #include "app/commands.h"
 #include "app/packets.h"
+#include "app/sync.h"
 #include "common/contact_flags.h"
 #include "config/build_info.h"
 #include "config/defaults.h"
@@ -33,6 +34,9 @@ _Static_assert(DEFAULT_FIT_N_LARGEST == 0, "n_largest needs FINGERTIP_FIT_GENERA
 void app_on_event(struct app *app) {
   uint64_t now_us = port_now_us();
   uint64_t wake_us = scan_step(&app->scan, now_us);
+#if FT_WITH_SYNC
+  sync_show_scan(app);
+#endif
   uint64_t tick_us = now_us + atomic_load_explicit(&app->tick_interval_us, memory_order_relaxed);
   if (now_us >= app->next_tick_us) {
     app->next_tick_us = tick_us;
@@ -250,6 +254,12 @@ static bool may_save_power(const struct app *app) {
 static void follow_suspend(struct app *app) {
   const bool saves = may_save_power(app);
   if (saves != app->saves_power) {
+#if FT_WITH_SYNC
+    if (saves) {
+      sync_pause(app, true);
+      commands_set_pace(app);
+    }
+#endif
     port_save_power(saves);
     port_event(saves ? CRASH_EVENT_ASLEEP : CRASH_EVENT_AWAKE, 0);
     const uint64_t now_us = port_now_us();
@@ -259,6 +269,12 @@ static void follow_suspend(struct app *app) {
       condition_start(&app->condition);
     }
     app->saves_power = saves;
+#if FT_WITH_SYNC
+    if (!saves) {
+      sync_pause(app, false);
+      commands_set_pace(app);
+    }
+#endif
   }
   scan_rest(&app->scan, cdc_is_suspended());
 }
@@ -359,6 +375,9 @@ void app_run(struct app *app) {
   uint64_t now_us = port_now_us();
   each_second(app, now_us, has_frame);
   commands_follow_store(app, now_us); /* after the frame, which it must not keep waiting */
+#if FT_WITH_SYNC
+  sync_follow(app, now_us);
+#endif
   if (app->loader_at_us != 0 && now_us >= app->loader_at_us && !store_is_writing(&app->store)) {
     port_reboot_to_loader();
   }

@@ -16,6 +16,7 @@
 #include "contact/tangential.h"
 #include "fit/fit.h"
 #include "fit/fit_tangential.h"
+#include "port/sync.h"
 #include "scan/scan.h"
 #include "store/store.h"
 #include "wire/packet.h"
@@ -103,6 +104,14 @@ struct app {
 
 #if FT_WITH_FIT
   struct rest rest;
+#endif
+#if FT_WITH_SYNC
+  struct {
+    uint8_t mode; /* enum port_sync, as it is set */
+    bool paused;
+    uint64_t looked_us;            /* at the edges */
+    _Atomic uint32_t shows_frames; /* for the event context */
+  } sync;
 #endif
 };
 

@@ -2,6 +2,7 @@
 
 #include "app/acting.h"
 #include "app/packets.h"
+#include "app/sync.h"
 #include "common/contact_flags.h"
 #include "config/geometry.h"
 #include "port/port.h"
@@ -9,8 +10,9 @@
 
 /* How often the main loop looks at the clock if nothing else wakes it: for the watchdog. */
 #define TICK_us (PORT_WATCHDOG_PERIOD_us / 5u)
-/* The same while something is being stored, which takes some fifty looks and an erase. */
-#define STORE_TICK_us 1000u
+/* The same while something is being stored, which takes some fifty looks and an erase, and while
+ * edges come. */
+#define FAST_TICK_us 1000u
 
 enum {
   STREAMS = (FT_WITH_FIT ? WIRE_STREAM_CONTACT : 0) | (FT_WITH_RAW_STREAM ? WIRE_STREAM_RAW : 0) |
@@ -26,6 +28,9 @@ static const struct wire_layout *const known_commands[] = {WIRE_COMMANDS,
 #endif
 #if FT_WITH_TANGENTIAL
                                                            WIRE_COMMANDS_OF_TANGENTIAL,
+#endif
+#if FT_WITH_SYNC
+                                                           WIRE_COMMANDS_OF_SYNC,
 #endif
                                                            NULL};
 
@@ -82,15 +87,27 @@ static enum wire_result set_osr(struct app *app, uint16_t osr) {
   return WIRE_RESULT_DONE;
 }
 
-/* While something is being stored the main loop looks after it each millisecond. The alarm that is
- * armed would come too late for that. */
-static void hurry_store(struct app *app, bool is_writing) {
-  atomic_store_explicit(&app->tick_interval_us, is_writing ? STORE_TICK_us : TICK_us,
+void commands_set_pace(struct app *app) {
+  bool is_fast = store_is_writing(&app->store);
+#if FT_WITH_SYNC
+  is_fast = is_fast || sync_is_stamping(app);
+#endif
+  atomic_store_explicit(&app->tick_interval_us, is_fast ? FAST_TICK_us : TICK_us,
                         memory_order_relaxed);
-  if (is_writing) {
+  if (is_fast) { /* the alarm that is armed would come too late */
     port_alarm_at_us(port_now_us());
   }
 }
+
+#if FT_WITH_SYNC
+static enum wire_result set_sync(struct app *app, uint8_t mode) {
+  if (!sync_set(app, mode)) {
+    return WIRE_RESULT_OUT_OF_RANGE;
+  }
+  commands_set_pace(app);
+  return WIRE_RESULT_DONE;
+}
+#endif
 
 #if FT_WITH_FIT
 /* What is kept of the pad acts. */
@@ -122,19 +139,22 @@ static void use_stored(struct app *app) {
   set_prior(app, settings->prior_sigma_mm, settings->prior_width_mm);
   set_location_limit(app, settings->location_limit_mm);
 #endif
+#if FT_WITH_SYNC
+  set_sync(app, (uint8_t)settings->sync);
+#endif
 }
 
 void commands_start(struct app *app) {
   use_stored(app);
   wire_receiver_init(&app->receiver, known_commands);
-  hurry_store(app, store_is_writing(&app->store));
+  commands_set_pace(app);
 }
 
 /* The result of a command whose acknowledgement has to wait. */
 enum { LATER = -1 };
 
 static int result_of_put(struct app *app, enum ft_status status) {
-  hurry_store(app, store_is_writing(&app->store));
+  commands_set_pace(app);
   return status == FT_PENDING ? LATER : status == FT_OK ? WIRE_RESULT_DONE : WIRE_RESULT_NOT_NOW;
 }
 
@@ -177,6 +197,9 @@ static int keep_settings(struct app *app, uint8_t keep) {
   settings.prior_sigma_mm = app->set_sigma_mm;
   settings.prior_width_mm = app->set_sigma_sd_mm;
   settings.location_limit_mm = app->fit_settings.location_sd_limit_mm;
+#endif
+#if FT_WITH_SYNC
+  settings.sync = app->sync.mode;
 #endif
   return result_of_put(app, store_put_settings(&app->store, keep ? &settings : NULL));
 }
@@ -229,6 +252,10 @@ static int obey(struct app *app, const struct wire_packet *command, uint64_t now
     return put_pad(app, &command->body.cmd_pad.profile);
   case WIRE_CMD_ERASE_PAD:
     return result_of_put(app, store_put_profile(&app->store, NULL));
+#endif
+#if FT_WITH_SYNC
+  case WIRE_CMD_SYNC:
+    return set_sync(app, command->body.cmd_sync.mode);
 #endif
   case WIRE_CMD_KEEP:
     return keep_settings(app, command->body.cmd_keep.keep);
@@ -290,7 +317,7 @@ void commands_follow_store(struct app *app, uint64_t now_us) {
   if (status == FT_PENDING) {
     return;
   }
-  hurry_store(app, false);
+  commands_set_pace(app);
   port_event(CRASH_EVENT_STORED, status != FT_OK);
 #if FT_WITH_FIT
   use_stored_pad(app);

@@ -17,6 +17,10 @@ bool commands_receive(struct app *app);
 /* Each round: takes a write to the store a step further, and answers its command at the end. */
 void commands_follow_store(struct app *app, uint64_t now_us);
 
+/* Sets how often the main loop looks at the clock: more often while something is being stored, and
+ * while edges of the sync pin are stamped. Whenever that changes. */
+void commands_set_pace(struct app *app);
+
 /* The host that sent commands is gone. */
 void commands_end_session(struct app *app);
 

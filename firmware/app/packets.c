@@ -12,7 +12,8 @@ enum {
   CAPABILITIES = (FT_WITH_FIT ? WIRE_CAPABILITY_FIT : 0) |
                  (FT_WITH_SLIP ? WIRE_CAPABILITY_SLIP : 0) |
                  (FT_WITH_RAW_STREAM ? WIRE_CAPABILITY_RAW_STREAM : 0) |
-                 (FT_WITH_TANGENTIAL ? WIRE_CAPABILITY_TANGENTIAL : 0),
+                 (FT_WITH_TANGENTIAL ? WIRE_CAPABILITY_TANGENTIAL : 0) |
+                 (FT_WITH_SYNC ? WIRE_CAPABILITY_SYNC : 0),
 };
 
 /* Sends app->packet. A sequence number is spent even when the queue is full: the gap tells. */
@@ -77,6 +78,9 @@ void packets_send_info(struct app *app, uint64_t now_us) {
     info->calibration = *app->calibration;
   }
 #endif
+#if FT_WITH_SYNC
+  info->sync = app->sync.mode;
+#endif
 #if FT_WITH_TANGENTIAL
   if (app->pad) {
     info->stored |= WIRE_STORED_PAD;
@@ -134,6 +138,13 @@ void packets_send_raw(struct app *app) {
   memcpy(raw->pressure_Pa_q10, frame->pressure_Pa_q10, length);
   memcpy(raw->baseline_Pa_q10, app->condition.zero_Pa_q10, length);
   send_packet(app, &wire_raw_layout, frame->t_us);
+}
+#endif
+
+#if FT_WITH_SYNC
+void packets_send_sync(struct app *app, const struct port_sync_edge *edge) {
+  app->packet.body.sync = (struct wire_sync){.number = edge->number, .level = edge->number & 1u};
+  send_packet(app, &wire_sync_layout, edge->t_us);
 }
 #endif
 

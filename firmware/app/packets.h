@@ -15,6 +15,9 @@ void packets_send_contact(struct app *app, const struct wire_stages *stages);
 #if FT_WITH_RAW_STREAM
 void packets_send_raw(struct app *app);
 #endif
+#if FT_WITH_SYNC
+void packets_send_sync(struct app *app, const struct port_sync_edge *edge);
+#endif
 
 static inline uint32_t read_counter(const _Atomic uint32_t *counter) {
   return atomic_load_explicit(counter, memory_order_relaxed);

@@ -29,6 +29,11 @@
 #define FT_WITH_RAW_STREAM FINGERTIP_RAW_STREAM
 #endif
 
+/* The sync pin, its packets, and the command that sets it. */
+#ifndef FT_WITH_SYNC
+#define FT_WITH_SYNC FINGERTIP_SYNC
+#endif
+
 #if FT_WITH_SLIP && !FT_WITH_FIT
 #error "slip is found from fits: switch FINGERTIP_FIT on too"
 #endif

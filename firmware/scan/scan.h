@@ -188,6 +188,11 @@ static inline bool scan_rests(const struct scan *scan) {
   return atomic_load_explicit(&scan->rests, memory_order_relaxed) != 0;
 }
 
+/* The sensors convert for a frame. Event context. */
+static inline bool scan_is_converting_frame(const struct scan *scan) {
+  return scan->state == SCAN_WAIT_CONVERSION && scan->conversion->is_frame;
+}
+
 /* Event context, after scan_step. It waits for what will be due within SCAN_WAIT_MAX_us; whatever
  * the bus does, it does so at least each 100 ms. */
 #define SCAN_WAIT_MAX_us 2000000u

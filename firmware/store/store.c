@@ -29,6 +29,7 @@ enum {
   HAS_CALIBRATION = 1 << 0,
   HAS_SETTINGS = 1 << 1,
   HAS_PROFILE = 1 << 2,
+  SYNC_AT = 2,
   CALIBRATION_AT = 4,
   SETTINGS_BYTES = 24,
   PROFILE_BYTES = 4 * PAD_PROFILE_FLOATS + 1,
@@ -176,6 +177,7 @@ static void make_record(struct store *store, const struct parts *parts) {
   }
   if (parts->settings) {
     put_settings(payload + settings_at, parts->settings);
+    payload[SYNC_AT] = (uint8_t)parts->settings->sync;
   }
   if (parts->profile) {
     put_profile(payload + settings_at + SETTINGS_BYTES, parts->profile);
@@ -234,6 +236,7 @@ static bool take_record(struct store *store) {
   }
   if (payload[0] & HAS_SETTINGS) {
     get_settings(payload + settings_at, &content->settings);
+    content->settings.sync = payload[SYNC_AT];
     content->has_settings = true;
   }
   if (version != VERSION_WITHOUT_PROFILE && payload[0] & HAS_PROFILE) {

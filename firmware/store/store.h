@@ -17,13 +17,14 @@
  *     504  u32  sealed: 0. The record was read back and is right
  *     508  u32  final: 0. The seal is whole
  *
- * Payload of version 1: u8 parts (bit 0 calibration, bit 1 settings), u8 n sensors, u16 0. Then the
- * calibration as in its command, without its n: 14 + 8 n bytes, zeros where there is none. Then the
- * settings: u32 rate mHz, u16 OSR, u16 slip window ms, f32 slip threshold mm, f32 f32 prior mm, f32
- * location limit mm. Version 2 has one more part, bit 2, the pad's profile, behind the settings: as
- * in its command, 177 bytes. Version 3 has the calibration's shape and air at the end: u16 sigma,
- * its sd, the dip's share and sd, u8 kPa; as in its command, which has them before the sensors.
- * Later versions keep the slot as it is and change the payload.
+ * Payload of version 1: u8 parts (bit 0 calibration, bit 1 settings), u8 n sensors, u8 sync pin (a
+ * setting, and 0 in the records of firmware without one), u8 0. Then the calibration as in its
+ * command, without its n: 14 + 8 n bytes, zeros where there is none. Then the other settings: u32
+ * rate mHz, u16 OSR, u16 slip window ms, f32 slip threshold mm, f32 f32 prior mm, f32 location limit
+ * mm. Version 2 has one more part, bit 2, the pad's profile, behind the settings: as in its command,
+ * 177 bytes. Version 3 has the calibration's shape and air at the end: u16 sigma, its sd, the dip's
+ * share and sd, u8 kPa; as in its command, which has them before the sensors. Later versions keep
+ * the slot as it is and change the payload.
  *
  * Bits whose change was cut short may read differently each time. So a record that is not final may
  * be there today and gone tomorrow, or the other way round. When start-up meets one, it writes the
@@ -51,6 +52,7 @@ struct store_settings {
   float slip_threshold_mm;
   float prior_sigma_mm, prior_width_mm;
   float location_limit_mm;
+  uint32_t sync; /* enum port_sync; judged by who uses it */
 };
 
 /* What is in the flash for good. */

@@ -12,9 +12,9 @@
 
 #include <stdint.h>
 
-#define WIRE_VERSION 6
+#define WIRE_VERSION 7
 
-enum { WIRE_TEXT_BYTES = 16, WIRE_MAX_BODY_BYTES = 824 };
+enum { WIRE_TEXT_BYTES = 16, WIRE_MAX_BODY_BYTES = 825 };
 
 enum wire_type {
   /* device to host */
@@ -24,6 +24,7 @@ enum wire_type {
   WIRE_HEALTH = 0x04,
   WIRE_ACK = 0x05,
   WIRE_CRASH = 0x06,
+  WIRE_SYNC = 0x07,
   /* host to device */
   WIRE_CMD_STREAM = 0x80,
   WIRE_CMD_TARE = 0x81,
@@ -41,6 +42,7 @@ enum wire_type {
   WIRE_CMD_LOCATION_LIMIT = 0x8C,
   WIRE_CMD_PAD = 0x8D,
   WIRE_CMD_ERASE_PAD = 0x8E,
+  WIRE_CMD_SYNC = 0x90,
 };
 
 /* Bits of the stream mask. */
@@ -57,6 +59,7 @@ enum wire_capability {
   WIRE_CAPABILITY_SLIP = 1 << 1, /* slip, and the command that sets it */
   WIRE_CAPABILITY_RAW_STREAM = 1 << 2, /* raw packets */
   WIRE_CAPABILITY_TANGENTIAL = 1 << 3, /* tangential load, where the pad's profile is stored */
+  WIRE_CAPABILITY_SYNC = 1 << 4, /* sync packets, and the command that sets the sync pin */
 };
 
 /* The result code of an acknowledgement. */
@@ -102,6 +105,9 @@ enum wire_stored {
 /* location_sd_mm above which UNCERTAIN is set */
 #define WIRE_LOCATION_LIMIT_MIN_mm 0.01f
 #define WIRE_LOCATION_LIMIT_MAX_mm 100.0f
+/* sync pin; 0: off */
+#define WIRE_SYNC_MIN 1u /* and its doubles */
+#define WIRE_SYNC_MAX 3u
 #define WIRE_LOADER_MAGIC 0x746F6F42u /* "Boot" */
 
 /* Where the time of one frame went, us. The stages follow one another without a gap. Values
@@ -205,6 +211,8 @@ struct wire_info {
   /* its standard deviation; 0: none is set, and the sigma of a calibration acts */
   float prior_width_mm;
   float location_limit_mm; /* UNCERTAIN is set where location_sd_mm is above it */
+  /* with WIRE_CAPABILITY_SYNC, else 0 */
+  uint8_t sync; /* sync pin: 0 off, 1 in, 2 frame, 3 second */
   /* always */
   uint32_t stored; /* what the fingertip keeps without power, see below */
   /* with WIRE_STORED_CALIBRATION, else 0 */
@@ -251,6 +259,14 @@ struct wire_ack {
   uint8_t result; /* result, see below */
   uint16_t sequence; /* the command's own */
   uint64_t host_time_us; /* time in the command's header, so that the host can relate the clocks */
+};
+
+/* An edge at the sync pin. The header's time is that of the edge. */
+struct wire_sync {
+  /* counts the edges since the pin was set, from 1, modulo 2^32; a gap is edges that came too
+   * fast. An odd one rises */
+  uint32_t number;
+  uint8_t level; /* of the pin after it: 1 high, 0 low */
 };
 
 /* Set the streams to send; 0 stops. A stream that the firmware's capabilities lack is out of
@@ -300,8 +316,8 @@ struct wire_cmd_calibrate {
 
 /* Keep settings without power. */
 struct wire_cmd_keep {
-  /* 1: from now on start with the present rate, OSR, slip settings, prior and limit; 0: with the
-   * firmware's own again */
+  /* 1: from now on start with the present rate, OSR, slip settings, prior, limit and sync pin;
+   * 0: with the firmware's own again */
   uint8_t keep;
 };
 
@@ -323,6 +339,11 @@ struct wire_cmd_pad {
   struct pad_profile profile; /* as in info */
 };
 
+/* Set the sync pin, as packet sync says; 0: off. */
+struct wire_cmd_sync {
+  uint8_t mode; /* 1 in, 2 frame, 3 second */
+};
+
 union wire_body {
   struct wire_contact contact;
   struct wire_raw raw;
@@ -330,6 +351,7 @@ union wire_body {
   struct wire_health health;
   struct wire_ack ack;
   struct crash_record crash;
+  struct wire_sync sync;
   struct wire_cmd_stream cmd_stream;
   struct wire_cmd_tare cmd_tare;
   struct wire_cmd_rate cmd_rate;
@@ -341,6 +363,7 @@ union wire_body {
   struct wire_cmd_prior cmd_prior;
   struct wire_cmd_location_limit cmd_location_limit;
   struct wire_cmd_pad cmd_pad;
+  struct wire_cmd_sync cmd_sync;
 };
 
 /* The layout of one body. */
@@ -351,6 +374,7 @@ extern const struct wire_layout wire_info_layout;
 extern const struct wire_layout wire_health_layout;
 extern const struct wire_layout wire_ack_layout;
 extern const struct wire_layout wire_crash_layout;
+extern const struct wire_layout wire_sync_layout;
 extern const struct wire_layout cmd_stream_layout;
 extern const struct wire_layout cmd_tare_layout;
 extern const struct wire_layout cmd_rate_layout;
@@ -367,6 +391,7 @@ extern const struct wire_layout cmd_prior_layout;
 extern const struct wire_layout cmd_location_limit_layout;
 extern const struct wire_layout cmd_pad_layout;
 extern const struct wire_layout cmd_erase_pad_layout;
+extern const struct wire_layout cmd_sync_layout;
 
 /* The commands that every fingertip knows, and those of its capabilities, for its set. */
 #define WIRE_COMMANDS \
@@ -389,5 +414,7 @@ extern const struct wire_layout cmd_erase_pad_layout;
 #define WIRE_COMMANDS_OF_TANGENTIAL \
   &cmd_pad_layout, \
   &cmd_erase_pad_layout
+#define WIRE_COMMANDS_OF_SYNC \
+  &cmd_sync_layout
 
 #endif

@@ -297,13 +297,13 @@ def layouts_inc(line):
             lines += ["};", f"LAYOUT({name}, {number});"]
     return [*lines, "", "#define ALL_PACKETS \\",
             *(f"  &wire_{body.name}_layout, \\" for body in list(line.packets.values())[:-1]), f"  &wire_{list(line.packets)[-1]}_layout",
-            "#define ALL_COMMANDS \\", "  WIRE_COMMANDS, WIRE_COMMANDS_OF_FIT, WIRE_COMMANDS_OF_SLIP, WIRE_COMMANDS_OF_TANGENTIAL"]
+            "#define ALL_COMMANDS \\", "  WIRE_COMMANDS, WIRE_COMMANDS_OF_FIT, WIRE_COMMANDS_OF_SLIP, WIRE_COMMANDS_OF_TANGENTIAL, \\", "  WIRE_COMMANDS_OF_SYNC"]
 
 
 # ---- C++
 
 def line_fields_hpp(line):
-    contact, raw, info, health, ack = (line.packets[name] for name in ("contact", "raw", "info", "health", "ack"))
+    contact, raw, info, health, ack, sync = (line.packets[name] for name in ("contact", "raw", "info", "health", "ack", "sync"))
     lines = [f"/* {SAYS}.", " *", " * Walks over the fields of packets in the order of columns and comments of recordings, and the words",
              " * for what packets number; no interface of the library. */", "#pragma once", "", '#include "libfingertip/wire.hpp"', "",
              "#include <cstddef>", "#include <cstdint>", "#include <string>", "", "namespace fingertip::recording {", "",
@@ -340,6 +340,7 @@ def line_fields_hpp(line):
                 *(f'  visit("{field.key}", {name}.{field.member});' for field in fields), "}", ""]
 
     lines += visitor("health", health, map(health.field, health.keys), "wire_health") + visitor("ack", ack, ack.fields, "wire_ack")
+    lines += visitor("sync", sync, sync.fields, "wire_sync")
     lines += visitor("info", info, map(info.field, info.keys), "wire_info")
     calibration, pad = line.structs["calibration"], line.structs["pad_profile"]
     lines += ["/* What there is only of a calibrated fingertip: numbers, and lists with one for each sensor. */"]
@@ -551,6 +552,8 @@ def protocol_parts(line):
         if not field.range:
             return ""
         each = line.ranges[field.range]
+        if "words" in each:
+            return f" ({', '.join(f'{number} {word}' for number, word in zip(each['choices'], each['words'], strict=True))})"
         return f" ({', '.join(map(str, each['choices']))})" if "choices" in each else f" ({each['min']:.12g} to {each['max']:.12g} {each['unit']})"
 
     parts["commands"] = ["| type | command | body | known with | what it does |", "|---|---|---|---|---|"]

@@ -20,6 +20,7 @@ OWNED = {
     "TANGENTIAL": (["ft_fit.dir/fit/fit_tangential*.obj", "ft_contact.dir/contact/tangential.c.obj"],
                    r"store_put_profile|app_use_pad|cmd_(pad|erase_pad)_\w+"),
     "RAW_STREAM": ([], r"wire_raw_\w+"),
+    "SYNC": (["ft_app.dir/app/sync.c.obj"], r"sync|sync_pin|numbers|times_us|port_sync_\w+|packets_send_sync|(wire|cmd)_sync_\w+"),
 }
 
 

@@ -28,7 +28,7 @@ values = [{ field = "hold_ms", info = "hold_ms", say = "Hold", give = "{0} ms", 
 """
 FIRST_COMMAND = "[command.stream]\n"
 NEW_COMMAND = """[command.hold]
-type = 0x90
+type = 0x9F
 python = "SetHold"
 word = "hold"
 text = "Hold a value."
@@ -111,7 +111,7 @@ class Generator(unittest.TestCase):
 
     def test_the_longest_frame_is_that_of_the_longest_body(self):
         described = line.Line(ROOT / "firmware/wire/line.toml")
-        self.assertEqual(described.longest_frame(), 12 + (135 + 16 * 32 + 177) + 4 + 3 + 2)  # info of 32 sensors, calibrated, with a pad; as PROTOCOL.md says
+        self.assertEqual(described.longest_frame(), 12 + (136 + 16 * 32 + 177) + 4 + 3 + 2)  # info of 32 sensors, calibrated, with a pad; as PROTOCOL.md says
         self.assertIn(f"longer than {described.longest_frame()} bytes is damage", (ROOT / PAGE).read_text(encoding="utf-8"))
 
     def test_what_is_there_twice_is_refused(self):

@@ -43,6 +43,11 @@ json packet_json(const wire_packet &packet) {
     recording::visit_ack(numbers, copy.body.ack);
     return {{"ack", told}};
   }
+  if (packet.type == WIRE_SYNC) {
+    Numbers numbers{told};
+    recording::visit_sync(numbers, copy.body.sync);
+    return {{"sync", told}};
+  }
   if (packet.type == WIRE_INFO) {
     return {{"info", told}};
   }

@@ -67,7 +67,7 @@ def info_of(metadata):
 def some_info():
     calibration = wire.Calibration(0, 0, 1, 0, 0, 0, 0, 0, 0, 30 * (1.0,))
     pad = wire.PadProfile(*(field.times * (0.0,) if field.times > 1 else 0 for _, field in wire.layout_of(wire.PadProfile)))
-    return wire.Info((0, 0, 0), 15, 15, "", "", "", "", 0, 0, 0, 0, 0, 0, 0, 0.0, 0.0, 30 * (0.0,), 0.0, 0.0, 0.0, 17, calibration, pad)
+    return wire.Info((0, 0, 0), 15, 31, "", "", "", "", 0, 0, 0, 0, 0, 0, 0, 0.0, 0.0, 30 * (0.0,), 0.0, 0.0, 0.0, 0, 17, calibration, pad)
 
 
 KNOWN_KEYS = list(info_metadata(some_info()))
@@ -91,7 +91,7 @@ def recording(path, salvage, device):
         if not math.isnan(value("raw_sequence")):
             parts.append(raw_text(value("t_us"), value("frame"), value, found.sensors_Pa[i], found.tare_Pa[i]))
         rows += parts if found.time_us is None else [{"time_us": f"{found.time_us[i]:.1f}", "row": part} for part in parts]
-    fields = {"health": wire.Health._fields, "ack": wire.Acknowledgement._fields, "info": ()}
+    fields = {"health": wire.Health._fields, "ack": wire.Acknowledgement._fields, "sync": wire.SyncEdge._fields, "info": ()}
     packets = [{kind: numbers({name: int(values[name]) for name in ("sequence", "t_us", *fields[kind])})} for kind, values in found.packets]
     has_info = any("info" in packet for packet in packets)
     return {"rows": rows, "packets": packets, "events": [event.encode("utf-8", "surrogateescape").decode("utf-8", "replace") for event in found.events],
@@ -111,6 +111,8 @@ def packet_answer(packet):
         answer = {"health": {**told, **{name: value or 0 for name, value in body._asdict().items()}}}
     elif isinstance(body, wire.Acknowledgement):
         answer = {"ack": numbers({**told, **body._asdict()})}
+    elif isinstance(body, wire.SyncEdge):
+        answer = {"sync": numbers({**told, **body._asdict()})}
     elif isinstance(body, wire.Info):
         answer = {"info": told, "keys": [list(pair) for pair in info_metadata(body).items()]}
     return {**answer, "frame": wire.encode(packet).hex()}
@@ -133,7 +135,7 @@ def setting(text):
                 raise BadValueError("none is said by its word")
         else:
             name, kind = {"rate": ("rate_Hz", float), "osr": ("osr", int), "limit": ("location_limit_mm", float),
-                          "slip_threshold": ("slip_threshold_mm", float), "slip_window": ("slip_window_ms", int)}[key]
+                          "slip_threshold": ("slip_threshold_mm", float), "slip_window": ("slip_window_ms", int), "sync": ("sync", str)}[key]
             keys = {name: 0.0 if value == "max" and key == "rate" else kind(value)}
             if keys == {"rate_Hz": 0.0} and value != "max":
                 raise BadValueError("max is said by its word")

@@ -54,6 +54,7 @@ def seed_packets():
     packets = list(bags.some_packets(7, FRAMES))
     packets.insert(5, wire.Packet(3, 2**33, wire.Health(*range(1, 21))))
     packets.insert(9, wire.Packet(4, 2**33, wire.Acknowledgement(0x81, 0, 7, 2**40)))
+    packets.insert(10, wire.Packet(5, 2**33, wire.SyncEdge(2**32 - 1, 1)))
     return packets
 
 
@@ -441,6 +442,7 @@ SETTINGS = ("osr=256", "osr=300", "osr=8192", "osr=16384", "osr=128", "osr=0", "
             "slip_threshold=0.01", "slip_threshold=0.009", "slip_threshold=50", "slip_threshold=50.1", "slip_threshold=nan", "slip_threshold=x",
             "slip_window=5", "slip_window=4", "slip_window=1000", "slip_window=1001", "slip_window=7.5", "slip_window=x",
             "prior=none", "prior=0", "prior=0.5", "prior=0.4", "prior=100", "prior=101", "prior=3:0.5", "prior=3:0", "prior=3:100", "prior=3:101", "prior=3:x", "prior=x", "prior=nan",
+            "sync=off", "sync=in", "sync=frame", "sync=second", "sync=out", "sync=In", "sync=1", "sync=0", "sync=",
             "limit=0.01", "limit=0.001", "limit=100", "limit=101", "limit=nan", "limit=x")
 
 

@@ -9,6 +9,7 @@
 #include "native/native_cdc.h"
 #include "native/native_flash.h"
 #include "native/native_port.h"
+#include "native/native_sync.h"
 #include "native/sim_array.h"
 #include "port/port.h"
 
@@ -41,6 +42,7 @@ static void power_up(void) {
   native_flash_power_up();
   native_start(false);
   native_cdc_reset();
+  native_sync_reset();
   sim_array_init(&array, geometry.sensor_count, 1);
   array.world = (struct sim_world){.pressure_Pa = pressure_Pa};
   array.noise = 1.0;
@@ -66,6 +68,7 @@ static void check_info(const struct wire_info *info) {
   FUZZ_CHECK(info->prior_width_mm == 0.0f || (info->prior_sigma_mm >= WIRE_PRIOR_SIGMA_MIN_mm &&
                                               info->prior_sigma_mm <= WIRE_PRIOR_SIGMA_MAX_mm));
   FUZZ_CHECK((info->streams & ~WIRE_STREAM_ALL) == 0);
+  FUZZ_CHECK(info->sync <= PORT_SYNC_SECOND);
   if (info->stored & WIRE_STORED_CALIBRATION) {
     FUZZ_CHECK(calibration_is_valid(&info->calibration, info->sensor_count));
   }
@@ -172,7 +175,9 @@ static void send_command(struct fuzz_input *input) {
   static const uint8_t body_bytes[] = {
       1, 1, 4, 2, 6, 0, 0, 4, 15 + 8 * 15, 0, 1, 8, 4, 4 * PAD_PROFILE_FLOATS + 1, 0, 3};
   const uint8_t type = fuzz_u8(input);
-  uint8_t packet[WIRE_HEADER_BYTES + 256] = {WIRE_VERSION, (uint8_t)(0x80 | (type & 0x0F))};
+  const bool is_sync = (type & 0x0F) == (WIRE_CMD_SYNC & 0x0F) && type & 0x40;
+  uint8_t packet[WIRE_HEADER_BYTES + 256] = {
+      WIRE_VERSION, is_sync ? (uint8_t)WIRE_CMD_SYNC : (uint8_t)(0x80 | (type & 0x0F))};
   size_t length = type & 0x10 ? fuzz_u8(input) : body_bytes[type & 0x0F];
   if (type & 0x20) { /* some other version or type */
     packet[0] = fuzz_u8(input);

@@ -32,7 +32,7 @@ void check_setting(const std::string &text) {
 
 void check_text(const std::string &text) {
   for (const char *name :
-       {"rate=", "osr=", "slip_threshold=", "slip_window=", "prior=", "limit="}) {
+       {"rate=", "osr=", "slip_threshold=", "slip_window=", "prior=", "limit=", "sync="}) {
     check_setting(name + text);
   }
   if (const auto number = to_float(text)) {

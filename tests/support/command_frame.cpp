@@ -5,7 +5,8 @@
 //
 // COMMAND: stream none|contact,raw,health; tare; tare-force; rate HZ|max; osr N; slip THRESHOLD_MM
 // WINDOW_MS; prior SIGMA[:WIDTH]|none; limit MM; keep; forget; erase (the calibration); pad
-// THICKNESS_MM OVERHANG_MM; pad-from-touch, with the same; erase-pad; info; health; crash; loader
+// THICKNESS_MM OVERHANG_MM; pad-from-touch, with the same; erase-pad; sync MODE|off; info; health;
+// crash; loader
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/names.hpp"
@@ -67,6 +68,7 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
       {"loader", {0, "loader", command_loader}},
       {"prior", {1, "prior SIGMA[:WIDTH]|none", [&] { return command_of({"prior=" + word(1)}); }}},
       {"limit", {1, "limit MM", [&] { return command_of({"limit=" + word(1)}); }}},
+      {"sync", {1, "sync MODE|off", [&] { return command_of({"sync=" + word(1)}); }}},
       {"keep", {0, "keep", [] { return command_keep(true); }}},
       {"forget", {0, "forget", [] { return command_keep(false); }}},
       {"erase", {0, "erase", command_erase_calibration}},

@@ -187,6 +187,7 @@ public:
       port_.wait(HostTime::max());
     }
     zero_ = host_now();
+    emulator_.say('Z', std::chrono::duration_cast<microseconds>(zero_.time_since_epoch()));
     std::printf("%lld\n", static_cast<long long>(zero_.time_since_epoch() / microseconds(1)));
     std::fflush(stdout);
   }

@@ -15,6 +15,7 @@
  *     absent=K,K...    these sensors are not there
  *     health=N         a health packet after every Nth frame, before its raw packet is sent; else
  *                      one after the first frame
+ *     edges=N          an edge at the sync pin after every Nth frame, but for the third of them
  *     tared=FILE       made when a tare is asked for
  *     mute=1           never says anything
  *     refuse=1         answers every command but stream, info, health and crash with "not now"
@@ -286,6 +287,13 @@ private:
       raw.body.raw.flags &= ~std::uint32_t{CONTACT_FLAG_TARED};
     }
     send(raw);
+    const long edges = number("edges", 0);
+    if (edges && frame_ % edges == 0 && frame_ / edges != 3) {
+      wire_packet edge = test::make_packet(WIRE_SYNC, 0, t_us);
+      edge.body.sync.number = static_cast<std::uint32_t>(frame_ / edges);
+      edge.body.sync.level = edge.body.sync.number % 2;
+      send(edge);
+    }
     if (!health && frame_ == 1) {
       send_health();
     }
@@ -362,6 +370,9 @@ private:
       return false;
     case WIRE_CMD_LOCATION_LIMIT:
       info_.body.info.location_limit_mm = command.body.cmd_location_limit.limit_mm;
+      return false;
+    case WIRE_CMD_SYNC:
+      info_.body.info.sync = command.body.cmd_sync.mode;
       return false;
     case WIRE_CMD_KEEP:
       store(WIRE_STORED_SETTINGS, command.body.cmd_keep.keep != 0);

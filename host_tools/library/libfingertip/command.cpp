@@ -28,7 +28,20 @@ std::string spoken(const Setting &setting) {
   return name;
 }
 
+/* Of its choices, by number; nullptr: it is none, or numbers are what people type. */
+const char *word_of(const SettingValue &value, double number) {
+  for (std::size_t i = 0; value.words && value.choices[i]; i++) {
+    if (value.choices[i] == number) {
+      return value.words[i];
+    }
+  }
+  return nullptr;
+}
+
 std::string value_text(const SettingValue &value, double number) {
+  if (const char *word = word_of(value, number)) {
+    return word;
+  }
   return value.per > 1 ? fixed(number / value.per, 3)
          : value.whole ? fixed(number, 0)
                        : shortest(static_cast<float>(number));
@@ -85,6 +98,14 @@ wire_packet command_with(const char *name, const SettingValues &values) {
 
 /* In units of the packet, not yet rounded. */
 std::optional<double> number_of(const SettingValue &value, const std::string &text) {
+  if (value.words) {
+    for (std::size_t i = 0; value.choices[i]; i++) {
+      if (text == value.words[i]) {
+        return value.choices[i];
+      }
+    }
+    return std::nullopt;
+  }
   if (value.per > 1) {
     auto number = to_double(text);
     return number ? std::optional(*number * value.per) : std::nullopt;
@@ -108,9 +129,13 @@ SettingValues values_from_text(const Setting &setting, const std::string &text) 
     const std::size_t end = is_last ? std::string::npos : rest.find(':');
     auto number = number_of(value, rest.substr(0, end));
     if (!number) {
-      throw Error(ErrorCode::bad_value, spoken(setting) + " \"" + text + "\" is no " +
-                                            (value.whole && value.per == 1 ? "whole " : "") +
-                                            "number; give " + setting.give);
+      throw Error(ErrorCode::bad_value,
+                  spoken(setting) + " \"" + text + "\" is " +
+                      (value.words ? "unknown"
+                                   : std::string("no ") +
+                                         (value.whole && value.per == 1 ? "whole " : "") +
+                                         "number") +
+                      "; give " + setting.give);
     }
     values[i] = *number;
     if (!is_last && end == std::string::npos) {

@@ -11,6 +11,15 @@ namespace fingertip {
 
 using namespace recording;
 
+namespace {
+
+/* A clock that goes back by more than packets overtake each other has begun anew. */
+constexpr std::uint64_t RESTART_us = 1'000'000;
+/* As times are written. */
+constexpr double ROUNDING_us = 0.1;
+
+} // namespace
+
 JointRecordingWriter::JointRecordingWriter(const std::string &path, bool replace,
                                            const std::vector<wire_info> &infos,
                                            const Metadata &extra, std::int64_t host_zero_us,
@@ -22,7 +31,7 @@ JointRecordingWriter::JointRecordingWriter(std::unique_ptr<LineSink> file,
                                            const std::vector<wire_info> &infos,
                                            const Metadata &extra, std::int64_t host_zero_us,
                                            bool raw_expected)
-    : file_(std::move(file)), host_zero_us_(host_zero_us) {
+    : file_(std::move(file)), host_zero_us_(host_zero_us), edges_(infos.size()) {
   std::string serials;
   for (std::size_t i = 0; i < infos.size(); i++) {
     if (infos[i].sensor_count != infos[0].sensor_count) {
@@ -79,9 +88,29 @@ std::string JointRecordingWriter::time_text(double host_us) const {
 }
 
 void JointRecordingWriter::packet(std::size_t device, const wire_packet &packet, double host_us) {
-  devices_[device].packet_t_us = packet.t_us;
-  devices_[device].packet_host_us = host_us;
-  devices_[device].lines.packet(packet);
+  Device &state = devices_[device];
+  if (packet.t_us + RESTART_us < state.newest_us) {
+    edges_.restart(device);
+    state.newest_us = packet.t_us;
+  }
+  state.newest_us = std::max(state.newest_us, packet.t_us);
+  if (packet.type == WIRE_SYNC) {
+    edges_.edge(device, packet.t_us, packet.body.sync.level != 0);
+  }
+  const auto place = edges_.place(device, packet.t_us);
+  state.edges_uncertainty_us = place ? std::max(place->uncertainty_us, ROUNDING_us) : 0;
+  state.packet_t_us = packet.t_us;
+  state.packet_host_us = place ? place->host_us : host_us;
+  if (place) {
+    std::vector<double> bounds;
+    for (const Device &each : devices_) {
+      bounds.push_back(each.edges_uncertainty_us);
+    }
+    std::sort(bounds.rbegin(), bounds.rend());
+    edges_alignment_us_ =
+        std::max(edges_alignment_us_, bounds[0] + (bounds.size() > 1 ? bounds[1] : 0));
+  }
+  state.lines.packet(packet);
 }
 
 void JointRecordingWriter::event(std::size_t device, const std::string &text) {
@@ -95,6 +124,7 @@ void JointRecordingWriter::clock(std::size_t device, const ClockEstimate &estima
   Device &state = devices_[device];
   state.clock = estimate;
   state.jumps = jumps;
+  edges_.clock(device, estimate);
   std::vector<double> bounds;
   for (const Device &each : devices_) {
     bounds.push_back(each.clock ? each.clock->uncertainty_us : 0);
@@ -144,12 +174,15 @@ void JointRecordingWriter::finish(const std::vector<LineStatistics> &statistics,
                                   " uncertainty_us=" + fixed(device.clock->uncertainty_us, 1)
                             : "";
     line("# " + std::to_string(i) + "/end: frames=" + std::to_string(device.lines.frames()) +
-         " jumps=" + std::to_string(device.jumps) + clock + " " + statistics[i].text());
+         " jumps=" + std::to_string(device.jumps) + clock + device.lines.edges_text() + " " +
+         statistics[i].text());
     sum += statistics[i];
   }
   double seconds = frames() > 0 ? (last_us_ - static_cast<double>(host_zero_us_)) / 1e6 : 0;
   line("# end: reason=" + reason + " frames=" + std::to_string(frames()) + " seconds=" +
-       fixed(seconds, 6) + " alignment_us=" + fixed(alignment_us_, 1) + " " + sum.text());
+       fixed(seconds, 6) + " alignment_us=" + fixed(alignment_us_, 1) +
+       (edges_alignment_us_ > 0 ? " edges_alignment_us=" + fixed(edges_alignment_us_, 1) : "") +
+       " " + sum.text());
   file_->finish();
 }
 

@@ -3,6 +3,7 @@
 
 #include "libfingertip/clock_fit.hpp"
 #include "libfingertip/decoder.hpp"
+#include "libfingertip/edge_alignment.hpp"
 #include "libfingertip/line_sink.hpp"
 #include "libfingertip/recording_lines.hpp"
 
@@ -26,7 +27,7 @@ public:
   JointRecordingWriter(std::unique_ptr<LineSink> file, const std::vector<wire_info> &infos,
                        const Metadata &extra, std::int64_t host_zero_us, bool raw_expected);
 
-  /* host_us: its time on the recorder's clock. */
+  /* host_us: its time on the recorder's clock, unless edges at the sync pins tell it better. */
   void packet(std::size_t device, const wire_packet &packet, double host_us);
   void event(std::size_t device, const std::string &text);
   void clock(std::size_t device, const ClockEstimate &estimate, unsigned jumps);
@@ -41,6 +42,8 @@ public:
   std::uint64_t frames(std::size_t device) const { return devices_[device].lines.frames(); }
   /* The bound on the distance in time of two rows of different fingertips, so far. */
   double alignment_us() const { return alignment_us_; }
+  /* The same of rows that edges have placed; 0: none. */
+  double edges_alignment_us() const { return edges_alignment_us_; }
   const std::string &path() const { return file_->path(); }
 
 private:
@@ -50,6 +53,8 @@ private:
     std::uint64_t packet_t_us = 0; /* of the packet under way, */
     double packet_host_us = 0;     /* on both clocks */
     double last_line_us = 0;       /* where its last line stands among those that wait */
+    std::uint64_t newest_us = 0;   /* of its times */
+    double edges_uncertainty_us = 0; /* of its last packet, if edges have placed it; else 0 */
     std::optional<ClockEstimate> clock;
     unsigned jumps = 0;
     double clock_written_us = 0;
@@ -65,7 +70,8 @@ private:
   std::vector<Device> devices_;
   bool head_written_ = false;
   std::multimap<double, std::string> waiting_; /* lines by their time */
-  double alignment_us_ = 0;
+  EdgeAlignment edges_;
+  double alignment_us_ = 0, edges_alignment_us_ = 0;
   double last_us_ = 0;
 };
 

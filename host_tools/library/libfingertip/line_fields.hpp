@@ -111,6 +111,11 @@ template <typename Visitor> void visit_ack(Visitor &visit, wire_ack &ack) {
   visit("host_time_us", ack.host_time_us);
 }
 
+template <typename Visitor> void visit_sync(Visitor &visit, wire_sync &sync) {
+  visit("number", sync.number);
+  visit("level", sync.level);
+}
+
 template <typename Visitor> void visit_info(Visitor &visit, wire_info &info) {
   visit("sensors", info.sensor_count);
   visit("capabilities", info.capabilities);
@@ -126,6 +131,7 @@ template <typename Visitor> void visit_info(Visitor &visit, wire_info &info) {
   visit("prior_sigma_mm", info.prior_sigma_mm);
   visit("prior_width_mm", info.prior_width_mm);
   visit("location_limit_mm", info.location_limit_mm);
+  visit("sync", info.sync);
   visit("stored", info.stored);
 }
 
@@ -202,6 +208,7 @@ inline constexpr Word capabilities[] = {
     {WIRE_CAPABILITY_SLIP, "slip"},
     {WIRE_CAPABILITY_RAW_STREAM, "raw"},
     {WIRE_CAPABILITY_TANGENTIAL, "tangential"},
+    {WIRE_CAPABILITY_SYNC, "sync"},
 };
 inline constexpr Word stored[] = {
     {WIRE_STORED_CALIBRATION, "calibration"},
@@ -233,6 +240,7 @@ inline constexpr Word commands[] = {
     {WIRE_CMD_LOCATION_LIMIT, "limit"},
     {WIRE_CMD_PAD, "pad"},
     {WIRE_CMD_ERASE_PAD, "erase pad"},
+    {WIRE_CMD_SYNC, "sync"},
 };
 
 struct Flag {

@@ -88,6 +88,7 @@ inline constexpr Field info_fields[] = {
     {"prior_sigma_mm", Kind::f32, offsetof(wire_packet, body.info.prior_sigma_mm), 1, 4},
     {"prior_width_mm", Kind::f32, offsetof(wire_packet, body.info.prior_width_mm), 1, 4},
     {"location_limit_mm", Kind::f32, offsetof(wire_packet, body.info.location_limit_mm), 1, 4},
+    {"sync", Kind::u8, offsetof(wire_packet, body.info.sync), 1, 1},
     {"stored", Kind::u32, offsetof(wire_packet, body.info.stored), 1, 4},
     {"calibration_date_s", Kind::u32, offsetof(wire_packet, body.info.calibration.date_s), 1, 4},
     {"calibration_placements", Kind::u16, offsetof(wire_packet, body.info.calibration.placements), 1, 2},
@@ -173,6 +174,12 @@ inline constexpr Field crash_fields[] = {
     {"sp", Kind::u32, offsetof(wire_packet, body.crash.sp), 1, 4},
     {"event_ages_1024us", Kind::u32, offsetof(wire_packet, body.crash.event_ages_1024us), 8, 4},
     {"end_us", Kind::u64, offsetof(wire_packet, body.crash.t_us), 1, 8},
+};
+inline constexpr Field sync_fields[] = {
+    {"sequence", Kind::u16, offsetof(wire_packet, sequence), 1, 2},
+    {"t_us", Kind::u64, offsetof(wire_packet, t_us), 1, 8},
+    {"number", Kind::u32, offsetof(wire_packet, body.sync.number), 1, 4},
+    {"level", Kind::u8, offsetof(wire_packet, body.sync.level), 1, 1},
 };
 inline constexpr Field cmd_stream_fields[] = {
     {"sequence", Kind::u16, offsetof(wire_packet, sequence), 1, 2},
@@ -280,6 +287,11 @@ inline constexpr Field cmd_erase_pad_fields[] = {
     {"sequence", Kind::u16, offsetof(wire_packet, sequence), 1, 2},
     {"t_us", Kind::u64, offsetof(wire_packet, t_us), 1, 8},
 };
+inline constexpr Field cmd_sync_fields[] = {
+    {"sequence", Kind::u16, offsetof(wire_packet, sequence), 1, 2},
+    {"t_us", Kind::u64, offsetof(wire_packet, t_us), 1, 8},
+    {"mode", Kind::u8, offsetof(wire_packet, body.cmd_sync.mode), 1, 1},
+};
 
 struct Packet {
   std::uint8_t type;
@@ -294,6 +306,7 @@ inline constexpr Packet packets[] = {
     {0x04, health_fields, sizeof health_fields / sizeof *health_fields},
     {0x05, ack_fields, sizeof ack_fields / sizeof *ack_fields},
     {0x06, crash_fields, sizeof crash_fields / sizeof *crash_fields},
+    {0x07, sync_fields, sizeof sync_fields / sizeof *sync_fields},
     {0x80, cmd_stream_fields, sizeof cmd_stream_fields / sizeof *cmd_stream_fields},
     {0x81, cmd_tare_fields, sizeof cmd_tare_fields / sizeof *cmd_tare_fields},
     {0x82, cmd_rate_fields, sizeof cmd_rate_fields / sizeof *cmd_rate_fields},
@@ -310,6 +323,7 @@ inline constexpr Packet packets[] = {
     {0x8C, cmd_location_limit_fields, sizeof cmd_location_limit_fields / sizeof *cmd_location_limit_fields},
     {0x8D, cmd_pad_fields, sizeof cmd_pad_fields / sizeof *cmd_pad_fields},
     {0x8E, cmd_erase_pad_fields, sizeof cmd_erase_pad_fields / sizeof *cmd_erase_pad_fields},
+    {0x90, cmd_sync_fields, sizeof cmd_sync_fields / sizeof *cmd_sync_fields},
 };
 
 } // namespace fingertip::values

@@ -29,6 +29,7 @@ inline constexpr const char *JOINT_COLUMNS = "device,time_us,";
 inline constexpr const char *PACKET_HEALTH = "health";
 inline constexpr const char *PACKET_INFO = "info";
 inline constexpr const char *PACKET_ACK = "ack";
+inline constexpr const char *PACKET_SYNC = "sync";
 inline constexpr double Q10 = 1024.0;
 struct Namer {
   std::string text;

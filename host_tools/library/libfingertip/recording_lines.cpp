@@ -28,6 +28,12 @@ double PacketLines::seconds() const {
   return static_cast<double>(before_restart_us_ + (first_us_ ? last_us_ - *first_us_ : 0)) / 1e6;
 }
 
+std::string PacketLines::edges_text() const {
+  return edges_.edges() == 0 ? ""
+                             : " edges=" + std::to_string(edges_.edges()) +
+                                   " edges_missing=" + std::to_string(edges_.missing());
+}
+
 void PacketLines::row(const wire_packet *contact, const wire_packet *raw) {
   const wire_packet &any = contact ? *contact : *raw;
   row_(any.t_us, row_text(contact, raw, sensor_count_));
@@ -88,6 +94,12 @@ void PacketLines::packet(const wire_packet &packet) {
     write_pending();
     visit_ack(writer, copy.body.ack);
     comment_("packet", PACKET_ACK + writer.text());
+    return;
+  case WIRE_SYNC:
+    write_pending();
+    edges_.take(packet.body.sync);
+    visit_sync(writer, copy.body.sync);
+    comment_("packet", PACKET_SYNC + writer.text());
     return;
   case WIRE_INFO:
     write_pending();

@@ -1,6 +1,7 @@
 /* The lines that the packets of one fingertip become, for the writers of recordings. */
 #pragma once
 
+#include "libfingertip/edge_counter.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/wire.hpp"
 
@@ -28,6 +29,8 @@ public:
   void write_pending();
 
   std::uint64_t frames() const { return frames_; }
+  /* For the end of a recording: " edges=7 edges_missing=0", at the sync pin; nothing if none came. */
+  std::string edges_text() const;
   /* Device time over all runs of a device that restarted. */
   double seconds() const;
 
@@ -45,6 +48,7 @@ private:
   std::optional<std::uint64_t> first_us_;
   std::uint64_t last_us_ = 0;
   std::uint64_t frames_ = 0;
+  EdgeCounter edges_;
 };
 
 } // namespace fingertip

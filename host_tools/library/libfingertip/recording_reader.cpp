@@ -222,6 +222,9 @@ void RecordingReader::read_comment(const std::string &text) {
     } else if (words[0] == PACKET_ACK) {
       item.packet.type = WIRE_ACK;
       visit_ack(reader, item.packet.body.ack);
+    } else if (words[0] == PACKET_SYNC) {
+      item.packet.type = WIRE_SYNC;
+      visit_sync(reader, item.packet.body.sync);
     } else if (words[0] == PACKET_INFO) {
       if (info.sensor_count < 1 || info.sensor_count > FT_MAX_SENSORS) {
         throw Damage{"an info packet without \"# sensors:\" before it"};

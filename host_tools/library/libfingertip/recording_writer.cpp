@@ -50,7 +50,7 @@ void RecordingWriter::event(const std::string &text) {
 void RecordingWriter::finish(const LineStatistics &statistics, const std::string &reason) {
   lines_.write_pending();
   line("# end: reason=" + reason + " frames=" + std::to_string(lines_.frames()) +
-       " seconds=" + fixed(lines_.seconds(), 6) + " " + statistics.text());
+       " seconds=" + fixed(lines_.seconds(), 6) + lines_.edges_text() + " " + statistics.text());
   file_->finish();
 }
 

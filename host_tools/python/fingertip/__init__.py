@@ -15,7 +15,7 @@ from .errors import (
     NotNowError, NotSharedError, OtherFingertipError, OtherVersionError, PermissionDeniedError, PortError, PortInUseError, RefusedError,
     RefusedValueError, SeveralFingertipsError, UnknownCommandError)
 from .files import Recording, read_recording
-from .frames import Block, Frame
+from .frames import Block, Edge, Frame
 from .group import Fingertips
 from .line import WARNINGS, Capability, Flag, Result, Stored, Streams
 from .recording import JointRecordingWriter, RecordingWriter
@@ -23,7 +23,7 @@ from .version import __version__
 from .wire import Calibration, Crash, Health, Info, LineStatistics, PadProfile
 
 __all__ = [
-    "WARNINGS", "__version__", "AsyncFingertip", "BadValueError", "Block", "Calibration", "Capability", "ClockEstimate", "Crash", "Fingertip",
+    "WARNINGS", "__version__", "AsyncFingertip", "BadValueError", "Block", "Calibration", "Capability", "ClockEstimate", "Crash", "Edge", "Fingertip",
     "FingertipError", "Fingertips", "Flag", "Found", "Frame", "GoneError", "Health", "host_now_us", "Info", "InputError", "JointRecordingWriter", "LineStatistics",
     "list_fingertips", "NoAnswerError", "NoFingertipError", "NoFrameError", "NoSuchPortError", "NotAPortError", "NotNowError", "NotSharedError",
     "OtherFingertipError", "OtherVersionError", "PadProfile", "PermissionDeniedError", "PortError", "PortInUseError", "read_recording",

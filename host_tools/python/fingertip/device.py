@@ -10,17 +10,18 @@ from . import discovery, host_time, wire
 from .clock import ClockEstimate, host_now_us
 from .conversation import ANSWER_TIMEOUT_s, Conversation
 from .errors import BadValueError, FingertipError, GoneError, InputError, NoFingertipError, NoFrameError, OtherFingertipError
-from .frames import Block, Frame
+from .frames import Block, Edge, Frame
 from .line import Capability, Settable, Streams
 from .recording import Recorder, RecordingWriter
 from .settings import setting_commands
 from .transport import Transport, open_way
-from .wire import Acknowledgement, Body, Contact, Crash, Health, Info, LineStatistics, Raw
+from .wire import Acknowledgement, Body, Contact, Crash, Health, Info, LineStatistics, Raw, SyncEdge
 
 EXCHANGE_INTERVAL_us = 500_000  # the two clocks are compared so often
 FIRST_EXCHANGES = 8
 RETURN_INTERVAL_s = 0.25  # a port that has gone is looked for so often
 FRAMES_MAX = 1 << 20
+EDGES_KEPT = 65536
 
 
 def _in_range(name: str, value: float, span: tuple[float, float], unit: str) -> None:
@@ -61,6 +62,7 @@ class Fingertip(Settable):
         self._share = share
         self._queue: collections.deque[Frame] = collections.deque()
         self._buffer_frames = int(buffer_frames)
+        self._edges: collections.deque[Edge] = collections.deque(maxlen=EDGES_KEPT)
         self._latest: Frame | None = None
         self._latest_s = 0.0
         self._health: Health | None = None
@@ -171,6 +173,12 @@ class Fingertip(Settable):
     def health(self) -> Health | None:
         """The last one that it sent, once a second."""
         return self._health
+
+    @property
+    def sync_edges(self) -> list[Edge]:
+        """Those at the sync pin since it was opened, the last 65536 at most, while set(sync="in") or "second" acts. A gap in their numbers is
+        edges that came too fast."""
+        return list(self._edges)
 
     @property
     def statistics(self) -> LineStatistics:
@@ -309,7 +317,7 @@ class Fingertip(Settable):
         """
         self._line.exchange(wire.Tare(int(force)))
 
-    def _set(self, given: dict[str, float | None], keep: bool | None) -> Info:
+    def _set(self, given: dict[str, float | str | None], keep: bool | None) -> Info:
         commands = setting_commands(given, self._info)
         if keep is not None:
             commands.append(wire.Keep(int(keep)))
@@ -516,6 +524,9 @@ class Fingertip(Settable):
                     self._pending = (sequence, t_us, body)
                 else:
                     frames.append(Frame(self._info.serial, self._run, t_us, body, None, sequence, -1, self._line.estimate))
+            elif isinstance(body, SyncEdge):
+                news = True
+                self._edges.append(Edge(t_us, body.number, body.level, self._line.estimate.host_at(t_us)))
             else:
                 news = True
                 if isinstance(body, Health):

@@ -38,7 +38,7 @@ import numpy.typing as npt
 
 from . import line, recorded
 from .errors import InputError
-from .frames import frame_of
+from .frames import Edge, frame_of
 from .line import CONTACT_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, TANGENTIAL_COLUMNS, Flag
 from .mcap_recording import MAGIC, Damaged, Line, McapLineReader
 from .recorded import Rows, counts_of, judge_key, packet_of
@@ -263,6 +263,21 @@ class Recording:
     def health(self) -> list[dict[str, int]]:
         """Counters and state as of each health packet: {field: number}."""
         return [{name: int(text) for name, text in fields.items()} for kind, fields in self.packets if kind == "health"]
+
+    @property
+    def sync_edges(self) -> list[Edge]:
+        """Those at the sync pin, in their order."""
+        found = [{name: int(text) for name, text in fields.items()} for kind, fields in self.packets if kind == "sync"]
+        t_us = np.array([fields["t_us"] for fields in found], dtype=float)
+        times_us = np.full(len(found), math.nan) if self.time_us is None or not len(self.time_us) else self._place(t_us)
+        return [Edge(fields["t_us"], fields["number"], fields["level"], float(time_us)) for fields, time_us in zip(found, times_us)]
+
+    def _place(self, t_us: Array) -> Array:
+        """On the recorder's clock: between the rows as they are, beyond them by the nearest."""
+        assert self.time_us is not None
+        order = np.argsort(self["t_us"], kind="stable")
+        placed: Array = t_us + np.interp(t_us, self["t_us"][order], (self.time_us - self["t_us"])[order])
+        return placed
 
     def flag(self, bit: int) -> npt.NDArray[np.bool_]:
         found: npt.NDArray[np.bool_] = (np.nan_to_num(self["flags"]).astype(np.int64) & bit) != 0

@@ -1,7 +1,7 @@
 """Frames, one by one and as arrays."""
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,19 @@ _FIT_VALID = int(Flag.FIT_VALID)
 _JUDGED = int(Flag.FIT_VALID | WARNINGS)
 NO_CONTACT = Contact._make(math.nan if wire.code == "f" else 0 for _, wire in layout_of(Contact))
 NO_RAW = Raw(0, 0, 0, 0, 0, 0, 0, ())
+
+
+class Edge(NamedTuple):
+    """The sync pin of a fingertip changed."""
+
+    t_us: int
+    """on the fingertip's clock, to a microsecond"""
+    number: int
+    """since the pin was set, from 1; a gap is edges that came too fast, or a lost packet"""
+    level: int
+    """of the pin after it: 1 high, 0 low"""
+    time_us: float
+    """on the host's clock, as Frame.host_us; in a recording of several on the recorder's, as their rows; NaN in a recording of one"""
 
 
 class Frame(ContactQuantities):

@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-VERSION = 6
+VERSION = 7
 SENSORS_MAX = 32
-MAX_FRAME_BYTES = 845  # longer is damage
+MAX_FRAME_BYTES = 846  # longer is damage
 LOADER_MAGIC = 0x746F6F42
 
 
@@ -78,6 +78,7 @@ class Capability(enum.IntFlag):
     SLIP = 1 << 1  #: slip, and the command that sets it
     RAW_STREAM = 1 << 2  #: raw packets
     TANGENTIAL = 1 << 3  #: tangential load, where the pad's profile is stored
+    SYNC = 1 << 4  #: sync packets, and the command that sets the sync pin
 
 
 class Stored(enum.IntFlag):
@@ -308,6 +309,8 @@ class Info(NamedTuple):
     """its standard deviation; 0: none is set, and the sigma of a calibration acts"""
     location_limit_mm: Annotated[float, Wire("f", when=("capabilities", Capability.FIT), absent=math.nan)]
     """UNCERTAIN is set where location_sd_mm is above it"""
+    sync: Annotated[int | None, Wire("B", when=("capabilities", Capability.SYNC))]
+    """sync pin: 0 off, 1 in, 2 frame, 3 second"""
     stored: Annotated[int, Wire("I")]
     """what the fingertip keeps without power, see below"""
     calibration: Annotated[Calibration | None, Wire("Calibration", when=("stored", Stored.CALIBRATION))]
@@ -419,6 +422,15 @@ class Crash(NamedTuple):
     """time of the end, since the start before it"""
 
 
+class SyncEdge(NamedTuple):
+    """An edge at the sync pin. The header's time is that of the edge."""
+
+    number: Annotated[int, Wire("I")]
+    """counts the edges since the pin was set, from 1, modulo 2^32; a gap is edges that came too fast. An odd one rises"""
+    level: Annotated[int, Wire("B")]
+    """of the pin after it: 1 high, 0 low"""
+
+
 class SetStreams(NamedTuple):
     """Set the streams to send; 0 stops. A stream that the firmware's capabilities lack is out of range. Nothing streams until this command,
     so that a terminal that echoes cannot start it by accident.
@@ -499,7 +511,7 @@ class Keep(NamedTuple):
     """Keep settings without power."""
 
     keep: Annotated[int, Wire("B")]
-    """1: from now on start with the present rate, OSR, slip settings, prior and limit; 0: with the firmware's own again"""
+    """1: from now on start with the present rate, OSR, slip settings, prior, limit and sync pin; 0: with the firmware's own again"""
 
 
 class SetPrior(NamedTuple):
@@ -531,7 +543,14 @@ class ErasePad(NamedTuple):
     """Erase the pad profile: there is no tangential load from now on."""
 
 
-Body = Contact | Raw | Info | Health | Acknowledgement | Crash | SetStreams | Tare | SetRate | SetOsr | SetSlip | AskInfo | AskHealth | AskCrash | Loader | StoreCalibration | EraseCalibration | Keep | SetPrior | SetLocationLimit | StorePad | ErasePad
+class SetSync(NamedTuple):
+    """Set the sync pin, as packet sync says; 0: off."""
+
+    mode: Annotated[int, Wire("B")]
+    """1 in, 2 frame, 3 second"""
+
+
+Body = Contact | Raw | Info | Health | Acknowledgement | Crash | SyncEdge | SetStreams | Tare | SetRate | SetOsr | SetSlip | AskInfo | AskHealth | AskCrash | Loader | StoreCalibration | EraseCalibration | Keep | SetPrior | SetLocationLimit | StorePad | ErasePad | SetSync
 CONTACT, RAW = 0x01, 0x02
 TYPES: dict[int, type[Body]] = {
     0x01: Contact,
@@ -540,6 +559,7 @@ TYPES: dict[int, type[Body]] = {
     0x04: Health,
     0x05: Acknowledgement,
     0x06: Crash,
+    0x07: SyncEdge,
     0x80: SetStreams,
     0x81: Tare,
     0x82: SetRate,
@@ -556,6 +576,7 @@ TYPES: dict[int, type[Body]] = {
     0x8C: SetLocationLimit,
     0x8D: StorePad,
     0x8E: ErasePad,
+    0x90: SetSync,
 }
 NESTED: dict[str, Any] = {"Calibration": Calibration, "PadProfile": PadProfile}
 
@@ -570,6 +591,8 @@ class Setting(NamedTuple):
     least: float
     most: float
     choices: tuple[int, ...]
+    words: tuple[str, ...]
+    """What is given for each choice, and for 0 the last; none: the number."""
     per: int
     whole: bool
     give: str
@@ -583,13 +606,14 @@ class Setting(NamedTuple):
 
 
 SETTINGS = (
-    Setting("rate_Hz", SetRate, "rate_mHz", "rate_mHz", 0.1, 2000, (), 1000, True, "0.1 to 2000 Hz, or 0 for as fast as possible", None, "", "", True),
-    Setting("osr", SetOsr, "osr", "osr", 256, 8192, (256, 512, 1024, 2048, 4096, 8192), 1, True, "one of 256, 512, 1024, 2048, 4096, 8192", None, "", "", False),
-    Setting("slip_threshold_mm", SetSlip, "threshold_mm", "slip_threshold_mm", 0.01, 50, (), 1, False, "0.01 to 50 mm", None, "slip", "", False),
-    Setting("slip_window_ms", SetSlip, "window_ms", "slip_window_ms", 5, 1000, (), 1, True, "5 to 1000 ms", None, "slip", "", False),
-    Setting("prior_sigma_mm", SetPrior, "sigma_mm", "prior_sigma_mm", 0.5, 100, (), 1, False, "0.5 to 100 mm, or 0 for none", None, "fit", "", True),
-    Setting("prior_width_mm", SetPrior, "width_mm", "prior_width_mm", 0.01, 100, (), 1, False, "0.01 to 100 mm", 0.5, "fit", "prior_sigma_mm", True),
-    Setting("location_limit_mm", SetLocationLimit, "limit_mm", "location_limit_mm", 0.01, 100, (), 1, False, "0.01 to 100 mm", None, "fit", "", False),
+    Setting("rate_Hz", SetRate, "rate_mHz", "rate_mHz", 0.1, 2000, (), (), 1000, True, "0.1 to 2000 Hz, or 0 for as fast as possible", None, "", "", True),
+    Setting("osr", SetOsr, "osr", "osr", 256, 8192, (256, 512, 1024, 2048, 4096, 8192), (), 1, True, "one of 256, 512, 1024, 2048, 4096, 8192", None, "", "", False),
+    Setting("slip_threshold_mm", SetSlip, "threshold_mm", "slip_threshold_mm", 0.01, 50, (), (), 1, False, "0.01 to 50 mm", None, "slip", "", False),
+    Setting("slip_window_ms", SetSlip, "window_ms", "slip_window_ms", 5, 1000, (), (), 1, True, "5 to 1000 ms", None, "slip", "", False),
+    Setting("prior_sigma_mm", SetPrior, "sigma_mm", "prior_sigma_mm", 0.5, 100, (), (), 1, False, "0.5 to 100 mm, or 0 for none", None, "fit", "", True),
+    Setting("prior_width_mm", SetPrior, "width_mm", "prior_width_mm", 0.01, 100, (), (), 1, False, "0.01 to 100 mm", 0.5, "fit", "prior_sigma_mm", True),
+    Setting("location_limit_mm", SetLocationLimit, "limit_mm", "location_limit_mm", 0.01, 100, (), (), 1, False, "0.01 to 100 mm", None, "fit", "", False),
+    Setting("sync", SetSync, "mode", "sync", 1, 3, (1, 2, 3), ('in', 'frame', 'second', 'off'), 1, True, "one of in, frame, second, or off", None, "sync", "", True),
 )
 
 
@@ -598,7 +622,7 @@ class Settable:
 
     def set(self, *, rate_Hz: float | None = None, osr: int | None = None, slip_threshold_mm: float | None = None,
             slip_window_ms: int | None = None, prior_sigma_mm: float | None = None, prior_width_mm: float | None = None,
-            location_limit_mm: float | None = None, keep: bool | None = None) -> Info:
+            location_limit_mm: float | None = None, sync: str | None = None, keep: bool | None = None) -> Info:
         """Changes what is given, until power-off; keep True: from now on start with all present settings, False: with the firmware's own.
 
         rate_Hz: 0.1 to 2000, 0 is as fast as the sensors allow.
@@ -608,12 +632,13 @@ class Settable:
         prior_sigma_mm: the width to expect of a contact, 0.5 to 100, 0 is none.
         prior_width_mm: its standard deviation, 0.01 to 100, 0.5 if not given.
         location_limit_mm: UNCERTAIN above it, 0.01 to 100.
+        sync: the sync pin, one of in, frame, second, or off.
         Raises BadValueError before anything is sent. Returns how it is set now.
         """
         return self._set({"rate_Hz": rate_Hz, "osr": osr, "slip_threshold_mm": slip_threshold_mm, "slip_window_ms": slip_window_ms,
-                          "prior_sigma_mm": prior_sigma_mm, "prior_width_mm": prior_width_mm, "location_limit_mm": location_limit_mm}, keep)
+                          "prior_sigma_mm": prior_sigma_mm, "prior_width_mm": prior_width_mm, "location_limit_mm": location_limit_mm, "sync": sync}, keep)
 
-    def _set(self, given: dict[str, float | None], keep: bool | None) -> Info:
+    def _set(self, given: dict[str, float | str | None], keep: bool | None) -> Info:
         raise NotImplementedError
 
 
@@ -630,7 +655,7 @@ RAW_COLUMNS = (
     "raw_sequence", "raw_flags", "valid", "saturated", "doubtful", "temperature_degC")
 INFO_KEYS = (
     "sensors", "capabilities", "rate_mHz", "measured_rate_mHz", "osr", "temperature_interval_ms", "slip_threshold_mm", "slip_window_ms",
-    "fit_iterations", "streams", "pitch_mm", "prior_sigma_mm", "prior_width_mm", "location_limit_mm", "stored")
+    "fit_iterations", "streams", "pitch_mm", "prior_sigma_mm", "prior_width_mm", "location_limit_mm", "sync", "stored")
 
 
 class ContactQuantities:

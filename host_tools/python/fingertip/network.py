@@ -148,7 +148,7 @@ def parts_of(key: str) -> tuple[str, str]:
 
 def settings_of(parameters: dict[str, str]) -> dict[str, Any]:
     """The arguments of Fingertip.set. Raises BadValueError."""
-    kinds: dict[str, Any] = {setting.argument: int if setting.whole and setting.per == 1 else float for setting in SETTINGS}
+    kinds: dict[str, Any] = {setting.argument: str if setting.words else int if setting.whole and setting.per == 1 else float for setting in SETTINGS}
     kinds["keep"] = lambda text: bool(int(text))
     settings: dict[str, Any] = {}
     for name, text in parameters.items():

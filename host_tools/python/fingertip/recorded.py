@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from .frames import Q10
 from .line import (
-    CONTACT_COLUMNS, RAW_COLUMNS, SENSORS_MAX, TANGENTIAL_COLUMNS, Acknowledgement, Calibration, Contact, Health, Info, PadProfile, Wire)
+    CONTACT_COLUMNS, RAW_COLUMNS, SENSORS_MAX, TANGENTIAL_COLUMNS, Acknowledgement, Calibration, Contact, Health, Info, PadProfile, SyncEdge, Wire)
 from .wire import layout_of
 
 _LARGEST = {"B": 2**8 - 1, "n": 2**8 - 1, "H": 2**16 - 1, "I": 2**32 - 1, "Q": 2**64 - 1}
@@ -21,7 +21,7 @@ _SCALARS = {prefix + name: wire.code for body, prefix in ((Info, ""), (Calibrati
             if wire.code in "BnHIf" and wire.times == 1}
 _SCALARS |= {f"calibration_{name}": _SCALARS.pop(name) for name in ("date_s", "placements")}
 _PACKETS = {kind: {"sequence": "H", "t_us": "Q", **{name: wire.code for name, wire in layout_of(body)}}
-            for kind, body in (("health", Health), ("ack", Acknowledgement))}
+            for kind, body in (("health", Health), ("ack", Acknowledgement), ("sync", SyncEdge))}
 _PACKETS["info"] = {"sequence": "H", "t_us": "Q"}
 
 

@@ -15,7 +15,7 @@ from .frames import Q10
 from .line import CONTACT_COLUMNS, INFO_KEYS, RAW_COLUMNS, TANGENTIAL_COLUMNS
 from .lines import LineFile, shortest
 from .mcap_recording import McapLines
-from .wire import Acknowledgement, Calibration, Contact, Health, Info, LineStatistics, Packet, PadProfile, Raw
+from .wire import Acknowledgement, Calibration, Contact, Health, Info, LineStatistics, Packet, PadProfile, Raw, SyncEdge
 
 LATE_us = 250_000  # rows wait so long for those of others
 CLOCK_LINES_us = 1e6
@@ -93,6 +93,8 @@ class _PacketLines:
         self._metadata: dict[str, str] = {}
         self._first_us: int | None = None
         self._last_us = self._before_us = 0
+        self._last_edge: int | None = None
+        self._edges = self._edges_missing = 0
         self._no_contact = [""] * (len(CONTACT_COLUMNS) + len(TANGENTIAL_COLUMNS))
         self._no_raw = [""] * (len(RAW_COLUMNS) + 2 * sensors)
 
@@ -130,6 +132,10 @@ class _PacketLines:
             else:
                 self.write_pending()
                 self._row(None, packet)
+        elif isinstance(body, SyncEdge):
+            self.write_pending()
+            self._take_edge(body)
+            self._packet_line("sync", packet, body._asdict())
         elif isinstance(body, (Health, Info, Acknowledgement)):
             self.write_pending()
             if isinstance(body, Info):
@@ -137,6 +143,17 @@ class _PacketLines:
                 self._packet_line("info", packet, {})
             else:
                 self._packet_line("ack" if isinstance(body, Acknowledgement) else "health", packet, body._asdict())
+
+    def _take_edge(self, edge: SyncEdge) -> None:
+        ahead = 1 if self._last_edge is None else edge.number - self._last_edge & 0xFFFFFFFF
+        if 1 <= ahead <= 0x7FFFFFFF:  # else the pin was set anew
+            self._edges_missing += ahead - 1
+        self._last_edge = edge.number
+        self._edges += 1
+
+    def edges_text(self) -> str:
+        """For the end of a recording; nothing if there were none."""
+        return f" edges={self._edges} edges_missing={self._edges_missing}" if self._edges else ""
 
     def write_pending(self) -> None:
         if self._pending:
@@ -275,7 +292,7 @@ class RecordingWriter(_Writer):
     def _end(self, reason: str) -> None:
         self._lines.write_pending()
         lines = self._lines
-        self._file.line(f"# end: reason={reason} frames={lines.frames} seconds={lines.seconds:.6f} {self._count().text()}")
+        self._file.line(f"# end: reason={reason} frames={lines.frames} seconds={lines.seconds:.6f}{lines.edges_text()} {self._count().text()}")
 
 
 class _Member:
@@ -396,7 +413,7 @@ class JointRecordingWriter(_Writer):
         for member, statistics in zip(self._members, counts):
             total += statistics
             clock = f" drift_ppm={member.clock.drift_ppm:.3f} uncertainty_us={member.clock.uncertainty_us:.1f}" if member.clock else ""
-            self._file.line(f"# {member.number}/end: frames={member.lines.frames} jumps={member.jumps}{clock} {statistics.text()}")
+            self._file.line(f"# {member.number}/end: frames={member.lines.frames} jumps={member.jumps}{clock}{member.lines.edges_text()} {statistics.text()}")
         frames = sum(member.lines.frames for member in self._members)
         seconds = (self._last_us - self._host_zero_us) / 1e6 if frames else 0
         self._file.line(f"# end: reason={reason} frames={frames} seconds={seconds:.6f} alignment_us={self._alignment_us:.1f} {total.text()}")

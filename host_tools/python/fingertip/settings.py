@@ -9,9 +9,22 @@ from .line import SETTINGS, Setting
 from .wire import Body, Info
 
 
-def _wanted(setting: Setting, given: Mapping[str, float | None], now: Info) -> float:
+Given = Mapping[str, float | str | None]
+
+
+def _number(setting: Setting, value: float | str | None) -> float | None:
+    """Of what is given, which may be a word."""
+    if value is None or not setting.words:
+        assert not isinstance(value, str)
+        return value
+    if value not in setting.words:
+        raise BadValueError(f"{setting.argument} {value!r} is unknown; give {setting.give}")
+    return (*setting.choices, 0)[setting.words.index(str(value))]
+
+
+def _wanted(setting: Setting, given: Given, now: Info) -> float:
     """What is given, else its default, else as it is now."""
-    value = given[setting.argument]
+    value = _number(setting, given[setting.argument])
     if value is not None and setting.needs and given[setting.needs] is None:
         raise BadValueError(f"{setting.argument} needs {setting.needs}")
     if value is None and setting.default is not None:
@@ -29,7 +42,7 @@ def _check(setting: Setting, value: float) -> None:
         raise BadValueError(f"{setting.argument} {value:g} is out of range; give {setting.give}")
 
 
-def setting_commands(given: Mapping[str, float | None], now: Info) -> list[Body]:
+def setting_commands(given: Given, now: Info) -> list[Body]:
     """Of the arguments of Fingertip.set; None: not given. Raises BadValueError."""
     commands: list[Body] = []
     for command, group in itertools.groupby(SETTINGS, lambda setting: setting.command):

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 from .errors import CrcError, FormatError, PacketError, PacketVersionError, UnknownTypeError
 from .line import (CONTACT, LOADER_MAGIC, MAX_FRAME_BYTES, NESTED, RAW, SENSORS_MAX, TYPES, VERSION, Acknowledgement, AskCrash, AskHealth, AskInfo,
                    Body, Calibration, Contact, Crash, EraseCalibration, ErasePad, Health, Info, Keep, Loader, PadProfile, Raw, SetLocationLimit,
-                   SetOsr, SetPrior, SetRate, SetSlip, SetStreams, StoreCalibration, StorePad, Tare, Wire)
+                   SetOsr, SetPrior, SetRate, SetSlip, SetStreams, SetSync, StoreCalibration, StorePad, SyncEdge, Tare, Wire)
 
 __all__ = ["CONTACT", "LOADER_MAGIC", "MAX_FRAME_BYTES", "RAW", "SENSORS_MAX", "TYPES", "VERSION", "Acknowledgement", "AskCrash", "AskHealth",
            "AskInfo", "Body", "Calibration", "Contact", "Crash", "Decoder", "EraseCalibration", "ErasePad", "Health", "Info", "Keep", "LineStatistics",
-           "Loader", "Packet", "PadProfile", "Raw", "SetLocationLimit", "SetOsr", "SetPrior", "SetRate", "SetSlip", "SetStreams", "StoreCalibration",
-           "StorePad", "Tare", "cobs_decode", "cobs_encode", "decode", "decode_stream_packet", "encode", "layout_of"]
+           "Loader", "Packet", "PadProfile", "Raw", "SetLocationLimit", "SetOsr", "SetPrior", "SetRate", "SetSlip", "SetStreams", "SetSync",
+           "StoreCalibration", "StorePad", "SyncEdge", "Tare", "cobs_decode", "cobs_encode", "decode", "decode_stream_packet", "encode", "layout_of"]
 
 _HEADER = struct.Struct("<BBHQ")
 _CRC = _FLAGS = struct.Struct("<I")

@@ -70,8 +70,8 @@ def some_packets(seed, frames):
 
     xy_mm = tuple(float(value) for k in range(15) for value in (9 * (k // 5 - 1), 9 * (k % 5 - 2)))
     calibration = wire.Calibration(1700000000, 20, 1.5, 0.01, 5552, 60, 3277, 13954, 101, tuple(1 + k / 100 for k in range(30)))
-    info = wire.Info((1, 2, 3), 15, 15, "abc", "board", "grasp", f"{seed:04d}ABCD", 400000, 399000, 256, 500, 3, 7, 100, 0.75, 9.0, xy_mm, 3.1, 0.5,
-                     0.6, 1, calibration, None)
+    info = wire.Info((1, 2, 3), 15, 31, "abc", "board", "grasp", f"{seed:04d}ABCD", 400000, 399000, 256, 500, 3, 7, 100, 0.75, 9.0, xy_mm, 3.1, 0.5,
+                     0.6, 1, 1, calibration, None)
     yield wire.Packet(0, 1000, info)
     t_us = 2**33
     for frame in range(frames):
@@ -92,6 +92,8 @@ def some_packets(seed, frames):
             yield wire.Packet(2 * frame + 1 & 0xFFFF, t_us, raw)
         if which == 2:
             yield wire.Packet(frame & 0xFFFF, t_us, wire.Health(*range(18), 5, prng.getrandbits(10)))
+        if which == 3:
+            yield wire.Packet(frame & 0xFFFF, t_us, wire.SyncEdge(frame, frame & 1))
 
 
 def write_random(path, seed, frames):

@@ -6,6 +6,7 @@
  *     machine.result                  // what run.json holds
  */
 import { createHash } from 'node:crypto';
+import { SyncPin } from './board/sync_pin.mjs';
 import { Chip, Stopped } from './chip/chip.mjs';
 import { RAM_BASE } from './chip/core.mjs';
 import { FlashMemory } from './chip/flash_memory.mjs';
@@ -25,12 +26,12 @@ export class Machine {
    * @param options image: Uint8Array; Board; scenario; seed; faults: parsed list; flash: 2 MiB of content, beside the
    *   image, from an earlier life; flashSpeed: see BUSY_NS; serial: 16 hex digits; clock_ppm: by how
    *   much the chip's clocks are fast; revision, uptime_us, rosc_hz: of the chip, see Chip; fastEnumeration, companion: of the host, see UsbHost; allowWatchdog: a watchdog reboot is no warning; onBusTransfer, onUsbPacket, onData(bytes);
-   *   sensor, rise_ns, onLevels: see the boards; makeClient({ host, report, onData }): what uses the USB device, CdcClient by
+   *   sync: next, onLevel of the SyncPin; sensor, rise_ns, onLevels: see the boards; makeClient({ host, report, onData }): what uses the USB device, CdcClient by
    *   default
    */
   constructor({
     image, Board, scenario, seed = 1, faults = [], serial = DEFAULT_SERIAL, clock_ppm = 0, fastEnumeration = false, companion = false, allowWatchdog = false, revision, uptime_us, rosc_hz,
-    flash = null, flashSpeed, sensor, rise_ns, onLevels, onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {}, makeClient = (parts) => new CdcClient(parts),
+    flash = null, flashSpeed, sync = {}, sensor, rise_ns, onLevels, onBusTransfer = () => {}, onUsbPacket = () => {}, onData = () => {}, makeClient = (parts) => new CdcClient(parts),
   }) {
     this.image = image;
     this.Board = Board;
@@ -60,6 +61,7 @@ export class Machine {
     this.trouble = new Trouble();
     this.boardScope = this.time.scope();
     this.board = this.makeBoard();
+    this.sync = new SyncPin({ gpio: Board.syncPin, scope: this.scope, report: this.report, ...sync });
     this.host = new UsbHost({ scope: this.scope, report: this.report, fast: fastEnumeration, companion, onPacket: onUsbPacket });
     this.client = makeClient({ host: this.host, report: this.report, onData });
     const onBoard = (type) => [type, (target, active) => this.board.faultActions[type](target, active)];
@@ -103,6 +105,7 @@ export class Machine {
     this.chip = new Chip(this.time, this.report, { serial: this.serial, seed: this.seed, clock_ppm: this.clock_ppm, revision: this.revision, uptime_us: this.uptime_us, rosc_hz: this.rosc_hz, memory: this.memory, trouble: this.trouble, kept });
     this.chip.load(this.image);
     this.board.attachChip(this.chip);
+    this.sync.attachChip(this.chip);
     this.host.connect(this.chip.usbCtrl);
     this.chip.boot();
     this.clockAlarm.schedule(CLOCK_CHECK_NS);

@@ -5,6 +5,7 @@ import { createInterface } from 'node:readline';
 import { parseArgs } from 'node:util';
 import { BOARDS, findBoard } from './board/boards.mjs';
 import { findSensor } from './board/ms5840.mjs';
+import { strobe } from './board/sync_pin.mjs';
 import { FLASH_BYTES } from './chip/flash_memory.mjs';
 import { InputError, inWords } from './errors.mjs';
 import { readFaults } from './faults.mjs';
@@ -52,6 +53,9 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
                        Unix socket or a TCP port on the loopback. QEMU: -chardev socket,id=r,path=WHERE,reconnect=1
                        -device qemu-xhci -device usb-redir,chardev=r. Lines on stdin: "unplug", "plug". While a packet
                        lies ready that the machine does not ask for, emulated time waits, 2 s at most
+  --sync-strobe MS     drive the sync pin: high for a millisecond at each multiple of MS, 2 to 60000; since power-on, with
+                       --stepped on the clock of the program, so that several emulators are on one wire
+  --sync-log FILE.csv  changes of the sync pin, whoever drives it: t_ns,level
   --host-script FILE   with the built-in host: lines "TIME_S HEXBYTES", "TIME_S dtr 0|1", "TIME_S baud N", comments "#"
   --capture FILE       every byte received on bulk IN
 
@@ -75,7 +79,7 @@ const OPTIONS = {
   revision: { type: 'string', default: '2' }, flash: { type: 'string' }, 'slow-flash': { type: 'boolean', default: false },
   'fast-enumeration': { type: 'boolean', default: false }, 'allow-watchdog': { type: 'boolean', default: false },
   pty: { type: 'string' }, stepped: { type: 'boolean' }, usbredir: { type: 'string' }, 'wait-open': { type: 'boolean', default: false }, pace: { type: 'string' },
-  'host-script': { type: 'string' }, capture: { type: 'string' }, 'bus-log': { type: 'string' }, 'usb-log': { type: 'string' },
+  'host-script': { type: 'string' }, capture: { type: 'string' }, 'sync-strobe': { type: 'string' }, 'sync-log': { type: 'string' }, 'bus-log': { type: 'string' }, 'usb-log': { type: 'string' },
   vcd: { type: 'string' }, 'vcd-from': { type: 'string', default: '0' }, 'vcd-to': { type: 'string' }, 'rise-ns': { type: 'string' },
   report: { type: 'string' }, progress: { type: 'boolean', default: false }, help: { type: 'boolean', short: 'h', default: false },
 };
@@ -88,6 +92,7 @@ const USBREDIR_SLICE_NS = 200e3;
 const WALL_SLICE_NS = 250e3;
 const WALL_CATCH_UP_NS = 10e6;
 const SLICE_BATCH_NS = 50e6;
+const STROBE_HIGH_NS = 1e6;
 
 /** parseArgs takes "-1" behind "--name" for an option: join the two, so that the value is judged. */
 function joinNegativeNumbers(argv) {
@@ -122,6 +127,7 @@ function parseOptions(argv) {
     values[name] = values[name] === undefined ? Infinity : number(name, (v) => Number.isFinite(v) && v >= 0, 'a time in seconds, 0 or later');
   }
   if (values['vcd-to'] < values['vcd-from']) throw new InputError('--vcd-to is before --vcd-from');
+  if (values['sync-strobe'] !== undefined) values['sync-strobe'] = number('sync-strobe', (v) => v >= 2 && v <= 60000, 'a period from 2 to 60000 ms');
   if (values['rise-ns'] !== undefined) values['rise-ns'] = number('rise-ns', (v) => v >= 0 && v <= 1000, 'a rise time from 0 to 1000 ns');
   if (!/^[0-9a-fA-F]{16}$/.test(values.serial)) throw new InputError(`--serial "${values.serial}" is not 16 hexadecimal digits`);
   values.pace ??= values.pty || values.usbredir ? 'real' : 'fast';
@@ -225,11 +231,17 @@ async function run(options) {
     });
     const usbLog = output(options['usb-log'], 't_ns,endpoint,dir,length,bytes,offered_ns');
 
+    const syncLog = output(options['sync-log'], 't_ns,level');
+
     while (options['wait-open'] && !pty.isOpen && !interrupted && !pty.failure) await sleep(5);
 
     const machine = new Machine({
       image, Board, scenario, sensor: options.sensor, faults, flash, flashSpeed: options['slow-flash'] ? 'slowest' : 'typical', seed: options.seed, serial: options.serial, clock_ppm: options['clock-ppm'], revision: options.revision,
       fastEnumeration: options['fast-enumeration'], allowWatchdog: options['allow-watchdog'],
+      sync: {
+        next: options['sync-strobe'] ? (t_ns) => strobe({ period_ns: options['sync-strobe'] * 1e6, high_ns: STROBE_HIGH_NS, zero_ns: stepped?.zero_ns })(t_ns) : null,
+        onLevel: (high, t_ns) => syncLog.write(Buffer.from(`${t_ns.toFixed(1)},${high ? 1 : 0}\n`)),
+      },
       rise_ns: options['rise-ns'], onLevels: vcd ? (levels, t_ns) => vcd.change(levels, t_ns) : undefined,
       onBusTransfer: options['bus-log']
         ? (t) => busLog.write(Buffer.from(`${t.start_ns.toFixed(0)},${t.end_ns.toFixed(0)},${t.muxes},0x${t.address.toString(16)},${t.read ? 'r' : 'w'},${hex(t.bytes)},${t.acknowledged ? 1 : 0}\n`))

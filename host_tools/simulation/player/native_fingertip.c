@@ -6,6 +6,7 @@
 #include "native/native_cdc.h"
 #include "native/native_flash.h"
 #include "native/native_port.h"
+#include "native/native_sync.h"
 #include "port/port.h"
 
 #include <string.h>
@@ -28,6 +29,7 @@ static uint64_t bus_next_us(const void *context) {
 bool native_fingertip_start(const struct native_fingertip_settings *settings) {
   native_start(false);
   native_cdc_reset();
+  native_sync_reset();
   native_flash_reset(settings->seed);
   if (settings->flash) {
     memcpy(native_flash.bytes, settings->flash, sizeof native_flash.bytes);

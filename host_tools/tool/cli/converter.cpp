@@ -25,7 +25,7 @@ bool is_frame(const wire_packet &packet) {
 /* That a recording has a place for. */
 bool is_kept(const wire_packet &packet) {
   return is_frame(packet) || packet.type == WIRE_HEALTH || packet.type == WIRE_INFO ||
-         packet.type == WIRE_ACK;
+         packet.type == WIRE_ACK || packet.type == WIRE_SYNC;
 }
 
 void check_paths(const Conversion &conversion) {

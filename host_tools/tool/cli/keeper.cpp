@@ -105,6 +105,7 @@ public:
   }
   std::uint64_t frames(std::size_t device) const override { return writer_.frames(device); }
   double alignment_us() const override { return writer_.alignment_us(); }
+  double edges_alignment_us() const override { return writer_.edges_alignment_us(); }
 
 private:
   static std::vector<wire_info> infos(const std::vector<DeviceNews> &ready) {

@@ -34,6 +34,8 @@ public:
   virtual std::uint64_t frames(std::size_t device) const = 0;
   /* The bound on the distance in time of two rows of different fingertips, so far. */
   virtual double alignment_us() const { return 0; }
+  /* The same of rows that edges at the sync pins have placed; 0: there are none. */
+  virtual double edges_alignment_us() const { return 0; }
 };
 
 /* ready: the news of that kind of each fingertip, and its port. extra: for the head of a recording

@@ -364,16 +364,21 @@ private:
       return;
     }
     std::uint64_t frames = 0;
+    std::string edges;
     for (std::size_t i = 0; i < models_.size(); i++) {
       frames += keeper_->frames(i);
+      edges += edges_text(models_[i]);
     }
+    const double edges_us = keeper_->edges_alignment_us();
+    const std::string by_edges =
+        edges_us > 0 ? ", by edges to " + fixed(edges_us, 1) + " us" : "";
     std::fprintf(stderr,
-                 "%s%llu frames of %zu fingertips, aligned to %s us or better, %llu packets "
-                 "dropped, %llu CRC errors\n",
+                 "%s%llu frames of %zu fingertips, aligned to %s us or better%s, %llu packets "
+                 "dropped, %llu CRC errors%s\n",
                  name.c_str(), static_cast<unsigned long long>(frames), models_.size(),
-                 fixed(keeper_->alignment_us(), 0).c_str(),
+                 fixed(keeper_->alignment_us(), 0).c_str(), by_edges.c_str(),
                  static_cast<unsigned long long>(sum.dropped_packets),
-                 static_cast<unsigned long long>(sum.crc_errors));
+                 static_cast<unsigned long long>(sum.crc_errors), edges.c_str());
   }
 
   const LiveOptions &options_;

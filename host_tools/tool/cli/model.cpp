@@ -34,6 +34,9 @@ void Model::take(const wire_packet &packet) {
   case WIRE_HEALTH:
     health_ = packet.body.health;
     break;
+  case WIRE_SYNC:
+    edges_.take(packet.body.sync);
+    break;
   default:
     break;
   }

@@ -3,6 +3,7 @@
 
 #include "libfingertip/clock.hpp"
 #include "libfingertip/decoder.hpp"
+#include "libfingertip/edge_counter.hpp"
 
 #include <chrono>
 #include <deque>
@@ -57,6 +58,8 @@ public:
   /* Frames since the first, and their device time. */
   std::uint64_t frames() const { return frames_; }
   double seconds() const;
+  /* At the sync pin. */
+  const EdgeCounter &edges() const { return edges_; }
   /* Over the last second of device time. */
   double frames_per_s() const;
   /* Over everything. */
@@ -96,6 +99,7 @@ private:
   std::optional<wire_health> health_;
 
   std::uint64_t frames_ = 0;
+  EdgeCounter edges_;
   std::uint64_t before_restart_us_ = 0; /* device time of earlier runs of the device */
   std::optional<std::uint64_t> first_us_;
   std::uint64_t last_us_ = 0;

@@ -247,7 +247,14 @@ std::string summary_text(const Model &model) {
   return std::to_string(model.frames()) + " frames in " + fixed(model.seconds(), 2) + " s (" +
          fixed(model.mean_frames_per_s(), 1) + "/s), " + std::to_string(line.dropped_packets) +
          " packets dropped, " + std::to_string(line.crc_errors) + " CRC errors, " +
-         std::to_string(line.format_errors) + " format errors";
+         std::to_string(line.format_errors) + " format errors" + edges_text(model);
+}
+
+std::string edges_text(const Model &model) {
+  const EdgeCounter &edges = model.edges();
+  return edges.edges() == 0 ? ""
+                            : ", " + std::to_string(edges.edges()) + " edges at the sync pin, " +
+                                  std::to_string(edges.missing()) + " missing";
 }
 
 } // namespace fingertip

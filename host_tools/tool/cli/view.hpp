@@ -39,5 +39,7 @@ std::unique_ptr<View> make_state_view();
 
 /* "5068 frames in 12.3 s (412.1/s), 0 packets dropped, 0 CRC errors, 0 format errors" */
 std::string summary_text(const Model &model);
+/* A part of it: ", 7 edges at the sync pin, 0 missing"; nothing if there were none. */
+std::string edges_text(const Model &model);
 
 } // namespace fingertip

@@ -10,6 +10,7 @@ import { Machine } from '../../../host_tools/simulation/emulator/machine.mjs';
 import { steady } from './bench.mjs';
 
 const commands = new Map();
+const HELD = 1 << 6; // contact_flags.h
 
 /** images: the folder with those of all boards; tools: { fingertip, command_frame }, the tool and the program of tests/support. */
 export class ImageBench {
@@ -94,14 +95,15 @@ export class ImageBench {
     return Object.fromEntries(line.split(' ').slice(3).map((pair) => pair.split('=')).map(([key, value]) => [key, Number(value)]));
   }
 
-  /** The last frame of the recording, by column. */
+  /** The last frame of the recording that was measured, and came with both packets, by column. */
   lastRow() {
-    const rows = this.recording().filter((l) => !l.startsWith('#'));
-    const values = rows.at(-1).split(',');
-    return Object.fromEntries(rows[0].split(',').map((name, i) => [name, Number(values[i])]));
+    const [head, ...rows] = this.recording().filter((l) => !l.startsWith('#')).map((l) => l.split(','));
+    const flags = head.indexOf('raw_flags');
+    const values = rows.findLast((cells) => cells[flags] !== '' && !(Number(cells[flags]) & HELD));
+    return Object.fromEntries(head.map((name, i) => [name, Number(values[i])]));
   }
 
-  /** Flags of the last frame. */
+  /** Flags of that frame. */
   flags() {
     return this.lastRow().flags;
   }

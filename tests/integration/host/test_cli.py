@@ -300,11 +300,11 @@ class ErrorsPeopleMeet(CliTest):
                              f"fingertip: {self.port}: is fingertip AAAA, not BBBB; see `fingertip list`, and choose by --device alone\n")
 
     def test_older_or_newer_protocol_version(self):
-        for version in (1, 5, 7):
+        for version in (1, 6, 8):
             with self.device(f"version={version}"):
                 for command in (["info"], ["set", "rate=max"]):
                     self.assertEqual(self.error(*command, "--port", self.port),
-                                     f"fingertip: {self.port}: speaks protocol version {version}, not 6; install "
+                                     f"fingertip: {self.port}: speaks protocol version {version}, not 7; install "
                                      "this tool's firmware with `fingertip flash`, or use the other's tool\n")
 
     def test_cable_pulled(self):

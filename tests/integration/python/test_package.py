@@ -144,6 +144,8 @@ class Codec(Folder):
         self.assertEqual((found["command_slip"].body, found["command_slip"].t_us), (wire.SetSlip(0.75, 100), 0x1122334455667788))
         self.assertIsNone(found["health_raw"].body.fit_failures)
         self.assertEqual(found["raw"].body.readings[0], 100000 * 1024)
+        self.assertEqual((found["sync"].body, found["sync"].t_us), (wire.SyncEdge(3, 1), 123456789))
+        self.assertEqual((found["command_sync"].body, found["info_sync"].body.sync, found["info"].body.sync), (wire.SetSync(3), 2, None))
 
     def test_the_same_as_c_both_ways(self):
         prng = random.Random(1)
@@ -456,6 +458,27 @@ class Streaming(DeviceTest):
         np.testing.assert_array_equal(np.float32(recording["x_mm"][rows]), np.float32([frame.x_mm for frame in frames if frame.frame in recorded]))
         self.assertEqual(recording.metadata["gains"].split()[0], f"{tip.info.calibration.gains[0]:g}")
 
+    def test_edges_at_the_sync_pin(self):
+        with self.device("frames=100", "edges=10", "capabilities=23"), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
+            self.assertEqual(tip.info.sync, 0)
+            self.assertEqual(tip.set(sync="second").sync, 3)
+            for wrong in ("out", "1", ""):
+                with self.assertRaisesRegex(fingertip.BadValueError, "give one of in, frame, second, or off"):
+                    tip.set(sync=wrong)
+            self.assertEqual(tip.set(sync="off").sync, 0)
+            with tip.record(self.path("r.csv")):
+                frames = {frame.frame: frame for frame in self.until_gone(tip)}
+            edges = tip.sync_edges
+        self.assertEqual([edge.number for edge in edges], [1, 2, 4, 5, 6, 7, 8, 9, 10])
+        for edge in edges:
+            self.assertEqual((edge.t_us, edge.level), (frames[10 * edge.number].t_us, edge.number % 2))
+            self.assertLess(abs(edge.time_us - frames[10 * edge.number].host_us), 1000)
+        recording = fingertip.read_recording(self.path("r.csv"))
+        recorded = recording.sync_edges
+        self.assertEqual([edge[:3] for edge in recorded], [edge[:3] for edge in edges][-len(recorded):])
+        self.assertTrue(len(recorded) >= 8 and math.isnan(recorded[0].time_us))
+        self.assertEqual((recording.end["edges"], recording.end["edges_missing"]), (str(len(recorded)), "1"))
+
 
 class Commands(DeviceTest):
     def test_set_tare_and_health(self):
@@ -492,7 +515,7 @@ class Commands(DeviceTest):
             self.assertTrue(next(iter(tip)).frame)
 
     def test_no_answer_and_another_version(self):
-        with self.device("version=4"), self.assertRaisesRegex(fingertip.OtherVersionError, "speaks protocol version 4, not 6"):
+        with self.device("version=4"), self.assertRaisesRegex(fingertip.OtherVersionError, "speaks protocol version 4, not 7"):
             Fingertip(self.port)
         with mock.patch.object(device, "ANSWER_TIMEOUT_s", 0.2), self.device("mute=1"):
             self.assertRaisesRegex(fingertip.NoAnswerError, "no answer to AskInfo", Fingertip, self.port)

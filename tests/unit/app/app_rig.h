@@ -8,6 +8,7 @@
 #include "native/native_cdc.h"
 #include "native/native_flash.h"
 #include "native/native_port.h"
+#include "native/native_sync.h"
 #include "native/sim_array.h"
 #include "port/port.h"
 
@@ -70,6 +71,7 @@ static inline void rig_power_up_at(uint64_t t_us) {
   native_start(false);
   native_set_time(t_us);
   native_cdc_reset();
+  native_sync_reset();
   sim_array_init(&array, geometry.sensor_count, 1);
   array.world = (struct sim_world){.pressure_Pa = world_pressure_Pa};
   array.noise = 1.0;

@@ -15,7 +15,8 @@ void tearDown(void) {
 static const uint32_t CAPABILITIES = (FT_WITH_FIT ? WIRE_CAPABILITY_FIT : 0) |
                                      (FT_WITH_SLIP ? WIRE_CAPABILITY_SLIP : 0) |
                                      (FT_WITH_RAW_STREAM ? WIRE_CAPABILITY_RAW_STREAM : 0) |
-                                     (FT_WITH_TANGENTIAL ? WIRE_CAPABILITY_TANGENTIAL : 0);
+                                     (FT_WITH_TANGENTIAL ? WIRE_CAPABILITY_TANGENTIAL : 0) |
+                                     (FT_WITH_SYNC ? WIRE_CAPABILITY_SYNC : 0);
 static const uint8_t STREAMS =
     (FT_WITH_FIT ? WIRE_STREAM_CONTACT : 0) | (FT_WITH_RAW_STREAM ? WIRE_STREAM_RAW : 0);
 
@@ -52,6 +53,9 @@ static void it_refuses_streams_and_commands_that_it_lacks(void) {
       ask((struct wire_packet){.type = WIRE_CMD_LOCATION_LIMIT, .body.cmd_location_limit = {1}}));
   TEST_ASSERT_EQUAL_UINT8(FT_WITH_FIT ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
                           ask((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION}));
+  TEST_ASSERT_EQUAL_UINT8(
+      FT_WITH_SYNC ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
+      ask((struct wire_packet){.type = WIRE_CMD_SYNC, .body.cmd_sync = {PORT_SYNC_IN}}));
   uint8_t of_tangential = FT_WITH_TANGENTIAL ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND;
   TEST_ASSERT_EQUAL_UINT8(
       of_tangential,
@@ -120,6 +124,7 @@ static void it_keeps_settings(void) {
   TEST_ASSERT_EQUAL(FT_PENDING, store_put_profile(&app.store, &pad));
   run_for(500);
   ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {512}});
+  ask((struct wire_packet){.type = WIRE_CMD_SYNC, .body.cmd_sync = {PORT_SYNC_SECOND}});
   TEST_ASSERT_EQUAL(WIRE_RESULT_DONE,
                     ask((struct wire_packet){.type = WIRE_CMD_KEEP, .body.cmd_keep = {1}}));
   rig_power_up();
@@ -127,6 +132,8 @@ static void it_keeps_settings(void) {
   run_for(300);
   struct wire_info info = get_info();
   TEST_ASSERT_EQUAL_UINT16(512, info.osr);
+  TEST_ASSERT_EQUAL_UINT8(FT_WITH_SYNC ? PORT_SYNC_SECOND : 0, info.sync);
+  TEST_ASSERT_EQUAL(FT_WITH_SYNC ? PORT_SYNC_SECOND : PORT_SYNC_OFF, native_sync_mode());
   TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_SETTINGS | (FT_WITH_FIT ? WIRE_STORED_CALIBRATION : 0) |
                               (FT_WITH_TANGENTIAL ? WIRE_STORED_PAD : 0),
                           info.stored);

@@ -24,7 +24,7 @@ wire_packet decoded(const wire_packet &command) {
 /* How it is shown once it is set: one setting of "rate=... osr=...". */
 std::string as_shown(const std::string &text) {
   wire_info info{};
-  info.capabilities = WIRE_CAPABILITY_FIT | WIRE_CAPABILITY_SLIP;
+  info.capabilities = WIRE_CAPABILITY_FIT | WIRE_CAPABILITY_SLIP | WIRE_CAPABILITY_SYNC;
   info.slip_threshold_mm = 1;
   info.slip_window_ms = 100;
   const wire_packet command = setting_commands({setting_from_text(text)}, info).front();
@@ -38,6 +38,9 @@ std::string as_shown(const std::string &text) {
   case WIRE_CMD_SLIP:
     info.slip_threshold_mm = command.body.cmd_slip.threshold_mm;
     info.slip_window_ms = command.body.cmd_slip.window_ms;
+    break;
+  case WIRE_CMD_SYNC:
+    info.sync = command.body.cmd_sync.mode;
     break;
   case WIRE_CMD_PRIOR:
     info.prior_sigma_mm = command.body.cmd_prior.sigma_mm;
@@ -86,12 +89,12 @@ TEST(Command, CarriesItsValue) {
 
 TEST(Command, BytesOnTheLine) {
   // COBS of version, type, sequence, time, body and CRC, worked out by zlib.crc32 and hand.
-  EXPECT_EQ(hex(frame_bytes(command_tare())), "0306810101010101010101010105d0baf35400");
-  EXPECT_EQ(hex(frame_bytes(command_erase_pad())), "03068e01010101010101010105167d7fb100");
+  EXPECT_EQ(hex(frame_bytes(command_tare())), "03078101010101010101010101055563658900");
+  EXPECT_EQ(hex(frame_bytes(command_erase_pad())), "03078e010101010101010101057931da2a00");
   wire_packet timed = command_osr(8192);
   timed.sequence = 258;
   timed.t_us = 1;
-  EXPECT_EQ(hex(frame_bytes(timed)).rfind("0606830201", 0), 0u);
+  EXPECT_EQ(hex(frame_bytes(timed)).rfind("0607830201", 0), 0u);
   // 12 and 9 mm; COBS has a code for each zero.
   const std::string pad = hex(frame_bytes(command_pad(pad_of_12_mm())));
   const auto at = pad.find("4041");
@@ -113,7 +116,7 @@ TEST(Command, SettingsAsTyped) {
        {"rate=20.000", "rate=0.100", "rate=2000.000", "rate=max", "osr=256", "osr=512", "osr=1024",
         "osr=2048", "osr=4096", "osr=8192", "slip_threshold=0.01", "slip_threshold=50",
         "slip_window=5", "slip_window=1000", "prior=3.1:0.5", "prior=100:0.01", "prior=none",
-        "limit=0.6", "limit=100"}) {
+        "limit=0.6", "limit=100", "sync=in", "sync=frame", "sync=second", "sync=off"}) {
     EXPECT_EQ(as_shown(text), text);
   }
   EXPECT_EQ(as_shown("prior=3.1"), "prior=3.1:0.5");
@@ -131,6 +134,7 @@ TEST(Command, SettingsOutOfRangeAreRefused) {
        {"", "x", "3.1:", ":0.5", "0", "0:0", "0.4", "101", "3:0", "3:101", "3:nan", "inf",
         "3:0.5:1", "-3"}},
       {"limit", {"", "0", "0.009", "101", "nan", "none"}},
+      {"sync", {"", "out", "1", "0", "In", "in ", "infinity", "none"}},
   };
   for (const auto &[name, texts] : wrong) {
     for (const std::string &text : texts) {
@@ -192,7 +196,8 @@ TEST(Command, TheErrorNamesTheAllowedRange) {
                     "100 mm, or none"},
       {"limit=x", "limit \"x\" is no number; give 0.01 to 100 mm"},
       {"gain=1", "setting \"gain=1\" is unknown; give rate=HZ|max, osr=N, slip_threshold=MM, "
-                 "slip_window=MS, prior=SIGMA[:WIDTH]|none or limit=MM"},
+                 "slip_window=MS, prior=SIGMA[:WIDTH]|none, limit=MM or sync=MODE|off"},
+      {"sync=out", "sync \"out\" is unknown; give in, frame, second, or off"},
   };
   for (const auto &[text, what] : said) {
     try {
@@ -206,7 +211,7 @@ TEST(Command, TheErrorNamesTheAllowedRange) {
                              "slip_threshold=MM (0.01 to 50), slip_window=MS (5 to "
                              "1000, and 160 frames at most), prior=SIGMA[:WIDTH]|none (mm, 0.5 to "
                              "100, 0.01 to 100; width 0.5), limit=MM (of "
-                             "location_sd_mm, 0.01 to 100)");
+                             "location_sd_mm, 0.01 to 100), sync=in|frame|second|off");
 }
 
 TEST(Names, StreamsBothWays) {

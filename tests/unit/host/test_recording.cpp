@@ -245,6 +245,22 @@ TEST(Recording, TheCalibrationIsKeptWithItsChanges) {
   EXPECT_NE(contents(folder / "r.csv").find("\n# gains: 0.86 0.88 "), std::string::npos);
 }
 
+TEST(Recording, EdgesAtTheSyncPinAreKeptAndCounted) {
+  test::TemporaryFolder folder;
+  std::vector<wire_packet> packets = {test::make_info(1, 2), test::make_contact(2, 3, 1)};
+  for (std::uint32_t number : {7u, 8u, 11u, 12u}) {
+    wire_packet edge = test::make_packet(WIRE_SYNC, static_cast<std::uint16_t>(number), 100 * number);
+    edge.body.sync = {number, static_cast<std::uint8_t>(number % 2)};
+    packets.push_back(edge);
+  }
+  record(folder / "r.csv", packets);
+  EXPECT_EQ(frames_of(read_all(folder / "r.csv")), frames_of(packets));
+  EXPECT_NE(contents(folder / "r.csv").find("\n# packet: sync sequence=11 t_us=1100 number=11 "
+                                            "level=1\n"),
+            std::string::npos);
+  EXPECT_NE(contents(folder / "r.csv").find(" edges=4 edges_missing=2 "), std::string::npos);
+}
+
 TEST(Recording, ThePadIsKeptWithItsChanges) {
   test::TemporaryFolder folder;
   wire_packet known = test::make_info(1, 2);

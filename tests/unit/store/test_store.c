@@ -49,7 +49,8 @@ static struct store_settings some_settings(void) {
                                  .slip_threshold_mm = (float)random_between(&random, 0.1, 5.0),
                                  .prior_sigma_mm = (float)random_between(&random, 1.0, 5.0),
                                  .prior_width_mm = (float)random_between(&random, 0.1, 1.0),
-                                 .location_limit_mm = (float)random_between(&random, 0.1, 2.0)};
+                                 .location_limit_mm = (float)random_between(&random, 0.1, 2.0),
+                                 .sync = random_below(&random, 4)};
 }
 
 static struct pad_profile some_profile(void) {

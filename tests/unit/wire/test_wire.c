@@ -23,7 +23,8 @@ static size_t body_length(const struct wire_packet *packet) {
   case WIRE_INFO: {
     const struct wire_info *info = &packet->body.info;
     return 93u + (info->capabilities & WIRE_CAPABILITY_FIT ? 13 : 0) +
-           (info->capabilities & WIRE_CAPABILITY_SLIP ? 6 : 0) + 8u * info->sensor_count +
+           (info->capabilities & WIRE_CAPABILITY_SLIP ? 6 : 0) +
+           (info->capabilities & WIRE_CAPABILITY_SYNC ? 1 : 0) + 8u * info->sensor_count +
            (info->stored & WIRE_STORED_CALIBRATION ? 23 + 8u * info->sensor_count : 0) +
            (info->stored & WIRE_STORED_PAD ? 177 : 0);
   }
@@ -36,7 +37,10 @@ static size_t body_length(const struct wire_packet *packet) {
   case WIRE_CMD_STREAM:
   case WIRE_CMD_TARE:
   case WIRE_CMD_KEEP:
+  case WIRE_CMD_SYNC:
     return 1;
+  case WIRE_SYNC:
+    return 5;
   case WIRE_CMD_RATE:
   case WIRE_CMD_LOADER:
   case WIRE_CMD_LOCATION_LIMIT:
@@ -157,7 +161,8 @@ static void test_sets_of_commands(void) {
                                          *const of_fit[] = {WIRE_COMMANDS_OF_FIT, NULL},
                                          *const of_slip[] = {WIRE_COMMANDS_OF_SLIP, NULL},
                                          *const of_tangential[] = {WIRE_COMMANDS_OF_TANGENTIAL,
-                                                                   NULL};
+                                                                   NULL},
+                                         *const of_sync[] = {WIRE_COMMANDS_OF_SYNC, NULL};
   for (size_t i = 0; i < WIRE_TYPES; i++) {
     uint8_t type = wire_types[i];
     bool command = type >= 0x80;
@@ -165,12 +170,14 @@ static void test_sets_of_commands(void) {
     bool fit = type == WIRE_CMD_CALIBRATE || type == WIRE_CMD_ERASE_CALIBRATION ||
                type == WIRE_CMD_PRIOR || type == WIRE_CMD_LOCATION_LIMIT;
     bool tangential = type == WIRE_CMD_PAD || type == WIRE_CMD_ERASE_PAD;
+    bool sync = type == WIRE_CMD_SYNC;
     TEST_ASSERT_NOT_NULL(wire_find_layout(wire_all_layouts, type));
     TEST_ASSERT_EQUAL(command, wire_find_layout(wire_commands, type) != NULL);
     TEST_ASSERT_EQUAL(fit, wire_find_layout(of_fit, type) != NULL);
     TEST_ASSERT_EQUAL(slip, wire_find_layout(of_slip, type) != NULL);
     TEST_ASSERT_EQUAL(tangential, wire_find_layout(of_tangential, type) != NULL);
-    TEST_ASSERT_EQUAL(command && !fit && !slip && !tangential,
+    TEST_ASSERT_EQUAL(sync, wire_find_layout(of_sync, type) != NULL);
+    TEST_ASSERT_EQUAL(command && !fit && !slip && !tangential && !sync,
                       wire_find_layout(always, type) != NULL);
   }
   struct sampler sampler = {SAMPLE_RANDOM, {12}};
@@ -227,7 +234,7 @@ static void assert_pad_guarded(uint8_t type, size_t body_offset, struct pad_prof
 
 /* PROTOCOL.md says how long a frame may be. */
 static void test_the_longest_frame_is_as_documented(void) {
-  TEST_ASSERT_EQUAL(845, WIRE_MAX_FRAME_BYTES);
+  TEST_ASSERT_EQUAL(846, WIRE_MAX_FRAME_BYTES);
   struct sampler sampler = {SAMPLE_GREATEST, {16}};
   struct wire_packet packet;
   sample_packet(&sampler, WIRE_INFO, &packet);
@@ -263,8 +270,8 @@ static void test_infinity_and_nan_are_refused_both_ways(void) {
   for (size_t i = 0; i < 3; i++) {
     assert_float_guarded(WIRE_INFO, 352 + 4 * i, settings[i], &packet);
   }
-  assert_calibration_guarded(WIRE_INFO, 368, &info->calibration, &packet);
-  assert_pad_guarded(WIRE_INFO, 647, &info->pad, &packet);
+  assert_calibration_guarded(WIRE_INFO, 369, &info->calibration, &packet);
+  assert_pad_guarded(WIRE_INFO, 648, &info->pad, &packet);
   sample_packet(&sampler, WIRE_CMD_CALIBRATE, &packet);
   assert_calibration_guarded(WIRE_CMD_CALIBRATE, 1, &packet.body.cmd_calibrate.calibration,
                              &packet);

@@ -251,6 +251,12 @@ static void test_info(void) {
   info->calibration = calibration_of_two();
   check("info.txt", &packet);
 
+  info->capabilities |= WIRE_CAPABILITY_SYNC;
+  info->sync = 2;
+  check("info_sync.txt", &packet);
+  info->capabilities &= ~(uint32_t)WIRE_CAPABILITY_SYNC;
+  info->sync = 0;
+
   memcpy(info->scene, "grasp", 5);
   info->capabilities |= WIRE_CAPABILITY_TANGENTIAL;
   info->stored |= WIRE_STORED_PAD;
@@ -305,6 +311,16 @@ static void test_health(void) {
   packet.body.health.capabilities = WIRE_CAPABILITY_RAW_STREAM;
   packet.body.health.fit_failures = 0;
   check("health_raw.txt", &packet);
+}
+
+static void test_sync(void) {
+  struct wire_packet packet = blank(0x07, 45, 123456789);
+  packet.body.sync = (struct wire_sync){.number = 3, .level = 1};
+  check("sync.txt", &packet);
+
+  packet = blank(0x90, 46, 60000);
+  packet.body.cmd_sync.mode = 3;
+  check("command_sync.txt", &packet);
 }
 
 static void test_acknowledgement(void) {
@@ -370,6 +386,7 @@ int main(void) {
   RUN_TEST(test_raw);
   RUN_TEST(test_info);
   RUN_TEST(test_health);
+  RUN_TEST(test_sync);
   RUN_TEST(test_acknowledgement);
   RUN_TEST(test_commands);
   return UNITY_END();

@@ -19,7 +19,7 @@ static const uint8_t wire_types[] = {
     WIRE_CMD_LOADER, WIRE_CMD_CALIBRATE, WIRE_CMD_ERASE_CALIBRATION,
     WIRE_CMD_KEEP,   WIRE_CMD_PRIOR,     WIRE_CMD_LOCATION_LIMIT,
     WIRE_CMD_PAD,    WIRE_CMD_ERASE_PAD, WIRE_CRASH,
-    WIRE_CMD_CRASH};
+    WIRE_CMD_CRASH,  WIRE_SYNC,          WIRE_CMD_SYNC};
 enum { WIRE_TYPES = sizeof wire_types };
 
 enum sample_kind { SAMPLE_ZERO, SAMPLE_GREATEST, SAMPLE_LEAST, SAMPLE_RANDOM, SAMPLE_KINDS };
@@ -210,6 +210,9 @@ static inline void sample_info(struct sampler *sampler, struct wire_info *info) 
     info->prior_width_mm = sample_f32(sampler);
     info->location_limit_mm = sample_f32(sampler);
   }
+  if (info->capabilities & WIRE_CAPABILITY_SYNC) {
+    info->sync = (uint8_t)sample_u32(sampler);
+  }
   info->stored = sample_u32(sampler);
   if (info->stored & WIRE_STORED_CALIBRATION) {
     sample_calibration(sampler, info->sensor_count, &info->calibration);
@@ -288,6 +291,13 @@ static inline void sample_packet(struct sampler *sampler, uint8_t type,
     break;
   case WIRE_CRASH:
     sample_crash(sampler, &packet->body.crash);
+    break;
+  case WIRE_SYNC:
+    packet->body.sync.number = sample_u32(sampler);
+    packet->body.sync.level = (uint8_t)sample_u32(sampler);
+    break;
+  case WIRE_CMD_SYNC:
+    packet->body.cmd_sync.mode = (uint8_t)sample_u32(sampler);
     break;
   case WIRE_ACK:
     packet->body.ack.command = (uint8_t)sample_u32(sampler);

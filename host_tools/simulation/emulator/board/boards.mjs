@@ -1,6 +1,6 @@
 /**
  * The boards by name: each folder of boards/ with a descriptor, board.json, which boards/README.md explains. A board class has static
- * sensors, muxes, lines (a data line for each sensor: there are faults of single lines), probes, clkSys_Hz; see its model for its instances.
+ * sensors, muxes, lines (a data line for each sensor: there are faults of single lines), probes, syncPin, clkSys_Hz; see its model for its instances.
  */
 import { existsSync, readFileSync, readdirSync } from 'node:fs';
 import { InputError } from '../errors.mjs';
@@ -20,7 +20,7 @@ export function findBoard(name) {
   if (!Model) throw new InputError(`board ${name} has a bus "${descriptor.bus}"; known: ${Object.keys(MODELS).join(', ')}`);
   return class extends Model {
     static {
-      Object.assign(this, Model.facts(descriptor), { clkSys_Hz: 125e6 });
+      Object.assign(this, Model.facts(descriptor), { syncPin: descriptor.wiring.pin_sync, clkSys_Hz: 125e6 });
     }
 
     constructor(options) {

@@ -6,6 +6,7 @@
  *     chip.pins.setLevels(mask, levels)            // the levels of these pins; from then on they are the world's
  *
  * A pin that the world never set reads what the chip drives, or else what its pull resistors make of it.
+ * onLevels(levels, t_ns) hears of changes of the pins in `watched`.
  * `before(t_ns)` is what the blocks read just before a time of the last few clock cycles, for synchronisers.
  */
 import { GPIOPin } from 'rp2040js';
@@ -54,6 +55,8 @@ export class Pins {
     this.chip = chip;
     chip.gpio = Array.from({ length: COUNT }, (_, i) => new Pin(chip, i));
     this.onDriven = () => {};
+    this.watched = 0;
+    this.onLevels = () => {};
     this.low = 0;
     this.high = 0;
     this.levels = 0;
@@ -146,6 +149,7 @@ export class Pins {
       pin.rawInputValue = ((levels >>> pin.index) & 1) === 1;
       pin.noteLevel();
     }
+    if (changed & this.watched) this.onLevels(levels, chip.time.nanos);
     const inputs = ((levels & this.readable) ^ this.inverted) | this.readHigh;
     const different = inputs ^ this.inputs;
     if (!different) return;

@@ -2,7 +2,8 @@
  * The CDC port on stdin and stdout, for a program that has a clock of its own: emulated time passes only as far as that
  * program asks. Frames either way: one byte type, u32 little-endian length, payload; times are u64, ns since power-on.
  *
- *     from the program: 'O' time                  a client opens the port at that time
+ *     from the program: 'Z' time                  the program's clock when the power comes; first of all, or not at all
+ *                       'O' time                  a client opens the port at that time
  *                       'C' time                  it closes it
  *                       'D' time, bytes           it writes them
  *                       'W' time, u8 0|1          it takes no more bytes (1), or some again (0)
@@ -24,6 +25,7 @@ export class SteppedPort {
     this.received = Buffer.alloc(0);
     this.chunk = Buffer.alloc(CHUNK);
     this.sent = [];
+    this.zero_ns = 0;
   }
 
   connect(scope, cdc) {
@@ -52,6 +54,10 @@ export class SteppedPort {
       const payload = this.#read(head.readUInt32LE(1));
       if (type === 'E') return null;
       const at_ns = Number(payload.readBigUInt64LE(0));
+      if (type === 'Z') {
+        this.zero_ns = at_ns;
+        continue;
+      }
       if (type === 'R') return { until_ns: at_ns, margin_ns: Number(payload.readBigUInt64LE(8)) };
       this.coming.push({ at_ns, type, bytes: Uint8Array.from(payload.subarray(8)) });
       if (this.coming.length === 1) this.alarm.scheduleAt(at_ns);

@@ -1,6 +1,6 @@
 /** written by firmware/wire/line.py from line.toml; change it there. */
 
-export const WIRE_VERSION = 6;
+export const WIRE_VERSION = 7;
 export const LOADER_MAGIC = 0x746f6f42;
 
 export const PacketType = {
@@ -10,6 +10,7 @@ export const PacketType = {
   HEALTH: 0x04,
   ACK: 0x05,
   CRASH: 0x06,
+  SYNC: 0x07,
   CMD_STREAM: 0x80,
   CMD_TARE: 0x81,
   CMD_RATE: 0x82,
@@ -26,6 +27,7 @@ export const PacketType = {
   CMD_LOCATION_LIMIT: 0x8c,
   CMD_PAD: 0x8d,
   CMD_ERASE_PAD: 0x8e,
+  CMD_SYNC: 0x90,
 } as const;
 
 /** Bits of the stream mask. */
@@ -40,6 +42,7 @@ export const Capability = {
   SLIP: 1 << 1,
   RAW_STREAM: 1 << 2,
   TANGENTIAL: 1 << 3,
+  SYNC: 1 << 4,
 } as const;
 /** What a fingertip keeps without power. */
 export const Stored = {
@@ -270,6 +273,8 @@ export interface Info extends Header {
   prior_width_mm: number;
   /** UNCERTAIN is set where location_sd_mm is above it */
   location_limit_mm: number;
+  /** sync pin: 0 off, 1 in, 2 frame, 3 second */
+  sync: number;
   /** what the fingertip keeps without power, see below */
   stored: number;
   /** date of the calibration, Unix time */
@@ -421,7 +426,15 @@ export interface Crash extends Header {
   /** time of the end, since the start before it */
   end_us: number;
 }
-export type DevicePacket = Contact | Raw | Info | Health | Ack | Crash;
+/** An edge at the sync pin. The header's time is that of the edge. */
+export interface Sync extends Header {
+  type: 0x07;
+  /** counts the edges since the pin was set, from 1, modulo 2^32; a gap is edges that came too fast. An odd one rises */
+  number: number;
+  /** of the pin after it: 1 high, 0 low */
+  level: number;
+}
+export type DevicePacket = Contact | Raw | Info | Health | Ack | Crash | Sync;
 /** What a command carries. */
 export type Command =
   | { type: 0x80; streams: number; }
@@ -439,7 +452,8 @@ export type Command =
   | { type: 0x8b; sigma_mm: number; width_mm: number; }
   | { type: 0x8c; limit_mm: number; }
   | { type: 0x8d; pad_thickness_mm: number; pad_overhang_mm: number; pad_normal: ArrayLike<number>; pad_tangential: ArrayLike<number>; pad_spread_mm2: number; pad_spread_sd_mm2: number; pad_force_ratio: number; pad_tangential_scale: number; pad_tangential_scale_sd: number; pad_edge_ratio_x: ArrayLike<number>; pad_edge_ratio_y: ArrayLike<number>; pad_edge_gain_x: ArrayLike<number>; pad_edge_gain_y: ArrayLike<number>; pad_edge_place_x_mm: ArrayLike<number>; pad_edge_place_y_mm: ArrayLike<number>; pad_edge_pull_x_mm: ArrayLike<number>; pad_edge_pull_y_mm: ArrayLike<number>; pad_edge_force: ArrayLike<number>; pad_from_touch: number; }
-  | { type: 0x8e; };
+  | { type: 0x8e; }
+  | { type: 0x90; mode: number; };
 
 /** What people set, as they type it; in a packet a value is `per` times as much. */
 export const SETTINGS = [
@@ -451,7 +465,7 @@ export const SETTINGS = [
     command: PacketType.CMD_RATE,
     capability: 0,
     values: [
-      { field: 'rate_mHz', info: 'rate_mHz', say: 'Frame rate', per: 1000, whole: true, span: [0.1, 2000], choices: null, unlessGiven: null },
+      { field: 'rate_mHz', info: 'rate_mHz', say: 'Frame rate', per: 1000, whole: true, span: [0.1, 2000], choices: null, words: null, unlessGiven: null },
     ],
   },
   {
@@ -462,7 +476,7 @@ export const SETTINGS = [
     command: PacketType.CMD_OSR,
     capability: 0,
     values: [
-      { field: 'osr', info: 'osr', say: 'Oversampling', per: 1, whole: true, span: null, choices: [256, 512, 1024, 2048, 4096, 8192], unlessGiven: null },
+      { field: 'osr', info: 'osr', say: 'Oversampling', per: 1, whole: true, span: null, choices: [256, 512, 1024, 2048, 4096, 8192], words: null, unlessGiven: null },
     ],
   },
   {
@@ -473,7 +487,7 @@ export const SETTINGS = [
     command: PacketType.CMD_SLIP,
     capability: Capability.SLIP,
     values: [
-      { field: 'threshold_mm', info: 'slip_threshold_mm', say: 'Slip threshold', per: 1, whole: false, span: [0.01, 50], choices: null, unlessGiven: null },
+      { field: 'threshold_mm', info: 'slip_threshold_mm', say: 'Slip threshold', per: 1, whole: false, span: [0.01, 50], choices: null, words: null, unlessGiven: null },
     ],
   },
   {
@@ -484,7 +498,7 @@ export const SETTINGS = [
     command: PacketType.CMD_SLIP,
     capability: Capability.SLIP,
     values: [
-      { field: 'window_ms', info: 'slip_window_ms', say: 'Slip window', per: 1, whole: true, span: [5, 1000], choices: null, unlessGiven: null },
+      { field: 'window_ms', info: 'slip_window_ms', say: 'Slip window', per: 1, whole: true, span: [5, 1000], choices: null, words: null, unlessGiven: null },
     ],
   },
   {
@@ -495,8 +509,8 @@ export const SETTINGS = [
     command: PacketType.CMD_PRIOR,
     capability: Capability.FIT,
     values: [
-      { field: 'sigma_mm', info: 'prior_sigma_mm', say: 'Prior', per: 1, whole: false, span: [0.5, 100], choices: null, unlessGiven: null },
-      { field: 'width_mm', info: 'prior_width_mm', say: "The prior's width", per: 1, whole: false, span: [0.01, 100], choices: null, unlessGiven: 0.5 },
+      { field: 'sigma_mm', info: 'prior_sigma_mm', say: 'Prior', per: 1, whole: false, span: [0.5, 100], choices: null, words: null, unlessGiven: null },
+      { field: 'width_mm', info: 'prior_width_mm', say: "The prior's width", per: 1, whole: false, span: [0.01, 100], choices: null, words: null, unlessGiven: 0.5 },
     ],
   },
   {
@@ -507,7 +521,18 @@ export const SETTINGS = [
     command: PacketType.CMD_LOCATION_LIMIT,
     capability: Capability.FIT,
     values: [
-      { field: 'limit_mm', info: 'location_limit_mm', say: 'Location limit', per: 1, whole: false, span: [0.01, 100], choices: null, unlessGiven: null },
+      { field: 'limit_mm', info: 'location_limit_mm', say: 'Location limit', per: 1, whole: false, span: [0.01, 100], choices: null, words: null, unlessGiven: null },
+    ],
+  },
+  {
+    name: 'sync',
+    label: 'Sync pin',
+    hint: 'in: stamp its edges; frame, second: pulse at each frame or second',
+    zeros: 'off',
+    command: PacketType.CMD_SYNC,
+    capability: Capability.SYNC,
+    values: [
+      { field: 'mode', info: 'sync', say: 'Sync pin', per: 1, whole: true, span: null, choices: [1, 2, 3], words: ['in', 'frame', 'second'], unlessGiven: null },
     ],
   },
 ] as const;

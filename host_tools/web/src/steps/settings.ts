@@ -8,18 +8,34 @@ type Setting = (typeof SETTINGS)[number];
 type Name = Setting['name'];
 type Value = Setting['values'][number];
 
+/** Of a choice, as people type it. */
+function wordOf({ choices, words }: Value, number: number): string {
+  const at = (choices as readonly number[] | null)?.indexOf(number) ?? -1;
+  return words?.[at] ?? String(number);
+}
+
 /** How it is now, as people type it. */
 function textOf(setting: Setting, info: Info): string {
   const numbers = setting.values.map((value) => info[value.info]);
   return numbers.at(-1) === 0 && setting.zeros !== null
     ? setting.zeros
     : setting.values
-        .map(({ per, whole }, i) => (whole ? String(numbers[i]! / per) : core.shortest(numbers[i]!)))
+        .map((value, i) => {
+          const number = numbers[i]! / value.per;
+          return value.whole ? wordOf(value, number) : core.shortest(number);
+        })
         .join(':');
 }
 
 /** In the packet's unit. */
 function numberIn(value: Value, text: string): number {
+  if (value.words) {
+    const at = (value.words as readonly string[]).indexOf(text);
+    if (at < 0) {
+      throw new Error(`${value.say}: "${text}" is none of ${value.words.join(', ')}`);
+    }
+    return value.choices[at]!;
+  }
   const isNumber = value.whole && value.per === 1 ? /^\d+$/.test(text) : text.trim() !== '';
   const number = isNumber ? Number(text) : NaN;
   if (value.choices) {
@@ -72,9 +88,14 @@ export function settings(fingertip: Fingertip): void {
     if (capability && !(info.capabilities & capability)) {
       continue;
     }
-    const { choices } = setting.values[0];
-    const input = choices
-      ? make('select', { name }, ...choices.map((each) => make('option', {}, String(each))))
+    const [value] = setting.values;
+    const input = value.choices
+      ? make(
+          'select',
+          { name },
+          ...(setting.zeros === null ? [] : [make('option', {}, setting.zeros)]),
+          ...value.choices.map((each) => make('option', {}, wordOf(value, each))),
+        )
       : make('input', { name, autocomplete: 'off' });
     inputs.set(name, input);
     form.append(field(label, input, hint));

@@ -51,6 +51,7 @@ static struct store_settings settings_of(uint32_t number) {
   }
   memcpy(bytes, &number, sizeof number);
   memcpy(&settings, bytes, sizeof settings);
+  settings.sync &= UINT8_MAX; /* so much is stored */
   return settings;
 }
 

@@ -1,0 +1,21 @@
+/* port/sync.h on the host: edges come from the test, and pulses go nowhere. */
+#ifndef NATIVE_NATIVE_SYNC_H
+#define NATIVE_NATIVE_SYNC_H
+
+#include "port/sync.h"
+
+/* Start-up: the pin is off, and no edge waits. */
+void native_sync_reset(void);
+
+/* The pin changes now, if its edges are stamped; else nobody notices. */
+void native_sync_edge(void);
+
+enum port_sync native_sync_mode(void);
+
+/* As port_sync_write() left it. */
+bool native_sync_level(void);
+
+/* Rises of it since start-up. */
+unsigned native_sync_pulses(void);
+
+#endif

@@ -1,0 +1,18 @@
+/* Sections that no interrupt cuts (ARMv6-M B1.4.3, PRIMASK). */
+#ifndef RP2040_INTERRUPTS_H
+#define RP2040_INTERRUPTS_H
+
+#include <stdint.h>
+
+static inline uint32_t disable_interrupts(void) {
+  uint32_t primask;
+  __asm volatile("mrs %0, primask\n cpsid i" : "=r"(primask)::"memory");
+  return primask;
+}
+
+/* As they were before. */
+static inline void restore_interrupts(uint32_t primask) {
+  __asm volatile("msr primask, %0" ::"r"(primask) : "memory");
+}
+
+#endif
