@@ -90,7 +90,8 @@ def main(argv):
     t_s, truth_s = grip["time_us"] / 1e6, (truth["time_us"] - int(zero.split()[-1])) / 1e6
     slips = slips_of(truth, truth_s)
     figure = draw(grip, t_s, truth, truth_s, slips)
-    peak = f"peak force {truth['peak_N'].max():.1f} N"
+    need_N = truth["least_N"].max()
+    peak = f"peak force {truth['peak_N'].max():.1f} N" + (f", {truth['peak_N'].max() / need_N:.1f} times the need" if need_N > 0 else "")
     if truth["dropped"].max() > 0:
         told = f"dropped after it slid by {truth['slid_mm'].max():.1f} mm; {peak}"
     elif slips:

@@ -65,15 +65,10 @@ std::array<DeviceNews, GraspLoop::FINGERS> GraspLoop::meet(const std::function<b
 }
 
 void GraspLoop::begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen,
-                      const grip_settings &settings) {
-  const grip_traits traits = core_traits(gripper->traits());
-  if (grip_init(&core_, &settings, &traits) != FT_OK) {
-    throw Error(ErrorCode::bad_value, "these limits do not go with a gripper " +
-                                          gripper->traits().model + ", or contradict one another");
-  }
+                      const GripSettings &settings) {
   status_ = gripper->poll();
-  const grip_status first = core_status(*status_);
-  grip_take_status(&core_, &first);
+  core_.emplace(settings, gripper->traits());
+  core_->take(*status_);
   gripper_ = std::make_unique<GripperThread>(std::move(gripper), std::move(reopen));
   for (DeviceNews &news : early_) {
     put({Kind::device, steady_now_us(), std::move(news)});
@@ -85,9 +80,9 @@ void GraspLoop::begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen,
   thread_ = Thread([this] { run(); });
 }
 
-bool GraspLoop::request(enum grip_request wanted) {
+bool GraspLoop::request(GripRequest wanted) {
   std::lock_guard lock(core_mutex_);
-  return grip_request(&core_, wanted);
+  return core_->request(wanted);
 }
 
 std::vector<GraspNews> GraspLoop::take(milliseconds timeout) {
@@ -156,9 +151,9 @@ void GraspLoop::take_devices() {
   for (DeviceNews &news : feed_.take(STEP)) {
     if (news.kind == DeviceNews::Kind::packet && news.packet.type == WIRE_CONTACT) {
       const double now_us = static_cast<double>(steady_now_us());
-      const grip_touch touch = touch_from_packet(news.packet, std::min(news.host_us, now_us));
+      const GripTouch touch = touch_from_packet(news.packet, std::min(news.host_us, now_us));
       std::lock_guard lock(core_mutex_);
-      grip_take_touch(&core_, static_cast<unsigned>(news.device), &touch);
+      core_->take(news.device, touch);
     }
     running_ -= news.kind == DeviceNews::Kind::ended;
     put({Kind::device, steady_now_us(), std::move(news)});
@@ -170,9 +165,8 @@ void GraspLoop::take_gripper() {
     if (news.status) {
       status_ = news.status;
       fault_text_ = status_->fault != 0 ? news.trouble : fault_text_;
-      const grip_status status = core_status(*status_);
       std::lock_guard lock(core_mutex_);
-      grip_take_status(&core_, &status);
+      core_->take(*status_);
     }
     if (news.trouble != gripper_trouble_) {
       gripper_trouble_ = news.trouble;
@@ -193,7 +187,7 @@ void GraspLoop::step() {
   GraspNews news{Kind::step, steady_now_us()};
   {
     std::lock_guard lock(core_mutex_);
-    grip_step(&core_, static_cast<std::uint64_t>(news.host_us), &news.command, &news.report);
+    news.report = core_->step(1e-6 * static_cast<double>(news.host_us), news.command);
   }
   /* Begun once it goes on, whatever the fingers touch on their way. */
   is_activating_ = news.report.state == GRIP_ACTIVATING && options_.activate &&

@@ -20,7 +20,7 @@
 // the last commanded width, some tenths of a millimetre away, and stays.
 #pragma once
 
-#include "grasp/core.hpp"
+#include "grasp/control/grip.hpp"
 #include "grasp/gripper_thread.hpp"
 #include "libfingertip/clock.hpp"
 #include "libfingertip/device_loop.hpp"
@@ -51,8 +51,8 @@ struct GraspNews {
   Kind kind;
   std::int64_t host_us = 0;
   std::optional<DeviceNews> device = {};
-  grip_command command = {};
-  grip_report report = {};
+  GripCommand command = {};
+  GripReport report = {};
   std::optional<GripperStatus> status = {}; // the newest answer
   std::string text = {};
   std::uint64_t count = 0;
@@ -88,10 +88,10 @@ public:
   std::array<DeviceNews, FINGERS> meet(const std::function<bool()> &stop);
 
   // Fingertips stream, the core steps; nothing moves before it is requested. Throws Error where the
-  // settings are out of range for this gripper, and where it does not answer.
-  void begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen, const grip_settings &settings);
+  // gripper does not answer.
+  void begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen, const GripSettings &settings);
   // False: not from this state.
-  bool request(enum grip_request wanted);
+  bool request(GripRequest wanted);
   // All there is, waiting at most this long for the first.
   std::vector<GraspNews> take(std::chrono::milliseconds timeout);
   // The width stays, streams end; news come until the one of kind ended.
@@ -115,13 +115,13 @@ private:
   std::size_t running_ = FINGERS;
 
   mutable std::mutex core_mutex_; // of the core
-  grip core_{};
+  std::optional<Grip> core_;
 
   std::unique_ptr<GripperThread> gripper_;
   std::optional<GripperStatus> status_;
   std::string gripper_trouble_;
   std::string fault_text_; // of the newest answer with a fault
-  grip_report report_{}; // of the last step
+  GripReport report_{}; // of the last step
   bool is_activating_ = false;
   unsigned interrupts_ = 0;
   std::atomic<bool> end_{false}, abandoned_{false};

@@ -14,7 +14,7 @@ namespace {
 // One walk serves the header, the rows and the reader. The order is that of the columns; a status
 // that is not there leaves its cells empty.
 template <typename Visitor> void visit(Visitor &visitor, GripRow &row, GripperStatus *status) {
-  grip_report &report = row.report;
+  GripReport &report = row.report;
   visitor.state("state", report.state);
   visitor.trouble("trouble", report.trouble);
   visitor.number("width_mm", status ? &status->width_mm : nullptr, 3);
@@ -25,14 +25,15 @@ template <typename Visitor> void visit(Visitor &visitor, GripRow &row, GripperSt
   visitor.number("current_A", status ? &status->current_A : nullptr, 3);
   visitor.integer("status_us", status ? &status->host_us : nullptr);
   visitor.integer("motion", &row.command.motion);
-  visitor.thousandths("command_mm", row.command.width_um);
-  visitor.thousandths("command_mm_s", row.command.speed_um_s);
-  visitor.thousandths("command_N", row.command.force_mN);
-  visitor.thousandths("wanted_N", report.wanted_mN);
-  visitor.thousandths("force_N", report.force_mN);
-  visitor.thousandths("load_N", report.load_mN);
-  visitor.thousandths("margin", report.margin_permille);
-  visitor.thousandths("friction", report.friction_permille);
+  visitor.thousandths("command_mm", row.command.width_mm);
+  visitor.thousandths("command_mm_s", row.command.speed_mm_s);
+  visitor.thousandths("command_N", row.command.force_N);
+  visitor.thousandths("wanted_N", report.wanted_N);
+  visitor.thousandths("force_N", report.force_N);
+  visitor.thousandths("load_N", report.load_N);
+  visitor.thousandths("margin", report.margin);
+  visitor.thousandths("friction", report.friction);
+  visitor.thousandths("delay_s", report.delay_s);
   visitor.integer("slides", &report.slides);
 }
 
@@ -45,7 +46,7 @@ struct Namer {
   void flag(const char *name, const bool *) { put(name); }
   void object(const char *name, const std::optional<bool> *) { put(name); }
   template <typename Integer> void integer(const char *name, const Integer *) { put(name); }
-  void thousandths(const char *name, std::int32_t) { put(name); }
+  void thousandths(const char *name, double) { put(name); }
 };
 
 struct Writer {
@@ -67,7 +68,7 @@ struct Writer {
   template <typename Integer> void integer(const char *, const Integer *value) {
     put(value ? std::to_string(*value) : "");
   }
-  void thousandths(const char *, std::int32_t value) { put(fixed(value / 1e3, 3)); }
+  void thousandths(const char *, double value) { put(fixed(value, 3)); }
 };
 
 struct Reader {
@@ -137,13 +138,13 @@ struct Reader {
       }
     }
   }
-  void thousandths(const char *name, std::int32_t &value) {
+  void thousandths(const char *name, double &value) {
     const auto cell = next();
     const auto read = to_double(cell);
-    if (!read || std::fabs(*read) > 2.1e6) {
+    if (!read || !std::isfinite(*read)) {
       wrong(name, cell);
     }
-    value = static_cast<std::int32_t>(std::lround(1e3 * *read));
+    value = *read;
   }
 };
 
@@ -194,8 +195,7 @@ GripRow grip_row(std::string_view value) {
   Reader reader{cells};
   visit(reader, row, row.status ? &*row.status : nullptr);
   row.report.gripper_fault = row.status ? row.status->fault : 0;
-  row.report.width_um =
-      row.status ? static_cast<std::int32_t>(std::lround(1e3 * row.status->width_mm)) : 0;
+  row.report.width_mm = row.status ? row.status->width_mm : 0.0;
   return row;
 }
 

@@ -13,11 +13,11 @@
 // - width_mm, moving, object (-1: unknown), active, fault and current_A: the gripper's answer at
 //   status_us. Before its first answer status_us is empty. The fault that led to state fault stays.
 // - motion: 0 stay, 1 activate, 2 move. command_*: of move.
-// - Forces are of one fingertip. margin: 0 without a load. slides: counted since the grasp began.
+// - Forces are of one fingertip. margin: 0 without a load. delay_s: from a fingertip's measurement
+//   to the controller, the later of both. slides: counted since the grasp began.
 #pragma once
 
-#include "grasp/core.hpp"
-#include "grasp/gripper/gripper.hpp"
+#include "grasp/control/grip.hpp"
 #include "libfingertip/line_source.hpp"
 
 #include <cstdint>
@@ -33,8 +33,8 @@ inline constexpr const char *GRIP_EVENT_KEY = "grip_event";
 
 struct GripRow {
   double time_us = 0; // from the recording's zero
-  grip_report report{};
-  grip_command command{};
+  GripReport report{};
+  GripCommand command{};
   std::optional<GripperStatus> status; // host_us from the recording's zero too
 };
 

@@ -18,10 +18,10 @@ constexpr std::int64_t REOPEN_us = 200000;
 // Answers that are not taken: some seconds of them.
 constexpr std::size_t MOST_NEWS = 2000;
 
-bool is_same(const grip_command &a, const grip_command &b) {
+bool is_same(const GripCommand &a, const GripCommand &b) {
   return a.motion == b.motion &&
          (a.motion != GRIP_MOVE ||
-          (a.width_um == b.width_um && a.speed_um_s == b.speed_um_s && a.force_mN == b.force_mN));
+          (a.width_mm == b.width_mm && a.speed_mm_s == b.speed_mm_s && a.force_N == b.force_N));
 }
 
 std::string trouble_of(const Gripper &gripper, const GripperStatus &status) {
@@ -47,7 +47,7 @@ GripperThread::~GripperThread() {
   thread_.join();
 }
 
-void GripperThread::command(const grip_command &command) {
+void GripperThread::command(const GripCommand &command) {
   std::lock_guard lock(mutex_);
   if (!is_same(command, command_)) {
     command_ = command;
@@ -74,7 +74,7 @@ void GripperThread::put(News news) {
 }
 
 GripperStatus GripperThread::exchange() {
-  grip_command command{};
+  GripCommand command{};
   std::uint64_t number = 0;
   bool is_new = false;
   {
@@ -87,7 +87,7 @@ GripperStatus GripperThread::exchange() {
     gripper_->activate();
   }
   const GripperStatus status = is_new && command.motion == GRIP_MOVE
-                                   ? gripper_->move(gripper_move(command))
+                                   ? gripper_->move(command)
                                    : gripper_->poll();
   std::lock_guard lock(mutex_);
   sent_ = number;

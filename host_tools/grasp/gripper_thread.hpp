@@ -4,7 +4,7 @@
 // nothing without a command, and sends nothing that the core did not command.
 #pragma once
 
-#include "grasp/core.hpp"
+#include "grasp/control/grip.hpp"
 #include "grasp/gripper/gripper.hpp"
 #include "libfingertip/clock.hpp"
 
@@ -37,7 +37,7 @@ public:
   GripperThread(const GripperThread &) = delete;
   GripperThread &operator=(const GripperThread &) = delete;
 
-  void command(const grip_command &command);
+  void command(const GripCommand &command);
   std::deque<News> take();
   // The newest command has been sent and answered.
   bool is_done() const;
@@ -54,7 +54,7 @@ private:
   mutable std::mutex mutex_;
   Wake ended_;
   bool end_ = false;
-  grip_command command_{};
+  GripCommand command_{};
   std::uint64_t number_ = 0, sent_ = 0; // of commands that differ
   std::deque<News> news_;
   std::string told_;

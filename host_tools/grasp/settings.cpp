@@ -1,115 +1,116 @@
 #include "grasp/settings.hpp"
 
-#include "grasp/convert.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/text.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace fingertip {
 
 namespace {
 
-using S = grip_settings;
+using S = GripSettings;
 
 constexpr const char *FIXED = "fixed";
 
-GraspSetting number(const char *name, const char *unit, double low, double high, double scale,
-                    std::int32_t &(*field)(S &), const char *help) {
-  return {name, unit, low, high, scale, field, nullptr, help};
-}
+// A breaking force as shares of itself: no closer, for pads differ and forces are known to a tenth.
+constexpr double CAP = 0.8, START = 0.33, FLOOR = 0.25;
+constexpr double GENTLE_mm_s = 4.0; // approach to what breaks
 
-GraspSetting time(const char *name, const char *unit, double low, double high, double scale,
-                  std::uint32_t &(*field)(S &), const char *help) {
-  return {name, unit, low, high, scale, nullptr, field, help};
+// Force of the stiffest contact that is expected, at 1 mm of indentation, and its power.
+constexpr double STIFF_N = 5.0, STIFF_POWER = 1.4;
+
+[[noreturn]] void impossible(const std::string &text) {
+  throw Error(ErrorCode::bad_value, text);
 }
 
 } // namespace
 
-// The ranges are grip_init's.
 const std::vector<GraspSetting> &grasp_settings() {
   static const std::vector<GraspSetting> all = {
-      number(
-          FIXED, "N", 0.1, 100, 1e3, [](S &s) -> std::int32_t & { return s.set_mN; },
-          "Hold this force; default: as much as the load needs"),
-      number(
-          "cap", "N", 0.5, 100, 1e3, [](S &s) -> std::int32_t & { return s.force_cap_mN; },
-          "Never aim at more force"),
-      number(
-          "travel-cap", "mm", 0.5, 100, 1e3, [](S &s) -> std::int32_t & { return s.travel_cap_um; },
-          "Never close further since the touch"),
-      number(
-          "first", "N", 0.2, 100, 1e3, [](S &s) -> std::int32_t & { return s.first_mN; },
-          "Force before anything pulls, and the least force"),
-      number(
-          "blind", "N", 0.2, 100, 1e3, [](S &s) -> std::int32_t & { return s.blind_mN; },
-          "Force where no load can be estimated"),
-      number(
-          "shift", "mm", 0, 20, 1e3, [](S &s) -> std::int32_t & { return s.shift_um; },
-          "How far a load as large as the force moves a long contact's location"),
-      number(
-          "friction", "", 0.1, 1.5, 1e3, [](S &s) -> std::int32_t & { return s.friction_permille; },
-          "Friction coefficient to begin with"),
-      number(
-          "margin", "", 1, 5, 1e3, [](S &s) -> std::int32_t & { return s.margin_permille; },
-          "Force divided by load / friction"),
-      number(
-          "slid", "", 1, 3, 1e3, [](S &s) -> std::int32_t & { return s.slid_permille; },
-          "Factor on that once the object has slid"),
-      number(
-          "decay", "%/s", 0, 500, 10, [](S &s) -> std::int32_t & { return s.decay_permille_s; },
-          "How fast an excess of force decays"),
-      time(
-          "rest", "s", 0, 60, 1e6, [](S &s) -> std::uint32_t & { return s.rest_us; },
-          "No decay for so long after a slide"),
-      number(
-          "touch", "N", 0.02, 2, 1e3, [](S &s) -> std::int32_t & { return s.touch_mN; },
-          "Force at which a touch begins"),
-      number(
-          "approach", "mm/s", 0.5, 8, 1e3, [](S &s) -> std::int32_t & { return s.approach_um_s; },
-          "Speed until the touch"),
-      number(
-          "release", "mm/s", 0.5, 100, 1e3, [](S &s) -> std::int32_t & { return s.release_um_s; },
-          "Speed of opening"),
-      number(
-          "open-width", "mm", 0, 500, 1e3,
-          [](S &s) -> std::int32_t & { return s.release_width_um; }, "How far to open"),
-      time(
-          "stale", "ms", 5, 1000, 1e3, [](S &s) -> std::uint32_t & { return s.stale_us; },
-          "Ignore a fingertip that is silent for so long"),
-      time(
-          "silent", "ms", 20, 5000, 1e3, [](S &s) -> std::uint32_t & { return s.silent_us; },
-          "Timeout of the gripper"),
-      number(
-          "differ", "%", 5, 100, 10, [](S &s) -> std::int32_t & { return s.differ_permille; },
-          "Warn if the fingertips' forces differ by more"),
-      number(
-          "kp", "um/N", 0, 10000, 1, [](S &s) -> std::int32_t & { return s.gains.kp_um_per_N; },
-          "With --fixed: the published controller's proportional gain"),
-      number(
-          "ki", "um/(N s)", 0, 100000, 1,
-          [](S &s) -> std::int32_t & { return s.gains.ki_um_per_Ns; }, "Its gain of the integral"),
-      number(
-          "kd", "um s/N", 0, 10000, 1, [](S &s) -> std::int32_t & { return s.gains.kd_um_s_per_N; },
-          "Its gain of the derivative"),
-      time(
-          "control", "ms", 0.5, 1000, 1e3, [](S &s) -> std::uint32_t & { return s.control_us; },
-          "Time between two of its steps"),
+      {FIXED, "N", 0.1, 100, 1, [](S &s) -> double & { return s.set_N; },
+       "Hold this force; default: as much as the load needs"},
+      {"cap", "N", 0.5, 100, 1, [](S &s) -> double & { return s.cap_N; },
+       "The true force stays below, errors of the fingertips included"},
+      {"travel-cap", "mm", 0.5, 100, 1, [](S &s) -> double & { return s.travel_cap_mm; },
+       "Never close further since the touch"},
+      {"start", "N", 0.2, 100, 1, [](S &s) -> double & { return s.start_N; },
+       "Force before anything pulls"},
+      {"floor", "N", 0.2, 100, 1, [](S &s) -> double & { return s.floor_N; },
+       "Least force once the load is known"},
+      {"blind", "N", 0.2, 100, 1, [](S &s) -> double & { return s.blind_N; },
+       "Force where no load can be estimated"},
+      {"friction", "", 0.1, 1.5, 1, [](S &s) -> double & { return s.friction; },
+       "Friction coefficient to begin with"},
+      {"margin", "", 1, 5, 1, [](S &s) -> double & { return s.margin; },
+       "Force divided by load / friction"},
+      {"slid", "", 1, 3, 1, [](S &s) -> double & { return s.slid; },
+       "Factor on that once the object has slid"},
+      {"decay", "%/s", 0, 2000, 0.01, [](S &s) -> double & { return s.decay_1_s; },
+       "How fast an excess of force decays"},
+      {"rest", "s", 0, 60, 1, [](S &s) -> double & { return s.rest_s; },
+       "No decay for so long after a slide"},
+      {"touch", "N", 0.02, 2, 1, [](S &s) -> double & { return s.touch_N; },
+       "Force at which a touch begins"},
+      {"approach", "mm/s", 0.5, 8, 1, [](S &s) -> double & { return s.approach_mm_s; },
+       "Speed until the touch; slower where frames come late"},
+      {"release", "mm/s", 0.5, 100, 1, [](S &s) -> double & { return s.release_mm_s; },
+       "Speed of opening"},
+      {"open-width", "mm", 0, 500, 1, [](S &s) -> double & { return s.release_width_mm; },
+       "How far to open"},
+      {"stale", "ms", 5, 1000, 1e-3, [](S &s) -> double & { return s.stale_s; },
+       "Ignore a fingertip without a new frame for so long"},
+      {"late", "ms", 5, 500, 1e-3, [](S &s) -> double & { return s.late_s; },
+       "Say so if frames are older than that when they come"},
+      {"silent", "ms", 20, 5000, 1e-3, [](S &s) -> double & { return s.silent_s; },
+       "Timeout of the gripper"},
+      {"differ", "%", 5, 100, 0.01, [](S &s) -> double & { return s.differ; },
+       "Warn if the fingertips' forces differ by more at rest"},
+      {"kp", "um/N", 0, 10000, 1e-3, [](S &s) -> double & { return s.gains.kp_mm_N; },
+       "With --fixed: the published controller's proportional gain"},
+      {"ki", "um/(N s)", 0, 100000, 1e-3, [](S &s) -> double & { return s.gains.ki_mm_Ns; },
+       "Its gain of the integral"},
+      {"kd", "um s/N", 0, 10000, 1e-3, [](S &s) -> double & { return s.gains.kd_mm_s_N; },
+       "Its gain of the derivative"},
+      {"control", "ms", 0.5, 1000, 1e-3, [](S &s) -> double & { return s.control_s; },
+       "Time between two of its steps"},
   };
   return all;
 }
 
-double value_of(const GraspSetting &setting, grip_settings settings) {
-  return (setting.number ? static_cast<double>(setting.number(settings))
-                         : static_cast<double>(setting.time(settings))) /
-         setting.scale;
+double value_of(const GraspSetting &setting, GripSettings settings) {
+  return setting.field(settings) / setting.scale;
 }
 
-grip_settings settings_for(const GripperTraits &traits,
-                           const std::map<std::string, double> &wanted) {
-  const grip_traits core = core_traits(traits);
-  grip_settings settings{};
-  grip_default_settings(&settings, &core);
+const std::vector<GraspPreset> &grasp_presets() {
+  static const std::vector<GraspPreset> all = {
+      {"egg", 25.0}, {"strawberry", 5.0}, {"cup", 3.0}, {"crisp", 1.5}};
+  return all;
+}
+
+std::map<std::string, double> breaking_values(double breaks_N) {
+  const S usual;
+  return {{"cap", std::min(CAP * breaks_N, usual.cap_N)},
+          {"start", std::min(START * breaks_N, usual.start_N)},
+          {"floor", std::min(FLOOR * breaks_N, usual.floor_N)},
+          {"approach", GENTLE_mm_s}};
+}
+
+std::map<std::string, double> preset_values(const std::string &preset) {
+  std::string names;
+  for (const GraspPreset &one : grasp_presets()) {
+    if (preset == one.name) {
+      return breaking_values(one.breaks_N);
+    }
+    names += std::string(names.empty() ? "" : ", ") + one.name;
+  }
+  impossible("no preset " + printable(preset) + "; there are " + names);
+}
+
+GripSettings settings_for(const GripperTraits &traits,
+                          const std::map<std::string, double> &wanted) {
+  GripSettings settings = default_settings(traits);
   settings.mode = wanted.count(FIXED) != 0 ? GRIP_MODE_FIXED : GRIP_MODE_HOLD;
   for (const GraspSetting &setting : grasp_settings()) {
     const auto value = wanted.find(setting.name);
@@ -117,45 +118,43 @@ grip_settings settings_for(const GripperTraits &traits,
       continue;
     }
     if (!(value->second >= setting.low && value->second <= setting.high)) {
-      throw Error(ErrorCode::bad_value, "--" + std::string(setting.name) +
-                                            " is not possible; give " +
-                                            shortest(static_cast<float>(setting.low)) + " to " +
-                                            shortest(static_cast<float>(setting.high)) +
-                                            (*setting.unit ? " " : "") + setting.unit);
+      impossible("--" + std::string(setting.name) + " is not possible; give " +
+                 shortest(static_cast<float>(setting.low)) + " to " +
+                 shortest(static_cast<float>(setting.high)) + (*setting.unit ? " " : "") +
+                 setting.unit);
     }
-    const double scaled = std::round(value->second * setting.scale);
-    if (setting.number) {
-      setting.number(settings) = static_cast<std::int32_t>(scaled);
-    } else {
-      setting.time(settings) = static_cast<std::uint32_t>(scaled);
-    }
+    setting.field(settings) = value->second * setting.scale;
   }
-  const auto follow = [&](const char *name, std::int32_t &field, std::int32_t low,
-                          std::int32_t high, const std::string &limit) {
-    if (field >= low && field <= high) {
-      return;
+  const auto follow = [&](const char *name, double &field, double low, double high,
+                          const std::string &limit) {
+    if (field < low || field > high) {
+      if (wanted.count(name) != 0) {
+        impossible("--" + std::string(name) + " is not possible; " + limit);
+      }
+      field = std::clamp(field, low, high); // a default gives way to what was asked for
     }
-    if (wanted.count(name) != 0) {
-      throw Error(ErrorCode::bad_value, "--" + std::string(name) + " is not possible; " + limit);
-    }
-    field = field < low ? low : high; // a default gives way to what was asked for
   };
-  follow("open-width", settings.release_width_um, 0, core.stroke_um,
+  const double cap_N = settings.cap_N;
+  follow("open-width", settings.release_width_mm, 0.0, traits.stroke_mm,
          traits.model + " opens to " + fixed(traits.stroke_mm, 1) + " mm");
-  const std::int32_t cap_mN = settings.force_cap_mN;
-  follow(FIXED, settings.set_mN, 100, cap_mN, "it is above --cap");
-  follow("first", settings.first_mN, 200, cap_mN, "it is above --cap");
-  follow("blind", settings.blind_mN, settings.first_mN, cap_mN,
-         "it must lie between --first and --cap");
-  grip checked;
-  if (grip_init(&checked, &settings, &core) != FT_OK) {
-    throw Error(ErrorCode::bad_value,
-                "these limits do not go with a gripper " + traits.model + ", or with one another");
+  follow(FIXED, settings.set_N, 0.0, cap_N, "it is above --cap");
+  follow("start", settings.start_N, 0.0, cap_N, "it is above --cap");
+  follow("floor", settings.floor_N, 0.0, cap_N, "it is above --cap");
+  follow("blind", settings.blind_N, settings.start_N, cap_N,
+         "it must lie between --start and --cap");
+  const double least_mm =
+      traits.step_mm *
+      std::max(1.0, std::ceil(traits.deadband_mm / std::max(traits.step_mm, 1e-6) - 1e-9));
+  const double step_N = STIFF_N * std::pow(0.5 * least_mm, STIFF_POWER);
+  if (step_N > cap_N) {
+    impossible("the least move of a " + traits.model + ", " + fixed(least_mm, 2) +
+               " mm, may press with " + fixed(step_N, 1) + " N, and the cap is " +
+               fixed(cap_N, 1) + " N; take a gripper of finer steps, or a higher --cap");
   }
   return settings;
 }
 
-Metadata settings_metadata(const grip_settings &settings) {
+Metadata settings_metadata(const GripSettings &settings) {
   Metadata all = {{"grasp_mode", settings.mode == GRIP_MODE_FIXED ? "fixed" : "hold"}};
   for (const GraspSetting &setting : grasp_settings()) {
     std::string key = std::string("grasp_") + setting.name;

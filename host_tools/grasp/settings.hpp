@@ -1,11 +1,10 @@
-// Every limit of the core's settings as an option of a command line, with its unit and its range.
+// Every limit of the controller's settings as an option of a command line, with its unit and its
+// range, and presets of them.
 #pragma once
 
-#include "grasp/core.hpp"
-#include "grasp/gripper/gripper.hpp"
+#include "grasp/control/settings.hpp"
 #include "libfingertip/packet_fields.hpp"
 
-#include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
@@ -17,22 +16,31 @@ struct GraspSetting {
   const char *unit; // "" for a ratio
   double low, high;
   double scale; // field = value * scale
-  // One of both.
-  std::int32_t &(*number)(grip_settings &settings);
-  std::uint32_t &(*time)(grip_settings &settings);
+  double &(*field)(GripSettings &settings);
   const char *help;
 };
 
 const std::vector<GraspSetting> &grasp_settings();
 
-double value_of(const GraspSetting &setting, grip_settings settings);
+double value_of(const GraspSetting &setting, GripSettings settings);
+
+// What an object is like: the force that breaks it.
+struct GraspPreset {
+  const char *name;
+  double breaks_N;
+};
+const std::vector<GraspPreset> &grasp_presets();
+// Of it: cap, start and floor well below that force, and a slow approach. Throws Error, bad_value:
+// there is none.
+std::map<std::string, double> preset_values(const std::string &preset);
+std::map<std::string, double> breaking_values(double breaks_N);
 
 // Defaults of this gripper, overridden by the wanted values, by name. "fixed" chooses that mode.
-// Throws Error, code bad_value: a value out of range, or one that contradicts another.
-grip_settings settings_for(const GripperTraits &traits,
-                           const std::map<std::string, double> &wanted);
+// Throws Error, code bad_value: a value out of range, or one that contradicts another; a gripper
+// one of whose steps may exceed the cap.
+GripSettings settings_for(const GripperTraits &traits, const std::map<std::string, double> &wanted);
 
 // For a recording's head: grasp_mode, grasp_touch_N, ...
-Metadata settings_metadata(const grip_settings &settings);
+Metadata settings_metadata(const GripSettings &settings);
 
 } // namespace fingertip

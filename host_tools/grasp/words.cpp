@@ -26,7 +26,7 @@ constexpr State STATES[GRIP_STATES] = {
 };
 
 struct Trouble {
-  grip_trouble bit;
+  GripTrouble bit;
   const char *name, *text;
 };
 constexpr Trouble TROUBLES[] = {
@@ -47,6 +47,8 @@ constexpr Trouble TROUBLES[] = {
     {GRIP_NO_LOAD, "no_load", "no load can be estimated"},
     {GRIP_FINGER_0_UNTOLD, "finger_0_untold", "left: no force can be estimated"},
     {GRIP_FINGER_1_UNTOLD, "finger_1_untold", "right: no force can be estimated"},
+    {GRIP_FINGER_0_LATE, "finger_0_late", "left: late"},
+    {GRIP_FINGER_1_LATE, "finger_1_late", "right: late"},
 };
 
 } // namespace
@@ -97,12 +99,20 @@ std::optional<std::uint32_t> trouble_of_names(std::string_view names) {
   return trouble;
 }
 
-std::vector<std::string> trouble_texts(std::uint32_t trouble) {
+std::vector<std::string> trouble_texts(const GripReport &report) {
   std::vector<std::string> texts;
   for (const Trouble &each : TROUBLES) {
-    if ((trouble & each.bit) != 0) {
-      texts.emplace_back(each.text);
+    if ((report.trouble & each.bit) == 0) {
+      continue;
     }
+    std::string text = each.text;
+    if (each.bit == GRIP_FINGERS_DIFFER) {
+      text += ", " + fixed(report.felt_N[0], 1) + " and " + fixed(report.felt_N[1], 1) +
+              " N: let the object move freely between them, or fingertip calibrate";
+    } else if (each.bit == GRIP_FINGER_0_LATE || each.bit == GRIP_FINGER_1_LATE) {
+      text += " by " + fixed(1e3 * report.delay_s, 0) + " ms";
+    }
+    texts.push_back(text);
   }
   return texts;
 }

@@ -1,7 +1,7 @@
 // The core's states and troubles as words: short ones for recordings, sentences for people.
 #pragma once
 
-#include "grasp/core.hpp"
+#include "grasp/control/grip.hpp"
 
 #include <cstdint>
 #include <optional>
@@ -23,7 +23,8 @@ bool is_end_state(std::uint8_t state);
 std::string trouble_names(std::uint32_t trouble);
 // Nothing where a word is none of them.
 std::optional<std::uint32_t> trouble_of_names(std::string_view names);
-// One for each bit; finger 0 is called left, 1 right.
-std::vector<std::string> trouble_texts(std::uint32_t trouble);
+// One for each bit of a report's; finger 0 is called left, 1 right. With the numbers that they are
+// about.
+std::vector<std::string> trouble_texts(const GripReport &report);
 
 } // namespace fingertip

@@ -16,7 +16,7 @@ circles             modules that need themselves, by way of others: of the Pytho
 format_disagreements inputs of tests/formats to which library, Python and page give other answers, by build/report/formats.json if it is there
 page_codec_lines    lines of the page in the folders of line and recordings, but for files that only ask and show; and elsewhere those that take
                     numbers out of bytes
-longest_file        lines of the longest source; firmware/fit, condition and grip apart
+longest_file        lines of the longest source; firmware/fit and condition apart
 product_lines       lines of sources and texts, firmware and boards too; no limit, for people
 """
 import argparse
@@ -31,7 +31,7 @@ import tomllib
 # figure: what it shall be, and what it may be until then. The second only ever falls.
 LIMITS = {"files_per_board": (8, 8), "files_per_gripper": (5, 5), "files_per_field": (6, 6), "files_per_setting": (6, 6), "rooms": (9, 9), "circles": (0, 0),
           "format_disagreements": (0, 0), "page_codec_lines": (0, 0), "longest_file": (700, 700)}
-APART = ("firmware/fit/", "firmware/condition/", "firmware/grip/")  # from longest_file
+APART = ("firmware/fit/", "firmware/condition/")  # from longest_file
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".S", ".py", ".mjs", ".ts", ".mts", ".sh", ".cmake", ".inc", ".css", ".toml"}
 TEXTS = SOURCES | {".md", ".txt", ".json", ".html", ".in", ".1", ".bash", ".fish", ".cfg", ".msg", ""}
 WRITTEN = re.compile(r"[Ww]ritten by |[Gg]enerated by ")

@@ -1,6 +1,6 @@
 #include "grasp/fault_trials.hpp"
 
-#include "grasp/convert.hpp"
+#include "grasp/settings.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -185,36 +185,14 @@ FaultRunner::FaultRunner(const std::string &cache) {
   }
 }
 
-double FaultRunner::most_N(const FaultTrial &one) const {
-  const Face &face = faces_.at(one.trial.scene.face);
-  const auto squeezed_mm = [&](double force_N) {
-    return 2.0 * face.indentation_mm(force_N) + force_N / one.trial.scene.object.stiffness_N_mm +
-           force_N / one.trial.scene.grasp.fingers_N_mm;
-  };
-  const double further_mm = OVER_CAP_STEPS * one.trial.gripper.traits.step_mm;
-  const double from_mm = squeezed_mm(OVER_CAP * one.cap_N);
-  double most_N = OVER_CAP * one.cap_N;
-  while (most_N < Face::FORCE_MAX_N && squeezed_mm(most_N) < from_mm + further_mm) {
-    most_N += 0.01;
-  }
-  return most_N;
-}
-
 FaultOutcome FaultRunner::run(const FaultTrial &one) const {
-  grip_settings settings;
-  const grip_traits traits = core_traits(one.trial.gripper.traits);
-  grip_default_settings(&settings, &traits);
-  settings.force_cap_mN = static_cast<std::int32_t>(1e3 * one.cap_N);
-  settings.blind_mN = std::min(settings.blind_mN, settings.force_cap_mN);
-  settings.first_mN = std::min(settings.first_mN, settings.force_cap_mN);
-  settings.set_mN = std::min(settings.set_mN, settings.force_cap_mN);
-  CoreController controller(settings, traits);
+  const GripperTraits &traits = one.trial.gripper.traits;
+  CoreController controller(settings_for(traits, {{"cap", one.cap_N}}), traits);
   FaultOutcome done{};
   done.outcome = run_trial(one.trial, faces_.at(one.trial.scene.face), controller);
   const Failed &failed = done.outcome.failed;
-  done.most_N = most_N(one);
   done.opened = failed.opened_mm > one.opens_mm;
-  done.beyond_cap = done.outcome.peak_N > done.most_N;
+  done.beyond_cap = done.outcome.peak_N > one.cap_N;
   const auto ends = std::find(one.ends_in.begin(), one.ends_in.end(), failed.state);
   done.unsaid = (!one.ends_in.empty() && ends == one.ends_in.end()) ||
                 failed.gripper_fault != one.gripper_fault ||

@@ -12,15 +12,11 @@ namespace fingertip::grasp {
 
 // Opening by less is still holding: a grip that was raised too far comes down.
 constexpr double OPENS_mm = 1.0;
-// Forces are measured within some 10 %, and what a gripper cannot do in finer steps it does in two
-// of its own: by so much a grip may be above its cap.
-constexpr double OVER_CAP = 1.1, OVER_CAP_STEPS = 2.0;
-
 struct FaultTrial {
   std::string fault, state, gripper, object;
   cell::Trial trial;
   double cap_N;
-  // What must be said, of grip_trouble: each of these, one of those; and where it must end.
+  // What must be said, of GripTrouble: each of these, one of those; and where it must end.
   std::uint32_t all_of = 0, any_of = 0;
   std::vector<std::uint8_t> ends_in; // empty: anywhere
   std::uint8_t gripper_fault = 0;
@@ -33,7 +29,6 @@ std::vector<FaultTrial> fault_trials();
 
 struct FaultOutcome {
   cell::Outcome outcome;
-  double most_N; // that the cap allows
   bool opened, beyond_cap, unsaid;
 };
 
@@ -44,8 +39,6 @@ public:
   FaultOutcome run(const FaultTrial &trial) const;
 
 private:
-  double most_N(const FaultTrial &trial) const;
-
   std::map<std::string, cell::Face> faces_;
 };
 

@@ -37,7 +37,6 @@ ordered_json row_of(const FaultTrial &one, const FaultOutcome &done) {
   row["opened_mm"] = failed.opened_mm;
   row["peak_N"] = done.outcome.peak_N;
   row["cap_N"] = one.cap_N;
-  row["most_N"] = done.most_N;
   row["dropped"] = done.outcome.dropped;
   row["crushed"] = done.outcome.crushed;
   row["opened"] = done.opened;

@@ -3,13 +3,13 @@ import bisect
 
 import emulated_grasp
 import faults
+import kinds
 from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save
 from fingertip.files import write_text
 from goals import goal_table_md
+from kinds import GRIPPERS
 from tables import table_md, text_of
 
-# model: what the figures call it, its colour
-GRIPPERS = {"2f85": ("2f85", ORANGE), "sts3215": ("servo", BLUE), "ideal": ("ideal", GOAL)}
 # key: what its column is called
 COLUMNS = {"gripper": "gripper", "about": "what", "object": "object", "friction": "friction", "mass": "mass", "disturbance": "disturbance", "grasps": "grasps",
            "drops_percent": "dropped, %", "margin_p50": "grip over least grip: p50", "margin_p5": "p5", "margin_p95": "p95",
@@ -19,15 +19,15 @@ COLUMNS = {"gripper": "gripper", "about": "what", "object": "object", "friction"
 STILL = {"gripper": "gripper", "about": "what", "set_force": "set force", "grasps": "grasps", "settle_p50_s": "settles within, s: p50", "settle_p95_s": "p95",
          "never_settled_percent": "never, %", "rms_p50_percent": "rms error, %: p50",
          "rms_of_steps_p50_percent": "of it by rounding to the gripper's steps", "limit_cycles": "limit cycles"}
-ABOUT = """Written by `sh cmake/bootstrap.sh report`. Simulated rubber, objects, sensors and grippers; the controller and the fingertips' code are the
-firmware's own. Nothing was checked on hardware.
+ABOUT = """Written by `sh cmake/bootstrap.sh report`. Simulated rubber, objects, sensors and grippers; the controller is the tool's own,
+the fingertips' code the firmware's. Nothing was checked on hardware.
 
-Each grasp: an object of 0.1 to 1 kg with a friction of 0.25 to 1 stands on a table; the gripper closes, holds, lifts it within 0.1 to 1 s; then come up to
+In the twin's cell, each grasp: an object of 0.1 to 1 kg with a friction of 0.25 to 1 stands on a table; the gripper closes, holds, lifts it within 0.1 to 1 s; then come up to
 two of: 30 to 150 % more mass is poured in, the hand jerks by 2 to 9 m/s2, a knock of 0.03 to 0.12 m/s, friction falls by 20 to 45 %. What would take more than
 15 N to hold at its worst is not drawn. The rubber relaxes by 9 to 26 % in 8 s, each fingertip's force is off by 5 % (sd), gains are those after a
 calibration. Dropped: slid by 22 mm, or lost. Least grip: load / (2 friction), without
-what a turning object takes of the friction. Force told: the mean of what both fingertips say; taken for: what the controller reckons with, the smaller
-of both and of flats what lies on the pad. A slip: all of both contacts slides, 0.3 mm or more. Settled: within 10 % for
+what a turning object takes of the friction. Force told: the mean of what both fingertips say; taken for: what the controller reckons with,
+of flats what lies on the pad. A slip: all of both contacts slides, 0.3 mm or more. Settled: within 10 % for
 0.5 s, by what the fingertips say. A limit cycle: the commanded width turns four times or more in the last half of a hold."""
 PARTS = {"by_object": "By object", "by_friction": "By friction", "by_mass": "By mass", "by_disturbance": "By disturbance"}
 
@@ -41,7 +41,7 @@ def write(found, path):
     moving = [row for row in found["rows"] if "drops_percent" in row]
     still = [row for row in found["rows"] if "settle_p50_s" in row]
     lines = ["# Grasps", "", *ABOUT.split("\n"), "", "![Drops, grip, reaction, a slip that is caught](grasp.png)", "", *goal_table_md(found), "",
-             "## By gripper, mode and rate", "", *rows_md(moving, COLUMNS), "", "## Set forces", "", *rows_md(still, STILL), ""]
+             "## By kind", "", *kinds.text(found), "## In the twin's cell, by gripper, mode and rate", "", *rows_md(moving, COLUMNS), "", "## Set forces", "", *rows_md(still, STILL), ""]
     if "by_set" in found:
         lines += ["Of those held for 12 s, by the set force:", "", *rows_md(found["by_set"], STILL), ""]
     for name, title in PARTS.items():
@@ -150,5 +150,5 @@ def draw(found, path):
         draw_caught(course.subplots(), series, shots)
         film.suptitle(f"A slip that is caught: {caught['face']}, {caught['mass_kg']:.2f} kg, friction {caught['friction']:.2f}, {caught['gripper']}, "
                       f"{' and '.join(caught['disturbances'])} (blue: grip; orange: load)", x=0.01, ha="left", size=10)
-    figure.suptitle("Grasps: simulated cell, the firmware's own controller and fingertips", x=0.01, ha="left", size=12, weight="bold")
+    figure.suptitle("Grasps: simulated cell, the tool's own controller, the firmware's own fingertips", x=0.01, ha="left", size=12, weight="bold")
     save(figure, path)

@@ -28,7 +28,7 @@ constexpr char HELP[] =
     "  --rate HZ         frames of a fingertip a second, 410; above 600 at OSR 256, else 1024\n"
     "  --effect SHARE    of a pull's field that acts on the readings, 1\n"
     "  --still S         length of a still grasp, 12\n"
-    "  --set NAME=VALUE  of the controller's settings, split by commas: margin_permille=1400\n"
+    "  --set NAME=VALUE  of the controller's settings, split by commas: margin=1.4\n"
     "  --seed S          another set of scenes, pads and noise; 1 to 999 are there to choose\n"
     "                    constants by, the report judges by others; 1\n"
     "  --count N         grasps, 100\n"

@@ -1,6 +1,6 @@
 #include "grasp/trials.hpp"
 
-#include "grasp/convert.hpp"
+#include "grasp/settings.hpp"
 #include "libfingertip/in_parallel.hpp"
 #include "libfingertip/text.hpp"
 #include "library/pad/table_file.hpp"
@@ -22,26 +22,10 @@ constexpr std::size_t CALIBRATIONS = 40;
 constexpr double FAST_Hz = 600.0;
 enum Stream : std::uint64_t { PADS = 831, NOISE, SET };
 
-void change(grip_settings &settings, const std::string &changes) {
-  const std::map<std::string, std::int32_t *> numbers{
-      {"touch_mN", &settings.touch_mN},
-      {"approach_um_s", &settings.approach_um_s},
-      {"force_cap_mN", &settings.force_cap_mN},
-      {"travel_cap_um", &settings.travel_cap_um},
-      {"differ_permille", &settings.differ_permille},
-      {"set_mN", &settings.set_mN},
-      {"kp_um_per_N", &settings.gains.kp_um_per_N},
-      {"ki_um_per_Ns", &settings.gains.ki_um_per_Ns},
-      {"kd_um_s_per_N", &settings.gains.kd_um_s_per_N},
-      {"first_mN", &settings.first_mN},
-      {"blind_mN", &settings.blind_mN},
-      {"shift_um", &settings.shift_um},
-      {"friction_permille", &settings.friction_permille},
-      {"margin_permille", &settings.margin_permille},
-      {"slid_permille", &settings.slid_permille},
-      {"decay_permille_s", &settings.decay_permille_s}};
-  const std::map<std::string, std::uint32_t *> times{{"control_us", &settings.control_us},
-                                                     {"rest_us", &settings.rest_us}};
+} // namespace
+
+std::map<std::string, double> settings_of(const std::string &changes) {
+  std::map<std::string, double> values;
   for (const std::string_view one : split(changes, ',')) {
     if (one.empty()) {
       continue;
@@ -50,18 +34,20 @@ void change(grip_settings &settings, const std::string &changes) {
     const std::string name(one.substr(0, equals));
     const auto value =
         equals == std::string_view::npos ? std::nullopt : to_double(one.substr(equals + 1));
+    const auto &all = grasp_settings();
+    if (std::none_of(all.begin(), all.end(),
+                     [&](const GraspSetting &each) { return name == each.name; })) {
+      throw std::runtime_error("the controller has no setting \"" + name + "\"");
+    }
     if (!value) {
       throw std::runtime_error("the setting " + name + " has no number");
     }
-    if (const auto number = numbers.find(name); number != numbers.end()) {
-      *number->second = static_cast<std::int32_t>(*value);
-    } else if (const auto time = times.find(name); time != times.end()) {
-      *time->second = static_cast<std::uint32_t>(*value);
-    } else {
-      throw std::runtime_error("the controller has no setting \"" + name + "\"");
-    }
+    values[name] = *value;
   }
+  return values;
 }
+
+namespace {
 
 // A calibration takes half a second, so they are kept; the first of them is gone through anyway,
 // and tells whether the others still are what they would be.
@@ -145,31 +131,25 @@ Trial Set::trial(std::uint64_t n) const {
     }
   }
   trial.still_s = is_still() ? options_.still_s : 0.0;
-  trial.set_N = 1e-3 * settings(n).set_mN;
+  trial.set_N = settings(n).set_N;
   trial.set_of_smaller = options_.mode == "still";
   return trial;
 }
 
-grip_settings Set::settings(std::uint64_t n) const {
-  grip_settings settings;
-  const grip_traits traits = core_traits(gripper_.traits);
-  grip_default_settings(&settings, &traits);
+GripSettings Set::settings(std::uint64_t n) const {
+  GripSettings settings = settings_for(gripper_.traits, settings_of(options_.settings));
   const bool holds = options_.mode == "hold" || options_.mode == "still";
   settings.mode = holds ? GRIP_MODE_HOLD : GRIP_MODE_FIXED;
   if (is_still()) {
-    settings.set_mN =
-        static_cast<std::int32_t>(1e3 * Random(options_.seed, SET, n).log_uniform(2.0, 12.0));
-    settings.first_mN = settings.set_mN;
-    settings.blind_mN = settings.set_mN;
-    settings.shift_um = 0; // nothing pulls: no load is guessed
+    settings.set_N = Random(options_.seed, SET, n).log_uniform(2.0, 15.0);
+    settings.start_N = settings.floor_N = settings.blind_N = settings.set_N;
   }
-  change(settings, options_.settings);
   return settings;
 }
 
 Outcome Set::run(std::uint64_t n, const std::function<void(const Moment &)> &trace) const {
   const Trial one = trial(n);
-  CoreController controller(settings(n), core_traits(gripper_.traits));
+  CoreController controller(settings(n), gripper_.traits);
   return run_trial(one, all_.at(one.scene.face), controller, trace);
 }
 

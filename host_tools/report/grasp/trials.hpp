@@ -14,6 +14,10 @@ namespace fingertip::grasp {
 // Seeds below this are there to choose constants by; the report judges by others.
 constexpr std::uint64_t JUDGING_SEEDS = 1000;
 
+// Of name=value, split by commas, as grasp_settings() has them. Throws std::runtime_error: there is
+// no such setting.
+std::map<std::string, double> settings_of(const std::string &changes);
+
 struct SetOptions {
   std::string gripper = gripper_models().front().model; // of gripper_mechanics()
   std::string mode = "hold";     // hold, fixed, or still, still-fixed: on the table, no lift
@@ -33,7 +37,7 @@ public:
 
   bool is_still() const { return options_.mode.rfind("still", 0) == 0; }
   cell::Trial trial(std::uint64_t n) const;
-  grip_settings settings(std::uint64_t n) const;
+  GripSettings settings(std::uint64_t n) const;
   // For several threads at once.
   cell::Outcome run(std::uint64_t n,
                     const std::function<void(const cell::Moment &)> &trace = {}) const;

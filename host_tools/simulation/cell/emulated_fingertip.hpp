@@ -5,7 +5,7 @@
 // emulated time.
 #pragma once
 
-#include "grasp/core.hpp"
+#include "grasp/control/grip.hpp"
 #include "libfingertip/clock_fit.hpp"
 #include "libfingertip/decoder.hpp"
 
@@ -28,7 +28,7 @@ public:
 
   struct Frame {
     double measured_us, arrived_us;
-    grip_touch touch;
+    GripTouch touch;
   };
   // Bytes that came at arrived_us and are looked at now; calls the handler for each frame. Throws
   // std::runtime_error where a command is refused.

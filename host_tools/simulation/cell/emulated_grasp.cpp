@@ -75,11 +75,11 @@ void EmulatedGrasp::take(std::size_t finger, const std::uint8_t *bytes, std::siz
                           if (!controller_) {
                             return;
                           }
-                          const grip_touch &touch = frame.touch;
-                          controller_->take_touch(static_cast<unsigned>(finger), touch);
+                          const GripTouch &touch = frame.touch;
+                          controller_->take_touch(finger, touch);
                           told_.push_back({1e-6 * frame.arrived_us, 1e-6 * frame.measured_us,
                                            finger, (touch.flags & CONTACT_FLAG_SLIDING) != 0,
-                                           1e-3 * std::hypot(touch.qx_mN, touch.qy_mN)});
+                                           std::hypot(touch.qx_N, touch.qy_N)});
                           frames_[finger]++;
                           loads_[finger] += (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
                           step_controller();
@@ -87,10 +87,10 @@ void EmulatedGrasp::take(std::size_t finger, const std::uint8_t *bytes, std::siz
 }
 
 void EmulatedGrasp::step_controller() {
-  const std::int32_t width_um = command_.width_um;
-  report_ = controller_->step(static_cast<std::uint64_t>(std::llround(1e6 * t_s_)), command_);
-  if (command_.width_um != width_um) {
-    commanded_.push_back({t_s_, 1e-3 * command_.width_um});
+  const double width_mm = command_.width_mm;
+  report_ = controller_->step(t_s_, command_);
+  if (command_.width_mm != width_mm) {
+    commanded_.push_back({t_s_, command_.width_mm});
   }
   if (report_.state == GRIP_HOLDING || report_.state == GRIP_SLIPPING) {
     trouble_ |= report_.trouble;
@@ -100,10 +100,8 @@ void EmulatedGrasp::step_controller() {
 
 void EmulatedGrasp::run(double until_s) {
   if (!controller_ && fingers_[0].is_ready() && fingers_[1].is_ready()) {
-    grip_settings settings;
-    const grip_traits traits = core_traits(trial_.gripper.traits);
-    grip_default_settings(&settings, &traits);
-    controller_ = std::make_unique<CoreController>(settings, traits);
+    const GripperTraits &traits = trial_.gripper.traits;
+    controller_ = std::make_unique<CoreController>(default_settings(traits), traits);
     asked_s_ = t_s_;
   }
   while (t_s_ < until_s && !over_) {
@@ -120,10 +118,10 @@ void EmulatedGrasp::run(double until_s) {
       line_.pop_front();
     }
     if (gripper_.next_s() <= t_s_) {
-      const std::int32_t width_um = gripper_.sent().width_um;
+      const double width_mm = gripper_.sent().width_mm;
       line_.push_back(gripper_.exchange(command_));
-      if (gripper_.sent().width_um != width_um) {
-        asked_.push_back({t_s_, 1e-3 * gripper_.sent().width_um});
+      if (gripper_.sent().width_mm != width_mm) {
+        asked_.push_back({t_s_, gripper_.sent().width_mm});
       }
     }
   }

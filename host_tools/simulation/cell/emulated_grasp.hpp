@@ -77,8 +77,8 @@ private:
   std::array<EmulatedFingertip, 2> fingers_;
   std::unique_ptr<CoreController> controller_; // none before both are ready
   std::deque<GripperLine::Said> line_;
-  grip_command command_{};
-  grip_report report_{};
+  GripCommand command_{};
+  GripReport report_{};
   Slips slips_;
   double t_s_ = 0.0, holds_s_, lift_s_, touched_s_, asked_s_ = 0.0;
   double peak_N_ = 0.0;

@@ -27,7 +27,7 @@ enum Stream : std::uint64_t { PAD = 842 };
 struct Options {
   std::string gripper = gripper_models().front().model, cache;
   std::uint64_t seed = 1;
-  double slice_us = 500.0, friction = 0.65, friction_falls = 0.4;
+  double slice_us = 500.0, friction = 0.65, friction_falls = 0.67;
 };
 
 // Lifted, and then friction falls so far, within 30 ms, that the grip does not hold it.
@@ -79,9 +79,8 @@ void put_u32(std::size_t value) {
 // The same with the cell's own model of fingertips, at other moments of sensors and line.
 ordered_json felt(const EmulatedTrial &emulated, const Face &face) {
   std::vector<double> reactions_ms, slid_mm;
-  grip_settings settings;
-  const grip_traits traits = core_traits(emulated.gripper.traits);
-  grip_default_settings(&settings, &traits);
+  const GripperTraits &traits = emulated.gripper.traits;
+  const GripSettings settings = default_settings(traits);
   int drops = 0;
   for (int n = 0; n < FELT_TRIALS; n++) {
     Trial trial;

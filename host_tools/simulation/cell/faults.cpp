@@ -10,7 +10,7 @@ namespace fingertip::cell {
 namespace {
 
 constexpr double LATE_s = 0.03, LATENCY_TIMER_s = 0.016;
-constexpr double LIES_um = 1e4; // about where it touches
+constexpr double LIES_mm = 10.0; // about where it touches
 
 } // namespace
 
@@ -28,31 +28,31 @@ std::optional<FeltFinger::Frame> Faults::frame(std::size_t finger, const FeltFin
     last_[finger] = felt.touch;
     return frame;
   }
-  grip_touch &touch = frame.touch;
+  GripTouch &touch = frame.touch;
   const bool contact = (touch.flags & CONTACT_FLAG_CONTACT) != 0;
   switch (fault_.kind) {
   case Kind::gone:
     return std::nullopt;
   case Kind::frozen:
     last_[finger] = last_[finger].value_or(touch);
-    last_[finger]->t_us = touch.t_us;
+    last_[finger]->t_s = touch.t_s;
     touch = *last_[finger];
     break;
   case Kind::uncertain:
     if (contact) {
-      const auto force_mN = static_cast<double>(touch.force_mN);
+      const double force_N = touch.force_N;
       touch.flags |= CONTACT_FLAG_UNCERTAIN;
-      touch.x_um = static_cast<std::int32_t>(random_.uniform(-LIES_um, LIES_um));
-      touch.y_um = static_cast<std::int32_t>(random_.uniform(-LIES_um, LIES_um));
-      touch.qx_mN = static_cast<std::int32_t>(random_.uniform(-force_mN, force_mN));
-      touch.qy_mN = static_cast<std::int32_t>(random_.uniform(-force_mN, force_mN));
-      touch.force_mN /= fault_.fingers[0] != fault_.fingers[1] ? 2 : 1;
+      touch.x_mm = random_.uniform(-LIES_mm, LIES_mm);
+      touch.y_mm = random_.uniform(-LIES_mm, LIES_mm);
+      touch.qx_N = random_.uniform(-force_N, force_N);
+      touch.qy_N = random_.uniform(-force_N, force_N);
+      touch.force_N /= fault_.fingers[0] != fault_.fingers[1] ? 2 : 1;
     }
     break;
   case Kind::saturated:
     if (contact) {
       touch.flags |= CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND;
-      touch.force_mN /= 2;
+      touch.force_N /= 2;
     }
     break;
   default:

@@ -59,7 +59,7 @@ private:
   Fault fault_;
   Random random_;
   double begins_s_ = std::numeric_limits<double>::infinity();
-  std::array<std::optional<grip_touch>, 2> last_;
+  std::array<std::optional<GripTouch>, 2> last_;
 };
 
 } // namespace fingertip::cell

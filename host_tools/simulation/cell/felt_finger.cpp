@@ -51,11 +51,11 @@ const Model &model_of(double layer_mm) {
   return made.emplace(layer_mm, model).first->second;
 }
 
-std::int32_t in_thousandths(float value) {
-  return static_cast<std::int32_t>(std::lround(1e3 * static_cast<double>(value)));
-}
-
 } // namespace
+
+double speed_of(const ::motion &motion) {
+  return static_cast<double>(std::hypot(motion.vx_mm_s, motion.vy_mm_s));
+}
 
 struct FeltFinger::Firmware {
   fit_array array;
@@ -69,7 +69,7 @@ struct FeltFinger::Firmware {
   motion_history motion{};
 
   Firmware(double layer_mm, const Rubber &rubber, double noise_Pa);
-  grip_touch frame(std::uint64_t t_us, bool pressed, const std::int32_t *readings);
+  GripTouch frame(std::uint64_t t_us, bool pressed, const std::int32_t *readings);
 };
 
 FeltFinger::Firmware::Firmware(double layer_mm, const Rubber &rubber, double noise_Pa)
@@ -88,7 +88,7 @@ FeltFinger::Firmware::Firmware(double layer_mm, const Rubber &rubber, double noi
   tangential.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
 }
 
-grip_touch FeltFinger::Firmware::frame(std::uint64_t t_us, bool pressed,
+GripTouch FeltFinger::Firmware::frame(std::uint64_t t_us, bool pressed,
                                        const std::int32_t *readings) {
   fit_result fitted{};
   fit_tangential estimate{};
@@ -116,19 +116,18 @@ grip_touch FeltFinger::Firmware::frame(std::uint64_t t_us, bool pressed,
   motion_update(&motion, &tangential, &input, &result, &moved);
 
   const bool pulls = (result.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
-  grip_touch told{};
-  told.t_us = t_us;
+  GripTouch told{};
+  told.t_s = 1e-6 * static_cast<double>(t_us);
   told.flags = result.flags;
-  told.force_mN = in_thousandths(pulls ? pull.force_N : force.force_N);
-  told.force_sd_mN = in_thousandths(pulls ? pull.force_sd_N : force.force_sd_N);
-  told.x_um = in_thousandths(pulls ? pull.x_mm : fitted.x_mm);
-  told.y_um = in_thousandths(pulls ? pull.y_mm : fitted.y_mm);
-  told.sigma_um = in_thousandths(fitted.sigma_mm);
-  told.qx_mN = in_thousandths(pull.qx_N);
-  told.qy_mN = in_thousandths(pull.qy_N);
-  told.q_sd_mN = in_thousandths(pull.q_sd_N);
-  told.vx_um_s = in_thousandths(moved.vx_mm_s);
-  told.vy_um_s = in_thousandths(moved.vy_mm_s);
+  told.force_N = static_cast<double>(pulls ? pull.force_N : force.force_N);
+  told.force_sd_N = static_cast<double>(pulls ? pull.force_sd_N : force.force_sd_N);
+  told.x_mm = static_cast<double>(pulls ? pull.x_mm : fitted.x_mm);
+  told.y_mm = static_cast<double>(pulls ? pull.y_mm : fitted.y_mm);
+  told.sigma_mm = static_cast<double>(fitted.sigma_mm);
+  told.qx_N = static_cast<double>(pull.qx_N);
+  told.qy_N = static_cast<double>(pull.qy_N);
+  told.q_sd_N = static_cast<double>(pull.q_sd_N);
+  told.speed_mm_s = speed_of(moved);
   return told;
 }
 

@@ -9,14 +9,16 @@
 #include "libfingertip/random.hpp"
 #include "simulation/cell/face.hpp"
 
-extern "C" {
-#include "grip/grip.h"
-}
+#include "grasp/control/grip.hpp"
 
 #include <cstdint>
 #include <memory>
 
+struct motion; // of firmware/contact
+
 namespace fingertip::cell {
+
+double speed_of(const ::motion &motion); // mm/s
 
 // What sets one pad apart, and its firmware's calibration.
 struct Rubber {
@@ -46,7 +48,7 @@ public:
   double next_s() const { return next_s_; }
   struct Frame {
     double known_s;
-    grip_touch touch;
+    GripTouch touch;
   };
   // That frame, of this touch at next_s.
   Frame feel(const twin::Touch &touch);

@@ -1,7 +1,5 @@
 #include "simulation/cell/gripper_line.hpp"
 
-#include "grasp/convert.hpp"
-
 #include <cmath>
 
 namespace fingertip::cell {
@@ -29,20 +27,20 @@ void GripperLine::press(const Cell &cell) {
   };
 }
 
-GripperLine::Said GripperLine::exchange(const grip_command &command) {
+GripperLine::Said GripperLine::exchange(const GripCommand &command) {
   const double t_s = next_s_, poll_s = motion_.mechanics().traits.poll_s;
   if (command.motion == GRIP_ACTIVATE && sent_.motion != GRIP_ACTIVATE) {
     motion_.activate();
     sent_ = command;
   } else if (command.motion == GRIP_MOVE &&
-             (command.width_um != sent_.width_um || command.speed_um_s != sent_.speed_um_s)) {
-    motion_.move(gripper_move(command));
+             (command.width_mm != sent_.width_mm || command.speed_mm_s != sent_.speed_mm_s)) {
+    motion_.move(command);
     sent_ = command;
   }
   next_s_ += poll_s;
   GripperStatus status = motion_.status();
   status.host_us = std::llround(1e6 * t_s);
-  return {t_s + 0.5 * poll_s, core_status(status)};
+  return {t_s + 0.5 * poll_s, status};
 }
 
 } // namespace fingertip::cell

@@ -2,7 +2,7 @@
 // the gripper says of that moment comes half of that time later.
 #pragma once
 
-#include "grasp/core.hpp"
+#include "grasp/control/grip.hpp"
 #include "libfingertip/random.hpp"
 #include "simulation/cell/cell.hpp"
 #include "simulation/cell/gripper_motion.hpp"
@@ -23,16 +23,16 @@ public:
   double next_s() const { return next_s_; } // of the exchange
   struct Said {
     double known_s;
-    grip_status status;
+    GripperStatus status;
   };
   // At next_s, to where motion() has been brought.
-  Said exchange(const grip_command &command);
+  Said exchange(const GripCommand &command);
   // The last move that went out.
-  const grip_command &sent() const { return sent_; }
+  const GripCommand &sent() const { return sent_; }
 
 private:
   GripperMotion motion_;
-  grip_command sent_{};
+  GripCommand sent_{};
   double next_s_;
 };
 

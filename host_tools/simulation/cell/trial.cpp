@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <stdexcept>
 
 namespace fingertip::cell {
 namespace {
@@ -22,8 +21,8 @@ constexpr double LOST_N = 0.01, TOUCHED_N = 0.05;
 constexpr double SAMPLED_s = 2e-3, NEAR = 0.1;
 constexpr double SWINGS_mm = 0.02; // a move that counts
 
-std::uint64_t in_us(double s) {
-  return static_cast<std::uint64_t>(std::llround(1e6 * s));
+std::int64_t in_us(double s) {
+  return std::llround(1e6 * s);
 }
 
 // Begins in no state.
@@ -33,7 +32,7 @@ Fault never() {
   return fault;
 }
 
-bool holds(const grip_report &report) {
+bool holds(const GripReport &report) {
   return report.state == GRIP_HOLDING || report.state == GRIP_SLIPPING;
 }
 
@@ -150,8 +149,8 @@ private:
   struct Known { // on its way
     double at_s;
     std::size_t from;
-    grip_touch touch;
-    grip_status status;
+    GripTouch touch;
+    GripperStatus status;
   };
 
   double since_lift_s(double t_s) const { return t_s - lift_s_; }
@@ -262,7 +261,7 @@ private:
   }
 
   void step_controller() {
-    report_ = controller_.step(in_us(t_s_), command_);
+    report_ = controller_.step(t_s_, command_);
     stepped_s_ = t_s_;
     faults_.look(t_s_, report_.state);
     if (faults_.has_begun(t_s_)) {
@@ -297,7 +296,7 @@ private:
       if (known->from == STATUS) {
         controller_.take_status(known->status);
       } else {
-        controller_.take_touch(static_cast<unsigned>(known->from), known->touch);
+        controller_.take_touch(known->from, known->touch);
         felt_[known->from] = known->touch;
       }
       known = line_.erase(known);
@@ -316,7 +315,7 @@ private:
     if (line.late_s > 0.0) {
       answered_s_ = said.known_s + line.late_s;
       said.known_s = answered_s_;
-      said.status.t_us += in_us(0.5 * line.late_s); /* the exchange's middle */
+      said.status.host_us += in_us(0.5 * line.late_s); /* the exchange's middle */
     }
     said.status.fault = faults_.is(Fault::Kind::fault, t_s_) ? 9 : said.status.fault;
     line_.push_back({said.known_s, STATUS, {}, said.status});
@@ -324,11 +323,11 @@ private:
 
   void sample() {
     sample_s_ += SAMPLED_s;
-    const double felt_N = 5e-4 * (felt_[0].force_mN + felt_[1].force_mN);
+    const double felt_N = 0.5 * (felt_[0].force_N + felt_[1].force_N);
     if (trial_.still_s > 0.0 && touched_s_ < NEVER_s) {
-      const double smaller_N = 1e-3 * std::min(felt_[0].force_mN, felt_[1].force_mN);
+      const double smaller_N = std::min(felt_[0].force_N, felt_[1].force_N);
       set_point_.look(t_s_, trial_.set_of_smaller ? smaller_N : felt_N,
-                      1e-3 * gripper_.sent().width_um, touched_s_,
+                      gripper_.sent().width_mm, touched_s_,
                       touched_mm_ - gripper_.motion().width_mm());
     }
     const double since_s = lift_s_ < NEVER_s ? since_lift_s(t_s_) : -1.0;
@@ -336,7 +335,7 @@ private:
       margins_.push_back(cell_.force_N() / trial_.scene.least_N(since_s));
       if (force_N() > LOST_N) {
         told_.push_back(felt_N / force_N());
-        taken_.push_back(1e-3 * report_.force_mN / force_N());
+        taken_.push_back(report_.force_N / force_N());
       }
     }
     if (trace_) {
@@ -356,8 +355,8 @@ private:
       moment.friction = 0.5 * (cell_.friction(0) + cell_.friction(1));
       moment.slips = cell_.slips();
       moment.felt_N = felt_N;
-      moment.felt_load_N = 1e-3 * report_.load_mN;
-      moment.wanted_N = 1e-3 * report_.wanted_mN;
+      moment.felt_load_N = report_.load_N;
+      moment.wanted_N = report_.wanted_N;
       moment.state = report_.state;
       moment.trouble = report_.trouble;
       trace_(moment);
@@ -389,9 +388,9 @@ private:
   GripperLine gripper_;
   std::array<FeltFinger, 2> fingers_;
   std::deque<Known> line_;
-  std::array<grip_touch, 2> felt_{};
-  grip_command command_{};
-  grip_report report_{};
+  std::array<GripTouch, 2> felt_{};
+  GripCommand command_{};
+  GripReport report_{};
   Outcome outcome_;
   Slips slips_;
   SetPoint set_point_;
@@ -407,29 +406,9 @@ private:
 
 } // namespace
 
-CoreController::CoreController(const grip_settings &settings, const grip_traits &traits) {
-  if (grip_init(&core_, &settings, &traits) != FT_OK) {
-    throw std::runtime_error("the controller refuses its settings");
-  }
-  grip_request(&core_, GRIP_REQUEST_GRASP);
-}
-
-void CoreController::take_touch(unsigned finger, const grip_touch &touch) {
-  grip_take_touch(&core_, finger, &touch);
-}
-
-void CoreController::take_status(const grip_status &status) {
-  grip_take_status(&core_, &status);
-}
-
-void CoreController::ask(enum grip_request request) {
-  grip_request(&core_, request);
-}
-
-grip_report CoreController::step(std::uint64_t now_us, grip_command &command) {
-  grip_report report;
-  grip_step(&core_, now_us, &command, &report);
-  return report;
+CoreController::CoreController(const GripSettings &settings, const GripperTraits &traits)
+    : core_(settings, traits) {
+  core_.request(GRIP_REQUEST_GRASP);
 }
 
 Outcome run_trial(const Trial &trial, const Face &face, Controller &controller,

@@ -8,6 +8,7 @@
 // 60 ms at 410 frames a second.
 #pragma once
 
+#include "simulation/cell/controller.hpp"
 #include "simulation/cell/faults.hpp"
 #include "simulation/cell/felt_finger.hpp"
 #include "simulation/cell/gripper_line.hpp"
@@ -19,28 +20,21 @@
 
 namespace fingertip::cell {
 
-// What decides.
-class Controller {
-public:
-  virtual ~Controller() = default;
-  virtual void take_touch(unsigned finger, const grip_touch &touch) = 0;
-  virtual void take_status(const grip_status &status) = 0;
-  virtual grip_report step(std::uint64_t now_us, grip_command &command) = 0;
-  virtual void ask(enum grip_request) {}
-};
-
-// firmware/grip, grasping from the first step on.
+// The controller of grasp/control, grasping from the first step on.
 class CoreController : public Controller {
 public:
-  // Throws std::runtime_error where it refuses its settings.
-  CoreController(const grip_settings &settings, const grip_traits &traits);
-  void take_touch(unsigned finger, const grip_touch &touch) override;
-  void take_status(const grip_status &status) override;
-  grip_report step(std::uint64_t now_us, grip_command &command) override;
-  void ask(enum grip_request request) override;
+  CoreController(const GripSettings &settings, const GripperTraits &traits);
+  void take_touch(std::size_t finger, const GripTouch &touch) override {
+    core_.take(finger, touch);
+  }
+  void take_status(const GripperStatus &status) override { core_.take(status); }
+  GripReport step(double now_s, GripCommand &command) override {
+    return core_.step(now_s, command);
+  }
+  void ask(GripRequest request) override { core_.request(request); }
 
 private:
-  grip core_{};
+  Grip core_;
 };
 
 struct Trial {
@@ -56,7 +50,7 @@ struct Trial {
   // once it is active.
   bool activates = false;
   // So long after the first HOLDING.
-  std::optional<enum grip_request> asked;
+  std::optional<GripRequest> asked;
   double asked_after_s = 0.0;
   // So long after the lift friction falls to what does not hold the object any more, by a tenth.
   std::optional<double> slick_after_s;

@@ -124,9 +124,9 @@ void draw_panel(Canvas &canvas, const Area &area, const std::vector<Model> &fing
     canvas.text(area.left, row, "nothing known of the gripper", text_style(FAINT));
     return;
   }
-  const grip_report &report = grip.row()->report;
+  const GripReport &report = grip.row()->report;
   const auto &status = grip.row()->status;
-  auto newton = [](std::int32_t force_mN) { return fixed(force_mN / 1e3, 2); };
+  auto newton = [](double force_N) { return fixed(force_N, 2); };
   for (const std::string &line : flowed({state_text(report.state)}, " ", area.width)) {
     canvas.text(area.left, row++, first_columns(line, area.width),
                 text_style(colour_of(report.state), true));
@@ -151,26 +151,27 @@ void draw_panel(Canvas &canvas, const Area &area, const std::vector<Model> &fing
     int width = area.left + area.width - column - 1;
     if (width >= 4) {
       draw_force(canvas, {column + 1, row, width, 1}, felt,
-                 static_cast<float>(report.wanted_mN) / 1000, grip.cap_N(), i == 0 ? LEFT : RIGHT);
+                 static_cast<float>(report.wanted_N), grip.cap_N(), i == 0 ? LEFT : RIGHT);
     }
   }
-  column = draw_quantity(canvas, area.left, row, {"wanted", newton(report.wanted_mN), 6, "N "});
+  column = draw_quantity(canvas, area.left, row, {"wanted", newton(report.wanted_N), 6, "N "});
   draw_quantity(canvas, column + 1, row, {"cap", number(grip.cap_N(), 1), 5, "N"});
   row++;
-  bool loaded = report.load_mN > 0 || report.margin_permille > 0;
+  bool loaded = report.load_N > 0;
   column = draw_quantity(
       canvas, area.left, row,
-      {"load  ", loaded ? std::optional(newton(report.load_mN)) : std::nullopt, 6, "N "});
+      {"load  ", loaded ? std::optional(newton(report.load_N)) : std::nullopt, 6, "N "});
   draw_quantity(canvas, column + 1, row,
                 {"margin",
-                 report.margin_permille > 0 ? std::optional(fixed(report.margin_permille / 1e3, 2))
+                 report.margin > 0 ? std::optional(fixed(report.margin, 2))
                                             : std::nullopt,
                  5, ""});
   row++;
   column =
       draw_quantity(canvas, area.left, row, {"slides", std::to_string(report.slides), 6, "  "});
-  draw_quantity(canvas, column + 1, row,
-                {"friction", fixed(report.friction_permille / 1e3, 2), 4, ""});
+  column = draw_quantity(canvas, column + 1, row,
+                {"friction", fixed(report.friction, 2), 4, " "});
+  draw_quantity(canvas, column + 1, row, {"delay", fixed(1e3 * report.delay_s, 0), 3, "ms"});
   row++;
   column = area.left;
   for (std::size_t i = 0; i < fingertips.size() && i < 2; i++) {
@@ -179,7 +180,7 @@ void draw_panel(Canvas &canvas, const Area &area, const std::vector<Model> &fing
     column = draw_lamp(canvas, column, row, slips, std::string("SLIP ") + SIDES[i], BAD) + 2;
   }
   row++;
-  std::vector<std::string> troubles = trouble_texts(report.trouble);
+  std::vector<std::string> troubles = trouble_texts(report);
   if (report.gripper_fault != 0) {
     troubles.push_back("gripper's fault " + std::to_string(report.gripper_fault));
   }

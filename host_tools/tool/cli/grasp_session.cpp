@@ -82,11 +82,11 @@ std::array<Way, FINGERS> ways_of(const GraspOptions &options) {
 
 class GraspSession {
 public:
-  GraspSession(const GraspOptions &options, const grip_settings &settings)
+  GraspSession(const GraspOptions &options, const GripSettings &settings)
       : options_(options), settings_(settings), models_(FINGERS),
         loop_(ways_of(options), {WIRE_STREAM_ALL, options.activate, interrupts}) {
     grip_.set_gripper(options.gripper.model);
-    grip_.set_cap_N(static_cast<float>(settings.force_cap_mN) / 1000);
+    grip_.set_cap_N(static_cast<float>(settings.cap_N));
     for (std::size_t i = 0; i < FINGERS; i++) {
       models_[i].set_source(loop_.name(i));
     }
@@ -101,6 +101,7 @@ public:
       view_ = make_grasp_view(options_.colour, grip_);
     }
     while (!take_news()) {
+      answer_interrupts();
       show();
       if (!ending_ && should_end()) {
         ending_ = true;
@@ -272,11 +273,11 @@ private:
   }
 
   void take_step(const GraspNews &news) {
-    const grip_report &report = news.report;
+    const GripReport &report = news.report;
     bool changed =
         !last_ || report.state != last_->report.state || report.trouble != last_->report.trouble ||
         report.slides != last_->report.slides || news.command.motion != last_->command.motion ||
-        news.command.width_um != last_->command.width_um ||
+        news.command.width_mm != last_->command.width_mm ||
         (news.status && (!last_->status || news.status->host_us != last_->status->host_us));
     if (last_ && report.state != last_->report.state) {
       state_since_us_ = news.host_us;
@@ -304,7 +305,7 @@ private:
   std::uint8_t state() const { return last_ ? last_->report.state : std::uint8_t{GRIP_IDLE}; }
   std::int64_t state_us() const { return steady_now_us() - state_since_us_; }
 
-  void wish(enum grip_request request, const std::string &name) {
+  void wish(GripRequest request, const std::string &name) {
     bool done = loop_.request(request);
     event(name + (done ? "" : ", which cannot be now"));
     if (!done) {
@@ -312,14 +313,19 @@ private:
     }
   }
 
-  /* Anything that ends it while the gripper holds, or never will. */
-  bool should_end() {
+  /* At once, and in words of its own. */
+  void answer_interrupts() {
     if (interrupts() > told_interrupts_) {
       told_interrupts_ = interrupts();
       say(told_interrupts_ == 1 ? "Ctrl-C: the width stays; again: opens slowly"
                                 : "Ctrl-C: opens slowly; again: ends here");
+      view_->hurry();
       event("interrupted");
     }
+  }
+
+  /* Anything that ends it while the gripper holds, or never will. */
+  bool should_end() {
     std::int64_t since_begin_us = steady_now_us() - zero_us_;
     if (!requested_ && since_begin_us > TARING_us) {
       failure_ = std::string(SIDES[has_zero_[0] ? 1 : 0]) +
@@ -446,7 +452,7 @@ private:
   }
 
   const GraspOptions &options_;
-  grip_settings settings_;
+  GripSettings settings_;
   std::vector<Model> models_;
   GripModel grip_;
   std::unique_ptr<Keeper> keeper_;
@@ -467,8 +473,10 @@ private:
 } // namespace
 
 int run_grasp(const GraspOptions &options) {
-  const grip_settings settings =
-      typed([&] { return settings_for(gripper_traits(options.gripper.model), options.limits); });
+  std::map<std::string, double> limits = options.limits;
+  limits.insert(options.breaking.begin(), options.breaking.end()); // a limit of its own stays
+  const GripSettings settings =
+      typed([&] { return settings_for(gripper_traits(options.gripper.model), limits); });
   if (!options.recording.empty()) {
     check_output(options.recording, options.overwrite);
   }

@@ -15,7 +15,8 @@ struct GraspOptions {
   GripperWay gripper;
   std::string left, right; /* serial number, or port; empty: what there is */
   Reach reach = Reach::automatic;
-  std::map<std::string, double> limits; /* by name, grasp/settings.hpp */
+  std::map<std::string, double> limits;   /* by name, grasp/settings.hpp */
+  std::map<std::string, double> breaking; /* the same, of a preset; limits override them */
   bool activate = false;
   std::optional<double> seconds; /* since both fingertips stream */
   std::string recording;         /* empty: none */

@@ -38,12 +38,12 @@ void GripModel::take(const GripRow &row) {
   while (samples_.size() > SAMPLES) {
     samples_.pop_front();
   }
-  const grip_report &report = row.report;
+  const GripReport &report = row.report;
   Sample &last = samples_.back();
   last.controlled = is_controlled(report.state);
-  last.wanted_N = static_cast<float>(report.wanted_mN) / 1000;
-  last.loaded = last.controlled && (report.load_mN > 0 || report.margin_permille > 0);
-  last.load_N = static_cast<float>(report.load_mN) / 1000;
+  last.wanted_N = static_cast<float>(report.wanted_N);
+  last.loaded = last.controlled && (report.load_N > 0);
+  last.load_N = static_cast<float>(report.load_N);
   last.slipping = last.slipping || report.state == GRIP_SLIPPING;
   last.answered = row.status.has_value();
   last.width_mm = row.status ? static_cast<float>(row.status->width_mm) : 0;
@@ -71,17 +71,17 @@ std::string grip_line(const GripModel &grip) {
     return "nothing known of the gripper";
   }
   const GripRow &row = *grip.row();
-  const grip_report &report = row.report;
+  const GripReport &report = row.report;
   std::string text = fixed(grip.seconds(), 1) + " s  " + state_name(report.state) + "  width " +
                      (row.status ? fixed(row.status->width_mm, 1) : "-") + " mm  force " +
-                     fixed(report.force_mN / 1e3, 2) + " N  wanted " +
-                     fixed(report.wanted_mN / 1e3, 2) + " N  load " +
-                     fixed(report.load_mN / 1e3, 2) + " N";
-  if (report.margin_permille > 0) {
-    text += "  margin " + fixed(report.margin_permille / 1e3, 2);
+                     fixed(report.force_N, 2) + " N  wanted " +
+                     fixed(report.wanted_N, 2) + " N  load " +
+                     fixed(report.load_N, 2) + " N";
+  if (report.margin > 0) {
+    text += "  margin " + fixed(report.margin, 2);
   }
-  text += "  slides " + std::to_string(report.slides);
-  for (const std::string &trouble : trouble_texts(report.trouble)) {
+  text += "  delay " + fixed(1e3 * report.delay_s, 0) + " ms  slides " + std::to_string(report.slides);
+  for (const std::string &trouble : trouble_texts(report)) {
     text += "  " + trouble;
   }
   return text;

@@ -151,9 +151,10 @@ public:
     if (!grip_.row() || grip_.row()->report.state == GRIP_IDLE) {
       return;
     }
-    const grip_report &report = grip_.row()->report;
+    const GripReport &report = grip_.row()->report;
     bool changed = change_.is_new(state_name(report.state) + trouble_names(report.trouble));
-    if (!changed && (quiet_ || !interval_.is_due())) {
+    bool says = !caption.note.empty() && note_.is_new(caption.note);
+    if (!changed && !says && (quiet_ || !interval_.is_due())) {
       return;
     }
     std::FILE *to = quiet_ ? stderr : stdout;
@@ -165,7 +166,7 @@ public:
 private:
   const GripModel &grip_;
   bool quiet_;
-  Change change_;
+  Change change_, note_;
   Interval interval_{std::chrono::milliseconds(1000)};
 };
 

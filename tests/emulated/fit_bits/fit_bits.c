@@ -6,7 +6,6 @@
 #include "fit/fit.h"
 #include "fit/fit_load.h"
 #include "fit/fit_tangential.h"
-#include "grip_bits.h"
 
 #include <stdbool.h>
 #include <string.h>
@@ -112,15 +111,13 @@ static void pull(const struct fit_array *array, int32_t *pressure_Pa_q10) {
 }
 
 uint32_t fit_bits_presses(enum fit_bits_kernel kernel) {
-  return kernel == FIT_BITS_GRIP ? 1000 : 10000;
+  (void)kernel;
+  return 10000;
 }
 
 uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   draw_from(UINT64_C(0x9E3779B97F4A7C15) * (press + 1) ^ (uint64_t)kernel);
   draw();
-  if (kernel == FIT_BITS_GRIP) {
-    return grip_bits_of(press);
-  }
   bool other = kernel == FIT_BITS_GENERAL && press % 2;
   const struct fit_array *array = &layouts[other ? draw_between(1, LAYOUTS - 1) : 0];
 

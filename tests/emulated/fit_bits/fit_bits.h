@@ -1,5 +1,4 @@
-/* Presses whose fits are compared bit by bit between machines, and grasps (grip_bits.h). They are
- * drawn from their number with integers alone, so that every machine has the same.
+/* Presses whose fits are compared bit by bit between machines. They are drawn from their number with integers alone, so that every machine has the same.
  */
 #ifndef FIT_BITS_FIT_BITS_H
 #define FIT_BITS_FIT_BITS_H
@@ -13,7 +12,6 @@ enum fit_bits_kernel {
   FIT_BITS_GENERAL,    /* fit_general: the same and other layouts, any subset */
   FIT_BITS_TANGENTIAL, /* fit_tangential after fit_gaussian: pads of 5 to 20 mm, every sensor or not
                         */
-  FIT_BITS_GRIP,       /* firmware/grip: a press is a grasp */
   FIT_BITS_KERNELS
 };
 

@@ -1,13 +1,8 @@
 /* usage: fit_bits KERNEL COUNT: prints the CRC of each of the first COUNT presses. */
 #include "fit_bits.h"
-#include "grip_bits.h"
 
 #include <stdio.h>
 #include <stdlib.h>
-
-void grip_bits_count(bool on) {
-  (void)on;
-}
 
 int main(int argc, char **argv) {
   if (argc != 3) {

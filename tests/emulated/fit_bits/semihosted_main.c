@@ -2,7 +2,6 @@
  * "Semihosting for AArch32 and AArch64"), for the kernels that the command line names by their
  * numbers. */
 #include "fit_bits.h"
-#include "grip_bits.h"
 
 #include <stdint.h>
 
@@ -24,10 +23,6 @@ static void print_hex(uint32_t value) {
   text[8] = '\n';
   text[9] = 0;
   call_host(SYS_WRITE0, text);
-}
-
-void grip_bits_count(bool on) {
-  (void)on;
 }
 
 int main(void) {

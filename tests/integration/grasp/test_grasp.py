@@ -24,7 +24,7 @@ from simulated_time import SimulatedTime  # noqa: E402
 
 MISSED, DROPPED, FAULT = 3, 4, 5
 # A load of 2 N on both pads at the friction that is taken before any slide.
-HOLDS_2_N = 1 / 0.55
+HOLDS_2_N = 1 / 0.5
 
 
 class GraspTest(unittest.TestCase):
@@ -100,6 +100,8 @@ class Usage(GraspTest):
         for arguments, words in ((("--cap", "0.1"), '--cap "0.1" is not possible; give N, 0.5 to 100'),
                                  (("--approach", "9"), "mm/s, 0.5 to 8"), (("--margin", "x"), "give 1 to 5"),
                                  (("--fixed", "nan"), "N, 0.1 to 100"),
+                                 (("--preset", "anvil"), "no preset anvil; there are egg, strawberry, cup"),
+                                 (("--preset", "crisp"), "the least move of a 2f85, 0.75 mm, may press with"),
                                  (("--fixed", "6", "--cap", "5"), "--fixed is not possible; it is above --cap"),
                                  (("--open-width", "90"), "2f85 opens to 85.0 mm")):
             _, err = self.run_grasp(*arguments, status=2)
@@ -193,7 +195,8 @@ class Course(GraspTest):
             process = self.start("-o", self.csv, "--open-width", "45")
             self.until_state(process, "holding")
             process.send_signal(signal.SIGINT)
-            self.until_state(process, "still")
+            lines = self.told(process, "Ctrl-C: the width stays; again: opens slowly")
+            self.assertIn(" s  still ", lines[-1])  # with the first line that tells of it
             width = self.steady()[0]
             self.tell("load 5")
             self.assertEqual(self.steady()[0], width)
@@ -238,6 +241,7 @@ class Trouble(GraspTest):
         process = self.start("-o", self.csv, *arguments)
         self.until_state(process, "holding")
         self.tell("load 1")
+        self.world.sleep(2)  # down from the start force
         self.assertGreater(self.steady()[1], 0.9)
         return process
 
@@ -469,7 +473,7 @@ class Recorded(GraspTest):
             squeezed_us = rows["time_us"][rows["state"] == "squeeze"][0]
             self.assertLess(abs(touched_us - squeezed_us), 1.5e6)
         self.assertEqual(left.metadata["grasp_mode"], "hold")
-        self.assertEqual(left.metadata["grasp_cap"], "20 N")
+        self.assertEqual(left.metadata["grasp_cap"], "21 N")
         self.assertRegex(left.metadata["grasp_gripper"], "2f85 .*gripper, ")
         events = files.read_grip_events(self.csv)
         self.assertTrue(any("grasp" in text for _, text in events), events)
@@ -529,7 +533,7 @@ class Live(GraspTest):
                     (r"q end, holding  o open  h hold  g grasp", b"h"),
                     (r"STILL", b"g"), (r"HOLDING", b"o"), (r"RELEASE", b"h"), (r"STILL", b"q")])
             self.assertEqual(status, 0)
-            for word in ("left ● AAAA", "right ● BBBB", "width", "cap  20.0 N", "slides", "friction", "SLIP left", "grasp  2f85", "kPa", "force ", " N┤",
+            for word in ("left ● AAAA", "right ● BBBB", "width", "cap  21.0 N", "slides", "friction", "SLIP left", "grasp  2f85", "kPa", "force ", " N┤",
                          "0 s"):
                 self.assertIn(word, self.shown)
             after = self.output[self.output.rfind(b"\x1b[?1049l") + 8:].decode()

@@ -92,7 +92,7 @@ protected:
   test::SoftFingertip left_{folder_ / "left", "AAAA", 200, [this] { return feel(); }};
   test::SoftFingertip right_{folder_ / "right", "BBBB", 200, [this] { return feel(); }};
   std::unique_ptr<GraspLoop> loop_;
-  grip_settings settings_{};
+  GripSettings settings_{};
   GraspNews last_{Kind::step};
   float highest_N_ = 0;
   int steps_ = 0, frames_ = 0;
@@ -107,12 +107,11 @@ TEST_F(GraspLoopTest, NothingMovesBeforeItIsRequestedThenTheObjectIsHeldAsItsLoa
   EXPECT_EQ(last_.report.state, GRIP_IDLE);
   ASSERT_TRUE(grasp());
   const auto force_N = [this] { return feel().force_N; };
-  until([&](const GraspNews &) { return std::abs(force_N() - 1.5f) < 0.3f; });
-  load_N_ = 1.0f;
-  const float needed_N = static_cast<float>(settings_.margin_permille) /
-                         static_cast<float>(settings_.friction_permille);
+  until([&](const GraspNews &) { return std::abs(force_N() - static_cast<float>(settings_.start_N)) < 0.4f; });
+  load_N_ = 3.0f;
+  const float needed_N = static_cast<float>(3.0 * settings_.margin / settings_.friction);
   until([&](const GraspNews &news) {
-    return force_N() > 0.95f * needed_N && news.report.load_mN > 900;
+    return force_N() > 0.95f * needed_N && news.report.load_N > 2.7;
   });
   EXPECT_LT(force_N(), 2.0f * needed_N);
   EXPECT_EQ(state_->activations, 0);

@@ -2,7 +2,6 @@
  * against. What changes a result was meant to, or is a mistake; where it was meant, the test says
  * what to put here. */
 #include "emulated/fit_bits/fit_bits.h"
-#include "emulated/fit_bits/grip_bits.h"
 #include "support/golden.h"
 #include "unity.h"
 
@@ -10,10 +9,6 @@
 
 void setUp(void) {}
 void tearDown(void) {}
-
-void grip_bits_count(bool on) {
-  (void)on;
-}
 
 static void assert_kernel(enum fit_bits_kernel kernel, const uint32_t golden[GOLDEN_BLOCKS]) {
   uint32_t found[GOLDEN_BLOCKS] = {0};

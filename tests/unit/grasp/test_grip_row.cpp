@@ -19,14 +19,15 @@ GripRow row_with_everything() {
   row.report.state = GRIP_SLIPPING;
   row.report.trouble = GRIP_FINGER_1_STALE | GRIP_AT_CAP;
   row.report.gripper_fault = 9;
-  row.report.wanted_mN = 4101;
-  row.report.force_mN = 4019;
-  row.report.load_mN = 1022;
-  row.report.margin_permille = 1573;
-  row.report.friction_permille = 400;
-  row.report.width_um = 34217;
+  row.report.wanted_N = 4.101;
+  row.report.force_N = 4.019;
+  row.report.load_N = 1.022;
+  row.report.margin = 1.573;
+  row.report.friction = 0.4;
+  row.report.width_mm = 34.217;
+  row.report.delay_s = 0.012;
   row.report.slides = 3;
-  row.command = {GRIP_MOVE, 34201, 150000, 20000};
+  row.command = {{34.201, 150.0, 20.0}, GRIP_MOVE};
   row.status = GripperStatus{-17, true, false, true, 34.217, 0.125, 9};
   return row;
 }
@@ -77,17 +78,17 @@ TEST(GripRow, ReadsWhatItWrote) {
   EXPECT_EQ(read.report.state, row.report.state);
   EXPECT_EQ(read.report.trouble, row.report.trouble);
   EXPECT_EQ(read.report.gripper_fault, row.report.gripper_fault);
-  EXPECT_EQ(read.report.wanted_mN, row.report.wanted_mN);
-  EXPECT_EQ(read.report.force_mN, row.report.force_mN);
-  EXPECT_EQ(read.report.load_mN, row.report.load_mN);
-  EXPECT_EQ(read.report.margin_permille, row.report.margin_permille);
-  EXPECT_EQ(read.report.friction_permille, row.report.friction_permille);
-  EXPECT_EQ(read.report.width_um, row.report.width_um);
+  EXPECT_EQ(read.report.wanted_N, row.report.wanted_N);
+  EXPECT_EQ(read.report.force_N, row.report.force_N);
+  EXPECT_EQ(read.report.load_N, row.report.load_N);
+  EXPECT_EQ(read.report.margin, row.report.margin);
+  EXPECT_EQ(read.report.friction, row.report.friction);
+  EXPECT_EQ(read.report.width_mm, row.report.width_mm);
   EXPECT_EQ(read.report.slides, row.report.slides);
   EXPECT_EQ(read.command.motion, row.command.motion);
-  EXPECT_EQ(read.command.width_um, row.command.width_um);
-  EXPECT_EQ(read.command.speed_um_s, row.command.speed_um_s);
-  EXPECT_EQ(read.command.force_mN, row.command.force_mN);
+  EXPECT_EQ(read.command.width_mm, row.command.width_mm);
+  EXPECT_EQ(read.command.speed_mm_s, row.command.speed_mm_s);
+  EXPECT_EQ(read.command.force_N, row.command.force_N);
   ASSERT_TRUE(read.status);
   EXPECT_EQ(read.status->host_us, -17);
   EXPECT_TRUE(read.status->active);
@@ -116,7 +117,7 @@ TEST(GripRow, EveryWrongCellIsNamed) {
   }
   EXPECT_EQ(error_of(with_cell("fault", "256")), "fault is \"256\"");
   EXPECT_EQ(error_of(with_cell("slides", "-1")), "slides is \"-1\"");
-  EXPECT_EQ(error_of(with_cell("wanted_N", "3000000")), "wanted_N is \"3000000\"");
+  EXPECT_EQ(error_of(with_cell("wanted_N", "inf")), "wanted_N is \"inf\"");
   EXPECT_EQ(error_of(with_cell("moving", "")), "moving is \"\"");
   EXPECT_NE(error_of("1,2,3").find("3 columns of the gripper"), std::string::npos);
 }

@@ -43,8 +43,8 @@ TEST_F(GripperThreadTest, TheNewestCommandGoesOutOnceAndAnswersComeBack) {
   state_->delay_ms = 5;
   GripperThread thread(open()(), open());
   EXPECT_TRUE(comes(thread, is_answer));
-  for (int um : {40000, 39000, 38000}) {
-    thread.command({GRIP_MOVE, um, 50000, 0});
+  for (const double width_mm : {40.0, 39.0, 38.0}) {
+    thread.command({{width_mm, 50.0, 0.0}, GRIP_MOVE});
   }
   const HostTime patience = host_now() + PATIENCE;
   while (!thread.is_done() && host_now() < patience) {
@@ -54,7 +54,7 @@ TEST_F(GripperThreadTest, TheNewestCommandGoesOutOnceAndAnswersComeBack) {
   EXPECT_TRUE(
       comes(thread, [](const auto &news) { return news.status && news.status->width_mm < 50; }));
   for (int i = 0; i < 5; i++) {
-    thread.command({GRIP_MOVE, 38000, 50000, 0}); /* the same */
+    thread.command({{38.0, 50.0, 0.0}, GRIP_MOVE}); /* the same */
     EXPECT_TRUE(comes(thread, is_answer));
   }
   const auto moves = state_->moves();
@@ -72,7 +72,7 @@ TEST_F(GripperThreadTest, TheNewestCommandGoesOutOnceAndAnswersComeBack) {
 TEST_F(GripperThreadTest, ActivatesOnceForEachCommand) {
   GripperThread thread(open()(), open());
   for (int i = 0; i < 10; i++) {
-    thread.command({GRIP_ACTIVATE, 0, 0, 0});
+    thread.command({{}, GRIP_ACTIVATE});
     EXPECT_TRUE(comes(thread, is_answer));
   }
   EXPECT_EQ(state_->activations, 1);
@@ -83,8 +83,8 @@ TEST_F(GripperThreadTest, SilenceIsToldOnceAndTheNewestCommandWaitsForTheEndOfIt
   EXPECT_TRUE(comes(thread, is_answer));
   state_->silent = true;
   EXPECT_TRUE(comes(thread, is_trouble));
-  thread.command({GRIP_MOVE, 30000, 50000, 0});
-  thread.command({GRIP_MOVE, 20000, 50000, 0});
+  thread.command({{30.0, 50.0, 0.0}, GRIP_MOVE});
+  thread.command({{20.0, 50.0, 0.0}, GRIP_MOVE});
   const int before = state_->exchanges;
   while (state_->exchanges < before + 20) {
     pass();
@@ -137,7 +137,7 @@ TEST_F(GripperThreadTest, EndsWhileTheLineIsSlow) {
   state_->delay_ms = 30;
   {
     GripperThread thread(open()(), open());
-    thread.command({GRIP_MOVE, 30000, 50000, 0});
+    thread.command({{30.0, 50.0, 0.0}, GRIP_MOVE});
   }
   const int after = state_->exchanges;
   pass(milliseconds(100));

@@ -23,15 +23,28 @@ TEST(Words, EveryStateHasAnotherNameAndIsFoundByIt) {
 }
 
 TEST(Words, EveryTroubleHasAName) {
-  constexpr std::uint32_t all = (GRIP_FINGER_1_UNTOLD << 1) - 1;
+  constexpr std::uint32_t all = (GRIP_FINGER_1_LATE << 1) - 1;
   EXPECT_EQ(trouble_of_names(trouble_names(all)), all);
   for (std::uint32_t bit = 1; bit <= all; bit <<= 1) {
     EXPECT_FALSE(trouble_names(bit).empty()) << bit;
     EXPECT_EQ(trouble_of_names(trouble_names(bit)), bit);
-    EXPECT_EQ(trouble_texts(bit).size(), 1u) << bit;
+    GripReport report;
+    report.trouble = bit;
+    EXPECT_EQ(trouble_texts(report).size(), 1u) << bit;
   }
   EXPECT_EQ(trouble_names(0), "");
   EXPECT_EQ(trouble_of_names(""), 0u);
   EXPECT_EQ(trouble_names(GRIP_FINGER_0_STALE | GRIP_AT_CAP), "finger_0_stale at_cap");
   EXPECT_EQ(trouble_of_names("at_cap nonsense"), std::nullopt);
+}
+
+TEST(Words, TroublesHaveTheirNumbers) {
+  GripReport report;
+  report.trouble = GRIP_FINGERS_DIFFER | GRIP_FINGER_1_LATE;
+  report.felt_N = {3.1, 4.6};
+  report.delay_s = 0.061;
+  const auto texts = trouble_texts(report);
+  ASSERT_EQ(texts.size(), 2u);
+  EXPECT_NE(texts[0].find("3.1 and 4.6 N"), std::string::npos) << texts[0];
+  EXPECT_EQ(texts[1], "right: late by 61 ms");
 }

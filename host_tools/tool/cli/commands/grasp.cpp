@@ -4,6 +4,7 @@
 #include "tool/cli/grasp_session.hpp"
 #include "tool/cli/gripper_options.hpp"
 #include "tool/cli/recording_options.hpp"
+#include "tool/cli/usage.hpp"
 
 #include <memory>
 
@@ -19,18 +20,48 @@ std::string range_of(const GraspSetting &setting) {
 }
 
 /* Of the usual gripper; those that depend on it are not shown. */
-std::string default_of(const GraspSetting &setting, const grip_settings &usual,
-                       const grip_settings &other) {
+std::string default_of(const GraspSetting &setting, const GripSettings &usual,
+                       const GripSettings &other) {
   double value = value_of(setting, usual);
   return value == value_of(setting, other) && setting.name != std::string("fixed")
              ? "; default " + shortest(static_cast<float>(value))
              : "";
 }
 
+/* What breaks: a preset by name, or the force that breaks it. Options of single limits override it. */
+void with_presets(CLI::App *command, std::map<std::string, double> &breaking) {
+  std::string names;
+  for (const GraspPreset &preset : grasp_presets()) {
+    names += (names.empty() ? "" : ", ") + std::string(preset.name) + " (" +
+             shortest(static_cast<float>(preset.breaks_N)) + " N)";
+  }
+  auto *preset = command->add_option_function<std::string>(
+      "--preset",
+      [&breaking](const std::string &name) {
+        breaking = typed([&] { return preset_values(name); });
+      },
+      "Cap, start, floor and approach for what breaks: " + names);
+  preset->type_name("NAME")->group("Limits");
+  command
+      ->add_option_function<std::string>(
+          "--breaks",
+          [&breaking](const std::string &text) {
+            const auto breaks_N = to_double(text);
+            if (!breaks_N || *breaks_N < 1.0 || *breaks_N > 100.0) {
+              wrong_value("--breaks", text, "N, 1 to 100");
+            }
+            breaking = breaking_values(*breaks_N);
+          },
+          "The same, for an object that this force breaks")
+      ->type_name("N")
+      ->excludes(preset)
+      ->group("Limits");
+}
+
 void with_limits(CLI::App *command, std::map<std::string, double> &limits) {
   const auto models = gripper_models();
-  const grip_settings usual = settings_for(models.front(), {});
-  const grip_settings other = settings_for(models.back(), {});
+  const GripSettings usual = settings_for(models.front(), {});
+  const GripSettings other = settings_for(models.back(), {});
   for (const GraspSetting &setting : grasp_settings()) {
     std::string option = std::string("--") + setting.name;
     command
@@ -73,6 +104,7 @@ void add_grasp(CommandLine &line) {
   with_transport(command, options->reach);
   with_colour(command, options->colour);
   with_gripper_line(command, options->gripper);
+  with_presets(command, options->breaking);
   with_limits(command, options->limits);
   command->footer("Exit status:\n"
                   "  0  as asked, the gripper holding or open\n"

@@ -1,19 +1,10 @@
 /* An image for the emulated RP2040: run_on_chip.mjs plays the debugger that its breakpoint calls,
- * takes the last CRC and names the next press, and counts the cycles between two others. */
+ * takes the last CRC and names the next press. */
 #include "fit_bits.h"
-#include "grip_bits.h"
 #include "port/port.h"
 
 /* In this order, as run_on_chip.mjs reads and writes them. */
 static struct { uint32_t kernel, press, crc; } job;
-
-void grip_bits_count(bool on) {
-  if (on) {
-    __asm volatile("bkpt 2" : : : "memory");
-  } else {
-    __asm volatile("bkpt 3" : : : "memory");
-  }
-}
 
 int main(void) {
   fit_bits_init();

@@ -1,0 +1,23 @@
+// A set force by eq. (5) and (6) of De Clercq et al., RA-L 2022:
+//   (5)  e = F_des - (F_l + F_r) / 2
+//   (6)  dP = k e + k_i integral(e) + k_d e'
+#pragma once
+
+#include "grasp/control/reach.hpp"
+
+#include <cstdint>
+
+namespace fingertip {
+
+class GripFixed {
+public:
+  void begin() { *this = GripFixed(); }
+  std::uint32_t step(const GripFelts &felt, const GripSettings &settings,
+                     const GripperTraits &traits, double now_s, GripReach &reach);
+
+private:
+  bool runs_ = false;
+  double stepped_s_ = 0.0, error_N_ = 0.0, integral_N_s_ = 0.0;
+};
+
+} // namespace fingertip

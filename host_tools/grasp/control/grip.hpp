@@ -1,0 +1,136 @@
+// The controller of a grasp: frames of two fingertips and a gripper's status in, one command out.
+//
+//   Grip grip(default_settings(traits), traits);
+//   grip.request(GRIP_REQUEST_GRASP);
+//   for (;;) {
+//     grip.take(finger, touch);         for every frame of either fingertip
+//     grip.take(status);                for every answer of the gripper
+//     grip.step(now_s, command);
+//   }
+//
+// Two modes. `fixed` holds a set force: De Clercq et al., RA-L 2022, eq. (5) and (6). `hold` holds
+// an object of unknown weight by its load: grip force = margin x tangential load / friction. The
+// grip rises at once where the object slides, and falls slowly while it rests. CONTROL.md has the
+// reasons.
+//
+// No clock, no allocation, deterministic. Times are the caller's, in s, on one clock for all
+// inputs. Forces are N, lengths mm, of one fingertip: its normal force is the grip force.
+#pragma once
+
+#include "grasp/control/finger.hpp"
+#include "grasp/control/fixed.hpp"
+#include "grasp/control/hold.hpp"
+#include "grasp/control/reach.hpp"
+#include "grasp/control/settings.hpp"
+#include "grasp/gripper/gripper.hpp"
+
+#include <array>
+#include <cstdint>
+
+namespace fingertip {
+
+// What the gripper is to do.
+enum GripMotion : std::uint8_t {
+  GRIP_STAY,     // hold the position: nothing is sent but what keeps the line alive
+  GRIP_ACTIVATE, // only where nothing is gripped
+  GRIP_MOVE,
+};
+struct GripCommand : GripperMove {
+  std::uint8_t motion = GRIP_STAY; // GripMotion
+};
+
+// Romano et al., "Human-inspired robotic grasp control with tactile sensing", IEEE Trans. Robotics
+// 27, 2011, has the course of it.
+enum GripState : std::uint8_t {
+  GRIP_IDLE, // no request yet
+  GRIP_ACTIVATING,
+  GRIP_APPROACH, // closing until both fingertips feel the object
+  GRIP_SQUEEZE,  // up to the start force
+  GRIP_READY,    // that force stands; the present load counts as zero
+  GRIP_HOLDING,
+  GRIP_SLIPPING, // as HOLDING, and an object that slides is being caught
+  GRIP_STILL,    // the width stays, because it was asked for
+  GRIP_RELEASE,  // opening, because it was asked for
+  GRIP_OPEN,     // done
+  GRIP_DROPPED,  // nothing is between the fingertips any more; the width stays
+  GRIP_MISSED,   // closed, and nothing was there
+  GRIP_FAULT,    // the width stays
+  GRIP_STATES,
+};
+
+enum GripRequest { GRIP_REQUEST_GRASP, GRIP_REQUEST_HOLD, GRIP_REQUEST_RELEASE };
+
+struct GripReport {
+  std::uint8_t state = GRIP_IDLE; // GripState
+  std::uint32_t trouble = 0;      // GripTrouble
+  std::uint8_t gripper_fault = 0; // its own code; that of FAULT stays, until there is another
+  double wanted_N = 0.0;          // the grip force that it aims at
+  double force_N = 0.0;           // as reported: of both fingertips
+  std::array<double, GRIP_FINGERS> felt_N{}; // and of each
+  double load_N = 0.0;            // tangential load of one fingertip since READY; 0: unknown
+  double margin = 0.0;            // force x friction / load; 0: no load
+  double friction = 0.0;
+  double width_mm = 0.0;
+  double delay_s = 0.0; // from a fingertip's measurement to here
+  std::uint32_t slides = 0; // so many since GRASP
+};
+
+class Grip {
+public:
+  Grip(const GripSettings &settings, const GripperTraits &traits);
+
+  // Ignores a frame or an answer that is no newer than the last.
+  void take(std::size_t finger, const GripTouch &touch);
+  void take(const GripperStatus &status);
+
+  // GRASP: from IDLE, OPEN, DROPPED, MISSED, STILL. HOLD: the width stays, from every state but
+  // FAULT. RELEASE: opens, from every state but a FAULT of the gripper itself. False: not from this
+  // state.
+  bool request(GripRequest request);
+
+  // Decides what to do now. Call it after every input, and every 10 ms without one.
+  GripReport step(double now_s, GripCommand &command);
+
+private:
+  void enter(GripState state);
+  bool is_grasping() const;
+  void look();
+  bool is_gone();
+  std::uint32_t gripper_trouble();
+  std::uint32_t go_on();
+  void approach();
+  std::uint32_t squeeze();
+  std::uint32_t make_ready();
+  std::uint32_t hold();
+  std::uint32_t aim(double wanted_N, GripReach::Haste haste);
+  void ramp(double to_mm, double speed_mm_s);
+  double dead_s() const;
+  double start_force() const;
+  void tell(GripCommand &command) const;
+  GripReport report() const;
+
+  GripSettings settings_;
+  GripperTraits traits_;
+  std::array<GripFinger, GRIP_FINGERS> fingers_;
+  GripFelts felt_;
+  GripReach reach_;
+  GripHold hold_;
+  GripFixed fixed_;
+  GripperStatus status_;
+  bool hears_status_ = false;
+  double now_s_ = 0.0, since_s_ = 0.0; // the state has been since
+  GripState state_ = GRIP_IDLE;
+  std::uint32_t trouble_ = 0, fault_trouble_ = 0; // as of the last step; that of FAULT,
+  std::uint8_t fault_code_ = 0;                   // and the gripper's own
+  double fault_s_ = 0.0;                          // of the first of its bad answers in a row
+  double wanted_N_ = 0.0;
+  double filled_s_ = 0.0; // when a fingertip last felt anything
+  double stood_s_ = 0.0;  // the gripper has not stood where an approach ends
+  double ramped_s_ = 0.0; // the last step of an approach or a release
+  double even_s_ = 0.0;   // the fingertips' forces were last alike, or the gripper moved
+  bool may_activate_ = false, is_entered_ = false;
+  bool still_grasps_ = false; // STILL with an object
+  bool is_blind_ = false;     // squeezed without a fingertip that could tell a load
+};
+
+} // namespace fingertip

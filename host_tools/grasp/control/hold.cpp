@@ -1,0 +1,181 @@
+#include "grasp/control/hold.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fingertip {
+
+namespace {
+
+constexpr double FRICTION_LEAST = 0.08, FRICTION_MOST = 1.5;
+constexpr double LOAD_NOISE_N = 0.06;
+// A load that rises above all of late counts as it is, with its rate. Below that it swings on the
+// rubber, or has begun to slide, and its mean counts.
+constexpr double RATE_s = 0.02, MEAN_s = 0.06, FORGETS_s = 0.3;
+constexpr double AHEAD_N = 3.0; // a rate is believed to add that much, or as much again
+constexpr double SWINGS_s = 0.25; // what was caught swings for so long
+constexpr double HELD_s = 0.05;   // a ratio that held, the mean of so long
+// A load is steady that changes by less than this share within 0.1 s, or by less than that.
+constexpr double STEADY = 0.15, STEADY_s = 0.1, STEADY_N = 0.15;
+constexpr double LOADED_s = 0.3; // a load has been steady
+// A reported slide that is slower is a contact that settles, until it has lasted.
+constexpr double CREEPS_mm_s = 4.0, CREEPS_s = 0.15;
+// What held within so long does not slide at a smaller share of that ratio, unless it has become
+// slick; and then it slides so far.
+constexpr double LATELY_s = 0.2, BEGINS_AT = 0.8, FAR_mm = 1.0;
+// At a smaller share of what held of late it holds: squeezed rubber and what has just been caught
+// move a contact so far.
+constexpr double HOLDS_AT = 0.6, NO_SLIDE_mm = 0.5;
+// What slides teaches friction as long as it does not slow down: then the grip holds already.
+constexpr double SLOWS = 0.85;
+// A slide raises the grip at once: by what the ratio says that it slides at, within these limits,
+// or, of an unknown load, by so much, and again after the gripper's answer and so long.
+constexpr double RAISE_LEAST = 1.12, RAISE_MOST = 1.6, RAISE_UNKNOWN = 1.5, AGAIN_s = 0.015;
+
+} // namespace
+
+void GripFriction::held(double ratio) {
+  held_ = std::clamp(ratio, held_, FRICTION_MOST);
+}
+
+void GripFriction::slid(double ratio) {
+  ratio = std::clamp(ratio, FRICTION_LEAST, FRICTION_MOST);
+  slid_ = slid_ > 0.0 ? std::min(slid_, ratio) : ratio;
+}
+
+double GripFriction::value(double assumed) const {
+  return slid_ > 0.0 ? slid_ : std::max(assumed, held_);
+}
+
+void GripLoad::rests(double load_N, double passed_s, bool swings) {
+  peak_N_ -= std::min(passed_s / FORGETS_s, 1.0) * (peak_N_ - load_N_);
+  const bool rises = load_N >= peak_N_ && !swings;
+  rate_N_s_ = rises ? std::max(load_N - slow_N_ - LOAD_NOISE_N, 0.0) / RATE_s : 0.0;
+  slow_N_ += std::min(passed_s / RATE_s, 1.0) * (load_N - slow_N_);
+  if (rises) {
+    load_N_ = peak_N_ = load_N;
+  } else {
+    load_N_ += std::min(passed_s / MEAN_s, 1.0) * (load_N - load_N_);
+  }
+}
+
+double GripLoad::ahead_N(double seconds) const {
+  return load_N_ + std::min(rate_N_s_ * seconds, std::max(load_N_, AHEAD_N));
+}
+
+bool GripLoad::is_steady() const {
+  return rate_N_s_ * STEADY_s < std::max(STEADY * load_N_, STEADY_N);
+}
+
+void GripLoad::begins_to_slide() {
+  is_known_ = is_steady();
+  peak_N_ = std::max(peak_N_, load_N_);
+  rate_N_s_ = is_known_ ? 0.0 : rate_N_s_;
+}
+
+void GripLoad::slides(double load_N) {
+  load_N_ = is_known_ ? load_N_ : std::max(load_N_, load_N);
+}
+
+void GripHold::begin() {
+  *this = GripHold();
+}
+
+double GripHold::need_N(const GripSettings &settings, double dead_s) const {
+  const double load_N = sliding_ ? load_.now_N() : load_.ahead_N(dead_s);
+  const double margin = settings.margin * (slides_ > 0 ? settings.slid : 1.0);
+  return margin * load_N / friction(settings);
+}
+
+void GripHold::slide(const GripFelts &felt, const GripSettings &settings, double now_s,
+                     double dead_s, double passed_s) {
+  const double ratio = std::max(felt.ratio, FRICTION_LEAST);
+  if (!sliding_) {
+    sliding_ = true;
+    slides_++;
+    raised_s_ = now_s;
+    fastest_mm_s_ = slid_mm_ = 0.0;
+    load_.begins_to_slide();
+    const double needed = settings.margin * load_.now_N() / ratio / std::max(felt.grip_N, 0.1);
+    raised_N_ = felt.grip_N * (load_.is_known() ? std::clamp(needed, RAISE_LEAST, RAISE_MOST)
+                                                : RAISE_UNKNOWN);
+  }
+  slid_s_ = now_s;
+  slid_mm_ += felt.speed_mm_s * passed_s;
+  fastest_mm_s_ = std::max(fastest_mm_s_, felt.speed_mm_s);
+  load_.slides(felt.load_N);
+  if (felt.speed_mm_s < SLOWS * fastest_mm_s_) {
+    return;
+  }
+  if (felt.load_N + LOAD_NOISE_N >= BEGINS_AT * lately_ * felt.grip_N || slid_mm_ > FAR_mm) {
+    friction_.slid(ratio);
+  }
+  if (now_s - raised_s_ > dead_s + AGAIN_s) {
+    // The gripper has had the time to answer: what still does not hold is more than is known.
+    if (load_.is_known() && felt.grip_N >= 0.95 * need_N(settings, dead_s)) {
+      load_.doubt();
+    }
+    raised_N_ = load_.is_known() ? raised_N_ : std::max(raised_N_, RAISE_UNKNOWN * felt.grip_N);
+    raised_s_ = now_s;
+  }
+}
+
+void GripHold::look(const GripFelts &felt, const GripSettings &settings, double now_s,
+                    double dead_s) {
+  const double passed_s = std::clamp(now_s - looked_s_, 0.0, 0.1);
+  looked_s_ = now_s;
+  still_s_ = felt.slides ? still_s_ : now_s;
+  moved_mm_ = felt.slides ? moved_mm_ + felt.speed_mm_s * passed_s : 0.0;
+  const bool creeps = felt.tells_load && felt.speed_mm_s < CREEPS_mm_s &&
+                      now_s - still_s_ < CREEPS_s;
+  const bool holds = felt.tells_load && moved_mm_ < NO_SLIDE_mm &&
+                     felt.load_N + LOAD_NOISE_N < HOLDS_AT * lately_ * felt.grip_N;
+  if (felt.slides && (sliding_ || !(creeps || holds))) {
+    slide(felt, settings, now_s, dead_s, passed_s);
+    return;
+  }
+  sliding_ = false;
+  if (!felt.tells_load) {
+    return;
+  }
+  has_told_ = true;
+  load_.rests(felt.load_N, passed_s, slides_ > 0 && now_s - slid_s_ < SWINGS_s);
+  ratio_ += std::min(passed_s / HELD_s, 1.0) * (felt.ratio - ratio_);
+  lately_ -= std::min(passed_s / LATELY_s, 1.0) * lately_;
+  if (felt.grip_N > 2.0 * settings.touch_N) {
+    lately_ = std::max(lately_, felt.ratio);
+    felt.slides ? void() : friction_.held(ratio_);
+  }
+  steady_s_ = load_.now_N() > LOADED_N && load_.is_steady() ? steady_s_ : now_s;
+  was_loaded_ = was_loaded_ || now_s - steady_s_ > LOADED_s;
+}
+
+double GripHold::wants(const GripFelts &felt, const GripSettings &settings, double now_s,
+                   double dead_s) {
+  const double passed_s = begun_ ? now_s - now_s_ : 0.0;
+  if (!begun_) {
+    begun_ = true;
+    looked_s_ = still_s_ = steady_s_ = now_s;
+    wanted_N_ = felt.grip_N;
+  }
+  now_s_ = now_s;
+  if (felt.fresh) {
+    look(felt, settings, now_s, dead_s);
+  }
+  const double least_N = !has_told_ && !felt.tells_load ? settings.blind_N
+                         : was_loaded_                   ? settings.floor_N
+                                                        : settings.start_N;
+  double need = std::max(need_N(settings, dead_s), least_N);
+  need = sliding_ ? std::max(need, raised_N_) : need;
+  need = std::min(need, settings.cap_N);
+  const bool rests = felt.tells_load && !felt.slides &&
+                     (slides_ == 0 || now_s - slid_s_ > settings.rest_s);
+  if (need >= wanted_N_) {
+    wanted_N_ = need;
+  } else if (rests) {
+    wanted_N_ -= (wanted_N_ - need) * (1.0 - std::exp(-settings.decay_1_s * passed_s));
+  }
+  return wanted_N_;
+}
+
+} // namespace fingertip

@@ -1,0 +1,249 @@
+#include "grasp/control/reach.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fingertip {
+
+namespace {
+
+// Layers of 12 mm under spheres of 6 to 30 mm, 1 to 10 N (host_tools/simulation/twin).
+constexpr double EXPONENT = 1.6;
+// Than what is known, where a cap is to hold; and where one fingertip presses alone, whose rubber
+// the moves of both do not teach.
+constexpr double STIFFER = 1.1, ALONE_STIFFER = 1.6;
+// Both pads, at the force of a touch; less is not told from nothing.
+constexpr double TOUCHED_mm = 0.3;
+constexpr double LEAST_N = 0.05;
+// What is learnt: from moves that make so much, by so large a share, within these limits.
+constexpr double TEACHES_N = 0.15, LEARNS = 0.5, LEAST_STEEP = 0.4, MOST_STEEP = 3.0;
+
+constexpr double SPACED_s = 0.003;     // widths of the ring
+constexpr double WIDTH_LAGS_s = 0.008; // newer forces tell nothing while the gripper moves
+constexpr double SHOWS_s = 0.02;       // after a move, in the force, whatever the clocks differ by
+constexpr double POLL_SHARE = 0.05;    // that an answer has in the mean
+// Of what the least move makes: less may be missing, and more than that must be spare.
+constexpr double MISSES = 0.2, SPARES = 1.25;
+constexpr double NEAR = 0.03;             // of the wanted force: near enough
+constexpr double WEAK = 0.8;              // and too weak, where the cap leaves no room
+constexpr double SHORT_mm = 0.5;           // a move while squeezing
+constexpr double OPENS_mm = 0.3;           // at once
+// Of a fingertip's force, below the cap. UNCERTAIN contacts report far more than the force is off;
+// chosen with cylinders of fingertip_grasp_trials, seed 1.
+constexpr double SDS = 2.5, SD_LEAST = 0.04, SD_MOST = 0.06;
+
+// The larger force as it may truly be.
+double most_N(const GripFelts &felt) {
+  return felt.high_N + SDS * std::clamp(felt.sd_N, SD_LEAST * felt.high_N, SD_MOST * felt.high_N);
+}
+
+double indentation_mm(double width_mm, double touch_mm) {
+  return std::max(touch_mm + TOUCHED_mm - width_mm, TOUCHED_mm);
+}
+
+} // namespace
+
+void GripRubber::begin(double first_width_mm) {
+  *this = GripRubber();
+  first_mm_ = both_mm_ = first_width_mm;
+}
+
+double GripRubber::force_at(double to_mm, double force_N, double from_mm) const {
+  const double grown = indentation_mm(to_mm, both_mm_) / indentation_mm(from_mm, both_mm_);
+  return std::max(0.0, force_N + std::max(force_N, LEAST_N) * (std::pow(grown, EXPONENT) - 1.0) *
+                                     (to_mm < from_mm ? closing_ : opening_));
+}
+
+double GripRubber::width_below(double cap_N, double force_N, double from_mm, bool alone) const {
+  const double steep = (alone ? ALONE_STIFFER : STIFFER) * closing_;
+  const double share = (cap_N - force_N) / std::max(force_N, LEAST_N) / steep;
+  const double grown = std::pow(std::max(1.0 + share, 0.0), 1.0 / EXPONENT);
+  return from_mm - (grown - 1.0) * indentation_mm(from_mm, alone ? first_mm_ : both_mm_);
+}
+
+double GripRubber::width_for(double wanted_N, double force_N, double from_mm) const {
+  const double share = (wanted_N - force_N) / std::max(force_N, LEAST_N) /
+                       (wanted_N > force_N ? closing_ : opening_);
+  const double grown = std::pow(std::max(1.0 + share, 0.0), 1.0 / EXPONENT);
+  return from_mm - (grown - 1.0) * indentation_mm(from_mm, both_mm_);
+}
+
+void GripRubber::learn(double force_N, double width_mm) {
+  if (has_pair_) {
+    double &steep = width_mm < pair_mm_ ? closing_ : opening_;
+    const double made_N = force_N - pair_N_;
+    const double expected_N = (force_at(width_mm, pair_N_, pair_mm_) - pair_N_) / steep;
+    if (std::abs(expected_N) < TEACHES_N) {
+      has_pair_ = std::abs(width_mm - pair_mm_) > 1e-6; // a way of many small moves teaches too
+      pair_N_ = has_pair_ ? pair_N_ : force_N;
+      pair_mm_ = has_pair_ ? pair_mm_ : width_mm;
+      has_pair_ = true;
+      return;
+    }
+    const double seen = std::clamp(made_N / expected_N, LEAST_STEEP, MOST_STEEP);
+    steep += LEARNS * (seen - steep);
+  }
+  has_pair_ = true;
+  pair_N_ = force_N;
+  pair_mm_ = width_mm;
+}
+
+void GripReach::take(const GripperStatus &status, double silent_s) {
+  const double t_s = 1e-6 * static_cast<double>(status.host_us);
+  if (is_heard_) {
+    const double passed_s = t_s - 1e-6 * static_cast<double>(status_.host_us);
+    // Between what was said before a silence and after it no width is known.
+    if (passed_s > silent_s) {
+      count_ = 0;
+    } else {
+      poll_s_ += POLL_SHARE * (passed_s - poll_s_);
+    }
+  } else {
+    poll_s_ = traits_.poll_s;
+  }
+  status_ = status;
+  is_heard_ = true;
+  const double before_s = widths_[(newest_ + widths_.size() - 1) % widths_.size()].t_s;
+  if (count_ < 2 || widths_[newest_].t_s - before_s >= SPACED_s) {
+    newest_ = (newest_ + 1) % widths_.size();
+    count_ = std::min(count_ + 1, widths_.size());
+  }
+  widths_[newest_] = {t_s, status.width_mm};
+}
+
+bool GripReach::knows(double t_s) const {
+  const std::size_t oldest = (newest_ + widths_.size() + 1 - count_) % widths_.size();
+  return count_ > 0 && widths_[oldest].t_s <= t_s;
+}
+
+double GripReach::width_at(double t_s) const {
+  Width after = widths_[newest_];
+  for (std::size_t back = 1; back < count_ && after.t_s > t_s; back++) {
+    const Width before = widths_[(newest_ + widths_.size() - back) % widths_.size()];
+    if (before.t_s <= t_s) {
+      const double share = (t_s - before.t_s) / (after.t_s - before.t_s);
+      return before.width_mm + share * (after.width_mm - before.width_mm);
+    }
+    after = before;
+  }
+  return after.width_mm;
+}
+
+bool GripReach::stands(double now_s) const {
+  const double t_s = 1e-6 * static_cast<double>(status_.host_us);
+  const double late_s = std::max(now_s - t_s, 0.0);
+  return !status_.moving && t_s > aimed_s_ + traits_.latency_s + late_s + poll_s_;
+}
+
+bool GripReach::has_come(double now_s, double frame_s) const {
+  return stands(now_s) && frame_s > aimed_s_ + traits_.latency_s + poll_s_ + SHOWS_s;
+}
+
+// Where it is going to be. Where it stands, it makes no move that is shorter than its deadband.
+double GripReach::coming_mm(double now_s) const {
+  const bool stays = stands(now_s) &&
+                     std::abs(status_.width_mm - target_mm_) <= traits_.deadband_mm + 1e-9;
+  return stays ? status_.width_mm : target_mm_;
+}
+
+double GripReach::least_mm() const {
+  return traits_.step_mm * std::max(1.0, std::ceil(traits_.deadband_mm / traits_.step_mm - 1e-9));
+}
+
+bool GripReach::limits_itself(const GripSettings &settings) const {
+  return traits_.force_min_N <= LIMIT * settings.cap_N;
+}
+
+double GripReach::least_move_N(double force_N) const {
+  return rubber_.force_at(target_mm_ - least_mm(), force_N, target_mm_) - force_N;
+}
+
+double GripReach::last_below_cap_mm(const GripFelts &felt, const GripSettings &settings) const {
+  const double least_mm =
+      rubber_.width_below(settings.cap_N, most_N(felt), width_at(felt.t_s), felt.is_alone());
+  const double steps = std::floor((target_mm_ - least_mm) / traits_.step_mm);
+  return target_mm_ - std::max(steps, 0.0) * traits_.step_mm;
+}
+
+double GripReach::allowed(double width_mm, const GripFelts &felt, const GripSettings &settings,
+                      std::uint32_t &trouble) const {
+  const double least_mm = touch_width_mm() - settings.travel_cap_mm;
+  if (width_mm < least_mm) {
+    width_mm = least_mm;
+    trouble |= GRIP_AT_TRAVEL_CAP;
+  }
+  // What is not believed to be below the cap is not added to.
+  if (width_mm < target_mm_ && (felt.over || felt.fingers == 0)) {
+    width_mm = target_mm_;
+  }
+  // Where it touched is as far as it opens without being asked to.
+  return std::clamp(width_mm, 0.0, std::max(target_mm_, touch_width_mm()));
+}
+
+std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt,
+                         const GripSettings &settings, double now_s) {
+  std::uint32_t trouble = 0;
+  if (felt.fingers == 0 || !knows(felt.t_s)) {
+    return trouble;
+  }
+  const double status_s = 1e-6 * static_cast<double>(status_.host_us);
+  const bool come = has_come(now_s, felt.t_s);
+  if (!stands(now_s) && felt.t_s > status_s + WIDTH_LAGS_s) {
+    return trouble; // forces of widths that are not known yet
+  }
+  const double width_mm = width_at(felt.t_s), coming = coming_mm(now_s);
+  if (come) {
+    rubber_.learn(felt.grip_N, width_mm);
+  }
+  if (haste == Haste::patient && !come) {
+    return trouble;
+  }
+  const double low_N = haste == Haste::patient ? felt.low_N : felt.grip_N;
+  const auto low_at = [&](double to_mm) { return rubber_.force_at(to_mm, low_N, width_mm); };
+  const double now_N = low_at(coming), step_mm = traits_.step_mm;
+  const bool standing = std::abs(coming - status_.width_mm) < 1e-6;
+  const double least = standing ? least_mm() : step_mm;
+  const double closes_N = low_at(coming - least) - now_N;
+  const double opens_N = now_N - low_at(coming + least);
+  const double near_N = NEAR * wanted_N;
+  // What tells no load will not tell a slide either.
+  const bool exact = haste == Haste::slides || !felt.tells_load;
+  const double misses_N = exact ? near_N : std::max(near_N, MISSES * closes_N);
+  double to_mm = coming;
+  if (now_N < wanted_N - misses_N) {
+    const double enough_mm = rubber_.width_for(wanted_N - misses_N, low_N, width_mm);
+    double way_mm = step_mm * std::ceil((coming - enough_mm) / step_mm - 1e-6);
+    way_mm = haste == Haste::patient ? std::min(way_mm, step_mm * std::floor(SHORT_mm / step_mm))
+                                     : way_mm;
+    way_mm = std::max(way_mm, least);
+    const double room_mm =
+        coming - rubber_.width_below(settings.cap_N, most_N(felt), width_mm, felt.is_alone());
+    if (way_mm > room_mm) {
+      // What is held too weakly gets the least move all the same, if the gripper's own limit keeps
+      // it below the cap.
+      const bool too_weak = !felt.is_alone() && (exact || now_N < WEAK * wanted_N);
+      way_mm = step_mm * std::floor(room_mm / step_mm);
+      way_mm = too_weak && limits_itself(settings) ? std::max(way_mm, least) : way_mm;
+      trouble |= GRIP_AT_CAP;
+    }
+    to_mm = way_mm >= least - 1e-9 ? coming - way_mm : coming;
+  } else if (haste != Haste::patient && come &&
+             now_N - wanted_N > std::max(near_N, SPARES * opens_N)) {
+    const double enough_mm = rubber_.width_for(wanted_N + near_N, low_N, width_mm);
+    const double way_mm = std::min(step_mm * std::floor((enough_mm - coming) / step_mm + 1e-6),
+                                   std::max(step_mm * std::floor(OPENS_mm / step_mm), least));
+    to_mm = way_mm >= least - 1e-9 ? coming + way_mm : coming;
+  }
+  if (to_mm != coming) {
+    // In whole steps of where it was last sent.
+    const double steps = std::round((to_mm - target_mm_) / step_mm);
+    const double sent_mm = allowed(target_mm_ + steps * step_mm, felt, settings, trouble);
+    if (sent_mm != target_mm_) {
+      target_mm_ = sent_mm;
+      aimed_s_ = now_s;
+    }
+  }
+  return trouble;
+}
+
+} // namespace fingertip

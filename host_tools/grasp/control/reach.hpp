@@ -1,0 +1,103 @@
+// From a wanted force to a width: where the gripper is, how the rubber's force follows it, and the
+// least move whose predicted force is enough.
+#pragma once
+
+#include "grasp/control/finger.hpp"
+#include "grasp/gripper/gripper.hpp"
+
+#include <array>
+#include <cstdint>
+
+namespace fingertip {
+
+// Force over width. The shape is a power of the indentation; how steep it is, closing and opening,
+// is learnt from the moves themselves.
+class GripRubber {
+public:
+  // One fingertip touches; both do.
+  void begin(double first_width_mm);
+  void both_touch(double width_mm) { both_mm_ = width_mm; }
+  double both_mm() const { return both_mm_; }
+  // The force at another width, from what it is at this one.
+  double force_at(double to_mm, double force_N, double from_mm) const;
+  // The width for another force.
+  double width_for(double wanted_N, double force_N, double from_mm) const;
+  // The least width at which a fingertip stays below the cap, on the stiffest rubber. alone: the
+  // other does not touch.
+  double width_below(double cap_N, double force_N, double from_mm, bool alone) const;
+  // A pair of force and width, both at rest.
+  void learn(double force_N, double width_mm);
+  void forget_pair() { has_pair_ = false; }
+
+private:
+  double first_mm_ = 0.0, both_mm_ = 0.0;
+  double closing_ = 1.0, opening_ = 1.3; // steeper than the power law by so much
+  bool has_pair_ = false;
+  double pair_N_ = 0.0, pair_mm_ = 0.0;
+};
+
+class GripReach {
+public:
+  // Of the cap: the gripper's own limit.
+  static constexpr double LIMIT = 0.97;
+
+  explicit GripReach(const GripperTraits &traits) : traits_(traits) {}
+
+  void take(const GripperStatus &status, double silent_s);
+  // The gripper had this width then; false: not known.
+  bool knows(double t_s) const;
+  double width_at(double t_s) const;
+  double poll_s() const { return poll_s_; } // between two answers, the mean of some
+  // Where it was last sent.
+  double target_mm() const { return target_mm_; }
+  void send(double width_mm) { target_mm_ = width_mm; }
+  void stop() { target_mm_ = status_.width_mm; }
+  // What was sent last has been made, and a frame since then tells of it.
+  bool has_come(double now_s, double frame_s) const;
+  bool stands(double now_s) const;
+
+  // One fingertip touches; both do. t_s: of the frames that tell it.
+  void first_touch(double t_s) { rubber_.begin(width_at(t_s)); }
+  void both_touch(double t_s) { rubber_.both_touch(width_at(t_s)); }
+  void approach_ends(double now_s) { aimed_s_ = now_s; } // it is still under way
+  double touch_width_mm() const { return rubber_.both_mm(); }
+  // A gripper makes no shorter move than this when it stands.
+  double least_mm() const;
+  // What that makes of this force, at where the gripper was last sent.
+  double least_move_N(double force_N) const;
+  // The last whole step from where it was last sent that keeps the fingertip that feels more below
+  // the cap.
+  double last_below_cap_mm(const GripFelts &felt, const GripSettings &settings) const;
+  // A width that no cap forbids.
+  double allowed(double width_mm, const GripFelts &felt, const GripSettings &settings,
+                 std::uint32_t &trouble) const;
+
+  enum class Haste {
+    patient, // closes only, by short moves, each after the last one shows
+    usual,
+    slides,  // at once
+  };
+  // Sends it to where the force is what is wanted. Troubles: which cap keeps it from that.
+  std::uint32_t aim(double wanted_N, Haste haste, const GripFelts &felt,
+                    const GripSettings &settings, double now_s);
+
+private:
+  double coming_mm(double now_s) const;
+  // Its own limit of force can be set to the cap.
+  bool limits_itself(const GripSettings &settings) const;
+
+  GripperTraits traits_;
+  GripperStatus status_;
+  GripRubber rubber_;
+  bool is_heard_ = false;
+  double target_mm_ = 0.0;
+  double aimed_s_ = 0.0; // when it last changed for a force
+  double poll_s_ = 0.0;
+  struct Width {
+    double t_s, width_mm;
+  };
+  std::array<Width, 64> widths_{}; // ring
+  std::size_t newest_ = 0, count_ = 0;
+};
+
+} // namespace fingertip

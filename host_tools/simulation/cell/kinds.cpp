@@ -1,0 +1,255 @@
+#include "simulation/cell/kinds.hpp"
+
+#include "libfingertip/random.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace fingertip::cell {
+namespace {
+
+enum Stream : std::uint64_t { KIND = 861 };
+
+struct Range {
+  double low, high;
+};
+
+struct Ranges {
+  Range mass_kg, friction, kinetic_share, side, off_mm, lift_m_s2, delay_s;
+  double jitter_s, lost_share, gone_share;
+  std::uint64_t events_least, events_most;
+  double strength; // of events
+};
+
+// In the order of Kind. side: the two sides' friction differs by this share.
+constexpr Ranges RANGES[] = {
+    {{0.05, 0.6}, {0.4, 1.0}, {0.9, 1.0}, {0.0, 0.05}, {0, 1}, {0.2, 0.6}, {0, 0},
+     2e-4, 0, 0, 0, 0, 0},
+    {{0.05, 1.0}, {0.3, 1.0}, {0.75, 1.0}, {0.0, 0.15}, {0, 2}, {0.2, 1.2}, {0, 0.015},
+     1e-3, 0.02, 0.03, 1, 2, 0.7},
+    {{0.05, 1.0}, {0.25, 0.9}, {0.714, 1.0}, {0.0, 0.3}, {0, 3}, {0.5, 2.0}, {0.01, 0.04},
+     3e-3, 0.05, 0.08, 2, 3, 1.0},
+    {{0.05, 1.0}, {0.35, 1.0}, {0.75, 1.0}, {0.0, 0.15}, {0, 2}, {0.2, 1.2}, {0, 0.015},
+     1e-3, 0.02, 0, 1, 1, 1.0},
+    {{0.0, 0.0}, {0.35, 0.9}, {0.75, 1.0}, {0.0, 0.15}, {0, 3}, {0.2, 0.8}, {0, 0.015},
+     1e-3, 0.02, 0, 0, 1, 0.4},
+};
+
+struct Fragile {
+  const char *name;
+  Range mass_kg;
+  double crushes_N;
+};
+constexpr Fragile FRAGILE[] = {
+    {"egg", {0.05, 0.07}, 25.0}, {"strawberry", {0.015, 0.035}, 5.0}, {"cup", {0.01, 0.05}, 3.0}};
+
+// Acceleration of the minimum-jerk way of unit length and time is at most this.
+constexpr double EASED_ACCELERATION = 5.7735;
+
+double way_of(double t) {
+  t = std::clamp(t, 0.0, 1.0);
+  return t * t * t * (10.0 - 15.0 * t + 6.0 * t * t);
+}
+double speed_of(double t) {
+  return t <= 0.0 || t >= 1.0 ? 0.0 : 30.0 * t * t * (1.0 - t) * (1.0 - t);
+}
+double acceleration_of(double t) {
+  return t <= 0.0 || t >= 1.0 ? 0.0 : 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t);
+}
+
+double draw(Random &random, const Range &range) {
+  return random.uniform(range.low, range.high);
+}
+
+Event draw_event(Random &random, const Ranges &ranges, double begin_s, bool calm) {
+  Event event{};
+  event.begin_s = begin_s;
+  event.angle_rad = random.uniform(-M_PI, M_PI);
+  event.kind = calm ? (random.next() % 2 ? Event::Kind::carry : Event::Kind::push)
+                    : static_cast<Event::Kind>(random.next() % 6);
+  const double strength = ranges.strength;
+  switch (event.kind) {
+  case Event::Kind::knock:
+    event.amount = strength * random.uniform(0.03, 0.12);
+    event.seconds = random.uniform(0.01, 0.03);
+    break;
+  case Event::Kind::push:
+    event.amount = strength * random.uniform(0.3, 1.5);
+    event.seconds = random.uniform(0.3, 1.0);
+    break;
+  case Event::Kind::vibrate:
+    event.amount = strength * random.uniform(1.0, 5.0);
+    event.seconds = random.uniform(0.5, 1.5);
+    event.rate_Hz = random.uniform(4.0, 20.0);
+    break;
+  case Event::Kind::pour:
+    event.amount = strength * random.uniform(0.3, 1.5);
+    event.seconds = random.uniform(0.5, 2.0);
+    break;
+  case Event::Kind::carry:
+    event.amount = strength * random.uniform(1.0, 4.0);
+    event.seconds = random.uniform(0.4, 1.2);
+    break;
+  case Event::Kind::slick:
+    event.amount = strength * random.uniform(0.2, 0.5);
+    event.seconds = random.uniform(0.05, 0.4);
+  }
+  return event;
+}
+
+KindOfGrasp draw_once(Random &random, Kind kind) {
+  const Ranges &ranges = RANGES[static_cast<int>(kind)];
+  KindOfGrasp grasp{};
+  grasp.kind = kind;
+  grasp.mass_kg = ranges.mass_kg.low > 0.0
+                      ? random.log_uniform(ranges.mass_kg.low, ranges.mass_kg.high)
+                      : 0.0;
+  grasp.crushes_N = std::numeric_limits<double>::infinity();
+  if (kind == Kind::fragile) {
+    const Fragile &fragile = FRAGILE[random.next() % std::size(FRAGILE)];
+    grasp.object = fragile.name;
+    grasp.mass_kg = draw(random, fragile.mass_kg);
+    grasp.crushes_N = fragile.crushes_N;
+  }
+  const double at_1_mm_N = random.log_uniform(2.0, 5.0), apart = random.uniform(-0.1, 0.1);
+  const double friction = draw(random, ranges.friction);
+  const double side = (random.next() % 2 ? 0.5 : -0.5) * draw(random, ranges.side);
+  const double gain_sd = random.uniform(0.01, 0.05), ratio = random.uniform(0.02, 0.05);
+  const double delay_s = draw(random, ranges.delay_s);
+  for (int i = 0; i < 2; i++) {
+    const double sign = i == 0 ? 1.0 : -1.0, angle_rad = random.uniform(-M_PI, M_PI);
+    grasp.pads[static_cast<std::size_t>(i)] = {
+        at_1_mm_N * (1.0 + sign * apart),
+        random.uniform(0.06, 0.3),
+        friction * (1.0 + sign * side),
+        1.0 + gain_sd * std::clamp(random.normal(), -2.5, 2.5),
+        {ratio * std::cos(angle_rad), ratio * std::sin(angle_rad)},
+        random.uniform(-0.3, 0.3),
+        delay_s + random.uniform(0.0, 0.002)};
+  }
+  grasp.exponent = random.uniform(1.3, 1.9);
+  grasp.shear_N_mm = random.log_uniform(2.0, 6.0);
+  grasp.rubber_N_s_mm = random.uniform(0.004, 0.012);
+  grasp.kinetic_share = draw(random, ranges.kinetic_share);
+  grasp.stribeck_mm_s = random.log_uniform(1.0, 10.0);
+  grasp.width_mm = random.uniform(20.0, 60.0);
+  grasp.off_mm = (random.next() % 2 ? 1.0 : -1.0) * draw(random, ranges.off_mm);
+  grasp.table_friction = random.uniform(0.2, 0.6);
+  grasp.opens_mm = 2.0 * std::abs(grasp.off_mm) + random.uniform(2.0, 5.0);
+  grasp.waits_s = random.uniform(0.1, 0.4);
+  grasp.lift_mm = random.uniform(20.0, 100.0);
+  const double lift_m_s2 = draw(random, ranges.lift_m_s2);
+  grasp.lift_s = std::sqrt(EASED_ACCELERATION * 1e-3 * grasp.lift_mm / lift_m_s2);
+  double t_s = grasp.lift_s;
+  const std::uint64_t more = ranges.events_most - ranges.events_least + 1;
+  for (std::uint64_t left = ranges.events_least + random.next() % more; left > 0; left--) {
+    t_s += random.uniform(0.4, 0.8);
+    grasp.events.push_back(draw_event(random, ranges, t_s, kind == Kind::fragile));
+    Event &event = grasp.events.back();
+    if (kind == Kind::slick) {
+      event = {Event::Kind::slick, t_s, random.uniform(0.005, 0.06), random.uniform(0.25, 0.55),
+               0.0, 0.0};
+    }
+    t_s += event.seconds;
+  }
+  grasp.steady_s = t_s + 0.5;
+  grasp.ends_s = grasp.steady_s + 4.0;
+  grasp.jitter_s = ranges.jitter_s;
+  grasp.lost_share = ranges.lost_share;
+  const double gone = random.uniform(0.0, 1.0);
+  grasp.gone = gone < ranges.gone_share ? static_cast<int>(random.next() % 2) : -1;
+  grasp.gone_s = random.uniform(-0.1, grasp.steady_s);
+  grasp.poll_factor = random.uniform(1.6, 3.2);
+  return grasp;
+}
+
+} // namespace
+
+const char *name_of(Kind kind) {
+  constexpr const char *NAMES[] = {"gentle", "usual", "rough", "slick", "fragile"};
+  return NAMES[static_cast<int>(kind)];
+}
+
+const char *name_of(Event::Kind kind) {
+  constexpr const char *NAMES[] = {"knock", "push", "vibrate", "pour", "carry", "slick"};
+  return NAMES[static_cast<int>(kind)];
+}
+
+Kind kind_of(const std::string &name) {
+  for (const Kind kind : KINDS) {
+    if (name == name_of(kind)) {
+      return kind;
+    }
+  }
+  throw std::runtime_error("there is no kind \"" + name +
+                           "\"; choose one of: gentle usual rough slick fragile");
+}
+
+KindOfGrasp::Acts KindOfGrasp::acts(double t_s) const {
+  Acts acts;
+  acts.mass_kg = mass_kg;
+  acts.lifted_mm = lift_mm * way_of(t_s / lift_s);
+  acts.lift_mm_s = lift_mm * speed_of(t_s / lift_s) / lift_s;
+  acts.hand_m_s2.y = 1e-3 * lift_mm * acceleration_of(t_s / lift_s) / (lift_s * lift_s);
+  acts.table = t_s < lift_s;
+  for (const Event &event : events) {
+    const double share = (t_s - event.begin_s) / event.seconds;
+    const bool lasts = share > 0.0 && share < 1.0;
+    const Vector way{std::sin(event.angle_rad), std::cos(event.angle_rad)};
+    double hand_m_s2 = 0.0, push_N = 0.0;
+    switch (event.kind) {
+    case Event::Kind::knock:
+      push_N = lasts ? mass_kg * event.amount * 0.5 * M_PI / event.seconds * std::sin(M_PI * share)
+                     : 0.0;
+      break;
+    case Event::Kind::push:
+      push_N = lasts ? event.amount * mass_kg * GRAVITY_m_s2 *
+                           std::min(1.0, 8.0 * std::min(share, 1.0 - share))
+                     : 0.0;
+      break;
+    case Event::Kind::vibrate:
+      hand_m_s2 =
+          lasts ? event.amount * std::sin(2.0 * M_PI * event.rate_Hz * share * event.seconds)
+                : 0.0;
+      break;
+    case Event::Kind::pour:
+      acts.mass_kg += event.amount * mass_kg * way_of(share);
+      break;
+    case Event::Kind::carry:
+      hand_m_s2 = event.amount / EASED_ACCELERATION * acceleration_of(share);
+      break;
+    case Event::Kind::slick:
+      acts.friction_share *= 1.0 - event.amount * way_of(share);
+    }
+    acts.hand_m_s2.x += hand_m_s2 * way.x;
+    acts.hand_m_s2.y += hand_m_s2 * way.y;
+    acts.push_N.x += push_N * way.x;
+    acts.push_N.y += push_N * way.y;
+  }
+  return acts;
+}
+
+double KindOfGrasp::least_N(double t_s) const {
+  const Acts now = acts(t_s);
+  const double x_N = now.push_N.x - now.mass_kg * now.hand_m_s2.x;
+  const double y_N = now.push_N.y - now.mass_kg * (GRAVITY_m_s2 + now.hand_m_s2.y);
+  return std::hypot(x_N, y_N) / (now.friction_share * (pads[0].friction + pads[1].friction));
+}
+
+KindOfGrasp draw_grasp(Kind kind, std::uint64_t seed, std::uint64_t n) {
+  Random random(seed, KIND + static_cast<std::uint64_t>(kind), n);
+  for (;;) {
+    KindOfGrasp grasp = draw_once(random, kind);
+    double worst_N = 0.0;
+    for (double t_s = 0.0; t_s < grasp.steady_s; t_s += 0.01) {
+      worst_N = std::max(worst_N, grasp.least_N(t_s) / grasp.kinetic_share);
+    }
+    // What breaks before it holds is nobody's to grasp.
+    if (worst_N <= std::min(NEEDS_MOST_N, 0.5 * grasp.crushes_N)) {
+      return grasp;
+    }
+  }
+}
+
+} // namespace fingertip::cell
