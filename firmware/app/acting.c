@@ -30,7 +30,6 @@ void app_use_shape(struct app *app) {
   settings->dip_share = found ? (1.0f / 65536.0f) * (float)found->dip_share_q16 : 0.0f;
   settings->dip_sd_mm = found ? millimetres(found->dip_sd_um) : 0.0f;
   settings->cut_noises = profile ? 0 : DEFAULT_CUT_NOISES;
-  settings->without_load = profile || !DEFAULT_DOUBTS_LOAD;
 }
 
 #if FT_WITH_TANGENTIAL

@@ -9,7 +9,6 @@
 #include "config/build_info.h"
 #include "config/defaults.h"
 #include "config/geometry.h"
-#include "fit/fit_load.h"
 #include "port/port.h"
 #include "usb/cdc.h"
 
@@ -126,10 +125,6 @@ static void estimate_tangential_load(struct app *app) {
     tangential_estimate(&app->tangential_course, &app->fit_array, &app->fit_pad,
                         app->conditioned.pressure_Pa_q10, &app->fit_settings, &app->fit,
                         app->frame.saturated, app->frame.t_us, &app->tangential);
-    if (!app->tangential.valid) {
-      fit_doubt_load(&app->fit_array, app->conditioned.pressure_Pa_q10, &app->fit_settings,
-                     &app->fit);
-    }
   } else {
     memset(&app->tangential, 0, sizeof app->tangential);
     memset(&app->tangential_course, 0, sizeof app->tangential_course);

@@ -24,11 +24,9 @@
 #ifdef FINGERTIP_SCENE_PAPER
 #define DEFAULT_CUT_NOISES 0u
 #define DEFAULT_USES_SHAPE 0
-#define DEFAULT_DOUBTS_LOAD 0
 #else
 #define DEFAULT_CUT_NOISES 4u
-#define DEFAULT_USES_SHAPE 1  /* that a calibration found */
-#define DEFAULT_DOUBTS_LOAD 1 /* that its residual shows: fit_load.h */
+#define DEFAULT_USES_SHAPE 1 /* that a calibration found */
 #endif
 
 /* Force over 2 pi p0 sigma^2 of a pad that was never calibrated. A contact's tails are not

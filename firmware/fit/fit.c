@@ -3,8 +3,6 @@
 #include "common/bytes.h"
 #include "fit/fit_grid_solve.h"
 #include "fit/fit_limits.h"
-#include "fit/fit_load.h"
-#include "fit/fit_math.h"
 #include "fit/kernels.h"
 
 #include <math.h>
@@ -121,8 +119,6 @@ static enum ft_status make_array(struct fit_array *array, uint8_t sensor_count, 
     float y = y_mm[k] / pitch_mm;
     made.x[k] = x;
     made.y[k] = y;
-    made.apart_x_q16[k] = fit_apart_q16(x - made.x[0]);
-    made.apart_y_q16[k] = fit_apart_q16(y - made.y[0]);
     made.x_min = k == 0 || x - MARGIN < made.x_min ? x - MARGIN : made.x_min;
     made.x_max = k == 0 || x + MARGIN > made.x_max ? x + MARGIN : made.x_max;
     made.y_min = k == 0 || y - MARGIN < made.y_min ? y - MARGIN : made.y_min;
@@ -194,9 +190,6 @@ void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa
   if (rough) {
     leave_outlier_out(array, pressure_Pa_q10, usable, settings, result);
   }
-  if (!settings->without_load) {
-    fit_doubt_load(array, pressure_Pa_q10, settings, result);
-  }
 }
 
 #define TAKE_IF_IT_SUITS(name, suits, fits)                                                         \
@@ -214,7 +207,4 @@ void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10,
   uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
   usable &= all;
   FIT_OTHER_KERNELS(TAKE_IF_IT_SUITS) {}
-  if (!settings->without_load) {
-    fit_doubt_load(array, pressure_Pa_q10, settings, result);
-  }
 }

@@ -30,7 +30,6 @@ struct fit_array {
   bool is_line;                      /* the sensors lie on x line_x + y line_y = line_offset, and */
   float line_x, line_y, line_offset; /* (line_x, line_y) is of unit length */
   struct fit_grid_shape grid;
-  int32_t apart_x_q16[FT_MAX_SENSORS], apart_y_q16[FT_MAX_SENSORS]; /* x and y from the first's */
 };
 
 struct fit_settings {
@@ -56,9 +55,6 @@ struct fit_settings {
   uint16_t
       model_sd_q16; /* sd of the model's own error, as a share of the largest reading; 0: none */
   float location_sd_limit_mm; /* UNCERTAIN above it; 0: FIT_LOCATION_SD_LIMIT_mm */
-  /* Leaves the load that nobody estimates out of location_sd_mm (fit_load.h): for those who estimate
-   * it, and ask for it where there is no estimate. */
-  bool without_load;
 };
 #define FIT_LOCATION_SD_LIMIT_mm 0.6f
 #define FIT_PRIOR_WEIGHT 0.01f
@@ -80,8 +76,7 @@ struct fit_result {
   float sigma_mm;
   float force_N;           /* 2 pi p0 sigma^2 */
   float residual_rms_Pa;   /* over the sensors used */
-  float location_sd_mm;    /* radial: 63 % of errors are smaller, 98 % smaller than twice it; with
-                              what a load that nobody estimates does, by fit_load.h */
+  float location_sd_mm;    /* radial: 63 % of errors are smaller, 98 % smaller than twice it */
   float location_noise_mm; /* what of it is noise: how far a contact at rest jitters */
   float force_sd_N;
   float sigma_x_mm, sigma_y_mm; /* WIDTHS_VALID: of an elliptic Gaussian, along the axes */

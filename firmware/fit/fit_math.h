@@ -24,12 +24,6 @@ float fit_exp2_negative(float z);
  * multiplication and a conversion less than in soft float. */
 int32_t fit_fixed(float value, int q);
 
-/* A distance in pitches, Q16, at most 2^13: two of them can be subtracted. */
-static inline int32_t fit_apart_q16(float pitches) {
-  int32_t fixed = fit_fixed(pitches, 16);
-  return fixed > 1 << 29 ? 1 << 29 : fixed < -(1 << 29) ? -(1 << 29) : fixed;
-}
-
 /* mantissa * 2^exponent, rounded to nearest, as a float; what is too large becomes FIT_HUGE. */
 float fit_float(int32_t mantissa, int32_t exponent);
 

@@ -21,8 +21,6 @@ const SEARCH_CYCLES_MAX = 44500;
 const OUTLIER_CYCLES_MAX = 92500;
 /** A frame's tangential estimate, which follows the fit, with the image's pad. */
 const TANGENTIAL_CYCLES_MAX = 40000;
-/** What the residual shows of a load, which follows the fit where nobody estimates it. */
-const LOAD_CYCLES_MAX = 20000;
 /** Between the cheapest and the dearest press, share of the dearest: a contact at a bound has no widths to tell. */
 const SPREAD_MAX = 0.1;
 /** FINGERTIP_FIT_ITERATIONS. */
@@ -99,16 +97,6 @@ test(`the tangential estimate takes at most ${TANGENTIAL_CYCLES_MAX} cycles, nor
   const worst = Math.max(...[...presses, ...garbage].map((readings, i) => run(readings, i % 2 ? ALL : maskFor(readings, i)).cycles));
   t.diagnostic(`presses and garbage: at most ${worst} cycles`);
   assert.ok(worst <= TANGENTIAL_CYCLES_MAX, `garbage: ${worst}`);
-});
-
-test(`a load that is not known takes at most ${LOAD_CYCLES_MAX} cycles`, (t) => {
-  const run = (readings, i) => bench.run({ kernel: 'load', iterations: ITERATIONS, noise_Pa_q10: 4096, usable: i % 2 ? ALL : maskFor(readings, i), readings }).cycles;
-  const inside = Array.from({ length: 100 }, () => pulled(press(between(-8, 8), between(-17, 17), 10 ** between(3, 5), between(5.5, 6.5), 2), between(-0.1, 0.1), between(-0.1, 0.1)));
-  for (const [name, list] of Object.entries({ inside, presses, garbage })) {
-    const cycles = list.map(run).sort((a, b) => a - b);
-    t.diagnostic(`${name}: ${cycles[0]} ${cycles[cycles.length >> 1]} ${cycles[cycles.length - 1]} cycles (min, median, max)`);
-    assert.ok(cycles[cycles.length - 1] <= LOAD_CYCLES_MAX, `${name}: ${cycles[cycles.length - 1]}`);
-  }
 });
 
 test(`looking for an outlier: at most ${SEARCH_CYCLES_MAX} cycles in vain, ${OUTLIER_CYCLES_MAX} with the fit without it`, (t) => {

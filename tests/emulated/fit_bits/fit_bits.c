@@ -4,7 +4,6 @@
 #include "config/geometry.h"
 #include "draw.h"
 #include "fit/fit.h"
-#include "fit/fit_load.h"
 #include "fit/fit_tangential.h"
 
 #include <stdbool.h>
@@ -179,7 +178,6 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   memset(&result, 0, sizeof result);
   if (kernel == FIT_BITS_GRID) {
     fit_grid(array, pressure_Pa_q10, &settings, &result);
-    fit_doubt_load(array, pressure_Pa_q10, &settings, &result);
   } else if (kernel == FIT_BITS_MASKED) {
     fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
   } else if (kernel == FIT_BITS_GENERAL) {

@@ -7,8 +7,8 @@
 
 /* The order is that of KERNELS in test_fit_bits.py. */
 enum fit_bits_kernel {
-  FIT_BITS_GRID,       /* fit_grid and fit_doubt_load: the array of the firmware */
-  FIT_BITS_MASKED,     /* fit_gaussian, so both: the same with one to eleven sensors left out */
+  FIT_BITS_GRID,       /* fit_grid: the array of the firmware */
+  FIT_BITS_MASKED,     /* fit_gaussian: the same with one to eleven sensors left out */
   FIT_BITS_GENERAL,    /* fit_general: the same and other layouts, any subset */
   FIT_BITS_TANGENTIAL, /* fit_tangential after fit_gaussian: pads of 5 to 20 mm, every sensor or not
                         */

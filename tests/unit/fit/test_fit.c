@@ -412,7 +412,7 @@ static void test_low_signal_below_twenty_sigma(void) {
 static void test_gains_spread_the_location_as_predicted(void) {
   struct random random = {101};
   for (int kernel = 0; kernel < 3; kernel++) {
-    struct fit_settings settings = {.iterations = 7, .noise_Pa_q10 = 1024, .without_load = true};
+    struct fit_settings settings = {.iterations = 7, .noise_Pa_q10 = 1024};
     uint32_t used = kernel == 1 ? ALL & ~(UINT32_C(1) << 4) : ALL;
     double squares = 0.0, predicted = 0.0, force = 0.0, force_predicted = 0.0;
     for (int i = 0; i < 4000; i++) {
@@ -617,8 +617,8 @@ static void test_predicted_scatter(void) {
   for (size_t i = 0; i < 4; i++) {
     enum { FITS = 20000 };
     struct random random = {90 + i};
-    const struct fit_settings settings = {
-        .iterations = 7, .noise_Pa_q10 = to_q10(cases[i].noise_Pa), .without_load = true};
+    const struct fit_settings settings = {.iterations = 7,
+                                          .noise_Pa_q10 = to_q10(cases[i].noise_Pa)};
     double sum_x = 0, sum_y = 0, sum_f = 0, square_x = 0, square_y = 0, square_f = 0;
     double predicted = 0, predicted_f = 0;
     for (int fit = 0; fit < FITS; fit++) {
@@ -661,7 +661,6 @@ static void test_n_largest(void) {
     }
     uint32_t usable = i % 3 ? ALL : random_u32(&random) & ALL;
     struct fit_settings settings = usual;
-    settings.without_load = true;
     settings.n_largest = (uint8_t)(1 + random_below(&random, 20));
     uint32_t expected = 0;
     int32_t largest = 0;
@@ -690,8 +689,7 @@ static void test_n_largest(void) {
     fit_general(&array, readings, ALL, &settings, &masked);
     fit_gaussian(&array, readings, ALL, &settings, &result);
     if (settings.n_largest >= SENSORS) {
-      settings.n_largest = 0;
-      fit_gaussian(&array, readings, ALL, &settings, &masked);
+      fit_gaussian(&array, readings, ALL, &usual, &masked);
     }
     TEST_ASSERT_EQUAL_MEMORY(&masked, &result, sizeof masked);
   }

@@ -394,8 +394,7 @@ static void a_known_dip_is_added_back_alike_in_all(void) {
 
 static void readings_below_zero_count_as_zero(void) {
   struct random random = {78};
-  const struct fit_settings cut = {
-      .iterations = 4, .noise_Pa_q10 = 5120, .cut_noises = 4, .without_load = true};
+  const struct fit_settings cut = {.iterations = 4, .noise_Pa_q10 = 5120, .cut_noises = 4};
   struct fit_settings whole = cut;
   whole.cut_noises = 0;
   for (int i = 0; i < 100; i++) {

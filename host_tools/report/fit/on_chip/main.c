@@ -4,7 +4,6 @@
 #include "alternatives/alternatives.h"
 #include "config/geometry.h"
 #include "fit/fit.h"
-#include "fit/fit_load.h"
 #include "fit/fit_tangential.h"
 #include "fit/kernels.h"
 #include "port/port.h"
@@ -78,13 +77,6 @@ static void tangential(void) {
   job.y_mm = tangential_result.y_mm;
 }
 
-/* After `fit` of the same readings, which is not counted. */
-static void load(void) {
-  fit_doubt_load(&layout, job.pressure_Pa_q10, &chosen, &contact);
-  job.x_mm = contact.x_mm;
-  job.y_mm = contact.y_mm;
-}
-
 #define ALTERNATIVE(name, solver, real)                                                            \
   static void name(void) {                                                                         \
     const struct alternative_settings options = {(int)job.iterations,                              \
@@ -104,7 +96,7 @@ ALTERNATIVE(lm_double, lm, double)
 static void (*const kernels[])(void) = {
     nothing,   fit,       naive_float,
     naive_double, lm_float,  lm_double,
-    tangential, load,      FIT_GRID_KERNELS(NAME) FIT_OTHER_KERNELS(NAME)};
+    tangential, FIT_GRID_KERNELS(NAME) FIT_OTHER_KERNELS(NAME)};
 
 int main(void) {
   if (fit_array_init(&layout, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
@@ -123,11 +115,7 @@ int main(void) {
     chosen.noise_Pa_q10 = job.noise_Pa_q10;
     chosen.prior_sigma_mm = job.prior_sigma_mm;
     chosen.prior_width_mm = job.prior_width_mm;
-    chosen.without_load = true; /* it has a row of its own */
     void (*kernel)(void) = kernels[job.kernel];
-    if (kernel == load) {
-      fit();
-    }
     if (kernel == tangential) {
       fit();
       tangential_state = (struct fit_tangential_state){0};

@@ -2,11 +2,10 @@
 //
 // Touches of the twin's objects on pads (touches.hpp) go through the firmware's fit_gaussian_grid
 // with the settings that the firmware starts with. One JSON object on the standard output: the keys
-// that are judged, and under "cases", "loaded", "elongated", "iterations" and "few_sensors" the
-// tables behind them. The constants of fit_limits.h and defaults.h were chosen with --seed 1.
+// that are judged, and under "cases", "elongated", "iterations" and "few_sensors" the tables behind
+// them. The constants of fit_limits.h and defaults.h were chosen with --seed 1.
 #include "libfingertip/in_parallel.hpp"
 #include "report/reference/options.hpp"
-#include "shear/static/pulled.hpp"
 #include "truth/fit/statistics.hpp"
 #include "truth/fit/touches.hpp"
 
@@ -56,10 +55,6 @@ struct Case {
   double angle_rad = NAN;
   int iterations = DEFAULT_FIT_ITERATIONS;
   std::size_t sensors = SENSORS; // in use, chosen for each touch
-  // What presses instead of contacts, and pulls along the rubber: by a share of its force from the
-  // first to the second, in any direction, under a force that stays.
-  std::vector<const shear::Object *> pulled = {};
-  double load_least = 0.0, load_most = 0.0;
 };
 
 struct Judged {
@@ -129,18 +124,6 @@ private:
   std::vector<Judged> judged_;
 };
 
-constexpr double FRICTION = 0.5; // at which all of the contact slides
-
-Contact pulled_by(const shear::Object &object, double force_N, double ratio, Random &random) {
-  const double direction = random.uniform(0.0, 2.0 * M_PI), load_N = ratio * force_N;
-  const twin::TractionTable::Load load{force_N, twin::stuck_force_N(force_N, load_N, FRICTION),
-                                       load_N * std::cos(direction), load_N * std::sin(direction)};
-  return {object.name, [&object, load](double normal_N, double dx_mm, double dy_mm) {
-            return object.pressure.base_pressure_Pa(normal_N, dx_mm, dy_mm) +
-                   object.traction.base_pressure_Pa(load, dx_mm, dy_mm);
-          }};
-}
-
 Results run(const Case &c, const Options &options) {
   const fit_array array = firmware_array();
   std::vector<Judged> judged(options.pads * TOUCHES);
@@ -154,13 +137,7 @@ Results run(const Case &c, const Options &options) {
       if (!std::isnan(c.angle_rad)) {
         touch.angle_rad = c.angle_rad;
       }
-      Contact contact;
-      if (c.pulled.empty()) {
-        contact = c.contacts[random.next() % c.contacts.size()];
-      } else {
-        const shear::Object &object = *c.pulled[random.next() % c.pulled.size()];
-        contact = pulled_by(object, touch.force_N, random.uniform(c.load_least, c.load_most), random);
-      }
+      const Contact &contact = c.contacts[random.next() % c.contacts.size()];
       const double noise_Pa = draw_noise_Pa(random);
       const auto readings = readings_of(array, contact, touch, pad, noise_Pa, random);
       const std::uint32_t usable = choose_sensors(c.sensors, random);
@@ -254,39 +231,6 @@ void judge_coverage(const Options &options, const std::vector<Contact> &thick,
   out["cover_2sd_min"] = least_2;
 }
 
-// No profile, and a load that nobody estimates.
-void judge_loaded(const Options &options, const CalibratedPads &calibrated, ordered_json &out) {
-  shear::Objects objects(options.cache);
-  struct Kind {
-    const char *name;
-    double layer_mm;
-    std::function<Pad(Random &, std::size_t)> pad;
-  };
-  const Kind kinds[] = {{"12 mm, calibrated", 12.0, one_of(calibrated)},
-                        {"12 mm, gains 10 %", 12.0, never_calibrated},
-                        {"6 mm, gains 10 %", 6.0, never_calibrated}};
-  const double loads[][2] = {{0.0, 0.0}, {0.1, 0.1}, {0.2, 0.2}, {0.3, 0.3}, {0.5, 0.5}, {0.0, 0.5}};
-  for (const Kind &kind : kinds) {
-    Case c{"loaded, " + std::string(kind.name), {}, kind.pad};
-    for (const char *name : OBJECTS) {
-      c.pulled.push_back(&objects.on(kind.layer_mm, name));
-    }
-    for (const auto &[least, most] : loads) {
-      c.load_least = least;
-      c.load_most = most;
-      char load[32];
-      std::snprintf(load, sizeof load, least < most ? ", Q/F %g to %g" : ", Q/F %g", least, most);
-      const Results results = run(c, options);
-      out["loaded"].push_back(results.row(kind.name + std::string(load)));
-      if (least < most && kind.name == kinds[0].name) {
-        out["loaded_silent_percent"] = results.bad_without(WARNINGS);
-      } else if (least < most && kind.name == kinds[1].name) {
-        out["raw_loaded_silent_percent"] = results.bad_without(WARNINGS);
-      }
-    }
-  }
-}
-
 void judge_elongated(const Options &options, const CalibratedPads &calibrated, ordered_json &out) {
   struct Shape {
     const char *name;
@@ -372,7 +316,6 @@ ordered_json judge(const Options &options) {
   const CalibratedPads calibrated = calibrated_pads(options.pads, options.seed, options.cache);
   std::fprintf(stderr, "truth_fit: %zu calibrations\n", calibrated.size());
   judge_coverage(options, thick, thin, calibrated, out);
-  judge_loaded(options, calibrated, out);
   judge_elongated(options, calibrated, out);
   judge_iterations(options, thick, thin, out);
   judge_few_sensors(options, thick, thin, calibrated, out);
