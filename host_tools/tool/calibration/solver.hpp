@@ -69,13 +69,13 @@ void remember(std::vector<Placement> &placements);
 
 /* What a session is expected to hold: standard deviations of the priors. */
 struct Assumptions {
-  double gain = 0.2;           /* of the log gains: real pads spread by 12 to 22 % */
-  double position_mm = 0.1;    /* of a sensor from its place in the layout, each way */
-  double offset_share = 0.005; /* of the peak: zeros that were off, and how far they move from
-                                  first to last placement */
-  double force = 0.025;        /* of the force between placements of one weight */
-  double width = 0.01;         /* of the width between places: a pad cast a little aslant */
-  double ellipse = 0.007;      /* of q1 and q2 from placement to placement; axes differ by 2 q */
+  double gain = 0.2;            /* of the log gains: real pads spread by 12 to 22 % */
+  double position_mm = 0.1;     /* of a sensor from its place in the layout, each way */
+  double offset_share = 0.0075; /* of the peak: zeros that were off, and how far they move from
+                                   first to last placement */
+  double force = 0.025;         /* of the force between placements of one weight */
+  double width = 0.01;          /* of the width between places: a pad cast a little aslant */
+  double ellipse = 0.007;       /* of q1 and q2 from placement to placement; axes differ by 2 q */
   double ellipse_of_all = 0.03; /* of their means: a foot is a foot, but its shape is not known */
   double memory = 0.03;         /* of r: losing 17.5 % in 8 s makes 0.025 */
   double model_share = 0.002;   /* of the peak: what the profile leaves (above, and 0.13 % rms) */

@@ -7,6 +7,7 @@ import {
   PacketType,
   Result,
   Stream,
+  WIRE_VERSION,
   type Contact,
   type DevicePacket,
   type Info,
@@ -41,7 +42,7 @@ class SpokenLine implements Line {
   streams = 0;
   commands: number[] = [];
   /** Version of the protocol that it speaks. */
-  version = 6;
+  version: number = WIRE_VERSION;
   silent = false;
   device_us = 5_000_000;
   sequence = 0;
@@ -76,7 +77,7 @@ class SpokenLine implements Line {
     if (packet[0] !== this.version) {
       return Promise.resolve();
     }
-    if (this.version !== 6) {
+    if (this.version !== WIRE_VERSION) {
       const answer = vector('health').packet.slice();
       answer[0] = this.version;
       new DataView(answer.buffer).setUint32(answer.length - 4, crc32(answer.subarray(0, -4)), true);

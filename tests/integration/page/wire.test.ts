@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { CoreError } from '../../../host_tools/web/src/core';
-import { Flag, PacketType, type Contact, type DevicePacket } from '../../../host_tools/web/src/line/line_facts';
+import { Flag, PacketType, WIRE_VERSION, type Contact, type DevicePacket } from '../../../host_tools/web/src/line/line_facts';
 import { core } from './library';
 import { cobsDecode, cobsEncode, crc32, readVectors, vector } from './vectors';
 
@@ -135,7 +135,7 @@ test('damage, gaps, other versions and unknown types are counted, each as what i
   feed(cobsEncode(packet));
   assert.equal(decoder.counts.version_errors, 1);
   assert.equal(decoder.other_version, 4);
-  packet[0] = 6;
+  packet[0] = WIRE_VERSION;
   packet[1] = 0x7f;
   new DataView(packet.buffer).setUint32(packet.length - 4, crc32(packet.subarray(0, -4)), true);
   feed(cobsEncode(packet));

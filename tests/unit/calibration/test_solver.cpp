@@ -27,12 +27,12 @@ TEST(Solver, finds_gains_places_and_the_profile) {
   const auto placements = good_session(pad, 30, 3);
   const Solution s = solve(pad.array, placements);
   ASSERT_TRUE(s.solved);
-  EXPECT_LT(rms_error(s.gain, pad.gain), 0.008);
+  EXPECT_LT(rms_error(s.gain, pad.gain), 0.010);
   EXPECT_NEAR(std::accumulate(s.gain.begin(), s.gain.end(), 0.0), 15.0, 1e-9);
   EXPECT_NEAR(s.peak_Pa / KnownPad::PEAK_Pa, 1.0, 0.02);
   EXPECT_EQ(s.kept, 30u);
   EXPECT_LT(s.residual_share, 0.003);
-  EXPECT_LT(s.spread.force, 0.008);
+  EXPECT_LT(s.spread.force, 0.012);
   EXPECT_LT(s.spread.position_mm, 0.08);
   Random random(3, 2, 0);
   for (const Fitted &fitted : s.placements) {
