@@ -43,7 +43,7 @@ int32_t fit_grid_sigma(int32_t height) {
   return (sigma + other) >> 1;
 }
 
-static void set_reading(struct readings *readings, int k, int32_t value, int32_t more_q28) {
+FIXED_INLINE void set_reading(struct readings *readings, int k, int32_t value, int32_t more_q28) {
   int32_t largest = readings->largest, shift = readings->shift;
   int32_t up = shift >= 0 ? shift : 0, down = up - shift;
   value = value < -largest ? -largest : value;
