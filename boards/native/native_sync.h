@@ -7,7 +7,7 @@
 /* Start-up: the pin is off, and no edge waits. */
 void native_sync_reset(void);
 
-/* The pin changes now, if its edges are stamped; else nobody notices. */
+/* The pin changes now, if its edges are stamped; else nothing happens. */
 void native_sync_edge(void);
 
 enum port_sync native_sync_mode(void);

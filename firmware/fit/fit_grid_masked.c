@@ -33,6 +33,7 @@
 #define SQUARE_ONE (1 << SQUARE_Q)
 #define CROSS_LIMIT (4 << LINEAR_Q)
 #define SKEW_LIMIT (4 << LINEAR_Q)
+#define LIFT_LIMIT (2 << LINEAR_Q)
 #define COEFFICIENT_SHIFT (LINEAR_Q - 12)
 
 /* Sums over all nodes stay within 32 bits. */
@@ -65,13 +66,13 @@ struct node {
 struct columns {
   struct node node[NODES];
   bool dip;
-  int32_t narrowness_q12;     /* sigma^2 over that of the dip */
-  int32_t centre_x, centre_y; /* LINEAR_Q */
+  int32_t narrowness_q12;      /* sigma^2 over that of the dip */
+  int32_t centre_x, centre_y;  /* LINEAR_Q */
   int32_t lift1, lift2, lift3; /* LINEAR_Q: what project_out took, in units of the polynomials */
-  int32_t q1, q2, q3;     /* value = integer * 2^-q */
-  int32_t mean_x, mean_y; /* LINEAR_Q, as the next */
-  int32_t cross;          /* p2 = dy - cross dx */
-  int32_t skew_x, skew_y; /* p3 = dx^2 + dy^2 - variance - skew_x dx - skew_y dy */
+  int32_t q1, q2, q3;          /* value = integer * 2^-q */
+  int32_t mean_x, mean_y;      /* LINEAR_Q, as the next */
+  int32_t cross;               /* p2 = dy - cross dx */
+  int32_t skew_x, skew_y;      /* p3 = dx^2 + dy^2 - variance - skew_x dx - skew_y dy */
   int32_t variance;
   int32_t mass;                /* sum of (e - d)^2, Q(30 - MASS_SHIFT) */
   int32_t product_q26;         /* sum of e - d times the reading */
@@ -93,6 +94,9 @@ static const struct ridge rounding_ridge = {24, 1 << 13};
                                        /* 1 % of the largest, do not enter */
 
 enum { STEP = sizeof(struct node) / sizeof(int32_t) };
+
+/* A column that the dip adds to may double when it is made orthogonal to the model. */
+#define COLUMN_BITS(has_dip) ((has_dip) ? 14 : 15)
 
 /* Brings a column in Qraw_q to so many bits; returns its norm with the ridge. What is smaller stays
  * as it is, since there is nothing below its last bit. */
@@ -155,7 +159,7 @@ static NOINLINE int32_t fill(int32_t *column, const struct node *node, const int
   if (dip) {
     size = take_dip(column, node - NODES, dip, size);
   }
-  return normalise(column, size, dip ? 14 : 15, q - 1, ridge, column_q);
+  return normalise(column, size, COLUMN_BITS(dip), q - 1, ridge, column_q);
 }
 
 /* Column of the model times along_x[i]. */
@@ -177,7 +181,7 @@ static NOINLINE int32_t fill_along_x(struct node *node, const int32_t *along_x,
   if (dip) {
     size = take_dip(column, node - NODES, dip, size);
   }
-  return normalise(column, size, dip ? 14 : 15, LINEAR_Q - 1, ridge, column_q);
+  return normalise(column, size, COLUMN_BITS(dip), LINEAR_Q - 1, ridge, column_q);
 }
 
 /* value * coefficient / 2^12, |coefficient| < 2^15. */
@@ -248,7 +252,7 @@ FIXED_INLINE int32_t model_q15(const struct node *node) {
 
 /* Mass and product with the dip. */
 static NOINLINE void set_mass(const struct readings *readings, struct columns *c) {
-  int32_t mass = 1 << 10, product_q26 = 0;
+  int32_t mass = 1 << 13, product_q26 = 0; /* never 0 as a divisor, as the norms */
   for (int k = 0; k < NODES; k++) {
     int32_t f = model_q15(&c->node[k]);
     mass += (f * f) >> MASS_SHIFT;
@@ -264,6 +268,8 @@ static NOINLINE void set_mass(const struct readings *readings, struct columns *c
 struct dips {
   struct polynomial p1, p2, p3;
 };
+/* Pitches squared, SQUARE_Q: a contact and sensors in use that are further apart tell no more. */
+#define PART_MAX (32 << SQUARE_Q)
 static NOINLINE void set_dips(const struct columns *c, struct dips *dips) {
   const int32_t off_x = c->centre_x - c->mean_x, off_y = c->centre_y - c->mean_y;
   const int32_t cross = c->cross >> COEFFICIENT_SHIFT;
@@ -277,13 +283,15 @@ static NOINLINE void set_dips(const struct columns *c, struct dips *dips) {
     int32_t away = times_q12((i - ORIGIN_X) * LINEAR_ONE - c->centre_x, c->narrowness_q12);
     dips->p1.x[i] = off_x + away;
     dips->p2.x[i] = -times_q12(off_x + away, cross);
-    dips->p3.x[i] = constant_x + fixed_mul_q26(away >> 1, slope_x);
+    int32_t part = constant_x + fixed_mul_q26(away >> 1, slope_x);
+    dips->p3.x[i] = fixed_clamp(part, -PART_MAX, PART_MAX);
   }
   for (int j = 0; j < ROWS; j++) {
     int32_t away = times_q12((j - ORIGIN_Y) * LINEAR_ONE - c->centre_y, c->narrowness_q12);
     dips->p1.y[j] = 0;
     dips->p2.y[j] = off_y + away;
-    dips->p3.y[j] = constant_y + fixed_mul_q26(away >> 1, slope_y);
+    int32_t part = constant_y + fixed_mul_q26(away >> 1, slope_y);
+    dips->p3.y[j] = fixed_clamp(part, -PART_MAX, PART_MAX);
   }
 }
 
@@ -304,7 +312,7 @@ static NOINLINE int32_t project_out(const struct columns *c, int32_t *column, in
   }
   sum = MASS_SHIFT > NORM_SHIFT ? sum << (MASS_SHIFT - NORM_SHIFT) : sum;
   *norm = remaining(*norm, times_factor(sum, share_q12));
-  return to_poly(share_q12, 15 - q, 8 << LINEAR_Q);
+  return to_poly(share_q12, 15 - q, LIFT_LIMIT);
 }
 
 /* Columns, norms and factors from the model at the nodes. */
@@ -511,7 +519,7 @@ static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused,
 }
 
 #define DEPTH_MAX_Q28 (1 << 26) /* of the strongest node, which is from a quarter to one */
-#define NARROWNESS_MAX_Q12 (2 << 12)
+#define NARROWNESS_MAX_Q12 (1 << 11) /* a dip is wider than its contact */
 
 /* The dip at the sensors in use. */
 static NOINLINE void set_dip(const struct readings *readings, const struct fit_system *system,

@@ -108,7 +108,7 @@ NOINLINE void fit_grid_begin_spread(const struct fit_settings *settings,
     gains |= settings->gain_sd_q16[k];
   }
   if (fit_has_dip(settings)) {
-    gains |= FIT_DIP_ERROR_Q16 >> 2; /* the dip is at most a quarter */
+    gains |= (uint32_t)FIT_DIP_ERROR_Q16 >> 2; /* the dip is at most a quarter */
   }
   spread->gain_shift = 15 - fixed_bits(gains);
   spread->apart = (struct scaled){0, 0};

@@ -37,7 +37,7 @@ struct fit_spread {
 /* The square of a number of 15 bits, so that those of all sensors and of two coordinates add up. */
 #define SPREAD_SQUARE_SHIFT (NODES > 15 ? 6 : 5)
 
-#define FIT_DIP_ERROR_Q16 16384 /* FIT_DIP_ERROR */
+#define FIT_DIP_ERROR_Q16 ((int32_t)(FIT_DIP_ERROR * 65536.0f))
 
 /* The columns have at most 1.5 * 2^15. */
 void fit_grid_begin_spread(const struct fit_settings *settings, const struct fit_system *system,

@@ -8,7 +8,7 @@
 #include <stdint.h>
 
 enum port_sync {
-  PORT_SYNC_OFF,    /* an input that nobody reads */
+  PORT_SYNC_OFF,    /* an input that is not read */
   PORT_SYNC_IN,     /* an input, pulled down; its edges are stamped */
   PORT_SYNC_FRAME,  /* an output, of port_sync_write() */
   PORT_SYNC_SECOND, /* an output, high for 0.1 s from each full second on; its edges are stamped */

@@ -141,7 +141,7 @@ for (const name of BOARDS) {
     bench.end();
   });
 
-  test(`${name}: while it is off the pin is left alone and nobody looks at it`, () => {
+  test(`${name}: while it is off the pin is left alone and is not read`, () => {
     const bench = new Bench(name, { next: spaced(() => 1e6) });
     bench.stream();
     bench.run(QUIET_ms + 50 - bench.now_ms);

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double FRICTION_LEAST = 0.08, FRICTION_MOST = 1.5;
 constexpr double LOAD_NOISE_N = 0.06;
-// A load that rises above all of late counts as it is, with its rate. Below that it swings on the
+// A load that rises above its latest peak counts as it is, with its rate. Below that it swings on the
 // rubber, or has begun to slide, and its mean counts.
 constexpr double RATE_s = 0.02, MEAN_s = 0.06, FORGETS_s = 0.3;
 constexpr double AHEAD_N = 3.0; // a rate is believed to add that much, or as much again
@@ -23,8 +23,8 @@ constexpr double CREEPS_mm_s = 4.0, CREEPS_s = 0.15;
 // What held within so long does not slide at a smaller share of that ratio, unless it has become
 // slick; and then it slides so far.
 constexpr double LATELY_s = 0.2, BEGINS_AT = 0.8, FAR_mm = 1.0;
-// At a smaller share of what held of late it holds: squeezed rubber and what has just been caught
-// move a contact so far.
+// At a smaller share of what held within LATELY_s it holds: squeezed rubber and what has just been
+// caught move a contact so far.
 constexpr double HOLDS_AT = 0.6, NO_SLIDE_mm = 0.5;
 // What slides teaches friction as long as it does not slow down: then the grip holds already.
 constexpr double SLOWS = 0.85;

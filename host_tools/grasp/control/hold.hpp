@@ -67,7 +67,7 @@ private:
   double still_s_ = 0.0;  // the last frame that told no slide
   double steady_s_ = 0.0; // since when the load is steady
   double ratio_ = 0.0;    // smoothed, of what rests
-  double lately_ = 0.0;   // the largest of late
+  double lately_ = 0.0;   // the largest within LATELY_s
   double slid_mm_ = 0.0;  // how far this slide has gone
   double moved_mm_ = 0.0; // and all that is told as one
   bool begun_ = false, sliding_ = false, has_told_ = false, was_loaded_ = false;

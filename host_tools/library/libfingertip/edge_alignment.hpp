@@ -28,7 +28,7 @@ public:
   void clock(std::size_t device, const ClockEstimate &estimate);
   /* An edge, in order of the device's time. */
   void edge(std::size_t device, std::uint64_t t_us, bool rises);
-  /* Its clock begins anew. */
+  /* Its clock begins again. */
   void restart(std::size_t device);
 
   struct Place {

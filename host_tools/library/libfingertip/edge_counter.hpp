@@ -13,7 +13,7 @@ class EdgeCounter {
 public:
   void take(const wire_sync &edge) {
     const std::uint32_t ahead = edge.number - last_.value_or(edge.number - 1);
-    if (ahead >= 1 && ahead <= UINT32_MAX / 2) { /* else the pin was set anew */
+    if (ahead >= 1 && ahead <= UINT32_MAX / 2) { /* else the pin was set again */
       missing_ += ahead - 1;
     }
     last_ = edge.number;

@@ -13,7 +13,7 @@ using namespace recording;
 
 namespace {
 
-/* A clock that goes back by more than packets overtake each other has begun anew. */
+/* A clock that goes back by more than packets overtake each other has begun again. */
 constexpr std::uint64_t RESTART_us = 1'000'000;
 /* As times are written. */
 constexpr double ROUNDING_us = 0.1;

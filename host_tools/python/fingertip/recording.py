@@ -146,7 +146,7 @@ class _PacketLines:
 
     def _take_edge(self, edge: SyncEdge) -> None:
         ahead = 1 if self._last_edge is None else edge.number - self._last_edge & 0xFFFFFFFF
-        if 1 <= ahead <= 0x7FFFFFFF:  # else the pin was set anew
+        if 1 <= ahead <= 0x7FFFFFFF:  # else the pin was set again
             self._edges_missing += ahead - 1
         self._last_edge = edge.number
         self._edges += 1

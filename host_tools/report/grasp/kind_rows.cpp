@@ -1,5 +1,6 @@
 #include "grasp/kind_rows.hpp"
 
+#include "grasp/figures.hpp"
 #include "grasp/settings.hpp"
 #include "grasp/textbook.hpp"
 #include "grasp/trials.hpp"
@@ -96,23 +97,6 @@ KindDone run_one(const KindOptions &options, std::uint64_t n,
   const KindOutcome outcome = run_kind(trial, timed, trace);
   return {trial.grasp, outcome, settings.start_N, settings.cap_N,
           timed.mean_us()};
-}
-
-double rounded(double value) {
-  return std::round(1e3 * value) / 1e3;
-}
-
-ordered_json quantile(std::vector<double> values, double share) {
-  if (values.empty()) {
-    return nullptr;
-  }
-  std::sort(values.begin(), values.end());
-  const double value = values[static_cast<std::size_t>(share * (double(values.size()) - 1.0))];
-  return std::isfinite(value) ? ordered_json(rounded(value)) : ordered_json(nullptr);
-}
-
-ordered_json percent(double part, double whole) {
-  return whole > 0.0 ? ordered_json(rounded(100.0 * part / whole)) : ordered_json(nullptr);
 }
 
 ordered_json line_of(std::uint64_t n, const KindDone &one) {

@@ -1,5 +1,7 @@
 #include "grasp/summary.hpp"
 
+#include "grasp/figures.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -11,25 +13,6 @@ using namespace cell;
 using nlohmann::ordered_json;
 
 namespace {
-
-double rounded(double value) {
-  return std::round(1e3 * value) / 1e3;
-}
-
-// null without values.
-ordered_json quantile(std::vector<double> values, double share) {
-  if (values.empty()) {
-    return nullptr;
-  }
-  std::sort(values.begin(), values.end());
-  const double value = values[static_cast<std::size_t>(share * (double(values.size()) - 1.0))];
-  return std::isfinite(value) ? ordered_json(rounded(value)) : ordered_json(nullptr);
-}
-
-ordered_json percent(std::size_t part, std::size_t whole) {
-  return whole == 0 ? ordered_json(nullptr)
-                    : ordered_json(rounded(100.0 * double(part) / double(whole)));
-}
 
 ordered_json summary(const std::vector<const Done *> &all, bool still) {
   std::size_t drops = 0, never = 0, unanswered = 0, cycles = 0, unsettled = 0;
@@ -76,13 +59,13 @@ ordered_json summary(const std::vector<const Done *> &all, bool still) {
   if (still) {
     out["settle_p50_s"] = quantile(settle_s, 0.5);
     out["settle_p95_s"] = quantile(settle_s, 0.95);
-    out["never_settled_percent"] = percent(unsettled, all.size());
+    out["never_settled_percent"] = percent(double(unsettled), double(all.size()));
     out["rms_p50_percent"] = quantile(rms, 0.5);
     out["rms_of_steps_p50_percent"] = quantile(rms_of_steps, 0.5);
     out["limit_cycles"] = cycles;
     return out;
   }
-  out["drops_percent"] = percent(drops + never, all.size());
+  out["drops_percent"] = percent(double(drops + never), double(all.size()));
   out["never_held"] = never;
   out["margin_p50"] = quantile(margin, 0.5);
   out["margin_p5"] = quantile(margin, 0.05);

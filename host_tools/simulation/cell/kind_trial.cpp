@@ -1,6 +1,7 @@
 #include "simulation/cell/kind_trial.hpp"
 
 #include "libfingertip/random.hpp"
+#include "simulation/cell/arrivals.hpp"
 #include "simulation/cell/felt_finger.hpp"
 #include "simulation/cell/gripper_line.hpp"
 #include "simulation/cell/pinch.hpp"
@@ -14,7 +15,6 @@ extern "C" {
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 
 namespace fingertip::cell {
 namespace {
@@ -186,7 +186,7 @@ public:
       feel();
       if (gripper_.next_s() <= t_s_) {
         const GripperLine::Said said = gripper_.exchange(command_);
-        line_.push_back({said.known_s, STATUS, {}, said.status});
+        arrivals_.status(said.known_s, said.status);
       }
       if (t_s_ >= sample_s_) {
         sample();
@@ -196,14 +196,6 @@ public:
   }
 
 private:
-  static constexpr std::size_t STATUS = 2;
-  struct Known {
-    double at_s;
-    std::size_t from;
-    GripTouch touch;
-    GripperStatus status;
-  };
-
   static GripperMechanics slowed(const KindTrial &trial) {
     GripperMechanics mechanics = trial.gripper;
     mechanics.traits.poll_s *= trial.grasp.poll_factor;
@@ -222,26 +214,16 @@ private:
       const bool gone = static_cast<int>(i) == grasp_.gone && lift_s_ < NEVER_s &&
                         since_lift_s() >= grasp_.gone_s;
       if (!tip.is_lost(grasp_.lost_share) && !gone) {
-        line_.push_back({tip.known_s(grasp_.jitter_s, later_s_), i, touch, {}});
+        arrivals_.touch(tip.known_s(grasp_.jitter_s, later_s_), i, touch);
       }
       tip.skip();
     }
   }
 
   void deliver() {
-    for (auto known = line_.begin(); known != line_.end();) {
-      if (known->at_s > t_s_) {
-        ++known;
-        continue;
-      }
-      if (known->from == STATUS) {
-        controller_.take_status(known->status);
-      } else {
-        controller_.take_touch(known->from, known->touch);
-      }
-      known = line_.erase(known);
-      step_controller();
-    }
+    arrivals_.deliver(
+        t_s_, controller_, [this](std::size_t, const GripTouch &) { step_controller(); },
+        [this] { step_controller(); });
   }
 
   void step_controller() {
@@ -316,7 +298,7 @@ private:
   Pinch pinch_;
   GripperLine gripper_;
   std::array<Tip, 2> tips_;
-  std::deque<Known> line_;
+  Arrivals arrivals_;
   GripCommand command_{};
   GripReport report_{};
   KindOutcome outcome_;

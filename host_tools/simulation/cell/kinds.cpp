@@ -245,7 +245,7 @@ KindOfGrasp draw_grasp(Kind kind, std::uint64_t seed, std::uint64_t n) {
     for (double t_s = 0.0; t_s < grasp.steady_s; t_s += 0.01) {
       worst_N = std::max(worst_N, grasp.least_N(t_s) / grasp.kinetic_share);
     }
-    // What breaks before it holds is nobody's to grasp.
+    // What breaks before it holds cannot be grasped at all.
     if (worst_N <= std::min(NEEDS_MOST_N, 0.5 * grasp.crushes_N)) {
       return grasp;
     }

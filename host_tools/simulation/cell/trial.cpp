@@ -1,8 +1,9 @@
 #include "simulation/cell/trial.hpp"
 
+#include "simulation/cell/arrivals.hpp"
+
 #include <algorithm>
 #include <cmath>
-#include <deque>
 
 namespace fingertip::cell {
 namespace {
@@ -112,14 +113,11 @@ public:
 
   Outcome go() {
     while (!over_) {
-      double next_s =
+      const double next_s =
           std::min({fingers_[0].next_s(), fingers_[1].next_s(), gripper_.next_s(), sample_s_,
                     stepped_s_ + STEPS_s, faults_.has_begun(t_s_) ? NEVER_s : faults_.begins_s(),
                     t_s_ + (gripper_.motion().moving() || cell_.slips() ? MOVES_s : STANDS_s)});
-      for (const Known &known : line_) {
-        next_s = std::min(next_s, known.at_s);
-      }
-      advance(next_s);
+      advance(std::min(next_s, arrivals_.next_s()));
       fail();
       deliver();
       if (stepped_s_ + STEPS_s <= t_s_) {
@@ -129,7 +127,7 @@ public:
         if (fingers_[f].next_s() <= t_s_) {
           const double felt_s = fingers_[f].next_s();
           if (const auto frame = faults_.frame(f, fingers_[f].feel(touch(f)), felt_s)) {
-            line_.push_back({frame->known_s, f, frame->touch, {}});
+            arrivals_.touch(frame->known_s, f, frame->touch);
           }
         }
       }
@@ -144,15 +142,6 @@ public:
   }
 
 private:
-  static constexpr std::size_t STATUS = 2; // comes from the gripper
-
-  struct Known { // on its way
-    double at_s;
-    std::size_t from;
-    GripTouch touch;
-    GripperStatus status;
-  };
-
   double since_lift_s(double t_s) const { return t_s - lift_s_; }
 
   void put_between() {
@@ -288,20 +277,13 @@ private:
   }
 
   void deliver() {
-    for (auto known = line_.begin(); known != line_.end();) {
-      if (known->at_s > t_s_) {
-        ++known;
-        continue;
-      }
-      if (known->from == STATUS) {
-        controller_.take_status(known->status);
-      } else {
-        controller_.take_touch(known->from, known->touch);
-        felt_[known->from] = known->touch;
-      }
-      known = line_.erase(known);
-      step_controller();
-    }
+    arrivals_.deliver(
+        t_s_, controller_,
+        [this](std::size_t finger, const GripTouch &touch) {
+          felt_[finger] = touch;
+          step_controller();
+        },
+        [this] { step_controller(); });
   }
 
   void exchange() {
@@ -318,7 +300,7 @@ private:
       said.status.host_us += in_us(0.5 * line.late_s); /* the exchange's middle */
     }
     said.status.fault = faults_.is(Fault::Kind::fault, t_s_) ? 9 : said.status.fault;
-    line_.push_back({said.known_s, STATUS, {}, said.status});
+    arrivals_.status(said.known_s, said.status);
   }
 
   void sample() {
@@ -387,7 +369,7 @@ private:
   Cell cell_;
   GripperLine gripper_;
   std::array<FeltFinger, 2> fingers_;
-  std::deque<Known> line_;
+  Arrivals arrivals_;
   std::array<GripTouch, 2> felt_{};
   GripCommand command_{};
   GripReport report_{};

@@ -55,7 +55,7 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
                        lies ready that the machine does not ask for, emulated time waits, 2 s at most
   --sync-strobe MS     drive the sync pin: high for a millisecond at each multiple of MS, 2 to 60000; since power-on, with
                        --stepped on the clock of the program, so that several emulators are on one wire
-  --sync-log FILE.csv  changes of the sync pin, whoever drives it: t_ns,level
+  --sync-log FILE.csv  changes of the sync pin, by the chip or the wire: t_ns,level
   --host-script FILE   with the built-in host: lines "TIME_S HEXBYTES", "TIME_S dtr 0|1", "TIME_S baud N", comments "#"
   --capture FILE       every byte received on bulk IN
 

@@ -72,7 +72,9 @@ struct Assumptions {
   double gain = 0.2;            /* of the log gains: real pads spread by 12 to 22 % */
   double position_mm = 0.1;     /* of a sensor from its place in the layout, each way */
   double offset_share = 0.0075; /* of the peak: zeros that were off, and how far they move from
-                                   first to last placement */
+                                   first to last placement. A wide dip and such zeros look alike:
+                                   with more, gains of real pads suffer; with less, sessions of the
+                                   twin pass whose zeros were off (truth_calibration, seed 20000) */
   double force = 0.025;         /* of the force between placements of one weight */
   double width = 0.01;          /* of the width between places: a pad cast a little aslant */
   double ellipse = 0.007;       /* of q1 and q2 from placement to placement; axes differ by 2 q */
@@ -89,7 +91,7 @@ struct Assumptions {
 
 /* Width of the narrow part of the profile over that of the wide one. */
 constexpr double NARROW = 0.64;
-/* Width of the dip over that of the wide part. As the assumed offsets and forces, chosen on the
+/* Width of the dip over that of the wide part. As the assumed spread of forces, chosen on the
  * recording of host_tools/report/real that chooses. */
 constexpr double DIP = 3.2;
 /* In residual standard deviations: where a reading's weight begins to fall. */

@@ -125,7 +125,7 @@ class Live(CalibrateTest):
             self.assertIn("taken: lift it\n", out)
             known = [float(text) for text in re.findall(r"gains known to ([\d.]+) %, wanted 1.5 %", out)]
             self.assertGreater(known[0], 5)
-            self.assertLessEqual(known[-1], 2.0)
+            self.assertLessEqual(known[-1], 2.0)  # the gains differ by more: from twenty placements on that is enough
             self.assertNotIn("\x1b", out)
             self.assert_gains(out)
             self.assertTrue(out.endswith("calibrated: it acts from now on\n"))

@@ -27,6 +27,8 @@ TEST(Solver, finds_gains_places_and_the_profile) {
   const auto placements = good_session(pad, 30, 3);
   const Solution s = solve(pad.array, placements);
   ASSERT_TRUE(s.solved);
+  // The pad's profile is not of the solver's family. It passes in part for a spread of the forces,
+  // and so for gains: some 1 % of either.
   EXPECT_LT(rms_error(s.gain, pad.gain), 0.010);
   EXPECT_NEAR(std::accumulate(s.gain.begin(), s.gain.end(), 0.0), 15.0, 1e-9);
   EXPECT_NEAR(s.peak_Pa / KnownPad::PEAK_Pa, 1.0, 0.02);

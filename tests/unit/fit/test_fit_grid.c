@@ -392,6 +392,47 @@ static void a_known_dip_is_added_back_alike_in_all(void) {
   TEST_ASSERT_TRUE_MESSAGE(apart < 0.02f, text);
 }
 
+/* Narrow contacts up to a third of a pitch beyond the outer sensors. The kernel for wide contacts,
+ * whose derivatives do not have the dip, ends far outside. */
+static void beyond_the_sensors_the_dip_tells_the_place(void) {
+  struct random random = {79};
+  const double share = 0.035, sd_per_sigma = 3.2;
+  enum { PRESSES = 400 };
+  int far = 0, far_of_wide = 0, unsure = 0, apart = 0;
+  for (int i = 0; i < PRESSES; i++) {
+    double half_x = 4.5 * (COLUMNS - 1), half_y = 4.5 * (ROWS - 1);
+    double x = 1.5 + (i % 2 ? -1.0 : 1.0) * (half_x + random_between(&random, 0.5, 3.0));
+    double y = -0.25 + random_between(&random, -half_y, half_y);
+    double sigma = random_between(&random, 2.8, 3.6), sd = sd_per_sigma * sigma;
+    for (int k = 0; k < SENSORS; k++) {
+      double dx = (double)x_mm[k] - x, dy = (double)y_mm[k] - y, square = dx * dx + dy * dy;
+      double p = exp(-square / (2 * sigma * sigma)) - share * exp(-square / (2 * sd * sd));
+      readings[k] = (int32_t)nearbyint(1024.0 * (3e4 * p + 2.0 * random_normal(&random)));
+    }
+    struct fit_settings settings = {.iterations = 8,
+                                    .noise_Pa_q10 = 2048,
+                                    .prior_sigma_mm = (float)sigma,
+                                    .prior_width_mm = 0.1f,
+                                    .dip_share = (float)share,
+                                    .dip_sd_mm = (float)sd};
+    struct fit_result found, wide, general;
+    fit_gaussian(&array, readings, ALL, &settings, &found);
+    fit_grid(&array, readings, &settings, &wide);
+    fit_general(&array, readings, ALL, &settings, &general);
+    far += off_mm(&found, x, y) > 0.5f;
+    far_of_wide += off_mm(&wide, x, y) > 0.5f;
+    unsure += off_mm(&found, x, y) > 2.5f * found.location_sd_mm;
+    apart += off_mm(&general, (double)found.x_mm, (double)found.y_mm) > 0.05f;
+  }
+  char text[160];
+  snprintf(text, sizeof text, "of %d off by 0.5 mm: %d, wide kernel %d; beyond 2.5 sd %d; apart %d",
+           PRESSES, far, far_of_wide, unsure, apart);
+  TEST_ASSERT_TRUE_MESSAGE(far_of_wide > PRESSES / 2, text);
+  TEST_ASSERT_TRUE_MESSAGE(far <= PRESSES / 50, text);
+  TEST_ASSERT_TRUE_MESSAGE(unsure <= PRESSES / 100, text);
+  TEST_ASSERT_TRUE_MESSAGE(apart <= PRESSES / 25, text);
+}
+
 static void readings_below_zero_count_as_zero(void) {
   struct random random = {78};
   const struct fit_settings cut = {.iterations = 4, .noise_Pa_q10 = 5120, .cut_noises = 4};
@@ -519,6 +560,7 @@ int main(void) {
   RUN_TEST(a_prior_pulls_sigma_alike_in_both);
   RUN_TEST(a_prior_leaves_what_is_uncertain_so);
   RUN_TEST(a_known_dip_is_added_back_alike_in_all);
+  RUN_TEST(beyond_the_sensors_the_dip_tells_the_place);
   RUN_TEST(readings_below_zero_count_as_zero);
   RUN_TEST(warnings_are_given);
   RUN_TEST(any_bits_give_finite_results);

@@ -138,6 +138,21 @@ TEST(Grip, ASteadyLoadIsNotWhatSlides) {
   EXPECT_LT(world.peak_N, 1.3 * needed_N);
 }
 
+// Squeezed rubber moves a contact by less than half a millimetre, far below what it holds.
+TEST(Grip, AShortMotionFarBelowWhatHoldsIsNoSlide) {
+  GripWorld world;
+  world.grasp();
+  world.pull(2.0, 0.3);
+  world.run(1.0);
+  const double held = world.load_N / world.force_N;
+  world.slide(0.4 * held, 9.0, 0.05);
+  EXPECT_EQ(world.report.slides, 0u);
+  world.load_N = 2.0;
+  world.run(0.3);
+  world.slide(0.4 * held, 9.0, 0.09);
+  EXPECT_EQ(world.report.slides, 1u);
+}
+
 // What has held more a moment ago does not slide at less, unless it moves far.
 TEST(Grip, WhatHeldMoreAMomentAgoTeachesNothing) {
   GripWorld world;

@@ -4,7 +4,7 @@
  *     new SyncPin({ gpio, scope, report, next, onLevel })
  *
  * next(t_ns): the first edge of the source after that time, { at_ns, high }, or null: there is none any more. Without next
- * the wire floats unless the chip drives it. onLevel(high, t_ns): the pin changed, whoever drives it.
+ * the wire floats unless the chip drives it. onLevel(high, t_ns): the pin changed, by the chip or the wire.
  */
 export class SyncPin {
   constructor({ gpio, scope, report, next = null, onLevel = () => {} }) {
