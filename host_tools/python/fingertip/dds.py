@@ -1,6 +1,6 @@
 """A participant of a ROS 2 domain without ROS: bytes of ROS 2 messages go out on DDS, under ROS 2's names of topics and types.
 
-Needs the package cyclonedds, which `pip install "fingertip-tactile[ros2]"` brings.
+Needs the package cyclonedds.
 """
 import contextlib
 import os
@@ -19,7 +19,7 @@ try:
     import cyclonedds.qos
     import cyclonedds.topic
 except ImportError:
-    raise InputError('ROS 2 topics need the package cyclonedds; pip install "fingertip-tactile[ros2]"') from None
+    raise InputError('ROS 2 topics need the package cyclonedds; pip install cyclonedds') from None
 
 HISTORY = 1000  # messages that are kept for who has not acknowledged them: 0.8 s at the highest rate
 BLOCKING_ns = 5_000_000

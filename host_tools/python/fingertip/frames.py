@@ -184,5 +184,5 @@ def frame_of(columns: dict[str, Any]) -> "pandas.DataFrame":
     try:
         import pandas
     except ImportError:
-        raise ImportError('pandas is not installed: pip install "fingertip-tactile[pandas]"') from None
+        raise ImportError('pandas is not installed: pip install pandas') from None
     return pandas.DataFrame(columns)

@@ -1,6 +1,6 @@
 """Recordings as MCAP files of ROS 2 messages, written and read line by line (host_tools/library/libfingertip/RECORDING.md has the format).
 
-Needs the package mcap, which `pip install "fingertip-tactile[mcap]"` brings.
+Needs the package mcap.
 """
 import calendar
 import collections
@@ -47,7 +47,7 @@ def _mcap() -> types.ModuleType:
         import mcap.writer
         import zstandard  # noqa: F401
     except ImportError:
-        raise InputError('MCAP files need the package mcap; pip install "fingertip-tactile[mcap]"') from None
+        raise InputError('MCAP files need the package mcap; pip install mcap') from None
     return mcap
 
 

@@ -18,7 +18,7 @@ during the answer it takes for lost what the bridge still keeps; and it knows ne
 nor when a recording is complete. The sequence numbers of the line do not do: they wrap after 25 s at the highest rate, and `fingertip serve`
 has its own.
 
-Needs the package eclipse-zenoh, which `pip install "fingertip-tactile[zenoh]"` brings.
+Needs the package eclipse-zenoh.
 """
 import argparse
 import json
@@ -106,7 +106,7 @@ def zenoh_module() -> types.ModuleType:
     try:
         import zenoh
     except ImportError:
-        raise InputError('this needs the package eclipse-zenoh; pip install "fingertip-tactile[zenoh]"') from None
+        raise InputError('this needs the package eclipse-zenoh; pip install eclipse-zenoh mcap') from None
     return zenoh
 
 

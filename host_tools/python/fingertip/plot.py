@@ -10,7 +10,7 @@ import sys
 try:
     import matplotlib
 except ImportError:
-    sys.exit('fingertip-plot: matplotlib is not installed: pip install "fingertip-tactile[plot]"')
+    sys.exit('fingertip-plot: matplotlib is not installed: pip install matplotlib')
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

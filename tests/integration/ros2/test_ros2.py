@@ -176,7 +176,7 @@ class Command(unittest.TestCase):
         (self.folder / "cyclonedds.py").write_text("raise ImportError\n")
         command = self.ros2()
         self.assertEqual(command.communicate(timeout=PATIENCE_s)[1],
-                         'fingertip-ros2: ROS 2 topics need the package cyclonedds; pip install "fingertip-tactile[ros2]"\n')
+                         'fingertip-ros2: ROS 2 topics need the package cyclonedds; pip install cyclonedds\n')
         self.assertEqual(command.returncode, 1)
 
     def test_a_reader_that_stalls_delays_nobody(self):
