@@ -49,7 +49,7 @@ def record_all(world, emulators, path, seconds):
 
 
 def recordings_in(path):
-    return [files.read_recording(path, device=serial) for serial in CLOCKS_ppm]
+    return [files.read_recording(path, serial=serial) for serial in CLOCKS_ppm]
 
 
 def worst_us(emulators, recordings, from_s=-np.inf, to_s=np.inf):

@@ -79,7 +79,7 @@ def numbers(fields):
 
 
 def recording(path, salvage, device):
-    found = read_recording(path, salvage=salvage, device=device or None)
+    found = read_recording(path, salvage=salvage, serial=device or None)
     rows = []
     for i in range(len(found["t_us"])):
         def value(name):

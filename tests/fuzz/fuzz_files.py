@@ -24,7 +24,7 @@ WORDS = (b"18446744073709551616", b"-1", b"1e400", b"nan", b"inf", b"", b"\n", b
 
 
 def check_recording(path, prng):
-    recording = files.read_recording(path, salvage=prng.random() < 0.5, device=prng.choice((None, "BBBB")))
+    recording = files.read_recording(path, salvage=prng.random() < 0.5, serial=prng.choice((None, "BBBB")))
     recording.health()
     assert recording["t_us"].shape == recording.has_contact.shape
 

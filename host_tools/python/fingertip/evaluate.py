@@ -36,7 +36,7 @@ import numpy as np
 
 from .files import (
     CONTACT, FIT_VALID, SLIP, SLIP_VALID, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, InputError, check_output, printable, read_recording, read_run,
-    read_scenario, restart_rows, run_tool, write_text)
+    read_scenario, recorded_devices, restart_rows, run_tool, write_text)
 
 FORCE_MIN_N = 0.2
 SLIP_MIN_s = 0.05
@@ -142,6 +142,9 @@ def add_recording_options(parser):
 
 
 def load_recording(options, **how):
+    devices = recorded_devices(options.recording)
+    if len(devices) > 1 and not options.device:
+        raise InputError(f"{options.recording}: holds several fingertips; choose one with --device: {' '.join(devices)}")
     recording = read_recording(options.recording, options.salvage, options.device, **how)
     if recording.skipped_lines:
         print(f"{printable(options.recording)}: {recording.skipped_lines} damaged lines skipped", file=sys.stderr)

@@ -39,7 +39,7 @@ import numpy.typing as npt
 from . import line, recorded
 from .errors import InputError
 from .frames import Edge, frame_of
-from .line import CONTACT_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, TANGENTIAL_COLUMNS, Flag
+from .line import CONTACT_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, TANGENTIAL_COLUMNS, WARNINGS, Flag
 from .mcap_recording import MAGIC, Damaged, Line, McapLineReader
 from .recorded import Rows, counts_of, judge_key, packet_of
 
@@ -283,6 +283,11 @@ class Recording:
         found: npt.NDArray[np.bool_] = (np.nan_to_num(self["flags"]).astype(np.int64) & bit) != 0
         return found
 
+    @property
+    def trusted(self) -> npt.NDArray[np.bool_]:
+        """Where there is a fit, and no warning."""
+        return self.flag(Flag.FIT_VALID) & ~self.flag(WARNINGS)
+
 
 # Some 20 MB are read in a second: below this the wait is short.
 WORTH_WAITING_bytes = 10_000_000
@@ -333,15 +338,16 @@ def _choose_device(path: Path, devices: list[str], wanted: str | None) -> int:
     for number, serial in enumerate(devices):
         if serial.lower() == wanted.lower() if wanted else len(devices) == 1:
             return number
-    problem = f"no fingertip {wanted} in it" if wanted else "holds several fingertips"
-    raise InputError(f"{path}: {problem}; choose one with --device: {' '.join(devices)}")
+    if wanted:
+        raise InputError(f"{path}: no fingertip {wanted} in it; choose one of {' '.join(devices)}")
+    raise InputError(f"{path}: holds several fingertips; choose one with " + " or ".join(f'serial="{serial}"' for serial in devices))
 
 
 class _Reading:
     """A recording while it is read, line by line."""
 
-    def __init__(self, path: Path, is_joint: bool, device: str | None, columns: Collection[str] | None) -> None:
-        self.path, self.is_joint, self.device, self.columns = path, is_joint, device, columns
+    def __init__(self, path: Path, is_joint: bool, serial: str | None, columns: Collection[str] | None) -> None:
+        self.path, self.is_joint, self.serial, self.columns = path, is_joint, serial, columns
         self.number: int | None = None  # of the wanted fingertip among several
         self.rows: Rows | None = None  # once there is a header
         self.metadata: dict[str, str] = {}
@@ -404,7 +410,7 @@ class _Reading:
                 self.own_end = counts_of(value)
                 return
         elif self.is_joint and key == "devices":
-            self.number = _choose_device(self.path, value.split(), self.device)
+            self.number = _choose_device(self.path, value.split(), self.serial)
         if key == "end":
             counts = dict(pair.split("=", 1) for pair in value.split(" ") if "=" in pair) if self.is_joint else counts_of(value)
             self.end = {**counts, **self.own_end}
@@ -426,12 +432,12 @@ class _Reading:
         self.packets.append((kind, fields))
 
 
-def read_recording(path: Path, salvage: bool = False, device: str | None = None, columns: Collection[str] | None = None,
+def read_recording(path: Path, salvage: bool = False, serial: str | None = None, columns: Collection[str] | None = None,
                    progress: Callable[[float], None] | None = None) -> Recording:
-    """device: the serial number of one of several fingertips. columns: only these (t_us and frame among them), for recordings
+    """serial: of one of several fingertips. columns: only these (t_us and frame among them), for recordings
     that are too large to hold whole; then there are no sensors. progress: called now and then with the share that was read."""
     lines = _RecordingLines(path, progress)
-    reading = _Reading(path, lines.format == "2", device, columns)
+    reading = _Reading(path, lines.format == "2", serial, columns)
     skipped = 0
     last: int | None = None  # line's number
 

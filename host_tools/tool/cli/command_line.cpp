@@ -3,13 +3,20 @@
 #include "libfingertip/text.hpp"
 #include "tool/cli/usage.hpp"
 
+#include <algorithm>
+#include <array>
 #include <map>
+#include <numeric>
 
 namespace fingertip {
 
 namespace {
 
 constexpr std::size_t HELP_COLUMNS = 80;
+/* So many letters of a word may be mistyped: two that change places count as two. */
+constexpr std::size_t letters_mistyped(std::size_t letters) {
+  return letters < 6 ? 1 : 2;
+}
 
 /* Lines of at most this many characters, broken at blanks; all but the first begin with so many. */
 std::string wrapped(const std::string &line, std::size_t columns, std::size_t indent) {
@@ -52,6 +59,11 @@ std::string problem_of(const CLI::App *failed, const CLI::Error &error) {
   if (kind == "ArgumentMismatch" && text.find("At Most") != std::string::npos) {
     return text.substr(0, text.find(':')) + " is given twice; give it once";
   }
+  if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError)) {
+    /* Its name is the command's. It tells the words from the last to the first. */
+    const std::string first = text.substr(text.rfind(' ') + 1);
+    return "\"" + first + (first[0] == '-' ? "\" is no option of it" : "\" is one word too many");
+  }
   if (kind == "RequiredError") {
     for (const CLI::App *command : failed->get_subcommands()) {
       for (const CLI::Option *option : command->get_options()) {
@@ -62,6 +74,24 @@ std::string problem_of(const CLI::App *failed, const CLI::Error &error) {
     }
   }
   return text;
+}
+
+/* Letters to put in, take out or change, to make one word of the other; many for long words. */
+std::size_t letters_apart(const std::string &one, const std::string &other) {
+  std::array<std::size_t, 32> row;
+  if (other.size() >= row.size()) {
+    return row.size();
+  }
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < one.size(); i++) {
+    std::size_t diagonal = row[0]++;
+    for (std::size_t j = 0; j < other.size(); j++) {
+      const std::size_t changed = diagonal + (one[i] != other[j]);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({changed, row[j + 1] + 1, row[j] + 1});
+    }
+  }
+  return row[other.size()];
 }
 
 Reach reach_from_text(const std::string &text) {
@@ -113,13 +143,23 @@ CLI::App *CommandLine::add(const std::string &name, const std::string &text,
 }
 
 int CommandLine::run(int argc, char **argv) {
-  std::string commands;
+  std::string commands, meant;
   bool is_known = false;
+  std::size_t nearest = argc > 1 ? letters_mistyped(std::string(argv[1]).size()) + 1 : 0;
   for (const CLI::App *command : app_.get_subcommands([](const CLI::App *) { return true; })) {
     commands += (commands.empty() ? "" : ", ") + command->get_name();
-    is_known = is_known || (argc > 1 && command->get_name() == argv[1]);
+    const std::size_t apart = argc > 1 ? letters_apart(argv[1], command->get_name()) : nearest;
+    is_known = is_known || apart == 0;
+    if (apart < nearest) {
+      nearest = apart;
+      meant = command->get_name();
+    }
   }
   if (argc < 2 || (argv[1][0] != '-' && !is_known)) {
+    if (!meant.empty()) {
+      throw WrongUsage("\"" + std::string(argv[1]) + "\" is no command; is " + meant +
+                       " meant? see fingertip --help");
+    }
     throw WrongUsage(
         (argc < 2 ? "a command is missing" : "\"" + std::string(argv[1]) + "\" is no command") +
         "; give one of " + commands + "; see fingertip --help");

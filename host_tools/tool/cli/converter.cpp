@@ -67,6 +67,15 @@ Contents contents_of(const Conversion &conversion) {
   return contents;
 }
 
+void report_cut_short(const std::string &path, bool is_cut_short) {
+  if (is_cut_short) {
+    std::fprintf(stderr,
+                 "%s: no end line: the recording was cut short, its recorder killed or its disk "
+                 "full\n",
+                 printable(path).c_str());
+  }
+}
+
 } // namespace
 
 void report_losses(const std::string &path, const PacketFile &file) {
@@ -75,12 +84,7 @@ void report_losses(const std::string &path, const PacketFile &file) {
     std::fprintf(stderr, "%s: %llu damaged lines skipped\n", name.c_str(),
                  static_cast<Count>(file.skipped_lines()));
   }
-  if (file.is_cut_short()) {
-    std::fprintf(stderr,
-                 "%s: no end line: the recording was cut short, its recorder killed or its disk "
-                 "full\n",
-                 name.c_str());
-  }
+  report_cut_short(path, file.is_cut_short());
 }
 
 void convert_lines(const Conversion &conversion) {
@@ -90,6 +94,7 @@ void convert_lines(const Conversion &conversion) {
   auto sink = make_lines(conversion.to, conversion.overwrite, OutputFile::Appears::when_finished);
   LineSource::Line line;
   std::uint64_t last = 0, count = 0;
+  bool is_ended = false;
   for (;;) {
     try {
       if (!source->next(line)) {
@@ -115,13 +120,20 @@ void convert_lines(const Conversion &conversion) {
     }
     last = line.number;
     count++;
+    is_ended = is_ended || (!line.torn && line.text.rfind("# end:", 0) == 0);
     if (line.torn) {
+      if (!conversion.salvage) {
+        throw Error(ErrorCode::damaged_line, conversion.from + ":" + std::to_string(line.number) +
+                                                 ": the last line is torn");
+      }
+      std::fprintf(stderr, "%s: the last line is torn\n", printable(conversion.from).c_str());
       sink->torn_line(line.text);
     } else {
       sink->line(line.text);
     }
   }
   sink->finish();
+  report_cut_short(conversion.from, !is_ended);
   std::printf("%s: %llu lines\n", printable(conversion.to).c_str(), static_cast<Count>(count));
 }
 

@@ -5,7 +5,10 @@
 #include "tool/cli/commands/commands.hpp"
 #include "tool/cli/usage.hpp"
 
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
+#include <iostream>
 
 int main(int argc, char **argv) {
   using namespace fingertip;
@@ -18,7 +21,13 @@ int main(int argc, char **argv) {
                      add_gripper, add_grasp, add_loader, add_flash, add_rule}) {
       add(line);
     }
-    return line.run(argc, argv);
+    const int status = line.run(argc, argv);
+    /* A reader that has left, as head does, has what it wanted. std::cout is what help goes to. */
+    if ((std::fflush(stdout) != 0 || !std::cout) && errno != EPIPE) {
+      throw Error(ErrorCode::cannot_write,
+                  std::string("cannot write to standard output: ") + std::strerror(errno));
+    }
+    return status;
   } catch (const WrongUsage &error) {
     tell("fingertip", error);
     return 2;

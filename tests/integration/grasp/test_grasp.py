@@ -218,7 +218,7 @@ class Course(GraspTest):
             process.kill()
             process.wait()
             self.assertGreater(self.steady()[1], 0.5)
-            recording = files.read_recording(self.csv, device="AAAA", salvage=True)
+            recording = files.read_recording(self.csv, serial="AAAA", salvage=True)
             self.assertGreater(len(recording["t_us"]), 50)
             self.assertEqual(recording.end, {})
 
@@ -273,7 +273,7 @@ class Trouble(GraspTest):
             while "no frames" in process.readline():
                 pass
             self.assertGreater(self.tell()[1], 0.8)
-            self.world.until(lambda: len(files.read_recording(self.csv, device="AAAA").events) == 2)  # went, came back
+            self.world.until(lambda: len(files.read_recording(self.csv, serial="AAAA").events) == 2)  # went, came back
             self.finish(process)
 
     def test_a_fingertip_is_unplugged_while_it_closes(self):
@@ -429,7 +429,7 @@ class Trouble(GraspTest):
             _, err = self.finish(process, 1)
             self.assertIn("make room", err)
             self.assertGreater(self.tell()[1], HOLDS_2_N)
-        self.assertGreater(len(files.read_recording(self.csv, device="BBBB")["t_us"]), 20)
+        self.assertGreater(len(files.read_recording(self.csv, serial="BBBB")["t_us"]), 20)
 
 
 class Recorded(GraspTest):
@@ -466,7 +466,7 @@ class Recorded(GraspTest):
         self.assertGreater(rows["load_N"].max(), 0.8)
         self.assertGreater(rows["margin"].max(), 1)
         # on the same clock as the fingertips
-        left, right = (files.read_recording(self.csv, device=serial) for serial in ("AAAA", "BBBB"))
+        left, right = (files.read_recording(self.csv, serial=serial) for serial in ("AAAA", "BBBB"))
         for recording in (left, right):
             self.assertEqual(recording.end["dropped_packets"], "0")
             touched_us = recording.time_us[recording.flag(files.CONTACT)][0]

@@ -201,7 +201,7 @@ class Course(CellTest):
         serials = files.recorded_devices(self.csv)
         self.assertEqual(len(serials), 2)
         for serial in serials:
-            finger = files.read_recording(self.csv, device=serial)
+            finger = files.read_recording(self.csv, serial=serial)
             presses = finger.flag(files.CONTACT) & (finger.time_us > rows["time_us"][rows["state"] == "holding"][0])
             self.assertGreater(presses.sum(), 100)
             force_N = np.interp(finger.time_us[presses] + zero_us, truth["time_us"], truth["force_N"])

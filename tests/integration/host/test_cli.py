@@ -37,8 +37,10 @@ class Usage(CliTest):
         self.assertIn("see fingertip --help", self.error(status=2))
         self.assertIn("see fingertip record --help", self.error("record", status=2))
         self.error("monitor", "--bogus", status=2)
-        for words, problem in (([], "a command is missing"), (["moniter"], '"moniter" is no command'), (["moniter", "--port", "x"], "is no command")):
+        for words, problem in (([], "a command is missing"), (["touched"], '"touched" is no command'), (["touched", "--port", "x"], "is no command")):
             self.assertRegex(self.error(*words, status=2), f"{problem}; give one of list, info, doctor, monitor, .*; see fingertip --help")
+        for word, meant in (("recrod", "record"), ("moniter", "monitor"), ("inf", "info"), ("gripper1", "gripper"), ("seet", "set")):
+            self.assertEqual(self.error(word, status=2), f'fingertip: "{word}" is no command; is {meant} meant? see fingertip --help\n')
 
     def test_wrong_values_say_what_is_right(self):
         for value in ("nan", "-1", "0", "inf", "1x"):
@@ -53,7 +55,17 @@ class Usage(CliTest):
     def test_what_the_parser_says_is_for_people(self):
         self.assertEqual(self.error("info", "--port", "a", "--port", "b", status=2),
                          "fingertip: --port is given twice; give it once; see fingertip info --help\n")
+        self.assertEqual(self.error("list", "--port", "a", status=2), 'fingertip: "--port" is no option of it; see fingertip list --help\n')
+        self.assertEqual(self.error("list", "a", "b", status=2), 'fingertip: "a" is one word too many; see fingertip list --help\n')
         self.assertEqual(self.error("record", status=2), "fingertip: FILE.csv|FILE.mcap|- is missing; see fingertip record --help\n")
+
+    def test_output_that_cannot_be_written(self):
+        for words in (["--help"], ["record", "--help"], ["--version"], ["rule"]):
+            with open("/dev/full", "w") as full:
+                process = self.start(*words, stdout=full)
+                _, err = process.communicate()
+            self.assertEqual((process.returncode, err), (
+                1, "fingertip: cannot write to standard output: No space left on device; choose another place\n"))
 
     def test_help_fits_into_80_columns(self):
         pages = {(): self.run_cli("--help")[0]}
@@ -156,7 +168,7 @@ class Several(CliTest):
         with self.device("serial=AAAA", "clock_ppm=25", "started=1000", f"zero_log={zeros[0]}", life), \
                 self.device("serial=BBBB", "clock_ppm=-25", "started=7", f"zero_log={zeros[1]}", life, port=self.other):
             self.run_cli("record", self.csv, "--all", "--seconds", str(self.ALIGNMENT_SECONDS))
-        one, two = (files.read_recording(self.csv, device=serial) for serial in ("AAAA", "bbbb"))
+        one, two = (files.read_recording(self.csv, serial=serial) for serial in ("AAAA", "bbbb"))
         host_zero_us = float(one.metadata["host_zero_us"])
         errors = []
         for recording, zero, rate in zip((one, two), zeros, rates):
@@ -202,7 +214,7 @@ class Several(CliTest):
             _, err = process.communicate()
         self.assertEqual(process.returncode, 0, err)
         self.assertIn(" of 2 fingertips, aligned to ", err)
-        one, two = (files.read_recording(self.csv, device=serial) for serial in ("AAAA", "BBBB"))
+        one, two = (files.read_recording(self.csv, serial=serial) for serial in ("AAAA", "BBBB"))
         self.assertEqual((len(one.events), len(two.events)), (0, 2))
         self.assertTrue((np.diff(two.time_us) > 0).all())
         self.assertTrue((np.diff(one["frame"]) == 1).all())
@@ -222,7 +234,7 @@ class Several(CliTest):
         pathlib.Path(cut).write_text(re.sub(r"(?m)^# (\d/)?end: .*\n", "", text), encoding="utf-8")
         for number, serial in enumerate(("AAAA", "BBBB")):
             end = re.search(rf"(?m)^# {number}/end: frames=(\d+) .* packets=(\d+) dropped_packets=0 out_of_order=0 crc_errors=0", text)
-            recording = files.read_recording(self.csv, device=serial)
+            recording = files.read_recording(self.csv, serial=serial)
             self.assertEqual(len(recording["frame"]), int(end[1]))
             self.assertEqual((recording.end["frames"], recording.end["packets"]), end.groups())  # its own, not those of all
             for path in (self.csv, cut):

@@ -113,7 +113,7 @@ class Sharing(ServeTest):
             self.assertIn("choose one with --device", self.error("info"))
         for name in ("j.csv", "k.csv"):
             for serial in ("AAAA", "BBBB"):
-                recording = files.read_recording(self.path(name), device=serial)
+                recording = files.read_recording(self.path(name), serial=serial)
                 self.assertEqual(recording.end["dropped_packets"], "0")
                 self.assertTrue(((recording["frame"][1:] - recording["frame"][:-1]) == 1).all())
 

@@ -121,13 +121,13 @@ class TestMcap(unittest.TestCase):
                 data.decode("utf-8")
             except UnicodeDecodeError:
                 continue
-            self.assertEqual(self.convert(self.convert(path, "edited.mcap"), "edited_back.csv").read_bytes(), data, number)
+            self.assertEqual(self.convert(self.convert(path, "edited.mcap", "--salvage"), "edited_back.csv", "--salvage").read_bytes(), data, number)
         path.write_bytes(text + b"# note: \xff\n")
         self.assertIn("is no UTF-8 text, which an MCAP file cannot hold", self.refused("convert", path, self.folder / "no.mcap"))
 
     def test_the_package_reads_it_as_the_csv_file(self):
         for path, device in ((self.csv, None), (self.random_csv, None), (self.several_csv, "BBBB")):
-            one, other = read_recording(path, device=device), read_recording(self.convert(path, "read.mcap"), device=device)
+            one, other = read_recording(path, serial=device), read_recording(self.convert(path, "read.mcap"), serial=device)
             self.assertEqual((one.metadata, one.packets, one.events, one.end), (other.metadata, other.packets, other.events, other.end))
             for name in one.columns:
                 np.testing.assert_array_equal(one[name], other[name])
@@ -148,6 +148,20 @@ class TestMcap(unittest.TestCase):
         rows = [line.split(",")[0] for line in self.several_csv.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
         counts = {topic: sum(each[0] == topic for each in bags.by_rosbags(bag)) for topic in ("/fingertip/AAAA/contact", "/fingertip/BBBB/contact")}
         self.assertEqual(list(counts.values()), [rows.count("0"), rows.count("1")])
+
+    def test_a_torn_recording_is_converted_with_salvage_only(self):
+        torn, uncut = self.folder / "torn.csv", self.folder / "unended.csv"
+        lines = self.csv.read_bytes().splitlines(keepends=True)[:-1]
+        uncut.write_bytes(b"".join(lines))
+        torn.write_bytes(b"".join(lines)[:-5])
+        for out in ("torn_out.csv", "torn_out.mcap"):
+            self.assertIn(f"torn.csv:{len(lines)}: the last line is torn; use --salvage", self.refused("convert", torn, self.folder / out))
+            self.assertFalse((self.folder / out).exists())
+            self.assertEqual(bags.call(FINGERTIP, "convert", torn, self.folder / out, "--salvage").stderr,
+                             f"{torn}: the last line is torn\n{torn}: no end line: the recording was cut short, its recorder killed or its disk full\n")
+        self.assertEqual(bags.call(FINGERTIP, "convert", uncut, self.folder / "unended_out.csv").stderr,
+                         f"{uncut}: no end line: the recording was cut short, its recorder killed or its disk full\n")
+        self.assertEqual(bags.call(FINGERTIP, "convert", self.csv, self.folder / "ended_out.csv").stderr, "")
 
     def test_cut_anywhere_a_chunk_is_lost(self):
         bags.of_python(self.csv, self.folder / "cut_from_python.mcap")
@@ -257,7 +271,7 @@ class TestMcap(unittest.TestCase):
         self.assertEqual(told[0].splitlines()[-1].replace(str(self.folder), ""), told[1].splitlines()[-1].replace(str(self.folder), ""))
 
     def test_without_mcap_it_says_what_to_install_and_csv_files_are_read(self):
-        said = r"MCAP files need the package mcap; pip install \"fingertip-tactile\[mcap\]\""
+        said = r"MCAP files need the package mcap; pip install mcap"
         with mock.patch.dict(sys.modules, {"mcap": None, "mcap.writer": None}):
             with self.assertRaisesRegex(InputError, said):
                 RecordingWriter(self.folder / "without.mcap", next(bags.some_packets(1, 0)).body)

@@ -625,8 +625,12 @@ class Together(DeviceTest):
                     frames = [frame for frame, _ in zip(both, range(250))]
         text = pathlib.Path(self.path("j.csv")).read_text(encoding="utf-8")
         self.assertRegex(text, r"(?m)^# 1/clock: t_us=\d{10} time_us=")
+        with self.assertRaisesRegex(fingertip.InputError, 'holds several fingertips; choose one with serial="AAAA" or serial="BBBB"$'):
+            fingertip.read_recording(self.path("j.csv"))
+        with self.assertRaisesRegex(fingertip.InputError, "no fingertip CCCC in it; choose one of AAAA BBBB$"):
+            fingertip.read_recording(self.path("j.csv"), serial="CCCC")
         for serial in ("AAAA", "BBBB"):
-            recording = fingertip.read_recording(self.path("j.csv"), device=serial)
+            recording = fingertip.read_recording(self.path("j.csv"), serial=serial)
             self.assertEqual((recording.end["dropped_packets"], recording.end["reason"]), ("0", "closed"))
             done = subprocess.run([FINGERTIP, "replay", self.path("j.csv"), "--device", serial, "--to-csv", self.path(serial)], capture_output=True,
                                   text=True, timeout=PATIENCE_s)

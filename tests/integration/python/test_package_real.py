@@ -167,7 +167,7 @@ class Examples(DeviceTest):
                 with contextlib.suppress(fingertip.GoneError):
                     exec(compile(code, "README.md", "exec"), {"print": lambda *values: shown.append(values), "__name__": "__main__"})
                 self.assertTrue(shown, code)
-
+                self.assertFalse([values for values in shown if any(isinstance(value, float) and math.isnan(value) for value in values)], code)
 
     def test_readme(self):
         """Frames with a warning are not shown, whichever it is."""

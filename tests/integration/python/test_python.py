@@ -18,7 +18,7 @@ import numpy as np
 TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools" / "python"
 sys.path.insert(0, str(TOOLS))
 
-from fingertip import files  # noqa: E402
+from fingertip import Flag, files  # noqa: E402
 from fingertip import plot  # noqa: E402
 from fingertip.wire import Health  # noqa: E402
 
@@ -323,6 +323,14 @@ class Evaluation(ToolTest):
     def test_names_cannot_speak_to_the_terminal(self):
         err = self.error("evaluate", self.folder / "\x1b[31m\n", "x", "-o", self.folder / "s")
         self.assertIn("\\x1b[31m\\n: No such file", err)
+
+
+class TrustedRows(ToolTest):
+    def test_a_fit_without_a_warning_is_trusted(self):
+        flags = [0, files.FIT_VALID, files.FIT_VALID | files.SLIP, files.FIT_VALID | int(Flag.SENSOR_DOUBTFUL), int(Flag.SENSOR_DOUBTFUL)]
+        rows = iter(flags * 10_000)
+        recording = files.read_recording(self.recording(self.scenario(), change=lambda row: {**row, "flags": next(rows)}))
+        np.testing.assert_array_equal(recording.trusted[:5], [False, True, True, False, False])
 
 
 class EarlierRecordings(ToolTest):

@@ -312,7 +312,7 @@ class OnZenoh(unittest.TestCase):
         told = json.loads(stdout)["fingertips"]
         self.assertGreater(max(told[serial]["recovered"] for serial in told), 20)
         for serial, every in (("AAAA", 0), ("BBBB", 50)):
-            frames = [int(frame) for frame in read_recording(path, device=serial)["frame"]]
+            frames = [int(frame) for frame in read_recording(path, serial=serial)["frame"]]
             sent = [frame for frame in range(frames[0], frames[-1] + 1) if not every or frame % every]
             self.assertEqual(frames, sent)
             self.assertEqual(told[serial]["lost"], 2 * (frames[-1] + 1 - frames[0] - len(sent)))
@@ -357,7 +357,7 @@ class OnZenoh(unittest.TestCase):
             stdout, stderr = recording.communicate(timeout=2 * PATIENCE_s)
         told = json.loads(stdout)["fingertips"]["AAAA"]
         self.assertEqual((recording.returncode, told["restarts"], told["lost"], told["sent"]), (3, 1, 0, told["recorded"]), stderr)
-        found = read_recording(path, device="AAAA")
+        found = read_recording(path, serial="AAAA")
         frames = [int(frame) for frame in found["frame"]]
         again = next(at for at in range(1, len(frames)) if frames[at] < frames[at - 1])
         self.assertEqual(frames, [*range(frames[0], frames[again - 1] + 1), *range(1, frames[-1] + 1)])
