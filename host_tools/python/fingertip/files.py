@@ -39,7 +39,7 @@ import numpy.typing as npt
 from . import line, recorded
 from .errors import InputError
 from .frames import Edge, frame_of
-from .line import CONTACT_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, TANGENTIAL_COLUMNS, WARNINGS, Flag
+from .line import CONTACT_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, TANGENTIAL_COLUMNS, Flag
 from .mcap_recording import MAGIC, Damaged, Line, McapLineReader
 from .recorded import Rows, counts_of, judge_key, packet_of
 
@@ -286,7 +286,7 @@ class Recording:
     @property
     def trusted(self) -> npt.NDArray[np.bool_]:
         """Where there is a fit, and no warning."""
-        return self.flag(Flag.FIT_VALID) & ~self.flag(WARNINGS)
+        return self.flag(FIT_VALID) & ~self.flag(WARNINGS)
 
 
 # Some 20 MB are read in a second: below this the wait is short.
