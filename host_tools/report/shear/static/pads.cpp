@@ -114,6 +114,9 @@ void judge_pads(Bench &bench, ordered_json &out) {
         }
         judge_places(results, out);
       }
+      if (kind.name == kinds[3].name && load.share == 0.0) {
+        out["raw_beyond_2sd_percent"] = results.beyond_percent(2.0);
+      }
       if (calibrated && load.share == 0.0) {
         out["location_unloaded_mm"] = row["location_p50_mm"];
         out["location_unloaded_without_mm"] = row["location_without_p50_mm"];
