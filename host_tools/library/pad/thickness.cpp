@@ -75,6 +75,10 @@ std::optional<Thickness> thickness_of(const calibration &calibration) {
   return thickness_of(1e-3 * calibration.sigma_um, 1e-3 * calibration.sigma_sd_um);
 }
 
+double Thickness::told_mm() const {
+  return 0.1 * std::round(10.0 * mm);
+}
+
 bool Thickness::agrees_with(double told_mm) const {
   return std::abs(told_mm - mm) <= AGREES_SDS * sd_mm;
 }

@@ -18,6 +18,7 @@ namespace fingertip::pad {
 
 struct Thickness {
   double mm, sd_mm;
+  double told_mm() const; // as text_of tells it, so that a profile is of what was said
   bool agrees_with(double told_mm) const; // within two standard deviations
 };
 

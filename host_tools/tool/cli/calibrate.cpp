@@ -158,7 +158,7 @@ void use_thickness(CalibratedDevice &device, const calibration &made) {
                    other.c_str());
     }
   } else if (pad::profile_suits(*found)) {
-    device.write(pad::profile_of({found->mm}, info));
+    device.write(pad::profile_of({found->told_mm()}, info));
     std::printf("profile of a pad without end of %s mm: fingertip pad --overhang MM where the "
                 "rubber ends\n",
                 fixed(found->mm, 1).c_str());

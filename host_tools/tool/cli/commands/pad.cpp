@@ -50,7 +50,7 @@ double thickness_mm(const PadOptions &options, const wire_info &info) {
                 " of rubber; the tangential load is accurate enough on 9 to 20 mm");
   }
   std::printf("thickness found in the calibration: %s\n", text_of(*found).c_str());
-  return found->mm;
+  return found->told_mm();
 }
 
 int pad_command(const PadOptions &options) {
