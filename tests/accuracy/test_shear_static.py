@@ -17,7 +17,9 @@ LIMITS = (
     ("q_cover_1sd", 65, 92), ("q_cover_2sd", 96, 100), ("location_cover_1sd", 60, 88), ("location_cover_2sd", 92, 100), ("force_p50_percent", 0.1, 0.6),
     ("force_without_p50_percent", 1, 2.2), ("screw_ratio", 0.005, 0.02), ("screw_change_p95", 0.001, 0.012), ("increment_error_p50_13mm", 0.03, 0.06),
     ("increment_error_p50_9mm", 0.015, 0.045), ("zero_error_p50_9mm", 0.1, 0.18), ("zero_error_p50_own_tables", 0.01, 0.036),
-    ("increment_error_p50_own_tables_9mm", 0.01, 0.03), ("elongated_false_unflagged_percent", 0, 2), ("elongated_false_percent", 0, 2), ("raw_beyond_2sd_percent", 0, 10))
+    ("increment_error_p50_own_tables_9mm", 0.01, 0.03), ("elongated_false_unflagged_percent", 0, 2), ("elongated_false_percent", 0, 2), ("raw_beyond_2sd_percent", 0, 10),
+    ("learned_ratio_error_p50", 0.005, 0.02), ("learned_ratio_error_p95", 0.02, 0.06), ("learned_valid_percent", 88, 100), ("told_wrong_said_percent", 90, 100),
+    ("told_right_said_percent", 0, 5))
 PADS = ("--pads", "40")
 
 
