@@ -96,7 +96,7 @@ class FromRecording(CalibrateTest):
             self.assertLess(sd, 0.7)
             self.assertEqual(err, "")
             self.assertIn(f"profile of a pad without end of {found} mm", out)
-            self.assertRegex(self.run_cli("info", "--port", self.port)[0], rf"(?m)^pad_thickness_mm +{found}")
+            self.assertRegex(self.run_cli("info", "--port", self.port)[0], rf"(?m)^pad_thickness_mm +{found:g}$")
             for told in ("10.2", "13.8"):
                 _, err = self.run_cli("pad", "--thickness", told, "--port", self.port)
                 self.assertIn(f"the profile is of {told} mm of rubber, but the calibration's width is that of {found} mm, sd {sd}", err)
