@@ -28,8 +28,8 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
 
 /* Of chi^2, as standard deviations count it. Independent model errors of MODEL_SD are more than
  * layers make of smooth contacts. So a small chi^2 takes from the variance what is the model's and
- * the noise's; of what is the gains' it leaves so much, for these are what they are. A half covers as
- * it should on pads of 1.5, 5 and 10 % (seed 1 of shear_static's touches). */
+ * the noise's; of what is the gains' it leaves so much, for these are what they are. A half covers
+ * as it should on pads of 1.5, 5 and 10 % (seed 1 of shear_static's touches). */
 #define GAINS_SHIFT 1
 #define MISFIT_SHIFT 4 /* 1 / 16 */
 #define MISFIT_LEAST_Q16 6554

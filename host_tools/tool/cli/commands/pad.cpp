@@ -111,8 +111,8 @@ void add_pad(CommandLine &line) {
   with_port(command, options->choice);
   CLI::Option *thickness = command
                                ->add_option("--thickness", options->thickness_mm,
-                                            "Thickness of the rubber above the sensors, 9 to 20 mm. "
-                                            "Default: as the calibration found it")
+                                            "Thickness of the rubber above the sensors, 9 to 20 mm."
+                                            " Default: as the calibration found it")
                                ->type_name("MM");
   CLI::Option *overhang =
       command
