@@ -5,6 +5,8 @@
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/recording.hpp"
 #include "libfingertip/text.hpp"
+#include "library/pad/profile.hpp"
+#include "library/pad/thickness.hpp"
 #include "tool/calibration/gain_session.hpp"
 #include "tool/cli/calibrate_device.hpp"
 #include "tool/cli/calibrate_drag.hpp"
@@ -43,6 +45,9 @@ void print_result(const GainSession &work, const calibration &made, std::optiona
     std::printf("force scale         unknown: give the weight, to calibrate forces too\n");
   }
   std::printf("%s\n", shape_text(made).c_str());
+  if (const auto found = pad::thickness_of(made)) {
+    std::printf("rubber %s\n", text_of(*found).c_str());
+  }
   std::fflush(stdout);
 }
 
@@ -137,6 +142,29 @@ int erase(const CalibrateOptions &options) {
   return 0;
 }
 
+/* A fingertip that estimates the tangential load needs the thickness: where it was told, this says
+ * whether that is the one found; where it was not, the pad's profile follows from it. */
+void use_thickness(CalibratedDevice &device, const calibration &made) {
+  const wire_info &info = device.info();
+  const auto found = pad::thickness_of(made);
+  if (!(info.capabilities & WIRE_CAPABILITY_TANGENTIAL) || !found) {
+    return;
+  }
+  if (info.stored & WIRE_STORED_PAD) {
+    const std::string other =
+        pad::disagreement(*found, static_cast<double>(info.pad.thickness_mm));
+    if (!other.empty()) {
+      std::fprintf(stderr, "fingertip: %s; fingertip pad takes the one that was found\n",
+                   other.c_str());
+    }
+  } else if (pad::profile_suits(*found)) {
+    device.write(pad::profile_of({found->told_mm()}, info));
+    std::printf("profile of a pad without end of %s mm: fingertip pad --overhang MM where the "
+                "rubber ends\n",
+                fixed(found->mm, 1).c_str());
+  }
+}
+
 int calibrate(const CalibrateOptions &options) {
   std::optional<CalibratedDevice> device;
   std::optional<GainSession> work;
@@ -164,6 +192,7 @@ int calibrate(const CalibrateOptions &options) {
   }
   ask(options, "Write this into " + text_field(device->info().serial) + "?", "not written");
   device->write(made);
+  use_thickness(*device, made);
   std::printf("calibrated: it acts from now on\n");
   return 0;
 }

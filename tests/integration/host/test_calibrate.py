@@ -86,6 +86,31 @@ class FromRecording(CalibrateTest):
             self.assertIn("is of fingertip", err)
             self.assertEqual(self.calibrate("--show", "--port", self.port)[0], "not calibrated\n")
 
+    def test_finds_the_thickness_and_says_where_another_was_told(self):
+        serial = re.search(r"^# serial: (\S+)$", pathlib.Path(recording).read_text(encoding="utf-8"), re.M)[1]
+        write = ("--from", recording, "--yes", "--port", self.port)
+        with self.device(f"serial={serial}", "capabilities=15"):
+            out, err = self.calibrate(*write)
+            found, sd = (float(value) for value in re.search(r"(?m)^rubber ([\d.]+) mm, sd ([\d.]+)$", out).groups())
+            self.assertAlmostEqual(found, 12, delta=0.5)
+            self.assertLess(sd, 0.7)
+            self.assertEqual(err, "")
+            self.assertIn(f"profile of a pad without end of {found} mm", out)
+            self.assertRegex(self.run_cli("info", "--port", self.port)[0], rf"(?m)^pad_thickness_mm +{found:g}$")
+            for told in ("10.2", "13.8"):
+                _, err = self.run_cli("pad", "--thickness", told, "--port", self.port)
+                self.assertIn(f"the profile is of {told} mm of rubber, but the calibration's width is that of {found} mm, sd {sd}", err)
+            _, err = self.calibrate(*write)
+            self.assertIn("the profile is of 13.8 mm of rubber", err)
+            out, err = self.run_cli("pad", "--overhang", "30", "--port", self.port)
+            self.assertIn(f"thickness found in the calibration: {found} mm", out)
+            self.assertEqual(err, "")
+            _, err = self.run_cli("pad", "--thickness", "12", "--overhang", "30", "--port", self.port)
+            self.assertEqual(err, "")
+        with self.device(f"serial={serial}"):
+            out, err = self.calibrate(*write)
+            self.assertNotIn("profile of a pad", out)
+
     def test_is_asked_before(self):
         serial = re.search(r"^# serial: (\S+)$", pathlib.Path(recording).read_text(encoding="utf-8"), re.M)[1]
         with self.device(f"serial={serial}"):

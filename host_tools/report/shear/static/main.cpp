@@ -26,8 +26,8 @@ ordered_json measure(const Options &options) {
   out["shear_pads"] = options.pads;
   Bench bench(options);
   for (const auto judge :
-       {judge_pads, judge_objects, judge_elongated, judge_limits, judge_thickness, judge_bounds,
-        judge_rubber, judge_screws, judge_taps, judge_overhang, draw_arrows}) {
+       {judge_pads, judge_objects, judge_elongated, judge_limits, judge_thickness, judge_learned,
+        judge_bounds, judge_rubber, judge_screws, judge_taps, judge_overhang, draw_arrows}) {
     judge(bench, out);
   }
   return out;

@@ -1,7 +1,10 @@
+#include "library/pad/thickness.hpp"
 #include "shear/static/tables.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <iterator>
 
 namespace fingertip::shear {
 
@@ -114,6 +117,9 @@ void judge_pads(Bench &bench, ordered_json &out) {
         }
         judge_places(results, out);
       }
+      if (kind.name == kinds[3].name && load.share == 0.0) {
+        out["raw_beyond_2sd_percent"] = results.beyond_percent(2.0);
+      }
       if (calibrated && load.share == 0.0) {
         out["location_unloaded_mm"] = row["location_p50_mm"];
         out["location_unloaded_without_mm"] = row["location_without_p50_mm"];
@@ -164,6 +170,47 @@ void judge_thickness(Bench &bench, ordered_json &out) {
     }
   }
   bench.progress("thicknesses");
+}
+
+// The profile that follows from a calibration's width, and a thickness that was told 15 % wrong.
+void judge_learned(Bench &bench, ordered_json &out) {
+  constexpr std::size_t SESSIONS = 20;
+  constexpr double WRONG = 0.15;
+  const truth::Feet feet(LAYER_mm, bench.options.cache);
+  const truth::PadOptions kinds[] = {{10.0, 0.0, 0.0}, {10.0, 17.5, 0.1}};
+  std::vector<Judged> judged;
+  double wrong_said = 0.0, right_said = 0.0;
+  std::vector<double> off_percent;
+  for (std::size_t i = 0; i < SESSIONS; i++) {
+    const std::uint64_t seed =
+        Random(bench.options.seed, truth::stream_of("learned thickness"), i).next();
+    truth::SessionPad pad(kinds[i % std::size(kinds)], LAYER_mm, seed);
+    truth::Session session(feet, truth::SessionKind::good, seed, 24);
+    std::vector<calibrating::Placement> placements;
+    while (auto placement = session.next(pad)) {
+      placements.push_back(std::move(*placement));
+    }
+    const auto solution = calibrating::solve(truth::session_array(), placements);
+    const pad::Thickness found = pad::thickness_of(solution.sigma_mm, solution.sigma_sd_mm);
+    off_percent.push_back(100.0 * std::abs(found.mm / LAYER_mm - 1.0));
+    right_said += !found.agrees_with(LAYER_mm);
+    wrong_said += !found.agrees_with((1.0 - WRONG) * LAYER_mm);
+    wrong_said += !found.agrees_with((1.0 + WRONG) * LAYER_mm);
+    const pad_profile told = profile_of(found.told_mm());
+    Case c = bench.usual();
+    c.fewer = 1.0 / SESSIONS;
+    const Results results = bench.run("learned " + std::to_string(i), c, &told);
+    judged.insert(judged.end(), results.all().begin(), results.all().end());
+  }
+  const ordered_json row = Results(std::move(judged)).row("12 mm, learned, Q/F 0.3");
+  out["learned"].push_back(row);
+  for (const char *key : {"valid_percent", "ratio_error_p50", "ratio_error_p95"}) {
+    out[std::string("learned_") + key] = row[key];
+  }
+  out["learned_thickness_off_p95_percent"] = truth::quantile(off_percent, 0.95);
+  out["told_wrong_said_percent"] = truth::percent(wrong_said, 2.0 * SESSIONS);
+  out["told_right_said_percent"] = truth::percent(right_said, 1.0 * SESSIONS);
+  bench.progress("learned thickness");
 }
 
 } // namespace fingertip::shear

@@ -68,6 +68,10 @@ double Results::q_covered(double sds) const {
   });
 }
 
+double Results::beyond_percent(double sds) const {
+  return 100.0 - q_covered(sds / std::sqrt(2.0));
+}
+
 double Results::location_covered(double sds) const {
   return where([](const Judged &j) { return j.said.valid; }).share([=](const Judged &j) {
     return j.location_error_mm() <= sds * j.said.location_sd_mm;

@@ -44,6 +44,9 @@ public:
   // 98 % for 1 and 2 would be a normal distribution in the plane.
   double q_covered(double sds) const;
   double location_covered(double sds) const;
+  // Of those too, the share whose Q is off by more than so many standard deviations of either
+  // component: 13.5 % for 2 would be a normal distribution.
+  double beyond_percent(double sds) const;
   // Claims a load: valid, |Q| / F above 0.05 and above two of its standard deviations.
   double claimed_percent() const;
   double claimed_unflagged_percent() const; // and is not flagged as elongated

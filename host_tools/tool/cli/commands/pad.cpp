@@ -5,6 +5,7 @@
 #include "library/pad/edges.hpp"
 #include "library/pad/profile.hpp"
 #include "library/pad/table_file.hpp"
+#include "library/pad/thickness.hpp"
 #include "tool/cli/commands/commands.hpp"
 #include "tool/cli/device.hpp"
 #include "tool/cli/usage.hpp"
@@ -16,10 +17,6 @@
 namespace fingertip {
 
 namespace {
-
-// On thinner rubber than the sensors are apart the corrected location is worse than the fit's, and
-// the load off by 0.07 of the force and more (the report's part shear).
-constexpr double THINNEST_mm = 9.0;
 
 struct PadOptions {
   Choice choice;
@@ -34,11 +31,29 @@ int erase_pad(Session &session) {
   return 0;
 }
 
-int pad_command(const PadOptions &options) {
-  if (!options.erase && !options.thickness_mm) {
-    throw WrongUsage(
-        "give --thickness MM of the pad's rubber, or --erase; see fingertip pad --help");
+// Told, or as the fingertip's calibration found it.
+double thickness_mm(const PadOptions &options, const wire_info &info) {
+  const bool calibrated = (info.stored & WIRE_STORED_CALIBRATION) != 0;
+  const auto found = calibrated ? pad::thickness_of(info.calibration) : std::nullopt;
+  if (options.thickness_mm) {
+    const std::string other = found ? pad::disagreement(*found, *options.thickness_mm) : "";
+    if (!other.empty()) {
+      std::fprintf(stderr, "fingertip: %s\n", other.c_str());
+    }
+    return *options.thickness_mm;
   }
+  if (!found) {
+    throw WrongUsage("give --thickness MM of the pad's rubber, or calibrate first: that finds it");
+  }
+  if (!pad::profile_suits(*found)) {
+    throw Error("the calibration's width is that of " + text_of(*found) +
+                " of rubber; the tangential load is accurate enough on 9 to 20 mm");
+  }
+  std::printf("thickness found in the calibration: %s\n", text_of(*found).c_str());
+  return found->told_mm();
+}
+
+int pad_command(const PadOptions &options) {
   Device device(options.choice);
   Session &session = device.session;
   wire_info info = session.info().body.info;
@@ -49,11 +64,11 @@ int pad_command(const PadOptions &options) {
   if (options.erase) {
     return erase_pad(session);
   }
-  if (*options.thickness_mm < THINNEST_mm) {
+  if (options.thickness_mm && *options.thickness_mm < pad::THINNEST_mm) {
     throw WrongUsage("on less than 9 mm of rubber the tangential load is not accurate enough; "
                      "--thickness goes from 9 to 20 mm");
   }
-  const pad::Shape shape{*options.thickness_mm, options.overhang_mm, options.from_touch};
+  const pad::Shape shape{thickness_mm(options, info), options.overhang_mm, options.from_touch};
   pad_profile profile = typed([&] { return pad::profile_of(shape, info); });
   const bool ends = shape.overhang_mm >= pad::EDGE_OVERHANG_MIN_mm &&
                     shape.overhang_mm <= pad::EDGE_OVERHANG_MAX_mm;
@@ -96,7 +111,8 @@ void add_pad(CommandLine &line) {
   with_port(command, options->choice);
   CLI::Option *thickness = command
                                ->add_option("--thickness", options->thickness_mm,
-                                            "Thickness of the rubber above the sensors, 9 to 20 mm")
+                                            "Thickness of the rubber above the sensors, 9 to 20 mm."
+                                            " Default: as the calibration found it")
                                ->type_name("MM");
   CLI::Option *overhang =
       command
@@ -104,14 +120,12 @@ void add_pad(CommandLine &line) {
                        "How far the rubber extends beyond the outer sensors, up to 100 mm; from 3 "
                        "to 20 mm the effect of the ends is computed and subtracted. Default: a pad "
                        "without end")
-          ->type_name("MM")
-          ->needs(thickness);
+          ->type_name("MM");
   CLI::Option *from_touch =
       command
           ->add_flag("--from-touch", options->from_touch,
                      "Report the change since the first 100 ms of each contact: for pads whose "
-                     "rubber ends within half its thickness of the outer sensors")
-          ->needs(thickness);
+                     "rubber ends within half its thickness of the outer sensors");
   command->add_flag("--erase", options->erase, "Erase the pad's profile: no tangential load")
       ->excludes(thickness)
       ->excludes(overhang)
