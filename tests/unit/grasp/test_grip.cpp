@@ -430,6 +430,21 @@ TEST(Grip, WhatOneFingertipPushedAwayIsNotDropped) {
   EXPECT_EQ(world.report.state, GRIP_HOLDING);
 }
 
+// A slide does not hurry a gripper that cannot keep the cap itself: each move shows before the next.
+TEST(Grip, ASlideNeverLeadsBeyondALowCap) {
+  for (const double stiffness : {2.0, 2.5}) {
+    GripWorld world({{"cap", 4.0}, {"start", 0.6}, {"floor", 0.5}}, gripper_traits("2f85"));
+    world.stiffness = stiffness;
+    world.power = 1.85;
+    world.delay_s = 0.04;
+    world.grasp();
+    world.pull(0.4, 0.1);
+    world.slide(0.6, 30.0, 0.5);
+    world.run(0.3);
+    EXPECT_LT(world.peak_N, 4.0) << stiffness;
+  }
+}
+
 TEST(Grip, SaysThatTheObjectIsGone) {
   GripWorld world;
   world.grasp();
