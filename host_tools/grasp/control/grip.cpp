@@ -76,7 +76,7 @@ bool Grip::request(GripRequest request) {
     hold_.begin();
     fixed_.begin();
     wanted_N_ = 0.0;
-    may_activate_ = is_blind_ = false;
+    may_activate_ = is_blind_ = was_held_ = false;
     enter(GRIP_ACTIVATING);
     return true;
   case GRIP_REQUEST_HOLD:
@@ -179,6 +179,7 @@ std::uint32_t Grip::squeeze() {
   const double aimed_N = start_force();
   // What one fingertip alone pushes is not gripped yet.
   const bool alone = felt_.fingers == 2 && felt_.low_N < settings_.touch_N;
+  was_held_ = was_held_ || !alone;
   if (alone) {
     reach_.both_touch(felt_.t_s);
   }
@@ -349,7 +350,8 @@ GripReport Grip::step(double now_s, GripCommand &command) {
     fault_code_ = status_.fault;
     enter(GRIP_FAULT);
   } else if (grasps && is_gone()) {
-    enter(GRIP_DROPPED);
+    // What only one fingertip has pushed was never held: on to the other.
+    enter(was_held_ || state_ != GRIP_SQUEEZE ? GRIP_DROPPED : GRIP_APPROACH);
   } else if (!silent && !(grasps && felt_.fingers > 0 && felt_.touches == 0)) {
     trouble_ |= go_on();
   }

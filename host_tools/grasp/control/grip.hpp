@@ -130,6 +130,7 @@ private:
   double even_s_ = 0.0;   // the fingertips' forces were last alike, or the gripper moved
   bool may_activate_ = false, is_entered_ = false;
   bool still_grasps_ = false; // STILL with an object
+  bool was_held_ = false;     // both fingertips have felt the object
   bool is_blind_ = false;     // squeezed without a fingertip that could tell a load
 };
 

@@ -27,7 +27,7 @@ constexpr double LATELY_s = 0.2, BEGINS_AT = 0.8, FAR_mm = 1.0;
 // caught move a contact so far.
 constexpr double HOLDS_AT = 0.6, NO_SLIDE_mm = 0.5;
 // What slides teaches friction as long as it does not slow down: then the grip holds already.
-constexpr double SLOWS = 0.85;
+constexpr double SLOWS = 0.95;
 // A slide raises the grip at once: by what the ratio says that it slides at, within these limits,
 // or, of an unknown load, by so much, and again after the gripper's answer and so long.
 constexpr double RAISE_LEAST = 1.12, RAISE_MOST = 1.6, RAISE_UNKNOWN = 1.5, AGAIN_s = 0.015;
@@ -73,10 +73,6 @@ void GripLoad::begins_to_slide() {
   rate_N_s_ = is_known_ ? 0.0 : rate_N_s_;
 }
 
-void GripLoad::slides(double load_N) {
-  load_N_ = is_known_ ? load_N_ : std::max(load_N_, load_N);
-}
-
 void GripHold::begin() {
   *this = GripHold();
 }
@@ -103,7 +99,6 @@ void GripHold::slide(const GripFelts &felt, const GripSettings &settings, double
   slid_s_ = now_s;
   slid_mm_ += felt.speed_mm_s * passed_s;
   fastest_mm_s_ = std::max(fastest_mm_s_, felt.speed_mm_s);
-  load_.slides(felt.load_N);
   if (felt.speed_mm_s < SLOWS * fastest_mm_s_) {
     return;
   }

@@ -26,7 +26,6 @@ public:
   void rests(double load_N, double passed_s, bool swings);
   // From now on it slides.
   void begins_to_slide();
-  void slides(double load_N);
   void doubt() { is_known_ = false; }
 
   double now_N() const { return load_N_; }

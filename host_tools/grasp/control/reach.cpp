@@ -11,7 +11,7 @@ namespace {
 constexpr double EXPONENT = 1.6;
 // Than what is known, where a cap is to hold; and where one fingertip presses alone, whose rubber
 // the moves of both do not teach.
-constexpr double STIFFER = 1.1, ALONE_STIFFER = 1.6;
+constexpr double STIFFER = 1.2, ALONE_STIFFER = 1.6;
 // Both pads, at the force of a touch; less is not told from nothing.
 constexpr double TOUCHED_mm = 0.3;
 constexpr double LEAST_N = 0.05;
@@ -195,7 +195,8 @@ std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt
   if (come) {
     rubber_.learn(felt.grip_N, width_mm);
   }
-  if (haste == Haste::patient && !come) {
+  // Nor does a gripper that cannot keep the cap itself add a move to one that does not show yet.
+  if ((haste == Haste::patient || !limits_itself(settings)) && !come) {
     return trouble;
   }
   const double low_N = haste == Haste::patient ? felt.low_N : felt.grip_N;

@@ -138,6 +138,20 @@ TEST(Grip, ASteadyLoadIsNotWhatSlides) {
   EXPECT_LT(world.peak_N, 1.3 * needed_N);
 }
 
+// Nor does one whose load is not known yet: what it asks for grows only by the raises of a slide.
+TEST(Grip, WhatSlidesInALiftDoesNotFeedItself) {
+  GripWorld world;
+  world.grasp();
+  world.pull(1.5, 0.05);
+  const double friction = world.load_N / world.force_N, before_N = world.force_N;
+  world.slide(friction, 30.0, 0.015); // the raise comes
+  for (double speed_mm_s = 28.0; speed_mm_s > 10.0; speed_mm_s *= 0.9) {
+    world.slide(friction, speed_mm_s, 0.005); // and the slide slows down
+  }
+  EXPECT_GT(world.force_N, 1.2 * before_N);
+  EXPECT_LT(world.force_N, 1.65 * before_N);
+}
+
 // Squeezed rubber moves a contact by less than half a millimetre, far below what it holds.
 TEST(Grip, AShortMotionFarBelowWhatHoldsIsNoSlide) {
   GripWorld world;
@@ -398,6 +412,37 @@ TEST(Grip, ActivatesOnlyWhatHoldsNothing) {
   full.run(0.5);
   EXPECT_FALSE(full.activated);
   EXPECT_NE(full.report.trouble & GRIP_GRIPPER_INACTIVE, 0u);
+}
+
+// An object that one fingertip has pushed away was never held, so the approach goes on.
+TEST(Grip, WhatOneFingertipPushedAwayIsNotDropped) {
+  GripWorld world({{"cap", 2.4}, {"start", 1.0}, {"floor", 0.75}}, gripper_traits("2f85"));
+  world.stiffness = 5.0;
+  world.off_mm = 0.3;
+  ASSERT_TRUE(world.grip.request(GRIP_REQUEST_GRASP));
+  world.run_to(GRIP_SQUEEZE);
+  world.object_mm = 38.0;
+  world.off_mm = 0.0;
+  for (int i = 0; i < 4000 && world.report.state != GRIP_HOLDING; i++) {
+    world.run(1e-3);
+    ASSERT_NE(world.report.state, GRIP_DROPPED);
+  }
+  EXPECT_EQ(world.report.state, GRIP_HOLDING);
+}
+
+// A slide does not hurry a gripper that cannot keep the cap itself: each move shows before the next.
+TEST(Grip, ASlideNeverLeadsBeyondALowCap) {
+  for (const double stiffness : {2.0, 2.5}) {
+    GripWorld world({{"cap", 4.0}, {"start", 0.6}, {"floor", 0.5}}, gripper_traits("2f85"));
+    world.stiffness = stiffness;
+    world.power = 1.85;
+    world.delay_s = 0.04;
+    world.grasp();
+    world.pull(0.4, 0.1);
+    world.slide(0.6, 30.0, 0.5);
+    world.run(0.3);
+    EXPECT_LT(world.peak_N, 4.0) << stiffness;
+  }
 }
 
 TEST(Grip, SaysThatTheObjectIsGone) {
