@@ -17,7 +17,7 @@ constexpr int SENSORS = 15, SENSOR_UNKNOWNS = 6; // log gain, dx, dy, o, d, r
 // One reading. Blocks: the sensor's, the profile's (log peak, log width, m, q1, q2), the
 // placement's (x, y, e, w, q1, q2).
 struct ReadingCost {
-  double x_mm, y_mm, reading_Pa, sd_Pa, tau, earlier_Pa;
+  double x_mm, y_mm, reading_Pa, sd_Pa, tau, earlier_Pa, dip_mm;
   template <typename T>
   bool operator()(const T *sensor, const T *profile, const T *placement, T *residual) const {
     const T u = x_mm + sensor[1] - placement[0], v = y_mm + sensor[2] - placement[1];
@@ -28,7 +28,7 @@ struct ReadingCost {
     const T narrow = exp(-square / (2.0 * NARROW * NARROW * width * width));
     const T value = exp(sensor[0] + profile[0] + placement[2] - 2.0 * placement[3]) *
                     ((1.0 - profile[2]) * wide + profile[2] * narrow -
-                     profile[5] * exp(-square / (2.0 * DIP * DIP * width * width)));
+                     profile[5] * exp(-square / (2.0 * dip_mm * dip_mm)));
     const T model = value + sensor[3] + sensor[4] * tau - sensor[5] * earlier_Pa;
     residual[0] = (reading_Pa - model) / sd_Pa;
     return true;
@@ -100,7 +100,8 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
       const double tau = 2.0 * (placements[i].t_s - first_s) / (last_s - first_s) - 1.0;
       problem.AddResidualBlock(
           new ceres::AutoDiffCostFunction<ReadingCost, 1, SENSOR_UNKNOWNS, 6, 6>(
-              new ReadingCost{array.x_mm[k], array.y_mm[k], reading, sd, tau, earlier}),
+              new ReadingCost{array.x_mm[k], array.y_mm[k], reading, sd, tau, earlier,
+                              DIP_PITCHES * array.pitch_mm}),
           huber, sensors[k].data(), profile.data(), own[i].data());
     }
     add_prior<6>(problem, own[i].data(), 2, 0.0, solution.spread.force, huber);

@@ -17,7 +17,7 @@ RESPONSE_MM = 6.0      # a sensor's response is fitted to presses so near it
 OUTSIDE_MM = 3.0       # presses so far beyond the outer sensors are judged apart
 RAW_GAIN_SD = 0.105    # of a pad that was never calibrated: DEFAULT_GAIN_SD
 PRIOR_WIDTH_MM = 0.5   # of the prior on sigma that a user types: PRIOR_WIDTH in line.toml
-DIP_WIDTHS = 3.2       # of the dip, in widths of the response: DIP of calibration/solver.hpp
+DIP_PITCHES = 2.3      # standard deviation of the dip: DIP_PITCHES of calibration/solver.hpp
 DIP_FROM_WIDTHS = 3.0
 PLACEMENTS, SESSIONS, EVERY_S = 20, 30, 8.0
 PLACEMENT_PEAK_PA = 1500.0  # a calibration refuses lighter ones
@@ -122,7 +122,7 @@ def dip_share(grid):
     square = ((grid.xy[:, None, :] - grid.layout)**2).sum(axis=2) / grid.width_mm**2
     far = (square > DIP_FROM_WIDTHS**2) & ~grid.judged[:, None]
     below = (np.exp(-square / 2) - grid.reading_Pa / grid.peak_Pa)[far]
-    dip = np.exp(-square[far] / (2 * DIP_WIDTHS**2))
+    dip = np.exp(-square[far] / (2 * (DIP_PITCHES * grid.pitch_mm / grid.width_mm.mean())**2))
     return float((below * dip).sum() / (dip**2).sum())
 
 

@@ -368,7 +368,7 @@ Judgement judge(const Array &array, const std::vector<Placement> &placements, bo
 Shape shape_of(const Solution &solution) {
   return {solution.sigma_mm,
           std::hypot(solution.sigma_sd_mm, CONTACTS_SD_mm2 / (2.0 * solution.sigma_mm)),
-          std::max(solution.dip, 0.0), DIP * solution.width_mm};
+          solution.dip_share, solution.dip_sd_mm};
 }
 
 std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements,

@@ -120,12 +120,13 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau,
   const double per = 0.5 / (width * width), narrow_per = per / (NARROW * NARROW);
   const double wide = std::exp(-per * square), narrow = std::exp(-narrow_per * square);
   const double strength = std::exp(g[k] + g[layout.log_peak()] + l[2] - 2.0 * l[3]);
-  const double dip_per = per / (DIP * DIP), h = g[layout.dip()];
+  const double dip_mm = DIP_PITCHES * array_.pitch_mm, dip_per = 0.5 / (dip_mm * dip_mm);
+  const double h = g[layout.dip()];
   const double dip = std::exp(-dip_per * square);
   const double value = strength * ((1.0 - m) * wide + m * narrow - h * dip);
-  const double by_square =
-      -strength * ((1.0 - m) * wide * per + m * narrow * narrow_per - h * dip * dip_per);
-  const double by_log_width = -2.0 * square * by_square;
+  const double core_by_square = -strength * ((1.0 - m) * wide * per + m * narrow * narrow_per);
+  const double by_square = core_by_square + strength * h * dip * dip_per;
+  const double by_log_width = -2.0 * square * core_by_square;
   const double by_u = by_square * (2.0 * u - 4.0 * q1 * u - 4.0 * q2 * v);
   const double by_v = by_square * (2.0 * v + 4.0 * q1 * v - 4.0 * q2 * u);
   Reading r;

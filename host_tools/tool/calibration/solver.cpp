@@ -36,17 +36,31 @@ MatrixXd gauge(const Array &array) {
   return MatrixXd(qr.householderQ()).leftCols(qr.rank());
 }
 
-/* Width, over that of the wide part, of the Gaussian nearest to the two parts of the profile: by
- * least squares over the plane, best amplitude each. Products of Gaussians have closed integrals. */
-double nearest_gaussian(double mixing) {
+/* The firmware's model nearest to the profile: one Gaussian less a dip. By least squares over the
+ * plane; products of Gaussians have closed integrals. */
+struct Nearest {
+  double width = 1.0; /* of the Gaussian, over that of the wide part, as all widths here */
+  double dip = 0.0;   /* of its amplitude */
+};
+Nearest nearest(double mixing, double dip, double dip_width) {
   const auto overlap = [](double a, double b) { return a * a * b * b / (a * a + b * b); };
-  double best = 1.0, most = 0.0;
+  const auto profile = [&](double b) {
+    return (1.0 - mixing) * overlap(1.0, b) + mixing * overlap(NARROW, b) -
+           dip * overlap(dip_width, b);
+  };
+  Nearest best;
+  double most = 0.0;
   for (double width = NARROW; width <= 1.2; width += 0.002) {
-    const double with = (1.0 - mixing) * overlap(1.0, width) + mixing * overlap(NARROW, width);
-    const double explained = with * with / overlap(width, width);
+    const double own = overlap(width, width), of_dip = overlap(dip_width, dip_width);
+    const double cross = overlap(width, dip_width);
+    const double with = profile(width), with_dip = profile(dip_width);
+    const double determinant = own * of_dip - cross * cross;
+    const double peak = (of_dip * with - cross * with_dip) / determinant;
+    const double depth = (cross * with - own * with_dip) / determinant;
+    const double explained = peak * with - depth * with_dip;
     if (explained > most) {
       most = explained;
-      best = width;
+      best = {width, depth / peak};
     }
   }
   return best;
@@ -259,12 +273,18 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
   }
   solution.dip = global[layout.dip()];
   solution.dip_sd = std::sqrt(std::max(covariance(layout.dip(), layout.dip()), 0.0));
-  solution.sigma_mm = solution.width_mm * nearest_gaussian(solution.mixing);
+  const auto near = [&](double mixing) {
+    return nearest(mixing, solution.dip, DIP_PITCHES * array.pitch_mm / solution.width_mm);
+  };
+  const auto [width, dip_share] = near(solution.mixing);
+  solution.sigma_mm = solution.width_mm * width;
+  solution.dip_share = std::max(dip_share, 0.0);
+  solution.dip_sd_mm = DIP_PITCHES * array.pitch_mm;
   /* By the width and the mixing, which go against each other. */
   constexpr double STEP = 0.05;
-  const double by_mixing = (nearest_gaussian(solution.mixing + STEP) -
-                            nearest_gaussian(solution.mixing - STEP)) /
-                           (2.0 * STEP * nearest_gaussian(solution.mixing));
+  const double by_mixing =
+      (near(solution.mixing + STEP).width - near(solution.mixing - STEP).width) /
+      (2.0 * STEP * width);
   const int at_width = layout.log_width(), at_mixing = layout.mixing();
   const double variance = covariance(at_width, at_width) +
                           2.0 * by_mixing * covariance(at_width, at_mixing) +

@@ -3,10 +3,10 @@
  * The same weight on the same rounded foot is set down at places that are not measured. Then every
  * placement presses with the same force and, on a pad of one thickness, with the same profile; what
  * differs between a reading and that profile at its distance is the sensor's. With placement i at
- * (x, y), its squared distance R from sensor k, c = NARROW and b = DIP,
+ * (x, y), its squared distance R from sensor k, c = NARROW and B = DIP_PITCHES pitches,
  *
  *   reading = g_k A exp(e - 2 w) [(1 - m) exp(-R / 2 S^2) + m exp(-R / 2 c^2 S^2)
- *                                 - h exp(-R / 2 b^2 S^2)] + o_k + d_k tau - r_k M,
+ *                                 - h exp(-R / 2 B^2)] + o_k + d_k tau - r_k M,
  *   S = s exp(w),   R = u^2 + v^2 - 2 q1 (u^2 - v^2) - 4 q2 u v,
  *   M = sum over earlier placements of what rubber has not let go of yet (remember)
  *
@@ -91,9 +91,10 @@ struct Assumptions {
 
 /* Width of the narrow part of the profile over that of the wide one. */
 constexpr double NARROW = 0.64;
-/* Width of the dip over that of the wide part. As the assumed spread of forces, chosen on the
- * recording of host_tools/report/real that chooses. */
-constexpr double DIP = 3.2;
+/* Standard deviation of the dip's Gaussian, in pitches: about as wide as the array can still tell
+ * from zeros that were off. As the assumed spread of forces, chosen on the recording of
+ * host_tools/report/real that chooses. */
+constexpr double DIP_PITCHES = 2.3;
 /* In residual standard deviations: where a reading's weight begins to fall. */
 constexpr double HUBER = 2.5;
 
@@ -125,7 +126,8 @@ struct Solution {
   double peak_Pa = 0.0; /* A, of a sensor of mean gain */
   double width_mm = 0.0, mixing = 0.0;
   double dip = 0.0, dip_sd = 0.0; /* h */
-  double sigma_mm = 0.0, sigma_sd_mm = 0.0; /* of the Gaussian nearest to the two without the dip */
+  /* Of the firmware's model that is nearest to the profile: one Gaussian less a dip. */
+  double sigma_mm = 0.0, sigma_sd_mm = 0.0, dip_share = 0.0, dip_sd_mm = 0.0;
   std::vector<Fitted> placements; /* as given */
   std::size_t kept = 0;
   double residual_share = 0.0; /* rms over all readings kept, of the peak */

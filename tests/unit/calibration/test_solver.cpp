@@ -47,6 +47,32 @@ TEST(Solver, finds_gains_places_and_the_profile) {
   }
 }
 
+/* What the firmware is told is its own model, a Gaussian less a dip, and not the solver's parts. */
+TEST(Solver, finds_the_gaussian_and_the_dip_of_the_firmware) {
+  constexpr double SIGMA_mm = 4.0, SHARE = 0.03;
+  const KnownPad pad(6);
+  const double dip_mm = DIP_PITCHES * pad.array.pitch_mm;
+  auto placements = good_session(pad, 24, 6);
+  Random random(6, 2, 0);
+  for (Placement &placement : placements) {
+    const double x = random.uniform(pad.array.x_mm.front(), pad.array.x_mm.back());
+    const double y = random.uniform(pad.array.y_mm.front(), pad.array.y_mm.back());
+    for (std::size_t k = 0; k < 15; k++) {
+      const double square =
+          std::pow(pad.array.x_mm[k] - x, 2) + std::pow(pad.array.y_mm[k] - y, 2);
+      placement.reading_Pa[k] = pad.gain[k] * KnownPad::PEAK_Pa *
+                                    (std::exp(-square / (2.0 * SIGMA_mm * SIGMA_mm)) -
+                                     SHARE * std::exp(-square / (2.0 * dip_mm * dip_mm))) +
+                                random.normal();
+    }
+  }
+  const Solution s = solve(pad.array, placements);
+  ASSERT_TRUE(s.solved);
+  EXPECT_NEAR(s.sigma_mm / SIGMA_mm, 1.0, 0.01);
+  EXPECT_NEAR(s.dip_share / SHARE, 1.0, 0.1);
+  EXPECT_DOUBLE_EQ(s.dip_sd_mm, dip_mm);
+}
+
 /* A tilt alone is what touches of unknown strength do not tell. */
 TEST(Solver, one_weight_tells_a_tilt_and_a_bowl) {
   for (int kind = 0; kind < 2; kind++) {
