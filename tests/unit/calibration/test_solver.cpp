@@ -69,7 +69,7 @@ TEST(Solver, finds_the_gaussian_and_the_dip_of_the_firmware) {
   const Solution s = solve(pad.array, placements);
   ASSERT_TRUE(s.solved);
   EXPECT_NEAR(s.sigma_mm / SIGMA_mm, 1.0, 0.01);
-  EXPECT_NEAR(s.dip_share / SHARE, 1.0, 0.1);
+  EXPECT_NEAR(s.dip_share / SHARE, 1.0, 0.02);
   EXPECT_DOUBLE_EQ(s.dip_sd_mm, dip_mm);
 }
 
