@@ -17,6 +17,7 @@ format_disagreements inputs of tests/formats to which library, Python and page g
 page_codec_lines    lines of the page in the folders of line and recordings, but for files that only ask and show; and elsewhere those that take
                     numbers out of bytes
 longest_file        lines of the longest source; firmware/fit and condition apart
+readme_words        words of README.md, the first screen
 product_lines       lines of sources and texts, firmware and boards too; no limit, for people
 """
 import argparse
@@ -30,7 +31,7 @@ import tomllib
 
 # figure: what it shall be, and what it may be until then. The second only ever falls.
 LIMITS = {"files_per_board": (8, 8), "files_per_gripper": (5, 5), "files_per_field": (6, 6), "files_per_setting": (6, 6), "rooms": (9, 9), "circles": (0, 0),
-          "format_disagreements": (0, 0), "page_codec_lines": (0, 0), "longest_file": (700, 700)}
+          "format_disagreements": (0, 0), "page_codec_lines": (0, 0), "longest_file": (700, 700), "readme_words": (600, 600)}
 APART = ("firmware/fit/", "firmware/condition/")  # from longest_file
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".S", ".py", ".mjs", ".ts", ".mts", ".sh", ".cmake", ".inc", ".css", ".toml"}
 TEXTS = SOURCES | {".md", ".txt", ".json", ".html", ".in", ".1", ".bash", ".fish", ".cfg", ".msg", ""}
@@ -132,8 +133,9 @@ def measure(root):
     lengths = {name: text.count("\n") for name, text in files.items() if pathlib.PurePath(name).suffix in SOURCES and not name.startswith(APART)}
     longest = max(lengths, key=lengths.get)
     figures["longest_file"] = lengths[longest]
+    figures["readme_words"] = len(files.get("README.md", "").split())
     figures["product_lines"] = sum(text.count("\n") for text in files.values())
-    found |= {"page_codec_lines": ("all", codec), "longest_file": (longest, [longest])}
+    found |= {"page_codec_lines": ("all", codec), "longest_file": (longest, [longest]), "readme_words": ("all", ["README.md"])}
     formats = root / "build/report/formats.json"
     if formats.exists():
         disagreements = json.loads(formats.read_text(encoding="utf-8"))["disagreements"]

@@ -120,6 +120,12 @@ def alike(kind, a, b):
     return all(abs(x - y) <= (MISFIT_CLOSE_Pa if i == MISFIT else CLOSE * max(1, abs(x))) for i, (x, y) in enumerate(zip(*floats)))
 
 
+def zeros_apart_Pa(a, b):
+    """The largest difference of a sensor's zero between two raw bodies."""
+    zeros = [struct.unpack(f"<{(len(body) - RAW_HEAD) // 4}i", body[RAW_HEAD:])[1::2] for body in (a, b)]
+    return max(abs(x - y) for x, y in zip(*zeros)) / 1024
+
+
 def gaps(packets):
     """How many packets are missing between the first and the last."""
     return sum((b[1] - a[1] - 1) % 65536 for a, b in zip(packets, packets[1:]))
@@ -391,8 +397,9 @@ class Linux(unittest.TestCase):
             bodies.append(of_frame)
         shared = set(bodies[0]) & set(bodies[1])
         different = [key for key in sorted(shared) if not alike(key[0], bodies[0][key], bodies[1][key])]
-        REPORT.update(packets_compared=len(shared), different=len(different))
-        self.assertEqual(different, [])
+        apart_Pa = max(zeros_apart_Pa(bodies[0][key], bodies[1][key]) for key in shared if key[0] == RAW)
+        REPORT.update(packets_compared=len(shared), different=len(different), zeros_apart_Pa=apart_Pa)
+        self.assertEqual(different, [], f"zeros up to {apart_Pa:.1f} Pa apart")
         # All that both can have seen: on a busy machine one recording begins later than the other.
         frames = [[frame for _, frame in each] for each in bodies]
         least, most = max(map(min, frames)), min(map(max, frames))

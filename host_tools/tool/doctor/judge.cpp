@@ -80,6 +80,8 @@ std::string count(std::uint64_t number, const std::string &what) {
   return std::to_string(number) + " " + what + (number == 1 ? "" : "s");
 }
 
+constexpr unsigned SYNC_IN = 1; /* of info's field sync: others send the edges */
+
 class Judge {
 public:
   explicit Judge(const Facts &facts) : facts_(facts) {
@@ -114,6 +116,9 @@ public:
     if (facts_.rest) {
       rate();
       packets();
+      if (facts_.info->sync == SYNC_IN) {
+        sync();
+      }
       at_rest();
     }
     return std::move(findings_);
@@ -478,6 +483,22 @@ private:
           "this computer or its hub does not take them fast enough");
     } else {
       add(Verdict::warn, "packets", text, "try another cable, and no hub");
+    }
+  }
+
+  void sync() {
+    const Rest &rest = *facts_.rest;
+    std::string text = count(rest.edges, "edge") + " at the sync pin in " +
+                       fixed(rest.seconds, 1) + " s";
+    if (rest.edges_missing > 0) {
+      add(Verdict::warn, "sync", text + ", " + std::to_string(rest.edges_missing) + " missing",
+          "slower pulses; a ringing wire gives edges too: join the grounds, keep it short");
+    } else if (rest.edges > 0) {
+      add(Verdict::ok, "sync", text);
+    } else {
+      add(Verdict::warn, "sync", text,
+          "join the pin and ground with the other side's, 3.3 V at most, and let that pulse; or "
+          "`fingertip set sync=off`");
     }
   }
 

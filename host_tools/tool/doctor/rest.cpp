@@ -61,6 +61,9 @@ std::optional<Slope> slope(const Means &means, double seconds) {
 } // namespace
 
 void RestMeter::add(const wire_packet &packet) {
+  if (packet.type == WIRE_SYNC) {
+    edges_.take(packet.body.sync);
+  }
   if (packet.type != WIRE_CONTACT && packet.type != WIRE_RAW) {
     return;
   }
@@ -140,6 +143,8 @@ Rest RestMeter::result() const {
   Rest rest = counted_;
   rest.seconds = seconds();
   rest.frames_made = last_frame_ - first_frame_;
+  rest.edges = edges_.edges();
+  rest.edges_missing = edges_.missing();
   auto together = steps_together();
   std::vector<Means> means(sensor_count_);
   for (unsigned k = 0; k < sensor_count_; k++) {

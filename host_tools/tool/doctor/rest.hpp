@@ -7,6 +7,7 @@
  */
 #pragma once
 
+#include "libfingertip/edge_counter.hpp"
 #include "libfingertip/wire.hpp"
 
 #include <cstdint>
@@ -37,11 +38,12 @@ struct Rest {
   std::uint32_t last_flags = 0;      /* enum contact_flag */
   std::vector<SensorAtRest> sensors; /* none where no readings are streamed */
   std::optional<Slope> common_drift; /* of all sensors together */
+  std::uint64_t edges = 0, edges_missing = 0; /* at the sync pin, by EdgeCounter */
 };
 
 class RestMeter {
 public:
-  /* Contact and raw packets, in order; others are nothing to it. */
+  /* Contact, raw and sync packets, in order; others are nothing to it. */
   void add(const wire_packet &packet);
 
   double seconds() const;
@@ -62,6 +64,7 @@ private:
   std::uint32_t first_frame_ = 0, last_frame_ = 0;
   Rest counted_;
   std::uint8_t sensor_count_ = 0;
+  EdgeCounter edges_;
   std::vector<Reading> readings_;
   std::vector<std::size_t> doubtful_, saturated_; /* [sensor] */
 };

@@ -94,6 +94,27 @@ void fail(Facts &facts, ErrorCode code, const std::string &text) {
 
 } // namespace
 
+TEST(Judge, EdgesOfASyncPinThatStampsThem) {
+  Facts facts = good();
+  facts.rest->edges = 600;
+  EXPECT_TRUE(wrong(facts).empty());
+  for (const Finding &finding : judge(facts)) {
+    EXPECT_NE(finding.check, "sync"); /* it is not set */
+  }
+  facts.info->sync = 2; /* pulses at each frame, which are no packets */
+  EXPECT_EQ(judge(facts).size(), judge(good()).size());
+  facts.info->sync = 1;
+  EXPECT_TRUE(wrong(facts).empty());
+  EXPECT_EQ(judge(facts).size(), judge(good()).size() + 1);
+  facts.rest->edges_missing = 3;
+  EXPECT_EQ(only(facts, Verdict::warn, "sync").text,
+            "600 edges at the sync pin in 10.0 s, 3 missing");
+  facts.rest->edges = facts.rest->edges_missing = 0;
+  const Finding silent = only(facts, Verdict::warn, "sync");
+  EXPECT_EQ(silent.text, "0 edges at the sync pin in 10.0 s");
+  EXPECT_NE(silent.advice.find("set sync=off"), std::string::npos);
+}
+
 TEST(Judge, NothingIsWrongWithAGoodOne) {
   for (const char *board : {"pico_mux", "pico_parallel"}) {
     auto findings = wrong(good(board));

@@ -56,6 +56,19 @@ double nothing(unsigned, double) {
 
 } // namespace
 
+TEST(Rest, EdgesAndThoseThatAreMissing) {
+  RestMeter meter;
+  for (std::uint32_t number : {7u, 8u, 11u}) {
+    wire_packet edge{};
+    edge.type = WIRE_SYNC;
+    edge.t_us = 1000000 + 1000 * number;
+    edge.body.sync.number = number;
+    meter.add(edge);
+  }
+  EXPECT_EQ(meter.result().edges, 3u);
+  EXPECT_EQ(meter.result().edges_missing, 2u);
+}
+
 TEST(Rest, NoiseOfEachSensorWhateverTheOthersDo) {
   Pad pad;
   pad.noise_Pa[7] = 40;
