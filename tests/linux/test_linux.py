@@ -75,10 +75,11 @@ STAGE_TIMES = slice(8, 22)
 # While the press comes on, a reading depends on its microsecond.
 PRESSED_s = 1.2
 STEADY_FROM_FRAME = 300
-# The zero follows by the clock, and while the bus rests the sensors do, so that it is of other moments: some pascals of their noise, and
-# what they do to a fit of 20 kPa. On an idle machine they are 9 Pa apart at most, on a busy one more than 12: the bus rests for longer.
+# The zero follows by the clock, and while the bus rests the sensors do, so that it is of other moments: 2 to 15 Pa apart, that of one sensor
+# most. ZERO_WARM_Pa of condition/zero.h is what the firmware takes the zero of a warm sensor to be off by. What some pascals do to a fit of
+# 20 kPa stands below.
 RAW_HEAD, CONTACT_HEAD = 23, 12  # bytes before the pairs of pressure and zero, and before the floats
-ZERO_q10 = 24 << 10
+ZERO_q10 = 60 << 10  # ZERO_WARM_Pa
 MISFIT = 5  # which of the floats: of some pascals
 CLOSE, MISFIT_CLOSE_Pa = 1e-2, 3
 

@@ -75,12 +75,12 @@ std::optional<Thickness> thickness_of(const calibration &calibration) {
   return thickness_of(1e-3 * calibration.sigma_um, 1e-3 * calibration.sigma_sd_um);
 }
 
-double Thickness::told_mm() const {
+double Thickness::shown_mm() const {
   return 0.1 * std::round(10.0 * mm);
 }
 
-bool Thickness::agrees_with(double told_mm) const {
-  return std::abs(told_mm - mm) <= AGREES_SDS * sd_mm;
+bool Thickness::agrees_with(double set_mm) const {
+  return std::abs(set_mm - mm) <= AGREES_SDS * sd_mm;
 }
 
 bool profile_suits(const Thickness &thickness) {
@@ -91,11 +91,11 @@ std::string text_of(const Thickness &thickness) {
   return fixed(thickness.mm, 1) + " mm, sd " + fixed(thickness.sd_mm, 1);
 }
 
-std::string disagreement(const Thickness &found, double told_mm) {
-  if (found.agrees_with(told_mm)) {
+std::string disagreement(const Thickness &found, double set_mm) {
+  if (found.agrees_with(set_mm)) {
     return {};
   }
-  return "the profile is of " + fixed(told_mm, 1) +
+  return "the profile is of " + fixed(set_mm, 1) +
          " mm of rubber, but the calibration's width is that of " + text_of(found) +
          ": with a wrong thickness the tangential load and the place are off, or there are none";
 }

@@ -18,8 +18,8 @@ namespace fingertip::pad {
 
 struct Thickness {
   double mm, sd_mm;
-  double told_mm() const; // as text_of tells it, so that a profile is of what was said
-  bool agrees_with(double told_mm) const; // within two standard deviations
+  double shown_mm() const; // as text_of shows it, so that a profile is of what was said
+  bool agrees_with(double set_mm) const; // within two standard deviations
 };
 
 // sigma_mm: of the Gaussian nearest to the response, without its dip; its standard deviation.
@@ -37,8 +37,8 @@ bool profile_suits(const Thickness &thickness);
 // "12.1 mm, sd 0.5"
 std::string text_of(const Thickness &thickness);
 
-// What to say where a thickness that was told is not the one that was found: a sentence with both;
+// What to say where the thickness that the user set is not the one found: a sentence with both;
 // empty where they agree.
-std::string disagreement(const Thickness &found, double told_mm);
+std::string disagreement(const Thickness &found, double set_mm);
 
 } // namespace fingertip::pad

@@ -20,7 +20,7 @@ OVER = (
      "valid and claiming more than 0.05 and more than two standard deviations"),
     ("elongated_false_surely_percent", "those that claim more than 2.8 standard deviations, which 98 % of a normal distribution in the plane stay below"),
     ("learned_ratio_error_p50, _p95", "the usual touches with the profile of the thickness that each of 20 calibrations found"),
-    ("told_wrong_said_percent", "calibrations that say so where 15 % less or more than the true thickness was told; told_right_said_percent: where the true one was"),
+    ("told_wrong_said_percent", "calibrations that say so where 15 % less or more than the true thickness is set; told_right_said_percent: where the true one is"),
     ("raw_beyond_2sd_percent", "Q = 0 on pads of 10 % that were never calibrated: the share with an estimate that reads a pull beyond two of its q_sd_N"),
     ("elongated_false_unflagged_percent", "those of `elongated_false_percent` that the Gaussian fit does not flag as elongated"),
     ("screw_ratio, screw_change_p95", "the twin's screws of a sphere of 15 mm, 6 N: what is read while it spins (median), and by how much that differs from before"),

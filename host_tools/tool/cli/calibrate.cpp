@@ -142,8 +142,8 @@ int erase(const CalibrateOptions &options) {
   return 0;
 }
 
-/* A fingertip that estimates the tangential load needs the thickness: where it was told, this says
- * whether that is the one found; where it was not, the pad's profile follows from it. */
+/* A fingertip that estimates the tangential load needs the thickness. Where the user has set one,
+ * this says whether it is the one found. Else the pad's profile follows from the one found. */
 void use_thickness(CalibratedDevice &device, const calibration &made) {
   const wire_info &info = device.info();
   const auto found = pad::thickness_of(made);
@@ -158,7 +158,7 @@ void use_thickness(CalibratedDevice &device, const calibration &made) {
                    other.c_str());
     }
   } else if (pad::profile_suits(*found)) {
-    device.write(pad::profile_of({found->told_mm()}, info));
+    device.write(pad::profile_of({found->shown_mm()}, info));
     std::printf("profile of a pad without end of %s mm: fingertip pad --overhang MM where the "
                 "rubber ends\n",
                 fixed(found->mm, 1).c_str());

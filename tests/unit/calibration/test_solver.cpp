@@ -47,7 +47,7 @@ TEST(Solver, finds_gains_places_and_the_profile) {
   }
 }
 
-/* What the firmware is told is its own model, a Gaussian less a dip, and not the solver's parts. */
+/* The firmware gets its own model, a Gaussian less a dip, and not the solver's parts. */
 TEST(Solver, finds_the_gaussian_and_the_dip_of_the_firmware) {
   constexpr double SIGMA_mm = 4.0, SHARE = 0.03;
   const KnownPad pad(6);

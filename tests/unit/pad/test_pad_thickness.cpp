@@ -36,12 +36,12 @@ TEST(PadThickness, IsThatOfTheRubber) {
   }
 }
 
-TEST(PadThickness, OneToldWrongBy15PercentIsSaid) {
+TEST(PadThickness, OneSetWrongBy15PercentIsSaid) {
   for (std::uint64_t seed = 0; seed < 6; seed++) {
     const pad::Thickness found = found_on(12.0, {10.0, 17.5, 0.1}, 7100 + seed);
-    for (const double told_mm : {12.0 * 0.85, 12.0 * 1.15}) {
-      EXPECT_FALSE(found.agrees_with(told_mm));
-      EXPECT_NE(pad::disagreement(found, told_mm).find(text_of(found)), std::string::npos);
+    for (const double set_mm : {12.0 * 0.85, 12.0 * 1.15}) {
+      EXPECT_FALSE(found.agrees_with(set_mm));
+      EXPECT_NE(pad::disagreement(found, set_mm).find(text_of(found)), std::string::npos);
     }
   }
 }

@@ -172,7 +172,7 @@ void judge_thickness(Bench &bench, ordered_json &out) {
   bench.progress("thicknesses");
 }
 
-// The profile that follows from a calibration's width, and a thickness that was told 15 % wrong.
+// The profile that follows from a calibration's width, and a thickness that is set 15 % wrong.
 void judge_learned(Bench &bench, ordered_json &out) {
   constexpr std::size_t SESSIONS = 20;
   constexpr double WRONG = 0.15;
@@ -196,7 +196,7 @@ void judge_learned(Bench &bench, ordered_json &out) {
     right_said += !found.agrees_with(LAYER_mm);
     wrong_said += !found.agrees_with((1.0 - WRONG) * LAYER_mm);
     wrong_said += !found.agrees_with((1.0 + WRONG) * LAYER_mm);
-    const pad_profile told = profile_of(found.told_mm());
+    const pad_profile told = profile_of(found.shown_mm());
     Case c = bench.usual();
     c.fewer = 1.0 / SESSIONS;
     const Results results = bench.run("learned " + std::to_string(i), c, &told);

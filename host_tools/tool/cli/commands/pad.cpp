@@ -31,7 +31,7 @@ int erase_pad(Session &session) {
   return 0;
 }
 
-// Told, or as the fingertip's calibration found it.
+// As the user sets it, or as the fingertip's calibration found it.
 double thickness_mm(const PadOptions &options, const wire_info &info) {
   const bool calibrated = (info.stored & WIRE_STORED_CALIBRATION) != 0;
   const auto found = calibrated ? pad::thickness_of(info.calibration) : std::nullopt;
@@ -50,7 +50,7 @@ double thickness_mm(const PadOptions &options, const wire_info &info) {
                 " of rubber; the tangential load is accurate enough on 9 to 20 mm");
   }
   std::printf("thickness found in the calibration: %s\n", text_of(*found).c_str());
-  return found->told_mm();
+  return found->shown_mm();
 }
 
 int pad_command(const PadOptions &options) {
