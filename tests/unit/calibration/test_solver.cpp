@@ -47,30 +47,51 @@ TEST(Solver, finds_gains_places_and_the_profile) {
   }
 }
 
-/* The firmware gets its own model, a Gaussian less a dip, and not the solver's parts. */
+/* The firmware gets its own model, a Gaussian less a dip: the one nearest to the pad's profile, and
+ * not the parts that the solver found. */
 TEST(Solver, finds_the_gaussian_and_the_dip_of_the_firmware) {
-  constexpr double SIGMA_mm = 4.0, SHARE = 0.03;
+  constexpr double WIDE_mm = 4.0, MIXING = 0.25, DIP = 0.03;
   const KnownPad pad(6);
   const double dip_mm = DIP_PITCHES * pad.array.pitch_mm;
+  const auto bell = [](double r_mm, double sd_mm) {
+    return std::exp(-r_mm * r_mm / (2.0 * sd_mm * sd_mm));
+  };
+  const auto profile = [&](double r_mm) {
+    return (1.0 - MIXING) * bell(r_mm, WIDE_mm) + MIXING * bell(r_mm, NARROW * WIDE_mm) -
+           DIP * bell(r_mm, dip_mm);
+  };
   auto placements = good_session(pad, 24, 6);
   Random random(6, 2, 0);
   for (Placement &placement : placements) {
     const double x = random.uniform(pad.array.x_mm.front(), pad.array.x_mm.back());
     const double y = random.uniform(pad.array.y_mm.front(), pad.array.y_mm.back());
     for (std::size_t k = 0; k < 15; k++) {
-      const double square =
-          std::pow(pad.array.x_mm[k] - x, 2) + std::pow(pad.array.y_mm[k] - y, 2);
-      placement.reading_Pa[k] = pad.gain[k] * KnownPad::PEAK_Pa *
-                                    (std::exp(-square / (2.0 * SIGMA_mm * SIGMA_mm)) -
-                                     SHARE * std::exp(-square / (2.0 * dip_mm * dip_mm))) +
-                                random.normal();
+      const double r_mm = std::hypot(pad.array.x_mm[k] - x, pad.array.y_mm[k] - y);
+      placement.reading_Pa[k] =
+          pad.gain[k] * KnownPad::PEAK_Pa * profile(r_mm) + random.normal();
     }
   }
   const Solution s = solve(pad.array, placements);
   ASSERT_TRUE(s.solved);
-  EXPECT_NEAR(s.sigma_mm / SIGMA_mm, 1.0, 0.01);
-  EXPECT_NEAR(s.dip_share / SHARE, 1.0, 0.02);
+  EXPECT_NEAR(s.dip / DIP, 1.0, 0.05);
   EXPECT_DOUBLE_EQ(s.dip_sd_mm, dip_mm);
+  // What is left of the profile over the plane, at the best amplitude.
+  const auto left = [&](double sigma_mm, double dip_share) {
+    double with = 0.0, own = 0.0, all = 0.0;
+    for (double r_mm = 0.05; r_mm < 100.0; r_mm += 0.1) {
+      const double model = bell(r_mm, sigma_mm) - dip_share * bell(r_mm, dip_mm);
+      with += r_mm * profile(r_mm) * model;
+      own += r_mm * model * model;
+      all += r_mm * profile(r_mm) * profile(r_mm);
+    }
+    return all - with * with / own;
+  };
+  const double least = left(s.sigma_mm, s.dip_share);
+  EXPECT_LT(least, left(s.sigma_mm * 1.02, s.dip_share));
+  EXPECT_LT(least, left(s.sigma_mm * 0.98, s.dip_share));
+  EXPECT_LT(least, left(s.sigma_mm, s.dip_share + 0.0015));
+  EXPECT_LT(least, left(s.sigma_mm, s.dip_share - 0.0015));
+  EXPECT_LT(least, left(s.sigma_mm, s.dip));
 }
 
 /* A tilt alone is what touches of unknown strength do not tell. */
