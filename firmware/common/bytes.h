@@ -11,8 +11,10 @@ static inline void bytes_put_u16(uint8_t *to, uint16_t value) {
 }
 
 static inline void bytes_put_u32(uint8_t *to, uint32_t value) {
-  bytes_put_u16(to, (uint16_t)value);
-  bytes_put_u16(to + 2, (uint16_t)(value >> 16));
+  to[0] = (uint8_t)value;
+  to[1] = (uint8_t)(value >> 8);
+  to[2] = (uint8_t)(value >> 16);
+  to[3] = (uint8_t)(value >> 24);
 }
 
 static inline void bytes_put_u64(uint8_t *to, uint64_t value) {
