@@ -89,32 +89,32 @@ def fit_gaussian(xy, reading_Pa, start, width_mm):
     return at
 
 
-def ask(program, grid, jobs):
-    """The answers of real_fit, one for each job."""
-    asked = {"x_mm": grid.layout[:, 0].tolist(), "y_mm": grid.layout[:, 1].tolist(), "pitch_mm": grid.pitch_mm, "jobs": jobs}
+def ask(program, array, jobs):
+    """The answers of real_fit, one for each job. array: has layout [sensor, 2] and pitch_mm, as a Grid."""
+    asked = {"x_mm": array.layout[:, 0].tolist(), "y_mm": array.layout[:, 1].tolist(), "pitch_mm": array.pitch_mm, "jobs": jobs}
     done = subprocess.run([str(program)], input=json.dumps(asked), capture_output=True, text=True)
     if done.returncode:
-        raise InputError(f"real_fit failed: {done.stderr.strip()}")
+        raise InputError(f"{program.name} failed: {done.stderr.strip()}")
     return json.loads(done.stdout)["results"]
 
 
-def fit_job(readings, gain=None, gain_sd=None, prior=(0.0, 0.0), dip=(0.0, 0.0)):
-    """prior: sigma, its standard deviation, mm; dip: its share, its sd, mm; NaN in readings: that sensor is missing."""
+def fit_job(readings, gain=None, gain_sd=None, prior=(0.0, 0.0), dip=(0.0, 0.0), **settings):
+    """prior: sigma, its standard deviation, mm; dip: its share, its sd, mm; NaN in readings: that sensor is missing. settings: others of real_fit."""
     sensors = readings.shape[1]
     return {
         "kind": "fit", "presses": [[None if np.isnan(one) else one for one in press] for press in readings.tolist()], "noise_Pa": NOISE_PA,
         "gain": [1.0] * sensors if gain is None else gain, "gain_sd": [RAW_GAIN_SD] * sensors if gain_sd is None else gain_sd,
-        "prior_sigma_mm": prior[0], "prior_width_mm": prior[1], "dip_share": dip[0], "dip_sd_mm": dip[1]}
+        "prior_sigma_mm": prior[0], "prior_width_mm": prior[1], "dip_share": dip[0], "dip_sd_mm": dip[1], **settings}
 
 
-def stored_job(readings, stored):
+def stored_job(readings, stored, **settings):
     """With what a calibration leaves in the fingertip."""
     return fit_job(readings, stored["gain"], stored["gain_sd"], (stored["prior_sigma_mm"], stored["prior_width_mm"]),
-                   (stored["dip_share"], stored["dip_sd_mm"]))
+                   (stored["dip_share"], stored["dip_sd_mm"]), **settings)
 
 
-def calibration_job(readings):
-    return {"kind": "calibrate", "presses": readings.tolist(), "noise_Pa": NOISE_PA, "every_s": EVERY_S}
+def calibration_job(readings, every_s=EVERY_S):
+    return {"kind": "calibrate", "presses": readings.tolist(), "noise_Pa": NOISE_PA, "every_s": every_s}
 
 
 def dip_share(grid):

@@ -9,6 +9,7 @@ checksum, and what is missing is named and left out.
     real.json    the figures by which it is judged, with their goals; all tables of real.md
     real.md      the same to read
     real.png     response of the sensors, errors over the array, coverage
+    pace.png     error against run time, with and without the pad's profile, on simulated and on real presses
 
 Recordings that chose a constant ("chooses") judge nothing. Presses lie in rows: every second row aligns the layout and gives the placements of
 calibrations, the others are judged.
@@ -26,6 +27,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 
 import grids  # noqa: E402
+import pace  # noqa: E402
 import real_report  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from goals import judge  # noqa: E402
@@ -90,7 +92,8 @@ def judge_grid(program, one, path):
         found["calibrated"] = grids.Felt.joined(felt).figures(all_inside, all_outside)
         found["calibrated"]["force_scatter_percent"] = float(np.mean([each.figures(inside, outside)["force_scatter_percent"] for each in felt]))
         found["one_missing_over_1mm_percent"] = grids.percent(np.concatenate([each.error_mm for each in missing]) > 1.0)
-    shown = {"grid": grid, "inside": inside, "shipped": shipped_felt, "raw": raw_felt, "calibrated": felt[0] if felt else None}
+    shown = {"grid": grid, "inside": inside, "shipped": shipped_felt, "raw": raw_felt, "calibrated": felt[0] if felt else None,
+             "to_pace": [(program, grid, readings[inside], xy[inside], one["stored"]) for one in accepted]}
     return found, shown
 
 
@@ -149,14 +152,18 @@ def main(argv):
     parser = option_parser(__doc__)
     parser.add_argument("folder", metavar="FOLDER", help="with the recordings, in any folders below it")
     parser.add_argument("--sources", default=pathlib.Path(__file__).with_name("sources.json"), metavar="FILE.json", help="which recordings there are")
+    parser.add_argument("--pads", type=int, default=30, help="simulated ones for the run times (default: %(default)s)")
     options = parser.parse_args(argv)
     out, programs = output_folder(options), pathlib.Path(options.build) / "host_tools/report/real"
-    for program in ("real_fit", "real_strips"):
+    for program in ("real_fit", "twin_fit", "real_strips"):
         if not (programs / program).is_file():
             raise InputError(f"{programs / program} is not there; build it: cmake --build --preset host")
     sources = json.loads(pathlib.Path(options.sources).read_text(encoding="utf-8"))
     here = found_below(options.folder, sources)
     found, shown = judge_grids(programs / "real_fit", sources["grids"], here)
+    print("        run times", flush=True)
+    judges = [row["recording"] for row in found["grids"] if row["part"] == "judges"]
+    found["pace"] = pace.twin_rows(programs, options.pads) + pace.rows("real", [pad for key in judges for pad in shown[key]["to_pace"]])
     found |= judge_strips(programs / "real_strips", sources["strips"], here)
     found["missing"] = sorted(one["name"] for source in sources.values() for one in source["files"] if one["name"] not in here)
     found["sources"] = {name: {key: source[key] for key in ("repository", "commit", "terms", "what")} for name, source in sources.items()}
@@ -164,7 +171,8 @@ def main(argv):
     write_json(out / "real.json", found)
     real_report.write(found, out / "real.md")
     real_report.draw(found, shown, out / "real.png")
-    return finish(found, options, ("real.json", "real.md", "real.png"))
+    real_report.draw_pace(found["pace"], out / "pace.png")
+    return finish(found, options, ("real.json", "real.md", "real.png", "pace.png"))
 
 
 if __name__ == "__main__":

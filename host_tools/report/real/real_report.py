@@ -3,6 +3,8 @@ import numpy as np
 from drawing import BLUE, FAINT, GOAL, INK, ORANGE, plt, save
 from fingertip.files import write_text
 from goals import goal_table_md
+from pace import PUBLISHED_ITERATIONS
+from pace import WAYS as PACE_WAYS
 from tables import table_md, text_of
 
 COLUMNS = ("inside_p50_mm", "inside_p95_mm", "over_1mm_percent", "over_2mm_percent", "cover_1sd_percent", "cover_2sd_percent", "warned_percent",
@@ -32,6 +34,11 @@ def write(found, path):
         lines += ["", *table_md(("recording", "width mm", "width found mm", "dip %", "gains cv %", "places off mm", "centroid p50 mm", "sessions", "accepted", "refused for"), [
             [row["recording"], *(text_of(row[key], 3) for key in ("width_mm", "width_found_mm", "dip_percent", "gains_cv_percent", "places_off_mm", "centroid_p50_mm")),
              row["sessions"], row["accepted"], ", ".join(row["reasons"])] for row in found["grids"]])]
+    lines += ["", "## Error against run time", "", "Distance from where the press was. As published: a Gaussian of free width, readings below zero as they are. Run time: of this",
+              f"host, over that of the published fit with {PUBLISHED_ITERATIONS} iterations.", ""]
+    lines += table_md(("presses", "way", "iterations", "run time", "p50 mm", "p95 mm"), [
+        [row["presses"], dict(PACE_WAYS)[row["way"]], row["iterations"], *(text_of(row[key], 3) for key in ("run_time", "p50_mm", "p95_mm"))]
+        for row in found["pace"]])
     if found["strips"]:
         rates = [f"{rate['frames_per_s']:g}/s" for rate in found["strips"][0]["rates"]]
         lines += ["", "## The zero on strips", "", "Share of the time in which nothing touches: contact without a doubt, and doubted zero, at each rate. Longest: of such contacts.", ""]
@@ -94,4 +101,23 @@ def draw(found, shown, path):
                 points = draw_map(ax, each, way, name[:1].upper() + name[1:])
         figure.colorbar(points, ax=axes[3], label="mm, 2 and more: darkest", shrink=0.8)
         draw_coverage(axes[4], shown, judges or set(shown))
+    save(figure, path)
+
+
+def draw_pace(rows, path):
+    """Error against run time: simulated presses left, real ones right."""
+    figure, both = plt.subplots(1, 2, figsize=(12, 4.8), layout="constrained", sharey=True)
+    for axes, presses, title in zip(both, ("twin", "real"), ("Simulated pads: dip, gains of 20 %, widths, places", "Real pads of others")):
+        for (way, name), colour in zip(PACE_WAYS, (ORANGE, GOAL, BLUE)):
+            these = [row for row in rows if row["presses"] == presses and row["way"] == way]
+            x = [row["run_time"] for row in these]
+            for key, style in (("p50_mm", "-o"), ("p95_mm", ":o")):
+                axes.plot(x, [row[key] for row in these], style, color=colour, ms=3.5, lw=1.3, label=f"{name}, {'half' if key == 'p50_mm' else '95 %'} below")
+            for row in these:
+                if row["iterations"] in (1, PUBLISHED_ITERATIONS, 10):
+                    axes.annotate(str(row["iterations"]), (row["run_time"], row["p50_mm"]), (0, 5), textcoords="offset points", size=7, ha="center", color=colour)
+        axes.set(title=title, yscale="log", xlabel=f"run time over that of the published fit with {PUBLISHED_ITERATIONS} iterations")
+        axes.grid()
+    both[0].set_ylabel("distance from where the press was, mm")
+    both[0].legend(fontsize=7)
     save(figure, path)

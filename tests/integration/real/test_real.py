@@ -13,6 +13,7 @@ sys.path[:0] = [str(ROOT / "host_tools/report/real"), str(ROOT / "host_tools/rep
 BUILD = pathlib.Path(sys.argv.pop())
 
 import grids  # noqa: E402
+import pace  # noqa: E402
 
 PITCH_MM, WIDTH_MM, PEAK_PA = 6.75, 4.0, 20e3
 TURN = math.radians(3.0)  # of the gantry against the board
@@ -53,7 +54,7 @@ class Real(unittest.TestCase):
         path = self.folder / "sources.json"
         path.write_text(json.dumps(self.sources))
         return subprocess.run([sys.executable, str(ROOT / "host_tools/report/real/real.py"), "--build", str(BUILD), "-o", str(self.folder / "out"),
-                               "--sources", str(path), str(self.folder / "data"), *options], capture_output=True, text=True)
+                               "--pads", "1", "--sources", str(path), str(self.folder / "data"), *options], capture_output=True, text=True)
 
     def test_the_layout_is_found_turned(self):
         grid = grids.Grid(self.grid, PITCH_MM)
@@ -70,6 +71,10 @@ class Real(unittest.TestCase):
         self.assertLess(found["grids"][0]["raw"]["force_scatter_percent"], 1.0)
         self.assertTrue(found["goals"]["raw_inside_p50_mm"]["met"])
         self.assertIsNone(found["goals"]["phantom_percent_1308"]["met"])
+        paced = {(row["presses"], row["way"], row["iterations"]): row for row in found["pace"]}
+        self.assertEqual({key[1:] for key in paced if key[0] == "twin"}, {(way, n) for way, _ in pace.WAYS for n in pace.ITERATIONS})
+        self.assertEqual(paced["twin", "published", pace.PUBLISHED_ITERATIONS]["run_time"], 1.0)
+        self.assertLess(paced["twin", "calibrated", 4]["p50_mm"], paced["twin", "published", 4]["p50_mm"])
         self.assertIn("| a/b | c | ours | made by a test |", (self.folder / "out/real.md").read_text())
 
     def test_gains_that_differ_move_them_and_a_calibration_mends_it(self):

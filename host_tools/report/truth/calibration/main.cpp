@@ -38,11 +38,14 @@ constexpr std::size_t JUDGED_EVERY = 2; // the tool does it after each placement
 constexpr double RAW_GAIN_SD = 0.10;    // of a pad never calibrated
 constexpr double NOISE_Pa = 5.0;
 enum Stream : std::uint64_t { TAP_PLACES = 401 };
+// As real arrays are.
+constexpr PadOptions LIKE_REAL{20.0, 0.0, 0.1, 5.0, 3.5};
 
 struct Options {
   std::uint64_t seed = 20000;
   std::size_t pads = 200;
   std::string cache = twin::default_cache_directory();
+  bool presses = false;
 };
 
 double median(std::vector<double> values) {
@@ -119,6 +122,15 @@ public:
 
   Felt felt(const Solution &solution) const {
     return felt(solution.gain, solution.gain_sd, calibrating::shape_of(solution));
+  }
+
+  json presses() const {
+    json readings = json::array(), places = json::array();
+    for (const Tap &tap : taps_) {
+      readings.push_back(tap.reading_Pa);
+      places.push_back({tap.x_mm, tap.y_mm});
+    }
+    return {{"presses", readings}, {"xy_mm", places}};
   }
 
 private:
@@ -387,6 +399,31 @@ Objects objects_on(const Feet &feet, const Options &options) {
           twin::ContactTable::load_or_build(twin::indenter("cylinder6"), layer, options.cache)};
 }
 
+// Presses on pads as real arrays are, for the report on real rubber: {"x_mm", "y_mm": [sensor],
+// "pitch_mm", "pads": [{"placements": [[reading_Pa]], "every_s": from one placement to the next,
+// "presses": [[reading_Pa]], "xy_mm": [[x, y]]}]}
+json presses(const Options &options) {
+  const Feet feet(12.0, options.cache);
+  const Objects objects = objects_on(feet, options);
+  json pads = json::array();
+  for (std::size_t i = 0; i < options.pads; i++) {
+    const std::uint64_t seed = options.seed + i;
+    SessionPad pad(LIKE_REAL, feet.layer_mm, seed);
+    Session session(feet, SessionKind::good, seed, PLACEMENTS);
+    json made = Taps(SessionPad(LIKE_REAL, feet.layer_mm, seed), objects.all(), seed).presses();
+    double last_s = 0.0;
+    for (std::size_t k = 0; k < PLACEMENTS; k++) {
+      const Placement placement = *session.next(pad);
+      made["placements"].push_back(placement.reading_Pa);
+      made["every_s"] = placement.t_s - last_s;
+      last_s = placement.t_s;
+    }
+    pads.push_back(made);
+  }
+  const Array array = session_array();
+  return {{"x_mm", array.x_mm}, {"y_mm", array.y_mm}, {"pitch_mm", array.pitch_mm}, {"pads", pads}};
+}
+
 json measure(const Options &options) {
   if (options.pads == 0) {
     throw std::runtime_error("--pads needs at least one pad");
@@ -404,12 +441,10 @@ json measure(const Options &options) {
       try_pads("relaxing pads", options, (options.pads + 1) / 2, objects, {10.0, 17.5, 0.0}, false);
   const PadCase thin =
       try_pads("6 mm", options, (options.pads + 9) / 10, thin_objects, {10.0}, false);
-  // As real arrays are.
-  const PadOptions real{20.0, 0.0, 0.1, 5.0, 3.5};
   const PadCase cast =
-      try_pads("with a dip", options, (options.pads + 1) / 2, objects, real, false);
+      try_pads("with a dip", options, (options.pads + 1) / 2, objects, LIKE_REAL, false);
   const PadCase thin_cast =
-      try_pads("6 mm, dip", options, (options.pads + 4) / 5, thin_objects, real, false);
+      try_pads("6 mm, dip", options, (options.pads + 4) / 5, thin_objects, LIKE_REAL, false);
 
   json bad = json::object();
   double refused_worst = 100.0;
@@ -460,7 +495,9 @@ json measure(const Options &options) {
   };
 }
 
-constexpr char HELP[] = "usage: truth_calibration [--seed N] [--pads N] [--cache DIR]\n";
+constexpr char HELP[] =
+    "usage: truth_calibration [--seed N] [--pads N] [--cache DIR] [--presses]\n"
+    "  --presses   only the presses of so many pads, for the report on real rubber\n";
 
 } // namespace
 
@@ -469,6 +506,7 @@ int main(int argc, char **argv) {
   return reference::print_found("truth_calibration", argc, argv,
                                 {{"--cache", &options.cache},
                                  {"--seed", nullptr, &options.seed},
-                                 {"--pads", nullptr, &options.pads}},
-                                HELP, [&] { return measure(options); });
+                                 {"--pads", nullptr, &options.pads},
+                                 {"--presses", nullptr, nullptr, &options.presses}},
+                                HELP, [&] { return options.presses ? presses(options) : measure(options); });
 }
