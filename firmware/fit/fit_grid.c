@@ -48,6 +48,7 @@
 #define KNOWN_SQUARE ((struct scaled){16384, -18})
 #define LINEAR_SQUARE ((struct scaled){16056, -15})
 #define SHAPE_HEIGHT_MAX_Q26 160029133
+#define TAIL_ERROR ((struct scaled){31457, -21}) /* FIT_TAIL_ERROR */
 
 /* 1 / n of a constant. */
 #define RECIPROCAL(n)                                                                              \
@@ -457,6 +458,30 @@ static NOINLINE void add_shape_moves(const struct moments *m, const struct moves
   shape->by_gains = squares;
 }
 
+/* And of the profile's tail, which is off everywhere at once. */
+static NOINLINE void add_tail_moves(const struct moments *m, const struct moves *moves,
+                                   const struct readings *readings,
+                                   const struct fit_system *system, int32_t gain_shift,
+                                   struct shape *shape) {
+  struct dip dip;
+  const int32_t depth_q28 =
+      fit_grid_dip(readings->dip_height, TAIL_ERROR, &system->at, 1 << 28, system->rise_q22,
+                   (int32_t)(FIT_DIP_DEPTH_MAX * 268435456.0f), &dip);
+  const int32_t error = (depth_q28 >> 12) * (1 << gain_shift);
+  int32_t sum = 0;
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t column = moves->column[i], g = m->x.g_q14[i];
+    int32_t slant = (shape->xy * m->x.linear[i]) >> 15;
+    int32_t along = (error * (dip.x[i] >> 15)) >> 15;
+    UNROLL for (int j = 0; j < ROWS; j++) {
+      int32_t move = (column * m->y.g_q14[j] + moves->row[j] * g + slant * m->y.linear[j]) >> 15;
+      sum += (move * ((along * (dip.y[j] >> 15)) >> 15)) >> 4;
+    }
+  }
+  const int32_t high = fixed_clamp(sum >> 12, -INT16_MAX, INT16_MAX);
+  shape->by_gains += (uint32_t)(high * high) >> SPREAD_SQUARE_SHIFT;
+}
+
 /* A coefficient times the linear and one times the square column of an axis. */
 FIXED_INLINE void set_parts(const struct factor *f, int nodes, int32_t linear, int32_t square,
                             int32_t *parts) {
@@ -495,6 +520,9 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid,
   set_parts(x, COLUMNS, 0, shape->x * 2, moves.column);
   set_parts(y, ROWS, 0, shape->y * 2, moves.row);
   add_shape_moves(m, &moves, room, shape);
+  if (room->dip_share.mantissa != 0) {
+    add_tail_moves(m, &moves, room, system, spread->gain_shift, shape);
+  }
   fit_grid_end_spread(settings, system, spread);
 }
 

@@ -534,8 +534,8 @@ static NOINLINE void set_dip(const struct readings *readings, const struct fit_s
   int32_t narrowness = port_divide(readings->dip_height, at->height >> 12);
   c->narrowness_q12 = narrowness < NARROWNESS_MAX_Q12 ? narrowness : NARROWNESS_MAX_Q12;
   struct dip dip;
-  int32_t depth_q28 =
-      fit_grid_dip(readings, at, 1 << 28, system->rise_q22, DEPTH_MAX_Q28, &dip);
+  int32_t depth_q28 = fit_grid_dip(readings->dip_height, readings->dip_share, at, 1 << 28,
+                                   system->rise_q22, DEPTH_MAX_Q28, &dip);
   for (int k = 0; k < NODES; k++) {
     int32_t along = fixed_mul_q30(depth_q28 * 4, dip.x[k / ROWS]);
     c->node[k].d = readings->residual[k] == 0 ? fixed_mul_q30(along, dip.y[k % ROWS]) : 0;

@@ -103,16 +103,15 @@ static void set_dip(int32_t *g, int nodes, int origin, int32_t centre, int32_t h
   }
 }
 
-int32_t fit_grid_dip(const struct readings *readings, const struct state *at, int32_t amplitude_q28,
-                     int32_t rise_q22, int32_t most_q28, struct dip *dip) {
-  set_dip(dip->x, COLUMNS, COLUMNS / 2, at->x, readings->dip_height);
-  set_dip(dip->y, ROWS, ROWS / 2, at->y, readings->dip_height);
+int32_t fit_grid_dip(int32_t height, struct scaled share, const struct state *at,
+                     int32_t amplitude_q28, int32_t rise_q22, int32_t most_q28, struct dip *dip) {
+  set_dip(dip->x, COLUMNS, COLUMNS / 2, at->x, height);
+  set_dip(dip->y, ROWS, ROWS / 2, at->y, height);
   /* 2^rise is 2^-(1 - its fraction) and a power of two. */
   rise_q22 = fixed_clamp(rise_q22, 0, DIP_RISE_MAX_Q22);
   int32_t fraction = exp2_negative((uint32_t)((1 << 22) - (rise_q22 & 0x3FFFFF)));
   struct scaled rise = fit_scaled_from(fraction, (rise_q22 >> 22) + 1 - 30);
-  struct scaled depth = scaled_mul(scaled_mul(rise, fit_scaled_from(amplitude_q28, -28)),
-                                   readings->dip_share);
+  struct scaled depth = scaled_mul(scaled_mul(rise, fit_scaled_from(amplitude_q28, -28)), share);
   return fixed_clamp(fit_scaled_to_fixed(depth, 28), 0, most_q28);
 }
 
@@ -122,7 +121,8 @@ void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressur
   const uint8_t *sensor = array->grid.sensor;
   struct dip dip;
   const int32_t most = readings->largest_q28 >> 2; /* FIT_DIP_DEPTH_MAX */
-  int32_t depth_q28 = fit_grid_dip(readings, at, amplitude_q28, rise_q22, most, &dip);
+  int32_t depth_q28 = fit_grid_dip(readings->dip_height, readings->dip_share, at, amplitude_q28,
+                                   rise_q22, most, &dip);
   for (int i = 0; i < COLUMNS; i++) {
     int32_t column = fixed_mul_q30(depth_q28, dip.x[i]);
     for (int j = 0; j < ROWS; j++) {

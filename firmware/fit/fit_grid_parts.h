@@ -92,10 +92,10 @@ struct dip {
   int32_t x[COLUMNS], y[ROWS];
 };
 /* Sets the factors about this contact, whose model is amplitude 2^rise at the centre, and returns
- * the dip's depth there, at most most_q28. readings: as fit_grid_take_readings left them, with a
- * dip. */
-int32_t fit_grid_dip(const struct readings *readings, const struct state *at, int32_t amplitude_q28,
-                     int32_t rise_q22, int32_t most_q28, struct dip *dip);
+ * the dip's depth there, at most most_q28. height: of the dip's Gaussian, Q26; share: its depth, of
+ * the contact's. */
+int32_t fit_grid_dip(int32_t height, struct scaled share, const struct state *at,
+                     int32_t amplitude_q28, int32_t rise_q22, int32_t most_q28, struct dip *dip);
 
 /* Adds the dip to the readings of a full rectangle. */
 void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,

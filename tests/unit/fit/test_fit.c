@@ -480,6 +480,35 @@ static void test_widths_and_slant(void) {
   TEST_ASSERT_BITS_LOW(CONTACT_FLAG_ELONGATED | CONTACT_FLAG_WIDTHS_VALID, result.flags);
 }
 
+/* The profile's tail is not what the dip says: 1 % of the peak too much of it. */
+static void test_a_wrong_tail_is_no_elongation(void) {
+  struct random random = {103};
+  struct fit_settings settings = {.iterations = 4,
+                                  .noise_Pa_q10 = 5 * 1024,
+                                  .prior_sigma_mm = 5.5f,
+                                  .prior_width_mm = 0.06f,
+                                  .dip_share = 0.01f,
+                                  .dip_sd_mm = 20.7f};
+  fit_set_errors(&settings, 0.01f, 0.005f);
+  int elongated[2] = {0};
+  for (int i = 0; i < 1000; i++) {
+    double x = random_between(&random, -9.0, 9.0), y = random_between(&random, -18.0, 18.0);
+    double longer = i % 2 ? 2.0 * 5.5 : 5.5, angle = random_between(&random, 0.0, 3.14159265);
+    double c = cos(angle), s = sin(angle);
+    for (int k = 0; k < SENSORS; k++) {
+      double dx = (double)x_mm[k] - x, dy = (double)y_mm[k] - y;
+      double u = (c * dx + s * dy) / longer, v = (c * dy - s * dx) / 5.5;
+      readings[k] = to_q10(20000.0 * exp(-0.5 * (u * u + v * v)));
+    }
+    fit_gaussian(&array, readings, ALL, &settings, &result);
+    elongated[i % 2] += (result.flags & CONTACT_FLAG_ELONGATED) != 0;
+  }
+  char text[60];
+  snprintf(text, sizeof text, "of 500: round %d, long %d", elongated[0], elongated[1]);
+  TEST_ASSERT_TRUE_MESSAGE(elongated[0] == 0, text);
+  TEST_ASSERT_TRUE_MESSAGE(elongated[1] > 400, text);
+}
+
 static void test_the_limit_of_uncertain_is_a_setting(void) {
   struct press press = {2.0, 5.0, 5000.0, 6.0};
   read_press(&press, 0.0, NULL);
@@ -892,6 +921,7 @@ int main(void) {
   RUN_TEST(test_a_fit_that_still_moves_says_how_far);
   RUN_TEST(test_gains_spread_the_location_as_predicted);
   RUN_TEST(test_widths_and_slant);
+  RUN_TEST(test_a_wrong_tail_is_no_elongation);
   RUN_TEST(test_the_limit_of_uncertain_is_a_setting);
   RUN_TEST(test_stiff_cases_are_flagged);
   RUN_TEST(test_predicted_scatter);

@@ -2,6 +2,7 @@
 // stderr, one JSON object on stdout; the keys are explained where they are set.
 #include "libfingertip/error.hpp"
 #include "libfingertip/in_parallel.hpp"
+#include "libfingertip/names.hpp"
 #include "libfingertip/progress_bar.hpp"
 #include "report/reference/options.hpp"
 #include "truth/calibration/sessions.hpp"
@@ -88,6 +89,7 @@ public:
 
   struct Felt {
     std::vector<double> location_mm, force; // distance from the truth; estimate over truth
+    std::size_t warned = 0;
   };
   Felt felt(const std::vector<double> &gain, const std::vector<double> &gain_sd,
             const calibrating::Shape &shape = {}) const {
@@ -116,6 +118,7 @@ public:
       felt.location_mm.push_back(std::hypot(static_cast<double>(result.x_mm) - tap.x_mm,
                                             static_cast<double>(result.y_mm) - tap.y_mm));
       felt.force.push_back(static_cast<double>(result.force_N) / tap.force_N);
+      felt.warned += (result.flags & warning_flags()) != 0;
     }
     return felt;
   }
@@ -189,7 +192,7 @@ struct PadCase {
   std::size_t pads = 0;
   std::vector<double> before_mm, after_mm, true_mm; // [pad] medians over the taps
   std::vector<double> before_p95_mm, after_p95_mm;
-  std::vector<double> after_all_mm;
+  std::size_t after_warned = 0; // taps
   std::vector<double> force_before, force_after;           // [tap] absolute relative errors
   std::array<std::vector<double>, COUNTS.size()> at_count; // [pad] medians after so many
   std::array<std::vector<double>, COUNTS.size()> sd_at_count;
@@ -300,6 +303,7 @@ PadCase try_pads(const std::string &what, const Options &options, std::size_t pa
     all.before_mm.push_back(median(before.location_mm));
     all.after_mm.push_back(median(after.location_mm));
     all.true_mm.push_back(median(best.location_mm));
+    all.after_warned += after.warned;
     all.before_p95_mm.push_back(quantile(before.location_mm, 0.95));
     all.after_p95_mm.push_back(quantile(after.location_mm, 0.95));
     for (std::size_t t = 0; t < TAPS; t++) {
@@ -327,6 +331,10 @@ PadCase try_pads(const std::string &what, const Options &options, std::size_t pa
   return all;
 }
 
+double warned_percent(const PadCase &c) {
+  return 100.0 * double(c.after_warned) / double(c.pads * TAPS);
+}
+
 json table_of(const PadCase &c) {
   return {{"pads", c.pads},
           {"before_median_mm", median(c.before_mm)},
@@ -335,6 +343,7 @@ json table_of(const PadCase &c) {
           {"before_p95_mm", median(c.before_p95_mm)},
           {"after_p95_mm", median(c.after_p95_mm)},
           {"after_worst_pad_mm", quantile(c.after_mm, 1.0)},
+          {"after_warned_percent", warned_percent(c)},
           {"force_mape_before_percent", 100.0 * mean(c.force_before)},
           {"force_mape_after_percent", 100.0 * mean(c.force_after)},
           {"force_scale_error_in_sds_rms", std::sqrt(mean([&] {
@@ -481,6 +490,8 @@ json measure(const Options &options) {
       // Of the kind that is refused least often.
       {"refused_percent_worst", refused_worst},
       {"cal_force_mape_percent", 100.0 * mean(usual.force_after)},
+      // Round touches, with all that a calibration leaves, on pads without a dip and with one.
+      {"calibrated_warned_percent_worst", std::max(warned_percent(usual), warned_percent(cast))},
       {"truth_calibration",
        {{"pads", options.pads},
         {"seed", options.seed},
