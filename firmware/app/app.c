@@ -19,6 +19,8 @@
 #define FRAME_WAIT_us 100000u
 /* A zero that is not followed may be off by 30 Pa after so long: condition.h. */
 #define ZERO_LASTS_us 60000000u
+/* Frames so far apart leave time for all parts of fit_load.h. */
+#define LOOK_AT_ONCE_us 4500u
 /* Up to this pitch the neighbours feel what one sensor feels: see READINGS_STILL_NOISES. */
 #define SHARED_PITCH_mm 9.0f
 
@@ -132,6 +134,38 @@ static void estimate_tangential_load(struct app *app) {
 }
 #endif
 
+#if FT_WITH_LOAD_DOUBT
+static bool is_load_estimated(const struct app *app) {
+#if FT_WITH_TANGENTIAL
+  return app->tangential.valid;
+#else
+  (void)app;
+  return false;
+#endif
+}
+
+static void doubt_load(struct app *app) {
+  if (app->conditioned.contact && !is_load_estimated(app)) {
+    fit_load_widen(&app->load_doubt, &app->fit_array, &app->fit_settings, &app->fit);
+  }
+}
+
+/* For the frames that follow. Where they are far apart there is time for a whole look. */
+static void look_for_load(struct app *app) {
+  const uint32_t t_us = (uint32_t)app->frame.t_us;
+  const bool slow = t_us - app->load_frame_us >= LOOK_AT_ONCE_us;
+  app->load_frame_us = t_us;
+  if (!app->conditioned.contact || is_load_estimated(app)) {
+    fit_load_begin(&app->load_doubt);
+  } else {
+    for (int parts = slow ? FIT_LOAD_PARTS : 1; parts > 0; parts--) {
+      fit_load_follow(&app->load_doubt, &app->fit_array, app->conditioned.pressure_Pa_q10,
+                      &app->fit_settings, &app->fit);
+    }
+  }
+}
+#endif
+
 static bool is_sensor_doubtful(const struct app *app) {
   return (app->frame.doubtful & app->conditioned.usable) != 0;
 }
@@ -203,6 +237,9 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
 #if FT_WITH_TANGENTIAL
     estimate_tangential_load(app);
 #endif
+#if FT_WITH_LOAD_DOUBT
+    doubt_load(app);
+#endif
   }
   uint64_t fitted_us = port_now_us();
 #endif
@@ -243,6 +280,9 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
     }
 #endif
     watch_below(app);
+#if FT_WITH_LOAD_DOUBT
+    look_for_load(app);
+#endif
   }
 }
 

@@ -15,6 +15,7 @@
 #include "contact/motion.h"
 #include "contact/tangential.h"
 #include "fit/fit.h"
+#include "fit/fit_load.h"
 #include "fit/fit_tangential.h"
 #include "port/sync.h"
 #include "scan/scan.h"
@@ -43,6 +44,10 @@ struct app {
   struct tangential_course tangential_course;
   struct tangential_history tangential_history;
   struct motion_history motion_history;
+#endif
+#if FT_WITH_LOAD_DOUBT
+  struct fit_load load_doubt;
+  uint32_t load_frame_us; /* the last frame's time */
 #endif
 #if FT_WITH_SLIP
   struct slip_history slip_history;

@@ -24,6 +24,16 @@
 #define FT_WITH_TANGENTIAL FINGERTIP_TANGENTIAL
 #endif
 
+/* What a tangential load that nobody estimates does to the location: fit_load.h. The paper's scene
+ * keeps the paper's fit. */
+#ifndef FT_WITH_LOAD_DOUBT
+#ifdef FINGERTIP_SCENE_PAPER
+#define FT_WITH_LOAD_DOUBT 0
+#else
+#define FT_WITH_LOAD_DOUBT FT_WITH_FIT
+#endif
+#endif
+
 /* The raw packets. */
 #ifndef FT_WITH_RAW_STREAM
 #define FT_WITH_RAW_STREAM FINGERTIP_RAW_STREAM

@@ -76,7 +76,8 @@ struct fit_result {
   float sigma_mm;
   float force_N;           /* 2 pi p0 sigma^2 */
   float residual_rms_Pa;   /* over the sensors used */
-  float location_sd_mm;    /* radial: 63 % of errors are smaller, 98 % smaller than twice it */
+  float location_sd_mm;    /* radial: 63 % of errors are smaller, 98 % smaller than twice it; without
+                              what a tangential load does, which fit_load.h adds */
   float location_noise_mm; /* what of it is noise: how far a contact at rest jitters */
   float force_sd_N;
   float sigma_x_mm, sigma_y_mm; /* WIDTHS_VALID: of an elliptic Gaussian, along the axes */

@@ -76,6 +76,31 @@ FIXED_INLINE int32_t fixed_clamp(int32_t value, int32_t low, int32_t high) {
   return value < low ? low : value > high ? high : value;
 }
 
+/* sqrt(a^2 + b^2) within 7 %, for weights. */
+FIXED_INLINE int32_t fixed_longer_leg(int32_t a, int32_t b) {
+  int32_t longer = a > b ? a : b, shorter = a > b ? b : a;
+  return longer + ((3 * shorter) >> 3);
+}
+
+/* The products of element a of each row of `words` with elements b, c, d and the last, summed: four
+ * in as many registers as a Cortex-M0+ has for them. */
+FIXED_INLINE void fixed_sum_products(const int32_t *row, const int32_t *end, int32_t *sums,
+                                     int words, int a, int b, int c, int d) {
+  int32_t ab = 0, ac = 0, ad = 0, al = 0;
+  do {
+    int32_t own = row[a];
+    ab += row[b] * own;
+    ac += row[c] * own;
+    ad += row[d] * own;
+    al += row[words - 1] * own;
+    row += words;
+  } while (row != end);
+  sums[0] = ab;
+  sums[1] = ac;
+  sums[2] = ad;
+  sums[3] = al;
+}
+
 /* numerator / denominator in Q26 from two divisions, for denominator >= 2^13 and a quotient of at
  * most 16. The remainder is exact modulo 2^32, and it is small. */
 FIXED_INLINE int32_t fixed_div_q26(int32_t numerator, int32_t denominator) {

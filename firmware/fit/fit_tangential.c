@@ -549,30 +549,12 @@ NOINLINE static void normalise_column(struct fit_tangential_room *room, int u, i
   room->matrix[u][u] = own * (1 << (2 * scale));
 }
 
-/* The products of column a with columns b, c, d and the last, summed over the nodes: four in as
- * many registers as a Cortex-M0+ has for them. */
-FIXED_INLINE void sum_products(const int32_t *column, int32_t *sums, int a, int b, int c, int d) {
-  int32_t ab = 0, ac = 0, ad = 0, al = 0;
-  const int32_t *end = column + NODES * UNKNOWNS;
-  do {
-    int32_t own = column[a];
-    ab += column[b] * own;
-    ac += column[c] * own;
-    ad += column[d] * own;
-    al += column[UNKNOWNS - 1] * own;
-    column += UNKNOWNS;
-  } while (column != end);
-  sums[0] = ab;
-  sums[1] = ac;
-  sums[2] = ad;
-  sums[3] = al;
-}
-
 /* Every pair of the first seven unknowns is a, a + 1, a + 2 or a + 3 modulo 7 of one a. */
 _Static_assert(UNKNOWNS == 8, "every pair is in one of these");
 #define SUM_PRODUCTS(a)                                                                            \
   NOINLINE static void sum_products_##a(const int32_t *column, int32_t *sums) {                    \
-    sum_products(column, sums, (a), ((a) + 1) % 7, ((a) + 2) % 7, ((a) + 3) % 7);                  \
+    fixed_sum_products(column, column + NODES * UNKNOWNS, sums, UNKNOWNS, (a), ((a) + 1) % 7,      \
+                       ((a) + 2) % 7, ((a) + 3) % 7);                                              \
   }
 SUM_PRODUCTS(0)
 SUM_PRODUCTS(1)
@@ -773,12 +755,6 @@ static void improve(const struct problem *problem, struct fit_tangential_unknown
   outcome->length_q14 = take_step(problem, outcome, residual_q, at, &outcome->at_bound);
 }
 
-/* sqrt(a^2 + b^2) within 7 %, for weights. */
-static int32_t longer_leg(int32_t a, int32_t b) {
-  int32_t longer = a > b ? a : b, shorter = a > b ? b : a;
-  return longer + ((3 * shorter) >> 3);
-}
-
 /* What a reading's errors are, and the weights that follow. False: too few sensors. */
 NOINLINE static bool weigh(const struct fit_array *array, const struct fit_settings *settings,
                            uint32_t used, struct problem *problem,
@@ -788,7 +764,7 @@ NOINLINE static bool weigh(const struct fit_array *array, const struct fit_setti
   noise = fixed_clamp(noise, 1, ONE_Q26 >> 5);
   int32_t up = readings->shift > 0 ? readings->shift : 0, down = up - readings->shift;
   int32_t largest_q28 = (readings->largest >> down) * (1 << up);
-  int32_t base = longer_leg(noise, ((largest_q28 >> 14) * MODEL_SD_Q16) >> 8);
+  int32_t base = fixed_longer_leg(noise, ((largest_q28 >> 14) * MODEL_SD_Q16) >> 8);
   int sensors = 0;
   int32_t squares_q12 = 0;
   for (int k = 0; k < NODES; k++) {
@@ -797,7 +773,7 @@ NOINLINE static bool weigh(const struct fit_array *array, const struct fit_setti
     if (used >> sensor & 1) {
       uint32_t size = fixed_size(readings->q14[k]);
       int32_t gain = (int32_t)((uint32_t)settings->gain_sd_q16[sensor] * size >> 8);
-      int32_t weight_q12 = port_divide(base << 8, longer_leg(base, gain) >> 4);
+      int32_t weight_q12 = port_divide(base << 8, fixed_longer_leg(base, gain) >> 4);
       room->weight_q12[k] = weight_q12;
       squares_q12 += (weight_q12 * weight_q12) >> 12;
       sensors++;

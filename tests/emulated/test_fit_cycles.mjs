@@ -21,6 +21,10 @@ const SEARCH_CYCLES_MAX = 44500;
 const OUTLIER_CYCLES_MAX = 94000;
 /** A frame's tangential estimate, which follows the fit, with the image's pad. */
 const TANGENTIAL_CYCLES_MAX = 40000;
+/** A part of the look for a load that nobody estimates, which follows the frame's packet (fit_load.h), and all of them. */
+const LOAD_PART_CYCLES_MAX = 5500;
+const LOAD_CYCLES_MAX = 25000;
+const LOAD_PARTS = 6;
 /** Between the cheapest and the dearest press, share of the dearest: a contact at a bound has no widths to tell. */
 const SPREAD_MAX = 0.1;
 /** FINGERTIP_FIT_ITERATIONS. */
@@ -97,6 +101,22 @@ test(`the tangential estimate takes at most ${TANGENTIAL_CYCLES_MAX} cycles, nor
   const worst = Math.max(...[...presses, ...garbage].map((readings, i) => run(readings, i % 2 ? ALL : maskFor(readings, i)).cycles));
   t.diagnostic(`presses and garbage: at most ${worst} cycles`);
   assert.ok(worst <= TANGENTIAL_CYCLES_MAX, `garbage: ${worst}`);
+});
+
+test(`no part of the look for a load takes more than ${LOAD_PART_CYCLES_MAX} cycles, nor all more than ${LOAD_CYCLES_MAX}`, (t) => {
+  const inside = Array.from({ length: 60 }, () => pulled(press(between(-8, 8), between(-17, 17), 10 ** between(3, 5), between(5.5, 6.5), 2), between(-0.1, 0.1), between(-0.1, 0.1)));
+  let sum = 0;
+  for (let part = 0; part < LOAD_PARTS; part++) {
+    let dearest = 0;
+    for (const [name, list] of Object.entries({ inside, presses, garbage })) {
+      const cycles = list.map((readings, i) => cyclesOf(readings, ITERATIONS, i % 2 ? ALL : maskFor(readings, i), `load_${part}`)).sort((a, b) => a - b);
+      t.diagnostic(`part ${part}, ${name}: ${cycles[0]} ${cycles[cycles.length >> 1]} ${cycles[cycles.length - 1]} cycles (min, median, max)`);
+      dearest = Math.max(dearest, cycles[cycles.length - 1]);
+    }
+    assert.ok(dearest <= LOAD_PART_CYCLES_MAX, `part ${part}: ${dearest}`);
+    sum += dearest;
+  }
+  assert.ok(sum <= LOAD_CYCLES_MAX, `all: ${sum}`);
 });
 
 test(`looking for an outlier: at most ${SEARCH_CYCLES_MAX} cycles in vain, ${OUTLIER_CYCLES_MAX} with the fit without it`, (t) => {

@@ -19,7 +19,7 @@
 
 extern "C" {
 #include "config/defaults.h"
-#include "fit/fit.h"
+#include "fit/fit_load.h"
 }
 
 #include <algorithm>
@@ -104,7 +104,13 @@ json fit(const Array &layout, const json &job) {
   std::vector<float> x_mm, y_mm, sigma_mm, force_N, location_sd_mm;
   std::vector<std::uint32_t> flags;
   for (std::size_t press = 0; press < prepared.usable.size(); press++) {
-    const fit_result result = fit_press(prepared, press);
+    fit_result result = fit_press(prepared, press);
+    fit_load load{};
+    for (int frame = 0; frame < FIT_LOAD_PARTS; frame++) { // of a press that is held
+      fit_load_follow(&load, &prepared.array, prepared.pressure_Pa_q10[press].data(),
+                      &prepared.settings, &result);
+    }
+    fit_load_widen(&load, &prepared.array, &prepared.settings, &result);
     x_mm.push_back(result.x_mm);
     y_mm.push_back(result.y_mm);
     sigma_mm.push_back(result.sigma_mm);

@@ -33,8 +33,10 @@ PARTS = {
 GOALS = (
     ("cal_median_mm", "<=", 0.15), ("cal_rough_median_mm", "<=", 0.21), ("worse_after_accept", "<=", 0), ("accepted_good_percent", ">=", 95),
     ("refused_percent_worst", ">=", 90), ("cal_force_mape_percent", "<=", 2), ("calibrated_warned_percent_worst", "<=", 5),
-    ("cover_1sd_min", ">=", 55), ("cover_1sd_max", "<=", 75), ("cover_2sd_min", ">=", 93), ("cal_warned_percent", "<=", 5), ("cal_bad_unflagged_percent", "<=", 0.1), ("raw_warned_percent", "<=", 32),
-    ("raw_bad_unflagged_percent", "<=", 1.3), ("elongated_bad_unflagged_percent", "<=", 3), ("round_elongated_percent", "<=", 1),
+    ("cover_1sd_min", ">=", 55), ("cover_1sd_max", "<=", 75), ("cover_2sd_min", ">=", 93), ("cal_warned_percent", "<=", 5),
+    ("cal_bad_unflagged_percent", "<=", 0.1), ("raw_warned_percent", "<=", 32), ("raw_bad_unflagged_percent", "<=", 1.3),
+    ("loaded_silent_percent", "<=", 1), ("unloaded_warned_percent", "<=", 5), ("elongated_bad_unflagged_percent", "<=", 3),
+    ("round_elongated_percent", "<=", 1),
     ("slow_force_error_percent", "<=", 2), ("false_contacts", "<=", 0), ("zero_recovery_s", "<=", 5), ("real_phantom_percent_worst", "<=", 5),
     ("real_phantom_longest_s", "<=", 5), ("real_held_missed", "<=", 0), ("phantom_force_longest_s", "<=", 10), ("real_median_mm_worst_test", "<=", 0.15),
     ("real_median_mm_worst_other", "<=", 0.30), ("flash_lost", "<=", 0), ("flash_frames_skipped", "<=", 0), ("cold_cycles", "<=", 31000),

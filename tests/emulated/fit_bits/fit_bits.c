@@ -4,6 +4,7 @@
 #include "config/geometry.h"
 #include "draw.h"
 #include "fit/fit.h"
+#include "fit/fit_load.h"
 #include "fit/fit_tangential.h"
 
 #include <stdbool.h>
@@ -117,7 +118,8 @@ uint32_t fit_bits_presses(enum fit_bits_kernel kernel) {
 uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   draw_from(UINT64_C(0x9E3779B97F4A7C15) * (press + 1) ^ (uint64_t)kernel);
   draw();
-  bool other = kernel == FIT_BITS_GENERAL && press % 2;
+  bool other = (kernel == FIT_BITS_GENERAL && press % 2) ||
+               (kernel == FIT_BITS_LOAD && press % 16 == 1);
   const struct fit_array *array = &layouts[other ? draw_between(1, LAYOUTS - 1) : 0];
 
   struct fit_settings settings;
@@ -163,10 +165,11 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   }
 
   uint32_t usable = UINT32_MAX;
-  if (kernel == FIT_BITS_TANGENTIAL && press % 16 != 15) {
+  const bool pulls = kernel == FIT_BITS_TANGENTIAL || kernel == FIT_BITS_LOAD;
+  if (pulls && press % 16 != 15) {
     pull(array, pressure_Pa_q10);
   }
-  if (kernel == FIT_BITS_MASKED || (kernel == FIT_BITS_TANGENTIAL && press % 4 == 2)) {
+  if (kernel == FIT_BITS_MASKED || (pulls && press % 4 == 2)) {
     for (int left_out = draw_between(1, 11) / draw_between(1, 11); left_out >= 0; left_out--) {
       usable &= ~(UINT32_C(1) << draw_between(0, array->sensor_count - 1));
     }
@@ -182,6 +185,14 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
   } else if (kernel == FIT_BITS_GENERAL) {
     fit_general(array, pressure_Pa_q10, usable, &settings, &result);
+  } else if (kernel == FIT_BITS_LOAD) {
+    struct fit_load load;
+    memset(&load, 0, sizeof load);
+    fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
+    for (int part = 0; part < FIT_LOAD_PARTS; part++) {
+      fit_load_follow(&load, array, pressure_Pa_q10, &settings, &result);
+    }
+    fit_load_widen(&load, array, &settings, &result);
   }
   if (kernel == FIT_BITS_TANGENTIAL) {
     struct fit_tangential found[FRAMES];

@@ -15,8 +15,8 @@ import subprocess
 import sys
 import unittest
 
-KERNELS = ["grid", "masked", "general", "tangential"]  # the order of enum fit_bits_kernel
-PRESSES = {"grid": 10000, "masked": 10000, "general": 10000, "tangential": 10000}  # fit_bits_presses
+KERNELS = ["grid", "masked", "general", "tangential", "load"]  # the order of enum fit_bits_kernel
+PRESSES = dict.fromkeys(KERNELS, 10000)  # fit_bits_presses
 FOLDER = pathlib.Path(__file__).resolve().parent
 TOOLS = argparse.Namespace()
 

@@ -99,6 +99,8 @@ static void a_profile_tells_the_load_and_corrects_the_location(void) {
   TEST_ASSERT_TRUE(app.fit.x_mm > 1.5f + 0.5f);
   TEST_ASSERT_TRUE(app.fit.y_mm < -4.0f - 0.4f);
   TEST_ASSERT_TRUE(contact.q_sd_N > 0.0f && contact.location_sd_mm > 0.0f);
+  TEST_ASSERT_TRUE(app.fit.location_sd_mm < FIT_LOAD_USUAL * 0.38f * 9.0f);
+  TEST_ASSERT_FALSE(app.load_doubt.known);
   TEST_ASSERT_EQUAL_FLOAT(app.fit.p0_Pa, contact.p0_Pa);
   TEST_ASSERT_EQUAL_FLOAT(app.fit.sigma_mm, contact.sigma_mm);
 }
@@ -112,6 +114,40 @@ static void without_a_profile_there_is_none_and_the_fit_stays_as_it_is(void) {
   TEST_ASSERT_EQUAL_FLOAT(app.fit.x_mm, contact.x_mm);
   TEST_ASSERT_EQUAL_FLOAT(app.fit.force_N, contact.force_N);
   TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.qx_N);
+}
+
+/* Until the readings have been looked at it is 0.2 of the force: for one frame where they are far
+ * apart. */
+static void a_load_that_nobody_estimates_is_part_of_the_error(void) {
+  for (int kind = 0; kind < 4; kind++) {
+    const bool loaded = kind % 2 != 0, slow = kind < 2;
+    load.qx_N = loaded ? 1.5 : 0.0;
+    rig_power_up();
+    native_cdc_open();
+    run_for(1300);
+    TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_OSR,
+                                                                 .body.cmd_osr = {slow ? 1024 : 256}}));
+    start_streams(WIRE_STREAM_CONTACT);
+    run_for(200);
+    unsigned frames = 0;
+    for (struct wire_packet packet; next_packet(&packet);) {
+      const struct wire_contact *contact = &packet.body.contact;
+      if (packet.type != WIRE_CONTACT || !(contact->flags & CONTACT_FLAG_FIT_VALID)) {
+        continue;
+      }
+      frames++;
+      const bool uncertain = (contact->flags & CONTACT_FLAG_UNCERTAIN) != 0;
+      if (frames <= (slow ? 1 : FIT_LOAD_PARTS)) {
+        TEST_ASSERT_TRUE(contact->location_sd_mm > FIT_LOAD_USUAL * 0.38f * 9.0f && uncertain);
+      } else if (loaded) {
+        TEST_ASSERT_FLOAT_WITHIN(0.4f, contact->x_mm - 1.5f, contact->location_sd_mm);
+        TEST_ASSERT_TRUE(contact->x_mm > 2.2f && uncertain);
+      } else {
+        TEST_ASSERT_TRUE(contact->location_sd_mm < 0.6f && !uncertain);
+      }
+    }
+    TEST_ASSERT_GREATER_THAN(FIT_LOAD_PARTS + 2, frames);
+  }
 }
 
 static void a_profile_outlives_power_until_it_is_erased(void) {
@@ -261,6 +297,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(a_profile_tells_the_load_and_corrects_the_location);
   RUN_TEST(without_a_profile_there_is_none_and_the_fit_stays_as_it_is);
+  RUN_TEST(a_load_that_nobody_estimates_is_part_of_the_error);
   RUN_TEST(a_profile_outlives_power_until_it_is_erased);
   RUN_TEST(a_profile_keeps_the_calibrations_shape_from_the_fit);
   RUN_TEST(a_profile_out_of_range_is_refused);

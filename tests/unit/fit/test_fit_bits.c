@@ -43,6 +43,12 @@ static void test_tangential(void) {
   assert_kernel(FIT_BITS_TANGENTIAL, golden);
 }
 
+static void test_load(void) {
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x2B34E686, 0x4BBB6167, 0x371BDC86, 0xBF9020EA,
+                                                 0x9364CD4A, 0x641007F6, 0xD89D9364, 0xA9575557};
+  assert_kernel(FIT_BITS_LOAD, golden);
+}
+
 int main(void) {
   UNITY_BEGIN();
   fit_bits_init();
@@ -50,5 +56,6 @@ int main(void) {
   RUN_TEST(test_masked);
   RUN_TEST(test_general);
   RUN_TEST(test_tangential);
+  RUN_TEST(test_load);
   return UNITY_END();
 }

@@ -4,6 +4,7 @@
 #include "alternatives/alternatives.h"
 #include "config/geometry.h"
 #include "fit/fit.h"
+#include "fit/fit_load.h"
 #include "fit/fit_tangential.h"
 #include "fit/kernels.h"
 #include "port/port.h"
@@ -33,6 +34,7 @@ static struct fit_result contact;
 static struct fit_pad pad;
 static struct fit_tangential_state tangential_state;
 static struct fit_tangential tangential_result;
+static struct fit_load load;
 
 static void nothing(void) {}
 
@@ -77,6 +79,23 @@ static void tangential(void) {
   job.y_mm = tangential_result.y_mm;
 }
 
+/* One part of a look, after `fit` of the same readings and the parts before, which are not counted. */
+static void follow_load(void) {
+  fit_load_follow(&load, &layout, job.pressure_Pa_q10, &chosen, &contact);
+}
+#define LOAD_PART(part)                                                                            \
+  static void load_##part(void) {                                                                  \
+    follow_load();                                                                                 \
+  }
+LOAD_PART(0)
+LOAD_PART(1)
+LOAD_PART(2)
+LOAD_PART(3)
+LOAD_PART(4)
+LOAD_PART(5)
+static void (*const load_parts[FIT_LOAD_PARTS])(void) = {load_0, load_1, load_2,
+                                                         load_3, load_4, load_5};
+
 #define ALTERNATIVE(name, solver, real)                                                            \
   static void name(void) {                                                                         \
     const struct alternative_settings options = {(int)job.iterations,                              \
@@ -96,7 +115,9 @@ ALTERNATIVE(lm_double, lm, double)
 static void (*const kernels[])(void) = {
     nothing,   fit,       naive_float,
     naive_double, lm_float,  lm_double,
-    tangential, FIT_GRID_KERNELS(NAME) FIT_OTHER_KERNELS(NAME)};
+    tangential, load_0,    load_1,
+    load_2,    load_3,    load_4,
+    load_5,    FIT_GRID_KERNELS(NAME) FIT_OTHER_KERNELS(NAME)};
 
 int main(void) {
   if (fit_array_init(&layout, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
@@ -121,6 +142,15 @@ int main(void) {
       tangential_state = (struct fit_tangential_state){0};
       for (int frame = 1; frame < FIT_TANGENTIAL_FRAMES; frame++) {
         tangential();
+      }
+    }
+    for (int part = 0; part < FIT_LOAD_PARTS; part++) {
+      if (kernel == load_parts[part]) {
+        fit();
+        fit_load_begin(&load);
+        for (int before = 0; before < part; before++) {
+          follow_load();
+        }
       }
     }
     CALL_DEBUGGER(CALL_START);

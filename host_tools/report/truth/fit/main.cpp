@@ -1,17 +1,20 @@
 // truth_fit: how well the fit's numbers say how far they are from the truth.
 //
 // Touches of the twin's objects on pads (touches.hpp) go through the firmware's fit_gaussian_grid
-// with the settings that the firmware starts with. One JSON object on the standard output: the keys
-// that are judged, and under "cases", "elongated", "iterations" and "few_sensors" the tables behind
-// them. The constants of fit_limits.h and defaults.h were chosen with --seed 1.
+// with the settings that the firmware starts with; those that pull along the rubber also through its
+// look for a load that nobody estimates (fit_load.h). One JSON object on the standard output: the keys
+// that are judged, and under "cases", "loaded", "elongated", "iterations" and "few_sensors" the
+// tables behind them. The constants of fit_limits.h and defaults.h were chosen with --seed 1.
 #include "libfingertip/in_parallel.hpp"
 #include "report/reference/options.hpp"
+#include "shear/static/pulled.hpp"
 #include "truth/fit/statistics.hpp"
 #include "truth/fit/touches.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"
 #include "config/defaults.h"
+#include "fit/fit_load.h"
 }
 
 #include <algorithm>
@@ -55,6 +58,10 @@ struct Case {
   double angle_rad = NAN;
   int iterations = DEFAULT_FIT_ITERATIONS;
   std::size_t sensors = SENSORS; // in use, chosen for each touch
+  // What presses instead of contacts, and pulls along the rubber: by a share of its force from the
+  // first to the second, in any direction, under a force that stays.
+  std::vector<const shear::Object *> pulled = {};
+  double load_least = 0.0, load_most = 0.0;
 };
 
 struct Judged {
@@ -124,6 +131,18 @@ private:
   std::vector<Judged> judged_;
 };
 
+constexpr double FRICTION = 0.5; // at which all of the contact slides
+
+Contact pulled_by(const shear::Object &object, double force_N, double ratio, Random &random) {
+  const double direction = random.uniform(0.0, 2.0 * M_PI), load_N = ratio * force_N;
+  const twin::TractionTable::Load load{force_N, twin::stuck_force_N(force_N, load_N, FRICTION),
+                                       load_N * std::cos(direction), load_N * std::sin(direction)};
+  return {object.name, [&object, load](double normal_N, double dx_mm, double dy_mm) {
+            return object.pressure.base_pressure_Pa(normal_N, dx_mm, dy_mm) +
+                   object.traction.base_pressure_Pa(load, dx_mm, dy_mm);
+          }};
+}
+
 Results run(const Case &c, const Options &options) {
   const fit_array array = firmware_array();
   std::vector<Judged> judged(options.pads * TOUCHES);
@@ -137,15 +156,30 @@ Results run(const Case &c, const Options &options) {
       if (!std::isnan(c.angle_rad)) {
         touch.angle_rad = c.angle_rad;
       }
-      const Contact &contact = c.contacts[random.next() % c.contacts.size()];
+      Contact contact;
+      if (c.pulled.empty()) {
+        contact = c.contacts[random.next() % c.contacts.size()];
+      } else {
+        const shear::Object &object = *c.pulled[random.next() % c.pulled.size()];
+        contact = pulled_by(object, touch.force_N, random.uniform(c.load_least, c.load_most), random);
+      }
       const double noise_Pa = draw_noise_Pa(random);
-      const auto readings = readings_of(array, contact, touch, pad, noise_Pa, random);
+      auto readings = readings_of(array, contact, touch, pad, noise_Pa, random);
       const std::uint32_t usable = choose_sensors(c.sensors, random);
       fit_settings settings = settings_for(pad, noise_Pa);
       settings.iterations = static_cast<std::uint8_t>(c.iterations);
       settings.model_sd_q16 = c.gaussian ? 0 : settings.model_sd_q16;
       fit_result fit;
       fit_gaussian_grid(&array, readings.data(), usable, &settings, &fit);
+      if (!c.pulled.empty()) { // held until the firmware has looked for the load
+        fit_load load{};
+        for (int frame = 0; frame < FIT_LOAD_PARTS; frame++) {
+          fit_load_follow(&load, &array, readings.data(), &settings, &fit);
+          readings = readings_of(array, contact, touch, pad, noise_Pa, random);
+          fit_gaussian_grid(&array, readings.data(), usable, &settings, &fit);
+        }
+        fit_load_widen(&load, &array, &settings, &fit);
+      }
       if (!(fit.flags & CONTACT_FLAG_FIT_VALID)) {
         continue; // no positive reading among the sensors in use
       }
@@ -229,6 +263,44 @@ void judge_coverage(const Options &options, const std::vector<Contact> &thick,
   out["cover_1sd_min"] = least;
   out["cover_1sd_max"] = most;
   out["cover_2sd_min"] = least_2;
+}
+
+// No profile, so that nobody estimates the load. Without a load: what the look for one costs.
+void judge_loaded(const Options &options, const CalibratedPads &calibrated, ordered_json &out) {
+  shear::Objects objects(options.cache);
+  struct Kind {
+    const char *name;
+    double layer_mm;
+    std::function<Pad(Random &, std::size_t)> pad;
+  };
+  const Kind kinds[] = {{"12 mm, calibrated", 12.0, one_of(calibrated)},
+                        {"12 mm, gains 10 %", 12.0, never_calibrated},
+                        {"6 mm, equal gains", 6.0, equal},
+                        {"6 mm, gains 10 %", 6.0, never_calibrated}};
+  const double loads[][2] = {{0.0, 0.0}, {0.1, 0.1}, {0.2, 0.2}, {0.3, 0.3}, {0.5, 0.5}, {0.0, 0.5}};
+  for (const Kind &kind : kinds) {
+    Case c{"loaded, " + std::string(kind.name), {}, kind.pad};
+    for (const char *name : OBJECTS) {
+      c.pulled.push_back(&objects.on(kind.layer_mm, name));
+    }
+    for (const auto &[least, most] : loads) {
+      c.load_least = least;
+      c.load_most = most;
+      char load[32];
+      std::snprintf(load, sizeof load, least < most ? ", Q/F %g to %g" : ", Q/F %g", least, most);
+      const Results results = run(c, options);
+      out["loaded"].push_back(results.row(kind.name + std::string(load)));
+      if (least < most && kind.name == kinds[0].name) {
+        out["loaded_silent_percent"] = results.bad_without(WARNINGS);
+      } else if (least < most && kind.name == kinds[1].name) {
+        out["raw_loaded_silent_percent"] = results.bad_without(WARNINGS);
+      } else if (most == 0.0 && kind.name == kinds[0].name) {
+        out["unloaded_warned_percent"] = results.flagged(WARNINGS);
+      } else if (most == 0.0 && kind.name == kinds[1].name) {
+        out["raw_unloaded_warned_percent"] = results.flagged(WARNINGS);
+      }
+    }
+  }
 }
 
 void judge_elongated(const Options &options, const CalibratedPads &calibrated, ordered_json &out) {
@@ -316,6 +388,7 @@ ordered_json judge(const Options &options) {
   const CalibratedPads calibrated = calibrated_pads(options.pads, options.seed, options.cache);
   std::fprintf(stderr, "truth_fit: %zu calibrations\n", calibrated.size());
   judge_coverage(options, thick, thin, calibrated, out);
+  judge_loaded(options, calibrated, out);
   judge_elongated(options, calibrated, out);
   judge_iterations(options, thick, thin, out);
   judge_few_sensors(options, thick, thin, calibrated, out);

@@ -1,0 +1,359 @@
+#include "fit/fit_load.h"
+
+#include "common/contact_flags.h"
+#include "fit/fit_grid_parts.h"
+#include "fit/fit_grid_solve.h"
+#include "fit/fit_limits.h"
+#include "fit/fit_math.h"
+
+#include <string.h>
+
+/* The model of the residual, lengths in sigma, parts of p0, d = (dx, dy) from the contact to the
+ * sensor, g(v) = exp(-d' d / (2 v)):
+ *   residual = g(1) (a + b dx + c dy + e d' d) + far g(FAR) + (qx dx + qy dy) g(PULL)
+ * The first four are what a step of the fit would still take. `far` is what the rubber has around a
+ * contact, heavier tails or a dip, and is 0 +- FAR_SD. The last two are the trace of a load: of the
+ * terms of a layer's profile (common/pad_profile.h) the narrow ones are such steps.
+ */
+enum { HEIGHT, ALONG_X, ALONG_Y, WIDTH, FAR, PULL_X, PULL_Y, UNKNOWNS };
+_Static_assert(UNKNOWNS == FIT_LOAD_UNKNOWNS, "the look's room is for them");
+
+#define FAR_Q16 10486 /* 1 / 6.25: the variance of the dip that the recordings of real pads show */
+#define PULL_SHIFT 2  /* 1 / 4: the layer's wide terms under the contacts of the twin */
+#define FAR_PER_SD 100 /* FAR_SD 0.01 of p0: half of what layers and cast pads differ by */
+/* Of the model's own error, MODEL_SHARE_SHIFT: a half of model_sd is independent from sensor to
+ * sensor. The other unknowns take the rest. */
+#define MODEL_SHARE_SHIFT 1
+/* A trace is one whose square is beyond so many times the sum of its two variances, which chance
+ * makes in one press of seven. */
+#define SURE 2
+
+/* How far the location moves for each unit of Q / F, the longer of two, and the trace's coefficient
+ * that it makes: medians over truth_fit's objects on 6 to 15 mm of rubber, seed 1. */
+#define SHIFT_PER_PITCH 0.38f
+#define SHIFT_PER_SIGMA 0.58f
+#define RATIO_PER_TRACE 14.7f
+/* Square of the largest coefficient that counts: Q / F of 1, which is what friction holds. */
+#define TRACE_MOST ((struct scaled){19389, -22})
+
+#define PIVOT_LEAST (1 << 18) /* 2^-12: an unknown with less is not told from others */
+#define X_MAX_Q12 (1 << 15)   /* 8 sigma */
+#define READING_BITS 15
+#define ERROR_MAX_Q4 ((1 << 18) - 1)
+#define SIGMA_MIN_Q16 10000 /* pitches; FIT_SIGMA_MIN is above */
+
+#define RESIDUAL UNKNOWNS /* its column */
+#define WORDS (UNKNOWNS + 1)
+
+/* 2^-z within 0.3 %. */
+FIXED_INLINE int32_t exp2_rough(uint32_t z_q22) {
+  uint32_t whole = z_q22 >> 22;
+  return whole > 29 ? 0 : fit_exp2_table[(z_q22 >> 14) & 255] >> whole;
+}
+
+#define DIP_PER_MAX_Q26 (1 << 29) /* 8 */
+#define Z_MAX_Q22 (1u << 27)      /* 6.7 sigma away */
+
+/* 2^shift: the readings' unit, 1/1024 Pa. */
+static void set_dip(const struct fit_settings *settings, const struct fit_result *result,
+                    int32_t shift, struct fit_load_look *look) {
+  look->dip_q18 = look->dip_per_q26 = look->dip_error_q4 = 0;
+  if (fit_has_dip(settings)) {
+    struct scaled ratio =
+        scaled_div(fit_grid_scaled(result->sigma_mm), fit_grid_scaled(settings->dip_sd_mm));
+    struct scaled error = scaled_mul(fit_grid_scaled(settings->dip_share * FIT_DIP_ERROR),
+                                     fit_grid_scaled(result->p0_Pa));
+    error.exponent += 10 - shift;
+    look->dip_q18 = fit_fixed(settings->dip_share, 18);
+    look->dip_per_q26 =
+        fixed_clamp(fit_scaled_to_fixed(scaled_mul(ratio, ratio), 26), 0, DIP_PER_MAX_Q26);
+    look->dip_error_q4 = fixed_clamp(fit_scaled_to_fixed(error, 4), 0, ERROR_MAX_Q4);
+  }
+}
+
+static void set_base(const struct fit_settings *settings, int32_t largest, int32_t shift,
+                     struct fit_load_look *look) {
+  int32_t noise_q4 = fixed_clamp(shifted(settings->noise_Pa_q10, 4 - shift), 1, ERROR_MAX_Q4);
+  int32_t model_q4 = (int32_t)((settings->model_sd_q16 * (uint32_t)shifted(largest, -shift)) >> 12);
+  look->base_q4 =
+      fixed_clamp(fixed_longer_leg(noise_q4, model_q4 >> MODEL_SHARE_SHIFT), 1, ERROR_MAX_Q4);
+}
+
+/* What is too far off for Q16 is so in both, and counts as the same place. */
+FIXED_INLINE int32_t in_sigmas(float at, int32_t from_q16, int32_t per_sigma_q12) {
+  int32_t off_q16 = (int32_t)((uint32_t)fit_fixed(at, 16) - (uint32_t)from_q16);
+  return fixed_clamp(fixed_mul_16(off_q16, per_sigma_q12), -X_MAX_Q12 + 1, X_MAX_Q12 - 1);
+}
+
+/* What a sensor's row holds before it is one: its place from the contact, its reading of p0, and
+ * what its gain makes of its error. */
+enum { AT_X_Q12, AT_Y_Q12, READING_Q18, GAIN_Q4 };
+
+/* False: there is nothing to be seen in so few or such readings. */
+static bool take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                          const struct fit_settings *settings, const struct fit_result *result,
+                          struct fit_load_look *look) {
+  int32_t largest = 0;
+  int count = 0;
+  for (int k = 0; k < array->sensor_count; k++) {
+    if (result->used >> k & 1) {
+      largest = pressure_Pa_q10[k] > largest ? pressure_Pa_q10[k] : largest;
+      count++;
+    }
+  }
+  if (count < FIT_LOAD_SENSORS || count > FIT_LOAD_SENSORS_MAX || largest <= 0) {
+    return false;
+  }
+  look->count = count;
+  memset(look->size, 0, sizeof look->size);
+  int32_t shift = fixed_bits((uint32_t)largest) - READING_BITS;
+  set_base(settings, largest, shift, look);
+  set_dip(settings, result, shift, look);
+  struct scaled per_p0 = fit_grid_reciprocal(fit_grid_scaled(result->p0_Pa));
+  look->base = scaled_mul(fit_scaled_from(look->base_q4, shift - 14), per_p0);
+  const float per_pitch = 1.0f / array->pitch_mm;
+  int32_t x_q16 = fit_fixed(result->x_mm * per_pitch, 16);
+  int32_t y_q16 = fit_fixed(result->y_mm * per_pitch, 16);
+  int32_t sigma_q16 = fit_fixed(result->sigma_mm * per_pitch, 16);
+  int32_t per_sigma_q12 =
+      port_divide(1 << 28, sigma_q16 < SIGMA_MIN_Q16 ? SIGMA_MIN_Q16 : sigma_q16);
+  int32_t(*row)[WORDS] = look->row;
+  for (int k = 0; k < array->sensor_count; k++) {
+    if (!(result->used >> k & 1)) {
+      continue;
+    }
+    int32_t reading = fixed_clamp(shifted(pressure_Pa_q10[k], -shift), -INT16_MAX, INT16_MAX);
+    (*row)[AT_X_Q12] = in_sigmas(array->x[k], x_q16, per_sigma_q12);
+    (*row)[AT_Y_Q12] = in_sigmas(array->y[k], y_q16, per_sigma_q12);
+    (*row)[READING_Q18] = shifted(reading * per_p0.mantissa, per_p0.exponent + shift - 10 + 18);
+    (*row)[GAIN_Q4] =
+        (int32_t)(((uint32_t)settings->gain_sd_q16[k] * fixed_size(reading)) >> 12);
+    row++;
+  }
+  return true;
+}
+
+static NOINLINE void set_row(struct fit_load_look *look, int32_t *row) {
+  int32_t x = row[AT_X_Q12], y = row[AT_Y_Q12], reading_q18 = row[READING_Q18];
+  int32_t square_q20 = (int32_t)(((uint32_t)(x * x) + (uint32_t)(y * y)) >> 4);
+  uint32_t z = (uint32_t)fixed_mul_q30(square_q20 * 4, 774541002); /* log2(e) / 2, Q22 */
+  int32_t e_q18 = exp2_negative(z) >> 12;
+  int32_t pull_q17 = exp2_rough(z >> PULL_SHIFT) >> 13;
+  int32_t error_q4 = fixed_longer_leg(look->base_q4, row[GAIN_Q4]);
+  if (look->dip_q18 != 0) {
+    int32_t z_dip = fixed_mul_q26((int32_t)(z < Z_MAX_Q22 ? z : Z_MAX_Q22), look->dip_per_q26);
+    int32_t dip_q12 = exp2_rough((uint32_t)z_dip) >> 18;
+    reading_q18 += (look->dip_q18 * dip_q12) >> 12;
+    error_q4 = fixed_longer_leg(error_q4, (look->dip_error_q4 * dip_q12) >> 12);
+  }
+  int32_t weight_q12 = port_divide(look->base_q4 << 12, error_q4);
+  int32_t residual_q18 = fixed_clamp(reading_q18 - e_q18, -(1 << 18), 1 << 18);
+  row[HEIGHT] = e_q18 * weight_q12;
+  row[ALONG_X] = ((e_q18 * x) >> 12) * weight_q12;
+  row[ALONG_Y] = ((e_q18 * y) >> 12) * weight_q12;
+  row[WIDTH] = ((e_q18 * (square_q20 >> 8)) >> 12) * weight_q12;
+  row[FAR] = (exp2_rough((uint32_t)fixed_mul_16((int32_t)z, FAR_Q16)) >> 12) * weight_q12;
+  row[PULL_X] = ((pull_q17 * x) >> 11) * weight_q12;
+  row[PULL_Y] = ((pull_q17 * y) >> 11) * weight_q12;
+  row[RESIDUAL] = residual_q18 * weight_q12;
+  for (int u = 0; u < WORDS; u++) {
+    look->size[u] |= fixed_size(row[u]);
+  }
+}
+
+static void set_rows(struct fit_load_look *look, int from, int to) {
+  for (int k = from; k < to; k++) {
+    set_row(look, look->row[k]);
+  }
+}
+
+/* Brings a column to 13 bits, or so many that the sums hold, and returns the sum of its squares. */
+static NOINLINE int32_t normalise(struct fit_load_look *look, int u, int32_t prior_q30) {
+  int32_t shift = fixed_bits(look->size[u] | fixed_size(prior_q30)) - (look->count > 16 ? 12 : 13);
+  shift = shift < 1 ? 1 : shift;
+  look->q[u] = (int8_t)(30 - shift);
+  int32_t half = 1 << (shift - 1), prior = prior_q30 >> shift;
+  int32_t *value = &look->row[0][u], *end = &look->row[0][u] + look->count * WORDS;
+  int32_t own = prior * prior;
+  do {
+    int32_t now = (*value + half) >> shift;
+    *value = now;
+    own += now * now;
+    value += WORDS;
+  } while (value != end);
+  return own;
+}
+
+static NOINLINE void put_products(int a, const int32_t *sums, struct fit_load_look *look) {
+  const int8_t *up = look->up;
+  for (int k = 0, b = a; k < 3; k++) {
+    b = b == UNKNOWNS - 1 ? 0 : b + 1;
+    look->matrix[a > b ? a : b][a > b ? b : a] = sums[k] * (1 << (up[a] + up[b]));
+  }
+  look->right[a] = sums[3] * (1 << up[a]);
+}
+
+_Static_assert(UNKNOWNS == 7, "every pair is in one of these");
+#define TAKE_PRODUCTS(a)                                                                           \
+  static NOINLINE void take_products_##a(struct fit_load_look *look) {                             \
+    int32_t sums[4];                                                                               \
+    const int32_t *row = look->row[0];                                                             \
+    fixed_sum_products(row, row + look->count * WORDS, sums, WORDS, (a), ((a) + 1) % 7,            \
+                       ((a) + 2) % 7, ((a) + 3) % 7);                                              \
+    put_products((a), sums, look);                                                                 \
+  }
+TAKE_PRODUCTS(0)
+TAKE_PRODUCTS(1)
+TAKE_PRODUCTS(2)
+TAKE_PRODUCTS(3)
+TAKE_PRODUCTS(4)
+TAKE_PRODUCTS(5)
+TAKE_PRODUCTS(6)
+
+/* Columns in the room that the sums have, and the diagonal 2^28 .. 2^30. */
+static void scale_columns(struct fit_load_look *look) {
+  int32_t prior_q30 =
+      fit_scaled_to_fixed(scaled_mul(look->base, fit_scaled_from(FAR_PER_SD, 0)), 30);
+  for (int u = 0; u < UNKNOWNS; u++) {
+    int32_t own = normalise(look, u, u == FAR ? prior_q30 : 0);
+    int32_t up = own >> 30 ? 0 : (30 - fixed_bits((uint32_t)own | 1)) >> 1;
+    look->up[u] = (int8_t)up;
+    look->matrix[u][u] = own * (1 << (2 * up));
+    look->q[u] = (int8_t)(look->q[u] + up);
+  }
+  look->residual_square = normalise(look, RESIDUAL, 0);
+}
+
+static void take_products(struct fit_load_look *look) {
+  take_products_0(look);
+  take_products_1(look);
+  take_products_2(look);
+  take_products_3(look);
+  take_products_4(look);
+  take_products_5(look);
+  take_products_6(look);
+}
+
+/* Takes from the unknowns after j what j explains, L D L^T with a power of two between the factors,
+ * of 16 bits each; returns what it explains of the square of the residual. An unknown that is not
+ * told from those before explains nothing more. */
+static NOINLINE int32_t eliminate(struct fit_load_look *look, int j) {
+  int32_t pivot = look->matrix[j][j];
+  if (pivot < PIVOT_LEAST) {
+    return 0;
+  }
+  int32_t half = pivot >> 30 ? 0 : (30 - fixed_bits((uint32_t)pivot)) >> 1;
+  int32_t down = 15 - half, round = 1 << down >> 1;
+  int32_t inverse_q14 = port_divide((1 << 29) - 1, (pivot * (1 << (2 * half))) >> 15);
+  int32_t right = fixed_clamp((look->right[j] + round) >> down, -(1 << 15), 1 << 15);
+  int32_t right_over = (right * inverse_q14 + (1 << 14)) >> 15; /* Q14, as the next */
+  int32_t over_pivot[UNKNOWNS];
+  for (int i = j + 1; i < UNKNOWNS; i++) {
+    int32_t *row = look->matrix[i];
+    int32_t element = fixed_clamp((row[j] + round) >> down, -(1 << 15), 1 << 15); /* Q15 */
+    over_pivot[i] = (element * inverse_q14 + (1 << 14)) >> 15;
+    for (int k = j + 1; k <= i; k++) {
+      row[k] -= element * over_pivot[k] * 2;
+    }
+    look->right[i] -= element * right_over * 2;
+  }
+  return right * right_over * 2;
+}
+
+/* The square of the trace's coefficients beyond what they are by chance, 0 where there is none. */
+static NOINLINE struct scaled trace_of(struct fit_load_look *look) {
+  const struct scaled none = {0, 0};
+  int32_t left = look->residual_square;
+  for (int j = 0; j < UNKNOWNS; j++) {
+    left -= eliminate(look, j);
+  }
+  if (look->matrix[PULL_X][PULL_X] < PIVOT_LEAST || look->matrix[PULL_Y][PULL_Y] < PIVOT_LEAST) {
+    return none;
+  }
+  struct scaled pivot_x = fit_scaled_from(look->matrix[PULL_X][PULL_X], -2 * look->q[PULL_X]);
+  struct scaled pivot_y = fit_scaled_from(look->matrix[PULL_Y][PULL_Y], -2 * look->q[PULL_Y]);
+  struct scaled both = fit_scaled_from(look->matrix[PULL_Y][PULL_X],
+                                       -look->q[PULL_X] - look->q[PULL_Y]);
+  struct scaled right_x =
+      fit_scaled_from(look->right[PULL_X], -look->q[PULL_X] - look->q[RESIDUAL]);
+  struct scaled right_y =
+      fit_scaled_from(look->right[PULL_Y], -look->q[PULL_Y] - look->q[RESIDUAL]);
+  struct scaled per_x = fit_grid_reciprocal(pivot_x), per_y = fit_grid_reciprocal(pivot_y);
+  struct scaled lean = scaled_mul(fit_scaled_short(both), per_x);
+  struct scaled y = scaled_mul(right_y, per_y);
+  struct scaled x = fit_scaled_short(
+      scaled_sub(scaled_mul(right_x, per_x), fit_scaled_short(scaled_mul(lean, y))));
+  struct scaled square = scaled_add(scaled_mul(x, x), scaled_mul(y, y));
+  struct scaled form_x = scaled_add(per_x, scaled_mul(scaled_mul(lean, lean), per_y));
+  struct scaled variance = scaled_mul(look->base, look->base);
+  /* Residuals that the model does not explain count as errors of the readings. */
+  int32_t freedom = look->count - UNKNOWNS;
+  struct scaled found = fit_scaled_from(port_divide(left > 0 ? left : 0, freedom < 1 ? 1 : freedom),
+                                        -2 * look->q[RESIDUAL]);
+  variance = scaled_sub(found, variance).mantissa > 0 ? found : variance;
+  struct scaled by_chance = scaled_mul(fit_scaled_short(variance), scaled_add(form_x, per_y));
+  by_chance = fit_scaled_short(by_chance);
+  struct scaled sure = {by_chance.mantissa * SURE, by_chance.exponent};
+  if (scaled_sub(square, sure).mantissa <= 0) {
+    return none;
+  }
+  struct scaled excess = scaled_sub(square, by_chance);
+  return scaled_sub(excess, TRACE_MOST).mantissa > 0 ? TRACE_MOST : excess;
+}
+
+static bool is_located(const struct fit_result *result) {
+  return (result->flags & CONTACT_FLAG_FIT_VALID) &&
+         !(result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT));
+}
+
+void fit_load_begin(struct fit_load *load) {
+  load->known = false;
+  load->part = 0;
+}
+
+void fit_load_widen(const struct fit_load *load, const struct fit_array *array,
+                    const struct fit_settings *settings, struct fit_result *result) {
+  if (!is_located(result) || (load->known && load->ratio == 0.0f)) {
+    return;
+  }
+  float by_pitch = SHIFT_PER_PITCH * array->pitch_mm;
+  float by_sigma = SHIFT_PER_SIGMA * result->sigma_mm;
+  result->location_sd_mm = fit_quadrature(result->location_sd_mm, 1.0f,
+                                          load->known ? load->ratio : FIT_LOAD_USUAL,
+                                          by_pitch > by_sigma ? by_pitch : by_sigma);
+  if (result->location_sd_mm > fit_location_sd_limit_mm(settings)) {
+    result->flags |= CONTACT_FLAG_UNCERTAIN;
+  }
+}
+
+void fit_load_follow(struct fit_load *load, const struct fit_array *array,
+                     const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
+                     const struct fit_result *result) {
+  struct fit_load_look *look = &load->look;
+  switch (load->part) {
+  case 0:
+    if (!is_located(result) || !take_readings(array, pressure_Pa_q10, settings, result, look)) {
+      return;
+    }
+    break;
+  case 1:
+    set_rows(look, 0, look->count / 2);
+    break;
+  case 2:
+    set_rows(look, look->count / 2, look->count);
+    break;
+  case 3:
+    scale_columns(look);
+    break;
+  case 4:
+    take_products(look);
+    break;
+  default: {
+    struct scaled ratio = scaled_mul(fit_scaled_sqrt(fit_scaled_short(trace_of(look))),
+                                     fit_grid_scaled(RATIO_PER_TRACE));
+    load->ratio = fit_float(ratio.mantissa, ratio.exponent);
+    load->known = true;
+  }
+  }
+  load->part = (uint8_t)((load->part + 1) % FIT_LOAD_PARTS);
+}

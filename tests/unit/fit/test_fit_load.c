@@ -1,0 +1,237 @@
+/* A load that nobody estimates: its trace in the residual, and what that makes of the error. */
+#include "common/contact_flags.h"
+#include "fit/fit_load.h"
+#include "support/random.h"
+#include "unity.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#define SENSORS 15
+#define ALL ((UINT32_C(1) << SENSORS) - 1)
+#define NOISE_Pa 4.0
+
+static struct fit_array array;
+static struct random noise;
+
+void setUp(void) {
+  float x_mm[SENSORS], y_mm[SENSORS];
+  for (int k = 0; k < SENSORS; k++) {
+    x_mm[k] = 9.0f * (float)(k / 5 - 1);
+    y_mm[k] = 9.0f * (float)(k % 5 - 2);
+  }
+  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, SENSORS, x_mm, y_mm, 9.0f));
+  noise = (struct random){UINT64_C(20221015)};
+}
+
+void tearDown(void) {}
+
+/* 5 N on 12 mm of rubber, the sums of Gaussians of its profile (common/pad_profile.h). */
+static void press(double x_mm, double y_mm, double qx, double qy, int32_t *pressure_Pa_q10) {
+  static const double share[] = {0.0962, 0.8206}, sd_mm[] = {3.563, 5.739};
+  static const double moment_mm[] = {1.052, 4.015, 5.431}, pull_sd_mm[] = {4.803, 7.883, 19.82};
+  for (int k = 0; k < SENSORS; k++) {
+    double dx = 9.0 * (k / 5 - 1) - x_mm, dy = 9.0 * (k % 5 - 2) - y_mm, sum = 0.0;
+    for (int j = 0; j < 2; j++) {
+      double v = sd_mm[j] * sd_mm[j] + 4.0;
+      sum += share[j] / v * exp(-(dx * dx + dy * dy) / (2.0 * v));
+    }
+    for (int j = 0; j < 3; j++) {
+      double v = pull_sd_mm[j] * pull_sd_mm[j] + 5.2;
+      sum += (qx * dx + qy * dy) * moment_mm[j] / (v * v) * exp(-(dx * dx + dy * dy) / (2.0 * v));
+    }
+    double pressure_Pa = 5e6 / 6.28318531 * sum + NOISE_Pa * random_between(&noise, -1.0, 1.0);
+    pressure_Pa_q10[k] = (int32_t)lround(1024.0 * pressure_Pa);
+  }
+}
+
+static struct fit_settings usual(void) {
+  struct fit_settings settings = {.iterations = 4, .noise_Pa_q10 = (int32_t)(1024 * NOISE_Pa)};
+  fit_set_errors(&settings, 0.015f, 0.0065f);
+  return settings;
+}
+
+/* A press that is held until the look has ended. */
+static void hold(struct fit_load *load, const int32_t *pressure_Pa_q10, uint32_t usable,
+                 const struct fit_settings *settings, struct fit_result *result) {
+  fit_gaussian(&array, pressure_Pa_q10, usable, settings, result);
+  for (int part = 0; part < FIT_LOAD_PARTS; part++) {
+    fit_load_follow(load, &array, pressure_Pa_q10, settings, result);
+  }
+  fit_load_widen(load, &array, settings, result);
+}
+
+static void test_a_load_is_part_of_the_error(void) {
+  const struct fit_settings settings = usual();
+  double errors_mm = 0.0, said_mm = 0.0;
+  int silent = 0;
+  for (int i = 0; i < 400; i++) {
+    double x_mm = random_between(&noise, -6.0, 6.0), y_mm = random_between(&noise, -14.0, 14.0);
+    double ratio = random_between(&noise, 0.25, 0.5), angle = random_between(&noise, 0.0, 6.28);
+    int32_t pressure_Pa_q10[SENSORS];
+    press(x_mm, y_mm, ratio * cos(angle), ratio * sin(angle), pressure_Pa_q10);
+    struct fit_result result;
+    struct fit_load load = {0};
+    hold(&load, pressure_Pa_q10, ALL, &settings, &result);
+    double error_mm = hypot((double)result.x_mm - x_mm, (double)result.y_mm - y_mm);
+    TEST_ASSERT_TRUE(error_mm > 0.6);
+    errors_mm += error_mm;
+    said_mm += (double)result.location_sd_mm;
+    silent += error_mm > 1.0 && !(result.flags & CONTACT_FLAG_UNCERTAIN);
+  }
+  char text[80];
+  snprintf(text, sizeof text, "off %.2f mm, said %.2f mm, %d silent", errors_mm / 400.0,
+           said_mm / 400.0, silent);
+  TEST_ASSERT_TRUE_MESSAGE(fabs(said_mm / errors_mm - 1.0) < 0.2, text);
+  TEST_ASSERT_LESS_OR_EQUAL_INT_MESSAGE(4, silent, text);
+}
+
+static void test_without_a_load_little_is_added(void) {
+  const struct fit_settings settings = usual();
+  int more = 0;
+  for (int i = 0; i < 200; i++) {
+    int32_t pressure_Pa_q10[SENSORS];
+    press(random_between(&noise, -9.0, 9.0), random_between(&noise, -18.0, 18.0), 0.0, 0.0,
+          pressure_Pa_q10);
+    struct fit_result with, without;
+    struct fit_load load = {0};
+    fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &without);
+    hold(&load, pressure_Pa_q10, ALL, &settings, &with);
+    TEST_ASSERT_TRUE(with.location_sd_mm >= without.location_sd_mm * 0.999f);
+    more += with.location_sd_mm > without.location_sd_mm + 0.25f;
+  }
+  TEST_ASSERT_LESS_OR_EQUAL(2, more);
+}
+
+/* Until a look has ended the load is what is usual, and so again after the contact. */
+static void test_before_the_first_look_a_load_is_assumed(void) {
+  const struct fit_settings settings = usual();
+  int32_t pressure_Pa_q10[SENSORS];
+  press(2.0, 3.0, 0.0, 0.0, pressure_Pa_q10);
+  struct fit_result fitted;
+  fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &fitted);
+  struct fit_load load = {0};
+  for (int contact = 0; contact < 2; contact++) {
+    for (int part = 0; part < FIT_LOAD_PARTS; part++) {
+      struct fit_result result = fitted;
+      fit_load_widen(&load, &array, &settings, &result);
+      TEST_ASSERT_FLOAT_WITHIN(0.01f, hypotf(fitted.location_sd_mm, FIT_LOAD_USUAL * 0.38f * 9.0f),
+                               result.location_sd_mm);
+      TEST_ASSERT_TRUE(result.flags & CONTACT_FLAG_UNCERTAIN);
+      fit_load_follow(&load, &array, pressure_Pa_q10, &settings, &result);
+    }
+    struct fit_result result = fitted;
+    fit_load_widen(&load, &array, &settings, &result);
+    TEST_ASSERT_TRUE(result.location_sd_mm < fitted.location_sd_mm + 0.1f);
+    fit_load_begin(&load);
+  }
+}
+
+/* A look is of the readings that it began with. */
+static void test_a_look_does_not_mix_frames(void) {
+  const struct fit_settings settings = usual();
+  int32_t loaded_Pa_q10[SENSORS], other_Pa_q10[SENSORS];
+  press(2.0, 3.0, 0.4, 0.1, loaded_Pa_q10);
+  press(-5.0, 8.0, 0.0, 0.0, other_Pa_q10);
+  struct fit_result loaded, other;
+  struct fit_load held = {0}, moved = {0};
+  hold(&held, loaded_Pa_q10, ALL, &settings, &loaded);
+  fit_gaussian(&array, loaded_Pa_q10, ALL, &settings, &loaded);
+  fit_gaussian(&array, other_Pa_q10, ALL, &settings, &other);
+  fit_load_follow(&moved, &array, loaded_Pa_q10, &settings, &loaded);
+  for (int part = 1; part < FIT_LOAD_PARTS; part++) {
+    TEST_ASSERT_FALSE(moved.known);
+    fit_load_follow(&moved, &array, other_Pa_q10, &settings, &other);
+  }
+  TEST_ASSERT_TRUE(moved.known);
+  TEST_ASSERT_TRUE(held.ratio > 0.2f);
+  TEST_ASSERT_EQUAL_FLOAT(held.ratio, moved.ratio);
+}
+
+/* What is known of the pad's dip is taken out of the residual too. */
+static void test_a_dip_that_is_known_is_no_load(void) {
+  struct fit_settings settings = usual();
+  settings.dip_share = 0.05f;
+  settings.dip_sd_mm = 15.0f;
+  double without_mm = 0.0, with_mm = 0.0;
+  for (int i = 0; i < 50; i++) {
+    double x_mm = random_between(&noise, -6.0, 6.0), y_mm = random_between(&noise, -14.0, 14.0);
+    int32_t pressure_Pa_q10[SENSORS];
+    press(x_mm, y_mm, 0.0, 0.0, pressure_Pa_q10);
+    struct fit_result result;
+    const struct fit_settings plain = {.iterations = 4, .noise_Pa_q10 = 4096};
+    fit_gaussian(&array, pressure_Pa_q10, ALL, &plain, &result);
+    for (int k = 0; k < SENSORS; k++) {
+      double dx = 9.0 * (k / 5 - 1) - x_mm, dy = 9.0 * (k % 5 - 2) - y_mm;
+      pressure_Pa_q10[k] -= (int32_t)(0.05 * 1024.0 * (double)result.p0_Pa *
+                                      exp(-(dx * dx + dy * dy) / (2.0 * 15.0 * 15.0)));
+    }
+    struct fit_load load = {0};
+    fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &result);
+    without_mm += (double)result.location_sd_mm;
+    hold(&load, pressure_Pa_q10, ALL, &settings, &result);
+    with_mm += (double)result.location_sd_mm;
+  }
+  TEST_ASSERT_TRUE(with_mm < 1.3 * without_mm);
+}
+
+static void test_sensors_may_be_missing(void) {
+  const struct fit_settings settings = usual();
+  int32_t pressure_Pa_q10[SENSORS];
+  press(2.0, 3.0, 0.4, 0.1, pressure_Pa_q10);
+  for (int k = 0; k < SENSORS; k++) {
+    struct fit_result result;
+    struct fit_load load = {0};
+    hold(&load, pressure_Pa_q10, ALL & ~(UINT32_C(1) << k), &settings, &result);
+    TEST_ASSERT_TRUE(load.known);
+    TEST_ASSERT_TRUE_MESSAGE(result.flags & CONTACT_FLAG_UNCERTAIN, "one is enough to hide it");
+  }
+}
+
+/* Where the residual shows nothing the load stays what is usual. */
+static void test_few_sensors_see_no_load(void) {
+  const struct fit_settings settings = usual();
+  int32_t pressure_Pa_q10[SENSORS];
+  press(2.0, 3.0, 0.0, 0.0, pressure_Pa_q10);
+  struct fit_result result;
+  struct fit_load load = {0};
+  hold(&load, pressure_Pa_q10, (UINT32_C(1) << (FIT_LOAD_SENSORS - 1)) - 1, &settings, &result);
+  TEST_ASSERT_FALSE(load.known);
+  TEST_ASSERT_TRUE(result.location_sd_mm > FIT_LOAD_USUAL * 0.38f * 9.0f);
+}
+
+static void test_what_is_no_fit_stays_as_it_is(void) {
+  const struct fit_settings settings = usual();
+  int32_t pressure_Pa_q10[SENSORS];
+  press(2.0, 3.0, 0.4, 0.1, pressure_Pa_q10);
+  struct fit_result fitted;
+  fit_gaussian_grid(&array, pressure_Pa_q10, ALL, &settings, &fitted);
+  const uint32_t flags[] = {0, CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_AT_BOUND,
+                            CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_FLAT};
+  for (int i = 0; i < 3; i++) {
+    struct fit_result result = fitted;
+    result.flags = flags[i];
+    result.location_sd_mm = 0.1f;
+    struct fit_load load = {0};
+    for (int frame = 0; frame < 2 * FIT_LOAD_PARTS; frame++) {
+      fit_load_widen(&load, &array, &settings, &result);
+      fit_load_follow(&load, &array, pressure_Pa_q10, &settings, &result);
+    }
+    TEST_ASSERT_FALSE(load.known);
+    TEST_ASSERT_EQUAL_FLOAT(0.1f, result.location_sd_mm);
+    TEST_ASSERT_EQUAL_HEX32(flags[i], result.flags);
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_a_load_is_part_of_the_error);
+  RUN_TEST(test_without_a_load_little_is_added);
+  RUN_TEST(test_before_the_first_look_a_load_is_assumed);
+  RUN_TEST(test_a_look_does_not_mix_frames);
+  RUN_TEST(test_a_dip_that_is_known_is_no_load);
+  RUN_TEST(test_sensors_may_be_missing);
+  RUN_TEST(test_few_sensors_see_no_load);
+  RUN_TEST(test_what_is_no_fit_stays_as_it_is);
+  return UNITY_END();
+}
