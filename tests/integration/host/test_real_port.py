@@ -108,8 +108,10 @@ class Install(RealPort, CliTest):
         page = {path for path in installed if path.startswith("share/fingertip/web/")}
         if page:  # only where it was built
             self.assertIn("share/fingertip/web/index.html", page)
-        self.assertEqual(installed - page, {
-            "bin/fingertip", "lib/udev/rules.d/60-fingertip.rules", "share/man/man1/fingertip.1",
+        tables = {path for path in installed if re.fullmatch(r"share/fingertip/tables/sphere(15|18)-.*\.table", path)}
+        self.assertEqual(len(tables), 2)
+        self.assertEqual(installed - page - tables, {
+            "bin/fingertip", "libexec/fingertip/fingertip-simulate", "lib/udev/rules.d/60-fingertip.rules", "share/man/man1/fingertip.1",
             "share/bash-completion/completions/fingertip", "share/zsh/site-functions/_fingertip",
             "share/fish/vendor_completions.d/fingertip.fish", "lib/systemd/user/fingertip.service"})
         self.assertEqual(subprocess.run([os.path.join(self.folder, "bin/fingertip"), "--version"], capture_output=True, text=True,

@@ -1,4 +1,5 @@
 #include "libfingertip/text.hpp"
+#include "tool/cli/beside.hpp"
 #include "tool/cli/commands/commands.hpp"
 #include "web/server/page_server.hpp"
 
@@ -25,15 +26,9 @@ struct WebOptions {
   bool no_browser = false;
 };
 
-/* Beside this program: where it is installed, or in the tree that it is built in. */
 fs::path page_folder() {
-  std::error_code none;
-  fs::path bin = fs::read_symlink("/proc/self/exe", none).parent_path();
-  for (const char *place : {"../share/fingertip/web", "../../web/page"}) {
-    fs::path folder = (bin / place).lexically_normal();
-    if (fs::exists(folder / "index.html", none)) {
-      return folder;
-    }
+  if (auto page = beside({"../share/fingertip/web/index.html", "../../web/page/index.html"})) {
+    return page->parent_path();
   }
   throw Error("the page is not built; `sh cmake/bootstrap.sh web` in the project's tree builds and "
               "serves it");
