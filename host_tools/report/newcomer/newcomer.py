@@ -11,13 +11,14 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
+import reading  # noqa: E402
 import simulated  # noqa: E402
 from fingertip.files import run_tool  # noqa: E402
 from reporting import report_of_parts  # noqa: E402
 
 
 def main(argv):
-    return report_of_parts(argv, __doc__, "newcomer", (simulated,))
+    return report_of_parts(argv, __doc__, "newcomer", (simulated, reading))
 
 
 if __name__ == "__main__":
