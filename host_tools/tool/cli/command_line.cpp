@@ -1,6 +1,7 @@
 #include "tool/cli/command_line.hpp"
 
 #include "libfingertip/text.hpp"
+#include "tool/cli/page.hpp"
 #include "tool/cli/usage.hpp"
 #include "tool/plain_help.hpp"
 
@@ -64,7 +65,10 @@ ColourMode colour_from_text(const std::string &text) {
 
 CommandLine::CommandLine(const std::string &description, const std::string &version)
     : app_(description, "fingertip") {
-  app_.set_version_flag("--version", "fingertip " + version);
+  app_.set_version_flag("--version", [version] {
+    const std::string note = page_note(version);
+    return "fingertip " + version + (note.empty() ? "" : "\n" + note);
+  });
   app_.require_subcommand(1);
   speak_plainly(app_);
 }

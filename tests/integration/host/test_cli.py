@@ -354,6 +354,7 @@ class Commands(CliTest):
             self.assertRegex(out, r"(?m)^sensors_present +15 of 15$")
             self.assertRegex(out, r"(?m)^sensors_prom_bad +0 1 2 3$")
             self.assertRegex(out, r"(?m)^rate_mHz +20000$")
+            self.assertRegex(out, r"(?m)^its firmware is of version 1\.20\.3, this tool of version [0-9.]+; install this tool's with `fingertip flash`")
             self.environment["FINGERTIP_PORT"] = self.port
             out = self.run_cli("set", "rate=max", "osr=256", "slip_threshold=0.5")[0]
             self.assertEqual(out, "rate=max osr=256 slip_threshold=0.5 slip_window=100 prior=3.1:0.5 limit=0.6\n")

@@ -119,6 +119,19 @@ class Install(RealPort, CliTest):
         with open(os.path.join(self.folder, "lib/udev/rules.d/60-fingertip.rules"), encoding="utf-8") as file:
             self.assertEqual(file.read(), self.run_cli("rule")[0])
 
+    def test_a_page_of_another_version_is_told(self):
+        build = pathlib.Path(FINGERTIP).parents[2]
+        subprocess.run(["cmake", "--install", build, "--component", "tool", "--prefix", self.folder], check=True, capture_output=True)
+        page = pathlib.Path(self.folder) / "share/fingertip/web/index.html"
+        page.parent.mkdir(parents=True, exist_ok=True)
+        version = self.run_cli("--version")[0].split()[1]
+        for head, told in ((f'<meta name="fingertip-version" content="{version}">', ""),
+                           ('<meta name="fingertip-version" content="9.8.7">', "version 9.8.7"), ("<meta>", "an unknown version")):
+            page.write_text(f"<html><head>{head}</head></html>")
+            said = subprocess.run([os.path.join(self.folder, "bin/fingertip"), "--version"], capture_output=True, text=True, check=True).stdout
+            self.assertEqual(said.splitlines(), [f"fingertip {version}"] + [
+                f"the page beside this tool is of {told}, the tool of version {version}; install both from one release"] * bool(told))
+
     def test_the_rule_is_for_our_ids(self):
         rule = self.run_cli("rule")[0]
         self.assertIn('ATTR{idVendor}=="1209", ATTR{idProduct}=="0001"', rule)

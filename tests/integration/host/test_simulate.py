@@ -66,6 +66,7 @@ class Presses(SimulateTest):
             lines = self.run_cli("list")[0].splitlines()
             self.assertEqual([line.split("\t")[:2] for line in lines], [[LEFT, "native"], [RIGHT, "native"]])
             self.assertRegex(self.error("info"), f"several fingertips found: {LEFT}, {RIGHT}")
+            self.assertNotIn("its firmware is of version", self.run_cli("info", "--port", "sim:")[0])  # the same tree's
             for name, serial in (("sim:", LEFT), ("sim:left", LEFT), ("sim:right", RIGHT)):
                 self.assertRegex(self.run_cli("info", "--port", name)[0], rf"(?m)^serial +{serial}$")
             self.assertIn("sim:up: nothing is simulated there; start `fingertip simulate`", self.error("info", "--port", "sim:up"))
