@@ -183,7 +183,7 @@ say "building firmware and host tools into build/"
 case $job in
   demo)
     configure host -DBUILD_TESTING=OFF
-    cmake --build --preset host --target fingertip twin fingertip_cell_program "image_$(/usr/bin/python3 host_tools/report/shared/boards.py | head -n 1)"
+    cmake --build --preset host --target fingertip twin "image_$(/usr/bin/python3 host_tools/report/shared/boards.py | head -n 1)"
     ;;
   web)
     configure host -DBUILD_TESTING=OFF -DFINGERTIP_WEB=ON

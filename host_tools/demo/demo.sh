@@ -81,7 +81,7 @@ echo "The rubber's sensors differ by 5 %, it relaxes, and a lime's pressure is n
 echo "picture: $out/demo.png"
 
 echo "== two fingertips on a gripper lift an object that becomes slick; the firmware on the host, all else simulated"
-build/host/host_tools/simulation/cell/fingertip_cell $out/cell --gripper 2f85 --mass 0.25 --friction 0.5 --kinetic 0.9 --then slick:0.65@1 --seconds 60 --patience 1 \
+$tool simulate --lift --ports $out/cell --gripper 2f85 --mass 0.25 --friction 0.5 --kinetic 0.9 --then slick:0.65@1 --seconds 60 --patience 1 \
   --cache build/host/contact_tables --truth $out/truth.csv < /dev/null > $out/cell.log 2>&1 &
 processes=$!
 while [ ! -e $out/cell/gripper ]; do

@@ -3,7 +3,7 @@
 
     grasp.py RECORDING.csv TRUTH.csv -o FILE.png
 
-RECORDING.csv: of fingertip grasp; TRUTH.csv: of fingertip_cell.
+RECORDING.csv: of fingertip grasp; TRUTH.csv: of fingertip simulate --lift.
 """
 import argparse
 import io
@@ -29,7 +29,7 @@ def read_truth(path):
         values = np.array(rows[1:], dtype=float)
         return {name: values[:, i] for i, name in enumerate(rows[0])}
     except (ValueError, IndexError) as error:
-        raise InputError(f"{path}: is no truth of fingertip_cell") from error
+        raise InputError(f"{path}: is no truth of fingertip simulate --lift") from error
 
 
 def slips_of(truth, t_s):

@@ -22,7 +22,10 @@ std::string advice(ErrorCode code) {
   case ErrorCode::cannot_read:
     return "check the path";
   case ErrorCode::no_fingertip:
-    return "plug one in, or name its port with --port PATH or in FINGERTIP_PORT";
+    return "plug one in, name its port with --port PATH or in FINGERTIP_PORT, or simulate one with "
+           "`fingertip simulate`";
+  case ErrorCode::not_simulated:
+    return "start `fingertip simulate`, with --lift where two or a gripper are needed";
   case ErrorCode::several_fingertips:
   case ErrorCode::several_in_file:
   case ErrorCode::no_such_in_file:

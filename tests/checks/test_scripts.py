@@ -166,7 +166,7 @@ class BootstrapReport(Folder):
             if run:
                 (self.folder / path.relative_to(ROOT)).with_name(run["program"]).write_text(
                     "import sys\nprint('ran', sys.argv[0], *(sys.argv[sys.argv.index(o) + 1] for o in ('-o', '--picture') if o in sys.argv))\n")
-        for job, after_traces in (("report",), 7), (("report", "all"), 9):
+        for job, after_traces in (("report",), 8), (("report", "all"), 10):
             done = subprocess.run(["sh", self.folder / "cmake/bootstrap.sh", *job], capture_output=True, text=True, timeout=PATIENCE_s,
                                   env={**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}"})
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -226,10 +226,11 @@ class Demo(Folder):
             """)
 
     def monitor(self, body):
-        self.write("build/host/host_tools/tool/cli/fingertip", f"#!/bin/sh\n{body}\n").chmod(0o755)
+        self.write("build/host/host_tools/tool/cli/fingertip",
+                   f'#!/bin/sh\n[ "$1" != simulate ] || exec sh "$(dirname "$0")/simulate" "$4"\n{body}\n').chmod(0o755)
 
     def cell(self, body):
-        self.write("build/host/host_tools/simulation/cell/fingertip_cell", f"#!/bin/sh\n{body}\n").chmod(0o755)
+        self.write("build/host/host_tools/tool/cli/simulate", f"{body}\n")
 
     def play(self, *options, **how):
         return subprocess.run(["sh", self.folder / "host_tools/demo/demo.sh", *options], capture_output=True, text=True, timeout=PATIENCE_s, **how)

@@ -289,6 +289,25 @@ class BadInput(PageTest):
         self.alert(page, "/torn.csv/")
         self.assertGreater(page.run("fingertip.fingertips[0].contacts"), 100)
 
+    def test_a_recording_of_two(self):
+        """Each has its name, and the traces the colour of the pad that is chosen; nothing in a replay is live."""
+        two, here = self.folder / "two.csv", ["env", "-u", "FINGERTIP_PORT", f"XDG_RUNTIME_DIR={self.folder}", self.tool]
+        with subprocess.Popen([*here, "simulate", "--fingertips", "2"], stdout=subprocess.PIPE, text=True) as simulated:
+            simulated.stdout.readline()
+            run(*here, "record", "--all", two, "--overwrite", "--seconds", 3)
+            simulated.terminate()
+        page = self.open(before=TEN_TIMES)
+        page.give("input[type=file]", two)
+        page.until("fingertip.fingertips.length === 2 && fingertip.fingertips.every(each => each.state === 'closed')")
+        page.shown()
+        names = page.until("(names => names.every(name => /fingertip/.test(name)) && names)([...document.querySelectorAll('.pad-card .name')].map(each => each.textContent))")
+        self.assertEqual(names, ["two.csv: fingertip E110", "two.csv: fingertip E111"])
+        self.assertEqual(page.run("document.querySelector('.moment').textContent"), "newest")
+        self.assertEqual([page.has("button", name) for name in ("Look back", "Go live")], [True, False])
+        for finger in (0, 1):
+            page.run(f"document.querySelectorAll('.pad-name')[{finger}].click()")
+            page.until(f"document.querySelector('.trace-title .key')?.dataset.finger === '{finger}'")
+
     def test_a_browser_without_web_serial(self):
         page = self.open(before="delete Navigator.prototype.serial;")
         page.click("button", "Connect")

@@ -163,8 +163,10 @@ wire_info ask(const Way &way, const std::function<bool()> &stop, const std::stri
   return session.info(QUICK).body.info;
 }
 
-Way choose_way(const Choice &choice, const std::string &root) {
+Way choose_way(const Choice &wanted, const std::string &root) {
+  Choice choice = wanted;
   if (!choice.port.empty()) {
+    choice.port = port_of(choice.port);
     if (choice.reach == Reach::usb) {
       throw Error(ErrorCode::wrong_choice, "a serial port is not reached by libusb");
     }

@@ -20,6 +20,7 @@ enum class ErrorCode {
   cannot_open,        /* for the system's reason in the text */
   no_fingertip,       /* none is plugged in or named */
   several_fingertips, /* none was chosen; the text names them */
+  not_simulated,      /* nothing is, of this name */
   no_such_fingertip,  /* none has the wanted serial number; the text names those that are there */
   other_fingertip,    /* the port's is not the wanted one, or not the one that was there before */
   no_driver,          /* on USB, but without a serial port */

@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr const char *SOCKET_END = ".sock";
 constexpr const char *PORT_END = ".port";
+constexpr const char *SIMULATED = "sim:";
 
 /* The connection, or -1 and why not. */
 int connect_to(const std::string &path, int *error) {
@@ -70,6 +71,23 @@ std::string own_share_folder() {
     return std::string(runtime) + "/fingertip";
   }
   return geteuid() == 0 ? COMMON_SHARE_FOLDER : own_folder_in_tmp();
+}
+
+std::string simulated_folder() {
+  return own_share_folder() + "/simulated";
+}
+
+std::string port_of(const std::string &path) {
+  if (path.rfind(SIMULATED, 0) != 0) {
+    return path;
+  }
+  const std::string name = path.substr(std::strlen(SIMULATED));
+  const std::string port = simulated_folder() + "/" + (name.empty() ? "left" : name);
+  std::error_code none;
+  if (!fs::exists(port, none)) {
+    throw Error(ErrorCode::not_simulated, path + ": nothing is simulated there");
+  }
+  return port;
 }
 
 std::string share_socket_name(const std::string &serial) {

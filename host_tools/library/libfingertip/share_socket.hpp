@@ -27,6 +27,12 @@ std::vector<Shared> find_shared();
 std::string own_share_folder();
 inline constexpr const char *COMMON_SHARE_FOLDER = "/run/fingertip";
 
+/* Where `fingertip simulate` has its ports left, right and gripper: a folder in the own one. */
+std::string simulated_folder();
+/* "sim:left" is the port left in it, "sim:" the same; any other path stays as it is. Throws Error:
+ * nothing is simulated there. */
+std::string port_of(const std::string &path);
+
 std::string share_socket_name(const std::string &serial);
 std::string share_port_name(const std::string &serial);
 

@@ -37,7 +37,7 @@ class Fingertip(Settable):
                 if frame.trusted:
                     print(frame.x_mm, frame.y_mm, frame.force_N)
 
-    port: a serial port; serial: a serial number, where there are several fingertips; neither: the only one, or the one that
+    port: a serial port, or sim:, which `fingertip simulate` simulates; serial: a serial number, where there are several fingertips; neither: the only one, or the one that
     FINGERTIP_PORT names. share: True is only by the socket of `fingertip serve`, False only by the port, None the socket where there is one.
     streams: what it sends, by default all that its firmware can. reconnect: wait for one that is unplugged to come back (frame.run then
     counts up, and settings that were not kept are the firmware's own again); else GoneError ends everything. buffer_frames: how many wait for

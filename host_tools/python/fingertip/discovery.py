@@ -13,6 +13,7 @@ from .errors import NoFingertipError, NotSharedError, SeveralFingertipsError
 
 USB_VID, USB_PID = 0x1209, 0x0001
 COMMON_SHARE_FOLDER = pathlib.Path("/run/fingertip")
+SIMULATED = "sim:"
 
 
 class Found(NamedTuple):
@@ -76,6 +77,17 @@ def find_in_environment() -> list[Found]:
     return [Found("", path) for path in os.environ.get("FINGERTIP_PORT", "").split(os.pathsep) if path]
 
 
+def _port_of(name: str) -> str:
+    """The port that "sim:left" names: of a fingertip that `fingertip simulate` simulates; "sim:" is the first. Any other name is a port's own."""
+    if not name.startswith(SIMULATED):
+        return name
+    for folder in _share_folders():
+        port = folder / "simulated" / (name.removeprefix(SIMULATED) or "left")
+        if port.exists():
+            return str(port)
+    raise NoFingertipError(f"{name}: nothing is simulated there; start `fingertip simulate`, with --lift where two are needed")
+
+
 def _is_of(shared: Found, found: Found) -> bool:
     same_port = bool(found.port) and bool(shared.port) and os.path.realpath(found.port) == os.path.realpath(shared.port)
     return same_port or (bool(found.serial) and shared.serial.lower() == found.serial.lower())
@@ -104,6 +116,7 @@ def _with_share(found: Found, share: bool | None) -> Found:
 def choose(port: str | None, serial: str | None, share: bool | None) -> list[Found]:
     """Where the wanted fingertip may be: one way, or several that have to be asked for their serial number."""
     if port is not None:
+        port = _port_of(port)
         shared = next((each.share_socket for each in find_shared() if _is_of(each, Found("", port))), "") if share is not False else ""
         return [_with_share(Found("", port, shared), share)]
     found = find()
@@ -115,7 +128,7 @@ def choose(port: str | None, serial: str | None, share: bool | None) -> list[Fou
             raise NoFingertipError(f"no fingertip {serial} here{others}")
         return [_with_share(each, share) for each in possible]
     if not found:
-        raise NoFingertipError("no fingertip found")
+        raise NoFingertipError("no fingertip found; plug one in, name its port, or start `fingertip simulate`")
     if len(found) > 1:
         raise SeveralFingertipsError("several fingertips found, choose one: " + ", ".join(each.serial or each.port for each in found))
     return [_with_share(found[0], share)]

@@ -31,7 +31,7 @@ import math
 import os
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -291,7 +291,15 @@ class Recording:
 
 # Some 20 MB are read in a second: below this the wait is short.
 WORTH_WAITING_bytes = 10_000_000
+BLOCK_bytes, ROWS_AT_ONCE = 500_000, 1024  # about the same; more take no less time each
 JOINT_COLUMNS = "device,time_us,"
+
+
+class Stretch(NamedTuple):
+    """Lines one after the other, without their ends, and the first one's number."""
+
+    number: int
+    texts: list[str]
 
 
 class _RecordingLines:
@@ -305,19 +313,40 @@ class _RecordingLines:
         self.format = _check_kind(path, [first[1]], "recording", ("1", "2"))
 
     def __iter__(self) -> Iterator[Line | Damaged]:
+        for each in self.stretches():
+            if isinstance(each, Stretch):
+                for number, text in enumerate(each.texts, each.number):
+                    yield number, text, False
+            else:
+                yield each
+
+    def stretches(self) -> Iterator["Line | Damaged | Stretch"]:
+        """The same, but rows, or what else is neither comment nor blank, many at a time."""
         try:
             with open(self.path, "rb") as file:
                 if file.read(len(MAGIC)) == MAGIC:
                     yield from McapLineReader(self.path, self.progress).lines()
                     return
                 file.seek(0)
-                size, read, told = os.fstat(file.fileno()).st_size, 0, 0
-                for number, line in enumerate(file, 1):
-                    read += len(line)
+                size, read, told, number = os.fstat(file.fileno()).st_size, 0, 0, 1
+                while lines := file.readlines(BLOCK_bytes):
+                    block = b"".join(lines)
+                    read += len(block)
                     if self.progress and size > WORTH_WAITING_bytes and read - told > size // 100:
                         told = read
                         self.progress(read / size)
-                    yield number, line.removesuffix(b"\n").removesuffix(b"\r").decode("utf-8", "surrogateescape"), not line.endswith(b"\n")
+                    torn = not block.endswith(b"\n")
+                    texts = block.decode("utf-8", "surrogateescape").removesuffix("\n").split("\n")
+                    if b"\r" in block:
+                        texts = [text.removesuffix("\r") for text in texts]
+                    begin = 0
+                    for at in sorted({*(at for at, text in enumerate(texts) if text[:1] in "# \t"), len(texts) - torn}):
+                        if at > begin:
+                            yield Stretch(number + begin, texts[begin:at])
+                        if at < len(texts):
+                            yield number + at, texts[at], torn and at == len(texts) - 1
+                        begin = at + 1
+                    number += len(texts)
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; check the path") from None
 
@@ -357,6 +386,7 @@ class _Reading:
         self.own_end: dict[str, str] = {}
         self.wanted: tuple[int, ...] = ()
         self.table, self.line_numbers, self.times_us = array.array("d"), array.array("q"), array.array("d")
+        self.waits: list[tuple[int, str, float]] = []  # rows of a joint recording, or of MCAP: line, text, time_us
         self.sensors = self.info_sensors = 0
 
     def line(self, number: int, text: str) -> None:
@@ -368,15 +398,13 @@ class _Reading:
         elif self.rows is None:
             self._header(text)
         elif not self.is_joint:
-            self._row(number, text)
+            self.waits.append((number, text, math.nan))
         else:
             cells = text.split(",", 2)
             if len(cells) < 3:
                 raise ValueError("neither a comment nor a row of this recording")
             if cells[0] == str(self.number):
-                time_us = recorded.number("time_us", cells[1])
-                self._row(number, cells[2])
-                self.times_us.append(time_us)
+                self.waits.append((number, cells[2], recorded.number("time_us", cells[1])))
 
     def _header(self, text: str) -> None:
         if self.is_joint:
@@ -391,11 +419,26 @@ class _Reading:
         self.wanted = tuple(range(len(names))) if self.columns is None else tuple(sorted(names.index(name) for name in self.columns if name in names))
         self.sensors = self.rows.sensors if self.columns is None else 0
 
-    def _row(self, number: int, text: str) -> None:
+    def take_rows(self, damaged: Callable[[int, ValueError], None]) -> None:
+        """Those that wait. damaged is called for each line that is."""
+        if self.waits:
+            numbers, texts, times_us = zip(*self.waits)
+            self.waits.clear()
+            self.take(numbers, texts, damaged, times_us)
+
+    def take(self, numbers: Sequence[int], texts: Sequence[str], damaged: Callable[[int, ValueError], None], times_us: Sequence[float] = ()) -> None:
+        """Rows and their lines' numbers."""
         assert self.rows is not None
-        values = self.rows.values(text)
-        self.table.extend(values if self.columns is None else [values[i] for i in self.wanted])
-        self.line_numbers.append(number)
+        at = 0
+        for found in self.rows.tables(texts):
+            if isinstance(found, ValueError):
+                damaged(numbers[at], found)
+                at += 1
+                continue
+            self.table.frombytes((found if self.columns is None else found[:, self.wanted]).tobytes())
+            self.line_numbers.extend(numbers[at:at + len(found)])
+            self.times_us.extend(times_us[at:at + len(found)])
+            at += len(found)
 
     def _comment(self, text: str) -> None:
         key, separator, value = text[1:].partition(": ")
@@ -447,23 +490,43 @@ def read_recording(path: Path, salvage: bool = False, serial: str | None = None,
             raise error
         skipped += lost
 
-    for each in lines:
-        if isinstance(each, Damaged):
-            damaged(each, 0)  # the next one's number tells how many lines are lost
-            continue
-        number, text, torn = each
-        if last is None:
-            last = 1
-            continue
-        if number > last + 1:
-            damaged(InputError(f"{path}:{number}: {number - last - 1} lines are missing before it; use --salvage to go on"), number - last - 1)
-        last = number
+    def wrong(number: int, error: ValueError) -> None:
+        damaged(InputError(f"{path}:{number}: {error}" + ("; use --salvage to skip damaged lines" if reading.rows else "")), 1)
+
+    def one(number: int, text: str, torn: bool) -> None:
+        if text.startswith("#") or len(reading.waits) >= ROWS_AT_ONCE:
+            reading.take_rows(wrong)
         try:
             if torn and text:
                 raise ValueError("the last line is torn")
             reading.line(number, text)
         except ValueError as error:
-            damaged(InputError(f"{path}:{number}: {error}" + ("; use --salvage to skip damaged lines" if reading.rows else "")), 1)
+            reading.take_rows(wrong)
+            wrong(number, error)
+
+    for each in lines.stretches():
+        if isinstance(each, Damaged):
+            reading.take_rows(wrong)
+            damaged(each, 0)  # the next one's number tells how many lines are lost
+        elif isinstance(each, Stretch):
+            numbers, texts = range(each.number, each.number + len(each.texts)), each.texts
+            if reading.rows is None or reading.is_joint:
+                for number, text in zip(numbers, texts):
+                    one(number, text, False)
+            else:
+                reading.take_rows(wrong)
+                reading.take(numbers, texts, wrong)
+            last = numbers[-1]
+        elif last is None:
+            last = 1
+        else:
+            if each[0] > last + 1:
+                lost = each[0] - last - 1
+                reading.take_rows(wrong)
+                damaged(InputError(f"{path}:{each[0]}: {lost} lines are missing before it; use --salvage to go on"), lost)
+            last = each[0]
+            one(*each)
+    reading.take_rows(wrong)
     if reading.rows is None:
         raise InputError(f"{path}: no header line; record again")
     names = [reading.rows.names[i] for i in reading.wanted]

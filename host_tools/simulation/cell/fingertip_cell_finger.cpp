@@ -80,6 +80,7 @@ private:
     settings.seed = finger_.seed;
     settings.noise = 1.0;
     settings.prom_spread = 0.03;
+    settings.parallel_bus = finger_.parallel_bus;
     settings.world = {this,
                       [](void *context, unsigned sensor, std::uint64_t t_us) {
                         return static_cast<Fingertip *>(context)->pressure_Pa(sensor, t_us);
@@ -90,6 +91,14 @@ private:
     }
     native_cdc_open();
     run_device_to(SETTLED_us);
+    if (finger_.calibrated_sd) {
+      calibrate(*finger_.calibrated_sd);
+    }
+    order(command_pad(pad_));
+    native_cdc_close();
+  }
+
+  void calibrate(double sd) {
     Random random(finger_.seed, CALIBRATION, 0);
     calibration told{};
     told.date_s = 1767225600;
@@ -97,13 +106,10 @@ private:
     told.force_scale = 1.0F / pad_.force_ratio;
     told.force_scale_sd = FORCE_SCALE_SD;
     for (std::size_t k = 0; k < SENSORS; k++) {
-      told.sensors[k] = {
-          static_cast<float>(finger_.gain[k] * (1.0 + finger_.gain_sd * random.normal())),
-          static_cast<float>(finger_.gain_sd)};
+      told.sensors[k] = {static_cast<float>(finger_.gain[k] * (1.0 + sd * random.normal())),
+                         static_cast<float>(sd)};
     }
     order(command_calibrate(told, SENSORS));
-    order(command_pad(pad_));
-    native_cdc_close();
   }
 
   void order(const wire_packet &command) {
@@ -264,9 +270,9 @@ pid_t start_finger(const FingerProcess &finger, SharedPressures &pressures) {
   try {
     Fingertip(finger, pressures).run();
   } catch (const Error &error) {
-    tell("fingertip_cell", error);
+    tell("fingertip", error);
   } catch (const std::exception &error) {
-    tell("fingertip_cell", Error(error.what()));
+    tell("fingertip", Error(error.what()));
   }
   std::_Exit(1);
 }

@@ -11,6 +11,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <sys/types.h>
 
@@ -47,8 +48,9 @@ struct FingerProcess {
   std::string serial, link; // of its port; what is in the link's way and no link is an error
   std::uint64_t seed = 1;
   double layer_mm = 12.0;
-  Pressures gain{};     // of its sensors, as they are; its calibration is off by
-  double gain_sd = 0.0; // so much of each
+  Pressures gain{};                    // of its sensors, as they are
+  std::optional<double> calibrated_sd; // share by which its calibration is off; none: it has none
+  bool parallel_bus = false;           // sim_array.h
 };
 
 // Starts it; it dies with this process, SIGINT is not for it. pressures: in memory that both share.

@@ -1,6 +1,7 @@
 #include "tool/cli/gripper_options.hpp"
 
 #include "grasp/gripper/serial_line.hpp"
+#include "libfingertip/share_socket.hpp"
 #include "tool/advice.hpp"
 #include "tool/cli/usage.hpp"
 
@@ -54,6 +55,7 @@ std::unique_ptr<Gripper> reach_gripper(GripperWay &way) {
   if (way.port.empty()) {
     way.port = only_port();
   }
+  way.port = port_of(way.port);
   try {
     return open_gripper(way);
   } catch (const Error &error) {

@@ -1,6 +1,6 @@
 """fingertip grasp in the simulated cell on simulated time, every part of it real but clock, rubber, object and motor.
 
-usage: test_grasp_cell.py FINGERTIP FINGERTIP_CELL TIME_KEEPER TABLES [unittest arguments]
+usage: test_grasp_cell.py FINGERTIP FINGERTIP_SIMULATE TIME_KEEPER TABLES [unittest arguments]
 
 Judged by the cell's truth.
 """
@@ -17,7 +17,7 @@ import unittest
 
 import numpy as np
 
-FINGERTIP, FINGERTIP_CELL, TIME_KEEPER, TABLES = (os.path.abspath(path) for path in sys.argv[1:5])
+FINGERTIP, FINGERTIP_SIMULATE, TIME_KEEPER, TABLES = (os.path.abspath(path) for path in sys.argv[1:5])
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"), str(pathlib.Path(__file__).resolve().parents[2] / "support")]
 from fingertip import files  # noqa: E402
 from simulated_time import SimulatedTime  # noqa: E402
@@ -50,7 +50,7 @@ class CellTest(unittest.TestCase):
     @contextlib.contextmanager
     def cell(self, *options, model="2f85"):
         self.model = model
-        process = self.world.start([FINGERTIP_CELL, self.folder, "--gripper", model, "--cache", TABLES, "--truth", self.truth_csv, *options],
+        process = self.world.start([FINGERTIP_SIMULATE, "--lift", "--ports", self.folder, "--gripper", model, "--cache", TABLES, "--truth", self.truth_csv, *options],
                                    stdin=subprocess.PIPE)
         self.process = process
         try:
@@ -130,7 +130,7 @@ class CellTest(unittest.TestCase):
 class Programs(CellTest):
     def test_bad_usage_is_told(self):
         def run(*arguments):
-            status, out, err = self.world.run([FINGERTIP_CELL, self.folder, "--cache", TABLES, *arguments])
+            status, out, err = self.world.run([FINGERTIP_SIMULATE, "--lift", "--ports", self.folder, "--cache", TABLES, *arguments])
             self.assertNotEqual(status, 0)
             return err + out
         self.assertIn("is no disturbance; give pour:", run("--then", "earthquake:9"))
@@ -141,7 +141,7 @@ class Programs(CellTest):
         pathlib.Path(self.truth_csv).touch()
         self.assertIn("truth.csv", run("--truth", self.truth_csv))
         with self.cell("--overwrite"):
-            self.assertIn("is there already; end the other cell", run())
+            self.assertIn("another simulation has its ports there; end that one", run())
             self.assertIn("give lift, take, pour", self.tell("dance", None))
             self.assertIn("cannot be", self.tell("knock 0.1", None))  # not lifted yet
 

@@ -1,6 +1,6 @@
 """A grasp in the simulated cell on the machine's own clock and pseudo-terminals, of which one program is stopped for two seconds.
 
-usage: test_grasp_realtime.py FINGERTIP FINGERTIP_CELL TABLES [unittest arguments]
+usage: test_grasp_realtime.py FINGERTIP FINGERTIP_SIMULATE TABLES [unittest arguments]
 """
 # real time: the tool as people run it, its clock, threads and serial ports, and a process that the kernel stops.
 import faulthandler
@@ -13,7 +13,7 @@ import tempfile
 import threading
 import unittest
 
-FINGERTIP, FINGERTIP_CELL, TABLES = (os.path.abspath(path) for path in sys.argv[1:4])
+FINGERTIP, FINGERTIP_SIMULATE, TABLES = (os.path.abspath(path) for path in sys.argv[1:4])
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"))
 from fingertip import files  # noqa: E402
 
@@ -52,7 +52,7 @@ class Stopped(unittest.TestCase):
         return lines[-1]
 
     def test_the_tool_and_then_the_cell(self):
-        cell = self.start(FINGERTIP_CELL, self.folder, "--gripper", "2f85", "--by-command", "--cache", TABLES)  # which stands on the table
+        cell = self.start(FINGERTIP_SIMULATE, "--lift", "--ports", self.folder, "--gripper", "2f85", "--by-command", "--cache", TABLES)  # which stands on the table
         self.until(cell, "ready: ")
         tool = self.start(FINGERTIP, "grasp", "--gripper", "2f85", "--gripper-port", f"{self.folder}/gripper", "-o", self.csv, *HELD_UP)
         self.until(tool, " s  holding ")

@@ -108,14 +108,29 @@ class Install(RealPort, CliTest):
         page = {path for path in installed if path.startswith("share/fingertip/web/")}
         if page:  # only where it was built
             self.assertIn("share/fingertip/web/index.html", page)
-        self.assertEqual(installed - page, {
-            "bin/fingertip", "lib/udev/rules.d/60-fingertip.rules", "share/man/man1/fingertip.1",
+        tables = {path for path in installed if re.fullmatch(r"share/fingertip/tables/sphere(15|18)-.*\.table", path)}
+        self.assertEqual(len(tables), 2)
+        self.assertEqual(installed - page - tables, {
+            "bin/fingertip", "libexec/fingertip/fingertip-simulate", "lib/udev/rules.d/60-fingertip.rules", "share/man/man1/fingertip.1",
             "share/bash-completion/completions/fingertip", "share/zsh/site-functions/_fingertip",
             "share/fish/vendor_completions.d/fingertip.fish", "lib/systemd/user/fingertip.service"})
         self.assertEqual(subprocess.run([os.path.join(self.folder, "bin/fingertip"), "--version"], capture_output=True, text=True,
                                         check=True).stdout, self.run_cli("--version")[0])
         with open(os.path.join(self.folder, "lib/udev/rules.d/60-fingertip.rules"), encoding="utf-8") as file:
             self.assertEqual(file.read(), self.run_cli("rule")[0])
+
+    def test_a_page_of_another_version_is_told(self):
+        build = pathlib.Path(FINGERTIP).parents[2]
+        subprocess.run(["cmake", "--install", build, "--component", "tool", "--prefix", self.folder], check=True, capture_output=True)
+        page = pathlib.Path(self.folder) / "share/fingertip/web/index.html"
+        page.parent.mkdir(parents=True, exist_ok=True)
+        version = self.run_cli("--version")[0].split()[1]
+        for head, told in ((f'<meta name="fingertip-version" content="{version}">', ""),
+                           ('<meta name="fingertip-version" content="9.8.7">', "version 9.8.7"), ("<meta>", "an unknown version")):
+            page.write_text(f"<html><head>{head}</head></html>")
+            said = subprocess.run([os.path.join(self.folder, "bin/fingertip"), "--version"], capture_output=True, text=True, check=True).stdout
+            self.assertEqual(said.splitlines(), [f"fingertip {version}"] + [
+                f"the page beside this tool is of {told}, the tool of version {version}; install both from one release"] * bool(told))
 
     def test_the_rule_is_for_our_ids(self):
         rule = self.run_cli("rule")[0]

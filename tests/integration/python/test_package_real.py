@@ -1,6 +1,6 @@
 """The Python package in real time: on pseudo-terminals, under asyncio, with the firmware in the simulated cell, and the manuals' examples.
 
-usage: test_package_real.py FINGERTIP FAKE_DEVICE FINGERTIP_CELL [unittest arguments]
+usage: test_package_real.py FINGERTIP FAKE_DEVICE FINGERTIP_SIMULATE [unittest arguments]
 """
 # real time: asyncio and pyserial wait by clocks of their own
 import asyncio
@@ -18,11 +18,12 @@ from unittest import mock
 
 import numpy as np
 
-FINGERTIP, FAKE_DEVICE, FINGERTIP_CELL = (os.path.abspath(path) for path in sys.argv[1:4])
+FINGERTIP, FAKE_DEVICE, FINGERTIP_SIMULATE = (os.path.abspath(path) for path in sys.argv[1:4])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PACKAGE = ROOT / "host_tools/python"
-sys.path[:0] = [str(PACKAGE), str(ROOT / "tests/support")]
+sys.path[:0] = [str(PACKAGE), str(ROOT / "tests/support"), str(ROOT / "host_tools/report/newcomer")]
 import fingertip  # noqa: E402
+import simulated as newcomer  # noqa: E402
 from fingertip import Fingertip, Fingertips, Flag, wire  # noqa: E402
 from real_time import RealTime  # noqa: E402
 
@@ -109,12 +110,35 @@ class Streaming(DeviceTest):
             asyncio.run(gone())
 
 
+class Simulated(DeviceTest):
+    """Against what `fingertip simulate` simulates, found as any program finds it."""
+
+    def test_the_example_of_the_readme_runs_as_printed(self):
+        environment = newcomer.environment_of(self.folder)
+        with newcomer.simulated(FINGERTIP, environment):
+            lines, err = newcomer.run_example(environment)
+        self.assertEqual(err, "")
+        self.assertTrue(newcomer.runs(lines), lines)
+        self.assertFalse(newcomer.runs(lines[:-1]) or newcomer.runs([*lines[:-1], "nan nan nan"]) or newcomer.runs([*lines[:-1], "0 0 nothing"]))
+
+    def test_names(self):
+        self.assertRaisesRegex(fingertip.NoFingertipError, "sim:: nothing is simulated there; start `fingertip simulate`", Fingertip, "sim:")
+        with newcomer.simulated(FINGERTIP, newcomer.environment_of(self.folder), "--fingertips", "2"):
+            serials = []
+            for name in ("sim:", "sim:left", "sim:right"):
+                with Fingertip(name, timeout_s=PATIENCE_s) as tip:
+                    serials.append(tip.info.serial)
+            self.assertEqual((serials[0], len(set(serials))), (serials[1], 2))
+            self.assertRaisesRegex(fingertip.NoFingertipError, "sim:up: nothing is simulated there", Fingertip, "sim:up")
+            self.assertRaises(fingertip.SeveralFingertipsError, Fingertip)
+
+
 class Firmware(DeviceTest):
     """The firmware's own code on two ports, an object and a gripper between them."""
 
     def test_a_grip_is_felt_and_no_zero(self):
         cell = self.path("cell")
-        process = subprocess.Popen([FINGERTIP_CELL, cell, "--lift-after", "1000", "--seconds", str(PATIENCE_s)], stdin=subprocess.PIPE,
+        process = subprocess.Popen([FINGERTIP_SIMULATE, "--lift", "--ports", cell, "--lift-after", "1000", "--seconds", str(PATIENCE_s)], stdin=subprocess.PIPE,
                                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
             self.wait_for(lambda: os.path.lexists(os.path.join(cell, "gripper")))

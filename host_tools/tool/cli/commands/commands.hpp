@@ -13,6 +13,7 @@ void add_record(CommandLine &line);
 void add_replay(CommandLine &line);
 void add_convert(CommandLine &line);
 void add_grasp(CommandLine &line);
+void add_simulate(CommandLine &line);
 void add_serve(CommandLine &line);
 void add_web(CommandLine &line);
 void add_tare(CommandLine &line);

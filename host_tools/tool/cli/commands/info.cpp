@@ -70,6 +70,13 @@ int info(const Choice &choice) {
   }
   leave_out_missing(counters, info.capabilities);
   print_pairs(counters);
+  const auto [key, firmware] = *std::find_if(
+      pairs.begin(), pairs.end(), [](const auto &pair) { return pair.first == "firmware"; });
+  if (firmware != FINGERTIP_VERSION) {
+    std::printf("\nits firmware is of version %s, this tool of version " FINGERTIP_VERSION
+                "; install this tool's with `fingertip flash`, or use the other's tool\n",
+                printable(firmware).c_str());
+  }
   if (info.stored & WIRE_STORED_CALIBRATION) {
     print_gains(info.calibration, info.sensor_count);
   }

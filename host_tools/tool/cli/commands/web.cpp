@@ -1,5 +1,6 @@
 #include "libfingertip/text.hpp"
 #include "tool/cli/commands/commands.hpp"
+#include "tool/cli/page.hpp"
 #include "web/server/page_server.hpp"
 
 #include <cstdio>
@@ -16,28 +17,12 @@ namespace fingertip {
 
 namespace {
 
-namespace fs = std::filesystem;
-
 struct WebOptions {
   std::string address = "127.0.0.1";
   unsigned port = 8109; /* the same each time: a browser remembers for each port which fingertips a
                            page may use */
   bool no_browser = false;
 };
-
-/* Beside this program: where it is installed, or in the tree that it is built in. */
-fs::path page_folder() {
-  std::error_code none;
-  fs::path bin = fs::read_symlink("/proc/self/exe", none).parent_path();
-  for (const char *place : {"../share/fingertip/web", "../../web/page"}) {
-    fs::path folder = (bin / place).lexically_normal();
-    if (fs::exists(folder / "index.html", none)) {
-      return folder;
-    }
-  }
-  throw Error("the page is not built; `sh cmake/bootstrap.sh web` in the project's tree builds and "
-              "serves it");
-}
 
 /* Whether there is a desktop whose browser was asked to. */
 bool opens(const std::string &url) {
@@ -57,6 +42,9 @@ bool opens(const std::string &url) {
 }
 
 int web(const WebOptions &options) {
+  if (const std::string note = page_note(FINGERTIP_VERSION); !note.empty()) {
+    std::fprintf(stderr, "%s\n", note.c_str());
+  }
   PageServer server(page_folder(), options.address, options.port);
   std::printf("%s\n", server.url().c_str());
   std::fflush(stdout);

@@ -104,10 +104,16 @@ class ReplayLine implements Line {
   private receive: ((bytes: Uint8Array, at_ms: number) => void) | null = null;
   private closed: ((why: string) => void) | null = null;
 
-  constructor(
-    readonly label: string,
-    private readonly replay: Replay,
-  ) {}
+  /** As its info packet says; empty before. */
+  serial = '';
+
+  constructor(private readonly replay: Replay) {}
+
+  /** The file, and of several fingertips in it also which one. */
+  get label(): string {
+    const { file, holdsSeveral } = this.replay;
+    return holdsSeveral && this.serial ? `${file.name}: fingertip ${this.serial.slice(-4)}` : file.name;
+  }
 
   open(
     receive: (bytes: Uint8Array, at_ms: number) => void,
@@ -173,6 +179,10 @@ export class Replay {
     this.stopped = true;
   }
 
+  get holdsSeveral(): boolean {
+    return this.lines.length > 1;
+  }
+
   left(line: Line): void {
     const at = this.lines.findIndex((each) => each === line);
     if (at >= 0) {
@@ -234,11 +244,15 @@ export class Replay {
       if (packet.type !== PacketType.INFO && packet.type !== PacketType.RAW && packet.type !== PacketType.CONTACT) {
         return;
       }
-      const line = new ReplayLine(this.file.name, this);
+      const line = new ReplayLine(this);
       this.lines[device] = line;
       this.onLine(line);
     }
-    this.lines[device]?.take(core.encode(packet));
+    const line = this.lines[device];
+    if (line && packet.type === PacketType.INFO) {
+      line.serial = packet.serial;
+    }
+    line?.take(core.encode(packet));
   }
 
   private end(problem: string): void {

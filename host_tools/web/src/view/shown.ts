@@ -73,6 +73,10 @@ export class Shown {
     return is_replay || !info ? line.label : `fingertip ${info.serial.slice(-4)}`;
   }
 
+  get isReplay(): boolean {
+    return this.fingertip.is_replay;
+  }
+
   get hand(): Hand | null {
     const line = this.fingertip.line as unknown;
     return line instanceof Object && 'press' in line && 'truth' in line ? (line as Hand) : null;

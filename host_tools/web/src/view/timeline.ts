@@ -13,6 +13,7 @@ export class Timeline {
   behind_s: number | null = null;
   onChange: (() => void) | null = null;
   private kept_s = 0;
+  private replay = false;
   private readonly pauseButton: HTMLButtonElement;
   private readonly slider: HTMLInputElement;
   private readonly told: HTMLOutputElement;
@@ -82,6 +83,14 @@ export class Timeline {
     }
   }
 
+  /** What is looked at is a replay: nothing in it is live, and it has a pause of its own. */
+  set isReplay(is_replay: boolean) {
+    if (is_replay !== this.replay) {
+      this.replay = is_replay;
+      this.show();
+    }
+  }
+
   toggle(): void {
     this.behind_s = this.behind_s === null ? 0 : null;
     this.show();
@@ -99,12 +108,14 @@ export class Timeline {
   }
 
   private show(): void {
-    const live = this.behind_s === null;
-    write(this.pauseButton, live ? 'Pause' : 'Go live');
-    this.element.classList.toggle('paused', !live);
+    const newest = this.behind_s === null;
+    const [look, leave, now] = this.replay ? ['Look back', 'To the newest', 'newest'] : ['Pause', 'Go live', 'live'];
+    write(this.pauseButton, newest ? look : leave);
+    this.element.classList.toggle('paused', !newest);
     this.slider.value = String(-(this.behind_s ?? 0));
-    const text = live ? 'live' : `${(this.behind_s ?? 0).toFixed(1)} s before the pause`;
-    write(this.told, live ? 'live' : `−${(this.behind_s ?? 0).toFixed(1)} s`);
+    const behind_s = (this.behind_s ?? 0).toFixed(1);
+    const text = newest ? now : `${behind_s} s before the ${this.replay ? 'newest' : 'pause'}`;
+    write(this.told, newest ? now : `−${behind_s} s`);
     this.slider.setAttribute('aria-valuetext', text);
   }
 }

@@ -4,7 +4,7 @@ import { FLAGS } from '../model/flags';
 import uPlot from 'uplot';
 import { Buckets, intervalOf, type ColumnName } from './buckets';
 import { chartOf, clock, roundAbove, spansOf, type Chart } from './curves';
-import { cssOf, type Palette } from './palette';
+import { FINGERS, cssOf, type Palette } from './palette';
 import type { History } from '../model/history';
 import type { Shown } from './shown';
 
@@ -36,9 +36,6 @@ const PLOTS: readonly Plot[] = [
   { title: 'Slip', unit: 'mm', columns: ['slip_mm'], height: 1, digits: 3 },
 ];
 
-/** First and second curve of a plot. */
-const COLOURS = ['finger-0', 'finger-1'];
-
 interface Drawn {
   readonly plot: Plot;
   readonly box: HTMLElement;
@@ -60,6 +57,7 @@ export class Traces {
   private drawn: Drawn[] = [];
   private palette: Palette | null = null;
   private tangential = false;
+  private finger = 0;
   private width = 0;
   private height = 0;
   private names: string[] = [];
@@ -87,8 +85,9 @@ export class Traces {
 
   /** zero_s: the time that the axis calls 0, as "now" or the end of the recording. */
   draw(fingertip: Shown, history: History, span: Span_s): void {
-    if (fingertip.tangential !== this.tangential) {
+    if (fingertip.tangential !== this.tangential || fingertip.finger !== this.finger) {
       this.tangential = fingertip.tangential;
+      this.finger = fingertip.finger;
       this.build();
     }
     const inner = this.width - AXIS_px - RIGHT_px;
@@ -176,7 +175,7 @@ export class Traces {
         plot.columns.forEach((name, i) => {
           const key = document.createElement('span');
           key.className = 'key';
-          key.dataset['curve'] = String(i);
+          key.dataset['finger'] = String(this.colour(i));
           key.textContent = name.replace(/_.*/, '');
           title.append(key);
         });
@@ -197,6 +196,11 @@ export class Traces {
     this.resize();
   }
 
+  /** Of a plot's curves: the first has that of the fingertip's pad. */
+  private colour(curve: number): number {
+    return (this.finger + curve) % FINGERS;
+  }
+
   private options(plot: Plot, palette: Palette, drawn: () => Drawn): uPlot.Options {
     const line = { stroke: palette.css('line'), width: 1 };
     const axis = {
@@ -206,7 +210,7 @@ export class Traces {
       font: '11px system-ui, sans-serif',
     };
     const last = plot === PLOTS[PLOTS.length - 1];
-    const colours = plot.columns.map((_, i) => palette.css(COLOURS[i] ?? 'finger-0'));
+    const colours = plot.columns.map((_, i) => palette.css(`finger-${this.colour(i)}`));
     const see = (css: string, part: number) =>
       `${css}${Math.round(255 * part).toString(16).padStart(2, '0')}`;
     return {

@@ -296,6 +296,7 @@ export class View {
     }
     const { contact, hand } = card;
     write(this.heading, shown.name);
+    this.timeline.isReplay = shown.isReplay;
     this.doingsPlace.setAttribute('aria-label', `What to do with ${shown.name}`);
     this.numbers.show(contact, shown.tangential, shown.location_limit_mm);
     if (hand && hand.element.parentElement !== this.handPlace) {

@@ -1,0 +1,118 @@
+#!/usr/bin/python3
+"""Builds all that a release has, from the last commit and from nothing else.
+
+    release.py FOLDER    makes FOLDER with the files, and SHA256SUMS
+
+    fingertip-V.tar.gz                    the source
+    fingertip-V-BOARD-SCENE.uf2           firmware: every board in every scene
+    fingertip_V_ARCH.deb and two more     tool, library, development
+    fingertip_tactile-V-...whl            Python
+    fingertip-V-page.tar.gz               the page, for any server
+
+The same commit gives the same bytes, in whatever folder. Times are that of the commit. What is built stays in FOLDER/.build until the end.
+"""
+import gzip
+import hashlib
+import io
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+
+
+def run(*command, **how):
+    done = subprocess.run([str(word) for word in command], capture_output=True, **how)
+    if done.returncode:
+        sys.exit(f"release.py: {' '.join(map(str, command))} failed\n{(done.stdout + done.stderr).decode(errors='replace')[-2000:]}")
+    return done.stdout
+
+
+def packed(tar):
+    """The bytes of a tar archive, compressed without a time."""
+    out = io.BytesIO()
+    with gzip.GzipFile(fileobj=out, mode="wb", mtime=0) as file:
+        file.write(tar)
+    return out.getvalue()
+
+
+def folder_as_tar(folder, prefix, time_s):
+    out = io.BytesIO()
+    with tarfile.open(fileobj=out, mode="w", format=tarfile.PAX_FORMAT) as tar:
+        for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+            entry = tarfile.TarInfo(f"{prefix}/{path.relative_to(folder)}")
+            entry.size, entry.mtime, entry.mode = path.stat().st_size, time_s, 0o644
+            with open(path, "rb") as file:
+                tar.addfile(entry, file)
+    return out.getvalue()
+
+
+def scenes(source):
+    return re.search(r"^set\(FINGERTIP_SCENES (.*)\)$", (source / "cmake/options.cmake").read_text(encoding="utf-8"), re.M)[1].split()
+
+
+def boards(source):
+    return sorted(path.parent.name for path in source.glob("boards/*/board.json") if "bus" in json.loads(path.read_text(encoding="utf-8")))
+
+
+def main(argv):
+    if len(argv) != 1 or argv[0].startswith("-"):
+        sys.exit(__doc__)
+    out = pathlib.Path(argv[0]).resolve()
+    if out.exists():
+        sys.exit(f"release.py: {out} is there already; give another folder")
+    if run("git", "status", "--porcelain", "--untracked-files=no", cwd=ROOT).strip():
+        sys.exit("release.py: there are changes that are in no commit; commit them first")
+    run(sys.executable, ROOT / "cmake/version.py", "--check")
+    version = run(sys.executable, ROOT / "cmake/version.py", "--print").decode().strip()
+    time_s = int(run("git", "log", "-1", "--format=%ct", cwd=ROOT))
+    os.environ |= {"SOURCE_DATE_EPOCH": str(time_s), "TZ": "UTC", "LC_ALL": "C.UTF-8", "PYTHONDONTWRITEBYTECODE": "1"}
+    os.umask(0o022)
+    name, work = f"fingertip-{version}", out / ".build"
+    source = work / name
+    work.mkdir(parents=True)
+    run("git", "clone", "--quiet", "--shared", "--config", "core.fileMode=true", ROOT, source)
+    run("git", "checkout", "--quiet", "--detach", run("git", "rev-parse", "HEAD", cwd=ROOT).decode().strip(), cwd=source)
+    # Folders in debug information would change what identifies a program.
+    flags = f"-ffile-prefix-map={source}=."
+    (out / f"{name}.tar.gz").write_bytes(packed(run("git", "archive", "--format=tar", f"--prefix={name}/", "HEAD", cwd=source)))
+
+    for board in boards(source):
+        for scene in scenes(source):
+            print(f"firmware: {board}, {scene}", flush=True)
+            build = work / f"{board}-{scene}"
+            run("cmake", "-G", "Ninja", "-S", source, "-B", build, "-DCMAKE_BUILD_TYPE=Release", f"-DFINGERTIP_BOARD={board}", f"-DFINGERTIP_SCENE={scene}",
+                f"-DCMAKE_TOOLCHAIN_FILE={source}/cmake/toolchain-arm-none-eabi.cmake")
+            run("cmake", "--build", build, "--target", f"fingertip-{board}")
+            shutil.copy(build / f"fingertip-{board}.uf2", out / f"{name}-{board}-{scene}.uf2")
+
+    print("tool, library and page", flush=True)
+    build = source / "build/host"
+    run("cmake", "--preset", "host", "-DBUILD_TESTING=OFF", "-DFINGERTIP_WEB=ON", "-DFINGERTIP_IMAGES=", f"-DCMAKE_C_FLAGS={flags}",
+        f"-DCMAKE_CXX_FLAGS={flags}", cwd=source)
+    run("cmake", "--build", build)
+    (out / f"{name}-page.tar.gz").write_bytes(packed(folder_as_tar(build / "host_tools/web/page", f"{name}-page", time_s)))
+    run("cpack", "--config", build / "CPackConfig.cmake", "-B", work / "packages")
+    for package in (work / "packages").glob("*.deb"):
+        shutil.copy(package, out)
+
+    print("Python package", flush=True)
+    run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", work / "wheel", source / "host_tools/python")
+    for wheel in (work / "wheel").glob("*.whl"):
+        shutil.copy(wheel, out)
+
+    files = sorted(path for path in out.iterdir() if path.is_file())
+    sums = "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in files)
+    (out / "SHA256SUMS").write_text(sums, encoding="ascii")
+    shutil.rmtree(work)
+    print(f"{len(files)} files in {out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

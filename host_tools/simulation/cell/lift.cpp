@@ -1,0 +1,326 @@
+#include "simulation/cell/lift.hpp"
+
+#include "libfingertip/clock.hpp"
+#include "libfingertip/error.hpp"
+#include "libfingertip/random.hpp"
+#include "libfingertip/session.hpp"
+#include "libfingertip/text.hpp"
+#include "simulation/cell/gripper_server.hpp"
+#include "tool/advice.hpp"
+
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <poll.h>
+#include <sstream>
+#include <unistd.h>
+#include <utility>
+
+namespace fingertip::cell {
+namespace {
+
+enum Stream : std::uint64_t { GAINS = 851 };
+
+constexpr std::chrono::microseconds ROUND{1000};
+constexpr std::int64_t LONGEST_ROUND_us = 10'000; // of the world's time
+constexpr std::int64_t LATE_us = 30'000;          // the world waits for what is later than that
+constexpr std::size_t FINGERS = 2;
+
+std::vector<FingerProcess> fingers_of(const LiftOptions &options, const Place &place) {
+  std::vector<FingerProcess> fingers;
+  for (std::size_t i = 0; i < FINGERS; i++) {
+    FingerProcess finger = place.finger(i, 2 * options.seed + i);
+    Random random(options.seed, GAINS, i);
+    for (double &gain : finger.gain) {
+      gain = 1.0 + std::clamp(options.gain_spread * random.normal(), -0.5, 0.5);
+    }
+    finger.calibrated_sd = options.gain_sd;
+    fingers.push_back(finger);
+  }
+  return fingers;
+}
+
+// Lines of standard input, as long as it may be read.
+class Lines {
+public:
+  std::vector<std::string> take() {
+    pollfd input = {STDIN_FILENO, POLLIN, 0};
+    const bool is_ours = !isatty(STDIN_FILENO) || tcgetpgrp(STDIN_FILENO) == getpgrp();
+    if (ended_ || !is_ours || wait_for(&input, 1, HostTime()) <= 0) {
+      return {};
+    }
+    char bytes[1024];
+    const ssize_t count = read(STDIN_FILENO, bytes, sizeof bytes);
+    if (count <= 0) {
+      ended_ = true;
+      return {};
+    }
+    came_.append(bytes, static_cast<std::size_t>(count));
+    std::vector<std::string> lines;
+    for (std::size_t end; (end = came_.find('\n')) != std::string::npos;) {
+      lines.push_back(came_.substr(0, end));
+      came_.erase(0, end + 1);
+    }
+    return lines;
+  }
+
+private:
+  std::string came_;
+  bool ended_ = false;
+};
+
+// A gripper on its own line, activated and as far open as it is to begin with.
+void stand_open(GripperServer &server, GripperMotion &motion, const std::string &model,
+                double width_mm) {
+  constexpr double HURRY_s = 0.02; // in a round: too short to notice
+  std::atomic<bool> is_done{false};
+  std::string why;
+  Thread client([&] {
+    try {
+      GripperWay way;
+      way.model = model;
+      way.port = server.port();
+      way.timeout_s = 10.0; // however busy this machine is
+      const auto gripper = open_gripper(way);
+      gripper->activate();
+      while (!gripper->poll().active) {
+      }
+      GripperMove move;
+      move.width_mm = width_mm;
+      move.speed_mm_s = gripper->traits().speed_max_mm_s;
+      gripper->move(move);
+      while (gripper->poll().moving) {
+      }
+    } catch (const Error &error) {
+      why = error.what();
+    }
+    is_done = true;
+  });
+  while (!is_done) {
+    server.step(ROUND);
+    motion.step(HURRY_s);
+  }
+  client.join();
+  if (!why.empty()) {
+    throw Error("the gripper does not open (" + why + ")");
+  }
+}
+
+class Lift {
+public:
+  Lift(const LiftOptions &options, const Place &place)
+      : options_(options), place_(place), face_(options.face, LAYER_mm, options.cache),
+        fingers_(place, fingers_of(options, place)),
+        motion_(GripperServer::mechanics(options.model)), server_(motion_, server_options()) {
+    fingers_.wait_until_ready();
+    stand_open(server_, motion_, options.model, options.world.object.width_mm + options.opens_mm);
+    server_.rename(place.port("gripper"));
+    world_.emplace(options.world, face_, motion_);
+    truth_.emplace(options.truth, options.overwrite, head() + "time_us," + World::columns() + "\n");
+  }
+
+  void run() {
+    std::printf("ready: %s, %s, %s\n", place_.port(SIDES[0]).c_str(), place_.port(SIDES[1]).c_str(),
+                place_.port("gripper").c_str());
+    std::fflush(stdout);
+    const std::int64_t began_us = steady_now_us();
+    last_us_ = began_us;
+    while (!interrupted && !over_) {
+      server_.step(ROUND);
+      fingers_.share(std::chrono::milliseconds(0));
+      round(steady_now_us());
+      over_ = over_ || (options_.seconds && world_->time_s() >= *options_.seconds);
+    }
+    const double all_s = 1e-6 * static_cast<double>(last_us_ - began_us);
+    const double stood_s = 1e-6 * static_cast<double>(stood_us_);
+    if (stood_s > 0.01 * all_s) {
+      std::fprintf(stderr, "the world stood still for %.2f of %.2f s: this machine is busy\n",
+                   stood_s, all_s);
+    }
+  }
+
+private:
+  GripperServer::Options server_options() const {
+    GripperServer::Options server;
+    server.model = options_.model;
+    server.real_time = false;
+    server.link = place_.port(".gripper"); // until all is ready
+    return server;
+  }
+
+  std::string head() const {
+    const Object &object = options_.world.object;
+    std::ostringstream text;
+    text << "# simulated: the truth of a cell; time_us is CLOCK_MONOTONIC\n# gripper: "
+         << options_.model << "\n# face: " << options_.face << "\n# width_mm: " << object.width_mm
+         << "\n# mass_kg: " << object.mass_kg << "\n# friction: " << object.friction
+         << "\n# crushes_N: " << object.crushes_N << "\n# seed: " << options_.seed << "\n";
+    return text.str();
+  }
+
+  // Somebody is late, and has not been for too long.
+  bool is_waited_for(std::int64_t now_us) const {
+    const auto patience_us = static_cast<std::int64_t>(1e6 * options_.patience_s);
+    const auto is_late = [&](std::int64_t seen_us) {
+      return now_us - seen_us > LATE_us && now_us - seen_us < patience_us;
+    };
+    const std::int64_t heard_us =
+        std::chrono::duration_cast<std::chrono::microseconds>(server_.heard_at().time_since_epoch())
+            .count();
+    bool is_late_one = is_late(heard_us);
+    for (std::size_t i = 0; i < FINGERS; i++) {
+      is_late_one = is_late_one || (fingers_.is_there(i) && !fingers_.is_frozen(i) &&
+                                    is_late(fingers_.reached_us(i)));
+    }
+    return is_late_one;
+  }
+
+  void round(std::int64_t now_us) {
+    const std::int64_t passed_us =
+        is_waited_for(now_us) ? 0 : std::min(now_us - last_us_, LONGEST_ROUND_us);
+    stood_us_ += now_us - last_us_ - passed_us;
+    last_us_ = now_us;
+    world_->advance(1e-6 * static_cast<double>(passed_us));
+    fingers_.put(now_us, {world_->pressures_Pa(0), world_->pressures_Pa(1)});
+    if (!at_touch_.empty() && world_->touched()) {
+      const std::string commands = std::exchange(at_touch_, {});
+      for (const std::string_view command : split(commands, ';')) {
+        obey(std::string(trim(command)));
+      }
+    }
+    for (const std::string &event : world_->take_events()) {
+      tell_event(event);
+    }
+    truth_->row(now_us, world_->cells());
+    for (const std::string &line : lines_.take()) {
+      std::string answer;
+      try {
+        answer = obey(line);
+      } catch (const Error &error) {
+        answer = "error: " + told(error);
+      }
+      std::printf("%s\n", answer.c_str());
+      std::fflush(stdout);
+    }
+    fingers_.look();
+  }
+
+  void tell_event(const std::string &text) {
+    truth_->event(steady_now_us(), text);
+    std::fprintf(stderr, "%.2f s: %s\n", world_->time_s(), printable(text).c_str());
+  }
+
+  // Answers. Throws Error: it knows no such command.
+  std::string obey(const std::string &command) {
+    std::istringstream words(command);
+    std::string verb, what;
+    words >> verb >> what;
+    if (verb == "truth") {
+      return world_->cells();
+    }
+    if (verb == "at_touch" && !what.empty()) {
+      at_touch_ = command.substr(command.find(what));
+      return "ok";
+    }
+    if (!(verb.empty() ? false : act(verb, what))) {
+      throw Error(ErrorCode::bad_value, "\"" + printable(command) + "\" cannot be; " + COMMANDS);
+    }
+    if (verb != "lift" && !is_disturbance(verb)) { // which the world tells
+      tell_event(command);
+    }
+    return "ok";
+  }
+
+  bool act(const std::string &verb, const std::string &what) {
+    const auto number = to_double(what);
+    if (verb == "lift") {
+      return world_->lift();
+    }
+    if (verb == "take") {
+      world_->take_away();
+      return true;
+    }
+    if (verb == "quit") {
+      over_ = true;
+      return true;
+    }
+    if (verb == "kill" || verb == "freeze" || verb == "thaw") {
+      const auto side = std::find(SIDES.begin(), SIDES.end(), what);
+      const auto finger = static_cast<std::size_t>(side - SIDES.begin());
+      if (finger == FINGERS || !fingers_.is_there(finger)) {
+        return false;
+      }
+      verb == "kill" ? fingers_.end(finger) : fingers_.freeze(finger, verb == "freeze");
+      return true;
+    }
+    if (verb == "line") {
+      const auto known = std::find_if(std::begin(FAULTS), std::end(FAULTS),
+                                      [&](const auto &one) { return what == one.first; });
+      if (known == std::end(FAULTS)) {
+        return false;
+      }
+      line_.fault = known->second;
+    } else if (verb == "late" && number && *number >= 0.0) {
+      line_.late_s = 1e-3 * *number;
+    } else if (verb == "latency_timer" && number && *number >= 0.0) {
+      line_.latency_timer_s = 1e-3 * *number;
+    } else if (verb == "power" && (what == "on" || what == "off")) {
+      server_.power(what == "on");
+      return true;
+    } else if (verb == "fault" && number && *number >= 0.0 && *number <= 255.0) {
+      server_.fail(static_cast<std::uint8_t>(*number));
+      return true;
+    } else if (is_disturbance(verb)) {
+      const Planned now = planned(verb + ":" + what);
+      return world_->disturb(now.kind, now.amount);
+    } else {
+      return false;
+    }
+    server_.trouble(line_);
+    return true;
+  }
+
+  static constexpr const char *COMMANDS =
+      "give lift, take, pour|jerk|knock|slick AMOUNT once it is lifted, kill|freeze|thaw "
+      "left|right, line none|silent|garbage|damaged|other_slave|refused, late MS, latency_timer "
+      "MS, power on|off, fault CODE, at_touch COMMAND; COMMAND..., truth, or quit";
+  static constexpr std::pair<const char *, LineFault> FAULTS[] = {
+      {"none", LineFault::none},
+      {"silent", LineFault::silent},
+      {"garbage", LineFault::garbage},
+      {"damaged", LineFault::damaged},
+      {"other_slave", LineFault::other_slave},
+      {"refused", LineFault::refused}};
+
+  const LiftOptions &options_;
+  const Place &place_;
+  Face face_;
+  Fingers fingers_; // processes, before there are threads
+  GripperMotion motion_;
+  GripperServer server_;
+  std::optional<World> world_;
+  std::optional<Truth> truth_;
+  Lines lines_;
+  LineTrouble line_;
+  std::string at_touch_; // a command
+  bool over_ = false;
+  std::int64_t last_us_ = 0, stood_us_ = 0;
+};
+
+} // namespace
+
+void check(const LiftOptions &options) {
+  const GripperTraits &traits = gripper_traits(options.model);
+  const double widest_mm = options.world.object.width_mm + options.opens_mm;
+  if (widest_mm > traits.stroke_mm) {
+    throw Error(ErrorCode::bad_value, options.model + " opens to " + fixed(traits.stroke_mm, 1) +
+                                          " mm; the object and --opens take " +
+                                          fixed(widest_mm, 1));
+  }
+}
+
+void lift(const LiftOptions &options, const Place &place) {
+  Lift(options, place).run();
+}
+
+} // namespace fingertip::cell

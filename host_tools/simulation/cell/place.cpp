@@ -1,0 +1,204 @@
+#include "simulation/cell/place.hpp"
+
+#include "libfingertip/clock.hpp"
+#include "libfingertip/discovery.hpp"
+#include "libfingertip/error.hpp"
+#include "libfingertip/session.hpp"
+#include "libfingertip/share_socket.hpp"
+#include "libfingertip/text.hpp"
+#include "tool/advice.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fcntl.h>
+#include <filesystem>
+#include <new>
+#include <sys/file.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <utility>
+
+namespace fingertip::cell {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char *SERIALS[SIDES.size()] = {"00000000000CE110", "00000000000CE111"};
+constexpr std::chrono::milliseconds LOOK_INTERVAL{10};
+constexpr std::int64_t ROW_us = 2'000;
+constexpr std::size_t ROWS_BYTES = 4096;
+
+} // namespace
+
+volatile std::sig_atomic_t interrupted = 0;
+
+Place::Place(const std::string &folder)
+    : folder_(folder.empty() ? simulated_folder() : folder), is_shared_(folder.empty()) {
+  std::error_code error;
+  fs::create_directories(folder_, error);
+  if (error) {
+    throw Error(ErrorCode::cannot_write, folder_ + ": " + error.message());
+  }
+  lock_ = open((folder_ + "/lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  if (lock_ < 0) {
+    throw Error(ErrorCode::cannot_write, folder_ + ": " + std::strerror(errno));
+  }
+  if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
+    close(lock_);
+    throw Error(ErrorCode::file_exists,
+                folder_ + ": another simulation has its ports there; end that one, or choose "
+                          "another folder (--ports)");
+  }
+}
+
+Place::~Place() {
+  unlink((folder_ + "/lock").c_str());
+  close(lock_);
+}
+
+FingerProcess Place::finger(std::size_t side, std::uint64_t seed) const {
+  FingerProcess finger;
+  finger.serial = SERIALS[side];
+  finger.link = port(SIDES[side]);
+  finger.seed = seed;
+  finger.layer_mm = LAYER_mm;
+  finger.gain.fill(1.0);
+  return finger;
+}
+
+Fingers::Fingers(const Place &place, const std::vector<FingerProcess> &fingers)
+    : fingers_(fingers), processes_(fingers.size()) {
+  if (place.is_shared()) {
+    server_.emplace(Server::Options{own_share_folder(), {}}, [](const std::string &line) {
+      if (line.find(": shared as ") == std::string::npos) {
+        std::fprintf(stderr, "%s\n", printable(line).c_str());
+      }
+    });
+  }
+  void *memory = mmap(nullptr, count() * sizeof(SharedPressures), PROT_READ | PROT_WRITE,
+                      MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) {
+    throw std::bad_alloc();
+  }
+  shared_ = static_cast<SharedPressures *>(memory);
+  for (std::size_t i = 0; i < count(); i++) {
+    new (&shared_[i]) SharedPressures();
+  }
+  for (std::size_t i = 0; i < count(); i++) {
+    processes_[i] = start_finger(fingers_[i], shared_[i]);
+  }
+}
+
+Fingers::~Fingers() {
+  server_.reset();
+  for (std::size_t i = 0; i < count(); i++) {
+    end(i);
+  }
+  munmap(shared_, count() * sizeof(SharedPressures));
+}
+
+void Fingers::wait_until_ready() {
+  const auto goes_on = [&] {
+    put(steady_now_us(), std::vector<Pressures>(count()));
+    look();
+    if (interrupted) {
+      throw Error("interrupted");
+    }
+  };
+  for (std::size_t i = 0; i < count(); i++) {
+    while (reached_us(i) == 0) {
+      goes_on();
+      wait_until(host_now() + LOOK_INTERVAL);
+    }
+  }
+  for (std::size_t i = 0; server_ && i < count(); i++) {
+    server_->add({fingers_[i].serial, fingers_[i].link, false});
+    const std::string socket = own_share_folder() + "/" + share_socket_name(fingers_[i].serial);
+    while (!fs::exists(socket)) {
+      goes_on();
+      server_->step(LOOK_INTERVAL);
+    }
+  }
+}
+
+void Fingers::put(std::int64_t host_us, const std::vector<Pressures> &pressures) {
+  for (std::size_t i = 0; i < count(); i++) {
+    shared_[i].put(host_us, pressures[i]);
+  }
+}
+
+void Fingers::share(std::chrono::milliseconds longest_wait) {
+  if (server_) {
+    server_->step(longest_wait);
+  } else if (longest_wait.count() > 0) {
+    wait_until(host_now() + longest_wait);
+  }
+}
+
+void Fingers::end(std::size_t finger) {
+  if (is_there(finger)) {
+    kill(processes_[finger], SIGKILL);
+    waitpid(processes_[finger], nullptr, 0);
+    forget(finger);
+  }
+}
+
+void Fingers::look() {
+  for (std::size_t i = 0; i < count(); i++) {
+    if (is_there(i) && waitpid(processes_[i], nullptr, WNOHANG) != 0) {
+      forget(i);
+      throw Error("a fingertip has ended by itself");
+    }
+  }
+}
+
+void Fingers::forget(std::size_t finger) {
+  processes_[finger] = 0;
+  std::error_code none;
+  fs::remove(fingers_[finger].link, none);
+}
+
+Truth::Truth(const std::string &path, bool overwrite, const std::string &head) {
+  if (!path.empty()) {
+    file_.emplace(path, overwrite, OutputFile::Appears::at_once);
+    rows_ = head;
+    flush();
+  }
+}
+
+Truth::~Truth() {
+  try {
+    flush();
+  } catch (const Error &error) {
+    tell("fingertip", error);
+  }
+}
+
+void Truth::row(std::int64_t host_us, const std::string &cells) {
+  if (file_ && host_us - told_us_ >= ROW_us) {
+    told_us_ = host_us;
+    rows_ += std::to_string(host_us) + "," + cells + "\n";
+    if (rows_.size() > ROWS_BYTES) {
+      flush();
+    }
+  }
+}
+
+void Truth::event(std::int64_t host_us, const std::string &text) {
+  if (file_) {
+    rows_ += "# event: " + std::to_string(host_us) + "," + printable(text) + "\n";
+    flush();
+  }
+}
+
+void Truth::flush() {
+  if (file_ && !rows_.empty()) {
+    const std::string rows = std::exchange(rows_, {});
+    file_->append(rows.data(), rows.size());
+  }
+}
+
+} // namespace fingertip::cell

@@ -1,0 +1,100 @@
+// What a simulation of fingertips in real time stands on, whatever happens to their rubber: a folder
+// with their ports, a process for each, the server that shares them, the file of what is true.
+#pragma once
+
+#include "libfingertip/output_file.hpp"
+#include "library/share/server.hpp"
+#include "simulation/cell/fingertip_cell_finger.hpp"
+
+#include <array>
+#include <csignal>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace fingertip::cell {
+
+constexpr double LAYER_mm = 12.0;
+constexpr std::array<const char *, 2> SIDES = {"left", "right"};
+
+// Signals that end a simulation set it.
+extern volatile std::sig_atomic_t interrupted;
+
+// The ports' folder, for one simulation at a time.
+class Place {
+public:
+  // folder empty: that of simulated ports (discovery.hpp), and fingertips are shared with every
+  // program as by `fingertip serve`. Throws Error: another simulation is there.
+  explicit Place(const std::string &folder);
+  ~Place();
+  Place(const Place &) = delete;
+  Place &operator=(const Place &) = delete;
+
+  bool is_shared() const { return is_shared_; }
+  std::string port(const std::string &name) const { return folder_ + "/" + name; }
+  // Of this side, on its port; the rest is for the caller to fill in.
+  FingerProcess finger(std::size_t side, std::uint64_t seed) const;
+
+private:
+  std::string folder_;
+  bool is_shared_;
+  int lock_ = -1;
+};
+
+// Their processes.
+class Fingers {
+public:
+  // Before there are threads. Throws Error.
+  Fingers(const Place &place, const std::vector<FingerProcess> &fingers);
+  ~Fingers();
+  Fingers(const Fingers &) = delete;
+  Fingers &operator=(const Fingers &) = delete;
+
+  // Once they know their zeros, and are shared where they are to be. Throws Error: one cannot
+  // start, or a signal came.
+  void wait_until_ready();
+  // At this time, later than all before; [finger].
+  void put(std::int64_t host_us, const std::vector<Pressures> &pressures);
+  // Serves the programs that share them, waiting at most this long for one.
+  void share(std::chrono::milliseconds longest_wait);
+
+  std::size_t count() const { return fingers_.size(); }
+  std::int64_t reached_us(std::size_t finger) const { return shared_[finger].reached_us; }
+  bool is_there(std::size_t finger) const { return processes_[finger] > 0; }
+  bool is_frozen(std::size_t finger) const { return shared_[finger].frozen; }
+  void freeze(std::size_t finger, bool frozen) { shared_[finger].frozen = frozen; }
+  void end(std::size_t finger);
+  // Throws Error: one has ended by itself.
+  void look();
+
+private:
+  void forget(std::size_t finger);
+
+  std::vector<FingerProcess> fingers_;
+  std::vector<pid_t> processes_;
+  SharedPressures *shared_ = nullptr; // [finger]
+  std::optional<Server> server_;
+};
+
+// The truth as a CSV file with comments.
+class Truth {
+public:
+  // path empty: it is not kept. head: comments and the names of the columns after the first.
+  Truth(const std::string &path, bool overwrite, const std::string &head);
+  ~Truth();
+  Truth(const Truth &) = delete;
+  Truth &operator=(const Truth &) = delete;
+
+  // Every 2 ms at most.
+  void row(std::int64_t host_us, const std::string &cells);
+  void event(std::int64_t host_us, const std::string &text);
+
+private:
+  void flush();
+
+  std::optional<OutputFile> file_;
+  std::string rows_;
+  std::int64_t told_us_ = 0;
+};
+
+} // namespace fingertip::cell

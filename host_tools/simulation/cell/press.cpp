@@ -1,0 +1,170 @@
+#include "simulation/cell/press.hpp"
+
+#include "libfingertip/clock.hpp"
+#include "libfingertip/error.hpp"
+#include "libfingertip/random.hpp"
+#include "libfingertip/session.hpp"
+#include "simulation/twin/effects.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <sstream>
+
+namespace fingertip::cell {
+namespace {
+
+enum Stream : std::uint64_t { GAINS = 861, PLACES = 862 };
+
+constexpr double GRAVITY_m_s2 = 9.80665, AIR_Pa = 101325.0;
+constexpr std::chrono::milliseconds ROUND{1};
+constexpr std::int64_t ROUND_us = 1'000;
+// Where the twin's placements are (twin/acts.hpp). Long enough for a calibration to take each.
+constexpr double HALF_WIDTH_mm = 9.0, HALF_LENGTH_mm = 18.0;
+constexpr double RESTS_s = 1.2, SETS_DOWN_s = 0.15, STANDS_s = 1.5;
+constexpr double PERIOD_s = RESTS_s + SETS_DOWN_s + STANDS_s + SETS_DOWN_s;
+
+// 0 to 1 within 0 to 1, smooth at both ends.
+double smooth(double share) {
+  return 0.5 - 0.5 * std::cos(M_PI * std::clamp(share, 0.0, 1.0));
+}
+
+// Of the van der Corput sequence, 0 to 1: evenly spread however many are taken.
+double spread(std::uint64_t number, unsigned base) {
+  double sum = 0.0, part = 1.0;
+  for (; number > 0; number /= base) {
+    part /= base;
+    sum += part * static_cast<double>(number % base);
+  }
+  return sum;
+}
+
+// One fingertip's weight and rubber.
+class Pressed {
+public:
+  Pressed(const Face &face, const PressOptions &options, std::uint64_t seed)
+      : face_(face), weight_N_(1e-3 * options.weight_g * GRAVITY_m_s2),
+        rubber_(twin::parse_effects("relaxation"), SENSORS, LAYER_mm, AIR_Pa, seed),
+        base_Pa_(SENSORS), felt_Pa_(SENSORS) {
+    Random random(seed, PLACES, 0);
+    begin_x_ = random.uniform(0.0, 1.0);
+    begin_y_ = random.uniform(0.0, 1.0);
+  }
+
+  void advance(double time_s) {
+    const double number = std::floor(time_s / PERIOD_s);
+    const double since_s = time_s - number * PERIOD_s - RESTS_s;
+    const auto place = static_cast<std::uint64_t>(number);
+    touch_ = {};
+    touch_.x_mm = HALF_WIDTH_mm * (2.0 * std::fmod(begin_x_ + spread(place, 2), 1.0) - 1.0);
+    touch_.y_mm = HALF_LENGTH_mm * (2.0 * std::fmod(begin_y_ + spread(place, 3), 1.0) - 1.0);
+    touch_.force_N = weight_N_ * (smooth(since_s / SETS_DOWN_s) -
+                                  smooth((since_s - SETS_DOWN_s - STANDS_s) / SETS_DOWN_s));
+    const Pressures pressures =
+        touch_.force_N > 0.0 ? face_.base_Pa(touch_, 0.0) : Pressures{};
+    std::copy(pressures.begin(), pressures.end(), base_Pa_.begin());
+    rubber_.report(time_s, base_Pa_, felt_Pa_);
+  }
+  Pressures pressures_Pa() const {
+    Pressures pressures;
+    std::copy(felt_Pa_.begin(), felt_Pa_.end(), pressures.begin());
+    return pressures;
+  }
+  // x_mm, y_mm, force_N; places only while it touches.
+  std::string cells() const {
+    std::ostringstream text;
+    if (touch_.force_N > 0.0) {
+      text << touch_.x_mm << "," << touch_.y_mm << "," << touch_.force_N;
+    } else {
+      text << ",,0";
+    }
+    return text.str();
+  }
+
+private:
+  const Face &face_;
+  double weight_N_;
+  twin::Pad rubber_;
+  double begin_x_, begin_y_; // of both sequences
+  twin::Touch touch_;
+  std::vector<double> base_Pa_, felt_Pa_; // [sensor]
+};
+
+std::vector<FingerProcess> fingers_of(const PressOptions &options, const Place &place) {
+  std::vector<FingerProcess> fingers;
+  for (std::size_t i = 0; i < options.fingertips; i++) {
+    FingerProcess finger = place.finger(i, 2 * options.seed + i);
+    finger.parallel_bus = true;
+    Random random(finger.seed, GAINS, 0);
+    for (double &gain : finger.gain) {
+      gain = 1.0 + std::clamp(options.gain_spread * random.normal(), -0.5, 0.5);
+    }
+    fingers.push_back(finger);
+  }
+  return fingers;
+}
+
+std::string head_of(const PressOptions &options, const std::vector<FingerProcess> &fingers) {
+  std::ostringstream text;
+  text << "# simulated: the truth of presses; time_us is CLOCK_MONOTONIC\n# weight_g: "
+       << options.weight_g << "\n# seed: " << options.seed;
+  for (std::size_t i = 0; i < fingers.size(); i++) {
+    text << "\n# gain_" << SIDES[i] << ":";
+    for (double gain : fingers[i].gain) {
+      text << " " << gain;
+    }
+  }
+  text << "\ntime_us";
+  for (std::size_t i = 0; i < fingers.size(); i++) {
+    for (const char *column : {"x_mm", "y_mm", "force_N"}) {
+      text << "," << SIDES[i] << "_" << column;
+    }
+  }
+  text << "\n";
+  return text.str();
+}
+
+} // namespace
+
+void press(const PressOptions &options, const Place &place) {
+  const Face face(PRESS_FACE, LAYER_mm, options.cache);
+  const std::vector<FingerProcess> processes = fingers_of(options, place);
+  Fingers fingers(place, processes);
+  Truth truth(options.truth, options.overwrite, head_of(options, processes));
+  std::vector<Pressed> pressed;
+  for (std::size_t i = 0; i < fingers.count(); i++) {
+    pressed.emplace_back(face, options, 2 * options.seed + i);
+  }
+  fingers.wait_until_ready();
+  std::printf("ready:");
+  for (std::size_t i = 0; i < fingers.count(); i++) {
+    std::printf("%s %s", i ? "," : "", place.port(SIDES[i]).c_str());
+  }
+  std::printf("\n");
+  std::fflush(stdout);
+  const std::int64_t began_us = steady_now_us();
+  std::int64_t last_us = 0;
+  while (!interrupted) {
+    fingers.share(ROUND);
+    const std::int64_t now_us = steady_now_us();
+    const double time_s = 1e-6 * static_cast<double>(now_us - began_us);
+    if (now_us - last_us >= ROUND_us) {
+      last_us = now_us;
+      std::vector<Pressures> pressures;
+      std::string cells;
+      for (Pressed &one : pressed) {
+        one.advance(time_s);
+        pressures.push_back(one.pressures_Pa());
+        cells += (cells.empty() ? "" : ",") + one.cells();
+      }
+      fingers.put(now_us, pressures);
+      truth.row(now_us, cells);
+      fingers.look();
+    }
+    if (options.seconds && time_s >= *options.seconds) {
+      break;
+    }
+  }
+}
+
+} // namespace fingertip::cell

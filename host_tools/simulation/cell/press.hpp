@@ -1,0 +1,26 @@
+// `fingertip simulate --press`: a weight on a ball is set down evenly all over each fingertip, to
+// look at, to record and to calibrate from.
+//
+// The pad: 12 mm of silicone without ends, which relaxes as the twin's does (twin/effects.hpp).
+// Sensors' gains differ by 10 %, and nobody has calibrated them.
+#pragma once
+
+#include "simulation/cell/place.hpp"
+
+namespace fingertip::cell {
+
+struct PressOptions {
+  std::size_t fingertips = 1; // 1 or 2
+  std::string cache, truth;
+  double weight_g = 300.0, gain_spread = 0.1;
+  std::optional<double> seconds;
+  std::uint64_t seed = 1;
+  bool overwrite = false;
+};
+
+constexpr const char *PRESS_FACE = "sphere15"; // a ball of 15 mm, as calibrate asks for
+
+// Until a signal comes, or its time is over. Throws Error.
+void press(const PressOptions &options, const Place &place);
+
+} // namespace fingertip::cell

@@ -1,0 +1,215 @@
+// The program behind `fingertip simulate`: simulated fingertips on ports, in real time, each with
+// its firmware on this machine and on simulated rubber. The tool itself knows no simulation: it
+// starts this program, which stands beside it (tool/cli/commands/simulate.cpp).
+#include "libfingertip/error.hpp"
+#include "libfingertip/output_file.hpp"
+#include "library/pad/table_file.hpp"
+#include "simulation/cell/lift.hpp"
+#include "simulation/cell/press.hpp"
+#include "tool/advice.hpp"
+#include "tool/plain_help.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+
+using namespace fingertip;
+using namespace fingertip::cell;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Options {
+  std::string ports, cache, truth;
+  PressOptions press;
+  LiftOptions lift;
+  double gain_spread = 0.0, seconds = 0.0;
+  std::uint64_t seed = 1;
+  bool overwrite = false;
+};
+
+// Contact tables: those that were built with this program, for the faces that it needs by itself;
+// others are solved once and kept for this user.
+std::string tables_for(const std::string &face) {
+  std::error_code none;
+  const fs::path bin = fs::read_symlink("/proc/self/exe", none).parent_path();
+  for (const char *place : {"../../share/fingertip/tables", "tables"}) {
+    const fs::path folder = (bin / place).lexically_normal();
+    for (const auto &file : fs::directory_iterator(folder, none)) {
+      if (file.path().filename().string().rfind(face + "-", 0) == 0) {
+        return folder.string();
+      }
+    }
+  }
+  return twin::default_cache_directory().string();
+}
+
+void run(const Options &options, bool is_lift) {
+  if (!options.truth.empty()) {
+    check_output(options.truth, options.overwrite);
+  }
+  const auto cache = [&](const std::string &face) {
+    return options.cache.empty() ? tables_for(face) : options.cache;
+  };
+  const auto both = [&](auto &one) {
+    one.truth = options.truth;
+    one.overwrite = options.overwrite;
+    one.seed = options.seed;
+    if (options.seconds > 0.0) {
+      one.seconds = options.seconds;
+    }
+    if (!std::isnan(options.gain_spread)) {
+      one.gain_spread = options.gain_spread;
+    }
+  };
+  if (is_lift) {
+    LiftOptions one = options.lift;
+    both(one);
+    one.cache = cache(one.face);
+    check(one);
+    lift(one, Place(options.ports));
+  } else {
+    PressOptions one = options.press;
+    both(one);
+    one.cache = cache(PRESS_FACE);
+    press(one, Place(options.ports));
+  }
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+  CLI::App app(
+      "Simulates fingertips in real time: their firmware on this machine, on simulated rubber. "
+      "Every program finds them as it finds real ones, and by the names sim:left and sim:right "
+      "(sim: for the first). Ctrl-C ends it.",
+      "fingertip simulate");
+  speak_plainly(app);
+  Options options;
+  Object &object = options.lift.world.object;
+  std::vector<std::string> models, planned_texts;
+  for (const GripperTraits &traits : gripper_models()) {
+    models.push_back(traits.model);
+  }
+  bool is_press = false, by_command = false;
+  options.gain_spread = std::nan("");
+  double lift_after_s = *options.lift.world.lift_after_s;
+  CLI::Option *press_flag = app.add_flag(
+      "--press", is_press,
+      "A weight on a ball of 15 mm is set down here and there, for two seconds each time; this is "
+      "what happens without an option");
+  CLI::Option *lift_flag =
+      app.add_flag("--lift",
+                   "Two fingertips on a gripper with an object between: `fingertip grasp "
+                   "--gripper 2f85 --gripper-port sim:gripper` grasps it, then a hand lifts it. "
+                   "Obeys lines of standard input (help lists them)")
+          ->excludes(press_flag);
+  const auto number = [&](const char *name, double &value, const char *unit, double low,
+                          double high, const char *help) {
+    return app.add_option(name, value, help)
+        ->type_name(unit)
+        ->check(CLI::Range(low, high))
+        ->capture_default_str();
+  };
+  app.add_option("--ports", options.ports,
+                 "Folder for the ports left, right and gripper, which FINGERTIP_PORT may name; no "
+                 "program finds the fingertips by itself then, and one at a time may use each")
+      ->type_name("FOLDER");
+  app.add_option("--seed", options.seed, "Of gains, noise and places; default 1")->type_name("N");
+  app.add_option("--gain-spread", options.gain_spread,
+                 "Standard deviation between sensors; default 0.1, with --lift 0.05")
+      ->type_name("SHARE")
+      ->check(CLI::Range(0.0, 0.2));
+  app.add_option("--seconds", options.seconds, "Ends after so long")
+      ->type_name("S")
+      ->check(CLI::Range(0.1, 1e6));
+  app.add_option("--truth", options.truth, "Keeps what is true")->type_name("FILE.csv");
+  app.add_flag("--overwrite", options.overwrite, "Replace FILE.csv if it exists");
+  app.add_option("--cache", options.cache,
+                 "Of contact tables; default: those installed, else ~/.cache/fingertip")
+      ->type_name("FOLDER");
+
+  app.add_option("--fingertips", options.press.fingertips, "How many")
+      ->excludes(lift_flag)
+      ->check(CLI::Range(1, 2))
+      ->group("Presses")
+      ->type_name("N")
+      ->capture_default_str();
+  app.add_option("--weight", options.press.weight_g, "What is set down")
+      ->excludes(lift_flag)
+      ->check(CLI::Range(20.0, 2000.0))
+      ->group("Presses")
+      ->type_name("GRAMS")
+      ->capture_default_str();
+
+  std::vector<CLI::Option *> of_lift;
+  const auto lift_number = [&](const char *name, double &value, const char *unit, double low,
+                               double high, const char *help) {
+    of_lift.push_back(number(name, value, unit, low, high, help));
+    return of_lift.back();
+  };
+  of_lift.push_back(app.add_option("--gripper", options.lift.model, "Which one")
+                        ->check(CLI::IsMember(models))
+                        ->capture_default_str());
+  of_lift.push_back(app.add_option("--face", options.lift.face,
+                                   "What of the object is touched: an indenter, or plate")
+                        ->capture_default_str());
+  lift_number("--width", object.width_mm, "MM", 1.0, 500.0, "Of the object");
+  lift_number("--mass", object.mass_kg, "KG", 0.001, 10.0, "Its mass");
+  lift_number("--friction", object.friction, "NUMBER", 0.05, 3.0, "Its friction coefficient");
+  lift_number("--kinetic", object.kinetic_share, "SHARE", 0.3, 1.0,
+              "Of the friction, while it slides");
+  of_lift.push_back(app.add_option("--stiffness", object.stiffness_N_mm,
+                                   "Its stiffness; default: it does not yield")
+                        ->type_name("N/MM")
+                        ->check(CLI::Range(0.1, 1e6)));
+  of_lift.push_back(
+      app.add_option("--crushes", object.crushes_N, "More force breaks it; default: none does")
+          ->type_name("N")
+          ->check(CLI::Range(0.1, 1e6)));
+  lift_number("--opens", options.lift.opens_mm, "MM", 0.5, 100.0,
+              "The gripper stands so much wider at first");
+  lift_number("--height", options.lift.world.lift_mm, "MM", 1.0, 500.0, "How far it is lifted");
+  lift_number("--lift-time", options.lift.world.lift_s, "S", 0.05, 60.0, "And how long that takes");
+  CLI::Option *after = lift_number("--lift-after", lift_after_s, "S", 0.1, 1e6,
+                                   "Lifted once the force has stood for so long");
+  of_lift.push_back(
+      app.add_flag("--by-command", by_command, "Lift only on the command")->excludes(after));
+  of_lift.push_back(app.add_option("--then", planned_texts,
+                                   "A disturbance: pour:MASSES, jerk:M/S2, knock:M/S or "
+                                   "slick:SHARE, @SECONDS after the lift")
+                        ->type_name("KIND:AMOUNT@S"));
+  lift_number("--gain-error", options.lift.gain_sd, "SHARE", 0.0, 0.2,
+              "That calibration left of the gains");
+  lift_number("--patience", options.lift.patience_s, "S", 0.0, 3600.0,
+              "The world stands still at most so long while fingertips or the gripper's client "
+              "are held up");
+  for (CLI::Option *option : of_lift) {
+    option->needs(lift_flag)->group("Lifts");
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError &error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  for (int number_of_signal : {SIGINT, SIGTERM, SIGHUP}) {
+    std::signal(number_of_signal, [](int) { interrupted = 1; });
+  }
+  std::signal(SIGPIPE, SIG_IGN);
+  try {
+    for (const std::string &text : planned_texts) {
+      options.lift.world.planned.push_back(planned(text));
+    }
+    options.lift.world.lift_after_s = by_command ? std::nullopt : std::optional(lift_after_s);
+    object.base_mm = 40.0;
+    options.lift.world.grasp.down_rad = 0.5 * M_PI;
+    run(options, lift_flag->count() > 0);
+    return 0;
+  } catch (const Error &error) {
+    tell("fingertip", error);
+  } catch (const std::runtime_error &error) { // of the twin: a face that there is not
+    tell("fingertip", Error(error.what()));
+  }
+  return 1;
+}
