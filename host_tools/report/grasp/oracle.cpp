@@ -58,7 +58,7 @@ GripReport Oracle::step(double now_s, GripCommand &command) {
   if (report_.state == GRIP_IDLE) {
     target_mm_ = status_.width_mm;
     report_.state = GRIP_SQUEEZE;
-    sent_s_ = now_s;
+    moved_s_ = now_s;
   }
   // The widest position whose force is enough and that stays below the cap, or this one.
   const double now_N = force_N(target_mm_);
@@ -76,10 +76,9 @@ GripReport Oracle::step(double now_s, GripCommand &command) {
       break;
     }
   }
-  if (std::abs(to_mm - target_mm_) > 1e-9) {
-    target_mm_ = to_mm;
-    sent_s_ = now_s;
-  } else if (report_.state == GRIP_SQUEEZE && now_s - sent_s_ > STANDS_s) {
+  moved_s_ = status_.moving || to_mm != target_mm_ ? now_s : moved_s_;
+  target_mm_ = to_mm;
+  if (now_s - moved_s_ > STANDS_s) {
     report_.state = GRIP_HOLDING;
   }
   command.motion = GRIP_MOVE;

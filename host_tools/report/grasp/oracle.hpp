@@ -37,7 +37,7 @@ private:
   std::vector<Moment> moments_;
   GripperStatus status_{};
   GripReport report_{};
-  double told_s_ = 0.0, target_mm_ = 0.0, sent_s_ = 0.0;
+  double told_s_ = 0.0, target_mm_ = 0.0, moved_s_ = 0.0;
 };
 
 } // namespace fingertip::grasp
