@@ -50,7 +50,8 @@ double GripFriction::value(double assumed) const {
 void GripLoad::rests(double load_N, double passed_s, bool swings) {
   peak_N_ -= std::min(passed_s / FORGETS_s, 1.0) * (peak_N_ - load_N_);
   const bool rises = load_N >= peak_N_ && !swings;
-  rate_N_s_ = rises ? std::max(load_N - slow_N_ - LOAD_NOISE_N, 0.0) / RATE_s : 0.0;
+  swings_s_ = load_N < peak_N_ - 2.0 * LOAD_NOISE_N ? SWINGS_s : swings_s_ - passed_s;
+  rate_N_s_ = rises && swings_s_ <= 0.0 ? std::max(load_N - slow_N_ - LOAD_NOISE_N, 0.0) / RATE_s : 0.0;
   slow_N_ += std::min(passed_s / RATE_s, 1.0) * (load_N - slow_N_);
   if (rises) {
     load_N_ = peak_N_ = load_N;

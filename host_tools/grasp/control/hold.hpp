@@ -35,6 +35,7 @@ public:
 
 private:
   double load_N_ = 0.0, slow_N_ = 0.0, peak_N_ = 0.0, rate_N_s_ = 0.0;
+  double swings_s_ = 0.0;
   bool is_known_ = false;
 };
 
