@@ -13,8 +13,9 @@ constexpr double LOAD_NOISE_N = 0.06;
 // rubber, or has begun to slide, and its mean counts.
 constexpr double RATE_s = 0.02, MEAN_s = 0.06, FORGETS_s = 0.3;
 constexpr double AHEAD_N = 3.0; // a rate is believed to add that much, or as much again
+constexpr double REMEMBERS_s = 1.0; // what a load has been it may be again
 constexpr double SWINGS_s = 0.25; // what was caught swings for so long
-constexpr double HELD_s = 0.05;   // a ratio that held, the mean of so long
+constexpr double HELD_s = 0.015;   // a ratio that held, the mean of so long
 // A load is steady that changes by less than this share within 0.1 s, or by less than that.
 constexpr double STEADY = 0.15, STEADY_s = 0.1, STEADY_N = 0.15;
 constexpr double LOADED_s = 0.3; // a load has been steady
@@ -50,7 +51,8 @@ double GripFriction::value(double assumed) const {
 void GripLoad::rests(double load_N, double passed_s, bool swings) {
   peak_N_ -= std::min(passed_s / FORGETS_s, 1.0) * (peak_N_ - load_N_);
   const bool rises = load_N >= peak_N_ && !swings;
-  rate_N_s_ = rises ? std::max(load_N - slow_N_ - LOAD_NOISE_N, 0.0) / RATE_s : 0.0;
+  swings_s_ = load_N < peak_N_ - 2.0 * LOAD_NOISE_N ? SWINGS_s : swings_s_ - passed_s;
+  rate_N_s_ = rises && swings_s_ <= 0.0 ? std::max(load_N - slow_N_ - LOAD_NOISE_N, 0.0) / RATE_s : 0.0;
   slow_N_ += std::min(passed_s / RATE_s, 1.0) * (load_N - slow_N_);
   if (rises) {
     load_N_ = peak_N_ = load_N;
@@ -78,7 +80,7 @@ void GripHold::begin() {
 }
 
 double GripHold::need_N(const GripSettings &settings, double dead_s) const {
-  const double load_N = sliding_ ? load_.now_N() : load_.ahead_N(dead_s);
+  const double load_N = sliding_ ? load_.now_N() : std::max(load_.ahead_N(dead_s), was_N_);
   const double margin = settings.margin * (slides_ > 0 ? settings.slid : 1.0);
   return margin * load_N / friction(settings);
 }
@@ -135,6 +137,7 @@ void GripHold::look(const GripFelts &felt, const GripSettings &settings, double 
   }
   has_told_ = true;
   load_.rests(felt.load_N, passed_s, slides_ > 0 && now_s - slid_s_ < SWINGS_s);
+  was_N_ = std::max(was_N_ - std::min(passed_s / REMEMBERS_s, 1.0) * was_N_, load_.now_N());
   ratio_ += std::min(passed_s / HELD_s, 1.0) * (felt.ratio - ratio_);
   lately_ -= std::min(passed_s / LATELY_s, 1.0) * lately_;
   if (felt.grip_N > 2.0 * settings.touch_N) {

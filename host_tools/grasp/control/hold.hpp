@@ -35,6 +35,7 @@ public:
 
 private:
   double load_N_ = 0.0, slow_N_ = 0.0, peak_N_ = 0.0, rate_N_s_ = 0.0;
+  double swings_s_ = 0.0;
   bool is_known_ = false;
 };
 
@@ -65,6 +66,7 @@ private:
   double raised_s_ = 0.0, fastest_mm_s_ = 0.0;
   double still_s_ = 0.0;  // the last frame that told no slide
   double steady_s_ = 0.0; // since when the load is steady
+  double was_N_ = 0.0;    // the load, as far as it is remembered
   double ratio_ = 0.0;    // smoothed, of what rests
   double lately_ = 0.0;   // the largest within LATELY_s
   double slid_mm_ = 0.0;  // how far this slide has gone

@@ -22,8 +22,7 @@ constexpr double SPACED_s = 0.003;     // widths of the ring
 constexpr double WIDTH_LAGS_s = 0.008; // newer forces tell nothing while the gripper moves
 constexpr double SHOWS_s = 0.02;       // after a move, in the force, whatever the clocks differ by
 constexpr double POLL_SHARE = 0.05;    // that an answer has in the mean
-// Of what the least move makes: less may be missing, and more than that must be spare.
-constexpr double MISSES = 0.2, SPARES = 1.25;
+constexpr double MISSES = 0.2; // of what the least move makes: less may be missing
 constexpr double NEAR = 0.03;             // of the wanted force: near enough
 constexpr double WEAK = 0.8;              // and too weak, where the cap leaves no room
 constexpr double SHORT_mm = 0.5;           // a move while squeezing
@@ -205,11 +204,12 @@ std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt
   const bool standing = std::abs(coming - status_.width_mm) < 1e-6;
   const double least = standing ? least_mm() : step_mm;
   const double closes_N = low_at(coming - least) - now_N;
-  const double opens_N = now_N - low_at(coming + least);
   const double near_N = NEAR * wanted_N;
   // What tells no load will not tell a slide either.
   const bool exact = haste == Haste::slides || !felt.tells_load;
-  const double misses_N = exact ? near_N : std::max(near_N, MISSES * closes_N);
+  // An opening that does not show yet is not taken back for less than a step.
+  const bool opens = !come && target_mm_ > width_mm;
+  const double misses_N = exact ? near_N : std::max(near_N, (opens ? 1.0 : MISSES) * closes_N);
   double to_mm = coming;
   if (now_N < wanted_N - misses_N) {
     const double enough_mm = rubber_.width_for(wanted_N - misses_N, low_N, width_mm);
@@ -228,8 +228,7 @@ std::uint32_t GripReach::aim(double wanted_N, Haste haste, const GripFelts &felt
       trouble |= GRIP_AT_CAP;
     }
     to_mm = way_mm >= least - 1e-9 ? coming - way_mm : coming;
-  } else if (haste != Haste::patient && come &&
-             now_N - wanted_N > std::max(near_N, SPARES * opens_N)) {
+  } else if (haste != Haste::patient && come && now_N - wanted_N > near_N) {
     const double enough_mm = rubber_.width_for(wanted_N + near_N, low_N, width_mm);
     const double way_mm = std::min(step_mm * std::floor((enough_mm - coming) / step_mm + 1e-6),
                                    std::max(step_mm * std::floor(OPENS_mm / step_mm), least));

@@ -1,6 +1,7 @@
 #include "grasp/kind_rows.hpp"
 
 #include "grasp/figures.hpp"
+#include "grasp/oracle.hpp"
 #include "grasp/settings.hpp"
 #include "grasp/textbook.hpp"
 #include "grasp/trials.hpp"
@@ -49,9 +50,10 @@ GripSettings settings_with(const KindOptions &options, const KindTrial &trial) {
   if (options.controller == "fixed" || options.controller == "paper") {
     values["fixed"] = options.controller == "fixed" ? FIXED_N : PAPER_N;
     values.erase("cap");
-  } else if (options.controller != "ours" && options.controller != "textbook") {
+  } else if (options.controller != "ours" && options.controller != "textbook" &&
+             options.controller != "oracle") {
     throw std::runtime_error("there is no controller \"" + options.controller +
-                             "\"; choose one of: ours textbook fixed paper");
+                             "\"; choose one of: ours textbook fixed paper oracle");
   }
   for (const auto &[name, value] : settings_of(options.settings)) {
     values[name] = value;
@@ -88,13 +90,21 @@ KindDone run_one(const KindOptions &options, std::uint64_t n,
   const GripperTraits &traits = trial.gripper.traits;
   const GripSettings settings = settings_with(options, trial);
   std::unique_ptr<Controller> controller;
-  if (options.controller == "textbook") {
+  std::function<void(const KindMoment &)> seen = trace;
+  if (options.controller == "oracle") {
+    auto oracle = std::make_unique<Oracle>(trial.grasp, trial.gripper, settings);
+    seen = [&trace, &told = *oracle](const KindMoment &moment) {
+      told.see(moment);
+      trace ? trace(moment) : void();
+    };
+    controller = std::move(oracle);
+  } else if (options.controller == "textbook") {
     controller = std::make_unique<Textbook>(traits);
   } else {
     controller = std::make_unique<CoreController>(settings, traits);
   }
   Timed timed(*controller);
-  const KindOutcome outcome = run_kind(trial, timed, trace);
+  const KindOutcome outcome = run_kind(trial, timed, seen);
   return {trial.grasp, outcome, settings.start_N, settings.cap_N,
           timed.mean_us()};
 }

@@ -11,7 +11,8 @@ namespace fingertip::grasp {
 struct KindOptions {
   std::string kind = "usual"; // or several by turns, split by commas
   std::string gripper = gripper_models().front().model;
-  std::string controller = "ours"; // ours, textbook, fixed (15 N), paper: eq. (5) and (6) at 6 N
+  // ours, textbook, fixed (15 N), paper: eq. (5) and (6) at 6 N, oracle
+  std::string controller = "ours";
   std::string settings;            // of ours: name=value, split by commas
   double later_s = 0.0;            // all frames come later by so much
   std::uint64_t seed = 1, first = 0, count = 100, jobs = 2;

@@ -16,7 +16,8 @@ GOALS = tuple((f"{name}_{called}", "<=", limit) for name, limits in BY_GRIPPER.i
     ("slick_drops_percent_worst", "<=", 3), ("peak_over_need_p95_worst", "<=", 3.5), ("hunting_percent_worst", "<=", 2), ("crushed_percent", "<=", 0),
     ("dropped_fragile_percent", "<=", 1), ("over_cap", "<=", 0), ("first_grip_over_2x_percent", "<=", 0.5), ("late_40ms_drops_percent", "<=", 3),
     ("step_us", "<=", 20))
-CONTROLLERS = {"ours": "ours", "textbook": "a textbook's: 1.3 load / friction, 30 % more in a slide", "fixed": "15 N", "paper": "eq. (5) and (6) at 6 N"}
+CONTROLLERS = {"ours": "ours", "textbook": "a textbook's: 1.3 load / friction, 30 % more in a slide", "fixed": "15 N", "paper": "eq. (5) and (6) at 6 N",
+               "oracle": "oracle"}
 # row: its options, whether it is judged; the others' controllers are beside it
 ROWS = {
     "usual and rough": (("--kind", "usual,rough"), True),
@@ -37,7 +38,8 @@ of each kind are in `host_tools/simulation/cell/kinds.cpp`. Only SLIDING is comp
 Dropped: slid by 22 mm in all, or never held. Need: what just holds by static friction. A catch: a slide of 0.3 mm or more that ended, with a need of 1.5 N
 or more. Hunting: the commanded width turns by 0.05 mm or more, half a time a second or more often, in the 4 s after the last disturbance. Over the cap: a true
 force of either pad. First grip over 2x: the mean force before the lift over twice the start force. An egg breaks at 25 N, a strawberry at 5 N, a cup at
-3 N; each is held with its preset."""
+3 N; each is held with its preset. The oracle is told the true load, friction and stiffness, and has the same frames, gripper and least move: a bar that it
+meets is one that the gripper allows."""
 COLUMNS = {"row": "kinds", "gripper": "gripper", "controller": "controller", "grasps": "grasps", "drops_percent": "dropped, %", "margin_p50": "margin: p50",
            "margin_p95": "p95", "catches": "catches", "peak_over_need_p50": "peak over need: p50", "peak_over_need_p95": "p95 ", "slid_p50_mm": "slid, mm: p50",
            "slid_p95_mm": "p95  ", "reaction_p50_ms": "reaction, ms: p50", "hunting_percent": "hunting, %", "crushed_percent": "crushed, %", "over_cap": "over the cap",

@@ -1,13 +1,7 @@
 // Grasps as they differ from each other: rubber, object, lift, what happens then, and the line.
 //
 // All of it is drawn from ranges. A kind is a set of ranges; kinds.cpp has them. The n-th grasp of
-// a kind and seed is always the same.
-//
-//   gentle    a slow lift, nothing else
-//   usual     a lift, then one or two disturbances
-//   rough     a quick lift, two or three disturbances, a late line that loses frames
-//   slick     the object turns slick within 5 to 60 ms
-//   fragile   an egg, a strawberry or a paper cup, carried with care
+// a kind and seed is always the same. host_tools/grasp/control/CONTROL.md has the table of kinds.
 #pragma once
 
 #include "simulation/cell/cell.hpp"
