@@ -111,8 +111,8 @@ class Store(unittest.TestCase):
         self.assertEqual(quiet["frames"], storing["frames"])
         for run_of in (storing, slowly):
             self.assertLess(abs(run_of["latency_us"]["median"] - quiet["latency_us"]["median"]), 3)
-            # The main loop looks after the store beside the frames. 23 us are measured.
-            self.assertLess(run_of["latency_us"]["p99"] - quiet["latency_us"]["p99"], 30)
+            # The main loop looks after the store beside the frames, and for a load, 41 us at most. 35 us are measured.
+            self.assertLess(run_of["latency_us"]["p99"] - quiet["latency_us"]["p99"], 41)
 
 
 if __name__ == "__main__":

@@ -54,7 +54,7 @@ def simulated(tool, environment, *options):
 def run_example(environment):
     """The lines that it printed, and what it wrote to standard error. It runs for ever, and is interrupted after so many lines."""
     program = example((ROOT / "README.md").read_text(encoding="utf-8"))
-    process = subprocess.Popen([sys.executable, "-u", "-c", program], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(["/usr/bin/python3", "-u", "-c", program], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     guard = threading.Timer(PATIENCE_s, process.kill)
     guard.start()
     lines = [line for line, _ in zip(iter(process.stdout.readline, ""), range(LINES))]

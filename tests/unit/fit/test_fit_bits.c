@@ -44,8 +44,8 @@ static void test_tangential(void) {
 }
 
 static void test_load(void) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0x2B34E686, 0x4BBB6167, 0x371BDC86, 0xBF9020EA,
-                                                 0x9364CD4A, 0x641007F6, 0xD89D9364, 0xA9575557};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0xD9087FD7, 0x28A84B74, 0xC1E6BE10, 0x7F79C1C5,
+                                                 0x267E674D, 0xE53C9600, 0x872F22ED, 0x0CCBE805};
   assert_kernel(FIT_BITS_LOAD, golden);
 }
 
