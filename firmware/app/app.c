@@ -108,8 +108,8 @@ void app_start(struct app *app, const struct array_bus *bus) {
 
 #if FT_WITH_FIT
 static void fit_frame(struct app *app) {
-  memset(&app->fit, 0, sizeof app->fit);
   if (!app->conditioned.contact) {
+    memset(&app->fit, 0, sizeof app->fit);
     return;
   }
   app->fit_settings.noise_Pa_q10 = app->frame.noise_Pa_q10;
