@@ -30,7 +30,7 @@ constexpr double STIFF_N = 5.0, STIFF_POWER = 1.4;
 const std::vector<GraspSetting> &grasp_settings() {
   static const std::vector<GraspSetting> all = {
       {FIXED, "N", 0.1, 100, 1, [](S &s) -> double & { return s.set_N; },
-       "Hold this force; default: as much as the load needs"},
+       "Hold this force, not as much as the load needs"},
       {"cap", "N", 0.5, 100, 1, [](S &s) -> double & { return s.cap_N; },
        "The true force stays below, errors of the fingertips included"},
       {"travel-cap", "mm", 0.5, 100, 1, [](S &s) -> double & { return s.travel_cap_mm; },

@@ -6,26 +6,32 @@
 #include "tool/cli/recording_options.hpp"
 #include "tool/cli/usage.hpp"
 
+#include <cmath>
+#include <cstdio>
 #include <memory>
 
 namespace fingertip {
 
 namespace {
 
-/* "N, 0.5 to 100": what an option takes. */
-std::string range_of(const GraspSetting &setting) {
-  auto text = [](double value) { return shortest(static_cast<float>(value)); };
-  return std::string(setting.unit) + (*setting.unit ? ", " : "") + text(setting.low) + " to " +
-         text(setting.high);
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, value == std::floor(value) ? "%.0f" : "%.4g", value);
+  return text;
 }
 
-/* Of the usual gripper; those that depend on it are not shown. */
+std::string range_of(const GraspSetting &setting) {
+  return number(setting.low) + " to " + number(setting.high);
+}
+
+/* Of the usual gripper, and of a servo if it has another. */
 std::string default_of(const GraspSetting &setting, const GripSettings &usual,
-                       const GripSettings &other) {
-  double value = value_of(setting, usual);
-  return value == value_of(setting, other) && setting.name != std::string("fixed")
-             ? "; default " + shortest(static_cast<float>(value))
-             : "";
+                       const GripSettings &servo) {
+  if (setting.name == std::string("fixed")) {
+    return "";
+  }
+  const double value = value_of(setting, usual), other = value_of(setting, servo);
+  return "; default " + number(value) + (value == other ? "" : ", of a servo " + number(other));
 }
 
 /* What breaks: a preset by name, or the force that breaks it. Options of single limits override it. */
@@ -33,7 +39,7 @@ void with_presets(CLI::App *command, std::map<std::string, double> &breaking) {
   std::string names;
   for (const GraspPreset &preset : grasp_presets()) {
     names += (names.empty() ? "" : ", ") + std::string(preset.name) + " (" +
-             shortest(static_cast<float>(preset.breaks_N)) + " N)";
+             number(preset.breaks_N) + " N)";
   }
   auto *preset = command->add_option_function<std::string>(
       "--preset",
@@ -61,7 +67,7 @@ void with_presets(CLI::App *command, std::map<std::string, double> &breaking) {
 void with_limits(CLI::App *command, std::map<std::string, double> &limits) {
   const auto models = gripper_models();
   const GripSettings usual = settings_for(models.front(), {});
-  const GripSettings other = settings_for(models.back(), {});
+  const GripSettings servo = settings_for(models.back(), {});
   for (const GraspSetting &setting : grasp_settings()) {
     std::string option = std::string("--") + setting.name;
     command
@@ -70,11 +76,12 @@ void with_limits(CLI::App *command, std::map<std::string, double> &limits) {
             [&limits, &setting, option](const std::string &text) {
               auto value = to_double(text);
               if (!value || *value < setting.low || *value > setting.high) {
-                wrong_value(option, text, range_of(setting));
+                const std::string unit = setting.unit;
+                wrong_value(option, text, unit + (unit.empty() ? "" : ", ") + range_of(setting));
               }
               limits[setting.name] = *value;
             },
-            setting.help + default_of(setting, usual, other))
+            std::string(setting.help) + ": " + range_of(setting) + default_of(setting, usual, servo))
         ->type_name(*setting.unit ? setting.unit : "X")
         ->group("Limits");
   }
@@ -106,7 +113,8 @@ void add_grasp(CommandLine &line) {
   with_gripper_line(command, options->gripper);
   with_presets(command, options->breaking);
   with_limits(command, options->limits);
-  command->footer("Exit status:\n"
+  command->footer("Keys, on a terminal: q end, holding; o open; h hold; g grasp.\n\n"
+                  "Exit status:\n"
                   "  0  as asked, the gripper holding or open\n"
                   "  1  an error, which is named\n"
                   "  2  wrong usage\n"
