@@ -78,6 +78,17 @@ class Usage(CliTest):
             self.assertIn("Usage:", words)
         self.assertIn("slip_window=MS (5 to 1000, and 160 frames at most), prior=SIGMA[:WIDTH]|none", " ".join(pages["set"].split()))
 
+    def test_the_help_of_grasp_knows_what_its_errors_know(self):
+        page = " ".join(self.run_cli("grasp", "--help")[0].split())
+        sections = page[page.index(" Limits: "):page.index(" Keys, ")].split(" --")[1:]
+        limits = [each.groups() for each in (re.fullmatch(r"([\w-]+) .*: ([0-9.]+ to [0-9.]+)(?:; default .*)?", section) for section in sections) if each]
+        self.assertGreater(len(limits), 20)
+        for option, most in limits:
+            self.assertIn(f"{most}; see fingertip grasp --help", self.error("grasp", f"--{option}=-1", status=2), option)
+        self.assertIn("Speed of opening: 0.5 to 100; default 10 ", page)
+        for key in ("q end", "o open", "h hold", "g grasp"):
+            self.assertIn(key, page[page.index(" Keys, "):page.index(" Exit status: ")])
+
     def test_names_cannot_speak_to_the_terminal(self):
         name = self.folder + "/\x1b[31m\n.csv"
         err = self.error("replay", name)
