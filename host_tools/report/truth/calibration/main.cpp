@@ -10,7 +10,7 @@
 extern "C" {
 #include "config/defaults.h"
 #include "config/geometry.h"
-#include "fit/fit.h"
+#include "fit/fit_load.h"
 }
 
 #include <algorithm>
@@ -71,7 +71,7 @@ double quantile(std::vector<double> values, double share) {
   return values.empty() ? 0.0 : values[std::size_t(share * double(values.size() - 1))];
 }
 
-// Taps on one pad, felt by the firmware's own fit.
+// Taps on one pad, felt by the firmware's own fit and its look for a load.
 class Taps {
 public:
   Taps(SessionPad pad, const std::vector<const twin::ContactTable *> &objects, std::uint64_t seed) {
@@ -115,6 +115,11 @@ public:
       }
       fit_result result;
       fit_gaussian_grid(&array, pressure, (1u << geometry.sensor_count) - 1u, &settings, &result);
+      fit_load load{};
+      for (int frame = 0; frame < FIT_LOAD_PARTS; frame++) { // held until it has looked
+        fit_load_follow(&load, &array, pressure, &settings, &result);
+      }
+      fit_load_widen(&load, &array, &settings, &result);
       felt.location_mm.push_back(std::hypot(static_cast<double>(result.x_mm) - tap.x_mm,
                                             static_cast<double>(result.y_mm) - tap.y_mm));
       felt.force.push_back(static_cast<double>(result.force_N) / tap.force_N);
@@ -490,7 +495,8 @@ json measure(const Options &options) {
       // Of the kind that is refused least often.
       {"refused_percent_worst", refused_worst},
       {"cal_force_mape_percent", 100.0 * mean(usual.force_after)},
-      // Round touches, with all that a calibration leaves, on pads without a dip and with one.
+      // Round touches without a load, with all that a calibration leaves, on pads without a dip and
+      // with one.
       {"calibrated_warned_percent_worst", std::max(warned_percent(usual), warned_percent(cast))},
       {"truth_calibration",
        {{"pads", options.pads},
