@@ -24,7 +24,7 @@
 #define FT_WITH_TANGENTIAL FINGERTIP_TANGENTIAL
 #endif
 
-/* What a tangential load that nobody estimates does to the location: fit_load.h. The paper's scene
+/* What a tangential load that is not estimated does to the location: fit_load.h. The paper's scene
  * keeps the paper's fit. */
 #ifndef FT_WITH_LOAD_DOUBT
 #ifdef FINGERTIP_SCENE_PAPER

@@ -1,4 +1,4 @@
-/* What a tangential load that nobody estimates does to the location.
+/* What a tangential load that is not estimated does to the location.
  *
  * A load that pulls along the rubber moves the Gaussian by some 0.38 pitch for each unit of Q / F,
  * though nothing has moved. It leaves a trace in the residual: its pressure is broader than the

@@ -21,7 +21,7 @@ const SEARCH_CYCLES_MAX = 44500;
 const OUTLIER_CYCLES_MAX = 94000;
 /** A frame's tangential estimate, which follows the fit, with the image's pad. */
 const TANGENTIAL_CYCLES_MAX = 40000;
-/** A part of the look for a load that nobody estimates, which follows the frame's packet (fit_load.h), and all of them. */
+/** A part of the look for a load that is not estimated, which follows the frame's packet (fit_load.h), and all of them. */
 const LOAD_PART_CYCLES_MAX = 5500;
 const LOAD_CYCLES_MAX = 25000;
 const LOAD_PARTS = 6;

@@ -2,7 +2,7 @@
 // look at, to record and to calibrate from.
 //
 // The pad: 12 mm of silicone without ends, which relaxes as the twin's does (twin/effects.hpp).
-// Sensors' gains differ by 10 %, and nobody has calibrated them.
+// Sensors' gains differ by 10 %, and are not calibrated.
 #pragma once
 
 #include "simulation/cell/place.hpp"

@@ -118,7 +118,7 @@ static void without_a_profile_there_is_none_and_the_fit_stays_as_it_is(void) {
 
 /* Until the readings have been looked at it is 0.2 of the force: for one frame where they are far
  * apart. */
-static void a_load_that_nobody_estimates_is_part_of_the_error(void) {
+static void a_load_that_is_not_estimated_is_part_of_the_error(void) {
   for (int kind = 0; kind < 4; kind++) {
     const bool loaded = kind % 2 != 0, slow = kind < 2;
     load.qx_N = loaded ? 1.5 : 0.0;
@@ -297,7 +297,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(a_profile_tells_the_load_and_corrects_the_location);
   RUN_TEST(without_a_profile_there_is_none_and_the_fit_stays_as_it_is);
-  RUN_TEST(a_load_that_nobody_estimates_is_part_of_the_error);
+  RUN_TEST(a_load_that_is_not_estimated_is_part_of_the_error);
   RUN_TEST(a_profile_outlives_power_until_it_is_erased);
   RUN_TEST(a_profile_keeps_the_calibrations_shape_from_the_fit);
   RUN_TEST(a_profile_out_of_range_is_refused);

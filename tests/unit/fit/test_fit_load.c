@@ -1,4 +1,4 @@
-/* A load that nobody estimates: its trace in the residual, and what that makes of the error. */
+/* A load that is not estimated: its trace in the residual, and what that makes of the error. */
 #include "common/contact_flags.h"
 #include "fit/fit_load.h"
 #include "support/random.h"

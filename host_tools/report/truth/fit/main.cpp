@@ -2,7 +2,7 @@
 //
 // Touches of the twin's objects on pads (touches.hpp) go through the firmware's fit_gaussian_grid
 // with the settings that the firmware starts with; those that pull along the rubber also through its
-// look for a load that nobody estimates (fit_load.h). One JSON object on the standard output: the keys
+// look for a load that is not estimated (fit_load.h). One JSON object on the standard output: the keys
 // that are judged, and under "cases", "loaded", "elongated", "iterations" and "few_sensors" the
 // tables behind them. The constants of fit_limits.h and defaults.h were chosen with --seed 1.
 #include "libfingertip/in_parallel.hpp"
@@ -265,7 +265,7 @@ void judge_coverage(const Options &options, const std::vector<Contact> &thick,
   out["cover_2sd_min"] = least_2;
 }
 
-// No profile, so that nobody estimates the load. Without a load: what the look for one costs.
+// No profile, so that is not estimated the load. Without a load: what the look for one costs.
 void judge_loaded(const Options &options, const CalibratedPads &calibrated, ordered_json &out) {
   shear::Objects objects(options.cache);
   struct Kind {
