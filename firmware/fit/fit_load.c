@@ -12,8 +12,9 @@
  * sensor, g(v) = exp(-d' d / (2 v)):
  *   residual = g(1) (a + b dx + c dy + e d' d) + far g(FAR) + (qx dx + qy dy) g(PULL)
  * The first four are what a step of the fit would still take. `far` is what the rubber has around a
- * contact, heavier tails or a dip, and is 0 +- FAR_SD. The last two are the trace of a load: of the
- * terms of a layer's profile (common/pad_profile.h) the narrow ones are such steps.
+ * contact, heavier tails, a dip, or what a known dip is off by, and is 0 +- FAR_SD. The last two
+ * are the trace of a load: of the terms of a layer's profile (common/pad_profile.h) the narrow ones
+ * are such steps.
  */
 enum { HEIGHT, ALONG_X, ALONG_Y, WIDTH, FAR, PULL_X, PULL_Y, UNKNOWNS };
 _Static_assert(UNKNOWNS == FIT_LOAD_UNKNOWNS, "the look's room is for them");
@@ -54,23 +55,19 @@ FIXED_INLINE int32_t exp2_rough(uint32_t z_q22) {
 #define DIP_PER_MAX_Q26 (1 << 29) /* 8 */
 #define Z_MAX_Q22 (1u << 27)      /* 6.7 sigma away */
 
-/* 2^shift: the readings' unit, 1/1024 Pa. */
 static void set_dip(const struct fit_settings *settings, const struct fit_result *result,
-                    int32_t shift, struct fit_load_look *look) {
-  look->dip_q18 = look->dip_per_q26 = look->dip_error_q4 = 0;
+                    struct fit_load_look *look) {
+  look->dip_q18 = look->dip_per_q26 = 0;
   if (fit_has_dip(settings)) {
     struct scaled ratio =
         scaled_div(fit_grid_scaled(result->sigma_mm), fit_grid_scaled(settings->dip_sd_mm));
-    struct scaled error = scaled_mul(fit_grid_scaled(settings->dip_share * FIT_DIP_ERROR),
-                                     fit_grid_scaled(result->p0_Pa));
-    error.exponent += 10 - shift;
     look->dip_q18 = fit_fixed(settings->dip_share, 18);
     look->dip_per_q26 =
         fixed_clamp(fit_scaled_to_fixed(scaled_mul(ratio, ratio), 26), 0, DIP_PER_MAX_Q26);
-    look->dip_error_q4 = fixed_clamp(fit_scaled_to_fixed(error, 4), 0, ERROR_MAX_Q4);
   }
 }
 
+/* 2^shift: the readings' unit, 1/1024 Pa. */
 static void set_base(const struct fit_settings *settings, int32_t largest, int32_t shift,
                      struct fit_load_look *look) {
   int32_t noise_q4 = fixed_clamp(shifted(settings->noise_Pa_q10, 4 - shift), 1, ERROR_MAX_Q4);
@@ -108,7 +105,7 @@ static bool take_readings(const struct fit_array *array, const int32_t *pressure
   memset(look->size, 0, sizeof look->size);
   int32_t shift = fixed_bits((uint32_t)largest) - READING_BITS;
   set_base(settings, largest, shift, look);
-  set_dip(settings, result, shift, look);
+  set_dip(settings, result, look);
   struct scaled per_p0 = fit_grid_reciprocal(fit_grid_scaled(result->p0_Pa));
   look->base = scaled_mul(fit_scaled_from(look->base_q4, shift - 14), per_p0);
   const float per_pitch = 1.0f / array->pitch_mm;
@@ -144,7 +141,6 @@ static NOINLINE void set_row(struct fit_load_look *look, int32_t *row) {
     int32_t z_dip = fixed_mul_q26((int32_t)(z < Z_MAX_Q22 ? z : Z_MAX_Q22), look->dip_per_q26);
     int32_t dip_q12 = exp2_rough((uint32_t)z_dip) >> 18;
     reading_q18 += (look->dip_q18 * dip_q12) >> 12;
-    error_q4 = fixed_longer_leg(error_q4, (look->dip_error_q4 * dip_q12) >> 12);
   }
   int32_t weight_q12 = port_divide(look->base_q4 << 12, error_q4);
   int32_t residual_q18 = fixed_clamp(reading_q18 - e_q18, -(1 << 18), 1 << 18);

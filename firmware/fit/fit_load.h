@@ -41,7 +41,7 @@ struct fit_load_look {
   int8_t up[FIT_LOAD_UNKNOWNS];                             /* of q, what the equations have more */
   int32_t base_q4;                                          /* error of a reading of weight 1 */
   struct scaled base;                                       /* the same, of p0 */
-  int32_t dip_q18, dip_error_q4;                            /* of p0, and what it is off by */
+  int32_t dip_q18;                                          /* of p0 */
   int32_t dip_per_q26;                                      /* sigma^2 over the dip's sd^2 */
   int32_t matrix[FIT_LOAD_UNKNOWNS][FIT_LOAD_UNKNOWNS];     /* lower half of the normal matrix */
   int32_t right[FIT_LOAD_UNKNOWNS];

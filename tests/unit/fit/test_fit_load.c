@@ -148,31 +148,41 @@ static void test_a_look_does_not_mix_frames(void) {
   TEST_ASSERT_EQUAL_FLOAT(held.ratio, moved.ratio);
 }
 
-/* What is known of the pad's dip is taken out of the residual too. */
+/* What is known of the pad's dip is taken out of the residual too. A calibration finds a wider one
+ * than there is, since it can not tell a narrow one from zeros (DIP_PITCHES of the solver). */
 static void test_a_dip_that_is_known_is_no_load(void) {
-  struct fit_settings settings = usual();
-  settings.dip_share = 0.05f;
-  settings.dip_sd_mm = 15.0f;
-  double without_mm = 0.0, with_mm = 0.0;
-  for (int i = 0; i < 50; i++) {
-    double x_mm = random_between(&noise, -6.0, 6.0), y_mm = random_between(&noise, -14.0, 14.0);
-    int32_t pressure_Pa_q10[SENSORS];
-    press(x_mm, y_mm, 0.0, 0.0, pressure_Pa_q10);
-    struct fit_result result;
-    const struct fit_settings plain = {.iterations = 4, .noise_Pa_q10 = 4096};
-    fit_gaussian(&array, pressure_Pa_q10, ALL, &plain, &result);
-    for (int k = 0; k < SENSORS; k++) {
-      double dx = 9.0 * (k / 5 - 1) - x_mm, dy = 9.0 * (k % 5 - 2) - y_mm;
-      pressure_Pa_q10[k] -= (int32_t)(0.05 * 1024.0 * (double)result.p0_Pa *
-                                      exp(-(dx * dx + dy * dy) / (2.0 * 15.0 * 15.0)));
+  static const float told_mm[] = {15.0f, 20.7f};
+  for (int c = 0; c < 2; c++) {
+    struct fit_settings settings = usual();
+    settings.prior_sigma_mm = 5.6f;
+    settings.prior_width_mm = 0.07f;
+    settings.dip_share = 0.05f;
+    settings.dip_sd_mm = told_mm[c];
+    int warned[2] = {0}; /* without a load, with one */
+    for (int i = 0; i < 400; i++) {
+      double x_mm = random_between(&noise, -9.0, 9.0), y_mm = random_between(&noise, -18.0, 18.0);
+      double load = i % 2 ? 0.4 : 0.0, angle = random_between(&noise, 0.0, 6.28);
+      int32_t pressure_Pa_q10[SENSORS];
+      press(x_mm, y_mm, 0.0, 0.0, pressure_Pa_q10);
+      struct fit_result result;
+      const struct fit_settings plain = {.iterations = 4, .noise_Pa_q10 = 4096};
+      fit_gaussian(&array, pressure_Pa_q10, ALL, &plain, &result);
+      press(x_mm, y_mm, load * cos(angle), load * sin(angle), pressure_Pa_q10);
+      for (int k = 0; k < SENSORS; k++) {
+        double dx = 9.0 * (k / 5 - 1) - x_mm, dy = 9.0 * (k % 5 - 2) - y_mm;
+        pressure_Pa_q10[k] -= (int32_t)(0.05 * 1024.0 * (double)result.p0_Pa *
+                                        exp(-(dx * dx + dy * dy) / (2.0 * 14.0 * 14.0)));
+      }
+      struct fit_load held = {0};
+      hold(&held, pressure_Pa_q10, ALL, &settings, &result);
+      warned[i % 2] += (result.flags & CONTACT_FLAG_UNCERTAIN) != 0;
     }
-    struct fit_load load = {0};
-    fit_gaussian(&array, pressure_Pa_q10, ALL, &settings, &result);
-    without_mm += (double)result.location_sd_mm;
-    hold(&load, pressure_Pa_q10, ALL, &settings, &result);
-    with_mm += (double)result.location_sd_mm;
+    char text[80];
+    snprintf(text, sizeof text, "told %.1f mm, of 200 warned: %d, loaded %d", (double)told_mm[c],
+             warned[0], warned[1]);
+    TEST_ASSERT_LESS_OR_EQUAL_INT_MESSAGE(4, warned[0], text);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT_MESSAGE(180, warned[1], text);
   }
-  TEST_ASSERT_TRUE(with_mm < 1.3 * without_mm);
 }
 
 static void test_sensors_may_be_missing(void) {

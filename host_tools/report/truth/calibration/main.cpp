@@ -97,6 +97,7 @@ public:
     fit_array_init_grid(&array, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
                         geometry.pitch_mm);
     fit_settings settings{};
+    fit_set_errors(&settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
     settings.iterations = DEFAULT_FIT_ITERATIONS;
     settings.cut_noises = DEFAULT_CUT_NOISES;
     settings.noise_Pa_q10 = static_cast<std::int32_t>(NOISE_Pa * 1024.0);
