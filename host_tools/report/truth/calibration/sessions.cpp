@@ -240,10 +240,10 @@ Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::
       }
       const auto scale =
           calibrating::force_scale(session_array(), placements, judgement.solution, WEIGHT_N,
-                               calibrating::shape_of(judgement.solution));
+                                   calibrating::shape_of(judgement.solution));
       if (judgement.state == calibrating::Judgement::State::good && scale) {
         const std::vector<double> truth = pad.settled_gains();
-        Calibrated left{{}, judgement.solution.gain_sd, scale->scale, scale->sd};
+        Calibrated left{{}, judgement.solution.reading_sd, scale->scale, scale->sd};
         for (std::size_t k = 0; k < truth.size(); k++) {
           left.remaining_gain.push_back(truth[k] / judgement.solution.gain[k]);
         }
