@@ -19,7 +19,7 @@
 #define FRAME_WAIT_us 100000u
 /* A zero that is not followed may be off by 30 Pa after so long: condition.h. */
 #define ZERO_LASTS_us 60000000u
-/* Frames so far apart leave time for all parts of fit_load.h. */
+/* Frames so far apart leave time for all parts of fit_load.h, and for fit_gains.h. */
 #define LOOK_AT_ONCE_us 4500u
 /* Up to this pitch the neighbours feel what one sensor feels: see READINGS_STILL_NOISES. */
 #define SHARED_PITCH_mm 9.0f
@@ -150,17 +150,35 @@ static void doubt_load(struct app *app) {
   }
 }
 
-/* For the frames that follow. Where they are far apart there is time for a whole look. */
+static void learn_gains(struct app *app) {
+  if (fit_gains_learn(&app->learnt_gains, &app->fit_array, app->conditioned.pressure_Pa_q10,
+                      &app->fit_settings, &app->fit)) {
+    const float gain_sd = fit_gains_sd(&app->learnt_gains);
+    for (unsigned k = 0; k < geometry.sensor_count; k++) {
+      app->fit_settings.gain_sd_q16[k] = (uint16_t)(65536.0f * gain_sd + 0.5f);
+    }
+  }
+}
+
+/* For the frames that follow. Where they are far apart there is time for all. */
 static void look_for_load(struct app *app) {
   const uint32_t t_us = (uint32_t)app->frame.t_us;
   const bool slow = t_us - app->load_frame_us >= LOOK_AT_ONCE_us;
   app->load_frame_us = t_us;
   if (!app->conditioned.contact || is_load_estimated(app)) {
     fit_load_begin(&app->load_doubt);
+    fit_gains_lift(&app->learnt_gains);
+    app->gains_due = false;
   } else {
-    for (int parts = slow ? FIT_LOAD_PARTS : 1; parts > 0; parts--) {
+    for (int parts = slow ? FIT_LOAD_PARTS + 1 : 1; parts > 0; parts--) {
+      if (app->gains_due) {
+        learn_gains(app);
+        app->gains_due = false;
+        continue;
+      }
       fit_load_follow(&app->load_doubt, &app->fit_array, app->conditioned.pressure_Pa_q10,
                       &app->fit_settings, &app->fit);
+      app->gains_due = app->load_doubt.part == 0 && !app->calibration;
     }
   }
 }

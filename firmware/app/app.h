@@ -15,6 +15,7 @@
 #include "contact/motion.h"
 #include "contact/tangential.h"
 #include "fit/fit.h"
+#include "fit/fit_gains.h"
 #include "fit/fit_load.h"
 #include "fit/fit_tangential.h"
 #include "port/sync.h"
@@ -47,7 +48,9 @@ struct app {
 #endif
 #if FT_WITH_LOAD_DOUBT
   struct fit_load load_doubt;
-  uint32_t load_frame_us; /* the last frame's time */
+  struct fit_gains learnt_gains; /* while no calibration acts */
+  bool gains_due;                /* of this contact, between two looks */
+  uint32_t load_frame_us;        /* the last frame's time */
 #endif
 #if FT_WITH_SLIP
   struct slip_history slip_history;

@@ -25,6 +25,8 @@ const TANGENTIAL_CYCLES_MAX = 40000;
 const LOAD_PART_CYCLES_MAX = 5500;
 const LOAD_CYCLES_MAX = 25000;
 const LOAD_PARTS = 6;
+/** What a touch tells of the gains, in the time of such a part (fit_gains.h). */
+const GAINS_CYCLES_MAX = 7000;
 /** Between the cheapest and the dearest press, share of the dearest: a contact at a bound has no widths to tell. */
 const SPREAD_MAX = 0.1;
 /** FINGERTIP_FIT_ITERATIONS. */
@@ -117,6 +119,16 @@ test(`no part of the look for a load takes more than ${LOAD_PART_CYCLES_MAX} cyc
     sum += dearest;
   }
   assert.ok(sum <= LOAD_CYCLES_MAX, `all: ${sum}`);
+});
+
+test(`what a touch tells of the gains takes at most ${GAINS_CYCLES_MAX} cycles`, (t) => {
+  const inside = Array.from({ length: 60 }, () => press(between(-8, 8), between(-17, 17), 10 ** between(4, 5), between(5.5, 6.5), 2));
+  for (const [name, list] of Object.entries({ inside, presses, garbage })) {
+    const cycles = list.map((readings) => cyclesOf(readings, ITERATIONS, ALL, 'gains_of_touch')).sort((a, b) => a - b);
+    t.diagnostic(`${name}: ${cycles[0]} ${cycles[cycles.length >> 1]} ${cycles[cycles.length - 1]} cycles (min, median, max)`);
+    assert.ok(cycles[cycles.length - 1] <= GAINS_CYCLES_MAX, `${name}: ${cycles[cycles.length - 1]}`);
+    assert.ok(name !== 'inside' || cycles[0] > 0.5 * GAINS_CYCLES_MAX, 'these count');
+  }
 });
 
 test(`looking for an outlier: at most ${SEARCH_CYCLES_MAX} cycles in vain, ${OUTLIER_CYCLES_MAX} with the fit without it`, (t) => {

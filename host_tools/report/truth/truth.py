@@ -35,6 +35,7 @@ GOALS = (
     ("refused_percent_worst", ">=", 90), ("cal_force_mape_percent", "<=", 2), ("calibrated_warned_percent_worst", "<=", 5),
     ("cover_1sd_min", ">=", 55), ("cover_1sd_max", "<=", 75), ("cover_2sd_min", ">=", 93), ("cal_warned_percent", "<=", 5),
     ("cal_bad_unflagged_percent", "<=", 0.1), ("raw_warned_percent", "<=", 32), ("raw_bad_unflagged_percent", "<=", 1.3),
+    ("raw_20_bad_unflagged_percent", "<=", 2),
     ("loaded_silent_percent", "<=", 1), ("unloaded_warned_percent", "<=", 5), ("elongated_bad_unflagged_percent", "<=", 3),
     ("round_elongated_percent", "<=", 1),
     ("slow_force_error_percent", "<=", 2), ("false_contacts", "<=", 0), ("zero_recovery_s", "<=", 5), ("real_phantom_percent_worst", "<=", 5),

@@ -1,4 +1,5 @@
 /* Tangential load, from sensors to packets: on the pad that the profile describes. */
+#include "app/acting.h"
 #include "app_rig.h"
 #include "common/contact_flags.h"
 #include "config/defaults.h"
@@ -150,6 +151,22 @@ static void a_load_that_is_not_estimated_is_part_of_the_error(void) {
   }
 }
 
+/* One touch, of gains that are alike: what was assumed is less then, and stays so. */
+static void touches_tell_the_gains_of_a_pad_without_a_calibration(void) {
+  const uint16_t assumed_q16 = (uint16_t)(65536.0f * DEFAULT_GAIN_SD + 0.5f);
+  native_cdc_open();
+  run_for(1400);
+  TEST_ASSERT_EQUAL_UINT16(assumed_q16, app.fit_settings.gain_sd_q16[14]);
+  run_for(400);
+  const uint16_t learnt_q16 = app.fit_settings.gain_sd_q16[14];
+  TEST_ASSERT_EQUAL_UINT16(learnt_q16, app.fit_settings.gain_sd_q16[0]);
+  TEST_ASSERT_TRUE(learnt_q16 < 0.95f * assumed_q16 && learnt_q16 > 0.8f * assumed_q16);
+  run_for(400);
+  TEST_ASSERT_EQUAL_UINT16(learnt_q16, app.fit_settings.gain_sd_q16[14]);
+  app_use_calibration(&app, NULL); /* as after its erasure */
+  TEST_ASSERT_EQUAL_UINT16(assumed_q16, app.fit_settings.gain_sd_q16[14]);
+}
+
 static void a_profile_outlives_power_until_it_is_erased(void) {
   struct wire_packet command = pad_command();
   store_pad(&command);
@@ -298,6 +315,7 @@ int main(void) {
   RUN_TEST(a_profile_tells_the_load_and_corrects_the_location);
   RUN_TEST(without_a_profile_there_is_none_and_the_fit_stays_as_it_is);
   RUN_TEST(a_load_that_is_not_estimated_is_part_of_the_error);
+  RUN_TEST(touches_tell_the_gains_of_a_pad_without_a_calibration);
   RUN_TEST(a_profile_outlives_power_until_it_is_erased);
   RUN_TEST(a_profile_keeps_the_calibrations_shape_from_the_fit);
   RUN_TEST(a_profile_out_of_range_is_refused);

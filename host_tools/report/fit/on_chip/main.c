@@ -4,6 +4,7 @@
 #include "alternatives/alternatives.h"
 #include "config/geometry.h"
 #include "fit/fit.h"
+#include "fit/fit_gains.h"
 #include "fit/fit_load.h"
 #include "fit/fit_tangential.h"
 #include "fit/kernels.h"
@@ -35,6 +36,7 @@ static struct fit_pad pad;
 static struct fit_tangential_state tangential_state;
 static struct fit_tangential tangential_result;
 static struct fit_load load;
+static struct fit_gains gains;
 
 static void nothing(void) {}
 
@@ -96,6 +98,11 @@ LOAD_PART(5)
 static void (*const load_parts[FIT_LOAD_PARTS])(void) = {load_0, load_1, load_2,
                                                          load_3, load_4, load_5};
 
+/* A touch that rests, after `fit` of the same readings. */
+static void gains_of_touch(void) {
+  fit_gains_learn(&gains, &layout, job.pressure_Pa_q10, &chosen, &contact);
+}
+
 #define ALTERNATIVE(name, solver, real)                                                            \
   static void name(void) {                                                                         \
     const struct alternative_settings options = {(int)job.iterations,                              \
@@ -117,7 +124,7 @@ static void (*const kernels[])(void) = {
     naive_double, lm_float,  lm_double,
     tangential, load_0,    load_1,
     load_2,    load_3,    load_4,
-    load_5,    FIT_GRID_KERNELS(NAME) FIT_OTHER_KERNELS(NAME)};
+    load_5,    gains_of_touch, FIT_GRID_KERNELS(NAME) FIT_OTHER_KERNELS(NAME)};
 
 int main(void) {
   if (fit_array_init(&layout, geometry.sensor_count, geometry.x_mm, geometry.y_mm,
@@ -152,6 +159,11 @@ int main(void) {
           follow_load();
         }
       }
+    }
+    if (kernel == gains_of_touch) {
+      fit();
+      fit_gains_begin(&gains, 0.1f);
+      gains.p0_Pa = contact.p0_Pa;
     }
     CALL_DEBUGGER(CALL_START);
     kernel();
