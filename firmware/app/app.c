@@ -1,7 +1,6 @@
 #include "app/app.h"
 
 #include "app/acting.h"
-
 #include "app/commands.h"
 #include "app/packets.h"
 #include "app/sync.h"
@@ -78,6 +77,10 @@ void app_start(struct app *app, const struct array_bus *bus) {
   app->fit_settings.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
   app->rest.apart_Pa = MS58XX_APART_Pa;
 #endif
+#if FT_WITH_TANGENTIAL
+  app->tangential_job.array = &app->fit_array;
+  worker_init(&app->worker, tangential_estimate, &app->tangential_job);
+#endif
 #if FT_WITH_SLIP
   app->contact_settings.slip_threshold_mm = DEFAULT_SLIP_THRESHOLD_mm;
   app->contact_settings.slip_window_us = DEFAULT_SLIP_WINDOW_ms * 1000u;
@@ -123,21 +126,28 @@ static void fit_frame(struct app *app) {
 
 #if FT_WITH_TANGENTIAL
 static void estimate_tangential_load(struct app *app) {
-  if (app->pad && app->conditioned.contact) {
-    tangential_estimate(&app->tangential_course, &app->fit_array, &app->fit_pad,
-                        app->conditioned.pressure_Pa_q10, &app->fit_settings, &app->fit,
-                        app->frame.saturated, app->frame.t_us, &app->tangential);
-  } else {
-    memset(&app->tangential, 0, sizeof app->tangential);
-    memset(&app->tangential_course, 0, sizeof app->tangential_course);
+  const bool asks = app->pad && app->conditioned.contact;
+  if (asks) {
+    app->tangential_job.question = (struct tangential_question){
+        .begins = !app->tangential_follows,
+        .saturated = app->frame.saturated,
+        .t_us = app->frame.t_us,
+        .pressure_Pa_q10 = app->conditioned.pressure_Pa_q10,
+        .settings = &app->fit_settings,
+        .fit = &app->fit,
+    };
+    worker_ask(&app->worker);
+    worker_serve(&app->worker); /* in line */
   }
+  app->tangential = asks ? &app->tangential_job.estimate : NULL;
+  app->tangential_follows = asks;
 }
 #endif
 
 #if FT_WITH_LOAD_DOUBT
 static bool is_load_estimated(const struct app *app) {
 #if FT_WITH_TANGENTIAL
-  return app->tangential.valid;
+  return app->tangential && app->tangential->valid;
 #else
   (void)app;
   return false;
@@ -185,7 +195,7 @@ static void judge_frame(struct app *app) {
     .calibrated = app->calibration != NULL,
 #endif
 #if FT_WITH_TANGENTIAL
-    .tangential = &app->tangential,
+    .tangential = app->tangential,
 #endif
   };
 #if FT_WITH_FIT

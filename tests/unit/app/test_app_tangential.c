@@ -248,8 +248,8 @@ static void a_calibration_and_the_scale_of_the_profile_act(void) {
   const float scale = 1.25f * command.body.cmd_pad.profile.force_ratio;
   TEST_ASSERT_FLOAT_WITHIN(0.2f, scale * 5.0f, contact.force_N);
   TEST_ASSERT_FLOAT_WITHIN(0.2f, 1.5f * scale * 1.2f, contact.qx_N);
-  TEST_ASSERT_EQUAL_FLOAT(scale * app.tangential.force_N, contact.force_N);
-  TEST_ASSERT_FLOAT_WITHIN(1e-5f, 1.5f * scale * app.tangential.qx_N, contact.qx_N);
+  TEST_ASSERT_EQUAL_FLOAT(scale * app.tangential->force_N, contact.force_N);
+  TEST_ASSERT_FLOAT_WITHIN(1e-5f, 1.5f * scale * app.tangential->qx_N, contact.qx_N);
   TEST_ASSERT_EQUAL_FLOAT(app.load.location_sd_mm, contact.location_sd_mm);
   TEST_ASSERT_TRUE(app.load.location_sd_mm != app.fit.location_sd_mm);
 }
