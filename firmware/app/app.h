@@ -43,6 +43,8 @@ struct app {
   struct tangential_settings tangential_settings; /* of it and the calibration */
   struct worker worker;                           /* of the job below */
   struct tangential_job tangential_job;
+  bool has_worker;         /* a processor of its own; else the main loop serves itself */
+  bool tangential_is_late; /* in this frame */
   bool tangential_follows; /* the frame before was of the same contact and pad */
   struct tangential_history tangential_history;
   struct motion_history motion_history;

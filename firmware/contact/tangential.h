@@ -78,6 +78,11 @@ struct tangential_job {
  * further. So it takes up to FIT_TANGENTIAL_FRAMES steps until an estimate can be reported. */
 #define TANGENTIAL_SLOW_us 4500u
 
+/* A Cortex-M0+ at 125 MHz answers within 320 us, and within 1.6 ms after a slow frame
+ * (fit_tangential.h). What takes longer than this is not waited for. */
+#define TANGENTIAL_LATE_us 450u
+#define TANGENTIAL_SLOW_LATE_us 2250u
+
 /* Answers the question of a struct tangential_job. Where the fit is not worthwhile there is no
  * estimate, and the course starts again. */
 void tangential_estimate(void *job);
