@@ -32,6 +32,14 @@ static struct {
   jmp_buf out;
 } native = {.alarm_us = UINT64_MAX};
 
+static struct {
+  bool exists;
+  uint64_t takes_us, due_us;
+  bool (*serve)(void *context);
+  void *context;
+  unsigned starts;
+} worker = {.due_us = UINT64_MAX};
+
 static _Noreturn void stop(const char *why) {
   (void)fprintf(stderr, "native_port: %s at %llu us\n", why, (unsigned long long)native.now_us);
   abort();
@@ -40,6 +48,8 @@ static _Noreturn void stop(const char *why) {
 void native_start(bool by_watchdog) {
   memset(&native, 0, sizeof native);
   native.alarm_us = UINT64_MAX;
+  worker.due_us = UINT64_MAX;
+  worker.starts = 0;
   native.started_by_watchdog = by_watchdog;
 }
 
@@ -135,6 +145,12 @@ void port_alarm_at_us(uint64_t t_us) {
 
 void port_sleep(void) {
   const uint64_t next_us = next_event_us();
+  if (worker.due_us <= next_us) {
+    pass_time_to(worker.due_us);
+    worker.due_us = UINT64_MAX;
+    worker.serve(worker.context);
+    return;
+  }
   if (next_us == UINT64_MAX) {
     stop("the main loop sleeps and nothing will wake it");
   }
@@ -143,6 +159,32 @@ void port_sleep(void) {
   } else {
     take_event(next_us);
   }
+}
+
+void native_set_worker(bool exists, uint64_t takes_us) {
+  worker.exists = exists;
+  worker.takes_us = takes_us;
+}
+
+unsigned native_worker_starts(void) {
+  return worker.starts;
+}
+
+bool port_worker_start(bool (*serve)(void *context), void *context) {
+  worker.serve = serve;
+  worker.context = context;
+  worker.due_us = UINT64_MAX;
+  worker.starts += worker.exists;
+  return worker.exists;
+}
+
+void port_worker_wake(void) {
+  const uint64_t takes_us = worker.takes_us;
+  worker.due_us = takes_us == UINT64_MAX ? UINT64_MAX : native.now_us + takes_us;
+}
+
+void port_worker_stop(void) {
+  worker.due_us = UINT64_MAX;
 }
 
 void port_save_power(bool saving) {

@@ -32,6 +32,13 @@ enum crash_event native_last_event(uint8_t *detail);
 /* next_us tells when the source has its next event, UINT64_MAX for never. */
 void native_set_event_source(uint64_t (*next_us)(const void *context), const void *context);
 
+/* Whether there is a second processor, which needs so long for what it is woken for; UINT64_MAX:
+ * for ever. Kept over starts. At first there is none. */
+void native_set_worker(bool exists, uint64_t takes_us);
+
+/* How often it was started since the start. */
+unsigned native_worker_starts(void);
+
 enum native_end {
   NATIVE_TIME_UP,
   NATIVE_LOADER, /* the program left by port_reboot_to_loader() */

@@ -8,6 +8,7 @@
   .thumb
 
   .equ FRAME_BYTES, 32
+  .equ SIO_CPUID, 0xd0000000
   .equ GUARD_AND_STACK_log2_BYTES, 13
 
   .section .noinit, "aw", %nobits
@@ -55,6 +56,10 @@ timer2_irq_handler:
   mov r0, sp
 
 take_note: /* r0: the frame, r1: the exception, 0 for a panic */
+  ldr r2, =SIO_CPUID
+  ldr r2, [r2]
+  cmp r2, #0
+  bne park
   ldr r2, =rp2040_fault_frame
   ldr r3, =__stack_guard
   subs r3, r0, r3
@@ -79,4 +84,9 @@ take_note: /* r0: the frame, r1: the exception, 0 for a panic */
   ldr r3, =__stack_top
   msr msp, r3
   bl rp2040_take_crash
+
+  /* The second processor: the first finds it late, and starts it again. */
+park:
+  wfi
+  b park
   .ltorg

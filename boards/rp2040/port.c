@@ -3,10 +3,12 @@
 #include "rp2040/crash.h"
 #include "rp2040/event.h"
 #include "rp2040/flash.h"
+#include "rp2040/guard.h"
 #include "rp2040/interrupts.h"
 #include "rp2040/mpu_regs.h"
 #include "rp2040/nvic.h"
 #include "rp2040/resets.h"
+#include "rp2040/sio_regs.h"
 #include "rp2040/timer_regs.h"
 #include "rp2040/watchdog_regs.h"
 
@@ -25,37 +27,6 @@ static struct {
 } alarm;
 
 static char serial_number[2 * FLASH_ID_BYTES + 1];
-
-/* From the start of SRAM up to __code_end: vectors, code and constants. Each region covers eighths
- * of its size, and the next one, of the size of an eighth, what is left. */
-static void guard_code(void) {
-  extern const uint32_t __image_start[], __code_end[];
-  uint32_t at = (uint32_t)(uintptr_t)__image_start;
-  uint32_t end = (uint32_t)(uintptr_t)__code_end;
-  uint32_t region = 2;
-  for (uint32_t log2 = 18; log2 >= 9; log2 -= 3) {
-    uint32_t eighths = (end - at) >> (log2 - 3);
-    MPU_RBAR = at | MPU_RBAR_REGION(region);
-    MPU_RASR = MPU_RASR_READ_ONLY | MPU_RASR_NORMAL | MPU_RASR_EIGHTHS(eighths) |
-               MPU_RASR_BYTES(log2) | MPU_RASR_ENABLE;
-    at += eighths << (log2 - 3);
-    region++;
-  }
-}
-
-/* A stack that grows out of its bank, a null pointer, and a write to what does not change are
- * faults instead of silent damage. As pico-sdk's runtime_init_stack_guard.c, but for the whole
- * bank. DMA is not held back. */
-static void guard_memory(void) {
-  extern const uint32_t __stack_guard[];
-  MPU_RBAR = (uint32_t)(uintptr_t)__stack_guard | MPU_RBAR_REGION(0u);
-  MPU_RASR = MPU_RASR_NO_ACCESS | MPU_RASR_BYTES(12u) | MPU_RASR_ENABLE;
-  MPU_RBAR = MPU_RBAR_REGION(1u);
-  MPU_RASR = MPU_RASR_NO_ACCESS | MPU_RASR_BYTES(8u) | MPU_RASR_ENABLE;
-  guard_code();
-  MPU_CTRL = MPU_CTRL_DEFAULT_MAP | MPU_CTRL_ENABLE;
-  __asm volatile("dsb\n isb" ::: "memory");
-}
 
 /* The boot ROM's tables begin at address 0. */
 static void open_memory(void) {
@@ -127,6 +98,13 @@ void port_sleep(void) {
   __asm volatile("wfe" ::: "memory");
 }
 
+/* Read back, so that it is in force (pico-sdk, multicore_reset_core1). */
+void port_worker_stop(void) {
+  REG32_SET(PSM_FRCE_OFF) = PSM_PROC1;
+  while (!(REG32(PSM_FRCE_OFF) & PSM_PROC1)) {
+  }
+}
+
 void port_serial_number(char text[17]) {
   for (unsigned i = 0; i < sizeof serial_number; i++)
     text[i] = serial_number[i];
@@ -149,6 +127,7 @@ _Noreturn void port_reboot_to_loader(void) {
   typedef void reset_to_usb_boot_fn(uint32_t activity_pins, uint32_t disabled_interfaces);
   const uint32_t code = 'U' | 'B' << 8;
 
+  port_worker_stop();
   disable_interrupts();
   open_memory();
   WATCHDOG_SCRATCH0 = 0;
@@ -172,8 +151,9 @@ static void read_serial_number(void) {
 }
 
 void port_start(void) {
+  extern const uint32_t __stack_guard[];
   crash_start();
-  guard_memory();
+  guard_memory(__stack_guard, 12u);
   rp2040_irq_set_priorities();
   if (resets_release(RESETS_TIMER) != FT_OK)
     port_panic();

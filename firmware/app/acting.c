@@ -41,11 +41,11 @@ static void use_tangential_scales(struct app *app) {
 }
 
 void app_use_pad(struct app *app, const struct pad_profile *pad) {
-  bool acts = pad && fit_pad_init(&app->fit_pad, &app->fit_array, pad) == FT_OK;
+  bool acts = pad && fit_pad_init(&app->tangential_job.pad, &app->fit_array, pad) == FT_OK;
   app->pad = acts ? pad : NULL;
   app_use_shape(app);
   use_tangential_scales(app);
-  memset(&app->tangential_course, 0, sizeof app->tangential_course);
+  app->tangential_follows = false;
   tangential_reset(&app->tangential_history);
   motion_reset(&app->motion_history);
 }

@@ -22,6 +22,7 @@
 #include "scan/scan.h"
 #include "store/store.h"
 #include "wire/packet.h"
+#include "worker/worker.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -40,9 +41,12 @@ struct app {
 #endif
 #if FT_WITH_TANGENTIAL
   const struct pad_profile *pad;                  /* that acts; NULL: none */
-  struct fit_pad fit_pad;                         /* of it */
   struct tangential_settings tangential_settings; /* of it and the calibration */
-  struct tangential_course tangential_course;
+  struct worker worker;                           /* of the job below */
+  struct tangential_job tangential_job;
+  bool has_worker;         /* a processor of its own; else the main loop serves itself */
+  bool tangential_is_late; /* in this frame */
+  bool tangential_follows; /* the frame before was of the same contact and pad */
   struct tangential_history tangential_history;
   struct motion_history motion_history;
 #endif
@@ -67,7 +71,7 @@ struct app {
   struct contact_force force;
 #endif
 #if FT_WITH_TANGENTIAL
-  struct fit_tangential tangential;
+  const struct fit_tangential *tangential; /* NULL: not estimated */
   struct tangential_load load;
   struct motion motion;
 #endif

@@ -43,6 +43,9 @@ enum contact_flag {
   CONTACT_FLAG_MOVING = 1 << 23, /* the speed of the contact is above the threshold */
   /* the contact moves beyond what the load explains, however slowly */
   CONTACT_FLAG_SLIDING = 1 << 24,
+  /* warning: the second processor did not estimate the tangential load in time: location and
+   * force are not corrected for it */
+  CONTACT_FLAG_TANGENTIAL_LATE = 1 << 25,
 };
 
 #endif

@@ -50,6 +50,7 @@ enum crash_event {
   CRASH_EVENT_SENSORS, /* others answer than before */
   CRASH_EVENT_BUS,     /* timeouts of the sensor bus; detail: so many in a second */
   CRASH_EVENT_SKIPPED, /* frames that were not taken; detail: so many in a second */
+  CRASH_EVENT_WORKER,  /* the second processor did not answer, and was started again */
 };
 
 enum { CRASH_EVENTS = 8 };

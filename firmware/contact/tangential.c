@@ -32,21 +32,25 @@ bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated) 
          !contact_is_lower_bound(fit, saturated);
 }
 
-void tangential_estimate(struct tangential_course *course, const struct fit_array *array,
-                         struct fit_pad *pad, const int32_t *pressure_Pa_q10,
-                         const struct fit_settings *settings, const struct fit_result *fit,
-                         uint32_t saturated, uint64_t t_us, struct fit_tangential *estimate) {
-  if (!tangential_is_worthwhile(fit, saturated)) {
+void tangential_estimate(void *job) {
+  struct tangential_job *own = job;
+  const struct tangential_question *question = &own->question;
+  struct tangential_course *course = &own->course;
+  const bool is_worthwhile = tangential_is_worthwhile(question->fit, question->saturated);
+  if (question->begins || !is_worthwhile) {
     memset(course, 0, sizeof *course);
-    memset(estimate, 0, sizeof *estimate);
+  }
+  if (!is_worthwhile) {
+    memset(&own->estimate, 0, sizeof own->estimate);
     return;
   }
-  bool slow = course->t_us != 0 && t_us - course->t_us >= TANGENTIAL_SLOW_us;
+  bool slow = course->t_us != 0 && question->t_us - course->t_us >= TANGENTIAL_SLOW_us;
   int steps = slow ? FIT_TANGENTIAL_FRAMES : 1;
-  course->t_us = t_us;
+  course->t_us = question->t_us;
   do {
-    fit_tangential_load(array, pad, pressure_Pa_q10, settings, fit, &course->state, estimate);
-  } while (!estimate->valid && --steps > 0);
+    fit_tangential_load(own->array, &own->pad, question->pressure_Pa_q10, question->settings,
+                        question->fit, &course->state, &own->estimate);
+  } while (!own->estimate.valid && --steps > 0);
 }
 
 void tangential_reset(struct tangential_history *history) {

@@ -57,16 +57,35 @@ struct tangential_course {
   struct fit_tangential_state state;
 };
 
+/* The estimate of one frame: a job of worker/worker.h. What the pointers lead to is handed over
+ * with it: nobody writes it before the answer. The course is the worker's own. */
+struct tangential_job {
+  const struct fit_array *array;
+  struct fit_pad pad;
+  struct tangential_question {
+    bool begins;        /* a course: forget the one before */
+    uint32_t saturated; /* bitmap of the sensors that were left out for it */
+    uint64_t t_us;
+    const int32_t *pressure_Pa_q10;
+    const struct fit_settings *settings;
+    const struct fit_result *fit; /* of the same readings */
+  } question;
+  struct fit_tangential estimate; /* the answer */
+  struct tangential_course course;
+};
+
 /* A frame so long after the last has time for more than one step, and the contact has moved
  * further. So it takes up to FIT_TANGENTIAL_FRAMES steps until an estimate can be reported. */
 #define TANGENTIAL_SLOW_us 4500u
 
-/* The estimate of one frame, whose fit is of the same readings. Where the fit is not worthwhile
- * there is none, and the course starts again. */
-void tangential_estimate(struct tangential_course *course, const struct fit_array *array,
-                         struct fit_pad *pad, const int32_t *pressure_Pa_q10,
-                         const struct fit_settings *settings, const struct fit_result *fit,
-                         uint32_t saturated, uint64_t t_us, struct fit_tangential *estimate);
+/* A Cortex-M0+ at 125 MHz answers within 320 us, and within 1.6 ms after a slow frame
+ * (fit_tangential.h). What takes longer than this is not waited for. */
+#define TANGENTIAL_LATE_us 450u
+#define TANGENTIAL_SLOW_LATE_us 2250u
+
+/* Answers the question of a struct tangential_job. Where the fit is not worthwhile there is no
+ * estimate, and the course starts again. */
+void tangential_estimate(void *job);
 
 /* Forgets the contact. */
 void tangential_reset(struct tangential_history *history);

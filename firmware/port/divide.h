@@ -1,5 +1,6 @@
-/* Integer division with whatever the core has for it. For the main context only: a divider that is
- * a peripheral, as the RP2040's, is not saved by interrupts.
+/* Integer division with whatever the core has for it. For the main context and the worker's
+ * only (worker/worker.h): a divider that is a peripheral, as the RP2040's, one for each processor, is
+ * not saved by interrupts.
  */
 #ifndef PORT_DIVIDE_H
 #define PORT_DIVIDE_H

@@ -47,6 +47,17 @@ void port_alive(enum port_part part);
 void port_at(enum crash_activity activity);
 void port_event(enum crash_event event, uint8_t detail);
 
+/* A second processor that shares the memory: from now on it calls serve(context) whenever it is
+ * woken, until that returns false. Whatever it did before has ended. False: there is none, or it
+ * does not start. Takes some 20 us. Main context only. */
+bool port_worker_start(bool (*serve)(void *context), void *context);
+
+/* Wakes it; port_sleep() returns once it has served. */
+void port_worker_wake(void);
+
+/* It does nothing more, in the middle of what it does. No effect if there is none. */
+void port_worker_stop(void);
+
 /* Resets by the watchdog since power-on; faults and panics end in one too. */
 uint32_t port_watchdog_resets(void);
 

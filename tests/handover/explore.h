@@ -8,7 +8,8 @@
  * to so many interrupts in a run; then all that was static is as it was before.
  *
  * Order within a context is that of this build: that the compiler of an image keeps it (release,
- * acquire, atomic_signal_fence) is not shown. One core, as on the chip.
+ * acquire, atomic_signal_fence) is not shown. A second processor is an interrupt too: it comes in
+ * whole steps. A test of two processors lets each in turn be the one that is interrupted.
  */
 #ifndef TESTS_HANDOVER_EXPLORE_H
 #define TESTS_HANDOVER_EXPLORE_H

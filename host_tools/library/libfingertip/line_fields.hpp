@@ -275,6 +275,7 @@ inline constexpr Flag flags[] = {
     {CONTACT_FLAG_ELONGATED, "ELONGATED", true},
     {CONTACT_FLAG_ZERO_DOUBTFUL, "ZERO_DOUBTFUL", true},
     {CONTACT_FLAG_SENSOR_DOUBTFUL, "SENSOR_DOUBTFUL", true},
+    {CONTACT_FLAG_TANGENTIAL_LATE, "TANGENTIAL_LATE", true},
 };
 
 } // namespace fingertip::words

@@ -55,9 +55,10 @@ class Flag(enum.IntFlag):
     VELOCITY_VALID = 1 << 22  #: the velocity of the contact has values
     MOVING = 1 << 23  #: the speed of the contact is above the threshold
     SLIDING = 1 << 24  #: the contact moves beyond what the load explains, however slowly
+    TANGENTIAL_LATE = 1 << 25  #: warning: the second processor did not estimate the tangential load in time: location and force are not corrected for it
 
 
-WARNINGS = Flag(0x7FF00)
+WARNINGS = Flag(0x207FF00)
 """The numbers are there, but deserve less trust: look at these before you use them."""
 
 
@@ -402,7 +403,7 @@ class Crash(NamedTuple):
     """parts without progress, for kind 3: bit 0 main loop, 1 scan, 2 USB, 3 interrupts"""
     events: Annotated[tuple[int, ...], Wire("B", 8)]
     """the last events, newest first: 0 none, 1 start, 2 command, 3 port closed, 4 bus asleep, 5 awake, 6 stored, 7 other sensors answer, 8
-    timeouts on the sensor bus, 9 frames skipped
+    timeouts on the sensor bus, 9 frames skipped, 10 the second processor started again
     """
     event_details: Annotated[tuple[int, ...], Wire("B", 8)]
     """of these: type of the command; 1 if storing failed; number of timeouts or frames in a second"""

@@ -51,6 +51,7 @@ export class Machine {
     this.hasPower = true;
     this.powerCuts = 0;
     this.cyclesBefore = 0;
+    this.secondCyclesBefore = 0;
 
     this.memory = new FlashMemory({ time: this.time, serial: this.serial, seed, speed: flashSpeed });
     if (flash) this.memory.bytes.set(flash);
@@ -119,9 +120,14 @@ export class Machine {
 
   #stopChip() {
     this.hasPower = false;
-    this.cyclesBefore += this.chip.core.cycles;
+    this.#keepCycles(this.chip);
     this.chip.dispose();
     this.host.disconnect();
+  }
+
+  #keepCycles({ core0, second }) {
+    this.cyclesBefore += core0.cycles;
+    this.secondCyclesBefore += second.cycles;
   }
 
   /** Everything on the board loses its power; the cable is still there. */
@@ -174,7 +180,7 @@ export class Machine {
     if (!this.allowWatchdog) this.report.warn('watchdog', `${why}; the chip rebooted`);
     this.reboots += 1;
     const old = this.chip;
-    this.cyclesBefore += old.core.cycles;
+    this.#keepCycles(old);
     const kept = { sram: old.sram, usbDPRAM: old.usbDPRAM, watchdog: { reason, scratch: old.watchdog.scratch } };
     old.dispose();
     this.memory.deselect(); // its pads let go; a command that was under way is what came until then
@@ -208,6 +214,7 @@ export class Machine {
     return {
       emulated_s: time.nanos / 1e9,
       cycles,
+      cycles_core1: this.secondCyclesBefore + chip.second.cycles,
       busy_fraction: time.nanos ? this.busyNs / time.nanos : 0,
       device_time_zero_s: chip.timer.zero_ns === null ? null : chip.timer.zero_ns / 1e9,
       clock_ppm: this.clock_ppm,

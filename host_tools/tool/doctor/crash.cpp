@@ -112,6 +112,8 @@ std::string event_text(unsigned code, unsigned detail) {
     return "other sensors answer";
   case CRASH_EVENT_BUS:
     return "timeouts on the sensor bus (" + std::to_string(detail) + " in a second)";
+  case CRASH_EVENT_WORKER:
+    return "second processor started again";
   case CRASH_EVENT_SKIPPED:
     return "frames skipped (" + std::to_string(detail) + " in a second)";
   default:

@@ -12,16 +12,16 @@ import { steady } from './bench.mjs';
 const commands = new Map();
 const HELD = 1 << 6; // contact_flags.h
 
-/** images: the folder with those of all boards; tools: { fingertip, command_frame }, the tool and the program of tests/support. */
+/** images: the folder with those of all boards; folder: that of this one; tools: { fingertip, command_frame }, the tool and the program of tests/support. */
 export class ImageBench {
-  constructor(images, tools, name, { faults = [], ...options } = {}) {
+  constructor(images, tools, name, { faults = [], folder = join(images, name), ...options } = {}) {
     const Board = findBoard(name);
     this.tools = tools;
-    this.elf = join(images, name, `fingertip-${name}.elf`);
+    this.elf = join(folder, `fingertip-${name}.elf`);
     this.received = [];
     this.bytes = 0;
     this.machine = new Machine({
-      image: readFileSync(join(images, name, `fingertip-${name}.bin`)), Board, scenario: steady(), fastEnumeration: true, allowWatchdog: true,
+      image: readFileSync(join(folder, `fingertip-${name}.bin`)), Board, scenario: steady(), fastEnumeration: true, allowWatchdog: true,
       faults: parseFaults(JSON.stringify(faults), 'faults', Board),
       onData: (bytes) => {
         this.received.push(Buffer.from(bytes));

@@ -42,6 +42,7 @@ void setUp(void) {
 
 void tearDown(void) {
   rig_end();
+  native_set_worker(false, 0);
 }
 
 static struct wire_packet pad_command(void) {
@@ -126,8 +127,9 @@ static void a_load_that_is_not_estimated_is_part_of_the_error(void) {
     rig_power_up();
     native_cdc_open();
     run_for(1300);
-    TEST_ASSERT_EQUAL(WIRE_RESULT_DONE, ask((struct wire_packet){.type = WIRE_CMD_OSR,
-                                                                 .body.cmd_osr = {slow ? 1024 : 256}}));
+    TEST_ASSERT_EQUAL(
+        WIRE_RESULT_DONE,
+        ask((struct wire_packet){.type = WIRE_CMD_OSR, .body.cmd_osr = {slow ? 1024 : 256}}));
     start_streams(WIRE_STREAM_CONTACT);
     run_for(200);
     unsigned frames = 0;
@@ -265,8 +267,8 @@ static void a_calibration_and_the_scale_of_the_profile_act(void) {
   const float scale = 1.25f * command.body.cmd_pad.profile.force_ratio;
   TEST_ASSERT_FLOAT_WITHIN(0.2f, scale * 5.0f, contact.force_N);
   TEST_ASSERT_FLOAT_WITHIN(0.2f, 1.5f * scale * 1.2f, contact.qx_N);
-  TEST_ASSERT_EQUAL_FLOAT(scale * app.tangential.force_N, contact.force_N);
-  TEST_ASSERT_FLOAT_WITHIN(1e-5f, 1.5f * scale * app.tangential.qx_N, contact.qx_N);
+  TEST_ASSERT_EQUAL_FLOAT(scale * app.tangential->force_N, contact.force_N);
+  TEST_ASSERT_FLOAT_WITHIN(1e-5f, 1.5f * scale * app.tangential->qx_N, contact.qx_N);
   TEST_ASSERT_EQUAL_FLOAT(app.load.location_sd_mm, contact.location_sd_mm);
   TEST_ASSERT_TRUE(app.load.location_sd_mm != app.fit.location_sd_mm);
 }
@@ -310,6 +312,57 @@ static void a_held_frame_repeats_the_load(void) {
   TEST_ASSERT_GREATER_THAN(0, held);
 }
 
+enum { CONTACTS = 300 };
+
+/* Contact packets of a press with a load, from power-on on. */
+static unsigned take_contacts(struct wire_contact contacts[CONTACTS]) {
+  struct wire_packet packet, command = pad_command();
+  setUp();
+  load.qx_N = 1.2;
+  store_pad(&command);
+  start_streams(WIRE_STREAM_CONTACT);
+  run_for((uint32_t)((1700000 - port_now_us()) / 1000));
+  unsigned count = 0;
+  while (next_packet(&packet) && count < CONTACTS) {
+    if (packet.type == WIRE_CONTACT && packet.t_us > press.from_us) {
+      contacts[count++] = packet.body.contact;
+    }
+  }
+  TEST_ASSERT_GREATER_THAN(10, count);
+  return count;
+}
+
+static void a_second_processor_gives_the_same_estimates(void) {
+  static struct wire_contact alone[CONTACTS], two[CONTACTS];
+  const unsigned count = take_contacts(alone);
+  TEST_ASSERT_FALSE(app.has_worker);
+  native_set_worker(true, TANGENTIAL_LATE_us / 2);
+  TEST_ASSERT_EQUAL(count, take_contacts(two));
+  TEST_ASSERT_TRUE(app.has_worker);
+  TEST_ASSERT_EQUAL(1, native_worker_starts());
+  for (unsigned i = 0; i < count; i++) {
+    TEST_ASSERT_GREATER_OR_EQUAL(TANGENTIAL_LATE_us / 2, two[i].stages.fit_us);
+    two[i].stages = alone[i].stages;
+    TEST_ASSERT_EQUAL_MEMORY(&alone[i], &two[i], sizeof two[i]);
+  }
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TANGENTIAL_VALID, two[count - 1].flags);
+}
+
+static void without_an_answer_frames_go_out_with_the_fit_and_say_so(void) {
+  static struct wire_contact contacts[CONTACTS];
+  native_set_worker(true, UINT64_MAX);
+  const unsigned count = take_contacts(contacts);
+  for (unsigned i = 0; i < count; i++) {
+    TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TANGENTIAL_LATE | CONTACT_FLAG_FIT_VALID, contacts[i].flags);
+    TEST_ASSERT_BITS_LOW(TANGENTIAL, contacts[i].flags);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, contacts[i].qx_N);
+  }
+  TEST_ASSERT_EQUAL_FLOAT(app.fit.x_mm, contacts[count - 1].x_mm);
+  uint8_t detail;
+  TEST_ASSERT_EQUAL(CRASH_EVENT_WORKER, native_last_event(&detail));
+  TEST_ASSERT_GREATER_THAN(count, native_worker_starts());
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(a_profile_tells_the_load_and_corrects_the_location);
@@ -323,5 +376,7 @@ int main(void) {
   RUN_TEST(a_calibration_and_the_scale_of_the_profile_act);
   RUN_TEST(from_touch_tells_what_changed);
   RUN_TEST(a_held_frame_repeats_the_load);
+  RUN_TEST(a_second_processor_gives_the_same_estimates);
+  RUN_TEST(without_an_answer_frames_go_out_with_the_fit_and_say_so);
   return UNITY_END();
 }

@@ -250,7 +250,7 @@ static void fits_that_an_estimate_is_worthwhile_for(void) {
 enum { SENSORS = 15 };
 
 /* A contact of the pad's own, pressing there. */
-static struct fit_tangential frame(struct tangential_course *course, float x_mm, float y_mm,
+static struct fit_tangential frame(struct tangential_job *job, float x_mm, float y_mm,
                                    uint64_t t_us, uint32_t flags) {
   const struct pad_profile profile = pad_of_12_mm();
   float at_x_mm[SENSORS], at_y_mm[SENSORS];
@@ -266,31 +266,37 @@ static struct fit_tangential frame(struct tangential_course *course, float x_mm,
     readings[k] = (int32_t)(4e8f * sum);
   }
   static struct fit_array array;
-  static struct fit_pad pad;
   TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, SENSORS, at_x_mm, at_y_mm, 9.0f));
-  TEST_ASSERT_EQUAL(FT_OK, fit_pad_init(&pad, &array, &profile));
+  TEST_ASSERT_EQUAL(FT_OK, fit_pad_init(&job->pad, &array, &profile));
   struct fit_settings fitting = {.iterations = 4, .noise_Pa_q10 = 4096};
   struct fit_result fit;
   fit_gaussian(&array, readings, UINT32_MAX, &fitting, &fit);
   TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_FIT_VALID, fit.flags);
   fit.flags |= flags;
-  struct fit_tangential estimate;
-  memset(&estimate, 0xFF, sizeof estimate);
-  tangential_estimate(course, &array, &pad, readings, &fitting, &fit, 0, t_us, &estimate);
-  return estimate;
+  job->array = &array;
+  job->question = (struct tangential_question){
+      .begins = job->question.begins,
+      .t_us = t_us,
+      .pressure_Pa_q10 = readings,
+      .settings = &fitting,
+      .fit = &fit,
+  };
+  memset(&job->estimate, 0xFF, sizeof job->estimate);
+  tangential_estimate(job);
+  return job->estimate;
 }
 
 static void slow_frames_have_time_for_more_steps(void) {
   for (int slow = 0; slow < 2; slow++) {
     const uint64_t interval_us = slow ? TANGENTIAL_SLOW_us : TANGENTIAL_SLOW_us - 1;
-    struct tangential_course course = {0};
+    struct tangential_job job = {0};
     uint64_t t_us = 9000000;
-    TEST_ASSERT_FALSE(frame(&course, 2.0f, 3.0f, t_us, 0).valid);
+    TEST_ASSERT_FALSE(frame(&job, 2.0f, 3.0f, t_us, 0).valid);
     for (int i = 0; i < FIT_TANGENTIAL_FRAMES; i++) {
-      frame(&course, 2.0f, 3.0f, t_us += interval_us, 0);
+      frame(&job, 2.0f, 3.0f, t_us += interval_us, 0);
     }
-    TEST_ASSERT_TRUE(frame(&course, 2.0f, 3.0f, t_us += interval_us, 0).valid);
-    struct fit_tangential jumped = frame(&course, -3.0f, -8.0f, t_us += interval_us, 0);
+    TEST_ASSERT_TRUE(frame(&job, 2.0f, 3.0f, t_us += interval_us, 0).valid);
+    struct fit_tangential jumped = frame(&job, -3.0f, -8.0f, t_us += interval_us, 0);
     TEST_ASSERT_EQUAL_INT(slow, jumped.valid);
     TEST_ASSERT_FLOAT_WITHIN(0.05f, slow ? -3.0f : 0.0f, jumped.x_mm);
   }
@@ -299,12 +305,25 @@ static void slow_frames_have_time_for_more_steps(void) {
 static void what_is_not_worthwhile_ends_the_course(void) {
   static const struct tangential_course none;
   static const struct fit_tangential nothing;
-  struct tangential_course course = {0};
-  frame(&course, 2.0f, 3.0f, 1000, 0);
-  TEST_ASSERT_TRUE(memcmp(&course, &none, sizeof course) != 0);
-  struct fit_tangential estimate = frame(&course, 2.0f, 3.0f, 2000, CONTACT_FLAG_FLAT);
-  TEST_ASSERT_EQUAL_MEMORY(&none, &course, sizeof course);
+  struct tangential_job job = {0};
+  frame(&job, 2.0f, 3.0f, 1000, 0);
+  TEST_ASSERT_TRUE(memcmp(&job.course, &none, sizeof none) != 0);
+  struct fit_tangential estimate = frame(&job, 2.0f, 3.0f, 2000, CONTACT_FLAG_FLAT);
+  TEST_ASSERT_EQUAL_MEMORY(&none, &job.course, sizeof none);
   TEST_ASSERT_EQUAL_MEMORY(&nothing, &estimate, sizeof estimate);
+}
+
+static void a_question_that_begins_forgets_the_contact_before(void) {
+  struct tangential_job job = {0}, fresh = {0};
+  uint64_t t_us = 9000000;
+  for (int i = 0; i < FIT_TANGENTIAL_FRAMES + 1; i++) {
+    frame(&job, 2.0f, 3.0f, t_us += 1000, 0);
+  }
+  TEST_ASSERT_TRUE(frame(&job, 2.0f, 3.0f, t_us += 1000, 0).valid);
+  job.question.begins = true;
+  TEST_ASSERT_FALSE(frame(&job, 2.0f, 3.0f, t_us += 1000, 0).valid);
+  frame(&fresh, 2.0f, 3.0f, t_us, 0);
+  TEST_ASSERT_EQUAL_MEMORY(&fresh.course, &job.course, sizeof job.course);
 }
 
 int main(void) {
@@ -321,6 +340,7 @@ int main(void) {
   RUN_TEST(slow_frames_settle_with_those_there_were);
   RUN_TEST(slow_frames_have_time_for_more_steps);
   RUN_TEST(what_is_not_worthwhile_ends_the_course);
+  RUN_TEST(a_question_that_begins_forgets_the_contact_before);
   RUN_TEST(fits_that_an_estimate_is_worthwhile_for);
   return UNITY_END();
 }

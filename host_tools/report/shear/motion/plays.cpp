@@ -6,7 +6,6 @@
 extern "C" {
 #include "config/defaults.h"
 #include "config/geometry.h"
-#include "contact/tangential.h"
 #include "ms58xx/ms58xx.h"
 }
 
@@ -105,7 +104,9 @@ Player::Player(const Object &object, const truth::Pad &pad, const Sensing &sensi
   conversion_s_ = 1e-6 * osr->maximum_us;
   settings_ = truth::settings_for(pad, noise_Pa_);
   settings_.cut_noises = 0; // as where a profile acts
-  fit_pad_ = std::make_unique<fit_pad>(pad_under(object.layer_mm, array_));
+  job_ = std::make_unique<tangential_job>();
+  job_->array = &array_;
+  job_->pad = pad_under(object.layer_mm, array_);
 }
 
 Player::~Player() = default;
@@ -113,7 +114,7 @@ Player::~Player() = default;
 void Player::play(const twin::Act &act, std::uint64_t number,
                   const std::function<void(const Felt &)> &frame) {
   Random random(seed_, NOISE, number);
-  tangential_course course{};
+  job_->course = {};
   const double first_s = random.uniform(0.0, 1.0) / sensing_.rate_Hz;
   for (std::uint64_t i = 0;; i++) {
     const double t_s = first_s + static_cast<double>(i) / sensing_.rate_Hz;
@@ -138,10 +139,11 @@ void Player::play(const twin::Act &act, std::uint64_t number,
     if (felt.contact) {
       fit_gaussian_grid(&array_, readings, (1u << geometry.sensor_count) - 1u, &settings_,
                         &felt.fit);
-      tangential_estimate(&course, &array_, fit_pad_.get(), readings, &settings_, &felt.fit, 0,
-                          felt.t_us, &felt.tangential);
+      job_->question = {false, 0, felt.t_us, readings, &settings_, &felt.fit};
+      tangential_estimate(job_.get());
+      felt.tangential = job_->estimate;
     } else {
-      course = {};
+      job_->course = {};
     }
     frame(felt);
   }

@@ -8,7 +8,7 @@
 #include "truth/fit/touches.hpp"
 
 extern "C" {
-#include "fit/fit_tangential.h"
+#include "contact/tangential.h"
 }
 
 #include <filesystem>
@@ -84,7 +84,7 @@ private:
   double noise_Pa_, conversion_s_;
   fit_array array_;
   fit_settings settings_;
-  std::unique_ptr<fit_pad> fit_pad_;
+  std::unique_ptr<tangential_job> job_;
 };
 
 } // namespace fingertip::shear

@@ -23,10 +23,11 @@ import { FLASH_BASE, FLASH_BYTES, RAM_BASE, StrictCore } from './core.mjs';
 import { Dma } from './dma.mjs';
 import { FlashMemory } from './flash_memory.mjs';
 import { I2cBlock } from './i2c_block.mjs';
-import { MemoryFault, Mpu } from './mpu.mjs';
+import { MemoryFault } from './mpu.mjs';
 import { Pins } from './pins.mjs';
 import { Pio } from './pio.mjs';
 import { RegisterFile } from './registers.mjs';
+import { SecondCore } from './second_core.mjs';
 import { StrictSio } from './sio.mjs';
 import { Ssi } from './ssi.mjs';
 import { SysClock } from './sys_clock.mjs';
@@ -38,6 +39,9 @@ const BOOT2_BYTES = 256;
 const SECTOR_BYTES = 4096;
 const SCR = 0xd10;
 const SCR_SLEEPDEEP = 4;
+const PSM_PROC1 = 1 << 16;
+const ISER = 0x100;
+const FIFO_IRQ_OF_CORE_1 = 16;
 /** Interrupt to what wakes by it in deep sleep: the bits of SLEEP_EN0 and SLEEP_EN1. */
 const WAKES = new Map([[0, [0, 1 << 5]], [1, [0, 1 << 5]], [2, [0, 1 << 5]], [3, [0, 1 << 5]], [5, [0, 3 << 10]], [11, [1 << 5, 0]], [12, [1 << 5, 0]], [23, [1 << 6, 0]], [24, [1 << 7, 0]]]);
 const BOOT2_RAM = 0x20041f00;
@@ -111,8 +115,9 @@ export class Chip extends RP2040 {
     this.options = { serial, seed, revision };
     this.trouble = trouble;
     this.logger = new StrictLogger(this);
-    this.core = new StrictCore(this);
-    this.mpu = new Mpu(this, () => this.core.guard(this.mpu.denied, this.mpu.readOnlyBytes));
+    this.core0 = new StrictCore(this, 0);
+    /** That executes: outside of a turn of core 1, core 0. */
+    this.core = this.core0;
     this.sio = new StrictSio(this);
     /** Frequencies are nominal here, as the firmware believes them; what passes in time is this many times as fast. */
     this.clockRate = 1 + clock_ppm * 1e-6;
@@ -122,7 +127,6 @@ export class Chip extends RP2040 {
     this.hooks = new Map();
     this.slept_since_ns = -1;
     this.sleepCycles = 0;
-    this.scr = 0;
     /** Time in which only what SLEEP_EN names had a clock. */
     this.deepSleep_ns = 0;
     /** Executes nothing that makes sense until it is reset: its clock is none. */
@@ -179,7 +183,7 @@ export class Chip extends RP2040 {
       if (before) memory.set(before);
       else for (let i = 0; i < words.length; i++) words[i] = noise.uint32();
     }
-    this.#makeBootRom();
+    this.second = new SecondCore(this, seed, this.#makeBootRom());
     this.onBreak = (code) => {
       if (code === 0x42) {
         const [r0, r1] = this.core.registers;
@@ -202,7 +206,7 @@ export class Chip extends RP2040 {
 
   #makeBootRom() {
     const rom = new DataView(this.bootrom.buffer);
-    const [table, lookup, usbBoot] = [0x40, 0x60, 0x80];
+    const [table, lookup, usbBoot, dead] = [0x40, 0x60, 0x80, 0xa0];
     const code = (at, ...ops) => ops.forEach((op, i) => rom.setUint16(at + 2 * i, op, true));
     rom.setUint32(0x00, BOOT2_RAM, true);
     rom.setUint32(0x04, usbBoot | 1, true);
@@ -214,6 +218,8 @@ export class Chip extends RP2040 {
     // ldrh r2,[r0]; cmp r2,#0; beq none; cmp r2,r1; beq found; adds r0,#4; b .; found: ldrh r0,[r0,#2]; bx lr; none: movs r0,#0; bx lr
     code(lookup, 0x8802, 0x2a00, 0xd005, 0x428a, 0xd001, 0x3004, 0xe7f8, 0x8840, 0x4770, 0x2000, 0x4770);
     code(usbBoot, 0xbe42, 0xe7fe);
+    code(dead, 0xbf30, 0xe7fd);
+    return dead;
   }
 
   load(image) {
@@ -242,6 +248,7 @@ export class Chip extends RP2040 {
       this.fail('boot ROM', 'watchdog reboot to a vector (scratch 4 magic) is not modelled');
     }
     this.sram.set(this.flash.subarray(0, BOOT2_BYTES), BOOT2_RAM - RAM_BASE);
+    this.second.powerUp();
     this.starts_ns = this.memory.isBusy ? this.memory.busyUntil_ns : 0;
     const tries_ns = (BOOT_TRIES_CYCLES / this.trueHz(this.roscHz)) * 1e9;
     if (this.starts_ns > this.time.nanos + tries_ns) {
@@ -259,7 +266,7 @@ export class Chip extends RP2040 {
     if (hz > 133e6) this.fail('CLOCKS', `clk_sys at ${hz / 1e6} MHz; the rated maximum is 133 MHz`);
     if (hz && hz !== this.clkSys) {
       this.clkSys = hz;
-      this.time.setCycleSource(this.core, 1e9 / this.trueHz(hz));
+      this.time.setCycleSource(this.core0, 1e9 / this.trueHz(hz));
       this.sysClock.retune(this.trueHz(hz));
       for (const block of [this.dma, ...this.pio]) block.clockChanged();
       this.ppb.systickTimer.frequency = this.trueHz(hz);
@@ -290,6 +297,39 @@ export class Chip extends RP2040 {
     }
   }
 
+  /** In a turn of this core. */
+  execute(core, action) {
+    this.core = core;
+    this.sio.use(core.id);
+    try {
+      action();
+    } finally {
+      this.core = this.core0;
+      this.sio.use(0);
+    }
+  }
+
+  /** SEV. */
+  sendEvent() {
+    this.core0.onEvent();
+    this.second.onEvent();
+  }
+
+  setInterrupt(irq, value) {
+    this.core0.setInterrupt(irq, value);
+  }
+
+  setFifoInterrupt(id, irq, value) {
+    (id ? this.second : this.core0).setInterrupt(irq, value);
+  }
+
+  #followPower({ frceOn, frceOff }) {
+    if (frceOn || frceOff & ~PSM_PROC1) this.fail('PSM', `FRCE_ON 0x${frceOn.toString(16)}, FRCE_OFF 0x${frceOff.toString(16)}: only the reset of core 1 is modelled`);
+    if (frceOff && this.core.id === 1) this.fail('PSM', 'core 1 resets itself');
+    if (frceOff) this.second.powerDown();
+    else if (this.second.state === 'off') this.second.powerUp();
+  }
+
   get gpioValues() {
     return this.pins.inputs;
   }
@@ -313,7 +353,7 @@ export class Chip extends RP2040 {
 
   /** A load that did not hit SRAM. */
   busRead(address, bytes) {
-    if (this.core.isGuarded && this.mpu.denies(address)) throw new MemoryFault();
+    if (this.core.isGuarded && this.core.mpu.denies(address)) throw new MemoryFault();
     if (address & (bytes - 1)) this.fail('core', `unaligned ${8 * bytes}-bit read of 0x${address.toString(16)}`);
     const word = (address & ~3) >>> 0;
     let value;
@@ -328,7 +368,7 @@ export class Chip extends RP2040 {
       value = this.sio.readUint32(word - 0xd0000000);
     } else if (address >>> 12 === 0xe000e) {
       const offset = word & 0xfff;
-      value = offset === SCR ? this.scr : offset >= 0xd90 && offset <= 0xda0 ? this.mpu.read(offset) : this.ppb.readUint32(offset);
+      value = offset === SCR ? this.core.scr : offset >= 0xd90 && offset <= 0xda0 ? this.core.mpu.read(offset) : this.ppb.readUint32(offset);
     } else if (address >>> 12 === DPRAM_BASE >>> 12) {
       this.#checkPage(address, 'read of');
       value = this.usbDPRAMView.getUint32(word - DPRAM_BASE, true);
@@ -344,7 +384,7 @@ export class Chip extends RP2040 {
 
   /** A store that did not hit SRAM. Narrow stores to peripherals replicate the value, as the bus does. */
   busWrite(address, value, bytes) {
-    if (this.core.isGuarded && this.mpu.denies(address)) throw new MemoryFault();
+    if (this.core.isGuarded && this.core.mpu.denies(address)) throw new MemoryFault();
     if (address & (bytes - 1)) this.fail('core', `unaligned ${8 * bytes}-bit write of 0x${address.toString(16)}`);
     if (address < 0x4000) this.fail('core', `write to 0x${address.toString(16)} in the boot ROM (null pointer?)`);
     if (address >>> 26 === FLASH_BASE >>> 26) this.fail('core', `write to 0x${address.toString(16)} in flash`);
@@ -361,20 +401,30 @@ export class Chip extends RP2040 {
       if (bytes !== 4) this.fail('core', `${8 * bytes}-bit write of system register 0x${address.toString(16)}`);
       const offset = address & 0xfff;
       if (offset === SCR) this.#writeScr(value);
-      else if (offset >= 0xd90 && offset <= 0xda0) this.mpu.write(offset, value);
-      else this.ppb.writeUint32(offset, value);
+      else if (offset >= 0xd90 && offset <= 0xda0) this.core.mpu.write(offset, value);
+      else {
+        this.#checkPrivate(offset, value);
+        this.ppb.writeUint32(offset, value);
+      }
     } else {
       const peripheral = this.findPeripheral(address);
       if (!peripheral) this.fail('core', `write to 0x${address.toString(16)}, where nothing is`);
       this.#checkPage(address, 'write of');
       peripheral.writeUint32Atomic(address & 0xffc, wide, (address >>> 12) & 3);
       if (peripheral === this.peripherals[0x40014] || peripheral === this.peripherals[0x4001c]) this.pins.reconfigure();
+      if (peripheral === this.peripherals[0x40010]) this.#followPower(peripheral);
     }
+  }
+
+  #checkPrivate(offset, value) {
+    if (this.core.id === 0) return;
+    if (offset >= 0x10 && offset < 0x20) this.fail('core 1', 'its SysTick is not modelled');
+    if (offset === ISER && value & ~(1 << FIFO_IRQ_OF_CORE_1)) this.fail('core 1', `interrupts 0x${value.toString(16)}: only that of its FIFO is modelled`);
   }
 
   #writeScr(value) {
     if (value & ~SCR_SLEEPDEEP) this.fail('core', `SCR 0x${value.toString(16)}: only SLEEPDEEP is modelled`);
-    this.scr = value;
+    this.core.scr = value;
   }
 
   #checkWake() {
@@ -392,11 +442,11 @@ export class Chip extends RP2040 {
 
   /** Run until emulated time `end_ns`, firing alarms on the way. */
   runUntil(end_ns) {
-    const { time, core } = this;
+    const { time, core0: core, second } = this;
     for (;;) {
       time.fireDue();
       if (core.waiting) core.checkForInterrupts();
-      if (this.slept_since_ns >= 0 && !core.waiting && this.scr & SCR_SLEEPDEEP) this.#checkWake();
+      if (this.slept_since_ns >= 0 && !core.waiting && core.scr & SCR_SLEEPDEEP && second.sleepsDeep) this.#checkWake();
       const now = time.nanos;
       if (now >= end_ns) return;
       const next = Math.min(time.next_ns, end_ns);
@@ -411,16 +461,19 @@ export class Chip extends RP2040 {
       }
       if (core.waiting) {
         if (this.slept_since_ns < 0) this.slept_since_ns = now;
-        if (!core.wakeable) this.fail('core', 'firmware hung: WFI with no interrupt enabled');
+        if (!core.wakeable && !(core.waitsForEvent && second.acts)) this.fail('core', 'firmware hung: WFI with no interrupt enabled');
         if (now - this.slept_since_ns >= HUNG_AFTER_NS) {
           this.fail('core', `firmware hung: asleep for ${HUNG_AFTER_NS / 1e9} s without an interrupt`);
         }
-        time.advanceTo(Math.min(next, this.slept_since_ns + HUNG_AFTER_NS));
-        if (this.scr & SCR_SLEEPDEEP) this.deepSleep_ns += time.nanos - now;
+        const turn_ns = second.isAwake ? second.turn() * time.ns_per_cycle : Infinity;
+        time.advanceTo(Math.min(next, this.slept_since_ns + HUNG_AFTER_NS, now + turn_ns));
+        if (core.scr & SCR_SLEEPDEEP && second.sleepsDeep) this.deepSleep_ns += time.nanos - now;
+        if (second.state === 'runs') second.catchUp();
         continue;
       }
       this.slept_since_ns = -1;
-      const stop = core.cycles + Math.max(1, Math.ceil((next - now) / time.ns_per_cycle - 1e-9));
+      const cycles = Math.max(1, Math.ceil((next - now) / time.ns_per_cycle - 1e-9));
+      const stop = core.cycles + (second.isAwake ? Math.min(cycles, second.turn()) : cycles);
       time.earliestChanged = false;
       try {
         if (this.hooks.size) {
@@ -433,6 +486,7 @@ export class Chip extends RP2040 {
         if (!(error instanceof MemoryFault)) throw error;
         core.hardFault();
       }
+      if (second.state === 'runs') second.catchUp();
     }
   }
 }

@@ -8,9 +8,10 @@
  *   with pc cost one more, exception entry 15 and exception return 13.
  * - WFI with PRIMASK set wakes without entering the handler, and does not sleep if an enabled interrupt is
  *   already pending (ARMv6-M Architecture Reference Manual, B1.5.18).
+ * - SEV sets the event register of both cores, and ends their WFE (B1.5.18).
  */
 import { RP2040 } from 'rp2040js';
-import { MemoryFault } from './mpu.mjs';
+import { MemoryFault, Mpu } from './mpu.mjs';
 
 export { RP2040 };
 
@@ -24,16 +25,28 @@ const CortexM0Core = new RP2040().core.constructor;
 const EXCEPTION_ENTRY_CYCLES = 15;
 const EXCEPTION_RETURN_CYCLES = 13;
 const HARD_FAULT = 3;
+const [WFE, WFI, SEV] = [0xbf20, 0xbf30, 0xbf40];
 
 export class StrictCore extends CortexM0Core {
-  constructor(chip) {
+  /** @param id 0 or 1 */
+  constructor(chip, id) {
     super(chip);
     this.chip = chip;
+    this.id = id;
+    this.scr = 0;
+    /** While `waiting`: by WFE. */
+    this.waitsForEvent = false;
     this.ram8 = chip.sram;
     this.ram16 = new Uint16Array(chip.sram.buffer);
     this.ram32 = new Int32Array(chip.sram.buffer);
     this.signed = new Int32Array(this.registers.buffer);
+    this.mpu = new Mpu(chip, () => this.guard(this.mpu.denied, this.mpu.readOnlyBytes));
     this.guard([], 0);
+  }
+
+  onEvent() {
+    if (this.waiting && this.waitsForEvent) this.waiting = false;
+    else this.eventRegistered = true;
   }
 
   /** The ranges of addresses that fault, one of them in SRAM at most, and how many bytes of SRAM are not to be written. */
@@ -154,7 +167,7 @@ export class StrictCore extends CortexM0Core {
     const offset = (pc - FLASH_BASE) >>> 0;
     const inRam = (pc - RAM_BASE) >>> 0;
     if (inRam < this.codeBytes) return this.ram16[inRam >>> 1];
-    if (this.isGuarded && this.chip.mpu.denies(pc >>> 0)) throw new MemoryFault();
+    if (this.isGuarded && this.mpu.denies(pc >>> 0)) throw new MemoryFault();
     if (inRam < RAM_BYTES) return this.ram16[inRam >>> 1];
     if (offset < FLASH_BYTES && this.chip.xipReady) return this.chip.flash16[offset >>> 1];
     return this.chip.busRead(pc & ~1, 2);
@@ -589,10 +602,12 @@ export class StrictCore extends CortexM0Core {
     }
   }
 
-  /** One instruction by rp2040js. */
+  /** One instruction by rp2040js, whose SEV does nothing. */
   slow(op) {
     super.executeInstruction();
     if ((op & 0xf700) === 0xb500) this.cycles += 1;
+    else if (op === SEV) this.chip.sendEvent();
+    else if (op === WFE || op === WFI) this.waitsForEvent = op === WFE;
   }
 }
 

@@ -1,14 +1,19 @@
 /**
- * SIO: GPIO through rp2040js, the hardware divider with its eight cycles (a result read earlier fails the run).
+ * SIO: GPIO and spin locks through rp2040js; for each core its hardware divider with its eight cycles (a result read earlier
+ * fails the run), its interpolators, and the FIFO that it reads, of eight words (RP2040 datasheet 2.3.1).
  */
 import { RP2040 } from 'rp2040js';
 
 const RPSIO = new RP2040().sio.constructor;
 const DIVIDER_CYCLES = 8;
+const FIFO_WORDS = 8;
+const [FIFO_ST, FIFO_WR, FIFO_RD] = [0x50, 0x54, 0x58];
+const [VLD, RDY, WOF, ROE] = [1, 2, 4, 8];
+/** SIO_IRQ_PROC0; that of core 1 follows. */
+const FIFO_IRQ = 15;
 
-export class StrictSio extends RPSIO {
-  constructor(chip) {
-    super(chip);
+class Divider {
+  constructor() {
     this.dividend = 0;
     this.divisor = 0;
     this.quotient = 0;
@@ -16,23 +21,95 @@ export class StrictSio extends RPSIO {
     this.readyAt = 0;
     this.dirty = 0;
   }
+}
+
+export class StrictSio extends RPSIO {
+  constructor(chip) {
+    super(chip);
+    const Interpolator = this.interp0.constructor;
+    this.own = [0, 1].map(() => ({ divider: new Divider(), interpolators: [new Interpolator(0), new Interpolator(1)], words: [], overflowed: false, underflowed: false }));
+    this.use(0);
+  }
+
+  /** From now on this core reads and writes. */
+  use(id) {
+    const own = this.own[id];
+    this.id = id;
+    this.divider = own.divider;
+    [this.interp0, this.interp1] = own.interpolators;
+  }
+
+  /** What the boot ROM leaves: it reads its empty FIFO. */
+  resetCore(id) {
+    const own = this.own[id];
+    own.divider = new Divider();
+    own.words.length = 0;
+    own.overflowed = false;
+    own.underflowed = true;
+  }
+
+  hasWord(id) {
+    return this.own[id].words.length > 0;
+  }
+
+  hasRoom(id) {
+    return this.own[1 - id].words.length < FIFO_WORDS;
+  }
+
+  pop(id) {
+    const own = this.own[id];
+    if (own.words.length === 0) own.underflowed = true;
+    const word = own.words.shift() ?? 0;
+    this.updateInterrupt(id);
+    return word;
+  }
+
+  push(id, word) {
+    if (this.hasRoom(id)) this.own[1 - id].words.push(word >>> 0);
+    else this.own[id].overflowed = true;
+    this.updateInterrupt(0);
+    this.updateInterrupt(1);
+  }
+
+  updateInterrupt(id) {
+    this.rp2040.setFifoInterrupt(id, FIFO_IRQ + id, this.hasWord(id) || this.own[id].overflowed || this.own[id].underflowed);
+  }
+
+  #readFifo(offset) {
+    const { id } = this;
+    if (offset === FIFO_RD) return this.pop(id);
+    if (offset !== FIFO_ST) return this.rp2040.fail('SIO', 'read of FIFO_WR');
+    const own = this.own[id];
+    return (this.hasWord(id) ? VLD : 0) | (this.hasRoom(id) ? RDY : 0) | (own.overflowed ? WOF : 0) | (own.underflowed ? ROE : 0);
+  }
+
+  #writeFifo(offset, value) {
+    const own = this.own[this.id];
+    if (offset === FIFO_WR) this.push(this.id, value);
+    else if (offset === FIFO_ST) {
+      own.overflowed &&= !(value & WOF);
+      own.underflowed &&= !(value & ROE);
+      this.updateInterrupt(this.id);
+    } else this.rp2040.fail('SIO', 'write of FIFO_RD');
+  }
 
   #divide(signed) {
-    const a = signed ? this.dividend | 0 : this.dividend >>> 0;
-    const b = signed ? this.divisor | 0 : this.divisor >>> 0;
+    const { divider } = this;
+    const a = signed ? divider.dividend | 0 : divider.dividend >>> 0;
+    const b = signed ? divider.divisor | 0 : divider.divisor >>> 0;
     if (b === 0) {
-      this.quotient = signed && a >= 0 ? -1 : signed ? 1 : -1;
-      this.remainder = a;
+      divider.quotient = signed && a >= 0 ? -1 : signed ? 1 : -1;
+      divider.remainder = a;
     } else {
-      this.quotient = Math.trunc(a / b);
-      this.remainder = a % b;
+      divider.quotient = Math.trunc(a / b);
+      divider.remainder = a % b;
     }
-    this.readyAt = this.rp2040.core.cycles + DIVIDER_CYCLES;
-    this.dirty = 2;
+    divider.readyAt = this.rp2040.core.cycles + DIVIDER_CYCLES;
+    divider.dirty = 2;
   }
 
   #result(value) {
-    if (this.rp2040.core.cycles < this.readyAt) {
+    if (this.rp2040.core.cycles < this.divider.readyAt) {
       this.rp2040.fail('SIO', 'divider result read before its 8 cycles were over');
     }
     return value >>> 0;
@@ -42,19 +119,20 @@ export class StrictSio extends RPSIO {
     switch (offset) {
       case 0x60:
       case 0x68:
-        return this.dividend >>> 0;
+        return this.divider.dividend >>> 0;
       case 0x64:
       case 0x6c:
-        return this.divisor >>> 0;
+        return this.divider.divisor >>> 0;
       case 0x70:
-        this.dirty = 0;
-        return this.#result(this.quotient);
+        this.divider.dirty = 0;
+        return this.#result(this.divider.quotient);
       case 0x74:
-        return this.#result(this.remainder);
+        return this.#result(this.divider.remainder);
       case 0x78:
-        return (this.rp2040.core.cycles >= this.readyAt ? 1 : 0) | this.dirty;
+        return (this.rp2040.core.cycles >= this.divider.readyAt ? 1 : 0) | this.divider.dirty;
     }
-    if (offset >= 0x50 && offset < 0x5c) return this.rp2040.fail('SIO', 'the inter-core FIFO is not modelled');
+    if (offset >= FIFO_ST && offset <= FIFO_RD) return this.#readFifo(offset);
+    if (offset === 0) return this.id;
     if (offset > 0x17c) return this.rp2040.fail('SIO', `read of 0x${offset.toString(16)}`);
     return super.readUint32(offset);
   }
@@ -63,24 +141,23 @@ export class StrictSio extends RPSIO {
     switch (offset) {
       case 0x60:
       case 0x68:
-        this.dividend = value;
+        this.divider.dividend = value;
         return this.#divide(offset === 0x68);
       case 0x64:
       case 0x6c:
-        this.divisor = value;
+        this.divider.divisor = value;
         return this.#divide(offset === 0x6c);
       case 0x70:
-        this.quotient = value;
-        this.dirty = 2;
+        this.divider.quotient = value;
+        this.divider.dirty = 2;
         return undefined;
       case 0x74:
-        this.remainder = value;
-        this.dirty = 2;
+        this.divider.remainder = value;
+        this.divider.dirty = 2;
         return undefined;
     }
-    if (offset === 0x78 || (offset >= 0x50 && offset < 0x5c)) {
-      return this.rp2040.fail('SIO', `write of 0x${offset.toString(16)}`);
-    }
+    if (offset >= FIFO_ST && offset <= FIFO_RD) return this.#writeFifo(offset, value);
+    if (offset === 0x78) return this.rp2040.fail('SIO', `write of 0x${offset.toString(16)}`);
     super.writeUint32(offset, value);
     if (offset >= 0x10 && offset < 0x30) this.rp2040.pins.drive();
     return undefined;

@@ -79,6 +79,7 @@ export const Flag = {
   VELOCITY_VALID: 1 << 22,
   MOVING: 1 << 23,
   SLIDING: 1 << 24,
+  TANGENTIAL_LATE: 1 << 25,
 } as const;
 /** What an acknowledgement says. */
 export const Result = {
@@ -115,6 +116,7 @@ export const FLAGS: readonly { bit: number; name: keyof typeof Flag; warning: bo
   { bit: Flag.ELONGATED, name: 'ELONGATED', warning: true, meaning: 'the contact is not round' },
   { bit: Flag.ZERO_DOUBTFUL, name: 'ZERO_DOUBTFUL', warning: true, meaning: 'the pressure may be a zero that has moved, or rubber that has not let go yet' },
   { bit: Flag.SENSOR_DOUBTFUL, name: 'SENSOR_DOUBTFUL', warning: true, meaning: 'a sensor in use gives reason to doubt it' },
+  { bit: Flag.TANGENTIAL_LATE, name: 'TANGENTIAL_LATE', warning: true, meaning: 'the force along the rubber was not computed in time' },
 ];
 
 /** The quantities of a contact that hold under a flag, in the order of a recording's columns, and that flag. */
@@ -407,7 +409,7 @@ export interface Crash extends Header {
   activity: number;
   /** parts without progress, for kind 3: bit 0 main loop, 1 scan, 2 USB, 3 interrupts */
   stuck: number;
-  /** the last events, newest first: 0 none, 1 start, 2 command, 3 port closed, 4 bus asleep, 5 awake, 6 stored, 7 other sensors answer, 8 timeouts on the sensor bus, 9 frames skipped */
+  /** the last events, newest first: 0 none, 1 start, 2 command, 3 port closed, 4 bus asleep, 5 awake, 6 stored, 7 other sensors answer, 8 timeouts on the sensor bus, 9 frames skipped, 10 the second processor started again */
   event_codes: Float64Array;
   /** of these: type of the command; 1 if storing failed; number of timeouts or frames in a second */
   event_details: Float64Array;
