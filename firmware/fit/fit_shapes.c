@@ -1,0 +1,806 @@
+#include "fit/fit_shapes.h"
+
+#include "common/contact_flags.h"
+#include "fit/fit_grid_parts.h"
+#include "fit/fit_grid_solve.h"
+#include "fit/fit_limits.h"
+#include "fit/fit_math.h"
+
+#include <math.h>
+
+/* The models, lengths in pitches. A blob at d = (dx, dy) from its middle, t its contact's spread:
+ *   s = sum_j share_j V / v_j exp(-d' d / (2 v_j)) - dip,    v_j = V_j + t,  V the widest V_j
+ * and what of a load Q the rubber shows there:
+ *   f = sum_j moment_j V / v_j^2 d exp(-d' d / (2 v_j)),     v_j = V_j + 1.3 t
+ * A model is A sum_b w_b [s(d_b) + far exp(-d_b' d_b / (2 FAR V))] + pull' f(d): blobs of weight
+ * w_b by lever_b span from the middle.
+ *   round  one blob
+ *   long   three, the nodes of Gauss's quadrature of a line from -span to span
+ *   two    two, by +-span, of weight (1 +- balance) / 2
+ * Forces are 2 pi V A and 2 pi V pull. */
+enum { ROUND, LONG, TWO, MODELS };
+enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, FAR, SPAN_X, SPAN_Y, BALANCE, PULL_X = BALANCE, PULL_Y };
+#define UNKNOWNS FIT_SHAPES_UNKNOWNS
+#define RESIDUAL UNKNOWNS
+_Static_assert(PULL_Y + 1 == UNKNOWNS, "a column for each");
+
+static const uint8_t unknowns_of[MODELS] = {SPAN_X, UNKNOWNS, PULL_Y};
+
+#define ONE_Q20 (1 << 20)
+#define MODEL_SD_Q16 262    /* 0.004 of the largest reading */
+#define FAR_WIDTHS 6.25f    /* FAR: the dip that the recordings of real pads show */
+#define PER_FAR_SD_Q4 1600  /* 1 / 0.01 */
+#define PER_LOAD_SD_Q4 53   /* 1 / 0.3: Q / F of what is held */
+#define KAPPA_Q14 21299     /* 1.3, as in fit_tangential.c */
+#define DAMPING_SHIFT 8     /* of the diagonal: what readings hardly tell moves slowly */
+/* The load joins its model once the line has settled. Both at once lose their way at the border. */
+#define FRAMES_WITHOUT_LOAD 9
+#define FREEDOM 9           /* readings and priors less the unknowns of two */
+/* The best of the models explains nothing if its chi^2 is above that. */
+#define CHI_SQUARE_MAX 60
+#define SEPARATION_MIN 0.5f /* pitches: nearer pairs are long contacts */
+
+#define PLACE_X_MAX ((5 << 20) / 2)
+#define PLACE_Y_MAX ((7 << 20) / 2)
+#define SPAN_MAX (3 << 20)
+#define BALANCE_MAX (15 << 16) /* 0.94 */
+#define AMPLITUDE_MAX ((4 << 20) - 1)
+#define AMPLITUDE_LEAST (1 << 13)
+#define MOVE_MAX (1 << 18) /* a quarter of a pitch */
+#define SQUARE_MAX_Q24 (40 << 24)
+#define PIVOT_LEAST (1 << 18)
+
+struct terms {
+  int32_t k_q24[PAD_NORMAL_TERMS], h_q14[PAD_NORMAL_TERMS], q_q12[PAD_NORMAL_TERMS],
+      s_q8[PAD_NORMAL_TERMS];
+  int32_t pull_k_q24[PAD_TANGENTIAL_TERMS], pull_q12[PAD_TANGENTIAL_TERMS];
+  int32_t dip_k_q24, dip_q14;
+};
+
+struct blob {
+  int32_t x_q12, y_q12, weight_q14, lever_q14;
+};
+
+struct problem {
+  struct fit_shapes_pad *pad;
+  struct readings readings;
+  int32_t base_q22; /* error of a reading of weight 1 */
+  int32_t dip_share_q16, dip_k_q24;
+};
+
+struct equations {
+  int count;
+  uint32_t size[UNKNOWNS + 1];
+  int8_t q[UNKNOWNS + 1]; /* value = integer 2^-q */
+  int32_t right[UNKNOWNS];
+  int32_t residual_square;
+  int8_t half[UNKNOWNS];
+  int32_t inverse_q14[UNKNOWNS];
+};
+
+static int32_t q26_from(float value) {
+  return fit_fixed(value, 26);
+}
+
+enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_array *array,
+                               const struct pad_profile *profile) {
+  const float per = 1.0f / array->pitch_mm, per_square = per * per;
+  const float widest = profile->normal[PAD_NORMAL_TERMS - 1].sd_mm * per;
+  const float narrowest = profile->normal[0].sd_mm * per;
+  if (array->grid.columns != FIT_GRID_COLUMNS || array->grid.rows != FIT_GRID_ROWS ||
+      !pad_profile_is_valid(profile) || narrowest * narrowest < FIT_SHAPES_VARIANCE_MIN ||
+      widest > 1.5f || profile->tangential[PAD_TANGENTIAL_TERMS - 1].sd_mm * per > 4.0f) {
+    return FT_ERR_ARGUMENT;
+  }
+  const float V = widest * widest;
+  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+    float sd = profile->normal[j].sd_mm * per;
+    pad->variance_q26[j] = q26_from(sd * sd);
+    pad->strength_q26[j] = q26_from(profile->normal[j].share * V);
+  }
+  for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
+    float sd = profile->tangential[j].sd_mm * per;
+    pad->pull_variance_q26[j] = q26_from(sd * sd);
+    pad->pull_strength_q26[j] = q26_from(profile->tangential[j].moment_mm * per * V);
+  }
+  pad->far_k_q24 = fit_fixed(0.72134752f / (FAR_WIDTHS * V), 24);
+  pad->spread_q20 = fit_fixed(profile->spread_mm2 * per_square, 20);
+  pad->per_spread_sd_q4 = fit_fixed(1.0f / (profile->spread_sd_mm2 * per_square), 4);
+  pad->spread_least_q20 = -(pad->variance_q26[0] >> 9); /* an eighth */
+  pad->spread_most_q20 = fit_fixed(0.75f * V, 20);
+  uint8_t origin = array->grid.sensor[COLUMNS / 2 * ROWS + ROWS / 2];
+  pad->pitch_mm = array->pitch_mm;
+  pad->per_pitch = per;
+  pad->origin_x_mm = array->x[origin] * array->pitch_mm;
+  pad->origin_y_mm = array->y[origin] * array->pitch_mm;
+  pad->widest_mm2 = profile->normal[PAD_NORMAL_TERMS - 1].sd_mm;
+  pad->widest_mm2 *= pad->widest_mm2;
+  pad->force_unit_N = 6.2831853e-6f * pad->widest_mm2;
+  return FT_OK;
+}
+
+static NOINLINE void set_terms(const struct problem *problem, int32_t t_q20, bool pulls,
+                               struct terms *terms) {
+  const struct fit_shapes_pad *pad = problem->pad;
+  int32_t heights = 0;
+  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+    int32_t v_q26 = pad->variance_q26[j] + t_q20 * 64;
+    int32_t h_q26 = fixed_div_q26(pad->strength_q26[j], v_q26);
+    terms->k_q24[j] = fixed_div_q26(LOG2E_HALF_Q26, v_q26) >> 2;
+    terms->h_q14[j] = h_q26 >> 12;
+    terms->q_q12[j] = fixed_div_q26(h_q26, v_q26) >> 14;
+    terms->s_q8[j] = port_divide(terms->q_q12[j] << 14, v_q26 >> 8);
+    heights += terms->h_q14[j];
+  }
+  terms->dip_q14 = fixed_mul_16(problem->dip_share_q16, heights);
+  terms->dip_k_q24 = problem->dip_k_q24;
+  for (int j = 0; pulls && j < PAD_TANGENTIAL_TERMS; j++) {
+    int32_t v_q26 = pad->pull_variance_q26[j] + fixed_mul_16(t_q20 * 64, KAPPA_Q14) * 4;
+    int32_t over_q26 = fixed_div_q26(pad->pull_strength_q26[j] >> 2, v_q26 >> 2);
+    terms->pull_k_q24[j] = fixed_div_q26(LOG2E_HALF_Q26 >> 2, v_q26 >> 2) >> 2;
+    terms->pull_q12[j] = fixed_div_q26(over_q26 >> 2, v_q26 >> 2) >> 14;
+  }
+}
+
+static int set_blobs(int model, const int32_t *at, struct blob *blob) {
+  static const int32_t weight_q14[3] = {7282, 4551, 4551}, lever_q14[3] = {0, 12691, -12691};
+  int count = model == ROUND ? 1 : model == LONG ? 3 : 2;
+  for (int b = 0; b < count; b++) {
+    if (model == TWO) {
+      int32_t sign = b == 0 ? 1 : -1;
+      blob[b].weight_q14 = (1 << 13) + sign * (at[BALANCE] >> 7);
+      blob[b].lever_q14 = sign * (1 << 14);
+    } else {
+      blob[b].weight_q14 = model == ROUND ? 1 << 14 : weight_q14[b];
+      blob[b].lever_q14 = lever_q14[b];
+    }
+    blob[b].x_q12 = at[PLACE_X] >> 8;
+    blob[b].y_q12 = at[PLACE_Y] >> 8;
+    if (model != ROUND) {
+      blob[b].x_q12 += ((at[SPAN_X] >> 8) * blob[b].lever_q14) >> 14;
+      blob[b].y_q12 += ((at[SPAN_Y] >> 8) * blob[b].lever_q14) >> 14;
+    }
+  }
+  return count;
+}
+
+static int32_t square_q24(int32_t dx_q12, int32_t dy_q12) {
+  uint32_t square = (uint32_t)(dx_q12 * dx_q12) + (uint32_t)(dy_q12 * dy_q12);
+  return square > SQUARE_MAX_Q24 ? SQUARE_MAX_Q24 : (int32_t)square;
+}
+
+static int32_t bell_q15(int32_t square, int32_t k_q24) {
+  return exp2_negative((uint32_t)fixed_mul_q26(square, k_q24)) >> 15;
+}
+
+/* Adds a blob at (dx, dy) to the row of its sensor, whose elements are Q15 (RESIDUAL Q28). */
+static NOINLINE void add_blob(const struct problem *problem, const struct terms *terms, int model,
+                              const struct blob *blob, int32_t amplitude_q13, int32_t dx_q12,
+                              int32_t dy_q12, int32_t *row) {
+  int32_t square = square_q24(dx_q12, dy_q12);
+  int32_t s_q29 = 0, g_q27 = 0, w_q23 = 0;
+  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
+    int32_t e_q15 = bell_q15(square, terms->k_q24[j]);
+    s_q29 += terms->h_q14[j] * e_q15;
+    g_q27 += terms->q_q12[j] * e_q15;
+    w_q23 += terms->s_q8[j] * e_q15;
+  }
+  if (terms->dip_q14 != 0) {
+    s_q29 -= terms->dip_q14 * bell_q15(square, terms->dip_k_q24);
+  }
+  int32_t far_q15 = bell_q15(square, problem->pad->far_k_q24);
+  int32_t s_q15 = s_q29 >> 14, g_q12 = g_q27 >> 15;
+  int32_t m_q12 = (((square >> 14) * (w_q23 >> 15)) >> 7) - g_q12;
+  int32_t a_q13 = (amplitude_q13 * blob->weight_q14) >> 14;
+  int32_t along_x = (((g_q12 * dx_q12) >> 12) * a_q13) >> 10;
+  int32_t along_y = (((g_q12 * dy_q12) >> 12) * a_q13) >> 10;
+  row[AMPLITUDE] += (s_q15 * blob->weight_q14) >> 14;
+  row[PLACE_X] += along_x;
+  row[PLACE_Y] += along_y;
+  row[SPREAD] += (m_q12 * a_q13) >> 10;
+  row[FAR] += (a_q13 * far_q15) >> 13;
+  row[RESIDUAL] -= a_q13 * s_q15;
+  if (model != ROUND) {
+    row[SPAN_X] += fixed_mul_16(along_x, blob->lever_q14) * 4;
+    row[SPAN_Y] += fixed_mul_16(along_y, blob->lever_q14) * 4;
+  }
+  if (model == TWO) {
+    int32_t half = (amplitude_q13 * s_q15) >> 14;
+    row[BALANCE] += blob->lever_q14 > 0 ? half : -half;
+  }
+}
+
+static NOINLINE void add_pull(const struct terms *terms, const int32_t *at, int32_t dx_q12,
+                              int32_t dy_q12, int32_t *row) {
+  int32_t square = square_q24(dx_q12, dy_q12), f_q27 = 0;
+  for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
+    f_q27 += terms->pull_q12[j] * bell_q15(square, terms->pull_k_q24[j]);
+  }
+  row[PULL_X] = ((f_q27 >> 15) * dx_q12) >> 9;
+  row[PULL_Y] = ((f_q27 >> 15) * dy_q12) >> 9;
+  row[RESIDUAL] -= row[PULL_X] * (at[PULL_X] >> 7) + row[PULL_Y] * (at[PULL_Y] >> 7);
+}
+
+/* Where a step begins is rounded, which moves the step and not where it ends. */
+static void round_places(struct fit_shapes_at *at) {
+  for (int u = 0; u < UNKNOWNS; u++) {
+    at->value[u] = (at->value[u] + 128) & ~255;
+  }
+}
+
+/* The weighted rows of a model, columns Q27 and residual Q28. */
+static NOINLINE void set_rows(const struct problem *problem, int model, int count,
+                              const struct fit_shapes_at *where, struct equations *equations) {
+  struct fit_shapes_pad *pad = problem->pad;
+  const int32_t *at = where->value;
+  const bool pulls = count > BALANCE && model == LONG;
+  struct terms terms;
+  struct blob blob[3];
+  set_terms(problem, at[SPREAD], pulls, &terms);
+  int blobs = set_blobs(model, at, blob);
+  equations->count = count;
+  for (int u = 0; u <= UNKNOWNS; u++) {
+    equations->size[u] = 0;
+  }
+  for (int k = 0; k < NODES; k++) {
+    int32_t *row = pad->room.row[k];
+    int32_t x_q12 = (k / ROWS - COLUMNS / 2) * 4096, y_q12 = (k % ROWS - ROWS / 2) * 4096;
+    for (int u = 0; u < UNKNOWNS; u++) {
+      row[u] = 0;
+    }
+    row[RESIDUAL] = problem->readings.q28[k];
+    for (int b = 0; b < blobs; b++) {
+      add_blob(problem, &terms, model, &blob[b], at[AMPLITUDE] >> 7, x_q12 - blob[b].x_q12,
+               y_q12 - blob[b].y_q12, row);
+    }
+    if (pulls) {
+      add_pull(&terms, at, x_q12 - (at[PLACE_X] >> 8), y_q12 - (at[PLACE_Y] >> 8), row);
+    }
+    row[RESIDUAL] = fixed_clamp((row[RESIDUAL] >> 12) - (((at[FAR] >> 4) * row[FAR]) >> 15),
+                                -(1 << 17), 1 << 17);
+    int32_t weight_q12 = pad->room.weight_q12[k];
+    for (int u = 0; u <= UNKNOWNS; u++) {
+      row[u] = fixed_clamp(row[u], -(1 << 18), 1 << 18) * weight_q12;
+      equations->size[u] |= fixed_size(row[u]);
+    }
+  }
+}
+
+/* Brings a column to 13 bits and returns the sum of its squares. */
+static NOINLINE int32_t normalise(struct fit_shapes_pad *pad, int u, int q, int32_t prior,
+                                  struct equations *equations) {
+  int32_t shift = fixed_bits(equations->size[u] | fixed_size(prior)) - 13;
+  shift = shift < 1 ? 1 : shift;
+  int32_t half = 1 << (shift - 1);
+  equations->q[u] = (int8_t)(q - shift);
+  int32_t own = (prior >> shift) * (prior >> shift);
+  for (int k = 0; k < NODES; k++) {
+    int32_t value = (pad->room.row[k][u] + half) >> shift;
+    pad->room.row[k][u] = value;
+    own += value * value;
+  }
+  return own;
+}
+
+/* The normal matrix, of which the diagonal is 2^28 to 2^30. */
+static NOINLINE void form(const struct problem *problem, const int32_t *at,
+                          struct equations *equations) {
+  struct fit_shapes_pad *pad = problem->pad;
+  int32_t element[UNKNOWNS] = {0}, off[UNKNOWNS] = {0}; /* priors, Q27 and Q28 */
+  int32_t base = problem->base_q22;
+  element[SPREAD] = base * pad->per_spread_sd_q4 * 2;
+  off[SPREAD] = (element[SPREAD] >> 12) * ((pad->spread_q20 - at[SPREAD]) >> 4) >> 3;
+  element[FAR] = base * PER_FAR_SD_Q4 * 2;
+  off[FAR] = (element[FAR] >> 12) * (-at[FAR] >> 4) >> 3;
+  if (equations->count == UNKNOWNS) {
+    int32_t per_q4 = port_divide(PER_LOAD_SD_Q4 << 16, at[AMPLITUDE] >> 4);
+    element[PULL_X] = element[PULL_Y] = base * (per_q4 < 1024 ? per_q4 : 1024) * 2;
+    off[PULL_X] = (element[PULL_X] >> 12) * (-at[PULL_X] >> 4) >> 3;
+    off[PULL_Y] = (element[PULL_Y] >> 12) * (-at[PULL_Y] >> 4) >> 3;
+  }
+  for (int u = 0; u < equations->count; u++) {
+    equations->size[RESIDUAL] |= fixed_size(off[u]);
+  }
+  equations->residual_square = normalise(pad, RESIDUAL, 28, 0, equations);
+  int32_t residual_shift = 28 - equations->q[RESIDUAL];
+  int8_t up[UNKNOWNS];
+  for (int u = 0; u < equations->count; u++) {
+    int32_t own = normalise(pad, u, 27, element[u], equations);
+    int32_t shift = 27 - equations->q[u], residual = off[u] >> residual_shift;
+    up[u] = (int8_t)(own >> 30 ? 0 : (30 - fixed_bits((uint32_t)own | 1)) >> 1);
+    pad->room.matrix[u][u] = own * (1 << (2 * up[u]));
+    int32_t right = (element[u] >> shift) * residual;
+    equations->residual_square += residual * residual;
+    for (int k = 0; k < NODES; k++) {
+      right += pad->room.row[k][u] * pad->room.row[k][RESIDUAL];
+    }
+    equations->right[u] = right * (1 << up[u]);
+    equations->q[u] = (int8_t)(equations->q[u] + up[u]);
+  }
+  for (int a = 1; a < equations->count; a++) {
+    for (int b = 0; b < a; b++) {
+      int32_t sum = 0;
+      const int32_t *row = pad->room.row[0];
+      for (int k = 0; k < NODES; k++, row += UNKNOWNS + 1) {
+        sum += row[a] * row[b];
+      }
+      pad->room.matrix[a][b] = sum * (1 << (up[a] + up[b]));
+    }
+  }
+}
+
+/* L D L^T in place, below the diagonal L 2^-half in Q14. An unknown that is not told from those
+ * before stays where it is. right: 2^-half times the elements of D^-1 L^-1 right, Q14. */
+static NOINLINE void eliminate(int32_t (*matrix)[UNKNOWNS], struct equations *equations,
+                               int32_t *right) {
+  int count = equations->count;
+  for (int j = 0; j < count; j++) {
+    int32_t pivot = matrix[j][j];
+    if (pivot < PIVOT_LEAST) {
+      equations->half[j] = 0;
+      equations->inverse_q14[j] = 0;
+      right[j] = 0;
+      for (int i = j + 1; i < count; i++) {
+        matrix[i][j] = 0;
+      }
+      continue;
+    }
+    int32_t half = pivot >> 30 ? 0 : (30 - fixed_bits((uint32_t)pivot)) >> 1;
+    int32_t down = 15 - half, round = 1 << down >> 1;
+    int32_t inverse_q14 = port_divide((1 << 29) - 1, (pivot * (1 << (2 * half))) >> 15);
+    equations->half[j] = (int8_t)half;
+    equations->inverse_q14[j] = inverse_q14;
+    int32_t own = fixed_clamp((right[j] + round) >> down, -(1 << 15), 1 << 15);
+    right[j] = (own * inverse_q14 + (1 << 14)) >> 15;
+    int32_t over[UNKNOWNS];
+    for (int i = j + 1; i < count; i++) {
+      int32_t *row = matrix[i];
+      int32_t element = fixed_clamp((row[j] + round) >> down, -(1 << 15), 1 << 15); /* Q15 */
+      over[i] = (element * inverse_q14 + (1 << 14)) >> 15;
+      for (int k = j + 1; k <= i; k++) {
+        row[k] -= element * over[k] * 2;
+      }
+      right[i] -= element * right[j] * 2;
+      row[j] = over[i];
+    }
+  }
+}
+
+/* x of L^T x = right, Q20 in the columns' units. */
+static NOINLINE void substitute(int32_t (*matrix)[UNKNOWNS], const struct equations *equations,
+                                const int32_t *right, int32_t *x_q20) {
+  for (int j = equations->count - 1; j >= 0; j--) {
+    int32_t sum = right[j] * 64;
+    for (int i = j + 1; i < equations->count; i++) {
+      sum -= fixed_mul_16(x_q20[i], matrix[i][j]) * 4;
+    }
+    x_q20[j] = fixed_clamp(sum, -(1 << 24), 1 << 24) * (1 << equations->half[j]);
+  }
+}
+
+static const int32_t limit_of[UNKNOWNS] = {AMPLITUDE_MAX, PLACE_X_MAX, PLACE_Y_MAX, 0,
+                                           ONE_Q20 / 8,   SPAN_MAX,    SPAN_MAX,    0, 0};
+
+static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model,
+                               const struct equations *equations, const int32_t *x_q20,
+                               struct fit_shapes_at *at) {
+  int32_t move[UNKNOWNS], most_q14 = 1 << 14;
+  int32_t amplitude = at->value[AMPLITUDE];
+  for (int u = 0; u < equations->count; u++) {
+    move[u] = shifted(x_q20[u], equations->q[u] - equations->q[RESIDUAL]);
+    int32_t limit = u == AMPLITUDE ? amplitude >> 1
+                    : u == SPREAD  ? MOVE_MAX / 4
+                    : u == FAR     ? MOVE_MAX / 4
+                    : u < BALANCE  ? MOVE_MAX
+                    : model == TWO ? MOVE_MAX * 2
+                                   : amplitude / 4;
+    int32_t size = (int32_t)fixed_size(move[u]) >> 6;
+    int32_t share_q14 = port_divide((size < 1 << 16 ? size : 1 << 16) << 14, (limit >> 6) | 1);
+    most_q14 = share_q14 > most_q14 ? share_q14 : most_q14;
+  }
+  int32_t share_q14 = port_divide(1 << 28, most_q14);
+  for (int u = 0; u < equations->count; u++) {
+    int32_t limit = limit_of[u];
+    if (u >= BALANCE) {
+      limit = model == TWO ? BALANCE_MAX : amplitude;
+    }
+    if (most_q14 > 1 << 14) {
+      move[u] = fixed_mul_16(move[u], share_q14) * 4;
+    }
+    move[u] = fixed_clamp(move[u], -(1 << 22), 1 << 22);
+    at->value[u] = u == SPREAD ? fixed_clamp(at->value[u] + move[u], pad->spread_least_q20,
+                                             pad->spread_most_q20)
+                               : fixed_clamp(at->value[u] + move[u], -limit, limit);
+  }
+  if (at->value[AMPLITUDE] < AMPLITUDE_LEAST) {
+    at->value[AMPLITUDE] = AMPLITUDE_LEAST;
+  }
+}
+
+/* chi^2 of the residuals and priors, Q8. */
+static int32_t chi_square_q8(const struct problem *problem, const struct equations *equations) {
+  struct scaled base = fit_scaled_from(problem->base_q22, -22);
+  struct scaled squares =
+      fit_scaled_from(equations->residual_square, -2 * equations->q[RESIDUAL]);
+  return fit_scaled_to_fixed(scaled_div(squares, scaled_mul(base, base)), 8);
+}
+
+static int32_t chi_square_at(const struct problem *problem, int model, int count,
+                             struct fit_shapes_at *at, struct equations *equations) {
+  round_places(at);
+  set_rows(problem, model, count, at, equations);
+  form(problem, at->value, equations);
+  return chi_square_q8(problem, equations);
+}
+
+static NOINLINE void step(const struct problem *problem, int model, struct equations *equations,
+                          struct fit_shapes_at *at) {
+  struct fit_shapes_pad *pad = problem->pad;
+  int32_t x_q20[UNKNOWNS], right[UNKNOWNS];
+  for (int u = 0; u < equations->count; u++) {
+    right[u] = equations->right[u];
+    pad->room.matrix[u][u] += pad->room.matrix[u][u] >> DAMPING_SHIFT;
+  }
+  eliminate(pad->room.matrix, equations, right);
+  substitute(pad->room.matrix, equations, right, x_q20);
+  take_step(pad, model, equations, x_q20, at);
+}
+
+static NOINLINE bool weigh(const struct fit_array *array, const struct fit_settings *settings,
+                           uint32_t used, struct problem *problem) {
+  const struct readings *readings = &problem->readings;
+  int32_t noise = fixed_clamp(shifted(settings->noise_Pa_q10, readings->shift - 6), 1, 1 << 18);
+  problem->base_q22 =
+      fixed_longer_leg(noise, ((readings->largest_q28 >> 14) * MODEL_SD_Q16) >> 8);
+  int sensors = 0;
+  for (int k = 0; k < NODES; k++) {
+    uint8_t sensor = array->grid.sensor[k];
+    problem->pad->room.weight_q12[k] = 0;
+    if (used >> sensor & 1) {
+      int32_t gain = (int32_t)((uint32_t)settings->gain_sd_q16[sensor] *
+                                   fixed_size(readings->q14[k]) >> 8);
+      problem->pad->room.weight_q12[k] = port_divide(
+          problem->base_q22 << 8, fixed_longer_leg(problem->base_q22, gain) >> 4);
+      sensors++;
+    }
+  }
+  return sensors >= FIT_SHAPES_SENSORS;
+}
+
+static int32_t sum_of(const struct readings *readings) {
+  int32_t sum_q20 = 0;
+  for (int k = 0; k < NODES; k++) {
+    sum_q20 += readings->q28[k] >> 8;
+  }
+  return sum_q20;
+}
+
+static int32_t pitches_q20(float mm, float per_pitch) {
+  return fixed_clamp(fit_fixed(mm * per_pitch, 20), -PLACE_Y_MAX, PLACE_Y_MAX);
+}
+
+/* Where the pair may be: along the Gaussian's longer axis, equal or three to one either way; or
+ * under the largest reading and where it leaves most. */
+static void set_pair(float x, float y, float dx, float dy, float share, struct fit_shapes_at *at) {
+  at->value[PLACE_X] = pitches_q20(x - share * dx, 1.0f);
+  at->value[PLACE_Y] = pitches_q20(y - share * dy, 1.0f);
+  at->value[SPAN_X] = pitches_q20(dx, 1.0f);
+  at->value[SPAN_Y] = pitches_q20(dy, 1.0f);
+  at->value[BALANCE] = fit_fixed(share, 20);
+}
+
+static NOINLINE void set_pair_by_readings(const struct problem *problem,
+                                          struct fit_shapes_at *at) {
+  const struct readings *readings = &problem->readings;
+  int first = 0, second = -1;
+  int32_t most = 0;
+  struct terms terms;
+  set_terms(problem, at->value[SPREAD], false, &terms);
+  for (int k = 1; k < NODES; k++) {
+    first = readings->q14[k] > readings->q14[first] ? k : first;
+  }
+  int32_t height_q14 = terms.h_q14[0] + terms.h_q14[1];
+  for (int k = 0; k < NODES; k++) {
+    int32_t dx = (k / ROWS - first / ROWS) * 4096, dy = (k % ROWS - first % ROWS) * 4096;
+    int32_t square = square_q24(dx, dy);
+    int32_t s_q14 = (terms.h_q14[0] * bell_q15(square, terms.k_q24[0]) +
+                     terms.h_q14[1] * bell_q15(square, terms.k_q24[1])) >> 15;
+    int32_t left = readings->q14[k] - port_divide(readings->q14[first] * s_q14, height_q14);
+    if (left > most) {
+      most = left;
+      second = k;
+    }
+  }
+  if (second < 0) {
+    return;
+  }
+  int32_t both = readings->q14[first] + most;
+  at->value[AMPLITUDE] = port_divide(both << 14, height_q14) << 6;
+  at->value[PLACE_X] = (first / ROWS + second / ROWS - 2 * (COLUMNS / 2)) * (ONE_Q20 / 2);
+  at->value[PLACE_Y] = (first % ROWS + second % ROWS - 2 * (ROWS / 2)) * (ONE_Q20 / 2);
+  at->value[SPAN_X] = (first / ROWS - second / ROWS) * (ONE_Q20 / 2);
+  at->value[SPAN_Y] = (first % ROWS - second % ROWS) * (ONE_Q20 / 2);
+  at->value[BALANCE] = port_divide((readings->q14[first] - most) << 14, both) << 6;
+}
+
+static NOINLINE void begin(const struct problem *problem, const struct fit_result *fit,
+                           struct fit_shapes_state *state) {
+  const struct fit_shapes_pad *pad = problem->pad;
+  const float per = pad->per_pitch;
+  struct fit_shapes_at at = {{0}};
+  float variance = fit->sigma_mm * fit->sigma_mm * per * per;
+  /* The longer axis: half the difference of its variance to the other's, and its direction. */
+  float half = 0.0f, along_x = 1.0f, along_y = 0.0f;
+  if (fit->flags & CONTACT_FLAG_WIDTHS_VALID) {
+    float sx = fit->sigma_x_mm * per, sy = fit->sigma_y_mm * per;
+    float difference = 0.5f * (sx * sx - sy * sy), slant = fit->width_correlation * sx * sy;
+    half = sqrtf(difference * difference + slant * slant);
+    if (half > 0.0f) {
+      float cosine = difference / half;
+      along_x = sqrtf(fmaxf(0.5f + 0.5f * cosine, 0.0f));
+      along_y = sqrtf(fmaxf(0.5f - 0.5f * cosine, 0.0f));
+      along_y = slant < 0.0f ? -along_y : along_y;
+    }
+  }
+  float excess = fminf(fmaxf(2.0f * half, 0.05f), 2.5f);
+  float widest = pad->widest_mm2 * per * per;
+  float spread = fminf(fmaxf(variance - half - 0.912f * widest, 0.0f), 0.1f);
+  float x = (fit->x_mm - pad->origin_x_mm) * per, y = (fit->y_mm - pad->origin_y_mm) * per;
+  struct scaled amplitude = fit_grid_scaled(fit->force_N / (1.0753f * pad->force_unit_N));
+  amplitude.exponent += problem->readings.shift - 18;
+  at.value[AMPLITUDE] =
+      fixed_clamp(fit_scaled_to_fixed(amplitude, 20), AMPLITUDE_LEAST, AMPLITUDE_MAX);
+  at.value[SPREAD] = fit_fixed(spread, 20);
+  at.value[PLACE_X] = pitches_q20(x, 1.0f);
+  at.value[PLACE_Y] = pitches_q20(y, 1.0f);
+  state->at[ROUND] = at;
+  float reach = sqrtf(excess);
+  float line = fminf(1.7320508f * reach, 1.4f);
+  at.value[SPAN_X] = pitches_q20(line * along_x, 1.0f);
+  at.value[SPAN_Y] = pitches_q20(line * along_y, 1.0f);
+  state->at[LONG] = at;
+  int32_t least = INT32_MAX;
+  for (int start = 0; start < 4; start++) {
+    static const float share[3] = {0.0f, 0.5f, -0.5f};
+    struct fit_shapes_at pair = at;
+    if (start < 3) {
+      float by = share[start] == 0.0f ? reach : 1.1547005f * reach;
+      set_pair(x, y, by * along_x, by * along_y, share[start], &pair);
+    } else {
+      set_pair_by_readings(problem, &pair);
+    }
+    struct equations equations;
+    int32_t chi_square = chi_square_at(problem, TWO, PULL_Y, &pair, &equations);
+    if (chi_square < least) {
+      least = chi_square;
+      state->at[TWO] = pair;
+    }
+  }
+}
+
+/* Variance of a sum of two unknowns times these, by the undamped factors. */
+static NOINLINE struct scaled variance_of(const struct fit_shapes_pad *pad,
+                                          const struct equations *equations, int first, float a,
+                                          int second, float b) {
+  const int32_t(*matrix)[UNKNOWNS] = pad->room.whole;
+  struct scaled w[UNKNOWNS], sum = {0, 0};
+  for (int j = 0; j < equations->count; j++) {
+    struct scaled own = {0, 0};
+    if (j == first || j == second) {
+      float size = j == first ? a : b;
+      own = fit_grid_scaled(size < 0.0f ? -size : size);
+      own.mantissa = size < 0.0f ? -own.mantissa : own.mantissa;
+      own.exponent += equations->q[j];
+    }
+    for (int i = 0; i < j; i++) {
+      if (w[i].mantissa != 0 && matrix[j][i] != 0) {
+        struct scaled l = fit_scaled_from(matrix[j][i], equations->half[i] - 14);
+        own = fit_scaled_short(scaled_sub(own, fit_scaled_short(scaled_mul(l, w[i]))));
+      }
+    }
+    w[j] = equations->inverse_q14[j] == 0 ? (struct scaled){0, 0} : own;
+    if (w[j].mantissa != 0) {
+      struct scaled inverse =
+          fit_scaled_from(equations->inverse_q14[j], 2 * equations->half[j] - 14);
+      sum = scaled_add(sum, scaled_mul(fit_scaled_short(scaled_mul(own, own)), inverse));
+    }
+  }
+  sum.exponent -= 30;
+  return fit_scaled_short(sum);
+}
+
+static float composed(struct scaled value) {
+  return fit_float(value.mantissa, value.exponent);
+}
+
+static float root(struct scaled value) {
+  return composed(fit_scaled_sqrt(value));
+}
+
+static float q20(int32_t value) {
+  return (float)value * (1.0f / 1048576.0f);
+}
+
+static NOINLINE void put_two(const struct problem *problem, const struct equations *equations,
+                             const int32_t *at, float force, struct scaled variance,
+                             struct fit_shapes_result *result) {
+  const struct fit_shapes_pad *pad = problem->pad;
+  float amplitude = q20(at[AMPLITUDE]), balance = q20(at[BALANCE]);
+  for (int c = 0; c < 2; c++) {
+    float sign = (c == 0) == (balance >= 0.0f) ? 1.0f : -1.0f;
+    float share = 0.5f * (1.0f + sign * balance);
+    result->x_mm[c] =
+        pad->origin_x_mm + pad->pitch_mm * (q20(at[PLACE_X]) + sign * q20(at[SPAN_X]));
+    result->y_mm[c] =
+        pad->origin_y_mm + pad->pitch_mm * (q20(at[PLACE_Y]) + sign * q20(at[SPAN_Y]));
+    result->force_N[c] = force * amplitude * share;
+    struct scaled place =
+        scaled_add(variance_of(pad, equations, PLACE_X, 1.0f, SPAN_X, sign),
+                   variance_of(pad, equations, PLACE_Y, 1.0f, SPAN_Y, sign));
+    result->location_sd_mm[c] = pad->pitch_mm * root(scaled_mul(fit_scaled_short(place), variance));
+    struct scaled of_force =
+        variance_of(pad, equations, AMPLITUDE, share, BALANCE, 0.5f * sign * amplitude);
+    result->force_sd_N[c] = force * root(scaled_mul(of_force, variance));
+  }
+}
+
+/* The readings are one contact's. */
+static NOINLINE void put_one(const struct problem *problem, const struct equations *equations,
+                             const int32_t *at, bool is_long, float force, struct scaled variance,
+                             struct fit_shapes_result *result) {
+  const struct fit_shapes_pad *pad = problem->pad;
+  result->x_mm[0] = pad->origin_x_mm + pad->pitch_mm * q20(at[PLACE_X]);
+  result->y_mm[0] = pad->origin_y_mm + pad->pitch_mm * q20(at[PLACE_Y]);
+  result->force_N[0] = force * q20(at[AMPLITUDE]);
+  struct scaled place = scaled_add(variance_of(pad, equations, PLACE_X, 1.0f, PLACE_Y, 0.0f),
+                                   variance_of(pad, equations, PLACE_Y, 1.0f, PLACE_X, 0.0f));
+  result->location_sd_mm[0] = pad->pitch_mm * root(scaled_mul(fit_scaled_short(place), variance));
+  result->force_sd_N[0] =
+      force * root(scaled_mul(variance_of(pad, equations, AMPLITUDE, 1.0f, FAR, 0.0f), variance));
+  if (!is_long) {
+    return;
+  }
+  result->qx_N = force * q20(at[PULL_X]);
+  result->qy_N = force * q20(at[PULL_Y]);
+  float sx = q20(at[SPAN_X]), sy = q20(at[SPAN_Y]);
+  float reach = sqrtf(sx * sx + sy * sy);
+  if (!(reach > 0.0f)) {
+    result->shape = FIT_SHAPE_PULLED;
+    return;
+  }
+  float ux = sx / reach, uy = sy / reach;
+  /* The pressure's second moment is reach^2 / 3: where reach is small its sd is twice what the
+   * slope says. Long is what is so beyond the penalty. */
+  struct scaled of_reach = scaled_mul(variance_of(pad, equations, SPAN_X, ux, SPAN_Y, uy), variance);
+  result->shape = reach * reach > (float)FIT_SHAPES_PENALTY * composed(fit_scaled_short(of_reach))
+                      ? FIT_SHAPE_ELONGATED
+                      : FIT_SHAPE_PULLED;
+  if (result->shape == FIT_SHAPE_ELONGATED) {
+    result->length_mm = 2.0f * reach * pad->pitch_mm;
+    result->along_x = ux < 0.0f ? -ux : ux;
+    result->along_y = ux < 0.0f ? -uy : uy;
+    result->angle_sd_rad =
+        root(scaled_mul(variance_of(pad, equations, SPAN_X, -uy, SPAN_Y, ux), variance)) / reach;
+  }
+}
+
+static int choose(const int32_t *chi_square, const int32_t *two) {
+  int32_t one = chi_square[ROUND] < chi_square[LONG] ? chi_square[ROUND] : chi_square[LONG];
+  int32_t penalty = FIT_SHAPES_PENALTY << 8;
+  int32_t rough = chi_square[TWO] < 1 << 24 ? chi_square[TWO] * FIT_SHAPES_PENALTY / FREEDOM
+                                            : INT32_MAX / 2;
+  float sx = q20(two[SPAN_X]), sy = q20(two[SPAN_Y]);
+  bool apart = 4.0f * (sx * sx + sy * sy) > SEPARATION_MIN * SEPARATION_MIN;
+  if (apart && chi_square[TWO] < one - (rough > penalty ? rough : penalty)) {
+    return TWO;
+  }
+  return chi_square[LONG] < chi_square[ROUND] - penalty ? LONG : ROUND;
+}
+
+static NOINLINE void keep_factors(struct fit_shapes_pad *pad, struct equations *equations) {
+  for (int a = 0; a < equations->count; a++) {
+    for (int b = 0; b <= a; b++) {
+      pad->room.whole[a][b] = pad->room.matrix[a][b];
+    }
+  }
+  int32_t right[UNKNOWNS] = {0};
+  eliminate(pad->room.whole, equations, right);
+}
+
+static void follow(const struct problem *problem, const struct fit_result *fit,
+                   struct fit_shapes_state *state, int32_t sum_q20) {
+  const struct fit_shapes_pad *pad = problem->pad;
+  int32_t x = pitches_q20(fit->x_mm - pad->origin_x_mm, pad->per_pitch);
+  int32_t y = pitches_q20(fit->y_mm - pad->origin_y_mm, pad->per_pitch);
+  if (state->frames > 0 && (sum_q20 < 1 << 18 || state->sum_q20 < 1 << 18 ||
+                            sum_q20 >> 2 >= state->sum_q20 || state->sum_q20 >> 2 >= sum_q20)) {
+    state->frames = 0;
+  }
+  if (state->frames > 0) {
+    int32_t share_q13 = port_divide(sum_q20, state->sum_q20 >> 13);
+    for (int m = 0; m < MODELS; m++) {
+      int32_t *value = state->at[m].value;
+      value[AMPLITUDE] = shifted(fixed_mul_16(value[AMPLITUDE], share_q13), 3);
+      value[AMPLITUDE] = fixed_clamp(value[AMPLITUDE], AMPLITUDE_LEAST, AMPLITUDE_MAX);
+      value[PLACE_X] = fixed_clamp(value[PLACE_X] + x - state->fit_x_q20, -PLACE_X_MAX, PLACE_X_MAX);
+      value[PLACE_Y] = fixed_clamp(value[PLACE_Y] + y - state->fit_y_q20, -PLACE_Y_MAX, PLACE_Y_MAX);
+      if (m == LONG) {
+        value[PULL_X] = shifted(fixed_mul_16(value[PULL_X], share_q13), 3);
+        value[PULL_Y] = shifted(fixed_mul_16(value[PULL_Y], share_q13), 3);
+      }
+    }
+  }
+  state->fit_x_q20 = x;
+  state->fit_y_q20 = y;
+  state->sum_q20 = sum_q20;
+}
+
+void fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
+                const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
+                const struct fit_result *fit, struct fit_shapes_state *state,
+                struct fit_shapes_result *result) {
+  *result = (struct fit_shapes_result){0};
+  struct problem problem = {.pad = pad};
+  if (!(fit->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
+      !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, settings, &problem.readings) ||
+      !weigh(array, settings, fit->used, &problem)) {
+    state->frames = 0;
+    return;
+  }
+  if (fit_has_dip(settings)) {
+    float sd = settings->dip_sd_mm * pad->per_pitch;
+    problem.dip_share_q16 = fit_fixed(settings->dip_share, 16);
+    problem.dip_k_q24 = fit_fixed(0.72134752f / (sd > 0.5f ? sd * sd : 0.25f), 24);
+  }
+  follow(&problem, fit, state, sum_of(&problem.readings));
+  if (state->frames == 0) {
+    begin(&problem, fit, state);
+    state->frames = 1;
+    return;
+  }
+  struct fit_shapes_at at[MODELS];
+  struct equations equations[MODELS];
+  int32_t chi_square[MODELS];
+  int best = MODELS;
+  bool ends = state->frames + 1 >= FIT_SHAPES_FRAMES;
+  for (int m = 0; m < MODELS; m++) {
+    int count = m == LONG && state->frames < FRAMES_WITHOUT_LOAD ? BALANCE : unknowns_of[m];
+    chi_square[m] = chi_square_at(&problem, m, count, &state->at[m], &equations[m]);
+    at[m] = state->at[m];
+    if (ends) {
+      int now = m == ROUND ? ROUND : m == LONG ? (chi_square[LONG] < chi_square[ROUND] - (FIT_SHAPES_PENALTY << 8) ? LONG : best) : choose(chi_square, at[TWO].value);
+      if (now == m) {
+        best = m;
+        keep_factors(pad, &equations[m]);
+      }
+    }
+    struct equations damped = equations[m];
+    step(&problem, m, &damped, &state->at[m]);
+  }
+  if (!ends) {
+    state->frames++;
+    return;
+  }
+  for (int m = 0; m < MODELS; m++) {
+    result->chi_square[m] = (float)chi_square[m] * (1.0f / 256.0f);
+  }
+  if (chi_square[best] > CHI_SQUARE_MAX << 8) {
+    result->shape = FIT_SHAPE_NONE;
+    state->frames = 0;
+    return;
+  }
+  struct scaled base = fit_scaled_from(problem.base_q22, -22);
+  struct scaled variance = scaled_mul(base, base);
+  if (chi_square[best] > FREEDOM << 8) {
+    variance = scaled_mul(variance, fit_scaled_from(chi_square[best] / FREEDOM, -8));
+  }
+  variance = fit_scaled_short(variance);
+  float force = pad->force_unit_N * fit_float(1 << 14, 18 - problem.readings.shift - 14);
+  if (best == TWO) {
+    result->shape = FIT_SHAPE_TWO;
+    put_two(&problem, &equations[TWO], at[TWO].value, force, variance, result);
+  } else {
+    result->shape = FIT_SHAPE_ROUND;
+    put_one(&problem, &equations[best], at[best].value, best == LONG, force, variance, result);
+  }
+}
