@@ -433,10 +433,27 @@ static int32_t chi_square_at(const struct problem *problem, int model, int count
   return chi_square_q8(problem, equations);
 }
 
+/* At a limit that it wants to pass the spread is no unknown: the others would step as if it moved. */
+static void hold_spread(struct fit_shapes_pad *pad, struct equations *equations, int32_t spread) {
+  int32_t right = equations->right[SPREAD];
+  if (!((spread < pad->spread_least_q20 + 256 && right < 0) ||
+        (spread > pad->spread_most_q20 - 256 && right > 0))) {
+    return;
+  }
+  for (int u = 0; u < SPREAD; u++) {
+    pad->room.matrix[SPREAD][u] = 0;
+  }
+  for (int u = SPREAD; u < equations->count; u++) {
+    pad->room.matrix[u][SPREAD] = 0;
+  }
+  equations->right[SPREAD] = 0;
+}
+
 static NOINLINE void step(const struct problem *problem, int model, struct equations *equations,
                           struct fit_shapes_at *at) {
   struct fit_shapes_pad *pad = problem->pad;
   int32_t x_q20[UNKNOWNS], right[UNKNOWNS];
+  hold_spread(pad, equations, at->value[SPREAD]);
   for (int u = 0; u < equations->count; u++) {
     right[u] = equations->right[u];
     pad->room.matrix[u][u] += pad->room.matrix[u][u] >> DAMPING_SHIFT;
