@@ -164,61 +164,105 @@ static int set_blobs(int model, const int32_t *at, struct blob *blob) {
   return count;
 }
 
-static int32_t square_q24(int32_t dx_q12, int32_t dy_q12) {
-  uint32_t square = (uint32_t)(dx_q12 * dx_q12) + (uint32_t)(dy_q12 * dy_q12);
-  return square > SQUARE_MAX_Q24 ? SQUARE_MAX_Q24 : (int32_t)square;
+/* exp(-d^2 / (2 v)) along both axes, whose products are the bells at the nodes. */
+struct bell {
+  int32_t x_q15[COLUMNS], y_q15[ROWS];
+};
+
+/* d^2 of the nodes along an axis. */
+struct squares {
+  int32_t x_q24[COLUMNS], y_q24[ROWS];
+};
+
+static void set_squares(int32_t x_q12, int32_t y_q12, struct squares *squares) {
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t d = (i - COLUMNS / 2) * 4096 - x_q12;
+    squares->x_q24[i] = fixed_clamp(d * d, 0, SQUARE_MAX_Q24);
+  }
+  for (int k = 0; k < ROWS; k++) {
+    int32_t d = (k - ROWS / 2) * 4096 - y_q12;
+    squares->y_q24[k] = fixed_clamp(d * d, 0, SQUARE_MAX_Q24);
+  }
 }
 
-static int32_t bell_q15(int32_t square, int32_t k_q24) {
-  return exp2_negative((uint32_t)fixed_mul_q26(square, k_q24)) >> 15;
+static NOINLINE void set_bell(const struct squares *squares, int32_t k_q24, struct bell *bell) {
+  for (int i = 0; i < COLUMNS; i++) {
+    bell->x_q15[i] = exp2_negative((uint32_t)fixed_mul_q26(squares->x_q24[i], k_q24)) >> 15;
+  }
+  for (int k = 0; k < ROWS; k++) {
+    bell->y_q15[k] = exp2_negative((uint32_t)fixed_mul_q26(squares->y_q24[k], k_q24)) >> 15;
+  }
 }
 
-/* Adds a blob at (dx, dy) to the row of its sensor, whose elements are Q15 (RESIDUAL Q28). */
+/* Adds a blob to the rows, whose elements are Q15 (RESIDUAL Q28). */
 static NOINLINE void add_blob(const struct problem *problem, const struct terms *terms, int model,
-                              const struct blob *blob, int32_t amplitude_q13, int32_t dx_q12,
-                              int32_t dy_q12, int32_t *row) {
-  int32_t square = square_q24(dx_q12, dy_q12);
-  int32_t s_q29 = 0, g_q27 = 0, w_q23 = 0;
-  for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
-    int32_t e_q15 = bell_q15(square, terms->k_q24[j]);
-    s_q29 += terms->h_q14[j] * e_q15;
-    g_q27 += terms->q_q12[j] * e_q15;
-    w_q23 += terms->s_q8[j] * e_q15;
-  }
-  if (terms->dip_q14 != 0) {
-    s_q29 -= terms->dip_q14 * bell_q15(square, terms->dip_k_q24);
-  }
-  int32_t far_q15 = bell_q15(square, problem->pad->far_k_q24);
-  int32_t s_q15 = s_q29 >> 14, g_q12 = g_q27 >> 15;
-  int32_t m_q12 = (((square >> 14) * (w_q23 >> 15)) >> 7) - g_q12;
+                              const struct blob *blob, int32_t amplitude_q13) {
+  struct squares squares;
+  struct bell narrow, wide, dip, far;
+  set_squares(blob->x_q12, blob->y_q12, &squares);
+  set_bell(&squares, terms->k_q24[0], &narrow);
+  set_bell(&squares, terms->k_q24[1], &wide);
+  set_bell(&squares, problem->pad->far_k_q24, &far);
+  set_bell(&squares, terms->dip_k_q24, &dip);
   int32_t a_q13 = (amplitude_q13 * blob->weight_q14) >> 14;
-  int32_t along_x = (((g_q12 * dx_q12) >> 12) * a_q13) >> 10;
-  int32_t along_y = (((g_q12 * dy_q12) >> 12) * a_q13) >> 10;
-  row[AMPLITUDE] += (s_q15 * blob->weight_q14) >> 14;
-  row[PLACE_X] += along_x;
-  row[PLACE_Y] += along_y;
-  row[SPREAD] += (m_q12 * a_q13) >> 10;
-  row[FAR] += (a_q13 * far_q15) >> 13;
-  row[RESIDUAL] -= a_q13 * s_q15;
-  if (model != ROUND) {
-    row[SPAN_X] += fixed_mul_16(along_x, blob->lever_q14) * 4;
-    row[SPAN_Y] += fixed_mul_16(along_y, blob->lever_q14) * 4;
-  }
-  if (model == TWO) {
-    int32_t half = (amplitude_q13 * s_q15) >> 14;
-    row[BALANCE] += blob->lever_q14 > 0 ? half : -half;
+  int32_t half_q13 = blob->lever_q14 > 0 ? amplitude_q13 : -amplitude_q13;
+  int32_t *row = problem->pad->room.row[0];
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t dx_q12 = (i - COLUMNS / 2) * 4096 - blob->x_q12;
+    for (int k = 0; k < ROWS; k++, row += UNKNOWNS + 1) {
+      int32_t dy_q12 = (k - ROWS / 2) * 4096 - blob->y_q12;
+      int32_t e_q15 = (narrow.x_q15[i] * narrow.y_q15[k]) >> 15;
+      int32_t s_q29 = terms->h_q14[0] * e_q15;
+      int32_t g_q27 = terms->q_q12[0] * e_q15;
+      int32_t w_q23 = terms->s_q8[0] * e_q15;
+      e_q15 = (wide.x_q15[i] * wide.y_q15[k]) >> 15;
+      s_q29 += terms->h_q14[1] * e_q15;
+      g_q27 += terms->q_q12[1] * e_q15;
+      w_q23 += terms->s_q8[1] * e_q15;
+      s_q29 -= terms->dip_q14 * ((dip.x_q15[i] * dip.y_q15[k]) >> 15);
+      int32_t s_q15 = s_q29 >> 14, g_q12 = g_q27 >> 15;
+      int32_t square_q10 = (squares.x_q24[i] + squares.y_q24[k]) >> 14;
+      int32_t along_x = (((g_q12 * dx_q12) >> 12) * a_q13) >> 10;
+      int32_t along_y = (((g_q12 * dy_q12) >> 12) * a_q13) >> 10;
+      row[AMPLITUDE] += (s_q15 * blob->weight_q14) >> 14;
+      row[PLACE_X] += along_x;
+      row[PLACE_Y] += along_y;
+      row[SPREAD] += (((square_q10 * (w_q23 >> 15)) >> 7) - g_q12) * a_q13 >> 10;
+      row[FAR] += (a_q13 * ((far.x_q15[i] * far.y_q15[k]) >> 15)) >> 13;
+      row[RESIDUAL] -= a_q13 * s_q15;
+      if (model != ROUND) {
+        row[SPAN_X] += (along_x * (blob->lever_q14 >> 2)) >> 12;
+        row[SPAN_Y] += (along_y * (blob->lever_q14 >> 2)) >> 12;
+      }
+      if (model == TWO) {
+        row[BALANCE] += (half_q13 * s_q15) >> 14;
+      }
+    }
   }
 }
 
-static NOINLINE void add_pull(const struct terms *terms, const int32_t *at, int32_t dx_q12,
-                              int32_t dy_q12, int32_t *row) {
-  int32_t square = square_q24(dx_q12, dy_q12), f_q27 = 0;
+static NOINLINE void add_pull(const struct problem *problem, const struct terms *terms,
+                              const int32_t *at) {
+  struct squares squares;
+  struct bell bell[PAD_TANGENTIAL_TERMS];
+  int32_t x_q12 = at[PLACE_X] >> 8, y_q12 = at[PLACE_Y] >> 8;
+  int32_t pull_x_q13 = at[PULL_X] >> 7, pull_y_q13 = at[PULL_Y] >> 7;
+  set_squares(x_q12, y_q12, &squares);
   for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
-    f_q27 += terms->pull_q12[j] * bell_q15(square, terms->pull_k_q24[j]);
+    set_bell(&squares, terms->pull_k_q24[j], &bell[j]);
   }
-  row[PULL_X] = ((f_q27 >> 15) * dx_q12) >> 9;
-  row[PULL_Y] = ((f_q27 >> 15) * dy_q12) >> 9;
-  row[RESIDUAL] -= row[PULL_X] * (at[PULL_X] >> 7) + row[PULL_Y] * (at[PULL_Y] >> 7);
+  int32_t *row = problem->pad->room.row[0];
+  for (int i = 0; i < COLUMNS; i++) {
+    for (int k = 0; k < ROWS; k++, row += UNKNOWNS + 1) {
+      int32_t f_q27 = 0;
+      for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
+        f_q27 += terms->pull_q12[j] * ((bell[j].x_q15[i] * bell[j].y_q15[k]) >> 15);
+      }
+      row[PULL_X] = ((f_q27 >> 15) * ((i - COLUMNS / 2) * 4096 - x_q12)) >> 9;
+      row[PULL_Y] = ((f_q27 >> 15) * ((k - ROWS / 2) * 4096 - y_q12)) >> 9;
+      row[RESIDUAL] -= row[PULL_X] * pull_x_q13 + row[PULL_Y] * pull_y_q13;
+    }
+  }
 }
 
 /* Where a step begins is rounded, which moves the step and not where it ends. */
@@ -244,22 +288,25 @@ static NOINLINE void set_rows(const struct problem *problem, int model, int coun
   }
   for (int k = 0; k < NODES; k++) {
     int32_t *row = pad->room.row[k];
-    int32_t x_q12 = (k / ROWS - COLUMNS / 2) * 4096, y_q12 = (k % ROWS - ROWS / 2) * 4096;
     for (int u = 0; u < UNKNOWNS; u++) {
       row[u] = 0;
     }
     row[RESIDUAL] = problem->readings.q28[k];
-    for (int b = 0; b < blobs; b++) {
-      add_blob(problem, &terms, model, &blob[b], at[AMPLITUDE] >> 7, x_q12 - blob[b].x_q12,
-               y_q12 - blob[b].y_q12, row);
-    }
-    if (pulls) {
-      add_pull(&terms, at, x_q12 - (at[PLACE_X] >> 8), y_q12 - (at[PLACE_Y] >> 8), row);
-    }
-    row[RESIDUAL] = fixed_clamp((row[RESIDUAL] >> 12) - (((at[FAR] >> 4) * row[FAR]) >> 15),
-                                -(1 << 17), 1 << 17);
+  }
+  for (int b = 0; b < blobs; b++) {
+    add_blob(problem, &terms, model, &blob[b], at[AMPLITUDE] >> 7);
+  }
+  if (pulls) {
+    add_pull(problem, &terms, at);
+  }
+  int32_t far_q16 = at[FAR] >> 4;
+  for (int k = 0; k < NODES; k++) {
+    int32_t *row = pad->room.row[k];
     int32_t weight_q12 = pad->room.weight_q12[k];
-    for (int u = 0; u <= UNKNOWNS; u++) {
+    int32_t residual_q16 = (row[RESIDUAL] >> 12) - ((far_q16 * row[FAR]) >> 15);
+    row[RESIDUAL] = fixed_clamp(residual_q16, -(1 << 17), 1 << 17) * weight_q12;
+    equations->size[RESIDUAL] |= fixed_size(row[RESIDUAL]);
+    for (int u = 0; u < count; u++) {
       row[u] = fixed_clamp(row[u], -(1 << 18), 1 << 18) * weight_q12;
       equations->size[u] |= fixed_size(row[u]);
     }
@@ -517,11 +564,15 @@ static NOINLINE void set_pair_by_readings(const struct problem *problem,
     first = readings->q14[k] > readings->q14[first] ? k : first;
   }
   int32_t height_q14 = terms.h_q14[0] + terms.h_q14[1];
+  struct squares squares;
+  struct bell narrow, wide;
+  set_squares((first / ROWS - COLUMNS / 2) * 4096, (first % ROWS - ROWS / 2) * 4096, &squares);
+  set_bell(&squares, terms.k_q24[0], &narrow);
+  set_bell(&squares, terms.k_q24[1], &wide);
   for (int k = 0; k < NODES; k++) {
-    int32_t dx = (k / ROWS - first / ROWS) * 4096, dy = (k % ROWS - first % ROWS) * 4096;
-    int32_t square = square_q24(dx, dy);
-    int32_t s_q14 = (terms.h_q14[0] * bell_q15(square, terms.k_q24[0]) +
-                     terms.h_q14[1] * bell_q15(square, terms.k_q24[1])) >> 15;
+    int32_t e_q15 = (narrow.x_q15[k / ROWS] * narrow.y_q15[k % ROWS]) >> 15;
+    int32_t wide_q15 = (wide.x_q15[k / ROWS] * wide.y_q15[k % ROWS]) >> 15;
+    int32_t s_q14 = (terms.h_q14[0] * e_q15 + terms.h_q14[1] * wide_q15) >> 15;
     int32_t left = readings->q14[k] - port_divide(readings->q14[first] * s_q14, height_q14);
     if (left > most) {
       most = left;
@@ -538,6 +589,19 @@ static NOINLINE void set_pair_by_readings(const struct problem *problem,
   at->value[SPAN_X] = (first / ROWS - second / ROWS) * (ONE_Q20 / 2);
   at->value[SPAN_Y] = (first % ROWS - second % ROWS) * (ONE_Q20 / 2);
   at->value[BALANCE] = port_divide((readings->q14[first] - most) << 14, both) << 6;
+}
+
+/* Sum of the squares of a pair's residuals, Q16: one with a good start has less. */
+static NOINLINE int32_t residuals_at(const struct problem *problem, struct fit_shapes_at *at) {
+  struct equations equations;
+  round_places(at);
+  set_rows(problem, TWO, SPAN_X, at, &equations);
+  int32_t sum_q16 = 0;
+  for (int k = 0; k < NODES; k++) {
+    int32_t residual_q13 = problem->pad->room.row[k][RESIDUAL] >> 15;
+    sum_q16 += (residual_q13 * residual_q13) >> 10;
+  }
+  return sum_q16;
 }
 
 static NOINLINE void begin(const struct problem *problem, const struct fit_result *fit,
@@ -586,8 +650,7 @@ static NOINLINE void begin(const struct problem *problem, const struct fit_resul
     } else {
       set_pair_by_readings(problem, &pair);
     }
-    struct equations equations;
-    int32_t chi_square = chi_square_at(problem, TWO, PULL_Y, &pair, &equations);
+    int32_t chi_square = residuals_at(problem, &pair);
     if (chi_square < least) {
       least = chi_square;
       state->at[TWO] = pair;
@@ -595,35 +658,27 @@ static NOINLINE void begin(const struct problem *problem, const struct fit_resul
   }
 }
 
-/* Variance of a sum of two unknowns times these, by the undamped factors. */
+/* Variance of a sum of two unknowns times these, each at most some pitches or units of the readings,
+ * by the undamped factors. */
 static NOINLINE struct scaled variance_of(const struct fit_shapes_pad *pad,
                                           const struct equations *equations, int first, float a,
                                           int second, float b) {
   const int32_t(*matrix)[UNKNOWNS] = pad->room.whole;
-  struct scaled w[UNKNOWNS], sum = {0, 0};
+  int32_t w_q10[UNKNOWNS], sum_q13 = 0;
+  int32_t q = equations->q[first] > equations->q[second] ? equations->q[first]
+                                                         : equations->q[second];
+  int32_t a_q10 = fit_fixed(a, 10 + equations->q[first] - q);
+  int32_t b_q10 = fit_fixed(b, 10 + equations->q[second] - q);
   for (int j = 0; j < equations->count; j++) {
-    struct scaled own = {0, 0};
-    if (j == first || j == second) {
-      float size = j == first ? a : b;
-      own = fit_grid_scaled(size < 0.0f ? -size : size);
-      own.mantissa = size < 0.0f ? -own.mantissa : own.mantissa;
-      own.exponent += equations->q[j];
-    }
+    int32_t w = (j == first ? a_q10 : 0) + (j == second ? b_q10 : 0);
     for (int i = 0; i < j; i++) {
-      if (w[i].mantissa != 0 && matrix[j][i] != 0) {
-        struct scaled l = fit_scaled_from(matrix[j][i], equations->half[i] - 14);
-        own = fit_scaled_short(scaled_sub(own, fit_scaled_short(scaled_mul(l, w[i]))));
-      }
+      w -= (matrix[j][i] * w_q10[i]) >> 14;
     }
-    w[j] = equations->inverse_q14[j] == 0 ? (struct scaled){0, 0} : own;
-    if (w[j].mantissa != 0) {
-      struct scaled inverse =
-          fit_scaled_from(equations->inverse_q14[j], 2 * equations->half[j] - 14);
-      sum = scaled_add(sum, scaled_mul(fit_scaled_short(scaled_mul(own, own)), inverse));
-    }
+    w = fixed_clamp(w * (1 << equations->half[j]), -INT16_MAX, INT16_MAX);
+    w_q10[j] = w;
+    sum_q13 += (((w * w) >> 13) * (equations->inverse_q14[j] >> 4)) >> 4;
   }
-  sum.exponent -= 30;
-  return fit_scaled_short(sum);
+  return fit_scaled_from(sum_q13, 2 * q - 30 - 13);
 }
 
 static float composed(struct scaled value) {
