@@ -288,7 +288,7 @@ static NOINLINE void set_rows(const struct problem *problem, int model, int coun
   }
   for (int k = 0; k < NODES; k++) {
     int32_t *row = pad->room.row[k];
-    for (int u = 0; u < UNKNOWNS; u++) {
+    for (int u = 0; u < count; u++) {
       row[u] = 0;
     }
     row[RESIDUAL] = problem->readings.q28[k];
@@ -321,12 +321,26 @@ static NOINLINE int32_t normalise(struct fit_shapes_pad *pad, int u, int q, int3
   int32_t half = 1 << (shift - 1);
   equations->q[u] = (int8_t)(q - shift);
   int32_t own = (prior >> shift) * (prior >> shift);
-  for (int k = 0; k < NODES; k++) {
-    int32_t value = (pad->room.row[k][u] + half) >> shift;
-    pad->room.row[k][u] = value;
+  const int32_t *row = &pad->room.row[0][u];
+  int32_t *column = pad->room.column[u];
+  for (int k = 0; k < NODES; k++, row += UNKNOWNS + 1) {
+    int32_t value = (*row + half) >> shift;
+    column[k] = value;
     own += value * value;
   }
   return own;
+}
+
+/* The sums of the products of a column with two that are behind one another. */
+static NOINLINE void sum_products(const int32_t *a, const int32_t *b, int32_t sums[2]) {
+  int32_t first = 0, second = 0;
+  for (int k = 0; k < NODES; k++) {
+    int32_t own = a[k];
+    first += own * b[k];
+    second += own * b[k + NODES];
+  }
+  sums[0] = first;
+  sums[1] = second;
 }
 
 /* The normal matrix, of which the diagonal is 2^28 to 2^30. */
@@ -358,21 +372,21 @@ static NOINLINE void form(const struct problem *problem, const int32_t *at,
     pad->room.matrix[u][u] = own * (1 << (2 * up[u]));
     int32_t right = (element[u] >> shift) * residual;
     equations->residual_square += residual * residual;
-    for (int k = 0; k < NODES; k++) {
-      right += pad->room.row[k][u] * pad->room.row[k][RESIDUAL];
-    }
-    equations->right[u] = right * (1 << up[u]);
+    equations->right[u] = right;
     equations->q[u] = (int8_t)(equations->q[u] + up[u]);
   }
-  for (int a = 1; a < equations->count; a++) {
-    for (int b = 0; b < a; b++) {
-      int32_t sum = 0;
-      const int32_t *row = pad->room.row[0];
-      for (int k = 0; k < NODES; k++, row += UNKNOWNS + 1) {
-        sum += row[a] * row[b];
+  for (int a = 0; a < equations->count; a++) {
+    const int32_t *column = pad->room.column[a];
+    int32_t sums[2];
+    for (int b = 0; b < a; b += 2) {
+      sum_products(column, pad->room.column[b], sums);
+      pad->room.matrix[a][b] = sums[0] * (1 << (up[a] + up[b]));
+      if (b + 1 < a) {
+        pad->room.matrix[a][b + 1] = sums[1] * (1 << (up[a] + up[b + 1]));
       }
-      pad->room.matrix[a][b] = sum * (1 << (up[a] + up[b]));
     }
+    sum_products(column, pad->room.column[RESIDUAL - 1], sums);
+    equations->right[a] = (equations->right[a] + sums[1]) * (1 << up[a]);
   }
 }
 
@@ -402,13 +416,12 @@ static NOINLINE void eliminate(int32_t (*matrix)[UNKNOWNS], struct equations *eq
     int32_t over[UNKNOWNS];
     for (int i = j + 1; i < count; i++) {
       int32_t *row = matrix[i];
-      int32_t element = fixed_clamp((row[j] + round) >> down, -(1 << 15), 1 << 15); /* Q15 */
-      over[i] = (element * inverse_q14 + (1 << 14)) >> 15;
+      int32_t twice = fixed_clamp((row[j] + round) >> down, -(1 << 15), 1 << 15) * 2; /* Q16 */
+      row[j] = over[i] = (twice * inverse_q14 + (1 << 15)) >> 16;
+      right[i] -= twice * right[j];
       for (int k = j + 1; k <= i; k++) {
-        row[k] -= element * over[k] * 2;
+        row[k] -= twice * over[k];
       }
-      right[i] -= element * right[j] * 2;
-      row[j] = over[i];
     }
   }
 }
@@ -658,12 +671,11 @@ static NOINLINE void begin(const struct problem *problem, const struct fit_resul
   }
 }
 
-/* Variance of a sum of two unknowns times these, each at most some pitches or units of the readings,
- * by the undamped factors. */
+/* Variance of a sum of two unknowns times these, each at most some pitches or units of the readings. */
 static NOINLINE struct scaled variance_of(const struct fit_shapes_pad *pad,
                                           const struct equations *equations, int first, float a,
                                           int second, float b) {
-  const int32_t(*matrix)[UNKNOWNS] = pad->room.whole;
+  const int32_t(*matrix)[UNKNOWNS] = pad->room.factors;
   int32_t w_q10[UNKNOWNS], sum_q13 = 0;
   int32_t q = equations->q[first] > equations->q[second] ? equations->q[first]
                                                          : equations->q[second];
@@ -756,6 +768,14 @@ static NOINLINE void put_one(const struct problem *problem, const struct equatio
   }
 }
 
+static void keep_factors(struct fit_shapes_pad *pad, int count) {
+  for (int a = 1; a < count; a++) {
+    for (int b = 0; b < a; b++) {
+      pad->room.factors[a][b] = pad->room.matrix[a][b];
+    }
+  }
+}
+
 static int choose(const int32_t *chi_square, const int32_t *two) {
   int32_t one = chi_square[ROUND] < chi_square[LONG] ? chi_square[ROUND] : chi_square[LONG];
   int32_t penalty = FIT_SHAPES_PENALTY << 8;
@@ -767,16 +787,6 @@ static int choose(const int32_t *chi_square, const int32_t *two) {
     return TWO;
   }
   return chi_square[LONG] < chi_square[ROUND] - penalty ? LONG : ROUND;
-}
-
-static NOINLINE void keep_factors(struct fit_shapes_pad *pad, struct equations *equations) {
-  for (int a = 0; a < equations->count; a++) {
-    for (int b = 0; b <= a; b++) {
-      pad->room.whole[a][b] = pad->room.matrix[a][b];
-    }
-  }
-  int32_t right[UNKNOWNS] = {0};
-  eliminate(pad->room.whole, equations, right);
 }
 
 static void follow(const struct problem *problem, const struct fit_result *fit,
@@ -843,11 +853,12 @@ void fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
       int now = m == ROUND ? ROUND : m == LONG ? (chi_square[LONG] < chi_square[ROUND] - (FIT_SHAPES_PENALTY << 8) ? LONG : best) : choose(chi_square, at[TWO].value);
       if (now == m) {
         best = m;
-        keep_factors(pad, &equations[m]);
       }
     }
-    struct equations damped = equations[m];
-    step(&problem, m, &damped, &state->at[m]);
+    step(&problem, m, &equations[m], &state->at[m]);
+    if (best == m) {
+      keep_factors(pad, equations[m].count);
+    }
   }
   if (!ends) {
     state->frames++;

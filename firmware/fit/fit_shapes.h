@@ -81,7 +81,8 @@ struct fit_shapes_pad {
   struct {
     int32_t row[FIT_SHAPES_NODES][FIT_SHAPES_UNKNOWNS + 1];
     int32_t matrix[FIT_SHAPES_UNKNOWNS][FIT_SHAPES_UNKNOWNS];
-    int32_t whole[FIT_SHAPES_UNKNOWNS][FIT_SHAPES_UNKNOWNS]; /* without damping, of the answer */
+    int32_t factors[FIT_SHAPES_UNKNOWNS][FIT_SHAPES_UNKNOWNS]; /* of the answer */
+    int32_t column[FIT_SHAPES_UNKNOWNS + 1][FIT_SHAPES_NODES];
     int32_t weight_q12[FIT_SHAPES_NODES];
   } room;
 };
