@@ -38,7 +38,7 @@ static const uint8_t unknowns_of[MODELS] = {SPAN_X, UNKNOWNS, PULL_Y};
 #define FREEDOM 9           /* readings and priors less the unknowns of two */
 /* The best of the models explains nothing if its chi^2 is above that. */
 #define CHI_SQUARE_MAX 60
-#define SEPARATION_MIN 0.5f /* pitches: nearer pairs are long contacts */
+#define SEPARATION_HALF_Q10 256 /* of half a pitch: nearer pairs are long contacts */
 
 #define PLACE_X_MAX ((5 << 20) / 2)
 #define PLACE_Y_MAX ((7 << 20) / 2)
@@ -49,6 +49,11 @@ static const uint8_t unknowns_of[MODELS] = {SPAN_X, UNKNOWNS, PULL_Y};
 #define MOVE_MAX (1 << 18) /* a quarter of a pitch */
 #define SQUARE_MAX_Q24 (40 << 24)
 #define PIVOT_LEAST (1 << 18)
+
+/* Columns are at most 2 pitches or units of the readings, in Q(27 - COLUMN_SHIFT). */
+#define COLUMN_MAX ((1 << 16) - 1)
+#define COLUMN_SHIFT 15
+#define PRIOR_MAX ((1 << 13) - 1)
 
 struct terms {
   int32_t k_q24[PAD_NORMAL_TERMS], h_q14[PAD_NORMAL_TERMS], q_q12[PAD_NORMAL_TERMS],
@@ -70,7 +75,7 @@ struct problem {
 
 struct equations {
   int count;
-  uint32_t size[UNKNOWNS + 1];
+  uint32_t residual_size;
   int8_t q[UNKNOWNS + 1]; /* value = integer 2^-q */
   int32_t right[UNKNOWNS];
   int32_t residual_square;
@@ -111,8 +116,10 @@ enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_arra
   uint8_t origin = array->grid.sensor[COLUMNS / 2 * ROWS + ROWS / 2];
   pad->pitch_mm = array->pitch_mm;
   pad->per_pitch = per;
-  pad->origin_x_mm = array->x[origin] * array->pitch_mm;
-  pad->origin_y_mm = array->y[origin] * array->pitch_mm;
+  pad->per_pitch_q28 = fit_fixed(per, 28);
+  pad->pitch_q22_mm = fit_fixed(array->pitch_mm, 22);
+  pad->origin_x_q20 = fit_fixed(array->x[origin], 20);
+  pad->origin_y_q20 = fit_fixed(array->y[origin], 20);
   pad->widest_mm2 = profile->normal[PAD_NORMAL_TERMS - 1].sd_mm;
   pad->widest_mm2 *= pad->widest_mm2;
   pad->force_unit_N = 6.2831853e-6f * pad->widest_mm2;
@@ -164,6 +171,12 @@ static int set_blobs(int model, const int32_t *at, struct blob *blob) {
   return count;
 }
 
+/* 2^-z within 0.3 %, Q15. */
+FIXED_INLINE int32_t exp2_rough(uint32_t z_q22) {
+  uint32_t whole = z_q22 >> 22;
+  return whole > 15 ? 0 : fit_exp2_table[(z_q22 >> 14) & 255] >> (whole + 15);
+}
+
 /* exp(-d^2 / (2 v)) along both axes, whose products are the bells at the nodes. */
 struct bell {
   int32_t x_q15[COLUMNS], y_q15[ROWS];
@@ -194,16 +207,43 @@ static NOINLINE void set_bell(const struct squares *squares, int32_t k_q24, stru
   }
 }
 
+/* The same within 0.6 %, for what is little. */
+static NOINLINE void set_rough_bell(const struct squares *squares, int32_t k_q24,
+                                    struct bell *bell) {
+  for (int i = 0; i < COLUMNS; i++) {
+    bell->x_q15[i] = exp2_rough((uint32_t)fixed_mul_q26(squares->x_q24[i], k_q24));
+  }
+  for (int k = 0; k < ROWS; k++) {
+    bell->y_q15[k] = exp2_rough((uint32_t)fixed_mul_q26(squares->y_q24[k], k_q24));
+  }
+}
+
+/* Begins the rows: the readings, and the broad term about the middle. */
+static NOINLINE void set_far(const struct problem *problem, const int32_t *at) {
+  struct squares squares;
+  struct bell bell;
+  set_squares(at[PLACE_X] >> 8, at[PLACE_Y] >> 8, &squares);
+  set_rough_bell(&squares, problem->pad->far_k_q24, &bell);
+  int32_t amplitude_q13 = at[AMPLITUDE] >> 7, far_q16 = at[FAR] >> 4;
+  int32_t *row = problem->pad->room.row[0];
+  for (int k = 0; k < NODES; k++, row += UNKNOWNS + 1) {
+    int32_t far_q15 = (bell.x_q15[k / ROWS] * bell.y_q15[k % ROWS]) >> 15;
+    row[AMPLITUDE] = row[PLACE_X] = row[PLACE_Y] = row[SPREAD] = 0;
+    row[SPAN_X] = row[SPAN_Y] = row[BALANCE] = 0;
+    row[FAR] = (amplitude_q13 * far_q15) >> 13;
+    row[RESIDUAL] = problem->readings.q28[k] - ((far_q16 * row[FAR]) >> 3);
+  }
+}
+
 /* Adds a blob to the rows, whose elements are Q15 (RESIDUAL Q28). */
 static NOINLINE void add_blob(const struct problem *problem, const struct terms *terms, int model,
                               const struct blob *blob, int32_t amplitude_q13) {
   struct squares squares;
-  struct bell narrow, wide, dip, far;
+  struct bell narrow, wide, dip;
   set_squares(blob->x_q12, blob->y_q12, &squares);
   set_bell(&squares, terms->k_q24[0], &narrow);
   set_bell(&squares, terms->k_q24[1], &wide);
-  set_bell(&squares, problem->pad->far_k_q24, &far);
-  set_bell(&squares, terms->dip_k_q24, &dip);
+  set_rough_bell(&squares, terms->dip_k_q24, &dip);
   int32_t a_q13 = (amplitude_q13 * blob->weight_q14) >> 14;
   int32_t half_q13 = blob->lever_q14 > 0 ? amplitude_q13 : -amplitude_q13;
   int32_t *row = problem->pad->room.row[0];
@@ -228,7 +268,6 @@ static NOINLINE void add_blob(const struct problem *problem, const struct terms 
       row[PLACE_X] += along_x;
       row[PLACE_Y] += along_y;
       row[SPREAD] += (((square_q10 * (w_q23 >> 15)) >> 7) - g_q12) * a_q13 >> 10;
-      row[FAR] += (a_q13 * ((far.x_q15[i] * far.y_q15[k]) >> 15)) >> 13;
       row[RESIDUAL] -= a_q13 * s_q15;
       if (model != ROUND) {
         row[SPAN_X] += (along_x * (blob->lever_q14 >> 2)) >> 12;
@@ -283,46 +322,45 @@ static NOINLINE void set_rows(const struct problem *problem, int model, int coun
   set_terms(problem, at[SPREAD], pulls, &terms);
   int blobs = set_blobs(model, at, blob);
   equations->count = count;
-  for (int u = 0; u <= UNKNOWNS; u++) {
-    equations->size[u] = 0;
-  }
-  for (int k = 0; k < NODES; k++) {
-    int32_t *row = pad->room.row[k];
-    for (int u = 0; u < count; u++) {
-      row[u] = 0;
-    }
-    row[RESIDUAL] = problem->readings.q28[k];
-  }
+  set_far(problem, at);
   for (int b = 0; b < blobs; b++) {
     add_blob(problem, &terms, model, &blob[b], at[AMPLITUDE] >> 7);
   }
   if (pulls) {
     add_pull(problem, &terms, at);
   }
-  int32_t far_q16 = at[FAR] >> 4;
-  for (int k = 0; k < NODES; k++) {
-    int32_t *row = pad->room.row[k];
-    int32_t weight_q12 = pad->room.weight_q12[k];
-    int32_t residual_q16 = (row[RESIDUAL] >> 12) - ((far_q16 * row[FAR]) >> 15);
-    row[RESIDUAL] = fixed_clamp(residual_q16, -(1 << 17), 1 << 17) * weight_q12;
-    equations->size[RESIDUAL] |= fixed_size(row[RESIDUAL]);
-    for (int u = 0; u < count; u++) {
-      row[u] = fixed_clamp(row[u], -(1 << 18), 1 << 18) * weight_q12;
-      equations->size[u] |= fixed_size(row[u]);
-    }
+  uint32_t size = 0;
+  int32_t *residual = &pad->room.row[0][RESIDUAL];
+  for (int k = 0; k < NODES; k++, residual += UNKNOWNS + 1) {
+    *residual = fixed_clamp(*residual >> 12, -(1 << 17), 1 << 17) * pad->room.weight_q12[k];
+    size |= fixed_size(*residual);
   }
+  equations->residual_size = size;
 }
 
-/* Brings a column to 13 bits and returns the sum of its squares. */
-static NOINLINE int32_t normalise(struct fit_shapes_pad *pad, int u, int q, int32_t prior,
-                                  struct equations *equations) {
-  int32_t shift = fixed_bits(equations->size[u] | fixed_size(prior)) - 13;
-  shift = shift < 1 ? 1 : shift;
-  int32_t half = 1 << (shift - 1);
-  equations->q[u] = (int8_t)(q - shift);
-  int32_t own = (prior >> shift) * (prior >> shift);
-  const int32_t *row = &pad->room.row[0][u];
+/* The column with its weights, 13 bits at most; returns the sum of its squares. */
+static NOINLINE int32_t put_column(struct fit_shapes_pad *pad, int u) {
+  const int32_t *row = &pad->room.row[0][u], *weight_q12 = pad->room.weight_q12;
   int32_t *column = pad->room.column[u];
+  int32_t own = 0;
+  for (int k = 0; k < NODES; k++, row += UNKNOWNS + 1) {
+    int32_t value = fixed_clamp(*row, -COLUMN_MAX, COLUMN_MAX) * weight_q12[k];
+    value = (value + (1 << (COLUMN_SHIFT - 1))) >> COLUMN_SHIFT;
+    column[k] = value;
+    own += value * value;
+  }
+  return own;
+}
+
+/* The same of the residuals, as many bits as there are. */
+static NOINLINE int32_t put_residuals(struct fit_shapes_pad *pad, uint32_t size,
+                                      struct equations *equations) {
+  int32_t shift = fixed_bits(size) - 13;
+  shift = shift < 1 ? 1 : shift;
+  equations->q[RESIDUAL] = (int8_t)(28 - shift);
+  const int32_t *row = &pad->room.row[0][RESIDUAL];
+  int32_t *column = pad->room.column[RESIDUAL];
+  int32_t own = 0, half = 1 << (shift - 1);
   for (int k = 0; k < NODES; k++, row += UNKNOWNS + 1) {
     int32_t value = (*row + half) >> shift;
     column[k] = value;
@@ -359,21 +397,23 @@ static NOINLINE void form(const struct problem *problem, const int32_t *at,
     off[PULL_X] = (element[PULL_X] >> 12) * (-at[PULL_X] >> 4) >> 3;
     off[PULL_Y] = (element[PULL_Y] >> 12) * (-at[PULL_Y] >> 4) >> 3;
   }
+  uint32_t size = equations->residual_size;
   for (int u = 0; u < equations->count; u++) {
-    equations->size[RESIDUAL] |= fixed_size(off[u]);
+    size |= fixed_size(off[u]);
   }
-  equations->residual_square = normalise(pad, RESIDUAL, 28, 0, equations);
+  equations->residual_square = put_residuals(pad, size, equations);
   int32_t residual_shift = 28 - equations->q[RESIDUAL];
   int8_t up[UNKNOWNS];
   for (int u = 0; u < equations->count; u++) {
-    int32_t own = normalise(pad, u, 27, element[u], equations);
-    int32_t shift = 27 - equations->q[u], residual = off[u] >> residual_shift;
+    int32_t prior = element[u] >> COLUMN_SHIFT, residual = off[u] >> residual_shift;
+    prior = prior < PRIOR_MAX ? prior : PRIOR_MAX;
+    int32_t own = put_column(pad, u) + prior * prior;
     up[u] = (int8_t)(own >> 30 ? 0 : (30 - fixed_bits((uint32_t)own | 1)) >> 1);
     pad->room.matrix[u][u] = own * (1 << (2 * up[u]));
-    int32_t right = (element[u] >> shift) * residual;
+    int32_t right = prior * residual;
     equations->residual_square += residual * residual;
     equations->right[u] = right;
-    equations->q[u] = (int8_t)(equations->q[u] + up[u]);
+    equations->q[u] = (int8_t)(27 - COLUMN_SHIFT + up[u]);
   }
   for (int a = 0; a < equations->count; a++) {
     const int32_t *column = pad->room.column[a];
@@ -552,17 +592,21 @@ static int32_t sum_of(const struct readings *readings) {
   return sum_q20;
 }
 
-static int32_t pitches_q20(float mm, float per_pitch) {
-  return fixed_clamp(fit_fixed(mm * per_pitch, 20), -PLACE_Y_MAX, PLACE_Y_MAX);
+static int32_t place_q20(const struct fit_shapes_pad *pad, float mm) {
+  return fixed_mul_q28(fixed_clamp(fit_fixed(mm, 20), -(1 << 29), 1 << 29), pad->per_pitch_q28);
+}
+
+static int32_t pitches_q20(float pitches) {
+  return fixed_clamp(fit_fixed(pitches, 20), -PLACE_Y_MAX, PLACE_Y_MAX);
 }
 
 /* Where the pair may be: along the Gaussian's longer axis, equal or three to one either way; or
  * under the largest reading and where it leaves most. */
 static void set_pair(float x, float y, float dx, float dy, float share, struct fit_shapes_at *at) {
-  at->value[PLACE_X] = pitches_q20(x - share * dx, 1.0f);
-  at->value[PLACE_Y] = pitches_q20(y - share * dy, 1.0f);
-  at->value[SPAN_X] = pitches_q20(dx, 1.0f);
-  at->value[SPAN_Y] = pitches_q20(dy, 1.0f);
+  at->value[PLACE_X] = pitches_q20(x - share * dx);
+  at->value[PLACE_Y] = pitches_q20(y - share * dy);
+  at->value[SPAN_X] = pitches_q20(dx);
+  at->value[SPAN_Y] = pitches_q20(dy);
   at->value[BALANCE] = fit_fixed(share, 20);
 }
 
@@ -639,19 +683,20 @@ static NOINLINE void begin(const struct problem *problem, const struct fit_resul
   float excess = fminf(fmaxf(2.0f * half, 0.05f), 2.5f);
   float widest = pad->widest_mm2 * per * per;
   float spread = fminf(fmaxf(variance - half - 0.912f * widest, 0.0f), 0.1f);
-  float x = (fit->x_mm - pad->origin_x_mm) * per, y = (fit->y_mm - pad->origin_y_mm) * per;
+  float x = fit->x_mm * per - fit_float(pad->origin_x_q20, -20);
+  float y = fit->y_mm * per - fit_float(pad->origin_y_q20, -20);
   struct scaled amplitude = fit_grid_scaled(fit->force_N / (1.0753f * pad->force_unit_N));
   amplitude.exponent += problem->readings.shift - 18;
   at.value[AMPLITUDE] =
       fixed_clamp(fit_scaled_to_fixed(amplitude, 20), AMPLITUDE_LEAST, AMPLITUDE_MAX);
   at.value[SPREAD] = fit_fixed(spread, 20);
-  at.value[PLACE_X] = pitches_q20(x, 1.0f);
-  at.value[PLACE_Y] = pitches_q20(y, 1.0f);
+  at.value[PLACE_X] = pitches_q20(x);
+  at.value[PLACE_Y] = pitches_q20(y);
   state->at[ROUND] = at;
   float reach = sqrtf(excess);
   float line = fminf(1.7320508f * reach, 1.4f);
-  at.value[SPAN_X] = pitches_q20(line * along_x, 1.0f);
-  at.value[SPAN_Y] = pitches_q20(line * along_y, 1.0f);
+  at.value[SPAN_X] = pitches_q20(line * along_x);
+  at.value[SPAN_Y] = pitches_q20(line * along_y);
   state->at[LONG] = at;
   int32_t least = INT32_MAX;
   for (int start = 0; start < 4; start++) {
@@ -673,14 +718,14 @@ static NOINLINE void begin(const struct problem *problem, const struct fit_resul
 
 /* Variance of a sum of two unknowns times these, each at most some pitches or units of the readings. */
 static NOINLINE struct scaled variance_of(const struct fit_shapes_pad *pad,
-                                          const struct equations *equations, int first, float a,
-                                          int second, float b) {
+                                          const struct equations *equations, int first, int32_t a_q20,
+                                          int second, int32_t b_q20) {
   const int32_t(*matrix)[UNKNOWNS] = pad->room.factors;
   int32_t w_q10[UNKNOWNS], sum_q13 = 0;
   int32_t q = equations->q[first] > equations->q[second] ? equations->q[first]
                                                          : equations->q[second];
-  int32_t a_q10 = fit_fixed(a, 10 + equations->q[first] - q);
-  int32_t b_q10 = fit_fixed(b, 10 + equations->q[second] - q);
+  int32_t a_q10 = shifted(a_q20, equations->q[first] - q - 10);
+  int32_t b_q10 = shifted(b_q20, equations->q[second] - q - 10);
   for (int j = 0; j < equations->count; j++) {
     int32_t w = (j == first ? a_q10 : 0) + (j == second ? b_q10 : 0);
     for (int i = 0; i < j; i++) {
@@ -697,75 +742,88 @@ static float composed(struct scaled value) {
   return fit_float(value.mantissa, value.exponent);
 }
 
-static float root(struct scaled value) {
-  return composed(fit_scaled_sqrt(value));
+static float mm(const struct fit_shapes_pad *pad, int32_t place_q20) {
+  return fit_float(fixed_mul_q26(place_q20 * 8, pad->pitch_q22_mm), -19);
 }
 
-static float q20(int32_t value) {
-  return (float)value * (1.0f / 1048576.0f);
+static float product_of(struct scaled a, struct scaled b) {
+  return composed(scaled_mul(fit_scaled_short(a), fit_scaled_short(b)));
+}
+
+/* unit: N of amplitude 1. variance: of a reading of weight 1. */
+struct scales {
+  struct scaled unit, variance, pitch;
+};
+
+static float sd_of(struct scaled scale, struct scaled form, struct scaled variance) {
+  return product_of(scale, fit_scaled_sqrt(scaled_mul(fit_scaled_short(form), variance)));
 }
 
 static NOINLINE void put_two(const struct problem *problem, const struct equations *equations,
-                             const int32_t *at, float force, struct scaled variance,
+                             const int32_t *at, const struct scales *scales,
                              struct fit_shapes_result *result) {
   const struct fit_shapes_pad *pad = problem->pad;
-  float amplitude = q20(at[AMPLITUDE]), balance = q20(at[BALANCE]);
   for (int c = 0; c < 2; c++) {
-    float sign = (c == 0) == (balance >= 0.0f) ? 1.0f : -1.0f;
-    float share = 0.5f * (1.0f + sign * balance);
-    result->x_mm[c] =
-        pad->origin_x_mm + pad->pitch_mm * (q20(at[PLACE_X]) + sign * q20(at[SPAN_X]));
-    result->y_mm[c] =
-        pad->origin_y_mm + pad->pitch_mm * (q20(at[PLACE_Y]) + sign * q20(at[SPAN_Y]));
-    result->force_N[c] = force * amplitude * share;
+    int32_t sign = (c == 0) == (at[BALANCE] >= 0) ? 1 : -1;
+    int32_t share_q20 = (ONE_Q20 + sign * at[BALANCE]) / 2;
+    result->x_mm[c] = mm(pad, pad->origin_x_q20 + at[PLACE_X] + sign * at[SPAN_X]);
+    result->y_mm[c] = mm(pad, pad->origin_y_q20 + at[PLACE_Y] + sign * at[SPAN_Y]);
+    result->force_N[c] =
+        product_of(scales->unit, scaled_mul(fit_scaled_from(at[AMPLITUDE], -20),
+                                            fit_scaled_from(share_q20, -20)));
     struct scaled place =
-        scaled_add(variance_of(pad, equations, PLACE_X, 1.0f, SPAN_X, sign),
-                   variance_of(pad, equations, PLACE_Y, 1.0f, SPAN_Y, sign));
-    result->location_sd_mm[c] = pad->pitch_mm * root(scaled_mul(fit_scaled_short(place), variance));
-    struct scaled of_force =
-        variance_of(pad, equations, AMPLITUDE, share, BALANCE, 0.5f * sign * amplitude);
-    result->force_sd_N[c] = force * root(scaled_mul(of_force, variance));
+        scaled_add(variance_of(pad, equations, PLACE_X, ONE_Q20, SPAN_X, sign * ONE_Q20),
+                   variance_of(pad, equations, PLACE_Y, ONE_Q20, SPAN_Y, sign * ONE_Q20));
+    result->location_sd_mm[c] = sd_of(scales->pitch, place, scales->variance);
+    struct scaled force = variance_of(pad, equations, AMPLITUDE, share_q20, BALANCE,
+                                      sign * (at[AMPLITUDE] >> 1));
+    result->force_sd_N[c] = sd_of(scales->unit, force, scales->variance);
   }
 }
 
-/* The readings are one contact's. */
+static NOINLINE void put_line(const struct problem *problem, const struct equations *equations,
+                              const int32_t *at, const struct scales *scales,
+                              struct fit_shapes_result *result) {
+  const struct fit_shapes_pad *pad = problem->pad;
+  result->shape = FIT_SHAPE_PULLED;
+  result->qx_N = product_of(scales->unit, fit_scaled_from(at[PULL_X], -20));
+  result->qy_N = product_of(scales->unit, fit_scaled_from(at[PULL_Y], -20));
+  struct scaled x = fit_scaled_from(at[SPAN_X], -20), y = fit_scaled_from(at[SPAN_Y], -20);
+  struct scaled square = fit_scaled_short(scaled_add(scaled_mul(x, x), scaled_mul(y, y)));
+  if (square.mantissa <= 0) {
+    return;
+  }
+  struct scaled reach = fit_scaled_sqrt(square);
+  int32_t ux_q20 = fit_scaled_to_fixed(scaled_div(x, reach), 20);
+  int32_t uy_q20 = fit_scaled_to_fixed(scaled_div(y, reach), 20);
+  struct scaled sure = scaled_mul(variance_of(pad, equations, SPAN_X, ux_q20, SPAN_Y, uy_q20),
+                                  scales->variance);
+  sure.mantissa *= FIT_SHAPES_PENALTY;
+  if (scaled_sub(square, fit_scaled_short(sure)).mantissa <= 0) {
+    return;
+  }
+  result->shape = FIT_SHAPE_ELONGATED;
+  int32_t sign = ux_q20 < 0 ? -1 : 1;
+  result->length_mm = 2.0f * product_of(scales->pitch, reach);
+  result->along_x = fit_float(sign * ux_q20, -20);
+  result->along_y = fit_float(sign * uy_q20, -20);
+  result->angle_sd_rad =
+      sd_of(fit_grid_reciprocal(reach),
+            variance_of(pad, equations, SPAN_X, -uy_q20, SPAN_Y, ux_q20), scales->variance);
+}
+
 static NOINLINE void put_one(const struct problem *problem, const struct equations *equations,
-                             const int32_t *at, bool is_long, float force, struct scaled variance,
+                             const int32_t *at, const struct scales *scales,
                              struct fit_shapes_result *result) {
   const struct fit_shapes_pad *pad = problem->pad;
-  result->x_mm[0] = pad->origin_x_mm + pad->pitch_mm * q20(at[PLACE_X]);
-  result->y_mm[0] = pad->origin_y_mm + pad->pitch_mm * q20(at[PLACE_Y]);
-  result->force_N[0] = force * q20(at[AMPLITUDE]);
-  struct scaled place = scaled_add(variance_of(pad, equations, PLACE_X, 1.0f, PLACE_Y, 0.0f),
-                                   variance_of(pad, equations, PLACE_Y, 1.0f, PLACE_X, 0.0f));
-  result->location_sd_mm[0] = pad->pitch_mm * root(scaled_mul(fit_scaled_short(place), variance));
-  result->force_sd_N[0] =
-      force * root(scaled_mul(variance_of(pad, equations, AMPLITUDE, 1.0f, FAR, 0.0f), variance));
-  if (!is_long) {
-    return;
-  }
-  result->qx_N = force * q20(at[PULL_X]);
-  result->qy_N = force * q20(at[PULL_Y]);
-  float sx = q20(at[SPAN_X]), sy = q20(at[SPAN_Y]);
-  float reach = sqrtf(sx * sx + sy * sy);
-  if (!(reach > 0.0f)) {
-    result->shape = FIT_SHAPE_PULLED;
-    return;
-  }
-  float ux = sx / reach, uy = sy / reach;
-  /* The pressure's second moment is reach^2 / 3: where reach is small its sd is twice what the
-   * slope says. Long is what is so beyond the penalty. */
-  struct scaled of_reach = scaled_mul(variance_of(pad, equations, SPAN_X, ux, SPAN_Y, uy), variance);
-  result->shape = reach * reach > (float)FIT_SHAPES_PENALTY * composed(fit_scaled_short(of_reach))
-                      ? FIT_SHAPE_ELONGATED
-                      : FIT_SHAPE_PULLED;
-  if (result->shape == FIT_SHAPE_ELONGATED) {
-    result->length_mm = 2.0f * reach * pad->pitch_mm;
-    result->along_x = ux < 0.0f ? -ux : ux;
-    result->along_y = ux < 0.0f ? -uy : uy;
-    result->angle_sd_rad =
-        root(scaled_mul(variance_of(pad, equations, SPAN_X, -uy, SPAN_Y, ux), variance)) / reach;
-  }
+  result->x_mm[0] = mm(pad, pad->origin_x_q20 + at[PLACE_X]);
+  result->y_mm[0] = mm(pad, pad->origin_y_q20 + at[PLACE_Y]);
+  result->force_N[0] = product_of(scales->unit, fit_scaled_from(at[AMPLITUDE], -20));
+  struct scaled place = scaled_add(variance_of(pad, equations, PLACE_X, ONE_Q20, PLACE_Y, 0),
+                                   variance_of(pad, equations, PLACE_Y, ONE_Q20, PLACE_X, 0));
+  result->location_sd_mm[0] = sd_of(scales->pitch, place, scales->variance);
+  result->force_sd_N[0] = sd_of(
+      scales->unit, variance_of(pad, equations, AMPLITUDE, ONE_Q20, FAR, 0), scales->variance);
 }
 
 static void keep_factors(struct fit_shapes_pad *pad, int count) {
@@ -781,8 +839,8 @@ static int choose(const int32_t *chi_square, const int32_t *two) {
   int32_t penalty = FIT_SHAPES_PENALTY << 8;
   int32_t rough = chi_square[TWO] < 1 << 24 ? chi_square[TWO] * FIT_SHAPES_PENALTY / FREEDOM
                                             : INT32_MAX / 2;
-  float sx = q20(two[SPAN_X]), sy = q20(two[SPAN_Y]);
-  bool apart = 4.0f * (sx * sx + sy * sy) > SEPARATION_MIN * SEPARATION_MIN;
+  int32_t x_q10 = two[SPAN_X] >> 10, y_q10 = two[SPAN_Y] >> 10;
+  bool apart = x_q10 * x_q10 + y_q10 * y_q10 > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10;
   if (apart && chi_square[TWO] < one - (rough > penalty ? rough : penalty)) {
     return TWO;
   }
@@ -792,8 +850,8 @@ static int choose(const int32_t *chi_square, const int32_t *two) {
 static void follow(const struct problem *problem, const struct fit_result *fit,
                    struct fit_shapes_state *state, int32_t sum_q20) {
   const struct fit_shapes_pad *pad = problem->pad;
-  int32_t x = pitches_q20(fit->x_mm - pad->origin_x_mm, pad->per_pitch);
-  int32_t y = pitches_q20(fit->y_mm - pad->origin_y_mm, pad->per_pitch);
+  int32_t x = place_q20(pad, fit->x_mm) - pad->origin_x_q20;
+  int32_t y = place_q20(pad, fit->y_mm) - pad->origin_y_q20;
   if (state->frames > 0 && (sum_q20 < 1 << 18 || state->sum_q20 < 1 << 18 ||
                             sum_q20 >> 2 >= state->sum_q20 || state->sum_q20 >> 2 >= sum_q20)) {
     state->frames = 0;
@@ -877,13 +935,17 @@ void fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
   if (chi_square[best] > FREEDOM << 8) {
     variance = scaled_mul(variance, fit_scaled_from(chi_square[best] / FREEDOM, -8));
   }
-  variance = fit_scaled_short(variance);
-  float force = pad->force_unit_N * fit_float(1 << 14, 18 - problem.readings.shift - 14);
+  struct scaled unit = fit_grid_scaled(pad->force_unit_N);
+  unit.exponent += 18 - problem.readings.shift;
+  const struct scales scales = {unit, fit_scaled_short(variance), fit_grid_scaled(pad->pitch_mm)};
   if (best == TWO) {
     result->shape = FIT_SHAPE_TWO;
-    put_two(&problem, &equations[TWO], at[TWO].value, force, variance, result);
-  } else {
-    result->shape = FIT_SHAPE_ROUND;
-    put_one(&problem, &equations[best], at[best].value, best == LONG, force, variance, result);
+    put_two(&problem, &equations[TWO], at[TWO].value, &scales, result);
+    return;
+  }
+  result->shape = FIT_SHAPE_ROUND;
+  put_one(&problem, &equations[best], at[best].value, &scales, result);
+  if (best == LONG) {
+    put_line(&problem, &equations[LONG], at[LONG].value, &scales, result);
   }
 }

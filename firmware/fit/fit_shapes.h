@@ -75,7 +75,8 @@ struct fit_shapes_pad {
   int32_t pull_variance_q26[PAD_TANGENTIAL_TERMS], pull_strength_q26[PAD_TANGENTIAL_TERMS];
   int32_t far_k_q24;
   int32_t spread_q20, per_spread_sd_q4, spread_least_q20, spread_most_q20;
-  float pitch_mm, per_pitch, origin_x_mm, origin_y_mm;
+  float pitch_mm, per_pitch;
+  int32_t pitch_q22_mm, per_pitch_q28, origin_x_q20, origin_y_q20; /* the origin node's place */
   float force_unit_N; /* normal force of amplitude 1 at 1 Pa */
   float widest_mm2;   /* variance of the widest normal term */
   struct {
