@@ -33,8 +33,13 @@ static const uint8_t unknowns_of[MODELS] = {SPAN_X, UNKNOWNS, PULL_Y};
 #define PER_LOAD_SD_Q4 53   /* 1 / 0.3: Q / F of what is held */
 #define KAPPA_Q14 21299     /* 1.3, as in fit_tangential.c */
 #define DAMPING_SHIFT 8     /* of the diagonal: what readings hardly tell moves slowly */
-/* The load joins its model once the line has settled. Both at once lose their way at the border. */
-#define FRAMES_WITHOUT_LOAD 9
+/* Frames of a contact, counted from 1. The load joins its model once the line has settled: both at
+ * once lose their way at the border. After the last frame, which steps only, comes the first that
+ * answers. */
+#define FIRST_WITH_LOAD 10
+#define FIRST_ANSWER FIT_SHAPES_FRAMES
+#define LAST_FRAME (FIRST_ANSWER + 3)
+#define LOG2E_HALF_FLOAT 0.72134752f
 #define FREEDOM 9           /* readings and priors less the unknowns of two */
 /* The best of the models explains nothing if its chi^2 is above that. */
 #define CHI_SQUARE_MAX 60
@@ -108,7 +113,7 @@ enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_arra
     pad->pull_variance_q26[j] = q26_from(sd * sd);
     pad->pull_strength_q26[j] = q26_from(profile->tangential[j].moment_mm * per * V);
   }
-  pad->far_k_q24 = fit_fixed(0.72134752f / (FAR_WIDTHS * V), 24);
+  pad->far_k_q24 = fit_fixed(LOG2E_HALF_FLOAT / (FAR_WIDTHS * V), 24);
   pad->spread_q20 = fit_fixed(profile->spread_mm2 * per_square, 20);
   pad->per_spread_sd_q4 = fit_fixed(1.0f / (profile->spread_sd_mm2 * per_square), 4);
   pad->spread_least_q20 = -(pad->variance_q26[0] >> 9); /* an eighth */
@@ -344,8 +349,11 @@ static NOINLINE int32_t put_column(struct fit_shapes_pad *pad, int u) {
   int32_t *column = pad->room.column[u];
   int32_t own = 0;
   for (int k = 0; k < NODES; k++, row += UNKNOWNS + 1) {
-    int32_t value = fixed_clamp(*row, -COLUMN_MAX, COLUMN_MAX) * weight_q12[k];
-    value = (value + (1 << (COLUMN_SHIFT - 1))) >> COLUMN_SHIFT;
+    int32_t value = *row;
+    if ((uint32_t)value + COLUMN_MAX > 2u * COLUMN_MAX) {
+      value = value < 0 ? -COLUMN_MAX : COLUMN_MAX;
+    }
+    value = (value * weight_q12[k] + (1 << (COLUMN_SHIFT - 1))) >> COLUMN_SHIFT;
     column[k] = value;
     own += value * value;
   }
@@ -369,13 +377,14 @@ static NOINLINE int32_t put_residuals(struct fit_shapes_pad *pad, uint32_t size,
   return own;
 }
 
-/* The sums of the products of a column with two that are behind one another. */
-static NOINLINE void sum_products(const int32_t *a, const int32_t *b, int32_t sums[2]) {
+/* The sums of the products of a column with two others. */
+static NOINLINE void sum_products(const int32_t *a, const int32_t *b, const int32_t *c,
+                                  int32_t sums[2]) {
   int32_t first = 0, second = 0;
   for (int k = 0; k < NODES; k++) {
     int32_t own = a[k];
     first += own * b[k];
-    second += own * b[k + NODES];
+    second += own * c[k];
   }
   sums[0] = first;
   sums[1] = second;
@@ -416,16 +425,18 @@ static NOINLINE void form(const struct problem *problem, const int32_t *at,
     equations->q[u] = (int8_t)(27 - COLUMN_SHIFT + up[u]);
   }
   for (int a = 0; a < equations->count; a++) {
-    const int32_t *column = pad->room.column[a];
+    int32_t(*column)[NODES] = pad->room.column;
     int32_t sums[2];
-    for (int b = 0; b < a; b += 2) {
-      sum_products(column, pad->room.column[b], sums);
+    int b = 0;
+    for (; b + 1 < a; b += 2) {
+      sum_products(column[a], column[b], column[b + 1], sums);
       pad->room.matrix[a][b] = sums[0] * (1 << (up[a] + up[b]));
-      if (b + 1 < a) {
-        pad->room.matrix[a][b + 1] = sums[1] * (1 << (up[a] + up[b + 1]));
-      }
+      pad->room.matrix[a][b + 1] = sums[1] * (1 << (up[a] + up[b + 1]));
     }
-    sum_products(column, pad->room.column[RESIDUAL - 1], sums);
+    sum_products(column[a], column[b], column[RESIDUAL], sums);
+    if (b < a) {
+      pad->room.matrix[a][b] = sums[0] * (1 << (up[a] + up[b]));
+    }
     equations->right[a] = (equations->right[a] + sums[1]) * (1 << up[a]);
   }
 }
@@ -518,19 +529,11 @@ static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model,
 }
 
 /* chi^2 of the residuals and priors, Q8. */
-static int32_t chi_square_q8(const struct problem *problem, const struct equations *equations) {
+static int32_t chi_square_of(const struct problem *problem, const struct equations *equations) {
   struct scaled base = fit_scaled_from(problem->base_q22, -22);
   struct scaled squares =
       fit_scaled_from(equations->residual_square, -2 * equations->q[RESIDUAL]);
   return fit_scaled_to_fixed(scaled_div(squares, scaled_mul(base, base)), 8);
-}
-
-static int32_t chi_square_at(const struct problem *problem, int model, int count,
-                             struct fit_shapes_at *at, struct equations *equations) {
-  round_places(at);
-  set_rows(problem, model, count, at, equations);
-  form(problem, at->value, equations);
-  return chi_square_q8(problem, equations);
 }
 
 /* At a limit that it wants to pass the spread is no unknown: the others would step as if it moved. */
@@ -549,18 +552,15 @@ static void hold_spread(struct fit_shapes_pad *pad, struct equations *equations,
   equations->right[SPREAD] = 0;
 }
 
-static NOINLINE void step(const struct problem *problem, int model, struct equations *equations,
-                          struct fit_shapes_at *at) {
-  struct fit_shapes_pad *pad = problem->pad;
-  int32_t x_q20[UNKNOWNS], right[UNKNOWNS];
-  hold_spread(pad, equations, at->value[SPREAD]);
+/* Factors of the damped matrix; right: of the step that it asks for. */
+static NOINLINE void factorise(struct fit_shapes_pad *pad, struct equations *equations,
+                               int32_t spread, int32_t *right) {
+  hold_spread(pad, equations, spread);
   for (int u = 0; u < equations->count; u++) {
     right[u] = equations->right[u];
     pad->room.matrix[u][u] += pad->room.matrix[u][u] >> DAMPING_SHIFT;
   }
   eliminate(pad->room.matrix, equations, right);
-  substitute(pad->room.matrix, equations, right, x_q20);
-  take_step(pad, model, equations, x_q20, at);
 }
 
 static NOINLINE bool weigh(const struct fit_array *array, const struct fit_settings *settings,
@@ -834,17 +834,53 @@ static void keep_factors(struct fit_shapes_pad *pad, int count) {
   }
 }
 
-static int choose(const int32_t *chi_square, const int32_t *two) {
-  int32_t one = chi_square[ROUND] < chi_square[LONG] ? chi_square[ROUND] : chi_square[LONG];
-  int32_t penalty = FIT_SHAPES_PENALTY << 8;
-  int32_t rough = chi_square[TWO] < 1 << 24 ? chi_square[TWO] * FIT_SHAPES_PENALTY / FREEDOM
-                                            : INT32_MAX / 2;
-  int32_t x_q10 = two[SPAN_X] >> 10, y_q10 = two[SPAN_Y] >> 10;
-  bool apart = x_q10 * x_q10 + y_q10 * y_q10 > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10;
-  if (apart && chi_square[TWO] < one - (rough > penalty ? rough : penalty)) {
-    return TWO;
+/* Whether the model explains the readings better than the best of those before it. */
+static bool wins(int model, const int32_t *at, int32_t chi_square_q8, int32_t least_q8) {
+  int32_t penalty_q8 = FIT_SHAPES_PENALTY << 8;
+  if (model == TWO) {
+    int32_t x_q10 = at[SPAN_X] >> 10, y_q10 = at[SPAN_Y] >> 10;
+    if (x_q10 * x_q10 + y_q10 * y_q10 <= SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10) {
+      return false;
+    }
+    /* Residuals larger than their errors are no more than that: the penalty is in their unit. */
+    int32_t rough_q8 = port_divide(chi_square_q8, FREEDOM) * FIT_SHAPES_PENALTY;
+    penalty_q8 = rough_q8 > penalty_q8 ? rough_q8 : penalty_q8;
   }
-  return chi_square[LONG] < chi_square[ROUND] - penalty ? LONG : ROUND;
+  return chi_square_q8 < least_q8 - penalty_q8;
+}
+
+static void set_dip(const struct fit_settings *settings, struct problem *problem) {
+  problem->dip_share_q16 = 0;
+  problem->dip_k_q24 = 1 << 24;
+  if (fit_has_dip(settings)) {
+    float sd = settings->dip_sd_mm * problem->pad->per_pitch;
+    problem->dip_share_q16 = fit_fixed(settings->dip_share, 16);
+    problem->dip_k_q24 = fit_fixed(LOG2E_HALF_FLOAT / (sd > 0.5f ? sd * sd : 0.25f), 24);
+  }
+}
+
+static void conclude(const struct problem *problem, int best, const int32_t *chi_square_q8,
+                     const struct equations *equations, const struct fit_shapes_at *at,
+                     struct fit_shapes_result *result) {
+  const struct fit_shapes_pad *pad = problem->pad;
+  struct scaled base = fit_scaled_from(problem->base_q22, -22);
+  struct scaled variance = scaled_mul(base, base);
+  if (chi_square_q8[best] > FREEDOM << 8) {
+    variance = scaled_mul(variance, fit_scaled_from(port_divide(chi_square_q8[best], FREEDOM), -8));
+  }
+  struct scaled unit = fit_grid_scaled(pad->force_unit_N);
+  unit.exponent += 18 - problem->readings.shift;
+  const struct scales scales = {unit, fit_scaled_short(variance), fit_grid_scaled(pad->pitch_mm)};
+  if (best == TWO) {
+    result->shape = FIT_SHAPE_TWO;
+    put_two(problem, equations, at->value, &scales, result);
+    return;
+  }
+  result->shape = FIT_SHAPE_ROUND;
+  put_one(problem, equations, at->value, &scales, result);
+  if (best == LONG) {
+    put_line(problem, equations, at->value, &scales, result);
+  }
 }
 
 static void follow(const struct problem *problem, const struct fit_result *fit,
@@ -875,77 +911,63 @@ static void follow(const struct problem *problem, const struct fit_result *fit,
   state->sum_q20 = sum_q20;
 }
 
-void fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
+bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
                 const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
                 const struct fit_result *fit, struct fit_shapes_state *state,
                 struct fit_shapes_result *result) {
-  *result = (struct fit_shapes_result){0};
-  struct problem problem = {.pad = pad};
+  struct problem problem;
+  problem.pad = pad;
   if (!(fit->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
       !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, settings, &problem.readings) ||
       !weigh(array, settings, fit->used, &problem)) {
     state->frames = 0;
-    return;
+    *result = (struct fit_shapes_result){0};
+    return true;
   }
-  if (fit_has_dip(settings)) {
-    float sd = settings->dip_sd_mm * pad->per_pitch;
-    problem.dip_share_q16 = fit_fixed(settings->dip_share, 16);
-    problem.dip_k_q24 = fit_fixed(0.72134752f / (sd > 0.5f ? sd * sd : 0.25f), 24);
-  }
+  set_dip(settings, &problem);
   follow(&problem, fit, state, sum_of(&problem.readings));
   if (state->frames == 0) {
     begin(&problem, fit, state);
     state->frames = 1;
-    return;
+    *result = (struct fit_shapes_result){0};
+    return true;
   }
-  struct fit_shapes_at at[MODELS];
-  struct equations equations[MODELS];
-  int32_t chi_square[MODELS];
-  int best = MODELS;
-  bool ends = state->frames + 1 >= FIT_SHAPES_FRAMES;
+  state->frames = state->frames == LAST_FRAME ? FIRST_ANSWER : state->frames + 1;
+  const bool answers = state->frames >= FIRST_ANSWER && state->frames < LAST_FRAME;
+  struct equations equations, kept;
+  int32_t chi_square_q8[MODELS];
+  int best = ROUND;
   for (int m = 0; m < MODELS; m++) {
-    int count = m == LONG && state->frames < FRAMES_WITHOUT_LOAD ? BALANCE : unknowns_of[m];
-    chi_square[m] = chi_square_at(&problem, m, count, &state->at[m], &equations[m]);
-    at[m] = state->at[m];
-    if (ends) {
-      int now = m == ROUND ? ROUND : m == LONG ? (chi_square[LONG] < chi_square[ROUND] - (FIT_SHAPES_PENALTY << 8) ? LONG : best) : choose(chi_square, at[TWO].value);
-      if (now == m) {
-        best = m;
-      }
+    int count = m == LONG && state->frames < FIRST_WITH_LOAD ? BALANCE : unknowns_of[m];
+    struct fit_shapes_at *at = &state->at[m];
+    int32_t right[UNKNOWNS], x_q20[UNKNOWNS];
+    round_places(at);
+    set_rows(&problem, m, count, at, &equations);
+    form(&problem, at->value, &equations);
+    chi_square_q8[m] = chi_square_of(&problem, &equations);
+    factorise(pad, &equations, at->value[SPREAD], right);
+    if (answers && (m == ROUND || wins(m, at->value, chi_square_q8[m], chi_square_q8[best]))) {
+      best = m;
+      kept = equations;
+      keep_factors(pad, count);
     }
-    step(&problem, m, &equations[m], &state->at[m]);
-    if (best == m) {
-      keep_factors(pad, equations[m].count);
+    if (m != ROUND || !answers) {
+      substitute(pad->room.matrix, &equations, right, x_q20);
+      take_step(pad, m, &equations, x_q20, at);
     }
   }
-  if (!ends) {
-    state->frames++;
-    return;
+  if (!answers) {
+    return false;
   }
+  *result = (struct fit_shapes_result){0};
   for (int m = 0; m < MODELS; m++) {
-    result->chi_square[m] = (float)chi_square[m] * (1.0f / 256.0f);
+    result->chi_square[m] = fit_float(chi_square_q8[m], -8);
   }
-  if (chi_square[best] > CHI_SQUARE_MAX << 8) {
+  if (chi_square_q8[best] > CHI_SQUARE_MAX << 8) {
     result->shape = FIT_SHAPE_NONE;
     state->frames = 0;
-    return;
+    return true;
   }
-  struct scaled base = fit_scaled_from(problem.base_q22, -22);
-  struct scaled variance = scaled_mul(base, base);
-  if (chi_square[best] > FREEDOM << 8) {
-    variance = scaled_mul(variance, fit_scaled_from(chi_square[best] / FREEDOM, -8));
-  }
-  struct scaled unit = fit_grid_scaled(pad->force_unit_N);
-  unit.exponent += 18 - problem.readings.shift;
-  const struct scales scales = {unit, fit_scaled_short(variance), fit_grid_scaled(pad->pitch_mm)};
-  if (best == TWO) {
-    result->shape = FIT_SHAPE_TWO;
-    put_two(&problem, &equations[TWO], at[TWO].value, &scales, result);
-    return;
-  }
-  result->shape = FIT_SHAPE_ROUND;
-  put_one(&problem, &equations[best], at[best].value, &scales, result);
-  if (best == LONG) {
-    put_line(&problem, &equations[LONG], at[LONG].value, &scales, result);
-  }
+  conclude(&problem, best, chi_square_q8, &kept, &state->at[best], result);
+  return true;
 }

@@ -95,8 +95,10 @@ struct fit_shapes_pad {
 enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_array *array,
                                const struct pad_profile *profile);
 
-/* fit: of the same readings, whose gains act. settings: its dip is the pad's, and cut_noises 0. */
-void fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
+/* Whether the result is of this frame. Where it is not, the one before stands: one frame in four only
+ * steps, and so do those of a contact's beginning. fit: of the same readings, whose gains act.
+ * settings: its dip is the pad's, and cut_noises 0. */
+bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
                 const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
                 const struct fit_result *fit, struct fit_shapes_state *state,
                 struct fit_shapes_result *result);
