@@ -7,6 +7,7 @@
 #include "fit/fit_math.h"
 
 #include <math.h>
+#include <stddef.h>
 
 /* The models, lengths in pitches. A blob at d = (dx, dy) from its middle, t its contact's spread:
  *   s = sum_j share_j V / v_j exp(-d' d / (2 v_j)) - dip,    v_j = V_j + t,  V the widest V_j
@@ -78,15 +79,6 @@ struct problem {
   int32_t dip_share_q16, dip_k_q24;
 };
 
-struct equations {
-  int count;
-  uint32_t residual_size;
-  int8_t q[UNKNOWNS + 1]; /* value = integer 2^-q */
-  int32_t right[UNKNOWNS];
-  int32_t residual_square;
-  int8_t half[UNKNOWNS];
-  int32_t inverse_q14[UNKNOWNS];
-};
 
 static int32_t q26_from(float value) {
   return fit_fixed(value, 26);
@@ -318,7 +310,7 @@ static void round_places(struct fit_shapes_at *at) {
 
 /* The weighted rows of a model, columns Q27 and residual Q28. */
 static NOINLINE void set_rows(const struct problem *problem, int model, int count,
-                              const struct fit_shapes_at *where, struct equations *equations) {
+                              const struct fit_shapes_at *where, struct fit_shapes_equations *equations) {
   struct fit_shapes_pad *pad = problem->pad;
   const int32_t *at = where->value;
   const bool pulls = count > BALANCE && model == LONG;
@@ -348,6 +340,7 @@ static NOINLINE int32_t put_column(struct fit_shapes_pad *pad, int u) {
   const int32_t *row = &pad->room.row[0][u], *weight_q12 = pad->room.weight_q12;
   int32_t *column = pad->room.column[u];
   int32_t own = 0;
+#pragma GCC unroll 5
   for (int k = 0; k < NODES; k++, row += UNKNOWNS + 1) {
     int32_t value = *row;
     if ((uint32_t)value + COLUMN_MAX > 2u * COLUMN_MAX) {
@@ -362,7 +355,7 @@ static NOINLINE int32_t put_column(struct fit_shapes_pad *pad, int u) {
 
 /* The same of the residuals, as many bits as there are. */
 static NOINLINE int32_t put_residuals(struct fit_shapes_pad *pad, uint32_t size,
-                                      struct equations *equations) {
+                                      struct fit_shapes_equations *equations) {
   int32_t shift = fixed_bits(size) - 13;
   shift = shift < 1 ? 1 : shift;
   equations->q[RESIDUAL] = (int8_t)(28 - shift);
@@ -392,7 +385,7 @@ static NOINLINE void sum_products(const int32_t *a, const int32_t *b, const int3
 
 /* The normal matrix, of which the diagonal is 2^28 to 2^30. */
 static NOINLINE void form(const struct problem *problem, const int32_t *at,
-                          struct equations *equations) {
+                          struct fit_shapes_equations *equations) {
   struct fit_shapes_pad *pad = problem->pad;
   int32_t element[UNKNOWNS] = {0}, off[UNKNOWNS] = {0}; /* priors, Q27 and Q28 */
   int32_t base = problem->base_q22;
@@ -418,7 +411,7 @@ static NOINLINE void form(const struct problem *problem, const int32_t *at,
     prior = prior < PRIOR_MAX ? prior : PRIOR_MAX;
     int32_t own = put_column(pad, u) + prior * prior;
     up[u] = (int8_t)(own >> 30 ? 0 : (30 - fixed_bits((uint32_t)own | 1)) >> 1);
-    pad->room.matrix[u][u] = own * (1 << (2 * up[u]));
+    equations->matrix[u][u] = own * (1 << (2 * up[u]));
     int32_t right = prior * residual;
     equations->residual_square += residual * residual;
     equations->right[u] = right;
@@ -430,12 +423,12 @@ static NOINLINE void form(const struct problem *problem, const int32_t *at,
     int b = 0;
     for (; b + 1 < a; b += 2) {
       sum_products(column[a], column[b], column[b + 1], sums);
-      pad->room.matrix[a][b] = sums[0] * (1 << (up[a] + up[b]));
-      pad->room.matrix[a][b + 1] = sums[1] * (1 << (up[a] + up[b + 1]));
+      equations->matrix[a][b] = sums[0] * (1 << (up[a] + up[b]));
+      equations->matrix[a][b + 1] = sums[1] * (1 << (up[a] + up[b + 1]));
     }
     sum_products(column[a], column[b], column[RESIDUAL], sums);
     if (b < a) {
-      pad->room.matrix[a][b] = sums[0] * (1 << (up[a] + up[b]));
+      equations->matrix[a][b] = sums[0] * (1 << (up[a] + up[b]));
     }
     equations->right[a] = (equations->right[a] + sums[1]) * (1 << up[a]);
   }
@@ -443,8 +436,8 @@ static NOINLINE void form(const struct problem *problem, const int32_t *at,
 
 /* L D L^T in place, below the diagonal L 2^-half in Q14. An unknown that is not told from those
  * before stays where it is. right: 2^-half times the elements of D^-1 L^-1 right, Q14. */
-static NOINLINE void eliminate(int32_t (*matrix)[UNKNOWNS], struct equations *equations,
-                               int32_t *right) {
+static NOINLINE void eliminate(struct fit_shapes_equations *equations, int32_t *right) {
+  int32_t(*matrix)[UNKNOWNS] = equations->matrix;
   int count = equations->count;
   for (int j = 0; j < count; j++) {
     int32_t pivot = matrix[j][j];
@@ -478,8 +471,9 @@ static NOINLINE void eliminate(int32_t (*matrix)[UNKNOWNS], struct equations *eq
 }
 
 /* x of L^T x = right, Q20 in the columns' units. */
-static NOINLINE void substitute(int32_t (*matrix)[UNKNOWNS], const struct equations *equations,
-                                const int32_t *right, int32_t *x_q20) {
+static NOINLINE void substitute(const struct fit_shapes_equations *equations, const int32_t *right,
+                                int32_t *x_q20) {
+  const int32_t(*matrix)[UNKNOWNS] = equations->matrix;
   for (int j = equations->count - 1; j >= 0; j--) {
     int32_t sum = right[j] * 64;
     for (int i = j + 1; i < equations->count; i++) {
@@ -493,7 +487,7 @@ static const int32_t limit_of[UNKNOWNS] = {AMPLITUDE_MAX, PLACE_X_MAX, PLACE_Y_M
                                            ONE_Q20 / 8,   SPAN_MAX,    SPAN_MAX,    0, 0};
 
 static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model,
-                               const struct equations *equations, const int32_t *x_q20,
+                               const struct fit_shapes_equations *equations, const int32_t *x_q20,
                                struct fit_shapes_at *at) {
   int32_t move[UNKNOWNS], most_q14 = 1 << 14;
   int32_t amplitude = at->value[AMPLITUDE];
@@ -529,7 +523,7 @@ static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model,
 }
 
 /* chi^2 of the residuals and priors, Q8. */
-static int32_t chi_square_of(const struct problem *problem, const struct equations *equations) {
+static int32_t chi_square_of(const struct problem *problem, const struct fit_shapes_equations *equations) {
   struct scaled base = fit_scaled_from(problem->base_q22, -22);
   struct scaled squares =
       fit_scaled_from(equations->residual_square, -2 * equations->q[RESIDUAL]);
@@ -537,30 +531,30 @@ static int32_t chi_square_of(const struct problem *problem, const struct equatio
 }
 
 /* At a limit that it wants to pass the spread is no unknown: the others would step as if it moved. */
-static void hold_spread(struct fit_shapes_pad *pad, struct equations *equations, int32_t spread) {
+static void hold_spread(struct fit_shapes_pad *pad, struct fit_shapes_equations *equations, int32_t spread) {
   int32_t right = equations->right[SPREAD];
   if (!((spread < pad->spread_least_q20 + 256 && right < 0) ||
         (spread > pad->spread_most_q20 - 256 && right > 0))) {
     return;
   }
   for (int u = 0; u < SPREAD; u++) {
-    pad->room.matrix[SPREAD][u] = 0;
+    equations->matrix[SPREAD][u] = 0;
   }
   for (int u = SPREAD; u < equations->count; u++) {
-    pad->room.matrix[u][SPREAD] = 0;
+    equations->matrix[u][SPREAD] = 0;
   }
   equations->right[SPREAD] = 0;
 }
 
 /* Factors of the damped matrix; right: of the step that it asks for. */
-static NOINLINE void factorise(struct fit_shapes_pad *pad, struct equations *equations,
+static NOINLINE void factorise(struct fit_shapes_pad *pad, struct fit_shapes_equations *equations,
                                int32_t spread, int32_t *right) {
   hold_spread(pad, equations, spread);
   for (int u = 0; u < equations->count; u++) {
     right[u] = equations->right[u];
-    pad->room.matrix[u][u] += pad->room.matrix[u][u] >> DAMPING_SHIFT;
+    equations->matrix[u][u] += equations->matrix[u][u] >> DAMPING_SHIFT;
   }
-  eliminate(pad->room.matrix, equations, right);
+  eliminate(equations, right);
 }
 
 static NOINLINE bool weigh(const struct fit_array *array, const struct fit_settings *settings,
@@ -650,9 +644,8 @@ static NOINLINE void set_pair_by_readings(const struct problem *problem,
 
 /* Sum of the squares of a pair's residuals, Q16: one with a good start has less. */
 static NOINLINE int32_t residuals_at(const struct problem *problem, struct fit_shapes_at *at) {
-  struct equations equations;
   round_places(at);
-  set_rows(problem, TWO, SPAN_X, at, &equations);
+  set_rows(problem, TWO, SPAN_X, at, problem->pad->room.equations);
   int32_t sum_q16 = 0;
   for (int k = 0; k < NODES; k++) {
     int32_t residual_q13 = problem->pad->room.row[k][RESIDUAL] >> 15;
@@ -717,10 +710,9 @@ static NOINLINE void begin(const struct problem *problem, const struct fit_resul
 }
 
 /* Variance of a sum of two unknowns times these, each at most some pitches or units of the readings. */
-static NOINLINE struct scaled variance_of(const struct fit_shapes_pad *pad,
-                                          const struct equations *equations, int first, int32_t a_q20,
+static NOINLINE struct scaled variance_of(const struct fit_shapes_equations *equations, int first, int32_t a_q20,
                                           int second, int32_t b_q20) {
-  const int32_t(*matrix)[UNKNOWNS] = pad->room.factors;
+  const int32_t(*matrix)[UNKNOWNS] = equations->matrix;
   int32_t w_q10[UNKNOWNS], sum_q13 = 0;
   int32_t q = equations->q[first] > equations->q[second] ? equations->q[first]
                                                          : equations->q[second];
@@ -759,7 +751,7 @@ static float sd_of(struct scaled scale, struct scaled form, struct scaled varian
   return product_of(scale, fit_scaled_sqrt(scaled_mul(fit_scaled_short(form), variance)));
 }
 
-static NOINLINE void put_two(const struct problem *problem, const struct equations *equations,
+static NOINLINE void put_two(const struct problem *problem, const struct fit_shapes_equations *equations,
                              const int32_t *at, const struct scales *scales,
                              struct fit_shapes_result *result) {
   const struct fit_shapes_pad *pad = problem->pad;
@@ -772,19 +764,18 @@ static NOINLINE void put_two(const struct problem *problem, const struct equatio
         product_of(scales->unit, scaled_mul(fit_scaled_from(at[AMPLITUDE], -20),
                                             fit_scaled_from(share_q20, -20)));
     struct scaled place =
-        scaled_add(variance_of(pad, equations, PLACE_X, ONE_Q20, SPAN_X, sign * ONE_Q20),
-                   variance_of(pad, equations, PLACE_Y, ONE_Q20, SPAN_Y, sign * ONE_Q20));
+        scaled_add(variance_of(equations, PLACE_X, ONE_Q20, SPAN_X, sign * ONE_Q20),
+                   variance_of(equations, PLACE_Y, ONE_Q20, SPAN_Y, sign * ONE_Q20));
     result->location_sd_mm[c] = sd_of(scales->pitch, place, scales->variance);
-    struct scaled force = variance_of(pad, equations, AMPLITUDE, share_q20, BALANCE,
+    struct scaled force = variance_of(equations, AMPLITUDE, share_q20, BALANCE,
                                       sign * (at[AMPLITUDE] >> 1));
     result->force_sd_N[c] = sd_of(scales->unit, force, scales->variance);
   }
 }
 
-static NOINLINE void put_line(const struct problem *problem, const struct equations *equations,
+static NOINLINE void put_line(const struct fit_shapes_equations *equations,
                               const int32_t *at, const struct scales *scales,
                               struct fit_shapes_result *result) {
-  const struct fit_shapes_pad *pad = problem->pad;
   result->shape = FIT_SHAPE_PULLED;
   result->qx_N = product_of(scales->unit, fit_scaled_from(at[PULL_X], -20));
   result->qy_N = product_of(scales->unit, fit_scaled_from(at[PULL_Y], -20));
@@ -796,7 +787,7 @@ static NOINLINE void put_line(const struct problem *problem, const struct equati
   struct scaled reach = fit_scaled_sqrt(square);
   int32_t ux_q20 = fit_scaled_to_fixed(scaled_div(x, reach), 20);
   int32_t uy_q20 = fit_scaled_to_fixed(scaled_div(y, reach), 20);
-  struct scaled sure = scaled_mul(variance_of(pad, equations, SPAN_X, ux_q20, SPAN_Y, uy_q20),
+  struct scaled sure = scaled_mul(variance_of(equations, SPAN_X, ux_q20, SPAN_Y, uy_q20),
                                   scales->variance);
   sure.mantissa *= FIT_SHAPES_PENALTY;
   if (scaled_sub(square, fit_scaled_short(sure)).mantissa <= 0) {
@@ -809,29 +800,21 @@ static NOINLINE void put_line(const struct problem *problem, const struct equati
   result->along_y = fit_float(sign * uy_q20, -20);
   result->angle_sd_rad =
       sd_of(fit_grid_reciprocal(reach),
-            variance_of(pad, equations, SPAN_X, -uy_q20, SPAN_Y, ux_q20), scales->variance);
+            variance_of(equations, SPAN_X, -uy_q20, SPAN_Y, ux_q20), scales->variance);
 }
 
-static NOINLINE void put_one(const struct problem *problem, const struct equations *equations,
+static NOINLINE void put_one(const struct problem *problem, const struct fit_shapes_equations *equations,
                              const int32_t *at, const struct scales *scales,
                              struct fit_shapes_result *result) {
   const struct fit_shapes_pad *pad = problem->pad;
   result->x_mm[0] = mm(pad, pad->origin_x_q20 + at[PLACE_X]);
   result->y_mm[0] = mm(pad, pad->origin_y_q20 + at[PLACE_Y]);
   result->force_N[0] = product_of(scales->unit, fit_scaled_from(at[AMPLITUDE], -20));
-  struct scaled place = scaled_add(variance_of(pad, equations, PLACE_X, ONE_Q20, PLACE_Y, 0),
-                                   variance_of(pad, equations, PLACE_Y, ONE_Q20, PLACE_X, 0));
+  struct scaled place = scaled_add(variance_of(equations, PLACE_X, ONE_Q20, PLACE_Y, 0),
+                                   variance_of(equations, PLACE_Y, ONE_Q20, PLACE_X, 0));
   result->location_sd_mm[0] = sd_of(scales->pitch, place, scales->variance);
   result->force_sd_N[0] = sd_of(
-      scales->unit, variance_of(pad, equations, AMPLITUDE, ONE_Q20, FAR, 0), scales->variance);
-}
-
-static void keep_factors(struct fit_shapes_pad *pad, int count) {
-  for (int a = 1; a < count; a++) {
-    for (int b = 0; b < a; b++) {
-      pad->room.factors[a][b] = pad->room.matrix[a][b];
-    }
-  }
+      scales->unit, variance_of(equations, AMPLITUDE, ONE_Q20, FAR, 0), scales->variance);
 }
 
 /* Whether the model explains the readings better than the best of those before it. */
@@ -860,7 +843,7 @@ static void set_dip(const struct fit_settings *settings, struct problem *problem
 }
 
 static void conclude(const struct problem *problem, int best, const int32_t *chi_square_q8,
-                     const struct equations *equations, const struct fit_shapes_at *at,
+                     const struct fit_shapes_equations *equations, const struct fit_shapes_at *at,
                      struct fit_shapes_result *result) {
   const struct fit_shapes_pad *pad = problem->pad;
   struct scaled base = fit_scaled_from(problem->base_q22, -22);
@@ -879,7 +862,7 @@ static void conclude(const struct problem *problem, int best, const int32_t *chi
   result->shape = FIT_SHAPE_ROUND;
   put_one(problem, equations, at->value, &scales, result);
   if (best == LONG) {
-    put_line(problem, equations, at->value, &scales, result);
+    put_line(equations, at->value, &scales, result);
   }
 }
 
@@ -934,7 +917,7 @@ bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
   }
   state->frames = state->frames == LAST_FRAME ? FIRST_ANSWER : state->frames + 1;
   const bool answers = state->frames >= FIRST_ANSWER && state->frames < LAST_FRAME;
-  struct equations equations, kept;
+  struct fit_shapes_equations *now = pad->room.equations, *kept = NULL;
   int32_t chi_square_q8[MODELS];
   int best = ROUND;
   for (int m = 0; m < MODELS; m++) {
@@ -942,18 +925,20 @@ bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
     struct fit_shapes_at *at = &state->at[m];
     int32_t right[UNKNOWNS], x_q20[UNKNOWNS];
     round_places(at);
-    set_rows(&problem, m, count, at, &equations);
-    form(&problem, at->value, &equations);
-    chi_square_q8[m] = chi_square_of(&problem, &equations);
-    factorise(pad, &equations, at->value[SPREAD], right);
+    set_rows(&problem, m, count, at, now);
+    form(&problem, at->value, now);
+    chi_square_q8[m] = chi_square_of(&problem, now);
+    factorise(pad, now, at->value[SPREAD], right);
     if (answers && (m == ROUND || wins(m, at->value, chi_square_q8[m], chi_square_q8[best]))) {
       best = m;
-      kept = equations;
-      keep_factors(pad, count);
+      kept = now;
     }
     if (m != ROUND || !answers) {
-      substitute(pad->room.matrix, &equations, right, x_q20);
-      take_step(pad, m, &equations, x_q20, at);
+      substitute(now, right, x_q20);
+      take_step(pad, m, now, x_q20, at);
+    }
+    if (kept == now) {
+      now = now == pad->room.equations ? now + 1 : pad->room.equations;
     }
   }
   if (!answers) {
@@ -968,6 +953,6 @@ bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
     state->frames = 0;
     return true;
   }
-  conclude(&problem, best, chi_square_q8, &kept, &state->at[best], result);
+  conclude(&problem, best, chi_square_q8, kept, &state->at[best], result);
   return true;
 }

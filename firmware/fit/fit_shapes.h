@@ -69,6 +69,17 @@ struct fit_shapes_state {
   uint8_t frames;
 };
 
+/* The normal equations of a step, and then the factors of their matrix. */
+struct fit_shapes_equations {
+  int count; /* of the unknowns */
+  uint32_t residual_size;
+  int32_t residual_square;
+  int8_t q[FIT_SHAPES_UNKNOWNS + 1]; /* of the columns and the residual: value = integer 2^-q */
+  int8_t half[FIT_SHAPES_UNKNOWNS];
+  int32_t inverse_q14[FIT_SHAPES_UNKNOWNS], right[FIT_SHAPES_UNKNOWNS];
+  int32_t matrix[FIT_SHAPES_UNKNOWNS][FIT_SHAPES_UNKNOWNS];
+};
+
 /* A profile as the models need it, and their working memory. Fill with fit_shapes_init. */
 struct fit_shapes_pad {
   int32_t variance_q26[PAD_NORMAL_TERMS], strength_q26[PAD_NORMAL_TERMS];
@@ -81,8 +92,7 @@ struct fit_shapes_pad {
   float widest_mm2;   /* variance of the widest normal term */
   struct {
     int32_t row[FIT_SHAPES_NODES][FIT_SHAPES_UNKNOWNS + 1];
-    int32_t matrix[FIT_SHAPES_UNKNOWNS][FIT_SHAPES_UNKNOWNS];
-    int32_t factors[FIT_SHAPES_UNKNOWNS][FIT_SHAPES_UNKNOWNS]; /* of the answer */
+    struct fit_shapes_equations equations[2]; /* of the best model, and of the one that steps */
     int32_t column[FIT_SHAPES_UNKNOWNS + 1][FIT_SHAPES_NODES];
     int32_t weight_q12[FIT_SHAPES_NODES];
   } room;
