@@ -7,7 +7,6 @@
 #include "fit/fit_math.h"
 
 #include <math.h>
-#include <stddef.h>
 
 /* The models, lengths in pitches. A blob at d = (dx, dy) from its middle, t its contact's spread:
  *   s = sum_j share_j V / v_j exp(-d' d / (2 v_j)) - dip,    v_j = V_j + t,  V the widest V_j
@@ -55,6 +54,9 @@ static const uint8_t unknowns_of[MODELS] = {SPAN_X, UNKNOWNS, PULL_Y};
 #define MOVE_MAX (1 << 18) /* a quarter of a pitch */
 #define SQUARE_MAX_Q24 (40 << 24)
 #define PIVOT_LEAST (1 << 18)
+#define PER_SD_MAX_Q4 1024
+/* Readings whose errors are more than 3 % of their unit tell no shapes. */
+#define BASE_MAX_Q22 (1 << 17)
 
 /* Columns are at most 2 pitches or units of the readings, in Q(27 - COLUMN_SHIFT). */
 #define COLUMN_MAX ((1 << 16) - 1)
@@ -107,7 +109,8 @@ enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_arra
   }
   pad->far_k_q24 = fit_fixed(LOG2E_HALF_FLOAT / (FAR_WIDTHS * V), 24);
   pad->spread_q20 = fit_fixed(profile->spread_mm2 * per_square, 20);
-  pad->per_spread_sd_q4 = fit_fixed(1.0f / (profile->spread_sd_mm2 * per_square), 4);
+  int32_t per_sd_q4 = fit_fixed(1.0f / (profile->spread_sd_mm2 * per_square), 4);
+  pad->per_spread_sd_q4 = per_sd_q4 < PER_SD_MAX_Q4 ? per_sd_q4 : PER_SD_MAX_Q4;
   pad->spread_least_q20 = -(pad->variance_q26[0] >> 9); /* an eighth */
   pad->spread_most_q20 = fit_fixed(0.75f * V, 20);
   uint8_t origin = array->grid.sensor[COLUMNS / 2 * ROWS + ROWS / 2];
@@ -340,7 +343,6 @@ static NOINLINE int32_t put_column(struct fit_shapes_pad *pad, int u) {
   const int32_t *row = &pad->room.row[0][u], *weight_q12 = pad->room.weight_q12;
   int32_t *column = pad->room.column[u];
   int32_t own = 0;
-#pragma GCC unroll 5
   for (int k = 0; k < NODES; k++, row += UNKNOWNS + 1) {
     int32_t value = *row;
     if ((uint32_t)value + COLUMN_MAX > 2u * COLUMN_MAX) {
@@ -383,38 +385,56 @@ static NOINLINE void sum_products(const int32_t *a, const int32_t *b, const int3
   sums[1] = second;
 }
 
-/* The normal matrix, of which the diagonal is 2^28 to 2^30. */
-static NOINLINE void form(const struct problem *problem, const int32_t *at,
-                          struct fit_shapes_equations *equations) {
-  struct fit_shapes_pad *pad = problem->pad;
-  int32_t element[UNKNOWNS] = {0}, off[UNKNOWNS] = {0}; /* priors, Q27 and Q28 */
-  int32_t base = problem->base_q22;
-  element[SPREAD] = base * pad->per_spread_sd_q4 * 2;
-  off[SPREAD] = (element[SPREAD] >> 12) * ((pad->spread_q20 - at[SPREAD]) >> 4) >> 3;
-  element[FAR] = base * PER_FAR_SD_Q4 * 2;
-  off[FAR] = (element[FAR] >> 12) * (-at[FAR] >> 4) >> 3;
+struct priors {
+  int32_t element_q27[UNKNOWNS], off_q28[UNKNOWNS]; /* rows of one element, and their residuals */
+};
+
+static void put_prior(int u, int32_t element_q27, int32_t off_q20, struct priors *priors) {
+  priors->element_q27[u] = element_q27;
+  priors->off_q28[u] = (element_q27 >> 12) * (off_q20 >> 4) >> 3;
+}
+
+/* The column of the residuals, and the sum of the squares with those of the priors. */
+static NOINLINE void form_residuals(const struct problem *problem, const int32_t *at,
+                                    struct priors *priors,
+                                    struct fit_shapes_equations *equations) {
+  const struct fit_shapes_pad *pad = problem->pad;
+  int32_t base_q23 = problem->base_q22 * 2;
+  for (int u = 0; u < UNKNOWNS; u++) {
+    priors->element_q27[u] = priors->off_q28[u] = 0;
+  }
+  put_prior(SPREAD, base_q23 * pad->per_spread_sd_q4, pad->spread_q20 - at[SPREAD], priors);
+  put_prior(FAR, base_q23 * PER_FAR_SD_Q4, -at[FAR], priors);
   if (equations->count == UNKNOWNS) {
     int32_t per_q4 = port_divide(PER_LOAD_SD_Q4 << 16, at[AMPLITUDE] >> 4);
-    element[PULL_X] = element[PULL_Y] = base * (per_q4 < 1024 ? per_q4 : 1024) * 2;
-    off[PULL_X] = (element[PULL_X] >> 12) * (-at[PULL_X] >> 4) >> 3;
-    off[PULL_Y] = (element[PULL_Y] >> 12) * (-at[PULL_Y] >> 4) >> 3;
+    int32_t element_q27 = base_q23 * (per_q4 < PER_SD_MAX_Q4 ? per_q4 : PER_SD_MAX_Q4);
+    put_prior(PULL_X, element_q27, -at[PULL_X], priors);
+    put_prior(PULL_Y, element_q27, -at[PULL_Y], priors);
   }
   uint32_t size = equations->residual_size;
-  for (int u = 0; u < equations->count; u++) {
-    size |= fixed_size(off[u]);
+  for (int u = SPREAD; u < equations->count; u++) {
+    size |= fixed_size(priors->off_q28[u]);
   }
-  equations->residual_square = put_residuals(pad, size, equations);
-  int32_t residual_shift = 28 - equations->q[RESIDUAL];
+  equations->residual_square = put_residuals(problem->pad, size, equations);
+  int32_t shift = 28 - equations->q[RESIDUAL];
+  for (int u = SPREAD; u < equations->count; u++) {
+    int32_t residual = priors->off_q28[u] >> shift;
+    priors->off_q28[u] = residual;
+    equations->residual_square += residual * residual;
+  }
+}
+
+/* The normal matrix, of which the diagonal is 2^28 to 2^30. */
+static NOINLINE void form(struct fit_shapes_pad *pad, const struct priors *priors,
+                          struct fit_shapes_equations *equations) {
   int8_t up[UNKNOWNS];
   for (int u = 0; u < equations->count; u++) {
-    int32_t prior = element[u] >> COLUMN_SHIFT, residual = off[u] >> residual_shift;
+    int32_t prior = priors->element_q27[u] >> COLUMN_SHIFT;
     prior = prior < PRIOR_MAX ? prior : PRIOR_MAX;
     int32_t own = put_column(pad, u) + prior * prior;
     up[u] = (int8_t)(own >> 30 ? 0 : (30 - fixed_bits((uint32_t)own | 1)) >> 1);
     equations->matrix[u][u] = own * (1 << (2 * up[u]));
-    int32_t right = prior * residual;
-    equations->residual_square += residual * residual;
-    equations->right[u] = right;
+    equations->right[u] = prior * priors->off_q28[u];
     equations->q[u] = (int8_t)(27 - COLUMN_SHIFT + up[u]);
   }
   for (int a = 0; a < equations->count; a++) {
@@ -531,7 +551,7 @@ static int32_t chi_square_of(const struct problem *problem, const struct fit_sha
 }
 
 /* At a limit that it wants to pass the spread is no unknown: the others would step as if it moved. */
-static void hold_spread(struct fit_shapes_pad *pad, struct fit_shapes_equations *equations, int32_t spread) {
+static void hold_spread(const struct fit_shapes_pad *pad, struct fit_shapes_equations *equations, int32_t spread) {
   int32_t right = equations->right[SPREAD];
   if (!((spread < pad->spread_least_q20 + 256 && right < 0) ||
         (spread > pad->spread_most_q20 - 256 && right > 0))) {
@@ -547,8 +567,8 @@ static void hold_spread(struct fit_shapes_pad *pad, struct fit_shapes_equations 
 }
 
 /* Factors of the damped matrix; right: of the step that it asks for. */
-static NOINLINE void factorise(struct fit_shapes_pad *pad, struct fit_shapes_equations *equations,
-                               int32_t spread, int32_t *right) {
+static NOINLINE void factorise(struct fit_shapes_equations *equations, int32_t spread,
+                               const struct fit_shapes_pad *pad, int32_t *right) {
   hold_spread(pad, equations, spread);
   for (int u = 0; u < equations->count; u++) {
     right[u] = equations->right[u];
@@ -575,7 +595,7 @@ static NOINLINE bool weigh(const struct fit_array *array, const struct fit_setti
       sensors++;
     }
   }
-  return sensors >= FIT_SHAPES_SENSORS;
+  return sensors >= FIT_SHAPES_SENSORS && problem->base_q22 <= BASE_MAX_Q22;
 }
 
 static int32_t sum_of(const struct readings *readings) {
@@ -817,19 +837,18 @@ static NOINLINE void put_one(const struct problem *problem, const struct fit_sha
       scales->unit, variance_of(equations, AMPLITUDE, ONE_Q20, FAR, 0), scales->variance);
 }
 
-/* Whether the model explains the readings better than the best of those before it. */
-static bool wins(int model, const int32_t *at, int32_t chi_square_q8, int32_t least_q8) {
+static int best_of(const int32_t *chi_square_q8, const int32_t *two) {
+  int32_t round = chi_square_q8[ROUND], line = chi_square_q8[LONG], pair = chi_square_q8[TWO];
   int32_t penalty_q8 = FIT_SHAPES_PENALTY << 8;
-  if (model == TWO) {
-    int32_t x_q10 = at[SPAN_X] >> 10, y_q10 = at[SPAN_Y] >> 10;
-    if (x_q10 * x_q10 + y_q10 * y_q10 <= SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10) {
-      return false;
-    }
-    /* Residuals larger than their errors are no more than that: the penalty is in their unit. */
-    int32_t rough_q8 = port_divide(chi_square_q8, FREEDOM) * FIT_SHAPES_PENALTY;
-    penalty_q8 = rough_q8 > penalty_q8 ? rough_q8 : penalty_q8;
+  /* Residuals larger than their errors are no more than that: the penalty is in their unit. */
+  int32_t rough_q8 = port_divide(pair, FREEDOM) * FIT_SHAPES_PENALTY;
+  rough_q8 = rough_q8 > penalty_q8 ? rough_q8 : penalty_q8;
+  int32_t x_q10 = two[SPAN_X] >> 10, y_q10 = two[SPAN_Y] >> 10;
+  bool apart = x_q10 * x_q10 + y_q10 * y_q10 > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10;
+  if (apart && pair < (round < line ? round : line) - rough_q8) {
+    return TWO;
   }
-  return chi_square_q8 < least_q8 - penalty_q8;
+  return line < round - penalty_q8 ? LONG : ROUND;
 }
 
 static void set_dip(const struct fit_settings *settings, struct problem *problem) {
@@ -894,6 +913,29 @@ static void follow(const struct problem *problem, const struct fit_result *fit,
   state->sum_q20 = sum_q20;
 }
 
+static void set_residuals(const struct problem *problem, int model, struct fit_shapes_state *state,
+                          struct priors *priors, int32_t *chi_square_q8) {
+  struct fit_shapes_equations *equations = &problem->pad->room.equations[model];
+  const bool early = model == LONG && state->frames < FIRST_WITH_LOAD;
+  struct fit_shapes_at *at = &state->at[model];
+  round_places(at);
+  set_rows(problem, model, early ? BALANCE : unknowns_of[model], at, equations);
+  form_residuals(problem, at->value, priors, equations);
+  *chi_square_q8 = chi_square_of(problem, equations);
+}
+
+/* After set_residuals of the model. */
+static void step(const struct problem *problem, int model, struct fit_shapes_state *state,
+                 const struct priors *priors) {
+  struct fit_shapes_pad *pad = problem->pad;
+  struct fit_shapes_equations *equations = &pad->room.equations[model];
+  int32_t right[UNKNOWNS], x_q20[UNKNOWNS];
+  form(pad, priors, equations);
+  factorise(equations, state->at[model].value[SPREAD], pad, right);
+  substitute(equations, right, x_q20);
+  take_step(pad, model, equations, x_q20, &state->at[model]);
+}
+
 bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
                 const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
                 const struct fit_result *fit, struct fit_shapes_state *state,
@@ -917,33 +959,19 @@ bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
   }
   state->frames = state->frames == LAST_FRAME ? FIRST_ANSWER : state->frames + 1;
   const bool answers = state->frames >= FIRST_ANSWER && state->frames < LAST_FRAME;
-  struct fit_shapes_equations *now = pad->room.equations, *kept = NULL;
   int32_t chi_square_q8[MODELS];
-  int best = ROUND;
-  for (int m = 0; m < MODELS; m++) {
-    int count = m == LONG && state->frames < FIRST_WITH_LOAD ? BALANCE : unknowns_of[m];
-    struct fit_shapes_at *at = &state->at[m];
-    int32_t right[UNKNOWNS], x_q20[UNKNOWNS];
-    round_places(at);
-    set_rows(&problem, m, count, at, now);
-    form(&problem, at->value, now);
-    chi_square_q8[m] = chi_square_of(&problem, now);
-    factorise(pad, now, at->value[SPREAD], right);
-    if (answers && (m == ROUND || wins(m, at->value, chi_square_q8[m], chi_square_q8[best]))) {
-      best = m;
-      kept = now;
-    }
-    if (m != ROUND || !answers) {
-      substitute(now, right, x_q20);
-      take_step(pad, m, now, x_q20, at);
-    }
-    if (kept == now) {
-      now = now == pad->room.equations ? now + 1 : pad->room.equations;
-    }
+  for (int m = LONG; m <= TWO; m++) {
+    struct priors priors;
+    set_residuals(&problem, m, state, &priors, &chi_square_q8[m]);
+    step(&problem, m, state, &priors);
   }
+  struct priors priors;
+  set_residuals(&problem, ROUND, state, &priors, &chi_square_q8[ROUND]);
   if (!answers) {
+    step(&problem, ROUND, state, &priors);
     return false;
   }
+  int best = best_of(chi_square_q8, state->at[TWO].value);
   *result = (struct fit_shapes_result){0};
   for (int m = 0; m < MODELS; m++) {
     result->chi_square[m] = fit_float(chi_square_q8[m], -8);
@@ -953,6 +981,9 @@ bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
     state->frames = 0;
     return true;
   }
-  conclude(&problem, best, chi_square_q8, kept, &state->at[best], result);
+  if (best == ROUND) {
+    step(&problem, ROUND, state, &priors);
+  }
+  conclude(&problem, best, chi_square_q8, &pad->room.equations[best], &state->at[best], result);
   return true;
 }

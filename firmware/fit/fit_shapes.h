@@ -92,7 +92,7 @@ struct fit_shapes_pad {
   float widest_mm2;   /* variance of the widest normal term */
   struct {
     int32_t row[FIT_SHAPES_NODES][FIT_SHAPES_UNKNOWNS + 1];
-    struct fit_shapes_equations equations[2]; /* of the best model, and of the one that steps */
+    struct fit_shapes_equations equations[3]; /* of each model */
     int32_t column[FIT_SHAPES_UNKNOWNS + 1][FIT_SHAPES_NODES];
     int32_t weight_q12[FIT_SHAPES_NODES];
   } room;
