@@ -32,7 +32,7 @@ static const uint8_t unknowns_of[MODELS] = {SPAN_X, UNKNOWNS, PULL_Y};
 #define PER_FAR_SD_Q4 1600  /* 1 / 0.01 */
 #define PER_LOAD_SD_Q4 53   /* 1 / 0.3: Q / F of what is held */
 #define KAPPA_Q14 21299     /* 1.3, as in fit_tangential.c */
-#define DAMPING_SHIFT 8     /* of the diagonal: what readings hardly tell moves slowly */
+#define DAMPING_SHIFT 6     /* of the diagonal: what readings hardly tell moves slowly */
 /* Frames of a contact, counted from 1. The load joins its model once the line has settled: both at
  * once lose their way at the border. After the last frame, which steps only, comes the first that
  * answers. */
@@ -42,7 +42,7 @@ static const uint8_t unknowns_of[MODELS] = {SPAN_X, UNKNOWNS, PULL_Y};
 #define LOG2E_HALF_FLOAT 0.72134752f
 #define FREEDOM 9           /* readings and priors less the unknowns of two */
 /* The best of the models explains nothing if its chi^2 is above that. */
-#define CHI_SQUARE_MAX 60
+#define CHI_SQUARE_MAX 100
 #define SEPARATION_HALF_Q10 256 /* of half a pitch: nearer pairs are long contacts */
 
 #define PLACE_X_MAX ((5 << 20) / 2)
@@ -218,20 +218,34 @@ static NOINLINE void set_rough_bell(const struct squares *squares, int32_t k_q24
   }
 }
 
-/* Begins the rows: the readings, and the broad term about the middle. */
-static NOINLINE void set_far(const struct problem *problem, const int32_t *at) {
+/* Begins the rows: the readings, and the broad term about the middle, of a pair about both. */
+static NOINLINE void set_far(const struct problem *problem, int model, const struct blob *blob,
+                             const int32_t *at) {
   struct squares squares;
-  struct bell bell;
-  set_squares(at[PLACE_X] >> 8, at[PLACE_Y] >> 8, &squares);
-  set_rough_bell(&squares, problem->pad->far_k_q24, &bell);
-  int32_t amplitude_q13 = at[AMPLITUDE] >> 7, far_q16 = at[FAR] >> 4;
+  struct bell bell, other;
+  const int32_t k_q24 = problem->pad->far_k_q24;
+  int32_t first_q13 = at[AMPLITUDE] >> 7, second_q13 = 0;
+  set_squares(blob[0].x_q12, blob[0].y_q12, &squares);
+  set_rough_bell(&squares, k_q24, &bell);
+  other = bell;
+  if (model == TWO) {
+    second_q13 = (first_q13 * blob[1].weight_q14) >> 14;
+    first_q13 -= second_q13;
+    set_squares(blob[1].x_q12, blob[1].y_q12, &squares);
+    set_rough_bell(&squares, k_q24, &other);
+  }
+  int32_t far_q16 = at[FAR] >> 4;
   int32_t *row = problem->pad->room.row[0];
-  for (int k = 0; k < NODES; k++, row += UNKNOWNS + 1) {
-    int32_t far_q15 = (bell.x_q15[k / ROWS] * bell.y_q15[k % ROWS]) >> 15;
-    row[AMPLITUDE] = row[PLACE_X] = row[PLACE_Y] = row[SPREAD] = 0;
-    row[SPAN_X] = row[SPAN_Y] = row[BALANCE] = 0;
-    row[FAR] = (amplitude_q13 * far_q15) >> 13;
-    row[RESIDUAL] = problem->readings.q28[k] - ((far_q16 * row[FAR]) >> 3);
+  const int32_t *reading_q28 = problem->readings.q28;
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t x_q13 = (first_q13 * bell.x_q15[i]) >> 15;
+    int32_t other_x_q13 = (second_q13 * other.x_q15[i]) >> 15;
+    for (int k = 0; k < ROWS; k++, row += UNKNOWNS + 1) {
+      row[AMPLITUDE] = row[PLACE_X] = row[PLACE_Y] = row[SPREAD] = 0;
+      row[SPAN_X] = row[SPAN_Y] = row[BALANCE] = 0;
+      row[FAR] = (x_q13 * bell.y_q15[k] + other_x_q13 * other.y_q15[k]) >> 13;
+      row[RESIDUAL] = *reading_q28++ - ((far_q16 * row[FAR]) >> 3);
+    }
   }
 }
 
@@ -322,7 +336,7 @@ static NOINLINE void set_rows(const struct problem *problem, int model, int coun
   set_terms(problem, at[SPREAD], pulls, &terms);
   int blobs = set_blobs(model, at, blob);
   equations->count = count;
-  set_far(problem, at);
+  set_far(problem, model, blob, at);
   for (int b = 0; b < blobs; b++) {
     add_blob(problem, &terms, model, &blob[b], at[AMPLITUDE] >> 7);
   }
@@ -497,7 +511,7 @@ static NOINLINE void substitute(const struct fit_shapes_equations *equations, co
   for (int j = equations->count - 1; j >= 0; j--) {
     int32_t sum = right[j] * 64;
     for (int i = j + 1; i < equations->count; i++) {
-      sum -= fixed_mul_16(x_q20[i], matrix[i][j]) * 4;
+      sum -= fixed_mul_16(x_q20[i], matrix[i][j] >> 1) * 8;
     }
     x_q20[j] = fixed_clamp(sum, -(1 << 24), 1 << 24) * (1 << equations->half[j]);
   }
@@ -839,16 +853,15 @@ static NOINLINE void put_one(const struct problem *problem, const struct fit_sha
 
 static int best_of(const int32_t *chi_square_q8, const int32_t *two) {
   int32_t round = chi_square_q8[ROUND], line = chi_square_q8[LONG], pair = chi_square_q8[TWO];
-  int32_t penalty_q8 = FIT_SHAPES_PENALTY << 8;
   /* Residuals larger than their errors are no more than that: the penalty is in their unit. */
-  int32_t rough_q8 = port_divide(pair, FREEDOM) * FIT_SHAPES_PENALTY;
-  rough_q8 = rough_q8 > penalty_q8 ? rough_q8 : penalty_q8;
+  int32_t unit_q8 = port_divide(pair, FREEDOM);
+  int32_t pair_q8 = FIT_SHAPES_PAIR_PENALTY * (unit_q8 > 1 << 8 ? unit_q8 : 1 << 8);
   int32_t x_q10 = two[SPAN_X] >> 10, y_q10 = two[SPAN_Y] >> 10;
   bool apart = x_q10 * x_q10 + y_q10 * y_q10 > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10;
-  if (apart && pair < (round < line ? round : line) - rough_q8) {
+  if (apart && pair < (round < line ? round : line) - pair_q8) {
     return TWO;
   }
-  return line < round - penalty_q8 ? LONG : ROUND;
+  return line < round - (FIT_SHAPES_PENALTY << 8) ? LONG : ROUND;
 }
 
 static void set_dip(const struct fit_settings *settings, struct problem *problem) {

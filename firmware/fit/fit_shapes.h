@@ -11,9 +11,9 @@
  * answer after FIT_SHAPES_FRAMES frames.
  *
  * The answer is the model whose chi^2 is the least, in standard deviations that contain noise,
- * gains and the model's own error. A model with more in it must win by FIT_SHAPES_PENALTY, more
- * where the residuals are larger than these errors say. So a pair that looks like a long contact is
- * called long, and a long one hardly ever a pair.
+ * gains and the model's own error. Long must beat round by FIT_SHAPES_PENALTY, and two must beat both
+ * by FIT_SHAPES_PAIR_PENALTY, more where the residuals are larger than these errors say. So a pair
+ * that looks like a long contact is called long, and a long one hardly ever a pair.
  *
  * Fixed point, the same bits on every machine, for the rectangle that the build knows, some sensors
  * missing. NUMERICS.md has the fit itself; host_tools/report/two judges this part. No recording of
@@ -33,6 +33,7 @@
 
 #define FIT_SHAPES_FRAMES 13
 #define FIT_SHAPES_PENALTY 8
+#define FIT_SHAPES_PAIR_PENALTY 4
 
 enum fit_shape {
   FIT_SHAPE_UNDECIDED, /* no fit, too few sensors, or too few frames of this contact */
@@ -47,7 +48,7 @@ enum fit_shape {
 struct fit_shapes_result {
   enum fit_shape shape;
   float x_mm[2], y_mm[2], force_N[2]; /* the stronger one first; of one contact its middle */
-  float location_sd_mm[2];            /* radial, as in fit_result */
+  float location_sd_mm[2]; /* radial, as in fit_result */
   float force_sd_N[2];
   float length_mm;              /* ELONGATED: of the line that presses evenly */
   float along_x, along_y;       /* ELONGATED: its direction, a unit vector, along_x >= 0 */
