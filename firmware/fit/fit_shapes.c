@@ -908,7 +908,7 @@ static void follow(const struct problem *problem, const struct fit_result *fit,
     state->frames = 0;
   }
   if (state->frames > 0) {
-    int32_t share_q13 = port_divide(sum_q20, state->sum_q20 >> 13);
+    int32_t share_q13 = fixed_clamp(port_divide(sum_q20, state->sum_q20 >> 13), 0, INT16_MAX);
     for (int m = 0; m < MODELS; m++) {
       int32_t *value = state->at[m].value;
       value[AMPLITUDE] = shifted(fixed_mul_16(value[AMPLITUDE], share_q13), 3);
