@@ -874,9 +874,23 @@ static void set_dip(const struct fit_settings *settings, struct problem *problem
   }
 }
 
+/* What a pair that explains the readings nearly as well would have as its middle of the forces adds
+ * to the error of a long contact's place. */
+static void doubt_place(const struct scales *scales, const int32_t *line, const int32_t *pair,
+                        struct fit_shapes_result *result) {
+  int32_t balance = pair[BALANCE] >> 6;
+  int32_t dx_q20 = pair[PLACE_X] + fixed_mul_16(pair[SPAN_X], balance) * 4 - line[PLACE_X];
+  int32_t dy_q20 = pair[PLACE_Y] + fixed_mul_16(pair[SPAN_Y], balance) * 4 - line[PLACE_Y];
+  struct scaled dx = fit_scaled_from(dx_q20, -20), dy = fit_scaled_from(dy_q20, -20);
+  struct scaled off = fit_scaled_sqrt(scaled_add(scaled_mul(dx, dx), scaled_mul(dy, dy)));
+  result->location_sd_mm[0] =
+      fit_quadrature(result->location_sd_mm[0], 1.0f, product_of(scales->pitch, off), 1.0f);
+}
+
 static void conclude(const struct problem *problem, int best, const int32_t *chi_square_q8,
-                     const struct fit_shapes_equations *equations, const struct fit_shapes_at *at,
-                     struct fit_shapes_result *result) {
+                     const struct fit_shapes_state *state, struct fit_shapes_result *result) {
+  const struct fit_shapes_equations *equations = &problem->pad->room.equations[best];
+  const struct fit_shapes_at *at = &state->at[best];
   const struct fit_shapes_pad *pad = problem->pad;
   struct scaled base = fit_scaled_from(problem->base_q22, -22);
   struct scaled variance = scaled_mul(base, base);
@@ -895,6 +909,9 @@ static void conclude(const struct problem *problem, int best, const int32_t *chi
   put_one(problem, equations, at->value, &scales, result);
   if (best == LONG) {
     put_line(equations, at->value, &scales, result);
+    if (chi_square_q8[TWO] < chi_square_q8[LONG] + (FIT_SHAPES_PENALTY << 8)) {
+      doubt_place(&scales, at->value, state->at[TWO].value, result);
+    }
   }
 }
 
@@ -997,6 +1014,6 @@ bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
   if (best == ROUND) {
     step(&problem, ROUND, state, &priors);
   }
-  conclude(&problem, best, chi_square_q8, &pad->room.equations[best], &state->at[best], result);
+  conclude(&problem, best, chi_square_q8, state, result);
   return true;
 }

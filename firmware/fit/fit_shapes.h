@@ -33,7 +33,7 @@
 
 #define FIT_SHAPES_FRAMES 13
 #define FIT_SHAPES_PENALTY 8
-#define FIT_SHAPES_PAIR_PENALTY 4
+#define FIT_SHAPES_PAIR_PENALTY 6
 
 enum fit_shape {
   FIT_SHAPE_UNDECIDED, /* no fit, too few sensors, or too few frames of this contact */
