@@ -34,11 +34,11 @@ GOALS = (
 
 
 def command_of(part, options):
-    if part == "cycles":
-        return ["node", pathlib.Path(__file__).with_name("cycles.mjs"), fit_cycles_of(options.boards)]
-    program = pathlib.Path(options.build) / "host_tools/report/two/two_touches"
+    program = pathlib.Path(options.build) / "host_tools/report/two/touches/two_touches" if part == "touches" else fit_cycles_of(options.boards)
     if not program.is_file():
-        raise InputError(f"{program} is not there; build it: cmake --build --preset host")
+        raise InputError(f"{program} is not there; build it: cmake --build --preset {'host' if part == 'touches' else 'pico_parallel'}")
+    if part == "cycles":
+        return ["node", pathlib.Path(__file__).with_name("cycles.mjs"), program]
     command = [str(program), "--cache", str(pathlib.Path(options.output) / "contact_tables")]
     if options.seed is not None:
         command += ["--seed", str(options.seed)]
