@@ -441,7 +441,7 @@ static NOINLINE void form_residuals(const struct problem *problem, const int32_t
 /* The normal matrix, of which the diagonal is 2^28 to 2^30. */
 static NOINLINE void form(struct fit_shapes_pad *pad, const struct priors *priors,
                           struct fit_shapes_equations *equations) {
-  int8_t up[UNKNOWNS];
+  int8_t up[UNKNOWNS] = {0};
   for (int u = 0; u < equations->count; u++) {
     int32_t prior = priors->element_q27[u] >> COLUMN_SHIFT;
     prior = prior < PRIOR_MAX ? prior : PRIOR_MAX;
@@ -959,7 +959,7 @@ static void step(const struct problem *problem, int model, struct fit_shapes_sta
                  const struct priors *priors) {
   struct fit_shapes_pad *pad = problem->pad;
   struct fit_shapes_equations *equations = &pad->room.equations[model];
-  int32_t right[UNKNOWNS], x_q20[UNKNOWNS];
+  int32_t right[UNKNOWNS], x_q20[UNKNOWNS] = {0};
   form(pad, priors, equations);
   factorise(equations, state->at[model].value[SPREAD], pad, right);
   substitute(equations, right, x_q20);

@@ -36,7 +36,7 @@ GOALS = (
 def command_of(part, options):
     program = pathlib.Path(options.build) / "host_tools/report/two/touches/two_touches" if part == "touches" else fit_cycles_of(options.boards)
     if not program.is_file():
-        raise InputError(f"{program} is not there; build it: cmake --build --preset {'host' if part == 'touches' else 'pico_parallel'}")
+        raise InputError(f"{program} is not there; build it: {'cmake --build --preset host' if part == 'touches' else 'sh cmake/bootstrap.sh'}")
     if part == "cycles":
         return ["node", pathlib.Path(__file__).with_name("cycles.mjs"), program]
     command = [str(program), "--cache", str(pathlib.Path(options.output) / "contact_tables")]
