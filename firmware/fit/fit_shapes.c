@@ -19,7 +19,7 @@
  *   two    two, by +-span, of weight (1 +- balance) / 2
  * Forces are 2 pi V A and 2 pi V pull. */
 enum { ROUND, LONG, TWO, MODELS };
-enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, FAR, SPAN_X, SPAN_Y, BALANCE, PULL_X = BALANCE, PULL_Y };
+enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, FAR, SPAN_X, SPAN_Y, BALANCE, PULL_X = 7, PULL_Y };
 #define UNKNOWNS FIT_SHAPES_UNKNOWNS
 #define RESIDUAL UNKNOWNS
 _Static_assert(PULL_Y + 1 == UNKNOWNS, "a column for each");
@@ -327,7 +327,8 @@ static void round_places(struct fit_shapes_at *at) {
 
 /* The weighted rows of a model, columns Q27 and residual Q28. */
 static NOINLINE void set_rows(const struct problem *problem, int model, int count,
-                              const struct fit_shapes_at *where, struct fit_shapes_equations *equations) {
+                              const struct fit_shapes_at *where,
+                              struct fit_shapes_equations *equations) {
   struct fit_shapes_pad *pad = problem->pad;
   const int32_t *at = where->value;
   const bool pulls = count > BALANCE && model == LONG;
@@ -557,15 +558,18 @@ static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model,
 }
 
 /* chi^2 of the residuals and priors, Q8. */
-static int32_t chi_square_of(const struct problem *problem, const struct fit_shapes_equations *equations) {
+static int32_t chi_square_of(const struct problem *problem,
+                             const struct fit_shapes_equations *equations) {
   struct scaled base = fit_scaled_from(problem->base_q22, -22);
   struct scaled squares =
       fit_scaled_from(equations->residual_square, -2 * equations->q[RESIDUAL]);
   return fit_scaled_to_fixed(scaled_div(squares, scaled_mul(base, base)), 8);
 }
 
-/* At a limit that it wants to pass the spread is no unknown: the others would step as if it moved. */
-static void hold_spread(const struct fit_shapes_pad *pad, struct fit_shapes_equations *equations, int32_t spread) {
+/* At a limit that it wants to pass the spread is no unknown: the others would step as if it moved.
+ */
+static void hold_spread(const struct fit_shapes_pad *pad, struct fit_shapes_equations *equations,
+                        int32_t spread) {
   int32_t right = equations->right[SPREAD];
   if (!((spread < pad->spread_least_q20 + 256 && right < 0) ||
         (spread > pad->spread_most_q20 - 256 && right > 0))) {
@@ -743,9 +747,10 @@ static NOINLINE void begin(const struct problem *problem, const struct fit_resul
   }
 }
 
-/* Variance of a sum of two unknowns times these, each at most some pitches or units of the readings. */
-static NOINLINE struct scaled variance_of(const struct fit_shapes_equations *equations, int first, int32_t a_q20,
-                                          int second, int32_t b_q20) {
+/* Variance of a sum of two unknowns times these, each at most some pitches or units of the
+ * readings. */
+static NOINLINE struct scaled variance_of(const struct fit_shapes_equations *equations, int first,
+                                          int32_t a_q20, int second, int32_t b_q20) {
   const int32_t(*matrix)[UNKNOWNS] = equations->matrix;
   int32_t w_q10[UNKNOWNS], sum_q13 = 0;
   int32_t q = equations->q[first] > equations->q[second] ? equations->q[first]
@@ -785,7 +790,8 @@ static float sd_of(struct scaled scale, struct scaled form, struct scaled varian
   return product_of(scale, fit_scaled_sqrt(scaled_mul(fit_scaled_short(form), variance)));
 }
 
-static NOINLINE void put_two(const struct problem *problem, const struct fit_shapes_equations *equations,
+static NOINLINE void put_two(const struct problem *problem,
+                             const struct fit_shapes_equations *equations,
                              const int32_t *at, const struct scales *scales,
                              struct fit_shapes_result *result) {
   const struct fit_shapes_pad *pad = problem->pad;
@@ -837,7 +843,8 @@ static NOINLINE void put_line(const struct fit_shapes_equations *equations,
             variance_of(equations, SPAN_X, -uy_q20, SPAN_Y, ux_q20), scales->variance);
 }
 
-static NOINLINE void put_one(const struct problem *problem, const struct fit_shapes_equations *equations,
+static NOINLINE void put_one(const struct problem *problem,
+                             const struct fit_shapes_equations *equations,
                              const int32_t *at, const struct scales *scales,
                              struct fit_shapes_result *result) {
   const struct fit_shapes_pad *pad = problem->pad;
@@ -930,8 +937,10 @@ static void follow(const struct problem *problem, const struct fit_result *fit,
       int32_t *value = state->at[m].value;
       value[AMPLITUDE] = shifted(fixed_mul_16(value[AMPLITUDE], share_q13), 3);
       value[AMPLITUDE] = fixed_clamp(value[AMPLITUDE], AMPLITUDE_LEAST, AMPLITUDE_MAX);
-      value[PLACE_X] = fixed_clamp(value[PLACE_X] + x - state->fit_x_q20, -PLACE_X_MAX, PLACE_X_MAX);
-      value[PLACE_Y] = fixed_clamp(value[PLACE_Y] + y - state->fit_y_q20, -PLACE_Y_MAX, PLACE_Y_MAX);
+      value[PLACE_X] += x - state->fit_x_q20;
+      value[PLACE_Y] += y - state->fit_y_q20;
+      value[PLACE_X] = fixed_clamp(value[PLACE_X], -PLACE_X_MAX, PLACE_X_MAX);
+      value[PLACE_Y] = fixed_clamp(value[PLACE_Y], -PLACE_Y_MAX, PLACE_Y_MAX);
       if (m == LONG) {
         value[PULL_X] = shifted(fixed_mul_16(value[PULL_X], share_q13), 3);
         value[PULL_Y] = shifted(fixed_mul_16(value[PULL_Y], share_q13), 3);

@@ -11,8 +11,8 @@
  * answer after FIT_SHAPES_FRAMES frames.
  *
  * The answer is the model whose chi^2 is the least, in standard deviations that contain noise,
- * gains and the model's own error. Long must beat round by FIT_SHAPES_PENALTY, and two must beat both
- * by FIT_SHAPES_PAIR_PENALTY, more where the residuals are larger than these errors say. So a pair
+ * gains and the model's own error. Long must beat round by FIT_SHAPES_PENALTY, and two must beat
+ * both by FIT_SHAPES_PAIR_PENALTY, more where the residuals are larger than these errors say. So a pair
  * that looks like a long contact is called long, and a long one hardly ever a pair.
  *
  * Fixed point, the same bits on every machine, for the rectangle that the build knows, some sensors
@@ -106,8 +106,8 @@ struct fit_shapes_pad {
 enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_array *array,
                                const struct pad_profile *profile);
 
-/* Whether the result is of this frame. Where it is not, the one before stands: one frame in four only
- * steps, and so do those of a contact's beginning. fit: of the same readings, whose gains act.
+/* Whether the result is of this frame. Where it is not, the one before stands: one frame in four
+ * only steps, and so do those of a contact's beginning. fit: of the same readings, whose gains act.
  * settings: its dip is the pad's, and cut_noises 0. */
 bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad,
                 const int32_t *pressure_Pa_q10, const struct fit_settings *settings,

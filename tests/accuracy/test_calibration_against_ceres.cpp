@@ -12,7 +12,7 @@ using test::KnownPad;
 
 namespace {
 
-constexpr int SENSORS = 15, SENSOR_UNKNOWNS = 6; // log gain, dx, dy, o, d, r
+constexpr int SENSORS = 15, SENSOR_UNKNOWNS = 7; // log gain, dx, dy, o, d, r, b
 
 // One reading. Blocks: the sensor's, the profile's (log peak, log width, m, q1, q2), the
 // placement's (x, y, e, w, q1, q2).
@@ -23,7 +23,7 @@ struct ReadingCost {
     const T u = x_mm + sensor[1] - placement[0], v = y_mm + sensor[2] - placement[1];
     const T q1 = profile[3] + placement[4], q2 = profile[4] + placement[5];
     const T square = u * u + v * v - 2.0 * q1 * (u * u - v * v) - 4.0 * q2 * u * v;
-    const T width = exp(profile[1] + placement[3]);
+    const T width = exp(profile[1] + sensor[6] + placement[3]);
     const T wide = exp(-square / (2.0 * width * width));
     const T narrow = exp(-square / (2.0 * NARROW * NARROW * width * width));
     const T value = exp(sensor[0] + profile[0] + placement[2] - 2.0 * placement[3]) *
@@ -113,7 +113,7 @@ Found by_ceres(const Array &array, std::vector<Placement> placements, const Solu
     const double zero_Pa = assumed.offset_share * peak_Pa;
     const double sds[] = {
         assumed.gain, solution.spread.position_mm, solution.spread.position_mm, zero_Pa,
-        zero_Pa,      solution.spread.memory};
+        zero_Pa,      solution.spread.memory,      solution.spread.own_width};
     for (int at = 0; at < SENSOR_UNKNOWNS; at++) {
       add_prior<SENSOR_UNKNOWNS>(problem, sensor.data(), at, 0.0, sds[at]);
     }

@@ -17,6 +17,7 @@ struct KnownPad {
   fingertip::calibrating::Array array;
   std::vector<double> gain; /* mean 1 */
   std::vector<double> x_mm, y_mm;
+  std::vector<double> own_width; /* log: what each sensor feels a contact wider */
 
   explicit KnownPad(std::uint64_t seed, double spread = 0.1, double misplaced_mm = 0.0) {
     fingertip::Random random(seed, 1, 0);
@@ -28,6 +29,7 @@ struct KnownPad {
       x_mm.push_back(array.x_mm[k] + misplaced_mm * random.normal());
       y_mm.push_back(array.y_mm[k] + misplaced_mm * random.normal());
       gain.push_back(1.0 + spread * random.normal());
+      own_width.push_back(0.0);
       mean += gain[k] / geometry.sensor_count;
     }
     for (double &each : gain) {
@@ -46,11 +48,12 @@ struct KnownPad {
   /* A heavy-shouldered bump, (1 + r^2 / (2 n s^2))^-n: not of the solver's own family. */
   double base_Pa(const Press &press, std::size_t k) const {
     constexpr double n = 12.0;
+    const double width_mm = press.width_mm * std::exp(own_width[k]);
     const double u = x_mm[k] - press.x_mm, v = y_mm[k] - press.y_mm;
     const double c = std::cos(press.slant), s = std::sin(press.slant), root = std::sqrt(press.axes);
     const double a = (c * u + s * v) / root, b = (c * v - s * u) * root;
     return PEAK_Pa * press.force *
-           std::pow(1.0 + (a * a + b * b) / (2.0 * n * press.width_mm * press.width_mm), -n);
+           std::pow(1.0 + (a * a + b * b) / (2.0 * n * width_mm * width_mm), -n);
   }
 
   fingertip::calibrating::Placement place(const Press &press, double t_s, fingertip::Random &random,

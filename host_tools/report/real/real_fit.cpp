@@ -160,7 +160,7 @@ json calibrate(const Array &layout, const json &job) {
   const char *const states[] = {"more", "good", "refused"};
   json stored, said;
   stored["gain"] = solution.gain;
-  stored["gain_sd"] = solution.gain_sd;
+  stored["gain_sd"] = solution.reading_sd;
   const Shape shape = shape_of(solution);
   stored["prior_sigma_mm"] = shape.sigma_mm;
   stored["prior_width_mm"] = shape.sigma_sd_mm;

@@ -180,7 +180,7 @@ calibration GainSession::made(std::optional<double> force_N, std::uint32_t date_
   made.ambient_kPa = static_cast<std::uint8_t>(std::lround(std::min(1e-3 * ambient_Pa_, 255.0)));
   for (std::size_t k = 0; k < solution.gain.size(); k++) {
     made.sensors[k] = {static_cast<float>(solution.gain[k]),
-                       static_cast<float>(solution.gain_sd[k])};
+                       static_cast<float>(solution.reading_sd[k])};
   }
   if (!calibration_is_valid(&made, static_cast<unsigned>(solution.gain.size()))) {
     throw Error("a gain is out of range, which no sensor under rubber has: see that every sensor "

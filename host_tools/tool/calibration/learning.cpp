@@ -22,7 +22,7 @@ double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions
   const auto &[global, locals] = optimiser.at;
   const std::vector<Placement> &placements = model.placements();
   const int n = layout.sensors;
-  double position = 0.0, memory = 0.0, known = 3.0;
+  double position = 0.0, memory = 0.0, own_width = 0.0, known = 3.0;
   for (int at = 0; at < layout.size(); at++) {
     const auto [mean, sd] = model.prior(at);
     if (sd > 0.0) {
@@ -30,6 +30,8 @@ double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions
     }
     if (at >= layout.dx(0) && at < layout.offset(0)) {
       position += global[at] * global[at] + covariance(at, at);
+    } else if (at >= layout.own_width(0)) {
+      own_width += global[at] * global[at] + covariance(at, at);
     } else if (at >= layout.memory(0)) {
       memory += global[at] * global[at] + covariance(at, at);
     }
@@ -70,6 +72,7 @@ double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions
   };
   learn(learnt.position_mm, given.position_mm, position, 2.0 * n);
   learn(learnt.memory, given.memory, memory, double(n));
+  learn(learnt.own_width, given.own_width, own_width, double(n));
   learn(learnt.force, given.force, squares[2], count);
   learn(learnt.width, given.width, squares[3], count);
   learn(learnt.ellipse, given.ellipse, squares[4] + squares[5], 2.0 * count);

@@ -47,6 +47,7 @@ void Model::assume(const Spread &spread, double excess) {
   assumed_.width = spread.width;
   assumed_.ellipse = spread.ellipse;
   assumed_.memory = spread.memory;
+  assumed_.own_width = spread.own_width;
   excess_ = excess;
 }
 
@@ -116,7 +117,8 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau,
   const double q1 = l[4] + g[layout.ellipse(0)], q2 = l[5] + g[layout.ellipse(1)];
   const double square =
       std::max(u * u + v * v - 2.0 * q1 * (u * u - v * v) - 4.0 * q2 * u * v, 0.0);
-  const double width = std::exp(g[layout.log_width()] + l[3]), m = g[layout.mixing()];
+  const double width = std::exp(g[layout.log_width()] + g[layout.own_width(k)] + l[3]);
+  const double m = g[layout.mixing()];
   const double per = 0.5 / (width * width), narrow_per = per / (NARROW * NARROW);
   const double wide = std::exp(-per * square), narrow = std::exp(-narrow_per * square);
   const double strength = std::exp(g[k] + g[layout.log_peak()] + l[2] - 2.0 * l[3]);
@@ -144,10 +146,12 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double tau,
                            layout.memory(k),
                            layout.ellipse(0),
                            layout.ellipse(1),
-                           layout.dip()};
+                           layout.dip(),
+                           layout.own_width(k)};
   const double by[TOUCHED] = {value,       value, by_log_width, strength * (narrow - wide),
                               by_u,        by_v,  1.0,          tau,
-                              -earlier_Pa, by_q1, by_q2, -strength * dip};
+                              -earlier_Pa, by_q1, by_q2,        -strength * dip,
+                              by_log_width};
   std::copy(at, at + TOUCHED, r.at);
   std::copy(by, by + TOUCHED, r.by);
   r.by_local << -by_u, -by_v, value, by_log_width - 2.0 * value, by_q1, by_q2;
@@ -186,7 +190,10 @@ std::pair<double, double> Model::prior(int at) const {
   if (at < layout.offset(0)) {
     return {0.0, assumed_.position_mm};
   }
-  return {0.0, at < layout.memory(0) ? assumed_.offset_share * peak_Pa_ : assumed_.memory};
+  if (at < layout.memory(0)) {
+    return {0.0, assumed_.offset_share * peak_Pa_};
+  }
+  return {0.0, at < layout.own_width(0) ? assumed_.memory : assumed_.own_width};
 }
 
 Local Model::local_sd() const {

@@ -17,7 +17,7 @@ constexpr int COMMON = 6; /* log A, log s, m, q1, q2 of all, h */
 using Local = Eigen::Matrix<double, LOCAL, 1>;
 using LocalSquare = Eigen::Matrix<double, LOCAL, LOCAL>;
 
-/* Where a global unknown lies in the vector: log gains, common, dx, dy, o, d, r. */
+/* Where a global unknown lies in the vector: log gains, common, dx, dy, o, d, r, b. */
 struct Layout {
   int sensors;
   int log_peak() const { return sensors; }
@@ -28,11 +28,12 @@ struct Layout {
   int offset(int k) const { return 3 * sensors + COMMON + k; }
   int drift(int k) const { return 4 * sensors + COMMON + k; }
   int memory(int k) const { return 5 * sensors + COMMON + k; }
+  int own_width(int k) const { return 6 * sensors + COMMON + k; }
   int ellipse(int which) const { return sensors + 3 + which; }
   int dip() const { return sensors + 5; }
-  int size() const { return 6 * sensors + COMMON; }
+  int size() const { return 7 * sensors + COMMON; }
 };
-constexpr int TOUCHED = 12; /* global unknowns that a reading depends on */
+constexpr int TOUCHED = 13; /* global unknowns that a reading depends on */
 
 struct Unknowns {
   Eigen::VectorXd global;
@@ -72,8 +73,8 @@ public:
   const std::vector<Placement> &placements() const { return placements_; }
   double excess() const { return excess_; }
   Spread spread() const {
-    return {assumed_.position_mm, assumed_.force, assumed_.width, assumed_.ellipse,
-            assumed_.memory};
+    return {assumed_.position_mm, assumed_.force,  assumed_.width,
+            assumed_.ellipse,     assumed_.memory, assumed_.own_width};
   }
   /* From now on, instead of what was assumed. */
   void assume(const Spread &spread, double excess);

@@ -91,6 +91,7 @@ void resume(const Solution &solution, Model &model, Optimiser &optimiser) {
     global[layout.offset(k)] = solution.offset_Pa[at];
     global[layout.drift(k)] = 0.5 * solution.drift_Pa[at];
     global[layout.memory(k)] = solution.memory[at];
+    global[layout.own_width(k)] = solution.own_width[at];
   }
   global[layout.log_peak()] = std::log(solution.peak_Pa) + log_mean;
   global[layout.log_width()] = std::log(solution.width_mm);
@@ -254,6 +255,8 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
   for (int k = 0; k < layout.sensors; k++) {
     solution.gain.push_back(std::exp(global[k]) / mean);
     solution.gain_sd.push_back(std::sqrt(std::max(of_gains(k, k), 0.0)));
+    solution.reading_sd.push_back(
+        std::hypot(solution.gain_sd.back(), OWN_WIDTH_SQUARE * solution.spread.own_width));
     solution.shape_sd.push_back(std::sqrt(std::max(of_shape(k, k), 0.0)));
     solution.offset_Pa.push_back(global[layout.offset(k)]);
     solution.drift_Pa.push_back(2.0 * global[layout.drift(k)]);
@@ -262,6 +265,7 @@ Solution solve_any(const Array &array, const std::vector<Placement> &given,
     solution.dx_mm.push_back(global[layout.dx(k)]);
     solution.dy_mm.push_back(global[layout.dy(k)]);
     solution.memory.push_back(global[layout.memory(k)]);
+    solution.own_width.push_back(global[layout.own_width(k)]);
   }
   solution.peak_Pa = peak_Pa * mean;
   solution.width_mm = std::exp(global[layout.log_width()]);

@@ -7,7 +7,7 @@
  *
  *   reading = g_k A exp(e - 2 w) [(1 - m) exp(-R / 2 S^2) + m exp(-R / 2 c^2 S^2)
  *                                 - h exp(-R / 2 B^2)] + o_k + d_k tau - r_k M,
- *   S = s exp(w),   R = u^2 + v^2 - 2 q1 (u^2 - v^2) - 4 q2 u v,
+ *   S = s exp(w + b_k),   R = u^2 + v^2 - 2 q1 (u^2 - v^2) - 4 q2 u v,
  *   M = sum over earlier placements of what rubber has not let go of yet (remember)
  *
  * One profile for all: peak A, width s and mixing m are fitted along, so nothing need be known of
@@ -23,14 +23,15 @@
  * subspace of log gains that 1, x, y and x^2 + y^2 span over the sensors.
  *
  * All else that a session may hold is in the model with a prior around nothing, so that it neither
- * passes for a gain nor stays unseen: where the sensors sit (they are soldered by hand), zeros that
- * were off (o) or move (d), rubber that has not let go of the placements before (r), contacts that
- * are not round (q, of all and of each). The posterior of each is in the Solution; judge.hpp says
- * what is too much.
+ * passes for a gain nor stays unseen: where the sensors sit (they are soldered by hand), sensors
+ * that feel a contact wider or narrower than the others do (b), zeros that were off (o) or move
+ * (d), rubber that has not let go of the placements before (r), contacts that are not round (q, of
+ * all and of each). The posterior of each is in the Solution; judge.hpp says what is too much.
  *
- * How large the spreads of e, w, q and of the places are, and the model's own error, is learnt from
- * the session itself (expectation and maximisation, from the Assumptions as the start): sensors
- * that sit where they should tell the gains better than others, and the standard deviations say so.
+ * How large the spreads of b, e, w, q, r and of the places are, and the model's own error, is
+ * learnt from the session itself (expectation and maximisation, from the Assumptions as the start):
+ * sensors that sit where they should tell the gains better than others, and the standard deviations
+ * say so.
  *
  * Robust least squares (Huber) by Levenberg-Marquardt, the placements' own unknowns eliminated; a
  * placement that does not fit the others is dropped as a whole. The same input gives the same
@@ -80,6 +81,7 @@ struct Assumptions {
   double ellipse = 0.007;       /* of q1 and q2 from placement to placement; axes differ by 2 q */
   double ellipse_of_all = 0.03; /* of their means: a foot is a foot, but its shape is not known */
   double memory = 0.03;         /* of r: losing 17.5 % in 8 s makes 0.025 */
+  double own_width = 0.01;      /* of b: 0.035 to 0.07 on real pads, which a session shows */
   double model_share = 0.002;   /* of the peak: what the profile leaves (above, and 0.13 % rms) */
   double reading_share = 0.003; /* of a reading: what rubber does between 0.5 and 1 s */
   double mixing = 0.2, mixing_sd = 0.1; /* of m: 0.05 to 0.23 on the twin's tables */
@@ -95,6 +97,9 @@ constexpr double NARROW = 0.64;
  * from zeros that were off. As the assumed spread of forces, chosen on the recording of
  * host_tools/report/real that chooses. */
 constexpr double DIP_PITCHES = 2.3;
+/* An own width b takes b R / S^2 of a reading. The readings that tell where a contact is have
+ * R / S^2 of 1 to 2. */
+constexpr double OWN_WIDTH_SQUARE = 1.5;
 /* In residual standard deviations: where a reading's weight begins to fall. */
 constexpr double HUBER = 2.5;
 
@@ -111,17 +116,21 @@ struct Fitted { /* one placement */
 /* What the session shows of the Assumptions of the same names; every sd is by these. */
 struct Spread {
   double position_mm = 0.0, force = 0.0, width = 0.0, ellipse = 0.0, memory = 0.0;
+  double own_width = 0.0;
 };
 
 struct Solution {
   bool solved = false;                     /* else too few placements or readings for any of it */
   std::vector<double> gain;                /* [sensor] relative to their mean */
   std::vector<double> gain_sd;             /* relative */
+  std::vector<double> reading_sd;          /* of a reading after this: gain_sd and the own widths'
+                                              (OWN_WIDTH_SQUARE), which the firmware does not know */
   std::vector<double> shape_sd;            /* the part of gain_sd outside the gauge */
   std::vector<double> offset_Pa, drift_Pa; /* o, and 2 d: from first to last placement */
   std::vector<double> offset_sd_Pa, drift_sd_Pa;
   std::vector<double> dx_mm, dy_mm; /* of the sensors from the layout */
   std::vector<double> memory;       /* r */
+  std::vector<double> own_width;    /* b: log */
   double ellipse_of_all[2] = {0.0, 0.0}, ellipse_of_all_sd[2] = {0.0, 0.0};
   double peak_Pa = 0.0; /* A, of a sensor of mean gain */
   double width_mm = 0.0, mixing = 0.0;

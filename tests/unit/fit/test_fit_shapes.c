@@ -44,8 +44,8 @@ struct reading {
   double Pa[SENSORS];
 };
 
-/* A contact of force_N with a spread of 4 mm^2 that pulls by qx_N, qy_N; with a dip of this share of
- * its peak, 14 mm wide. */
+/* A contact of force_N with a spread of 4 mm^2 that pulls by qx_N, qy_N; with a dip of this share
+ * of its peak, 14 mm wide. */
 static void press(double x_mm, double y_mm, double force_N, double qx_N, double qy_N, double dip,
                   struct reading *reading) {
   for (int k = 0; k < SENSORS; k++) {
@@ -165,7 +165,8 @@ static void test_two_have_their_places_and_forces(void) {
     double dip = i % 2 ? 0.015 : 0.0, angle = random_between(&noise, 0.25 * PI, 0.75 * PI);
     double x[2], y[2], force[2];
     double half = random_between(&noise, 6.5, 9.0);
-    double middle_x = random_between(&noise, -2.0, 2.0), middle_y = random_between(&noise, -8.0, 8.0);
+    double middle_x = random_between(&noise, -2.0, 2.0);
+    double middle_y = random_between(&noise, -8.0, 8.0);
     for (int c = 0; c < 2; c++) {
       x[c] = middle_x + (c ? -1.0 : 1.0) * half * cos(angle);
       y[c] = middle_y + (c ? -1.0 : 1.0) * half * sin(angle);

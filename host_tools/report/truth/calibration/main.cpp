@@ -130,7 +130,7 @@ public:
   }
 
   Felt felt(const Solution &solution) const {
-    return felt(solution.gain, solution.gain_sd, calibrating::shape_of(solution));
+    return felt(solution.gain, solution.reading_sd, calibrating::shape_of(solution));
   }
 
   json presses() const {
@@ -198,7 +198,7 @@ struct PadCase {
   std::size_t pads = 0;
   std::vector<double> before_mm, after_mm, true_mm; // [pad] medians over the taps
   std::vector<double> before_p95_mm, after_p95_mm;
-  std::size_t after_warned = 0; // taps
+  std::size_t after_warned = 0;                            // taps
   std::vector<double> force_before, force_after;           // [tap] absolute relative errors
   std::array<std::vector<double>, COUNTS.size()> at_count; // [pad] medians after so many
   std::array<std::vector<double>, COUNTS.size()> sd_at_count;
@@ -277,7 +277,7 @@ PadCase try_pads(const std::string &what, const Options &options, std::size_t pa
     }
     const Solution solution = calibrating::solve(session_array(), placements);
     const auto scale = calibrating::force_scale(session_array(), placements, solution, WEIGHT_N,
-                                                 calibrating::shape_of(solution));
+                                                calibrating::shape_of(solution));
     SessionPad fresh(pad_options, layer_mm, seed);
     const std::vector<double> truth = fresh.settled_gains();
     const Taps taps(fresh, objects.all(), seed);
@@ -447,8 +447,7 @@ json measure(const Options &options) {
   const Objects objects = objects_on(feet, options), thin_objects = objects_on(thin_feet, options);
   const double pads = double(options.pads);
 
-  const PadCase usual =
-      try_pads("10 % gain spread", options, options.pads, objects, {10.0}, true);
+  const PadCase usual = try_pads("10 % gain spread", options, options.pads, objects, {10.0}, true);
   // Relaxation of 9 to 26 %, sensors soldered 0.1 mm (sd) off.
   const PadCase rough =
       try_pads("rough pads", options, options.pads, objects, {10.0, 17.5, 0.1}, false);
@@ -521,10 +520,11 @@ constexpr char HELP[] =
 
 int main(int argc, char **argv) {
   Options options;
-  return reference::print_found("truth_calibration", argc, argv,
-                                {{"--cache", &options.cache},
-                                 {"--seed", nullptr, &options.seed},
-                                 {"--pads", nullptr, &options.pads},
-                                 {"--presses", nullptr, nullptr, &options.presses}},
-                                HELP, [&] { return options.presses ? presses(options) : measure(options); });
+  return reference::print_found(
+      "truth_calibration", argc, argv,
+      {{"--cache", &options.cache},
+       {"--seed", nullptr, &options.seed},
+       {"--pads", nullptr, &options.pads},
+       {"--presses", nullptr, nullptr, &options.presses}},
+      HELP, [&] { return options.presses ? presses(options) : measure(options); });
 }

@@ -240,11 +240,11 @@ Calibrated calibrated_session(const Feet &feet, const PadOptions &options, std::
       }
       const auto scale =
           calibrating::force_scale(session_array(), placements, judgement.solution, WEIGHT_N,
-                               calibrating::shape_of(judgement.solution));
+                                   calibrating::shape_of(judgement.solution));
       if (judgement.state == calibrating::Judgement::State::good && scale) {
         const std::vector<double> truth = pad.settled_gains();
         Calibrated left{{},
-                        judgement.solution.gain_sd,
+                        judgement.solution.reading_sd,
                         scale->scale,
                         scale->sd,
                         calibrating::shape_of(judgement.solution)};

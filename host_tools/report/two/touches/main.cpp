@@ -63,9 +63,9 @@ struct Case {
 
 struct Judged {
   fit_shapes_result said;
-  double off_mm;    // of one contact its place; of two the worse place, or, where the answer is one,
-                    // its place from the middle of the forces
-  double off_sd_mm; // what the answer says of that
+  // Of one contact its place; of two the worse place, or, where the answer is one, its place from
+  // the middle of the forces; and what the answer says of that.
+  double off_mm, off_sd_mm;
   double force;     // relative error of the sum
   double angle_deg; // of a long contact or the line through two
   bool pair, silent;
@@ -150,8 +150,8 @@ template <fit_shape SHAPE> bool is(const Judged &j) {
 }
 
 template <typename Value>
-double quantile_where(const std::vector<Judged> &judged, double at, bool (*predicate)(const Judged &),
-                      const Value &value) {
+double quantile_where(const std::vector<Judged> &judged, double at,
+                      bool (*predicate)(const Judged &), const Value &value) {
   std::vector<double> values;
   for (const Judged &j : judged) {
     if (predicate(j)) {
@@ -189,7 +189,8 @@ ordered_json row_of(const std::string &name, const std::vector<Judged> &judged) 
           {"off_p50_mm", quantile_where(judged, 0.5, has_place, off)},
           {"off_p95_mm", quantile_where(judged, 0.95, has_place, off)},
           {"within_1sd", share(placed, [](const Judged &j) { return j.off_mm <= j.off_sd_mm; })},
-          {"within_2sd", share(placed, [](const Judged &j) { return j.off_mm <= 2.0 * j.off_sd_mm; })},
+          {"within_2sd",
+           share(placed, [](const Judged &j) { return j.off_mm <= 2.0 * j.off_sd_mm; })},
           {"angle_p50_deg", quantile_where(judged, 0.5, is<FIT_SHAPE_ELONGATED>, angle)},
           {"angle_p90_deg", quantile_where(judged, 0.9, is<FIT_SHAPE_ELONGATED>, angle)},
           {"chi_square_one", chi_square_median(judged, 0)},
@@ -206,7 +207,8 @@ std::vector<DippedPad> dipped_pads(const Options &options) {
     kind.dip_percent = DIP_PERCENT;
     kind.relaxation_percent = i % 2 == 0 ? 0.0 : 17.5;
     kind.misplaced_mm = i % 2 == 0 ? 0.0 : 0.1;
-    const Calibrated session = calibrated_session(feet, kind, Random(options.seed, stream, i).next());
+    const std::uint64_t seed = Random(options.seed, stream, i).next();
+    const Calibrated session = calibrated_session(feet, kind, seed);
     pads[i] = {calibrated_pad(session), session.shape};
   });
   return pads;
@@ -245,9 +247,9 @@ Readings base_of(const fit_array &array, const shear::Object &object,
   const double pitch_mm = static_cast<double>(array.pitch_mm);
   for (const Touch &touch : touches) {
     const double load_N = load * touch.force_N;
-    const twin::TractionTable::Load pull{touch.force_N,
-                                         twin::stuck_force_N(touch.force_N, load_N, FRICTION),
-                                         load_N * std::cos(direction), load_N * std::sin(direction)};
+    const twin::TractionTable::Load pull{
+        touch.force_N, twin::stuck_force_N(touch.force_N, load_N, FRICTION),
+        load_N * std::cos(direction), load_N * std::sin(direction)};
     const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);
     for (std::size_t k = 0; k < SENSORS; k++) {
       const double dx = pitch_mm * static_cast<double>(array.x[k]) - touch.x_mm;
@@ -331,7 +333,8 @@ ordered_json judge(const Options &options) {
   for (const int apart_mm : {8, 10, 12}) {
     const std::string name = "two, " + std::to_string(apart_mm) + " mm, 1:1, ";
     cases.push_back({name + "exact gains", ball, double(apart_mm), 1.0, 0.0, true});
-    cases.push_back({name + "along the pad", ball, double(apart_mm), 1.0, 0.0, false, Towards::along});
+    cases.push_back(
+        {name + "along the pad", ball, double(apart_mm), 1.0, 0.0, false, Towards::along});
     cases.push_back(
         {name + "across the pad", ball, double(apart_mm), 1.0, 0.0, false, Towards::across});
   }
